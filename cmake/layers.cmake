@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# How a layer is built: r4_portable_layer(NAME FILES...) and r4_host_layer(NAME FILES...).
+# Each makes an OBJECT library; cmake/library.cmake joins their objects into libr4link.a.
+
+# Our warnings, for our own targets only. Asio, CLI11 and the like are system headers.
+function(r4_warnings target)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow
+                         $<$<BOOL:${R4_WERROR}>:-Werror>)
+endfunction()
+
+# Host code: C++20, the tree's root on the include path ("protocol/crc32.hpp").
+function(r4_host_code target)
+  r4_warnings(${target})
+  target_compile_features(${target} PRIVATE cxx_std_20)
+  set_target_properties(${target} PROPERTIES CXX_STANDARD 20 CXX_EXTENSIONS OFF)
+  target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR})
+endfunction()
+
+function(r4_layer target)
+  if(NOT ARGN)
+    return()
+  endif()
+  add_library(${target} OBJECT ${ARGN})
+  r4_warnings(${target})
+  set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  set_property(GLOBAL APPEND PROPERTY R4_LAYERS ${target})
+endfunction()
+
+# What also compiles for the board: C++14 as GCC 7 has it, no exceptions, no RTTI.
+function(r4_portable_layer target)
+  r4_layer(${target} ${ARGN})
+  if(TARGET ${target})
+    set_target_properties(${target} PROPERTIES CXX_STANDARD 14 CXX_STANDARD_REQUIRED ON
+                          CXX_EXTENSIONS ON)
+    target_compile_options(${target} PRIVATE -fno-exceptions -fno-rtti)
+  endif()
+endfunction()
+
+# What only a computer runs: C++20 on standalone Asio.
+function(r4_host_layer target)
+  r4_layer(${target} ${ARGN})
+  if(TARGET ${target})
+    set_target_properties(${target} PROPERTIES CXX_STANDARD 20 CXX_STANDARD_REQUIRED ON
+                          CXX_EXTENSIONS OFF)
+    target_link_libraries(${target} PRIVATE r4_asio Threads::Threads)
+  endif()
+endfunction()
+
+# Asio without Boost, its code compiled once (transports/asio.cpp).
+add_library(r4_asio INTERFACE)
+target_compile_definitions(r4_asio INTERFACE ASIO_STANDALONE ASIO_SEPARATE_COMPILATION
+                           ASIO_NO_DEPRECATED)
