@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The board's end of the link: who controls the board, whether that host is alive, and which of its
+// commands may be executed (paper section 4.3; docs/protocol.md "The link", docs/safety.md).
+//
+//                    host heartbeat                     timeout, or owner's transport lost
+//     CONNECTING ------------------------> ACTIVE ------------------------------------------+
+//         (boot)                             ^                                              v
+//                                            +------------------------------------------- LOST
+//                                                fresh host heartbeat
+//
+// Two kinds of host. An *echo host* numbers from the upper half (PNum >= 2^31) and so declares that
+// the T of its heartbeats echoes the T of the board's newest heartbeat: only a fresh echo feeds, and
+// commands are executed only after the first echo of a T of this boot (armed), so that nothing which a
+// network held back, from before a reboot or an outage, can move a motor. A *paper host* numbers from
+// below (or leaves PNum out); its T is an echo if it once was one, else its own clock.
+//
+// All times are the board's clock in ms, which wraps; it must start at a random value at boot.
+#pragma once
+
+#include <cstdint>
+
+#include "packet_tracker.hpp"
+#include "refusal.hpp"
+
+namespace r4 {
+
+// Where a datagram came from and where its answer goes: a port of the board and, on it, a peer.
+struct Source {
+  std::uint8_t port = 0;
+  std::uint32_t peer = 0;
+  friend bool operator==(Source a, Source b) { return a.port == b.port && a.peer == b.peer; }
+  friend bool operator!=(Source a, Source b) { return !(a == b); }
+};
+
+enum class BoardLinkState : std::uint8_t { connecting, active, lost };
+
+constexpr std::uint32_t echo_host_first_pnum = 0x80000000U;
+
+// What a host's heartbeat did.
+enum class HeartbeatEffect : std::uint8_t {
+  fed,          // the owner is alive
+  resumed,      // LOST -> ACTIVE, the same session goes on
+  new_session,  // the sender controls the board now; nothing of an earlier host may be restored
+  stale,        // an old echo, or overtaken by a newer heartbeat: no effect
+  busy,         // another host controls the board
+};
+
+// What to do with a command.
+enum class Admission : std::uint8_t {
+  execute,
+  refuse,  // answer with the code
+  drop,    // count it, no answer: the session is not armed yet
+};
+
+class BoardLink {
+ public:
+  struct Timing {
+    std::uint32_t heartbeat_ms = 500;
+    std::uint32_t timeout_ms = 1000;
+  };
+
+  explicit BoardLink(Timing timing) : timing_(timing) {}
+  void set_timing(Timing timing) { timing_ = timing; }
+
+  // A host heartbeat. `pnum` and `t` count only where `has_…` says so.
+  struct HostHeartbeat {
+    Source from;
+    bool has_pnum = false;
+    std::uint32_t pnum = 0;
+    bool has_time = false;
+    std::uint64_t t = 0;
+  };
+  HeartbeatEffect on_heartbeat(const HostHeartbeat& heartbeat, std::uint32_t now_ms);
+
+  // May this command be executed? On `refuse`, `code` is stale, duplicate, safe or busy. The gate does
+  // not move until executed() is called, so a command that is refused for its content stays unexecuted.
+  Admission admit(Source from, std::uint32_t pnum, std::uint32_t now_ms, Refusal& code) const;
+  // The owner's command with this number was carried out: it and all older ones are spent.
+  void executed(std::uint32_t pnum);
+
+  // Lets time pass. True once, when the owner has been silent for the timeout: ACTIVE -> LOST.
+  bool poll(std::uint32_t now_ms);
+  // The transport under `port` is gone. True if that was the owner's: ACTIVE -> LOST.
+  bool port_lost(std::uint8_t port, std::uint32_t now_ms);
+
+  // The board's own heartbeats: is one due, and tell when one was sent (its T). Besides the regular
+  // ones, an echo that stays away is asked for again every echo_retry_ms; entering ACTIVE and LOST
+  // each send one at once.
+  bool heartbeat_due(std::uint32_t now_ms) const;
+  void heartbeat_sent(std::uint32_t t_ms);
+
+  // Milliseconds until poll() or heartbeat_due() may have something to say; 0 is now.
+  std::uint32_t due_in(std::uint32_t now_ms) const;
+
+  BoardLinkState state() const { return state_; }
+  bool has_owner() const { return state_ == BoardLinkState::active; }
+  Source owner() const { return owner_; }
+  // The number of the last command executed in this session (the CMD field); 0 before the first.
+  std::uint32_t last_executed() const { return last_executed_; }
+
+  static constexpr std::uint32_t echo_retry_ms = 100;
+  // A command that a heartbeat overtook this long ago is stale.
+  static constexpr std::uint32_t late_limit_ms = 250;
+  // How far ahead of the newest known number a command may be.
+  static constexpr std::uint32_t command_window = 65536;
+
+ private:
+  enum class Clock : std::uint8_t { unknown, echo, own };  // what a paper host's T turned out to be
+  enum class Freshness : std::uint8_t { fresh, stale, no_echo };
+
+  Freshness judge(const HostHeartbeat& heartbeat, bool echo_host, std::uint32_t now_ms) const;
+  bool sent_at(std::uint32_t t_ms) const;
+  bool continues(const HostHeartbeat& heartbeat) const;
+  HeartbeatEffect begin_session(const HostHeartbeat& heartbeat, bool armed, std::uint32_t now_ms);
+  void feed(const HostHeartbeat& heartbeat, std::uint32_t now_ms);
+  void lose(std::uint32_t now_ms);
+  void spend(std::uint32_t pnum);
+
+  Timing timing_;
+  BoardLinkState state_ = BoardLinkState::connecting;
+
+  // The session: kept while LOST, so that the same host can resume it.
+  bool has_session_ = false;
+  Source owner_;
+  bool echo_host_ = false;
+  bool armed_ = false;
+  Clock clock_ = Clock::unknown;
+  bool has_baseline_ = false;         // numbers up to newest_ are spent
+  std::uint32_t newest_ = 0;          // newest executed command, or the session's first heartbeat
+  std::uint64_t executed_bits_ = 0;   // bit i: newest_ - i was executed
+  std::uint32_t last_executed_ = 0;
+  bool has_heartbeat_pnum_ = false;
+  std::uint32_t newest_heartbeat_ = 0;
+  std::uint32_t newest_echo_ms_ = 0;
+  std::uint32_t fed_ms_ = 0;
+
+  // Heartbeat numbers with their arrival, for late_limit_ms: a ring as long as the limit at 10 Hz needs.
+  struct Mark {
+    std::uint32_t pnum;
+    std::uint32_t at_ms;
+  };
+  static constexpr int mark_count = 4;
+  Mark marks_[mark_count] = {};
+  int marks_used_ = 0;
+
+  // The board's own heartbeats, to recognise a paper host's echoes.
+  static constexpr int sent_count = 64;
+  std::uint32_t sent_[sent_count] = {};
+  int sent_used_ = 0;
+  int sent_next_ = 0;
+  bool any_sent_ = false;
+  std::uint32_t last_sent_ms_ = 0;
+  std::uint32_t lost_ms_ = 0;      // when LOST was entered
+  bool send_now_ = true;           // boot, ACTIVE and LOST entered
+};
+
+}  // namespace r4

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A datagram as it is on the wire, checked and read in place (paper section 4; docs/protocol.md).
+//
+//     datagram = 1*field "^0x" 1*8HEXDIG "^" [CR] [LF]
+//     field    = name ":" value *("," value) ";"
+//     name     = 1*(%x21-7E except ":" ";" "," "^")
+//     value    = *(%x20-7E except ";" "," "^")
+//
+// read() accepts a datagram whole or not at all. What it accepts is a view: it holds no copy and is
+// valid as long as the bytes are. Reading costs no heap and one pass over the bytes besides the CRC.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "text.hpp"
+
+namespace r4 {
+
+// The longest datagram, terminator not counted (docs/protocol.md).
+constexpr std::size_t max_datagram = 1024;
+
+enum class ReadError : std::uint8_t {
+  none,
+  length,  // empty, or longer than max_datagram
+  syntax,  // not of the grammar above
+  crc,     // the checksum does not match
+};
+
+// "length", "syntax", "crc"; "" for none.
+const char* to_text(ReadError error);
+
+// The outcome of reading: where it went wrong (a byte offset) and, for crc, both checksums.
+struct ReadResult {
+  ReadError error = ReadError::none;
+  std::size_t position = 0;
+  std::uint32_t crc_expected = 0;  // of the bytes that are there
+  std::uint32_t crc_found = 0;     // what the datagram claims
+  explicit operator bool() const { return error == ReadError::none; }
+};
+
+// One field: its name and its comma-separated values.
+class Field {
+ public:
+  Field() = default;
+  Field(Text name, Text values) : name_(name), values_(values) {}
+  Text name() const { return name_; }
+  Text values() const { return values_; }     // all, commas included
+  std::size_t count() const;                  // number of values, at least 1
+  // Splits the first `max` values into `out`; returns count(), which may be larger than `max`.
+  std::size_t split(Text* out, std::size_t max) const;
+
+ private:
+  Text name_;
+  Text values_;
+};
+
+class Datagram {
+ public:
+  // Forward iteration over the fields in the order of the wire.
+  class Iterator {
+   public:
+    Iterator(const char* at, const char* end) : at_(at), end_(end) { advance(); }
+    const Field& operator*() const { return field_; }
+    const Field* operator->() const { return &field_; }
+    Iterator& operator++() {
+      at_ = next_;
+      advance();
+      return *this;
+    }
+    friend bool operator==(const Iterator& a, const Iterator& b) { return a.at_ == b.at_; }
+    friend bool operator!=(const Iterator& a, const Iterator& b) { return a.at_ != b.at_; }
+
+   private:
+    void advance();
+    const char* at_;
+    const char* end_;
+    const char* next_ = nullptr;
+    Field field_;
+  };
+
+  Iterator begin() const { return Iterator(fields_.begin(), fields_.end()); }
+  Iterator end() const { return Iterator(fields_.end(), fields_.end()); }
+
+  // The datagram's bytes without the line terminator.
+  Text bytes() const { return bytes_; }
+  // The first field of that name; a Field with an empty name if there is none.
+  Field find(Text name) const;
+
+  // PNum and T, where the datagram has them as whole numbers. A host heartbeat may lack PNum.
+  bool has_pnum() const { return has_pnum_; }
+  std::uint32_t pnum() const { return pnum_; }
+  bool has_time() const { return has_time_; }
+  std::uint64_t time_ms() const { return time_ms_; }
+
+ private:
+  friend ReadResult read(Text bytes, Datagram& out);
+  Text bytes_;
+  Text fields_;
+  std::uint64_t time_ms_ = 0;
+  std::uint32_t pnum_ = 0;
+  bool has_pnum_ = false;
+  bool has_time_ = false;
+};
+
+// Checks `bytes` (one datagram, with or without its line terminator) and makes `out` a view of it.
+// Never fails but by its result; `out` is only written on success. A PNum or T that is not a whole
+// number in range (32 bit, 64 bit), or is there twice, is `syntax`. Linear in the size.
+ReadResult read(Text bytes, Datagram& out);
+
+}  // namespace r4

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Writes one datagram into a buffer that the caller owns.
+//
+//     char buffer[max_datagram];
+//     DatagramWriter w(buffer, sizeof buffer);
+//     w.field("O").value(358).value(1).value(1);
+//     Text datagram = w.finish(pnum, t_ms);   // "O:358,1,1;PNum:66;T:79146;^0x…^"
+//
+// What does not fit is refused as a whole: finish() returns an empty Text. Names and texts with bytes
+// that the grammar does not allow (datagram.hpp) refuse it too, so no writer can forge a field.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "text.hpp"
+
+namespace r4 {
+
+class DatagramWriter {
+ public:
+  DatagramWriter(char* buffer, std::size_t capacity)
+      : begin_(buffer), at_(buffer), end_(buffer + capacity) {}
+
+  DatagramWriter& field(Text name);
+  DatagramWriter& value(Text text);
+  DatagramWriter& value(std::uint32_t number);
+  DatagramWriter& value(std::int32_t number);
+  DatagramWriter& value(std::uint64_t number);
+  DatagramWriter& hundredths(std::int32_t value);  // 2428 is written 24.28
+  // A text that may hold commas: "ROS2-R4", "a,b". Copied as it is.
+  DatagramWriter& values(Text text);
+
+  // Bytes written so far, and whether all of them did fit and were allowed.
+  std::size_t size() const { return static_cast<std::size_t>(at_ - begin_); }
+  bool ok() const { return ok_; }
+
+  // Takes everything after `size` back (a field that turned out too long for a split datagram).
+  void truncate(std::size_t size);
+
+  // Closes with PNum, T and the CRC. An empty Text if anything did not fit.
+  Text finish(std::uint32_t pnum, std::uint64_t t_ms);
+  // Closes with the CRC alone: the fields, PNum and T among them, are as the caller wrote them.
+  Text finish();
+
+  // Room that finish(pnum, t) needs at most: ";PNum:4294967295;T:18446744073709551615;^0xffffffff^".
+  static constexpr std::size_t trailer_max = 54;
+
+ private:
+  bool reserve(std::size_t bytes);
+  void separator();
+  char* begin_;
+  char* at_;
+  char* end_;
+  bool ok_ = true;
+  bool open_ = false;       // a field is being written
+  bool has_value_ = false;  // it has a value already
+};
+
+}  // namespace r4

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The board's state as typed values, and the fields that carry it (paper section 4.1).
+//
+// One table (state.cpp) names every field, its unit and where it lives in State; the board writes with
+// it, the host reads with it, the `F` command selects from it.
+#pragma once
+
+#include <cstdint>
+
+#include "datagram.hpp"
+#include "datagram_writer.hpp"
+#include "units.hpp"
+
+namespace r4 {
+
+// Every state field, in the order in which the board sends them. The first ten are the paper's
+// default set.
+enum class StateField : std::uint8_t {
+  ain24, ain12, ain5, aindmh,  // volts, two decimals
+  dmhsta,                      // 1: the dead-man's handle is held, 0: released
+  ainsteer,                    // volts
+  dhb1a,                       // pwm,direction
+  osmc1,                       // pwm,direction
+  step1pos,                    // steps
+  servo1pos,                   // microseconds
+  ain6,
+  dhb1b, dhb2a, dhb2b,
+  osmc2, osmc3, osmc4,
+  step2pos, step3pos, step4pos,
+  servo2pos, servo3pos, servo4pos, servo5pos, servo6pos, servo7pos, servo8pos, servo9pos,
+  servo10pos, servo11pos, servo12pos, servo13pos, servo14pos, servo15pos, servo16pos,
+  enc1, enc2, enc3, enc4,      // counts
+  us1, us2, us3, us4,          // centimetres; 0: no echo
+  bldc1, bldc2, bldc3, bldc4,  // speed,direction,brake
+  relays,                      // bit n-1 is relay n, 0-255
+  safe,                        // SafeReason
+  cmd,                         // PNum of the last command executed
+  rxok,                        // datagrams accepted since boot
+  rxcrc,                       // dropped: bad checksum, syntax or length
+  rxlost,                      // gaps in the host's packet numbers
+  rxdup,                       // received again
+  rxref,                       // commands refused
+  late,                        // state periods that the board's loop missed
+  count
+};
+constexpr int state_field_count = static_cast<int>(StateField::count);
+
+// A set of state fields: the preamble's selection, or what a datagram brought.
+class FieldSet {
+ public:
+  constexpr FieldSet() = default;
+  constexpr bool has(StateField f) const { return (bits_ >> static_cast<int>(f)) & 1U; }
+  void add(StateField f) { bits_ |= std::uint64_t{1} << static_cast<int>(f); }
+  void remove(StateField f) { bits_ &= ~(std::uint64_t{1} << static_cast<int>(f)); }
+  void add(FieldSet other) { bits_ |= other.bits_; }
+  constexpr bool empty() const { return bits_ == 0; }
+  friend bool operator==(FieldSet a, FieldSet b) { return a.bits_ == b.bits_; }
+  friend bool operator!=(FieldSet a, FieldSet b) { return a.bits_ != b.bits_; }
+
+  static FieldSet paper_default();  // AIN24 … SERVO1POS
+  static FieldSet all();
+
+ private:
+  std::uint64_t bits_ = 0;
+};
+
+// The board's analog inputs in the paper's order; values in hundredths of a volt.
+enum class Analog : std::uint8_t { ain24, ain12, ain5, aindmh, ainsteer, ain6, count };
+constexpr int analog_channels = static_cast<int>(Analog::count);
+
+// What the board reports. On the host, `present` tells which members the datagram carried; the others
+// keep the value of earlier datagrams. Channel n of the board is element n-1.
+struct State {
+  FieldSet present;
+  std::uint32_t pnum = 0;
+  std::uint32_t t_ms = 0;  // the board's clock; wraps
+  std::int32_t analog_cv[analog_channels] = {};  // hundredths of a volt
+  bool handle_held = false;
+  Drive dhb12[dhb12_channels];
+  Drive osmc[osmc_channels];
+  std::int32_t stepper_steps[stepper_channels] = {};
+  std::uint16_t servo_us[servo_channels] = {};
+  std::int32_t encoder_counts[encoder_channels] = {};
+  std::uint16_t ultrasonic_cm[ultrasonic_channels] = {};
+  Bldc bldc[bldc_channels];
+  std::uint8_t relays = 0;
+  SafeReason safe = SafeReason::none;
+  std::uint32_t last_command = 0;  // CMD
+  std::uint32_t rx_ok = 0;
+  std::uint32_t rx_crc = 0;
+  std::uint32_t rx_lost = 0;
+  std::uint32_t rx_duplicate = 0;
+  std::uint32_t rx_refused = 0;
+  std::uint32_t late = 0;
+};
+
+// The field's name on the wire, "AIN24".
+Text name_of(StateField field);
+// The field of that name; StateField::count if there is none. Constant time.
+StateField state_field(Text name);
+
+// Appends one field with its values from `state`.
+void write_field(DatagramWriter& writer, StateField field, const State& state);
+
+// Reads the state fields of `datagram` into `state` and sets `present`, `pnum` and `t_ms`. Unknown
+// fields are passed over (they stay reachable through the datagram). Returns false, with `state`
+// untouched, when a known field has values that are not of its form or range, or stands twice.
+bool read_state(const Datagram& datagram, State& state);
+
+}  // namespace r4

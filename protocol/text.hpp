@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A view of characters that somebody else owns: the portable core's string_view (C++14 has none).
+//
+// A Text never owns, never ends in NUL and may hold any byte. It is valid as long as the buffer that
+// it points into.
+#pragma once
+
+#include <cstddef>
+#include <cstring>
+
+namespace r4 {
+
+class Text {
+ public:
+  constexpr Text() = default;
+  constexpr Text(const char* data, std::size_t size) : data_(data), size_(size) {}
+  // A string literal, without its NUL.
+  template <std::size_t N>
+  constexpr Text(const char (&literal)[N]) : data_(literal), size_(N - 1) {}
+  // Anything contiguous with data() and size(): std::string, std::string_view on the host.
+  template <class Container, class = decltype(static_cast<const char*>(
+                                 static_cast<const Container*>(nullptr)->data()))>
+  constexpr Text(const Container& c) : data_(c.data()), size_(c.size()) {}
+
+  constexpr const char* data() const { return data_; }
+  constexpr std::size_t size() const { return size_; }
+  constexpr bool empty() const { return size_ == 0; }
+  constexpr const char* begin() const { return data_; }
+  constexpr const char* end() const { return data_ + size_; }
+  constexpr char operator[](std::size_t i) const { return data_[i]; }
+  // From `from` to the end, or `count` characters of it; `from` must be at most size().
+  constexpr Text substr(std::size_t from, std::size_t count = ~std::size_t{0}) const {
+    return Text(data_ + from, count < size_ - from ? count : size_ - from);
+  }
+
+  friend bool operator==(Text a, Text b) {
+    return a.size_ == b.size_ && (a.size_ == 0 || std::memcmp(a.data_, b.data_, a.size_) == 0);
+  }
+  friend bool operator!=(Text a, Text b) { return !(a == b); }
+
+ private:
+  const char* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+}  // namespace r4
