@@ -2,6 +2,12 @@
 # How a layer is built: r4_portable_layer(NAME FILES...) and r4_host_layer(NAME FILES...).
 # Each makes an OBJECT library; cmake/library.cmake joins their objects into libr4link.a.
 
+# Asio without Boost, its code compiled once (transports/asio.cpp). Whether Asio finds
+# std::aligned_alloc depends on what was included before it: unless that is switched off, objects
+# disagree on how handler memory is freed. Whoever includes Asio beside r4link needs all of these.
+set(R4_ASIO_DEFINITIONS ASIO_STANDALONE ASIO_SEPARATE_COMPILATION ASIO_NO_DEPRECATED
+    ASIO_DISABLE_STD_ALIGNED_ALLOC)
+
 # Our warnings, for our own targets only. Asio, CLI11 and the like are system headers.
 function(r4_warnings target)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow
@@ -42,11 +48,7 @@ function(r4_host_layer target)
   if(TARGET ${target})
     set_target_properties(${target} PROPERTIES CXX_STANDARD 20 CXX_STANDARD_REQUIRED ON
                           CXX_EXTENSIONS OFF)
-    target_link_libraries(${target} PRIVATE r4_asio Threads::Threads)
+    target_compile_definitions(${target} PRIVATE ${R4_ASIO_DEFINITIONS})
+    target_link_libraries(${target} PRIVATE Threads::Threads)
   endif()
 endfunction()
-
-# Asio without Boost, its code compiled once (transports/asio.cpp).
-add_library(r4_asio INTERFACE)
-target_compile_definitions(r4_asio INTERFACE ASIO_STANDALONE ASIO_SEPARATE_COMPILATION
-                           ASIO_NO_DEPRECATED)
