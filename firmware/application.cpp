@@ -1,0 +1,399 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "application.hpp"
+
+namespace r4 {
+namespace firmware {
+
+namespace {
+
+// The answers are short; a buffer for one of them.
+constexpr std::size_t answer_size = 256;
+
+BoardLink::Timing timing_of(const Settings& settings) {
+  BoardLink::Timing timing;
+  timing.heartbeat_ms = settings.heartbeat_ms;
+  timing.timeout_ms = settings.timeout_ms;
+  return timing;
+}
+
+std::uint32_t period_of(const Settings& settings) { return 1000U / settings.state_rate_hz; }
+
+}  // namespace
+
+const char* to_text(BoardState state) {
+  switch (state) {
+    case BoardState::connecting: return "CONNECTING";
+    case BoardState::active: return "ACTIVE";
+    case BoardState::safe: return "SAFE";
+  }
+  return "unknown";
+}
+
+Application::Application(Hal& hal, const Config& config, Observer* observer)
+    : hal_(hal),
+      observer_(observer),
+      identity_(config.identity),
+      link_(timing_of(config.settings)) {
+  setpoints_.settings = config.settings;
+}
+
+std::uint8_t Application::add_port(Port& port) {
+  ports_[port_count_].port = &port;
+  return port_count_++;
+}
+
+void Application::start(std::uint32_t now_ms) {
+  hal_.make_safe();
+  if (observer_ != nullptr) {
+    observer_->on_state(now_ms, BoardState::connecting, SafeReason::none);
+    observer_->on_outputs(now_ms, outputs_);
+  }
+  poll(now_ms);
+}
+
+BoardState Application::state() const {
+  if (link_.state() == BoardLinkState::connecting) return BoardState::connecting;
+  return safety_.is_safe() ? BoardState::safe : BoardState::active;
+}
+
+// --- what comes in
+
+void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std::uint32_t now_ms) {
+  if (link_.poll(now_ms)) enter(SafeReason::link, now_ms);  // silence counts before what ends it
+  Datagram datagram;
+  if (!read(bytes, datagram)) {
+    ++rx_bad_;
+    return;
+  }
+  ++rx_ok_;
+  Source from;
+  from.port = port;
+  from.peer = peer;
+  if (link_.has_owner() && from == link_.owner() && datagram.has_pnum()) {
+    tracker_.on(datagram.pnum());
+  }
+  switch (kind_of(datagram)) {
+    case MessageKind::host_heartbeat:
+      on_host_heartbeat(from, datagram, now_ms);
+      break;
+    case MessageKind::command:
+      on_command(from, datagram, now_ms);
+      break;
+    case MessageKind::board_heartbeat:
+    case MessageKind::nack:
+    case MessageKind::identity:
+    case MessageKind::state:
+      break;  // another board's talk
+  }
+}
+
+void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::uint32_t now_ms) {
+  BoardLink::HostHeartbeat heartbeat;
+  heartbeat.from = from;
+  heartbeat.has_pnum = datagram.has_pnum();
+  heartbeat.pnum = datagram.pnum();
+  heartbeat.has_time = datagram.has_time();
+  heartbeat.t = datagram.time_ms();
+  switch (link_.on_heartbeat(heartbeat, now_ms)) {
+    case HeartbeatEffect::fed:
+      break;
+    case HeartbeatEffect::new_session:
+      // Nothing that another host, or this one before its restart, commanded may come back.
+      setpoints_.outputs = Outputs();
+      setpoints_.fields = FieldSet::paper_default();
+      update_outputs(now_ms);
+      safety_.leave(SafeReason::link);
+      tracker_.restart();
+      if (heartbeat.has_pnum) tracker_.on(heartbeat.pnum);
+      schedule_.start(now_ms, period_of(setpoints_.settings));
+      break;
+    case HeartbeatEffect::resumed:
+      if (setpoints_.settings.recovery == Recovery::rearm) setpoints_.outputs = Outputs();
+      safety_.leave(SafeReason::link);
+      schedule_.start(now_ms, period_of(setpoints_.settings));
+      break;
+    case HeartbeatEffect::stale:
+      // A host that has heard nothing yet needs a heartbeat of ours to echo.
+      if (heartbeat.has_time && heartbeat.t == 0) {
+        send_heartbeat(from.port, from.peer, false, now_ms);
+        link_.heartbeat_sent(now_ms);
+      }
+      break;
+    case HeartbeatEffect::busy:
+      refuse(from, datagram, Refusal::busy, now_ms);
+      break;
+  }
+  poll(now_ms);
+}
+
+void Application::on_command(Source from, const Datagram& datagram, std::uint32_t now_ms) {
+  int count = 0;
+  const Field field = command_field(datagram, count);
+  Command command;
+  const Refusal refusal = count == 1 ? parse_command(field, command) : Refusal::format;
+  if (refusal == Refusal::none && command.kind == CommandKind::stop) {
+    emergency_stop(from, datagram, now_ms);
+    return;
+  }
+  if (refusal == Refusal::none && command.kind == CommandKind::identify) {
+    identify(from, now_ms);
+    return;
+  }
+  if (!datagram.has_pnum()) {  // nothing to execute it once by, and nothing to answer to
+    ++rx_refused_;
+    return;
+  }
+  if (refusal != Refusal::none) {
+    refuse(from, datagram, refusal, now_ms);
+    return;
+  }
+  Refusal code = Refusal::none;
+  switch (link_.admit(from, datagram.pnum(), now_ms, code)) {
+    case Admission::refuse:
+      refuse(from, datagram, code, now_ms);
+      return;
+    case Admission::drop:
+      ++rx_refused_;
+      return;
+    case Admission::execute:
+      break;
+  }
+  if (drives_output(command.kind) && safety_.is_safe()) {
+    refuse(from, datagram, Refusal::safe, now_ms);
+    return;
+  }
+  const Refusal outcome = carry_out(command, setpoints_);
+  if (outcome != Refusal::none) {
+    refuse(from, datagram, outcome, now_ms);
+    return;
+  }
+  execute(datagram.pnum(), command, now_ms);
+}
+
+// The command has changed the setpoints; the rest of its effect.
+void Application::execute(std::uint32_t pnum, const Command& command, std::uint32_t now_ms) {
+  link_.executed(pnum);
+  switch (command.kind) {
+    case CommandKind::zero:
+      hal_.zero(command.channel);
+      break;
+    case CommandKind::clear:
+      safety_.clear();
+      break;
+    case CommandKind::setting:
+      link_.set_timing(timing_of(setpoints_.settings));
+      schedule_.set_period(period_of(setpoints_.settings));
+      break;
+    default:
+      break;
+  }
+  if (observer_ != nullptr) observer_->on_executed(now_ms, pnum, command);
+  check_interlocks(now_ms);
+  update_outputs(now_ms);
+  report_state(now_ms);
+}
+
+void Application::emergency_stop(Source from, const Datagram& datagram, std::uint32_t now_ms) {
+  enter(SafeReason::stop, now_ms);
+  const bool owner = link_.has_owner() && from == link_.owner();
+  if (owner && datagram.has_pnum()) {
+    Refusal code = Refusal::none;
+    if (link_.admit(from, datagram.pnum(), now_ms, code) == Admission::execute) {
+      link_.executed(datagram.pnum());
+    }
+  }
+  if (observer_ != nullptr) observer_->on_executed(now_ms, datagram.pnum(), Command::stop());
+  send_heartbeats(now_ms);
+  if (!owner) send_heartbeat(from.port, from.peer, link_.has_owner(), now_ms);
+}
+
+void Application::identify(Source to, std::uint32_t now_ms) {
+  char buffer[answer_size];
+  DatagramWriter writer(buffer, sizeof buffer);
+  write_identity(writer, identity_);
+  const Text answer = writer.finish(number_for(to)++, now_ms);
+  ports_[to.port].port->send(answer, Urgency::normal, to.peer);
+}
+
+void Application::refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms) {
+  ++rx_refused_;
+  if (!datagram.has_pnum()) return;
+  if (observer_ != nullptr) observer_->on_refused(now_ms, datagram.pnum(), code);
+  Nack nack;
+  nack.pnum = datagram.pnum();
+  nack.code = code;
+  char buffer[answer_size];
+  DatagramWriter writer(buffer, sizeof buffer);
+  write_nack(writer, nack);
+  const Text answer = writer.finish(number_for(to)++, now_ms);
+  ports_[to.port].port->send(answer, Urgency::normal, to.peer);
+}
+
+void Application::port_down(std::uint8_t port, std::uint32_t now_ms) {
+  if (link_.port_lost(port, now_ms)) enter(SafeReason::link, now_ms);
+}
+
+void Application::fail(SafeReason cause, std::uint32_t now_ms) { enter(cause, now_ms); }
+
+// --- safety
+
+void Application::enter(SafeReason cause, std::uint32_t now_ms) {
+  if (!safety_.enter(cause)) return;
+  if (cause == SafeReason::link) {
+    schedule_.stop();
+  } else {
+    setpoints_.outputs = Outputs();
+  }
+  update_outputs(now_ms);
+  report_state(now_ms);
+}
+
+bool Application::obstacle() const {
+  for (int i = 0; i < ultrasonic_channels; ++i) {
+    const int threshold = setpoints_.proximity_cm[i];
+    const int margin = safety_.has(SafeReason::proximity) ? proximity_hysteresis_cm : 0;
+    const int distance = inputs_.ultrasonic_cm[i];
+    if (threshold != 0 && distance != 0 && distance < threshold + margin) return true;
+  }
+  return false;
+}
+
+void Application::check_interlocks(std::uint32_t now_ms) {
+  hal_.sample(inputs_);
+  if (!inputs_.handle_held) {
+    enter(SafeReason::handle, now_ms);
+  } else {
+    safety_.leave(SafeReason::handle);
+  }
+  if (obstacle()) {
+    enter(SafeReason::proximity, now_ms);
+  } else {
+    safety_.leave(SafeReason::proximity);
+  }
+}
+
+// The one place where outputs change: safe unless the board is ACTIVE, else the setpoints.
+void Application::update_outputs(std::uint32_t now_ms) {
+  const bool live = state() == BoardState::active;
+  if (!live) {
+    if (!outputs_live_) return;
+    hal_.make_safe();
+    outputs_ = Outputs();
+  } else {
+    if (outputs_live_ && outputs_ == setpoints_.outputs) return;
+    outputs_ = setpoints_.outputs;
+    hal_.apply(outputs_);
+  }
+  outputs_live_ = live;
+  if (observer_ != nullptr) observer_->on_outputs(now_ms, outputs_);
+}
+
+void Application::report_state(std::uint32_t now_ms) {
+  const BoardState state_now = state();
+  const SafeReason reason_now = safety_.reason();
+  if (state_now == reported_state_ && reason_now == reported_reason_) return;
+  reported_state_ = state_now;
+  reported_reason_ = reason_now;
+  if (observer_ != nullptr) observer_->on_state(now_ms, state_now, reason_now);
+}
+
+// --- what goes out
+
+std::uint32_t Application::poll(std::uint32_t now_ms) {
+  if (link_.poll(now_ms)) enter(SafeReason::link, now_ms);
+  check_interlocks(now_ms);
+  update_outputs(now_ms);
+  report_state(now_ms);
+  send_states(now_ms);
+  if (link_.heartbeat_due(now_ms)) send_heartbeats(now_ms);
+
+  std::uint32_t due = link_.due_in(now_ms);
+  if (schedule_.running() && schedule_.due_in(now_ms) < due) due = schedule_.due_in(now_ms);
+  return due < interlock_period_ms ? due : interlock_period_ms;
+}
+
+// The controlling host where it is, else whoever the port streams to.
+std::uint32_t Application::audience(std::uint8_t port) const {
+  const bool owned = link_.has_owner() && link_.owner().port == port;
+  return owned ? link_.owner().peer : everyone;
+}
+
+std::uint32_t& Application::number_for(Source to) {
+  const bool aside = link_.has_owner() && to != link_.owner();
+  return aside ? ports_[to.port].aside_pnum : ports_[to.port].next_pnum;
+}
+
+void Application::send_heartbeats(std::uint32_t now_ms) {
+  for (std::uint8_t i = 0; i < port_count_; ++i) send_heartbeat(i, audience(i), false, now_ms);
+  link_.heartbeat_sent(now_ms);
+}
+
+void Application::send_heartbeat(std::uint8_t port, std::uint32_t peer, bool aside,
+                                 std::uint32_t now_ms) {
+  PortSlot& slot = ports_[port];
+  char buffer[answer_size];
+  Text heartbeat;
+  if (link_.state() == BoardLinkState::connecting) {
+    heartbeat = write_board_heartbeat(buffer, sizeof buffer, 0, 0, safety_.reason());
+    slot.next_pnum = 1;
+  } else {
+    std::uint32_t& pnum = aside ? slot.aside_pnum : slot.next_pnum;
+    heartbeat = write_board_heartbeat(buffer, sizeof buffer, pnum++, now_ms, safety_.reason());
+  }
+  slot.port->send(heartbeat, Urgency::normal, peer);
+}
+
+void Application::send_states(std::uint32_t now_ms) {
+  std::uint32_t t_ms = 0;
+  if (!schedule_.take(now_ms, t_ms)) return;
+  State state;
+  fill(state);
+  for (std::uint8_t i = 0; i < port_count_; ++i) send_state(i, state, t_ms);
+}
+
+// One state, in as many datagrams of the same T as the port's limit asks for.
+void Application::send_state(std::uint8_t port, const State& state, std::uint32_t t_ms) {
+  PortSlot& slot = ports_[port];
+  char buffer[max_datagram];
+  const std::size_t limit = slot.port->max_size() < sizeof buffer ? slot.port->max_size()
+                                                                  : sizeof buffer;
+  FieldSet fields = setpoints_.fields;
+  if (state.safe != SafeReason::none) fields.add(StateField::safe);
+  DatagramWriter writer(buffer, limit);
+  for (int i = 0; i < state_field_count; ++i) {
+    const StateField field = static_cast<StateField>(i);
+    if (!fields.has(field)) continue;
+    const std::size_t before = writer.size();
+    write_field(writer, field, state);
+    if (writer.ok() && writer.size() + DatagramWriter::trailer_max <= limit) continue;
+    writer.truncate(before);
+    slot.port->send(writer.finish(slot.next_pnum++, t_ms), Urgency::state, audience(port));
+    writer = DatagramWriter(buffer, limit);
+    write_field(writer, field, state);
+  }
+  slot.port->send(writer.finish(slot.next_pnum++, t_ms), Urgency::state, audience(port));
+}
+
+void Application::fill(State& state) const {
+  for (int i = 0; i < analog_channels; ++i) state.analog_cv[i] = inputs_.analog_cv[i];
+  state.handle_held = inputs_.handle_held;
+  for (int i = 0; i < dhb12_channels; ++i) state.dhb12[i] = outputs_.dhb12[i];
+  for (int i = 0; i < osmc_channels; ++i) state.osmc[i] = outputs_.osmc[i];
+  for (int i = 0; i < servo_channels; ++i) state.servo_us[i] = outputs_.servo_us[i];
+  for (int i = 0; i < bldc_channels; ++i) state.bldc[i] = outputs_.bldc[i];
+  state.relays = outputs_.relays;
+  for (int i = 0; i < stepper_channels; ++i) state.stepper_steps[i] = inputs_.stepper_steps[i];
+  for (int i = 0; i < encoder_channels; ++i) state.encoder_counts[i] = inputs_.encoder_counts[i];
+  for (int i = 0; i < ultrasonic_channels; ++i) state.ultrasonic_cm[i] = inputs_.ultrasonic_cm[i];
+  state.safe = safety_.reason();
+  state.last_command = link_.last_executed();
+  state.rx_ok = rx_ok_;
+  state.rx_crc = rx_bad_;
+  state.rx_lost = tracker_.counters().lost;
+  state.rx_duplicate = tracker_.counters().duplicate;
+  state.rx_refused = rx_refused_;
+  state.late = schedule_.late();
+}
+
+}  // namespace firmware
+}  // namespace r4

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The R4 board's application: datagrams in, outputs and datagrams out (paper sections 2-4).
+//
+// It owns no thread, clock or socket. The port feeds it: receive() for each datagram, poll() when time
+// has passed, port_down() when a transport is gone; it answers through Hal and Port. Every path to the
+// outputs goes through update_outputs(), every way into the safe state through Safety.
+//
+//     CONNECTING   no host yet: outputs safe, `H:R4-ROS2;PNum:0;T:0;` each heartbeat interval
+//     ACTIVE       a host is alive and nothing is wrong: outputs follow the setpoints
+//     SAFE         a cause of safety.hpp is there: outputs safe; with cause `link` heartbeats only
+//
+// Packet numbers count per port; answers to hosts that do not control the board count apart, so the
+// controlling host sees no gaps. All times are ms of the board's clock, which wraps.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "../protocol/board_link.hpp"
+#include "../protocol/message.hpp"
+#include "executor.hpp"
+#include "hal.hpp"
+#include "observer.hpp"
+#include "port.hpp"
+#include "safety.hpp"
+#include "state_schedule.hpp"
+
+namespace r4 {
+namespace firmware {
+
+class Application {
+ public:
+  struct Config {
+    Identity identity;  // the texts must outlive the application
+    Settings settings;
+  };
+  static constexpr int max_ports = 4;
+
+  Application(Hal& hal, const Config& config, Observer* observer = nullptr);
+
+  // Ports are added before start(); returns the port's number. At most max_ports.
+  std::uint8_t add_port(Port& port);
+  // Makes the outputs safe and sends the first heartbeat.
+  void start(std::uint32_t now_ms);
+
+  // A datagram from `peer` on `port`. Anything may be in it.
+  void receive(std::uint8_t port, std::uint32_t peer, Text bytes, std::uint32_t now_ms);
+  // The transport under `port` is gone.
+  void port_down(std::uint8_t port, std::uint32_t now_ms);
+  // Something is wrong with the board itself: cause is fault or watchdog.
+  void fail(SafeReason cause, std::uint32_t now_ms);
+  // Does everything that is due; returns the milliseconds until the next call is needed (at most 10).
+  std::uint32_t poll(std::uint32_t now_ms);
+
+  BoardState state() const;
+  SafeReason reason() const { return safety_.reason(); }
+  const Outputs& outputs() const { return outputs_; }  // as the hardware has them
+  const Settings& settings() const { return setpoints_.settings; }
+  const BoardLink& link() const { return link_; }
+
+  // poll() is wanted at least this often, for the interlocks.
+  static constexpr std::uint32_t interlock_period_ms = 10;
+  // A proximity cause leaves when the obstacle is this much beyond the threshold.
+  static constexpr int proximity_hysteresis_cm = 5;
+
+ private:
+  struct PortSlot {
+    Port* port = nullptr;
+    std::uint32_t next_pnum = 0;   // of the stream and of the controlling host's answers
+    std::uint32_t aside_pnum = 0;  // of answers to others
+  };
+
+  void on_host_heartbeat(Source from, const Datagram& datagram, std::uint32_t now_ms);
+  void on_command(Source from, const Datagram& datagram, std::uint32_t now_ms);
+  void execute(std::uint32_t pnum, const Command& command, std::uint32_t now_ms);
+  void emergency_stop(Source from, const Datagram& datagram, std::uint32_t now_ms);
+  void identify(Source to, std::uint32_t now_ms);
+  void refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms);
+
+  void enter(SafeReason cause, std::uint32_t now_ms);
+  void check_interlocks(std::uint32_t now_ms);
+  bool obstacle() const;
+  void update_outputs(std::uint32_t now_ms);
+  void report_state(std::uint32_t now_ms);
+
+  void send_heartbeats(std::uint32_t now_ms);
+  void send_heartbeat(std::uint8_t port, std::uint32_t peer, bool aside, std::uint32_t now_ms);
+  void send_states(std::uint32_t now_ms);
+  void send_state(std::uint8_t port, const State& state, std::uint32_t t_ms);
+  void fill(State& state) const;
+  std::uint32_t& number_for(Source to);
+  std::uint32_t audience(std::uint8_t port) const;
+
+  Hal& hal_;
+  Observer* observer_;
+  Identity identity_;
+  BoardLink link_;
+  Safety safety_;
+  StateSchedule schedule_;
+  Setpoints setpoints_;
+  Outputs outputs_;  // what the hardware was told last
+  Inputs inputs_;
+  PacketTracker tracker_;  // the controlling host's numbers
+  PortSlot ports_[max_ports];
+  std::uint8_t port_count_ = 0;
+  BoardState reported_state_ = BoardState::connecting;
+  SafeReason reported_reason_ = SafeReason::none;
+  bool outputs_live_ = false;  // outputs_ follow the setpoints
+  std::uint32_t rx_ok_ = 0;
+  std::uint32_t rx_bad_ = 0;
+  std::uint32_t rx_refused_ = 0;
+};
+
+}  // namespace firmware
+}  // namespace r4

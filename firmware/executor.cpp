@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "executor.hpp"
+
+namespace r4 {
+namespace firmware {
+
+namespace {
+
+void set_relay(std::uint8_t& relays, int channel, bool on) {
+  const unsigned bit = 1U << static_cast<unsigned>(channel - 1);
+  relays = static_cast<std::uint8_t>(on ? relays | bit : relays & ~bit);
+}
+
+}  // namespace
+
+Refusal carry_out(const Command& command, Setpoints& setpoints) {
+  const Refusal refusal = check(command);
+  if (refusal != Refusal::none) return refusal;
+  const int i = command.channel - 1;
+  const std::uint16_t value = static_cast<std::uint16_t>(command.value);
+  Outputs& outputs = setpoints.outputs;
+  switch (command.kind) {
+    case CommandKind::osmc:
+      outputs.osmc[i].pwm = value;
+      outputs.osmc[i].direction = command.direction;
+      break;
+    case CommandKind::dhb12:
+      outputs.dhb12[i].pwm = value;
+      outputs.dhb12[i].direction = command.direction;
+      break;
+    case CommandKind::servo:
+      outputs.servo_us[i] = value;
+      break;
+    case CommandKind::relay:
+      set_relay(outputs.relays, command.channel, command.on);
+      break;
+    case CommandKind::stepper:
+      outputs.stepper[i].position = command.value;
+      outputs.stepper[i].speed = command.speed;
+      outputs.stepper[i].enabled = true;
+      break;
+    case CommandKind::zero:
+      if (i < stepper_channels) outputs.stepper[i] = StepperTarget();
+      break;
+    case CommandKind::bldc:
+      outputs.bldc[i].speed = value;
+      outputs.bldc[i].direction = command.direction;
+      outputs.bldc[i].brake = command.on;
+      break;
+    case CommandKind::proximity:
+      setpoints.proximity_cm[i] = value;
+      break;
+    case CommandKind::fields:
+      return parse_fields(command.text, setpoints.fields);
+    case CommandKind::setting:
+      return set(setpoints.settings, command.text, command.text2);
+    case CommandKind::heartbeat:
+    case CommandKind::stop:
+    case CommandKind::clear:
+    case CommandKind::identify:
+      break;
+  }
+  return Refusal::none;
+}
+
+}  // namespace firmware
+}  // namespace r4

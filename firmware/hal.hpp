@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the board's application needs of the hardware, at the level of channel values. Each port
+// (firmware/ports/…) implements it; chips, registers and pins are below it.
+#pragma once
+
+#include <cstdint>
+
+#include "../protocol/state.hpp"
+#include "../protocol/units.hpp"
+
+namespace r4 {
+namespace firmware {
+
+// Where a stepper is to go, and how fast.
+struct StepperTarget {
+  std::int32_t position = 0;  // steps
+  std::int32_t speed = stepper_speed_default;  // steps per second
+  bool enabled = false;  // false: it stays where it is
+  friend bool operator==(const StepperTarget& a, const StepperTarget& b) {
+    return a.position == b.position && a.speed == b.speed && a.enabled == b.enabled;
+  }
+  friend bool operator!=(const StepperTarget& a, const StepperTarget& b) { return !(a == b); }
+};
+
+// Every output of the board as commanded: the setpoints. Default-constructed: the safe state.
+struct Outputs {
+  Drive osmc[osmc_channels];
+  Drive dhb12[dhb12_channels];
+  std::uint16_t servo_us[servo_channels] = {};  // 0: no pulses
+  std::uint8_t relays = 0;                      // bit n-1: relay n is on
+  Bldc bldc[bldc_channels];
+  StepperTarget stepper[stepper_channels];
+};
+bool operator==(const Outputs& a, const Outputs& b);
+inline bool operator!=(const Outputs& a, const Outputs& b) { return !(a == b); }
+
+// Every input of the board as sampled.
+struct Inputs {
+  std::int32_t analog_cv[analog_channels] = {};  // hundredths of a volt
+  bool handle_held = false;
+  std::int32_t stepper_steps[stepper_channels] = {};  // where it is
+  std::int32_t encoder_counts[encoder_channels] = {};
+  std::uint16_t ultrasonic_cm[ultrasonic_channels] = {};  // 0: no echo
+};
+
+class Hal {
+ public:
+  // Drives the outputs. Called when a setpoint changed; writes what differs and does not wait.
+  virtual void apply(const Outputs& outputs) = 0;
+  // Every output off, at once and unconditionally; a fault handler may call it at any time.
+  virtual void make_safe() = 0;
+  // The inputs as they are now; does not wait.
+  virtual void sample(Inputs& inputs) = 0;
+  // Encoder and stepper `channel` (1 …) count from zero now; the stepper holds.
+  virtual void zero(int channel) = 0;
+
+ protected:
+  ~Hal() = default;
+};
+
+}  // namespace firmware
+}  // namespace r4

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One transport as the board's application sees it: whole datagrams out, to one peer or to everyone.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "../protocol/text.hpp"
+
+namespace r4 {
+namespace firmware {
+
+// Numbers a peer on a port; 0 is the port's standing audience.
+constexpr std::uint32_t everyone = 0;
+
+// What may be lost when a port cannot keep up.
+enum class Urgency : std::uint8_t {
+  state,   // only the newest matters
+  normal,  // heartbeats, answers
+};
+
+class Port {
+ public:
+  // Sends one datagram; never waits. What cannot be sent is the port's to count.
+  virtual void send(Text datagram, Urgency urgency, std::uint32_t peer) = 0;
+  // The longest datagram the port carries: 508 on the Giga's WiFi, 1024 elsewhere.
+  virtual std::size_t max_size() const = 0;
+
+ protected:
+  ~Port() = default;
+};
+
+}  // namespace firmware
+}  // namespace r4

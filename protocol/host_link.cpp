@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "host_link.hpp"
+
+namespace r4 {
+
+const char* to_text(HostLinkState state) {
+  switch (state) {
+    case HostLinkState::connecting: return "connecting";
+    case HostLinkState::active: return "active";
+    case HostLinkState::safe: return "safe";
+    case HostLinkState::lost: return "lost";
+  }
+  return "unknown";
+}
+
+Arrival HostLink::on_datagram(std::uint32_t pnum, std::uint32_t t_ms, bool heartbeat,
+                              SafeReason reason, std::uint32_t now_ms) {
+  heard_ms_ = now_ms;
+  if (heartbeat && pnum == 0 && t_ms == 0) {  // the board is booting: it knows nothing of us
+    if (tracker_.started()) tracker_.restart();
+    state_ = HostLinkState::connecting;
+    reason_ = reason;
+    echo_ = 0;
+    echoed_ = false;
+    answer_now_ = true;
+    return Arrival::first;
+  }
+  const Arrival arrival = tracker_.on(pnum);
+  const bool current = arrival == Arrival::first || arrival == Arrival::next ||
+                       arrival == Arrival::gap || arrival == Arrival::restart;
+  if (!current) return arrival;
+  if (heartbeat) {
+    echo_ = t_ms;
+    answer_now_ = true;
+  }
+  reason_ = reason;
+  state_ = reason == SafeReason::none ? HostLinkState::active : HostLinkState::safe;
+  return arrival;
+}
+
+bool HostLink::poll(std::uint32_t now_ms) {
+  if (state_ != HostLinkState::active && state_ != HostLinkState::safe) return false;
+  if (now_ms - heard_ms_ < timing_.timeout_ms) return false;
+  state_ = HostLinkState::lost;
+  return true;
+}
+
+bool HostLink::heartbeat_due(std::uint32_t now_ms) const {
+  if (watchdog_expired(now_ms)) return false;
+  return answer_now_ || !any_sent_ || now_ms - sent_ms_ >= timing_.heartbeat_ms;
+}
+
+void HostLink::heartbeat_sent(std::uint32_t now_ms) {
+  sent_ms_ = now_ms;
+  any_sent_ = true;
+  answer_now_ = false;
+  if (echo_ != 0) echoed_ = true;
+}
+
+void HostLink::watchdog(std::uint32_t period_ms, std::uint32_t now_ms) {
+  watchdog_ms_ = period_ms;
+  fed_ms_ = now_ms;
+}
+
+std::uint32_t HostLink::due_in(std::uint32_t now_ms) const {
+  if (heartbeat_due(now_ms)) return 0;
+  std::uint32_t due = timing_.heartbeat_ms;
+  if (!watchdog_expired(now_ms)) due = timing_.heartbeat_ms - (now_ms - sent_ms_);
+  if (state_ == HostLinkState::active || state_ == HostLinkState::safe) {
+    const std::uint32_t silent = now_ms - heard_ms_;
+    const std::uint32_t left = silent < timing_.timeout_ms ? timing_.timeout_ms - silent : 0;
+    if (left < due) due = left;
+  }
+  return due;
+}
+
+}  // namespace r4
