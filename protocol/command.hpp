@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Every command of the board, typed and checked (paper section 4.2; docs/protocol.md).
 //
-// The same parser serves the board, the host's `r4 send` text and the tests, so what one side sends the
-// other side takes.
+// The same parser serves the board, the host's `r4 send` text and the tests, so what one side sends
+// the other side takes.
 #pragma once
 
 #include <cstdint>
@@ -14,6 +14,9 @@
 #include "units.hpp"
 
 namespace r4 {
+
+// The value of a host's heartbeat.
+constexpr Text host_heartbeat_word("ROS2-R4");
 
 enum class CommandKind : std::uint8_t {
   heartbeat,  // H:ROS2-R4
@@ -32,17 +35,17 @@ enum class CommandKind : std::uint8_t {
   identify,   // Q:ID
 };
 
-// One command. Which members count depends on `kind`; the factories set them. `text` and `text2` are
-// views: they must outlive the command.
+// One command. Which members count depends on `kind`; the factories set them. `text` and `text2`
+// are views: they must outlive the command.
 struct Command {
   CommandKind kind = CommandKind::heartbeat;
-  std::uint8_t channel = 0;                       // 1 … the kind's channel count
-  std::int32_t value = 0;                         // pwm, us, cm, BLDC speed, stepper target
-  std::int32_t speed = stepper_speed_default;     // stepper, steps per second
-  Direction direction = Direction::reverse;       // osmc, dhb12, bldc
-  bool on = false;                                // relay; bldc: brake
-  Text text;                                      // fields: the list; setting: the key
-  Text text2;                                     // setting: the value
+  std::uint8_t channel = 0;                    // 1 … the kind's channel count
+  std::int32_t value = 0;                      // pwm, us, cm, BLDC speed, stepper target
+  std::int32_t speed = stepper_speed_default;  // stepper, steps per second
+  Direction direction = Direction::reverse;    // osmc, dhb12, bldc
+  bool on = false;                             // relay; bldc: brake
+  Text text;                                   // fields: the list; setting: the key
+  Text text2;                                  // setting: the value
 
   static Command heartbeat();
   static Command osmc(std::int32_t pwm, Direction direction, int channel);
@@ -67,9 +70,10 @@ bool drives_output(CommandKind kind);
 // `count` tells how many there are (0 or several are no command); the first is returned.
 Field command_field(const Datagram& datagram, int& count);
 
-// Reads a command field. Refusal::unknown (no such letter or word), ::format (number of values, not a
-// number), ::range, ::channel; `out` is only written on Refusal::none. Its texts are views of `field`.
-// Ranges of settings and names of fields are checked by settings.hpp and parse_fields.
+// Reads a command field. Refusal::unknown (no such letter or word), ::format (number of values, an
+// empty one, not a whole number), ::channel, ::range (also a number too large for any type), in
+// this order; `out` is only written on Refusal::none. Its texts are views of `field`. Ranges of
+// settings and names of fields are checked by settings.hpp and parse_fields.
 Refusal parse_command(const Field& field, Command& out);
 
 // The ranges that parse_command checks, for a command made by a factory.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// CRC-32 as zlib computes it (reflected polynomial 0xEDB88320, initial value and final XOR all ones),
-// the datagram's checksum (paper section 4.1).
+// CRC-32 as zlib computes it (reflected polynomial 0xEDB88320, initial value and final XOR all
+// ones), the datagram's checksum (paper section 4.1).
 #pragma once
 
 #include <cstddef>

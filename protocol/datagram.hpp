@@ -7,7 +7,8 @@
 //     value    = *(%x20-7E except ";" "," "^")
 //
 // read() accepts a datagram whole or not at all. What it accepts is a view: it holds no copy and is
-// valid as long as the bytes are. Reading costs no heap and one pass over the bytes besides the CRC.
+// valid as long as the bytes are. Reading costs no heap and one pass over the bytes besides the
+// CRC.
 #pragma once
 
 #include <cstddef>
@@ -30,7 +31,8 @@ enum class ReadError : std::uint8_t {
 // "length", "syntax", "crc"; "" for none.
 const char* to_text(ReadError error);
 
-// The outcome of reading: where it went wrong (a byte offset) and, for crc, both checksums.
+// The outcome of reading: where it went wrong (a byte offset; for crc that of the claimed
+// checksum's first digit) and, for crc, both checksums.
 struct ReadResult {
   ReadError error = ReadError::none;
   std::size_t position = 0;
@@ -45,8 +47,8 @@ class Field {
   Field() = default;
   Field(Text name, Text values) : name_(name), values_(values) {}
   Text name() const { return name_; }
-  Text values() const { return values_; }     // all, commas included
-  std::size_t count() const;                  // number of values, at least 1
+  Text values() const { return values_; }  // all, commas included
+  std::size_t count() const;               // number of values, at least 1
   // Splits the first `max` values into `out`; returns count(), which may be larger than `max`.
   std::size_t split(Text* out, std::size_t max) const;
 
@@ -54,6 +56,10 @@ class Field {
   Text name_;
   Text values_;
 };
+
+// Reads one field that stands alone, without its semicolon: "O:358,1,1". False if it is not of the
+// grammar above; `out` is only written on success.
+bool read_field(Text text, Field& out);
 
 class Datagram {
  public:

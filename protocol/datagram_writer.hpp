@@ -6,8 +6,9 @@
 //     w.field("O").value(358).value(1).value(1);
 //     Text datagram = w.finish(pnum, t_ms);   // "O:358,1,1;PNum:66;T:79146;^0x…^"
 //
-// What does not fit is refused as a whole: finish() returns an empty Text. Names and texts with bytes
-// that the grammar does not allow (datagram.hpp) refuse it too, so no writer can forge a field.
+// What does not fit is refused as a whole: finish() returns an empty Text. Names and texts with
+// bytes that the grammar does not allow (datagram.hpp) refuse it too, so no writer can forge a
+// field.
 #pragma once
 
 #include <cstddef>
@@ -36,19 +37,25 @@ class DatagramWriter {
   bool ok() const { return ok_; }
 
   // Takes everything after `size` back (a field that turned out too long for a split datagram).
+  // `size` is what size() was before a field(), while ok() was true; it is true again.
   void truncate(std::size_t size);
 
-  // Closes with PNum, T and the CRC. An empty Text if anything did not fit.
+  // Closes with PNum, T and the CRC. An empty Text if anything did not fit or was not allowed, or
+  // if the datagram is longer than max_datagram.
   Text finish(std::uint32_t pnum, std::uint64_t t_ms);
   // Closes with the CRC alone: the fields, PNum and T among them, are as the caller wrote them.
   Text finish();
 
-  // Room that finish(pnum, t) needs at most: ";PNum:4294967295;T:18446744073709551615;^0xffffffff^".
-  static constexpr std::size_t trailer_max = 54;
+  // Room that finish(pnum, t) needs at most:
+  // ";PNum:4294967295;T:18446744073709551615;^0xffffffff^".
+  static constexpr std::size_t trailer_max = 52;
 
  private:
   bool reserve(std::size_t bytes);
   void separator();
+  template <class Number>
+  DatagramWriter& number(Number value, char* (*write)(char*, Number));
+
   char* begin_;
   char* at_;
   char* end_;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The one place where numbers are read from text and written to it.
 //
-// Reading is strict: the whole text must be the number, with no blanks and no '+'; a value that does
-// not fit its type is refused. Every reader returns false and leaves `out` alone on refusal.
+// Reading is strict: the whole text must be the number, with no blanks and no '+'; a value that
+// does not fit its type is refused. Every reader returns false and leaves `out` alone on refusal.
 #pragma once
 
 #include <cstddef>
@@ -15,6 +15,10 @@ namespace r4 {
 bool parse_number(Text text, std::uint32_t& out);
 bool parse_number(Text text, std::uint64_t& out);
 bool parse_number(Text text, std::int32_t& out);
+
+// Is it digits, perhaps behind a '-', of whatever size? Tells a number that does not fit its type
+// (out of range) from what is no number (a wrong form).
+bool is_whole_number(Text text);
 
 // A decimal such as "24.28", "-0.5" or "12" as hundredths of its unit (2428, -50, 1200). Further
 // decimals are cut off. |value| must stay below 20 million units.

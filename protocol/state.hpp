@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The board's state as typed values, and the fields that carry it (paper section 4.1).
 //
-// One table (state.cpp) names every field, its unit and where it lives in State; the board writes with
-// it, the host reads with it, the `F` command selects from it.
+// One table (state.cpp) names every field, its unit and where it lives in State; the board writes
+// with it, the host reads with it, the `F` command selects from it.
 #pragma once
 
 #include <cstdint>
@@ -16,31 +16,62 @@ namespace r4 {
 // Every state field, in the order in which the board sends them. The first ten are the paper's
 // default set.
 enum class StateField : std::uint8_t {
-  ain24, ain12, ain5, aindmh,  // volts, two decimals
-  dmhsta,                      // 1: the dead-man's handle is held, 0: released
-  ainsteer,                    // volts
-  dhb1a,                       // pwm,direction
-  osmc1,                       // pwm,direction
-  step1pos,                    // steps
-  servo1pos,                   // microseconds
+  ain24,
+  ain12,
+  ain5,
+  aindmh,     // volts, two decimals
+  dmhsta,     // 1: the dead-man's handle is held, 0: released
+  ainsteer,   // volts
+  dhb1a,      // pwm,direction
+  osmc1,      // pwm,direction
+  step1pos,   // steps
+  servo1pos,  // microseconds
   ain6,
-  dhb1b, dhb2a, dhb2b,
-  osmc2, osmc3, osmc4,
-  step2pos, step3pos, step4pos,
-  servo2pos, servo3pos, servo4pos, servo5pos, servo6pos, servo7pos, servo8pos, servo9pos,
-  servo10pos, servo11pos, servo12pos, servo13pos, servo14pos, servo15pos, servo16pos,
-  enc1, enc2, enc3, enc4,      // counts
-  us1, us2, us3, us4,          // centimetres; 0: no echo
-  bldc1, bldc2, bldc3, bldc4,  // speed,direction,brake
-  relays,                      // bit n-1 is relay n, 0-255
-  safe,                        // SafeReason
-  cmd,                         // PNum of the last command executed
-  rxok,                        // datagrams accepted since boot
-  rxcrc,                       // dropped: bad checksum, syntax or length
-  rxlost,                      // gaps in the host's packet numbers
-  rxdup,                       // received again
-  rxref,                       // commands refused
-  late,                        // state periods that the board's loop missed
+  dhb1b,
+  dhb2a,
+  dhb2b,
+  osmc2,
+  osmc3,
+  osmc4,
+  step2pos,
+  step3pos,
+  step4pos,
+  servo2pos,
+  servo3pos,
+  servo4pos,
+  servo5pos,
+  servo6pos,
+  servo7pos,
+  servo8pos,
+  servo9pos,
+  servo10pos,
+  servo11pos,
+  servo12pos,
+  servo13pos,
+  servo14pos,
+  servo15pos,
+  servo16pos,
+  enc1,
+  enc2,
+  enc3,
+  enc4,  // counts
+  us1,
+  us2,
+  us3,
+  us4,  // centimetres; 0: no echo
+  bldc1,
+  bldc2,
+  bldc3,
+  bldc4,   // speed,direction,brake
+  relays,  // bit n-1 is relay n, 0-255
+  safe,    // SafeReason
+  cmd,     // PNum of the last command executed
+  rxok,    // datagrams accepted since boot
+  rxcrc,   // dropped: bad checksum, syntax or length
+  rxlost,  // gaps in the host's packet numbers
+  rxdup,   // received again
+  rxref,   // commands refused
+  late,    // state periods that the board's loop missed
   count
 };
 constexpr int state_field_count = static_cast<int>(StateField::count);
@@ -68,12 +99,12 @@ class FieldSet {
 enum class Analog : std::uint8_t { ain24, ain12, ain5, aindmh, ainsteer, ain6, count };
 constexpr int analog_channels = static_cast<int>(Analog::count);
 
-// What the board reports. On the host, `present` tells which members the datagram carried; the others
-// keep the value of earlier datagrams. Channel n of the board is element n-1.
+// What the board reports. On the host, `present` tells which members the datagram carried; the
+// others keep the value of earlier datagrams. Channel n of the board is element n-1.
 struct State {
   FieldSet present;
   std::uint32_t pnum = 0;
-  std::uint32_t t_ms = 0;  // the board's clock; wraps
+  std::uint32_t t_ms = 0;                        // the board's clock; wraps
   std::int32_t analog_cv[analog_channels] = {};  // hundredths of a volt
   bool handle_held = false;
   Drive dhb12[dhb12_channels];

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A view of characters that somebody else owns: the portable core's string_view (C++14 has none).
 //
-// A Text never owns, never ends in NUL and may hold any byte. It is valid as long as the buffer that
-// it points into.
+// A Text never owns, never ends in NUL and may hold any byte. It is valid as long as the buffer
+// that it points into.
 #pragma once
 
 #include <cstddef>

@@ -16,11 +16,11 @@ constexpr int encoder_channels = 4;
 constexpr int bldc_channels = 4;
 constexpr int ultrasonic_channels = 4;
 
-constexpr std::int32_t pwm_max = 4095;            // 12 bit duty (PCA9685), DAC code (MCP4728)
-constexpr std::int32_t servo_max_us = 2500;       // pulse width; 0 is off
-constexpr std::int32_t stepper_speed_max = 20000; // steps per second
+constexpr std::int32_t pwm_max = 4095;             // 12 bit duty (PCA9685), DAC code (MCP4728)
+constexpr std::int32_t servo_max_us = 2500;        // pulse width; 0 is off
+constexpr std::int32_t stepper_speed_max = 20000;  // steps per second
 constexpr std::int32_t stepper_speed_default = 1000;
-constexpr std::int32_t proximity_max_cm = 400;    // HC-SR04 range; a threshold of 0 is off
+constexpr std::int32_t proximity_max_cm = 400;  // HC-SR04 range; a threshold of 0 is off
 
 enum class Direction : std::uint8_t { reverse = 0, forward = 1 };
 

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "message.hpp"
+
+#include "command.hpp"
+#include "numbers.hpp"
+
+namespace r4 {
+namespace {
+
+constexpr Text board_heartbeat_word("R4-ROS2");
+constexpr Text board_word("R4");
+
+}  // namespace
+
+const char* to_text(MessageKind kind) {
+  switch (kind) {
+    case MessageKind::board_heartbeat:
+    case MessageKind::host_heartbeat:
+      return "heartbeat";
+    case MessageKind::command:
+      return "command";
+    case MessageKind::nack:
+      return "nack";
+    case MessageKind::identity:
+      return "identity";
+    case MessageKind::state:
+      break;
+  }
+  return "state";
+}
+
+MessageKind kind_of(const Datagram& datagram) {
+  int count = 0;
+  const Field field = command_field(datagram, count);
+  if (count == 0) return MessageKind::state;
+  if (count > 1) return MessageKind::command;  // to be refused as one
+  if (field.name() == Text("H")) {
+    if (field.values() == board_heartbeat_word) return MessageKind::board_heartbeat;
+    if (field.values() == host_heartbeat_word) return MessageKind::host_heartbeat;
+  }
+  if (field.name() == Text("N")) return MessageKind::nack;
+  if (field.name() == Text("I")) return MessageKind::identity;
+  return MessageKind::command;
+}
+
+Text write_board_heartbeat(char* buffer, std::size_t capacity, std::uint32_t pnum,
+                           std::uint32_t t_ms, SafeReason safe) {
+  DatagramWriter writer(buffer, capacity);
+  writer.field("H").value(board_heartbeat_word);
+  writer.field("PNum").value(pnum);
+  writer.field("T").value(t_ms);
+  if (safe != SafeReason::none) writer.field("SAFE").value(static_cast<std::uint32_t>(safe));
+  return writer.finish();
+}
+
+SafeReason heartbeat_reason(const Datagram& datagram) {
+  std::uint32_t number = 0;
+  if (!parse_number(datagram.find("SAFE").values(), number)) return SafeReason::none;
+  return number < safe_reason_count ? static_cast<SafeReason>(number) : SafeReason::none;
+}
+
+bool read_nack(const Datagram& datagram, Nack& out) {
+  Text values[2];
+  if (datagram.find("N").split(values, 2) != 2) return false;
+  Nack nack;
+  nack.code = refusal_from(values[1]);
+  if (nack.code == Refusal::none || !parse_number(values[0], nack.pnum)) return false;
+  out = nack;
+  return true;
+}
+
+void write_nack(DatagramWriter& writer, const Nack& nack) {
+  writer.field("N").value(nack.pnum).value(name_of(nack.code));
+}
+
+bool read_identity(const Datagram& datagram, Identity& out) {
+  Text values[4];
+  if (datagram.find("I").split(values, 4) != 4 || values[0] != board_word) return false;
+  out.firmware = values[1];
+  out.board_id = values[2];
+  out.capabilities = values[3];
+  return true;
+}
+
+void write_identity(DatagramWriter& writer, const Identity& identity) {
+  writer.field("I")
+      .value(board_word)
+      .value(identity.firmware)
+      .value(identity.board_id)
+      .value(identity.capabilities);
+}
+
+}  // namespace r4

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "numbers.hpp"
+
+namespace r4 {
+namespace {
+
+constexpr std::uint64_t u32_max = 0xFFFFFFFFU;
+constexpr std::uint64_t u64_max = ~std::uint64_t{0};
+
+constexpr bool is_digit(char c) { return c >= '0' && c <= '9'; }
+constexpr unsigned digit_of(char c) { return static_cast<unsigned>(c - '0'); }
+
+// Digits up to `limit`; false for anything else, and for no digits at all.
+bool parse_digits(const char* at, const char* end, std::uint64_t limit, std::uint64_t& out) {
+  if (at == end) return false;
+  // 19 digits always fit 64 bits, so only what follows them needs the check for overflow.
+  constexpr std::ptrdiff_t safe_digits = 19;
+  const char* const safe_end = end - at > safe_digits ? at + safe_digits : end;
+  std::uint64_t value = 0;
+  for (; at != safe_end; ++at) {
+    if (!is_digit(*at)) return false;
+    value = value * 10 + digit_of(*at);
+  }
+  for (; at != end; ++at) {
+    if (!is_digit(*at)) return false;
+    const unsigned digit = digit_of(*at);
+    if (value > (u64_max - digit) / 10) return false;
+    value = value * 10 + digit;
+  }
+  if (value > limit) return false;
+  out = value;
+  return true;
+}
+
+bool skip_minus(Text text, const char*& at) {
+  at = text.begin();
+  if (text.empty() || *at != '-') return false;
+  ++at;
+  return true;
+}
+
+// The largest magnitude of a 32-bit number with that sign.
+constexpr std::uint64_t magnitude_limit(bool negative) {
+  return negative ? std::uint64_t{0x80000000U} : std::uint64_t{0x7FFFFFFFU};
+}
+
+constexpr std::int32_t with_sign(bool negative, std::uint64_t magnitude) {
+  return static_cast<std::int32_t>(negative ? -static_cast<std::int64_t>(magnitude)
+                                            : static_cast<std::int64_t>(magnitude));
+}
+
+constexpr std::uint32_t magnitude_of(std::int32_t value) {
+  return value < 0 ? 0U - static_cast<std::uint32_t>(value) : static_cast<std::uint32_t>(value);
+}
+
+constexpr char digit_pairs[] =
+    "0001020304050607080910111213141516171819202122232425262728293031323334353637383940414243444546"
+    "4748495051525354555657585960616263646566676869707172737475767778798081828384858687888990919293"
+    "949596979899";
+
+inline void put_pair(char* out, std::uint32_t below_100) {
+  std::memcpy(out, digit_pairs + 2 * below_100, 2);
+}
+
+int decimal_digits(std::uint32_t value) {
+  if (value < 100) return value < 10 ? 1 : 2;
+  if (value < 10000) return value < 1000 ? 3 : 4;
+  if (value < 1000000) return value < 100000 ? 5 : 6;
+  if (value < 100000000) return value < 10000000 ? 7 : 8;
+  return value < 1000000000 ? 9 : 10;
+}
+
+// Exactly 8 digits, with leading zeros.
+char* put_8_digits(char* out, std::uint32_t value) {
+  for (int i = 6; i >= 0; i -= 2) {
+    put_pair(out + i, value % 100);
+    value /= 100;
+  }
+  return out + 8;
+}
+
+}  // namespace
+
+bool parse_number(Text text, std::uint32_t& out) {
+  std::uint64_t value = 0;
+  if (!parse_digits(text.begin(), text.end(), u32_max, value)) return false;
+  out = static_cast<std::uint32_t>(value);
+  return true;
+}
+
+bool parse_number(Text text, std::uint64_t& out) {
+  return parse_digits(text.begin(), text.end(), u64_max, out);
+}
+
+bool parse_number(Text text, std::int32_t& out) {
+  const char* at = nullptr;
+  const bool negative = skip_minus(text, at);
+  std::uint64_t magnitude = 0;
+  if (!parse_digits(at, text.end(), magnitude_limit(negative), magnitude)) return false;
+  out = with_sign(negative, magnitude);
+  return true;
+}
+
+bool is_whole_number(Text text) {
+  const char* at = nullptr;
+  skip_minus(text, at);
+  if (at == text.end()) return false;
+  for (; at != text.end(); ++at) {
+    if (!is_digit(*at)) return false;
+  }
+  return true;
+}
+
+bool parse_hundredths(Text text, std::int32_t& out) {
+  constexpr std::uint64_t max_units = 19999999;
+  const char* at = nullptr;
+  const bool negative = skip_minus(text, at);
+  const char* point = at;
+  while (point != text.end() && *point != '.') ++point;
+  std::uint64_t units = 0;
+  if (!parse_digits(at, point, max_units, units)) return false;
+  unsigned hundredths = 0;
+  if (point != text.end()) {
+    const char* const decimals = point + 1;
+    if (decimals == text.end()) return false;
+    for (const char* p = decimals; p != text.end(); ++p) {
+      if (!is_digit(*p)) return false;
+    }
+    hundredths = 10 * digit_of(decimals[0]);
+    if (text.end() - decimals > 1) hundredths += digit_of(decimals[1]);
+  }
+  out = with_sign(negative, 100 * units + hundredths);
+  return true;
+}
+
+bool parse_hex(Text text, std::uint32_t& out) {
+  if (text.empty() || text.size() > 8) return false;
+  std::uint32_t value = 0;
+  for (const char c : text) {
+    std::uint32_t digit = 0;
+    if (is_digit(c)) {
+      digit = digit_of(c);
+    } else if (c >= 'a' && c <= 'f') {
+      digit = static_cast<std::uint32_t>(c - 'a') + 10;
+    } else if (c >= 'A' && c <= 'F') {
+      digit = static_cast<std::uint32_t>(c - 'A') + 10;
+    } else {
+      return false;
+    }
+    value = value << 4 | digit;
+  }
+  out = value;
+  return true;
+}
+
+char* write_number(char* out, std::uint32_t value) {
+  char* const end = out + decimal_digits(value);
+  char* at = end;
+  while (value >= 100) {
+    at -= 2;
+    put_pair(at, value % 100);
+    value /= 100;
+  }
+  if (value >= 10) {
+    put_pair(at - 2, value);
+  } else {
+    at[-1] = static_cast<char>('0' + value);
+  }
+  return end;
+}
+
+char* write_number(char* out, std::uint64_t value) {
+  constexpr std::uint64_t e8 = 100000000;
+  if (value <= u32_max) return write_number(out, static_cast<std::uint32_t>(value));
+  out = write_number(out, value / e8);
+  return put_8_digits(out, static_cast<std::uint32_t>(value % e8));
+}
+
+char* write_number(char* out, std::int32_t value) {
+  if (value < 0) *out++ = '-';
+  return write_number(out, magnitude_of(value));
+}
+
+char* write_hundredths(char* out, std::int32_t hundredths) {
+  if (hundredths < 0) *out++ = '-';
+  const std::uint32_t magnitude = magnitude_of(hundredths);
+  out = write_number(out, magnitude / 100);
+  *out = '.';
+  put_pair(out + 1, magnitude % 100);
+  return out + 3;
+}
+
+char* write_hex(char* out, std::uint32_t value) {
+  int shift = 28;
+  while (shift > 0 && value >> shift == 0) shift -= 4;
+  for (; shift >= 0; shift -= 4) *out++ = "0123456789abcdef"[value >> shift & 0xFU];
+  return out;
+}
+
+}  // namespace r4

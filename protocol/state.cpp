@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "state.hpp"
+
+#include "numbers.hpp"
+
+namespace r4 {
+namespace {
+
+// How a field's values look, and which type of State's they are.
+enum class Form : std::uint8_t {
+  volts,   // int32 in hundredths: "24.28"
+  flag,    // bool: 0 or 1
+  drive,   // Drive: pwm,direction
+  bldc,    // Bldc: speed,direction,brake
+  servo,   // uint16, 0-2500
+  u8,      // uint8
+  u16,     // uint16
+  i32,     // int32
+  u32,     // uint32
+  reason,  // SafeReason
+};
+
+struct Entry {
+  StateField field;
+  Form form;
+  Text name;
+  std::size_t offset;  // in State
+};
+
+// clang-format off
+#define R4_ENTRY(field, form, name, member) {StateField::field, Form::form, name, offsetof(State, member)}
+constexpr Entry table[] = {
+    R4_ENTRY(ain24, volts, "AIN24", analog_cv[0]),
+    R4_ENTRY(ain12, volts, "AIN12", analog_cv[1]),
+    R4_ENTRY(ain5, volts, "AIN5", analog_cv[2]),
+    R4_ENTRY(aindmh, volts, "AINDMH", analog_cv[3]),
+    R4_ENTRY(dmhsta, flag, "DMHSTA", handle_held),
+    R4_ENTRY(ainsteer, volts, "AINSTEER", analog_cv[4]),
+    R4_ENTRY(dhb1a, drive, "DHB1A", dhb12[0]),
+    R4_ENTRY(osmc1, drive, "OSMC1", osmc[0]),
+    R4_ENTRY(step1pos, i32, "STEP1POS", stepper_steps[0]),
+    R4_ENTRY(servo1pos, servo, "SERVO1POS", servo_us[0]),
+    R4_ENTRY(ain6, volts, "AIN6", analog_cv[5]),
+    R4_ENTRY(dhb1b, drive, "DHB1B", dhb12[1]),
+    R4_ENTRY(dhb2a, drive, "DHB2A", dhb12[2]),
+    R4_ENTRY(dhb2b, drive, "DHB2B", dhb12[3]),
+    R4_ENTRY(osmc2, drive, "OSMC2", osmc[1]),
+    R4_ENTRY(osmc3, drive, "OSMC3", osmc[2]),
+    R4_ENTRY(osmc4, drive, "OSMC4", osmc[3]),
+    R4_ENTRY(step2pos, i32, "STEP2POS", stepper_steps[1]),
+    R4_ENTRY(step3pos, i32, "STEP3POS", stepper_steps[2]),
+    R4_ENTRY(step4pos, i32, "STEP4POS", stepper_steps[3]),
+    R4_ENTRY(servo2pos, servo, "SERVO2POS", servo_us[1]),
+    R4_ENTRY(servo3pos, servo, "SERVO3POS", servo_us[2]),
+    R4_ENTRY(servo4pos, servo, "SERVO4POS", servo_us[3]),
+    R4_ENTRY(servo5pos, servo, "SERVO5POS", servo_us[4]),
+    R4_ENTRY(servo6pos, servo, "SERVO6POS", servo_us[5]),
+    R4_ENTRY(servo7pos, servo, "SERVO7POS", servo_us[6]),
+    R4_ENTRY(servo8pos, servo, "SERVO8POS", servo_us[7]),
+    R4_ENTRY(servo9pos, servo, "SERVO9POS", servo_us[8]),
+    R4_ENTRY(servo10pos, servo, "SERVO10POS", servo_us[9]),
+    R4_ENTRY(servo11pos, servo, "SERVO11POS", servo_us[10]),
+    R4_ENTRY(servo12pos, servo, "SERVO12POS", servo_us[11]),
+    R4_ENTRY(servo13pos, servo, "SERVO13POS", servo_us[12]),
+    R4_ENTRY(servo14pos, servo, "SERVO14POS", servo_us[13]),
+    R4_ENTRY(servo15pos, servo, "SERVO15POS", servo_us[14]),
+    R4_ENTRY(servo16pos, servo, "SERVO16POS", servo_us[15]),
+    R4_ENTRY(enc1, i32, "ENC1", encoder_counts[0]),
+    R4_ENTRY(enc2, i32, "ENC2", encoder_counts[1]),
+    R4_ENTRY(enc3, i32, "ENC3", encoder_counts[2]),
+    R4_ENTRY(enc4, i32, "ENC4", encoder_counts[3]),
+    R4_ENTRY(us1, u16, "US1", ultrasonic_cm[0]),
+    R4_ENTRY(us2, u16, "US2", ultrasonic_cm[1]),
+    R4_ENTRY(us3, u16, "US3", ultrasonic_cm[2]),
+    R4_ENTRY(us4, u16, "US4", ultrasonic_cm[3]),
+    R4_ENTRY(bldc1, bldc, "BLDC1", bldc[0]),
+    R4_ENTRY(bldc2, bldc, "BLDC2", bldc[1]),
+    R4_ENTRY(bldc3, bldc, "BLDC3", bldc[2]),
+    R4_ENTRY(bldc4, bldc, "BLDC4", bldc[3]),
+    R4_ENTRY(relays, u8, "RELAYS", relays),
+    R4_ENTRY(safe, reason, "SAFE", safe),
+    R4_ENTRY(cmd, u32, "CMD", last_command),
+    R4_ENTRY(rxok, u32, "RXOK", rx_ok),
+    R4_ENTRY(rxcrc, u32, "RXCRC", rx_crc),
+    R4_ENTRY(rxlost, u32, "RXLOST", rx_lost),
+    R4_ENTRY(rxdup, u32, "RXDUP", rx_duplicate),
+    R4_ENTRY(rxref, u32, "RXREF", rx_refused),
+    R4_ENTRY(late, u32, "LATE", late),
+};
+#undef R4_ENTRY
+// clang-format on
+
+constexpr bool in_order() {
+  for (int i = 0; i < state_field_count; ++i) {
+    if (table[i].field != static_cast<StateField>(i)) return false;
+  }
+  return true;
+}
+static_assert(sizeof table / sizeof table[0] == state_field_count, "one entry for every field");
+static_assert(in_order(), "the table is indexed by StateField");
+
+constexpr const Entry& entry_of(StateField field) { return table[static_cast<int>(field)]; }
+
+template <class Member>
+const Member& member(const State& state, const Entry& entry) {
+  return *reinterpret_cast<const Member*>(reinterpret_cast<const char*>(&state) + entry.offset);
+}
+template <class Member>
+Member& member(State& state, const Entry& entry) {
+  return *reinterpret_cast<Member*>(reinterpret_cast<char*>(&state) + entry.offset);
+}
+
+// Names by hash, made at compile time: open addressing, a quarter full at most.
+constexpr unsigned slot_count = 256;
+constexpr std::uint8_t no_entry = 0xFF;
+
+constexpr unsigned slot_of(Text name) {
+  std::uint32_t hash = 2166136261U;  // FNV-1a
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    hash = (hash ^ static_cast<unsigned char>(name[i])) * 16777619U;
+  }
+  return (hash ^ hash >> 16) % slot_count;
+}
+
+struct NameIndex {
+  std::uint8_t entry[slot_count] = {};
+  constexpr NameIndex() {
+    for (unsigned i = 0; i < slot_count; ++i) entry[i] = no_entry;
+    for (int i = 0; i < state_field_count; ++i) {
+      unsigned slot = slot_of(table[i].name);
+      while (entry[slot] != no_entry) slot = (slot + 1) % slot_count;
+      entry[slot] = static_cast<std::uint8_t>(i);
+    }
+  }
+};
+constexpr NameIndex name_index;
+constexpr std::size_t longest_name = 10;  // "SERVO10POS"
+
+bool parse_up_to(Text text, std::uint32_t limit, std::uint32_t& out) {
+  return parse_number(text, out) && out <= limit;
+}
+
+// Parses `text` into a member whose type holds 0 to `limit`.
+template <class Member>
+bool parse_into(Text text, std::uint32_t limit, Member& out) {
+  std::uint32_t value = 0;
+  if (!parse_up_to(text, limit, value)) return false;
+  out = static_cast<Member>(value);
+  return true;
+}
+
+bool parse_drive(const Field& field, Drive& out) {
+  Text values[2];
+  return field.split(values, 2) == 2 && parse_into(values[0], pwm_max, out.pwm) &&
+         parse_into(values[1], 1, out.direction);
+}
+
+bool parse_bldc(const Field& field, Bldc& out) {
+  Text values[3];
+  return field.split(values, 3) == 3 && parse_into(values[0], pwm_max, out.speed) &&
+         parse_into(values[1], 1, out.direction) && parse_into(values[2], 1, out.brake);
+}
+
+bool parse_entry(const Field& field, const Entry& entry, State& state) {
+  const Text text = field.values();  // the number parsers refuse a comma
+  switch (entry.form) {
+    case Form::volts:
+      return parse_hundredths(text, member<std::int32_t>(state, entry));
+    case Form::flag:
+      return parse_into(text, 1, member<bool>(state, entry));
+    case Form::drive:
+      return parse_drive(field, member<Drive>(state, entry));
+    case Form::bldc:
+      return parse_bldc(field, member<Bldc>(state, entry));
+    case Form::servo:
+      return parse_into(text, servo_max_us, member<std::uint16_t>(state, entry));
+    case Form::u8:
+      return parse_into(text, 0xFF, member<std::uint8_t>(state, entry));
+    case Form::u16:
+      return parse_into(text, 0xFFFF, member<std::uint16_t>(state, entry));
+    case Form::i32:
+      return parse_number(text, member<std::int32_t>(state, entry));
+    case Form::u32:
+      return parse_number(text, member<std::uint32_t>(state, entry));
+    case Form::reason:
+      return parse_into(text, safe_reason_count - 1, member<SafeReason>(state, entry));
+  }
+  return false;
+}
+
+}  // namespace
+
+FieldSet FieldSet::paper_default() {
+  FieldSet set;
+  set.bits_ = (std::uint64_t{1} << (static_cast<int>(StateField::servo1pos) + 1)) - 1;
+  return set;
+}
+
+FieldSet FieldSet::all() {
+  static_assert(state_field_count < 64, "a bit for every field");
+  FieldSet set;
+  set.bits_ = (std::uint64_t{1} << state_field_count) - 1;
+  return set;
+}
+
+Text name_of(StateField field) { return entry_of(field).name; }
+
+StateField state_field(Text name) {
+  if (name.size() > longest_name) return StateField::count;
+  for (unsigned slot = slot_of(name);; slot = (slot + 1) % slot_count) {
+    const std::uint8_t index = name_index.entry[slot];
+    if (index == no_entry) return StateField::count;
+    if (table[index].name == name) return static_cast<StateField>(index);
+  }
+}
+
+void write_field(DatagramWriter& writer, StateField field, const State& state) {
+  const Entry& entry = entry_of(field);
+  writer.field(entry.name);
+  switch (entry.form) {
+    case Form::volts:
+      writer.hundredths(member<std::int32_t>(state, entry));
+      break;
+    case Form::flag:
+      writer.value(static_cast<std::uint32_t>(member<bool>(state, entry)));
+      break;
+    case Form::drive: {
+      const Drive& drive = member<Drive>(state, entry);
+      writer.value(std::uint32_t{drive.pwm}).value(static_cast<std::uint32_t>(drive.direction));
+      break;
+    }
+    case Form::bldc: {
+      const Bldc& bldc = member<Bldc>(state, entry);
+      writer.value(std::uint32_t{bldc.speed})
+          .value(static_cast<std::uint32_t>(bldc.direction))
+          .value(static_cast<std::uint32_t>(bldc.brake));
+      break;
+    }
+    case Form::servo:
+    case Form::u16:
+      writer.value(std::uint32_t{member<std::uint16_t>(state, entry)});
+      break;
+    case Form::u8:
+      writer.value(std::uint32_t{member<std::uint8_t>(state, entry)});
+      break;
+    case Form::i32:
+      writer.value(member<std::int32_t>(state, entry));
+      break;
+    case Form::u32:
+      writer.value(member<std::uint32_t>(state, entry));
+      break;
+    case Form::reason:
+      writer.value(static_cast<std::uint32_t>(member<SafeReason>(state, entry)));
+      break;
+  }
+}
+
+bool read_state(const Datagram& datagram, State& state) {
+  if (datagram.has_time() && datagram.time_ms() > 0xFFFFFFFFU) return false;
+  State next = state;
+  next.present = FieldSet();
+  if (datagram.has_pnum()) next.pnum = datagram.pnum();
+  if (datagram.has_time()) next.t_ms = static_cast<std::uint32_t>(datagram.time_ms());
+  int expected = 0;  // boards send in the table's order, so the next entry is the likely one
+  for (const Field& field : datagram) {
+    int index = expected;
+    if (index == state_field_count || table[index].name != field.name()) {
+      index = static_cast<int>(state_field(field.name()));
+      if (index == state_field_count) continue;
+    }
+    const Entry& entry = table[index];
+    if (next.present.has(entry.field) || !parse_entry(field, entry, next)) return false;
+    next.present.add(entry.field);
+    expected = index + 1;
+  }
+  state = next;
+  return true;
+}
+
+}  // namespace r4
