@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's settings (`C:key,value`): keys, ranges, defaults (paper section 8.1: 100 Hz state, 2
-// Hz heartbeat, 1 s timeout).
+// The board's settings (`C:key,value`): keys, ranges, defaults (paper section 8.1: 100 Hz state,
+// 2 Hz heartbeat, 1 s timeout).
 //
-//     key        value              default  meaning
-//     rate       1-1000             100      state datagrams a second; 1000/rate is rounded down to
-//                                            whole milliseconds
-//     heartbeat  50-1000            500      ms between the board's heartbeats; below the timeout
-//     timeout    100-10000          1000     ms of silence until the safe state; above the
-//     heartbeat recovery   last | rearm       last     outputs after SAFE(link)
+//     key        value         default  meaning
+//     rate       1-1000        100      state datagrams a second; 1000/rate is rounded down to
+//                                       whole milliseconds
+//     heartbeat  50-1000       500      ms between the board's heartbeats; below the timeout
+//     timeout    100-10000     1000     ms of silence until the safe state; above `heartbeat`
+//     recovery   last | rearm  last     outputs after SAFE(link)
 //
 // Keys of later capabilities (packed form, network, key) are added to the table in settings.cpp.
 #pragma once
@@ -29,8 +29,7 @@ struct Settings {
 };
 
 // Changes one setting. Refusal::unknown for a key, ::format for a value that is not of the key's
-// kind,
-// ::range outside its range; `settings` only changes on Refusal::none.
+// kind, ::range outside its range; `settings` only changes on Refusal::none.
 Refusal set(Settings& settings, Text key, Text value);
 
 }  // namespace r4

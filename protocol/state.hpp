@@ -16,16 +16,23 @@ namespace r4 {
 // Every state field, in the order in which the board sends them. The first ten are the paper's
 // default set.
 enum class StateField : std::uint8_t {
+  // volts, two decimals
   ain24,
   ain12,
   ain5,
-  aindmh,     // volts, two decimals
-  dmhsta,     // 1: the dead-man's handle is held, 0: released
-  ainsteer,   // volts
-  dhb1a,      // pwm,direction
-  osmc1,      // pwm,direction
-  step1pos,   // steps
-  servo1pos,  // microseconds
+  aindmh,
+  // 1: the dead-man's handle is held, 0: released
+  dmhsta,
+  // volts
+  ainsteer,
+  // pwm,direction
+  dhb1a,
+  osmc1,
+  // steps
+  step1pos,
+  // microseconds of pulse width
+  servo1pos,
+  // the rest, in the same forms
   ain6,
   dhb1b,
   dhb2a,
@@ -51,18 +58,21 @@ enum class StateField : std::uint8_t {
   servo14pos,
   servo15pos,
   servo16pos,
+  // counts
   enc1,
   enc2,
   enc3,
-  enc4,  // counts
+  enc4,
+  // centimetres; 0: no echo
   us1,
   us2,
   us3,
-  us4,  // centimetres; 0: no echo
+  us4,
+  // speed,direction,brake
   bldc1,
   bldc2,
   bldc3,
-  bldc4,   // speed,direction,brake
+  bldc4,
   relays,  // bit n-1 is relay n, 0-255
   safe,    // SafeReason
   cmd,     // PNum of the last command executed
