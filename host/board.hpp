@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4::Board: a board, opened by URL. Thread-safe, blocking calls with deadlines, and callbacks.
+//
+//     r4::Board board("udp://192.168.0.125");
+//     board.wait_active();
+//     board.osmc(1).set(358, r4::Direction::forward);   // returns when the board's state confirms it
+//     board.on_state([](const r4::State& s) { … });
+//     board.stop();                                     // every output safe, at once
+//
+// The board goes safe by itself when this object is gone or its process hangs: the heartbeats stop.
+// Errors are thrown as r4::Error with the thing, the reason and the fix: open and permission when the
+// transport cannot be opened, usage for a wrong URL or a value outside its range, refused when the board
+// refuses a command or does not confirm it in time.
+//
+// Callbacks run on the board's own thread, one at a time, and must not block: a blocking call in a
+// callback throws Error{usage}; post() and stop_async() may be used there.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "board_options.hpp"
+
+namespace r4 {
+
+class Board {
+ public:
+  using Duration = std::chrono::milliseconds;
+  static constexpr Duration default_timeout{1000};
+
+  // Opens the transport and begins the link; returns without waiting for the board. Throws Error.
+  explicit Board(std::string_view url, BoardOptions options = {});
+  ~Board();
+  Board(const Board&) = delete;
+  Board& operator=(const Board&) = delete;
+
+  // Ends heartbeats and closes the transport; the board goes safe within its timeout. Idempotent.
+  void close();
+
+  // Waits until the board is ACTIVE under our control; throws Error{refused} saying what it is instead.
+  void wait_active(Duration timeout = Duration{3000});
+
+  // --- commands: each returns when the board's own state confirms it, throws Error{refused} otherwise
+
+  void send(const Command& command, Duration timeout = default_timeout);
+  // The same from the text of design: "O:358,1,1".
+  void send(std::string_view command, Duration timeout = default_timeout);
+  // Sends once, without waiting or confirmation; false while the link is not up. For streams of
+  // setpoints where the next one replaces this one.
+  bool post(const Command& command);
+
+  // Every output safe, at once, repeated until the board confirms it; latched until clear().
+  void stop(Duration timeout = default_timeout);
+  void stop_async();
+  void clear(Duration timeout = default_timeout);
+
+  class DriveChannel {
+   public:
+    void set(int pwm, Direction direction, Duration timeout = default_timeout) const;  // pwm 0-4095
+
+   private:
+    friend class Board;
+    DriveChannel(Board& board, CommandKind kind, int channel)
+        : board_(board), kind_(kind), channel_(channel) {}
+    Board& board_;
+    CommandKind kind_;
+    int channel_;
+  };
+  class ServoChannel {
+   public:
+    void set(int pulse_us, Duration timeout = default_timeout) const;  // 0 (off) to 2500
+
+   private:
+    friend class Board;
+    ServoChannel(Board& board, int channel) : board_(board), channel_(channel) {}
+    Board& board_;
+    int channel_;
+  };
+  class RelayChannel {
+   public:
+    void set(bool on, Duration timeout = default_timeout) const;
+
+   private:
+    friend class Board;
+    RelayChannel(Board& board, int channel) : board_(board), channel_(channel) {}
+    Board& board_;
+    int channel_;
+  };
+  class StepperChannel {
+   public:
+    // Position in steps, speed in steps per second (1-20000).
+    void move_to(std::int32_t position, int speed = stepper_speed_default,
+                 Duration timeout = default_timeout) const;
+    void zero(Duration timeout = default_timeout) const;
+
+   private:
+    friend class Board;
+    StepperChannel(Board& board, int channel) : board_(board), channel_(channel) {}
+    Board& board_;
+    int channel_;
+  };
+  class BldcChannel {
+   public:
+    // Speed 0-4095.
+    void set(int speed, Direction direction, bool brake = false,
+             Duration timeout = default_timeout) const;
+
+   private:
+    friend class Board;
+    BldcChannel(Board& board, int channel) : board_(board), channel_(channel) {}
+    Board& board_;
+    int channel_;
+  };
+
+  // Channels count from 1, as on the board. A channel that does not exist throws at set().
+  DriveChannel osmc(int channel) { return {*this, CommandKind::osmc, channel}; }
+  DriveChannel dhb12(int channel) { return {*this, CommandKind::dhb12, channel}; }
+  ServoChannel servo(int channel) { return {*this, channel}; }
+  RelayChannel relay(int channel) { return {*this, channel}; }
+  StepperChannel stepper(int channel) { return {*this, channel}; }
+  BldcChannel bldc(int channel) { return {*this, channel}; }
+  void proximity(int channel, int threshold_cm, Duration timeout = default_timeout);  // 0: off
+  void fields(std::string_view names, Duration timeout = default_timeout);  // "DEFAULT,ENC1"
+  void setting(std::string_view key, std::string_view value, Duration timeout = default_timeout);
+
+  // --- what the board says
+
+  BoardIdentity identify(Duration timeout = default_timeout);
+  // The newest state, fields merged over all datagrams so far.
+  State state() const;
+  // Waits for a state newer than now; throws Error{refused} when none comes in time.
+  State next_state(Duration timeout = default_timeout);
+  LinkStatus link() const;
+  Statistics statistics() const;
+  const std::string& name() const;  // the transport, for people
+
+  void on_state(std::function<void(const State&)> callback);
+  void on_link(std::function<void(const LinkStatus&)> callback);
+  void on_event(std::function<void(const CarrierEvent&)> callback);
+
+  // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off.
+  void watchdog(Duration period);
+  void feed();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace r4

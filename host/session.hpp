@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The host's side of one board, without I/O: datagrams and time in, datagrams and events out.
+//
+// It keeps the link alive (protocol/host_link), takes control, chooses the state fields it needs, sends
+// commands and finds out whether the board executed them:
+//
+//     queued --link up--> sent --CMD == PNum in the board's state--> confirmed
+//                          |  ^                  N:…,<code>  ------> refused
+//                          +--+ the same bytes   deadline    ------> timed out
+//                         every 50 ms
+//
+// A retry has the bytes and the packet number of the original, so the board can execute it only once.
+// When CMD has moved past a command, the retry's answer (DUPLICATE: executed, STALE: not) decides.
+// A board without CMD (the paper's release) confirms by the value that its state shows.
+//
+// E:STOP does not wait for the link, overtakes everything, discards all commands that wait, and is
+// repeated every 20 ms until the board reports the reason `stop`.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "../protocol/command.hpp"
+#include "../protocol/host_link.hpp"
+#include "../protocol/message.hpp"
+#include "../protocol/state.hpp"
+#include "../transports/carrier.hpp"
+#include "statistics.hpp"
+
+namespace r4 {
+
+// Time of the host's steady clock; any start.
+using Time = std::chrono::microseconds;
+
+// What the host knows of the link.
+struct LinkStatus {
+  HostLinkState state = HostLinkState::connecting;
+  SafeReason reason = SafeReason::none;  // why the board is safe
+  bool busy = false;                     // another host controls the board
+  bool gated = false;                    // the application watchdog has stopped our heartbeats
+  friend bool operator==(const LinkStatus&, const LinkStatus&) = default;
+};
+
+// How a command ended.
+enum class Outcome : std::uint8_t {
+  confirmed,  // the board's own state says so
+  refused,    // the board refused it: `code`
+  timed_out,  // no confirmation until the deadline; it may or may not have been executed
+  cancelled,  // never sent: a stop, or the end of the session, came first
+};
+
+struct CommandResult {
+  Outcome outcome = Outcome::timed_out;
+  Refusal code = Refusal::none;     // for refused
+  Time elapsed{0};                  // from send() to now
+};
+
+// Names a command that send() took; never 0.
+using Ticket = std::uint64_t;
+
+struct SessionOptions {
+  HostLink::Timing timing;
+  // The state fields to ask for; SAFE and CMD are added. Empty: leave the board's choice alone.
+  std::string fields = "DEFAULT";
+  std::chrono::milliseconds command_retry{50};
+  std::chrono::milliseconds stop_retry{20};
+  std::chrono::milliseconds identify_interval{1000};  // Q:ID, for identity and round-trip time; 0: never
+};
+
+class Session {
+ public:
+  // What the session does and tells. The calls come from receive(), poll(), send() and stop(); the
+  // views are valid in the call.
+  class Handler {
+   public:
+    virtual void transmit(std::string_view datagram, Priority priority) = 0;
+    virtual void on_state(const State& state, const Datagram& datagram) = 0;
+    virtual void on_board_heartbeat(const Datagram& datagram) = 0;
+    virtual void on_identity(const Identity& identity) = 0;
+    virtual void on_nack(const Nack& nack, const Datagram& datagram) = 0;
+    virtual void on_bad_datagram(const ReadResult& result, std::string_view bytes) = 0;
+    virtual void on_link(const LinkStatus& status) = 0;
+    virtual void on_result(Ticket ticket, const CommandResult& result) = 0;
+
+   protected:
+    ~Handler() = default;
+  };
+
+  // `first_pnum`: echo_host_first_pnum plus 30 random bits (random_first_pnum()).
+  Session(Handler& handler, SessionOptions options, std::uint32_t first_pnum);
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  void receive(std::string_view bytes, Time now);
+  // Does what is due and returns the time until the next call is needed.
+  Time poll(Time now);
+
+  // Sends a command and finds out what became of it, by on_result() at the latest at `timeout` from
+  // now. Throws Error{usage} for a command outside its ranges; returns 0 when 64 are under way already.
+  Ticket send(const Command& command, Time timeout, Time now);
+  // Sends a command once and forgets it. False while the link is not up.
+  bool post(const Command& command, Time now);
+  // E:STOP. A Stop is confirmed when the board reports the reason stop.
+  Ticket stop(Time timeout, Time now);
+  // Asks who the board is; on_identity() follows. Confirmed by the answer.
+  Ticket identify(Time timeout, Time now);
+  // Gives a command up without on_result().
+  void forget(Ticket ticket);
+  // Ends every command under way as cancelled.
+  void cancel_all(Time now);
+
+  // The application watchdog: without feed() for `period` the heartbeats stop, and the board goes safe.
+  // 0 turns it off.
+  void watchdog(std::chrono::milliseconds period, Time now);
+  void feed(Time now);
+
+  const LinkStatus& link() const { return status_; }
+  const State& state() const { return state_; }
+  Statistics statistics(Time now) const;
+
+  static constexpr std::size_t max_pending = 64;
+  static std::uint32_t random_first_pnum();
+
+ private:
+  enum class Stage : std::uint8_t { free, queued, sent };
+  struct Pending {
+    Stage stage = Stage::free;
+    CommandKind kind = CommandKind::heartbeat;
+    Command command;             // without its texts
+    bool executed = false;       // the board said DUPLICATE: it has executed this number
+    bool internal = false;       // the session's own: no on_result()
+    std::uint32_t pnum = 0;
+    Ticket ticket = 0;
+    Time started{0}, deadline{0}, retry{0};
+    std::size_t fields_size = 0;   // bytes of the command's field in `bytes`
+    std::size_t size = 0;          // bytes of the whole datagram, once sent
+    std::array<char, max_datagram> bytes;
+  };
+
+  Pending* allocate(const Command& command, Time timeout, Time now);
+  Ticket add(const Command& command, Time timeout, Time now, bool internal);
+  void transmit(Pending& pending, Time now);
+  void send_queued(Time now);
+  void retry_due(Time now);
+  void finish(Pending& pending, Outcome outcome, Refusal code, Time now);
+  void send_heartbeat(Time now);
+  bool link_up() const;
+
+  void on_state_datagram(const Datagram& datagram, Arrival arrival, Time now);
+  void on_nack_datagram(const Datagram& datagram, Time now);
+  void confirm_from_state(const State& fresh, Time now);
+  void confirm_stop(Time now);
+  void select_fields(const State& fresh, Time now);
+  void refresh_status(Time now);
+
+  Handler& handler_;
+  SessionOptions options_;
+  HostLink link_;
+  LinkStatus status_;
+  State state_;
+  StatisticsCollector collector_;
+  std::unique_ptr<std::array<Pending, max_pending>> pending_;
+  Ticket next_ticket_ = 1;
+  std::uint32_t busy_until_ms_ = 0;
+  bool busy_ = false;
+  Time next_identify_{0};
+  Time question_sent_{0};
+  bool question_open_ = false;
+  Time command_field_seen_{0};
+  Time next_selection_{0};
+  int selections_ = 0;
+};
+
+}  // namespace r4
