@@ -1,0 +1,54 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Counts what tools/test ran. Usage: summary.py BUILD
+
+Reads BUILD/results/*.xml (ctest), BUILD/[asan|tsan/]junit/*.xml (pytest, in place of the one
+ctest entry of the file) and BUILD/results/checks.txt. Names every failed and every skipped test;
+a skipped test counts as failed. The last line is `N passed, N failed`.
+"""
+import pathlib
+import sys
+import xml.etree.ElementTree as ET
+
+
+def cases(file):
+    """Yields (name, outcome) for each test case of a JUnit file."""
+    for case in ET.parse(file).iter('testcase'):
+        children = {child.tag for child in case}
+        if children & {'failure', 'error'} or case.get('status') == 'fail':
+            outcome = 'failed'
+        elif 'skipped' in children or case.get('status', 'run') != 'run':
+            outcome = 'skipped'
+        else:
+            outcome = 'passed'
+        yield case.get('name'), outcome
+
+
+def outcomes(build):
+    for line in (build / 'results/checks.txt').read_text().splitlines():
+        outcome, name = line.split(' ', 1)
+        yield name, outcome
+    for report in sorted((build / 'results').glob('*.xml')):
+        preset = report.stem
+        junit = (build if preset == 'release' else build / preset) / 'junit'
+        for name, outcome in cases(report):
+            file = junit / (name.removeprefix('integration.') + '.xml')
+            inner = list(cases(file)) if name.startswith('integration.') and file.exists() else []
+            if outcome == 'failed' and all(each == 'passed' for _, each in inner):
+                inner = []  # the process failed, whatever its tests say
+            for each, its_outcome in [(f'{name}.{case}', o) for case, o in inner] or [(name, outcome)]:
+                yield f'{preset}: {each}', its_outcome
+
+
+def main():
+    found = list(outcomes(pathlib.Path(sys.argv[1])))
+    for name, outcome in found:
+        if outcome != 'passed':
+            print(f'{outcome}: {name}')
+    passed = sum(outcome == 'passed' for _, outcome in found)
+    print(f'{passed} passed, {len(found) - passed} failed')
+    return 0 if found and passed == len(found) else 1
+
+
+if __name__ == '__main__':
+    sys.exit(main())
