@@ -22,9 +22,12 @@ std::uint32_t period_of(const Settings& settings) { return 1000U / settings.stat
 
 const char* to_text(BoardState state) {
   switch (state) {
-    case BoardState::connecting: return "CONNECTING";
-    case BoardState::active: return "ACTIVE";
-    case BoardState::safe: return "SAFE";
+    case BoardState::connecting:
+      return "CONNECTING";
+    case BoardState::active:
+      return "ACTIVE";
+    case BoardState::safe:
+      return "SAFE";
   }
   return "unknown";
 }
@@ -355,8 +358,8 @@ void Application::send_states(std::uint32_t now_ms) {
 void Application::send_state(std::uint8_t port, const State& state, std::uint32_t t_ms) {
   PortSlot& slot = ports_[port];
   char buffer[max_datagram];
-  const std::size_t limit = slot.port->max_size() < sizeof buffer ? slot.port->max_size()
-                                                                  : sizeof buffer;
+  const std::size_t limit =
+      slot.port->max_size() < sizeof buffer ? slot.port->max_size() : sizeof buffer;
   FieldSet fields = setpoints_.fields;
   if (state.safe != SafeReason::none) fields.add(StateField::safe);
   DatagramWriter writer(buffer, limit);

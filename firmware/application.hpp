@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The R4 board's application: datagrams in, outputs and datagrams out (paper sections 2-4).
 //
-// It owns no thread, clock or socket. The port feeds it: receive() for each datagram, poll() when time
-// has passed, port_down() when a transport is gone; it answers through Hal and Port. Every path to the
-// outputs goes through update_outputs(), every way into the safe state through Safety.
+// It owns no thread, clock or socket. The port feeds it: receive() for each datagram, poll() when
+// time has passed, port_down() when a transport is gone; it answers through Hal and Port. Every
+// path to the outputs goes through update_outputs(), every way into the safe state through Safety.
 //
 //     CONNECTING   no host yet: outputs safe, `H:R4-ROS2;PNum:0;T:0;` each heartbeat interval
 //     ACTIVE       a host is alive and nothing is wrong: outputs follow the setpoints
@@ -49,7 +49,8 @@ class Application {
   void port_down(std::uint8_t port, std::uint32_t now_ms);
   // Something is wrong with the board itself: cause is fault or watchdog.
   void fail(SafeReason cause, std::uint32_t now_ms);
-  // Does everything that is due; returns the milliseconds until the next call is needed (at most 10).
+  // Does everything that is due; returns the milliseconds until the next call is needed (at most
+  // 10).
   std::uint32_t poll(std::uint32_t now_ms);
 
   BoardState state() const;

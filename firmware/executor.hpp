@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Carries out commands that have passed every check: setpoints, thresholds, field selection, settings.
+// Carries out commands that have passed every check: setpoints, thresholds, field selection,
+// settings.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +20,8 @@ struct Setpoints {
   Settings settings;
 };
 
-// Carries `command` out on `setpoints`: wholly, or not at all with the reason why. Stop, clear, zero,
-// heartbeat and identify change no setpoint and are left to the application.
+// Carries `command` out on `setpoints`: wholly, or not at all with the reason why. Stop, clear,
+// zero, heartbeat and identify change no setpoint and are left to the application.
 Refusal carry_out(const Command& command, Setpoints& setpoints);
 
 }  // namespace firmware

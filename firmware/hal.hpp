@@ -13,9 +13,9 @@ namespace firmware {
 
 // Where a stepper is to go, and how fast.
 struct StepperTarget {
-  std::int32_t position = 0;  // steps
+  std::int32_t position = 0;                   // steps
   std::int32_t speed = stepper_speed_default;  // steps per second
-  bool enabled = false;  // false: it stays where it is
+  bool enabled = false;                        // false: it stays where it is
   friend bool operator==(const StepperTarget& a, const StepperTarget& b) {
     return a.position == b.position && a.speed == b.speed && a.enabled == b.enabled;
   }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One transport as the board's application sees it: whole datagrams out, to one peer or to everyone.
+// One transport as the board's application sees it: whole datagrams out, to one peer or to
+// everyone.
 #pragma once
 
 #include <cstddef>

@@ -24,8 +24,8 @@ void Safety::clear() {
 }
 
 SafeReason Safety::reason() const {
-  static const SafeReason gravest_first[] = {SafeReason::stop,   SafeReason::fault,
-                                             SafeReason::watchdog, SafeReason::handle,
+  static const SafeReason gravest_first[] = {SafeReason::stop,      SafeReason::fault,
+                                             SafeReason::watchdog,  SafeReason::handle,
                                              SafeReason::proximity, SafeReason::link};
   for (const SafeReason cause : gravest_first) {
     if (has(cause)) return cause;

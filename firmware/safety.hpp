@@ -10,8 +10,8 @@
 //     watchdog   a duty missed its deadline               E:CLEAR                     cleared
 //
 // The outputs are safe while any cause is there. The board reports the gravest one: stop, fault,
-// watchdog, handle, proximity, link. E:CLEAR takes away only the one that is reported, so that nobody
-// clears what they have not seen.
+// watchdog, handle, proximity, link. E:CLEAR takes away only the one that is reported, so that
+// nobody clears what they have not seen.
 #pragma once
 
 #include <cstdint>

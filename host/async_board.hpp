@@ -8,8 +8,9 @@
 //                      [](const r4::CommandResult& result) { … });
 //     io.run();
 //
-// Everything happens on the io_context's thread: call it there, the callbacks come there. Completion
-// tokens work: callbacks, asio::use_future, asio::use_awaitable. The steady state allocates nothing.
+// Everything happens on the io_context's thread: call it there, the callbacks come there.
+// Completion tokens work: callbacks, asio::use_future, asio::use_awaitable. The steady state
+// allocates nothing.
 #pragma once
 
 #include <asio/async_result.hpp>
@@ -59,7 +60,9 @@ class AsyncBoard {
   template <class Token>
   auto async_identify(Duration timeout, Token&& token) {
     return asio::async_initiate<Token, void(CommandResult)>(
-        [this](auto handler, Duration t) { start_identify(t, make_completion(std::move(handler))); },
+        [this](auto handler, Duration t) {
+          start_identify(t, make_completion(std::move(handler)));
+        },
         token, timeout);
   }
 
@@ -102,7 +105,8 @@ class AsyncBoard {
   std::unique_ptr<Impl> impl_;
 };
 
-// The transports of the library: those of transports/ and `sim:`, the simulated board in this process.
+// The transports of the library: those of transports/ and `sim:`, the simulated board in this
+// process.
 const Registry& standard_registry();
 
 template <class Handler>

@@ -3,14 +3,13 @@
 //
 //     r4::Board board("udp://192.168.0.125");
 //     board.wait_active();
-//     board.osmc(1).set(358, r4::Direction::forward);   // returns when the board's state confirms it
-//     board.on_state([](const r4::State& s) { … });
-//     board.stop();                                     // every output safe, at once
+//     board.osmc(1).set(358, r4::Direction::forward);   // returns when the board's state confirms
+//     it board.on_state([](const r4::State& s) { … }); board.stop(); // every output safe, at once
 //
 // The board goes safe by itself when this object is gone or its process hangs: the heartbeats stop.
-// Errors are thrown as r4::Error with the thing, the reason and the fix: open and permission when the
-// transport cannot be opened, usage for a wrong URL or a value outside its range, refused when the board
-// refuses a command or does not confirm it in time.
+// Errors are thrown as r4::Error with the thing, the reason and the fix: open and permission when
+// the transport cannot be opened, usage for a wrong URL or a value outside its range, refused when
+// the board refuses a command or does not confirm it in time.
 //
 // Callbacks run on the board's own thread, one at a time, and must not block: a blocking call in a
 // callback throws Error{usage}; post() and stop_async() may be used there.
@@ -41,10 +40,12 @@ class Board {
   // Ends heartbeats and closes the transport; the board goes safe within its timeout. Idempotent.
   void close();
 
-  // Waits until the board is ACTIVE under our control; throws Error{refused} saying what it is instead.
+  // Waits until the board is ACTIVE under our control; throws Error{refused} saying what it is
+  // instead.
   void wait_active(Duration timeout = Duration{3000});
 
-  // --- commands: each returns when the board's own state confirms it, throws Error{refused} otherwise
+  // --- commands: each returns when the board's own state confirms it, throws Error{refused}
+  // otherwise
 
   void send(const Command& command, Duration timeout = default_timeout);
   // The same from the text of design: "O:358,1,1".

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The host's side of one board, without I/O: datagrams and time in, datagrams and events out.
 //
-// It keeps the link alive (protocol/host_link), takes control, chooses the state fields it needs, sends
-// commands and finds out whether the board executed them:
+// It keeps the link alive (protocol/host_link), takes control, chooses the state fields it needs,
+// sends commands and finds out whether the board executed them:
 //
 //     queued --link up--> sent --CMD == PNum in the board's state--> confirmed
 //                          |  ^                  N:…,<code>  ------> refused
 //                          +--+ the same bytes   deadline    ------> timed out
 //                         every 50 ms
 //
-// A retry has the bytes and the packet number of the original, so the board can execute it only once.
-// When CMD has moved past a command, the retry's answer (DUPLICATE: executed, STALE: not) decides.
-// A board without CMD (the paper's release) confirms by the value that its state shows.
+// A retry has the bytes and the packet number of the original, so the board can execute it only
+// once. When CMD has moved past a command, the retry's answer (DUPLICATE: executed, STALE: not)
+// decides. A board without CMD (the paper's release) confirms by the value that its state shows.
 //
 // E:STOP does not wait for the link, overtakes everything, discards all commands that wait, and is
 // repeated every 20 ms until the board reports the reason `stop`.
@@ -55,8 +55,8 @@ enum class Outcome : std::uint8_t {
 
 struct CommandResult {
   Outcome outcome = Outcome::timed_out;
-  Refusal code = Refusal::none;     // for refused
-  Time elapsed{0};                  // from send() to now
+  Refusal code = Refusal::none;  // for refused
+  Time elapsed{0};               // from send() to now
 };
 
 // Names a command that send() took; never 0.
@@ -68,7 +68,8 @@ struct SessionOptions {
   std::string fields = "DEFAULT";
   std::chrono::milliseconds command_retry{50};
   std::chrono::milliseconds stop_retry{20};
-  std::chrono::milliseconds identify_interval{1000};  // Q:ID, for identity and round-trip time; 0: never
+  std::chrono::milliseconds identify_interval{
+      1000};  // Q:ID, for identity and round-trip time; 0: never
 };
 
 class Session {
@@ -100,11 +101,13 @@ class Session {
   Time poll(Time now);
 
   // Sends a command and finds out what became of it, by on_result() at the latest at `timeout` from
-  // now. Throws Error{usage} for a command outside its ranges; returns 0 when 64 are under way already.
+  // now. Throws Error{usage} for a command outside its ranges; returns 0 when 64 are under way
+  // already.
   Ticket send(const Command& command, Time timeout, Time now);
   // Sends a command once and forgets it. False while the link is not up.
   bool post(const Command& command, Time now);
-  // E:STOP. A Stop is confirmed when the board reports the reason stop.
+  // E:STOP, sent before this returns. Confirmed when the board reports the reason stop. Returns 0,
+  // with the stop sent all the same, when 16 stops are under way already.
   Ticket stop(Time timeout, Time now);
   // Asks who the board is; on_identity() follows. Confirmed by the answer.
   Ticket identify(Time timeout, Time now);
@@ -113,8 +116,8 @@ class Session {
   // Ends every command under way as cancelled.
   void cancel_all(Time now);
 
-  // The application watchdog: without feed() for `period` the heartbeats stop, and the board goes safe.
-  // 0 turns it off.
+  // The application watchdog: without feed() for `period` the heartbeats stop, and the board goes
+  // safe. 0 turns it off.
   void watchdog(std::chrono::milliseconds period, Time now);
   void feed(Time now);
 
@@ -123,6 +126,7 @@ class Session {
   Statistics statistics(Time now) const;
 
   static constexpr std::size_t max_pending = 64;
+  static constexpr std::size_t max_stops = 16;
   static std::uint32_t random_first_pnum();
 
  private:
@@ -130,31 +134,32 @@ class Session {
   struct Pending {
     Stage stage = Stage::free;
     CommandKind kind = CommandKind::heartbeat;
-    Command command;             // without its texts
-    bool executed = false;       // the board said DUPLICATE: it has executed this number
-    bool internal = false;       // the session's own: no on_result()
+    Command command;         // without its texts
+    bool executed = false;   // the board said DUPLICATE: it has executed this number
+    bool overtaken = false;  // CMD is past it: the answer to a retry decides
     std::uint32_t pnum = 0;
     Ticket ticket = 0;
     Time started{0}, deadline{0}, retry{0};
-    std::size_t fields_size = 0;   // bytes of the command's field in `bytes`
-    std::size_t size = 0;          // bytes of the whole datagram, once sent
+    std::size_t fields_size = 0;  // bytes of the command's field in `bytes`
+    std::size_t size = 0;         // bytes of the whole datagram, once sent
     std::array<char, max_datagram> bytes;
   };
 
   Pending* allocate(const Command& command, Time timeout, Time now);
-  Ticket add(const Command& command, Time timeout, Time now, bool internal);
   void transmit(Pending& pending, Time now);
   void send_queued(Time now);
   void retry_due(Time now);
   void finish(Pending& pending, Outcome outcome, Refusal code, Time now);
-  void send_heartbeat(Time now);
+  void transmit_now(const Command& command, std::uint32_t t_ms, Priority priority);
   bool link_up() const;
 
-  void on_state_datagram(const Datagram& datagram, Arrival arrival, Time now);
+  void on_state_datagram(const Datagram& datagram, Time now);
+  void on_identity_datagram(const Datagram& datagram, Time now);
   void on_nack_datagram(const Datagram& datagram, Time now);
-  void confirm_from_state(const State& fresh, Time now);
+  void on_answer(const Datagram& datagram, Time now);
+  void confirm_from_state(Time now);
   void confirm_stop(Time now);
-  void select_fields(const State& fresh, Time now);
+  void select_fields(Time now);
   void refresh_status(Time now);
 
   Handler& handler_;
@@ -163,10 +168,10 @@ class Session {
   LinkStatus status_;
   State state_;
   StatisticsCollector collector_;
-  std::unique_ptr<std::array<Pending, max_pending>> pending_;
+  std::unique_ptr<std::array<Pending, max_pending + max_stops>> pending_;
   Ticket next_ticket_ = 1;
-  std::uint32_t busy_until_ms_ = 0;
-  bool busy_ = false;
+  std::uint32_t newest_command_ = 0;  // packet number of the last command sent
+  Time busy_until_{0};
   Time next_identify_{0};
   Time question_sent_{0};
   bool question_open_ = false;

@@ -12,20 +12,20 @@ namespace r4 {
 
 struct Statistics {
   // Datagrams of the board
-  std::uint64_t received = 0;    // valid ones
+  std::uint64_t received = 0;  // valid ones
   std::uint64_t states = 0;
-  std::uint64_t damaged = 0;     // bad checksum, syntax or length
-  PacketCounters packets;        // lost, duplicate, late, restarts
-  double state_rate_hz = 0;      // over the last second
+  std::uint64_t damaged = 0;  // bad checksum, syntax or length
+  PacketCounters packets;     // lost, duplicate, late, restarts
+  double state_rate_hz = 0;   // over the last second
   // Time, microseconds; 0 where nothing was measured yet
-  double round_trip_us = 0;      // question to answer, the newest
+  double round_trip_us = 0;  // question to answer, the newest
   double round_trip_min_us = 0;
   double round_trip_mean_us = 0;
-  double jitter_us = 0;          // interarrival jitter of the states (RFC 3550 6.4.1)
-  double state_age_us = 0;       // since the newest state arrived
+  double jitter_us = 0;     // interarrival jitter of the states (RFC 3550 6.4.1)
+  double state_age_us = 0;  // since the newest state arrived
   // Datagrams of ours
   std::uint64_t heartbeats = 0;
-  std::uint64_t commands = 0;    // retries not counted
+  std::uint64_t commands = 0;  // retries not counted
   std::uint64_t retries = 0;
   std::uint64_t confirmed = 0;
   std::uint64_t refused = 0;

@@ -207,8 +207,8 @@ bool BoardLink::heartbeat_due(std::uint32_t now_ms) const {
   const std::uint32_t since = now_ms - last_sent_ms_;
   if (since >= timing_.heartbeat_ms) return true;
   // An echo host whose echo stays away is asked again: one lost heartbeat must not become stale.
-  const bool waiting = state_ == BoardLinkState::active && echo_host_ &&
-                       newer(last_sent_ms_, newest_echo_ms_);
+  const bool waiting =
+      state_ == BoardLinkState::active && echo_host_ && newer(last_sent_ms_, newest_echo_ms_);
   return waiting && since >= echo_retry_ms;
 }
 

@@ -9,10 +9,10 @@
 //                                                fresh host heartbeat
 //
 // Two kinds of host. An *echo host* numbers from the upper half (PNum >= 2^31) and so declares that
-// the T of its heartbeats echoes the T of the board's newest heartbeat: only a fresh echo feeds, and
-// commands are executed only after the first echo of a T of this boot (armed), so that nothing which a
-// network held back, from before a reboot or an outage, can move a motor. A *paper host* numbers from
-// below (or leaves PNum out); its T is an echo if it once was one, else its own clock.
+// the T of its heartbeats echoes the T of the board's newest heartbeat: only a fresh echo feeds,
+// and commands are executed only after the first echo of a T of this boot (armed), so that nothing
+// which a network held back, from before a reboot or an outage, can move a motor. A *paper host*
+// numbers from below (or leaves PNum out); its T is an echo if it once was one, else its own clock.
 //
 // All times are the board's clock in ms, which wraps; it must start at a random value at boot.
 #pragma once
@@ -72,8 +72,9 @@ class BoardLink {
   };
   HeartbeatEffect on_heartbeat(const HostHeartbeat& heartbeat, std::uint32_t now_ms);
 
-  // May this command be executed? On `refuse`, `code` is stale, duplicate, safe or busy. The gate does
-  // not move until executed() is called, so a command that is refused for its content stays unexecuted.
+  // May this command be executed? On `refuse`, `code` is stale, duplicate, safe or busy. The gate
+  // does not move until executed() is called, so a command that is refused for its content stays
+  // unexecuted.
   Admission admit(Source from, std::uint32_t pnum, std::uint32_t now_ms, Refusal& code) const;
   // The owner's command with this number was carried out: it and all older ones are spent.
   void executed(std::uint32_t pnum);
@@ -125,16 +126,17 @@ class BoardLink {
   bool echo_host_ = false;
   bool armed_ = false;
   Clock clock_ = Clock::unknown;
-  bool has_baseline_ = false;         // numbers up to newest_ are spent
-  std::uint32_t newest_ = 0;          // newest executed command, or the session's first heartbeat
-  std::uint64_t executed_bits_ = 0;   // bit i: newest_ - i was executed
+  bool has_baseline_ = false;        // numbers up to newest_ are spent
+  std::uint32_t newest_ = 0;         // newest executed command, or the session's first heartbeat
+  std::uint64_t executed_bits_ = 0;  // bit i: newest_ - i was executed
   std::uint32_t last_executed_ = 0;
   bool has_heartbeat_pnum_ = false;
   std::uint32_t newest_heartbeat_ = 0;
   std::uint32_t newest_echo_ms_ = 0;
   std::uint32_t fed_ms_ = 0;
 
-  // Heartbeat numbers with their arrival, for late_limit_ms: a ring as long as the limit at 10 Hz needs.
+  // Heartbeat numbers with their arrival, for late_limit_ms: a ring as long as the limit at 10 Hz
+  // needs.
   struct Mark {
     std::uint32_t pnum;
     std::uint32_t at_ms;
@@ -150,8 +152,8 @@ class BoardLink {
   int sent_next_ = 0;
   bool any_sent_ = false;
   std::uint32_t last_sent_ms_ = 0;
-  std::uint32_t lost_ms_ = 0;      // when LOST was entered
-  bool send_now_ = true;           // boot, ACTIVE and LOST entered
+  std::uint32_t lost_ms_ = 0;  // when LOST was entered
+  bool send_now_ = true;       // boot, ACTIVE and LOST entered
 };
 
 }  // namespace r4

@@ -20,8 +20,9 @@ namespace r4 {
 
 class DatagramWriter {
  public:
-  DatagramWriter(char* buffer, std::size_t capacity)
-      : begin_(buffer), at_(buffer), end_(buffer + capacity) {}
+  // Goes on behind the first `used` bytes of the buffer, whole fields written before.
+  DatagramWriter(char* buffer, std::size_t capacity, std::size_t used = 0)
+      : begin_(buffer), at_(buffer + used), end_(buffer + capacity) {}
 
   DatagramWriter& field(Text name);
   DatagramWriter& value(Text text);

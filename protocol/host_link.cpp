@@ -5,10 +5,14 @@ namespace r4 {
 
 const char* to_text(HostLinkState state) {
   switch (state) {
-    case HostLinkState::connecting: return "connecting";
-    case HostLinkState::active: return "active";
-    case HostLinkState::safe: return "safe";
-    case HostLinkState::lost: return "lost";
+    case HostLinkState::connecting:
+      return "connecting";
+    case HostLinkState::active:
+      return "active";
+    case HostLinkState::safe:
+      return "safe";
+    case HostLinkState::lost:
+      return "lost";
   }
   return "unknown";
 }
@@ -26,9 +30,7 @@ Arrival HostLink::on_datagram(std::uint32_t pnum, std::uint32_t t_ms, bool heart
     return Arrival::first;
   }
   const Arrival arrival = tracker_.on(pnum);
-  const bool current = arrival == Arrival::first || arrival == Arrival::next ||
-                       arrival == Arrival::gap || arrival == Arrival::restart;
-  if (!current) return arrival;
+  if (!is_current(arrival)) return arrival;
   if (heartbeat) {
     echo_ = t_ms;
     answer_now_ = true;
@@ -36,6 +38,11 @@ Arrival HostLink::on_datagram(std::uint32_t pnum, std::uint32_t t_ms, bool heart
   reason_ = reason;
   state_ = reason == SafeReason::none ? HostLinkState::active : HostLinkState::safe;
   return arrival;
+}
+
+Arrival HostLink::on_answer(std::uint32_t pnum, std::uint32_t now_ms) {
+  heard_ms_ = now_ms;
+  return tracker_.on(pnum);
 }
 
 bool HostLink::poll(std::uint32_t now_ms) {

@@ -34,11 +34,15 @@ class HostLink {
   // `first_pnum` must be echo_host_first_pnum (board_link.hpp) plus 30 random bits.
   HostLink(Timing timing, std::uint32_t first_pnum) : timing_(timing), next_pnum_(first_pnum) {}
 
-  // A valid datagram of the board. Returns what its number says; a late, old or duplicate one does not
-  // change the state. `heartbeat`: it is a board heartbeat, answered at once by heartbeat_due().
-  // `reason`: its SAFE, none if it carries none.
+  // A valid datagram of the board. Returns what its number says; a late, old or duplicate one does
+  // not change the state. `heartbeat`: it is a board heartbeat, answered at once by
+  // heartbeat_due(). `reason`: its SAFE, none if it carries none.
   Arrival on_datagram(std::uint32_t pnum, std::uint32_t t_ms, bool heartbeat, SafeReason reason,
                       std::uint32_t now_ms);
+
+  // A valid answer of the board to us (N, I): it counts in the packet numbers and shows that the
+  // board is there, but says nothing of its state.
+  Arrival on_answer(std::uint32_t pnum, std::uint32_t now_ms);
 
   // Lets time pass: silence of the board. True if the state changed.
   bool poll(std::uint32_t now_ms);
@@ -50,7 +54,8 @@ class HostLink {
   // The T that it carries: the T of the board's newest heartbeat, 0 before the first.
   std::uint32_t echo() const { return echo_; }
 
-  // The application watchdog: heartbeats stop when feed() stays away for `period_ms`; 0 turns it off.
+  // The application watchdog: heartbeats stop when feed() stays away for `period_ms`; 0 turns it
+  // off.
   void watchdog(std::uint32_t period_ms, std::uint32_t now_ms);
   void feed(std::uint32_t now_ms) { fed_ms_ = now_ms; }
   bool watchdog_expired(std::uint32_t now_ms) const {
@@ -59,6 +64,8 @@ class HostLink {
 
   // The number for the next datagram that the host sends.
   std::uint32_t take_pnum() { return next_pnum_++; }
+  // The number that was taken last.
+  std::uint32_t last_pnum() const { return next_pnum_ - 1; }
 
   // Milliseconds until poll() or heartbeat_due() may have something to say; 0 is now.
   std::uint32_t due_in(std::uint32_t now_ms) const;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Tells lost, duplicate, reordered and restarted packet numbers apart (paper section 4.1: PNum).
 //
-// Packet numbers are unsigned 32 bit and wrap; "newer" is by serial-number arithmetic (RFC 1982). The
-// last 64 numbers are remembered, so a late packet is told from a repeated one and takes its loss back.
-// A number that is further behind is old news, until two old ones in a row rise: then the sender has
-// restarted (the rule of RFC 3550 A.1).
+// Packet numbers are unsigned 32 bit and wrap; "newer" is by serial-number arithmetic (RFC 1982).
+// The last 64 numbers are remembered, so a late packet is told from a repeated one and takes its
+// loss back. A number that is further behind is old news, until two old ones in a row rise: then
+// the sender has restarted (the rule of RFC 3550 A.1).
 #pragma once
 
 #include <cstdint>
@@ -26,9 +26,15 @@ enum class Arrival : std::uint8_t {
   restart,    // the sender began again
 };
 
+// Is the packet the newest so far? What an older one says is no longer so.
+constexpr bool is_current(Arrival arrival) {
+  return arrival == Arrival::first || arrival == Arrival::next || arrival == Arrival::gap ||
+         arrival == Arrival::restart;
+}
+
 struct PacketCounters {
-  std::uint32_t received = 0;   // every call of on()
-  std::uint32_t lost = 0;       // in gaps and not arrived late
+  std::uint32_t received = 0;  // every call of on()
+  std::uint32_t lost = 0;      // in gaps and not arrived late
   std::uint32_t duplicate = 0;
   std::uint32_t late = 0;
   std::uint32_t old = 0;
@@ -51,9 +57,9 @@ class PacketTracker {
 
  private:
   PacketCounters counters_;
-  std::uint64_t seen_ = 0;        // bit i: newest_ - i was seen
+  std::uint64_t seen_ = 0;  // bit i: newest_ - i was seen
   std::uint32_t newest_ = 0;
-  std::uint32_t suspect_ = 0;     // the number that would confirm a restart
+  std::uint32_t suspect_ = 0;  // the number that would confirm a restart
   bool started_ = false;
   bool suspecting_ = false;
 };

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Commands in words: their text form, and what to say when one is wrong or refused.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "../protocol/command.hpp"
+#include "../protocol/settings.hpp"
+#include "../transports/error.hpp"
+
+namespace r4 {
+
+// One command of the board, for help and for the fix in an error.
+struct CommandHelp {
+  char letter;
+  std::string_view form;     // "O:pwm,dir,ch"
+  std::string_view meaning;  // "OSMC motor driver"
+  std::string_view ranges;   // "pwm 0-4095, dir 0 or 1, ch 1-4"
+};
+
+// The help of the command with that letter; nullptr if there is none.
+const CommandHelp* command_help(char letter);
+// All of them, in the order of docs/protocol.md; terminated by letter 0.
+const CommandHelp* all_command_help();
+
+// The text of a command, as it is on the wire: "O:358,1,1".
+std::string text_of(const Command& command);
+
+// Parses "O:358,1,1" (with or without the final ';'). Throws Error{usage} naming what is wrong. The
+// command's texts are views of `text`.
+Command parse_command_text(std::string_view text);
+
+// The problem of a command, given as text, that is refused for its form or its values before it is
+// sent.
+Problem bad_command(std::string_view text, Refusal refusal);
+
+// What a board's refusal means: "no such channel".
+std::string_view meaning_of(Refusal refusal);
+
+}  // namespace r4

@@ -1,0 +1,430 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "session.hpp"
+
+#include <algorithm>
+#include <random>
+
+#include "../protocol/board_link.hpp"
+#include "../transports/error.hpp"
+#include "command_evidence.hpp"
+#include "command_help.hpp"
+
+namespace r4 {
+
+namespace {
+
+std::uint32_t to_ms(Time time) {
+  return static_cast<std::uint32_t>(
+      std::chrono::duration_cast<std::chrono::milliseconds>(time).count());
+}
+
+constexpr Time busy_memory = std::chrono::milliseconds{300};
+constexpr Time selection_retry = std::chrono::milliseconds{200};
+constexpr int max_selections = 5;  // a board that does not know F is left alone
+
+}  // namespace
+
+std::uint32_t Session::random_first_pnum() {
+  std::random_device random;
+  return echo_host_first_pnum + (random() & 0x3fffffffU);
+}
+
+Session::Session(Handler& handler, SessionOptions options, std::uint32_t first_pnum)
+    : handler_(handler),
+      options_(std::move(options)),
+      link_(options_.timing, first_pnum),
+      pending_(std::make_unique<std::array<Pending, max_pending + max_stops>>()) {
+  if (!options_.fields.empty()) options_.fields += ",SAFE,CMD";
+}
+
+// --- what comes in
+
+void Session::receive(std::string_view bytes, Time now) {
+  Datagram datagram;
+  const ReadResult result = read(bytes, datagram);
+  if (!result) {
+    ++collector_.counts.damaged;
+    handler_.on_bad_datagram(result, bytes);
+    return;
+  }
+  const MessageKind kind = kind_of(datagram);
+  const bool from_board = kind == MessageKind::board_heartbeat || kind == MessageKind::nack ||
+                          kind == MessageKind::identity || kind == MessageKind::state;
+  if (!from_board || !datagram.has_pnum() || !datagram.has_time()) return;
+  ++collector_.counts.received;
+
+  switch (kind) {
+    case MessageKind::nack:
+      on_nack_datagram(datagram, now);
+      break;
+    case MessageKind::identity:
+      on_identity_datagram(datagram, now);
+      break;
+    case MessageKind::board_heartbeat:
+      link_.on_datagram(datagram.pnum(), static_cast<std::uint32_t>(datagram.time_ms()), true,
+                        heartbeat_reason(datagram), to_ms(now));
+      handler_.on_board_heartbeat(datagram);
+      break;
+    default:
+      on_state_datagram(datagram, now);
+      break;
+  }
+  refresh_status(now);
+  confirm_stop(now);
+  poll(now);
+}
+
+void Session::on_state_datagram(const Datagram& datagram, Time now) {
+  State fresh = state_;
+  if (!read_state(datagram, fresh)) {
+    ++collector_.counts.damaged;
+    ReadResult result;
+    result.error = ReadError::syntax;
+    handler_.on_bad_datagram(result,
+                             std::string_view(datagram.bytes().data(), datagram.bytes().size()));
+    return;
+  }
+  const SafeReason reason = fresh.present.has(StateField::safe) ? fresh.safe : SafeReason::none;
+  const Arrival arrival = link_.on_datagram(fresh.pnum, fresh.t_ms, false, reason, to_ms(now));
+  if (!is_current(arrival)) return;  // an older state must not replace a newer one
+  collector_.on_state(fresh.t_ms, now);
+  state_ = fresh;
+  state_.safe = reason;
+  refresh_status(now);
+  confirm_from_state(now);
+  select_fields(now);
+  handler_.on_state(state_, datagram);
+}
+
+void Session::on_nack_datagram(const Datagram& datagram, Time now) {
+  Nack nack;
+  if (!read_nack(datagram, nack)) return;
+  if (nack.code == Refusal::busy) busy_until_ = now + busy_memory;
+  on_answer(datagram, now);
+  handler_.on_nack(nack, datagram);
+  for (Pending& pending : *pending_) {
+    if (pending.stage != Stage::sent || pending.pnum != nack.pnum) continue;
+    // STALE and BUSY: it was not executed and, numbered as it is, never will be. It may go out
+    // again under a new number, unless a later command was sent: the order of commands stays.
+    const bool again = nack.code == Refusal::busy ||
+                       (nack.code == Refusal::stale && pending.pnum == newest_command_);
+    if (nack.code == Refusal::duplicate) {
+      pending.executed = true;
+      confirm_from_state(now);
+    } else if (again) {
+      pending.stage = Stage::queued;
+    } else {
+      finish(pending, Outcome::refused, nack.code, now);
+    }
+  }
+}
+
+void Session::on_identity_datagram(const Datagram& datagram, Time now) {
+  Identity identity;
+  if (!read_identity(datagram, identity)) return;
+  on_answer(datagram, now);
+  if (question_open_) collector_.on_round_trip(now - question_sent_);
+  question_open_ = false;
+  handler_.on_identity(identity);
+  for (Pending& pending : *pending_) {
+    if (pending.stage == Stage::sent && pending.kind == CommandKind::identify) {
+      finish(pending, Outcome::confirmed, Refusal::none, now);
+    }
+  }
+}
+
+// An answer counts in the board's packet numbers, but not in those that a host without control
+// sees.
+void Session::on_answer(const Datagram& datagram, Time now) {
+  if (busy_until_ > now) return;
+  link_.on_answer(datagram.pnum(), to_ms(now));
+}
+
+// --- what the board's state proves
+
+void Session::confirm_from_state(Time now) {
+  const bool has_cmd = state_.present.has(StateField::cmd);
+  if (has_cmd) command_field_seen_ = now;
+  const bool no_cmd_to_come = options_.fields.empty() || selections_ >= max_selections;
+  for (Pending& pending : *pending_) {
+    if (pending.stage != Stage::sent || pending.kind == CommandKind::stop ||
+        pending.kind == CommandKind::identify) {
+      continue;
+    }
+    if (has_cmd) {
+      const bool exact = state_.last_command == pending.pnum;
+      const bool past = newer(state_.last_command, pending.pnum);
+      if (exact || (past && pending.executed)) {
+        finish(pending, Outcome::confirmed, Refusal::none, now);
+      } else if (past && !pending.overtaken) {
+        pending.overtaken = true;
+        pending.retry = now;  // ask at once what became of it
+      }
+    } else if (no_cmd_to_come && state_shows(state_, pending.command)) {
+      finish(pending, Outcome::confirmed, Refusal::none, now);
+    }
+  }
+}
+
+void Session::confirm_stop(Time now) {
+  if (link_.reason() != SafeReason::stop) return;
+  for (Pending& pending : *pending_) {
+    if (pending.stage == Stage::sent && pending.kind == CommandKind::stop) {
+      finish(pending, Outcome::confirmed, Refusal::none, now);
+    }
+  }
+}
+
+// Sees to it that the state has the fields we need, whoever chose others.
+void Session::select_fields(Time now) {
+  if (state_.present.has(StateField::cmd)) {
+    selections_ = 0;
+    return;
+  }
+  const bool split =
+      now - command_field_seen_ < selection_retry && command_field_seen_.count() != 0;
+  if (options_.fields.empty() || split || now < next_selection_) return;
+  if (selections_ >= max_selections) return;
+  ++selections_;
+  next_selection_ = now + selection_retry;
+  post(Command::fields(options_.fields), now);
+}
+
+// --- time
+
+Time Session::poll(Time now) {
+  link_.poll(to_ms(now));
+  refresh_status(now);
+  if (link_.heartbeat_due(to_ms(now))) {
+    transmit_now(Command::heartbeat(), link_.echo(), Priority::normal);
+    link_.heartbeat_sent(to_ms(now));
+    ++collector_.counts.heartbeats;
+  }
+  for (Pending& pending : *pending_) {
+    if (pending.stage != Stage::free && now >= pending.deadline) {
+      finish(pending, Outcome::timed_out, Refusal::none, now);
+    }
+  }
+  send_queued(now);
+  retry_due(now);
+  if (options_.identify_interval.count() != 0 && link_up() && now >= next_identify_) {
+    next_identify_ = now + options_.identify_interval;
+    question_sent_ = now;
+    question_open_ = true;
+    transmit_now(Command::identify(), to_ms(now), Priority::normal);
+  }
+
+  Time next = now + std::chrono::milliseconds{link_.due_in(to_ms(now))};
+  // due_in() counts whole milliseconds; aim behind the edge, not before it.
+  next = std::chrono::duration_cast<std::chrono::milliseconds>(next) + Time{0};
+  if (next <= now) next = now + Time{1000};
+  if (link_up() && options_.identify_interval.count() != 0) next = std::min(next, next_identify_);
+  if (busy_until_ > now) next = std::min(next, busy_until_);
+  for (const Pending& pending : *pending_) {
+    if (pending.stage == Stage::free) continue;
+    next = std::min(next, pending.deadline);
+    if (pending.stage == Stage::sent) next = std::min(next, pending.retry);
+  }
+  return next;
+}
+
+bool Session::link_up() const {
+  if (!link_.echoed()) return false;
+  switch (link_.state()) {
+    case HostLinkState::active:
+      return true;
+    case HostLinkState::safe:
+      return link_.reason() != SafeReason::link;
+    case HostLinkState::connecting:
+    case HostLinkState::lost:
+      return false;
+  }
+  return false;
+}
+
+void Session::refresh_status(Time now) {
+  const LinkStatus fresh{link_.state(), link_.reason(), busy_until_ > now,
+                         link_.watchdog_expired(to_ms(now))};
+  if (fresh == status_) return;
+  status_ = fresh;
+  handler_.on_link(status_);
+}
+
+// --- what goes out
+
+// A datagram of which no copy is kept.
+void Session::transmit_now(const Command& command, std::uint32_t t_ms, Priority priority) {
+  std::array<char, max_datagram> buffer;
+  DatagramWriter writer(buffer.data(), buffer.size());
+  write_command(writer, command);
+  const Text bytes = writer.finish(link_.take_pnum(), t_ms);
+  if (!bytes.empty()) handler_.transmit({bytes.data(), bytes.size()}, priority);
+}
+
+Session::Pending* Session::allocate(const Command& command, Time timeout, Time now) {
+  // Stops have slots of their own: no number of commands under way can keep one out.
+  const auto border = pending_->begin() + max_pending;
+  const bool stop = command.kind == CommandKind::stop;
+  const auto end = stop ? pending_->end() : border;
+  const auto slot = std::find_if(stop ? border : pending_->begin(), end,
+                                 [](const Pending& p) { return p.stage == Stage::free; });
+  if (slot == end) return nullptr;
+  DatagramWriter writer(slot->bytes.data(), slot->bytes.size());
+  write_command(writer, command);
+  if (!writer.ok() || writer.size() + DatagramWriter::trailer_max > slot->bytes.size()) {
+    throw Error(ErrorKind::usage, "command", "too long for one datagram",
+                "send fewer names at a time");
+  }
+  slot->stage = Stage::queued;
+  slot->command = command;
+  slot->command.text = slot->command.text2 = Text();
+  slot->kind = command.kind;
+  slot->fields_size = writer.size();
+  slot->executed = false;
+  slot->overtaken = false;
+  slot->ticket = next_ticket_++;
+  slot->started = now;
+  slot->deadline = now + timeout;
+  return &*slot;
+}
+
+Ticket Session::send(const Command& command, Time timeout, Time now) {
+  if (const Refusal refusal = check(command); refusal != Refusal::none) {
+    throw Error(bad_command(text_of(command), refusal));
+  }
+  Pending* pending = allocate(command, timeout, now);
+  if (pending == nullptr) return 0;
+  ++collector_.counts.commands;
+  const Ticket ticket = pending->ticket;
+  send_queued(now);
+  return ticket;
+}
+
+bool Session::post(const Command& command, Time now) {
+  if (const Refusal refusal = check(command); refusal != Refusal::none) {
+    throw Error(bad_command(text_of(command), refusal));
+  }
+  if (!link_up()) return false;
+  ++collector_.counts.commands;
+  transmit_now(command, to_ms(now), Priority::normal);
+  newest_command_ = link_.last_pnum();
+  return true;
+}
+
+Ticket Session::stop(Time timeout, Time now) {
+  ++collector_.counts.commands;
+  Ticket ticket = 0;
+  if (Pending* pending = allocate(Command::stop(), timeout, now)) {
+    ticket = pending->ticket;
+    transmit(*pending, now);
+  } else {
+    transmit_now(Command::stop(), to_ms(now), Priority::stop);
+  }
+  for (Pending& pending : *pending_) {  // nothing that was asked for before a stop may follow it
+    if (pending.stage != Stage::free && pending.kind != CommandKind::stop) {
+      finish(pending, Outcome::cancelled, Refusal::none, now);
+    }
+  }
+  return ticket;
+}
+
+Ticket Session::identify(Time timeout, Time now) {
+  Pending* pending = allocate(Command::identify(), timeout, now);
+  if (pending == nullptr) return 0;
+  const Ticket ticket = pending->ticket;
+  transmit(*pending, now);
+  return ticket;
+}
+
+// Sends a pending command: the first time with a number of its own, then the same bytes again.
+void Session::transmit(Pending& pending, Time now) {
+  const bool stop = pending.kind == CommandKind::stop;
+  if (pending.stage == Stage::queued) {
+    pending.pnum = link_.take_pnum();
+    // The field is there already; finish() appends what follows it.
+    DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.fields_size);
+    pending.size = writer.finish(pending.pnum, to_ms(now)).size();
+    pending.stage = Stage::sent;
+    pending.overtaken = false;
+    newest_command_ = pending.pnum;
+    if (pending.kind == CommandKind::identify) {
+      question_sent_ = now;
+      question_open_ = true;
+    }
+  } else {
+    ++collector_.counts.retries;
+  }
+  pending.retry = now + (stop ? Time{options_.stop_retry} : Time{options_.command_retry});
+  handler_.transmit(std::string_view(pending.bytes.data(), pending.size),
+                    stop ? Priority::stop : Priority::normal);
+}
+
+// In the order of send(): tickets rise.
+void Session::send_queued(Time now) {
+  if (!link_up() || busy_until_ > now) return;
+  for (;;) {
+    Pending* first = nullptr;
+    for (Pending& pending : *pending_) {
+      if (pending.stage != Stage::queued) continue;
+      if (first == nullptr || pending.ticket < first->ticket) first = &pending;
+    }
+    if (first == nullptr) return;
+    transmit(*first, now);
+  }
+}
+
+void Session::retry_due(Time now) {
+  for (Pending& pending : *pending_) {
+    if (pending.stage == Stage::sent && now >= pending.retry) transmit(pending, now);
+  }
+}
+
+void Session::finish(Pending& pending, Outcome outcome, Refusal code, Time now) {
+  switch (outcome) {
+    case Outcome::confirmed:
+      ++collector_.counts.confirmed;
+      break;
+    case Outcome::refused:
+      ++collector_.counts.refused;
+      break;
+    case Outcome::timed_out:
+      ++collector_.counts.timed_out;
+      break;
+    case Outcome::cancelled:
+      break;
+  }
+  const Ticket ticket = pending.ticket;
+  const CommandResult result{outcome, code, now - pending.started};
+  pending.stage = Stage::free;  // before the call: the handler may send again
+  handler_.on_result(ticket, result);
+}
+
+void Session::forget(Ticket ticket) {
+  for (Pending& pending : *pending_) {
+    if (pending.ticket == ticket) pending.stage = Stage::free;
+  }
+}
+
+void Session::cancel_all(Time now) {
+  for (Pending& pending : *pending_) {
+    if (pending.stage != Stage::free) finish(pending, Outcome::cancelled, Refusal::none, now);
+  }
+}
+
+void Session::watchdog(std::chrono::milliseconds period, Time now) {
+  link_.watchdog(static_cast<std::uint32_t>(period.count()), to_ms(now));
+  refresh_status(now);
+}
+
+void Session::feed(Time now) {
+  link_.feed(to_ms(now));
+  refresh_status(now);
+}
+
+Statistics Session::statistics(Time now) const {
+  Statistics report = collector_.report(now);
+  report.packets = link_.counters();
+  return report;
+}
+
+}  // namespace r4
