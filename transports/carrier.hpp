@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How whole datagrams travel: the interface that every transport implements.
+//
+// A carrier moves datagrams like UDP does: it may lose and reorder them, it never blocks, and it
+// never corrupts silently (the datagram's CRC is checked above it). It lives on one io_context and
+// is used from that io_context's thread only. The first open() throws when the transport cannot be
+// opened; after that, trouble is an event, and the carrier comes back by itself when the device
+// does.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "error.hpp"
+
+namespace r4 {
+
+// Who is at the other end, on carriers where several can be (a UDP socket of the board's side). A
+// carrier hands a number out for each sender; `everyone` is its standing audience.
+using Peer = std::uint32_t;
+inline constexpr Peer everyone = 0;
+
+// What a full queue does with a datagram.
+enum class Priority : std::uint8_t {
+  state,   // newest wins: an older waiting state is replaced
+  normal,  // waits its turn; refused when the queue is full
+  stop,    // overtakes everything and is never dropped
+};
+
+enum class SendResult : std::uint8_t {
+  sent,  // handed to the system, or waiting for it
+  full,  // the queue is full: try again later
+  down,  // the transport is down at the moment, or nobody is known at the other end
+};
+
+struct CarrierCounters {
+  std::uint64_t rx_datagrams = 0;
+  std::uint64_t rx_bytes = 0;
+  std::uint64_t rx_oversize = 0;  // lines or packets that were too long, thrown away
+  std::uint64_t rx_foreign = 0;   // packets from an address that is not the board's, thrown away
+  std::uint64_t tx_datagrams = 0;
+  std::uint64_t tx_bytes = 0;
+  std::uint64_t tx_dropped = 0;  // replaced by newer state, expired or refused
+  std::uint64_t tx_errors = 0;
+  std::uint64_t downs = 0;  // times the transport was lost
+  std::uint64_t ups = 0;    // times it came (back) up
+};
+
+struct CarrierEvent {
+  enum class Kind : std::uint8_t { up, down, warning };
+  Kind kind = Kind::warning;
+  Problem problem;  // for up: thing is the transport, the rest is empty
+};
+
+class Carrier {
+ public:
+  // Called on the io_context's thread; must not destroy the carrier.
+  class Handler {
+   public:
+    virtual void on_datagram(std::string_view bytes, Peer from) = 0;  // `bytes` valid in the call
+    virtual void on_carrier_event(const CarrierEvent& event) = 0;
+    // All datagrams that had arrived have been handed over. A handler that was held up can tell by
+    // it which state of a backlog is the newest. Behind a long burst on a byte stream it may come
+    // with the next datagram only.
+    virtual void on_drained() {}
+
+   protected:
+    ~Handler() = default;
+  };
+
+  virtual ~Carrier() = default;
+  Carrier() = default;
+  Carrier(const Carrier&) = delete;
+  Carrier& operator=(const Carrier&) = delete;
+
+  // Opens and begins to receive. `handler` must outlive the carrier or its close(). Throws Error.
+  // A transport that is up at once reports `up` before this returns.
+  virtual void open(Handler& handler) = 0;
+  // Stops at once; no call of the handler follows. Can be called twice.
+  virtual void close() noexcept = 0;
+
+  // Sends one datagram (no terminator). Never blocks; `bytes` are copied if they must wait. A
+  // datagram that could not be written within 100 ms is dropped and counted.
+  virtual SendResult send(std::string_view bytes, Priority priority, Peer to = everyone) = 0;
+
+  virtual bool up() const = 0;
+  // The longest datagram it carries, in bytes.
+  virtual std::size_t max_size() const = 0;
+  // For people: the URL, with what `auto` found.
+  virtual const std::string& name() const = 0;
+  virtual const CarrierCounters& counters() const = 0;
+};
+
+}  // namespace r4

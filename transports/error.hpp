@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The one error type of the host: what went wrong, why, and what to do about it.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace r4 {
+
+// What kind of trouble; the value is the exit code of `r4` (docs/transports.md).
+enum class ErrorKind : int {
+  data = 1,         // a datagram, a recording or a file is bad
+  usage = 2,        // a URL, an option or a command is wrong
+  refused = 3,      // the board refused, or did not confirm in time
+  open = 4,         // the transport cannot be opened or is gone
+  permission = 5,   // the system denies it
+  unsupported = 6,  // kernel support or interface missing
+};
+
+// A problem in words: "/dev/ttyACM0: permission denied; add yourself to the group dialout: …".
+struct Problem {
+  ErrorKind kind = ErrorKind::open;
+  std::string thing;   // what it is about: a URL, a device, a command
+  std::string reason;  // why
+  std::string fix;     // what to do; empty where nobody can know
+
+  std::string text() const { return thing + ": " + reason + (fix.empty() ? "" : "; " + fix); }
+};
+
+class Error : public std::runtime_error {
+ public:
+  explicit Error(Problem problem)
+      : std::runtime_error(problem.text()), problem_(std::move(problem)) {}
+  Error(ErrorKind kind, std::string thing, std::string reason, std::string fix = {})
+      : Error(Problem{kind, std::move(thing), std::move(reason), std::move(fix)}) {}
+  const Problem& problem() const { return problem_; }
+  ErrorKind kind() const { return problem_.kind; }
+
+ private:
+  Problem problem_;
+};
+
+}  // namespace r4

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Datagrams on a byte stream: one a line (docs/protocol.md "On a byte stream").
+//
+// A line ends with CR, LF or both; empty lines are passed over. We send CR LF. A line longer than
+// max_datagram is counted and thrown away up to its terminator, so that noise, a cut or a foreign
+// speed costs the datagrams it hit and no more. No heap; memory is one line.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "../../protocol/datagram.hpp"
+
+namespace r4 {
+
+class LineFraming {
+ public:
+  // Feeds `size` bytes; calls `on_line(Text)` for each line that they complete, without terminator.
+  // A line that lies whole in `data` is passed in place, without a copy. The Text is valid in the
+  // call.
+  template <class OnLine>
+  void push(const char* data, std::size_t size, OnLine&& on_line);
+
+  // Forgets an unfinished line (the stream was closed and opened again).
+  void reset();
+
+  std::uint32_t oversize() const { return oversize_; }  // lines thrown away
+  std::size_t pending() const { return used_; }         // bytes of the unfinished line
+
+ private:
+  char line_[max_datagram];
+  std::size_t used_ = 0;
+  std::uint32_t oversize_ = 0;
+  bool skipping_ = false;  // inside a line that is too long
+};
+
+// What ends a line that we send.
+constexpr Text line_end("\r\n");
+
+template <class OnLine>
+void LineFraming::push(const char* data, std::size_t size, OnLine&& on_line) {
+  const char* const end = data + size;
+  while (data != end) {
+    const char* stop = data;
+    while (stop != end && *stop != '\n' && *stop != '\r') ++stop;
+    const std::size_t length = static_cast<std::size_t>(stop - data);
+    if (!skipping_ && used_ + length > max_datagram) {
+      skipping_ = true;
+      used_ = 0;
+      ++oversize_;
+    }
+    if (stop == end) {
+      if (!skipping_ && length != 0) {
+        std::memcpy(line_ + used_, data, length);
+        used_ += length;
+      }
+      return;
+    }
+    if (!skipping_) {
+      if (used_ == 0) {
+        if (length != 0) on_line(Text(data, length));
+      } else {
+        std::memcpy(line_ + used_, data, length);
+        const Text line(line_, used_ + length);
+        used_ = 0;
+        on_line(line);
+      }
+    }
+    skipping_ = false;
+    data = stop + 1;
+  }
+}
+
+inline void LineFraming::reset() {
+  used_ = 0;
+  skipping_ = false;
+}
+
+}  // namespace r4

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// From a URL to a carrier: one table of schemes serves the library, the simulated board and `r4`.
+#pragma once
+
+#include <asio/io_context.hpp>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "carrier.hpp"
+#include "url.hpp"
+
+namespace r4 {
+
+// Which end of the link the carrier serves: a host calls out to a board, a board listens for hosts.
+enum class Role : std::uint8_t { host, board };
+
+using CarrierFactory =
+    std::function<std::unique_ptr<Carrier>(asio::io_context& io, const Url& url, Role role)>;
+
+class Registry {
+ public:
+  struct Entry {
+    std::string scheme;
+    std::string usage;    // "udp://HOST[:2018][?listen=2390]"
+    std::string meaning;  // one line for --help
+    CarrierFactory make;
+  };
+
+  // A registry with the transports of this folder: udp, serial, pty.
+  static Registry standard();
+
+  void add(Entry entry);
+  const std::vector<Entry>& entries() const { return entries_; }
+
+  // The carrier for a URL, not yet opened. Throws Error{usage} for an unknown scheme, naming those
+  // that exist, and for a URL that its scheme does not take.
+  std::unique_ptr<Carrier> make(asio::io_context& io, std::string_view url, Role role) const;
+
+ private:
+  std::vector<Entry> entries_;
+};
+
+}  // namespace r4

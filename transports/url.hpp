@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Where a board is: the URL grammar of every transport (docs/transports.md has the table).
+//
+//     url    = scheme ":" ["//" authority] [path] ["?" key "=" value *("&" key "=" value)]
+//     scheme = udp | serial | pty | sim | …        authority = HOST[:PORT] | [IPv6][:PORT]
+//
+// Percent-encoding is decoded in path and values.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "error.hpp"
+
+namespace r4 {
+
+class Url {
+ public:
+  // Throws Error{usage} that names the URL and what is wrong with it.
+  static Url parse(std::string_view text);
+
+  const std::string& text() const { return text_; }  // as it was given
+  const std::string& scheme() const { return scheme_; }
+  const std::string& host() const { return host_; }  // without brackets
+  std::optional<std::uint16_t> port() const { return port_; }
+  const std::string& path() const { return path_; }  // "/dev/ttyACM0", "auto", "can0"
+
+  // The value of a key, if it is there.
+  std::optional<std::string> get(std::string_view key) const;
+  // As a whole number within [min, max], or `fallback`; throws Error{usage} otherwise.
+  long get_number(std::string_view key, long min, long max, long fallback) const;
+  // Throws Error{usage} naming the first key that is not in the space-separated `allowed`.
+  void allow_only(std::string_view allowed) const;
+
+ private:
+  std::string text_, scheme_, host_, path_;
+  std::optional<std::uint16_t> port_;
+  std::map<std::string, std::string, std::less<>> query_;
+};
+
+}  // namespace r4
