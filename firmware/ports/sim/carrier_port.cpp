@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "carrier_port.hpp"
+
+#include <utility>
+
+namespace r4::sim {
+
+static_assert(r4::everyone == firmware::everyone, "peers go through unchanged");
+
+CarrierPort::CarrierPort(std::unique_ptr<Carrier> carrier, Owner& owner)
+    : carrier_(std::move(carrier)), owner_(owner) {}
+
+void CarrierPort::send(Text datagram, firmware::Urgency urgency, std::uint32_t peer) {
+  const Priority priority =
+      urgency == firmware::Urgency::state ? Priority::state : Priority::normal;
+  carrier_->send({datagram.data(), datagram.size()}, priority, peer);  // it counts what it drops
+}
+
+void CarrierPort::on_datagram(std::string_view bytes, Peer from) {
+  owner_.on_datagram(*this, from, bytes);
+}
+
+void CarrierPort::on_carrier_event(const CarrierEvent& event) {
+  owner_.on_carrier_event(*this, event);
+}
+
+}  // namespace r4::sim

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A carrier (transports/carrier.hpp) as a port of the board's application.
+#pragma once
+
+#include <memory>
+#include <string_view>
+
+#include "../../../transports/carrier.hpp"
+#include "../../port.hpp"
+
+namespace r4::sim {
+
+class CarrierPort final : public firmware::Port, private Carrier::Handler {
+ public:
+  // Whoever takes what arrives.
+  class Owner {
+   public:
+    virtual void on_datagram(CarrierPort& port, Peer from, std::string_view bytes) = 0;
+    virtual void on_carrier_event(CarrierPort& port, const CarrierEvent& event) = 0;
+
+   protected:
+    ~Owner() = default;
+  };
+
+  CarrierPort(std::unique_ptr<Carrier> carrier, Owner& owner);
+
+  void open() { carrier_->open(*this); }
+  void close() noexcept { carrier_->close(); }
+  const Carrier& carrier() const { return *carrier_; }
+
+  // The application's number for this port.
+  std::uint8_t number = 0;
+
+  void send(Text datagram, firmware::Urgency urgency, std::uint32_t peer) override;
+  std::size_t max_size() const override { return carrier_->max_size(); }
+
+ private:
+  void on_datagram(std::string_view bytes, Peer from) override;
+  void on_carrier_event(const CarrierEvent& event) override;
+
+  std::unique_ptr<Carrier> carrier_;
+  Owner& owner_;
+};
+
+}  // namespace r4::sim

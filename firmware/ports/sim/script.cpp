@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "script.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+
+#include "../../../protocol/numbers.hpp"
+#include "../../../protocol/state.hpp"
+#include "../../../protocol/units.hpp"
+#include "../../../transports/error.hpp"
+
+namespace r4::sim {
+
+namespace {
+
+// One line on its way to a step.
+struct Line {
+  std::string where;  // FILE:LINE
+  std::vector<std::string_view> words;
+};
+
+[[noreturn]] void fail(const Line& line, std::string_view what, const std::string& reason,
+                       const std::string& fix) {
+  throw Error(ErrorKind::data, line.where, "'" + std::string(what) + "' " + reason, fix);
+}
+
+std::vector<std::string_view> words_of(std::string_view line) {
+  constexpr std::string_view blanks = " \t\r";
+  line = line.substr(0, line.find('#'));
+  std::vector<std::string_view> words;
+  for (std::size_t at = line.find_first_not_of(blanks); at != std::string_view::npos;
+       at = line.find_first_not_of(blanks, at)) {
+    const std::size_t end = std::min(line.find_first_of(blanks, at), line.size());
+    words.push_back(line.substr(at, end - at));
+    at = end;
+  }
+  return words;
+}
+
+// Seconds with up to three decimals, as milliseconds.
+std::uint32_t time_of(const Line& line) {
+  constexpr std::uint32_t max_s = 1000000;
+  const std::string_view word = line.words[0];
+  const std::size_t point = std::min(word.find('.'), word.size());
+  std::string thousandths(word.substr(std::min(point + 1, word.size())));
+  const bool has_point = point != word.size();
+  std::uint32_t seconds = 0;
+  std::uint32_t milliseconds = 0;
+  const bool good_length = has_point ? !thousandths.empty() && thousandths.size() <= 3 : true;
+  thousandths.resize(3, '0');
+  if (!good_length || !parse_number(Text(word.substr(0, point)), seconds) || seconds > max_s ||
+      !parse_number(Text(thousandths), milliseconds)) {
+    fail(line, word, "is no time", "begin the line with seconds such as 1 or 0.125");
+  }
+  return seconds * 1000 + milliseconds;
+}
+
+int channel_of(const Line& line, int channels, const char* what) {
+  std::uint32_t channel = 0;
+  if (!parse_number(Text(line.words[2]), channel) || channel < 1 ||
+      channel > static_cast<std::uint32_t>(channels)) {
+    fail(line, line.words[2], std::string("is no ") + what,
+         "there are 1 to " + std::to_string(channels));
+  }
+  return static_cast<int>(channel);
+}
+
+void read_handle(const Line& line, ScriptStep& step) {
+  if (line.words[2] != "held" && line.words[2] != "released") {
+    fail(line, line.words[2], "is nothing a handle can be", "write held or released");
+  }
+  step.value = line.words[2] == "held" ? 1 : 0;
+}
+
+void read_ultrasonic(const Line& line, ScriptStep& step) {
+  step.channel = channel_of(line, ultrasonic_channels, "ultrasonic sensor");
+  std::uint32_t cm = 0;
+  if (!parse_number(Text(line.words[3]), cm) || cm > proximity_max_cm) {
+    fail(line, line.words[3], "is no distance", "write 0 (nothing) to 400 cm");
+  }
+  step.value = static_cast<std::int32_t>(cm);
+}
+
+void read_encoder(const Line& line, ScriptStep& step) {
+  step.channel = channel_of(line, encoder_channels, "encoder");
+  if (!parse_number(Text(line.words[3]), step.value)) {
+    fail(line, line.words[3], "is no count", "write a whole number of 32 bits");
+  }
+}
+
+void read_analog(const Line& line, ScriptStep& step) {
+  static constexpr StateField fields[analog_channels] = {StateField::ain24,    StateField::ain12,
+                                                         StateField::ain5,     StateField::aindmh,
+                                                         StateField::ainsteer, StateField::ain6};
+  const StateField* const name =
+      std::find(std::begin(fields), std::end(fields), state_field(Text(line.words[2])));
+  if (name == std::end(fields)) {
+    fail(line, line.words[2], "is no analog input",
+         "write AIN24, AIN12, AIN5, AINDMH, AINSTEER or AIN6");
+  }
+  step.channel = static_cast<int>(name - std::begin(fields));
+  if (!parse_hundredths(Text(line.words[3]), step.value)) {
+    fail(line, line.words[3], "is no voltage", "write volts such as 21.5");
+  }
+}
+
+struct Form {
+  std::string_view word;
+  std::size_t words;  // with the time
+  const char* usage;
+  ScriptStep::Kind kind;
+  void (*read)(const Line&, ScriptStep&);
+};
+constexpr Form forms[] = {
+    {"handle", 3, "TIME handle held|released", ScriptStep::Kind::handle, read_handle},
+    {"us", 4, "TIME us SENSOR CM", ScriptStep::Kind::ultrasonic, read_ultrasonic},
+    {"enc", 4, "TIME enc ENCODER COUNTS", ScriptStep::Kind::encoder, read_encoder},
+    {"analog", 4, "TIME analog NAME VOLTS", ScriptStep::Kind::analog, read_analog},
+    {"fault", 2, "TIME fault", ScriptStep::Kind::fault, nullptr},
+    {"watchdog", 2, "TIME watchdog", ScriptStep::Kind::watchdog, nullptr},
+    {"reboot", 2, "TIME reboot", ScriptStep::Kind::reboot, nullptr},
+};
+
+ScriptStep step_of(const Line& line) {
+  ScriptStep step;
+  step.at_ms = time_of(line);
+  if (line.words.size() < 2) {
+    fail(line, line.words[0], "has nothing to do at that time",
+         "follow the time with handle, us, enc, analog, fault, watchdog or reboot");
+  }
+  const auto* const form = std::find_if(std::begin(forms), std::end(forms),
+                                        [&](const Form& f) { return f.word == line.words[1]; });
+  if (form == std::end(forms)) {
+    fail(line, line.words[1], "is nothing that can happen",
+         "use handle, us, enc, analog, fault, watchdog or reboot");
+  }
+  if (line.words.size() != form->words) {
+    fail(line, line.words[1], "has too few or too many words", std::string("write ") + form->usage);
+  }
+  step.kind = form->kind;
+  if (form->read != nullptr) form->read(line, step);
+  return step;
+}
+
+}  // namespace
+
+Script Script::parse(std::string_view text, const std::string& name) {
+  Script script;
+  for (std::size_t number = 1; !text.empty(); ++number) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    Line line{name + ":" + std::to_string(number), words_of(text.substr(0, end))};
+    text.remove_prefix(std::min(end + 1, text.size()));
+    if (!line.words.empty()) script.steps_.push_back(step_of(line));
+  }
+  std::stable_sort(script.steps_.begin(), script.steps_.end(),
+                   [](const ScriptStep& a, const ScriptStep& b) { return a.at_ms < b.at_ms; });
+  return script;
+}
+
+Script Script::load(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  if (!file) {
+    throw Error(ErrorKind::usage, path,
+                std::string("the scenario cannot be read: ") + std::strerror(errno),
+                "give the path of a readable scenario file");
+  }
+  return parse(text, path);
+}
+
+}  // namespace r4::sim

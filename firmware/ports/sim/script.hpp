@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A scenario for the simulated board: what happens around it and to it, and when.
+//
+//     # TIME_S what args           '#' begins a comment; seconds since the start, to the
+//     millisecond 0.5 handle released          the dead-man's handle: held | released 1   us 1 15
+//     ultrasonic sensor 1 sees something at 15 cm; 0: nothing 1   enc 2 100                encoder
+//     2 stands at 100 counts 1   analog AIN24 21.5        that input stays at 21.5 V 3   fault the
+//     board finds itself broken 3   watchdog                 a duty of the board misses its
+//     deadline 4   reboot                   power off and on again
+//
+// Lines may stand in any order; those of the same time happen in theirs.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace r4::sim {
+
+struct ScriptStep {
+  enum class Kind : std::uint8_t { handle, ultrasonic, encoder, analog, fault, watchdog, reboot };
+  Kind kind = Kind::handle;
+  std::uint32_t at_ms = 0;
+  int channel = 0;         // ultrasonic, encoder: 1 …; analog: an Analog
+  std::int32_t value = 0;  // handle: 1 held; cm; counts; hundredths of a volt
+};
+
+class Script {
+ public:
+  Script() = default;
+
+  // `name` stands for the file in errors. Throws Error{data} as "FILE:LINE: reason; fix".
+  static Script parse(std::string_view text, const std::string& name);
+  // Throws Error{usage} if the file cannot be read.
+  static Script load(const std::string& path);
+
+  const std::vector<ScriptStep>& steps() const { return steps_; }  // in the order of time
+
+ private:
+  std::vector<ScriptStep> steps_;
+};
+
+}  // namespace r4::sim

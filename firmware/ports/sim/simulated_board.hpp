@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A whole R4 board in a process: the firmware's application on simulated hardware, reached through
+// any carriers. One timer drives it, which sleeps until the application needs time.
+//
+// It lives on one io_context and is used from that io_context's thread only. A datagram costs no
+// heap.
+#pragma once
+
+#include <asio/io_context.hpp>
+#include <asio/steady_timer.hpp>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "../../application.hpp"
+#include "carrier_port.hpp"
+#include "script.hpp"
+#include "simulated_hal.hpp"
+
+namespace r4::sim {
+
+class SimulatedBoard final : private firmware::Observer, private CarrierPort::Owner {
+ public:
+  // What happens on the board; each may be empty, none may stop the board. `t_ms` is the board's
+  // clock, the T of its datagrams.
+  struct Events {
+    std::function<void(std::uint32_t t_ms, firmware::BoardState, SafeReason)> on_state;
+    std::function<void(std::uint32_t t_ms, const firmware::Outputs&)> on_outputs;
+    std::function<void(std::uint32_t t_ms, std::uint32_t pnum, const Command&)> on_executed;
+    std::function<void(std::uint32_t t_ms, std::uint32_t pnum, Refusal)> on_refused;
+    std::function<void(std::uint32_t t_ms, const Carrier&, const CarrierEvent&)> on_carrier;
+  };
+
+  struct Options {
+    std::optional<std::uint64_t> seed;  // of clock and analog inputs; another each time if absent
+    std::string board_id = "sim-1";     // the texts of its answer to Q:ID
+    std::string firmware_version = "0.1.0";
+    std::string capabilities = "sim";
+    Script script;
+    Settings settings;
+    Events events;
+    // A clock in ms, for tests. With one the board has no timer: the caller calls poll().
+    std::function<std::uint32_t()> clock_ms;
+  };
+
+  SimulatedBoard(asio::io_context& io, Options options);
+  ~SimulatedBoard();
+
+  // Before start(); at most Application::max_ports. Throws Error{usage} for one more.
+  void add_carrier(std::unique_ptr<Carrier> carrier);
+
+  // Opens the carriers (throws Error if one cannot be opened) and switches the board on.
+  void start();
+  // Switches it off: outputs off, carriers closed.
+  void stop() noexcept;
+
+  // Does everything that is due; returns the milliseconds until the next call is needed.
+  std::uint32_t poll();
+
+  SimulatedHal& hal() { return hal_; }
+  // The firmware running now; only between start() and stop().
+  const firmware::Application& application() const { return *application_; }
+  // The board's clock.
+  std::uint32_t now_ms() const { return board_ms(elapsed()); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  using Milliseconds = std::chrono::milliseconds;
+
+  Milliseconds elapsed() const;  // since start()
+  std::uint32_t board_ms(Milliseconds elapsed) const {
+    return static_cast<std::uint32_t>(elapsed.count()) + clock_offset_ms_;
+  }
+  void boot(Milliseconds elapsed);
+  void advance(Milliseconds elapsed);
+  void take(const ScriptStep& step, Milliseconds elapsed);
+  std::uint32_t poll(Milliseconds elapsed);
+  void settle_downs(std::uint32_t t_ms);
+  void arm(Milliseconds at);
+
+  void on_datagram(CarrierPort& port, Peer from, std::string_view bytes) override;
+  void on_carrier_event(CarrierPort& port, const CarrierEvent& event) override;
+
+  void on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason reason) override;
+  void on_outputs(std::uint32_t t_ms, const firmware::Outputs& outputs) override;
+  void on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command) override;
+  void on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code) override;
+
+  Options options_;
+  std::uint64_t seed_;
+  SimulatedHal hal_;
+  std::vector<std::unique_ptr<CarrierPort>> ports_;
+  std::optional<firmware::Application> application_;
+
+  std::uint32_t clock_offset_ms_ =
+      0;  // another for each boot, so that no T of one is a T of another
+  std::uint32_t boots_ = 0;
+  Clock::time_point start_;
+  std::uint32_t clock_start_ms_ = 0;  // of options_.clock_ms
+  std::size_t next_step_ = 0;
+  bool in_application_ = false;  // a carrier may report its end from inside a send
+  std::uint32_t downs_ = 0;      // bit n: port n went down meanwhile
+
+  asio::steady_timer timer_;
+  bool armed_ = false;
+  Milliseconds armed_for_{};
+  std::shared_ptr<const bool> alive_;  // timer handlers may come after stop()
+};
+
+}  // namespace r4::sim
