@@ -129,9 +129,8 @@ class Values {
   bool out_of_range_ = false;
 };
 
-// E, H and Q: one of the letter's words, alone.
-Refusal parse_word(char letter, const Values& values, Command& out) {
-  const Text word = values.text(0);
+// E, H and Q: is it one of the letter's words?
+bool read_word(char letter, Text word, Command& out) {
   if (letter == 'H' && word == host_heartbeat_word) {
     out = Command::heartbeat();
   } else if (letter == 'E' && word == stop_word) {
@@ -141,9 +140,9 @@ Refusal parse_word(char letter, const Values& values, Command& out) {
   } else if (letter == 'Q' && word == identify_word) {
     out = Command::identify();
   } else {
-    return word.empty() ? Refusal::format : Refusal::unknown;
+    return false;
   }
-  return values.count() == 1 ? Refusal::none : Refusal::format;
+  return true;
 }
 
 Command read_stepper(Values& v) {
@@ -260,7 +259,10 @@ Refusal parse_command(const Field& field, Command& out) {
     case 'H':
     case 'E':
     case 'Q':
-      return parse_word(letter, v, out);
+      if (v.text(0).empty()) return Refusal::format;
+      if (!read_word(letter, v.text(0), command)) return Refusal::unknown;
+      v.count_is(1);
+      break;
     case 'O':
       if (v.count_is(3)) command = Command::osmc(v.number(0), v.direction(1), v.number(2));
       break;
