@@ -96,6 +96,8 @@ class BoardLink {
   BoardLinkState state() const { return state_; }
   bool has_owner() const { return state_ == BoardLinkState::active; }
   Source owner() const { return owner_; }
+  // When the owner was last heard alive: a heartbeat that fed. Only after the first session began.
+  std::uint32_t fed_ms() const { return fed_ms_; }
   // The number of the last command executed in this session (the CMD field); 0 before the first.
   std::uint32_t last_executed() const { return last_executed_; }
 
@@ -104,6 +106,8 @@ class BoardLink {
   static constexpr std::uint32_t late_limit_ms = 250;
   // How far ahead of the newest known number a command may be.
   static constexpr std::uint32_t command_window = 65536;
+  // How far back it is known which numbers were executed: there DUPLICATE and STALE are exact.
+  static constexpr std::uint32_t memory = 64;
 
  private:
   enum class Clock : std::uint8_t { unknown, echo, own };  // what a paper host's T turned out to be
