@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Any bytes: whatever the protocol accepts, written again, reads equal. The input is taken as it
+// is, and as fields to which the right checksum is put, so that the fuzzer need not find CRCs.
+#include <cstdint>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "protocol/command.hpp"
+#include "protocol/crc32.hpp"
+#include "protocol/datagram.hpp"
+#include "protocol/datagram_writer.hpp"
+#include "protocol/message.hpp"
+#include "protocol/numbers.hpp"
+#include "protocol/settings.hpp"
+#include "protocol/state.hpp"
+
+namespace {
+
+using namespace r4;
+
+void require(bool holds) {
+  if (!holds) std::abort();
+}
+
+std::string str(Text text) { return {text.data(), text.size()}; }
+
+// What `write` puts into a datagram, without PNum, T and CRC.
+template <class Write>
+std::string written(Write write) {
+  static char buffer[4 * max_datagram];
+  DatagramWriter writer(buffer, sizeof buffer);
+  write(writer);
+  require(writer.ok());
+  return {buffer, writer.size()};
+}
+
+Field field_of(const std::string& text) {
+  Field field;
+  require(read_field(text, field));
+  return field;
+}
+
+void fields_read_equal(const Datagram& datagram) {
+  const std::string fields = written([&](DatagramWriter& writer) {
+    for (const Field& field : datagram) {
+      std::vector<Text> values(field.count());
+      require(field.split(values.data(), values.size()) == values.size());
+      writer.field(field.name());
+      for (const Text value : values) writer.value(value);
+    }
+  });
+  require(str(datagram.bytes()).starts_with(fields + ";^0x"));
+
+  static char buffer[max_datagram];
+  DatagramWriter writer(buffer, sizeof buffer);
+  for (const Field& field : datagram) writer.field(field.name()).values(field.values());
+  const Text again = writer.finish();
+  require(!again.empty());
+  Datagram second;
+  require(static_cast<bool>(read(again, second)));
+  require(second.has_pnum() == datagram.has_pnum() && second.pnum() == datagram.pnum());
+  require(second.has_time() == datagram.has_time() && second.time_ms() == datagram.time_ms());
+  for (auto a = datagram.begin(), b = second.begin(); a != datagram.end(); ++a, ++b) {
+    require(b != second.end() && a->name() == b->name() && a->values() == b->values());
+  }
+}
+
+std::string fields_of(const State& state) {
+  return written([&](DatagramWriter& writer) {
+    for (int i = 0; i < state_field_count; ++i) {
+      const auto field = static_cast<StateField>(i);
+      if (state.present.has(field)) write_field(writer, field, state);
+    }
+    writer.field("PNum").value(state.pnum);
+    writer.field("T").value(state.t_ms);
+  });
+}
+
+void state_reads_equal(const Datagram& datagram) {
+  State state;
+  if (!read_state(datagram, state)) {
+    require(state.present.empty() && fields_of(state) == fields_of(State()));
+    return;
+  }
+  const std::string fields = fields_of(state);
+  std::string bytes = fields + ";^";
+  char hex[max_number_text];
+  char* const hex_end = write_hex(hex, crc32(bytes));
+  bytes += "0x" + std::string(hex, hex_end) + '^';
+  if (bytes.size() > max_datagram) return;
+  Datagram second;
+  require(static_cast<bool>(read(bytes, second)));
+  State back;
+  require(read_state(second, back));
+  require(back.present == state.present && fields_of(back) == fields);
+}
+
+std::string text_of(const Command& command) {
+  return written([&](DatagramWriter& writer) { write_command(writer, command); });
+}
+
+void command_reads_equal(const Field& field) {
+  Command command;
+  const Refusal refusal = parse_command(field, command);
+  require(refusal_from(name_of(refusal)) == refusal);
+  if (refusal != Refusal::none) return;
+  require(check(command) == Refusal::none);
+  const std::string text = text_of(command);
+  Command again;
+  require(parse_command(field_of(text), again) == Refusal::none);
+  require(again.kind == command.kind && again.channel == command.channel &&
+          again.value == command.value && again.speed == command.speed &&
+          again.direction == command.direction && again.on == command.on &&
+          again.text == command.text && again.text2 == command.text2);
+  require(text_of(again) == text);
+  FieldSet set;
+  if (command.kind == CommandKind::fields && parse_fields(command.text, set) == Refusal::none) {
+    require(!set.empty());
+  }
+  Settings settings;
+  if (command.kind == CommandKind::setting) {
+    set = FieldSet();
+    static_cast<void>(r4::set(settings, command.text, command.text2));
+    require(settings.heartbeat_ms < settings.timeout_ms && settings.state_rate_hz >= 1);
+  }
+}
+
+void messages_read_equal(const Datagram& datagram) {
+  require(to_text(kind_of(datagram)) != nullptr);
+  require(static_cast<int>(heartbeat_reason(datagram)) < safe_reason_count);
+  Nack nack;
+  if (read_nack(datagram, nack)) {
+    const std::string text = written([&](DatagramWriter& writer) { write_nack(writer, nack); });
+    Text values[2];
+    std::uint32_t pnum = 0;
+    require(field_of(text).split(values, 2) == 2 && parse_number(values[0], pnum));
+    require(pnum == nack.pnum && refusal_from(values[1]) == nack.code);
+  }
+  Identity identity;
+  if (read_identity(datagram, identity)) {
+    const std::string text =
+        written([&](DatagramWriter& writer) { write_identity(writer, identity); });
+    require(text == "I:" + str(datagram.find("I").values()));
+  }
+}
+
+void try_bytes(const std::string& bytes) {
+  Datagram datagram;
+  const ReadResult result = read(bytes, datagram);
+  if (!result) {
+    require(result.position <= bytes.size());
+    return;
+  }
+  fields_read_equal(datagram);
+  state_reads_equal(datagram);
+  messages_read_equal(datagram);
+  int count = 0;
+  const Field command = command_field(datagram, count);
+  require(count == 0 ? command.name().empty() : command.name().size() == 1);
+  for (const Field& field : datagram) command_reads_equal(field);
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  std::string bytes(reinterpret_cast<const char*>(data), size);
+  try_bytes(bytes);
+  bytes = bytes.substr(0, bytes.find('^')) + '^';
+  char hex[max_number_text];
+  char* const hex_end = write_hex(hex, crc32(bytes));
+  try_bytes(bytes + "0x" + std::string(hex, hex_end) + '^');
+  return 0;
+}
