@@ -44,6 +44,7 @@ void SimulatedBoard::start() {
   start_ = Clock::now();
   clock_start_ms_ = options_.clock_ms ? options_.clock_ms() : 0;
   next_step_ = 0;
+  power_on(elapsed());
   try {
     for (const auto& port : ports_) port->open();
   } catch (...) {
@@ -68,12 +69,12 @@ SimulatedBoard::Milliseconds SimulatedBoard::elapsed() const {
   return std::chrono::floor<Milliseconds>(Clock::now() - start_);
 }
 
-void SimulatedBoard::boot(Milliseconds elapsed) {
+// A fresh application on hardware that has just got its supply.
+void SimulatedBoard::power_on(Milliseconds elapsed) {
   clock_offset_ms_ = static_cast<std::uint32_t>(scramble(seed_ + boots_));
   ++boots_;
   downs_ = 0;
-  const std::uint32_t t_ms = board_ms(elapsed);
-  hal_.power_on(t_ms);
+  hal_.power_on(board_ms(elapsed));
   firmware::Application::Config config;
   config.identity.firmware = Text(options_.firmware_version);
   config.identity.board_id = Text(options_.board_id);
@@ -82,8 +83,11 @@ void SimulatedBoard::boot(Milliseconds elapsed) {
   Observer& observer = *this;
   application_.emplace(hal_, config, &observer);
   for (const auto& port : ports_) port->number = application_->add_port(*port);
+}
+
+void SimulatedBoard::boot(Milliseconds elapsed) {
   in_application_ = true;
-  application_->start(t_ms);
+  application_->start(board_ms(elapsed));
   in_application_ = false;
 }
 
@@ -132,6 +136,7 @@ void SimulatedBoard::take(const ScriptStep& step, Milliseconds elapsed) {
       application_->fail(SafeReason::watchdog, board_ms(elapsed));
       break;
     case ScriptStep::Kind::reboot:
+      power_on(elapsed);
       boot(elapsed);
       break;
   }

@@ -76,6 +76,7 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   std::uint32_t board_ms(Milliseconds elapsed) const {
     return static_cast<std::uint32_t>(elapsed.count()) + clock_offset_ms_;
   }
+  void power_on(Milliseconds elapsed);
   void boot(Milliseconds elapsed);
   void advance(Milliseconds elapsed);
   void take(const ScriptStep& step, Milliseconds elapsed);
