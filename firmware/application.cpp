@@ -161,12 +161,10 @@ void Application::on_command(Source from, const Datagram& datagram, std::uint32_
     case Admission::execute:
       break;
   }
-  if (drives_output(command.kind) && safety_.is_safe()) {
-    refuse(from, datagram, Refusal::safe, now_ms);
-    return;
-  }
-  const Refusal outcome = carry_out(command, setpoints_);
+  const bool held = drives_output(command.kind) && safety_.is_safe();
+  const Refusal outcome = held ? Refusal::safe : carry_out(command, setpoints_);
   if (outcome != Refusal::none) {
+    link_.spend(datagram.pnum());
     refuse(from, datagram, outcome, now_ms);
     return;
   }

@@ -32,6 +32,7 @@ std::uint32_t Session::random_first_pnum() {
 Session::Session(Handler& handler, SessionOptions options, std::uint32_t first_pnum)
     : handler_(handler),
       options_(std::move(options)),
+      first_pnum_(first_pnum),
       link_(options_.timing, first_pnum),
       pending_(std::make_unique<std::array<Pending, max_pending + max_stops>>()) {
   if (!options_.fields.empty()) options_.fields += ",SAFE,CMD";
@@ -99,29 +100,31 @@ void Session::on_state_datagram(const Datagram& datagram, Time now) {
 void Session::on_nack_datagram(const Datagram& datagram, Time now) {
   Nack nack;
   if (!read_nack(datagram, nack)) return;
+  knows_cmd_ = true;  // the paper's release answers nothing
   if (nack.code == Refusal::busy) busy_until_ = now + busy_memory;
   on_answer(datagram, now);
   handler_.on_nack(nack, datagram);
   for (Pending& pending : *pending_) {
     if (pending.stage != Stage::sent || pending.pnum != nack.pnum) continue;
-    // STALE and BUSY: it was not executed and, numbered as it is, never will be. It may go out
-    // again under a new number, unless a later command was sent: the order of commands stays.
-    const bool again = nack.code == Refusal::busy ||
-                       (nack.code == Refusal::stale && pending.pnum == newest_command_);
     if (nack.code == Refusal::duplicate) {
       pending.executed = true;
       confirm_from_state(now);
-    } else if (again) {
-      pending.stage = Stage::queued;
-    } else {
-      finish(pending, Outcome::refused, nack.code, now);
+      continue;
     }
+    // A refusal proves that the command was not executed only while the board remembers: not over
+    // an outage, a reboot, another host's control or too many numbers. Then the deadline ends it,
+    // as unknown.
+    if (nack.code == Refusal::busy) pending.doubtful = true;
+    const bool remembered =
+        !pending.doubtful && link_up() && link_.last_pnum() - pending.pnum < BoardLink::memory;
+    if (remembered) finish(pending, Outcome::refused, nack.code, now);
   }
 }
 
 void Session::on_identity_datagram(const Datagram& datagram, Time now) {
   Identity identity;
   if (!read_identity(datagram, identity)) return;
+  knows_cmd_ = true;
   on_answer(datagram, now);
   if (question_open_) collector_.on_round_trip(now - question_sent_);
   question_open_ = false;
@@ -137,15 +140,20 @@ void Session::on_identity_datagram(const Datagram& datagram, Time now) {
 // sees.
 void Session::on_answer(const Datagram& datagram, Time now) {
   if (busy_until_ > now) return;
-  link_.on_answer(datagram.pnum(), to_ms(now));
+  link_.on_answer(datagram.pnum(), static_cast<std::uint32_t>(datagram.time_ms()), to_ms(now));
 }
 
 // --- what the board's state proves
 
 void Session::confirm_from_state(Time now) {
   const bool has_cmd = state_.present.has(StateField::cmd);
-  if (has_cmd) command_field_seen_ = now;
-  const bool no_cmd_to_come = options_.fields.empty() || selections_ >= max_selections;
+  if (has_cmd) {
+    command_field_seen_ = now;
+    knows_cmd_ = true;
+    // One of our numbers: the board has executed a command of ours, so we control it.
+    const std::uint32_t ours = link_.last_pnum() - first_pnum_;
+    if (link_up() && state_.last_command - first_pnum_ <= ours) controlled_ = true;
+  }
   for (Pending& pending : *pending_) {
     if (pending.stage != Stage::sent || pending.kind == CommandKind::stop ||
         pending.kind == CommandKind::identify) {
@@ -160,7 +168,8 @@ void Session::confirm_from_state(Time now) {
         pending.overtaken = true;
         pending.retry = now;  // ask at once what became of it
       }
-    } else if (no_cmd_to_come && state_shows(state_, pending.command)) {
+    } else if (!knows_cmd_ && (options_.fields.empty() || selections_ >= max_selections) &&
+               state_shows(state_, pending.command)) {
       finish(pending, Outcome::confirmed, Refusal::none, now);
     }
   }
@@ -175,19 +184,18 @@ void Session::confirm_stop(Time now) {
   }
 }
 
-// Sees to it that the state has the fields we need, whoever chose others.
+// Sees to it that the state has the fields we need, whoever chose others, and that we are in
+// control.
 void Session::select_fields(Time now) {
-  if (state_.present.has(StateField::cmd)) {
+  if (controlled_ && now - command_field_seen_ < selection_retry) {
     selections_ = 0;
     return;
   }
-  const bool split =
-      now - command_field_seen_ < selection_retry && command_field_seen_.count() != 0;
-  if (options_.fields.empty() || split || now < next_selection_) return;
-  if (selections_ >= max_selections) return;
+  if (options_.fields.empty() || !link_up() || busy_until_ > now) return;
+  if (now < next_selection_ || speaks_no_cmd()) return;
   ++selections_;
   next_selection_ = now + selection_retry;
-  post(Command::fields(options_.fields), now);
+  transmit_now(Command::fields(options_.fields), to_ms(now), Priority::normal);
 }
 
 // --- time
@@ -242,7 +250,23 @@ bool Session::link_up() const {
   return false;
 }
 
+// Commands wait for proof of control: the session's own F, executed. So none is ever sent into a
+// session that the board has not accepted, where a refusal would say nothing.
+bool Session::in_control(Time now) const {
+  const bool proven = controlled_ || options_.fields.empty() || speaks_no_cmd();
+  return link_up() && busy_until_ <= now && proven;
+}
+
+// The paper's release: it has let our selections pass, and has never answered anything.
+bool Session::speaks_no_cmd() const { return !knows_cmd_ && selections_ >= max_selections; }
+
 void Session::refresh_status(Time now) {
+  if (!link_up() || busy_until_ > now) {
+    controlled_ = false;
+    for (Pending& pending : *pending_) {
+      if (pending.stage == Stage::sent) pending.doubtful = true;
+    }
+  }
   const LinkStatus fresh{link_.state(), link_.reason(), busy_until_ > now,
                          link_.watchdog_expired(to_ms(now))};
   if (fresh == status_) return;
@@ -282,6 +306,7 @@ Session::Pending* Session::allocate(const Command& command, Time timeout, Time n
   slot->fields_size = writer.size();
   slot->executed = false;
   slot->overtaken = false;
+  slot->doubtful = false;
   slot->ticket = next_ticket_++;
   slot->started = now;
   slot->deadline = now + timeout;
@@ -304,10 +329,10 @@ bool Session::post(const Command& command, Time now) {
   if (const Refusal refusal = check(command); refusal != Refusal::none) {
     throw Error(bad_command(text_of(command), refusal));
   }
-  if (!link_up()) return false;
+  send_queued(now);  // what was asked for earlier goes first
+  if (!in_control(now)) return false;
   ++collector_.counts.commands;
   transmit_now(command, to_ms(now), Priority::normal);
-  newest_command_ = link_.last_pnum();
   return true;
 }
 
@@ -345,8 +370,6 @@ void Session::transmit(Pending& pending, Time now) {
     DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.fields_size);
     pending.size = writer.finish(pending.pnum, to_ms(now)).size();
     pending.stage = Stage::sent;
-    pending.overtaken = false;
-    newest_command_ = pending.pnum;
     if (pending.kind == CommandKind::identify) {
       question_sent_ = now;
       question_open_ = true;
@@ -361,7 +384,7 @@ void Session::transmit(Pending& pending, Time now) {
 
 // In the order of send(): tickets rise.
 void Session::send_queued(Time now) {
-  if (!link_up() || busy_until_ > now) return;
+  if (!in_control(now)) return;
   for (;;) {
     Pending* first = nullptr;
     for (Pending& pending : *pending_) {

@@ -4,7 +4,7 @@
 // It keeps the link alive (protocol/host_link), takes control, chooses the state fields it needs,
 // sends commands and finds out whether the board executed them:
 //
-//     queued --link up--> sent --CMD == PNum in the board's state--> confirmed
+//     queued --control--> sent --CMD == PNum in the board's state--> confirmed
 //                          |  ^                  N:…,<code>  ------> refused
 //                          +--+ the same bytes   deadline    ------> timed out
 //                         every 50 ms
@@ -48,7 +48,7 @@ struct LinkStatus {
 // How a command ended.
 enum class Outcome : std::uint8_t {
   confirmed,  // the board's own state says so
-  refused,    // the board refused it: `code`
+  refused,    // the board refused it, and did not execute it: `code`
   timed_out,  // no confirmation until the deadline; it may or may not have been executed
   cancelled,  // never sent: a stop, or the end of the session, came first
 };
@@ -136,6 +136,7 @@ class Session {
     CommandKind kind = CommandKind::heartbeat;
     Command command;         // without its texts
     bool executed = false;   // the board said DUPLICATE: it has executed this number
+    bool doubtful = false;   // the link was down since: a refusal proves nothing any more
     bool overtaken = false;  // CMD is past it: the answer to a retry decides
     std::uint32_t pnum = 0;
     Ticket ticket = 0;
@@ -152,6 +153,8 @@ class Session {
   void finish(Pending& pending, Outcome outcome, Refusal code, Time now);
   void transmit_now(const Command& command, std::uint32_t t_ms, Priority priority);
   bool link_up() const;
+  bool in_control(Time now) const;
+  bool speaks_no_cmd() const;
 
   void on_state_datagram(const Datagram& datagram, Time now);
   void on_identity_datagram(const Datagram& datagram, Time now);
@@ -164,13 +167,14 @@ class Session {
 
   Handler& handler_;
   SessionOptions options_;
+  std::uint32_t first_pnum_;
   HostLink link_;
+  bool controlled_ = false;  // the board has executed a command of ours since the link came up
   LinkStatus status_;
   State state_;
   StatisticsCollector collector_;
   std::unique_ptr<std::array<Pending, max_pending + max_stops>> pending_;
   Ticket next_ticket_ = 1;
-  std::uint32_t newest_command_ = 0;  // packet number of the last command sent
   Time busy_until_{0};
   Time next_identify_{0};
   Time question_sent_{0};
@@ -178,6 +182,7 @@ class Session {
   Time command_field_seen_{0};
   Time next_selection_{0};
   int selections_ = 0;
+  bool knows_cmd_ = false;  // the board speaks this protocol, not only the paper's release of it
 };
 
 }  // namespace r4

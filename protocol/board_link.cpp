@@ -139,25 +139,25 @@ HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uin
 
 Admission BoardLink::admit(Source from, std::uint32_t pnum, std::uint32_t now_ms,
                            Refusal& code) const {
+  // Whatever the link is now: a number that was executed is answered so, and the host knows.
+  const std::uint32_t behind = newest_ - pnum;
+  const bool ours = has_session_ && from == owner_;
+  if (ours && has_baseline_ && behind < memory && ((executed_bits_ >> behind) & 1U) != 0) {
+    code = Refusal::duplicate;
+    return Admission::refuse;
+  }
   if (state_ != BoardLinkState::active) {
     code = Refusal::safe;
     return Admission::refuse;
   }
-  if (from != owner_) {
+  if (!ours) {
     code = Refusal::busy;
     return Admission::refuse;
   }
   if (!armed_) return Admission::drop;
-  if (has_baseline_) {
-    const std::uint32_t behind = newest_ - pnum;
-    if (behind < 64 && ((executed_bits_ >> behind) & 1U) != 0) {
-      code = Refusal::duplicate;
-      return Admission::refuse;
-    }
-    if (!newer(pnum, newest_) || pnum - newest_ > command_window) {
-      code = Refusal::stale;
-      return Admission::refuse;
-    }
+  if (has_baseline_ && (!newer(pnum, newest_) || pnum - newest_ > command_window)) {
+    code = Refusal::stale;
+    return Admission::refuse;
   }
   for (int i = 0; i < marks_used_; ++i) {
     if (now_ms - marks_[i].at_ms > late_limit_ms && newer(marks_[i].pnum, pnum)) {
@@ -168,11 +168,10 @@ Admission BoardLink::admit(Source from, std::uint32_t pnum, std::uint32_t now_ms
   return Admission::execute;
 }
 
-// Commands up to `pnum` are not to be executed any more.
 void BoardLink::spend(std::uint32_t pnum) {
   if (has_baseline_ && !newer(pnum, newest_)) return;
-  const std::uint32_t ahead = has_baseline_ ? pnum - newest_ : 64;
-  executed_bits_ = ahead < 64 ? executed_bits_ << ahead : 0;
+  const std::uint32_t ahead = has_baseline_ ? pnum - newest_ : memory;
+  executed_bits_ = ahead < memory ? executed_bits_ << ahead : 0;
   newest_ = pnum;
   has_baseline_ = true;
 }
@@ -180,7 +179,7 @@ void BoardLink::spend(std::uint32_t pnum) {
 void BoardLink::executed(std::uint32_t pnum) {
   spend(pnum);
   const std::uint32_t behind = newest_ - pnum;
-  if (behind < 64) executed_bits_ |= std::uint64_t{1} << behind;
+  if (behind < memory) executed_bits_ |= std::uint64_t{1} << behind;
   if (behind == 0) last_executed_ = pnum;
 }
 

@@ -20,9 +20,13 @@ namespace r4 {
 
 class DatagramWriter {
  public:
-  // Goes on behind the first `used` bytes of the buffer, whole fields written before.
+  // Goes on behind the first `used` bytes of the buffer: size() of a writer that wrote them there.
   DatagramWriter(char* buffer, std::size_t capacity, std::size_t used = 0)
-      : begin_(buffer), at_(buffer + used), end_(buffer + capacity) {}
+      : begin_(buffer),
+        at_(buffer + used),
+        end_(buffer + capacity),
+        open_(used != 0),
+        has_value_(used != 0) {}
 
   DatagramWriter& field(Text name);
   DatagramWriter& value(Text text);
@@ -61,8 +65,8 @@ class DatagramWriter {
   char* at_;
   char* end_;
   bool ok_ = true;
-  bool open_ = false;       // a field is being written
-  bool has_value_ = false;  // it has a value already
+  bool open_;       // a field is being written
+  bool has_value_;  // it has a value already
 };
 
 }  // namespace r4

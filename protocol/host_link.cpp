@@ -19,9 +19,10 @@ const char* to_text(HostLinkState state) {
 
 Arrival HostLink::on_datagram(std::uint32_t pnum, std::uint32_t t_ms, bool heartbeat,
                               SafeReason reason, std::uint32_t now_ms) {
-  heard_ms_ = now_ms;
   if (heartbeat && pnum == 0 && t_ms == 0) {  // the board is booting: it knows nothing of us
+    heard_ms_ = now_ms;
     if (tracker_.started()) tracker_.restart();
+    board_clock_known_ = false;
     state_ = HostLinkState::connecting;
     reason_ = reason;
     echo_ = 0;
@@ -29,6 +30,7 @@ Arrival HostLink::on_datagram(std::uint32_t pnum, std::uint32_t t_ms, bool heart
     answer_now_ = true;
     return Arrival::first;
   }
+  notice_boot(t_ms, now_ms);
   const Arrival arrival = tracker_.on(pnum);
   if (!is_current(arrival)) return arrival;
   if (heartbeat) {
@@ -40,9 +42,26 @@ Arrival HostLink::on_datagram(std::uint32_t pnum, std::uint32_t t_ms, bool heart
   return arrival;
 }
 
-Arrival HostLink::on_answer(std::uint32_t pnum, std::uint32_t now_ms) {
-  heard_ms_ = now_ms;
+Arrival HostLink::on_answer(std::uint32_t pnum, std::uint32_t t_ms, std::uint32_t now_ms) {
+  notice_boot(t_ms, now_ms);
   return tracker_.on(pnum);
+}
+
+// Each boot has a clock of its own: a T that does not fit the last one is of a board that has begun
+// again, even if its first heartbeats were lost.
+void HostLink::notice_boot(std::uint32_t t_ms, std::uint32_t now_ms) {
+  if (board_clock_known_) {
+    const std::uint32_t expected = board_ms_ + (now_ms - heard_ms_);
+    const std::int32_t off = static_cast<std::int32_t>(t_ms - expected);
+    if (off > boot_tolerance_ms || off < -boot_tolerance_ms) {
+      tracker_.restart();
+      echo_ = 0;
+      echoed_ = false;
+    }
+  }
+  board_clock_known_ = true;
+  board_ms_ = t_ms;
+  heard_ms_ = now_ms;
 }
 
 bool HostLink::poll(std::uint32_t now_ms) {

@@ -42,7 +42,7 @@ class HostLink {
 
   // A valid answer of the board to us (N, I): it counts in the packet numbers and shows that the
   // board is there, but says nothing of its state.
-  Arrival on_answer(std::uint32_t pnum, std::uint32_t now_ms);
+  Arrival on_answer(std::uint32_t pnum, std::uint32_t t_ms, std::uint32_t now_ms);
 
   // Lets time pass: silence of the board. True if the state changed.
   bool poll(std::uint32_t now_ms);
@@ -71,12 +71,17 @@ class HostLink {
   std::uint32_t due_in(std::uint32_t now_ms) const;
 
   HostLinkState state() const { return state_; }
-  // Has the board heard a real echo of ours (and so armed the session)?
+  // Have we echoed a real T of this boot of the board? It executes no command of ours before.
   bool echoed() const { return echoed_; }
   SafeReason reason() const { return reason_; }
   const PacketCounters& counters() const { return tracker_.counters(); }
 
+  // A T this far from where the board's clock should be is of another boot.
+  static constexpr std::int32_t boot_tolerance_ms = 10000;
+
  private:
+  void notice_boot(std::uint32_t t_ms, std::uint32_t now_ms);
+
   Timing timing_;
   std::uint32_t next_pnum_;
   HostLinkState state_ = HostLinkState::connecting;
@@ -84,6 +89,8 @@ class HostLink {
   PacketTracker tracker_;
   std::uint32_t echo_ = 0;
   std::uint32_t heard_ms_ = 0;
+  std::uint32_t board_ms_ = 0;  // the board's T at heard_ms_
+  bool board_clock_known_ = false;
   std::uint32_t sent_ms_ = 0;
   bool any_sent_ = false;
   bool answer_now_ = true;  // the first heartbeat goes out at once

@@ -16,7 +16,7 @@ ALLOWED = {
     'transports/framing': {'protocol'},
     'transports': {'transports/framing', 'protocol'},
     'firmware': {'transports/framing', 'protocol'},
-    'firmware/ports': {'firmware', 'transports/framing', 'protocol'},
+    'firmware/ports': {'firmware', 'transports', 'transports/framing', 'protocol'},
     'host': {'transports', 'transports/framing', 'protocol'},
     'tools': {'host', 'transports', 'firmware', 'firmware/ports', 'transports/framing', 'protocol'},
 }

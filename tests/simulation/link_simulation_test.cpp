@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The promises of docs/safety.md under random faults. R4_SCHEDULES sets how many schedules are run
+// (100,000 by default), R4_SEED replays one and prints its trace.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "world.hpp"
+
+namespace r4::simulation {
+namespace {
+
+std::uint64_t from_environment(const char* name, std::uint64_t fallback) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? fallback : std::strtoull(value, nullptr, 10);
+}
+
+std::string tail_of(const Report& report, std::size_t lines) {
+  std::string text;
+  const std::size_t from = report.trace.size() > lines ? report.trace.size() - lines : 0;
+  for (std::size_t i = from; i < report.trace.size(); ++i) text += report.trace[i] + "\n";
+  return text;
+}
+
+TEST(LinkSimulation, KeepsEveryPromiseUnderRandomFaults) {
+  if (std::getenv("R4_SEED") != nullptr) {
+    const Report report = World(from_environment("R4_SEED", 0), true).run();
+    fmt::print("{}", tail_of(report, report.trace.size()));
+    EXPECT_EQ(report.violation, "");
+    return;
+  }
+  const std::uint64_t schedules = from_environment("R4_SCHEDULES", 100'000);
+  std::atomic<std::uint64_t> next{1};
+  std::mutex mutex;
+  Report sum;
+  std::vector<std::uint64_t> failing;
+  auto work = [&] {
+    Report mine;
+    for (std::uint64_t seed = next++; seed <= schedules; seed = next++) {
+      const Report report = World(seed, false).run();
+      mine.executed += report.executed;
+      mine.confirmed += report.confirmed;
+      mine.refused += report.refused;
+      mine.timed_out += report.timed_out;
+      mine.link_losses += report.link_losses;
+      mine.restores += report.restores;
+      mine.stops += report.stops;
+      mine.busy += report.busy;
+      mine.stale += report.stale;
+      mine.duplicate += report.duplicate;
+      mine.worst_silence_us = std::max(mine.worst_silence_us, report.worst_silence_us);
+      if (!report.violation.empty()) {
+        const std::lock_guard lock(mutex);
+        failing.push_back(seed);
+      }
+    }
+    const std::lock_guard lock(mutex);
+    sum.executed += mine.executed;
+    sum.confirmed += mine.confirmed;
+    sum.refused += mine.refused;
+    sum.timed_out += mine.timed_out;
+    sum.link_losses += mine.link_losses;
+    sum.restores += mine.restores;
+    sum.stops += mine.stops;
+    sum.busy += mine.busy;
+    sum.stale += mine.stale;
+    sum.duplicate += mine.duplicate;
+    sum.worst_silence_us = std::max(sum.worst_silence_us, mine.worst_silence_us);
+  };
+  std::vector<std::thread> threads;
+  for (unsigned i = 0; i < std::max(1U, std::thread::hardware_concurrency()); ++i) {
+    threads.emplace_back(work);
+  }
+  for (std::thread& thread : threads) thread.join();
+
+  fmt::print(
+      "{} schedules: {} violations; {} commands executed, {} confirmed, {} refused, {} timed out; "
+      "{} links lost, {} outputs restored, {} stops; answers {} BUSY, {} STALE, {} DUPLICATE; "
+      "longest silence to safe {:.1f} ms\n",
+      schedules, failing.size(), sum.executed, sum.confirmed, sum.refused, sum.timed_out,
+      sum.link_losses, sum.restores, sum.stops, sum.busy, sum.stale, sum.duplicate,
+      static_cast<double>(sum.worst_silence_us) / 1000);
+  std::sort(failing.begin(), failing.end());
+  for (std::size_t i = 0; i < failing.size() && i < 3; ++i) {
+    const Report report = World(failing[i], true).run();
+    ADD_FAILURE() << report.violation << "\nreplay: R4_SEED=" << failing[i]
+                  << " with this test; the end of its trace:\n"
+                  << tail_of(report, 60);
+  }
+  EXPECT_EQ(failing.size(), 0U);
+  // The schedules must reach what they are to test.
+  EXPECT_GT(sum.executed, schedules);
+  EXPECT_GT(sum.restores, schedules / 100);
+  EXPECT_GT(sum.stale, schedules / 100);
+  EXPECT_GT(sum.duplicate, schedules / 100);
+  EXPECT_GT(sum.busy, schedules / 100);
+}
+
+TEST(LinkSimulation, RepeatsASeedToTheSameTrace) {
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    const Report first = World(seed, true).run();
+    const Report second = World(seed, true).run();
+    ASSERT_EQ(first.trace, second.trace) << "seed " << seed;
+    ASSERT_EQ(first.trace_hash, World(seed, false).run().trace_hash) << "seed " << seed;
+  }
+}
+
+TEST(LinkSimulation, TripsFalselyLessThanOnceADayAtTenPercentLoss) {
+  Schedule day;
+  day.duration_us = 24ULL * 3600 * 1'000'000;
+  day.settings.state_rate_hz = 1;
+  day.to_board.loss = day.to_host.loss = 0.1;
+  day.command_interval_us = 3'600'000'000U;
+  const Report report = World(1, day, false).run();
+  fmt::print("false trips in a day at 10 % loss: {}\n", report.link_losses);
+  EXPECT_EQ(report.violation, "");
+  EXPECT_EQ(report.link_losses, 0U);
+}
+
+}  // namespace
+}  // namespace r4::simulation

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "schedule.hpp"
+
+namespace r4::simulation {
+
+namespace {
+
+ChannelFaults random_faults(Random& random) {
+  ChannelFaults faults;
+  static constexpr double losses[] = {0, 0, 0.01, 0.1, 0.3};
+  static constexpr double shares[] = {0, 0, 0.02, 0.2};
+  static constexpr std::uint32_t jitters_us[] = {0, 0, 2'000, 20'000, 150'000};
+  static constexpr std::uint32_t delays_us[] = {100, 1'000, 10'000, 100'000};
+  faults.loss = random.pick(losses);
+  faults.duplicate = random.pick(shares);
+  faults.corrupt = random.pick(shares) / 2;
+  faults.delay_us = random.pick(delays_us);
+  faults.jitter_us = random.pick(jitters_us);
+  if (random.chance(0.4)) {
+    faults.straggle = 0.05;
+    faults.straggle_us = static_cast<std::uint32_t>(random.between(200'000, 4'000'000));
+  }
+  return faults;
+}
+
+}  // namespace
+
+Schedule Schedule::random(Random& random) {
+  Schedule s;
+  s.duration_us = random.between(2'500'000, 6'000'000);
+  s.hosts = random.chance(0.25) ? 2 : 1;
+  static constexpr std::uint16_t rates[] = {5, 10, 10, 20, 20, 50, 100};
+  s.settings.state_rate_hz = random.pick(rates);
+  s.settings.recovery = random.chance(0.7) ? Recovery::last : Recovery::rearm;
+  s.to_board = random_faults(random);
+  s.to_host = random_faults(random);
+  s.command_interval_us = static_cast<std::uint32_t>(random.between(5'000, 400'000));
+  s.command_timeout_us = static_cast<std::uint32_t>(random.between(100'000, 2'500'000));
+  s.post_share = random.chance(0.5) ? 0.5 : 0;
+  s.board_lateness_us = static_cast<std::uint32_t>(random.below(3'000));
+  const int count = static_cast<int>(random.below(6));
+  for (int i = 0; i < count; ++i) {
+    Happening h;
+    h.kind = static_cast<Happening::Kind>(random.below(10));
+    h.at_us = random.below(s.duration_us);
+    h.length_us = random.between(1'000, 2'500'000);
+    h.host = static_cast<int>(random.below(static_cast<std::uint64_t>(s.hosts)));
+    s.happenings.push_back(h);
+  }
+  return s;
+}
+
+const char* to_text(Happening::Kind kind) {
+  switch (kind) {
+    case Happening::Kind::cut:
+      return "cut";
+    case Happening::Kind::cut_to_board:
+      return "cut_to_board";
+    case Happening::Kind::cut_to_host:
+      return "cut_to_host";
+    case Happening::Kind::host_restart:
+      return "host_restart";
+    case Happening::Kind::host_freeze:
+      return "host_freeze";
+    case Happening::Kind::board_restart:
+      return "board_restart";
+    case Happening::Kind::port_down:
+      return "port_down";
+    case Happening::Kind::stop:
+      return "stop";
+    case Happening::Kind::handle:
+      return "handle";
+    case Happening::Kind::obstacle:
+      return "obstacle";
+  }
+  return "?";
+}
+
+}  // namespace r4::simulation

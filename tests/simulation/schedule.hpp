@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One seed's scenario: how bad the channel is and what happens when.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "protocol/settings.hpp"
+#include "random.hpp"
+
+namespace r4::simulation {
+
+// What one direction of the channel does to a datagram.
+struct ChannelFaults {
+  double loss = 0;
+  double duplicate = 0;
+  double corrupt = 0;
+  std::uint32_t delay_us = 500;  // everything
+  std::uint32_t jitter_us = 0;   // uniform on top: reorders
+  double straggle = 0;           // a few are held back far longer
+  std::uint32_t straggle_us = 0;
+};
+
+// Something that happens at a time of the scenario.
+struct Happening {
+  enum class Kind : std::uint8_t {
+    cut,           // nothing passes, both ways, for `length_us`
+    cut_to_board,  // … host to board only
+    cut_to_host,
+    host_restart,  // the host process dies and comes back after `length_us`
+    host_freeze,   // the application hangs: its watchdog gates the heartbeats for `length_us`
+    board_restart,
+    port_down,  // the board's port reports its transport lost
+    stop,       // the host asks for an emergency stop, and clears it after `length_us`
+    handle,     // the dead-man's handle is released for `length_us`
+    obstacle,   // something stands before sensor 1 for `length_us`
+  };
+  Kind kind;
+  std::uint64_t at_us;
+  std::uint64_t length_us;
+  int host;
+};
+
+struct Schedule {
+  std::uint64_t duration_us = 0;
+  int hosts = 1;  // the second one meddles
+  Settings settings;
+  ChannelFaults to_board, to_host;
+  std::vector<Happening> happenings;
+  std::uint32_t command_interval_us = 0;
+  std::uint32_t command_timeout_us = 0;
+  double post_share = 0;                // commands sent without asking for confirmation
+  std::uint32_t board_lateness_us = 0;  // the board's loop comes up to this much late
+
+  static Schedule random(Random& random);
+};
+
+const char* to_text(Happening::Kind kind);
+
+}  // namespace r4::simulation

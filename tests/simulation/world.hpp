@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The link simulator: the board's application and the host's session, the very code that ships,
+// joined by a faulty channel in virtual time. One seed is one run, to the last byte.
+//
+// While it runs it checks the promises of docs/safety.md and stops at the first one broken:
+//   silence    outputs are live only while intact host heartbeats arrive: the last one at most
+//              timeout + 20 ms ago, and sent at most 2 timeouts + 20 ms ago
+//   once       no command is executed twice, ever, board reboots included
+//   order      never one older than the newest executed, nor one from before an executed stop
+//   intact     what is executed is what a host sent, by the host that controls the board
+//   fresh      and sent at most 2 timeouts + 250 ms before
+//   truth      confirmed means executed; refused means not executed, then and later
+//   restore    outputs that come back belong to a host that was alive a timeout ago
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <queue>
+#include <string>
+#include <vector>
+
+#include "firmware/application.hpp"
+#include "host/session.hpp"
+#include "schedule.hpp"
+
+namespace r4::simulation {
+
+struct Report {
+  std::uint64_t seed = 0;
+  std::string violation;           // empty: every promise held
+  std::uint64_t trace_hash = 0;    // FNV-1a over every datagram and event with its time
+  std::vector<std::string> trace;  // only when asked for
+  // What happened, to see that the schedules reach what they are to test.
+  std::uint32_t executed = 0;
+  std::uint32_t confirmed = 0;
+  std::uint32_t refused = 0;
+  std::uint32_t timed_out = 0;
+  std::uint32_t link_losses = 0;  // SAFE with reason link
+  std::uint32_t restores = 0;     // outputs came back by recovery=last
+  std::uint32_t stops = 0;
+  std::uint32_t busy = 0;
+  std::uint32_t stale = 0;
+  std::uint32_t duplicate = 0;
+  std::uint64_t worst_silence_us = 0;  // last heartbeat in to outputs safe
+};
+
+class World : public firmware::Hal, public firmware::Port, public firmware::Observer {
+ public:
+  World(std::uint64_t seed, bool keep_trace);
+  // The same with a given scenario.
+  World(std::uint64_t seed, Schedule schedule, bool keep_trace);
+  ~World();
+
+  Report run();
+
+ private:
+  struct Host;
+  struct Event {
+    std::uint64_t at_us;
+    std::uint64_t order;
+    enum class Kind : std::uint8_t { packet, board, host, command, happening, over } kind;
+    int index;
+    std::uint32_t generation;
+    bool operator>(const Event& other) const {
+      return at_us != other.at_us ? at_us > other.at_us : order > other.order;
+    }
+  };
+  struct Packet {
+    bool to_board = false;
+    int host = 0;
+    bool intact = true;
+    bool heartbeat = false;
+    int command = -1;  // index in commands_
+    std::uint64_t sent_us = 0;
+    std::string bytes;
+  };
+  // One command that a host asked for, named by its stepper target.
+  struct Sent {
+    int host = 0;
+    std::uint32_t incarnation = 0;
+    std::uint64_t asked_us = 0;
+    std::uint64_t transmitted_us = 0;  // the last time
+    int executed = 0;
+    bool dead = false;  // a refusal was reported
+  };
+
+  // firmware::Hal
+  void apply(const firmware::Outputs& outputs) override;
+  void make_safe() override;
+  void sample(firmware::Inputs& inputs) override;
+  void zero(int) override {}
+  // firmware::Port
+  void send(Text datagram, firmware::Urgency urgency, std::uint32_t peer) override;
+  std::size_t max_size() const override { return max_datagram; }
+  // firmware::Observer
+  void on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason reason) override;
+  void on_outputs(std::uint32_t t_ms, const firmware::Outputs& outputs) override;
+  void on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command) override;
+  void on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code) override;
+
+  void at(std::uint64_t time_us, Event::Kind kind, int index, std::uint32_t generation = 0);
+  void boot_board();
+  void start_host(int index);
+  void poll_board();
+  void poll_host(int index);
+  void issue_command(int index);
+  void happen(const Happening& happening, bool over);
+  void transfer(bool to_board, int host, std::string_view bytes);
+  void deliver(int packet);
+  void check_silence();
+  void violate(const std::string& what);
+  void note(const std::string& line);
+  void show(const std::string& line);
+  void mix(const void* data, std::size_t size);
+  std::uint32_t board_ms() const;
+
+  Random random_;
+  Schedule schedule_;
+  Report report_;
+  bool keep_trace_;
+  bool over_ = false;
+  std::uint64_t now_us_ = 0;
+  std::uint64_t order_ = 0;
+  std::priority_queue<Event, std::vector<Event>, std::greater<>> events_;
+  std::vector<Packet> packets_;
+  std::vector<int> free_packets_;
+
+  std::unique_ptr<firmware::Application> board_;
+  std::uint32_t boot_offset_ms_ = 0;
+  std::uint64_t boot_us_ = 0;
+  std::uint32_t board_generation_ = 0;
+  bool handle_held_ = true;
+  std::uint16_t distance_cm_ = 200;
+  firmware::Outputs outputs_;
+  bool live_ = false;
+  bool was_lost_ = false;
+  std::uint64_t heartbeat_in_us_ = 0;    // the newest intact one to arrive
+  std::uint64_t heartbeat_sent_us_ = 0;  // when the newest to arrive was sent
+  std::uint32_t stop_pnum_ = 0;          // of the last stop executed
+  int newest_executed_ = -1;
+
+  std::vector<std::unique_ptr<Host>> hosts_;
+  std::vector<Sent> commands_;
+  std::uint64_t cut_to_board_until_us_ = 0;
+  std::uint64_t cut_to_host_until_us_ = 0;
+};
+
+}  // namespace r4::simulation
