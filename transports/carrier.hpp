@@ -56,7 +56,8 @@ struct CarrierEvent {
 
 class Carrier {
  public:
-  // Called on the io_context's thread; must not destroy the carrier.
+  // Called on the io_context's thread, never from within send(); may call anything of the carrier,
+  // but must not destroy it.
   class Handler {
    public:
     virtual void on_datagram(std::string_view bytes, Peer from) = 0;  // `bytes` valid in the call

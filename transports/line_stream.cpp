@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "line_stream.hpp"
+
+#include <unistd.h>
+
+#include <asio/post.hpp>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+
+namespace r4 {
+namespace {
+
+constexpr std::size_t normal_entries = 64;
+constexpr std::size_t state_entries = 1;
+
+bool would_block(int error) { return error == EAGAIN || error == EWOULDBLOCK || error == EINTR; }
+
+}  // namespace
+
+LineStream::LineStream(asio::io_context& io, Owner& owner, CarrierCounters& counters)
+    : io_(io),
+      owner_(owner),
+      counters_(counters),
+      stream_(io),
+      writable_(io),
+      queue_(normal_entries, state_entries, counters.tx_dropped) {}
+
+void LineStream::start(FileDescriptor descriptor) {
+  stop();
+  stream_.assign(descriptor.get());
+  (void)descriptor.release();
+  framing_.reset();
+  line_size_ = line_written_ = 0;
+  terminator_first_ = false;
+  wait_readable();
+}
+
+void LineStream::stop() noexcept {
+  readable_.cancel();
+  failure_.cancel();
+  writable_.stop();
+  queue_.clear();
+  asio::error_code ignored;
+  stream_.close(ignored);
+}
+
+void LineStream::wait_readable() {
+  stream_.async_wait(asio::posix::stream_descriptor::wait_read,
+                     readable_.handler([this] { receive(); }));
+}
+
+void LineStream::receive() {
+  const ssize_t count = ::read(stream_.native_handle(), received_.data(), received_.size());
+  if (count < 0 && would_block(errno)) return wait_readable();
+  if (count <= 0) return lost(count == 0 ? 0 : errno);
+  framing_.push(received_.data(), static_cast<std::size_t>(count), [this](Text line) {
+    if (!stream_.is_open()) return;  // closed by the handler of a line before
+    ++counters_.rx_datagrams;
+    counters_.rx_bytes += line.size();
+    owner_.on_line({line.data(), line.size()});
+  });
+  counters_.rx_oversize = framing_.oversize();
+  // The system hands a backlog over in pieces of up to 4095 bytes.
+  if (stream_.is_open() && static_cast<std::size_t>(count) < received_.size() / 2) {
+    owner_.on_drained();
+  }
+  if (stream_.is_open()) wait_readable();
+}
+
+void LineStream::lost(int error) {
+  stop();
+  owner_.on_lost(error);
+}
+
+SendResult LineStream::send(std::string_view bytes, Priority priority) {
+  if (!stream_.is_open()) return SendResult::down;
+  if (bytes.size() > max_datagram) {
+    ++counters_.tx_errors;
+    return SendResult::full;
+  }
+  if (priority == Priority::state) owner_.before_state();
+  if (line_written_ == line_size_ && queue_.empty()) {
+    switch (write_line(bytes)) {
+      case Outcome::written:
+        return SendResult::sent;
+      case Outcome::failed:
+        return SendResult::down;
+      case Outcome::busy:
+        break;
+    }
+  }
+  const SendResult result =
+      queue_.push(bytes, priority, everyone, std::chrono::steady_clock::now());
+  writable_.start(stream_.native_handle(), [this] { send_waiting(); });
+  return result;
+}
+
+void LineStream::restart_line() {
+  line_size_ = line_written_ = 0;
+  terminator_first_ = true;
+  if (!queue_.empty()) send_waiting();
+}
+
+// Begins a line; written also if only a part of it has been.
+LineStream::Outcome LineStream::write_line(std::string_view bytes) {
+  std::size_t size = 0;
+  const auto append = [&](const char* data, std::size_t count) {
+    std::memcpy(line_.data() + size, data, count);
+    size += count;
+  };
+  if (terminator_first_) append(line_end.data(), line_end.size());
+  append(bytes.data(), bytes.size());
+  append(line_end.data(), line_end.size());
+  line_size_ = size;
+  line_written_ = 0;
+  const Outcome outcome = continue_line();
+  if (line_written_ == 0) {
+    line_size_ = 0;
+    return outcome;
+  }
+  terminator_first_ = false;
+  ++counters_.tx_datagrams;
+  counters_.tx_bytes += bytes.size();
+  if (outcome == Outcome::busy) {
+    writable_.start(stream_.native_handle(), [this] { send_waiting(); });
+  }
+  return Outcome::written;
+}
+
+LineStream::Outcome LineStream::continue_line() {
+  while (line_written_ != line_size_) {
+    const ssize_t count =
+        ::write(stream_.native_handle(), line_.data() + line_written_, line_size_ - line_written_);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0 && would_block(errno)) return Outcome::busy;
+    if (count < 0) {
+      ++counters_.tx_errors;
+      asio::post(io_, failure_.handler([this, error = errno] { lost(error); }));
+      return Outcome::failed;
+    }
+    line_written_ += static_cast<std::size_t>(count);
+    owner_.on_written(static_cast<std::size_t>(count));
+    if (line_written_ != line_size_) return Outcome::busy;
+  }
+  return Outcome::written;
+}
+
+void LineStream::send_waiting() {
+  Outcome outcome = continue_line();
+  while (outcome == Outcome::written && line_written_ == line_size_) {
+    const SendQueue::Entry* const entry = queue_.front(std::chrono::steady_clock::now());
+    if (entry == nullptr) return writable_.stop();
+    outcome = write_line(entry->text());
+    if (outcome == Outcome::written) queue_.pop();
+  }
+  if (outcome != Outcome::failed) {
+    writable_.start(stream_.native_handle(), [this] { send_waiting(); });
+  }
+}
+
+}  // namespace r4

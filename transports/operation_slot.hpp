@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Memory and cancellation for one asynchronous operation that is started again and again.
+//
+// A carrier has a slot for each thing it waits for (readable, writable, a time). The operation
+// lives in the slot's memory, so that waiting costs no heap, and after cancel(), or when the slot
+// is gone, the handler is not called any more, whatever the event loop still holds. For one thread,
+// like all of a carrier.
+#pragma once
+
+#include <asio/error_code.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <new>
+#include <utility>
+
+namespace r4 {
+
+class OperationSlot {
+  struct Memory {
+    alignas(std::max_align_t) std::byte bytes[256];
+    bool taken = false;
+    std::uint32_t started = 0;  // counts operations: only the newest is alive
+  };
+
+  template <class T>
+  class Allocator {
+   public:
+    using value_type = T;
+    explicit Allocator(Memory& memory) : memory_(&memory) {}
+    template <class U>
+    Allocator(const Allocator<U>& other)
+        : memory_(other.memory_) {}  // NOLINT: as the standard has it
+
+    T* allocate(std::size_t count) {
+      if (!memory_->taken && count * sizeof(T) <= sizeof(memory_->bytes)) {
+        memory_->taken = true;
+        return reinterpret_cast<T*>(memory_->bytes);
+      }
+      return static_cast<T*>(::operator new(count * sizeof(T)));  // a cancelled one is still there
+    }
+    void deallocate(T* at, std::size_t) {
+      if (reinterpret_cast<std::byte*>(at) == memory_->bytes) {
+        memory_->taken = false;
+      } else {
+        ::operator delete(at);
+      }
+    }
+    template <class U>
+    bool operator==(const Allocator<U>& other) const {
+      return memory_ == other.memory_;
+    }
+
+   private:
+    template <class>
+    friend class Allocator;
+    Memory* memory_;  // kept alive by the Operation that gave it
+  };
+
+  template <class Function>
+  class Operation {
+   public:
+    using allocator_type = Allocator<std::byte>;
+    Operation(std::shared_ptr<Memory> memory, Function function)
+        : memory_(std::move(memory)), number_(memory_->started), function_(std::move(function)) {}
+
+    allocator_type get_allocator() const noexcept { return allocator_type(*memory_); }
+
+    void operator()() {
+      if (memory_->started == number_) function_();
+    }
+    // A wait that failed (its descriptor was closed) is over without a call.
+    void operator()(const asio::error_code& error) {
+      if (!error) (*this)();
+    }
+
+   private:
+    std::shared_ptr<Memory> memory_;
+    std::uint32_t number_;
+    Function function_;
+  };
+
+ public:
+  OperationSlot() = default;
+  OperationSlot(const OperationSlot&) = delete;
+  OperationSlot& operator=(const OperationSlot&) = delete;
+  ~OperationSlot() { cancel(); }
+
+  // A completion handler for Asio that calls `function()`. Cancels the operation before it.
+  template <class Function>
+  Operation<Function> handler(Function function) {
+    ++memory_->started;
+    return Operation<Function>(memory_, std::move(function));
+  }
+
+  void cancel() { ++memory_->started; }
+
+ private:
+  std::shared_ptr<Memory> memory_ = std::make_shared<Memory>();
+};
+
+}  // namespace r4

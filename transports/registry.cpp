@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "registry.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "pty_carrier.hpp"
+#include "serial_carrier.hpp"
+#include "udp_carrier.hpp"
+
+namespace r4 {
+
+Registry Registry::standard() {
+  Registry registry;
+  registry.add({"udp", "udp://HOST[:2018][?listen=2390]",
+                "WiFi or Ethernet; for a board: udp://BIND[:2018][?peer=HOST[:2390]]",
+                make_udp_carrier});
+  registry.add({"serial", "serial:///dev/ttyACM0[?baud=1000000], serial:auto, serial:?sn=SERIAL",
+                "USB serial, or the pty of a simulated board", make_serial_carrier});
+  registry.add(
+      {"pty", "pty:[PATH]", "for a board: a pty that a host opens as serial", make_pty_carrier});
+  return registry;
+}
+
+void Registry::add(Entry entry) { entries_.push_back(std::move(entry)); }
+
+std::unique_ptr<Carrier> Registry::make(asio::io_context& io, std::string_view text,
+                                        Role role) const {
+  const Url url = Url::parse(text);
+  const auto entry = std::find_if(entries_.begin(), entries_.end(),
+                                  [&](const Entry& e) { return e.scheme == url.scheme(); });
+  if (entry == entries_.end()) {
+    std::string known;
+    for (const Entry& e : entries_) known += (known.empty() ? "" : ", ") + e.usage;
+    throw Error(ErrorKind::usage, url.text(), "there is no transport '" + url.scheme() + "'",
+                "use one of " + known);
+  }
+  return entry->make(io, url, role);
+}
+
+}  // namespace r4
