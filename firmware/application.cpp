@@ -153,6 +153,7 @@ void Application::on_command(Source from, const Datagram& datagram, std::uint32_
   Refusal code = Refusal::none;
   switch (link_.admit(from, datagram.pnum(), now_ms, code)) {
     case Admission::refuse:
+      if (code == Refusal::safe) link_.refused(from, datagram.pnum());
       refuse(from, datagram, code, now_ms);
       return;
     case Admission::drop:
@@ -164,7 +165,7 @@ void Application::on_command(Source from, const Datagram& datagram, std::uint32_
   const bool held = drives_output(command.kind) && safety_.is_safe();
   const Refusal outcome = held ? Refusal::safe : carry_out(command, setpoints_);
   if (outcome != Refusal::none) {
-    link_.spend(datagram.pnum());
+    link_.refused(from, datagram.pnum());
     refuse(from, datagram, outcome, now_ms);
     return;
   }

@@ -168,12 +168,18 @@ Admission BoardLink::admit(Source from, std::uint32_t pnum, std::uint32_t now_ms
   return Admission::execute;
 }
 
+// Commands up to `pnum` are not to be executed any more.
 void BoardLink::spend(std::uint32_t pnum) {
   if (has_baseline_ && !newer(pnum, newest_)) return;
   const std::uint32_t ahead = has_baseline_ ? pnum - newest_ : memory;
   executed_bits_ = ahead < memory ? executed_bits_ << ahead : 0;
   newest_ = pnum;
   has_baseline_ = true;
+}
+
+void BoardLink::refused(Source from, std::uint32_t pnum) {
+  const bool in_window = has_baseline_ && pnum - newest_ <= command_window;
+  if (has_session_ && from == owner_ && in_window) spend(pnum);
 }
 
 void BoardLink::executed(std::uint32_t pnum) {

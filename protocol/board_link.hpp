@@ -78,9 +78,9 @@ class BoardLink {
   Admission admit(Source from, std::uint32_t pnum, std::uint32_t now_ms, Refusal& code) const;
   // The owner's command with this number was carried out: it and all older ones are spent.
   void executed(std::uint32_t pnum);
-  // The command with this number was refused for its content or the safe state: it and all older ones
-  // are spent, so that no copy of it is executed when the reason is gone.
-  void spend(std::uint32_t pnum);
+  // A command was refused, for its content or the safe state: if it is the session's, it and all
+  // older ones are spent, so that no copy of it is executed when the reason is gone.
+  void refused(Source from, std::uint32_t pnum);
 
   // Lets time pass. True once, when the owner has been silent for the timeout: ACTIVE -> LOST.
   bool poll(std::uint32_t now_ms);
@@ -122,6 +122,7 @@ class BoardLink {
   HeartbeatEffect begin_session(const HostHeartbeat& heartbeat, bool armed, std::uint32_t now_ms);
   void feed(const HostHeartbeat& heartbeat, std::uint32_t now_ms);
   void lose(std::uint32_t now_ms);
+  void spend(std::uint32_t pnum);
 
   Timing timing_;
   BoardLinkState state_ = BoardLinkState::connecting;
