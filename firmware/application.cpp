@@ -6,9 +6,6 @@ namespace firmware {
 
 namespace {
 
-// The answers are short; a buffer for one of them.
-constexpr std::size_t answer_size = 256;
-
 BoardLink::Timing timing_of(const Settings& settings) {
   BoardLink::Timing timing;
   timing.heartbeat_ms = settings.heartbeat_ms;
@@ -72,9 +69,7 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
   Source from;
   from.port = port;
   from.peer = peer;
-  if (link_.has_owner() && from == link_.owner() && datagram.has_pnum()) {
-    tracker_.on(datagram.pnum());
-  }
+  if (link_.in_session(from) && datagram.has_pnum()) tracker_.on(datagram.pnum());
   switch (kind_of(datagram)) {
     case MessageKind::host_heartbeat:
       on_host_heartbeat(from, datagram, now_ms);
@@ -116,10 +111,9 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
       schedule_.start(now_ms, period_of(setpoints_.settings));
       break;
     case HeartbeatEffect::stale:
-      // A host that has heard nothing yet needs a heartbeat of ours to echo.
-      if (heartbeat.has_time && heartbeat.t == 0) {
+      if (link_.wants_answer(heartbeat, now_ms)) {
         send_heartbeat(from.port, from.peer, false, now_ms);
-        link_.heartbeat_sent(now_ms);
+        link_.heartbeat_answered(now_ms);
       }
       break;
     case HeartbeatEffect::busy:
@@ -163,6 +157,7 @@ void Application::on_command(Source from, const Datagram& datagram, std::uint32_
       break;
   }
   const bool held = drives_output(command.kind) && safety_.is_safe();
+  if (!held && link_.begins_anew(datagram.pnum())) setpoints_.outputs = Outputs();
   const Refusal outcome = held ? Refusal::safe : carry_out(command, setpoints_);
   if (outcome != Refusal::none) {
     link_.refused(from, datagram.pnum());
@@ -196,6 +191,7 @@ void Application::execute(std::uint32_t pnum, const Command& command, std::uint3
 }
 
 void Application::emergency_stop(Source from, const Datagram& datagram, std::uint32_t now_ms) {
+  const bool repeated = safety_.has(SafeReason::stop);
   enter(SafeReason::stop, now_ms);
   const bool owner = link_.has_owner() && from == link_.owner();
   if (owner && datagram.has_pnum()) {
@@ -205,30 +201,12 @@ void Application::emergency_stop(Source from, const Datagram& datagram, std::uin
     }
   }
   if (observer_ != nullptr) observer_->on_executed(now_ms, datagram.pnum(), Command::stop());
-  send_heartbeats(now_ms);
-  if (!owner) send_heartbeat(from.port, from.peer, link_.has_owner(), now_ms);
-}
-
-void Application::identify(Source to, std::uint32_t now_ms) {
-  char buffer[answer_size];
-  DatagramWriter writer(buffer, sizeof buffer);
-  write_identity(writer, identity_);
-  const Text answer = writer.finish(number_for(to)++, now_ms);
-  ports_[to.port].port->send(answer, Urgency::normal, to.peer);
-}
-
-void Application::refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms) {
-  ++rx_refused_;
-  if (!datagram.has_pnum()) return;
-  if (observer_ != nullptr) observer_->on_refused(now_ms, datagram.pnum(), code);
-  Nack nack;
-  nack.pnum = datagram.pnum();
-  nack.code = code;
-  char buffer[answer_size];
-  DatagramWriter writer(buffer, sizeof buffer);
-  write_nack(writer, nack);
-  const Text answer = writer.finish(number_for(to)++, now_ms);
-  ports_[to.port].port->send(answer, Urgency::normal, to.peer);
+  // Everyone hears of it once; who asks hears it each time, as often as it takes.
+  if (!repeated) send_heartbeats(now_ms);
+  if (!owner || repeated) {
+    send_heartbeat(from.port, from.peer, link_.has_owner() && !owner, now_ms);
+    link_.heartbeat_answered(now_ms);
+  }
 }
 
 void Application::port_down(std::uint8_t port, std::uint32_t now_ms) {
@@ -236,6 +214,19 @@ void Application::port_down(std::uint8_t port, std::uint32_t now_ms) {
 }
 
 void Application::fail(SafeReason cause, std::uint32_t now_ms) { enter(cause, now_ms); }
+
+std::uint32_t Application::poll(std::uint32_t now_ms) {
+  if (link_.poll(now_ms)) enter(SafeReason::link, now_ms);
+  check_interlocks(now_ms);
+  update_outputs(now_ms);
+  report_state(now_ms);
+  send_states(now_ms);
+  if (link_.heartbeat_due(now_ms)) send_heartbeats(now_ms);
+
+  std::uint32_t due = link_.due_in(now_ms);
+  if (schedule_.running() && schedule_.due_in(now_ms) < due) due = schedule_.due_in(now_ms);
+  return due < interlock_period_ms ? due : interlock_period_ms;
+}
 
 // --- safety
 
@@ -297,104 +288,6 @@ void Application::report_state(std::uint32_t now_ms) {
   reported_state_ = state_now;
   reported_reason_ = reason_now;
   if (observer_ != nullptr) observer_->on_state(now_ms, state_now, reason_now);
-}
-
-// --- what goes out
-
-std::uint32_t Application::poll(std::uint32_t now_ms) {
-  if (link_.poll(now_ms)) enter(SafeReason::link, now_ms);
-  check_interlocks(now_ms);
-  update_outputs(now_ms);
-  report_state(now_ms);
-  send_states(now_ms);
-  if (link_.heartbeat_due(now_ms)) send_heartbeats(now_ms);
-
-  std::uint32_t due = link_.due_in(now_ms);
-  if (schedule_.running() && schedule_.due_in(now_ms) < due) due = schedule_.due_in(now_ms);
-  return due < interlock_period_ms ? due : interlock_period_ms;
-}
-
-// The controlling host where it is, else whoever the port streams to.
-std::uint32_t Application::audience(std::uint8_t port) const {
-  const bool owned = link_.has_owner() && link_.owner().port == port;
-  return owned ? link_.owner().peer : everyone;
-}
-
-std::uint32_t& Application::number_for(Source to) {
-  const bool aside = link_.has_owner() && to != link_.owner();
-  return aside ? ports_[to.port].aside_pnum : ports_[to.port].next_pnum;
-}
-
-void Application::send_heartbeats(std::uint32_t now_ms) {
-  for (std::uint8_t i = 0; i < port_count_; ++i) send_heartbeat(i, audience(i), false, now_ms);
-  link_.heartbeat_sent(now_ms);
-}
-
-void Application::send_heartbeat(std::uint8_t port, std::uint32_t peer, bool aside,
-                                 std::uint32_t now_ms) {
-  PortSlot& slot = ports_[port];
-  char buffer[answer_size];
-  Text heartbeat;
-  if (link_.state() == BoardLinkState::connecting) {
-    heartbeat = write_board_heartbeat(buffer, sizeof buffer, 0, 0, safety_.reason());
-    slot.next_pnum = 1;
-  } else {
-    std::uint32_t& pnum = aside ? slot.aside_pnum : slot.next_pnum;
-    heartbeat = write_board_heartbeat(buffer, sizeof buffer, pnum++, now_ms, safety_.reason());
-  }
-  slot.port->send(heartbeat, Urgency::normal, peer);
-}
-
-void Application::send_states(std::uint32_t now_ms) {
-  std::uint32_t t_ms = 0;
-  if (!schedule_.take(now_ms, t_ms)) return;
-  State state;
-  fill(state);
-  for (std::uint8_t i = 0; i < port_count_; ++i) send_state(i, state, t_ms);
-}
-
-// One state, in as many datagrams of the same T as the port's limit asks for.
-void Application::send_state(std::uint8_t port, const State& state, std::uint32_t t_ms) {
-  PortSlot& slot = ports_[port];
-  char buffer[max_datagram];
-  const std::size_t limit =
-      slot.port->max_size() < sizeof buffer ? slot.port->max_size() : sizeof buffer;
-  FieldSet fields = setpoints_.fields;
-  if (state.safe != SafeReason::none) fields.add(StateField::safe);
-  DatagramWriter writer(buffer, limit);
-  for (int i = 0; i < state_field_count; ++i) {
-    const StateField field = static_cast<StateField>(i);
-    if (!fields.has(field)) continue;
-    const std::size_t before = writer.size();
-    write_field(writer, field, state);
-    if (writer.ok() && writer.size() + DatagramWriter::trailer_max <= limit) continue;
-    writer.truncate(before);
-    slot.port->send(writer.finish(slot.next_pnum++, t_ms), Urgency::state, audience(port));
-    writer = DatagramWriter(buffer, limit);
-    write_field(writer, field, state);
-  }
-  slot.port->send(writer.finish(slot.next_pnum++, t_ms), Urgency::state, audience(port));
-}
-
-void Application::fill(State& state) const {
-  for (int i = 0; i < analog_channels; ++i) state.analog_cv[i] = inputs_.analog_cv[i];
-  state.handle_held = inputs_.handle_held;
-  for (int i = 0; i < dhb12_channels; ++i) state.dhb12[i] = outputs_.dhb12[i];
-  for (int i = 0; i < osmc_channels; ++i) state.osmc[i] = outputs_.osmc[i];
-  for (int i = 0; i < servo_channels; ++i) state.servo_us[i] = outputs_.servo_us[i];
-  for (int i = 0; i < bldc_channels; ++i) state.bldc[i] = outputs_.bldc[i];
-  state.relays = outputs_.relays;
-  for (int i = 0; i < stepper_channels; ++i) state.stepper_steps[i] = inputs_.stepper_steps[i];
-  for (int i = 0; i < encoder_channels; ++i) state.encoder_counts[i] = inputs_.encoder_counts[i];
-  for (int i = 0; i < ultrasonic_channels; ++i) state.ultrasonic_cm[i] = inputs_.ultrasonic_cm[i];
-  state.safe = safety_.reason();
-  state.last_command = link_.last_executed();
-  state.rx_ok = rx_ok_;
-  state.rx_crc = rx_bad_;
-  state.rx_lost = tracker_.counters().lost;
-  state.rx_duplicate = tracker_.counters().duplicate;
-  state.rx_refused = rx_refused_;
-  state.late = schedule_.late();
 }
 
 }  // namespace firmware

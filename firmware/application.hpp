@@ -75,20 +75,22 @@ class Application {
   void on_command(Source from, const Datagram& datagram, std::uint32_t now_ms);
   void execute(std::uint32_t pnum, const Command& command, std::uint32_t now_ms);
   void emergency_stop(Source from, const Datagram& datagram, std::uint32_t now_ms);
-  void identify(Source to, std::uint32_t now_ms);
-  void refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms);
-
   void enter(SafeReason cause, std::uint32_t now_ms);
   void check_interlocks(std::uint32_t now_ms);
   bool obstacle() const;
   void update_outputs(std::uint32_t now_ms);
   void report_state(std::uint32_t now_ms);
 
+  // application_sending.cpp
   void send_heartbeats(std::uint32_t now_ms);
   void send_heartbeat(std::uint8_t port, std::uint32_t peer, bool aside, std::uint32_t now_ms);
   void send_states(std::uint32_t now_ms);
   void send_state(std::uint8_t port, const State& state, std::uint32_t t_ms);
+  void send_part(std::uint8_t port, DatagramWriter& writer, const State& state, std::uint32_t t_ms);
   void fill(State& state) const;
+  void answer(Source to, DatagramWriter& writer, std::uint32_t now_ms);
+  void identify(Source to, std::uint32_t now_ms);
+  void refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms);
   std::uint32_t& number_for(Source to);
   std::uint32_t audience(std::uint8_t port) const;
 

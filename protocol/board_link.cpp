@@ -19,32 +19,34 @@ bool BoardLink::sent_at(std::uint32_t t_ms) const {
   return false;
 }
 
+// Is its T one of those?
+bool BoardLink::is_echo(const HostHeartbeat& heartbeat) const {
+  return heartbeat.has_time && heartbeat.t != 0 && heartbeat.t <= 0xffffffffU &&
+         sent_at(static_cast<std::uint32_t>(heartbeat.t));
+}
+
 // Is the T of this heartbeat a recent T of ours, an old one, or something else?
 BoardLink::Freshness BoardLink::judge(const HostHeartbeat& heartbeat, bool echo_host,
                                       std::uint32_t now_ms) const {
-  const bool board_time = heartbeat.has_time && heartbeat.t <= 0xffffffffU;
-  const std::uint32_t t = static_cast<std::uint32_t>(heartbeat.t);
-  const bool known = board_time && t != 0 && sent_at(t);
-  const bool recent = at_or_after(now_ms, t) && now_ms - t <= timing_.timeout_ms;
-  // What was sent before the link was lost says nothing of the host's being alive now.
-  const bool this_episode = state_ != BoardLinkState::lost || at_or_after(t, lost_ms_);
-  if (echo_host) return known && recent && this_episode ? Freshness::fresh : Freshness::stale;
-  if (clock_ == Clock::own && has_session_ && heartbeat.from == owner_) return Freshness::no_echo;
-  if (known) return recent ? Freshness::fresh : Freshness::stale;
-  const bool echoes = clock_ == Clock::echo && has_session_ && heartbeat.from == owner_;
-  return echoes ? Freshness::stale : Freshness::no_echo;
+  const bool ours = in_session(heartbeat.from) && !echo_host;
+  if (ours && clock_ == Clock::own) return Freshness::no_echo;
+  if (is_echo(heartbeat)) {
+    const std::uint32_t t = static_cast<std::uint32_t>(heartbeat.t);
+    const bool recent = at_or_after(now_ms, t) && now_ms - t <= timing_.timeout_ms;
+    // What was sent before the link was lost says nothing of the host's being alive now.
+    const bool this_episode = state_ != BoardLinkState::lost || at_or_after(t, lost_ms_);
+    return recent && this_episode ? Freshness::fresh : Freshness::stale;
+  }
+  const bool should_echo = echo_host || (ours && clock_ == Clock::echo && has_owner());
+  return should_echo ? Freshness::stale : Freshness::no_echo;
 }
 
-// Does the heartbeat go on where the session's numbers are?
+// Does the heartbeat go on where the session's numbers are? A session without numbers goes on with
+// any heartbeat without one.
 bool BoardLink::continues(const HostHeartbeat& heartbeat) const {
-  if (!has_session_ || heartbeat.from != owner_) return false;
-  const bool echo_host = heartbeat.has_pnum && heartbeat.pnum >= echo_host_first_pnum;
-  if (echo_host_ && !echo_host && !(heartbeat.has_pnum && heartbeat.pnum < command_window)) {
-    return false;  // a declared host stays one until its numbers wrap
-  }
-  if (!heartbeat.has_pnum) return true;
-  return !has_heartbeat_pnum_ || (newer(heartbeat.pnum, newest_heartbeat_) &&
-                                  heartbeat.pnum - newest_heartbeat_ <= command_window);
+  if (!in_session(heartbeat.from) || heartbeat.has_pnum != has_heartbeat_pnum_) return false;
+  return !heartbeat.has_pnum || (newer(heartbeat.pnum, newest_heartbeat_) &&
+                                 heartbeat.pnum - newest_heartbeat_ <= command_window);
 }
 
 HeartbeatEffect BoardLink::begin_session(const HostHeartbeat& heartbeat, bool armed,
@@ -58,7 +60,8 @@ HeartbeatEffect BoardLink::begin_session(const HostHeartbeat& heartbeat, bool ar
   newest_ = heartbeat.pnum;
   executed_bits_ = 0;
   last_executed_ = 0;
-  has_heartbeat_pnum_ = false;
+  numbers_in_doubt_ = false;
+  has_heartbeat_pnum_ = heartbeat.has_pnum;
   marks_used_ = 0;
   newest_echo_ms_ = now_ms - timing_.timeout_ms;
   state_ = BoardLinkState::active;
@@ -70,17 +73,20 @@ HeartbeatEffect BoardLink::begin_session(const HostHeartbeat& heartbeat, bool ar
 void BoardLink::feed(const HostHeartbeat& heartbeat, std::uint32_t now_ms) {
   fed_ms_ = now_ms;
   const std::uint32_t t = static_cast<std::uint32_t>(heartbeat.t);
-  const bool known = heartbeat.has_time && heartbeat.t <= 0xffffffffU && t != 0 && sent_at(t);
-  if (known && (armed_ || echo_host_) && newer(t, newest_echo_ms_)) newest_echo_ms_ = t;
+  const bool known = is_echo(heartbeat);
+  if (known && newer(t, newest_echo_ms_)) newest_echo_ms_ = t;
   if (!echo_host_ && clock_ == Clock::unknown && heartbeat.has_time && heartbeat.t != 0) {
     clock_ = known ? Clock::echo : Clock::own;
   }
   if (!heartbeat.has_pnum) return;
-  has_heartbeat_pnum_ = true;
   newest_heartbeat_ = heartbeat.pnum;
-  // Keep the marks apart by a share of the limit, the newest replacing itself until then.
+  // The marks last for the limit at any rate of heartbeats. Between two marks a heartbeat counts as
+  // come at the earlier one, so a command is never taken for younger than it is.
   constexpr std::uint32_t spacing_ms = late_limit_ms / (mark_count - 1);
-  if (marks_used_ != 0 && now_ms - marks_[marks_used_ - 1].at_ms < spacing_ms) return;
+  if (marks_used_ != 0 && now_ms - marks_[marks_used_ - 1].at_ms < spacing_ms) {
+    marks_[marks_used_ - 1].pnum = heartbeat.pnum;
+    return;
+  }
   if (marks_used_ == mark_count) {
     for (int i = 1; i < mark_count; ++i) marks_[i - 1] = marks_[i];
     --marks_used_;
@@ -89,59 +95,70 @@ void BoardLink::feed(const HostHeartbeat& heartbeat, std::uint32_t now_ms) {
 }
 
 HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uint32_t now_ms) {
-  const bool echo_host = heartbeat.has_pnum && heartbeat.pnum >= echo_host_first_pnum;
   const bool continuing = continues(heartbeat);
-  const bool declared = echo_host || (continuing && echo_host_);
-  const Freshness freshness = judge(heartbeat, declared, now_ms);
+  const bool echo_host =
+      continuing ? echo_host_ : heartbeat.has_pnum && heartbeat.pnum >= echo_host_first_pnum;
+  const Freshness freshness = judge(heartbeat, echo_host, now_ms);
 
   switch (state_) {
     case BoardLinkState::connecting:
-      // The first word of a host. An echo host's commands wait for its echo of a T of this boot.
-      if (declared && heartbeat.t != 0) return HeartbeatEffect::stale;
-      if (freshness == Freshness::stale && !declared) return HeartbeatEffect::stale;
-      return begin_session(heartbeat, !declared, now_ms);
+      // The first word of a host. An echo host's commands wait for its echo of a T of this boot;
+      // one that echoes already speaks of another boot.
+      if (echo_host && heartbeat.t != 0) return HeartbeatEffect::stale;
+      return begin_session(heartbeat, !echo_host, now_ms);
 
     case BoardLinkState::active:
       if (heartbeat.from != owner_) return HeartbeatEffect::busy;
-      if (declared && !armed_ && continuing && freshness == Freshness::fresh) {
-        armed_ = true;
-        spend(heartbeat.pnum);
-        feed(heartbeat, now_ms);
-        return HeartbeatEffect::fed;
-      }
+      if (freshness == Freshness::stale) return HeartbeatEffect::stale;
       if (continuing) {
-        if (freshness == Freshness::stale) return HeartbeatEffect::stale;
+        if (!armed_) {
+          armed_ = true;
+          spend(heartbeat.pnum);
+        }
         feed(heartbeat, now_ms);
         return HeartbeatEffect::fed;
       }
       // The same place, other numbers: a restarted host, if its echo is newer than any before.
-      if (declared && freshness == Freshness::fresh &&
-          newer(static_cast<std::uint32_t>(heartbeat.t), newest_echo_ms_) &&
-          (heartbeat.pnum - newest_heartbeat_) > command_window &&
-          (newest_heartbeat_ - heartbeat.pnum) > command_window) {
+      if (echo_host && newer(static_cast<std::uint32_t>(heartbeat.t), newest_echo_ms_) &&
+          !near_newest_heartbeat(heartbeat.pnum)) {
         return begin_session(heartbeat, true, now_ms);
       }
       return HeartbeatEffect::stale;
 
-    case BoardLinkState::lost:
+    case BoardLinkState::lost: {
       if (freshness == Freshness::stale) return HeartbeatEffect::stale;
-      if (continuing && armed_) {
-        state_ = BoardLinkState::active;
-        send_now_ = true;
-        if (heartbeat.has_pnum) spend(heartbeat.pnum);  // what was sent before the outage
-        feed(heartbeat, now_ms);
-        return HeartbeatEffect::resumed;
-      }
-      return begin_session(heartbeat, true, now_ms);
+      const bool other_clock = clock_ == Clock::echo && freshness == Freshness::no_echo;
+      if (!continuing || !armed_ || other_clock) return begin_session(heartbeat, true, now_ms);
+      state_ = BoardLinkState::active;
+      send_now_ = true;
+      if (heartbeat.has_pnum) spend(heartbeat.pnum);  // what was sent before the outage
+      numbers_in_doubt_ = !heartbeat.has_pnum;
+      feed(heartbeat, now_ms);
+      return HeartbeatEffect::resumed;
+    }
   }
   return HeartbeatEffect::stale;
+}
+
+// A late or repeated heartbeat of this session, not one of another.
+bool BoardLink::near_newest_heartbeat(std::uint32_t pnum) const {
+  return has_heartbeat_pnum_ &&
+         (pnum - newest_heartbeat_ <= command_window || newest_heartbeat_ - pnum <= command_window);
+}
+
+bool BoardLink::in_window(std::uint32_t pnum) const {
+  return !has_baseline_ || (newer(pnum, newest_) && pnum - newest_ <= command_window);
+}
+
+bool BoardLink::begins_anew(std::uint32_t pnum) const {
+  return numbers_in_doubt_ && !in_window(pnum) && newest_ - pnum >= memory;
 }
 
 Admission BoardLink::admit(Source from, std::uint32_t pnum, std::uint32_t now_ms,
                            Refusal& code) const {
   // Whatever the link is now: a number that was executed is answered so, and the host knows.
   const std::uint32_t behind = newest_ - pnum;
-  const bool ours = has_session_ && from == owner_;
+  const bool ours = in_session(from);
   if (ours && has_baseline_ && behind < memory && ((executed_bits_ >> behind) & 1U) != 0) {
     code = Refusal::duplicate;
     return Admission::refuse;
@@ -155,7 +172,7 @@ Admission BoardLink::admit(Source from, std::uint32_t pnum, std::uint32_t now_ms
     return Admission::refuse;
   }
   if (!armed_) return Admission::drop;
-  if (has_baseline_ && (!newer(pnum, newest_) || pnum - newest_ > command_window)) {
+  if (!in_window(pnum) && !begins_anew(pnum)) {
     code = Refusal::stale;
     return Admission::refuse;
   }
@@ -170,6 +187,8 @@ Admission BoardLink::admit(Source from, std::uint32_t pnum, std::uint32_t now_ms
 
 // Commands up to `pnum` are not to be executed any more.
 void BoardLink::spend(std::uint32_t pnum) {
+  if (begins_anew(pnum)) has_baseline_ = false;
+  numbers_in_doubt_ = false;
   if (has_baseline_ && !newer(pnum, newest_)) return;
   const std::uint32_t ahead = has_baseline_ ? pnum - newest_ : memory;
   executed_bits_ = ahead < memory ? executed_bits_ << ahead : 0;
@@ -178,8 +197,7 @@ void BoardLink::spend(std::uint32_t pnum) {
 }
 
 void BoardLink::refused(Source from, std::uint32_t pnum) {
-  const bool in_window = has_baseline_ && pnum - newest_ <= command_window;
-  if (has_session_ && from == owner_ && in_window) spend(pnum);
+  if (in_session(from) && (in_window(pnum) || begins_anew(pnum))) spend(pnum);
 }
 
 void BoardLink::executed(std::uint32_t pnum) {
@@ -221,7 +239,22 @@ void BoardLink::heartbeat_sent(std::uint32_t t_ms) {
   any_sent_ = true;
   send_now_ = false;
   last_sent_ms_ = t_ms;
-  if (state_ == BoardLinkState::connecting) return;  // those carry T:0
+  remember_sent(t_ms);
+}
+
+bool BoardLink::wants_answer(const HostHeartbeat& heartbeat, std::uint32_t now_ms) const {
+  if (any_answered_ && now_ms - last_answered_ms_ < answer_spacing_ms) return false;
+  return state_ != BoardLinkState::active || (heartbeat.has_time && heartbeat.t == 0);
+}
+
+void BoardLink::heartbeat_answered(std::uint32_t t_ms) {
+  any_answered_ = true;
+  last_answered_ms_ = t_ms;
+  remember_sent(t_ms);
+}
+
+void BoardLink::remember_sent(std::uint32_t t_ms) {
+  if (state_ == BoardLinkState::connecting || sent_at(t_ms)) return;  // connecting: those carry T:0
   sent_[sent_next_] = t_ms;
   sent_next_ = (sent_next_ + 1) % sent_count;
   if (sent_used_ < sent_count) ++sent_used_;

@@ -13,6 +13,7 @@
 // and commands are executed only after the first echo of a T of this boot (armed), so that nothing
 // which a network held back, from before a reboot or an outage, can move a motor. A *paper host*
 // numbers from below (or leaves PNum out); its T is an echo if it once was one, else its own clock.
+// A session keeps its kind as long as its numbers continue, also where they wrap.
 //
 // All times are the board's clock in ms, which wraps; it must start at a random value at boot.
 #pragma once
@@ -81,6 +82,9 @@ class BoardLink {
   // A command was refused, for its content or the safe state: if it is the session's, it and all
   // older ones are spent, so that no copy of it is executed when the reason is gone.
   void refused(Source from, std::uint32_t pnum);
+  // Is this admitted command of a host that has begun again? One that does not number its
+  // heartbeats shows that only by its first command after an outage. Nothing set before may remain.
+  bool begins_anew(std::uint32_t pnum) const;
 
   // Lets time pass. True once, when the owner has been silent for the timeout: ACTIVE -> LOST.
   bool poll(std::uint32_t now_ms);
@@ -92,6 +96,12 @@ class BoardLink {
   // each send one at once.
   bool heartbeat_due(std::uint32_t now_ms) const;
   void heartbeat_sent(std::uint32_t t_ms);
+  // Should this stale heartbeat be answered with one of ours? Its sender may have none to echo: it
+  // has heard nothing yet, or nothing since we were lost or booted. Seldom enough that two sides
+  // which answer each other do not fill the line.
+  bool wants_answer(const HostHeartbeat& heartbeat, std::uint32_t now_ms) const;
+  // A heartbeat was sent to one peer, besides those above.
+  void heartbeat_answered(std::uint32_t t_ms);
 
   // Milliseconds until poll() or heartbeat_due() may have something to say; 0 is now.
   std::uint32_t due_in(std::uint32_t now_ms) const;
@@ -99,12 +109,15 @@ class BoardLink {
   BoardLinkState state() const { return state_; }
   bool has_owner() const { return state_ == BoardLinkState::active; }
   Source owner() const { return owner_; }
+  // Is it the owner, or the one that was when the link was lost?
+  bool in_session(Source from) const { return has_session_ && from == owner_; }
   // When the owner was last heard alive: a heartbeat that fed. Only after the first session began.
   std::uint32_t fed_ms() const { return fed_ms_; }
   // The number of the last command executed in this session (the CMD field); 0 before the first.
   std::uint32_t last_executed() const { return last_executed_; }
 
   static constexpr std::uint32_t echo_retry_ms = 100;
+  static constexpr std::uint32_t answer_spacing_ms = 20;
   // A command that a heartbeat overtook this long ago is stale.
   static constexpr std::uint32_t late_limit_ms = 250;
   // How far ahead of the newest known number a command may be.
@@ -118,11 +131,15 @@ class BoardLink {
 
   Freshness judge(const HostHeartbeat& heartbeat, bool echo_host, std::uint32_t now_ms) const;
   bool sent_at(std::uint32_t t_ms) const;
+  bool is_echo(const HostHeartbeat& heartbeat) const;
   bool continues(const HostHeartbeat& heartbeat) const;
   HeartbeatEffect begin_session(const HostHeartbeat& heartbeat, bool armed, std::uint32_t now_ms);
   void feed(const HostHeartbeat& heartbeat, std::uint32_t now_ms);
   void lose(std::uint32_t now_ms);
   void spend(std::uint32_t pnum);
+  bool near_newest_heartbeat(std::uint32_t pnum) const;
+  bool in_window(std::uint32_t pnum) const;
+  void remember_sent(std::uint32_t t_ms);
 
   Timing timing_;
   BoardLinkState state_ = BoardLinkState::connecting;
@@ -137,18 +154,18 @@ class BoardLink {
   std::uint32_t newest_ = 0;         // newest executed command, or the session's first heartbeat
   std::uint64_t executed_bits_ = 0;  // bit i: newest_ - i was executed
   std::uint32_t last_executed_ = 0;
+  bool numbers_in_doubt_ = false;  // resumed by a heartbeat without a number
   bool has_heartbeat_pnum_ = false;
   std::uint32_t newest_heartbeat_ = 0;
   std::uint32_t newest_echo_ms_ = 0;
   std::uint32_t fed_ms_ = 0;
 
-  // Heartbeat numbers with their arrival, for late_limit_ms: a ring as long as the limit at 10 Hz
-  // needs.
+  // Heartbeat numbers and when they had arrived, as long back as late_limit_ms asks for.
   struct Mark {
     std::uint32_t pnum;
     std::uint32_t at_ms;
   };
-  static constexpr int mark_count = 4;
+  static constexpr int mark_count = 16;
   Mark marks_[mark_count] = {};
   int marks_used_ = 0;
 
@@ -159,6 +176,8 @@ class BoardLink {
   int sent_next_ = 0;
   bool any_sent_ = false;
   std::uint32_t last_sent_ms_ = 0;
+  bool any_answered_ = false;
+  std::uint32_t last_answered_ms_ = 0;
   std::uint32_t lost_ms_ = 0;  // when LOST was entered
   bool send_now_ = true;       // boot, ACTIVE and LOST entered
 };

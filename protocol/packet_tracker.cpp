@@ -10,6 +10,7 @@ Arrival PacketTracker::on(std::uint32_t pnum) {
     suspecting_ = false;
     newest_ = pnum;
     seen_ = 1;
+    reach_ = 0;
     return Arrival::first;
   }
   const std::uint32_t ahead = pnum - newest_;
@@ -18,10 +19,11 @@ Arrival PacketTracker::on(std::uint32_t pnum) {
     suspecting_ = false;
     seen_ = ahead < window ? (seen_ << ahead) | 1U : 1U;
     newest_ = pnum;
+    reach_ = reach_ + ahead < window ? reach_ + ahead : window - 1;
     counters_.lost += ahead - 1;
     return ahead == 1 ? Arrival::next : Arrival::gap;
   }
-  if (behind < window) {
+  if (behind <= reach_) {
     suspecting_ = false;
     const std::uint64_t bit = std::uint64_t{1} << behind;
     if ((seen_ & bit) != 0) {
@@ -30,14 +32,20 @@ Arrival PacketTracker::on(std::uint32_t pnum) {
     }
     seen_ |= bit;
     ++counters_.late;
-    if (counters_.lost != 0) --counters_.lost;
+    --counters_.lost;
     return Arrival::late;
+  }
+  if (behind < window) {  // sent before the first that came
+    suspecting_ = false;
+    ++counters_.old;
+    return Arrival::old;
   }
   if (suspecting_ && pnum == suspect_) {
     ++counters_.restarts;
     suspecting_ = false;
     newest_ = pnum;
     seen_ = 3;  // this one and the one that raised the suspicion
+    reach_ = 1;
     return Arrival::restart;
   }
   suspecting_ = true;

@@ -22,7 +22,7 @@ enum class Arrival : std::uint8_t {
   gap,        // newer than expected: the numbers between are counted lost
   duplicate,  // seen before
   late,       // was counted lost; taken back
-  old,        // too far behind to tell late from duplicate
+  old,        // too far behind to tell late from duplicate, or from before the first
   restart,    // the sender began again
 };
 
@@ -59,6 +59,7 @@ class PacketTracker {
   PacketCounters counters_;
   std::uint64_t seen_ = 0;  // bit i: newest_ - i was seen
   std::uint32_t newest_ = 0;
+  std::uint32_t reach_ = 0;    // how far back seen_ goes: not before the sender's first number
   std::uint32_t suspect_ = 0;  // the number that would confirm a restart
   bool started_ = false;
   bool suspecting_ = false;

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the application sends: heartbeats, states, answers.
+#include "application.hpp"
+
+namespace r4 {
+namespace firmware {
+
+namespace {
+
+// Room for a heartbeat or a refusal.
+constexpr std::size_t short_datagram = 128;
+
+// ";SAFE:6" behind the last field of a state.
+constexpr std::size_t safe_field_size = 8;
+
+}  // namespace
+
+// The controlling host where it is, else whoever the port streams to.
+std::uint32_t Application::audience(std::uint8_t port) const {
+  const bool owned = link_.has_owner() && link_.owner().port == port;
+  return owned ? link_.owner().peer : everyone;
+}
+
+// The answers to a host that does not control the board count apart.
+std::uint32_t& Application::number_for(Source to) {
+  const bool aside = link_.has_owner() && to != link_.owner();
+  return aside ? ports_[to.port].aside_pnum : ports_[to.port].next_pnum;
+}
+
+void Application::answer(Source to, DatagramWriter& writer, std::uint32_t now_ms) {
+  const Text datagram = writer.finish(number_for(to)++, now_ms);
+  if (!datagram.empty()) ports_[to.port].port->send(datagram, Urgency::normal, to.peer);
+}
+
+void Application::identify(Source to, std::uint32_t now_ms) {
+  char buffer[max_datagram];
+  DatagramWriter writer(buffer, sizeof buffer);
+  write_identity(writer, identity_);
+  answer(to, writer, now_ms);
+}
+
+void Application::refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms) {
+  ++rx_refused_;
+  if (!datagram.has_pnum()) return;
+  if (observer_ != nullptr) observer_->on_refused(now_ms, datagram.pnum(), code);
+  Nack nack;
+  nack.pnum = datagram.pnum();
+  nack.code = code;
+  char buffer[short_datagram];
+  DatagramWriter writer(buffer, sizeof buffer);
+  write_nack(writer, nack);
+  answer(to, writer, now_ms);
+}
+
+void Application::send_heartbeats(std::uint32_t now_ms) {
+  for (std::uint8_t i = 0; i < port_count_; ++i) send_heartbeat(i, audience(i), false, now_ms);
+  link_.heartbeat_sent(now_ms);
+}
+
+void Application::send_heartbeat(std::uint8_t port, std::uint32_t peer, bool aside,
+                                 std::uint32_t now_ms) {
+  PortSlot& slot = ports_[port];
+  char buffer[short_datagram];
+  Text heartbeat;
+  if (link_.state() == BoardLinkState::connecting) {
+    heartbeat = write_board_heartbeat(buffer, sizeof buffer, 0, 0, safety_.reason());
+    slot.next_pnum = 1;
+  } else {
+    std::uint32_t& pnum = aside ? slot.aside_pnum : slot.next_pnum;
+    heartbeat = write_board_heartbeat(buffer, sizeof buffer, pnum++, now_ms, safety_.reason());
+  }
+  slot.port->send(heartbeat, Urgency::normal, peer);
+}
+
+void Application::send_states(std::uint32_t now_ms) {
+  std::uint32_t t_ms = 0;
+  if (!schedule_.take(now_ms, t_ms)) return;
+  State state;
+  fill(state);
+  for (std::uint8_t i = 0; i < port_count_; ++i) send_state(i, state, t_ms);
+}
+
+// One state, in as many datagrams of the same T as the port's limit asks for.
+void Application::send_state(std::uint8_t port, const State& state, std::uint32_t t_ms) {
+  char buffer[max_datagram];
+  const std::size_t carried = ports_[port].port->max_size();
+  const std::size_t limit = carried < sizeof buffer ? carried : sizeof buffer;
+  const std::size_t room = limit - DatagramWriter::trailer_max - safe_field_size;
+  FieldSet fields = setpoints_.fields;
+  if (state.safe != SafeReason::none) fields.remove(StateField::safe);  // it ends every part
+  DatagramWriter writer(buffer, limit);
+  for (int i = 0; i < state_field_count; ++i) {
+    const StateField field = static_cast<StateField>(i);
+    if (!fields.has(field)) continue;
+    const std::size_t before = writer.size();
+    write_field(writer, field, state);
+    if (writer.ok() && writer.size() <= room) continue;
+    writer.truncate(before);
+    send_part(port, writer, state, t_ms);
+    writer = DatagramWriter(buffer, limit);
+    write_field(writer, field, state);
+  }
+  send_part(port, writer, state, t_ms);
+}
+
+// Each part tells by itself whether the outputs are safe.
+void Application::send_part(std::uint8_t port, DatagramWriter& writer, const State& state,
+                            std::uint32_t t_ms) {
+  if (state.safe != SafeReason::none) write_field(writer, StateField::safe, state);
+  PortSlot& slot = ports_[port];
+  slot.port->send(writer.finish(slot.next_pnum++, t_ms), Urgency::state, audience(port));
+}
+
+void Application::fill(State& state) const {
+  for (int i = 0; i < analog_channels; ++i) state.analog_cv[i] = inputs_.analog_cv[i];
+  state.handle_held = inputs_.handle_held;
+  for (int i = 0; i < dhb12_channels; ++i) state.dhb12[i] = outputs_.dhb12[i];
+  for (int i = 0; i < osmc_channels; ++i) state.osmc[i] = outputs_.osmc[i];
+  for (int i = 0; i < servo_channels; ++i) state.servo_us[i] = outputs_.servo_us[i];
+  for (int i = 0; i < bldc_channels; ++i) state.bldc[i] = outputs_.bldc[i];
+  state.relays = outputs_.relays;
+  for (int i = 0; i < stepper_channels; ++i) state.stepper_steps[i] = inputs_.stepper_steps[i];
+  for (int i = 0; i < encoder_channels; ++i) state.encoder_counts[i] = inputs_.encoder_counts[i];
+  for (int i = 0; i < ultrasonic_channels; ++i) state.ultrasonic_cm[i] = inputs_.ultrasonic_cm[i];
+  state.safe = safety_.reason();
+  state.last_command = link_.last_executed();
+  state.rx_ok = rx_ok_;
+  state.rx_crc = rx_bad_;
+  state.rx_lost = tracker_.counters().lost;
+  state.rx_duplicate = tracker_.counters().duplicate;
+  state.rx_refused = rx_refused_;
+  state.late = schedule_.late();
+}
+
+}  // namespace firmware
+}  // namespace r4
