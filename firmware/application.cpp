@@ -268,17 +268,17 @@ void Application::check_interlocks(std::uint32_t now_ms) {
 // The one place where outputs change: safe unless the board is ACTIVE, else the setpoints.
 void Application::update_outputs(std::uint32_t now_ms) {
   const bool live = state() == BoardState::active;
-  if (!live) {
-    if (!outputs_live_) return;
-    hal_.make_safe();
-    outputs_ = Outputs();
-  } else {
-    if (outputs_live_ && outputs_ == setpoints_.outputs) return;
-    outputs_ = setpoints_.outputs;
-    hal_.apply(outputs_);
-  }
+  const Outputs wanted = live ? setpoints_.outputs : Outputs();
+  const bool changed = wanted != outputs_;
+  if (!changed && live == outputs_live_) return;
+  outputs_ = wanted;
   outputs_live_ = live;
-  if (observer_ != nullptr) observer_->on_outputs(now_ms, outputs_);
+  if (live) {
+    hal_.apply(outputs_);
+  } else {
+    hal_.make_safe();
+  }
+  if (changed && observer_ != nullptr) observer_->on_outputs(now_ms, outputs_);
 }
 
 void Application::report_state(std::uint32_t now_ms) {

@@ -162,8 +162,13 @@ Script Script::parse(std::string_view text, const std::string& name) {
 
 Script Script::load(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
-  std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  if (!file) {
+  const bool opened = file.is_open();
+  std::string text;
+  char chunk[4096];
+  while (file.read(chunk, sizeof chunk) || file.gcount() != 0) {
+    text.append(chunk, static_cast<std::size_t>(file.gcount()));
+  }
+  if (!opened || file.bad()) {
     throw Error(ErrorKind::usage, path,
                 std::string("the scenario cannot be read: ") + std::strerror(errno),
                 "give the path of a readable scenario file");

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "firmware/ports/sim/script.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <fstream>
+
+#include "protocol/state.hpp"
+#include "transports/error.hpp"
+
+namespace r4::sim {
+namespace {
+
+using Kind = ScriptStep::Kind;
+
+// The error that `text` gives, as a user sees it.
+std::string error_of(const std::string& text) {
+  try {
+    Script::parse(text, "bench.txt");
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::data);
+    EXPECT_FALSE(error.problem().fix.empty());
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Script, ReadsEveryKindOfStep) {
+  const Script script = Script::parse(
+      "# a day on the bench\n"
+      "\n"
+      "0.5 handle released   # let go\n"
+      "1 us 1 15\n"
+      "\t1.25   enc 2 -100\r\n"
+      "1.5 analog AIN24 21.5\n"
+      "2 handle held\n"
+      "3 fault\n"
+      "3.125 watchdog\n"
+      "4 reboot",
+      "bench.txt");
+  const auto& steps = script.steps();
+  ASSERT_EQ(steps.size(), 8U);
+
+  EXPECT_EQ(steps[0].kind, Kind::handle);
+  EXPECT_EQ(steps[0].at_ms, 500U);
+  EXPECT_EQ(steps[0].value, 0);
+
+  EXPECT_EQ(steps[1].kind, Kind::ultrasonic);
+  EXPECT_EQ(steps[1].at_ms, 1000U);
+  EXPECT_EQ(steps[1].channel, 1);
+  EXPECT_EQ(steps[1].value, 15);
+
+  EXPECT_EQ(steps[2].kind, Kind::encoder);
+  EXPECT_EQ(steps[2].at_ms, 1250U);
+  EXPECT_EQ(steps[2].channel, 2);
+  EXPECT_EQ(steps[2].value, -100);
+
+  EXPECT_EQ(steps[3].kind, Kind::analog);
+  EXPECT_EQ(steps[3].channel, static_cast<int>(Analog::ain24));
+  EXPECT_EQ(steps[3].value, 2150);
+
+  EXPECT_EQ(steps[4].value, 1);
+  EXPECT_EQ(steps[5].kind, Kind::fault);
+  EXPECT_EQ(steps[6].kind, Kind::watchdog);
+  EXPECT_EQ(steps[6].at_ms, 3125U);
+  EXPECT_EQ(steps[7].kind, Kind::reboot);
+}
+
+TEST(Script, NamesEveryAnalogInput) {
+  const char* const names[] = {"AIN24", "AIN12", "AIN5", "AINDMH", "AINSTEER", "AIN6"};
+  for (int i = 0; i < analog_channels; ++i) {
+    const auto script = Script::parse(std::string("0 analog ") + names[i] + " 1", "x");
+    EXPECT_EQ(script.steps().at(0).channel, i) << names[i];
+  }
+}
+
+TEST(Script, PutsStepsInTheOrderOfTimeAndKeepsTheOrderOfLinesWithin) {
+  const Script script = Script::parse("2 enc 1 1\n1 enc 1 2\n2 enc 1 3\n", "x");
+  ASSERT_EQ(script.steps().size(), 3U);
+  EXPECT_EQ(script.steps()[0].value, 2);
+  EXPECT_EQ(script.steps()[1].value, 1);
+  EXPECT_EQ(script.steps()[2].value, 3);
+}
+
+TEST(Script, IsEmptyWithoutSteps) {
+  EXPECT_TRUE(Script::parse("", "x").steps().empty());
+  EXPECT_TRUE(Script::parse("# nothing\n\n  \n", "x").steps().empty());
+}
+
+TEST(Script, SaysWhereWhatAndHowToMendIt) {
+  EXPECT_EQ(error_of("1 handle held\n2 handle open\n"),
+            "bench.txt:2: 'open' is nothing a handle can be; write held or released");
+  EXPECT_EQ(error_of("1 us 5 10"), "bench.txt:1: '5' is no ultrasonic sensor; there are 1 to 4");
+  EXPECT_EQ(error_of("1 us"),
+            "bench.txt:1: 'us' has too few or too many words; write TIME us SENSOR CM");
+}
+
+TEST(Script, RefusesWhatItDoesNotUnderstand) {
+  for (const char* line : {
+           "handle held",           // no time
+           "-1 handle held",        // before the start
+           "1. handle held",        // half a number
+           ".5 handle held",        //
+           "1.2345 handle held",    // finer than a millisecond
+           "1e3 handle held",       //
+           "99999999 handle held",  // too long for the board's clock
+           "1",                     // nothing to do
+           "1 dance",               //
+           "1 handle",              //
+           "1 handle held now",     //
+           "1 handle HELD",         //
+           "1 us 0 10",             // sensors are 1 to 4
+           "1 us one 10",           //
+           "1 us 1 401",            // beyond what a sensor sees
+           "1 us 1 -3",             //
+           "1 enc 5 0",             //
+           "1 enc 1 2147483648",    // more than 32 bits
+           "1 enc 1 1.5",           //
+           "1 analog AIN7 1",       //
+           "1 analog SERVO1POS 1",  // a field, but no input
+           "1 analog AIN24 high",   //
+           "1 fault 3",             //
+           "1 reboot now",          //
+       }) {
+    EXPECT_NE(error_of(line), "") << line;
+  }
+}
+
+TEST(Script, IsReadFromAFile) {
+  const std::string path = testing::TempDir() + "r4_script_test.txt";
+  std::ofstream(path) << "1 reboot\n2 fall over\n";
+  try {
+    Script::load(path);
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.problem().thing, path + ":2");
+  }
+  std::remove(path.c_str());
+}
+
+TEST(Script, SaysWhichFileCannotBeRead) {
+  for (const std::string path : {"/nonexistent/bench.txt", "/"}) {
+    try {
+      Script::load(path);
+      FAIL() << "no error for " << path;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::usage);
+      EXPECT_EQ(error.problem().thing, path);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace r4::sim

@@ -1,0 +1,321 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The simulated board over a memory pair, with a clock that the test moves.
+#include "firmware/ports/sim/simulated_board.hpp"
+
+#include <gtest/gtest.h>
+
+#include <asio/io_context.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "protocol/board_link.hpp"
+#include "protocol/message.hpp"
+#include "protocol/state.hpp"
+#include "tests/support/datagrams.hpp"
+#include "transports/memory_carrier.hpp"
+
+namespace r4::sim {
+namespace {
+
+using firmware::BoardState;
+
+// What the host's end of a carrier hears.
+struct Listener final : Carrier::Handler {
+  std::vector<std::string> heard;
+  void on_datagram(std::string_view bytes, Peer) override { heard.emplace_back(bytes); }
+  void on_carrier_event(const CarrierEvent&) override {}
+};
+
+// A board, an echo host at the other end of a memory pair, and the time.
+class SimulatedBoardTest : public testing::Test {
+ protected:
+  void build(SimulatedBoard::Options options = {}) {
+    options.seed = options.seed.value_or(5);
+    options.clock_ms = [this] { return clock_ms_; };
+    options.events.on_state = [this](std::uint32_t t_ms, BoardState state, SafeReason reason) {
+      events_.push_back(std::string(firmware::to_text(state)) + " " + to_text(reason));
+      event_ms_ = t_ms;
+    };
+    options.events.on_outputs = [this](std::uint32_t, const firmware::Outputs& outputs) {
+      events_.push_back("outputs " + std::to_string(outputs.osmc[0].pwm));
+    };
+    options.events.on_executed = [this](std::uint32_t, std::uint32_t pnum, const Command&) {
+      events_.push_back("executed " + std::to_string(pnum - first_pnum));
+    };
+    options.events.on_refused = [this](std::uint32_t, std::uint32_t, Refusal code) {
+      events_.push_back("refused " + test::str(name_of(code)));
+    };
+    options.events.on_carrier = [this](std::uint32_t, const Carrier&, const CarrierEvent& event) {
+      events_.push_back(event.kind == CarrierEvent::Kind::up ? "up" : "down");
+    };
+    board_ = std::make_unique<SimulatedBoard>(io_, std::move(options));
+    auto [host_end, board_end] = make_memory_pair(io_);
+    host_ = std::move(host_end);
+    board_->add_carrier(std::move(board_end));
+    host_->open(listener_);
+    board_->start();
+    deliver();
+  }
+
+  void deliver() {
+    io_.restart();
+    io_.poll();
+  }
+
+  // Lets the board run as its own timer would.
+  void run(std::uint32_t ms) {
+    const std::uint32_t end = clock_ms_ + ms;
+    while (clock_ms_ != end) {
+      const std::uint32_t due = board_->poll();
+      clock_ms_ += std::max(1U, std::min(due, end - clock_ms_));
+      board_->poll();
+      deliver();
+    }
+  }
+
+  // The same with a host that answers at 10 Hz.
+  void run_alive(std::uint32_t ms) {
+    for (std::uint32_t done = 0; done < ms; done += 100) {
+      heartbeat(newest_t());
+      run(std::min(100U, ms - done));
+    }
+  }
+
+  void send(const std::string& fields) {
+    const std::string bytes = test::with_crc(fields);
+    host_->send(bytes, Priority::normal);
+    deliver();
+  }
+  void heartbeat(std::uint32_t t) {
+    send("H:ROS2-R4;PNum:" + std::to_string(pnum_++) + ";T:" + std::to_string(t) + ";");
+  }
+  void command(const std::string& field) {
+    send(field + ";PNum:" + std::to_string(pnum_++) + ";T:1;");
+  }
+  void connect() {
+    heartbeat(0);
+    heartbeat(newest_t());
+    events_.clear();
+    listener_.heard.clear();
+  }
+
+  // The T of the board's newest heartbeat.
+  std::uint32_t newest_t() const {
+    for (auto line = listener_.heard.rbegin(); line != listener_.heard.rend(); ++line) {
+      Datagram datagram;
+      if (read(*line, datagram) && kind_of(datagram) == MessageKind::board_heartbeat) {
+        newest_t_ = static_cast<std::uint32_t>(datagram.time_ms());
+        break;
+      }
+    }
+    return newest_t_;
+  }
+
+  std::vector<State> states() const {
+    std::vector<State> states;
+    for (const std::string& line : listener_.heard) {
+      Datagram datagram;
+      State state;
+      if (read(line, datagram) && kind_of(datagram) == MessageKind::state &&
+          read_state(datagram, state)) {
+        states.push_back(state);
+      }
+    }
+    return states;
+  }
+
+  static constexpr std::uint32_t first_pnum = echo_host_first_pnum + 1000;
+  asio::io_context io_;
+  std::uint32_t clock_ms_ = 0;
+  std::uint32_t pnum_ = first_pnum;
+  mutable std::uint32_t newest_t_ = 0;
+  Listener listener_;
+  std::unique_ptr<Carrier> host_;
+  std::unique_ptr<SimulatedBoard> board_;
+  std::vector<std::string> events_;
+  std::uint32_t event_ms_ = 0;
+};
+
+using Lines = std::vector<std::string>;
+
+TEST_F(SimulatedBoardTest, WaitsForAHostAndThenStreamsTheInputsOfTheBench) {
+  build();
+  run(1000);
+  for (const std::string& line : listener_.heard) {
+    EXPECT_EQ(line, "H:R4-ROS2;PNum:0;T:0;^0xb10b3a06^");
+  }
+  EXPECT_EQ(listener_.heard.size(), 3U);
+  EXPECT_EQ(events_, (Lines{"up", "CONNECTING none", "outputs 0"}));
+
+  connect();
+  run_alive(1000);
+  const std::vector<State> seen = states();
+  ASSERT_EQ(seen.size(), 100U);
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    EXPECT_TRUE(seen[i].handle_held);
+    EXPECT_GE(seen[i].analog_cv[0], 2413);
+    EXPECT_LE(seen[i].analog_cv[0], 2456);
+    if (i > 0) {
+      EXPECT_EQ(seen[i].t_ms - seen[i - 1].t_ms, 10U);
+    }
+  }
+}
+
+TEST_F(SimulatedBoardTest, ObeysItsHostAndGoesSafeWhenItFallsSilent) {
+  build();
+  connect();
+  command("O:358,1,1");
+  EXPECT_EQ(events_, (Lines{"executed 2", "outputs 358"}));
+  EXPECT_EQ(board_->hal().outputs().osmc[0].pwm, 358);
+  events_.clear();
+  const std::uint32_t fed = board_->now_ms();
+  heartbeat(newest_t());
+  run(2000);
+  EXPECT_EQ(events_, (Lines{"outputs 0", "SAFE link"}));
+  EXPECT_EQ(event_ms_ - fed, 1000U);
+  EXPECT_EQ(board_->hal().outputs(), firmware::Outputs());
+}
+
+TEST_F(SimulatedBoardTest, TellsOfWhatItRefuses) {
+  build();
+  connect();
+  command("O:5000,1,1");
+  EXPECT_EQ(events_, (Lines{"refused RANGE"}));
+}
+
+TEST_F(SimulatedBoardTest, FollowsItsScriptToTheMillisecond) {
+  SimulatedBoard::Options options;
+  options.script = Script::parse(
+      "0.123 handle released\n"
+      "0.25 handle held\n"
+      "0.3 analog AIN24 21.5\n"
+      "0.3 enc 2 100\n"
+      "0.3 us 3 42\n"
+      "0.4 fault\n",
+      "test");
+  build(std::move(options));
+  connect();
+  const std::uint32_t start = board_->now_ms();
+  command("O:358,1,1");
+  events_.clear();
+  run_alive(200);
+  EXPECT_EQ(events_, (Lines{"outputs 0", "SAFE handle"}));
+  EXPECT_EQ(event_ms_ - start, 123U);
+  events_.clear();
+  run_alive(100);
+  EXPECT_EQ(events_, (Lines{"ACTIVE none"}));
+  EXPECT_EQ(event_ms_ - start, 250U);
+  command("F:DEFAULT,ENC2,US3");
+  listener_.heard.clear();
+  run(50);
+  const State state = states().back();
+  EXPECT_EQ(state.analog_cv[0], 2150);
+  EXPECT_EQ(state.encoder_counts[1], 100);
+  EXPECT_EQ(state.ultrasonic_cm[2], 42);
+  events_.clear();
+  run_alive(100);
+  EXPECT_EQ(events_, (Lines{"SAFE fault"}));
+  EXPECT_EQ(event_ms_ - start, 400U);
+}
+
+TEST_F(SimulatedBoardTest, ARebootForgetsTheHostAndTurnsTheClock) {
+  SimulatedBoard::Options options;
+  options.script = Script::parse("0.05 reboot", "test");
+  build(std::move(options));
+  connect();
+  command("O:358,1,1");
+  command("P:1000,1000,1");
+  const std::uint32_t before = board_->now_ms();
+  events_.clear();
+  run(51);
+  EXPECT_EQ(events_, (Lines{"CONNECTING none", "outputs 0"}));
+  EXPECT_EQ(board_->hal().outputs(), firmware::Outputs());
+  EXPECT_GT(board_->now_ms() - before, 1000U);
+  EXPECT_EQ(listener_.heard.back(), "H:R4-ROS2;PNum:0;T:0;^0xb10b3a06^");
+  command("O:400,1,1");
+  EXPECT_EQ(board_->hal().outputs(), firmware::Outputs());
+  heartbeat(0);
+  heartbeat(newest_t());
+  command("O:400,1,1");
+  EXPECT_EQ(board_->hal().outputs().osmc[0].pwm, 400);
+}
+
+TEST_F(SimulatedBoardTest, GoesSafeAtOnceWhenTheHostsCarrierCloses) {
+  build();
+  connect();
+  command("O:358,1,1");
+  events_.clear();
+  host_->close();
+  deliver();
+  EXPECT_EQ(events_, (Lines{"down", "outputs 0", "SAFE link"}));
+  EXPECT_EQ(board_->hal().outputs(), firmware::Outputs());
+
+  // It is back as soon as the host is.
+  events_.clear();
+  listener_.heard.clear();
+  host_->open(listener_);
+  deliver();
+  run(500);
+  heartbeat(newest_t());
+  EXPECT_EQ(events_, (Lines{"up", "outputs 358", "ACTIVE none"}));
+}
+
+TEST_F(SimulatedBoardTest, SameSeedSameTrace) {
+  Lines traces[2];
+  for (Lines& trace : traces) {
+    clock_ms_ = 0;
+    pnum_ = first_pnum;
+    listener_.heard.clear();
+    SimulatedBoard::Options options;
+    options.seed = 77;
+    build(std::move(options));
+    heartbeat(0);
+    run_alive(500);
+    trace = listener_.heard;
+  }
+  EXPECT_GT(traces[0].size(), 50U);
+  EXPECT_EQ(traces[0], traces[1]);
+}
+
+TEST_F(SimulatedBoardTest, AnotherSeedStartsTheClockElsewhere) {
+  SimulatedBoard::Options options;
+  options.seed = 1;
+  build(std::move(options));
+  const std::uint32_t one = board_->now_ms();
+  options = {};
+  options.seed = 2;
+  build(std::move(options));
+  EXPECT_GT(board_->now_ms() - one, 1000U);
+}
+
+TEST_F(SimulatedBoardTest, StopsAndStartsAgain) {
+  build();
+  connect();
+  command("O:358,1,1");
+  board_->stop();
+  EXPECT_EQ(board_->hal().outputs(), firmware::Outputs());
+  board_->start();
+  deliver();
+  EXPECT_EQ(board_->application().state(), BoardState::connecting);
+}
+
+TEST_F(SimulatedBoardTest, AnswersWhoItIs) {
+  SimulatedBoard::Options options;
+  options.board_id = "bench-3";
+  options.firmware_version = "9.9";
+  build(std::move(options));
+  command("Q:ID");
+  EXPECT_EQ(listener_.heard.back().substr(0, 23), "I:R4,9.9,bench-3,sim;PN");
+}
+
+TEST_F(SimulatedBoardTest, RefusesAFifthCarrier) {
+  build();
+  for (int i = 1; i < firmware::Application::max_ports; ++i) {
+    board_->add_carrier(make_memory_pair(io_).first);
+  }
+  EXPECT_THROW(board_->add_carrier(make_memory_pair(io_).first), Error);
+}
+
+}  // namespace
+}  // namespace r4::sim
