@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the tests of carriers share: a handler that remembers, and waiting for something to happen.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <asio/io_context.hpp>
+#include <asio/steady_timer.hpp>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "transports/carrier.hpp"
+#include "transports/registry.hpp"
+
+namespace r4::test {
+
+using Clock = std::chrono::steady_clock;
+using Kind = CarrierEvent::Kind;
+
+// Generous: a test that waits this long has failed.
+inline constexpr std::chrono::seconds patience{5};
+
+class Recorder final : public Carrier::Handler {
+ public:
+  struct Datagram {
+    std::string text;
+    Peer from;
+    Clock::time_point when;
+  };
+  struct Event {
+    Kind kind;
+    Problem problem;
+    Clock::time_point when;
+  };
+
+  void on_datagram(std::string_view bytes, Peer from) override {
+    datagrams.push_back({std::string(bytes), from, Clock::now()});
+    if (then) then(datagrams.back());
+  }
+  void on_carrier_event(const CarrierEvent& event) override {
+    events.push_back({event.kind, event.problem, Clock::now()});
+  }
+  void on_drained() override { ++drained; }
+
+  bool has(std::string_view text) const {
+    for (const Datagram& datagram : datagrams) {
+      if (datagram.text == text) return true;
+    }
+    return false;
+  }
+  std::size_t count(Kind kind) const {
+    std::size_t n = 0;
+    for (const Event& event : events) n += event.kind == kind ? 1 : 0;
+    return n;
+  }
+  const Event* last(Kind kind) const {
+    const Event* found = nullptr;
+    for (const Event& event : events) {
+      if (event.kind == kind) found = &event;
+    }
+    return found;
+  }
+
+  std::vector<Datagram> datagrams;
+  std::vector<Event> events;
+  int drained = 0;
+  std::function<void(const Datagram&)> then;  // also called
+};
+
+// Runs the loop until `done()`; false if it is not within `limit`.
+template <class Done>
+bool run_until(asio::io_context& io, Done done, Clock::duration limit = patience) {
+  const auto deadline = Clock::now() + limit;
+  io.restart();
+  while (!done()) {
+    const auto now = Clock::now();
+    if (now >= deadline) return false;
+    // With nothing to wait for there is nothing that could change.
+    if (io.run_one_for(deadline - now) == 0 && io.stopped()) return done();
+  }
+  return true;
+}
+
+// Runs the loop for a while: to see that something does not happen, or to keep a rate.
+inline void run_for(asio::io_context& io, Clock::duration time) {
+  const auto never = [] { return false; };
+  run_until(io, never, time);
+}
+inline void run_to(asio::io_context& io, Clock::time_point time) {
+  run_for(io, time - Clock::now());
+}
+
+inline double in_milliseconds(Clock::duration time) {
+  return std::chrono::duration<double, std::milli>(time).count();
+}
+
+// Opens a carrier by URL.
+inline std::unique_ptr<Carrier> open_carrier(asio::io_context& io, const std::string& url,
+                                             Role role, Recorder& recorder) {
+  auto carrier = Registry::standard().make(io, url, role);
+  carrier->open(recorder);
+  return carrier;
+}
+
+// The Error that `action` throws; none if it throws none.
+template <class Action>
+std::optional<Error> error_of(Action action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error;
+  }
+  return std::nullopt;
+}
+
+// File descriptors that this process has open.
+std::size_t open_descriptors();
+
+// Runs `action` in a child process and returns its exit status; 126 if a signal ended it.
+int run_in_child(const std::function<int()>& action);
+
+// The same without privileges, as user nobody.
+int run_unprivileged(const std::function<int()>& action);
+
+}  // namespace r4::test

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "transports/registry.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "recorder.hpp"
+#include "transports/memory_carrier.hpp"
+
+namespace r4::test {
+namespace {
+
+TEST(Registry, MakesACarrierForEachTransport) {
+  asio::io_context io;
+  const Registry registry = Registry::standard();
+  EXPECT_NE(registry.make(io, "udp://127.0.0.1", Role::host), nullptr);
+  EXPECT_NE(registry.make(io, "serial:auto", Role::host), nullptr);
+  EXPECT_NE(registry.make(io, "pty:", Role::board), nullptr);
+  EXPECT_EQ(registry.entries().size(), 3U);
+}
+
+TEST(Registry, NamesTheTransportsThatItHas) {
+  asio::io_context io;
+  const auto error =
+      error_of([&] { Registry::standard().make(io, "tcp://127.0.0.1", Role::host); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->kind(), ErrorKind::usage);
+  EXPECT_EQ(error->problem().thing, "tcp://127.0.0.1");
+  EXPECT_EQ(error->problem().reason, "there is no transport 'tcp'");
+  for (const char* usage : {"udp://HOST", "serial:auto", "pty:[PATH]"}) {
+    EXPECT_NE(error->problem().fix.find(usage), std::string::npos) << error->what();
+  }
+}
+
+TEST(Registry, TakesFurtherTransports) {
+  asio::io_context io;
+  Registry registry = Registry::standard();
+  registry.add({"memory", "memory:", "for this test", [](asio::io_context& loop, const Url&, Role) {
+                  return make_memory_pair(loop).first;
+                }});
+  EXPECT_EQ(registry.make(io, "memory:", Role::host)->name(), "memory:");
+}
+
+struct Refusal {
+  std::string url;
+  Role role;
+  std::string reason;
+};
+
+TEST(Registry, RefusesAUrlThatItsTransportDoesNotTake) {
+  const std::vector<Refusal> table = {
+      {"udp:", Role::host, "it is not udp://HOST"},
+      {"udp:192.168.1.77", Role::host, "it is not udp://HOST"},
+      {"udp://host/path", Role::host, "it is not udp://HOST"},
+      {"udp://host:0", Role::host, "port 0"},
+      {"udp://host?listen=65536", Role::host, "out of range"},
+      {"udp://host?listen=any", Role::host, "out of range"},
+      {"udp://host?peer=x", Role::host, "no option 'peer'"},
+      {"udp://0.0.0.0?listen=1", Role::board, "no option 'listen'"},
+      {"udp://0.0.0.0?peer=", Role::board, "is not HOST"},
+      {"udp://0.0.0.0?peer=host:0", Role::board, "is not HOST"},
+      {"udp://0.0.0.0?peer=host/x", Role::board, "is not HOST"},
+      {"serial:", Role::host, "names no serial port"},
+      {"serial:ttyACM0", Role::host, "names no serial port"},
+      {"serial://ttyACM0", Role::host, "names no serial port"},
+      {"serial:auto?sn=5", Role::host, "names no serial port"},
+      {"serial:///dev/ttyACM0?sn=5", Role::host, "names no serial port"},
+      {"serial:?sn=", Role::host, "names no serial port"},
+      {"serial:auto?baud=1200", Role::host, "out of range"},
+      {"serial:auto?baud=fast", Role::host, "out of range"},
+      {"serial:auto?speed=9600", Role::host, "no option 'speed'"},
+      {"pty:/tmp/r4", Role::host, "the board's end"},
+      {"pty://tmp/r4", Role::board, "it is not pty:"},
+      {"pty:/tmp/r4?baud=9600", Role::board, "no option 'baud'"},
+  };
+  asio::io_context io;
+  for (const Refusal& row : table) {
+    SCOPED_TRACE(row.url);
+    const auto error = error_of([&] { Registry::standard().make(io, row.url, row.role); });
+    ASSERT_TRUE(error) << "taken";
+    EXPECT_EQ(error->kind(), ErrorKind::usage);
+    EXPECT_NE(error->problem().reason.find(row.reason), std::string::npos) << error->what();
+    EXPECT_FALSE(error->problem().fix.empty()) << error->what();
+  }
+}
+
+}  // namespace
+}  // namespace r4::test
