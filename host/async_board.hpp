@@ -8,19 +8,31 @@
 //                      [](const r4::CommandResult& result) { … });
 //     io.run();
 //
-// Everything happens on the io_context's thread: call it there, the callbacks come there.
-// Completion tokens work: callbacks, asio::use_future, asio::use_awaitable. The steady state
-// allocates nothing.
+// Everything happens on the io_context's thread: call it there, or before it runs; the callbacks
+// come there. Completion tokens work: callbacks, asio::use_future, asio::use_awaitable; a handler
+// runs on its associated executor, never inside the call that started it. A failure to execute a
+// command is a result, not an exception: explain.hpp puts it into words.
+//
+// Callbacks and completion handlers may call anything here, destroy the board included. The steady
+// state allocates nothing.
 #pragma once
 
+#include <asio/associated_allocator.hpp>
+#include <asio/associated_executor.hpp>
 #include <asio/async_result.hpp>
+#include <asio/dispatch.hpp>
+#include <asio/executor_work_guard.hpp>
 #include <asio/io_context.hpp>
+#include <asio/post.hpp>
+#include <asio/recycling_allocator.hpp>
 #include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "board_options.hpp"
+#include "command_help.hpp"
 
 namespace r4 {
 
@@ -30,33 +42,40 @@ class AsyncBoard {
  public:
   using Duration = std::chrono::milliseconds;
 
-  // Throws Error{usage} for a wrong URL. `io` must outlive the board.
+  // A URL of standard_registry(); throws Error{usage} for a wrong one. `io` must outlive the board.
   AsyncBoard(asio::io_context& io, std::string_view url, BoardOptions options = {});
+  // The same on a transport made elsewhere, not yet open.
+  AsyncBoard(asio::io_context& io, std::unique_ptr<Carrier> carrier, BoardOptions options = {});
+  // Does what close() does.
   ~AsyncBoard();
   AsyncBoard(const AsyncBoard&) = delete;
   AsyncBoard& operator=(const AsyncBoard&) = delete;
 
-  // Opens the transport and begins the link. Throws Error.
+  // Opens the transport and begins the link: the first heartbeat goes out at once. Throws Error;
+  // once only.
   void open();
-  // Cancels what is under way (outcome cancelled) and closes.
+  // Cancels what is under way (outcome cancelled) and closes the transport: the board goes safe. No
+  // callback follows. Idempotent; the board cannot be opened again.
   void close();
 
-  // void(const CommandResult&). Throws Error{usage} for a command outside its ranges.
+  // void(CommandResult). Throws Error{usage} for a command outside its ranges.
   template <class Token>
   auto async_send(const Command& command, Duration timeout, Token&& token) {
+    require_valid(command);
     return asio::async_initiate<Token, void(CommandResult)>(
         [this](auto handler, const Command& c, Duration t) {
           start_send(c, t, make_completion(std::move(handler)));
         },
         token, command, timeout);
   }
+  // void(CommandResult). E:STOP: overtakes and cancels everything, also before the link is up.
   template <class Token>
   auto async_stop(Duration timeout, Token&& token) {
     return asio::async_initiate<Token, void(CommandResult)>(
         [this](auto handler, Duration t) { start_stop(t, make_completion(std::move(handler))); },
         token, timeout);
   }
-  // Confirmed by the board's answer; identity() has it.
+  // void(CommandResult). Confirmed by the board's answer; identity() has it.
   template <class Token>
   auto async_identify(Duration timeout, Token&& token) {
     return asio::async_initiate<Token, void(CommandResult)>(
@@ -66,16 +85,20 @@ class AsyncBoard {
         token, timeout);
   }
 
+  // Sends once, without confirmation; false while the link is not up. Throws Error{usage}.
   bool post(const Command& command);
 
+  // What is known now; after close(), what was known last.
   const State& state() const;
   const LinkStatus& link() const;
+  // The link is up and the board takes our commands: they go out at once.
+  bool in_control() const;
   const BoardIdentity& identity() const;
   Statistics statistics() const;
   const CarrierCounters& carrier_counters() const;
   const std::string& name() const;
 
-  // Callbacks are stored once; an empty function turns one off.
+  // One callback for each; an empty function turns it off.
   void on_state(std::function<void(const State&, const Datagram&)> callback);
   void on_board_heartbeat(std::function<void(const Datagram&)> callback);
   void on_nack(std::function<void(const Nack&, const Datagram&)> callback);
@@ -83,43 +106,114 @@ class AsyncBoard {
   void on_link(std::function<void(const LinkStatus&)> callback);
   void on_event(std::function<void(const CarrierEvent&)> callback);
 
+  // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. feed()
+  // may be called from any thread, costs no system call and counts from the next time the loop
+  // runs.
   void watchdog(Duration period);
   void feed();
 
  private:
-  // A completion handler of any type, kept until its command ends. Allocated with the handler's
-  // allocator, as Asio does for its own.
+  // A completion handler of any type, kept until its command ends.
   class Completion {
    public:
-    virtual ~Completion() = default;
-    virtual void complete(const CommandResult& result) = 0;
-  };
-  template <class Handler>
-  std::unique_ptr<Completion> make_completion(Handler handler);
+    enum class How : std::uint8_t { dispatch, post };
+    // Frees the memory, then hands the result to the handler's executor.
+    virtual void complete(const CommandResult& result, How how) = 0;
+    virtual void destroy() noexcept = 0;
 
-  void start_send(const Command& command, Duration timeout, std::unique_ptr<Completion> completion);
-  void start_stop(Duration timeout, std::unique_ptr<Completion> completion);
-  void start_identify(Duration timeout, std::unique_ptr<Completion> completion);
+   protected:
+    ~Completion() = default;
+  };
+  struct Destroy {
+    void operator()(Completion* completion) const noexcept { completion->destroy(); }
+  };
+  using CompletionPtr = std::unique_ptr<Completion, Destroy>;
+
+  template <class Handler>
+  struct Bound;
+  template <class Handler>
+  class Typed;
+  template <class Handler>
+  CompletionPtr make_completion(Handler handler);
+
+  asio::io_context::executor_type executor() const;
+  void start_send(const Command& command, Duration timeout, CompletionPtr completion);
+  void start_stop(Duration timeout, CompletionPtr completion);
+  void start_identify(Duration timeout, CompletionPtr completion);
 
   struct Impl;
-  std::unique_ptr<Impl> impl_;
+  std::shared_ptr<Impl> impl_;
 };
 
 // The transports of the library: those of transports/ and `sim:`, the simulated board in this
 // process.
 const Registry& standard_registry();
 
-template <class Handler>
-std::unique_ptr<AsyncBoard::Completion> AsyncBoard::make_completion(Handler handler) {
-  class Typed final : public Completion {
-   public:
-    explicit Typed(Handler h) : handler_(std::move(h)) {}
-    void complete(const CommandResult& result) override { std::move(handler_)(result); }
+// --- implementation of the templates
 
-   private:
-    Handler handler_;
-  };
-  return std::make_unique<Typed>(std::move(handler));
+// A handler with its argument, as Asio wants it.
+template <class Handler>
+struct AsyncBoard::Bound {
+  using allocator_type = asio::associated_allocator_t<Handler, asio::recycling_allocator<void>>;
+  allocator_type get_allocator() const noexcept {
+    return asio::get_associated_allocator(handler, asio::recycling_allocator<void>());
+  }
+  void operator()() { std::move(handler)(result); }
+
+  Handler handler;
+  CommandResult result;
+};
+
+template <class Handler>
+class AsyncBoard::Typed final : public Completion {
+  using Executor = asio::associated_executor_t<Handler, asio::io_context::executor_type>;
+  using Allocator = typename std::allocator_traits<
+      typename Bound<Handler>::allocator_type>::template rebind_alloc<Typed>;
+  using Traits = std::allocator_traits<Allocator>;
+
+ public:
+  static CompletionPtr make(Handler handler, const asio::io_context::executor_type& io) {
+    Allocator allocator = allocator_of(handler);
+    Typed* place = Traits::allocate(allocator, 1);
+    return CompletionPtr(new (place) Typed(std::move(handler), io));
+  }
+
+  void complete(const CommandResult& result, How how) override {
+    Allocator allocator = allocator_of(handler_);
+    const auto work = std::move(work_);
+    Bound<Handler> bound{std::move(handler_), result};
+    free(allocator);
+    if (how == How::dispatch) {
+      asio::dispatch(work.get_executor(), std::move(bound));
+    } else {
+      asio::post(work.get_executor(), std::move(bound));
+    }
+  }
+  void destroy() noexcept override {
+    Allocator allocator = allocator_of(handler_);
+    free(allocator);
+  }
+
+ private:
+  Typed(Handler handler, const asio::io_context::executor_type& io)
+      : handler_(std::move(handler)), work_(asio::get_associated_executor(handler_, io)) {}
+  ~Typed() = default;
+
+  static Allocator allocator_of(const Handler& handler) noexcept {
+    return Allocator(asio::get_associated_allocator(handler, asio::recycling_allocator<void>()));
+  }
+  void free(Allocator& allocator) noexcept {
+    this->~Typed();
+    Traits::deallocate(allocator, this, 1);
+  }
+
+  Handler handler_;
+  asio::executor_work_guard<Executor> work_;
+};
+
+template <class Handler>
+AsyncBoard::CompletionPtr AsyncBoard::make_completion(Handler handler) {
+  return Typed<Handler>::make(std::move(handler), executor());
 }
 
 }  // namespace r4

@@ -9,10 +9,13 @@
 // The board goes safe by itself when this object is gone or its process hangs: the heartbeats stop.
 // Errors are thrown as r4::Error with the thing, the reason and the fix: open and permission when
 // the transport cannot be opened, usage for a wrong URL or a value outside its range, refused when
-// the board refuses a command or does not confirm it in time.
+// the board refuses a command or does not confirm it in time, or when the Board was closed.
 //
 // Callbacks run on the board's own thread, one at a time, and must not block: a blocking call in a
-// callback throws Error{usage}; post() and stop_async() may be used there.
+// callback throws Error{usage}; post(), stop_async() and what only looks (state(), link(),
+// statistics()) may be used there, and on_…(), watchdog(), feed() and close(). When on_…() returns
+// on another thread, the callback before it is not running and will not be called again. An
+// exception out of a callback ends the program, as it does out of any thread.
 #pragma once
 
 #include <chrono>
@@ -37,7 +40,9 @@ class Board {
   Board(const Board&) = delete;
   Board& operator=(const Board&) = delete;
 
-  // Ends heartbeats and closes the transport; the board goes safe within its timeout. Idempotent.
+  // Ends heartbeats and closes the transport; the board goes safe within its timeout. Calls that
+  // wait in other threads throw Error{refused}. Idempotent. The destructor does it too, and may run
+  // while other threads wait.
   void close();
 
   // Waits until the board is ACTIVE under our control; throws Error{refused} saying what it is
@@ -50,13 +55,13 @@ class Board {
   void send(const Command& command, Duration timeout = default_timeout);
   // The same from the text of design: "O:358,1,1".
   void send(std::string_view command, Duration timeout = default_timeout);
-  // Sends once, without waiting or confirmation; false while the link is not up. For streams of
-  // setpoints where the next one replaces this one.
+  // Sends once, without waiting or confirmation; false while the link is not up or when 256 wait to
+  // be sent. For streams of setpoints where the next one replaces this one. Allocates nothing.
   bool post(const Command& command);
 
   // Every output safe, at once, repeated until the board confirms it; latched until clear().
   void stop(Duration timeout = default_timeout);
-  void stop_async();
+  void stop_async();  // does not wait; repeated for default_timeout
   void clear(Duration timeout = default_timeout);
 
   class DriveChannel {
@@ -143,13 +148,14 @@ class Board {
   void on_link(std::function<void(const LinkStatus&)> callback);
   void on_event(std::function<void(const CarrierEvent&)> callback);
 
-  // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off.
+  // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. feed()
+  // costs no system call.
   void watchdog(Duration period);
   void feed();
 
  private:
   struct Impl;
-  std::unique_ptr<Impl> impl_;
+  std::shared_ptr<Impl> impl_;
 };
 
 }  // namespace r4

@@ -87,6 +87,21 @@ Problem bad_command(std::string_view text, Refusal refusal) {
   return problem;
 }
 
+void require_valid(const Command& command) {
+  if (const Refusal refusal = check(command); refusal != Refusal::none) {
+    throw Error(bad_command(text_of(command), refusal));
+  }
+  if (command.kind != CommandKind::fields && command.kind != CommandKind::setting) return;
+  std::array<char, max_datagram - DatagramWriter::trailer_max> buffer;
+  DatagramWriter writer(buffer.data(), buffer.size());
+  write_command(writer, command);
+  if (!writer.ok()) {
+    throw Error(ErrorKind::usage, command.kind == CommandKind::fields ? "F" : "C",
+                "its text is too long for one datagram, or has bytes that a datagram cannot hold",
+                "use printable ASCII without ; and ^, at most 900 characters");
+  }
+}
+
 Command parse_command_text(std::string_view text) {
   const std::string_view trimmed = text.substr(0, text.size() - (text.ends_with(';') ? 1 : 0));
   const auto colon = trimmed.find(':');

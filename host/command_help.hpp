@@ -35,6 +35,10 @@ Command parse_command_text(std::string_view text);
 // sent.
 Problem bad_command(std::string_view text, Refusal refusal);
 
+// Throws Error{usage} for a command outside its ranges, and for one whose texts do not go into a
+// datagram. What it lets pass can be sent.
+void require_valid(const Command& command);
+
 // What a board's refusal means: "no such channel".
 std::string_view meaning_of(Refusal refusal);
 

@@ -35,23 +35,29 @@ Session::Session(Handler& handler, SessionOptions options, std::uint32_t first_p
       first_pnum_(first_pnum),
       link_(options_.timing, first_pnum),
       pending_(std::make_unique<std::array<Pending, max_pending + max_stops>>()) {
-  if (!options_.fields.empty()) options_.fields += ",SAFE,CMD";
+  if (!options_.fields.empty()) {
+    const std::string fields = options_.fields;
+    if (FieldSet set; parse_fields(fields, set) != Refusal::none) {
+      throw Error(bad_command("F:" + fields, Refusal::unknown));
+    }
+    require_valid(with_needed_fields(Command::fields(fields)));
+  }
 }
 
 // --- what comes in
 
-void Session::receive(std::string_view bytes, Time now) {
+Time Session::receive(std::string_view bytes, Time now) {
   Datagram datagram;
   const ReadResult result = read(bytes, datagram);
   if (!result) {
     ++collector_.counts.damaged;
     handler_.on_bad_datagram(result, bytes);
-    return;
+    return poll(now);
   }
   const MessageKind kind = kind_of(datagram);
   const bool from_board = kind == MessageKind::board_heartbeat || kind == MessageKind::nack ||
                           kind == MessageKind::identity || kind == MessageKind::state;
-  if (!from_board || !datagram.has_pnum() || !datagram.has_time()) return;
+  if (!from_board || !datagram.has_pnum() || !datagram.has_time()) return poll(now);
   ++collector_.counts.received;
 
   switch (kind) {
@@ -72,7 +78,7 @@ void Session::receive(std::string_view bytes, Time now) {
   }
   refresh_status(now);
   confirm_stop(now);
-  poll(now);
+  return poll(now);
 }
 
 void Session::on_state_datagram(const Datagram& datagram, Time now) {
@@ -198,6 +204,21 @@ void Session::select_fields(Time now) {
   transmit_now(Command::fields(options_.fields), to_ms(now), Priority::normal);
 }
 
+// A command that chooses fields, with those that we need; the choice is remembered.
+Command Session::with_needed_fields(const Command& command) {
+  if (command.kind != CommandKind::fields || options_.fields.empty()) return command;
+  FieldSet set;
+  parse_fields(command.text, set);
+  std::string fields(command.text.data(), command.text.size());
+  if (!set.has(StateField::safe)) fields += ",SAFE";
+  if (!set.has(StateField::cmd)) fields += ",CMD";
+  if (fields != options_.fields) {
+    options_.fields = std::move(fields);
+    selections_ = 0;
+  }
+  return Command::fields(options_.fields);
+}
+
 // --- time
 
 Time Session::poll(Time now) {
@@ -213,6 +234,7 @@ Time Session::poll(Time now) {
       finish(pending, Outcome::timed_out, Refusal::none, now);
     }
   }
+  if (!controlled_) select_fields(now);  // the first thing when the link comes up
   send_queued(now);
   retry_due(now);
   if (options_.identify_interval.count() != 0 && link_up() && now >= next_identify_) {
@@ -234,6 +256,11 @@ Time Session::poll(Time now) {
     if (pending.stage == Stage::sent) next = std::min(next, pending.retry);
   }
   return next;
+}
+
+void Session::on_transport(bool up, Time now) {
+  link_.on_transport(up);
+  refresh_status(now);
 }
 
 bool Session::link_up() const {
@@ -295,10 +322,6 @@ Session::Pending* Session::allocate(const Command& command, Time timeout, Time n
   if (slot == end) return nullptr;
   DatagramWriter writer(slot->bytes.data(), slot->bytes.size());
   write_command(writer, command);
-  if (!writer.ok() || writer.size() + DatagramWriter::trailer_max > slot->bytes.size()) {
-    throw Error(ErrorKind::usage, "command", "too long for one datagram",
-                "send fewer names at a time");
-  }
   slot->stage = Stage::queued;
   slot->command = command;
   slot->command.text = slot->command.text2 = Text();
@@ -314,10 +337,8 @@ Session::Pending* Session::allocate(const Command& command, Time timeout, Time n
 }
 
 Ticket Session::send(const Command& command, Time timeout, Time now) {
-  if (const Refusal refusal = check(command); refusal != Refusal::none) {
-    throw Error(bad_command(text_of(command), refusal));
-  }
-  Pending* pending = allocate(command, timeout, now);
+  require_valid(command);
+  Pending* pending = allocate(with_needed_fields(command), timeout, now);
   if (pending == nullptr) return 0;
   ++collector_.counts.commands;
   const Ticket ticket = pending->ticket;
@@ -326,9 +347,7 @@ Ticket Session::send(const Command& command, Time timeout, Time now) {
 }
 
 bool Session::post(const Command& command, Time now) {
-  if (const Refusal refusal = check(command); refusal != Refusal::none) {
-    throw Error(bad_command(text_of(command), refusal));
-  }
+  require_valid(command);
   send_queued(now);  // what was asked for earlier goes first
   if (!in_control(now)) return false;
   ++collector_.counts.commands;
@@ -414,6 +433,7 @@ void Session::finish(Pending& pending, Outcome outcome, Refusal code, Time now) 
       ++collector_.counts.timed_out;
       break;
     case Outcome::cancelled:
+    case Outcome::full:
       break;
   }
   const Ticket ticket = pending.ticket;

@@ -50,7 +50,8 @@ enum class Outcome : std::uint8_t {
   confirmed,  // the board's own state says so
   refused,    // the board refused it, and did not execute it: `code`
   timed_out,  // no confirmation until the deadline; it may or may not have been executed
-  cancelled,  // never sent: a stop, or the end of the session, came first
+  cancelled,  // given up: a stop, or the end of the session, came first
+  full,       // not taken: Session::max_pending commands are under way already
 };
 
 struct CommandResult {
@@ -64,7 +65,8 @@ using Ticket = std::uint64_t;
 
 struct SessionOptions {
   HostLink::Timing timing;
-  // The state fields to ask for; SAFE and CMD are added. Empty: leave the board's choice alone.
+  // The state fields to ask for, as in F; SAFE and CMD are added, to these and to those of any F
+  // that is sent. Empty: leave the board's choice, and every F, alone.
   std::string fields = "DEFAULT";
   std::chrono::milliseconds command_retry{50};
   std::chrono::milliseconds stop_retry{20};
@@ -92,13 +94,17 @@ class Session {
   };
 
   // `first_pnum`: echo_host_first_pnum plus 30 random bits (random_first_pnum()).
+  // Throws Error{usage} if options.fields are no state fields.
   Session(Handler& handler, SessionOptions options, std::uint32_t first_pnum);
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  void receive(std::string_view bytes, Time now);
-  // Does what is due and returns the time until the next call is needed.
+  // A datagram has come, or time has passed: does what is due. Both return when poll() is needed
+  // next, at the latest.
+  Time receive(std::string_view bytes, Time now);
   Time poll(Time now);
+  // The transport has gone or come; poll() is needed now.
+  void on_transport(bool up, Time now);
 
   // Sends a command and finds out what became of it, by on_result() at the latest at `timeout` from
   // now. Throws Error{usage} for a command outside its ranges; returns 0 when 64 are under way
@@ -122,6 +128,8 @@ class Session {
   void feed(Time now);
 
   const LinkStatus& link() const { return status_; }
+  // The link is up and the board has executed a command of ours: commands go out at once.
+  bool in_control(Time now) const;
   const State& state() const { return state_; }
   Statistics statistics(Time now) const;
 
@@ -153,7 +161,6 @@ class Session {
   void finish(Pending& pending, Outcome outcome, Refusal code, Time now);
   void transmit_now(const Command& command, std::uint32_t t_ms, Priority priority);
   bool link_up() const;
-  bool in_control(Time now) const;
   bool speaks_no_cmd() const;
 
   void on_state_datagram(const Datagram& datagram, Time now);
@@ -163,6 +170,7 @@ class Session {
   void confirm_from_state(Time now);
   void confirm_stop(Time now);
   void select_fields(Time now);
+  Command with_needed_fields(const Command& command);
   void refresh_status(Time now);
 
   Handler& handler_;

@@ -64,6 +64,14 @@ void HostLink::notice_boot(std::uint32_t t_ms, std::uint32_t now_ms) {
   heard_ms_ = now_ms;
 }
 
+void HostLink::on_transport(bool up) {
+  if (up) {
+    answer_now_ = true;
+  } else if (state_ != HostLinkState::connecting) {
+    state_ = HostLinkState::lost;
+  }
+}
+
 bool HostLink::poll(std::uint32_t now_ms) {
   if (state_ != HostLinkState::active && state_ != HostLinkState::safe) return false;
   if (now_ms - heard_ms_ < timing_.timeout_ms) return false;

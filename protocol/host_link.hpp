@@ -44,6 +44,9 @@ class HostLink {
   // board is there, but says nothing of its state.
   Arrival on_answer(std::uint32_t pnum, std::uint32_t t_ms, std::uint32_t now_ms);
 
+  // The transport has gone (`lost` at once) or come (a heartbeat is due at once).
+  void on_transport(bool up);
+
   // Lets time pass: silence of the board. True if the state changed.
   bool poll(std::uint32_t now_ms);
 

@@ -77,6 +77,7 @@ struct World::Host final : Session::Handler {
         ++world.report_.timed_out;
         break;
       case Outcome::cancelled:
+      case Outcome::full:
         break;
     }
   }

@@ -1,0 +1,305 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "async_board.hpp"
+
+#include <algorithm>
+#include <asio/steady_timer.hpp>
+#include <atomic>
+#include <vector>
+
+#include "../transports/registry.hpp"
+#include "callback.hpp"
+
+namespace r4 {
+
+namespace {
+
+Time steady_now() {
+  return std::chrono::duration_cast<Time>(std::chrono::steady_clock::now().time_since_epoch());
+}
+
+// A day is as good as for ever, and cannot overflow.
+Time time_of(AsyncBoard::Duration timeout) {
+  return std::clamp<AsyncBoard::Duration>(timeout, AsyncBoard::Duration{0}, std::chrono::hours{24});
+}
+
+}  // namespace
+
+// Outlives the AsyncBoard where a callback or handler destroys that.
+struct AsyncBoard::Impl final : Carrier::Handler,
+                                Session::Handler,
+                                std::enable_shared_from_this<AsyncBoard::Impl> {
+  // A command under way, and one that has ended.
+  struct Waiting {
+    Ticket ticket = 0;
+    CompletionPtr completion;
+  };
+  struct Ended {
+    CommandResult result;
+    CompletionPtr completion;
+  };
+
+  Impl(asio::io_context& context, std::unique_ptr<Carrier> transport, BoardOptions options)
+      : io(context),
+        carrier(std::move(transport)),
+        session(*this, std::move(options.session), Session::random_first_pnum()),
+        timer(context) {
+    waiting.reserve(Session::max_pending + Session::max_stops);
+    ended.reserve(Session::max_pending + Session::max_stops);
+  }
+
+  // --- entering the session
+
+  // Every call of the session is made in here. The outermost one tells the results and sets the
+  // timer afterwards; so no handler runs inside the session, or inside the call that started its
+  // command.
+  template <class Action>
+  void enter(Completion::How way, Action action) {
+    if (depth == 0) how = way;
+    now = steady_now();
+    {
+      const Inside inside(depth);
+      if (fed.load(std::memory_order_relaxed) != 0) {
+        session.feed(Time{fed.exchange(0, std::memory_order_relaxed)});
+      }
+      action();
+    }
+    if (depth == 0) settle();
+  }
+  struct Inside {
+    explicit Inside(int& d) : depth(d) { ++depth; }
+    ~Inside() { --depth; }
+    Inside(const Inside&) = delete;
+    Inside& operator=(const Inside&) = delete;
+    int& depth;
+  };
+
+  void settle() {
+    const Inside inside(depth);
+    for (;;) {
+      // Handlers that are dispatched may start commands, whose ends are appended.
+      while (!ended.empty()) {
+        Ended first = std::move(ended.front());
+        ended.erase(ended.begin());
+        first.completion.release()->complete(first.result, how);
+      }
+      if (!poll_wanted || !is_open) break;
+      poll_wanted = false;
+      due = session.poll(now);
+    }
+    if (is_open) arm();
+  }
+
+  // --- time
+
+  // The timer is only set when it must ring earlier than it will; ringing early costs one poll.
+  void arm() {
+    if (armed && armed_for <= due) return;
+    armed = true;
+    armed_for = due;
+    timer.expires_at(std::chrono::steady_clock::time_point(due));
+    timer.async_wait([self = shared_from_this()](const std::error_code& error) {
+      if (!error) self->on_timer();
+    });
+  }
+  void on_timer() {
+    if (!is_open) return;
+    armed = false;
+    enter(Completion::How::dispatch, [this] { due = session.poll(now); });
+  }
+
+  // --- Carrier::Handler
+
+  void on_datagram(std::string_view bytes, Peer) override {
+    enter(Completion::How::dispatch, [&] { due = session.receive(bytes, now); });
+  }
+  void on_carrier_event(const CarrierEvent& event) override {
+    enter(Completion::How::dispatch, [&] {
+      event_callback(event);
+      if (event.kind != CarrierEvent::Kind::warning) {
+        session.on_transport(event.kind == CarrierEvent::Kind::up, now);
+      }
+      poll_wanted = true;
+    });
+  }
+
+  // --- Session::Handler
+
+  void transmit(std::string_view datagram, Priority priority) override {
+    if (is_open) carrier->send(datagram, priority);
+  }
+  void on_state(const State& state, const Datagram& datagram) override {
+    if (is_open) state_callback(state, datagram);
+  }
+  void on_board_heartbeat(const Datagram& datagram) override {
+    if (is_open) heartbeat_callback(datagram);
+  }
+  void on_identity(const Identity& fresh) override {
+    identity.firmware.assign(fresh.firmware.data(), fresh.firmware.size());
+    identity.board_id.assign(fresh.board_id.data(), fresh.board_id.size());
+    identity.capabilities.assign(fresh.capabilities.data(), fresh.capabilities.size());
+  }
+  void on_nack(const Nack& nack, const Datagram& datagram) override {
+    if (is_open) nack_callback(nack, datagram);
+  }
+  void on_bad_datagram(const ReadResult& result, std::string_view bytes) override {
+    if (is_open) bad_callback(result, bytes);
+  }
+  void on_link(const LinkStatus& status) override {
+    if (is_open) link_callback(status);
+  }
+  void on_result(Ticket ticket, const CommandResult& result) override {
+    const auto found = std::find_if(waiting.begin(), waiting.end(),
+                                    [ticket](const Waiting& w) { return w.ticket == ticket; });
+    if (found == waiting.end()) return;
+    ended.push_back({result, std::move(found->completion)});
+    if (found != waiting.end() - 1) *found = std::move(waiting.back());
+    waiting.pop_back();
+  }
+
+  // --- what the user starts
+
+  // `start` hands the command to the session; its ticket is 0 if there is no room.
+  template <class Start>
+  void begin(CompletionPtr completion, Start start) {
+    enter(Completion::How::post, [&] {
+      const Ticket ticket = is_open ? start() : 0;
+      if (ticket != 0) {
+        waiting.push_back({ticket, std::move(completion)});
+        poll_wanted = true;
+      } else {
+        const Outcome outcome = is_open ? Outcome::full : Outcome::cancelled;
+        completion.release()->complete({outcome, Refusal::none, Time{0}}, Completion::How::post);
+      }
+    });
+  }
+
+  void open() {
+    if (is_open || closed) {
+      throw Error(ErrorKind::usage, carrier->name(), "a board is opened once",
+                  "make another one for the same URL");
+    }
+    carrier->open(*this);
+    is_open = true;
+    enter(Completion::How::post, [this] { due = session.poll(now); });
+  }
+  void close() {
+    if (closed) return;
+    closed = true;
+    is_open = false;
+    carrier->close();
+    timer.cancel();
+    how = Completion::How::post;
+    enter(Completion::How::post, [this] { session.cancel_all(now); });
+  }
+
+  asio::io_context& io;
+  std::unique_ptr<Carrier> carrier;
+  Session session;
+  BoardIdentity identity;
+
+  Callback<void(const State&, const Datagram&)> state_callback;
+  Callback<void(const Datagram&)> heartbeat_callback;
+  Callback<void(const Nack&, const Datagram&)> nack_callback;
+  Callback<void(const ReadResult&, std::string_view)> bad_callback;
+  Callback<void(const LinkStatus&)> link_callback;
+  Callback<void(const CarrierEvent&)> event_callback;
+
+  std::vector<Waiting> waiting;
+  std::vector<Ended> ended;
+  int depth = 0;  // calls of enter() and settle() under way
+  bool poll_wanted = false;
+  Completion::How how = Completion::How::post;
+  bool is_open = false;
+  bool closed = false;
+
+  Time now{0};
+  Time due{0};
+  asio::steady_timer timer;
+  bool armed = false;
+  Time armed_for{0};
+  std::atomic<Time::rep> fed{0};  // when feed() was called last; 0: the session knows it
+};
+
+AsyncBoard::AsyncBoard(asio::io_context& io, std::string_view url, BoardOptions options)
+    : AsyncBoard(io, standard_registry().make(io, url, Role::host), std::move(options)) {}
+
+AsyncBoard::AsyncBoard(asio::io_context& io, std::unique_ptr<Carrier> carrier, BoardOptions options)
+    : impl_(std::make_shared<Impl>(io, std::move(carrier), std::move(options))) {}
+
+AsyncBoard::~AsyncBoard() {
+  impl_->close();
+  // Inside a callback the transport is still running: it goes when that is over.
+  if (impl_->depth > 0) asio::post(impl_->io, [keep = impl_] {});
+}
+
+void AsyncBoard::open() { impl_->open(); }
+void AsyncBoard::close() { impl_->close(); }
+
+asio::io_context::executor_type AsyncBoard::executor() const { return impl_->io.get_executor(); }
+
+void AsyncBoard::start_send(const Command& command, Duration timeout, CompletionPtr completion) {
+  Impl& impl = *impl_;
+  impl.begin(std::move(completion),
+             [&] { return impl.session.send(command, time_of(timeout), impl.now); });
+}
+
+void AsyncBoard::start_stop(Duration timeout, CompletionPtr completion) {
+  Impl& impl = *impl_;
+  impl.begin(std::move(completion), [&] { return impl.session.stop(time_of(timeout), impl.now); });
+}
+
+void AsyncBoard::start_identify(Duration timeout, CompletionPtr completion) {
+  Impl& impl = *impl_;
+  impl.begin(std::move(completion),
+             [&] { return impl.session.identify(time_of(timeout), impl.now); });
+}
+
+bool AsyncBoard::post(const Command& command) {
+  Impl& impl = *impl_;
+  bool sent = false;
+  impl.enter(Completion::How::post,
+             [&] { sent = impl.is_open && impl.session.post(command, impl.now); });
+  return sent;
+}
+
+const State& AsyncBoard::state() const { return impl_->session.state(); }
+const LinkStatus& AsyncBoard::link() const { return impl_->session.link(); }
+bool AsyncBoard::in_control() const {
+  return impl_->is_open && impl_->session.in_control(steady_now());
+}
+const BoardIdentity& AsyncBoard::identity() const { return impl_->identity; }
+Statistics AsyncBoard::statistics() const { return impl_->session.statistics(steady_now()); }
+const CarrierCounters& AsyncBoard::carrier_counters() const { return impl_->carrier->counters(); }
+const std::string& AsyncBoard::name() const { return impl_->carrier->name(); }
+
+void AsyncBoard::on_state(std::function<void(const State&, const Datagram&)> callback) {
+  impl_->state_callback.set(std::move(callback));
+}
+void AsyncBoard::on_board_heartbeat(std::function<void(const Datagram&)> callback) {
+  impl_->heartbeat_callback.set(std::move(callback));
+}
+void AsyncBoard::on_nack(std::function<void(const Nack&, const Datagram&)> callback) {
+  impl_->nack_callback.set(std::move(callback));
+}
+void AsyncBoard::on_bad_datagram(
+    std::function<void(const ReadResult&, std::string_view)> callback) {
+  impl_->bad_callback.set(std::move(callback));
+}
+void AsyncBoard::on_link(std::function<void(const LinkStatus&)> callback) {
+  impl_->link_callback.set(std::move(callback));
+}
+void AsyncBoard::on_event(std::function<void(const CarrierEvent&)> callback) {
+  impl_->event_callback.set(std::move(callback));
+}
+
+void AsyncBoard::watchdog(Duration period) {
+  Impl& impl = *impl_;
+  impl.enter(Completion::How::post, [&] {
+    impl.session.watchdog(period, impl.now);
+    impl.poll_wanted = true;
+  });
+}
+
+void AsyncBoard::feed() { impl_->fed.store(steady_now().count(), std::memory_order_relaxed); }
+
+}  // namespace r4

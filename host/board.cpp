@@ -1,0 +1,378 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "board.hpp"
+
+#include <algorithm>
+#include <asio/executor_work_guard.hpp>
+#include <asio/io_context.hpp>
+#include <asio/post.hpp>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include "async_board.hpp"
+#include "callback.hpp"
+#include "command_help.hpp"
+#include "explain.hpp"
+#include "post_box.hpp"
+
+namespace r4 {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// The session ends every command at its deadline. A call that waits longer than this beyond it is
+// held up by a callback that does not return.
+constexpr std::chrono::milliseconds grace{500};
+
+// A day is as good as for ever, and cannot overflow.
+Board::Duration bounded(Board::Duration timeout) {
+  return std::clamp<Board::Duration>(timeout, Board::Duration{0}, std::chrono::hours{24});
+}
+
+Error closed_error(std::string_view what) {
+  return Error(ErrorKind::refused, std::string(what), "cancelled: the board was closed",
+               "open it again with another Board");
+}
+
+Error blocked_error(std::string_view what) {
+  return Error(ErrorKind::refused, std::string(what), "the board's thread does not answer",
+               "a callback must return at once; do the work in another thread");
+}
+
+}  // namespace
+
+// The board's thread runs the loop, on which everything of AsyncBoard happens. The threads meet
+// under `mutex`: callers hand work to the loop and wait there for its end, or for news.
+struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
+  // Something asked of the loop, and its answer. Held by both sides, since the caller may give up.
+  struct Call {
+    explicit Call(const Command& c)
+        : command(c), text(c.text.data(), c.text.size()), text2(c.text2.data(), c.text2.size()) {
+      command.text = text;
+      command.text2 = text2;
+    }
+    Command command;
+    std::string text, text2;
+    bool done = false;
+    std::condition_variable ended;
+    CommandResult result;
+    LinkStatus link;
+    BoardIdentity identity;
+  };
+  using CallPtr = std::shared_ptr<Call>;
+
+  Impl(std::string_view url, BoardOptions options)
+      : async(io, url, std::move(options)), box(io, [this](const Command& c) { deliver(c); }) {
+    async.on_state([this](const State& fresh, const Datagram&) {
+      {
+        const std::lock_guard lock(mutex);
+        state = fresh;
+        ++states;
+        in_control = async.in_control();
+      }
+      news.notify_all();
+      state_callback(fresh);
+    });
+    async.on_link([this](const LinkStatus& fresh) {
+      {
+        const std::lock_guard lock(mutex);
+        link = fresh;
+        in_control = async.in_control();
+      }
+      news.notify_all();
+      link_callback(fresh);
+    });
+    async.on_event([this](const CarrierEvent& event) { event_callback(event); });
+    async.open();
+  }
+
+  LinkStatus link_now() {
+    const std::lock_guard lock(mutex);
+    return link;
+  }
+  std::uint64_t states_now() {
+    const std::lock_guard lock(mutex);
+    return states;
+  }
+
+  void start() {
+    thread = std::thread([self = shared_from_this()] { self->io.run(); });
+  }
+
+  // --- on the loop
+
+  void deliver(const Command& command) {
+    if (command.kind == CommandKind::stop) {
+      async.async_stop(default_timeout, [](const CommandResult&) {});
+    } else {
+      async.post(command);
+    }
+  }
+
+  void begin(const CallPtr& call, Duration timeout) {
+    auto end = [this, call](const CommandResult& result) { finish(*call, result); };
+    if (call->command.kind == CommandKind::stop) {
+      async.async_stop(timeout, std::move(end));
+    } else if (call->command.kind == CommandKind::identify) {
+      async.async_identify(timeout, std::move(end));
+    } else {
+      async.async_send(call->command, timeout, std::move(end));
+    }
+  }
+
+  void finish(Call& call, const CommandResult& result) {
+    {
+      const std::lock_guard lock(mutex);
+      call.result = result;
+      call.link = async.link();
+      call.identity = async.identity();
+      call.done = true;
+    }
+    call.ended.notify_all();
+  }
+
+  // After this, nothing more is put on the loop; what is on it is carried out, then the loop ends.
+  void shut() {
+    {
+      const std::lock_guard lock(mutex);
+      if (closed) return;
+      closed = true;
+      last_statistics = async.statistics();
+    }
+    news.notify_all();
+    async.close();
+    work.reset();
+    // Twice around: the ends of commands that begin() finds closed come behind this one.
+    asio::post(io, [this] { asio::post(io, [this] { io.stop(); }); });
+  }
+
+  // --- on any thread
+
+  bool in_loop() { return io.get_executor().running_in_this_thread(); }
+
+  void must_not_be_in_loop(std::string_view what) {
+    if (!in_loop()) return;
+    throw Error(ErrorKind::usage, std::string(what), "a callback must not wait for the board",
+                "use post() or stop_async(), or call it from another thread");
+  }
+
+  // Has the loop carry out a command. Throws if it is not confirmed.
+  CallPtr execute(const Command& command, Duration timeout) {
+    const std::string text = text_of(command);
+    must_not_be_in_loop(text);
+    const auto call = std::make_shared<Call>(command);
+    const auto deadline = Clock::now() + bounded(timeout) + grace;
+    std::unique_lock lock(mutex);
+    if (closed) throw closed_error(text);
+    asio::post(io, [this, call, timeout] { begin(call, timeout); });
+    if (!call->ended.wait_until(lock, deadline, [&] { return call->done; })) {
+      throw blocked_error(text);
+    }
+    if (call->result.outcome == Outcome::confirmed) return call;
+    if (closed && call->result.outcome == Outcome::cancelled) throw closed_error(text);
+    throw Error(explain(text, call->result, call->link));
+  }
+
+  // Does `action` on the loop and waits until it is done; nothing if the board is closed.
+  template <class Action>
+  void run_on_loop(std::string_view what, Action action) {
+    if (in_loop()) {
+      action();
+      return;
+    }
+    const auto call = std::make_shared<Call>(Command());
+    std::unique_lock lock(mutex);
+    if (closed) return;
+    asio::post(io, [this, call, action]() mutable {
+      action();
+      finish(*call, {});
+    });
+    if (!call->ended.wait_for(lock, default_timeout, [&] { return call->done; })) {
+      throw blocked_error(what);
+    }
+  }
+
+  // Waits until `arrived` (asked under the lock) is true. False if it was not in time.
+  template <class Predicate>
+  bool wait_for_news(std::string_view what, Duration timeout, Predicate arrived) {
+    must_not_be_in_loop(what);
+    std::unique_lock lock(mutex);
+    const bool woken = news.wait_for(lock, bounded(timeout), [&] { return closed || arrived(); });
+    if (closed) throw closed_error(what);
+    return woken;
+  }
+
+  bool post(const Command& command) {
+    require_valid(command);
+    const std::lock_guard lock(mutex);
+    if (closed || (!in_control && command.kind != CommandKind::stop)) return false;
+    return box.put(command);
+  }
+
+  void close() {
+    if (in_loop()) {
+      shut();
+      return;
+    }
+    {
+      const std::lock_guard lock(mutex);
+      if (!closed) asio::post(io, [this] { shut(); });
+    }
+    const std::lock_guard joining(join_mutex);
+    if (thread.joinable()) thread.join();
+  }
+
+  // The last a Board does. From a callback the loop's thread ends by itself, and Impl with it.
+  void release() {
+    close();
+    if (!in_loop()) return;
+    const std::lock_guard joining(join_mutex);
+    if (thread.joinable()) thread.detach();
+  }
+
+  asio::io_context io{1};
+  asio::executor_work_guard<asio::io_context::executor_type> work{io.get_executor()};
+  AsyncBoard async;
+  PostBox box;
+  std::thread thread;
+  std::mutex join_mutex;
+
+  // Of the loop.
+  Callback<void(const State&)> state_callback;
+  Callback<void(const LinkStatus&)> link_callback;
+  Callback<void(const CarrierEvent&)> event_callback;
+
+  // What both sides see.
+  std::mutex mutex;
+  std::condition_variable news;  // state, link or closed has changed
+  State state;
+  std::uint64_t states = 0;
+  LinkStatus link;
+  bool in_control = false;
+  bool closed = false;
+  Statistics last_statistics;
+};
+
+Board::Board(std::string_view url, BoardOptions options)
+    : impl_(std::make_shared<Impl>(url, std::move(options))) {
+  impl_->start();
+}
+Board::~Board() { impl_->release(); }
+
+void Board::close() { impl_->close(); }
+
+// A call holds the Impl, so that the Board may be destroyed while it waits.
+
+void Board::wait_active(Duration timeout) {
+  const auto impl = impl_;
+  const bool active = impl->wait_for_news(name(), timeout, [&] {
+    return impl->link.state == HostLinkState::active && impl->in_control;
+  });
+  if (!active) throw Error(explain(impl->async.name(), impl->link_now()));
+}
+
+void Board::send(const Command& command, Duration timeout) {
+  require_valid(command);
+  const auto impl = impl_;
+  impl->execute(command, timeout);
+}
+void Board::send(std::string_view command, Duration timeout) {
+  send(parse_command_text(command), timeout);
+}
+bool Board::post(const Command& command) { return impl_->post(command); }
+
+void Board::stop(Duration timeout) { send(Command::stop(), timeout); }
+void Board::stop_async() { impl_->post(Command::stop()); }
+void Board::clear(Duration timeout) { send(Command::clear(), timeout); }
+
+void Board::DriveChannel::set(int pwm, Direction direction, Duration timeout) const {
+  board_.send(kind_ == CommandKind::osmc ? Command::osmc(pwm, direction, channel_)
+                                         : Command::dhb12(pwm, direction, channel_),
+              timeout);
+}
+void Board::ServoChannel::set(int pulse_us, Duration timeout) const {
+  board_.send(Command::servo(pulse_us, channel_), timeout);
+}
+void Board::RelayChannel::set(bool on, Duration timeout) const {
+  board_.send(Command::relay(channel_, on), timeout);
+}
+void Board::StepperChannel::move_to(std::int32_t position, int speed, Duration timeout) const {
+  board_.send(Command::stepper(position, speed, channel_), timeout);
+}
+void Board::StepperChannel::zero(Duration timeout) const {
+  board_.send(Command::zero(channel_), timeout);
+}
+void Board::BldcChannel::set(int speed, Direction direction, bool brake, Duration timeout) const {
+  board_.send(Command::bldc(speed, direction, brake, channel_), timeout);
+}
+void Board::proximity(int channel, int threshold_cm, Duration timeout) {
+  send(Command::proximity(threshold_cm, channel), timeout);
+}
+void Board::fields(std::string_view names, Duration timeout) {
+  send("F:" + std::string(names), timeout);
+}
+void Board::setting(std::string_view key, std::string_view value, Duration timeout) {
+  send("C:" + std::string(key) + "," + std::string(value), timeout);
+}
+
+BoardIdentity Board::identify(Duration timeout) {
+  const auto impl = impl_;
+  return impl->execute(Command::identify(), timeout)->identity;
+}
+
+State Board::state() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->state;
+}
+State Board::next_state(Duration timeout) {
+  const auto impl = impl_;
+  const std::uint64_t seen = impl->states_now();
+  if (!impl->wait_for_news(name(), timeout, [&] { return impl->states != seen; })) {
+    Problem problem = explain(impl->async.name(), impl->link_now());
+    problem.reason = "no state came in time: " + problem.reason;
+    throw Error(std::move(problem));
+  }
+  const std::lock_guard lock(impl->mutex);
+  return impl->state;
+}
+LinkStatus Board::link() const { return impl_->link_now(); }
+const std::string& Board::name() const { return impl_->async.name(); }
+
+Statistics Board::statistics() const {
+  const auto impl = impl_;
+  auto report = std::make_shared<Statistics>();
+  {
+    const std::lock_guard lock(impl->mutex);
+    *report = impl->last_statistics;
+  }
+  impl->run_on_loop("statistics()", [impl, report] { *report = impl->async.statistics(); });
+  return *report;
+}
+
+void Board::on_state(std::function<void(const State&)> callback) {
+  const auto impl = impl_;
+  impl->run_on_loop("on_state()", [impl = impl.get(), callback = std::move(callback)]() mutable {
+    impl->state_callback.set(std::move(callback));
+  });
+}
+void Board::on_link(std::function<void(const LinkStatus&)> callback) {
+  const auto impl = impl_;
+  impl->run_on_loop("on_link()", [impl = impl.get(), callback = std::move(callback)]() mutable {
+    impl->link_callback.set(std::move(callback));
+  });
+}
+void Board::on_event(std::function<void(const CarrierEvent&)> callback) {
+  const auto impl = impl_;
+  impl->run_on_loop("on_event()", [impl = impl.get(), callback = std::move(callback)]() mutable {
+    impl->event_callback.set(std::move(callback));
+  });
+}
+
+void Board::watchdog(Duration period) {
+  const auto impl = impl_;
+  impl->run_on_loop("watchdog()", [impl = impl.get(), period] { impl->async.watchdog(period); });
+}
+void Board::feed() { impl_->async.feed(); }
+
+}  // namespace r4

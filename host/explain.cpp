@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "explain.hpp"
+
+#include <fmt/format.h>
+
+#include "command_help.hpp"
+
+namespace r4 {
+
+namespace {
+
+struct Words {
+  std::string reason;
+  std::string fix;
+};
+
+Words safe_words(SafeReason reason) {
+  switch (reason) {
+    case SafeReason::link:
+      return {"the board is safe: it does not hear our heartbeats",
+              "check the way from here to the board (firewall, cable); the link comes back by "
+              "itself"};
+    case SafeReason::stop:
+      return {"the board is safe: an emergency stop is latched",
+              "send E:CLEAR when the danger is over"};
+    case SafeReason::handle:
+      return {"the board is safe: the dead-man's handle is released", "hold the handle"};
+    case SafeReason::proximity:
+      return {"the board is safe: something is nearer than a proximity threshold",
+              "clear the way, or change the threshold with U:cm,ch (0 turns it off)"};
+    case SafeReason::watchdog:
+      return {"the board is safe: a duty of its firmware missed its deadline",
+              "find out why, then send E:CLEAR or restart the board"};
+    case SafeReason::fault:
+      return {"the board is safe: it found a fault in itself",
+              "check its chips and wiring, then send E:CLEAR or restart it"};
+    case SafeReason::none:
+      break;
+  }
+  return {"the board is safe", "E:CLEAR clears a stop, a fault and a watchdog"};
+}
+
+Words link_words(const LinkStatus& link) {
+  if (link.gated) {
+    return {"the application watchdog has stopped our heartbeats",
+            "call feed() at least once in the watchdog's period"};
+  }
+  if (link.busy) {
+    return {"another host controls the board",
+            "stop that host; control is free when its heartbeats have stayed away for the board's "
+            "timeout (1 s)"};
+  }
+  switch (link.state) {
+    case HostLinkState::connecting:
+      return {"nothing was heard from the board yet",
+              "check that it is switched on and connected, and that the URL names it"};
+    case HostLinkState::lost:
+      return {"the board has fallen silent",
+              "check its power, cable and network; the link comes back by itself"};
+    case HostLinkState::safe:
+      return safe_words(link.reason);
+    case HostLinkState::active:
+      break;
+  }
+  return {"the board streams its state, but has confirmed no command of ours yet",
+          "allow more time; `r4 bench` shows how many datagrams are lost"};
+}
+
+bool link_is_well(const LinkStatus& link) {
+  return link.state == HostLinkState::active && !link.busy && !link.gated;
+}
+
+Words refusal_words(std::string_view command, Refusal code, const LinkStatus& link) {
+  Words words{
+      fmt::format("refused by the board: {} ({})",
+                  std::string_view(name_of(code).data(), name_of(code).size()), meaning_of(code)),
+      ""};
+  switch (code) {
+    case Refusal::unknown:
+    case Refusal::format:
+    case Refusal::range:
+    case Refusal::channel:
+      words.fix = bad_command(command, code).fix;
+      break;
+    case Refusal::safe:
+      if (link.state == HostLinkState::safe) {
+        const Words why = safe_words(link.reason);
+        words.reason = fmt::format("refused by the board: SAFE ({})", why.reason);
+        words.fix = why.fix;
+      } else {
+        words.fix = "look at the board's SAFE field for the reason";
+      }
+      break;
+    case Refusal::busy:
+      words.fix = link_words(LinkStatus{.busy = true}).fix;
+      break;
+    case Refusal::stale:
+      words.fix = "send it again if it is still wanted";
+      break;
+    case Refusal::auth:
+      words.fix = "give this host the board's key";
+      break;
+    case Refusal::none:
+    case Refusal::duplicate:
+      break;
+  }
+  return words;
+}
+
+}  // namespace
+
+Problem explain(std::string_view name, const LinkStatus& link) {
+  Words words = link_words(link);
+  return {ErrorKind::refused, std::string(name), std::move(words.reason), std::move(words.fix)};
+}
+
+Problem explain(std::string_view command, const CommandResult& result, const LinkStatus& link) {
+  Words words;
+  switch (result.outcome) {
+    case Outcome::confirmed:
+      words.reason = "confirmed by the board's state";
+      break;
+    case Outcome::refused:
+      words = refusal_words(command, result.code, link);
+      break;
+    case Outcome::timed_out: {
+      const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(result.elapsed).count();
+      words.reason = fmt::format("not confirmed within {} ms", ms);
+      if (link_is_well(link)) {
+        words.reason += "; it may have been executed or not";
+        words.fix =
+            "allow more time, or send it again; `r4 bench` shows how many datagrams are lost";
+      } else {
+        Words why = link_words(link);
+        words.reason += ": " + why.reason;
+        words.fix = std::move(why.fix);
+      }
+      break;
+    }
+    case Outcome::cancelled:
+      words.reason = "cancelled: an emergency stop came, or the board was closed";
+      break;
+    case Outcome::full:
+      words.reason =
+          fmt::format("not sent: {} commands are under way already", Session::max_pending);
+      words.fix = "wait until some of them are confirmed";
+      break;
+  }
+  return {ErrorKind::refused, std::string(command), std::move(words.reason), std::move(words.fix)};
+}
+
+}  // namespace r4

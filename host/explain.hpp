@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What became of a command, or of the link, in words: the thing, the reason and the fix.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "../transports/error.hpp"
+#include "session.hpp"
+
+namespace r4 {
+
+// How the link is and, where something is wrong with it, what to do: "another host controls the
+// board" and "stop it, or …". `thing` is the board's name. Of kind refused.
+Problem explain(std::string_view name, const LinkStatus& link);
+
+// Why `command` ("O:358,1,1") was not confirmed. `link` is the link at that time. Of kind refused.
+Problem explain(std::string_view command, const CommandResult& result, const LinkStatus& link);
+
+}  // namespace r4

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The one place where the host knows the simulated board.
+#include "../firmware/ports/sim/sim_carrier.hpp"
+
+#include "../transports/registry.hpp"
+#include "async_board.hpp"
+
+namespace r4 {
+
+namespace {
+
+Registry with_simulated_board() {
+  Registry registry = Registry::standard();
+  registry.add({"sim", "sim:[?node=1]", "a simulated board in this process",
+                [](asio::io_context& io, const Url& url, Role role) {
+                  if (role == Role::board) {
+                    throw Error(ErrorKind::usage, url.text(), "sim: is a board, it cannot listen",
+                                "give the board a transport to listen on, such as udp://:2018");
+                  }
+                  return sim::make_sim_carrier(io, url);
+                }});
+  return registry;
+}
+
+}  // namespace
+
+const Registry& standard_registry() {
+  static const Registry registry = with_simulated_board();
+  return registry;
+}
+
+}  // namespace r4
