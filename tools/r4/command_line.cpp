@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "command_line.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <exception>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "help.hpp"
+#include "json.hpp"
+#include "subcommands.hpp"
+#include "transports/error.hpp"
+
+namespace r4::tool {
+namespace {
+
+void add_subcommands(CLI::App& root, Action& chosen) {
+  add_monitor(root, chosen);
+  add_send(root, chosen);
+  add_stop(root, chosen);
+  add_list(root, chosen);
+  add_bench(root, chosen);
+  add_sim(root, chosen);
+  add_demo(root, chosen);
+  add_encode(root, chosen);
+  add_decode(root, chosen);
+  add_completion(root, chosen);
+}
+
+// The text without the ending, if it has it.
+std::string without(std::string text, std::string_view ending) {
+  if (text.ends_with(ending)) text.resize(text.size() - ending.size());
+  return text;
+}
+
+// What CLI11 found wrong, in the shape of our errors.
+Problem usage_problem(const CLI::App& root, const CLI::ParseError& error) {
+  Problem problem{ErrorKind::usage, "", "", ""};
+  const std::vector<CLI::App*> used = root.get_subcommands();
+  const CLI::App& command = used.empty() ? root : *used.front();
+  const std::string help = used.empty() ? "r4 --help" : "r4 " + command.get_name() + " --help";
+  problem.fix = "see " + help;
+
+  const std::vector<std::string> extras = root.remaining(true);
+  const bool unexpected = used.empty() || dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
+  if (unexpected && !extras.empty()) {
+    problem.thing = extras.front();
+    const bool option = problem.thing.starts_with('-');
+    problem.reason = option         ? "no such option"
+                     : used.empty() ? "no such command"
+                                    : "one argument too many";
+    const std::string near = nearest_name(command, problem.thing);
+    if (!near.empty()) problem.fix = fmt::format("did you mean {}? {} lists them", near, help);
+  } else if (used.empty()) {
+    problem.thing = "command";
+    problem.reason = "none was given";
+    problem.fix = "r4 --help lists them; r4 demo shows what this is about";
+  } else if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) {
+    problem.thing = without(error.what(), " is required");
+    problem.reason = "is missing";
+  } else if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr) {
+    problem.thing = std::string(error.what()).substr(0, std::string(error.what()).find(':'));
+    problem.reason = "needs a value";
+  } else {
+    const std::string_view text = error.what();
+    const std::size_t colon = text.find(": ");
+    problem.thing = colon == text.npos ? "command line" : std::string(text.substr(0, colon));
+    problem.reason = colon == text.npos ? std::string(text) : std::string(text.substr(colon + 2));
+  }
+  return problem;
+}
+
+int report(const Problem& problem, bool json) {
+  std::fflush(stdout);
+  fmt::print(stderr, "r4: {}\n", problem.text());
+  if (json) print_line(problem_json(problem));
+  return static_cast<int>(problem.kind);
+}
+
+// What was printed must have gone somewhere: a full disk is no success.
+void flush_output() {
+  errno = 0;
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+    throw Error(ErrorKind::open, "standard output", std::strerror(errno != 0 ? errno : EIO),
+                "make room where it goes, or send it elsewhere");
+  }
+}
+
+}  // namespace
+
+int run(int argc, const char* const* argv) {
+  const auto is_json = [](const char* argument) { return std::string_view(argument) == "--json"; };
+  const bool json = std::any_of(argv, argv + argc, is_json);
+  Action chosen;
+  CLI::App root("R4 boards: watch them, command them, stop them, simulate them", "r4");
+  root.set_version_flag("--version", "r4 " R4_VERSION, "Print the version and exit");
+  root.set_help_flag("-h,--help", "Print help and exit; also after a command");
+  root.footer(root_footer);
+  root.require_subcommand(1);
+  add_subcommands(root, chosen);
+  set_help_layout(root);
+  try {
+    root.parse(argc, argv);
+    const int code = chosen();
+    flush_output();
+    return code;
+  } catch (const CLI::Success& success) {  // --help, --version
+    return root.exit(success);
+  } catch (const CLI::ParseError& error) {
+    return report(usage_problem(root, error), json);
+  } catch (const Error& error) {
+    return report(error.problem(), json);
+  } catch (const std::exception& error) {
+    return report({ErrorKind::data, "internal error", error.what(), "please report it"}, json);
+  }
+}
+
+}  // namespace r4::tool

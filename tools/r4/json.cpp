@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "json.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <vector>
+
+namespace r4::tool {
+namespace {
+
+const char* name_of(ErrorKind kind) {
+  switch (kind) {
+    case ErrorKind::data:
+      return "data";
+    case ErrorKind::usage:
+      return "usage";
+    case ErrorKind::refused:
+      return "refused";
+    case ErrorKind::open:
+      return "open";
+    case ErrorKind::permission:
+      return "permission";
+    case ErrorKind::unsupported:
+      return "unsupported";
+  }
+  return "unknown";
+}
+
+std::string_view view(Text text) { return {text.data(), text.size()}; }
+
+}  // namespace
+
+Json value_json(Text value) {
+  const std::string_view text = view(value);
+  const bool plain = !text.empty() && text.find_first_not_of("-.0123456789") == text.npos;
+  if (plain) {
+    Json number = Json::parse(text, nullptr, false);
+    // A whole number beyond 64 bits would come out rounded.
+    const bool exact = number.is_number_integer() || text.find('.') != text.npos;
+    if (number.is_number() && exact) return number;
+  }
+  return text;
+}
+
+Json field_json(const Field& field) {
+  std::vector<Text> values(field.count());
+  field.split(values.data(), values.size());
+  if (values.size() == 1) return value_json(values[0]);
+  Json array = Json::array();
+  for (const Text value : values) array.push_back(value_json(value));
+  return array;
+}
+
+Json fields_json(const Datagram& datagram) {
+  Json fields = Json::object();
+  for (const Field& field : datagram) {
+    if (field.name() == Text("PNum") || field.name() == Text("T")) continue;
+    const std::string name(view(field.name()));
+    const auto earlier = fields.find(name);
+    if (earlier == fields.end()) {
+      fields.emplace(name, field_json(field));
+    } else {
+      *earlier = Json::array({std::move(*earlier), field_json(field)});
+    }
+  }
+  return fields;
+}
+
+Json bad_datagram_json(const ReadResult& result) {
+  Json object{{"error", to_text(result.error)}, {"position", result.position}};
+  if (result.error == ReadError::crc) {
+    object["expected"] = fmt::format("{:#x}", result.crc_expected);
+    object["found"] = fmt::format("{:#x}", result.crc_found);
+  }
+  return object;
+}
+
+Json problem_json(const Problem& problem) {
+  return {{"type", "error"},
+          {"kind", name_of(problem.kind)},
+          {"thing", problem.thing},
+          {"reason", problem.reason},
+          {"fix", problem.fix}};
+}
+
+std::string escaped(std::string_view bytes) {
+  std::string text;
+  text.reserve(bytes.size());
+  for (const char c : bytes) {
+    if (c >= 0x20 && c <= 0x7E && c != '\\') {
+      text += c;
+    } else {
+      text += fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
+    }
+  }
+  return text;
+}
+
+std::string line_of(const Json& object) {
+  return object.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+void print_text(std::string_view text) {
+  std::fwrite(text.data(), 1, text.size(), stdout);
+  std::fflush(stdout);
+}
+
+void print_line(const Json& object) { print_text(line_of(object)); }
+
+}  // namespace r4::tool

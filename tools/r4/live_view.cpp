@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The status that `r4 monitor` redraws on a terminal.
+#include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <deque>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "host/command_help.hpp"
+#include "json.hpp"
+#include "monitor_view.hpp"
+
+namespace r4::tool {
+namespace {
+
+constexpr std::size_t most_notes = 4;
+constexpr std::size_t cell_width = 24;  // "SERVO16POS          2000"
+
+// The terminal's size; that of an old one where it does not tell.
+winsize terminal_size() {
+  winsize size{};
+  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) size.ws_col = 80;
+  if (size.ws_row == 0) size.ws_row = 24;
+  return size;
+}
+
+class LiveView final : public MonitorView {
+ public:
+  explicit LiveView(const AsyncBoard& board) : board_(board) { print_text("\x1b[?25l"); }
+  ~LiveView() override { print_text("\x1b[?25h"); }
+
+  void on_state(const Datagram& datagram) override {
+    for (const Field& field : datagram) {
+      if (field.name() == Text("PNum") || field.name() == Text("T")) continue;
+      std::string name(field.name().data(), field.name().size());
+      const auto known = std::find_if(fields_.begin(), fields_.end(),
+                                      [&](const auto& each) { return each.first == name; });
+      std::string& value =
+          known != fields_.end() ? known->second : fields_.emplace_back(std::move(name), "").second;
+      value.assign(field.values().data(), field.values().size());
+    }
+    pnum_ = datagram.pnum();
+    t_ms_ = datagram.time_ms();
+  }
+  void on_heartbeat(const Datagram&) override { ++heartbeats_; }
+  void on_nack(const Nack& nack, const Datagram&) override {
+    if (nack.code == Refusal::busy) return;  // the first line says so
+    note(fmt::format("refused PNum {}: {}", nack.pnum, meaning_of(nack.code)));
+  }
+  void on_bad_datagram(const ReadResult& result, std::string_view) override {
+    note(fmt::format("a damaged datagram ({})", to_text(result.error)));
+  }
+  void on_link(const LinkStatus& status) override { note(link_text(status)); }
+  void on_event(const CarrierEvent& event) override {
+    note(event.kind == CarrierEvent::Kind::up ? event.problem.thing + ": up"
+                                              : event.problem.text());
+  }
+
+  void on_tick() override {
+    const winsize size = terminal_size();
+    std::vector<std::string> lines = status_lines();
+    add_fields(lines, std::max<std::size_t>(1, size.ws_col / cell_width));
+    lines.emplace_back();
+    for (const std::string& each : notes_) lines.push_back(each);
+    lines.resize(std::min<std::size_t>(lines.size(), size.ws_row - 1U));
+
+    std::string frame = drawn_ > 0 ? fmt::format("\x1b[{}A", drawn_) : "";
+    for (std::string& line : lines) {
+      if (line.size() > size.ws_col) line.resize(size.ws_col);
+      frame += "\r" + line + "\x1b[K\n";
+    }
+    frame += "\x1b[J";
+    drawn_ = lines.size();
+    print_text(frame);
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void note(std::string text) {
+    const auto seconds = std::chrono::duration<double>(Clock::now() - start_).count();
+    notes_.push_back(fmt::format("{:8.1f} s  {}", seconds, escaped(text)));
+    if (notes_.size() > most_notes) notes_.pop_front();
+  }
+
+  std::vector<std::string> status_lines() const {
+    const Statistics now = board_.statistics();
+    const BoardIdentity& id = board_.identity();
+    std::vector<std::string> lines;
+    lines.push_back(
+        fmt::format("{}   {}   (Ctrl-C ends)", board_.name(), link_text(board_.link())));
+    if (!id.board_id.empty()) {
+      lines.push_back(
+          fmt::format("board {}, firmware {}, {}", id.board_id, id.firmware, id.capabilities));
+    }
+    lines.push_back(
+        fmt::format("{:.1f} Hz   lost {} ({:.2f} %)   damaged {}   round trip {:.0f} us   "
+                    "jitter {:.0f} us   age {:.0f} ms",
+                    now.state_rate_hz, now.packets.lost, now.loss() * 100, now.damaged,
+                    now.round_trip_us, now.jitter_us, now.state_age_us / 1000));
+    lines.push_back(fmt::format("PNum {}   T {} ms   states {}   heartbeats {} in, {} out", pnum_,
+                                t_ms_, now.states, heartbeats_, now.heartbeats));
+    lines.emplace_back();
+    return lines;
+  }
+
+  // The fields in columns, read downwards.
+  void add_fields(std::vector<std::string>& lines, std::size_t columns) const {
+    const std::size_t rows = (fields_.size() + columns - 1) / columns;
+    for (std::size_t row = 0; row < rows; ++row) {
+      std::string line;
+      for (std::size_t i = row; i < fields_.size(); i += rows) {
+        line += fmt::format("{:<11}{:>10}   ", fields_[i].first, fields_[i].second);
+      }
+      lines.push_back(std::move(line));
+    }
+  }
+
+  const AsyncBoard& board_;
+  const Clock::time_point start_ = Clock::now();
+  std::vector<std::pair<std::string, std::string>> fields_;
+  std::deque<std::string> notes_;
+  std::uint32_t pnum_ = 0;
+  std::uint64_t t_ms_ = 0;
+  std::uint64_t heartbeats_ = 0;
+  std::size_t drawn_ = 0;  // lines on the screen
+};
+
+}  // namespace
+
+std::unique_ptr<MonitorView> make_live_view(const AsyncBoard& board) {
+  return std::make_unique<LiveView>(board);
+}
+
+}  // namespace r4::tool

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "monitor_view.hpp"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <string>
+
+#include "host/command_help.hpp"
+#include "json.hpp"
+#include "protocol/host_link.hpp"
+
+namespace r4::tool {
+namespace {
+
+std::string_view view(Text text) { return {text.data(), text.size()}; }
+
+// Room for a line on stdout, so that a reader who has stalled cannot stall our heartbeats.
+bool output_has_room() {
+  pollfd out{STDOUT_FILENO, POLLOUT, 0};
+  return ::poll(&out, 1, 0) != 0;
+}
+
+// Prints what may be lost, states and heartbeats, only while the output has room.
+class Lines {
+ public:
+  void print_or_skip(std::string_view line) {
+    if (output_has_room()) {
+      print_text(line);
+    } else {
+      ++skipped_;
+    }
+  }
+  std::uint64_t skipped() const { return skipped_; }
+
+ private:
+  std::uint64_t skipped_ = 0;
+};
+
+class JsonView final : public MonitorView {
+ public:
+  explicit JsonView(const AsyncBoard& board) : board_(board) {}
+
+  void on_state(const Datagram& datagram) override { print("state", datagram); }
+  void on_heartbeat(const Datagram& datagram) override { print("heartbeat", datagram); }
+  void on_nack(const Nack&, const Datagram& datagram) override { print("nack", datagram); }
+  void on_bad_datagram(const ReadResult& result, std::string_view bytes) override {
+    Json fields = bad_datagram_json(result);
+    fields["text"] = escaped(bytes);
+    print_line(object("error", std::move(fields)));
+  }
+  void on_link(const LinkStatus& status) override {
+    print_line(object("link", {{"up", up_},
+                               {"state", to_text(status.state)},
+                               {"reason", to_text(status.reason)},
+                               {"busy", status.busy},
+                               {"gated", status.gated}}));
+  }
+  void on_event(const CarrierEvent& event) override {
+    if (event.kind != CarrierEvent::Kind::warning) up_ = event.kind == CarrierEvent::Kind::up;
+    if (event.kind != CarrierEvent::Kind::up) {
+      const Problem& problem = event.problem;
+      print_line(object(
+          "error", {{"error", "transport"}, {"reason", problem.reason}, {"fix", problem.fix}}));
+    }
+    on_link(board_.link());
+  }
+  std::uint64_t skipped() const override { return lines_.skipped(); }
+
+ private:
+  Json object(const char* type, Json fields) const {
+    return {{"type", type},
+            {"transport", board_.name()},
+            {"pnum", nullptr},
+            {"t", nullptr},
+            {"fields", std::move(fields)}};
+  }
+  void print(const char* type, const Datagram& datagram) {
+    Json json = object(type, fields_json(datagram));
+    json["pnum"] = datagram.pnum();
+    json["t"] = datagram.time_ms();
+    lines_.print_or_skip(line_of(json));
+  }
+
+  const AsyncBoard& board_;
+  Lines lines_;
+  bool up_ = true;
+};
+
+class PlainView final : public MonitorView {
+ public:
+  void on_state(const Datagram& datagram) override {
+    std::string line = fmt::format("state {:>10} T {:>10} ", datagram.pnum(), datagram.time_ms());
+    for (const Field& field : datagram) {
+      if (field.name() == Text("PNum") || field.name() == Text("T")) continue;
+      line += fmt::format(" {}:{}", view(field.name()), view(field.values()));
+    }
+    line += '\n';
+    lines_.print_or_skip(line);
+  }
+  void on_heartbeat(const Datagram&) override {}
+  void on_nack(const Nack& nack, const Datagram&) override {
+    print_text(fmt::format("refused PNum {}: {}\n", nack.pnum, meaning_of(nack.code)));
+  }
+  void on_bad_datagram(const ReadResult& result, std::string_view bytes) override {
+    print_text(fmt::format("damaged datagram ({} at byte {}): {}\n", to_text(result.error),
+                           result.position, escaped(bytes)));
+  }
+  void on_link(const LinkStatus& status) override {
+    print_text(fmt::format("link: {}\n", link_text(status)));
+  }
+  void on_event(const CarrierEvent& event) override {
+    if (event.kind == CarrierEvent::Kind::up) {
+      print_text(fmt::format("{}: up\n", event.problem.thing));
+    } else {
+      print_text(event.problem.text() + "\n");
+    }
+  }
+  std::uint64_t skipped() const override { return lines_.skipped(); }
+
+ private:
+  Lines lines_;
+};
+
+}  // namespace
+
+std::unique_ptr<MonitorView> make_json_view(const AsyncBoard& board) {
+  return std::make_unique<JsonView>(board);
+}
+
+std::unique_ptr<MonitorView> make_plain_view() { return std::make_unique<PlainView>(); }
+
+std::string link_text(const LinkStatus& status) {
+  std::string text;
+  switch (status.state) {
+    case HostLinkState::connecting:
+      text = "CONNECTING";
+      break;
+    case HostLinkState::active:
+      text = "ACTIVE";
+      break;
+    case HostLinkState::safe:
+      text = fmt::format("SAFE ({})", to_text(status.reason));
+      break;
+    case HostLinkState::lost:
+      text = "LOST: the board is silent";
+      break;
+  }
+  if (status.busy) text += ", another host controls the board";
+  if (status.gated) text += ", our heartbeats are stopped";
+  return text;
+}
+
+}  // namespace r4::tool

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Options that several subcommands share, and how their values are read. A wrong value throws
+// Error{usage} from the parsing of the command line.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace r4::tool {
+
+using Milliseconds = std::chrono::milliseconds;
+
+// Seconds such as 5 or 0.25, to the hundredth, at most 10 million.
+CLI::Option* add_seconds(CLI::App& command, const std::string& name, Milliseconds& out,
+                         const std::string& meaning);
+CLI::Option* add_seconds(CLI::App& command, const std::string& name,
+                         std::optional<Milliseconds>& out, const std::string& meaning);
+
+// A whole number from `min` to `max`.
+CLI::Option* add_number(CLI::App& command, const std::string& name, std::uint64_t& out,
+                        std::uint64_t min, std::uint64_t max, const std::string& meaning);
+CLI::Option* add_number(CLI::App& command, const std::string& name,
+                        std::optional<std::uint64_t>& out, std::uint64_t min, std::uint64_t max,
+                        const std::string& meaning);
+
+CLI::Option* add_json(CLI::App& command, bool& out, const std::string& meaning);
+
+// The board's URL. A list, for sessions over several links; one_url() takes it for those that can
+// have only one so far.
+CLI::Option* add_urls(CLI::App& command, std::vector<std::string>& out);
+const std::string& one_url(const std::vector<std::string>& urls);
+
+// State fields for `F`, checked.
+CLI::Option* add_fields(CLI::App& command, std::string& out);
+
+// What the completion scripts offer for an option's or a positional's value, by its type name.
+inline constexpr const char* url_type = "URL";
+inline constexpr const char* file_type = "FILE";
+
+}  // namespace r4::tool

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 send: commands in order, each confirmed by the board's own state before the next.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <asio/io_context.hpp>
+#include <asio/steady_timer.hpp>
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "help.hpp"
+#include "host/async_board.hpp"
+#include "host/command_help.hpp"
+#include "host/explain.hpp"
+#include "json.hpp"
+#include "options.hpp"
+#include "subcommands.hpp"
+#include "transports/error.hpp"
+#include "transports/registry.hpp"
+
+namespace r4::tool {
+namespace {
+
+struct Options {
+  std::vector<std::string> urls;
+  std::vector<std::string> commands;
+  Milliseconds timeout{3000};
+  Milliseconds hold{0};
+  bool json = false;
+};
+
+bool is_url(std::string_view text) {
+  const std::vector<Registry::Entry>& entries = standard_registry().entries();
+  return std::any_of(entries.begin(), entries.end(), [&](const Registry::Entry& entry) {
+    return text.starts_with(entry.scheme + ":");
+  });
+}
+
+// The command, checked; its texts are views of `text`.
+Command command_of(const std::string& text) {
+  const Command command = parse_command_text(text);
+  if (command.kind == CommandKind::heartbeat) {
+    throw Error(ErrorKind::usage, text, "heartbeats are sent by themselves",
+                "use --hold to keep the link up");
+  }
+  return command;
+}
+
+class Sender {
+ public:
+  Sender(const Options& options, const std::vector<Command>& commands)
+      : options_(options), commands_(commands), board_(io_, options.urls.front()), hold_(io_) {}
+
+  int run() {
+    board_.open();
+    send_next();
+    io_.run();
+    board_.close();
+    if (failure_) throw Error(*failure_);
+    return 0;
+  }
+
+ private:
+  void send_next() {
+    if (next_ == commands_.size()) {
+      hold_.expires_after(options_.hold);
+      hold_.async_wait([this](const std::error_code&) { io_.stop(); });
+      return;
+    }
+    const Command& command = commands_[next_];
+    const auto done = [this](const CommandResult& result) { on_result(result); };
+    if (command.kind == CommandKind::stop) {
+      board_.async_stop(options_.timeout, done);
+    } else if (command.kind == CommandKind::identify) {
+      board_.async_identify(options_.timeout, done);
+    } else {
+      board_.async_send(command, options_.timeout, done);
+    }
+  }
+
+  void on_result(const CommandResult& result) {
+    const std::string text = text_of(commands_[next_]);
+    const bool confirmed = result.outcome == Outcome::confirmed;
+    const Problem problem = explain(text, result, board_.link());
+    if (options_.json) {
+      print_line(result_json(text, result, problem));
+    } else if (confirmed) {
+      fmt::print("{}  confirmed in {:.1f} ms{}\n", text, milliseconds(result),
+                 next_ == 0 ? ", connecting included" : "");
+      if (commands_[next_].kind == CommandKind::identify) print_identity();
+    } else {
+      fmt::print("{}  {}\n", text, problem.reason);
+    }
+    if (!confirmed) {
+      for (std::size_t i = next_ + 1; i < commands_.size() && !options_.json; ++i) {
+        fmt::print("{}  not sent\n", text_of(commands_[i]));
+      }
+      failure_ = problem;
+      io_.stop();
+      return;
+    }
+    std::fflush(stdout);
+    ++next_;
+    send_next();
+  }
+
+  void print_identity() const {
+    const BoardIdentity& id = board_.identity();
+    fmt::print("  board {}, firmware {}, {}\n", id.board_id, id.firmware, id.capabilities);
+  }
+
+  static double milliseconds(const CommandResult& result) {
+    return std::chrono::duration<double, std::milli>(result.elapsed).count();
+  }
+
+  Json result_json(const std::string& text, const CommandResult& result,
+                   const Problem& problem) const {
+    const bool confirmed = result.outcome == Outcome::confirmed;
+    Json object{{"type", "result"},
+                {"command", text},
+                {"confirmed", confirmed},
+                {"ms", milliseconds(result)}};
+    if (result.outcome == Outcome::refused) {
+      const Text name = name_of(result.code);
+      object["code"] = std::string_view(name.data(), name.size());
+    }
+    if (!confirmed) object["reason"] = problem.reason;
+    if (confirmed && text == "Q:ID") {
+      const BoardIdentity& id = board_.identity();
+      object["board_id"] = id.board_id;
+      object["firmware"] = id.firmware;
+      object["capabilities"] = id.capabilities;
+    }
+    return object;
+  }
+
+  const Options& options_;
+  const std::vector<Command>& commands_;
+  asio::io_context io_{1};
+  AsyncBoard board_;
+  asio::steady_timer hold_;
+  std::size_t next_ = 0;
+  std::optional<Problem> failure_;
+};
+
+int send(const Options& options) {
+  std::vector<Command> commands;
+  for (const std::string& text : options.commands) {
+    if (is_url(text)) one_url({options.urls.front(), text});
+    commands.push_back(command_of(text));
+  }
+  return Sender(options, commands).run();
+}
+
+constexpr const char* footer =
+    R"(Each command is sent when the board's own state has confirmed the one before it; the first that is not
+confirmed ends the run. All are checked before the first is sent.
+
+The board goes safe, its outputs off, one second after this program ends: --hold keeps them on.
+
+Examples:
+  r4 send udp://192.168.0.125 O:358,1,1 --hold 5
+  r4 send serial:auto D:1000,1,1 S:1500,3 R:2,On --hold 60
+  r4 send serial:auto E:CLEAR                 after an emergency stop
+  r4 send udp://127.0.0.1 Q:ID                who is it?
+
+Exit codes: 0 all confirmed; 3 one was refused or not confirmed in time; 2 a command or option is
+wrong, nothing was sent; 4 the transport cannot be opened; 5 permission denied.)";
+
+}  // namespace
+
+void add_send(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* const command =
+      add_subcommand(root, chosen, "send", "Send commands and wait until the board confirms them",
+                     footer, options, send);
+  command->footer("Commands:\n" + command_table() + "\n" + footer);
+  add_urls(*command, options->urls)->expected(1);
+  command->add_option("CMD", options->commands, "commands, such as O:358,1,1")
+      ->required()
+      ->type_name("");
+  add_seconds(*command, "--timeout", options->timeout,
+              "how long to wait for each confirmation (default 3)");
+  add_seconds(*command, "--hold", options->hold, "keep the link up that long after the last");
+  add_json(*command, options->json, "print JSON, one object a command");
+}
+
+}  // namespace r4::tool

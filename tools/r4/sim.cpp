@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 sim: the simulated board as a process, its events on stdout.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <asio/io_context.hpp>
+#include <asio/signal_set.hpp>
+#include <asio/steady_timer.hpp>
+#include <csignal>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "firmware/ports/sim/simulated_board.hpp"
+#include "host/async_board.hpp"
+#include "options.hpp"
+#include "sim_log.hpp"
+#include "subcommands.hpp"
+#include "transports/registry.hpp"
+
+namespace r4::tool {
+namespace {
+
+struct Options {
+  std::vector<std::string> urls;
+  bool json = false;
+  bool quiet = false;
+  std::optional<Milliseconds> duration;
+  std::string script;
+  std::optional<std::uint64_t> seed;
+  std::string board_id;
+};
+
+void check_id(const std::string& id) {
+  Field field;
+  if (!id.empty() && read_field(Text("I:" + id), field) && field.count() == 1) return;
+  throw Error(ErrorKind::usage, "--board-id " + id, "cannot be sent",
+              "use printable ASCII without , ; and ^");
+}
+
+int simulate(const Options& options) {
+  asio::io_context io(1);
+  asio::signal_set signals(io, SIGINT, SIGTERM);
+  signals.async_wait([&io](const std::error_code&, int) { io.stop(); });
+
+  SimLog log(options.json, options.quiet);
+  sim::SimulatedBoard::Options board_options;
+  board_options.seed = options.seed;
+  if (!options.script.empty()) board_options.script = sim::Script::load(options.script);
+  if (!options.board_id.empty()) {
+    check_id(options.board_id);
+    board_options.board_id = options.board_id;
+  }
+  board_options.firmware_version = R4_VERSION;
+  board_options.events = log.events();
+  sim::SimulatedBoard board(io, std::move(board_options));
+
+  std::vector<const Carrier*> carriers;
+  for (const std::string& url : options.urls) {
+    auto carrier = standard_registry().make(io, url, Role::board);
+    carriers.push_back(carrier.get());
+    board.add_carrier(std::move(carrier));
+  }
+  log.watch(board);
+  board.start();
+  std::vector<std::string> names;
+  for (const Carrier* const carrier : carriers) names.push_back(carrier->name());
+  log.listening(names);
+
+  asio::steady_timer end(io);
+  if (options.duration) {
+    end.expires_after(*options.duration);
+    end.async_wait([&io](const std::error_code&) { io.stop(); });
+  }
+  io.run();
+  board.stop();
+  return 0;
+}
+
+constexpr const char* footer =
+    R"(The board streams its state and obeys commands as the real one does, with the inputs of the bench in
+the paper's capture. It prints where it listens and what it does; with --json one object a line:
+  {"type":"listening","url":…}
+  {"type":"event","t":…,"state":"CONNECTING|ACTIVE|SAFE","reason":…}   t: the board's clock, ms
+with "outputs" when they changed, "executed" or "refused" for a command, "transport" when one went
+down or came up, and "silence" (ms since the host was last heard) when the board goes safe for that.
+
+A scenario (--script) has lines such as: 0.5 handle released / 1 us 1 15 / 2 reboot
+
+Examples:
+  r4 sim                                       at udp://127.0.0.1:2018
+  r4 sim udp://0.0.0.0:2018 pty:/tmp/r4        two transports at once; open the second with
+                                               r4 monitor serial:///tmp/r4
+  r4 sim 'udp://127.0.0.1:2018?peer=127.0.0.1:2390'   streams to that port, as the paper's board
+
+Exit codes: 0 ended by --duration or a signal; 1 the script is wrong; 2 usage; 4, 5 the port or
+device cannot be opened.)";
+
+}  // namespace
+
+void add_sim(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<Options>();
+  options->urls = {"udp://127.0.0.1:2018"};
+  CLI::App* const command =
+      add_subcommand(root, chosen, "sim", "Run a simulated board", footer, options, simulate);
+  command
+      ->add_option("URL", options->urls,
+                   "where it listens, up to four (default udp://127.0.0.1:2018)")
+      ->type_name(url_type);
+  add_json(*command, options->json, "print events as JSON, one object a line");
+  command->add_flag("--quiet", options->quiet, "print only where it listens");
+  add_seconds(*command, "--duration", options->duration, "end after that time");
+  command->add_option("--script", options->script, "a scenario: what happens around the board")
+      ->type_name(file_type);
+  add_number(*command, "--seed", options->seed, 0, ~std::uint64_t{0},
+             "the same seed gives the same clock and inputs");
+  command->add_option("--board-id", options->board_id, "its answer to Q:ID (default sim-1)")
+      ->type_name("ID");
+}
+
+}  // namespace r4::tool

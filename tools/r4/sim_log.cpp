@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sim_log.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <string_view>
+
+#include "host/command_help.hpp"
+#include "protocol/refusal.hpp"
+#include "protocol/units.hpp"
+
+namespace r4::tool {
+namespace {
+
+int number_of(Direction direction) { return static_cast<int>(direction); }
+
+std::string_view name_of_kind(CarrierEvent::Kind kind) {
+  switch (kind) {
+    case CarrierEvent::Kind::up:
+      return "up";
+    case CarrierEvent::Kind::down:
+      return "down";
+    case CarrierEvent::Kind::warning:
+      break;
+  }
+  return "warning";
+}
+
+}  // namespace
+
+Json outputs_json(const firmware::Outputs& outputs) {
+  Json json{{"osmc", Json::array()},    {"dhb", Json::array()},  {"servo", outputs.servo_us},
+            {"relays", outputs.relays}, {"bldc", Json::array()}, {"stepper", Json::array()}};
+  for (const Drive& drive : outputs.osmc) {
+    json["osmc"].push_back({drive.pwm, number_of(drive.direction)});
+  }
+  for (const Drive& drive : outputs.dhb12) {
+    json["dhb"].push_back({drive.pwm, number_of(drive.direction)});
+  }
+  for (const Bldc& bldc : outputs.bldc) {
+    json["bldc"].push_back({bldc.speed, number_of(bldc.direction), bldc.brake ? 1 : 0});
+  }
+  for (const firmware::StepperTarget& stepper : outputs.stepper) {
+    json["stepper"].push_back(stepper.enabled ? Json{stepper.position, stepper.speed} : Json());
+  }
+  return json;
+}
+
+std::string outputs_text(const firmware::Outputs& outputs) {
+  static constexpr const char* dhb12_names[dhb12_channels] = {"DHB1A", "DHB1B", "DHB2A", "DHB2B"};
+  std::string text;
+  const auto add = [&text](const std::string& output) {
+    text += text.empty() ? output : ' ' + output;
+  };
+  const auto add_drive = [&add](const std::string& name, const Drive& drive) {
+    if (drive == Drive()) return;
+    add(fmt::format("{}:{},{}", name, drive.pwm, number_of(drive.direction)));
+  };
+  for (int i = 0; i < osmc_channels; ++i) add_drive(fmt::format("OSMC{}", i + 1), outputs.osmc[i]);
+  for (int i = 0; i < dhb12_channels; ++i) add_drive(dhb12_names[i], outputs.dhb12[i]);
+  for (int i = 0; i < servo_channels; ++i) {
+    if (outputs.servo_us[i] != 0) add(fmt::format("SERVO{}:{}", i + 1, outputs.servo_us[i]));
+  }
+  for (int i = 0; i < bldc_channels; ++i) {
+    const Bldc& bldc = outputs.bldc[i];
+    if (bldc == Bldc()) continue;
+    add(fmt::format("BLDC{}:{},{},{}", i + 1, bldc.speed, number_of(bldc.direction),
+                    bldc.brake ? 1 : 0));
+  }
+  for (int i = 0; i < stepper_channels; ++i) {
+    const firmware::StepperTarget& stepper = outputs.stepper[i];
+    if (!stepper.enabled) continue;
+    add(fmt::format("STEP{}:{},{}", i + 1, stepper.position, stepper.speed));
+  }
+  for (int i = 0; i < relay_channels; ++i) {
+    if ((outputs.relays >> i & 1) != 0) add(fmt::format("RELAY{}:On", i + 1));
+  }
+  return text.empty() ? "all off" : text;
+}
+
+sim::SimulatedBoard::Events SimLog::events() {
+  sim::SimulatedBoard::Events events;
+  if (quiet_) return events;
+  events.on_state = [this](auto... a) { on_state(a...); };
+  events.on_outputs = [this](std::uint32_t t_ms, const firmware::Outputs& outputs) {
+    on_outputs(t_ms, outputs);
+  };
+  events.on_executed = [this](auto... a) { on_executed(a...); };
+  events.on_refused = [this](auto... a) { on_refused(a...); };
+  events.on_carrier = [this](std::uint32_t t_ms, const Carrier& carrier, const CarrierEvent& e) {
+    on_carrier(t_ms, carrier, e);
+  };
+  return events;
+}
+
+void SimLog::listening(const std::vector<std::string>& urls) {
+  started_ = true;
+  for (const std::string& url : urls) {
+    if (json_) {
+      print(Json{{"type", "listening"}, {"url", url}});
+    } else {
+      print("listening at " + url + "\n");
+    }
+  }
+  for (std::string& line : held_) print(std::move(line));
+  held_.clear();
+}
+
+void SimLog::print(std::uint32_t t_ms, std::string_view text) {
+  print(fmt::format("{:>10} ms  {}\n", t_ms, text));
+}
+
+void SimLog::print(std::string line) {
+  if (started_) {
+    print_text(line);
+  } else {
+    held_.push_back(std::move(line));
+  }
+}
+
+Json SimLog::event(std::uint32_t t_ms) const {
+  return {{"type", "event"},
+          {"t", t_ms},
+          {"state", to_text(board_->application().state())},
+          {"reason", to_text(board_->application().reason())}};
+}
+
+void SimLog::on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason reason) {
+  const bool silent = state == firmware::BoardState::safe && reason == SafeReason::link;
+  const std::uint32_t silence_ms = silent ? t_ms - board_->application().link().fed_ms() : 0;
+  if (json_) {
+    Json object = event(t_ms);
+    if (silent) object["silence"] = silence_ms;
+    print(object);
+    return;
+  }
+  std::string text = to_text(state);
+  if (reason != SafeReason::none) text += fmt::format(" ({})", to_text(reason));
+  if (silent) text += fmt::format(", the host was last heard {} ms ago", silence_ms);
+  print(t_ms, text);
+}
+
+void SimLog::on_outputs(std::uint32_t t_ms, const firmware::Outputs& outputs) {
+  if (!json_) return print(t_ms, "outputs: " + outputs_text(outputs));
+  Json object = event(t_ms);
+  object["outputs"] = outputs_json(outputs);
+  print(object);
+}
+
+void SimLog::on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command) {
+  const std::string text = text_of(command);
+  if (!json_) return print(t_ms, fmt::format("executed {} (PNum {})", text, pnum));
+  Json object = event(t_ms);
+  object["executed"] = {{"pnum", pnum}, {"command", text}};
+  print(object);
+}
+
+void SimLog::on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code) {
+  const Text name = name_of(code);
+  const std::string_view code_text(name.data(), name.size());
+  if (!json_) {
+    return print(t_ms, fmt::format("refused PNum {}: {}, {}", pnum, code_text, meaning_of(code)));
+  }
+  Json object = event(t_ms);
+  object["refused"] = {{"pnum", pnum}, {"code", code_text}};
+  print(object);
+}
+
+void SimLog::on_carrier(std::uint32_t t_ms, const Carrier& carrier,
+                        const CarrierEvent& carrier_event) {
+  const std::string_view kind = name_of_kind(carrier_event.kind);
+  const std::string& reason = carrier_event.problem.reason;
+  if (!json_) {
+    return print(
+        t_ms, fmt::format("{} {}{}{}", carrier.name(), kind, reason.empty() ? "" : ": ", reason));
+  }
+  Json object = event(t_ms);
+  object["transport"] = {{"url", carrier.name()}, {"event", kind}, {"reason", reason}};
+  print(object);
+}
+
+}  // namespace r4::tool

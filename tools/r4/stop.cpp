@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 stop: every output off, now.
+#include <fmt/format.h>
+
+#include <asio/io_context.hpp>
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/async_board.hpp"
+#include "host/explain.hpp"
+#include "json.hpp"
+#include "options.hpp"
+#include "subcommands.hpp"
+#include "transports/error.hpp"
+#include "transports/url.hpp"
+
+namespace r4::tool {
+namespace {
+
+constexpr const char* last_resort = "CUT THE POWER if it must stop now";
+
+struct Options {
+  std::vector<std::string> urls;
+  Milliseconds timeout{2000};
+  bool json = false;
+};
+
+// Another program on this machine may hold the port at which hosts listen; a stop can do without.
+std::string any_port(const std::string& url) {
+  const Url parsed = Url::parse(url);
+  if (parsed.scheme() != "udp" || parsed.get("listen")) return "";
+  return url + (url.find('?') == std::string::npos ? "?listen=0" : "&listen=0");
+}
+
+std::unique_ptr<AsyncBoard> open(asio::io_context& io, const std::string& url) {
+  auto board = std::make_unique<AsyncBoard>(io, url);
+  try {
+    board->open();
+  } catch (const Error& error) {
+    const std::string other = any_port(url);
+    if (error.kind() == ErrorKind::open && !other.empty()) return open(io, other);
+    Problem problem = error.problem();
+    problem.fix = fmt::format("{}; {}", last_resort, problem.fix);
+    throw Error(problem);
+  }
+  return board;
+}
+
+int stop(const Options& options) {
+  asio::io_context io(1);
+  const std::string& url = one_url(options.urls);
+  const std::unique_ptr<AsyncBoard> board = open(io, url);
+  std::optional<CommandResult> result;
+  board->async_stop(options.timeout, [&](const CommandResult& r) {
+    result = r;
+    io.stop();
+  });
+  io.run();
+  const LinkStatus link = board->link();
+  board->close();
+  if (!result || result->outcome != Outcome::confirmed) {
+    Problem problem = explain("E:STOP", link);
+    problem.reason = fmt::format("the board did not confirm the stop within {} ms: {}",
+                                 options.timeout.count(), problem.reason);
+    problem.fix =
+        problem.fix.empty() ? last_resort : fmt::format("{}; {}", last_resort, problem.fix);
+    throw Error(problem);
+  }
+  const double ms = std::chrono::duration<double, std::milli>(result->elapsed).count();
+  if (options.json) {
+    print_line({{"type", "result"}, {"command", "E:STOP"}, {"confirmed", true}, {"ms", ms}});
+  } else {
+    fmt::print(
+        "stopped: the board reports SAFE (stop), after {:.1f} ms\n"
+        "it stays so until: r4 send {} E:CLEAR\n",
+        ms, url);
+  }
+  return 0;
+}
+
+constexpr const char* footer =
+    R"(Works whoever controls the board, and without waiting for a link: the stop is repeated every 20 ms
+until the board reports it. It stays stopped until E:CLEAR.
+
+Examples:
+  r4 stop udp://192.168.0.125
+  r4 stop serial:auto
+
+Exit codes: 0 the board reports that it has stopped; 3 it did not confirm: cut the power; 4, 5 the
+transport cannot be opened: cut the power.)";
+
+}  // namespace
+
+void add_stop(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* const command = add_subcommand(
+      root, chosen, "stop", "Emergency stop: all outputs off, now", footer, options, stop);
+  add_urls(*command, options->urls);
+  add_seconds(*command, "--timeout", options->timeout,
+              "how long to repeat it for a confirmation (default 2)");
+  add_json(*command, options->json, "print JSON");
+}
+
+}  // namespace r4::tool
