@@ -88,6 +88,9 @@ void BoardLink::feed(const HostHeartbeat& heartbeat, std::uint32_t now_ms) {
     return;
   }
   if (marks_used_ == mark_count) {
+    // Commands from before the oldest mark are late anyway. The window follows it, so that a host
+    // that commanded nothing for hours is not ahead of it.
+    if (has_baseline_ && marks_[0].pnum - newest_ > command_window / 2) spend(marks_[0].pnum);
     for (int i = 1; i < mark_count; ++i) marks_[i - 1] = marks_[i];
     --marks_used_;
   }
