@@ -1,0 +1,459 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Which commands move an output, and what the others are answered.
+#include <gtest/gtest.h>
+
+#include "tests/firmware/board_fixture.hpp"
+
+namespace r4 {
+namespace {
+
+using firmware::BoardState;
+using test::echo_pnum;
+using test::Heard;
+using test::TestBoard;
+using test::TestHost;
+using Lines = std::vector<std::string>;
+
+// A board with an echo host in control.
+struct ApplicationCommand : testing::Test {
+  ApplicationCommand() {
+    host.connect();
+    host.stay(300);
+    forget();
+  }
+  void forget() {
+    board.take();
+    board.log.executed.clear();
+    board.log.refused.clear();
+  }
+  // The code of the answers to the datagrams since forget().
+  Lines answers(int port = 0) {
+    Lines codes;
+    for (const Heard& heard : board.take(MessageKind::nack, port)) {
+      Datagram datagram;
+      Nack nack;
+      EXPECT_TRUE(read(heard.bytes, datagram) && read_nack(datagram, nack));
+      codes.push_back(test::str(name_of(nack.code)));
+    }
+    return codes;
+  }
+
+  TestBoard board;
+  TestHost host{board, echo_pnum, Source{0, 4}};
+};
+
+TEST_F(ApplicationCommand, EveryOutputDoesWhatItIsTold) {
+  for (const char* field : {"O:4095,1,1", "O:1,0,4", "D:7,1,2", "S:2500,16", "R:1,On", "R:8,1",
+                            "R:2,on", "R:2,Off", "P:-100,20000,1", "P:5,4", "B:4095,1,1,3"}) {
+    host.command(field);
+  }
+  EXPECT_EQ(board.log.refused, Lines());
+  firmware::Outputs expected;
+  expected.osmc[0] = {4095, Direction::forward};
+  expected.osmc[3] = {1, Direction::reverse};
+  expected.dhb12[1] = {7, Direction::forward};
+  expected.servo_us[15] = 2500;
+  expected.relays = 0x81;
+  expected.stepper[0].position = -100;
+  expected.stepper[0].speed = 20000;
+  expected.stepper[0].enabled = true;
+  expected.stepper[3].position = 5;
+  expected.stepper[3].speed = 1000;
+  expected.stepper[3].enabled = true;
+  expected.bldc[2] = {4095, Direction::forward, true};
+  EXPECT_EQ(board.outputs(), expected);
+}
+
+TEST_F(ApplicationCommand, RefusesWhatIsNoCommandOfTheBoard) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"X:1", "UNKNOWN"},        {"E:HALT", "UNKNOWN"},         {"H:HELLO", "UNKNOWN"},
+      {"Q:WHO", "UNKNOWN"},      {"O:1,1", "FORMAT"},           {"O:1,1,1,1", "FORMAT"},
+      {"O:a,1,1", "FORMAT"},     {"O:,1,1", "FORMAT"},          {"O:5000,1,1", "RANGE"},
+      {"O:-1,1,1", "RANGE"},     {"O:1,2,1", "RANGE"},          {"O:1,1,5", "CHANNEL"},
+      {"O:1,1,0", "CHANNEL"},    {"D:4096,1,1", "RANGE"},       {"D:1,1,5", "CHANNEL"},
+      {"S:2501,1", "RANGE"},     {"S:1,17", "CHANNEL"},         {"R:9,On", "CHANNEL"},
+      {"R:1,Maybe", "FORMAT"},   {"P:1,0,1", "RANGE"},          {"P:1,20001,1", "RANGE"},
+      {"P:1,5", "CHANNEL"},      {"P:2147483648,1", "RANGE"},   {"Z:5", "CHANNEL"},
+      {"B:4096,1,0,1", "RANGE"}, {"B:1,1,2,1", "RANGE"},        {"B:1,1,1,5", "CHANNEL"},
+      {"U:401,1", "RANGE"},      {"U:1,5", "CHANNEL"},          {"F:", "FORMAT"},
+      {"F:AIN25", "UNKNOWN"},    {"F:AIN24,", "UNKNOWN"},       {"C:colour,red", "UNKNOWN"},
+      {"C:rate,0", "RANGE"},     {"C:rate,fast", "FORMAT"},     {"C:rate", "FORMAT"},
+      {"E:STOP,1", "FORMAT"},    {"O:1,1,1;O:2,1,2", "FORMAT"}, {"O:1,1,1;E:STOP", "FORMAT"},
+  };
+  const Settings before = board.application->settings();
+  for (const auto& [field, code] : cases) {
+    host.command(field);
+    EXPECT_EQ(answers(), Lines{code}) << field;
+  }
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(board.state(), BoardState::active);
+  EXPECT_EQ(board.log.executed.size(), 0U);
+  EXPECT_EQ(board.application->settings().state_rate_hz, before.state_rate_hz);
+}
+
+TEST_F(ApplicationCommand, DropsWhatIsDamaged) {
+  const std::string good = test::with_crc("O:358,1,1;PNum:" + std::to_string(host.pnum) + ";T:1;");
+  for (std::size_t i = 0; i < good.size(); ++i) {
+    for (int bit = 0; bit < 8; ++bit) {
+      std::string bad = good;
+      bad[i] = static_cast<char>(bad[i] ^ (1 << bit));
+      // Capital digits in the checksum are the same checksum.
+      if (i + 10 > good.size() && std::isalpha(good[i]) && bit == 5) continue;
+      board.receive_raw(bad, host.at);
+      ASSERT_TRUE(board.safe()) << bad;
+    }
+    board.receive_raw(good.substr(0, i), host.at);
+    ASSERT_TRUE(board.safe()) << good.substr(0, i);
+  }
+  EXPECT_EQ(answers(), Lines());  // nothing of it is believed, its number neither
+  board.receive_raw(good, host.at);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+}
+
+TEST_F(ApplicationCommand, ExecutesANumberOnce) {
+  const std::uint32_t number = host.command("P:100,1");
+  for (int i = 0; i < 3; ++i) host.resend("P:100,1", number);
+  EXPECT_EQ(board.log.executed, std::vector<std::uint32_t>{number});
+  EXPECT_EQ(answers(), (Lines{"DUPLICATE", "DUPLICATE", "DUPLICATE"}));
+}
+
+TEST_F(ApplicationCommand, KnowsTheLast64NumbersThatItExecuted) {
+  const std::uint32_t first = host.command("S:1,1");
+  for (int i = 0; i < 63; ++i) host.command("S:2,2");
+  host.resend("S:1,1", first);
+  EXPECT_EQ(answers(), Lines{"DUPLICATE"});
+  host.command("S:2,2");
+  host.resend("S:1,1", first);
+  EXPECT_EQ(answers(), Lines{"STALE"});
+}
+
+TEST_F(ApplicationCommand, RefusesWhatANewerOneOvertook) {
+  const std::uint32_t late = host.pnum++;
+  host.command("O:2,1,1");
+  host.resend("O:1,1,1", late);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 2);
+  EXPECT_EQ(answers(), Lines{"STALE"});
+}
+
+TEST_F(ApplicationCommand, RefusesWhatAHeartbeatOvertookMoreThan250MsAgo) {
+  const std::uint32_t in_time = host.pnum++;
+  const std::uint32_t late = host.pnum++;
+  host.echo();
+  board.run(250);
+  host.resend("O:1,1,1", in_time);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 1);
+  board.run(1);
+  host.resend("O:2,1,1", late);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 1);
+  EXPECT_EQ(answers(), Lines{"STALE"});
+}
+
+TEST_F(ApplicationCommand, OvertakenIsOvertakenAtAnyRateOfHeartbeats) {
+  const std::uint32_t late = host.pnum++;
+  for (int ms = 0; ms < 300; ++ms) {  // a heartbeat each millisecond
+    host.echo();
+    board.run(1);
+  }
+  host.resend("O:2,1,1", late);
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(answers(), Lines{"STALE"});
+}
+
+TEST_F(ApplicationCommand, RefusesWhatIsFarAhead) {
+  host.resend("O:1,1,1", host.pnum + 65536);  // the newest spent number is one back
+  EXPECT_EQ(answers(), Lines{"STALE"});
+  host.command("S:1,1");
+  host.resend("O:1,1,1", host.pnum - 1 + 65536);
+  EXPECT_EQ(answers(), Lines());
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 1);
+}
+
+TEST_F(ApplicationCommand, NothingSentBeforeTheSessionWasArmedIsExecuted) {
+  TestBoard fresh;
+  TestHost again(fresh, echo_pnum);
+  again.heartbeat(0);
+  const std::uint32_t early = again.command("O:1,1,1");
+  EXPECT_TRUE(fresh.safe());
+  EXPECT_EQ(fresh.take(MessageKind::nack).size(), 0U);  // dropped and counted, not answered
+  again.echo();
+  again.resend("O:1,1,1", early);
+  EXPECT_TRUE(fresh.safe());
+  EXPECT_EQ(fresh.log.refused, Lines{std::to_string(early) + " STALE"});
+  again.command("O:2,1,1");
+  EXPECT_EQ(fresh.outputs().osmc[0].pwm, 2);
+}
+
+TEST_F(ApplicationCommand, AnEchoOfAnotherBootDoesNotArm) {
+  TestBoard fresh;
+  TestHost again(fresh, echo_pnum);
+  again.heartbeat(0);
+  again.heartbeat(board.newest_t() + 77);
+  again.heartbeat(fresh.now_ms + 1);
+  again.heartbeat(std::uint64_t{fresh.newest_t()} + (std::uint64_t{1} << 32));
+  again.command("O:1,1,1");
+  EXPECT_TRUE(fresh.safe());
+}
+
+TEST_F(ApplicationCommand, NothingSentBeforeAnOutageIsExecutedAfterIt) {
+  const std::uint32_t held_back = host.pnum++;
+  board.run(1500);
+  const std::uint32_t in_between = host.command("O:1,1,1");
+  EXPECT_EQ(answers(), Lines{"SAFE"});
+  host.echo();
+  ASSERT_EQ(board.state(), BoardState::active);
+  host.resend("O:1,1,1", held_back);
+  host.resend("O:1,1,1", in_between);
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(answers(), (Lines{"STALE", "STALE"}));
+}
+
+TEST_F(ApplicationCommand, TellsOfAnExecutedNumberEvenAfterAnOutage) {
+  const std::uint32_t number = host.command("O:1,1,1");
+  board.run(1500);
+  host.resend("O:1,1,1", number);
+  EXPECT_EQ(answers(), Lines{"DUPLICATE"});
+  host.echo();
+  host.resend("O:1,1,1", number);
+  EXPECT_EQ(answers(), Lines{"DUPLICATE"});
+}
+
+TEST_F(ApplicationCommand, ARefusedCommandStaysRefused) {
+  board.hal.inputs.handle_held = false;
+  board.run(10);
+  const std::uint32_t refused = host.command("O:1,1,1");
+  EXPECT_EQ(answers(), Lines{"SAFE"});
+  board.hal.inputs.handle_held = true;
+  board.run(10);
+  ASSERT_EQ(board.state(), BoardState::active);
+  host.resend("O:1,1,1", refused);  // a copy that the network made
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(answers(), Lines{"STALE"});
+}
+
+TEST_F(ApplicationCommand, NeedsANumberForAllButStopHeartbeatAndQuestion) {
+  for (const char* field :
+       {"O:1,1,1;", "E:CLEAR;", "F:ALL;", "C:rate,10;", "X:1;", "O:9999,1,1;"}) {
+    board.receive(field, host.at);
+  }
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(answers(), Lines());
+  EXPECT_EQ(board.application->settings().state_rate_hz, 100);
+  board.receive("Q:ID;", Source{0, 9});
+  EXPECT_EQ(board.take(MessageKind::identity).size(), 1U);
+  board.receive("E:STOP;", Source{0, 9});
+  EXPECT_EQ(board.reason(), SafeReason::stop);
+}
+
+TEST_F(ApplicationCommand, SurvivesTheWrapOfTheHostsNumbers) {
+  TestBoard fresh;
+  TestHost again(fresh, 0xffffffffU - 100);
+  again.connect();
+  for (int i = 0; i < 200; ++i) {
+    again.command("S:" + std::to_string(i + 1) + ",1");
+    ASSERT_EQ(fresh.outputs().servo_us[0], i + 1);
+    if (i % 10 == 0) again.echo();
+    fresh.run(20);
+  }
+  EXPECT_LT(again.pnum, 1000U);
+  EXPECT_EQ(fresh.log.states.size(), 2U);  // one session, never lost
+  // It goes on far behind the wrap, also after an outage.
+  again.pnum = 60'000;
+  again.echo();
+  again.pnum = 120'000;
+  again.echo();
+  fresh.run(1500);
+  again.echo();
+  EXPECT_EQ(fresh.outputs().servo_us[0], 200);
+}
+
+TEST_F(ApplicationCommand, ReportsTheNewestExecutedNumber) {
+  host.command("F:SAFE,CMD");
+  const std::uint32_t number = host.command("O:1,1,1");
+  host.command("O:9999,1,1");
+  board.take();
+  board.run(10);
+  EXPECT_EQ(state_of(board.take(MessageKind::state).back()).last_command, number);
+}
+
+TEST_F(ApplicationCommand, AnswersWhereTheQuestionCameFrom) {
+  TestBoard two(Settings(), 2);
+  TestHost owner(two, echo_pnum, Source{0, 4});
+  owner.connect();
+  two.take(0);
+  two.take(1);
+  two.receive("O:9999,1,1;PNum:5;T:1;", Source{1, 8});
+  two.receive("Q:ID;PNum:6;T:1;", Source{1, 9});
+  owner.command("O:9999,1,1");
+  const std::vector<Heard> first = two.take(0);
+  const std::vector<Heard> second = two.take(1);
+  ASSERT_EQ(first.size(), 1U);
+  EXPECT_EQ(first[0].peer, 4U);
+  ASSERT_EQ(second.size(), 2U);
+  EXPECT_EQ(second[0].kind, MessageKind::nack);
+  EXPECT_EQ(second[0].peer, 8U);
+  EXPECT_EQ(second[1].kind, MessageKind::identity);
+  EXPECT_EQ(second[1].peer, 9U);
+}
+
+TEST_F(ApplicationCommand, AnswersTheQuestionWhoItIsInAnyState) {
+  const std::string answer = "I:R4,1.2.3,R4-7,udp+serial;";
+  TestBoard fresh;
+  fresh.take();
+  fresh.receive("Q:ID;PNum:6;T:1;", Source{0, 9});
+  std::vector<Heard> heard = fresh.take();
+  ASSERT_EQ(heard.size(), 1U);
+  EXPECT_EQ(heard[0].bytes.rfind(answer, 0), 0U);
+  EXPECT_EQ(fresh.state(), BoardState::connecting);
+
+  board.run(1500);
+  board.take();
+  host.command("Q:ID");
+  heard = board.take(MessageKind::identity);
+  ASSERT_EQ(heard.size(), 1U);
+  EXPECT_EQ(heard[0].bytes.rfind(answer, 0), 0U);
+}
+
+TEST_F(ApplicationCommand, ListensToNoOtherBoard) {
+  for (const char* fields : {"H:R4-ROS2;PNum:1;T:1;", "N:5,SAFE;PNum:1;T:1;",
+                             "I:R4,1,2,3;PNum:1;T:1;", "AIN24:24.28;PNum:1;T:1;", "PNum:1;T:1;"}) {
+    board.receive(fields, host.at);
+  }
+  EXPECT_EQ(board.take(MessageKind::nack).size(), 0U);
+  EXPECT_EQ(board.log.executed.size(), 0U);
+  // Nor do such datagrams feed.
+  board.run(900);
+  board.receive("H:R4-ROS2;PNum:1;T:1;", host.at);
+  board.run(100);
+  EXPECT_EQ(board.reason(), SafeReason::link);
+}
+
+// --- settings
+
+TEST_F(ApplicationCommand, SettingsTakeEffectAtOnce) {
+  host.command("C:rate,1000");
+  board.run(10);
+  board.take();
+  board.run(100);
+  EXPECT_EQ(board.take(MessageKind::state).size(), 100U);
+
+  host.command("C:timeout,200");
+  EXPECT_EQ(answers(), Lines{"RANGE"});  // not above the heartbeat's interval
+  host.command("C:heartbeat,50");
+  host.command("C:timeout,200");
+  host.echo();
+  board.run(1);
+  host.echo();
+  board.run(199);
+  EXPECT_EQ(board.state(), BoardState::active);
+  board.run(1);
+  EXPECT_EQ(board.reason(), SafeReason::link);
+}
+
+TEST_F(ApplicationCommand, TheHeartbeatIntervalFollowsItsSetting) {
+  TestHost paper(board, 7, Source{0, 4});
+  board.run(1500);
+  paper.heartbeat(5);
+  board.run(1);
+  paper.command("C:heartbeat,90");
+  board.run(200);
+  board.take();
+  for (int i = 0; i < 10; ++i) {
+    paper.heartbeat(6);
+    board.run(90);
+  }
+  EXPECT_EQ(board.take(MessageKind::board_heartbeat).size(), 10U);
+}
+
+TEST_F(ApplicationCommand, RecoveryFollowsItsSetting) {
+  host.command("O:358,1,1");
+  host.command("C:recovery,rearm");
+  board.run(1500);
+  host.echo();
+  EXPECT_EQ(board.state(), BoardState::active);
+  EXPECT_TRUE(board.safe());
+}
+
+TEST_F(ApplicationCommand, SettingsOutlastTheSession) {
+  host.command("C:rate,10");
+  host.command("U:30,1");
+  board.run(1500);
+  TestHost other(board, echo_pnum + 100'000'000, Source{0, 6});
+  other.connect();
+  EXPECT_EQ(board.application->settings().state_rate_hz, 10);
+  board.hal.inputs.ultrasonic_cm[0] = 20;
+  board.run(10);
+  EXPECT_EQ(board.reason(), SafeReason::proximity);
+}
+
+TEST_F(ApplicationCommand, ZeroCountsAnewAndHoldsTheStepper) {
+  host.command("P:1000,2");
+  host.command("Z:2");
+  EXPECT_EQ(board.hal.zeroed, std::vector<int>{2});
+  EXPECT_FALSE(board.outputs().stepper[1].enabled);
+  host.command("Z:9");
+  EXPECT_EQ(board.hal.zeroed.size(), 1U);
+}
+
+TEST_F(ApplicationCommand, CountsWhatItReceives) {
+  host.command("F:RXOK,RXCRC,RXLOST,RXDUP,RXREF");
+  board.take();
+  board.run(10);
+  const State before = state_of(board.take(MessageKind::state).back());
+  const std::uint32_t number = host.command("S:1,1");
+  host.resend("S:1,1", number);
+  host.pnum += 3;
+  host.command("S:9999,1");
+  board.receive_raw("noise", host.at);
+  board.run(10);
+  const State after = state_of(board.take(MessageKind::state).back());
+  EXPECT_EQ(after.rx_ok - before.rx_ok, 3U);
+  EXPECT_EQ(after.rx_crc - before.rx_crc, 1U);
+  EXPECT_EQ(after.rx_lost - before.rx_lost, 3U);
+  EXPECT_EQ(after.rx_duplicate - before.rx_duplicate, 1U);
+  EXPECT_EQ(after.rx_refused - before.rx_refused, 2U);
+}
+
+// --- hosts that do not number their heartbeats, as in the paper's capture
+
+TEST(ApplicationNumberless, IsRestoredAfterAnOutageAndGoesOn) {
+  TestBoard board;
+  board.receive("H:ROS2-R4;T:1;");
+  board.receive("O:358,1,1;PNum:6600;T:1;");
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+  board.run(1500);
+  board.receive("H:ROS2-R4;T:1;");
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+  board.receive("O:1,1,1;PNum:6600;T:1;");
+  board.receive("O:2,1,1;PNum:6599;T:1;");
+  EXPECT_EQ(board.log.refused, (Lines{"6600 DUPLICATE", "6599 STALE"}));
+  board.receive("O:3,1,1;PNum:6601;T:1;");
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 3);
+}
+
+TEST(ApplicationNumberless, MayBeginAgainAfterAnOutageWithNothingOfTheOldLeft) {
+  TestBoard board;
+  board.receive("H:ROS2-R4;T:1;");
+  board.receive("O:358,1,1;PNum:6600;T:1;");
+  board.run(1500);
+  board.receive("H:ROS2-R4;T:1;");
+  board.receive("S:1500,1;PNum:0;T:1;");
+  EXPECT_EQ(board.outputs().servo_us[0], 1500);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 0);
+  board.receive("S:1600,1;PNum:0;T:1;");
+  board.receive("O:1,1,1;PNum:6601;T:1;");  // within the window of the new numbers, and not used
+  EXPECT_EQ(board.log.refused, Lines{"0 DUPLICATE"});
+  board.receive("S:1700,1;PNum:1;T:1;");
+  EXPECT_EQ(board.log.refused.back(), "1 STALE");
+}
+
+TEST(ApplicationNumberless, MayNotBeginAgainWithoutAnOutage) {
+  TestBoard board;
+  board.receive("H:ROS2-R4;T:1;");
+  board.receive("O:358,1,1;PNum:6600;T:1;");
+  board.receive("O:1,1,1;PNum:0;T:1;");
+  EXPECT_EQ(board.log.refused, Lines{"0 STALE"});
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+}
+
+}  // namespace
+}  // namespace r4

@@ -1,0 +1,466 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Who controls the board and how the link comes, goes and comes back.
+#include <gtest/gtest.h>
+
+#include "tests/firmware/board_fixture.hpp"
+
+namespace r4 {
+namespace {
+
+using firmware::BoardState;
+using test::echo_pnum;
+using test::Heard;
+using test::TestBoard;
+using test::TestHost;
+using Lines = std::vector<std::string>;
+
+TEST(ApplicationLink, SendsThePapersHeartbeatWhileConnecting) {
+  TestBoard board;
+  board.run(2000);
+  const std::vector<Heard> heard = board.take();
+  ASSERT_EQ(heard.size(), 5U);
+  for (std::size_t i = 0; i < heard.size(); ++i) {
+    EXPECT_EQ(heard[i].bytes, "H:R4-ROS2;PNum:0;T:0;^0xb10b3a06^");
+    EXPECT_EQ(heard[i].at_ms, 500'000 + 500 * i);
+    EXPECT_EQ(heard[i].peer, firmware::everyone);
+  }
+  EXPECT_EQ(board.state(), BoardState::connecting);
+  EXPECT_EQ(board.hal.made_safe, 1);
+}
+
+TEST(ApplicationLink, StreamsFromTheFirstHostHeartbeatOn) {
+  TestBoard board;
+  TestHost host(board, echo_pnum);
+  board.run(777);
+  board.take();
+  host.heartbeat(0);
+  const std::vector<Heard> heard = board.take();
+  ASSERT_EQ(heard.size(), 2U);
+  EXPECT_EQ(heard[0].kind, MessageKind::state);
+  EXPECT_EQ(heard[0].pnum, 1U);
+  EXPECT_EQ(heard[0].t_ms, board.now_ms);
+  EXPECT_EQ(heard[1].kind, MessageKind::board_heartbeat);
+  EXPECT_EQ(heard[1].pnum, 2U);
+  EXPECT_EQ(heard[1].t_ms, board.now_ms);
+  EXPECT_EQ(board.log.states, (Lines{"CONNECTING none", "ACTIVE none"}));
+}
+
+TEST(ApplicationLink, HearsAPaperHostsHeartbeatWithoutNumberOrTime) {
+  for (const char* fields : {"H:ROS2-R4;", "H:ROS2-R4;T:79201;", "H:ROS2-R4;PNum:1;",
+                             "T:5;PNum:1;H:ROS2-R4;", "X:1;H:ROS2-R4;"}) {
+    TestBoard board;
+    board.receive(fields);
+    const bool expected = std::string(fields).rfind("X", 0) != 0;  // two command fields are none
+    EXPECT_EQ(board.state() == BoardState::active, expected) << fields;
+  }
+}
+
+TEST(ApplicationLink, GoesSafeExactlyAtTheTimeout) {
+  TestBoard board;
+  TestHost host(board, echo_pnum);
+  host.connect();
+  host.stay(300);
+  host.command("O:358,1,1");
+  host.echo();
+  board.run(999);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+  board.run(1);
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(board.log.states.back(), "SAFE link");
+  EXPECT_EQ(board.log.state_ms, board.now_ms);
+}
+
+TEST(ApplicationLink, AsksToBePolledInTimeForTheTimeout) {
+  Settings settings;
+  settings.timeout_ms = 137;
+  settings.heartbeat_ms = 50;
+  settings.state_rate_hz = 1;
+  TestBoard board(settings);
+  TestHost host(board, 1);
+  host.heartbeat(5);
+  const std::uint32_t fed = board.now_ms;
+  board.run(1000);  // polls only as told
+  EXPECT_EQ(board.log.states.back(), "SAFE link");
+  EXPECT_EQ(board.log.state_ms - fed, 137U);
+}
+
+TEST(ApplicationLink, SilenceCountsBeforeTheHeartbeatThatEndsIt) {
+  TestBoard board;
+  TestHost host(board, 1);
+  host.heartbeat(5);
+  host.command("O:358,1,1");
+  board.now_ms += 5000;  // the board was held up: nothing was polled
+  host.heartbeat(6);
+  EXPECT_EQ(board.log.states,
+            (Lines{"CONNECTING none", "ACTIVE none", "SAFE link", "ACTIVE none"}));
+  EXPECT_EQ(board.hal.made_safe, 2);
+}
+
+TEST(ApplicationLink, ACommandAfterTheSilenceComesTooLate) {
+  TestBoard board;
+  TestHost host(board, 1);
+  host.heartbeat(5);
+  board.now_ms += 1000;
+  host.command("O:358,1,1");
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(board.log.refused, (Lines{"2 SAFE"}));
+}
+
+TEST(ApplicationLink, SendsHeartbeatsOnlyWhileTheLinkIsLost) {
+  TestBoard board;
+  TestHost host(board, echo_pnum);
+  host.connect();
+  board.run(1000);
+  board.take();
+  const std::uint32_t lost = board.now_ms;
+  board.run(2000);
+  const std::vector<Heard> heard = board.take();
+  ASSERT_EQ(heard.size(), 4U);
+  for (std::size_t i = 0; i < heard.size(); ++i) {
+    EXPECT_EQ(heard[i].kind, MessageKind::board_heartbeat);
+    EXPECT_EQ(heard[i].t_ms, lost + 500 * (i + 1));
+    EXPECT_NE(heard[i].bytes.find(";SAFE:1;"), std::string::npos);
+  }
+}
+
+TEST(ApplicationLink, SendsAHeartbeatAtOnceWhenTheLinkIsLost) {
+  TestBoard board;
+  TestHost host(board, echo_pnum);
+  host.connect();
+  board.run(999);
+  board.take();
+  board.run(1);
+  const std::vector<Heard> heard = board.take();
+  ASSERT_FALSE(heard.empty());
+  EXPECT_EQ(heard.back().kind, MessageKind::board_heartbeat);
+  EXPECT_EQ(heard.back().t_ms, board.now_ms);
+}
+
+TEST(ApplicationLink, RepeatsItsHeartbeatWhileAnEchoStaysAway) {
+  TestBoard board;
+  TestHost host(board, echo_pnum);
+  host.connect();
+  host.stay(400);
+  board.take();
+  host.echo();
+  const std::uint32_t start = board.now_ms;
+  board.run(550);
+  std::vector<std::uint32_t> times;
+  for (const Heard& heard : board.take(MessageKind::board_heartbeat)) {
+    times.push_back(heard.at_ms - start);
+  }
+  // The regular one at 100 is not echoed.
+  EXPECT_EQ(times, (std::vector<std::uint32_t>{100, 200, 300, 400, 500}));
+}
+
+TEST(ApplicationLink, KeepsTwoHeartbeatsASecondForAPaperHost) {
+  TestBoard board;
+  TestHost host(board, 1);
+  host.heartbeat(1);
+  board.take();
+  for (int i = 0; i < 20; ++i) {
+    host.heartbeat(static_cast<std::uint64_t>(i) + 2);
+    board.run(100);
+  }
+  EXPECT_EQ(board.take(MessageKind::board_heartbeat).size(), 4U);
+}
+
+TEST(ApplicationLink, LosesTheLinkWithTheOwnersTransport) {
+  TestBoard board(Settings(), 2);
+  TestHost host(board, echo_pnum, Source{1, 4});
+  host.connect();
+  host.command("O:358,1,1");
+  board.application->port_down(0, board.now_ms);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+  board.application->port_down(1, board.now_ms);
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(board.log.states.back(), "SAFE link");
+}
+
+// --- recovery
+
+TEST(ApplicationLink, RestoresTheOutputsForTheSameHost) {
+  TestBoard board;
+  TestHost host(board, echo_pnum);
+  host.connect();
+  host.command("O:358,1,1");
+  host.command("F:AIN24");
+  board.run(1500);
+  EXPECT_TRUE(board.safe());
+  host.echo();
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+  EXPECT_EQ(board.log.states.back(), "ACTIVE none");
+  board.take();
+  board.run(10);
+  const State state = state_of(board.take(MessageKind::state).back());
+  EXPECT_FALSE(state.present.has(StateField::ain12));  // the selection is the session's
+}
+
+TEST(ApplicationLink, RearmKeepsTheOutputsOffUntilAFreshCommand) {
+  Settings settings;
+  settings.recovery = Recovery::rearm;
+  TestBoard board(settings);
+  TestHost host(board, echo_pnum);
+  host.connect();
+  host.command("O:358,1,1");
+  host.command("S:1500,2");
+  board.run(1500);
+  host.echo();
+  EXPECT_EQ(board.log.states.back(), "ACTIVE none");
+  EXPECT_TRUE(board.safe());
+  host.command("S:1600,2");
+  EXPECT_EQ(board.outputs().servo_us[1], 1600);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 0);
+}
+
+TEST(ApplicationLink, RestoresNothingForAnotherHost) {
+  TestBoard board;
+  TestHost first(board, echo_pnum, Source{0, 1});
+  first.connect();
+  first.command("O:358,1,1");
+  board.run(1500);
+  TestHost second(board, echo_pnum + 100'000'000, Source{0, 2});
+  second.connect();
+  EXPECT_EQ(board.log.states.back(), "ACTIVE none");
+  EXPECT_TRUE(board.safe());
+  first.command("O:1,1,1");
+  EXPECT_EQ(board.log.refused.back(), std::to_string(first.pnum - 1) + " BUSY");
+}
+
+TEST(ApplicationLink, RestoresNothingForARestartedHost) {
+  TestBoard board;
+  TestHost host(board, echo_pnum);
+  host.connect();
+  host.command("O:358,1,1");
+  board.run(1500);
+  TestHost restarted(board, echo_pnum + 100'000'000);
+  restarted.connect();
+  EXPECT_EQ(board.log.states.back(), "ACTIVE none");
+  EXPECT_TRUE(board.safe());
+  restarted.command("O:400,1,1");
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 400);
+}
+
+TEST(ApplicationLink, ARestartIsNoticedAtOnceAndMakesTheOutputsSafe) {
+  TestBoard board;
+  TestHost host(board, echo_pnum);
+  host.connect();
+  host.stay(200);
+  host.command("O:358,1,1");
+  host.command("F:AIN24");
+  TestHost restarted(board, echo_pnum + 100'000'000);
+  restarted.heartbeat(0);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);  // nothing is proven yet
+  board.run(1);
+  restarted.echo();
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(board.state(), BoardState::active);
+  board.take();
+  board.run(10);
+  const State state = state_of(board.take(MessageKind::state).back());
+  EXPECT_TRUE(state.present.has(StateField::ain12));  // the default selection again
+}
+
+TEST(ApplicationLink, AnswersAHostThatHasNothingToEcho) {
+  TestBoard board;
+  TestHost host(board, echo_pnum, Source{0, 1});
+  host.connect();
+  host.stay(200);
+  board.take();
+
+  // The owner began again: a heartbeat for it to echo.
+  TestHost restarted(board, echo_pnum + 100'000'000, Source{0, 1});
+  restarted.heartbeat(0);
+  EXPECT_EQ(board.take(MessageKind::board_heartbeat).size(), 1U);
+
+  // While the link is lost, to any host, wherever it is.
+  board.run(1500);
+  board.take();
+  TestHost other(board, echo_pnum + 200'000'000, Source{0, 9});
+  other.heartbeat(0);
+  const std::vector<Heard> heard = board.take(MessageKind::board_heartbeat);
+  ASSERT_EQ(heard.size(), 1U);
+  EXPECT_EQ(heard[0].peer, 9U);
+  EXPECT_EQ(heard[0].t_ms, board.now_ms);
+}
+
+TEST(ApplicationLink, AnswersAHostThatEchoesWhatIsPast) {
+  // After a reboot of the board.
+  TestBoard board;
+  TestHost host(board, echo_pnum, Source{0, 3});
+  board.take();
+  host.heartbeat(123456);
+  EXPECT_EQ(board.state(), BoardState::connecting);
+  std::vector<Heard> heard = board.take();
+  ASSERT_EQ(heard.size(), 1U);
+  EXPECT_EQ(heard[0].bytes, "H:R4-ROS2;PNum:0;T:0;^0xb10b3a06^");
+  EXPECT_EQ(heard[0].peer, 3U);
+
+  // After an outage.
+  host.connect();
+  const std::uint32_t old_t = board.newest_t();
+  board.run(1500);
+  board.take();
+  host.heartbeat(old_t);
+  EXPECT_EQ(board.state(), BoardState::safe);
+  EXPECT_EQ(board.take(MessageKind::board_heartbeat).size(), 1U);
+}
+
+TEST(ApplicationLink, DoesNotFillTheLineWithAnswers) {
+  TestBoard board;
+  TestHost host(board, echo_pnum);
+  host.connect();
+  board.run(1500);
+  board.take();
+  for (int ms = 0; ms < 100; ++ms) {
+    host.heartbeat(0);
+    host.heartbeat(0);
+    board.run(1);
+  }
+  EXPECT_LE(board.take(MessageKind::board_heartbeat).size(), 6U);
+}
+
+TEST(ApplicationLink, KeepsSendingToEveryoneWhileOneHostAsks) {
+  TestBoard board(Settings(), 2);
+  TestHost host(board, echo_pnum);
+  host.connect();
+  board.run(1500);
+  board.take(1);
+  TestHost deaf(board, echo_pnum + 100'000'000, Source{0, 5});
+  for (int i = 0; i < 20; ++i) {
+    deaf.heartbeat(0);
+    board.run(100);
+  }
+  EXPECT_EQ(board.take(MessageKind::board_heartbeat, 1).size(), 4U);
+}
+
+// --- several hosts and ports
+
+TEST(ApplicationLink, AnswersBusyToOtherHosts) {
+  TestBoard board;
+  TestHost owner(board, echo_pnum, Source{0, 1});
+  TestHost other(board, echo_pnum + 100'000'000, Source{0, 2});
+  owner.connect();
+  owner.stay(200);
+  board.take();
+  const std::uint32_t heartbeat = other.heartbeat(0);
+  const std::uint32_t command = other.command("O:358,1,1");
+  board.receive("H:ROS2-R4;T:1;", Source{0, 2});  // nothing to answer to
+  const std::vector<Heard> heard = board.take(MessageKind::nack);
+  ASSERT_EQ(heard.size(), 2U);
+  EXPECT_EQ(heard[0].bytes.rfind("N:" + std::to_string(heartbeat) + ",BUSY;", 0), 0U);
+  EXPECT_EQ(heard[1].bytes.rfind("N:" + std::to_string(command) + ",BUSY;", 0), 0U);
+  for (const Heard& one : heard) EXPECT_EQ(one.peer, 2U);
+  EXPECT_TRUE(board.safe());
+  // Others do not feed.
+  for (int i = 0; i < 15; ++i) {
+    other.heartbeat(board.newest_t());
+    board.run(100);
+  }
+  EXPECT_EQ(board.log.states[2], "SAFE link");
+}
+
+TEST(ApplicationLink, TheSamePeerNumberOnAnotherPortIsAnotherHost) {
+  TestBoard board(Settings(), 2);
+  TestHost owner(board, echo_pnum, Source{0, 1});
+  TestHost other(board, echo_pnum + 50, Source{1, 1});
+  owner.connect();
+  other.command("O:358,1,1");
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(board.take(MessageKind::nack, 1).size(), 1U);
+  EXPECT_EQ(board.take(MessageKind::nack, 0).size(), 0U);
+}
+
+TEST(ApplicationLink, AnswersToOthersDoNotCountInTheOwnersNumbers) {
+  TestBoard board;
+  TestHost owner(board, echo_pnum, Source{0, 1});
+  TestHost other(board, echo_pnum + 100'000'000, Source{0, 2});
+  owner.connect();
+  for (int i = 0; i < 50; ++i) {
+    other.command("Q:ID");
+    other.heartbeat(0);
+    other.command("E:CLEAR");
+    owner.command("Q:ID");
+    owner.echo();
+    board.run(10);
+  }
+  std::uint32_t next = 0;
+  for (const Heard& heard : board.take()) {
+    if (heard.peer != 1 || heard.t_ms == 0) continue;
+    if (next != 0) {
+      EXPECT_EQ(heard.pnum, next);
+    }
+    next = heard.pnum + 1;
+  }
+  EXPECT_GT(next, 100U);
+}
+
+TEST(ApplicationLink, StreamsOnEveryPortWithNumbersOfItsOwn) {
+  TestBoard board(Settings(), 3);
+  TestHost owner(board, echo_pnum, Source{1, 6});
+  owner.connect();
+  owner.stay(200);
+  for (int port = 0; port < 3; ++port) {
+    std::uint32_t next = 0;
+    std::size_t states = 0;
+    for (const Heard& heard : board.take(port)) {
+      if (heard.t_ms == 0) continue;  // from before the session
+      if (next != 0) {
+        EXPECT_EQ(heard.pnum, next);
+      }
+      next = heard.pnum + 1;
+      states += heard.kind == MessageKind::state;
+      EXPECT_EQ(heard.peer, port == 1 ? 6U : firmware::everyone);
+    }
+    EXPECT_EQ(states, 21U) << "port " << port;
+  }
+}
+
+TEST(ApplicationLink, TheFirstNumberOfASessionIsOneOnEveryPort) {
+  TestBoard board(Settings(), 2);
+  TestHost owner(board, echo_pnum);
+  owner.heartbeat(0);
+  EXPECT_EQ(board.take(MessageKind::state, 0)[0].pnum, 1U);
+  EXPECT_EQ(board.take(MessageKind::state, 1)[0].pnum, 1U);
+}
+
+TEST(ApplicationLink, ItsHeartbeatsTimeWrapsWithTheClock) {
+  TestBoard board(Settings(), 1, 0xffffffffU - 1500);
+  TestHost host(board, echo_pnum);
+  host.connect();
+  host.command("O:358,1,1");
+  host.stay(4000);
+  EXPECT_LT(board.now_ms, 10'000U);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+  EXPECT_EQ(board.log.states.size(), 2U);  // never lost
+  host.echo();
+  board.run(1000);
+  EXPECT_EQ(board.log.states.back(), "SAFE link");
+}
+
+// The paper's Python client: T before PNum, its own clock in seconds, an answer to each heartbeat.
+TEST(ApplicationLink, ServesThePapersPythonClient) {
+  TestBoard board;
+  std::uint32_t pnum = 0;
+  for (int ms = 0; ms < 10'000; ++ms) {
+    for (const Heard& heard : board.take()) {
+      const std::string t = std::to_string(4000 + ms / 1000);
+      auto send = [&](const std::string& field) {
+        board.receive(field + ";T:" + t + ";PNum:" + std::to_string(pnum++) + ";");
+      };
+      if (heard.kind == MessageKind::board_heartbeat) send("H:ROS2-R4");
+      for (const char* field : {"D:1000,1,1", "D:1000,0,2", "D:1000,1,3", "D:1000,0,4", "S:300,1",
+                                "S:100,2", "S:1000,3"}) {
+        send(field);
+      }
+    }
+    board.run(1);
+  }
+  EXPECT_EQ(board.log.states, (Lines{"CONNECTING none", "ACTIVE none"}));
+  EXPECT_EQ(board.outputs().dhb12[2].pwm, 1000);
+  EXPECT_EQ(board.outputs().servo_us[2], 1000);
+  EXPECT_GT(board.log.executed.size(), 6900U);
+}
+
+}  // namespace
+}  // namespace r4

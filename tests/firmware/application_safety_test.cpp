@@ -1,0 +1,377 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Every cause of the safe state: how it enters, what it leaves behind, how it leaves.
+#include <gtest/gtest.h>
+
+#include "tests/firmware/board_fixture.hpp"
+
+namespace r4 {
+namespace {
+
+using firmware::BoardState;
+using test::echo_pnum;
+using test::Heard;
+using test::TestBoard;
+using test::TestHost;
+using Lines = std::vector<std::string>;
+
+// A board whose host drives motor 1.
+struct ApplicationSafety : testing::Test {
+  ApplicationSafety() {
+    host.connect();
+    host.stay(300);
+    host.command("O:358,1,1");
+    EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+    board.take();
+    board.log.states.clear();
+  }
+  void distance(int cm) {
+    board.hal.inputs.ultrasonic_cm[0] = static_cast<std::uint16_t>(cm);
+    board.run(10);
+  }
+  void handle(bool held) {
+    board.hal.inputs.handle_held = held;
+    board.run(10);
+  }
+  // Nothing comes back by itself, whatever the host does but command.
+  void expect_nothing_restored() {
+    host.stay(200);
+    EXPECT_EQ(board.state(), BoardState::active);
+    EXPECT_TRUE(board.safe());
+    host.command("S:1500,1");
+    EXPECT_EQ(board.outputs().servo_us[0], 1500);
+    EXPECT_EQ(board.outputs().osmc[0].pwm, 0);
+  }
+
+  TestBoard board;
+  TestHost host{board, echo_pnum, Source{0, 4}};
+};
+
+// --- stop
+
+TEST_F(ApplicationSafety, AStopIsLatchedUntilItIsCleared) {
+  host.command("E:STOP");
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(board.log.states, Lines{"SAFE stop"});
+  host.stay(1000);
+  host.command("O:1,1,1");
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(board.log.refused.size(), 1U);
+  host.command("E:CLEAR");
+  EXPECT_EQ(board.log.states, (Lines{"SAFE stop", "ACTIVE none"}));
+  expect_nothing_restored();
+}
+
+TEST_F(ApplicationSafety, AStopIsObeyedFromAnyone) {
+  board.receive("E:STOP;PNum:1;T:1;", Source{0, 99});
+  EXPECT_TRUE(board.safe());
+  host.command("E:CLEAR");
+  host.command("O:1,1,1");
+  EXPECT_FALSE(board.safe());
+  board.receive("E:STOP;", Source{0, 99});  // without a number
+  EXPECT_TRUE(board.safe());
+}
+
+TEST_F(ApplicationSafety, AStopIsObeyedHoweverOldItIs) {
+  const std::uint32_t old = host.pnum++;
+  for (int i = 0; i < 100; ++i) host.command("S:1,1");
+  host.stay(500);
+  host.resend("E:STOP", old);
+  EXPECT_TRUE(board.safe());
+  host.command("E:CLEAR");
+  host.command("O:1,1,1");
+  host.resend("E:STOP", old);  // and however often it comes
+  EXPECT_TRUE(board.safe());
+}
+
+TEST_F(ApplicationSafety, AStopOvertakesTheCommandsBeforeIt) {
+  const std::uint32_t before = host.pnum++;
+  host.command("E:STOP");
+  host.command("E:CLEAR");
+  host.resend("O:1,1,1", before);
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(board.log.refused, Lines{std::to_string(before) + " STALE"});
+}
+
+TEST_F(ApplicationSafety, AStopIsAnsweredToEveryoneAndToWhoAsked) {
+  TestBoard two(Settings(), 2);
+  TestHost owner(two, echo_pnum, Source{0, 4});
+  owner.connect();
+  two.take(0);
+  two.take(1);
+  two.receive("E:STOP;PNum:1;T:1;", Source{1, 99});
+  std::vector<Heard> first = two.take(0);
+  std::vector<Heard> second = two.take(1);
+  ASSERT_EQ(first.size(), 1U);
+  EXPECT_EQ(first[0].peer, 4U);
+  ASSERT_EQ(second.size(), 2U);
+  EXPECT_EQ(second[0].peer, firmware::everyone);
+  EXPECT_EQ(second[1].peer, 99U);
+  for (const Heard& heard : {first[0], second[0], second[1]}) {
+    EXPECT_EQ(heard.kind, MessageKind::board_heartbeat);
+    EXPECT_NE(heard.bytes.find(";SAFE:2;"), std::string::npos);
+  }
+  // Each repetition is answered to its sender, so that it learns of it on a bad line.
+  two.receive("E:STOP;PNum:1;T:1;", Source{1, 99});
+  two.receive("E:STOP;PNum:1;T:1;", Source{0, 4});
+  first = two.take(0);
+  second = two.take(1);
+  ASSERT_EQ(first.size(), 1U);
+  EXPECT_EQ(first[0].peer, 4U);
+  ASSERT_EQ(second.size(), 1U);
+  EXPECT_EQ(second[0].peer, 99U);
+}
+
+TEST_F(ApplicationSafety, AStopIsObeyedBeforeThereIsAHost) {
+  TestBoard fresh;
+  fresh.receive("E:STOP;PNum:1;T:1;", Source{0, 99});
+  EXPECT_EQ(fresh.reason(), SafeReason::stop);
+  EXPECT_EQ(fresh.state(), BoardState::connecting);
+  TestHost first(fresh, echo_pnum);
+  first.connect();
+  EXPECT_EQ(fresh.log.states.back(), "SAFE stop");
+  first.command("O:1,1,1");
+  EXPECT_TRUE(fresh.safe());
+  first.command("E:CLEAR");
+  first.command("O:1,1,1");
+  EXPECT_FALSE(fresh.safe());
+}
+
+TEST_F(ApplicationSafety, AStopIsObeyedWhileTheLinkIsLost) {
+  board.run(1500);
+  EXPECT_EQ(board.reason(), SafeReason::link);
+  board.receive("E:STOP;PNum:1;T:1;", Source{0, 99});
+  EXPECT_EQ(board.reason(), SafeReason::stop);
+  host.echo();
+  EXPECT_EQ(board.reason(), SafeReason::stop);
+  EXPECT_TRUE(board.safe());
+  host.command("E:CLEAR");
+  expect_nothing_restored();
+}
+
+TEST_F(ApplicationSafety, OnlyTheOwnerClears) {
+  host.command("E:STOP");
+  board.receive("E:CLEAR;PNum:9;T:1;", Source{0, 99});
+  EXPECT_EQ(board.reason(), SafeReason::stop);
+  EXPECT_EQ(board.log.refused, Lines{"9 BUSY"});
+}
+
+TEST_F(ApplicationSafety, ANewHostDoesNotClearByTakingControl) {
+  host.command("E:STOP");
+  board.run(1500);
+  TestHost other(board, echo_pnum + 100'000'000, Source{0, 5});
+  other.connect();
+  EXPECT_EQ(board.reason(), SafeReason::stop);
+}
+
+TEST_F(ApplicationSafety, ARepeatedClearDoesNotClearALaterStop) {
+  host.command("E:STOP");
+  const std::uint32_t clear = host.command("E:CLEAR");
+  host.command("E:STOP");
+  host.resend("E:CLEAR", clear);
+  EXPECT_EQ(board.reason(), SafeReason::stop);
+}
+
+TEST_F(ApplicationSafety, ClearTakesAwayOnlyWhatIsReported) {
+  board.application->fail(SafeReason::watchdog, board.now_ms);
+  board.application->fail(SafeReason::fault, board.now_ms);
+  host.command("E:STOP");
+  handle(false);
+  EXPECT_EQ(board.reason(), SafeReason::stop);
+  for (const SafeReason left :
+       {SafeReason::fault, SafeReason::watchdog, SafeReason::handle, SafeReason::handle}) {
+    host.command("E:CLEAR");
+    EXPECT_EQ(board.reason(), left);
+    EXPECT_TRUE(board.safe());
+  }
+  handle(true);
+  expect_nothing_restored();
+}
+
+TEST_F(ApplicationSafety, StateKeepsComingWhileStopped) {
+  host.command("E:STOP");
+  board.take();
+  host.stay(100);
+  const std::vector<Heard> heard = board.take(MessageKind::state);
+  EXPECT_EQ(heard.size(), 10U);
+  const State state = state_of(heard.back());
+  EXPECT_EQ(state.safe, SafeReason::stop);
+  EXPECT_EQ(state.osmc[0].pwm, 0);  // as it is, not as it was commanded
+}
+
+// --- fault and watchdog
+
+TEST_F(ApplicationSafety, AFaultIsLatchedAndLeavesNothing) {
+  for (const SafeReason cause : {SafeReason::fault, SafeReason::watchdog}) {
+    host.command("O:358,1,1");
+    EXPECT_FALSE(board.safe());
+    board.application->fail(cause, board.now_ms);
+    EXPECT_TRUE(board.safe());
+    EXPECT_EQ(board.reason(), cause);
+    host.stay(500);
+    EXPECT_EQ(board.reason(), cause);
+    host.command("E:CLEAR");
+    expect_nothing_restored();
+  }
+}
+
+// --- handle
+
+TEST_F(ApplicationSafety, AReleasedHandleIsSafeUntilItIsHeldAgain) {
+  handle(false);
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(board.log.states, Lines{"SAFE handle"});
+  host.command("O:1,1,1");
+  EXPECT_TRUE(board.safe());
+  host.command("E:CLEAR");  // clears no handle
+  EXPECT_EQ(board.reason(), SafeReason::handle);
+  handle(true);
+  EXPECT_EQ(board.log.states, (Lines{"SAFE handle", "ACTIVE none"}));
+  expect_nothing_restored();
+}
+
+TEST_F(ApplicationSafety, AReleasedHandleIsNoticedWithin10Ms) {
+  board.run(3);
+  board.hal.inputs.handle_held = false;
+  board.run(10);
+  EXPECT_TRUE(board.safe());
+}
+
+TEST_F(ApplicationSafety, AHandleReleasedSinceTheLastLookStopsTheNextCommand) {
+  board.hal.inputs.handle_held = false;
+  host.command("O:400,1,1");
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(board.reason(), SafeReason::handle);
+}
+
+TEST_F(ApplicationSafety, AHandleReleasedBeforeTheHostComesKeepsItSafe) {
+  TestBoard fresh;
+  fresh.hal.inputs.handle_held = false;
+  fresh.run(20);
+  TestHost first(fresh, echo_pnum);
+  first.connect();
+  first.command("O:1,1,1");
+  EXPECT_TRUE(fresh.safe());
+  EXPECT_EQ(fresh.log.states.back(), "SAFE handle");
+}
+
+TEST_F(ApplicationSafety, AHandleReleasedDuringAnOutageLeavesNothing) {
+  board.run(1500);
+  handle(false);
+  EXPECT_EQ(board.reason(), SafeReason::handle);
+  handle(true);
+  EXPECT_EQ(board.reason(), SafeReason::link);
+  host.echo();
+  expect_nothing_restored();
+}
+
+TEST_F(ApplicationSafety, AHandleReleasedAtTheMomentOfRecoveryLeavesNothing) {
+  board.run(1500);
+  board.hal.inputs.handle_held = false;
+  const int changes = board.log.outputs;
+  host.echo();
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(board.log.outputs, changes);  // not for an instant
+  handle(true);
+  expect_nothing_restored();
+}
+
+// --- proximity
+
+TEST_F(ApplicationSafety, AnObstacleIsSafeUntilItIsFiveCentimetresBeyond) {
+  host.command("U:30,1");
+  distance(30);
+  EXPECT_FALSE(board.safe());
+  distance(29);
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(board.log.states, Lines{"SAFE proximity"});
+  distance(34);
+  EXPECT_EQ(board.reason(), SafeReason::proximity);
+  distance(35);
+  EXPECT_EQ(board.reason(), SafeReason::none);
+  distance(34);
+  EXPECT_EQ(board.reason(), SafeReason::none);  // the threshold counts again
+  expect_nothing_restored();
+}
+
+TEST_F(ApplicationSafety, NoEchoIsNoObstacle) {
+  host.command("U:30,1");
+  distance(0);
+  EXPECT_FALSE(board.safe());
+}
+
+TEST_F(ApplicationSafety, EachSensorHasItsThreshold) {
+  host.command("U:30,1");
+  host.command("U:10,4");
+  board.hal.inputs.ultrasonic_cm[3] = 10;
+  board.hal.inputs.ultrasonic_cm[1] = 1;  // has none
+  board.run(10);
+  EXPECT_FALSE(board.safe());
+  board.hal.inputs.ultrasonic_cm[3] = 9;
+  board.run(10);
+  EXPECT_EQ(board.reason(), SafeReason::proximity);
+}
+
+TEST_F(ApplicationSafety, AThresholdIsSetAtOnceAndTurnedOffAtOnce) {
+  distance(20);
+  host.command("U:21,1");
+  EXPECT_TRUE(board.safe());
+  host.command("U:0,1");
+  EXPECT_EQ(board.state(), BoardState::active);
+  expect_nothing_restored();
+}
+
+// --- several at once
+
+TEST_F(ApplicationSafety, OutputsAreSafeWhileAnyCauseIsThere) {
+  host.command("U:30,1");
+  distance(20);
+  handle(false);
+  host.command("E:STOP");
+  host.command("E:CLEAR");
+  EXPECT_EQ(board.reason(), SafeReason::handle);
+  handle(true);
+  EXPECT_EQ(board.reason(), SafeReason::proximity);
+  host.command("O:1,1,1");
+  EXPECT_TRUE(board.safe());
+  distance(40);
+  EXPECT_EQ(board.reason(), SafeReason::none);
+  host.command("O:1,1,1");
+  EXPECT_FALSE(board.safe());
+}
+
+TEST_F(ApplicationSafety, TheGravestCauseIsReported) {
+  host.command("U:30,1");
+  board.run(1500);
+  EXPECT_EQ(board.reason(), SafeReason::link);
+  distance(20);
+  EXPECT_EQ(board.reason(), SafeReason::proximity);
+  handle(false);
+  EXPECT_EQ(board.reason(), SafeReason::handle);
+  board.application->fail(SafeReason::watchdog, board.now_ms);
+  EXPECT_EQ(board.reason(), SafeReason::watchdog);
+  board.application->fail(SafeReason::fault, board.now_ms);
+  EXPECT_EQ(board.reason(), SafeReason::fault);
+  board.receive("E:STOP;", Source{0, 9});
+  EXPECT_EQ(board.reason(), SafeReason::stop);
+}
+
+TEST_F(ApplicationSafety, TheReasonIsInEveryHeartbeatAndState) {
+  host.command("F:AIN24");
+  handle(false);
+  board.take();
+  host.stay(1000);
+  const std::vector<Heard> heard = board.take();
+  EXPECT_GT(heard.size(), 100U);
+  for (const Heard& one : heard) {
+    EXPECT_NE(one.bytes.find(";SAFE:3;"), std::string::npos) << one.bytes;
+  }
+  handle(true);
+  board.take();
+  host.stay(1000);
+  for (const Heard& one : board.take()) {
+    EXPECT_EQ(one.bytes.find("SAFE"), std::string::npos) << one.bytes;
+  }
+}
+
+}  // namespace
+}  // namespace r4

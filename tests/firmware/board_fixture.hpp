@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The board's application on hardware and ports in memory, in virtual time, with hosts to drive it.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "firmware/application.hpp"
+#include "protocol/message.hpp"
+#include "tests/support/datagrams.hpp"
+
+namespace r4::test {
+
+class MemoryHal final : public firmware::Hal {
+ public:
+  MemoryHal() { inputs.handle_held = true; }
+
+  void apply(const firmware::Outputs& wanted) override { outputs = wanted; }
+  void make_safe() override {
+    outputs = firmware::Outputs();
+    ++made_safe;
+  }
+  void sample(firmware::Inputs& sampled) override { sampled = inputs; }
+  void zero(int channel) override { zeroed.push_back(channel); }
+
+  firmware::Outputs outputs;  // what the hardware does
+  firmware::Inputs inputs;    // what the board will see
+  int made_safe = 0;
+  std::vector<int> zeroed;
+};
+
+class MemoryPort final : public firmware::Port {
+ public:
+  struct Sent {
+    std::string bytes;
+    firmware::Urgency urgency;
+    std::uint32_t peer;
+    std::uint32_t at_ms;
+  };
+
+  void send(Text datagram, firmware::Urgency urgency, std::uint32_t peer) override {
+    sent.push_back({str(datagram), urgency, peer, *now_ms});
+  }
+  std::size_t max_size() const override { return limit; }
+
+  const std::uint32_t* now_ms = nullptr;
+  std::size_t limit = max_datagram;
+  std::vector<Sent> sent;
+};
+
+// What happened on the board, in words: "ACTIVE none", "executed 5", "refused 5 RANGE".
+class EventLog final : public firmware::Observer {
+ public:
+  void on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason reason) override {
+    states.push_back(std::string(firmware::to_text(state)) + " " + to_text(reason));
+    state_ms = t_ms;
+  }
+  void on_outputs(std::uint32_t, const firmware::Outputs&) override { ++outputs; }
+  void on_executed(std::uint32_t, std::uint32_t pnum, const Command&) override {
+    executed.push_back(pnum);
+  }
+  void on_refused(std::uint32_t, std::uint32_t pnum, Refusal code) override {
+    refused.push_back(std::to_string(pnum) + " " + str(name_of(code)));
+  }
+
+  std::vector<std::string> states;
+  std::uint32_t state_ms = 0;  // of the newest
+  int outputs = 0;             // changes
+  std::vector<std::uint32_t> executed;
+  std::vector<std::string> refused;
+};
+
+// A datagram of the board, read.
+struct Heard {
+  std::string bytes;
+  MessageKind kind = MessageKind::state;
+  std::uint32_t pnum = 0;
+  std::uint32_t t_ms = 0;
+  std::uint32_t peer = 0;
+  std::uint32_t at_ms = 0;
+};
+
+class TestBoard {
+ public:
+  explicit TestBoard(Settings settings = {}, int port_count = 1, std::uint32_t start_ms = 500'000)
+      : now_ms(start_ms) {
+    firmware::Application::Config config;
+    config.identity.firmware = "1.2.3";
+    config.identity.board_id = "R4-7";
+    config.identity.capabilities = "udp+serial";
+    config.settings = settings;
+    application = std::make_unique<firmware::Application>(hal, config, &log);
+    for (int i = 0; i < port_count; ++i) {
+      ports[i].now_ms = &now_ms;
+      application->add_port(ports[i]);
+    }
+    application->start(now_ms);
+  }
+
+  // Lets time pass, with poll() exactly when the board asked for it.
+  void run(std::uint32_t ms) {
+    for (std::uint32_t left = ms;;) {
+      const std::uint32_t due = application->poll(now_ms);
+      if (left == 0) return;
+      const std::uint32_t step = std::clamp(due, 1U, left);
+      now_ms += step;
+      left -= step;
+    }
+  }
+
+  // Fields, with the right checksum, from a source.
+  void receive(const std::string& fields, Source from = {}) { receive_raw(with_crc(fields), from); }
+  void receive_raw(const std::string& bytes, Source from = {}) {
+    application->receive(from.port, from.peer, bytes, now_ms);
+  }
+
+  // Everything that a port sent since the last take().
+  std::vector<Heard> take(int port = 0) {
+    newest_t(port);
+    std::vector<Heard> heard;
+    for (const MemoryPort::Sent& sent : ports[port].sent) {
+      Datagram datagram;
+      Heard one;
+      one.bytes = sent.bytes;
+      if (!read(sent.bytes, datagram)) throw std::runtime_error("bad: " + sent.bytes);
+      one.kind = kind_of(datagram);
+      one.pnum = datagram.pnum();
+      one.t_ms = static_cast<std::uint32_t>(datagram.time_ms());
+      one.peer = sent.peer;
+      one.at_ms = sent.at_ms;
+      heard.push_back(one);
+    }
+    ports[port].sent.clear();
+    return heard;
+  }
+  std::vector<Heard> take(MessageKind kind, int port = 0) {
+    std::vector<Heard> heard = take(port);
+    heard.erase(std::remove_if(heard.begin(), heard.end(),
+                               [&](const Heard& one) { return one.kind != kind; }),
+                heard.end());
+    return heard;
+  }
+
+  // The T of the newest heartbeat on a port that carried one; 0 before the first.
+  std::uint32_t newest_t(int port = 0) {
+    for (const MemoryPort::Sent& sent : ports[port].sent) {
+      Datagram datagram;
+      if (read(sent.bytes, datagram) && kind_of(datagram) == MessageKind::board_heartbeat) {
+        newest_t_[port] = static_cast<std::uint32_t>(datagram.time_ms());
+      }
+    }
+    return newest_t_[port];
+  }
+
+  const firmware::Outputs& outputs() const { return hal.outputs; }
+  bool safe() const { return hal.outputs == firmware::Outputs(); }
+  firmware::BoardState state() const { return application->state(); }
+  SafeReason reason() const { return application->reason(); }
+
+  std::uint32_t now_ms;
+  MemoryHal hal;
+  EventLog log;
+  MemoryPort ports[firmware::Application::max_ports];
+  std::unique_ptr<firmware::Application> application;
+
+ private:
+  std::uint32_t newest_t_[firmware::Application::max_ports] = {};
+};
+
+// The state that a datagram of the board carries.
+inline State state_of(const Heard& heard) {
+  Datagram datagram;
+  State state;
+  if (!read(heard.bytes, datagram) || !read_state(datagram, state)) {
+    throw std::runtime_error("no state: " + heard.bytes);
+  }
+  return state;
+}
+
+// A host at one place, numbering its packets.
+class TestHost {
+ public:
+  TestHost(TestBoard& to, std::uint32_t first_pnum, Source place = {})
+      : board(to), at(place), pnum(first_pnum) {}
+
+  std::uint32_t heartbeat(std::uint64_t t) {
+    board.receive("H:ROS2-R4;PNum:" + std::to_string(pnum) + ";T:" + std::to_string(t) + ";", at);
+    return pnum++;
+  }
+  // A heartbeat that echoes the board's newest.
+  std::uint32_t echo() {
+    heard_ = board.newest_t(at.port);
+    return heartbeat(heard_);
+  }
+  // Sends a command field and returns its number.
+  std::uint32_t command(const std::string& field) {
+    resend(field, pnum);
+    return pnum++;
+  }
+  void resend(const std::string& field, std::uint32_t number) {
+    board.receive(field + ";PNum:" + std::to_string(number) + ";T:1699276044383;", at);
+  }
+  // Takes control: T:0, then the echo of what the board sent.
+  void connect() {
+    heartbeat(0);
+    echo();
+  }
+  // Lets time pass with an echo every 100 ms.
+  void stay(std::uint32_t ms) {
+    for (std::uint32_t done = 0; done < ms; done += 100) {
+      echo();
+      board.run(std::min(100U, ms - done));
+    }
+  }
+
+  TestBoard& board;
+  Source at;
+  std::uint32_t pnum;
+
+ private:
+  std::uint32_t heard_ = 0;
+};
+
+// Where our hosts begin to number.
+constexpr std::uint32_t echo_pnum = echo_host_first_pnum + 12345;
+
+}  // namespace r4::test

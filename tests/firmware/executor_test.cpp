@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "firmware/executor.hpp"
+
+#include <gtest/gtest.h>
+
+namespace r4::firmware {
+namespace {
+
+bool same(const Setpoints& a, const Setpoints& b) {
+  return a.outputs == b.outputs && a.fields == b.fields &&
+         std::equal(std::begin(a.proximity_cm), std::end(a.proximity_cm), b.proximity_cm) &&
+         a.settings.state_rate_hz == b.settings.state_rate_hz &&
+         a.settings.heartbeat_ms == b.settings.heartbeat_ms &&
+         a.settings.timeout_ms == b.settings.timeout_ms &&
+         a.settings.recovery == b.settings.recovery;
+}
+
+TEST(Executor, ChangesWhatTheCommandNamesAndNothingElse) {
+  Setpoints setpoints;
+  Setpoints expected;
+  auto expect = [&](const Command& command) {
+    EXPECT_EQ(carry_out(command, setpoints), Refusal::none);
+    EXPECT_TRUE(same(setpoints, expected)) << static_cast<int>(command.kind);
+  };
+
+  expected.outputs.osmc[0] = {4095, Direction::forward};
+  expect(Command::osmc(4095, Direction::forward, 1));
+  expected.outputs.dhb12[3] = {1, Direction::forward};
+  expect(Command::dhb12(1, Direction::forward, 4));
+  expected.outputs.servo_us[15] = 2500;
+  expect(Command::servo(2500, 16));
+  expected.outputs.relays = 0x80;
+  expect(Command::relay(8, true));
+  expected.outputs.relays = 0x81;
+  expect(Command::relay(1, true));
+  expected.outputs.relays = 0x01;
+  expect(Command::relay(8, false));
+  expected.outputs.stepper[1].position = -5;
+  expected.outputs.stepper[1].speed = 20;
+  expected.outputs.stepper[1].enabled = true;
+  expect(Command::stepper(-5, 20, 2));
+  expected.outputs.bldc[2] = {9, Direction::reverse, true};
+  expect(Command::bldc(9, Direction::reverse, true, 3));
+  expected.proximity_cm[3] = 400;
+  expect(Command::proximity(400, 4));
+  expected.fields = FieldSet();
+  expected.fields.add(StateField::ain5);
+  expect(Command::fields("AIN5"));
+  expected.settings.state_rate_hz = 10;
+  expect(Command::setting("rate", "10"));
+  expected.outputs.stepper[1] = StepperTarget();
+  expect(Command::zero(2));
+  for (const Command& command :
+       {Command::heartbeat(), Command::stop(), Command::clear(), Command::identify()}) {
+    expect(command);
+  }
+}
+
+TEST(Executor, ChangesNothingWhenItRefuses) {
+  Setpoints setpoints;
+  carry_out(Command::osmc(1, Direction::forward, 1), setpoints);
+  const Setpoints before = setpoints;
+  const std::pair<Command, Refusal> cases[] = {
+      {Command::osmc(4096, Direction::forward, 1), Refusal::range},
+      {Command::osmc(-1, Direction::forward, 1), Refusal::range},
+      {Command::osmc(1, Direction::forward, 5), Refusal::channel},
+      {Command::osmc(1, Direction::forward, 0), Refusal::channel},
+      {Command::osmc(1, static_cast<Direction>(2), 1), Refusal::range},
+      {Command::dhb12(1, Direction::forward, 257), Refusal::channel},
+      {Command::servo(2501, 1), Refusal::range},
+      {Command::servo(1, 17), Refusal::channel},
+      {Command::relay(9, true), Refusal::channel},
+      {Command::stepper(1, 0, 1), Refusal::range},
+      {Command::stepper(1, 20001, 1), Refusal::range},
+      {Command::stepper(1, 1, -1), Refusal::channel},
+      {Command::zero(5), Refusal::channel},
+      {Command::bldc(4096, Direction::forward, false, 1), Refusal::range},
+      {Command::proximity(401, 1), Refusal::range},
+      {Command::proximity(1, 5), Refusal::channel},
+      {Command::fields("AIN24,NONSENSE"), Refusal::unknown},
+      {Command::fields(""), Refusal::format},
+      {Command::setting("rate", "1001"), Refusal::range},
+      {Command::setting("rate", "x"), Refusal::format},
+      {Command::setting("nonsense", "1"), Refusal::unknown},
+      {Command::setting("heartbeat", "1000"), Refusal::range},  // not below the timeout
+  };
+  for (const auto& [command, refusal] : cases) {
+    EXPECT_EQ(carry_out(command, setpoints), refusal) << static_cast<int>(command.kind);
+    EXPECT_TRUE(same(setpoints, before)) << static_cast<int>(command.kind);
+  }
+}
+
+TEST(Executor, TheDefaultOutputsAreTheSafeOnes) {
+  const Outputs outputs;
+  for (const Drive& drive : outputs.osmc) EXPECT_EQ(drive.pwm, 0);
+  for (const Drive& drive : outputs.dhb12) EXPECT_EQ(drive.pwm, 0);
+  for (const std::uint16_t us : outputs.servo_us) EXPECT_EQ(us, 0);
+  for (const Bldc& bldc : outputs.bldc) EXPECT_EQ(bldc.speed, 0);
+  for (const StepperTarget& stepper : outputs.stepper) EXPECT_FALSE(stepper.enabled);
+  EXPECT_EQ(outputs.relays, 0);
+}
+
+TEST(Executor, OutputsDifferInEveryMember) {
+  const Outputs base;
+  auto differs = [&](auto change) {
+    Outputs other;
+    change(other);
+    return other != base;
+  };
+  EXPECT_FALSE(differs([](Outputs&) {}));
+  EXPECT_TRUE(differs([](Outputs& o) { o.osmc[3].pwm = 1; }));
+  EXPECT_TRUE(differs([](Outputs& o) { o.osmc[0].direction = Direction::forward; }));
+  EXPECT_TRUE(differs([](Outputs& o) { o.dhb12[3].pwm = 1; }));
+  EXPECT_TRUE(differs([](Outputs& o) { o.servo_us[15] = 1; }));
+  EXPECT_TRUE(differs([](Outputs& o) { o.relays = 1; }));
+  EXPECT_TRUE(differs([](Outputs& o) { o.bldc[3].speed = 1; }));
+  EXPECT_TRUE(differs([](Outputs& o) { o.bldc[3].brake = true; }));
+  EXPECT_TRUE(differs([](Outputs& o) { o.bldc[3].direction = Direction::forward; }));
+  EXPECT_TRUE(differs([](Outputs& o) { o.stepper[3].position = 1; }));
+  EXPECT_TRUE(differs([](Outputs& o) { o.stepper[3].speed = 1; }));
+  EXPECT_TRUE(differs([](Outputs& o) { o.stepper[3].enabled = true; }));
+}
+
+}  // namespace
+}  // namespace r4::firmware
