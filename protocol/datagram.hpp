@@ -8,7 +8,7 @@
 //
 // read() accepts a datagram whole or not at all. What it accepts is a view: it holds no copy and is
 // valid as long as the bytes are. Reading costs no heap and one pass over the bytes besides the
-// CRC.
+// CRC; going over the fields costs no second one.
 #pragma once
 
 #include <cstddef>
@@ -63,30 +63,41 @@ bool read_field(Text text, Field& out);
 
 class Datagram {
  public:
-  // Forward iteration over the fields in the order of the wire.
+  // Forward iteration over the fields in the order of the wire. Valid as long as the Datagram is.
   class Iterator {
    public:
-    Iterator(const char* at, const char* end) : at_(at), end_(end) { advance(); }
     const Field& operator*() const { return field_; }
     const Field* operator->() const { return &field_; }
     Iterator& operator++() {
-      at_ = next_;
-      advance();
+      at_ = field_.values().end() + 1;
+      if (at_ != end_) load();
       return *this;
     }
     friend bool operator==(const Iterator& a, const Iterator& b) { return a.at_ == b.at_; }
     friend bool operator!=(const Iterator& a, const Iterator& b) { return a.at_ != b.at_; }
 
    private:
-    void advance();
+    friend class Datagram;
+    explicit Iterator(const char* end) : at_(end), end_(end) {}
+    explicit Iterator(const Datagram& datagram);
+    void load();
+    const char* next_end();
+
     const char* at_;
     const char* end_;
-    const char* next_ = nullptr;
+    // The ends of names and fields that are not yet passed, in the current word.
+    const std::uint64_t* word_ = nullptr;
+    std::uint64_t ends_ = 0;
+    const char* word_begin_ = nullptr;
     Field field_;
   };
 
-  Iterator begin() const { return Iterator(fields_.begin(), fields_.end()); }
-  Iterator end() const { return Iterator(fields_.end(), fields_.end()); }
+  Datagram() = default;
+  Datagram(const Datagram& other) { *this = other; }
+  Datagram& operator=(const Datagram& other);
+
+  Iterator begin() const { return fields_.empty() ? end() : Iterator(*this); }
+  Iterator end() const { return Iterator(fields_.end()); }
 
   // The datagram's bytes without the line terminator.
   Text bytes() const { return bytes_; }
@@ -101,13 +112,47 @@ class Datagram {
 
  private:
   friend ReadResult read(Text bytes, Datagram& out);
+  // Reads PNum and T, which are among the names whose ends are in `short_names`; where they are
+  // wrong, nullptr if they are not.
+  const char* read_numbers(const std::uint64_t* short_names);
+
   Text bytes_;
   Text fields_;
   std::uint64_t time_ms_ = 0;
   std::uint32_t pnum_ = 0;
   bool has_pnum_ = false;
   bool has_time_ = false;
+  // Where names and fields end, in turn: bit i of word k is byte 64 k + i of fields_. Only the
+  // words of fields_ are ever written or read.
+  static constexpr std::size_t words = max_datagram / 64;
+  std::uint64_t ends_[words];
 };
+
+inline const char* Datagram::Iterator::next_end() {
+  while (ends_ == 0) {
+    ends_ = *++word_;
+    word_begin_ += 64;
+  }
+  const char* const at = word_begin_ + __builtin_ctzll(ends_);
+  ends_ &= ends_ - 1;
+  return at;
+}
+
+inline Datagram::Iterator::Iterator(const Datagram& datagram)
+    : at_(datagram.fields_.begin()),
+      end_(datagram.fields_.end()),
+      word_(datagram.ends_),
+      ends_(datagram.ends_[0]),
+      word_begin_(at_) {
+  load();
+}
+
+inline void Datagram::Iterator::load() {
+  const char* const colon = next_end();
+  const char* const semicolon = next_end();
+  field_ = Field(Text(at_, static_cast<std::size_t>(colon - at_)),
+                 Text(colon + 1, static_cast<std::size_t>(semicolon - colon - 1)));
+}
 
 // Checks `bytes` (one datagram, with or without its line terminator) and makes `out` a view of it.
 // Never fails but by its result; `out` is only written on success. A PNum or T that is not a whole

@@ -7,55 +7,88 @@
 #include "numbers.hpp"
 
 namespace r4 {
+namespace {
+
+constexpr FieldName pnum_name("PNum");
+constexpr FieldName time_name("T");
+
+}  // namespace
 
 bool DatagramWriter::reserve(std::size_t bytes) {
   if (static_cast<std::size_t>(end_ - at_) < bytes) ok_ = false;
   return ok_;
 }
 
-void DatagramWriter::separator() {
-  if (has_value_) *at_++ = ',';
-  has_value_ = true;
-}
-
 DatagramWriter& DatagramWriter::field(Text name) {
-  if (name.empty() || skip_name(name.begin(), name.end()) != name.end()) ok_ = false;
-  if (!reserve(name.size() + 2)) return *this;
-  if (open_) *at_++ = ';';
-  std::memcpy(at_, name.data(), name.size());
-  at_ += name.size();
-  *at_++ = ':';
+  if (name.empty() || !reserve(name.size() + 2)) {
+    ok_ = false;
+    return *this;
+  }
+  char* at = at_;
+  if (open_) *at++ = ';';
+  for (const char c : name) {
+    if (!is_in(ByteClasses::in_name, c)) {
+      ok_ = false;
+      return *this;
+    }
+    *at++ = c;
+  }
+  *at++ = ':';
+  at_ = at;
   open_ = true;
   has_value_ = false;
   return *this;
 }
 
-DatagramWriter& DatagramWriter::value(Text text) {
-  if (skip_value(text.begin(), text.end()) != text.end()) ok_ = false;
-  return values(text);
-}
-
-DatagramWriter& DatagramWriter::values(Text text) {
-  if (!open_ || skip_values(text.begin(), text.end()) != text.end()) ok_ = false;
-  if (!reserve(text.size() + 1)) return *this;
-  separator();
-  if (!text.empty()) std::memcpy(at_, text.data(), text.size());
-  at_ += text.size();
+DatagramWriter& DatagramWriter::field(const FieldName& name) {
+  if (static_cast<std::size_t>(end_ - at_) < sizeof name.text_) return field(name.name());
+  if (!ok_) return *this;
+  const std::size_t skip = open_ ? 0 : 1;  // the first field has no semicolon in front
+  // All of text_, whose size is known: what is behind the name is written over.
+  std::memcpy(at_, name.text_ + skip, sizeof name.text_ - 1);
+  at_ += name.size_ - skip;
+  open_ = true;
+  has_value_ = false;
   return *this;
 }
 
+DatagramWriter& DatagramWriter::append(Text text, std::uint8_t allowed) {
+  if (!open_ || !reserve(text.size() + 1)) {
+    ok_ = false;
+    return *this;
+  }
+  char* at = at_;
+  if (has_value_) *at++ = ',';
+  for (const char c : text) {
+    if (!is_in(allowed, c)) {
+      ok_ = false;
+      return *this;
+    }
+    *at++ = c;
+  }
+  at_ = at;
+  has_value_ = true;
+  return *this;
+}
+
+DatagramWriter& DatagramWriter::value(Text text) { return append(text, ByteClasses::in_value); }
+DatagramWriter& DatagramWriter::values(Text text) { return append(text, ByteClasses::in_values); }
+
 template <class Number>
 DatagramWriter& DatagramWriter::number(Number value, char* (*write)(char*, Number)) {
-  if (!open_) ok_ = false;
-  // Near the end of the buffer the number is made beside it, to see whether it fits.
-  char beside[max_number_text];
-  const bool roomy = static_cast<std::size_t>(end_ - at_) > max_number_text;
-  if (roomy && ok_) {
-    separator();
-    at_ = write(at_, value);
-  } else {
-    values(Text(beside, static_cast<std::size_t>(write(beside, value) - beside)));
+  if (static_cast<std::size_t>(end_ - at_) <= max_number_text) {
+    // Near the end of the buffer it is made beside it, to see whether it fits.
+    char beside[max_number_text];
+    return values(Text(beside, static_cast<std::size_t>(write(beside, value) - beside)));
   }
+  if (!ok_ || !open_) {
+    ok_ = false;
+    return *this;
+  }
+  char* at = at_;
+  if (has_value_) *at++ = ',';
+  at_ = write(at, value);
+  has_value_ = true;
   return *this;
 }
 
@@ -74,8 +107,8 @@ void DatagramWriter::truncate(std::size_t size) {
 }
 
 Text DatagramWriter::finish(std::uint32_t pnum, std::uint64_t t_ms) {
-  field("PNum").value(pnum);
-  field("T").value(t_ms);
+  field(pnum_name).value(pnum);
+  field(time_name).value(t_ms);
   return finish();
 }
 

@@ -1,40 +1,72 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "grammar.hpp"
 
-#include <cstdint>
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
 
 namespace r4 {
+
+const ByteClasses byte_classes;
+
+#if defined(__SSE2__)
+
 namespace {
 
-constexpr std::uint8_t in_name = 1;
-constexpr std::uint8_t in_value = 2;
-constexpr std::uint8_t in_values = 4;
-
-struct ByteClasses {
-  std::uint8_t of[256] = {};
-  constexpr ByteClasses() {
-    for (int c = 0x20; c <= 0x7E; ++c) {
-      if (c == ';' || c == '^') continue;
-      of[c] = in_values;
-      if (c == ',') continue;
-      of[c] |= in_value;
-      if (c != ' ' && c != ':') of[c] |= in_name;
-    }
-  }
-};
-
-constexpr ByteClasses classes;
-
-template <std::uint8_t allowed>
-const char* skip(const char* at, const char* end) {
-  while (at != end && (classes.of[static_cast<unsigned char>(*at)] & allowed) != 0) ++at;
-  return at;
+// The 16 bytes at `at` as bits `shift` and up.
+inline void add_separators(const char* at, int shift, Separators& out) {
+  const __m128i bytes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(at));
+  const auto equal = [&](char c) { return _mm_cmpeq_epi8(bytes, _mm_set1_epi8(c)); };
+  const auto bits = [&](__m128i mask) {
+    return static_cast<std::uint64_t>(static_cast<unsigned>(_mm_movemask_epi8(mask))) << shift;
+  };
+  const __m128i semicolon = equal(';');
+  // Signed: also the bytes from 0x80.
+  const __m128i below_space = _mm_cmplt_epi8(bytes, _mm_set1_epi8(' '));
+  const __m128i no_field = _mm_or_si128(below_space, _mm_or_si128(equal('^'), equal('\x7F')));
+  const __m128i no_name = _mm_or_si128(_mm_or_si128(no_field, semicolon),
+                                       _mm_or_si128(equal(' '), equal(',')));
+  out.colons |= bits(equal(':'));
+  out.semicolons |= bits(semicolon);
+  out.no_name |= bits(no_name);
+  out.no_field |= bits(no_field);
 }
 
 }  // namespace
 
-const char* skip_name(const char* at, const char* end) { return skip<in_name>(at, end); }
-const char* skip_value(const char* at, const char* end) { return skip<in_value>(at, end); }
-const char* skip_values(const char* at, const char* end) { return skip<in_values>(at, end); }
+Separators separators(Text block) {
+  Separators out{0, 0, 0, 0};
+  char copy[separators_block];
+  const char* at = block.data();
+  if (block.size() < separators_block) {
+    std::memset(copy, 'x', sizeof copy);  // of a name, of a value, no separator
+    std::memcpy(copy, at, block.size());
+    at = copy;
+  }
+  for (int shift = 0; shift < 64; shift += 16) add_separators(at + shift, shift, out);
+  return out;
+}
+
+#else
+
+Separators separators(Text block) {
+  Separators out{0, 0, 0, 0};
+  std::uint64_t bit = 1;
+  for (const char c : block) {
+    if (c == ':') {
+      out.colons |= bit;
+    } else if (c == ';') {
+      out.semicolons |= bit;
+      out.no_name |= bit;
+    } else {
+      if (!is_in(ByteClasses::in_name, c)) out.no_name |= bit;
+      if (!is_in(ByteClasses::in_values, c)) out.no_field |= bit;
+    }
+    bit <<= 1;
+  }
+  return out;
+}
+
+#endif
 
 }  // namespace r4

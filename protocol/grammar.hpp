@@ -1,14 +1,51 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which bytes the names and values of a datagram may hold (the grammar is in datagram.hpp). The
-// reader and the writer ask here, so that they cannot disagree.
+// Which bytes the names and values of a datagram may hold (the grammar is in datagram.hpp). The reader
+// and the writer ask here, so that they cannot disagree.
 #pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "text.hpp"
 
 namespace r4 {
 
-// The first byte in [at, end) that no name may hold; `end` if there is none.
-const char* skip_name(const char* at, const char* end);
-// The same for a value, and for values with the commas between them.
-const char* skip_value(const char* at, const char* end);
-const char* skip_values(const char* at, const char* end);
+struct ByteClasses {
+  static constexpr std::uint8_t in_name = 1;
+  static constexpr std::uint8_t in_value = 2;
+  static constexpr std::uint8_t in_values = 4;  // values with the commas between them
+
+  std::uint8_t of[256] = {};
+  constexpr ByteClasses() {
+    for (int c = 0x20; c <= 0x7E; ++c) {
+      if (c == ';' || c == '^') continue;
+      of[c] = in_values;
+      if (c == ',') continue;
+      of[c] |= in_value;
+      if (c != ' ' && c != ':') of[c] |= in_name;
+    }
+  }
+};
+extern const ByteClasses byte_classes;
+
+inline bool is_in(std::uint8_t byte_class, char byte) {
+  return (byte_classes.of[static_cast<unsigned char>(byte)] & byte_class) != 0;
+}
+
+// The first byte in [at, end) that is not of the class; `end` if there is none.
+inline const char* skip(std::uint8_t byte_class, const char* at, const char* end) {
+  while (at != end && is_in(byte_class, *at)) ++at;
+  return at;
+}
+
+// Where the bytes that matter stand in a block of at most 64: bit i is byte i.
+struct Separators {
+  std::uint64_t colons;
+  std::uint64_t semicolons;
+  std::uint64_t no_name;   // neither of a name nor a colon
+  std::uint64_t no_field;  // neither of values nor a semicolon
+};
+constexpr std::size_t separators_block = 64;
+Separators separators(Text block);
 
 }  // namespace r4

@@ -7,25 +7,26 @@ namespace {
 constexpr std::uint64_t u32_max = 0xFFFFFFFFU;
 constexpr std::uint64_t u64_max = ~std::uint64_t{0};
 
-constexpr bool is_digit(char c) { return c >= '0' && c <= '9'; }
-constexpr unsigned digit_of(char c) { return static_cast<unsigned>(c - '0'); }
+// Its value, above 9 for what is no digit.
+constexpr unsigned digit_of(char c) { return static_cast<unsigned char>(c - '0'); }
+constexpr bool is_digit(char c) { return digit_of(c) <= 9; }
 
 // Digits up to `limit`; false for anything else, and for no digits at all.
-bool parse_digits(const char* at, const char* end, std::uint64_t limit, std::uint64_t& out) {
+inline bool parse_digits(const char* at, const char* end, std::uint64_t limit, std::uint64_t& out) {
   if (at == end) return false;
-  // 19 digits always fit 64 bits, so only what follows them needs the check for overflow.
-  constexpr std::ptrdiff_t safe_digits = 19;
-  const char* const safe_end = end - at > safe_digits ? at + safe_digits : end;
   std::uint64_t value = 0;
-  for (; at != safe_end; ++at) {
-    if (!is_digit(*at)) return false;
-    value = value * 10 + digit_of(*at);
-  }
-  for (; at != end; ++at) {
-    if (!is_digit(*at)) return false;
-    const unsigned digit = digit_of(*at);
-    if (value > (u64_max - digit) / 10) return false;
-    value = value * 10 + digit;
+  if (end - at <= 19) {  // as many always fit 64 bits
+    do {
+      const unsigned digit = digit_of(*at);
+      if (digit > 9) return false;
+      value = value * 10 + digit;
+    } while (++at != end);
+  } else {
+    do {
+      const unsigned digit = digit_of(*at);
+      if (digit > 9 || value > (u64_max - digit) / 10) return false;
+      value = value * 10 + digit;
+    } while (++at != end);
   }
   if (value > limit) return false;
   out = value;
@@ -82,8 +83,20 @@ char* put_8_digits(char* out, std::uint32_t value) {
 }  // namespace
 
 bool parse_number(Text text, std::uint32_t& out) {
+  const char* at = text.begin();
+  const char* const end = text.end();
+  if (text.size() - 1 < 9) {  // one to nine digits always fit
+    std::uint32_t value = 0;
+    do {
+      const unsigned digit = digit_of(*at);
+      if (digit > 9) return false;
+      value = value * 10 + digit;
+    } while (++at != end);
+    out = value;
+    return true;
+  }
   std::uint64_t value = 0;
-  if (!parse_digits(text.begin(), text.end(), u32_max, value)) return false;
+  if (!parse_digits(at, end, u32_max, value)) return false;
   out = static_cast<std::uint32_t>(value);
   return true;
 }
@@ -112,24 +125,30 @@ bool is_whole_number(Text text) {
 }
 
 bool parse_hundredths(Text text, std::int32_t& out) {
-  constexpr std::uint64_t max_units = 19999999;
+  constexpr std::uint32_t max_units = 19999999;
   const char* at = nullptr;
   const bool negative = skip_minus(text, at);
-  const char* point = at;
-  while (point != text.end() && *point != '.') ++point;
-  std::uint64_t units = 0;
-  if (!parse_digits(at, point, max_units, units)) return false;
-  unsigned hundredths = 0;
-  if (point != text.end()) {
-    const char* const decimals = point + 1;
-    if (decimals == text.end()) return false;
-    for (const char* p = decimals; p != text.end(); ++p) {
-      if (!is_digit(*p)) return false;
-    }
-    hundredths = 10 * digit_of(decimals[0]);
-    if (text.end() - decimals > 1) hundredths += digit_of(decimals[1]);
+  const char* const end = text.end();
+  if (at == end) return false;
+  std::uint32_t units = digit_of(*at);
+  if (units > 9) return false;
+  for (++at; at != end && is_digit(*at); ++at) {
+    units = units * 10 + digit_of(*at);
+    if (units > max_units) return false;
   }
-  out = with_sign(negative, 100 * units + hundredths);
+  std::uint32_t hundredths = 100 * units;
+  if (at != end) {
+    if (*at != '.' || ++at == end || !is_digit(*at)) return false;
+    hundredths += 10 * digit_of(*at);
+    if (++at != end) {
+      if (!is_digit(*at)) return false;
+      hundredths += digit_of(*at);
+      while (++at != end) {
+        if (!is_digit(*at)) return false;
+      }
+    }
+  }
+  out = with_sign(negative, hundredths);
   return true;
 }
 

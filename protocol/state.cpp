@@ -23,12 +23,13 @@ enum class Form : std::uint8_t {
 struct Entry {
   StateField field;
   Form form;
-  Text name;
+  FieldName name;
   std::size_t offset;  // in State
 };
 
 // clang-format off
-#define R4_ENTRY(field, form, name, member) {StateField::field, Form::form, name, offsetof(State, member)}
+#define R4_ENTRY(field, form, name, member) \
+  {StateField::field, Form::form, FieldName(name), offsetof(State, member)}
 constexpr Entry table[] = {
     R4_ENTRY(ain24, volts, "AIN24", analog_cv[0]),
     R4_ENTRY(ain12, volts, "AIN12", analog_cv[1]),
@@ -92,12 +93,12 @@ constexpr Entry table[] = {
 
 constexpr bool in_order() {
   for (int i = 0; i < state_field_count; ++i) {
-    if (table[i].field != static_cast<StateField>(i)) return false;
+    if (table[i].field != static_cast<StateField>(i) || !table[i].name.allowed()) return false;
   }
   return true;
 }
 static_assert(sizeof table / sizeof table[0] == state_field_count, "one entry for every field");
-static_assert(in_order(), "the table is indexed by StateField");
+static_assert(in_order(), "the table is indexed by StateField, its names are of the grammar");
 
 constexpr const Entry& entry_of(StateField field) { return table[static_cast<int>(field)]; }
 
@@ -127,7 +128,7 @@ struct NameIndex {
   constexpr NameIndex() {
     for (unsigned i = 0; i < slot_count; ++i) entry[i] = no_entry;
     for (int i = 0; i < state_field_count; ++i) {
-      unsigned slot = slot_of(table[i].name);
+      unsigned slot = slot_of(table[i].name.name());
       while (entry[slot] != no_entry) slot = (slot + 1) % slot_count;
       entry[slot] = static_cast<std::uint8_t>(i);
     }
@@ -149,29 +150,29 @@ bool parse_into(Text text, std::uint32_t limit, Member& out) {
   return true;
 }
 
-bool parse_drive(const Field& field, Drive& out) {
+bool parse_drive(Text text, Drive& out) {
   Text values[2];
-  return field.split(values, 2) == 2 && parse_into(values[0], pwm_max, out.pwm) &&
+  return Field(Text(), text).split(values, 2) == 2 && parse_into(values[0], pwm_max, out.pwm) &&
          parse_into(values[1], 1, out.direction);
 }
 
-bool parse_bldc(const Field& field, Bldc& out) {
+bool parse_bldc(Text text, Bldc& out) {
   Text values[3];
-  return field.split(values, 3) == 3 && parse_into(values[0], pwm_max, out.speed) &&
+  return Field(Text(), text).split(values, 3) == 3 && parse_into(values[0], pwm_max, out.speed) &&
          parse_into(values[1], 1, out.direction) && parse_into(values[2], 1, out.brake);
 }
 
-bool parse_entry(const Field& field, const Entry& entry, State& state) {
-  const Text text = field.values();  // the number parsers refuse a comma
+// `text` is the field's values; the number parsers refuse a comma.
+bool parse_entry(Text text, const Entry& entry, State& state) {
   switch (entry.form) {
     case Form::volts:
       return parse_hundredths(text, member<std::int32_t>(state, entry));
     case Form::flag:
       return parse_into(text, 1, member<bool>(state, entry));
     case Form::drive:
-      return parse_drive(field, member<Drive>(state, entry));
+      return parse_drive(text, member<Drive>(state, entry));
     case Form::bldc:
-      return parse_bldc(field, member<Bldc>(state, entry));
+      return parse_bldc(text, member<Bldc>(state, entry));
     case Form::servo:
       return parse_into(text, servo_max_us, member<std::uint16_t>(state, entry));
     case Form::u8:
@@ -203,14 +204,14 @@ FieldSet FieldSet::all() {
   return set;
 }
 
-Text name_of(StateField field) { return entry_of(field).name; }
+Text name_of(StateField field) { return entry_of(field).name.name(); }
 
 StateField state_field(Text name) {
   if (name.size() > longest_name) return StateField::count;
   for (unsigned slot = slot_of(name);; slot = (slot + 1) % slot_count) {
     const std::uint8_t index = name_index.entry[slot];
     if (index == no_entry) return StateField::count;
-    if (table[index].name == name) return static_cast<StateField>(index);
+    if (table[index].name.name() == name) return static_cast<StateField>(index);
   }
 }
 
@@ -255,25 +256,38 @@ void write_field(DatagramWriter& writer, StateField field, const State& state) {
   }
 }
 
-bool read_state(const Datagram& datagram, State& state) {
-  if (datagram.has_time() && datagram.time_ms() > 0xFFFFFFFFU) return false;
-  State next = state;
-  next.present = FieldSet();
-  if (datagram.has_pnum()) next.pnum = datagram.pnum();
-  if (datagram.has_time()) next.t_ms = static_cast<std::uint32_t>(datagram.time_ms());
+namespace {
+
+bool read_fields(const Datagram& datagram, State& state) {
+  FieldSet present;
   int expected = 0;  // boards send in the table's order, so the next entry is the likely one
   for (const Field& field : datagram) {
     int index = expected;
-    if (index == state_field_count || table[index].name != field.name()) {
+    if (index == state_field_count || table[index].name.name() != field.name()) {
       index = static_cast<int>(state_field(field.name()));
       if (index == state_field_count) continue;
     }
-    const Entry& entry = table[index];
-    if (next.present.has(entry.field) || !parse_entry(field, entry, next)) return false;
-    next.present.add(entry.field);
+    const auto which = static_cast<StateField>(index);
+    if (present.has(which) || !parse_entry(field.values(), table[index], state)) return false;
+    present.add(which);
     expected = index + 1;
   }
-  state = next;
+  state.present = present;
+  return true;
+}
+
+}  // namespace
+
+bool read_state(const Datagram& datagram, State& state) {
+  if (datagram.has_time() && datagram.time_ms() > 0xFFFFFFFFU) return false;
+  // Written in place and taken back on failure: copying what was just written costs more.
+  const State before = state;
+  if (!read_fields(datagram, state)) {
+    state = before;
+    return false;
+  }
+  if (datagram.has_pnum()) state.pnum = datagram.pnum();
+  if (datagram.has_time()) state.t_ms = static_cast<std::uint32_t>(datagram.time_ms());
   return true;
 }
 

@@ -95,6 +95,23 @@ class FieldSet {
   void remove(StateField f) { bits_ &= ~(std::uint64_t{1} << static_cast<int>(f)); }
   void add(FieldSet other) { bits_ |= other.bits_; }
   constexpr bool empty() const { return bits_ == 0; }
+  // Its fields in the order of the table: `for (StateField field : set)`.
+  class Iterator {
+   public:
+    explicit constexpr Iterator(std::uint64_t bits) : bits_(bits) {}
+    StateField operator*() const { return static_cast<StateField>(__builtin_ctzll(bits_)); }
+    Iterator& operator++() {
+      bits_ &= bits_ - 1;
+      return *this;
+    }
+    friend bool operator!=(Iterator a, Iterator b) { return a.bits_ != b.bits_; }
+
+   private:
+    std::uint64_t bits_;
+  };
+  constexpr Iterator begin() const { return Iterator(bits_); }
+  constexpr Iterator end() const { return Iterator(0); }
+
   friend bool operator==(FieldSet a, FieldSet b) { return a.bits_ == b.bits_; }
   friend bool operator!=(FieldSet a, FieldSet b) { return a.bits_ != b.bits_; }
 

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 
 namespace r4 {
@@ -34,11 +35,29 @@ class Text {
   }
 
   friend bool operator==(Text a, Text b) {
-    return a.size_ == b.size_ && (a.size_ == 0 || std::memcmp(a.data_, b.data_, a.size_) == 0);
+    return a.size_ == b.size_ && same(a.data_, b.data_, a.size_);
   }
   friend bool operator!=(Text a, Text b) { return !(a == b); }
 
  private:
+  // memcmp() of names and words, without the call: the ends of both, which may overlap.
+  template <class Word>
+  static bool same_ends(const char* a, const char* b, std::size_t size) {
+    Word words[4];
+    std::memcpy(&words[0], a, sizeof(Word));
+    std::memcpy(&words[1], b, sizeof(Word));
+    std::memcpy(&words[2], a + size - sizeof(Word), sizeof(Word));
+    std::memcpy(&words[3], b + size - sizeof(Word), sizeof(Word));
+    return words[0] == words[1] && words[2] == words[3];
+  }
+  static bool same(const char* a, const char* b, std::size_t size) {
+    if (size > 16) return std::memcmp(a, b, size) == 0;
+    if (size >= 8) return same_ends<std::uint64_t>(a, b, size);
+    if (size >= 4) return same_ends<std::uint32_t>(a, b, size);
+    if (size >= 2) return same_ends<std::uint16_t>(a, b, size);
+    return size == 0 || *a == *b;
+  }
+
   const char* data_ = nullptr;
   std::size_t size_ = 0;
 };

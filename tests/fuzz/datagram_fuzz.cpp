@@ -68,10 +68,7 @@ void fields_read_equal(const Datagram& datagram) {
 
 std::string fields_of(const State& state) {
   return written([&](DatagramWriter& writer) {
-    for (int i = 0; i < state_field_count; ++i) {
-      const auto field = static_cast<StateField>(i);
-      if (state.present.has(field)) write_field(writer, field, state);
-    }
+    for (const StateField field : state.present) write_field(writer, field, state);
     writer.field("PNum").value(state.pnum);
     writer.field("T").value(state.t_ms);
   });

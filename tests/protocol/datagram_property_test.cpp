@@ -148,6 +148,17 @@ RC_GTEST_PROP(DatagramProperty, PacketNumberAndTimeOfTheWriterAreRead,
   RC_ASSERT(content->time_ms == time_ms);
 }
 
+ReadResult result_of(const std::string& bytes) {
+  Datagram datagram;
+  return read(bytes, datagram);
+}
+
+// Is there a field PNum or T?
+bool mentions_numbers(const std::string& fields) {
+  const std::string text = ';' + fields;
+  return text.find(";PNum:") != std::string::npos || text.find(";T:") != std::string::npos;
+}
+
 // The grammar said a second time, slowly.
 bool is_datagram(const std::string& bytes) {
   static const std::regex grammar(
@@ -160,6 +171,24 @@ RC_GTEST_PROP(DatagramProperty, AcceptedIsWhatTheGrammarSays, ()) {
   static const std::string alphabet = "AB1::;;;, ^\n\r\x7F";
   const std::string bytes = with_crc(*text_of(alphabet, 0, 12));
   RC_ASSERT(read_content(bytes).has_value() == is_datagram(bytes));
+}
+
+// The same with fields of all lengths, and a byte of any kind anywhere.
+RC_GTEST_PROP(DatagramProperty, AcceptedIsWhatTheGrammarSaysOfLongDatagramsToo, ()) {
+  static const std::string alphabet = ":;, ^xT\n\x7F\x80";
+  const std::string good = *any_datagram();
+  std::string fields = good.substr(0, good.find('^'));
+  const int bytes = *rc::gen::inRange(0, 4);
+  for (int i = 0; i < bytes && !fields.empty(); ++i) {
+    const auto at = static_cast<std::size_t>(*rc::gen::inRange(0, static_cast<int>(fields.size())));
+    fields[at] = *rc::gen::elementOf(alphabet);
+  }
+  const std::string damaged = with_crc(fields);
+  const auto content = read_content(damaged);
+  // Beyond the grammar: PNum and T are numbers and stand once.
+  const bool numbers_wrong =
+      !content && result_of(damaged).position < fields.size() && mentions_numbers(fields);
+  RC_ASSERT(content.has_value() == is_datagram(damaged) || numbers_wrong);
 }
 
 RC_GTEST_PROP(DatagramProperty, AnySingleByteOfDamageIsRefusedOrChangesNothing, ()) {

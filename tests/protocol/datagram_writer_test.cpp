@@ -46,6 +46,27 @@ TEST(DatagramWriter, WritesEveryKindOfValue) {
                      "D:a,b,c,,d;E:;F:;G:,;"));
 }
 
+TEST(DatagramWriter, NamesKnownBeforehandAreWrittenTheSame) {
+  constexpr FieldName one("A");
+  constexpr FieldName twelve("TWELVELETTER");
+  static_assert(one.allowed() && twelve.allowed());
+  static_assert(!FieldName("A;B").allowed() && !FieldName("A B").allowed() &&
+                !FieldName("A:").allowed() && !FieldName("\x7F").allowed());
+  EXPECT_EQ(str(twelve.name()), "TWELVELETTER");
+  // In a buffer of every size, also where the fixed copy would not fit.
+  for (std::size_t capacity = 0; capacity <= 64; ++capacity) {
+    const auto write = [&](const auto& first, const auto& second) {
+      std::string buffer(capacity + 32, '#');
+      DatagramWriter writer(&buffer[0], capacity);
+      writer.field(first).value(1).field(second).value(2).field(first);
+      const std::string written = str(writer.finish());
+      EXPECT_EQ(buffer.substr(capacity), std::string(32, '#')) << capacity;
+      return written;
+    };
+    EXPECT_EQ(write(one, twelve), write(one.name(), twelve.name())) << capacity;
+  }
+}
+
 TEST(DatagramWriter, NothingCanForgeAField) {
   const std::string forgeries[] = {"1;E:STOP", "1^",   "1\r",   "1\n", std::string("1\0", 2),
                                    "\x7F",     "\x80", "\xC3²", "\t"};

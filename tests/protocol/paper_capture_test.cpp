@@ -24,10 +24,7 @@ std::string state_again(const Datagram& datagram) {
   EXPECT_EQ(state.present, FieldSet::paper_default());
   char buffer[max_datagram];
   DatagramWriter writer(buffer, sizeof buffer);
-  for (int i = 0; i < state_field_count; ++i) {
-    const auto field = static_cast<StateField>(i);
-    if (state.present.has(field)) write_field(writer, field, state);
-  }
+  for (const StateField field : state.present) write_field(writer, field, state);
   return str(writer.finish(state.pnum, state.t_ms));
 }
 

@@ -268,5 +268,20 @@ TEST(State, ThePapersSetIsTheFirstTenFields) {
   EXPECT_NE(set, FieldSet::all());
 }
 
+TEST(State, ASetGivesItsFieldsInTheOrderOfTheTable) {
+  FieldSet set;
+  for (const StateField field : set) FAIL() << str(name_of(field));
+  for (const StateField field : {StateField::late, StateField::cmd, StateField::ain24}) {
+    set.add(field);
+  }
+  std::vector<StateField> fields;
+  for (const StateField field : set) fields.push_back(field);
+  EXPECT_EQ(fields,
+            (std::vector<StateField>{StateField::ain24, StateField::cmd, StateField::late}));
+  fields.clear();
+  for (const StateField field : FieldSet::all()) fields.push_back(field);
+  EXPECT_EQ(fields, every_field());
+}
+
 }  // namespace
 }  // namespace r4

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a state datagram costs: the first line of the paper's capture, written and read. The floor
+// in the same run is copying its bytes and computing its CRC.
+#include <benchmark/benchmark.h>
+#include <libdeflate.h>
+
+#include <cstdlib>
+#include <cstring>
+
+#include "protocol/crc32.hpp"
+#include "protocol/datagram.hpp"
+#include "protocol/datagram_writer.hpp"
+#include "protocol/state.hpp"
+#include "tests/bench/allocations.hpp"
+
+namespace {
+
+using namespace r4;
+
+constexpr Text line(
+    "AIN24:24.28;AIN12:12.12;AIN5:5.12;AINDMH:12.11;DMHSTA:1;AINSTEER:1.03;DHB1A:4095,1;"
+    "OSMC1:400,1;STEP1POS:-100;SERVO1POS:2000;PNum:7434;T:79090;^0xf07cfd9a^");
+
+State state_of_line() {
+  Datagram datagram;
+  State state;
+  if (!read(line, datagram) || !read_state(datagram, state)) std::abort();
+  return state;
+}
+
+Text write_state(char* buffer, const State& state) {
+  DatagramWriter writer(buffer, max_datagram);
+  for (const StateField field : state.present) write_field(writer, field, state);
+  return writer.finish(state.pnum, state.t_ms);
+}
+
+// Times `work` on the line's bytes and reports what it allocates as "allocs".
+template <class Work>
+void measure(benchmark::State& bench, Work work) {
+  bench.counters["allocs"] = bench::allocations_per_call(work);
+  for (auto _ : bench) {
+    work();
+    benchmark::ClobberMemory();
+  }
+  bench.SetBytesProcessed(bench.iterations() * static_cast<std::int64_t>(line.size()));
+}
+
+// The line, its content unknown to the compiler.
+Text opaque_line() {
+  Text bytes = line;
+  benchmark::DoNotOptimize(bytes);
+  return bytes;
+}
+
+void write_state_datagram(benchmark::State& bench) {
+  State state = state_of_line();
+  char buffer[max_datagram];
+  if (write_state(buffer, state) != line) bench.SkipWithError("not the line of the capture");
+  measure(bench, [&] {
+    benchmark::DoNotOptimize(state);
+    benchmark::DoNotOptimize(write_state(buffer, state));
+  });
+}
+BENCHMARK(write_state_datagram);
+
+void read_datagram(benchmark::State& bench) {
+  measure(bench, [&] {
+    Datagram datagram;
+    if (!read(opaque_line(), datagram)) bench.SkipWithError("refused");
+    benchmark::DoNotOptimize(datagram);
+  });
+}
+BENCHMARK(read_datagram);
+
+void read_typed_state(benchmark::State& bench) {
+  State state;
+  measure(bench, [&] {
+    Datagram datagram;
+    if (!read(opaque_line(), datagram) || !read_state(datagram, state)) {
+      bench.SkipWithError("refused");
+    }
+    benchmark::DoNotOptimize(state);
+  });
+}
+BENCHMARK(read_typed_state);
+
+void crc_table(benchmark::State& bench) {
+  measure(bench, [] { benchmark::DoNotOptimize(crc32_table(opaque_line())); });
+}
+BENCHMARK(crc_table);
+
+void crc_fast(benchmark::State& bench) {
+  measure(bench, [] { benchmark::DoNotOptimize(crc32(opaque_line())); });
+}
+BENCHMARK(crc_fast);
+
+// The floor: nothing is written or read without moving its bytes and checking their CRC.
+void copy_and_crc(benchmark::State& bench) {
+  char buffer[max_datagram];
+  measure(bench, [&] {
+    const Text bytes = opaque_line();
+    std::memcpy(buffer, bytes.data(), bytes.size());
+    benchmark::DoNotOptimize(libdeflate_crc32(0, buffer, bytes.size()));
+  });
+}
+BENCHMARK(copy_and_crc);
+
+}  // namespace
