@@ -267,7 +267,7 @@ void Board::close() { impl_->close(); }
 void Board::wait_active(Duration timeout) {
   const auto impl = impl_;
   const bool active = impl->wait_for_news(name(), timeout, [&] {
-    return impl->link.state == HostLinkState::active && impl->in_control;
+    return impl->link.state == HostLinkState::active && impl->in_control && !impl->link.gated;
   });
   if (!active) throw Error(explain(impl->async.name(), impl->link_now()));
 }

@@ -114,7 +114,9 @@ Command parse_command_text(std::string_view text) {
     refusal = parse_fields(command.text, set);
   }
   if (refusal == Refusal::none && command.kind == CommandKind::setting) {
-    Settings settings;
+    Settings settings;  // the board's are not known here: those that leave each key its whole range
+    settings.heartbeat_ms = 50;
+    settings.timeout_ms = 10000;
     refusal = set(settings, command.text, command.text2);
   }
   if (refusal != Refusal::none) throw Error(bad_command(trimmed, refusal));

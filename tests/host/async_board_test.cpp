@@ -1,0 +1,364 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4::AsyncBoard on one event loop with the simulated board.
+#include "host/async_board.hpp"
+
+#include <gtest/gtest.h>
+
+#include <asio/bind_executor.hpp>
+#include <asio/co_spawn.hpp>
+#include <asio/detached.hpp>
+#include <asio/executor_work_guard.hpp>
+#include <asio/steady_timer.hpp>
+#include <asio/strand.hpp>
+#include <asio/thread_pool.hpp>
+#include <asio/use_awaitable.hpp>
+#include <asio/use_future.hpp>
+#include <optional>
+#include <thread>
+
+#include "board_in_a_thread.hpp"
+#include "firmware/ports/sim/simulated_board.hpp"
+#include "transports/memory_carrier.hpp"
+#include "transports/registry.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+const Command drive = Command::osmc(358, Direction::forward, 1);
+
+// Runs the loop until `done()`; false after 5 s.
+template <class Done>
+bool run_until(asio::io_context& io, Done done) {
+  const auto deadline = std::chrono::steady_clock::now() + 5s;
+  io.restart();
+  while (!done()) {
+    if (std::chrono::steady_clock::now() > deadline) return false;
+    if (io.run_one_for(5s) == 0 && io.stopped()) return done();
+  }
+  return true;
+}
+
+struct AsyncBoardTest : testing::Test {
+  asio::io_context io;
+  AsyncBoard board{io, "sim:?seed=1"};
+};
+
+TEST_F(AsyncBoardTest, SendsItsFirstHeartbeatWhenItOpens) {
+  auto [host_end, board_end] = make_memory_pair(io);
+  struct Listener final : Carrier::Handler {
+    void on_datagram(std::string_view bytes, Peer) override { heard.emplace_back(bytes); }
+    void on_carrier_event(const CarrierEvent&) override {}
+    std::vector<std::string> heard;
+  } listener;
+  board_end->open(listener);
+  AsyncBoard over_memory(io, std::move(host_end));
+  over_memory.open();
+  const auto start = std::chrono::steady_clock::now();
+  ASSERT_TRUE(run_until(io, [&] { return !listener.heard.empty(); }));
+  EXPECT_LT(std::chrono::steady_clock::now() - start, 50ms);
+  EXPECT_EQ(listener.heard[0].substr(0, 9), "H:ROS2-R4");
+  board_end->close();
+}
+
+TEST_F(AsyncBoardTest, ConfirmsThroughACallback) {
+  std::optional<CommandResult> result;
+  board.open();
+  board.async_send(drive, 1s, [&](const CommandResult& r) { result = r; });
+  EXPECT_FALSE(result) << "never inside the call that starts it";
+  ASSERT_TRUE(run_until(io, [&] { return result.has_value(); }));
+  EXPECT_EQ(result->outcome, Outcome::confirmed);
+  EXPECT_EQ(board.state().osmc[0], (Drive{358, Direction::forward}));
+  EXPECT_TRUE(board.in_control());
+}
+
+TEST_F(AsyncBoardTest, ConfirmsThroughAFuture) {
+  board.open();
+  std::thread loop([&] {
+    const auto work = asio::make_work_guard(io);
+    io.run();
+  });
+  auto sent =
+      asio::post(io,
+                 asio::use_future([&] { return board.async_send(drive, 1s, asio::use_future); }))
+          .get();
+  EXPECT_EQ(sent.get().outcome, Outcome::confirmed);
+  auto stopped =
+      asio::post(io, asio::use_future([&] { return board.async_stop(1s, asio::use_future); }))
+          .get();
+  EXPECT_EQ(stopped.get().outcome, Outcome::confirmed);
+  io.stop();
+  loop.join();
+}
+
+TEST_F(AsyncBoardTest, ConfirmsThroughACoroutine) {
+  std::vector<Outcome> outcomes;
+  auto program = [&]() -> asio::awaitable<void> {
+    board.open();
+    CommandResult result = co_await board.async_identify(1s, asio::use_awaitable);
+    outcomes.push_back(result.outcome);
+    EXPECT_EQ(board.identity().board_id, "sim-1");
+    for (int i = 0; i < 3; ++i) {
+      result = co_await board.async_send(Command::servo(1500 + i, 1), 1s, asio::use_awaitable);
+      outcomes.push_back(result.outcome);
+    }
+    result = co_await board.async_stop(1s, asio::use_awaitable);
+    outcomes.push_back(result.outcome);
+    result = co_await board.async_send(drive, 1s, asio::use_awaitable);
+    outcomes.push_back(result.outcome);
+    EXPECT_EQ(result.code, Refusal::safe);
+    board.close();
+  };
+  asio::co_spawn(io, program(), [](std::exception_ptr e) { EXPECT_FALSE(e); });
+  io.run();
+  EXPECT_EQ(outcomes,
+            (std::vector<Outcome>{Outcome::confirmed, Outcome::confirmed, Outcome::confirmed,
+                                  Outcome::confirmed, Outcome::confirmed, Outcome::refused}));
+}
+
+TEST_F(AsyncBoardTest, ThrowsIntoACoroutineWhatIsOutsideItsRange) {
+  bool caught = false;
+  auto program = [&]() -> asio::awaitable<void> {
+    board.open();
+    try {
+      co_await board.async_send(Command::servo(9999, 1), 1s, asio::use_awaitable);
+    } catch (const Error& error) {
+      caught = error.kind() == ErrorKind::usage;
+    }
+    board.close();
+  };
+  asio::co_spawn(io, program(), asio::detached);
+  io.run();
+  EXPECT_TRUE(caught);
+}
+
+TEST_F(AsyncBoardTest, RunsAHandlerOnItsExecutor) {
+  asio::thread_pool pool(1);
+  std::atomic<bool> done{false};
+  std::thread::id where;
+  board.open();
+  board.async_send(drive, 1s, asio::bind_executor(pool.get_executor(), [&](const CommandResult&) {
+                     where = std::this_thread::get_id();
+                     done = true;
+                   }));
+  ASSERT_TRUE(run_until(io, [&] { return done.load(); }));
+  EXPECT_NE(where, std::this_thread::get_id());
+  board.close();
+  pool.join();
+
+  auto strand = asio::make_strand(io);
+  bool inside = false;
+  board.async_send(drive, 1s, asio::bind_executor(strand, [&](const CommandResult& result) {
+                     inside = strand.running_in_this_thread();
+                     EXPECT_EQ(result.outcome, Outcome::cancelled) << "the board is closed";
+                   }));
+  io.restart();
+  io.run();
+  EXPECT_TRUE(inside);
+}
+
+TEST_F(AsyncBoardTest, TakesMoveOnlyHandlers) {
+  std::optional<Outcome> outcome;
+  board.open();
+  board.async_send(drive, 1s, [&, owned = std::make_unique<int>(7)](const CommandResult& r) {
+    outcome = r.outcome;
+    EXPECT_EQ(*owned, 7);
+  });
+  ASSERT_TRUE(run_until(io, [&] { return outcome.has_value(); }));
+}
+
+TEST_F(AsyncBoardTest, HandlersMaySendAgain) {
+  int confirmed = 0;
+  std::function<void(const CommandResult&)> again = [&](const CommandResult& result) {
+    EXPECT_EQ(result.outcome, Outcome::confirmed);
+    if (++confirmed < 1000) board.async_identify(1s, again);
+  };
+  board.open();
+  board.async_identify(1s, again);
+  ASSERT_TRUE(run_until(io, [&] { return confirmed == 1000; }));
+}
+
+TEST_F(AsyncBoardTest, CallbacksMaySend) {
+  std::optional<Outcome> outcome;
+  board.on_state([&, sent = false](const State&, const Datagram&) mutable {
+    if (sent) return;
+    sent = true;
+    board.async_send(drive, 1s, [&](const CommandResult& r) { outcome = r.outcome; });
+  });
+  board.open();
+  ASSERT_TRUE(run_until(io, [&] { return outcome.has_value(); }));
+  EXPECT_EQ(*outcome, Outcome::confirmed);
+}
+
+TEST_F(AsyncBoardTest, IsNotInTheWayWithSixtyFiveCommands) {
+  std::vector<Outcome> outcomes;
+  const auto note = [&](const CommandResult& result) { outcomes.push_back(result.outcome); };
+  board.open();
+  for (std::size_t i = 0; i < Session::max_pending + 1; ++i) board.async_send(drive, 1s, note);
+  ASSERT_TRUE(run_until(io, [&] { return outcomes.size() == Session::max_pending + 1; }));
+  EXPECT_EQ(outcomes[0], Outcome::full) << "said at once";
+  EXPECT_EQ(std::count(outcomes.begin(), outcomes.end(), Outcome::confirmed),
+            static_cast<long>(Session::max_pending));
+}
+
+TEST_F(AsyncBoardTest, CloseCancelsAndNoCallbackFollows) {
+  std::vector<Outcome> outcomes;
+  const auto note = [&](const CommandResult& result) { outcomes.push_back(result.outcome); };
+  board.open();
+  ASSERT_TRUE(run_until(io, [&] { return board.in_control(); }));
+  board.async_send(drive, 10s, note);
+  board.async_stop(10s, note);
+  board.on_state([](const State&, const Datagram&) { ADD_FAILURE() << "called after close()"; });
+  board.close();
+  board.close();
+  board.async_send(drive, 1s, note);
+  board.async_stop(1s, note);
+  EXPECT_FALSE(board.post(drive));
+  EXPECT_TRUE(outcomes.empty()) << "handlers run on the loop";
+  io.restart();
+  io.run();  // ends: nothing is left
+  EXPECT_EQ(outcomes, std::vector<Outcome>(4, Outcome::cancelled));
+  EXPECT_THROW(board.open(), Error) << "once only";
+}
+
+TEST_F(AsyncBoardTest, MayBeClosedInACallback) {
+  int calls = 0;
+  std::optional<Outcome> outcome;
+  board.on_state([&](const State&, const Datagram&) {
+    ++calls;
+    board.close();
+  });
+  board.open();
+  board.async_send(Command::fields("ENC1"), 10s,
+                   [&](const CommandResult& r) { outcome = r.outcome; });
+  io.run();
+  EXPECT_EQ(calls, 1);
+  EXPECT_TRUE(outcome);
+}
+
+// Everywhere where the user's code runs, the board may be destroyed.
+struct DestroyedIn : testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(AsyncBoard, DestroyedIn,
+                         testing::Values("handler", "state", "heartbeat", "link", "nack"),
+                         [](const auto& place) { return std::string(place.param); });
+
+TEST_P(DestroyedIn, SurvivesIt) {
+  const std::string place = GetParam();
+  asio::io_context io;
+  BoardInAThread over_udp("udp");
+  for (const std::string& url : {std::string("sim:"), over_udp.url()}) {
+    auto board = std::make_unique<AsyncBoard>(io, url);
+    int cancelled = 0;
+    const auto destroy = [&](const auto&...) { board.reset(); };
+    if (place == "state") board->on_state(destroy);
+    if (place == "heartbeat") board->on_board_heartbeat(destroy);
+    if (place == "link") board->on_link(destroy);
+    if (place == "nack") board->on_nack(destroy);
+    board->open();
+    if (place == "handler") {
+      board->async_identify(10s, destroy);
+    } else if (place == "nack") {
+      board->async_stop(1s, [&](const CommandResult&) {
+        if (board) board->async_send(drive, 1s, [](const CommandResult&) {});
+      });
+    }
+    board->async_send(Command::fields("ENC1"), 10s, [&](const CommandResult& result) {
+      cancelled += result.outcome == Outcome::cancelled ? 1 : 0;
+    });
+    io.restart();
+    io.run();
+    EXPECT_FALSE(board);
+    EXPECT_EQ(cancelled, 1) << url;
+  }
+}
+
+TEST(AsyncBoardEnd, IsDestroyedBeforeOrWithoutItsLoop) {
+  asio::io_context io;
+  bool called = false;
+  {
+    AsyncBoard board(io, "sim:");
+    board.open();
+    board.async_send(drive, 1s, [&](const CommandResult&) { called = true; });
+  }
+  EXPECT_FALSE(called);
+  io.run();
+  EXPECT_TRUE(called);
+
+  AsyncBoard never_opened(io, "sim:");
+  std::optional<Outcome> outcome;
+  never_opened.async_stop(1s, [&](const CommandResult& r) { outcome = r.outcome; });
+  io.restart();
+  io.run();
+  EXPECT_EQ(outcome, Outcome::cancelled);
+}
+
+TEST(AsyncBoardEnd, ItsHandlersDieWithTheLoop) {
+  const auto payload = std::make_shared<int>(1);
+  {
+    asio::io_context io;
+    AsyncBoard board(io, "sim:");
+    board.open();
+    board.async_send(drive, 1s, [payload](const CommandResult&) {});
+    io.poll();
+  }
+  EXPECT_EQ(payload.use_count(), 1);
+}
+
+TEST_F(AsyncBoardTest, TellsOfEverythingThatComes) {
+  int states = 0;
+  int heartbeats = 0;
+  int links = 0;
+  int nacks = 0;
+  board.on_state([&](const State&, const Datagram& datagram) {
+    EXPECT_TRUE(datagram.has_pnum());
+    ++states;
+  });
+  board.on_board_heartbeat([&](const Datagram&) { ++heartbeats; });
+  board.on_link([&](const LinkStatus&) { ++links; });
+  board.on_nack([&](const Nack& nack, const Datagram&) {
+    EXPECT_EQ(nack.code, Refusal::safe);
+    ++nacks;
+  });
+  board.open();
+  board.async_stop(
+      1s, [&](const CommandResult&) { board.async_send(drive, 1s, [](const CommandResult&) {}); });
+  ASSERT_TRUE(
+      run_until(io, [&] { return states > 3 && heartbeats > 1 && links > 1 && nacks > 0; }));
+  EXPECT_EQ(board.carrier_counters().rx_oversize, 0U);
+  EXPECT_GT(board.carrier_counters().rx_datagrams, 3U);
+  EXPECT_EQ(board.name(), "sim:?seed=1");
+}
+
+TEST_F(AsyncBoardTest, GatesItsHeartbeatsAndFeedsFromAnyThread) {
+  board.watchdog(30ms);
+  board.open();
+  ASSERT_TRUE(run_until(io, [&] { return board.link().gated; }));
+  std::atomic<bool> stop{false};
+  std::thread feeder([&] {
+    while (!stop) board.feed();
+  });
+  EXPECT_TRUE(run_until(io, [&] { return !board.link().gated && board.in_control(); }));
+  stop = true;
+  feeder.join();
+}
+
+TEST(AsyncBoardTransport, IsLostAndBackWithItsPty) {
+  asio::io_context io;
+  auto simulated = std::make_unique<BoardInAThread>("pty");
+  AsyncBoard board(io, simulated->url());
+  std::vector<CarrierEvent::Kind> events;
+  board.on_event([&](const CarrierEvent& event) { events.push_back(event.kind); });
+  board.open();
+  ASSERT_TRUE(run_until(io, [&] { return board.in_control(); }));
+  const auto start = std::chrono::steady_clock::now();
+  simulated->switch_off();
+  simulated.reset();
+  ASSERT_TRUE(run_until(io, [&] { return board.link().state == HostLinkState::lost; }));
+  EXPECT_LT(std::chrono::steady_clock::now() - start, 300ms) << "at once, not after the timeout";
+  ASSERT_FALSE(events.empty());
+  EXPECT_EQ(events.back(), CarrierEvent::Kind::down);
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "board_in_a_thread.hpp"
+
+#include <asio/executor_work_guard.hpp>
+#include <asio/post.hpp>
+#include <asio/use_future.hpp>
+
+#include "host/command_help.hpp"
+#include "transports/registry.hpp"
+
+namespace r4::test {
+
+BoardInAThread::BoardInAThread(const std::string& transport, const std::string& script) {
+  sim::SimulatedBoard::Options options;
+  options.board_id = "test-board";
+  options.script = sim::Script::parse(script, "script");
+  options.events.on_executed = [this](std::uint32_t, std::uint32_t, const Command& command) {
+    const std::lock_guard lock(mutex_);
+    executed_.push_back(text_of(command));
+  };
+  options.events.on_state = [this](std::uint32_t, firmware::BoardState state, SafeReason reason) {
+    {
+      const std::lock_guard lock(mutex_);
+      state_ = state;
+      reason_ = reason;
+    }
+    changed_.notify_all();
+  };
+  board_ = std::make_unique<sim::SimulatedBoard>(io_, std::move(options));
+  const bool udp = transport == "udp";
+  auto carrier = Registry::standard().make(io_, udp ? "udp://127.0.0.1:0" : "pty:", Role::board);
+  const Carrier& listening = *carrier;
+  board_->add_carrier(std::move(carrier));
+  board_->start();
+  const std::string& name = listening.name();  // "udp://127.0.0.1:40123", "pty:/dev/pts/5"
+  url_ = udp ? name + "?listen=0" : "serial://" + name.substr(name.find(':') + 1);
+  thread_ = std::thread([this] {
+    const auto work = asio::make_work_guard(io_);
+    io_.run();
+  });
+}
+
+BoardInAThread::~BoardInAThread() { switch_off(); }
+
+void BoardInAThread::switch_off() {
+  if (!thread_.joinable()) return;
+  run([](sim::SimulatedBoard& board) { board.stop(); });
+  io_.stop();
+  thread_.join();
+}
+
+void BoardInAThread::run(const std::function<void(sim::SimulatedBoard&)>& action) {
+  asio::post(io_, asio::use_future([&] { action(*board_); })).get();
+}
+
+std::vector<std::string> BoardInAThread::executed() {
+  const std::lock_guard lock(mutex_);
+  return executed_;
+}
+
+bool BoardInAThread::wait_for(firmware::BoardState state, SafeReason reason) {
+  std::unique_lock lock(mutex_);
+  return changed_.wait_for(lock, std::chrono::seconds{5},
+                           [&] { return state_ == state && reason_ == reason; });
+}
+
+}  // namespace r4::test

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A simulated board with an event loop and a thread of its own, for hosts in the test's thread.
+#pragma once
+
+#include <asio/io_context.hpp>
+#include <condition_variable>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "firmware/ports/sim/simulated_board.hpp"
+
+namespace r4::test {
+
+class BoardInAThread {
+ public:
+  // What it listens on: "udp" (a free port of this machine) or "pty". `script`: what happens to it
+  // (firmware/ports/sim/script.hpp).
+  explicit BoardInAThread(const std::string& transport, const std::string& script = "");
+  ~BoardInAThread();
+  BoardInAThread(const BoardInAThread&) = delete;
+  BoardInAThread& operator=(const BoardInAThread&) = delete;
+
+  // The URL by which a host reaches it.
+  const std::string& url() const { return url_; }
+
+  // Switches it off; the transport disappears.
+  void switch_off();
+
+  // Does `action` on the board's thread.
+  void run(const std::function<void(sim::SimulatedBoard&)>& action);
+
+  // What the board has executed so far, "O:358,1,1".
+  std::vector<std::string> executed();
+  // Waits for the board to enter that state; false after 5 s.
+  bool wait_for(firmware::BoardState state, SafeReason reason = SafeReason::none);
+
+ private:
+  asio::io_context io_;
+  std::string url_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<std::string> executed_;
+  firmware::BoardState state_ = firmware::BoardState::connecting;
+  SafeReason reason_ = SafeReason::none;
+  std::unique_ptr<sim::SimulatedBoard> board_;
+  std::thread thread_;
+};
+
+}  // namespace r4::test

@@ -1,0 +1,481 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4::Board opposite simulated boards in real time: in process, over UDP and over a pty.
+#include "host/board.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <future>
+#include <thread>
+
+#include "board_in_a_thread.hpp"
+#include "host/command_help.hpp"
+#include "transports/error.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+using firmware::BoardState;
+
+// The problem that `action` throws.
+template <class Action>
+Problem problem_of(Action action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error.problem();
+  }
+  ADD_FAILURE() << "nothing was thrown";
+  return {};
+}
+
+testing::AssertionResult contains(const std::string& text, const std::string& part) {
+  if (text.find(part) != std::string::npos) return testing::AssertionSuccess();
+  return testing::AssertionFailure() << "\"" << text << "\" has no \"" << part << "\"";
+}
+
+// --- every transport
+
+class BoardOver : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Transports, BoardOver, testing::Values("udp", "pty"),
+                         [](const auto& transport) { return std::string(transport.param); });
+
+TEST_P(BoardOver, ConfirmsEveryCommandOnceExecuted) {
+  BoardInAThread simulated(GetParam());
+  Board board(simulated.url());
+  board.wait_active();
+  board.setting("rate", "1000");
+  board.fields("ALL");
+  board.osmc(1).set(358, Direction::forward);
+  board.osmc(4).set(4095, Direction::reverse);
+  board.dhb12(2).set(100, Direction::forward);
+  board.servo(16).set(1500);
+  board.relay(3).set(true);
+  board.stepper(2).move_to(-5, 20000);
+  board.bldc(4).set(2000, Direction::forward, true);
+  board.proximity(1, 15);
+  board.stepper(1).zero();
+  board.setting("recovery", "rearm");
+  board.send("S:0,16");
+  const State state = board.next_state();
+  EXPECT_EQ(state.osmc[0], (Drive{358, Direction::forward}));
+  EXPECT_EQ(state.osmc[3], (Drive{4095, Direction::reverse}));
+  EXPECT_EQ(state.dhb12[1], (Drive{100, Direction::forward}));
+  EXPECT_EQ(state.relays, 0b100);
+  EXPECT_EQ(state.bldc[3], (Bldc{2000, Direction::forward, true}));
+  EXPECT_EQ(state.servo_us[15], 0);
+  const std::vector<std::string> after_settings{
+      "O:358,1,1",    "O:4095,0,4", "D:100,1,2", "S:1500,16",        "R:3,On", "P:-5,20000,2",
+      "B:2000,1,1,4", "U:15,1",     "Z:1",       "C:recovery,rearm", "S:0,16"};
+  std::vector<std::string> executed = simulated.executed();
+  ASSERT_GE(executed.size(), after_settings.size());
+  executed.erase(executed.begin(), executed.end() - static_cast<long>(after_settings.size()));
+  EXPECT_EQ(executed, after_settings) << "each once, in order";
+}
+
+TEST_P(BoardOver, StopsUntilCleared) {
+  BoardInAThread simulated(GetParam());
+  Board board(simulated.url());
+  board.wait_active();
+  board.osmc(1).set(1000, Direction::forward);
+  board.stop();
+  EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::stop));
+  EXPECT_EQ(board.link(), (LinkStatus{HostLinkState::safe, SafeReason::stop}));
+
+  const Problem refused = problem_of([&] { board.osmc(1).set(5, Direction::forward); });
+  EXPECT_EQ(refused.kind, ErrorKind::refused);
+  EXPECT_EQ(refused.thing, "O:5,1,1");
+  EXPECT_TRUE(contains(refused.reason, "SAFE"));
+  EXPECT_TRUE(contains(refused.reason, "emergency stop"));
+  EXPECT_TRUE(contains(refused.fix, "E:CLEAR"));
+
+  board.clear();
+  board.wait_active();
+  EXPECT_EQ(board.next_state().osmc[0].pwm, 0) << "nothing comes back after a stop";
+  board.osmc(1).set(5, Direction::forward);
+}
+
+TEST_P(BoardOver, TheBoardGoesSafeWhenTheApplicationHangs) {
+  BoardInAThread simulated(GetParam());
+  Board board(simulated.url());
+  board.setting("heartbeat", "50");
+  board.setting("timeout", "150");
+  board.watchdog(100ms);
+  std::promise<void> gated;
+  board.on_link([&, told = false](const LinkStatus& link) mutable {
+    if (link.gated && !told) {
+      told = true;
+      gated.set_value();
+    }
+  });
+  ASSERT_EQ(gated.get_future().wait_for(5s), std::future_status::ready);
+  EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::link));
+  const Problem problem = problem_of([&] { board.wait_active(50ms); });
+  EXPECT_TRUE(contains(problem.reason, "watchdog"));
+  EXPECT_TRUE(contains(problem.fix, "feed()"));
+  board.watchdog(0ms);
+  board.wait_active();
+}
+
+TEST_P(BoardOver, TheBoardGoesSafeWhenTheHostIsGone) {
+  BoardInAThread simulated(GetParam());
+  {
+    Board board(simulated.url());
+    board.setting("heartbeat", "50");
+    board.setting("timeout", "150");
+  }
+  EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::link));
+}
+
+TEST_P(BoardOver, FindsTheBoardAgainAfterAReboot) {
+  BoardInAThread simulated(GetParam(), "0.3 reboot\n0.31 enc 1 77\n");
+  Board board(simulated.url());
+  board.fields("ENC1");
+  board.osmc(1).set(358, Direction::forward);
+  std::promise<void> rebooted;
+  board.on_state([&, done = false](const State& state) mutable {
+    if (done || state.encoder_counts[0] != 77) return;
+    done = true;
+    rebooted.set_value();
+  });
+  ASSERT_EQ(rebooted.get_future().wait_for(5s), std::future_status::ready)
+      << "the link comes back, with the fields that were chosen";
+  board.fields("OSMC1");
+  EXPECT_EQ(board.next_state().osmc[0].pwm, 0) << "but not the setpoints";
+  board.osmc(1).set(359, Direction::forward);
+}
+
+// --- opening
+
+TEST(Board, SaysWhatIsWrongWithAUrl) {
+  const Problem scheme = problem_of([] { Board("fax:123"); });
+  EXPECT_EQ(scheme.kind, ErrorKind::usage);
+  EXPECT_TRUE(contains(scheme.fix, "udp://HOST"));
+  EXPECT_TRUE(contains(scheme.fix, "sim:"));
+  EXPECT_EQ(problem_of([] { Board(""); }).kind, ErrorKind::usage);
+  EXPECT_EQ(problem_of([] { Board("udp://127.0.0.1?color=red"); }).kind, ErrorKind::usage);
+  EXPECT_EQ(problem_of([] { Board("serial:///dev/there-is-no-such-port"); }).kind, ErrorKind::open);
+  EXPECT_EQ(problem_of([] { Board("sim:?node=99"); }).kind, ErrorKind::usage);
+}
+
+TEST(Board, SaysThatAPortIsInUse) {
+  BoardInAThread simulated("pty");
+  Board board(simulated.url());
+  const Problem problem = problem_of([&] { Board another(simulated.url()); });
+  EXPECT_EQ(problem.kind, ErrorKind::open);
+  EXPECT_FALSE(problem.fix.empty());
+}
+
+TEST(Board, SaysWhatTheLinkIsInsteadOfActive) {
+  Board board("udp://127.0.0.1:9?listen=0");
+  const Problem nobody = problem_of([&] { board.wait_active(30ms); });
+  EXPECT_EQ(nobody.kind, ErrorKind::refused);
+  EXPECT_EQ(nobody.thing, board.name());
+  EXPECT_TRUE(contains(nobody.reason, "nothing was heard"));
+  const Problem command = problem_of([&] { board.osmc(1).set(1, Direction::forward, 30ms); });
+  EXPECT_EQ(command.thing, "O:1,1,1");
+  EXPECT_TRUE(contains(command.reason, "not confirmed within 3"));
+  EXPECT_TRUE(contains(command.reason, "nothing was heard"));
+  EXPECT_TRUE(contains(problem_of([&] { board.next_state(30ms); }).reason, "nothing was heard"));
+  EXPECT_TRUE(contains(problem_of([&] { board.identify(30ms); }).reason, "not confirmed"));
+  EXPECT_TRUE(contains(problem_of([&] { board.stop(30ms); }).reason, "not confirmed"));
+  EXPECT_FALSE(board.post(Command::osmc(1, Direction::forward, 1)));
+}
+
+TEST(Board, SaysThatAnotherHostControlsTheBoard) {
+  BoardInAThread simulated("udp");
+  Board owner(simulated.url());
+  owner.wait_active();
+  Board other(simulated.url());
+  const Problem problem = problem_of([&] { other.osmc(1).set(1, Direction::forward, 300ms); });
+  EXPECT_EQ(problem.kind, ErrorKind::refused);
+  EXPECT_TRUE(contains(problem.reason, "another host controls the board"));
+  EXPECT_TRUE(other.link().busy);
+
+  other.stop();  // which anyone may
+  EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::stop));
+  owner.clear();
+  owner.close();
+  ASSERT_NO_THROW(other.wait_active(5s)) << "control is free once the owner is silent";
+}
+
+// --- commands
+
+TEST(Board, ThrowsForEveryValueOutsideItsRange) {
+  Board board("sim:");
+  const auto is_usage = [](auto action) {
+    const Problem problem = problem_of(action);
+    EXPECT_EQ(problem.kind, ErrorKind::usage) << problem.text();
+    EXPECT_FALSE(problem.fix.empty()) << problem.text();
+    EXPECT_FALSE(problem.thing.empty()) << problem.text();
+  };
+  is_usage([&] { board.osmc(5).set(1, Direction::forward); });
+  is_usage([&] { board.osmc(0).set(1, Direction::forward); });
+  is_usage([&] { board.osmc(-1).set(1, Direction::forward); });
+  is_usage([&] { board.osmc(257).set(1, Direction::forward); });
+  is_usage([&] { board.osmc(1).set(5000, Direction::forward); });
+  is_usage([&] { board.osmc(1).set(-1, Direction::forward); });
+  is_usage([&] { board.dhb12(5).set(1, Direction::forward); });
+  is_usage([&] { board.servo(17).set(1500); });
+  is_usage([&] { board.servo(1).set(2501); });
+  is_usage([&] { board.relay(9).set(true); });
+  is_usage([&] { board.stepper(5).move_to(1); });
+  is_usage([&] { board.stepper(1).move_to(1, 20001); });
+  is_usage([&] { board.stepper(1).move_to(1, 0); });
+  is_usage([&] { board.stepper(0).zero(); });
+  is_usage([&] { board.bldc(5).set(1, Direction::forward); });
+  is_usage([&] { board.bldc(1).set(4096, Direction::forward); });
+  is_usage([&] { board.proximity(5, 1); });
+  is_usage([&] { board.proximity(1, 401); });
+  is_usage([&] { board.fields("AIN24,AIN99"); });
+  is_usage([&] { board.setting("rate", "0"); });
+  is_usage([&] { board.setting("colour", "red"); });
+  is_usage([&] { board.send("O:1,1"); });
+  is_usage([&] { board.send("X:1"); });
+  is_usage([&] { board.send("osmc 1"); });
+  is_usage([&] { board.post(Command::osmc(5000, Direction::forward, 1)); });
+  EXPECT_EQ(board.statistics().refused, 0U) << "none of them was sent";
+}
+
+TEST(Board, SaysTheRangeInTheFix) {
+  Board board("sim:");
+  EXPECT_EQ(problem_of([&] { board.osmc(5).set(1, Direction::forward); }).text(),
+            "O:1,1,5: no such channel; use O:pwm,dir,ch with pwm 0-4095, dir 0 or 1, ch 1-4");
+}
+
+TEST(Board, PostsSetpointsWithoutWaiting) {
+  BoardInAThread simulated("udp");
+  Board board(simulated.url());
+  board.wait_active();
+  for (int pwm = 1; pwm <= 100; ++pwm) {
+    EXPECT_TRUE(board.post(Command::osmc(pwm, Direction::forward, 1)));
+  }
+  board.servo(1).set(1500);  // behind all of them
+  EXPECT_EQ(board.next_state().osmc[0].pwm, 100);
+}
+
+TEST(Board, StopsWithoutWaiting) {
+  BoardInAThread simulated("udp");
+  Board board(simulated.url());
+  board.wait_active();
+  board.stop_async();
+  EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::stop));
+}
+
+TEST(Board, TellsWhoItIs) {
+  Board board("sim:?node=3");
+  const BoardIdentity identity = board.identify();
+  EXPECT_EQ(identity.board_id, "sim-3");
+  EXPECT_EQ(identity.firmware, "0.1.0");
+  EXPECT_FALSE(identity.capabilities.empty());
+}
+
+TEST(Board, MeasuresTheLink) {
+  Board board("sim:");
+  board.wait_active();
+  board.identify();
+  for (int i = 0; i < 20; ++i) board.next_state();
+  const Statistics statistics = board.statistics();
+  EXPECT_GE(statistics.states, 20U);
+  EXPECT_EQ(statistics.packets.lost, 0U);
+  EXPECT_EQ(statistics.packets.duplicate, 0U);
+  EXPECT_GT(statistics.round_trip_us, 0);
+  EXPECT_GT(statistics.state_rate_hz, 50);
+  EXPECT_LT(statistics.state_rate_hz, 150);
+  EXPECT_EQ(statistics.loss(), 0);
+  board.close();
+  EXPECT_GE(board.statistics().states, statistics.states) << "they stay after the end";
+}
+
+TEST(Board, TakesCommandsFromSeveralThreadsAtOnce) {
+  BoardInAThread simulated("udp");
+  Board board(simulated.url());
+  board.setting("rate", "1000");
+  std::atomic<int> confirmed{0};
+  std::vector<std::thread> threads;
+  for (int channel = 1; channel <= 4; ++channel) {
+    threads.emplace_back([&, channel] {
+      for (int i = 0; i < 50; ++i) {
+        board.osmc(channel).set(i, Direction::forward, 5s);
+        board.post(Command::servo(i, channel));
+        static_cast<void>(board.state());
+        static_cast<void>(board.link());
+        static_cast<void>(board.statistics());
+        board.feed();
+        ++confirmed;
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(confirmed, 200);
+  const State state = board.next_state();
+  EXPECT_EQ(state.osmc[0].pwm, 49);
+}
+
+TEST(Board, LetsAStopCancelWhatOtherThreadsWaitFor) {
+  Board board("udp://127.0.0.1:9?listen=0");
+  auto waiting = std::async(std::launch::async, [&] {
+    return problem_of([&] { board.osmc(1).set(1, Direction::forward, 20s); });
+  });
+  while (waiting.wait_for(1ms) != std::future_status::ready) board.stop_async();
+  EXPECT_TRUE(contains(waiting.get().reason, "cancelled"));
+}
+
+// --- callbacks
+
+TEST(Board, CallsBackWithStatesAndLinkChanges) {
+  Board board("sim:");
+  std::promise<std::thread::id> caller;
+  std::atomic<int> states{0};
+  std::atomic<bool> active{false};
+  board.on_link([&](const LinkStatus& link) { active = link.state == HostLinkState::active; });
+  board.on_state([&](const State& state) {
+    EXPECT_TRUE(state.present.has(StateField::ain24));
+    if (states++ == 0) caller.set_value(std::this_thread::get_id());
+  });
+  auto future = caller.get_future();
+  ASSERT_EQ(future.wait_for(5s), std::future_status::ready);
+  EXPECT_NE(future.get(), std::this_thread::get_id());
+  board.on_state({});
+  const int seen = states;
+  for (int i = 0; i < 3; ++i) board.next_state();
+  EXPECT_EQ(states, seen) << "none after it was turned off";
+}
+
+TEST(Board, RefusesToWaitInACallback) {
+  Board board("sim:");
+  std::promise<std::vector<Problem>> told;
+  board.on_state([&, done = false](const State&) mutable {
+    if (done) return;
+    done = true;
+    std::vector<Problem> problems;
+    problems.push_back(problem_of([&] { board.osmc(1).set(1, Direction::forward); }));
+    problems.push_back(problem_of([&] { board.wait_active(); }));
+    problems.push_back(problem_of([&] { board.next_state(); }));
+    problems.push_back(problem_of([&] { board.identify(); }));
+    problems.push_back(problem_of([&] { board.stop(); }));
+    static_cast<void>(board.state());
+    static_cast<void>(board.statistics());
+    board.watchdog(0ms);
+    board.post(Command::servo(1, 1));
+    board.stop_async();
+    told.set_value(problems);
+  });
+  auto future = told.get_future();
+  ASSERT_EQ(future.wait_for(5s), std::future_status::ready);
+  for (const Problem& problem : future.get()) {
+    EXPECT_EQ(problem.kind, ErrorKind::usage) << problem.text();
+    EXPECT_TRUE(contains(problem.reason, "callback"));
+  }
+}
+
+TEST(Board, LetsACallbackReplaceItself) {
+  Board board("sim:");
+  std::promise<int> told;
+  const auto payload = std::make_shared<int>(42);
+  board.on_state([&, payload](const State&) {
+    board.on_state({});
+    told.set_value(*payload);  // of the function that was replaced
+  });
+  auto future = told.get_future();
+  ASSERT_EQ(future.wait_for(5s), std::future_status::ready);
+  EXPECT_EQ(future.get(), 42);
+}
+
+// --- the end
+
+TEST(Board, ClosesTwiceAndThenRefusesEverything) {
+  Board board("sim:");
+  board.wait_active();
+  board.close();
+  board.close();
+  EXPECT_TRUE(
+      contains(problem_of([&] { board.osmc(1).set(1, Direction::forward); }).reason, "closed"));
+  EXPECT_TRUE(contains(problem_of([&] { board.wait_active(); }).reason, "closed"));
+  EXPECT_TRUE(contains(problem_of([&] { board.next_state(); }).reason, "closed"));
+  EXPECT_FALSE(board.post(Command::servo(1, 1)));
+  board.on_state([](const State&) {});
+  board.watchdog(10ms);
+  board.feed();
+  board.stop_async();
+  EXPECT_NE(board.state().t_ms, 0U) << "the last state stays";
+}
+
+TEST(Board, CloseWakesAllWhoWait) {
+  Board board("udp://127.0.0.1:9?listen=0");
+  const auto reason_of = [](auto action) {
+    return std::async(std::launch::async, [action] { return problem_of(action).reason; });
+  };
+  std::vector<std::future<std::string>> waiting;
+  waiting.push_back(reason_of([&] { board.osmc(1).set(1, Direction::forward, 60s); }));
+  waiting.push_back(reason_of([&] { board.identify(60s); }));
+  waiting.push_back(reason_of([&] { board.wait_active(60s); }));
+  waiting.push_back(reason_of([&] { board.next_state(60s); }));
+  EXPECT_EQ(waiting[0].wait_for(20ms), std::future_status::timeout);
+  board.close();
+  for (auto& each : waiting) {
+    ASSERT_EQ(each.wait_for(5s), std::future_status::ready);
+    EXPECT_TRUE(contains(each.get(), "closed"));
+  }
+}
+
+TEST(Board, IsDestroyedWhileOthersWait) {
+  auto board = std::make_unique<Board>("udp://127.0.0.1:9?listen=0");
+  std::vector<std::future<std::string>> waiting;
+  std::atomic<int> begun{0};
+  for (int i = 0; i < 4; ++i) {
+    waiting.push_back(std::async(std::launch::async, [&, raw = board.get(), i] {
+      ++begun;
+      return problem_of([&] {
+               if (i % 2 == 0) {
+                 raw->osmc(1).set(1, Direction::forward, 60s);
+               } else {
+                 raw->next_state(60s);
+               }
+             })
+          .reason;
+    }));
+  }
+  while (begun < 4) std::this_thread::yield();
+  EXPECT_EQ(waiting[0].wait_for(50ms), std::future_status::timeout);
+  board.reset();
+  for (auto& each : waiting) {
+    ASSERT_EQ(each.wait_for(5s), std::future_status::ready);
+    EXPECT_TRUE(contains(each.get(), "closed"));
+  }
+}
+
+TEST(Board, ClosesInACallback) {
+  Board board("sim:");
+  std::promise<void> closed;
+  board.on_state([&, first = true](const State&) mutable {
+    EXPECT_TRUE(first) << "no callback after close()";
+    first = false;
+    board.close();
+    closed.set_value();
+  });
+  ASSERT_EQ(closed.get_future().wait_for(5s), std::future_status::ready);
+  EXPECT_TRUE(contains(problem_of([&] { board.next_state(); }).reason, "closed"));
+}
+
+TEST(Board, IsDestroyedInACallback) {
+  auto board = std::make_unique<Board>("sim:");
+  std::promise<void> destroyed;
+  board->on_state([&](const State&) {
+    board.reset();
+    destroyed.set_value_at_thread_exit();  // also the board's thread ends
+  });
+  ASSERT_EQ(destroyed.get_future().wait_for(5s), std::future_status::ready);
+}
+
+TEST(Board, OpensAndClosesAtAnyMoment) {
+  for (int i = 0; i < 30; ++i) {
+    Board board("sim:");
+    if (i % 3 == 1) board.stop_async();
+    if (i % 3 == 2) board.wait_active();
+  }
+}
+
+}  // namespace
+}  // namespace r4::test
