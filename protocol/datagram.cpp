@@ -51,44 +51,6 @@ Trailer read_trailer(const char* at, const char* end) {
   return trailer;
 }
 
-// Follows runs of set bits: for each bit of `starts`, which stands in a run of `run`, the bit
-// behind the run's end. The addition does it: a start carries through its run and no further.
-// `carry` takes a run over the end of the word, into bit 0 of the next.
-std::uint64_t run_ends(std::uint64_t run, std::uint64_t starts, std::uint64_t& carry) {
-  const std::uint64_t sum = run + (starts | carry);
-  carry = sum < run ? 1 : 0;
-  return sum & ~run;
-}
-
-// Marks in `ends` the colon behind each name and the semicolon behind each field, and in
-// `short_names` those colons that stand one or four bytes behind the beginning of a field; 64 bytes
-// a word. False if the fields are not of the grammar. The time does not depend on how many there
-// are.
-bool mark_fields(Text fields, std::uint64_t* ends, std::uint64_t* short_names) {
-  if (fields.empty() || *(fields.end() - 1) != ';') return false;
-  std::uint64_t starts = 0;
-  std::uint64_t first = 1;  // a field begins with the word's first byte
-  std::uint64_t name_carry = 0;
-  std::uint64_t value_carry = 0;
-  for (std::size_t at = 0, word = 0; at < fields.size(); at += separators_block, ++word) {
-    const Separators found = separators(fields.substr(at, separators_block));
-    const std::uint64_t name = ~(found.colons | found.no_name);
-    const std::uint64_t value = ~(found.semicolons | found.no_field);
-    const std::uint64_t before = starts;
-    starts = found.semicolons << 1 | first;
-    first = found.semicolons >> 63;
-    const std::uint64_t name_ends = run_ends(name, starts & name, name_carry);
-    const std::uint64_t field_ends = run_ends(value, name_ends, value_carry);
-    if ((starts & ~name) != 0 || (name_ends & ~found.colons) != 0 ||
-        field_ends != found.semicolons) {
-      return false;
-    }
-    ends[word] = name_ends | field_ends;
-    short_names[word] = name_ends & (starts << 1 | before >> 63 | starts << 4 | before >> 60);
-  }
-  return true;
-}
-
 // The first byte that is not of the grammar, `fields.end()` if the last field is not closed.
 const char* first_wrong_byte(Text fields) {
   const char* at = fields.begin();
@@ -100,6 +62,13 @@ const char* first_wrong_byte(Text fields) {
     ++at;
   } while (at != fields.end());
   return at;
+}
+
+// Is the field name that ends before `colon` this one?
+inline bool ends_in_name(const char* begin, const char* colon, Text name) {
+  if (static_cast<std::size_t>(colon - begin) < name.size()) return false;
+  const char* const at = colon - name.size();
+  return Text(at, name.size()) == name && (at == begin || at[-1] == ';');
 }
 
 // Reads a number that may stand once; returns where it is not one, nullptr if it is.
@@ -167,14 +136,14 @@ Field Datagram::find(Text name) const {
 }
 
 const char* Datagram::read_numbers(const std::uint64_t* short_names) {
+  constexpr Text time("T");
+  constexpr Text pnum("PNum");
   for (std::size_t word = 0; word * 64 < fields_.size(); ++word) {
     for (std::uint64_t left = short_names[word]; left != 0; left &= left - 1) {
       const char* const colon = fields_.begin() + word * 64 + __builtin_ctzll(left);
-      const char* begin = colon - 1;
-      while (begin != fields_.begin() && begin[-1] != ';') --begin;
-      const Text name = between(begin, colon);
-      const bool is_time = name == Text("T");
-      if (!is_time && name != Text("PNum")) continue;
+      const bool is_time = ends_in_name(fields_.begin(), colon, time);
+      if (!is_time && !ends_in_name(fields_.begin(), colon, pnum)) continue;
+      const Text name = between(colon - (is_time ? time : pnum).size(), colon);
       const Text value = between(colon + 1, find_byte(colon, fields_.end(), ';'));
       const char* const wrong = is_time ? take_number(name, value, has_time_, time_ms_)
                                         : take_number(name, value, has_pnum_, pnum_);

@@ -46,7 +46,7 @@ DatagramWriter& DatagramWriter::field(const FieldName& name) {
   const std::size_t skip = open_ ? 0 : 1;  // the first field has no semicolon in front
   // All of text_, whose size is known: what is behind the name is written over.
   std::memcpy(at_, name.text_ + skip, sizeof name.text_ - 1);
-  at_ += name.size_ - skip;
+  at_ += name.size_ + 2 - skip;
   open_ = true;
   has_value_ = false;
   return *this;

@@ -24,16 +24,16 @@ namespace r4 {
 class FieldName {
  public:
   template <std::size_t N>
-  explicit constexpr FieldName(const char (&name)[N]) : size_(N + 1) {
-    static_assert(N > 1 && N + 1 <= sizeof text_, "a name has 1 to 12 characters");
+  explicit constexpr FieldName(const char (&name)[N]) : size_(N - 1) {
+    static_assert(N > 1 && N + 1 < sizeof text_, "a name has 1 to 12 characters");
     text_[0] = ';';
     for (std::size_t i = 0; i + 1 < N; ++i) text_[i + 1] = name[i];
     text_[N] = ':';
   }
-  constexpr Text name() const { return Text(text_ + 1, std::size_t{size_} - 2); }
+  constexpr Text name() const { return Text(text_ + 1, size_); }
   // Is it of the grammar? For a static_assert beside the names.
   constexpr bool allowed() const {
-    for (int i = 1; i + 1 < size_; ++i) {
+    for (int i = 1; i <= size_; ++i) {
       const char c = text_[i];
       if (c <= ' ' || c > '~' || c == ':' || c == ';' || c == ',' || c == '^') return false;
     }
@@ -43,7 +43,7 @@ class FieldName {
  private:
   friend class DatagramWriter;
   char text_[15] = {};
-  std::uint8_t size_;
+  std::uint8_t size_;  // of the name alone
 };
 
 class DatagramWriter {

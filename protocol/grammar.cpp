@@ -14,7 +14,7 @@ const ByteClasses byte_classes;
 namespace {
 
 // The 16 bytes at `at` as bits `shift` and up.
-inline void add_separators(const char* at, int shift, Separators& out) {
+inline void add_separators(const char* at, unsigned shift, Separators& out) {
   const __m128i bytes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(at));
   const auto equal = [&](char c) { return _mm_cmpeq_epi8(bytes, _mm_set1_epi8(c)); };
   const auto bits = [&](__m128i mask) {
@@ -24,8 +24,8 @@ inline void add_separators(const char* at, int shift, Separators& out) {
   // Signed: also the bytes from 0x80.
   const __m128i below_space = _mm_cmplt_epi8(bytes, _mm_set1_epi8(' '));
   const __m128i no_field = _mm_or_si128(below_space, _mm_or_si128(equal('^'), equal('\x7F')));
-  const __m128i no_name = _mm_or_si128(_mm_or_si128(no_field, semicolon),
-                                       _mm_or_si128(equal(' '), equal(',')));
+  const __m128i no_name =
+      _mm_or_si128(_mm_or_si128(no_field, semicolon), _mm_or_si128(equal(' '), equal(',')));
   out.colons |= bits(equal(':'));
   out.semicolons |= bits(semicolon);
   out.no_name |= bits(no_name);
@@ -43,7 +43,8 @@ Separators separators(Text block) {
     std::memcpy(copy, at, block.size());
     at = copy;
   }
-  for (int shift = 0; shift < 64; shift += 16) add_separators(at + shift, shift, out);
+  for (unsigned shift = 0; shift < block.size(); shift += 16)
+    add_separators(at + shift, shift, out);
   return out;
 }
 
@@ -68,5 +69,43 @@ Separators separators(Text block) {
 }
 
 #endif
+
+namespace {
+
+// Follows runs of set bits: for each bit of `starts`, which stands in a run of `run`, the bit
+// behind the run's end. The addition does it: a start carries through its run and no further.
+// `carry` takes a run over the end of the word, into bit 0 of the next.
+std::uint64_t run_ends(std::uint64_t run, std::uint64_t starts, std::uint64_t& carry) {
+  const std::uint64_t sum = run + (starts | carry);
+  carry = sum < run ? 1 : 0;
+  return sum & ~run;
+}
+
+}  // namespace
+
+bool mark_fields(Text fields, std::uint64_t* ends, std::uint64_t* short_names) {
+  if (fields.empty() || *(fields.end() - 1) != ';') return false;
+  std::uint64_t starts = 0;
+  std::uint64_t first = 1;  // a field begins with the word's first byte
+  std::uint64_t name_carry = 0;
+  std::uint64_t value_carry = 0;
+  for (std::size_t at = 0, word = 0; at < fields.size(); at += separators_block, ++word) {
+    const Separators found = separators(fields.substr(at, separators_block));
+    const std::uint64_t name = ~(found.colons | found.no_name);
+    const std::uint64_t value = ~(found.semicolons | found.no_field);
+    const std::uint64_t before = starts;
+    starts = found.semicolons << 1 | first;
+    first = found.semicolons >> 63;
+    const std::uint64_t name_ends = run_ends(name, starts & name, name_carry);
+    const std::uint64_t field_ends = run_ends(value, name_ends, value_carry);
+    if ((starts & ~name) != 0 || (name_ends & ~found.colons) != 0 ||
+        field_ends != found.semicolons) {
+      return false;
+    }
+    ends[word] = name_ends | field_ends;
+    short_names[word] = name_ends & (starts << 1 | before >> 63 | starts << 4 | before >> 60);
+  }
+  return true;
+}
 
 }  // namespace r4

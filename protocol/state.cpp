@@ -150,16 +150,23 @@ bool parse_into(Text text, std::uint32_t limit, Member& out) {
   return true;
 }
 
-bool parse_drive(Text text, Drive& out) {
-  Text values[2];
-  return Field(Text(), text).split(values, 2) == 2 && parse_into(values[0], pwm_max, out.pwm) &&
-         parse_into(values[1], 1, out.direction);
+// Takes the first value off `rest`.
+Text next_value(Text& rest) {
+  std::size_t size = 0;
+  while (size < rest.size() && rest[size] != ',') ++size;
+  const Text value = rest.substr(0, size);
+  rest = rest.substr(size < rest.size() ? size + 1 : size);
+  return value;
 }
 
-bool parse_bldc(Text text, Bldc& out) {
-  Text values[3];
-  return Field(Text(), text).split(values, 3) == 3 && parse_into(values[0], pwm_max, out.speed) &&
-         parse_into(values[1], 1, out.direction) && parse_into(values[2], 1, out.brake);
+// The last value is the whole rest: one too many leaves a comma in it, one too few leaves nothing.
+bool parse_drive(Text rest, Drive& out) {
+  return parse_into(next_value(rest), pwm_max, out.pwm) && parse_into(rest, 1, out.direction);
+}
+
+bool parse_bldc(Text rest, Bldc& out) {
+  return parse_into(next_value(rest), pwm_max, out.speed) &&
+         parse_into(next_value(rest), 1, out.direction) && parse_into(rest, 1, out.brake);
 }
 
 // `text` is the field's values; the number parsers refuse a comma.
