@@ -93,7 +93,10 @@ void Session::on_state_datagram(const Datagram& datagram, Time now) {
   }
   const SafeReason reason = fresh.present.has(StateField::safe) ? fresh.safe : SafeReason::none;
   const Arrival arrival = link_.on_datagram(fresh.pnum, fresh.t_ms, false, reason, to_ms(now));
-  if (!is_current(arrival)) return;  // an older state must not replace a newer one
+  // An older state must not replace a newer one. A late one that only a heartbeat or an answer has
+  // overtaken, in a queue where those go first, is still the newest state.
+  const bool newest_state = arrival == Arrival::late && newer(fresh.pnum, state_.pnum);
+  if (!is_current(arrival) && !newest_state) return;
   collector_.on_state(fresh.t_ms, now);
   state_ = fresh;
   state_.safe = reason;

@@ -194,6 +194,19 @@ TEST(Session, LetsNoOlderStateReplaceANewerOne) {
   EXPECT_EQ(link.session.statistics(link.now).packets.late, 1U);
 }
 
+TEST(Session, TakesTheNewestStateThatAHeartbeatHasOvertaken) {
+  ScriptedLink link;
+  link.connect();
+  link.state("ENC1:1;SAFE:0;CMD:1;");
+  ++link.board_pnum;
+  link.heartbeat();
+  const std::size_t known = link.states.size();
+  link.board_pnum -= 2;
+  link.state("ENC1:2;SAFE:0;CMD:1;");
+  EXPECT_EQ(link.states.size(), known + 1);
+  EXPECT_EQ(link.session.state().encoder_counts[0], 2);
+}
+
 TEST(Session, CountsDamagedDatagramsAndGoesOn) {
   ScriptedLink link;
   link.connect();
