@@ -28,6 +28,8 @@ using Clock = std::chrono::steady_clock;
 
 constexpr Milliseconds connect_timeout{3000};
 constexpr Milliseconds answer_timeout{1000};
+// More would run ahead of the board's window of packet numbers (protocol/board_link.hpp).
+constexpr std::size_t most_questions = 20000;
 
 struct Options {
   std::vector<std::string> urls;
@@ -123,42 +125,46 @@ class Bench {
     if (states_ == 0) throw Error(explain(board_.name(), board_.link()));
   }
 
+  // Asks again as soon as an answer is there.
   void ask() {
-    asking_ = true;
+    running_ = true;
     ask_next();
     run_for(options_.duration * 2 / 5);
-    asking_ = false;
+    running_ = false;
   }
   void ask_next() {
     board_.async_identify(answer_timeout, [this](const CommandResult& result) {
-      if (!asking_) return;
-      if (result.outcome == Outcome::confirmed) {
-        round_trips_.add(result.elapsed);
+      if (!running_ || !count(result, round_trips_, unanswered_)) return;
+      if (round_trips_.count() == most_questions) {
+        io_.stop();
       } else {
-        ++unanswered_;
+        ask_next();
       }
-      ask_next();
     });
   }
 
   // The session's own choice of fields again: a command that changes nothing.
   void command() {
-    commanding_ = true;
+    running_ = true;
     command_next();
     run_for(options_.duration / 5);
-    commanding_ = false;
+    running_ = false;
   }
   void command_next() {
     board_.async_send(Command::fields(Text("DEFAULT")), answer_timeout,
                       [this](const CommandResult& result) {
-                        if (!commanding_) return;
-                        if (result.outcome == Outcome::confirmed) {
-                          confirmations_.add(result.elapsed);
-                        } else {
-                          ++unconfirmed_;
-                        }
-                        command_next();
+                        if (running_ && count(result, confirmations_, unconfirmed_)) command_next();
                       });
+  }
+
+  // False where going on would only fail again: the board refuses.
+  static bool count(const CommandResult& result, Durations& durations, std::uint64_t& failed) {
+    if (result.outcome == Outcome::confirmed) {
+      durations.add(result.elapsed);
+    } else {
+      ++failed;
+    }
+    return result.outcome == Outcome::confirmed || result.outcome == Outcome::timed_out;
   }
 
   double per_second() const {
@@ -215,10 +221,9 @@ class Bench {
   std::uint64_t damaged_ = 0;
   double state_hz_ = 0;
   double jitter_us_ = 0;
-  bool asking_ = false;
+  bool running_ = false;  // a question or command follows the other
   Durations round_trips_;
   std::uint64_t unanswered_ = 0;
-  bool commanding_ = false;
   Durations confirmations_;
   std::uint64_t unconfirmed_ = 0;
 };

@@ -224,7 +224,7 @@ void Story::stop() {
   teller_.say("stop      E:STOP, the emergency stop, which the board obeys from anyone:");
   teller_.show(state_bytes_);
   teller_.say(
-      fmt::format("          SAFE:2, motor off, confirmed after {:.1f} ms. It stays so until",
+      fmt::format("          SAFE:2, motor off, confirmed after {:.1f} ms; latched until E:CLEAR.",
                   result_.stop_ms));
 }
 
@@ -235,7 +235,7 @@ void Story::clear() {
           "E:CLEAR did not clear the stop");
   require(state_.osmc[0] == Drive(), "a command came back after an emergency stop");
   teller_.say(
-      "clear     E:CLEAR. After a stop nothing comes back by itself: the motor is still off.");
+      "clear     E:CLEAR allows it to move again. Nothing comes back by itself: the motor is off.");
 }
 
 }  // namespace r4::tool

@@ -54,6 +54,13 @@ CLI::Option* number(CLI::App& command, const std::string& name, Out& out, std::u
       ->type_name("N");
 }
 
+template <class Out>
+CLI::Option* url(CLI::App& command, Out& out) {
+  return command.add_option("URL", out, "where the board is, such as udp://192.168.0.125")
+      ->required()
+      ->type_name(url_type);
+}
+
 }  // namespace
 
 CLI::Option* add_seconds(CLI::App& command, const std::string& name, Milliseconds& out,
@@ -79,10 +86,9 @@ CLI::Option* add_json(CLI::App& command, bool& out, const std::string& meaning) 
   return command.add_flag("--json", out, meaning);
 }
 
+CLI::Option* add_url(CLI::App& command, std::string& out) { return url(command, out); }
 CLI::Option* add_urls(CLI::App& command, std::vector<std::string>& out) {
-  return command.add_option("URL", out, "where the board is, such as udp://192.168.0.125")
-      ->required()
-      ->type_name(url_type);
+  return url(command, out);
 }
 
 const std::string& one_url(const std::vector<std::string>& urls) {

@@ -30,8 +30,9 @@ CLI::Option* add_number(CLI::App& command, const std::string& name,
 
 CLI::Option* add_json(CLI::App& command, bool& out, const std::string& meaning);
 
-// The board's URL. A list, for sessions over several links; one_url() takes it for those that can
-// have only one so far.
+// The board's URL. Where it can be several, a list, for sessions over several links; one_url()
+// takes it for those that can have only one so far.
+CLI::Option* add_url(CLI::App& command, std::string& out);
 CLI::Option* add_urls(CLI::App& command, std::vector<std::string>& out);
 const std::string& one_url(const std::vector<std::string>& urls);
 

@@ -26,7 +26,7 @@ namespace r4::tool {
 namespace {
 
 struct Options {
-  std::vector<std::string> urls;
+  std::string url;
   std::vector<std::string> commands;
   Milliseconds timeout{3000};
   Milliseconds hold{0};
@@ -53,7 +53,7 @@ Command command_of(const std::string& text) {
 class Sender {
  public:
   Sender(const Options& options, const std::vector<Command>& commands)
-      : options_(options), commands_(commands), board_(io_, options.urls.front()), hold_(io_) {}
+      : options_(options), commands_(commands), board_(io_, options.url), hold_(io_) {}
 
   int run() {
     board_.open();
@@ -150,7 +150,7 @@ class Sender {
 int send(const Options& options) {
   std::vector<Command> commands;
   for (const std::string& text : options.commands) {
-    if (is_url(text)) one_url({options.urls.front(), text});
+    if (is_url(text)) one_url({options.url, text});
     commands.push_back(command_of(text));
   }
   return Sender(options, commands).run();
@@ -179,7 +179,7 @@ void add_send(CLI::App& root, Action& chosen) {
       add_subcommand(root, chosen, "send", "Send commands and wait until the board confirms them",
                      footer, options, send);
   command->footer("Commands:\n" + command_table() + "\n" + footer);
-  add_urls(*command, options->urls)->expected(1);
+  add_url(*command, options->url);
   command->add_option("CMD", options->commands, "commands, such as O:358,1,1")
       ->required()
       ->type_name("");
