@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Any datagrams, from anyone, at any time: the board does not crash, and moves nothing that it was
+// not validly told to move.
+//
+// The input is lines. A line is a control byte and a payload. Control: bits 0-1 the peer, bit 2 the
+// port, bit 3 a checksum is put behind the payload, bits 4-6 how much time passes before. A payload
+// that begins with '!' is something that happens around the board. In others, to reach what only a
+// host in session reaches: $T stands for the T of the newest heartbeat that the peer heard, $N for
+// its next packet number in the upper half, $L for its last, $P for its next in the lower half.
+#include <algorithm>
+#include <cstdint>
+#include <cstdlib>
+#include <memory>
+#include <string>
+
+#include "firmware/application.hpp"
+#include "protocol/crc32.hpp"
+
+namespace {
+
+using namespace r4;
+using firmware::BoardState;
+using firmware::Outputs;
+
+void require(bool holds) {
+  if (!holds) std::abort();
+}
+
+bool within_ranges(const Outputs& outputs) {
+  for (const Drive& drive : outputs.osmc) {
+    if (drive.pwm > pwm_max || drive.direction > Direction::forward) return false;
+  }
+  for (const Drive& drive : outputs.dhb12) {
+    if (drive.pwm > pwm_max || drive.direction > Direction::forward) return false;
+  }
+  for (const std::uint16_t us : outputs.servo_us) {
+    if (us > servo_max_us) return false;
+  }
+  for (const Bldc& bldc : outputs.bldc) {
+    if (bldc.speed > pwm_max || bldc.direction > Direction::forward) return false;
+  }
+  for (const firmware::StepperTarget& stepper : outputs.stepper) {
+    if (stepper.speed < 1 || stepper.speed > stepper_speed_max) return false;
+  }
+  return true;
+}
+
+constexpr int ports = 2;
+constexpr std::uint32_t peers = 4;
+
+// A board with what is around it, and what its hosts would know.
+class World final : public firmware::Hal, public firmware::Observer {
+ public:
+  World() {
+    firmware::Application::Config config;
+    config.identity = Identity{"1", "fuzz", "none"};
+    board_ = std::make_unique<firmware::Application>(*this, config, this);
+    for (int i = 0; i < ports; ++i) {
+      ports_[i].world = this;
+      ports_[i].number = i;
+      ports_[i].limit = i == 0 ? max_datagram : 508;
+      board().add_port(ports_[i]);
+    }
+    board().start(now_ms_);
+  }
+
+  void line(std::uint8_t control, const std::string& payload) {
+    constexpr std::uint32_t waits_ms[] = {0, 1, 9, 60, 260, 490, 999, 2500};
+    pass(waits_ms[control >> 4 & 7]);
+    if (!payload.empty() && payload[0] == '!') return happen(payload);
+    const Source from{static_cast<std::uint8_t>(control >> 2 & 1), control & 3U};
+    std::string bytes = expand(payload, host(from));
+    if ((control & 8) != 0) append_checksum(bytes);
+    receive(from, bytes);
+    if (executed_ != 0 && !stop_) receive_again(from, bytes);
+  }
+
+ private:
+  struct Port final : firmware::Port {
+    World* world = nullptr;
+    int number = 0;
+    std::size_t limit = max_datagram;
+    void send(Text datagram, firmware::Urgency, std::uint32_t peer) override {
+      world->on_sent(number, datagram, peer);
+    }
+    std::size_t max_size() const override { return limit; }
+  };
+  struct Host {
+    std::uint32_t board_t = 0;
+    std::uint32_t high = echo_host_first_pnum + 1000;
+    std::uint32_t low = 0;
+  };
+
+  firmware::Application& board() { return *board_; }
+  Host& host(Source source) { return hosts_[source.port][source.peer]; }
+
+  // firmware::Hal
+  void apply(const Outputs& outputs) override {
+    require(within_ranges(outputs));
+    outputs_ = outputs;
+  }
+  void make_safe() override { outputs_ = Outputs(); }
+  void sample(firmware::Inputs& inputs) override { inputs = inputs_; }
+  void zero(int channel) override { require(channel >= 1 && channel <= stepper_channels); }
+
+  // firmware::Observer
+  void on_state(std::uint32_t, BoardState, SafeReason) override {}
+  void on_outputs(std::uint32_t, const Outputs& outputs) override { require(outputs == outputs_); }
+  void on_executed(std::uint32_t, std::uint32_t pnum, const Command& command) override {
+    ++executed_;
+    executed_pnum_ = pnum;
+    stop_ = command.kind == CommandKind::stop;
+  }
+  void on_refused(std::uint32_t, std::uint32_t, Refusal) override { ++refused_; }
+
+  void on_sent(int port, Text bytes, std::uint32_t peer) {
+    require(bytes.size() <= ports_[port].limit);
+    Datagram datagram;
+    require(static_cast<bool>(read(bytes, datagram)) && datagram.has_pnum() && datagram.has_time());
+    const MessageKind kind = kind_of(datagram);
+    State state;
+    if (kind == MessageKind::state) require(read_state(datagram, state));
+    if (kind == MessageKind::board_heartbeat) {
+      for (std::uint32_t p = 0; p < peers; ++p) {
+        if (peer != p && peer != firmware::everyone) continue;
+        hosts_[port][p].board_t = static_cast<std::uint32_t>(datagram.time_ms());
+      }
+    }
+    ++sent_;
+  }
+
+  // Time passes; the board is polled as it asks, but not more often than fuzzing has patience for.
+  void pass(std::uint32_t ms) {
+    for (std::uint32_t left = ms; left != 0;) {
+      const std::uint32_t due = std::max(board().poll(now_ms_), ms / 8);
+      const std::uint32_t step = std::min(std::max(due, 1U), left);
+      check();
+      now_ms_ += step;
+      left -= step;
+    }
+    require(board().poll(now_ms_) <= firmware::Application::interlock_period_ms);
+    check();
+  }
+
+  void happen(const std::string& payload) {
+    const int value = payload.size() > 2 ? static_cast<unsigned char>(payload[2]) : 0;
+    switch (payload.size() > 1 ? payload[1] : 0) {
+      case 'h':
+        inputs_.handle_held = value % 2 == 0;
+        break;
+      case 'u':
+        inputs_.ultrasonic_cm[value & 3] = static_cast<std::uint16_t>(value);
+        break;
+      case 'd':
+        board().port_down(static_cast<std::uint8_t>(value % ports), now_ms_);
+        break;
+      case 'f':
+        board().fail(value % 2 == 0 ? SafeReason::fault : SafeReason::watchdog, now_ms_);
+        require(outputs_ == Outputs());
+        break;
+      case 'j':  // the board is held up: time passes, nothing is polled
+        now_ms_ += static_cast<std::uint32_t>(value) * 20;
+        return;
+      default:
+        break;
+    }
+    check();
+  }
+
+  void receive(Source from, const std::string& bytes) {
+    Datagram datagram;
+    const bool valid = static_cast<bool>(read(Text(bytes), datagram));
+    const MessageKind kind = valid ? kind_of(datagram) : MessageKind::state;
+    if (kind == MessageKind::host_heartbeat) {
+      heard_any_ = true;
+      heard_ms_ = now_ms_;
+    }
+    const Outputs before = outputs_;
+    const int sent = sent_;
+    executed_ = refused_ = 0;
+    stop_ = false;
+    board().receive(from.port, from.peer, Text(bytes), now_ms_);
+    // A damaged datagram does nothing and is not answered.
+    if (!valid) require(executed_ == 0 && sent_ == sent);
+    // Outputs move by a command that is executed, come back with a heartbeat, or become safe.
+    if (outputs_ != before && outputs_ != Outputs()) {
+      require(executed_ == 1 || kind == MessageKind::host_heartbeat);
+    }
+    require(executed_ + refused_ <= 1);
+    if (executed_ != 0) {
+      require(valid && kind == MessageKind::command && datagram.pnum() == executed_pnum_);
+      if (stop_) {
+        require(outputs_ == Outputs() && board().reason() == SafeReason::stop);
+      } else {
+        require(board().link().has_owner() && board().link().owner() == from);
+        require(datagram.has_pnum() && board().link().last_executed() == executed_pnum_);
+      }
+    }
+    check();
+  }
+
+  // What has been executed is not executed again.
+  void receive_again(Source from, const std::string& bytes) {
+    const Outputs before = outputs_;
+    receive(from, bytes);
+    require(executed_ == 0 && (outputs_ == before || outputs_ == Outputs()));
+  }
+
+  // What must hold at any moment.
+  void check() {
+    if (board().state() != BoardState::active) require(outputs_ == Outputs());
+    if (outputs_ == Outputs()) return;
+    require(board().reason() == SafeReason::none && board().link().has_owner());
+    require(heard_any_ && now_ms_ - heard_ms_ <= board().settings().timeout_ms);
+  }
+
+  std::string expand(const std::string& payload, Host& host) {
+    std::string bytes;
+    for (std::size_t i = 0; i < payload.size(); ++i) {
+      const char name = payload[i] == '$' && i + 1 < payload.size() ? payload[i + 1] : 0;
+      switch (name) {
+        case 'T':
+          bytes += std::to_string(host.board_t);
+          break;
+        case 'N':
+          bytes += std::to_string(host.high++);
+          break;
+        case 'L':
+          bytes += std::to_string(host.high - 1);
+          break;
+        case 'P':
+          bytes += std::to_string(host.low++);
+          break;
+        default:
+          bytes += payload[i];
+          continue;
+      }
+      ++i;
+    }
+    return bytes;
+  }
+
+  static void append_checksum(std::string& bytes) {
+    bytes += '^';
+    static constexpr char digits[] = "0123456789abcdef";
+    const std::uint32_t crc = crc32(Text(bytes));
+    bytes += "0x";
+    for (int shift = 28; shift >= 0; shift -= 4) bytes += digits[crc >> shift & 0xF];
+    bytes += '^';
+  }
+
+  std::uint32_t now_ms_ = 0xffffff00U;
+  firmware::Inputs inputs_ = held();
+  Outputs outputs_;
+  Port ports_[ports];
+  Host hosts_[ports][peers];
+  std::unique_ptr<firmware::Application> board_;
+  int sent_ = 0;
+  int executed_ = 0;
+  int refused_ = 0;
+  bool stop_ = false;
+  std::uint32_t executed_pnum_ = 0;
+  bool heard_any_ = false;
+  std::uint32_t heard_ms_ = 0;
+
+  static firmware::Inputs held() {
+    firmware::Inputs inputs;
+    inputs.handle_held = true;
+    return inputs;
+  }
+};
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  World world;
+  const std::string input(reinterpret_cast<const char*>(data), size);
+  for (std::size_t at = 0; at < size;) {
+    std::size_t end = input.find('\n', at + 1);  // the control byte may be one
+    if (end == std::string::npos) end = size;
+    world.line(static_cast<std::uint8_t>(input[at]), input.substr(at + 1, end - at - 1));
+    at = end + 1;
+  }
+  return 0;
+}
