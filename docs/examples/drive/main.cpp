@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Drives OSMC channel 1 up and down again, says what happens, and stops.
+//
+//     drive [URL]        sim: without a URL; udp://192.168.0.125, serial:auto …
+//
+// Exit code: 0 done, 2 usage, 3 refused or timed out, 4 no such transport, 5 permission,
+// 6 not supported here.
+#include <chrono>
+#include <cstdio>
+#include <r4link/host/board.hpp>
+#include <r4link/transports/error.hpp>
+#include <thread>
+
+using namespace std::chrono_literals;
+
+namespace {
+
+// Called on the board's own thread: it must be quick and must not wait for the board.
+void print_link(const r4::LinkStatus& link) {
+  std::printf("link: %s%s%s%s\n", r4::to_text(link.state),
+              link.state == r4::HostLinkState::safe ? ", reason " : "",
+              link.state == r4::HostLinkState::safe ? r4::to_text(link.reason) : "",
+              link.gated ? ", our heartbeats have stopped" : "");
+}
+
+void print_state(const r4::State& state) {
+  std::printf("state: %6.2f V, OSMC 1 at %4u %s\n", state.analog_cv[0] / 100.0, state.osmc[0].pwm,
+              state.osmc[0].direction == r4::Direction::forward ? "forward" : "reverse");
+}
+
+void drive(r4::Board& board) {
+  board.on_link(print_link);
+  board.on_state([last = r4::Drive{}](const r4::State& state) mutable {
+    if (state.osmc[0] == last) return;  // the state comes 100 times a second
+    last = state.osmc[0];
+    print_state(state);
+  });
+
+  board.wait_active();
+  const r4::BoardIdentity who = board.identify();
+  std::printf("board %s, firmware %s, on %s\n", who.board_id.c_str(), who.firmware.c_str(),
+              board.name().c_str());
+
+  // From here on this program must show that it is alive. If it hangs for 300 ms, the heartbeats
+  // stop and the board switches its outputs off.
+  board.watchdog(300ms);
+  for (const int pwm : {0, 500, 1000, 1500, 1000, 500, 0}) {
+    board.osmc(1).set(pwm, r4::Direction::forward, 250ms);  // the board's state has confirmed it
+    board.feed();
+    std::this_thread::sleep_for(50ms);
+  }
+
+  board.stop();  // every output safe; latched until board.clear()
+  const r4::Statistics statistics = board.statistics();
+  std::printf("%llu states, %.1f a second, %.0f us round trip, %.1f %% lost\n",
+              static_cast<unsigned long long>(statistics.states), statistics.state_rate_hz,
+              statistics.round_trip_us, statistics.loss() * 100);
+  board.clear();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    r4::Board board(argc > 1 ? argv[1] : "sim:");
+    drive(board);
+  } catch (const r4::Error& error) {  // the thing, the reason and the fix
+    std::fprintf(stderr, "drive: %s\n", error.what());
+    return static_cast<int>(error.kind());
+  }
+}

@@ -1,0 +1,68 @@
+#!/bin/bash
+# SPDX-License-Identifier: GPL-3.0-or-later
+# The installed library is enough for a program outside the tree. Usage: run.sh SOURCE BUILD
+# Installs BUILD into a new prefix, copies docs/examples/drive elsewhere, builds it with
+# find_package and with pkg-config, runs both, and compiles every installed header.
+set -euo pipefail
+
+source_tree=$(realpath "$1")
+build_tree=$(realpath "$2")
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+prefix=$work/prefix
+cxx=$(sed -n 's/^CMAKE_CXX_COMPILER:[A-Z]*=//p' "$build_tree/CMakeCache.txt")
+
+cmake --install "$build_tree" --prefix "$prefix" >"$work/install.log" 2>&1 || {
+  tail -n 5 "$work/install.log"
+  exit 1
+}
+cp -r "$source_tree/docs/examples/drive" "$work/drive"
+cd "$work/drive"
+
+# check NAME COMMAND...: the program must end well and say what the README promises.
+check() {
+  local name=$1
+  shift
+  "$@" >"$work/out" 2>&1 || {
+    cat "$work/out"
+    echo "install: $name failed"
+    exit 1
+  }
+  for words in 'board sim-1' 'OSMC 1 at 1000 forward' 'link: safe, reason stop' ' us round trip'; do
+    grep -q "$words" "$work/out" || {
+      cat "$work/out"
+      echo "install: $name did not print '$words'"
+      exit 1
+    }
+  done
+  echo "install: $name: $(grep ' us round trip' "$work/out")"
+}
+
+cmake -B build -DCMAKE_CXX_COMPILER="$cxx" -DCMAKE_PREFIX_PATH="$prefix" >"$work/cmake.log"
+cmake --build build >>"$work/cmake.log" || {
+  cat "$work/cmake.log"
+  exit 1
+}
+check find_package build/drive
+
+PKG_CONFIG_PATH=$(dirname "$(find "$prefix" -name r4link.pc)")
+export PKG_CONFIG_PATH
+read -ra flags <<<"$(pkg-config --cflags --libs r4link)"
+"$cxx" -std=c++20 -O1 main.cpp "${flags[@]}" -o drive
+check pkg-config ./drive sim:?node=1
+
+status=0
+./drive fax:1 >/dev/null 2>"$work/err" || status=$?
+if [[ $status != 2 ]] || ! grep -q 'udp://HOST' "$work/err"; then
+  echo "install: 'drive fax:1' ended with $status: $(cat "$work/err")"
+  exit 1
+fi
+
+# Every installed header, in one program.
+(cd "$prefix/include" && find r4link -name '*.hpp' | sort | sed 's/.*/#include <&>/') >all.cpp
+read -ra flags <<<"$(pkg-config --cflags r4link)"
+"$cxx" -std=c++20 -fsyntax-only "${flags[@]}" all.cpp || {
+  echo "install: an installed header does not compile"
+  exit 1
+}
+echo "install: $(wc -l <all.cpp) headers"
