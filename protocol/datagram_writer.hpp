@@ -59,9 +59,9 @@ class DatagramWriter {
   DatagramWriter& field(Text name);
   DatagramWriter& field(const FieldName& name);
   DatagramWriter& value(Text text);
-  DatagramWriter& value(std::uint32_t number);
-  DatagramWriter& value(std::int32_t number);
-  DatagramWriter& value(std::uint64_t number);
+  DatagramWriter& value(std::uint32_t value);
+  DatagramWriter& value(std::int32_t value);
+  DatagramWriter& value(std::uint64_t value);
   DatagramWriter& hundredths(std::int32_t value);  // 2428 is written 24.28
   // A text that may hold commas: "ROS2-R4", "a,b". Copied as it is.
   DatagramWriter& values(Text text);

@@ -117,16 +117,14 @@ constexpr std::uint8_t no_entry = 0xFF;
 
 constexpr unsigned slot_of(Text name) {
   std::uint32_t hash = 2166136261U;  // FNV-1a
-  for (std::size_t i = 0; i < name.size(); ++i) {
-    hash = (hash ^ static_cast<unsigned char>(name[i])) * 16777619U;
-  }
+  for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 16777619U;
   return (hash ^ hash >> 16) % slot_count;
 }
 
 struct NameIndex {
   std::uint8_t entry[slot_count] = {};
   constexpr NameIndex() {
-    for (unsigned i = 0; i < slot_count; ++i) entry[i] = no_entry;
+    for (std::uint8_t& slot : entry) slot = no_entry;
     for (int i = 0; i < state_field_count; ++i) {
       unsigned slot = slot_of(table[i].name.name());
       while (entry[slot] != no_entry) slot = (slot + 1) % slot_count;

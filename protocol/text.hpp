@@ -15,13 +15,15 @@ class Text {
  public:
   constexpr Text() = default;
   constexpr Text(const char* data, std::size_t size) : data_(data), size_(size) {}
-  // A string literal, without its NUL.
+  // A string literal, without its NUL. Implicit, as for a string_view.
+  // NOLINTBEGIN(google-explicit-constructor)
   template <std::size_t N>
   constexpr Text(const char (&literal)[N]) : data_(literal), size_(N - 1) {}
   // Anything contiguous with data() and size(): std::string, std::string_view on the host.
   template <class Container, class = decltype(static_cast<const char*>(
                                  static_cast<const Container*>(nullptr)->data()))>
   constexpr Text(const Container& c) : data_(c.data()), size_(c.size()) {}
+  // NOLINTEND(google-explicit-constructor)
 
   constexpr const char* data() const { return data_; }
   constexpr std::size_t size() const { return size_; }

@@ -13,9 +13,8 @@
 #include "protocol/state.hpp"
 #include "tests/bench/allocations.hpp"
 
+namespace r4::bench {
 namespace {
-
-using namespace r4;
 
 constexpr Text line(
     "AIN24:24.28;AIN12:12.12;AIN5:5.12;AINDMH:12.11;DMHSTA:1;AINSTEER:1.03;DHB1A:4095,1;"
@@ -37,7 +36,7 @@ Text write_state(char* buffer, const State& state) {
 // Times `work` on the line's bytes and reports what it allocates as "allocs".
 template <class Work>
 void measure(benchmark::State& bench, Work work) {
-  bench.counters["allocs"] = bench::allocations_per_call(work);
+  bench.counters["allocs"] = allocations_per_call(work);
   for (auto _ : bench) {
     work();
     benchmark::ClobberMemory();
@@ -106,3 +105,4 @@ void copy_and_crc(benchmark::State& bench) {
 BENCHMARK(copy_and_crc);
 
 }  // namespace
+}  // namespace r4::bench

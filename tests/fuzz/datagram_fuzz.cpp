@@ -15,9 +15,8 @@
 #include "protocol/settings.hpp"
 #include "protocol/state.hpp"
 
+namespace r4 {
 namespace {
-
-using namespace r4;
 
 void require(bool holds) {
   if (!holds) std::abort();
@@ -159,13 +158,14 @@ void try_bytes(const std::string& bytes) {
 }
 
 }  // namespace
+}  // namespace r4
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   std::string bytes(reinterpret_cast<const char*>(data), size);
-  try_bytes(bytes);
+  r4::try_bytes(bytes);
   bytes = bytes.substr(0, bytes.find('^')) + '^';
-  char hex[max_number_text];
-  char* const hex_end = write_hex(hex, crc32(bytes));
-  try_bytes(bytes + "0x" + std::string(hex, hex_end) + '^');
+  char hex[r4::max_number_text];
+  char* const hex_end = r4::write_hex(hex, r4::crc32(bytes));
+  r4::try_bytes(bytes + "0x" + std::string(hex, hex_end) + '^');
   return 0;
 }

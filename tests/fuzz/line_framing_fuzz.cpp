@@ -9,9 +9,8 @@
 
 #include "transports/framing/line_framing.hpp"
 
+namespace r4 {
 namespace {
-
-using namespace r4;
 
 void require(bool holds) {
   if (!holds) std::abort();
@@ -64,12 +63,13 @@ Split framed(const std::string& stream, std::uint32_t cuts) {
 }
 
 }  // namespace
+}  // namespace r4
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   std::uint32_t cuts = 0;
   if (size < sizeof cuts) return 0;
   std::memcpy(&cuts, data, sizeof cuts);
   const std::string stream(reinterpret_cast<const char*>(data) + sizeof cuts, size - sizeof cuts);
-  require(framed(stream, cuts) == expected(stream));
+  r4::require(r4::framed(stream, cuts) == r4::expected(stream));
   return 0;
 }
