@@ -76,9 +76,23 @@ Problem usage_problem(const CLI::App& root, const CLI::ParseError& error) {
   return problem;
 }
 
+// One line, whatever the command line held.
+std::string one_line(const std::string& text) {
+  std::string line;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte == 0x7F) {
+      line += fmt::format("\\x{:02x}", byte);
+    } else {
+      line += c;
+    }
+  }
+  return line;
+}
+
 int report(const Problem& problem, bool json) {
   std::fflush(stdout);
-  fmt::print(stderr, "r4: {}\n", problem.text());
+  fmt::print(stderr, "r4: {}\n", one_line(problem.text()));
   if (json) print_line(problem_json(problem));
   return static_cast<int>(problem.kind);
 }

@@ -44,6 +44,10 @@ class Layout : public CLI::Formatter {
   std::string make_usage(const CLI::App* app, std::string name) const override {
     return "\n" + CLI::Formatter::make_usage(app, std::move(name));
   }
+  // A positional is named after its type already.
+  std::string make_option_opts(const CLI::Option* option) const override {
+    return option->get_positional() ? "" : CLI::Formatter::make_option_opts(option);
+  }
 };
 
 }  // namespace
@@ -51,21 +55,25 @@ class Layout : public CLI::Formatter {
 std::string url_table() {
   std::string table;
   for (const Registry::Entry& entry : standard_registry().entries()) {
-    table += fmt::format("  {:<46} {}\n", entry.usage, entry.meaning);
+    table += fmt::format("  {}\n      {}\n", entry.usage, entry.meaning);
   }
   return table;
 }
 
 std::string command_table() {
+  constexpr std::size_t widest = 100;
   std::string table;
   for (const CommandHelp* each = all_command_help(); each->letter != 0; ++each) {
-    table += fmt::format("  {:<22} {}: {}\n", each->form, each->meaning, each->ranges);
+    if (each->letter == 'H') continue;  // those are sent by themselves
+    const std::string first = fmt::format("  {:<21} {}:", each->form, each->meaning);
+    const bool fits = first.size() + each->ranges.size() < widest;
+    table += fmt::format("{}{}{}\n", first, fits ? " " : "\n      ", each->ranges);
   }
   return table;
 }
 
 std::string root_footer() {
-  return "First steps, in two terminals:\n"
+  return "First steps: r4 sim in one terminal, then in another one\n"
          "  r4 sim                          a simulated board, at udp://127.0.0.1:2018\n"
          "  r4 monitor udp://127.0.0.1      its state, a hundred times a second\n"
          "  r4 send udp://127.0.0.1 O:358,1,1 --hold 5\n"

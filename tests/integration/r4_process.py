@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The r4 command as real processes: run to its end, or running with its lines awaited.
+
+Nothing here sleeps to wait: everything awaits an event until a deadline.
+"""
+import json
+import os
+import queue
+import re
+import signal
+import subprocess
+import threading
+import time
+
+R4 = os.environ['R4']
+DATA = os.environ.get('R4_TEST_DATA', os.path.join(os.path.dirname(__file__), '..', 'data'))
+# Sanitizers make everything slower and bigger; promises about time and memory are for release builds.
+SANITIZED = 'R4_SANITIZER' in os.environ
+PATIENCE_S = 30 if SANITIZED else 10
+
+# The one shape of an error: thing, reason, fix.
+ERROR = re.compile(r'^r4: .+: .+; .+$', re.MULTILINE)
+
+
+def run(*arguments, stdin='', timeout=PATIENCE_S, **options):
+    """Runs r4 to its end; text in and out."""
+    return subprocess.run([R4, *arguments], input=stdin, capture_output=True, text=True,
+                          timeout=timeout, check=False, **options)
+
+
+def objects(text):
+    """The JSON objects of an output, one a line."""
+    return [json.loads(line) for line in text.splitlines()]
+
+
+class Running:
+    """r4 as it runs. Each line of its stdout is kept with the time at which it came."""
+
+    def __init__(self, *arguments, **options):
+        self.process = subprocess.Popen([R4, *arguments], stdout=subprocess.PIPE,
+                                        stderr=subprocess.PIPE, text=True, **options)
+        self.lines = queue.Queue()
+        self.log = []  # what was taken off the queue
+        self.errors = ''
+        self._readers = [threading.Thread(target=self._read_lines, daemon=True),
+                         threading.Thread(target=self._read_errors, daemon=True)]
+        for reader in self._readers:
+            reader.start()
+
+    def _read_lines(self):
+        for line in self.process.stdout:
+            self.lines.put((time.monotonic(), line))
+        self.lines.put((time.monotonic(), None))
+
+    def _read_errors(self):
+        self.errors = self.process.stderr.read()
+
+    def next(self, is_it=lambda each: True, timeout=PATIENCE_S):
+        """The next object for which `is_it` is true, with the time at which it came as `came`."""
+        deadline = time.monotonic() + timeout
+        while True:
+            try:
+                came, line = self.lines.get(timeout=max(0, deadline - time.monotonic()))
+            except queue.Empty:
+                raise AssertionError(f'nothing of that kind within {timeout} s; '
+                                     f'the last lines: {self.log[-5:]}') from None
+            if line is None:
+                self.process.wait()
+                self._readers[1].join()
+                raise AssertionError(f'r4 has ended with {self.process.returncode}: {self.errors}; '
+                                     f'the last lines: {self.log[-5:]}')
+            each = json.loads(line)
+            each['came'] = came
+            self.log.append(each)
+            if is_it(each):
+                return each
+
+    def skip_past(self):
+        """Forgets what has come so far."""
+        while not self.lines.empty():
+            self.lines.get()
+
+    def signal(self, number):
+        self.process.send_signal(number)
+        return time.monotonic()
+
+    def end(self):
+        """Ends it as Ctrl-C does; returns its exit code."""
+        self.process.send_signal(signal.SIGCONT)
+        self.process.send_signal(signal.SIGINT)
+        return self.wait()
+
+    def wait(self, timeout=PATIENCE_S):
+        code = self.process.wait(timeout=timeout)
+        for reader in self._readers:
+            reader.join(timeout)
+        return code
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.kill()
+        self.wait()
+        self.process.stdout.close()
+        self.process.stderr.close()
+
+
+class Board(Running):
+    """A simulated board. `url` is where it listens, `host_url` how a host opens that."""
+
+    def __init__(self, *urls, options=()):
+        super().__init__('sim', '--json', *urls, *options)
+        self.urls = [self.next(lambda each: each['type'] == 'listening')['url'] for _ in urls]
+        self.url = self.urls[0]
+        self.host_url = host_url(self.url)
+
+    def state(self, state, reason=None, timeout=PATIENCE_S):
+        """The next event of that state."""
+        return self.next(lambda each: each.get('state') == state and 'outputs' not in each and
+                         reason in (None, each['reason']), timeout)
+
+    def outputs(self, is_it=lambda outputs: True, timeout=PATIENCE_S):
+        return self.next(lambda each: 'outputs' in each and is_it(each['outputs']), timeout)
+
+    def executed(self, command, timeout=PATIENCE_S):
+        return self.next(lambda each: each.get('executed', {}).get('command') == command, timeout)
+
+
+def host_url(board_url):
+    if board_url.startswith('pty:'):
+        return 'serial://' + board_url[len('pty:'):]
+    return board_url + '?listen=0'
+
+
+def monitor(url, *options):
+    return Running('monitor', url, '--json', *options)
+
+
+def is_state(each):
+    return each['type'] == 'state'
+
+
+def is_link(state, reason='none', busy=False):
+    return lambda each: (each['type'] == 'link' and each['fields']['state'] == state and
+                         each['fields']['reason'] == reason and each['fields']['busy'] == busy)
