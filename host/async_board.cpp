@@ -2,8 +2,10 @@
 #include "async_board.hpp"
 
 #include <algorithm>
+#include <array>
 #include <asio/steady_timer.hpp>
 #include <atomic>
+#include <utility>
 #include <vector>
 
 #include "../transports/registry.hpp"
@@ -16,6 +18,10 @@ namespace {
 Time steady_now() {
   return std::chrono::duration_cast<Time>(std::chrono::steady_clock::now().time_since_epoch());
 }
+
+// Not in the event loop for this long: what has come meanwhile is a backlog, and of its states only
+// the newest is told.
+constexpr Time held_up{std::chrono::milliseconds{50}};
 
 // A day is as good as for ever, and cannot overflow.
 Time time_of(AsyncBoard::Duration timeout) {
@@ -55,7 +61,8 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   template <class Action>
   void enter(Completion::How way, Action action) {
     if (depth == 0) how = way;
-    now = steady_now();
+    const Time before = std::exchange(now, steady_now());
+    if (now - before > held_up) in_backlog = true;
     {
       const Inside inside(depth);
       if (fed.load(std::memory_order_relaxed) != 0) {
@@ -112,6 +119,17 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   void on_datagram(std::string_view bytes, Peer) override {
     enter(Completion::How::dispatch, [&] { due = session.receive(bytes, now); });
   }
+  void on_drained() override {
+    in_backlog = false;
+    if (backlog_size == 0) return;
+    const std::size_t size = std::exchange(backlog_size, 0);
+    enter(Completion::How::dispatch, [&] {
+      Datagram datagram;
+      if (is_open && read(Text(backlog.data(), size), datagram)) {
+        state_callback(session.state(), datagram);
+      }
+    });
+  }
   void on_carrier_event(const CarrierEvent& event) override {
     enter(Completion::How::dispatch, [&] {
       event_callback(event);
@@ -128,7 +146,13 @@ struct AsyncBoard::Impl final : Carrier::Handler,
     if (is_open) carrier->send(datagram, priority);
   }
   void on_state(const State& state, const Datagram& datagram) override {
-    if (is_open) state_callback(state, datagram);
+    if (!is_open) return;
+    if (in_backlog) {
+      backlog_size = datagram.bytes().size();
+      std::copy_n(datagram.bytes().data(), backlog_size, backlog.data());
+    } else {
+      state_callback(state, datagram);
+    }
   }
   void on_board_heartbeat(const Datagram& datagram) override {
     if (is_open) heartbeat_callback(datagram);
@@ -203,6 +227,10 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   Callback<void(const ReadResult&, std::string_view)> bad_callback;
   Callback<void(const LinkStatus&)> link_callback;
   Callback<void(const CarrierEvent&)> event_callback;
+
+  bool in_backlog = false;
+  std::array<char, max_datagram> backlog;  // the newest state of it
+  std::size_t backlog_size = 0;
 
   std::vector<Waiting> waiting;
   std::vector<Ended> ended;

@@ -98,7 +98,8 @@ class AsyncBoard {
   const CarrierCounters& carrier_counters() const;
   const std::string& name() const;
 
-  // One callback for each; an empty function turns it off.
+  // One callback for each; an empty function turns it off. Of the states that came while the event
+  // loop was held up for more than 50 ms, on_state is told the newest alone.
   void on_state(std::function<void(const State&, const Datagram&)> callback);
   void on_board_heartbeat(std::function<void(const Datagram&)> callback);
   void on_nack(std::function<void(const Nack&, const Datagram&)> callback);
