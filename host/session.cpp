@@ -34,7 +34,7 @@ Session::Session(Handler& handler, SessionOptions options, std::uint32_t first_p
       options_(std::move(options)),
       first_pnum_(first_pnum),
       link_(options_.timing, first_pnum),
-      pending_(std::make_unique<std::array<Pending, max_pending + max_stops>>()) {
+      pending_(max_pending, max_stops) {
   if (!options_.fields.empty()) {
     const std::string fields = options_.fields;
     if (FieldSet set; parse_fields(fields, set) != Refusal::none) {
@@ -113,7 +113,7 @@ void Session::on_nack_datagram(const Datagram& datagram, Time now) {
   if (nack.code == Refusal::busy) busy_until_ = now + busy_memory;
   on_answer(datagram, now);
   handler_.on_nack(nack, datagram);
-  for (Pending& pending : *pending_) {
+  for (Pending& pending : pending_.under_way()) {
     if (pending.stage != Stage::sent || pending.pnum != nack.pnum) continue;
     if (nack.code == Refusal::duplicate) {
       pending.executed = true;
@@ -138,7 +138,7 @@ void Session::on_identity_datagram(const Datagram& datagram, Time now) {
   if (question_open_) collector_.on_round_trip(now - question_sent_);
   question_open_ = false;
   handler_.on_identity(identity);
-  for (Pending& pending : *pending_) {
+  for (Pending& pending : pending_.under_way()) {
     if (pending.stage == Stage::sent && pending.kind == CommandKind::identify) {
       finish(pending, Outcome::confirmed, Refusal::none, now);
     }
@@ -163,7 +163,7 @@ void Session::confirm_from_state(Time now) {
     const std::uint32_t ours = link_.last_pnum() - first_pnum_;
     if (link_up() && state_.last_command - first_pnum_ <= ours) controlled_ = true;
   }
-  for (Pending& pending : *pending_) {
+  for (Pending& pending : pending_.under_way()) {
     if (pending.stage != Stage::sent || pending.kind == CommandKind::stop ||
         pending.kind == CommandKind::identify) {
       continue;
@@ -186,7 +186,7 @@ void Session::confirm_from_state(Time now) {
 
 void Session::confirm_stop(Time now) {
   if (link_.reason() != SafeReason::stop) return;
-  for (Pending& pending : *pending_) {
+  for (Pending& pending : pending_.under_way()) {
     if (pending.stage == Stage::sent && pending.kind == CommandKind::stop) {
       finish(pending, Outcome::confirmed, Refusal::none, now);
     }
@@ -232,8 +232,8 @@ Time Session::poll(Time now) {
     link_.heartbeat_sent(to_ms(now));
     ++collector_.counts.heartbeats;
   }
-  for (Pending& pending : *pending_) {
-    if (pending.stage != Stage::free && now >= pending.deadline) {
+  for (Pending& pending : pending_.under_way()) {
+    if (now >= pending.deadline) {
       finish(pending, Outcome::timed_out, Refusal::none, now);
     }
   }
@@ -253,8 +253,7 @@ Time Session::poll(Time now) {
   if (next <= now) next = now + Time{1000};
   if (link_up() && options_.identify_interval.count() != 0) next = std::min(next, next_identify_);
   if (busy_until_ > now) next = std::min(next, busy_until_);
-  for (const Pending& pending : *pending_) {
-    if (pending.stage == Stage::free) continue;
+  for (const Pending& pending : pending_.under_way()) {
     next = std::min(next, pending.deadline);
     if (pending.stage == Stage::sent) next = std::min(next, pending.retry);
   }
@@ -293,7 +292,7 @@ bool Session::speaks_no_cmd() const { return !knows_cmd_ && selections_ >= max_s
 void Session::refresh_status(Time now) {
   if (!link_up() || busy_until_ > now) {
     controlled_ = false;
-    for (Pending& pending : *pending_) {
+    for (Pending& pending : pending_.under_way()) {
       if (pending.stage == Stage::sent) pending.doubtful = true;
     }
   }
@@ -316,27 +315,17 @@ void Session::transmit_now(const Command& command, std::uint32_t t_ms, Priority 
 }
 
 Session::Pending* Session::allocate(const Command& command, Time timeout, Time now) {
-  // Stops have slots of their own: no number of commands under way can keep one out.
-  const auto border = pending_->begin() + max_pending;
-  const bool stop = command.kind == CommandKind::stop;
-  const auto end = stop ? pending_->end() : border;
-  const auto slot = std::find_if(stop ? border : pending_->begin(), end,
-                                 [](const Pending& p) { return p.stage == Stage::free; });
-  if (slot == end) return nullptr;
+  Pending* const slot = pending_.add(command.kind);
+  if (slot == nullptr) return nullptr;
   DatagramWriter writer(slot->bytes.data(), slot->bytes.size());
   write_command(writer, command);
-  slot->stage = Stage::queued;
+  slot->fields_size = writer.size();
   slot->command = command;
   slot->command.text = slot->command.text2 = Text();
-  slot->kind = command.kind;
-  slot->fields_size = writer.size();
-  slot->executed = false;
-  slot->overtaken = false;
-  slot->doubtful = false;
   slot->ticket = next_ticket_++;
   slot->started = now;
   slot->deadline = now + timeout;
-  return &*slot;
+  return slot;
 }
 
 Ticket Session::send(const Command& command, Time timeout, Time now) {
@@ -367,8 +356,9 @@ Ticket Session::stop(Time timeout, Time now) {
   } else {
     transmit_now(Command::stop(), to_ms(now), Priority::stop);
   }
-  for (Pending& pending : *pending_) {  // nothing that was asked for before a stop may follow it
-    if (pending.stage != Stage::free && pending.kind != CommandKind::stop) {
+  for (Pending& pending :
+       pending_.under_way()) {  // nothing that was asked for before a stop may follow it
+    if (pending.kind != CommandKind::stop) {
       finish(pending, Outcome::cancelled, Refusal::none, now);
     }
   }
@@ -407,19 +397,13 @@ void Session::transmit(Pending& pending, Time now) {
 // In the order of send(): tickets rise.
 void Session::send_queued(Time now) {
   if (!in_control(now)) return;
-  for (;;) {
-    Pending* first = nullptr;
-    for (Pending& pending : *pending_) {
-      if (pending.stage != Stage::queued) continue;
-      if (first == nullptr || pending.ticket < first->ticket) first = &pending;
-    }
-    if (first == nullptr) return;
-    transmit(*first, now);
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.stage == Stage::queued) transmit(pending, now);
   }
 }
 
 void Session::retry_due(Time now) {
-  for (Pending& pending : *pending_) {
+  for (Pending& pending : pending_.under_way()) {
     if (pending.stage == Stage::sent && now >= pending.retry) transmit(pending, now);
   }
 }
@@ -441,19 +425,19 @@ void Session::finish(Pending& pending, Outcome outcome, Refusal code, Time now) 
   }
   const Ticket ticket = pending.ticket;
   const CommandResult result{outcome, code, now - pending.started};
-  pending.stage = Stage::free;  // before the call: the handler may send again
+  pending_.remove(pending);  // before the call: the handler may send again
   handler_.on_result(ticket, result);
 }
 
 void Session::forget(Ticket ticket) {
-  for (Pending& pending : *pending_) {
-    if (pending.ticket == ticket) pending.stage = Stage::free;
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.ticket == ticket) pending_.remove(pending);
   }
 }
 
 void Session::cancel_all(Time now) {
-  for (Pending& pending : *pending_) {
-    if (pending.stage != Stage::free) finish(pending, Outcome::cancelled, Refusal::none, now);
+  for (Pending& pending : pending_.under_way()) {
+    finish(pending, Outcome::cancelled, Refusal::none, now);
   }
 }
 

@@ -17,10 +17,8 @@
 // repeated every 20 ms until the board reports the reason `stop`.
 #pragma once
 
-#include <array>
 #include <chrono>
 #include <cstdint>
-#include <memory>
 #include <string>
 #include <string_view>
 
@@ -29,6 +27,7 @@
 #include "../protocol/message.hpp"
 #include "../protocol/state.hpp"
 #include "../transports/carrier.hpp"
+#include "pending_commands.hpp"
 #include "statistics.hpp"
 
 namespace r4 {
@@ -138,21 +137,8 @@ class Session {
   static std::uint32_t random_first_pnum();
 
  private:
-  enum class Stage : std::uint8_t { free, queued, sent };
-  struct Pending {
-    Stage stage = Stage::free;
-    CommandKind kind = CommandKind::heartbeat;
-    Command command;         // without its texts
-    bool executed = false;   // the board said DUPLICATE: it has executed this number
-    bool doubtful = false;   // the link was down since: a refusal proves nothing any more
-    bool overtaken = false;  // CMD is past it: the answer to a retry decides
-    std::uint32_t pnum = 0;
-    Ticket ticket = 0;
-    Time started{0}, deadline{0}, retry{0};
-    std::size_t fields_size = 0;  // bytes of the command's field in `bytes`
-    std::size_t size = 0;         // bytes of the whole datagram, once sent
-    std::array<char, max_datagram> bytes;
-  };
+  using Pending = PendingCommand;
+  using Stage = PendingCommand::Stage;
 
   Pending* allocate(const Command& command, Time timeout, Time now);
   void transmit(Pending& pending, Time now);
@@ -181,7 +167,7 @@ class Session {
   LinkStatus status_;
   State state_;
   StatisticsCollector collector_;
-  std::unique_ptr<std::array<Pending, max_pending + max_stops>> pending_;
+  PendingCommands pending_;
   Ticket next_ticket_ = 1;
   Time busy_until_{0};
   Time next_identify_{0};

@@ -3,7 +3,7 @@
 
 #include <asio/executor_work_guard.hpp>
 #include <asio/post.hpp>
-#include <asio/use_future.hpp>
+#include <future>
 
 #include "host/command_help.hpp"
 #include "transports/registry.hpp"
@@ -50,7 +50,12 @@ void BoardInAThread::switch_off() {
 }
 
 void BoardInAThread::run(const std::function<void(sim::SimulatedBoard&)>& action) {
-  asio::post(io_, asio::use_future([&] { action(*board_); })).get();
+  std::promise<void> done;
+  asio::post(io_, [&] {
+    action(*board_);
+    done.set_value();
+  });
+  done.get_future().get();
 }
 
 std::vector<std::string> BoardInAThread::executed() {

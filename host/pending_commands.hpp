@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The commands of a session that are under way: a fixed number of slots, walked in the order in
+// which the commands were given. No heap after the construction.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "../protocol/command.hpp"
+
+namespace r4 {
+
+// One command, from send() until it ends. The times are the session's.
+struct PendingCommand {
+  enum class Stage : std::uint8_t { free, queued, sent };
+  Stage stage = Stage::free;
+  CommandKind kind = CommandKind::heartbeat;
+  bool executed = false;   // the board said DUPLICATE: it has executed this number
+  bool overtaken = false;  // CMD is past it: the answer to a retry decides
+  bool doubtful = false;   // sent before an outage or while BUSY: a refusal proves nothing
+  std::uint32_t pnum = 0;
+  std::uint64_t ticket = 0;
+  std::chrono::microseconds started{0}, deadline{0}, retry{0};
+  std::size_t fields_size = 0;  // bytes of the command's field in `bytes`
+  std::size_t size = 0;         // bytes of the whole datagram, once sent
+  Command command;              // without its texts
+  std::array<char, max_datagram> bytes;
+};
+
+class PendingCommands {
+ public:
+  static constexpr std::size_t max_slots = 128;
+
+  // At most max_slots together: `commands` and, in slots of their own, `stops`: no number of commands can keep a stop out.
+  PendingCommands(std::size_t commands, std::size_t stops)
+      : slots_(commands + stops), order_(commands + stops), commands_(commands), stops_(stops) {
+    for (std::size_t i = 0; i < order_.size(); ++i) order_[i] = static_cast<std::uint8_t>(i);
+  }
+
+  // A slot for a command, the last in the order, with everything reset but `bytes`; nullptr if all
+  // are taken.
+  PendingCommand* add(CommandKind kind) {
+    std::size_t& room = room_for(kind);
+    if (room == 0) return nullptr;
+    --room;
+    PendingCommand& slot = slots_[order_[used_++]];
+    slot.stage = PendingCommand::Stage::queued;
+    slot.kind = kind;
+    slot.executed = slot.overtaken = slot.doubtful = false;
+    slot.pnum = 0;
+    slot.fields_size = slot.size = 0;
+    return &slot;
+  }
+
+  void remove(PendingCommand& command) {
+    const auto index = static_cast<std::uint8_t>(&command - slots_.data());
+    const auto end = order_.begin() + static_cast<std::ptrdiff_t>(used_);
+    std::rotate(std::find(order_.begin(), end, index), std::find(order_.begin(), end, index) + 1,
+                end);
+    --used_;
+    ++room_for(command.kind);
+    command.stage = PendingCommand::Stage::free;
+  }
+
+  // Those under way now, oldest first. While they are walked, commands may be added, which are not
+  // visited, and removed, which are passed over.
+  class Walk {
+   public:
+    class Iterator {
+     public:
+      Iterator(const Walk& walk, std::size_t at) : walk_(walk), at_(at) { skip(); }
+      PendingCommand& operator*() const { return walk_.command(at_); }
+      Iterator& operator++() {
+        ++at_;
+        skip();
+        return *this;
+      }
+      friend bool operator!=(const Iterator& a, const Iterator& b) { return a.at_ != b.at_; }
+
+     private:
+      void skip() {
+        while (at_ < walk_.count_ && (**this).stage == PendingCommand::Stage::free) ++at_;
+      }
+      const Walk& walk_;
+      std::size_t at_;
+    };
+    explicit Walk(PendingCommands& commands)
+        : slots_(commands.slots_.data()), count_(commands.used_) {
+      std::copy_n(commands.order_.begin(), count_, order_.begin());
+    }
+    Iterator begin() const { return {*this, 0}; }
+    Iterator end() const { return {*this, count_}; }
+
+   private:
+    PendingCommand& command(std::size_t at) const { return slots_[order_[at]]; }
+    PendingCommand* slots_;
+    std::size_t count_;
+    std::array<std::uint8_t, max_slots> order_;
+  };
+  Walk under_way() { return Walk(*this); }
+
+ private:
+  std::size_t& room_for(CommandKind kind) { return kind == CommandKind::stop ? stops_ : commands_; }
+
+  std::vector<PendingCommand> slots_;
+  std::vector<std::uint8_t> order_;  // of slots: those under way, oldest first, then the free ones
+  std::size_t used_ = 0;
+  std::size_t commands_, stops_;  // how many more
+};
+
+}  // namespace r4

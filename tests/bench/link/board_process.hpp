@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The other ends of the benchmarks, each in a process of its own: a simulated board, and the plain
+// program that answers every packet or line, against which the board's round trip is measured.
+// Both are forked; make them before any thread.
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstdint>
+#include <string>
+
+namespace r4::bench {
+
+// What a process has used so far.
+struct Usage {
+  double cpu_s = 0;               // user and system
+  std::uint64_t allocations = 0;  // calls of operator new
+  std::uint64_t sent = 0;         // datagrams, by the board
+};
+Usage own_usage();
+
+enum class Wire { udp, pty };
+const char* to_text(Wire wire);
+
+class ChildProcess {
+ public:
+  ChildProcess() = default;
+  ~ChildProcess();
+  ChildProcess(const ChildProcess&) = delete;
+  ChildProcess& operator=(const ChildProcess&) = delete;
+
+ protected:
+  // True in the child.
+  bool fork_child();
+  [[noreturn]] static void end_child();
+  pid_t pid_ = -1;
+  int control_ = -1;  // a socket to the other of parent and child
+};
+
+// A simulated board. With `unbound` its clock runs as fast as it can be served, so that its 1000 Hz
+// become as many as go.
+class BoardProcess : public ChildProcess {
+ public:
+  BoardProcess(Wire wire, bool unbound);
+  const std::string& url() const { return url_; }
+  Usage usage() const;
+
+ private:
+  [[noreturn]] void serve(Wire wire, bool unbound);
+  std::string url_;
+};
+
+// Answers each packet (line) with one of `answer_size` bytes, with blocking calls and nothing else.
+class EchoProcess : public ChildProcess {
+ public:
+  EchoProcess(Wire wire, std::size_t question_size, std::size_t answer_size);
+  // Seconds from the question to the answer, by blocking calls.
+  double round_trip();
+
+ private:
+  [[noreturn]] void serve();
+  Wire wire_;
+  std::string question_, answer_;
+  int ours_ = -1, theirs_ = -1;
+};
+
+}  // namespace r4::bench

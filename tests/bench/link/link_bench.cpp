@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The link between two processes: round trip against a plain ping-pong, heap, and streaming.
+//
+//     r4_link_bench [round-trips a wire, default 20000 [part: round-trip, heap or stream]]
+//
+// The three ways of asking take turns in blocks, so that what else the machine does meets all of
+// them. Exit code 1 if a bar of the plan is missed: asynchronous p50 at most 1.3 times the plain
+// one; no allocation per datagram; at 100 Hz at most 2 % of a core on either side.
+#include <algorithm>
+#include <asio/io_context.hpp>
+#include <asio/steady_timer.hpp>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "board_process.hpp"
+#include "host/async_board.hpp"
+#include "host/board.hpp"
+#include "tests/bench/allocations.hpp"
+#include "transports/error.hpp"
+
+namespace r4::bench {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+constexpr int block = 500;
+
+bool all_met = true;
+
+const char* verdict(bool met) {
+  all_met = all_met && met;
+  return met ? "met" : "MISSED";
+}
+
+struct Percentiles {
+  double p50 = 0, p99 = 0;
+};
+Percentiles percentiles(std::vector<double>& seconds) {
+  std::sort(seconds.begin(), seconds.end());
+  return {seconds[seconds.size() / 2] * 1e6, seconds[seconds.size() * 99 / 100] * 1e6};
+}
+
+// A board with its loop, in this thread.
+struct AsyncHost {
+  explicit AsyncHost(const std::string& url) : board(io, url) {
+    board.open();
+    run_until([this] { return board.in_control(); });
+  }
+
+  template <class Done>
+  void run_until(Done done) {
+    const auto deadline = Clock::now() + 10s;
+    while (!done()) {
+      io.run_one_for(1s);
+      if (Clock::now() > deadline) {
+        std::fprintf(stderr, "r4_link_bench: the board does not answer\n");
+        std::exit(1);
+      }
+    }
+  }
+  void run_for(Clock::duration duration) {
+    asio::steady_timer timer(io, duration);
+    bool over = false;
+    timer.async_wait([&](const std::error_code&) { over = true; });
+    while (!over) io.run_one();
+  }
+  // `count` questions one after the other; appends the seconds that each took.
+  void round_trips(int count, std::vector<double>& seconds) {
+    int left = count;
+    Clock::time_point start;
+    struct Ask {
+      AsyncHost& host;
+      std::vector<double>& seconds;
+      int& left;
+      Clock::time_point& start;
+      void operator()(const CommandResult&) const {
+        seconds.push_back(std::chrono::duration<double>(Clock::now() - start).count());
+        if (--left > 0) again();
+      }
+      void again() const {
+        start = Clock::now();
+        host.board.async_identify(1s, *this);
+      }
+    };
+    Ask{*this, seconds, left, start}.again();
+    while (left > 0) io.run_one();
+  }
+
+  asio::io_context io{1};
+  AsyncBoard board;
+};
+
+// --- (a)
+
+void compare_round_trips(Wire wire, int count) {
+  // Sizes of Q:ID and of the simulated board's answer, as sent; a line has CR LF behind it.
+  const std::size_t line_end = wire == Wire::udp ? 0 : 2;
+  EchoProcess plain(wire, 42 + line_end, 55 + line_end);
+  BoardProcess board_for_async(wire, false);
+  BoardProcess board_for_blocking(wire, false);
+  AsyncHost host(board_for_async.url());
+
+  std::vector<double> raw, async, blocking;
+  raw.reserve(static_cast<std::size_t>(count));
+  async.reserve(static_cast<std::size_t>(count));
+  blocking.reserve(static_cast<std::size_t>(count));
+  for (int i = 0; i < block; ++i) plain.round_trip();
+  for (int done = 0; done < count; done += block) {
+    for (int i = 0; i < block; ++i) raw.push_back(plain.round_trip());
+    host.round_trips(block, async);
+  }
+  host.board.close();
+  {
+    Board board(board_for_blocking.url());
+    board.wait_active();
+    for (int i = 0; i < count; ++i) {
+      const auto start = Clock::now();
+      board.identify();
+      blocking.push_back(std::chrono::duration<double>(Clock::now() - start).count());
+    }
+  }
+  const Percentiles r = percentiles(raw);
+  const Percentiles a = percentiles(async);
+  const Percentiles b = percentiles(blocking);
+  std::printf("%s  plain ping-pong   p50 %6.1f us   p99 %6.1f us\n", to_text(wire), r.p50, r.p99);
+  std::printf("%s  async_identify    p50 %6.1f us   p99 %6.1f us   %.2f times, bar 1.30: %s\n",
+              to_text(wire), a.p50, a.p99, a.p50 / r.p50, verdict(a.p50 <= 1.3 * r.p50));
+  std::printf("%s  Board::identify   p50 %6.1f us   p99 %6.1f us   %.2f times\n", to_text(wire),
+              b.p50, b.p99, b.p50 / r.p50);
+}
+
+// --- (b)
+
+void print_allocations(Wire wire, const char* what, std::uint64_t host, std::uint64_t board,
+                       std::uint64_t datagrams) {
+  std::printf("%s  %-34s %6llu datagrams   host %llu, board %llu allocations, bar 0: %s\n",
+              to_text(wire), what, static_cast<unsigned long long>(datagrams),
+              static_cast<unsigned long long>(host), static_cast<unsigned long long>(board),
+              verdict(host == 0 && board == 0));
+}
+
+void count_allocations(Wire wire) {
+  BoardProcess process(wire, false);
+  {
+    AsyncHost host(process.url());
+    std::vector<double> seconds;
+    seconds.reserve(10000);
+    std::uint64_t states = 0;
+    host.board.on_state([&](const State&, const Datagram&) { ++states; });
+    host.round_trips(500, seconds);
+    host.run_for(1200ms);  // what is made once has been made
+
+    const auto measure = [&](const char* what, auto action) {
+      const Usage board_before = process.usage();
+      const Statistics statistics_before = host.board.statistics();
+      const std::uint64_t before = allocations();
+      action();
+      const std::uint64_t host_made = allocations() - before;
+      const Statistics s = host.board.statistics();
+      const Usage board_after = process.usage();
+      print_allocations(wire, what, host_made, board_after.allocations - board_before.allocations,
+                        s.received - statistics_before.received + s.heartbeats -
+                            statistics_before.heartbeats + s.commands - statistics_before.commands);
+    };
+    measure("states and heartbeats, 2 s", [&] { host.run_for(2s); });
+    measure("post(), 1000 setpoints", [&] {
+      for (int i = 0; i < 1000; ++i) {
+        host.board.post(Command::osmc(i, Direction::forward, 1));
+        host.io.poll();
+      }
+    });
+    measure("async_identify, 1000", [&] { host.round_trips(1000, seconds); });
+    measure("async_send, 100 confirmed", [&] {
+      int left = 100;
+      struct Next {
+        AsyncHost& host;
+        int& left;
+        void operator()(const CommandResult&) const {
+          if (--left > 0) again();
+        }
+        void again() const {
+          host.board.async_send(Command::osmc(left, Direction::forward, 1), 1s, *this);
+        }
+      };
+      Next{host, left}.again();
+      host.run_until([&] { return left == 0; });
+    });
+  }
+  BoardProcess other(wire, false);
+  Board board(other.url());
+  board.wait_active();
+  for (int i = 0; i < 300; ++i) {  // also the deques of the loop have their size now
+    board.post(Command::osmc(i, Direction::forward, 1));
+    if (i % 10 == 0) board.next_state();
+  }
+  const Usage board_before = other.usage();
+  const std::uint64_t before = allocations();
+  for (int i = 0; i < 1000; ++i) {
+    board.post(Command::osmc(i, Direction::forward, 1));
+    if (i % 10 == 0) board.next_state();
+  }
+  const std::uint64_t made = allocations() - before;
+  print_allocations(wire, "Board::post() and next_state()", made,
+                    other.usage().allocations - board_before.allocations, 1100);
+}
+
+// --- (c)
+
+void stream(Wire wire, int rate_hz) {
+  const bool unbound = rate_hz == 0;
+  BoardProcess process(wire, unbound);
+  AsyncHost host(process.url());
+  if (!unbound) {
+    bool set = false;
+    const std::string rate = std::to_string(rate_hz);
+    host.board.async_send(Command::setting("rate", rate), 1s,
+                          [&](const CommandResult& r) { set = r.outcome == Outcome::confirmed; });
+    host.run_until([&] { return set; });
+  }
+  host.run_for(200ms);
+  const Usage board_before = process.usage();
+  const Usage host_before = own_usage();
+  const Statistics before = host.board.statistics();
+  const auto start = Clock::now();
+  host.run_for(2s);
+  const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  const Statistics after = host.board.statistics();
+  const Usage host_after = own_usage();
+  const Usage board_after = process.usage();
+
+  const auto received = static_cast<double>(after.received - before.received);
+  const auto sent = static_cast<double>(board_after.sent - board_before.sent);
+  const double host_cpu = host_after.cpu_s - host_before.cpu_s;
+  const double board_cpu = board_after.cpu_s - board_before.cpu_s;
+  char wanted[16] = "   max";
+  if (!unbound) std::snprintf(wanted, sizeof wanted, "%6d", rate_hz);
+  std::printf(
+      "%s  %s Hz   sent %8.0f/s   received %8.0f/s   CPU a datagram: board %5.2f us, "
+      "host %5.2f us   of a core: board %5.2f %%, host %5.2f %%",
+      to_text(wire), wanted, sent / seconds, received / seconds, board_cpu / sent * 1e6,
+      host_cpu / received * 1e6, board_cpu / seconds * 100, host_cpu / seconds * 100);
+  if (rate_hz == 100) {
+    const bool met = board_cpu <= 0.02 * seconds && host_cpu <= 0.02 * seconds;
+    std::printf(", bar 2 %%: %s", verdict(met));
+  }
+  std::printf("\n");
+}
+
+int run(int count, const std::string& part) {
+  const auto wanted = [&](const char* name) { return part.empty() || part == name; };
+  if (wanted("round-trip")) {
+    std::printf("round trip, %d questions in blocks of %d, 42 bytes there and 55 back\n", count,
+                block);
+    for (const Wire wire : {Wire::udp, Wire::pty}) compare_round_trips(wire, count);
+  }
+  if (wanted("heap")) {
+    std::printf("\nallocations in the steady state\n");
+    for (const Wire wire : {Wire::udp, Wire::pty}) count_allocations(wire);
+  }
+  if (wanted("stream")) {
+    std::printf("\nstreaming, 2 s each\n");
+    for (const Wire wire : {Wire::udp, Wire::pty}) {
+      for (const int rate : {100, 1000, 0}) stream(wire, rate);
+    }
+  }
+  return all_met ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace r4::bench
+
+int main(int argc, char** argv) {
+  const int count = argc > 1 ? std::atoi(argv[1]) : 20000;
+  try {
+    return r4::bench::run(std::max(count, r4::bench::block), argc > 2 ? argv[2] : "");
+  } catch (const r4::Error& error) {
+    std::fprintf(stderr, "r4_link_bench: %s\n", error.what());
+    return static_cast<int>(error.kind());
+  }
+}
