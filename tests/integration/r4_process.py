@@ -90,6 +90,21 @@ class Running:
         self.process.send_signal(signal.SIGINT)
         return self.wait()
 
+    def rest(self):
+        """Ends it; all that it has printed."""
+        assert self.end() == 0, self.errors
+        while True:
+            came, line = self.lines.get()
+            if line is None:
+                return self.log
+            self.log.append({**json.loads(line), 'came': came})
+
+    def cpu_seconds(self):
+        """What it has used of a processor so far."""
+        with open(f'/proc/{self.process.pid}/stat', encoding='ascii') as stat:
+            fields = stat.read().rsplit(')', 1)[1].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
+
     def wait(self, timeout=PATIENCE_S):
         code = self.process.wait(timeout=timeout)
         for reader in self._readers:

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The demonstration, the live status on a terminal, and what board and monitor cost."""
+import os
+import pty
+import re
+import select
+import signal
+import subprocess
+import time
+
+import pytest
+
+from r4_process import PATIENCE_S, R4, SANITIZED, Board, is_state, monitor, objects, run
+
+TRANSPORTS = ['in process', 'UDP', 'serial']
+
+
+def test_the_demonstration_is_true_on_every_transport_and_short():
+    start = time.monotonic()
+    result = run('demo', timeout=60)
+    took = time.monotonic() - start
+    print(result.stdout[-1500:], f'took {took:.1f} s')
+    assert result.returncode == 0 and result.stderr == ''
+    assert took < 12 or SANITIZED
+    for transport in TRANSPORTS:
+        assert re.search(rf'^  {transport} .* ok$', result.stdout, re.MULTILINE)
+    for word in ('checksum', 'heartbeat', 'O:358,1,1', 'OSMC1:358,1', 'SAFE:1', 'E:STOP', 'E:CLEAR'):
+        assert word in result.stdout
+
+
+def test_the_demonstrations_numbers_as_json():
+    results = objects(run('demo', '--json', timeout=60).stdout)
+    assert [each['transport'] for each in results] == TRANSPORTS
+    for each in results:
+        assert each['ok'], each
+        assert SANITIZED or 980 <= each['safe_ms'] <= 1020
+        assert each['lost'] == 0
+
+
+def test_no_board_is_left_behind_by_the_demonstration():
+    with subprocess.Popen([R4, 'demo'], stdout=subprocess.PIPE, text=True) as demo:
+        line = demo.stdout.readline()
+        while 'Over UDP' not in line:
+            line = demo.stdout.readline()
+        while 'stream' not in line:
+            line = demo.stdout.readline()
+        children = f'/proc/{demo.pid}/task/{demo.pid}/children'
+        with open(children, encoding='ascii') as file:
+            child = int(file.read().split()[0])
+        demo.send_signal(signal.SIGKILL)
+    deadline = time.monotonic() + PATIENCE_S
+    while os.path.exists(f'/proc/{child}') and time.monotonic() < deadline:
+        with open(f'/proc/{child}/stat', encoding='ascii') as file:
+            if file.read().rsplit(')', 1)[1].split()[0] == 'Z':
+                return  # ended; nobody has asked for its exit code
+        time.sleep(0.02)
+    assert not os.path.exists(f'/proc/{child}')
+
+
+def read_screen(master, until, timeout=PATIENCE_S):
+    """What was drawn until a text stands there."""
+    screen = ''
+    deadline = time.monotonic() + timeout
+    while not re.search(until, screen):
+        ready, _, _ = select.select([master], [], [], max(0, deadline - time.monotonic()))
+        assert ready, f'{until!r} was not drawn: {screen[-1000:]!r}'
+        screen += os.read(master, 65536).decode()
+    return screen
+
+
+def test_on_a_terminal_the_monitor_draws_a_status_and_leaves_the_cursor_as_it_was():
+    with Board('udp://127.0.0.1:0') as board:
+        master, slave = pty.openpty()
+        with subprocess.Popen([R4, 'monitor', board.host_url], stdout=slave) as process:
+            os.close(slave)
+            screen = read_screen(master, r'ACTIVE[^$]*1[0-9][0-9]\.[0-9] Hz[^$]*AIN24 +24')
+            run('stop', board.host_url)
+            screen += read_screen(master, r'SAFE \(stop\)')
+            process.send_signal(signal.SIGINT)
+            screen += read_screen(master, r'\x1b\[\?25h')
+            assert process.wait(PATIENCE_S) == 0
+        os.close(master)
+    assert '\x1b[?25l' in screen and 'Ctrl-C' in screen and 'board sim-1' in screen
+
+
+@pytest.mark.parametrize('url', ['udp://127.0.0.1:0', 'pty:'])
+def test_a_board_and_a_monitor_at_100_hz_cost_little(url):
+    with Board(url) as board, monitor(board.host_url) as host:
+        host.next(is_state)
+        lasts_s = 5
+        before = [each.cpu_seconds() for each in (board, host)]
+        end = time.monotonic() + lasts_s
+        count = 0
+        while time.monotonic() < end:
+            host.next(is_state)
+            count += 1
+        shares = [100 * (each.cpu_seconds() - earlier) / lasts_s
+                  for each, earlier in zip((board, host), before)]
+    print(f'{url}: {count / lasts_s:.0f} Hz, board {shares[0]:.1f} % and monitor {shares[1]:.1f} % of a core')
+    assert SANITIZED or max(shares) <= 2

@@ -1,0 +1,246 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A simulated board and hosts as separate processes over a pseudo-terminal, which stands for USB."""
+import os
+import pty
+import random
+import signal
+import subprocess
+import threading
+import time
+import tty
+
+import pytest
+
+from r4_process import R4, SANITIZED, Board, Running, is_link, is_state, monitor, run
+
+SAFE_WITHIN_MS = 1020
+
+
+@pytest.fixture(name='path')
+def link_path(tmp_path):
+    return str(tmp_path / 'board')
+
+
+@pytest.fixture(name='board')
+def running_board(path):
+    with Board(f'pty:{path}') as board:
+        yield board
+
+
+def test_streams_its_state_at_100_hz(board):
+    with monitor(board.host_url, '--count', '200') as host:
+        assert host.wait() == 0
+        states = []
+        while len(states) < 200:
+            states.append(host.next(is_state))
+    times = [each['t'] for each in states[20:]]
+    assert SANITIZED or {later - earlier for earlier, later in zip(times, times[1:])} == {10}
+
+
+def test_a_pty_without_a_path_is_named():
+    with Board('pty:') as board:
+        assert board.url.startswith('pty:/dev/pts/')
+        assert run('monitor', board.host_url, '--count', '5').returncode == 0
+
+
+def test_commands_are_confirmed_refused_and_stopped(board):
+    assert run('send', board.host_url, 'O:358,1,1', 'D:1000,1,1').returncode == 0
+    board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1] and outputs['dhb'][0] == [1000, 1])
+    assert run('stop', board.host_url).returncode == 0
+    refused = run('send', board.host_url, 'O:1,1,1')
+    assert refused.returncode == 3 and 'E:CLEAR' in refused.stderr
+    assert run('send', board.host_url, 'E:CLEAR', 'O:1,1,1').returncode == 0
+
+
+def test_a_second_program_is_told_that_the_port_is_in_use(board):
+    with monitor(board.host_url) as host:
+        host.next(is_state)
+        result = run('monitor', board.host_url, '--duration', '1')
+        assert result.returncode == 4 and 'in use' in result.stderr
+        stopped = run('stop', board.host_url)
+        assert stopped.returncode == 4 and 'CUT THE POWER' in stopped.stderr
+        host.next(is_state)
+
+
+def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(board):
+    with Running('send', board.host_url, 'O:358,1,1', '--hold', '60', '--json') as host:
+        host.next(lambda each: each['confirmed'])
+        board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
+        killed = host.signal(signal.SIGKILL)
+        board.outputs(lambda outputs: outputs['osmc'][0] == [0, 0])
+        safe = board.state('SAFE', 'link')
+    print(f"safe {safe['silence']} ms after the last heartbeat, "
+          f"{(safe['came'] - killed) * 1000:.0f} ms after the kill")
+    assert safe['silence'] <= SAFE_WITHIN_MS or SANITIZED
+
+
+def test_the_board_is_safe_within_its_timeout_of_a_hung_hosts_last_heartbeat(board):
+    with Running('send', board.host_url, 'O:358,1,1', '--hold', '60', '--json') as host:
+        host.next(lambda each: each['confirmed'])
+        host.signal(signal.SIGSTOP)
+        safe = board.state('SAFE', 'link')
+        print(f"safe {safe['silence']} ms after the last heartbeat")
+        assert 1000 <= safe['silence'] <= SAFE_WITHIN_MS or SANITIZED
+        host.signal(signal.SIGCONT)
+        board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
+        board.state('ACTIVE')
+
+
+def test_a_session_goes_on_when_the_board_is_plugged_in_again(board, path):
+    with monitor(board.host_url) as host:
+        host.next(is_link('active'))
+        unplugged = board.signal(signal.SIGKILL)
+        lost = host.next(lambda each: each['type'] == 'link' and not each['fields']['up'])
+        assert lost['came'] - unplugged < 0.05 or SANITIZED
+        with Board(f'pty:{path}') as again:
+            back = host.next(is_link('active'))
+            assert back['came'] - again.log[-1]['came'] < 1.05 or SANITIZED
+            host.next(is_state)
+            print(f"told after {(lost['came'] - unplugged) * 1000:.1f} ms, "
+                  f"back after {(back['came'] - again.log[-1]['came']) * 1000:.1f} ms")
+        host.next(lambda each: each['type'] == 'link' and not each['fields']['up'])
+
+
+def test_a_board_goes_on_when_the_host_comes_back(board):
+    for _ in range(3):
+        with Running('send', board.host_url, 'O:358,1,1', '--hold', '60', '--json') as host:
+            host.next(lambda each: each['confirmed'])
+            board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
+            host.signal(signal.SIGKILL)
+            board.state('SAFE', 'link')
+
+
+def test_a_new_host_begins_with_the_outputs_off(board):
+    with Running('send', board.host_url, 'O:358,1,1', '--hold', '60', '--json') as host:
+        host.next(lambda each: each['confirmed'])
+        host.signal(signal.SIGKILL)
+    board.state('SAFE', 'link')
+    with monitor(board.host_url) as host:
+        host.next(is_link('active'))
+        assert host.next(is_state)['fields']['OSMC1'] == [0, 0]
+
+
+def garbage(size):
+    return random.Random(7).randbytes(size)
+
+
+def test_a_board_recovers_from_a_host_of_another_speed(board):
+    device = os.open(board.host_url[len('serial://'):], os.O_RDWR | os.O_NOCTTY)
+    for _ in range(20):
+        os.write(device, garbage(1000))
+    os.close(device)
+    with monitor(board.host_url, '--fields', 'RXCRC') as host:
+        host.next(is_link('active'))
+        state = host.next(lambda each: is_state(each) and 'RXCRC' in each['fields'])
+        print(f"RXCRC {state['fields']['RXCRC']}")
+        assert state['fields']['RXCRC'] > 10 and state['fields']['SAFE'] == 0
+
+
+def test_a_board_throws_10_mb_without_a_terminator_away(board):
+    device = os.open(board.host_url[len('serial://'):], os.O_RDWR | os.O_NOCTTY)
+    tty.setraw(device)
+    for _ in range(1000):
+        os.write(device, b'x' * 10_000)
+    os.write(device, b'\n')
+    with open(f'/proc/{board.process.pid}/status', encoding='ascii') as status:
+        peak = next(line for line in status if line.startswith('VmHWM'))
+    os.close(device)
+    print(peak)
+    assert int(peak.split()[1]) < 12_000 or SANITIZED
+    assert run('send', board.host_url, 'O:358,1,1').returncode == 0
+
+
+class Noise:
+    """A device that talks at another speed: what a host reads there is garbage."""
+
+    def __enter__(self):
+        self.master, slave = pty.openpty()
+        tty.setraw(slave)
+        self.path = os.ttyname(slave)
+        self.slave = slave
+        self.going = True
+        self.thread = threading.Thread(target=self.talk)
+        self.thread.start()
+        return self
+
+    def talk(self):
+        os.set_blocking(self.master, False)
+        while self.going:
+            for act in (lambda: os.write(self.master, garbage(500)), lambda: os.read(self.master, 4096)):
+                try:
+                    act()
+                except BlockingIOError:
+                    time.sleep(0.001)  # it is the device that takes its time
+
+    def __exit__(self, *_):
+        self.going = False
+        self.thread.join()
+        os.close(self.master)
+        os.close(self.slave)
+
+
+def test_a_host_of_another_speed_says_so():
+    with Noise() as device:
+        result = run('monitor', f'serial://{device.path}', '--json', '--duration', '0.5')
+    assert result.returncode == 3
+    assert 'none of them valid' in result.stderr and 'same speed' in result.stderr
+    assert '"type":"error"' in result.stdout and '"type":"state"' not in result.stdout
+
+
+def test_a_host_recovers_when_the_speed_is_right_again(board, path):
+    other, slave = pty.openpty()
+    tty.setraw(slave)
+    os.unlink(path)
+    os.symlink(os.ttyname(slave), path)
+    with monitor(f'serial://{path}') as host:
+        host.next(lambda each: each['type'] == 'link' and each['fields']['up'])
+        os.write(other, garbage(2000) + b'\n')
+        host.next(lambda each: each['type'] == 'error')
+        os.unlink(path)
+        os.symlink('/dev/null', path)
+        os.close(other)
+        os.close(slave)
+        board.end()
+        os.unlink(path)
+        with Board(f'pty:{path}'):
+            host.next(is_link('active'))
+            host.next(is_state)
+
+
+def test_a_stalled_reader_gets_a_young_state_first(board):
+    with monitor(board.host_url) as host:
+        for _ in range(50):
+            before = host.next(is_state)
+        host.signal(signal.SIGSTOP)
+        deadline = time.monotonic() + 0.7
+        while time.monotonic() < deadline:  # the stall itself
+            time.sleep(0.01)
+        host.skip_past()
+        host.signal(signal.SIGCONT)
+        first = host.next(is_state)
+        # Longer than the heartbeats may stay away: the board goes safe, and the link comes back.
+        host.signal(signal.SIGSTOP)
+        board.state('SAFE', 'link')
+        host.signal(signal.SIGCONT)
+        board.state('ACTIVE')
+    age_ms = (first['came'] - before['came']) * 1000 - (first['t'] - before['t'])
+    print(f'the first state is {age_ms:.1f} ms old')
+    assert age_ms < 50
+
+
+def test_a_stalled_pipe_does_not_stall_the_heartbeats(board):
+    with subprocess.Popen([R4, 'monitor', board.host_url, '--json'], stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE, text=True) as host:
+        assert host.stdout.readline()
+        # Nobody reads on: the pipe of 64 kB is full after some 250 states.
+        silent_until = time.monotonic() + 5
+        while time.monotonic() < silent_until:
+            try:
+                board.state('SAFE', timeout=0.5)
+                pytest.fail('the board went safe')
+            except AssertionError as nothing:
+                assert 'nothing of that kind' in str(nothing)
+        host.send_signal(signal.SIGINT)
+        host.stdout.read()
+        assert 'left out' in host.stderr.read()
+        assert host.wait() == 0

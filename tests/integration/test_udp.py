@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A simulated board and hosts as separate processes over UDP."""
+import signal
+import socket
+import time
+import zlib
+
+import pytest
+
+from r4_process import (PATIENCE_S, SANITIZED, Board, Running, is_link, is_state, monitor, objects, run)
+
+# The board's timeout, and what docs/safety.md promises on top.
+SAFE_WITHIN_MS = 1020
+
+
+@pytest.fixture(name='board')
+def running_board():
+    with Board('udp://127.0.0.1:0') as board:
+        yield board
+
+
+def test_streams_its_state_at_100_hz(board):
+    with monitor(board.host_url, '--count', '200') as host:
+        assert host.wait() == 0
+        states = []
+        while len(states) < 200:
+            states.append(host.next(is_state))
+        states = states[20:]  # behind the choice of fields
+    numbers = [each['pnum'] for each in states]
+    times = [each['t'] for each in states]
+    steps = [later - earlier for earlier, later in zip(times, times[1:])]
+    print(f'{len(states)} states in {times[-1] - times[0]} ms of the board')
+    # Heartbeats have numbers of the same series: four of them in these two seconds.
+    assert len(states) - 1 <= numbers[-1] - numbers[0] <= len(states) + 6
+    assert SANITIZED or set(steps) == {10}
+    assert states[0]['fields']['AIN24'] == pytest.approx(24.3, abs=1)
+    assert states[0]['fields']['OSMC1'] == [0, 0]
+
+
+def test_a_monitor_without_a_terminal_prints_one_line_a_state(board):
+    result = run('monitor', board.host_url, '--count', '5')
+    states = [line for line in result.stdout.splitlines() if line.startswith('state ')]
+    assert result.returncode == 0 and len(states) == 5 and 'AIN24:24' in states[0]
+
+
+def test_a_command_is_confirmed_by_the_boards_state(board):
+    result = run('send', board.host_url, 'O:358,1,1', 'S:1500,16', 'Q:ID')
+    assert result.returncode == 0, result
+    assert [line.split()[:2] for line in result.stdout.splitlines() if 'confirmed' in line] == [
+        ['O:358,1,1', 'confirmed'], ['S:1500,16', 'confirmed'], ['Q:ID', 'confirmed']]
+    assert 'board sim-1' in result.stdout
+    board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
+    board.outputs(lambda outputs: outputs['servo'][15] == 1500)
+
+
+def test_every_kind_of_command_is_executed(board):
+    commands = ['O:1,1,4', 'D:2,0,4', 'S:2500,16', 'R:8,On', 'P:-100,500,4', 'Z:4', 'B:4095,1,1,4',
+                'U:10,4', 'F:ENC1', 'C:rate,50', 'C:recovery,rearm', 'E:STOP', 'E:CLEAR']
+    result = run('send', board.host_url, *commands, '--json')
+    assert result.returncode == 0, result
+    assert [(each['command'], each['confirmed']) for each in objects(result.stdout)] == [
+        (command, True) for command in commands]
+
+
+def test_a_command_is_refused_while_a_stop_is_latched(board):
+    assert run('stop', board.host_url).returncode == 0
+    refused = run('send', board.host_url, 'O:358,1,1', 'D:1,1,1')
+    assert refused.returncode == 3
+    assert 'emergency stop' in refused.stderr and 'E:CLEAR' in refused.stderr
+    assert 'D:1,1,1  not sent' in refused.stdout
+    assert run('send', board.host_url, 'E:CLEAR', 'O:358,1,1').returncode == 0
+
+
+def test_a_stop_switches_every_output_off_and_nothing_comes_back(board):
+    with monitor(board.host_url) as host:
+        host.next(is_link('active'))
+        # The same socket's owner commands: through the monitor nobody can, so stop from outside.
+        stopped = run('stop', board.host_url)
+        assert stopped.returncode == 0 and 'SAFE (stop)' in stopped.stdout
+        board.state('SAFE', 'stop')
+        host.next(is_link('safe', 'stop'))
+        state = host.next(lambda each: is_state(each) and each['fields']['SAFE'] == 2)
+        assert state['fields']['OSMC1'] == [0, 0]
+
+
+def test_a_stop_during_a_drive_switches_it_off(board):
+    with Running('send', board.host_url, 'O:358,1,1', '--hold', '20', '--json') as host:
+        host.next(lambda each: each['confirmed'])
+        board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
+        assert run('stop', board.host_url).returncode == 0
+        board.outputs(lambda outputs: outputs['osmc'][0] == [0, 0])
+        board.state('SAFE', 'stop')
+
+
+def test_a_second_host_is_told_that_the_board_is_busy_and_may_still_stop_it(board):
+    with monitor(board.host_url) as first:
+        first.next(is_link('active'))
+        refused = run('send', board.host_url, 'O:358,1,1', '--timeout', '0.5')
+        assert refused.returncode == 3 and 'another host controls the board' in refused.stderr
+        with monitor(board.host_url) as second:
+            second.next(lambda each: each['type'] == 'nack' and each['fields']['N'][1] == 'BUSY')
+            second.next(lambda each: each['type'] == 'link' and each['fields']['busy'])
+        assert run('stop', board.host_url).returncode == 0
+        first.next(is_link('safe', 'stop'))
+    assert not any('executed' in each and each['executed']['command'].startswith('O:')
+                   for each in board.log)
+
+
+def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(board):
+    with Running('send', board.host_url, 'O:358,1,1', '--hold', '60', '--json') as host:
+        host.next(lambda each: each['confirmed'])
+        board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
+        killed = host.signal(signal.SIGKILL)
+        off = board.outputs(lambda outputs: outputs['osmc'][0] == [0, 0])
+        safe = board.state('SAFE', 'link')
+    print(f"safe {safe['silence']} ms after the last heartbeat, "
+          f"{(safe['came'] - killed) * 1000:.0f} ms after the kill")
+    assert off['t'] == safe['t']
+    assert 1000 <= safe['silence'] <= SAFE_WITHIN_MS or SANITIZED
+    assert safe['came'] - killed <= SAFE_WITHIN_MS / 1000 + 0.05 or SANITIZED
+
+
+def test_control_is_free_when_the_host_that_had_it_is_gone(board):
+    with monitor(board.host_url) as first:
+        first.next(is_link('active'))
+        first.signal(signal.SIGKILL)
+    result = run('send', board.host_url, 'O:358,1,1')
+    assert result.returncode == 0, result
+
+
+def test_a_session_goes_on_when_the_board_comes_back(board):
+    with monitor(board.host_url) as host:
+        host.next(is_state)
+        board.signal(signal.SIGKILL)
+        host.next(is_link('lost'))
+        with Board(board.url) as again:
+            host.next(is_link('active'))
+            host.next(is_state)
+            again.state('ACTIVE')
+        host.next(is_link('lost'))
+
+
+def test_a_monitor_may_be_started_before_the_board():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(('127.0.0.1', 0))
+        url = f'udp://127.0.0.1:{probe.getsockname()[1]}'
+    with monitor(url + '?listen=0', '--count', '20') as host, Board(url):
+        assert host.wait() == 0
+
+
+def test_a_stalled_reader_gets_a_young_state_first(board):
+    with monitor(board.host_url) as host:
+        for _ in range(50):
+            before = host.next(is_state)
+        host.signal(signal.SIGSTOP)
+        deadline = time.monotonic() + 0.6
+        while time.monotonic() < deadline:  # the stall itself
+            board.next(timeout=0.1) if not board.lines.empty() else time.sleep(0.01)
+        host.skip_past()
+        woken = host.signal(signal.SIGCONT)
+        first = host.next(is_state)
+    age_ms = (first['came'] - before['came']) * 1000 - (first['t'] - before['t'])
+    print(f'the first state is {age_ms:.1f} ms old, {1000 * (first["came"] - woken):.1f} ms after waking')
+    assert age_ms < 50
+
+
+def test_noise_from_others_does_no_harm(board):
+    with monitor(board.host_url, '--fields', 'RXCRC') as host, \
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as noise:
+        host.next(is_link('active'))
+        address = ('127.0.0.1', int(board.url.rsplit(':', 1)[1]))
+        good = b'O:358,1,1;PNum:1;T:1;^'
+        damaged = good + hex(zlib.crc32(good) ^ 1).encode() + b'^'
+        junk = [b'', b'\0', b'^0x^', b'x' * 2000, bytes(range(256)), damaged, b'E:STOP;^0x12345678^']
+        for _ in range(20):
+            for each in junk:
+                noise.sendto(each, address)
+            host.next(is_state)
+        noise.sendto(b'x' * 60000, address)
+        host.next(lambda each: is_state(each) and each['fields'].get('RXCRC', 0) >= 100)
+        assert host.next(is_state)['fields']['SAFE'] == 0
+    assert not any('executed' in each and each['executed']['command'][0] in 'OE' for each in board.log)
+
+
+def test_noise_at_the_host_is_counted_and_shown_and_the_link_goes_on(board):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(('127.0.0.1', 0))
+        port = probe.getsockname()[1]
+    with monitor(f'{board.url}?listen={port}') as host, \
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as noise:
+        host.next(is_link('active'))
+        noise.sendto(b'AIN24:24.28;PNum:1;T:1;^0x1^', ('127.0.0.1', port))
+        error = host.next(lambda each: each['type'] == 'error')
+        assert error['fields']['error'] == 'crc' and error['fields']['found'] == '0x1'
+        host.next(is_state)
+
+
+def test_measures_a_link(board):
+    result = run('bench', board.host_url, '--duration', '1.5', '--json', timeout=PATIENCE_S + 10)
+    assert result.returncode == 0, result
+    measured = objects(result.stdout)[0]
+    print(result.stdout)
+    assert SANITIZED or measured['state_hz'] == pytest.approx(100, abs=3)
+    assert measured['round_trip_us']['count'] > 100 and measured['unanswered'] == 0
+    assert measured['confirmation_us']['count'] > 5 and measured['unconfirmed'] == 0
+    assert measured['lost'] == 0 and measured['damaged'] == 0
+    assert run('bench', board.host_url, '--duration', '0.3').returncode == 0
+
+
+def test_bench_of_nothing_is_refused():
+    result = run('bench', 'udp://127.0.0.1:9?listen=0', timeout=PATIENCE_S)
+    assert result.returncode == 3 and 'nothing was heard' in result.stderr
+
+
+def test_a_board_ends_by_itself_or_by_a_signal():
+    with Board('udp://127.0.0.1:0', options=['--duration', '0.2']) as board:
+        assert board.wait() == 0
+    for number in (signal.SIGINT, signal.SIGTERM):
+        with Board('udp://127.0.0.1:0') as board:
+            board.signal(number)
+            assert board.wait() == 0
+
+
+def test_the_same_seed_gives_the_same_inputs_and_another_board_id():
+    options = ['--seed', '7', '--board-id', 'left']
+    first_states = []
+    for _ in range(2):
+        with Board('udp://127.0.0.1:0', options=options) as board:
+            boot = next(each for each in board.log + [board.next()] if 't' in each)
+            with monitor(board.host_url, '--count', '1') as host:
+                host.wait()
+            assert 'board left,' in run('send', board.host_url, 'Q:ID').stdout
+        first_states.append(boot['t'])
+    assert first_states[0] == first_states[1]
+
+
+def test_a_scenario_happens_to_the_board(tmp_path):
+    script = tmp_path / 'scenario'
+    script.write_text('0.3 handle released\n0.6 handle held\n0.9 fault\n')
+    with Board('udp://127.0.0.1:0', options=['--script', str(script)]) as board:
+        with monitor(board.host_url) as host:
+            host.next(is_link('active'))
+            for reason in ('handle', 'fault'):
+                board.state('SAFE', reason)
+                host.next(is_link('safe', reason))
+            result = run('stop', board.host_url)
+            assert result.returncode == 0, 'fault and stop together'
+
+
+def test_a_quiet_board_says_only_where_it_listens():
+    with Board('udp://127.0.0.1:0', options=['--quiet', '--duration', '0.5']) as board:
+        run('send', board.host_url, 'O:358,1,1')
+        board.wait()
+        assert [each[1] for each in list(board.lines.queue)] == [None]
+
+
+def test_an_older_client_without_heartbeats_gets_nothing_done(board):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
+        fields = b'O:358,1,1;PNum:1;T:1;^'
+        client.settimeout(PATIENCE_S)
+        client.sendto(fields + hex(zlib.crc32(fields)).encode() + b'^',
+                      ('127.0.0.1', int(board.url.rsplit(':', 1)[1])))
+        answer = client.recv(2000)
+        while not answer.startswith(b'N:'):
+            answer = client.recv(2000)
+    assert answer.startswith(b'N:1,SAFE;')
