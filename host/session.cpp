@@ -60,6 +60,8 @@ Time Session::receive(std::string_view bytes, Time now) {
   if (!from_board || !datagram.has_pnum() || !datagram.has_time()) return poll(now);
   ++collector_.counts.received;
 
+  bool current = false;                // tells the board's reason as it is now
+  const Ticket before = next_ticket_;  // what the handler asks for came after it
   switch (kind) {
     case MessageKind::nack:
       on_nack_datagram(datagram, now);
@@ -68,20 +70,22 @@ Time Session::receive(std::string_view bytes, Time now) {
       on_identity_datagram(datagram, now);
       break;
     case MessageKind::board_heartbeat:
-      link_.on_datagram(datagram.pnum(), static_cast<std::uint32_t>(datagram.time_ms()), true,
-                        heartbeat_reason(datagram), to_ms(now));
+      current = is_current(link_.on_datagram(datagram.pnum(),
+                                             static_cast<std::uint32_t>(datagram.time_ms()), true,
+                                             heartbeat_reason(datagram), to_ms(now)));
       handler_.on_board_heartbeat(datagram);
       break;
     default:
-      on_state_datagram(datagram, now);
+      current = on_state_datagram(datagram, now);
       break;
   }
   refresh_status(now);
-  confirm_stop(now);
+  if (current) confirm_stop(before, now);
   return poll(now);
 }
 
-void Session::on_state_datagram(const Datagram& datagram, Time now) {
+// Returns whether it is the newest datagram of the board.
+bool Session::on_state_datagram(const Datagram& datagram, Time now) {
   State fresh = state_;
   if (!read_state(datagram, fresh)) {
     ++collector_.counts.damaged;
@@ -89,14 +93,14 @@ void Session::on_state_datagram(const Datagram& datagram, Time now) {
     result.error = ReadError::syntax;
     handler_.on_bad_datagram(result,
                              std::string_view(datagram.bytes().data(), datagram.bytes().size()));
-    return;
+    return false;
   }
   const SafeReason reason = fresh.present.has(StateField::safe) ? fresh.safe : SafeReason::none;
   const Arrival arrival = link_.on_datagram(fresh.pnum, fresh.t_ms, false, reason, to_ms(now));
   // An older state must not replace a newer one. A late one that only a heartbeat or an answer has
   // overtaken, in a queue where those go first, is still the newest state.
   const bool newest_state = arrival == Arrival::late && newer(fresh.pnum, state_.pnum);
-  if (!is_current(arrival) && !newest_state) return;
+  if (!is_current(arrival) && !newest_state) return false;
   collector_.on_state(fresh.t_ms, now);
   state_ = fresh;
   state_.safe = reason;
@@ -104,6 +108,7 @@ void Session::on_state_datagram(const Datagram& datagram, Time now) {
   confirm_from_state(now);
   select_fields(now);
   handler_.on_state(state_, datagram);
+  return is_current(arrival);
 }
 
 void Session::on_nack_datagram(const Datagram& datagram, Time now) {
@@ -112,6 +117,7 @@ void Session::on_nack_datagram(const Datagram& datagram, Time now) {
   knows_cmd_ = true;  // the paper's release answers nothing
   if (nack.code == Refusal::busy) busy_until_ = now + busy_memory;
   on_answer(datagram, now);
+  if (nack.pnum == newest_clear_ && nack.code != Refusal::busy) clear_open_ = false;
   handler_.on_nack(nack, datagram);
   for (Pending& pending : pending_.under_way()) {
     if (pending.stage != Stage::sent || pending.pnum != nack.pnum) continue;
@@ -161,7 +167,10 @@ void Session::confirm_from_state(Time now) {
     knows_cmd_ = true;
     // One of our numbers: the board has executed a command of ours, so we control it.
     const std::uint32_t ours = link_.last_pnum() - first_pnum_;
-    if (link_up() && state_.last_command - first_pnum_ <= ours) controlled_ = true;
+    if (link_up() && state_.last_command - first_pnum_ <= ours) {
+      controlled_ = true;
+      if (!newer(newest_clear_, state_.last_command)) clear_open_ = false;
+    }
   }
   for (Pending& pending : pending_.under_way()) {
     if (pending.stage != Stage::sent || pending.kind == CommandKind::stop ||
@@ -184,10 +193,14 @@ void Session::confirm_from_state(Time now) {
   }
 }
 
-void Session::confirm_stop(Time now) {
+// By a datagram that came when `before` was the next ticket.
+void Session::confirm_stop(Ticket before, Time now) {
   if (link_.reason() != SafeReason::stop) return;
+  // The report of an earlier stop, which an E:CLEAR of ours may be about to take away.
+  if (clear_open_ && state_.present.has(StateField::cmd)) return;
   for (Pending& pending : pending_.under_way()) {
-    if (pending.stage == Stage::sent && pending.kind == CommandKind::stop) {
+    if (pending.stage == Stage::sent && pending.kind == CommandKind::stop &&
+        pending.ticket < before) {
       finish(pending, Outcome::confirmed, Refusal::none, now);
     }
   }
@@ -310,8 +323,17 @@ void Session::transmit_now(const Command& command, std::uint32_t t_ms, Priority 
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   write_command(writer, command);
-  const Text bytes = writer.finish(link_.take_pnum(), t_ms);
+  const Text bytes = writer.finish(take_pnum(command.kind), t_ms);
   if (!bytes.empty()) handler_.transmit({bytes.data(), bytes.size()}, priority);
+}
+
+std::uint32_t Session::take_pnum(CommandKind kind) {
+  const std::uint32_t pnum = link_.take_pnum();
+  if (kind == CommandKind::clear) {
+    newest_clear_ = pnum;
+    clear_open_ = true;
+  }
+  return pnum;
 }
 
 Session::Pending* Session::allocate(const Command& command, Time timeout, Time now) {
@@ -356,8 +378,8 @@ Ticket Session::stop(Time timeout, Time now) {
   } else {
     transmit_now(Command::stop(), to_ms(now), Priority::stop);
   }
-  for (Pending& pending :
-       pending_.under_way()) {  // nothing that was asked for before a stop may follow it
+  // Nothing that was asked for before a stop may follow it.
+  for (Pending& pending : pending_.under_way()) {
     if (pending.kind != CommandKind::stop) {
       finish(pending, Outcome::cancelled, Refusal::none, now);
     }
@@ -377,7 +399,7 @@ Ticket Session::identify(Time timeout, Time now) {
 void Session::transmit(Pending& pending, Time now) {
   const bool stop = pending.kind == CommandKind::stop;
   if (pending.stage == Stage::queued) {
-    pending.pnum = link_.take_pnum();
+    pending.pnum = take_pnum(pending.kind);
     // The field is there already; finish() appends what follows it.
     DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.fields_size);
     pending.size = writer.finish(pending.pnum, to_ms(now)).size();

@@ -14,7 +14,8 @@
 // decides. A board without CMD (the paper's release) confirms by the value that its state shows.
 //
 // E:STOP does not wait for the link, overtakes everything, discards all commands that wait, and is
-// repeated every 20 ms until the board reports the reason `stop`.
+// repeated every 20 ms until the board reports the reason `stop`: in a datagram that comes after it
+// was sent, and not while an E:CLEAR sent before it may still take the reported stop away.
 #pragma once
 
 #include <chrono>
@@ -69,8 +70,8 @@ struct SessionOptions {
   std::string fields = "DEFAULT";
   std::chrono::milliseconds command_retry{50};
   std::chrono::milliseconds stop_retry{20};
-  std::chrono::milliseconds identify_interval{
-      1000};  // Q:ID, for identity and round-trip time; 0: never
+  // Q:ID, for identity and round-trip time; 0: never.
+  std::chrono::milliseconds identify_interval{1000};
 };
 
 class Session {
@@ -146,15 +147,16 @@ class Session {
   void retry_due(Time now);
   void finish(Pending& pending, Outcome outcome, Refusal code, Time now);
   void transmit_now(const Command& command, std::uint32_t t_ms, Priority priority);
+  std::uint32_t take_pnum(CommandKind kind);
   bool link_up() const;
   bool speaks_no_cmd() const;
 
-  void on_state_datagram(const Datagram& datagram, Time now);
+  bool on_state_datagram(const Datagram& datagram, Time now);
   void on_identity_datagram(const Datagram& datagram, Time now);
   void on_nack_datagram(const Datagram& datagram, Time now);
   void on_answer(const Datagram& datagram, Time now);
   void confirm_from_state(Time now);
-  void confirm_stop(Time now);
+  void confirm_stop(Ticket before, Time now);
   void select_fields(Time now);
   Command with_needed_fields(const Command& command);
   void refresh_status(Time now);
@@ -169,6 +171,8 @@ class Session {
   StatisticsCollector collector_;
   PendingCommands pending_;
   Ticket next_ticket_ = 1;
+  std::uint32_t newest_clear_ = 0;  // its packet number
+  bool clear_open_ = false;         // it may be on its way: neither executed nor overtaken yet
   Time busy_until_{0};
   Time next_identify_{0};
   Time question_sent_{0};

@@ -34,7 +34,8 @@ BoardLink::Freshness BoardLink::judge(const HostHeartbeat& heartbeat, bool echo_
     const std::uint32_t t = static_cast<std::uint32_t>(heartbeat.t);
     const bool recent = at_or_after(now_ms, t) && now_ms - t <= timing_.timeout_ms;
     // What was sent before the link was lost says nothing of the host's being alive now.
-    const bool this_episode = state_ != BoardLinkState::lost || at_or_after(t, lost_ms_);
+    const bool this_episode = state_ != BoardLinkState::lost ||
+                              now_ms - t <= now_ms - lost_ms_;  // by age: it may be weeks
     return recent && this_episode ? Freshness::fresh : Freshness::stale;
   }
   const bool should_echo = echo_host || (ours && clock_ == Clock::echo && has_owner());
@@ -81,8 +82,9 @@ void BoardLink::feed(const HostHeartbeat& heartbeat, std::uint32_t now_ms) {
   if (!heartbeat.has_pnum) return;
   newest_heartbeat_ = heartbeat.pnum;
   // The marks last for the limit at any rate of heartbeats. Between two marks a heartbeat counts as
-  // come at the earlier one, so a command is never taken for younger than it is.
-  constexpr std::uint32_t spacing_ms = late_limit_ms / (mark_count - 1);
+  // come at the earlier one, so a command is never taken for younger than it is. When the oldest
+  // mark is dropped, the next is past the limit itself.
+  constexpr std::uint32_t spacing_ms = late_limit_ms / (mark_count - 1) + 1;
   if (marks_used_ != 0 && now_ms - marks_[marks_used_ - 1].at_ms < spacing_ms) {
     marks_[marks_used_ - 1].pnum = heartbeat.pnum;
     return;
@@ -134,6 +136,7 @@ HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uin
       if (!continuing || !armed_ || other_clock) return begin_session(heartbeat, true, now_ms);
       state_ = BoardLinkState::active;
       send_now_ = true;
+      newest_echo_ms_ = now_ms - timing_.timeout_ms;
       if (heartbeat.has_pnum) spend(heartbeat.pnum);  // what was sent before the outage
       numbers_in_doubt_ = !heartbeat.has_pnum;
       feed(heartbeat, now_ms);

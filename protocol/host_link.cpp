@@ -73,6 +73,7 @@ void HostLink::on_transport(bool up) {
 }
 
 bool HostLink::poll(std::uint32_t now_ms) {
+  hung_ = watchdog_expired(now_ms);
   if (state_ != HostLinkState::active && state_ != HostLinkState::safe) return false;
   if (now_ms - heard_ms_ < timing_.timeout_ms) return false;
   state_ = HostLinkState::lost;
@@ -93,7 +94,12 @@ void HostLink::heartbeat_sent(std::uint32_t now_ms) {
 
 void HostLink::watchdog(std::uint32_t period_ms, std::uint32_t now_ms) {
   watchdog_ms_ = period_ms;
+  feed(now_ms);
+}
+
+void HostLink::feed(std::uint32_t now_ms) {
   fed_ms_ = now_ms;
+  hung_ = false;
 }
 
 std::uint32_t HostLink::due_in(std::uint32_t now_ms) const {

@@ -57,12 +57,12 @@ class HostLink {
   // The T that it carries: the T of the board's newest heartbeat, 0 before the first.
   std::uint32_t echo() const { return echo_; }
 
-  // The application watchdog: heartbeats stop when feed() stays away for `period_ms`; 0 turns it
-  // off.
+  // The application watchdog: heartbeats stop when feed() stays away for `period_ms`, until it is
+  // called again; 0 turns it off.
   void watchdog(std::uint32_t period_ms, std::uint32_t now_ms);
-  void feed(std::uint32_t now_ms) { fed_ms_ = now_ms; }
+  void feed(std::uint32_t now_ms);
   bool watchdog_expired(std::uint32_t now_ms) const {
-    return watchdog_ms_ != 0 && now_ms - fed_ms_ > watchdog_ms_;
+    return watchdog_ms_ != 0 && (hung_ || now_ms - fed_ms_ > watchdog_ms_);
   }
 
   // The number for the next datagram that the host sends.
@@ -100,6 +100,7 @@ class HostLink {
   bool echoed_ = false;
   std::uint32_t watchdog_ms_ = 0;
   std::uint32_t fed_ms_ = 0;
+  bool hung_ = false;  // the watchdog had expired at a poll(): the clock's wrap does not undo it
 };
 
 }  // namespace r4

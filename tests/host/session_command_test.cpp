@@ -289,6 +289,49 @@ TEST(SessionStop, IsRepeatedEveryTwentyMillisecondsUntilTheBoardReportsIt) {
   EXPECT_EQ(link.count('E'), 5U);
 }
 
+TEST(SessionStop, IsNotConfirmedByWhatWasKnownBeforeIt) {
+  ScriptedLink link;
+  link.connect();
+  link.heartbeat(SafeReason::stop);
+  const Ticket ticket = link.session.stop(1s, link.now);
+  link.nack(1, "STALE");
+  link.identity();
+  EXPECT_TRUE(under_way(link, ticket));
+  link.heartbeat(SafeReason::stop);
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
+}
+
+TEST(SessionStop, IsNotConfirmedByAnEarlierStopThatAClearMayTakeAway) {
+  ScriptedLink link;
+  link.connect();
+  const std::string stopped = "SAFE:2;CMD:";
+  const std::string before = std::to_string(link.session.state().last_command) + ";";
+  link.state(stopped + before);
+  link.session.send(Command::clear(), 1s, link.now);
+  const std::uint32_t clear = link.last('E').pnum;
+  const Ticket ticket = link.session.stop(1s, link.now);
+  link.state(stopped + before);  // left the board before the E:CLEAR came
+  link.heartbeat(SafeReason::stop);
+  EXPECT_TRUE(under_way(link, ticket));
+  link.executed(clear);
+  link.pass(50ms);
+  EXPECT_TRUE(under_way(link, ticket));
+  EXPECT_GE(link.count('E'), 4U) << "the E:STOP is still repeated";
+  link.state(stopped + std::to_string(link.last('E').pnum) + ";");
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
+}
+
+TEST(SessionStop, IsConfirmedByAHeartbeatOnceTheClearIsKnownToBeRefused) {
+  ScriptedLink link;
+  link.connect();
+  link.session.send(Command::clear(), 1s, link.now);
+  const std::uint32_t clear = link.last('E').pnum;
+  const Ticket ticket = link.session.stop(1s, link.now);
+  link.nack(clear, "SAFE");
+  link.heartbeat(SafeReason::stop);
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
+}
+
 TEST(SessionStop, CancelsEveryCommandUnderWayAndNoneFollowsIt) {
   ScriptedLink link;
   const Ticket queued = link.session.send(drive, 5s, link.now);

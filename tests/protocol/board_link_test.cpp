@@ -144,6 +144,19 @@ TEST_F(BoardLinkTest, TheSameHostResumesWithAnEchoFromAfterTheLoss) {
   EXPECT_EQ(heartbeat(echo_pnum + 4, sent.back()), HeartbeatEffect::resumed);
 }
 
+TEST_F(BoardLinkTest, AHostIsServedAfterWeeksOfSilence) {
+  connect();
+  now += 2000;
+  ASSERT_TRUE(link.poll(now));
+  for (int day = 0; day < 30; ++day) {  // more than half a turn of the clock
+    now += 24U * 3600 * 1000;
+    send_due();
+  }
+  now += 5;
+  ASSERT_EQ(heartbeat(echo_pnum + 2, sent.back()), HeartbeatEffect::resumed);
+  EXPECT_TRUE(link.heartbeat_due(now + BoardLink::echo_retry_ms)) << "its echo is missed again";
+}
+
 TEST_F(BoardLinkTest, OtherNumbersOrAnotherPlaceAreANewSession) {
   for (const Source from : {here, there}) {
     link = BoardLink(BoardLink::Timing{});
@@ -435,6 +448,21 @@ TEST_F(BoardLinkTest, TheFirstHeartbeatThatOvertookItCounts) {
   }
   EXPECT_EQ(command(echo_pnum + 17), "STALE");    // 18 came 300 ms ago
   EXPECT_EQ(command(echo_pnum + 19), "execute");  // 20 came 250 ms ago
+}
+
+TEST_F(BoardLinkTest, TheFirstHeartbeatThatOvertookItCountsAtAnyRate) {
+  connect();
+  std::uint32_t pnum = echo_pnum + 10;
+  const std::uint32_t held_back = pnum++;
+  for (std::uint32_t ms = 0; ms <= 2 * BoardLink::late_limit_ms; ++ms) {
+    ASSERT_EQ(heartbeat(pnum++, sent.back()), HeartbeatEffect::fed);
+    if (ms > BoardLink::late_limit_ms) {
+      Refusal code = Refusal::none;
+      ASSERT_EQ(link.admit(here, held_back, now, code), Admission::refuse) << ms;
+      ASSERT_EQ(code, Refusal::stale);
+    }
+    run(1);
+  }
 }
 
 TEST_F(BoardLinkTest, ADeadHeartbeatOvertakesNothing) {

@@ -205,6 +205,18 @@ TEST_F(HostLinkTest, TheWatchdogStopsTheHeartbeatsOfAHungApplication) {
   EXPECT_TRUE(send_due());
 }
 
+TEST_F(HostLinkTest, TheWatchdogOutlastsTheWrapOfTheClock) {
+  link.watchdog(200, now);
+  const std::uint32_t fed = now;
+  for (; now - fed < 0xffff'0000U; now += 0x8000) link.poll(now);
+  for (; now != fed; now += 0x1000) link.poll(now);
+  now += 100;
+  EXPECT_TRUE(link.watchdog_expired(now));
+  EXPECT_FALSE(link.heartbeat_due(now));
+  link.feed(now);
+  EXPECT_TRUE(link.heartbeat_due(now));
+}
+
 TEST_F(HostLinkTest, TheWatchdogCanBeTurnedOff) {
   link.watchdog(200, now);
   now += 1000;
