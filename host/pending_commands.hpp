@@ -35,7 +35,8 @@ class PendingCommands {
  public:
   static constexpr std::size_t max_slots = 128;
 
-  // At most max_slots together: `commands` and, in slots of their own, `stops`: no number of commands can keep a stop out.
+  // At most max_slots together: `commands` and, in slots of their own, `stops`, so that no number
+  // of commands can keep a stop out.
   PendingCommands(std::size_t commands, std::size_t stops)
       : slots_(commands + stops), order_(commands + stops), commands_(commands), stops_(stops) {
     for (std::size_t i = 0; i < order_.size(); ++i) order_[i] = static_cast<std::uint8_t>(i);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Datagrams over UDP, one a packet, on the ports of the paper.
 //
-//     host    udp://HOST[:2018][?listen=2390]   sends to HOST:2018 from port 2390 and hears HOST
-//     there,
-//                                               from any of its ports; listen=0 takes any free port
+//     host    udp://HOST[:2018][?listen=2390]        sends to HOST:2018 from port 2390 and hears
+//                                                    HOST there, from any of its ports; listen=0
+//                                                    takes any free port
 //     board   udp://BIND[:2018][?peer=HOST[:2390]]   port 0 takes any free port; name() tells it
 //
 // A board with a peer sends to it what is for everyone; one without sends that to the host heard

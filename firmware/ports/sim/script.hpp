@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A scenario for the simulated board: what happens around it and to it, and when.
 //
-//     # TIME_S what args           '#' begins a comment; seconds since the start, to the
-//     millisecond 0.5 handle released          the dead-man's handle: held | released 1   us 1 15
-//     ultrasonic sensor 1 sees something at 15 cm; 0: nothing 1   enc 2 100                encoder
-//     2 stands at 100 counts 1   analog AIN24 21.5        that input stays at 21.5 V 3   fault the
-//     board finds itself broken 3   watchdog                 a duty of the board misses its
-//     deadline 4   reboot                   power off and on again
+//     # TIME_S what args        '#' begins a comment; seconds since the start, to the millisecond
+//     0.5 handle released       the dead-man's handle: held | released
+//     1   us 1 15               ultrasonic sensor 1 sees something at 15 cm; 0: nothing
+//     1   enc 2 100             encoder 2 stands at 100 counts
+//     1   analog AIN24 21.5     that input stays at 21.5 V
+//     3   fault                 the board finds itself broken
+//     3   watchdog              a duty of the board misses its deadline
+//     4   reboot                power off and on again
 //
 // Lines may stand in any order; those of the same time happen in theirs.
 #pragma once
