@@ -19,6 +19,8 @@ namespace r4::tool {
 namespace {
 
 constexpr std::size_t most_notes = 4;
+// More than a board has: what else a state names is not kept.
+constexpr std::size_t most_fields = 128;
 constexpr std::size_t cell_width = 24;  // "SERVO16POS          2000"
 
 // The terminal's size; that of an old one where it does not tell.
@@ -40,6 +42,7 @@ class LiveView final : public MonitorView {
       std::string name(field.name().data(), field.name().size());
       const auto known = std::find_if(fields_.begin(), fields_.end(),
                                       [&](const auto& each) { return each.first == name; });
+      if (known == fields_.end() && fields_.size() == most_fields) continue;
       std::string& value =
           known != fields_.end() ? known->second : fields_.emplace_back(std::move(name), "").second;
       value.assign(field.values().data(), field.values().size());
@@ -62,6 +65,7 @@ class LiveView final : public MonitorView {
   }
 
   void on_tick() override {
+    if (!output_has_room()) return;  // Ctrl-S
     const winsize size = terminal_size();
     std::vector<std::string> lines = status_lines();
     add_fields(lines, std::max<std::size_t>(1, size.ws_col / cell_width));

@@ -5,7 +5,9 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include <deque>
 #include <string>
+#include <utility>
 
 #include "host/command_help.hpp"
 #include "json.hpp"
@@ -16,25 +18,45 @@ namespace {
 
 std::string_view view(Text text) { return {text.data(), text.size()}; }
 
-// Room for a line on stdout, so that a reader who has stalled cannot stall our heartbeats.
-bool output_has_room() {
-  pollfd out{STDOUT_FILENO, POLLOUT, 0};
-  return ::poll(&out, 1, 0) != 0;
+// Of a damaged datagram. A byte takes up to five (\\xNN), and a pipe with room has it for 4096.
+constexpr std::size_t most_shown = 600;
+// Lines that wait for room.
+constexpr std::size_t most_held = 64;
+
+std::string shown(std::string_view bytes) {
+  return escaped(bytes.substr(0, most_shown)) + (bytes.size() > most_shown ? "..." : "");
 }
 
-// Prints what may be lost, states and heartbeats, only while the output has room.
+// Prints only while the output has room. What tells of the link waits for it, the newest of it;
+// what the wire brings may be left out.
 class Lines {
  public:
+  void print(std::string line) {
+    held_.push_back(std::move(line));
+    if (held_.size() > most_held) {
+      held_.pop_front();
+      ++skipped_;
+    }
+    print_held();
+  }
   void print_or_skip(std::string_view line) {
-    if (output_has_room()) {
+    print_held();
+    if (held_.empty() && output_has_room()) {
       print_text(line);
     } else {
       ++skipped_;
     }
   }
-  std::uint64_t skipped() const { return skipped_; }
+  void print_held() {
+    while (!held_.empty() && output_has_room()) {
+      print_text(held_.front());
+      held_.pop_front();
+    }
+  }
+  std::uint64_t skipped() const { return skipped_ + held_.size(); }
 
  private:
+  std::deque<std::string> held_;
   std::uint64_t skipped_ = 0;
 };
 
@@ -47,25 +69,26 @@ class JsonView final : public MonitorView {
   void on_nack(const Nack&, const Datagram& datagram) override { print("nack", datagram); }
   void on_bad_datagram(const ReadResult& result, std::string_view bytes) override {
     Json fields = bad_datagram_json(result);
-    fields["text"] = escaped(bytes);
-    print_line(object("error", std::move(fields)));
+    fields["text"] = shown(bytes);
+    lines_.print_or_skip(line_of(object("error", std::move(fields))));
   }
   void on_link(const LinkStatus& status) override {
-    print_line(object("link", {{"up", up_},
-                               {"state", to_text(status.state)},
-                               {"reason", to_text(status.reason)},
-                               {"busy", status.busy},
-                               {"gated", status.gated}}));
+    lines_.print(line_of(object("link", {{"up", up_},
+                                         {"state", to_text(status.state)},
+                                         {"reason", to_text(status.reason)},
+                                         {"busy", status.busy},
+                                         {"gated", status.gated}})));
   }
   void on_event(const CarrierEvent& event) override {
     if (event.kind != CarrierEvent::Kind::warning) up_ = event.kind == CarrierEvent::Kind::up;
     if (event.kind != CarrierEvent::Kind::up) {
       const Problem& problem = event.problem;
-      print_line(object(
-          "error", {{"error", "transport"}, {"reason", problem.reason}, {"fix", problem.fix}}));
+      lines_.print(line_of(object(
+          "error", {{"error", "transport"}, {"reason", problem.reason}, {"fix", problem.fix}})));
     }
     on_link(board_.link());
   }
+  void on_tick() override { lines_.print_held(); }
   std::uint64_t skipped() const override { return lines_.skipped(); }
 
  private:
@@ -101,22 +124,23 @@ class PlainView final : public MonitorView {
   }
   void on_heartbeat(const Datagram&) override {}
   void on_nack(const Nack& nack, const Datagram&) override {
-    print_text(fmt::format("refused PNum {}: {}\n", nack.pnum, meaning_of(nack.code)));
+    lines_.print_or_skip(fmt::format("refused PNum {}: {}\n", nack.pnum, meaning_of(nack.code)));
   }
   void on_bad_datagram(const ReadResult& result, std::string_view bytes) override {
-    print_text(fmt::format("damaged datagram ({} at byte {}): {}\n", to_text(result.error),
-                           result.position, escaped(bytes)));
+    lines_.print_or_skip(fmt::format("damaged datagram ({} at byte {}): {}\n",
+                                     to_text(result.error), result.position, shown(bytes)));
   }
   void on_link(const LinkStatus& status) override {
-    print_text(fmt::format("link: {}\n", link_text(status)));
+    lines_.print(fmt::format("link: {}\n", link_text(status)));
   }
   void on_event(const CarrierEvent& event) override {
     if (event.kind == CarrierEvent::Kind::up) {
-      print_text(fmt::format("{}: up\n", event.problem.thing));
+      lines_.print(fmt::format("{}: up\n", event.problem.thing));
     } else {
-      print_text(event.problem.text() + "\n");
+      lines_.print(event.problem.text() + "\n");
     }
   }
+  void on_tick() override { lines_.print_held(); }
   std::uint64_t skipped() const override { return lines_.skipped(); }
 
  private:
@@ -124,6 +148,11 @@ class PlainView final : public MonitorView {
 };
 
 }  // namespace
+
+bool output_has_room() {
+  pollfd out{STDOUT_FILENO, POLLOUT, 0};
+  return ::poll(&out, 1, 0) != 0;
+}
 
 std::unique_ptr<MonitorView> make_json_view(const AsyncBoard& board) {
   return std::make_unique<JsonView>(board);

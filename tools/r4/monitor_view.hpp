@@ -25,9 +25,12 @@ class MonitorView {
   virtual void on_event(const CarrierEvent& event) = 0;
   // Ten times a second, and at the end.
   virtual void on_tick() {}
-  // States that were left out because nobody read the output.
+  // Lines that were left out because nobody read the output.
   virtual std::uint64_t skipped() const { return 0; }
 };
+
+// Room for a line on stdout, so that a reader who has stalled cannot stall our heartbeats.
+bool output_has_room();
 
 // One object a line: type, transport, pnum, t, fields.
 std::unique_ptr<MonitorView> make_json_view(const AsyncBoard& board);

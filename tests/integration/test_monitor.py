@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The monitor against what a hostile network sends it and a reader who does not read."""
+import os
+import pty
+import re
+import select
+import signal
+import socket
+import subprocess
+import time
+import zlib
+
+import pytest
+
+from r4_process import PATIENCE_S, R4, SANITIZED, Board
+
+
+def datagram(fields):
+    text = fields.encode() + b'^'
+    return text + hex(zlib.crc32(text)).encode() + b'^'
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(('127.0.0.1', 0))
+        return probe.getsockname()[1]
+
+
+def test_noise_and_a_stalled_pipe_do_not_stall_the_heartbeats():
+    port = free_port()
+    with Board('udp://127.0.0.1:0') as board, \
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as noise, \
+            subprocess.Popen([R4, 'monitor', f'{board.url}?listen={port}', '--json'], text=True,
+                             stdout=subprocess.PIPE, stderr=subprocess.PIPE) as host:
+        assert host.stdout.readline()
+        board.state('ACTIVE')
+        # Nobody reads on: the pipe of 64 kB is soon full.
+        for _ in range(25):
+            for _ in range(10):
+                noise.sendto(bytes(range(128, 256)) * 8, ('127.0.0.1', port))
+            try:
+                board.state('SAFE', timeout=0.1)
+                pytest.fail('the board went safe')
+            except AssertionError as nothing:
+                assert 'nothing of that kind' in str(nothing)
+        host.send_signal(signal.SIGINT)
+        host.stdout.read()
+        assert 'left out' in host.stderr.read()
+        assert host.wait() == 0
+
+
+def read_screen(master, until):
+    """Reads what is drawn until that is there."""
+    screen = ''
+    deadline = time.monotonic() + PATIENCE_S
+    while until not in screen:
+        ready, _, _ = select.select([master], [], [], max(0, deadline - time.monotonic()))
+        assert ready, f'{until!r} was not drawn: {screen[-1000:]!r}'
+        screen += os.read(master, 65536).decode()
+
+
+def resident_kib(process):
+    with open(f'/proc/{process.pid}/status', encoding='ascii') as status:
+        return int(re.search(r'VmRSS:\s*(\d+)', status.read()).group(1))
+
+
+def test_the_status_on_a_terminal_is_bounded_whatever_fields_a_state_has():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
+        board.bind(('127.0.0.1', 0))
+        board.settimeout(PATIENCE_S)
+        master, slave = pty.openpty()
+        url = f'udp://127.0.0.1:{board.getsockname()[1]}?listen=0'
+        with subprocess.Popen([R4, 'monitor', url], stdout=slave) as process:
+            os.close(slave)
+            _, host = board.recvfrom(2000)
+            sizes = []
+            for pnum in range(1, 1001):
+                fields = ''.join(f'X{pnum}x{i}:1;' for i in range(60))
+                board.sendto(datagram(f'{fields}PNum:{pnum};T:{pnum};'), host)
+                if pnum % 10 == 0:
+                    read_screen(master, f'PNum {pnum} ')  # it has come so far
+                    sizes.append(resident_kib(process))
+            process.kill()
+        os.close(master)
+    print(f'resident after 10 states {sizes[0]} KiB, after 1000 {sizes[-1]} KiB')
+    assert SANITIZED or sizes[-1] < sizes[0] + 1000
