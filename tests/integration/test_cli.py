@@ -9,10 +9,11 @@ import shutil
 import socket
 import subprocess
 import tempfile
+import time
 
 import pytest
 
-from r4_process import DATA, ERROR, R4, SANITIZED, objects, run
+from r4_process import DATA, ERROR, PATIENCE_S, R4, SANITIZED, objects, run
 
 DATA_BAD, USAGE, REFUSED, OPEN, PERMISSION = 1, 2, 3, 4, 5
 COMMANDS = ['monitor', 'send', 'stop', 'list', 'bench', 'sim', 'demo', 'encode', 'decode', 'completion']
@@ -130,6 +131,7 @@ NO_BOARD = 'udp://127.0.0.1:9?listen=0'
 
 @pytest.mark.parametrize('arguments, code, message', [
     ([], USAGE, 'none was given'),
+    ([''], USAGE, "^r4: '': no such command"),
     (['frobnicate'], USAGE, 'frobnicate: no such command'),
     (['monitr', 'sim:'], USAGE, 'did you mean monitor'),
     (['monitor'], USAGE, 'URL: is missing'),
@@ -264,6 +266,17 @@ def test_output_that_cannot_be_written_is_an_error():
         result = subprocess.run([R4, 'encode', 'Q:ID'], stdout=full, stderr=subprocess.PIPE, text=True,
                                 check=False)
     assert result.returncode == OPEN and 'No space left' in result.stderr
+
+
+def test_nothing_that_is_opened_takes_the_place_of_a_closed_output():
+    closed = f'exec "{R4}" sim --quiet udp://127.0.0.1:0 <&- >&-'
+    with subprocess.Popen(['bash', '-c', closed], stderr=subprocess.DEVNULL) as process:
+        deadline = time.monotonic() + PATIENCE_S
+        while len(os.listdir(f'/proc/{process.pid}/fd')) < 6 and time.monotonic() < deadline:
+            time.sleep(0.01)
+        streams = [os.readlink(f'/proc/{process.pid}/fd/{fd}') for fd in range(3)]
+        process.kill()
+    assert streams == ['/dev/null'] * 3
 
 
 def test_with_json_an_error_is_an_object_too():

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "command_line.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -90,11 +92,20 @@ std::string one_line(const std::string& text) {
   return line;
 }
 
-int report(const Problem& problem, bool json) {
+int report(Problem problem, bool json) {
+  if (problem.thing.empty()) problem.thing = "''";
   std::fflush(stdout);
   fmt::print(stderr, "r4: {}\n", one_line(problem.text()));
   if (json) print_line(problem_json(problem));
   return static_cast<int>(problem.kind);
+}
+
+// In the place of a closed standard stream the first port to be opened would be found, and what is
+// printed would go to a board. /dev/null, opened the wrong way round, fails instead.
+void occupy_standard_streams() {
+  for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; ++fd) {
+    if (::fcntl(fd, F_GETFD) < 0) (void)::open("/dev/null", fd == 0 ? O_WRONLY : O_RDONLY);
+  }
 }
 
 // What was printed must have gone somewhere: a full disk is no success.
@@ -109,6 +120,7 @@ void flush_output() {
 }  // namespace
 
 int run(int argc, const char* const* argv) {
+  occupy_standard_streams();
   const auto is_json = [](const char* argument) { return std::string_view(argument) == "--json"; };
   const bool json = std::any_of(argv, argv + argc, is_json);
   Action chosen;
