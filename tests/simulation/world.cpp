@@ -168,6 +168,7 @@ void World::boot_board() {
   boot_offset_ms_ = static_cast<std::uint32_t>(random_.next());
   outputs_ = firmware::Outputs();
   live_ = false;
+  fed_.clear();
   firmware::Application::Config config;
   config.identity = Identity{Text("simulated"), Text("0"), Text("sim")};
   config.settings = schedule_.settings;
@@ -275,6 +276,13 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
   if (now_us_ - sent.transmitted_us > limit_us) {
     violate(fmt::format("fresh: command {} executed {} us after it was sent", id,
                         now_us_ - sent.transmitted_us));
+  }
+  for (const Fed& fed : fed_) {
+    const bool overtook = fed.host == sent.host && newer(fed.pnum, pnum) && fed.pnum - pnum < 65536;
+    if (overtook && now_us_ - fed.at_us > BoardLink::late_limit_ms * 1000U + 1000) {
+      violate(fmt::format("late: command {} was overtaken {} us before", id, now_us_ - fed.at_us));
+      break;
+    }
   }
   if (board_->link().owner().peer != static_cast<std::uint32_t>(sent.host + 1)) {
     violate(fmt::format("intact: command {} is of a host that does not control", id));
@@ -390,9 +398,11 @@ void World::transfer(bool to_board, int host, std::string_view bytes) {
   const ChannelFaults& faults = to_board ? schedule_.to_board : schedule_.to_host;
   Datagram datagram;
   bool heartbeat = false;
+  std::uint32_t pnum = 0;
   int command = -1;
   if (to_board && read(Text(bytes), datagram)) {
     heartbeat = kind_of(datagram) == MessageKind::host_heartbeat;
+    pnum = datagram.pnum();
     int count = 0;
     Command parsed;
     const Field field = command_field(datagram, count);
@@ -419,6 +429,7 @@ void World::transfer(bool to_board, int host, std::string_view bytes) {
     packet.to_board = to_board;
     packet.host = host;
     packet.heartbeat = heartbeat;
+    packet.pnum = pnum;
     packet.command = command;
     packet.sent_us = now_us_;
     packet.intact = true;
@@ -464,7 +475,14 @@ void World::deliver(int slot) {
       heartbeat_in_us_ = now_us_;
       heartbeat_sent_us_ = std::max(heartbeat_sent_us_, packet.sent_us);
     }
-    board_->receive(0, static_cast<std::uint32_t>(packet.host + 1), Text(packet.bytes), board_ms());
+    const auto peer = static_cast<std::uint32_t>(packet.host + 1);
+    const std::uint32_t fed_before = board_->link().fed_ms();
+    board_->receive(0, peer, Text(packet.bytes), board_ms());
+    const BoardLink& link = board_->link();
+    if (packet.intact && packet.heartbeat && link.owner().peer == peer &&
+        link.fed_ms() != fed_before && link.fed_ms() == board_ms()) {
+      fed_.push_back({packet.host, packet.pnum, now_us_});
+    }
   } else {
     Host& host = *hosts_[static_cast<std::size_t>(packet.host)];
     if (host.alive) {

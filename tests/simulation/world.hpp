@@ -9,6 +9,7 @@
 //   order      never one older than the newest executed, nor one from before an executed stop
 //   intact     what is executed is what a host sent, by the host that controls the board
 //   fresh      and sent at most 2 timeouts + 250 ms before
+//   late       nor one that a heartbeat which fed overtook more than 250 ms before
 //   truth      confirmed means executed; refused means not executed, then and later
 //   restore    outputs that come back belong to a host that was alive a timeout ago
 #pragma once
@@ -70,9 +71,16 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
     int host = 0;
     bool intact = true;
     bool heartbeat = false;
-    int command = -1;  // index in commands_
+    std::uint32_t pnum = 0;  // of a heartbeat
+    int command = -1;        // index in commands_
     std::uint64_t sent_us = 0;
     std::string bytes;
+  };
+  // A heartbeat that the board took as a sign of life.
+  struct Fed {
+    int host;
+    std::uint32_t pnum;
+    std::uint64_t at_us;
   };
   // One command that a host asked for, named by its stepper target.
   struct Sent {
@@ -136,6 +144,7 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   bool was_lost_ = false;
   std::uint64_t heartbeat_in_us_ = 0;    // the newest intact one to arrive
   std::uint64_t heartbeat_sent_us_ = 0;  // when the newest to arrive was sent
+  std::vector<Fed> fed_;                 // by this boot of the board
   std::uint32_t stop_pnum_ = 0;          // of the last stop executed
   int newest_executed_ = -1;
 
