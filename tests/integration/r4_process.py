@@ -127,9 +127,11 @@ class Board(Running):
 
     def __init__(self, *urls, options=()):
         super().__init__('sim', '--json', *urls, *options)
-        self.urls = [self.next(lambda each: each['type'] == 'listening')['url'] for _ in urls]
-        self.url = self.urls[0]
-        self.host_url = host_url(self.url)
+        listening = [self.next(lambda each: each['type'] == 'listening') for _ in urls]
+        self.url = listening[0]['url']
+        self.host_url = listening[0]['host_url']
+        if self.host_url.startswith('udp:'):
+            self.host_url += '?listen=0'  # the port of hosts is one, and the tests have several
 
     def state(self, state, reason=None, timeout=PATIENCE_S):
         """The next event of that state."""
@@ -141,12 +143,6 @@ class Board(Running):
 
     def executed(self, command, timeout=PATIENCE_S):
         return self.next(lambda each: each.get('executed', {}).get('command') == command, timeout)
-
-
-def host_url(board_url):
-    if board_url.startswith('pty:'):
-        return 'serial://' + board_url[len('pty:'):]
-    return board_url + '?listen=0'
 
 
 def monitor(url, *options):

@@ -144,7 +144,7 @@ def test_a_monitor_may_be_started_before_the_board():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(('127.0.0.1', 0))
         url = f'udp://127.0.0.1:{probe.getsockname()[1]}'
-    with monitor(url + '?listen=0', '--count', '20') as host, Board(url):
+    with monitor(f'{url}?listen=0', '--count', '20') as host, Board(url):
         assert host.wait() == 0
 
 
@@ -252,6 +252,12 @@ def test_a_quiet_board_says_only_where_it_listens():
         run('send', board.host_url, 'O:358,1,1')
         board.wait()
         assert [each[1] for each in list(board.lines.queue)] == [None]
+
+
+def test_a_board_tells_how_a_host_opens_it():
+    with Board('udp://0.0.0.0:0?peer=127.0.0.1:2390') as board:
+        assert board.log[0]['host_url'].startswith('udp://127.0.0.1:')
+        assert run('monitor', board.host_url, '--count', '5').returncode == 0
 
 
 def test_an_older_client_without_heartbeats_gets_nothing_done(board):

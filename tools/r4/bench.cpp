@@ -9,6 +9,7 @@
 #include <asio/io_context.hpp>
 #include <asio/steady_timer.hpp>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -44,9 +45,7 @@ class Durations {
   std::size_t count() const { return values_.size(); }
   double quantile(double share) {
     if (values_.empty()) return 0;
-    const auto index =
-        static_cast<std::size_t>(share * static_cast<double>(values_.size() - 1) + 0.5);
-    const auto at = values_.begin() + static_cast<std::ptrdiff_t>(index);
+    const auto at = values_.begin() + std::lround(share * static_cast<double>(values_.size() - 1));
     std::nth_element(values_.begin(), at, values_.end());
     return *at;
   }

@@ -79,7 +79,7 @@ void ChildBoard::read_more() {
 }
 
 void ChildBoard::take(std::string_view bytes) {
-  for (std::size_t end = bytes.find('\n'); end != bytes.npos; end = bytes.find('\n')) {
+  for (std::size_t end = bytes.find('\n'); end != std::string_view::npos; end = bytes.find('\n')) {
     line_ += bytes.substr(0, end);
     bytes.remove_prefix(end + 1);
     const Json event = Json::parse(line_, nullptr, false);

@@ -72,8 +72,10 @@ Problem usage_problem(const CLI::App& root, const CLI::ParseError& error) {
   } else {
     const std::string_view text = error.what();
     const std::size_t colon = text.find(": ");
-    problem.thing = colon == text.npos ? "command line" : std::string(text.substr(0, colon));
-    problem.reason = colon == text.npos ? std::string(text) : std::string(text.substr(colon + 2));
+    problem.thing =
+        colon == std::string_view::npos ? "command line" : std::string(text.substr(0, colon));
+    problem.reason =
+        colon == std::string_view::npos ? std::string(text) : std::string(text.substr(colon + 2));
   }
   return problem;
 }

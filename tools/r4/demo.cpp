@@ -105,9 +105,8 @@ class SeparateBoard {
     const std::string type = event.value("type", "");
     if (type == "ended") ended_ = true;
     if (type == "listening") {
-      const std::string url = event.value("url", "");
-      const bool pty = url.starts_with("pty:");
-      host_url_ = pty ? "serial://" + url.substr(4) : url + "?listen=0";
+      host_url_ = event.value("host_url", "");
+      if (host_url_.starts_with("udp:")) host_url_ += "?listen=0";  // 2390 may be taken
     }
     if (type != "event") return;
     if (event.contains("silence")) log_.silence_ms = event["silence"].get<std::uint32_t>();

@@ -142,6 +142,7 @@ void Story::stream() {
 
 void Story::ask() {
   std::vector<double> times;
+  times.reserve(questions);
   for (int i = 0; i < questions; ++i) {
     times.push_back(static_cast<double>(send(Command::identify()).elapsed.count()));
   }

@@ -33,11 +33,12 @@ std::string_view view(Text text) { return {text.data(), text.size()}; }
 
 Json value_json(Text value) {
   const std::string_view text = view(value);
-  const bool plain = !text.empty() && text.find_first_not_of("-.0123456789") == text.npos;
+  const bool plain =
+      !text.empty() && text.find_first_not_of("-.0123456789") == std::string_view::npos;
   if (plain) {
     Json number = Json::parse(text, nullptr, false);
     // A whole number beyond 64 bits would come out rounded.
-    const bool exact = number.is_number_integer() || text.find('.') != text.npos;
+    const bool exact = number.is_number_integer() || text.find('.') != std::string_view::npos;
     if (number.is_number() && exact) return number;
   }
   return text;

@@ -65,6 +65,7 @@ int simulate(const Options& options) {
   log.watch(board);
   board.start();
   std::vector<std::string> names;
+  names.reserve(carriers.size());
   for (const Carrier* const carrier : carriers) names.push_back(carrier->name());
   log.listening(names);
 
@@ -81,7 +82,7 @@ int simulate(const Options& options) {
 constexpr const char* footer =
     R"(The board streams its state and obeys commands as the real one does, with the inputs of the bench in
 the paper's capture. It prints where it listens and what it does; with --json one object a line:
-  {"type":"listening","url":…}
+  {"type":"listening","url":…,"host_url":…}
   {"type":"event","t":…,"state":"CONNECTING|ACTIVE|SAFE","reason":…}   t: the board's clock, ms
 with "outputs" when they changed, "executed" or "refused" for a command, "transport" when one went
 down or came up, and "silence" (ms since the host was last heard) when the board goes safe for that.

@@ -9,6 +9,7 @@
 #include "host/command_help.hpp"
 #include "protocol/refusal.hpp"
 #include "protocol/units.hpp"
+#include "transports/url.hpp"
 
 namespace r4::tool {
 namespace {
@@ -98,13 +99,23 @@ void SimLog::listening(const std::vector<std::string>& urls) {
   started_ = true;
   for (const std::string& url : urls) {
     if (json_) {
-      print(Json{{"type", "listening"}, {"url", url}});
+      print(Json{{"type", "listening"}, {"url", url}, {"host_url", host_url(url)}});
     } else {
-      print("listening at " + url + "\n");
+      print(fmt::format("listening at {}; a host opens {}\n", url, host_url(url)));
     }
   }
   for (std::string& line : held_) print(std::move(line));
   held_.clear();
+}
+
+std::string host_url(const std::string& board_url) {
+  const Url url = Url::parse(board_url);
+  if (url.scheme() == "pty") return "serial://" + url.path();
+  const bool any = url.host() == "0.0.0.0" || url.host() == "::";
+  const bool v6 = url.host().find(':') != std::string::npos;
+  const std::string host = any ? (v6 ? "::1" : "127.0.0.1") : url.host();
+  return fmt::format("{}://{}:{}", url.scheme(), v6 ? "[" + host + "]" : host,
+                     url.port().value_or(0));
 }
 
 void SimLog::print(std::uint32_t t_ms, std::string_view text) {

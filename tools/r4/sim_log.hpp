@@ -42,6 +42,9 @@ class SimLog {
   const sim::SimulatedBoard* board_ = nullptr;
 };
 
+// How a host on this machine opens what a board listens on: "serial:///tmp/r4" for "pty:/tmp/r4".
+std::string host_url(const std::string& board_url);
+
 // {"osmc":[[pwm,dir],…],"dhb":…,"servo":[us,…],"relays":bits,"bldc":[[speed,dir,brake],…],
 //  "stepper":[[position,speed] or null,…]}
 Json outputs_json(const firmware::Outputs& outputs);
