@@ -13,6 +13,17 @@ BoardLink::Timing timing_of(const Settings& settings) {
   return timing;
 }
 
+// A stop is obeyed whatever else is in its datagram.
+bool asks_to_stop(const Datagram& datagram) {
+  for (const Field& field : datagram) {
+    Command command;
+    if (parse_command(field, command) == Refusal::none && command.kind == CommandKind::stop) {
+      return true;
+    }
+  }
+  return false;
+}
+
 std::uint32_t period_of(const Settings& settings) { return 1000U / settings.state_rate_hz; }
 
 }  // namespace
@@ -124,14 +135,14 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
 }
 
 void Application::on_command(Source from, const Datagram& datagram, std::uint32_t now_ms) {
+  if (asks_to_stop(datagram)) {
+    emergency_stop(from, datagram, now_ms);
+    return;
+  }
   int count = 0;
   const Field field = command_field(datagram, count);
   Command command;
   const Refusal refusal = count == 1 ? parse_command(field, command) : Refusal::format;
-  if (refusal == Refusal::none && command.kind == CommandKind::stop) {
-    emergency_stop(from, datagram, now_ms);
-    return;
-  }
   if (refusal == Refusal::none && command.kind == CommandKind::identify) {
     identify(from, now_ms);
     return;

@@ -71,6 +71,14 @@ TEST_F(ApplicationSafety, AStopIsObeyedFromAnyone) {
   EXPECT_TRUE(board.safe());
 }
 
+TEST_F(ApplicationSafety, AStopIsObeyedWhateverElseIsInItsDatagram) {
+  host.command("O:1,1,1");
+  EXPECT_FALSE(board.safe());
+  board.receive("O:2,1,1;E:STOP;PNum:1;T:1;", Source{0, 99});
+  EXPECT_TRUE(board.safe());
+  EXPECT_TRUE(board.log.refused.empty());
+}
+
 TEST_F(ApplicationSafety, AStopIsObeyedHoweverOldItIs) {
   const std::uint32_t old = host.pnum++;
   for (int i = 0; i < 100; ++i) host.command("S:1,1");
