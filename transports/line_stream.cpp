@@ -46,7 +46,7 @@ void LineStream::stop() noexcept {
 }
 
 void LineStream::wait_readable() {
-  stream_.async_wait(asio::posix::stream_descriptor::wait_read,
+  stream_.async_wait(asio::posix::descriptor_base::wait_read,
                      readable_.handler([this] { receive(); }));
 }
 

@@ -8,7 +8,6 @@
 
 #include <array>
 #include <asio/io_context.hpp>
-#include <asio/posix/stream_descriptor.hpp>
 #include <cstddef>
 #include <string_view>
 
@@ -65,7 +64,7 @@ class LineStream {
   asio::io_context& io_;
   Owner& owner_;
   CarrierCounters& counters_;
-  asio::posix::stream_descriptor stream_;
+  LoopDescriptor stream_;
   OperationSlot readable_;
   OperationSlot failure_;
   WritableWait writable_;

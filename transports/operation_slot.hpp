@@ -7,7 +7,11 @@
 // like all of a carrier.
 #pragma once
 
+#include <asio/basic_waitable_timer.hpp>
 #include <asio/error_code.hpp>
+#include <asio/io_context.hpp>
+#include <asio/posix/basic_stream_descriptor.hpp>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -15,6 +19,14 @@
 #include <utility>
 
 namespace r4 {
+
+// Asio's objects take the event loop's executor as it is: their default, any_io_executor, costs 0.1 us
+// an operation.
+using LoopExecutor = asio::io_context::executor_type;
+using LoopDescriptor = asio::posix::basic_stream_descriptor<LoopExecutor>;
+using LoopTimer =
+    asio::basic_waitable_timer<std::chrono::steady_clock,
+                               asio::wait_traits<std::chrono::steady_clock>, LoopExecutor>;
 
 class OperationSlot {
   struct Memory {
@@ -29,8 +41,8 @@ class OperationSlot {
     using value_type = T;
     explicit Allocator(Memory& memory) : memory_(&memory) {}
     template <class U>
-    Allocator(const Allocator<U>& other)
-        : memory_(other.memory_) {}  // NOLINT: as the standard has it
+    // NOLINTNEXTLINE(google-explicit-constructor): as the standard has it
+    Allocator(const Allocator<U>& other) : memory_(other.memory_) {}
 
     T* allocate(std::size_t count) {
       if (!memory_->taken && count * sizeof(T) <= sizeof(memory_->bytes)) {
@@ -73,6 +85,10 @@ class OperationSlot {
     void operator()(const asio::error_code& error) {
       if (!error) (*this)();
     }
+    // A transfer tells how it ended.
+    void operator()(const asio::error_code& error, std::size_t size) {
+      if (memory_->started == number_) function_(error, size);
+    }
 
    private:
     std::shared_ptr<Memory> memory_;
@@ -86,7 +102,8 @@ class OperationSlot {
   OperationSlot& operator=(const OperationSlot&) = delete;
   ~OperationSlot() { cancel(); }
 
-  // A completion handler for Asio that calls `function()`. Cancels the operation before it.
+  // A completion handler for Asio that calls `function()`, or `function(error, size)` for a transfer.
+  // Cancels the operation before it.
   template <class Function>
   Operation<Function> handler(Function function) {
     ++memory_->started;

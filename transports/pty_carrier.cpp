@@ -3,14 +3,13 @@
 
 #include <fcntl.h>
 #include <poll.h>
-#include <stdlib.h>
 #include <sys/ioctl.h>
 #include <termios.h>
 
 #include <array>
-#include <asio/steady_timer.hpp>
 #include <cerrno>
 #include <chrono>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <utility>
@@ -62,7 +61,7 @@ class PtyCarrier final : public Carrier, private LineStream::Owner {
   std::string name_;
   std::string device_;  // "/dev/pts/5"
   bool linked_ = false;
-  asio::steady_timer timer_;
+  LoopTimer timer_;
   OperationSlot looking_;
   FileDescriptor master_;
   UnreadMarks unread_;

@@ -24,18 +24,18 @@ Registry Registry::standard() {
 
 void Registry::add(Entry entry) { entries_.push_back(std::move(entry)); }
 
-std::unique_ptr<Carrier> Registry::make(asio::io_context& io, std::string_view text,
+std::unique_ptr<Carrier> Registry::make(asio::io_context& io, std::string_view url,
                                         Role role) const {
-  const Url url = Url::parse(text);
+  const Url parsed = Url::parse(url);
   const auto entry = std::find_if(entries_.begin(), entries_.end(),
-                                  [&](const Entry& e) { return e.scheme == url.scheme(); });
+                                  [&](const Entry& e) { return e.scheme == parsed.scheme(); });
   if (entry == entries_.end()) {
     std::string known;
     for (const Entry& e : entries_) known += (known.empty() ? "" : ", ") + e.usage;
-    throw Error(ErrorKind::usage, url.text(), "there is no transport '" + url.scheme() + "'",
+    throw Error(ErrorKind::usage, parsed.text(), "there is no transport '" + parsed.scheme() + "'",
                 "use one of " + known);
   }
-  return entry->make(io, url, role);
+  return entry->make(io, parsed, role);
 }
 
 }  // namespace r4

@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <asio/steady_timer.hpp>
 #include <chrono>
 #include <cstring>
 #include <utility>
@@ -57,7 +56,7 @@ class SerialCarrier final : public Carrier, private LineStream::Owner {
   const std::string serial_number_;  // that the URL asks for
   SerialPort device_;                // that has been open
   std::string name_;
-  asio::steady_timer timer_;
+  LoopTimer timer_;
   OperationSlot looking_;
   std::string obstacle_;  // why it cannot be opened again though it is there
   int obstructed_ = 0;    // looks at which it was so

@@ -9,7 +9,6 @@
 #include <asio/ip/udp.hpp>
 #include <asio/ip/v6_only.hpp>
 #include <asio/post.hpp>
-#include <asio/steady_timer.hpp>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -29,8 +28,6 @@ using Endpoint = udp::endpoint;
 
 constexpr std::uint16_t board_port = 2018;
 constexpr std::uint16_t host_port = 2390;
-constexpr std::size_t batch = 16;      // packets for one system call
-constexpr int batches_in_a_turn = 16;  // then others on the event loop have theirs
 constexpr std::size_t normal_entries = 64;
 constexpr std::size_t state_entries = 4;
 constexpr std::chrono::milliseconds probe_interval{200};
@@ -89,9 +86,8 @@ class UdpCarrier final : public Carrier {
   enum class Outcome { sent, busy, failed };
 
   void bind(const Endpoint& local);
-  void wait_readable();
-  void receive();
-  void received(std::string_view bytes, const Endpoint& from);
+  bool begin_to_receive();
+  void received(std::size_t size);
   Outcome transmit(std::string_view bytes, Peer to);
   Outcome transmit_to(std::string_view bytes, const Endpoint& to, bool standing);
   void send_waiting();
@@ -109,10 +105,10 @@ class UdpCarrier final : public Carrier {
   std::uint16_t peer_port_ = host_port;
   std::string name_;
 
-  udp::socket socket_;
-  OperationSlot readable_;
+  asio::basic_datagram_socket<udp, LoopExecutor> socket_;
+  OperationSlot reception_;
   WritableWait writable_;
-  asio::steady_timer probe_timer_;
+  LoopTimer probe_timer_;
   OperationSlot probe_;
 
   Handler* handler_ = nullptr;
@@ -128,11 +124,8 @@ class UdpCarrier final : public Carrier {
   CarrierCounters counters_;
   SendQueue queue_;
 
-  // One more byte than is allowed tells a packet that is too long.
-  std::array<std::array<char, max_datagram + 1>, batch> buffers_;
-  std::array<Endpoint, batch> senders_;
-  std::array<iovec, batch> vectors_{};
-  std::array<mmsghdr, batch> messages_{};
+  std::array<char, max_datagram> received_;
+  Endpoint sender_;
 };
 
 UdpCarrier::UdpCarrier(asio::io_context& io, Url url, Role role)
@@ -165,13 +158,6 @@ UdpCarrier::UdpCarrier(asio::io_context& io, Url url, Role role)
                     "write it as in peer=192.168.1.10:2390");
       }
     }
-  }
-  for (std::size_t i = 0; i < batch; ++i) {
-    vectors_[i] = {buffers_[i].data(), buffers_[i].size()};
-    messages_[i].msg_hdr.msg_iov = &vectors_[i];
-    messages_[i].msg_hdr.msg_iovlen = 1;
-    messages_[i].msg_hdr.msg_name = senders_[i].data();
-    messages_[i].msg_hdr.msg_namelen = static_cast<socklen_t>(senders_[i].capacity());
   }
   name_ = url_.text();
 }
@@ -212,7 +198,7 @@ void UdpCarrier::open(Handler& handler) {
     if (const auto peer = url_.get("peer")) name_ += "?peer=" + *peer;
   }
   handler_ = &handler;
-  wait_readable();
+  begin_to_receive();
   set_up(true);
   report();
 }
@@ -251,7 +237,7 @@ void UdpCarrier::close() noexcept {
   up_ = reported_up_ = false;
   refused_error_ = reported_refusal_ = 0;
   reporting_.cancel();
-  readable_.cancel();
+  reception_.cancel();
   probe_.cancel();
   writable_.stop();
   queue_.clear();
@@ -259,50 +245,40 @@ void UdpCarrier::close() noexcept {
   socket_.close(ignored);
 }
 
-void UdpCarrier::wait_readable() {
-  socket_.async_wait(udp::socket::wait_read, readable_.handler([this] { receive(); }));
+// The attempt to receive at once with which Asio begins tells whether more is there, at no cost: it
+// fills in the sender.
+bool UdpCarrier::begin_to_receive() {
+  sender_.port(0);
+  socket_.async_receive_from(asio::buffer(received_), sender_, MSG_TRUNC,
+                             reception_.handler([this](asio::error_code error, std::size_t size) {
+                               if (!error) received(size);
+                               if (handler_ == nullptr) return;
+                               const bool more = begin_to_receive();
+                               if (!more) handler_->on_drained();
+                             }));
+  return sender_.port() != 0;
 }
 
-void UdpCarrier::receive() {
-  bool drained = false;
-  for (int turn = 0; turn < batches_in_a_turn && !drained; ++turn) {
-    const int count =
-        ::recvmmsg(socket_.native_handle(), messages_.data(), batch, MSG_DONTWAIT, nullptr);
-    for (int i = 0; i < count; ++i) {
-      mmsghdr& message = messages_[static_cast<std::size_t>(i)];
-      received({static_cast<const char*>(message.msg_hdr.msg_iov->iov_base), message.msg_len},
-               senders_[static_cast<std::size_t>(i)]);
-      message.msg_hdr.msg_namelen = static_cast<socklen_t>(senders_[0].capacity());
-      if (handler_ == nullptr) return;
-    }
-    drained = count < static_cast<int>(batch);
+void UdpCarrier::received(std::size_t size) {
+  if (role_ == Role::host && sender_.address() != standing_.address()) {
+    ++counters_.rx_foreign;
+    return;
   }
-  if (drained) handler_->on_drained();
-  if (handler_ != nullptr) wait_readable();
-}
-
-void UdpCarrier::received(std::string_view bytes, const Endpoint& from) {
-  Peer peer = everyone;
-  if (role_ == Role::host) {
-    if (from.address() != standing_.address()) {
-      ++counters_.rx_foreign;
-      return;
-    }
-  }
-  if (bytes.size() > max_datagram) {
+  if (size > max_datagram) {
     ++counters_.rx_oversize;
     return;
   }
+  Peer peer = everyone;
   if (role_ == Role::board) {
-    peer = peers_.heard(from, std::chrono::steady_clock::now());
+    peer = peers_.heard(sender_, std::chrono::steady_clock::now());
     if (peer_host_.empty()) {
-      standing_ = from;
+      standing_ = sender_;
       standing_known_ = true;
     }
   }
   ++counters_.rx_datagrams;
-  counters_.rx_bytes += bytes.size();
-  handler_->on_datagram(bytes, peer);
+  counters_.rx_bytes += size;
+  handler_->on_datagram({received_.data(), size}, peer);
 }
 
 SendResult UdpCarrier::send(std::string_view bytes, Priority priority, Peer to) {

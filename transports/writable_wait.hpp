@@ -9,7 +9,6 @@
 #include <fcntl.h>
 
 #include <asio/io_context.hpp>
-#include <asio/posix/stream_descriptor.hpp>
 #include <utility>
 
 #include "operation_slot.hpp"
@@ -30,7 +29,7 @@ class WritableWait {
       if (error) return;
     }
     waiting_ = true;
-    duplicate_.async_wait(asio::posix::stream_descriptor::wait_write,
+    duplicate_.async_wait(asio::posix::descriptor_base::wait_write,
                           slot_.handler([this, call = std::move(function)] {
                             waiting_ = false;
                             call();
@@ -46,7 +45,7 @@ class WritableWait {
   }
 
  private:
-  asio::posix::stream_descriptor duplicate_;
+  LoopDescriptor duplicate_;
   OperationSlot slot_;
   bool waiting_ = false;
 };
