@@ -127,8 +127,8 @@ void Session::on_nack_datagram(const Datagram& datagram, Time now) {
       continue;
     }
     // A refusal proves that the command was not executed only while the board remembers: not over
-    // an outage, a reboot, another host's control or too many numbers. Then the deadline ends it,
-    // as unknown.
+    // an outage, a reboot, another host's control or too many numbers, nor before we had control.
+    // Then the deadline ends it, as unknown.
     if (nack.code == Refusal::busy) pending.doubtful = true;
     const bool remembered =
         !pending.doubtful && link_up() && link_.last_pnum() - pending.pnum < BoardLink::memory;
@@ -403,6 +403,7 @@ void Session::transmit(Pending& pending, Time now) {
     // The field is there already; finish() appends what follows it.
     DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.fields_size);
     pending.size = writer.finish(pending.pnum, to_ms(now)).size();
+    pending.doubtful = !controlled_ && !options_.fields.empty();
     pending.stage = Stage::sent;
     if (pending.kind == CommandKind::identify) {
       question_sent_ = now;

@@ -28,7 +28,10 @@ PORTABLE_STANDARD = {
     'initializer_list', 'iterator', 'limits', 'new', 'numeric', 'type_traits', 'utility',
     'limits.h', 'stddef.h', 'stdint.h', 'string.h',
 }
-PORTABLE_EXCEPTIONS = {('protocol/crc32.cpp', 'libdeflate.h')}  # only where R4_CRC32_LIBDEFLATE
+PORTABLE_EXCEPTIONS = {
+    ('protocol/crc32.cpp', 'libdeflate.h'),  # only where R4_CRC32_LIBDEFLATE
+    ('protocol/grammar.cpp', 'emmintrin.h'),  # only where __SSE2__
+}
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 SPDX = '// SPDX-License-Identifier: GPL-3.0-or-later'
 

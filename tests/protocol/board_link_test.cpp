@@ -171,7 +171,7 @@ TEST_F(BoardLinkTest, OtherNumbersOrAnotherPlaceAreANewSession) {
 TEST_F(BoardLinkTest, AJumpBeyondTheWindowIsANewSession) {
   connect();
   run(1000);
-  EXPECT_EQ(heartbeat(echo_pnum + 1 + 65537, sent.back()), HeartbeatEffect::new_session);
+  EXPECT_EQ(heartbeat(echo_pnum + 1 + 4097, sent.back()), HeartbeatEffect::new_session);
 }
 
 TEST_F(BoardLinkTest, AnUnarmedSessionIsNeverResumed) {
@@ -248,7 +248,7 @@ TEST_F(BoardLinkTest, TheKindOfASessionOutlastsTheWrapOfItsNumbers) {
   heartbeat(pnum, 0);
   heartbeat(++pnum, sent.back());
   for (int i = 0; i < 20; ++i) {
-    pnum += 20'000;
+    pnum += 4'000;
     run(100);
     ASSERT_EQ(heartbeat(pnum, sent.back()), HeartbeatEffect::fed) << pnum;
   }
@@ -398,11 +398,11 @@ TEST_F(BoardLinkTest, ExecutesOnceAndNeverAnOlderOne) {
   EXPECT_EQ(command(echo_pnum + 5), "DUPLICATE");
 }
 
-TEST_F(BoardLinkTest, TheWindowIs65536Ahead) {
+TEST_F(BoardLinkTest, TheWindowIs4096Ahead) {
   connect();
   command(echo_pnum + 2);
-  EXPECT_EQ(command(echo_pnum + 2 + 65537), "STALE");
-  EXPECT_EQ(command(echo_pnum + 2 + 65536), "execute");
+  EXPECT_EQ(command(echo_pnum + 2 + 4097), "STALE");
+  EXPECT_EQ(command(echo_pnum + 2 + 4096), "execute");
 }
 
 TEST_F(BoardLinkTest, RemembersExactly64Numbers) {
