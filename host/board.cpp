@@ -161,7 +161,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   CallPtr execute(const Command& command, Duration timeout) {
     const std::string text = text_of(command);
     must_not_be_in_loop(text);
-    const auto call = std::make_shared<Call>(command);
+    CallPtr call = std::make_shared<Call>(command);
     const auto deadline = Clock::now() + bounded(timeout) + grace;
     std::unique_lock lock(mutex);
     if (closed) throw closed_error(text);
