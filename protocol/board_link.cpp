@@ -133,7 +133,10 @@ HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uin
     case BoardLinkState::lost: {
       if (freshness == Freshness::stale) return HeartbeatEffect::stale;
       const bool other_clock = clock_ == Clock::echo && freshness == Freshness::no_echo;
-      if (!continuing || !armed_ || other_clock) return begin_session(heartbeat, true, now_ms);
+      const bool near = !heartbeat.has_pnum || heartbeat.pnum - newest_heartbeat_ <= resume_window;
+      if (!continuing || !near || !armed_ || other_clock) {
+        return begin_session(heartbeat, true, now_ms);
+      }
       state_ = BoardLinkState::active;
       send_now_ = true;
       newest_echo_ms_ = now_ms - timing_.timeout_ms;

@@ -121,7 +121,10 @@ class BoardLink {
   // A command that a heartbeat overtook this long ago is stale.
   static constexpr std::uint32_t late_limit_ms = 250;
   // How far ahead of the newest known number a command may be.
-  static constexpr std::uint32_t command_window = 4096;
+  static constexpr std::uint32_t command_window = 65536;
+  // The same for a host that comes back after an outage: less, since a restarted host's random first
+  // number must not pass for the next of its predecessor's.
+  static constexpr std::uint32_t resume_window = 4096;
   // How far back it is known which numbers were executed: there DUPLICATE and STALE are exact.
   static constexpr std::uint32_t memory = 64;
 

@@ -160,10 +160,10 @@ TEST_F(ApplicationCommand, OvertakenIsOvertakenAtAnyRateOfHeartbeats) {
 }
 
 TEST_F(ApplicationCommand, RefusesWhatIsFarAhead) {
-  host.resend("O:1,1,1", host.pnum + 4096);  // the newest spent number is one back
+  host.resend("O:1,1,1", host.pnum + 65536);  // the newest spent number is one back
   EXPECT_EQ(answers(), Lines{"STALE"});
   host.command("S:1,1");
-  host.resend("O:1,1,1", host.pnum - 1 + 4096);
+  host.resend("O:1,1,1", host.pnum - 1 + 65536);
   EXPECT_EQ(answers(), Lines());
   EXPECT_EQ(board.outputs().osmc[0].pwm, 1);
 }

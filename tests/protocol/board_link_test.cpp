@@ -398,11 +398,11 @@ TEST_F(BoardLinkTest, ExecutesOnceAndNeverAnOlderOne) {
   EXPECT_EQ(command(echo_pnum + 5), "DUPLICATE");
 }
 
-TEST_F(BoardLinkTest, TheWindowIs4096Ahead) {
+TEST_F(BoardLinkTest, TheWindowIs65536Ahead) {
   connect();
   command(echo_pnum + 2);
-  EXPECT_EQ(command(echo_pnum + 2 + 4097), "STALE");
-  EXPECT_EQ(command(echo_pnum + 2 + 4096), "execute");
+  EXPECT_EQ(command(echo_pnum + 2 + 65537), "STALE");
+  EXPECT_EQ(command(echo_pnum + 2 + 65536), "execute");
 }
 
 TEST_F(BoardLinkTest, RemembersExactly64Numbers) {

@@ -269,7 +269,7 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
       violate(fmt::format("order: command {} executed after {}", id, newest_executed_));
     }
   }
-  if (newer(stop_pnum_, pnum) && stop_pnum_ - pnum < BoardLink::command_window) {
+  if (newer(stop_pnum_, pnum) && stop_pnum_ - pnum < BoardLink::resume_window) {
     violate(fmt::format("order: command {} is older than the stop before it", id));
   }
   const std::uint64_t limit_us = 2U * board_->settings().timeout_ms * 1000U + 250'000 + slack_us;
@@ -279,7 +279,7 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
   }
   for (const Fed& fed : fed_) {
     const bool overtook = fed.host == sent.host && newer(fed.pnum, pnum) &&
-                          fed.pnum - pnum < BoardLink::command_window;
+                          fed.pnum - pnum < BoardLink::resume_window;
     if (overtook && now_us_ - fed.at_us > BoardLink::late_limit_ms * 1000U + 1000) {
       violate(fmt::format("late: command {} was overtaken {} us before", id, now_us_ - fed.at_us));
       break;
