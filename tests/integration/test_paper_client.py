@@ -76,7 +76,7 @@ def test_the_papers_python_client_drives_the_board_for_ten_seconds_without_a_saf
     assert not went_safe, went_safe[:3]
     assert active and any('outputs' in each for each in active)
     assert client.heartbeats >= 2 * LASTS_S - 2
-    assert len(client.states) >= 100 * LASTS_S - 20 or SANITIZED
+    assert len(client.states) >= 90 * LASTS_S or SANITIZED
     for state in client.states[-100:]:
         assert ';DHB1A:1000,1;' in state and ';SERVO1POS:300;' in state
         assert len(state) <= 256 - len('0x12345678^'), 'the client reads 256 bytes'

@@ -34,7 +34,9 @@ def test_streams_its_state_at_100_hz(board):
         while len(states) < 200:
             states.append(host.next(is_state))
     times = [each['t'] for each in states[20:]]
-    assert SANITIZED or {later - earlier for earlier, later in zip(times, times[1:])} == {10}
+    steps = [later - earlier for earlier, later in zip(times, times[1:])]
+    assert all(step % 10 == 0 for step in steps)
+    assert SANITIZED or steps.count(10) > 0.9 * len(steps)
 
 
 def test_a_pty_without_a_path_is_named():

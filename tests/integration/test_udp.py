@@ -32,7 +32,9 @@ def test_streams_its_state_at_100_hz(board):
     print(f'{len(states)} states in {times[-1] - times[0]} ms of the board')
     # Heartbeats have numbers of the same series: four of them in these two seconds.
     assert len(states) - 1 <= numbers[-1] - numbers[0] <= len(states) + 6
-    assert SANITIZED or set(steps) == {10}
+    # The grid of 10 ms is kept; a busy machine may leave periods out, but never shifts it.
+    assert all(step % 10 == 0 for step in steps)
+    assert SANITIZED or steps.count(10) > 0.9 * len(steps)
     assert states[0]['fields']['AIN24'] == pytest.approx(24.3, abs=1)
     assert states[0]['fields']['OSMC1'] == [0, 0]
 
