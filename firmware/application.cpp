@@ -167,6 +167,10 @@ void Application::on_command(Source from, const Datagram& datagram, std::uint32_
     case Admission::execute:
       break;
   }
+  if (command.kind == CommandKind::clear && !may_clear(now_ms)) {
+    ++rx_refused_;  // dropped: it is too early, and a repetition may come
+    return;
+  }
   const bool held = drives_output(command.kind) && safety_.is_safe();
   if (!held && link_.begins_anew(datagram.pnum())) setpoints_.outputs = Outputs();
   const Refusal outcome = held ? Refusal::safe : carry_out(command, setpoints_);
@@ -204,6 +208,7 @@ void Application::execute(std::uint32_t pnum, const Command& command, std::uint3
 void Application::emergency_stop(Source from, const Datagram& datagram, std::uint32_t now_ms) {
   const bool repeated = safety_.has(SafeReason::stop);
   enter(SafeReason::stop, now_ms);
+  latched_ms_ = now_ms;
   const bool owner = link_.has_owner() && from == link_.owner();
   if (owner && datagram.has_pnum()) {
     Refusal code = Refusal::none;
@@ -224,7 +229,10 @@ void Application::port_down(std::uint8_t port, std::uint32_t now_ms) {
   if (link_.port_lost(port, now_ms)) enter(SafeReason::link, now_ms);
 }
 
-void Application::fail(SafeReason cause, std::uint32_t now_ms) { enter(cause, now_ms); }
+void Application::fail(SafeReason cause, std::uint32_t now_ms) {
+  enter(cause, now_ms);
+  latched_ms_ = now_ms;
+}
 
 std::uint32_t Application::poll(std::uint32_t now_ms) {
   if (link_.poll(now_ms)) enter(SafeReason::link, now_ms);
@@ -248,8 +256,15 @@ void Application::enter(SafeReason cause, std::uint32_t now_ms) {
   } else {
     setpoints_.outputs = Outputs();
   }
+  link_.send_soon();
   update_outputs(now_ms);
   report_state(now_ms);
+}
+
+// Nobody clears what they have not heard of: a stop may have been pressed, or a fault have come, while
+// E:CLEAR was on its way. What is older than the timeout the owner has heard of, or is lost.
+bool Application::may_clear(std::uint32_t now_ms) const {
+  return now_ms - latched_ms_ >= setpoints_.settings.timeout_ms || link_.has_heard(latched_ms_);
 }
 
 bool Application::obstacle() const {

@@ -78,6 +78,7 @@ class Application {
   void enter(SafeReason cause, std::uint32_t now_ms);
   void check_interlocks(std::uint32_t now_ms);
   bool obstacle() const;
+  bool may_clear(std::uint32_t now_ms) const;
   void update_outputs(std::uint32_t now_ms);
   void report_state(std::uint32_t now_ms);
 
@@ -108,7 +109,8 @@ class Application {
   std::uint8_t port_count_ = 0;
   BoardState reported_state_ = BoardState::connecting;
   SafeReason reported_reason_ = SafeReason::none;
-  bool outputs_live_ = false;  // outputs_ follow the setpoints
+  std::uint32_t latched_ms_ = 0;  // when stop, fault or watchdog came last
+  bool outputs_live_ = false;     // outputs_ follow the setpoints
   std::uint32_t rx_ok_ = 0;
   std::uint32_t rx_bad_ = 0;
   std::uint32_t rx_refused_ = 0;

@@ -50,18 +50,29 @@ bool BoardLink::continues(const HostHeartbeat& heartbeat) const {
                                  heartbeat.pnum - newest_heartbeat_ <= command_window);
 }
 
+bool BoardLink::is_echo_host(const HostHeartbeat& heartbeat) const {
+  if (continues(heartbeat)) return echo_host_;
+  return heartbeat.has_pnum && heartbeat.pnum >= echo_host_first_pnum;
+}
+
 HeartbeatEffect BoardLink::begin_session(const HostHeartbeat& heartbeat, bool armed,
                                          std::uint32_t now_ms) {
+  // Numbers that go on are the same count, whatever else has changed: the gate does not move back.
+  echo_host_ = is_echo_host(heartbeat);
+  if (continues(heartbeat) && heartbeat.has_pnum) {
+    spend(heartbeat.pnum);
+  } else {
+    has_baseline_ = heartbeat.has_pnum;
+    newest_ = heartbeat.pnum;
+    executed_bits_ = 0;
+  }
   has_session_ = true;
   owner_ = heartbeat.from;
-  echo_host_ = heartbeat.has_pnum && heartbeat.pnum >= echo_host_first_pnum;
   armed_ = armed;
   clock_ = Clock::unknown;
-  has_baseline_ = heartbeat.has_pnum;
-  newest_ = heartbeat.pnum;
-  executed_bits_ = 0;
   last_executed_ = 0;
   numbers_in_doubt_ = false;
+  begun_again_ = false;
   has_heartbeat_pnum_ = heartbeat.has_pnum;
   marks_used_ = 0;
   newest_echo_ms_ = now_ms - timing_.timeout_ms;
@@ -101,9 +112,10 @@ void BoardLink::feed(const HostHeartbeat& heartbeat, std::uint32_t now_ms) {
 
 HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uint32_t now_ms) {
   const bool continuing = continues(heartbeat);
-  const bool echo_host =
-      continuing ? echo_host_ : heartbeat.has_pnum && heartbeat.pnum >= echo_host_first_pnum;
+  const bool echo_host = is_echo_host(heartbeat);
   const Freshness freshness = judge(heartbeat, echo_host, now_ms);
+  // Who has echoed and then knows nothing to echo has begun again, even if its numbers would fit.
+  if (continuing && echo_host && armed_ && heartbeat.t == 0) begun_again_ = true;
 
   switch (state_) {
     case BoardLinkState::connecting:
@@ -115,7 +127,7 @@ HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uin
     case BoardLinkState::active:
       if (heartbeat.from != owner_) return HeartbeatEffect::busy;
       if (freshness == Freshness::stale) return HeartbeatEffect::stale;
-      if (continuing) {
+      if (continuing && !begun_again_) {
         if (!armed_) {
           armed_ = true;
           spend(heartbeat.pnum);
@@ -125,7 +137,7 @@ HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uin
       }
       // The same place, other numbers: a restarted host, if its echo is newer than any before.
       if (echo_host && newer(static_cast<std::uint32_t>(heartbeat.t), newest_echo_ms_) &&
-          !near_newest_heartbeat(heartbeat.pnum)) {
+          (continuing || !near_newest_heartbeat(heartbeat.pnum))) {
         return begin_session(heartbeat, true, now_ms);
       }
       return HeartbeatEffect::stale;
@@ -134,9 +146,8 @@ HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uin
       if (freshness == Freshness::stale) return HeartbeatEffect::stale;
       const bool other_clock = clock_ == Clock::echo && freshness == Freshness::no_echo;
       const bool near = !heartbeat.has_pnum || heartbeat.pnum - newest_heartbeat_ <= resume_window;
-      if (!continuing || !near || !armed_ || other_clock) {
-        return begin_session(heartbeat, true, now_ms);
-      }
+      const bool same = continuing && near && armed_ && !begun_again_ && !other_clock;
+      if (!same) return begin_session(heartbeat, true, now_ms);
       state_ = BoardLinkState::active;
       send_now_ = true;
       newest_echo_ms_ = now_ms - timing_.timeout_ms;
@@ -267,6 +278,10 @@ void BoardLink::remember_sent(std::uint32_t t_ms) {
   sent_[sent_next_] = t_ms;
   sent_next_ = (sent_next_ + 1) % sent_count;
   if (sent_used_ < sent_count) ++sent_used_;
+}
+
+bool BoardLink::has_heard(std::uint32_t since_ms) const {
+  return !echo_host_ || at_or_after(newest_echo_ms_, since_ms);
 }
 
 std::uint32_t BoardLink::due_in(std::uint32_t now_ms) const {

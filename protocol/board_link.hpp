@@ -100,6 +100,8 @@ class BoardLink {
   // has heard nothing yet, or nothing since we were lost or booted. Seldom enough that two sides
   // which answer each other do not fill the line.
   bool wants_answer(const HostHeartbeat& heartbeat, std::uint32_t now_ms) const;
+  // The next one is wanted at once: it brings news.
+  void send_soon() { send_now_ = true; }
   // A heartbeat was sent to one peer, besides those above.
   void heartbeat_answered(std::uint32_t t_ms);
 
@@ -113,6 +115,9 @@ class BoardLink {
   bool in_session(Source from) const { return has_session_ && from == owner_; }
   // When the owner was last heard alive: a heartbeat that fed. Only after the first session began.
   std::uint32_t fed_ms() const { return fed_ms_; }
+  // Has the owner echoed a T of `since_ms` or later, and so heard what the board said then? Of a paper
+  // host, which need not echo, nobody can tell: true.
+  bool has_heard(std::uint32_t since_ms) const;
   // The number of the last command executed in this session (the CMD field); 0 before the first.
   std::uint32_t last_executed() const { return last_executed_; }
 
@@ -136,6 +141,7 @@ class BoardLink {
   bool sent_at(std::uint32_t t_ms) const;
   bool is_echo(const HostHeartbeat& heartbeat) const;
   bool continues(const HostHeartbeat& heartbeat) const;
+  bool is_echo_host(const HostHeartbeat& heartbeat) const;
   HeartbeatEffect begin_session(const HostHeartbeat& heartbeat, bool armed, std::uint32_t now_ms);
   void feed(const HostHeartbeat& heartbeat, std::uint32_t now_ms);
   void lose(std::uint32_t now_ms);
@@ -158,6 +164,7 @@ class BoardLink {
   std::uint64_t executed_bits_ = 0;  // bit i: newest_ - i was executed
   std::uint32_t last_executed_ = 0;
   bool numbers_in_doubt_ = false;  // resumed by a heartbeat without a number
+  bool begun_again_ = false;       // the owner seems to have restarted
   bool has_heartbeat_pnum_ = false;
   std::uint32_t newest_heartbeat_ = 0;
   std::uint32_t newest_echo_ms_ = 0;

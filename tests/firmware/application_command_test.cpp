@@ -230,6 +230,20 @@ TEST_F(ApplicationCommand, ARefusedCommandStaysRefused) {
   EXPECT_EQ(answers(), Lines{"STALE"});
 }
 
+TEST_F(ApplicationCommand, ACommandRefusedInAnOutageStaysRefused) {
+  board.run(1500);
+  const std::uint32_t overtaken = host.pnum++;  // a heartbeat that comes after the command
+  const std::uint32_t refused = host.command("O:1,1,1");
+  EXPECT_EQ(answers(), Lines{"SAFE"});
+  board.receive("H:ROS2-R4;PNum:" + std::to_string(overtaken) +
+                    ";T:" + std::to_string(board.newest_t()) + ";",
+                host.at);
+  ASSERT_EQ(board.state(), BoardState::active);
+  host.resend("O:1,1,1", refused);
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(answers(), Lines{"STALE"});
+}
+
 TEST_F(ApplicationCommand, NeedsANumberForAllButStopHeartbeatAndQuestion) {
   for (const char* field :
        {"O:1,1,1;", "E:CLEAR;", "F:ALL;", "C:rate,10;", "X:1;", "O:9999,1,1;"}) {

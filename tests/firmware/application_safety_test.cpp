@@ -32,6 +32,11 @@ struct ApplicationSafety : testing::Test {
     board.hal.inputs.handle_held = held;
     board.run(10);
   }
+  // E:CLEAR by an owner that has heard what there is to clear.
+  std::uint32_t clear() {
+    host.echo();
+    return host.command("E:CLEAR");
+  }
   // Nothing comes back by itself, whatever the host does but command.
   void expect_nothing_restored() {
     host.stay(200);
@@ -56,7 +61,7 @@ TEST_F(ApplicationSafety, AStopIsLatchedUntilItIsCleared) {
   host.command("O:1,1,1");
   EXPECT_TRUE(board.safe());
   EXPECT_EQ(board.log.refused.size(), 1U);
-  host.command("E:CLEAR");
+  clear();
   EXPECT_EQ(board.log.states, (Lines{"SAFE stop", "ACTIVE none"}));
   expect_nothing_restored();
 }
@@ -64,7 +69,7 @@ TEST_F(ApplicationSafety, AStopIsLatchedUntilItIsCleared) {
 TEST_F(ApplicationSafety, AStopIsObeyedFromAnyone) {
   board.receive("E:STOP;PNum:1;T:1;", Source{0, 99});
   EXPECT_TRUE(board.safe());
-  host.command("E:CLEAR");
+  clear();
   host.command("O:1,1,1");
   EXPECT_FALSE(board.safe());
   board.receive("E:STOP;", Source{0, 99});  // without a number
@@ -85,7 +90,7 @@ TEST_F(ApplicationSafety, AStopIsObeyedHoweverOldItIs) {
   host.stay(500);
   host.resend("E:STOP", old);
   EXPECT_TRUE(board.safe());
-  host.command("E:CLEAR");
+  clear();
   host.command("O:1,1,1");
   host.resend("E:STOP", old);  // and however often it comes
   EXPECT_TRUE(board.safe());
@@ -94,7 +99,7 @@ TEST_F(ApplicationSafety, AStopIsObeyedHoweverOldItIs) {
 TEST_F(ApplicationSafety, AStopOvertakesTheCommandsBeforeIt) {
   const std::uint32_t before = host.pnum++;
   host.command("E:STOP");
-  host.command("E:CLEAR");
+  clear();
   host.resend("O:1,1,1", before);
   EXPECT_TRUE(board.safe());
   EXPECT_EQ(board.log.refused, Lines{std::to_string(before) + " STALE"});
@@ -152,7 +157,7 @@ TEST_F(ApplicationSafety, AStopIsObeyedWhileTheLinkIsLost) {
   host.echo();
   EXPECT_EQ(board.reason(), SafeReason::stop);
   EXPECT_TRUE(board.safe());
-  host.command("E:CLEAR");
+  clear();
   expect_nothing_restored();
 }
 
@@ -173,10 +178,76 @@ TEST_F(ApplicationSafety, ANewHostDoesNotClearByTakingControl) {
 
 TEST_F(ApplicationSafety, ARepeatedClearDoesNotClearALaterStop) {
   host.command("E:STOP");
-  const std::uint32_t clear = host.command("E:CLEAR");
+  const std::uint32_t number = clear();
   host.command("E:STOP");
-  host.resend("E:CLEAR", clear);
+  host.resend("E:CLEAR", number);
   EXPECT_EQ(board.reason(), SafeReason::stop);
+}
+
+TEST_F(ApplicationSafety, AClearOnItsWayDoesNotClearWhatCameMeanwhile) {
+  host.command("E:STOP");
+  host.echo();
+  board.run(50);
+  board.receive("E:STOP;PNum:1;T:1;", Source{0, 99});  // pressed again, by somebody else
+  board.take();
+  const std::uint32_t number = host.command("E:CLEAR");
+  EXPECT_EQ(board.reason(), SafeReason::stop);
+  EXPECT_EQ(board.take(MessageKind::nack).size(), 0U);  // the host repeats it
+  for (int ms = 0; board.reason() == SafeReason::stop && ms < 1000; ms += 50) {
+    board.run(50);
+    host.echo();
+    host.resend("E:CLEAR", number);
+    if (board.log.refused.size() != 0) break;  // overtaken by then
+  }
+  clear();
+  EXPECT_EQ(board.state(), BoardState::active);
+}
+
+TEST_F(ApplicationSafety, AClearCountsOnceTheStopHasBeenHeardOf) {
+  board.receive("E:STOP;PNum:1;T:1;", Source{0, 99});
+  const std::uint32_t number = host.command("E:CLEAR");
+  EXPECT_EQ(board.reason(), SafeReason::stop);
+  host.echo();  // of the heartbeat that told of it
+  host.resend("E:CLEAR", number);
+  EXPECT_EQ(board.state(), BoardState::active);
+}
+
+TEST_F(ApplicationSafety, APaperHostsClearIsTakenAtItsWord) {
+  TestBoard fresh;
+  TestHost paper(fresh, 1);
+  paper.heartbeat(4000);
+  paper.command("E:STOP");
+  paper.command("E:CLEAR");
+  EXPECT_EQ(fresh.state(), BoardState::active);
+}
+
+TEST_F(ApplicationSafety, AStopIsConfirmedByItsNumberToo) {
+  host.command("F:CMD");
+  const std::uint32_t number = host.command("E:STOP");
+  board.run(10);
+  EXPECT_EQ(state_of(board.take(MessageKind::state).back()).last_command, number);
+}
+
+TEST_F(ApplicationSafety, EveryCauseIsToldOfAtOnce) {
+  auto told = [&](const char* reason) {
+    const std::vector<Heard> heard = board.take(MessageKind::board_heartbeat);
+    return heard.size() == 1 && heard[0].bytes.find(reason) != std::string::npos;
+  };
+  host.command("U:30,1");
+  host.stay(400);
+  board.take();
+  distance(20);
+  EXPECT_TRUE(told(";SAFE:4;"));
+  handle(false);
+  EXPECT_TRUE(told(";SAFE:3;"));
+  board.application->fail(SafeReason::watchdog, board.now_ms);
+  board.run(0);
+  EXPECT_TRUE(told(";SAFE:5;"));
+  board.application->fail(SafeReason::fault, board.now_ms);
+  board.run(0);
+  EXPECT_TRUE(told(";SAFE:6;"));
+  board.receive("E:STOP;", Source{0, 4});
+  EXPECT_TRUE(told(";SAFE:2;"));
 }
 
 TEST_F(ApplicationSafety, ClearTakesAwayOnlyWhatIsReported) {
@@ -187,7 +258,7 @@ TEST_F(ApplicationSafety, ClearTakesAwayOnlyWhatIsReported) {
   EXPECT_EQ(board.reason(), SafeReason::stop);
   for (const SafeReason left :
        {SafeReason::fault, SafeReason::watchdog, SafeReason::handle, SafeReason::handle}) {
-    host.command("E:CLEAR");
+    clear();
     EXPECT_EQ(board.reason(), left);
     EXPECT_TRUE(board.safe());
   }
@@ -217,7 +288,7 @@ TEST_F(ApplicationSafety, AFaultIsLatchedAndLeavesNothing) {
     EXPECT_EQ(board.reason(), cause);
     host.stay(500);
     EXPECT_EQ(board.reason(), cause);
-    host.command("E:CLEAR");
+    clear();
     expect_nothing_restored();
   }
 }
@@ -230,7 +301,7 @@ TEST_F(ApplicationSafety, AReleasedHandleIsSafeUntilItIsHeldAgain) {
   EXPECT_EQ(board.log.states, Lines{"SAFE handle"});
   host.command("O:1,1,1");
   EXPECT_TRUE(board.safe());
-  host.command("E:CLEAR");  // clears no handle
+  clear();  // clears no handle
   EXPECT_EQ(board.reason(), SafeReason::handle);
   handle(true);
   EXPECT_EQ(board.log.states, (Lines{"SAFE handle", "ACTIVE none"}));
@@ -335,7 +406,7 @@ TEST_F(ApplicationSafety, OutputsAreSafeWhileAnyCauseIsThere) {
   distance(20);
   handle(false);
   host.command("E:STOP");
-  host.command("E:CLEAR");
+  clear();
   EXPECT_EQ(board.reason(), SafeReason::handle);
   handle(true);
   EXPECT_EQ(board.reason(), SafeReason::proximity);

@@ -140,7 +140,6 @@ TEST_F(BoardLinkTest, TheSameHostResumesWithAnEchoFromAfterTheLoss) {
   ASSERT_EQ(link.state(), BoardLinkState::lost);
   EXPECT_GE(sent.back(), lost_at);
   EXPECT_EQ(heartbeat(echo_pnum + 2, before), HeartbeatEffect::stale);
-  EXPECT_EQ(heartbeat(echo_pnum + 3, 0), HeartbeatEffect::stale);
   EXPECT_EQ(heartbeat(echo_pnum + 4, sent.back()), HeartbeatEffect::resumed);
 }
 
@@ -168,10 +167,75 @@ TEST_F(BoardLinkTest, OtherNumbersOrAnotherPlaceAreANewSession) {
   }
 }
 
-TEST_F(BoardLinkTest, AJumpBeyondTheWindowIsANewSession) {
+TEST_F(BoardLinkTest, AfterAnOutageNumbersGoOnWithinANarrowWindow) {
+  for (const bool too_far : {false, true}) {
+    link = BoardLink(BoardLink::Timing{});
+    sent.clear();
+    connect();
+    run(1000);
+    const std::uint32_t ahead = BoardLink::resume_window + (too_far ? 1 : 0);
+    EXPECT_EQ(heartbeat(echo_pnum + 1 + ahead, sent.back()),
+              too_far ? HeartbeatEffect::new_session : HeartbeatEffect::resumed);
+  }
+}
+
+TEST_F(BoardLinkTest, WhileActiveNumbersMayJumpWithinTheWideWindow) {
   connect();
-  run(1000);
-  EXPECT_EQ(heartbeat(echo_pnum + 1 + 4097, sent.back()), HeartbeatEffect::new_session);
+  run(100);
+  std::uint32_t pnum = echo_pnum + 1 + BoardLink::command_window;
+  EXPECT_EQ(heartbeat(pnum, sent.back()), HeartbeatEffect::fed);
+  pnum += BoardLink::command_window + 1;
+  EXPECT_EQ(heartbeat(pnum, sent.back()), HeartbeatEffect::stale);
+}
+
+TEST_F(BoardLinkTest, AHostThatHasNothingToEchoAnyMoreHasBegunAgain) {
+  // Its first number happens to fit the session before.
+  for (const std::uint32_t silence : {100U, 1500U}) {
+    link = BoardLink(BoardLink::Timing{});
+    sent.clear();
+    connect();
+    command(echo_pnum + 2);
+    run(silence);
+    EXPECT_EQ(heartbeat(echo_pnum + 500, 0), HeartbeatEffect::stale);
+    run(5);
+    link.heartbeat_answered(now);
+    EXPECT_EQ(heartbeat(echo_pnum + 501, now), HeartbeatEffect::new_session) << silence;
+    EXPECT_EQ(command(echo_pnum + 502), "execute");
+  }
+}
+
+TEST_F(BoardLinkTest, ANewSessionWhoseNumbersGoOnDoesNotMoveTheGateBack) {
+  connect();
+  command(echo_pnum + 5);
+  run(100);
+  heartbeat(echo_pnum + 2, 0);
+  link.heartbeat_answered(now);
+  // The newest heartbeat, but older than the command.
+  EXPECT_EQ(heartbeat(echo_pnum + 3, now), HeartbeatEffect::new_session);
+  EXPECT_EQ(command(echo_pnum + 4), "STALE");
+  EXPECT_EQ(command(echo_pnum + 5), "DUPLICATE");
+  EXPECT_EQ(command(echo_pnum + 6), "execute");
+}
+
+TEST_F(BoardLinkTest, ANewSessionKeepsItsKindBehindTheWrap) {
+  send_due();
+  heartbeat(0xffffffffU, 0);
+  heartbeat(0, sent.back());
+  run(100);
+  heartbeat(1, 0);  // it has begun again, it seems
+  link.heartbeat_answered(now);
+  EXPECT_EQ(heartbeat(2, now), HeartbeatEffect::new_session);
+  run(100);
+  EXPECT_EQ(heartbeat(3, 4711), HeartbeatEffect::stale);
+}
+
+TEST_F(BoardLinkTest, AnOldHeartbeatWithNothingToEchoIsNoNews) {
+  connect();
+  run(100);
+  heartbeat(echo_pnum + 3, sent.back());
+  EXPECT_EQ(heartbeat(echo_pnum + 2, 0), HeartbeatEffect::stale);  // late, from the beginning
+  EXPECT_EQ(heartbeat(echo_pnum, 0), HeartbeatEffect::stale);
+  EXPECT_EQ(heartbeat(echo_pnum + 4, sent.back()), HeartbeatEffect::fed);
 }
 
 TEST_F(BoardLinkTest, AnUnarmedSessionIsNeverResumed) {
@@ -253,8 +317,7 @@ TEST_F(BoardLinkTest, TheKindOfASessionOutlastsTheWrapOfItsNumbers) {
     ASSERT_EQ(heartbeat(pnum, sent.back()), HeartbeatEffect::fed) << pnum;
   }
   ASSERT_LT(pnum, echo_host_first_pnum);
-  EXPECT_EQ(heartbeat(pnum + 1, 0), HeartbeatEffect::stale);  // still an echo host
-  EXPECT_EQ(heartbeat(pnum + 2, sent.back() + 1), HeartbeatEffect::stale);
+  EXPECT_EQ(heartbeat(pnum + 2, sent.back() + 1), HeartbeatEffect::stale);  // still an echo host
   run(1000);
   ASSERT_EQ(link.state(), BoardLinkState::lost);
   EXPECT_EQ(heartbeat(pnum + 3, sent.back()), HeartbeatEffect::resumed);
@@ -271,6 +334,16 @@ TEST_F(BoardLinkTest, APaperHostWithAClockOfItsOwnFeedsByArriving) {
   }
   run(1000);
   EXPECT_EQ(heartbeat(100, 1699276044390), HeartbeatEffect::resumed);
+}
+
+TEST_F(BoardLinkTest, AClockOfItsOwnMayHappenToShowATimeOfOurs) {
+  send_due();
+  heartbeat(0, 4000);
+  const std::uint32_t ours = sent.back();
+  run(900);
+  EXPECT_EQ(heartbeat(1, 4001), HeartbeatEffect::fed);
+  run(900);
+  EXPECT_EQ(heartbeat(2, ours), HeartbeatEffect::fed);
 }
 
 TEST_F(BoardLinkTest, APaperHostThatEchoesMustGoOnEchoing) {
@@ -509,7 +582,26 @@ TEST_F(BoardLinkTest, ANewSessionForgetsTheNumbersOfTheOld) {
   heartbeat(echo_pnum + 100'000'000, sent.back(), there);
   EXPECT_EQ(link.last_executed(), 0U);
   EXPECT_EQ(command(echo_pnum + 6, here), "BUSY");
+  EXPECT_EQ(command(echo_pnum + 100'000'000, there), "STALE");  // not DUPLICATE
   EXPECT_EQ(command(echo_pnum + 100'000'001, there), "execute");
+}
+
+TEST_F(BoardLinkTest, KnowsWhatAnEchoHostHasHeard) {
+  connect();
+  const std::uint32_t heard = sent.back();
+  EXPECT_TRUE(link.has_heard(heard));
+  EXPECT_FALSE(link.has_heard(heard + 1));
+  run(100);
+  link.send_soon();
+  send_due();
+  EXPECT_FALSE(link.has_heard(now));
+  heartbeat(echo_pnum + 2, now);
+  EXPECT_TRUE(link.has_heard(now));
+}
+
+TEST_F(BoardLinkTest, OfAPaperHostNobodyCanTellWhatItHasHeard) {
+  heartbeat(1, 4000);
+  EXPECT_TRUE(link.has_heard(now + 1000));
 }
 
 // --- the board's own heartbeats

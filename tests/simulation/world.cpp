@@ -252,6 +252,7 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
                    command.value));
   if (command.kind == CommandKind::stop) {
     ++report_.stops;
+    stop_from_ = delivering_;
     stop_pnum_ = pnum;
   }
   if (command.kind != CommandKind::stepper) return;
@@ -269,7 +270,7 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
       violate(fmt::format("order: command {} executed after {}", id, newest_executed_));
     }
   }
-  if (newer(stop_pnum_, pnum) && stop_pnum_ - pnum < BoardLink::resume_window) {
+  if (stop_from_ == delivering_ && newer(stop_pnum_, pnum)) {
     violate(fmt::format("order: command {} is older than the stop before it", id));
   }
   const std::uint64_t limit_us = 2U * board_->settings().timeout_ms * 1000U + 250'000 + slack_us;
@@ -278,8 +279,7 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
                         now_us_ - sent.transmitted_us));
   }
   for (const Fed& fed : fed_) {
-    const bool overtook = fed.host == sent.host && newer(fed.pnum, pnum) &&
-                          fed.pnum - pnum < BoardLink::resume_window;
+    const bool overtook = fed.from == delivering_ && newer(fed.pnum, pnum);
     if (overtook && now_us_ - fed.at_us > BoardLink::late_limit_ms * 1000U + 1000) {
       violate(fmt::format("late: command {} was overtaken {} us before", id, now_us_ - fed.at_us));
       break;
@@ -429,6 +429,7 @@ void World::transfer(bool to_board, int host, std::string_view bytes) {
     Packet& packet = packets_[static_cast<std::size_t>(slot)];
     packet.to_board = to_board;
     packet.host = host;
+    packet.incarnation = hosts_[static_cast<std::size_t>(host)]->incarnation;
     packet.heartbeat = heartbeat;
     packet.pnum = pnum;
     packet.command = command;
@@ -478,11 +479,12 @@ void World::deliver(int slot) {
     }
     const auto peer = static_cast<std::uint32_t>(packet.host + 1);
     const std::uint32_t fed_before = board_->link().fed_ms();
+    delivering_ = {packet.host, packet.incarnation};
     board_->receive(0, peer, Text(packet.bytes), board_ms());
     const BoardLink& link = board_->link();
     if (packet.intact && packet.heartbeat && link.owner().peer == peer &&
         link.fed_ms() != fed_before && link.fed_ms() == board_ms()) {
-      fed_.push_back({packet.host, packet.pnum, now_us_});
+      fed_.push_back({delivering_, packet.pnum, now_us_});
     }
   } else {
     Host& host = *hosts_[static_cast<std::size_t>(packet.host)];

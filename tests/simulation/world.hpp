@@ -69,6 +69,7 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   struct Packet {
     bool to_board = false;
     int host = 0;
+    std::uint32_t incarnation = 0;  // of the host when it was sent
     bool intact = true;
     bool heartbeat = false;
     std::uint32_t pnum = 0;  // of a heartbeat
@@ -76,9 +77,15 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
     std::uint64_t sent_us = 0;
     std::string bytes;
   };
+  // One run of a host process: numbers of different ones do not compare.
+  struct Process {
+    int host = -1;
+    std::uint32_t incarnation = 0;
+    bool operator==(const Process&) const = default;
+  };
   // A heartbeat that the board took as a sign of life.
   struct Fed {
-    int host;
+    Process from;
     std::uint32_t pnum;
     std::uint64_t at_us;
   };
@@ -145,7 +152,9 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   std::uint64_t heartbeat_in_us_ = 0;    // the newest intact one to arrive
   std::uint64_t heartbeat_sent_us_ = 0;  // when the newest to arrive was sent
   std::vector<Fed> fed_;                 // by this boot of the board
-  std::uint32_t stop_pnum_ = 0;          // of the last stop executed
+  Process delivering_;                   // whose packet the board has before it
+  Process stop_from_;                    // of the last stop executed
+  std::uint32_t stop_pnum_ = 0;
   int newest_executed_ = -1;
 
   std::vector<std::unique_ptr<Host>> hosts_;
