@@ -3,6 +3,8 @@
 
 #include <unistd.h>
 
+#include <asio/buffer.hpp>
+#include <asio/error.hpp>
 #include <asio/post.hpp>
 #include <cerrno>
 #include <chrono>
@@ -33,7 +35,7 @@ void LineStream::start(FileDescriptor descriptor) {
   framing_.reset();
   line_size_ = line_written_ = 0;
   terminator_first_ = false;
-  wait_readable();
+  begin_to_receive();
 }
 
 void LineStream::stop() noexcept {
@@ -45,16 +47,17 @@ void LineStream::stop() noexcept {
   stream_.close(ignored);
 }
 
-void LineStream::wait_readable() {
-  stream_.async_wait(asio::posix::descriptor_base::wait_read,
-                     readable_.handler([this] { receive(); }));
+// Asio tries to read at once before it waits: on a tty that costs half as much as a wait, which has
+// to be armed anew each time.
+void LineStream::begin_to_receive() {
+  stream_.async_read_some(asio::buffer(received_),
+                          readable_.handler([this](const asio::error_code& error,
+                                                   std::size_t size) { receive(error, size); }));
 }
 
-void LineStream::receive() {
-  const ssize_t count = ::read(stream_.native_handle(), received_.data(), received_.size());
-  if (count < 0 && would_block(errno)) return wait_readable();
-  if (count <= 0) return lost(count == 0 ? 0 : errno);
-  framing_.push(received_.data(), static_cast<std::size_t>(count), [this](Text line) {
+void LineStream::receive(const asio::error_code& error, std::size_t size) {
+  if (error) return lost(error == asio::error::eof ? 0 : error.value());
+  framing_.push(received_.data(), size, [this](Text line) {
     if (!stream_.is_open()) return;  // closed by the handler of a line before
     ++counters_.rx_datagrams;
     counters_.rx_bytes += line.size();
@@ -62,10 +65,8 @@ void LineStream::receive() {
   });
   counters_.rx_oversize = framing_.oversize();
   // The system hands a backlog over in pieces of up to 4095 bytes.
-  if (stream_.is_open() && static_cast<std::size_t>(count) < received_.size() / 2) {
-    owner_.on_drained();
-  }
-  if (stream_.is_open()) wait_readable();
+  if (stream_.is_open() && size < received_.size() / 2) owner_.on_drained();
+  if (stream_.is_open()) begin_to_receive();
 }
 
 void LineStream::lost(int error) {

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <asio/error_code.hpp>
 #include <asio/io_context.hpp>
 #include <cstddef>
 #include <string_view>
@@ -54,8 +55,8 @@ class LineStream {
  private:
   enum class Outcome { written, busy, failed };
 
-  void wait_readable();
-  void receive();
+  void begin_to_receive();
+  void receive(const asio::error_code& error, std::size_t size);
   void lost(int error);
   Outcome write_line(std::string_view bytes);
   Outcome continue_line();

@@ -29,8 +29,10 @@ using Clock = std::chrono::steady_clock;
 
 constexpr Milliseconds connect_timeout{3000};
 constexpr Milliseconds answer_timeout{1000};
-// More would run ahead of the board's window of packet numbers (protocol/board_link.hpp).
-constexpr std::size_t most_questions = 20000;
+// Questions come in bursts with pauses between them: the board takes no packet number that is far
+// ahead of the newest heartbeat's (BoardLink::command_window).
+constexpr std::size_t burst = 100;
+constexpr Milliseconds pause{10};
 
 struct Options {
   std::vector<std::string> urls;
@@ -63,7 +65,10 @@ BoardOptions board_options() {
 class Bench {
  public:
   explicit Bench(const Options& options)
-      : options_(options), board_(io_, one_url(options.urls), board_options()), timer_(io_) {}
+      : options_(options),
+        board_(io_, one_url(options.urls), board_options()),
+        timer_(io_),
+        pause_(io_) {}
 
   int run() {
     board_.open();
@@ -124,21 +129,24 @@ class Bench {
     if (states_ == 0) throw Error(explain(board_.name(), board_.link()));
   }
 
-  // Asks again as soon as an answer is there.
+  // In a burst, a question follows as soon as the answer to the last one is there.
   void ask() {
     running_ = true;
-    ask_next();
+    ask_next(burst);
     run_for(options_.duration * 2 / 5);
     running_ = false;
+    pause_.cancel();
   }
-  void ask_next() {
-    board_.async_identify(answer_timeout, [this](const CommandResult& result) {
-      if (!running_ || !count(result, round_trips_, unanswered_)) return;
-      if (round_trips_.count() == most_questions) {
-        io_.stop();
-      } else {
-        ask_next();
-      }
+  void ask_next(std::size_t left) {
+    if (left == 0) {
+      pause_.expires_after(pause);
+      pause_.async_wait([this](const std::error_code& error) {
+        if (!error && running_) ask_next(burst);
+      });
+      return;
+    }
+    board_.async_identify(answer_timeout, [this, left](const CommandResult& result) {
+      if (running_ && count(result, round_trips_, unanswered_)) ask_next(left - 1);
     });
   }
 
@@ -214,6 +222,7 @@ class Bench {
   asio::io_context io_{1};
   AsyncBoard board_;
   asio::steady_timer timer_;
+  asio::steady_timer pause_;
   double connect_us_ = 0;
   std::uint64_t states_ = 0;
   std::uint64_t lost_ = 0;

@@ -3,7 +3,7 @@
 
 #include <fcntl.h>
 #include <netinet/in.h>
-#include <poll.h>
+#include <sched.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
@@ -49,6 +49,26 @@ void read_all(int fd, void* data, std::size_t size) {
   }
 }
 
+// The first or second of the cores that this process had at first, if it had two.
+void run_on_core(int index) {
+  static const cpu_set_t all = [] {
+    cpu_set_t set;
+    require(::sched_getaffinity(0, sizeof set, &set) == 0, "sched_getaffinity");
+    return set;
+  }();
+  int left = CPU_COUNT(&all) > 1 ? index : 0;
+  for (int core = 0; core < CPU_SETSIZE; ++core) {
+    if (!CPU_ISSET(core, &all) || left-- > 0) continue;
+    cpu_set_t one;
+    CPU_ZERO(&one);
+    CPU_SET(core, &one);
+    require(::sched_setaffinity(0, sizeof one, &one) == 0, "sched_setaffinity");
+    return;
+  }
+}
+
+int child_core = 1;
+
 void make_raw(int fd) {
   termios settings;
   require(::tcgetattr(fd, &settings) == 0, "tcgetattr");
@@ -67,6 +87,15 @@ bool read_line(int fd) {
 }
 
 }  // namespace
+
+const char* to_text(Placement placement) {
+  return placement == Placement::two_cores ? "two cores" : "one core";
+}
+
+void place(Placement placement) {
+  child_core = placement == Placement::two_cores ? 1 : 0;
+  run_on_core(0);
+}
 
 const char* to_text(Wire wire) { return wire == Wire::udp ? "udp" : "pty"; }
 
@@ -87,6 +116,7 @@ bool ChildProcess::fork_child() {
   require(pid_ >= 0, "fork");
   control_ = ends[pid_ == 0 ? 1 : 0];
   ::close(ends[pid_ == 0 ? 0 : 1]);
+  if (pid_ == 0) run_on_core(child_core);
   return pid_ == 0;
 }
 
@@ -116,7 +146,7 @@ Usage BoardProcess::usage() const {
 }
 
 void BoardProcess::serve(Wire wire, bool unbound) {
-  asio::io_context io{1};
+  asio::io_context io{ASIO_CONCURRENCY_HINT_UNSAFE};
   std::uint32_t virtual_ms = 0;
   sim::SimulatedBoard::Options options;
   if (unbound) {

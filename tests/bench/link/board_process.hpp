@@ -19,6 +19,13 @@ struct Usage {
 };
 Usage own_usage();
 
+// Where the two processes run: on a core each, or sharing one. Left to itself, the scheduler moves
+// between the two, which differ by more than anything that is measured here.
+enum class Placement { two_cores, one_core };
+const char* to_text(Placement placement);
+// Of this process, and of those forked from now on.
+void place(Placement placement);
+
 enum class Wire { udp, pty };
 const char* to_text(Wire wire);
 

@@ -8,13 +8,11 @@
 // one; no allocation per datagram; at 100 Hz at most 2 % of a core on either side.
 #include <algorithm>
 #include <asio/io_context.hpp>
+#include <asio/post.hpp>
 #include <asio/steady_timer.hpp>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <functional>
-#include <memory>
 #include <vector>
 
 #include "board_process.hpp"
@@ -81,7 +79,11 @@ struct AsyncHost {
       Clock::time_point& start;
       void operator()(const CommandResult&) const {
         seconds.push_back(std::chrono::duration<double>(Clock::now() - start).count());
-        if (--left > 0) again();
+        if (--left > 0) {
+          again();
+        } else {
+          host.io.stop();
+        }
       }
       void again() const {
         start = Clock::now();
@@ -89,10 +91,12 @@ struct AsyncHost {
       }
     };
     Ask{*this, seconds, left, start}.again();
-    while (left > 0) io.run_one();
+    io.run();
+    io.restart();
   }
 
-  asio::io_context io{1};
+  // One thread: Asio's locks can go.
+  asio::io_context io{ASIO_CONCURRENCY_HINT_UNSAFE};
   AsyncBoard board;
 };
 
@@ -156,41 +160,67 @@ void count_allocations(Wire wire) {
     host.round_trips(500, seconds);
     host.run_for(1200ms);  // what is made once has been made
 
-    const auto measure = [&](const char* what, auto action) {
-      const Usage board_before = process.usage();
-      const Statistics statistics_before = host.board.statistics();
-      const std::uint64_t before = allocations();
-      action();
-      const std::uint64_t host_made = allocations() - before;
-      const Statistics s = host.board.statistics();
-      const Usage board_after = process.usage();
-      print_allocations(wire, what, host_made, board_after.allocations - board_before.allocations,
-                        s.received - statistics_before.received + s.heartbeats -
-                            statistics_before.heartbeats + s.commands - statistics_before.commands);
-    };
-    measure("states and heartbeats, 2 s", [&] { host.run_for(2s); });
-    measure("post(), 1000 setpoints", [&] {
-      for (int i = 0; i < 1000; ++i) {
-        host.board.post(Command::osmc(i, Direction::forward, 1));
-        host.io.poll();
+    // Begun and ended on the loop, so that what this function allocates is not counted.
+    struct Count {
+      AsyncHost& host;
+      std::uint64_t before = 0, made = 0;
+      int left = 0;
+      void end() {
+        made = allocations() - before;
+        host.io.stop();
       }
+    } count{host};
+    const auto measure = [&](const char* what, auto start) {
+      const Usage board_before = process.usage();
+      const Statistics then = host.board.statistics();
+      asio::post(host.io, [&] {
+        count.before = allocations();
+        start();
+      });
+      host.io.run();
+      host.io.restart();
+      const Statistics now = host.board.statistics();
+      const Usage board_after = process.usage();
+      print_allocations(wire, what, count.made, board_after.allocations - board_before.allocations,
+                        now.received - then.received + now.heartbeats - then.heartbeats +
+                            now.commands - then.commands);
+    };
+
+    struct Post {
+      Count& count;
+      void operator()() const {
+        if (count.left-- == 0) return count.end();
+        count.host.board.post(Command::osmc(count.left, Direction::forward, 1));
+        asio::post(count.host.io, *this);
+      }
+    };
+    struct Identify {
+      Count& count;
+      void operator()(const CommandResult&) const { ask(); }
+      void ask() const {
+        if (count.left-- == 0) return count.end();
+        count.host.board.async_identify(1s, *this);
+      }
+    };
+    struct Send {
+      Count& count;
+      void operator()(const CommandResult&) const { send(); }
+      void send() const {
+        if (count.left-- == 0) return count.end();
+        count.host.board.async_send(Command::osmc(count.left, Direction::forward, 1), 1s, *this);
+      }
+    };
+    asio::steady_timer timer(host.io);
+    measure("states and heartbeats, 2 s", [&] {
+      timer.expires_after(2s);
+      timer.async_wait([&](const std::error_code&) { count.end(); });
     });
-    measure("async_identify, 1000", [&] { host.round_trips(1000, seconds); });
-    measure("async_send, 100 confirmed", [&] {
-      int left = 100;
-      struct Next {
-        AsyncHost& host;
-        int& left;
-        void operator()(const CommandResult&) const {
-          if (--left > 0) again();
-        }
-        void again() const {
-          host.board.async_send(Command::osmc(left, Direction::forward, 1), 1s, *this);
-        }
-      };
-      Next{host, left}.again();
-      host.run_until([&] { return left == 0; });
-    });
+    count.left = 1000;
+    measure("post(), 1000 setpoints", [&] { Post{count}(); });
+    count.left = 1000;
+    measure("async_identify, 1000", [&] { Identify{count}.ask(); });
+    count.left = 100;
+    measure("async_send, 100 confirmed", [&] { Send{count}.send(); });
   }
   BoardProcess other(wire, false);
   Board board(other.url());
@@ -257,7 +287,12 @@ int run(int count, const std::string& part) {
   if (wanted("round-trip")) {
     std::printf("round trip, %d questions in blocks of %d, 42 bytes there and 55 back\n", count,
                 block);
-    for (const Wire wire : {Wire::udp, Wire::pty}) compare_round_trips(wire, count);
+    for (const Placement placement : {Placement::two_cores, Placement::one_core}) {
+      place(placement);
+      std::printf("  %s\n", to_text(placement));
+      for (const Wire wire : {Wire::udp, Wire::pty}) compare_round_trips(wire, count);
+    }
+    place(Placement::two_cores);
   }
   if (wanted("heap")) {
     std::printf("\nallocations in the steady state\n");
