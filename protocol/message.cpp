@@ -3,6 +3,7 @@
 
 #include "command.hpp"
 #include "numbers.hpp"
+#include "state.hpp"
 
 namespace r4 {
 namespace {
@@ -54,9 +55,10 @@ Text write_board_heartbeat(char* buffer, std::size_t capacity, std::uint32_t pnu
 }
 
 SafeReason heartbeat_reason(const Datagram& datagram) {
-  std::uint32_t number = 0;
-  if (!parse_number(datagram.find("SAFE").values(), number)) return SafeReason::none;
-  return number < safe_reason_count ? static_cast<SafeReason>(number) : SafeReason::none;
+  const Field field = datagram.find("SAFE");
+  if (field.name().empty()) return SafeReason::none;
+  SafeReason reason = SafeReason::none;
+  return parse_safe_reason(field.values(), reason) ? reason : SafeReason::fault;
 }
 
 bool read_nack(const Datagram& datagram, Nack& out) {

@@ -29,7 +29,8 @@ MessageKind kind_of(const Datagram& datagram);
 // The board's heartbeat: `H:R4-ROS2;PNum:…;T:…;`, with `SAFE:n;` behind the T while n is not 0.
 Text write_board_heartbeat(char* buffer, std::size_t capacity, std::uint32_t pnum,
                            std::uint32_t t_ms, SafeReason safe);
-// The reason that a board heartbeat carries; none if it carries no (valid) SAFE.
+// The reason that a board heartbeat carries; none if it carries no SAFE. One that cannot be read is
+// taken for a fault.
 SafeReason heartbeat_reason(const Datagram& datagram);
 
 // A refusal: which command of ours, and why. False if the datagram's N field is not of that form.

@@ -189,7 +189,7 @@ bool parse_entry(Text text, const Entry& entry, State& state) {
     case Form::u32:
       return parse_number(text, member<std::uint32_t>(state, entry));
     case Form::reason:
-      return parse_into(text, safe_reason_count - 1, member<SafeReason>(state, entry));
+      return parse_safe_reason(text, member<SafeReason>(state, entry));
   }
   return false;
 }
@@ -282,6 +282,13 @@ bool read_fields(const Datagram& datagram, State& state) {
 }
 
 }  // namespace
+
+bool parse_safe_reason(Text text, SafeReason& out) {
+  std::uint32_t number = 0;
+  if (!parse_number(text, number)) return false;
+  out = number < safe_reason_count ? static_cast<SafeReason>(number) : SafeReason::fault;
+  return true;
+}
 
 bool read_state(const Datagram& datagram, State& state) {
   if (datagram.has_time() && datagram.time_ms() > 0xFFFFFFFFU) return false;

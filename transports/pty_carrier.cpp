@@ -2,9 +2,11 @@
 #include "pty_carrier.hpp"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <poll.h>
 #include <sys/ioctl.h>
 #include <termios.h>
+#include <unistd.h>
 
 #include <array>
 #include <cerrno>
@@ -29,6 +31,13 @@ constexpr std::chrono::milliseconds stale{30};
 // Up to 4095 unread bytes lie where they can be counted, the others before that.
 constexpr int countable_bytes = 3500;
 constexpr std::size_t all_bytes = 4096 + 20480;
+
+// A link that a board left behind, or that of another board: into /dev/pts, or to nowhere.
+bool is_our_kind(const std::filesystem::path& link) {
+  std::error_code error;
+  const std::filesystem::path target = std::filesystem::read_symlink(link, error);
+  return !error && (target.parent_path() == "/dev/pts" || !std::filesystem::exists(link, error));
+}
 
 class PtyCarrier final : public Carrier, private LineStream::Owner {
  public:
@@ -118,14 +127,18 @@ void PtyCarrier::make_link() {
   const fs::path link(url_.path());
   std::error_code error;
   const fs::file_status status = fs::symlink_status(link, error);
-  if (fs::exists(status) && !fs::is_symlink(status)) {
-    throw Error(ErrorKind::open, url_.text(), link.string() + " is there and is no link",
+  if (fs::exists(status) && !is_our_kind(link)) {
+    throw Error(ErrorKind::open, url_.text(), link.string() + " is there and leads to no pty",
                 "give another path, or remove it");
   }
-  const fs::path fresh = link.string() + ".new";
-  fs::remove(fresh, error);
+  // Made aside and moved there: at no moment is the path without a link.
+  const fs::path fresh = fmt::format("{}.{}", link.string(), ::getpid());
   fs::create_symlink(device_, fresh, error);
-  if (!error) fs::rename(fresh, link, error);
+  if (!error) {
+    fs::rename(fresh, link, error);
+    std::error_code ignored;
+    if (error) fs::remove(fresh, ignored);
+  }
   if (error) {
     throw Error(error == std::errc::permission_denied ? ErrorKind::permission : ErrorKind::open,
                 url_.text(), "the link cannot be made: " + error.message(),

@@ -54,10 +54,16 @@ Endpoint look_up(asio::io_context& io, const std::string& thing, const std::stri
                 fmt::format("there is no host '{}' ({})", host, error.message()),
                 "check the name, or give the IP address");
   }
+  Endpoint endpoint = found.begin()->endpoint();
   for (const auto& result : found) {
-    if (result.endpoint().protocol() == udp::v4()) return result.endpoint();
+    if (endpoint.protocol() != udp::v4()) endpoint = result.endpoint();
   }
-  return found.begin()->endpoint();
+  const asio::ip::address address = endpoint.address();
+  if (address.is_multicast() || address == asio::ip::address_v4::broadcast()) {
+    throw Error(ErrorKind::usage, thing, host + " is the address of many, not of one",
+                "give the IP address of the board itself");
+  }
+  return endpoint;
 }
 
 // 0 if the system knows a way to that address, else errno. Sends nothing.

@@ -241,7 +241,7 @@ TEST(ApplicationLink, RestoresNothingForARestartedHost) {
   EXPECT_EQ(board.outputs().osmc[0].pwm, 400);
 }
 
-TEST(ApplicationLink, ARestartIsNoticedAtOnceAndMakesTheOutputsSafe) {
+TEST(ApplicationLink, ARestartIsNoticedWithinTheTimeoutAndMakesTheOutputsSafe) {
   TestBoard board;
   TestHost host(board, echo_pnum);
   host.connect();
@@ -251,7 +251,7 @@ TEST(ApplicationLink, ARestartIsNoticedAtOnceAndMakesTheOutputsSafe) {
   TestHost restarted(board, echo_pnum + 100'000'000);
   restarted.heartbeat(0);
   EXPECT_EQ(board.outputs().osmc[0].pwm, 358);  // nothing is proven yet
-  board.run(1);
+  board.run(BoardLink::takeover_silence_ms);
   restarted.echo();
   EXPECT_TRUE(board.safe());
   EXPECT_EQ(board.state(), BoardState::active);

@@ -181,6 +181,9 @@ NO_BOARD = 'udp://127.0.0.1:9?listen=0'
     (['decode', '/'], OPEN, 'directory'),
     (['sim', '--script', '/no/such/file'], USAGE, '/no/such/file'),
     (['sim', '--board-id', 'a,b'], USAGE, 'cannot be sent'),
+    (['sim', '--board-id', 'x' * 65], USAGE, 'use 1 to 64'),
+    (['monitor', 'udp://255.255.255.255'], USAGE, 'the address of many'),
+    (['monitor', 'udp://224.0.0.1'], USAGE, 'the address of many'),
     (['sim', 'udp://127.0.0.1:0', 'pty:', 'pty:', 'pty:', 'pty:'], USAGE, 'at most 4'),
     (['completion', 'fish'], USAGE, 'bash or zsh'),
 ])
@@ -261,11 +264,30 @@ def test_permission_denied_is_named_with_the_fix():
     assert objects(result.stdout)[-1]['kind'] == 'permission'
 
 
-def test_output_that_cannot_be_written_is_an_error():
+@pytest.mark.parametrize('arguments', [['encode', 'Q:ID'], ['decode'], ['--help'], ['--version']])
+def test_output_that_cannot_be_written_is_an_error(arguments):
     with open('/dev/full', 'wb') as full:
-        result = subprocess.run([R4, 'encode', 'Q:ID'], stdout=full, stderr=subprocess.PIPE, text=True,
-                                check=False)
+        result = subprocess.run([R4, *arguments], input='AIN:1;^0x1^\n', stdout=full, stderr=subprocess.PIPE,
+                                text=True, check=False)
     assert result.returncode == OPEN and 'No space left' in result.stderr
+
+
+def test_a_board_does_not_wait_for_whoever_reads_its_log():
+    """The pipe holds 64 KB, and nobody empties it; each command is a line or two."""
+    with subprocess.Popen([R4, 'sim', 'udp://127.0.0.1:0', '--json', '--duration', '20'],
+                          stdout=subprocess.PIPE, text=True) as board:
+        url = json.loads(board.stdout.readline())['host_url'] + '?listen=0'
+        for round_ in range(2):
+            commands = [f'O:{pwm},1,1' for pwm in range(1 + 500 * round_, 501 + 500 * round_)]
+            result = run('send', url, *commands, timeout=60)
+            assert result.returncode == 0, result
+        monitor = run('monitor', url, '--json', '--duration', '1', timeout=60)
+        states = [each for each in objects(monitor.stdout) if each['type'] == 'state']
+        assert len(states) > 50
+        board.terminate()
+        written = board.stdout.read()
+    events = objects(written)  # whole lines, nothing torn
+    assert sum('executed' in each for each in events) > 100
 
 
 def test_nothing_that_is_opened_takes_the_place_of_a_closed_output():

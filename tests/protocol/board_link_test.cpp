@@ -190,7 +190,7 @@ TEST_F(BoardLinkTest, WhileActiveNumbersMayJumpWithinTheWideWindow) {
 
 TEST_F(BoardLinkTest, AHostThatHasNothingToEchoAnyMoreHasBegunAgain) {
   // Its first number happens to fit the session before.
-  for (const std::uint32_t silence : {100U, 1500U}) {
+  for (const std::uint32_t silence : {BoardLink::takeover_silence_ms, 1500U}) {
     link = BoardLink(BoardLink::Timing{});
     sent.clear();
     connect();
@@ -207,7 +207,7 @@ TEST_F(BoardLinkTest, AHostThatHasNothingToEchoAnyMoreHasBegunAgain) {
 TEST_F(BoardLinkTest, ANewSessionWhoseNumbersGoOnDoesNotMoveTheGateBack) {
   connect();
   command(echo_pnum + 5);
-  run(100);
+  run(BoardLink::takeover_silence_ms);
   heartbeat(echo_pnum + 2, 0);
   link.heartbeat_answered(now);
   // The newest heartbeat, but older than the command.
@@ -221,7 +221,7 @@ TEST_F(BoardLinkTest, ANewSessionKeepsItsKindBehindTheWrap) {
   send_due();
   heartbeat(0xffffffffU, 0);
   heartbeat(0, sent.back());
-  run(100);
+  run(BoardLink::takeover_silence_ms);
   heartbeat(1, 0);  // it has begun again, it seems
   link.heartbeat_answered(now);
   EXPECT_EQ(heartbeat(2, now), HeartbeatEffect::new_session);
@@ -261,6 +261,22 @@ TEST_F(BoardLinkTest, ARestartNeedsAnEchoNewerThanAnyOfTheSession) {
   // What the host sent before its restart is of no effect now.
   EXPECT_EQ(heartbeat(echo_pnum + 3, newest), HeartbeatEffect::stale);
   EXPECT_EQ(command(echo_pnum + 4), "STALE");
+}
+
+TEST_F(BoardLinkTest, AnotherHostAtTheSamePlaceIsBusyWhileTheOwnerIsHeard) {
+  connect();
+  std::uint32_t owner = echo_pnum + 2;
+  std::uint32_t other = echo_pnum + 100'000'000;
+  for (int i = 0; i < 50; ++i) {
+    EXPECT_EQ(heartbeat(owner++, sent.back()), HeartbeatEffect::fed);
+    run(100);
+    const HeartbeatEffect effect = heartbeat(other++, sent.back());
+    EXPECT_TRUE(effect == HeartbeatEffect::busy || effect == HeartbeatEffect::stale);
+    EXPECT_EQ(command(other++), "STALE");
+  }
+  EXPECT_EQ(command(owner), "execute");
+  run(BoardLink::takeover_silence_ms);
+  EXPECT_EQ(heartbeat(other, sent.back()), HeartbeatEffect::new_session);
 }
 
 TEST_F(BoardLinkTest, ALateHeartbeatOfTheSessionIsNoRestart) {
@@ -425,7 +441,9 @@ TEST_F(BoardLinkTest, AnEchoHostTakesAPaperHostsPlaceAsANewSession) {
   EXPECT_EQ(heartbeat(echo_pnum, 0), HeartbeatEffect::stale);
   run(1);
   link.heartbeat_answered(now);
-  EXPECT_EQ(heartbeat(echo_pnum + 1, now), HeartbeatEffect::new_session);
+  EXPECT_EQ(heartbeat(echo_pnum + 1, now), HeartbeatEffect::busy);
+  run(1000);
+  EXPECT_EQ(heartbeat(echo_pnum + 2, sent.back()), HeartbeatEffect::new_session);
 }
 
 TEST_F(BoardLinkTest, APaperHostMayCountIntoTheUpperHalf) {

@@ -72,10 +72,16 @@ TEST(Message, BoardHeartbeatCarriesTheReasonBehindTheTime) {
   }
 }
 
-TEST(Message, AHeartbeatWithoutAValidReasonHasNone) {
-  for (const char* fields : {"H:R4-ROS2;", "H:R4-ROS2;SAFE:0;", "H:R4-ROS2;SAFE:7;",
-                             "H:R4-ROS2;SAFE:;", "H:R4-ROS2;SAFE:1,2;", "H:R4-ROS2;SAFE:link;"}) {
+TEST(Message, AHeartbeatWithoutAReasonHasNone) {
+  for (const char* fields : {"H:R4-ROS2;", "H:R4-ROS2;SAFE:0;"}) {
     EXPECT_EQ(heartbeat_reason(Read(fields).datagram), SafeReason::none) << fields;
+  }
+}
+
+TEST(Message, AReasonThatIsNotKnownIsAFault) {
+  for (const char* fields : {"H:R4-ROS2;SAFE:7;", "H:R4-ROS2;SAFE:4294967295;", "H:R4-ROS2;SAFE:;",
+                             "H:R4-ROS2;SAFE:1,2;", "H:R4-ROS2;SAFE:link;"}) {
+    EXPECT_EQ(heartbeat_reason(Read(fields).datagram), SafeReason::fault) << fields;
   }
 }
 

@@ -89,6 +89,12 @@ const char* const numbered_fields[] = {
     "RXOK:12",         "RXCRC:13",        "RXLOST:14",       "RXDUP:15",        "RXREF:16",
     "LATE:17"};
 
+TEST(State, AReasonThatIsNotKnownIsAFault) {
+  State state;
+  ASSERT_TRUE(read_fields("SAFE:7;", state));
+  EXPECT_EQ(state.safe, SafeReason::fault);
+}
+
 TEST(State, EveryFieldHasItsOwnMemberAndItsForm) {
   const State state = numbered_state();
   ASSERT_EQ(std::size(numbered_fields), static_cast<std::size_t>(state_field_count));
@@ -215,7 +221,6 @@ TEST(State, AValueOutsideItsRangeOrFormRefusesTheWhole) {
                                   "BLDC1:1,1",
                                   "BLDC1:1,1,1,1",
                                   "RELAYS:256",
-                                  "SAFE:7",
                                   "SAFE:-1",
                                   "CMD:4294967296",
                                   "CMD:-1",

@@ -21,12 +21,14 @@ void* allocate(std::size_t size) {
 
 }  // namespace
 
-void* operator new(std::size_t size) { return allocate(size); }
-void* operator new[](std::size_t size) { return allocate(size); }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete[](void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+// Not inlined: where gcc sees through one of a pair only, it takes them for mismatched.
+#define R4_OPAQUE [[gnu::noinline]]
+R4_OPAQUE void* operator new(std::size_t size) { return allocate(size); }
+R4_OPAQUE void* operator new[](std::size_t size) { return allocate(size); }
+R4_OPAQUE void operator delete(void* memory) noexcept { std::free(memory); }
+R4_OPAQUE void operator delete[](void* memory) noexcept { std::free(memory); }
+R4_OPAQUE void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+R4_OPAQUE void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace r4::test {
 namespace {

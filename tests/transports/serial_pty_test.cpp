@@ -458,6 +458,10 @@ TEST_F(SerialPtyTest, ReplacesALinkAndNothingElse) {
   ASSERT_TRUE(error);
   EXPECT_EQ(error->kind(), ErrorKind::open);
   EXPECT_TRUE(fs::is_regular_file(path));
+  fs::rename(path, folder / "precious");
+  fs::create_symlink(folder / "precious", path);
+  ASSERT_TRUE(error_of([&] { open_board("pty:" + path.string()); })) << "no link of a board's";
+  EXPECT_EQ(fs::read_symlink(path), folder / "precious");
   fs::remove(path);
   fs::create_symlink("/nowhere", path);
   open_board("pty:" + path.string());

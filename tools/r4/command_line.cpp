@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <iostream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -113,7 +114,8 @@ void occupy_standard_streams() {
 // What was printed must have gone somewhere: a full disk is no success.
 void flush_output() {
   errno = 0;
-  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+  std::cout.flush();  // CLI11 prints help there
+  if (!std::cout || std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
     throw Error(ErrorKind::open, "standard output", std::strerror(errno != 0 ? errno : EIO),
                 "make room where it goes, or send it elsewhere");
   }
@@ -134,12 +136,15 @@ int run(int argc, const char* const* argv) {
   add_subcommands(root, chosen);
   set_help_layout(root);
   try {
-    root.parse(argc, argv);
-    const int code = chosen();
+    int code = 0;
+    try {
+      root.parse(argc, argv);
+      code = chosen();
+    } catch (const CLI::Success& success) {  // --help, --version
+      code = root.exit(success);
+    }
     flush_output();
     return code;
-  } catch (const CLI::Success& success) {  // --help, --version
-    return root.exit(success);
   } catch (const CLI::ParseError& error) {
     return report(usage_problem(root, error), json);
   } catch (const Error& error) {

@@ -32,11 +32,14 @@ struct Options {
   std::string board_id;
 };
 
+constexpr std::size_t longest_id = 64;
+
 void check_id(const std::string& id) {
   Field field;
-  if (!id.empty() && read_field(Text("I:" + id), field) && field.count() == 1) return;
+  const bool valid = read_field(Text("I:" + id), field) && field.count() == 1;
+  if (valid && !id.empty() && id.size() <= longest_id) return;
   throw Error(ErrorKind::usage, "--board-id " + id, "cannot be sent",
-              "use printable ASCII without , ; and ^");
+              fmt::format("use 1 to {} printable ASCII characters without , ; and ^", longest_id));
 }
 
 int simulate(const Options& options) {

@@ -28,7 +28,17 @@ std::string_view name_of_kind(CarrierEvent::Kind kind) {
   return "warning";
 }
 
+std::string missing_lines(bool json, std::uint64_t count) {
+  if (json) return line_of({{"type", "lost"}, {"lines", count}});
+  return fmt::format("({} lines are missing: whoever reads this was too slow)\n", count);
+}
+
 }  // namespace
+
+SimLog::SimLog(bool json, bool quiet)
+    : json_(json),
+      quiet_(quiet),
+      writer_([json](std::uint64_t count) { return missing_lines(json, count); }) {}
 
 Json outputs_json(const firmware::Outputs& outputs) {
   Json json{{"osmc", Json::array()},    {"dhb", Json::array()},  {"servo", outputs.servo_us},
@@ -124,7 +134,7 @@ void SimLog::print(std::uint32_t t_ms, std::string_view text) {
 
 void SimLog::print(std::string line) {
   if (started_) {
-    print_text(line);
+    writer_.write(line);
   } else {
     held_.push_back(std::move(line));
   }

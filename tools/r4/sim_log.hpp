@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What `r4 sim` prints: where the board listens and its own events, in words or as JSON. Each line
-// is handed to the system at once.
+// What `r4 sim` prints: where the board listens and its own events, in words or as JSON. A slow
+// reader does not hold the board up.
 #pragma once
 
 #include <string>
@@ -9,12 +9,13 @@
 
 #include "firmware/ports/sim/simulated_board.hpp"
 #include "json.hpp"
+#include "line_writer.hpp"
 
 namespace r4::tool {
 
 class SimLog {
  public:
-  SimLog(bool json, bool quiet) : json_(json), quiet_(quiet) {}
+  SimLog(bool json, bool quiet);
 
   // The callbacks for the board's options; the log must outlive the board.
   sim::SimulatedBoard::Events events();
@@ -40,6 +41,7 @@ class SimLog {
   bool started_ = false;
   std::vector<std::string> held_;  // lines of before listening()
   const sim::SimulatedBoard* board_ = nullptr;
+  LineWriter writer_;
 };
 
 // How a host on this machine opens what a board listens on: "serial:///tmp/r4" for "pty:/tmp/r4".

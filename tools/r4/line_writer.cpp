@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "line_writer.hpp"
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <climits>
+#include <utility>
+
+namespace r4::tool {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr std::chrono::seconds farewell{1};
+
+}  // namespace
+
+LineWriter::LineWriter(std::function<std::string(std::uint64_t count)> note)
+    : note_(std::move(note)), thread_([this] { run(); }) {}
+
+LineWriter::~LineWriter() {
+  {
+    const std::lock_guard lock(mutex_);
+    ending_ = true;
+  }
+  changed_.notify_one();
+  thread_.join();
+}
+
+void LineWriter::write(std::string_view line) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (waiting_.size() + line.size() > capacity) {
+      ++lost_;
+      return;
+    }
+    if (lost_ != 0) waiting_ += note_(std::exchange(lost_, 0));
+    waiting_ += line;
+  }
+  changed_.notify_one();
+}
+
+void LineWriter::run() {
+  std::string text;
+  for (;;) {
+    text.clear();
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [this] { return ending_ || !waiting_.empty(); });
+      if (waiting_.empty()) return;
+      text.swap(waiting_);
+    }
+    if (!write_out(text)) return;
+  }
+}
+
+// What poll() calls writable takes PIPE_BUF bytes without waiting. False if it is time to give up.
+bool LineWriter::write_out(std::string_view text) {
+  Clock::time_point deadline = Clock::time_point::max();
+  while (!text.empty()) {
+    pollfd out{STDOUT_FILENO, POLLOUT, 0};
+    const int ready = ::poll(&out, 1, 100);
+    {
+      const std::lock_guard lock(mutex_);
+      if (ending_ && deadline == Clock::time_point::max()) deadline = Clock::now() + farewell;
+    }
+    if (ready == 0 && Clock::now() >= deadline) return false;
+    if (ready <= 0) continue;
+    const ssize_t written =
+        ::write(STDOUT_FILENO, text.data(), std::min<std::size_t>(text.size(), PIPE_BUF));
+    if (written > 0) {
+      text.remove_prefix(static_cast<std::size_t>(written));
+    } else if (errno != EINTR && errno != EAGAIN) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace r4::tool

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Lines to standard output from a loop that must not wait for whoever reads them: a pipe that nobody
+// empties, a terminal that is held. A thread of its own writes them; what does not fit into a
+// megabyte is lost and counted.
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <thread>
+
+namespace r4::tool {
+
+class LineWriter {
+ public:
+  // `note` makes the line that stands where `count` lines are missing.
+  explicit LineWriter(std::function<std::string(std::uint64_t count)> note);
+  // Gives the reader a second to take what is left.
+  ~LineWriter();
+  LineWriter(const LineWriter&) = delete;
+  LineWriter& operator=(const LineWriter&) = delete;
+
+  // `line` with its end. Never waits.
+  void write(std::string_view line);
+
+  static constexpr std::size_t capacity = std::size_t{1} << 20;
+
+ private:
+  void run();
+  bool write_out(std::string_view text);
+
+  const std::function<std::string(std::uint64_t)> note_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::string waiting_;
+  std::uint64_t lost_ = 0;
+  bool ending_ = false;
+  std::thread thread_;
+};
+
+}  // namespace r4::tool
