@@ -281,7 +281,7 @@ def test_a_board_does_not_wait_for_whoever_reads_its_log():
             commands = [f'O:{pwm},1,1' for pwm in range(1 + 500 * round_, 501 + 500 * round_)]
             result = run('send', url, *commands, timeout=60)
             assert result.returncode == 0, result
-        monitor = run('monitor', url, '--json', '--duration', '1', timeout=60)
+        monitor = run('monitor', url, '--json', '--duration', '3', timeout=60)
         states = [each for each in objects(monitor.stdout) if each['type'] == 'state']
         assert len(states) > 50
         board.terminate()
