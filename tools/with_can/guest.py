@@ -325,7 +325,7 @@ class Guest:
                 continue
             for key, _ in selector.select(left):
                 key.data()
-        return self._status
+        return TIME_LIMIT_EXIT if self._limit_passed else self._status
 
     def _on_control(self, line):
         what, _, rest = line.partition(' ')
@@ -337,7 +337,7 @@ class Guest:
                 self._tell('size {} {}'.format(*self._size()))
             feed(self._input)
         elif what == 'exit':
-            self._status = self._status or int(rest)
+            self._status = int(rest)
             self._deadline = None
         elif line == 'usb unplug':
             self._say_to_qemu({'execute': 'device_del', 'arguments': {'id': USB_DEVICE['id']}})
