@@ -43,6 +43,16 @@ Refusal set_recovery(Settings& settings, Text value) {
   return Refusal::none;
 }
 
+Refusal set_pack(Settings& settings, Text value) {
+  std::uint32_t number = 0;
+  if (!parse_number(value, number)) {
+    return is_whole_number(value) ? Refusal::range : Refusal::format;
+  }
+  if (number > 1) return Refusal::range;
+  settings.pack = number == 1;
+  return Refusal::none;
+}
+
 }  // namespace
 
 Refusal set(Settings& settings, Text key, Text value) {
@@ -50,6 +60,7 @@ Refusal set(Settings& settings, Text key, Text value) {
     if (setting.key == key) return set_number(settings, setting, value);
   }
   if (key == Text("recovery")) return set_recovery(settings, value);
+  if (key == Text("pack")) return set_pack(settings, value);
   return Refusal::unknown;
 }
 

@@ -8,8 +8,9 @@
 //     heartbeat  50-1000       500      ms between the board's heartbeats; below the timeout
 //     timeout    100-10000     1000     ms of silence until the safe state; above `heartbeat`
 //     recovery   last | rearm  last     outputs after SAFE(link)
+//     pack       0 | 1         0        1: on CAN the board sends the packed form
 //
-// Keys of later capabilities (packed form, network, key) are added to the table in settings.cpp.
+// Keys of later capabilities (network, key) are added to the table in settings.cpp.
 #pragma once
 
 #include <cstdint>
@@ -26,6 +27,7 @@ struct Settings {
   std::uint16_t heartbeat_ms = 500;
   std::uint16_t timeout_ms = 1000;
   Recovery recovery = Recovery::last;
+  bool pack = false;
 };
 
 // Changes one setting. Refusal::unknown for a key, ::format for a value that is not of the key's

@@ -12,7 +12,7 @@ bool same(const Setpoints& a, const Setpoints& b) {
          a.settings.state_rate_hz == b.settings.state_rate_hz &&
          a.settings.heartbeat_ms == b.settings.heartbeat_ms &&
          a.settings.timeout_ms == b.settings.timeout_ms &&
-         a.settings.recovery == b.settings.recovery;
+         a.settings.recovery == b.settings.recovery && a.settings.pack == b.settings.pack;
 }
 
 TEST(Executor, ChangesWhatTheCommandNamesAndNothingElse) {

@@ -18,6 +18,7 @@ TEST(Settings, DefaultsAreThePapers) {
   EXPECT_EQ(settings.heartbeat_ms, 500);
   EXPECT_EQ(settings.timeout_ms, 1000);
   EXPECT_EQ(settings.recovery, Recovery::last);
+  EXPECT_FALSE(settings.pack);
 }
 
 TEST(Settings, NumbersAreTakenToTheEdgesOfTheirRange) {
@@ -71,9 +72,24 @@ TEST(Settings, RecoveryIsOneOfTwoWords) {
   EXPECT_EQ(settings.recovery, Recovery::last);
 }
 
+TEST(Settings, PackIsSwitchedOnAndOff) {
+  Settings settings;
+  EXPECT_EQ(set_text(settings, "pack", "1"), Refusal::none);
+  EXPECT_TRUE(settings.pack);
+  for (const std::string value : {"2", "-1", "99999999999999999999"}) {
+    EXPECT_EQ(set_text(settings, "pack", value), Refusal::range) << value;
+  }
+  for (const std::string value : {"", "on", "1.0", "+1"}) {
+    EXPECT_EQ(set_text(settings, "pack", value), Refusal::format) << value;
+  }
+  EXPECT_TRUE(settings.pack);
+  EXPECT_EQ(set_text(settings, "pack", "0"), Refusal::none);
+  EXPECT_FALSE(settings.pack);
+}
+
 TEST(Settings, OtherKeysAreUnknown) {
   Settings settings;
-  for (const std::string key : {"", "Rate", "rates", "timeout "}) {
+  for (const std::string key : {"", "Rate", "rates", "timeout ", "PACK"}) {
     EXPECT_EQ(set_text(settings, key, "100"), Refusal::unknown) << key;
   }
 }

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What packing costs: the first state of the paper's capture. The floor in the same run is copying
+// the datagram.
+#include <benchmark/benchmark.h>
+
+#include <cstring>
+
+#include "tests/bench/allocations.hpp"
+#include "transports/framing/packed_form.hpp"
+
+namespace r4::bench {
+namespace {
+
+constexpr Text line(
+    "AIN24:24.28;AIN12:12.12;AIN5:5.12;AINDMH:12.11;DMHSTA:1;AINSTEER:1.03;DHB1A:4095,1;"
+    "OSMC1:400,1;STEP1POS:-100;SERVO1POS:2000;PNum:7434;T:79090;^0xf07cfd9a^");
+constexpr Text command("O:358,1,1;PNum:66;T:1699276044383;^0x7fefae81^");
+
+template <class Work>
+void measure(benchmark::State& bench, Text datagram, Work work) {
+  bench.counters["allocs"] = allocations_per_call(work);
+  for (auto _ : bench) {
+    work();
+    benchmark::ClobberMemory();
+  }
+  bench.SetBytesProcessed(bench.iterations() * static_cast<std::int64_t>(datagram.size()));
+}
+
+void pack_datagram(benchmark::State& bench, Text datagram) {
+  std::uint8_t bytes[max_datagram];
+  if (pack(datagram, bytes, sizeof bytes) == 0) bench.SkipWithError("travels plain");
+  measure(bench, datagram, [&] {
+    Text text = datagram;
+    benchmark::DoNotOptimize(text);
+    benchmark::DoNotOptimize(pack(text, bytes, sizeof bytes));
+  });
+}
+BENCHMARK_CAPTURE(pack_datagram, state, line);
+BENCHMARK_CAPTURE(pack_datagram, command, command);
+
+void unpack_datagram(benchmark::State& bench, Text datagram) {
+  std::uint8_t bytes[max_datagram];
+  char out[max_datagram];
+  std::size_t size = pack(datagram, bytes, sizeof bytes);
+  const UnpackResult result = unpack(bytes, size, out, sizeof out);
+  if (!result || Text(out, result.size) != datagram) bench.SkipWithError("not the datagram");
+  measure(bench, datagram, [&] {
+    benchmark::DoNotOptimize(size);
+    benchmark::DoNotOptimize(unpack(bytes, size, out, sizeof out));
+  });
+}
+BENCHMARK_CAPTURE(unpack_datagram, state, line);
+BENCHMARK_CAPTURE(unpack_datagram, command, command);
+
+// The floor: nothing is recoded without moving its bytes.
+void copy_datagram(benchmark::State& bench) {
+  char buffer[max_datagram];
+  measure(bench, line, [&] {
+    Text text = line;
+    benchmark::DoNotOptimize(text);
+    std::memcpy(buffer, text.data(), text.size());
+    benchmark::DoNotOptimize(buffer);
+  });
+}
+BENCHMARK(copy_datagram);
+
+}  // namespace
+}  // namespace r4::bench

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the first byte of a packed datagram says: which fields need no name, and how long PNum and T
+// are (docs/packed.md).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "packed_words.hpp"
+
+namespace r4 {
+namespace packed {
+
+// The fields in the order of the datagram; "more" is any number of fields with their names.
+enum class Layout : std::uint8_t {
+  plain_fields,     // more: PNum and T, if any, are among them
+  fields,           // more, PNum, T
+  state,            // the ten default fields of the state, more, PNum, T
+  state_safe_cmd,   // those ten, SAFE, CMD, more, PNum, T
+  full_state,       // all state fields, more, PNum, T
+  board_heartbeat,  // H:R4-ROS2, PNum, T, more
+  host_heartbeat,   // H:ROS2-R4, PNum, T, more
+  count
+};
+
+constexpr std::uint8_t version_bits = 0x80;  // of version 1
+constexpr std::uint8_t version_mask = 0xC0;
+
+constexpr unsigned default_fields = code_servo1pos + 1;
+
+// How many fields of a layout have no name.
+constexpr unsigned nameless_fields(Layout layout) {
+  return layout == Layout::state            ? default_fields
+         : layout == Layout::state_safe_cmd ? default_fields + 2
+         : layout == Layout::full_state     ? state_words
+                                            : 0;
+}
+
+// The code of the field at `index` below nameless_fields().
+constexpr unsigned nameless_code(Layout layout, unsigned index) {
+  return layout == Layout::state_safe_cmd && index >= default_fields
+             ? code_safe + (index - default_fields)
+             : index;
+}
+
+constexpr bool is_heartbeat(Layout layout) {
+  return layout == Layout::board_heartbeat || layout == Layout::host_heartbeat;
+}
+
+// How many digits PNum and T have, by the head's last three bits; a writer takes the first that is
+// enough.
+struct Sizes {
+  std::uint8_t pnum;
+  std::uint8_t time;
+};
+constexpr Sizes sizes[8] = {{0, 0}, {4, 5}, {4, 8}, {5, 8}, {6, 8}, {4, 11}, {8, 8}, {8, 11}};
+
+// --- digits with a meaning
+
+constexpr unsigned digit_escape = 0xF;  // in place of a value: it follows as text
+// Text: 0-9 are themselves.
+constexpr unsigned digit_point = 0xA;
+constexpr unsigned digit_minus = 0xB;
+constexpr unsigned digit_comma = 0xC;
+constexpr unsigned digit_end = 0xD;    // of the field
+constexpr unsigned digit_bytes = 0xE;  // how many (1-15), then as many bytes
+constexpr unsigned digit_word = 0xF;   // then a code of two digits
+// A name: a code of two digits, the first at most D; or E, how many bytes (1-14), those bytes.
+constexpr unsigned digit_name = 0xE;
+constexpr unsigned longest_name = 14;
+constexpr unsigned longest_bytes = 15;
+constexpr unsigned longest_count = 14;  // digits
+
+// Fixed forms: how many digits, and the largest value.
+constexpr unsigned flag_max = 0xE;
+constexpr unsigned short3_max = 0xEFF;
+constexpr unsigned drive_max = 0xEFFF;
+
+constexpr std::size_t checksum_size = 4;
+
+}  // namespace packed
+}  // namespace r4

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "packed_words.hpp"
+
+namespace r4 {
+namespace packed {
+namespace {
+
+using Form = PackedForm;
+
+}  // namespace
+
+// clang-format off
+constexpr PackedWord words[word_count] = {
+    // 00: state
+    {"AIN24", Form::hundredths}, {"AIN12", Form::hundredths}, {"AIN5", Form::hundredths},
+    {"AINDMH", Form::hundredths}, {"DMHSTA", Form::flag}, {"AINSTEER", Form::hundredths},
+    {"DHB1A", Form::drive}, {"OSMC1", Form::drive}, {"STEP1POS", Form::steps},
+    {"SERVO1POS", Form::short3},
+    // 0A
+    {"AIN6", Form::hundredths}, {"DHB1B", Form::drive}, {"DHB2A", Form::drive},
+    {"DHB2B", Form::drive}, {"OSMC2", Form::drive}, {"OSMC3", Form::drive}, {"OSMC4", Form::drive},
+    // 11
+    {"STEP2POS", Form::steps}, {"STEP3POS", Form::steps}, {"STEP4POS", Form::steps},
+    // 14
+    {"SERVO2POS", Form::short3}, {"SERVO3POS", Form::short3}, {"SERVO4POS", Form::short3},
+    {"SERVO5POS", Form::short3}, {"SERVO6POS", Form::short3}, {"SERVO7POS", Form::short3},
+    {"SERVO8POS", Form::short3}, {"SERVO9POS", Form::short3}, {"SERVO10POS", Form::short3},
+    {"SERVO11POS", Form::short3}, {"SERVO12POS", Form::short3}, {"SERVO13POS", Form::short3},
+    {"SERVO14POS", Form::short3}, {"SERVO15POS", Form::short3}, {"SERVO16POS", Form::short3},
+    // 23
+    {"ENC1", Form::steps}, {"ENC2", Form::steps}, {"ENC3", Form::steps}, {"ENC4", Form::steps},
+    {"US1", Form::count}, {"US2", Form::count}, {"US3", Form::count}, {"US4", Form::count},
+    {"BLDC1", Form::bldc}, {"BLDC2", Form::bldc}, {"BLDC3", Form::bldc}, {"BLDC4", Form::bldc},
+    {"RELAYS", Form::count},
+    // 30
+    {"SAFE", Form::flag}, {"CMD", Form::count},
+    {"RXOK", Form::count}, {"RXCRC", Form::count}, {"RXLOST", Form::count}, {"RXDUP", Form::count},
+    {"RXREF", Form::count}, {"LATE", Form::count},
+    // 38: the other names
+    {"PNum", Form::count}, {"T", Form::count},
+    {"H"}, {"O"}, {"D"}, {"S"}, {"R"}, {"E"}, {"P"}, {"Z"}, {"B"}, {"U"}, {"F"}, {"C"}, {"Q"},
+    {"N"}, {"I"}, {"A"}, {"AN"},
+    // 4B: words of values
+    {"R4-ROS2"}, {"ROS2-R4"}, {"On"}, {"Off"}, {"STOP"}, {"CLEAR"}, {"DEFAULT"}, {"ALL"}, {"ID"},
+    // 54
+    {"rate"}, {"heartbeat"}, {"timeout"}, {"recovery"}, {"pack"}, {"last"}, {"rearm"},
+    // 5B
+    {"UNKNOWN"}, {"FORMAT"}, {"RANGE"}, {"CHANNEL"}, {"STALE"}, {"DUPLICATE"}, {"BUSY"}, {"AUTH"},
+    // 63
+    {"R4"}, {"sim"}, {"udp"}, {"serial"}, {"pty"}, {"can"},
+};
+// clang-format on
+
+namespace {
+
+static_assert(words[code_servo1pos].word().size() == 9 && words[code_safe].text[0] == 'S' &&
+                  words[code_cmd].text[0] == 'C' && words[state_words].text[0] == 'P' &&
+                  words[code_r4_ros2].text[1] == '4' && words[code_ros2_r4].text[1] == 'O',
+              "the codes by name are those of the table");
+
+// Words by hash, made at compile time: open addressing, less than half full.
+constexpr unsigned slot_count = 256;
+constexpr std::uint8_t empty_slot = 0xFF;
+constexpr std::size_t longest_word = 10;  // "SERVO10POS"
+
+constexpr unsigned slot_of(Text word) {
+  std::uint32_t hash = 2166136261U;  // FNV-1a
+  for (const char c : word) hash = (hash ^ static_cast<unsigned char>(c)) * 16777619U;
+  return (hash ^ hash >> 16) % slot_count;
+}
+
+struct Index {
+  std::uint8_t code[slot_count] = {};
+  constexpr Index() {
+    for (std::uint8_t& slot : code) slot = empty_slot;
+    for (unsigned i = 0; i < word_count; ++i) {
+      unsigned slot = slot_of(words[i].word());
+      while (code[slot] != empty_slot) slot = (slot + 1) % slot_count;
+      code[slot] = static_cast<std::uint8_t>(i);
+    }
+  }
+};
+constexpr Index index;
+
+}  // namespace
+
+unsigned code_of(Text word) {
+  if (word.size() > longest_word) return no_word;
+  for (unsigned slot = slot_of(word);; slot = (slot + 1) % slot_count) {
+    const unsigned code = index.code[slot];
+    if (code == empty_slot) return no_word;
+    if (words[code].word() == word) return code;
+  }
+}
+
+}  // namespace packed
+}  // namespace r4
