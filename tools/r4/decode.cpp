@@ -17,8 +17,10 @@
 #include "options.hpp"
 #include "protocol/datagram.hpp"
 #include "protocol/message.hpp"
+#include "protocol/numbers.hpp"
 #include "subcommands.hpp"
 #include "transports/framing/line_framing.hpp"
+#include "transports/framing/packed_form.hpp"
 
 namespace r4::tool {
 namespace {
@@ -62,6 +64,31 @@ class Input {
   std::array<char, 65536> buffer_;
 };
 
+// A line packed:HEX, as r4 encode --packed writes it. No datagram looks so: it has a semicolon.
+constexpr std::string_view packed_prefix = "packed:";
+
+bool is_packed_line(Text line) {
+  const std::string_view text(line.data(), line.size());
+  return text.starts_with(packed_prefix) && text.find(';') == std::string_view::npos;
+}
+
+// The datagram at `out`; else why there is none: "hex", or the UnpackError by name.
+const char* unpack_line(Text line, std::array<char, max_datagram>& out, std::size_t& size,
+                        std::size_t& packed_size) {
+  const Text hex = line.substr(packed_prefix.size());
+  std::array<std::uint8_t, max_datagram> bytes;
+  if (hex.size() % 2 != 0) return "hex";
+  packed_size = hex.size() / 2;  // a line holds no more than max_datagram characters
+  for (std::size_t i = 0; i < packed_size; ++i) {
+    std::uint32_t byte = 0;
+    if (!parse_hex(hex.substr(2 * i, 2), byte)) return "hex";
+    bytes[i] = static_cast<std::uint8_t>(byte);
+  }
+  const UnpackResult result = unpack(bytes.data(), packed_size, out.data(), out.size());
+  size = result.size;
+  return to_text(result.error);
+}
+
 class Decoder {
  public:
   void push(std::string_view bytes) {
@@ -90,9 +117,32 @@ class Decoder {
 
  private:
   void report(Text line) {
+    if (!is_packed_line(line)) {
+      report_datagram(line, 0);
+      return;
+    }
+    std::array<char, max_datagram> datagram;
+    std::size_t size = 0;
+    std::size_t packed_size = 0;
+    const std::string_view reason = unpack_line(line, datagram, size, packed_size);
+    if (reason.empty()) {
+      report_datagram(Text(datagram.data(), size), packed_size);
+      return;
+    }
+    any_bad_ = true;
+    print(Json{{"line", line_},
+               {"ok", false},
+               {"error", "packed"},
+               {"reason", reason},
+               {"text", escaped({line.data(), line.size()})}});
+  }
+
+  // `packed_size`: how many bytes it had in the packed form; 0 if it is plain.
+  void report_datagram(Text line, std::size_t packed_size) {
     Datagram datagram;
     const ReadResult result = read(line, datagram);
     Json object{{"line", line_}, {"ok", static_cast<bool>(result)}};
+    if (packed_size != 0) object["packed"] = packed_size;
     if (result) {
       object["type"] = to_text(kind_of(datagram));
       object["pnum"] = datagram.has_pnum() ? Json(datagram.pnum()) : Json();
@@ -147,10 +197,15 @@ constexpr const char* footer = R"(One JSON object for each line of input that is
   fields        the other fields: numbers as numbers, several values as an array
   error         length, syntax or crc, with the position of the byte where it went wrong
   expected, found   for crc: the checksum of the bytes, and the one that they claim
+  packed        of a line packed:HEX (r4 encode --packed, docs/packed.md): its size in bytes;
+                the rest is about the datagram that it holds
+  error packed  it holds none; reason: hex (not pairs of hexadecimal digits), length, version
+                (of a later one: update r4) or syntax
   text          the datagram; bytes that are no printable ASCII, and \, as \xNN
 
 Examples:
   r4 encode O:358,1,1 | r4 decode
+  r4 encode O:358,1,1 --packed | r4 decode
   cut -f2 tests/data/paper_capture.tsv | r4 decode
 
 Exit codes: 0 every datagram is valid; 1 at least one is not; 4, 5 the file cannot be read.)";

@@ -14,6 +14,7 @@
 #include "protocol/datagram_writer.hpp"
 #include "protocol/message.hpp"
 #include "subcommands.hpp"
+#include "transports/framing/packed_form.hpp"
 
 namespace r4::tool {
 namespace {
@@ -23,6 +24,7 @@ struct Options {
   std::uint64_t pnum = 0;
   std::optional<std::uint64_t> time;
   bool force = false;
+  bool packed = false;
 };
 
 [[noreturn]] void fail(std::string_view thing, std::string reason, std::string fix) {
@@ -105,7 +107,13 @@ int encode(const Options& options) {
          "put fewer fields into it");
   }
   if (!options.force) check(datagram);
-  fmt::print("{}\n", std::string_view(bytes.data(), bytes.size()));
+  std::array<std::uint8_t, max_datagram> packed;
+  const std::size_t size = options.packed ? pack(bytes, packed.data(), packed.size()) : 0;
+  if (size != 0) {
+    fmt::print("packed:{:02x}\n", fmt::join(packed.data(), packed.data() + size, ""));
+  } else {
+    fmt::print("{}\n", std::string_view(bytes.data(), bytes.size()));
+  }
   return 0;
 }
 
@@ -115,6 +123,12 @@ constexpr const char* footer = R"(Examples:
   r4 encode H:ROS2-R4         a host's heartbeat
   r4 encode 'AIN24:24.28;AIN12:12.15'
                               a board's state, of any fields
+
+  r4 encode O:358,1,1 --pnum 66 --time 1699276044383 --packed
+                              packed:8d004218ba4beb85f3b358c1c1df7fefae81
+
+--packed is the form for a CAN bus (docs/packed.md), in hexadecimal; a datagram that would not
+get shorter is printed plain, as it would travel. r4 decode reads both.
 
 Commands of the board (r4 send --help) are checked before they are encoded.
 
@@ -134,6 +148,7 @@ void add_encode(CLI::App& root, Action& chosen) {
   add_number(*command, "--pnum", options->pnum, 0, 0xFFFFFFFFU, "packet number (default 0)");
   add_number(*command, "--time", options->time, 0, ~std::uint64_t{0},
              "T in milliseconds (default: now, since 1970)");
+  command->add_flag("--packed", options->packed, "in the packed form of a CAN bus, as packed:HEX");
   command->add_flag("--force", options->force, "do not check commands and their ranges");
 }
 
