@@ -123,7 +123,6 @@ constexpr const char* footer = R"(Examples:
   r4 encode H:ROS2-R4         a host's heartbeat
   r4 encode 'AIN24:24.28;AIN12:12.15'
                               a board's state, of any fields
-
   r4 encode O:358,1,1 --pnum 66 --time 1699276044383 --packed
                               packed:8d004218ba4beb85f3b358c1c1df7fefae81
 

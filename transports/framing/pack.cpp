@@ -321,11 +321,7 @@ bool take_checksum(Text datagram, Text& fields, std::uint32_t& checksum) {
   return true;
 }
 
-}  // namespace
-}  // namespace packed
-
-std::size_t pack(Text datagram, std::uint8_t* out, std::size_t capacity) {
-  using namespace packed;
+std::size_t write_packed(Text datagram, std::uint8_t* out, std::size_t capacity) {
   Text text;
   std::uint32_t checksum = 0;
   std::uint64_t ends[max_datagram / separators_block];
@@ -365,6 +361,13 @@ std::size_t pack(Text datagram, std::uint8_t* out, std::size_t capacity) {
     *at++ = static_cast<std::uint8_t>(checksum >> shift);
   }
   return static_cast<std::size_t>(at - out);
+}
+
+}  // namespace
+}  // namespace packed
+
+std::size_t pack(Text datagram, std::uint8_t* out, std::size_t capacity) {
+  return packed::write_packed(datagram, out, capacity);
 }
 
 }  // namespace r4

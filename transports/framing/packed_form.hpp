@@ -21,7 +21,7 @@
 // Several bits, too, are no rule: a frame's own CRC-15 is what guards the bits on the bus, and what
 // passes it is a lost or foreign frame. What unpacks is always of the grammar.
 //
-// No heap; 300 bytes of stack; linear in the size.
+// No heap; about 600 bytes of stack; linear in the size.
 #pragma once
 
 #include <cstddef>

@@ -28,6 +28,7 @@ struct PackedWord {
   PackedForm form;
 
   template <std::size_t N>
+  // NOLINTNEXTLINE(google-explicit-constructor): the table is a list of words
   constexpr PackedWord(const char (&word)[N], PackedForm values = PackedForm::text)
       : size(N - 1), form(values) {
     static_assert(N > 1 && N < sizeof text, "a word has 1 to 12 characters");

@@ -272,25 +272,8 @@ UnpackResult failed(UnpackError error) {
   return result;
 }
 
-}  // namespace
-}  // namespace packed
-
-const char* to_text(UnpackError error) {
-  switch (error) {
-    case UnpackError::none:
-      return "";
-    case UnpackError::length:
-      return "length";
-    case UnpackError::version:
-      return "version";
-    case UnpackError::syntax:
-      return "syntax";
-  }
-  return "unknown";
-}
-
-UnpackResult unpack(const std::uint8_t* bytes, std::size_t size, char* out, std::size_t capacity) {
-  using namespace packed;
+UnpackResult read_packed(const std::uint8_t* bytes, std::size_t size, char* out,
+                         std::size_t capacity) {
   if (size == 0 || size > max_datagram) return failed(UnpackError::length);
   const unsigned head = bytes[0];
   const auto layout = static_cast<Layout>(head >> 3 & 7U);
@@ -313,6 +296,27 @@ UnpackResult unpack(const std::uint8_t* bytes, std::size_t size, char* out, std:
   UnpackResult result;
   result.size = characters.size();
   return result;
+}
+
+}  // namespace
+}  // namespace packed
+
+const char* to_text(UnpackError error) {
+  switch (error) {
+    case UnpackError::none:
+      return "";
+    case UnpackError::length:
+      return "length";
+    case UnpackError::version:
+      return "version";
+    case UnpackError::syntax:
+      return "syntax";
+  }
+  return "unknown";
+}
+
+UnpackResult unpack(const std::uint8_t* bytes, std::size_t size, char* out, std::size_t capacity) {
+  return packed::read_packed(bytes, size, out, capacity);
 }
 
 }  // namespace r4
