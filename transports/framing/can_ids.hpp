@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Who says what on the bus: the plan of 11-bit ids (docs/can.md). Lower wins.
+//
+//     0x010    emergency stop from a host   one raw frame, any content, obeyed by every board
+//     0x020+n  board n went safe            one raw frame: the reason
+//     0x180+n  host to board n              ISO-TP; the board's flow control on 0x200+n
+//     0x200+n  board n's replies            ISO-TP; the host's flow control on 0x180+n
+//     0x400+n  board n's telemetry          ISO-TP without flow control: any number may listen
+//
+// n, the node, is 0–31. Whatever else is on the bus is `other` and none of ours.
+#pragma once
+
+#include <cstdint>
+
+#include "can_frame.hpp"
+
+namespace r4 {
+
+constexpr std::uint32_t can_nodes = 32;
+
+// `node` must be below can_nodes: what is above is cut off.
+constexpr std::uint32_t emergency_stop_id = 0x010;
+constexpr std::uint32_t went_safe_id(std::uint32_t node) { return 0x020 | (node % can_nodes); }
+constexpr std::uint32_t command_id(std::uint32_t node) { return 0x180 | (node % can_nodes); }
+constexpr std::uint32_t reply_id(std::uint32_t node) { return 0x200 | (node % can_nodes); }
+constexpr std::uint32_t telemetry_id(std::uint32_t node) { return 0x400 | (node % can_nodes); }
+
+enum class CanIdKind : std::uint8_t { other, emergency_stop, went_safe, command, reply, telemetry };
+
+struct CanIdMeaning {
+  CanIdKind kind = CanIdKind::other;
+  std::uint8_t node = 0;  // 0 where the kind has none
+};
+
+// What an 11-bit id means: the inverse of the functions above.
+constexpr CanIdMeaning classify(std::uint32_t id) {
+  CanIdMeaning meaning;
+  const std::uint32_t node = id % can_nodes;
+  if (id == emergency_stop_id) {
+    meaning.kind = CanIdKind::emergency_stop;
+  } else if (id == went_safe_id(node)) {
+    meaning.kind = CanIdKind::went_safe;
+  } else if (id == command_id(node)) {
+    meaning.kind = CanIdKind::command;
+  } else if (id == reply_id(node)) {
+    meaning.kind = CanIdKind::reply;
+  } else if (id == telemetry_id(node)) {
+    meaning.kind = CanIdKind::telemetry;
+  }
+  if (meaning.kind != CanIdKind::other && meaning.kind != CanIdKind::emergency_stop) {
+    meaning.node = static_cast<std::uint8_t>(node);
+  }
+  return meaning;
+}
+
+// The same for a frame: one with a 29-bit id, or a remote request, is none of ours.
+constexpr CanIdMeaning classify(const CanFrame& frame) {
+  return frame.extended || frame.remote ? CanIdMeaning() : classify(frame.id);
+}
+
+}  // namespace r4
