@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What ISO-TP costs: a datagram of 170 bytes cut into 25 classic frames and joined again, in
+// memory. The floor in the same run is copying its bytes into and out of the same frames.
+#include <benchmark/benchmark.h>
+
+#include <cstdlib>
+#include <cstring>
+
+#include "tests/bench/allocations.hpp"
+#include "transports/framing/isotp_receiver.hpp"
+#include "transports/framing/isotp_sender.hpp"
+
+namespace r4::bench {
+namespace {
+
+constexpr std::uint32_t datagram_size = 170;
+constexpr std::size_t frame_count = 25;
+
+struct Ends {
+  static IsotpSenderOptions sender_options() {
+    IsotpSenderOptions options;
+    options.channel.id = 0x400;
+    options.flow_control = false;
+    return options;
+  }
+  static IsotpReceiverOptions receiver_options() {
+    IsotpReceiverOptions options;
+    options.channel.id = 0x400;
+    options.listen_only = true;
+    return options;
+  }
+
+  Ends() { std::memset(datagram, 'x', sizeof datagram); }
+
+  // Into `frames`.
+  void cut() {
+    benchmark::DoNotOptimize(datagram);
+    std::size_t count = 0;
+    sender.begin(datagram, sizeof datagram, 0);
+    while (sender.offer(0, frames[count])) {
+      sender.frame_sent(0);
+      ++count;
+    }
+    if (count != frame_count) std::abort();
+  }
+  void join() {
+    bool complete = false;
+    for (const CanFrame& frame : frames) complete |= receiver.on_frame(frame, 0).datagram;
+    if (!complete) std::abort();
+    benchmark::DoNotOptimize(receiver.data());
+  }
+
+  char datagram[datagram_size];
+  char buffer[1024];
+  CanFrame frames[frame_count + 1] = {};
+  IsotpSender sender{sender_options()};
+  IsotpReceiver receiver{receiver_options(), buffer, sizeof buffer};
+};
+
+template <class Work>
+void measure(benchmark::State& bench, Work work) {
+  bench.counters["allocs"] = allocations_per_call(work);
+  for (auto _ : bench) {
+    work();
+    benchmark::ClobberMemory();
+  }
+  bench.SetBytesProcessed(bench.iterations() * datagram_size);
+}
+
+void isotp_cut(benchmark::State& bench) {
+  Ends ends;
+  measure(bench, [&] { ends.cut(); });
+}
+BENCHMARK(isotp_cut);
+
+void isotp_join(benchmark::State& bench) {
+  Ends ends;
+  ends.cut();
+  measure(bench, [&] { ends.join(); });
+}
+BENCHMARK(isotp_join);
+
+void isotp_cut_and_join(benchmark::State& bench) {
+  Ends ends;
+  measure(bench, [&] {
+    ends.cut();
+    ends.join();
+  });
+}
+BENCHMARK(isotp_cut_and_join);
+
+// The floor.
+void isotp_copy(benchmark::State& bench) {
+  Ends ends;
+  measure(bench, [&] {
+    benchmark::DoNotOptimize(ends.datagram);
+    for (std::size_t i = 0; i < frame_count - 1; ++i) {
+      std::memcpy(ends.frames[i].data + 1, ends.datagram + i * 7, 7);
+    }
+    benchmark::ClobberMemory();
+    for (std::size_t i = 0; i < frame_count - 1; ++i) {
+      std::memcpy(ends.buffer + i * 7, ends.frames[i].data + 1, 7);
+    }
+  });
+}
+BENCHMARK(isotp_copy);
+
+}  // namespace
+}  // namespace r4::bench
