@@ -76,6 +76,7 @@ def prepare(cache, ready):
                       f'rm {package}, then run this again') from error
     (making / 'vmlinux').write_bytes(elf_inside(package, image))
     (making / 'initrd').write_bytes(initial_ram_disk(modules))
+    making.chmod(0o755)
     making.rename(ready)
     if package.parent == cache:
         package.unlink()

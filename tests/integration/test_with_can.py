@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""tools/with-can: a command in its guest is as one that runs here, and the guest leaves nothing."""
+import os
+import pathlib
+import pty
+import random
+import shutil
+import signal
+import subprocess
+import termios
+import time
+
+import pytest
+
+TOOLS = pathlib.Path(__file__).resolve().parents[2] / 'tools'
+WITH_CAN = [str(TOOLS / 'with-can'), '--guest']
+PATIENCE_S = 60
+ERROR = 'tools/with-can: '
+
+
+def run(*command, **options):
+    options = {'capture_output': True, 'stdin': subprocess.DEVNULL, **options}
+    if 'input' in options:
+        del options['stdin']
+    return subprocess.run([*WITH_CAN, *command], timeout=PATIENCE_S, check=False, **options)
+
+
+def script(code):
+    return ['/usr/bin/python3', '-S', '-c', code]
+
+
+def children(pid):
+    with open(f'/proc/{pid}/task/{pid}/children', encoding='ascii') as file:
+        return [int(each) for each in file.read().split()]
+
+
+def await_end(pid):
+    deadline = time.monotonic() + 10
+    while os.path.exists(f'/proc/{pid}') and time.monotonic() < deadline:
+        with open(f'/proc/{pid}/stat', encoding='ascii') as stat:
+            if ') Z ' in stat.read():
+                return True
+        time.sleep(0.01)
+    return not os.path.exists(f'/proc/{pid}')
+
+
+@pytest.fixture(scope='module', autouse=True)
+def kernel():
+    """The first run ever downloads the kernel."""
+    before = time.monotonic()
+    subprocess.run([*WITH_CAN, 'true'], check=True, timeout=300)
+    if time.monotonic() - before > 6:
+        before = time.monotonic()
+        subprocess.run([*WITH_CAN, 'true'], check=True, timeout=300)
+    print(f'boot to exit: {time.monotonic() - before:.1f} s')
+
+
+def test_bytes_pass_unchanged_in_all_three_streams_and_the_exit_status_with_them():
+    content = bytes(range(256)) * 64 + random.Random(1).randbytes(4_000_000)
+    result = run('sh', '-c', r"printf 'a\r\n\000b\nc' >&2; cat; exit 255", input=content)
+    assert result.returncode == 255
+    assert result.stdout == content
+    assert result.stderr == b'a\r\n\0b\nc'
+
+
+def test_a_command_that_a_signal_ends_has_128_and_its_number_as_its_status():
+    assert run('sh', '-c', 'kill -SEGV $$').returncode == 128 + signal.SIGSEGV
+
+
+def test_directory_environment_and_arguments_are_those_of_the_caller(tmp_path):
+    result = run(*script('import os, sys; print(os.getcwdb(), os.environ["ODD"], sys.argv[1:]);'
+                         'open("made", "w").write("x" * 3_000_000); sys.exit(7)'),
+                 '', "a 'b' $c\n", cwd=tmp_path, env={**os.environ, 'ODD': "x'\n$y"})
+    assert result.stderr == b'' and result.returncode == 7
+    assert result.stdout.decode() == \
+        f'''{os.fsencode(tmp_path)} x'\n$y ['', "a 'b' $c\\n"]\n'''
+    assert (tmp_path / 'made').read_text() == 'x' * 3_000_000
+
+
+def test_what_tests_need_is_there():
+    result = run(*script('''
+import mmap, os, pty, socket, tempfile
+os.chdir(tempfile.mkdtemp())
+os.mkfifo('fifo')
+listener = socket.socket(socket.AF_UNIX)
+listener.bind('socket')
+os.ttyname(pty.openpty()[1])
+open('/dev/shm/r4', 'w').write('x')
+with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
+    one.bind(('127.0.0.1', 0))
+    one.sendto(b'x', one.getsockname())
+    assert one.recv(9) == b'x'
+print(os.environ['R4_CAN_GUEST'])
+'''))
+    assert (result.stdout, result.stderr, result.returncode) == (b'1\n', b'', 0)
+
+
+def test_a_frame_passes_on_every_bus_and_inside_the_guest_the_interfaces_come_and_go():
+    result = run('sh', '-c', r'''
+for pair in "vcan0 vcan0" "vxcan0 vxcan1" "vxcan1 vxcan0" "can0 can1" "can1 can0"; do
+  set -- $pair
+  candump -T 5000 -n 1 $2 &
+  until grep -q $2 /proc/net/can/rcvlist_all; do sleep 0.01; done
+  cansend $1 123#DEADBEEF
+  wait
+done
+candump -T 5000 -n 1 vcan0 &
+until grep -q vcan0 /proc/net/can/rcvlist_all; do sleep 0.01; done
+cansend vcan0 123##1000102030405060708090A0B0C0D0E0F
+wait
+[ "$(id -u)" = 0 ] || exit 0
+ip link del vcan0 && ip link del vxcan0
+"$1" sh -c 'cat /sys/class/net/vcan0/mtu /sys/class/net/vxcan1/tx_queue_len; exit 9' here
+echo $?
+ls /sys/class/net
+'''.replace('"$1" sh', f'{TOOLS}/with-can sh'))
+    lines = [line.split() for line in result.stdout.decode().splitlines()]
+    assert [line[0] for line in lines[:6]] == ['vcan0', 'vxcan1', 'vxcan0', 'can1', 'can0', 'vcan0']
+    assert all(line[1:] == ['123', '[4]', 'DE', 'AD', 'BE', 'EF'] for line in lines[:5])
+    assert lines[5][1:4] == ['123', '[16]', '00']
+    if os.geteuid() == 0:
+        assert lines[6:] == [['72'], ['1000'], ['9'], ['can0'], ['can1'], ['lo']]
+
+
+def test_ctrl_c_ends_the_command_and_a_killed_wrapper_leaves_no_guest():
+    for ending, expected in ((signal.SIGINT, 128 + signal.SIGINT), (signal.SIGKILL, -signal.SIGKILL)):
+        with subprocess.Popen([*WITH_CAN, 'sh', '-c', 'echo begun; exec sleep 60'],
+                              stdin=subprocess.DEVNULL, stdout=subprocess.PIPE) as process:
+            assert process.stdout.readline() == b'begun\n'
+            qemus = children(process.pid)
+            assert len(qemus) == 1
+            process.send_signal(ending)
+            assert process.wait(timeout=PATIENCE_S) == expected
+            assert await_end(qemus[0])
+
+
+def test_a_terminal_is_a_terminal_inside():
+    process, terminal = pty.fork()
+    if process == 0:
+        os.execv(WITH_CAN[0], [*WITH_CAN, 'sh', '-c', 'tty; stty size; sleep 60'])
+    termios.tcsetwinsize(terminal, (33, 99))
+    seen = b''
+    while b'33 99' not in seen:
+        seen += os.read(terminal, 4096)
+    assert b'/dev/hvc0\r\n' in seen
+    os.write(terminal, b'\x03')
+    assert os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]) == 128 + signal.SIGINT
+    os.close(terminal)
+
+
+def test_an_ordinary_user_has_it_too_with_his_own_ids(tmp_path_factory):
+    if os.geteuid() != 0:
+        result = run('sh', '-c', 'id -u; ip link set can0 down')
+        assert (result.stdout, result.stderr) == (b'%d\n' % os.geteuid(), b'')
+        return
+    folder = tmp_path_factory.mktemp('user')
+    for each in (folder, folder.parent, folder.parent.parent):
+        os.chmod(each, 0o755)
+    cache = os.environ.get('XDG_CACHE_HOME') or os.path.expanduser('~/.cache')
+    shutil.copytree(f'{cache}/r4link/with-can', folder / 'r4link' / 'with-can')
+    shutil.copy(TOOLS / 'with-can', folder)
+    shutil.copytree(TOOLS / 'with_can', folder / 'with_can')
+    result = subprocess.run(
+        ['runuser', '-u', 'nobody', '--', 'env', f'XDG_CACHE_HOME={folder}', folder / 'with-can',
+         '--guest', 'sh', '-c', 'id -un; ip link set can0 down && echo down; cat /etc/shadow'],
+        capture_output=True, timeout=PATIENCE_S, check=False, cwd='/', stdin=subprocess.DEVNULL)
+    assert result.stdout == b'nobody\ndown\n'
+    assert b'Permission denied' in result.stderr and result.returncode == 1
+
+
+def test_the_time_limit_ends_what_does_not_end():
+    result = run('--time', '0.5', 'sleep', '60')
+    assert result.returncode == 124 and b'0.5 s' in result.stderr
+
+
+@pytest.mark.parametrize('arguments, environment, code, words', [
+    (['no-such-command'], {}, 127, 'no such command'),
+    ([], {}, 2, '--help'),
+    (['--usb-serial', '/no/such/tty', 'true'], {}, 6, 'r4 sim pty:PATH'),
+    (['/bin/true'], {'PATH': '/nowhere'}, 6, 'tools/setup --can'),
+    (['true'], {'XDG_CACHE_HOME': '/dev/null'}, 6, 'XDG_CACHE_HOME'),
+    (['true'], {'XDG_CACHE_HOME': '{tmp}', 'R4_CAN_KERNEL': '/no/such.deb'}, 6, 'R4_CAN_KERNEL'),
+    (['true'], {'XDG_CACHE_HOME': '{tmp}', 'PATH': '{bin}'}, 6, 'apt-get update'),
+])
+def test_what_is_missing_is_told_with_the_fix(tmp_path, arguments, environment, code, words):
+    # A Debian whose package lists are empty.
+    programs = tmp_path / 'bin'
+    programs.mkdir()
+    for name in ('qemu-system-x86_64', 'ip', 'apt-get', 'dpkg-deb', 'apt-cache', 'true'):
+        (programs / name).symlink_to('/bin/true')
+    values = {key: value.format(tmp=tmp_path, bin=programs) for key, value in environment.items()}
+    result = run(*arguments, env={**os.environ, **values}, text=True)
+    assert result.returncode == code
+    assert result.stderr.startswith(ERROR) and '\n  fix: ' in result.stderr
+    assert words in result.stderr and result.stdout == ''
+
+
+def test_a_kernel_that_panics_is_told(tmp_path):
+    cache = os.environ.get('XDG_CACHE_HOME') or os.path.expanduser('~/.cache')
+    shutil.copytree(f'{cache}/r4link', tmp_path / 'r4link', copy_function=os.symlink)
+    initrd = next(tmp_path.glob('r4link/with-can/kernel-*/initrd'))
+    initrd.unlink()
+    initrd.write_bytes(b'')
+    result = run('true', env={**os.environ, 'XDG_CACHE_HOME': str(tmp_path)}, text=True)
+    assert result.returncode == 6 and 'Kernel panic' in result.stderr and 'fix: ' in result.stderr
