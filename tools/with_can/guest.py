@@ -30,6 +30,7 @@ from trouble import Trouble
 
 QEMU = 'qemu-system-x86_64'
 BOOT_S = 60
+PLUG_AGAIN_S = 0.02
 KILL_AFTER_S = 2  # after the time limit's SIGTERM
 TIME_LIMIT_EXIT = 124  # as timeout(1)
 KERNEL_ARGUMENTS = ('console=ttyS0 quiet panic=-1 mitigations=off no_timer_check tsc=reliable '
@@ -187,6 +188,7 @@ class Guest:
         self._kernel = prepared()
         self._limit = limit
         self._limit_passed = False
+        self._plugging = False
         self._deadline = None
         self._verbose = verbose
         self._qemu = None
@@ -342,11 +344,23 @@ class Guest:
         elif line == 'usb unplug':
             self._say_to_qemu({'execute': 'device_del', 'arguments': {'id': USB_DEVICE['id']}})
         elif line == 'usb plug':
-            self._say_to_qemu({'execute': 'device_add', 'arguments': USB_DEVICE})
+            self._plugging = True
+            self._plug()
+
+    def _plug(self):
+        try:
+            self._say_to_qemu({'execute': 'device_add', 'arguments': USB_DEVICE, 'id': 'plug'})
+        except OSError:
+            pass  # it has ended
 
     def _on_qmp(self, line):
         answer = json.loads(line)
-        if 'error' in answer:
+        if 'error' not in answer:
+            self._plugging = self._plugging and answer.get('id') != 'plug'
+        elif self._plugging and 'in use' in answer['error']['desc']:
+            # QEMU is not done with the device that was unplugged.
+            threading.Timer(PLUG_AGAIN_S, self._plug).start()
+        else:
             self._say(f"USB: {answer['error']['desc']}")
 
     def _on_log(self):

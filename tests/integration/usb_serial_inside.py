@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What test_usb_serial.py runs inside the guest; fails by an exception.
+
+The USB serial port is real to everything here: the kernel's driver, sysfs, libserialport.
+"""
+import os
+import queue
+import socket
+import subprocess
+import threading
+import time
+
+from r4_process import is_link, is_state, monitor, run
+
+NETLINK_KOBJECT_UEVENT = 15
+PORT = '/dev/ttyUSB0'
+DOWN_WITHIN_S = 0.05
+BACK_WITHIN_S = 3
+
+
+def kernel_reports():
+    """A queue of (time, action) of the port, as the kernel tells of it."""
+    reports = queue.Queue()
+    events = socket.socket(socket.AF_NETLINK, socket.SOCK_DGRAM, NETLINK_KOBJECT_UEVENT)
+    events.bind((0, 1))
+
+    def read():
+        while True:
+            event = events.recv(65536)
+            now = time.monotonic()
+            if b'\0DEVNAME=ttyUSB0\0' in event + b'\0':
+                reports.put((now, event.split(b'@')[0].decode()))
+    threading.Thread(target=read, daemon=True).start()
+    return reports
+
+
+def is_down(each):
+    return each['type'] == 'link' and not each['fields']['up']
+
+
+def listed():
+    result = run('list')
+    line = next(line for line in result.stdout.splitlines() if PORT in line)
+    assert line.split()[:3] == [PORT, '0403:6001', 'R4-0001'], line
+    print(line.strip())
+
+
+def streams_at_the_boards_rate():
+    with monitor(f'serial://{PORT}') as host:
+        first = host.next(is_state)
+        rate = subprocess.run(['stty', '-F', PORT, 'speed'], capture_output=True, text=True,
+                              check=False)
+        # To all but root the port is r4's alone.
+        assert rate.stdout == '1000000\n' if os.geteuid() == 0 else 'busy' in rate.stderr, rate
+        states = [host.next(is_state) for _ in range(200)]
+        taken = states[-1]['came'] - first['came']
+        assert host.end() == 0
+    print(f'{200 / taken:.1f} states a second at 1000000 baud')
+    assert 90 < 200 / taken < 110
+
+
+def unplugged_and_plugged_in_again(url, times):
+    reports = kernel_reports()
+    with monitor(url) as host:
+        host.next(is_link('active'))
+        for _ in range(times):
+            host.next(is_state)
+            subprocess.run(['r4-usb', 'unplug'], check=True)
+            removed = reports.get(timeout=5)
+            assert removed[1] == 'remove'
+            down = host.next(is_down)
+            delay = down['came'] - removed[0]
+            assert delay < DOWN_WITHIN_S, delay
+            subprocess.run(['r4-usb', 'plug'], check=True)
+            added = reports.get(timeout=5)
+            assert added[1] == 'add'
+            active = host.next(is_link('active'))
+            state = host.next(is_state)
+            print(f"down {delay * 1000:.1f} ms after the kernel's report, "
+                  f"in control again {(active['came'] - added[0]) * 1000:.0f} ms after it")
+            assert state['came'] - added[0] < BACK_WITHIN_S
+        assert host.end() == 0, host.errors
+
+
+listed()
+streams_at_the_boards_rate()
+unplugged_and_plugged_in_again('serial:?sn=R4-0001', times=3)
+unplugged_and_plugged_in_again(f'serial://{PORT}', times=1)
