@@ -101,8 +101,7 @@ def fetched(cache):
                       'sudo apt-get update; on another system than Debian set R4_CAN_KERNEL to the '
                       'path of a Debian linux-image-*-amd64 package')
     print(f'with-can: downloading {names[0]} (70 MB, once)', file=sys.stderr)
-    # Into its folder of that name a broken download is resumed.
-    done = subprocess.run(['apt-get', '-q', 'download', names[0]], cwd=cache, check=False,
+    done = subprocess.run(['apt-get', '-q', '-o', 'Acquire::Retries=3', 'download', names[0]], cwd=cache, check=False,
                           stdin=subprocess.DEVNULL, capture_output=True, text=True,
                           errors='replace')
     found = sorted(glob.glob(f'{cache}/{names[0]}_*.deb'), key=os.path.getmtime)
