@@ -462,9 +462,17 @@ TEST(Board, ClosesInACallback) {
 TEST(Board, IsDestroyedInACallback) {
   auto board = std::make_unique<Board>("sim:");
   std::promise<void> destroyed;
+  // Goes with the board's thread, which must end too.
+  struct AtThreadExit {
+    std::promise<void>* promise = nullptr;
+    ~AtThreadExit() {
+      if (promise != nullptr) promise->set_value();
+    }
+  };
   board->on_state([&](const State&) {
+    thread_local AtThreadExit end;
+    end.promise = &destroyed;
     board.reset();
-    destroyed.set_value_at_thread_exit();  // also the board's thread ends
   });
   ASSERT_EQ(destroyed.get_future().wait_for(5s), std::future_status::ready);
 }
