@@ -69,12 +69,7 @@ std::size_t classic_bits(const CanFrame& frame) {
                                     : "0" + binary<11>(frame.id) + request + "00";
   bits += binary<4>(frame.size);
   if (!frame.remote) bits += data_of(frame);
-  return stuffed(bits + crc15(bits)).size() + std::string(
-                                                  "1"
-                                                  "01"
-                                                  "1111111"
-                                                  "111")
-                                                  .size();
+  return stuffed(bits + crc15(bits)).size() + tail.size();
 }
 
 // The whole FD frame, of which the CRC field is as long whatever it holds.

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A CAN bus in virtual time: every frame takes the time of its bits, and the bus decides who is next.
+//
+//     CanBusModel bus({.rate = {1000000, 0}, .seed = 7});
+//     const int board = bus.add_node({.sent = …, .received = …});
+//     bus.send(board, frame);                 // false: no room, try again when one was sent
+//     bus.at(2'000'000, [&] { … });           // an event of the test's own
+//     bus.run_until(1'000'000'000);
+//     bus.load();                             // busy time / time
+//
+// What it keeps to (ISO 11898-1:2015): arbitration by id among those that wait when the bus becomes
+// idle (10.4.2.2), the bits of each frame (can_bits.hpp), error frames and retransmission (10.4.4),
+// error counters, error-passive with its 8 bits of suspended transmission, bus-off and the return
+// after 128 times 11 recessive bits (12.1.4). What it leaves out: errors of bits within a frame
+// (every error is one of the CRC or of the acknowledgement, seen by all), overload frames, clocks
+// that differ, the propagation delay.
+//
+// Times are nanoseconds from 0. Same options and same calls: the same run.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <vector>
+
+#include "tests/simulation/random.hpp"
+#include "transports/framing/can_bits.hpp"
+
+namespace r4::test {
+
+struct CanBusOptions {
+  CanBitRate rate{1000000, 0};
+  std::uint64_t seed = 1;
+  double corrupted = 0;  // probability that all see a frame damaged: it is sent again
+  double missed = 0;     // probability that one receiver loses a good frame, of which nobody knows
+};
+
+enum class CanQueue : std::uint8_t {
+  mailboxes,  // of the frames that wait the lowest id is next
+  fifo,       // the oldest is next, whatever waits behind it
+};
+enum class CanNodeState : std::uint8_t { active, passive, bus_off };
+
+struct CanNodeOptions {
+  CanQueue queue = CanQueue::mailboxes;
+  std::size_t room = 3;    // frames that can wait
+  bool silent = false;     // listens only: acknowledges nothing, counts no errors
+  bool comes_back = true;  // returns from bus-off by itself
+  // A frame of its own is out (called before the others receive it); one of another node came in;
+  // its state has changed. At the end of the frame, its intermission not yet begun.
+  std::function<void(const CanFrame&)> sent = {};
+  std::function<void(const CanFrame&)> received = {};
+  std::function<void(CanNodeState)> changed = {};
+};
+
+struct CanIdTraffic {
+  std::uint64_t frames = 0;          // that arrived
+  std::uint64_t failed = 0;          // attempts that ended in an error frame
+  std::uint64_t busy_ns = 0;         // of both
+  std::uint64_t latency_ns = 0;      // sum over the frames, from send() to the end of the frame
+  std::uint64_t max_latency_ns = 0;  //
+};
+
+class CanBusModel {
+ public:
+  explicit CanBusModel(const CanBusOptions& options) : options_(options), random_(options.seed) {}
+
+  int add_node(CanNodeOptions options);
+  // Queues a frame; false: no room. Frames stay queued through bus-off.
+  bool send(int node, const CanFrame& frame);
+  // The next `count` frames are seen damaged by all.
+  void corrupt_next(unsigned count) { corrupt_next_ = count; }
+  // Runs `action` then; those of one time in the order of the calls, and before what the bus does.
+  void at(std::uint64_t time_ns, std::function<void()> action) {
+    actions_.emplace(time_ns < now_ns_ ? now_ns_ : time_ns, std::move(action));
+  }
+  // Runs all that happens up to and with that time.
+  void run_until(std::uint64_t time_ns);
+
+  std::uint64_t now_ns() const { return now_ns_; }
+  std::uint32_t now_us() const { return static_cast<std::uint32_t>(now_ns_ / 1000); }  // wraps
+  std::uint64_t busy_ns() const { return busy_ns_; }
+  double load() const {
+    return now_ns_ == 0 ? 0 : static_cast<double>(busy_ns_) / static_cast<double>(now_ns_);
+  }
+  const std::map<std::uint32_t, CanIdTraffic>& traffic() const { return traffic_; }
+  std::size_t waiting(int node) const { return at_node(node).queue.size(); }
+  CanNodeState state(int node) const { return at_node(node).state; }
+  unsigned transmit_errors(int node) const { return at_node(node).transmit_errors; }  // TEC
+  unsigned receive_errors(int node) const { return at_node(node).receive_errors; }    // REC
+
+ private:
+  struct Waiting {
+    CanFrame frame;
+    std::uint64_t since_ns;
+  };
+  struct Node {
+    CanNodeOptions options;
+    std::vector<Waiting> queue;
+    CanNodeState state = CanNodeState::active;
+    unsigned transmit_errors = 0;
+    unsigned receive_errors = 0;
+    std::uint64_t recessive_runs = 0;  // of 11 bits, while bus-off
+    std::uint64_t suspended_until_ns = 0;
+    std::size_t chosen = 0;  // place in the queue of the frame on the bus
+    bool sending = false;
+  };
+  // What the bus does next, and when.
+  enum class Step : std::uint8_t { none, begin, end, come_back };
+  struct Next {
+    Step step;
+    std::uint64_t time_ns;
+    std::size_t node;  // of come_back
+  };
+
+  const Node& at_node(int node) const { return nodes_[static_cast<std::size_t>(node)]; }
+  Next next() const;
+  void begin_frame();
+  void end_frame();
+  void succeed();
+  void fail();
+  void count_error(Node& node, bool sender);
+  void count_success(Node& node, bool sender);
+  void update_state(Node& node);
+  void come_back(Node& node);
+  std::uint64_t bits_ns(std::uint64_t bits) const {
+    return time_ns(CanBits{static_cast<std::uint32_t>(bits), 0}, options_.rate);
+  }
+
+  CanBusOptions options_;
+  simulation::Random random_;
+  std::vector<Node> nodes_;
+  std::multimap<std::uint64_t, std::function<void()>> actions_;
+  std::map<std::uint32_t, CanIdTraffic> traffic_;
+  std::uint64_t now_ns_ = 0;
+  std::uint64_t busy_ns_ = 0;
+  std::uint64_t begun_ns_ = 0;            // of the frame on the bus
+  std::uint64_t frame_ends_ns_ = 0;       // of the frame on the bus, before its intermission
+  std::uint64_t free_at_ns_ = 0;          // the intermission is over
+  std::uint64_t recessive_since_ns_ = 0;  // the last 11 bits of a frame are always recessive
+  unsigned corrupt_next_ = 0;
+  bool on_bus_ = false;
+  bool damaged_ = false;
+  bool acknowledged_ = false;
+};
+
+}  // namespace r4::test
