@@ -33,11 +33,12 @@ struct Message {
   bool heartbeat = false;  // of the host
 };
 
-// What a board or its host says next. Both count from where they would.
+// What a board and its host say next, some hours after the board began to count.
 class Voice {
  public:
   explicit Voice(std::uint64_t seed) : random_(seed) {
     board_t_ = static_cast<std::uint32_t>(random_.next());
+    board_pnum_ = static_cast<std::uint32_t>(random_.between(100000, 999999));
     host_pnum_ = 0x80000000U | static_cast<std::uint32_t>(random_.next() & 0x3FFFFFFFU);
   }
 
@@ -108,7 +109,7 @@ class Voice {
   Random random_;
   std::array<char, max_datagram> buffer_;
   std::uint32_t board_t_;
-  std::uint32_t board_pnum_ = 1;
+  std::uint32_t board_pnum_;
   std::uint32_t host_pnum_;
 };
 

@@ -18,6 +18,7 @@ void add_stop(CLI::App& root, Action& chosen);
 void add_list(CLI::App& root, Action& chosen);
 void add_encode(CLI::App& root, Action& chosen);
 void add_decode(CLI::App& root, Action& chosen);
+void add_bus(CLI::App& root, Action& chosen);
 void add_bench(CLI::App& root, Action& chosen);
 void add_demo(CLI::App& root, Action& chosen);
 void add_completion(CLI::App& root, Action& chosen);

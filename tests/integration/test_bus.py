@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""r4 bus: the table, the JSON, the warning, the exit codes, and the numbers of docs/can.md."""
+import math
+import os
+import re
+
+import pytest
+
+from r4_process import ERROR, objects, run
+
+DATA_BAD, USAGE = 1, 2
+DOCS = os.path.join(os.path.dirname(__file__), '..', '..', 'docs')
+
+
+def planned(*arguments):
+    """The rows of a plan by name, and its exit code."""
+    result = run('bus', '--json', *arguments)
+    return {each['name']: each for each in objects(result.stdout) if 'name' in each}, result
+
+
+def test_eight_boards_in_packed_form_fit_and_in_plain_form_do_not():
+    rows, result = planned('--packed')
+    assert result.returncode == 0 and result.stderr == ''
+    assert rows['total']['boards'] == 8 and rows['total']['fits'] is True
+    assert rows['total']['load'] < 0.6 and rows['total']['worst_load'] < 0.8
+    rows, result = planned()
+    assert result.returncode == DATA_BAD and ERROR.search(result.stderr) and '--packed' in result.stderr
+    assert rows['total']['load'] > 2 and rows['total']['fits'] is False
+    assert objects(result.stdout)[-1]['type'] == 'error'
+    rows, result = planned('--boards', '2')
+    assert result.returncode == 0 and rows['total']['fits'] is True
+
+
+def test_the_rows_add_up_to_the_total():
+    rows, _ = planned('--packed', '--boards', '3', '--commands', '5', '--rate', '40')
+    total = rows.pop('total')
+    assert list(rows) == ['state', 'board heartbeat', 'host heartbeat', 'command']
+    assert [rows[name]['datagrams'] for name in rows] == [120, 6, 30, 15]
+    for key in ('datagrams', 'frames', 'bits', 'load', 'worst_load'):
+        assert math.isclose(total[key], sum(row[key] for row in rows.values())), key
+    assert math.isclose(total['load'], total['bits'] / total['bitrate'], rel_tol=1e-9)
+
+
+def test_frames_are_those_of_iso_tp():
+    """The board's plain heartbeat: a first frame of 6 bytes, then 7 a frame."""
+    rows, _ = planned('--boards', '1')
+    heartbeat = rows['board heartbeat']
+    assert math.isclose(heartbeat['frames'] / heartbeat['datagrams'],
+                        1 + math.ceil((heartbeat['bytes'] - 6) / 7), abs_tol=1)
+    rows, _ = planned('--boards', '1', '--fd')
+    assert rows['board heartbeat']['frames'] == rows['board heartbeat']['datagrams']  # one FD frame
+
+
+def test_above_80_percent_it_warns_and_still_fits():
+    result = run('bus', '--packed', '--boards', '13')
+    assert result.returncode == 0
+    assert re.fullmatch(r'r4: warning: the bus: .+; .+\n', result.stderr)
+    assert run('bus', '--packed', '--boards', '11').stderr == ''
+
+
+def test_what_it_says_fits_does_fit():
+    rows, _ = planned('--packed')
+    boards, rate = rows['total']['most_boards'], rows['total']['highest_rate']
+    for more in (('--boards', str(boards)), ('--rate', str(rate))):
+        rows, result = planned('--packed', *more)
+        assert rows['total']['load'] <= 0.8 and result.stderr == ''
+    for more in (('--boards', str(boards + 1)), ('--rate', str(rate + 1))):
+        rows, result = planned('--packed', *more)
+        assert rows['total']['load'] > 0.8 and 'warning' in result.stderr
+
+
+def test_load_follows_the_bit_rate():
+    fast, _ = planned('--packed', '--boards', '4')
+    slow, _ = planned('--packed', '--boards', '4', '--bitrate', '500000')
+    assert math.isclose(slow['total']['load'], 2 * fast['total']['load'], rel_tol=1e-6)
+    fd, _ = planned('--packed', '--boards', '4', '--fd', '--dbitrate', '8000000')
+    assert fd['total']['load'] < fast['total']['load'] and fd['total']['dbitrate'] == 8000000
+
+
+@pytest.mark.parametrize('arguments, words', [
+    (['--boards', '0'], 'write 1 to 32'),
+    (['--boards', '33'], 'write 1 to 32'),
+    (['--rate', '1001'], 'write 1 to 1000'),
+    (['--bitrate', '2000000'], 'write 10000 to 1000000'),
+    (['--fields', 'AIN99'], 'no such state field'),
+    (['--dbitrate', '5000000'], 'add --fd'),
+    (['--fd', '--dbitrate', '500000'], 'below the nominal'),
+    (['can0'], 'argument too many'),
+])
+def test_wrong_options_are_told_with_the_fix(arguments, words):
+    result = run('bus', *arguments)
+    assert result.returncode == USAGE and result.stdout == ''
+    assert ERROR.search(result.stderr) and words in result.stderr
+
+
+def test_the_documentation_shows_what_is_printed():
+    with open(os.path.join(DOCS, 'can.md'), encoding='utf-8') as file:
+        text = file.read()
+    examples = re.findall(r'^    \$ r4 bus(.*)\n((?:    .*\n|\n(?=    (?!\$)))*)', text, re.MULTILINE)
+    assert len(examples) >= 2
+    for arguments, shown in examples:
+        printed = run('bus', *arguments.split())
+        lines = [line.removeprefix('    ').rstrip() for line in shown.rstrip('\n').split('\n')]
+        assert lines == [line.rstrip() for line in (printed.stdout + printed.stderr).rstrip('\n').split('\n')]
