@@ -23,7 +23,7 @@ struct BusPlan {
   bool packed = false;
 };
 
-// What the link adds by itself (docs/safety.md).
+// What the link adds by itself (docs/protocol.md).
 constexpr std::uint32_t board_heartbeats_hz = 2;
 constexpr std::uint32_t host_heartbeats_hz = 10;
 
