@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Our ISO-TP engine against the kernel's and can-utils', on vcan0: can_test inside tools/with-can.
+
+A run in which a test was not executed fails.
+"""
+import os
+import pathlib
+import re
+import subprocess
+
+from r4_process import R4
+
+WITH_CAN = pathlib.Path(__file__).resolve().parents[2] / 'tools' / 'with-can'
+CAN_TEST = pathlib.Path(os.environ.get('R4_CAN_TEST') or pathlib.Path(R4).parent / 'tests/can_test')
+FILTERS = ('GTEST_FILTER', 'GTEST_TOTAL_SHARDS', 'GTEST_SHARD_INDEX', 'GTEST_REPEAT')
+
+
+def test_every_test_of_can_test_is_executed_and_passes():
+    listed = subprocess.run([CAN_TEST, '--gtest_list_tests'], capture_output=True, text=True,
+                            timeout=60, check=True).stdout
+    count = len(re.findall(r'^  \w', listed, re.MULTILINE))
+    assert count > 0
+    environment = {key: value for key, value in os.environ.items() if key not in FILTERS}
+    result = subprocess.run([WITH_CAN, '--time', '200', CAN_TEST], env=environment,
+                            stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=280,
+                            check=False)
+    print(result.stdout[-20000:])
+    assert result.returncode == 0, result.stderr[-20000:]
+    assert re.findall(r'^\[==========\] (\d+) tests? from \d+ test suites? ran\.', result.stdout,
+                      re.MULTILINE) == [str(count)]
+    assert re.findall(r'^\[  PASSED  \] (\d+) tests?\.', result.stdout, re.MULTILINE) == [str(count)]
+    assert 'SKIPPED' not in result.stdout and 'DISABLED' not in result.stdout
