@@ -53,8 +53,15 @@ std::uint8_t Application::add_port(Port& port) {
   return port_count_++;
 }
 
+void Application::tell_ports() {
+  for (std::uint8_t i = 0; i < port_count_; ++i) {
+    ports_[i].port->use_packed_form(setpoints_.settings.pack);
+  }
+}
+
 void Application::start(std::uint32_t now_ms) {
   hal_.make_safe();
+  tell_ports();
   if (observer_ != nullptr) {
     observer_->on_state(now_ms, BoardState::connecting, SafeReason::none);
     observer_->on_outputs(now_ms, outputs_);
@@ -195,6 +202,7 @@ void Application::execute(std::uint32_t pnum, const Command& command, std::uint3
     case CommandKind::setting:
       link_.set_timing(timing_of(setpoints_.settings));
       schedule_.set_period(period_of(setpoints_.settings));
+      tell_ports();
       break;
     default:
       break;

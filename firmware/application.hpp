@@ -80,6 +80,7 @@ class Application {
   bool obstacle() const;
   bool may_clear(std::uint32_t now_ms) const;
   void update_outputs(std::uint32_t now_ms);
+  void tell_ports();
   void report_state(std::uint32_t now_ms);
 
   // application_sending.cpp

@@ -86,6 +86,9 @@ class Carrier {
   // datagram that could not be written within 100 ms is dropped and counted.
   virtual SendResult send(std::string_view bytes, Priority priority, Peer to = everyone) = 0;
 
+  // Sends the packed form from now on, where there is one (CAN). Received are both at any time.
+  virtual void use_packed_form(bool wanted) { static_cast<void>(wanted); }
+
   virtual bool up() const = 0;
   // The longest datagram it carries, in bytes.
   virtual std::size_t max_size() const = 0;

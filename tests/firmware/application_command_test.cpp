@@ -460,6 +460,18 @@ TEST(ApplicationNumberless, MayBeginAgainAfterAnOutageWithNothingOfTheOldLeft) {
   EXPECT_EQ(board.log.refused.back(), "1 STALE");
 }
 
+TEST(ApplicationSetting, MakesEveryPortSendThePackedForm) {
+  TestBoard board;
+  TestHost host(board, echo_pnum);
+  host.connect();
+  host.command("C:pack,1");
+  EXPECT_TRUE(board.ports[0].packed);
+  host.command("C:rate,50");
+  EXPECT_TRUE(board.ports[0].packed);
+  host.command("C:pack,0");
+  EXPECT_FALSE(board.ports[0].packed);
+}
+
 TEST(ApplicationNumberless, MayNotBeginAgainWithoutAnOutage) {
   TestBoard board;
   board.receive("H:ROS2-R4;T:1;");

@@ -45,7 +45,9 @@ class MemoryPort final : public firmware::Port {
     sent.push_back({str(datagram), urgency, peer, *now_ms});
   }
   std::size_t max_size() const override { return limit; }
+  void use_packed_form(bool wanted) override { packed = wanted; }
 
+  bool packed = false;
   const std::uint32_t* now_ms = nullptr;
   std::size_t limit = max_datagram;
   std::vector<Sent> sent;

@@ -180,6 +180,8 @@ NO_BOARD = 'udp://127.0.0.1:9?listen=0'
     (['decode', '/no/such/file'], OPEN, '/no/such/file'),
     (['decode', '/'], OPEN, 'directory'),
     (['sim', '--script', '/no/such/file'], USAGE, '/no/such/file'),
+    (['sim', '--set', 'pack,2'], USAGE, '--set pack,2'),
+    (['sim', '--set', 'colour,red'], USAGE, '--set colour,red'),
     (['sim', '--board-id', 'a,b'], USAGE, 'cannot be sent'),
     (['sim', '--board-id', 'x' * 65], USAGE, 'use 1 to 64'),
     (['monitor', 'udp://255.255.255.255'], USAGE, 'the address of many'),

@@ -18,7 +18,9 @@ TEST(Registry, MakesACarrierForEachTransport) {
   EXPECT_NE(registry.make(io, "udp://127.0.0.1", Role::host), nullptr);
   EXPECT_NE(registry.make(io, "serial:auto", Role::host), nullptr);
   EXPECT_NE(registry.make(io, "pty:", Role::board), nullptr);
-  EXPECT_EQ(registry.entries().size(), 3U);
+  EXPECT_NE(registry.make(io, "can://can0?node=31&fd=1&pack=1", Role::host), nullptr);
+  EXPECT_NE(registry.make(io, "can://can0?node=0", Role::board), nullptr);
+  EXPECT_EQ(registry.entries().size(), 4U);
 }
 
 TEST(Registry, NamesTheTransportsThatItHas) {

@@ -14,7 +14,10 @@
 
 #include "firmware/ports/sim/simulated_board.hpp"
 #include "host/async_board.hpp"
+#include "host/command_help.hpp"
 #include "options.hpp"
+#include "protocol/refusal.hpp"
+#include "protocol/settings.hpp"
 #include "sim_log.hpp"
 #include "subcommands.hpp"
 #include "transports/registry.hpp"
@@ -30,6 +33,7 @@ struct Options {
   std::string script;
   std::optional<std::uint64_t> seed;
   std::string board_id;
+  std::vector<std::string> settings;
 };
 
 constexpr std::size_t longest_id = 64;
@@ -40,6 +44,20 @@ void check_id(const std::string& id) {
   if (valid && !id.empty() && id.size() <= longest_id) return;
   throw Error(ErrorKind::usage, "--board-id " + id, "cannot be sent",
               fmt::format("use 1 to {} printable ASCII characters without , ; and ^", longest_id));
+}
+
+Settings read_settings(const std::vector<std::string>& texts) {
+  Settings settings;
+  for (const std::string& text : texts) {
+    const std::size_t comma = text.find(',');
+    const std::string key = text.substr(0, comma);
+    const std::string value = comma == std::string::npos ? "" : text.substr(comma + 1);
+    const Refusal refusal = set(settings, Text(key), Text(value));
+    if (refusal == Refusal::none) continue;
+    throw Error(ErrorKind::usage, "--set " + text, std::string(meaning_of(refusal)),
+                std::string("use ") + std::string(command_help('C')->ranges));
+  }
+  return settings;
 }
 
 int simulate(const Options& options) {
@@ -55,6 +73,7 @@ int simulate(const Options& options) {
     check_id(options.board_id);
     board_options.board_id = options.board_id;
   }
+  board_options.settings = read_settings(options.settings);
   board_options.firmware_version = R4_VERSION;
   board_options.events = log.events();
   sim::SimulatedBoard board(io, std::move(board_options));
@@ -119,6 +138,11 @@ void add_sim(CLI::App& root, Action& chosen) {
       ->type_name(file_type);
   add_number(*command, "--seed", options->seed, 0, ~std::uint64_t{0},
              "the same seed gives the same clock and inputs");
+  command
+      ->add_option("--set", options->settings,
+                   "a setting as C:KEY,VALUE makes it, such as pack,1 (can be given again)")
+      ->type_name("KEY,VALUE")
+      ->allow_extra_args(false);
   command->add_option("--board-id", options->board_id, "its answer to Q:ID (default sim-1)")
       ->type_name("ID");
 }

@@ -121,6 +121,7 @@ void SimLog::listening(const std::vector<std::string>& urls) {
 std::string host_url(const std::string& board_url) {
   const Url url = Url::parse(board_url);
   if (url.scheme() == "pty") return "serial://" + url.path();
+  if (url.scheme() == "can") return board_url;
   const bool any = url.host() == "0.0.0.0" || url.host() == "::";
   const bool v6 = url.host().find(':') != std::string::npos;
   const std::string host = any ? (v6 ? "::1" : "127.0.0.1") : url.host();

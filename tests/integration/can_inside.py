@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What test_can.py runs where SocketCAN is: boards and hosts as processes on a CAN bus.
+
+vcan0 is a bus in the kernel, can0 and can1 are two controllers with their driver on one bus.
+"""
+import contextlib
+import signal
+import subprocess
+import threading
+import time
+
+import pytest
+
+from r4_process import ERROR, Board, is_link, is_state, monitor, run
+
+# The board's timeout, what docs/safety.md promises on top, and what an emulated machine may take.
+SAFE_WITHIN_MS = 1020 + 80
+BUS = 'can://vcan0?node=3'
+EMERGENCY, WENT_SAFE, COMMAND, REPLY, TELEMETRY = 0x010, 0x023, 0x183, 0x203, 0x403
+
+
+def ip(*arguments):
+    subprocess.run(['ip', *arguments], check=True)
+
+
+@pytest.fixture(name='board')
+def running_board():
+    with Board(BUS) as board:
+        yield board
+
+
+class Dump:
+    """candump: every frame on an interface, as (id, data), seen by something we did not write."""
+
+    def __init__(self, interface):
+        self.process = subprocess.Popen(['candump', '-L', interface], stdout=subprocess.PIPE, text=True)
+        self.frames = []
+        self.reader = threading.Thread(target=self._read, daemon=True)
+        self.reader.start()
+
+    def _read(self):
+        for line in self.process.stdout:
+            frame, _, data = line.split()[2].partition('#')
+            self.frames.append((int(frame, 16), data.lstrip('#')))
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.terminate()
+        self.reader.join()
+        self.process.stdout.close()
+        self.process.wait()
+
+
+def in_control(host):
+    host.next(is_link('active'))
+    return host.next(lambda each: is_state(each) and 'CMD' in each['fields'])
+
+
+def test_streams_its_state_on_the_grid(board):
+    with monitor(board.host_url) as host:
+        in_control(host)
+        states = [host.next(is_state) for _ in range(200)]
+        assert host.end() == 0
+    times = [each['t'] for each in states]
+    assert all((later - earlier) % 10 == 0 for earlier, later in zip(times, times[1:]))
+    assert len(states) > 0.9 * (times[-1] - times[0]) / 10
+    assert states[0]['transport'] == BUS
+
+
+def test_commands_are_confirmed_by_the_boards_state(board):
+    result = run('send', board.host_url, 'O:358,1,1', 'S:1500,16', 'Q:ID', timeout=60)
+    assert result.returncode == 0, result
+    assert 'board sim-1' in result.stdout
+    board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
+    board.outputs(lambda outputs: outputs['servo'][15] == 1500)
+
+
+def test_a_refusal_comes_back(board):
+    result = run('send', board.host_url, 'E:STOP', 'O:1,1,1', timeout=60)
+    assert result.returncode == 3 and 'SAFE' in result.stderr, result
+    assert ERROR.search(result.stderr), result.stderr
+
+
+def test_a_killed_host_leaves_the_board_safe_in_time(board):
+    with monitor(board.host_url) as host:
+        in_control(host)
+        host.signal(signal.SIGKILL)
+        safe = board.state('SAFE', 'link')
+    print(f'silence to safe {safe["silence"]} ms')
+    assert 1000 <= safe['silence'] <= SAFE_WITHIN_MS
+
+
+def test_a_host_that_was_held_up_goes_on_by_itself(board):
+    with monitor(board.host_url) as host:
+        in_control(host)
+        host.signal(signal.SIGSTOP)
+        board.state('SAFE', 'link')
+        host.signal(signal.SIGCONT)
+        board.state('ACTIVE')
+        host.skip_past()
+        host.next(is_state)
+
+
+def test_a_stop_is_one_frame_of_top_priority_and_is_told_in_one(board):
+    with monitor(board.host_url) as host, Dump('vcan0') as dump:
+        in_control(host)
+        result = run('stop', board.host_url, timeout=60)
+        assert result.returncode == 0, result
+        board.state('SAFE', 'stop')
+        host.next(lambda each: is_state(each) and each['fields']['SAFE'] == 2)
+    ids = [frame for frame, _ in dump.frames]
+    assert EMERGENCY in ids
+    assert (WENT_SAFE, '02') in dump.frames
+    assert ids.index(WENT_SAFE) > ids.index(EMERGENCY)
+
+
+def test_a_stop_of_a_foreign_program_is_obeyed(board):
+    with monitor(board.host_url) as host:
+        in_control(host)
+        subprocess.run(['cansend', 'vcan0', '010#'], check=True)
+        board.state('SAFE', 'stop')
+
+
+def test_another_host_is_refused_while_the_first_is_there(board):
+    with monitor(board.host_url) as first:
+        in_control(first)
+        result = run('send', board.host_url, '--timeout', '2', 'O:358,1,1', timeout=60)
+        assert result.returncode == 3, result
+        first.skip_past()
+        first.next(is_state)
+        assert first.end() == 0
+    assert not any(each.get('executed', {}).get('command') == 'O:358,1,1' for each in board.log)
+
+
+def test_a_restarted_board_is_taken_up_again():
+    with contextlib.ExitStack() as stack:
+        first = stack.enter_context(Board(BUS))
+        host = stack.enter_context(monitor(BUS))
+        in_control(host)
+        first.signal(signal.SIGKILL)
+        first.wait()
+        host.next(lambda each: each['type'] == 'link' and each['fields']['state'] != 'active', timeout=20)
+        stack.enter_context(Board(BUS))
+        host.next(is_link('active'), timeout=20)
+
+
+def test_packed_and_fd_take_fewer_frames(board):
+    def frames_a_second():
+        with Dump('vcan0') as dump, monitor(board.host_url, '--duration', '4') as host:
+            in_control(host)
+            dump.frames.clear()
+            times = [host.next(is_state)['t'] for _ in range(100)]
+            telemetry = [data for frame, data in dump.frames if frame == TELEMETRY]
+            return len(telemetry) / (times[-1] - times[0]) * 1000
+
+    plain = frames_a_second()
+    assert run('send', board.host_url, 'C:pack,1', timeout=60).returncode == 0
+    packed = frames_a_second()
+    print(f'{plain:.0f} frames a second plain, {packed:.0f} packed')
+    assert plain > 2000 and packed < 700
+
+
+def test_can_fd_carries_a_state_in_three_frames():
+    with Board('can://vcan0?node=3&fd=1') as board, Dump('vcan0') as dump:
+        with monitor(board.host_url) as host:
+            in_control(host)
+            for _ in range(50):
+                host.next(is_state)
+        result = run('send', board.host_url + '&pack=1', 'O:358,1,1', timeout=60)
+        assert result.returncode == 0, result
+    states = [data for frame, data in dump.frames if frame == TELEMETRY and len(data) > 100]
+    assert len(states) > 100
+
+
+def test_an_interface_that_goes_down_is_told_of_and_comes_back(board):
+    with monitor(board.host_url) as host:
+        in_control(host)
+        ip('link', 'set', 'vcan0', 'down')
+        down_at = time.monotonic()
+        down = host.next(lambda each: each['type'] == 'link' and not each['fields']['up'])
+        print(f'down after {(down["came"] - down_at) * 1000:.0f} ms')
+        board.state('SAFE', 'link')
+        refused = run('monitor', BUS)
+        assert refused.returncode == 4 and 'ip link set vcan0 up' in refused.stderr, refused
+        ip('link', 'set', 'vcan0', 'up')
+        up_at = time.monotonic()
+        up = host.next(lambda each: each['type'] == 'link' and each['fields']['up'])
+        print(f'up after {(up["came"] - up_at) * 1000:.0f} ms')
+        assert up['came'] - up_at < 1
+        board.state('ACTIVE')
+        host.skip_past()
+        host.next(is_state)
+
+
+def test_the_same_through_two_controllers_with_their_driver():
+    # Each frame costs the emulated machine some 100 us: fewer frames.
+    with Board('can://can0?node=5', options=('--set', 'pack,1')) as board, monitor('can://can1?node=5') as host:
+        in_control(host)
+        for _ in range(100):
+            host.next(is_state)
+        host.signal(signal.SIGKILL)
+        safe = board.state('SAFE', 'link')
+        assert safe['silence'] <= SAFE_WITHIN_MS
+        assert run('send', 'can://can1?node=5', 'O:358,1,1', timeout=60).returncode == 0
+        board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
+        assert run('stop', 'can://can1?node=5', timeout=60).returncode == 0
+        board.state('SAFE', 'stop')
+
+
+@pytest.mark.parametrize('url, code, message', [
+    ('can://can7?node=1', 6, 'there is no interface can7'),
+    ('can://lo?node=1', 2, 'lo is no CAN interface'),
+    ('can://can0?fd=1', 4, 'not set up for CAN FD'),
+])
+def test_what_cannot_be_opened_is_said_with_the_fix(url, code, message):
+    result = run('monitor', url)
+    assert result.returncode == code and message in result.stderr, result
+    assert ERROR.fullmatch(result.stderr.strip()), result.stderr
+
+
+def test_garbage_on_every_id_of_ours_harms_nobody(board):
+    with monitor(board.host_url) as host:
+        in_control(host)
+        for identifier in (COMMAND, REPLY, TELEMETRY, WENT_SAFE):
+            subprocess.run(['cangen', 'vcan0', '-I', f'{identifier:x}', '-n', '300', '-g', '0'], check=True)
+        host.skip_past()
+        host.next(is_state)
+    board.state('SAFE', 'link')
+    executed = [each['executed']['command'] for each in board.log if 'executed' in each]
+    assert executed and all(command.startswith('F:') for command in executed), executed

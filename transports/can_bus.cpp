@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "can_bus.hpp"
+
+#include <linux/can/error.h>
+
+#include <algorithm>
+#include <asio/post.hpp>
+#include <cerrno>
+#include <cstring>
+#include <map>
+#include <utility>
+
+#include "can_interface.hpp"
+#include "framing/can_ids.hpp"
+
+namespace r4 {
+namespace {
+
+constexpr std::chrono::milliseconds retry_interval{1};
+constexpr std::chrono::milliseconds look_interval{100};
+
+// The buses of one event loop.
+class Buses : public asio::execution_context::service {
+ public:
+  using key_type = Buses;
+  static asio::execution_context::id id;
+  explicit Buses(asio::execution_context& context) : service(context) {}
+  void shutdown() noexcept override {}
+
+  std::map<std::pair<std::string, bool>, std::weak_ptr<CanBus>> buses;
+};
+asio::execution_context::id Buses::id;
+
+}  // namespace
+
+std::shared_ptr<CanBus> CanBus::of(asio::io_context& io, const std::string& interface, bool fd) {
+  std::weak_ptr<CanBus>& known = asio::use_service<Buses>(io).buses[{interface, fd}];
+  std::shared_ptr<CanBus> bus = known.lock();
+  if (!bus) {
+    bus = std::make_shared<CanBus>(io, interface, fd);
+    known = bus;
+  }
+  return bus;
+}
+
+CanBus::CanBus(asio::io_context& io, std::string interface, bool fd)
+    : io_(io),
+      interface_(std::move(interface)),
+      fd_(fd),
+      readable_(io),
+      writable_(io),
+      retry_timer_(io),
+      look_timer_(io) {
+  socket_.open(interface_, fd_);
+  readable_.assign(socket_.number());
+  listen();
+}
+
+CanBus::~CanBus() {
+  writable_.stop();
+  if (readable_.is_open()) readable_.release();  // the socket owns it
+}
+
+void CanBus::join(Member& member, std::vector<std::uint32_t> ids) {
+  members_.push_back({&member, std::move(ids)});
+  hear();
+}
+
+void CanBus::leave(Member& member) noexcept {
+  for (Place& place : members_) {
+    if (place.member == &member) place.member = nullptr;
+  }
+  if (sending_ || receiving_) return;  // whoever goes through them now cleans up
+  std::erase_if(members_, [](const Place& place) { return place.member == nullptr; });
+  hear();
+}
+
+void CanBus::hear() {
+  if (socket_.number() < 0) return;
+  std::vector<std::uint32_t> ids;
+  for (const Place& place : members_) {
+    if (place.member != nullptr) ids.insert(ids.end(), place.ids.begin(), place.ids.end());
+  }
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  socket_.hear(ids);
+}
+
+// Members may leave, and others join, in any call of theirs.
+template <class Action>
+void CanBus::for_each_member(Action action) {
+  for (std::size_t i = 0; i < members_.size(); ++i) {  // NOLINT(modernize-loop-convert): it grows
+    if (members_[i].member != nullptr) action(*members_[i].member);
+  }
+}
+
+// --- receiving
+
+void CanBus::listen() {
+  readable_.async_wait(asio::posix::descriptor_base::wait_read,
+                       reading_.handler([this] { receive(); }));
+}
+
+void CanBus::receive() {
+  const std::shared_ptr<CanBus> alive = shared_from_this();
+  const int count = socket_.receive(in_);
+  if (count == -EAGAIN || count == -EINTR) return listen();
+  if (count < 0) {
+    go_down(std::strerror(-count), bring_up_fix(interface_), true);
+    return;
+  }
+  receiving_ = true;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+    if (in_[i].error != 0) {
+      on_error_frame(in_[i]);
+      continue;
+    }
+    const std::uint32_t at_us = to_us(in_[i].at);
+    for_each_member([&](Member& member) { member.on_frame(in_[i].frame, at_us); });
+  }
+  if (static_cast<std::size_t>(count) < in_.size()) {
+    for_each_member([](Member& member) { member.on_drained(); });
+  }
+  receiving_ = false;
+  std::erase_if(members_, [](const Place& place) { return place.member == nullptr; });
+  if (socket_.number() < 0) return;
+  listen();
+  if (up_) send();
+}
+
+void CanBus::on_error_frame(const CanSocket::Received& received) {
+  const std::string restart = "find the cause (wiring, termination, bit rate), then: ip link set " +
+                              interface_ + " type can restart; restart-ms 100 does it by itself";
+  if ((received.error & CAN_ERR_BUSOFF) != 0) {
+    return go_down("the controller is bus-off: too many errors", restart, false);
+  }
+  if ((received.error & CAN_ERR_RESTARTED) != 0) {
+    trouble_.clear();
+    if (!up_ && !reopen_) {
+      up_ = true;
+      tell({CarrierEvent::Kind::up, Problem{ErrorKind::open, "can://" + interface_, "", ""}});
+    }
+    return;
+  }
+  const std::uint8_t controller = received.frame.data[1];
+  if ((received.error & CAN_ERR_CRTL) != 0 && (controller & CAN_ERR_CRTL_ACTIVE) != 0) {
+    trouble_.clear();
+  } else if ((received.error & CAN_ERR_CRTL) != 0 &&
+             (controller & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0) {
+    set_trouble("the controller is error-passive", "look at wiring, termination and bit rate");
+  } else if ((received.error & CAN_ERR_CRTL) != 0 &&
+             (controller & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING)) != 0) {
+    set_trouble("the controller warns of errors", "look at wiring, termination and bit rate");
+  } else if ((received.error & CAN_ERR_ACK) != 0) {
+    set_trouble("nobody acknowledges", "is another node on the bus, at this bit rate?");
+  }
+}
+
+// Told once until it changes.
+void CanBus::set_trouble(std::string reason, std::string fix) {
+  if (reason == trouble_) return;
+  trouble_ = reason;
+  tell({CarrierEvent::Kind::warning,
+        Problem{ErrorKind::open, "can://" + interface_, std::move(reason), std::move(fix)}});
+}
+
+// --- sending
+
+// Takes what members offer, a transfer of one after the other. True if frames wait now.
+bool CanBus::refill(std::uint32_t now_us) {
+  std::size_t quiet = 0;
+  while (out_count_ < ahead && quiet < members_.size()) {
+    next_ %= members_.size();
+    Member* const member = members_[next_].member;
+    if (member != nullptr && member->offer(now_us, out_[out_count_])) {
+      ++out_count_;
+      quiet = 0;
+      member->frame_sent(now_us);
+    } else {
+      ++next_;
+      ++quiet;
+    }
+  }
+  return out_count_ != 0;
+}
+
+void CanBus::send() {
+  if (!up_ || sending_) return;
+  sending_ = true;
+  CanSocket::Outcome outcome = CanSocket::Outcome::done;
+  if (out_count_ == 0) progress_ = Clock::now();
+  while (outcome == CanSocket::Outcome::done && refill(now_us())) {
+    std::size_t sent = 0;
+    outcome = socket_.send(out_.data(), out_count_, sent);
+    const int error = errno;
+    if (sent != 0) progress_ = Clock::now();
+    std::move(out_.begin() + static_cast<std::ptrdiff_t>(sent),
+              out_.begin() + static_cast<std::ptrdiff_t>(out_count_), out_.begin());
+    out_count_ -= sent;
+    if (outcome == CanSocket::Outcome::failed) {
+      asio::post(io_, retrying_.handler([this, error] {
+        go_down(std::strerror(error), bring_up_fix(interface_), true);
+      }));
+    }
+  }
+  sending_ = false;
+  if (outcome == CanSocket::Outcome::done) {
+    writable_.stop();
+  } else if (outcome != CanSocket::Outcome::failed) {
+    send_later();
+  }
+}
+
+// A socket that is writable tells so; a full interface queue does not.
+void CanBus::send_later() {
+  if (Clock::now() - progress_ > patience) {
+    out_count_ = 0;
+    progress_ = Clock::now();
+    for_each_member([](Member& member) { member.on_stuck(); });
+  }
+  retry_timer_.expires_after(retry_interval);
+  retry_timer_.async_wait(retrying_.handler([this] { send(); }));
+  writable_.start(socket_.number(), [this] { send(); });
+}
+
+SendResult CanBus::send_stop() {
+  if (socket_.number() < 0) return SendResult::down;
+  CanFrame frame{};
+  frame.id = emergency_stop_id;
+  switch (socket_.send_first(frame)) {
+    case CanSocket::Outcome::done:
+      return SendResult::sent;
+    case CanSocket::Outcome::busy:
+    case CanSocket::Outcome::full:
+      return SendResult::full;
+    case CanSocket::Outcome::failed:
+      break;
+  }
+  return SendResult::down;
+}
+
+// --- the interface
+
+void CanBus::go_down(std::string reason, std::string fix, bool reopen) {
+  const std::shared_ptr<CanBus> alive = shared_from_this();
+  out_count_ = 0;
+  retrying_.cancel();
+  writable_.stop();
+  if (reopen) {
+    reading_.cancel();
+    if (readable_.is_open()) readable_.release();
+    socket_.close();
+    reopen_ = true;
+    look_later();
+  }
+  if (!std::exchange(up_, false)) return;
+  tell({CarrierEvent::Kind::down,
+        Problem{ErrorKind::open, "can://" + interface_, std::move(reason), std::move(fix)}});
+}
+
+void CanBus::look_later() {
+  look_timer_.expires_after(look_interval);
+  look_timer_.async_wait(looking_.handler([this] { look(); }));
+}
+
+// Opened anew: the interface may be another one of the same name.
+void CanBus::look() {
+  const std::shared_ptr<CanBus> alive = shared_from_this();
+  try {
+    socket_.open(interface_, fd_);
+  } catch (const Error&) {
+    return look_later();
+  }
+  hear();
+  readable_.assign(socket_.number());
+  listen();
+  reopen_ = false;
+  up_ = true;
+  trouble_.clear();
+  tell({CarrierEvent::Kind::up, Problem{ErrorKind::open, "can://" + interface_, "", ""}});
+}
+
+void CanBus::tell(const CarrierEvent& event) {
+  for_each_member([&](Member& member) { member.on_bus(event); });
+}
+
+}  // namespace r4

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One CAN interface, shared by everything in an event loop that uses it: one socket with kernel
+// filters for the ids in use, frames read and written in batches, and its state as events.
+//
+// Each member hears all frames that any of them asked for. Frames leave in the order in which
+// members offer them; a member's transfer is not interrupted by another's. Of what the interface
+// does not take, at most `ahead` frames wait here; after 100 ms without progress they are dropped.
+#pragma once
+
+#include <array>
+#include <asio/io_context.hpp>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "can_socket.hpp"
+#include "carrier.hpp"
+#include "operation_slot.hpp"
+#include "writable_wait.hpp"
+
+namespace r4 {
+
+class CanBus : public std::enable_shared_from_this<CanBus> {
+ public:
+  using Clock = CanSocket::Clock;
+  static constexpr std::size_t ahead = 32;
+  static constexpr std::chrono::milliseconds patience{100};
+
+  class Member {
+   public:
+    virtual void on_frame(const CanFrame& frame, std::uint32_t at_us) = 0;
+    virtual void on_drained() = 0;  // all frames that had arrived were handed over
+    // The frame to send now, accepted with frame_sent().
+    virtual bool offer(std::uint32_t now_us, CanFrame& frame) = 0;
+    virtual void frame_sent(std::uint32_t now_us) = 0;
+    // The bus came up or went down (transfers are over), or the controller is in trouble.
+    virtual void on_bus(const CarrierEvent& event) = 0;
+    // The bus took nothing for too long: what was under way is lost.
+    virtual void on_stuck() = 0;
+
+   protected:
+    ~Member() = default;
+  };
+
+  // Microseconds of the clock that members are driven by; wraps.
+  static std::uint32_t to_us(Clock::time_point at) {
+    return static_cast<std::uint32_t>(
+        std::chrono::duration_cast<std::chrono::microseconds>(at.time_since_epoch()).count());
+  }
+  static std::uint32_t now_us() { return to_us(Clock::now()); }
+
+  // The bus of that interface in this event loop, opened if nobody has yet. Throws Error.
+  static std::shared_ptr<CanBus> of(asio::io_context& io, const std::string& interface, bool fd);
+
+  CanBus(asio::io_context& io, std::string interface, bool fd);
+  ~CanBus();
+  CanBus(const CanBus&) = delete;
+  CanBus& operator=(const CanBus&) = delete;
+
+  // A member hears the frames of `ids` (11 bits) until it leaves.
+  void join(Member& member, std::vector<std::uint32_t> ids);
+  void leave(Member& member) noexcept;
+
+  // Members have something to offer.
+  void send();
+  // The emergency stop, ahead of everything that waits in the interface's queue.
+  SendResult send_stop();
+
+  bool up() const { return up_; }
+  std::uint32_t overflows() const { return socket_.overflows(); }
+
+ private:
+  struct Place {
+    Member* member;  // null: has left
+    std::vector<std::uint32_t> ids;
+  };
+
+  void listen();
+  void receive();
+  void on_error_frame(const CanSocket::Received& received);
+  bool refill(std::uint32_t now_us);
+  void send_later();
+  void set_trouble(std::string reason, std::string fix);
+  void go_down(std::string reason, std::string fix, bool reopen);
+  void look_later();
+  void look();
+  void tell(const CarrierEvent& event);
+  void hear();
+  template <class Action>
+  void for_each_member(Action action);
+
+  asio::io_context& io_;
+  const std::string interface_;
+  const bool fd_;
+  CanSocket socket_;
+  LoopDescriptor readable_;
+  OperationSlot reading_;
+  WritableWait writable_;
+  LoopTimer retry_timer_;
+  OperationSlot retrying_;
+  LoopTimer look_timer_;
+  OperationSlot looking_;
+
+  std::vector<Place> members_;
+  std::size_t next_ = 0;  // whose turn it is
+  bool sending_ = false;
+  bool receiving_ = false;
+  std::array<CanFrame, ahead> out_;
+  std::size_t out_count_ = 0;
+  Clock::time_point progress_;
+
+  bool up_ = true;
+  bool reopen_ = false;
+  std::string trouble_;
+  std::array<CanSocket::Received, CanSocket::batch> in_;
+};
+
+}  // namespace r4

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "can_carrier.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "can_bus.hpp"
+#include "framing/can_node.hpp"
+#include "operation_slot.hpp"
+#include "send_queue.hpp"
+
+namespace r4 {
+namespace {
+
+constexpr std::size_t normal_entries = 32;
+constexpr std::size_t state_entries = 1;  // newest wins
+
+class CanCarrier final : public Carrier, private CanBus::Member {
+ public:
+  CanCarrier(asio::io_context& io, Url url, Role role);
+  ~CanCarrier() override { close(); }
+
+  void open(Handler& handler) override;
+  void close() noexcept override;
+  SendResult send(std::string_view bytes, Priority priority, Peer) override;
+  void use_packed_form(bool wanted) override { node_.use_packed_form(wanted); }
+  bool up() const override { return handler_ != nullptr && bus_->up(); }
+  std::size_t max_size() const override { return max_datagram; }
+  const std::string& name() const override { return name_; }
+  const CarrierCounters& counters() const override { return counters_; }
+
+ private:
+  using Clock = CanBus::Clock;
+  struct Lane {
+    CanLane which;
+    SendQueue queue;
+  };
+
+  void on_frame(const CanFrame& frame, std::uint32_t at_us) override;
+  void on_drained() override;
+  bool offer(std::uint32_t now_us, CanFrame& frame) override;
+  void frame_sent(std::uint32_t now_us) override { node_.frame_sent(now_us); }
+  void on_bus(const CarrierEvent& event) override;
+  void on_stuck() override;
+
+  Lane& lane(CanLane which) { return lanes_[which == CanLane::dialogue ? 0 : 1]; }
+  bool begin(std::string_view bytes);
+  bool begin_waiting();
+  void arm();
+
+  asio::io_context& io_;
+  const Url url_;
+  const Role role_;
+  const std::uint8_t number_;
+  const bool fd_;
+  const std::string name_;
+  CanNode node_;
+  CarrierCounters counters_;
+  std::array<Lane, 2> lanes_;
+  std::shared_ptr<CanBus> bus_;
+  Handler* handler_ = nullptr;
+  LoopTimer timer_;
+  OperationSlot timing_;
+  bool armed_ = false;
+  std::uint32_t armed_for_us_ = 0;
+};
+
+// Whether a board packs is its setting, not its URL's.
+std::uint8_t node_of(const Url& url, Role role) {
+  url.allow_only(role == Role::host ? "node fd pack" : "node fd");
+  if (url.host().empty() || !url.path().empty() || url.port()) {
+    throw Error(ErrorKind::usage, url.text(), "it is not can://INTERFACE",
+                "write it as in can://can0?node=1");
+  }
+  return static_cast<std::uint8_t>(url.get_number("node", 0, can_nodes - 1, 1));
+}
+
+CanCarrier::CanCarrier(asio::io_context& io, Url url, Role role)
+    : io_(io),
+      url_(std::move(url)),
+      role_(role),
+      number_(node_of(url_, role)),
+      fd_(url_.get_number("fd", 0, 1, 0) == 1),
+      name_(fmt::format("can://{}?node={}{}", url_.host(), number_, fd_ ? "&fd=1" : "")),
+      node_(role == Role::board ? CanEnd::board : CanEnd::host, number_, fd_),
+      lanes_{
+          Lane{CanLane::dialogue, SendQueue(normal_entries, state_entries, counters_.tx_dropped)},
+          Lane{CanLane::telemetry, SendQueue(normal_entries, state_entries, counters_.tx_dropped)}},
+      timer_(io) {
+  node_.use_packed_form(url_.get_number("pack", 0, 1, 0) == 1);
+}
+
+void CanCarrier::open(Handler& handler) {
+  close();
+  bus_ = CanBus::of(io_, url_.host(), fd_);
+  handler_ = &handler;
+  bus_->join(*this, role_ == Role::board
+                        ? std::vector<std::uint32_t>{emergency_stop_id, command_id(number_)}
+                        : std::vector<std::uint32_t>{reply_id(number_), telemetry_id(number_)});
+  ++counters_.ups;
+  handler_->on_carrier_event({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
+}
+
+void CanCarrier::close() noexcept {
+  handler_ = nullptr;
+  timing_.cancel();
+  armed_ = false;
+  for (Lane& each : lanes_) each.queue.clear();
+  node_.cancel();
+  if (bus_) bus_->leave(*this);
+  bus_.reset();
+}
+
+SendResult CanCarrier::send(std::string_view bytes, Priority priority, Peer) {
+  if (handler_ == nullptr || !bus_->up()) return SendResult::down;
+  if (bytes.size() > max_datagram) {
+    ++counters_.tx_errors;
+    return SendResult::full;
+  }
+  if (priority == Priority::stop && role_ == Role::host) {
+    const SendResult result = bus_->send_stop();
+    ++(result == SendResult::sent ? counters_.tx_datagrams : counters_.tx_errors);
+    return result;
+  }
+  Lane& own = lane(node_.lane_of(Text(bytes.data(), bytes.size())));
+  if (!own.queue.empty() || !begin(bytes)) {
+    return own.queue.push(bytes, priority, everyone, Clock::now());
+  }
+  bus_->send();
+  arm();
+  return SendResult::sent;
+}
+
+bool CanCarrier::begin(std::string_view bytes) {
+  if (!node_.begin(Text(bytes.data(), bytes.size()), CanBus::now_us())) return false;
+  ++counters_.tx_datagrams;
+  counters_.tx_bytes += bytes.size();
+  return true;
+}
+
+// Begins the next datagram of each lane that has become idle. True if there was one.
+bool CanCarrier::begin_waiting() {
+  bool any = false;
+  for (Lane& each : lanes_) {
+    if (each.queue.empty() || !node_.idle(each.which)) continue;
+    const SendQueue::Entry* const entry = each.queue.front(Clock::now());
+    if (entry == nullptr) continue;
+    any = begin(entry->text()) || any;
+    each.queue.pop();
+  }
+  return any;
+}
+
+bool CanCarrier::offer(std::uint32_t now_us, CanFrame& frame) {
+  return node_.offer(now_us, frame) || (begin_waiting() && node_.offer(now_us, frame));
+}
+
+void CanCarrier::on_frame(const CanFrame& frame, std::uint32_t at_us) {
+  const Text datagram = node_.on_frame(frame, at_us);
+  if (datagram.empty()) return;
+  ++counters_.rx_datagrams;
+  counters_.rx_bytes += datagram.size();
+  handler_->on_datagram({datagram.data(), datagram.size()}, everyone);
+}
+
+void CanCarrier::on_drained() {
+  handler_->on_drained();
+  if (handler_ != nullptr) arm();
+}
+
+void CanCarrier::arm() {
+  const IsotpDeadline deadline = node_.deadline();
+  if (!deadline.armed) return;
+  if (armed_ && reached(deadline.at_us, armed_for_us_)) return;
+  armed_ = true;
+  armed_for_us_ = deadline.at_us;
+  const auto in_us = static_cast<std::int32_t>(deadline.at_us - CanBus::now_us());
+  timer_.expires_after(std::chrono::microseconds(in_us > 0 ? in_us : 0));
+  timer_.async_wait(timing_.handler([this] {
+    armed_ = false;
+    node_.poll(CanBus::now_us());
+    bus_->send();
+    arm();
+  }));
+}
+
+void CanCarrier::on_bus(const CarrierEvent& event) {
+  CarrierEvent own = event;
+  own.problem.thing = name_;
+  if (event.kind == CarrierEvent::Kind::down) {
+    ++counters_.downs;
+    node_.cancel();
+    for (Lane& each : lanes_) each.queue.clear();
+  } else if (event.kind == CarrierEvent::Kind::up) {
+    ++counters_.ups;
+  }
+  handler_->on_carrier_event(own);
+}
+
+void CanCarrier::on_stuck() {
+  node_.cancel();
+  ++counters_.tx_dropped;
+}
+
+}  // namespace
+
+std::unique_ptr<Carrier> make_can_carrier(asio::io_context& io, const Url& url, Role role) {
+  return std::make_unique<CanCarrier>(io, url, role);
+}
+
+}  // namespace r4

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A raw SocketCAN socket on one interface: frames in batches with the time at which they came, the
+// controller's error frames apart, and sends that never wait. What it hears is filtered in the
+// kernel.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "file_descriptor.hpp"
+#include "framing/can_frame.hpp"
+
+namespace r4 {
+
+class CanSocket {
+ public:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::size_t batch = 64;
+
+  struct Received {
+    CanFrame frame;           // of an error frame, the data hold its details
+    std::uint32_t error = 0;  // the error classes of <linux/can/error.h>; 0 in a data frame
+    Clock::time_point at;     // when the kernel got it
+  };
+
+  enum class Outcome : std::uint8_t {
+    done,    // everything was taken
+    busy,    // the socket's share of the queue is used up: wait until it is writable
+    full,    // the interface's queue is full: nothing tells when it is not
+    failed,  // errno tells why
+  };
+
+  // Opens it on `interface` with no id to hear. With `fd`, CAN FD frames can be sent. Throws Error:
+  // unsupported if this kernel has no CAN or there is no such interface, open if the interface is
+  // down, is not CAN or does not do CAN FD, permission.
+  void open(const std::string& interface, bool fd);
+  void close() noexcept;
+  int number() const { return descriptor_.get(); }
+  int interface_index() const { return index_; }
+
+  // Hears the frames with exactly these 11-bit ids, or with `everything` all of them, extended and
+  // remote ones too.
+  void hear(const std::vector<std::uint32_t>& ids);
+  void hear_everything();
+
+  // Takes up to `batch` frames; returns how many, or -errno (EAGAIN: none is there).
+  int receive(std::array<Received, batch>& frames);
+  // Hands frames over in order. `sent` tells how many were taken.
+  Outcome send(const CanFrame* frames, std::size_t count, std::size_t& sent);
+  // Hands one frame over ahead of everything that waits in the interface's queue.
+  Outcome send_first(const CanFrame& frame);
+
+  // Frames that came while the socket's buffer was full.
+  std::uint32_t overflows() const { return overflows_; }
+
+ private:
+  FileDescriptor descriptor_;
+  FileDescriptor first_;  // with a priority and a queue of its own
+  int index_ = 0;
+  std::uint32_t overflows_ = 0;
+};
+
+}  // namespace r4
