@@ -135,13 +135,11 @@ HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uin
         feed(heartbeat, now_ms);
         return HeartbeatEffect::fed;
       }
-      // The same place, other numbers: a restarted host, if its echo is newer than any before. But
-      // on a bus all hosts are at one place: as long as the owner is heard, this is another.
+      // The same place, other numbers, and an echo newer than any before: the host has restarted, or
+      // it is another, since on a bus all hosts are at one place. It waits until the owner is lost.
       if (echo_host && newer(static_cast<std::uint32_t>(heartbeat.t), newest_echo_ms_) &&
           (continuing || !near_newest_heartbeat(heartbeat.pnum))) {
-        const std::uint32_t silence_ms = echo_host_ ? takeover_silence_ms : timing_.timeout_ms;
-        if (armed_ && now_ms - fed_ms_ < silence_ms) return HeartbeatEffect::busy;
-        return begin_session(heartbeat, true, now_ms);
+        return armed_ ? HeartbeatEffect::busy : begin_session(heartbeat, true, now_ms);
       }
       return HeartbeatEffect::stale;
 

@@ -125,9 +125,6 @@ class BoardLink {
   static constexpr std::uint32_t answer_spacing_ms = 20;
   // A command that a heartbeat overtook this long ago is stale.
   static constexpr std::uint32_t late_limit_ms = 250;
-  // A host of other numbers at the owner's place takes over when the owner, an echo host, was silent
-  // for this long: two of its heartbeats.
-  static constexpr std::uint32_t takeover_silence_ms = 250;
   // How far ahead of the newest known number a command may be.
   static constexpr std::uint32_t command_window = 65536;
   // The same for a host that comes back after an outage: less, since a restarted host's random first

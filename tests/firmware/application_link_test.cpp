@@ -251,7 +251,7 @@ TEST(ApplicationLink, ARestartIsNoticedWithinTheTimeoutAndMakesTheOutputsSafe) {
   TestHost restarted(board, echo_pnum + 100'000'000);
   restarted.heartbeat(0);
   EXPECT_EQ(board.outputs().osmc[0].pwm, 358);  // nothing is proven yet
-  board.run(BoardLink::takeover_silence_ms);
+  board.run(1010);
   restarted.echo();
   EXPECT_TRUE(board.safe());
   EXPECT_EQ(board.state(), BoardState::active);

@@ -190,7 +190,7 @@ TEST_F(BoardLinkTest, WhileActiveNumbersMayJumpWithinTheWideWindow) {
 
 TEST_F(BoardLinkTest, AHostThatHasNothingToEchoAnyMoreHasBegunAgain) {
   // Its first number happens to fit the session before.
-  for (const std::uint32_t silence : {BoardLink::takeover_silence_ms, 1500U}) {
+  for (const std::uint32_t silence : {1010U, 1500U}) {
     link = BoardLink(BoardLink::Timing{});
     sent.clear();
     connect();
@@ -207,7 +207,7 @@ TEST_F(BoardLinkTest, AHostThatHasNothingToEchoAnyMoreHasBegunAgain) {
 TEST_F(BoardLinkTest, ANewSessionWhoseNumbersGoOnDoesNotMoveTheGateBack) {
   connect();
   command(echo_pnum + 5);
-  run(BoardLink::takeover_silence_ms);
+  run(1010);
   heartbeat(echo_pnum + 2, 0);
   link.heartbeat_answered(now);
   // The newest heartbeat, but older than the command.
@@ -221,7 +221,7 @@ TEST_F(BoardLinkTest, ANewSessionKeepsItsKindBehindTheWrap) {
   send_due();
   heartbeat(0xffffffffU, 0);
   heartbeat(0, sent.back());
-  run(BoardLink::takeover_silence_ms);
+  run(1010);
   heartbeat(1, 0);  // it has begun again, it seems
   link.heartbeat_answered(now);
   EXPECT_EQ(heartbeat(2, now), HeartbeatEffect::new_session);
@@ -255,7 +255,7 @@ TEST_F(BoardLinkTest, ARestartNeedsAnEchoNewerThanAnyOfTheSession) {
   EXPECT_EQ(heartbeat(echo_pnum + 100'000'000, 0), HeartbeatEffect::stale);
   EXPECT_EQ(heartbeat(echo_pnum + 100'000'001, used), HeartbeatEffect::stale);
   EXPECT_EQ(heartbeat(echo_pnum + 100'000'002, newest), HeartbeatEffect::stale);
-  run(500);
+  run(1010);
   ASSERT_GT(sent.back(), newest);
   EXPECT_EQ(heartbeat(echo_pnum + 100'000'003, sent.back()), HeartbeatEffect::new_session);
   // What the host sent before its restart is of no effect now.
@@ -275,7 +275,7 @@ TEST_F(BoardLinkTest, AnotherHostAtTheSamePlaceIsBusyWhileTheOwnerIsHeard) {
     EXPECT_EQ(command(other++), "STALE");
   }
   EXPECT_EQ(command(owner), "execute");
-  run(BoardLink::takeover_silence_ms);
+  run(1010);
   EXPECT_EQ(heartbeat(other, sent.back()), HeartbeatEffect::new_session);
 }
 
