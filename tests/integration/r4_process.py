@@ -16,7 +16,8 @@ R4 = os.environ['R4']
 DATA = os.environ.get('R4_TEST_DATA', os.path.join(os.path.dirname(__file__), '..', 'data'))
 # Sanitizers make everything slower and bigger; promises about time and memory are for release builds.
 SANITIZED = 'R4_SANITIZER' in os.environ
-PATIENCE_S = 30 if SANITIZED else 10
+# So does the guest of tools/with-can, which emulates its processor.
+PATIENCE_S = 30 if SANITIZED or 'R4_CAN_GUEST' in os.environ else 10
 
 # The one shape of an error: thing, reason, fix.
 ERROR = re.compile(r'^r4: .+: .+; .+$', re.MULTILINE)
