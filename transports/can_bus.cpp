@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "can_bus.hpp"
 
+#include <fmt/format.h>
 #include <linux/can/error.h>
 
 #include <algorithm>
 #include <asio/post.hpp>
 #include <cerrno>
-#include <cstring>
 #include <map>
 #include <utility>
 
@@ -16,6 +16,7 @@
 namespace r4 {
 namespace {
 
+constexpr const char* not_acknowledged = "nobody acknowledges";
 constexpr std::chrono::milliseconds retry_interval{1};
 constexpr std::chrono::milliseconds look_interval{100};
 
@@ -70,9 +71,14 @@ void CanBus::leave(Member& member) noexcept {
   for (Place& place : members_) {
     if (place.member == &member) place.member = nullptr;
   }
-  if (sending_ || receiving_) return;  // whoever goes through them now cleans up
-  std::erase_if(members_, [](const Place& place) { return place.member == nullptr; });
-  hear();
+  clear_places();
+}
+
+// Not while somebody goes through them.
+void CanBus::clear_places() {
+  if (calling_ != 0 || sending_) return;
+  if (std::erase_if(members_, [](const Place& place) { return place.member == nullptr; }) != 0)
+    hear();
 }
 
 void CanBus::hear() {
@@ -89,9 +95,12 @@ void CanBus::hear() {
 // Members may leave, and others join, in any call of theirs.
 template <class Action>
 void CanBus::for_each_member(Action action) {
+  ++calling_;
   for (std::size_t i = 0; i < members_.size(); ++i) {  // NOLINT(modernize-loop-convert): it grows
     if (members_[i].member != nullptr) action(*members_[i].member);
   }
+  --calling_;
+  clear_places();
 }
 
 // --- receiving
@@ -103,56 +112,57 @@ void CanBus::listen() {
 
 void CanBus::receive() {
   const std::shared_ptr<CanBus> alive = shared_from_this();
+  take();
+  if (socket_.number() < 0) return;
+  listen();
+  send();
+}
+
+void CanBus::take() {
+  if (receiving_ || socket_.number() < 0) return;
   const int count = socket_.receive(in_);
-  if (count == -EAGAIN || count == -EINTR) return listen();
-  if (count < 0) {
-    go_down(std::strerror(-count), bring_up_fix(interface_), true);
-    return;
-  }
+  if (count == -EAGAIN || count == -EINTR) return;
+  if (count < 0) return go_down(can_problem(interface_, -count), true);
   receiving_ = true;
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     if (in_[i].error != 0) {
       on_error_frame(in_[i]);
       continue;
     }
+    // Whoever hears others is on the bus, whatever was told of before.
+    if (!up_) come_up();
+    if (trouble_ == not_acknowledged) trouble_.clear();
     const std::uint32_t at_us = to_us(in_[i].at);
     for_each_member([&](Member& member) { member.on_frame(in_[i].frame, at_us); });
   }
+  receiving_ = false;
   if (static_cast<std::size_t>(count) < in_.size()) {
     for_each_member([](Member& member) { member.on_drained(); });
   }
-  receiving_ = false;
-  std::erase_if(members_, [](const Place& place) { return place.member == nullptr; });
-  if (socket_.number() < 0) return;
-  listen();
-  if (up_) send();
 }
 
 void CanBus::on_error_frame(const CanSocket::Received& received) {
-  const std::string restart = "find the cause (wiring, termination, bit rate), then: ip link set " +
-                              interface_ + " type can restart; restart-ms 100 does it by itself";
+  constexpr const char* look = "look at wiring, termination and bit rate";
   if ((received.error & CAN_ERR_BUSOFF) != 0) {
-    return go_down("the controller is bus-off: too many errors", restart, false);
+    return go_down(
+        {ErrorKind::open, "can://" + interface_, "the controller is bus-off: too many errors",
+         fmt::format("{}, then: ip link set {} type can restart; with restart-ms 100 it "
+                     "does so by itself",
+                     look, interface_)},
+        false);
   }
-  if ((received.error & CAN_ERR_RESTARTED) != 0) {
-    trouble_.clear();
-    if (!up_ && !reopen_) {
-      up_ = true;
-      tell({CarrierEvent::Kind::up, Problem{ErrorKind::open, "can://" + interface_, "", ""}});
+  if ((received.error & CAN_ERR_RESTARTED) != 0) return come_up();
+  if ((received.error & CAN_ERR_CRTL) != 0) {
+    const std::uint8_t controller = received.frame.data[1];
+    if ((controller & CAN_ERR_CRTL_ACTIVE) != 0) {
+      come_up();
+    } else if ((controller & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0) {
+      set_trouble("the controller is error-passive", look);
+    } else if ((controller & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING)) != 0) {
+      set_trouble("the controller warns of errors", look);
     }
-    return;
-  }
-  const std::uint8_t controller = received.frame.data[1];
-  if ((received.error & CAN_ERR_CRTL) != 0 && (controller & CAN_ERR_CRTL_ACTIVE) != 0) {
-    trouble_.clear();
-  } else if ((received.error & CAN_ERR_CRTL) != 0 &&
-             (controller & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0) {
-    set_trouble("the controller is error-passive", "look at wiring, termination and bit rate");
-  } else if ((received.error & CAN_ERR_CRTL) != 0 &&
-             (controller & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING)) != 0) {
-    set_trouble("the controller warns of errors", "look at wiring, termination and bit rate");
   } else if ((received.error & CAN_ERR_ACK) != 0) {
-    set_trouble("nobody acknowledges", "is another node on the bus, at this bit rate?");
+    set_trouble(not_acknowledged, "see that another node is on the bus, at this bit rate");
   }
 }
 
@@ -198,12 +208,12 @@ void CanBus::send() {
               out_.begin() + static_cast<std::ptrdiff_t>(out_count_), out_.begin());
     out_count_ -= sent;
     if (outcome == CanSocket::Outcome::failed) {
-      asio::post(io_, retrying_.handler([this, error] {
-        go_down(std::strerror(error), bring_up_fix(interface_), true);
-      }));
+      asio::post(
+          io_, retrying_.handler([this, error] { go_down(can_problem(interface_, error), true); }));
     }
   }
   sending_ = false;
+  clear_places();
   if (outcome == CanSocket::Outcome::done) {
     writable_.stop();
   } else if (outcome != CanSocket::Outcome::failed) {
@@ -241,7 +251,7 @@ SendResult CanBus::send_stop() {
 
 // --- the interface
 
-void CanBus::go_down(std::string reason, std::string fix, bool reopen) {
+void CanBus::go_down(Problem problem, bool reopen) {
   const std::shared_ptr<CanBus> alive = shared_from_this();
   out_count_ = 0;
   retrying_.cancel();
@@ -250,12 +260,16 @@ void CanBus::go_down(std::string reason, std::string fix, bool reopen) {
     reading_.cancel();
     if (readable_.is_open()) readable_.release();
     socket_.close();
-    reopen_ = true;
     look_later();
   }
-  if (!std::exchange(up_, false)) return;
-  tell({CarrierEvent::Kind::down,
-        Problem{ErrorKind::open, "can://" + interface_, std::move(reason), std::move(fix)}});
+  if (std::exchange(up_, false)) tell({CarrierEvent::Kind::down, std::move(problem)});
+}
+
+// Also when nothing was wrong but a warning.
+void CanBus::come_up() {
+  trouble_.clear();
+  if (std::exchange(up_, true)) return;
+  tell({CarrierEvent::Kind::up, Problem{ErrorKind::open, "can://" + interface_, "", ""}});
 }
 
 void CanBus::look_later() {
@@ -274,10 +288,7 @@ void CanBus::look() {
   hear();
   readable_.assign(socket_.number());
   listen();
-  reopen_ = false;
-  up_ = true;
-  trouble_.clear();
-  tell({CarrierEvent::Kind::up, Problem{ErrorKind::open, "can://" + interface_, "", ""}});
+  come_up();
 }
 
 void CanBus::tell(const CarrierEvent& event) {

@@ -2,9 +2,10 @@
 // One CAN interface, shared by everything in an event loop that uses it: one socket with kernel
 // filters for the ids in use, frames read and written in batches, and its state as events.
 //
-// Each member hears all frames that any of them asked for. Frames leave in the order in which
-// members offer them; a member's transfer is not interrupted by another's. Of what the interface
-// does not take, at most `ahead` frames wait here; after 100 ms without progress they are dropped.
+// Each member hears all frames that any of them asked for, but none that a member sent. Frames
+// leave in the order in which members offer them; a member's transfer is not interrupted by
+// another's. Of what the interface does not take, at most `ahead` frames wait here; after 100 ms
+// without progress they are dropped.
 #pragma once
 
 #include <array>
@@ -66,6 +67,9 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
 
   // Members have something to offer.
   void send();
+  // Hands over the frames that have arrived. Before somebody gives up waiting for one: a loop that
+  // was held up may find the time-out and the frame together.
+  void take();
   // The emergency stop, ahead of everything that waits in the interface's queue.
   SendResult send_stop();
 
@@ -84,11 +88,13 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   bool refill(std::uint32_t now_us);
   void send_later();
   void set_trouble(std::string reason, std::string fix);
-  void go_down(std::string reason, std::string fix, bool reopen);
+  void go_down(Problem problem, bool reopen);
+  void come_up();
   void look_later();
   void look();
   void tell(const CarrierEvent& event);
   void hear();
+  void clear_places();
   template <class Action>
   void for_each_member(Action action);
 
@@ -106,6 +112,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
 
   std::vector<Place> members_;
   std::size_t next_ = 0;  // whose turn it is
+  int calling_ = 0;       // members are being called: their places stay
   bool sending_ = false;
   bool receiving_ = false;
   std::array<CanFrame, ahead> out_;
@@ -113,7 +120,6 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   Clock::time_point progress_;
 
   bool up_ = true;
-  bool reopen_ = false;
   std::string trouble_;
   std::array<CanSocket::Received, CanSocket::batch> in_;
 };

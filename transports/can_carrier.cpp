@@ -170,6 +170,7 @@ void CanCarrier::on_frame(const CanFrame& frame, std::uint32_t at_us) {
 }
 
 void CanCarrier::on_drained() {
+  counters_.rx_overflows = bus_->overflows();
   handler_->on_drained();
   if (handler_ != nullptr) arm();
 }
@@ -184,8 +185,11 @@ void CanCarrier::arm() {
   timer_.expires_after(std::chrono::microseconds(in_us > 0 ? in_us : 0));
   timer_.async_wait(timing_.handler([this] {
     armed_ = false;
+    const std::shared_ptr<CanBus> bus = bus_;
+    bus->take();
+    if (handler_ == nullptr) return;
     node_.poll(CanBus::now_us());
-    bus_->send();
+    bus->send();
     arm();
   }));
 }

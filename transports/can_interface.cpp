@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "can_interface.hpp"
 
+#include <fmt/format.h>
 #include <linux/can.h>
 #include <net/if.h>
 #include <net/if_arp.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 
+#include <cerrno>
 #include <cstring>
 #include <filesystem>
 
@@ -37,11 +39,33 @@ CanInterface can_interface(const std::string& name) {
   return result;
 }
 
-std::string bring_up_fix(const std::string& name) {
-  const CanInterface interface = can_interface(name);
-  return "ip link set " + name + " up" +
-         (interface.has_controller ? " txqueuelen 1000 type can bitrate 1000000 restart-ms 100"
-                                   : "");
+Problem can_problem(const std::string& interface, int error) {
+  const std::string thing = "can://" + interface;
+  switch (error) {
+    case EAFNOSUPPORT:
+    case EPROTONOSUPPORT:
+      return {ErrorKind::unsupported, thing, "this kernel has no SocketCAN",
+              "load it (modprobe can-raw), or run the command under tools/with-can"};
+    case ENODEV:
+    case ENXIO:
+      return {
+          ErrorKind::unsupported, thing, "there is no interface " + interface,
+          fmt::format("plug its adapter in, or make a virtual one: ip link add {0} type vcan && "
+                      "ip link set {0} up",
+                      interface)};
+    case ENETDOWN:
+      return {ErrorKind::open, thing, "the interface is down",
+              fmt::format("ip link set {} up{}", interface,
+                          can_interface(interface).has_controller
+                              ? " txqueuelen 1000 type can bitrate 1000000 restart-ms 100"
+                              : "")};
+    case EPERM:
+    case EACCES:
+      return {ErrorKind::permission, thing, std::strerror(error),
+              "run it as a user who may open raw CAN sockets"};
+    default:
+      return {ErrorKind::open, thing, std::strerror(error), ""};
+  }
 }
 
 }  // namespace r4

@@ -4,6 +4,8 @@
 
 #include <string>
 
+#include "error.hpp"
+
 namespace r4 {
 
 struct CanInterface {
@@ -17,7 +19,7 @@ struct CanInterface {
 
 CanInterface can_interface(const std::string& name);
 
-// The command that brings it up, for an error's fix.
-std::string bring_up_fix(const std::string& name);
+// What an errno of a socket on that interface means, with the fix where there is one.
+Problem can_problem(const std::string& interface, int error);
 
 }  // namespace r4

@@ -35,24 +35,7 @@ bool set_option(int socket, int level, int name, const Value& value) {
 }
 
 [[noreturn]] void fail(const std::string& interface, int error) {
-  const std::string thing = "can://" + interface;
-  switch (error) {
-    case EAFNOSUPPORT:
-    case EPROTONOSUPPORT:
-      throw Error(ErrorKind::unsupported, thing, "this kernel has no SocketCAN",
-                  "load it (modprobe can-raw), or run the command under tools/with-can");
-    case ENODEV:
-      throw Error(ErrorKind::unsupported, thing, "there is no interface " + interface,
-                  "r4 list shows those that are there; a virtual one is made by: "
-                  "ip link add " +
-                      interface + " type vcan && ip link set " + interface + " up");
-    case EPERM:
-    case EACCES:
-      throw Error(ErrorKind::permission, thing, std::strerror(error),
-                  "run it as a user who may open raw CAN sockets");
-    default:
-      throw Error(ErrorKind::open, thing, std::strerror(error), bring_up_fix(interface));
-  }
+  throw Error(can_problem(interface, error));
 }
 
 FileDescriptor open_socket(const std::string& interface, int index) {
@@ -118,10 +101,7 @@ void CanSocket::open(const std::string& interface, bool fd) {
     throw Error(ErrorKind::usage, "can://" + interface, interface + " is no CAN interface",
                 "r4 list shows those that are there");
   }
-  if (!state.up) {
-    throw Error(ErrorKind::open, "can://" + interface, "the interface is down",
-                bring_up_fix(interface));
-  }
+  if (!state.up) fail(interface, ENETDOWN);
   if (fd && !state.fd) {
     throw Error(ErrorKind::open, "can://" + interface, "the interface is not set up for CAN FD",
                 state.has_controller

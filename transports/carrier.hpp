@@ -38,8 +38,9 @@ enum class SendResult : std::uint8_t {
 struct CarrierCounters {
   std::uint64_t rx_datagrams = 0;
   std::uint64_t rx_bytes = 0;
-  std::uint64_t rx_oversize = 0;  // lines or packets that were too long, thrown away
-  std::uint64_t rx_foreign = 0;   // packets from an address that is not the board's, thrown away
+  std::uint64_t rx_oversize = 0;   // lines or packets that were too long, thrown away
+  std::uint64_t rx_foreign = 0;    // packets from an address that is not the board's, thrown away
+  std::uint64_t rx_overflows = 0;  // frames that the system dropped, for nobody took them (CAN)
   std::uint64_t tx_datagrams = 0;
   std::uint64_t tx_bytes = 0;
   std::uint64_t tx_dropped = 0;  // replaced by newer state, expired or refused

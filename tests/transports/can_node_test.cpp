@@ -155,6 +155,17 @@ TEST(CanNode, ABoardThatGoesSafeSaysSoAheadInOneFrame) {
   EXPECT_EQ(bus.at_host.size(), 6U);
 }
 
+TEST(CanNode, AReasonThatTheBusDidNotTakeIsToldLater) {
+  Bus bus;
+  const std::string safe = with_crc("H:R4-ROS2;PNum:79;T:81300;SAFE:2;");
+  bus.board.begin(safe, bus.now_us);
+  bus.board.cancel();  // the bus went down first
+  bus.board.begin(safe, bus.now_us);
+  bus.settle();
+  EXPECT_EQ(bus.ids.front(), went_safe_id(3));
+  EXPECT_EQ(bus.at_host, (std::vector<std::string>{safe}));
+}
+
 TEST(CanNode, TakesNothingWhileALaneIsBusyAndNothingTooLong) {
   Bus bus;
   EXPECT_TRUE(bus.board.begin(state_line, bus.now_us));

@@ -86,7 +86,8 @@ void CanNode::note_reason(Text heartbeat) {
   Datagram datagram;
   if (!read(heartbeat, datagram)) return;
   const SafeReason reason = heartbeat_reason(datagram);
-  reason_due_ = reason != reason_ && reason != SafeReason::none;
+  if (reason == reason_) return;  // told, or still to be told
+  reason_due_ = reason != SafeReason::none;
   reason_ = reason;
 }
 
