@@ -2,6 +2,7 @@
 #include "state.hpp"
 
 #include "numbers.hpp"
+#include "word_index.hpp"
 
 namespace r4 {
 namespace {
@@ -111,29 +112,8 @@ Member& member(State& state, const Entry& entry) {
   return *reinterpret_cast<Member*>(reinterpret_cast<char*>(&state) + entry.offset);
 }
 
-// Names by hash, made at compile time: open addressing, a quarter full at most.
-constexpr unsigned slot_count = 256;
-constexpr std::uint8_t no_entry = 0xFF;
-
-constexpr unsigned slot_of(Text name) {
-  std::uint32_t hash = 2166136261U;  // FNV-1a
-  for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 16777619U;
-  return (hash ^ hash >> 16) % slot_count;
-}
-
-struct NameIndex {
-  std::uint8_t entry[slot_count] = {};
-  constexpr NameIndex() {
-    for (std::uint8_t& slot : entry) slot = no_entry;
-    for (int i = 0; i < state_field_count; ++i) {
-      unsigned slot = slot_of(table[i].name.name());
-      while (entry[slot] != no_entry) slot = (slot + 1) % slot_count;
-      entry[slot] = static_cast<std::uint8_t>(i);
-    }
-  }
-};
-constexpr NameIndex name_index;
-constexpr std::size_t longest_name = 10;  // "SERVO10POS"
+constexpr Text name_of_entry(const Entry& entry) { return entry.name.name(); }
+constexpr WordIndex<Entry, state_field_count, name_of_entry> name_index(table);
 
 bool parse_up_to(Text text, std::uint32_t limit, std::uint32_t& out) {
   return parse_number(text, out) && out <= limit;
@@ -212,12 +192,8 @@ FieldSet FieldSet::all() {
 Text name_of(StateField field) { return entry_of(field).name.name(); }
 
 StateField state_field(Text name) {
-  if (name.size() > longest_name) return StateField::count;
-  for (unsigned slot = slot_of(name);; slot = (slot + 1) % slot_count) {
-    const std::uint8_t index = name_index.entry[slot];
-    if (index == no_entry) return StateField::count;
-    if (table[index].name.name() == name) return static_cast<StateField>(index);
-  }
+  const unsigned index = name_index.find(name);
+  return index == no_index ? StateField::count : static_cast<StateField>(index);
 }
 
 void write_field(DatagramWriter& writer, StateField field, const State& state) {

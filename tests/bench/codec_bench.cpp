@@ -11,7 +11,7 @@
 #include "protocol/datagram.hpp"
 #include "protocol/datagram_writer.hpp"
 #include "protocol/state.hpp"
-#include "tests/bench/allocations.hpp"
+#include "tests/bench/measure.hpp"
 
 namespace r4::bench {
 namespace {
@@ -33,17 +33,6 @@ Text write_state(char* buffer, const State& state) {
   return writer.finish(state.pnum, state.t_ms);
 }
 
-// Times `work` on the line's bytes and reports what it allocates as "allocs".
-template <class Work>
-void measure(benchmark::State& bench, Work work) {
-  bench.counters["allocs"] = allocations_per_call(work);
-  for (auto _ : bench) {
-    work();
-    benchmark::ClobberMemory();
-  }
-  bench.SetBytesProcessed(bench.iterations() * static_cast<std::int64_t>(line.size()));
-}
-
 // The line, its content unknown to the compiler.
 Text opaque_line() {
   Text bytes = line;
@@ -55,7 +44,7 @@ void write_state_datagram(benchmark::State& bench) {
   State state = state_of_line();
   char buffer[max_datagram];
   if (write_state(buffer, state) != line) bench.SkipWithError("not the line of the capture");
-  measure(bench, [&] {
+  measure(bench, line.size(), [&] {
     benchmark::DoNotOptimize(state);
     benchmark::DoNotOptimize(write_state(buffer, state));
   });
@@ -63,7 +52,7 @@ void write_state_datagram(benchmark::State& bench) {
 BENCHMARK(write_state_datagram);
 
 void read_datagram(benchmark::State& bench) {
-  measure(bench, [&] {
+  measure(bench, line.size(), [&] {
     Datagram datagram;
     if (!read(opaque_line(), datagram)) bench.SkipWithError("refused");
     benchmark::DoNotOptimize(datagram);
@@ -73,7 +62,7 @@ BENCHMARK(read_datagram);
 
 void read_typed_state(benchmark::State& bench) {
   State state;
-  measure(bench, [&] {
+  measure(bench, line.size(), [&] {
     Datagram datagram;
     if (!read(opaque_line(), datagram) || !read_state(datagram, state)) {
       bench.SkipWithError("refused");
@@ -84,19 +73,19 @@ void read_typed_state(benchmark::State& bench) {
 BENCHMARK(read_typed_state);
 
 void crc_table(benchmark::State& bench) {
-  measure(bench, [] { benchmark::DoNotOptimize(crc32_table(opaque_line())); });
+  measure(bench, line.size(), [] { benchmark::DoNotOptimize(crc32_table(opaque_line())); });
 }
 BENCHMARK(crc_table);
 
 void crc_fast(benchmark::State& bench) {
-  measure(bench, [] { benchmark::DoNotOptimize(crc32(opaque_line())); });
+  measure(bench, line.size(), [] { benchmark::DoNotOptimize(crc32(opaque_line())); });
 }
 BENCHMARK(crc_fast);
 
 // The floor: nothing is written or read without moving its bytes and checking their CRC.
 void copy_and_crc(benchmark::State& bench) {
   char buffer[max_datagram];
-  measure(bench, [&] {
+  measure(bench, line.size(), [&] {
     const Text bytes = opaque_line();
     std::memcpy(buffer, bytes.data(), bytes.size());
     benchmark::DoNotOptimize(libdeflate_crc32(0, buffer, bytes.size()));

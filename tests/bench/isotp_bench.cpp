@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "tests/bench/allocations.hpp"
+#include "tests/bench/measure.hpp"
 #include "transports/framing/isotp_receiver.hpp"
 #include "transports/framing/isotp_sender.hpp"
 
@@ -57,32 +57,22 @@ struct Ends {
   IsotpReceiver receiver{receiver_options(), buffer, sizeof buffer};
 };
 
-template <class Work>
-void measure(benchmark::State& bench, Work work) {
-  bench.counters["allocs"] = allocations_per_call(work);
-  for (auto _ : bench) {
-    work();
-    benchmark::ClobberMemory();
-  }
-  bench.SetBytesProcessed(bench.iterations() * datagram_size);
-}
-
 void isotp_cut(benchmark::State& bench) {
   Ends ends;
-  measure(bench, [&] { ends.cut(); });
+  measure(bench, datagram_size, [&] { ends.cut(); });
 }
 BENCHMARK(isotp_cut);
 
 void isotp_join(benchmark::State& bench) {
   Ends ends;
   ends.cut();
-  measure(bench, [&] { ends.join(); });
+  measure(bench, datagram_size, [&] { ends.join(); });
 }
 BENCHMARK(isotp_join);
 
 void isotp_cut_and_join(benchmark::State& bench) {
   Ends ends;
-  measure(bench, [&] {
+  measure(bench, datagram_size, [&] {
     ends.cut();
     ends.join();
   });
@@ -92,7 +82,7 @@ BENCHMARK(isotp_cut_and_join);
 // The floor.
 void isotp_copy(benchmark::State& bench) {
   Ends ends;
-  measure(bench, [&] {
+  measure(bench, datagram_size, [&] {
     benchmark::DoNotOptimize(ends.datagram);
     for (std::size_t i = 0; i < frame_count - 1; ++i) {
       std::memcpy(ends.frames[i].data + 1, ends.datagram + i * 7, 7);

@@ -5,7 +5,7 @@
 
 #include <cstring>
 
-#include "tests/bench/allocations.hpp"
+#include "tests/bench/measure.hpp"
 #include "transports/framing/packed_form.hpp"
 
 namespace r4::bench {
@@ -16,20 +16,10 @@ constexpr Text line(
     "OSMC1:400,1;STEP1POS:-100;SERVO1POS:2000;PNum:7434;T:79090;^0xf07cfd9a^");
 constexpr Text command("O:358,1,1;PNum:66;T:1699276044383;^0x7fefae81^");
 
-template <class Work>
-void measure(benchmark::State& bench, Text datagram, Work work) {
-  bench.counters["allocs"] = allocations_per_call(work);
-  for (auto _ : bench) {
-    work();
-    benchmark::ClobberMemory();
-  }
-  bench.SetBytesProcessed(bench.iterations() * static_cast<std::int64_t>(datagram.size()));
-}
-
 void pack_datagram(benchmark::State& bench, Text datagram) {
   std::uint8_t bytes[max_datagram];
   if (pack(datagram, bytes, sizeof bytes) == 0) bench.SkipWithError("travels plain");
-  measure(bench, datagram, [&] {
+  measure(bench, datagram.size(), [&] {
     Text text = datagram;
     benchmark::DoNotOptimize(text);
     benchmark::DoNotOptimize(pack(text, bytes, sizeof bytes));
@@ -44,7 +34,7 @@ void unpack_datagram(benchmark::State& bench, Text datagram) {
   std::size_t size = pack(datagram, bytes, sizeof bytes);
   const UnpackResult result = unpack(bytes, size, out, sizeof out);
   if (!result || Text(out, result.size) != datagram) bench.SkipWithError("not the datagram");
-  measure(bench, datagram, [&] {
+  measure(bench, datagram.size(), [&] {
     benchmark::DoNotOptimize(size);
     benchmark::DoNotOptimize(unpack(bytes, size, out, sizeof out));
   });
@@ -55,7 +45,7 @@ BENCHMARK_CAPTURE(unpack_datagram, command, command);
 // The floor: nothing is recoded without moving its bytes.
 void copy_datagram(benchmark::State& bench) {
   char buffer[max_datagram];
-  measure(bench, line, [&] {
+  measure(bench, line.size(), [&] {
     Text text = line;
     benchmark::DoNotOptimize(text);
     std::memcpy(buffer, text.data(), text.size());

@@ -81,6 +81,13 @@ class Running:
         while not self.lines.empty():
             self.lines.get()
 
+    def stall(self, seconds):
+        """Holds it up and forgets what came before; returns the time at which it went on."""
+        self.signal(signal.SIGSTOP)
+        time.sleep(seconds)  # the stall itself
+        self.skip_past()
+        return self.signal(signal.SIGCONT)
+
     def signal(self, number):
         self.process.send_signal(number)
         return time.monotonic()
@@ -138,6 +145,18 @@ class Board(Running):
         """The next event of that state."""
         return self.next(lambda each: each.get('state') == state and 'outputs' not in each and
                          reason in (None, each['reason']), timeout)
+
+    def never(self, state, seconds, meanwhile=lambda: None):
+        """For that long it does not come to that state; `meanwhile` is called all the time."""
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            meanwhile()
+            try:
+                came = self.state(state, timeout=0.1)
+            except AssertionError as nothing:
+                assert 'nothing of that kind' in str(nothing)
+            else:
+                raise AssertionError(f'the board has become {state}: {came}')
 
     def outputs(self, is_it=lambda outputs: True, timeout=PATIENCE_S):
         return self.next(lambda each: 'outputs' in each and is_it(each['outputs']), timeout)

@@ -213,12 +213,7 @@ def test_a_stalled_reader_gets_a_young_state_first(board):
     with monitor(board.host_url) as host:
         for _ in range(50):
             before = host.next(is_state)
-        host.signal(signal.SIGSTOP)
-        deadline = time.monotonic() + 0.7
-        while time.monotonic() < deadline:  # the stall itself
-            time.sleep(0.01)
-        host.skip_past()
-        host.signal(signal.SIGCONT)
+        host.stall(0.7)
         first = host.next(is_state)
         # Longer than the heartbeats may stay away: the board goes safe, and the link comes back.
         host.signal(signal.SIGSTOP)
@@ -235,13 +230,7 @@ def test_a_stalled_pipe_does_not_stall_the_heartbeats(board):
                           stderr=subprocess.PIPE, text=True) as host:
         assert host.stdout.readline()
         # Nobody reads on: the pipe of 64 kB is full after some 250 states.
-        silent_until = time.monotonic() + 5
-        while time.monotonic() < silent_until:
-            try:
-                board.state('SAFE', timeout=0.5)
-                pytest.fail('the board went safe')
-            except AssertionError as nothing:
-                assert 'nothing of that kind' in str(nothing)
+        board.never('SAFE', 5)
         host.send_signal(signal.SIGINT)
         host.stdout.read()
         assert 'left out' in host.stderr.read()

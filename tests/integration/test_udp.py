@@ -154,12 +154,7 @@ def test_a_stalled_reader_gets_a_young_state_first(board):
     with monitor(board.host_url) as host:
         for _ in range(50):
             before = host.next(is_state)
-        host.signal(signal.SIGSTOP)
-        deadline = time.monotonic() + 0.6
-        while time.monotonic() < deadline:  # the stall itself
-            board.next(timeout=0.1) if not board.lines.empty() else time.sleep(0.01)
-        host.skip_past()
-        woken = host.signal(signal.SIGCONT)
+        woken = host.stall(0.6)
         first = host.next(is_state)
     age_ms = (first['came'] - before['came']) * 1000 - (first['t'] - before['t'])
     print(f'the first state is {age_ms:.1f} ms old, {1000 * (first["came"] - woken):.1f} ms after waking')

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
-#include <cstring>
 #include <exception>
 #include <iostream>
 #include <string>
@@ -17,6 +16,7 @@
 
 #include "help.hpp"
 #include "json.hpp"
+#include "line_writer.hpp"
 #include "subcommands.hpp"
 #include "transports/error.hpp"
 
@@ -117,9 +117,9 @@ void flush_output() {
   errno = 0;
   std::cout.flush();  // CLI11 prints help there
   if (!std::cout || std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
-    throw Error(ErrorKind::open, "standard output", std::strerror(errno != 0 ? errno : EIO),
-                "make room where it goes, or send it elsewhere");
+    throw output_error(errno != 0 ? errno : EIO);
   }
+  LineWriter::finish();
 }
 
 }  // namespace

@@ -5,9 +5,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <climits>
+#include <cstring>
 #include <utility>
 
 namespace r4::tool {
@@ -15,6 +17,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr std::chrono::seconds farewell{1};
+
+std::atomic<int> first_error{0};  // the errno of the first write that failed
 
 }  // namespace
 
@@ -41,6 +45,15 @@ void LineWriter::write(std::string_view line) {
     waiting_ += line;
   }
   changed_.notify_one();
+}
+
+void LineWriter::finish() {
+  if (first_error != 0) throw output_error(first_error);
+}
+
+Error output_error(int error) {
+  return Error(ErrorKind::open, "standard output", std::strerror(error),
+               "make room where it goes, or send it elsewhere");
 }
 
 void LineWriter::run() {
@@ -73,7 +86,9 @@ bool LineWriter::write_out(std::string_view text) {
         ::write(STDOUT_FILENO, text.data(), std::min<std::size_t>(text.size(), PIPE_BUF));
     if (written > 0) {
       text.remove_prefix(static_cast<std::size_t>(written));
-    } else if (errno != EINTR && errno != EAGAIN) {
+    } else if (const int error = errno; error != EINTR && error != EAGAIN) {
+      int none = 0;
+      first_error.compare_exchange_strong(none, error);
       return false;
     }
   }

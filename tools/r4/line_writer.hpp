@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Lines to standard output from a loop that must not wait for whoever reads them: a pipe that nobody
 // empties, a terminal that is held. A thread of its own writes them; what does not fit into a
-// megabyte is lost and counted.
+// megabyte is lost and counted. An output that cannot be written holds nobody up either; finish()
+// tells of it when the command ends.
 #pragma once
 
 #include <condition_variable>
@@ -12,6 +13,8 @@
 #include <string>
 #include <string_view>
 #include <thread>
+
+#include "transports/error.hpp"
 
 namespace r4::tool {
 
@@ -27,6 +30,9 @@ class LineWriter {
   // `line` with its end. Never waits.
   void write(std::string_view line);
 
+  // When no writer is left: throws Error if one could not write. Standard output is one for all.
+  static void finish();
+
   static constexpr std::size_t capacity = std::size_t{1} << 20;
 
  private:
@@ -41,5 +47,8 @@ class LineWriter {
   bool ending_ = false;
   std::thread thread_;
 };
+
+// The error of a standard output that cannot be written, by errno.
+Error output_error(int error);
 
 }  // namespace r4::tool

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "packed_words.hpp"
 
+#include "../../protocol/word_index.hpp"
+
 namespace r4 {
 namespace packed {
 namespace {
@@ -58,40 +60,13 @@ static_assert(words[code_servo1pos].word().size() == 9 && words[code_safe].text[
                   words[code_r4_ros2].text[1] == '4' && words[code_ros2_r4].text[1] == 'O',
               "the codes by name are those of the table");
 
-// Words by hash, made at compile time: open addressing, less than half full.
-constexpr unsigned slot_count = 256;
-constexpr std::uint8_t empty_slot = 0xFF;
-constexpr std::size_t longest_word = 10;  // "SERVO10POS"
-
-constexpr unsigned slot_of(Text word) {
-  std::uint32_t hash = 2166136261U;  // FNV-1a
-  for (const char c : word) hash = (hash ^ static_cast<unsigned char>(c)) * 16777619U;
-  return (hash ^ hash >> 16) % slot_count;
-}
-
-struct Index {
-  std::uint8_t code[slot_count] = {};
-  constexpr Index() {
-    for (std::uint8_t& slot : code) slot = empty_slot;
-    for (unsigned i = 0; i < word_count; ++i) {
-      unsigned slot = slot_of(words[i].word());
-      while (code[slot] != empty_slot) slot = (slot + 1) % slot_count;
-      code[slot] = static_cast<std::uint8_t>(i);
-    }
-  }
-};
-constexpr Index index;
+constexpr Text word_of(const PackedWord& word) { return word.word(); }
+constexpr WordIndex<PackedWord, word_count, word_of> index(words);
+static_assert(no_word == no_index, "what is not found has no code");
 
 }  // namespace
 
-unsigned code_of(Text word) {
-  if (word.size() > longest_word) return no_word;
-  for (unsigned slot = slot_of(word);; slot = (slot + 1) % slot_count) {
-    const unsigned code = index.code[slot];
-    if (code == empty_slot) return no_word;
-    if (words[code].word() == word) return code;
-  }
-}
+unsigned code_of(Text word) { return index.find(word); }
 
 }  // namespace packed
 }  // namespace r4

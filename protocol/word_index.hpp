@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Finds a word in a table of words by its hash, with no work at run time but the lookup. The index is
+// made by the compiler; a table with a word twice finds the first.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "text.hpp"
+
+namespace r4 {
+
+constexpr unsigned no_index = 0xFF;
+
+// For a table of `count` entries, of which `word_of` tells the word. The table must be constexpr and
+// outlive the index.
+template <class Entry, unsigned count, Text (*word_of)(const Entry&)>
+class WordIndex {
+ public:
+  constexpr explicit WordIndex(const Entry (&table)[count]) : table_(table) {
+    for (std::uint8_t& slot : entry_) slot = no_index;
+    for (unsigned i = 0; i < count; ++i) {
+      const Text word = word_of(table[i]);
+      if (word.size() > longest_) longest_ = word.size();
+      unsigned slot = slot_of(word);
+      while (entry_[slot] != no_index) slot = (slot + 1) % slot_count;
+      entry_[slot] = static_cast<std::uint8_t>(i);
+    }
+  }
+
+  // The number of the entry with that word, or no_index. Constant time.
+  unsigned find(Text word) const {
+    if (word.size() > longest_) return none;
+    for (unsigned slot = slot_of(word);; slot = (slot + 1) % slot_count) {
+      const unsigned found = entry_[slot];
+      if (found == no_index || word_of(table_[found]) == word) return found;
+    }
+  }
+
+ private:
+  // Open addressing.
+  static constexpr unsigned slot_count = 256;
+  static_assert(count < slot_count / 2, "less than half full");
+
+  static constexpr unsigned slot_of(Text word) {
+    std::uint32_t hash = 2166136261U;  // FNV-1a
+    for (const char c : word) hash = (hash ^ static_cast<unsigned char>(c)) * 16777619U;
+    return (hash ^ hash >> 16) % slot_count;
+  }
+
+  const Entry* table_;
+  std::size_t longest_ = 0;
+  std::uint8_t entry_[slot_count] = {};
+};
+
+}  // namespace r4
