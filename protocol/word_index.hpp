@@ -30,7 +30,7 @@ class WordIndex {
 
   // The number of the entry with that word, or no_index. Constant time.
   unsigned find(Text word) const {
-    if (word.size() > longest_) return none;
+    if (word.size() > longest_) return no_index;
     for (unsigned slot = slot_of(word);; slot = (slot + 1) % slot_count) {
       const unsigned found = entry_[slot];
       if (found == no_index || word_of(table_[found]) == word) return found;
