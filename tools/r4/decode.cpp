@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 decode: datagrams in, one a line, JSON out. Whatever the input, memory stays bounded: a line
-// that is too long to be a datagram is measured, not kept.
+// r4 decode: datagrams in, one a line or as the frames of a CAN bus, JSON out. Whatever the input,
+// memory stays bounded.
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -13,20 +13,20 @@
 #include <string>
 #include <string_view>
 
+#include "bus_log.hpp"
 #include "json.hpp"
+#include "numbered_lines.hpp"
 #include "options.hpp"
 #include "protocol/datagram.hpp"
-#include "protocol/message.hpp"
 #include "protocol/numbers.hpp"
 #include "subcommands.hpp"
-#include "transports/framing/line_framing.hpp"
-#include "transports/framing/packed_form.hpp"
 
 namespace r4::tool {
 namespace {
 
 struct Options {
   std::string file = "-";
+  bool candump = false;
 };
 
 class Input {
@@ -67,127 +67,92 @@ class Input {
 // A line packed:HEX, as r4 encode --packed writes it. No datagram looks so: it has a semicolon.
 constexpr std::string_view packed_prefix = "packed:";
 
-bool is_packed_line(Text line) {
-  const std::string_view text(line.data(), line.size());
-  return text.starts_with(packed_prefix) && text.find(';') == std::string_view::npos;
+bool is_packed_line(std::string_view line) {
+  return line.starts_with(packed_prefix) && line.find(';') == std::string_view::npos;
 }
 
-// The datagram at `out`; else why there is none: "hex", or the UnpackError by name.
-const char* unpack_line(Text line, std::array<char, max_datagram>& out, std::size_t& size,
-                        std::size_t& packed_size) {
-  const Text hex = line.substr(packed_prefix.size());
-  std::array<std::uint8_t, max_datagram> bytes;
-  if (hex.size() % 2 != 0) return "hex";
-  packed_size = hex.size() / 2;  // a line holds no more than max_datagram characters
-  for (std::size_t i = 0; i < packed_size; ++i) {
-    std::uint32_t byte = 0;
-    if (!parse_hex(hex.substr(2 * i, 2), byte)) return "hex";
-    bytes[i] = static_cast<std::uint8_t>(byte);
-  }
-  const UnpackResult result = unpack(bytes.data(), packed_size, out.data(), out.size());
-  size = result.size;
-  return to_text(result.error);
+void print(const Json& object) {
+  const std::string line = line_of(object);
+  std::fwrite(line.data(), 1, line.size(), stdout);
 }
 
-class Decoder {
+// Datagrams, one a line.
+class DatagramLines {
  public:
-  void push(std::string_view bytes) {
-    while (!bytes.empty()) {
-      const std::size_t end = std::min(bytes.find_first_of("\r\n"), bytes.size());
-      const bool ends = end != bytes.size();
-      const std::size_t taken = end + (ends ? 1 : 0);
-      line_size_ += end;
-      framing_.push(bytes.data(), taken, [this](Text line) { report(line); });
-      if (!ends) {
-        after_cr_ = false;
-        return;
-      }
-      if (line_size_ > max_datagram) report_long_line();
-      const bool second_half = bytes[end] == '\n' && end == 0 && after_cr_;  // of CR LF
-      if (!second_half) ++line_;
-      line_size_ = 0;
-      after_cr_ = bytes[end] == '\r';
-      bytes.remove_prefix(taken);
-    }
-  }
-  void finish() {
-    if (line_size_ != 0) push("\n");
-  }
-  bool any_bad() const { return any_bad_; }
-
- private:
-  void report(Text line) {
-    if (!is_packed_line(line)) {
-      report_datagram(line, 0);
-      return;
-    }
-    std::array<char, max_datagram> datagram;
-    std::size_t size = 0;
-    std::size_t packed_size = 0;
-    const std::string_view reason = unpack_line(line, datagram, size, packed_size);
-    if (reason.empty()) {
-      report_datagram(Text(datagram.data(), size), packed_size);
-      return;
-    }
-    any_bad_ = true;
-    print(Json{{"line", line_},
-               {"ok", false},
-               {"error", "packed"},
-               {"reason", reason},
-               {"text", escaped({line.data(), line.size()})}});
-  }
-
-  // `packed_size`: how many bytes it had in the packed form; 0 if it is plain.
-  void report_datagram(Text line, std::size_t packed_size) {
-    Datagram datagram;
-    const ReadResult result = read(line, datagram);
-    Json object{{"line", line_}, {"ok", static_cast<bool>(result)}};
-    if (packed_size != 0) object["packed"] = packed_size;
-    if (result) {
-      object["type"] = to_text(kind_of(datagram));
-      object["pnum"] = datagram.has_pnum() ? Json(datagram.pnum()) : Json();
-      object["t"] = datagram.has_time() ? Json(datagram.time_ms()) : Json();
-      object["fields"] = fields_json(datagram);
-    } else {
-      object.update(bad_datagram_json(result));
+  void on_line(std::uint64_t number, std::string_view line) {
+    Json object{{"line", number}};
+    if (!(is_packed_line(line) ? add_packed(object, line) : add_plain(object, line))) {
       any_bad_ = true;
     }
-    object["text"] = escaped({line.data(), line.size()});
     print(object);
   }
-
-  void report_long_line() {
+  void on_long_line(std::uint64_t number, std::uint64_t size) {
     any_bad_ = true;
     ReadResult result;
     result.error = ReadError::length;
     result.position = max_datagram;
-    Json object{{"line", line_}, {"ok", false}};
+    Json object{{"line", number}, {"ok", false}};
     object.update(bad_datagram_json(result));
-    object["size"] = line_size_;
+    object["size"] = size;
     print(object);
   }
+  void finish() {}
+  bool any_bad() const { return any_bad_; }
 
-  static void print(const Json& object) {
-    const std::string line = line_of(object);
-    std::fwrite(line.data(), 1, line.size(), stdout);
+ private:
+  static bool add_plain(Json& object, std::string_view line) {
+    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): characters as bytes
+    return add_datagram_json(object, reinterpret_cast<const std::uint8_t*>(line.data()),
+                             line.size(), DatagramForm::plain);
+  }
+  static bool add_packed(Json& object, std::string_view line) {
+    const std::string_view hex = line.substr(packed_prefix.size());
+    std::array<std::uint8_t, max_datagram> bytes;  // a line holds no more characters
+    const std::size_t size = hex.size() / 2;
+    bool good = hex.size() % 2 == 0;
+    for (std::size_t i = 0; good && i < size; ++i) {
+      std::uint32_t byte = 0;
+      good = parse_hex(Text(hex.substr(2 * i, 2)), byte);
+      bytes[i] = static_cast<std::uint8_t>(byte);
+    }
+    if (good) {
+      good = add_datagram_json(object, bytes.data(), size, DatagramForm::packed);
+    } else {
+      object.update({{"ok", false}, {"error", "packed"}, {"reason", "hex"}});
+    }
+    if (object.value("error", "") == "packed") object["text"] = escaped(line);
+    return good;
   }
 
-  LineFraming framing_;
-  std::uint64_t line_ = 1;
-  std::uint64_t line_size_ = 0;
-  bool after_cr_ = false;
   bool any_bad_ = false;
 };
 
-int decode(const Options& options) {
-  Input input(options.file);
-  Decoder decoder;
+template <class Reader>
+int decode_lines(Input& input, Reader& reader) {
+  NumberedLines lines;
+  const auto line = [&](std::uint64_t number, std::string_view text) {
+    reader.on_line(number, text);
+  };
+  const auto too_long = [&](std::uint64_t number, std::uint64_t size) {
+    reader.on_long_line(number, size);
+  };
   for (std::string_view bytes = input.read(); !bytes.empty(); bytes = input.read()) {
-    decoder.push(bytes);
+    lines.push(bytes, line, too_long);
     std::fflush(stdout);  // a pipe's reader need not wait for more
   }
-  decoder.finish();
-  return decoder.any_bad() ? static_cast<int>(ErrorKind::data) : 0;
+  lines.finish(line, too_long);
+  reader.finish();
+  return reader.any_bad() ? static_cast<int>(ErrorKind::data) : 0;
+}
+
+int decode(const Options& options) {
+  Input input(options.file);
+  if (options.candump) {
+    BusLog log(print);
+    return decode_lines(input, log);
+  }
+  DatagramLines datagrams;
+  return decode_lines(input, datagrams);
 }
 
 constexpr const char* footer = R"(One JSON object for each line of input that is not empty:
@@ -203,12 +168,27 @@ constexpr const char* footer = R"(One JSON object for each line of input that is
                 (of a later one: update r4) or syntax
   text          the datagram; bytes that are no printable ASCII, and \, as \xNN
 
+--candump reads what candump prints, candump -L best, and joins the frames of every interface and
+node to datagrams. Before those keys, and with the line and time of the last frame:
+  time          as in the dump: seconds, or a date as text; null where it has none
+  interface, node, from, lane   from host: command; from board: reply, telemetry
+  frames, took_ms   how many it took, and how long from the first to the last
+  type          also emergency_stop, and went_safe with its reason
+  error isotp   a transfer that failed, and why: a receiver on the bus lost it, too
+  error candump a line that is none of candump's: reason and fix
+The last object is the summary. It counts what is not printed: flow control, orphans (frames
+without the beginning of their transfer), unfinished transfers, frames that are none of ours (other),
+error frames of the controller.
+
 Examples:
   r4 encode O:358,1,1 | r4 decode
   r4 encode O:358,1,1 --packed | r4 decode
   cut -f2 tests/data/paper_capture.tsv | r4 decode
+  candump -L can0 | r4 decode --candump
+  r4 decode --candump bus.log | jq -c 'select(.node == 3 and .lane == "command")'
 
-Exit codes: 0 every datagram is valid; 1 at least one is not; 4, 5 the file cannot be read.)";
+Exit codes: 0 every datagram is valid; 1 at least one is not, or with --candump a transfer failed or
+a line is damaged; 4, 5 the file cannot be read.)";
 
 }  // namespace
 
@@ -218,6 +198,7 @@ void add_decode(CLI::App& root, Action& chosen) {
       root, chosen, "decode", "Check datagrams and show them as JSON", footer, options, decode);
   command->add_option("FILE", options->file, "datagrams, one a line (default: standard input)")
       ->type_name(file_type);
+  command->add_flag("--candump", options->candump, "the file is what candump printed");
 }
 
 }  // namespace r4::tool

@@ -3,8 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cstdio>
 #include <vector>
+
+#include "protocol/message.hpp"
+#include "transports/framing/packed_form.hpp"
 
 namespace r4::tool {
 namespace {
@@ -75,6 +79,40 @@ Json bad_datagram_json(const ReadResult& result) {
     object["found"] = fmt::format("{:#x}", result.crc_found);
   }
   return object;
+}
+
+bool add_datagram_json(Json& object, const std::uint8_t* bytes, std::size_t size,
+                       DatagramForm form) {
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): bytes as characters
+  Text text(reinterpret_cast<const char*>(bytes), size);
+  std::array<char, max_datagram> plain;
+  const bool packed = form == DatagramForm::packed ||
+                      (form == DatagramForm::by_first_byte && size != 0 && is_packed(bytes[0]));
+  if (packed) {
+    const UnpackResult result = unpack(bytes, size, plain.data(), plain.size());
+    if (!result) {
+      object["ok"] = false;
+      object["error"] = "packed";
+      object["reason"] = to_text(result.error);
+      object["text"] = fmt::format("packed:{:02x}", fmt::join(bytes, bytes + size, ""));
+      return false;
+    }
+    text = Text(plain.data(), result.size);
+  }
+  Datagram datagram;
+  const ReadResult result = read(text, datagram);
+  object["ok"] = static_cast<bool>(result);
+  if (packed) object["packed"] = size;
+  if (result) {
+    object["type"] = to_text(kind_of(datagram));
+    object["pnum"] = datagram.has_pnum() ? Json(datagram.pnum()) : Json();
+    object["t"] = datagram.has_time() ? Json(datagram.time_ms()) : Json();
+    object["fields"] = fields_json(datagram);
+  } else {
+    object.update(bad_datagram_json(result));
+  }
+  object["text"] = escaped(view(text));
+  return static_cast<bool>(result);
 }
 
 Json problem_json(const Problem& problem) {

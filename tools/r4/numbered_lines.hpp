@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The lines of an input, with their numbers from 1, whatever ends them: CR, LF or both. Memory is
+// one line of max_datagram characters: a longer one is measured, not kept.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "transports/framing/line_framing.hpp"
+
+namespace r4::tool {
+
+class NumberedLines {
+ public:
+  // Calls line(number, text) for each line that is complete and not empty, and too_long(number,
+  // size) for each that is longer than max_datagram.
+  template <class Line, class TooLong>
+  void push(std::string_view bytes, Line line, TooLong too_long) {
+    while (!bytes.empty()) {
+      const std::size_t end = std::min(bytes.find_first_of("\r\n"), bytes.size());
+      const bool ends = end != bytes.size();
+      const std::size_t taken = end + (ends ? 1 : 0);
+      size_ += end;
+      framing_.push(bytes.data(), taken,
+                    [&](Text text) { line(number_, std::string_view(text.data(), text.size())); });
+      if (!ends) {
+        after_cr_ = false;
+        return;
+      }
+      if (size_ > max_datagram) too_long(number_, size_);
+      const bool second_half = bytes[end] == '\n' && end == 0 && after_cr_;  // of CR LF
+      if (!second_half) ++number_;
+      size_ = 0;
+      after_cr_ = bytes[end] == '\r';
+      bytes.remove_prefix(taken);
+    }
+  }
+  // The input has ended, perhaps within a line.
+  template <class Line, class TooLong>
+  void finish(Line line, TooLong too_long) {
+    if (size_ != 0) push("\n", line, too_long);
+  }
+
+ private:
+  LineFraming framing_;
+  std::uint64_t number_ = 1;
+  std::uint64_t size_ = 0;  // of the line so far
+  bool after_cr_ = false;
+};
+
+}  // namespace r4::tool
