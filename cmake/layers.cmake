@@ -28,7 +28,9 @@ function(r4_layer target)
   endif()
   add_library(${target} OBJECT ${ARGN})
   r4_warnings(${target})
+  # Nobody replaces our functions from a shared library: they may be inlined nevertheless.
   set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  target_compile_options(${target} PRIVATE -fno-semantic-interposition)
   set_property(GLOBAL APPEND PROPERTY R4_LAYERS ${target})
 endfunction()
 

@@ -13,17 +13,6 @@ BoardLink::Timing timing_of(const Settings& settings) {
   return timing;
 }
 
-// A stop is obeyed whatever else is in its datagram.
-bool asks_to_stop(const Datagram& datagram) {
-  for (const Field& field : datagram) {
-    Command command;
-    if (parse_command(field, command) == Refusal::none && command.kind == CommandKind::stop) {
-      return true;
-    }
-  }
-  return false;
-}
-
 std::uint32_t period_of(const Settings& settings) { return 1000U / settings.state_rate_hz; }
 
 }  // namespace

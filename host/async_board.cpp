@@ -117,7 +117,10 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   // --- Carrier::Handler
 
   void on_datagram(std::string_view bytes, Peer) override {
-    enter(Completion::How::dispatch, [&] { due = session.receive(bytes, now); });
+    enter(Completion::How::dispatch, [&] {
+      session.receive(bytes, now);
+      poll_wanted = true;
+    });
   }
   void on_drained() override {
     in_backlog = false;

@@ -46,18 +46,18 @@ Session::Session(Handler& handler, SessionOptions options, std::uint32_t first_p
 
 // --- what comes in
 
-Time Session::receive(std::string_view bytes, Time now) {
+void Session::receive(std::string_view bytes, Time now) {
   Datagram datagram;
   const ReadResult result = read(bytes, datagram);
   if (!result) {
     ++collector_.counts.damaged;
     handler_.on_bad_datagram(result, bytes);
-    return poll(now);
+    return;
   }
   const MessageKind kind = kind_of(datagram);
   const bool from_board = kind == MessageKind::board_heartbeat || kind == MessageKind::nack ||
                           kind == MessageKind::identity || kind == MessageKind::state;
-  if (!from_board || !datagram.has_pnum() || !datagram.has_time()) return poll(now);
+  if (!from_board || !datagram.has_pnum() || !datagram.has_time()) return;
   ++collector_.counts.received;
 
   bool current = false;                // tells the board's reason as it is now
@@ -81,7 +81,6 @@ Time Session::receive(std::string_view bytes, Time now) {
   }
   refresh_status(now);
   if (current) confirm_stop(before, now);
-  return poll(now);
 }
 
 // Returns whether it is the newest datagram of the board.

@@ -99,9 +99,9 @@ class Session {
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  // A datagram has come, or time has passed: does what is due. Both return when poll() is needed
-  // next, at the latest.
-  Time receive(std::string_view bytes, Time now);
+  // A datagram has come. poll() is needed then.
+  void receive(std::string_view bytes, Time now);
+  // Does what is due. Returns when it is needed next, at the latest.
   Time poll(Time now);
   // The transport has gone or come; poll() is needed now.
   void on_transport(bool up, Time now);

@@ -130,15 +130,15 @@ class Values {
 };
 
 // E, H and Q: is it one of the letter's words?
-bool read_word(char letter, Text word, Command& out) {
+bool read_word(char letter, Text word, CommandKind& out) {
   if (letter == 'H' && word == host_heartbeat_word) {
-    out = Command::heartbeat();
+    out = CommandKind::heartbeat;
   } else if (letter == 'E' && word == stop_word) {
-    out = Command::stop();
+    out = CommandKind::stop;
   } else if (letter == 'E' && word == clear_word) {
-    out = Command::clear();
+    out = CommandKind::clear;
   } else if (letter == 'Q' && word == identify_word) {
-    out = Command::identify();
+    out = CommandKind::identify;
   } else {
     return false;
   }
@@ -250,6 +250,13 @@ Field command_field(const Datagram& datagram, int& count) {
   return first;
 }
 
+bool asks_to_stop(const Datagram& datagram) {
+  for (const Field& field : datagram) {
+    if (field.name() == "E" && field.values() == stop_word) return true;
+  }
+  return false;
+}
+
 Refusal parse_command(const Field& field, Command& out) {
   if (!is_command_name(field.name())) return Refusal::unknown;
   const char letter = field.name()[0];
@@ -260,7 +267,7 @@ Refusal parse_command(const Field& field, Command& out) {
     case 'E':
     case 'Q':
       if (v.text(0).empty()) return Refusal::format;
-      if (!read_word(letter, v.text(0), command)) return Refusal::unknown;
+      if (!read_word(letter, v.text(0), command.kind)) return Refusal::unknown;
       v.count_is(1);
       break;
     case 'O':

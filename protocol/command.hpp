@@ -70,6 +70,9 @@ bool drives_output(CommandKind kind);
 // `count` tells how many there are (0 or several are no command); the first is returned.
 Field command_field(const Datagram& datagram, int& count);
 
+// Is there E:STOP among its fields? A stop is obeyed whatever else is in its datagram.
+bool asks_to_stop(const Datagram& datagram);
+
 // Reads a command field. Refusal::unknown (no such letter or word), ::format (number of values, an
 // empty one, not a whole number), ::channel, ::range (also a number too large for any type), in
 // this order; `out` is only written on Refusal::none. Its texts are views of `field`. Ranges of

@@ -152,22 +152,18 @@ bool parse_hundredths(Text text, std::int32_t& out) {
   return true;
 }
 
+// Without a branch a digit: those of a CRC cannot be predicted.
 bool parse_hex(Text text, std::uint32_t& out) {
   if (text.empty() || text.size() > 8) return false;
   std::uint32_t value = 0;
+  bool all_digits = true;
   for (const char c : text) {
-    std::uint32_t digit = 0;
-    if (is_digit(c)) {
-      digit = digit_of(c);
-    } else if (c >= 'a' && c <= 'f') {
-      digit = static_cast<std::uint32_t>(c - 'a') + 10;
-    } else if (c >= 'A' && c <= 'F') {
-      digit = static_cast<std::uint32_t>(c - 'A') + 10;
-    } else {
-      return false;
-    }
-    value = value << 4 | digit;
+    const std::uint32_t code = static_cast<unsigned char>(c);
+    const bool letter = (code | 0x20U) - 'a' < 6;
+    all_digits &= letter | (code - '0' < 10);
+    value = value << 4 | ((code & 0xFU) + (letter ? 9U : 0U));
   }
+  if (!all_digits) return false;
   out = value;
   return true;
 }

@@ -32,7 +32,10 @@ std::uint32_t ScriptedLink::board_clock() const {
   return static_cast<std::uint32_t>(now.count() / 1000) + 77'000;
 }
 
-void ScriptedLink::raw(std::string_view bytes) { due_ = session.receive(bytes, now); }
+void ScriptedLink::raw(std::string_view bytes) {
+  session.receive(bytes, now);
+  due_ = session.poll(now);
+}
 
 void ScriptedLink::finish(std::string_view fields) {
   raw(with_crc(std::string(fields) + "PNum:" + std::to_string(board_pnum++) +

@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 #include "../../protocol/datagram.hpp"
 
@@ -28,6 +29,11 @@ class LineFraming {
   std::size_t pending() const { return used_; }         // bytes of the unfinished line
 
  private:
+  static const char* find(char wanted, const char* begin, const char* end) {
+    const void* const at = std::memchr(begin, wanted, static_cast<std::size_t>(end - begin));
+    return at == nullptr ? end : static_cast<const char*>(at);
+  }
+
   char line_[max_datagram];
   std::size_t used_ = 0;
   std::uint32_t oversize_ = 0;
@@ -40,9 +46,10 @@ constexpr Text line_end("\r\n");
 template <class OnLine>
 void LineFraming::push(const char* data, std::size_t size, OnLine&& on_line) {
   const char* const end = data + size;
+  const char* feed = nullptr;  // the next line feed, or the end
   while (data != end) {
-    const char* stop = data;
-    while (stop != end && *stop != '\n' && *stop != '\r') ++stop;
+    if (feed == nullptr || feed < data) feed = find('\n', data, end);
+    const char* const stop = find('\r', data, feed);
     const std::size_t length = static_cast<std::size_t>(stop - data);
     if (!skipping_ && used_ + length > max_datagram) {
       skipping_ = true;

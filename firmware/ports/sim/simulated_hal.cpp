@@ -55,6 +55,7 @@ void SimulatedHal::power_on(std::uint32_t now_ms) {
 
 void SimulatedHal::advance(std::uint32_t now_ms) {
   const std::uint32_t passed_ms = now_ms - now_ms_;
+  if (passed_ms == 0) return;
   now_ms_ = now_ms;
   for (int i = 0; i < stepper_channels; ++i) move(steppers_[i], outputs_.stepper[i], passed_ms);
 }
