@@ -67,6 +67,13 @@ class KernelIsotp : CanSocket {
     return datagram;
   }
 
+  // The next datagram, however long it takes; returns its size, cut to `size`.
+  std::size_t await_datagram(void* data, std::size_t size) {
+    const ssize_t got = recv(fd(), data, size, 0);
+    if (got < 0) fail("CAN_ISOTP receive");
+    return static_cast<std::size_t>(got);
+  }
+
   // What went wrong since the last call, an errno; waits for it if told to. 0: nothing.
   int error(std::uint32_t limit_us = 0) {
     int error = std::exchange(error_, 0);

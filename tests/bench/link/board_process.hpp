@@ -4,10 +4,10 @@
 // Both are forked; make them before any thread.
 #pragma once
 
-#include <sys/types.h>
-
 #include <cstdint>
 #include <string>
+
+#include "child_process.hpp"
 
 namespace r4::bench {
 
@@ -19,30 +19,8 @@ struct Usage {
 };
 Usage own_usage();
 
-// Where the two processes run: on a core each, or sharing one. Left to itself, the scheduler moves
-// between the two, which differ by more than anything that is measured here.
-enum class Placement { two_cores, one_core };
-const char* to_text(Placement placement);
-// Of this process, and of those forked from now on.
-void place(Placement placement);
-
 enum class Wire { udp, pty };
 const char* to_text(Wire wire);
-
-class ChildProcess {
- public:
-  ChildProcess() = default;
-  ~ChildProcess();
-  ChildProcess(const ChildProcess&) = delete;
-  ChildProcess& operator=(const ChildProcess&) = delete;
-
- protected:
-  // True in the child.
-  bool fork_child();
-  [[noreturn]] static void end_child();
-  pid_t pid_ = -1;
-  int control_ = -1;  // a socket to the other of parent and child
-};
 
 // A simulated board. With `unbound` its clock runs as fast as it can be served, so that its 1000 Hz
 // become as many as go.
