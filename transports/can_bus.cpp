@@ -19,6 +19,8 @@ namespace {
 constexpr const char* not_acknowledged = "nobody acknowledges";
 constexpr std::chrono::milliseconds retry_interval{1};
 constexpr std::chrono::milliseconds look_interval{100};
+// Frames of a transfer often come closer together than a loop goes to sleep and is woken up.
+constexpr int most_looks = 8;
 
 // The buses of one event loop.
 class Buses : public asio::execution_context::service {
@@ -119,12 +121,23 @@ void CanBus::receive() {
 }
 
 void CanBus::take() {
-  if (receiving_ || socket_.number() < 0) return;
-  const int count = socket_.receive(in_);
-  if (count == -EAGAIN || count == -EINTR) return;
-  if (count < 0) return go_down(can_problem(interface_, -count), true);
+  if (receiving_) return;
+  bool any = false;
+  for (int looks = 0; looks < most_looks && socket_.number() >= 0; ++looks) {
+    const int count = socket_.receive(in_);
+    if (count == -EAGAIN || count == -EINTR) break;
+    if (count < 0) return go_down(can_problem(interface_, -count), true);
+    hand_over(static_cast<std::size_t>(count));
+    any = true;
+  }
+  if (any && socket_.number() >= 0) {
+    for_each_member([](Member& member) { member.on_drained(); });
+  }
+}
+
+void CanBus::hand_over(std::size_t count) {
   receiving_ = true;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+  for (std::size_t i = 0; i < count; ++i) {
     if (in_[i].error != 0) {
       on_error_frame(in_[i]);
       continue;
@@ -136,9 +149,6 @@ void CanBus::take() {
     for_each_member([&](Member& member) { member.on_frame(in_[i].frame, at_us); });
   }
   receiving_ = false;
-  if (static_cast<std::size_t>(count) < in_.size()) {
-    for_each_member([](Member& member) { member.on_drained(); });
-  }
 }
 
 void CanBus::on_error_frame(const CanSocket::Received& received) {

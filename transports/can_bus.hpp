@@ -84,6 +84,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
 
   void listen();
   void receive();
+  void hand_over(std::size_t count);
   void on_error_frame(const CanSocket::Received& received);
   bool refill(std::uint32_t now_us);
   void send_later();

@@ -90,6 +90,26 @@ struct Control {
 
 }  // namespace
 
+// Where recvmmsg() puts frames. The headers are made once: most calls take few frames.
+struct CanSocket::Inbox {
+  Inbox() {
+    for (std::size_t i = 0; i < batch; ++i) {
+      parts[i] = {&raw[i], sizeof(canfd_frame)};
+      messages[i].msg_hdr.msg_iov = &parts[i];
+      messages[i].msg_hdr.msg_iovlen = 1;
+      messages[i].msg_hdr.msg_control = controls[i].bytes;
+      messages[i].msg_hdr.msg_controllen = control_size;
+    }
+  }
+  std::array<canfd_frame, batch> raw{};
+  std::array<iovec, batch> parts{};
+  std::array<mmsghdr, batch> messages{};
+  std::array<Control, batch> controls{};
+};
+
+CanSocket::CanSocket() : inbox_(std::make_unique<Inbox>()) {}
+CanSocket::~CanSocket() = default;
+
 void CanSocket::open(const std::string& interface, bool fd) {
   close();
   // Which of the two is missing: CAN as such, or this interface.
@@ -154,18 +174,7 @@ void CanSocket::hear_everything() {
 }
 
 int CanSocket::receive(std::array<Received, batch>& frames) {
-  std::array<canfd_frame, batch> raw;
-  std::array<iovec, batch> parts;
-  std::array<mmsghdr, batch> messages;
-  std::array<Control, batch> controls;
-  for (std::size_t i = 0; i < batch; ++i) {
-    parts[i] = {&raw[i], sizeof(canfd_frame)};
-    messages[i] = {};
-    messages[i].msg_hdr.msg_iov = &parts[i];
-    messages[i].msg_hdr.msg_iovlen = 1;
-    messages[i].msg_hdr.msg_control = controls[i].bytes;
-    messages[i].msg_hdr.msg_controllen = control_size;
-  }
+  auto& [raw, parts, messages, controls] = *inbox_;
   const int count = ::recvmmsg(descriptor_.get(), messages.data(), batch, MSG_DONTWAIT, nullptr);
   if (count < 0) return -errno;
 
@@ -191,6 +200,7 @@ int CanSocket::receive(std::array<Received, batch>& frames) {
         std::memcpy(&overflows_, CMSG_DATA(item), sizeof overflows_);
       }
     }
+    messages[i].msg_hdr.msg_controllen = control_size;  // the kernel wrote what it used
     received.error = (raw[i].can_id & CAN_ERR_FLAG) != 0 ? raw[i].can_id & CAN_ERR_MASK : 0;
     received.frame = from_kernel(raw[i], messages[i].msg_len == CANFD_MTU);
   }

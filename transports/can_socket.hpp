@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,11 @@ class CanSocket {
  public:
   using Clock = std::chrono::steady_clock;
   static constexpr std::size_t batch = 64;
+
+  CanSocket();
+  ~CanSocket();
+  CanSocket(const CanSocket&) = delete;
+  CanSocket& operator=(const CanSocket&) = delete;
 
   struct Received {
     CanFrame frame;           // of an error frame, the data hold its details
@@ -58,10 +64,12 @@ class CanSocket {
   std::uint32_t overflows() const { return overflows_; }
 
  private:
+  struct Inbox;
   FileDescriptor descriptor_;
   FileDescriptor first_;  // with a priority and a queue of its own
   int index_ = 0;
   std::uint32_t overflows_ = 0;
+  const std::unique_ptr<Inbox> inbox_;
 };
 
 }  // namespace r4

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A CAN bus against the kernel's own ISO-TP (CAN_ISOTP with CAN_ISOTP_FRAME_TXTIME_ZERO), on vcan0:
 //
-//     tools/with-can build/tests/bench/r4_can_bench [rounds, default 9]
+//     tools/with-can build/tests/bench/r4_can_bench [rounds, default 9
+//                  [part: round-trip or throughput]]
 //
 // Round trip: a command and the state that confirms it, through all of the stack on both sides,
 // beside blocking sockets that send as many bytes to and fro. Throughput: datagrams of 170 bytes one
@@ -226,15 +227,21 @@ void compare_throughput(Lane lane, int rounds) {
       verdict(median(ratios) >= 1));
 }
 
-int run(int rounds) {
+int run(int rounds, const std::string& part) {
+  const auto wanted = [&](const char* name) { return part.empty() || part == name; };
   for (const Placement placement : {Placement::two_cores, Placement::one_core}) {
     place(placement);
-    std::printf("%s\nround trip of a command and the state that confirms it, %d rounds of %d\n",
-                to_text(placement), rounds, trips);
-    compare_round_trips(rounds);
-    std::printf("datagrams of %zu bytes one way, %d rounds of %u\n", datagram_size, rounds,
-                datagrams);
-    for (const Lane lane : {Lane::telemetry, Lane::dialogue}) compare_throughput(lane, rounds);
+    std::printf("%s\n", to_text(placement));
+    if (wanted("round-trip")) {
+      std::printf("round trip of a command and the state that confirms it, %d rounds of %d\n",
+                  rounds, trips);
+      compare_round_trips(rounds);
+    }
+    if (wanted("throughput")) {
+      std::printf("datagrams of %zu bytes one way, %d rounds of %u\n", datagram_size, rounds,
+                  datagrams);
+      for (const Lane lane : {Lane::telemetry, Lane::dialogue}) compare_throughput(lane, rounds);
+    }
     std::fflush(stdout);
   }
   return all_met ? 0 : 1;
@@ -246,7 +253,7 @@ int run(int rounds) {
 int main(int argc, char** argv) {
   const int rounds = argc > 1 ? std::atoi(argv[1]) : 9;
   try {
-    return r4::bench::run(std::max(rounds, 1));
+    return r4::bench::run(std::max(rounds, 1), argc > 2 ? argv[2] : "");
   } catch (const std::exception& error) {
     std::fprintf(stderr, "r4_can_bench: %s\n", error.what());
     return 1;
