@@ -33,7 +33,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   bool up() const override { return handler_ != nullptr && bus_->up(); }
   std::size_t max_size() const override { return max_datagram; }
   const std::string& name() const override { return name_; }
-  const CarrierCounters& counters() const override { return counters_; }
+  const CarrierCounters& counters() const override;
 
  private:
   using Clock = CanBus::Clock;
@@ -61,7 +61,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   const bool fd_;
   const std::string name_;
   CanNode node_;
-  CarrierCounters counters_;
+  mutable CarrierCounters counters_;  // what others count is put in when it is asked for
   std::array<Lane, 2> lanes_;
   std::shared_ptr<CanBus> bus_;
   Handler* handler_ = nullptr;
@@ -94,6 +94,24 @@ CanCarrier::CanCarrier(asio::io_context& io, Url url, Role role)
           Lane{CanLane::telemetry, SendQueue(normal_entries, state_entries, counters_.tx_dropped)}},
       timer_(io) {
   node_.use_packed_form(url_.get_number("pack", 0, 1, 0) == 1);
+}
+
+TransferCounters transfers_of(const CanNode& node) {
+  TransferCounters sum;
+  for (const CanLane lane : {CanLane::dialogue, CanLane::telemetry}) {
+    const IsotpSenderCounters& out = node.sent(lane);
+    const IsotpReceiverCounters& in = node.received(lane);
+    sum.wrong_sequence += in.wrong_sequence_number;
+    sum.timed_out += in.consecutive_timeout + in.send_timeout + in.too_many_waits +
+                     out.flow_control_timeout + out.send_timeout + out.too_many_waits;
+    sum.overflow += in.overflow + out.overflow;
+    sum.interrupted += in.interrupted;
+    sum.unexpected += in.unexpected_frame + out.unexpected_frame;
+    sum.malformed += in.malformed + out.malformed + out.invalid_flow_status;
+  }
+  sum.packed = node.counters().unpacked;
+  sum.bad_form = node.counters().bad_form;
+  return sum;
 }
 
 void CanCarrier::open(Handler& handler) {
@@ -169,8 +187,13 @@ void CanCarrier::on_frame(const CanFrame& frame, std::uint32_t at_us) {
   handler_->on_datagram({datagram.data(), datagram.size()}, everyone);
 }
 
+const CarrierCounters& CanCarrier::counters() const {
+  if (bus_) counters_.rx_overflows = bus_->overflows();
+  counters_.transfers = transfers_of(node_);
+  return counters_;
+}
+
 void CanCarrier::on_drained() {
-  counters_.rx_overflows = bus_->overflows();
   handler_->on_drained();
   if (handler_ != nullptr) arm();
 }

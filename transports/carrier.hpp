@@ -10,6 +10,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -35,6 +36,21 @@ enum class SendResult : std::uint8_t {
   down,  // the transport is down at the moment, or nobody is known at the other end
 };
 
+// Where a datagram travels in several frames (CAN): what became of the transfers, of both directions.
+struct TransferCounters {
+  // Ended a transfer, whose datagram is lost.
+  std::uint64_t wrong_sequence = 0;  // a frame was lost, doubled or overtaken
+  std::uint64_t timed_out = 0;       // a frame, or leave to send one, did not come in time
+  std::uint64_t overflow = 0;        // longer than a datagram may be
+  std::uint64_t interrupted = 0;     // another began in its place
+  // Frames that were passed over.
+  std::uint64_t unexpected = 0;  // of no transfer
+  std::uint64_t malformed = 0;
+  // Packed datagrams that came.
+  std::uint64_t packed = 0;    // taken
+  std::uint64_t bad_form = 0;  // not what can be unpacked
+};
+
 struct CarrierCounters {
   std::uint64_t rx_datagrams = 0;
   std::uint64_t rx_bytes = 0;
@@ -45,8 +61,9 @@ struct CarrierCounters {
   std::uint64_t tx_bytes = 0;
   std::uint64_t tx_dropped = 0;  // replaced by newer state, expired or refused
   std::uint64_t tx_errors = 0;
-  std::uint64_t downs = 0;  // times the transport was lost
-  std::uint64_t ups = 0;    // times it came (back) up
+  std::uint64_t downs = 0;                    // times the transport was lost
+  std::uint64_t ups = 0;                      // times it came (back) up
+  std::optional<TransferCounters> transfers;  // none: a datagram is one packet or line
 };
 
 struct CarrierEvent {

@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-from r4_process import ERROR, Board, is_link, is_state, monitor, run
+from r4_process import ERROR, Board, is_link, is_state, monitor, objects, run
 
 # The board's timeout, what docs/safety.md promises on top, and what an emulated machine may take.
 SAFE_WITHIN_MS = 1020 + 80
@@ -158,6 +158,8 @@ def test_packed_and_fd_take_fewer_frames(board):
     plain = frames_a_second()
     assert run('send', board.host_url, 'C:pack,1', timeout=60).returncode == 0
     packed = frames_a_second()
+    measured = objects(run('bench', board.host_url, '--duration', '2', '--json', timeout=60).stdout)[0]
+    assert measured['transfers']['packed'] > 50 and measured['transfers']['bad_form'] == 0
     print(f'{plain:.0f} frames a second plain, {packed:.0f} packed')
     assert plain > 2000 and packed < 700
 
@@ -227,6 +229,8 @@ def test_garbage_on_every_id_of_ours_harms_nobody(board):
             subprocess.run(['cangen', 'vcan0', '-I', f'{identifier:x}', '-n', '300', '-g', '0'], check=True)
         host.skip_past()
         host.next(is_state)
+        counts = [each['fields'] for each in host.rest() if each['type'] == 'transfers'][0]
+    assert counts['unexpected'] > 0 and counts['malformed'] > 0 and counts['packed'] == 0, counts
     board.state('SAFE', 'link')
     executed = [each['executed']['command'] for each in board.log if 'executed' in each]
     assert executed and all(command.startswith('F:') for command in executed), executed

@@ -49,5 +49,17 @@ TEST(Json, ReplacesWhatIsNoUtf8) {
   EXPECT_EQ(line_of({{"thing", "\xff"}}), "{\"thing\":\"\xEF\xBF\xBD\"}\n");
 }
 
+TEST(Json, TellsOfTransfersWhereThereAreSome) {
+  CarrierCounters counters;
+  EXPECT_TRUE(transfers_json(counters).is_null());
+  counters.rx_overflows = 3;
+  counters.transfers = TransferCounters();
+  counters.transfers->timed_out = 2;
+  const Json json = transfers_json(counters);
+  EXPECT_EQ(json["timed_out"], 2);
+  EXPECT_EQ(json["wrong_sequence"], 0);
+  EXPECT_EQ(json["dropped_frames"], 3);
+}
+
 }  // namespace
 }  // namespace r4::tool

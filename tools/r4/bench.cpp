@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "host/async_board.hpp"
@@ -187,7 +188,7 @@ class Bench {
                   {"p99", durations.quantile(0.99)},
                   {"max", durations.quantile(1)}};
     };
-    print_line({{"type", "bench"},
+    Json result{{"type", "bench"},
                 {"transport", board_.name()},
                 {"connect_us", connect_us_},
                 {"round_trip_us", quantiles(round_trips_)},
@@ -199,7 +200,10 @@ class Bench {
                 {"jitter_us", jitter_us_},
                 {"confirmation_us", quantiles(confirmations_)},
                 {"unconfirmed", unconfirmed_},
-                {"commands_per_s", per_second()}});
+                {"commands_per_s", per_second()}};
+    Json transfers = transfers_json(board_.carrier_counters());
+    if (!transfers.is_null()) result["transfers"] = std::move(transfers);
+    print_line(result);
   }
 
   void print_table() {
@@ -216,6 +220,24 @@ class Bench {
     row("round trip, median", round_trips_, unanswered_);
     row("command confirmed", confirmations_, unconfirmed_);
     fmt::print("  commands confirmed    {:>9.0f} a second, one at a time\n", per_second());
+    print_transfers(board_.carrier_counters());
+  }
+
+  static void print_transfers(const CarrierCounters& counters) {
+    if (!counters.transfers) return;
+    const TransferCounters& transfers = *counters.transfers;
+    fmt::print(
+        "  transfers lost        {:>9}       {} wrong sequence, {} timed out, {} overflow, "
+        "{} interrupted\n",
+        transfers.wrong_sequence + transfers.timed_out + transfers.overflow + transfers.interrupted,
+        transfers.wrong_sequence, transfers.timed_out, transfers.overflow, transfers.interrupted);
+    fmt::print(
+        "  frames passed over    {:>9}       {} unexpected, {} malformed; dropped by the "
+        "system {}\n",
+        transfers.unexpected + transfers.malformed, transfers.unexpected, transfers.malformed,
+        counters.rx_overflows);
+    fmt::print("  packed datagrams      {:>9}       {} of bad form\n", transfers.packed,
+               transfers.bad_form);
   }
 
   const Options& options_;

@@ -115,6 +115,20 @@ bool add_datagram_json(Json& object, const std::uint8_t* bytes, std::size_t size
   return static_cast<bool>(result);
 }
 
+Json transfers_json(const CarrierCounters& counters) {
+  if (!counters.transfers) return nullptr;
+  const TransferCounters& transfers = *counters.transfers;
+  return {{"wrong_sequence", transfers.wrong_sequence},
+          {"timed_out", transfers.timed_out},
+          {"overflow", transfers.overflow},
+          {"interrupted", transfers.interrupted},
+          {"unexpected", transfers.unexpected},
+          {"malformed", transfers.malformed},
+          {"packed", transfers.packed},
+          {"bad_form", transfers.bad_form},
+          {"dropped_frames", counters.rx_overflows}};
+}
+
 Json problem_json(const Problem& problem) {
   return {{"type", "error"},
           {"kind", name_of(problem.kind)},

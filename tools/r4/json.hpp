@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "protocol/datagram.hpp"
+#include "transports/carrier.hpp"
 #include "transports/error.hpp"
 
 namespace r4::tool {
@@ -37,6 +38,10 @@ bool add_datagram_json(Json& object, const std::uint8_t* bytes, std::size_t size
 
 // {"type":"error","kind":…,"thing":…,"reason":…,"fix":…}
 Json problem_json(const Problem& problem);
+
+// {"wrong_sequence":…,"timed_out":…,"overflow":…,"interrupted":…,"unexpected":…,"malformed":…,
+//  "packed":…,"bad_form":…,"dropped_frames":…}; null where datagrams do not travel in frames.
+Json transfers_json(const CarrierCounters& counters);
 
 // Any bytes as printable ASCII: what is not, and the backslash, as \xNN.
 std::string escaped(std::string_view bytes);

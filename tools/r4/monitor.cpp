@@ -55,6 +55,7 @@ class Monitor {
     end_after(options_.duration ? *options_.duration : patience);
     next_tick();
     io_.run();
+    view_->on_end();
     view_->on_tick();
     const std::uint64_t skipped = view_->skipped();
     if (skipped != 0) {
@@ -132,7 +133,7 @@ int monitor(const Options& options) { return Monitor(options).run(); }
 constexpr const char* footer =
     R"(On a terminal: a status, redrawn in place. Into a pipe: one line a state. With --json: one object a
 line, with type (state, heartbeat, link, nack, error), transport, pnum, t and fields (numbers as
-numbers, several values as an array).
+numbers, several values as an array); on a CAN bus, at the end, one of type transfers.
 
 The monitor takes part in the link: it sends heartbeats, so the board streams and, unless another
 host has it, obeys this one. It goes on when the transport is lost and comes back.

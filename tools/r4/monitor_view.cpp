@@ -88,6 +88,10 @@ class JsonView final : public MonitorView {
     }
     on_link(board_.link());
   }
+  void on_end() override {
+    Json transfers = transfers_json(board_.carrier_counters());
+    if (!transfers.is_null()) lines_.print(line_of(object("transfers", std::move(transfers))));
+  }
   void on_tick() override { lines_.print_held(); }
   std::uint64_t skipped() const override { return lines_.skipped(); }
 

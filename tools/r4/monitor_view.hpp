@@ -19,6 +19,7 @@ class MonitorView {
 
   virtual void on_state(const Datagram& datagram) = 0;
   virtual void on_heartbeat(const Datagram& datagram) = 0;
+  virtual void on_end() {}  // before the last tick
   virtual void on_nack(const Nack& nack, const Datagram& datagram) = 0;
   virtual void on_bad_datagram(const ReadResult& result, std::string_view bytes) = 0;
   virtual void on_link(const LinkStatus& status) = 0;
