@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What test_can_python.py runs where SocketCAN is: r4 against the host and the board of can_python.py."""
+import contextlib
+import subprocess
+import sys
+import time
+
+import pytest
+
+import can_python
+from r4_process import Board, is_state, monitor, objects, run
+
+BOARD_URL, HOST_URL = 'can://vcan0?node=3', 'can://vcan0?node=4'
+SLOWLY = ('--set', 'rate,20')  # python takes half a millisecond a frame in an emulated machine
+sys.setswitchinterval(0.0005)
+
+
+@contextlib.contextmanager
+def recording(path):
+    """candump -L of vcan0 from before the block to after it."""
+    with open(path, 'w', encoding='ascii') as file, \
+            subprocess.Popen(['candump', '-L', 'vcan0'], stdout=file) as process:
+        try:
+            yield
+        finally:
+            process.terminate()
+
+
+@contextlib.contextmanager
+def python_host(**options):
+    host = can_python.Host('vcan0', 3, **options)
+    try:
+        yield host
+    finally:
+        host.close()
+
+
+@pytest.fixture(name='board')
+def running_board():
+    with Board(BOARD_URL, options=SLOWLY) as board:
+        yield board
+
+
+# --- python is the host, r4 sim the board
+
+def test_host_connects_commands_and_sees_it_in_the_state(board, tmp_path):
+    with recording(tmp_path / 'bus.log'), python_host() as host:
+        host.beats = False
+        host.next(lambda fields: 'H' in fields)
+        assert host.heard[-1][0] == 'H:R4-ROS2;PNum:0;T:0;^0xb10b3a06^'
+        host.beats = True
+        host.take_control()
+        assert host.command('O:358,1,1') == 'done'
+        state = host.next(lambda fields: 'OSMC1' in fields)
+        assert (state['OSMC1'], state['SAFE'], state['DMHSTA']) == ('358,1', '0', '1')
+        heard = [text for text, _, _ in host.heard]
+    board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
+    executed = [each['executed']['command'] for each in board.log if 'executed' in each]
+    assert executed == ['F:DEFAULT,SAFE,CMD', 'O:358,1,1']
+    # What candump saw, r4 decodes to the same datagrams. (candump may have begun within one.)
+    *decoded, summary = objects(run('decode', '--candump', str(tmp_path / 'bus.log'), timeout=60).stdout)
+    assert summary['damaged_lines'] == 0 and summary['bad'] == 0 and summary['other'] == 0
+    of_board = {each['text'] for each in decoded if each.get('from') == 'board' and 'text' in each}
+    missing = [text for text in heard if text not in of_board]
+    assert len(heard) > 5 and len(missing) <= 1, missing
+    assert [each['fields']['O'] for each in decoded if 'O' in each.get('fields', {})][:1] == [[358, 1, 1]]
+
+
+def test_host_is_refused_on_the_reply_lane_and_a_number_is_executed_once(board):
+    with python_host() as host:
+        host.take_control()
+        assert host.command('O:358,1,9') == 'CHANNEL'
+        assert host.command('O:5000,1,1') == 'RANGE'
+        assert host.command('X:1') == 'UNKNOWN'
+        assert host.command('O:100,1,1') == 'done'
+        answer = host.next(lambda fields: 'N' in fields, retry=host.newest_command)
+        assert answer['N'].endswith(',DUPLICATE') and answer['N'].partition(',')[0] in host.newest_command
+    board.outputs(lambda outputs: outputs['osmc'][0] == [100, 1])
+    assert sum('executed' in each and each['executed']['command'] == 'O:100,1,1' for each in board.log) == 1
+
+
+def test_the_board_obeys_blocks_and_gaps_of_the_hosts_flow_control(board):
+    with python_host(block_size=2, stmin=3) as host:
+        host.take_control()
+        asked, replies = time.monotonic(), host.receivers[0x203]
+        _, question = host.send('Q:ID')
+        assert host.next(lambda fields: 'I' in fields, retry=question)['I'].startswith('R4,')
+        frames = -(-(len(host.heard[-1][0]) - 6) // 7)  # of which the gap is within each pair
+        assert time.monotonic() - asked >= frames // 2 * 0.003
+        assert replies.answered >= -(-frames // 2)
+        assert host.command('O:358,1,9') == 'CHANNEL'
+    board.state('SAFE', 'link')
+
+
+def test_the_emergency_frame_stops_is_told_in_one_frame_and_can_be_cleared(board):
+    with python_host() as host:
+        host.take_control()
+        assert host.command('O:358,1,1') == 'done'
+        host.stop()
+        assert host.next(lambda fields: fields.get('H') and fields.get('SAFE'))['SAFE'] == '2'
+        assert [reason for _, reason in host.went_safe] == [2]
+        state = host.next(lambda fields: 'OSMC1' in fields)
+        assert (state['SAFE'], state['OSMC1']) == ('2', '0,0')
+        assert host.command('O:358,1,1') == 'SAFE'
+        host.next(lambda fields: 'H' in fields)
+        assert host.command('E:CLEAR') == 'done'
+        assert host.command('O:200,0,1') == 'done'
+    board.state('SAFE', 'stop')
+    board.outputs(lambda outputs: outputs['osmc'][0] == [200, 0])
+
+
+def test_a_host_that_falls_silent_leaves_the_board_safe_and_comes_back(board):
+    with python_host() as host:
+        host.take_control()
+        silent, host.beats = time.monotonic(), False
+        host.run_until(lambda: host.went_safe, timeout=5)
+        at, reason = host.went_safe[0]
+        print(f'silence to the went-safe frame {(at - silent) * 1000:.0f} ms')
+        assert reason == 1 and 0.85 <= at - silent <= 1.2
+        assert host.next(lambda fields: 'H' in fields)['SAFE'] == '1'
+        host.beats = True
+        assert host.next(lambda fields: 'OSMC1' in fields)['SAFE'] == '0'
+    assert board.state('SAFE', 'link')['silence'] >= 1000
+
+
+def test_both_ends_pack(board):
+    with python_host() as host:
+        host.take_control()
+        assert host.command('C:pack,1') == 'done'
+        host.next(lambda fields: 'H' in fields)
+        host.packs = True
+        assert host.command('O:358,1,1') == 'done'
+        assert host.command('O:358,1,9') == 'CHANNEL'
+        host.next(lambda fields: fields.get('OSMC1') == '358,1')
+        assert all(packed for _, _, packed in host.heard[-3:])
+        assert host.command('C:pack,0') == 'done'
+        host.next(lambda fields: 'OSMC1' in fields and not host.heard[-1][2])
+    board.executed('O:358,1,1')
+
+
+def test_a_host_that_speaks_fd_is_understood_and_hears_fd():
+    with Board(BOARD_URL + '&fd=1', options=SLOWLY) as board, python_host(fd=True) as host:
+        host.take_control()
+        assert host.command('O:358,1,1') == 'done'
+        assert host.command('O:358,1,9') == 'CHANNEL'
+        host.fd = False
+        assert host.command('O:359,1,1') == 'done'
+        board.executed('O:359,1,1')
+
+
+# --- python is the board, r4 the host
+
+def test_monitor_follows_a_python_board():
+    with can_python.Board('vcan0', 4) as board, monitor(HOST_URL) as host:
+        host.next(lambda each: each['type'] == 'link' and each['fields']['state'] == 'active')
+        state = host.next(lambda each: is_state(each) and 'CMD' in each['fields'])
+        assert state['fields']['AIN24'] == 24.1 and state['transport'] == HOST_URL
+        times = [host.next(is_state)['t'] for _ in range(20)]
+        assert times == sorted(set(times))
+        assert host.end() == 0
+    assert board.executed == ['F:DEFAULT,SAFE,CMD'] and board.stops == 0
+
+
+@pytest.mark.parametrize('options', [{}, {'packs': True}, {'fd': True}])
+def test_send_is_confirmed_by_a_python_board(options):
+    with can_python.Board('vcan0', 4, **options) as board:
+        url = HOST_URL + ('&fd=1' if 'fd' in options else '') + ('&pack=1' if 'packs' in options else '')
+        result = run('send', url, 'O:358,1,1', 'Q:ID', timeout=60)
+    assert result.returncode == 0 and 'second' in result.stdout, result
+    assert board.executed == ['F:DEFAULT,SAFE,CMD', 'O:358,1,1']
+
+
+def test_send_tells_of_a_refusal_of_a_python_board():
+    with can_python.Board('vcan0', 4, refuses='S') as board:
+        result = run('send', HOST_URL, 'S:1500,1', timeout=60)
+    assert result.returncode == 3 and 'RANGE' in result.stderr, result
+    assert board.executed == ['F:DEFAULT,SAFE,CMD']
+
+
+def test_a_python_board_that_never_confirms_is_no_success():
+    with can_python.Board('vcan0', 4, obeys=False) as board:
+        result = run('send', HOST_URL, '--timeout', '2', 'O:358,1,1', timeout=60)
+        assert result.returncode == 3 and 'not confirmed' in result.stdout, result
+    assert board.executed == []
+
+
+def test_stop_is_the_emergency_frame_and_a_python_board_confirms_it():
+    with can_python.Board('vcan0', 4) as board, monitor(HOST_URL) as host:
+        host.next(lambda each: is_state(each) and each['fields'].get('SAFE') == 0)
+        result = run('stop', HOST_URL, timeout=60)
+        assert result.returncode == 0 and 'SAFE (stop)' in result.stdout, result
+        host.next(lambda each: is_state(each) and each['fields']['SAFE'] == 2)
+    assert board.stops >= 1 and board.osmc == '0,0'
