@@ -186,7 +186,20 @@ void CanBus::set_trouble(std::string reason, std::string fix) {
 
 // --- sending
 
-// Takes what members offer, a transfer of one after the other. True if frames wait now.
+// Flow control behind a whole datagram of telemetry would come too late on a slow bus. What finds no
+// room is offered again with the rest.
+void CanBus::send_urgent(std::uint32_t now_us) {
+  CanFrame frame;
+  for (const Place& place : members_) {
+    while (place.member != nullptr && place.member->offer_urgent(now_us, frame) &&
+           socket_.send_first(frame) == CanSocket::Outcome::done) {
+      place.member->frame_sent(now_us);
+    }
+  }
+}
+
+// Takes what members offer, a transfer of one after the other. True if there is any. Not while some
+// are left: of what waits longer, members choose the newest.
 bool CanBus::refill(std::uint32_t now_us) {
   std::size_t quiet = 0;
   while (out_count_ < ahead && quiet < members_.size()) {
@@ -209,7 +222,8 @@ void CanBus::send() {
   sending_ = true;
   CanSocket::Outcome outcome = CanSocket::Outcome::done;
   if (out_count_ == 0) progress_ = Clock::now();
-  while (outcome == CanSocket::Outcome::done && refill(now_us())) {
+  send_urgent(now_us());
+  while (outcome == CanSocket::Outcome::done && (out_count_ != 0 || refill(now_us()))) {
     std::size_t sent = 0;
     outcome = socket_.send(out_.data(), out_count_, sent);
     const int error = errno;
@@ -229,6 +243,7 @@ void CanBus::send() {
   } else if (outcome != CanSocket::Outcome::failed) {
     send_later();
   }
+  for_each_member([](Member& member) { member.on_sent(); });
 }
 
 // A socket that is writable tells so; a full interface queue does not.
@@ -277,8 +292,13 @@ void CanBus::go_down(Problem problem, bool reopen) {
 
 // Also when nothing was wrong but a warning.
 void CanBus::come_up() {
-  trouble_.clear();
-  if (std::exchange(up_, true)) return;
+  const bool troubled = !std::exchange(trouble_, {}).empty();
+  if (std::exchange(up_, true)) {
+    if (!troubled) return;
+    return tell({CarrierEvent::Kind::warning,
+                 Problem{ErrorKind::open, "can://" + interface_,
+                         "the trouble is over: the controller is error-active again", ""}});
+  }
   tell({CarrierEvent::Kind::up, Problem{ErrorKind::open, "can://" + interface_, "", ""}});
 }
 

@@ -4,8 +4,8 @@
 //
 // Each member hears all frames that any of them asked for, but none that a member sent. Frames
 // leave in the order in which members offer them; a member's transfer is not interrupted by
-// another's. Of what the interface does not take, at most `ahead` frames wait here; after 100 ms
-// without progress they are dropped.
+// another's. At most `ahead` frames are taken from members at a time, the next when the interface has
+// them; after 100 ms without progress they are dropped.
 #pragma once
 
 #include <array>
@@ -36,7 +36,10 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
     virtual void on_drained() = 0;  // all frames that had arrived were handed over
     // The frame to send now, accepted with frame_sent().
     virtual bool offer(std::uint32_t now_us, CanFrame& frame) = 0;
+    // The same, of those that may overtake what was accepted before.
+    virtual bool offer_urgent(std::uint32_t now_us, CanFrame& frame) = 0;
     virtual void frame_sent(std::uint32_t now_us) = 0;
+    virtual void on_sent() = 0;  // all was asked for what they offer: time to set a timer
     // The bus came up or went down (transfers are over), or the controller is in trouble.
     virtual void on_bus(const CarrierEvent& event) = 0;
     // The bus took nothing for too long: what was under way is lost.
@@ -74,6 +77,8 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   SendResult send_stop();
 
   bool up() const { return up_; }
+  // Frames wait for the interface. None is asked for until it has taken them.
+  bool full() const { return out_count_ != 0; }
   std::uint32_t overflows() const { return socket_.overflows(); }
 
  private:
@@ -86,6 +91,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   void receive();
   void hand_over(std::size_t count);
   void on_error_frame(const CanSocket::Received& received);
+  void send_urgent(std::uint32_t now_us);
   bool refill(std::uint32_t now_us);
   void send_later();
   void set_trouble(std::string reason, std::string fix);

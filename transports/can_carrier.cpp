@@ -44,14 +44,18 @@ class CanCarrier final : public Carrier, private CanBus::Member {
 
   void on_frame(const CanFrame& frame, std::uint32_t at_us) override;
   void on_drained() override;
+  void on_sent() override { arm(); }
   bool offer(std::uint32_t now_us, CanFrame& frame) override;
+  bool offer_urgent(std::uint32_t now_us, CanFrame& frame) override {
+    return node_.offer_urgent(now_us, frame);
+  }
   void frame_sent(std::uint32_t now_us) override { node_.frame_sent(now_us); }
   void on_bus(const CarrierEvent& event) override;
   void on_stuck() override;
 
   Lane& lane(CanLane which) { return lanes_[which == CanLane::dialogue ? 0 : 1]; }
-  bool begin(std::string_view bytes);
-  bool begin_waiting();
+  bool begin(std::string_view bytes, std::uint32_t now_us);
+  bool begin_waiting(std::uint32_t now_us);
   void arm();
 
   asio::io_context& io_;
@@ -147,36 +151,36 @@ SendResult CanCarrier::send(std::string_view bytes, Priority priority, Peer) {
     return result;
   }
   Lane& own = lane(node_.lane_of(Text(bytes.data(), bytes.size())));
-  if (!own.queue.empty() || !begin(bytes)) {
-    return own.queue.push(bytes, priority, everyone, Clock::now());
+  SendResult result = SendResult::sent;
+  if (!own.queue.empty() || !begin(bytes, CanBus::now_us())) {
+    result = own.queue.push(bytes, priority, everyone, Clock::now());
   }
   bus_->send();
-  arm();
-  return SendResult::sent;
+  return result;
 }
 
-bool CanCarrier::begin(std::string_view bytes) {
-  if (!node_.begin(Text(bytes.data(), bytes.size()), CanBus::now_us())) return false;
+bool CanCarrier::begin(std::string_view bytes, std::uint32_t now_us) {
+  if (!node_.begin(Text(bytes.data(), bytes.size()), now_us)) return false;
   ++counters_.tx_datagrams;
   counters_.tx_bytes += bytes.size();
   return true;
 }
 
 // Begins the next datagram of each lane that has become idle. True if there was one.
-bool CanCarrier::begin_waiting() {
+bool CanCarrier::begin_waiting(std::uint32_t now_us) {
   bool any = false;
   for (Lane& each : lanes_) {
     if (each.queue.empty() || !node_.idle(each.which)) continue;
     const SendQueue::Entry* const entry = each.queue.front(Clock::now());
     if (entry == nullptr) continue;
-    any = begin(entry->text()) || any;
+    any = begin(entry->text(), now_us) || any;
     each.queue.pop();
   }
   return any;
 }
 
 bool CanCarrier::offer(std::uint32_t now_us, CanFrame& frame) {
-  return node_.offer(now_us, frame) || (begin_waiting() && node_.offer(now_us, frame));
+  return node_.offer(now_us, frame) || (begin_waiting(now_us) && node_.offer(now_us, frame));
 }
 
 void CanCarrier::on_frame(const CanFrame& frame, std::uint32_t at_us) {
@@ -195,12 +199,13 @@ const CarrierCounters& CanCarrier::counters() const {
 
 void CanCarrier::on_drained() {
   handler_->on_drained();
-  if (handler_ != nullptr) arm();
 }
 
 void CanCarrier::arm() {
   const IsotpDeadline deadline = node_.deadline();
-  if (!deadline.armed) return;
+  if (handler_ == nullptr || !deadline.armed) return;
+  // What is due to be sent waits for the bus, which asks for it.
+  if (bus_->full() && reached(CanBus::now_us(), deadline.at_us)) return;
   if (armed_ && reached(deadline.at_us, armed_for_us_)) return;
   armed_ = true;
   armed_for_us_ = deadline.at_us;
@@ -213,7 +218,6 @@ void CanCarrier::arm() {
     if (handler_ == nullptr) return;
     node_.poll(CanBus::now_us());
     bus->send();
-    arm();
   }));
 }
 

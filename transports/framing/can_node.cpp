@@ -92,6 +92,16 @@ void CanNode::note_reason(Text heartbeat) {
 }
 
 bool CanNode::offer(std::uint32_t now_us, CanFrame& frame) {
+  if (offer_urgent(now_us, frame)) return true;
+  if (dialogue_out_.offer(now_us, frame)) {
+    offered_ = Offered::dialogue;
+  } else if (telemetry_out_.offer(now_us, frame)) {
+    offered_ = Offered::telemetry;
+  }
+  return offered_ != Offered::nothing;
+}
+
+bool CanNode::offer_urgent(std::uint32_t now_us, CanFrame& frame) {
   offered_ = Offered::nothing;
   if (dialogue_in_.offer(now_us, frame)) {
     offered_ = Offered::flow_control;
@@ -101,10 +111,6 @@ bool CanNode::offer(std::uint32_t now_us, CanFrame& frame) {
     frame.size = 1;
     frame.data[0] = static_cast<std::uint8_t>(reason_);
     offered_ = Offered::reason;
-  } else if (dialogue_out_.offer(now_us, frame)) {
-    offered_ = Offered::dialogue;
-  } else if (telemetry_out_.offer(now_us, frame)) {
-    offered_ = Offered::telemetry;
   }
   return offered_ != Offered::nothing;
 }

@@ -56,6 +56,9 @@ class CanNode {
   // Writes the frame to send now, the most urgent first; the same one until frame_sent(), unless
   // something more urgent came. False: none.
   bool offer(std::uint32_t now_us, CanFrame& frame);
+  // Of those, only what stands alone and may overtake all that was accepted before: flow control,
+  // for which the other end waits, and the reason of going safe.
+  bool offer_urgent(std::uint32_t now_us, CanFrame& frame);
   // The frame that was offered last was accepted.
   void frame_sent(std::uint32_t now_us);
   // Takes a frame; one that is none of its own is passed over. Returns the datagram that it
