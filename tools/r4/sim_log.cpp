@@ -192,13 +192,15 @@ void SimLog::on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code) {
 void SimLog::on_carrier(std::uint32_t t_ms, const Carrier& carrier,
                         const CarrierEvent& carrier_event) {
   const std::string_view kind = name_of_kind(carrier_event.kind);
-  const std::string& reason = carrier_event.problem.reason;
+  const auto& [error, thing, reason, fix] = carrier_event.problem;
   if (!json_) {
     return print(
-        t_ms, fmt::format("{} {}{}{}", carrier.name(), kind, reason.empty() ? "" : ": ", reason));
+        t_ms, fmt::format("{} {}{}{}{}{}", carrier.name(), kind, reason.empty() ? "" : ": ", reason,
+                          fix.empty() ? "" : "; ", fix));
   }
   Json object = event(t_ms);
-  object["transport"] = {{"url", carrier.name()}, {"event", kind}, {"reason", reason}};
+  object["transport"] = {
+      {"url", carrier.name()}, {"event", kind}, {"reason", reason}, {"fix", fix}};
   print(object);
 }
 
