@@ -50,10 +50,31 @@ int CanBusModel::add_node(CanNodeOptions options) {
 }
 
 bool CanBusModel::send(int node, const CanFrame& frame) {
-  Node& sender = nodes_[static_cast<std::size_t>(node)];
+  Node& sender = to_node(node);
   if (sender.queue.size() >= sender.options.room) return false;
   sender.queue.push_back({frame, now_ns_});
   return true;
+}
+
+void CanBusModel::set_errors(int node, unsigned transmit_errors, unsigned receive_errors) {
+  to_node(node).transmit_errors = transmit_errors;
+  to_node(node).receive_errors = receive_errors;
+  update_state(to_node(node));
+}
+
+void CanBusModel::clear(int node) {
+  std::vector<Waiting>& queue = to_node(node).queue;
+  if (on_bus_ && to_node(node).sending) {
+    queue = {queue[to_node(node).chosen]};
+    to_node(node).chosen = 0;
+  } else {
+    queue.clear();
+  }
+}
+
+std::uint64_t CanBusModel::next_ns() const {
+  const std::uint64_t action_ns = actions_.empty() ? never : actions_.begin()->first;
+  return std::min(next().time_ns, action_ns);
 }
 
 void CanBusModel::run_until(std::uint64_t time_ns) {
@@ -83,6 +104,7 @@ CanBusModel::Next CanBusModel::next() const {
   Next first{Step::none, never, 0};
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     const Node& node = nodes_[i];
+    if (!node.present) continue;
     if (node.state == CanNodeState::bus_off) {
       if (!node.options.comes_back) continue;
       const std::uint64_t left = (runs_to_come_back - node.recessive_runs) * run_bits;
@@ -102,6 +124,7 @@ void CanBusModel::begin_frame() {
   std::uint64_t best = never;
   for (Node& node : nodes_) {
     node.sending = false;
+    if (!node.present) continue;
     if (node.state == CanNodeState::bus_off) {
       if (node.options.comes_back) node.recessive_runs += runs;
       continue;
@@ -128,10 +151,11 @@ void CanBusModel::begin_frame() {
   for (Node& node : nodes_) {
     node.sending = node.sending && rank(node.queue[node.chosen].frame) == best;
     if (!node.sending) {
-      acknowledged_ |= node.state != CanNodeState::bus_off && !node.options.silent;
+      acknowledged_ |= node.on_bus() && !node.options.silent;
       continue;
     }
     if (frame != nullptr && !same(*frame, node.queue[node.chosen].frame)) damaged_ = true;
+    damaged_ |= node.spoiled;
     frame = &node.queue[node.chosen].frame;
   }
   CanBits bits = can_bits(*frame, options_.rate.data != 0);
@@ -157,7 +181,7 @@ void CanBusModel::succeed() {
   std::vector<std::size_t> senders;
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     Node& node = nodes_[i];
-    if (node.state != CanNodeState::bus_off) count_success(node, node.sending);
+    if (node.on_bus()) count_success(node, node.sending);
     if (!node.sending) continue;
     const auto sent = node.queue.begin() + static_cast<std::ptrdiff_t>(node.chosen);
     frame = sent->frame;
@@ -176,7 +200,7 @@ void CanBusModel::succeed() {
   std::vector<std::size_t> receivers;
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     const Node& node = nodes_[i];
-    if (node.sending || node.state == CanNodeState::bus_off) continue;
+    if (node.sending || !node.on_bus()) continue;
     if (!random_.chance(options_.missed)) receivers.push_back(i);
   }
   for (const std::size_t i : senders) {
@@ -197,7 +221,11 @@ void CanBusModel::fail() {
       busy_ns_ += free_at_ns_ - begun_ns_;
       counted = true;
     }
-    if (node.state != CanNodeState::bus_off) count_error(node, node.sending);
+    if (!node.on_bus()) continue;
+    count_error(node, node.sending);
+    if (node.options.failed && (node.sending || damaged_)) {
+      node.options.failed(damaged_ ? CanBusError::damaged : CanBusError::not_acknowledged);
+    }
   }
 }
 

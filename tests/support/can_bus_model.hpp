@@ -40,6 +40,7 @@ enum class CanQueue : std::uint8_t {
   fifo,       // the oldest is next, whatever waits behind it
 };
 enum class CanNodeState : std::uint8_t { active, passive, bus_off };
+enum class CanBusError : std::uint8_t { damaged, not_acknowledged };
 
 struct CanNodeOptions {
   CanQueue queue = CanQueue::mailboxes;
@@ -47,9 +48,11 @@ struct CanNodeOptions {
   bool silent = false;     // listens only: acknowledges nothing, counts no errors
   bool comes_back = true;  // returns from bus-off by itself
   // A frame of its own is out (called before the others receive it); one of another node came in;
+  // it saw an error frame (all do of a damaged frame, its sender of one that nobody acknowledged);
   // its state has changed. At the end of the frame, its intermission not yet begun.
   std::function<void(const CanFrame&)> sent = {};
   std::function<void(const CanFrame&)> received = {};
+  std::function<void(CanBusError)> failed = {};
   std::function<void(CanNodeState)> changed = {};
 };
 
@@ -70,12 +73,25 @@ class CanBusModel {
   bool send(int node, const CanFrame& frame);
   // The next `count` frames are seen damaged by all.
   void corrupt_next(unsigned count) { corrupt_next_ = count; }
+  void set_corrupted(double probability) { options_.corrupted = probability; }
+  // What this node sends is seen damaged by all: it will be bus-off.
+  void spoil(int node, bool spoiled) { to_node(node).spoiled = spoiled; }
+  // Its controller is on the bus or it is off: neither sends nor hears, nor acknowledges. What is
+  // on the bus ends first.
+  void set_present(int node, bool present) { to_node(node).present = present; }
+  // Whether it returns from bus-off by itself; to be allowed to begins that.
+  void let_come_back(int node, bool comes_back) { to_node(node).options.comes_back = comes_back; }
+  void set_errors(int node, unsigned transmit_errors, unsigned receive_errors);
+  // Forgets what waits, but not the frame on the bus.
+  void clear(int node);
   // Runs `action` then; those of one time in the order of the calls, and before what the bus does.
   void at(std::uint64_t time_ns, std::function<void()> action) {
     actions_.emplace(time_ns < now_ns_ ? now_ns_ : time_ns, std::move(action));
   }
   // Runs all that happens up to and with that time.
   void run_until(std::uint64_t time_ns);
+  // When something happens next; ~0 if nothing does.
+  std::uint64_t next_ns() const;
 
   std::uint64_t now_ns() const { return now_ns_; }
   std::uint32_t now_us() const { return static_cast<std::uint32_t>(now_ns_ / 1000); }  // wraps
@@ -104,6 +120,9 @@ class CanBusModel {
     std::uint64_t suspended_until_ns = 0;
     std::size_t chosen = 0;  // place in the queue of the frame on the bus
     bool sending = false;
+    bool present = true;
+    bool spoiled = false;
+    bool on_bus() const { return present && state != CanNodeState::bus_off; }
   };
   // What the bus does next, and when.
   enum class Step : std::uint8_t { none, begin, end, come_back };
@@ -114,6 +133,7 @@ class CanBusModel {
   };
 
   const Node& at_node(int node) const { return nodes_[static_cast<std::size_t>(node)]; }
+  Node& to_node(int node) { return nodes_[static_cast<std::size_t>(node)]; }
   Next next() const;
   void begin_frame();
   void end_frame();
