@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What test_can_faults.py runs where SocketCAN is: a board and hosts on a bus with bit time and errors.
+
+slcan0, the board's controller, and slcan1, the host's, are nodes of slcan_bus: error frames, error
+counters, bus-off and the states that the kernel tells of are those of ISO 11898-1.
+"""
+import subprocess
+import time
+
+import pytest
+
+from can_inside import SAFE_WITHIN_MS, Dump, in_control, ip
+from r4_process import Board, Running, is_link, is_state, monitor, run
+from slcan_bus import SlcanBus
+
+BITRATE = 500000
+BOARD, HOST = 'can://slcan0?node=1', 'can://slcan1?node=1'
+STOP, TELEMETRY, BABBLE = 0x010, 0x401, 0x001
+# From the end of a fault to the board's obeying again. The host looks every 100 ms whether an
+# interface is back and sends ten heartbeats a second; the rest is the emulated machine's.
+BACK_WITHIN_S = 2
+DRIVING, OFF = [358, 1], [0, 0]
+
+
+@pytest.fixture(name='bus')
+def running_bus():
+    with SlcanBus(2, BITRATE) as bus:
+        yield bus
+
+
+@pytest.fixture(name='board')
+def running_board(bus):
+    assert bus.interfaces == ['slcan0', 'slcan1']
+    with packed_board() as board:
+        yield board
+
+
+def packed_board():
+    return Board(BOARD, options=('--set', 'pack,1'))
+
+
+def driving_host(board, hold=60):
+    """A host that has a motor run and stays."""
+    host = Running('send', HOST, '--hold', str(hold), 'O:358,1,1')
+    board.outputs(lambda outputs: outputs['osmc'][0] == DRIVING)
+    return host
+
+
+def told(reason):
+    """A host's event of trouble with the transport, with that reason and a fix."""
+    return lambda each: each['type'] == 'error' and reason in each['fields'].get('reason', '')
+
+
+def board_told(reason):
+    return lambda each: reason in each.get('transport', {}).get('reason', '')
+
+
+def goes_safe_in_time(board):
+    board.outputs(lambda outputs: outputs['osmc'][0] == OFF)
+    safe = board.state('SAFE', 'link')
+    print(f'silence to safe {safe["silence"]} ms')
+    assert safe['silence'] <= SAFE_WITHIN_MS
+    return safe
+
+
+def drives_again(board, since):
+    """The session goes on by itself, with what it had commanded."""
+    back = board.outputs(lambda outputs: outputs['osmc'][0] == DRIVING)
+    print(f'drives again after {(back["came"] - since) * 1000:.0f} ms')
+    assert back['came'] - since < BACK_WITHIN_S
+
+
+def streams_again(host, since):
+    host.skip_past()
+    state = host.next(is_state)
+    print(f'streams again after {(state["came"] - since) * 1000:.0f} ms')
+
+
+def test_a_board_streams_and_obeys_on_a_bus_with_bit_time(bus, board):
+    result = run('send', HOST, 'O:358,1,1', 'S:1500,16', 'Q:ID', timeout=60)
+    assert result.returncode == 0, result
+    with monitor(HOST) as host:
+        in_control(host)
+        before = bus.status()
+        states = [host.next(is_state) for _ in range(200)]
+        after = bus.status()
+    took_ms = states[-1]['t'] - states[0]['t']
+    load = (after['busy_us'] - before['busy_us']) / (after['t_us'] - before['t_us'])
+    print(f'{1000 * 199 / took_ms:.1f} states/s, load {100 * load:.1f} %, '
+          f'{after["frames"] - before["frames"]} frames')
+    assert took_ms < 1.1 * 1990
+    assert after['failed'] == 0
+
+
+def test_bus_off_of_the_boards_controller(bus, board):
+    with driving_host(board):
+        bus.order('spoil', 0)
+        off = bus.state(0, 'bus-off')
+        down = board.next(board_told('bus-off'))
+        assert down['transport']['event'] == 'down' and 'ip link set slcan0' in down['transport']['fix']
+        print(f'told {(down["came"] - off["came"]) * 1000:.1f} ms after it')
+        safe = goes_safe_in_time(board)
+        assert safe['came'] - off['came'] < SAFE_WITHIN_MS / 1000
+        bus.order('heal', 0)
+        since = time.monotonic()
+        bus.reset(0)
+        drives_again(board, since)
+
+
+def test_bus_off_of_the_hosts_controller(bus, board):
+    with driving_host(board):
+        bus.order('spoil', 1)
+        off = bus.state(1, 'bus-off')
+        safe = goes_safe_in_time(board)
+        print(f'safe {(safe["came"] - off["came"]) * 1000:.0f} ms after bus-off')
+        bus.order('heal', 1)
+        since = time.monotonic()
+        bus.reset(1)
+        drives_again(board, since)
+
+
+def test_a_host_tells_of_its_bus_off_and_goes_on_by_itself(bus, board):
+    with monitor(HOST) as host:
+        in_control(host)
+        bus.order('spoil', 1)
+        down = host.next(told('bus-off'))
+        assert 'ip link set slcan1' in down['fields']['fix']
+        assert not host.next(lambda each: each['type'] == 'link')['fields']['up']
+        board.state('SAFE', 'link')
+        bus.order('heal', 1)
+        since = time.monotonic()
+        bus.reset(1)
+        assert host.next(is_link('active'))['fields']['up']
+        streams_again(host, since)
+
+
+def test_errors_are_told_with_a_fix_and_that_they_are_over(bus, board):
+    with monitor(HOST) as host:
+        in_control(host)
+        for node, where, end in ((0, board_told, board), (1, told, host)):
+            for errors, reason in ((100, 'warns of errors'), (130, 'error-passive')):
+                bus.order('errors', node, errors, 0)
+                each = end.next(where(reason))
+                assert 'wiring' in str(each)
+            end.next(where('the trouble is over'))  # by frames that went well, one error each
+        streams_again(host, time.monotonic())
+    assert not any(each.get('reason') == 'link' for each in board.log)
+
+
+def test_a_host_alone_is_told_that_nobody_acknowledges(bus, board):
+    with monitor(HOST) as host:
+        in_control(host)
+        bus.order('away', 0)
+        lonely = host.next(told('nobody acknowledges'))
+        assert 'bit rate' in lonely['fields']['fix']
+        bus.state(1, 'passive')  # and never bus-off: ISO 11898-1, 12.1.4.2
+        goes_safe = board.state('SAFE', 'link')
+        assert goes_safe['silence'] <= SAFE_WITHIN_MS
+        bus.order('back', 0)
+        since = time.monotonic()
+        board.state('ACTIVE')
+        streams_again(host, since)
+        assert bus.status()['nodes'][1]['state'] != 'b'
+
+
+@pytest.mark.parametrize('percent', [1, 5])
+def test_damaged_frames_cost_time_and_no_datagram(bus, board, percent):
+    with monitor(HOST, '--duration', '30') as host:
+        in_control(host)
+        bus.order('noise', percent / 100)
+        states = [host.next(is_state) for _ in range(200)]
+        status = bus.status()
+        bus.order('noise', 0)
+        host.end()
+    result = run('send', HOST, *(f'S:{1000 + i},{1 + i % 16}' for i in range(5)), timeout=60)
+    assert result.returncode == 0, result
+    pnums = {each['pnum'] for each in host.log if each['pnum'] is not None}
+    between = [pnum for pnum in range(states[0]['pnum'], states[-1]['pnum'] + 1) if pnum not in pnums]
+    print(f'{status["failed"]} of {status["frames"]} frames damaged, {len(between)} datagrams missing')
+    assert status['failed'] > 0.4 * percent / 100 * status['frames']
+    assert len(between) <= 4  # answers to Q:ID, which the host asks each second and does not print
+
+
+def test_a_babbling_node_of_top_priority_leaves_the_board_safe():
+    with SlcanBus(2, 250000) as bus, packed_board() as board, driving_host(board):
+        bus.order('babble', f'{BABBLE:x}')
+        since = time.monotonic()
+        safe = goes_safe_in_time(board)
+        print(f'safe {(safe["came"] - since) * 1000:.0f} ms after the babbling began')
+        bus.order('quiet')
+        since = time.monotonic()
+        drives_again(board, since)
+
+
+def test_a_full_queue_drops_old_states_and_no_frame_within_a_datagram():
+    with SlcanBus(2, BITRATE, txqueuelen=10) as bus, packed_board() as board, monitor(HOST) as host:
+        in_control(host)
+        # Another program keeps the queue of the board's interface full.
+        flood = subprocess.Popen(['cangen', 'slcan0', '-g', '0', '-i', '-I', '7FF', '-L', '8'])
+        try:
+            for _ in range(10):
+                bus.order('stall', 0)
+                time.sleep(0.05)
+                bus.order('go', 0)
+                host.next(is_state)
+        finally:
+            flood.terminate()
+            flood.wait()
+        bus.order('stall', 0)
+        time.sleep(0.3)
+        host.skip_past()
+        bus.order('go', 0)
+        since = time.monotonic()
+        states = [host.next(is_state) for _ in range(20)]
+        streams_again(host, since)
+        log = list(host.log)
+    gaps = [(later['t'] - earlier['t']) for earlier, later in zip(states, states[1:])]
+    print(f'gaps after the stall: {gaps} ms')
+    assert max(gaps[4:]) <= 30, 'a transfer that waits for the next event'
+    pnums = [each['pnum'] for each in log if each['type'] == 'state']
+    assert pnums == sorted(set(pnums))
+    damaged = [each for each in log if each['type'] == 'error' and each['fields']['error'] != 'transport']
+    assert not damaged, damaged
+
+
+def test_a_stop_overtakes_a_full_queue():
+    with SlcanBus(2, BITRATE, txqueuelen=10) as bus, packed_board() as board, Dump('slcan0') as dump:
+        with driving_host(board):
+            bus.order('stall', 1)
+            flood = subprocess.Popen(['cangen', 'slcan1', '-g', '0', '-i', '-I', '7FF', '-L', '8'])
+            stop = Running('stop', HOST, '--timeout', '20')
+            time.sleep(0.5)
+            dump.frames.clear()
+            bus.order('go', 1)
+            since = time.monotonic()
+            stopped = board.state('SAFE', 'stop')
+            print(f'stopped {(stopped["came"] - since) * 1000:.1f} ms after the bus went on')
+            assert stop.wait(30) == 0, stop.errors
+            flood.terminate()
+            flood.wait()
+            stop.process.stdout.close()
+            stop.process.stderr.close()
+        ids = [frame for frame, _ in dump.frames if frame != TELEMETRY]
+        print(f'{ids.index(STOP)} frames before the stop')
+        assert ids.index(STOP) <= 4  # three mailboxes and the frame that the driver holds

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""slcan_bus (tests/can/slcan_bus.cpp) with its nodes as interfaces slcan0, slcan1, … of this kernel."""
+import fcntl
+import json
+import os
+import pathlib
+import queue
+import struct
+import subprocess
+import termios
+import threading
+import time
+
+from r4_process import PATIENCE_S, R4
+
+PROGRAM = os.environ.get('R4_SLCAN_BUS') or pathlib.Path(R4).parent / 'tests/slcan_bus'
+N_SLCAN = 17
+SIOCGIFNAME = 0x8910
+
+
+def ip(*arguments):
+    subprocess.run(['ip', *arguments], check=True)
+
+
+class SlcanBus:
+    """One bus; `interfaces` are its nodes in order."""
+
+    def __init__(self, nodes=2, bitrate=125000, txqueuelen=1000, **options):
+        self.process = subprocess.Popen(
+            [PROGRAM, '--nodes', str(nodes), '--bitrate', str(bitrate),
+             *(word for name, value in options.items() for word in (f'--{name}', str(value)))],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.bitrate = bitrate
+        self.answers = queue.Queue()
+        self.states = queue.Queue()
+        self.ptys = json.loads(self.process.stdout.readline())['ptys']
+        self.reader = threading.Thread(target=self._read, daemon=True)
+        self.reader.start()
+        self.interfaces = [f'slcan{number}' for number in range(nodes)]
+        for interface, pty in zip(self.interfaces, self.ptys):
+            ip('link', 'set', self._attach(pty), 'name', interface)
+            ip('link', 'set', interface, 'txqueuelen', str(txqueuelen), 'type', 'can', 'bitrate',
+               str(bitrate))
+            ip('link', 'set', interface, 'up')
+
+    @staticmethod
+    def _attach(pty):
+        tty = os.open(pty, os.O_RDWR | os.O_NOCTTY)
+        try:
+            fcntl.ioctl(tty, termios.TIOCSETD, struct.pack('i', N_SLCAN))
+            name = bytearray(16)
+            fcntl.ioctl(tty, SIOCGIFNAME, name)
+            return name.partition(b'\0')[0].decode()
+        finally:
+            os.close(tty)  # slcan_bus keeps it open
+
+    def _read(self):
+        for line in self.process.stdout:
+            each = json.loads(line)
+            each['came'] = time.monotonic()
+            (self.states if each['type'] == 'state' else self.answers).put(each)
+
+    def order(self, *words):
+        """Gives an order; returns its answer."""
+        self.process.stdin.write(' '.join(map(str, words)) + '\n')
+        self.process.stdin.flush()
+        answer = self.answers.get(timeout=PATIENCE_S)
+        assert answer['type'] != 'error', answer
+        return answer
+
+    def status(self):
+        return self.order('status')
+
+    def state(self, node, state, timeout=PATIENCE_S):
+        """Awaits a node's change to that state."""
+        deadline = time.monotonic() + timeout
+        while True:
+            each = self.states.get(timeout=max(0, deadline - time.monotonic()))
+            if each['node'] == node and each['state'] == state:
+                return each
+
+    def reset(self, node):
+        """What there is on Linux for an slcan controller that is bus-off."""
+        ip('link', 'set', self.interfaces[node], 'down')
+        ip('link', 'set', self.interfaces[node], 'up')
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        for interface in self.interfaces:  # while somebody answers the kernel
+            subprocess.run(['ip', 'link', 'set', interface, 'down'], check=False)
+        self.process.stdin.close()
+        self.process.wait(PATIENCE_S)
+        self.reader.join()
+        self.process.stdout.close()
