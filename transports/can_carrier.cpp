@@ -197,9 +197,7 @@ const CarrierCounters& CanCarrier::counters() const {
   return counters_;
 }
 
-void CanCarrier::on_drained() {
-  handler_->on_drained();
-}
+void CanCarrier::on_drained() { handler_->on_drained(); }
 
 void CanCarrier::arm() {
   const IsotpDeadline deadline = node_.deadline();
