@@ -2,35 +2,15 @@
 // Any frames at any times: a sender and a receiver, each with arbitrary options, keep their
 // promises. The input is a list of actions; what the options are is in its first bytes.
 #include <cstdint>
-#include <cstdlib>
 #include <cstring>
 #include <vector>
 
+#include "tests/fuzz/input.hpp"
 #include "transports/framing/isotp_receiver.hpp"
 #include "transports/framing/isotp_sender.hpp"
 
 namespace r4 {
 namespace {
-
-void require(bool holds) {
-  if (!holds) std::abort();
-}
-
-// The input, byte by byte; zeros after its end.
-class Input {
- public:
-  Input(const std::uint8_t* data, std::size_t size) : at_(data), end_(data + size) {}
-  bool empty() const { return at_ == end_; }
-  std::uint8_t byte() { return empty() ? std::uint8_t{0} : *at_++; }
-  std::uint32_t word() {
-    const std::uint32_t high = byte();
-    return high << 8 | byte();
-  }
-
- private:
-  const std::uint8_t* at_;
-  const std::uint8_t* end_;
-};
 
 constexpr std::uint32_t longest_wait_us = 127000;  // of the options below, STmin included
 

@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What comes in on a CAN bus: any frames at any times, to a board's end and a host's end that also
+// talk to each other, lose frames, time out and are cancelled. The input is a list of actions.
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "protocol/datagram_writer.hpp"
+#include "protocol/message.hpp"
+#include "tests/fuzz/input.hpp"
+#include "transports/framing/can_node.hpp"
+
+namespace r4 {
+namespace {
+
+constexpr Text stop_datagram("E:STOP;^0x506f0fbe^");
+constexpr std::uint32_t longest_wait_us = 127000;  // STmin; N_As, N_Bs and N_Cr are less
+constexpr CanLane lanes[] = {CanLane::dialogue, CanLane::telemetry};
+
+// All counters of a node, in one order.
+template <class Counters>
+void append(std::vector<std::uint32_t>& all, const Counters& counters) {
+  static_assert(sizeof(Counters) % sizeof(std::uint32_t) == 0, "counters of 32 bits alone");
+  const std::size_t first = all.size();
+  all.resize(first + sizeof(Counters) / sizeof(std::uint32_t));
+  std::memcpy(&all[first], &counters, sizeof counters);
+}
+std::vector<std::uint32_t> counters_of(const CanNode& node) {
+  std::vector<std::uint32_t> all;
+  append(all, node.counters());
+  for (const CanLane lane : lanes) {
+    append(all, node.sent(lane));
+    append(all, node.received(lane));
+  }
+  return all;
+}
+
+std::uint32_t completed(const CanNode& node) {
+  return node.received(CanLane::dialogue).datagrams + node.received(CanLane::telemetry).datagrams;
+}
+
+// One end, with what must hold whatever it is fed with.
+class End {
+ public:
+  End(CanEnd end, std::uint8_t node, bool fd)
+      : board_(end == CanEnd::board), number_(node % can_nodes), node_(end, node, fd) {}
+
+  void begin(Text datagram, std::uint32_t now_us) {
+    const CanLane lane = node_.lane_of(datagram);
+    require(board_ || lane == CanLane::dialogue);
+    const bool possible = node_.idle(lane) && !datagram.empty() && datagram.size() <= max_datagram;
+    require(node_.begin(datagram, now_us) == possible);
+    require(!possible || !node_.idle(lane));
+    check();
+  }
+
+  bool offer(std::uint32_t now_us, CanFrame& frame) {
+    std::memset(&frame, 0xA5, sizeof frame);
+    if (!node_.offer(now_us, frame)) return false;
+    require(has_valid_size(frame) && frame.size != 0 && !frame.extended && !frame.remote);
+    if (!board_) {
+      require(frame.id == command_id(number_));
+    } else if (frame.id == went_safe_id(number_)) {
+      require(frame.size == 1 && !frame.fd && frame.data[0] != 0 &&
+              frame.data[0] < safe_reason_count);
+    } else {
+      require(frame.id == reply_id(number_) || frame.id == telemetry_id(number_));
+    }
+    check();
+    return true;
+  }
+
+  void frame_sent(std::uint32_t now_us) {
+    node_.frame_sent(now_us);
+    check();
+  }
+
+  void on_frame(const CanFrame& frame, std::uint32_t now_us) {
+    const CanNodeCounters before = node_.counters();
+    const std::uint32_t completed_before = completed(node_);
+    const Text datagram = node_.on_frame(frame, now_us);
+    require(datagram.size() <= max_datagram);
+    std::uint32_t sum = 0;  // every byte can be read
+    for (const char c : datagram) sum += static_cast<std::uint8_t>(c);
+    require(datagram.empty() || sum != 0 || datagram[0] == 0);
+
+    const CanNodeCounters& after = node_.counters();
+    const std::uint32_t whole = completed(node_) - completed_before;
+    const std::uint32_t bad = after.bad_form - before.bad_form;
+    require(whole <= 1 && bad <= whole && after.unpacked - before.unpacked <= whole);
+    const bool stop = classify(frame).kind == CanIdKind::emergency_stop;
+    require(after.stops - before.stops == (stop && board_ ? 1U : 0U));
+    if (stop) {
+      require(whole == 0 && datagram == (board_ ? stop_datagram : Text()));
+    } else {
+      require(datagram.empty() == (whole == bad));
+    }
+    if (classify(frame).kind == CanIdKind::other) require(datagram.empty());
+    check();
+  }
+
+  // After poll(), what is armed lies ahead, or there is something to send.
+  void poll(std::uint32_t now_us) {
+    node_.poll(now_us);
+    check();
+    const IsotpDeadline deadline = node_.deadline();
+    if (!deadline.armed) return;
+    CanFrame frame;
+    if (reached(now_us, deadline.at_us)) {
+      require(offer(now_us, frame));
+    } else {
+      require(deadline.at_us - now_us <= longest_wait_us);
+    }
+  }
+
+  void cancel() {
+    node_.cancel();
+    require(node_.idle(CanLane::dialogue) && node_.idle(CanLane::telemetry));
+    require(!node_.deadline().armed);
+    check();
+  }
+
+  void use_packed_form(bool wanted) { node_.use_packed_form(wanted); }
+
+ private:
+  void check() {
+    std::vector<std::uint32_t> now = counters_of(node_);
+    for (std::size_t i = 0; i < counters_.size(); ++i) require(now[i] >= counters_[i]);
+    counters_ = std::move(now);
+  }
+
+  const bool board_;
+  const std::uint8_t number_;
+  CanNode node_;
+  std::vector<std::uint32_t> counters_;
+};
+
+class Fuzz {
+ public:
+  explicit Fuzz(Input& input) : Fuzz(input, input.byte(), input.byte()) {}
+
+  void run() {
+    now_us_ = input_.word() << 16;
+    while (!input_.empty()) {
+      act(input_.byte());
+      board_.poll(now_us_);
+      host_.poll(now_us_);
+    }
+  }
+
+ private:
+  Fuzz(Input& input, std::uint8_t node, std::uint8_t flags)
+      : input_(input),
+        node_(node % can_nodes),
+        board_(CanEnd::board, node, (flags & 1) != 0),
+        host_(CanEnd::host, node, (flags & 2) != 0) {}
+
+  void act(std::uint8_t action) {
+    End& end = (action & 0x80) != 0 ? board_ : host_;
+    switch (action % 8) {
+      case 0:
+        now_us_ += input_.word();
+        break;
+      case 1:
+        begin(end);
+        break;
+      case 2:
+      case 3:
+        take(foreign_frame());
+        break;
+      case 4:
+      case 5:
+        exchange(action);
+        break;
+      case 6:
+        end.use_packed_form((action & 0x40) != 0);
+        break;
+      default:
+        if ((action & 0x70) == 0) {
+          end.cancel();
+        } else {
+          end.frame_sent(now_us_);
+        }
+    }
+  }
+
+  // A heartbeat, a datagram that is none, an answer, a state.
+  void begin(End& end) {
+    std::array<char, 256> buffer;
+    const std::uint8_t kind = input_.byte();
+    if (kind % 4 == 0) {
+      const auto reason = static_cast<SafeReason>(kind / 4 % safe_reason_count);
+      end.begin(write_board_heartbeat(buffer.data(), buffer.size(), kind, now_us_, reason),
+                now_us_);
+    } else if (kind % 4 == 1) {
+      const std::vector<char> bytes(input_.word() % 1100, static_cast<char>(kind));
+      end.begin(Text(bytes.data(), bytes.size()), now_us_);
+    } else {
+      DatagramWriter writer(buffer.data(), buffer.size());
+      writer.field(kind % 4 == 2 ? Text("N") : Text("AIN24")).value(std::uint32_t{kind});
+      end.begin(writer.finish(kind, now_us_), now_us_);
+    }
+  }
+
+  CanFrame foreign_frame() {
+    const std::uint32_t ids[] = {emergency_stop_id, went_safe_id(node_),   command_id(node_),
+                                 reply_id(node_),   telemetry_id(node_),   command_id(node_),
+                                 reply_id(node_),   input_.word() % 0x1000};
+    CanFrame frame;
+    std::memset(&frame, 0x55, sizeof frame);
+    const std::uint8_t flags = input_.byte();
+    frame.id = ids[flags % 8];
+    frame.fd = (flags & 0x08) != 0;
+    frame.extended = (flags & 0xF0) == 0x10;
+    frame.remote = (flags & 0xF0) == 0x20;
+    frame.size = input_.byte();
+    for (std::uint8_t i = 0; i < 12 && i < frame.size; ++i) frame.data[i] = input_.byte();
+    return frame;
+  }
+
+  void take(const CanFrame& frame) {
+    board_.on_frame(frame, now_us_);
+    host_.on_frame(frame, now_us_);
+  }
+
+  // Moves frames between the two; some are lost, or offered and not taken.
+  void exchange(std::uint8_t action) {
+    CanFrame frame;
+    for (int i = 0; i < 40; ++i) {
+      bool moved = false;
+      for (End* const from : {&board_, &host_}) {
+        if (!from->offer(now_us_, frame) || (action & 0x40) != 0) continue;
+        from->frame_sent(now_us_);
+        End& to = from == &board_ ? host_ : board_;
+        if ((action & 0x20) == 0 || i % 5 != 4) to.on_frame(frame, now_us_);
+        moved = true;
+      }
+      if (!moved) return;
+      now_us_ += (action & 0x10) != 0 ? 1000 : 100;
+    }
+  }
+
+  Input& input_;
+  const std::uint8_t node_;
+  End board_;
+  End host_;
+  std::uint32_t now_us_ = 0;
+};
+
+}  // namespace
+}  // namespace r4
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  r4::Input input(data, size);
+  r4::Fuzz(input).run();
+  return 0;
+}
