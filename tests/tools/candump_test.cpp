@@ -90,6 +90,7 @@ TEST(Candump, SaysWhatIsWrongWithALine) {
   using E = CandumpError;
   for (const auto& [text, error] : std::vector<std::pair<std::string, CandumpError>>{
            {"H:ROS2-R4;T:79201;^0xf390d9ad^", E::no_frame},
+           {"DROPCOUNT: dropped 3 CAN frames on 'can0' socket (total drops 3)", E::dropped},
            {"vcan0", E::no_frame},
            {"vcan0 244", E::no_frame},
            {"  vcan0  TX B E 244 4 00", E::no_frame},

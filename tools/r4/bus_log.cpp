@@ -33,6 +33,17 @@ Json time_json(const CandumpLine& line) {
   return static_cast<double>(*line.time_us) / 1e6;
 }
 
+const char* fix_of(CandumpError error) {
+  switch (error) {
+    case CandumpError::cut:
+      return "was candump killed while it wrote? Leave the line out";
+    case CandumpError::dropped:
+      return "give it a larger buffer, candump -r 1000000, or fewer ids to record";
+    default:
+      return record_it;
+  }
+}
+
 struct LaneKind {
   std::size_t index;
   const char* from;
@@ -64,12 +75,7 @@ void BusLog::on_line(std::uint64_t number, std::string_view text) {
   const CandumpError error = read_candump_line(text, line);
   if (error == CandumpError::detail) return;
   if (error != CandumpError::none) {
-    return report_damage(number, to_text(error),
-                         error == CandumpError::cut
-                             ? "was candump killed while it wrote? Leave the "
-                               "line out"
-                             : record_it,
-                         {{"text", escaped(text)}});
+    return report_damage(number, to_text(error), fix_of(error), {{"text", escaped(text)}});
   }
   pass_time(line.time_us);
   on_frame(line, {number, time_json(line), line.time_us});

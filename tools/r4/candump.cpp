@@ -19,6 +19,7 @@ constexpr std::uint64_t max_seconds = 1'000'000'000'000;
 constexpr std::array texts{
     "none",
     "a detail of the frame before",
+    "candump has lost frames here",
     "not a line of candump",
     "the time is none",
     "no name of an interface",
@@ -173,6 +174,7 @@ const char* to_text(CandumpError error) {
 CandumpError read_candump_line(std::string_view line, CandumpLine& out) {
   out = CandumpLine{};
   if (line.starts_with('\t')) return CandumpError::detail;
+  if (line.starts_with("DROPCOUNT:")) return CandumpError::dropped;
   line.remove_prefix(std::min(line.find_first_not_of(' '), line.size()));
   if (line.starts_with('(')) {
     const std::size_t end = line.find(')');

@@ -29,6 +29,7 @@ struct CandumpLine {
 enum class CandumpError : std::uint8_t {
   none,
   detail,     // no frame: a line of candump -e that explains the one before
+  dropped,    // no frame: candump -d tells that it was too slow
   no_frame,   // not of either format
   time,       // what is in the parentheses is no time
   interface,  // no name of an interface
