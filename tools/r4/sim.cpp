@@ -10,16 +10,19 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "firmware/ports/sim/simulated_board.hpp"
 #include "host/async_board.hpp"
 #include "host/command_help.hpp"
 #include "options.hpp"
+#include "protocol/numbers.hpp"
 #include "protocol/refusal.hpp"
 #include "protocol/settings.hpp"
 #include "sim_log.hpp"
 #include "subcommands.hpp"
+#include "transports/framing/can_ids.hpp"
 #include "transports/registry.hpp"
 
 namespace r4::tool {
@@ -60,44 +63,113 @@ Settings read_settings(const std::vector<std::string>& texts) {
   return settings;
 }
 
+// A board of the process: what it listens on, and what it answers to Q:ID.
+struct Plan {
+  std::vector<std::string> urls;
+  std::string id;
+  std::uint64_t number = 0;  // of the boards, from 0
+};
+
+// "0-7" of can://can0?node=0-7, if that is such a range. Throws Error{usage} for a wrong one.
+std::optional<std::pair<std::uint32_t, std::uint32_t>> node_range(const Url& url) {
+  const std::string nodes = url.get("node").value_or("");
+  const std::size_t dash = nodes.find('-', 1);
+  if (url.scheme() != "can" || dash == std::string::npos) return std::nullopt;
+  std::uint32_t first = 0;
+  std::uint32_t last = 0;
+  if (!parse_number(Text(nodes.data(), dash), first) ||
+      !parse_number(Text(nodes.data() + dash + 1, nodes.size() - dash - 1), last) || first > last ||
+      last >= can_nodes || url.text().find("node=" + nodes) == std::string::npos) {
+    throw Error(
+        ErrorKind::usage, url.text(), "node=" + nodes + " is no range of nodes",
+        fmt::format("write the lower one first, both 0 to {}, as in node=0-7", can_nodes - 1));
+  }
+  return std::pair(first, last);
+}
+
+std::vector<Plan> plans_of(const Options& options) {
+  const std::string id = options.board_id.empty() ? "sim" : options.board_id;
+  for (const std::string& text : options.urls) {
+    const Url url = Url::parse(text);
+    const auto range = node_range(url);
+    if (!range) continue;
+    if (options.urls.size() > 1) {
+      throw Error(ErrorKind::usage, text, "several boards cannot share the other transports",
+                  "run them as a process of their own");
+    }
+    const std::string nodes = "node=" + *url.get("node");
+    std::vector<Plan> plans;
+    for (std::uint32_t node = range->first; node <= range->second; ++node) {
+      std::string one = text;
+      one.replace(text.find(nodes), nodes.size(), fmt::format("node={}", node));
+      plans.push_back({{std::move(one)}, fmt::format("{}-{}", id, node), node - range->first});
+    }
+    return plans;
+  }
+  return {{options.urls, options.board_id.empty() ? "sim-1" : options.board_id, 0}};
+}
+
+// A board with its log, at its transports.
+class Board {
+ public:
+  Board(asio::io_context& io, SimOutput& output, const Options& options, const Plan& plan,
+        bool named)
+      : log_(output, options.quiet, named ? plan.id : ""), board_(io, options_of(options, plan)) {
+    for (const std::string& url : plan.urls) {
+      auto carrier = standard_registry().make(io, url, Role::board);
+      carriers_.push_back(carrier.get());
+      board_.add_carrier(std::move(carrier));
+    }
+    log_.watch(board_);
+  }
+
+  void start(std::vector<std::string>& listening) {
+    board_.start();
+    for (const Carrier* const carrier : carriers_) listening.push_back(carrier->name());
+  }
+
+ private:
+  sim::SimulatedBoard::Options options_of(const Options& options, const Plan& plan) {
+    sim::SimulatedBoard::Options board_options;
+    if (options.seed) board_options.seed = *options.seed + plan.number;
+    if (!options.script.empty()) board_options.script = sim::Script::load(options.script);
+    check_id(plan.id);
+    board_options.board_id = plan.id;
+    board_options.settings = read_settings(options.settings);
+    board_options.firmware_version = R4_VERSION;
+    board_options.events = log_.events();
+    return board_options;
+  }
+
+  SimLog log_;
+  sim::SimulatedBoard board_;
+  std::vector<const Carrier*> carriers_;
+};
+
 int simulate(const Options& options) {
   asio::io_context io(1);
   asio::signal_set signals(io, SIGINT, SIGTERM);
   signals.async_wait([&io](const std::error_code&, int) { io.stop(); });
 
-  SimLog log(options.json, options.quiet);
-  sim::SimulatedBoard::Options board_options;
-  board_options.seed = options.seed;
-  if (!options.script.empty()) board_options.script = sim::Script::load(options.script);
-  if (!options.board_id.empty()) {
-    check_id(options.board_id);
-    board_options.board_id = options.board_id;
-  }
-  board_options.settings = read_settings(options.settings);
-  board_options.firmware_version = R4_VERSION;
-  board_options.events = log.events();
-  sim::SimulatedBoard board(io, std::move(board_options));
+  const std::vector<Plan> plans = plans_of(options);
+  {
+    SimOutput output(options.json);
+    std::vector<std::unique_ptr<Board>> boards;
+    boards.reserve(plans.size());
+    for (const Plan& plan : plans) {
+      boards.push_back(std::make_unique<Board>(io, output, options, plan, plans.size() > 1));
+    }
+    std::vector<std::string> listening;
+    for (const auto& board : boards) board->start(listening);
+    output.listening(listening);
 
-  std::vector<const Carrier*> carriers;
-  for (const std::string& url : options.urls) {
-    auto carrier = standard_registry().make(io, url, Role::board);
-    carriers.push_back(carrier.get());
-    board.add_carrier(std::move(carrier));
+    asio::steady_timer end(io);
+    if (options.duration) {
+      end.expires_after(*options.duration);
+      end.async_wait([&io](const std::error_code&) { io.stop(); });
+    }
+    io.run();
   }
-  log.watch(board);
-  board.start();
-  std::vector<std::string> names;
-  names.reserve(carriers.size());
-  for (const Carrier* const carrier : carriers) names.push_back(carrier->name());
-  log.listening(names);
-
-  asio::steady_timer end(io);
-  if (options.duration) {
-    end.expires_after(*options.duration);
-    end.async_wait([&io](const std::error_code&) { io.stop(); });
-  }
-  io.run();
-  board.stop();
   return 0;
 }
 
@@ -106,7 +178,7 @@ constexpr const char* footer =
 the paper's capture. It prints where it listens and what it does; with --json one object a line:
   {"type":"listening","url":…,"host_url":…}
   {"type":"event","t":…,"state":"CONNECTING|ACTIVE|SAFE","reason":…}   t: the board's clock, ms
-with "outputs" when they changed, "executed" or "refused" for a command, "transport" when one went
+with "board" if there are several, "outputs" when they changed, "executed" or "refused" for a command, "transport" when one went
 down or came up, and "silence" (ms since the host was last heard) when the board goes safe for that.
 
 A scenario (--script) has lines such as: 0.5 handle released / 1 us 1 15 / 2 reboot
@@ -116,6 +188,7 @@ Examples:
   r4 sim udp://0.0.0.0:2018 pty:/tmp/r4        two transports at once; open the second with
                                                r4 monitor serial:///tmp/r4
   r4 sim 'udp://127.0.0.1:2018?peer=127.0.0.1:2390'   streams to that port, as the paper's board
+  r4 sim 'can://vcan0?node=0-7' --set pack,1   eight boards on one CAN bus
 
 Exit codes: 0 ended by --duration or a signal; 1 the script is wrong; 2 usage; 4, 5 the port or
 device cannot be opened.)";

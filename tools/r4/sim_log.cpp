@@ -35,10 +35,8 @@ std::string missing_lines(bool json, std::uint64_t count) {
 
 }  // namespace
 
-SimLog::SimLog(bool json, bool quiet)
-    : json_(json),
-      quiet_(quiet),
-      writer_([json](std::uint64_t count) { return missing_lines(json, count); }) {}
+SimOutput::SimOutput(bool json)
+    : json_(json), writer_([json](std::uint64_t count) { return missing_lines(json, count); }) {}
 
 Json outputs_json(const firmware::Outputs& outputs) {
   Json json{{"osmc", Json::array()},    {"dhb", Json::array()},  {"servo", outputs.servo_us},
@@ -105,11 +103,11 @@ sim::SimulatedBoard::Events SimLog::events() {
   return events;
 }
 
-void SimLog::listening(const std::vector<std::string>& urls) {
+void SimOutput::listening(const std::vector<std::string>& urls) {
   started_ = true;
   for (const std::string& url : urls) {
     if (json_) {
-      print(Json{{"type", "listening"}, {"url", url}, {"host_url", host_url(url)}});
+      print(line_of({{"type", "listening"}, {"url", url}, {"host_url", host_url(url)}}));
     } else {
       print(fmt::format("listening at {}; a host opens {}\n", url, host_url(url)));
     }
@@ -130,10 +128,10 @@ std::string host_url(const std::string& board_url) {
 }
 
 void SimLog::print(std::uint32_t t_ms, std::string_view text) {
-  print(fmt::format("{:>10} ms  {}\n", t_ms, text));
+  output_.print(fmt::format("{:>10} ms  {}{}{}\n", t_ms, name_, name_.empty() ? "" : ": ", text));
 }
 
-void SimLog::print(std::string line) {
+void SimOutput::print(std::string line) {
   if (started_) {
     writer_.write(line);
   } else {
@@ -142,16 +140,18 @@ void SimLog::print(std::string line) {
 }
 
 Json SimLog::event(std::uint32_t t_ms) const {
-  return {{"type", "event"},
-          {"t", t_ms},
-          {"state", to_text(board_->application().state())},
-          {"reason", to_text(board_->application().reason())}};
+  Json object{{"type", "event"}};
+  if (!name_.empty()) object["board"] = name_;
+  object["t"] = t_ms;
+  object["state"] = to_text(board_->application().state());
+  object["reason"] = to_text(board_->application().reason());
+  return object;
 }
 
 void SimLog::on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason reason) {
   const bool silent = state == firmware::BoardState::safe && reason == SafeReason::link;
   const std::uint32_t silence_ms = silent ? t_ms - board_->application().link().fed_ms() : 0;
-  if (json_) {
+  if (output_.json()) {
     Json object = event(t_ms);
     if (silent) object["silence"] = silence_ms;
     print(object);
@@ -164,7 +164,7 @@ void SimLog::on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason
 }
 
 void SimLog::on_outputs(std::uint32_t t_ms, const firmware::Outputs& outputs) {
-  if (!json_) return print(t_ms, "outputs: " + outputs_text(outputs));
+  if (!output_.json()) return print(t_ms, "outputs: " + outputs_text(outputs));
   Json object = event(t_ms);
   object["outputs"] = outputs_json(outputs);
   print(object);
@@ -172,7 +172,7 @@ void SimLog::on_outputs(std::uint32_t t_ms, const firmware::Outputs& outputs) {
 
 void SimLog::on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command) {
   const std::string text = text_of(command);
-  if (!json_) return print(t_ms, fmt::format("executed {} (PNum {})", text, pnum));
+  if (!output_.json()) return print(t_ms, fmt::format("executed {} (PNum {})", text, pnum));
   Json object = event(t_ms);
   object["executed"] = {{"pnum", pnum}, {"command", text}};
   print(object);
@@ -181,7 +181,7 @@ void SimLog::on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& 
 void SimLog::on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code) {
   const Text name = name_of(code);
   const std::string_view code_text(name.data(), name.size());
-  if (!json_) {
+  if (!output_.json()) {
     return print(t_ms, fmt::format("refused PNum {}: {}, {}", pnum, code_text, meaning_of(code)));
   }
   Json object = event(t_ms);
@@ -193,7 +193,7 @@ void SimLog::on_carrier(std::uint32_t t_ms, const Carrier& carrier,
                         const CarrierEvent& carrier_event) {
   const std::string_view kind = name_of_kind(carrier_event.kind);
   const auto& [error, thing, reason, fix] = carrier_event.problem;
-  if (!json_) {
+  if (!output_.json()) {
     return print(
         t_ms, fmt::format("{} {}{}{}{}{}", carrier.name(), kind, reason.empty() ? "" : ": ", reason,
                           fix.empty() ? "" : "; ", fix));

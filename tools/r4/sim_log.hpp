@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What `r4 sim` prints: where the board listens and its own events, in words or as JSON. A slow
-// reader does not hold the board up.
+// What `r4 sim` prints: where the boards listen and their own events, in words or as JSON. A slow
+// reader does not hold a board up.
 #pragma once
 
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "firmware/ports/sim/simulated_board.hpp"
@@ -13,17 +14,35 @@
 
 namespace r4::tool {
 
+// The lines of all boards of the process, in the order in which they were said.
+class SimOutput {
+ public:
+  explicit SimOutput(bool json);
+
+  // Where they listen, known once they have started; what was said before is printed behind it.
+  void listening(const std::vector<std::string>& urls);
+  void print(std::string line);
+
+  bool json() const { return json_; }
+
+ private:
+  const bool json_;
+  bool started_ = false;
+  std::vector<std::string> held_;  // lines of before listening()
+  LineWriter writer_;
+};
+
+// One board's.
 class SimLog {
  public:
-  SimLog(bool json, bool quiet);
+  // `name` is told with each event if there are several boards; else it is empty.
+  SimLog(SimOutput& output, bool quiet, std::string name)
+      : output_(output), quiet_(quiet), name_(std::move(name)) {}
 
   // The callbacks for the board's options; the log must outlive the board.
   sim::SimulatedBoard::Events events();
   // The board they belong to, before its start().
   void watch(const sim::SimulatedBoard& board) { board_ = &board; }
-
-  // Where it listens, known once it has started; events of before are printed behind it.
-  void listening(const std::vector<std::string>& urls);
 
  private:
   Json event(std::uint32_t t_ms) const;
@@ -32,16 +51,13 @@ class SimLog {
   void on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command);
   void on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code);
   void on_carrier(std::uint32_t t_ms, const Carrier& carrier, const CarrierEvent& event);
-  void print(const Json& object) { print(line_of(object)); }
+  void print(const Json& object) { output_.print(line_of(object)); }
   void print(std::uint32_t t_ms, std::string_view text);
-  void print(std::string line);
 
-  bool json_;
-  bool quiet_;
-  bool started_ = false;
-  std::vector<std::string> held_;  // lines of before listening()
+  SimOutput& output_;
+  const bool quiet_;
+  const std::string name_;
   const sim::SimulatedBoard* board_ = nullptr;
-  LineWriter writer_;
 };
 
 // How a host on this machine opens what a board listens on: "serial:///tmp/r4" for "pty:/tmp/r4".
