@@ -10,6 +10,7 @@
 #include <asio/post.hpp>
 #include <asio/steady_timer.hpp>
 #include <chrono>
+#include <cstring>
 #include <functional>
 #include <memory>
 #include <new>
@@ -28,10 +29,6 @@ using namespace std::chrono_literals;
 constexpr std::uint32_t unused_id = 0x7FF;
 constexpr char pass_time = 'p', hold_time = 'h', tell_sent = 's';
 
-std::string url_of(std::uint8_t node) {
-  return std::string("can://") + test::can_interface + "?node=" + std::to_string(node);
-}
-
 // A carrier's handler that takes nothing.
 struct Deaf : Carrier::Handler {
   void on_datagram(std::string_view, Peer) override {}
@@ -39,6 +36,17 @@ struct Deaf : Carrier::Handler {
 };
 
 }  // namespace
+
+const char* to_text(Form form) { return form == Form::plain ? "plain" : "packed"; }
+
+std::string board_url(Form form) {
+  const char* const node = form == Form::plain ? "5" : "7";
+  return std::string("can://") + test::can_interface + "?node=" + node;
+}
+
+std::string host_url(Form form) {
+  return board_url(form) + (form == Form::packed ? "&pack=1" : "");
+}
 
 test::KernelIsotp kernel_dialogue(bool board) {
   const std::uint32_t command = command_id(kernel_node);
@@ -56,29 +64,24 @@ test::KernelIsotp kernel_telemetry(bool board) {
 
 // --- a board of ours
 
-CanBoardProcess::CanBoardProcess() {
-  if (fork_child()) serve();
+CanBoardProcess::CanBoardProcess(Form form) {
+  if (fork_child()) serve(form);
   char ready = 0;
   read_all(control_, &ready, 1);
 }
-
-std::string CanBoardProcess::url() { return url_of(our_node); }
 
 void CanBoardProcess::let_time_pass(bool wanted) const {
   write_all(control_, wanted ? &pass_time : &hold_time, 1);
 }
 
-std::size_t CanBoardProcess::mean_size() {
+CanBoardProcess::Passed CanBoardProcess::sent() const {
   write_all(control_, &tell_sent, 1);
-  Sent now;
+  Passed now;
   read_all(control_, &now, sizeof now);
-  const std::uint64_t datagrams = now.datagrams - before_.datagrams;
-  const std::uint64_t bytes = now.bytes - before_.bytes;
-  before_ = now;
-  return datagrams == 0 ? 0 : static_cast<std::size_t>(bytes / datagrams);
+  return now;
 }
 
-void CanBoardProcess::serve() const {
+void CanBoardProcess::serve(Form form) const {
   asio::io_context io{ASIO_CONCURRENCY_HINT_UNSAFE};
   std::uint32_t clock_ms = 0;
   bool time_passes = true;
@@ -86,6 +89,7 @@ void CanBoardProcess::serve() const {
 
   sim::SimulatedBoard::Options options;
   options.settings.timeout_ms = 10000;  // of a clock that runs too fast at times
+  options.settings.pack = form == Form::packed;
   options.clock_ms = [&] { return clock_ms; };
   const std::uint32_t period_ms = 1000 / options.settings.state_rate_hz;
   options.events.on_executed = [&](std::uint32_t, std::uint32_t, const Command&) {
@@ -97,7 +101,7 @@ void CanBoardProcess::serve() const {
   };
   sim::SimulatedBoard board(io, std::move(options));
   running = &board;
-  auto carrier = Registry::standard().make(io, url(), Role::board);
+  auto carrier = Registry::standard().make(io, board_url(form), Role::board);
   const Carrier& end = *carrier;
   board.add_carrier(std::move(carrier));
   board.start();
@@ -121,7 +125,7 @@ void CanBoardProcess::serve() const {
         asio::buffer(&order, 1), [&](const std::error_code& error, std::size_t) {
           if (error) end_child();
           if (order == tell_sent) {
-            const Sent sent{end.counters().tx_datagrams, end.counters().tx_bytes};
+            const Passed sent{end.counters().tx_datagrams, end.counters().tx_bytes};
             write_all(control_, &sent, sizeof sent);
           } else if (time_passes != (order == pass_time)) {
             time_passes = order == pass_time;
@@ -138,7 +142,13 @@ void CanBoardProcess::serve() const {
 
 // --- the plain program
 
-KernelEchoProcess::KernelEchoProcess(std::size_t answer_size) {
+std::string KernelEchoProcess::question(std::size_t size, std::uint16_t answer_size) {
+  std::string question(size, 'q');
+  std::memcpy(question.data(), &answer_size, sizeof answer_size);
+  return question;
+}
+
+KernelEchoProcess::KernelEchoProcess() {
   if (!fork_child()) {
     char ready = 0;
     read_all(control_, &ready, 1);
@@ -147,22 +157,29 @@ KernelEchoProcess::KernelEchoProcess(std::size_t answer_size) {
   test::KernelIsotp dialogue = kernel_dialogue(true);
   test::KernelIsotp telemetry = kernel_telemetry(true);
   write_all(control_, "r", 1);
-  const std::string answer(answer_size, 'a');
+  std::string answer;
+  std::uint16_t answer_size = 0;
   std::array<char, max_datagram> question;
   for (;;) {
     dialogue.await_datagram(question.data(), question.size());
+    std::memcpy(&answer_size, question.data(), sizeof answer_size);
+    answer.assign(answer_size, 'a');
     telemetry.send(answer);
   }
 }
 
 // --- senders
 
-CanSenderProcess::CanSenderProcess(CanStack stack, Lane lane, std::size_t datagram_size) {
+CanSenderProcess::CanSenderProcess(std::optional<Form> ours, Lane lane,
+                                   const std::string& datagram) {
   void* const memory =
       ::mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   require(memory != MAP_FAILED, "mmap");
   shared_ = new (memory) Shared;
-  if (fork_child()) serve(stack, lane, std::string(datagram_size, 'x'));
+  if (fork_child()) {
+    if (ours) serve_ours(*ours, lane, datagram);
+    serve_kernel(lane, datagram);
+  }
   char ready = 0;
   read_all(control_, &ready, 1);
 }
@@ -184,19 +201,12 @@ void CanSenderProcess::await_room(std::uint32_t sent) const {
   while (sent - shared_->received.load(std::memory_order_acquire) >= ahead) ::sched_yield();
 }
 
-void CanSenderProcess::serve(CanStack stack, Lane lane, const std::string& datagram) {
-  if (stack == CanStack::ours) {
-    serve_ours(lane, datagram);
-  } else {
-    serve_kernel(lane, datagram);
-  }
-  end_child();
-}
-
-void CanSenderProcess::serve_ours(Lane lane, const std::string& datagram) {
+void CanSenderProcess::serve_ours(Form form, Lane lane, const std::string& datagram) {
   asio::io_context io{ASIO_CONCURRENCY_HINT_UNSAFE};
-  const auto carrier = Registry::standard().make(
-      io, url_of(our_node), lane == Lane::telemetry ? Role::board : Role::host);
+  const auto carrier =
+      Registry::standard().make(io, lane == Lane::telemetry ? board_url(form) : host_url(form),
+                                lane == Lane::telemetry ? Role::board : Role::host);
+  carrier->use_packed_form(form == Form::packed);
   Deaf handler;
   carrier->open(handler);
   write_all(control_, "r", 1);

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "tests/bench/link/child_process.hpp"
@@ -14,8 +15,13 @@
 namespace r4::bench {
 
 // Who is who on the bus; the ids of each are those of can_ids.hpp.
-constexpr std::uint8_t our_node = 5;
 constexpr std::uint8_t kernel_node = 6;
+
+// How ours travel. The kernel's end carries the plain datagrams beside both.
+enum class Form { plain, packed };
+const char* to_text(Form form);
+std::string host_url(Form form);
+std::string board_url(Form form);  // whether a board packs is no matter of its URL
 
 // The kernel's sockets for the two lanes of a node, from either end.
 test::KernelIsotp kernel_dialogue(bool board);
@@ -25,27 +31,33 @@ test::KernelIsotp kernel_telemetry(bool board);
 // that it executes: that takes it to the time of the next state, which confirms the command.
 class CanBoardProcess : public ChildProcess {
  public:
-  CanBoardProcess();
-  static std::string url();
+  // Datagrams that passed, as the program has them: not packed.
+  struct Passed {
+    std::uint64_t datagrams = 0, bytes = 0;
+    Passed operator-(const Passed& before) const {
+      return {datagrams - before.datagrams, bytes - before.bytes};
+    }
+    std::size_t mean_size() const {
+      return datagrams == 0 ? 0 : static_cast<std::size_t>((bytes + datagrams / 2) / datagrams);
+    }
+  };
+
+  explicit CanBoardProcess(Form form);
   void let_time_pass(bool wanted) const;
-  // Of all datagrams that it has sent so far; the mean of those sent between two calls.
-  std::size_t mean_size();
+  Passed sent() const;
 
  private:
-  struct Sent {
-    std::uint64_t datagrams = 0, bytes = 0;
-  };
-  [[noreturn]] void serve() const;
-  Sent before_;
+  [[noreturn]] void serve(Form form) const;
 };
 
-// Answers each datagram of the dialogue with one of `answer_size` bytes in the telemetry.
+// Answers each datagram of the dialogue with one in the telemetry, as long as the question says.
 class KernelEchoProcess : public ChildProcess {
  public:
-  explicit KernelEchoProcess(std::size_t answer_size);
+  KernelEchoProcess();
+  // A question of `size` bytes.
+  static std::string question(std::size_t size, std::uint16_t answer_size);
 };
 
-enum class CanStack { ours, kernel };
 enum class Lane { telemetry, dialogue };
 
 // Sends datagrams, as many as go. In the telemetry, which has no flow control, it keeps at most
@@ -54,7 +66,8 @@ class CanSenderProcess : public ChildProcess {
  public:
   static constexpr std::uint32_t ahead = 8;
 
-  CanSenderProcess(CanStack stack, Lane lane, std::size_t datagram_size);
+  // On our stack, or (no form) on the kernel's.
+  CanSenderProcess(std::optional<Form> ours, Lane lane, const std::string& datagram);
   ~CanSenderProcess();
   CanSenderProcess(const CanSenderProcess&) = delete;
   CanSenderProcess& operator=(const CanSenderProcess&) = delete;
@@ -67,8 +80,7 @@ class CanSenderProcess : public ChildProcess {
     std::atomic<std::uint32_t> received{0};
   };
   void await_room(std::uint32_t sent) const;
-  [[noreturn]] void serve(CanStack stack, Lane lane, const std::string& datagram);
-  void serve_ours(Lane lane, const std::string& datagram);
+  void serve_ours(Form form, Lane lane, const std::string& datagram);
   void serve_kernel(Lane lane, const std::string& datagram);
   std::uint32_t next_count();
 
