@@ -262,7 +262,7 @@ bool read_fields(const Datagram& datagram, State& state) {
 bool parse_safe_reason(Text text, SafeReason& out) {
   std::uint32_t number = 0;
   if (!parse_number(text, number)) return false;
-  out = number < safe_reason_count ? static_cast<SafeReason>(number) : SafeReason::fault;
+  out = to_safe_reason(number);
   return true;
 }
 

@@ -55,6 +55,12 @@ enum class SafeReason : std::uint8_t {
 };
 constexpr int safe_reason_count = 7;
 
+// The reason of a number on the wire. One that is not known is taken for a fault.
+constexpr SafeReason to_safe_reason(std::uint32_t number) {
+  return number < static_cast<std::uint32_t>(safe_reason_count) ? static_cast<SafeReason>(number)
+                                                                : SafeReason::fault;
+}
+
 // "none", "link", "stop", "handle", "proximity", "watchdog", "fault"; "unknown" for other numbers.
 const char* to_text(SafeReason reason);
 

@@ -65,7 +65,12 @@ CanBus::~CanBus() {
 }
 
 void CanBus::join(Member& member, std::vector<std::uint32_t> ids) {
-  members_.push_back({&member, std::move(ids)});
+  members_.push_back({&member, std::move(ids), false});
+  hear();
+}
+
+void CanBus::join_all(Member& member) {
+  members_.push_back({&member, {}, true});
   hear();
 }
 
@@ -87,7 +92,9 @@ void CanBus::hear() {
   if (socket_.number() < 0) return;
   std::vector<std::uint32_t> ids;
   for (const Place& place : members_) {
-    if (place.member != nullptr) ids.insert(ids.end(), place.ids.begin(), place.ids.end());
+    if (place.member == nullptr) continue;
+    if (place.all) return socket_.hear_everything();
+    ids.insert(ids.end(), place.ids.begin(), place.ids.end());
   }
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());

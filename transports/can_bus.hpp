@@ -64,8 +64,10 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   CanBus(const CanBus&) = delete;
   CanBus& operator=(const CanBus&) = delete;
 
-  // A member hears the frames of `ids` (11 bits) until it leaves.
+  // A member hears the frames of `ids` (11 bits) until it leaves, or with join_all() every frame
+  // that is on the bus, extended and remote ones too.
   void join(Member& member, std::vector<std::uint32_t> ids);
+  void join_all(Member& member);
   void leave(Member& member) noexcept;
 
   // Members have something to offer.
@@ -85,6 +87,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   struct Place {
     Member* member;  // null: has left
     std::vector<std::uint32_t> ids;
+    bool all;
   };
 
   void listen();

@@ -2,22 +2,35 @@
 // What the system knows of a CAN interface, and how it is brought up.
 #pragma once
 
+#include <cstdint>
 #include <string>
+#include <vector>
 
 #include "error.hpp"
 
 namespace r4 {
 
 struct CanInterface {
+  std::string name;
   bool exists = false;
   bool is_can = false;
   bool up = false;
   bool fd = false;              // takes CAN FD frames
-  bool has_controller = false;  // with a bit rate; not vcan, vxcan
+  bool has_controller = false;  // with a bit rate and an error state; not vcan, vxcan
   int index = 0;
 };
 
 CanInterface can_interface(const std::string& name);
+
+// All of this machine, by name.
+std::vector<CanInterface> list_can_interfaces();
+
+// What its controller says, as far as the driver tells.
+struct CanController {
+  std::string state;           // "error-active", "error-warning", … "stopped"; empty: not known
+  std::uint32_t bit_rate = 0;  // bit/s, of FD the nominal one; 0: not known
+};
+CanController can_controller(const CanInterface& interface);
 
 // What an errno of a socket on that interface means, with the fix where there is one.
 Problem can_problem(const std::string& interface, int error);

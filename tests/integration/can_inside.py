@@ -234,3 +234,52 @@ def test_garbage_on_every_id_of_ours_harms_nobody(board):
     board.state('SAFE', 'link')
     executed = [each['executed']['command'] for each in board.log if 'executed' in each]
     assert executed and all(command.startswith('F:') for command in executed), executed
+
+
+def test_eight_boards_on_one_bus_each_with_its_host():
+    with contextlib.ExitStack() as stack:
+        boards = stack.enter_context(Board('can://vcan0?node=0-7', options=('--set', 'pack,1'), listens=8))
+        hosts = [stack.enter_context(monitor(f'can://vcan0?node={node}')) for node in range(8)]
+        for host in hosts:
+            in_control(host)
+        for host in hosts:
+            host.skip_past()
+            states = [host.next(is_state) for _ in range(100)]
+            assert all((later['t'] - earlier['t']) % 10 == 0 for earlier, later in zip(states, states[1:]))
+        hosts[5].signal(signal.SIGKILL)
+        safe = boards.next(lambda each: each.get('state') == 'SAFE')
+        assert safe['board'] == 'sim-5' and safe['reason'] == 'link', safe
+        assert safe['silence'] <= SAFE_WITHIN_MS
+        for node in (4, 6):
+            hosts[node].skip_past()
+            assert hosts[node].next(is_state)['fields']['SAFE'] == 0
+        assert run('stop', 'can://vcan0?node=1', timeout=60).returncode == 0
+        stopped = set()
+        while len(stopped) < 8:  # one frame stops all of them
+            stopped.add(boards.state('SAFE', 'stop')['board'])
+
+
+def test_a_bus_is_shown_with_all_of_its_boards():
+    with Board('can://vcan0?node=2-4', listens=3), monitor('can://vcan0?node=3') as host:
+        in_control(host)
+        listed = {each.get('interface'): each for each in objects(run('list', '--json', timeout=60).stdout)}
+        assert [board['node'] for board in listed['vcan0']['boards']] == [2, 3, 4]
+        assert listed['can0']['state'] == 'error-active' and listed['can0']['bitrate'] == 1000000
+        assert listed['can0']['boards'] == []
+
+        heard = objects(run('monitor', 'can://vcan0', '--json', '--duration', '1.5', timeout=60).stdout)
+        assert {each['node'] for each in heard if each['type'] == 'heartbeat'} == {2, 3, 4}
+        assert {each['node'] for each in heard if each['type'] == 'state'} == {3}
+        table = run('monitor', 'can://vcan0', '--count', '30', timeout=60).stdout
+        assert 'ACTIVE' in table and 'CONNECTING' in table
+
+        *rows, total = objects(run('bus', 'can://vcan0', '--json', '--duration', '2', timeout=60).stdout)
+        load = {row['id']: row['load'] for row in rows}
+        assert load[TELEMETRY] > 0.1 > load[TELEMETRY - 1] > 0
+        assert abs(sum(load.values()) - total['load']) < 1e-9 and total['nearly_full'] is False
+        warned = run('bus', 'can://vcan0', '--duration', '1', '--bitrate', '125000', timeout=60)
+        assert warned.returncode == 0 and 'nearly full' in warned.stderr
+        host.skip_past()
+        host.next(is_state)
+    silent = run('monitor', 'can://vcan0', '--duration', '1', timeout=60)
+    assert silent.returncode == 3 and ERROR.search(silent.stderr), silent

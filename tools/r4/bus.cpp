@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 bus: does a planned CAN bus carry its boards?
+// r4 bus: does a planned CAN bus carry its boards? And how full is a real one (bus_live.hpp)?
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "bus_live.hpp"
 #include "bus_plan.hpp"
 #include "json.hpp"
 #include "options.hpp"
@@ -20,6 +21,7 @@ namespace {
 
 constexpr double full = 1.0;
 constexpr double nearly_full = 0.8;  // room for retransmissions, and for what was forgotten
+constexpr std::uint64_t usual_bit_rate = 1000000;
 constexpr std::uint64_t usual_data_rate = 5000000;
 
 struct Options {
@@ -27,30 +29,33 @@ struct Options {
   std::uint64_t rate = 100;
   std::uint64_t commands = 20;
   std::string fields = "DEFAULT,SAFE,CMD";
-  std::uint64_t bit_rate = 1000000;
+  std::optional<std::uint64_t> bit_rate;
   std::optional<std::uint64_t> data_bit_rate;
   bool fd = false;
   bool packed = false;
   bool json = false;
+  std::string url;
+  std::optional<Milliseconds> duration;
 };
 
 BusPlan plan_of(const Options& options) {
+  const std::uint64_t bit_rate = options.bit_rate.value_or(usual_bit_rate);
   const std::uint64_t data_rate = options.data_bit_rate.value_or(usual_data_rate);
   if (options.data_bit_rate && !options.fd) {
     throw Error(ErrorKind::usage, fmt::format("--dbitrate {}", data_rate),
                 "classic frames have one bit rate only", "add --fd, or leave it out");
   }
-  if (options.fd && data_rate < options.bit_rate) {
+  if (options.fd && data_rate < bit_rate) {
     throw Error(ErrorKind::usage, fmt::format("--dbitrate {}", data_rate),
                 "is below the nominal bit rate",
-                fmt::format("write {} or more, or a lower --bitrate", options.bit_rate));
+                fmt::format("write {} or more, or a lower --bitrate", bit_rate));
   }
   BusPlan plan;
   plan.boards = static_cast<std::uint32_t>(options.boards);
   plan.states_hz = static_cast<std::uint32_t>(options.rate);
   plan.commands_hz = static_cast<std::uint32_t>(options.commands);
   parse_fields(Text(options.fields), plan.fields);  // checked when it was read
-  plan.bit_rate.nominal = static_cast<std::uint32_t>(options.bit_rate);
+  plan.bit_rate.nominal = static_cast<std::uint32_t>(bit_rate);
   plan.bit_rate.data = options.fd ? static_cast<std::uint32_t>(data_rate) : 0;
   plan.packed = options.packed;
   return plan;
@@ -121,7 +126,22 @@ std::string remedy(const BusPlan& plan) {
   return "fewer boards, fields or states, or a second bus";
 }
 
+int live(const Options& options) {
+  LiveBusOptions bus;
+  bus.url = options.url;
+  bus.json = options.json;
+  bus.duration = options.duration;
+  if (options.bit_rate) bus.bit_rate = static_cast<std::uint32_t>(*options.bit_rate);
+  bus.data_bit_rate = static_cast<std::uint32_t>(options.data_bit_rate.value_or(0));
+  show_live_bus(bus, nearly_full);
+  return 0;
+}
+
 int bus(const Options& options) {
+  if (!options.url.empty()) return live(options);
+  if (options.duration) {
+    throw Error(ErrorKind::usage, "--duration", "is for a real bus", "name it, as in can://can0");
+  }
   const BusPlan plan = plan_of(options);
   const BusLoad load = load_of(plan);
   if (options.json) {
@@ -146,21 +166,32 @@ constexpr const char* footer = R"(Examples:
   r4 bus --boards 8 --fd        eight in the plain form on CAN FD
   r4 bus --boards 3 --packed --bitrate 500000 --rate 50 --fields DEFAULT,ENC1,ENC2
 
-Besides states and commands the link has 2 heartbeats a second from each board and 10 to it. What
+  r4 bus can://can0             a real bus: what is on it, per id, by listening
+
+Of a plan: besides states and commands the link has 2 heartbeats a second from each board and 10 to it. What
 goes to a board is answered by a frame of flow control, which is counted with it.
 
 load is the part of the bus's time that is taken: the frames of boards that drive, counted to the
 bit. worst is the longest values and the most stuff bits that there can be, all at once. A warning
 comes above 80 % of load: damaged frames are sent again, and what has a high id waits for longer.
 
-Exit codes: 0 it fits; 1 it does not, more than 100 %; 2 an option is wrong.)";
+Of a real bus: on a terminal the last second, redrawn until Ctrl-C; else, or with --duration, one table.
+The bit rate is the controller's; a virtual bus has none and is taken for one of 1 Mbit/s. Frames of
+CAN FD are counted as switching to --dbitrate, if that is given.
+
+Exit codes: 0 it fits; 1 it does not, more than 100 %; 2 an option is wrong; 4, 5, 6 the interface
+cannot be opened.)";
 
 }  // namespace
 
 void add_bus(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<Options>();
   CLI::App* const command = add_subcommand(
-      root, chosen, "bus", "The load of a planned CAN bus: what fits on it", footer, options, bus);
+      root, chosen, "bus", "The load of a CAN bus: of a planned one, or of one that is there",
+      footer, options, bus);
+  CLI::Option* const url =
+      command->add_option("URL", options->url, "a real bus, such as can://can0; without: a plan")
+          ->type_name(url_type);
   add_number(*command, "--boards", options->boards, 1, can_nodes, "boards on the bus (default 8)");
   add_number(*command, "--rate", options->rate, 1, 1000,
              "states a second of each board (default 100)");
@@ -175,6 +206,11 @@ void add_bus(CLI::App& root, Action& chosen) {
   add_number(*command, "--dbitrate", options->data_bit_rate, 10000, 8000000,
              "bit/s of the data phase, with --fd (default 5000000)");
   command->add_flag("--packed", options->packed, "the packed form (C:pack,1)");
+  for (const char* const of_plan :
+       {"--boards", "--rate", "--fields", "--commands", "--fd", "--packed"}) {
+    url->excludes(command->get_option(of_plan));
+  }
+  add_seconds(*command, "--duration", options->duration, "how long to listen to a real bus");
   add_json(*command, options->json, "print JSON, one object a line");
 }
 

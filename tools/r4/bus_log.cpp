@@ -5,27 +5,16 @@
 #include <utility>
 
 #include "protocol/units.hpp"
+#include "transports/framing/can_node.hpp"
 #include "transports/framing/packed_form.hpp"
 
 namespace r4::tool {
 namespace {
 
-// A receiver of telemetry waits for N_Cr. One of commands or answers begins to wait when its own
-// flow control is out, for which the sender waits N_Bs: the two together.
-constexpr std::uint32_t n_cr_us = 5000;
-constexpr std::uint32_t n_bs_us = 20000;
 // A longer pause is as good as this: nothing is under way after it.
 constexpr std::uint64_t longest_pause_us = 10'000'000;
 
 constexpr const char* record_it = "record with: candump -L INTERFACE";
-
-IsotpReceiverOptions listener(std::uint32_t id, std::uint32_t patience_us) {
-  IsotpReceiverOptions options;
-  options.channel.id = id;
-  options.listen_only = true;
-  options.n_cr_us = patience_us;
-  return options;
-}
 
 Json time_json(const CandumpLine& line) {
   if (line.date) return line.time;
@@ -67,8 +56,8 @@ constexpr bool is_flow_control(const CanFrame& frame) {
 
 }  // namespace
 
-BusLog::Lane::Lane(std::uint32_t id, std::uint32_t patience_us)
-    : receiver(listener(id, patience_us), bytes.data(), max_datagram) {}
+BusLog::Lane::Lane(const CanIdMeaning& meaning)
+    : receiver(listening_to(meaning.kind, meaning.node), bytes.data(), max_datagram) {}
 
 void BusLog::on_line(std::uint64_t number, std::string_view text) {
   CandumpLine line;
@@ -130,8 +119,8 @@ void BusLog::on_raw_frame(const Interface& interface, const CanIdMeaning& meanin
     ++failed_;
     object.update({{"error", "went_safe"}, {"reason", "the frame has no byte with the reason"}});
   } else {
-    const bool known = frame.data[0] != 0 && frame.data[0] < safe_reason_count;
-    const auto reason = known ? static_cast<SafeReason>(frame.data[0]) : SafeReason::fault;
+    const SafeReason reason =
+        frame.data[0] == 0 ? SafeReason::fault : to_safe_reason(frame.data[0]);
     object.update({{"type", "went_safe"},
                    {"reason", to_text(reason)},
                    {"fields", {{"SAFE", frame.data[0]}}}});
@@ -265,11 +254,7 @@ BusLog::Lane& BusLog::lane_of(Interface& interface, const CanIdMeaning& meaning)
   const LaneKind kind = lane_kind(meaning.kind);
   std::unique_ptr<Lane>& lane = interface.lanes[meaning.node][kind.index];
   if (!lane) {
-    const bool telemetry = meaning.kind == CanIdKind::telemetry;
-    const std::uint32_t id = telemetry                            ? telemetry_id(meaning.node)
-                             : meaning.kind == CanIdKind::command ? command_id(meaning.node)
-                                                                  : reply_id(meaning.node);
-    lane = std::make_unique<Lane>(id, telemetry ? n_cr_us : n_bs_us + n_cr_us);
+    lane = std::make_unique<Lane>(meaning);
     lane->whose = {{"interface", interface.name},
                    {"node", meaning.node},
                    {"from", kind.from},

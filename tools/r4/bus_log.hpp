@@ -50,7 +50,7 @@ class BusLog {
     std::optional<std::uint64_t> time_us;
   };
   struct Lane {
-    Lane(std::uint32_t id, std::uint32_t patience_us);
+    explicit Lane(const CanIdMeaning& meaning);
 
     std::array<std::uint8_t, max_datagram> bytes;
     IsotpReceiver receiver;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The status that `r4 monitor` redraws on a terminal.
 #include <fmt/format.h>
-#include <sys/ioctl.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -14,6 +12,7 @@
 #include "host/command_help.hpp"
 #include "json.hpp"
 #include "monitor_view.hpp"
+#include "output.hpp"
 
 namespace r4::tool {
 namespace {
@@ -23,18 +22,9 @@ constexpr std::size_t most_notes = 4;
 constexpr std::size_t most_fields = 128;
 constexpr std::size_t cell_width = 24;  // "SERVO16POS          2000"
 
-// The terminal's size; that of an old one where it does not tell.
-winsize terminal_size() {
-  winsize size{};
-  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) size.ws_col = 80;
-  if (size.ws_row == 0) size.ws_row = 24;
-  return size;
-}
-
 class LiveView final : public MonitorView {
  public:
-  explicit LiveView(const AsyncBoard& board) : board_(board) { print_text("\x1b[?25l"); }
-  ~LiveView() override { print_text("\x1b[?25h"); }
+  explicit LiveView(const AsyncBoard& board) : board_(board) {}
 
   void on_state(const Datagram& datagram) override {
     for (const Field& field : datagram) {
@@ -66,21 +56,11 @@ class LiveView final : public MonitorView {
 
   void on_tick() override {
     if (!output_has_room()) return;  // Ctrl-S
-    const winsize size = terminal_size();
     std::vector<std::string> lines = status_lines();
-    add_fields(lines, std::max<std::size_t>(1, size.ws_col / cell_width));
+    add_fields(lines, std::max<std::size_t>(1, Screen::columns() / cell_width));
     lines.emplace_back();
     for (const std::string& each : notes_) lines.push_back(each);
-    lines.resize(std::min<std::size_t>(lines.size(), size.ws_row - 1U));
-
-    std::string frame = drawn_ > 0 ? fmt::format("\x1b[{}A", drawn_) : "";
-    for (std::string& line : lines) {
-      if (line.size() > size.ws_col) line.resize(size.ws_col);
-      frame += "\r" + line + "\x1b[K\n";
-    }
-    frame += "\x1b[J";
-    drawn_ = lines.size();
-    print_text(frame);
+    screen_.draw(std::move(lines));
   }
 
  private:
@@ -132,7 +112,7 @@ class LiveView final : public MonitorView {
   std::uint32_t pnum_ = 0;
   std::uint64_t t_ms_ = 0;
   std::uint64_t heartbeats_ = 0;
-  std::size_t drawn_ = 0;  // lines on the screen
+  Screen screen_;
 };
 
 }  // namespace

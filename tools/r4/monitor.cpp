@@ -15,10 +15,12 @@
 
 #include "host/async_board.hpp"
 #include "host/explain.hpp"
+#include "monitor_bus.hpp"
 #include "monitor_view.hpp"
 #include "options.hpp"
 #include "subcommands.hpp"
 #include "transports/error.hpp"
+#include "transports/url.hpp"
 
 namespace r4::tool {
 namespace {
@@ -128,7 +130,25 @@ class Monitor {
   std::uint64_t states_ = 0;
 };
 
-int monitor(const Options& options) { return Monitor(options).run(); }
+// can://can0, without a node: all boards.
+bool is_whole_bus(const std::string& text) {
+  const Url url = Url::parse(text);
+  return url.scheme() == "can" && !url.get("node");
+}
+
+int monitor(const Options& options) {
+  if (options.urls.size() == 1 && is_whole_bus(options.urls.front())) {
+    const Url url = Url::parse(options.urls.front());
+    url.allow_only("");
+    if (!options.fields.empty()) {
+      throw Error(ErrorKind::usage, "--fields", "only one board can be asked for its fields",
+                  "name the board: " + url.text() + "?node=1");
+    }
+    monitor_bus({url.host(), options.json, options.count, options.duration});
+    return 0;
+  }
+  return Monitor(options).run();
+}
 
 constexpr const char* footer =
     R"(On a terminal: a status, redrawn in place. Into a pipe: one line a state. With --json: one object a
@@ -136,11 +156,13 @@ line, with type (state, heartbeat, link, nack, error), transport, pnum, t and fi
 numbers, several values as an array); on a CAN bus, at the end, one of type transfers.
 
 The monitor takes part in the link: it sends heartbeats, so the board streams and, unless another
-host has it, obeys this one. It goes on when the transport is lost and comes back.
+host has it, obeys this one. It goes on when the transport is lost and comes back. On a CAN bus without
+a node it only listens, and shows every board that it hears.
 
 Examples:
   r4 monitor udp://192.168.0.125
   r4 monitor serial:auto --fields DEFAULT,ENC1,US1
+  r4 monitor can://can0                 every board on the bus; can://can0?node=3 is one
   r4 monitor udp://127.0.0.1 --json --count 100 | jq .fields.AIN24
 
 Exit codes: 0 ended by --count, --duration or Ctrl-C; 3 nothing was heard; 2 usage; 4 the transport

@@ -2,15 +2,13 @@
 #include "monitor_view.hpp"
 
 #include <fmt/format.h>
-#include <poll.h>
-#include <unistd.h>
 
-#include <deque>
 #include <string>
 #include <utility>
 
 #include "host/command_help.hpp"
 #include "json.hpp"
+#include "output.hpp"
 #include "protocol/host_link.hpp"
 
 namespace r4::tool {
@@ -20,45 +18,10 @@ std::string_view view(Text text) { return {text.data(), text.size()}; }
 
 // Of a damaged datagram. A byte takes up to five (\\xNN), and a pipe with room has it for 4096.
 constexpr std::size_t most_shown = 600;
-// Lines that wait for room.
-constexpr std::size_t most_held = 64;
 
 std::string shown(std::string_view bytes) {
   return escaped(bytes.substr(0, most_shown)) + (bytes.size() > most_shown ? "..." : "");
 }
-
-// Prints only while the output has room. What tells of the link waits for it, the newest of it;
-// what the wire brings may be left out.
-class Lines {
- public:
-  void print(std::string line) {
-    held_.push_back(std::move(line));
-    if (held_.size() > most_held) {
-      held_.pop_front();
-      ++skipped_;
-    }
-    print_held();
-  }
-  void print_or_skip(std::string_view line) {
-    print_held();
-    if (held_.empty() && output_has_room()) {
-      print_text(line);
-    } else {
-      ++skipped_;
-    }
-  }
-  void print_held() {
-    while (!held_.empty() && output_has_room()) {
-      print_text(held_.front());
-      held_.pop_front();
-    }
-  }
-  std::uint64_t skipped() const { return skipped_ + held_.size(); }
-
- private:
-  std::deque<std::string> held_;
-  std::uint64_t skipped_ = 0;
-};
 
 class JsonView final : public MonitorView {
  public:
@@ -111,7 +74,7 @@ class JsonView final : public MonitorView {
   }
 
   const AsyncBoard& board_;
-  Lines lines_;
+  OutputLines lines_;
   bool up_ = true;
 };
 
@@ -148,15 +111,10 @@ class PlainView final : public MonitorView {
   std::uint64_t skipped() const override { return lines_.skipped(); }
 
  private:
-  Lines lines_;
+  OutputLines lines_;
 };
 
 }  // namespace
-
-bool output_has_room() {
-  pollfd out{STDOUT_FILENO, POLLOUT, 0};
-  return ::poll(&out, 1, 0) != 0;
-}
 
 std::unique_ptr<MonitorView> make_json_view(const AsyncBoard& board) {
   return std::make_unique<JsonView>(board);

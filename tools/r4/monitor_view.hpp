@@ -30,9 +30,6 @@ class MonitorView {
   virtual std::uint64_t skipped() const { return 0; }
 };
 
-// Room for a line on stdout, so that a reader who has stalled cannot stall our heartbeats.
-bool output_has_room();
-
 // One object a line: type, transport, pnum, t, fields.
 std::unique_ptr<MonitorView> make_json_view(const AsyncBoard& board);
 // One line a state, for people who pipe it.

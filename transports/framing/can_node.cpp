@@ -50,6 +50,19 @@ constexpr std::uint32_t other_id(CanEnd end, std::uint8_t node) {
 
 }  // namespace
 
+IsotpReceiverOptions listening_to(CanIdKind lane, std::uint8_t node) {
+  IsotpReceiverOptions options;
+  options.listen_only = true;
+  if (lane == CanIdKind::telemetry) {
+    options.channel.id = telemetry_id(node);
+  } else {
+    options.channel.id = lane == CanIdKind::command ? command_id(node) : reply_id(node);
+    // The sender waits for flow control between its first frames, which this end does not see.
+    options.n_cr_us += IsotpSenderOptions().n_bs_us;
+  }
+  return options;
+}
+
 CanNode::CanNode(CanEnd end, std::uint8_t node, bool fd)
     : end_(end),
       node_(static_cast<std::uint8_t>(node % can_nodes)),

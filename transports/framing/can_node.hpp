@@ -33,6 +33,9 @@ struct CanNodeCounters {
   std::uint32_t bad_form = 0;  // packed datagrams that do not unpack, dropped
 };
 
+// How a third party hears a lane of `node` (command, reply or telemetry) without taking part.
+IsotpReceiverOptions listening_to(CanIdKind lane, std::uint8_t node);
+
 class CanNode {
  public:
   // `node` is 0-31. With `fd`, frames of up to 64 bytes are sent; received are both.

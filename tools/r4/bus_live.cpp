@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bus_live.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <asio/io_context.hpp>
+#include <asio/signal_set.hpp>
+#include <asio/steady_timer.hpp>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "json.hpp"
+#include "output.hpp"
+#include "transports/can_interface.hpp"
+#include "transports/can_listener.hpp"
+#include "transports/url.hpp"
+
+namespace r4::tool {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr Milliseconds usual_duration{5000};
+constexpr Milliseconds interval{1000};
+constexpr std::uint32_t usual_bit_rate = 1000000;
+
+std::string meaning_of_id(std::uint32_t id) {
+  if (id == CanSurvey::extended_ids) return "ids of 29 bits";
+  const CanIdMeaning meaning = classify(id);
+  switch (meaning.kind) {
+    case CanIdKind::emergency_stop:
+      return "emergency stop";
+    case CanIdKind::went_safe:
+      return fmt::format("board {} went safe", meaning.node);
+    case CanIdKind::command:
+      return fmt::format("host to board {}", meaning.node);
+    case CanIdKind::reply:
+      return fmt::format("answers of board {}", meaning.node);
+    case CanIdKind::telemetry:
+      return fmt::format("states of board {}", meaning.node);
+    case CanIdKind::other:
+      break;
+  }
+  return "not R4's";
+}
+
+// What passed since the last look.
+struct Window {
+  std::map<std::uint32_t, CanTraffic> traffic;
+  CanTraffic total;
+  double seconds = 0;
+
+  double load(const CanTraffic& part) const {
+    return static_cast<double>(part.busy_ns) / (seconds * 1e9);
+  }
+};
+
+class LiveBus {
+ public:
+  LiveBus(const LiveBusOptions& options, double nearly_full)
+      : options_(options),
+        nearly_full_(nearly_full),
+        url_(Url::parse(options.url)),
+        rate_(rate_of(options, url_)),
+        listener_(io_, url_.host(), rate_),
+        signals_(io_, SIGINT, SIGTERM),
+        timer_(io_),
+        live_(!options.json && !options.duration && ::isatty(STDOUT_FILENO) != 0) {}
+
+  void run() {
+    listener_.on_event([this](const CarrierEvent& event) {
+      if (event.kind != CarrierEvent::Kind::up) problem_ = event.problem.text();
+    });
+    signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
+    wait();
+    io_.run();
+    if (live_) return;
+    const Window window = look();
+    if (options_.json) {
+      print_json(window);
+    } else {
+      for (const std::string& row : table(window)) print_text(row + "\n");
+    }
+    std::fflush(stdout);
+    if (!problem_.empty()) fmt::print(stderr, "r4: warning: {}\n", problem_);
+    if (window.load(window.total) > nearly_full_) {
+      fmt::print(stderr, "r4: warning: {}\n", fullness(window));
+    }
+  }
+
+ private:
+  static CanBitRate rate_of(const LiveBusOptions& options, const Url& url) {
+    if (url.scheme() != "can" || url.host().empty() || !url.path().empty() || url.port()) {
+      throw Error(ErrorKind::usage, options.url, "it is not can://INTERFACE",
+                  "write it as in can://can0");
+    }
+    url.allow_only("");
+    const std::uint32_t known = can_controller(can_interface(url.host())).bit_rate;
+    if (known != 0 && options.bit_rate && *options.bit_rate != known) {
+      throw Error(ErrorKind::usage, fmt::format("--bitrate {}", *options.bit_rate),
+                  fmt::format("the controller of {} is set to {}", url.host(), known),
+                  "leave the option out");
+    }
+    return {known != 0 ? known : options.bit_rate.value_or(usual_bit_rate), options.data_bit_rate};
+  }
+
+  void wait() {
+    timer_.expires_after(live_ ? interval : options_.duration.value_or(usual_duration));
+    timer_.async_wait([this](const std::error_code& error) {
+      if (error) return;
+      if (!live_) return io_.stop();
+      if (output_has_room()) {
+        const Window window = look();
+        std::vector<std::string> rows = table(window);
+        if (window.load(window.total) > nearly_full_)
+          rows.push_back("warning: " + fullness(window));
+        if (!problem_.empty()) rows.push_back(problem_);
+        screen_.draw(std::move(rows));
+      }
+      wait();
+    });
+  }
+
+  Window look() {
+    Window window;
+    const Clock::time_point now = Clock::now();
+    window.seconds = std::chrono::duration<double>(now - std::exchange(looked_, now)).count();
+    for (const auto& [id, traffic] : listener_.survey().traffic()) {
+      CanTraffic& before = before_[id];
+      const CanTraffic part{traffic.frames - before.frames, traffic.bits - before.bits,
+                            traffic.busy_ns - before.busy_ns};
+      before = traffic;
+      window.total.frames += part.frames;
+      window.total.bits += part.bits;
+      window.total.busy_ns += part.busy_ns;
+      window.traffic[id] = part;
+    }
+    return window;
+  }
+
+  std::vector<std::string> table(const Window& window) const {
+    std::vector<std::string> rows;
+    rows.push_back(fmt::format("{} at {} kbit/s, {:.1f} s", options_.url, rate_.nominal / 1000.0,
+                               window.seconds));
+    rows.emplace_back();
+    rows.push_back(fmt::format("{:<26}{:>12}{:>12}{:>11}", "id", "frames/s", "bit/s", "load"));
+    const auto add = [&](const std::string& name, const CanTraffic& part) {
+      rows.push_back(fmt::format("{:<26}{:>12.0f}{:>12.0f}{:>9.1f} %", name,
+                                 static_cast<double>(part.frames) / window.seconds,
+                                 static_cast<double>(part.bits) / window.seconds,
+                                 100 * window.load(part)));
+    };
+    for (const auto& [id, part] : window.traffic) {
+      const std::string number = id > max_can_id ? "" : fmt::format("{:03X}  ", id);
+      add(number + meaning_of_id(id), part);
+    }
+    add("total", window.total);
+    return rows;
+  }
+
+  void print_json(const Window& window) const {
+    const auto object = [&](const char* type, const CanTraffic& part) {
+      return Json{{"type", type},
+                  {"frames", static_cast<double>(part.frames) / window.seconds},
+                  {"bits", static_cast<double>(part.bits) / window.seconds},
+                  {"load", window.load(part)}};
+    };
+    for (const auto& [id, part] : window.traffic) {
+      Json row = object("traffic", part);
+      row["id"] = id > max_can_id ? Json() : Json(id);
+      row["name"] = meaning_of_id(id);
+      print_line(row);
+    }
+    Json bus = object("bus", window.total);
+    bus["transport"] = options_.url;
+    bus["seconds"] = window.seconds;
+    bus["bitrate"] = rate_.nominal;
+    bus["dbitrate"] = rate_.data;
+    bus["nearly_full"] = window.load(window.total) > nearly_full_;
+    print_line(bus);
+  }
+
+  std::string fullness(const Window& window) const {
+    return fmt::format(
+        "{}: nearly full, {:.1f} % of its time is taken; fewer boards, fields or states, or "
+        "C:pack,1 on the boards",
+        options_.url, 100 * window.load(window.total));
+  }
+
+  const LiveBusOptions& options_;
+  const double nearly_full_;
+  const Url url_;
+  const CanBitRate rate_;
+  asio::io_context io_{1};
+  CanListener listener_;
+  asio::signal_set signals_;
+  asio::steady_timer timer_;
+  const bool live_;
+  Screen screen_;
+  std::string problem_;
+  Clock::time_point looked_ = Clock::now();
+  std::map<std::uint32_t, CanTraffic> before_;
+};
+
+}  // namespace
+
+void show_live_bus(const LiveBusOptions& options, double nearly_full) {
+  LiveBus(options, nearly_full).run();
+}
+
+}  // namespace r4::tool

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "output.hpp"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "json.hpp"
+
+namespace r4::tool {
+namespace {
+
+constexpr std::size_t most_held = 64;
+
+// The terminal's size; that of an old one where it does not tell.
+winsize terminal_size() {
+  winsize size{};
+  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) size.ws_col = 80;
+  if (size.ws_row == 0) size.ws_row = 24;
+  return size;
+}
+
+}  // namespace
+
+bool output_has_room() {
+  pollfd out{STDOUT_FILENO, POLLOUT, 0};
+  return ::poll(&out, 1, 0) != 0;
+}
+
+void OutputLines::print(std::string line) {
+  held_.push_back(std::move(line));
+  if (held_.size() > most_held) {
+    held_.pop_front();
+    ++skipped_;
+  }
+  print_held();
+}
+
+void OutputLines::print_or_skip(std::string_view line) {
+  print_held();
+  if (held_.empty() && output_has_room()) {
+    print_text(line);
+  } else {
+    ++skipped_;
+  }
+}
+
+void OutputLines::print_held() {
+  while (!held_.empty() && output_has_room()) {
+    print_text(held_.front());
+    held_.pop_front();
+  }
+}
+
+Screen::~Screen() {
+  if (begun_) print_text("\x1b[?25h");
+}
+
+std::size_t Screen::columns() { return terminal_size().ws_col; }
+
+void Screen::draw(std::vector<std::string> lines) {
+  const winsize size = terminal_size();
+  lines.resize(std::min<std::size_t>(lines.size(), size.ws_row - 1U));
+  std::string frame = begun_ ? "" : "\x1b[?25l";
+  begun_ = true;
+  if (drawn_ > 0) frame += fmt::format("\x1b[{}A", drawn_);
+  for (std::string& line : lines) {
+    if (line.size() > size.ws_col) line.resize(size.ws_col);
+    frame += "\r" + line + "\x1b[K\n";
+  }
+  frame += "\x1b[J";
+  drawn_ = lines.size();
+  print_text(frame);
+}
+
+}  // namespace r4::tool
