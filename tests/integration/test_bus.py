@@ -85,7 +85,11 @@ def test_load_follows_the_bit_rate():
     (['--fields', 'AIN99'], 'no such state field'),
     (['--dbitrate', '5000000'], 'add --fd'),
     (['--fd', '--dbitrate', '500000'], 'below the nominal'),
-    (['can0'], 'argument too many'),
+    (['can0'], 'a transport and a colon'),
+    (['udp://192.168.1.77'], 'as in can://can0'),
+    (['can://can0?node=1'], 'node'),
+    (['can://can0', '--boards', '2'], 'excludes --boards'),
+    (['--duration', '2'], 'as in can://can0'),
 ])
 def test_wrong_options_are_told_with_the_fix(arguments, words):
     result = run('bus', *arguments)
@@ -96,7 +100,7 @@ def test_wrong_options_are_told_with_the_fix(arguments, words):
 def test_the_documentation_shows_what_is_printed():
     with open(os.path.join(DOCS, 'can.md'), encoding='utf-8') as file:
         text = file.read()
-    examples = re.findall(r'^    \$ r4 bus(.*)\n((?:    .*\n|\n(?=    (?!\$)))*)', text, re.MULTILINE)
+    examples = re.findall(r'^    \$ r4 bus(?! can:)(.*)\n((?:    .*\n|\n(?=    (?!\$)))*)', text, re.MULTILINE)
     assert len(examples) >= 2
     for arguments, shown in examples:
         printed = run('bus', *arguments.split())
