@@ -149,9 +149,13 @@ void CanBus::hand_over(std::size_t count) {
       on_error_frame(in_[i]);
       continue;
     }
-    // Whoever hears others is on the bus, whatever was told of before.
-    if (!up_) come_up();
-    if (trouble_ == not_acknowledged) trouble_.clear();
+    if (!in_[i].local) {
+      // Whoever hears others is on the bus, whatever was told of before.
+      if (!up_) come_up();
+      if (trouble_ == not_acknowledged) trouble_.clear();
+    } else if (!up_ && in_[i].frame.id != emergency_stop_id) {
+      continue;  // it did not get to the bus
+    }
     const std::uint32_t at_us = to_us(in_[i].at);
     for_each_member([&](Member& member) { member.on_frame(in_[i].frame, at_us); });
   }

@@ -202,6 +202,7 @@ int CanSocket::receive(std::array<Received, batch>& frames) {
     }
     messages[i].msg_hdr.msg_controllen = control_size;  // the kernel wrote what it used
     received.error = (raw[i].can_id & CAN_ERR_FLAG) != 0 ? raw[i].can_id & CAN_ERR_MASK : 0;
+    received.local = (messages[i].msg_hdr.msg_flags & MSG_DONTROUTE) != 0;
     received.frame = from_kernel(raw[i], messages[i].msg_len == CANFD_MTU);
   }
   return count;

@@ -30,6 +30,7 @@ class CanSocket {
   struct Received {
     CanFrame frame;           // of an error frame, the data hold its details
     std::uint32_t error = 0;  // the error classes of <linux/can/error.h>; 0 in a data frame
+    bool local = false;       // sent on this machine: it tells nothing of the wire
     Clock::time_point at;     // when the kernel got it
   };
 

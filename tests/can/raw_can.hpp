@@ -60,10 +60,10 @@ class CanSocket {
   void set(int level, int option, const Value& value, const char* name) {
     if (setsockopt(fd_, level, option, &value, sizeof value) != 0) fail(name);
   }
-  void bind_to_interface(sockaddr_can address) {
+  void bind_to_interface(sockaddr_can address, const char* interface = can_interface) {
     address.can_family = AF_CAN;
-    address.can_ifindex = static_cast<int>(if_nametoindex(can_interface));
-    if (address.can_ifindex == 0) fail(can_interface);
+    address.can_ifindex = static_cast<int>(if_nametoindex(interface));
+    if (address.can_ifindex == 0) fail(interface);
     if (bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) fail("bind");
   }
   int fd() const { return fd_; }
@@ -75,12 +75,13 @@ class CanSocket {
 class RawCan : CanSocket {
  public:
   // Hears classic and FD frames with that 11-bit id, not its own.
-  explicit RawCan(std::uint32_t heard_id) : CanSocket(SOCK_RAW, CAN_RAW) {
+  explicit RawCan(std::uint32_t heard_id, const char* interface = can_interface)
+      : CanSocket(SOCK_RAW, CAN_RAW) {
     set(SOL_CAN_RAW, CAN_RAW_FILTER, can_filter{heard_id, CAN_SFF_MASK | CAN_EFF_FLAG},
         "CAN_RAW_FILTER");
     set(SOL_CAN_RAW, CAN_RAW_FD_FRAMES, 1, "CAN_RAW_FD_FRAMES");
     set(SOL_SOCKET, SO_RCVBUF, 1 << 20, "SO_RCVBUF");  // as much of it as the system grants
-    bind_to_interface({});
+    bind_to_interface({}, interface);
   }
 
   // A full queue (ENOBUFS) costs time: the frame is offered again until it is taken.

@@ -196,6 +196,28 @@ def test_an_interface_that_goes_down_is_told_of_and_comes_back(board):
         host.next(is_state)
 
 
+def test_bus_off_is_safe_at_once_and_a_restart_brings_it_back(board):
+    def error_frame(classes):
+        subprocess.run(['cansend', 'vcan0', f'{0x20000000 | classes:08x}#0000000000000000'], check=True)
+
+    with monitor(board.host_url) as host:
+        in_control(host)
+        off_at = time.monotonic()
+        error_frame(0x040)  # CAN_ERR_BUSOFF
+        safe = board.state('SAFE', 'link')
+        print(f'safe {(safe["came"] - off_at) * 1000:.0f} ms after bus-off')
+        assert safe['silence'] < 500, 'it waited for the timeout'
+        host.next(lambda each: each['type'] == 'link' and not each['fields']['up'])
+        subprocess.run(['cansend', 'vcan0', f'{COMMAND:x}#00'], check=True)  # of this machine
+        board.never('ACTIVE', 1.5)
+        error_frame(0x100)  # CAN_ERR_RESTARTED
+        back_at = time.monotonic()
+        board.state('ACTIVE')
+        host.skip_past()
+        host.next(is_state)
+        print(f'back {(time.monotonic() - back_at) * 1000:.0f} ms after the restart')
+
+
 def test_the_same_through_two_controllers_with_their_driver():
     # Each frame costs the emulated machine some 100 us: fewer frames.
     with Board('can://can0?node=5', options=('--set', 'pack,1')) as board, monitor('can://can1?node=5') as host:
