@@ -130,16 +130,15 @@ class Monitor {
   std::uint64_t states_ = 0;
 };
 
-// can://can0, without a node: all boards.
+// can://can0 and nothing else: all boards.
 bool is_whole_bus(const std::string& text) {
   const Url url = Url::parse(text);
-  return url.scheme() == "can" && !url.get("node");
+  return url.scheme() == "can" && text.find('?') == std::string::npos;
 }
 
 int monitor(const Options& options) {
   if (options.urls.size() == 1 && is_whole_bus(options.urls.front())) {
     const Url url = Url::parse(options.urls.front());
-    url.allow_only("");
     if (!options.fields.empty()) {
       throw Error(ErrorKind::usage, "--fields", "only one board can be asked for its fields",
                   "name the board: " + url.text() + "?node=1");
