@@ -10,7 +10,7 @@ import time
 import pytest
 
 from can_inside import SAFE_WITHIN_MS, Dump, in_control, ip
-from r4_process import Board, Running, is_link, is_state, monitor, run
+from r4_process import Board, Running, is_link, is_state, lasts, monitor, run
 from slcan_bus import SlcanBus
 
 BITRATE = 500000
@@ -200,14 +200,14 @@ def test_a_full_queue_drops_old_states_and_no_frame_within_a_datagram():
         try:
             for _ in range(10):
                 bus.order('stall', 0)
-                time.sleep(0.05)
+                lasts(0.05)
                 bus.order('go', 0)
                 host.next(is_state)
         finally:
             flood.terminate()
             flood.wait()
         bus.order('stall', 0)
-        time.sleep(0.3)
+        lasts(0.3)
         host.skip_past()
         bus.order('go', 0)
         since = time.monotonic()
@@ -229,7 +229,7 @@ def test_a_stop_overtakes_a_full_queue():
             bus.order('stall', 1)
             flood = subprocess.Popen(['cangen', 'slcan1', '-g', '0', '-i', '-I', '7FF', '-L', '8'])
             stop = Running('stop', HOST, '--timeout', '20')
-            time.sleep(0.5)
+            lasts(0.5)
             dump.frames.clear()
             bus.order('go', 1)
             since = time.monotonic()

@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-from r4_process import ERROR, Board, is_link, is_state, monitor, objects, run
+from r4_process import ERROR, PATIENCE_S, Board, is_link, is_state, monitor, objects, run
 
 # The board's timeout, what docs/safety.md promises on top, and what an emulated machine may take.
 SAFE_WITHIN_MS = 1020 + 80
@@ -49,6 +49,7 @@ class Dump:
     def __init__(self, interface):
         self.process = subprocess.Popen(['candump', '-L', interface], stdout=subprocess.PIPE, text=True)
         self.frames = []
+        self.came = threading.Event()
         self.reader = threading.Thread(target=self._read, daemon=True)
         self.reader.start()
 
@@ -56,6 +57,15 @@ class Dump:
         for line in self.process.stdout:
             frame, _, data = line.split()[2].partition('#')
             self.frames.append((int(frame, 16), data.lstrip('#')))
+            self.came.set()
+
+    def more(self, count):
+        """Waits until that many more frames have come."""
+        wanted = len(self.frames) + count
+        deadline = time.monotonic() + PATIENCE_S
+        while len(self.frames) < wanted:
+            self.came.clear()
+            assert self.came.wait(deadline - time.monotonic()), f'{wanted - len(self.frames)} frames are missing'
 
     def __enter__(self):
         return self

@@ -15,8 +15,8 @@ import zlib
 
 import pytest
 
-from can_inside import in_control, ip
-from r4_process import Board, Running, is_link, is_state, monitor, run
+from can_inside import Dump, in_control, ip
+from r4_process import Board, Running, is_link, is_state, lasts, monitor, run
 
 BOARD, HOST = 'can://vxcan0?node=2', 'can://vxcan1?node=2'
 TELEMETRY_OF_2 = '402'
@@ -52,7 +52,8 @@ def test_of_telemetry_arrives_what_its_frames_allow(tmp_path):
         written = tmp_path / 'frames'
         with open(written, 'w', encoding='ascii') as file:
             dump = subprocess.Popen(['candump', '-L', f'vxcan0,{TELEMETRY_OF_2}:7FF'], stdout=file)
-            time.sleep(0.5)
+            while written.stat().st_size == 0:
+                host.next(is_state)
             wall = time.time() - time.monotonic()
             begun = time.monotonic()
             host.skip_past()
@@ -131,15 +132,15 @@ def test_nothing_corrupt_is_ever_applied(form):
     host_url = f'can://vcan1?node={NODE}' + ('&pack=1' if options else '')
     commands = [f'S:{1000 + i},{1 + i % 16}' for i in range(400)]
     with Gateway() as gateway, Board(f'can://vcan0?node={NODE}', options=options) as board:
-        with Running('send', host_url, '--timeout', '20', '--json', *commands) as sender:
+        with Running('send', host_url, '--timeout', '20', '--json', *commands) as sender, Dump('vcan1') as dump:
             board.executed(commands[0], timeout=20)
             for byte in range(8):
                 mask = bytearray(8)
                 mask[byte] = 0x01 if byte % 2 == 0 else 0x20
                 gateway.carry('-m', f'XOR:D:0.0.{mask.hex().upper()}')
-                time.sleep(0.1)
+                dump.more(100)
                 gateway.carry()
-                time.sleep(0.05)
+                dump.more(50)
             sender.signal(signal.SIGKILL)
         log = board.rest()
     ours = executed(log)
@@ -189,7 +190,7 @@ def test_the_datagram_after_a_broken_one_is_taken(break_off):
     with Board(f'can://vcan0?node={NODE}') as board, contextlib.closing(RawHost()) as host:
         host.send(host.heartbeat(), frames=3)
         if break_off == 'falls silent':
-            time.sleep(0.1)  # N_Cr is 5 ms
+            lasts(0.1)  # N_Cr is 5 ms
         elif break_off == 'interface down':
             ip('link', 'set', 'vcan0', 'down')
             board.next(lambda each: each.get('transport', {}).get('event') == 'down')

@@ -34,6 +34,11 @@ def objects(text):
     return [json.loads(line) for line in text.splitlines()]
 
 
+def lasts(seconds):
+    """A fault that is that long: nothing is waited for."""
+    time.sleep(seconds)
+
+
 class Running:
     """r4 as it runs. Each line of its stdout is kept with the time at which it came."""
 
@@ -84,7 +89,7 @@ class Running:
     def stall(self, seconds):
         """Holds it up and forgets what came before; returns the time at which it went on."""
         self.signal(signal.SIGSTOP)
-        time.sleep(seconds)  # the stall itself
+        lasts(seconds)
         self.skip_past()
         return self.signal(signal.SIGCONT)
 

@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs test files where SocketCAN is: here, or in the guest of tools/with-can.
+
+A run in which one of their tests was not executed fails.
+"""
+import pathlib
+import re
+import subprocess
+
+HERE = pathlib.Path(__file__).resolve().parent
+WITH_CAN = HERE.parents[1] / 'tools' / 'with-can'
+
+
+def run_inside(*names, options=(), seconds=240):
+    """`names`: files beside this one; `options`: of tools/with-can."""
+    files = [HERE / name for name in names]
+    inside = subprocess.run(
+        [WITH_CAN, *options, '--time', str(seconds), '/usr/bin/python3', '-m', 'pytest', *files, '-q', '-ra',
+         '-s', '-p', 'no:cacheprovider'], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+        timeout=min(seconds + 50, 290), check=False)
+    print(inside.stdout)
+    written = sum(len(re.findall(r'^def test_', file.read_text(), re.MULTILINE)) for file in files)
+    passed = re.search(r'(\d+) passed', inside.stdout)
+    assert inside.returncode == 0, inside.stdout[-6000:] + inside.stderr
+    assert passed and int(passed[1]) >= written and 'skipped' not in inside.stdout
