@@ -4,7 +4,8 @@
 
 #include <cstdint>
 
-namespace r4::sim {
+namespace r4 {
+namespace sim {
 
 // A number that looks random, always the same for the same input.
 constexpr std::uint64_t scramble(std::uint64_t x) {
@@ -14,4 +15,5 @@ constexpr std::uint64_t scramble(std::uint64_t x) {
   return x ^ x >> 31;
 }
 
-}  // namespace r4::sim
+}  // namespace sim
+}  // namespace r4

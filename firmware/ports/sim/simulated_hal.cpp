@@ -6,7 +6,8 @@
 
 #include "random.hpp"
 
-namespace r4::sim {
+namespace r4 {
+namespace sim {
 
 namespace {
 
@@ -76,10 +77,11 @@ void SimulatedHal::move(Stepper& stepper, const firmware::StepperTarget& target,
 
 void SimulatedHal::pin_analog(Analog input, std::int32_t centivolts) {
   pinned_cv_[static_cast<int>(input)] = centivolts;
+  pinned_ = static_cast<std::uint8_t>(pinned_ | 1U << static_cast<int>(input));
 }
 
 std::int32_t SimulatedHal::analog_cv(int input) const {
-  if (pinned_cv_[input]) return *pinned_cv_[input];
+  if ((pinned_ >> input & 1) != 0) return pinned_cv_[input];
   const std::uint64_t random =
       scramble(seed_ ^ scramble(std::uint64_t{now_ms_} << 8 | static_cast<std::uint64_t>(input)));
   switch (static_cast<Analog>(input)) {
@@ -114,4 +116,5 @@ void SimulatedHal::zero(int channel) {
   outputs_.stepper[channel - 1].enabled = false;
 }
 
-}  // namespace r4::sim
+}  // namespace sim
+}  // namespace r4

@@ -5,15 +5,15 @@
 // By default a drivable board stands on the bench as in the capture (paper section 4.4): handle
 // held, nothing in sight. Analog inputs take the values of the capture's converters as often as
 // they occur there; which one depends on the seed and the time alone, so the same seed gives the
-// same trace.
+// same trace. As portable as the firmware: the image for the Cortex-M7 uses it too.
 #pragma once
 
 #include <cstdint>
-#include <optional>
 
 #include "../../hal.hpp"
 
-namespace r4::sim {
+namespace r4 {
+namespace sim {
 
 class SimulatedHal final : public firmware::Hal {
  public:
@@ -54,8 +54,10 @@ class SimulatedHal final : public firmware::Hal {
   Stepper steppers_[stepper_channels];
   std::int32_t encoder_counts_[encoder_channels] = {};
   std::uint16_t ultrasonic_cm_[ultrasonic_channels] = {};
-  std::optional<std::int32_t> pinned_cv_[analog_channels];
+  std::int32_t pinned_cv_[analog_channels] = {};
+  std::uint8_t pinned_ = 0;  // bit n: analog input n stays at pinned_cv_[n]
   bool handle_held_ = true;
 };
 
-}  // namespace r4::sim
+}  // namespace sim
+}  // namespace r4

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The CMSDK UART as a port of the application: one datagram a line, both ways by interrupts.
+//
+// The handlers are called from the interrupts of the same number; everything else from the loop.
+// Nothing here ever waits for the other side.
+#pragma once
+
+#include <cstdint>
+
+#include "../../../transports/framing/line_framing.hpp"
+#include "../../port.hpp"
+#include "byte_ring.hpp"
+#include "transmit_lines.hpp"
+
+namespace r4 {
+namespace mps2 {
+
+class Uart final : public firmware::Port {
+ public:
+  static constexpr std::uint32_t receive_capacity = 2048;
+
+  // `base` is the UART's address. 1 Mbit/s.
+  explicit Uart(std::uint32_t base) : base_(base) {}
+  void start();
+
+  void on_receive_interrupt();
+  void on_transmit_interrupt();
+
+  // Calls `on_datagram(Text)` for each line that has arrived.
+  template <class OnDatagram>
+  void receive(OnDatagram&& on_datagram) {
+    char chunk[64];
+    while (const std::uint32_t size = received_.take(chunk, sizeof chunk)) {
+      framing_.push(chunk, size, on_datagram);
+    }
+  }
+  bool has_received() const { return !received_.empty(); }
+
+  void send(Text datagram, firmware::Urgency urgency, std::uint32_t peer) override;
+  std::size_t max_size() const override { return max_datagram; }
+  // Lets time pass.
+  void poll(std::uint32_t now_ms);
+
+  std::uint32_t overruns() const { return overruns_; }  // bytes that were lost on the way in
+  std::uint32_t dropped() const { return lines_.dropped(); }
+
+ private:
+  void fill();
+
+  const std::uint32_t base_;
+  ByteRing<receive_capacity> received_;
+  TransmitLines lines_;
+  LineFraming framing_;
+  volatile std::uint32_t overruns_ = 0;
+};
+
+// For the board's log: writes and waits for the UART, though not for ever; a fault handler may call
+// it at any time.
+class Log {
+ public:
+  explicit Log(std::uint32_t base);
+  const Log& text(Text text) const;
+  const Log& hex(std::uint32_t value) const;
+  const Log& number(std::uint32_t value) const;
+
+ private:
+  const std::uint32_t base_;
+};
+
+}  // namespace mps2
+}  // namespace r4
