@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What the board does when it finds itself broken: every output off, at once; note what it was; reset.
 //
-//     hard fault, bus fault (a stack overflow too), usage fault ...   -> Kind::fault
+//     bus fault, memory fault (a stack overflow too), usage fault ... -> Kind::fault
 //     the loop has not fed the watchdog (NMI)                         -> Kind::watchdog
 //     a broken invariant: halt()                                      -> Kind::fault
 //
@@ -21,10 +21,11 @@ struct FaultNote {
   std::uint32_t exception = 0;  // the Cortex-M7's number of it; 0: none, halt()
   std::uint32_t pc = 0;         // where it was; 0: unknown
   std::uint32_t cfsr = 0;       // why, as the Cortex-M7 tells
-  std::uint32_t address = 0;    // the address that did not work, for a bus fault
+  std::uint32_t address = 0;    // the address that did not work, for a bus or memory fault
 };
 
-// Whose outputs a fault switches off. Before it is set, none were ever switched on.
+// Whose outputs a fault switches off, and faults for what the memory must not be used for: writing
+// code, and what is below the loop's stack. To be called before any output is switched on.
 void guard(firmware::Hal& hal);
 
 // What ended the last boot; once.

@@ -32,7 +32,11 @@ constexpr std::uint32_t scb_aircr = 0xE000ED0C;
 constexpr std::uint32_t scb_shcsr = 0xE000ED24;
 constexpr std::uint32_t scb_cfsr = 0xE000ED28;
 constexpr std::uint32_t scb_hfsr = 0xE000ED2C;
+constexpr std::uint32_t scb_mmfar = 0xE000ED34;
 constexpr std::uint32_t scb_bfar = 0xE000ED38;
+constexpr std::uint32_t mpu_control = 0xE000ED94;
+constexpr std::uint32_t mpu_rbar = 0xE000ED9C;
+constexpr std::uint32_t mpu_rasr = 0xE000EDA0;
 
 inline void enable(Irq irq) { at(nvic_enable) = 1U << static_cast<unsigned>(irq); }
 

@@ -4,7 +4,7 @@
 // Lines go through a ring, each whole or not at all. A state that finds no room waits outside of it,
 // where a newer one replaces it; the last part of the ring is kept for heartbeats and answers. If
 // nothing has left for `stale_ms` (the host does not read), the lines that have not begun are thrown
-// away, so that a host which reads again hears the present.
+// away and none are taken but the newest state, so that a host which reads again hears the present.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@ class TransmitLines {
 
   // A heartbeat or an answer. What finds no room is dropped.
   void put(Text datagram) {
-    if (!put_line(datagram)) ++dropped_;
+    if (stalled_ || !put_line(datagram)) ++dropped_;
   }
   // A state. Later ones may replace it.
   void put_state(Text datagram) {
@@ -40,7 +40,9 @@ class TransmitLines {
     if (ring_.size() == 0 || taken_ != taken_before_) {
       taken_before_ = taken_;
       progress_ms_ = now_ms;
-    } else if (now_ms - progress_ms_ >= stale_ms) {
+      stalled_ = false;
+    } else if (!stalled_ && now_ms - progress_ms_ >= stale_ms) {
+      stalled_ = true;
       cut();
     }
     if (waiting_size_ != 0 && put_state_line(Text(waiting_, waiting_size_))) waiting_size_ = 0;
@@ -66,7 +68,7 @@ class TransmitLines {
     return true;
   }
   bool put_state_line(Text datagram) {
-    return ring_.room() >= datagram.size() + line_end.size() + kept_for_answers &&
+    return !stalled_ && ring_.room() >= datagram.size() + line_end.size() + kept_for_answers &&
            put_line(datagram);
   }
   // Throws away what has not begun: all behind the end of the first line.
@@ -84,6 +86,7 @@ class TransmitLines {
   volatile std::uint32_t taken_ = 0;  // bytes, ever
   std::uint32_t taken_before_ = 0;
   std::uint32_t progress_ms_ = 0;
+  bool stalled_ = false;
   std::uint32_t dropped_ = 0;
 };
 

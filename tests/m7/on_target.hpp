@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Tests that run on the processor itself. A test reads as in gtest:
+//
+//     TEST(Crc32, IsThatOfThePaper) { EXPECT(crc32("123456789") == 0xCBF43926); }
+#pragma once
+
+#include <cstdint>
+
+namespace r4 {
+namespace on_target {
+
+class Test {
+ public:
+  Test(const char* name, void (*body)());
+  // Runs all; returns how many have failed.
+  static std::uint32_t run_all();
+
+ private:
+  const char* name_;
+  void (*body_)();
+  Test* next_;
+};
+
+// Says what did not hold, and counts it against the test that runs.
+void failed(const char* what, const char* file, std::uint32_t line);
+// Says a number, for the log.
+void say_number(const char* what, std::uint32_t number);
+
+}  // namespace on_target
+}  // namespace r4
+
+#define EXPECT(condition) \
+  ((condition) ? static_cast<void>(0) : r4::on_target::failed(#condition, __FILE__, __LINE__))
+
+#define TEST(subject, behaviour)                                                   \
+  static void subject##_##behaviour();                                             \
+  static r4::on_target::Test test_##subject##_##behaviour(#subject "." #behaviour, \
+                                                          subject##_##behaviour);  \
+  static void subject##_##behaviour()
