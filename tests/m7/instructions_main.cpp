@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the protocol costs on a Cortex-M7, in instructions. Under `-icount shift=10` an instruction
+// takes 1024 ns of the board's time, so the timer counts them; a loop of known length says how many
+// ticks that are.
+#include "firmware/application.hpp"
+#include "firmware/ports/mps2/board_clock.hpp"
+#include "firmware/ports/mps2/semihosting.hpp"
+#include "firmware/ports/mps2/startup.hpp"
+#include "on_target.hpp"
+#include "protocol/crc32.hpp"
+#include "protocol/datagram.hpp"
+#include "protocol/datagram_writer.hpp"
+#include "protocol/state.hpp"
+#include "transports/framing/isotp_sender.hpp"
+#include "transports/framing/packed_form.hpp"
+
+namespace {
+
+using namespace r4;
+using namespace r4::mps2;
+
+// Runs 2 * `turns` instructions, and a few.
+__attribute__((noinline)) void loop(std::uint32_t turns) {
+  asm volatile("1: subs %0, #1\n\tbne 1b" : "+r"(turns) : : "cc");
+}
+
+// The same work is done that many times between two looks at the timer: a tick is less than an
+// instruction, but looking costs some too.
+constexpr std::uint32_t repetitions = 100;
+
+template <class Work>
+std::uint32_t ticks_of(Work&& work) {
+  work();  // what is done only once
+  const std::uint32_t before = BoardClock::ticks();
+  for (std::uint32_t i = 0; i < repetitions; ++i) work();
+  return BoardClock::ticks() - before;
+}
+
+// Ticks for a million instructions.
+std::uint32_t ticks_per_million = 0;
+
+void calibrate() {
+  const std::uint32_t before = BoardClock::ticks();
+  loop(500000);
+  ticks_per_million = BoardClock::ticks() - before;
+}
+
+template <class Work>
+std::uint32_t instructions_of(Work&& work) {
+  const std::uint64_t ticks = ticks_of(work);
+  return static_cast<std::uint32_t>(ticks * 1000000 / ticks_per_million / repetitions);
+}
+
+// A port that measures nothing but takes everything.
+class Sink final : public firmware::Port {
+ public:
+  void send(Text datagram, firmware::Urgency, std::uint32_t) override { size_ = datagram.size(); }
+  std::size_t max_size() const override { return max_datagram; }
+
+ private:
+  volatile std::size_t size_ = 0;
+};
+
+class Hal final : public firmware::Hal {
+ public:
+  void apply(const firmware::Outputs& outputs) override { outputs_ = outputs; }
+  void make_safe() override { outputs_ = firmware::Outputs(); }
+  void sample(firmware::Inputs& inputs) override { inputs.handle_held = true; }
+  void zero(int) override {}
+  const firmware::Outputs& outputs() const { return outputs_; }
+
+ private:
+  firmware::Outputs outputs_;
+};
+
+// A state as in the paper's capture: 154 bytes.
+State captured() {
+  State state;
+  state.analog_cv[0] = 2428;
+  state.analog_cv[1] = 1215;
+  state.analog_cv[2] = 511;
+  state.analog_cv[3] = 1219;
+  state.analog_cv[4] = 103;
+  state.handle_held = true;
+  return state;
+}
+
+Text written(const State& state, char* buffer) {
+  DatagramWriter writer(buffer, max_datagram);
+  for (const StateField field : FieldSet::paper_default()) write_field(writer, field, state);
+  return writer.finish(22, 79146);
+}
+
+// One command after the other, each with its own number; what reading, checking and executing costs.
+std::uint32_t command_instructions() {
+  static Hal hal;
+  static Sink sink;
+  firmware::Application::Config config;
+  static firmware::Application application(hal, config);
+  const std::uint8_t port = application.add_port(sink);
+  static char heartbeat[max_datagram];
+  static char commands[repetitions + 1][64];
+  static Text texts[repetitions + 1];
+  for (std::uint32_t i = 0; i <= repetitions; ++i) {
+    DatagramWriter writer(commands[i], sizeof commands[i]);
+    writer.field("O")
+        .value(std::uint32_t{358 + i % 2})
+        .value(std::uint32_t{1})
+        .value(std::uint32_t{1});
+    texts[i] = writer.finish(1000 + i, 79146);
+  }
+  application.start(1000);
+  DatagramWriter writer(heartbeat, sizeof heartbeat);
+  writer.field("H").value("ROS2-R4");
+  application.receive(port, 1, writer.finish(999, 79000), 1000);
+  std::uint32_t next = 0;
+  const std::uint32_t count =
+      instructions_of([&] { application.receive(port, 1, texts[next++], 1000); });
+  // It has cost what it should only if it was done.
+  const bool done = application.state() == firmware::BoardState::active &&
+                    application.link().last_executed() == 1000 + repetitions &&
+                    hal.outputs().osmc[0].pwm == 358;
+  return done ? count : 0;
+}
+
+}  // namespace
+
+int main() {
+  BoardClock clock(0);
+  clock.start();
+  calibrate();
+
+  static char buffer[max_datagram];
+  const State state = captured();
+  Text datagram = written(state, buffer);
+  const std::uint32_t writing = instructions_of([&] { datagram = written(state, buffer); });
+  if (datagram.size() < 140 || datagram.size() > 160) exit_emulator(1);
+  on_target::say_number("a state with the default fields, written", writing);
+
+  Datagram seen;
+  on_target::say_number("that state, read and checked",
+                        instructions_of([&] { read(datagram, seen); }));
+
+  const std::uint32_t command = command_instructions();
+  if (command == 0) exit_emulator(2);
+  on_target::say_number("a command read, checked and executed", command);
+
+  static char bytes[170];
+  for (std::size_t i = 0; i < sizeof bytes; ++i) bytes[i] = static_cast<char>(i);
+  volatile std::uint32_t crc = 0;
+  on_target::say_number("CRC-32 of 154 bytes",
+                        instructions_of([&] { crc = crc32(Text(bytes, 154)); }));
+
+  IsotpSenderOptions options;
+  options.channel.id = 0x401;
+  options.flow_control = false;
+  static IsotpSender sender(options);
+  std::uint32_t frames = 0;
+  const std::uint32_t cutting = instructions_of([&] {
+    CanFrame frame;
+    sender.begin(bytes, sizeof bytes, 0);
+    while (sender.offer(0, frame)) {
+      sender.frame_sent(0);
+      ++frames;
+    }
+  });
+  if (frames != 25 * (repetitions + 1)) exit_emulator(3);
+  on_target::say_number("170 bytes cut into ISO-TP frames", cutting);
+
+  static std::uint8_t packed[max_datagram];
+  std::size_t size = 0;
+  const std::uint32_t packing =
+      instructions_of([&] { size = pack(datagram, packed, sizeof packed); });
+  if (size == 0) exit_emulator(4);
+  on_target::say_number("that state, packed", packing);
+  exit_emulator(0);
+}
