@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "board_hardware.hpp"
+
+namespace r4 {
+namespace firmware {
+
+namespace {
+
+constexpr std::uint8_t bit(std::uint8_t number, bool on) {
+  return static_cast<std::uint8_t>(on ? 1U << number : 0U);
+}
+
+constexpr std::uint8_t pca9685_chips = 1U << static_cast<int>(Chip::osmc_pwm) |
+                                       1U << static_cast<int>(Chip::dhb12_pwm) |
+                                       1U << static_cast<int>(Chip::servo_pwm);
+
+// In the safe state, after the all-call: what moves most with least, first.
+constexpr Chip safe_order[chip_count] = {Chip::dac, Chip::expander, Chip::osmc_pwm, Chip::dhb12_pwm,
+                                         Chip::servo_pwm};
+
+void set_drive(Pca9685& pwm, const DriveLines& lines, Drive drive) {
+  pwm.set_duty(lines.pwm, drive.pwm);
+  pwm.set_level(lines.direction, drive.direction == Direction::forward);
+}
+
+}  // namespace
+
+const char* to_text(Chip chip) {
+  switch (chip) {
+    case Chip::osmc_pwm:
+      return "PCA9685 0x40 (OSMC)";
+    case Chip::dhb12_pwm:
+      return "PCA9685 0x41 (DHB12)";
+    case Chip::expander:
+      return "MCP23017 0x20 (relays, BLDC direction and brake)";
+    case Chip::dac:
+      return "MCP4728 0x61 (BLDC speed)";
+    case Chip::servo_pwm:
+      return "PCA9685 0x42 (servos)";
+    case Chip::count:
+      break;
+  }
+  return "none";
+}
+
+BoardHardware::BoardHardware(I2cBus& bus, const BoardPins& pins, const Config& config)
+    : bus_(bus),
+      pins_(pins),
+      config_(config),
+      osmc_(bus, osmc_pwm_address, drive_hz, drive_lines),
+      dhb12_(bus, dhb12_pwm_address, drive_hz, drive_lines),
+      expander_(bus, expander_address, brakes_on, 0),
+      dac_(bus, dac_address),
+      servo_(bus, servo_pwm_address, servo_hz),
+      chips_{&osmc_, &dhb12_, &expander_, &dac_, &servo_},
+      steppers_{{*pins.step[0], *pins.direction[0], config.step_tick_hz, stepper_speed_max},
+                {*pins.step[1], *pins.direction[1], config.step_tick_hz, stepper_speed_max},
+                {*pins.step[2], *pins.direction[2], config.step_tick_hz, stepper_speed_max},
+                {*pins.step[3], *pins.direction[3], config.step_tick_hz, stepper_speed_max}},
+      ultrasonic_(*pins.trigger[0], *pins.trigger[1], *pins.trigger[2], *pins.trigger[3],
+                  config.ultrasonic_fitted) {}
+
+void BoardHardware::power_up(std::uint32_t now_us) {
+  now_us_ = now_us;
+  verified_us_ = now_us;
+  make_safe();
+  for (int i = 0; i < chip_count; ++i) {
+    if (fitted(i) && !failed_[i]) chips_[i]->begin();
+  }
+}
+
+void BoardHardware::make_safe() {
+  const bool nested = busy_;
+  if (nested) {
+    interrupted_ = true;
+    bus_.recover();
+  }
+  busy_ = true;
+  drive_safe();
+  look_for_trouble();
+  if (nested) return;
+  leave();
+}
+
+void BoardHardware::drive_safe() {
+  for (Stepper& stepper : steppers_) stepper.stop();
+  // A held bus fails at its first transfer. If it cannot be freed, there is nothing more to do.
+  if (!drive_chips_safe() && bus_.recover()) drive_chips_safe();
+}
+
+// Every chip into its safe state; false as soon as the bus is held.
+bool BoardHardware::drive_chips_safe() {
+  if ((config_.chips_fitted & pca9685_chips) != 0 && Pca9685::all_off(bus_) == I2cResult::timeout) {
+    for (int i = 0; i < chip_count; ++i) {
+      if (fitted(i)) chips_[i]->note(I2cResult::timeout);
+    }
+    return false;
+  }
+  // Its acknowledge may be that of one of three: each is told by its own address, too.
+  for (const Chip chip : safe_order) {
+    const int i = static_cast<int>(chip);
+    if (!fitted(i)) continue;
+    const I2cResult result = chips_[i]->make_safe();
+    chips_[i]->note(result);
+    if (result == I2cResult::timeout) return false;
+  }
+  return true;
+}
+
+void BoardHardware::apply(const Outputs& outputs) {
+  if (fault_.any()) return;
+  busy_ = true;
+  set_outputs(outputs);
+  BusBudget budget(bus_bytes_per_poll);
+  for_each_chip(budget, false);
+  leave();
+}
+
+void BoardHardware::set_outputs(const Outputs& outputs) {
+  for (int i = 0; i < osmc_channels; ++i) set_drive(osmc_, osmc_lines[i], outputs.osmc[i]);
+  for (int i = 0; i < dhb12_channels; ++i) set_drive(dhb12_, dhb12_lines[i], outputs.dhb12[i]);
+  for (int i = 0; i < servo_channels; ++i) {
+    servo_.set_pulse_us(servo_lines[i], outputs.servo_us[i]);
+  }
+  std::uint8_t port_a = 0;
+  for (int i = 0; i < bldc_channels; ++i) {
+    const Bldc& bldc = outputs.bldc[i];
+    port_a |= bit(bldc_lines[i].direction, bldc.direction == Direction::forward);
+    port_a |= bit(bldc_lines[i].brake, bldc.brake);
+    dac_.set_code(bldc_lines[i].speed, bldc.speed);
+  }
+  std::uint8_t port_b = 0;
+  for (int i = 0; i < relay_channels; ++i) port_b |= bit(relay_bits[i], outputs.relays >> i & 1);
+  expander_.set_ports(port_a, port_b);
+  for (int i = 0; i < stepper_channels; ++i) {
+    const StepperTarget& target = outputs.stepper[i];
+    steppers_[i].go(target.position, target.enabled ? target.speed : 0);
+  }
+}
+
+// From the chip at which the budget ran out last time, so that none is left behind. Ends at a held
+// bus: one timeout is enough.
+void BoardHardware::for_each_chip(BusBudget& budget, bool set_up) {
+  for (int n = 0; n < chip_count; ++n) {
+    const int i = (first_chip_ + n) % chip_count;
+    if (!fitted(i) || chips_[i]->trouble() != ChipTrouble::none) continue;
+    if (set_up) {
+      chips_[i]->poll(now_us_, budget);
+    } else {
+      chips_[i]->write_changes(budget);
+    }
+    if (chips_[i]->trouble() == ChipTrouble::bus_stuck) return;
+    if (budget.exhausted()) {
+      first_chip_ = i;
+      return;
+    }
+  }
+  first_chip_ = 0;
+}
+
+void BoardHardware::poll(std::uint32_t now_us) {
+  busy_ = true;
+  now_us_ = now_us;
+
+  const bool seen = pins_.handle->read() == handle_held_level;
+  if (!seen || !handle_seen_) held_since_us_ = now_us;
+  handle_seen_ = seen;
+  handle_held_ = seen && (handle_held_ || now_us - held_since_us_ >= handle_settle_us);
+  ultrasonic_.poll(now_us);
+  for (QuadratureEncoder& encoder : encoders_) encoder.measure(now_us);
+
+  set_up_again();
+  BusBudget budget(bus_bytes_per_poll);
+  if (now_us - verified_us_ >= verify_us) {
+    verified_us_ = now_us;
+    if (fitted(verified_chip_)) chips_[verified_chip_]->verify(budget);
+    verified_chip_ = (verified_chip_ + 1) % chip_count;
+  }
+  for_each_chip(budget, true);
+  leave();
+}
+
+// Chips in trouble get another chance, if the bus is free: their set-up begins anew.
+void BoardHardware::set_up_again() {
+  bool tried = false;
+  bool free = false;
+  for (int i = 0; i < chip_count; ++i) {
+    if (chips_[i]->trouble() == ChipTrouble::none || now_us_ - failed_us_[i] < retry_us) continue;
+    failed_us_[i] = now_us_;
+    free = tried ? free : bus_.recover();
+    tried = true;
+    if (free) chips_[i]->begin();
+  }
+}
+
+// Latches new trouble. True if there is some.
+bool BoardHardware::look_for_trouble() {
+  bool found = false;
+  for (int i = 0; i < chip_count; ++i) {
+    const ChipTrouble trouble = chips_[i]->trouble();
+    if (trouble == ChipTrouble::none) {
+      if (chips_[i]->ready()) failed_[i] = false;
+      continue;
+    }
+    if (failed_[i]) continue;
+    failed_[i] = true;
+    failed_us_[i] = now_us_;
+    found = true;
+    if (!fault_.any()) {
+      fault_.chip = static_cast<Chip>(i);
+      fault_.trouble = trouble;
+    }
+  }
+  return found;
+}
+
+// The end of what uses the bus. New trouble makes everything safe. If make_safe() came between,
+// what was being written may have come after it: once more.
+void BoardHardware::leave() {
+  if (look_for_trouble()) {
+    drive_safe();
+    look_for_trouble();
+  }
+  while (interrupted_) {
+    interrupted_ = false;
+    drive_safe();
+    look_for_trouble();
+  }
+  busy_ = false;
+  interrupted_ = false;  // what came after the last look drove everything safe by itself
+}
+
+void BoardHardware::sample(Inputs& inputs) {
+  for (int i = 0; i < analog_channels; ++i) {
+    inputs.analog_cv[i] = centivolts_of(pins_.analog[i]->read(), config_.calibration[i]);
+  }
+  // Letting go counts at once, not at the next poll.
+  inputs.handle_held = handle_held_ && pins_.handle->read() == handle_held_level;
+  for (int i = 0; i < stepper_channels; ++i) inputs.stepper_steps[i] = steppers_[i].position();
+  for (int i = 0; i < encoder_channels; ++i) inputs.encoder_counts[i] = encoders_[i].count();
+  for (int i = 0; i < ultrasonic_channels; ++i) {
+    inputs.ultrasonic_cm[i] = ultrasonic_.distance_cm(i);
+  }
+}
+
+void BoardHardware::zero(int channel) {
+  encoders_[channel - 1].zero();
+  steppers_[channel - 1].zero();
+}
+
+bool BoardHardware::ready() const {
+  for (int i = 0; i < chip_count; ++i) {
+    if (fitted(i) && !chips_[i]->ready()) return false;
+  }
+  return true;
+}
+
+bool BoardHardware::clear_fault() {
+  if (!ready()) return false;
+  fault_ = ChipFault();
+  return true;
+}
+
+}  // namespace firmware
+}  // namespace r4

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The R4 board's hardware made of the chip drivers: outputs go to chips and pins by the table of
+// board_channels.hpp, inputs come from pins, converters and interrupts.
+//
+// Order at power-up: power_up() first, before anything else. Its first transfer turns every PWM
+// output off, its last leaves every output in its safe value; only then the chips are set up, in
+// poll(), and ready() tells when all are.
+//
+// The safe state (make_safe): steppers stand, PWM outputs off, DAC codes 0, brakes on, relays off.
+// It may be called at any time, also in an interrupt or a fault handler in the middle of a
+// transfer. It makes at most two bounded attempts (a held bus is recovered once).
+//
+// A chip in trouble: the fault is latched with chip and reason, all outputs are made safe, and
+// apply() has no effect until clear_fault(). Meanwhile the chip is set up anew, outputs off first,
+// every retry_us, after a recovery of the bus. Chips are looked at one after the other, so a chip
+// that was reset is noticed within chip_count x verify_us plus one poll.
+//
+// The bus carries at most bus_bytes_per_poll bytes in each poll() and each apply(); what does not
+// fit follows in the next polls. Nothing waits.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "board_channels.hpp"
+#include "drivers/analog.hpp"
+#include "drivers/mcp23017.hpp"
+#include "drivers/mcp4728.hpp"
+#include "drivers/pca9685.hpp"
+#include "drivers/pins.hpp"
+#include "drivers/quadrature.hpp"
+#include "drivers/stepper.hpp"
+#include "drivers/ultrasonic.hpp"
+#include "hal.hpp"
+
+namespace r4 {
+namespace firmware {
+
+enum class Chip : std::uint8_t { osmc_pwm, dhb12_pwm, expander, dac, servo_pwm, count };
+constexpr int chip_count = static_cast<int>(Chip::count);
+// "PCA9685 0x40 (OSMC)" and so on.
+const char* to_text(Chip chip);
+
+struct ChipFault {
+  Chip chip = Chip::count;
+  ChipTrouble trouble = ChipTrouble::none;
+  bool any() const { return trouble != ChipTrouble::none; }
+};
+
+// The microcontroller's pins; all of them must be there and outlive the hardware.
+struct BoardPins {
+  OutputPin* step[stepper_channels];
+  OutputPin* direction[stepper_channels];
+  OutputPin* trigger[ultrasonic_channels];
+  AnalogPin* analog[analog_channels];
+  InputPin* handle;
+};
+
+class BoardHardware final : public Hal {
+ public:
+  struct Config {
+    std::uint8_t chips_fitted = (1U << chip_count) - 1;  // bit: Chip; the others are left alone
+    std::uint8_t ultrasonic_fitted = 0;                  // bit n-1: sensor n
+    std::int32_t step_tick_hz = 40000;
+    AnalogCalibration calibration[analog_channels];
+  };
+  static constexpr std::size_t bus_bytes_per_poll = 48;
+  static constexpr std::uint32_t verify_us = 20000;
+  static constexpr std::uint32_t retry_us = 100000;
+  static constexpr std::uint32_t handle_settle_us = 20000;
+  static_assert(bus_bytes_per_poll >= bus_budget_min, "a set-up would never end");
+
+  BoardHardware(I2cBus& bus, const BoardPins& pins, const Config& config);
+
+  void power_up(std::uint32_t now_us);
+  // To be called every millisecond or so.
+  void poll(std::uint32_t now_us);
+
+  void apply(const Outputs& outputs) override;
+  void make_safe() override;
+  void sample(Inputs& inputs) override;
+  void zero(int channel) override;
+
+  // Every chip is set up and answers.
+  bool ready() const;
+  // The first trouble since the last clear_fault().
+  const ChipFault& fault() const { return fault_; }
+  ChipTrouble trouble(Chip chip) const { return chips_[static_cast<int>(chip)]->trouble(); }
+  // Outputs are obeyed again. False while a chip is not ready.
+  bool clear_fault();
+
+  // For interrupts. Channels count from 1.
+  void step_tick() {
+    for (Stepper& stepper : steppers_) stepper.tick();
+  }
+  QuadratureEncoder& encoder(int channel) { return encoders_[channel - 1]; }
+  UltrasonicSensors& ultrasonic() { return ultrasonic_; }
+
+ private:
+  bool fitted(int chip) const { return (config_.chips_fitted >> chip & 1) != 0; }
+  void drive_safe();
+  bool drive_chips_safe();
+  void set_outputs(const Outputs& outputs);
+  void for_each_chip(BusBudget& budget, bool set_up);
+  void set_up_again();
+  bool look_for_trouble();
+  void leave();
+
+  I2cBus& bus_;
+  BoardPins pins_;
+  Config config_;
+  Pca9685 osmc_;
+  Pca9685 dhb12_;
+  Mcp23017 expander_;
+  Mcp4728 dac_;
+  Pca9685 servo_;
+  ChipDriver* chips_[chip_count];
+  Stepper steppers_[stepper_channels];
+  QuadratureEncoder encoders_[encoder_channels];
+  UltrasonicSensors ultrasonic_;
+
+  ChipFault fault_;
+  bool failed_[chip_count] = {};
+  std::uint32_t failed_us_[chip_count] = {};
+  int first_chip_ = 0;     // of the next poll
+  int verified_chip_ = 0;  // the next
+  std::uint32_t verified_us_ = 0;
+  std::uint32_t now_us_ = 0;  // of the last poll
+  std::uint32_t held_since_us_ = 0;
+  bool handle_seen_ = false;           // the pin said held at the last poll
+  bool handle_held_ = false;           // it has said so for a while
+  volatile bool busy_ = false;         // the bus is in use: in poll(), apply() or make_safe()
+  volatile bool interrupted_ = false;  // and make_safe() came between
+};
+
+}  // namespace firmware
+}  // namespace r4

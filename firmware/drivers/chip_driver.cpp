@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "chip_driver.hpp"
+
+namespace r4 {
+namespace firmware {
+
+const char* to_text(ChipTrouble trouble) {
+  switch (trouble) {
+    case ChipTrouble::none:
+      return "none";
+    case ChipTrouble::no_acknowledge:
+      return "no acknowledge";
+    case ChipTrouble::bus_stuck:
+      return "bus stuck";
+    case ChipTrouble::was_reset:
+      return "was reset";
+    case ChipTrouble::wrong_register:
+      return "wrong register";
+    case ChipTrouble::not_ready:
+      return "not ready";
+  }
+  return "unknown";
+}
+
+void ChipDriver::begin() {
+  started_ = true;
+  ready_ = false;
+  trouble_ = ChipTrouble::none;
+  on_begin();
+}
+
+void ChipDriver::poll(std::uint32_t now_us, BusBudget& budget) {
+  if (!started_) return;
+  while (usable() && !ready_) {
+    if (!set_up(now_us, budget)) return;
+  }
+  write_changes(budget);
+}
+
+void ChipDriver::write_changes(BusBudget& budget) {
+  if (usable() && ready_) on_write_changes(budget);
+}
+
+void ChipDriver::verify(BusBudget& budget) {
+  if (usable() && ready_) on_verify(budget);
+}
+
+bool ChipDriver::note(I2cResult result) {
+  if (result == I2cResult::no_acknowledge) fail(ChipTrouble::no_acknowledge);
+  if (result == I2cResult::timeout) fail(ChipTrouble::bus_stuck);
+  return result == I2cResult::ok;
+}
+
+bool ChipDriver::send(const std::uint8_t* bytes, std::size_t size, BusBudget& budget) {
+  return usable() && budget.take(size + 1) && note(bus_.write(address_, bytes, size));
+}
+
+bool ChipDriver::fetch(std::uint8_t first_register, std::uint8_t* bytes, std::size_t size,
+                       BusBudget& budget) {
+  return usable() && budget.take(size + 3) &&
+         note(bus_.write_read(address_, &first_register, 1, bytes, size));
+}
+
+void ChipDriver::fail(ChipTrouble trouble) {
+  if (usable()) trouble_ = trouble;
+  ready_ = false;
+}
+
+}  // namespace firmware
+}  // namespace r4

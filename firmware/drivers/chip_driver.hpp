@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the drivers of the I2C chips have in common: set-up without waiting, changes only, a look at
+// the chip's registers now and then, and trouble as a value.
+//
+//           begin()             poll(), over and over
+//     new ----------> setting up ----------------------> ready
+//                        ^   |                             |  a transfer failed, or verify() found
+//                begin() |   | a transfer failed           |  other values than were written
+//                        |   v                             v
+//                      trouble <---------------------------+
+//
+// Setting up begins with the outputs off. A driver in trouble makes no transfers until begin().
+// Times are microseconds of a clock that wraps.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "i2c_bus.hpp"
+
+namespace r4 {
+namespace firmware {
+
+// What is wrong with a chip.
+enum class ChipTrouble : std::uint8_t {
+  none,
+  no_acknowledge,  // it does not answer
+  bus_stuck,       // a line of the bus is held
+  was_reset,       // it lost its set-up: it must have been reset under way
+  wrong_register,  // a register holds what was not written
+  not_ready,       // it did not come up in time, or cannot store its power-on values
+};
+// "none", "no acknowledge", "bus stuck", "was reset", "wrong register", "not ready".
+const char* to_text(ChipTrouble trouble);
+
+// How many bytes the bus may still carry in this poll; addresses count.
+class BusBudget {
+ public:
+  explicit BusBudget(std::size_t bytes) : left_(bytes) {}
+  std::size_t left() const { return left_; }
+  bool take(std::size_t bytes) {
+    if (bytes > left_) {
+      exhausted_ = true;
+      return false;
+    }
+    left_ -= bytes;
+    return true;
+  }
+  // Something had to wait for the next poll.
+  bool exhausted() const { return exhausted_; }
+
+ private:
+  std::size_t left_;
+  bool exhausted_ = false;
+};
+
+// No budget of a poll may be smaller: some steps of a set-up need that much at once.
+constexpr std::size_t bus_budget_min = 36;
+
+class ChipDriver {
+ public:
+  ChipDriver(const ChipDriver&) = delete;
+  ChipDriver& operator=(const ChipDriver&) = delete;
+
+  std::uint8_t address() const { return address_; }
+  bool ready() const { return ready_; }
+  ChipTrouble trouble() const { return trouble_; }
+
+  // Starts the set-up anew, from whatever the chip is in; all outputs are to be off.
+  void begin();
+  // The next steps of the set-up; once ready, the registers that are to change.
+  void poll(std::uint32_t now_us, BusBudget& budget);
+  // Writes the registers that are to change, if ready. Nothing is written when nothing changed.
+  void write_changes(BusBudget& budget);
+  // Compares the chip's registers with what was written, if ready.
+  void verify(BusBudget& budget);
+  // All outputs off, at once and in whatever state the chip or the driver is. Does not touch
+  // trouble(): the caller decides with note().
+  virtual I2cResult make_safe() = 0;
+  // Takes the result of a transfer that somebody made for this driver.
+  bool note(I2cResult result);
+
+ protected:
+  ChipDriver(I2cBus& bus, std::uint8_t address) : bus_(bus), address_(address) {}
+  ~ChipDriver() = default;
+
+  virtual void on_begin() = 0;
+  // One step of the set-up. True if another may follow at once.
+  virtual bool set_up(std::uint32_t now_us, BusBudget& budget) = 0;
+  virtual void on_write_changes(BusBudget& budget) = 0;
+  virtual void on_verify(BusBudget& budget) = 0;
+
+  // Transfers; false if the budget does not allow it now, or it failed (then there is trouble).
+  bool send(const std::uint8_t* bytes, std::size_t size, BusBudget& budget);
+  bool fetch(std::uint8_t first_register, std::uint8_t* bytes, std::size_t size, BusBudget& budget);
+  void fail(ChipTrouble trouble);
+  void set_ready() { ready_ = true; }
+  bool usable() const { return trouble_ == ChipTrouble::none; }
+
+  I2cBus& bus_;
+
+ private:
+  std::uint8_t address_;
+  bool started_ = false;
+  bool ready_ = false;
+  ChipTrouble trouble_ = ChipTrouble::none;
+};
+
+}  // namespace firmware
+}  // namespace r4

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "mcp23017.hpp"
+
+namespace r4 {
+namespace firmware {
+
+namespace {
+
+constexpr std::uint8_t iodir_a = 0x00;
+constexpr std::uint8_t iocon_if_bank_1 = 0x05;  // GPINTENB if BANK is 0, where 0 does no harm
+constexpr std::uint8_t iocon = 0x0A;
+constexpr std::uint8_t olat_a = 0x14;
+
+}  // namespace
+
+void Mcp23017::set_ports(std::uint8_t a, std::uint8_t b) {
+  wanted_[0] = a;
+  wanted_[1] = b;
+}
+
+I2cResult Mcp23017::make_safe() {
+  set_ports(safe_[0], safe_[1]);
+  const std::uint8_t latches[] = {olat_a, safe_[0], safe_[1]};
+  const I2cResult result = bus_.write(address(), latches, sizeof latches);
+  if (result != I2cResult::ok) return result;
+  written_[0] = safe_[0];
+  written_[1] = safe_[1];
+  const std::uint8_t directions[] = {iodir_a, 0, 0};
+  return bus_.write(address(), directions, sizeof directions);
+}
+
+void Mcp23017::on_begin() {
+  set_ports(safe_[0], safe_[1]);
+  step_ = Step::bank;
+}
+
+bool Mcp23017::set_up(std::uint32_t now_us, BusBudget& budget) {
+  static_cast<void>(now_us);
+  switch (step_) {
+    case Step::bank: {
+      const std::uint8_t bytes[] = {iocon_if_bank_1, 0};
+      if (!send(bytes, sizeof bytes, budget)) return false;
+      step_ = Step::latches;
+      return true;
+    }
+    case Step::latches: {
+      const std::uint8_t bytes[] = {olat_a, safe_[0], safe_[1]};
+      if (!send(bytes, sizeof bytes, budget)) return false;
+      written_[0] = safe_[0];
+      written_[1] = safe_[1];
+      step_ = Step::directions;
+      return true;
+    }
+    case Step::directions: {
+      const std::uint8_t bytes[] = {iodir_a, 0, 0, 0, 0};  // IPOL follows
+      if (!send(bytes, sizeof bytes, budget)) return false;
+      step_ = Step::mode;
+      return true;
+    }
+    case Step::mode: {
+      const std::uint8_t bytes[] = {iocon, 0};
+      if (!send(bytes, sizeof bytes, budget)) return false;
+      set_ready();
+      return true;
+    }
+  }
+  return false;
+}
+
+void Mcp23017::on_write_changes(BusBudget& budget) {
+  const bool a = wanted_[0] != written_[0];
+  const bool b = wanted_[1] != written_[1];
+  if (!a && !b) return;
+  const std::uint8_t first = a ? 0 : 1;
+  const std::uint8_t end = b ? 2 : 1;
+  std::uint8_t bytes[3] = {static_cast<std::uint8_t>(olat_a + first)};
+  std::uint8_t size = 1;
+  for (std::uint8_t i = first; i < end; ++i) bytes[size++] = wanted_[i];
+  if (!send(bytes, size, budget)) return;
+  for (std::uint8_t i = first; i < end; ++i) written_[i] = wanted_[i];
+}
+
+void Mcp23017::on_verify(BusBudget& budget) {
+  if (budget.left() < 10) {
+    budget.take(10);
+    return;
+  }
+  std::uint8_t directions[2] = {};
+  std::uint8_t latches[2] = {};
+  if (!fetch(iodir_a, directions, sizeof directions, budget)) return;
+  if (!fetch(olat_a, latches, sizeof latches, budget)) return;
+  if (directions[0] != 0 || directions[1] != 0) {
+    fail(directions[0] == 0xFF && directions[1] == 0xFF ? ChipTrouble::was_reset
+                                                        : ChipTrouble::wrong_register);
+  } else if (latches[0] != written_[0] || latches[1] != written_[1]) {
+    fail(ChipTrouble::wrong_register);
+  }
+}
+
+}  // namespace firmware
+}  // namespace r4

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// NXP PCA9685: sixteen 12-bit PWM outputs of one frequency (data sheet Rev. 4).
+//
+//     register          value                                                   section
+//     00 MODE1          RESTART 80, EXTCLK 40, AI 20, SLEEP 10, SUB1-3 0E,       7.3.1
+//                       ALLCALL 01; reset 11
+//     01 MODE2          INVRT 10, OCH 08, OUTDRV 04, OUTNE 03; reset 04          7.3.2
+//     06+4n …           LEDn_ON_L, ON_H, OFF_L, OFF_H: counts 0-4095; bit 4 of   7.3.3
+//                       H: full on, full off; OFF wins; reset full off
+//     FA-FD ALL_LED     the same for all sixteen; reads 0                        7.3.4
+//     FE PRE_SCALE      25 MHz / (4096 f), rounded, - 1; at least 3; written     7.3.5
+//                       only in SLEEP
+//
+// Set-up: all outputs off, SLEEP with AI and ALLCALL, PRE_SCALE, awake, and 500 us later RESTART
+// (7.3.1.1), all sixteen off again (after an orderly shutdown their contents are undefined), then
+// a look at what was written. Nothing waits: the 500 us pass between polls.
+//
+// The outputs change together on STOP, so what one transfer writes comes at once. Registers that
+// differ are written, neighbours in one auto-increment burst; a burst is cut, when the budget is
+// short, only between groups of channels: a motor's duty and direction never part.
+//
+// The chip has no timeout of its own: it keeps driving when the microcontroller dies. Safe state of
+// all three in three bytes: all_off().
+#pragma once
+
+#include <cstdint>
+
+#include "chip_driver.hpp"
+
+namespace r4 {
+namespace firmware {
+
+class Pca9685 final : public ChipDriver {
+ public:
+  static constexpr int channels = 16;
+  static constexpr std::uint8_t all_call_address = 0x70;
+  static constexpr std::uint32_t oscillator_us = 500;
+  // Counted from the beginning of the poll that woke it, which may have spent this much on the bus.
+  static constexpr std::uint32_t wake_wait_us = oscillator_us + 1500;
+
+  static constexpr std::uint8_t prescale_for(std::uint32_t hz) {
+    return static_cast<std::uint8_t>((25000000U + 2048U * hz) / (4096U * hz) - 1U);
+  }
+
+  // `frequency_hz` 24-1526. `group`: that many channels, from channel 0 on, change together; a
+  // divisor of 16, at most 4.
+  Pca9685(I2cBus& bus, std::uint8_t address, std::uint32_t frequency_hz, int group = 1)
+      : ChipDriver(bus, address), prescale_(prescale_for(frequency_hz)), group_(group) {}
+
+  // What a channel (0-15) is to do from the next write on.
+  void set_duty(int channel, std::uint16_t duty);  // 0: off, 4095 and more: on, else n/4096
+  void set_level(int channel, bool high) { set_duty(channel, high ? duty_on : 0); }
+  // Pulses of `us` microseconds, to the nearest count (4.88 us at 50 Hz); 0: none.
+  void set_pulse_us(int channel, std::uint16_t us);
+  void set_all_off();
+
+  I2cResult make_safe() override;
+  // Every output of every PCA9685 on the bus off, by the all-call address: 70 <- FD 10. Its
+  // acknowledge says that at least one of them heard it.
+  static I2cResult all_off(I2cBus& bus);
+
+ private:
+  static constexpr int registers = 4 * channels;
+  static constexpr std::uint16_t duty_on = 4095;
+  enum class Step : std::uint8_t { off, sleep, prescale, wake, restart, clear, check };
+
+  void on_begin() override;
+  bool set_up(std::uint32_t now_us, BusBudget& budget) override;
+  void on_write_changes(BusBudget& budget) override;
+  void on_verify(BusBudget& budget) override;
+  bool check_mode(BusBudget& budget);
+  bool wanted(int index, std::uint8_t& value) const;
+  bool differs(int index) const;
+
+  std::uint8_t prescale_;
+  int group_;
+  Step step_ = Step::off;
+  std::uint32_t awake_us_ = 0;
+  std::uint8_t verified_channel_ = 0;
+  std::uint16_t duty_[channels] = {};
+  std::uint8_t written_[registers] = {};  // LED0_ON_L … as the chip has them
+};
+
+}  // namespace firmware
+}  // namespace r4

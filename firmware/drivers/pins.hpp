@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Single pins and converters of the microcontroller, as the drivers need them. No call waits;
+// all may be made in an interrupt.
+#pragma once
+
+#include <cstdint>
+
+namespace r4 {
+namespace firmware {
+
+class OutputPin {
+ public:
+  virtual void write(bool high) = 0;
+
+ protected:
+  ~OutputPin() = default;
+};
+
+class InputPin {
+ public:
+  virtual bool read() = 0;
+
+ protected:
+  ~InputPin() = default;
+};
+
+// An analog input: the newest conversion, 0-65535 for 0 V to the reference (paper section 8.5).
+class AnalogPin {
+ public:
+  virtual std::uint16_t read() = 0;
+
+ protected:
+  ~AnalogPin() = default;
+};
+
+}  // namespace firmware
+}  // namespace r4

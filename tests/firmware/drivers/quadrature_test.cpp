@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "firmware/drivers/quadrature.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck.h>
+#include <rapidcheck/gtest.h>
+
+namespace r4::firmware {
+namespace {
+
+// A shaft with 4 counts a cycle; A leads B forward.
+struct Shaft {
+  void turn(int counts) {
+    const int step = counts > 0 ? 1 : -1;
+    for (; counts != 0; counts -= step) {
+      at = (at + step) & 3;
+      encoder.sample(a(), b());
+    }
+  }
+  bool a() const { return at == 1 || at == 2; }
+  bool b() const { return at == 2 || at == 3; }
+  Shaft() { encoder.sample(a(), b()); }
+  int at = 0;
+  QuadratureEncoder encoder;
+};
+
+TEST(QuadratureEncoder, CountsFourACycleBothWays) {
+  Shaft shaft;
+  shaft.turn(8);
+  EXPECT_EQ(shaft.encoder.count(), 8);
+  shaft.turn(-13);
+  EXPECT_EQ(shaft.encoder.count(), -5);
+  EXPECT_EQ(shaft.encoder.illegal(), 0U);
+}
+
+TEST(QuadratureEncoder, TheFirstLevelsCountNothing) {
+  for (int levels = 0; levels < 4; ++levels) {
+    QuadratureEncoder encoder;
+    encoder.sample((levels & 2) != 0, (levels & 1) != 0);
+    EXPECT_EQ(encoder.count(), 0);
+    EXPECT_EQ(encoder.illegal(), 0U);
+  }
+}
+
+TEST(QuadratureEncoder, AJumpOverBothLinesIsIllegalAndCountsNothing) {
+  QuadratureEncoder encoder;
+  encoder.sample(false, false);
+  encoder.sample(true, true);
+  encoder.sample(false, false);
+  encoder.sample(false, true);
+  encoder.sample(true, false);
+  EXPECT_EQ(encoder.illegal(), 3U);
+  EXPECT_EQ(encoder.count(), -1);
+}
+
+TEST(QuadratureEncoder, TheSameLevelsAgainCountNothing) {
+  Shaft shaft;
+  shaft.turn(3);
+  for (int i = 0; i < 10; ++i) shaft.encoder.sample(shaft.a(), shaft.b());
+  EXPECT_EQ(shaft.encoder.count(), 3);
+}
+
+TEST(QuadratureEncoder, TheIndexLatchesAndMaySetToZero) {
+  Shaft shaft;
+  shaft.turn(5);
+  shaft.encoder.index(true);
+  shaft.encoder.index(true);
+  EXPECT_EQ(shaft.encoder.index_pulses(), 1U);
+  EXPECT_EQ(shaft.encoder.index_count(), 5);
+  EXPECT_EQ(shaft.encoder.count(), 5);
+  shaft.encoder.index(false);
+  shaft.encoder.zero_on_index(true);
+  shaft.turn(2);
+  shaft.encoder.index(true);
+  EXPECT_EQ(shaft.encoder.index_count(), 7);
+  EXPECT_EQ(shaft.encoder.count(), 0);
+  EXPECT_EQ(shaft.encoder.index_pulses(), 2U);
+}
+
+TEST(QuadratureEncoder, FrequencyIsThatOfTheWindowAndZeroDoesNotDisturbIt) {
+  Shaft shaft;
+  std::uint32_t now_us = 0xFFFF0000U;  // the clock wraps
+  shaft.encoder.measure(now_us);
+  for (int ms = 0; ms < 100; ++ms) {
+    shaft.turn(-3);
+    if (ms == 50) shaft.encoder.zero();
+    now_us += 1000;
+    shaft.encoder.measure(now_us);
+  }
+  EXPECT_EQ(shaft.encoder.frequency_hz(), -3000);
+  shaft.encoder.measure(now_us + 100000);
+  EXPECT_EQ(shaft.encoder.frequency_hz(), 0);
+}
+
+RC_GTEST_PROP(QuadratureEncoder, CountsWhatTheShaftTurns, (const std::vector<std::int8_t>& turns)) {
+  Shaft shaft;
+  int sum = 0;
+  for (const std::int8_t counts : turns) {
+    shaft.turn(counts);
+    sum += counts;
+  }
+  RC_ASSERT(shaft.encoder.count() == sum);
+  RC_ASSERT(shaft.encoder.illegal() == 0U);
+}
+
+}  // namespace
+}  // namespace r4::firmware

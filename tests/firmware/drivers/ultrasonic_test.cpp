@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "firmware/drivers/ultrasonic.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <vector>
+
+#include "pin_models.hpp"
+
+namespace r4::firmware {
+namespace {
+
+// Four sensors with obstacles; the echo rises 450 us after the trigger fell.
+struct Bench {
+  explicit Bench(std::uint8_t fitted = 0x0F)
+      : sensors(trigger[0], trigger[1], trigger[2], trigger[3], fitted) {}
+  void run(int ms, std::uint32_t step_us = 1000) {
+    for (std::uint32_t end = now_us + static_cast<std::uint32_t>(ms) * 1000; now_us != end;
+         now_us += step_us) {
+      std::array<bool, 4> before{};
+      for (std::size_t i = 0; i < 4; ++i) before[i] = trigger[i].high;
+      sensors.poll(now_us);
+      for (std::size_t i = 0; i < 4; ++i) {
+        if (trigger[i].high && !before[i]) turns.emplace_back(static_cast<int>(i), now_us);
+        if (trigger[i].high || !before[i]) continue;
+        if (echo_us[i] == 0) continue;
+        const std::uint32_t rose = now_us + 450;
+        sensors.echo(static_cast<int>(i), true, rose);
+        pending.emplace_back(static_cast<int>(i), rose + echo_us[i]);
+      }
+      while (!pending.empty() && static_cast<std::int32_t>(now_us - pending.front().second) >= 0) {
+        sensors.echo(pending.front().first, false, pending.front().second);
+        pending.erase(pending.begin());
+      }
+    }
+  }
+  std::array<test::OutputPinModel, 4> trigger;
+  std::array<std::uint32_t, 4> echo_us{};
+  std::vector<std::pair<int, std::uint32_t>> turns;
+  std::vector<std::pair<int, std::uint32_t>> pending;
+  std::uint32_t now_us = 0xFFFE0000U;  // the clock wraps
+  UltrasonicSensors sensors;
+};
+
+TEST(UltrasonicSensors, DistanceIsTheEchoBy58) {
+  Bench bench;
+  bench.echo_us = {58 * 2, 58 * 100 + 57, 58 * 400, 58 * 4};
+  bench.run(250);
+  EXPECT_EQ(bench.sensors.distance_cm(0), 2);
+  EXPECT_EQ(bench.sensors.distance_cm(1), 100);
+  EXPECT_EQ(bench.sensors.distance_cm(2), 400);
+  EXPECT_EQ(bench.sensors.distance_cm(3), 4);
+}
+
+TEST(UltrasonicSensors, TakesTurnsSixtyMillisecondsApart) {
+  Bench bench;
+  bench.echo_us = {1000, 1000, 1000, 1000};
+  bench.run(1000);
+  ASSERT_GE(bench.turns.size(), 16U);
+  for (std::size_t i = 1; i < bench.turns.size(); ++i) {
+    EXPECT_EQ(bench.turns[i].first, (bench.turns[i - 1].first + 1) % 4);
+    EXPECT_GE(bench.turns[i].second - bench.turns[i - 1].second, 60000U);
+    EXPECT_LE(bench.turns[i].second - bench.turns[i - 1].second, 61000U);
+  }
+}
+
+TEST(UltrasonicSensors, TheTriggerLastsTenMicrosecondsOrMore) {
+  Bench bench(0x01);
+  bench.run(1, 2);
+  EXPECT_EQ(bench.trigger[0].rises, 1);
+  bench.now_us = 0;
+  test::OutputPinModel pins[4];
+  UltrasonicSensors sensors(pins[0], pins[1], pins[2], pins[3], 1);
+  sensors.poll(100);
+  EXPECT_TRUE(pins[0].high);
+  sensors.poll(109);
+  EXPECT_TRUE(pins[0].high);
+  sensors.poll(110);
+  EXPECT_FALSE(pins[0].high);
+}
+
+TEST(UltrasonicSensors, NothingInRangeASilentSensorAndAStuckLineAreToldApart) {
+  Bench bench;
+  bench.echo_us = {58 * 401, 39000, 0, 580};
+  bench.run(200);
+  bench.sensors.echo(3, true, bench.now_us);
+  bench.run(300);
+  EXPECT_EQ(bench.sensors.result(0), EchoResult::no_echo);
+  EXPECT_EQ(bench.sensors.result(1), EchoResult::no_echo);
+  EXPECT_EQ(bench.sensors.result(2), EchoResult::no_answer);
+  EXPECT_EQ(bench.sensors.result(3), EchoResult::line_stuck);
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(bench.sensors.distance_cm(i), 0);
+}
+
+TEST(UltrasonicSensors, SomethingRightAtTheSensorIsNotNothing) {
+  Bench bench(0x01);
+  bench.echo_us = {20, 0, 0, 0};
+  bench.run(70);
+  EXPECT_EQ(bench.sensors.distance_cm(0), 1);
+}
+
+TEST(UltrasonicSensors, OnlyThoseThatAreFittedHaveATurn) {
+  Bench bench(0b1010);
+  bench.run(500);
+  EXPECT_EQ(bench.trigger[0].rises, 0);
+  EXPECT_GT(bench.trigger[1].rises, 2);
+  EXPECT_EQ(bench.trigger[2].rises, 0);
+  EXPECT_GT(bench.trigger[3].rises, 2);
+  Bench none(0);
+  none.run(500);
+  EXPECT_TRUE(none.turns.empty());
+}
+
+TEST(UltrasonicSensors, ALateEchoOfAnotherSensorIsNotTakenForOnesOwn) {
+  Bench bench(0b0011);
+  bench.echo_us = {0, 0, 0, 0};
+  bench.run(65);
+  bench.sensors.echo(0, true, bench.now_us);
+  bench.sensors.echo(0, false, bench.now_us + 600);
+  bench.run(60);
+  EXPECT_EQ(bench.sensors.result(1), EchoResult::no_answer);
+}
+
+}  // namespace
+}  // namespace r4::firmware
