@@ -37,7 +37,7 @@ void Pca9685Model::power_on() {
   registers_[sub_address_1 + 1] = 0xE4;
   registers_[sub_address_1 + 2] = 0xE8;
   registers_[all_call_address] = 0xE0;
-  for (int i = led_first + 3; i <= led_last; i += 4) registers_[static_cast<std::size_t>(i)] = full;
+  for (std::size_t i = led_first + 3; i <= led_last; i += 4) registers_[i] = full;
   registers_[pre_scale] = 0x1E;
   std::copy_n(registers_.begin() + led_first, active_.size(), active_.begin());
   pointer_ = 0;
@@ -129,9 +129,9 @@ void Pca9685Model::write_register(std::uint8_t value) {
     registers_[pointer_] = (pointer_ - led_first) % 2 == 0 ? value : value & 0x1F;
     led_written_ = true;
   } else if (pointer_ >= all_led_first && pointer_ <= all_led_last) {
-    const int offset = pointer_ - all_led_first;
-    for (int i = led_first + offset; i <= led_last; i += 4) {
-      registers_[static_cast<std::size_t>(i)] = offset % 2 == 0 ? value : value & 0x1F;
+    const std::size_t offset = static_cast<std::size_t>(pointer_ - all_led_first);
+    for (std::size_t i = led_first + offset; i <= led_last; i += 4) {
+      registers_[i] = offset % 2 == 0 ? value : value & 0x1F;
     }
     led_written_ = true;
   } else if (pointer_ == pre_scale && (registers_[mode1] & sleep) != 0) {
@@ -150,10 +150,8 @@ void Pca9685Model::write_mode1(std::uint8_t value) {
   if (was_asleep && (value & sleep) != 0) after |= value & external_clock;
   if ((value & sleep) != 0 && !was_asleep) {
     // Channels that were not shut down in order wait for RESTART.
-    for (int channel = 0; channel < channels; ++channel) {
-      if ((registers_[static_cast<std::size_t>(led_first + 4 * channel + 3)] & full) == 0) {
-        restart_wanted_ = true;
-      }
+    for (std::size_t i = led_first + 3; i <= led_last; i += 4) {
+      if ((registers_[i] & full) == 0) restart_wanted_ = true;
     }
   }
   if ((value & sleep) == 0 && was_asleep) awake_since_us_ = now_us_;
@@ -168,7 +166,7 @@ bool Pca9685Model::running() const {
 }
 
 int Pca9685Model::duty(int channel) const {
-  const std::uint8_t* led = &active_[static_cast<std::size_t>(4 * channel)];
+  const std::uint8_t* led = &active_[4 * static_cast<std::size_t>(channel)];
   int duty = 0;
   if (!running() || (led[3] & full) != 0) {
     duty = 0;
