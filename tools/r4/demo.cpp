@@ -6,6 +6,7 @@
 #include <asio/io_context.hpp>
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,7 +18,10 @@
 #include "protocol/datagram.hpp"
 #include "protocol/message.hpp"
 #include "subcommands.hpp"
+#include "transports/can_interface.hpp"
+#include "transports/can_socket.hpp"
 #include "transports/error.hpp"
+#include "transports/framing/can_ids.hpp"
 
 namespace r4::tool {
 namespace {
@@ -30,7 +34,7 @@ constexpr const char* introduction = R"(R4 in a few lines
   An R4 board drives motors, servos and relays and reads sensors. A program, the host, talks to it in
   lines of text, datagrams. Each ends with a checksum, so a damaged one is noticed and thrown away.
   Both sides number their datagrams and send heartbeats: if the host's stay away for a second, the
-  board switches every output off. The same datagrams go over WiFi, USB serial or within a program.
+  board switches every output off. The same datagrams go over WiFi, USB serial, CAN or within a program.
 
 1. What was on the wire
   Captured from a real board (paper, section 4.4), read by this program:
@@ -122,20 +126,44 @@ class SeparateBoard {
 struct Stage {
   const char* name;  // in the table
   const char* title;
-  const char* board_url;  // where the separate process listens; empty: no other process
+  std::string board_url;  // where the separate process listens; empty: no other process
 };
-constexpr std::array<Stage, 3> stages{{
-    {"in process", "Within this program (sim:)", ""},
-    {"UDP", "Over UDP, as by WiFi: host and board are two processes now", "udp://127.0.0.1:0"},
-    {"serial", "Over a serial line (a pseudo-terminal, which stands for USB): two processes",
-     "pty:"},
-}};
+
+// Only an interface that cannot be anything but virtual by its name: there may be motors on others.
+std::string virtual_can() {
+  for (const CanInterface& each : list_can_interfaces()) {
+    if (each.up && !each.has_controller && each.name.starts_with("vcan")) return each.name;
+  }
+  return {};
+}
+
+// What this machine has. `missing` tells why CAN is not among them.
+std::vector<Stage> stages(std::optional<Problem>& missing) {
+  std::vector<Stage> all{
+      {"in process", "Within this program (sim:)", ""},
+      {"UDP", "Over UDP, as by WiFi: host and board are two processes now", "udp://127.0.0.1:0"},
+      {"serial", "Over a serial line (a pseudo-terminal, which stands for USB): two processes",
+       "pty:"},
+  };
+  const std::string interface = virtual_can();
+  if (!interface.empty()) {
+    all.push_back({"CAN", "Over a CAN bus (a virtual one): two processes",
+                   fmt::format("can://{}?node={}", interface, can_nodes - 1)});
+    return all;
+  }
+  try {
+    CanSocket().open("vcan0", false);
+  } catch (const Error& error) {
+    missing = error.problem();
+  }
+  return all;
+}
 
 StoryResult play(const Stage& stage, const Story::Teller& teller) {
   asio::io_context io(1);
   StoryResult result;
   try {
-    if (*stage.board_url == 0) {
+    if (stage.board_url.empty()) {
       result = Story(io, "sim:", nullptr, teller).run();
     } else {
       SeparateBoard board(io, stage.board_url);
@@ -163,7 +191,7 @@ void print_json(const StoryResult& r) {
               {"trouble", r.trouble}});
 }
 
-void print_table(const std::vector<StoryResult>& results) {
+void print_table(const std::vector<StoryResult>& results, const std::optional<Problem>& missing) {
   print("\nSummary");
   print(fmt::format("  {:<11}{:>9}{:>9}{:>7}{:>12}{:>11}{:>12}{:>11}{:>9}", "transport", "connect",
                     "states", "lost", "round trip", "command", "silence to", "recovery", "stop"));
@@ -174,6 +202,9 @@ void print_table(const std::vector<StoryResult>& results) {
         fmt::format("  {:<11}{:>9.1f}{:>9.1f}{:>7}{:>12.0f}{:>11.1f}{:>12.0f}{:>11.1f}{:>9.1f}  {}",
                     r.transport, r.connect_ms, r.rate_hz, r.lost, r.round_trip_us, r.confirmed_ms,
                     r.safe_ms, r.recovered_ms, r.stop_ms, r.good ? "ok" : "NOT OK"));
+  }
+  if (missing) {
+    print(fmt::format("  {:<11}  not played: {}; {}", "CAN", missing->reason, missing->fix));
   }
   print(
       "  command: sent until seen in the board's state, which comes every 10 ms\n"
@@ -187,7 +218,8 @@ int demo(const Options& options) {
   bool good = decode_capture(options.json);
   std::vector<StoryResult> results;
   int chapter = 2;
-  for (const Stage& stage : stages) {
+  std::optional<Problem> missing;
+  for (const Stage& stage : stages(missing)) {
     Story::Teller teller{[](std::string_view) {}, [](std::string_view) {}};
     if (!options.json) {
       print(fmt::format("\n{}. {}", chapter++, stage.title));
@@ -200,8 +232,14 @@ int demo(const Options& options) {
     good = good && result.good;
     results.push_back(result);
   }
+  if (options.json && missing) {
+    print_line({{"type", "not_played"},
+                {"transport", "CAN"},
+                {"reason", missing->reason},
+                {"fix", missing->fix}});
+  }
   if (!options.json) {
-    print_table(results);
+    print_table(results, missing);
     print(good ? "\nAll of it was true. Next: r4 --help"
                : "\nSomething was not true, see NOT OK above.");
   }
@@ -209,8 +247,10 @@ int demo(const Options& options) {
 }
 
 constexpr const char* footer =
-    R"(Starts simulated boards by itself: in this process, and two as processes of their own, reached over
-UDP and over a pseudo-terminal. Nothing is needed but this program.
+    R"(Starts simulated boards by itself: in this process, and others as processes of their own, reached over
+UDP and over a pseudo-terminal. Nothing is needed but this program. Where a virtual CAN interface
+(vcan0) is up, a third is reached over that, as node 31; its emergency stop is heard by every simulated
+board on it. Other CAN interfaces are left alone: there may be motors behind them.
 
 Exit codes: 0 every step was true; 3 at least one was not.)";
 
