@@ -113,7 +113,8 @@ bool Session::on_state_datagram(const Datagram& datagram, Time now) {
 void Session::on_nack_datagram(const Datagram& datagram, Time now) {
   Nack nack;
   if (!read_nack(datagram, nack)) return;
-  knows_cmd_ = true;  // the paper's release answers nothing
+  if (!is_ours(nack.pnum)) return;  // on a CAN bus the answers to other hosts are heard too
+  knows_cmd_ = true;                // the paper's release answers nothing
   if (nack.code == Refusal::busy) busy_until_ = now + busy_memory;
   on_answer(datagram, now);
   if (nack.pnum == newest_clear_ && nack.code != Refusal::busy) clear_open_ = false;
@@ -150,6 +151,11 @@ void Session::on_identity_datagram(const Datagram& datagram, Time now) {
   }
 }
 
+// Have we sent a datagram with that number?
+bool Session::is_ours(std::uint32_t pnum) const {
+  return pnum - first_pnum_ <= link_.last_pnum() - first_pnum_;
+}
+
 // An answer counts in the board's packet numbers, but not in those that a host without control
 // sees.
 void Session::on_answer(const Datagram& datagram, Time now) {
@@ -164,9 +170,8 @@ void Session::confirm_from_state(Time now) {
   if (has_cmd) {
     command_field_seen_ = now;
     knows_cmd_ = true;
-    // One of our numbers: the board has executed a command of ours, so we control it.
-    const std::uint32_t ours = link_.last_pnum() - first_pnum_;
-    if (link_up() && state_.last_command - first_pnum_ <= ours) {
+    // The board has executed a command of ours, so we control it.
+    if (link_up() && is_ours(state_.last_command)) {
       controlled_ = true;
       if (!newer(newest_clear_, state_.last_command)) clear_open_ = false;
     }

@@ -155,6 +155,7 @@ class Session {
   void on_identity_datagram(const Datagram& datagram, Time now);
   void on_nack_datagram(const Datagram& datagram, Time now);
   void on_answer(const Datagram& datagram, Time now);
+  bool is_ours(std::uint32_t pnum) const;
   void confirm_from_state(Time now);
   void confirm_stop(Ticket before, Time now);
   void select_fields(Time now);

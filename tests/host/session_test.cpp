@@ -279,6 +279,21 @@ TEST(Session, IsBusyWhileTheBoardSaysThatAnotherHostControlsIt) {
   link.connect();
 }
 
+TEST(Session, AnswersToAnotherHostChangeNothing) {
+  ScriptedLink link;
+  link.connect();
+  link.pass(100ms);
+  const std::uint32_t ours = link.last('H').pnum;
+  for (const std::uint32_t others : {ours + 1000, ours - 1000000, std::uint32_t{7}}) {
+    link.nack(others, "BUSY");
+  }
+  EXPECT_FALSE(link.session.link().busy);
+  EXPECT_TRUE(link.nacks.empty());
+  EXPECT_TRUE(link.session.in_control(link.now));
+  link.nack(ours, "BUSY");
+  EXPECT_TRUE(link.session.link().busy);
+}
+
 TEST(Session, AsksTheBoardWhoItIsOnceASecondAndMeasuresTheRoundTrip) {
   ScriptedLink link{SessionOptions{}};
   link.connect();
