@@ -34,6 +34,8 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
    public:
     virtual void on_frame(const CanFrame& frame, std::uint32_t at_us) = 0;
     virtual void on_drained() = 0;  // all frames that had arrived were handed over
+    // Is in the middle of a transfer whose next frame may come at once.
+    virtual bool awaits_frame() const { return false; }
     // The frame to send now, accepted with frame_sent().
     virtual bool offer(std::uint32_t now_us, CanFrame& frame) = 0;
     // The same, of those that may overtake what was accepted before.
@@ -73,8 +75,8 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   // Members have something to offer.
   void send();
   // Hands over the frames that have arrived. Before somebody gives up waiting for one: a loop that
-  // was held up may find the time-out and the frame together.
-  void take();
+  // was held up may find the time-out and the frame together. True if there were any.
+  bool take();
   // The emergency stop, ahead of everything that waits in the interface's queue.
   SendResult send_stop();
 
@@ -92,6 +94,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
 
   void listen();
   void receive();
+  bool look_a_little();
   void hand_over(std::size_t count);
   void on_error_frame(const CanSocket::Received& received);
   void send_urgent(std::uint32_t now_us);
@@ -125,6 +128,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   int calling_ = 0;       // members are being called: their places stay
   bool sending_ = false;
   bool receiving_ = false;
+  Clock::time_point look_from_;  // not before: it was in vain
   std::array<CanFrame, ahead> out_;
   std::size_t out_count_ = 0;
   Clock::time_point progress_;

@@ -44,6 +44,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
 
   void on_frame(const CanFrame& frame, std::uint32_t at_us) override;
   void on_drained() override;
+  bool awaits_frame() const override { return node_.awaits_frame(); }
   void on_sent() override { arm(); }
   bool offer(std::uint32_t now_us, CanFrame& frame) override;
   bool offer_urgent(std::uint32_t now_us, CanFrame& frame) override {

@@ -303,7 +303,7 @@ def test_a_bus_is_shown_with_all_of_its_boards():
         heard = objects(run('monitor', 'can://vcan0', '--json', '--duration', '1.5', timeout=60).stdout)
         assert {each['node'] for each in heard if each['type'] == 'heartbeat'} == {2, 3, 4}
         assert {each['node'] for each in heard if each['type'] == 'state'} == {3}
-        table = run('monitor', 'can://vcan0', '--count', '30', timeout=60).stdout
+        table = run('monitor', 'can://vcan0', '--count', '100', timeout=60).stdout
         assert 'ACTIVE' in table and 'CONNECTING' in table
 
         *rows, total = objects(run('bus', 'can://vcan0', '--json', '--duration', '2', timeout=60).stdout)

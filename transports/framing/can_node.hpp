@@ -67,6 +67,10 @@ class CanNode {
   // Takes a frame; one that is none of its own is passed over. Returns the datagram that it
   // completes, valid up to the next call, or an empty text.
   Text on_frame(const CanFrame& frame, std::uint32_t now_us);
+  // Is a transfer being received whose next frame may come at once?
+  bool awaits_frame() const {
+    return telemetry_in_.awaits_consecutive() || dialogue_in_.awaits_consecutive();
+  }
   // Ends what has timed out.
   void poll(std::uint32_t now_us);
   IsotpDeadline deadline() const;

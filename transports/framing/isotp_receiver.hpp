@@ -97,6 +97,8 @@ class IsotpReceiver {
 
   // Is a transfer unfinished?
   bool busy() const { return state_ != State::idle && !refusing(); }
+  // Is a consecutive frame the next?
+  bool awaits_consecutive() const { return state_ == State::receiving; }
   // The datagram that on_frame() has told of.
   const std::uint8_t* data() const { return buffer_; }
   std::uint32_t size() const { return size_; }
