@@ -316,3 +316,10 @@ def test_a_bus_is_shown_with_all_of_its_boards():
         host.next(is_state)
     silent = run('monitor', 'can://vcan0', '--duration', '1', timeout=60)
     assert silent.returncode == 3 and ERROR.search(silent.stderr), silent
+
+
+def test_the_demo_plays_over_can_too():
+    result = run('demo', '--json', timeout=60)
+    assert result.returncode == 0, result
+    row = next(each for each in objects(result.stdout) if each.get('transport') == 'CAN')
+    assert row['ok'] and row['safe_ms'] <= SAFE_WITHIN_MS, row
