@@ -23,7 +23,8 @@ target_link_libraries(r4link PUBLIC Threads::Threads
 install(TARGETS r4link EXPORT r4link-targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY protocol transports firmware host
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/r4link
-        FILES_MATCHING PATTERN "*.hpp" PATTERN "firmware/ports/giga" EXCLUDE)
+        FILES_MATCHING PATTERN "*.hpp" PATTERN "firmware/ports/giga" EXCLUDE
+        PATTERN "firmware/ports/mps2" EXCLUDE)
 install(EXPORT r4link-targets NAMESPACE r4link::
         DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/r4link)
 

@@ -131,12 +131,13 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
 }
 
 void Application::on_command(Source from, const Datagram& datagram, std::uint32_t now_ms) {
-  if (asks_to_stop(datagram)) {
+  int count = 0;
+  const Field field = command_field(datagram, count);
+  // A stop is obeyed beside other commands, too. A single one of another letter is none.
+  if ((count != 1 || field.name() == "E") && asks_to_stop(datagram)) {
     emergency_stop(from, datagram, now_ms);
     return;
   }
-  int count = 0;
-  const Field field = command_field(datagram, count);
   Command command;
   const Refusal refusal = count == 1 ? parse_command(field, command) : Refusal::format;
   if (refusal == Refusal::none && command.kind == CommandKind::identify) {
@@ -265,11 +266,12 @@ bool Application::may_clear(std::uint32_t now_ms) const {
 }
 
 bool Application::obstacle() const {
+  const int margin = safety_.has(SafeReason::proximity) ? proximity_hysteresis_cm : 0;
   for (int i = 0; i < ultrasonic_channels; ++i) {
     const int threshold = setpoints_.proximity_cm[i];
-    const int margin = safety_.has(SafeReason::proximity) ? proximity_hysteresis_cm : 0;
+    if (threshold == 0) continue;
     const int distance = inputs_.ultrasonic_cm[i];
-    if (threshold != 0 && distance != 0 && distance < threshold + margin) return true;
+    if (distance != 0 && distance < threshold + margin) return true;
   }
   return false;
 }
@@ -290,8 +292,9 @@ void Application::check_interlocks(std::uint32_t now_ms) {
 
 // The one place where outputs change: safe unless the board is ACTIVE, else the setpoints.
 void Application::update_outputs(std::uint32_t now_ms) {
+  static const Outputs off;
   const bool live = state() == BoardState::active;
-  const Outputs wanted = live ? setpoints_.outputs : Outputs();
+  const Outputs& wanted = live ? setpoints_.outputs : off;
   const bool changed = wanted != outputs_;
   if (!changed && live == outputs_live_) return;
   outputs_ = wanted;

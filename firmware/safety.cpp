@@ -24,6 +24,7 @@ void Safety::clear() {
 }
 
 SafeReason Safety::reason() const {
+  if (!is_safe()) return SafeReason::none;
   static const SafeReason gravest_first[] = {SafeReason::stop,      SafeReason::fault,
                                              SafeReason::watchdog,  SafeReason::handle,
                                              SafeReason::proximity, SafeReason::link};

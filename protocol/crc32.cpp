@@ -27,9 +27,17 @@ constexpr Table table;
 
 std::uint32_t crc32_table(Text bytes, std::uint32_t crc) {
   crc = ~crc;
-  for (const char c : bytes) {
+  const auto add = [&crc](char c) {
     crc = (crc >> 8) ^ table.of[(crc ^ static_cast<unsigned char>(c)) & 0xFFU];
+  };
+  const char* at = bytes.begin();
+  for (; bytes.end() - at >= 4; at += 4) {  // in fours: a loop of its own would cost half as much
+    add(at[0]);
+    add(at[1]);
+    add(at[2]);
+    add(at[3]);
   }
+  for (; at != bytes.end(); ++at) add(*at);
   return ~crc;
 }
 

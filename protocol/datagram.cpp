@@ -140,7 +140,7 @@ const char* Datagram::read_numbers(const std::uint64_t* short_names) {
   constexpr Text pnum("PNum");
   for (std::size_t word = 0; word * 64 < fields_.size(); ++word) {
     for (std::uint64_t left = short_names[word]; left != 0; left &= left - 1) {
-      const char* const colon = fields_.begin() + word * 64 + __builtin_ctzll(left);
+      const char* const colon = fields_.begin() + word * 64 + lowest_bit(left);
       const bool is_time = ends_in_name(fields_.begin(), colon, time);
       if (!is_time && !ends_in_name(fields_.begin(), colon, pnum)) continue;
       const Text name = between(colon - (is_time ? time : pnum).size(), colon);

@@ -128,12 +128,23 @@ class Datagram {
   std::uint64_t ends_[words];
 };
 
+// The number of the lowest bit that is set; there is one. On a 32-bit processor the compiler would
+// call a function.
+inline int lowest_bit(std::uint64_t bits) {
+#if UINTPTR_MAX > 0xFFFFFFFFU
+  return __builtin_ctzll(bits);
+#else
+  const std::uint32_t low = static_cast<std::uint32_t>(bits);
+  return low != 0 ? __builtin_ctz(low) : 32 + __builtin_ctz(static_cast<std::uint32_t>(bits >> 32));
+#endif
+}
+
 inline const char* Datagram::Iterator::next_end() {
   while (ends_ == 0) {
     ends_ = *++word_;
     word_begin_ += 64;
   }
-  const char* const at = word_begin_ + __builtin_ctzll(ends_);
+  const char* const at = word_begin_ + lowest_bit(ends_);
   ends_ &= ends_ - 1;
   return at;
 }

@@ -33,6 +33,21 @@ inline bool parse_digits(const char* at, const char* end, std::uint64_t limit, s
   return true;
 }
 
+// One to nine digits always fit, and need no arithmetic of 64 bits.
+constexpr bool fits_32_bits(std::size_t digits) { return digits - 1 < 9; }
+
+// As many digits as that; false for anything else.
+inline bool parse_short(const char* at, const char* end, std::uint32_t& out) {
+  std::uint32_t value = 0;
+  do {
+    const unsigned digit = digit_of(*at);
+    if (digit > 9) return false;
+    value = value * 10 + digit;
+  } while (++at != end);
+  out = value;
+  return true;
+}
+
 bool skip_minus(Text text, const char*& at) {
   at = text.begin();
   if (text.empty() || *at != '-') return false;
@@ -83,31 +98,32 @@ char* put_8_digits(char* out, std::uint32_t value) {
 }  // namespace
 
 bool parse_number(Text text, std::uint32_t& out) {
-  const char* at = text.begin();
-  const char* const end = text.end();
-  if (text.size() - 1 < 9) {  // one to nine digits always fit
-    std::uint32_t value = 0;
-    do {
-      const unsigned digit = digit_of(*at);
-      if (digit > 9) return false;
-      value = value * 10 + digit;
-    } while (++at != end);
-    out = value;
-    return true;
-  }
+  if (fits_32_bits(text.size())) return parse_short(text.begin(), text.end(), out);
   std::uint64_t value = 0;
-  if (!parse_digits(at, end, u32_max, value)) return false;
+  if (!parse_digits(text.begin(), text.end(), u32_max, value)) return false;
   out = static_cast<std::uint32_t>(value);
   return true;
 }
 
 bool parse_number(Text text, std::uint64_t& out) {
+  if (fits_32_bits(text.size())) {
+    std::uint32_t value = 0;
+    if (!parse_short(text.begin(), text.end(), value)) return false;
+    out = value;
+    return true;
+  }
   return parse_digits(text.begin(), text.end(), u64_max, out);
 }
 
 bool parse_number(Text text, std::int32_t& out) {
   const char* at = nullptr;
   const bool negative = skip_minus(text, at);
+  if (fits_32_bits(static_cast<std::size_t>(text.end() - at))) {
+    std::uint32_t value = 0;
+    if (!parse_short(at, text.end(), value)) return false;
+    out = negative ? -static_cast<std::int32_t>(value) : static_cast<std::int32_t>(value);
+    return true;
+  }
   std::uint64_t magnitude = 0;
   if (!parse_digits(at, text.end(), magnitude_limit(negative), magnitude)) return false;
   out = with_sign(negative, magnitude);

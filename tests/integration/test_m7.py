@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The board's firmware on an emulated Cortex-M7 (tools/m7) and r4 as the host, by UART and by UDP."""
+import collections
+import os
+import pathlib
+import re
+import select
+import signal
+import socket
+import subprocess
+import threading
+
+import pytest
+
+from r4_process import PATIENCE_S, SANITIZED, Running, is_link, is_state, monitor, objects, run
+
+M7 = str(pathlib.Path(__file__).resolve().parents[2] / 'tools/m7')
+FIRST_BUILD_S = 240  # and the packages, where tools/test has not installed them
+SAFE_WITHIN_MS = 1020
+
+Urls = collections.namedtuple('Urls', 'serial udp')
+
+
+def m7(*arguments):
+    return subprocess.run([M7, *arguments], capture_output=True, text=True, timeout=FIRST_BUILD_S,
+                          check=False)
+
+
+@pytest.fixture(scope='module', name='urls')
+def running_board():
+    """One board for all tests: it goes on as a real one does."""
+    board = subprocess.Popen([M7], stdout=subprocess.PIPE, text=True)
+    try:
+        yield Urls(board.stdout.readline().strip(), board.stdout.readline().strip())
+    finally:
+        board.send_signal(signal.SIGINT)
+        assert board.wait(PATIENCE_S) == 0
+        board.stdout.close()
+
+
+@pytest.fixture(params=['serial', 'udp'], name='url')
+def either_url(urls, request):
+    return getattr(urls, request.param)
+
+
+def states_of(url, count):
+    """That many states in a row, behind the choice of fields."""
+    with monitor(url, '--fields', 'LATE') as host:
+        host.next(is_link('active'))
+        host.next(lambda each: is_state(each) and 'LATE' in each['fields'])
+        return [host.next(is_state) for _ in range(count)]
+
+
+def steps_of(states, period_ms):
+    """The steps of T. A period that is left out is the board's, and told: none was lost on the way."""
+    steps = []
+    for earlier, later in zip(states, states[1:]):
+        step = (later['t'] - earlier['t']) % 2**32
+        left_out = later['fields']['LATE'] - earlier['fields']['LATE']
+        assert step == period_ms * (1 + left_out), (earlier, later)
+        steps.append(step)
+    print(collections.Counter(steps))
+    return steps
+
+
+def test_streams_at_100_hz_with_nothing_lost(url):
+    steps = steps_of(states_of(url, 200), 10)
+    assert SANITIZED or steps.count(10) > 0.95 * len(steps)
+
+
+def test_streams_at_1000_hz_over_udp_with_nothing_lost(urls):
+    assert run('send', urls.udp, 'C:rate,1000').returncode == 0
+    steps = steps_of(states_of(urls.udp, 2000), 1)
+    assert run('send', urls.udp, 'C:rate,100').returncode == 0
+    assert SANITIZED or steps.count(1) > 0.8 * len(steps)
+
+
+def test_every_kind_of_command_is_executed(url):
+    commands = ['O:1,1,4', 'D:2,0,4', 'S:2500,16', 'R:8,On', 'P:-100,500,4', 'Z:4', 'B:4095,1,1,4',
+                'U:10,4', 'F:ENC1', 'C:rate,50', 'C:rate,100', 'C:recovery,last', 'Q:ID', 'E:STOP', 'E:CLEAR']
+    result = run('send', url, *commands, '--json')
+    assert result.returncode == 0, result
+    assert [(each['command'], each['confirmed']) for each in objects(result.stdout)] == [
+        (command, True) for command in commands]
+
+
+def test_what_is_set_is_in_the_state_until_the_board_is_stopped(urls):
+    with Running('send', urls.serial, 'O:358,1,1', 'S:1500,1', '--hold', '60', '--json') as host:
+        host.next(lambda each: each['confirmed'] and each['command'].startswith('S'))
+        # A host that does not control the board watches what it tells everyone.
+        with Watcher(urls.udp) as watcher:
+            state = watcher.next(lambda fields: fields.get('OSMC1') == '358,1')
+            assert state['SERVO1POS'] == '1500'
+            stopped = run('stop', urls.udp)
+            assert stopped.returncode == 0, stopped
+            print(stopped.stdout.splitlines()[0])
+            watcher.ask()  # again the last that was heard
+            watcher.next(lambda fields: fields.get('OSMC1') == '0,0' and fields.get('SAFE') == '2')
+    assert run('send', urls.serial, 'E:CLEAR').returncode == 0
+
+
+def test_commands_are_refused_while_a_stop_is_latched(url):
+    assert run('stop', url).returncode == 0
+    refused = run('send', url, 'O:358,1,1')
+    assert refused.returncode == 3 and 'E:CLEAR' in refused.stderr, refused
+    assert run('send', url, 'E:CLEAR', 'O:358,1,1').returncode == 0
+
+
+class Watcher:
+    """A UDP socket that the board has heard: what the board tells everyone is told to it."""
+
+    def __init__(self, url):
+        address, port = re.match(r'udp://(.+):(\d+)', url).groups()
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.settimeout(PATIENCE_S)
+        self.socket.connect((address, int(port)))
+        self.ask()
+
+    def ask(self):
+        self.socket.send(b'hello')
+
+    def next(self, is_it):
+        while True:
+            datagram = self.socket.recv(2048).decode()
+            fields = dict(each.split(':', 1) for each in datagram.split(';')[:-1])
+            if is_it(fields):
+                return fields
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.socket.close()
+
+
+class Relay(threading.Thread):
+    """Between a host and the board: notes when, by the board's clock, the host was heard last."""
+
+    def __init__(self, url):
+        super().__init__(daemon=True)
+        address, port = re.match(r'udp://(.+):(\d+)', url).groups()
+        self.to_board = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.to_board.connect((address, int(port)))
+        self.to_host = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.to_host.bind(('127.0.0.1', 0))
+        self.url = 'udp://127.0.0.1:%d?listen=0' % self.to_host.getsockname()[1]
+        self.heartbeat_t = self.safe = self.host = None
+        self.went_safe = threading.Event()
+        self.going = True
+
+    def run(self):
+        t = None
+        while self.going:
+            for each in select.select([self.to_board, self.to_host], [], [], 0.1)[0]:
+                if each is self.to_host:
+                    datagram, self.host = each.recvfrom(2048)
+                    if datagram.startswith(b'H:'):
+                        self.heartbeat_t = t
+                    self.to_board.send(datagram)
+                    continue
+                datagram = each.recv(2048)
+                fields = dict(re.findall(r'(\w+):([^;]*);', datagram.decode()))
+                if int(fields['T']) != 0:
+                    t = int(fields['T'])
+                if fields.get('H') and fields.get('SAFE') == '1' and not self.safe:
+                    self.safe = fields
+                    self.went_safe.set()
+                if self.host:
+                    self.to_host.sendto(datagram, self.host)
+
+    def __enter__(self):
+        self.start()
+        return self
+
+    def __exit__(self, *_):
+        self.going = False
+        self.join()
+        self.to_board.close()
+        self.to_host.close()
+
+
+def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(urls):
+    with Relay(urls.udp) as relay:
+        with Running('send', relay.url, 'O:358,1,1', '--hold', '60', '--json') as host:
+            host.next(lambda each: each['confirmed'])
+            relay.safe = None
+            relay.went_safe.clear()
+            host.signal(signal.SIGKILL)
+        assert relay.went_safe.wait(PATIENCE_S)
+        silence = (int(relay.safe['T']) - relay.heartbeat_t) % 2**32
+    print(f'safe {silence} ms after the last heartbeat, by the board\'s clock')
+    assert silence >= 1000 or SANITIZED
+    assert silence <= SAFE_WITHIN_MS or SANITIZED
+    # Another host finds the outputs off, and gets them on again.
+    with monitor(urls.udp) as host:
+        host.next(is_link('active'))
+        assert host.next(is_state)['fields']['OSMC1'] == [0, 0]
+    assert run('send', urls.udp, 'O:358,1,1').returncode == 0
+
+
+def test_a_hung_host_loses_the_outputs_and_gets_them_back_when_it_wakes(urls):
+    with Running('send', urls.serial, 'O:358,1,1', '--hold', '60', '--json') as host:
+        host.next(lambda each: each['confirmed'])
+        with Watcher(urls.udp) as watcher:
+            watcher.next(lambda fields: fields.get('OSMC1') == '358,1')
+            host.signal(signal.SIGSTOP)
+            watcher.next(lambda fields: 'H' in fields and fields.get('SAFE') == '1')
+            host.signal(signal.SIGCONT)
+            watcher.next(lambda fields: fields.get('OSMC1') == '358,1')
+
+
+def test_a_serial_host_that_does_not_read_holds_nothing_up(urls):
+    unread = os.open(urls.serial[len('serial://'):], os.O_RDWR | os.O_NOCTTY)
+    try:
+        steps_of(states_of(urls.udp, 150), 10)
+        # Far more than the line and the board can hold has been said; what is heard now is new.
+        assert run('stop', urls.serial).returncode == 0
+        assert run('send', urls.serial, 'E:CLEAR').returncode == 0
+    finally:
+        os.close(unread)
+
+
+def test_the_tests_that_run_on_the_m7_pass():
+    result = m7('--test')
+    print(result.stdout)
+    assert result.returncode == 0, result
+    names = re.findall(r'^passed (\S+)$', result.stdout, re.MULTILINE)
+    assert 'FAILED' not in result.stdout and len(names) >= 20
+    assert 'Fault.AStackOverflowSwitchesOffAndIsNoted' in names
+    assert int(re.search(r'stack of the tests: (\d+)', result.stdout)[1]) < 8192
+
+
+def test_what_the_protocol_costs_is_what_the_table_says():
+    result = m7('--instructions')
+    print(result.stdout)
+    assert result.returncode == 0, result
+    assert m7('--instructions').stdout == result.stdout  # to the last instruction
+
+
+def test_flash_and_ram_are_within_their_bars():
+    result = m7('--size')
+    print(result.stdout)
+    assert result.returncode == 0, result
+
+
+@pytest.mark.parametrize('arguments, code, words', [
+    (['--udp', '0'], 2, ['--udp 0', 'no port']),
+    (['--nothing'], 2, ['--nothing']),
+    (['--update'], 2, ['--instructions']),
+])
+def test_wrong_options_are_told_with_the_fix(arguments, code, words):
+    result = m7(*arguments)
+    assert result.returncode == code
+    assert re.match(r'tools/m7: m7: .+\n  fix: .+\n$', result.stderr), result.stderr
+    assert all(word in result.stderr for word in words)
+
+
+def test_a_port_that_is_in_use_is_told():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(('127.0.0.1', 0))
+        result = m7('--udp', str(taken.getsockname()[1]))
+    assert result.returncode == 4 and '--udp picks another port' in result.stderr
