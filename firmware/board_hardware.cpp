@@ -83,6 +83,7 @@ void BoardHardware::make_safe() {
 }
 
 void BoardHardware::drive_safe() {
+  waiting_ = false;
   for (Stepper& stepper : steppers_) stepper.stop();
   // A held bus fails at its first transfer. If it cannot be freed, there is nothing more to do.
   if (!drive_chips_safe() && bus_.recover()) drive_chips_safe();
@@ -110,6 +111,12 @@ bool BoardHardware::drive_chips_safe() {
 void BoardHardware::apply(const Outputs& outputs) {
   if (fault_.any()) return;
   busy_ = true;
+  waiting_ = !ready();
+  if (waiting_) {
+    waiting_outputs_ = outputs;
+    leave();
+    return;
+  }
   set_outputs(outputs);
   BusBudget budget(bus_bytes_per_poll);
   for_each_chip(budget, false);
@@ -177,6 +184,10 @@ void BoardHardware::poll(std::uint32_t now_us) {
     verified_chip_ = (verified_chip_ + 1) % chip_count;
   }
   for_each_chip(budget, true);
+  if (waiting_ && ready()) {
+    waiting_ = false;
+    set_outputs(waiting_outputs_);
+  }
   leave();
 }
 

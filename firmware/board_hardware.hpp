@@ -4,7 +4,8 @@
 //
 // Order at power-up: power_up() first, before anything else. Its first transfer turns every PWM
 // output off, its last leaves every output in its safe value; only then the chips are set up, in
-// poll(), and ready() tells when all are.
+// poll(), and ready() tells when all are. What is applied before that waits until then: no motor
+// runs while the chip that brakes another is not there.
 //
 // The safe state (make_safe): steppers stand, PWM outputs off, DAC codes 0, brakes on, relays off.
 // It may be called at any time, also in an interrupt or a fault handler in the middle of a
@@ -119,6 +120,8 @@ class BoardHardware final : public Hal {
   QuadratureEncoder encoders_[encoder_channels];
   UltrasonicSensors ultrasonic_;
 
+  Outputs waiting_outputs_;  // applied before every chip was ready
+  bool waiting_ = false;
   ChipFault fault_;
   bool failed_[chip_count] = {};
   std::uint32_t failed_us_[chip_count] = {};

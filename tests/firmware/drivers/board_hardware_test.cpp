@@ -497,20 +497,56 @@ TEST(BoardHardware, ChangesCostWhatTheDocumentationSays) {
   Outputs outputs;
   bench.apply(outputs);
   bench.board.bus.clear_log();
-  bench.hardware.apply(full());
-  for (int i = 0; i < 10; ++i) bench.hardware.apply(full());
+  int calls = 0;
+  for (std::size_t before = 1; before != bench.board.bus.log().size(); ++calls) {
+    before = bench.board.bus.log().size();
+    bench.hardware.apply(full());
+  }
+  EXPECT_EQ(calls - 1, 4);
   const test::BusCost everything = test::cost(bench.board.bus);
+  EXPECT_EQ(everything.bytes, 146U);
+  EXPECT_EQ(everything.us, 3325);
+  const auto cost_of = [&](Drive drive) {
+    outputs.osmc[0] = drive;
+    bench.board.bus.clear_log();
+    bench.hardware.apply(outputs);
+    EXPECT_EQ(bench.board.bus.log().size(), 1U);
+    return test::cost(bench.board.bus);
+  };
   outputs = full();
-  outputs.osmc[0].pwm = 0x123;
-  bench.board.bus.clear_log();
-  bench.hardware.apply(outputs);
-  const test::BusCost drive = test::cost(bench.board.bus);
-  RecordProperty("all_outputs_bytes", static_cast<int>(everything.bytes));
-  RecordProperty("all_outputs_us", static_cast<int>(everything.us));
-  RecordProperty("one_drive_bytes", static_cast<int>(drive.bytes));
-  RecordProperty("one_drive_us", static_cast<int>(drive.us));
-  EXPECT_LE(everything.bytes, 192U);
-  EXPECT_LE(drive.bytes, 5U);
+  EXPECT_EQ(cost_of({0x123, Direction::forward}).us, 117.5);
+  EXPECT_EQ(cost_of({0x124, Direction::forward}).us, 72.5);
+  EXPECT_EQ(cost_of({0x200, Direction::reverse}).us, 185);
+}
+
+TEST(BoardHardware, WhatIsAppliedBeforeEveryChipIsReadyWaits) {
+  Bench bench;
+  for (int i = 0; i < sim::Mcp4728Model::channels; ++i) {
+    bench.board.dac.set_eeprom(i, {true, 0, false, 2000});
+  }
+  bench.board.power_on();
+  bench.hardware.power_up(bench.now());
+  bench.hardware.apply(full());
+  while (!bench.hardware.ready()) {
+    EXPECT_TRUE(test::is_safe(bench.board));
+    bench.hardware.step_tick();
+    ASSERT_LT(bench.now(), 100000U);
+    bench.run(1);
+  }
+  EXPECT_EQ(bench.board.dac.eeprom_writes(), 1);
+  bench.run(10);
+  EXPECT_EQ(test::outputs_of(bench.board), test::as_pins(full()));
+  EXPECT_EQ(bench.board.step[0].rises, 0);
+}
+
+TEST(BoardHardware, TheSafeStateForgetsWhatWasWaiting) {
+  Bench bench;
+  bench.hardware.power_up(bench.now());
+  bench.hardware.apply(full());
+  bench.hardware.make_safe();
+  bench.run(30);
+  EXPECT_TRUE(bench.hardware.ready());
+  EXPECT_TRUE(test::is_safe(bench.board));
 }
 
 }  // namespace
