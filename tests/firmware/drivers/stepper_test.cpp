@@ -124,8 +124,10 @@ RC_GTEST_PROP(Stepper, ThePinsCountWhatThePositionSays, ()) {
     for (int i = 0; i < ticks; ++i) {
       const int rises = bench.step.rises;
       const bool was_high = bench.step.high;
+      const bool direction = bench.direction.high;
       bench.tick(1);
       if (bench.step.rises == rises) continue;
+      RC_ASSERT(direction == bench.direction.high);
       RC_ASSERT(!was_high);  // pulses do not run into each other
       by_pins += bench.direction.high ? 1 : -1;
     }
