@@ -235,10 +235,8 @@ TEST(BoardHardware, NoChipIsLeftBehindWhenOthersChangeAllTheTime) {
   bench.boot();
   Outputs outputs = full();
   for (int i = 0; i < 12; ++i) {
-    for (int n = 0; n < 4; ++n) {
-      outputs.osmc[n].pwm = static_cast<std::uint16_t>(i % 2 == 0 ? 0x123 : 0xEDC);
-      outputs.dhb12[n].pwm = static_cast<std::uint16_t>(i % 2 == 0 ? 0xEDC : 0x123);
-    }
+    const Drive drive = i % 2 == 0 ? Drive{0x123, Direction::reverse} : full().osmc[0];
+    for (int n = 0; n < 4; ++n) outputs.osmc[n] = outputs.dhb12[n] = drive;
     bench.hardware.apply(outputs);
   }
   EXPECT_EQ(test::outputs_of(bench.board).relays, 0xFF);
@@ -305,6 +303,21 @@ TEST(BoardHardware, AFaultHandlerThatNeverReturnsLeavesEverythingSafe) {
     } catch (const Halt&) {
       EXPECT_TRUE(test::is_safe(bench.board)) << at;
     }
+  }
+}
+
+TEST(BoardHardware, MayBeMadeSafeWhileItIsBeingMadeSafe) {
+  for (int at = 0; at < 7; ++at) {
+    Bench bench;
+    bench.boot();
+    bench.apply(full());
+    bench.line.after = at;
+    bench.line.what = [&] {
+      bench.hardware.make_safe();
+      EXPECT_EQ(bench.line.recoveries, 1) << at;  // the bus was in use
+    };
+    bench.hardware.make_safe();
+    EXPECT_TRUE(test::is_safe(bench.board)) << at;
   }
 }
 
