@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Interrupts, chips that fail and buses that are held: the outputs are safe nevertheless.
+#include <gtest/gtest.h>
+
+#include "board_bench.hpp"
+#include "firmware/board_hardware.hpp"
+
+namespace r4::firmware {
+namespace {
+
+using Bench = test::BoardBench;
+using test::full;
+
+TEST(BoardHardware, IsSafeFromAnyTransferOfAnyUseOn) {
+  // make_safe() in an interrupt at every transfer of set-up, apply and verification: with the
+  // transfer cut off, and with it going through afterwards, stale.
+  for (const bool cuts : {true, false}) {
+    for (int at = 0; at < 60; ++at) {
+      Bench bench;
+      bench.line.cuts = cuts;
+      bench.line.what = [&] { bench.hardware.make_safe(); };
+      bench.line.after = at;
+      bench.hardware.power_up(bench.now());
+      int polls = 0;
+      while (bench.line.after >= 0 && polls++ < 200) {
+        bench.run(1);
+        if (bench.line.after < 0) break;
+        Outputs outputs = full();
+        outputs.osmc[0].pwm = static_cast<std::uint16_t>(polls);
+        if (bench.hardware.ready()) bench.hardware.apply(outputs);
+      }
+      EXPECT_LT(bench.line.after, 0);
+      EXPECT_TRUE(test::is_safe(bench.board)) << "transfer " << at << (cuts ? " cut" : " stale");
+    }
+  }
+}
+
+TEST(BoardHardware, AFaultHandlerThatNeverReturnsLeavesEverythingSafe) {
+  struct Halt {};
+  for (int at = 0; at < 12; ++at) {
+    Bench bench;
+    bench.boot();
+    bench.apply(full());
+    Outputs outputs = full();
+    for (int i = 0; i < 4; ++i) outputs.dhb12[i].pwm = 77;
+    for (std::uint16_t& us : outputs.servo_us) us = 999;
+    bench.line.after = at;
+    bench.line.what = [&] {
+      bench.hardware.make_safe();
+      throw Halt();
+    };
+    try {
+      bench.hardware.apply(outputs);
+      bench.run(200);
+      FAIL() << "no transfer " << at;
+    } catch (const Halt&) {
+      EXPECT_TRUE(test::is_safe(bench.board)) << at;
+    }
+  }
+}
+
+TEST(BoardHardware, MayBeMadeSafeWhileItIsBeingMadeSafe) {
+  for (int at = 0; at < 7; ++at) {
+    Bench bench;
+    bench.boot();
+    bench.apply(full());
+    bench.line.after = at;
+    bench.line.what = [&] {
+      bench.hardware.make_safe();
+      EXPECT_EQ(bench.line.recoveries, 1) << at;  // the bus was in use
+    };
+    bench.hardware.make_safe();
+    EXPECT_TRUE(test::is_safe(bench.board)) << at;
+  }
+}
+
+struct ChipAt {
+  Chip chip;
+  std::uint8_t address;
+};
+constexpr ChipAt chips_at[] = {{Chip::osmc_pwm, 0x40},
+                               {Chip::dhb12_pwm, 0x41},
+                               {Chip::expander, 0x20},
+                               {Chip::dac, 0x61},
+                               {Chip::servo_pwm, 0x42}};
+
+TEST(BoardHardware, ASilentChipIsAFaultWithItsNameAndEverythingElseGoesSafe) {
+  for (const ChipAt& at : chips_at) {
+    Bench bench;
+    bench.boot();
+    bench.apply(full());
+    bench.board.bus.refuse(at.address, 0, 1000);
+    bench.run(110);
+    EXPECT_EQ(bench.hardware.fault().chip, at.chip);
+    EXPECT_EQ(bench.hardware.fault().trouble, ChipTrouble::no_acknowledge);
+    const Outputs pins = test::outputs_of(bench.board);
+    EXPECT_EQ(pins.bldc[0].speed, at.chip == Chip::dac ? 3000 : 0);
+    EXPECT_EQ(pins.bldc[0].brake, at.chip != Chip::expander);
+    EXPECT_EQ(pins.relays, at.chip == Chip::expander ? 0xFF : 0);
+    EXPECT_EQ(pins.osmc[0].pwm, 0);  // all-call reaches a chip that is silent at its own address
+    EXPECT_FALSE(bench.hardware.clear_fault());
+    bench.apply(full());
+    EXPECT_EQ(test::outputs_of(bench.board).dhb12[1].pwm, 0);
+  }
+}
+
+TEST(BoardHardware, ComesBackWithOutputsOffAndObeysAgainWhenTheFaultIsCleared) {
+  for (const ChipAt& at : chips_at) {
+    Bench bench;
+    bench.boot();
+    bench.apply(full());
+    bench.board.bus.refuse(at.address, 0, 3);
+    bench.run(400);
+    EXPECT_TRUE(bench.hardware.ready()) << to_text(at.chip);
+    EXPECT_EQ(bench.hardware.fault().chip, at.chip);
+    EXPECT_TRUE(test::is_safe(bench.board));
+    bench.apply(full());
+    EXPECT_TRUE(test::is_safe(bench.board));
+    EXPECT_TRUE(bench.hardware.clear_fault());
+    EXPECT_TRUE(test::is_safe(bench.board));
+    bench.apply(full());
+    EXPECT_EQ(test::outputs_of(bench.board), test::as_pins(full()));
+  }
+}
+
+TEST(BoardHardware, AChipThatWasResetIsNoticedWithinATurnOfVerification) {
+  for (const ChipAt& at : chips_at) {
+    Bench bench;
+    bench.boot();
+    bench.apply(full());
+    sim::I2cChipModel* chips[] = {&bench.board.osmc, &bench.board.dhb12, &bench.board.expander,
+                                  &bench.board.dac, &bench.board.servo};
+    chips[static_cast<int>(at.chip)]->power_on();
+    bench.run(chip_count * 20 + 2);
+    EXPECT_EQ(bench.hardware.fault().chip, at.chip);
+    EXPECT_EQ(bench.hardware.fault().trouble, ChipTrouble::was_reset) << to_text(at.chip);
+    EXPECT_TRUE(test::is_safe(bench.board));
+    bench.run(200);
+    EXPECT_TRUE(bench.hardware.clear_fault());
+  }
+}
+
+TEST(BoardHardware, AChipThatIsResetAtAnyByteNeverLeavesAnythingRunningUnnoticed) {
+  for (std::size_t after = 1; after < 120; after += 3) {
+    for (const ChipAt& at : chips_at) {
+      Bench bench;
+      bench.boot();
+      sim::I2cChipModel* chips[] = {&bench.board.osmc, &bench.board.dhb12, &bench.board.expander,
+                                    &bench.board.dac, &bench.board.servo};
+      bench.board.bus.reset_after(*chips[static_cast<int>(at.chip)], after);
+      bench.apply(full(), 240);
+      if (bench.hardware.fault().any()) {
+        EXPECT_TRUE(test::is_safe(bench.board));
+      } else {
+        EXPECT_EQ(test::outputs_of(bench.board), test::as_pins(full())) << after;
+      }
+    }
+  }
+}
+
+TEST(BoardHardware, AHeldBusIsFreedAndEverythingIsSafeAtOnce) {
+  for (std::size_t after = 1; after < 60; ++after) {
+    Bench bench;
+    bench.boot();
+    bench.board.bus.hold_after(after);
+    bench.hardware.apply(full());
+    for (int ms = 0; ms < 110 && !bench.hardware.fault().any(); ++ms) bench.run(1);
+    EXPECT_EQ(bench.hardware.fault().trouble, ChipTrouble::bus_stuck);
+    EXPECT_TRUE(test::is_safe(bench.board)) << after;
+    EXPECT_LE(bench.longest_poll_us, 5000U);
+    bench.run(300);
+    EXPECT_TRUE(bench.hardware.clear_fault());
+    bench.apply(full());
+    EXPECT_EQ(test::outputs_of(bench.board), test::as_pins(full()));
+  }
+}
+
+TEST(BoardHardware, ABusThatStaysHeldCostsTheLoopLittle) {
+  Bench bench;
+  bench.boot();
+  bench.apply(full());
+  bench.board.bus.hold(1000);
+  bench.run(300);
+  EXPECT_EQ(bench.hardware.fault().trouble, ChipTrouble::bus_stuck);
+  EXPECT_LE(bench.longest_poll_us, 3 * (i2c_timeout_us + 200));
+  bench.longest_poll_us = 0;
+  bench.run(1000);
+  EXPECT_LE(bench.longest_poll_us, 100U);
+  const std::uint64_t began = bench.board.bus.now_us();
+  bench.hardware.make_safe();
+  EXPECT_LE(bench.board.bus.now_us() - began, i2c_timeout_us + 100U);
+}
+
+}  // namespace
+}  // namespace r4::firmware
