@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Not a board: what one with CAN and a UART would link, for `tools/m7 --size`. No machine that QEMU
-// has with a Cortex-M has a CAN controller, so its frames go nowhere.
+// Not a board: what one with CAN, a UART and all chip drivers would link, for `tools/m7 --size`. No
+// machine that QEMU has with a Cortex-M has a CAN controller, and this one has no chips: frames and
+// transfers go nowhere.
 #include "../../../transports/framing/can_node.hpp"
 #include "../../application.hpp"
+#include "../../board_hardware.hpp"
 #include "board_clock.hpp"
 #include "fault.hpp"
 #include "registers.hpp"
@@ -48,17 +50,67 @@ class CanPort final : public firmware::Port {
   CanNode node_{CanEnd::board, 1, false};
 };
 
-// The channels as they were told; a board has chips here.
-class Hal final : public firmware::Hal {
+// The places of the I2C bus and the pins.
+class Bus final : public firmware::I2cBus {
  public:
-  void apply(const firmware::Outputs& outputs) override { outputs_ = outputs; }
-  void make_safe() override { outputs_ = firmware::Outputs(); }
-  void sample(firmware::Inputs& inputs) override { inputs = inputs_; }
-  void zero(int channel) override { inputs_.encoder_counts[channel - 1] = 0; }
+  firmware::I2cResult write(std::uint8_t address, const std::uint8_t* bytes,
+                            std::size_t size) override {
+    for (std::size_t i = 0; i < size; ++i)
+      wire_ = static_cast<std::uint32_t>(address << 8 | bytes[i]);
+    return firmware::I2cResult::ok;
+  }
+  firmware::I2cResult write_read(std::uint8_t address, const std::uint8_t* out,
+                                 std::size_t out_size, std::uint8_t* in,
+                                 std::size_t in_size) override {
+    write(address, out, out_size);
+    for (std::size_t i = 0; i < in_size; ++i) in[i] = static_cast<std::uint8_t>(wire_);
+    return firmware::I2cResult::ok;
+  }
+  bool recover() override { return true; }
 
  private:
-  firmware::Outputs outputs_;
-  firmware::Inputs inputs_;
+  volatile std::uint32_t wire_ = 0;
+};
+
+class Output final : public firmware::OutputPin {
+ public:
+  void write(bool high) override { level_ = high; }
+
+ private:
+  volatile bool level_ = false;
+};
+class Input final : public firmware::InputPin {
+ public:
+  bool read() override { return level_; }
+
+ private:
+  volatile bool level_ = true;
+};
+class Converter final : public firmware::AnalogPin {
+ public:
+  std::uint16_t read() override { return value_; }
+
+ private:
+  volatile std::uint16_t value_ = 0;
+};
+
+// All channels of the board on them.
+struct Hardware {
+  Bus bus;
+  Output pin;
+  Input handle;
+  Converter converter;
+  firmware::BoardHardware channels{bus, pins(), {}};
+
+  firmware::BoardPins pins() {
+    firmware::BoardPins pins{};
+    for (auto& each : pins.step) each = &pin;
+    for (auto& each : pins.direction) each = &pin;
+    for (auto& each : pins.trigger) each = &pin;
+    for (auto& each : pins.analog) each = &converter;
+    pins.handle = &handle;
+    return pins;
+  }
 };
 
 }  // namespace
@@ -71,9 +123,11 @@ void r4_wake() { BoardClock::on_wake_interrupt(); }
 
 int main() {
   static BoardClock clock(r4_chance);
-  static Hal hal;
+  static Hardware hardware;
+  firmware::BoardHardware& hal = hardware.channels;
   static CanPort can(clock);
   clock.start();
+  hal.power_up(clock.now_us());
   guard(hal);
   firmware::Application::Config config;
   config.identity.firmware = Text("0.1.0");
@@ -94,6 +148,9 @@ int main() {
     can.receive([&](Text datagram) {
       application.receive(can_number, firmware::everyone, datagram, clock.now_ms());
     });
+    hal.poll(clock.now_us());
+    hal.step_tick();
+    if (hal.fault().any()) application.fail(SafeReason::fault, clock.now_ms());
     application.poll(clock.now_ms());
     link.poll(clock.now_ms());
     wait_for_interrupt();

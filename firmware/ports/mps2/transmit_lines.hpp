@@ -19,7 +19,7 @@ namespace mps2 {
 
 class TransmitLines {
  public:
-  static constexpr std::uint32_t capacity = 4096;
+  static constexpr std::uint32_t capacity = 2048;
   static constexpr std::uint32_t kept_for_answers = 512;
   static constexpr std::uint32_t stale_ms = 100;
 
