@@ -93,11 +93,11 @@ Text written(const State& state, char* buffer) {
 }
 
 // One command after the other, each with its own number; what reading, checking and executing costs.
-std::uint32_t command_instructions() {
-  static Hal hal;
-  static Sink sink;
+std::uint32_t command_instructions(std::uint32_t first, std::uint64_t t) {
+  Hal hal;
+  Sink sink;
   firmware::Application::Config config;
-  static firmware::Application application(hal, config);
+  firmware::Application application(hal, config);
   const std::uint8_t port = application.add_port(sink);
   static char heartbeat[max_datagram];
   static char commands[repetitions + 1][64];
@@ -108,18 +108,18 @@ std::uint32_t command_instructions() {
         .value(std::uint32_t{358 + i % 2})
         .value(std::uint32_t{1})
         .value(std::uint32_t{1});
-    texts[i] = writer.finish(1000 + i, 79146);
+    texts[i] = writer.finish(first + i, t);
   }
   application.start(1000);
   DatagramWriter writer(heartbeat, sizeof heartbeat);
   writer.field("H").value("ROS2-R4");
-  application.receive(port, 1, writer.finish(999, 79000), 1000);
+  application.receive(port, 1, writer.finish(first - 1, t - 100), 1000);
   std::uint32_t next = 0;
   const std::uint32_t count =
       instructions_of([&] { application.receive(port, 1, texts[next++], 1000); });
   // It has cost what it should only if it was done.
   const bool done = application.state() == firmware::BoardState::active &&
-                    application.link().last_executed() == 1000 + repetitions && hal.pwm() == 358;
+                    application.link().last_executed() == first + repetitions && hal.pwm() == 358;
   return done ? count : 0;
 }
 
@@ -141,9 +141,11 @@ int main() {
   on_target::say_number("that state, read and checked",
                         instructions_of([&] { read(datagram, seen); }));
 
-  const std::uint32_t command = command_instructions();
-  if (command == 0) exit_emulator(2);
+  const std::uint32_t command = command_instructions(1000, 79146);
+  const std::uint32_t long_command = command_instructions(1500001000, 1699276044383);
+  if (command == 0 || long_command == 0) exit_emulator(2);
   on_target::say_number("a command read, checked and executed", command);
+  on_target::say_number("one with a PNum of 10 and a T of 13 digits", long_command);
 
   static char bytes[170];
   for (std::size_t i = 0; i < sizeof bytes; ++i) bytes[i] = static_cast<char>(i);
