@@ -181,8 +181,7 @@ void CanBus::hand_over(std::size_t count) {
     }
     if (!in_[i].local) {
       // Whoever hears others is on the bus, whatever was told of before.
-      if (!up_) come_up();
-      if (trouble_ == not_acknowledged) trouble_.clear();
+      if (!up_ || trouble_ == not_acknowledged) come_up();
     } else if (!up_ && in_[i].frame.id != emergency_stop_id) {
       continue;  // it did not get to the bus
     }
@@ -337,8 +336,7 @@ void CanBus::come_up() {
   if (std::exchange(up_, true)) {
     if (!troubled) return;
     return tell({CarrierEvent::Kind::warning,
-                 Problem{ErrorKind::open, "can://" + interface_,
-                         "the trouble is over: the controller is error-active again", ""}});
+                 Problem{ErrorKind::open, "can://" + interface_, "the trouble is over", ""}});
   }
   tell({CarrierEvent::Kind::up, Problem{ErrorKind::open, "can://" + interface_, "", ""}});
 }

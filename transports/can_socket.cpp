@@ -14,6 +14,7 @@
 #include <cerrno>
 #include <cstring>
 #include <ctime>
+#include <utility>
 
 #include "can_interface.hpp"
 #include "error.hpp"
@@ -147,7 +148,7 @@ void CanSocket::open(const std::string& interface, bool fd) {
              set_option(first.get(), SOL_SOCKET, SO_PRIORITY, highest_priority);
   if (!set) fail(interface, errno);
   index_ = state.index;
-  overflows_ = 0;
+  overflows_before_ += std::exchange(overflows_, 0);  // the kernel counts anew
   descriptor_ = std::move(socket);
   first_ = std::move(first);
 }

@@ -61,15 +61,16 @@ class CanSocket {
   // Hands one frame over ahead of everything that waits in the interface's queue.
   Outcome send_first(const CanFrame& frame);
 
-  // Frames that came while the socket's buffer was full.
-  std::uint32_t overflows() const { return overflows_; }
+  // Frames that came while the socket's buffer was full, since it was opened first.
+  std::uint32_t overflows() const { return overflows_before_ + overflows_; }
 
  private:
   struct Inbox;
   FileDescriptor descriptor_;
   FileDescriptor first_;  // with a priority and a queue of its own
   int index_ = 0;
-  std::uint32_t overflows_ = 0;
+  std::uint32_t overflows_ = 0;         // of this opening
+  std::uint32_t overflows_before_ = 0;  // of those before
   const std::unique_ptr<Inbox> inbox_;
 };
 
