@@ -61,7 +61,7 @@ struct BoardBench {
     run(20);
     ASSERT_TRUE(hardware.ready());
     ASSERT_FALSE(hardware.fault().any());
-    board.bus.clear_log();
+    log.clear();
     longest_poll_us = 0;
   }
   void apply(const Outputs& outputs, int polls = 8) {
@@ -69,6 +69,7 @@ struct BoardBench {
     run(polls);
   }
   BoardModel board;
+  BusLog log{board.bus};
   InterruptedBus line{board.bus};
   BoardHardware hardware;
   std::uint64_t longest_poll_us = 0;

@@ -41,7 +41,7 @@ rc::Gen<Outputs> any_outputs() {
 TEST(BoardHardware, OutputsAreOffBeforeAnythingElseAtPowerUp) {
   Bench bench;
   bench.hardware.power_up(bench.now());
-  EXPECT_EQ(test::lines(bench.board.bus),
+  EXPECT_EQ(test::lines(bench.log),
             (Lines{"70 <- FD 10", "61 <- 40 00 00 42 00 00 44 00 00 46 00 00", "20 <- 14 AA 00",
                    "20 <- 00 00 00", "40 <- FD 10", "41 <- FD 10", "42 <- FD 10"}));
   EXPECT_TRUE(test::is_safe(bench.board));
@@ -77,14 +77,14 @@ TEST(BoardHardware, OneChannelIsOneShortTransfer) {
   bench.boot();
   Outputs outputs;
   bench.apply(outputs);
-  bench.board.bus.clear_log();
+  bench.log.clear();
   outputs.osmc[0] = {358, Direction::forward};
   bench.hardware.apply(outputs);
-  EXPECT_EQ(test::lines(bench.board.bus), Lines{"40 <- 08 66 01 00 10 00 00"});
-  bench.board.bus.clear_log();
+  EXPECT_EQ(test::lines(bench.log), Lines{"40 <- 08 66 01 00 10 00 00"});
+  bench.log.clear();
   outputs.osmc[0].pwm = 400;
   bench.hardware.apply(outputs);
-  EXPECT_EQ(test::lines(bench.board.bus), Lines{"40 <- 08 90"});
+  EXPECT_EQ(test::lines(bench.log), Lines{"40 <- 08 90"});
   EXPECT_EQ(test::outputs_of(bench.board), test::as_pins(outputs));
 }
 
@@ -95,9 +95,9 @@ RC_GTEST_PROP(BoardHardware, PinsFollowAnySequenceOfOutputs, ()) {
   for (const Outputs& outputs : sequence) {
     bench.apply(outputs, 12);
     RC_ASSERT(test::outputs_of(bench.board) == test::as_pins(outputs));
-    bench.board.bus.clear_log();
+    bench.log.clear();
     bench.apply(outputs, 25);
-    RC_ASSERT(test::writes(bench.board.bus).empty());
+    RC_ASSERT(test::writes(bench.log).empty());
     RC_ASSERT(!bench.hardware.fault().any());
   }
   bench.hardware.make_safe();
@@ -146,12 +146,12 @@ TEST(BoardHardware, NoCallCarriesMoreThanItsBudget) {
     for (std::uint16_t& us : outputs.servo_us) us = static_cast<std::uint16_t>(600 + 7 * i);
     outputs.osmc[i % 4].pwm = static_cast<std::uint16_t>(i);
     outputs.bldc[i % 4].speed = static_cast<std::uint16_t>(i);
-    bench.board.bus.clear_log();
+    bench.log.clear();
     bench.hardware.apply(outputs);
-    EXPECT_LE(test::cost(bench.board.bus).bytes, BoardHardware::bus_bytes_per_poll);
-    bench.board.bus.clear_log();
+    EXPECT_LE(test::cost(bench.log).bytes, BoardHardware::bus_bytes_per_poll);
+    bench.log.clear();
     bench.run(1);
-    EXPECT_LE(test::cost(bench.board.bus).bytes, BoardHardware::bus_bytes_per_poll);
+    EXPECT_LE(test::cost(bench.log).bytes, BoardHardware::bus_bytes_per_poll);
   }
   EXPECT_LE(bench.longest_poll_us, 1200U);
   EXPECT_FALSE(bench.hardware.fault().any());
@@ -174,11 +174,11 @@ TEST(BoardHardware, SafeStateCostsWhatTheDocumentationSays) {
   Bench bench;
   bench.boot();
   bench.apply(full());
-  bench.board.bus.clear_log();
+  bench.log.clear();
   bench.hardware.make_safe();
   EXPECT_TRUE(test::is_safe(bench.board));
-  EXPECT_EQ(test::lines(bench.board.bus).front(), "70 <- FD 10");
-  const test::BusCost safe = test::cost(bench.board.bus);
+  EXPECT_EQ(test::lines(bench.log).front(), "70 <- FD 10");
+  const test::BusCost safe = test::cost(bench.log);
   EXPECT_EQ(safe.bytes, 33U);
   EXPECT_EQ(safe.us, 777.5);
   for (int i = 0; i < 100; ++i) bench.hardware.step_tick();
@@ -192,7 +192,7 @@ TEST(BoardHardware, AChipThatIsNotFittedIsLeftAlone) {
   bench.boot();
   bench.apply(full());
   bench.run(200);
-  for (const std::string& line : test::lines(bench.board.bus)) {
+  for (const std::string& line : test::lines(bench.log)) {
     EXPECT_EQ(line.substr(0, 2), "40") << line;
   }
   EXPECT_FALSE(bench.hardware.fault().any());
@@ -271,22 +271,22 @@ TEST(BoardHardware, ChangesCostWhatTheDocumentationSays) {
   bench.boot();
   Outputs outputs;
   bench.apply(outputs);
-  bench.board.bus.clear_log();
+  bench.log.clear();
   int calls = 0;
-  for (std::size_t before = 1; before != bench.board.bus.log().size(); ++calls) {
-    before = bench.board.bus.log().size();
+  for (std::size_t before = 1; before != bench.log.transfers().size(); ++calls) {
+    before = bench.log.transfers().size();
     bench.hardware.apply(full());
   }
   EXPECT_EQ(calls - 1, 4);
-  const test::BusCost everything = test::cost(bench.board.bus);
+  const test::BusCost everything = test::cost(bench.log);
   EXPECT_EQ(everything.bytes, 146U);
   EXPECT_EQ(everything.us, 3325);
   const auto cost_of = [&](Drive drive) {
     outputs.osmc[0] = drive;
-    bench.board.bus.clear_log();
+    bench.log.clear();
     bench.hardware.apply(outputs);
-    EXPECT_EQ(bench.board.bus.log().size(), 1U);
-    return test::cost(bench.board.bus);
+    EXPECT_EQ(bench.log.transfers().size(), 1U);
+    return test::cost(bench.log);
   };
   outputs = full();
   EXPECT_EQ(cost_of({0x123, Direction::forward}).us, 117.5);

@@ -5,7 +5,7 @@
 
 namespace r4::test {
 
-std::string to_text(const sim::I2cTransfer& transfer) {
+std::string to_text(const BusLog::Transfer& transfer) {
   using Kind = sim::I2cTransfer::Kind;
   if (transfer.kind == Kind::recover) return "recover";
   std::string text = fmt::format("{:02X}", transfer.address);
@@ -18,23 +18,23 @@ std::string to_text(const sim::I2cTransfer& transfer) {
   return text;
 }
 
-std::vector<std::string> lines(const sim::I2cBusModel& bus) {
+std::vector<std::string> lines(const BusLog& log) {
   std::vector<std::string> all;
-  for (const sim::I2cTransfer& transfer : bus.log()) all.push_back(to_text(transfer));
+  for (const BusLog::Transfer& transfer : log.transfers()) all.push_back(to_text(transfer));
   return all;
 }
 
-std::vector<std::string> writes(const sim::I2cBusModel& bus) {
+std::vector<std::string> writes(const BusLog& log) {
   std::vector<std::string> all;
-  for (const sim::I2cTransfer& transfer : bus.log()) {
+  for (const BusLog::Transfer& transfer : log.transfers()) {
     if (transfer.kind == sim::I2cTransfer::Kind::write) all.push_back(to_text(transfer));
   }
   return all;
 }
 
-BusCost cost(const sim::I2cBusModel& bus) {
+BusCost cost(const BusLog& log) {
   BusCost sum;
-  for (const sim::I2cTransfer& transfer : bus.log()) {
+  for (const BusLog::Transfer& transfer : log.transfers()) {
     sum.bytes += transfer.bytes;
     sum.us += static_cast<double>(transfer.duration_ns) / 1000;
   }

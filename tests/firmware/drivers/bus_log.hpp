@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What went over a simulated bus, as people write it in data sheets: "40 <- 00 31 04" for a write,
 // "40 <- 00 -> 21 04" for a read of a register; refused ones end with " NACK", those of a held bus
-// with " TIMEOUT"; "recover" for nine clocks.
+// and those that were cut short with " TIMEOUT"; "recover" for nine clocks.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -12,16 +13,41 @@
 
 namespace r4::test {
 
-std::string to_text(const sim::I2cTransfer& transfer);
-std::vector<std::string> lines(const sim::I2cBusModel& bus);
+// Everything since the last clear(). It must outlive what is made on the bus.
+class BusLog final : public sim::I2cObserver {
+ public:
+  // A transfer with bytes of its own.
+  struct Transfer : sim::I2cTransfer {
+    explicit Transfer(const sim::I2cTransfer& told)
+        : I2cTransfer(told),
+          written(told.written, told.written + told.written_size),
+          read(told.read, told.read + told.read_size) {}
+    std::vector<std::uint8_t> written;
+    std::vector<std::uint8_t> read;
+  };
+
+  explicit BusLog(sim::I2cBusModel& bus) { bus.set_observer(this); }
+  BusLog(const BusLog&) = delete;
+  BusLog& operator=(const BusLog&) = delete;
+
+  void on_transfer(const sim::I2cTransfer& transfer) override { transfers_.emplace_back(transfer); }
+  const std::vector<Transfer>& transfers() const { return transfers_; }
+  void clear() { transfers_.clear(); }
+
+ private:
+  std::vector<Transfer> transfers_;
+};
+
+std::string to_text(const BusLog::Transfer& transfer);
+std::vector<std::string> lines(const BusLog& log);
 // Only those that write to a chip (not reads).
-std::vector<std::string> writes(const sim::I2cBusModel& bus);
+std::vector<std::string> writes(const BusLog& log);
 
 struct BusCost {
   std::size_t bytes = 0;
   double us = 0;
 };
-BusCost cost(const sim::I2cBusModel& bus);
+BusCost cost(const BusLog& log);
 
 // Calls poll(now_us) each millisecond for `ms` milliseconds of the bus's time.
 template <class Driver>

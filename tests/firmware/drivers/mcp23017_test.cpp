@@ -21,14 +21,14 @@ struct Bench {
     expander.begin();
     test::run(expander, bus, 1);
     ASSERT_TRUE(expander.ready());
-    bus.clear_log();
+    log.clear();
   }
   Lines write(std::uint8_t a, std::uint8_t b) {
-    bus.clear_log();
+    log.clear();
     expander.set_ports(a, b);
     BusBudget budget(48);
     expander.write_changes(budget);
-    return test::lines(bus);
+    return test::lines(log);
   }
   ChipTrouble verify() {
     BusBudget budget(48);
@@ -36,6 +36,7 @@ struct Bench {
     return expander.trouble();
   }
   sim::I2cBusModel bus;
+  test::BusLog log{bus};
   Mcp23017Model chip{0x20};
   Mcp23017 expander{bus, 0x20, safe_a, safe_b};
 };
@@ -44,7 +45,7 @@ TEST(Mcp23017, WritesTheLatchesBeforeTheDirections) {
   Bench bench;
   bench.expander.begin();
   test::run(bench.expander, bench.bus, 1);
-  EXPECT_EQ(test::lines(bench.bus),
+  EXPECT_EQ(test::lines(bench.log),
             (Lines{"20 <- 05 00", "20 <- 14 AA 00", "20 <- 00 00 00 00 00", "20 <- 0A 00"}));
   EXPECT_EQ(bench.chip.driven(0), 0xFF);
   EXPECT_EQ(bench.chip.driven(1), 0xFF);
@@ -92,9 +93,9 @@ TEST(Mcp23017, SafeStateIsRightAlsoForAChipThatWasReset) {
   bench.set_up();
   bench.write(0x55, 0xFF);
   bench.chip.power_on();
-  bench.bus.clear_log();
+  bench.log.clear();
   EXPECT_EQ(bench.expander.make_safe(), I2cResult::ok);
-  EXPECT_EQ(test::lines(bench.bus), (Lines{"20 <- 14 AA 00", "20 <- 00 00 00"}));
+  EXPECT_EQ(test::lines(bench.log), (Lines{"20 <- 14 AA 00", "20 <- 00 00 00"}));
   EXPECT_EQ(bench.chip.level(0), safe_a);
   EXPECT_EQ(bench.chip.level(1), safe_b);
   EXPECT_EQ(bench.chip.driven(0), 0xFF);

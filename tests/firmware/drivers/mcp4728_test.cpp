@@ -28,13 +28,13 @@ struct Bench {
     dac.begin();
     test::run(dac, bus, ms);
     ASSERT_TRUE(dac.ready());
-    bus.clear_log();
+    log.clear();
   }
   Lines write() {
-    bus.clear_log();
+    log.clear();
     BusBudget budget(48);
     dac.write_changes(budget);
-    return test::lines(bus);
+    return test::lines(log);
   }
   ChipTrouble verify() {
     BusBudget budget(48);
@@ -42,6 +42,7 @@ struct Bench {
     return dac.trouble();
   }
   sim::I2cBusModel bus;
+  test::BusLog log{bus};
   Mcp4728Model chip{0x61};
   Mcp4728 dac{bus, 0x61};
 };
@@ -51,7 +52,7 @@ TEST(Mcp4728, ProvisionsTheEepromOfANewChipWithZerosOnce) {
   bench.dac.begin();
   test::run(bench.dac, bench.bus, 70);
   EXPECT_TRUE(bench.dac.ready());
-  const Lines all = test::lines(bench.bus);
+  const Lines all = test::lines(bench.log);
   ASSERT_GT(all.size(), 6U);
   EXPECT_EQ(all[0], zeros);
   EXPECT_EQ(all[1], factory_eeprom);
@@ -74,7 +75,7 @@ TEST(Mcp4728, LeavesAProvisionedEepromAlone) {
   bench.provisioned();
   bench.dac.begin();
   test::run(bench.dac, bench.bus, 1);
-  EXPECT_EQ(test::lines(bench.bus), (Lines{zeros, zero_eeprom}));
+  EXPECT_EQ(test::lines(bench.log), (Lines{zeros, zero_eeprom}));
   EXPECT_TRUE(bench.dac.ready());
   EXPECT_EQ(bench.chip.eeprom_writes(), 0);
 }
@@ -126,9 +127,9 @@ TEST(Mcp4728, SafeStateIsZeroVoltsOnAllFour) {
   bench.set_up();
   for (int i = 0; i < Mcp4728::channels; ++i) bench.dac.set_code(i, 4095);
   bench.write();
-  bench.bus.clear_log();
+  bench.log.clear();
   EXPECT_EQ(bench.dac.make_safe(), I2cResult::ok);
-  EXPECT_EQ(test::lines(bench.bus), Lines{zeros});
+  EXPECT_EQ(test::lines(bench.log), Lines{zeros});
   for (int i = 0; i < Mcp4728::channels; ++i) EXPECT_EQ(bench.chip.volts(i), 0);
   EXPECT_EQ(bench.write(), Lines{});
 }

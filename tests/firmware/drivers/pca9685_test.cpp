@@ -26,19 +26,20 @@ struct Bench {
     pwm.begin();
     test::run(pwm, bus, 5);
     ASSERT_TRUE(pwm.ready());
-    bus.clear_log();
+    log.clear();
   }
   Lines write(std::size_t bytes = 100) {
-    bus.clear_log();
+    log.clear();
     BusBudget budget(bytes);
     pwm.write_changes(budget);
-    return test::lines(bus);
+    return test::lines(log);
   }
   void verify() {
     BusBudget budget(48);
     pwm.verify(budget);
   }
   I2cBusModel bus;
+  test::BusLog log{bus};
   Pca9685Model chip{0x40};
   Pca9685 pwm;
 };
@@ -47,10 +48,10 @@ TEST(Pca9685, SetsTheFrequencyInSleepAndRestartsHalfAMillisecondLater) {
   Bench bench(50);
   bench.pwm.begin();
   test::run(bench.pwm, bench.bus, 5);
-  EXPECT_EQ(test::lines(bench.bus),
+  EXPECT_EQ(test::lines(bench.log),
             (Lines{"40 <- FD 10", "40 <- 00 31 04", "40 <- FE 79", "40 <- 00 21", "40 <- 00 A1",
                    "40 <- FA 00 00 00 10", "40 <- 00 -> 21 04", "40 <- FE -> 79"}));
-  const auto& log = bench.bus.log();
+  const auto& log = bench.log.transfers();
   EXPECT_GE(log[4].start_ns - (log[3].start_ns + log[3].duration_ns), 500'000U);
   EXPECT_TRUE(bench.pwm.ready());
   EXPECT_NEAR(bench.chip.frequency_hz(), 50, 0.1);
@@ -154,7 +155,7 @@ TEST(Pca9685, ASmallBudgetCutsBetweenGroupsOnly) {
   int writes = 0;
   for (; writes < 4 && of(3) != std::pair(0x0FF, true); ++writes) {
     EXPECT_EQ(bench.write(20).size(), 1U);
-    EXPECT_LE(test::cost(bench.bus).bytes, 20U);
+    EXPECT_LE(test::cost(bench.log).bytes, 20U);
     for (int drive = 0; drive < 4; ++drive) {
       EXPECT_TRUE(of(drive) == std::pair(0, false) || of(drive) == std::pair(0x0FF, true));
     }
@@ -165,6 +166,7 @@ TEST(Pca9685, ASmallBudgetCutsBetweenGroupsOnly) {
 
 TEST(Pca9685, AllOffReachesEveryChipInThreeBytes) {
   I2cBusModel bus;
+  test::BusLog log{bus};
   Pca9685Model chips[] = {Pca9685Model(0x40), Pca9685Model(0x41), Pca9685Model(0x42)};
   for (Pca9685Model& chip : chips) bus.attach(chip);
   Pca9685 drivers[] = {{bus, 0x40, 1000}, {bus, 0x41, 1000}, {bus, 0x42, 50}};
@@ -175,10 +177,10 @@ TEST(Pca9685, AllOffReachesEveryChipInThreeBytes) {
     BusBudget budget(100);
     driver.write_changes(budget);
   }
-  bus.clear_log();
+  log.clear();
   EXPECT_EQ(Pca9685::all_off(bus), I2cResult::ok);
-  EXPECT_EQ(test::lines(bus), Lines{"70 <- FD 10"});
-  EXPECT_EQ(test::cost(bus).us, 72.5);
+  EXPECT_EQ(test::lines(log), Lines{"70 <- FD 10"});
+  EXPECT_EQ(test::cost(log).us, 72.5);
   for (const Pca9685Model& chip : chips) {
     for (int i = 0; i < Pca9685::channels; ++i) EXPECT_EQ(chip.duty(i), 0);
   }
@@ -190,9 +192,9 @@ TEST(Pca9685, SafeStateIsOneTransferAndCleansUpForTheNextDuty) {
   bench.pwm.set_duty(0, 4095);
   bench.pwm.set_duty(5, 77);
   bench.write();
-  bench.bus.clear_log();
+  bench.log.clear();
   EXPECT_EQ(bench.pwm.make_safe(), I2cResult::ok);
-  EXPECT_EQ(test::lines(bench.bus), Lines{"40 <- FD 10"});
+  EXPECT_EQ(test::lines(bench.log), Lines{"40 <- FD 10"});
   EXPECT_EQ(bench.chip.duty(0), 0);
   EXPECT_EQ(bench.chip.duty(5), 0);
   EXPECT_EQ(bench.write(), Lines{});
@@ -221,7 +223,7 @@ TEST(Pca9685, AByteThatIsRefusedIsTroubleAtEachStepOfTheSetUp) {
     for (int step = 0; step < 6; ++step) {
       Bench bench;
       bench.pwm.begin();
-      for (int i = 0; i < 20 && static_cast<int>(bench.bus.log().size()) < step; ++i) {
+      for (int i = 0; i < 20 && static_cast<int>(bench.log.transfers().size()) < step; ++i) {
         BusBudget one(7);
         bench.pwm.poll(static_cast<std::uint32_t>(bench.bus.now_us()), one);
         bench.bus.advance(1000);

@@ -1,61 +1,95 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "i2c_bus_model.hpp"
 
-#include <algorithm>
-
-namespace r4::sim {
+namespace r4 {
+namespace sim {
 
 using firmware::I2cResult;
 
-void I2cBusModel::attach(I2cChipModel& chip) {
-  chips_.push_back(&chip);
-  chip.set_time(now_us());
+// While one lives, no interrupt comes.
+class I2cBusModel::Whole {
+ public:
+  explicit Whole(const I2cBusModel& bus) : interrupts_(bus.interrupts_) {
+    if (interrupts_ != nullptr) before_ = interrupts_->lock();
+  }
+  Whole(const Whole&) = delete;
+  Whole& operator=(const Whole&) = delete;
+  ~Whole() {
+    if (interrupts_ != nullptr) interrupts_->unlock(before_);
+  }
+
+ private:
+  InterruptLock* interrupts_;
+  std::uint32_t before_ = 0;
+};
+
+bool I2cBusModel::attach(I2cChipModel& chip) {
+  if (chip_count_ == max_chips) return false;
+  chips_[chip_count_++] = &chip;
+  chip.follow(now_ns_);
   chip.power_on();
+  return true;
 }
 
 I2cResult I2cBusModel::write(std::uint8_t address, const std::uint8_t* bytes, std::size_t size) {
-  I2cTransfer& transfer = begin(I2cTransfer::Kind::write, address);
-  I2cResult result = start(transfer, address, false);
+  Transfer transfer;
+  begin(transfer, I2cTransfer::Kind::write, address);
+  I2cResult result = start(transfer, false);
   if (result == I2cResult::ok) result = send(transfer, bytes, size);
   return end(transfer, result);
 }
 
 I2cResult I2cBusModel::write_read(std::uint8_t address, const std::uint8_t* out,
                                   std::size_t out_size, std::uint8_t* in, std::size_t in_size) {
-  I2cTransfer& transfer = begin(I2cTransfer::Kind::write_read, address);
+  Transfer transfer;
+  begin(transfer, I2cTransfer::Kind::write_read, address);
   I2cResult result = I2cResult::ok;
   if (out_size != 0) {
-    result = start(transfer, address, false);
+    result = start(transfer, false);
     if (result == I2cResult::ok) result = send(transfer, out, out_size);
   }
-  if (result == I2cResult::ok) result = start(transfer, address, true);
+  if (result == I2cResult::ok) result = start(transfer, true);
+  transfer.read = in;
   for (std::size_t i = 0; i < in_size && result == I2cResult::ok; ++i) {
-    if (held_ != 0) {
-      result = I2cResult::timeout;
-      break;
-    }
-    in[i] = taking_part_.empty() ? 0xFF : taking_part_.front()->read();
-    transfer.read.push_back(in[i]);
-    byte_sent(transfer);
+    result = fetch_byte(transfer, in[i]);
   }
   return end(transfer, result);
 }
 
 bool I2cBusModel::recover() {
-  I2cTransfer& transfer = begin(I2cTransfer::Kind::recover, 0);
-  clocks(transfer, 10);
-  if (held_ > 0) --held_;
-  end(transfer, held_ == 0 ? I2cResult::ok : I2cResult::timeout);
-  return held_ == 0;
+  constexpr int nine_and_a_stop = 10;
+  Transfer transfer;
+  begin(transfer, I2cTransfer::Kind::recover, 0);
+  bool free = false;
+  {
+    const Whole whole(*this);
+    pass(nine_and_a_stop);
+    if (held_ > 0) --held_;
+    free = held_ == 0;
+  }
+  end(transfer, free ? I2cResult::ok : I2cResult::timeout);
+  return free;
+}
+
+std::uint64_t I2cBusModel::now_ns() const {
+  const Whole whole(*this);
+  return now_ns_;
 }
 
 void I2cBusModel::advance(std::uint64_t us) {
+  const Whole whole(*this);
   now_ns_ += us * 1000;
-  tell_time();
 }
 
-void I2cBusModel::refuse(std::uint8_t address, std::size_t after_bytes, int times) {
-  refusals_.push_back({address, after_bytes, times});
+bool I2cBusModel::refuse(std::uint8_t address, std::size_t after_bytes, int times) {
+  for (Refusal& place : refusals_) {
+    if (place.times > 0) continue;
+    place.address = address;
+    place.after_bytes = after_bytes;
+    place.times = times;
+    return true;
+  }
+  return false;
 }
 
 void I2cBusModel::hold(int recoveries) { held_ = recoveries; }
@@ -65,113 +99,155 @@ void I2cBusModel::hold_after(std::size_t after_bytes, int recoveries) {
   hold_recoveries_ = recoveries;
 }
 
-void I2cBusModel::reset_after(I2cChipModel& chip, std::size_t after_bytes) {
-  resets_.push_back({&chip, after_bytes});
+bool I2cBusModel::reset_after(I2cChipModel& chip, std::size_t after_bytes) {
+  for (Reset& place : resets_) {
+    if (place.after_bytes > 0) continue;
+    place.chip = &chip;
+    place.after_bytes = after_bytes;
+    return true;
+  }
+  return false;
 }
 
 void I2cBusModel::clear_errors() {
-  refusals_.clear();
-  resets_.clear();
-  hold_after_.reset();
+  for (Refusal& refusal : refusals_) refusal = Refusal();
+  for (Reset& reset : resets_) reset = Reset();
+  hold_after_ = 0;
   held_ = 0;
 }
 
-I2cTransfer& I2cBusModel::begin(I2cTransfer::Kind kind, std::uint8_t address) {
-  tell_time();
-  taking_part_.clear();
-  I2cTransfer& transfer = log_.emplace_back();
+// What is under way is cut short by it.
+void I2cBusModel::begin(Transfer& transfer, I2cTransfer::Kind kind, std::uint8_t address) {
+  const Whole whole(*this);
+  transfers_ = transfers_ + 1;
+  transfer.number = transfers_;
   transfer.kind = kind;
   transfer.address = address;
   transfer.start_ns = now_ns_;
-  return transfer;
+  addressed_ = 0;
+  // The STOP of a recovery is for all that were cut off.
+  if (kind != I2cTransfer::Kind::recover) taking_part_ = 0;
 }
 
-I2cResult I2cBusModel::end(I2cTransfer& transfer, I2cResult result) {
-  clocks(transfer, 1);
-  if (result == I2cResult::timeout && transfer.kind != I2cTransfer::Kind::recover) {
-    now_ns_ += std::uint64_t{firmware::i2c_timeout_us} * 1000;
+I2cResult I2cBusModel::end(Transfer& transfer, I2cResult result) {
+  {
+    const Whole whole(*this);
+    if (cut_short(transfer)) {
+      result = I2cResult::timeout;
+    } else {
+      pass(1);
+      if (result != I2cResult::timeout) {
+        stop_chips();
+      } else if (transfer.kind != I2cTransfer::Kind::recover) {
+        // A chip that is cut off by a held line sees no STOP.
+        now_ns_ += std::uint64_t{firmware::i2c_timeout_us} * 1000;
+      }
+    }
+    transfer.result = result;
+    transfer.duration_ns = now_ns_ - transfer.start_ns;
   }
-  tell_time();
-  // A chip that is cut off by a held line sees no STOP.
-  if (result != I2cResult::timeout) {
-    for (I2cChipModel* chip : taking_part_) chip->stop();
-  }
-  transfer.result = result;
-  transfer.duration_ns = now_ns_ - transfer.start_ns;
+  if (observer_ != nullptr) observer_->on_transfer(transfer);
   return result;
 }
 
-I2cResult I2cBusModel::start(I2cTransfer& transfer, std::uint8_t address, bool read) {
-  if (held_ != 0) return I2cResult::timeout;
-  clocks(transfer, 1);
-  std::vector<I2cChipModel*> answering;
-  const auto refusal = std::find_if(refusals_.begin(), refusals_.end(), [&](const Refusal& r) {
-    return r.address == address && r.after_bytes == 0 && r.times > 0;
-  });
-  if (refusal != refusals_.end()) {
+void I2cBusModel::stop_chips() {
+  const ChipSet stopping = taking_part_;
+  taking_part_ = 0;
+  for (int i = 0; i < chip_count_; ++i) {
+    if ((stopping >> i & 1) != 0) chips_[i]->stop();
+  }
+}
+
+I2cResult I2cBusModel::start(Transfer& transfer, bool read) {
+  const Whole whole(*this);
+  if (cut_short(transfer) || held_ != 0) return I2cResult::timeout;
+  pass(1);
+  ChipSet answering = 0;
+  if (Refusal* refusal = refusal_of(transfer.address, 0, 0)) {
     --refusal->times;
   } else {
-    for (I2cChipModel* chip : chips_) {
-      if (chip->start(address, read)) answering.push_back(chip);
+    for (int i = 0; i < chip_count_; ++i) {
+      const bool answers = chips_[i]->start(transfer.address, read);
+      if (cut_short(transfer)) return I2cResult::timeout;
+      if (answers) answering |= static_cast<ChipSet>(1U << i);
     }
   }
-  // A chip that was addressed before a repeated START and is not now sees the STOP nevertheless.
-  for (I2cChipModel* chip : answering) {
-    std::erase(taking_part_, chip);
-  }
-  taking_part_.insert(taking_part_.begin(), answering.begin(), answering.end());
+  addressed_ = answering;
+  taking_part_ |= answering;
   byte_sent(transfer);
-  if (answering.empty()) return I2cResult::no_acknowledge;
+  if (answering == 0) return I2cResult::no_acknowledge;
   return held_ != 0 ? I2cResult::timeout : I2cResult::ok;
 }
 
-I2cResult I2cBusModel::send(I2cTransfer& transfer, const std::uint8_t* bytes, std::size_t size) {
-  const auto refusal = std::find_if(refusals_.begin(), refusals_.end(), [&](const Refusal& r) {
-    return r.address == transfer.address && r.after_bytes != 0 && r.after_bytes < size &&
-           r.times > 0;
-  });
+I2cResult I2cBusModel::send(Transfer& transfer, const std::uint8_t* bytes, std::size_t size) {
+  transfer.written = bytes;
+  Refusal* refusal = size > 1 ? refusal_of(transfer.address, 1, size - 1) : nullptr;
   std::size_t accepted = size;
-  if (refusal != refusals_.end()) {
+  if (refusal != nullptr) {
     --refusal->times;
     accepted = refusal->after_bytes;
   }
   for (std::size_t i = 0; i < size; ++i) {
-    bool acknowledged = false;
-    if (i < accepted) {
-      for (I2cChipModel* chip : taking_part_) acknowledged |= chip->write(bytes[i]);
-    }
-    byte_sent(transfer);
-    if (held_ != 0) return I2cResult::timeout;
-    if (!acknowledged) return I2cResult::no_acknowledge;
-    transfer.written.push_back(bytes[i]);
+    const I2cResult result = send_byte(transfer, bytes[i], i >= accepted);
+    if (result != I2cResult::ok) return result;
+    ++transfer.written_size;
   }
   return I2cResult::ok;
 }
 
-void I2cBusModel::clocks(I2cTransfer& transfer, int count) {
-  static_cast<void>(transfer);
-  now_ns_ += static_cast<std::uint64_t>(count) * clock_ns;
+I2cResult I2cBusModel::send_byte(Transfer& transfer, std::uint8_t byte, bool refused) {
+  const Whole whole(*this);
+  bool acknowledged = false;
+  for (int i = 0; i < chip_count_ && !refused; ++i) {
+    if (cut_short(transfer)) return I2cResult::timeout;
+    if ((addressed_ >> i & 1) != 0 && chips_[i]->write(byte)) acknowledged = true;
+  }
+  if (cut_short(transfer)) return I2cResult::timeout;
+  byte_sent(transfer);
+  if (held_ != 0) return I2cResult::timeout;
+  return acknowledged ? I2cResult::ok : I2cResult::no_acknowledge;
 }
 
-void I2cBusModel::byte_sent(I2cTransfer& transfer) {
-  ++transfer.bytes;
-  clocks(transfer, 9);
-  tell_time();
-  for (Reset& reset : resets_) {
-    if (reset.after_bytes > 0 && --reset.after_bytes == 0) {
-      reset.chip->power_on();
-      std::erase(taking_part_, reset.chip);
+I2cResult I2cBusModel::fetch_byte(Transfer& transfer, std::uint8_t& byte) {
+  const Whole whole(*this);
+  if (held_ != 0) return I2cResult::timeout;
+  byte = 0xFF;  // what nobody pulls down
+  for (int i = 0; i < chip_count_; ++i) {
+    if (cut_short(transfer)) return I2cResult::timeout;
+    if ((addressed_ >> i & 1) != 0) byte &= chips_[i]->read();
+  }
+  if (cut_short(transfer)) return I2cResult::timeout;
+  ++transfer.read_size;
+  byte_sent(transfer);
+  return I2cResult::ok;
+}
+
+// One that refuses `address` after so many bytes; nullptr: none.
+I2cBusModel::Refusal* I2cBusModel::refusal_of(std::uint8_t address, std::size_t first,
+                                              std::size_t last) {
+  for (Refusal& refusal : refusals_) {
+    if (refusal.times > 0 && refusal.address == address && refusal.after_bytes >= first &&
+        refusal.after_bytes <= last) {
+      return &refusal;
     }
   }
-  std::erase_if(resets_, [](const Reset& reset) { return reset.after_bytes == 0; });
-  if (hold_after_ && --*hold_after_ == 0) {
-    hold_after_.reset();
-    held_ = hold_recoveries_;
+  return nullptr;
+}
+
+void I2cBusModel::byte_sent(Transfer& transfer) {
+  ++transfer.bytes;
+  pass(9);
+  for (Reset& reset : resets_) {
+    if (reset.after_bytes == 0 || --reset.after_bytes != 0) continue;
+    reset.chip->power_on();
+    for (int i = 0; i < chip_count_; ++i) {
+      if (chips_[i] != reset.chip) continue;
+      addressed_ &= static_cast<ChipSet>(~(1U << i));
+      taking_part_ &= static_cast<ChipSet>(~(1U << i));
+    }
   }
+  if (hold_after_ != 0 && --hold_after_ == 0) held_ = hold_recoveries_;
 }
 
-void I2cBusModel::tell_time() {
-  for (I2cChipModel* chip : chips_) chip->set_time(now_us());
-}
-
-}  // namespace r4::sim
+}  // namespace sim
+}  // namespace r4

@@ -1,39 +1,68 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A simulated I2C bus at 400 kHz: chip models behind the drivers' interface, the time that each
-// transfer takes, a log of all of them, and errors on request.
+// transfer takes, errors on request, and somebody who is told of every transfer.
 //
 // Time passes by transfers and by advance(); nobody waits.
+//
+// An interrupt may make transfers in the middle of another: the one that it came into ends with
+// `timeout` and touches no chip any more. Where that can happen, an InterruptLock keeps each byte
+// whole, as the wire does.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
-#include <vector>
 
 #include "../../../drivers/i2c_bus.hpp"
 #include "i2c_chip_model.hpp"
 
-namespace r4::sim {
+namespace r4 {
+namespace sim {
 
-// What happened on the bus.
+// What happened on the bus. The bytes are the caller's and the chips': valid only while told.
 struct I2cTransfer {
   enum class Kind : std::uint8_t { write, write_read, recover };
   Kind kind = Kind::write;
   std::uint8_t address = 0;
-  std::vector<std::uint8_t> written;  // bytes that were acknowledged
-  std::vector<std::uint8_t> read;
   firmware::I2cResult result = firmware::I2cResult::ok;
+  const std::uint8_t* written = nullptr;
+  std::size_t written_size = 0;  // bytes that were acknowledged
+  const std::uint8_t* read = nullptr;
+  std::size_t read_size = 0;
   std::uint64_t start_ns = 0;
   std::uint64_t duration_ns = 0;
   std::size_t bytes = 0;  // on the wire, addresses and refused bytes included
 };
 
+class I2cObserver {
+ public:
+  // After its STOP. One that was cut short comes after those that cut it.
+  virtual void on_transfer(const I2cTransfer& transfer) = 0;
+
+ protected:
+  ~I2cObserver() = default;
+};
+
+class InterruptLock {
+ public:
+  // Holds interrupts back; what it returns goes to the unlock() that belongs to it.
+  virtual std::uint32_t lock() = 0;
+  virtual void unlock(std::uint32_t before) = 0;
+
+ protected:
+  ~InterruptLock() = default;
+};
+
 class I2cBusModel final : public firmware::I2cBus {
  public:
   static constexpr std::uint64_t clock_ns = 2500;  // 400 kHz
+  static constexpr int max_chips = 8;
+  static constexpr int max_errors = 8;  // of each kind at once
 
-  // The chip must outlive the bus. It is powered on.
-  void attach(I2cChipModel& chip);
+  // The chip must outlive the bus. It is powered on. False: there are max_chips already.
+  bool attach(I2cChipModel& chip);
+  // nullptr: nobody.
+  void set_observer(I2cObserver* observer) { observer_ = observer; }
+  void set_interrupt_lock(InterruptLock* interrupts) { interrupts_ = interrupts; }
 
   firmware::I2cResult write(std::uint8_t address, const std::uint8_t* bytes,
                             std::size_t size) override;
@@ -42,51 +71,66 @@ class I2cBusModel final : public firmware::I2cBus {
                                  std::size_t in_size) override;
   bool recover() override;
 
-  std::uint64_t now_us() const { return now_ns_ / 1000; }
+  std::uint64_t now_ns() const;
+  std::uint64_t now_us() const { return now_ns() / 1000; }
   void advance(std::uint64_t us);
 
-  const std::vector<I2cTransfer>& log() const { return log_; }
-  void clear_log() { log_.clear(); }
-
-  // Errors. Transfers to `address` are not acknowledged after `after_bytes` bytes of data (0: the
-  // address itself), `times` times.
-  void refuse(std::uint8_t address, std::size_t after_bytes = 0, int times = 1);
+  // Errors; false if there are max_errors of that kind already. Transfers to `address` are not
+  // acknowledged after `after_bytes` bytes of data (0: the address itself), `times` times.
+  bool refuse(std::uint8_t address, std::size_t after_bytes = 0, int times = 1);
   // A chip holds SDA: transfers time out, until recover() was called `recoveries` times.
   void hold(int recoveries = 1);
   // The bus is held from the moment on at which `after_bytes` more bytes were sent.
   void hold_after(std::size_t after_bytes, int recoveries = 1);
   // `chip` loses power for a moment when `after_bytes` more bytes were sent on the bus.
-  void reset_after(I2cChipModel& chip, std::size_t after_bytes);
+  bool reset_after(I2cChipModel& chip, std::size_t after_bytes);
   void clear_errors();
 
  private:
+  using ChipSet = std::uint8_t;  // bit: chip
+  static_assert(max_chips <= 8, "a ChipSet has eight bits");
+
   struct Refusal {
-    std::uint8_t address;
-    std::size_t after_bytes;
-    int times;
+    std::uint8_t address = 0;
+    std::size_t after_bytes = 0;
+    int times = 0;  // 0: this place is free
   };
   struct Reset {
-    I2cChipModel* chip;
-    std::size_t after_bytes;
+    I2cChipModel* chip = nullptr;
+    std::size_t after_bytes = 0;  // 0: this place is free
   };
+  // A transfer under way.
+  struct Transfer : I2cTransfer {
+    std::uint32_t number = 0;
+  };
+  class Whole;
 
-  I2cTransfer& begin(I2cTransfer::Kind kind, std::uint8_t address);
-  firmware::I2cResult end(I2cTransfer& transfer, firmware::I2cResult result);
-  firmware::I2cResult start(I2cTransfer& transfer, std::uint8_t address, bool read);
-  firmware::I2cResult send(I2cTransfer& transfer, const std::uint8_t* bytes, std::size_t size);
-  void clocks(I2cTransfer& transfer, int count);
-  void byte_sent(I2cTransfer& transfer);
-  void tell_time();
+  void begin(Transfer& transfer, I2cTransfer::Kind kind, std::uint8_t address);
+  firmware::I2cResult end(Transfer& transfer, firmware::I2cResult result);
+  firmware::I2cResult start(Transfer& transfer, bool read);
+  firmware::I2cResult send(Transfer& transfer, const std::uint8_t* bytes, std::size_t size);
+  firmware::I2cResult send_byte(Transfer& transfer, std::uint8_t byte, bool refused);
+  firmware::I2cResult fetch_byte(Transfer& transfer, std::uint8_t& byte);
+  bool cut_short(const Transfer& transfer) const { return transfer.number != transfers_; }
+  Refusal* refusal_of(std::uint8_t address, std::size_t first, std::size_t last);
+  void stop_chips();
+  void byte_sent(Transfer& transfer);
+  void pass(int clocks) { now_ns_ += static_cast<std::uint64_t>(clocks) * clock_ns; }
 
-  std::vector<I2cChipModel*> chips_;
-  std::vector<I2cChipModel*> taking_part_;
-  std::vector<I2cTransfer> log_;
-  std::vector<Refusal> refusals_;
-  std::vector<Reset> resets_;
-  std::optional<std::size_t> hold_after_;
+  I2cChipModel* chips_[max_chips] = {};
+  int chip_count_ = 0;
+  ChipSet addressed_ = 0;    // by the last START
+  ChipSet taking_part_ = 0;  // since the last STOP
+  Refusal refusals_[max_errors];
+  Reset resets_[max_errors];
+  std::size_t hold_after_ = 0;  // 0: not
   int hold_recoveries_ = 0;
   int held_ = 0;  // that many recover() calls are needed
   std::uint64_t now_ns_ = 0;
+  volatile std::uint32_t transfers_ = 0;  // begun so far
+  I2cObserver* observer_ = nullptr;
+  InterruptLock* interrupts_ = nullptr;
 };
 
-}  // namespace r4::sim
+}  // namespace sim
+}  // namespace r4

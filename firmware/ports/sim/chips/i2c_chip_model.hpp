@@ -4,12 +4,11 @@
 
 #include <cstdint>
 
-namespace r4::sim {
+namespace r4 {
+namespace sim {
 
 class I2cChipModel {
  public:
-  virtual ~I2cChipModel() = default;
-
   // Power comes, or comes back: every register at its reset value.
   virtual void power_on() = 0;
   // START (or repeated START) and an address. True: the chip acknowledges and takes part.
@@ -20,8 +19,18 @@ class I2cChipModel {
   virtual std::uint8_t read() = 0;
   // The end of a transfer in which the chip took part.
   virtual void stop() {}
-  // The time is now `now_us`.
-  virtual void set_time(std::uint64_t now_us) { static_cast<void>(now_us); }
+
+  // From now on the chip's time is what `now_ns` says.
+  void follow(const std::uint64_t& now_ns) { clock_ = &now_ns; }
+
+ protected:
+  ~I2cChipModel() = default;
+  // Nanoseconds; 0 for a chip that is on no bus.
+  std::uint64_t now_ns() const { return clock_ == nullptr ? 0 : *clock_; }
+
+ private:
+  const std::uint64_t* clock_ = nullptr;
 };
 
-}  // namespace r4::sim
+}  // namespace sim
+}  // namespace r4

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "mcp23017_model.hpp"
 
-namespace r4::sim {
+namespace r4 {
+namespace sim {
 
 namespace {
 
@@ -9,13 +10,13 @@ using Register = Mcp23017Model::Register;
 
 constexpr std::uint8_t byte_mode = 0x20;  // IOCON.SEQOP
 
-constexpr std::size_t at(Register number) { return static_cast<std::size_t>(number); }
+constexpr int at(Register number) { return static_cast<int>(number); }
 
 }  // namespace
 
 void Mcp23017Model::power_on() {
   for (auto& port : registers_) {
-    port.fill(0);
+    for (std::uint8_t& value : port) value = 0;
     port[at(Register::iodir)] = 0xFF;
   }
   iocon_ = 0;
@@ -28,19 +29,17 @@ std::uint8_t Mcp23017Model::driven(int port) const {
 
 std::uint8_t Mcp23017Model::level(int port) const {
   const std::uint8_t pulled_up = reg(port, Register::gppu);
-  const std::uint8_t outside = outside_[static_cast<std::size_t>(port)] | pulled_up;
+  const std::uint8_t outside = outside_[port] | pulled_up;
   const std::uint8_t chip = driven(port);
   return static_cast<std::uint8_t>((reg(port, Register::olat) & chip) | (outside & ~chip));
 }
 
 std::uint8_t Mcp23017Model::reg(int port, Register number) const {
   if (number == Register::iocon) return iocon_;
-  return registers_[static_cast<std::size_t>(port)][at(number)];
+  return registers_[port][at(number)];
 }
 
-void Mcp23017Model::set_outside(int port, std::uint8_t levels) {
-  outside_[static_cast<std::size_t>(port)] = levels;
-}
+void Mcp23017Model::set_outside(int port, std::uint8_t levels) { outside_[port] = levels; }
 
 bool Mcp23017Model::start(std::uint8_t address, bool read) {
   pointer_next_ = !read;
@@ -59,9 +58,9 @@ bool Mcp23017Model::write(std::uint8_t byte) {
     if (number == Register::iocon) {
       iocon_ = byte & 0xFE;
     } else if (number == Register::gpio) {  // a write to the port is one to its latch
-      registers_[static_cast<std::size_t>(port)][at(Register::olat)] = byte;
+      registers_[port][at(Register::olat)] = byte;
     } else if (number != Register::intf && number != Register::intcap) {
-      registers_[static_cast<std::size_t>(port)][at(number)] = byte;
+      registers_[port][at(number)] = byte;
     }
   }
   next_register();
@@ -104,4 +103,5 @@ void Mcp23017Model::next_register() {
   if (bank() && pointer_ >= 0x10 + registers) pointer_ = 0;
 }
 
-}  // namespace r4::sim
+}  // namespace sim
+}  // namespace r4

@@ -4,12 +4,12 @@
 // INTF and INTCAP read 0).
 #pragma once
 
-#include <array>
 #include <cstdint>
 
 #include "i2c_chip_model.hpp"
 
-namespace r4::sim {
+namespace r4 {
+namespace sim {
 
 class Mcp23017Model final : public I2cChipModel {
  public:
@@ -50,11 +50,12 @@ class Mcp23017Model final : public I2cChipModel {
   void next_register();
 
   std::uint8_t address_;
-  std::array<std::array<std::uint8_t, registers>, ports> registers_{};
-  std::array<std::uint8_t, ports> outside_{};
+  std::uint8_t registers_[ports][registers] = {};
+  std::uint8_t outside_[ports] = {};
   std::uint8_t iocon_ = 0;
   std::uint8_t pointer_ = 0;
   bool pointer_next_ = false;  // the next byte is the register's number
 };
 
-}  // namespace r4::sim
+}  // namespace sim
+}  // namespace r4

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "mcp4728_model.hpp"
 
-namespace r4::sim {
+namespace r4 {
+namespace sim {
 
 namespace {
 
@@ -17,8 +18,12 @@ std::uint8_t high_byte(const Mcp4728Model::Setting& setting) {
 }
 
 Mcp4728Model::Setting setting_of(std::uint8_t high, std::uint8_t low) {
-  return {(high & 0x80) != 0, static_cast<std::uint8_t>(high >> 5 & 3), (high & 0x10) != 0,
-          static_cast<std::uint16_t>((high & 0x0F) << 8 | low)};
+  Mcp4728Model::Setting setting;
+  setting.internal_reference = (high & 0x80) != 0;
+  setting.power_down = static_cast<std::uint8_t>(high >> 5 & 3);
+  setting.gain_2 = (high & 0x10) != 0;
+  setting.code = static_cast<std::uint16_t>((high & 0x0F) << 8 | low);
+  return setting;
 }
 
 }  // namespace
@@ -29,23 +34,22 @@ Mcp4728Model::Mcp4728Model(std::uint8_t address, bool ldac_low)
   power_on();
 }
 
-double Mcp4728Model::volts(int channel, double supply) const {
+std::int32_t Mcp4728Model::microvolts(int channel) const {
   const Setting& setting = output(channel);
   if (setting.power_down != 0) return 0;
-  const double reference = setting.internal_reference ? (setting.gain_2 ? 4.096 : 2.048) : supply;
-  return reference * setting.code / 4096;
+  if (setting.internal_reference) return setting.code * (setting.gain_2 ? 1000 : 500);
+  return static_cast<std::int32_t>(std::int64_t{5000000} * setting.code / 4096);
 }
 
 void Mcp4728Model::power_on() {
-  input_ = eeprom_;
-  output_ = eeprom_;
-  busy_until_us_ = 0;
-  bytes_.clear();
+  for (int i = 0; i < channels; ++i) input_[i] = output_[i] = eeprom_[i];
+  busy_until_ns_ = 0;
+  size_ = 0;
 }
 
 bool Mcp4728Model::start(std::uint8_t address, bool read) {
-  bytes_.clear();
-  command_.reset();
+  size_ = 0;
+  has_command_ = false;
   channel_ = 0;
   read_at_ = 0;
   general_ = address == 0 && !read;
@@ -56,8 +60,10 @@ bool Mcp4728Model::start(std::uint8_t address, bool read) {
 bool Mcp4728Model::write(std::uint8_t byte) {
   if (general_) return general_call(byte);
   if (ignoring_) return true;
-  if (!command_) command_ = byte;
-  bytes_.push_back(byte);
+  if (size_ == sizeof bytes_) return false;
+  if (!has_command_) command_ = byte;
+  has_command_ = true;
+  bytes_[size_++] = byte;
   return command_complete();
 }
 
@@ -68,10 +74,10 @@ bool Mcp4728Model::general_call(std::uint8_t byte) {
       power_on();
       return true;
     case 0x08:
-      output_ = input_;
+      for (int i = 0; i < channels; ++i) show(i);
       return true;
     case 0x09:
-      for (std::size_t i = 0; i < channels; ++i) {
+      for (int i = 0; i < channels; ++i) {
         input_[i].power_down = 0;
         output_[i].power_down = 0;
       }
@@ -84,40 +90,39 @@ bool Mcp4728Model::general_call(std::uint8_t byte) {
 // Takes the bytes so far; false refuses the last one. The first byte of the transfer is the command;
 // in what repeats after it, the command's bits mean nothing.
 bool Mcp4728Model::command_complete() {
-  const std::uint8_t command = *command_;
-  const std::size_t size = bytes_.size();
+  const unsigned command = command_;
   if (command >> 6 == 0) {  // fast write: two bytes a channel, reference and gain stay
-    if (size < 2) return true;
+    if (size_ < 2) return true;
     Setting& input = input_[channel_ % channels];
     input.power_down = bytes_[0] >> 4 & 3;
     input.code = static_cast<std::uint16_t>((bytes_[0] & 0x0F) << 8 | bytes_[1]);
     if (ldac_low_) show(channel_ % channels);
     ++channel_;
-    bytes_.clear();
+    size_ = 0;
     return true;
   }
-  const auto selected = static_cast<std::size_t>(bytes_[0] >> 1 & 3);
+  const int selected = bytes_[0] >> 1 & 3;
   switch (command >> 3) {
     case multi_write:
-      if (size < 3) return true;
+      if (size_ < 3) return true;
       store(selected, (bytes_[0] & 1) == 0);
-      bytes_.clear();
+      size_ = 0;
       return true;
     case single_write:
-      if (size < 3) return true;
+      if (size_ < 3) return true;
       store(selected, (command & 1) == 0);
       write_eeprom(selected, selected + 1);
       ignoring_ = true;
       return true;
     case sequential_write:
-      if (size == 1) {
+      if (size_ == 1) {
         channel_ = first_channel_ = selected;
         return true;
       }
-      if (size < 3) return true;
+      if (size_ < 3) return true;
       if (channel_ == channels) return false;
       store(channel_, (command & 1) == 0);
-      bytes_.resize(1);
+      size_ = 1;
       if (++channel_ == channels) write_eeprom(first_channel_, channels);
       return true;
     default:
@@ -126,7 +131,7 @@ bool Mcp4728Model::command_complete() {
   switch (command >> 5) {
     case 0b100:  // reference, gain: a bit a channel, A first
     case 0b110:
-      for (std::size_t i = 0; i < channels; ++i) {
+      for (int i = 0; i < channels; ++i) {
         const bool bit = (command >> (3 - i) & 1) != 0;
         (command >> 5 == 0b100 ? input_[i].internal_reference : input_[i].gain_2) = bit;
         show(i);
@@ -134,9 +139,9 @@ bool Mcp4728Model::command_complete() {
       ignoring_ = true;
       return true;
     case 0b101: {  // power-down: 101x PDA PDB, PDC PDD xxxx
-      if (size < 2) return true;
-      const unsigned bits = (command & 0x0FU) << 4 | bytes_[1] >> 4;
-      for (std::size_t i = 0; i < channels; ++i) {
+      if (size_ < 2) return true;
+      const unsigned bits = (command & 0x0F) << 4 | bytes_[1] >> 4U;
+      for (int i = 0; i < channels; ++i) {
         input_[i].power_down = static_cast<std::uint8_t>(bits >> (6 - 2 * i) & 3U);
         show(i);
       }
@@ -148,28 +153,29 @@ bool Mcp4728Model::command_complete() {
   }
 }
 
-void Mcp4728Model::store(std::size_t channel, bool update) {
+void Mcp4728Model::store(int channel, bool update) {
   input_[channel] = setting_of(bytes_[1], bytes_[2]);
   if (update || ldac_low_) show(channel);
 }
 
-void Mcp4728Model::write_eeprom(std::size_t first, std::size_t end) {
+void Mcp4728Model::write_eeprom(int first, int end) {
   ++eeprom_writes_;
-  busy_until_us_ = now_us_ + eeprom_write_us;
-  for (std::size_t i = first; i < end && !worn_out_; ++i) eeprom_[i] = input_[i];
+  busy_until_ns_ = now_ns() + eeprom_write_us * 1000;
+  for (int i = first; i < end && !worn_out_; ++i) eeprom_[i] = input_[i];
 }
 
 std::uint8_t Mcp4728Model::read() {
-  const std::size_t channel = read_at_ / 6 % channels;
+  const int channel = read_at_ / 6 % channels;
   const bool from_eeprom = read_at_ % 6 >= 3;
   const Setting& setting = from_eeprom ? eeprom_[channel] : input_[channel];
-  const std::size_t part = read_at_++ % 3;
+  const int part = read_at_++ % 3;
   if (part == 0) {
     return static_cast<std::uint8_t>((busy() ? 0 : 0x80) | 0x40 | channel << 4 | (address_ & 7));
   }
   return part == 1 ? high_byte(setting) : static_cast<std::uint8_t>(setting.code & 0xFF);
 }
 
-void Mcp4728Model::stop() { bytes_.clear(); }
+void Mcp4728Model::stop() { size_ = 0; }
 
-}  // namespace r4::sim
+}  // namespace sim
+}  // namespace r4

@@ -2,8 +2,11 @@
 #include "pca9685_model.hpp"
 
 #include <algorithm>
+#include <cstddef>
+#include <iterator>
 
-namespace r4::sim {
+namespace r4 {
+namespace sim {
 
 namespace {
 
@@ -27,10 +30,12 @@ constexpr std::uint8_t inverted = 0x10;
 constexpr std::uint8_t change_on_acknowledge = 0x08;
 constexpr std::uint8_t full = 0x10;
 
+constexpr std::uint64_t start_up_ns = 500'000;
+
 }  // namespace
 
 void Pca9685Model::power_on() {
-  registers_.fill(0);
+  for (std::uint8_t& value : registers_) value = 0;
   registers_[mode1] = sleep | all_call;
   registers_[mode2] = 0x04;
   registers_[sub_address_1] = 0xE2;
@@ -39,7 +44,7 @@ void Pca9685Model::power_on() {
   registers_[all_call_address] = 0xE0;
   for (std::size_t i = led_first + 3; i <= led_last; i += 4) registers_[i] = full;
   registers_[pre_scale] = 0x1E;
-  std::copy_n(registers_.begin() + led_first, active_.size(), active_.begin());
+  show();
   pointer_ = 0;
   phase_ = Phase::idle;
   led_written_ = false;
@@ -105,7 +110,7 @@ void Pca9685Model::stop() {
   phase_ = Phase::idle;
   if (!led_written_) return;
   led_written_ = false;
-  std::copy_n(registers_.begin() + led_first, active_.size(), active_.begin());
+  show();
   restart_wanted_ = false;  // section 7.3.1.1, 3
 }
 
@@ -137,9 +142,7 @@ void Pca9685Model::write_register(std::uint8_t value) {
   } else if (pointer_ == pre_scale && (registers_[mode1] & sleep) != 0) {
     registers_[pre_scale] = std::max<std::uint8_t>(value, 3);
   }
-  if (led_written_ && (registers_[mode2] & change_on_acknowledge) != 0) {
-    std::copy_n(registers_.begin() + led_first, active_.size(), active_.begin());
-  }
+  if (led_written_ && (registers_[mode2] & change_on_acknowledge) != 0) show();
 }
 
 void Pca9685Model::write_mode1(std::uint8_t value) {
@@ -154,19 +157,24 @@ void Pca9685Model::write_mode1(std::uint8_t value) {
       if ((registers_[i] & full) == 0) restart_wanted_ = true;
     }
   }
-  if ((value & sleep) == 0 && was_asleep) awake_since_us_ = now_us_;
+  if ((value & sleep) == 0 && was_asleep) awake_since_ns_ = now_ns();
   registers_[mode1] = after;
-  if ((value & restart) != 0 && (value & sleep) == 0 && now_us_ - awake_since_us_ >= 500) {
+  if ((value & restart) != 0 && (value & sleep) == 0 && now_ns() - awake_since_ns_ >= start_up_ns) {
     restart_wanted_ = false;
   }
 }
 
+void Pca9685Model::show() {
+  std::copy_n(registers_ + led_first, std::end(active_) - std::begin(active_), active_);
+}
+
 bool Pca9685Model::running() const {
-  return (registers_[mode1] & sleep) == 0 && now_us_ - awake_since_us_ >= 500 && !restart_wanted_;
+  return (registers_[mode1] & sleep) == 0 && now_ns() - awake_since_ns_ >= start_up_ns &&
+         !restart_wanted_;
 }
 
 int Pca9685Model::duty(int channel) const {
-  const std::uint8_t* led = &active_[4 * static_cast<std::size_t>(channel)];
+  const std::uint8_t* led = &active_[4 * channel];
   int duty = 0;
   if (!running() || (led[3] & full) != 0) {
     duty = 0;
@@ -180,4 +188,5 @@ int Pca9685Model::duty(int channel) const {
   return (registers_[mode2] & inverted) != 0 ? 4096 - duty : duty;
 }
 
-}  // namespace r4::sim
+}  // namespace sim
+}  // namespace r4

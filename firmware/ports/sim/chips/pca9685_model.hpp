@@ -3,12 +3,12 @@
 // low), the external clock, the phase of the pulses, test mode.
 #pragma once
 
-#include <array>
 #include <cstdint>
 
 #include "i2c_chip_model.hpp"
 
-namespace r4::sim {
+namespace r4 {
+namespace sim {
 
 class Pca9685Model final : public I2cChipModel {
  public:
@@ -19,8 +19,9 @@ class Pca9685Model final : public I2cChipModel {
   // What a pin does.
   int duty(int channel) const;  // 0-4096 of 4096; 0 while the oscillator stands
   bool high(int channel) const { return duty(channel) == 4096; }
+  std::int32_t pulse_ns(int channel) const { return duty(channel) * (reg(0xFE) + 1) * 40; }
+  double pulse_us(int channel) const { return pulse_ns(channel) / 1000.0; }
   double frequency_hz() const { return 25e6 / (4096.0 * (reg(0xFE) + 1)); }
-  double pulse_us(int channel) const { return duty(channel) * (reg(0xFE) + 1) / 25.0; }
   std::uint8_t reg(std::uint8_t number) const { return registers_[number]; }
 
   void power_on() override;
@@ -28,7 +29,6 @@ class Pca9685Model final : public I2cChipModel {
   bool write(std::uint8_t byte) override;
   std::uint8_t read() override;
   void stop() override;
-  void set_time(std::uint64_t now_us) override { now_us_ = now_us; }
 
  private:
   enum class Phase : std::uint8_t { idle, control, data, general_call, reset_wanted };
@@ -36,17 +36,18 @@ class Pca9685Model final : public I2cChipModel {
   void write_register(std::uint8_t value);
   void write_mode1(std::uint8_t value);
   void next_register();
+  void show();
   bool running() const;
 
   std::uint8_t address_;
-  std::array<std::uint8_t, 256> registers_{};
-  std::array<std::uint8_t, 64> active_{};  // LED0_ON_L … as the outputs have them
+  std::uint8_t registers_[256] = {};
+  std::uint8_t active_[4 * channels] = {};  // LED0_ON_L … as the outputs have them
   std::uint8_t pointer_ = 0;
   Phase phase_ = Phase::idle;
   bool led_written_ = false;     // since the last STOP
   bool restart_wanted_ = false;  // the RESTART bit
-  std::uint64_t awake_since_us_ = 0;
-  std::uint64_t now_us_ = 0;
+  std::uint64_t awake_since_ns_ = 0;
 };
 
-}  // namespace r4::sim
+}  // namespace sim
+}  // namespace r4

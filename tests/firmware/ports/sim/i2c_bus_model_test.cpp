@@ -4,6 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <deque>
+#include <functional>
+#include <utility>
+#include <vector>
+
+#include "tests/firmware/drivers/bus_log.hpp"
 
 namespace r4::sim {
 namespace {
@@ -17,15 +22,24 @@ struct Memory final : I2cChipModel {
   bool start(std::uint8_t at, bool) override { return at == address; }
   bool write(std::uint8_t byte) override {
     bytes.push_back(byte);
+    interrupt();
     return true;
   }
-  std::uint8_t read() override { return next++; }
+  std::uint8_t read() override {
+    interrupt();
+    return next++;
+  }
+  // Once, in the middle of a byte.
+  void interrupt() {
+    if (const auto handler = std::exchange(on_byte, nullptr)) handler();
+  }
   void stop() override { ++stops; }
   std::uint8_t address;
   std::deque<std::uint8_t> bytes;
   std::uint8_t next = 1;
   int power_ons = 0;
   int stops = 0;
+  std::function<void()> on_byte;
 };
 
 struct Bench {
@@ -34,20 +48,21 @@ struct Bench {
     return bus.write(address, bytes.data(), bytes.size());
   }
   I2cBusModel bus;
+  test::BusLog log{bus};
   Memory chip{0x11};
 };
 
 TEST(I2cBusModel, ATransferTakesItsClocksAt400Kilohertz) {
   Bench bench;
   EXPECT_EQ(bench.write({1, 2}), I2cResult::ok);
-  const I2cTransfer& write = bench.bus.log().back();
+  const test::BusLog::Transfer write = bench.log.transfers().back();
   EXPECT_EQ(write.bytes, 3U);
   EXPECT_EQ(write.duration_ns, (3 * 9 + 2) * 2500U);
   EXPECT_EQ(write.duration_ns / 1000, firmware::i2c_wire_us(3));
   const std::uint8_t out = 7;
   std::uint8_t in[2] = {};
   EXPECT_EQ(bench.bus.write_read(0x11, &out, 1, in, 2), I2cResult::ok);
-  const I2cTransfer& read = bench.bus.log().back();
+  const test::BusLog::Transfer read = bench.log.transfers().back();
   EXPECT_EQ(read.bytes, 5U);
   EXPECT_EQ(read.duration_ns, (5 * 9 + 3) * 2500U);
   EXPECT_EQ(read.read, (std::vector<std::uint8_t>{1, 2}));
@@ -57,7 +72,7 @@ TEST(I2cBusModel, ATransferTakesItsClocksAt400Kilohertz) {
 TEST(I2cBusModel, NobodyAtAnAddressIsNoAcknowledge) {
   Bench bench;
   EXPECT_EQ(bench.write({1}, 0x12), I2cResult::no_acknowledge);
-  EXPECT_EQ(bench.bus.log().back().bytes, 1U);
+  EXPECT_EQ(bench.log.transfers().back().bytes, 1U);
   std::uint8_t in = 0;
   EXPECT_EQ(bench.bus.write_read(0x12, nullptr, 0, &in, 1), I2cResult::no_acknowledge);
 }
@@ -103,6 +118,105 @@ TEST(I2cBusModel, AChipThatIsResetInATransferIsOutOfIt) {
   bench.bus.reset_after(bench.chip, 2);
   EXPECT_EQ(bench.bus.write_read(0x11, nullptr, 0, in, 2), I2cResult::ok);
   EXPECT_EQ(in[1], 0xFF);  // nobody pulls SDA down
+}
+
+TEST(I2cBusModel, TheStopOfARecoveryReachesTheChipThatWasCutOff) {
+  Bench bench;
+  bench.bus.hold_after(2, 2);
+  EXPECT_EQ(bench.write({1, 2, 3}), I2cResult::timeout);
+  EXPECT_FALSE(bench.bus.recover());
+  EXPECT_EQ(bench.chip.stops, 0);
+  EXPECT_TRUE(bench.bus.recover());
+  EXPECT_EQ(bench.chip.stops, 1);
+}
+
+TEST(I2cBusModel, ATransferInTheMiddleOfAnotherCutsItShort) {
+  Bench bench;
+  Memory other(0x22);
+  bench.bus.attach(other);
+  std::vector<std::uint8_t> in(2);
+  bench.chip.on_byte = [&] {
+    EXPECT_TRUE(bench.bus.recover());
+    EXPECT_EQ(bench.write({7, 8}, 0x22), I2cResult::ok);
+    EXPECT_EQ(bench.bus.write_read(0x22, nullptr, 0, in.data(), in.size()), I2cResult::ok);
+  };
+  EXPECT_EQ(bench.write({1, 2, 3}), I2cResult::timeout);
+  EXPECT_EQ(bench.chip.bytes, (std::deque<std::uint8_t>{1}));
+  EXPECT_EQ(other.bytes, (std::deque<std::uint8_t>{7, 8}));
+  EXPECT_EQ(other.stops, 2);
+  EXPECT_EQ(bench.chip.stops, 1);  // by the recovery
+  const auto& all = bench.log.transfers();
+  ASSERT_EQ(all.size(), 4U);
+  EXPECT_EQ(all.back().result, I2cResult::timeout);
+  // Its time is that of the others and of its two bytes, without a wait for a held line.
+  EXPECT_EQ(all.back().duration_ns,
+            all[0].duration_ns + all[1].duration_ns + all[2].duration_ns + (9 + 1) * 2500U);
+  EXPECT_EQ(bench.write({4}), I2cResult::ok);
+  EXPECT_EQ(bench.chip.stops, 2);
+}
+
+TEST(I2cBusModel, AReadIsCutShortToo) {
+  Bench bench;
+  const std::uint8_t out = 1;
+  std::uint8_t in[3] = {};
+  bench.chip.on_byte = [&] {
+    bench.chip.on_byte = [&] { EXPECT_EQ(bench.write({5}), I2cResult::ok); };
+  };
+  EXPECT_EQ(bench.bus.write_read(0x11, &out, 1, in, sizeof in), I2cResult::timeout);
+  EXPECT_EQ(bench.chip.next, 2);
+  EXPECT_EQ(bench.chip.bytes, (std::deque<std::uint8_t>{1, 5}));
+}
+
+TEST(I2cBusModel, OfSeveralChipsAtAnAddressTheInterruptCutsOffAll) {
+  Bench bench;
+  Memory twin(0x11);
+  bench.bus.attach(twin);
+  bench.chip.on_byte = [&] { bench.bus.recover(); };
+  EXPECT_EQ(bench.write({1, 2}), I2cResult::timeout);
+  EXPECT_TRUE(twin.bytes.empty());
+  EXPECT_EQ(twin.stops, 1);
+}
+
+struct CountingLock final : InterruptLock {
+  std::uint32_t lock() override {
+    ++taken;
+    return depth++;
+  }
+  void unlock(std::uint32_t before) override { EXPECT_EQ(before, --depth); }
+  int taken = 0;
+  std::uint32_t depth = 0;
+};
+
+TEST(I2cBusModel, NoInterruptComesWithinAByteButBetweenTwo) {
+  Bench bench;
+  CountingLock interrupts;
+  bench.bus.set_interrupt_lock(&interrupts);
+  bench.chip.on_byte = [&] { EXPECT_EQ(interrupts.depth, 1U); };
+  bench.write({1, 2, 3});
+  EXPECT_EQ(interrupts.depth, 0U);
+  EXPECT_EQ(interrupts.taken, 6);  // begin, START, three bytes, end
+}
+
+TEST(I2cBusModel, TakesAsManyChipsAndErrorsAsItSays) {
+  I2cBusModel bus;
+  std::deque<Memory> chips;
+  for (std::uint8_t i = 0; i <= I2cBusModel::max_chips; ++i) {
+    chips.emplace_back(i);
+    EXPECT_EQ(bus.attach(chips.back()), i < I2cBusModel::max_chips);
+  }
+  for (int i = 0; i <= I2cBusModel::max_errors; ++i) {
+    EXPECT_EQ(bus.refuse(3), i < I2cBusModel::max_errors);
+    EXPECT_EQ(bus.reset_after(chips[0], 100), i < I2cBusModel::max_errors);
+  }
+  const std::uint8_t byte = 0;
+  for (int i = 0; i <= I2cBusModel::max_errors; ++i) {
+    const I2cResult expected =
+        i < I2cBusModel::max_errors ? I2cResult::no_acknowledge : I2cResult::ok;
+    EXPECT_EQ(bus.write(3, &byte, 1), expected);
+  }
+  EXPECT_TRUE(bus.refuse(3));
+  bus.clear_errors();
+  EXPECT_EQ(bus.write(3, &byte, 1), I2cResult::ok);
 }
 
 }  // namespace

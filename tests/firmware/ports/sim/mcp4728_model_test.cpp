@@ -31,16 +31,16 @@ TEST(Mcp4728Model, SequentialWriteOfTheDataSheetsExample) {
   // Figure 7-4: A VDD/2, B VDD full, C 2.048 V reference gain 2 half, D full.
   Bench bench;
   EXPECT_EQ(bench.write({0x50, 0x08, 0x00, 0x0F, 0xFF, 0x98, 0x00, 0x9F, 0xFF}), I2cResult::ok);
-  EXPECT_NEAR(bench.chip.volts(0), 2.5, 1e-9);
-  EXPECT_NEAR(bench.chip.volts(1), 5 - 5.0 / 4096, 1e-9);
-  EXPECT_NEAR(bench.chip.volts(2), 2.048, 1e-9);
-  EXPECT_NEAR(bench.chip.volts(3), 4.096 - 0.001, 1e-9);
+  EXPECT_NEAR(bench.chip.volts(0), 2.5, 1e-6);
+  EXPECT_NEAR(bench.chip.volts(1), 5 - 5.0 / 4096, 1e-6);
+  EXPECT_NEAR(bench.chip.volts(2), 2.048, 1e-6);
+  EXPECT_NEAR(bench.chip.volts(3), 4.096 - 0.001, 1e-6);
   EXPECT_TRUE(bench.chip.busy());
   EXPECT_EQ(bench.read()[0], 0x41);
   bench.bus.advance(Mcp4728Model::eeprom_write_us);
   EXPECT_FALSE(bench.chip.busy());
   bench.chip.power_on();
-  EXPECT_NEAR(bench.chip.volts(0), 2.5, 1e-9);
+  EXPECT_NEAR(bench.chip.volts(0), 2.5, 1e-6);
 }
 
 TEST(Mcp4728Model, IgnoresWritesWhileTheEepromIsWritten) {
