@@ -2,13 +2,14 @@
 // The ends of the board's transports, without their chips.
 #include <cstring>
 
-#include "firmware/ports/mps2/transmit_lines.hpp"
 #include "firmware/ports/mps2/udp_frames.hpp"
+#include "firmware/transmit_lines.hpp"
 #include "on_target.hpp"
 
 namespace {
 
 using namespace r4;
+using namespace r4::firmware;
 using namespace r4::mps2;
 
 // All that the UART would send now.

@@ -8,9 +8,9 @@
 #include <cstdint>
 
 #include "../../../transports/framing/line_framing.hpp"
+#include "../../byte_ring.hpp"
 #include "../../port.hpp"
-#include "byte_ring.hpp"
-#include "transmit_lines.hpp"
+#include "../../transmit_lines.hpp"
 
 namespace r4 {
 namespace mps2 {
@@ -48,8 +48,8 @@ class Uart final : public firmware::Port {
   void fill();
 
   const std::uint32_t base_;
-  ByteRing<receive_capacity> received_;
-  TransmitLines lines_;
+  firmware::ByteRing<receive_capacity> received_;
+  firmware::TransmitLines lines_;
   LineFraming framing_;
   volatile std::uint32_t overruns_ = 0;
 };

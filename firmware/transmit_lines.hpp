@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Lines on their way out of a UART: never waits, and the newest state wins.
+// Lines on their way out of a serial port: never waits, and the newest state wins.
 //
 // Lines go through a ring, each whole or not at all. A state that finds no room waits outside of it,
 // where a newer one replaces it; the last part of the ring is kept for heartbeats and answers. If
@@ -10,12 +10,12 @@
 #include <cstdint>
 #include <cstring>
 
-#include "../../../protocol/datagram.hpp"
-#include "../../../transports/framing/line_framing.hpp"
+#include "../protocol/datagram.hpp"
+#include "../transports/framing/line_framing.hpp"
 #include "byte_ring.hpp"
 
 namespace r4 {
-namespace mps2 {
+namespace firmware {
 
 class TransmitLines {
  public:
@@ -48,7 +48,7 @@ class TransmitLines {
     if (waiting_size_ != 0 && put_state_line(Text(waiting_, waiting_size_))) waiting_size_ = 0;
   }
 
-  // The next byte for the UART, from its interrupt or with that off. False: there is none.
+  // The next byte for the port, from its interrupt or with that off. False: there is none.
   bool take(char& byte) {
     if (!ring_.take(byte)) return false;
     ++taken_;
@@ -90,5 +90,5 @@ class TransmitLines {
   std::uint32_t dropped_ = 0;
 };
 
-}  // namespace mps2
+}  // namespace firmware
 }  // namespace r4

@@ -8,7 +8,7 @@
 #include <cstdint>
 
 namespace r4 {
-namespace mps2 {
+namespace firmware {
 
 template <std::uint32_t capacity>
 class ByteRing {
@@ -65,5 +65,5 @@ class ByteRing {
   char bytes_[capacity];
 };
 
-}  // namespace mps2
+}  // namespace firmware
 }  // namespace r4
