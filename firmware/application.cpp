@@ -33,7 +33,9 @@ Application::Application(Hal& hal, const Config& config, Observer* observer)
     : hal_(hal),
       observer_(observer),
       identity_(config.identity),
-      link_(timing_of(config.settings)) {
+      link_(timing_of(config.settings)),
+      guard_(hal),
+      loop_(guard_.add_duty(loop_limit_ms)) {
   setpoints_.settings = config.settings;
 }
 
@@ -66,7 +68,7 @@ BoardState Application::state() const {
 // --- what comes in
 
 void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std::uint32_t now_ms) {
-  if (link_.poll(now_ms)) enter(SafeReason::link, now_ms);  // silence counts before what ends it
+  look_at_time(now_ms);  // silence counts before what ends it
   Datagram datagram;
   if (!read(bytes, datagram)) {
     ++rx_bad_;
@@ -187,7 +189,7 @@ void Application::execute(std::uint32_t pnum, const Command& command, std::uint3
       hal_.zero(command.channel);
       break;
     case CommandKind::clear:
-      safety_.clear();
+      clear();
       break;
     case CommandKind::setting:
       link_.set_timing(timing_of(setpoints_.settings));
@@ -233,7 +235,8 @@ void Application::fail(SafeReason cause, std::uint32_t now_ms) {
 }
 
 std::uint32_t Application::poll(std::uint32_t now_ms) {
-  if (link_.poll(now_ms)) enter(SafeReason::link, now_ms);
+  guard_.check_in(loop_);
+  look_at_time(now_ms);
   check_interlocks(now_ms);
   update_outputs(now_ms);
   report_state(now_ms);
@@ -246,6 +249,15 @@ std::uint32_t Application::poll(std::uint32_t now_ms) {
 }
 
 // --- safety
+
+// Has the host fallen silent, or has the guard found something while the loop was elsewhere?
+void Application::look_at_time(std::uint32_t now_ms) {
+  const SafeReason tripped = guard_.take();
+  if (tripped == SafeReason::watchdog) fail(SafeReason::watchdog, now_ms);
+  const bool lost = tripped == SafeReason::link ? link_.port_lost(link_.owner().port, now_ms)
+                                                : link_.poll(now_ms);
+  if (lost) enter(SafeReason::link, now_ms);
+}
 
 void Application::enter(SafeReason cause, std::uint32_t now_ms) {
   if (!safety_.enter(cause)) return;
@@ -265,11 +277,18 @@ bool Application::may_clear(std::uint32_t now_ms) const {
   return now_ms - latched_ms_ >= setpoints_.settings.timeout_ms || link_.has_heard(latched_ms_);
 }
 
+// E:CLEAR. A fault that is still there stays.
+void Application::clear() {
+  if (safety_.reason() != SafeReason::fault || hal_.clear_fault()) safety_.clear();
+}
+
+// A sensor with a threshold must see: one that does not answer is taken for an obstacle.
 bool Application::obstacle() const {
   const int margin = safety_.has(SafeReason::proximity) ? proximity_hysteresis_cm : 0;
   for (int i = 0; i < ultrasonic_channels; ++i) {
     const int threshold = setpoints_.proximity_cm[i];
     if (threshold == 0) continue;
+    if ((inputs_.ultrasonic_blind >> i & 1) != 0) return true;
     const int distance = inputs_.ultrasonic_cm[i];
     if (distance != 0 && distance < threshold + margin) return true;
   }
@@ -278,6 +297,7 @@ bool Application::obstacle() const {
 
 void Application::check_interlocks(std::uint32_t now_ms) {
   hal_.sample(inputs_);
+  if (inputs_.fault) enter(SafeReason::fault, now_ms);
   if (!inputs_.handle_held) {
     enter(SafeReason::handle, now_ms);
   } else {
@@ -294,6 +314,11 @@ void Application::check_interlocks(std::uint32_t now_ms) {
 void Application::update_outputs(std::uint32_t now_ms) {
   static const Outputs off;
   const bool live = state() == BoardState::active;
+  if (live) {
+    guard_.arm(link_.deadline_ms());
+  } else {
+    guard_.disarm();
+  }
   const Outputs& wanted = live ? setpoints_.outputs : off;
   const bool changed = wanted != outputs_;
   if (!changed && live == outputs_live_) return;
@@ -301,6 +326,7 @@ void Application::update_outputs(std::uint32_t now_ms) {
   outputs_live_ = live;
   if (live) {
     hal_.apply(outputs_);
+    if (guard_.tripped()) hal_.make_safe();  // it may have come just before
   } else {
     hal_.make_safe();
   }

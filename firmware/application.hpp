@@ -2,8 +2,9 @@
 // The R4 board's application: datagrams in, outputs and datagrams out (paper sections 2-4).
 //
 // It owns no thread, clock or socket. The port feeds it: receive() for each datagram, poll() when
-// time has passed, port_down() when a transport is gone; it answers through Hal and Port. Every
-// path to the outputs goes through update_outputs(), every way into the safe state through Safety.
+// time has passed, port_down() when a transport is gone, guard().tick() in a timer interrupt; it
+// answers through Hal and Port. Every path to the outputs goes through update_outputs(), every way
+// into the safe state through Safety.
 //
 //     CONNECTING   no host yet: outputs safe, `H:R4-ROS2;PNum:0;T:0;` each heartbeat interval
 //     ACTIVE       a host is alive and nothing is wrong: outputs follow the setpoints
@@ -19,6 +20,7 @@
 #include "../protocol/board_link.hpp"
 #include "../protocol/message.hpp"
 #include "executor.hpp"
+#include "guard.hpp"
 #include "hal.hpp"
 #include "observer.hpp"
 #include "port.hpp"
@@ -53,6 +55,9 @@ class Application {
   // 10).
   std::uint32_t poll(std::uint32_t now_ms);
 
+  // For the timer interrupt; the loop's turns are a duty of it.
+  Guard& guard() { return guard_; }
+
   BoardState state() const;
   SafeReason reason() const { return safety_.reason(); }
   const Outputs& outputs() const { return outputs_; }  // as the hardware has them
@@ -61,6 +66,8 @@ class Application {
 
   // poll() is wanted at least this often, for the interlocks.
   static constexpr std::uint32_t interlock_period_ms = 10;
+  // The guard counts a turn of the loop as missed after this.
+  static constexpr std::uint32_t loop_limit_ms = 20;
   // A proximity cause leaves when the obstacle is this much beyond the threshold.
   static constexpr int proximity_hysteresis_cm = 5;
 
@@ -75,8 +82,10 @@ class Application {
   void on_command(Source from, const Datagram& datagram, std::uint32_t now_ms);
   void execute(std::uint32_t pnum, const Command& command, std::uint32_t now_ms);
   void emergency_stop(Source from, const Datagram& datagram, std::uint32_t now_ms);
+  void look_at_time(std::uint32_t now_ms);
   void enter(SafeReason cause, std::uint32_t now_ms);
   void check_interlocks(std::uint32_t now_ms);
+  void clear();
   bool obstacle() const;
   bool may_clear(std::uint32_t now_ms) const;
   void update_outputs(std::uint32_t now_ms);
@@ -100,6 +109,8 @@ class Application {
   Observer* observer_;
   Identity identity_;
   BoardLink link_;
+  Guard guard_;
+  Guard::Duty loop_;
   Safety safety_;
   StateSchedule schedule_;
   Setpoints setpoints_;

@@ -249,9 +249,12 @@ void BoardHardware::sample(Inputs& inputs) {
   inputs.handle_held = handle_held_ && pins_.handle->read() == handle_held_level;
   for (int i = 0; i < stepper_channels; ++i) inputs.stepper_steps[i] = steppers_[i].position();
   for (int i = 0; i < encoder_channels; ++i) inputs.encoder_counts[i] = encoders_[i].count();
+  inputs.ultrasonic_blind = 0;
   for (int i = 0; i < ultrasonic_channels; ++i) {
     inputs.ultrasonic_cm[i] = ultrasonic_.distance_cm(i);
+    inputs.ultrasonic_blind |= bit(static_cast<std::uint8_t>(i), !ultrasonic_.sees(i));
   }
+  inputs.fault = fault_.any();
 }
 
 void BoardHardware::zero(int channel) {

@@ -81,14 +81,13 @@ class BoardHardware final : public Hal {
   void make_safe() override;
   void sample(Inputs& inputs) override;
   void zero(int channel) override;
+  bool clear_fault() override;  // false while a chip is not ready
 
   // Every chip is set up and answers.
   bool ready() const;
   // The first trouble since the last clear_fault().
   const ChipFault& fault() const { return fault_; }
   ChipTrouble trouble(Chip chip) const { return chips_[static_cast<int>(chip)]->trouble(); }
-  // Outputs are obeyed again. False while a chip is not ready.
-  bool clear_fault();
 
   // For interrupts. Channels count from 1.
   void step_tick() {

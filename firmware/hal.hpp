@@ -22,8 +22,12 @@ struct StepperTarget {
   friend bool operator!=(const StepperTarget& a, const StepperTarget& b) { return !(a == b); }
 };
 
-// Every output of the board as commanded: the setpoints. Default-constructed: the safe state.
+// Every output of the board as commanded: the setpoints. Default-constructed: the safe state, all off
+// and the brakes on.
 struct Outputs {
+  Outputs() {
+    for (Bldc& channel : bldc) channel.brake = true;
+  }
   Drive osmc[osmc_channels];
   Drive dhb12[dhb12_channels];
   std::uint16_t servo_us[servo_channels] = {};  // 0: no pulses
@@ -41,6 +45,8 @@ struct Inputs {
   std::int32_t stepper_steps[stepper_channels] = {};  // where it is
   std::int32_t encoder_counts[encoder_channels] = {};
   std::uint16_t ultrasonic_cm[ultrasonic_channels] = {};  // 0: no echo
+  std::uint8_t ultrasonic_blind = 0;  // bit n-1: sensor n does not answer, nothing is known
+  bool fault = false;                 // a chip was in trouble since the last clear_fault()
 };
 
 class Hal {
@@ -53,6 +59,8 @@ class Hal {
   virtual void sample(Inputs& inputs) = 0;
   // Encoder and stepper `channel` (1 …) count from zero now; the stepper holds.
   virtual void zero(int channel) = 0;
+  // Outputs may be driven again after a fault. False: it is still there.
+  virtual bool clear_fault() = 0;
 
  protected:
   ~Hal() = default;

@@ -115,6 +115,8 @@ class BoardLink {
   bool in_session(Source from) const { return has_session_ && from == owner_; }
   // When the owner was last heard alive: a heartbeat that fed. Only after the first session began.
   std::uint32_t fed_ms() const { return fed_ms_; }
+  // When it is lost if it stays silent; only while ACTIVE.
+  std::uint32_t deadline_ms() const { return fed_ms_ + timing_.timeout_ms; }
   // Has the owner echoed a T of `since_ms` or later, and so heard what the board said then? Of a paper
   // host, which need not echo, nobody can tell: true.
   bool has_heard(std::uint32_t since_ms) const;

@@ -51,6 +51,10 @@ class UltrasonicSensors {
   // Centimetres, 1-400; 0: nothing in range, or nothing known.
   std::uint16_t distance_cm(int sensor) const { return distance_cm_[sensor]; }
   EchoResult result(int sensor) const { return result_[sensor]; }
+  // Does distance_cm() tell what is before the sensor?
+  bool sees(int sensor) const {
+    return result_[sensor] == EchoResult::distance || result_[sensor] == EchoResult::no_echo;
+  }
 
  private:
   enum class Phase : std::uint8_t { waiting, trigger, listening, done };

@@ -25,10 +25,15 @@ class MemoryHal final : public firmware::Hal {
   }
   void sample(firmware::Inputs& sampled) override { sampled = inputs; }
   void zero(int channel) override { zeroed.push_back(channel); }
+  bool clear_fault() override {
+    if (!broken) inputs.fault = false;
+    return !inputs.fault;
+  }
 
   firmware::Outputs outputs;  // what the hardware does
   firmware::Inputs inputs;    // what the board will see
   int made_safe = 0;
+  bool broken = false;  // a fault cannot be cleared
   std::vector<int> zeroed;
 };
 

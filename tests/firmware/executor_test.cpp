@@ -114,7 +114,7 @@ TEST(Executor, OutputsDifferInEveryMember) {
   EXPECT_TRUE(differs([](Outputs& o) { o.servo_us[15] = 1; }));
   EXPECT_TRUE(differs([](Outputs& o) { o.relays = 1; }));
   EXPECT_TRUE(differs([](Outputs& o) { o.bldc[3].speed = 1; }));
-  EXPECT_TRUE(differs([](Outputs& o) { o.bldc[3].brake = true; }));
+  EXPECT_TRUE(differs([](Outputs& o) { o.bldc[3].brake = false; }));
   EXPECT_TRUE(differs([](Outputs& o) { o.bldc[3].direction = Direction::forward; }));
   EXPECT_TRUE(differs([](Outputs& o) { o.stepper[3].position = 1; }));
   EXPECT_TRUE(differs([](Outputs& o) { o.stepper[3].speed = 1; }));

@@ -102,6 +102,7 @@ class World final : public firmware::Hal, public firmware::Observer {
   void make_safe() override { outputs_ = Outputs(); }
   void sample(firmware::Inputs& inputs) override { inputs = inputs_; }
   void zero(int channel) override { require(channel >= 1 && channel <= stepper_channels); }
+  bool clear_fault() override { return true; }
 
   // firmware::Observer
   void on_state(std::uint32_t, BoardState, SafeReason) override {}

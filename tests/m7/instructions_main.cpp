@@ -68,6 +68,7 @@ class Hal final : public firmware::Hal {
   void make_safe() override { pwm_ = 0; }
   void sample(firmware::Inputs& inputs) override { inputs.handle_held = true; }
   void zero(int) override {}
+  bool clear_fault() override { return true; }
   std::uint16_t pwm() const { return pwm_; }
 
  private:

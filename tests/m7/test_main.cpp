@@ -27,6 +27,7 @@ class Spy final : public firmware::Hal {
   void make_safe() override { ++story.made_safe; }
   void sample(firmware::Inputs&) override {}
   void zero(int) override {}
+  bool clear_fault() override { return true; }
 };
 
 // The parameter makes each turn different, so that the compiler keeps all of them.

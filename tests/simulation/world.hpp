@@ -104,6 +104,7 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   void make_safe() override;
   void sample(firmware::Inputs& inputs) override;
   void zero(int) override {}
+  bool clear_fault() override { return true; }
   // firmware::Port
   void send(Text datagram, firmware::Urgency urgency, std::uint32_t peer) override;
   std::size_t max_size() const override { return max_datagram; }

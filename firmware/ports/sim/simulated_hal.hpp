@@ -28,6 +28,7 @@ class SimulatedHal final : public firmware::Hal {
   void make_safe() override { outputs_ = firmware::Outputs(); }
   void sample(firmware::Inputs& inputs) override;
   void zero(int channel) override;
+  bool clear_fault() override { return true; }
 
   // The surroundings. Channels count from 1.
   void hold_handle(bool held) { handle_held_ = held; }

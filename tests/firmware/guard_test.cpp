@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The guard in the timer interrupt: what it sees, when, and what the application makes of it.
+#include "firmware/guard.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <initializer_list>
+
+#include "tests/firmware/board_fixture.hpp"
+
+namespace r4 {
+namespace {
+
+using firmware::Guard;
+using test::echo_pnum;
+using test::MemoryHal;
+using test::TestBoard;
+using test::TestHost;
+
+struct GuardTest : testing::Test {
+  // Ticks for `ms`, the duties of `alive` checking in each time. The ticks that returned true.
+  int run(std::uint32_t ms, std::initializer_list<Guard::Duty> alive = {}) {
+    int fed = 0;
+    for (std::uint32_t i = 0; i < ms; ++i) {
+      for (const Guard::Duty duty : alive) guard.check_in(duty);
+      if (guard.tick(++now_ms)) ++fed;
+    }
+    return fed;
+  }
+
+  MemoryHal hal;
+  Guard guard{hal};
+  std::uint32_t now_ms = 0xfffffff0U;  // it wraps under way
+};
+
+TEST_F(GuardTest, FeedsTheWatchdogOnlyWhenEveryDutyHasCheckedIn) {
+  const Guard::Duty loop = guard.add_duty(20);
+  const Guard::Duty wifi = guard.add_duty(1000);
+  EXPECT_EQ(run(10, {loop, wifi}), 10);
+  EXPECT_EQ(run(10, {loop}), 0);
+  EXPECT_EQ(run(10, {wifi}), 1);  // the loop was there in between
+  EXPECT_EQ(run(10), 0);
+}
+
+TEST_F(GuardTest, WithoutDutiesThereIsNothingToWaitFor) { EXPECT_EQ(run(3), 3); }
+
+TEST_F(GuardTest, AHangingDutyTripsAfterFiveDeadlines) {
+  const Guard::Duty loop = guard.add_duty(20);
+  run(50, {loop});
+  run(99);
+  EXPECT_FALSE(guard.tripped());
+  EXPECT_EQ(guard.missed(), 4U);
+  EXPECT_EQ(hal.made_safe, 0);
+  run(1);
+  EXPECT_TRUE(guard.tripped());
+  EXPECT_EQ(hal.made_safe, 1);
+  EXPECT_EQ(guard.take(), SafeReason::watchdog);
+  EXPECT_FALSE(guard.tripped());
+}
+
+TEST_F(GuardTest, AMissNowAndThenIsCountedAndForgiven) {
+  const Guard::Duty loop = guard.add_duty(20);
+  for (int i = 0; i < 100; ++i) {
+    run(480, {loop});
+    run(20);
+  }
+  EXPECT_EQ(guard.missed(), 100U);
+  EXPECT_FALSE(guard.tripped());
+}
+
+TEST_F(GuardTest, MissesThatComeTooOftenTripInTheEnd) {
+  const Guard::Duty loop = guard.add_duty(20);
+  int periods = 0;
+  for (; !guard.tripped() && periods < 100; ++periods) {
+    run(230, {loop});
+    run(20);
+  }
+  EXPECT_GT(periods, 5);
+  EXPECT_LT(periods, 20);
+}
+
+TEST_F(GuardTest, MakesTheOutputsSafeAtTheDeadlineAndNotBefore) {
+  guard.arm(now_ms + 100);
+  run(99);
+  EXPECT_EQ(hal.made_safe, 0);
+  run(1);
+  EXPECT_EQ(hal.made_safe, 1);
+  EXPECT_EQ(guard.take(), SafeReason::link);
+  run(1000);
+  EXPECT_EQ(hal.made_safe, 1);  // once
+}
+
+TEST_F(GuardTest, ADeadlineIsPutOffOrTakenBack) {
+  guard.arm(now_ms + 100);
+  run(99);
+  guard.arm(now_ms + 100);
+  run(99);
+  guard.disarm();
+  run(1000);
+  EXPECT_FALSE(guard.tripped());
+}
+
+TEST_F(GuardTest, RemembersTheGraverOfTwoCauses) {
+  guard.add_duty(20);
+  guard.arm(now_ms + 10);
+  run(200);
+  EXPECT_EQ(guard.take(), SafeReason::watchdog);
+  EXPECT_EQ(hal.made_safe, 2);
+}
+
+// --- with the application
+
+struct GuardedBoard : testing::Test {
+  GuardedBoard() {
+    host.connect();
+    host.stay(300);
+    host.command("O:358,1,1");
+    EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+    board.log.states.clear();
+  }
+  // The timer goes on, the loop hangs.
+  void hang(std::uint32_t ms) {
+    for (std::uint32_t i = 0; i < ms; ++i) guard().tick(++board.now_ms);
+  }
+  Guard& guard() { return board.application->guard(); }
+
+  TestBoard board;
+  TestHost host{board, echo_pnum, Source{0, 4}};
+};
+
+TEST_F(GuardedBoard, AHungLoopEndsInTheSafeStateWithoutTheLoop) {
+  guard().tick(board.now_ms);
+  hang(101);
+  EXPECT_TRUE(board.safe());
+  EXPECT_TRUE(board.log.states.empty());  // the application has not heard of it
+  board.run(1);
+  EXPECT_EQ(board.log.states, std::vector<std::string>{"SAFE watchdog"});
+  host.stay(300);
+  EXPECT_TRUE(board.safe());
+  host.command("O:400,1,1");
+  EXPECT_TRUE(board.safe());
+  host.echo();
+  host.command("E:CLEAR");
+  host.command("O:400,1,1");
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 400);
+}
+
+TEST_F(GuardedBoard, SilenceIsSeenWhileTheLoopHangsEvenIfAHeartbeatWaits) {
+  const std::uint32_t fed_ms = board.application->link().fed_ms();
+  board.now_ms = fed_ms + 990;  // ten milliseconds are left, and the loop hangs for eleven
+  guard().tick(board.now_ms);
+  hang(9);
+  EXPECT_FALSE(board.safe());
+  hang(1);
+  EXPECT_TRUE(board.safe());
+  host.echo();
+  EXPECT_EQ(board.log.states.front(), "SAFE link");
+}
+
+TEST_F(GuardedBoard, WhatTheGuardTookOffStaysOffUntilTheApplicationKnows) {
+  // The guard trips between the loop's look at the time and its command.
+  class Trip final : public firmware::Observer {
+   public:
+    void on_state(std::uint32_t, firmware::BoardState, SafeReason) override {}
+    void on_outputs(std::uint32_t, const firmware::Outputs&) override {}
+    void on_executed(std::uint32_t, std::uint32_t, const Command&) override { trip(); }
+    void on_refused(std::uint32_t, std::uint32_t, Refusal) override {}
+    std::function<void()> trip = [] {};
+  } observer;
+  MemoryHal hal;
+  test::MemoryPort port;
+  std::uint32_t now_ms = 1000;
+  port.now_ms = &now_ms;
+  firmware::Application application(hal, {}, &observer);
+  application.add_port(port);
+  application.start(now_ms);
+  const auto say = [&](const std::string& fields) {
+    const std::string bytes = test::with_crc(fields);
+    application.receive(0, 1, bytes, now_ms);
+  };
+  say("H:ROS2-R4;PNum:1;T:5;");
+  observer.trip = [&] {
+    const std::uint32_t deadline_ms = application.link().deadline_ms();
+    application.guard().tick(deadline_ms);
+  };
+  say("O:100,1,1;PNum:2;T:5;");
+  EXPECT_EQ(hal.outputs, firmware::Outputs());
+  observer.trip = [] {};
+  application.poll(++now_ms);
+  EXPECT_EQ(application.reason(), SafeReason::link);
+}
+
+}  // namespace
+}  // namespace r4
