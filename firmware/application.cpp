@@ -172,13 +172,21 @@ void Application::on_command(Source from, const Datagram& datagram, std::uint32_
   }
   const bool held = drives_output(command.kind) && safety_.is_safe();
   if (!held && link_.begins_anew(datagram.pnum())) setpoints_.outputs = Outputs();
-  const Refusal outcome = held ? Refusal::safe : carry_out(command, setpoints_);
+  const Refusal outcome = held                           ? Refusal::safe
+                          : !may_set(from.port, command) ? Refusal::auth
+                                                         : carry_out(command, setpoints_);
   if (outcome != Refusal::none) {
     link_.refused(from, datagram.pnum());
     refuse(from, datagram, outcome, now_ms);
     return;
   }
   execute(datagram.pnum(), command, now_ms);
+}
+
+// May a command be given by this port?
+bool Application::may_set(std::uint8_t port, const Command& command) const {
+  return command.kind != CommandKind::setting || !is_site_setting(command.text) ||
+         ports_[port].port->may_configure();
 }
 
 // The command has changed the setpoints; the rest of its effect.

@@ -80,6 +80,7 @@ class Application {
 
   void on_host_heartbeat(Source from, const Datagram& datagram, std::uint32_t now_ms);
   void on_command(Source from, const Datagram& datagram, std::uint32_t now_ms);
+  bool may_set(std::uint8_t port, const Command& command) const;
   void execute(std::uint32_t pnum, const Command& command, std::uint32_t now_ms);
   void emergency_stop(Source from, const Datagram& datagram, std::uint32_t now_ms);
   void look_at_time(std::uint32_t now_ms);

@@ -83,6 +83,11 @@ class BoardHardware final : public Hal {
   void zero(int channel) override;
   bool clear_fault() override;  // false while a chip is not ready
 
+  // From now on. `input` as in BoardPins::analog.
+  void calibrate(int input, const AnalogCalibration& calibration) {
+    config_.calibration[input] = calibration;
+  }
+
   // Every chip is set up and answers.
   bool ready() const;
   // The first trouble since the last clear_fault().

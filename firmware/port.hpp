@@ -28,6 +28,9 @@ class Port {
   virtual std::size_t max_size() const = 0;
   // The setting `pack`: send the packed form from now on, on a port that has one (CAN).
   virtual void use_packed_form(bool wanted) { static_cast<void>(wanted); }
+  // Is it a cable of the board's own? Only from there are the settings taken that tell how the board
+  // is wired and reached (site_settings.hpp).
+  virtual bool may_configure() const { return false; }
 
  protected:
   ~Port() = default;

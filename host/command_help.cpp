@@ -21,7 +21,8 @@ constexpr std::array<CommandHelp, 14> table{{
     {'E', "E:STOP|CLEAR", "every output safe, until E:CLEAR", "STOP or CLEAR"},
     {'F', "F:name,name…", "which state fields are sent", "DEFAULT, ALL or names such as ENC1"},
     {'C', "C:key,value", "settings",
-     "rate 1-1000 Hz, heartbeat 50-1000 ms, timeout 100-10000 ms, recovery last|rearm, pack 0|1"},
+     "rate 1-1000 Hz, heartbeat 50-1000 ms, timeout 100-10000 ms, recovery last|rearm, pack 0|1; "
+     "over USB also network, password, host, port, node, chips, AIN24 ... (docs/protocol.md)"},
     {'Q', "Q:ID", "asks who the board is", "ID"},
     {'H', "H:ROS2-R4", "host heartbeat", "ROS2-R4"},
     {0, "", "", ""},
@@ -66,7 +67,7 @@ std::string_view meaning_of(Refusal refusal) {
     case Refusal::busy:
       return "another host controls the board";
     case Refusal::auth:
-      return "not authenticated";
+      return "not authenticated, or only to be set over USB";
   }
   return "unknown code";
 }

@@ -10,12 +10,14 @@
 //     recovery   last | rearm  last     outputs after SAFE(link)
 //     pack       0 | 1         0        1: on CAN the board sends the packed form
 //
-// Keys of later capabilities (network, key) are added to the table in settings.cpp.
+// Beside them those of the place where the board stands: site_settings.hpp.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "refusal.hpp"
+#include "site_settings.hpp"
 #include "text.hpp"
 
 namespace r4 {
@@ -28,10 +30,21 @@ struct Settings {
   std::uint16_t timeout_ms = 1000;
   Recovery recovery = Recovery::last;
   bool pack = false;
+  SiteSettings site;
 };
+bool operator==(const Settings& a, const Settings& b);
+inline bool operator!=(const Settings& a, const Settings& b) { return !(a == b); }
 
 // Changes one setting. Refusal::unknown for a key, ::format for a value that is not of the key's
 // kind, ::range outside its range; `settings` only changes on Refusal::none.
 Refusal set(Settings& settings, Text key, Text value);
+
+// All settings as lines "key,value", each ended by a line feed, so that they can be kept. False: more
+// than `capacity` bytes.
+constexpr std::size_t max_settings_text = 640;
+bool write_settings(const Settings& settings, char* out, std::size_t capacity, Text& text);
+// Takes such lines, in any order. What is not known or not allowed is passed over: the text may be
+// of an older or newer firmware.
+void read_settings(Text text, Settings& settings);
 
 }  // namespace r4

@@ -472,6 +472,21 @@ TEST(ApplicationSetting, MakesEveryPortSendThePackedForm) {
   EXPECT_FALSE(board.ports[0].packed);
 }
 
+TEST(ApplicationSetting, TellsHowTheBoardIsReachedOnlyOverItsOwnCable) {
+  TestBoard board;
+  TestHost host(board, echo_pnum);
+  host.connect();
+  host.command("C:network,mine");
+  EXPECT_EQ(board.log.refused.size(), 1U);
+  EXPECT_NE(board.log.refused.back().find("AUTH"), std::string::npos);
+  EXPECT_STREQ(board.application->settings().site.network, "");
+  board.ports[0].cable = true;
+  host.command("C:network,mine");
+  EXPECT_STREQ(board.application->settings().site.network, "mine");
+  host.command("C:rate,50");
+  EXPECT_EQ(board.log.refused.size(), 1U);
+}
+
 TEST(ApplicationNumberless, MayNotBeginAgainWithoutAnOutage) {
   TestBoard board;
   board.receive("H:ROS2-R4;T:1;");

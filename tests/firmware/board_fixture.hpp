@@ -51,8 +51,10 @@ class MemoryPort final : public firmware::Port {
   }
   std::size_t max_size() const override { return limit; }
   void use_packed_form(bool wanted) override { packed = wanted; }
+  bool may_configure() const override { return cable; }
 
   bool packed = false;
+  bool cable = false;
   const std::uint32_t* now_ms = nullptr;
   std::size_t limit = max_datagram;
   std::vector<Sent> sent;
