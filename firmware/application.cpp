@@ -133,8 +133,8 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
 }
 
 void Application::on_command(Source from, const Datagram& datagram, std::uint32_t now_ms) {
-  int count = 0;
-  const Field field = command_field(datagram, count);
+  const int count = datagram.command_count();
+  const Field& field = datagram.command();
   // A stop is obeyed beside other commands, too. A single one of another letter is none.
   if ((count != 1 || field.name() == "E") && asks_to_stop(datagram)) {
     emergency_stop(from, datagram, now_ms);

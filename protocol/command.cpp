@@ -65,12 +65,6 @@ Command of_channel(CommandKind kind, std::int32_t value, int channel) {
   return command;
 }
 
-bool is_letter(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z'); }
-
-bool is_command_name(Text name) {
-  return name.size() == 1 && is_letter(name[0]) && name[0] != 'T' && name[0] != 'A';
-}
-
 // `lower` is in lower case.
 bool equal_in_any_case(Text text, Text lower) {
   if (text.size() != lower.size()) return false;
@@ -239,17 +233,6 @@ bool drives_output(CommandKind kind) {
   return false;
 }
 
-Field command_field(const Datagram& datagram, int& count) {
-  Field first;
-  count = 0;
-  for (const Field& field : datagram) {
-    if (!is_command_name(field.name())) continue;
-    if (count == 0) first = field;
-    ++count;
-  }
-  return first;
-}
-
 bool asks_to_stop(const Datagram& datagram) {
   for (const Field& field : datagram) {
     if (field.name() == "E" && field.values() == stop_word) return true;
@@ -258,7 +241,7 @@ bool asks_to_stop(const Datagram& datagram) {
 }
 
 Refusal parse_command(const Field& field, Command& out) {
-  if (!is_command_name(field.name())) return Refusal::unknown;
+  if (field.name().size() != 1 || !is_command_letter(field.name()[0])) return Refusal::unknown;
   const char letter = field.name()[0];
   Values v(field);
   Command command;

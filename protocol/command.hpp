@@ -38,6 +38,7 @@ enum class CommandKind : std::uint8_t {
 // One command. Which members count depends on `kind`; the factories set them. `text` and `text2`
 // are views: they must outlive the command.
 struct Command {
+  Command() {}  // NOLINT(modernize-use-equals-default): else GCC calls memset for it
   CommandKind kind = CommandKind::heartbeat;
   std::uint8_t channel = 0;                    // 1 … the kind's channel count
   std::int32_t value = 0;                      // pwm, us, cm, BLDC speed, stepper target
@@ -65,10 +66,6 @@ struct Command {
 
 // Does it drive an output? Those are refused in the safe state: O D S R P B Z.
 bool drives_output(CommandKind kind);
-
-// The command field of a datagram: the one whose name is a single letter other than T and A.
-// `count` tells how many there are (0 or several are no command); the first is returned.
-Field command_field(const Datagram& datagram, int& count);
 
 // Is there E:STOP among its fields? A stop is obeyed whatever else is in its datagram.
 bool asks_to_stop(const Datagram& datagram);

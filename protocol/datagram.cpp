@@ -64,13 +64,6 @@ const char* first_wrong_byte(Text fields) {
   return at;
 }
 
-// Is the field name that ends before `colon` this one?
-inline bool ends_in_name(const char* begin, const char* colon, Text name) {
-  if (static_cast<std::size_t>(colon - begin) < name.size()) return false;
-  const char* const at = colon - name.size();
-  return Text(at, name.size()) == name && (at == begin || at[-1] == ';');
-}
-
 // Reads a number that may stand once; returns where it is not one, nullptr if it is.
 template <class Number>
 const char* take_number(Text name, Text value, bool& has, Number& number) {
@@ -124,6 +117,8 @@ Datagram& Datagram::operator=(const Datagram& other) {
   pnum_ = other.pnum_;
   has_pnum_ = other.has_pnum_;
   has_time_ = other.has_time_;
+  command_count_ = other.command_count_;
+  command_ = other.command_;
   for (std::size_t word = 0; word * 64 < fields_.size(); ++word) ends_[word] = other.ends_[word];
   return *this;
 }
@@ -135,18 +130,33 @@ Field Datagram::find(Text name) const {
   return Field();
 }
 
-const char* Datagram::read_numbers(const std::uint64_t* short_names) {
-  constexpr Text time("T");
+// The field's values that begin behind the colon at `bit` of word `word`.
+Text Datagram::values_at(std::size_t word, std::uint64_t bit) const {
+  const char* const colon = fields_.begin() + word * 64 + lowest_bit(bit);
+  std::uint64_t later = ends_[word] & ~(bit | (bit - 1));
+  while (later == 0) later = ends_[++word];
+  return between(colon + 1, fields_.begin() + word * 64 + lowest_bit(later));
+}
+
+const char* Datagram::read_short_names(const std::uint64_t* short_names) {
   constexpr Text pnum("PNum");
   for (std::size_t word = 0; word * 64 < fields_.size(); ++word) {
     for (std::uint64_t left = short_names[word]; left != 0; left &= left - 1) {
-      const char* const colon = fields_.begin() + word * 64 + lowest_bit(left);
-      const bool is_time = ends_in_name(fields_.begin(), colon, time);
-      if (!is_time && !ends_in_name(fields_.begin(), colon, pnum)) continue;
-      const Text name = between(colon - (is_time ? time : pnum).size(), colon);
-      const Text value = between(colon + 1, find_byte(colon, fields_.end(), ';'));
-      const char* const wrong = is_time ? take_number(name, value, has_time_, time_ms_)
-                                        : take_number(name, value, has_pnum_, pnum_);
+      const std::uint64_t bit = left & (0 - left);
+      const char* const colon = fields_.begin() + word * 64 + lowest_bit(bit);
+      const char* wrong = nullptr;
+      if (colon - 1 == fields_.begin() || colon[-2] == ';') {
+        const Text name(colon - 1, 1);
+        if (name[0] == 'T') {
+          wrong = take_number(name, values_at(word, bit), has_time_, time_ms_);
+        } else if (is_command_letter(name[0])) {
+          if (command_count_ == 0) command_ = Field(name, values_at(word, bit));
+          ++command_count_;
+        }
+      } else {  // four letters
+        const Text name(colon - 4, 4);
+        if (name == pnum) wrong = take_number(name, values_at(word, bit), has_pnum_, pnum_);
+      }
       if (wrong != nullptr) return wrong;
     }
   }
@@ -183,7 +193,7 @@ ReadResult read(Text bytes, Datagram& out) {
   if (!mark_fields(datagram.fields_, datagram.ends_, short_names)) {
     return fail(ReadError::syntax, first_wrong_byte(datagram.fields_));
   }
-  const char* const wrong = datagram.read_numbers(short_names);
+  const char* const wrong = datagram.read_short_names(short_names);
   if (wrong != nullptr) return fail(ReadError::syntax, wrong);
   out = datagram;
   return result;

@@ -61,6 +61,11 @@ class Field {
 // grammar above; `out` is only written on success.
 bool read_field(Text text, Field& out);
 
+// Is a field with this letter for its name a command? Of T (time) and A (authentication) it is not.
+constexpr bool is_command_letter(char c) {
+  return ((c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z')) && c != 'T' && c != 'A';
+}
+
 class Datagram {
  public:
   // Forward iteration over the fields in the order of the wire. Valid as long as the Datagram is.
@@ -109,12 +114,17 @@ class Datagram {
   std::uint32_t pnum() const { return pnum_; }
   bool has_time() const { return has_time_; }
   std::uint64_t time_ms() const { return time_ms_; }
+  // The fields that are commands by their name: how many there are (none or several are no command),
+  // and the first.
+  int command_count() const { return command_count_; }
+  const Field& command() const { return command_; }
 
  private:
   friend ReadResult read(Text bytes, Datagram& out);
-  // Reads PNum and T, which are among the names whose ends are in `short_names`; where they are
-  // wrong, nullptr if they are not.
-  const char* read_numbers(const std::uint64_t* short_names);
+  // Reads PNum and T, and finds the letters, which are among the names whose ends are in
+  // `short_names`; where a number is wrong, nullptr if none is.
+  const char* read_short_names(const std::uint64_t* short_names);
+  Text values_at(std::size_t word, std::uint64_t bit) const;
 
   Text bytes_;
   Text fields_;
@@ -122,6 +132,8 @@ class Datagram {
   std::uint32_t pnum_ = 0;
   bool has_pnum_ = false;
   bool has_time_ = false;
+  int command_count_ = 0;
+  Field command_;
   // Where names and fields end, in turn: bit i of word k is byte 64 k + i of fields_. Only the
   // words of fields_ are ever written or read.
   static constexpr std::size_t words = max_datagram / 64;

@@ -31,10 +31,9 @@ const char* to_text(MessageKind kind) {
 }
 
 MessageKind kind_of(const Datagram& datagram) {
-  int count = 0;
-  const Field field = command_field(datagram, count);
-  if (count == 0) return MessageKind::state;
-  if (count > 1) return MessageKind::command;  // to be refused as one
+  if (datagram.command_count() == 0) return MessageKind::state;
+  if (datagram.command_count() > 1) return MessageKind::command;  // to be refused as one
+  const Field& field = datagram.command();
   if (field.name() == Text("H")) {
     if (field.values() == board_heartbeat_word) return MessageKind::board_heartbeat;
     if (field.values() == host_heartbeat_word) return MessageKind::host_heartbeat;

@@ -8,30 +8,8 @@ constexpr std::uint64_t u32_max = 0xFFFFFFFFU;
 constexpr std::uint64_t u64_max = ~std::uint64_t{0};
 
 // Its value, above 9 for what is no digit.
-constexpr unsigned digit_of(char c) { return static_cast<unsigned char>(c - '0'); }
+constexpr unsigned digit_of(char c) { return unsigned{static_cast<unsigned char>(c)} - '0'; }
 constexpr bool is_digit(char c) { return digit_of(c) <= 9; }
-
-// Digits up to `limit`; false for anything else, and for no digits at all.
-inline bool parse_digits(const char* at, const char* end, std::uint64_t limit, std::uint64_t& out) {
-  if (at == end) return false;
-  std::uint64_t value = 0;
-  if (end - at <= 19) {  // as many always fit 64 bits
-    do {
-      const unsigned digit = digit_of(*at);
-      if (digit > 9) return false;
-      value = value * 10 + digit;
-    } while (++at != end);
-  } else {
-    do {
-      const unsigned digit = digit_of(*at);
-      if (digit > 9 || value > (u64_max - digit) / 10) return false;
-      value = value * 10 + digit;
-    } while (++at != end);
-  }
-  if (value > limit) return false;
-  out = value;
-  return true;
-}
 
 // One to nine digits always fit, and need no arithmetic of 64 bits.
 constexpr bool fits_32_bits(std::size_t digits) { return digits - 1 < 9; }
@@ -44,6 +22,30 @@ inline bool parse_short(const char* at, const char* end, std::uint32_t& out) {
     if (digit > 9) return false;
     value = value * 10 + digit;
   } while (++at != end);
+  out = value;
+  return true;
+}
+
+// Digits up to `limit`; false for anything else, and for no digits at all.
+inline bool parse_digits(const char* at, const char* end, std::uint64_t limit, std::uint64_t& out) {
+  constexpr std::uint32_t e9 = 1000000000;
+  if (at == end) return false;
+  std::uint64_t value = 0;
+  if (end - at <= 18) {  // as many always fit 64 bits: the last nine, and those before them
+    std::uint32_t high = 0;
+    std::uint32_t low = 0;
+    const char* const last_nine = end - at > 9 ? end - 9 : at;
+    if (last_nine != at && !parse_short(at, last_nine, high)) return false;
+    if (!parse_short(last_nine, end, low)) return false;
+    value = std::uint64_t{high} * e9 + low;
+  } else {
+    do {
+      const unsigned digit = digit_of(*at);
+      if (digit > 9 || value > (u64_max - digit) / 10) return false;
+      value = value * 10 + digit;
+    } while (++at != end);
+  }
+  if (value > limit) return false;
   out = value;
   return true;
 }
@@ -94,6 +96,21 @@ char* put_8_digits(char* out, std::uint32_t value) {
   }
   return out + 8;
 }
+
+// Without a branch a digit: those of a CRC cannot be predicted.
+struct HexDigits {
+  static constexpr std::uint8_t none = 0x80;
+  std::uint8_t of[256] = {};
+  constexpr HexDigits() {
+    for (int c = 0; c < 256; ++c) {
+      const int letter = (c | 0x20) - 'a';
+      of[c] = none;
+      if (c >= '0' && c <= '9') of[c] = static_cast<std::uint8_t>(c - '0');
+      if (letter >= 0 && letter < 6) of[c] = static_cast<std::uint8_t>(letter + 10);
+    }
+  }
+};
+constexpr HexDigits hex_digits;
 
 }  // namespace
 
@@ -168,18 +185,16 @@ bool parse_hundredths(Text text, std::int32_t& out) {
   return true;
 }
 
-// Without a branch a digit: those of a CRC cannot be predicted.
 bool parse_hex(Text text, std::uint32_t& out) {
   if (text.empty() || text.size() > 8) return false;
   std::uint32_t value = 0;
-  bool all_digits = true;
+  std::uint32_t seen = 0;
   for (const char c : text) {
-    const std::uint32_t code = static_cast<unsigned char>(c);
-    const bool letter = (code | 0x20U) - 'a' < 6;
-    all_digits &= letter | (code - '0' < 10);
-    value = value << 4 | ((code & 0xFU) + (letter ? 9U : 0U));
+    const std::uint32_t digit = hex_digits.of[static_cast<unsigned char>(c)];
+    seen |= digit;
+    value = value << 4 | digit;
   }
-  if (!all_digits) return false;
+  if ((seen & HexDigits::none) != 0) return false;
   out = value;
   return true;
 }

@@ -151,10 +151,15 @@ void try_bytes(const std::string& bytes) {
   fields_read_equal(datagram);
   state_reads_equal(datagram);
   messages_read_equal(datagram);
-  int count = 0;
-  const Field command = command_field(datagram, count);
-  require(count == 0 ? command.name().empty() : command.name().size() == 1);
-  for (const Field& field : datagram) command_reads_equal(field);
+  int commands = 0;
+  for (const Field& field : datagram) {
+    command_reads_equal(field);
+    if (field.name().size() != 1 || !is_command_letter(field.name()[0])) continue;
+    if (++commands > 1) continue;
+    require(datagram.command().name().begin() == field.name().begin());
+    require(datagram.command().values() == field.values());
+  }
+  require(datagram.command_count() == commands);
 }
 
 }  // namespace

@@ -175,7 +175,16 @@ TEST(Numbers, WrittenAtEveryNumberOfDigitsAsTheStandardLibraryDoes) {
   std::uint64_t power = 1;
   for (int digits = 1; digits <= 19; ++digits, power *= 10) {
     for (const std::uint64_t value : {power - 1, power, power + 1}) {
-      ASSERT_EQ(number_text(value), std::to_string(value));
+      const std::string text = std::to_string(value);
+      ASSERT_EQ(number_text(value), text);
+      ASSERT_EQ(parsed<std::uint64_t>(text), value);
+      for (std::size_t i = 0; i < text.size(); ++i) {
+        for (const char wrong : {'/', ':', '-', ' ', '\xB5'}) {
+          std::string damaged = text;
+          damaged[i] = wrong;
+          ASSERT_FALSE(parsed<std::uint64_t>(damaged)) << damaged;
+        }
+      }
     }
   }
 }

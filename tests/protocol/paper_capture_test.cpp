@@ -29,10 +29,9 @@ std::string state_again(const Datagram& datagram) {
 }
 
 std::string command_again(const Datagram& datagram) {
-  int count = 0;
   Command command;
-  EXPECT_EQ(parse_command(command_field(datagram, count), command), Refusal::none);
-  EXPECT_EQ(count, 1);
+  EXPECT_EQ(parse_command(datagram.command(), command), Refusal::none);
+  EXPECT_EQ(datagram.command_count(), 1);
   char buffer[max_datagram];
   DatagramWriter writer(buffer, sizeof buffer);
   write_command(writer, command);

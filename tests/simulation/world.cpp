@@ -404,10 +404,9 @@ void World::transfer(bool to_board, int host, std::string_view bytes) {
   if (to_board && read(Text(bytes), datagram)) {
     heartbeat = kind_of(datagram) == MessageKind::host_heartbeat;
     pnum = datagram.pnum();
-    int count = 0;
     Command parsed;
-    const Field field = command_field(datagram, count);
-    if (count == 1 && parse_command(field, parsed) == Refusal::none &&
+    if (datagram.command_count() == 1 &&
+        parse_command(datagram.command(), parsed) == Refusal::none &&
         parsed.kind == CommandKind::stepper) {
       command = parsed.value;
       commands_[static_cast<std::size_t>(command)].transmitted_us = now_us_;

@@ -54,8 +54,8 @@ void write_fields(DatagramWriter& writer, std::string_view text) {
 
 // Would a board or a host take it for what its letter says? Letters that nobody knows may pass.
 void check(const Datagram& datagram) {
-  int count = 0;
-  const Field field = command_field(datagram, count);
+  const int count = datagram.command_count();
+  const Field& field = datagram.command();
   if (count == 0) return;
   const std::string text =
       fmt::format("{}:{}", std::string_view(field.name().data(), 1),
