@@ -6,21 +6,27 @@ namespace sim {
 
 using firmware::I2cResult;
 
-// While one lives, no interrupt comes.
-class I2cBusModel::Whole {
+// While one lives, no interrupt comes. The time that passes on the wire is waited for at its end.
+class I2cBusModel::Held {
  public:
-  explicit Whole(const I2cBusModel& bus) : interrupts_(bus.interrupts_) {
-    if (interrupts_ != nullptr) before_ = interrupts_->lock();
+  explicit Held(const I2cBusModel& bus) : bus_(bus) {
+    if (bus_.processor_ == nullptr) return;
+    before_ = bus_.processor_->hold_interrupts();
+    began_ns_ = bus_.now_ns_;
   }
-  Whole(const Whole&) = delete;
-  Whole& operator=(const Whole&) = delete;
-  ~Whole() {
-    if (interrupts_ != nullptr) interrupts_->unlock(before_);
+  Held(const Held&) = delete;
+  Held& operator=(const Held&) = delete;
+  ~Held() {
+    if (bus_.processor_ == nullptr) return;
+    const std::uint32_t passed_ns = static_cast<std::uint32_t>(bus_.now_ns_ - began_ns_);
+    bus_.processor_->release_interrupts(before_);
+    if (passed_ns != 0) bus_.processor_->wait(passed_ns);
   }
 
  private:
-  InterruptLock* interrupts_;
+  const I2cBusModel& bus_;
   std::uint32_t before_ = 0;
+  std::uint64_t began_ns_ = 0;
 };
 
 bool I2cBusModel::attach(I2cChipModel& chip) {
@@ -62,7 +68,7 @@ bool I2cBusModel::recover() {
   begin(transfer, I2cTransfer::Kind::recover, 0);
   bool free = false;
   {
-    const Whole whole(*this);
+    const Held held(*this);
     pass(nine_and_a_stop);
     if (held_ > 0) --held_;
     free = held_ == 0;
@@ -72,13 +78,14 @@ bool I2cBusModel::recover() {
 }
 
 std::uint64_t I2cBusModel::now_ns() const {
-  const Whole whole(*this);
+  const Held held(*this);
   return now_ns_;
 }
 
 void I2cBusModel::advance(std::uint64_t us) {
-  const Whole whole(*this);
+  const std::uint32_t before = processor_ == nullptr ? 0 : processor_->hold_interrupts();
   now_ns_ += us * 1000;
+  if (processor_ != nullptr) processor_->release_interrupts(before);
 }
 
 bool I2cBusModel::refuse(std::uint8_t address, std::size_t after_bytes, int times) {
@@ -118,7 +125,7 @@ void I2cBusModel::clear_errors() {
 
 // What is under way is cut short by it.
 void I2cBusModel::begin(Transfer& transfer, I2cTransfer::Kind kind, std::uint8_t address) {
-  const Whole whole(*this);
+  const Held held(*this);
   transfers_ = transfers_ + 1;
   transfer.number = transfers_;
   transfer.kind = kind;
@@ -131,7 +138,7 @@ void I2cBusModel::begin(Transfer& transfer, I2cTransfer::Kind kind, std::uint8_t
 
 I2cResult I2cBusModel::end(Transfer& transfer, I2cResult result) {
   {
-    const Whole whole(*this);
+    const Held held(*this);
     if (cut_short(transfer)) {
       result = I2cResult::timeout;
     } else {
@@ -159,7 +166,7 @@ void I2cBusModel::stop_chips() {
 }
 
 I2cResult I2cBusModel::start(Transfer& transfer, bool read) {
-  const Whole whole(*this);
+  const Held held(*this);
   if (cut_short(transfer) || held_ != 0) return I2cResult::timeout;
   pass(1);
   ChipSet answering = 0;
@@ -196,7 +203,7 @@ I2cResult I2cBusModel::send(Transfer& transfer, const std::uint8_t* bytes, std::
 }
 
 I2cResult I2cBusModel::send_byte(Transfer& transfer, std::uint8_t byte, bool refused) {
-  const Whole whole(*this);
+  const Held held(*this);
   bool acknowledged = false;
   for (int i = 0; i < chip_count_ && !refused; ++i) {
     if (cut_short(transfer)) return I2cResult::timeout;
@@ -209,7 +216,7 @@ I2cResult I2cBusModel::send_byte(Transfer& transfer, std::uint8_t byte, bool ref
 }
 
 I2cResult I2cBusModel::fetch_byte(Transfer& transfer, std::uint8_t& byte) {
-  const Whole whole(*this);
+  const Held held(*this);
   if (held_ != 0) return I2cResult::timeout;
   byte = 0xFF;  // what nobody pulls down
   for (int i = 0; i < chip_count_; ++i) {

@@ -2,10 +2,10 @@
 // A simulated I2C bus at 400 kHz: chip models behind the drivers' interface, the time that each
 // transfer takes, errors on request, and somebody who is told of every transfer.
 //
-// Time passes by transfers and by advance(); nobody waits.
+// Time passes by transfers and by advance(). Nobody waits, unless a processor is told to.
 //
 // An interrupt may make transfers in the middle of another: the one that it came into ends with
-// `timeout` and touches no chip any more. Where that can happen, an InterruptLock keeps each byte
+// `timeout` and touches no chip any more. Where that can happen, an I2cProcessor keeps each byte
 // whole, as the wire does.
 #pragma once
 
@@ -42,14 +42,17 @@ class I2cObserver {
   ~I2cObserver() = default;
 };
 
-class InterruptLock {
+// Whose program makes the transfers.
+class I2cProcessor {
  public:
-  // Holds interrupts back; what it returns goes to the unlock() that belongs to it.
-  virtual std::uint32_t lock() = 0;
-  virtual void unlock(std::uint32_t before) = 0;
+  // Holds interrupts back; what it returns goes to the release_interrupts() that belongs to it.
+  virtual std::uint32_t hold_interrupts() = 0;
+  virtual void release_interrupts(std::uint32_t before) = 0;
+  // The wire was busy for `ns` just now; interrupts may come.
+  virtual void wait(std::uint32_t ns) = 0;
 
  protected:
-  ~InterruptLock() = default;
+  ~I2cProcessor() = default;
 };
 
 class I2cBusModel final : public firmware::I2cBus {
@@ -62,7 +65,7 @@ class I2cBusModel final : public firmware::I2cBus {
   bool attach(I2cChipModel& chip);
   // nullptr: nobody.
   void set_observer(I2cObserver* observer) { observer_ = observer; }
-  void set_interrupt_lock(InterruptLock* interrupts) { interrupts_ = interrupts; }
+  void set_processor(I2cProcessor* processor) { processor_ = processor; }
 
   firmware::I2cResult write(std::uint8_t address, const std::uint8_t* bytes,
                             std::size_t size) override;
@@ -103,7 +106,7 @@ class I2cBusModel final : public firmware::I2cBus {
   struct Transfer : I2cTransfer {
     std::uint32_t number = 0;
   };
-  class Whole;
+  class Held;
 
   void begin(Transfer& transfer, I2cTransfer::Kind kind, std::uint8_t address);
   firmware::I2cResult end(Transfer& transfer, firmware::I2cResult result);
@@ -129,7 +132,7 @@ class I2cBusModel final : public firmware::I2cBus {
   std::uint64_t now_ns_ = 0;
   volatile std::uint32_t transfers_ = 0;  // begun so far
   I2cObserver* observer_ = nullptr;
-  InterruptLock* interrupts_ = nullptr;
+  I2cProcessor* processor_ = nullptr;
 };
 
 }  // namespace sim

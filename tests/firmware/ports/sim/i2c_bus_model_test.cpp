@@ -177,24 +177,53 @@ TEST(I2cBusModel, OfSeveralChipsAtAnAddressTheInterruptCutsOffAll) {
   EXPECT_EQ(twin.stops, 1);
 }
 
-struct CountingLock final : InterruptLock {
-  std::uint32_t lock() override {
-    ++taken;
+struct ProcessorModel final : I2cProcessor {
+  std::uint32_t hold_interrupts() override {
+    ++held;
     return depth++;
   }
-  void unlock(std::uint32_t before) override { EXPECT_EQ(before, --depth); }
-  int taken = 0;
+  void release_interrupts(std::uint32_t before) override { EXPECT_EQ(before, --depth); }
+  void wait(std::uint32_t ns) override {
+    EXPECT_EQ(depth, 0U);
+    waited_ns += ns;
+    if (const auto handler = std::exchange(on_wait, nullptr)) handler();
+  }
+  int held = 0;
   std::uint32_t depth = 0;
+  std::uint64_t waited_ns = 0;
+  std::function<void()> on_wait;
 };
 
 TEST(I2cBusModel, NoInterruptComesWithinAByteButBetweenTwo) {
   Bench bench;
-  CountingLock interrupts;
-  bench.bus.set_interrupt_lock(&interrupts);
-  bench.chip.on_byte = [&] { EXPECT_EQ(interrupts.depth, 1U); };
+  ProcessorModel processor;
+  bench.bus.set_processor(&processor);
+  bench.chip.on_byte = [&] { EXPECT_EQ(processor.depth, 1U); };
   bench.write({1, 2, 3});
-  EXPECT_EQ(interrupts.depth, 0U);
-  EXPECT_EQ(interrupts.taken, 6);  // begin, START, three bytes, end
+  EXPECT_EQ(processor.depth, 0U);
+  EXPECT_EQ(processor.held, 6);  // begin, START, three bytes, end
+}
+
+TEST(I2cBusModel, AProcessorWaitsAsLongAsTheWireIsBusyAndNotForTimeThatPassesOtherwise) {
+  Bench bench;
+  ProcessorModel processor;
+  bench.bus.set_processor(&processor);
+  bench.write({1, 2, 3});
+  EXPECT_EQ(processor.waited_ns, bench.log.transfers().back().duration_ns);
+  bench.bus.advance(1000);
+  EXPECT_EQ(processor.waited_ns, bench.log.transfers().back().duration_ns);
+  bench.bus.hold();
+  bench.write({1});
+  EXPECT_GE(processor.waited_ns, firmware::i2c_timeout_us * 1000);
+}
+
+TEST(I2cBusModel, AnInterruptWhileTheProcessorWaitsCutsTheTransferShort) {
+  Bench bench;
+  ProcessorModel processor;
+  bench.bus.set_processor(&processor);
+  processor.on_wait = [&] { EXPECT_EQ(bench.write({7}), I2cResult::ok); };
+  EXPECT_EQ(bench.write({1, 2}), I2cResult::timeout);
+  EXPECT_EQ(bench.chip.bytes, (std::deque<std::uint8_t>{7}));
 }
 
 TEST(I2cBusModel, TakesAsManyChipsAndErrorsAsItSays) {
