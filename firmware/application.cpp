@@ -34,9 +34,9 @@ Application::Application(Hal& hal, const Config& config, Observer* observer)
       observer_(observer),
       identity_(config.identity),
       link_(timing_of(config.settings)),
-      guard_(hal),
-      loop_(guard_.add_duty(loop_limit_ms)) {
+      guard_(hal) {
   setpoints_.settings = config.settings;
+  guard_.add_duty(loop_limit_ms);  // loop_duty
 }
 
 std::uint8_t Application::add_port(Port& port) {
@@ -129,6 +129,7 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
       refuse(from, datagram, Refusal::busy, now_ms);
       break;
   }
+  expect_host();
   poll(now_ms);
 }
 
@@ -201,6 +202,7 @@ void Application::execute(std::uint32_t pnum, const Command& command, std::uint3
       break;
     case CommandKind::setting:
       link_.set_timing(timing_of(setpoints_.settings));
+      expect_host();
       schedule_.set_period(period_of(setpoints_.settings));
       tell_ports();
       break;
@@ -243,7 +245,7 @@ void Application::fail(SafeReason cause, std::uint32_t now_ms) {
 }
 
 std::uint32_t Application::poll(std::uint32_t now_ms) {
-  guard_.check_in(loop_);
+  guard_.check_in(loop_duty);
   look_at_time(now_ms);
   check_interlocks(now_ms);
   update_outputs(now_ms);
@@ -260,10 +262,12 @@ std::uint32_t Application::poll(std::uint32_t now_ms) {
 
 // Has the host fallen silent, or has the guard found something while the loop was elsewhere?
 void Application::look_at_time(std::uint32_t now_ms) {
-  const SafeReason tripped = guard_.take();
-  if (tripped == SafeReason::watchdog) fail(SafeReason::watchdog, now_ms);
-  const bool lost = tripped == SafeReason::link ? link_.port_lost(link_.owner().port, now_ms)
-                                                : link_.poll(now_ms);
+  bool lost = link_.poll(now_ms);
+  if (guard_.tripped()) {
+    const SafeReason cause = guard_.take();
+    if (cause == SafeReason::watchdog) fail(SafeReason::watchdog, now_ms);
+    if (cause == SafeReason::link) lost = lost || link_.port_lost(link_.owner().port, now_ms);
+  }
   if (lost) enter(SafeReason::link, now_ms);
 }
 
@@ -318,20 +322,27 @@ void Application::check_interlocks(std::uint32_t now_ms) {
   }
 }
 
-// The one place where outputs change: safe unless the board is ACTIVE, else the setpoints.
-void Application::update_outputs(std::uint32_t now_ms) {
-  static const Outputs off;
-  const bool live = state() == BoardState::active;
-  if (live) {
+// Until when the guard lets the outputs live without a word of the host.
+void Application::expect_host() {
+  if (outputs_live_) {
     guard_.arm(link_.deadline_ms());
   } else {
     guard_.disarm();
   }
+}
+
+// The one place where outputs change: safe unless the board is ACTIVE, else the setpoints.
+void Application::update_outputs(std::uint32_t now_ms) {
+  static const Outputs off;
+  const bool live = state() == BoardState::active;
   const Outputs& wanted = live ? setpoints_.outputs : off;
   const bool changed = wanted != outputs_;
   if (!changed && live == outputs_live_) return;
   outputs_ = wanted;
-  outputs_live_ = live;
+  if (live != outputs_live_) {
+    outputs_live_ = live;
+    expect_host();
+  }
   if (live) {
     hal_.apply(outputs_);
     if (guard_.tripped()) hal_.make_safe();  // it may have come just before

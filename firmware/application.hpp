@@ -55,8 +55,9 @@ class Application {
   // 10).
   std::uint32_t poll(std::uint32_t now_ms);
 
-  // For the timer interrupt; the loop's turns are a duty of it.
+  // For the timer interrupt. Its first duty is the loop: poll() checks in.
   Guard& guard() { return guard_; }
+  static constexpr Guard::Duty loop_duty = 0;
 
   BoardState state() const;
   SafeReason reason() const { return safety_.reason(); }
@@ -89,6 +90,7 @@ class Application {
   void clear();
   bool obstacle() const;
   bool may_clear(std::uint32_t now_ms) const;
+  void expect_host();
   void update_outputs(std::uint32_t now_ms);
   void tell_ports();
   void report_state(std::uint32_t now_ms);
@@ -111,7 +113,6 @@ class Application {
   Identity identity_;
   BoardLink link_;
   Guard guard_;
-  Guard::Duty loop_;
   Safety safety_;
   StateSchedule schedule_;
   Setpoints setpoints_;

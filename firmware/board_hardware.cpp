@@ -246,7 +246,8 @@ void BoardHardware::sample(Inputs& inputs) {
     inputs.analog_cv[i] = centivolts_of(pins_.analog[i]->read(), config_.calibration[i]);
   }
   // Letting go counts at once, not at the next poll.
-  inputs.handle_held = handle_held_ && pins_.handle->read() == handle_held_level;
+  if (pins_.handle->read() != handle_held_level) handle_seen_ = handle_held_ = false;
+  inputs.handle_held = handle_held_;
   for (int i = 0; i < stepper_channels; ++i) inputs.stepper_steps[i] = steppers_[i].position();
   for (int i = 0; i < encoder_channels; ++i) inputs.encoder_counts[i] = encoders_[i].count();
   inputs.ultrasonic_blind = 0;
@@ -260,6 +261,13 @@ void BoardHardware::sample(Inputs& inputs) {
 void BoardHardware::zero(int channel) {
   encoders_[channel - 1].zero();
   steppers_[channel - 1].zero();
+}
+
+bool BoardHardware::stepping() const {
+  for (const Stepper& stepper : steppers_) {
+    if (stepper.moving()) return true;
+  }
+  return false;
 }
 
 bool BoardHardware::ready() const {

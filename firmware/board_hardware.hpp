@@ -98,6 +98,8 @@ class BoardHardware final : public Hal {
   void step_tick() {
     for (Stepper& stepper : steppers_) stepper.tick();
   }
+  // Does a stepper move? If not, the ticks may rest from the next one on.
+  bool stepping() const;
   QuadratureEncoder& encoder(int channel) { return encoders_[channel - 1]; }
   UltrasonicSensors& ultrasonic() { return ultrasonic_; }
 

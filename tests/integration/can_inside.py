@@ -98,7 +98,7 @@ def test_commands_are_confirmed_by_the_boards_state(board):
     assert result.returncode == 0, result
     assert 'board sim-1' in result.stdout
     board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
-    board.outputs(lambda outputs: outputs['servo'][15] == 1500)
+    board.outputs(lambda outputs: outputs['servo'][15] == 1498)
 
 
 def test_a_refusal_comes_back(board):

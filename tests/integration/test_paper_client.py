@@ -82,4 +82,4 @@ def test_the_papers_python_client_drives_the_board_for_ten_seconds_without_a_saf
         assert len(state) <= 256 - len('0x12345678^'), 'the client reads 256 bytes'
     outputs = [each['outputs'] for each in active if 'outputs' in each][-1]
     assert outputs['dhb'] == [[1000, 1], [1000, 0], [1000, 1], [1000, 0]]
-    assert outputs['servo'][:3] == [300, 100, 1000]
+    assert outputs['servo'][:3] == [298, 98, 1000]  # the nearest that the chip has

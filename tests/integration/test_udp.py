@@ -52,7 +52,7 @@ def test_a_command_is_confirmed_by_the_boards_state(board):
         ['O:358,1,1', 'confirmed'], ['S:1500,16', 'confirmed'], ['Q:ID', 'confirmed']]
     assert 'board sim-1' in result.stdout
     board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
-    board.outputs(lambda outputs: outputs['servo'][15] == 1500)
+    board.outputs(lambda outputs: outputs['servo'][15] == 1498)
 
 
 def test_every_kind_of_command_is_executed(board):

@@ -38,25 +38,25 @@ std::string missing_lines(bool json, std::uint64_t count) {
 SimOutput::SimOutput(bool json)
     : json_(json), writer_([json](std::uint64_t count) { return missing_lines(json, count); }) {}
 
-Json outputs_json(const firmware::Outputs& outputs) {
-  Json json{{"osmc", Json::array()},    {"dhb", Json::array()},  {"servo", outputs.servo_us},
-            {"relays", outputs.relays}, {"bldc", Json::array()}, {"stepper", Json::array()}};
-  for (const Drive& drive : outputs.osmc) {
+Json pins_json(const sim::Pins& pins) {
+  Json json{{"osmc", Json::array()}, {"dhb", Json::array()},  {"servo", pins.servo_us},
+            {"relays", pins.relays}, {"bldc", Json::array()}, {"stepper", Json::array()}};
+  for (const Drive& drive : pins.osmc) {
     json["osmc"].push_back({drive.pwm, number_of(drive.direction)});
   }
-  for (const Drive& drive : outputs.dhb12) {
+  for (const Drive& drive : pins.dhb12) {
     json["dhb"].push_back({drive.pwm, number_of(drive.direction)});
   }
-  for (const Bldc& bldc : outputs.bldc) {
+  for (const Bldc& bldc : pins.bldc) {
     json["bldc"].push_back({bldc.speed, number_of(bldc.direction), bldc.brake ? 1 : 0});
   }
-  for (const firmware::StepperTarget& stepper : outputs.stepper) {
-    json["stepper"].push_back(stepper.enabled ? Json{stepper.position, stepper.speed} : Json());
+  for (const sim::Pins::Stepper& stepper : pins.stepper) {
+    json["stepper"].push_back({stepper.position, stepper.stepping});
   }
   return json;
 }
 
-std::string outputs_text(const firmware::Outputs& outputs) {
+std::string pins_text(const sim::Pins& pins) {
   static constexpr const char* dhb12_names[dhb12_channels] = {"DHB1A", "DHB1B", "DHB2A", "DHB2B"};
   std::string text;
   const auto add = [&text](const std::string& output) {
@@ -66,24 +66,25 @@ std::string outputs_text(const firmware::Outputs& outputs) {
     if (drive == Drive()) return;
     add(fmt::format("{}:{},{}", name, drive.pwm, number_of(drive.direction)));
   };
-  for (int i = 0; i < osmc_channels; ++i) add_drive(fmt::format("OSMC{}", i + 1), outputs.osmc[i]);
-  for (int i = 0; i < dhb12_channels; ++i) add_drive(dhb12_names[i], outputs.dhb12[i]);
+  for (int i = 0; i < osmc_channels; ++i) add_drive(fmt::format("OSMC{}", i + 1), pins.osmc[i]);
+  for (int i = 0; i < dhb12_channels; ++i) add_drive(dhb12_names[i], pins.dhb12[i]);
   for (int i = 0; i < servo_channels; ++i) {
-    if (outputs.servo_us[i] != 0) add(fmt::format("SERVO{}:{}", i + 1, outputs.servo_us[i]));
+    if (pins.servo_us[i] != 0) add(fmt::format("SERVO{}:{}", i + 1, pins.servo_us[i]));
   }
   for (int i = 0; i < bldc_channels; ++i) {
-    const Bldc& bldc = outputs.bldc[i];
-    if (bldc == Bldc()) continue;
+    const Bldc& bldc = pins.bldc[i];
+    if (bldc == Bldc{0, Direction::reverse, true}) continue;
     add(fmt::format("BLDC{}:{},{},{}", i + 1, bldc.speed, number_of(bldc.direction),
                     bldc.brake ? 1 : 0));
   }
   for (int i = 0; i < stepper_channels; ++i) {
-    const firmware::StepperTarget& stepper = outputs.stepper[i];
-    if (!stepper.enabled) continue;
-    add(fmt::format("STEP{}:{},{}", i + 1, stepper.position, stepper.speed));
+    const sim::Pins::Stepper& stepper = pins.stepper[i];
+    if (stepper.stepping == 0) continue;
+    add(fmt::format("STEP{}:{} and {}", i + 1, stepper.position,
+                    stepper.stepping > 0 ? "rising" : "falling"));
   }
   for (int i = 0; i < relay_channels; ++i) {
-    if ((outputs.relays >> i & 1) != 0) add(fmt::format("RELAY{}:On", i + 1));
+    if ((pins.relays >> i & 1) != 0) add(fmt::format("RELAY{}:On", i + 1));
   }
   return text.empty() ? "all off" : text;
 }
@@ -92,8 +93,9 @@ sim::SimulatedBoard::Events SimLog::events() {
   sim::SimulatedBoard::Events events;
   if (quiet_) return events;
   events.on_state = [this](auto... a) { on_state(a...); };
-  events.on_outputs = [this](std::uint32_t t_ms, const firmware::Outputs& outputs) {
-    on_outputs(t_ms, outputs);
+  events.on_pins = [this](std::uint32_t t_ms, const sim::Pins& pins) { on_pins(t_ms, pins); };
+  events.on_fault = [this](std::uint32_t t_ms, const firmware::ChipFault& fault) {
+    on_fault(t_ms, fault);
   };
   events.on_executed = [this](auto... a) { on_executed(a...); };
   events.on_refused = [this](auto... a) { on_refused(a...); };
@@ -163,10 +165,19 @@ void SimLog::on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason
   print(t_ms, text);
 }
 
-void SimLog::on_outputs(std::uint32_t t_ms, const firmware::Outputs& outputs) {
-  if (!output_.json()) return print(t_ms, "outputs: " + outputs_text(outputs));
+void SimLog::on_pins(std::uint32_t t_ms, const sim::Pins& pins) {
+  if (!output_.json()) return print(t_ms, "outputs: " + pins_text(pins));
   Json object = event(t_ms);
-  object["outputs"] = outputs_json(outputs);
+  object["outputs"] = pins_json(pins);
+  print(object);
+}
+
+void SimLog::on_fault(std::uint32_t t_ms, const firmware::ChipFault& fault) {
+  const std::string chip = firmware::to_text(fault.chip);
+  const std::string trouble = firmware::to_text(fault.trouble);
+  if (!output_.json()) return print(t_ms, fmt::format("{}: {}", chip, trouble));
+  Json object = event(t_ms);
+  object["fault"] = {{"chip", chip}, {"trouble", trouble}};
   print(object);
 }
 

@@ -47,7 +47,8 @@ class SimLog {
  private:
   Json event(std::uint32_t t_ms) const;
   void on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason reason);
-  void on_outputs(std::uint32_t t_ms, const firmware::Outputs& outputs);
+  void on_pins(std::uint32_t t_ms, const sim::Pins& pins);
+  void on_fault(std::uint32_t t_ms, const firmware::ChipFault& fault);
   void on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command);
   void on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code);
   void on_carrier(std::uint32_t t_ms, const Carrier& carrier, const CarrierEvent& event);
@@ -64,10 +65,10 @@ class SimLog {
 std::string host_url(const std::string& board_url);
 
 // {"osmc":[[pwm,dir],…],"dhb":…,"servo":[us,…],"relays":bits,"bldc":[[speed,dir,brake],…],
-//  "stepper":[[position,speed] or null,…]}
-Json outputs_json(const firmware::Outputs& outputs);
+//  "stepper":[[position,stepping],…]}; stepping: 1 forward, -1 backward, 0 standing
+Json pins_json(const sim::Pins& pins);
 
-// "OSMC1:358,1 SERVO1:2000": what is not off; "all off".
-std::string outputs_text(const firmware::Outputs& outputs);
+// "OSMC1:358,1 SERVO1:2001": what is not as in the safe state; "all off".
+std::string pins_text(const sim::Pins& pins);
 
 }  // namespace r4::tool

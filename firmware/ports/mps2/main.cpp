@@ -2,7 +2,7 @@
 // The board on an MPS2 with AN500: the application between a UART, UDP and the hardware.
 #include "../../application.hpp"
 #include "../sim/random.hpp"
-#include "../sim/simulated_hal.hpp"
+#include "../sim/simulated_hardware.hpp"
 #include "board_clock.hpp"
 #include "fault.hpp"
 #include "registers.hpp"
@@ -59,10 +59,11 @@ void r4_ethernet() { Lan9118::on_interrupt(); }
 int main() {
   const std::uint64_t seed = sim::scramble(std::uint64_t{boots()} << 32 | r4_chance);
   static BoardClock clock(static_cast<std::uint32_t>(seed));
-  static sim::SimulatedHal hal(seed);
+  static sim::BoardModel board(seed);
+  static sim::SimulatedHardware hardware(board);
+  firmware::BoardHardware& hal = hardware.hal();
   clock.start();
-  hal.power_on(clock.now_ms());
-  hal.make_safe();
+  hardware.power_up();
   guard(hal);
   start_watchdog(watchdog_ms);
 
@@ -93,10 +94,11 @@ int main() {
         clock.now_ms());
   }
 
+  std::uint32_t passed_ms = clock.now_ms();
   for (;;) {
     if (!canary_alive()) halt();
     feed_watchdog();
-    hal.advance(clock.now_ms());
+    for (; passed_ms != clock.now_ms(); ++passed_ms) hardware.pass_millisecond();
     link.receive([&](Text datagram) {
       application.receive(link_number, firmware::everyone, datagram, clock.now_ms());
     });

@@ -11,6 +11,7 @@
 #include "../../../protocol/state.hpp"
 #include "../../../protocol/units.hpp"
 #include "../../../transports/error.hpp"
+#include "../../board_hardware.hpp"
 
 namespace r4::sim {
 
@@ -41,9 +42,8 @@ std::vector<std::string_view> words_of(std::string_view line) {
 }
 
 // Seconds with up to three decimals, as milliseconds.
-std::uint32_t time_of(const Line& line) {
+std::uint32_t milliseconds_of(const Line& line, std::string_view word, const char* fix) {
   constexpr std::uint32_t max_s = 1000000;
-  const std::string_view word = line.words[0];
   const std::size_t point = std::min(word.find('.'), word.size());
   std::string thousandths(word.substr(std::min(point + 1, word.size())));
   const bool has_point = point != word.size();
@@ -53,9 +53,13 @@ std::uint32_t time_of(const Line& line) {
   thousandths.resize(3, '0');
   if (!good_length || !parse_number(Text(word.substr(0, point)), seconds) || seconds > max_s ||
       !parse_number(Text(thousandths), milliseconds)) {
-    fail(line, word, "is no time", "begin the line with seconds such as 1 or 0.125");
+    fail(line, word, "is no time", fix);
   }
   return seconds * 1000 + milliseconds;
+}
+
+std::uint32_t time_of(const Line& line) {
+  return milliseconds_of(line, line.words[0], "begin the line with seconds such as 1 or 0.125");
 }
 
 int channel_of(const Line& line, int channels, const char* what) {
@@ -77,9 +81,13 @@ void read_handle(const Line& line, ScriptStep& step) {
 
 void read_ultrasonic(const Line& line, ScriptStep& step) {
   step.channel = channel_of(line, ultrasonic_channels, "ultrasonic sensor");
+  if (line.words[3] == "off") {
+    step.value = ScriptStep::off;
+    return;
+  }
   std::uint32_t cm = 0;
   if (!parse_number(Text(line.words[3]), cm) || cm > proximity_max_cm) {
-    fail(line, line.words[3], "is no distance", "write 0 (nothing) to 400 cm");
+    fail(line, line.words[3], "is no distance", "write 0 (nothing) to 400 cm, or off");
   }
   step.value = static_cast<std::int32_t>(cm);
 }
@@ -107,6 +115,34 @@ void read_analog(const Line& line, ScriptStep& step) {
   }
 }
 
+void read_chip(const Line& line, ScriptStep& step) {
+  static constexpr std::string_view chips[firmware::chip_count] = {"osmc", "dhb", "expander", "dac",
+                                                                   "servo"};
+  static constexpr std::string_view supplies[] = {"off", "on", "reset"};
+  const auto* const chip = std::find(std::begin(chips), std::end(chips), line.words[2]);
+  if (chip == std::end(chips)) {
+    fail(line, line.words[2], "is no chip", "write osmc, dhb, expander, dac or servo");
+  }
+  const auto* const supply = std::find(std::begin(supplies), std::end(supplies), line.words[3]);
+  if (supply == std::end(supplies)) {
+    fail(line, line.words[3], "is nothing that can happen to a chip", "write off, on or reset");
+  }
+  step.channel = static_cast<int>(chip - std::begin(chips));
+  step.value = static_cast<std::int32_t>(supply - std::begin(supplies));
+}
+
+void read_i2c(const Line& line, ScriptStep& step) {
+  if (line.words[2] != "held" && line.words[2] != "free") {
+    fail(line, line.words[2], "is nothing a bus can be", "write held or free");
+  }
+  step.value = line.words[2] == "held" ? 1 : 0;
+}
+
+void read_hang(const Line& line, ScriptStep& step) {
+  step.value = static_cast<std::int32_t>(
+      milliseconds_of(line, line.words[2], "write for how long, in seconds such as 0.3"));
+}
+
 struct Form {
   std::string_view word;
   std::size_t words;  // with the time
@@ -116,26 +152,38 @@ struct Form {
 };
 constexpr Form forms[] = {
     {"handle", 3, "TIME handle held|released", ScriptStep::Kind::handle, read_handle},
-    {"us", 4, "TIME us SENSOR CM", ScriptStep::Kind::ultrasonic, read_ultrasonic},
+    {"us", 4, "TIME us SENSOR CM|off", ScriptStep::Kind::ultrasonic, read_ultrasonic},
     {"enc", 4, "TIME enc ENCODER COUNTS", ScriptStep::Kind::encoder, read_encoder},
     {"analog", 4, "TIME analog NAME VOLTS", ScriptStep::Kind::analog, read_analog},
+    {"chip", 4, "TIME chip NAME off|on|reset", ScriptStep::Kind::chip, read_chip},
+    {"i2c", 3, "TIME i2c held|free", ScriptStep::Kind::i2c, read_i2c},
+    {"hang", 3, "TIME hang SECONDS", ScriptStep::Kind::hang, read_hang},
     {"fault", 2, "TIME fault", ScriptStep::Kind::fault, nullptr},
     {"watchdog", 2, "TIME watchdog", ScriptStep::Kind::watchdog, nullptr},
     {"reboot", 2, "TIME reboot", ScriptStep::Kind::reboot, nullptr},
 };
+
+// "handle, us, … or reboot".
+std::string words_of_forms() {
+  std::string words;
+  for (const Form& form : forms) {
+    const bool last = &form == std::end(forms) - 1;
+    words += (&form == std::begin(forms) ? "" : last ? " or " : ", ") + std::string(form.word);
+  }
+  return words;
+}
 
 ScriptStep step_of(const Line& line) {
   ScriptStep step;
   step.at_ms = time_of(line);
   if (line.words.size() < 2) {
     fail(line, line.words[0], "has nothing to do at that time",
-         "follow the time with handle, us, enc, analog, fault, watchdog or reboot");
+         "follow the time with " + words_of_forms());
   }
   const auto* const form = std::find_if(std::begin(forms), std::end(forms),
                                         [&](const Form& f) { return f.word == line.words[1]; });
   if (form == std::end(forms)) {
-    fail(line, line.words[1], "is nothing that can happen",
-         "use handle, us, enc, analog, fault, watchdog or reboot");
+    fail(line, line.words[1], "is nothing that can happen", "use " + words_of_forms());
   }
   if (line.words.size() != form->words) {
     fail(line, line.words[1], "has too few or too many words", std::string("write ") + form->usage);

@@ -4,10 +4,15 @@
 //     # TIME_S what args        '#' begins a comment; seconds since the start, to the millisecond
 //     0.5 handle released       the dead-man's handle: held | released
 //     1   us 1 15               ultrasonic sensor 1 sees something at 15 cm; 0: nothing
-//     1   enc 2 100             encoder 2 stands at 100 counts
+//     1   us 1 off              its cable is off: no answer, until there is a distance again
+//     1   enc 2 100             encoder 2 is turned to 100 counts, 1000 counts a millisecond
 //     1   analog AIN24 21.5     that input stays at 21.5 V
+//     2   chip dac off          that chip acknowledges nothing, until it is on; reset: it loses its
+//                               supply for a moment. osmc, dhb, servo, expander, dac
+//     2   i2c held              a chip holds the bus until it is free
+//     2   hang 0.3              the firmware's loop stands still for 0.3 s; what arrives is lost
 //     3   fault                 the board finds itself broken
-//     3   watchdog              a duty of the board misses its deadline
+//     3   watchdog              a duty of the board missed its deadline
 //     4   reboot                power off and on again
 //
 // Lines may stand in any order; those of the same time happen in theirs.
@@ -21,11 +26,26 @@
 namespace r4::sim {
 
 struct ScriptStep {
-  enum class Kind : std::uint8_t { handle, ultrasonic, encoder, analog, fault, watchdog, reboot };
+  enum class Kind : std::uint8_t {
+    handle,
+    ultrasonic,
+    encoder,
+    analog,
+    chip,
+    i2c,
+    hang,
+    fault,
+    watchdog,
+    reboot
+  };
+  static constexpr std::int32_t off = -1;  // ultrasonic
+  enum class Supply : std::int32_t { off, on, reset };
+
   Kind kind = Kind::handle;
   std::uint32_t at_ms = 0;
-  int channel = 0;         // ultrasonic, encoder: 1 …; analog: an Analog
-  std::int32_t value = 0;  // handle: 1 held; cm; counts; hundredths of a volt
+  int channel = 0;  // ultrasonic, encoder: 1 …; analog: an Analog; chip: a Chip
+  std::int32_t value =
+      0;  // 1 held (handle, i2c); cm or off; counts; hundredths of a volt; Supply; ms
 };
 
 class Script {

@@ -2,6 +2,7 @@
 #include "simulated_board.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <random>
 #include <system_error>
 #include <utility>
@@ -22,7 +23,7 @@ std::uint64_t random_seed() {
 SimulatedBoard::SimulatedBoard(asio::io_context& io, Options options)
     : options_(std::move(options)),
       seed_(options_.seed ? *options_.seed : random_seed()),
-      hal_(seed_),
+      model_(seed_),
       timer_(io) {}
 
 SimulatedBoard::~SimulatedBoard() { stop(); }
@@ -43,15 +44,17 @@ void SimulatedBoard::start() {
   alive_ = std::make_shared<const bool>(true);
   start_ = Clock::now();
   clock_start_ms_ = options_.clock_ms ? options_.clock_ms() : 0;
+  passed_ = hangs_until_ = watchdog_fed_ = Milliseconds(0);
   next_step_ = 0;
-  power_on(elapsed());
+  model_.power_on();
+  reset_microcontroller();
   try {
     for (const auto& port : ports_) port->open();
   } catch (...) {
     stop();
     throw;
   }
-  boot(elapsed());
+  boot();
   poll();
 }
 
@@ -61,7 +64,8 @@ void SimulatedBoard::stop() noexcept {
   armed_ = false;
   for (const auto& port : ports_) port->close();
   application_.reset();
-  hal_.make_safe();
+  if (hardware_) hardware_->hal().make_safe();
+  hardware_.reset();
 }
 
 SimulatedBoard::Milliseconds SimulatedBoard::elapsed() const {
@@ -69,25 +73,32 @@ SimulatedBoard::Milliseconds SimulatedBoard::elapsed() const {
   return std::chrono::floor<Milliseconds>(Clock::now() - start_);
 }
 
-// A fresh application on hardware that has just got its supply.
-void SimulatedBoard::power_on(Milliseconds elapsed) {
+// The chips stay as they are until the firmware makes them safe, first of all.
+void SimulatedBoard::reset_microcontroller() {
   clock_offset_ms_ = static_cast<std::uint32_t>(scramble(seed_ + boots_));
   ++boots_;
   downs_ = 0;
-  hal_.power_on(board_ms(elapsed));
+  hangs_until_ = watchdog_fed_ = passed_;
+  told_pins_.reset();
+  told_fault_ = false;
+  hardware_.emplace(model_);
+  hardware_->power_up();
+
   firmware::Application::Config config;
   config.identity.firmware = Text(options_.firmware_version);
   config.identity.board_id = Text(options_.board_id);
   config.identity.capabilities = Text(options_.capabilities);
   config.settings = options_.settings;
   Observer& observer = *this;
-  application_.emplace(hal_, config, &observer);
+  application_.emplace(hardware_->hal(), config, &observer);
   for (const auto& port : ports_) port->number = application_->add_port(*port);
 }
 
-void SimulatedBoard::boot(Milliseconds elapsed) {
+// `cause`: what ended the last boot.
+void SimulatedBoard::boot(SafeReason cause) {
   in_application_ = true;
-  application_->start(board_ms(elapsed));
+  application_->start(board_ms(passed_));
+  if (cause != SafeReason::none) application_->fail(cause, board_ms(passed_));
   in_application_ = false;
 }
 
@@ -95,51 +106,107 @@ std::uint32_t SimulatedBoard::poll() { return poll(elapsed()); }
 
 std::uint32_t SimulatedBoard::poll(Milliseconds elapsed) {
   advance(elapsed);
-  settle_downs(board_ms(elapsed));
-  in_application_ = true;
-  const std::uint32_t due_ms = application_->poll(board_ms(elapsed));
-  in_application_ = false;
-  Milliseconds next = elapsed + Milliseconds(downs_ == 0 ? due_ms : 0);
+  Milliseconds next = hangs_until_;
+  if (!hangs()) {
+    settle_downs(board_ms(elapsed));
+    in_application_ = true;
+    const std::uint32_t due_ms = application_->poll(board_ms(elapsed));
+    in_application_ = false;
+    next = elapsed + Milliseconds(downs_ == 0 ? due_ms : 0);
+  }
+  next = std::min(next, elapsed + Milliseconds(firmware::Application::interlock_period_ms));
   const std::vector<ScriptStep>& steps = options_.script.steps();
   if (next_step_ < steps.size()) next = std::min(next, Milliseconds(steps[next_step_].at_ms));
   if (!options_.clock_ms) arm(next);
   return static_cast<std::uint32_t>((next - elapsed).count());
 }
 
-// Lets time pass around the board.
+// Makes up for the time that has passed on the board and around it.
 void SimulatedBoard::advance(Milliseconds elapsed) {
-  hal_.advance(board_ms(elapsed));
   const std::vector<ScriptStep>& steps = options_.script.steps();
-  while (next_step_ < steps.size() && Milliseconds(steps[next_step_].at_ms) <= elapsed) {
-    take(steps[next_step_++], elapsed);
+  for (;;) {
+    while (next_step_ < steps.size() && Milliseconds(steps[next_step_].at_ms) <= passed_) {
+      take(steps[next_step_++]);
+    }
+    if (passed_ >= elapsed) return;
+    pass_millisecond();
   }
 }
 
-void SimulatedBoard::take(const ScriptStep& step, Milliseconds elapsed) {
+void SimulatedBoard::pass_millisecond() {
+  ++passed_;
+  hardware_->pass_millisecond();
+  if (!hangs()) application_->guard().check_in(firmware::Application::loop_duty);
+  if (application_->guard().tick(board_ms(passed_))) {
+    watchdog_fed_ = passed_;
+  } else if (passed_ - watchdog_fed_ >= watchdog_ms) {
+    reset_microcontroller();
+    boot(SafeReason::watchdog);
+  }
+  tell_pins();
+}
+
+void SimulatedBoard::take(const ScriptStep& step) {
   switch (step.kind) {
     case ScriptStep::Kind::handle:
-      hal_.hold_handle(step.value != 0);
+      model_.hold_handle(step.value != 0);
       break;
     case ScriptStep::Kind::ultrasonic:
-      hal_.set_ultrasonic(step.channel, static_cast<std::uint16_t>(step.value));
+      model_.connect_ultrasonic(step.channel, step.value != ScriptStep::off);
+      if (step.value != ScriptStep::off) {
+        model_.set_ultrasonic(step.channel, static_cast<std::uint16_t>(step.value));
+      }
       break;
     case ScriptStep::Kind::encoder:
-      hal_.set_encoder(step.channel, step.value);
+      model_.turn_encoder(step.channel, step.value);
       break;
     case ScriptStep::Kind::analog:
-      hal_.pin_analog(static_cast<Analog>(step.channel), step.value);
+      model_.pin_analog(static_cast<Analog>(step.channel), step.value);
+      break;
+    case ScriptStep::Kind::chip: {
+      I2cChipModel& chip = model_.chips()[static_cast<firmware::Chip>(step.channel)];
+      const auto supply = static_cast<ScriptStep::Supply>(step.value);
+      if (supply == ScriptStep::Supply::reset) {
+        chip.power_on();
+      } else {
+        model_.chips().bus.connect(chip, supply == ScriptStep::Supply::on);
+      }
+      break;
+    }
+    case ScriptStep::Kind::i2c:
+      model_.chips().bus.hold(step.value != 0 ? std::numeric_limits<int>::max() : 0);
+      break;
+    case ScriptStep::Kind::hang:
+      hangs_until_ = passed_ + Milliseconds(step.value);
       break;
     case ScriptStep::Kind::fault:
-      application_->fail(SafeReason::fault, board_ms(elapsed));
+      application_->fail(SafeReason::fault, board_ms(passed_));
       break;
     case ScriptStep::Kind::watchdog:
-      application_->fail(SafeReason::watchdog, board_ms(elapsed));
+      application_->fail(SafeReason::watchdog, board_ms(passed_));
       break;
     case ScriptStep::Kind::reboot:
-      power_on(elapsed);
-      boot(elapsed);
+      model_.power_on();
+      reset_microcontroller();
+      boot();
       break;
   }
+}
+
+// What the pins do, and what is wrong with the chips, where that is news.
+void SimulatedBoard::tell_pins() {
+  const firmware::ChipFault& fault = hardware_->hal().fault();
+  if (fault.any() != told_fault_) {
+    told_fault_ = fault.any();
+    if (told_fault_ && options_.events.on_fault) {
+      options_.events.on_fault(board_ms(passed_), fault);
+    }
+  }
+  if (!options_.events.on_pins) return;
+  const Pins pins = model_.pins();
+  if (told_pins_ && *told_pins_ == pins) return;
+  told_pins_ = pins;
+  options_.events.on_pins(board_ms(passed_), pins);
 }
 
 void SimulatedBoard::settle_downs(std::uint32_t t_ms) {
@@ -168,6 +235,7 @@ void SimulatedBoard::on_datagram(CarrierPort& port, Peer from, std::string_view 
   if (!application_) return;
   const Milliseconds now = elapsed();
   advance(now);
+  if (hangs()) return;
   in_application_ = true;
   application_->receive(port.number, from, Text(bytes), board_ms(now));
   in_application_ = false;
@@ -185,9 +253,7 @@ void SimulatedBoard::on_state(std::uint32_t t_ms, firmware::BoardState state, Sa
   if (options_.events.on_state) options_.events.on_state(t_ms, state, reason);
 }
 
-void SimulatedBoard::on_outputs(std::uint32_t t_ms, const firmware::Outputs& outputs) {
-  if (options_.events.on_outputs) options_.events.on_outputs(t_ms, outputs);
-}
+void SimulatedBoard::on_outputs(std::uint32_t, const firmware::Outputs&) { tell_pins(); }
 
 void SimulatedBoard::on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command) {
   if (options_.events.on_executed) options_.events.on_executed(t_ms, pnum, command);

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A whole R4 board in a process: the firmware's application on simulated hardware, reached through
-// any carriers. One timer drives it, which sleeps until the application needs time.
+// A whole R4 board in a process: the firmware's application and chip drivers on a model of the board,
+// reached through any carriers. One timer drives it, which sleeps until the application needs time;
+// then the milliseconds that have passed on the board are made up for, one by one.
+//
+// A hardware watchdog resets the microcontroller, not the chips, when the guard does not let it be fed
+// for watchdog_ms. A slow computer is no slow board: only a `hang` of the script keeps the loop from
+// checking in.
 //
 // It lives on one io_context and is used from that io_context's thread only. A datagram costs no
 // heap.
@@ -18,9 +23,10 @@
 #include <vector>
 
 #include "../../application.hpp"
+#include "board_model.hpp"
 #include "carrier_port.hpp"
 #include "script.hpp"
-#include "simulated_hal.hpp"
+#include "simulated_hardware.hpp"
 
 namespace r4::sim {
 
@@ -30,7 +36,8 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   // clock, the T of its datagrams.
   struct Events {
     std::function<void(std::uint32_t t_ms, firmware::BoardState, SafeReason)> on_state;
-    std::function<void(std::uint32_t t_ms, const firmware::Outputs&)> on_outputs;
+    std::function<void(std::uint32_t t_ms, const Pins&)> on_pins;
+    std::function<void(std::uint32_t t_ms, const firmware::ChipFault&)> on_fault;
     std::function<void(std::uint32_t t_ms, std::uint32_t pnum, const Command&)> on_executed;
     std::function<void(std::uint32_t t_ms, std::uint32_t pnum, Refusal)> on_refused;
     std::function<void(std::uint32_t t_ms, const Carrier&, const CarrierEvent&)> on_carrier;
@@ -62,11 +69,13 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   // Does everything that is due; returns the milliseconds until the next call is needed.
   std::uint32_t poll();
 
-  SimulatedHal& hal() { return hal_; }
+  BoardModel& model() { return model_; }
   // The firmware running now; only between start() and stop().
   const firmware::Application& application() const { return *application_; }
   // The board's clock.
   std::uint32_t now_ms() const { return board_ms(elapsed()); }
+
+  static constexpr std::chrono::milliseconds watchdog_ms{500};
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -76,10 +85,13 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   std::uint32_t board_ms(Milliseconds elapsed) const {
     return static_cast<std::uint32_t>(elapsed.count()) + clock_offset_ms_;
   }
-  void power_on(Milliseconds elapsed);
-  void boot(Milliseconds elapsed);
+  void reset_microcontroller();
+  void boot(SafeReason cause = SafeReason::none);
   void advance(Milliseconds elapsed);
-  void take(const ScriptStep& step, Milliseconds elapsed);
+  void pass_millisecond();
+  void take(const ScriptStep& step);
+  void tell_pins();
+  bool hangs() const { return passed_ < hangs_until_; }
   std::uint32_t poll(Milliseconds elapsed);
   void settle_downs(std::uint32_t t_ms);
   void arm(Milliseconds at);
@@ -94,7 +106,8 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
 
   Options options_;
   std::uint64_t seed_;
-  SimulatedHal hal_;
+  BoardModel model_;
+  std::optional<SimulatedHardware> hardware_;  // of this boot
   std::vector<std::unique_ptr<CarrierPort>> ports_;
   std::optional<firmware::Application> application_;
 
@@ -103,6 +116,11 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   std::uint32_t boots_ = 0;
   Clock::time_point start_;
   std::uint32_t clock_start_ms_ = 0;  // of options_.clock_ms
+  Milliseconds passed_{};             // on the board, since start()
+  Milliseconds hangs_until_{};        // the loop
+  Milliseconds watchdog_fed_{};
+  std::optional<Pins> told_pins_;
+  bool told_fault_ = false;
   std::size_t next_step_ = 0;
   bool in_application_ = false;  // a carrier may report its end from inside a send
   std::uint32_t downs_ = 0;      // bit n: port n went down meanwhile

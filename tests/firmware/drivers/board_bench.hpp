@@ -46,7 +46,7 @@ struct InterruptedBus final : I2cBus {
 
 struct BoardBench {
   explicit BoardBench(const BoardHardware::Config& config = {})
-      : hardware(line, board.pins(), config) {}
+      : hardware(line, board.microcontroller_pins(), config) {}
   std::uint32_t now() const { return static_cast<std::uint32_t>(board.bus.now_us()); }
   void run(int ms) {
     for (int i = 0; i < ms; ++i) {
@@ -68,7 +68,7 @@ struct BoardBench {
     hardware.apply(outputs);
     run(polls);
   }
-  BoardModel board;
+  BoardParts board;
   BusLog log{board.bus};
   InterruptedBus line{board.bus};
   BoardHardware hardware;

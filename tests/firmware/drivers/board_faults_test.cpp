@@ -30,7 +30,7 @@ TEST(BoardHardware, IsSafeFromAnyTransferOfAnyUseOn) {
         if (bench.hardware.ready()) bench.hardware.apply(outputs);
       }
       EXPECT_LT(bench.line.after, 0);
-      EXPECT_TRUE(test::is_safe(bench.board)) << "transfer " << at << (cuts ? " cut" : " stale");
+      EXPECT_TRUE(bench.board.pins().is_safe()) << "transfer " << at << (cuts ? " cut" : " stale");
     }
   }
 }
@@ -54,7 +54,7 @@ TEST(BoardHardware, AFaultHandlerThatNeverReturnsLeavesEverythingSafe) {
       bench.run(200);
       FAIL() << "no transfer " << at;
     } catch (const Halt&) {
-      EXPECT_TRUE(test::is_safe(bench.board)) << at;
+      EXPECT_TRUE(bench.board.pins().is_safe()) << at;
     }
   }
 }
@@ -70,7 +70,7 @@ TEST(BoardHardware, MayBeMadeSafeWhileItIsBeingMadeSafe) {
       EXPECT_EQ(bench.line.recoveries, 1) << at;  // the bus was in use
     };
     bench.hardware.make_safe();
-    EXPECT_TRUE(test::is_safe(bench.board)) << at;
+    EXPECT_TRUE(bench.board.pins().is_safe()) << at;
   }
 }
 
@@ -113,11 +113,11 @@ TEST(BoardHardware, ComesBackWithOutputsOffAndObeysAgainWhenTheFaultIsCleared) {
     bench.run(400);
     EXPECT_TRUE(bench.hardware.ready()) << to_text(at.chip);
     EXPECT_EQ(bench.hardware.fault().chip, at.chip);
-    EXPECT_TRUE(test::is_safe(bench.board));
+    EXPECT_TRUE(bench.board.pins().is_safe());
     bench.apply(full());
-    EXPECT_TRUE(test::is_safe(bench.board));
+    EXPECT_TRUE(bench.board.pins().is_safe());
     EXPECT_TRUE(bench.hardware.clear_fault());
-    EXPECT_TRUE(test::is_safe(bench.board));
+    EXPECT_TRUE(bench.board.pins().is_safe());
     bench.apply(full());
     EXPECT_EQ(test::outputs_of(bench.board), test::as_pins(full()));
   }
@@ -134,7 +134,7 @@ TEST(BoardHardware, AChipThatWasResetIsNoticedWithinATurnOfVerification) {
     bench.run(chip_count * 20 + 2);
     EXPECT_EQ(bench.hardware.fault().chip, at.chip);
     EXPECT_EQ(bench.hardware.fault().trouble, ChipTrouble::was_reset) << to_text(at.chip);
-    EXPECT_TRUE(test::is_safe(bench.board));
+    EXPECT_TRUE(bench.board.pins().is_safe());
     bench.run(200);
     EXPECT_TRUE(bench.hardware.clear_fault());
   }
@@ -150,7 +150,7 @@ TEST(BoardHardware, AChipThatIsResetAtAnyByteNeverLeavesAnythingRunningUnnoticed
       bench.board.bus.reset_after(*chips[static_cast<int>(at.chip)], after);
       bench.apply(full(), 240);
       if (bench.hardware.fault().any()) {
-        EXPECT_TRUE(test::is_safe(bench.board));
+        EXPECT_TRUE(bench.board.pins().is_safe());
       } else {
         EXPECT_EQ(test::outputs_of(bench.board), test::as_pins(full())) << after;
       }
@@ -166,7 +166,7 @@ TEST(BoardHardware, AHeldBusIsFreedAndEverythingIsSafeAtOnce) {
     bench.hardware.apply(full());
     for (int ms = 0; ms < 110 && !bench.hardware.fault().any(); ++ms) bench.run(1);
     EXPECT_EQ(bench.hardware.fault().trouble, ChipTrouble::bus_stuck);
-    EXPECT_TRUE(test::is_safe(bench.board)) << after;
+    EXPECT_TRUE(bench.board.pins().is_safe()) << after;
     EXPECT_LE(bench.longest_poll_us, 5000U);
     bench.run(300);
     EXPECT_TRUE(bench.hardware.clear_fault());

@@ -44,10 +44,10 @@ TEST(BoardHardware, OutputsAreOffBeforeAnythingElseAtPowerUp) {
   EXPECT_EQ(test::lines(bench.log),
             (Lines{"70 <- FD 10", "61 <- 40 00 00 42 00 00 44 00 00 46 00 00", "20 <- 14 AA 00",
                    "20 <- 00 00 00", "40 <- FD 10", "41 <- FD 10", "42 <- FD 10"}));
-  EXPECT_TRUE(test::is_safe(bench.board));
+  EXPECT_TRUE(bench.board.pins().is_safe());
   for (int i = 0; i < 20; ++i) {
     bench.run(1);
-    EXPECT_TRUE(test::is_safe(bench.board));
+    EXPECT_TRUE(bench.board.pins().is_safe());
   }
   EXPECT_TRUE(bench.hardware.ready());
 }
@@ -56,10 +56,10 @@ TEST(BoardHardware, AWarmStartTurnsOffWhatTheLastProgramLeftOn) {
   Bench bench;
   bench.boot();
   bench.apply(full());
-  ASSERT_FALSE(test::is_safe(bench.board));
-  BoardHardware next(bench.board.bus, bench.board.pins(), {});
+  ASSERT_FALSE(bench.board.pins().is_safe());
+  BoardHardware next(bench.board.bus, bench.board.microcontroller_pins(), {});
   next.power_up(bench.now());
-  EXPECT_TRUE(test::is_safe(bench.board));
+  EXPECT_TRUE(bench.board.pins().is_safe());
 }
 
 TEST(BoardHardware, EveryChannelReachesItsPin) {
@@ -101,9 +101,9 @@ RC_GTEST_PROP(BoardHardware, PinsFollowAnySequenceOfOutputs, ()) {
     RC_ASSERT(!bench.hardware.fault().any());
   }
   bench.hardware.make_safe();
-  RC_ASSERT(test::is_safe(bench.board));
+  RC_ASSERT(bench.board.pins().is_safe());
   bench.run(12);
-  RC_ASSERT(test::is_safe(bench.board));
+  RC_ASSERT(bench.board.pins().is_safe());
 }
 
 RC_GTEST_PROP(BoardHardware, PinsSettleOnTheNewestOutputsHoweverFastTheyChange, ()) {
@@ -176,7 +176,7 @@ TEST(BoardHardware, SafeStateCostsWhatTheDocumentationSays) {
   bench.apply(full());
   bench.log.clear();
   bench.hardware.make_safe();
-  EXPECT_TRUE(test::is_safe(bench.board));
+  EXPECT_TRUE(bench.board.pins().is_safe());
   EXPECT_EQ(test::lines(bench.log).front(), "70 <- FD 10");
   const test::BusCost safe = test::cost(bench.log);
   EXPECT_EQ(safe.bytes, 33U);
@@ -303,7 +303,7 @@ TEST(BoardHardware, WhatIsAppliedBeforeEveryChipIsReadyWaits) {
   bench.hardware.power_up(bench.now());
   bench.hardware.apply(full());
   while (!bench.hardware.ready()) {
-    EXPECT_TRUE(test::is_safe(bench.board));
+    EXPECT_TRUE(bench.board.pins().is_safe());
     bench.hardware.step_tick();
     ASSERT_LT(bench.now(), 100000U);
     bench.run(1);
@@ -321,7 +321,7 @@ TEST(BoardHardware, TheSafeStateForgetsWhatWasWaiting) {
   bench.hardware.make_safe();
   bench.run(30);
   EXPECT_TRUE(bench.hardware.ready());
-  EXPECT_TRUE(test::is_safe(bench.board));
+  EXPECT_TRUE(bench.board.pins().is_safe());
 }
 
 }  // namespace

@@ -8,10 +8,7 @@
 #include "bus_log.hpp"
 #include "firmware/board_hardware.hpp"
 #include "firmware/drivers/pins.hpp"
-#include "firmware/ports/sim/chips/i2c_bus_model.hpp"
-#include "firmware/ports/sim/chips/mcp23017_model.hpp"
-#include "firmware/ports/sim/chips/mcp4728_model.hpp"
-#include "firmware/ports/sim/chips/pca9685_model.hpp"
+#include "firmware/ports/sim/board_chips.hpp"
 
 namespace r4::test {
 
@@ -35,24 +32,12 @@ struct AnalogPinModel final : firmware::AnalogPin {
 };
 
 // The board's chips and pins. Their provisioned EEPROM makes the set-up short.
-struct BoardModel {
-  BoardModel() {
-    bus.attach(expander);
-    bus.attach(osmc);
-    bus.attach(dhb12);
-    bus.attach(servo);
-    bus.attach(dac);
+struct BoardParts : sim::BoardChips {
+  BoardParts() {
     for (int i = 0; i < sim::Mcp4728Model::channels; ++i) dac.set_eeprom(i, {});
     power_on();
   }
-  void power_on() {
-    expander.power_on();
-    osmc.power_on();
-    dhb12.power_on();
-    servo.power_on();
-    dac.power_on();
-  }
-  firmware::BoardPins pins() {
+  firmware::BoardPins microcontroller_pins() {
     firmware::BoardPins all{};
     for (std::size_t i = 0; i < 4; ++i) {
       all.step[i] = &step[i];
@@ -63,12 +48,6 @@ struct BoardModel {
     all.handle = &handle;
     return all;
   }
-  sim::I2cBusModel bus;
-  sim::Mcp23017Model expander{0x20};
-  sim::Pca9685Model osmc{0x40};
-  sim::Pca9685Model dhb12{0x41};
-  sim::Pca9685Model servo{0x42};
-  sim::Mcp4728Model dac{0x61};
   std::array<OutputPinModel, 4> step;
   std::array<OutputPinModel, 4> direction;
   std::array<OutputPinModel, 4> trigger;
@@ -77,10 +56,8 @@ struct BoardModel {
 };
 
 // What the chips' pins do now, in the application's terms; steppers are not looked at.
-firmware::Outputs outputs_of(const BoardModel& board);
+firmware::Outputs outputs_of(const BoardParts& board);
 // `outputs` as the pins can show them: without steppers, servo pulses to the nearest count.
 firmware::Outputs as_pins(firmware::Outputs outputs);
-// The safe state: nothing moves, every brake is on.
-bool is_safe(const BoardModel& board);
 
 }  // namespace r4::test

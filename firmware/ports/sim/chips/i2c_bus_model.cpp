@@ -29,6 +29,14 @@ class I2cBusModel::Held {
   std::uint64_t began_ns_ = 0;
 };
 
+void I2cBusModel::connect(const I2cChipModel& chip, bool connected) {
+  for (int i = 0; i < chip_count_; ++i) {
+    if (chips_[i] != &chip) continue;
+    const ChipSet bit = static_cast<ChipSet>(1U << i);
+    disconnected_ = static_cast<ChipSet>(connected ? disconnected_ & ~bit : disconnected_ | bit);
+  }
+}
+
 bool I2cBusModel::attach(I2cChipModel& chip) {
   if (chip_count_ == max_chips) return false;
   chips_[chip_count_++] = &chip;
@@ -174,6 +182,7 @@ I2cResult I2cBusModel::start(Transfer& transfer, bool read) {
     --refusal->times;
   } else {
     for (int i = 0; i < chip_count_; ++i) {
+      if ((disconnected_ >> i & 1) != 0) continue;
       const bool answers = chips_[i]->start(transfer.address, read);
       if (cut_short(transfer)) return I2cResult::timeout;
       if (answers) answering |= static_cast<ChipSet>(1U << i);

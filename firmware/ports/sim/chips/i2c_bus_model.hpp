@@ -63,6 +63,8 @@ class I2cBusModel final : public firmware::I2cBus {
 
   // The chip must outlive the bus. It is powered on. False: there are max_chips already.
   bool attach(I2cChipModel& chip);
+  // A chip that is not connected takes no part, whatever the address.
+  void connect(const I2cChipModel& chip, bool connected);
   // nullptr: nobody.
   void set_observer(I2cObserver* observer) { observer_ = observer; }
   void set_processor(I2cProcessor* processor) { processor_ = processor; }
@@ -122,6 +124,7 @@ class I2cBusModel final : public firmware::I2cBus {
 
   I2cChipModel* chips_[max_chips] = {};
   int chip_count_ = 0;
+  ChipSet disconnected_ = 0;
   ChipSet addressed_ = 0;    // by the last START
   ChipSet taking_part_ = 0;  // since the last STOP
   Refusal refusals_[max_errors];

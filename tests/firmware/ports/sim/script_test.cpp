@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <fstream>
 
+#include "firmware/board_hardware.hpp"
 #include "protocol/state.hpp"
 #include "transports/error.hpp"
 
@@ -93,7 +94,7 @@ TEST(Script, SaysWhereWhatAndHowToMendIt) {
             "bench.txt:2: 'open' is nothing a handle can be; write held or released");
   EXPECT_EQ(error_of("1 us 5 10"), "bench.txt:1: '5' is no ultrasonic sensor; there are 1 to 4");
   EXPECT_EQ(error_of("1 us"),
-            "bench.txt:1: 'us' has too few or too many words; write TIME us SENSOR CM");
+            "bench.txt:1: 'us' has too few or too many words; write TIME us SENSOR CM|off");
 }
 
 TEST(Script, RefusesWhatItDoesNotUnderstand) {
@@ -149,6 +150,42 @@ TEST(Script, SaysWhichFileCannotBeRead) {
       EXPECT_EQ(error.problem().thing, path);
     }
   }
+}
+
+TEST(Script, ReadsTroubleWithChipsBusAndLoop) {
+  const Script script = Script::parse(
+      "1 chip dac off\n"
+      "2 chip osmc reset\n"
+      "3 i2c held\n"
+      "4 i2c free\n"
+      "5 hang 0.3\n"
+      "6 us 2 off\n",
+      "bench.txt");
+  const auto& steps = script.steps();
+  ASSERT_EQ(steps.size(), 6U);
+  EXPECT_EQ(steps[0].kind, Kind::chip);
+  EXPECT_EQ(steps[0].channel, static_cast<int>(firmware::Chip::dac));
+  EXPECT_EQ(steps[0].value, static_cast<int>(ScriptStep::Supply::off));
+  EXPECT_EQ(steps[1].channel, static_cast<int>(firmware::Chip::osmc_pwm));
+  EXPECT_EQ(steps[1].value, static_cast<int>(ScriptStep::Supply::reset));
+  EXPECT_EQ(steps[2].kind, Kind::i2c);
+  EXPECT_EQ(steps[2].value, 1);
+  EXPECT_EQ(steps[3].value, 0);
+  EXPECT_EQ(steps[4].kind, Kind::hang);
+  EXPECT_EQ(steps[4].value, 300);
+  EXPECT_EQ(steps[5].value, ScriptStep::off);
+
+  EXPECT_EQ(error_of("1 chip eeprom off"),
+            "bench.txt:1: 'eeprom' is no chip; write osmc, dhb, expander, dac or servo");
+  EXPECT_EQ(error_of("1 chip dac broken"),
+            "bench.txt:1: 'broken' is nothing that can happen to a chip; write off, on or reset");
+  EXPECT_EQ(error_of("1 i2c stuck"),
+            "bench.txt:1: 'stuck' is nothing a bus can be; write held or free");
+  EXPECT_EQ(error_of("1 hang long"),
+            "bench.txt:1: 'long' is no time; write for how long, in seconds such as 0.3");
+  EXPECT_EQ(error_of("1 dance"),
+            "bench.txt:1: 'dance' is nothing that can happen; use handle, us, enc, analog, chip, "
+            "i2c, hang, fault, watchdog or reboot");
 }
 
 }  // namespace

@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "board_model.hpp"
+
+#include "random.hpp"
+
+namespace r4 {
+namespace sim {
+
+namespace {
+
+static_assert(osmc_channels == encoder_channels, "each of these motors turns an encoder");
+
+// A value of an analog input and how often it occurs.
+struct Level {
+  std::int16_t centivolts;
+  std::uint8_t count;
+};
+
+// The capture's (paper section 4.4).
+constexpr Level ain24[] = {{2413, 4},  {2415, 1}, {2418, 6}, {2421, 6},
+                           {2428, 33}, {2431, 7}, {2433, 4}, {2456, 1}};
+constexpr Level ain12[] = {{1208, 5},  {1209, 2},  {1211, 4},  {1212, 3}, {1214, 1},
+                           {1215, 20}, {1216, 11}, {1218, 11}, {1219, 3}, {1221, 2}};
+constexpr Level ain5[] = {{507, 3},  {508, 3},  {509, 9}, {510, 4},
+                          {511, 24}, {512, 14}, {513, 4}, {515, 1}};
+constexpr Level aindmh_held[] = {{1183, 1},  {1193, 1}, {1208, 2}, {1209, 2}, {1211, 4},
+                                 {1212, 6},  {1214, 4}, {1215, 6}, {1216, 9}, {1218, 9},
+                                 {1219, 10}, {1221, 3}, {1222, 3}, {1223, 1}, {1229, 1}};
+constexpr Level ainsteer[] = {{86, 2},  {92, 2},   {94, 2},  {95, 4},  {98, 7},
+                              {99, 12}, {100, 10}, {102, 2}, {103, 8}, {105, 10},
+                              {106, 1}, {107, 1},  {119, 1}};
+// An input that nothing drives, and that of a released handle.
+constexpr Level near_zero[] = {{0, 4}, {1, 2}, {2, 1}};
+
+template <std::size_t N>
+std::int32_t pick(const Level (&levels)[N], std::uint64_t random) {
+  std::uint32_t total = 0;
+  for (const Level& level : levels) total += level.count;
+  std::uint32_t at = static_cast<std::uint32_t>(random % total);
+  for (const Level& level : levels) {
+    if (at < level.count) return level.centivolts;
+    at -= level.count;
+  }
+  return levels[N - 1].centivolts;
+}
+
+constexpr std::int32_t steering_span_cv = 300;  // from end to end
+constexpr std::int32_t battery_mohm = 20;
+
+}  // namespace
+
+bool Pins::is_safe() const {
+  for (const Stepper& each : stepper) {
+    if (each.stepping != 0) return false;
+  }
+  return ChipPins::is_safe();
+}
+
+bool operator==(const Pins& a, const Pins& b) {
+  for (int i = 0; i < stepper_channels; ++i) {
+    if (a.stepper[i].stepping != b.stepper[i].stepping) return false;
+  }
+  return static_cast<const ChipPins&>(a) == static_cast<const ChipPins&>(b);
+}
+
+BoardModel::BoardModel(std::uint64_t seed) : seed_(seed) {
+  for (int i = 0; i < analog_channels; ++i) {
+    converters_[i].model = this;
+    converters_[i].input = i;
+  }
+  hold_handle(true);
+}
+
+void BoardModel::power_on() {
+  chips_.power_on();
+  for (Stepper& stepper : steppers_) {
+    stepper.driver.power_on();
+    stepper.pause_ms = stepper_pause_ms;
+  }
+  for (Shaft& shaft : shafts_) shaft = Shaft();
+}
+
+void BoardModel::hold_handle(bool held) {
+  handle_held_ = held;
+  handle_.set(held == firmware::handle_held_level);
+}
+
+void BoardModel::turn_encoder(int channel, std::int32_t counts) {
+  shafts_[channel - 1].by_hand = true;
+  shafts_[channel - 1].hand_count = counts;
+}
+
+void BoardModel::pin_analog(Analog input, std::int32_t centivolts) {
+  pinned_cv_[static_cast<int>(input)] = centivolts;
+  pinned_ = static_cast<std::uint8_t>(pinned_ | 1U << static_cast<int>(input));
+}
+
+firmware::BoardPins BoardModel::microcontroller_pins() {
+  firmware::BoardPins pins{};
+  for (int i = 0; i < stepper_channels; ++i) {
+    pins.step[i] = &steppers_[i].driver.step();
+    pins.direction[i] = &steppers_[i].driver.direction();
+  }
+  for (int i = 0; i < ultrasonic_channels; ++i) pins.trigger[i] = &sensors_[i].trigger();
+  for (int i = 0; i < analog_channels; ++i) pins.analog[i] = &converters_[i];
+  pins.handle = &handle_;
+  return pins;
+}
+
+void BoardModel::pass_millisecond(std::uint32_t now_us, Interrupts& interrupts) {
+  ++time_ms_;
+  chips_.bus.advance(1000);
+  for (int i = 0; i < encoder_channels; ++i) {
+    Shaft& shaft = shafts_[i];
+    std::int32_t counts = shaft.motor.pass_millisecond(chips_.osmc_drive(i + 1));
+    if (shaft.by_hand) {
+      const std::int64_t left = std::int64_t{shaft.hand_count} - shaft.count;
+      shaft.by_hand = left > hand_speed || left < -hand_speed;
+      counts = !shaft.by_hand ? static_cast<std::int32_t>(left)
+               : left > 0     ? hand_speed
+                              : -hand_speed;
+    }
+    turn(i + 1, counts, interrupts);
+  }
+  steer(chips_.dhb12_drive(1));
+  for (int i = 0; i < ultrasonic_channels; ++i) {
+    sensors_[i].pass(
+        now_us, [&](bool high, std::uint32_t at_us) { interrupts.on_echo(i + 1, high, at_us); });
+  }
+  for (Stepper& stepper : steppers_) {
+    if (stepper.pulses != stepper.driver.pulses()) {
+      stepper.pulses = stepper.driver.pulses();
+      stepper.pause_ms = 0;
+    } else if (stepper.pause_ms < stepper_pause_ms) {
+      ++stepper.pause_ms;
+    }
+  }
+}
+
+void BoardModel::turn(int channel, std::int32_t counts, Interrupts& interrupts) {
+  std::int32_t& count = shafts_[channel - 1].count;
+  while (counts != 0) {
+    const std::int32_t step = counts > 0 ? 1 : -1;
+    counts -= step;
+    count += step;
+    tell_levels(channel, interrupts);
+  }
+}
+
+// Forward, A leads B: 00 10 11 01.
+void BoardModel::tell_levels(int channel, Interrupts& interrupts) {
+  const unsigned quarter = static_cast<unsigned>(shafts_[channel - 1].count) & 3U;
+  interrupts.on_encoder(channel, quarter == 1 || quarter == 2, quarter == 2 || quarter == 3);
+}
+
+void BoardModel::tell_levels(Interrupts& interrupts) {
+  for (int i = 0; i < encoder_channels; ++i) tell_levels(i + 1, interrupts);
+}
+
+void BoardModel::steer(Drive drive) {
+  steering_ += drive.direction == Direction::forward ? -drive.pwm : drive.pwm;
+  if (steering_ < 0) steering_ = 0;
+  if (steering_ > steering_range) steering_ = steering_range;
+}
+
+std::int32_t BoardModel::analog_cv(int input) const {
+  if ((pinned_ >> input & 1) != 0) return pinned_cv_[input];
+  const std::uint64_t random =
+      scramble(seed_ ^ scramble(std::uint64_t{time_ms_} << 8 | static_cast<std::uint64_t>(input)));
+  switch (static_cast<Analog>(input)) {
+    case Analog::ain24: {
+      std::int32_t current_ca = 0;
+      for (const Shaft& shaft : shafts_) current_ca += shaft.motor.current_ca();
+      return pick(ain24, random) - current_ca * battery_mohm / 1000;
+    }
+    case Analog::ain12:
+      return pick(ain12, random);
+    case Analog::ain5:
+      return pick(ain5, random);
+    case Analog::aindmh:
+      return handle_held_ ? pick(aindmh_held, random) : pick(near_zero, random);
+    case Analog::ainsteer:
+      return pick(ainsteer, random) + steering_ / (steering_range / steering_span_cv);
+    case Analog::ain6:
+    case Analog::count:
+      break;
+  }
+  return pick(near_zero, random);
+}
+
+// The divider before the converter: 50 V is its full range (drivers/analog.hpp).
+std::uint16_t BoardModel::Converter::read() {
+  constexpr std::int32_t range_cv = 5000;
+  const std::int32_t cv = model->analog_cv(input);
+  const std::int32_t within = cv < 0 ? 0 : cv > range_cv ? range_cv : cv;
+  return static_cast<std::uint16_t>((within * 65535 + range_cv / 2) / range_cv);
+}
+
+Pins BoardModel::pins() const {
+  Pins pins;
+  static_cast<ChipPins&>(pins) = chips_.pins();
+  for (int i = 0; i < stepper_channels; ++i) {
+    const Stepper& stepper = steppers_[i];
+    pins.stepper[i].position = stepper.driver.position();
+    const bool stepping =
+        stepper.pause_ms < stepper_pause_ms || stepper.pulses != stepper.driver.pulses();
+    if (stepping) pins.stepper[i].stepping = stepper.driver.forward() ? 1 : -1;
+  }
+  return pins;
+}
+
+}  // namespace sim
+}  // namespace r4

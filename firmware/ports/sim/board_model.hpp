@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The R4 board around its microcontroller: the chips on their bus, the pins, what is connected to
+// them, and the time that passes there. As portable as the firmware and in integers, for the image for
+// the Cortex-M7 runs it too.
+//
+// Connected is the vehicle of the paper's capture (section 4.4), standing on the bench:
+//
+//     OSMC 1-4    a motor each, whose shaft turns encoder 1-4: 4000 counts a second at full duty
+//     DHB1A       the steering motor; AINSTEER tells where it stands: 1 V, where forward ends, to 4 V,
+//                 1.5 s from end to end at full duty
+//     battery     AIN24 sags with the current of the OSMC motors (20 mOhm)
+//     US 1-4      ultrasonic sensors with nothing in sight
+//     steppers    drivers that count the pulses
+//
+// Analog inputs take the values of the capture's converters as often as they occur there; which one
+// depends on the seed and the time alone, so the same seed gives the same trace.
+#pragma once
+
+#include <cstdint>
+
+#include "board_chips.hpp"
+#include "motor_model.hpp"
+#include "pin_models.hpp"
+#include "ultrasonic_model.hpp"
+
+namespace r4 {
+namespace sim {
+
+// What all outputs of the board do.
+struct Pins : ChipPins {
+  struct Stepper {
+    std::int32_t position = 0;  // pulses since power came, forward less backward
+    std::int8_t stepping = 0;   // 1 forward, -1 backward, 0: no pulse for stepper_pause_ms
+  };
+  Stepper stepper[stepper_channels];
+
+  bool is_safe() const;
+};
+// Whether the outputs do the same; the steppers' positions do not count.
+bool operator==(const Pins& a, const Pins& b);
+inline bool operator!=(const Pins& a, const Pins& b) { return !(a == b); }
+
+class BoardModel {
+ public:
+  // Where edges interrupt the microcontroller. Channels count from 1.
+  class Interrupts {
+   public:
+    virtual void on_encoder(int channel, bool a, bool b) = 0;
+    virtual void on_echo(int channel, bool high, std::uint32_t at_us) = 0;
+
+   protected:
+    ~Interrupts() = default;
+  };
+  static constexpr std::uint32_t stepper_pause_ms = 100;
+  static constexpr std::int32_t hand_speed = 1000;  // counts a millisecond
+
+  explicit BoardModel(std::uint64_t seed);
+
+  // The supply comes, or comes back: motors stand, counters are at 0. The surroundings stay.
+  void power_on();
+  // The levels of the encoders as they are, as if they had just come.
+  void tell_levels(Interrupts& interrupts);
+  // A millisecond passes, which ends at `now_us` of the microcontroller's clock.
+  void pass_millisecond(std::uint32_t now_us, Interrupts& interrupts);
+
+  BoardChips& chips() { return chips_; }
+  firmware::BoardPins microcontroller_pins();
+  Pins pins() const;
+
+  // The surroundings. Channels count from 1.
+  void hold_handle(bool held);
+  // Something is `cm` (0: nothing) before the sensor.
+  void set_ultrasonic(int channel, std::uint16_t cm) { sensors_[channel - 1].set_distance(cm); }
+  void connect_ultrasonic(int channel, bool connected) { sensors_[channel - 1].connect(connected); }
+  // Somebody turns the shaft to where the encoder has counted `counts` since power came.
+  void turn_encoder(int channel, std::int32_t counts);
+  // The input stays at `centivolts` (hundredths of a volt) from now on.
+  void pin_analog(Analog input, std::int32_t centivolts);
+
+ private:
+  static constexpr std::int32_t steering_range = 3 * 1000 * 2048;  // 1.5 s of 4096 a millisecond
+
+  struct Shaft {
+    MotorModel motor;
+    std::int32_t count = 0;
+    bool by_hand = false;
+    std::int32_t hand_count = 0;  // where it is being turned to
+  };
+  struct Stepper {
+    StepperDriverModel driver;
+    std::uint32_t pulses = 0;  // seen so far
+    std::uint32_t pause_ms = stepper_pause_ms;
+  };
+  // A converter asks the model for the voltage when it is read.
+  struct Converter final : firmware::AnalogPin {
+    std::uint16_t read() override;
+    const BoardModel* model = nullptr;
+    int input = 0;
+  };
+
+  void turn(int channel, std::int32_t counts, Interrupts& interrupts);
+  void tell_levels(int channel, Interrupts& interrupts);
+  void steer(Drive drive);
+  std::int32_t analog_cv(int input) const;
+
+  std::uint64_t seed_;
+  std::uint32_t time_ms_ = 0;
+  BoardChips chips_;
+  Stepper steppers_[stepper_channels];
+  Shaft shafts_[encoder_channels];
+  std::int32_t steering_ = 0;  // from where forward ends
+  UltrasonicModel sensors_[ultrasonic_channels];
+  bool handle_held_ = true;
+  InputPinModel handle_;
+  Converter converters_[analog_channels];
+  std::int32_t pinned_cv_[analog_channels] = {};
+  std::uint8_t pinned_ = 0;  // bit n: analog input n stays at pinned_cv_[n]
+};
+
+}  // namespace sim
+}  // namespace r4

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The microcontroller on the model of the board: the firmware's chip drivers, with the timers and
+// interrupts that drive them.
+#pragma once
+
+#include <cstdint>
+
+#include "../../board_hardware.hpp"
+#include "board_model.hpp"
+
+namespace r4 {
+namespace sim {
+
+class SimulatedHardware final : private BoardModel::Interrupts {
+ public:
+  explicit SimulatedHardware(BoardModel& board);
+
+  // The microcontroller starts: outputs off, then the chips are set up, which takes boot_ms of the
+  // board's time at most.
+  void power_up();
+  // A millisecond passes on the board: what interrupts and timers do in it, and the drivers' turn.
+  void pass_millisecond();
+
+  firmware::BoardHardware& hal() { return hardware_; }
+
+  // For a chip's EEPROM that is written for the first time, and a handle that settles.
+  static constexpr int boot_ms = 100;
+
+ private:
+  void on_encoder(int channel, bool a, bool b) override { hardware_.encoder(channel).sample(a, b); }
+  void on_echo(int channel, bool high, std::uint32_t at_us) override {
+    hardware_.ultrasonic().echo(channel - 1, high, at_us);
+  }
+
+  BoardModel& board_;
+  firmware::BoardHardware hardware_;
+  std::uint32_t now_us_ = 0;  // of the microcontroller's clock; wraps
+};
+
+}  // namespace sim
+}  // namespace r4

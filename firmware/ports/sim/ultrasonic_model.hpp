@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// An ultrasonic sensor HC-SR04 (data sheet): after a trigger pulse its echo line is high for 58 us a
+// centimetre, or 38 ms if nothing is there.
+#pragma once
+
+#include <cstdint>
+
+#include "pin_models.hpp"
+
+namespace r4 {
+namespace sim {
+
+class UltrasonicModel {
+ public:
+  static constexpr std::uint32_t burst_us = 450;  // from the trigger's end to the echo line's rise
+  static constexpr std::uint32_t us_per_cm = 58;
+  static constexpr std::uint32_t nothing_us = 38000;
+
+  OutputPinModel& trigger() { return trigger_; }
+  // 0: nothing is in sight.
+  void set_distance(std::uint16_t cm) { cm_ = cm; }
+  // A sensor without its cable says nothing.
+  void connect(bool connected) { connected_ = connected; }
+
+  // It is `now_us`. Reports the edges of the echo line since the last call, with their times:
+  // on_edge(bool high, std::uint32_t at_us).
+  template <class OnEdge>
+  void pass(std::uint32_t now_us, OnEdge&& on_edge) {
+    const bool fell = triggered_ && !trigger_.high();
+    triggered_ = trigger_.high();
+    if (fell && phase_ == Phase::quiet && connected_) {
+      phase_ = Phase::burst;
+      next_us_ = now_us + burst_us;
+    }
+    if (phase_ == Phase::burst && reached(now_us)) {
+      on_edge(true, next_us_);
+      phase_ = Phase::echo;
+      next_us_ += cm_ == 0 ? nothing_us : cm_ * us_per_cm;
+    }
+    if (phase_ == Phase::echo && reached(now_us)) {
+      on_edge(false, next_us_);
+      phase_ = Phase::quiet;
+    }
+  }
+
+ private:
+  enum class Phase : std::uint8_t { quiet, burst, echo };
+
+  bool reached(std::uint32_t now_us) const {
+    return static_cast<std::int32_t>(now_us - next_us_) >= 0;
+  }
+
+  OutputPinModel trigger_;
+  std::uint16_t cm_ = 0;
+  bool connected_ = true;
+  bool triggered_ = false;
+  Phase phase_ = Phase::quiet;
+  std::uint32_t next_us_ = 0;  // the next edge
+};
+
+}  // namespace sim
+}  // namespace r4
