@@ -270,6 +270,15 @@ bool BoardHardware::stepping() const {
   return false;
 }
 
+void BoardHardware::fit(std::uint8_t chips) {
+  config_.chips_fitted = chips;
+  fault_ = ChipFault();
+  for (int i = 0; i < chip_count; ++i) {
+    failed_[i] = false;
+    if (!fitted(i)) chips_[i]->begin();  // forgets its trouble
+  }
+}
+
 bool BoardHardware::ready() const {
   for (int i = 0; i < chip_count; ++i) {
     if (fitted(i) && !chips_[i]->ready()) return false;

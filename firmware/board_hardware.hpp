@@ -83,6 +83,9 @@ class BoardHardware final : public Hal {
   void zero(int channel) override;
   bool clear_fault() override;  // false while a chip is not ready
 
+  // Only these chips are there (bit: Chip): the others are left alone from now on, and what was
+  // found wrong before is found again if it still is. Before anything is applied.
+  void fit(std::uint8_t chips);
   // From now on. `input` as in BoardPins::analog.
   void calibrate(int input, const AnalogCalibration& calibration) {
     config_.calibration[input] = calibration;

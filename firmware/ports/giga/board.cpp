@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "board.hpp"
+
+#include "../../../transports/framing/can_ids.hpp"
+#include "board_clock.hpp"
+
+namespace r4 {
+namespace giga {
+
+namespace {
+
+constexpr std::uint32_t settle_ms =
+    1000;  // settings are kept when they have been left alone so long
+constexpr std::uint32_t can_bit_rate = 1000000;
+
+// Hexadecimal, 24 digits: the chip's own number.
+Text board_id() {
+  static char text[24];
+  const std::uint32_t words[] = {HAL_GetUIDw0(), HAL_GetUIDw1(), HAL_GetUIDw2()};
+  char* at = text;
+  for (const std::uint32_t word : words) {
+    for (int shift = 28; shift >= 0; shift -= 4) *at++ = "0123456789abcdef"[word >> shift & 0xFU];
+  }
+  return Text(text, sizeof text);
+}
+
+firmware::Application::Config config_of(const Settings& settings) {
+  firmware::Application::Config config;
+  config.identity.firmware = Text("0.1.0");
+  config.identity.board_id = board_id();
+  config.identity.capabilities = Text("udp+serial+can");
+  config.settings = settings;
+  return config;
+}
+
+// Pins, clock and bit timing of FDCAN2. False: it does not run.
+bool start_can(Fdcan& fdcan, std::uint8_t node) {
+  constexpr std::uint32_t rcc_fdcan_on = 1U << 8;
+  constexpr std::uint32_t clock_field = 3U << 28;
+  constexpr std::uint32_t clock_pll1_q = 1U << 28;
+  make_alternate(line_of(can_tx_pin), can_function, LinePull::up);
+  make_alternate(line_of(can_rx_pin), can_function, LinePull::up);
+  {
+    const InterruptLock lock;
+    RCC->D2CCIP1R = (RCC->D2CCIP1R & ~clock_field) | clock_pll1_q;
+    RCC->APB1HENR |= rcc_fdcan_on;
+    static_cast<void>(static_cast<std::uint32_t>(RCC->APB1HENR));
+  }
+  PLL1_ClocksTypeDef clocks;
+  HAL_RCCEx_GetPLL1ClockFreq(&clocks);
+  return fdcan.start(can_bit_timing(clocks.PLL1_Q_Frequency, can_bit_rate), emergency_stop_id,
+                     command_id(node));
+}
+
+Fdcan* interrupted = nullptr;  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables)
+
+void on_can() {
+  interrupted->on_interrupt();
+  wake_loop();
+}
+
+// A word for the board itself: letters only, so no datagram.
+bool is_word(Text line, Text word) { return line == word; }
+
+SafeReason reason_of(const FaultNote& note) {
+  switch (note.kind) {
+    case FaultNote::Kind::none:
+      break;
+    case FaultNote::Kind::fault:
+      return SafeReason::fault;
+    case FaultNote::Kind::watchdog:
+      return SafeReason::watchdog;
+  }
+  return SafeReason::none;
+}
+
+}  // namespace
+
+Board::Board(Machine& machine, SettingsStore& store, const Settings& settings,
+             const FaultNote& last_boot)
+    : machine_(machine),
+      store_(store),
+      fdcan_(*FDCAN2, reinterpret_cast<volatile std::uint32_t*>(SRAMCAN_BASE)),
+      can_(fdcan_, settings.site.can_node, &BoardClock::now_us),
+      application_(machine.hardware(), config_of(settings)),
+      report_(report_sources(last_boot)),
+      used_(settings),
+      kept_(settings),
+      last_boot_(reason_of(last_boot)) {}
+
+BootReport::Sources Board::report_sources(const FaultNote& last_boot) {
+  BootReport::Sources sources{};
+  sources.settings = &used_;
+  sources.bus = &machine_.bus();
+  sources.hardware = &machine_.hardware();
+  sources.network = &network_;
+  sources.can = &fdcan_;
+  sources.store = &store_;
+  sources.last_boot = last_boot;
+  sources.timer_hz = timer_input_hz();
+  return sources;
+}
+
+void Board::start() {
+  usb_number_ = application_.add_port(usb_);
+  udp_number_ = application_.add_port(udp_);
+  can_number_ = application_.add_port(can_);
+  use(used_);
+  if (start_can(fdcan_, used_.site.can_node)) {
+    interrupted = &fdcan_;
+    NVIC_SetVector(FDCAN2_IT0_IRQn, reinterpret_cast<std::uintptr_t>(&on_can));
+    NVIC_EnableIRQ(FDCAN2_IT0_IRQn);
+  }
+  network_.start();
+  const std::uint32_t now_ms = BoardClock::now_ms();
+  application_.start(now_ms);
+  if (last_boot_ != SafeReason::none) application_.fail(last_boot_, now_ms);
+  start_guard_timer(application_.guard());
+  machine_.start();
+}
+
+void Board::poll() {
+  machine_.poll();
+  hear();
+  const std::uint32_t now_ms = BoardClock::now_ms();
+  application_.poll(now_ms);
+  follow_settings(now_ms);
+  tell_report();
+  light_.show(application_.state(), application_.reason(), now_ms);
+}
+
+// All that has arrived, and what became of the transports.
+void Board::hear() {
+  const bool can_lost = can_.receive([this](Text datagram) {
+    application_.receive(can_number_, firmware::everyone, datagram, BoardClock::now_ms());
+  });
+  usb_.receive([this](Text line) { hear_usb(line); });
+  const bool udp_lost = udp_.receive([this](std::uint32_t peer, Text datagram) {
+    application_.receive(udp_number_, peer, datagram, BoardClock::now_ms());
+  });
+  const std::uint32_t now_ms = BoardClock::now_ms();
+  if (can_lost) application_.port_down(can_number_, now_ms);
+  if (udp_lost) application_.port_down(udp_number_, now_ms);
+  if (usb_.poll(now_ms)) application_.port_down(usb_number_, now_ms);
+}
+
+void Board::hear_usb(Text line) {
+  if (is_word(line, "report")) {
+    report_.begin();
+    waiting_line_ = Text();
+  } else {
+    application_.receive(usb_number_, firmware::everyone, line, BoardClock::now_ms());
+  }
+}
+
+// A line of the report a turn, each as soon as USB has room for it.
+void Board::tell_report() {
+  if (!usb_.open() || (waiting_line_.empty() && !report_.running())) return;
+  if (waiting_line_.empty()) waiting_line_ = report_.next(report_line_);
+  if (!waiting_line_.empty() && usb_.say(waiting_line_)) waiting_line_ = Text();
+}
+
+void Board::use(const Settings& settings) {
+  for (int i = 0; i < analog_channels; ++i) {
+    firmware::AnalogCalibration calibration;
+    if (calibration.set(0, 0, 0xFFFF, settings.site.full_scale_cv[i])) {
+      machine_.hardware().calibrate(i, calibration);
+    }
+  }
+  network_.use(settings.site);
+}
+
+void Board::follow_settings(std::uint32_t now_ms) {
+  const Settings& settings = application_.settings();
+  if (settings != used_) {
+    const bool elsewhere = !(settings.site == used_.site);
+    used_ = settings;
+    if (elsewhere) use(used_);
+    changed_ = true;
+    changed_ms_ = now_ms;
+  }
+  if (!changed_ || now_ms - changed_ms_ < settle_ms) return;
+  changed_ = false;
+  if (used_ != kept_) store_.keep(used_);
+  kept_ = used_;
+}
+
+}  // namespace giga
+}  // namespace r4

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "boot_report.hpp"
+
+#include "../../../protocol/message.hpp"
+#include "../../../protocol/numbers.hpp"
+
+namespace r4 {
+namespace giga {
+
+namespace {
+
+// A line being written; what does not fit is cut off.
+class LineWriter {
+ public:
+  explicit LineWriter(char (&out)[BootReport::max_line]) : out_(out) {}
+  LineWriter& text(Text text) {
+    for (const char c : text) {
+      if (size_ < BootReport::max_line) out_[size_++] = c;
+    }
+    return *this;
+  }
+  LineWriter& words(const char* words) { return text(Text(words, std::strlen(words))); }
+  LineWriter& number(std::uint32_t value) {
+    char digits[max_number_text];
+    return text(Text(digits, static_cast<std::size_t>(write_number(digits, value) - digits)));
+  }
+  LineWriter& hundredths(std::uint32_t value) {
+    char digits[max_number_text];
+    char* const end = write_hundredths(digits, static_cast<std::int32_t>(value));
+    return text(Text(digits, static_cast<std::size_t>(end - digits)));
+  }
+  // At least two digits, as the paper writes addresses.
+  LineWriter& hex(std::uint32_t value) {
+    char digits[max_number_text];
+    const char* const end = write_hex(digits, value);
+    text(value < 0x10 ? Text("0x0") : Text("0x"));
+    return text(Text(digits, static_cast<std::size_t>(end - digits)));
+  }
+  LineWriter& address(std::uint32_t ip) {
+    for (int shift = 24; shift >= 0; shift -= 8) {
+      number(ip >> shift & 0xFFU);
+      if (shift != 0) text(".");
+    }
+    return *this;
+  }
+  Text done() const { return Text(out_, size_); }
+
+ private:
+  char* const out_;
+  std::size_t size_ = 0;
+};
+
+Text state_text(StoreState state) {
+  switch (state) {
+    case StoreState::loading:
+      return "being read";
+    case StoreState::ready:
+      return "kept in the key-value store";
+    case StoreState::absent:
+      break;
+  }
+  return "not kept: no key-value store on QSPI partition 3 (docs/firmware.md)";
+}
+
+void write_last_boot(LineWriter& line, const FaultNote& note) {
+  line.text("Last boot ended by: ");
+  switch (note.kind) {
+    case FaultNote::Kind::none:
+      line.text("power or reset");
+      break;
+    case FaultNote::Kind::watchdog:
+      line.text("watchdog");
+      break;
+    case FaultNote::Kind::fault:
+      line.text("fault, exception ").number(note.exception).text(", pc ").hex(note.pc);
+      line.text(", status ").hex(note.status);
+      break;
+  }
+}
+
+}  // namespace
+
+// One address of the scan; nothing to say while nobody answers.
+Text BootReport::scan(char (&out)[max_line]) {
+  const std::uint8_t address = address_++;
+  if (sources_.bus->write(address, nullptr, 0) != firmware::I2cResult::ok) return Text();
+  LineWriter line(out);
+  line.text("i2c device found at address ").hex(address);
+  return line.done();
+}
+
+Text BootReport::chip(char (&out)[max_line]) {
+  const auto chip = static_cast<firmware::Chip>(chip_++);
+  LineWriter line(out);
+  const bool fitted = (sources_.settings->site.chips >> static_cast<int>(chip) & 1) != 0;
+  line.words(firmware::to_text(chip)).text(": ");
+  const firmware::ChipTrouble trouble = sources_.hardware->trouble(chip);
+  if (!fitted) {
+    line.text("not fitted");
+  } else if (trouble == firmware::ChipTrouble::none) {
+    line.text("ok");
+  } else {
+    line.words(firmware::to_text(trouble));
+  }
+  return line.done();
+}
+
+Text BootReport::next(char (&out)[max_line]) {
+  LineWriter line(out);
+  const Settings& settings = *sources_.settings;
+  const std::uint32_t period_ms = 1000U / settings.state_rate_hz;
+  const bool up = sources_.network->state() == NetworkState::up;
+  switch (step_++) {
+    case 1:
+      return line.text("R4 Test!").done();
+    case 2:
+      line.text("Heartbeat Frequency Hz   : ");
+      if (1000 % settings.heartbeat_ms == 0)
+        return line.number(1000U / settings.heartbeat_ms).done();
+      return line.hundredths(100000U / settings.heartbeat_ms).done();
+    case 3:
+      line.text("TimedheartBeatlimiter    : ").number(settings.heartbeat_ms / period_ms);
+      return line.done();
+    case 4:
+      return line.text("HeartbeatInterval_ms     : ").number(settings.heartbeat_ms).done();
+    case 5:
+      return line.text("heartbeatIntervalMax     : ").number(settings.timeout_ms).done();
+    case 6:
+      return line.text("Datagram  Frequency Hz   : ").number(settings.state_rate_hz).done();
+    case 7:
+      return line.text("datagramInteruptlimiter  : ").number(period_ms).done();
+    case 8:
+      return line.text("datagramInterval_ms      : ").number(period_ms).done();
+    case 9:
+      return line.text("Scanning i2c Bus...").done();
+    case 10:
+      if (address_ < last_address) --step_;
+      return scan(out);
+    case 11:
+      return line.text("Scan Complete").done();
+    case 12:
+      return line.text("[TISR] Timer Input Freq (Hz) = ").number(sources_.timer_hz).done();
+    case 13:
+      return line.text("[TISR] Frequency =1000.00, _count = 1000").done();
+    case 14:
+      return line.text("Started ITimer0 OK").done();
+    case 15:
+      if (settings.site.network[0] == '\0') return line.text("WiFi: off (C:network,NAME)").done();
+      return line.text("Initializing Giga WiFi UDP Client").done();
+    case 16:
+      return up ? line.address(sources_.network->ip()).done() : Text();
+    case 17:
+      if (settings.site.network[0] == '\0') return Text();
+      line.text(up ? Text("Connected to Wifi: ") : Text("Joining Wifi: "));
+      line.words(settings.site.network);
+      return line.text(up ? Text(" : WL_CONNECTED") : Text("")).done();
+    case 18:
+      if (!up) return Text();
+      line.text("Starting Wifi UDP - 0 means failed: 1, port ").number(settings.site.udp_port);
+      return line.done();
+    case 19:
+      line.text("CAN: node ").number(settings.site.can_node).text(", ");
+      line.words(to_text(sources_.can->state()));
+      line.text(", errors sent ").number(sources_.can->transmit_errors());
+      line.text(", received ").number(sources_.can->receive_errors());
+      return line.text(", bus-offs ").number(sources_.can->counters().bus_offs).done();
+    case 20:
+      chip_ = 0;
+      return line.text("Settings: ").text(state_text(sources_.store->state())).done();
+    case 21:
+      if (chip_ + 1 < firmware::chip_count) --step_;
+      return chip(out);
+    default:
+      step_ = 0;
+      write_last_boot(line, sources_.last_boot);
+      return line.done();
+  }
+}
+
+}  // namespace giga
+}  // namespace r4

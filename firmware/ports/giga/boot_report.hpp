@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The report of the paper's Figure 3, on request, a line a turn: rates, the scan of the I2C bus, the
+// timer, the network; then what the paper's firmware did not know: chips, CAN, settings, how the last
+// boot ended. Labels are spelled as in the paper.
+//
+// The scan asks one address a turn, so the loop waits for no more than one transfer.
+#pragma once
+
+#include <cstdint>
+
+#include "../../../protocol/settings.hpp"
+#include "../../board_hardware.hpp"
+#include "fault.hpp"
+#include "fdcan.hpp"
+#include "network.hpp"
+#include "settings_store.hpp"
+
+namespace r4 {
+namespace giga {
+
+class BootReport {
+ public:
+  // What is told. All of it outlives the report.
+  struct Sources {
+    const Settings* settings;
+    firmware::I2cBus* bus;
+    const firmware::BoardHardware* hardware;
+    const Network* network;
+    const Fdcan* can;
+    const SettingsStore* store;
+    FaultNote last_boot;
+    std::uint32_t timer_hz;
+  };
+  static constexpr std::size_t max_line = 96;
+
+  explicit BootReport(const Sources& sources) : sources_(sources) {}
+
+  // From the beginning.
+  void begin() {
+    step_ = 1;
+    address_ = first_address;
+  }
+  bool running() const { return step_ != 0; }
+  // The next line, or nothing this turn; to be called while running().
+  Text next(char (&out)[max_line]);
+
+ private:
+  static constexpr std::uint8_t first_address = 0x08;  // below and above: reserved (UM10204 3.1.12)
+  static constexpr std::uint8_t last_address = 0x77;
+
+  Text scan(char (&out)[max_line]);
+  Text chip(char (&out)[max_line]);
+
+  Sources sources_;
+  int step_ = 0;  // of the list in next(); 0: not running
+  std::uint8_t address_ = 0;
+  int chip_ = 0;
+};
+
+}  // namespace giga
+}  // namespace r4

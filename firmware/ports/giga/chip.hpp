@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The Giga's core: Mbed OS, and the registers of the STM32H747 by the names of its maker (CMSIS).
+// Included here, and only here and below, after the standard's headers: it defines common names as
+// macros. Those that are functions elsewhere are taken back.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <initializer_list>
+#include <limits>
+#include <type_traits>
+
+// clang-format off
+#include <Arduino.h>
+#include <mbed.h>
+#include <hal/trng_api.h>
+#include <hal/us_ticker_api.h>
+// clang-format on
+
+#undef abs
+#undef bit
+#undef max
+#undef min
+#undef round

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fault.hpp"
+
+#include "chip.hpp"
+
+namespace r4 {
+namespace giga {
+
+namespace {
+
+firmware::Hal* guarded = nullptr;  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables)
+
+constexpr std::uint32_t mark = 0x52344700;  // with the kind in its lowest byte
+
+// RM0399: backup domain writable (PWR_CR1), the clock of the RTC's registers (RCC_APB4ENR), what
+// reset the chip (RCC_RSR).
+constexpr std::uint32_t pwr_backup_writable = 1U << 8;
+constexpr std::uint32_t rcc_rtc_on = 1U << 16;
+constexpr std::uint32_t rsr_forget = 1U << 16;
+constexpr std::uint32_t rsr_watchdog = 1U << 26;
+
+void open_backup_registers() {
+  PWR->CR1 |= pwr_backup_writable;
+  RCC->APB4ENR |= rcc_rtc_on;
+  static_cast<void>(static_cast<std::uint32_t>(RCC->APB4ENR));
+}
+
+// The core and its boot loader use the first ones.
+void keep(const FaultNote& note) {
+  open_backup_registers();
+  RTC->BKP21R = note.exception;
+  RTC->BKP22R = note.pc;
+  RTC->BKP23R = note.status;
+  RTC->BKP20R = mark | static_cast<std::uint32_t>(note.kind);
+}
+
+[[noreturn]] void reset() {
+  constexpr std::uint32_t key = 0x5FAU << 16;
+  constexpr std::uint32_t request = 1U << 2;
+  __DSB();
+  SCB->AIRCR = key | (SCB->AIRCR & 0x700U) | request;
+  __DSB();
+  for (;;) {
+  }
+}
+
+// What the processor puts on the stack for an exception: r0-r3, r12, lr, pc, psr.
+constexpr int frame_pc = 6;
+
+bool is_stack(const std::uint32_t* frame) {
+  const auto at = reinterpret_cast<std::uintptr_t>(frame);
+  const bool in_dtcm = at >= 0x20000000U && at < 0x20020000U - 32;
+  const bool in_ram = at >= 0x24000000U && at < 0x24080000U - 32;
+  return in_dtcm || in_ram;
+}
+
+void on_core_error(const mbed_error_ctx* context) {
+  FaultNote note;
+  note.kind = FaultNote::Kind::fault;
+  note.pc = context->error_address;
+  note.status = static_cast<std::uint32_t>(context->error_status);
+  end_boot(note);
+}
+
+}  // namespace
+
+extern "C" {
+
+[[noreturn, gnu::used]] void r4_giga_on_fault(const std::uint32_t* frame) {
+  FaultNote note;
+  note.kind = FaultNote::Kind::fault;
+  note.exception = __get_IPSR();
+  note.status = SCB->CFSR;
+  if (is_stack(frame)) note.pc = frame[frame_pc];
+  end_boot(note);
+}
+
+#ifdef __arm__
+// From the vector table: the stack that was in use.
+[[gnu::naked]] void r4_giga_fault_entry() {
+  asm volatile(
+      "tst lr, #4\n"
+      "ite eq\n"
+      "mrseq r0, msp\n"
+      "mrsne r0, psp\n"
+      "b r4_giga_on_fault\n");
+}
+#else
+void r4_giga_fault_entry() { r4_giga_on_fault(nullptr); }
+#endif
+
+// The core's last word, instead of blinking for ever with the motors on.
+void mbed_die() {
+  FaultNote note;
+  note.kind = FaultNote::Kind::fault;
+  end_boot(note);
+}
+}
+
+void guard_against_faults(firmware::Hal& hal) {
+  guarded = &hal;
+  const auto entry = reinterpret_cast<std::uintptr_t>(&r4_giga_fault_entry);
+  for (const IRQn_Type fault :
+       {HardFault_IRQn, MemoryManagement_IRQn, BusFault_IRQn, UsageFault_IRQn}) {
+    NVIC_SetVector(fault, entry);
+  }
+  mbed_set_error_hook(&on_core_error);
+}
+
+FaultNote take_fault_note() {
+  open_backup_registers();
+  FaultNote note;
+  const std::uint32_t kind = RTC->BKP20R ^ mark;
+  const bool by_watchdog = (RCC->RSR & rsr_watchdog) != 0;
+  RCC->RSR |= rsr_forget;
+  if (kind == static_cast<std::uint32_t>(FaultNote::Kind::fault) ||
+      kind == static_cast<std::uint32_t>(FaultNote::Kind::watchdog)) {
+    note.kind = static_cast<FaultNote::Kind>(kind);
+    note.exception = RTC->BKP21R;
+    note.pc = RTC->BKP22R;
+    note.status = RTC->BKP23R;
+  } else if (by_watchdog) {
+    note.kind = FaultNote::Kind::watchdog;
+  }
+  keep(FaultNote());
+  return note;
+}
+
+void end_boot(const FaultNote& note) {
+  __disable_irq();
+  if (guarded != nullptr) guarded->make_safe();
+  keep(note);
+  reset();
+}
+
+}  // namespace giga
+}  // namespace r4

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A value that one thread hands to another: the newest wins, neither waits. A seqlock: the taker
+// tries again when it was being written. T is copied byte by byte.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+
+namespace r4 {
+namespace giga {
+
+template <class T>
+class HandOver {
+  static_assert(std::is_trivially_copyable<T>::value, "copied byte by byte");
+
+ public:
+  void put(const T& value) {
+    const std::uint32_t before = version_.load(std::memory_order_relaxed);
+    version_.store(before + 1, std::memory_order_relaxed);  // odd: being written
+    std::atomic_thread_fence(std::memory_order_release);
+    unsigned char flat[sizeof(T)];
+    std::memcpy(flat, &value, sizeof flat);
+    for (std::size_t i = 0; i < sizeof flat; ++i) {
+      bytes_[i].store(flat[i], std::memory_order_relaxed);
+    }
+    version_.store(before + 2, std::memory_order_release);
+  }
+
+  // The newest, if it is another than that of version `known` (0: none yet), which is updated.
+  // False: there is no newer one, or it is being written just now.
+  bool take(std::uint32_t& known, T& value) const {
+    const std::uint32_t before = version_.load(std::memory_order_acquire);
+    if (before == known || before % 2 != 0) return false;
+    unsigned char flat[sizeof(T)];
+    for (std::size_t i = 0; i < sizeof flat; ++i) {
+      flat[i] = bytes_[i].load(std::memory_order_relaxed);
+    }
+    std::atomic_thread_fence(std::memory_order_acquire);
+    if (version_.load(std::memory_order_relaxed) != before) return false;
+    std::memcpy(&value, flat, sizeof flat);
+    known = before;
+    return true;
+  }
+
+ private:
+  std::atomic<std::uint32_t> version_{0};
+  std::atomic<unsigned char> bytes_[sizeof(T)];
+};
+
+}  // namespace giga
+}  // namespace r4

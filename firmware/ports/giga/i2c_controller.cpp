@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "i2c_controller.hpp"
+
+namespace r4 {
+namespace giga {
+
+using firmware::I2cResult;
+
+namespace {
+
+// RM0399 section 50.7.
+constexpr std::uint32_t cr1_on = 1U << 0;  // PE; off releases the lines and forgets the transfer
+constexpr std::uint32_t cr2_read = 1U << 10;
+constexpr std::uint32_t cr2_start = 1U << 13;
+constexpr std::uint32_t cr2_then_stop = 1U << 25;  // AUTOEND
+constexpr std::uint32_t isr_want_byte = 1U << 1;   // TXIS
+constexpr std::uint32_t isr_byte = 1U << 2;        // RXNE
+constexpr std::uint32_t isr_refused = 1U << 4;     // NACKF
+constexpr std::uint32_t isr_stopped = 1U << 5;     // STOPF
+constexpr std::uint32_t isr_complete = 1U << 6;    // TC
+constexpr std::uint32_t isr_bus_error = 1U << 8;   // BERR
+constexpr std::uint32_t isr_lost = 1U << 9;        // ARLO: somebody else pulls SDA down
+constexpr std::uint32_t isr_busy = 1U << 15;
+constexpr std::uint32_t icr_all = 0x3F38;
+
+constexpr std::uint32_t cr2_for(std::uint8_t address, std::size_t size) {
+  return std::uint32_t{address} << 1 | static_cast<std::uint32_t>(size) << 16;
+}
+
+// Of a recovery: half a clock of 100 kHz, and how long a chip may stretch it.
+constexpr std::uint32_t half_clock_us = 5;
+constexpr std::uint32_t stretch_us = 20;
+constexpr int recovery_clocks = 9;
+
+}  // namespace
+
+std::uint32_t i2c_timing(std::uint32_t kernel_hz) {
+  constexpr std::uint32_t fastest_tick_hz = 16000000;
+  constexpr std::uint32_t low_ns = 1500;
+  constexpr std::uint32_t high_ns = 1000;
+  constexpr std::uint32_t hold_ns = 250;
+  constexpr std::uint32_t setup_ns = 400;
+  const std::uint32_t prescaler = (kernel_hz + fastest_tick_hz - 1) / fastest_tick_hz;
+  const std::uint32_t tick_khz = kernel_hz / prescaler / 1000;
+  const auto ticks = [tick_khz](std::uint32_t ns) { return (ns * tick_khz + 999999) / 1000000; };
+  return (prescaler - 1) << 28 | (ticks(setup_ns) - 1) << 20 | ticks(hold_ns) << 16 |
+         (ticks(high_ns) - 1) << 8 | (ticks(low_ns) - 1);
+}
+
+I2cController::I2cController(const Wiring& wiring, Clock clock)
+    : registers_(*wiring.registers),
+      scl_(line_of(wiring.scl)),
+      sda_(line_of(wiring.sda)),
+      clock_(clock) {
+  prepare_open_drain(scl_, wiring.scl_function);
+  prepare_open_drain(sda_, wiring.sda_function);
+}
+
+void I2cController::start(std::uint32_t kernel_hz) {
+  registers_.CR1 = 0;
+  registers_.TIMINGR = i2c_timing(kernel_hz);
+  set_mode(scl_, LineMode::alternate);
+  set_mode(sda_, LineMode::alternate);
+  registers_.CR1 = cr1_on;
+}
+
+I2cController::Transfer I2cController::begin(std::size_t bytes, std::size_t starts) {
+  constexpr std::uint32_t clean_up_us = 20;
+  Transfer transfer;
+  transfer.recovery = recoveries_;
+  transfer.began_us = clock_();
+  transfer.limit_us = firmware::i2c_wire_us(bytes, starts) + firmware::i2c_timeout_us - clean_up_us;
+  return transfer;
+}
+
+bool I2cController::alive(const Transfer& transfer) const {
+  return transfer.recovery == recoveries_ && clock_() - transfer.began_us < transfer.limit_us;
+}
+
+// The next two touch the wire only if nobody has taken it over meanwhile: what was cut off must not
+// begin again, nor leave a byte for the next transfer.
+bool I2cController::request(const Transfer& transfer, std::uint32_t cr2) {
+  const InterruptLock lock;
+  if (transfer.recovery != recoveries_) return false;
+  registers_.ICR = icr_all;
+  registers_.CR2 = cr2 | cr2_start;
+  return true;
+}
+
+bool I2cController::put(const Transfer& transfer, std::uint8_t byte) {
+  const InterruptLock lock;
+  if (transfer.recovery != recoveries_) return false;
+  registers_.TXDR = byte;
+  return true;
+}
+
+I2cResult I2cController::wait_until_free(const Transfer& transfer) {
+  while ((registers_.ISR & isr_busy) != 0) {
+    if (!alive(transfer)) return I2cResult::timeout;
+  }
+  return I2cResult::ok;
+}
+
+// Sends the address and `size` bytes. Ends with STOP, or ready for a repeated START.
+I2cResult I2cController::send(const Transfer& transfer, std::uint8_t address,
+                              const std::uint8_t* bytes, std::size_t size, bool then_stop) {
+  if (!request(transfer, cr2_for(address, size) | (then_stop ? cr2_then_stop : 0))) {
+    return I2cResult::timeout;
+  }
+  std::size_t sent = 0;
+  const std::uint32_t end = then_stop ? isr_stopped : isr_complete;
+  for (;;) {
+    const std::uint32_t status = registers_.ISR;
+    if ((status & (isr_bus_error | isr_lost)) != 0) return I2cResult::timeout;
+    if ((status & isr_refused) != 0) {  // the peripheral sends STOP by itself
+      if ((status & isr_stopped) != 0) return I2cResult::no_acknowledge;
+    } else if ((status & end) != 0) {
+      return I2cResult::ok;
+    } else if ((status & isr_want_byte) != 0 && sent < size) {
+      if (!put(transfer, bytes[sent])) return I2cResult::timeout;
+      ++sent;
+    }
+    if (!alive(transfer)) return I2cResult::timeout;
+  }
+}
+
+I2cResult I2cController::receive(const Transfer& transfer, std::uint8_t address,
+                                 std::uint8_t* bytes, std::size_t size) {
+  if (!request(transfer, cr2_for(address, size) | cr2_read | cr2_then_stop)) {
+    return I2cResult::timeout;
+  }
+  std::size_t received = 0;
+  for (;;) {
+    const std::uint32_t status = registers_.ISR;
+    if ((status & (isr_bus_error | isr_lost)) != 0) return I2cResult::timeout;
+    if ((status & isr_byte) != 0 && received < size) {
+      bytes[received++] = static_cast<std::uint8_t>(registers_.RXDR);
+    } else if ((status & isr_stopped) != 0) {
+      return received == size ? I2cResult::ok : I2cResult::no_acknowledge;
+    }
+    if (!alive(transfer)) return I2cResult::timeout;
+  }
+}
+
+I2cResult I2cController::finish(const Transfer& transfer, I2cResult result) {
+  const InterruptLock lock;
+  if (transfer.recovery != recoveries_) return I2cResult::timeout;
+  registers_.ICR = icr_all;
+  if (result == I2cResult::timeout) restart();
+  return result;
+}
+
+// Off and on: the lines are released and the state of the transfer is gone (50.4.5).
+void I2cController::restart() {
+  registers_.CR1 = 0;
+  for (int i = 0; i < 3; ++i) {  // PE must be low for three clocks of the peripherals' bus
+    static_cast<void>(static_cast<std::uint32_t>(registers_.CR1));
+  }
+  registers_.CR1 = cr1_on;
+}
+
+I2cResult I2cController::write(std::uint8_t address, const std::uint8_t* bytes, std::size_t size) {
+  if (size > max_size) return I2cResult::no_acknowledge;
+  const Transfer transfer = begin(1 + size, 1);
+  I2cResult result = wait_until_free(transfer);
+  if (result == I2cResult::ok) result = send(transfer, address, bytes, size, true);
+  return finish(transfer, result);
+}
+
+I2cResult I2cController::write_read(std::uint8_t address, const std::uint8_t* out,
+                                    std::size_t out_size, std::uint8_t* in, std::size_t in_size) {
+  if (out_size > max_size || in_size > max_size) return I2cResult::no_acknowledge;
+  if (in_size == 0) return write(address, out, out_size);
+  const Transfer transfer = begin(2 + out_size + in_size, 2);
+  I2cResult result = wait_until_free(transfer);
+  if (result == I2cResult::ok && out_size != 0) {
+    result = send(transfer, address, out, out_size, false);
+  }
+  if (result == I2cResult::ok) result = receive(transfer, address, in, in_size);
+  return finish(transfer, result);
+}
+
+void I2cController::pause_us(std::uint32_t us) const {
+  const std::uint32_t began_us = clock_();
+  while (clock_() - began_us <= us) {
+  }
+}
+
+bool I2cController::release_scl() {
+  giga::write(scl_, true);
+  const std::uint32_t began_us = clock_();
+  while (!read(scl_)) {
+    if (clock_() - began_us > stretch_us) return false;
+  }
+  pause_us(half_clock_us);
+  return true;
+}
+
+// By the pins' own levels: the peripheral would not drive lines that it takes for busy.
+bool I2cController::recover() {
+  recoveries_ = recoveries_ + 1;
+  registers_.CR1 = 0;
+  giga::write(scl_, true);
+  giga::write(sda_, true);
+  set_mode(scl_, LineMode::output);
+  set_mode(sda_, LineMode::output);
+  bool released = release_scl();
+  for (int i = 0; released && i < recovery_clocks; ++i) {
+    giga::write(scl_, false);
+    pause_us(half_clock_us);
+    released = release_scl();
+  }
+  if (released) {  // STOP: SDA rises while SCL is high
+    giga::write(scl_, false);
+    giga::write(sda_, false);
+    pause_us(half_clock_us);
+    released = release_scl();
+    giga::write(sda_, true);
+    pause_us(half_clock_us);
+  }
+  const bool free = released && read(scl_) && read(sda_);
+  set_mode(scl_, LineMode::alternate);
+  set_mode(sda_, LineMode::alternate);
+  registers_.CR1 = cr1_on;
+  return free;
+}
+
+}  // namespace giga
+}  // namespace r4

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "machine.hpp"
+
+#include "board_clock.hpp"
+
+namespace r4 {
+namespace giga {
+
+namespace {
+
+firmware::BoardHardware::Config hardware_config() {
+  firmware::BoardHardware::Config config;
+  config.ultrasonic_fitted = (1U << ultrasonic_channels) - 1;  // one that is not there is blind
+  config.step_tick_hz = static_cast<std::int32_t>(step_tick_hz);
+  return config;
+}
+
+I2cController::Wiring bus_wiring() {
+  I2cController::Wiring wiring;
+  wiring.registers = I2C2;
+  wiring.scl = i2c_scl_pin;
+  wiring.sda = i2c_sda_pin;
+  wiring.scl_function = i2c_function;
+  wiring.sda_function = i2c_function;
+  return wiring;
+}
+
+void start_bus(I2cController& bus) {
+  constexpr std::uint32_t rcc_i2c2_on = 1U << 22;
+  {
+    const InterruptLock lock;
+    RCC->APB1LENR |= rcc_i2c2_on;
+    static_cast<void>(static_cast<std::uint32_t>(RCC->APB1LENR));
+  }
+  bus.start(HAL_RCC_GetPCLK1Freq());  // the clock of I2C1-3 after a reset (RCC_D2CCIP2R)
+}
+
+}  // namespace
+
+Machine::Encoder::Encoder(Pin a_pin, Pin b_pin, Pin index_pin)
+    : a(line_of(a_pin)),
+      b(line_of(b_pin)),
+      index(line_of(index_pin), LinePull::down),
+      a_edge(pin_name(a_pin), PullUp),
+      b_edge(pin_name(b_pin), PullUp) {}
+
+void Machine::Encoder::on_edge() { counter->sample(read(a), read(b)); }
+
+Machine::Echo::Echo(Pin pin) : line(line_of(pin)), edge(pin_name(pin), PullDown) {}
+
+void Machine::Echo::on_edge() { sensors->echo(sensor, read(line), BoardClock::now_us()); }
+
+Machine::OutputsOff::OutputsOff(I2cController& bus, firmware::BoardHardware& hardware) {
+  start_bus(bus);
+  hardware.power_up(BoardClock::now_us());
+}
+
+Machine::Machine()
+    : bus_(bus_wiring(), &BoardClock::now_us),
+      step_{GpioOutput(line_of(step_pins[0])), GpioOutput(line_of(step_pins[1])),
+            GpioOutput(line_of(step_pins[2])), GpioOutput(line_of(step_pins[3]))},
+      direction_{GpioOutput(line_of(direction_pins[0])), GpioOutput(line_of(direction_pins[1])),
+                 GpioOutput(line_of(direction_pins[2])), GpioOutput(line_of(direction_pins[3]))},
+      trigger_{GpioOutput(line_of(trigger_pins[0])), GpioOutput(line_of(trigger_pins[1])),
+               GpioOutput(line_of(trigger_pins[2])), GpioOutput(line_of(trigger_pins[3]))},
+      handle_(line_of(handle_pin), LinePull::down),
+      hardware_(bus_, pins(), hardware_config()),
+      outputs_off_(bus_, hardware_),
+      analog_(analog_values_),
+      encoders_{{encoder_a_pins[0], encoder_b_pins[0], index_pins[0]},
+                {encoder_a_pins[1], encoder_b_pins[1], index_pins[1]},
+                {encoder_a_pins[2], encoder_b_pins[2], index_pins[2]},
+                {encoder_a_pins[3], encoder_b_pins[3], index_pins[3]}},
+      echoes_{{echo_pins[0]}, {echo_pins[1]}, {echo_pins[2]}, {echo_pins[3]}} {}
+
+firmware::BoardPins Machine::pins() {
+  firmware::BoardPins pins{};
+  for (int i = 0; i < stepper_channels; ++i) {
+    pins.step[i] = &step_[i];
+    pins.direction[i] = &direction_[i];
+  }
+  for (int i = 0; i < ultrasonic_channels; ++i) pins.trigger[i] = &trigger_[i];
+  for (int i = 0; i < analog_channels; ++i) pins.analog[i] = &analog_values_[i];
+  pins.handle = &handle_;
+  return pins;
+}
+
+void Machine::start() {
+  for (int i = 0; i < encoder_channels; ++i) {
+    Encoder& encoder = encoders_[i];
+    encoder.counter = &hardware_.encoder(i + 1);
+    encoder.on_edge();
+    for (mbed::InterruptIn* line : {&encoder.a_edge, &encoder.b_edge}) {
+      line->rise(mbed::callback(&encoder, &Encoder::on_edge));
+      line->fall(mbed::callback(&encoder, &Encoder::on_edge));
+    }
+  }
+  for (int i = 0; i < ultrasonic_channels; ++i) {
+    Echo& echo = echoes_[i];
+    echo.sensors = &hardware_.ultrasonic();
+    echo.sensor = i;
+    echo.edge.rise(mbed::callback(&echo, &Echo::on_edge));
+    echo.edge.fall(mbed::callback(&echo, &Echo::on_edge));
+  }
+  start_step_timer(*this);
+}
+
+void Machine::poll() {
+  analog_.poll();
+  hardware_.poll(BoardClock::now_us());
+}
+
+void Machine::step_tick() {
+  hardware_.step_tick();
+  for (int i = 0; i < encoder_channels; ++i) {
+    hardware_.encoder(i + 1).index(encoders_[i].index.read());
+  }
+}
+
+}  // namespace giga
+}  // namespace r4

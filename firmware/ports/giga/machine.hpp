@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The hardware of the board as the firmware sees it: the chips on the I2C bus, the pins, the
+// converters, and the interrupts that feed them. There is one.
+#pragma once
+
+#include <cstdint>
+
+#include "../../board_hardware.hpp"
+#include "analog_inputs.hpp"
+#include "i2c_controller.hpp"
+#include "pins.hpp"
+#include "timers.hpp"
+
+namespace r4 {
+namespace giga {
+
+class Machine final : public StepTick {
+ public:
+  // Sets up bus and pins; every output of the board is off when it returns.
+  Machine();
+  // The interrupts: edges of encoders and echoes, the step timer.
+  void start();
+  // A turn of the loop: at most bus_bytes_per_poll bytes on the bus, one conversion.
+  void poll();
+
+  firmware::BoardHardware& hardware() { return hardware_; }
+  I2cController& bus() { return bus_; }
+
+  void step_tick() override;
+
+ private:
+  // Both edges of two lines, or of one.
+  struct Encoder {
+    Encoder(Pin a, Pin b, Pin index);
+    Line a;
+    Line b;
+    GpioInput index;
+    mbed::InterruptIn a_edge;
+    mbed::InterruptIn b_edge;
+    firmware::QuadratureEncoder* counter = nullptr;
+    void on_edge();
+  };
+  struct Echo {
+    Echo(Pin pin);  // NOLINT(google-explicit-constructor): made in an array
+    Line line;
+    mbed::InterruptIn edge;
+    firmware::UltrasonicSensors* sensors = nullptr;
+    int sensor = 0;
+    void on_edge();
+  };
+  // Steps of the construction.
+  struct PortsOn {
+    PortsOn() { start_ports(); }
+  };
+  struct OutputsOff {
+    OutputsOff(I2cController& bus, firmware::BoardHardware& hardware);
+  };
+  firmware::BoardPins pins();
+
+  // The order is that of the power-up: the clock of the ports, the bus, the pins at rest, the chips'
+  // outputs off; then what may take its time.
+  PortsOn ports_on_;
+  I2cController bus_;
+  GpioOutput step_[stepper_channels];
+  GpioOutput direction_[stepper_channels];
+  GpioOutput trigger_[ultrasonic_channels];
+  GpioInput handle_;
+  AnalogValue analog_values_[analog_channels];
+  firmware::BoardHardware hardware_;
+  OutputsOff outputs_off_;
+  AnalogInputs analog_;
+  Encoder encoders_[encoder_channels];
+  Echo echoes_[ultrasonic_channels];
+};
+
+}  // namespace giga
+}  // namespace r4

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Which pin of the Giga serves which channel: the one place where it is said.
+//
+// The paper does not say it; this is our plan. Compare it with the schematic of the board in hand
+// before power is applied to a motor. Element n-1 is channel n; the names in comments are those
+// printed on the Giga.
+//
+// An edge on pin number n of any port comes in by interrupt line n: two pins with the same number
+// cannot both interrupt (RM0399 section 20.4). Line 8 is WiFi's (PI8). The other pins with edges are
+// A and B of the encoders and the echoes; the index lines are sampled, the handle is read.
+#pragma once
+
+#include <cstdint>
+
+#include "gpio.hpp"
+
+namespace r4 {
+namespace giga {
+
+// Stepper drivers.
+constexpr Pin step_pins[stepper_channels] = {{'A', 3}, {'A', 2}, {'J', 8}, {'A', 7}};  // D2-D5
+constexpr Pin direction_pins[stepper_channels] = {
+    {'K', 5}, {'K', 6}, {'E', 6}, {'K', 7}};  // D34 D36 D40 D41
+
+// Ultrasonic sensors.
+constexpr Pin trigger_pins[ultrasonic_channels] = {
+    {'I', 14}, {'H', 15}, {'G', 12}, {'I', 13}};  // D39 D46 D24 D45
+constexpr Pin echo_pins[ultrasonic_channels] = {
+    {'I', 10}, {'I', 11}, {'J', 12}, {'G', 13}};  // D43 D50 D22 D23
+
+// Encoders.
+constexpr Pin encoder_a_pins[encoder_channels] = {
+    {'J', 0}, {'J', 2}, {'J', 4}, {'J', 6}};  // D25 D29 D33 D37
+constexpr Pin encoder_b_pins[encoder_channels] = {
+    {'J', 1}, {'J', 3}, {'J', 5}, {'J', 7}};  // D27 D31 D35 D38
+constexpr Pin index_pins[encoder_channels] = {
+    {'J', 14}, {'J', 15}, {'K', 3}, {'K', 4}};  // D26 D28 D30 D32
+
+// The dead-man's handle: high while held; a broken wire is a released handle.
+constexpr Pin handle_pin = {'I', 15};  // D42
+
+// Analog inputs in the order of protocol/state.hpp: AIN24 AIN12 AIN5 AINDMH AINSTEER AIN6.
+constexpr Pin analog_pins[analog_channels] = {{'C', 4}, {'C', 5}, {'B', 0},
+                                              {'B', 1}, {'C', 3}, {'C', 2}};  // A0-A5
+
+// The I2C bus of the chips: SCL and SDA (D21, D20), I2C2, alternate function 4.
+constexpr Pin i2c_scl_pin = {'H', 4};
+constexpr Pin i2c_sda_pin = {'B', 11};
+constexpr std::uint32_t i2c_function = 4;
+
+// CAN: FDCAN2, alternate function 9; the transceiver is on the board.
+constexpr Pin can_tx_pin = {'B', 13};
+constexpr Pin can_rx_pin = {'B', 5};
+constexpr std::uint32_t can_function = 9;
+
+// The Giga's own light; low is on.
+constexpr Pin red_led_pin = {'I', 12};
+constexpr Pin green_led_pin = {'J', 13};
+constexpr Pin blue_led_pin = {'E', 3};
+
+namespace pin_plan {
+
+constexpr std::uint32_t wifi_line = 1U << 8;
+
+template <int n>
+constexpr std::uint32_t lines_of(const Pin (&pins)[n]) {
+  std::uint32_t lines = 0;
+  for (const Pin& pin : pins) lines |= 1U << pin.number;
+  return lines;
+}
+
+constexpr int count_of(std::uint32_t lines) {
+  int count = 0;
+  for (; lines != 0; lines &= lines - 1) ++count;
+  return count;
+}
+
+static_assert(count_of(lines_of(encoder_a_pins) | lines_of(encoder_b_pins) | lines_of(echo_pins) |
+                       wifi_line) == 2 * encoder_channels + ultrasonic_channels + 1,
+              "two pins share an interrupt line");
+
+}  // namespace pin_plan
+
+}  // namespace giga
+}  // namespace r4

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "settings_store.hpp"
+
+// clang-format off
+#include "chip.hpp"
+#include <BlockDevice.h>
+#include <MBRBlockDevice.h>
+#include <TDBStore.h>
+// clang-format on
+
+namespace r4 {
+namespace giga {
+
+namespace {
+
+constexpr int partition_number = 3;
+constexpr const char* key = "r4-settings";
+constexpr std::chrono::milliseconds pause(100);
+
+}  // namespace
+
+void SettingsStore::start() { thread_.start(mbed::callback(&SettingsStore::run, this)); }
+
+void SettingsStore::run(SettingsStore* store) { store->serve(); }
+
+void SettingsStore::serve() {
+  mbed::BlockDevice* const flash = mbed::BlockDevice::get_default_instance();
+  mbed::MBRBlockDevice partition(flash, partition_number);
+  mbed::TDBStore store(&partition);
+  if (flash == nullptr || partition.init() != mbed::BD_ERROR_OK ||
+      partition.size() > partition_max || store.init() != MBED_SUCCESS) {
+    state_.store(StoreState::absent, std::memory_order_release);
+    return;
+  }
+  Record record = {};
+  std::size_t size = 0;
+  if (store.get(key, record.text, sizeof record.text, &size) == MBED_SUCCESS) {
+    record.size = static_cast<std::uint16_t>(size);
+    from_store_.put(record);
+  }
+  state_.store(StoreState::ready, std::memory_order_release);
+  for (std::uint32_t version = 0;;) {
+    if (to_store_.take(version, record)) {
+      if (store.set(key, record.text, record.size, 0) != MBED_SUCCESS) ++failures_;
+    }
+    rtos::ThisThread::sleep_for(pause);
+  }
+}
+
+bool SettingsStore::loaded(Settings& settings) {
+  Record record;
+  std::uint32_t version = 0;
+  if (!from_store_.take(version, record) || record.size > sizeof record.text) return false;
+  read_settings(Text(record.text, record.size), settings);
+  return true;
+}
+
+void SettingsStore::keep(const Settings& settings) {
+  if (state() != StoreState::ready) return;
+  Record record = {};
+  Text text;
+  if (!write_settings(settings, record.text, sizeof record.text, text)) return;
+  record.size = static_cast<std::uint16_t>(text.size());
+  to_store_.put(record);
+}
+
+}  // namespace giga
+}  // namespace r4

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The settings over a restart: a text (settings.hpp) in the core's key-value store on partition 3 of
+// the QSPI flash, by a thread of its own, for an erase takes a tenth of a second and more.
+//
+//     loading ---> ready     the store is there; the settings, if any were kept, wait in loaded()
+//             ---> absent    no partition 3, or one that is not the store's
+//
+// Nothing is ever written outside that partition (partition 1 holds the WiFi firmware), nor to one
+// larger than partition_max: older layouts have a user's files there.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "../../../protocol/settings.hpp"
+#include "chip.hpp"
+#include "hand_over.hpp"
+
+namespace r4 {
+namespace giga {
+
+enum class StoreState : std::uint8_t { loading, ready, absent };
+
+class SettingsStore {
+ public:
+  static constexpr std::uint64_t partition_max = 2 * 1024 * 1024;
+
+  // Once, from the loop.
+  void start();
+  StoreState state() const { return state_.load(std::memory_order_acquire); }
+  // What was kept, into `settings`; as soon as the state is ready. False: nothing was.
+  bool loaded(Settings& settings);
+  // To be kept, soon. Not while loading.
+  void keep(const Settings& settings);
+
+  std::uint32_t failures() const {
+    return failures_.load(std::memory_order_relaxed);
+  }  // of writing
+
+ private:
+  struct Record {
+    std::uint16_t size;
+    char text[max_settings_text];
+  };
+
+  static void run(SettingsStore* store);
+  void serve();
+
+  static constexpr std::uint32_t stack_size = 8192;
+
+  std::atomic<StoreState> state_{StoreState::loading};
+  std::atomic<std::uint32_t> failures_{0};
+  HandOver<Record> from_store_;
+  HandOver<Record> to_store_;
+
+  alignas(8) unsigned char stack_[stack_size];
+  rtos::Thread thread_{osPriorityBelowNormal, stack_size, stack_, "r4-settings"};
+};
+
+}  // namespace giga
+}  // namespace r4

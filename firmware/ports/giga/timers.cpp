@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "timers.hpp"
+
+#include "board_clock.hpp"
+#include "chip.hpp"
+#include "fault.hpp"
+#include "watchdog.hpp"
+
+namespace r4 {
+namespace giga {
+
+namespace {
+
+// What interrupt handlers need lives here, and only here. NOLINTBEGIN
+StepTick* stepping = nullptr;
+firmware::Guard* guarding = nullptr;
+std::uint32_t fed_ms = 0;
+// NOLINTEND
+
+constexpr std::uint32_t woken = 1;
+rtos::EventFlags& loop_flags() {
+  static rtos::EventFlags flags;
+  return flags;
+}
+
+void on_step_timer() {
+  TIM7->SR = 0;
+  stepping->step_tick();
+}
+
+void on_millisecond() {
+  BoardClock::advance();
+  const std::uint32_t now_ms = BoardClock::now_ms();
+  if (guarding->tick(now_ms)) {
+    Watchdog::feed();
+    fed_ms = now_ms;
+  } else if (now_ms - fed_ms >= starve_ms) {
+    FaultNote note;
+    note.kind = FaultNote::Kind::watchdog;
+    end_boot(note);
+  }
+  wake_loop();
+}
+
+}  // namespace
+
+// The timers' clock is twice their bus's, unless that runs undivided (RM0399 section 8.5.5).
+std::uint32_t timer_input_hz() {
+  const std::uint32_t bus_hz = HAL_RCC_GetPCLK1Freq();
+  return bus_hz == HAL_RCC_GetHCLKFreq() ? bus_hz : 2 * bus_hz;
+}
+
+void start_step_timer(StepTick& tick) {
+  constexpr std::uint32_t rcc_tim7_on = 1U << 5;
+  constexpr std::uint32_t update_interrupt = 1;
+  constexpr std::uint32_t on = 1;
+  stepping = &tick;
+  RCC->APB1LENR |= rcc_tim7_on;
+  static_cast<void>(static_cast<std::uint32_t>(RCC->APB1LENR));
+  TIM7->PSC = 0;
+  TIM7->ARR = timer_input_hz() / step_tick_hz - 1;
+  TIM7->EGR = 1;  // takes both over now
+  TIM7->SR = 0;
+  TIM7->DIER = update_interrupt;
+  NVIC_SetVector(TIM7_IRQn, reinterpret_cast<std::uintptr_t>(&on_step_timer));
+  NVIC_EnableIRQ(TIM7_IRQn);
+  TIM7->CR1 = on;
+}
+
+void start_guard_timer(firmware::Guard& guard) {
+  static mbed::Ticker ticker;
+  guarding = &guard;
+  fed_ms = BoardClock::now_ms();
+  loop_flags();
+  ticker.attach(mbed::callback(&on_millisecond), std::chrono::microseconds(1000));
+}
+
+void wake_loop() { loop_flags().set(woken); }
+
+void rest() { loop_flags().wait_any_for(woken, std::chrono::milliseconds(2)); }
+
+}  // namespace giga
+}  // namespace r4

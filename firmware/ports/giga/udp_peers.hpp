@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Numbers for the hosts that have sent to the board's socket, and where what is for everyone goes
+// (docs/transports.md, as udp://BIND?peer=HOST does it). A number is never given twice; the table
+// forgets whoever was silent longest. Of the network thread alone.
+#pragma once
+
+#include <cstdint>
+
+#include "../../port.hpp"
+
+namespace r4 {
+namespace giga {
+
+struct UdpAddress {
+  std::uint32_t ip = 0;  // a.b.c.d, a in the highest byte
+  std::uint16_t port = 0;
+  friend bool operator==(UdpAddress a, UdpAddress b) { return a.ip == b.ip && a.port == b.port; }
+};
+
+class UdpPeers {
+ public:
+  static constexpr int capacity = 8;
+  static constexpr std::uint16_t host_port = 2390;  // where the paper's client listens
+
+  // A host that gets what is for everyone, at host_port; 0: none.
+  void set_host(std::uint32_t ip) { host_ = ip; }
+
+  // The number of whoever has just been heard.
+  std::uint32_t heard(UdpAddress from, std::uint32_t now_ms) {
+    Entry* place = &entries_[0];
+    for (Entry& entry : entries_) {
+      if (entry.number != firmware::everyone && entry.address == from) {
+        place = &entry;
+        break;
+      }
+      const bool longer_silent = now_ms - entry.heard_ms > now_ms - place->heard_ms;
+      if (place->number != firmware::everyone &&
+          (entry.number == firmware::everyone || longer_silent)) {
+        place = &entry;
+      }
+    }
+    if (place->number == firmware::everyone || !(place->address == from)) {
+      place->address = from;
+      place->number = ++given_;
+    }
+    place->heard_ms = now_ms;
+    last_ = place->number;
+    return place->number;
+  }
+
+  // Where to send what is for `peer`. False: nowhere.
+  bool find(std::uint32_t peer, UdpAddress& to) const {
+    if (peer == firmware::everyone && host_ != 0) {
+      to.ip = host_;
+      to.port = host_port;
+      return true;
+    }
+    const std::uint32_t number = peer == firmware::everyone ? last_ : peer;
+    for (const Entry& entry : entries_) {
+      if (number == firmware::everyone || entry.number != number) continue;
+      to = entry.address;
+      if (to.ip == host_) to.port = host_port;  // it asks from another port than it listens at
+      return true;
+    }
+    return false;
+  }
+
+ private:
+  struct Entry {
+    UdpAddress address;
+    std::uint32_t number = firmware::everyone;  // everyone: free
+    std::uint32_t heard_ms = 0;
+  };
+  Entry entries_[capacity];
+  std::uint32_t given_ = 0;
+  std::uint32_t last_ = firmware::everyone;
+  std::uint32_t host_ = 0;
+};
+
+}  // namespace giga
+}  // namespace r4

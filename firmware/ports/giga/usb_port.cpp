@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "usb_port.hpp"
+
+// clang-format off
+#include "chip.hpp"
+#include <USB/PluggableUSBSerial.h>
+// clang-format on
+
+namespace r4 {
+namespace giga {
+
+std::uint32_t UsbPort::read(char (&chunk)[packet_size]) {
+  std::uint32_t size = 0;
+  while (size < packet_size && _SerialUSB.available() > 0) {
+    const int byte = _SerialUSB.read();
+    if (byte < 0) break;
+    chunk[size++] = static_cast<char>(byte);
+  }
+  return size;
+}
+
+void UsbPort::fill_packet() {
+  packet_sent_ = 0;
+  packet_used_ = 0;
+  char byte = 0;
+  while (packet_used_ < packet_size && lines_.take(byte)) {
+    packet_[packet_used_++] = static_cast<std::uint8_t>(byte);
+  }
+}
+
+void UsbPort::send_packet() {
+  if (packet_sent_ == packet_used_) fill_packet();
+  std::uint32_t size = packet_used_ - packet_sent_;
+  if (size == 0) return;
+  // The host's driver passes on what it has at a packet that is not full.
+  if (size == packet_size && lines_.empty()) --size;
+  std::uint32_t taken = 0;
+  _SerialUSB.send_nb(packet_ + packet_sent_, size, &taken, true);
+  packet_sent_ += taken;
+}
+
+bool UsbPort::poll(std::uint32_t now_ms) {
+  const bool open = _SerialUSB.connected();
+  const bool closed = open_ && !open;
+  if (open != open_) {  // what began for one program is nothing for the next
+    framing_.reset();
+    packet_sent_ = packet_used_;
+  }
+  open_ = open;
+  lines_.poll(now_ms);
+  send_packet();
+  return closed;
+}
+
+void UsbPort::send(Text datagram, firmware::Urgency urgency, std::uint32_t) {
+  if (urgency == firmware::Urgency::state) {
+    lines_.put_state(datagram);
+  } else {
+    lines_.put(datagram);
+  }
+  send_packet();
+}
+
+bool UsbPort::say(Text line) {
+  const std::uint32_t before = lines_.dropped();
+  lines_.put(line);
+  return lines_.dropped() == before;
+}
+
+}  // namespace giga
+}  // namespace r4

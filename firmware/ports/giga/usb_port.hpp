@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// USB serial as a port of the application: one datagram a line, and a few words for people.
+//
+// Nothing here waits for the host. The core's Serial.write() would, for ever, when a program has the
+// port open and does not read; so lines go out by send_nb(), a packet at a time, whole or not at
+// all, and the newest state wins (transmit_lines.hpp).
+//
+// A line that is one word (`report`, `help`) is for the board itself; no datagram is one. From the
+// loop only.
+#pragma once
+
+#include <cstdint>
+
+#include "../../../transports/framing/line_framing.hpp"
+#include "../../port.hpp"
+#include "../../transmit_lines.hpp"
+
+namespace r4 {
+namespace giga {
+
+class UsbPort final : public firmware::Port {
+ public:
+  // A full packet: more is to come. The core takes no more at a time.
+  static constexpr std::uint32_t packet_size = 64;
+
+  // Calls `on_line(Text)` for each line that has arrived.
+  template <class OnLine>
+  void receive(OnLine&& on_line) {
+    char chunk[packet_size];
+    while (const std::uint32_t size = read(chunk)) framing_.push(chunk, size, on_line);
+  }
+
+  // Lets time pass and sends what the host takes now. True: the host has just closed the port, or
+  // the cable is out.
+  bool poll(std::uint32_t now_ms);
+
+  void send(Text datagram, firmware::Urgency urgency, std::uint32_t peer) override;
+  std::size_t max_size() const override { return max_datagram; }
+  bool may_configure() const override { return true; }
+
+  // A line of a report. False: no room now.
+  bool say(Text line);
+
+  bool open() const { return open_; }
+  std::uint32_t dropped() const { return lines_.dropped(); }
+
+ private:
+  static std::uint32_t read(char (&chunk)[packet_size]);
+  void fill_packet();
+  void send_packet();
+
+  firmware::TransmitLines lines_;
+  LineFraming framing_;
+  bool open_ = false;
+  std::uint8_t packet_[packet_size];
+  std::uint32_t packet_used_ = 0;
+  std::uint32_t packet_sent_ = 0;
+};
+
+}  // namespace giga
+}  // namespace r4

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the firmware uses of ArduinoCore-mbed 4.6.0 and ArduinoCore-API 1.5.2: our own declarations,
+// and the macros of the original, which are a trap for whatever is included behind them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "mbed.h"
+
+#define abs(x) ((x) > 0 ? (x) : -(x))
+#define min(a, b) ((a) < (b) ? (a) : (b))
+#define max(a, b) ((a) > (b) ? (a) : (b))
+#define round(x) ((x) >= 0 ? (long)((x) + 0.5) : (long)((x)-0.5))
+#define radians(deg) ((deg)*DEG_TO_RAD)
+#define sq(x) ((x) * (x))
+#define bit(b) (1UL << (b))
+#define bitRead(value, bit) (((value) >> (bit)) & 0x01)
+#define lowByte(w) ((uint8_t)((w)&0xff))
+#define highByte(w) ((uint8_t)((w) >> 8))
+#define constrain(amt, low, high) ((amt) < (low) ? (low) : ((amt) > (high) ? (high) : (amt)))
+#define interrupts() __enable_irq()
+#define noInterrupts() __disable_irq()
+#define PI 3.1415926535897932384626433832795
+#define SERIAL 0x0
+#define DISPLAY 0x1
+#define F(text) (text)
+#define B0 0
+#define B1 1
+
+void setup();
+void loop();
+
+namespace arduino {
+
+class IPAddress {
+ public:
+  IPAddress() = default;
+  IPAddress(std::uint8_t a, std::uint8_t b, std::uint8_t c, std::uint8_t d) : bytes_{a, b, c, d} {}
+  std::uint8_t operator[](int index) const { return bytes_[index]; }
+
+ private:
+  std::uint8_t bytes_[4] = {};
+};
+
+}  // namespace arduino

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Arduino.h>
+
+namespace arduino {
+
+class USBSerial {
+ public:
+  bool connected();
+  int available();
+  int read();
+  // Gives the driver what it takes now: nothing while a packet is on its way or the port is closed.
+  void send_nb(std::uint8_t* buffer, std::uint32_t size, std::uint32_t* actual, bool now = true);
+};
+
+}  // namespace arduino
+
+extern arduino::USBSerial _SerialUSB;  // NOLINT(bugprone-reserved-identifier): as it is called

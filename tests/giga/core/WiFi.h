@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Arduino.h>
+
+enum wl_status_t { WL_IDLE_STATUS = 0, WL_CONNECTED = 3, WL_CONNECT_FAILED = 4 };
+
+namespace arduino {
+
+class WiFiClass {
+ public:
+  int begin(const char* ssid);
+  int begin(const char* ssid, const char* passphrase);
+  int disconnect();
+  std::uint8_t status();
+  IPAddress localIP();
+};
+
+}  // namespace arduino
+
+extern arduino::WiFiClass WiFi;

@@ -1,0 +1,95 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Arduino library compiles as it stands, for the Giga's processor and dialect, needs no heap, and
+lacks nothing but the core.
+
+The core cannot be had here: tests/giga/core declares what the firmware uses of it, with the
+originals' signatures and macros. Usage: library_test.py TREE
+"""
+import concurrent.futures
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import zipfile
+
+CROSS = 'arm-none-eabi-'
+# As the Arduino IDE's for the Giga, and warnings are errors.
+FLAGS = ['-std=gnu++14', '-fno-rtti', '-fno-exceptions', '-Os', '-mcpu=cortex-m7', '-mthumb',
+         '-mfloat-abi=softfp', '-mfpu=fpv5-d16', '-DARDUINO_GIGA', '-DTARGET_GIGA',
+         '-Wall', '-Wextra', '-Werror']
+# Who asks for one of these uses the heap, or can throw.
+FORBIDDEN = re.compile(r'\b(malloc|calloc|realloc|free|_Zn[wa]\w*|_Zd[la]\w*|__cxa_throw\w*|_ZSt\d+__throw\w*)$')
+SHELL = {'library.properties', 'library.json', 'keywords.txt', 'LICENSE', 'src/R4Link.h',
+         'examples/R4Board/R4Board.ino', 'extras/firmware.md'}
+
+
+def run(*command):
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise AssertionError(f'{" ".join(map(str, command))}\n{done.stdout}{done.stderr}')
+    return done.stdout
+
+
+def assemble(tree, folder):
+    """The library, unpacked; assembled twice, it is the same file."""
+    first, second = folder / 'a.zip', folder / 'b.zip'
+    for target in (first, second):
+        run(tree / 'tools/arduino', target)
+    assert first.read_bytes() == second.read_bytes(), 'two runs of tools/arduino differ'
+    with zipfile.ZipFile(first) as archive:
+        archive.extractall(folder)
+    library = folder / 'R4_Link'
+    missing = [name for name in SHELL if not (library / name).is_file()]
+    assert not missing, f'the library lacks {missing}'
+    for name in ('library.properties', 'library.json'):
+        assert '@' not in (library / name).read_text(), f'{name} has a placeholder left'
+    return library
+
+
+def compile_all(tree, library, out):
+    """Every source, and the sketch as the IDE makes C++ of it: Arduino.h in front."""
+    sketch = out / 'sketch.cpp'
+    example = library / 'examples/R4Board/R4Board.ino'
+    sketch.write_text(f'#include <Arduino.h>\n#line 1 "{example}"\n{example.read_text()}')
+    sources = sorted((library / 'src').rglob('*.cpp')) + [sketch]
+
+    def compile_one(numbered):
+        number, source = numbered
+        target = out / f'{number}.o'
+        run(CROSS + 'g++', *FLAGS, '-I', library / 'src', '-isystem', tree / 'tests/giga/core',
+            '-c', source, '-o', target)
+        return target
+
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(compile_one, enumerate(sources)))
+
+
+def needs(objects, out):
+    """What the objects together still lack, as the linker names it."""
+    together = out / 'together.o'
+    run(CROSS + 'ld', '-r', '-o', together, *objects)
+    return [line.split()[-1] for line in run(CROSS + 'nm', '-u', together).splitlines()], together
+
+
+def main():
+    tree = pathlib.Path(sys.argv[1]).resolve()
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        library = assemble(tree, folder)
+        out = folder / 'out'
+        out.mkdir()
+        objects = compile_all(tree, library, out)
+        lacking, together = needs(objects, out)
+        heap = [symbol for symbol in lacking if FORBIDDEN.search(symbol)]
+        assert not heap, f'the firmware uses the heap or exceptions: {heap}'
+        ours = [symbol for symbol in lacking if re.match(r'_ZN?K?\w*2r4', symbol)]
+        assert not ours, f'the library lacks what it uses: {ours}'
+        text, data, bss = run(CROSS + 'size', together).splitlines()[1].split()[:3]
+    print(f'{len(objects)} sources; {int(text)} bytes of code, {int(data) + int(bss)} of RAM, without the core')
+
+
+if __name__ == '__main__':
+    main()
