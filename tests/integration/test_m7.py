@@ -227,7 +227,7 @@ def test_the_tests_that_run_on_the_m7_pass():
     names = re.findall(r'^passed (\S+)$', result.stdout, re.MULTILINE)
     assert 'FAILED' not in result.stdout and len(names) >= 20
     assert 'Fault.AStackOverflowSwitchesOffAndIsNoted' in names
-    assert int(re.search(r'stack of the tests: (\d+)', result.stdout)[1]) < 8192
+    assert int(re.search(r'stack of the tests: (\d+)', result.stdout)[1]) < 6144
 
 
 def test_what_the_protocol_costs_is_what_the_table_says():

@@ -28,18 +28,21 @@ class BoardClock {
   }
   static void on_wake_interrupt() { at(timer1_base + interrupt) = 1; }
 
-  // To be called more often than the timer wraps: every 171 s.
+  // May be asked in interrupts, too. To be called more often than the timer wraps: every 171 s.
   std::uint32_t now_ms() {
+    const InterruptsHeld held;
     advance();
     return ms_;
   }
   // Wraps after 71 minutes.
   std::uint32_t now_us() {
+    const InterruptsHeld held;
     advance();
     return ms_ * 1000 + rest_ / ticks_per_us;
   }
   // The timer itself; counts up, and wraps.
   static std::uint32_t ticks() { return ~at(timer0_base + value); }
+  static constexpr std::uint32_t ticks_per_us = clock_hz / 1000000;
 
  private:
   // Registers of the CMSDK timer. It counts down.
@@ -49,7 +52,6 @@ class BoardClock {
   static constexpr std::uint32_t interrupt = 0xC;
 
   static constexpr std::uint32_t ticks_per_ms = clock_hz / 1000;
-  static constexpr std::uint32_t ticks_per_us = clock_hz / 1000000;
 
   void advance() {
     const std::uint32_t now = at(timer0_base + value);

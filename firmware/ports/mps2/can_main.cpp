@@ -16,7 +16,10 @@ namespace {
 using namespace r4;
 using namespace r4::mps2;
 
+constexpr std::uint32_t watchdog_ms = 500;
 Uart link(uart0_base);
+firmware::Guard* watching = nullptr;
+BoardClock* watch = nullptr;
 
 // The place of a controller: two mailboxes.
 struct Controller {
@@ -118,7 +121,10 @@ struct Hardware {
 extern "C" {
 void r4_uart0_receive() { link.on_receive_interrupt(); }
 void r4_uart0_transmit() { link.on_transmit_interrupt(); }
-void r4_wake() { BoardClock::on_wake_interrupt(); }
+void r4_wake() {
+  BoardClock::on_wake_interrupt();
+  if (watching != nullptr && watching->tick(watch->now_ms())) feed_watchdog();
+}
 }
 
 int main() {
@@ -139,8 +145,12 @@ int main() {
   link.start();
   enable(Irq::uart0_rx);
   enable(Irq::uart0_tx);
+  give_way(Irq::timer1);
   enable(Irq::timer1);
+  start_watchdog(watchdog_ms);
   application.start(clock.now_ms());
+  watch = &clock;
+  watching = &application.guard();
   for (;;) {
     link.receive([&](Text datagram) {
       application.receive(link_number, firmware::everyone, datagram, clock.now_ms());
@@ -150,7 +160,6 @@ int main() {
     });
     hal.poll(clock.now_us());
     hal.step_tick();
-    if (hal.fault().any()) application.fail(SafeReason::fault, clock.now_ms());
     application.poll(clock.now_ms());
     link.poll(clock.now_ms());
     wait_for_interrupt();

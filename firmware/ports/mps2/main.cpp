@@ -5,10 +5,12 @@
 #include "../sim/simulated_hardware.hpp"
 #include "board_clock.hpp"
 #include "fault.hpp"
+#include "pins_report.hpp"
 #include "registers.hpp"
 #include "startup.hpp"
 #include "uart.hpp"
 #include "udp_port.hpp"
+#include "wire_time.hpp"
 
 namespace {
 
@@ -22,6 +24,8 @@ constexpr std::uint32_t watchdog_ms = 500;
 
 // What interrupt handlers need lives here, and only here.
 Uart link(uart0_base);
+firmware::Guard* watching = nullptr;  // once the loop begins
+BoardClock* watch = nullptr;
 
 void report(const Log& log, const FaultNote& note) {
   log.text("r4: boot ").number(boots()).text(": ");
@@ -50,16 +54,27 @@ void rest(const UdpPort& udp) {
 }  // namespace
 
 extern "C" {
-void r4_uart0_receive() { link.on_receive_interrupt(); }
+void r4_uart0_receive() {
+  link.on_receive_interrupt();
+  PinsReport::on_datagram(link.last_line_ticks());
+}
 void r4_uart0_transmit() { link.on_transmit_interrupt(); }
-void r4_wake() { BoardClock::on_wake_interrupt(); }
-void r4_ethernet() { Lan9118::on_interrupt(); }
+void r4_wake() {
+  BoardClock::on_wake_interrupt();
+  if (watching != nullptr && watching->tick(watch->now_ms())) feed_watchdog();
+}
+void r4_ethernet() {
+  Lan9118::on_interrupt();
+  PinsReport::on_datagram(BoardClock::ticks());
+}
 }
 
 int main() {
   const std::uint64_t seed = sim::scramble(std::uint64_t{boots()} << 32 | r4_chance);
   static BoardClock clock(static_cast<std::uint32_t>(seed));
+  static WireTime wire;
   static sim::BoardModel board(seed);
+  board.chips().bus.set_processor(&wire);
   static sim::SimulatedHardware hardware(board);
   firmware::BoardHardware& hal = hardware.hal();
   clock.start();
@@ -82,8 +97,12 @@ int main() {
   const std::uint8_t link_number = application.add_port(link);
   const std::uint8_t udp_number = application.add_port(udp);
 
+  static PinsReport pins(board, clock, application.link(), uart2_base);
+  if (r4_wants_pins != 0) pins.start();
+
   enable(Irq::uart0_rx);
   enable(Irq::uart0_tx);
+  give_way(Irq::timer1);  // the safe state takes longer than a byte
   enable(Irq::timer1);
   enable(Irq::ethernet);
   interrupts_on();
@@ -94,10 +113,11 @@ int main() {
         clock.now_ms());
   }
 
+  watch = &clock;
+  watching = &application.guard();
   std::uint32_t passed_ms = clock.now_ms();
   for (;;) {
     if (!canary_alive()) halt();
-    feed_watchdog();
     for (; passed_ms != clock.now_ms(); ++passed_ms) hardware.pass_millisecond();
     link.receive([&](Text datagram) {
       application.receive(link_number, firmware::everyone, datagram, clock.now_ms());
@@ -108,6 +128,7 @@ int main() {
     const std::uint32_t now_ms = clock.now_ms();
     application.poll(now_ms);
     link.poll(now_ms);
+    if (r4_wants_pins != 0) pins.poll();
     rest(udp);
   }
 }

@@ -19,6 +19,7 @@ constexpr std::uint32_t timer0_base = 0x40000000;  // CMSDK timer: time
 constexpr std::uint32_t timer1_base = 0x40001000;  // CMSDK timer: wakes the loop
 constexpr std::uint32_t uart0_base = 0x40004000;   // CMSDK UART: the link
 constexpr std::uint32_t uart1_base = 0x40005000;   // CMSDK UART: the board's log
+constexpr std::uint32_t uart2_base = 0x40006000;   // CMSDK UART: what the pins do
 constexpr std::uint32_t watchdog_base = 0x40008000;
 constexpr std::uint32_t ethernet_base = 0xA0000000;  // LAN9118
 
@@ -28,6 +29,7 @@ constexpr int irq_count = 16;
 
 // The Cortex-M7's own registers (ARM DDI 0403).
 constexpr std::uint32_t nvic_enable = 0xE000E100;
+constexpr std::uint32_t nvic_priority = 0xE000E400;  // a byte for each interrupt
 constexpr std::uint32_t scb_aircr = 0xE000ED0C;
 constexpr std::uint32_t scb_shcsr = 0xE000ED24;
 constexpr std::uint32_t scb_cfsr = 0xE000ED28;
@@ -39,9 +41,36 @@ constexpr std::uint32_t mpu_rbar = 0xE000ED9C;
 constexpr std::uint32_t mpu_rasr = 0xE000EDA0;
 
 inline void enable(Irq irq) { at(nvic_enable) = 1U << static_cast<unsigned>(irq); }
+// All others come also while this one is being handled.
+inline void give_way(Irq irq) {
+  constexpr std::uint32_t lowest = 0xFF;
+  const std::uint32_t shift = static_cast<unsigned>(irq) % 4 * 8;
+  volatile std::uint32_t& priority = at(nvic_priority + static_cast<unsigned>(irq) / 4 * 4);
+  priority = (priority & ~(0xFFU << shift)) | lowest << shift;
+}
 
 inline void interrupts_off() { asm volatile("cpsid i" ::: "memory"); }
 inline void interrupts_on() { asm volatile("cpsie i" ::: "memory"); }
+// Interrupts off while one lives; then as before.
+class InterruptsHeld {
+ public:
+  InterruptsHeld() : before_(hold()) {}
+  ~InterruptsHeld() { release(before_); }
+  InterruptsHeld(const InterruptsHeld&) = delete;
+  InterruptsHeld& operator=(const InterruptsHeld&) = delete;
+
+  static std::uint32_t hold() {
+    std::uint32_t before = 0;
+    asm volatile("mrs %0, primask\n\tcpsid i" : "=r"(before) : : "memory");
+    return before;
+  }
+  static void release(std::uint32_t before) {
+    asm volatile("msr primask, %0" : : "r"(before) : "memory");
+  }
+
+ private:
+  std::uint32_t before_;
+};
 // Until an interrupt is pending; also with interrupts off.
 inline void wait_for_interrupt() { asm volatile("dsb\n\twfi" ::: "memory"); }
 

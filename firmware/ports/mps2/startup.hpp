@@ -15,6 +15,7 @@ extern std::uint32_t r4_handler_stack_end[];
 
 // What chance has put there before the board was started.
 extern std::uint32_t r4_chance;
+extern std::uint32_t r4_wants_pins;
 
 int main();
 void r4_uart0_receive();

@@ -2,6 +2,7 @@
 #include "uart.hpp"
 
 #include "../../../protocol/numbers.hpp"
+#include "board_clock.hpp"
 #include "registers.hpp"
 
 namespace r4 {
@@ -42,7 +43,9 @@ void Uart::on_receive_interrupt() {
     overruns_ = overruns_ + 1;
   }
   while ((at(base_ + state) & receive_full) != 0) {
-    if (!received_.put(static_cast<char>(at(base_ + data)))) overruns_ = overruns_ + 1;
+    const char byte = static_cast<char>(at(base_ + data));
+    if (!received_.put(byte)) overruns_ = overruns_ + 1;
+    if (byte == '\n') last_line_ticks_ = BoardClock::ticks();
   }
 }
 

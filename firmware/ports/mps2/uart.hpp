@@ -41,6 +41,8 @@ class Uart final : public firmware::Port {
   // Lets time pass.
   void poll(std::uint32_t now_ms);
 
+  // When, by BoardClock::ticks(), the end of a line came last.
+  std::uint32_t last_line_ticks() const { return last_line_ticks_; }
   std::uint32_t overruns() const { return overruns_; }  // bytes that were lost on the way in
   std::uint32_t dropped() const { return lines_.dropped(); }
 
@@ -51,6 +53,7 @@ class Uart final : public firmware::Port {
   firmware::ByteRing<receive_capacity> received_;
   firmware::TransmitLines lines_;
   LineFraming framing_;
+  volatile std::uint32_t last_line_ticks_ = 0;
   volatile std::uint32_t overruns_ = 0;
 };
 
