@@ -204,6 +204,14 @@ void BoardHardware::set_up_again() {
   }
 }
 
+// A transfer that was cut short says nothing of its chip, nor do registers that were compared with what
+// make_safe() meanwhile has written.
+void BoardHardware::set_up_what_was_cut_off() {
+  for (int i = 0; i < chip_count; ++i) {
+    if (chips_[i]->trouble() != ChipTrouble::none && !failed_[i]) chips_[i]->begin();
+  }
+}
+
 // Latches new trouble. True if there is some.
 bool BoardHardware::look_for_trouble() {
   bool found = false;
@@ -228,14 +236,15 @@ bool BoardHardware::look_for_trouble() {
 // The end of what uses the bus. New trouble makes everything safe. If make_safe() came between,
 // what was being written may have come after it: once more.
 void BoardHardware::leave() {
-  if (look_for_trouble()) {
+  if (!interrupted_ && look_for_trouble()) {
     drive_safe();
-    look_for_trouble();
+    if (!interrupted_) look_for_trouble();
   }
   while (interrupted_) {
     interrupted_ = false;
+    set_up_what_was_cut_off();
     drive_safe();
-    look_for_trouble();
+    if (!interrupted_) look_for_trouble();
   }
   busy_ = false;
   interrupted_ = false;  // what came after the last look drove everything safe by itself

@@ -113,6 +113,7 @@ class BoardHardware final : public Hal {
   void set_outputs(const Outputs& outputs);
   void for_each_chip(BusBudget& budget, bool set_up);
   void set_up_again();
+  void set_up_what_was_cut_off();
   bool look_for_trouble();
   void leave();
 

@@ -35,6 +35,39 @@ TEST(BoardHardware, IsSafeFromAnyTransferOfAnyUseOn) {
   }
 }
 
+TEST(BoardHardware, ATransferThatTheSafeStateCutShortIsNoTroubleOfItsChip) {
+  for (int at = 0; at < 60; ++at) {
+    Bench bench;
+    bench.boot();
+    bench.line.what = [&] { bench.hardware.make_safe(); };
+    bench.line.after = at;
+    Outputs outputs = full();
+    for (int i = 0; bench.line.after >= 0; ++i) {
+      outputs.osmc[0].pwm = static_cast<std::uint16_t>(i);
+      bench.hardware.apply(outputs);
+      bench.run(1);
+    }
+    EXPECT_FALSE(bench.hardware.fault().any()) << "transfer " << at;
+    bench.run(150);
+    EXPECT_FALSE(bench.hardware.fault().any()) << "transfer " << at;
+    EXPECT_TRUE(bench.hardware.ready());
+    bench.apply(full());
+    EXPECT_EQ(test::outputs_of(bench.board), test::as_pins(full()));
+  }
+}
+
+TEST(BoardHardware, ABusThatIsHeldWhenTheSafeStateCutsIntoATransferIsTrouble) {
+  Bench bench;
+  bench.boot();
+  bench.line.what = [&] {
+    bench.board.bus.hold(1000);
+    bench.hardware.make_safe();
+  };
+  bench.line.after = 0;
+  bench.hardware.apply(full());
+  EXPECT_EQ(bench.hardware.fault().trouble, ChipTrouble::bus_stuck);
+}
+
 TEST(BoardHardware, AFaultHandlerThatNeverReturnsLeavesEverythingSafe) {
   struct Halt {};
   for (int at = 0; at < 12; ++at) {
