@@ -1,16 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The board on an MPS2 with AN500: the application between a UART, UDP and the hardware.
-#include "../../application.hpp"
 #include "../sim/random.hpp"
-#include "../sim/simulated_hardware.hpp"
-#include "board_clock.hpp"
+#include "board.hpp"
 #include "fault.hpp"
 #include "pins_report.hpp"
 #include "registers.hpp"
 #include "startup.hpp"
-#include "uart.hpp"
-#include "udp_port.hpp"
-#include "wire_time.hpp"
 
 namespace {
 
@@ -24,8 +19,7 @@ constexpr std::uint32_t watchdog_ms = 500;
 
 // What interrupt handlers need lives here, and only here.
 Uart link(uart0_base);
-firmware::Guard* watching = nullptr;  // once the loop begins
-BoardClock* watch = nullptr;
+Board* board = nullptr;
 
 void report(const Log& log, const FaultNote& note) {
   log.text("r4: boot ").number(boots()).text(": ");
@@ -44,11 +38,16 @@ void report(const Log& log, const FaultNote& note) {
   }
 }
 
-// Sleeps until an interrupt, unless there is work. With interrupts off nothing comes between.
-void rest(const UdpPort& udp) {
-  interrupts_off();
-  if (!link.has_received() && !udp.has_received()) wait_for_interrupt();
-  interrupts_on();
+SafeReason cause_of(const FaultNote& note) {
+  switch (note.kind) {
+    case FaultNote::Kind::none:
+      break;
+    case FaultNote::Kind::fault:
+      return SafeReason::fault;
+    case FaultNote::Kind::watchdog:
+      return SafeReason::watchdog;
+  }
+  return SafeReason::none;
 }
 
 }  // namespace
@@ -60,8 +59,7 @@ void r4_uart0_receive() {
 }
 void r4_uart0_transmit() { link.on_transmit_interrupt(); }
 void r4_wake() {
-  BoardClock::on_wake_interrupt();
-  if (watching != nullptr && watching->tick(watch->now_ms())) feed_watchdog();
+  if (board->on_wake()) feed_watchdog();
 }
 void r4_ethernet() {
   Lan9118::on_interrupt();
@@ -70,65 +68,35 @@ void r4_ethernet() {
 }
 
 int main() {
-  const std::uint64_t seed = sim::scramble(std::uint64_t{boots()} << 32 | r4_chance);
-  static BoardClock clock(static_cast<std::uint32_t>(seed));
-  static WireTime wire;
-  static sim::BoardModel board(seed);
-  board.chips().bus.set_processor(&wire);
-  static sim::SimulatedHardware hardware(board);
-  firmware::BoardHardware& hal = hardware.hal();
-  clock.start();
-  hardware.power_up();
-  guard(hal);
-  start_watchdog(watchdog_ms);
-
-  const FaultNote note = take_note();
-  report(Log(uart1_base), note);
-
-  static UdpPort udp(address, udp_port);
-  link.start();
-  if (!udp.start()) Log(uart1_base).text("r4: no Ethernet: UDP is off\n");
-
   firmware::Application::Config config;
   config.identity.firmware = Text("0.1.0");
   config.identity.board_id = Text("mps2-1");
   config.identity.capabilities = Text("udp+serial");
-  static firmware::Application application(hal, config);
-  const std::uint8_t link_number = application.add_port(link);
-  const std::uint8_t udp_number = application.add_port(udp);
+  static UdpPort udp(address, udp_port);
+  static Board the_board(sim::scramble(std::uint64_t{boots()} << 32 | r4_chance), link, udp,
+                         config);
+  board = &the_board;
+  board->power_up();
+  guard(board->hal());
+  start_watchdog(watchdog_ms);
 
-  static PinsReport pins(board, clock, application.link(), uart2_base);
+  const FaultNote note = take_note();
+  report(Log(uart1_base), note);
+  static PinsReport pins(board->model(), board->clock(), board->application().link(), uart2_base);
   if (r4_wants_pins != 0) pins.start();
+  link.start();
+  if (!udp.start()) Log(uart1_base).text("r4: no Ethernet: UDP is off\n");
 
+  give_way(Irq::timer1);  // the safe state takes longer than a byte
   enable(Irq::uart0_rx);
   enable(Irq::uart0_tx);
-  give_way(Irq::timer1);  // the safe state takes longer than a byte
   enable(Irq::timer1);
   enable(Irq::ethernet);
-  interrupts_on();
-  application.start(clock.now_ms());
-  if (note.kind != FaultNote::Kind::none) {
-    application.fail(
-        note.kind == FaultNote::Kind::watchdog ? SafeReason::watchdog : SafeReason::fault,
-        clock.now_ms());
-  }
-
-  watch = &clock;
-  watching = &application.guard();
-  std::uint32_t passed_ms = clock.now_ms();
+  board->start(cause_of(note));
   for (;;) {
     if (!canary_alive()) halt();
-    for (; passed_ms != clock.now_ms(); ++passed_ms) hardware.pass_millisecond();
-    link.receive([&](Text datagram) {
-      application.receive(link_number, firmware::everyone, datagram, clock.now_ms());
-    });
-    udp.receive([&](std::uint32_t peer, Text datagram) {
-      application.receive(udp_number, peer, datagram, clock.now_ms());
-    });
-    const std::uint32_t now_ms = clock.now_ms();
-    application.poll(now_ms);
-    link.poll(now_ms);
+    board->turn();
     if (r4_wants_pins != 0) pins.poll();
-    rest(udp);
+    board->rest();
   }
 }

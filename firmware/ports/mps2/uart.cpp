@@ -43,10 +43,13 @@ void Uart::on_receive_interrupt() {
     overruns_ = overruns_ + 1;
   }
   while ((at(base_ + state) & receive_full) != 0) {
-    const char byte = static_cast<char>(at(base_ + data));
-    if (!received_.put(byte)) overruns_ = overruns_ + 1;
-    if (byte == '\n') last_line_ticks_ = BoardClock::ticks();
+    on_byte(static_cast<char>(at(base_ + data)));
   }
+}
+
+void Uart::on_byte(char byte) {
+  if (!received_.put(byte)) overruns_ = overruns_ + 1;
+  if (byte == '\n') last_line_ticks_ = BoardClock::ticks();
 }
 
 void Uart::on_transmit_interrupt() {

@@ -25,6 +25,8 @@ class Uart final : public firmware::Port {
 
   void on_receive_interrupt();
   void on_transmit_interrupt();
+  // A byte has come.
+  void on_byte(char byte);
 
   // Calls `on_datagram(Text)` for each line that has arrived.
   template <class OnDatagram>
