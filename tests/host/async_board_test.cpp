@@ -16,8 +16,8 @@
 #include <optional>
 #include <thread>
 
-#include "board_in_a_thread.hpp"
 #include "firmware/ports/sim/simulated_board.hpp"
+#include "tests/support/board_in_a_thread.hpp"
 #include "transports/memory_carrier.hpp"
 #include "transports/registry.hpp"
 

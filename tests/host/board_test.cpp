@@ -8,8 +8,9 @@
 #include <future>
 #include <thread>
 
-#include "board_in_a_thread.hpp"
 #include "host/command_help.hpp"
+#include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/every_channel.hpp"
 #include "transports/error.hpp"
 
 namespace r4::test {
@@ -72,6 +73,20 @@ TEST_P(BoardOver, ConfirmsEveryCommandOnceExecuted) {
   ASSERT_GE(executed.size(), after_settings.size());
   executed.erase(executed.begin(), executed.end() - static_cast<long>(after_settings.size()));
   EXPECT_EQ(executed, after_settings) << "each once, in order";
+}
+
+TEST_P(BoardOver, EveryChannelReachesItsPinAndComesBack) {
+  BoardInAThread simulated(GetParam());
+  Board board(simulated.url());
+  board.wait_active();
+  expect_every_channel({
+      [&](const std::string& command) { board.send(command); },
+      [&] {
+        board.next_state();  // it may have been under way
+        return board.next_state();
+      },
+      [&](const auto& action) { simulated.run(action); },
+  });
 }
 
 TEST_P(BoardOver, StopsUntilCleared) {

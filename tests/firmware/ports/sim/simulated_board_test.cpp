@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <asio/io_context.hpp>
 #include <memory>
 #include <string>
@@ -13,6 +14,7 @@
 #include "protocol/message.hpp"
 #include "protocol/state.hpp"
 #include "tests/support/datagrams.hpp"
+#include "tests/support/every_channel.hpp"
 #include "transports/memory_carrier.hpp"
 
 namespace r4::sim {
@@ -322,6 +324,41 @@ TEST_F(SimulatedBoardTest, RefusesAFifthCarrier) {
     board_->add_carrier(make_memory_pair(io_).first);
   }
   EXPECT_THROW(board_->add_carrier(make_memory_pair(io_).first), Error);
+}
+
+TEST_F(SimulatedBoardTest, EveryChannelReachesItsPinAndComesBack) {
+  build();
+  connect();
+  test::expect_every_channel({
+      [this](const std::string& text) {
+        heartbeat(newest_t());  // E:CLEAR counts only from who has heard
+        events_.clear();
+        command(text);
+        EXPECT_EQ(std::count(events_.begin(), events_.end(),
+                             "executed " + std::to_string(pnum_ - 1 - first_pnum)),
+                  1)
+            << text;
+      },
+      [this] {
+        newest_t();
+        listener_.heard.clear();
+        for (;;) {  // with all fields a state comes in parts; this one has them all
+          heartbeat(newest_t());
+          run(10);
+          State whole;
+          std::uint32_t t_ms = 0;
+          for (const std::string& line : listener_.heard) {
+            Datagram datagram;
+            if (read(line, datagram) && kind_of(datagram) == MessageKind::state &&
+                read_state(datagram, whole)) {
+              t_ms = whole.t_ms;
+            }
+          }
+          if (t_ms != 0) return whole;
+        }
+      },
+      [this](const auto& action) { action(*board_); },
+  });
 }
 
 // --- trouble with the chips and the loop

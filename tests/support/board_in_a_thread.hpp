@@ -16,8 +16,8 @@ namespace r4::test {
 
 class BoardInAThread {
  public:
-  // What it listens on: "udp" (a free port of this machine) or "pty". `script`: what happens to it
-  // (firmware/ports/sim/script.hpp).
+  // What it listens on: "udp" (a free port of this machine), "pty", or a URL of a CAN bus. `script`:
+  // what happens to it (firmware/ports/sim/script.hpp).
   explicit BoardInAThread(const std::string& transport, const std::string& script = "");
   ~BoardInAThread();
   BoardInAThread(const BoardInAThread&) = delete;

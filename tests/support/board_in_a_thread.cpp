@@ -28,12 +28,17 @@ BoardInAThread::BoardInAThread(const std::string& transport, const std::string& 
   };
   board_ = std::make_unique<sim::SimulatedBoard>(io_, std::move(options));
   const bool udp = transport == "udp";
-  auto carrier = Registry::standard().make(io_, udp ? "udp://127.0.0.1:0" : "pty:", Role::board);
+  const bool pty = transport == "pty";
+  auto carrier = Registry::standard().make(io_,
+                                           udp   ? "udp://127.0.0.1:0"
+                                           : pty ? "pty:"
+                                                 : transport,
+                                           Role::board);
   const Carrier& listening = *carrier;
   board_->add_carrier(std::move(carrier));
   board_->start();
   const std::string& name = listening.name();  // "udp://127.0.0.1:40123", "pty:/dev/pts/5"
-  url_ = udp ? name + "?listen=0" : "serial://" + name.substr(name.find(':') + 1);
+  url_ = udp ? name + "?listen=0" : pty ? "serial://" + name.substr(name.find(':') + 1) : transport;
   thread_ = std::thread([this] {
     const auto work = asio::make_work_guard(io_);
     io_.run();

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A board on a CAN bus with its host, channel by channel.
+#include <gtest/gtest.h>
+
+#include "host/board.hpp"
+#include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/every_channel.hpp"
+
+namespace r4::test {
+namespace {
+
+struct Form {
+  const char* name;
+  const char* url;
+  bool packed;
+};
+class CanBoard : public testing::TestWithParam<Form> {};
+INSTANTIATE_TEST_SUITE_P(Forms, CanBoard,
+                         testing::Values(Form{"plain", "can://vcan0?node=9", false},
+                                         Form{"packed", "can://vcan0?node=9", true},
+                                         Form{"fd", "can://vcan0?node=9&fd=1", false}),
+                         [](const auto& form) { return std::string(form.param.name); });
+
+TEST_P(CanBoard, EveryChannelReachesItsPinAndComesBack) {
+  BoardInAThread simulated(GetParam().url);
+  Board board(simulated.url() + (GetParam().packed ? "&pack=1" : ""));
+  board.wait_active();
+  if (GetParam().packed) board.setting("pack", "1");
+  expect_every_channel({
+      [&](const std::string& command) { board.send(command); },
+      [&] {
+        board.next_state();  // it may have been under way
+        return board.next_state();
+      },
+      [&](const auto& action) { simulated.run(action); },
+  });
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "every_channel.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+
+namespace r4::test {
+
+namespace {
+
+sim::Pins pins_of(const ControlledBoard& board) {
+  sim::Pins pins;
+  board.at_board([&](sim::SimulatedBoard& at) { pins = at.model().pins(); });
+  return pins;
+}
+
+// The first state for which `is_so`; the last one if none comes.
+State await(const ControlledBoard& board, const std::function<bool(const State&)>& is_so) {
+  State state;
+  for (int tries = 0; tries < 1000; ++tries) {
+    state = board.next_state();
+    if (is_so(state)) return state;
+  }
+  ADD_FAILURE() << "no state came to be so";
+  return state;
+}
+
+void expect_inputs(const ControlledBoard& board) {
+  board.at_board([](sim::SimulatedBoard& at) {
+    for (int i = 0; i < analog_channels; ++i) {
+      at.model().pin_analog(static_cast<Analog>(i), 100 * (i + 1) + i);
+    }
+    for (int channel = 1; channel <= encoder_channels; ++channel) {
+      at.model().turn_encoder(channel, channel % 2 == 0 ? -100 * channel : 100 * channel);
+    }
+    for (int channel = 1; channel <= ultrasonic_channels; ++channel) {
+      at.model().set_ultrasonic(channel, static_cast<std::uint16_t>(50 * channel));
+    }
+  });
+  const State state = await(board, [](const State& s) { return s.ultrasonic_cm[3] == 200; });
+  const State again = await(board, [&](const State& s) {  // every sensor had a turn since
+    return s.t_ms - state.t_ms > 250;
+  });
+  EXPECT_TRUE(again.handle_held);
+  for (int i = 0; i < analog_channels; ++i) EXPECT_EQ(again.analog_cv[i], 100 * (i + 1) + i);
+  for (int channel = 1; channel <= encoder_channels; ++channel) {
+    EXPECT_EQ(again.encoder_counts[channel - 1], channel % 2 == 0 ? -100 * channel : 100 * channel);
+  }
+  for (int channel = 1; channel <= ultrasonic_channels; ++channel) {
+    EXPECT_EQ(again.ultrasonic_cm[channel - 1], 50 * channel);
+  }
+  for (int channel = 1; channel <= encoder_channels; ++channel) {
+    board.command(fmt::format("Z:{}", channel));
+    EXPECT_EQ(board.next_state().encoder_counts[channel - 1], 0);
+  }
+}
+
+void expect_drives(const ControlledBoard& board) {
+  for (int channel = 1; channel <= osmc_channels; ++channel) {
+    const std::uint16_t pwm = static_cast<std::uint16_t>(1000 + channel);
+    for (const Direction direction : {Direction::forward, Direction::reverse}) {
+      board.command(fmt::format("O:{},{},{}", pwm, static_cast<int>(direction), channel));
+      board.command(fmt::format("D:{},{},{}", pwm + 10, static_cast<int>(direction), channel));
+      const State state = board.next_state();
+      const sim::Pins pins = pins_of(board);
+      const Drive osmc{pwm, direction};
+      const Drive dhb12{static_cast<std::uint16_t>(pwm + 10), direction};
+      EXPECT_EQ(pins.osmc[channel - 1], osmc) << channel;
+      EXPECT_EQ(state.osmc[channel - 1], osmc) << channel;
+      EXPECT_EQ(pins.dhb12[channel - 1], dhb12) << channel;
+      EXPECT_EQ(state.dhb12[channel - 1], dhb12) << channel;
+    }
+  }
+}
+
+void expect_servos_and_relays(const ControlledBoard& board) {
+  for (int channel = 1; channel <= servo_channels; ++channel) {
+    const int us = 700 + 100 * channel;
+    board.command(fmt::format("S:{},{}", us, channel));
+    EXPECT_EQ(board.next_state().servo_us[channel - 1], us);
+    EXPECT_NEAR(pins_of(board).servo_us[channel - 1], us, 3) << channel;
+  }
+  unsigned on = 0;
+  for (int channel = 1; channel <= relay_channels; ++channel) {
+    board.command(fmt::format("R:{},On", channel));
+    on |= 1U << (channel - 1);
+    EXPECT_EQ(board.next_state().relays, on);
+    EXPECT_EQ(pins_of(board).relays, on);
+  }
+  board.command("R:3,Off");
+  EXPECT_EQ(pins_of(board).relays, on & ~0b100U);
+}
+
+void expect_brushless(const ControlledBoard& board) {
+  for (int channel = 1; channel <= bldc_channels; ++channel) {
+    for (const bool brake : {false, true}) {
+      const Bldc bldc{static_cast<std::uint16_t>(2000 + channel),
+                      channel % 2 == 0 ? Direction::reverse : Direction::forward, brake};
+      board.command(fmt::format("B:{},{},{},{}", bldc.speed, static_cast<int>(bldc.direction),
+                                brake ? 1 : 0, channel));
+      EXPECT_EQ(board.next_state().bldc[channel - 1], bldc) << channel;
+      EXPECT_EQ(pins_of(board).bldc[channel - 1], bldc) << channel;
+    }
+  }
+}
+
+void expect_steppers(const ControlledBoard& board) {
+  for (int channel = 1; channel <= stepper_channels; ++channel) {
+    const int to = channel % 2 == 0 ? -50 * channel : 50 * channel;
+    board.command(fmt::format("P:{},5000,{}", to, channel));
+    await(board, [&](const State& s) { return s.stepper_steps[channel - 1] == to; });
+    EXPECT_EQ(pins_of(board).stepper[channel - 1].position, to) << channel;
+  }
+}
+
+void expect_interlocks(const ControlledBoard& board) {
+  for (int channel = 1; channel <= ultrasonic_channels; ++channel) {
+    board.command("O:500,1,1");
+    EXPECT_FALSE(pins_of(board).is_safe());
+    board.command(fmt::format("U:{},{}", 50 * channel + 1, channel));
+    await(board, [](const State& s) { return s.safe == SafeReason::proximity; });
+    EXPECT_TRUE(pins_of(board).is_safe()) << channel;
+    board.command(fmt::format("U:0,{}", channel));
+    await(board, [](const State& s) { return s.safe == SafeReason::none; });
+  }
+  board.command("O:500,1,1");
+  board.at_board([](sim::SimulatedBoard& at) { at.model().hold_handle(false); });
+  await(board, [](const State& s) { return s.safe == SafeReason::handle && !s.handle_held; });
+  EXPECT_TRUE(pins_of(board).is_safe());
+  board.at_board([](sim::SimulatedBoard& at) { at.model().hold_handle(true); });
+  await(board, [](const State& s) { return s.safe == SafeReason::none && s.handle_held; });
+}
+
+}  // namespace
+
+void expect_every_channel(const ControlledBoard& board) {
+  board.command("F:ALL");
+  expect_inputs(board);
+  expect_drives(board);
+  expect_servos_and_relays(board);
+  expect_brushless(board);
+  expect_steppers(board);
+  board.command("E:STOP");
+  await(board, [](const State& s) { return s.safe == SafeReason::stop; });
+  // The steppers' pulses have ended, and with the next pause they are known to.
+  const State stopped = board.next_state();
+  await(board, [&](const State& s) {
+    return s.t_ms - stopped.t_ms > sim::BoardModel::stepper_pause_ms + 20;
+  });
+  EXPECT_TRUE(pins_of(board).is_safe());
+  board.command("E:CLEAR");
+  await(board, [](const State& s) { return s.safe == SafeReason::none; });
+  EXPECT_TRUE(pins_of(board).is_safe());
+  expect_interlocks(board);
+}
+
+}  // namespace r4::test

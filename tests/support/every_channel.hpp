@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Every channel of the board from end to end: a command at the host, the register and the pin in the
+// model, the state back at the host; and every input from its pin to the host. Whatever the transport.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "firmware/ports/sim/simulated_board.hpp"
+#include "protocol/state.hpp"
+
+namespace r4::test {
+
+// A host that controls a simulated board, and a way to the board itself.
+struct ControlledBoard {
+  std::function<void(const std::string&)> command;  // returns when it was executed
+  std::function<State()> next_state;                // one that was sent after the call
+  std::function<void(const std::function<void(sim::SimulatedBoard&)>&)> at_board;
+};
+
+void expect_every_channel(const ControlledBoard& board);
+
+}  // namespace r4::test
