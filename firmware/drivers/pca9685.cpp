@@ -33,8 +33,10 @@ constexpr int bridged = 2;
 }  // namespace
 
 void Pca9685::set_duty(int channel, std::uint16_t duty) {
+  if (duty > duty_on) duty = duty_on;
+  if (duty_[channel] == duty) return;
   duty_[channel] = duty;
-  if (duty > duty_on) duty_[channel] = duty_on;
+  changed_ = true;
 }
 
 void Pca9685::set_pulse_us(int channel, std::uint16_t us) {
@@ -46,6 +48,7 @@ void Pca9685::set_pulse_us(int channel, std::uint16_t us) {
 
 void Pca9685::set_all_off() {
   for (std::uint16_t& duty : duty_) duty = 0;
+  changed_ = true;
 }
 
 I2cResult Pca9685::all_off(I2cBus& bus) {
@@ -149,6 +152,7 @@ bool Pca9685::differs(int index) const {
 }
 
 void Pca9685::on_write_changes(BusBudget& budget) {
+  if (!changed_) return;
   const int step = 4 * group_;
   int at = 0;
   while (at < registers) {
@@ -173,7 +177,7 @@ void Pca9685::on_write_changes(BusBudget& budget) {
       }
       end = group_end;
     }
-    if (first < 0) return;
+    if (first < 0) break;
     std::uint8_t bytes[1 + registers];
     std::uint8_t size = 0;
     bytes[size++] = static_cast<std::uint8_t>(led0_on_l + first);
@@ -184,6 +188,7 @@ void Pca9685::on_write_changes(BusBudget& budget) {
     if (!send(bytes, size, budget)) return;
     std::memcpy(written_ + first, bytes + 1, static_cast<std::size_t>(end - first));
   }
+  changed_ = false;
 }
 
 bool Pca9685::check_mode(BusBudget& budget) {

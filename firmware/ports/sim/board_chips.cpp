@@ -28,11 +28,13 @@ bool same(const T (&a)[N], const T (&b)[N]) {
 
 }  // namespace
 
-bool ChipPins::is_safe() const {
-  ChipPins safe;
-  for (Bldc& channel : safe.bldc) channel.brake = true;
-  return *this == safe;
+ChipPins ChipPins::safe() {
+  ChipPins pins;
+  for (Bldc& channel : pins.bldc) channel.brake = true;
+  return pins;
 }
+
+bool ChipPins::is_safe() const { return *this == safe(); }
 
 bool operator==(const ChipPins& a, const ChipPins& b) {
   return a.relays == b.relays && same(a.osmc, b.osmc) && same(a.dhb12, b.dhb12) &&

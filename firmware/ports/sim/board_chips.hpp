@@ -23,6 +23,7 @@ struct ChipPins {
   Bldc bldc[bldc_channels];
 
   // Nothing is driven, and every brake is on.
+  static ChipPins safe();
   bool is_safe() const;
 };
 bool operator==(const ChipPins& a, const ChipPins& b);

@@ -83,6 +83,7 @@ void BoardModel::power_on() {
 void BoardModel::hold_handle(bool held) {
   handle_held_ = held;
   handle_.set(held == firmware::handle_held_level);
+  convert_again();
 }
 
 void BoardModel::turn_encoder(int channel, std::int32_t counts) {
@@ -93,6 +94,7 @@ void BoardModel::turn_encoder(int channel, std::int32_t counts) {
 void BoardModel::pin_analog(Analog input, std::int32_t centivolts) {
   pinned_cv_[static_cast<int>(input)] = centivolts;
   pinned_ = static_cast<std::uint8_t>(pinned_ | 1U << static_cast<int>(input));
+  convert_again();
 }
 
 firmware::BoardPins BoardModel::microcontroller_pins() {
@@ -188,12 +190,21 @@ std::int32_t BoardModel::analog_cv(int input) const {
   return pick(near_zero, random);
 }
 
+// The surroundings have changed within the millisecond.
+void BoardModel::convert_again() {
+  for (Converter& converter : converters_) converter.converted = false;
+}
+
 // The divider before the converter: 50 V is its full range (drivers/analog.hpp).
 std::uint16_t BoardModel::Converter::read() {
+  if (converted && at_ms == model->time_ms_) return counts;
   constexpr std::int32_t range_cv = 5000;
   const std::int32_t cv = model->analog_cv(input);
   const std::int32_t within = cv < 0 ? 0 : cv > range_cv ? range_cv : cv;
-  return static_cast<std::uint16_t>((within * 65535 + range_cv / 2) / range_cv);
+  counts = static_cast<std::uint16_t>((within * 65535 + range_cv / 2) / range_cv);
+  at_ms = model->time_ms_;
+  converted = true;
+  return counts;
 }
 
 Pins BoardModel::pins() const {

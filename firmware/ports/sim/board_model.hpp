@@ -66,6 +66,8 @@ class BoardModel {
   BoardChips& chips() { return chips_; }
   firmware::BoardPins microcontroller_pins();
   Pins pins() const;
+  // How far the shaft of an encoder has turned since power came, in the encoder's counts.
+  std::int32_t shaft_count(int channel) const { return shafts_[channel - 1].count; }
 
   // The surroundings. Channels count from 1.
   void hold_handle(bool held);
@@ -91,17 +93,21 @@ class BoardModel {
     std::uint32_t pulses = 0;  // seen so far
     std::uint32_t pause_ms = stepper_pause_ms;
   };
-  // A converter asks the model for the voltage when it is read.
+  // A converter, which asks the model for the voltage once a millisecond.
   struct Converter final : firmware::AnalogPin {
     std::uint16_t read() override;
     const BoardModel* model = nullptr;
     int input = 0;
+    std::uint32_t at_ms = 0;
+    bool converted = false;
+    std::uint16_t counts = 0;
   };
 
   void turn(int channel, std::int32_t counts, Interrupts& interrupts);
   void tell_levels(int channel, Interrupts& interrupts);
   void steer(Drive drive);
   std::int32_t analog_cv(int input) const;
+  void convert_again();
 
   std::uint64_t seed_;
   std::uint32_t time_ms_ = 0;
