@@ -51,7 +51,7 @@ class TransmitLines {
   // The next byte for the port, from its interrupt or with that off. False: there is none.
   bool take(char& byte) {
     if (!ring_.take(byte)) return false;
-    ++taken_;
+    taken_ = taken_ + 1;
     return true;
   }
 

@@ -19,11 +19,10 @@ class HandOver {
   void put(const T& value) {
     const std::uint32_t before = version_.load(std::memory_order_relaxed);
     version_.store(before + 1, std::memory_order_relaxed);  // odd: being written
-    std::atomic_thread_fence(std::memory_order_release);
     unsigned char flat[sizeof(T)];
     std::memcpy(flat, &value, sizeof flat);
     for (std::size_t i = 0; i < sizeof flat; ++i) {
-      bytes_[i].store(flat[i], std::memory_order_relaxed);
+      bytes_[i].store(flat[i], std::memory_order_release);  // who sees it sees the odd version, too
     }
     version_.store(before + 2, std::memory_order_release);
   }
@@ -35,9 +34,8 @@ class HandOver {
     if (before == known || before % 2 != 0) return false;
     unsigned char flat[sizeof(T)];
     for (std::size_t i = 0; i < sizeof flat; ++i) {
-      flat[i] = bytes_[i].load(std::memory_order_relaxed);
+      flat[i] = bytes_[i].load(std::memory_order_acquire);
     }
-    std::atomic_thread_fence(std::memory_order_acquire);
     if (version_.load(std::memory_order_relaxed) != before) return false;
     std::memcpy(&value, flat, sizeof flat);
     known = before;

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "system.hpp"
+
+#include <new>
+
+#include "board_clock.hpp"
+#include "fault.hpp"
+
+namespace r4 {
+namespace giga {
+
+namespace {
+
+// By the chip's generator of true random numbers.
+std::uint32_t random_number() {
+  std::uint32_t number = 0;
+  std::size_t size = 0;
+  trng_t generator;
+  trng_init(&generator);
+  trng_get_bytes(&generator, reinterpret_cast<std::uint8_t*>(&number), sizeof number, &size);
+  trng_free(&generator);
+  constexpr std::uint32_t scatter = 2654435761U;
+  return size == sizeof number ? number : BoardClock::now_us() * scatter;
+}
+
+}  // namespace
+
+System::~System() {
+  if (board_ != nullptr) board_->~Board();
+}
+
+void System::boot() {
+  guard_against_faults(machine_.hardware());
+  const FaultNote last_boot = take_fault_note();
+  BoardClock::start(random_number());
+
+  store_.start();
+  const std::uint32_t began_us = BoardClock::now_us();
+  while (store_.state() == StoreState::loading &&
+         BoardClock::now_us() - began_us < settings_limit_us) {
+    machine_.poll();
+    Watchdog::feed();
+    rtos::ThisThread::sleep_for(std::chrono::milliseconds(1));
+  }
+  Settings settings;
+  store_.loaded(settings);
+  machine_.hardware().fit(settings.site.chips);
+
+  // Above the network's thread: it cannot keep the loop waiting.
+  osThreadSetPriority(osThreadGetId(), osPriorityAboveNormal);
+  board_ = new (board_place_) Board(machine_, store_, settings, last_boot);
+  board_->start();
+}
+
+}  // namespace giga
+}  // namespace r4

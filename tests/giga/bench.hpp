@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The firmware on a fake Giga, with hosts at the ends of its transports.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "fake_giga.hpp"
+#include "firmware/ports/giga/system.hpp"
+#include "firmware/ports/giga/timers.hpp"
+#include "tests/support/datagrams.hpp"
+#include "transports/framing/can_node.hpp"
+
+extern "C" void r4_fake_core_error(std::int32_t status, std::uint32_t address);
+
+namespace r4::test {
+
+// A host that does as the paper's client: heartbeats of its own clock, numbers from below.
+class PlainHost {
+ public:
+  std::string heartbeat(std::uint64_t now_ms) {
+    return with_crc("H:ROS2-R4;PNum:" + std::to_string(++pnum_) + ";T:" + std::to_string(now_ms) +
+                    ";");
+  }
+  std::string command(const std::string& field) {
+    return with_crc(field + ";PNum:" + std::to_string(++pnum_) + ";T:1;");
+  }
+
+ private:
+  unsigned pnum_ = 0;
+};
+
+class GigaBench {
+ public:
+  using Send = std::function<void(const std::string&)>;
+
+  GigaBench() {
+    giga.set_pin('I', 15, true);  // the handle is held
+    giga.usb_open = true;
+    giga.can.on_sent = [this](const CanFrame& frame) { on_can(frame); };
+  }
+  ~GigaBench() { system.reset(); }
+
+  void boot() {
+    system = std::make_unique<giga::System>();
+    system->boot();
+  }
+  // The chip starts again, as after a reset or with new power for the microcontroller alone.
+  void restart() {
+    giga.reset_by([this] { giga.reset(); });
+    system.reset();
+    giga.connect_registers();
+    boot();
+  }
+  // As the sketch does it.
+  void turn() {
+    system->poll();
+    giga::rest();
+  }
+  void run_ms(std::uint64_t ms) {
+    const std::uint64_t end = giga.now_ms() + ms;
+    while (giga.now_ms() < end) turn();
+  }
+  // With a host that sends a heartbeat each 100 ms.
+  void run_ms(std::uint64_t ms, PlainHost& host, const Send& send) {
+    const std::uint64_t end = giga.now_ms() + ms;
+    for (std::uint64_t next = giga.now_ms(); giga.now_ms() < end; turn()) {
+      if (giga.now_ms() < next) continue;
+      send(host.heartbeat(giga.now_ms()));
+      next += 100;
+    }
+  }
+  // Until `done`, giving the firmware's threads time.
+  bool run_until(const std::function<bool()>& done) {
+    for (int i = 0; i < 20000; ++i) {
+      if (done()) return true;
+      turn();
+      std::this_thread::sleep_for(std::chrono::microseconds(20));
+    }
+    return false;
+  }
+
+  // --- the ends of the transports
+  Send usb() {
+    return [this](const std::string& line) { giga.usb_send(line + "\r\n"); };
+  }
+  Send udp(std::uint32_t ip = host_ip, std::uint16_t port = 40000) {
+    return [this, ip, port](const std::string& bytes) {
+      const std::lock_guard<std::mutex> lock(giga.mutex);
+      giga.udp_in.push_back({ip, port, bytes});
+    };
+  }
+  Send can() {
+    return [this](const std::string& bytes) {
+      can_node.begin(Text(bytes.data(), bytes.size()), now_us());
+      pump_can();
+    };
+  }
+  std::uint32_t now_us() const { return static_cast<std::uint32_t>(giga.now_ns() / 1000); }
+
+  std::vector<std::string> usb_lines() {
+    std::vector<std::string> lines;
+    std::size_t end = 0;
+    while ((end = giga.usb_host.find("\r\n")) != std::string::npos) {
+      lines.push_back(giga.usb_host.substr(0, end));
+      giga.usb_host.erase(0, end + 2);
+    }
+    return lines;
+  }
+
+  const firmware::Application& application() { return system->board().application(); }
+  SafeReason reason() { return application().reason(); }
+  bool active() { return application().state() == firmware::BoardState::active; }
+  sim::ChipPins pins() const { return giga.chips.pins(); }
+
+  // A host in control by `send`, OSMC 1 at 358.
+  void drive(PlainHost& host, const Send& send) {
+    run_ms(150, host, send);
+    send(host.command("O:358,1,1"));
+    run_ms(20);
+    ASSERT_EQ(pins().osmc[0].pwm, 358);
+  }
+
+  static constexpr std::uint32_t host_ip = 192U << 24 | 168U << 16 | 117;
+
+  fake::Giga giga;
+  std::unique_ptr<giga::System> system;
+  CanNode can_node{CanEnd::host, 1, false};
+  std::vector<std::string> can_datagrams;
+  std::vector<CanFrame> can_raw;  // that are no part of a datagram
+
+ private:
+  void on_can(const CanFrame& frame) {
+    if (frame.id < 0x180) can_raw.push_back(frame);
+    const Text datagram = can_node.on_frame(frame, now_us());
+    if (!datagram.empty()) can_datagrams.push_back(str(datagram));
+    pump_can();
+  }
+  void pump_can() {
+    CanFrame frame;
+    while (can_node.offer(now_us(), frame)) {
+      giga.can.deliver(frame);
+      can_node.frame_sent(now_us());
+    }
+  }
+};
+
+}  // namespace r4::test

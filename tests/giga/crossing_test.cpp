@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What crosses between the loop and the threads.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <string>
+#include <thread>
+
+#include "firmware/ports/giga/datagram_ring.hpp"
+#include "firmware/ports/giga/hand_over.hpp"
+#include "firmware/ports/giga/udp_peers.hpp"
+#include "firmware/ports/giga/udp_port.hpp"
+
+namespace r4::test {
+namespace {
+
+using firmware::Urgency;
+
+std::uint32_t now_ms = 0;
+std::uint32_t clock_ms() { return now_ms; }
+std::string str(Text text) { return std::string(text.data(), text.size()); }
+
+TEST(DatagramRing, GivesDatagramsWholeAndInOrder) {
+  giga::DatagramRing<256> ring;
+  giga::DatagramNote note;
+  note.peer = 7;
+  note.time_ms = 5;
+  note.urgency = Urgency::state;
+  EXPECT_TRUE(ring.put(note, "first"));
+  EXPECT_TRUE(ring.put(giga::DatagramNote(), "second"));
+  giga::DatagramNote taken;
+  char buffer[max_datagram];
+  Text text;
+  ASSERT_TRUE(ring.take(taken, buffer, text));
+  EXPECT_EQ(str(text), "first");
+  EXPECT_EQ(taken.peer, 7U);
+  EXPECT_EQ(taken.time_ms, 5U);
+  EXPECT_EQ(taken.urgency, Urgency::state);
+  ASSERT_TRUE(ring.take(taken, buffer, text));
+  EXPECT_EQ(str(text), "second");
+  EXPECT_FALSE(ring.take(taken, buffer, text));
+}
+
+TEST(DatagramRing, RefusesWhatDoesNotFitAndGoesOnAroundItsEnd) {
+  giga::DatagramRing<256> ring;
+  giga::DatagramNote note;
+  char buffer[max_datagram];
+  Text text;
+  const std::string datagram(60, 'x');
+  for (int round = 0; round < 50; ++round) {
+    int put = 0;
+    while (ring.put(note, Text(datagram))) ++put;
+    EXPECT_EQ(put, 3);
+    for (int i = 0; i < put; ++i) {
+      ASSERT_TRUE(ring.take(note, buffer, text));
+      EXPECT_EQ(str(text), datagram);
+    }
+  }
+  EXPECT_FALSE(ring.put(note, "x", 250)) << "room is kept";
+}
+
+TEST(DatagramRing, CarriesBetweenThreadsWithoutLosingAnyByte) {
+  static giga::DatagramRing<1024> ring;
+  std::thread producer([] {
+    giga::DatagramNote note;
+    for (int i = 0; i < 20000;) {
+      const std::string text =
+          std::to_string(i) + std::string(static_cast<std::size_t>(i % 90), '.');
+      if (ring.put(note, Text(text))) ++i;
+    }
+  });
+  giga::DatagramNote note;
+  char buffer[max_datagram];
+  Text text;
+  for (int i = 0; i < 20000;) {
+    if (!ring.take(note, buffer, text)) continue;
+    ASSERT_EQ(str(text), std::to_string(i) + std::string(static_cast<std::size_t>(i % 90), '.'));
+    ++i;
+  }
+  producer.join();
+}
+
+TEST(HandOver, GivesTheNewestOnceAndNeverAMixture) {
+  struct Pair {
+    std::uint32_t a;
+    std::uint32_t b;
+  };
+  static giga::HandOver<Pair> place;
+  std::uint32_t known = 0;
+  Pair value{};
+  EXPECT_FALSE(place.take(known, value));
+  static std::atomic<bool> done{false};
+  std::thread writer([] {
+    for (std::uint32_t i = 1; i <= 20000; ++i) place.put({i, ~i});
+    done = true;
+  });
+  std::uint32_t newest = 0;
+  while (!done || newest != 20000) {
+    if (!place.take(known, value)) continue;
+    ASSERT_EQ(value.b, ~value.a);
+    ASSERT_GT(value.a, newest);
+    newest = value.a;
+  }
+  writer.join();
+  EXPECT_FALSE(place.take(known, value));
+}
+
+TEST(UdpPeers, NumberEveryHostOnceAndForgetTheOneSilentLongest) {
+  giga::UdpPeers peers;
+  std::uint32_t numbers[giga::UdpPeers::capacity];
+  for (std::uint16_t i = 0; i < giga::UdpPeers::capacity; ++i) numbers[i] = peers.heard({1, i}, i);
+  EXPECT_EQ(peers.heard({1, 0}, 100), numbers[0]) << "known";
+  const std::uint32_t fresh = peers.heard({2, 9}, 101);
+  for (const std::uint32_t number : numbers) EXPECT_NE(fresh, number);
+  giga::UdpAddress to;
+  EXPECT_FALSE(peers.find(numbers[1], to)) << "it was silent longest";
+  EXPECT_TRUE(peers.find(numbers[0], to));
+  EXPECT_EQ(to.port, 0);
+  EXPECT_TRUE(peers.find(firmware::everyone, to));
+  EXPECT_EQ(to.ip, 2U) << "the host heard last";
+}
+
+TEST(UdpPeers, SendToThePapersClientWhereItListens) {
+  giga::UdpPeers peers;
+  giga::UdpAddress to;
+  EXPECT_FALSE(peers.find(firmware::everyone, to)) << "nobody is there";
+  peers.set_host(77);
+  ASSERT_TRUE(peers.find(firmware::everyone, to)) << "before it was heard";
+  EXPECT_EQ(to.ip, 77U);
+  EXPECT_EQ(to.port, 2390);
+  const std::uint32_t number = peers.heard({77, 50000}, 1);
+  ASSERT_TRUE(peers.find(number, to));
+  EXPECT_EQ(to.port, 2390) << "it asks from another socket";
+  const std::uint32_t other = peers.heard({78, 50001}, 2);
+  ASSERT_TRUE(peers.find(other, to));
+  EXPECT_EQ(to.port, 50001);
+}
+
+TEST(UdpLink, AThreadThatWasAwaySendsThePresent) {
+  giga::UdpLink link;
+  giga::UdpPort port(link, &clock_ms);
+  link.set_up(true);
+  EXPECT_FALSE(port.receive([](std::uint32_t, Text) {}));
+  for (int i = 0; i < 300; ++i) {
+    now_ms += 10;
+    port.send("AIN24:24.28;", Urgency::state, 1);
+    if (i % 50 == 0) port.send("H:R4-ROS2;", Urgency::normal, 1);
+  }
+  EXPECT_GT(port.dropped(), 0U);
+  std::uint32_t peer = 0;
+  char buffer[max_datagram];
+  Text text;
+  int heartbeats = 0;
+  while (link.take(now_ms, peer, buffer, text)) {
+    ASSERT_EQ(str(text), "H:R4-ROS2;") << "no old state";
+    ++heartbeats;
+  }
+  EXPECT_EQ(heartbeats, 6) << "states left room for answers";
+  now_ms += 10;
+  port.send("AIN24:24.29;", Urgency::state, 1);
+  ASSERT_TRUE(link.take(now_ms, peer, buffer, text));
+  EXPECT_EQ(str(text), "AIN24:24.29;");
+}
+
+TEST(UdpLink, TellsTheLoopOnceThatTheNetworkHasGone) {
+  giga::UdpLink link;
+  giga::UdpPort port(link, &clock_ms);
+  const auto receive = [&] { return port.receive([](std::uint32_t, Text) {}); };
+  EXPECT_FALSE(receive()) << "it was never there";
+  link.set_up(true);
+  EXPECT_FALSE(receive());
+  link.set_up(false);
+  EXPECT_TRUE(receive());
+  EXPECT_FALSE(receive());
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,329 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The parts of the core that the firmware calls, on a fake Giga.
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <cstring>
+#include <thread>
+
+#include "core/BlockDevice.h"
+#include "core/MBRBlockDevice.h"
+#include "core/TDBStore.h"
+#include "core/USB/PluggableUSBSerial.h"
+#include "core/WiFi.h"
+#include "core/WiFiUdp.h"
+#include "core/hal/trng_api.h"
+#include "core/hal/us_ticker_api.h"
+#undef abs
+#undef bit
+#undef max
+#undef min
+#undef round
+
+#include "fake_giga.hpp"
+
+namespace {
+
+using r4::fake::Giga;
+using r4::fake::giga;
+
+// A thread of the firmware. It ends where it sleeps or hangs: there it stays, for good, and touches
+// nothing any more.
+struct FakeThread {
+  std::mutex mutex;
+  std::condition_variable changed;
+  bool end = false;
+  bool parked = false;
+
+  void stop() {
+    std::unique_lock<std::mutex> lock(mutex);
+    end = true;
+    changed.notify_all();
+    changed.wait(lock, [this] { return parked; });
+  }
+  // Stays here if it is to end.
+  void may_end() {
+    std::unique_lock<std::mutex> lock(mutex);
+    while (end) {
+      parked = true;
+      changed.notify_all();
+      changed.wait(lock);
+    }
+  }
+};
+thread_local FakeThread* current = nullptr;
+
+}  // namespace
+
+extern "C" {
+
+std::uint32_t __get_PRIMASK() { return current == nullptr ? giga().primask : 0; }
+void __set_PRIMASK(std::uint32_t mask) {
+  if (current != nullptr) return;
+  giga().primask = mask;
+}
+void __disable_irq() { __set_PRIMASK(1); }
+void __enable_irq() { __set_PRIMASK(0); }
+std::uint32_t __get_IPSR() { return 3; }
+void __DSB() {}
+void NVIC_SetVector(IRQn_Type line, std::uintptr_t vector) {
+  giga().vectors[line] = reinterpret_cast<void (*)()>(vector);
+}
+void NVIC_EnableIRQ(IRQn_Type) {}
+
+std::uint32_t HAL_RCC_GetPCLK1Freq() { return 120000000; }
+std::uint32_t HAL_RCC_GetHCLKFreq() { return 240000000; }
+void HAL_RCCEx_GetPLL1ClockFreq(PLL1_ClocksTypeDef* clocks) {
+  *clocks = {480000000, 60000000, 240000000};
+}
+std::uint32_t HAL_GetUIDw0() { return 0x00112233; }
+std::uint32_t HAL_GetUIDw1() { return 0x44556677; }
+std::uint32_t HAL_GetUIDw2() { return 0x8899aabb; }
+
+osThreadId_t osThreadGetId() { return nullptr; }
+std::int32_t osThreadSetPriority(osThreadId_t, osPriority_t) { return 0; }
+
+static void (*error_hook)(const mbed_error_ctx*) = nullptr;
+std::int32_t mbed_set_error_hook(void (*hook)(const mbed_error_ctx*)) {
+  error_hook = hook;
+  return 0;
+}
+void r4_fake_core_error(std::int32_t status, std::uint32_t address) {
+  const mbed_error_ctx context = {status, address, 0};
+  error_hook(&context);
+}
+
+std::uint32_t us_ticker_read() {
+  if (current == nullptr) giga().pass_us(1);
+  return static_cast<std::uint32_t>(giga().now_ns() / 1000);
+}
+void trng_init(trng_t*) {}
+void trng_free(trng_t*) {}
+int trng_get_bytes(trng_t*, std::uint8_t* output, std::size_t length, std::size_t* output_length) {
+  std::memset(output, 0x5A, length);
+  *output_length = length;
+  return 0;
+}
+}
+
+namespace mbed {
+
+InterruptIn::InterruptIn(PinName pin, MbedPinMode mode) : pin_(pin) {
+  GPIO_TypeDef& port = r4_fake_gpio[pin >> 4];
+  const int line = pin & 0xF;
+  port.MODER &= ~(3U << (2 * line));
+  port.PUPDR = (port.PUPDR & ~(3U << (2 * line))) | (mode == PullUp     ? 1U
+                                                     : mode == PullDown ? 2U
+                                                                        : 0U)
+                                                        << (2 * line);
+  giga().edges[pin] = [this](bool high) {
+    const Callback<void()>& action = high ? rise_ : fall_;
+    if (!action) return;
+    giga().in_interrupt = true;
+    action();
+    giga().in_interrupt = false;
+  };
+}
+InterruptIn::~InterruptIn() { giga().edges.erase(pin_); }
+void InterruptIn::rise(Callback<void()> function) { rise_ = function; }
+void InterruptIn::fall(Callback<void()> function) { fall_ = function; }
+
+AnalogIn::AnalogIn(PinName pin, float) : pin_(pin) {}
+unsigned short AnalogIn::read_u16() { return giga().analog[pin_]; }
+
+void Ticker::attach(Callback<void()> function, std::chrono::microseconds period) {
+  Giga::Timer& timer = giga().ticker;
+  timer.period_ns = static_cast<std::uint64_t>(period.count()) * 1000;
+  timer.next_ns = giga().now_ns() + timer.period_ns;
+  timer.action = [function] { function(); };
+}
+void Ticker::detach() { giga().ticker.period_ns = 0; }
+
+// --- flash
+
+namespace {
+struct Flash final : BlockDevice {
+  int init() override { return BD_ERROR_OK; }
+  bd_size_t size() const override { return 16 * 1024 * 1024; }
+};
+}  // namespace
+BlockDevice::~BlockDevice() = default;
+BlockDevice* BlockDevice::get_default_instance() {
+  static Flash flash;
+  return &flash;
+}
+MBRBlockDevice::MBRBlockDevice(BlockDevice* device, int part) : device_(device), part_(part) {}
+MBRBlockDevice::~MBRBlockDevice() = default;
+int MBRBlockDevice::init() {
+  return device_ != nullptr && part_ == 3 && giga().has_partition ? BD_ERROR_OK
+                                                                  : BD_ERROR_DEVICE_ERROR;
+}
+bd_size_t MBRBlockDevice::size() const { return giga().partition_size; }
+TDBStore::TDBStore(BlockDevice* device) : device_(device) {}
+TDBStore::~TDBStore() = default;
+int TDBStore::init() { return device_ == nullptr ? -1 : MBED_SUCCESS; }
+int TDBStore::set(const char* key, const void* buffer, std::size_t size, std::uint32_t) {
+  const std::lock_guard<std::mutex> lock(giga().mutex);
+  giga().stored[key] = std::string(static_cast<const char*>(buffer), size);
+  ++giga().writes;
+  return MBED_SUCCESS;
+}
+int TDBStore::get(const char* key, void* buffer, std::size_t buffer_size, std::size_t* actual_size,
+                  std::size_t) {
+  const std::lock_guard<std::mutex> lock(giga().mutex);
+  const auto found = giga().stored.find(key);
+  if (found == giga().stored.end()) return -1;
+  *actual_size = std::min(buffer_size, found->second.size());
+  std::memcpy(buffer, found->second.data(), *actual_size);
+  return MBED_SUCCESS;
+}
+
+}  // namespace mbed
+
+namespace rtos {
+
+Thread::Thread(osPriority, std::uint32_t, unsigned char*, const char*) {}
+Thread::~Thread() {
+  if (running_ != nullptr) static_cast<FakeThread*>(running_)->stop();
+}
+osStatus Thread::start(mbed::Callback<void()> task) {
+  auto* const thread = new FakeThread;  // outlives everything, as its std::thread does
+  running_ = thread;
+  std::thread([thread, task] {
+    current = thread;
+    task();
+    for (;;) rtos::ThisThread::sleep_for(std::chrono::milliseconds(1));
+  }).detach();
+  return 0;
+}
+
+void ThisThread::sleep_for(Kernel::Clock::duration_u32 time) {
+  if (current != nullptr) {
+    current->may_end();
+    std::this_thread::sleep_for(std::chrono::microseconds(50));
+    return;
+  }
+  giga().pass_ms(time.count());
+  std::this_thread::sleep_for(std::chrono::microseconds(200));  // the other threads' turn
+}
+
+std::uint32_t EventFlags::set(std::uint32_t flags) {
+  giga().flag = true;
+  return flags;
+}
+std::uint32_t EventFlags::wait_any_for(std::uint32_t flags, Kernel::Clock::duration_u32 time,
+                                       bool) {
+  Giga& chip = giga();
+  const std::uint64_t end = chip.now_ms() + time.count();
+  while (!chip.flag && chip.now_ms() < end) chip.pass_us(25);
+  chip.flag = false;
+  return flags;
+}
+
+}  // namespace rtos
+
+// --- USB
+
+arduino::USBSerial _SerialUSB;
+
+namespace arduino {
+
+bool USBSerial::connected() { return giga().usb_open; }
+int USBSerial::available() {
+  return giga().usb_packets.empty() ? 0 : static_cast<int>(giga().usb_packets.front().size());
+}
+int USBSerial::read() {
+  auto& packets = giga().usb_packets;
+  if (packets.empty()) return -1;
+  const int byte = static_cast<unsigned char>(packets.front().front());
+  packets.front().erase(0, 1);
+  if (packets.front().empty()) packets.erase(packets.begin());
+  return byte;
+}
+void USBSerial::send_nb(std::uint8_t* buffer, std::uint32_t size, std::uint32_t* actual, bool) {
+  Giga& chip = giga();
+  *actual = 0;
+  if (!chip.usb_open || !chip.usb_reads) return;
+  *actual = std::min(size, 64U);
+  chip.usb_host.append(reinterpret_cast<const char*>(buffer), *actual);
+  chip.usb_sent.push_back({*actual, chip.now_ms()});
+}
+
+// --- WiFi
+
+int WiFiClass::begin(const char* ssid) { return begin(ssid, ""); }
+int WiFiClass::begin(const char* ssid, const char* passphrase) {
+  for (;;) {
+    {
+      const std::lock_guard<std::mutex> lock(giga().mutex);
+      if (!giga().wifi_hangs) break;
+    }
+    rtos::ThisThread::sleep_for(std::chrono::milliseconds(1));
+  }
+  const std::lock_guard<std::mutex> lock(giga().mutex);
+  ++giga().joins;
+  giga().wifi_connected = giga().air == ssid && giga().air_password == passphrase;
+  return giga().wifi_connected ? WL_CONNECTED : WL_CONNECT_FAILED;
+}
+int WiFiClass::disconnect() {
+  const std::lock_guard<std::mutex> lock(giga().mutex);
+  giga().wifi_connected = false;
+  return 0;
+}
+std::uint8_t WiFiClass::status() {
+  const std::lock_guard<std::mutex> lock(giga().mutex);
+  return giga().wifi_connected ? WL_CONNECTED : WL_IDLE_STATUS;
+}
+IPAddress WiFiClass::localIP() { return IPAddress(192, 168, 0, 162); }
+
+namespace {
+r4::fake::Datagram arrived;
+r4::fake::Datagram leaving;
+}  // namespace
+WiFiUDP::WiFiUDP() : packet_(nullptr) {}
+WiFiUDP::~WiFiUDP() = default;
+std::uint8_t WiFiUDP::begin(std::uint16_t port) {
+  const std::lock_guard<std::mutex> lock(giga().mutex);
+  giga().udp_port = port;
+  return 1;
+}
+void WiFiUDP::stop() {
+  const std::lock_guard<std::mutex> lock(giga().mutex);
+  giga().udp_port = 0;
+}
+int WiFiUDP::beginPacket(IPAddress ip, std::uint16_t port) {
+  leaving = {
+      std::uint32_t{ip[0]} << 24 | std::uint32_t{ip[1]} << 16 | std::uint32_t{ip[2]} << 8 | ip[3],
+      port, ""};
+  return 1;
+}
+std::size_t WiFiUDP::write(const std::uint8_t* buffer, std::size_t size) {
+  leaving.bytes.append(reinterpret_cast<const char*>(buffer), size);
+  return size;
+}
+int WiFiUDP::endPacket() {
+  const std::lock_guard<std::mutex> lock(giga().mutex);
+  giga().udp_out.push_back(leaving);
+  return 1;
+}
+int WiFiUDP::parsePacket() {
+  const std::lock_guard<std::mutex> lock(giga().mutex);
+  if (giga().udp_in.empty()) return 0;
+  arrived = giga().udp_in.front();
+  giga().udp_in.pop_front();
+  return static_cast<int>(arrived.bytes.size());
+}
+int WiFiUDP::read(char* buffer, std::size_t size) {
+  const std::size_t count = std::min(size, arrived.bytes.size());
+  std::memcpy(buffer, arrived.bytes.data(), count);
+  return static_cast<int>(count);
+}
+IPAddress WiFiUDP::remoteIP() {
+  const auto byte = [](int shift) { return static_cast<std::uint8_t>(arrived.ip >> shift); };
+  return IPAddress(byte(24), byte(16), byte(8), byte(0));
+}
+std::uint16_t WiFiUDP::remotePort() { return arrived.port; }
+
+}  // namespace arduino
+
+arduino::WiFiClass WiFi;

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fake_giga.hpp"
+
+#include <algorithm>
+#include <csetjmp>
+#include <cstdlib>
+#include <thread>
+
+#include "core/registers.hpp"
+
+GPIO_TypeDef r4_fake_gpio[11];
+I2C_TypeDef r4_fake_i2c2;
+FDCAN_GlobalTypeDef r4_fake_fdcan2;
+IWDG_TypeDef r4_fake_iwdg1;
+TIM_TypeDef r4_fake_tim7;
+RCC_TypeDef r4_fake_rcc;
+PWR_TypeDef r4_fake_pwr;
+RTC_TypeDef r4_fake_rtc;
+SCB_Type r4_fake_scb;
+std::uint32_t r4_fake_message_ram[2560];
+
+namespace r4::fake {
+
+namespace {
+
+Giga* the_giga = nullptr;
+std::jmp_buf reset_point;
+bool reset_expected = false;
+
+constexpr std::uint64_t us_ns = 1000;
+constexpr std::uint64_t timer_hz = 240000000;
+
+void clear_registers() {
+  for (GPIO_TypeDef& port : r4_fake_gpio) {
+    for (Register* each : {&port.MODER, &port.OTYPER, &port.OSPEEDR, &port.PUPDR, &port.IDR,
+                           &port.ODR, &port.BSRR, &port.LCKR, &port.AFR[0], &port.AFR[1]}) {
+      each->clear();
+    }
+    port.MODER.value = 0xFFFFFFFF;
+  }
+  auto* const words = reinterpret_cast<Register*>(&r4_fake_i2c2);
+  for (std::size_t i = 0; i < sizeof r4_fake_i2c2 / sizeof(Register); ++i) words[i].clear();
+  auto* const can = reinterpret_cast<Register*>(&r4_fake_fdcan2);
+  for (std::size_t i = 0; i < sizeof r4_fake_fdcan2 / sizeof(Register); ++i) can[i].clear();
+  for (Register* each :
+       {&r4_fake_tim7.CR1, &r4_fake_tim7.DIER, &r4_fake_tim7.SR, &r4_fake_tim7.ARR,
+        &r4_fake_tim7.PSC, &r4_fake_tim7.EGR, &r4_fake_rcc.AHB4ENR, &r4_fake_rcc.APB1LENR,
+        &r4_fake_rcc.APB1HENR, &r4_fake_rcc.D2CCIP1R, &r4_fake_scb.AIRCR, &r4_fake_iwdg1.KR}) {
+    each->clear();
+  }
+}
+
+}  // namespace
+
+Giga& giga() { return *the_giga; }
+
+Giga::Giga() {
+  the_giga = this;
+  r4_fake_rtc.BKP20R.clear();
+  r4_fake_rcc.RSR.clear();
+  r4_fake_rcc.RSR.on_write = [](std::uint32_t value) {
+    if ((value & 1U << 16) != 0) r4_fake_rcc.RSR.value = 0;
+  };
+  chips.power_on();
+  for (sim::I2cChipModel* chip : std::initializer_list<sim::I2cChipModel*>{
+           &chips.osmc, &chips.dhb12, &chips.servo, &chips.expander, &chips.dac}) {
+    chip->follow(now_ns_);
+  }
+  connect_registers();
+}
+
+Giga::~Giga() {
+  clear_registers();
+  the_giga = nullptr;
+}
+
+void Giga::connect_registers() {
+  clear_registers();
+  for (int i = 0; i < 11; ++i) {
+    GPIO_TypeDef& port = r4_fake_gpio[i];
+    port.BSRR.on_write = [this, i, &port](std::uint32_t value) {
+      const std::uint32_t before = port.ODR.value;
+      port.ODR.value = (before & ~(value >> 16)) | (value & 0xFFFF);
+      const bool scl = i == 'H' - 'A' && (port.MODER.value >> 8 & 3U) == 1;  // PH4 as an output
+      if (scl && (before & 1U << 4) == 0 && (port.ODR.value & 1U << 4) != 0) i2c.scl_rose();
+    };
+    port.IDR.on_read = [this, i, &port] {
+      std::uint32_t levels = 0;
+      for (std::uint32_t line = 0; line < 16; ++line) {
+        const std::uint32_t mode = port.MODER.value >> (2 * line) & 3U;
+        const std::uint32_t pull = port.PUPDR.value >> (2 * line) & 3U;
+        const bool driven = (driven_[static_cast<std::size_t>(i)] >> line & 1U) != 0;
+        bool high = mode == 1   ? (port.ODR.value >> line & 1U) != 0
+                    : driven    ? (outside_[static_cast<std::size_t>(i)] >> line & 1U) != 0
+                    : mode == 2 ? true
+                                : pull == 1;
+        if (i == 'B' - 'A' && line == 11 && i2c.sda_low()) high = false;
+        if (i == 'H' - 'A' && line == 4 && i2c.scl_low()) high = false;
+        levels |= (high ? 1U : 0U) << line;
+      }
+      return levels;
+    };
+  }
+  i2c.connect();
+  can.connect();
+  r4_fake_iwdg1.KR.on_write = [this](std::uint32_t key) {
+    if (key == 0xCCCC) watchdog_runs = true;
+    if (key == 0xAAAA) ++watchdog_feeds;
+    if (key == 0xCCCC || key == 0xAAAA) watchdog_fed_ns = now_ns_;
+  };
+  r4_fake_tim7.CR1.on_write = [this](std::uint32_t value) {
+    step_timer.period_ns =
+        (value & 1U) == 0 ? 0 : (r4_fake_tim7.ARR + 1) * 1000000000ULL / timer_hz;
+    step_timer.next_ns = now_ns_ + step_timer.period_ns;
+    step_timer.action = [this] {
+      if (vectors.count(TIM7_IRQn) != 0) vectors[TIM7_IRQn]();
+    };
+  };
+  r4_fake_scb.AIRCR.on_write = [this](std::uint32_t value) {
+    if ((value & 0xFFFF0004) == 0x05FA0004) reset();
+  };
+}
+
+void Giga::reset() {
+  if (!reset_expected) {
+    std::fputs("the chip was reset\n", stderr);
+    std::abort();
+  }
+  std::longjmp(reset_point, 1);
+}
+
+bool Giga::reset_by(const std::function<void()>& action) {
+  reset_expected = true;
+  volatile bool was_reset = true;
+  if (setjmp(reset_point) == 0) {
+    action();
+    was_reset = false;
+  }
+  reset_expected = false;
+  if (was_reset) {
+    ticker = Timer();
+    step_timer = Timer();
+    primask = 0;
+    in_interrupt = false;
+    watchdog_runs = false;
+    edges.clear();
+    vectors.clear();
+    connect_registers();
+  }
+  return was_reset;
+}
+
+void Giga::set_pin(char port, int number, bool level) {
+  const auto index = static_cast<std::size_t>(port - 'A');
+  const std::uint32_t bit = 1U << number;
+  driven_[index] |= bit;
+  outside_[index] = level ? outside_[index] | bit : outside_[index] & ~bit;
+  const auto edge = edges.find(static_cast<int>(index) << 4 | number);
+  if (edge != edges.end()) edge->second(level);
+}
+
+bool Giga::pin(char port, int number) {
+  return (r4_fake_gpio[port - 'A'].ODR.value >> number & 1U) != 0;
+}
+
+// Runs what is due, unless interrupts are off or one is running.
+void Giga::interrupts_may_come() {
+  constexpr std::uint64_t bite_ns = 500000000;
+  if (watchdog_runs && now_ns_ - watchdog_fed_ns > bite_ns) {
+    r4_fake_rcc.RSR.value = 1U << 26;
+    reset();
+  }
+  if (primask != 0 || in_interrupt) return;
+  for (Timer* timer : {&ticker, &step_timer}) {
+    while (timer->period_ns != 0 && timer->next_ns <= now_ns_) {
+      timer->next_ns += timer->period_ns;
+      in_interrupt = true;
+      ++interrupts;
+      timer->action();
+      in_interrupt = false;
+    }
+  }
+}
+
+void Giga::pass_us(std::uint64_t us) {
+  const std::uint64_t end = now_ns_ + us * us_ns;
+  while (now_ns_ < end) {
+    constexpr std::uint64_t step_ns = 100000;  // a frame on the CAN bus
+    std::uint64_t next = std::min(end, now_ns_ + step_ns);
+    if (!in_interrupt && primask == 0) {
+      for (const Timer* timer : {&ticker, &step_timer}) {
+        if (timer->period_ns != 0) next = std::min(next, std::max(timer->next_ns, now_ns_ + 1));
+      }
+    }
+    now_ns_ = next;
+    can.pass(now_ns_);
+    interrupts_may_come();
+  }
+}
+
+void Giga::usb_send(const std::string& bytes) { usb_packets.push_back(bytes); }
+
+}  // namespace r4::fake

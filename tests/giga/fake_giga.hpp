@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A Giga in virtual time: the microcontroller's registers that the firmware uses, with what is behind
+// them, and the parts of the core that it calls. One at a time; the firmware runs in the test's thread,
+// its threads are threads.
+//
+// Time passes when the firmware looks at the clock (a microsecond each time), rests, or when the test
+// lets it pass. Timers interrupt whatever runs then, unless interrupts are off, so an interrupt comes in
+// the middle of a transfer as on the chip. A reset ends reset_by()'s action.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "firmware/ports/sim/board_chips.hpp"
+#include "transports/framing/can_frame.hpp"
+
+namespace r4::fake {
+
+// The I2C peripheral between the firmware and the chips, by RM0399 section 50.
+class I2cPeripheral {
+ public:
+  // Somebody holds SDA until SCL has risen so often.
+  void hold_sda(int clocks) { sda_held_ = clocks; }
+  // Somebody holds SCL, for good.
+  void hold_scl(bool held) { scl_held_ = held; }
+  // SDA is held from the moment on at which so many more bytes were sent.
+  void hold_after(int bytes, int clocks) {
+    hold_after_ = bytes;
+    hold_clocks_ = clocks;
+  }
+  // Bytes put on the wire, addresses included: {address << 1 | read, bytes…} for each START.
+  std::vector<std::vector<std::uint8_t>> log;
+
+  void connect();  // to the registers, as after a reset
+  bool sda_low() const { return sda_held_ > 0; }
+  bool scl_low() const { return scl_held_; }
+  void scl_rose() {
+    if (sda_held_ > 0) --sda_held_;
+  }
+
+ private:
+  enum class Step { idle, address, want_byte, byte, complete, read, stop, stuck };
+  void start(std::uint32_t cr2);
+  void progress();
+  void after(Step step, std::uint64_t ns);
+  void end_of_bytes();
+  void refuse();
+  void count_byte();
+
+  Step step_ = Step::idle;
+  std::uint64_t due_ns_ = 0;
+  std::uint32_t cr2_ = 0;
+  std::uint32_t left_ = 0;
+  std::uint32_t flags_ = 0;
+  std::uint8_t out_ = 0;
+  std::uint8_t in_ = 0;
+  std::vector<sim::I2cChipModel*> taking_part_;
+  int sda_held_ = 0;
+  bool scl_held_ = false;
+  int hold_after_ = -1;
+  int hold_clocks_ = 0;
+};
+
+// The FDCAN controller and the bus behind it, by RM0399 section 59: 100 us a frame.
+class CanPeripheral {
+ public:
+  void connect();
+  // From the bus. False: the filters did not let it in.
+  bool deliver(const CanFrame& frame);
+  void pass(std::uint64_t now_ns);
+
+  bool acknowledged = true;  // somebody else is on the bus
+  bool quiet = true;         // the bus is fit to come back to
+  void go_bus_off();
+  std::deque<CanFrame> sent;
+  int overtaken = 0;  // frames sent from the buffer before the queue
+  // What the controller calls when a frame has gone out.
+  std::function<void(const CanFrame&)> on_sent;
+
+ private:
+  CanFrame element(std::uint32_t word) const;
+  void store(std::uint32_t base, std::uint32_t index, const CanFrame& frame);
+
+  std::uint32_t pending_ = 0;
+  std::uint32_t put_ = 1;  // of the queue's elements 1 … 8
+  std::uint32_t get_ = 1;
+  std::uint32_t fifo0_get_ = 0, fifo0_fill_ = 0, fifo1_get_ = 0, fifo1_fill_ = 0;
+  std::uint64_t free_at_ns_ = 0;
+  bool bus_off_ = false;
+  std::uint64_t back_at_ns_ = 0;
+};
+
+struct Datagram {
+  std::uint32_t ip;
+  std::uint16_t port;
+  std::string bytes;
+};
+
+class Giga {
+ public:
+  Giga();
+  ~Giga();
+  Giga(const Giga&) = delete;
+  Giga& operator=(const Giga&) = delete;
+
+  // --- time
+  std::uint64_t now_ns() const { return now_ns_; }
+  std::uint64_t now_ms() const { return now_ns_ / 1000000; }
+  void pass_us(std::uint64_t us);
+  void pass_ms(std::uint64_t ms) { pass_us(ms * 1000); }
+
+  // --- resets
+  // Did `action` end in a reset of the chip? The peripherals are then as after one.
+  bool reset_by(const std::function<void()>& action);
+  // The watchdog is not fed by anybody and does not bite.
+  bool watchdog_runs = false;
+  std::uint64_t watchdog_fed_ns = 0;
+  int watchdog_feeds = 0;
+
+  // --- the board
+  sim::BoardChips chips;
+  I2cPeripheral i2c;
+  CanPeripheral can;
+  void set_pin(char port, int number, bool level);  // an input, from outside
+  bool pin(char port, int number);                  // an output
+  std::map<int, unsigned short> analog;             // PinName to counts
+
+  // --- USB
+  bool usb_open = false;
+  bool usb_reads = true;  // the host's program reads
+  std::string usb_host;   // what it has read, and not taken yet
+  void usb_send(const std::string& bytes);
+  std::vector<std::string> usb_packets;  // to the board
+  struct UsbPacket {
+    std::uint32_t size;
+    std::uint64_t at_ms;
+  };
+  std::vector<UsbPacket> usb_sent;  // by the board
+
+  // --- WiFi; for both threads
+  std::mutex mutex;
+  std::string air = "lab";  // the network that is there
+  std::string air_password = "correct horse";
+  bool wifi_hangs = false;  // joining never returns
+  bool wifi_connected = false;
+  int joins = 0;
+  std::uint16_t udp_port = 0;
+  std::deque<Datagram> udp_in, udp_out;
+
+  // --- flash
+  bool has_partition = true;
+  std::uint64_t partition_size = 1024 * 1024;
+  std::map<std::string, std::string> stored;
+  int writes = 0;
+
+  // --- for the fakes
+  void interrupts_may_come();
+  struct Timer {
+    std::uint64_t next_ns = 0;
+    std::uint64_t period_ns = 0;  // 0: off
+    std::function<void()> action;
+  };
+  Timer ticker, step_timer;
+  std::map<int, void (*)()> vectors;
+  std::uint32_t primask = 0;
+  bool in_interrupt = false;
+  int interrupts = 0;
+  std::map<int, std::function<void(bool)>> edges;  // PinName to what an edge calls
+  bool flag = false;
+  [[noreturn]] void reset();
+  void connect_registers();
+
+ private:
+  std::uint64_t now_ns_ = 0;
+  std::array<std::uint32_t, 11> outside_{}, driven_{};
+};
+
+Giga& giga();
+
+}  // namespace r4::fake

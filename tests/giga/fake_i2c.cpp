@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/registers.hpp"
+#include "fake_giga.hpp"
+
+namespace r4::fake {
+
+namespace {
+
+constexpr std::uint64_t byte_ns = 22500;  // nine clocks of 400 kHz
+constexpr std::uint64_t stop_ns = 2500;
+
+constexpr std::uint32_t txis = 1U << 1;
+constexpr std::uint32_t rxne = 1U << 2;
+constexpr std::uint32_t nackf = 1U << 4;
+constexpr std::uint32_t stopf = 1U << 5;
+constexpr std::uint32_t tc = 1U << 6;
+constexpr std::uint32_t busy = 1U << 15;
+constexpr std::uint32_t cr2_read = 1U << 10;
+constexpr std::uint32_t cr2_start = 1U << 13;
+constexpr std::uint32_t cr2_autoend = 1U << 25;
+
+}  // namespace
+
+void I2cPeripheral::connect() {
+  step_ = Step::idle;
+  flags_ = 0;
+  taking_part_.clear();
+  r4_fake_i2c2.CR1.on_write = [this](std::uint32_t value) {
+    r4_fake_i2c2.CR1.value = value;
+    if ((value & 1U) != 0) return;
+    step_ = Step::idle;
+    flags_ = 0;
+    taking_part_.clear();
+  };
+  r4_fake_i2c2.CR2.on_write = [this](std::uint32_t value) {
+    if ((value & cr2_start) != 0 && (r4_fake_i2c2.CR1.value & 1U) != 0) start(value);
+  };
+  r4_fake_i2c2.ISR.on_read = [this] {
+    progress();
+    const bool held = sda_held_ > 0 || scl_held_;
+    return flags_ | (step_ != Step::idle || held ? busy : 0U);
+  };
+  r4_fake_i2c2.ICR.on_write = [this](std::uint32_t value) { flags_ &= ~value; };
+  r4_fake_i2c2.TXDR.on_write = [this](std::uint32_t value) {
+    if (step_ != Step::want_byte) return;
+    out_ = static_cast<std::uint8_t>(value);
+    flags_ &= ~txis;
+    after(Step::byte, byte_ns);
+  };
+  r4_fake_i2c2.RXDR.on_read = [this] {
+    flags_ &= ~rxne;
+    if (--left_ == 0) {
+      after(Step::stop, stop_ns);
+    } else {
+      after(Step::read, byte_ns);
+    }
+    return in_;
+  };
+}
+
+void I2cPeripheral::after(Step step, std::uint64_t ns) {
+  step_ = step;
+  due_ns_ = giga().now_ns() + ns;
+}
+
+void I2cPeripheral::start(std::uint32_t cr2) {
+  cr2_ = cr2;
+  left_ = cr2 >> 16 & 0xFF;
+  flags_ = 0;
+  if (sda_held_ > 0 || scl_held_) {
+    step_ = Step::stuck;
+    return;
+  }
+  after(Step::address, byte_ns + stop_ns);
+}
+
+void I2cPeripheral::count_byte() {
+  if (hold_after_ < 0) return;
+  if (hold_after_-- > 0) return;
+  sda_held_ = hold_clocks_;
+  hold_after_ = -1;
+}
+
+void I2cPeripheral::refuse() {
+  flags_ |= nackf;
+  after(Step::stop, stop_ns);
+}
+
+void I2cPeripheral::end_of_bytes() {
+  if ((cr2_ & cr2_autoend) != 0) {
+    after(Step::stop, stop_ns);
+  } else {
+    step_ = Step::complete;
+    flags_ |= tc;
+  }
+}
+
+void I2cPeripheral::progress() {
+  if (sda_held_ > 0 && step_ != Step::idle) step_ = Step::stuck;
+  if (giga().now_ns() < due_ns_) return;
+  const bool reading = (cr2_ & cr2_read) != 0;
+  switch (step_) {
+    case Step::address: {
+      const auto address = static_cast<std::uint8_t>(cr2_ >> 1 & 0x7F);
+      log.push_back({static_cast<std::uint8_t>(address << 1 | (reading ? 1 : 0))});
+      count_byte();
+      taking_part_.clear();
+      sim::BoardChips& chips = giga().chips;
+      for (sim::I2cChipModel* chip : std::initializer_list<sim::I2cChipModel*>{
+               &chips.osmc, &chips.dhb12, &chips.servo, &chips.expander, &chips.dac}) {
+        if (chip->start(address, reading)) taking_part_.push_back(chip);
+      }
+      if (taking_part_.empty()) {
+        refuse();
+      } else if (left_ == 0) {
+        end_of_bytes();
+      } else if (reading) {
+        after(Step::read, byte_ns);
+      } else {
+        step_ = Step::want_byte;
+        flags_ |= txis;
+      }
+      return;
+    }
+    case Step::byte: {
+      log.back().push_back(out_);
+      count_byte();
+      bool acknowledged = false;
+      for (sim::I2cChipModel* chip : taking_part_) acknowledged |= chip->write(out_);
+      --left_;
+      if (!acknowledged) {
+        refuse();
+      } else if (left_ == 0) {
+        end_of_bytes();
+      } else {
+        step_ = Step::want_byte;
+        flags_ |= txis;
+      }
+      return;
+    }
+    case Step::read:
+      if ((flags_ & rxne) != 0) return;
+      in_ = taking_part_.front()->read();
+      count_byte();
+      flags_ |= rxne;
+      return;
+    case Step::stop:
+      for (sim::I2cChipModel* chip : taking_part_) chip->stop();
+      taking_part_.clear();
+      flags_ |= stopf;
+      step_ = Step::idle;
+      return;
+    case Step::idle:
+    case Step::want_byte:
+    case Step::complete:
+    case Step::stuck:
+      return;
+  }
+}
+
+}  // namespace r4::fake

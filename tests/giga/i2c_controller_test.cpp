@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "firmware/ports/giga/i2c_controller.hpp"
+
+#include <gtest/gtest.h>
+
+#include "fake_giga.hpp"
+#include "firmware/ports/giga/board_clock.hpp"
+#include "firmware/ports/giga/pins.hpp"
+#include "tests/giga/core/registers.hpp"
+
+namespace r4::test {
+namespace {
+
+using firmware::I2cResult;
+using Bytes = std::vector<std::uint8_t>;
+
+class Bus {
+ public:
+  Bus() {
+    giga::start_ports();
+    bus.start(120000000);
+  }
+  I2cResult write(std::uint8_t address, const Bytes& bytes) {
+    began_us_ = now_us();
+    const I2cResult result = bus.write(address, bytes.data(), bytes.size());
+    took_us = now_us() - began_us_;
+    return result;
+  }
+  std::uint64_t now_us() const { return chip.now_ns() / 1000; }
+
+  fake::Giga chip;
+  giga::I2cController bus{
+      {I2C2, giga::i2c_scl_pin, giga::i2c_sda_pin, giga::i2c_function, giga::i2c_function},
+      &giga::BoardClock::now_us};
+  std::uint64_t took_us = 0;
+
+ private:
+  std::uint64_t began_us_ = 0;
+};
+
+TEST(I2cTiming, KeepsTheLimitsOfFastModeForEveryClock) {
+  for (std::uint32_t mhz = 4; mhz <= 250; ++mhz) {
+    const std::uint32_t timing = giga::i2c_timing(mhz * 1000000);
+    const double tick_ns = 1000.0 * ((timing >> 28) + 1) / mhz;
+    const double low = tick_ns * ((timing & 0xFF) + 1);
+    const double high = tick_ns * ((timing >> 8 & 0xFF) + 1);
+    const double hold = tick_ns * (timing >> 16 & 0xF);
+    const double setup = tick_ns * ((timing >> 20 & 0xF) + 1);
+    EXPECT_GE(low, 1300) << mhz;  // UM10204 table 10
+    EXPECT_GE(high, 600) << mhz;
+    EXPECT_GE(setup, 100 + 300) << mhz << ": with the rise time";
+    EXPECT_LE(hold, 900) << mhz;
+    EXPECT_GE(low + high, 2500) << mhz << ": 400 kHz";
+    EXPECT_LE(low + high, 3100) << mhz << ": not needlessly slow";
+    EXPECT_EQ(timing & 0x0F000000, 0U) << "reserved";
+  }
+}
+
+TEST(I2cController, PutsBytesOnTheWire) {
+  Bus bus;
+  EXPECT_EQ(bus.write(0x40, {0x06, 0x00, 0x10}), I2cResult::ok);
+  EXPECT_EQ(bus.chip.i2c.log, (std::vector<Bytes>{{0x80, 0x06, 0x00, 0x10}}));
+  EXPECT_LE(bus.took_us, firmware::i2c_wire_us(4) + 20);
+}
+
+TEST(I2cController, ReadsAfterARepeatedStart) {
+  Bus bus;
+  const std::uint8_t mode1 = 0x00;
+  Bytes in(2);
+  EXPECT_EQ(bus.bus.write_read(0x40, &mode1, 1, in.data(), 2), I2cResult::ok);
+  EXPECT_EQ(in[0], 0x11) << "MODE1 after power-up";
+  EXPECT_EQ(bus.chip.i2c.log, (std::vector<Bytes>{{0x80, 0x00}, {0x81}}));
+}
+
+TEST(I2cController, TellsThatNobodyAnswers) {
+  Bus bus;
+  EXPECT_EQ(bus.write(0x55, {1, 2, 3}), I2cResult::no_acknowledge);
+  EXPECT_LE(bus.took_us, 60U);
+  Bytes in(1);
+  EXPECT_EQ(bus.bus.write_read(0x55, nullptr, 0, in.data(), 1), I2cResult::no_acknowledge);
+  EXPECT_EQ(bus.write(0x40, {0x00}), I2cResult::ok) << "and goes on";
+}
+
+TEST(I2cController, AsksWhoIsThereWithoutBytes) {
+  Bus bus;
+  EXPECT_EQ(bus.write(0x61, {}), I2cResult::ok);
+  EXPECT_EQ(bus.write(0x62, {}), I2cResult::no_acknowledge);
+}
+
+TEST(I2cController, RefusesWhatItCannotSendAtOnce) {
+  Bus bus;
+  EXPECT_EQ(bus.write(0x40, Bytes(256)), I2cResult::no_acknowledge);
+  EXPECT_TRUE(bus.chip.i2c.log.empty());
+}
+
+TEST(I2cController, WaitsForAHeldLineNoLongerThanItPromises) {
+  Bus bus;
+  bus.chip.i2c.hold_sda(9);
+  for (const std::size_t size : {0U, 1U, 5U, 65U}) {
+    EXPECT_EQ(bus.write(0x40, Bytes(size)), I2cResult::timeout);
+    EXPECT_LE(bus.took_us, firmware::i2c_wire_us(1 + size) + firmware::i2c_timeout_us) << size;
+  }
+}
+
+TEST(I2cController, WaitsNoLongerWhenALineIsHeldOnTheWay) {
+  Bus bus;
+  for (int after = 0; after < 6; ++after) {
+    bus.chip.i2c.hold_after(after, 9);
+    EXPECT_EQ(bus.write(0x40, {0x06, 0, 0, 0, 0}), I2cResult::timeout) << after;
+    EXPECT_LE(bus.took_us, firmware::i2c_wire_us(6) + firmware::i2c_timeout_us) << after;
+    EXPECT_TRUE(bus.bus.recover()) << after;
+    EXPECT_EQ(bus.write(0x40, {0x06, 0, 0, 0, 0}), I2cResult::ok) << after;
+  }
+}
+
+TEST(I2cController, FreesAChipThatWasCutOffWithNineClocks) {
+  Bus bus;
+  bus.chip.i2c.hold_sda(9);
+  EXPECT_TRUE(bus.bus.recover());
+  EXPECT_EQ(bus.write(0x40, {0x00}), I2cResult::ok);
+  bus.chip.i2c.hold_sda(40);
+  EXPECT_FALSE(bus.bus.recover());
+  EXPECT_EQ(bus.write(0x40, {0x00}), I2cResult::timeout);
+}
+
+TEST(I2cController, GivesUpSoonWhenTheClockIsHeld) {
+  Bus bus;
+  bus.chip.i2c.hold_scl(true);
+  const std::uint64_t before_us = bus.now_us();
+  EXPECT_FALSE(bus.bus.recover());
+  EXPECT_LT(bus.now_us() - before_us, 100U);
+}
+
+TEST(I2cController, GivesThePinsBackToThePeripheral) {
+  Bus bus;
+  bus.bus.recover();
+  EXPECT_EQ(GPIOB->MODER.value >> 22 & 3U, 2U);
+  EXPECT_EQ(GPIOH->MODER.value >> 8 & 3U, 2U);
+  EXPECT_EQ(GPIOB->OTYPER.value >> 11 & 1U, 1U) << "open drain";
+  EXPECT_EQ(GPIOB->AFR[1].value >> 12 & 0xFU, 4U);
+  EXPECT_EQ(GPIOH->AFR[0].value >> 16 & 0xFU, 4U);
+}
+
+// An interrupt at every microsecond of a transfer recovers the bus and uses it.
+TEST(I2cController, ATransferThatWasTakenOverDoesNotGoOn) {
+  for (std::uint64_t at_us = 1; at_us < 130; ++at_us) {
+    Bus bus;
+    bool interrupted = false;
+    bus.chip.ticker.period_ns = ~0ULL / 4;
+    bus.chip.ticker.next_ns = bus.chip.now_ns() + at_us * 1000;
+    bus.chip.ticker.action = [&] {
+      interrupted = true;
+      EXPECT_TRUE(bus.bus.recover());
+      const std::uint8_t off[] = {0xFD, 0x10};
+      EXPECT_EQ(bus.bus.write(0x70, off, 2), I2cResult::ok);
+      bus.chip.i2c.log.clear();
+    };
+    const I2cResult result = bus.write(0x40, {0x06, 0x00, 0x10, 0x00});
+    if (!interrupted) break;
+    EXPECT_EQ(result, I2cResult::timeout) << at_us;
+    EXPECT_TRUE(bus.chip.i2c.log.empty()) << at_us << ": nothing was sent afterwards";
+    EXPECT_EQ(bus.write(0x42, {0x01, 0x04}), I2cResult::ok) << at_us;
+    EXPECT_EQ(bus.chip.i2c.log, (std::vector<Bytes>{{0x84, 0x01, 0x04}})) << at_us;
+  }
+}
+
+}  // namespace
+}  // namespace r4::test
