@@ -21,8 +21,7 @@ constexpr std::array<CommandHelp, 14> table{{
     {'E', "E:STOP|CLEAR", "every output safe, until E:CLEAR", "STOP or CLEAR"},
     {'F', "F:name,name…", "which state fields are sent", "DEFAULT, ALL or names such as ENC1"},
     {'C', "C:key,value", "settings",
-     "rate 1-1000 Hz, heartbeat 50-1000 ms, timeout 100-10000 ms, recovery last|rearm, pack 0|1; "
-     "over USB also network, password, host, port, node, chips, AIN24 ... (docs/protocol.md)"},
+     "rate 1-1000 Hz, heartbeat 50-1000 ms, timeout 100-10000 ms, recovery last|rearm, pack 0|1 …"},
     {'Q', "Q:ID", "asks who the board is", "ID"},
     {'H', "H:ROS2-R4", "host heartbeat", "ROS2-R4"},
     {0, "", "", ""},

@@ -10,6 +10,7 @@
 // the program), each against the kernel carrying the plain ones. They take turns; the ratio is that
 // of a round, and the median of the rounds counts. Exit code 1 if a bar of the plan is missed by
 // either form: round trip p50 at most 1.2 times the kernel's, throughput no less than the kernel's.
+// Bare frames say what a program that does ISO-TP itself could reach at best.
 #include <algorithm>
 #include <array>
 #include <asio/io_context.hpp>
@@ -24,6 +25,7 @@
 #include <utility>
 #include <vector>
 
+#include "bare_frames.hpp"
 #include "can_processes.hpp"
 #include "host/async_board.hpp"
 #include "protocol/datagram_writer.hpp"
@@ -171,6 +173,7 @@ void compare_round_trips(int rounds) {
   Ours plain(Form::plain), packed(Form::packed);
 
   std::vector<double> theirs;
+  std::vector<double> bare[2], bare_ratios[2];
   std::size_t question_size = 0, answer_size = 0;
   for (int round = 0; round <= rounds; ++round) {
     const std::vector<double> a = plain.measure();
@@ -182,6 +185,13 @@ void compare_round_trips(int rounds) {
     const std::vector<double> b = packed.measure();
     if (round == 0) continue;  // what is made once has been made
     theirs.insert(theirs.end(), kernel.begin(), kernel.end());
+    for (const Wait wait : {Wait::sleeping, Wait::looking}) {
+      const std::size_t i = static_cast<std::size_t>(wait);
+      const std::vector<double> times =
+          bare_round_trips(wait, frames_of(question_size), frames_of(answer_size), trips);
+      bare[i].insert(bare[i].end(), times.begin(), times.end());
+      bare_ratios[i].push_back(median(times) / median(kernel));
+    }
     for (auto [ours, times] : {std::pair(&plain, &a), std::pair(&packed, &b)}) {
       ours->seconds.insert(ours->seconds.end(), times->begin(), times->end());
       ours->ratios.push_back(median(*times) / median(kernel));
@@ -190,6 +200,11 @@ void compare_round_trips(int rounds) {
   std::printf(
       "  kernel sockets, plain   p50 %6.0f us   p99 %6.0f us   (%zu bytes, answered by %zu)\n",
       median(theirs) * 1e6, quantile(theirs, 0.99) * 1e6, question_size, answer_size);
+  for (const Wait wait : {Wait::sleeping, Wait::looking}) {
+    const std::size_t i = static_cast<std::size_t>(wait);
+    std::printf("  bare frames, %-8s   p50 %6.0f us   p99 %6.0f us   ratio %.2f\n", to_text(wait),
+                median(bare[i]) * 1e6, quantile(bare[i], 0.99) * 1e6, median(bare_ratios[i]));
+  }
   for (const Ours* ours : {&plain, &packed}) {
     std::printf(
         "  async_send, %-6s      p50 %6.0f us   p99 %6.0f us   (%zu bytes, answered by %zu, mean)  "

@@ -89,6 +89,7 @@ void CanBoardProcess::serve(Form form) const {
 
   sim::SimulatedBoard::Options options;
   options.settings.timeout_ms = 10000;  // of a clock that runs too fast at times
+  options.settings.state_rate_hz = 1000;  // the less time has to be made up for in a trip
   options.settings.pack = form == Form::packed;
   options.clock_ms = [&] { return clock_ms; };
   const std::uint32_t period_ms = 1000 / options.settings.state_rate_hz;
