@@ -265,7 +265,7 @@ void Application::look_at_time(std::uint32_t now_ms) {
   bool lost = link_.poll(now_ms);
   if (guard_.tripped()) {
     const SafeReason cause = guard_.take();
-    if (cause == SafeReason::watchdog) fail(SafeReason::watchdog, now_ms);
+    if (cause == SafeReason::watchdog || cause == SafeReason::stop) fail(cause, now_ms);
     if (cause == SafeReason::link) lost = lost || link_.port_lost(link_.owner().port, now_ms);
   }
   if (lost) enter(SafeReason::link, now_ms);

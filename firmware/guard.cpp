@@ -37,6 +37,7 @@ bool Guard::tick(std::uint32_t now_ms) {
     debt_ = 0;
     trip(SafeReason::watchdog);
   }
+  if (stop_.exchange(false, std::memory_order_acquire)) trip(SafeReason::stop);
   if (armed_.load(std::memory_order_acquire) &&
       static_cast<std::int32_t>(now_ms - deadline_ms_.load(std::memory_order_relaxed)) >= 0) {
     disarm();
@@ -51,7 +52,8 @@ bool Guard::tick(std::uint32_t now_ms) {
 // The outputs are made safe once for each cause; the graver one is remembered.
 void Guard::trip(SafeReason cause) {
   const SafeReason before = tripped_.load(std::memory_order_relaxed);
-  if (before == SafeReason::watchdog || before == cause) return;
+  if (before == SafeReason::stop || before == cause) return;
+  if (before == SafeReason::watchdog && cause == SafeReason::link) return;
   tripped_.store(cause, std::memory_order_relaxed);
   hal_.make_safe();
 }

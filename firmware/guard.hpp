@@ -4,6 +4,7 @@
 //
 //     what                      seen when                          then
 //     the host falls silent     the link's deadline has passed     outputs safe, cause link
+//     E:STOP has come in        stop() was called                   outputs safe, cause stop
 //     a duty hangs              5 deadlines missed in a row        outputs safe, cause watchdog
 //     a duty is often late      2 missed a second for long         outputs safe, cause watchdog
 //     a duty stays away         tick() does not return true        the port starves the hardware
@@ -40,13 +41,17 @@ class Guard {
   void arm(std::uint32_t deadline_ms);
   void disarm() { armed_.store(false, std::memory_order_relaxed); }
 
+  // E:STOP has come in, in an interrupt or a thread that need not wait for the loop
+  // (stop_detector.hpp): outputs safe at the next tick(), which may be called for it at once.
+  void stop() { stop_.store(true, std::memory_order_release); }
+
   // A millisecond has passed. True: every duty has checked in since it was last true, so the
   // hardware watchdog may be fed.
   bool tick(std::uint32_t now_ms);
 
   // Has the guard made the outputs safe since the last take()?
   bool tripped() const { return tripped_.load(std::memory_order_relaxed) != SafeReason::none; }
-  // Why: none, link or watchdog. From now on it may trip again.
+  // Why: none, link, watchdog or stop. From now on it may trip again.
   SafeReason take() { return tripped_.exchange(SafeReason::none, std::memory_order_relaxed); }
 
   // Deadlines that duties missed since boot.
@@ -72,6 +77,7 @@ class Guard {
   Watched duties_[max_duties];
   std::uint8_t duty_count_ = 0;
   std::atomic<bool> armed_{false};
+  std::atomic<bool> stop_{false};
   std::atomic<std::uint32_t> deadline_ms_{0};
   std::atomic<SafeReason> tripped_{SafeReason::none};
   std::atomic<std::uint32_t> missed_{0};

@@ -109,6 +109,21 @@ TEST_F(GuardTest, RemembersTheGraverOfTwoCauses) {
   EXPECT_EQ(hal.made_safe, 2);
 }
 
+TEST_F(GuardTest, AStopIsDoneAtTheNextTickAndNothingIsGraver) {
+  guard.add_duty(20);
+  guard.stop();
+  EXPECT_EQ(hal.made_safe, 0);
+  run(1);
+  EXPECT_EQ(hal.made_safe, 1);
+  guard.arm(now_ms + 10);
+  run(200);
+  guard.stop();
+  run(1);
+  EXPECT_EQ(hal.made_safe, 1);
+  EXPECT_EQ(guard.take(), SafeReason::stop);
+  EXPECT_FALSE(guard.tripped());
+}
+
 // --- with the application
 
 struct GuardedBoard : testing::Test {
@@ -156,6 +171,22 @@ TEST_F(GuardedBoard, SilenceIsSeenWhileTheLoopHangsEvenIfAHeartbeatWaits) {
   EXPECT_TRUE(board.safe());
   host.echo();
   EXPECT_EQ(board.log.states.front(), "SAFE link");
+}
+
+TEST_F(GuardedBoard, AStopThatAnInterruptHasHeardIsDoneBeforeTheLoopReadsIt) {
+  guard().stop();
+  guard().tick(board.now_ms);
+  EXPECT_TRUE(board.safe());
+  EXPECT_TRUE(board.log.states.empty());
+  host.command("E:STOP");
+  EXPECT_EQ(board.log.states, std::vector<std::string>{"SAFE stop"});
+  host.command("O:400,1,1");
+  EXPECT_TRUE(board.safe());
+  board.run(10);
+  host.echo();
+  host.command("E:CLEAR");
+  host.command("O:400,1,1");
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 400);
 }
 
 TEST_F(GuardedBoard, WhatTheGuardTookOffStaysOffUntilTheApplicationKnows) {

@@ -61,6 +61,8 @@ int main() {
     case 1:
       story.failures = on_target::Test::run_all();
       on_target::say_number("stack of the tests", used_at_most(r4_stack, r4_stack_end));
+      on_target::say_number("stack of the handlers",
+                            used_at_most(r4_handler_stack, r4_handler_stack_end));
       story.made_safe = 0;
       expect(note.kind == FaultNote::Kind::none && canary_alive(), "Fault.NoneAtPowerUp");
       asm volatile("udf #0");

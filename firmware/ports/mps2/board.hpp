@@ -65,6 +65,12 @@ class Board {
     return started_ && application_.guard().tick(clock_.now_ms());
   }
 
+  // A stop has come, in an interrupt: the timer's follows at once.
+  void on_stop() {
+    application_.guard().stop();
+    pend(Irq::timer1);
+  }
+
   BoardClock& clock() { return clock_; }
   sim::BoardModel& model() { return model_; }
   firmware::BoardHardware& hal() { return hardware_.hal(); }

@@ -16,14 +16,18 @@ class BoardClock {
   explicit BoardClock(std::uint32_t first_ms) : ms_(first_ms) {}
 
   void start() {
-    constexpr std::uint32_t on = 1;
-    constexpr std::uint32_t with_interrupt = 8;
     at(timer0_base + value) = ~0U;
     at(timer0_base + reload) = ~0U;
     at(timer0_base + control) = on;
     last_ = at(timer0_base + value);
-    at(timer1_base + reload) = ticks_per_ms - 1;
-    at(timer1_base + value) = ticks_per_ms - 1;
+    wake_every(1000, 1000);
+  }
+  // Timer 1 interrupts each `us`, for the first time after `first_us`.
+  static void wake_every(std::uint32_t us, std::uint32_t first_us) {
+    at(timer1_base + control) = 0;
+    at(timer1_base + reload) = us * ticks_per_us - 1;
+    at(timer1_base + value) = first_us * ticks_per_us - 1;
+    on_wake_interrupt();
     at(timer1_base + control) = on | with_interrupt;
   }
   static void on_wake_interrupt() { at(timer1_base + interrupt) = 1; }
@@ -50,6 +54,8 @@ class BoardClock {
   static constexpr std::uint32_t value = 0x4;
   static constexpr std::uint32_t reload = 0x8;
   static constexpr std::uint32_t interrupt = 0xC;
+  static constexpr std::uint32_t on = 1;  // in control
+  static constexpr std::uint32_t with_interrupt = 8;
 
   static constexpr std::uint32_t ticks_per_ms = clock_hz / 1000;
 

@@ -18,7 +18,7 @@ class Lan9118 {
   bool start();
   Mac mac();
 
-  // From its interrupt: it only wakes the loop.
+  // In its interrupt: it is heard.
   static void on_interrupt();
 
   bool has_received() const;

@@ -19,6 +19,7 @@ constexpr std::uint32_t watchdog_ms = 500;
 
 // What interrupt handlers need lives here, and only here.
 Uart link(uart0_base);
+UdpPort udp(address, udp_port);
 Board* board = nullptr;
 
 void report(const Log& log, const FaultNote& note) {
@@ -55,6 +56,7 @@ SafeReason cause_of(const FaultNote& note) {
 extern "C" {
 void r4_uart0_receive() {
   link.on_receive_interrupt();
+  if (link.take_stop()) board->on_stop();
   PinsReport::on_datagram(link.last_line_ticks());
 }
 void r4_uart0_transmit() { link.on_transmit_interrupt(); }
@@ -62,7 +64,8 @@ void r4_wake() {
   if (board->on_wake()) feed_watchdog();
 }
 void r4_ethernet() {
-  Lan9118::on_interrupt();
+  udp.on_interrupt();
+  if (udp.take_stop()) board->on_stop();
   PinsReport::on_datagram(BoardClock::ticks());
 }
 }
@@ -72,7 +75,6 @@ int main() {
   config.identity.firmware = Text("0.1.0");
   config.identity.board_id = Text("mps2-1");
   config.identity.capabilities = Text("udp+serial");
-  static UdpPort udp(address, udp_port);
   static Board the_board(sim::scramble(std::uint64_t{boots()} << 32 | r4_chance), link, udp,
                          config);
   board = &the_board;

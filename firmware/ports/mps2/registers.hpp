@@ -29,6 +29,9 @@ constexpr int irq_count = 16;
 
 // The Cortex-M7's own registers (ARM DDI 0403).
 constexpr std::uint32_t nvic_enable = 0xE000E100;
+constexpr std::uint32_t nvic_disable = 0xE000E180;
+constexpr std::uint32_t nvic_pend = 0xE000E200;
+constexpr std::uint32_t nvic_forget = 0xE000E280;
 constexpr std::uint32_t nvic_priority = 0xE000E400;  // a byte for each interrupt
 constexpr std::uint32_t scb_aircr = 0xE000ED0C;
 constexpr std::uint32_t scb_shcsr = 0xE000ED24;
@@ -41,6 +44,12 @@ constexpr std::uint32_t mpu_rbar = 0xE000ED9C;
 constexpr std::uint32_t mpu_rasr = 0xE000EDA0;
 
 inline void enable(Irq irq) { at(nvic_enable) = 1U << static_cast<unsigned>(irq); }
+inline void disable(Irq irq) {
+  at(nvic_disable) = 1U << static_cast<unsigned>(irq);
+  at(nvic_forget) = 1U << static_cast<unsigned>(irq);
+}
+// As if it had come.
+inline void pend(Irq irq) { at(nvic_pend) = 1U << static_cast<unsigned>(irq); }
 // All others come also while this one is being handled.
 inline void give_way(Irq irq) {
   constexpr std::uint32_t lowest = 0xFF;

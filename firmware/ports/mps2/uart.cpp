@@ -49,6 +49,7 @@ void Uart::on_receive_interrupt() {
 
 void Uart::on_byte(char byte) {
   if (!received_.put(byte)) overruns_ = overruns_ + 1;
+  if (detector_.push(byte)) stop_ = true;
   if (byte == '\n') last_line_ticks_ = BoardClock::ticks();
 }
 

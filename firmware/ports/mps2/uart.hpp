@@ -10,6 +10,7 @@
 #include "../../../transports/framing/line_framing.hpp"
 #include "../../byte_ring.hpp"
 #include "../../port.hpp"
+#include "../../stop_detector.hpp"
 #include "../../transmit_lines.hpp"
 
 namespace r4 {
@@ -27,6 +28,12 @@ class Uart final : public firmware::Port {
   void on_transmit_interrupt();
   // A byte has come.
   void on_byte(char byte);
+  // Has a stop come since it was asked last? In the same interrupt.
+  bool take_stop() {
+    const bool stop = stop_;
+    stop_ = false;
+    return stop;
+  }
 
   // Calls `on_datagram(Text)` for each line that has arrived.
   template <class OnDatagram>
@@ -55,6 +62,8 @@ class Uart final : public firmware::Port {
   firmware::ByteRing<receive_capacity> received_;
   firmware::TransmitLines lines_;
   LineFraming framing_;
+  firmware::StopDetector detector_;
+  bool stop_ = false;
   volatile std::uint32_t last_line_ticks_ = 0;
   volatile std::uint32_t overruns_ = 0;
 };

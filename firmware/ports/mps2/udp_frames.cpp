@@ -89,6 +89,16 @@ std::size_t UdpFrames::answer_arp(const std::uint8_t* frame, std::size_t size,
   return min_frame;
 }
 
+Text UdpFrames::peek(const std::uint8_t* frame, std::size_t size) {
+  if (size < ip + ip_size || get16(frame + ethernet_type) != type_ip) return Text();
+  const std::size_t header_size = std::size_t{frame[ip] & 0xFU} * 4;
+  const std::size_t begin = ip + header_size + udp_size;
+  if (frame[ip + 9] != protocol_udp || begin > size) return Text();
+  const std::size_t udp_total = get16(frame + ip + header_size + 4);
+  if (udp_total < udp_size || begin + udp_total - udp_size > size) return Text();
+  return Text(reinterpret_cast<const char*>(frame) + begin, udp_total - udp_size);
+}
+
 UdpFrames::Arrival UdpFrames::take(const std::uint8_t* frame, std::size_t size,
                                    std::uint8_t* reply) {
   Arrival arrival;

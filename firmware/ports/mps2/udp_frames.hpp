@@ -21,6 +21,8 @@ struct Mac {
 
 class UdpFrames {
  public:
+  // What a frame carries if it is UDP; nothing is checked.
+  static Text peek(const std::uint8_t* frame, std::size_t size);
   // Ethernet, IPv4 and UDP in front of a datagram.
   static constexpr std::size_t head_size = 14 + 20 + 8;
   static constexpr std::size_t max_frame = head_size + max_datagram;

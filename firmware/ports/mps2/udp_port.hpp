@@ -6,7 +6,9 @@
 #include <cstdint>
 
 #include "../../port.hpp"
+#include "../../stop_detector.hpp"
 #include "lan9118.hpp"
+#include "registers.hpp"
 #include "udp_frames.hpp"
 
 namespace r4 {
@@ -22,21 +24,43 @@ class UdpPort final : public firmware::Port {
     return true;
   }
 
+  // Takes the frames that have come. In the interrupt, or with interrupts off.
+  void on_interrupt() {
+    Lan9118::on_interrupt();
+    while (put_ - taken_ < frames_max && chip_.has_received()) {
+      Frame& frame = received_[put_ % frames_max];
+      frame.size = chip_.receive(frame.words);
+      if (frame.size == 0) continue;
+      if (firmware::is_stop(UdpFrames::peek(frame.bytes(), frame.size))) stop_ = true;
+      put_ = put_ + 1;
+    }
+  }
+  // Has a stop come since it was asked last? In the interrupt.
+  bool take_stop() {
+    const bool stop = stop_;
+    stop_ = false;
+    return stop;
+  }
+
   // Calls `on_datagram(peer, Text)` for each that has arrived.
   template <class OnDatagram>
   void receive(OnDatagram&& on_datagram) {
-    while (chip_.has_received()) {
-      const std::size_t size = chip_.receive(in_);
+    while (has_received()) {
+      const Frame& frame = received_[taken_ % frames_max];
       std::uint32_t reply[UdpFrames::min_frame / 4];
-      const UdpFrames::Arrival arrival = frames_.take(reinterpret_cast<const std::uint8_t*>(in_),
-                                                      size, reinterpret_cast<std::uint8_t*>(reply));
+      const UdpFrames::Arrival arrival =
+          frames_.take(frame.bytes(), frame.size, reinterpret_cast<std::uint8_t*>(reply));
       if (arrival.reply_size != 0) chip_.send(reply, arrival.reply_size);
-      if (arrival.peer == 0) continue;
-      last_peer_ = arrival.peer;
-      on_datagram(arrival.peer, arrival.datagram);
+      if (arrival.peer != 0) {
+        last_peer_ = arrival.peer;
+        on_datagram(arrival.peer, arrival.datagram);
+      }
+      taken_ = taken_ + 1;
+      const InterruptsHeld held;
+      on_interrupt();  // there is room for another
     }
   }
-  bool has_received() const { return chip_.has_received(); }
+  bool has_received() const { return put_ != taken_; }
 
   void send(Text datagram, firmware::Urgency, std::uint32_t peer) override {
     const std::uint32_t to = peer == firmware::everyone ? last_peer_ : peer;
@@ -50,11 +74,21 @@ class UdpPort final : public firmware::Port {
   std::uint32_t bad() const { return frames_.bad(); }
 
  private:
+  static constexpr std::uint32_t frames_max = 4;
+  struct Frame {
+    const std::uint8_t* bytes() const { return reinterpret_cast<const std::uint8_t*>(words); }
+    std::size_t size;
+    std::uint32_t words[Lan9118::max_frame / 4];
+  };
+
   Lan9118 chip_;
   UdpFrames frames_;
+  Frame received_[frames_max];
+  volatile std::uint32_t put_ = 0;
+  volatile std::uint32_t taken_ = 0;
+  volatile bool stop_ = false;
   std::uint32_t last_peer_ = firmware::everyone;
   std::uint32_t dropped_ = 0;
-  std::uint32_t in_[Lan9118::max_frame / 4];
   std::uint32_t out_[(UdpFrames::max_frame + 3) / 4];
 };
 
