@@ -164,5 +164,26 @@ TEST(I2cController, ATransferThatWasTakenOverDoesNotGoOn) {
   }
 }
 
+TEST(I2cController, ATransferInAnInterruptTakesTheBusOver) {
+  for (std::uint64_t at_us = 1; at_us < 130; ++at_us) {
+    Bus bus;
+    bool interrupted = false;
+    bus.chip.ticker.period_ns = ~0ULL / 4;
+    bus.chip.ticker.next_ns = bus.chip.now_ns() + at_us * 1000;
+    bus.chip.ticker.action = [&] {
+      interrupted = true;
+      const std::uint8_t off[] = {0xFD, 0x10};
+      bus.chip.i2c.log.clear();
+      EXPECT_EQ(bus.bus.write(0x70, off, 2), I2cResult::ok) << at_us;
+    };
+    const I2cResult result = bus.write(0x40, {0x06, 0x00, 0x10, 0x00});
+    if (!interrupted) break;
+    if (result == I2cResult::timeout) {
+      EXPECT_EQ(bus.chip.i2c.log, (std::vector<Bytes>{{0xE0, 0xFD, 0x10}})) << at_us;
+    }
+    EXPECT_EQ(bus.write(0x42, {0x01, 0x04}), I2cResult::ok) << at_us;
+  }
+}
+
 }  // namespace
 }  // namespace r4::test

@@ -106,17 +106,17 @@ void Board::start() {
   udp_number_ = application_.add_port(udp_);
   can_number_ = application_.add_port(can_);
   use(used_);
-  if (start_can(fdcan_, used_.site.can_node)) {
-    interrupted = &fdcan_;
-    NVIC_SetVector(FDCAN2_IT0_IRQn, reinterpret_cast<std::uintptr_t>(&on_can));
-    NVIC_EnableIRQ(FDCAN2_IT0_IRQn);
-  }
-  network_.start();
+  const bool has_can = start_can(fdcan_, used_.site.can_node);
   const std::uint32_t now_ms = BoardClock::now_ms();
   application_.start(now_ms);
   if (last_boot_ != SafeReason::none) application_.fail(last_boot_, now_ms);
   start_guard_timer(application_.guard());
   machine_.start();
+  network_.start();
+  if (!has_can) return;
+  interrupted = &fdcan_;
+  NVIC_SetVector(FDCAN2_IT0_IRQn, reinterpret_cast<std::uintptr_t>(&on_can));
+  NVIC_EnableIRQ(FDCAN2_IT0_IRQn);
 }
 
 void Board::poll() {

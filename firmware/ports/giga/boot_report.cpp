@@ -50,16 +50,13 @@ class LineWriter {
   std::size_t size_ = 0;
 };
 
-Text state_text(StoreState state) {
-  switch (state) {
-    case StoreState::loading:
-      return "being read";
-    case StoreState::ready:
-      return "kept in the key-value store";
-    case StoreState::absent:
-      break;
+Text fate_of_settings(const SettingsStore& store) {
+  if (store.state() == StoreState::absent) {
+    return "not kept: no key-value store on QSPI partition 3 (docs/firmware.md)";
   }
-  return "not kept: no key-value store on QSPI partition 3 (docs/firmware.md)";
+  if (!store.keeps()) return "not kept: the key-value store was not ready in time";
+  return store.failures() == 0 ? Text("kept in the key-value store")
+                               : Text("not kept: the key-value store cannot be written");
 }
 
 void write_last_boot(LineWriter& line, const FaultNote& note) {
@@ -166,7 +163,7 @@ Text BootReport::next(char (&out)[max_line]) {
       return line.text(", bus-offs ").number(sources_.can->counters().bus_offs).done();
     case 20:
       chip_ = 0;
-      return line.text("Settings: ").text(state_text(sources_.store->state())).done();
+      return line.text("Settings: ").text(fate_of_settings(*sources_.store)).done();
     case 21:
       if (chip_ + 1 < firmware::chip_count) --step_;
       return chip(out);

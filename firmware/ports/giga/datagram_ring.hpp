@@ -30,14 +30,14 @@ class DatagramRing {
     if (datagram.size() > max_datagram) return false;
     const std::uint32_t size = overhead + static_cast<std::uint32_t>(datagram.size());
     if (bytes_.room() < size + keep_free) return false;
-    Entry entry;
-    entry.head.peer = note.peer;
-    entry.head.time_ms = note.time_ms;
-    entry.head.urgency = static_cast<std::uint16_t>(note.urgency);
-    entry.head.size = static_cast<std::uint16_t>(datagram.size());
-    std::memcpy(entry.bytes, datagram.data(), datagram.size());
-    char flat[sizeof(Entry)];
-    std::memcpy(flat, &entry, size);
+    Head head;
+    head.peer = note.peer;
+    head.time_ms = note.time_ms;
+    head.urgency = static_cast<std::uint16_t>(note.urgency);
+    head.size = static_cast<std::uint16_t>(datagram.size());
+    char flat[overhead + max_datagram];
+    std::memcpy(flat, &head, overhead);
+    std::memcpy(flat + overhead, datagram.data(), datagram.size());
     return bytes_.put(flat, size);
   }
 
@@ -65,10 +65,6 @@ class DatagramRing {
     std::uint16_t size;
   };
   static_assert(sizeof(Head) == overhead, "as it is copied");
-  struct Entry {
-    Head head;
-    char bytes[max_datagram];
-  };
 
   firmware::ByteRing<capacity> bytes_;
 };

@@ -66,6 +66,8 @@ void I2cController::start(std::uint32_t kernel_hz) {
 
 I2cController::Transfer I2cController::begin(std::size_t bytes, std::size_t starts) {
   constexpr std::uint32_t clean_up_us = 20;
+  if (under_way_) recover();
+  under_way_ = true;
   Transfer transfer;
   transfer.recovery = recoveries_;
   transfer.began_us = clock_();
@@ -144,6 +146,7 @@ I2cResult I2cController::receive(const Transfer& transfer, std::uint8_t address,
 
 I2cResult I2cController::finish(const Transfer& transfer, I2cResult result) {
   const InterruptLock lock;
+  under_way_ = false;
   if (transfer.recovery != recoveries_) return I2cResult::timeout;
   registers_.ICR = icr_all;
   if (result == I2cResult::timeout) restart();

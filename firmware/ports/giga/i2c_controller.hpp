@@ -2,7 +2,8 @@
 // An I2C peripheral of the STM32H747 as master, by its registers (RM0399 section 50), at no more
 // than 400 kHz. It keeps what drivers/i2c_bus.hpp promises: no call waits longer than its time on the
 // wire plus i2c_timeout_us, and recover() may come in an interrupt or a fault handler in the middle
-// of a transfer.
+// of a transfer. So may a transfer: it takes the bus over, and the one that it interrupted returns
+// timeout.
 //
 // The core's own library (Wire) cannot be used: on a hung bus it waits 36 ms for each byte.
 #pragma once
@@ -75,6 +76,7 @@ class I2cController final : public firmware::I2cBus {
   const Line sda_;
   const Clock clock_;
   volatile std::uint32_t recoveries_ = 0;
+  volatile bool under_way_ = false;  // a transfer, or one that was taken over
 };
 
 }  // namespace giga

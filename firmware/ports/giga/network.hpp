@@ -10,7 +10,8 @@
 // Joining scans first and takes up to 7 s, a send up to 1 s, and without WiFi firmware in the flash
 // the library never returns: all of that is this thread's alone. What the library says of the
 // connection may be wrong for long: only heartbeats decide whether the host is there, and when hosts
-// that were there have been silent for quiet_ms the network is joined anew.
+// that were there have been silent for quiet_ms the network is joined anew. The thread has the lowest
+// priority: where the library spins, it spins alone.
 #pragma once
 
 #include <atomic>
@@ -83,7 +84,7 @@ class Network {
   arduino::WiFiUDP socket_;
 
   alignas(8) unsigned char stack_[stack_size];
-  rtos::Thread thread_{osPriorityNormal, stack_size, stack_, "r4-network"};
+  rtos::Thread thread_{osPriorityBelowNormal, stack_size, stack_, "r4-network"};
 };
 
 }  // namespace giga

@@ -48,15 +48,17 @@ void SettingsStore::serve() {
 }
 
 bool SettingsStore::loaded(Settings& settings) {
+  keeps_ = state() == StoreState::ready;
   Record record;
   std::uint32_t version = 0;
-  if (!from_store_.take(version, record) || record.size > sizeof record.text) return false;
+  if (!keeps_ || !from_store_.take(version, record) || record.size > sizeof record.text)
+    return false;
   read_settings(Text(record.text, record.size), settings);
   return true;
 }
 
 void SettingsStore::keep(const Settings& settings) {
-  if (state() != StoreState::ready) return;
+  if (!keeps_) return;
   Record record = {};
   Text text;
   if (!write_settings(settings, record.text, sizeof record.text, text)) return;

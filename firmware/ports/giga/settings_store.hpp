@@ -28,10 +28,12 @@ class SettingsStore {
   // Once, from the loop.
   void start();
   StoreState state() const { return state_.load(std::memory_order_acquire); }
-  // What was kept, into `settings`; as soon as the state is ready. False: nothing was.
+  // What was kept, into `settings`; once, when the state is no longer loading. False: nothing was. Who
+  // does not wait that long gets nothing, and nothing will be kept: it would overwrite what was.
   bool loaded(Settings& settings);
-  // To be kept, soon. Not while loading.
+  // To be kept, soon.
   void keep(const Settings& settings);
+  bool keeps() const { return keeps_; }
 
   std::uint32_t failures() const {
     return failures_.load(std::memory_order_relaxed);
@@ -48,13 +50,14 @@ class SettingsStore {
 
   static constexpr std::uint32_t stack_size = 8192;
 
+  bool keeps_ = false;
   std::atomic<StoreState> state_{StoreState::loading};
   std::atomic<std::uint32_t> failures_{0};
   HandOver<Record> from_store_;
   HandOver<Record> to_store_;
 
   alignas(8) unsigned char stack_[stack_size];
-  rtos::Thread thread_{osPriorityBelowNormal, stack_size, stack_, "r4-settings"};
+  rtos::Thread thread_{osPriorityNormal, stack_size, stack_, "r4-settings"};
 };
 
 }  // namespace giga
