@@ -115,6 +115,11 @@ bool CanPeripheral::deliver(const CanFrame& frame) {
     }
     return true;
   }
+  if ((can.GFC.value >> 4 & 3U) == 0) {  // what no filter knows goes to FIFO 0 after a reset
+    store(start_word(can.RXF0C), (fifo0_get_ + fifo0_fill_) % fifo_size(can.RXF0C), frame);
+    ++fifo0_fill_;
+    return true;
+  }
   return false;
 }
 
