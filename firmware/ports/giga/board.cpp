@@ -80,6 +80,7 @@ Board::Board(Machine& machine, SettingsStore& store, const Settings& settings,
              const FaultNote& last_boot)
     : machine_(machine),
       store_(store),
+      // NOLINTNEXTLINE(performance-no-int-to-ptr): where the message RAM is
       fdcan_(*FDCAN2, reinterpret_cast<volatile std::uint32_t*>(SRAMCAN_BASE)),
       can_(fdcan_, settings.site.can_node, &BoardClock::now_us),
       application_(machine.hardware(), config_of(settings)),

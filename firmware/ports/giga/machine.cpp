@@ -44,11 +44,13 @@ Machine::Encoder::Encoder(Pin a_pin, Pin b_pin, Pin index_pin)
       a_edge(pin_name(a_pin), PullUp),
       b_edge(pin_name(b_pin), PullUp) {}
 
+// Methods as the core calls them back. NOLINTBEGIN(readability-make-member-function-const)
 void Machine::Encoder::on_edge() { counter->sample(read(a), read(b)); }
 
 Machine::Echo::Echo(Pin pin) : line(line_of(pin)), edge(pin_name(pin), PullDown) {}
 
 void Machine::Echo::on_edge() { sensors->echo(sensor, read(line), BoardClock::now_us()); }
+// NOLINTEND(readability-make-member-function-const)
 
 Machine::OutputsOff::OutputsOff(I2cController& bus, firmware::BoardHardware& hardware) {
   start_bus(bus);
