@@ -48,6 +48,14 @@ class TransmitLines {
     if (waiting_size_ != 0 && put_state_line(Text(waiting_, waiting_size_))) waiting_size_ = 0;
   }
 
+  // Forgets all that waits: whoever was at the other end has gone. While the taker does not run.
+  void clear() {
+    if (!ring_.empty() || waiting_size_ != 0) ++dropped_;
+    ring_.cut(0);
+    waiting_size_ = 0;
+    stalled_ = false;
+  }
+
   // The next byte for the port, from its interrupt or with that off. False: there is none.
   bool take(char& byte) {
     if (!ring_.take(byte)) return false;

@@ -95,6 +95,26 @@ TEST(GigaUsb, AnUnpluggedCableIsTheEndOfTheSession) {
   EXPECT_TRUE(bench.pins().is_safe());
 }
 
+TEST(GigaUsb, AProgramThatOpensThePortHearsThePresentFromItsFirstLineOn) {
+  GigaBench bench;
+  bench.boot();
+  PlainHost host;
+  bench.drive(host, bench.usb());
+  bench.giga.usb_reads = false;
+  bench.run_ms(300, host, bench.usb());
+  bench.giga.usb_open = false;
+  bench.run_ms(3000);
+  bench.giga.usb_host.clear();
+  bench.giga.usb_reads = true;
+  bench.giga.usb_open = true;
+  bench.run_ms(600);
+  const std::vector<std::string> lines = bench.usb_lines();
+  ASSERT_FALSE(lines.empty());
+  Datagram datagram;
+  ASSERT_TRUE(read(Text(lines[0].data(), lines[0].size()), datagram)) << lines[0];
+  EXPECT_LE(giga::BoardClock::now_ms() - static_cast<std::uint32_t>(datagram.time_ms()), 600U);
+}
+
 TEST(GigaUsb, EndsNoBurstWithAFullPacket) {
   // A host's driver waits for more behind a packet of 64 bytes.
   GigaBench bench;

@@ -42,8 +42,9 @@ void UsbPort::send_packet() {
 bool UsbPort::poll(std::uint32_t now_ms) {
   const bool open = _SerialUSB.connected();
   const bool closed = open_ && !open;
-  if (open != open_) {  // what began for one program is nothing for the next
+  if (open != open_) {  // what was for one program is nothing for the next
     framing_.reset();
+    lines_.clear();
     packet_sent_ = packet_used_;
   }
   open_ = open;
@@ -53,6 +54,7 @@ bool UsbPort::poll(std::uint32_t now_ms) {
 }
 
 void UsbPort::send(Text datagram, firmware::Urgency urgency, std::uint32_t) {
+  if (!open_) return;  // nobody is there to hear it
   if (urgency == firmware::Urgency::state) {
     lines_.put_state(datagram);
   } else {
