@@ -23,7 +23,7 @@
 
 namespace r4::fake {
 
-// The I2C peripheral between the firmware and the chips, by RM0399 section 50.
+// The I2C peripheral between the firmware and the chips, by RM0399.
 class I2cPeripheral {
  public:
   // Somebody holds SDA until SCL has risen so often.
@@ -68,7 +68,7 @@ class I2cPeripheral {
   int hold_clocks_ = 0;
 };
 
-// The FDCAN controller and the bus behind it, by RM0399 section 59: 100 us a frame.
+// The FDCAN controller and the bus behind it, by RM0399: 100 us a frame.
 class CanPeripheral {
  public:
   void connect();

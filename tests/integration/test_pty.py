@@ -54,6 +54,14 @@ def test_commands_are_confirmed_refused_and_stopped(board):
     assert run('send', board.host_url, 'E:CLEAR', 'O:1,1,1').returncode == 0
 
 
+def test_settings_of_the_network_are_taken_over_the_cable_only(board):
+    assert run('send', board.host_url, 'C:network,My%2CNet', 'C:password,12345678').returncode == 0
+    assert run('send', board.host_url, 'C:password,short').returncode == 2
+    with Board('udp://127.0.0.1:0') as other:
+        refused = run('send', other.host_url, 'C:network,mine')
+        assert refused.returncode == 3 and 'USB' in refused.stderr
+
+
 def test_a_second_program_is_told_that_the_port_is_in_use(board):
     with monitor(board.host_url) as host:
         host.next(is_state)

@@ -6,7 +6,7 @@ namespace giga {
 
 namespace {
 
-// RM0399 section 59.5.
+// RM0399, chapter FDCAN: registers.
 constexpr std::uint32_t cccr_init = 1U << 0;
 constexpr std::uint32_t cccr_change =
     1U << 1;  // CCE: settings may change; forgets what waits to be sent
@@ -35,12 +35,12 @@ constexpr std::uint32_t urgent_word = fifo1_word + fifo1_size * element_words;
 constexpr std::uint32_t end_word = urgent_word + (1 + transmit_size) * element_words;
 static_assert(end_word == Fdcan::words_used, "the layout of the message RAM");
 
-// 59.3.20: two ids; to FIFO 0 or 1.
+// A standard message ID filter element: two ids; to FIFO 0 or 1.
 constexpr std::uint32_t filter_element(std::uint32_t id, std::uint32_t fifo) {
   return 1U << 30 | (fifo + 1) << 27 | id << 16 | id;
 }
 
-// Bits of an element (59.3.19, 59.3.21).
+// Bits of an Rx FIFO or Tx buffer element.
 constexpr std::uint32_t element_extended = 1U << 30;
 constexpr std::uint32_t element_remote = 1U << 29;
 constexpr std::uint32_t element_id_shift = 18;

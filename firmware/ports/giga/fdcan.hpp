@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // An FDCAN controller of the STM32H747 for classic frames, by its registers and its message RAM
-// (RM0399 section 59). The core's own library has no filters, no error state and no way out of
+// (RM0399, chapter FDCAN). The core's own library has no filters, no error state and no way out of
 // bus-off, and loses frames between polls.
 //
 //     received    the emergency stop   -> FIFO 1,  8 frames, the newest stay

@@ -29,7 +29,7 @@ void set_function(Line line, std::uint32_t function) {
 void start_ports() {
   const InterruptLock lock;
   RCC->AHB4ENR |= all_ports;
-  static_cast<void>(static_cast<std::uint32_t>(RCC->AHB4ENR));  // on when it can be read (8.5.13)
+  static_cast<void>(static_cast<std::uint32_t>(RCC->AHB4ENR));  // it is on when this is read
 }
 
 Line line_of(Pin pin) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Single lines of the STM32H747's ports, by their registers (RM0399 section 11).
+// Single lines of the STM32H747's ports, by their registers (RM0399, chapter GPIO).
 //
 // Reading and writing are one access each, right in any interrupt and in a fault handler. Setting a
 // line up changes registers that it shares with its neighbours: interrupts are off for that moment.

@@ -8,7 +8,7 @@ using firmware::I2cResult;
 
 namespace {
 
-// RM0399 section 50.7.
+// RM0399, chapter I2C: registers.
 constexpr std::uint32_t cr1_on = 1U << 0;  // PE; off releases the lines and forgets the transfer
 constexpr std::uint32_t cr2_read = 1U << 10;
 constexpr std::uint32_t cr2_start = 1U << 13;
@@ -153,7 +153,7 @@ I2cResult I2cController::finish(const Transfer& transfer, I2cResult result) {
   return result;
 }
 
-// Off and on: the lines are released and the state of the transfer is gone (50.4.5).
+// Off and on: the lines are released and the state of the transfer is gone (software reset).
 void I2cController::restart() {
   registers_.CR1 = 0;
   for (int i = 0; i < 3; ++i) {  // PE must be low for three clocks of the peripherals' bus

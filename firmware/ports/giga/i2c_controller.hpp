@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An I2C peripheral of the STM32H747 as master, by its registers (RM0399 section 50), at no more
+// An I2C peripheral of the STM32H747 as master, by its registers (RM0399, chapter I2C), at no more
 // than 400 kHz. It keeps what drivers/i2c_bus.hpp promises: no call waits longer than its time on the
 // wire plus i2c_timeout_us, and recover() may come in an interrupt or a fault handler in the middle
 // of a transfer. So may a transfer: it takes the bus over, and the one that it interrupted returns

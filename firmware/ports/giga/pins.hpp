@@ -6,7 +6,7 @@
 // printed on the Giga.
 //
 // An edge on pin number n of any port comes in by interrupt line n: two pins with the same number
-// cannot both interrupt (RM0399 section 20.4). Line 8 is WiFi's (PI8). The other pins with edges are
+// cannot both interrupt (RM0399, chapter EXTI). Line 8 is WiFi's (PI8). The other pins with edges are
 // A and B of the encoders and the echoes; the index lines are sampled, the handle is read.
 #pragma once
 

@@ -44,7 +44,7 @@ void on_millisecond() {
 
 }  // namespace
 
-// The timers' clock is twice their bus's, unless that runs undivided (RM0399 section 8.5.5).
+// The timers' clock is twice their bus's, unless that runs undivided (RM0399, chapter RCC).
 std::uint32_t timer_input_hz() {
   const std::uint32_t bus_hz = HAL_RCC_GetPCLK1Freq();
   return bus_hz == HAL_RCC_GetHCLKFreq() ? bus_hz : 2 * bus_hz;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The independent watchdog IWDG1 (RM0399 section 48): runs on a clock of its own, cannot be stopped,
+// The independent watchdog IWDG1 (RM0399, chapter IWDG): runs on a clock of its own, cannot be stopped,
 // resets the whole chip limit_ms after the last feed(). That clock is 32 kHz within 7 %.
 #pragma once
 

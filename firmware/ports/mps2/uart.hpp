@@ -47,6 +47,7 @@ class Uart final : public firmware::Port {
 
   void send(Text datagram, firmware::Urgency urgency, std::uint32_t peer) override;
   std::size_t max_size() const override { return max_datagram; }
+  bool may_configure() const override { return true; }
   // Lets time pass.
   void poll(std::uint32_t now_ms);
 
