@@ -196,8 +196,8 @@ void CanBus::on_error_frame(const CanSocket::Received& received) {
   if ((received.error & CAN_ERR_BUSOFF) != 0) {
     return go_down(
         {ErrorKind::open, "can://" + interface_, "the controller is bus-off: too many errors",
-         fmt::format("{}, then: ip link set {} type can restart; with restart-ms 100 it "
-                     "does so by itself",
+         fmt::format("{}, then: ip link set {} type can restart (slcan: down, and up); with "
+                     "restart-ms 100 it does so by itself",
                      look, interface_)},
         false);
   }

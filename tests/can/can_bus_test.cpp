@@ -139,10 +139,9 @@ TEST_F(CanBusTest, BusOffIsDownWithTheWayOutAndARestartIsUp) {
   local.send(error(CAN_ERR_BUSOFF));
   run_until([&] { return member.events.size() == 1; });
   EXPECT_EQ(member.events, (Told{{Kind::down, bus_off}}));
-  EXPECT_EQ(
-      member.fix,
-      std::string(look) +
-          ", then: ip link set vxcan7 type can restart; with restart-ms 100 it does so by itself");
+  EXPECT_EQ(member.fix, std::string(look) +
+                            ", then: ip link set vxcan7 type can restart (slcan: down, and up); "
+                            "with restart-ms 100 it does so by itself");
   EXPECT_FALSE(bus->up());
   local.send(error(CAN_ERR_RESTARTED));
   run_until([&] { return member.events.size() == 2; });
