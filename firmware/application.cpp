@@ -309,7 +309,7 @@ bool Application::obstacle() const {
 
 void Application::check_interlocks(std::uint32_t now_ms) {
   hal_.sample(inputs_);
-  if (inputs_.fault) enter(SafeReason::fault, now_ms);
+  if (inputs_.fault.any()) enter(SafeReason::fault, now_ms);
   if (!inputs_.handle_held) {
     enter(SafeReason::handle, now_ms);
   } else {

@@ -10,8 +10,8 @@ namespace {
 // Room for a heartbeat or a refusal.
 constexpr std::size_t short_datagram = 128;
 
-// ";SAFE:6" behind the last field of a state.
-constexpr std::size_t safe_field_size = 8;
+// ";SAFE:6;FAULT:127,255" behind the last field of a state.
+constexpr std::size_t safe_fields_size = 22;
 
 }  // namespace
 
@@ -85,9 +85,12 @@ void Application::send_state(std::uint8_t port, const State& state, std::uint32_
   char buffer[max_datagram];
   const std::size_t carried = ports_[port].port->max_size();
   const std::size_t limit = carried < sizeof buffer ? carried : sizeof buffer;
-  const std::size_t room = limit - DatagramWriter::trailer_max - safe_field_size;
+  const std::size_t room = limit - DatagramWriter::trailer_max - safe_fields_size;
   FieldSet fields = setpoints_.fields;
-  if (state.safe != SafeReason::none) fields.remove(StateField::safe);  // it ends every part
+  if (state.safe != SafeReason::none) {  // these end every part
+    fields.remove(StateField::safe);
+    fields.remove(StateField::fault);
+  }
   DatagramWriter writer(buffer, limit);
   for (int i = 0; i < state_field_count; ++i) {
     const StateField field = static_cast<StateField>(i);
@@ -103,10 +106,13 @@ void Application::send_state(std::uint8_t port, const State& state, std::uint32_
   send_part(port, writer, state, t_ms);
 }
 
-// Each part tells by itself whether the outputs are safe.
+// Each part tells by itself whether the outputs are safe, and why.
 void Application::send_part(std::uint8_t port, DatagramWriter& writer, const State& state,
                             std::uint32_t t_ms) {
   if (state.safe != SafeReason::none) write_field(writer, StateField::safe, state);
+  if (state.safe != SafeReason::none && state.fault.any()) {
+    write_field(writer, StateField::fault, state);
+  }
   PortSlot& slot = ports_[port];
   slot.port->send(writer.finish(slot.next_pnum++, t_ms), Urgency::state, audience(port));
 }
@@ -130,6 +136,7 @@ void Application::fill(State& state) const {
   state.rx_duplicate = tracker_.counters().duplicate;
   state.rx_refused = rx_refused_;
   state.late = schedule_.late();
+  state.fault = inputs_.fault;
 }
 
 }  // namespace firmware

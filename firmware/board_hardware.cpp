@@ -25,22 +25,10 @@ void set_drive(Pca9685& pwm, const DriveLines& lines, Drive drive) {
 
 }  // namespace
 
-const char* to_text(Chip chip) {
-  switch (chip) {
-    case Chip::osmc_pwm:
-      return "PCA9685 0x40 (OSMC)";
-    case Chip::dhb12_pwm:
-      return "PCA9685 0x41 (DHB12)";
-    case Chip::expander:
-      return "MCP23017 0x20 (relays, BLDC direction and brake)";
-    case Chip::dac:
-      return "MCP4728 0x61 (BLDC speed)";
-    case Chip::servo_pwm:
-      return "PCA9685 0x42 (servos)";
-    case Chip::count:
-      break;
-  }
-  return "none";
+std::uint8_t address_of(Chip chip) {
+  constexpr std::uint8_t addresses[chip_count] = {osmc_pwm_address, dhb12_pwm_address,
+                                                  expander_address, dac_address, servo_pwm_address};
+  return addresses[static_cast<int>(chip)];
 }
 
 BoardHardware::BoardHardware(I2cBus& bus, const BoardPins& pins, const Config& config)
@@ -226,7 +214,7 @@ bool BoardHardware::look_for_trouble() {
     failed_us_[i] = now_us_;
     found = true;
     if (!fault_.any()) {
-      fault_.chip = static_cast<Chip>(i);
+      fault_.address = address_of(static_cast<Chip>(i));
       fault_.trouble = trouble;
     }
   }
@@ -264,7 +252,7 @@ void BoardHardware::sample(Inputs& inputs) {
     inputs.ultrasonic_cm[i] = ultrasonic_.distance_cm(i);
     inputs.ultrasonic_blind |= bit(static_cast<std::uint8_t>(i), !ultrasonic_.sees(i));
   }
-  inputs.fault = fault_.any();
+  inputs.fault = fault_;
 }
 
 void BoardHardware::zero(int channel) {

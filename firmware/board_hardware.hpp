@@ -39,14 +39,7 @@ namespace firmware {
 
 enum class Chip : std::uint8_t { osmc_pwm, dhb12_pwm, expander, dac, servo_pwm, count };
 constexpr int chip_count = static_cast<int>(Chip::count);
-// "PCA9685 0x40 (OSMC)" and so on.
-const char* to_text(Chip chip);
-
-struct ChipFault {
-  Chip chip = Chip::count;
-  ChipTrouble trouble = ChipTrouble::none;
-  bool any() const { return trouble != ChipTrouble::none; }
-};
+std::uint8_t address_of(Chip chip);
 
 // The microcontroller's pins; all of them must be there and outlive the hardware.
 struct BoardPins {
@@ -94,7 +87,7 @@ class BoardHardware final : public Hal {
   // Every chip is set up and answers.
   bool ready() const;
   // The first trouble since the last clear_fault().
-  const ChipFault& fault() const { return fault_; }
+  ChipFault fault() const { return fault_; }
   ChipTrouble trouble(Chip chip) const { return chips_[static_cast<int>(chip)]->trouble(); }
 
   // For interrupts. Channels count from 1.

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 
+#include "../protocol/chip_fault.hpp"
 #include "../protocol/state.hpp"
 #include "../protocol/units.hpp"
 
@@ -46,7 +47,7 @@ struct Inputs {
   std::int32_t encoder_counts[encoder_channels] = {};
   std::uint16_t ultrasonic_cm[ultrasonic_channels] = {};  // 0: no echo
   std::uint8_t ultrasonic_blind = 0;  // bit n-1: sensor n does not answer, nothing is known
-  bool fault = false;                 // a chip was in trouble since the last clear_fault()
+  ChipFault fault;                    // the first since the last clear_fault()
 };
 
 class Hal {

@@ -19,6 +19,7 @@ enum class Form : std::uint8_t {
   i32,     // int32
   u32,     // uint32
   reason,  // SafeReason
+  fault,   // ChipFault: chip,trouble
 };
 
 struct Entry {
@@ -88,6 +89,7 @@ constexpr Entry table[] = {
     R4_ENTRY(rxdup, u32, "RXDUP", rx_duplicate),
     R4_ENTRY(rxref, u32, "RXREF", rx_refused),
     R4_ENTRY(late, u32, "LATE", late),
+    R4_ENTRY(fault, fault, "FAULT", fault),
 };
 #undef R4_ENTRY
 // clang-format on
@@ -147,6 +149,10 @@ bool parse_bldc(Text rest, Bldc& out) {
          parse_into(next_value(rest), 1, out.direction) && parse_into(rest, 1, out.brake);
 }
 
+bool parse_fault(Text rest, ChipFault& out) {
+  return parse_into(next_value(rest), 0x7F, out.address) && parse_into(rest, 0xFF, out.trouble);
+}
+
 // `text` is the field's values; the number parsers refuse a comma.
 bool parse_entry(Text text, const Entry& entry, State& state) {
   switch (entry.form) {
@@ -170,6 +176,8 @@ bool parse_entry(Text text, const Entry& entry, State& state) {
       return parse_number(text, member<std::uint32_t>(state, entry));
     case Form::reason:
       return parse_safe_reason(text, member<SafeReason>(state, entry));
+    case Form::fault:
+      return parse_fault(text, member<ChipFault>(state, entry));
   }
   return false;
 }
@@ -186,6 +194,7 @@ FieldSet FieldSet::all() {
   static_assert(state_field_count < 64, "a bit for every field");
   FieldSet set;
   set.bits_ = (std::uint64_t{1} << state_field_count) - 1;
+  set.remove(StateField::fault);
   return set;
 }
 
@@ -234,6 +243,11 @@ void write_field(DatagramWriter& writer, StateField field, const State& state) {
     case Form::reason:
       writer.value(static_cast<std::uint32_t>(member<SafeReason>(state, entry)));
       break;
+    case Form::fault: {
+      const ChipFault& fault = member<ChipFault>(state, entry);
+      writer.value(std::uint32_t{fault.address}).value(static_cast<std::uint32_t>(fault.trouble));
+      break;
+    }
   }
 }
 

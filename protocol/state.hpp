@@ -7,6 +7,7 @@
 
 #include <cstdint>
 
+#include "chip_fault.hpp"
 #include "datagram.hpp"
 #include "datagram_writer.hpp"
 #include "units.hpp"
@@ -82,6 +83,7 @@ enum class StateField : std::uint8_t {
   rxdup,   // received again
   rxref,   // commands refused
   late,    // state periods that the board's loop missed
+  fault,   // chip,trouble: ChipFault; 0,0: none
   count
 };
 constexpr int state_field_count = static_cast<int>(StateField::count);
@@ -116,7 +118,7 @@ class FieldSet {
   friend bool operator!=(FieldSet a, FieldSet b) { return a.bits_ != b.bits_; }
 
   static FieldSet paper_default();  // AIN24 … SERVO1POS
-  static FieldSet all();
+  static FieldSet all();            // but FAULT, which is sent where there is one
 
  private:
   std::uint64_t bits_ = 0;
@@ -150,6 +152,7 @@ struct State {
   std::uint32_t rx_duplicate = 0;
   std::uint32_t rx_refused = 0;
   std::uint32_t late = 0;
+  ChipFault fault;
 };
 
 // The field's name on the wire, "AIN24".

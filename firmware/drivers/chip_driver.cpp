@@ -4,24 +4,6 @@
 namespace r4 {
 namespace firmware {
 
-const char* to_text(ChipTrouble trouble) {
-  switch (trouble) {
-    case ChipTrouble::none:
-      return "none";
-    case ChipTrouble::no_acknowledge:
-      return "no acknowledge";
-    case ChipTrouble::bus_stuck:
-      return "bus stuck";
-    case ChipTrouble::was_reset:
-      return "was reset";
-    case ChipTrouble::wrong_register:
-      return "wrong register";
-    case ChipTrouble::not_ready:
-      return "not ready";
-  }
-  return "unknown";
-}
-
 void ChipDriver::begin() {
   started_ = true;
   ready_ = false;

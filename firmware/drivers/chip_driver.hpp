@@ -16,22 +16,13 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "../../protocol/chip_fault.hpp"
 #include "i2c_bus.hpp"
 
 namespace r4 {
 namespace firmware {
 
-// What is wrong with a chip.
-enum class ChipTrouble : std::uint8_t {
-  none,
-  no_acknowledge,  // it does not answer
-  bus_stuck,       // a line of the bus is held
-  was_reset,       // it lost its set-up: it must have been reset under way
-  wrong_register,  // a register holds what was not written
-  not_ready,       // it did not come up in time, or cannot store its power-on values
-};
-// "none", "no acknowledge", "bus stuck", "was reset", "wrong register", "not ready".
-const char* to_text(ChipTrouble trouble);
+using r4::ChipTrouble;
 
 // How many bytes the bus may still carry in this poll; addresses count.
 class BusBudget {

@@ -452,5 +452,45 @@ TEST_F(ApplicationSafety, TheReasonIsInEveryHeartbeatAndState) {
   }
 }
 
+// --- a fault of a chip
+
+TEST_F(ApplicationSafety, AChipsFaultIsToldWithChipAndTrouble) {
+  board.hal.inputs.fault = {64, ChipTrouble::no_acknowledge};
+  board.hal.broken = true;
+  host.stay(100);
+  EXPECT_EQ(board.log.states, Lines{"SAFE fault"});
+  const std::vector<Heard> states = board.take(MessageKind::state);
+  ASSERT_FALSE(states.empty());
+  const State state = test::state_of(states.back());
+  EXPECT_EQ(state.safe, SafeReason::fault);
+  EXPECT_EQ(state.fault, (ChipFault{64, ChipTrouble::no_acknowledge}));
+
+  clear();  // executed; but it is still there
+  host.stay(100);
+  EXPECT_EQ(board.reason(), SafeReason::fault);
+  host.command("O:1,1,1");
+  EXPECT_TRUE(board.safe());
+
+  board.hal.broken = false;
+  clear();
+  host.stay(100);
+  EXPECT_EQ(board.reason(), SafeReason::none);
+  EXPECT_FALSE(
+      test::state_of(board.take(MessageKind::state).back()).present.has(StateField::fault));
+  expect_nothing_restored();
+}
+
+TEST_F(ApplicationSafety, ASensorThatDoesNotAnswerIsAnObstacleIfItHasAThreshold) {
+  board.hal.inputs.ultrasonic_blind = 0b0010;
+  board.run(10);
+  EXPECT_FALSE(board.safe());
+  host.command("U:20,2");
+  EXPECT_EQ(board.reason(), SafeReason::proximity);
+  EXPECT_TRUE(board.safe());
+  board.hal.inputs.ultrasonic_blind = 0;
+  board.run(10);
+  EXPECT_EQ(board.reason(), SafeReason::none);
+}
+
 }  // namespace
 }  // namespace r4

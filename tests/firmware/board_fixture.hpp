@@ -26,8 +26,8 @@ class MemoryHal final : public firmware::Hal {
   void sample(firmware::Inputs& sampled) override { sampled = inputs; }
   void zero(int channel) override { zeroed.push_back(channel); }
   bool clear_fault() override {
-    if (!broken) inputs.fault = false;
-    return !inputs.fault;
+    if (!broken) inputs.fault = ChipFault();
+    return !inputs.fault.any();
   }
 
   firmware::Outputs outputs;  // what the hardware does

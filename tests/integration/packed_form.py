@@ -12,7 +12,7 @@ NAMES = [*'AIN24 AIN12 AIN5 AINDMH DMHSTA AINSTEER DHB1A OSMC1 STEP1POS SERVO1PO
          *'RELAYS SAFE CMD RXOK RXCRC RXLOST RXDUP RXREF LATE PNum T'.split(), *'HODSREPZBUFCQNIA', 'AN',
          *'R4-ROS2 ROS2-R4 On Off STOP CLEAR DEFAULT ALL ID'.split(),
          *'rate heartbeat timeout recovery pack last rearm'.split(),
-         *'UNKNOWN FORMAT RANGE CHANNEL STALE DUPLICATE BUSY AUTH R4 sim udp serial pty can'.split()]
+         *'UNKNOWN FORMAT RANGE CHANNEL STALE DUPLICATE BUSY AUTH R4 sim udp serial pty can FAULT'.split()]
 CODES = {name: code for code, name in enumerate(NAMES)}
 # first code, last code, form
 FORMS = [(0x00, 0x03, 'hundredths'), (0x04, 0x04, 'flag'), (0x05, 0x05, 'hundredths'), (0x06, 0x07, 'drive'),

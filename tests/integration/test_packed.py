@@ -126,7 +126,7 @@ def test_encode_and_decode_go_together_through_a_pipe():
 @pytest.mark.parametrize('line, reason', [
     ('packed:', 'length'), ('packed:8', 'hex'), ('packed:8x', 'hex'), ('packed:80', 'length'),
     ('packed:' + b'O:1;^0x0^'.hex(), 'version'), ('packed:c000000000', 'version'),
-    ('packed:8069ff00000000', 'syntax')])
+    ('packed:806aff00000000', 'syntax')])
 def test_decode_says_why_a_packed_line_holds_no_datagram(line, reason):
     result = run('decode', stdin=line + '\n')
     assert result.returncode == DATA_BAD

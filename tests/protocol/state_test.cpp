@@ -70,6 +70,7 @@ State numbered_state() {
   state.rx_lost = 14;
   state.rx_duplicate = 15;
   state.rx_refused = 16;
+  state.fault = {64, ChipTrouble::no_acknowledge};
   state.late = 17;
   return state;
 }
@@ -87,7 +88,7 @@ const char* const numbered_fields[] = {
     "US2:102",         "US3:103",         "US4:104",         "BLDC1:6,1,1",     "BLDC2:7,1,1",
     "BLDC3:8,1,1",     "BLDC4:9,1,1",     "RELAYS:129",      "SAFE:4",          "CMD:11",
     "RXOK:12",         "RXCRC:13",        "RXLOST:14",       "RXDUP:15",        "RXREF:16",
-    "LATE:17"};
+    "LATE:17",         "FAULT:64,1"};
 
 TEST(State, AReasonThatIsNotKnownIsAFault) {
   State state;
@@ -130,7 +131,9 @@ TEST(State, AllFieldsFitOneDatagramAndRoundTrip) {
   ASSERT_TRUE(read(bytes, datagram));
   State back;
   ASSERT_TRUE(read_state(datagram, back));
-  EXPECT_EQ(back.present, FieldSet::all());
+  FieldSet every = FieldSet::all();
+  every.add(StateField::fault);
+  EXPECT_EQ(back.present, every);
   EXPECT_EQ(back.pnum, 4294967295U);
   EXPECT_EQ(back.t_ms, 4294967295U);
   for (const StateField field : every_field()) {
@@ -184,6 +187,8 @@ TEST(State, ValuesAreTakenToTheEdgesOfTheirRange) {
                              "SAFE:6;",
                              "CMD:4294967295;",
                              "LATE:4294967295;",
+                             "FAULT:0,0;",
+                             "FAULT:127,255;",
                              "T:4294967295;"}) {
     EXPECT_TRUE(accepts(fields)) << fields;
   }
@@ -216,6 +221,10 @@ TEST(State, AValueOutsideItsRangeOrFormRefusesTheWhole) {
                                   "US1:65536",
                                   "US1:-1",
                                   "BLDC1:4096,1,1",
+                                  "FAULT:128,1",
+                                  "FAULT:64",
+                                  "FAULT:64,256",
+                                  "FAULT:64,1,1",
                                   "BLDC1:1,2,1",
                                   "BLDC1:1,1,2",
                                   "BLDC1:1,1",
@@ -263,7 +272,7 @@ TEST(State, ThePapersSetIsTheFirstTenFields) {
   const FieldSet paper = FieldSet::paper_default();
   for (const StateField field : every_field()) {
     EXPECT_EQ(paper.has(field), static_cast<int>(field) < 10);
-    EXPECT_TRUE(FieldSet::all().has(field));
+    EXPECT_EQ(FieldSet::all().has(field), field != StateField::fault);  // it comes by itself
   }
   FieldSet set = FieldSet::all();
   for (const StateField field : every_field()) set.remove(field);
@@ -284,7 +293,9 @@ TEST(State, ASetGivesItsFieldsInTheOrderOfTheTable) {
   EXPECT_EQ(fields,
             (std::vector<StateField>{StateField::ain24, StateField::cmd, StateField::late}));
   fields.clear();
-  for (const StateField field : FieldSet::all()) fields.push_back(field);
+  FieldSet every = FieldSet::all();
+  every.add(StateField::fault);
+  for (const StateField field : every) fields.push_back(field);
   EXPECT_EQ(fields, every_field());
 }
 

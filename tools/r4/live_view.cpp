@@ -29,6 +29,7 @@ class LiveView final : public MonitorView {
   void on_state(const Datagram& datagram) override {
     for (const Field& field : datagram) {
       if (field.name() == Text("PNum") || field.name() == Text("T")) continue;
+      if (field.name() == name_of(StateField::fault)) continue;  // the first lines tell
       std::string name(field.name().data(), field.name().size());
       const auto known = std::find_if(fields_.begin(), fields_.end(),
                                       [&](const auto& each) { return each.first == name; });
@@ -37,6 +38,8 @@ class LiveView final : public MonitorView {
           known != fields_.end() ? known->second : fields_.emplace_back(std::move(name), "").second;
       value.assign(field.values().data(), field.values().size());
     }
+    State state;
+    fault_ = read_state(datagram, state) ? state.fault : ChipFault();
     pnum_ = datagram.pnum();
     t_ms_ = datagram.time_ms();
   }
@@ -89,6 +92,9 @@ class LiveView final : public MonitorView {
                     now.round_trip_us, now.jitter_us, now.state_age_us / 1000));
     lines.push_back(fmt::format("PNum {}   T {} ms   states {}   heartbeats {} in, {} out", pnum_,
                                 t_ms_, now.states, heartbeats_, now.heartbeats));
+    if (fault_.any()) {
+      lines.push_back(fmt::format("{}: {}", chip_name(fault_.address), to_text(fault_.trouble)));
+    }
     lines.emplace_back();
     return lines;
   }
@@ -109,6 +115,7 @@ class LiveView final : public MonitorView {
   const Clock::time_point start_ = Clock::now();
   std::vector<std::pair<std::string, std::string>> fields_;
   std::deque<std::string> notes_;
+  ChipFault fault_;
   std::uint32_t pnum_ = 0;
   std::uint64_t t_ms_ = 0;
   std::uint64_t heartbeats_ = 0;

@@ -94,9 +94,7 @@ sim::SimulatedBoard::Events SimLog::events() {
   if (quiet_) return events;
   events.on_state = [this](auto... a) { on_state(a...); };
   events.on_pins = [this](std::uint32_t t_ms, const sim::Pins& pins) { on_pins(t_ms, pins); };
-  events.on_fault = [this](std::uint32_t t_ms, const firmware::ChipFault& fault) {
-    on_fault(t_ms, fault);
-  };
+  events.on_fault = [this](std::uint32_t t_ms, ChipFault fault) { on_fault(t_ms, fault); };
   events.on_executed = [this](auto... a) { on_executed(a...); };
   events.on_refused = [this](auto... a) { on_refused(a...); };
   events.on_carrier = [this](std::uint32_t t_ms, const Carrier& carrier, const CarrierEvent& e) {
@@ -172,9 +170,9 @@ void SimLog::on_pins(std::uint32_t t_ms, const sim::Pins& pins) {
   print(object);
 }
 
-void SimLog::on_fault(std::uint32_t t_ms, const firmware::ChipFault& fault) {
-  const std::string chip = firmware::to_text(fault.chip);
-  const std::string trouble = firmware::to_text(fault.trouble);
+void SimLog::on_fault(std::uint32_t t_ms, ChipFault fault) {
+  const std::string chip = chip_name(fault.address);
+  const std::string trouble = to_text(fault.trouble);
   if (!output_.json()) return print(t_ms, fmt::format("{}: {}", chip, trouble));
   Json object = event(t_ms);
   object["fault"] = {{"chip", chip}, {"trouble", trouble}};

@@ -48,7 +48,7 @@ class SimLog {
   Json event(std::uint32_t t_ms) const;
   void on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason reason);
   void on_pins(std::uint32_t t_ms, const sim::Pins& pins);
-  void on_fault(std::uint32_t t_ms, const firmware::ChipFault& fault);
+  void on_fault(std::uint32_t t_ms, ChipFault fault);
   void on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command);
   void on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code);
   void on_carrier(std::uint32_t t_ms, const Carrier& carrier, const CarrierEvent& event);

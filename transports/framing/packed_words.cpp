@@ -50,6 +50,8 @@ constexpr PackedWord words[word_count] = {
     {"UNKNOWN"}, {"FORMAT"}, {"RANGE"}, {"CHANNEL"}, {"STALE"}, {"DUPLICATE"}, {"BUSY"}, {"AUTH"},
     // 63
     {"R4"}, {"sim"}, {"udp"}, {"serial"}, {"pty"}, {"can"},
+    // 69
+    {"FAULT"},
 };
 // clang-format on
 

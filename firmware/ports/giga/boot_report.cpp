@@ -90,14 +90,14 @@ Text BootReport::chip(char (&out)[max_line]) {
   const auto chip = static_cast<firmware::Chip>(chip_++);
   LineWriter line(out);
   const bool fitted = (sources_.settings->site.chips >> static_cast<int>(chip) & 1) != 0;
-  line.words(firmware::to_text(chip)).text(": ");
+  line.words(chip_name(firmware::address_of(chip))).text(": ");
   const firmware::ChipTrouble trouble = sources_.hardware->trouble(chip);
   if (!fitted) {
     line.text("not fitted");
   } else if (trouble == firmware::ChipTrouble::none) {
     line.text("ok");
   } else {
-    line.words(firmware::to_text(trouble));
+    line.words(to_text(trouble));
   }
   return line.done();
 }

@@ -195,7 +195,7 @@ void SimulatedBoard::take(const ScriptStep& step) {
 
 // What the pins do, and what is wrong with the chips, where that is news.
 void SimulatedBoard::tell_pins() {
-  const firmware::ChipFault& fault = hardware_->hal().fault();
+  const ChipFault fault = hardware_->hal().fault();
   if (fault.any() != told_fault_) {
     told_fault_ = fault.any();
     if (told_fault_ && options_.events.on_fault) {

@@ -37,7 +37,7 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   struct Events {
     std::function<void(std::uint32_t t_ms, firmware::BoardState, SafeReason)> on_state;
     std::function<void(std::uint32_t t_ms, const Pins&)> on_pins;
-    std::function<void(std::uint32_t t_ms, const firmware::ChipFault&)> on_fault;
+    std::function<void(std::uint32_t t_ms, ChipFault)> on_fault;
     std::function<void(std::uint32_t t_ms, std::uint32_t pnum, const Command&)> on_executed;
     std::function<void(std::uint32_t t_ms, std::uint32_t pnum, Refusal)> on_refused;
     std::function<void(std::uint32_t t_ms, const Carrier&, const CarrierEvent&)> on_carrier;

@@ -124,7 +124,7 @@ TEST(BoardHardware, ASilentChipIsAFaultWithItsNameAndEverythingElseGoesSafe) {
     bench.apply(full());
     bench.board.bus.refuse(at.address, 0, 1000);
     bench.run(110);
-    EXPECT_EQ(bench.hardware.fault().chip, at.chip);
+    EXPECT_EQ(bench.hardware.fault().address, address_of(at.chip));
     EXPECT_EQ(bench.hardware.fault().trouble, ChipTrouble::no_acknowledge);
     const Outputs pins = test::outputs_of(bench.board);
     EXPECT_EQ(pins.bldc[0].speed, at.chip == Chip::dac ? 3000 : 0);
@@ -144,8 +144,8 @@ TEST(BoardHardware, ComesBackWithOutputsOffAndObeysAgainWhenTheFaultIsCleared) {
     bench.apply(full());
     bench.board.bus.refuse(at.address, 0, 3);
     bench.run(400);
-    EXPECT_TRUE(bench.hardware.ready()) << to_text(at.chip);
-    EXPECT_EQ(bench.hardware.fault().chip, at.chip);
+    EXPECT_TRUE(bench.hardware.ready()) << chip_name(address_of(at.chip));
+    EXPECT_EQ(bench.hardware.fault().address, address_of(at.chip));
     EXPECT_TRUE(bench.board.pins().is_safe());
     bench.apply(full());
     EXPECT_TRUE(bench.board.pins().is_safe());
@@ -165,8 +165,8 @@ TEST(BoardHardware, AChipThatWasResetIsNoticedWithinATurnOfVerification) {
                                   &bench.board.dac, &bench.board.servo};
     chips[static_cast<int>(at.chip)]->power_on();
     bench.run(chip_count * 20 + 2);
-    EXPECT_EQ(bench.hardware.fault().chip, at.chip);
-    EXPECT_EQ(bench.hardware.fault().trouble, ChipTrouble::was_reset) << to_text(at.chip);
+    EXPECT_EQ(bench.hardware.fault().address, address_of(at.chip));
+    EXPECT_EQ(bench.hardware.fault().trouble, ChipTrouble::was_reset) << chip_name(address_of(at.chip));
     EXPECT_TRUE(bench.board.pins().is_safe());
     bench.run(200);
     EXPECT_TRUE(bench.hardware.clear_fault());

@@ -44,8 +44,8 @@ class SimulatedBoardTest : public testing::Test {
       if (pins.osmc[0].pwm != seen_pwm_) events_.push_back(event);
       seen_pwm_ = pins.osmc[0].pwm;
     };
-    options.events.on_fault = [this](std::uint32_t, const firmware::ChipFault& fault) {
-      events_.push_back(firmware::to_text(fault.trouble));
+    options.events.on_fault = [this](std::uint32_t, ChipFault fault) {
+      events_.push_back(to_text(fault.trouble));
     };
     options.events.on_executed = [this](std::uint32_t, std::uint32_t pnum, const Command&) {
       events_.push_back("executed " + std::to_string(pnum - first_pnum));
