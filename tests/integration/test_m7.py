@@ -2,40 +2,23 @@
 """The board's firmware on an emulated Cortex-M7 (tools/m7) and r4 as the host, by UART and by UDP."""
 import collections
 import os
-import pathlib
 import re
-import select
 import signal
 import socket
-import subprocess
-import threading
 
 import pytest
 
+from m7_board import M7Board, Relay, Watcher, m7
 from r4_process import PATIENCE_S, SANITIZED, Running, is_link, is_state, monitor, objects, run
 
-M7 = str(pathlib.Path(__file__).resolve().parents[2] / 'tools/m7')
-FIRST_BUILD_S = 240  # and the packages, where tools/test has not installed them
 SAFE_WITHIN_MS = 1020
-
-Urls = collections.namedtuple('Urls', 'serial udp')
-
-
-def m7(*arguments):
-    return subprocess.run([M7, *arguments], capture_output=True, text=True, timeout=FIRST_BUILD_S,
-                          check=False)
 
 
 @pytest.fixture(scope='module', name='urls')
 def running_board():
     """One board for all tests: it goes on as a real one does."""
-    board = subprocess.Popen([M7], stdout=subprocess.PIPE, text=True)
-    try:
-        yield Urls(board.stdout.readline().strip(), board.stdout.readline().strip())
-    finally:
-        board.send_signal(signal.SIGINT)
-        assert board.wait(PATIENCE_S) == 0
-        board.stdout.close()
+    with M7Board() as board:
+        yield board
 
 
 @pytest.fixture(params=['serial', 'udp'], name='url')
@@ -104,79 +87,6 @@ def test_commands_are_refused_while_a_stop_is_latched(url):
     refused = run('send', url, 'O:358,1,1')
     assert refused.returncode == 3 and 'E:CLEAR' in refused.stderr, refused
     assert run('send', url, 'E:CLEAR', 'O:358,1,1').returncode == 0
-
-
-class Watcher:
-    """A UDP socket that the board has heard: what the board tells everyone is told to it."""
-
-    def __init__(self, url):
-        address, port = re.match(r'udp://(.+):(\d+)', url).groups()
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.settimeout(PATIENCE_S)
-        self.socket.connect((address, int(port)))
-        self.ask()
-
-    def ask(self):
-        self.socket.send(b'hello')
-
-    def next(self, is_it):
-        while True:
-            datagram = self.socket.recv(2048).decode()
-            fields = dict(each.split(':', 1) for each in datagram.split(';')[:-1])
-            if is_it(fields):
-                return fields
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.socket.close()
-
-
-class Relay(threading.Thread):
-    """Between a host and the board: notes when, by the board's clock, the host was heard last."""
-
-    def __init__(self, url):
-        super().__init__(daemon=True)
-        address, port = re.match(r'udp://(.+):(\d+)', url).groups()
-        self.to_board = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.to_board.connect((address, int(port)))
-        self.to_host = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.to_host.bind(('127.0.0.1', 0))
-        self.url = 'udp://127.0.0.1:%d?listen=0' % self.to_host.getsockname()[1]
-        self.heartbeat_t = self.safe = self.host = None
-        self.went_safe = threading.Event()
-        self.going = True
-
-    def run(self):
-        t = None
-        while self.going:
-            for each in select.select([self.to_board, self.to_host], [], [], 0.1)[0]:
-                if each is self.to_host:
-                    datagram, self.host = each.recvfrom(2048)
-                    if datagram.startswith(b'H:'):
-                        self.heartbeat_t = t
-                    self.to_board.send(datagram)
-                    continue
-                datagram = each.recv(2048)
-                fields = dict(re.findall(r'(\w+):([^;]*);', datagram.decode()))
-                if int(fields['T']) != 0:
-                    t = int(fields['T'])
-                if fields.get('H') and fields.get('SAFE') == '1' and not self.safe:
-                    self.safe = fields
-                    self.went_safe.set()
-                if self.host:
-                    self.to_host.sendto(datagram, self.host)
-
-    def __enter__(self):
-        self.start()
-        return self
-
-    def __exit__(self, *_):
-        self.going = False
-        self.join()
-        self.to_board.close()
-        self.to_host.close()
 
 
 def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(urls):

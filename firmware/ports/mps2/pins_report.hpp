@@ -33,8 +33,10 @@ class PinsReport final : public sim::I2cObserver {
   // To be called in each turn of the loop.
   void poll();
 
-  // The last datagram came at `ticks` of the board's clock. In interrupts.
-  static void on_datagram(std::uint32_t ticks) { datagram_ticks_ = ticks; }
+  // A datagram came at `ticks` of the board's clock; of several the newest counts. In interrupts.
+  static void on_datagram(std::uint32_t ticks) {
+    if (static_cast<std::int32_t>(ticks - datagram_ticks_) > 0) datagram_ticks_ = ticks;
+  }
 
  private:
   struct Note {

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""tools/m7 as it runs, and who stands between its board and a host."""
+import json
+import os
+import pathlib
+import queue
+import re
+import select
+import signal
+import socket
+import subprocess
+import threading
+import time
+import tty
+
+from r4_process import PATIENCE_S
+
+M7 = str(pathlib.Path(__file__).resolve().parents[2] / 'tools/m7')
+FIRST_BUILD_S = 240  # and the packages, where tools/test has not installed them
+
+
+def m7(*arguments):
+    return subprocess.run([M7, *arguments], capture_output=True, text=True, timeout=FIRST_BUILD_S,
+                          check=False)
+
+
+class M7Board:
+    """A board on the emulated M7; with --pins it tells what its pins do."""
+
+    def __init__(self, *options):
+        self.process = subprocess.Popen([M7, *options], stdout=subprocess.PIPE, text=True)
+        self.serial = self.process.stdout.readline().strip()
+        self.udp = self.process.stdout.readline().strip()
+        self.events = queue.Queue()
+        self.log = []  # what was taken off the queue
+        self.reader = threading.Thread(target=self._read, daemon=True)
+        self.reader.start()
+
+    def _read(self):
+        for line in self.process.stdout:
+            self.events.put(json.loads(line))
+
+    def pins(self, is_it, timeout=PATIENCE_S):
+        """The next event for which it is true."""
+        deadline = time.monotonic() + timeout
+        while True:
+            try:
+                event = self.events.get(timeout=max(0, deadline - time.monotonic()))
+            except queue.Empty:
+                raise AssertionError(f'the pins have not done that in {timeout} s: {self.log[-3:]}') from None
+            self.log.append(event)
+            if is_it(event):
+                return event
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.send_signal(signal.SIGINT)
+        assert self.process.wait(PATIENCE_S) == 0
+        self.reader.join()
+        self.process.stdout.close()
+
+
+def fields_of(datagram):
+    return dict(re.findall(r'(\w+):([^;]*);', datagram))
+
+
+class Watcher:
+    """A UDP socket that the board has heard: what the board tells everyone is told to it."""
+
+    def __init__(self, url):
+        address, port = re.match(r'udp://(.+):(\d+)', url).groups()
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.settimeout(PATIENCE_S)
+        self.socket.connect((address, int(port)))
+        self.ask()
+
+    def ask(self):
+        self.socket.send(b'hello')
+
+    def next(self, is_it):
+        while True:
+            datagram = self.socket.recv(2048).decode()
+            fields = fields_of(datagram)
+            if is_it(fields):
+                return fields
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.socket.close()
+
+
+class LineWatcher:
+    """The end of the board's serial line: what the board tells everyone is told there, too."""
+
+    def __init__(self, url):
+        self.file = os.open(url[len('serial://'):], os.O_RDWR | os.O_NOCTTY)
+        tty.setraw(self.file)
+        self.pending = b''
+
+    def next(self, is_it):
+        deadline = time.monotonic() + PATIENCE_S
+        while time.monotonic() < deadline:
+            line, end, rest = self.pending.partition(b'\r\n')
+            if end:
+                self.pending = rest
+                fields = fields_of(line.decode())
+                if is_it(fields):
+                    return fields
+            elif select.select([self.file], [], [], PATIENCE_S)[0]:
+                self.pending += os.read(self.file, 4096)
+        raise AssertionError(f'nothing of that kind in {PATIENCE_S} s: {self.pending}')
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        os.close(self.file)
+
+
+class Relay(threading.Thread):
+    """Between a host and the board: notes when, by the board's clock, the host was heard last."""
+
+    def __init__(self, url):
+        super().__init__(daemon=True)
+        address, port = re.match(r'udp://(.+):(\d+)', url).groups()
+        self.to_board = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.to_board.connect((address, int(port)))
+        self.to_host = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.to_host.bind(('127.0.0.1', 0))
+        self.url = 'udp://127.0.0.1:%d?listen=0' % self.to_host.getsockname()[1]
+        self.heartbeat_t = self.safe = self.host = None
+        self.went_safe = threading.Event()
+        self.going = True
+
+    def run(self):
+        t = None
+        while self.going:
+            for each in select.select([self.to_board, self.to_host], [], [], 0.1)[0]:
+                if each is self.to_host:
+                    datagram, self.host = each.recvfrom(2048)
+                    if datagram.startswith(b'H:'):
+                        self.heartbeat_t = t
+                    self.to_board.send(datagram)
+                    continue
+                datagram = each.recv(2048)
+                fields = fields_of(datagram.decode())
+                if int(fields['T']) != 0:
+                    t = int(fields['T'])
+                if fields.get('H') and fields.get('SAFE') == '1' and not self.safe:
+                    self.safe = fields
+                    self.went_safe.set()
+                if self.host:
+                    self.to_host.sendto(datagram, self.host)
+
+    def __enter__(self):
+        self.start()
+        return self
+
+    def __exit__(self, *_):
+        self.going = False
+        self.join()
+        self.to_board.close()
+        self.to_host.close()
