@@ -36,7 +36,7 @@ void Pca9685::set_duty(int channel, std::uint16_t duty) {
   if (duty > duty_on) duty = duty_on;
   if (duty_[channel] == duty) return;
   duty_[channel] = duty;
-  changed_ = true;
+  changed_ = static_cast<std::uint16_t>(changed_ | 1U << channel);
 }
 
 void Pca9685::set_pulse_us(int channel, std::uint16_t us) {
@@ -48,7 +48,7 @@ void Pca9685::set_pulse_us(int channel, std::uint16_t us) {
 
 void Pca9685::set_all_off() {
   for (std::uint16_t& duty : duty_) duty = 0;
-  changed_ = true;
+  changed_ = all_channels;
 }
 
 I2cResult Pca9685::all_off(I2cBus& bus) {
@@ -152,8 +152,9 @@ bool Pca9685::differs(int index) const {
 }
 
 void Pca9685::on_write_changes(BusBudget& budget) {
-  if (!changed_) return;
+  if (changed_ == 0) return;
   const int step = 4 * group_;
+  const unsigned group_bits = (1U << group_) - 1;
   int at = 0;
   while (at < registers) {
     // One burst: from `first` up to `end`; it takes up group after group while the gap is small
@@ -161,6 +162,7 @@ void Pca9685::on_write_changes(BusBudget& budget) {
     int first = -1;
     int end = -1;
     for (; at < registers; at += step) {
+      if ((changed_ >> at / 4 & group_bits) == 0) continue;
       int group_first = -1;
       int group_end = -1;
       for (int i = at; i < at + step; ++i) {
@@ -188,7 +190,7 @@ void Pca9685::on_write_changes(BusBudget& budget) {
     if (!send(bytes, size, budget)) return;
     std::memcpy(written_ + first, bytes + 1, static_cast<std::size_t>(end - first));
   }
-  changed_ = false;
+  changed_ = 0;
 }
 
 bool Pca9685::check_mode(BusBudget& budget) {

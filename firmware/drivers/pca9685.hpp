@@ -77,7 +77,8 @@ class Pca9685 final : public ChipDriver {
   Step step_ = Step::off;
   std::uint32_t awake_us_ = 0;
   std::uint8_t verified_channel_ = 0;
-  bool changed_ = true;  // duty_ may ask for more than is written
+  static constexpr std::uint16_t all_channels = 0xFFFF;
+  std::uint16_t changed_ = all_channels;  // bit: duty_ may ask for another value than is written
   std::uint16_t duty_[channels] = {};
   std::uint8_t written_[registers] = {};  // LED0_ON_L … as the chip has them
 };
