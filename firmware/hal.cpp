@@ -1,24 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "hal.hpp"
 
+#include "../protocol/same_elements.hpp"
+
 namespace r4 {
 namespace firmware {
 
-namespace {
-
-template <class T, int N>
-bool same(const T (&a)[N], const T (&b)[N]) {
-  for (int i = 0; i < N; ++i) {
-    if (a[i] != b[i]) return false;
-  }
-  return true;
-}
-
-}  // namespace
-
 bool operator==(const Outputs& a, const Outputs& b) {
-  return a.relays == b.relays && same(a.osmc, b.osmc) && same(a.dhb12, b.dhb12) &&
-         same(a.servo_us, b.servo_us) && same(a.bldc, b.bldc) && same(a.stepper, b.stepper);
+  return a.relays == b.relays && same_elements(a.osmc, b.osmc) && same_elements(a.dhb12, b.dhb12) &&
+         same_elements(a.servo_us, b.servo_us) && same_elements(a.bldc, b.bldc) &&
+         same_elements(a.stepper, b.stepper);
 }
 
 }  // namespace firmware

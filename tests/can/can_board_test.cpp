@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include "host/board.hpp"
-#include "tests/support/board_in_a_thread.hpp"
 #include "tests/support/every_channel.hpp"
 
 namespace r4::test {
@@ -26,14 +25,7 @@ TEST_P(CanBoard, EveryChannelReachesItsPinAndComesBack) {
   Board board(simulated.url() + (GetParam().packed ? "&pack=1" : ""));
   board.wait_active();
   if (GetParam().packed) board.setting("pack", "1");
-  expect_every_channel({
-      [&](const std::string& command) { board.send(command); },
-      [&] {
-        board.next_state();  // it may have been under way
-        return board.next_state();
-      },
-      [&](const auto& action) { simulated.run(action); },
-  });
+  expect_every_channel(controlled(simulated, board));
 }
 
 }  // namespace

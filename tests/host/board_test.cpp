@@ -79,14 +79,7 @@ TEST_P(BoardOver, EveryChannelReachesItsPinAndComesBack) {
   BoardInAThread simulated(GetParam());
   Board board(simulated.url());
   board.wait_active();
-  expect_every_channel({
-      [&](const std::string& command) { board.send(command); },
-      [&] {
-        board.next_state();  // it may have been under way
-        return board.next_state();
-      },
-      [&](const auto& action) { simulated.run(action); },
-  });
+  expect_every_channel(controlled(simulated, board));
 }
 
 TEST_P(BoardOver, StopsUntilCleared) {

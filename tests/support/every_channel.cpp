@@ -135,6 +135,17 @@ void expect_interlocks(const ControlledBoard& board) {
 
 }  // namespace
 
+ControlledBoard controlled(BoardInAThread& simulated, Board& host) {
+  return {
+      [&host](const std::string& command) { host.send(command); },
+      [&host] {
+        host.next_state();  // it may have been under way
+        return host.next_state();
+      },
+      [&simulated](const auto& action) { simulated.run(action); },
+  };
+}
+
 void expect_every_channel(const ControlledBoard& board) {
   board.command("F:ALL");
   expect_inputs(board);

@@ -6,7 +6,9 @@
 #include <functional>
 #include <string>
 
+#include "board_in_a_thread.hpp"
 #include "firmware/ports/sim/simulated_board.hpp"
+#include "host/board.hpp"
 #include "protocol/state.hpp"
 
 namespace r4::test {
@@ -17,6 +19,9 @@ struct ControlledBoard {
   std::function<State()> next_state;                // one that was sent after the call
   std::function<void(const std::function<void(sim::SimulatedBoard&)>&)> at_board;
 };
+
+// A board of a thread, and the host that has opened it.
+ControlledBoard controlled(BoardInAThread& simulated, Board& host);
 
 void expect_every_channel(const ControlledBoard& board);
 

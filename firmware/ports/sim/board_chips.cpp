@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "board_chips.hpp"
 
+#include "../../../protocol/same_elements.hpp"
+
 namespace r4 {
 namespace sim {
 
@@ -18,14 +20,6 @@ Drive drive_of(const Pca9685Model& chip, const firmware::DriveLines& lines) {
 
 bool bit(unsigned bits, int number) { return (bits >> number & 1U) != 0; }
 
-template <class T, int N>
-bool same(const T (&a)[N], const T (&b)[N]) {
-  for (int i = 0; i < N; ++i) {
-    if (a[i] != b[i]) return false;
-  }
-  return true;
-}
-
 }  // namespace
 
 ChipPins ChipPins::safe() {
@@ -37,8 +31,8 @@ ChipPins ChipPins::safe() {
 bool ChipPins::is_safe() const { return *this == safe(); }
 
 bool operator==(const ChipPins& a, const ChipPins& b) {
-  return a.relays == b.relays && same(a.osmc, b.osmc) && same(a.dhb12, b.dhb12) &&
-         same(a.servo_us, b.servo_us) && same(a.bldc, b.bldc);
+  return a.relays == b.relays && same_elements(a.osmc, b.osmc) && same_elements(a.dhb12, b.dhb12) &&
+         same_elements(a.servo_us, b.servo_us) && same_elements(a.bldc, b.bldc);
 }
 
 BoardChips::BoardChips() {
