@@ -4,16 +4,10 @@
 #include <algorithm>
 
 #include "bench.hpp"
-#include "firmware/ports/giga/watchdog.hpp"
 #include "tests/giga/core/registers.hpp"
 
 namespace r4::test {
 namespace {
-
-bool has_line(const std::vector<std::string>& lines, const std::string& part) {
-  return std::any_of(lines.begin(), lines.end(),
-                     [&](const std::string& line) { return line.find(part) != std::string::npos; });
-}
 
 TEST(GigaPowerUp, SwitchesEveryOutputOffBeforeAnythingElse) {
   GigaBench bench;
@@ -113,6 +107,22 @@ TEST(GigaUsb, AProgramThatOpensThePortHearsThePresentFromItsFirstLineOn) {
   Datagram datagram;
   ASSERT_TRUE(read(Text(lines[0].data(), lines[0].size()), datagram)) << lines[0];
   EXPECT_LE(giga::BoardClock::now_ms() - static_cast<std::uint32_t>(datagram.time_ms()), 600U);
+}
+
+TEST(GigaUsb, AFloodOfInputTakesItsTurn) {
+  GigaBench bench;
+  bench.boot();
+  PlainHost host;
+  bench.drive(host, bench.can());
+  bench.usb_lines();
+  for (int i = 0; i < 20000; ++i) bench.giga.usb_send(std::string(64, i % 2 == 0 ? 'x' : '\n'));
+  const std::size_t before = bench.giga.usb_packets.size();
+  bench.system->poll();
+  EXPECT_GE(bench.giga.usb_packets.size(), before - giga::UsbPort::packets_per_turn);
+  bench.can_datagrams.clear();
+  bench.run_ms(1000, host, bench.can());
+  EXPECT_TRUE(bench.active());
+  EXPECT_NEAR(static_cast<double>(bench.can_datagrams.size()), 102, 4);
 }
 
 TEST(GigaUsb, EndsNoBurstWithAFullPacket) {
@@ -228,6 +238,86 @@ TEST(GigaWiFi, AThreadThatHangsInTheLibraryDoesNotDisturbTheLoop) {
   EXPECT_NEAR(static_cast<double>(bench.usb_lines().size()), 204, 6);
 }
 
+TEST(GigaWiFi, IsJoinedAgainWhenItIsLostAndAWrongPasswordIsTriedAgain) {
+  GigaBench bench;
+  bench.giga.stored["r4-settings"] = "network,lab\npassword,wrong-one\n";
+  bench.boot();
+  const auto joins = [&] {
+    const std::lock_guard<std::mutex> lock(bench.giga.mutex);
+    return bench.giga.joins;
+  };
+  const auto up = [&] {
+    const std::lock_guard<std::mutex> lock(bench.giga.mutex);
+    return bench.giga.udp_port != 0;
+  };
+  ASSERT_TRUE(bench.run_until([&] { return joins() >= 3; }));
+  EXPECT_FALSE(up());
+  {
+    const std::lock_guard<std::mutex> lock(bench.giga.mutex);
+    bench.giga.air_password = "wrong-one";
+  }
+  ASSERT_TRUE(bench.run_until(up));
+  const int before = joins();
+  {
+    const std::lock_guard<std::mutex> lock(bench.giga.mutex);
+    bench.giga.wifi_connected = false;
+  }
+  ASSERT_TRUE(bench.run_until([&] { return joins() > before && up(); }));
+}
+
+TEST(GigaWiFi, LosingItMakesTheOutputsOfItsHostSafeAtOnce) {
+  GigaBench bench;
+  bench.giga.stored["r4-settings"] = "network,lab\npassword,correct%20horse\n";
+  bench.boot();
+  ASSERT_TRUE(bench.run_until([&] {
+    const std::lock_guard<std::mutex> lock(bench.giga.mutex);
+    return bench.giga.udp_port != 0;
+  }));
+  PlainHost host;
+  std::uint64_t next_ms = 0;
+  ASSERT_TRUE(bench.run_until([&] {
+    if (bench.giga.now_ms() < next_ms) return false;
+    next_ms = bench.giga.now_ms() + 100;
+    bench.udp()(host.heartbeat(next_ms));
+    bench.udp()(host.command("O:358,1,1"));
+    return bench.pins().osmc[0].pwm == 358;
+  }));
+  {
+    const std::lock_guard<std::mutex> lock(bench.giga.mutex);
+    bench.giga.wifi_connected = false;
+    bench.giga.air.clear();
+  }
+  ASSERT_TRUE(bench.run_until([&] {
+    if (bench.giga.now_ms() >= next_ms) {
+      next_ms = bench.giga.now_ms() + 100;
+      bench.udp()(host.heartbeat(next_ms));
+    }
+    return bench.pins().is_safe();
+  }));
+  EXPECT_EQ(bench.reason(), SafeReason::link);
+}
+
+TEST(GigaWiFi, AnotherCalibrationDoesNotDropIt) {
+  GigaBench bench;
+  bench.giga.stored["r4-settings"] = "network,lab\npassword,correct%20horse\n";
+  bench.boot();
+  const auto joins = [&] {
+    const std::lock_guard<std::mutex> lock(bench.giga.mutex);
+    return bench.giga.joins;
+  };
+  ASSERT_TRUE(bench.run_until([&] { return joins() == 1; }));
+  PlainHost host;
+  bench.run_ms(150, host, bench.usb());
+  bench.usb()(host.command("C:AIN24,33.00"));
+  bench.usb()(host.command("C:host,192.168.0.117"));
+  ASSERT_TRUE(bench.run_until([&] {
+    const std::lock_guard<std::mutex> lock(bench.giga.mutex);
+    return std::any_of(bench.giga.udp_out.begin(), bench.giga.udp_out.end(),
+                       [](const fake::Datagram& datagram) { return datagram.port == 2390; });
+  })) << "the new host is called";
+  EXPECT_EQ(joins(), 1);
+}
+
 TEST(GigaStop, IsObeyedOverEachTransport) {
   for (const char* transport : {"usb", "can", "emergency frame", "udp"}) {
     GigaBench bench;
@@ -259,198 +349,6 @@ TEST(GigaStop, IsObeyedOverEachTransport) {
     EXPECT_EQ(bench.reason(), SafeReason::stop) << name;
     EXPECT_TRUE(bench.pins().is_safe()) << name;
   }
-}
-
-TEST(GigaWatchdog, IsFedByTheGuardAsLongAsTheLoopTurns) {
-  GigaBench bench;
-  bench.boot();
-  const int feeds = bench.giga.watchdog_feeds;
-  bench.run_ms(1000);
-  EXPECT_GT(bench.giga.watchdog_feeds - feeds, 300);
-}
-
-TEST(GigaWatchdog, ALoopThatHangsIsSafeSoonAndResetsTheBoardWhichStaysSafe) {
-  GigaBench bench;
-  bench.boot();
-  PlainHost host;
-  bench.drive(host, bench.usb());
-  std::uint64_t safe_after_ms = 0;
-  const std::uint64_t hung_ms = bench.giga.now_ms();
-  EXPECT_TRUE(bench.giga.reset_by([&] {
-    for (int ms = 0; ms < 5000; ++ms) {  // the loop does not come back; the timers do
-      bench.giga.pass_ms(1);
-      if (safe_after_ms == 0 && bench.pins().is_safe()) {
-        safe_after_ms = bench.giga.now_ms() - hung_ms;
-      }
-    }
-  }));
-  EXPECT_GT(safe_after_ms, 0U);
-  EXPECT_LE(safe_after_ms, 125U) << "five deadlines of 20 ms";
-  EXPECT_LE(bench.giga.now_ms() - hung_ms, 450U);
-
-  bench.system.reset();
-  bench.giga.connect_registers();
-  bench.boot();
-  PlainHost again;
-  bench.run_ms(150, again, bench.usb());
-  EXPECT_EQ(bench.reason(), SafeReason::watchdog);
-  bench.usb()(again.command("O:358,1,1"));
-  bench.run_ms(20);
-  EXPECT_TRUE(bench.pins().is_safe());
-  bench.run_ms(1100, again, bench.usb());
-  bench.usb()(again.command("E:CLEAR"));
-  bench.usb()(again.command("O:358,1,1"));
-  bench.run_ms(20);
-  EXPECT_EQ(bench.pins().osmc[0].pwm, 358);
-}
-
-TEST(GigaWatchdog, BitesWhenEvenTheTimerInterruptIsDead) {
-  GigaBench bench;
-  bench.boot();
-  EXPECT_TRUE(bench.giga.reset_by([&] {
-    bench.giga.primask = 1;
-    bench.giga.pass_ms(2000);
-  }));
-  bench.restart();
-  EXPECT_EQ(bench.reason(), SafeReason::watchdog);
-}
-
-TEST(GigaFault, AProcessorFaultSwitchesEverythingOffAndIsReportedByTheNextBoot) {
-  GigaBench bench;
-  bench.boot();
-  PlainHost host;
-  bench.drive(host, bench.usb());
-  ASSERT_EQ(bench.giga.vectors.count(HardFault_IRQn), 1U);
-  r4_fake_scb.CFSR.value = 0x8200;
-  EXPECT_TRUE(bench.giga.reset_by([&] { bench.giga.vectors[HardFault_IRQn](); }));
-  EXPECT_TRUE(bench.pins().is_safe());
-  bench.restart();
-  EXPECT_EQ(bench.reason(), SafeReason::fault);
-  bench.usb()("report");
-  bench.run_ms(400);
-  EXPECT_TRUE(has_line(bench.usb_lines(), "fault, exception 3, pc 0x00, status 0x8200"));
-}
-
-TEST(GigaFault, InTheMiddleOfATransferEverythingIsSwitchedOffAllTheSame) {
-  GigaBench bench;
-  bench.boot();
-  PlainHost host;
-  bench.drive(host, bench.usb());
-  for (int after_bytes = 0; after_bytes < 6; ++after_bytes) {
-    bench.giga.i2c.hold_after(after_bytes, 4);
-    if (!bench.giga.reset_by([&] {
-          bench.usb()(host.command("O:" + std::to_string(400 + after_bytes) + ",1,1"));
-          bench.run_ms(2);
-          bench.giga.vectors[BusFault_IRQn]();
-        })) {
-      ADD_FAILURE() << "no reset";
-    }
-    EXPECT_TRUE(bench.pins().is_safe()) << after_bytes;
-    bench.restart();
-    bench.run_ms(150, host, bench.usb());
-    bench.run_ms(1100, host, bench.usb());
-    bench.usb()(host.command("E:CLEAR"));
-    bench.run_ms(20);
-  }
-}
-
-TEST(GigaFault, AnErrorOfTheCoreEndsTheBootInsteadOfBlinkingForEver) {
-  GigaBench bench;
-  bench.boot();
-  PlainHost host;
-  bench.drive(host, bench.usb());
-  EXPECT_TRUE(bench.giga.reset_by([] { r4_fake_core_error(-5, 0x08040000); }));
-  EXPECT_TRUE(bench.pins().is_safe());
-  EXPECT_TRUE(bench.giga.reset_by([] { mbed_die(); }));
-}
-
-TEST(GigaBus, AStuckBusCostsTheLoopAtMostItsBound) {
-  GigaBench bench;
-  bench.boot();
-  PlainHost host;
-  bench.drive(host, bench.usb());
-  bench.giga.i2c.hold_scl(true);
-  std::uint64_t longest_us = 0;
-  for (int i = 0; i < 500; ++i) {
-    const std::uint64_t before = bench.giga.now_ns();
-    bench.system->poll();
-    longest_us = std::max(longest_us, (bench.giga.now_ns() - before) / 1000);
-    giga::rest();
-  }
-  EXPECT_EQ(bench.reason(), SafeReason::fault);
-  EXPECT_LT(longest_us, 10000U);
-  RecordProperty("longest_turn_us", static_cast<int>(longest_us));
-  bench.giga.i2c.hold_scl(false);
-  bench.run_ms(500, host, bench.usb());
-  bench.run_ms(1100, host, bench.usb());
-  bench.usb()(host.command("E:CLEAR"));
-  bench.usb()(host.command("O:358,1,1"));
-  bench.run_ms(20);
-  EXPECT_EQ(bench.pins().osmc[0].pwm, 358) << "it comes back";
-}
-
-TEST(GigaSettings, SurviveARestart) {
-  GigaBench bench;
-  bench.boot();
-  PlainHost host;
-  bench.run_ms(150, host, bench.usb());
-  bench.usb()(host.command("C:rate,50"));
-  bench.usb()(host.command("C:timeout,1500"));
-  bench.usb()(host.command("C:node,7"));
-  bench.usb()(host.command("C:AIN24,33.00"));
-  bench.run_ms(20);
-  ASSERT_TRUE(bench.run_until([&] {
-    const std::lock_guard<std::mutex> lock(bench.giga.mutex);
-    return bench.giga.writes == 1;
-  })) << "all of them at once, when they have settled";
-  bench.giga.analog[0x24] = 0x8000;
-  bench.restart();
-  const Settings& settings = bench.application().settings();
-  EXPECT_EQ(settings.state_rate_hz, 50);
-  EXPECT_EQ(settings.timeout_ms, 1500);
-  EXPECT_EQ(settings.site.can_node, 7);
-  PlainHost again;
-  bench.run_ms(200, again, bench.usb());
-  EXPECT_TRUE(has_line(bench.usb_lines(), "AIN24:16.50;"));
-}
-
-TEST(GigaSettings, AreNotKeptWhereAUsersFilesMayBe) {
-  GigaBench bench;
-  bench.giga.partition_size = 8 * 1024 * 1024;
-  bench.boot();
-  PlainHost host;
-  bench.run_ms(150, host, bench.usb());
-  bench.usb()(host.command("C:rate,50"));
-  bench.run_ms(2500, host, bench.usb());
-  EXPECT_EQ(bench.giga.writes, 0);
-  bench.usb_lines();
-  bench.usb()("report");
-  bench.run_ms(400);
-  EXPECT_TRUE(has_line(bench.usb_lines(), "Settings: not kept"));
-}
-
-TEST(GigaSettings, TellWhichChipsAreFitted) {
-  GigaBench bench;
-  bench.giga.stored["r4-settings"] = "chips,17\n";  // OSMC and servos
-  bench.boot();
-  PlainHost host;
-  bench.drive(host, bench.usb());
-  bench.giga.i2c.log.clear();
-  bench.run_ms(200, host, bench.usb());
-  for (const auto& transfer : bench.giga.i2c.log) {
-    EXPECT_TRUE(transfer[0] >> 1 == 0x40 || transfer[0] >> 1 == 0x42) << int{transfer[0]};
-  }
-}
-
-TEST(GigaSettings, ForTheNetworkAreRefusedOverCan) {
-  GigaBench bench;
-  bench.boot();
-  PlainHost host;
-  bench.run_ms(150, host, bench.can());
-  bench.can()(host.command("C:network,evil"));
-  bench.run_ms(50);
-  EXPECT_TRUE(has_line(bench.can_datagrams, ",AUTH;"));
-  EXPECT_STREQ(bench.application().settings().site.network, "");
 }
 
 TEST(GigaReport, IsThePapersFigure3) {

@@ -11,9 +11,9 @@
 #include "core/TDBStore.h"
 #include "core/USB/PluggableUSBSerial.h"
 #include "core/WiFi.h"
-#include "core/WiFiUdp.h"
 #include "core/hal/trng_api.h"
 #include "core/hal/us_ticker_api.h"
+#include "core/netsocket/UDPSocket.h"
 #undef abs
 #undef bit
 #undef max
@@ -276,54 +276,49 @@ std::uint8_t WiFiClass::status() {
 }
 IPAddress WiFiClass::localIP() { return IPAddress(192, 168, 0, 162); }
 
-namespace {
-r4::fake::Datagram arrived;
-r4::fake::Datagram leaving;
-}  // namespace
-WiFiUDP::WiFiUDP() : packet_(nullptr) {}
-WiFiUDP::~WiFiUDP() = default;
-std::uint8_t WiFiUDP::begin(std::uint16_t port) {
-  const std::lock_guard<std::mutex> lock(giga().mutex);
-  giga().udp_port = port;
-  return 1;
-}
-void WiFiUDP::stop() {
-  const std::lock_guard<std::mutex> lock(giga().mutex);
-  giga().udp_port = 0;
-}
-int WiFiUDP::beginPacket(IPAddress ip, std::uint16_t port) {
-  leaving = {
-      std::uint32_t{ip[0]} << 24 | std::uint32_t{ip[1]} << 16 | std::uint32_t{ip[2]} << 8 | ip[3],
-      port, ""};
-  return 1;
-}
-std::size_t WiFiUDP::write(const std::uint8_t* buffer, std::size_t size) {
-  leaving.bytes.append(reinterpret_cast<const char*>(buffer), size);
-  return size;
-}
-int WiFiUDP::endPacket() {
-  const std::lock_guard<std::mutex> lock(giga().mutex);
-  giga().udp_out.push_back(leaving);
-  return 1;
-}
-int WiFiUDP::parsePacket() {
-  const std::lock_guard<std::mutex> lock(giga().mutex);
-  if (giga().udp_in.empty()) return 0;
-  arrived = giga().udp_in.front();
-  giga().udp_in.pop_front();
-  return static_cast<int>(arrived.bytes.size());
-}
-int WiFiUDP::read(char* buffer, std::size_t size) {
-  const std::size_t count = std::min(size, arrived.bytes.size());
-  std::memcpy(buffer, arrived.bytes.data(), count);
-  return static_cast<int>(count);
-}
-IPAddress WiFiUDP::remoteIP() {
-  const auto byte = [](int shift) { return static_cast<std::uint8_t>(arrived.ip >> shift); };
-  return IPAddress(byte(24), byte(16), byte(8), byte(0));
-}
-std::uint16_t WiFiUDP::remotePort() { return arrived.port; }
+NetworkInterface* WiFiClass::getNetwork() { return nullptr; }
 
 }  // namespace arduino
 
 arduino::WiFiClass WiFi;
+
+UDPSocket::~UDPSocket() = default;
+nsapi_error_t UDPSocket::open(NetworkInterface*) { return NSAPI_ERROR_OK; }
+nsapi_error_t UDPSocket::bind(std::uint16_t port) {
+  const std::lock_guard<std::mutex> lock(giga().mutex);
+  giga().udp_port = port;
+  return NSAPI_ERROR_OK;
+}
+void UDPSocket::set_blocking(bool blocking) { blocking_ = blocking; }
+nsapi_error_t UDPSocket::close() {
+  const std::lock_guard<std::mutex> lock(giga().mutex);
+  giga().udp_port = 0;
+  return NSAPI_ERROR_OK;
+}
+nsapi_size_or_error_t UDPSocket::sendto(const SocketAddress& address, const void* data,
+                                        unsigned int size) {
+  const nsapi_addr_t to = address.get_addr();
+  const std::uint32_t ip = std::uint32_t{to.bytes[0]} << 24 | std::uint32_t{to.bytes[1]} << 16 |
+                           std::uint32_t{to.bytes[2]} << 8 | to.bytes[3];
+  const std::lock_guard<std::mutex> lock(giga().mutex);
+  giga().udp_out.push_back(
+      {ip, address.get_port(), std::string(static_cast<const char*>(data), size)});
+  return static_cast<int>(size);
+}
+nsapi_size_or_error_t UDPSocket::recvfrom(SocketAddress* address, void* data, unsigned int size) {
+  const std::lock_guard<std::mutex> lock(giga().mutex);
+  if (giga().udp_in.empty()) {
+    if (blocking_) std::abort();  // it would wait for ever
+    return NSAPI_ERROR_WOULD_BLOCK;
+  }
+  const r4::fake::Datagram datagram = giga().udp_in.front();
+  giga().udp_in.pop_front();
+  nsapi_addr_t from = {};
+  from.version = NSAPI_IPv4;
+  for (int i = 0; i < 4; ++i)
+    from.bytes[i] = static_cast<std::uint8_t>(datagram.ip >> (24 - 8 * i));
+  *address = SocketAddress(from, datagram.port);
+  const std::size_t count = std::min<std::size_t>(size, datagram.bytes.size());
+  std::memcpy(data, datagram.bytes.data(), count);
+  return static_cast<int>(count);
+}

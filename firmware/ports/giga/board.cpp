@@ -9,8 +9,8 @@ namespace giga {
 
 namespace {
 
-constexpr std::uint32_t settle_ms =
-    1000;  // settings are kept when they have been left alone so long
+// Settings are kept when they have been left alone for so long.
+constexpr std::uint32_t settle_ms = 1000;
 constexpr std::uint32_t can_bit_rate = 1000000;
 
 // Hexadecimal, 24 digits: the chip's own number.
@@ -59,8 +59,8 @@ void on_can() {
   wake_loop();
 }
 
-// A word for the board itself: letters only, so no datagram.
-bool is_word(Text line, Text word) { return line == word; }
+// What a person asks of the board itself; no datagram is so short.
+constexpr Text report_word("report");
 
 SafeReason reason_of(const FaultNote& note) {
   switch (note.kind) {
@@ -146,7 +146,7 @@ void Board::hear() {
 }
 
 void Board::hear_usb(Text line) {
-  if (is_word(line, "report")) {
+  if (line == report_word) {
     report_.begin();
     waiting_line_ = Text();
   } else {

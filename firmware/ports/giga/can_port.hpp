@@ -31,7 +31,7 @@ class CanPort final : public firmware::Port {
     const Fdcan::Event event = controller_.poll(clock_());
     if (event != Fdcan::Event::none) forget();
     CanFrame frame;
-    while (controller_.receive(frame)) {
+    for (int i = 0; i < frames_per_turn && controller_.receive(frame); ++i) {
       const Text datagram = node_.on_frame(frame, clock_());
       pump();  // flow control is waited for
       if (!datagram.empty()) on_datagram(datagram);
@@ -50,6 +50,7 @@ class CanPort final : public firmware::Port {
 
  private:
   static constexpr std::uint32_t queue_bytes = 1024;
+  static constexpr int frames_per_turn = 32;  // a full bus brings eight in a millisecond
 
   void pump();
   bool begin_next(CanLane lane, DatagramRing<queue_bytes>& queue);

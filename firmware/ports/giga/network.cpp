@@ -2,6 +2,7 @@
 #include "network.hpp"
 
 #include "board_clock.hpp"
+
 namespace r4 {
 namespace giga {
 
@@ -9,16 +10,18 @@ namespace {
 
 constexpr std::chrono::milliseconds pause(1);
 
-std::uint32_t number_of(const arduino::IPAddress& address) {
-  std::uint32_t number = 0;
-  for (int i = 0; i < 4; ++i) number = number << 8 | address[i];
-  return number;
+template <class Bytes>
+std::uint32_t ip_of(const Bytes& bytes) {
+  std::uint32_t ip = 0;
+  for (int i = 0; i < 4; ++i) ip = ip << 8 | bytes[i];
+  return ip;
 }
 
-arduino::IPAddress address_of(std::uint32_t ip) {
-  return arduino::IPAddress(static_cast<std::uint8_t>(ip >> 24),
-                            static_cast<std::uint8_t>(ip >> 16), static_cast<std::uint8_t>(ip >> 8),
-                            static_cast<std::uint8_t>(ip));
+SocketAddress address_of(UdpAddress to) {
+  nsapi_addr_t address = {};
+  address.version = NSAPI_IPv4;
+  for (int i = 0; i < 4; ++i) address.bytes[i] = static_cast<std::uint8_t>(to.ip >> (24 - 8 * i));
+  return SocketAddress(address, to.port);
 }
 
 }  // namespace
@@ -40,13 +43,22 @@ void Network::run(Network* network) {
   }
 }
 
+// Only another network, password or port is a reason to join anew.
+void Network::take_settings() {
+  const Wanted before = wanted_;
+  if (!handed_over_.take(version_, wanted_)) return;
+  peers_.set_host(wanted_.host);
+  const bool same = std::strcmp(wanted_.network, before.network) == 0 &&
+                    std::strcmp(wanted_.password, before.password) == 0 &&
+                    wanted_.udp_port == before.udp_port;
+  if (same) return;
+  if (state() == NetworkState::up) leave();
+  tried_ = false;
+  state_.store(wanted_.network[0] == '\0' ? NetworkState::idle : NetworkState::joining);
+}
+
 bool Network::turn() {
-  if (handed_over_.take(version_, wanted_)) {
-    if (state() == NetworkState::up) leave();
-    peers_.set_host(wanted_.host);
-    tried_ = false;
-    state_.store(wanted_.network[0] == '\0' ? NetworkState::idle : NetworkState::joining);
-  }
+  take_settings();
   switch (state()) {
     case NetworkState::idle:
       return false;
@@ -72,9 +84,14 @@ void Network::join() {
       open ? WiFi.begin(wanted_.network) : WiFi.begin(wanted_.network, wanted_.password);
   tried_ = true;
   tried_ms_ = BoardClock::now_ms();
-  if (status != WL_CONNECTED || socket_.begin(wanted_.udp_port) != 1) return;
+  if (status != WL_CONNECTED || socket_.open(WiFi.getNetwork()) != NSAPI_ERROR_OK) return;
+  if (socket_.bind(wanted_.udp_port) != NSAPI_ERROR_OK) {
+    socket_.close();
+    return;
+  }
+  socket_.set_blocking(false);
   heard_ = false;
-  ip_.store(number_of(WiFi.localIP()));
+  ip_.store(ip_of(WiFi.localIP()));
   link_.set_up(true);
   state_.store(NetworkState::up);
 }
@@ -82,7 +99,7 @@ void Network::join() {
 void Network::leave() {
   link_.set_up(false);
   ip_.store(0);
-  socket_.stop();
+  socket_.close();
   WiFi.disconnect();
 }
 
@@ -92,30 +109,29 @@ bool Network::carry() {
 }
 
 bool Network::receive_next() {
-  const int size = socket_.parsePacket();
-  if (size <= 0) return false;
   char buffer[udp_max_size];
-  const int read = socket_.read(buffer, sizeof buffer);  // all at once: byte by byte it skips one
-  if (read <= 0) return true;
+  SocketAddress address;
+  const int size = socket_.recvfrom(&address, buffer, sizeof buffer);
+  if (size <= 0) return false;
   UdpAddress from;
-  from.ip = number_of(socket_.remoteIP());
-  from.port = socket_.remotePort();
+  from.ip = ip_of(address.get_addr().bytes);
+  from.port = address.get_port();
   heard_ = true;
   heard_ms_ = BoardClock::now_ms();
   const std::uint32_t peer = peers_.heard(from, heard_ms_);
-  link_.give(peer, Text(buffer, static_cast<std::size_t>(read)));
+  link_.give(peer, Text(buffer, static_cast<std::size_t>(size)));
   return true;
 }
 
+// What the stack does not take now is lost, as on any network.
 bool Network::send_next() {
   std::uint32_t peer = firmware::everyone;
   char buffer[max_datagram];
   Text datagram;
   if (!link_.take(BoardClock::now_ms(), peer, buffer, datagram)) return false;
   UdpAddress to;
-  if (peers_.find(peer, to) && socket_.beginPacket(address_of(to.ip), to.port) == 1) {
-    socket_.write(reinterpret_cast<const std::uint8_t*>(datagram.data()), datagram.size());
-    socket_.endPacket();
+  if (peers_.find(peer, to)) {
+    socket_.sendto(address_of(to), datagram.data(), static_cast<unsigned>(datagram.size()));
   }
   return true;
 }

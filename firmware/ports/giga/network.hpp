@@ -7,8 +7,8 @@
 //                                      ^   | not joined: again after retry_ms
 //                                      +---+
 //
-// Joining scans first and takes up to 7 s, a send up to 1 s, and without WiFi firmware in the flash
-// the library never returns: all of that is this thread's alone. What the library says of the
+// Joining scans first and takes up to 7 s, and without WiFi firmware in the flash the library never
+// returns: all of that is this thread's alone. What the library says of the
 // connection may be wrong for long: only heartbeats decide whether the host is there, and when hosts
 // that were there have been silent for quiet_ms the network is joined anew. The thread has the lowest
 // priority: where the library spins, it spins alone.
@@ -25,7 +25,7 @@
 // clang-format off
 #include "chip.hpp"
 #include <WiFi.h>
-#include <WiFiUdp.h>
+#include <netsocket/UDPSocket.h>
 // clang-format on
 
 namespace r4 {
@@ -61,6 +61,7 @@ class Network {
   };
 
   static void run(Network* network);
+  void take_settings();
   void join();
   void leave();
   bool carry();
@@ -81,7 +82,7 @@ class Network {
   std::uint32_t tried_ms_ = 0;
   bool heard_ = false;  // somebody, since we joined
   std::uint32_t heard_ms_ = 0;
-  arduino::WiFiUDP socket_;
+  UDPSocket socket_;  // never blocks: the core's WiFiUDP can wait a second in either direction
 
   alignas(8) unsigned char stack_[stack_size];
   rtos::Thread thread_{osPriorityBelowNormal, stack_size, stack_, "r4-network"};

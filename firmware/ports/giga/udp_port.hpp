@@ -64,6 +64,7 @@ class UdpPort final : public firmware::Port {
  public:
   using Clock = std::uint32_t (*)();  // milliseconds that wrap
   static constexpr std::uint32_t kept_for_answers = 1024;
+  static constexpr int datagrams_per_turn = 8;
 
   UdpPort(UdpLink& link, Clock now_ms) : link_(link), now_ms_(now_ms) {}
 
@@ -73,7 +74,10 @@ class UdpPort final : public firmware::Port {
     DatagramNote note;
     char buffer[max_datagram];
     Text datagram;
-    while (link_.from_network_.take(note, buffer, datagram)) on_datagram(note.peer, datagram);
+    for (int i = 0; i < datagrams_per_turn && link_.from_network_.take(note, buffer, datagram);
+         ++i) {
+      on_datagram(note.peer, datagram);
+    }
     const bool was_up = up_;
     up_ = link_.up();
     return was_up && !up_;

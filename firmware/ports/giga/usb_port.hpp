@@ -5,8 +5,7 @@
 // port open and does not read; so lines go out by send_nb(), a packet at a time, whole or not at
 // all, and the newest state wins (transmit_lines.hpp).
 //
-// A line that is one word (`report`, `help`) is for the board itself; no datagram is one. From the
-// loop only.
+// The line `report` is for the board itself. From the loop only.
 #pragma once
 
 #include <cstdint>
@@ -23,11 +22,19 @@ class UsbPort final : public firmware::Port {
   // A full packet: more is to come. The core takes no more at a time.
   static constexpr std::uint32_t packet_size = 64;
 
+  // In one receive(); the rest waits at the host, so that a flood of input takes no time from the
+  // rest of the board.
+  static constexpr int packets_per_turn = 8;
+
   // Calls `on_line(Text)` for each line that has arrived.
   template <class OnLine>
   void receive(OnLine&& on_line) {
     char chunk[packet_size];
-    while (const std::uint32_t size = read(chunk)) framing_.push(chunk, size, on_line);
+    for (int i = 0; i < packets_per_turn; ++i) {
+      const std::uint32_t size = read(chunk);
+      if (size == 0) return;
+      framing_.push(chunk, size, on_line);
+    }
   }
 
   // Lets time pass and sends what the host takes now. True: the host has just closed the port, or

@@ -3,6 +3,8 @@
 
 #include <Arduino.h>
 
+class NetworkInterface;
+
 enum wl_status_t { WL_IDLE_STATUS = 0, WL_CONNECTED = 3, WL_CONNECT_FAILED = 4 };
 
 namespace arduino {
@@ -14,6 +16,7 @@ class WiFiClass {
   int disconnect();
   std::uint8_t status();
   IPAddress localIP();
+  NetworkInterface* getNetwork();
 };
 
 }  // namespace arduino

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the firmware does when it, its hardware or its power fails, and what it keeps.
+#include "bench.hpp"
+#include "tests/giga/core/registers.hpp"
+
+namespace r4::test {
+namespace {
+
+TEST(GigaWatchdog, IsFedByTheGuardAsLongAsTheLoopTurns) {
+  GigaBench bench;
+  bench.boot();
+  const int feeds = bench.giga.watchdog_feeds;
+  bench.run_ms(1000);
+  EXPECT_GT(bench.giga.watchdog_feeds - feeds, 300);
+}
+
+TEST(GigaWatchdog, ALoopThatHangsIsSafeSoonAndResetsTheBoardWhichStaysSafe) {
+  GigaBench bench;
+  bench.boot();
+  PlainHost host;
+  bench.drive(host, bench.usb());
+  std::uint64_t safe_after_ms = 0;
+  const std::uint64_t hung_ms = bench.giga.now_ms();
+  EXPECT_TRUE(bench.giga.reset_by([&] {
+    for (int ms = 0; ms < 5000; ++ms) {  // the loop does not come back; the timers do
+      bench.giga.pass_ms(1);
+      if (safe_after_ms == 0 && bench.pins().is_safe()) {
+        safe_after_ms = bench.giga.now_ms() - hung_ms;
+      }
+    }
+  }));
+  EXPECT_GT(safe_after_ms, 0U);
+  EXPECT_LE(safe_after_ms, 125U) << "five deadlines of 20 ms";
+  EXPECT_LE(bench.giga.now_ms() - hung_ms, 450U);
+
+  bench.system.reset();
+  bench.giga.connect_registers();
+  bench.boot();
+  PlainHost again;
+  bench.run_ms(150, again, bench.usb());
+  EXPECT_EQ(bench.reason(), SafeReason::watchdog);
+  bench.usb()(again.command("O:358,1,1"));
+  bench.run_ms(20);
+  EXPECT_TRUE(bench.pins().is_safe());
+  bench.run_ms(1100, again, bench.usb());
+  bench.usb()(again.command("E:CLEAR"));
+  bench.usb()(again.command("O:358,1,1"));
+  bench.run_ms(20);
+  EXPECT_EQ(bench.pins().osmc[0].pwm, 358);
+}
+
+TEST(GigaWatchdog, BitesWhenEvenTheTimerInterruptIsDead) {
+  GigaBench bench;
+  bench.boot();
+  EXPECT_TRUE(bench.giga.reset_by([&] {
+    bench.giga.primask = 1;
+    bench.giga.pass_ms(2000);
+  }));
+  bench.restart();
+  EXPECT_EQ(bench.reason(), SafeReason::watchdog);
+}
+
+TEST(GigaFault, AProcessorFaultSwitchesEverythingOffAndIsReportedByTheNextBoot) {
+  GigaBench bench;
+  bench.boot();
+  PlainHost host;
+  bench.drive(host, bench.usb());
+  ASSERT_EQ(bench.giga.vectors.count(HardFault_IRQn), 1U);
+  r4_fake_scb.CFSR.value = 0x8200;
+  EXPECT_TRUE(bench.giga.reset_by([&] { bench.giga.vectors[HardFault_IRQn](); }));
+  EXPECT_TRUE(bench.pins().is_safe());
+  bench.restart();
+  EXPECT_EQ(bench.reason(), SafeReason::fault);
+  bench.usb()("report");
+  bench.run_ms(400);
+  EXPECT_TRUE(has_line(bench.usb_lines(), "fault, exception 3, pc 0x00, status 0x8200"));
+}
+
+TEST(GigaFault, InTheMiddleOfATransferEverythingIsSwitchedOffAllTheSame) {
+  GigaBench bench;
+  bench.boot();
+  PlainHost host;
+  bench.drive(host, bench.usb());
+  for (int after_bytes = 0; after_bytes < 6; ++after_bytes) {
+    bench.giga.i2c.hold_after(after_bytes, 4);
+    if (!bench.giga.reset_by([&] {
+          bench.usb()(host.command("O:" + std::to_string(400 + after_bytes) + ",1,1"));
+          bench.run_ms(2);
+          bench.giga.vectors[BusFault_IRQn]();
+        })) {
+      ADD_FAILURE() << "no reset";
+    }
+    EXPECT_TRUE(bench.pins().is_safe()) << after_bytes;
+    bench.restart();
+    bench.run_ms(150, host, bench.usb());
+    bench.run_ms(1100, host, bench.usb());
+    bench.usb()(host.command("E:CLEAR"));
+    bench.run_ms(20);
+  }
+}
+
+TEST(GigaFault, AnErrorOfTheCoreEndsTheBootInsteadOfBlinkingForEver) {
+  GigaBench bench;
+  bench.boot();
+  PlainHost host;
+  bench.drive(host, bench.usb());
+  EXPECT_TRUE(bench.giga.reset_by([] { r4_fake_core_error(-5, 0x08040000); }));
+  EXPECT_TRUE(bench.pins().is_safe());
+  EXPECT_TRUE(bench.giga.reset_by([] { mbed_die(); }));
+}
+
+TEST(GigaBus, AStuckBusCostsTheLoopAtMostItsBound) {
+  GigaBench bench;
+  bench.boot();
+  PlainHost host;
+  bench.drive(host, bench.usb());
+  bench.giga.i2c.hold_scl(true);
+  std::uint64_t longest_us = 0;
+  for (int i = 0; i < 500; ++i) {
+    const std::uint64_t before = bench.giga.now_ns();
+    bench.system->poll();
+    longest_us = std::max(longest_us, (bench.giga.now_ns() - before) / 1000);
+    giga::rest();
+  }
+  EXPECT_EQ(bench.reason(), SafeReason::fault);
+  EXPECT_LT(longest_us, 10000U);
+  RecordProperty("longest_turn_us", static_cast<int>(longest_us));
+  bench.giga.i2c.hold_scl(false);
+  bench.run_ms(500, host, bench.usb());
+  bench.run_ms(1100, host, bench.usb());
+  bench.usb()(host.command("E:CLEAR"));
+  bench.usb()(host.command("O:358,1,1"));
+  bench.run_ms(20);
+  EXPECT_EQ(bench.pins().osmc[0].pwm, 358) << "it comes back";
+}
+
+TEST(GigaSettings, SurviveARestart) {
+  GigaBench bench;
+  bench.boot();
+  PlainHost host;
+  bench.run_ms(150, host, bench.usb());
+  bench.usb()(host.command("C:rate,50"));
+  bench.usb()(host.command("C:timeout,1500"));
+  bench.usb()(host.command("C:node,7"));
+  bench.usb()(host.command("C:AIN24,33.00"));
+  bench.run_ms(20);
+  ASSERT_TRUE(bench.run_until([&] {
+    const std::lock_guard<std::mutex> lock(bench.giga.mutex);
+    return bench.giga.writes == 1;
+  })) << "all of them at once, when they have settled";
+  bench.giga.analog[0x24] = 0x8000;
+  bench.restart();
+  const Settings& settings = bench.application().settings();
+  EXPECT_EQ(settings.state_rate_hz, 50);
+  EXPECT_EQ(settings.timeout_ms, 1500);
+  EXPECT_EQ(settings.site.can_node, 7);
+  PlainHost again;
+  bench.run_ms(200, again, bench.usb());
+  EXPECT_TRUE(has_line(bench.usb_lines(), "AIN24:16.50;"));
+}
+
+TEST(GigaSettings, AreNotKeptWhereAUsersFilesMayBe) {
+  GigaBench bench;
+  bench.giga.partition_size = 8 * 1024 * 1024;
+  bench.boot();
+  PlainHost host;
+  bench.run_ms(150, host, bench.usb());
+  bench.usb()(host.command("C:rate,50"));
+  bench.run_ms(2500, host, bench.usb());
+  EXPECT_EQ(bench.giga.writes, 0);
+  bench.usb_lines();
+  bench.usb()("report");
+  bench.run_ms(400);
+  EXPECT_TRUE(has_line(bench.usb_lines(), "Settings: not kept"));
+}
+
+TEST(GigaSettings, TellWhichChipsAreFitted) {
+  GigaBench bench;
+  bench.giga.stored["r4-settings"] = "chips,17\n";  // OSMC and servos
+  bench.boot();
+  PlainHost host;
+  bench.drive(host, bench.usb());
+  bench.giga.i2c.log.clear();
+  bench.run_ms(200, host, bench.usb());
+  for (const auto& transfer : bench.giga.i2c.log) {
+    EXPECT_TRUE(transfer[0] >> 1 == 0x40 || transfer[0] >> 1 == 0x42) << int{transfer[0]};
+  }
+}
+
+TEST(GigaSettings, ForTheNetworkAreRefusedOverCan) {
+  GigaBench bench;
+  bench.boot();
+  PlainHost host;
+  bench.run_ms(150, host, bench.can());
+  bench.can()(host.command("C:network,evil"));
+  bench.run_ms(50);
+  EXPECT_TRUE(has_line(bench.can_datagrams, ",AUTH;"));
+  EXPECT_STREQ(bench.application().settings().site.network, "");
+}
+
+}  // namespace
+}  // namespace r4::test
