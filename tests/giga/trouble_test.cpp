@@ -49,6 +49,20 @@ TEST(GigaWatchdog, ALoopThatHangsIsSafeSoonAndResetsTheBoardWhichStaysSafe) {
   EXPECT_EQ(bench.pins().osmc[0].pwm, 358);
 }
 
+TEST(GigaWatchdog, AnEmergencyFrameIsObeyedWhileTheLoopHangs) {
+  GigaBench bench;
+  bench.boot();
+  PlainHost host;
+  bench.drive(host, bench.can());
+  CanFrame frame{};
+  frame.id = emergency_stop_id;
+  ASSERT_TRUE(bench.giga.can.deliver(frame));
+  bench.giga.pass_ms(3);  // the safe state takes 0.8 ms on the bus
+  EXPECT_TRUE(bench.pins().is_safe());
+  bench.run_ms(5);
+  EXPECT_EQ(bench.reason(), SafeReason::stop);
+}
+
 TEST(GigaWatchdog, BitesWhenEvenTheTimerInterruptIsDead) {
   GigaBench bench;
   bench.boot();

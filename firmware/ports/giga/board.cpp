@@ -52,10 +52,13 @@ bool start_can(Fdcan& fdcan, std::uint8_t node) {
                      command_id(node));
 }
 
-Fdcan* interrupted = nullptr;  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables)
+// What the interrupt needs. NOLINTBEGIN(cppcoreguidelines-avoid-non-const-global-variables)
+Fdcan* interrupting = nullptr;
+firmware::Guard* told = nullptr;
+// NOLINTEND(cppcoreguidelines-avoid-non-const-global-variables)
 
 void on_can() {
-  interrupted->on_interrupt();
+  if (interrupting->on_interrupt()) told->stop();  // also if the loop hangs
   wake_loop();
 }
 
@@ -115,7 +118,8 @@ void Board::start() {
   machine_.start();
   network_.start();
   if (!has_can) return;
-  interrupted = &fdcan_;
+  interrupting = &fdcan_;
+  told = &application_.guard();
   NVIC_SetVector(FDCAN2_IT0_IRQn, reinterpret_cast<std::uintptr_t>(&on_can));
   NVIC_EnableIRQ(FDCAN2_IT0_IRQn);
 }

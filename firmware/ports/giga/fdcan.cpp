@@ -220,7 +220,11 @@ Fdcan::Event Fdcan::poll(std::uint32_t now_us) {
   return Event::none;
 }
 
-void Fdcan::on_interrupt() { registers_.IR = ir_fifo0_new | ir_fifo1_new | ir_bus_off; }
+bool Fdcan::on_interrupt() {
+  const bool stop = (registers_.IR & ir_fifo1_new) != 0;
+  registers_.IR = ir_fifo0_new | ir_fifo1_new | ir_bus_off;
+  return stop;
+}
 
 CanState Fdcan::state() const {
   if (!started_) return CanState::off;

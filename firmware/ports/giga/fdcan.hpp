@@ -9,7 +9,7 @@
 //     to send     what is urgent       -> a buffer of its own, which overtakes the queue by its id
 //                 the rest, in order   -> FIFO of 8 frames
 //
-// An interrupt only wakes the loop: the hardware keeps the frames. Times are microseconds of a
+// An interrupt wakes the loop and tells of a stop: the hardware keeps the frames. Times are microseconds of a
 // clock that wraps. Nothing waits for the bus.
 #pragma once
 
@@ -69,8 +69,9 @@ class Fdcan {
   // Looks after the controller. bus_off: it has just left the bus; stale: nothing went out for
   // stale_us. In both cases whatever waited is gone.
   Event poll(std::uint32_t now_us);
-  // In its interrupt: takes it back.
-  void on_interrupt();
+  // In its interrupt: takes it back. True: an emergency stop has come in; it waits to be received,
+  // too.
+  bool on_interrupt();
 
   CanState state() const;
   bool on_bus() const { return started_ && !bus_off_; }
