@@ -155,6 +155,7 @@ BlockDevice* BlockDevice::get_default_instance() {
 MBRBlockDevice::MBRBlockDevice(BlockDevice* device, int part) : device_(device), part_(part) {}
 MBRBlockDevice::~MBRBlockDevice() = default;
 int MBRBlockDevice::init() {
+  while (giga().flash_hangs) rtos::ThisThread::sleep_for(std::chrono::milliseconds(1));
   return device_ != nullptr && part_ == 3 && giga().has_partition ? BD_ERROR_OK
                                                                   : BD_ERROR_DEVICE_ERROR;
 }
@@ -204,7 +205,8 @@ void ThisThread::sleep_for(Kernel::Clock::duration_u32 time) {
     return;
   }
   giga().pass_ms(time.count());
-  std::this_thread::sleep_for(std::chrono::microseconds(200));  // the other threads' turn
+  // The other threads' turn, also on a busy machine.
+  std::this_thread::sleep_for(std::chrono::microseconds(giga().flash_hangs ? 20 : 1000));
 }
 
 std::uint32_t EventFlags::set(std::uint32_t flags) {

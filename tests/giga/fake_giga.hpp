@@ -9,6 +9,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -156,6 +157,7 @@ class Giga {
 
   // --- flash
   bool has_partition = true;
+  std::atomic<bool> flash_hangs{false};
   std::uint64_t partition_size = 1024 * 1024;
   std::map<std::string, std::string> stored;
   int writes = 0;

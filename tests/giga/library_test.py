@@ -49,6 +49,13 @@ def assemble(tree, folder):
     return library
 
 
+def refuses_what_it_cannot_do(tree):
+    """A wrong option, a place that cannot be written to: told with the fix, and the exit status."""
+    for arguments, status in ((['--nonsense'], 2), (['a.zip', '--folder', 'b'], 2), (['/proc/a/b.zip'], 4)):
+        done = subprocess.run([tree / 'tools/arduino', *arguments], capture_output=True, text=True, check=False)
+        assert done.returncode == status and '\n  fix: ' in done.stderr, (arguments, done)
+
+
 def compile_all(tree, library, out):
     """Every source, and the sketch as the IDE makes C++ of it: Arduino.h in front."""
     sketch = out / 'sketch.cpp'
@@ -78,6 +85,7 @@ def main():
     tree = pathlib.Path(sys.argv[1]).resolve()
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
+        refuses_what_it_cannot_do(tree)
         library = assemble(tree, folder)
         out = folder / 'out'
         out.mkdir()

@@ -188,6 +188,29 @@ TEST(GigaSettings, AreNotKeptWhereAUsersFilesMayBe) {
   EXPECT_TRUE(has_line(bench.usb_lines(), "Settings: not kept"));
 }
 
+TEST(GigaSettings, ThatCouldNotBeReadInTimeAreNotOverwritten) {
+  GigaBench bench;
+  bench.giga.stored["r4-settings"] = "network,mine\nrate,20\n";
+  bench.giga.flash_hangs = true;
+  const std::uint64_t before_ms = bench.giga.now_ms();
+  bench.boot();
+  EXPECT_LE(bench.giga.now_ms() - before_ms, 2100U);
+  EXPECT_EQ(bench.application().settings().state_rate_hz, 100);
+  bench.giga.flash_hangs = false;
+  PlainHost host;
+  bench.run_ms(150, host, bench.usb());
+  bench.usb()(host.command("C:rate,50"));
+  for (int i = 0; i < 30; ++i) {
+    bench.run_ms(100, host, bench.usb());
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));  // the store's turn
+  }
+  EXPECT_EQ(bench.giga.writes, 0);
+  bench.usb_lines();
+  bench.usb()("report");
+  bench.run_ms(400);
+  EXPECT_TRUE(has_line(bench.usb_lines(), "Settings: not kept: the key-value store was not ready"));
+}
+
 TEST(GigaSettings, TellWhichChipsAreFitted) {
   GigaBench bench;
   bench.giga.stored["r4-settings"] = "chips,17\n";  // OSMC and servos
