@@ -109,8 +109,8 @@ TEST(UdpPeers, NumberEveryHostOnceAndForgetTheOneSilentLongest) {
   giga::UdpPeers peers;
   std::uint32_t numbers[giga::UdpPeers::capacity];
   for (std::uint16_t i = 0; i < giga::UdpPeers::capacity; ++i) numbers[i] = peers.heard({1, i}, i);
-  EXPECT_EQ(peers.heard({1, 0}, 100), numbers[0]) << "known";
-  const std::uint32_t fresh = peers.heard({2, 9}, 101);
+  EXPECT_EQ(peers.heard({1, 0}, 3000), numbers[0]) << "known";
+  const std::uint32_t fresh = peers.heard({2, 9}, 3001);
   for (const std::uint32_t number : numbers) EXPECT_NE(fresh, number);
   giga::UdpAddress to;
   EXPECT_FALSE(peers.find(numbers[1], to)) << "it was silent longest";
@@ -118,6 +118,17 @@ TEST(UdpPeers, NumberEveryHostOnceAndForgetTheOneSilentLongest) {
   EXPECT_EQ(to.port, 0);
   EXPECT_TRUE(peers.find(firmware::everyone, to));
   EXPECT_EQ(to.ip, 2U) << "the host heard last";
+}
+
+TEST(UdpPeers, AreNotPushedOutByAFloodFromChangingAddresses) {
+  giga::UdpPeers peers;
+  const std::uint32_t owner = peers.heard({1, 1}, 0);
+  for (std::uint32_t i = 0; i < 10; ++i) peers.heard({1, 1}, i);
+  for (std::uint32_t i = 0; i < 5000; ++i) {
+    peers.heard({100 + i, 2}, 10 + i / 10);
+    if (i % 1000 != 0) continue;
+    EXPECT_EQ(peers.heard({1, 1}, 10 + i / 10), owner);
+  }
 }
 
 TEST(UdpPeers, SendToThePapersClientWhereItListens) {
