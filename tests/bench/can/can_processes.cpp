@@ -88,7 +88,7 @@ void CanBoardProcess::serve(Form form) const {
   sim::SimulatedBoard* running = nullptr;
 
   sim::SimulatedBoard::Options options;
-  options.settings.timeout_ms = 10000;  // of a clock that runs too fast at times
+  options.settings.timeout_ms = 10000;    // of a clock that runs too fast at times
   options.settings.state_rate_hz = 1000;  // the less time has to be made up for in a trip
   options.settings.pack = form == Form::packed;
   options.clock_ms = [&] { return clock_ms; };

@@ -166,7 +166,8 @@ TEST(BoardHardware, AChipThatWasResetIsNoticedWithinATurnOfVerification) {
     chips[static_cast<int>(at.chip)]->power_on();
     bench.run(chip_count * 20 + 2);
     EXPECT_EQ(bench.hardware.fault().address, address_of(at.chip));
-    EXPECT_EQ(bench.hardware.fault().trouble, ChipTrouble::was_reset) << chip_name(address_of(at.chip));
+    EXPECT_EQ(bench.hardware.fault().trouble, ChipTrouble::was_reset)
+        << chip_name(address_of(at.chip));
     EXPECT_TRUE(bench.board.pins().is_safe());
     bench.run(200);
     EXPECT_TRUE(bench.hardware.clear_fault());
