@@ -73,6 +73,8 @@ void BoardHardware::make_safe() {
 void BoardHardware::drive_safe() {
   waiting_ = false;
   for (Stepper& stepper : steppers_) stepper.stop();
+  // Also those that a held bus keeps from being told now: what they were to do next is void.
+  for (ChipDriver* chip : chips_) chip->want_safe();
   // A held bus fails at its first transfer. If it cannot be freed, there is nothing more to do.
   if (!drive_chips_safe() && bus_.recover()) drive_chips_safe();
 }

@@ -8,6 +8,7 @@ void ChipDriver::begin() {
   started_ = true;
   ready_ = false;
   trouble_ = ChipTrouble::none;
+  want_safe();
   on_begin();
 }
 

@@ -65,7 +65,9 @@ class ChipDriver {
   void write_changes(BusBudget& budget);
   // Compares the chip's registers with what was written, if ready.
   void verify(BusBudget& budget);
-  // All outputs off, at once and in whatever state the chip or the driver is. Does not touch
+  // All outputs are to be off from the next write on. Nothing is sent.
+  virtual void want_safe() = 0;
+  // The same, and sent at once, in whatever state the chip or the driver is. Does not touch
   // trouble(): the caller decides with note().
   virtual I2cResult make_safe() = 0;
   // Takes the result of a transfer that somebody made for this driver.

@@ -19,7 +19,7 @@ void Mcp23017::set_ports(std::uint8_t a, std::uint8_t b) {
 }
 
 I2cResult Mcp23017::make_safe() {
-  set_ports(safe_[0], safe_[1]);
+  want_safe();
   const std::uint8_t latches[] = {olat_a, safe_[0], safe_[1]};
   const I2cResult result = bus_.write(address(), latches, sizeof latches);
   if (result != I2cResult::ok) return result;
@@ -29,10 +29,7 @@ I2cResult Mcp23017::make_safe() {
   return bus_.write(address(), directions, sizeof directions);
 }
 
-void Mcp23017::on_begin() {
-  set_ports(safe_[0], safe_[1]);
-  step_ = Step::bank;
-}
+void Mcp23017::on_begin() { step_ = Step::bank; }
 
 bool Mcp23017::set_up(std::uint32_t now_us, BusBudget& budget) {
   static_cast<void>(now_us);

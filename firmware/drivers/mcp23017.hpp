@@ -31,6 +31,7 @@ class Mcp23017 final : public ChipDriver {
   // The levels of ports A and B from the next write on; bit n is pin n.
   void set_ports(std::uint8_t a, std::uint8_t b);
 
+  void want_safe() override { set_ports(safe_[0], safe_[1]); }
   // Latches, then directions: right also for a chip that was reset.
   I2cResult make_safe() override;
 

@@ -31,8 +31,12 @@ void Mcp4728::set_code(int channel, std::uint16_t code) {
   if (code > code_max) wanted_[channel] = code_max;
 }
 
-I2cResult Mcp4728::make_safe() {
+void Mcp4728::want_safe() {
   for (std::uint16_t& code : wanted_) code = 0;
+}
+
+I2cResult Mcp4728::make_safe() {
+  want_safe();
   const I2cResult result = bus_.write(address(), zeros, sizeof zeros);
   if (result == I2cResult::ok) {
     for (std::uint16_t& code : written_) code = 0;
@@ -40,10 +44,7 @@ I2cResult Mcp4728::make_safe() {
   return result;
 }
 
-void Mcp4728::on_begin() {
-  for (std::uint16_t& code : wanted_) code = 0;
-  step_ = Step::zero;
-}
+void Mcp4728::on_begin() { step_ = Step::zero; }
 
 bool Mcp4728::read_all(std::uint8_t (&bytes)[read_size], BusBudget& budget) {
   return usable() && budget.take(read_size + 1) &&

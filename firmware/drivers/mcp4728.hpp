@@ -40,6 +40,7 @@ class Mcp4728 final : public ChipDriver {
   // How often the EEPROM was written since power-up: 0 or 1.
   int eeprom_writes() const { return eeprom_writes_; }
 
+  void want_safe() override;
   I2cResult make_safe() override;
 
  private:

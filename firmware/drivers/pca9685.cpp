@@ -46,7 +46,7 @@ void Pca9685::set_pulse_us(int channel, std::uint16_t us) {
   set_duty(channel, static_cast<std::uint16_t>(counts));
 }
 
-void Pca9685::set_all_off() {
+void Pca9685::want_safe() {
   for (std::uint16_t& duty : duty_) duty = 0;
   changed_ = all_channels;
 }
@@ -57,7 +57,7 @@ I2cResult Pca9685::all_off(I2cBus& bus) {
 }
 
 I2cResult Pca9685::make_safe() {
-  set_all_off();
+  want_safe();
   const std::uint8_t bytes[] = {all_led_off_h, full};
   const I2cResult result = bus_.write(address(), bytes, sizeof bytes);
   if (result == I2cResult::ok) {
@@ -66,10 +66,7 @@ I2cResult Pca9685::make_safe() {
   return result;
 }
 
-void Pca9685::on_begin() {
-  set_all_off();
-  step_ = Step::off;
-}
+void Pca9685::on_begin() { step_ = Step::off; }
 
 bool Pca9685::set_up(std::uint32_t now_us, BusBudget& budget) {
   switch (step_) {

@@ -52,8 +52,8 @@ class Pca9685 final : public ChipDriver {
   void set_level(int channel, bool high) { set_duty(channel, high ? duty_on : 0); }
   // Pulses of `us` microseconds, to the nearest count (4.88 us at 50 Hz); 0: none.
   void set_pulse_us(int channel, std::uint16_t us);
-  void set_all_off();
 
+  void want_safe() override;
   I2cResult make_safe() override;
   // Every output of every PCA9685 on the bus off, by the all-call address: 70 <- FD 10. Its
   // acknowledge says that at least one of them heard it.

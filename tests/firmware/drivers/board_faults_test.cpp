@@ -209,6 +209,30 @@ TEST(BoardHardware, AHeldBusIsFreedAndEverythingIsSafeAtOnce) {
   }
 }
 
+TEST(BoardHardware, NothingThatWasStillToBeWrittenComesAfterASafeStateThatTheBusCutShort) {
+  // Most of what was applied still waits for its turn when the bus is held in the middle of
+  // make_safe(), and cannot be freed; a moment later it is free by itself.
+  for (int polls = 0; polls < 3; ++polls) {
+    for (std::size_t after = 1; after <= 33; ++after) {
+      Bench bench;
+      bench.boot();
+      bench.apply(full(), polls);
+      bench.board.bus.hold_after(after, 1000);
+      bench.hardware.make_safe();
+      const bool told = after > 3;  // the PWM chips, by the first transfer
+      bench.board.bus.clear_errors();
+      for (int ms = 0; ms < 200; ++ms) {
+        bench.run(1);
+        if (!told && ms < 100) continue;
+        const Outputs pins = test::outputs_of(bench.board);
+        EXPECT_EQ(pins.osmc[0].pwm, 0) << after;
+        for (const std::uint16_t us : pins.servo_us) EXPECT_EQ(us, 0) << after;
+      }
+      EXPECT_TRUE(bench.board.pins().is_safe()) << after;
+    }
+  }
+}
+
 TEST(BoardHardware, ABusThatStaysHeldCostsTheLoopLittle) {
   Bench bench;
   bench.boot();
