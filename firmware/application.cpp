@@ -121,8 +121,7 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
       break;
     case HeartbeatEffect::stale:
       if (link_.wants_answer(heartbeat, now_ms)) {
-        send_heartbeat(from.port, from.peer, false, now_ms);
-        link_.heartbeat_answered(now_ms);
+        answer_heartbeat(from, false, now_ms);
       }
       break;
     case HeartbeatEffect::busy:
@@ -230,8 +229,7 @@ void Application::emergency_stop(Source from, const Datagram& datagram, std::uin
   // Everyone hears of it once; who asks hears it each time, as often as it takes.
   if (!repeated) send_heartbeats(now_ms);
   if (!owner || repeated) {
-    send_heartbeat(from.port, from.peer, link_.has_owner() && !owner, now_ms);
-    link_.heartbeat_answered(now_ms);
+    answer_heartbeat(from, link_.has_owner() && !owner, now_ms);
   }
 }
 
@@ -294,6 +292,13 @@ void Application::clear() {
   if (safety_.reason() != SafeReason::fault || hal_.clear_fault()) safety_.clear();
 }
 
+bool Application::any_threshold() const {
+  for (const std::uint16_t cm : setpoints_.proximity_cm) {
+    if (cm != 0) return true;
+  }
+  return false;
+}
+
 // A sensor with a threshold must see: one that does not answer is taken for an obstacle.
 bool Application::obstacle() const {
   const int margin = safety_.has(SafeReason::proximity) ? proximity_hysteresis_cm : 0;
@@ -316,8 +321,9 @@ void Application::check_interlocks(std::uint32_t now_ms) {
     safety_.leave(SafeReason::handle);
   }
   if (obstacle()) {
+    obstacle_ms_ = now_ms;
     enter(SafeReason::proximity, now_ms);
-  } else {
+  } else if (!any_threshold() || now_ms - obstacle_ms_ >= proximity_clear_ms) {
     safety_.leave(SafeReason::proximity);
   }
 }
@@ -343,7 +349,7 @@ void Application::update_outputs(std::uint32_t now_ms) {
     outputs_live_ = live;
     expect_host();
   }
-  if (live) {
+  if (live && !guard_.tripped()) {
     hal_.apply(outputs_);
     if (guard_.tripped()) hal_.make_safe();  // it may have come just before
   } else {

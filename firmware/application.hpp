@@ -71,6 +71,8 @@ class Application {
   static constexpr std::uint32_t loop_limit_ms = 20;
   // A proximity cause leaves when the obstacle is this much beyond the threshold.
   static constexpr int proximity_hysteresis_cm = 5;
+  // … for this long: two turns of each sensor (drivers/ultrasonic.hpp), for one may miss an echo.
+  static constexpr std::uint32_t proximity_clear_ms = 500;
 
  private:
   struct PortSlot {
@@ -88,6 +90,7 @@ class Application {
   void enter(SafeReason cause, std::uint32_t now_ms);
   void check_interlocks(std::uint32_t now_ms);
   void clear();
+  bool any_threshold() const;
   bool obstacle() const;
   bool may_clear(std::uint32_t now_ms) const;
   void expect_host();
@@ -96,7 +99,9 @@ class Application {
   void report_state(std::uint32_t now_ms);
 
   // application_sending.cpp
+  static std::uint32_t heartbeat_time(std::uint32_t now_ms);
   void send_heartbeats(std::uint32_t now_ms);
+  void answer_heartbeat(Source to, bool aside, std::uint32_t now_ms);
   void send_heartbeat(std::uint8_t port, std::uint32_t peer, bool aside, std::uint32_t now_ms);
   void send_states(std::uint32_t now_ms);
   void send_state(std::uint8_t port, const State& state, std::uint32_t t_ms);
@@ -123,8 +128,9 @@ class Application {
   std::uint8_t port_count_ = 0;
   BoardState reported_state_ = BoardState::connecting;
   SafeReason reported_reason_ = SafeReason::none;
-  std::uint32_t latched_ms_ = 0;  // when stop, fault or watchdog came last
-  bool outputs_live_ = false;     // outputs_ follow the setpoints
+  std::uint32_t obstacle_ms_ = 0;  // when there was one last
+  std::uint32_t latched_ms_ = 0;   // when stop, fault or watchdog came last
+  bool outputs_live_ = false;      // outputs_ follow the setpoints
   std::uint32_t rx_ok_ = 0;
   std::uint32_t rx_bad_ = 0;
   std::uint32_t rx_refused_ = 0;

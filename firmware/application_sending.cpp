@@ -52,9 +52,20 @@ void Application::refuse(Source to, const Datagram& datagram, Refusal code, std:
   answer(to, writer, now_ms);
 }
 
+// What a heartbeat says the time is. An echo of 0 would say that its host has heard nothing: when the
+// clock wraps, that millisecond is left out.
+std::uint32_t Application::heartbeat_time(std::uint32_t now_ms) {
+  return now_ms != 0 ? now_ms : 0xFFFFFFFFU;
+}
+
 void Application::send_heartbeats(std::uint32_t now_ms) {
   for (std::uint8_t i = 0; i < port_count_; ++i) send_heartbeat(i, audience(i), false, now_ms);
-  link_.heartbeat_sent(now_ms);
+  link_.heartbeat_sent(heartbeat_time(now_ms));
+}
+
+void Application::answer_heartbeat(Source to, bool aside, std::uint32_t now_ms) {
+  send_heartbeat(to.port, to.peer, aside, now_ms);
+  link_.heartbeat_answered(heartbeat_time(now_ms));
 }
 
 void Application::send_heartbeat(std::uint8_t port, std::uint32_t peer, bool aside,
@@ -67,7 +78,8 @@ void Application::send_heartbeat(std::uint8_t port, std::uint32_t peer, bool asi
     slot.next_pnum = 1;
   } else {
     std::uint32_t& pnum = aside ? slot.aside_pnum : slot.next_pnum;
-    heartbeat = write_board_heartbeat(buffer, sizeof buffer, pnum++, now_ms, safety_.reason());
+    heartbeat = write_board_heartbeat(buffer, sizeof buffer, pnum++, heartbeat_time(now_ms),
+                                      safety_.reason());
   }
   slot.port->send(heartbeat, Urgency::normal, peer);
 }

@@ -75,27 +75,36 @@ void BoardHardware::drive_safe() {
   for (Stepper& stepper : steppers_) stepper.stop();
   // Also those that a held bus keeps from being told now: what they were to do next is void.
   for (ChipDriver* chip : chips_) chip->want_safe();
-  // A held bus fails at its first transfer. If it cannot be freed, there is nothing more to do.
-  if (!drive_chips_safe() && bus_.recover()) drive_chips_safe();
+  // A held bus fails at a transfer. If it can be freed, who held it comes last.
+  const int held_at = drive_chips_safe(nowhere);
+  if (held_at != nowhere && bus_.recover()) drive_chips_safe(held_at);
 }
 
-// Every chip into its safe state; false as soon as the bus is held.
-bool BoardHardware::drive_chips_safe() {
-  if ((config_.chips_fitted & pca9685_chips) != 0 && Pca9685::all_off(bus_) == I2cResult::timeout) {
+// Every chip into its safe state, as far as the bus lets it: the chip at which it was held, all_chips
+// if that was the all-call, or nowhere. `held_before`: the same of the try before.
+int BoardHardware::drive_chips_safe(int held_before) {
+  if ((config_.chips_fitted & pca9685_chips) != 0 && held_before != all_chips &&
+      Pca9685::all_off(bus_) == I2cResult::timeout) {
     for (int i = 0; i < chip_count; ++i) {
       if (fitted(i)) chips_[i]->note(I2cResult::timeout);
     }
-    return false;
+    return all_chips;
   }
   // Its acknowledge may be that of one of three: each is told by its own address, too.
   for (const Chip chip : safe_order) {
     const int i = static_cast<int>(chip);
-    if (!fitted(i)) continue;
-    const I2cResult result = chips_[i]->make_safe();
-    chips_[i]->note(result);
-    if (result == I2cResult::timeout) return false;
+    if (i != held_before && !drive_chip_safe(i)) return i;
   }
-  return true;
+  const bool one_left = held_before != nowhere && held_before != all_chips;
+  return one_left && !drive_chip_safe(held_before) ? held_before : nowhere;
+}
+
+// False: the bus is held.
+bool BoardHardware::drive_chip_safe(int chip) {
+  if (!fitted(chip)) return true;
+  const I2cResult result = chips_[chip]->make_safe();
+  chips_[chip]->note(result);
+  return result != I2cResult::timeout;
 }
 
 void BoardHardware::apply(const Outputs& outputs) {
@@ -109,7 +118,7 @@ void BoardHardware::apply(const Outputs& outputs) {
   }
   set_outputs(outputs);
   BusBudget budget(bus_bytes_per_poll);
-  for_each_chip(budget, false);
+  if (!interrupted_) for_each_chip(budget, false);
   leave();
 }
 
@@ -287,8 +296,11 @@ bool BoardHardware::ready() const {
 
 bool BoardHardware::clear_fault() {
   if (!ready()) return false;
+  const ChipFault before = fault_;
   fault_ = ChipFault();
-  return true;
+  if (ready()) return true;
+  fault_ = before;  // an interrupt's make_safe() has just found new trouble
+  return false;
 }
 
 }  // namespace firmware

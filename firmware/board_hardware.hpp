@@ -100,9 +100,14 @@ class BoardHardware final : public Hal {
   UltrasonicSensors& ultrasonic() { return ultrasonic_; }
 
  private:
+  // Where the bus was held, besides the number of a chip.
+  static constexpr int nowhere = -1;
+  static constexpr int all_chips = chip_count;
+
   bool fitted(int chip) const { return (config_.chips_fitted >> chip & 1) != 0; }
   void drive_safe();
-  bool drive_chips_safe();
+  int drive_chips_safe(int held_before);
+  bool drive_chip_safe(int chip);
   void set_outputs(const Outputs& outputs);
   void for_each_chip(BusBudget& budget, bool set_up);
   void set_up_again();

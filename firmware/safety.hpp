@@ -4,7 +4,8 @@
 //     cause      enters                                   leaves                      setpoints
 //     link       owner silent, or its transport gone      the owner is back           kept
 //     handle     dead-man's handle released               it is held again            cleared
-//     proximity  something nearer than a threshold        it is 5 cm beyond, or off   cleared
+//     proximity  something nearer than a threshold,       it is 5 cm beyond for       cleared
+//                or a sensor with one is blind            500 ms, or off
 //     stop       E:STOP                                   E:CLEAR                     cleared
 //     fault      a chip or the firmware failed            E:CLEAR                     cleared
 //     watchdog   a duty missed its deadline               E:CLEAR                     cleared

@@ -462,5 +462,19 @@ TEST(ApplicationLink, ServesThePapersPythonClient) {
   EXPECT_GT(board.log.executed.size(), 6900U);
 }
 
+TEST(ApplicationLink, TheClockWrapsInTheMiddleOfASession) {
+  // Heartbeats fall on every half second, and so on the wrap itself.
+  TestBoard board({}, 1, 0U - 2000U);
+  TestHost host{board, echo_pnum, Source{0, 4}};
+  host.connect();
+  host.command("O:358,1,1");
+  board.take();
+  board.log.states.clear();
+  host.stay(5000);
+  EXPECT_EQ(board.log.states, std::vector<std::string>{});
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+  for (const Heard& heard : board.take(MessageKind::board_heartbeat)) EXPECT_NE(heard.t_ms, 0U);
+}
+
 }  // namespace
 }  // namespace r4

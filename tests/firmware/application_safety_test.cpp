@@ -356,7 +356,7 @@ TEST_F(ApplicationSafety, AHandleReleasedAtTheMomentOfRecoveryLeavesNothing) {
 
 // --- proximity
 
-TEST_F(ApplicationSafety, AnObstacleIsSafeUntilItIsFiveCentimetresBeyond) {
+TEST_F(ApplicationSafety, AnObstacleIsSafeUntilItHasBeenFiveCentimetresBeyondForAWhile) {
   host.command("U:30,1");
   distance(30);
   EXPECT_FALSE(board.safe());
@@ -364,8 +364,13 @@ TEST_F(ApplicationSafety, AnObstacleIsSafeUntilItIsFiveCentimetresBeyond) {
   EXPECT_TRUE(board.safe());
   EXPECT_EQ(board.log.states, Lines{"SAFE proximity"});
   distance(34);
+  host.stay(600);
   EXPECT_EQ(board.reason(), SafeReason::proximity);
   distance(35);
+  EXPECT_EQ(board.reason(), SafeReason::proximity);
+  host.stay(480);
+  EXPECT_EQ(board.reason(), SafeReason::proximity);
+  host.stay(20);
   EXPECT_EQ(board.reason(), SafeReason::none);
   distance(34);
   EXPECT_EQ(board.reason(), SafeReason::none);  // the threshold counts again
@@ -376,6 +381,21 @@ TEST_F(ApplicationSafety, NoEchoIsNoObstacle) {
   host.command("U:30,1");
   distance(0);
   EXPECT_FALSE(board.safe());
+}
+
+TEST_F(ApplicationSafety, AMissedEchoDoesNotTakeAnObstacleAway) {
+  host.command("U:30,1");
+  distance(20);
+  for (int turn = 0; turn < 10; ++turn) {
+    distance(0);
+    host.stay(240);
+    EXPECT_EQ(board.reason(), SafeReason::proximity);
+    distance(20);
+    host.stay(240);
+  }
+  distance(0);
+  host.stay(500);
+  EXPECT_EQ(board.reason(), SafeReason::none);
 }
 
 TEST_F(ApplicationSafety, EachSensorHasItsThreshold) {
@@ -413,6 +433,7 @@ TEST_F(ApplicationSafety, OutputsAreSafeWhileAnyCauseIsThere) {
   host.command("O:1,1,1");
   EXPECT_TRUE(board.safe());
   distance(40);
+  host.stay(500);
   EXPECT_EQ(board.reason(), SafeReason::none);
   host.command("O:1,1,1");
   EXPECT_FALSE(board.safe());
@@ -488,7 +509,7 @@ TEST_F(ApplicationSafety, ASensorThatDoesNotAnswerIsAnObstacleIfItHasAThreshold)
   EXPECT_EQ(board.reason(), SafeReason::proximity);
   EXPECT_TRUE(board.safe());
   board.hal.inputs.ultrasonic_blind = 0;
-  board.run(10);
+  host.stay(520);
   EXPECT_EQ(board.reason(), SafeReason::none);
 }
 

@@ -144,7 +144,8 @@ void BoardModel::turn(int channel, std::int32_t counts, Interrupts& interrupts) 
   while (counts != 0) {
     const std::int32_t step = counts > 0 ? 1 : -1;
     counts -= step;
-    count += step;
+    count = static_cast<std::int32_t>(static_cast<std::uint32_t>(count) +
+                                      static_cast<std::uint32_t>(step));
     tell_levels(channel, interrupts);
   }
 }

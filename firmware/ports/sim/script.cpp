@@ -209,12 +209,17 @@ Script Script::parse(std::string_view text, const std::string& name) {
 }
 
 Script Script::load(const std::string& path) {
+  constexpr std::size_t max_size = 1'000'000;
   std::ifstream file(path, std::ios::binary);
   const bool opened = file.is_open();
   std::string text;
   char chunk[4096];
   while (file.read(chunk, sizeof chunk) || file.gcount() != 0) {
     text.append(chunk, static_cast<std::size_t>(file.gcount()));
+    if (text.size() > max_size) {
+      throw Error(ErrorKind::data, path, "the scenario is longer than 1 MB",
+                  "give a file of lines such as: 0.5 handle released");
+    }
   }
   if (!opened || file.bad()) {
     throw Error(ErrorKind::usage, path,

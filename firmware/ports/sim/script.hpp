@@ -54,7 +54,7 @@ class Script {
 
   // `name` stands for the file in errors. Throws Error{data} as "FILE:LINE: reason; fix".
   static Script parse(std::string_view text, const std::string& name);
-  // Throws Error{usage} if the file cannot be read.
+  // Throws Error{usage} if the file cannot be read, Error{data} if it is longer than 1 MB.
   static Script load(const std::string& path);
 
   const std::vector<ScriptStep>& steps() const { return steps_; }  // in the order of time

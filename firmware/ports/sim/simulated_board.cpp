@@ -135,7 +135,7 @@ void SimulatedBoard::advance(Milliseconds elapsed) {
 
 void SimulatedBoard::pass_millisecond() {
   ++passed_;
-  hardware_->pass_millisecond();
+  hardware_->pass_millisecond(!hangs());
   if (!hangs()) application_->guard().check_in(firmware::Application::loop_duty);
   if (application_->guard().tick(board_ms(passed_))) {
     watchdog_fed_ = passed_;

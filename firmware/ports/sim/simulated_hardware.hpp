@@ -18,8 +18,9 @@ class SimulatedHardware final : private BoardModel::Interrupts {
   // The microcontroller starts: outputs off, then the chips are set up, which takes boot_ms of the
   // board's time at most.
   void power_up();
-  // A millisecond passes on the board: what interrupts and timers do in it, and the drivers' turn.
-  void pass_millisecond();
+  // A millisecond passes on the board: what interrupts and timers do in it, and the drivers' turn if
+  // the loop turns.
+  void pass_millisecond(bool loop_turns = true);
 
   firmware::BoardHardware& hal() { return hardware_; }
 

@@ -249,5 +249,63 @@ TEST(BoardHardware, ABusThatStaysHeldCostsTheLoopLittle) {
   EXPECT_LE(bench.board.bus.now_us() - began, i2c_timeout_us + 100U);
 }
 
+// Some chip lets go when the bus is recovered, and holds it again whenever it is addressed.
+class HeldByOne final : public I2cBus {
+ public:
+  HeldByOne(I2cBus& below, std::uint8_t holder) : bus_(below), holder_(holder) {}
+  bool holds = false;
+  I2cResult write(std::uint8_t address, const std::uint8_t* bytes, std::size_t size) override {
+    return addressed(address) ? I2cResult::timeout : bus_.write(address, bytes, size);
+  }
+  I2cResult write_read(std::uint8_t address, const std::uint8_t* out, std::size_t out_size,
+                       std::uint8_t* in, std::size_t in_size) override {
+    return addressed(address) ? I2cResult::timeout
+                              : bus_.write_read(address, out, out_size, in, in_size);
+  }
+  bool recover() override {
+    held_ = false;
+    return bus_.recover();
+  }
+
+ private:
+  bool addressed(std::uint8_t address) {
+    if (holds && address == holder_) held_ = true;
+    return held_;
+  }
+  I2cBus& bus_;
+  std::uint8_t holder_;
+  bool held_ = false;
+};
+
+TEST(BoardFaults, AChipThatHoldsTheBusWheneverItIsAddressedKeepsNoOtherFromTheSafeState) {
+  for (const Chip chip : {Chip::dac, Chip::expander, Chip::osmc_pwm, Chip::servo_pwm}) {
+    test::BoardParts board;
+    HeldByOne line(board.bus, address_of(chip));
+    BoardHardware hardware(line, board.microcontroller_pins(), {});
+    const auto run = [&](int ms) {
+      for (int i = 0; i < ms; ++i) {
+        hardware.poll(static_cast<std::uint32_t>(board.bus.now_us()));
+        board.bus.advance(1000);
+      }
+    };
+    hardware.power_up(0);
+    run(20);
+    hardware.apply(test::full());
+    run(10);
+    line.holds = true;
+    hardware.make_safe();  // as the guard does while the loop hangs
+    const sim::ChipPins pins = board.pins();
+    const sim::ChipPins safe = sim::ChipPins::safe();
+    for (int i = 0; i < 4; ++i) {
+      EXPECT_EQ(pins.osmc[i], safe.osmc[i]) << chip_name(address_of(chip));
+      EXPECT_EQ(pins.dhb12[i], safe.dhb12[i]) << chip_name(address_of(chip));
+      EXPECT_EQ(pins.bldc[i].brake, chip != Chip::expander) << chip_name(address_of(chip));
+      EXPECT_EQ(pins.bldc[i].speed == 0, chip != Chip::dac) << chip_name(address_of(chip));
+    }
+    EXPECT_EQ(pins.relays == 0, chip != Chip::expander) << chip_name(address_of(chip));
+    EXPECT_EQ(pins.servo_us[0], 0) << chip_name(address_of(chip));
+  }
+}
+
 }  // namespace
 }  // namespace r4::firmware

@@ -482,7 +482,7 @@ TEST_F(TroubledBoardTest, AThresholdNeedsASensorThatAnswers) {
   events_.clear();
   run_alive(500);
   EXPECT_EQ(events_, (Lines{"outputs 0", "SAFE proximity"}));
-  run_alive(600);
+  run_alive(1100);
   EXPECT_EQ(events_.back(), "ACTIVE none");
   EXPECT_EQ(board_->model().pins().osmc[0].pwm, 0);
 }
