@@ -78,6 +78,49 @@ TEST(GigaUsb, AHostThatStopsReadingNeverHoldsTheLoop) {
   EXPECT_LT(giga::BoardClock::now_ms() - static_cast<std::uint32_t>(datagram.time_ms()), 100U);
 }
 
+TEST(GigaUsb, AnUploadAt1200BaudFindsEverythingOffBeforeTheCoreResets) {
+  GigaBench bench;
+  bench.giga.usb_open = false;
+  bench.boot();
+  PlainHost host;
+  bench.drive(host, bench.can());
+  bench.giga.usb_open = true;
+  bench.giga.usb_baud = 1200;
+  const std::uint64_t asked_ns = bench.giga.now_ns();
+  bench.system->poll();
+  EXPECT_TRUE(bench.pins().is_safe()) << "in the first turn";
+  EXPECT_LE(bench.giga.now_ns() - asked_ns, 2000000U);
+  EXPECT_EQ(bench.reason(), SafeReason::fault);
+
+  // It stays, whatever the host says and whatever becomes of the port, until the reset comes.
+  for (int i = 0; i < 300; ++i) {
+    if (i == 100) bench.giga.usb_baud = 115200;
+    if (i == 200) bench.giga.usb_open = false;
+    if (i % 20 == 0) bench.can()(host.heartbeat(bench.giga.now_ms()));
+    if (i % 20 == 5) bench.can()(host.command("E:CLEAR"));
+    if (i % 20 == 10) bench.can()(host.command("O:358,1,1"));
+    bench.turn();
+    ASSERT_TRUE(bench.pins().is_safe()) << i;
+    ASSERT_EQ(bench.reason(), SafeReason::fault) << i;
+  }
+  bench.giga.usb_baud = 115200;
+  bench.restart();
+  bench.drive(host, bench.can());
+}
+
+TEST(GigaUsb, ACommandRightBehindAClearDoesNotDriveDuringAnUpload) {
+  GigaBench bench;
+  bench.boot();
+  PlainHost host;
+  bench.drive(host, bench.usb());
+  bench.giga.usb_baud = 1200;
+  bench.usb()(host.command("E:CLEAR") + "\r\n" + host.command("O:358,1,1"));
+  bench.system->poll();  // both in one turn
+  EXPECT_TRUE(bench.pins().is_safe());
+  EXPECT_EQ(bench.application().outputs().osmc[0].pwm, 0);
+  EXPECT_EQ(bench.reason(), SafeReason::fault);
+}
+
 TEST(GigaUsb, AnUnpluggedCableIsTheEndOfTheSession) {
   GigaBench bench;
   bench.boot();

@@ -231,6 +231,7 @@ arduino::USBSerial _SerialUSB;
 namespace arduino {
 
 bool USBSerial::connected() { return giga().usb_open; }
+std::uint32_t USBSerial::baud() { return giga().usb_baud; }
 int USBSerial::available() {
   return giga().usb_packets.empty() ? 0 : static_cast<int>(giga().usb_packets.front().size());
 }

@@ -135,6 +135,7 @@ class Giga {
 
   // --- USB
   bool usb_open = false;
+  std::uint32_t usb_baud = 115200;
   bool usb_reads = true;  // the host's program reads
   std::string usb_host;   // what it has read, and not taken yet
   void usb_send(const std::string& bytes);

@@ -126,6 +126,7 @@ void Board::start() {
 
 void Board::poll() {
   machine_.poll();
+  stay_safe_for_upload();
   hear();
   const std::uint32_t now_ms = BoardClock::now_ms();
   application_.poll(now_ms);
@@ -134,15 +135,23 @@ void Board::poll() {
   light_.show(application_.state(), application_.reason(), now_ms);
 }
 
+// The boot loader knows nothing of the chips: what they drive when the core resets, they drive for ever.
+void Board::stay_safe_for_upload() {
+  if (usb_.upload_asked()) application_.fail(SafeReason::fault, BoardClock::now_ms());
+}
+
+void Board::receive(std::uint8_t port, std::uint32_t peer, Text datagram) {
+  application_.receive(port, peer, datagram, BoardClock::now_ms());
+  stay_safe_for_upload();  // it may have been E:CLEAR
+}
+
 // All that has arrived, and what became of the transports.
 void Board::hear() {
-  const bool can_lost = can_.receive([this](Text datagram) {
-    application_.receive(can_number_, firmware::everyone, datagram, BoardClock::now_ms());
-  });
+  const bool can_lost =
+      can_.receive([this](Text datagram) { receive(can_number_, firmware::everyone, datagram); });
   usb_.receive([this](Text line) { hear_usb(line); });
-  const bool udp_lost = udp_.receive([this](std::uint32_t peer, Text datagram) {
-    application_.receive(udp_number_, peer, datagram, BoardClock::now_ms());
-  });
+  const bool udp_lost = udp_.receive(
+      [this](std::uint32_t peer, Text datagram) { receive(udp_number_, peer, datagram); });
   const std::uint32_t now_ms = BoardClock::now_ms();
   if (can_lost) application_.port_down(can_number_, now_ms);
   if (udp_lost) application_.port_down(udp_number_, now_ms);
@@ -154,7 +163,7 @@ void Board::hear_usb(Text line) {
     report_.begin();
     waiting_line_ = Text();
   } else {
-    application_.receive(usb_number_, firmware::everyone, line, BoardClock::now_ms());
+    receive(usb_number_, firmware::everyone, line);
   }
 }
 

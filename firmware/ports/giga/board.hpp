@@ -32,6 +32,8 @@ class Board {
 
  private:
   void hear();
+  void receive(std::uint8_t port, std::uint32_t peer, Text datagram);
+  void stay_safe_for_upload();
   void hear_usb(Text line);
   void follow_settings(std::uint32_t now_ms);
   void use(const Settings& settings);

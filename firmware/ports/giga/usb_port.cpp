@@ -63,6 +63,12 @@ void UsbPort::send(Text datagram, firmware::Urgency urgency, std::uint32_t) {
   send_packet();
 }
 
+bool UsbPort::upload_asked() {
+  constexpr std::uint32_t upload_baud = 1200;
+  if (_SerialUSB.baud() == upload_baud) upload_asked_ = true;
+  return upload_asked_;
+}
+
 bool UsbPort::say(Text line) {
   const std::uint32_t before = lines_.dropped();
   lines_.put(line);

@@ -45,6 +45,10 @@ class UsbPort final : public firmware::Port {
   std::size_t max_size() const override { return max_datagram; }
   bool may_configure() const override { return true; }
 
+  // Has the host asked for new firmware, by 1200 baud? From then on the core resets the chip into its
+  // boot loader as soon as the port is closed, 200 ms later at the earliest, whatever the speed is then.
+  bool upload_asked();
+
   // A line of a report. False: no room now.
   bool say(Text line);
 
@@ -59,6 +63,7 @@ class UsbPort final : public firmware::Port {
   firmware::TransmitLines lines_;
   LineFraming framing_;
   bool open_ = false;
+  bool upload_asked_ = false;
   std::uint8_t packet_[packet_size];
   std::uint32_t packet_used_ = 0;
   std::uint32_t packet_sent_ = 0;
