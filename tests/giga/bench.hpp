@@ -18,6 +18,7 @@
 #include "transports/framing/can_node.hpp"
 
 extern "C" void r4_fake_core_error(std::int32_t status, std::uint32_t address);
+extern "C" void r4_fake_core_warning(std::int32_t status, std::uint32_t address);
 
 namespace r4::test {
 

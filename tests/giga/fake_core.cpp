@@ -88,9 +88,14 @@ std::int32_t mbed_set_error_hook(void (*hook)(const mbed_error_ctx*)) {
   error_hook = hook;
   return 0;
 }
-void r4_fake_core_error(std::int32_t status, std::uint32_t address) {
+bool mbed_get_error_in_progress() { return giga().core_error; }
+void r4_fake_core_warning(std::int32_t status, std::uint32_t address) {
   const mbed_error_ctx context = {status, address, 0};
   error_hook(&context);
+}
+void r4_fake_core_error(std::int32_t status, std::uint32_t address) {
+  giga().core_error = true;
+  r4_fake_core_warning(status, address);
 }
 
 std::uint32_t us_ticker_read() {

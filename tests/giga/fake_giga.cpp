@@ -142,6 +142,7 @@ bool Giga::reset_by(const std::function<void()>& action) {
     step_timer = Timer();
     primask = 0;
     in_interrupt = false;
+    core_error = false;
     watchdog_runs = false;
     edges.clear();
     vectors.clear();
@@ -172,7 +173,7 @@ void Giga::interrupts_may_come() {
   }
   if (primask != 0 || in_interrupt) return;
   for (Timer* timer : {&ticker, &step_timer}) {
-    while (timer->period_ns != 0 && timer->next_ns <= now_ns_) {
+    while (timer->period_ns != 0 && timer->next_ns <= now_ns_) {  // the late ones in one interrupt
       timer->next_ns += timer->period_ns;
       in_interrupt = true;
       ++interrupts;

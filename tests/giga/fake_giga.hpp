@@ -177,6 +177,7 @@ class Giga {
   int interrupts = 0;
   std::map<int, std::function<void(bool)>> edges;  // PinName to what an edge calls
   bool flag = false;
+  bool core_error = false;  // a fatal one
   [[noreturn]] void reset();
   void connect_registers();
 

@@ -123,6 +123,54 @@ TEST(GigaFault, AnErrorOfTheCoreEndsTheBootInsteadOfBlinkingForEver) {
   EXPECT_TRUE(bench.giga.reset_by([] { mbed_die(); }));
 }
 
+TEST(GigaFault, AWarningOfTheCoreChangesNothing) {
+  GigaBench bench;
+  bench.boot();
+  PlainHost host;
+  bench.drive(host, bench.usb());
+  r4_fake_core_warning(-5, 0x08040000);
+  bench.run_ms(20);
+  EXPECT_TRUE(bench.active());
+  EXPECT_EQ(bench.pins().osmc[0].pwm, 358);
+  bench.restart();
+  EXPECT_NE(bench.reason(), SafeReason::fault);
+}
+
+TEST(GigaFault, ASettingsStoreThatEndsTheBootIsLeftOutOfTheNext) {
+  GigaBench bench;
+  bench.giga.stored["r4-settings"] = "rate,20\n";
+  bench.giga.flash_hangs = true;
+  bench.giga.step_timer.period_ns = 1000000000;
+  bench.giga.step_timer.next_ns = bench.giga.now_ns() + 50000000;
+  bench.giga.step_timer.action = [] { r4_fake_core_error(-5, 0x08040000); };
+  EXPECT_TRUE(bench.giga.reset_by([&] { bench.boot(); }));
+
+  bench.system.reset();
+  const std::uint64_t before_ms = bench.giga.now_ms();
+  bench.boot();
+  EXPECT_LE(bench.giga.now_ms() - before_ms, 20U) << "it waits for no store";
+  EXPECT_EQ(bench.reason(), SafeReason::fault);
+  bench.usb()("report");
+  bench.run_ms(400);
+  EXPECT_TRUE(
+      has_line(bench.usb_lines(), "Settings: not kept: the key-value store ended the last boot"));
+
+  bench.giga.flash_hangs = false;
+  bench.restart();
+  EXPECT_NE(bench.reason(), SafeReason::fault);
+  EXPECT_EQ(bench.application().settings().state_rate_hz, 20) << "it gets another chance";
+}
+
+TEST(GigaFault, AfterTheStoreHasStartedDoesNotCostTheSettings) {
+  GigaBench bench;
+  bench.giga.stored["r4-settings"] = "rate,20\n";
+  bench.boot();
+  EXPECT_TRUE(bench.giga.reset_by([] { r4_fake_core_error(-5, 0x08040000); }));
+  bench.restart();
+  EXPECT_EQ(bench.reason(), SafeReason::fault);
+  EXPECT_EQ(bench.application().settings().state_rate_hz, 20);
+}
+
 TEST(GigaBus, AStuckBusCostsTheLoopAtMostItsBound) {
   GigaBench bench;
   bench.boot();

@@ -54,6 +54,9 @@ Text fate_of_settings(const SettingsStore& store) {
   if (store.state() == StoreState::absent) {
     return "not kept: no key-value store on QSPI partition 3 (docs/firmware.md)";
   }
+  if (store.state() == StoreState::avoided) {
+    return "not kept: the key-value store ended the last boot";
+  }
   if (!store.keeps()) return "not kept: the key-value store was not ready in time";
   return store.failures() == 0 ? Text("kept in the key-value store")
                                : Text("not kept: the key-value store cannot be written");

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fault.hpp"
 
+#include <atomic>
+
 #include "chip.hpp"
 
 namespace r4 {
@@ -8,9 +10,13 @@ namespace giga {
 
 namespace {
 
-firmware::Hal* guarded = nullptr;  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables)
+// NOLINTBEGIN(cppcoreguidelines-avoid-non-const-global-variables)
+firmware::Hal* guarded = nullptr;
+std::atomic<bool> store_starting{false};
+// NOLINTEND(cppcoreguidelines-avoid-non-const-global-variables)
 
 constexpr std::uint32_t mark = 0x52344700;  // with the kind in its lowest byte
+constexpr std::uint32_t in_store_mark = 0x80;
 
 // RM0399: backup domain writable (PWR_CR1), the clock of the RTC's registers (RCC_APB4ENR), what
 // reset the chip (RCC_RSR).
@@ -31,7 +37,7 @@ void keep(const FaultNote& note) {
   RTC->BKP21R = note.exception;
   RTC->BKP22R = note.pc;
   RTC->BKP23R = note.status;
-  RTC->BKP20R = mark | static_cast<std::uint32_t>(note.kind);
+  RTC->BKP20R = mark | static_cast<std::uint32_t>(note.kind) | (note.in_store ? in_store_mark : 0);
 }
 
 [[noreturn]] void reset() {
@@ -54,7 +60,9 @@ bool is_stack(const std::uint32_t* frame) {
   return in_dtcm || in_ram;
 }
 
+// Comes for warnings, too. The way from here to mbed_die() prints and may wait, so it is not taken.
 void on_core_error(const mbed_error_ctx* context) {
+  if (!mbed_get_error_in_progress()) return;
   FaultNote note;
   note.kind = FaultNote::Kind::fault;
   note.pc = context->error_address;
@@ -99,6 +107,7 @@ void mbed_die() {
 
 void guard_against_faults(firmware::Hal& hal) {
   guarded = &hal;
+  store_is_starting(false);
   const auto entry = reinterpret_cast<std::uintptr_t>(&r4_giga_fault_entry);
   for (const IRQn_Type fault :
        {HardFault_IRQn, MemoryManagement_IRQn, BusFault_IRQn, UsageFault_IRQn}) {
@@ -107,10 +116,13 @@ void guard_against_faults(firmware::Hal& hal) {
   mbed_set_error_hook(&on_core_error);
 }
 
+void store_is_starting(bool starting) { store_starting.store(starting, std::memory_order_relaxed); }
+
 FaultNote take_fault_note() {
   open_backup_registers();
   FaultNote note;
-  const std::uint32_t kind = RTC->BKP20R ^ mark;
+  const std::uint32_t kept = RTC->BKP20R ^ mark;
+  const std::uint32_t kind = kept & ~in_store_mark;
   const bool by_watchdog = (RCC->RSR & rsr_watchdog) != 0;
   RCC->RSR |= rsr_forget;
   if (kind == static_cast<std::uint32_t>(FaultNote::Kind::fault) ||
@@ -119,6 +131,7 @@ FaultNote take_fault_note() {
     note.exception = RTC->BKP21R;
     note.pc = RTC->BKP22R;
     note.status = RTC->BKP23R;
+    note.in_store = (kept & in_store_mark) != 0;
   } else if (by_watchdog) {
     note.kind = FaultNote::Kind::watchdog;
   }
@@ -129,7 +142,9 @@ FaultNote take_fault_note() {
 void end_boot(const FaultNote& note) {
   __disable_irq();
   if (guarded != nullptr) guarded->make_safe();
-  keep(note);
+  FaultNote whole = note;
+  whole.in_store = store_starting.load(std::memory_order_relaxed);
+  keep(whole);
   reset();
 }
 

@@ -8,6 +8,8 @@
 #include <TDBStore.h>
 // clang-format on
 
+#include "fault.hpp"
+
 namespace r4 {
 namespace giga {
 
@@ -19,7 +21,15 @@ constexpr std::chrono::milliseconds pause(100);
 
 }  // namespace
 
-void SettingsStore::start() { thread_.start(mbed::callback(&SettingsStore::run, this)); }
+void SettingsStore::start() {
+  store_is_starting(true);
+  thread_.start(mbed::callback(&SettingsStore::run, this));
+}
+
+void SettingsStore::started(StoreState state) {
+  store_is_starting(false);
+  state_.store(state, std::memory_order_release);
+}
 
 void SettingsStore::run(SettingsStore* store) { store->serve(); }
 
@@ -29,7 +39,7 @@ void SettingsStore::serve() {
   mbed::TDBStore store(&partition);
   if (flash == nullptr || partition.init() != mbed::BD_ERROR_OK ||
       partition.size() > partition_max || store.init() != MBED_SUCCESS) {
-    state_.store(StoreState::absent, std::memory_order_release);
+    started(StoreState::absent);
     return;
   }
   Record record = {};
@@ -38,7 +48,7 @@ void SettingsStore::serve() {
     record.size = static_cast<std::uint16_t>(size);
     from_store_.put(record);
   }
-  state_.store(StoreState::ready, std::memory_order_release);
+  started(StoreState::ready);
   for (std::uint32_t version = 0;;) {
     if (to_store_.take(version, record)) {
       if (store.set(key, record.text, record.size, 0) != MBED_SUCCESS) ++failures_;

@@ -4,6 +4,8 @@
 //
 //     loading ---> ready     the store is there; the settings, if any were kept, wait in loaded()
 //             ---> absent    no partition 3, or one that is not the store's
+//     avoided                it has ended the last boot: the core gives up for good where a flash that
+//                            is worn out cannot be erased
 //
 // Nothing is ever written outside that partition (partition 1 holds the WiFi firmware), nor to one
 // larger than partition_max: older layouts have a user's files there.
@@ -19,14 +21,15 @@
 namespace r4 {
 namespace giga {
 
-enum class StoreState : std::uint8_t { loading, ready, absent };
+enum class StoreState : std::uint8_t { loading, ready, absent, avoided };
 
 class SettingsStore {
  public:
   static constexpr std::uint64_t partition_max = 2 * 1024 * 1024;
 
-  // Once, from the loop.
+  // One of them, once, from the loop.
   void start();
+  void avoid() { state_.store(StoreState::avoided, std::memory_order_relaxed); }
   StoreState state() const { return state_.load(std::memory_order_acquire); }
   // What was kept, into `settings`; once, when the state is no longer loading. False: nothing was. Who
   // does not wait that long gets nothing, and nothing will be kept: it would overwrite what was.
@@ -47,6 +50,7 @@ class SettingsStore {
 
   static void run(SettingsStore* store);
   void serve();
+  void started(StoreState state);
 
   static constexpr std::uint32_t stack_size = 8192;
 

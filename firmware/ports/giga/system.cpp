@@ -34,7 +34,11 @@ void System::boot() {
   const FaultNote last_boot = take_fault_note();
   BoardClock::start(random_number());
 
-  store_.start();
+  if (last_boot.in_store) {
+    store_.avoid();
+  } else {
+    store_.start();
+  }
   const std::uint32_t began_us = BoardClock::now_us();
   while (store_.state() == StoreState::loading &&
          BoardClock::now_us() - began_us < settings_limit_us) {

@@ -37,6 +37,8 @@ extern "C" {
 osThreadId_t osThreadGetId();
 std::int32_t osThreadSetPriority(osThreadId_t thread, osPriority_t priority);
 [[noreturn]] void mbed_die();
+// A fatal one: not during mbed_warning(), which calls the hook, too.
+bool mbed_get_error_in_progress();
 std::int32_t mbed_set_error_hook(void (*hook)(const mbed_error_ctx*));
 }
 #define MBED_SUCCESS 0
