@@ -21,6 +21,7 @@ void interrupt(std::uint32_t bits) {
   if ((can.IE.value & bits) == 0 || (can.ILE.value & 1U) == 0) return;
   if (chip.vectors.count(FDCAN2_IT0_IRQn) == 0 || chip.in_interrupt) return;
   chip.in_interrupt = true;
+  chip.isr_queue = 0;
   chip.vectors[FDCAN2_IT0_IRQn]();
   chip.in_interrupt = false;
 }

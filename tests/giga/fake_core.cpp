@@ -125,6 +125,7 @@ InterruptIn::InterruptIn(PinName pin, MbedPinMode mode) : pin_(pin) {
     const Callback<void()>& action = high ? rise_ : fall_;
     if (!action) return;
     giga().in_interrupt = true;
+    giga().isr_queue = 0;
     action();
     giga().in_interrupt = false;
   };
@@ -215,6 +216,8 @@ void ThisThread::sleep_for(Kernel::Clock::duration_u32 time) {
 }
 
 std::uint32_t EventFlags::set(std::uint32_t flags) {
+  constexpr int isr_queue_size = 16;
+  if (giga().in_interrupt && ++giga().isr_queue > isr_queue_size) r4_fake_core_error(-1, 0);
   giga().flag = true;
   return flags;
 }

@@ -143,6 +143,7 @@ bool Giga::reset_by(const std::function<void()>& action) {
     primask = 0;
     in_interrupt = false;
     core_error = false;
+    isr_queue = 0;
     watchdog_runs = false;
     edges.clear();
     vectors.clear();
@@ -173,6 +174,7 @@ void Giga::interrupts_may_come() {
   }
   if (primask != 0 || in_interrupt) return;
   for (Timer* timer : {&ticker, &step_timer}) {
+    isr_queue = 0;
     while (timer->period_ns != 0 && timer->next_ns <= now_ns_) {  // the late ones in one interrupt
       timer->next_ns += timer->period_ns;
       in_interrupt = true;

@@ -178,6 +178,7 @@ class Giga {
   std::map<int, std::function<void(bool)>> edges;  // PinName to what an edge calls
   bool flag = false;
   bool core_error = false;  // a fatal one
+  int isr_queue = 0;        // what the interrupt that runs has told the core
   [[noreturn]] void reset();
   void connect_registers();
 

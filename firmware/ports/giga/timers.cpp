@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "timers.hpp"
 
+#include <atomic>
+
 #include "board_clock.hpp"
 #include "chip.hpp"
 #include "fault.hpp"
@@ -15,6 +17,7 @@ namespace {
 StepTick* stepping = nullptr;
 firmware::Guard* guarding = nullptr;
 std::uint32_t fed_ms = 0;
+std::atomic<bool> awake{false};
 // NOLINTEND
 
 constexpr std::uint32_t woken = 1;
@@ -71,13 +74,21 @@ void start_guard_timer(firmware::Guard& guard) {
   static mbed::Ticker ticker;
   guarding = &guard;
   fed_ms = BoardClock::now_ms();
+  awake = false;
   loop_flags();
   ticker.attach(mbed::callback(&on_millisecond), std::chrono::microseconds(1000));
 }
 
-void wake_loop() { loop_flags().set(woken); }
+// Once is enough, and more than 16 times in one interrupt is an error of the core: its ticker makes up
+// for late ticks in a single one.
+void wake_loop() {
+  if (!awake.exchange(true)) loop_flags().set(woken);
+}
 
-void rest() { loop_flags().wait_any_for(woken, std::chrono::milliseconds(2)); }
+void rest() {
+  loop_flags().wait_any_for(woken, std::chrono::milliseconds(2));
+  awake = false;
+}
 
 }  // namespace giga
 }  // namespace r4
