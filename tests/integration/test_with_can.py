@@ -99,12 +99,12 @@ def test_a_frame_passes_on_every_bus_and_inside_the_guest_the_interfaces_come_an
     result = run('sh', '-c', r'''
 for pair in "vcan0 vcan0" "vxcan0 vxcan1" "vxcan1 vxcan0" "can0 can1" "can1 can0"; do
   set -- $pair
-  candump -T 5000 -n 1 $2 &
+  candump -T 20000 -n 1 $2 &
   until grep -q $2 /proc/net/can/rcvlist_all; do sleep 0.01; done
   cansend $1 123#DEADBEEF
   wait
 done
-candump -T 5000 -n 1 vcan0 &
+candump -T 20000 -n 1 vcan0 &
 until grep -q vcan0 /proc/net/can/rcvlist_all; do sleep 0.01; done
 cansend vcan0 123##1000102030405060708090A0B0C0D0E0F
 wait
