@@ -18,7 +18,10 @@ class MemoryHal final : public firmware::Hal {
  public:
   MemoryHal() { inputs.handle_held = true; }
 
-  void apply(const firmware::Outputs& wanted) override { outputs = wanted; }
+  void apply(const firmware::Outputs& wanted) override {
+    outputs = wanted;
+    ++applied;
+  }
   void make_safe() override {
     outputs = firmware::Outputs();
     ++made_safe;
@@ -32,6 +35,7 @@ class MemoryHal final : public firmware::Hal {
 
   firmware::Outputs outputs;  // what the hardware does
   firmware::Inputs inputs;    // what the board will see
+  int applied = 0;
   int made_safe = 0;
   bool broken = false;  // a fault cannot be cleared
   std::vector<int> zeroed;

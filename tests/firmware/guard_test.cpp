@@ -215,8 +215,10 @@ TEST_F(GuardedBoard, WhatTheGuardTookOffStaysOffUntilTheApplicationKnows) {
     const std::uint32_t deadline_ms = application.link().deadline_ms();
     application.guard().tick(deadline_ms);
   };
+  const int applied = hal.applied;
   say("O:100,1,1;PNum:2;T:5;");
   EXPECT_EQ(hal.outputs, firmware::Outputs());
+  EXPECT_EQ(hal.applied, applied);  // not for an instant
   observer.trip = [] {};
   application.poll(++now_ms);
   EXPECT_EQ(application.reason(), SafeReason::link);

@@ -188,5 +188,17 @@ TEST(Script, ReadsTroubleWithChipsBusAndLoop) {
             "i2c, hang, fault, watchdog or reboot");
 }
 
+TEST(Script, AFileThatDoesNotEndIsNoScenario) {
+  try {
+    Script::load("/dev/zero");
+    FAIL() << "it was read";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::data);
+    EXPECT_STREQ(error.what(),
+                 "/dev/zero: the scenario is longer than 1 MB; give a file of lines such as: "
+                 "0.5 handle released");
+  }
+}
+
 }  // namespace
 }  // namespace r4::sim
