@@ -4,7 +4,8 @@
 
 Reads BUILD/results/*.xml (ctest), BUILD/[asan|tsan/]junit/*.xml (pytest, in place of the one
 ctest entry of the file) and BUILD/results/checks.txt. Names every failed and every skipped test;
-a skipped test counts as failed. The last line is `N passed, N failed`.
+a skipped test counts as failed. Names what was repeated since the machine stood still (main.cpp,
+integration/conftest.py). The last line is `N passed, N failed`.
 """
 import pathlib
 import sys
@@ -24,6 +25,14 @@ def cases(file):
         yield case.get('name'), outcome
 
 
+def repeated(build):
+    for report in sorted((build / 'results').glob('*.xml')):
+        for case in ET.parse(report).iter('testcase'):
+            for line in (case.findtext('system-out') or '').splitlines():
+                if 'The machine stood still' in line:
+                    yield f'{report.stem}: {case.get("name")}: {line}'
+
+
 def outcomes(build):
     for line in (build / 'results/checks.txt').read_text().splitlines():
         outcome, name = line.split(' ', 1)
@@ -41,7 +50,10 @@ def outcomes(build):
 
 
 def main():
-    found = list(outcomes(pathlib.Path(sys.argv[1])))
+    build = pathlib.Path(sys.argv[1])
+    found = list(outcomes(build))
+    for each in repeated(build):
+        print(f'repeated: {each}')
     for name, outcome in found:
         if outcome != 'passed':
             print(f'{outcome}: {name}')

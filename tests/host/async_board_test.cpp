@@ -53,11 +53,11 @@ TEST_F(AsyncBoardTest, SendsItsFirstHeartbeatWhenItOpens) {
     std::vector<std::string> heard;
   } listener;
   board_end->open(listener);
-  AsyncBoard over_memory(io, std::move(host_end));
+  BoardOptions options;
+  options.session.timing.heartbeat_ms = 60'000;  // the second one is far away
+  AsyncBoard over_memory(io, std::move(host_end), options);
   over_memory.open();
-  const auto start = std::chrono::steady_clock::now();
   ASSERT_TRUE(run_until(io, [&] { return !listener.heard.empty(); }));
-  EXPECT_LT(std::chrono::steady_clock::now() - start, 50ms);
   EXPECT_EQ(listener.heard[0].substr(0, 9), "H:ROS2-R4");
   board_end->close();
 }
@@ -346,16 +346,17 @@ TEST_F(AsyncBoardTest, GatesItsHeartbeatsAndFeedsFromAnyThread) {
 TEST(AsyncBoardTransport, IsLostAndBackWithItsPty) {
   asio::io_context io;
   auto simulated = std::make_unique<BoardInAThread>("pty");
-  AsyncBoard board(io, simulated->url());
+  BoardOptions options;
+  options.session.timing.timeout_ms = 60'000;  // silence alone would not tell in time
+  AsyncBoard board(io, simulated->url(), options);
   std::vector<CarrierEvent::Kind> events;
   board.on_event([&](const CarrierEvent& event) { events.push_back(event.kind); });
   board.open();
   ASSERT_TRUE(run_until(io, [&] { return board.in_control(); }));
-  const auto start = std::chrono::steady_clock::now();
   simulated->switch_off();
   simulated.reset();
-  ASSERT_TRUE(run_until(io, [&] { return board.link().state == HostLinkState::lost; }));
-  EXPECT_LT(std::chrono::steady_clock::now() - start, 300ms) << "at once, not after the timeout";
+  ASSERT_TRUE(run_until(io, [&] { return board.link().state == HostLinkState::lost; }))
+      << "at once, not after the timeout";
   ASSERT_FALSE(events.empty());
   EXPECT_EQ(events.back(), CarrierEvent::Kind::down);
 }

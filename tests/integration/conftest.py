@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A failure while the machine stood still is repeated: it says nothing about r4.
+
+Bounds of real time are what r4 promises, so they are tested; a virtual machine that is paused breaks
+them all. A thread that only looks at the clock tells; a failure without a standstill counts at once.
+"""
+import threading
+import time
+
+import pytest
+from _pytest.runner import runtestprotocol
+
+STANDSTILL_S = 0.05
+MOST_RUNS = 3
+
+
+class Watch:
+    """The longest that this process was kept from running while it is entered, in seconds."""
+
+    def __enter__(self):
+        self.longest = 0.0
+        self._done = threading.Event()
+        self._thread = threading.Thread(target=self._look)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self._done.set()
+        self._thread.join()
+
+    def _look(self):
+        before = time.monotonic()
+        while not self._done.wait(0.005):
+            now = time.monotonic()
+            self.longest = max(self.longest, now - before)
+            before = now
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_protocol(item, nextitem):
+    item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+    for run in range(1, MOST_RUNS + 1):
+        with Watch() as watch:
+            reports = runtestprotocol(item, nextitem=nextitem, log=False)
+        failed = [each for each in reports if each.failed]
+        if not failed or watch.longest < STANDSTILL_S or run == MOST_RUNS:
+            break
+        item.config.pluginmanager.get_plugin('terminalreporter').write(
+            f'\n{item.nodeid}: The machine stood still for {watch.longest * 1000:.0f} ms: run again. It said\n'
+            f'{failed[0].longreprtext}\n')
+    for report in reports:
+        item.ihook.pytest_runtest_logreport(report=report)
+    item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+    return True
