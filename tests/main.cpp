@@ -24,18 +24,14 @@ constexpr milliseconds standstill{50};
 constexpr int most_runs = 3;
 constexpr const char* run_variable = "R4_TEST_RUN";
 
-// The longest that this process was kept from running.
+// The longest that this process was kept from running, until done() is called.
 class Watch {
  public:
-  Watch() : thread_([this] { look(); }) {}
-  ~Watch() {
+  milliseconds done() {
     done_ = true;
     thread_.join();
+    return longest_;
   }
-  Watch(const Watch&) = delete;
-  Watch& operator=(const Watch&) = delete;
-
-  milliseconds longest() const { return longest_; }
 
  private:
   void look() {
@@ -43,30 +39,24 @@ class Watch {
     for (auto before = Clock::now(); !done_;) {
       std::this_thread::sleep_for(step);
       const auto now = Clock::now();
-      longest_ = std::max(longest_.load(), std::chrono::duration_cast<milliseconds>(now - before));
+      longest_ = std::max(longest_, std::chrono::duration_cast<milliseconds>(now - before));
       before = now;
     }
   }
 
   std::atomic<bool> done_{false};
-  std::atomic<milliseconds> longest_{milliseconds(0)};
-  std::thread thread_;
+  milliseconds longest_{0};
+  std::thread thread_{[this] { look(); }};
 };
-
-int run_all(milliseconds& stood_still) {
-  const Watch watch;
-  const int status = RUN_ALL_TESTS();
-  stood_still = watch.longest();
-  return status;
-}
 
 }  // namespace
 
 int main(int argc, char** argv) {
   std::vector<char*> again(argv, argv + argc + 1);  // GoogleTest takes its options out of argv
   testing::InitGoogleTest(&argc, argv);
-  milliseconds stood_still{0};
-  const int status = run_all(stood_still);
+  Watch watch;
+  const int status = RUN_ALL_TESTS();
+  const milliseconds stood_still = watch.done();
   const char* variable = std::getenv(run_variable);
   const int runs = variable == nullptr ? 1 : std::atoi(variable);
   if (status == 0 || stood_still < standstill || runs >= most_runs) return status;

@@ -30,7 +30,9 @@ class Watch:
 
     def _look(self):
         before = time.monotonic()
-        while not self._done.wait(0.005):
+        done = False
+        while not done:
+            done = self._done.wait(0.005)
             now = time.monotonic()
             self.longest = max(self.longest, now - before)
             before = now
