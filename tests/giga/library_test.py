@@ -66,7 +66,7 @@ def compile_all(tree, library, out):
     def compile_one(numbered):
         number, source = numbered
         target = out / f'{number}.o'
-        run(CROSS + 'g++', *FLAGS, '-I', library / 'src', '-isystem', tree / 'tests/giga/core',
+        run(CROSS + 'g++', *FLAGS, '-I', library / 'src', '-I', tree / 'tests/giga/core',
             '-c', source, '-o', target)
         return target
 

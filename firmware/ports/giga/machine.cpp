@@ -69,11 +69,14 @@ Machine::Machine()
       hardware_(bus_, pins(), hardware_config()),
       outputs_off_(bus_, hardware_),
       analog_(analog_values_),
-      encoders_{{encoder_a_pins[0], encoder_b_pins[0], index_pins[0]},
-                {encoder_a_pins[1], encoder_b_pins[1], index_pins[1]},
-                {encoder_a_pins[2], encoder_b_pins[2], index_pins[2]},
-                {encoder_a_pins[3], encoder_b_pins[3], index_pins[3]}},
-      echoes_{{echo_pins[0]}, {echo_pins[1]}, {echo_pins[2]}, {echo_pins[3]}} {}
+      encoder1_(encoder_a_pins[0], encoder_b_pins[0], index_pins[0]),
+      encoder2_(encoder_a_pins[1], encoder_b_pins[1], index_pins[1]),
+      encoder3_(encoder_a_pins[2], encoder_b_pins[2], index_pins[2]),
+      encoder4_(encoder_a_pins[3], encoder_b_pins[3], index_pins[3]),
+      echo1_(echo_pins[0]),
+      echo2_(echo_pins[1]),
+      echo3_(echo_pins[2]),
+      echo4_(echo_pins[3]) {}
 
 firmware::BoardPins Machine::pins() {
   firmware::BoardPins pins{};
@@ -89,7 +92,7 @@ firmware::BoardPins Machine::pins() {
 
 void Machine::start() {
   for (int i = 0; i < encoder_channels; ++i) {
-    Encoder& encoder = encoders_[i];
+    Encoder& encoder = *encoders_[i];
     encoder.counter = &hardware_.encoder(i + 1);
     encoder.on_edge();
     for (mbed::InterruptIn* line : {&encoder.a_edge, &encoder.b_edge}) {
@@ -98,7 +101,7 @@ void Machine::start() {
     }
   }
   for (int i = 0; i < ultrasonic_channels; ++i) {
-    Echo& echo = echoes_[i];
+    Echo& echo = *echoes_[i];
     echo.sensors = &hardware_.ultrasonic();
     echo.sensor = i;
     echo.edge.rise(mbed::callback(&echo, &Echo::on_edge));
@@ -115,7 +118,7 @@ void Machine::poll() {
 void Machine::step_tick() {
   hardware_.step_tick();
   for (int i = 0; i < encoder_channels; ++i) {
-    hardware_.encoder(i + 1).index(encoders_[i].index.read());
+    hardware_.encoder(i + 1).index(encoders_[i]->index.read());
   }
 }
 

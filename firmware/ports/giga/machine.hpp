@@ -41,7 +41,7 @@ class Machine final : public StepTick {
     void on_edge();
   };
   struct Echo {
-    Echo(Pin pin);  // NOLINT(google-explicit-constructor): made in an array
+    explicit Echo(Pin pin);
     Line line;
     mbed::InterruptIn edge;
     firmware::UltrasonicSensors* sensors = nullptr;
@@ -69,8 +69,12 @@ class Machine final : public StepTick {
   firmware::BoardHardware hardware_;
   OutputsOff outputs_off_;
   AnalogInputs analog_;
-  Encoder encoders_[encoder_channels];
-  Echo echoes_[ultrasonic_channels];
+  // GCC 7 and 8 would copy the elements of an array that a constructor makes (GCC bug 63707), and
+  // these cannot be copied: each by itself, and their addresses.
+  Encoder encoder1_, encoder2_, encoder3_, encoder4_;
+  Encoder* const encoders_[encoder_channels] = {&encoder1_, &encoder2_, &encoder3_, &encoder4_};
+  Echo echo1_, echo2_, echo3_, echo4_;
+  Echo* const echoes_[ultrasonic_channels] = {&echo1_, &echo2_, &echo3_, &echo4_};
 };
 
 }  // namespace giga
