@@ -34,8 +34,10 @@ Application::Application(Hal& hal, const Config& config, Observer* observer)
       observer_(observer),
       identity_(config.identity),
       link_(timing_of(config.settings)),
+      authentication_(config.chance),
       guard_(hal) {
   setpoints_.settings = config.settings;
+  authentication_.use(config.settings.site.keys);
   guard_.add_duty(loop_limit_ms);  // loop_duty
 }
 
@@ -78,13 +80,20 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
   Source from;
   from.port = port;
   from.peer = peer;
-  if (link_.in_session(from) && datagram.has_pnum()) tracker_.on(datagram.pnum());
-  switch (kind_of(datagram)) {
+  const MessageKind kind = kind_of(datagram);
+  const Verdict verdict = judge(port, kind, datagram, now_ms);
+  const bool authentic = verdict == Verdict::authentic;
+  if (authentic && link_.in_session(from) && datagram.has_pnum()) tracker_.on(datagram.pnum());
+  switch (kind) {
     case MessageKind::host_heartbeat:
-      on_host_heartbeat(from, datagram, now_ms);
+      if (authentic) {
+        on_host_heartbeat(from, datagram, now_ms);
+      } else if (rejected(verdict, now_ms)) {
+        answer_heartbeat(from, now_ms);  // it tells the nonce
+      }
       break;
     case MessageKind::command:
-      on_command(from, datagram, now_ms);
+      on_command(from, datagram, verdict, now_ms);
       break;
     case MessageKind::board_heartbeat:
     case MessageKind::nack:
@@ -92,6 +101,21 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
     case MessageKind::state:
       break;  // another board's talk
   }
+}
+
+// Is the datagram of a host that may command? Without a key all are, and at a cable of the board's own:
+// who is there can set a key.
+Verdict Application::judge(std::uint8_t port, MessageKind kind, const Datagram& datagram,
+                           std::uint32_t now_ms) {
+  if (!authentication_.required() || ports_[port].port->may_configure()) return Verdict::authentic;
+  const bool of_host = kind == MessageKind::host_heartbeat || kind == MessageKind::command;
+  return of_host ? authentication_.verify(datagram, now_ms) : Verdict::missing;
+}
+
+// It is dropped. True if it may be answered.
+bool Application::rejected(Verdict verdict, std::uint32_t now_ms) {
+  if (observer_ != nullptr) observer_->on_rejected(now_ms, verdict);
+  return authentication_.rejected(verdict, now_ms);
 }
 
 void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::uint32_t now_ms) {
@@ -121,7 +145,7 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
       break;
     case HeartbeatEffect::stale:
       if (link_.wants_answer(heartbeat, now_ms)) {
-        answer_heartbeat(from, false, now_ms);
+        answer_heartbeat(from, now_ms);
       }
       break;
     case HeartbeatEffect::busy:
@@ -132,18 +156,27 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
   poll(now_ms);
 }
 
-void Application::on_command(Source from, const Datagram& datagram, std::uint32_t now_ms) {
+void Application::on_command(Source from, const Datagram& datagram, Verdict verdict,
+                             std::uint32_t now_ms) {
   const int count = datagram.command_count();
   const Field& field = datagram.command();
   // A stop is obeyed beside other commands, too. A single one of another letter is none.
   if ((count != 1 || field.name() == "E") && asks_to_stop(datagram)) {
-    emergency_stop(from, datagram, now_ms);
+    emergency_stop(from, datagram, verdict == Verdict::authentic, now_ms);
     return;
   }
   Command command;
   const Refusal refusal = count == 1 ? parse_command(field, command) : Refusal::format;
   if (refusal == Refusal::none && command.kind == CommandKind::identify) {
     identify(from, now_ms);
+    return;
+  }
+  if (verdict != Verdict::authentic) {
+    if (rejected(verdict, now_ms)) {
+      refuse(from, datagram, Refusal::auth, now_ms);
+    } else {
+      ++rx_refused_;
+    }
     return;
   }
   if (!datagram.has_pnum()) {  // nothing to execute it once by, and nothing to answer to
@@ -200,6 +233,7 @@ void Application::execute(std::uint32_t pnum, const Command& command, std::uint3
       clear();
       break;
     case CommandKind::setting:
+      if (command.text == key_setting) authentication_.use(setpoints_.settings.site.keys);
       link_.set_timing(timing_of(setpoints_.settings));
       expect_host();
       schedule_.set_period(period_of(setpoints_.settings));
@@ -214,12 +248,14 @@ void Application::execute(std::uint32_t pnum, const Command& command, std::uint3
   report_state(now_ms);
 }
 
-void Application::emergency_stop(Source from, const Datagram& datagram, std::uint32_t now_ms) {
+// One that is not authentic spends no number: CMD would prove to its host what was not executed.
+void Application::emergency_stop(Source from, const Datagram& datagram, bool authentic,
+                                 std::uint32_t now_ms) {
   const bool repeated = safety_.has(SafeReason::stop);
   enter(SafeReason::stop, now_ms);
   latched_ms_ = now_ms;
   const bool owner = link_.has_owner() && from == link_.owner();
-  if (owner && datagram.has_pnum()) {
+  if (owner && authentic && datagram.has_pnum()) {
     Refusal code = Refusal::none;
     if (link_.admit(from, datagram.pnum(), now_ms, code) == Admission::execute) {
       link_.executed(datagram.pnum());
@@ -228,9 +264,7 @@ void Application::emergency_stop(Source from, const Datagram& datagram, std::uin
   if (observer_ != nullptr) observer_->on_executed(now_ms, datagram.pnum(), Command::stop());
   // Everyone hears of it once; who asks hears it each time, as often as it takes.
   if (!repeated) send_heartbeats(now_ms);
-  if (!owner || repeated) {
-    answer_heartbeat(from, link_.has_owner() && !owner, now_ms);
-  }
+  if (!owner || repeated) answer_heartbeat(from, now_ms);
 }
 
 void Application::port_down(std::uint8_t port, std::uint32_t now_ms) {
@@ -278,6 +312,7 @@ void Application::enter(SafeReason cause, std::uint32_t now_ms) {
   }
   link_.send_soon();
   update_outputs(now_ms);
+  authentication_.renew();
   report_state(now_ms);
 }
 

@@ -17,6 +17,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "../protocol/authentication.hpp"
 #include "../protocol/board_link.hpp"
 #include "../protocol/message.hpp"
 #include "executor.hpp"
@@ -35,6 +36,9 @@ class Application {
   struct Config {
     Identity identity;  // the texts must outlive the application
     Settings settings;
+    // Authentication::chance_size random bytes, others at each boot. Without them a board with a key
+    // obeys nobody but who is at a cable of its own.
+    const std::uint8_t* chance = nullptr;
   };
   static constexpr int max_ports = 4;
 
@@ -64,6 +68,7 @@ class Application {
   const Outputs& outputs() const { return outputs_; }  // as the hardware has them
   const Settings& settings() const { return setpoints_.settings; }
   const BoardLink& link() const { return link_; }
+  const Authentication& authentication() const { return authentication_; }
 
   // poll() is wanted at least this often, for the interlocks.
   static constexpr std::uint32_t interlock_period_ms = 10;
@@ -81,11 +86,14 @@ class Application {
     std::uint32_t aside_pnum = 0;  // of answers to others
   };
 
+  Verdict judge(std::uint8_t port, MessageKind kind, const Datagram& datagram,
+                std::uint32_t now_ms);
   void on_host_heartbeat(Source from, const Datagram& datagram, std::uint32_t now_ms);
-  void on_command(Source from, const Datagram& datagram, std::uint32_t now_ms);
+  void on_command(Source from, const Datagram& datagram, Verdict verdict, std::uint32_t now_ms);
   bool may_set(std::uint8_t port, const Command& command) const;
   void execute(std::uint32_t pnum, const Command& command, std::uint32_t now_ms);
-  void emergency_stop(Source from, const Datagram& datagram, std::uint32_t now_ms);
+  void emergency_stop(Source from, const Datagram& datagram, bool authentic, std::uint32_t now_ms);
+  bool rejected(Verdict verdict, std::uint32_t now_ms);
   void look_at_time(std::uint32_t now_ms);
   void enter(SafeReason cause, std::uint32_t now_ms);
   void check_interlocks(std::uint32_t now_ms);
@@ -101,7 +109,7 @@ class Application {
   // application_sending.cpp
   static std::uint32_t heartbeat_time(std::uint32_t now_ms);
   void send_heartbeats(std::uint32_t now_ms);
-  void answer_heartbeat(Source to, bool aside, std::uint32_t now_ms);
+  void answer_heartbeat(Source to, std::uint32_t now_ms);
   void send_heartbeat(std::uint8_t port, std::uint32_t peer, bool aside, std::uint32_t now_ms);
   void send_states(std::uint32_t now_ms);
   void send_state(std::uint8_t port, const State& state, std::uint32_t t_ms);
@@ -117,6 +125,7 @@ class Application {
   Observer* observer_;
   Identity identity_;
   BoardLink link_;
+  Authentication authentication_;
   Guard guard_;
   Safety safety_;
   StateSchedule schedule_;

@@ -63,7 +63,8 @@ void Application::send_heartbeats(std::uint32_t now_ms) {
   link_.heartbeat_sent(heartbeat_time(now_ms));
 }
 
-void Application::answer_heartbeat(Source to, bool aside, std::uint32_t now_ms) {
+void Application::answer_heartbeat(Source to, std::uint32_t now_ms) {
+  const bool aside = link_.has_owner() && to != link_.owner();
   send_heartbeat(to.port, to.peer, aside, now_ms);
   link_.heartbeat_answered(heartbeat_time(now_ms));
 }
@@ -73,13 +74,16 @@ void Application::send_heartbeat(std::uint8_t port, std::uint32_t peer, bool asi
   PortSlot& slot = ports_[port];
   char buffer[short_datagram];
   Text heartbeat;
+  const Text nonce = authentication_.nonce();
+  const std::uint32_t t_ms = heartbeat_time(now_ms);
   if (link_.state() == BoardLinkState::connecting) {
-    heartbeat = write_board_heartbeat(buffer, sizeof buffer, 0, 0, safety_.reason());
+    heartbeat = write_board_heartbeat(buffer, sizeof buffer, 0, nonce.empty() ? 0 : t_ms,
+                                      safety_.reason(), nonce);
     slot.next_pnum = 1;
   } else {
     std::uint32_t& pnum = aside ? slot.aside_pnum : slot.next_pnum;
-    heartbeat = write_board_heartbeat(buffer, sizeof buffer, pnum++, heartbeat_time(now_ms),
-                                      safety_.reason());
+    if (pnum == 0 && !nonce.empty()) ++pnum;  // that would say CONNECTING
+    heartbeat = write_board_heartbeat(buffer, sizeof buffer, pnum++, t_ms, safety_.reason(), nonce);
   }
   slot.port->send(heartbeat, Urgency::normal, peer);
 }

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "../protocol/authentication.hpp"
 #include "../protocol/command.hpp"
 #include "hal.hpp"
 
@@ -22,6 +23,8 @@ class Observer {
   virtual void on_outputs(std::uint32_t t_ms, const Outputs& outputs) = 0;
   virtual void on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command) = 0;
   virtual void on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code) = 0;
+  // A heartbeat or command was dropped because its signature is not right, or not there.
+  virtual void on_rejected(std::uint32_t t_ms, Verdict verdict) = 0;
 
  protected:
   ~Observer() = default;

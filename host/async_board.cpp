@@ -19,6 +19,13 @@ Time steady_now() {
   return std::chrono::duration_cast<Time>(std::chrono::steady_clock::now().time_since_epoch());
 }
 
+// The session counts from the steady clock; since 1970 it is this much more.
+SessionOptions with_clock(SessionOptions options) {
+  const auto epoch = std::chrono::system_clock::now().time_since_epoch();
+  options.clock_start = std::chrono::duration_cast<Time>(epoch) - steady_now();
+  return options;
+}
+
 // Not in the event loop for this long: what has come meanwhile is a backlog, and of its states only
 // the newest is told.
 constexpr Time held_up{std::chrono::milliseconds{50}};
@@ -47,7 +54,7 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   Impl(asio::io_context& context, std::unique_ptr<Carrier> transport, BoardOptions options)
       : io(context),
         carrier(std::move(transport)),
-        session(*this, std::move(options.session), Session::random_first_pnum()),
+        session(*this, with_clock(std::move(options.session)), Session::random_first_pnum()),
         timer(context) {
     waiting.reserve(Session::max_pending + Session::max_stops);
     ended.reserve(Session::max_pending + Session::max_stops);

@@ -159,7 +159,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
 
   // Has the loop carry out a command. Throws if it is not confirmed.
   CallPtr execute(const Command& command, Duration timeout) {
-    const std::string text = text_of(command);
+    const std::string text = shown(command);
     must_not_be_in_loop(text);
     CallPtr call = std::make_shared<Call>(command);
     const auto deadline = Clock::now() + bounded(timeout) + grace;

@@ -6,6 +6,8 @@
 //     board.osmc(1).set(358, r4::Direction::forward);   // returns when the board's state confirms
 //     it board.on_state([](const r4::State& s) { … }); board.stop(); // every output safe, at once
 //
+// A board with a key obeys only who has it: BoardOptions options; options.session.key = key;
+//
 // The board goes safe by itself when this object is gone or its process hangs: the heartbeats stop.
 // Errors are thrown as r4::Error with the thing, the reason and the fix: open and permission when
 // the transport cannot be opened, usage for a wrong URL or a value outside its range, refused when

@@ -45,6 +45,16 @@ std::string text_of(const Command& command) {
   return std::string(field.substr(0, field.find_last_of(';')));
 }
 
+std::string shown(const Command& command) {
+  if (command.kind != CommandKind::setting || !is_secret_setting(command.text)) {
+    return text_of(command);
+  }
+  const std::string_view value(command.text2.data(), command.text2.size());
+  // Of a key, which one it is.
+  const std::size_t colon = command.text == key_setting ? value.find(':') + 1 : 0;
+  return text_of(Command::setting(command.text, Text(std::string(value.substr(0, colon)) + "...")));
+}
+
 std::string_view meaning_of(Refusal refusal) {
   switch (refusal) {
     case Refusal::none:
@@ -66,7 +76,7 @@ std::string_view meaning_of(Refusal refusal) {
     case Refusal::busy:
       return "another host controls the board";
     case Refusal::auth:
-      return "not authenticated, or only to be set over USB";
+      return "not signed with the board's key, or only to be set over USB";
   }
   return "unknown code";
 }
@@ -92,7 +102,7 @@ void require_valid(const Command& command) {
     throw Error(bad_command(text_of(command), refusal));
   }
   if (command.kind != CommandKind::fields && command.kind != CommandKind::setting) return;
-  std::array<char, max_datagram - DatagramWriter::trailer_max> buffer;
+  std::array<char, max_datagram - DatagramWriter::trailer_max - signature_max> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   write_command(writer, command);
   if (!writer.ok()) {

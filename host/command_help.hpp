@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "../protocol/authentication.hpp"
 #include "../protocol/command.hpp"
 #include "../protocol/settings.hpp"
 #include "../transports/error.hpp"
@@ -26,6 +27,9 @@ const CommandHelp* all_command_help();
 
 // The text of a command, as it is on the wire: "O:358,1,1".
 std::string text_of(const Command& command);
+
+// The same for people and logs to see: "C:password,...", "C:key,1:...".
+std::string shown(const Command& command);
 
 // Parses "O:358,1,1" (with or without the final ';'). Throws Error{usage} naming what is wrong. The
 // command's texts are views of `text`.

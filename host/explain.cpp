@@ -40,6 +40,25 @@ Words safe_words(SafeReason reason) {
   return {"the board is safe", "E:CLEAR clears a stop, a fault and a watchdog"};
 }
 
+Words key_words(KeyTrouble trouble) {
+  switch (trouble) {
+    case KeyTrouble::board_has_none:
+      return {"the board has no key, so it obeys anyone: refused",
+              "give it ours over USB (r4 key give FILE URL), or open it without a key"};
+    case KeyTrouble::needed:
+      return {"the board obeys only who has its key",
+              "open it with the key: --key FILE or R4_KEY of r4, SessionOptions::key in a program"};
+    case KeyTrouble::not_taken:
+      return {
+          "the board takes nothing that is signed with our key, or does not hear it",
+          "see that both have the same key (r4 key give FILE URL, over USB); where a round trip "
+          "takes more than 250 ms, signatures come too late"};
+    case KeyTrouble::none:
+      break;
+  }
+  return {};
+}
+
 Words link_words(const LinkStatus& link) {
   if (link.gated) {
     return {"the application watchdog has stopped our heartbeats",
@@ -49,6 +68,9 @@ Words link_words(const LinkStatus& link) {
     return {"another host controls the board",
             "stop that host; control is free when its heartbeats have stayed away for the board's "
             "timeout (1 s)"};
+  }
+  if (link.key != KeyTrouble::none && link.state != HostLinkState::lost) {
+    return key_words(link.key);
   }
   switch (link.state) {
     case HostLinkState::connecting:
@@ -67,7 +89,8 @@ Words link_words(const LinkStatus& link) {
 }
 
 bool link_is_well(const LinkStatus& link) {
-  return link.state == HostLinkState::active && !link.busy && !link.gated;
+  return link.state == HostLinkState::active && !link.busy && !link.gated &&
+         link.key == KeyTrouble::none;
 }
 
 Words refusal_words(std::string_view command, Refusal code, const LinkStatus& link) {
@@ -98,7 +121,10 @@ Words refusal_words(std::string_view command, Refusal code, const LinkStatus& li
       words.fix = "send it again if it is still wanted";
       break;
     case Refusal::auth:
-      words.fix = "give this host the board's key";
+      words.fix =
+          command.starts_with("C:")
+              ? "set it over USB; or, if the board has a key, open it with that (--key FILE)"
+              : key_words(KeyTrouble::needed).fix;
       break;
     case Refusal::none:
     case Refusal::duplicate:
@@ -108,6 +134,11 @@ Words refusal_words(std::string_view command, Refusal code, const LinkStatus& li
 }
 
 }  // namespace
+
+Problem explain(KeyTrouble trouble) {
+  Words words = key_words(trouble);
+  return {ErrorKind::refused, "key", std::move(words.reason), std::move(words.fix)};
+}
 
 Problem explain(std::string_view name, const LinkStatus& link) {
   Words words = link_words(link);

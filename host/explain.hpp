@@ -14,6 +14,9 @@ namespace r4 {
 // board" and "stop it, or …". `thing` is the board's name. Of kind refused.
 Problem explain(std::string_view name, const LinkStatus& link);
 
+// What is wrong with keys, and what to do; of kind refused. Not for KeyTrouble::none.
+Problem explain(KeyTrouble trouble);
+
 // Why `command` ("O:358,1,1") was not confirmed. `link` is the link at that time. Of kind refused.
 Problem explain(std::string_view command, const CommandResult& result, const LinkStatus& link);
 

@@ -19,15 +19,15 @@ struct PendingCommand {
   enum class Stage : std::uint8_t { free, queued, sent };
   Stage stage = Stage::free;
   CommandKind kind = CommandKind::heartbeat;
-  bool executed = false;   // the board said DUPLICATE: it has executed this number
-  bool overtaken = false;  // CMD is past it: the answer to a retry decides
-  bool doubtful = false;   // sent before an outage or while BUSY: a refusal proves nothing
+  bool executed = false;    // the board said DUPLICATE: it has executed this number
+  bool overtaken = false;   // CMD is past it: the answer to a retry decides
+  bool cable_only = false;  // a setting that is refused elsewhere
+  bool doubtful = false;    // sent before an outage or while BUSY: a refusal proves nothing
   std::uint32_t pnum = 0;
   std::uint64_t ticket = 0;
   std::chrono::microseconds started{0}, deadline{0}, retry{0};
-  std::size_t fields_size = 0;  // bytes of the command's field in `bytes`
-  std::size_t size = 0;         // bytes of the whole datagram, once sent
-  Command command;              // without its texts
+  std::size_t size = 0;  // of what is in `bytes`: the command's field; once sent, PNum and T too
+  Command command;       // without its texts
   std::array<char, max_datagram> bytes;
 };
 
@@ -51,9 +51,9 @@ class PendingCommands {
     PendingCommand& slot = slots_[order_[used_++]];
     slot.stage = PendingCommand::Stage::queued;
     slot.kind = kind;
-    slot.executed = slot.overtaken = slot.doubtful = false;
+    slot.executed = slot.overtaken = slot.cable_only = slot.doubtful = false;
     slot.pnum = 0;
-    slot.fields_size = slot.size = 0;
+    slot.size = 0;
     return &slot;
   }
 

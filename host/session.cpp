@@ -13,11 +13,6 @@ namespace r4 {
 
 namespace {
 
-std::uint32_t to_ms(Time time) {
-  return static_cast<std::uint32_t>(
-      std::chrono::duration_cast<std::chrono::milliseconds>(time).count());
-}
-
 constexpr Time busy_memory = std::chrono::milliseconds{300};
 constexpr Time selection_retry = std::chrono::milliseconds{200};
 constexpr int max_selections = 5;  // a board that does not know F is left alone
@@ -34,6 +29,7 @@ Session::Session(Handler& handler, SessionOptions options, std::uint32_t first_p
       options_(std::move(options)),
       first_pnum_(first_pnum),
       link_(options_.timing, first_pnum),
+      key_(options_.key, options_.clock_start),
       pending_(max_pending, max_stops) {
   if (!options_.fields.empty()) {
     const std::string fields = options_.fields;
@@ -70,10 +66,7 @@ void Session::receive(std::string_view bytes, Time now) {
       on_identity_datagram(datagram, now);
       break;
     case MessageKind::board_heartbeat:
-      current = is_current(link_.on_datagram(datagram.pnum(),
-                                             static_cast<std::uint32_t>(datagram.time_ms()), true,
-                                             heartbeat_reason(datagram), to_ms(now)));
-      handler_.on_board_heartbeat(datagram);
+      current = on_heartbeat_datagram(datagram, now);
       break;
     default:
       current = on_state_datagram(datagram, now);
@@ -81,6 +74,22 @@ void Session::receive(std::string_view bytes, Time now) {
   }
   refresh_status(now);
   if (current) confirm_stop(before, now);
+}
+
+// Returns whether it is the newest datagram of the board.
+bool Session::on_heartbeat_datagram(const Datagram& datagram, Time now) {
+  const bool connecting = is_connecting_heartbeat(datagram);
+  const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
+  const SafeReason reason = heartbeat_reason(datagram);
+  const bool current = is_current(
+      link_.on_datagram(datagram.pnum(), connecting ? 0 : t_ms, true, reason, to_ms(now)));
+  if (current) {
+    if (key_.on_heartbeat(datagram)) doubt_sent();
+    key_.on_board_time(t_ms, now);
+    if (!connecting && reason != SafeReason::link) key_.on_host_seen();
+  }
+  handler_.on_board_heartbeat(datagram);
+  return current;
 }
 
 // Returns whether it is the newest datagram of the board.
@@ -101,6 +110,10 @@ bool Session::on_state_datagram(const Datagram& datagram, Time now) {
   const bool newest_state = arrival == Arrival::late && newer(fresh.pnum, state_.pnum);
   if (!is_current(arrival) && !newest_state) return false;
   collector_.on_state(fresh.t_ms, now);
+  if (!newest_state) {
+    key_.on_board_time(fresh.t_ms, now);
+    key_.on_host_seen();
+  }
   state_ = fresh;
   state_.safe = reason;
   refresh_status(now);
@@ -117,7 +130,10 @@ void Session::on_nack_datagram(const Datagram& datagram, Time now) {
   knows_cmd_ = true;                // the paper's release answers nothing
   if (nack.code == Refusal::busy) busy_until_ = now + busy_memory;
   on_answer(datagram, now);
-  if (nack.pnum == newest_clear_ && nack.code != Refusal::busy) clear_open_ = false;
+  const bool not_taken = nack.code == Refusal::auth && !is_cable_only(nack.pnum);
+  if (not_taken) key_.on_refusal(now);
+  const bool proof = !(not_taken && key_.has_key());
+  if (nack.pnum == newest_clear_ && nack.code != Refusal::busy && proof) clear_open_ = false;
   handler_.on_nack(nack, datagram);
   for (Pending& pending : pending_.under_way()) {
     if (pending.stage != Stage::sent || pending.pnum != nack.pnum) continue;
@@ -127,11 +143,12 @@ void Session::on_nack_datagram(const Datagram& datagram, Time now) {
       continue;
     }
     // A refusal proves that the command was not executed only while the board remembers: not over
-    // an outage, a reboot, another host's control or too many numbers, nor before we had control.
+    // an outage, a reboot, another host's control, another nonce or too many numbers, nor before we had
+    // control.
     // Then the deadline ends it, as unknown.
     if (nack.code == Refusal::busy) pending.doubtful = true;
-    const bool remembered =
-        !pending.doubtful && link_up() && link_.last_pnum() - pending.pnum < BoardLink::memory;
+    const bool remembered = proof && !pending.doubtful && link_up() &&
+                            link_.last_pnum() - pending.pnum < BoardLink::memory;
     if (remembered) finish(pending, Outcome::refused, nack.code, now);
   }
 }
@@ -149,6 +166,14 @@ void Session::on_identity_datagram(const Datagram& datagram, Time now) {
       finish(pending, Outcome::confirmed, Refusal::none, now);
     }
   }
+}
+
+// Is that one of our settings that the board takes over a cable only?
+bool Session::is_cable_only(std::uint32_t pnum) {
+  for (const Pending& pending : pending_.under_way()) {
+    if (pending.stage == Stage::sent && pending.pnum == pnum) return pending.cable_only;
+  }
+  return false;
 }
 
 // Have we sent a datagram with that number?
@@ -221,7 +246,7 @@ void Session::select_fields(Time now) {
   if (now < next_selection_ || speaks_no_cmd()) return;
   ++selections_;
   next_selection_ = now + selection_retry;
-  transmit_now(Command::fields(options_.fields), to_ms(now), Priority::normal);
+  transmit_now(Command::fields(options_.fields), to_ms(now), Priority::normal, now);
 }
 
 // A command that chooses fields, with those that we need; the choice is remembered.
@@ -245,9 +270,11 @@ Time Session::poll(Time now) {
   link_.poll(to_ms(now));
   refresh_status(now);
   if (link_.heartbeat_due(to_ms(now))) {
-    transmit_now(Command::heartbeat(), link_.echo(), Priority::normal);
+    if (transmit_now(Command::heartbeat(), link_.echo(), Priority::normal, now)) {
+      ++collector_.counts.heartbeats;
+      key_.on_heartbeat_sent();
+    }
     link_.heartbeat_sent(to_ms(now));
-    ++collector_.counts.heartbeats;
   }
   for (Pending& pending : pending_.under_way()) {
     if (now >= pending.deadline) {
@@ -261,7 +288,7 @@ Time Session::poll(Time now) {
     next_identify_ = now + options_.identify_interval;
     question_sent_ = now;
     question_open_ = true;
-    transmit_now(Command::identify(), to_ms(now), Priority::normal);
+    transmit_now(Command::identify(), to_ms(now), Priority::normal, now);
   }
 
   Time next = now + std::chrono::milliseconds{link_.due_in(to_ms(now))};
@@ -283,7 +310,7 @@ void Session::on_transport(bool up, Time now) {
 }
 
 bool Session::link_up() const {
-  if (!link_.echoed()) return false;
+  if (!link_.echoed() || key_.refuses_board()) return false;
   switch (link_.state()) {
     case HostLinkState::active:
       return true;
@@ -306,166 +333,23 @@ bool Session::in_control(Time now) const {
 // The paper's release: it has let our selections pass, and has never answered anything.
 bool Session::speaks_no_cmd() const { return !knows_cmd_ && selections_ >= max_selections; }
 
+// From now on a refusal does not prove that what was sent before was not executed.
+void Session::doubt_sent() {
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.stage == Stage::sent) pending.doubtful = true;
+  }
+}
+
 void Session::refresh_status(Time now) {
   if (!link_up() || busy_until_ > now) {
     controlled_ = false;
-    for (Pending& pending : pending_.under_way()) {
-      if (pending.stage == Stage::sent) pending.doubtful = true;
-    }
+    doubt_sent();
   }
   const LinkStatus fresh{link_.state(), link_.reason(), busy_until_ > now,
-                         link_.watchdog_expired(to_ms(now))};
+                         link_.watchdog_expired(to_ms(now)), key_.trouble(now)};
   if (fresh == status_) return;
   status_ = fresh;
   handler_.on_link(status_);
-}
-
-// --- what goes out
-
-// A datagram of which no copy is kept.
-void Session::transmit_now(const Command& command, std::uint32_t t_ms, Priority priority) {
-  std::array<char, max_datagram> buffer;
-  DatagramWriter writer(buffer.data(), buffer.size());
-  write_command(writer, command);
-  const Text bytes = writer.finish(take_pnum(command.kind), t_ms);
-  if (!bytes.empty()) handler_.transmit({bytes.data(), bytes.size()}, priority);
-}
-
-std::uint32_t Session::take_pnum(CommandKind kind) {
-  const std::uint32_t pnum = link_.take_pnum();
-  if (kind == CommandKind::clear) {
-    newest_clear_ = pnum;
-    clear_open_ = true;
-  }
-  return pnum;
-}
-
-Session::Pending* Session::allocate(const Command& command, Time timeout, Time now) {
-  Pending* const slot = pending_.add(command.kind);
-  if (slot == nullptr) return nullptr;
-  DatagramWriter writer(slot->bytes.data(), slot->bytes.size());
-  write_command(writer, command);
-  slot->fields_size = writer.size();
-  slot->command = command;
-  slot->command.text = slot->command.text2 = Text();
-  slot->ticket = next_ticket_++;
-  slot->started = now;
-  slot->deadline = now + timeout;
-  return slot;
-}
-
-Ticket Session::send(const Command& command, Time timeout, Time now) {
-  require_valid(command);
-  Pending* pending = allocate(with_needed_fields(command), timeout, now);
-  if (pending == nullptr) return 0;
-  ++collector_.counts.commands;
-  const Ticket ticket = pending->ticket;
-  send_queued(now);
-  return ticket;
-}
-
-bool Session::post(const Command& command, Time now) {
-  require_valid(command);
-  send_queued(now);  // what was asked for earlier goes first
-  if (!in_control(now)) return false;
-  ++collector_.counts.commands;
-  transmit_now(command, to_ms(now), Priority::normal);
-  return true;
-}
-
-Ticket Session::stop(Time timeout, Time now) {
-  ++collector_.counts.commands;
-  Ticket ticket = 0;
-  if (Pending* pending = allocate(Command::stop(), timeout, now)) {
-    ticket = pending->ticket;
-    transmit(*pending, now);
-  } else {
-    transmit_now(Command::stop(), to_ms(now), Priority::stop);
-  }
-  // Nothing that was asked for before a stop may follow it.
-  for (Pending& pending : pending_.under_way()) {
-    if (pending.kind != CommandKind::stop) {
-      finish(pending, Outcome::cancelled, Refusal::none, now);
-    }
-  }
-  return ticket;
-}
-
-Ticket Session::identify(Time timeout, Time now) {
-  Pending* pending = allocate(Command::identify(), timeout, now);
-  if (pending == nullptr) return 0;
-  const Ticket ticket = pending->ticket;
-  transmit(*pending, now);
-  return ticket;
-}
-
-// Sends a pending command: the first time with a number of its own, then the same bytes again.
-void Session::transmit(Pending& pending, Time now) {
-  const bool stop = pending.kind == CommandKind::stop;
-  if (pending.stage == Stage::queued) {
-    pending.pnum = take_pnum(pending.kind);
-    // The field is there already; finish() appends what follows it.
-    DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.fields_size);
-    pending.size = writer.finish(pending.pnum, to_ms(now)).size();
-    pending.doubtful = !controlled_ && !options_.fields.empty();
-    pending.stage = Stage::sent;
-    if (pending.kind == CommandKind::identify) {
-      question_sent_ = now;
-      question_open_ = true;
-    }
-  } else {
-    ++collector_.counts.retries;
-  }
-  pending.retry = now + (stop ? Time{options_.stop_retry} : Time{options_.command_retry});
-  handler_.transmit(std::string_view(pending.bytes.data(), pending.size),
-                    stop ? Priority::stop : Priority::normal);
-}
-
-// In the order of send(): tickets rise.
-void Session::send_queued(Time now) {
-  if (!in_control(now)) return;
-  for (Pending& pending : pending_.under_way()) {
-    if (pending.stage == Stage::queued) transmit(pending, now);
-  }
-}
-
-void Session::retry_due(Time now) {
-  for (Pending& pending : pending_.under_way()) {
-    if (pending.stage == Stage::sent && now >= pending.retry) transmit(pending, now);
-  }
-}
-
-void Session::finish(Pending& pending, Outcome outcome, Refusal code, Time now) {
-  switch (outcome) {
-    case Outcome::confirmed:
-      ++collector_.counts.confirmed;
-      break;
-    case Outcome::refused:
-      ++collector_.counts.refused;
-      break;
-    case Outcome::timed_out:
-      ++collector_.counts.timed_out;
-      break;
-    case Outcome::cancelled:
-    case Outcome::full:
-      break;
-  }
-  const Ticket ticket = pending.ticket;
-  const CommandResult result{outcome, code, now - pending.started};
-  pending_.remove(pending);  // before the call: the handler may send again
-  handler_.on_result(ticket, result);
-}
-
-void Session::forget(Ticket ticket) {
-  for (Pending& pending : pending_.under_way()) {
-    if (pending.ticket == ticket) pending_.remove(pending);
-  }
-}
-
-void Session::cancel_all(Time now) {
-  for (Pending& pending : pending_.under_way()) {
-    finish(pending, Outcome::cancelled, Refusal::none, now);
-  }
 }
 
 void Session::watchdog(std::chrono::milliseconds period, Time now) {

@@ -9,9 +9,12 @@
 //                          +--+ the same bytes   deadline    ------> timed out
 //                         every 50 ms
 //
-// A retry has the bytes and the packet number of the original, so the board can execute it only
-// once. When CMD has moved past a command, the retry's answer (DUPLICATE: executed, STALE: not)
+// A retry has the bytes and the packet number of the original (signed anew, where there is a key), so
+// the board can execute it only once. When CMD has moved past a command, the retry's answer (DUPLICATE: executed, STALE: not)
 // decides. A board without CMD (the paper's release) confirms by the value that its state shows.
+//
+// With a key (host_key.hpp) all is signed, a board without one is refused, and AUTH says only that one
+// copy was not taken: another may have been executed.
 //
 // E:STOP does not wait for the link, overtakes everything, discards all commands that wait, and is
 // repeated every 20 ms until the board reports the reason `stop`: in a datagram that comes after it
@@ -20,6 +23,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -28,13 +32,12 @@
 #include "../protocol/message.hpp"
 #include "../protocol/state.hpp"
 #include "../transports/carrier.hpp"
+#include "host_key.hpp"
 #include "pending_commands.hpp"
 #include "statistics.hpp"
+#include "time.hpp"
 
 namespace r4 {
-
-// Time of the host's steady clock; any start.
-using Time = std::chrono::microseconds;
 
 // What the host knows of the link.
 struct LinkStatus {
@@ -42,6 +45,7 @@ struct LinkStatus {
   SafeReason reason = SafeReason::none;  // why the board is safe
   bool busy = false;                     // another host controls the board
   bool gated = false;                    // the application watchdog has stopped our heartbeats
+  KeyTrouble key = KeyTrouble::none;
   friend bool operator==(const LinkStatus&, const LinkStatus&) = default;
 };
 
@@ -72,6 +76,12 @@ struct SessionOptions {
   std::chrono::milliseconds stop_retry{20};
   // Q:ID, for identity and round-trip time; 0: never.
   std::chrono::milliseconds identify_interval{1000};
+  // The board's key. Each host has its own, by its id: of two that share one, the slower is taken for
+  // a replay.
+  std::optional<Key> key;
+  // When the session's clock began, in microseconds since 1970: a host that begins again must go on
+  // counting above what it has used.
+  Time clock_start{0};
 };
 
 class Session {
@@ -146,26 +156,31 @@ class Session {
   void send_queued(Time now);
   void retry_due(Time now);
   void finish(Pending& pending, Outcome outcome, Refusal code, Time now);
-  void transmit_now(const Command& command, std::uint32_t t_ms, Priority priority);
+  bool transmit_now(const Command& command, std::uint32_t t_ms, Priority priority, Time now);
+  bool close_and_transmit(DatagramWriter& writer, CommandKind kind, Priority priority, Time now);
   std::uint32_t take_pnum(CommandKind kind);
   bool link_up() const;
   bool speaks_no_cmd() const;
 
+  bool on_heartbeat_datagram(const Datagram& datagram, Time now);
   bool on_state_datagram(const Datagram& datagram, Time now);
   void on_identity_datagram(const Datagram& datagram, Time now);
   void on_nack_datagram(const Datagram& datagram, Time now);
   void on_answer(const Datagram& datagram, Time now);
   bool is_ours(std::uint32_t pnum) const;
+  bool is_cable_only(std::uint32_t pnum);
   void confirm_from_state(Time now);
   void confirm_stop(Ticket before, Time now);
   void select_fields(Time now);
   Command with_needed_fields(const Command& command);
+  void doubt_sent();
   void refresh_status(Time now);
 
   Handler& handler_;
   SessionOptions options_;
   std::uint32_t first_pnum_;
   HostLink link_;
+  HostKey key_;
   bool controlled_ = false;  // the board has executed a command of ours since the link came up
   LinkStatus status_;
   State state_;

@@ -106,9 +106,13 @@ void DatagramWriter::truncate(std::size_t size) {
   has_value_ = open_;
 }
 
-Text DatagramWriter::finish(std::uint32_t pnum, std::uint64_t t_ms) {
+DatagramWriter& DatagramWriter::stamp(std::uint32_t pnum, std::uint64_t t_ms) {
   field(pnum_name).value(pnum);
-  field(time_name).value(t_ms);
+  return field(time_name).value(t_ms);
+}
+
+Text DatagramWriter::finish(std::uint32_t pnum, std::uint64_t t_ms) {
+  stamp(pnum, t_ms);
   return finish();
 }
 

@@ -68,12 +68,15 @@ class DatagramWriter {
 
   // Bytes written so far, and whether all of them did fit and were allowed.
   std::size_t size() const { return static_cast<std::size_t>(at_ - begin_); }
+  Text written() const { return Text(begin_, size()); }
   bool ok() const { return ok_; }
 
   // Takes everything after `size` back (a field that turned out too long for a split datagram).
   // `size` is what size() was before a field(), while ok() was true; it is true again.
   void truncate(std::size_t size);
 
+  // Writes PNum and T: the last fields, but for a signature (authentication.hpp).
+  DatagramWriter& stamp(std::uint32_t pnum, std::uint64_t t_ms);
   // Closes with PNum, T and the CRC. An empty Text if anything did not fit or was not allowed, or
   // if the datagram is longer than max_datagram.
   Text finish(std::uint32_t pnum, std::uint64_t t_ms);

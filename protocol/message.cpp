@@ -10,6 +10,7 @@ namespace {
 
 constexpr Text board_heartbeat_word("R4-ROS2");
 constexpr Text board_word("R4");
+constexpr Text nonce_name("AN");
 
 }  // namespace
 
@@ -44,12 +45,13 @@ MessageKind kind_of(const Datagram& datagram) {
 }
 
 Text write_board_heartbeat(char* buffer, std::size_t capacity, std::uint32_t pnum,
-                           std::uint32_t t_ms, SafeReason safe) {
+                           std::uint32_t t_ms, SafeReason safe, Text nonce) {
   DatagramWriter writer(buffer, capacity);
   writer.field("H").value(board_heartbeat_word);
   writer.field("PNum").value(pnum);
   writer.field("T").value(t_ms);
   if (safe != SafeReason::none) writer.field("SAFE").value(static_cast<std::uint32_t>(safe));
+  if (!nonce.empty()) writer.field(nonce_name).value(nonce);
   return writer.finish();
 }
 
@@ -58,6 +60,16 @@ SafeReason heartbeat_reason(const Datagram& datagram) {
   if (field.name().empty()) return SafeReason::none;
   SafeReason reason = SafeReason::none;
   return parse_safe_reason(field.values(), reason) ? reason : SafeReason::fault;
+}
+
+Text heartbeat_nonce(const Datagram& datagram) {
+  const Text nonce = datagram.find(nonce_name).values();
+  return nonce.size() == nonce_size ? nonce : Text();
+}
+
+bool is_connecting_heartbeat(const Datagram& datagram) {
+  if (!datagram.has_pnum() || datagram.pnum() != 0) return false;
+  return datagram.time_ms() == 0 || !heartbeat_nonce(datagram).empty();
 }
 
 bool read_nack(const Datagram& datagram, Nack& out) {

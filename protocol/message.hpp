@@ -5,6 +5,7 @@
 
 #include <cstdint>
 
+#include "authentication.hpp"
 #include "datagram.hpp"
 #include "datagram_writer.hpp"
 #include "refusal.hpp"
@@ -26,12 +27,18 @@ const char* to_text(MessageKind kind);
 
 MessageKind kind_of(const Datagram& datagram);
 
-// The board's heartbeat: `H:R4-ROS2;PNum:…;T:…;`, with `SAFE:n;` behind the T while n is not 0.
+// The board's heartbeat: `H:R4-ROS2;PNum:…;T:…;`, with `SAFE:n;` behind the T while n is not 0, and
+// `AN:<nonce>;` behind that unless there is none (authentication.hpp).
 Text write_board_heartbeat(char* buffer, std::size_t capacity, std::uint32_t pnum,
-                           std::uint32_t t_ms, SafeReason safe);
+                           std::uint32_t t_ms, SafeReason safe, Text nonce = Text());
 // The reason that a board heartbeat carries; none if it carries no SAFE. One that cannot be read is
 // taken for a fault.
 SafeReason heartbeat_reason(const Datagram& datagram);
+// The nonce that it carries; empty if it carries none.
+Text heartbeat_nonce(const Datagram& datagram);
+// Does it say that the board waits for a host, in CONNECTING? Its PNum is 0 then, and its T too,
+// unless it carries a nonce.
+bool is_connecting_heartbeat(const Datagram& datagram);
 
 // A refusal: which command of ours, and why. False if the datagram's N field is not of that form.
 struct Nack {

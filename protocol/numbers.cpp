@@ -243,4 +243,22 @@ char* write_hex(char* out, std::uint32_t value) {
   return out;
 }
 
+char* write_hex(char* out, const std::uint8_t* bytes, std::size_t size) {
+  for (std::size_t i = 0; i < size; ++i) {
+    *out++ = "0123456789abcdef"[bytes[i] >> 4];
+    *out++ = "0123456789abcdef"[bytes[i] & 0xFU];
+  }
+  return out;
+}
+
+bool parse_hex(Text text, std::uint8_t* out, std::size_t size) {
+  if (text.size() != 2 * size) return false;
+  for (std::size_t i = 0; i < size; ++i) {
+    std::uint32_t byte = 0;
+    if (!parse_hex(text.substr(2 * i, 2), byte)) return false;
+    out[i] = static_cast<std::uint8_t>(byte);
+  }
+  return true;
+}
+
 }  // namespace r4

@@ -26,6 +26,8 @@ bool parse_hundredths(Text text, std::int32_t& out);
 
 // 1 to 8 hexadecimal digits, either case, leading zeros allowed.
 bool parse_hex(Text text, std::uint32_t& out);
+// Bytes, two digits each: `size` of them, neither more nor fewer. `out` is written on refusal, too.
+bool parse_hex(Text text, std::uint8_t* out, std::size_t size);
 
 // The longest text that a writer below produces ("-2147483648", 20 digits of a 64-bit number).
 constexpr std::size_t max_number_text = 20;
@@ -37,5 +39,7 @@ char* write_number(char* out, std::uint64_t value);
 char* write_number(char* out, std::int32_t value);
 char* write_hundredths(char* out, std::int32_t hundredths);  // always two decimals: "1.00"
 char* write_hex(char* out, std::uint32_t value);             // lower case, no leading zeros
+// Bytes, two digits each, lower case; `out` must have room for them.
+char* write_hex(char* out, const std::uint8_t* bytes, std::size_t size);
 
 }  // namespace r4

@@ -10,9 +10,10 @@ namespace {
 
 constexpr Text off_word("off");
 
-enum class Site : int { network, password, host, port, node, chips, count };
+enum class Site : int { network, password, host, port, node, chips, key, count };
 constexpr int site_count = static_cast<int>(Site::count);
-constexpr Text site_keys[site_count] = {"network", "password", "host", "port", "node", "chips"};
+constexpr Text site_keys[site_count] = {"network", "password", "host",     "port",
+                                        "node",    "chips",    key_setting};
 
 struct Range {
   std::uint32_t min;
@@ -121,6 +122,26 @@ Refusal set_host(SiteSettings& settings, Text value) {
   return Refusal::none;
 }
 
+// `<id>:off`, or a key as parse_key() takes it.
+Refusal set_key(Key (&keys)[max_keys], Text value) {
+  Key key;
+  Text rest;
+  Refusal refusal = split_key(value, key.id, rest);
+  if (refusal != Refusal::none) return refusal;
+  const bool off = rest == off_word;
+  if (!off) refusal = parse_key(value, key);
+  if (refusal != Refusal::none) return refusal;
+  int at = 0;
+  while (at < max_keys && keys[at].id != 0 && keys[at].id != key.id) ++at;
+  if (!off) {
+    if (at == max_keys) return Refusal::range;
+    keys[at] = key;
+    return Refusal::none;
+  }
+  for (; at < max_keys; ++at) keys[at] = at + 1 < max_keys ? keys[at + 1] : Key();
+  return Refusal::none;
+}
+
 constexpr StateField analog_fields[analog_channels] = {StateField::ain24,    StateField::ain12,
                                                        StateField::ain5,     StateField::aindmh,
                                                        StateField::ainsteer, StateField::ain6};
@@ -167,12 +188,20 @@ bool operator==(const SiteSettings& a, const SiteSettings& b) {
   for (int i = 0; i < analog_channels; ++i) {
     if (a.full_scale_cv[i] != b.full_scale_cv[i]) return false;
   }
+  for (int i = 0; i < max_keys; ++i) {
+    if (a.keys[i] != b.keys[i]) return false;
+  }
   return std::strcmp(a.network, b.network) == 0 && std::strcmp(a.password, b.password) == 0 &&
          a.host == b.host && a.udp_port == b.udp_port && a.can_node == b.can_node &&
          a.chips == b.chips;
 }
 
 bool is_site_setting(Text key) { return index_of(key) >= 0; }
+
+bool is_secret_setting(Text key) {
+  const int index = index_of(key);
+  return index == static_cast<int>(Site::password) || index == static_cast<int>(Site::key);
+}
 
 Refusal set(SiteSettings& settings, Text key, Text value) {
   const int index = index_of(key);
@@ -191,6 +220,8 @@ Refusal set(SiteSettings& settings, Text key, Text value) {
       return set_number(settings.can_node, value, Range{0, 31});
     case Site::chips:
       return set_number(settings.chips, value, Range{0, 31});
+    case Site::key:
+      return set_key(settings.keys, value);
     case Site::count:
       break;
   }
@@ -199,9 +230,18 @@ Refusal set(SiteSettings& settings, Text key, Text value) {
 
 bool get(const SiteSettings& settings, int index, Text& key, char (&out)[max_site_value],
          Text& value) {
-  if (index < 0 || index >= site_count + analog_channels) return false;
-  if (index >= site_count) {
-    const int input = index - site_count;
+  // The single ones, the analog inputs, the keys.
+  constexpr int first_input = static_cast<int>(Site::key);
+  constexpr int first_key = first_input + analog_channels;
+  if (index < 0 || index >= first_key + max_keys) return false;
+  if (index >= first_key) {
+    const Key& one = settings.keys[index - first_key];
+    key = site_keys[static_cast<int>(Site::key)];
+    value = Text(out, static_cast<std::size_t>(write_key(out, one) - out));
+    return one.id != 0;
+  }
+  if (index >= first_input) {
+    const int input = index - first_input;
     key = name_of(analog_fields[input]);
     char* const end = write_hundredths(out, std::int32_t{settings.full_scale_cv[input]});
     value = Text(out, static_cast<std::size_t>(end - out));
@@ -225,6 +265,7 @@ bool get(const SiteSettings& settings, int index, Text& key, char (&out)[max_sit
       value = write(out, std::uint32_t{settings.can_node});
       break;
     case Site::chips:
+    case Site::key:
     case Site::count:
       value = write(out, std::uint32_t{settings.chips});
       break;

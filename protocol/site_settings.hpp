@@ -15,17 +15,20 @@
 //     chips      0-31                  31       which chips are fitted: 1 OSMC, 2 DHB12, 4 expander,
 //                                               8 DAC, 16 servos
 //     AIN24 …    volts, 0.01-650       50.00    of that analog input at full scale
+//     key        id:64 hex digits      none     a key, of id 1-9 (key.hpp); `id:off`: it is none any
+//                                               more. At most four
 //
 // In a name or password, what the grammar does not allow is written as in URLs: %2C is a comma, %25
 // a percent sign, %6Fff the network that is called "off".
 //
-// network, password, host and port count at once, the others when the board starts next; analog
-// inputs at once.
+// network, password, host, port, key and analog inputs count at once, the others when the board starts
+// next.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
+#include "key.hpp"
 #include "refusal.hpp"
 #include "state.hpp"
 #include "text.hpp"
@@ -44,17 +47,22 @@ struct SiteSettings {
   std::uint8_t can_node = 1;
   std::uint8_t chips = 31;
   std::uint16_t full_scale_cv[analog_channels] = {5000, 5000, 5000, 5000, 5000, 5000};
+  Key keys[max_keys];  // those there are come first
 };
 bool operator==(const SiteSettings& a, const SiteSettings& b);
 
+constexpr Text key_setting("key");
+
 bool is_site_setting(Text key);
+// Is it one whose value is for nobody to see: `password`, `key`?
+bool is_secret_setting(Text key);
 // As set() of settings.hpp.
 Refusal set(SiteSettings& settings, Text key, Text value);
 
 // The longest text of a value: each byte of a password as %XX.
 constexpr std::size_t max_site_value = 3 * password_max;
 // The value of setting `index` (0 …) as set() takes it, in `out`; its key in `key`. False: there is
-// no such setting.
+// no such setting. For keeping them, not for telling: the secret ones are among them.
 bool get(const SiteSettings& settings, int index, Text& key, char (&out)[max_site_value],
          Text& value);
 

@@ -79,11 +79,16 @@ class EventLog final : public firmware::Observer {
     refused.push_back(std::to_string(pnum) + " " + str(name_of(code)));
   }
 
+  void on_rejected(std::uint32_t, Verdict verdict) override {
+    rejected.emplace_back(to_text(verdict));
+  }
+
   std::vector<std::string> states;
   std::uint32_t state_ms = 0;  // of the newest
   int outputs = 0;             // changes
   std::vector<std::uint32_t> executed;
   std::vector<std::string> refused;
+  std::vector<std::string> rejected;
 };
 
 // A datagram of the board, read.
@@ -105,6 +110,8 @@ class TestBoard {
     config.identity.board_id = "R4-7";
     config.identity.capabilities = "udp+serial";
     config.settings = settings;
+    const std::uint8_t chance[Authentication::chance_size] = {1, 2, 3};
+    config.chance = chance;
     application = std::make_unique<firmware::Application>(hal, config, &log);
     for (int i = 0; i < port_count; ++i) {
       ports[i].now_ms = &now_ms;

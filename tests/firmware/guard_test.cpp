@@ -197,6 +197,7 @@ TEST_F(GuardedBoard, WhatTheGuardTookOffStaysOffUntilTheApplicationKnows) {
     void on_outputs(std::uint32_t, const firmware::Outputs&) override {}
     void on_executed(std::uint32_t, std::uint32_t, const Command&) override { trip(); }
     void on_refused(std::uint32_t, std::uint32_t, Refusal) override {}
+    void on_rejected(std::uint32_t, Verdict) override {}
     std::function<void()> trip = [] {};
   } observer;
   MemoryHal hal;

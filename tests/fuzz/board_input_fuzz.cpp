@@ -6,7 +6,9 @@
 // port, bit 3 a checksum is put behind the payload, bits 4-6 how much time passes before. A payload
 // that begins with '!' is something that happens around the board. In others, to reach what only a
 // host in session reaches: $T stands for the T of the newest heartbeat that the peer heard, $N for
-// its next packet number in the upper half, $L for its last, $P for its next in the lower half.
+// its next packet number in the upper half, $L for its last, $P for its next in the lower half, $A for
+// a right signature of what is before it. If the first payload is "!k", the board has a key: then
+// nothing is executed, and no heartbeat feeds, without such a signature, but a stop.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
@@ -14,6 +16,7 @@
 #include <string>
 
 #include "firmware/application.hpp"
+#include "protocol/authentication.hpp"
 #include "protocol/crc32.hpp"
 
 namespace {
@@ -51,8 +54,11 @@ constexpr std::uint32_t peers = 4;
 // A board with what is around it, and what its hosts would know.
 class World final : public firmware::Hal, public firmware::Observer {
  public:
-  World() {
+  explicit World(bool keyed) : keyed_(keyed) {
     firmware::Application::Config config;
+    const std::uint8_t chance[Authentication::chance_size] = {1};
+    config.chance = chance;
+    if (keyed) config.settings.site.keys[0] = key();
     config.identity = Identity{"1", "fuzz", "none"};
     board_ = std::make_unique<firmware::Application>(*this, config, this);
     for (int i = 0; i < ports; ++i) {
@@ -69,6 +75,7 @@ class World final : public firmware::Hal, public firmware::Observer {
     pass(waits_ms[control >> 4 & 7]);
     if (!payload.empty() && payload[0] == '!') return happen(payload);
     const Source from{static_cast<std::uint8_t>(control >> 2 & 1), control & 3U};
+    signed_ = !keyed_;
     std::string bytes = expand(payload, host(from));
     if ((control & 8) != 0) append_checksum(bytes);
     receive(from, bytes);
@@ -113,6 +120,7 @@ class World final : public firmware::Hal, public firmware::Observer {
     stop_ = command.kind == CommandKind::stop;
   }
   void on_refused(std::uint32_t, std::uint32_t, Refusal) override { ++refused_; }
+  void on_rejected(std::uint32_t, Verdict) override { ++rejected_; }
 
   void on_sent(int port, Text bytes, std::uint32_t peer) {
     require(bytes.size() <= ports_[port].limit);
@@ -172,13 +180,14 @@ class World final : public firmware::Hal, public firmware::Observer {
     Datagram datagram;
     const bool valid = static_cast<bool>(read(Text(bytes), datagram));
     const MessageKind kind = valid ? kind_of(datagram) : MessageKind::state;
-    if (kind == MessageKind::host_heartbeat) {
+    if (kind == MessageKind::host_heartbeat && signed_) {
       heard_any_ = true;
       heard_ms_ = now_ms_;
     }
     const Outputs before = outputs_;
+    const BoardLinkState state = board().link().state();
     const int sent = sent_;
-    executed_ = refused_ = 0;
+    executed_ = refused_ = rejected_ = 0;
     stop_ = false;
     board().receive(from.port, from.peer, Text(bytes), now_ms_);
     // A damaged datagram does nothing and is not answered.
@@ -187,13 +196,15 @@ class World final : public firmware::Hal, public firmware::Observer {
     if (outputs_ != before && outputs_ != Outputs()) {
       require(executed_ == 1 || kind == MessageKind::host_heartbeat);
     }
-    require(executed_ + refused_ <= 1);
+    require(executed_ + refused_ <= 1 && rejected_ <= (keyed_ ? 1 : 0));
+    if (!signed_)
+      require(board().link().state() == state || board().link().state() == BoardLinkState::lost);
     if (executed_ != 0) {
       require(valid && kind == MessageKind::command && datagram.pnum() == executed_pnum_);
       if (stop_) {
         require(outputs_ == Outputs() && board().reason() == SafeReason::stop);
       } else {
-        require(board().link().has_owner() && board().link().owner() == from);
+        require(signed_ && board().link().has_owner() && board().link().owner() == from);
         require(datagram.has_pnum() && board().link().last_executed() == executed_pnum_);
       }
     }
@@ -232,6 +243,9 @@ class World final : public firmware::Hal, public firmware::Observer {
         case 'P':
           bytes += std::to_string(host.low++);
           break;
+        case 'A':
+          sign(bytes);
+          break;
         default:
           bytes += payload[i];
           continue;
@@ -239,6 +253,20 @@ class World final : public firmware::Hal, public firmware::Observer {
       ++i;
     }
     return bytes;
+  }
+
+  static Key key() {
+    Key key;
+    key.id = 1;
+    return key;
+  }
+  void sign(std::string& bytes) {
+    const Text nonce = board().authentication().nonce();
+    bytes += "A:1," + std::to_string(++counter_) + "," + std::to_string(now_ms_);
+    char tag[tag_size];
+    write_tag(signing_key(key()), nonce, Text(bytes), tag);
+    bytes += "," + std::string(tag, tag_size);
+    signed_ = true;
   }
 
   static void append_checksum(std::string& bytes) {
@@ -250,6 +278,9 @@ class World final : public firmware::Hal, public firmware::Observer {
     bytes += '^';
   }
 
+  const bool keyed_;
+  bool signed_ = false;  // this line, or no signature is needed
+  std::uint64_t counter_ = 0;
   std::uint32_t now_ms_ = 0xffffff00U;
   firmware::Inputs inputs_ = held();
   Outputs outputs_;
@@ -259,6 +290,7 @@ class World final : public firmware::Hal, public firmware::Observer {
   int sent_ = 0;
   int executed_ = 0;
   int refused_ = 0;
+  int rejected_ = 0;
   bool stop_ = false;
   std::uint32_t executed_pnum_ = 0;
   bool heard_any_ = false;
@@ -274,8 +306,8 @@ class World final : public firmware::Hal, public firmware::Observer {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  World world;
   const std::string input(reinterpret_cast<const char*>(data), size);
+  World world(input.compare(0, 3, "0!k") == 0);
   for (std::size_t at = 0; at < size;) {
     std::size_t end = input.find('\n', at + 1);  // the control byte may be one
     if (end == std::string::npos) end = size;

@@ -273,6 +273,34 @@ TEST(GigaSettings, ThatCouldNotBeReadInTimeAreNotOverwritten) {
   EXPECT_TRUE(has_line(bench.usb_lines(), "Settings: not kept: the key-value store was not ready"));
 }
 
+TEST(GigaSettings, AKeySurvivesARestartAndIsAskedForOnCan) {
+  GigaBench bench;
+  bench.boot();
+  PlainHost host;
+  bench.run_ms(150, host, bench.usb());
+  bench.usb()(host.command("C:key,3:" + std::string(64, 'c')));
+  bench.run_ms(20);
+  ASSERT_TRUE(bench.run_until([&] {
+    const std::lock_guard<std::mutex> lock(bench.giga.mutex);
+    return bench.giga.writes == 1;
+  }));
+  bench.restart();
+  EXPECT_TRUE(bench.application().authentication().required());
+  PlainHost stranger;
+  bench.can_datagrams.clear();
+  bench.run_ms(600, stranger, bench.can());
+  EXPECT_EQ(bench.application().state(), firmware::BoardState::connecting);
+  EXPECT_TRUE(has_line(bench.can_datagrams, ";AN:"));
+  bench.usb_lines();
+  bench.usb()("report");
+  bench.run_ms(400);
+  const std::vector<std::string> report = bench.usb_lines();
+  EXPECT_TRUE(has_line(report, "Keys: 3; dropped: missing "));
+  EXPECT_FALSE(has_line(report, "cccc"));
+  PlainHost again;
+  bench.drive(again, bench.usb());
+}
+
 TEST(GigaSettings, TellWhichChipsAreFitted) {
   GigaBench bench;
   bench.giga.stored["r4-settings"] = "chips,17\n";  // OSMC and servos

@@ -16,7 +16,8 @@ import pytest
 from r4_process import DATA, ERROR, PATIENCE_S, R4, SANITIZED, objects, run
 
 DATA_BAD, USAGE, REFUSED, OPEN, PERMISSION = 1, 2, 3, 4, 5
-COMMANDS = ['monitor', 'send', 'stop', 'list', 'bus', 'bench', 'sim', 'demo', 'encode', 'decode', 'completion']
+COMMANDS = ['monitor', 'send', 'stop', 'list', 'bus', 'bench', 'sim', 'key', 'demo', 'encode', 'decode',
+            'completion']
 
 
 def captured_lines():
@@ -367,6 +368,8 @@ def test_bash_completes_commands_options_urls_and_files():
     assert complete('r4', 'monitor', '--count', '') == []
     assert complete('r4', 'completion', '') == ['bash', 'zsh']
     assert complete('r4', 'decode', DATA + '/paper_c') == [DATA + '/paper_capture.tsv']
+    assert complete('r4', 'key', 'giv') == ['give']
+    assert complete('r4', 'send', '--key', DATA + '/paper_c') == [DATA + '/paper_capture.tsv']
     assert complete('r4', 'sim', '--script', DATA + '/paper_c') == [DATA + '/paper_capture.tsv']
 
 

@@ -89,6 +89,23 @@ def test_commands_are_refused_while_a_stop_is_latched(url):
     assert run('send', url, 'E:CLEAR', 'O:358,1,1').returncode == 0
 
 
+def test_a_key_given_over_the_uart_is_asked_for_over_udp(urls, tmp_path):
+    key = str(tmp_path / 'key')
+    assert run('key', 'new', key).returncode == 0
+    given = run('key', 'give', key, urls.serial)
+    assert given.returncode == 0, given.stderr
+    try:
+        # The UART's session has to end first.
+        signed = run('send', urls.udp, 'O:358,1,1', 'E:STOP', 'E:CLEAR', 'O:358,1,1', '--key', key, timeout=30)
+        assert signed.returncode == 0, signed.stderr
+        refused = run('send', urls.udp, 'O:1,1,1', '--timeout', '2.5')
+        assert refused.returncode == 3 and '--key FILE' in refused.stderr, refused
+        assert run('stop', urls.udp).returncode == 0
+    finally:
+        assert run('send', urls.serial, 'E:CLEAR', 'C:key,1:off').returncode == 0
+    assert run('send', urls.udp, 'O:358,1,1').returncode == 0
+
+
 def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(urls):
     with Relay(urls.udp) as relay:
         with Running('send', relay.url, 'O:358,1,1', '--hold', '60', '--json') as host:

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What compiler, C library and byte order could make differ on the board: checksums, numbers, lines,
-// the packed form.
+// What compiler, C library and byte order could make differ on the board: checksums, signatures,
+// numbers, lines, the packed form.
 #include "on_target.hpp"
+#include "protocol/authentication.hpp"
 #include "protocol/crc32.hpp"
 #include "protocol/datagram.hpp"
 #include "protocol/datagram_writer.hpp"
@@ -47,6 +48,16 @@ TEST(Crc32, IsThatOfZlib) {
   EXPECT(crc32("") == 0);
   EXPECT(crc32("6789", crc32("12345")) == 0xCBF43926U);
   EXPECT(crc32("O:358,1,1;PNum:66;T:1699276044383;^") == 0x7FEFAE81U);  // the paper's
+}
+
+TEST(AuthenticationTag, IsThatOfPythonsHashlib) {
+  Key key;
+  key.id = 3;
+  for (std::uint8_t i = 0; i < key_size; ++i) key.bytes[i] = i;
+  char tag[tag_size];
+  write_tag(signing_key(key), "0123456789abcdef",
+            "O:358,1,1;PNum:2147484648;T:1699276044383;A:3,1700000000000000,79146", tag);
+  EXPECT(Text(tag, tag_size) == "YDgO3-AnQVQ");
 }
 
 TEST(Numbers, SurviveTheirTexts) {

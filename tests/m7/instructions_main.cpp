@@ -119,27 +119,45 @@ Text written(const State& state, char* buffer) {
   return writer.finish(22, 79146);
 }
 
+// Signs for a board with a key; without one does nothing.
+void sign(Signer* signer, DatagramWriter& writer) {
+  if (signer != nullptr) signer->sign(writer, 1700000000000000, 1000);
+}
+
 // One command after the other, each with its own number; what reading, checking and executing costs.
-std::uint32_t command_instructions(firmware::Hal& hal, std::uint32_t first, std::uint64_t t) {
+// With a key they are signed.
+std::uint32_t command_instructions(firmware::Hal& hal, std::uint32_t first, std::uint64_t t,
+                                   const Key* key = nullptr) {
   Sink sink;
   firmware::Application::Config config;
+  const std::uint8_t chance[Authentication::chance_size] = {1};
+  config.chance = chance;
+  if (key != nullptr) config.settings.site.keys[0] = *key;
   firmware::Application application(hal, config);
   const std::uint8_t port = application.add_port(sink);
+  Signer key_signer(key != nullptr ? *key : Key());
+  key_signer.on_nonce(application.authentication().nonce());
+  key_signer.on_board_time(1000, 1000);
+  Signer* const signer = key != nullptr ? &key_signer : nullptr;
   static char heartbeat[max_datagram];
-  static char commands[repetitions + 1][64];
+  static char commands[repetitions + 1][128];
   static Text texts[repetitions + 1];
-  for (std::uint32_t i = 0; i <= repetitions; ++i) {
-    DatagramWriter writer(commands[i], sizeof commands[i]);
-    writer.field("O")
-        .value(std::uint32_t{358 + i % 2})
-        .value(std::uint32_t{1})
-        .value(std::uint32_t{1});
-    texts[i] = writer.finish(first + i, t);
-  }
   application.start(1000);
   DatagramWriter writer(heartbeat, sizeof heartbeat);
   writer.field("H").value("ROS2-R4");
-  application.receive(port, 1, writer.finish(first - 1, t - 100), 1000);
+  writer.stamp(first - 1, t - 100);
+  sign(signer, writer);
+  application.receive(port, 1, writer.finish(), 1000);
+  for (std::uint32_t i = 0; i <= repetitions; ++i) {
+    DatagramWriter command(commands[i], sizeof commands[i]);
+    command.field("O")
+        .value(std::uint32_t{358 + i % 2})
+        .value(std::uint32_t{1})
+        .value(std::uint32_t{1});
+    command.stamp(first + i, t);
+    sign(signer, command);
+    texts[i] = command.finish();
+  }
   std::uint32_t next = 0;
   const std::uint32_t count =
       instructions_of([&] { application.receive(port, 1, texts[next++], 1000); });
@@ -192,6 +210,11 @@ int main() {
   on_target::say_number("a command read, checked and executed", command);
   on_target::say_number("one with a PNum of 10 and a T of 13 digits", long_command);
   on_target::say_number("that, written to its chip by the drivers", with_drivers());
+  Key key;
+  key.id = 1;
+  const std::uint32_t signed_command = command_instructions(hal, 1500001000, 1699276044383, &key);
+  if (signed_command == 0) exit_emulator(6);
+  on_target::say_number("that command signed, on a board with a key", signed_command);
 
   static char bytes[170];
   for (std::size_t i = 0; i < sizeof bytes; ++i) bytes[i] = static_cast<char>(i);

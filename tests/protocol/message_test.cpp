@@ -72,6 +72,31 @@ TEST(Message, BoardHeartbeatCarriesTheReasonBehindTheTime) {
   }
 }
 
+TEST(Message, BoardHeartbeatCarriesTheNonceBehindTheReason) {
+  char buffer[max_datagram];
+  const Text bytes =
+      write_board_heartbeat(buffer, sizeof buffer, 12, 790, SafeReason::stop, "0123456789abcdef");
+  Datagram datagram;
+  ASSERT_TRUE(read(bytes, datagram));
+  EXPECT_EQ(test::str(bytes).find("H:R4-ROS2;PNum:12;T:790;SAFE:2;AN:0123456789abcdef;^"), 0U);
+  EXPECT_EQ(test::str(heartbeat_nonce(datagram)), "0123456789abcdef");
+  EXPECT_FALSE(is_connecting_heartbeat(datagram));
+}
+
+TEST(Message, AConnectingHeartbeatHasNumberZeroAndNoTimeOrANonce) {
+  const auto connecting = [](const std::string& fields) {
+    const std::string bytes = test::with_crc(fields);
+    Datagram datagram;
+    EXPECT_TRUE(read(Text(bytes), datagram));
+    return is_connecting_heartbeat(datagram);
+  };
+  EXPECT_TRUE(connecting("H:R4-ROS2;PNum:0;T:0;"));
+  EXPECT_TRUE(connecting("H:R4-ROS2;PNum:0;T:79146;AN:0123456789abcdef;"));
+  EXPECT_FALSE(connecting("H:R4-ROS2;PNum:0;T:79146;"));
+  EXPECT_FALSE(connecting("H:R4-ROS2;PNum:0;T:79146;AN:0123;"));
+  EXPECT_FALSE(connecting("H:R4-ROS2;PNum:1;T:79146;AN:0123456789abcdef;"));
+}
+
 TEST(Message, AHeartbeatWithoutAReasonHasNone) {
   for (const char* fields : {"H:R4-ROS2;", "H:R4-ROS2;SAFE:0;"}) {
     EXPECT_EQ(heartbeat_reason(Read(fields).datagram), SafeReason::none) << fields;

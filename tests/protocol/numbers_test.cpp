@@ -128,6 +128,19 @@ TEST(Numbers, DecimalsAreReadAsHundredths) {
   }
 }
 
+TEST(Numbers, BytesInHexadecimalAreTwoDigitsEach) {
+  const std::uint8_t bytes[] = {0x00, 0x0F, 0xA5};
+  char text[6];
+  EXPECT_EQ(write_hex(text, bytes, sizeof bytes), text + 6);
+  EXPECT_EQ(std::string(text, 6), "000fa5");
+  std::uint8_t back[3] = {};
+  EXPECT_TRUE(parse_hex("000FA5", back, sizeof back));
+  EXPECT_EQ(back[2], 0xA5);
+  EXPECT_FALSE(parse_hex("000fa", back, sizeof back));
+  EXPECT_FALSE(parse_hex("000fa5b", back, sizeof back));
+  EXPECT_FALSE(parse_hex("000fx5", back, sizeof back));
+}
+
 TEST(Numbers, HexadecimalOfOneToEightDigitsInEitherCase) {
   EXPECT_EQ(hex("d9bd7e4"), 0x0D9BD7E4U);
   EXPECT_EQ(hex("0D9BD7E4"), 0x0D9BD7E4U);

@@ -91,6 +91,15 @@ TEST(SiteSettings, EveryAcceptedAndRefusedForm) {
       {"AIN6", "0", Refusal::range},
       {"AIN6", "-1", Refusal::range},
       {"AIN6", "V", Refusal::format},
+      {"key", "1:" + std::string(64, 'f'), Refusal::none},
+      {"key", "9:" + std::string(64, '0'), Refusal::none},
+      {"key", "1:off", Refusal::none},
+      {"key", "0:" + std::string(64, '0'), Refusal::range},
+      {"key", "10:off", Refusal::range},
+      {"key", "1:" + std::string(63, '0'), Refusal::format},
+      {"key", "1:" + std::string(65, '0'), Refusal::format},
+      {"key", "1:Off", Refusal::format},
+      {"key", "off", Refusal::format},
       {"OSMC1", "1", Refusal::unknown},
       {"Network", "x", Refusal::unknown},
   };
@@ -104,8 +113,35 @@ TEST(SiteSettings, EveryAcceptedAndRefusedForm) {
   }
 }
 
+TEST(SiteSettings, HoldFourKeysAndReplaceOneOfTheSameId) {
+  SiteSettings settings;
+  for (const char id : {'3', '1', '9', '4'}) {
+    EXPECT_EQ(set_text(settings, "key", std::string(1, id) + ":" + std::string(64, id)),
+              Refusal::none);
+  }
+  EXPECT_EQ(set_text(settings, "key", "5:" + std::string(64, '5')), Refusal::range);
+  EXPECT_EQ(set_text(settings, "key", "1:" + std::string(64, 'e')), Refusal::none);
+  EXPECT_EQ(settings.keys[1].id, 1);
+  EXPECT_EQ(settings.keys[1].bytes[0], 0xEE);
+  EXPECT_EQ(set_text(settings, "key", "3:off"), Refusal::none);
+  EXPECT_EQ(settings.keys[0].id, 1);
+  EXPECT_EQ(settings.keys[2].id, 4);
+  EXPECT_TRUE(settings.keys[3] == Key()) << "nothing of it is left";
+  EXPECT_EQ(set_text(settings, "key", "3:off"), Refusal::none);
+  EXPECT_EQ(set_text(settings, "key", "5:" + std::string(64, '5')), Refusal::none);
+}
+
+TEST(SiteSettings, PasswordAndKeysAreSecret) {
+  EXPECT_TRUE(is_secret_setting("password"));
+  EXPECT_TRUE(is_secret_setting("key"));
+  EXPECT_FALSE(is_secret_setting("network"));
+  EXPECT_FALSE(is_secret_setting("AIN24"));
+  EXPECT_FALSE(is_secret_setting("other"));
+}
+
 TEST(SiteSettings, AreToldFromTheOthers) {
-  for (const char* key : {"network", "password", "host", "port", "node", "chips", "AINDMH"}) {
+  for (const char* key :
+       {"network", "password", "host", "port", "node", "chips", "AINDMH", "key"}) {
     EXPECT_TRUE(is_site_setting(Text(key, std::string(key).size()))) << key;
   }
   for (const char* key : {"rate", "heartbeat", "timeout", "recovery", "pack", "DMHSTA", ""}) {
@@ -127,6 +163,8 @@ TEST(KeptSettings, ComeBackAsTheyWere) {
   set_text(settings.site, "node", "7");
   set_text(settings.site, "chips", "5");
   set_text(settings.site, "AINSTEER", "3.3");
+  set_text(settings.site, "key", "2:00ff" + std::string(60, 'a'));
+  set_text(settings.site, "key", "1:" + std::string(64, 'b'));
   Settings back;
   read_settings(Text(written(settings)), back);
   EXPECT_TRUE(back == settings) << written(back);
@@ -149,6 +187,9 @@ TEST(KeptSettings, TheLongestFit) {
   set_text(settings.site, "port", "65535");
   set_text(settings.site, "node", "31");
   for (std::uint16_t& full_scale : settings.site.full_scale_cv) full_scale = 65000;
+  for (const char id : {'1', '2', '3', '4'}) {
+    set_text(settings.site, "key", std::string(1, id) + ":" + std::string(64, 'f'));
+  }
   Settings back;
   read_settings(Text(written(settings)), back);
   EXPECT_TRUE(back == settings);

@@ -54,6 +54,9 @@ TEST(LinkSimulation, KeepsEveryPromiseUnderRandomFaults) {
       mine.busy += report.busy;
       mine.stale += report.stale;
       mine.duplicate += report.duplicate;
+      mine.attacks += report.attacks;
+      mine.rejected += report.rejected;
+      mine.executed_signed += report.executed_signed;
       mine.worst_silence_us = std::max(mine.worst_silence_us, report.worst_silence_us);
       if (!report.violation.empty()) {
         const std::lock_guard lock(mutex);
@@ -71,6 +74,9 @@ TEST(LinkSimulation, KeepsEveryPromiseUnderRandomFaults) {
     sum.busy += mine.busy;
     sum.stale += mine.stale;
     sum.duplicate += mine.duplicate;
+    sum.attacks += mine.attacks;
+    sum.rejected += mine.rejected;
+    sum.executed_signed += mine.executed_signed;
     sum.worst_silence_us = std::max(sum.worst_silence_us, mine.worst_silence_us);
   };
   std::vector<std::thread> threads;
@@ -82,10 +88,11 @@ TEST(LinkSimulation, KeepsEveryPromiseUnderRandomFaults) {
   fmt::print(
       "{} schedules: {} violations; {} commands executed, {} confirmed, {} refused, {} timed out; "
       "{} links lost, {} outputs restored, {} stops; answers {} BUSY, {} STALE, {} DUPLICATE; "
+      "{} forged or replayed datagrams, {} rejected, {} signed commands executed; "
       "longest silence to safe {:.1f} ms\n",
       schedules, failing.size(), sum.executed, sum.confirmed, sum.refused, sum.timed_out,
-      sum.link_losses, sum.restores, sum.stops, sum.busy, sum.stale, sum.duplicate,
-      static_cast<double>(sum.worst_silence_us) / 1000);
+      sum.link_losses, sum.restores, sum.stops, sum.busy, sum.stale, sum.duplicate, sum.attacks,
+      sum.rejected, sum.executed_signed, static_cast<double>(sum.worst_silence_us) / 1000);
   std::sort(failing.begin(), failing.end());
   for (std::size_t i = 0; i < failing.size() && i < 3; ++i) {
     const Report report = World(failing[i], true).run();
@@ -100,6 +107,9 @@ TEST(LinkSimulation, KeepsEveryPromiseUnderRandomFaults) {
   EXPECT_GT(sum.stale, schedules / 100);
   EXPECT_GT(sum.duplicate, schedules / 100);
   EXPECT_GT(sum.busy, schedules / 100);
+  EXPECT_GT(sum.attacks, schedules);
+  EXPECT_GT(sum.rejected, sum.attacks * 9 / 10);
+  EXPECT_GT(sum.executed_signed, schedules / 10);
 }
 
 TEST(LinkSimulation, RepeatsASeedToTheSameTrace) {

@@ -47,6 +47,9 @@ Schedule Schedule::random(Random& random) {
     h.host = static_cast<int>(random.below(static_cast<std::uint64_t>(s.hosts)));
     s.happenings.push_back(h);
   }
+  if (random.chance(0.3)) {
+    s.attack_interval_us = static_cast<std::uint32_t>(random.between(2'000, 200'000));
+  }
   return s;
 }
 

@@ -6,11 +6,15 @@
 #include <algorithm>
 #include <map>
 
+#include "tests/support/signing.hpp"
+
 namespace r4::simulation {
 
 namespace {
 
 constexpr std::uint64_t slack_us = 20'000;
+
+Key key_of_host(int index) { return test::key_of(static_cast<std::uint8_t>(index + 1)); }
 
 bool driven(const firmware::Outputs& outputs) { return outputs != firmware::Outputs(); }
 
@@ -27,6 +31,10 @@ struct World::Host final : Session::Handler {
     const auto first =
         echo_host_first_pnum + static_cast<std::uint32_t>(world.random_.below(1U << 30));
     SessionOptions options;
+    if (world.schedule_.attack_interval_us != 0) {
+      options.key = key_of_host(index);
+      options.clock_start = std::chrono::hours{24} - Time{clock_offset_us};
+    }
     session = std::make_unique<Session>(*this, options, first);
     tickets.clear();
   }
@@ -119,6 +127,7 @@ Report World::run() {
   for (std::size_t i = 0; i < schedule_.happenings.size(); ++i) {
     at(schedule_.happenings[i].at_us, Event::Kind::happening, static_cast<int>(i));
   }
+  if (schedule_.attack_interval_us != 0) at(0, Event::Kind::attack, 0);
   while (!events_.empty() && report_.violation.empty()) {
     const Event event = events_.top();
     if (event.at_us > schedule_.duration_us) break;
@@ -141,6 +150,9 @@ Report World::run() {
         break;
       case Event::Kind::happening:
         happen(schedule_.happenings[static_cast<std::size_t>(event.index)], false);
+        break;
+      case Event::Kind::attack:
+        attack();
         break;
       case Event::Kind::over:
         happen(schedule_.happenings[static_cast<std::size_t>(event.index)], true);
@@ -172,6 +184,12 @@ void World::boot_board() {
   firmware::Application::Config config;
   config.identity = Identity{Text("simulated"), Text("0"), Text("sim")};
   config.settings = schedule_.settings;
+  std::uint8_t chance[Authentication::chance_size];
+  if (schedule_.attack_interval_us != 0) {
+    for (int i = 0; i < schedule_.hosts; ++i) config.settings.site.keys[i] = key_of_host(i);
+    for (std::uint8_t& byte : chance) byte = static_cast<std::uint8_t>(random_.next());
+    config.chance = chance;
+  }
   board_ = std::make_unique<firmware::Application>(*this, config, this);
   board_->add_port(*this);
   note("board boots");
@@ -250,6 +268,7 @@ void World::on_outputs(std::uint32_t, const firmware::Outputs& outputs) {
 void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& command) {
   note(fmt::format("board executes {} kind {} value {}", pnum, static_cast<int>(command.kind),
                    command.value));
+  if (attacking_ && command.kind != CommandKind::stop) return violate("forged: executed");
   if (command.kind == CommandKind::stop) {
     ++report_.stops;
     stop_from_ = delivering_;
@@ -257,6 +276,7 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
   }
   if (command.kind != CommandKind::stepper) return;
   ++report_.executed;
+  if (schedule_.attack_interval_us != 0) ++report_.executed_signed;
   const int id = command.value;
   if (id < 0 || id >= static_cast<int>(commands_.size()) || command.channel != 1) {
     return violate("intact: executed a command that nobody sent");
@@ -293,6 +313,11 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
 
 void World::on_refused(std::uint32_t, std::uint32_t pnum, Refusal code) {
   note(fmt::format("board refuses {} {}", pnum, static_cast<int>(code)));
+}
+
+void World::on_rejected(std::uint32_t, Verdict verdict) {
+  ++report_.rejected;
+  note(fmt::format("board drops it: signature {}", r4::to_text(verdict)));
 }
 
 // --- the hosts
@@ -391,9 +416,43 @@ void World::happen(const Happening& happening, bool over) {
   if (!over) at(end_us, Event::Kind::over, index);
 }
 
+void World::attack() {
+  at(now_us_ + random_.between(1, 2ULL * schedule_.attack_interval_us), Event::Kind::attack, 0);
+  const Attack attack = attacker_.next(random_);
+  if (attack.bytes.empty()) return;
+  ++report_.attacks;
+  note(fmt::format("attacker at {}: {} {}", attack.host, to_text(attack.kind), attack.bytes));
+  const BoardLink& link = board_->link();
+  const BoardLinkState state = link.state();
+  const std::uint32_t fed_ms = link.fed_ms();
+  const Source owner = link.owner();
+  const std::uint32_t rejected = report_.rejected;
+  board_->poll(board_ms());  // so that silence is not taken for the attacker's doing
+  const bool lost = link.state() != state;
+  attacking_ = true;
+  delivering_ = {attack.host, 0};  // no process has that incarnation
+  constexpr std::uint32_t own_address = 99;
+  board_->receive(0, attack.host < 0 ? own_address : static_cast<std::uint32_t>(attack.host + 1),
+                  Text(attack.bytes), board_ms());
+  attacking_ = false;
+  Datagram datagram;
+  if (attack.kind != Attack::Kind::stop && read(Text(attack.bytes), datagram) &&
+      report_.rejected == rejected) {
+    violate(fmt::format("forged: a {} was taken for signed", to_text(attack.kind)));
+  }
+  if (link.fed_ms() != fed_ms || link.owner() != owner || (!lost && link.state() != state)) {
+    violate(fmt::format("forged: a {} changed the link", to_text(attack.kind)));
+  }
+}
+
 // --- the channel
 
 void World::transfer(bool to_board, int host, std::string_view bytes) {
+  if (to_board) {
+    attacker_.on_sent(host, bytes);
+  } else {
+    attacker_.on_board(bytes);
+  }
   mix(bytes.data(), bytes.size());
   if (keep_trace_) show(fmt::format("{} host {} {}", to_board ? "->" : "<-", host, bytes));
   const ChannelFaults& faults = to_board ? schedule_.to_board : schedule_.to_host;
@@ -480,6 +539,7 @@ void World::deliver(int slot) {
     const std::uint32_t fed_before = board_->link().fed_ms();
     delivering_ = {packet.host, packet.incarnation};
     board_->receive(0, peer, Text(packet.bytes), board_ms());
+    attacker_.on_received(packet.host, packet.bytes);
     const BoardLink& link = board_->link();
     if (packet.intact && packet.heartbeat && link.owner().peer == peer &&
         link.fed_ms() != fed_before && link.fed_ms() == board_ms()) {

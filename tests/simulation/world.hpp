@@ -12,6 +12,8 @@
 //   late       nor one that a heartbeat which fed overtook more than 250 ms before
 //   truth      confirmed means executed; refused means not executed, then and later
 //   restore    outputs that come back belong to a host that was alive a timeout ago
+//   forged     of a board with a key: nothing that an attacker sends is executed, feeds or takes control,
+//              but a stop
 #pragma once
 
 #include <cstdint>
@@ -20,6 +22,7 @@
 #include <string>
 #include <vector>
 
+#include "attacker.hpp"
 #include "firmware/application.hpp"
 #include "host/session.hpp"
 #include "schedule.hpp"
@@ -42,6 +45,9 @@ struct Report {
   std::uint32_t busy = 0;
   std::uint32_t stale = 0;
   std::uint32_t duplicate = 0;
+  std::uint32_t attacks = 0;   // datagrams of an attacker
+  std::uint32_t rejected = 0;  // for their signatures
+  std::uint32_t executed_signed = 0;
   std::uint64_t worst_silence_us = 0;  // last heartbeat in to outputs safe
 };
 
@@ -59,7 +65,7 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   struct Event {
     std::uint64_t at_us;
     std::uint64_t order;
-    enum class Kind : std::uint8_t { packet, board, host, command, happening, over } kind;
+    enum class Kind : std::uint8_t { packet, board, host, command, happening, over, attack } kind;
     int index;
     std::uint32_t generation;
     bool operator>(const Event& other) const {
@@ -113,6 +119,7 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   void on_outputs(std::uint32_t t_ms, const firmware::Outputs& outputs) override;
   void on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command) override;
   void on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code) override;
+  void on_rejected(std::uint32_t t_ms, Verdict verdict) override;
 
   void at(std::uint64_t time_us, Event::Kind kind, int index, std::uint32_t generation = 0);
   void boot_board();
@@ -123,6 +130,7 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   void happen(const Happening& happening, bool over);
   void transfer(bool to_board, int host, std::string_view bytes);
   void deliver(int packet);
+  void attack();
   void check_silence();
   void violate(const std::string& what);
   void note(const std::string& line);
@@ -160,6 +168,8 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
 
   std::vector<std::unique_ptr<Host>> hosts_;
   std::vector<Sent> commands_;
+  Attacker attacker_;
+  bool attacking_ = false;
   std::uint64_t cut_to_board_until_us_ = 0;
   std::uint64_t cut_to_host_until_us_ = 0;
 };

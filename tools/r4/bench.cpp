@@ -19,6 +19,7 @@
 #include "host/async_board.hpp"
 #include "host/explain.hpp"
 #include "json.hpp"
+#include "key_file.hpp"
 #include "options.hpp"
 #include "subcommands.hpp"
 #include "transports/error.hpp"
@@ -38,6 +39,7 @@ constexpr Milliseconds pause{10};
 struct Options {
   std::vector<std::string> urls;
   Milliseconds duration{5000};
+  std::string key;
   bool json = false;
 };
 
@@ -57,8 +59,8 @@ class Durations {
   std::vector<double> values_;
 };
 
-BoardOptions board_options() {
-  BoardOptions options;
+BoardOptions board_options(const std::string& key) {
+  BoardOptions options = with_key(key);
   options.session.identify_interval = Milliseconds(0);  // the questions are ours
   return options;
 }
@@ -67,7 +69,7 @@ class Bench {
  public:
   explicit Bench(const Options& options)
       : options_(options),
-        board_(io_, one_url(options.urls), board_options()),
+        board_(io_, one_url(options.urls), board_options(options.key)),
         timer_(io_),
         pause_(io_) {}
 
@@ -279,6 +281,7 @@ void add_bench(CLI::App& root, Action& chosen) {
       add_subcommand(root, chosen, "bench", "Measure the link to a board", footer, options, bench);
   add_urls(*command, options->urls);
   add_seconds(*command, "--duration", options->duration, "how long to measure (default 5)");
+  add_key(*command, options->key);
   add_json(*command, options->json, "print JSON");
 }
 

@@ -31,6 +31,7 @@ void add_subcommands(CLI::App& root, Action& chosen) {
   add_bus(root, chosen);
   add_bench(root, chosen);
   add_sim(root, chosen);
+  add_key_command(root, chosen);
   add_demo(root, chosen);
   add_encode(root, chosen);
   add_decode(root, chosen);

@@ -133,11 +133,11 @@ _r4() {
     return
   fi
   COMPREPLY=($(compgen -W "$words $urls" -- "$cur"))
-  if [[ -n $urls ]]; then
-    compopt -o nospace 2>/dev/null
-  elif [[ -n $files ]]; then
+  if [[ -n $files ]]; then
     compopt -o filenames 2>/dev/null
     COMPREPLY+=($(compgen -f -- "$cur"))
+  elif [[ -n $urls ]]; then
+    compopt -o nospace 2>/dev/null
   fi
 }
 complete -F _r4 r4

@@ -15,6 +15,7 @@
 
 #include "host/async_board.hpp"
 #include "host/explain.hpp"
+#include "key_file.hpp"
 #include "monitor_bus.hpp"
 #include "monitor_view.hpp"
 #include "options.hpp"
@@ -35,6 +36,7 @@ struct Options {
   std::uint64_t count = 0;  // 0: no end
   std::optional<Milliseconds> duration;
   std::string fields;
+  std::string key;
 };
 
 class Monitor {
@@ -73,7 +75,7 @@ class Monitor {
 
  private:
   static BoardOptions board_options(const Options& options) {
-    BoardOptions board_options;
+    BoardOptions board_options = with_key(options.key);
     if (!options.fields.empty()) board_options.session.fields = options.fields;
     return board_options;
   }
@@ -179,6 +181,7 @@ void add_monitor(CLI::App& root, Action& chosen) {
              "end after that many states (or 5 s in which nothing at all is heard)");
   add_seconds(*command, "--duration", options->duration, "end after that time");
   add_fields(*command, options->fields);
+  add_key(*command, options->key);
 }
 
 }  // namespace r4::tool

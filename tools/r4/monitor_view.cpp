@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "host/command_help.hpp"
+#include "host/explain.hpp"
 #include "json.hpp"
 #include "output.hpp"
 #include "protocol/host_link.hpp"
@@ -36,11 +37,13 @@ class JsonView final : public MonitorView {
     lines_.print_or_skip(line_of(object("error", std::move(fields))));
   }
   void on_link(const LinkStatus& status) override {
-    lines_.print(line_of(object("link", {{"up", up_},
-                                         {"state", to_text(status.state)},
-                                         {"reason", to_text(status.reason)},
-                                         {"busy", status.busy},
-                                         {"gated", status.gated}})));
+    Json fields{{"up", up_},
+                {"state", to_text(status.state)},
+                {"reason", to_text(status.reason)},
+                {"busy", status.busy},
+                {"gated", status.gated}};
+    if (status.key != KeyTrouble::none) fields["key"] = to_text(status.key);
+    lines_.print(line_of(object("link", std::move(fields))));
   }
   void on_event(const CarrierEvent& event) override {
     if (event.kind != CarrierEvent::Kind::warning) up_ = event.kind == CarrierEvent::Kind::up;
@@ -140,6 +143,7 @@ std::string link_text(const LinkStatus& status) {
   }
   if (status.busy) text += ", another host controls the board";
   if (status.gated) text += ", our heartbeats are stopped";
+  if (status.key != KeyTrouble::none) text += ", " + explain(status.key).text();
   return text;
 }
 

@@ -17,6 +17,7 @@
 #include "host/command_help.hpp"
 #include "host/explain.hpp"
 #include "json.hpp"
+#include "key_file.hpp"
 #include "options.hpp"
 #include "subcommands.hpp"
 #include "transports/error.hpp"
@@ -30,6 +31,7 @@ struct Options {
   std::vector<std::string> commands;
   Milliseconds timeout{3000};
   Milliseconds hold{0};
+  std::string key;
   bool json = false;
 };
 
@@ -53,7 +55,10 @@ Command command_of(const std::string& text) {
 class Sender {
  public:
   Sender(const Options& options, const std::vector<Command>& commands)
-      : options_(options), commands_(commands), board_(io_, options.url), hold_(io_) {}
+      : options_(options),
+        commands_(commands),
+        board_(io_, options.url, with_key(options.key)),
+        hold_(io_) {}
 
   int run() {
     board_.open();
@@ -83,7 +88,7 @@ class Sender {
   }
 
   void on_result(const CommandResult& result) {
-    const std::string text = text_of(commands_[next_]);
+    const std::string text = shown(commands_[next_]);
     const bool confirmed = result.outcome == Outcome::confirmed;
     const Problem problem = explain(text, result, board_.link());
     if (options_.json) {
@@ -97,7 +102,7 @@ class Sender {
     }
     if (!confirmed) {
       for (std::size_t i = next_ + 1; i < commands_.size() && !options_.json; ++i) {
-        fmt::print("{}  not sent\n", text_of(commands_[i]));
+        fmt::print("{}  not sent\n", shown(commands_[i]));
       }
       failure_ = problem;
       io_.stop();
@@ -186,6 +191,7 @@ void add_send(CLI::App& root, Action& chosen) {
   add_seconds(*command, "--timeout", options->timeout,
               "how long to wait for each confirmation (default 3)");
   add_seconds(*command, "--hold", options->hold, "keep the link up that long after the last");
+  add_key(*command, options->key);
   add_json(*command, options->json, "print JSON, one object a command");
 }
 

@@ -179,8 +179,9 @@ the paper's capture. It prints where it listens and what it does; with --json on
   {"type":"listening","url":…,"host_url":…}
   {"type":"event","t":…,"state":"CONNECTING|ACTIVE|SAFE","reason":…}   t: the board's clock, ms
 with "board" if there are several, "outputs" when a pin of a chip or a stepper does something else,
-"fault" when a chip is in trouble, "executed" or "refused" for a command, "transport" when one went
-down or came up, and "silence" (ms since the host was last heard) when the board goes safe for that.
+"fault" when a chip is in trouble, "executed" or "refused" for a command, "rejected" (missing, unknown
+key, wrong tag, replayed, old) for what was not signed as a key asks, "transport" when one went down or
+came up, and "silence" (ms since the host was last heard) when the board goes safe for that.
 
 A scenario (--script) has lines such as: 0.5 handle released / 1 us 1 15 / 2 chip dac off / 3 reboot
 

@@ -97,6 +97,7 @@ sim::SimulatedBoard::Events SimLog::events() {
   events.on_fault = [this](std::uint32_t t_ms, ChipFault fault) { on_fault(t_ms, fault); };
   events.on_executed = [this](auto... a) { on_executed(a...); };
   events.on_refused = [this](auto... a) { on_refused(a...); };
+  events.on_rejected = [this](std::uint32_t t_ms, Verdict verdict) { on_rejected(t_ms, verdict); };
   events.on_carrier = [this](std::uint32_t t_ms, const Carrier& carrier, const CarrierEvent& e) {
     on_carrier(t_ms, carrier, e);
   };
@@ -180,7 +181,7 @@ void SimLog::on_fault(std::uint32_t t_ms, ChipFault fault) {
 }
 
 void SimLog::on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command) {
-  const std::string text = text_of(command);
+  const std::string text = shown(command);
   if (!output_.json()) return print(t_ms, fmt::format("executed {} (PNum {})", text, pnum));
   Json object = event(t_ms);
   object["executed"] = {{"pnum", pnum}, {"command", text}};
@@ -195,6 +196,14 @@ void SimLog::on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code) {
   }
   Json object = event(t_ms);
   object["refused"] = {{"pnum", pnum}, {"code", code_text}};
+  print(object);
+}
+
+void SimLog::on_rejected(std::uint32_t t_ms, Verdict verdict) {
+  const char* const why = to_text(verdict);
+  if (!output_.json()) return print(t_ms, fmt::format("dropped: signature {}", why));
+  Json object = event(t_ms);
+  object["rejected"] = why;
   print(object);
 }
 

@@ -25,6 +25,7 @@ constexpr const char* last_resort = "CUT THE POWER if it must stop now";
 struct Options {
   std::vector<std::string> urls;
   Milliseconds timeout{2000};
+  std::string key;  // not needed, and so not read: nothing may keep a stop back
   bool json = false;
 };
 
@@ -101,6 +102,8 @@ void add_stop(CLI::App& root, Action& chosen) {
   add_urls(*command, options->urls);
   add_seconds(*command, "--timeout", options->timeout,
               "how long to repeat it for a confirmation (default 2)");
+  command->add_option("--key", options->key, "not needed: a board obeys a stop from anyone")
+      ->type_name(file_type);
   add_json(*command, options->json, "print JSON");
 }
 

@@ -3,6 +3,7 @@
 
 #include "../../../transports/framing/can_ids.hpp"
 #include "board_clock.hpp"
+#include "true_random.hpp"
 
 namespace r4 {
 namespace giga {
@@ -30,6 +31,8 @@ firmware::Application::Config config_of(const Settings& settings) {
   config.identity.board_id = board_id();
   config.identity.capabilities = Text("udp+serial+can");
   config.settings = settings;
+  static std::uint8_t chance[Authentication::chance_size];
+  if (true_random(chance, sizeof chance)) config.chance = chance;
   return config;
 }
 
@@ -100,6 +103,7 @@ BootReport::Sources Board::report_sources(const FaultNote& last_boot) {
   sources.network = &network_;
   sources.can = &fdcan_;
   sources.store = &store_;
+  sources.authentication = &application_.authentication();
   sources.last_boot = last_boot;
   sources.timer_hz = timer_input_hz();
   return sources;

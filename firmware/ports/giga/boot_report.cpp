@@ -105,6 +105,26 @@ Text BootReport::chip(char (&out)[max_line]) {
   return line.done();
 }
 
+// Which keys there are, and what was dropped for its signature; nothing to say without a key.
+Text BootReport::keys(char (&out)[max_line]) const {
+  const Authentication& authentication = *sources_.authentication;
+  if (!authentication.required()) return Text();
+  LineWriter line(out);
+  line.text("Keys:");
+  for (const Key& key : sources_.settings->site.keys) {
+    if (key.id != 0) line.text(" ").number(key.id);
+  }
+  if (authentication.nonce().empty()) {
+    return line.text("; no random numbers: only USB is obeyed").done();
+  }
+  line.text("; dropped:");
+  for (int i = static_cast<int>(Verdict::authentic) + 1; i < verdict_count; ++i) {
+    const Verdict verdict = static_cast<Verdict>(i);
+    line.text(" ").words(to_text(verdict)).text(" ").number(authentication.rejections(verdict));
+  }
+  return line.done();
+}
+
 Text BootReport::next(char (&out)[max_line]) {
   LineWriter line(out);
   const Settings& settings = *sources_.settings;
@@ -170,6 +190,8 @@ Text BootReport::next(char (&out)[max_line]) {
     case 21:
       if (chip_ + 1 < firmware::chip_count) --step_;
       return chip(out);
+    case 22:
+      return keys(out);
     default:
       step_ = 0;
       write_last_boot(line, sources_.last_boot);

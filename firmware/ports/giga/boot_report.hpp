@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The report of the paper's Figure 3, on request, a line a turn: rates, the scan of the I2C bus, the
-// timer, the network; then what the paper's firmware did not know: chips, CAN, settings, how the last
-// boot ended. Labels are spelled as in the paper.
+// timer, the network; then what the paper's firmware did not know: chips, CAN, settings, keys if there
+// are any, how the last boot ended. Labels are spelled as in the paper.
 //
 // The scan asks one address a turn, so the loop waits for no more than one transfer.
 #pragma once
 
 #include <cstdint>
 
+#include "../../../protocol/authentication.hpp"
 #include "../../../protocol/settings.hpp"
 #include "../../board_hardware.hpp"
 #include "fault.hpp"
@@ -28,6 +29,7 @@ class BootReport {
     const Network* network;
     const Fdcan* can;
     const SettingsStore* store;
+    const Authentication* authentication;
     FaultNote last_boot;
     std::uint32_t timer_hz;
   };
@@ -50,6 +52,7 @@ class BootReport {
 
   Text scan(char (&out)[max_line]);
   Text chip(char (&out)[max_line]);
+  Text keys(char (&out)[max_line]) const;
 
   Sources sources_;
   int step_ = 0;  // of the list in next(); 0: not running

@@ -5,22 +5,18 @@
 
 #include "board_clock.hpp"
 #include "fault.hpp"
+#include "true_random.hpp"
 
 namespace r4 {
 namespace giga {
 
 namespace {
 
-// By the chip's generator of true random numbers.
 std::uint32_t random_number() {
   std::uint32_t number = 0;
-  std::size_t size = 0;
-  trng_t generator;
-  trng_init(&generator);
-  trng_get_bytes(&generator, reinterpret_cast<std::uint8_t*>(&number), sizeof number, &size);
-  trng_free(&generator);
   constexpr std::uint32_t scatter = 2654435761U;
-  return size == sizeof number ? number : BoardClock::now_us() * scatter;
+  const bool good = true_random(reinterpret_cast<std::uint8_t*>(&number), sizeof number);
+  return good ? number : BoardClock::now_us() * scatter;
 }
 
 }  // namespace

@@ -75,8 +75,14 @@ int main() {
   config.identity.firmware = Text("0.1.0");
   config.identity.board_id = Text("mps2-1");
   config.identity.capabilities = Text("udp+serial");
-  static Board the_board(sim::scramble(std::uint64_t{boots()} << 32 | r4_chance), link, udp,
-                         config);
+  const std::uint64_t seed = sim::scramble(std::uint64_t{boots()} << 32 | r4_chance);
+  // As random as the 32 bits that tools/m7 has put there: enough for tests.
+  std::uint8_t chance[Authentication::chance_size];
+  for (std::size_t i = 0; i < sizeof chance; ++i) {
+    chance[i] = static_cast<std::uint8_t>(sim::scramble(seed + i));
+  }
+  config.chance = chance;
+  static Board the_board(seed, link, udp, config);
   board = &the_board;
   board->power_up();
   guard(board->hal());

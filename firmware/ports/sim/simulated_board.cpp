@@ -89,9 +89,23 @@ void SimulatedBoard::reset_microcontroller() {
   config.identity.board_id = Text(options_.board_id);
   config.identity.capabilities = Text(options_.capabilities);
   config.settings = options_.settings;
+  const auto random_bytes = chance();
+  config.chance = random_bytes.data();
   Observer& observer = *this;
   application_.emplace(hardware_->hal(), config, &observer);
   for (const auto& port : ports_) port->number = application_->add_port(*port);
+}
+
+// Of this boot.
+std::array<std::uint8_t, Authentication::chance_size> SimulatedBoard::chance() const {
+  std::array<std::uint8_t, Authentication::chance_size> bytes;
+  std::random_device device;
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    const std::uint64_t number =
+        options_.seed ? scramble(scramble(*options_.seed + boots_) + i) : device();
+    bytes[i] = static_cast<std::uint8_t>(number);
+  }
+  return bytes;
 }
 
 // `cause`: what ended the last boot.
@@ -261,6 +275,10 @@ void SimulatedBoard::on_executed(std::uint32_t t_ms, std::uint32_t pnum, const C
 
 void SimulatedBoard::on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code) {
   if (options_.events.on_refused) options_.events.on_refused(t_ms, pnum, code);
+}
+
+void SimulatedBoard::on_rejected(std::uint32_t t_ms, Verdict verdict) {
+  if (options_.events.on_rejected) options_.events.on_rejected(t_ms, verdict);
 }
 
 }  // namespace r4::sim

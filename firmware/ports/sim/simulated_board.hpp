@@ -11,6 +11,7 @@
 // heap.
 #pragma once
 
+#include <array>
 #include <asio/io_context.hpp>
 #include <asio/steady_timer.hpp>
 #include <chrono>
@@ -40,12 +41,15 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
     std::function<void(std::uint32_t t_ms, ChipFault)> on_fault;
     std::function<void(std::uint32_t t_ms, std::uint32_t pnum, const Command&)> on_executed;
     std::function<void(std::uint32_t t_ms, std::uint32_t pnum, Refusal)> on_refused;
+    std::function<void(std::uint32_t t_ms, Verdict)> on_rejected;
     std::function<void(std::uint32_t t_ms, const Carrier&, const CarrierEvent&)> on_carrier;
   };
 
   struct Options {
-    std::optional<std::uint64_t> seed;  // of clock and analog inputs; another each time if absent
-    std::string board_id = "sim-1";     // the texts of its answer to Q:ID
+    // Of clock, analog inputs and nonces, which it makes predictable: for tests. Without one they are
+    // others each time.
+    std::optional<std::uint64_t> seed;
+    std::string board_id = "sim-1";  // the texts of its answer to Q:ID
     std::string firmware_version = "0.1.0";
     std::string capabilities = "sim";
     Script script;
@@ -86,6 +90,7 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
     return static_cast<std::uint32_t>(elapsed.count()) + clock_offset_ms_;
   }
   void reset_microcontroller();
+  std::array<std::uint8_t, Authentication::chance_size> chance() const;
   void boot(SafeReason cause = SafeReason::none);
   void advance(Milliseconds elapsed);
   void pass_millisecond();
@@ -103,6 +108,7 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   void on_outputs(std::uint32_t t_ms, const firmware::Outputs& outputs) override;
   void on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command) override;
   void on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code) override;
+  void on_rejected(std::uint32_t t_ms, Verdict verdict) override;
 
   Options options_;
   std::uint64_t seed_;

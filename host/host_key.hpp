@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The host's key, and what its board makes of it.
+//
+// With a key everything is signed as soon as the board's nonce is known, and a board that tells none
+// is refused: it has no key and obeys anyone. Without one, a board that asks for a signature is found
+// out by what it does not do: it takes no heartbeat, or answers AUTH.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+
+#include "../protocol/authentication.hpp"
+#include "time.hpp"
+
+namespace r4 {
+
+// What is wrong with keys.
+enum class KeyTrouble : std::uint8_t {
+  none,
+  board_has_none,  // we have a key, and the board asks for no signature
+  needed,          // the board asks for a signature, and we have no key
+  not_taken,       // the board takes nothing that we sign, or does not hear it
+};
+// "none", "board has none", "needed", "not taken".
+const char* to_text(KeyTrouble trouble);
+
+class HostKey {
+ public:
+  // `clock_start`: when that clock began, in microseconds since 1970.
+  HostKey(const std::optional<Key>& key, Time clock_start) : clock_start_(clock_start) {
+    if (key) signer_.emplace(*key);
+  }
+
+  // The board's newest heartbeat. True if we sign and its nonce is another: the board has been safe
+  // since, and our session may have ended.
+  bool on_heartbeat(const Datagram& heartbeat);
+  // The T of its newest datagram.
+  void on_board_time(std::uint32_t t_ms, Time now);
+  // The board has a host, whoever that is.
+  void on_host_seen() { in_vain_ = 0; }
+  // A heartbeat was sent.
+  void on_heartbeat_sent() { in_vain_ += asked_for_ && in_vain_ < many ? 1 : 0; }
+  // It has answered AUTH to something that a key would have made good.
+  void on_refusal(Time now) { refused_until_ = now + refusal_memory; }
+
+  bool has_key() const { return signer_.has_value(); }
+  // To that board nothing may be sent but stops.
+  bool refuses_board() const { return has_key() && heard_ && !asked_for_; }
+  // Signs what is written, if there is a key and a nonce; finish() is to follow.
+  void sign(DatagramWriter& writer, Time now);
+
+  KeyTrouble trouble(Time now) const;
+
+ private:
+  static constexpr int many = 10;  // heartbeats: a second of them
+  static constexpr Time refusal_memory = std::chrono::seconds{1};
+
+  std::optional<Signer> signer_;
+  Time clock_start_;
+  bool heard_ = false;      // a heartbeat
+  bool asked_for_ = false;  // a signature, by that heartbeat
+  int in_vain_ = 0;         // heartbeats sent since on_host_seen()
+  Time refused_until_{0};
+};
+
+}  // namespace r4

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the session sends, and how a command of it ends.
+#include <array>
+
+#include "command_help.hpp"
+#include "session.hpp"
+
+namespace r4 {
+
+// A datagram of which no copy is kept. Returns whether it was sent.
+bool Session::transmit_now(const Command& command, std::uint32_t t_ms, Priority priority,
+                           Time now) {
+  std::array<char, max_datagram> buffer;
+  DatagramWriter writer(buffer.data(), buffer.size());
+  write_command(writer, command);
+  writer.stamp(take_pnum(command.kind), t_ms);
+  return close_and_transmit(writer, command.kind, priority, now);
+}
+
+// The one way out: nothing is sent to a board that is refused, but stops.
+bool Session::close_and_transmit(DatagramWriter& writer, CommandKind kind, Priority priority,
+                                 Time now) {
+  if (key_.refuses_board() && kind != CommandKind::stop) return false;
+  key_.sign(writer, now);
+  const Text bytes = writer.finish();
+  if (!bytes.empty()) handler_.transmit({bytes.data(), bytes.size()}, priority);
+  return !bytes.empty();
+}
+
+std::uint32_t Session::take_pnum(CommandKind kind) {
+  const std::uint32_t pnum = link_.take_pnum();
+  if (kind == CommandKind::clear) {
+    newest_clear_ = pnum;
+    clear_open_ = true;
+  }
+  return pnum;
+}
+
+Session::Pending* Session::allocate(const Command& command, Time timeout, Time now) {
+  Pending* const slot = pending_.add(command.kind);
+  if (slot == nullptr) return nullptr;
+  DatagramWriter writer(slot->bytes.data(), slot->bytes.size());
+  write_command(writer, command);
+  slot->size = writer.size();
+  slot->command = command;
+  slot->cable_only = command.kind == CommandKind::setting && is_site_setting(command.text);
+  slot->command.text = slot->command.text2 = Text();
+  slot->ticket = next_ticket_++;
+  slot->started = now;
+  slot->deadline = now + timeout;
+  return slot;
+}
+
+Ticket Session::send(const Command& command, Time timeout, Time now) {
+  require_valid(command);
+  Pending* pending = allocate(with_needed_fields(command), timeout, now);
+  if (pending == nullptr) return 0;
+  ++collector_.counts.commands;
+  const Ticket ticket = pending->ticket;
+  send_queued(now);
+  return ticket;
+}
+
+bool Session::post(const Command& command, Time now) {
+  require_valid(command);
+  send_queued(now);  // what was asked for earlier goes first
+  if (!in_control(now)) return false;
+  ++collector_.counts.commands;
+  return transmit_now(command, to_ms(now), Priority::normal, now);
+}
+
+Ticket Session::stop(Time timeout, Time now) {
+  ++collector_.counts.commands;
+  Ticket ticket = 0;
+  if (Pending* pending = allocate(Command::stop(), timeout, now)) {
+    ticket = pending->ticket;
+    transmit(*pending, now);
+  } else {
+    transmit_now(Command::stop(), to_ms(now), Priority::stop, now);
+  }
+  // Nothing that was asked for before a stop may follow it.
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.kind != CommandKind::stop) {
+      finish(pending, Outcome::cancelled, Refusal::none, now);
+    }
+  }
+  return ticket;
+}
+
+Ticket Session::identify(Time timeout, Time now) {
+  Pending* pending = allocate(Command::identify(), timeout, now);
+  if (pending == nullptr) return 0;
+  const Ticket ticket = pending->ticket;
+  transmit(*pending, now);
+  return ticket;
+}
+
+// Sends a pending command: the first time with a number of its own, then the same again.
+void Session::transmit(Pending& pending, Time now) {
+  const bool stop = pending.kind == CommandKind::stop;
+  if (pending.stage == Stage::queued) {
+    pending.pnum = take_pnum(pending.kind);
+    // The command's field is there already.
+    DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.size);
+    pending.size = writer.stamp(pending.pnum, to_ms(now)).size();
+    pending.doubtful = !controlled_ && !options_.fields.empty();
+    pending.stage = Stage::sent;
+    if (pending.kind == CommandKind::identify) {
+      question_sent_ = now;
+      question_open_ = true;
+    }
+  } else {
+    ++collector_.counts.retries;
+  }
+  pending.retry = now + (stop ? Time{options_.stop_retry} : Time{options_.command_retry});
+  DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.size);
+  close_and_transmit(writer, pending.kind, stop ? Priority::stop : Priority::normal, now);
+}
+
+// In the order of send(): tickets rise.
+void Session::send_queued(Time now) {
+  if (!in_control(now)) return;
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.stage == Stage::queued) transmit(pending, now);
+  }
+}
+
+void Session::retry_due(Time now) {
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.stage == Stage::sent && now >= pending.retry) transmit(pending, now);
+  }
+}
+
+void Session::finish(Pending& pending, Outcome outcome, Refusal code, Time now) {
+  switch (outcome) {
+    case Outcome::confirmed:
+      ++collector_.counts.confirmed;
+      break;
+    case Outcome::refused:
+      ++collector_.counts.refused;
+      break;
+    case Outcome::timed_out:
+      ++collector_.counts.timed_out;
+      break;
+    case Outcome::cancelled:
+    case Outcome::full:
+      break;
+  }
+  const Ticket ticket = pending.ticket;
+  const CommandResult result{outcome, code, now - pending.started};
+  pending_.remove(pending);  // before the call: the handler may send again
+  handler_.on_result(ticket, result);
+}
+
+void Session::forget(Ticket ticket) {
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.ticket == ticket) pending_.remove(pending);
+  }
+}
+
+void Session::cancel_all(Time now) {
+  for (Pending& pending : pending_.under_way()) {
+    finish(pending, Outcome::cancelled, Refusal::none, now);
+  }
+}
+
+}  // namespace r4

@@ -1,0 +1,346 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A board with a key: whom it obeys, what it answers, and what it tells.
+#include <gtest/gtest.h>
+
+#include "tests/firmware/board_fixture.hpp"
+#include "tests/support/signing.hpp"
+
+namespace r4 {
+namespace {
+
+using firmware::BoardState;
+using test::echo_pnum;
+using test::Heard;
+using test::key_of;
+using test::settings_with;
+using test::TestBoard;
+using Lines = std::vector<std::string>;
+
+const Key key = key_of(1);
+
+// A host that signs.
+class KeyHost {
+ public:
+  explicit KeyHost(TestBoard& to, const Key& its_key = key, Source place = {0, 7})
+      : board(to), at(place), key_(its_key) {}
+
+  // The nonce and T of the newest heartbeat.
+  void listen() {
+    for (const test::MemoryPort::Sent& sent : board.ports[at.port].sent) {
+      Datagram datagram;
+      if (!read(sent.bytes, datagram) || kind_of(datagram) != MessageKind::board_heartbeat)
+        continue;
+      nonce = test::str(heartbeat_nonce(datagram));
+      t = static_cast<std::uint32_t>(datagram.time_ms());
+      echo = is_connecting_heartbeat(datagram) ? 0 : t;
+    }
+  }
+  std::string fields(const std::string& field, std::uint64_t time) {
+    return field + ";PNum:" + std::to_string(pnum++) + ";T:" + std::to_string(time) + ";";
+  }
+  std::string signed_fields(const std::string& text) {
+    return test::with_signature(text, key_, nonce, ++counter, board.now_ms);
+  }
+  // A signed heartbeat that echoes.
+  std::string heartbeat() {
+    listen();
+    last = signed_fields(fields("H:ROS2-R4", echo));
+    board.receive(last, at);
+    return last;
+  }
+  std::uint32_t command(const std::string& field) {
+    last = signed_fields(fields(field, 1699276044383));
+    board.receive(last, at);
+    return pnum - 1;
+  }
+  void connect() {
+    heartbeat();
+    heartbeat();
+  }
+
+  TestBoard& board;
+  Source at;
+  std::uint32_t pnum = echo_pnum;
+  std::uint64_t counter = 1000;
+  std::string nonce;
+  std::uint32_t t = 0;
+  std::uint32_t echo = 0;
+  std::string last;
+
+ private:
+  Key key_;
+};
+
+class ApplicationKey : public testing::Test {
+ protected:
+  ApplicationKey() {
+    board.run(600);
+    host.listen();
+  }
+  std::uint16_t pwm() const { return board.outputs().osmc[0].pwm; }
+
+  TestBoard board{settings_with(key), 2};
+  KeyHost host{board};
+};
+
+TEST_F(ApplicationKey, TellsItsNonceAndItsTimeInEveryHeartbeat) {
+  const std::vector<Heard> heard = board.take();
+  ASSERT_EQ(heard.size(), 2U);
+  EXPECT_EQ(heard[1].bytes, test::with_crc("H:R4-ROS2;PNum:0;T:500500;AN:" + host.nonce + ";"));
+  host.connect();
+  const std::vector<Heard> active = board.take(MessageKind::board_heartbeat);
+  ASSERT_FALSE(active.empty());
+  EXPECT_NE(active[0].bytes.find(";AN:" + host.nonce + ";^"), std::string::npos);
+  EXPECT_NE(active[0].pnum, 0U);
+}
+
+TEST_F(ApplicationKey, ObeysAHostThatSigns) {
+  host.connect();
+  EXPECT_EQ(board.state(), BoardState::active);
+  host.command("O:358,1,1");
+  EXPECT_EQ(pwm(), 358);
+  EXPECT_EQ(board.log.rejected, Lines());
+}
+
+TEST_F(ApplicationKey, ObeysNoHostThatDoesNot) {
+  board.take();
+  board.receive("H:ROS2-R4;PNum:" + std::to_string(echo_pnum) + ";T:0;");
+  EXPECT_EQ(board.state(), BoardState::connecting);
+  board.receive("O:358,1,1;PNum:" + std::to_string(echo_pnum + 1) + ";T:0;");
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(board.log.rejected, (Lines{"missing", "missing"}));
+  EXPECT_EQ(board.log.executed, std::vector<std::uint32_t>());
+}
+
+TEST_F(ApplicationKey, AnswersAnUnsignedHeartbeatWithItsNonceSeldom) {
+  const Source stranger{0, 99};
+  board.take();
+  for (int i = 0; i < 1000; ++i) {
+    board.receive("H:ROS2-R4;PNum:7;T:0;", stranger);
+    ++board.now_ms;
+  }
+  std::size_t to_stranger = 0;
+  for (const Heard& heard : board.take(MessageKind::board_heartbeat)) {
+    to_stranger += heard.peer == stranger.peer ? 1 : 0;
+  }
+  EXPECT_EQ(to_stranger, 10U);
+}
+
+TEST_F(ApplicationKey, AnswersAnUnsignedCommandWithAuthSeldom) {
+  host.connect();
+  board.take();
+  for (int i = 0; i < 300; ++i) {
+    board.receive("O:1,1,1;PNum:" + std::to_string(i) + ";T:0;", {0, 99});
+    board.receive("nonsense:1;O:x;PNum:" + std::to_string(i) + ";T:0;", {0, 99});
+    ++board.now_ms;
+  }
+  const std::vector<Heard> nacks = board.take(MessageKind::nack);
+  ASSERT_EQ(nacks.size(), 3U);
+  EXPECT_EQ(nacks[0].bytes.find("N:0,AUTH;"), 0U) << nacks[0].bytes;
+}
+
+TEST_F(ApplicationKey, AForgedHeartbeatOfTheOwnerDoesNotFeed) {
+  host.connect();
+  host.command("O:358,1,1");
+  for (int i = 0; i < 11; ++i) {
+    board.run(100);
+    host.listen();
+    board.receive(host.fields("H:ROS2-R4", host.echo), host.at);
+  }
+  EXPECT_EQ(board.reason(), SafeReason::link);
+  EXPECT_TRUE(board.safe());
+}
+
+TEST_F(ApplicationKey, AReplayDoesNothingFromAnywhereAndIsNotAnswered) {
+  host.connect();
+  host.command("O:358,1,1");
+  const std::string command = host.last;
+  const std::string heartbeat = host.heartbeat();
+  host.command("O:0,1,1");
+  board.take();
+  board.take(1);
+  for (const Source from : {host.at, Source{0, 99}, Source{1, 7}}) {
+    board.receive(command, from);
+    board.receive(heartbeat, from);
+  }
+  EXPECT_EQ(pwm(), 0);
+  EXPECT_EQ(board.log.rejected, Lines(6, "replayed"));
+  EXPECT_TRUE(board.take().empty());
+  EXPECT_TRUE(board.take(1).empty());
+}
+
+TEST_F(ApplicationKey, WhatTheNetworkHeldBackForMoreThan250MsDoesNothing) {
+  host.connect();
+  const std::string late = host.signed_fields(host.fields("O:358,1,1", 1));
+  board.run(250);
+  host.heartbeat();
+  board.run(1);
+  board.receive(late, host.at);
+  EXPECT_TRUE(board.safe());
+  // The counter of the heartbeat is above its own; one with a rising counter is too old by itself.
+  const std::string later = host.signed_fields(host.fields("O:358,1,1", 1));
+  board.run(251);
+  board.receive(later, host.at);
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(board.log.rejected, (Lines{"replayed", "old"}));
+}
+
+TEST_F(ApplicationKey, ARetrySignedAnewIsExecutedOnce) {
+  host.connect();
+  const std::uint32_t pnum = host.pnum++;
+  const std::string text = "O:358,1,1;PNum:" + std::to_string(pnum) + ";T:5;";
+  board.receive(host.signed_fields(text), host.at);
+  board.receive(host.signed_fields(text), host.at);
+  EXPECT_EQ(board.log.executed, std::vector<std::uint32_t>{pnum});
+  EXPECT_EQ(board.log.refused, Lines{std::to_string(pnum) + " DUPLICATE"});
+}
+
+TEST_F(ApplicationKey, AChangedCommandDoesNothing) {
+  host.connect();
+  std::string text = host.signed_fields(host.fields("O:358,1,1", 1));
+  text.replace(text.find("358"), 3, "359");
+  board.receive(text, host.at);
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(board.log.rejected, Lines{"wrong tag"});
+}
+
+TEST_F(ApplicationKey, AKeyThatItDoesNotHaveOpensNothing) {
+  KeyHost other(board, key_of(1, 9), {0, 8});
+  KeyHost unknown(board, key_of(2), {0, 9});
+  other.connect();
+  unknown.connect();
+  EXPECT_EQ(board.state(), BoardState::connecting);
+  EXPECT_EQ(board.log.rejected, (Lines{"wrong tag", "wrong tag", "unknown key", "unknown key"}));
+}
+
+TEST_F(ApplicationKey, AStopNeedsNoSignature) {
+  host.connect();
+  host.command("O:358,1,1");
+  board.receive("E:STOP;", {0, 99});
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(board.reason(), SafeReason::stop);
+  EXPECT_EQ(board.log.rejected, Lines());
+}
+
+TEST_F(ApplicationKey, AnUnsignedStopProvesNothingOfTheOwnersCommands) {
+  host.connect();
+  const std::uint32_t executed = host.command("O:358,1,1");
+  // With the number of a command that was kept from the board.
+  const std::uint32_t held_back = host.pnum++;
+  board.receive("E:STOP;PNum:" + std::to_string(held_back) + ";T:0;", host.at);
+  EXPECT_EQ(board.reason(), SafeReason::stop);
+  EXPECT_EQ(board.application->link().last_executed(), executed);
+  host.heartbeat();  // there is another nonce
+  const std::uint32_t stop = host.command("E:STOP");
+  EXPECT_EQ(board.application->link().last_executed(), stop) << "a signed one is a command";
+}
+
+TEST_F(ApplicationKey, OnlyTheOwnerClearsAStop) {
+  host.connect();
+  board.receive("E:STOP;", {0, 99});
+  board.run(5);
+  host.heartbeat();
+  board.receive(host.fields("E:CLEAR", 0), host.at);
+  EXPECT_EQ(board.reason(), SafeReason::stop);
+  host.command("E:CLEAR");
+  EXPECT_EQ(board.reason(), SafeReason::none);
+}
+
+TEST_F(ApplicationKey, AnswersWhoItIsToAnyone) {
+  board.take();
+  board.receive("Q:ID;PNum:1;T:0;", {0, 99});
+  EXPECT_EQ(board.take(MessageKind::identity).size(), 1U);
+  EXPECT_EQ(board.log.rejected, Lines());
+}
+
+TEST_F(ApplicationKey, TakesAnotherNonceForEachCauseToBeSafe) {
+  host.connect();
+  const std::string first = host.nonce;
+  const std::string before = host.signed_fields(host.fields("O:358,1,1", 1));
+  board.hal.inputs.handle_held = false;
+  board.run(20);
+  board.hal.inputs.handle_held = true;
+  board.run(20);
+  ASSERT_EQ(board.reason(), SafeReason::none);
+  board.receive(before, host.at);
+  EXPECT_TRUE(board.safe()) << "it was signed before the handle was released";
+  host.heartbeat();
+  EXPECT_NE(host.nonce, first);
+  host.command("O:358,1,1");
+  EXPECT_EQ(pwm(), 358);
+}
+
+TEST_F(ApplicationKey, AHostThatBeginsAgainWithALowCounterIsTakenAfterTheOutage) {
+  host.connect();
+  KeyHost again(board);
+  again.pnum = echo_pnum + 1'000'000;
+  again.counter = 0;
+  again.heartbeat();
+  EXPECT_EQ(board.log.rejected, Lines{"replayed"});
+  board.run(1000);
+  ASSERT_EQ(board.reason(), SafeReason::link);
+  again.connect();
+  EXPECT_EQ(board.state(), BoardState::active);
+}
+
+TEST_F(ApplicationKey, ACableOfItsOwnNeedsNoSignatureAndCanSetKeys) {
+  board.ports[1].cable = true;
+  test::TestHost cable(board, echo_pnum, {1, 0});
+  cable.connect();
+  cable.command("O:358,1,1");
+  EXPECT_EQ(pwm(), 358);
+  cable.command("C:key,1:off");
+  EXPECT_FALSE(board.application->authentication().required());
+  EXPECT_EQ(board.log.refused, Lines());
+}
+
+TEST_F(ApplicationKey, AKeyIsNotSetOverANetworkNotEvenBySomebodyWhoHasOne) {
+  host.connect();
+  const std::uint32_t pnum = host.command("C:key,1:off");
+  EXPECT_EQ(board.log.refused, Lines{std::to_string(pnum) + " AUTH"});
+  EXPECT_TRUE(board.application->authentication().required());
+}
+
+TEST(ApplicationWithoutKey, AsksForASignatureAsSoonAsItIsGivenAKey) {
+  TestBoard board({}, 2);
+  board.ports[0].cable = true;
+  test::TestHost cable(board, echo_pnum);
+  cable.connect();
+  cable.command("C:key,1:" + std::string(64, 'a'));
+  board.take();
+  board.take(1);
+  board.run(600);
+  const std::vector<Heard> heard = board.take(MessageKind::board_heartbeat, 1);
+  ASSERT_FALSE(heard.empty());
+  EXPECT_NE(heard.back().bytes.find(";AN:"), std::string::npos);
+  board.run(1000);
+  ASSERT_EQ(board.reason(), SafeReason::link);
+  test::TestHost network(board, echo_pnum + 9'000'000, {1, 5});
+  network.connect();
+  EXPECT_EQ(board.reason(), SafeReason::link);
+  EXPECT_EQ(board.log.rejected.front(), "missing");
+}
+
+TEST(ApplicationWithoutKey, TakesASignedDatagramAsAnyOther) {
+  TestBoard board;
+  test::TestHost host(board, echo_pnum);
+  host.connect();
+  host.command("O:358,1,1;A:1,1,1,AAAAAAAAAAA");
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+}
+
+TEST(ApplicationHeartbeat, NumberZeroMeansConnectingAndNothingElse) {
+  TestBoard board(settings_with(key));
+  KeyHost host(board);
+  board.run(10);
+  host.connect();
+  board.take();
+  // Answers to others count from their beginning.
+  board.receive("H:ROS2-R4;PNum:7;T:0;", {0, 99});
+  const std::vector<Heard> heard = board.take(MessageKind::board_heartbeat);
+  ASSERT_EQ(heard.size(), 1U);
+  EXPECT_EQ(heard[0].pnum, 1U);
+}
+
+}  // namespace
+}  // namespace r4

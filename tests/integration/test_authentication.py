@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A board with a key: a second implementation drives it, an attacker does not; r4 with keys."""
+import os
+import re
+import socket
+import stat
+
+import pytest
+from r4_process import ERROR, Board, monitor, run
+from signing import SigningHost, closed
+
+KEY = bytes(range(32))
+OTHER = bytes(range(1, 33))
+
+
+def key_setting(number, key):
+    return f'key,{number}:{key.hex()}'
+
+
+@pytest.fixture
+def board():
+    with Board('udp://127.0.0.1:0', options=('--set', key_setting(3, KEY), '--set', key_setting(5, OTHER))) as it:
+        yield it
+
+
+@pytest.fixture
+def host(board):
+    it = SigningHost(board.url, 3, KEY)
+    it.connect()
+    it.run(seconds=0.15)  # its first, unsigned heartbeat was answered: the next answer may be given now
+    yield it
+    it.close()
+
+
+@pytest.fixture
+def stranger():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as it:
+        it.bind(('127.0.0.1', 0))
+        yield it
+
+
+def write_key(path, text, mode=0o600):
+    path.write_text(text, encoding='ascii')
+    path.chmod(mode)
+    return str(path)
+
+
+def pwm(host):
+    return host.state.get('OSMC1')
+
+
+def driven(host, speed):
+    return host.run(lambda: pwm(host) == f'{speed},1')
+
+
+def test_a_second_implementation_drives_the_board(board, host):
+    number, _ = host.command('O:358,1,1')
+    assert host.executed(number) and driven(host, 358)
+    board.executed('O:358,1,1')
+
+
+def test_every_length_over_the_borders_of_the_hash_is_taken(host):
+    for size in range(0, 140):
+        number, bytes_ = host.command(f'O:{size},1,1', more=f'PAD:{"x" * size};')
+        assert host.executed(number), (size, len(bytes_))
+
+
+def test_a_replay_does_nothing_and_is_not_answered(board, host, stranger):
+    number, bytes_ = host.command('O:358,1,1')
+    assert host.executed(number)
+    number, _ = host.command('O:0,1,1')
+    assert host.executed(number)
+    board.skip_past()
+    for copy in (host.socket, stranger):
+        host.send(bytes_, copy)
+        board.next(lambda each: each.get('rejected') == 'replayed')
+    stranger.settimeout(0.3)
+    with pytest.raises(TimeoutError):
+        stranger.recv(2048)
+    assert host.run(lambda: False, 0.3) is False
+    assert pwm(host) == '0,1' and not host.refused
+
+
+def test_every_changed_byte_is_found(board, host):
+    before = host.signed(host.fields('O:358,1,1')).split(b'^')[0].decode()
+    tried = 0
+    for i, byte in enumerate(before):
+        if byte in ':;,':
+            continue
+        changed = before[:i] + ('7' if byte != '7' else '8') + before[i + 1:]
+        host.send(closed(changed))
+        tried += 1
+        if i % 8 == 0:
+            host.run(seconds=0.02)
+    assert tried > 60
+    number, _ = host.command('S:1500,1')  # all that was sent before has been looked at then
+    assert host.executed(number)
+    assert pwm(host) == '0,0'
+    assert not [each for each in board.log if each.get('executed', {}).get('command', '').startswith('O')]
+
+
+@pytest.mark.parametrize('kind', ['old', 'future', 'foreign', 'unknown', 'cut', 'none', 'nonce'])
+def test_what_is_not_rightly_signed_does_nothing(board, host, kind):
+    fields = host.fields('O:358,1,1')
+    if kind == 'old':
+        bytes_, why = host.signed(fields, board_t=host.board_t - 300), 'old'
+    elif kind == 'future':
+        bytes_, why = host.signed(fields, board_t=host.board_t + 5000), 'old'
+    elif kind == 'foreign':
+        bytes_, why = host.signed(fields, key=OTHER), 'wrong tag'
+    elif kind == 'unknown':
+        bytes_, why = host.signed(fields, key_id=4), 'unknown key'
+    elif kind == 'cut':
+        whole = host.signed(fields).split(b'^')[0].decode()
+        bytes_, why = closed(whole[:whole.rindex(',')] + ';'), 'missing'
+    elif kind == 'none':
+        bytes_, why = closed(fields), 'missing'
+    else:
+        nonce, host.nonce = host.nonce, '0123456789abcdef'
+        bytes_, why = host.signed(fields), 'wrong tag'
+        host.nonce = nonce
+    host.send(bytes_)
+    board.next(lambda each: each.get('rejected') == why)
+    number, _ = host.command('S:1500,1')
+    assert host.executed(number)
+    assert pwm(host) == '0,0'
+    answered = why not in ('old', 'replayed')
+    assert [code for _, code in host.refused] == (['AUTH'] if answered else [])
+
+
+def test_a_stop_needs_no_signature_and_is_cleared_with_one(board, host, stranger):
+    number, _ = host.command('O:358,1,1')
+    assert host.executed(number)
+    nonce = host.nonce
+    host.send(closed('E:STOP;'), stranger)
+    board.state('SAFE', 'stop')
+    assert host.run(lambda: host.reasons and host.reasons[-1] == 2)
+    assert host.nonce != nonce, 'another nonce for the safe state'
+    host.send(closed('E:CLEAR;PNum:1;T:1;'), stranger)
+    board.next(lambda each: each.get('rejected') == 'missing')
+    number, _ = host.command('E:CLEAR')
+    assert host.executed(number)
+    assert host.run(lambda: host.state.get('SAFE') == '0')
+
+
+def test_forged_heartbeats_do_not_keep_the_outputs_on(board, host):
+    number, _ = host.command('O:358,1,1')
+    assert host.executed(number)
+    replay = host.heartbeat()
+
+    def forge():
+        host.send(closed(host.fields('H:ROS2-R4')))
+        host.send(replay)
+
+    with pytest.raises(AssertionError, match='SAFE'):
+        board.never('SAFE', 2, meanwhile=forge)
+
+
+def test_a_host_without_the_key_is_told_the_nonce_seldom(board, host, stranger):
+    for _ in range(200):
+        host.send(closed('H:ROS2-R4;PNum:7;T:0;'), stranger)
+    stranger.settimeout(0.3)
+    assert re.search(rb';AN:[0-9a-f]{16};', stranger.recv(2048))
+    with pytest.raises(TimeoutError):
+        for _ in range(20):
+            stranger.recv(2048)
+
+
+def test_r4_drives_a_board_with_its_key_and_not_without(board, tmp_path):
+    key = write_key(tmp_path / 'key', f'3:{KEY.hex()}\n')
+    sent = run('send', board.host_url, 'O:358,1,1', 'D:1000,1,1', '--key', key)
+    assert sent.returncode == 0, sent.stderr
+    sent = run('send', board.host_url, 'O:358,1,1', env={**os.environ, 'R4_KEY': key})
+    assert sent.returncode == 0, sent.stderr
+    sent = run('send', board.host_url, 'O:99,1,1', '--timeout', '2')
+    assert sent.returncode == 3 and '--key FILE' in sent.stderr and ERROR.match(sent.stderr)
+    wrong = write_key(tmp_path / 'wrong', f'3:{OTHER.hex()}')
+    sent = run('send', board.host_url, 'O:99,1,1', '--timeout', '2', '--key', wrong)
+    assert sent.returncode == 3 and 'signed with our key' in sent.stderr
+    stopped = run('stop', board.host_url)
+    assert stopped.returncode == 0, stopped.stderr
+    assert not [each for each in board.log if 'O:99,1,1' in str(each)]
+
+
+def test_r4_with_a_key_refuses_a_board_without_one(tmp_path):
+    key = write_key(tmp_path / 'key', f'3:{KEY.hex()}\n')
+    with Board('udp://127.0.0.1:0') as board:
+        sent = run('send', board.host_url, 'O:358,1,1', '--timeout', '1.5', '--key', key)
+        assert sent.returncode == 3 and 'the board has no key' in sent.stderr
+        stopped = run('stop', board.host_url, '--key', key)
+        assert stopped.returncode == 0, stopped.stderr
+        with monitor(board.host_url, '--key', key) as watcher:
+            watcher.next(lambda each: each['type'] == 'link' and
+                         each['fields'].get('key') == 'board has none')
+        assert not [each for each in board.rest() if 'O:358' in str(each)]
+
+
+def test_a_key_is_made_and_given_over_a_cable_and_taken_away_there(tmp_path):
+    file = tmp_path / 'key'
+    made = run('key', 'new', str(file), '--id', '7')
+    assert made.returncode == 0, made.stderr
+    assert stat.S_IMODE(file.stat().st_mode) == 0o600
+    assert re.fullmatch(r'7:[0-9a-f]{64}\n', file.read_text(encoding='ascii'))
+    again = run('key', 'new', str(file))
+    assert again.returncode == 4 and 'never overwritten' in again.stderr
+    with Board(f'pty:{tmp_path}/cable', 'udp://127.0.0.1:0') as board:
+        cable = f'serial://{tmp_path}/cable'
+        network = [each for each in board.log if each['type'] == 'listening'][1]['host_url'] + '?listen=0'
+        refused = run('key', 'give', str(file), network)
+        assert refused.returncode == 3 and 'over USB' in refused.stderr
+        given = run('key', 'give', str(file), cable)
+        assert given.returncode == 0, given.stderr
+        board.executed('C:key,7:...')
+        assert file.read_text(encoding='ascii').strip()[2:] not in str(board.log)
+        driven_by_cable = run('send', cable, 'O:358,1,1')
+        assert driven_by_cable.returncode == 0, 'who is at the cable needs no key'
+        board.state('SAFE', 'link')
+        assert run('send', network, 'O:1,1,1', '--timeout', '1.5').returncode == 3
+        signed = run('send', network, 'O:1,1,1', '--key', str(file))
+        assert signed.returncode == 0, signed.stderr
+        board.state('SAFE', 'link')
+        assert run('send', cable, 'C:key,7:off').returncode == 0
+        board.state('SAFE', 'link')
+        assert run('send', network, 'O:1,1,1').returncode == 0
+
+
+@pytest.mark.parametrize('mode, text, code, words', [
+    (0o644, f'3:{"0" * 64}', 5, 'chmod 600'),
+    (0o620, f'3:{"0" * 64}', 5, 'chmod 600'),
+    (0o600, f'0:{"0" * 64}', 1, 'holds no key'),
+    (0o600, f'3:{"0" * 63}', 1, 'holds no key'),
+    (0o600, '', 1, 'holds no key'),
+    (0o600, f'3:{"0" * 64}' + 'x' * 10000, 1, 'holds no key'),
+])
+def test_a_key_file_that_is_none_or_open_to_others_is_refused(tmp_path, mode, text, code, words):
+    file = write_key(tmp_path / 'key', text, mode)
+    for command in (('monitor',), ('send', 'O:1,1,1'), ('bench',)):
+        done = run(command[0], 'udp://127.0.0.1:9', *command[1:], '--key', file)
+        assert done.returncode == code, done.stderr
+        assert words in done.stderr and ERROR.match(done.stderr)
+
+
+def test_a_key_file_that_is_not_there_is_named_but_does_not_hold_a_stop_back(board, tmp_path):
+    missing = str(tmp_path / 'missing')
+    done = run('send', board.host_url, 'O:1,1,1', '--key', missing)
+    assert done.returncode == 4 and missing in done.stderr
+    stopped = run('stop', board.host_url, '--key', missing, env={**os.environ, 'R4_KEY': missing})
+    assert stopped.returncode == 0, stopped.stderr
+
+
+def test_two_hosts_with_a_key_each_are_told_apart(board, host):
+    other = SigningHost(board.url, 5, OTHER)
+    assert other.run(lambda: other.nonce is not None)
+    other.command('O:77,1,1')
+    assert other.run(lambda: other.refused, 5, beats=False)
+    assert other.refused[0][1] == 'BUSY'
+    number, _ = host.command('O:358,1,1')
+    assert host.executed(number)
+    other.close()
+
+
+def test_a_monitor_says_that_a_key_is_needed(board):
+    with monitor(board.host_url) as watcher:
+        watcher.next(lambda each: each['type'] == 'link' and each['fields'].get('key') == 'needed')

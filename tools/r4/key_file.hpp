@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A file with a board's key: one line, `<id>:<64 hexadecimal digits>`, for its owner alone.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <string>
+
+#include "host/board_options.hpp"
+
+namespace r4::tool {
+
+// Throws Error: open if it cannot be read, permission if others than its owner may read it, data if it
+// holds no key.
+Key read_key_file(const std::string& path);
+
+// Makes a file with a new random key. Throws Error: open if it cannot be made; one that is there is
+// never overwritten.
+void make_key_file(const std::string& path, std::uint8_t id);
+
+// --key FILE, or R4_KEY in the environment, for a command that opens a board.
+CLI::Option* add_key(CLI::App& command, std::string& path);
+
+// The options of a session with the key of that file; without one if `path` is empty.
+BoardOptions with_key(const std::string& path, BoardOptions options = {});
+
+}  // namespace r4::tool
