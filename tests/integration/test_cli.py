@@ -154,7 +154,7 @@ NO_BOARD = 'udp://127.0.0.1:9?listen=0'
     (['monitor', 'serial:///dev/tty-that-is-not-there'], OPEN, 'tty-that-is-not-there'),
     (['monitor', 'udp://no-such-host.invalid'], OPEN, 'no-such-host.invalid'),
     (['monitor', NO_BOARD, '--duration', '0.3'], REFUSED, 'nothing was heard'),
-    (['send', NO_BOARD, 'O:1,1,1', '--timeout', '0.3'], REFUSED, 'not confirmed within 300 ms'),
+    (['send', NO_BOARD, 'O:1,1,1', '--timeout', '0.3'], REFUSED, 'not confirmed within 3'),
     (['stop', NO_BOARD, '--timeout', '0.3'], REFUSED, 'CUT THE POWER'),
     (['stop', 'serial:///dev/tty-that-is-not-there'], OPEN, 'CUT THE POWER'),
     (['send', NO_BOARD, 'O:358,1'], USAGE, 'O:pwm,dir,ch'),
