@@ -15,7 +15,9 @@ namespace {
 
 constexpr Time busy_memory = std::chrono::milliseconds{300};
 constexpr Time selection_retry = std::chrono::milliseconds{200};
-constexpr int max_selections = 5;  // a board that does not know F is left alone
+constexpr int max_selections = 5;  // then the board is taken for one that does not know F
+// Such a board is asked now and then all the same: on a bad line all five may have been lost.
+constexpr Time selection_reminder = std::chrono::seconds{1};
 
 }  // namespace
 
@@ -243,9 +245,9 @@ void Session::select_fields(Time now) {
     return;
   }
   if (options_.fields.empty() || !link_up() || busy_until_ > now) return;
-  if (now < next_selection_ || speaks_no_cmd()) return;
+  if (now < next_selection_) return;
   ++selections_;
-  next_selection_ = now + selection_retry;
+  next_selection_ = now + (speaks_no_cmd() ? selection_reminder : selection_retry);
   transmit_now(Command::fields(options_.fields), to_ms(now), Priority::normal, now);
 }
 

@@ -173,6 +173,27 @@ TEST(SessionCommand, IsConfirmedByItsValueWhereTheBoardHasNoCmd) {
   EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
 }
 
+TEST(SessionCommand, FieldsAreAskedForUntilTheBoardKnowsHoweverManyAreLost) {
+  ScriptedLink link;
+  link.heartbeat();
+  const auto lose = [&](int states) {
+    for (int i = 0; i < states; ++i) {
+      link.pass(10ms);
+      link.state("AIN24:24.28;");
+    }
+    return link.count('F');
+  };
+  const std::size_t at_first = lose(300);
+  EXPECT_LE(lose(300) - at_first, 4U) << "seldom: the paper's board knows no F";
+  ASSERT_GT(link.count('F'), at_first);
+  link.executed(link.last('F').pnum);
+  const Ticket ticket = link.session.send(drive, 1s, link.now);
+  link.state("AIN24:24.28;CMD:7;OSMC1:358,1;");
+  EXPECT_TRUE(under_way(link, ticket)) << "its value is no proof where there is CMD";
+  link.executed(link.last('O').pnum);
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
+}
+
 TEST(SessionCommand, OutsideItsRangesIsThrownBack) {
   ScriptedLink link;
   link.connect();
