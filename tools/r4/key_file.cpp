@@ -14,25 +14,12 @@
 
 #include "options.hpp"
 #include "transports/error.hpp"
+#include "transports/file_descriptor.hpp"
 
 namespace r4::tool {
 namespace {
 
 constexpr const char* new_one = "make one: r4 key new FILE";
-
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int get() const { return fd_; }
-
- private:
-  int fd_;
-};
 
 Error system_error(const std::string& path, int error, const std::string& fix) {
   const ErrorKind kind =
@@ -41,7 +28,7 @@ Error system_error(const std::string& path, int error, const std::string& fix) {
 }
 
 // What is in it, up to a little more than a key is long.
-std::string contents(const Descriptor& file, const std::string& path) {
+std::string contents(const FileDescriptor& file, const std::string& path) {
   std::array<char, 2 * key_text_size> buffer;
   std::string text;
   while (text.size() < buffer.size()) {
@@ -56,9 +43,9 @@ std::string contents(const Descriptor& file, const std::string& path) {
 }  // namespace
 
 Key read_key_file(const std::string& path) {
-  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   struct stat status {};
-  if (file.get() < 0 || ::fstat(file.get(), &status) != 0) throw system_error(path, errno, new_one);
+  if (!file || ::fstat(file.get(), &status) != 0) throw system_error(path, errno, new_one);
   if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
     throw Error(ErrorKind::permission, path, "others can read or write this key",
                 "chmod 600 " + path + "; if somebody may have read it, make a new one");
@@ -83,8 +70,8 @@ void make_key_file(const std::string& path, std::uint8_t id) {
   }
   std::array<char, key_text_size + 1> text;
   *write_key(text.data(), key) = '\n';
-  const Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
-  if (file.get() < 0) {
+  const FileDescriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
+  if (!file) {
     throw system_error(path, errno,
                        errno == EEXIST ? "choose another name; a key is never overwritten"
                                        : "choose a place that can be written");
