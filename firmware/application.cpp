@@ -103,8 +103,8 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
   }
 }
 
-// Is the datagram of a host that may command? Without a key all are, and at a cable of the board's own:
-// who is there can set a key.
+// Is the datagram of a host that may command? Without a key all are, and at a cable of the board's
+// own: who is there can set a key.
 Verdict Application::judge(std::uint8_t port, MessageKind kind, const Datagram& datagram,
                            std::uint32_t now_ms) {
   if (!authentication_.required() || ports_[port].port->may_configure()) return Verdict::authentic;
@@ -316,8 +316,8 @@ void Application::enter(SafeReason cause, std::uint32_t now_ms) {
   report_state(now_ms);
 }
 
-// Nobody clears what they have not heard of: a stop may have been pressed, or a fault have come, while
-// E:CLEAR was on its way. What is older than the timeout the owner has heard of, or is lost.
+// Nobody clears what they have not heard of: a stop may have been pressed, or a fault have come,
+// while E:CLEAR was on its way. What is older than the timeout the owner has heard of, or is lost.
 bool Application::may_clear(std::uint32_t now_ms) const {
   return now_ms - latched_ms_ >= setpoints_.settings.timeout_ms || link_.has_heard(latched_ms_);
 }

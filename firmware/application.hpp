@@ -36,8 +36,8 @@ class Application {
   struct Config {
     Identity identity;  // the texts must outlive the application
     Settings settings;
-    // Authentication::chance_size random bytes, others at each boot. Without them a board with a key
-    // obeys nobody but who is at a cable of its own.
+    // Authentication::chance_size random bytes, others at each boot. Without them a board with a
+    // key obeys nobody but who is at a cable of its own.
     const std::uint8_t* chance = nullptr;
   };
   static constexpr int max_ports = 4;

@@ -52,8 +52,8 @@ void Application::refuse(Source to, const Datagram& datagram, Refusal code, std:
   answer(to, writer, now_ms);
 }
 
-// What a heartbeat says the time is. An echo of 0 would say that its host has heard nothing: when the
-// clock wraps, that millisecond is left out.
+// What a heartbeat says the time is. An echo of 0 would say that its host has heard nothing: when
+// the clock wraps, that millisecond is left out.
 std::uint32_t Application::heartbeat_time(std::uint32_t now_ms) {
   return now_ms != 0 ? now_ms : 0xFFFFFFFFU;
 }

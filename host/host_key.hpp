@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The host's key, and what its board makes of it.
 //
-// With a key everything is signed as soon as the board's nonce is known, and a board that tells none
-// is refused: it has no key and obeys anyone. Without one, a board that asks for a signature is found
-// out by what it does not do: it takes no heartbeat, or answers AUTH.
+// With a key everything is signed as soon as the board's nonce is known, and a board that tells
+// none is refused: it has no key and obeys anyone. Without one, a board that asks for a signature
+// is found out by what it does not do: it takes no heartbeat, or answers AUTH.
 #pragma once
 
 #include <chrono>

@@ -9,9 +9,10 @@
 //                          +--+ the same bytes   deadline    ------> timed out
 //                         every 50 ms
 //
-// A retry has the bytes and the packet number of the original (signed anew, where there is a key), so
-// the board can execute it only once. When CMD has moved past a command, the retry's answer (DUPLICATE: executed, STALE: not)
-// decides. A board without CMD (the paper's release) confirms by the value that its state shows.
+// A retry has the bytes and the packet number of the original (signed anew, where there is a key),
+// so the board can execute it only once. When CMD has moved past a command, the retry's answer
+// (DUPLICATE: executed, STALE: not) decides. A board without CMD (the paper's release) confirms by
+// the value that its state shows.
 //
 // With a key (host_key.hpp) all is signed, a board without one is refused, and AUTH says only that one
 // copy was not taken: another may have been executed.

@@ -2,13 +2,13 @@
 // Proof that a datagram is of a host that has the board's key, made just now and not seen before
 // (docs/protocol.md "Authentication"). Both ends; only hosts sign.
 //
-// The board tells a nonce in its heartbeats, 64 random bits as `AN:<16 hex digits>;`. The host signs
-// with the last field of its datagrams:
+// The board tells a nonce in its heartbeats, 64 random bits as `AN:<16 hex digits>;`. The host
+// signs with the last field of its datagrams:
 //
 //     A:<key id>,<counter>,<board T>,<tag>;
 //
-// The tag is 64 bits of BLAKE2s, keyed, over "R4A1", the digits of AN and every byte of the datagram
-// before the tag; in base64url without padding (RFC 4648, 5), 11 characters.
+// The tag is 64 bits of BLAKE2s, keyed, over "R4A1", the digits of AN and every byte of the
+// datagram before the tag; in base64url without padding (RFC 4648, 5), 11 characters.
 //
 // What it does not do: hide anything, or prove what the board says.
 #pragma once
@@ -55,8 +55,8 @@ class Authentication {
   static constexpr std::uint32_t age_limit_ms = 250;
   static constexpr std::uint32_t answer_spacing_ms = 100;
 
-  // `chance`: random bytes, others at each boot, from which the nonces are made. nullptr: the board has
-  // none; then it tells no nonce, and nothing is ever authentic.
+  // `chance`: random bytes, others at each boot, from which the nonces are made. nullptr: the board
+  // has none; then it tells no nonce, and nothing is ever authentic.
   explicit Authentication(const std::uint8_t* chance);
 
   // The board's keys; those with id 0 are none. Takes a new nonce.
@@ -71,8 +71,8 @@ class Authentication {
 
   // Is it signed? If so, its counter and those below are used up.
   Verdict verify(const Datagram& datagram, std::uint32_t now_ms);
-  // It was not and was needed. True if that may be answered: at most every answer_spacing_ms, and not
-  // what a network has repeated or held back.
+  // It was not and was needed. True if that may be answered: at most every answer_spacing_ms, and
+  // not what a network has repeated or held back.
   bool rejected(Verdict verdict, std::uint32_t now_ms);
   // How many were rejected for that.
   std::uint32_t rejections(Verdict verdict) const {
@@ -104,17 +104,17 @@ class Signer {
  public:
   explicit Signer(const Key& key) : key_(signing_key(key)), id_(key.id) {}
 
-  // The newest heartbeat of the board has this nonce (heartbeat_nonce()); empty: none, it has no key.
-  // True if it is not the one before.
+  // The newest heartbeat of the board has this nonce (heartbeat_nonce()); empty: none, it has no
+  // key. True if it is not the one before.
   bool on_nonce(Text nonce);
   // The newest datagram of the board has this T. `now_ms`: the host's clock, which wraps.
   void on_board_time(std::uint32_t t_ms, std::uint32_t now_ms);
   // Has a nonce been heard? Nothing can be signed before.
   bool ready() const { return has_nonce_; }
 
-  // Writes the field A behind all others: finish() of the writer is to follow. `counter_floor` is the
-  // least that the counter may be: microseconds since 1970, so that a host which begins again goes on
-  // above what it has used. Only while ready().
+  // Writes the field A behind all others: finish() of the writer is to follow. `counter_floor` is
+  // the least that the counter may be: microseconds since 1970, so that a host which begins again
+  // goes on above what it has used. Only while ready().
   void sign(DatagramWriter& writer, std::uint64_t counter_floor, std::uint32_t now_ms);
 
  private:

@@ -10,8 +10,8 @@
 //     const Blake2sKey prepared(8, key, sizeof key);
 //     Blake2s code(prepared);           // for a message of at least one byte
 //
-// Messages of up to 2^32 - 1 bytes, the key's block of 64 included. Nothing fails; the time depends on
-// the sizes only, never on the bytes.
+// Messages of up to 2^32 - 1 bytes, the key's block of 64 included. Nothing fails; the time depends
+// on the sizes only, never on the bytes.
 #pragma once
 
 #include <cstddef>

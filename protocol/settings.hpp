@@ -39,8 +39,8 @@ inline bool operator!=(const Settings& a, const Settings& b) { return !(a == b);
 // kind, ::range outside its range; `settings` only changes on Refusal::none.
 Refusal set(Settings& settings, Text key, Text value);
 
-// All settings as lines "key,value", each ended by a line feed, so that they can be kept. False: more
-// than `capacity` bytes.
+// All settings as lines "key,value", each ended by a line feed, so that they can be kept. False:
+// more than `capacity` bytes.
 constexpr std::size_t max_settings_text = 960;
 bool write_settings(const Settings& settings, char* out, std::size_t capacity, Text& text);
 // Takes such lines, in any order. What is not known or not allowed is passed over: the text may be

@@ -12,17 +12,17 @@
 //                                               the host heard last
 //     port       1-65535               2018     where the board listens for UDP
 //     node       0-31                  1        its number on the CAN bus
-//     chips      0-31                  31       which chips are fitted: 1 OSMC, 2 DHB12, 4 expander,
-//                                               8 DAC, 16 servos
+//     chips      0-31                  31       which chips are fitted: 1 OSMC, 2 DHB12, 4
+//                                               expander, 8 DAC, 16 servos
 //     AIN24 …    volts, 0.01-650       50.00    of that analog input at full scale
-//     key        id:64 hex digits      none     a key, of id 1-9 (key.hpp); `id:off`: it is none any
-//                                               more. At most four
+//     key        id:64 hex digits      none     a key, of id 1-9 (key.hpp); `id:off`: it is none
+//                                               any more. At most four
 //
 // In a name or password, what the grammar does not allow is written as in URLs: %2C is a comma, %25
 // a percent sign, %6Fff the network that is called "off".
 //
-// network, password, host, port, key and analog inputs count at once, the others when the board starts
-// next.
+// network, password, host, port, key and analog inputs count at once, the others when the board
+// starts next.
 #pragma once
 
 #include <cstddef>

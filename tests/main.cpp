@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// main() of the test programs. Some tests set bounds to real time, as the promises that they test do.
-// A machine that stands still in the middle (a virtual one that is paused) breaks them all. A thread
-// that only looks at the clock tells: a failure during a standstill says nothing and is repeated, one
-// without counts. integration/conftest.py has the same rule.
+// main() of the test programs. Some tests set bounds to real time, as the promises that they test
+// do. A machine that stands still in the middle (a virtual one that is paused) breaks them all. A
+// thread that only looks at the clock tells: a failure during a standstill says nothing and is
+// repeated, one without counts. integration/conftest.py has the same rule.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

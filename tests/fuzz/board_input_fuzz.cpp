@@ -6,9 +6,9 @@
 // port, bit 3 a checksum is put behind the payload, bits 4-6 how much time passes before. A payload
 // that begins with '!' is something that happens around the board. In others, to reach what only a
 // host in session reaches: $T stands for the T of the newest heartbeat that the peer heard, $N for
-// its next packet number in the upper half, $L for its last, $P for its next in the lower half, $A for
-// a right signature of what is before it. If the first payload is "!k", the board has a key: then
-// nothing is executed, and no heartbeat feeds, without such a signature, but a stop.
+// its next packet number in the upper half, $L for its last, $P for its next in the lower half, $A
+// for a right signature of what is before it. If the first payload is "!k", the board has a key:
+// then nothing is executed, and no heartbeat feeds, without such a signature, but a stop.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A Giga in virtual time: the microcontroller's registers that the firmware uses, with what is behind
-// them, and the parts of the core that it calls. One at a time; the firmware runs in the test's thread,
-// its threads are threads.
+// A Giga in virtual time: the microcontroller's registers that the firmware uses, with what is
+// behind them, and the parts of the core that it calls. One at a time; the firmware runs in the
+// test's thread, its threads are threads.
 //
-// Time passes when the firmware looks at the clock (a microsecond each time), rests, or when the test
-// lets it pass. Timers interrupt whatever runs then, unless interrupts are off, so an interrupt comes in
-// the middle of a transfer as on the chip. A reset ends reset_by()'s action.
+// Time passes when the firmware looks at the clock (a microsecond each time), rests, or when the
+// test lets it pass. Timers interrupt whatever runs then, unless interrupts are off, so an
+// interrupt comes in the middle of a transfer as on the chip. A reset ends reset_by()'s action.
 #pragma once
 
 #include <array>

@@ -124,8 +124,8 @@ void sign(Signer* signer, DatagramWriter& writer) {
   if (signer != nullptr) signer->sign(writer, 1700000000000000, 1000);
 }
 
-// One command after the other, each with its own number; what reading, checking and executing costs.
-// With a key they are signed.
+// One command after the other, each with its own number; what reading, checking and executing
+// costs. With a key they are signed.
 std::uint32_t command_instructions(firmware::Hal& hal, std::uint32_t first, std::uint64_t t,
                                    const Key* key = nullptr) {
   Sink sink;

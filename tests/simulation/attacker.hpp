@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Somebody on the network of a board with a key, but without that key: hears all that is sent both ways,
-// and sends the board what it likes, from any address, whole and in time.
+// Somebody on the network of a board with a key, but without that key: hears all that is sent both
+// ways, and sends the board what it likes, from any address, whole and in time.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +32,8 @@ const char* to_text(Attack::Kind kind);
 
 class Attacker {
  public:
-  // What goes over the network: a host sends, the board has received what a host sent, the board sends.
+  // What goes over the network: a host sends, the board has received what a host sent, the board
+  // sends.
   void on_sent(int host, std::string_view bytes) { keep(sent_, host, bytes); }
   void on_received(int host, std::string_view bytes) { keep(received_, host, bytes); }
   void on_board(std::string_view bytes);

@@ -51,7 +51,8 @@ struct Schedule {
   std::uint32_t command_timeout_us = 0;
   double post_share = 0;                // commands sent without asking for confirmation
   std::uint32_t board_lateness_us = 0;  // the board's loop comes up to this much late
-  // The board has a key for each host, and there is an attacker, who acts about so often; 0: neither.
+  // The board has a key for each host, and there is an attacker, who acts about so often; 0:
+  // neither.
   std::uint32_t attack_interval_us = 0;
 
   static Schedule random(Random& random);

@@ -12,8 +12,8 @@
 //   late       nor one that a heartbeat which fed overtook more than 250 ms before
 //   truth      confirmed means executed; refused means not executed, then and later
 //   restore    outputs that come back belong to a host that was alive a timeout ago
-//   forged     of a board with a key: nothing that an attacker sends is executed, feeds or takes control,
-//              but a stop
+//   forged     of a board with a key: nothing that an attacker sends is executed, feeds or takes
+//              control, but a stop
 #pragma once
 
 #include <cstdint>

@@ -10,8 +10,8 @@
 
 namespace r4::tool {
 
-// Throws Error: open if it cannot be read, permission if others than its owner may read it, data if it
-// holds no key.
+// Throws Error: open if it cannot be read, permission if others than its owner may read it, data if
+// it holds no key.
 Key read_key_file(const std::string& path);
 
 // Makes a file with a new random key. Throws Error: open if it cannot be made; one that is there is

@@ -139,7 +139,8 @@ void Board::poll() {
   light_.show(application_.state(), application_.reason(), now_ms);
 }
 
-// The boot loader knows nothing of the chips: what they drive when the core resets, they drive for ever.
+// The boot loader knows nothing of the chips: what they drive when the core resets, they drive for
+// ever.
 void Board::stay_safe_for_upload() {
   if (usb_.upload_asked()) application_.fail(SafeReason::fault, BoardClock::now_ms());
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The report of the paper's Figure 3, on request, a line a turn: rates, the scan of the I2C bus, the
-// timer, the network; then what the paper's firmware did not know: chips, CAN, settings, keys if there
-// are any, how the last boot ended. Labels are spelled as in the paper.
+// The report of the paper's Figure 3, on request, a line a turn: rates, the scan of the I2C bus,
+// the timer, the network; then what the paper's firmware did not know: chips, CAN, settings, keys
+// if there are any, how the last boot ended. Labels are spelled as in the paper.
 //
 // The scan asks one address a turn, so the loop waits for no more than one transfer.
 #pragma once

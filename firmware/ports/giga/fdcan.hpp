@@ -9,8 +9,8 @@
 //     to send     what is urgent       -> a buffer of its own, which overtakes the queue by its id
 //                 the rest, in order   -> FIFO of 8 frames
 //
-// An interrupt wakes the loop and tells of a stop: the hardware keeps the frames. Times are microseconds of a
-// clock that wraps. Nothing waits for the bus.
+// An interrupt wakes the loop and tells of a stop: the hardware keeps the frames. Times are
+// microseconds of a clock that wraps. Nothing waits for the bus.
 #pragma once
 
 #include <cstdint>

@@ -57,8 +57,8 @@ class Machine final : public StepTick {
   };
   firmware::BoardPins pins();
 
-  // The order is that of the power-up: the clock of the ports, the bus, the pins at rest, the chips'
-  // outputs off; then what may take its time.
+  // The order is that of the power-up: the clock of the ports, the bus, the pins at rest, the
+  // chips' outputs off; then what may take its time.
   PortsOn ports_on_;
   I2cController bus_;
   GpioOutput step_[stepper_channels];

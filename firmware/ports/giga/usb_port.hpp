@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // USB serial as a port of the application: one datagram a line, and a few words for people.
 //
-// Nothing here waits for the host. The core's Serial.write() would, for ever, when a program has the
-// port open and does not read; so lines go out by send_nb(), a packet at a time, whole or not at
-// all, and the newest state wins (transmit_lines.hpp).
+// Nothing here waits for the host. The core's Serial.write() would, for ever, when a program has
+// the port open and does not read; so lines go out by send_nb(), a packet at a time, whole or not
+// at all, and the newest state wins (transmit_lines.hpp).
 //
 // The line `report` is for the board itself. From the loop only.
 #pragma once
@@ -45,8 +45,9 @@ class UsbPort final : public firmware::Port {
   std::size_t max_size() const override { return max_datagram; }
   bool may_configure() const override { return true; }
 
-  // Has the host asked for new firmware, by 1200 baud? From then on the core resets the chip into its
-  // boot loader as soon as the port is closed, 200 ms later at the earliest, whatever the speed is then.
+  // Has the host asked for new firmware, by 1200 baud? From then on the core resets the chip into
+  // its boot loader as soon as the port is closed, 200 ms later at the earliest, whatever the speed
+  // is then.
   bool upload_asked();
 
   // A line of a report. False: no room now.

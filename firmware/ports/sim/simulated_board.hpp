@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A whole R4 board in a process: the firmware's application and chip drivers on a model of the board,
-// reached through any carriers. One timer drives it, which sleeps until the application needs time;
-// then the milliseconds that have passed on the board are made up for, one by one.
+// A whole R4 board in a process: the firmware's application and chip drivers on a model of the
+// board, reached through any carriers. One timer drives it, which sleeps until the application
+// needs time; then the milliseconds that have passed on the board are made up for, one by one.
 //
-// A hardware watchdog resets the microcontroller, not the chips, when the guard does not let it be fed
-// for watchdog_ms. A slow computer is no slow board: only a `hang` of the script keeps the loop from
-// checking in.
+// A hardware watchdog resets the microcontroller, not the chips, when the guard does not let it be
+// fed for watchdog_ms. A slow computer is no slow board: only a `hang` of the script keeps the loop
+// from checking in.
 //
 // It lives on one io_context and is used from that io_context's thread only. A datagram costs no
 // heap.
@@ -46,8 +46,8 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   };
 
   struct Options {
-    // Of clock, analog inputs and nonces, which it makes predictable: for tests. Without one they are
-    // others each time.
+    // Of clock, analog inputs and nonces, which it makes predictable: for tests. Without one they
+    // are others each time.
     std::optional<std::uint64_t> seed;
     std::string board_id = "sim-1";  // the texts of its answer to Q:ID
     std::string firmware_version = "0.1.0";

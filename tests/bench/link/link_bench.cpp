@@ -5,7 +5,8 @@
 //
 // The three ways of asking take turns in blocks, so that what else the machine does meets all of
 // them. Exit code 1 if a bar of the plan is missed: asynchronous p50 at most 1.3 times the plain
-// one, each process on a core of its own; no allocation per datagram; at 100 Hz at most 2 % of a core on either side.
+// one, each process on a core of its own; no allocation per datagram; at 100 Hz at most 2 % of a
+// core on either side.
 #include <algorithm>
 #include <asio/io_context.hpp>
 #include <asio/post.hpp>
