@@ -3,9 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <string>
 
 #include "tests/support/datagrams.hpp"
+#include "tests/support/signing.hpp"
 
 namespace r4::firmware {
 namespace {
@@ -51,6 +53,18 @@ TEST(StopDetector, OneWrongBitIsNoStop) {
     if (hexadecimal_in_the_other_case) continue;
     EXPECT_EQ(stops_in(detector, damaged + "\n"), 0) << damaged;
   }
+}
+
+TEST(StopDetector, HearsASignedStopOfTheLongestNumbers) {
+  const std::string fields =
+      test::with_signature("E:STOP;PNum:4294967295;T:18446744073709551615;",
+                           test::key_of(max_key_id), "0123456789abcdef", UINT64_MAX, UINT32_MAX);
+  const std::string longest_checksum = "^0x01234567^";
+  EXPECT_LE(fields.size() + longest_checksum.size(), StopDetector::max_line);
+  const std::string datagram = with_crc(fields);
+  EXPECT_TRUE(is_stop(Text(datagram)));
+  StopDetector detector;
+  EXPECT_EQ(stops_in(detector, datagram + "\r\n" + datagram + "\n"), 2) << datagram;
 }
 
 TEST(StopDetector, FindsTheNextLineAfterOneThatIsTooLong) {
