@@ -27,6 +27,56 @@ constexpr std::array<CommandHelp, 14> table{{
     {0, "", "", ""},
 }};
 
+struct SettingHelp {
+  std::string_view name;
+  std::string_view values;
+};
+
+constexpr std::array<SettingHelp, 13> settings_table{{
+    {"rate", "1-1000 states a second"},
+    {"heartbeat", "50-1000 ms, below the timeout"},
+    {"timeout", "100-10000 ms, above the heartbeat"},
+    {"recovery", "last or rearm"},
+    {"pack", "0 or 1"},
+    {"network", "1-32 bytes, or off"},
+    {"password", "8-63 bytes, or off"},
+    {"host", "an IPv4 address, or off"},
+    {"port", "1-65535"},
+    {"node", "0-31"},
+    {"chips", "0-31"},
+    {"key", "id:digits, the id 1-9, then 64 hexadecimal digits; or id:off"},
+    {"AIN24", "0.01-650 volts; AIN12, AIN5 and the others likewise"},
+}};
+
+// A text "C:key,value" in its parts. The key ends where it can, if there is no comma.
+struct SettingText {
+  explicit SettingText(std::string_view text) : name(text.substr(2)) {
+    const std::size_t end = std::min(name.find_first_of(", :="), name.size());
+    value = name.substr(std::min(end + 1, name.size()));
+    name = name.substr(0, end);
+  }
+  static bool is_one(std::string_view text) { return text.starts_with("C:"); }
+  bool is_known() const {
+    Settings settings;
+    return set(settings, Text(name), Text(value)) != Refusal::unknown;
+  }
+
+  std::string_view name;
+  std::string_view value;
+};
+
+std::string setting_fix(const SettingText& setting) {
+  const bool analog = setting.is_known() && setting.name.starts_with("AIN");
+  for (const SettingHelp& each : settings_table) {
+    if (each.name == setting.name || (analog && each.name.starts_with("AIN"))) {
+      return "write " + std::string(setting.name) + ",value with " + std::string(each.values);
+    }
+  }
+  std::string fix = "write key,value with a key of";
+  for (const SettingHelp& each : settings_table) fix += " " + std::string(each.name);
+  return fix + " …";
+}
+
 }  // namespace
 
 const CommandHelp* all_command_help() { return table.data(); }
@@ -45,15 +95,21 @@ std::string text_of(const Command& command) {
   return std::string(field.substr(0, field.find_last_of(';')));
 }
 
-std::string shown(const Command& command) {
-  if (command.kind != CommandKind::setting || !is_secret_setting(command.text)) {
-    return text_of(command);
-  }
-  const std::string_view value(command.text2.data(), command.text2.size());
+std::string shown(std::string_view text) {
+  if (!SettingText::is_one(text)) return std::string(text);
+  const SettingText setting(text);
+  const bool is_public = setting.is_known() && !is_secret_setting(Text(setting.name));
+  if (setting.value.empty() || is_public) return std::string(text);
   // Of a key, which one it is.
-  const std::size_t colon = command.text == key_setting ? value.find(':') + 1 : 0;
-  return text_of(Command::setting(command.text, Text(std::string(value.substr(0, colon)) + "...")));
+  std::uint8_t id = 0;
+  Text digits;
+  const bool has_id = Text(setting.name) == key_setting &&
+                      split_key(Text(setting.value), id, digits) == Refusal::none;
+  return std::string(text.substr(0, text.size() - setting.value.size())) +
+         (has_id ? std::to_string(id) + ":..." : "...");
 }
+
+std::string shown(const Command& command) { return shown(text_of(command)); }
 
 std::string_view meaning_of(Refusal refusal) {
   switch (refusal) {
@@ -82,10 +138,12 @@ std::string_view meaning_of(Refusal refusal) {
 }
 
 Problem bad_command(std::string_view text, Refusal refusal) {
-  Problem problem{ErrorKind::usage, std::string(text), std::string(meaning_of(refusal)), ""};
+  Problem problem{ErrorKind::usage, shown(text), std::string(meaning_of(refusal)), ""};
   const CommandHelp* help = text.empty() ? nullptr : command_help(text.front());
   const bool is_letter = text.size() == 1 || (text.size() > 1 && text[1] == ':');
-  if (help != nullptr && is_letter) {
+  if (SettingText::is_one(text)) {
+    problem.fix = setting_fix(SettingText(text));
+  } else if (help != nullptr && is_letter) {
     problem.fix = "use " + std::string(help->form) + " with " + std::string(help->ranges);
   } else {
     problem.reason = "no such command";

@@ -28,8 +28,10 @@ const CommandHelp* all_command_help();
 // The text of a command, as it is on the wire: "O:358,1,1".
 std::string text_of(const Command& command);
 
-// The same for people and logs to see: "C:password,...", "C:key,1:...".
+// The same for people and logs to see, without what is secret: "C:password,...", "C:key,1:...". The
+// value of a setting that we do not know may be meant for one that is.
 std::string shown(const Command& command);
+std::string shown(std::string_view text);
 
 // Parses "O:358,1,1" (with or without the final ';'). Throws Error{usage} naming what is wrong. The
 // command's texts are views of `text`.

@@ -182,7 +182,7 @@ NO_BOARD = 'udp://127.0.0.1:9?listen=0'
     (['decode', '/'], OPEN, 'directory'),
     (['sim', '--script', '/no/such/file'], USAGE, '/no/such/file'),
     (['sim', '--set', 'pack,2'], USAGE, '--set pack,2'),
-    (['sim', '--set', 'colour,red'], USAGE, '--set colour,red'),
+    (['sim', '--set', 'colour,red'], USAGE, '--set colour'),
     (['sim', '--board-id', 'a,b'], USAGE, 'cannot be sent'),
     (['sim', '--board-id', 'x' * 65], USAGE, 'use 1 to 64'),
     (['monitor', 'udp://255.255.255.255'], USAGE, 'the address of many'),

@@ -57,8 +57,9 @@ Settings read_settings(const std::vector<std::string>& texts) {
     const std::string value = comma == std::string::npos ? "" : text.substr(comma + 1);
     const Refusal refusal = set(settings, Text(key), Text(value));
     if (refusal == Refusal::none) continue;
-    throw Error(ErrorKind::usage, "--set " + text, std::string(meaning_of(refusal)),
-                std::string("use ") + std::string(command_help('C')->ranges));
+    Problem problem = bad_command("C:" + text, refusal);
+    problem.thing.replace(0, 2, "--set ");
+    throw Error(std::move(problem));
   }
   return settings;
 }
