@@ -122,21 +122,25 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   void on_rejected(std::uint32_t t_ms, Verdict verdict) override;
 
   void at(std::uint64_t time_us, Event::Kind kind, int index, std::uint32_t generation = 0);
-  void boot_board();
-  void start_host(int index);
-  void poll_board();
-  void poll_host(int index);
-  void issue_command(int index);
-  void happen(const Happening& happening, bool over);
-  void transfer(bool to_board, int host, std::string_view bytes);
-  void deliver(int packet);
-  void attack();
-  void check_silence();
-  void violate(const std::string& what);
+  std::uint32_t board_ms() const;
+  void mix(const void* data, std::size_t size);
   void note(const std::string& line);
   void show(const std::string& line);
-  void mix(const void* data, std::size_t size);
-  std::uint32_t board_ms() const;
+  void violate(const std::string& what);
+  // world_board.cpp, with what is overridden above
+  void boot_board();
+  void poll_board();
+  void check_silence();
+  // world_hosts.cpp
+  void start_host(int index);
+  void poll_host(int index);
+  void issue_command(int index);
+  // world_happenings.cpp
+  void happen(const Happening& happening, bool over);
+  void attack();
+  // world_channel.cpp
+  void transfer(bool to_board, int host, std::string_view bytes);
+  void deliver(int packet);
 
   Random random_;
   Schedule schedule_;

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The simulated board: the application on a HAL that only remembers, and the promises that are checked
+// where the board acts.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "world_host.hpp"
+
+namespace r4::simulation {
+
+namespace {
+
+constexpr std::uint64_t slack_us = 20'000;
+
+bool driven(const firmware::Outputs& outputs) { return outputs != firmware::Outputs(); }
+
+}  // namespace
+
+void World::boot_board() {
+  ++board_generation_;
+  boot_us_ = now_us_;
+  boot_offset_ms_ = static_cast<std::uint32_t>(random_.next());
+  outputs_ = firmware::Outputs();
+  live_ = false;
+  fed_.clear();
+  firmware::Application::Config config;
+  config.identity = Identity{Text("simulated"), Text("0"), Text("sim")};
+  config.settings = schedule_.settings;
+  std::uint8_t chance[Authentication::chance_size];
+  if (schedule_.attack_interval_us != 0) {
+    for (int i = 0; i < schedule_.hosts; ++i) config.settings.site.keys[i] = key_of_host(i);
+    for (std::uint8_t& byte : chance) byte = static_cast<std::uint8_t>(random_.next());
+    config.chance = chance;
+  }
+  board_ = std::make_unique<firmware::Application>(*this, config, this);
+  board_->add_port(*this);
+  note("board boots");
+  board_->start(board_ms());
+  poll_board();
+}
+
+void World::poll_board() {
+  const std::uint32_t wait_ms = board_->poll(board_ms());
+  const std::uint64_t late_us = random_.below(schedule_.board_lateness_us + 1);
+  at(now_us_ + wait_ms * 1000 + late_us, Event::Kind::board, 0, board_generation_);
+}
+
+void World::sample(firmware::Inputs& inputs) {
+  inputs.handle_held = handle_held_;
+  for (auto& cm : inputs.ultrasonic_cm) cm = 200;
+  inputs.ultrasonic_cm[0] = distance_cm_;
+}
+
+void World::apply(const firmware::Outputs& outputs) {
+  const bool came_back = !live_ && driven(outputs);
+  outputs_ = outputs;
+  live_ = driven(outputs);
+  if (!came_back) return;
+  const int id = outputs.stepper[0].position;
+  if (id < 0 || id >= static_cast<int>(commands_.size())) return violate("intact: unknown output");
+  const Sent& sent = commands_[static_cast<std::size_t>(id)];
+  const Host& host = *hosts_[static_cast<std::size_t>(sent.host)];
+  if (was_lost_ && id == newest_executed_ && sent.executed != 0) ++report_.restores;
+  const bool gone = host.incarnation != sent.incarnation || !host.alive;
+  if (gone && now_us_ - host.died_us > schedule_.settings.timeout_ms * 1000U + slack_us) {
+    violate(fmt::format("restore: outputs of command {} came back long after its host died", id));
+  }
+}
+
+void World::make_safe() {
+  if (live_) {
+    report_.worst_silence_us = std::max(report_.worst_silence_us, now_us_ - heartbeat_in_us_);
+  }
+  outputs_ = firmware::Outputs();
+  live_ = false;
+}
+
+void World::check_silence() {
+  if (!live_) return;
+  const std::uint64_t timeout_us = board_->settings().timeout_ms * 1000U;
+  if (now_us_ - heartbeat_in_us_ > timeout_us + slack_us) {
+    violate(fmt::format("silence: outputs live {} us after the last heartbeat came",
+                        now_us_ - heartbeat_in_us_));
+  }
+  if (now_us_ - heartbeat_sent_us_ > 2 * timeout_us + slack_us) {
+    violate(fmt::format("silence: outputs live {} us after the last heartbeat was sent",
+                        now_us_ - heartbeat_sent_us_));
+  }
+}
+
+void World::send(Text datagram, firmware::Urgency, std::uint32_t peer) {
+  const std::string_view bytes(datagram.data(), datagram.size());
+  for (int i = 0; i < static_cast<int>(hosts_.size()); ++i) {
+    if (peer == firmware::everyone || peer == static_cast<std::uint32_t>(i + 1)) {
+      transfer(false, i, bytes);
+    }
+  }
+}
+
+void World::on_state(std::uint32_t, firmware::BoardState state, SafeReason reason) {
+  note(fmt::format("board {} {}", firmware::to_text(state), r4::to_text(reason)));
+  if (state == firmware::BoardState::safe && reason == SafeReason::link) ++report_.link_losses;
+  was_lost_ = state == firmware::BoardState::safe && reason == SafeReason::link;
+}
+
+void World::on_outputs(std::uint32_t, const firmware::Outputs& outputs) {
+  note(fmt::format("board outputs of command {}", outputs.stepper[0].position));
+}
+
+void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& command) {
+  note(fmt::format("board executes {} kind {} value {}", pnum, static_cast<int>(command.kind),
+                   command.value));
+  if (attacking_ && command.kind != CommandKind::stop) return violate("forged: executed");
+  if (command.kind == CommandKind::stop) {
+    ++report_.stops;
+    stop_from_ = delivering_;
+    stop_pnum_ = pnum;
+  }
+  if (command.kind != CommandKind::stepper) return;
+  ++report_.executed;
+  if (schedule_.attack_interval_us != 0) ++report_.executed_signed;
+  const int id = command.value;
+  if (id < 0 || id >= static_cast<int>(commands_.size()) || command.channel != 1) {
+    return violate("intact: executed a command that nobody sent");
+  }
+  Sent& sent = commands_[static_cast<std::size_t>(id)];
+  if (++sent.executed > 1) violate(fmt::format("once: command {} executed again", id));
+  if (sent.dead) violate(fmt::format("truth: command {} executed after its refusal", id));
+  if (id < newest_executed_) {
+    const Sent& newest = commands_[static_cast<std::size_t>(newest_executed_)];
+    if (newest.host == sent.host) {
+      violate(fmt::format("order: command {} executed after {}", id, newest_executed_));
+    }
+  }
+  if (stop_from_ == delivering_ && newer(stop_pnum_, pnum)) {
+    violate(fmt::format("order: command {} is older than the stop before it", id));
+  }
+  const std::uint64_t limit_us = 2U * board_->settings().timeout_ms * 1000U + 250'000 + slack_us;
+  if (now_us_ - sent.transmitted_us > limit_us) {
+    violate(fmt::format("fresh: command {} executed {} us after it was sent", id,
+                        now_us_ - sent.transmitted_us));
+  }
+  for (const Fed& fed : fed_) {
+    const bool overtook = fed.from == delivering_ && newer(fed.pnum, pnum);
+    if (overtook && now_us_ - fed.at_us > BoardLink::late_limit_ms * 1000U + 1000) {
+      violate(fmt::format("late: command {} was overtaken {} us before", id, now_us_ - fed.at_us));
+      break;
+    }
+  }
+  if (board_->link().owner().peer != static_cast<std::uint32_t>(sent.host + 1)) {
+    violate(fmt::format("intact: command {} is of a host that does not control", id));
+  }
+  newest_executed_ = std::max(newest_executed_, id);
+}
+
+void World::on_refused(std::uint32_t, std::uint32_t pnum, Refusal code) {
+  note(fmt::format("board refuses {} {}", pnum, static_cast<int>(code)));
+}
+
+void World::on_rejected(std::uint32_t, Verdict verdict) {
+  ++report_.rejected;
+  note(fmt::format("board drops it: signature {}", r4::to_text(verdict)));
+}
+
+}  // namespace r4::simulation

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A host of the link simulator: the session that ships, and an application that commands through it.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string_view>
+
+#include "tests/support/signing.hpp"
+#include "world.hpp"
+
+namespace r4::simulation {
+
+inline Key key_of_host(int index) { return test::key_of(static_cast<std::uint8_t>(index + 1)); }
+
+struct World::Host final : Session::Handler {
+  Host(World& w, int i) : world(w), index(i) {}
+
+  void begin() {
+    ++incarnation;
+    alive = true;
+    clock_offset_us = world.random_.below(1'000'000'000);
+    const auto first =
+        echo_host_first_pnum + static_cast<std::uint32_t>(world.random_.below(1U << 30));
+    SessionOptions options;
+    if (world.schedule_.attack_interval_us != 0) {
+      options.key = key_of_host(index);
+      options.clock_start = std::chrono::hours{24} - Time{clock_offset_us};
+    }
+    session = std::make_unique<Session>(*this, options, first);
+    tickets.clear();
+  }
+  void die() {
+    alive = false;
+    died_us = world.now_us_;
+    session.reset();
+  }
+  Time time() const { return Time{static_cast<std::int64_t>(world.now_us_ + clock_offset_us)}; }
+
+  void transmit(std::string_view bytes, Priority) override { world.transfer(true, index, bytes); }
+  void on_state(const State&, const Datagram&) override {}
+  void on_board_heartbeat(const Datagram&) override {}
+  void on_identity(const Identity&) override {}
+  void on_nack(const Nack& nack, const Datagram&) override {
+    world.report_.busy += nack.code == Refusal::busy;
+    world.report_.stale += nack.code == Refusal::stale;
+    world.report_.duplicate += nack.code == Refusal::duplicate;
+  }
+  void on_bad_datagram(const ReadResult&, std::string_view) override {}
+  void on_link(const LinkStatus& status) override {
+    world.note(fmt::format("host {} link {} safe {} busy {}", index, r4::to_text(status.state),
+                           r4::to_text(status.reason), status.busy));
+  }
+  void on_result(Ticket ticket, const CommandResult& result) override;
+
+  World& world;
+  int index;
+  std::uint32_t incarnation = 0;
+  bool alive = false;
+  bool frozen = false;
+  std::uint64_t died_us = 0;
+  std::uint64_t clock_offset_us = 0;
+  std::uint64_t next_poll_us = 0;
+  std::uint32_t poll_generation = 0;
+  std::unique_ptr<Session> session;
+  std::map<Ticket, int> tickets;
+};
+
+}  // namespace r4::simulation

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The hosts: when they poll, what they command, and whether what they are told is true.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "world_host.hpp"
+
+namespace r4::simulation {
+
+void World::Host::on_result(Ticket ticket, const CommandResult& result) {
+  const auto found = tickets.find(ticket);
+  if (found == tickets.end()) return;
+  const int id = found->second;
+  tickets.erase(found);
+  Sent& sent = world.commands_[static_cast<std::size_t>(id)];
+  world.note(fmt::format("host {} command {} outcome {} {}", index, id,
+                         static_cast<int>(result.outcome), static_cast<int>(result.code)));
+  switch (result.outcome) {
+    case Outcome::confirmed:
+      ++world.report_.confirmed;
+      if (sent.executed == 0) {
+        world.violate(fmt::format("truth: command {} confirmed but never executed", id));
+      }
+      break;
+    case Outcome::refused:
+      ++world.report_.refused;
+      sent.dead = true;
+      if (sent.executed != 0) {
+        world.violate(fmt::format("truth: command {} refused but executed", id));
+      }
+      break;
+    case Outcome::timed_out:
+      ++world.report_.timed_out;
+      break;
+    case Outcome::cancelled:
+    case Outcome::full:
+      break;
+  }
+}
+
+void World::start_host(int index) {
+  Host& host = *hosts_[static_cast<std::size_t>(index)];
+  host.begin();
+  poll_host(index);
+}
+
+void World::poll_host(int index) {
+  Host& host = *hosts_[static_cast<std::size_t>(index)];
+  if (!host.alive) return;
+  if (!host.frozen) host.session->feed(host.time());
+  const Time next = host.session->poll(host.time());
+  const std::uint64_t at_us = std::max<std::uint64_t>(
+      static_cast<std::uint64_t>(next.count()) - host.clock_offset_us, now_us_ + 1);
+  at(at_us, Event::Kind::host, index, ++host.poll_generation);
+}
+
+void World::issue_command(int index) {
+  Host& host = *hosts_[static_cast<std::size_t>(index)];
+  at(now_us_ + random_.between(1, 2ULL * schedule_.command_interval_us), Event::Kind::command,
+     index);
+  if (!host.alive || host.frozen) return;
+  const int id = static_cast<int>(commands_.size());
+  Sent sent;
+  sent.host = index;
+  sent.incarnation = host.incarnation;
+  sent.asked_us = now_us_;
+  commands_.push_back(sent);
+  const Command command = Command::stepper(id, 1000, 1);
+  if (random_.chance(schedule_.post_share)) {
+    host.session->post(command, host.time());
+  } else {
+    const Time timeout{schedule_.command_timeout_us};
+    // The ticket is known only after send(), which may already transmit.
+    const Ticket ticket = host.session->send(command, timeout, host.time());
+    if (ticket != 0) host.tickets[ticket] = id;
+  }
+  poll_host(index);
+}
+
+}  // namespace r4::simulation
