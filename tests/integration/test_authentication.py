@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A board with a key: a second implementation drives it, an attacker does not; r4 with keys."""
 import os
+import pathlib
+import pwd
 import re
+import shutil
 import socket
 import stat
+import subprocess
+import tempfile
 
 import pytest
-from r4_process import ERROR, Board, monitor, run
+from r4_process import ERROR, R4, Board, monitor, run
 from signing import SigningHost, closed
 
 KEY = bytes(range(32))
@@ -207,7 +212,7 @@ def test_a_key_is_made_and_given_over_a_cable_and_taken_away_there(tmp_path):
         cable = f'serial://{tmp_path}/cable'
         network = [each for each in board.log if each['type'] == 'listening'][1]['host_url'] + '?listen=0'
         refused = run('key', 'give', str(file), network)
-        assert refused.returncode == 3 and 'over USB' in refused.stderr
+        assert refused.returncode == 2 and 'over USB' in refused.stderr
         given = run('key', 'give', str(file), cable)
         assert given.returncode == 0, given.stderr
         board.executed('C:key,7:...')
@@ -246,6 +251,57 @@ def test_a_key_file_that_is_not_there_is_named_but_does_not_hold_a_stop_back(boa
     assert done.returncode == 4 and missing in done.stderr
     stopped = run('stop', board.host_url, '--key', missing, env={**os.environ, 'R4_KEY': missing})
     assert stopped.returncode == 0, stopped.stderr
+
+
+def test_a_key_file_of_somebody_else_is_told_from_one_that_is_missing():
+    with tempfile.TemporaryDirectory() as folder:
+        os.chmod(folder, 0o755)
+        key = write_key(pathlib.Path(folder, 'key'), f'3:{KEY.hex()}')
+        program = [R4]
+        options = {}
+        if os.geteuid() == 0:  # root may read anything: somebody else asks, in whose reach r4 must be
+            program = [shutil.copy(R4, os.path.join(folder, 'r4'))]
+            nobody = pwd.getpwnam('nobody')
+            options = {'user': nobody.pw_uid, 'group': nobody.pw_gid, 'extra_groups': []}
+        else:
+            os.chmod(key, 0)
+        done = subprocess.run([*program, 'monitor', 'udp://127.0.0.1:9', '--key', key], check=False, text=True,
+                              capture_output=True, timeout=10, **options)
+    assert done.returncode == 5, done
+    assert 'run r4 as the user whose key it is' in done.stderr and ERROR.match(done.stderr)
+
+
+@pytest.mark.parametrize('arguments, code, words', [
+    (['monitor', 'udp://127.0.0.1:9', '--key', ''], 2, '--key: names no file'),
+    (['monitor', 'udp://127.0.0.1:9', '--key', '/'], 4, '/: is a directory; name the file'),
+    (['monitor', 'udp://127.0.0.1:9', '--key=~/.no-key'], 4, 'write $HOME/.no-key'),
+    (['key', 'new', ''], 2, 'is no file; r4 key new FILE'),
+    (['key', 'new', 'serial:auto'], 2, 'is no file; r4 key new FILE'),
+    (['key', 'new', '/no-such-folder/key'], 4, 'a place that can be written'),
+    (['key', 'new', 'key', '--id', '10'], 2, 'write 1 to 9'),
+    (['key', 'new', 'key', 'serial:auto'], 2, 'needs no board'),
+    (['key', 'give', 'serial:auto', 'key'], 2, 'is no file; r4 key give FILE serial:auto'),
+    (['key', 'give', 'key'], 2, 'URL: is missing'),
+    (['key', 'give', 'key', 'serial:auto', '--id', '3'], 2, 'r4 key new FILE --id N'),
+    (['key', 'give', '/no/such/key', 'serial:auto'], 4, '/no/such/key: No such file'),
+    (['key', 'give', 'key', 'can://can0'], 2, 'over USB only'),
+    (['key', 'take', 'key'], 2, 'use new or give'),
+])
+def test_a_mistake_with_keys_is_named_with_its_fix(arguments, code, words):
+    done = run(*arguments)
+    assert done.returncode == code, done.stderr
+    assert words in done.stderr and ERROR.fullmatch(done.stderr.strip())
+
+
+@pytest.mark.parametrize('command', [f'C:key,1:{KEY.hex()}', 'C:password,letmein!'])
+def test_a_secret_goes_over_no_network(stranger, command):
+    url = f'udp://127.0.0.1:{stranger.getsockname()[1]}?listen=0'
+    done = run('send', url, 'O:1,1,1', command)
+    assert done.returncode == 2 and 'over USB only' in done.stderr and ERROR.match(done.stderr)
+    assert KEY.hex() not in done.stderr and 'letmein' not in done.stderr
+    stranger.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        stranger.recv(2048)
 
 
 def test_two_hosts_with_a_key_each_are_told_apart(board, host):

@@ -61,7 +61,7 @@ void check(const Datagram& datagram) {
       fmt::format("{}:{}", std::string_view(field.name().data(), 1),
                   std::string_view(field.values().data(), field.values().size()));
   if (count > 1) {
-    fail(text, "is not the only command in the datagram",
+    fail(shown(text), "is not the only command in the datagram",
          "a board takes one command a datagram; --force encodes it all the same");
   }
   bool good = true;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "host/board.hpp"
@@ -19,19 +20,20 @@ struct Options {
   std::string action;
   std::string file;
   std::string url;
-  std::uint64_t id = 1;
+  std::optional<std::uint64_t> id;
 };
 
 int make(const Options& options) {
   if (!options.url.empty()) {
     throw Error(ErrorKind::usage, options.url, "a new key needs no board", "r4 key new FILE");
   }
-  make_key_file(options.file, static_cast<std::uint8_t>(options.id));
+  const auto id = static_cast<std::uint8_t>(options.id.value_or(1));
+  make_key_file(options.file, id);
   fmt::print(
       "{}: key {}\n"
       "give it to the board over USB:   r4 key give {} serial:auto\n"
       "then open the board with it:     r4 monitor udp://... --key {}\n",
-      options.file, options.id, options.file, options.file);
+      options.file, id, options.file, options.file);
   return 0;
 }
 
@@ -39,6 +41,11 @@ int give(const Options& options) {
   if (options.url.empty()) {
     throw Error(ErrorKind::usage, "URL", "is missing", "r4 key give FILE serial:auto");
   }
+  if (options.id) {
+    throw Error(ErrorKind::usage, fmt::format("--id {}", *options.id),
+                "a key has its id since it was made", "r4 key new FILE --id N");
+  }
+  require_cable(options.url, "the key in " + options.file);
   const Key key = read_key_file(options.file);
   std::array<char, key_text_size> text;
   write_key(text.data(), key);
@@ -52,7 +59,13 @@ int give(const Options& options) {
   return 0;
 }
 
-int keys(const Options& options) { return options.action == "new" ? make(options) : give(options); }
+int keys(const Options& options) {
+  if (options.file.empty() || is_url(options.file)) {
+    throw Error(ErrorKind::usage, fmt::format("'{}'", options.file), "is no file",
+                options.action == "new" ? "r4 key new FILE" : "r4 key give FILE serial:auto");
+  }
+  return options.action == "new" ? make(options) : give(options);
+}
 
 constexpr const char* footer =
     R"(A board with a key obeys only hosts that have it, too: with --key FILE, or R4_KEY=FILE in the
@@ -67,8 +80,8 @@ Examples:
   r4 key give ~/.r4-key serial:auto     the board has it, and from now on asks for it
   r4 send udp://192.168.0.125 O:358,1,1 --key ~/.r4-key
 
-Exit codes: 0 done; 1 the file holds no key; 2 usage; 3 the board refused it: that is no cable of its
-own; 4, 5 the file or the transport cannot be opened.)";
+Exit codes: 0 done; 1 the file holds no key; 2 usage, also a URL that is no cable; 3 the board did not
+take it; 4, 5 the file or the transport cannot be opened.)";
 
 }  // namespace
 

@@ -15,6 +15,7 @@
 #include "options.hpp"
 #include "transports/error.hpp"
 #include "transports/file_descriptor.hpp"
+#include "transports/url.hpp"
 
 namespace r4::tool {
 namespace {
@@ -27,13 +28,23 @@ Error system_error(const std::string& path, int error, const std::string& fix) {
   return {kind, path, std::strerror(error), fix};
 }
 
+Error cannot_be_read(const std::string& path, int error) {
+  std::string fix = new_one;
+  if (error == EACCES || error == EPERM) {
+    fix = "run r4 as the user whose key it is, or make one of your own: r4 key new FILE";
+  } else if (path.starts_with("~/")) {
+    fix = "the shell left the ~ as it is: write $HOME" + path.substr(1);
+  }
+  return system_error(path, error, fix);
+}
+
 // What is in it, up to a little more than a key is long.
 std::string contents(const FileDescriptor& file, const std::string& path) {
   std::array<char, 2 * key_text_size> buffer;
   std::string text;
   while (text.size() < buffer.size()) {
     const ssize_t n = ::read(file.get(), buffer.data(), buffer.size());
-    if (n < 0) throw system_error(path, errno, new_one);
+    if (n < 0) throw cannot_be_read(path, errno);
     if (n == 0) break;
     text.append(buffer.data(), static_cast<std::size_t>(n));
   }
@@ -45,7 +56,10 @@ std::string contents(const FileDescriptor& file, const std::string& path) {
 Key read_key_file(const std::string& path) {
   const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   struct stat status {};
-  if (!file || ::fstat(file.get(), &status) != 0) throw system_error(path, errno, new_one);
+  if (!file || ::fstat(file.get(), &status) != 0) throw cannot_be_read(path, errno);
+  if (S_ISDIR(status.st_mode)) {
+    throw Error(ErrorKind::open, path, "is a directory", "name the file that holds the key");
+  }
   if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
     throw Error(ErrorKind::permission, path, "others can read or write this key",
                 "chmod 600 " + path + "; if somebody may have read it, make a new one");
@@ -86,9 +100,26 @@ void make_key_file(const std::string& path, std::uint8_t id) {
 
 CLI::Option* add_key(CLI::App& command, std::string& path) {
   return command
-      .add_option("--key", path, "the board's key, in a file made by r4 key new (default: $R4_KEY)")
+      .add_option_function<std::string>(
+          "--key",
+          [&path](const std::string& text) {
+            if (text.empty()) {
+              throw Error(ErrorKind::usage, "--key", "names no file",
+                          "write --key FILE, or leave it out");
+            }
+            path = text;
+          },
+          "the board's key, in a file made by r4 key new (default: $R4_KEY)")
       ->envname("R4_KEY")
       ->type_name(file_type);
+}
+
+void require_cable(const std::string& url, const std::string& secret) {
+  const std::string scheme = Url::parse(url).scheme();
+  if (scheme != "udp" && scheme != "can") return;
+  throw Error(ErrorKind::usage, secret,
+              fmt::format("a board takes it over USB only, and at {} others would see it", url),
+              "use serial:auto");
 }
 
 BoardOptions with_key(const std::string& path, BoardOptions options) {

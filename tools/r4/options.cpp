@@ -3,10 +3,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "host/async_board.hpp"
 #include "host/command_help.hpp"
 #include "protocol/numbers.hpp"
 #include "protocol/state.hpp"
 #include "transports/error.hpp"
+#include "transports/registry.hpp"
 
 namespace r4::tool {
 namespace {
@@ -89,6 +93,13 @@ CLI::Option* add_json(CLI::App& command, bool& out, const std::string& meaning) 
 CLI::Option* add_url(CLI::App& command, std::string& out) { return url(command, out); }
 CLI::Option* add_urls(CLI::App& command, std::vector<std::string>& out) {
   return url(command, out);
+}
+
+bool is_url(std::string_view text) {
+  const std::vector<Registry::Entry>& entries = standard_registry().entries();
+  return std::any_of(entries.begin(), entries.end(), [&](const Registry::Entry& entry) {
+    return text.starts_with(entry.scheme + ":");
+  });
 }
 
 const std::string& one_url(const std::vector<std::string>& urls) {

@@ -9,6 +9,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace r4::tool {
@@ -35,6 +36,9 @@ CLI::Option* add_json(CLI::App& command, bool& out, const std::string& meaning);
 CLI::Option* add_url(CLI::App& command, std::string& out);
 CLI::Option* add_urls(CLI::App& command, std::vector<std::string>& out);
 const std::string& one_url(const std::vector<std::string>& urls);
+
+// Does it begin as the URL of a transport?
+bool is_url(std::string_view text);
 
 // State fields for `F`, checked.
 CLI::Option* add_fields(CLI::App& command, std::string& out);

@@ -2,7 +2,6 @@
 // r4 send: commands in order, each confirmed by the board's own state before the next.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <asio/io_context.hpp>
 #include <asio/steady_timer.hpp>
 #include <chrono>
@@ -21,7 +20,6 @@
 #include "options.hpp"
 #include "subcommands.hpp"
 #include "transports/error.hpp"
-#include "transports/registry.hpp"
 
 namespace r4::tool {
 namespace {
@@ -35,19 +33,15 @@ struct Options {
   bool json = false;
 };
 
-bool is_url(std::string_view text) {
-  const std::vector<Registry::Entry>& entries = standard_registry().entries();
-  return std::any_of(entries.begin(), entries.end(), [&](const Registry::Entry& entry) {
-    return text.starts_with(entry.scheme + ":");
-  });
-}
-
 // The command, checked; its texts are views of `text`.
-Command command_of(const std::string& text) {
+Command command_of(const std::string& text, const std::string& url) {
   const Command command = parse_command_text(text);
   if (command.kind == CommandKind::heartbeat) {
     throw Error(ErrorKind::usage, text, "heartbeats are sent by themselves",
                 "use --hold to keep the link up");
+  }
+  if (command.kind == CommandKind::setting && is_secret_setting(command.text)) {
+    require_cable(url, shown(command));
   }
   return command;
 }
@@ -156,7 +150,7 @@ int send(const Options& options) {
   std::vector<Command> commands;
   for (const std::string& text : options.commands) {
     if (is_url(text)) one_url({options.url, text});
-    commands.push_back(command_of(text));
+    commands.push_back(command_of(text, options.url));
   }
   return Sender(options, commands).run();
 }
