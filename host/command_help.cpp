@@ -100,11 +100,12 @@ std::string shown(std::string_view text) {
   const SettingText setting(text);
   const bool is_public = setting.is_known() && !is_secret_setting(Text(setting.name));
   if (setting.value.empty() || is_public) return std::string(text);
-  // Of a key, which one it is.
+  // Of a key, which one it is, and that it is taken away.
   std::uint8_t id = 0;
   Text digits;
   const bool has_id = Text(setting.name) == key_setting &&
                       split_key(Text(setting.value), id, digits) == Refusal::none;
+  if (has_id && digits == Text("off")) return std::string(text);
   return std::string(text.substr(0, text.size() - setting.value.size())) +
          (has_id ? std::to_string(id) + ":..." : "...");
 }

@@ -93,6 +93,13 @@ bool link_is_well(const LinkStatus& link) {
          link.key == KeyTrouble::none;
 }
 
+// Is it a setting that a board takes over its own cable only?
+bool sets_the_site(std::string_view command) {
+  constexpr std::string_view setting = "C:";
+  return command.starts_with(setting) &&
+         is_site_setting(Text(command.substr(setting.size(), command.find(',') - setting.size())));
+}
+
 Words refusal_words(std::string_view command, Refusal code, const LinkStatus& link) {
   Words words{
       fmt::format("refused by the board: {} ({})",
@@ -121,10 +128,8 @@ Words refusal_words(std::string_view command, Refusal code, const LinkStatus& li
       words.fix = "send it again if it is still wanted";
       break;
     case Refusal::auth:
-      words.fix =
-          command.starts_with("C:")
-              ? "set it over USB; or, if the board has a key, open it with that (--key FILE)"
-              : key_words(KeyTrouble::needed).fix;
+      words.fix = sets_the_site(command) ? "send it over USB: serial:auto"
+                                         : key_words(KeyTrouble::needed).fix;
       break;
     case Refusal::none:
     case Refusal::duplicate:

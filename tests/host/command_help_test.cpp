@@ -29,7 +29,7 @@ TEST(CommandHelp, ShowsNoKeyAndNoPassword) {
     std::string shown;
   } cases[] = {
       {"C:key,3:" + digits, "C:key,3:..."},
-      {"C:key,3:off", "C:key,3:..."},
+      {"C:key,3:off", "C:key,3:off"},
       {"C:key," + digits, "C:key,..."},
       {"C:key," + digits + ":3", "C:key,..."},
       {"C:key=3:" + digits, "C:key=3:..."},

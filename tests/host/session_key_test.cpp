@@ -2,7 +2,6 @@
 // A session with a key, and one without opposite a board that asks for one.
 #include <gtest/gtest.h>
 
-#include "host/command_help.hpp"
 #include "host/explain.hpp"
 #include "host/session.hpp"
 #include "scripted_link.hpp"
@@ -251,11 +250,13 @@ TEST(SessionWithoutKey, IsTakenOverACableOfTheBoardAllTheSame) {
   EXPECT_EQ(link.session.link().key, KeyTrouble::none);
 }
 
-TEST(Explain, ShowsNoKeyAndNoPassword) {
-  EXPECT_EQ(shown(Command::setting("key", "2:00ff")), "C:key,2:...");
-  EXPECT_EQ(shown(Command::setting("password", "1:2345678")), "C:password,...");
-  EXPECT_EQ(shown(Command::setting("network", "home")), "C:network,home");
-  EXPECT_EQ(shown(drive), "O:358,1,1");
+TEST(Explain, TellsASettingForTheCableFromOneThatWantsAKey) {
+  const CommandResult refused{Outcome::refused, Refusal::auth, Time{0}};
+  EXPECT_EQ(explain("C:key,1:...", refused, {}).fix, "send it over USB: serial:auto");
+  EXPECT_EQ(explain("C:node,5", refused, {}).fix, "send it over USB: serial:auto");
+  for (const char* command : {"C:rate,50", "C:rate", "O:1,1,1"}) {
+    EXPECT_NE(explain(command, refused, {}).fix.find("--key FILE"), std::string::npos) << command;
+  }
 }
 
 }  // namespace

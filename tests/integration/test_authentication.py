@@ -253,6 +253,18 @@ def test_a_key_file_that_is_not_there_is_named_but_does_not_hold_a_stop_back(boa
     assert stopped.returncode == 0, stopped.stderr
 
 
+def test_a_board_that_is_stopped_takes_a_key_and_loses_it(tmp_path):
+    with Board(f'pty:{tmp_path}/cable') as board:
+        cable = f'serial://{tmp_path}/cable'
+        assert run('stop', cable).returncode == 0
+        given = run('key', 'give', write_key(tmp_path / 'key', f'3:{KEY.hex()}\n'), cable)
+        assert given.returncode == 0, given.stderr
+        board.executed('C:key,3:...')
+        taken = run('send', cable, 'C:key,3:off')
+        assert taken.returncode == 0 and taken.stdout.startswith('C:key,3:off  confirmed')
+        board.executed('C:key,3:off')
+
+
 def test_a_key_file_of_somebody_else_is_told_from_one_that_is_missing():
     with tempfile.TemporaryDirectory() as folder:
         os.chmod(folder, 0o755)

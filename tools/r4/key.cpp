@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <string>
@@ -50,8 +51,8 @@ int give(const Options& options) {
   std::array<char, key_text_size> text;
   write_key(text.data(), key);
   Board board(options.url);
-  board.wait_active();
-  board.setting("key", {text.data(), text.size()});
+  // It need not be active: a board that is stopped takes a key, too.
+  board.setting("key", {text.data(), text.size()}, std::chrono::seconds{5});
   fmt::print(
       "the board has key {} now: from networks and buses it obeys only who has it, stops "
       "excepted\n",
