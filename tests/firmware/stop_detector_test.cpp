@@ -37,7 +37,8 @@ TEST(StopDetector, HearsAStopWhereverItStandsAndNothingElse) {
     EXPECT_EQ(is_stop(Text(datagram)), c.stop) << c.fields;
     StopDetector detector;
     EXPECT_EQ(stops_in(detector, datagram + "\r\n"), c.stop ? 1 : 0) << c.fields;
-    EXPECT_EQ(stops_in(detector, datagram + "\n" + datagram + "\n"), c.stop ? 2 : 0) << c.fields;
+    const std::string line = datagram + "\n";
+    EXPECT_EQ(stops_in(detector, line + line), c.stop ? 2 : 0) << c.fields;
     EXPECT_EQ(stops_in(detector, datagram), 0) << "no end yet: " << c.fields;
   }
 }

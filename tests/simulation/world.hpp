@@ -140,7 +140,7 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   void attack();
   // world_channel.cpp
   void transfer(bool to_board, int host, std::string_view bytes);
-  void deliver(int packet);
+  void deliver(int slot);
 
   Random random_;
   Schedule schedule_;
