@@ -111,6 +111,11 @@ Words refusal_words(std::string_view command, Refusal code, const LinkStatus& li
     case Refusal::range:
     case Refusal::channel:
       words.fix = bad_command(command, code).fix;
+      // What is no key is not sent.
+      if (code == Refusal::range && command.starts_with("C:key,")) {
+        words.reason = fmt::format("refused by the board: RANGE (it holds {} keys)", max_keys);
+        words.fix = "take one away: C:key,id:off";
+      }
       break;
     case Refusal::safe:
       if (link.state == HostLinkState::safe) {

@@ -250,6 +250,12 @@ TEST(SessionWithoutKey, IsTakenOverACableOfTheBoardAllTheSame) {
   EXPECT_EQ(link.session.link().key, KeyTrouble::none);
 }
 
+TEST(Explain, TellsThatABoardHasAllTheKeysItCanHold) {
+  const CommandResult refused{Outcome::refused, Refusal::range, Time{0}};
+  EXPECT_NE(explain("C:key,5:...", refused, {}).reason.find("it holds 4 keys"), std::string::npos);
+  EXPECT_NE(explain("C:rate,50", refused, {}).fix.find("1-1000"), std::string::npos);
+}
+
 TEST(Explain, TellsASettingForTheCableFromOneThatWantsAKey) {
   const CommandResult refused{Outcome::refused, Refusal::auth, Time{0}};
   EXPECT_EQ(explain("C:key,1:...", refused, {}).fix, "send it over USB: serial:auto");
