@@ -152,8 +152,8 @@ struct AsyncBoard::Impl final : Carrier::Handler,
 
   // --- Session::Handler
 
-  void transmit(std::string_view datagram, Priority priority) override {
-    if (is_open) carrier->send(datagram, priority);
+  SendResult transmit(std::string_view datagram, Priority priority) override {
+    return is_open ? carrier->send(datagram, priority) : SendResult::down;
   }
   void on_state(const State& state, const Datagram& datagram) override {
     if (!is_open) return;

@@ -13,7 +13,6 @@ namespace r4 {
 
 namespace {
 
-constexpr Time busy_memory = std::chrono::milliseconds{300};
 constexpr Time selection_retry = std::chrono::milliseconds{200};
 constexpr int max_selections = 5;  // then the board is taken for one that does not know F
 // Such a board is asked now and then all the same: on a bad line all five may have been lost.
@@ -275,8 +274,10 @@ Time Session::poll(Time now) {
     if (transmit_now(Command::heartbeat(), link_.echo(), Priority::normal, now)) {
       ++collector_.counts.heartbeats;
       key_.on_heartbeat_sent();
+      link_.heartbeat_sent(to_ms(now));
+    } else {
+      link_.heartbeat_not_sent(to_ms(now));
     }
-    link_.heartbeat_sent(to_ms(now));
   }
   for (Pending& pending : pending_.under_way()) {
     if (now >= pending.deadline) {

@@ -91,7 +91,7 @@ class Session {
   // views are valid in the call.
   class Handler {
    public:
-    virtual void transmit(std::string_view datagram, Priority priority) = 0;
+    virtual SendResult transmit(std::string_view datagram, Priority priority) = 0;
     virtual void on_state(const State& state, const Datagram& datagram) = 0;
     virtual void on_board_heartbeat(const Datagram& datagram) = 0;
     virtual void on_identity(const Identity& identity) = 0;
@@ -151,6 +151,7 @@ class Session {
  private:
   using Pending = PendingCommand;
   using Stage = PendingCommand::Stage;
+  static constexpr Time busy_memory = std::chrono::milliseconds{300};
 
   Pending* allocate(const Command& command, Time timeout, Time now);
   void transmit(Pending& pending, Time now);

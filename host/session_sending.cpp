@@ -23,8 +23,10 @@ bool Session::close_and_transmit(DatagramWriter& writer, CommandKind kind, Prior
   if (key_.refuses_board() && kind != CommandKind::stop) return false;
   key_.sign(writer, now);
   const Text bytes = writer.finish();
-  if (!bytes.empty()) handler_.transmit({bytes.data(), bytes.size()}, priority);
-  return !bytes.empty();
+  if (bytes.empty()) return false;
+  const SendResult result = handler_.transmit({bytes.data(), bytes.size()}, priority);
+  if (result == SendResult::busy) busy_until_ = now + busy_memory;
+  return result == SendResult::sent;
 }
 
 std::uint32_t Session::take_pnum(CommandKind kind) {

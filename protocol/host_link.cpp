@@ -92,6 +92,12 @@ void HostLink::heartbeat_sent(std::uint32_t now_ms) {
   if (echo_ != 0) echoed_ = true;
 }
 
+void HostLink::heartbeat_not_sent(std::uint32_t now_ms) {
+  sent_ms_ = now_ms - timing_.heartbeat_ms + retry_ms;
+  any_sent_ = true;
+  answer_now_ = false;
+}
+
 void HostLink::watchdog(std::uint32_t period_ms, std::uint32_t now_ms) {
   watchdog_ms_ = period_ms;
   feed(now_ms);

@@ -54,6 +54,8 @@ class HostLink {
   bool heartbeat_due(std::uint32_t now_ms) const;
   // A heartbeat was sent.
   void heartbeat_sent(std::uint32_t now_ms);
+  // It could not be: it is due again soon.
+  void heartbeat_not_sent(std::uint32_t now_ms);
   // The T that it carries: the T of the board's newest heartbeat, 0 before the first.
   std::uint32_t echo() const { return echo_; }
 
@@ -81,6 +83,8 @@ class HostLink {
 
   // A T this far from where the board's clock should be is of another boot.
   static constexpr std::int32_t boot_tolerance_ms = 10000;
+  // From a heartbeat that could not be sent to the next attempt.
+  static constexpr std::uint32_t retry_ms = 20;
 
  private:
   void notice_boot(std::uint32_t t_ms, std::uint32_t now_ms);

@@ -6,11 +6,13 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <random>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "can_bus.hpp"
+#include "can_turn.hpp"
 #include "framing/can_node.hpp"
 #include "operation_slot.hpp"
 #include "send_queue.hpp"
@@ -57,6 +59,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   Lane& lane(CanLane which) { return lanes_[which == CanLane::dialogue ? 0 : 1]; }
   bool begin(std::string_view bytes, std::uint32_t now_us);
   bool begin_waiting(std::uint32_t now_us);
+  void listen_for_others(const CanFrame& frame);
   void arm();
 
   asio::io_context& io_;
@@ -66,7 +69,8 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   const bool fd_;
   const std::string name_;
   CanNode node_;
-  mutable CarrierCounters counters_;  // what others count is put in when it is asked for
+  CanTurn turn_{std::random_device{}()};  // of a host
+  mutable CarrierCounters counters_;      // what others count is put in when it is asked for
   std::array<Lane, 2> lanes_;
   std::shared_ptr<CanBus> bus_;
   Handler* handler_ = nullptr;
@@ -125,7 +129,9 @@ void CanCarrier::open(Handler& handler) {
   handler_ = &handler;
   bus_->join(*this, role_ == Role::board
                         ? std::vector<std::uint32_t>{emergency_stop_id, command_id(number_)}
-                        : std::vector<std::uint32_t>{reply_id(number_), telemetry_id(number_)});
+                        : std::vector<std::uint32_t>{reply_id(number_), telemetry_id(number_),
+                                                     command_id(number_)});
+  turn_.listen(Clock::now());
   ++counters_.ups;
   handler_->on_carrier_event({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
 }
@@ -151,6 +157,9 @@ SendResult CanCarrier::send(std::string_view bytes, Priority priority, Peer) {
     ++(result == SendResult::sent ? counters_.tx_datagrams : counters_.tx_errors);
     return result;
   }
+  if (role_ == Role::host && !turn_.ours(Clock::now())) {
+    return turn_.others() ? SendResult::busy : SendResult::down;
+  }
   Lane& own = lane(node_.lane_of(Text(bytes.data(), bytes.size())));
   SendResult result = SendResult::sent;
   if (!own.queue.empty() || !begin(bytes, CanBus::now_us())) {
@@ -162,9 +171,19 @@ SendResult CanCarrier::send(std::string_view bytes, Priority priority, Peer) {
 
 bool CanCarrier::begin(std::string_view bytes, std::uint32_t now_us) {
   if (!node_.begin(Text(bytes.data(), bytes.size()), now_us)) return false;
+  turn_.on_own(Clock::now());
   ++counters_.tx_datagrams;
   counters_.tx_bytes += bytes.size();
   return true;
+}
+
+// What another host sends to our board: commands; its flow control is the same as ours.
+void CanCarrier::listen_for_others(const CanFrame& frame) {
+  const bool command =
+      classify(frame).kind == CanIdKind::command && !isotp_frame::is_flow_control(frame);
+  if (role_ != Role::host || !command || !turn_.on_other(Clock::now())) return;
+  node_.stop_commanding();
+  lane(CanLane::dialogue).queue.clear();
 }
 
 // Begins the next datagram of each lane that has become idle. True if there was one.
@@ -185,6 +204,7 @@ bool CanCarrier::offer(std::uint32_t now_us, CanFrame& frame) {
 }
 
 void CanCarrier::on_frame(const CanFrame& frame, std::uint32_t at_us) {
+  listen_for_others(frame);
   const Text datagram = node_.on_frame(frame, at_us);
   if (datagram.empty()) return;
   ++counters_.rx_datagrams;
@@ -229,6 +249,7 @@ void CanCarrier::on_bus(const CarrierEvent& event) {
     for (Lane& each : lanes_) each.queue.clear();
   } else if (event.kind == CarrierEvent::Kind::up) {
     ++counters_.ups;
+    turn_.listen(Clock::now());
   }
   handler_->on_carrier_event(own);
 }

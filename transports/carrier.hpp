@@ -34,6 +34,7 @@ enum class SendResult : std::uint8_t {
   sent,  // handed to the system, or waiting for it
   full,  // the queue is full: try again later
   down,  // the transport is down at the moment, or nobody is known at the other end
+  busy,  // not sent, for another host commands the board from the same place (CAN)
 };
 
 // Where a datagram travels in several frames (CAN): what became of the transfers, of both directions.

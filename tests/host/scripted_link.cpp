@@ -89,12 +89,14 @@ ScriptedLink::Sent ScriptedLink::last(char letter) const {
   return found.back();
 }
 
-void ScriptedLink::transmit(std::string_view bytes, Priority priority) {
+SendResult ScriptedLink::transmit(std::string_view bytes, Priority priority) {
+  if (place_taken && priority != Priority::stop) return SendResult::busy;
   Datagram datagram;
-  ASSERT_TRUE(read(bytes, datagram)) << bytes;
+  EXPECT_TRUE(read(bytes, datagram)) << bytes;
   const Field field = *datagram.begin();
   sent.push_back({str(field.name()) + ":" + str(field.values()), datagram.pnum(),
                   datagram.time_ms(), priority, now, std::string(bytes)});
+  return SendResult::sent;
 }
 
 void ScriptedLink::on_identity(const Identity& identity) { board_id = str(identity.board_id); }

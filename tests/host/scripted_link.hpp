@@ -40,6 +40,9 @@ class ScriptedLink final : private Session::Handler {
   std::vector<Nack> nacks;
   std::string board_id;
 
+  // Does another host send from our place, so that the carrier takes nothing but stops?
+  bool place_taken = false;
+
   // Time passes; poll() is called exactly when the session asked for it.
   void pass(Time duration);
 
@@ -67,7 +70,7 @@ class ScriptedLink final : private Session::Handler {
   std::uint32_t board_clock() const;
   void finish(std::string_view fields);
 
-  void transmit(std::string_view datagram, Priority priority) override;
+  SendResult transmit(std::string_view datagram, Priority priority) override;
   void on_state(const State& state, const Datagram&) override { states.push_back(state); }
   void on_board_heartbeat(const Datagram&) override {}
   void on_identity(const Identity& identity) override;

@@ -375,6 +375,31 @@ TEST(SessionStop, IsSentEvenWhenSixteenAreUnderWay) {
   EXPECT_EQ(link.count('E'), Session::max_stops + 1);
 }
 
+TEST(SessionBusy, AHostWhosePlaceOnTheBusIsTakenMayOnlyStopTheBoard) {
+  ScriptedLink link;
+  link.connect();
+  link.place_taken = true;
+  const Ticket ticket = link.session.send(drive, 5s, link.now);
+  EXPECT_FALSE(link.session.post(drive, link.now));
+  for (int i = 0; i < 20; ++i) {
+    link.pass(100ms);
+    link.heartbeat();
+    link.executed(0);
+    EXPECT_TRUE(link.session.link().busy);
+  }
+  EXPECT_EQ(link.sent.size(), 0U);
+  EXPECT_FALSE(link.session.in_control(link.now));
+  const Ticket stop = link.session.stop(1s, link.now);
+  EXPECT_EQ(link.count('E'), 1U);
+  link.heartbeat(SafeReason::stop);
+  EXPECT_EQ(result_of(link, stop).outcome, Outcome::confirmed);
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::cancelled);
+
+  link.place_taken = false;
+  link.pass(400ms);
+  EXPECT_FALSE(link.session.link().busy);
+}
+
 TEST(SessionBusy, CommandsWaitUntilTheOtherHostHasGone) {
   ScriptedLink link;
   link.nack(link.last('H').pnum, "BUSY");

@@ -150,10 +150,17 @@ def test_another_host_is_refused_while_the_first_is_there(board):
         in_control(first)
         result = run('send', board.host_url, '--timeout', '2', 'O:358,1,1', timeout=60)
         assert result.returncode == 3, result
+        assert 'another host' in result.stderr, result
         first.skip_past()
         first.next(is_state)
+        assert not any(each['type'] == 'nack' for each in first.log), 'the other one did not even try'
+        assert not any(each.get('state') == 'SAFE' for each in board.log)
+        assert run('stop', board.host_url, timeout=60).returncode == 0, 'but it may stop the board'
+        first.next(is_link('safe', 'stop'))
         assert first.end() == 0
     assert not any(each.get('executed', {}).get('command') == 'O:358,1,1' for each in board.log)
+    result = run('send', board.host_url, 'E:CLEAR', timeout=60)
+    assert result.returncode == 0, f'control is free again: {result}'
 
 
 @pytest.mark.parametrize('url, host_url', [(BUS, BUS), ('can://can0?node=3', 'can://can1?node=3')])

@@ -49,6 +49,19 @@ TEST_F(HostLinkTest, SendsTenHeartbeatsASecond) {
   EXPECT_EQ(sent, 10);
 }
 
+TEST_F(HostLinkTest, TriesAgainSoonWhenAHeartbeatCouldNotBeSent) {
+  heartbeat();
+  ASSERT_TRUE(link.heartbeat_due(now));
+  link.heartbeat_not_sent(now);
+  EXPECT_FALSE(link.echoed()) << "the board has not got its time back";
+  EXPECT_FALSE(link.heartbeat_due(now));
+  EXPECT_EQ(link.due_in(now), HostLink::retry_ms);
+  now += HostLink::retry_ms;
+  EXPECT_TRUE(send_due());
+  EXPECT_TRUE(link.echoed());
+  EXPECT_EQ(link.due_in(now), 100U);
+}
+
 TEST_F(HostLinkTest, AnswersABoardHeartbeatAtOnceWithItsTime) {
   send_due();
   now += 30;

@@ -40,7 +40,10 @@ struct World::Host final : Session::Handler {
   }
   Time time() const { return Time{static_cast<std::int64_t>(world.now_us_ + clock_offset_us)}; }
 
-  void transmit(std::string_view bytes, Priority) override { world.transfer(true, index, bytes); }
+  SendResult transmit(std::string_view bytes, Priority) override {
+    world.transfer(true, index, bytes);
+    return SendResult::sent;
+  }
   void on_state(const State&, const Datagram&) override {}
   void on_board_heartbeat(const Datagram&) override {}
   void on_identity(const Identity&) override {}

@@ -50,10 +50,6 @@ constexpr LaneKind lane_kind(CanIdKind kind) {
   }
 }
 
-constexpr bool is_flow_control(const CanFrame& frame) {
-  return frame.size != 0 && frame.data[0] >> 4 == static_cast<int>(IsotpFrameType::flow_control);
-}
-
 }  // namespace
 
 BusLog::Lane::Lane(const CanIdMeaning& meaning)
@@ -130,7 +126,7 @@ void BusLog::on_raw_frame(const Interface& interface, const CanIdMeaning& meanin
 
 void BusLog::on_lane_frame(Interface& interface, const CanIdMeaning& meaning, const CanFrame& frame,
                            const Place& place) {
-  if (is_flow_control(frame) && meaning.kind != CanIdKind::telemetry) {
+  if (isotp_frame::is_flow_control(frame) && meaning.kind != CanIdKind::telemetry) {
     ++flow_control_;
     // Each end has its flow control on the id of its own datagrams.
     const bool of_board = meaning.kind == CanIdKind::reply;

@@ -74,6 +74,8 @@ class CanNode {
   // Ends what has timed out.
   void poll(std::uint32_t now_us);
   IsotpDeadline deadline() const;
+  // Ends the transfer to the other end that is under way: another host has begun one.
+  void stop_commanding() { dialogue_out_.cancel(); }
   // Ends all transfers: the bus is gone.
   void cancel();
 

@@ -101,6 +101,10 @@ constexpr std::uint8_t control(IsotpFrameType type, std::uint32_t low) {
   return static_cast<std::uint8_t>(static_cast<std::uint32_t>(type) << 4 | (low & 0xF));
 }
 
+constexpr bool is_flow_control(const CanFrame& frame) {
+  return frame.size != 0 && frame.data[0] >> 4 == static_cast<int>(IsotpFrameType::flow_control);
+}
+
 // Ends a frame of ours that has `used` bytes of data: id, format, padding and size.
 void finish(CanFrame& frame, const IsotpChannel& channel, std::uint32_t id, std::uint32_t used);
 

@@ -108,7 +108,7 @@ void IsotpSender::frame_sent(std::uint32_t now_us) {
 
 IsotpError IsotpSender::on_frame(const CanFrame& frame, std::uint32_t now_us) {
   if (!isotp_frame::is_for(frame, options_.channel.flow_control_id)) return IsotpError::none;
-  if (frame.size == 0 || frame.data[0] >> 4 != static_cast<int>(IsotpFrameType::flow_control)) {
+  if (!isotp_frame::is_flow_control(frame)) {
     return IsotpError::none;
   }
   const IsotpError late = poll(now_us);
