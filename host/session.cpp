@@ -144,9 +144,8 @@ void Session::on_nack_datagram(const Datagram& datagram, Time now) {
       continue;
     }
     // A refusal proves that the command was not executed only while the board remembers: not over
-    // an outage, a reboot, another host's control, another nonce or too many numbers, nor before we had
-    // control.
-    // Then the deadline ends it, as unknown.
+    // an outage, a reboot, another host's control, another nonce or too many numbers, nor before
+    // we had control. Then the deadline ends it, as unknown.
     if (nack.code == Refusal::busy) pending.doubtful = true;
     const bool remembered = proof && !pending.doubtful && link_up() &&
                             link_.last_pnum() - pending.pnum < BoardLink::memory;

@@ -190,7 +190,7 @@ def test_the_datagram_after_a_broken_one_is_taken(break_off):
     with Board(f'can://vcan0?node={NODE}') as board, contextlib.closing(RawHost()) as host:
         host.send(host.heartbeat(), frames=3)
         if break_off == 'falls silent':
-            lasts(0.1)  # N_Cr is 5 ms
+            lasts(0.2)  # N_Cr is 100 ms
         elif break_off == 'interface down':
             ip('link', 'set', 'vcan0', 'down')
             board.next(lambda each: each.get('transport', {}).get('event') == 'down')

@@ -143,7 +143,7 @@ TEST(BusLog, TellsOfTransfersThatFailed) {
   EXPECT_EQ(dump.printed[2]["reason"], "no consecutive frame in time (N_Cr)");
 
   dump.frame(0x183, "100A48656C6C6F2C");
-  dump.at_us += 26000;
+  dump.at_us += 121000;
   dump.frame(0x777, "");
   ASSERT_EQ(dump.printed.size(), 4U);
   EXPECT_EQ(dump.printed[3]["reason"], "no flow control in time (N_Bs)");

@@ -122,6 +122,30 @@ TEST(CanNode, EveryLostFrameCostsOneDatagramAndNoMore) {
   }
 }
 
+// A host's process is held up for longer than a bus ever is.
+TEST(CanNode, ACommandIsTakenIfItsFramesAreLateByLessThan100Ms) {
+  for (const std::uint32_t late_us : {99999U, 100000U}) {
+    CanNode board(CanEnd::board, 3, false);
+    CanNode host(CanEnd::host, 3, false);
+    std::uint32_t now_us = 1000;
+    CanFrame frame;
+    Text taken;
+    ASSERT_TRUE(host.begin(Text(command_line.data(), command_line.size()), now_us));
+    for (int frames = 0; host.offer(now_us, frame); ++frames) {
+      host.frame_sent(now_us);
+      if (frames == 1) now_us += late_us;
+      board.poll(now_us);
+      taken = board.on_frame(frame, now_us);
+      if (board.offer(now_us, frame)) {
+        board.frame_sent(now_us);
+        host.on_frame(frame, now_us);
+      }
+    }
+    EXPECT_EQ(str(taken), late_us < 100000 ? command_line : std::string()) << late_us;
+    EXPECT_EQ(board.received(CanLane::dialogue).consecutive_timeout, late_us < 100000 ? 0U : 1U);
+  }
+}
+
 TEST(CanNode, AnEmergencyFrameOfAnyContentIsAStop) {
   for (const std::uint8_t size : std::vector<std::uint8_t>{0, 1, 8}) {
     Bus bus;
