@@ -4,18 +4,21 @@
 slcan0, the board's controller, and slcan1, the host's, are nodes of slcan_bus: error frames, error
 counters, bus-off and the states that the kernel tells of are those of ISO 11898-1.
 """
+import pathlib
+import re
 import subprocess
 import time
 
 import pytest
 
 from can_inside import SAFE_WITHIN_MS, Dump, in_control, ip
-from r4_process import Board, Running, is_link, is_state, lasts, monitor, run
+from r4_process import PATIENCE_S, Board, Running, is_link, is_state, lasts, monitor, run
 from slcan_bus import SlcanBus
 
 BITRATE = 500000
 BOARD, HOST = 'can://slcan0?node=1', 'can://slcan1?node=1'
-STOP, TELEMETRY, BABBLE = 0x010, 0x401, 0x001
+STOP, COMMAND, TELEMETRY, FLOOD, BABBLE = 0x010, 0x181, 0x401, 0x7FF, 0x001
+OF_HOST = (STOP, COMMAND, FLOOD)
 # From the end of a fault to the board's obeying again. The host looks every 100 ms whether an
 # interface is back and sends ten heartbeats a second; the rest is the emulated machine's.
 BACK_WITHIN_S = 2
@@ -172,14 +175,16 @@ def test_damaged_frames_cost_time_and_no_datagram(bus, board, percent):
         states = [host.next(is_state) for _ in range(200)]
         status = bus.status()
         bus.order('noise', 0)
-        host.end()
+        log = host.rest()
     result = run('send', HOST, *(f'S:{1000 + i},{1 + i % 16}' for i in range(5)), timeout=60)
     assert result.returncode == 0, result
-    pnums = {each['pnum'] for each in host.log if each['pnum'] is not None}
+    pnums = {each['pnum'] for each in log if each['pnum'] is not None}
     between = [pnum for pnum in range(states[0]['pnum'], states[-1]['pnum'] + 1) if pnum not in pnums]
     failed, frames = (status[each] - before[each] for each in ('failed', 'frames'))
-    print(f'{failed} of {frames} frames damaged, {len(between)} datagrams missing')
+    transfers = next(each['fields'] for each in log if each['type'] == 'transfers')
+    print(f'{failed} of {frames} frames damaged, {len(between)} datagrams missing, {transfers}')
     assert frames >= 1000 and failed >= percent  # it is a matter of chance: ten times as many are likely
+    assert transfers['wrong_sequence'] == 0, 'a frame was lost'
     assert len(between) <= 4  # answers to Q:ID, which the host asks each second and does not print
 
 
@@ -198,7 +203,7 @@ def test_a_full_queue_drops_old_states_and_no_frame_within_a_datagram():
     with SlcanBus(2, BITRATE, txqueuelen=10) as bus, packed_board() as board, monitor(HOST) as host:
         in_control(host)
         # Another program keeps the queue of the board's interface full.
-        flood = subprocess.Popen(['cangen', 'slcan0', '-g', '0', '-i', '-I', '7FF', '-L', '8'])
+        flood = subprocess.Popen(['cangen', 'slcan0', '-g', '0', '-i', '-I', f'{FLOOD:X}', '-L', '8'])
         try:
             for _ in range(10):
                 bus.order('stall', 0)
@@ -225,14 +230,24 @@ def test_a_full_queue_drops_old_states_and_no_frame_within_a_datagram():
     assert not damaged, damaged
 
 
+def wait_for_sockets(interface, identifier, count):
+    """Until that many sockets hear the id on the interface."""
+    entry = re.compile(rf'^\s*{interface}\s+{identifier:x}\s', re.MULTILINE)
+    deadline = time.monotonic() + PATIENCE_S
+    while len(entry.findall(pathlib.Path('/proc/net/can/rcvlist_sff').read_text(encoding='ascii'))) < count:
+        assert time.monotonic() < deadline, f'fewer than {count} sockets hear {identifier:x} on {interface}'
+        lasts(0.05)
+
+
 def test_a_stop_overtakes_a_full_queue():
     with SlcanBus(2, BITRATE, txqueuelen=10) as bus, packed_board() as board, Dump('slcan0') as dump:
         with driving_host(board):
             bus.order('stall', 1)
-            flood = subprocess.Popen(['cangen', 'slcan1', '-g', '0', '-i', '-I', '7FF', '-L', '8'])
+            flood = subprocess.Popen(['cangen', 'slcan1', '-g', '0', '-i', '-I', f'{FLOOD:X}', '-L', '8'])
             stop = Running('stop', HOST, '--timeout', '20')
-            lasts(0.5)
-            dump.frames.clear()
+            wait_for_sockets('slcan1', TELEMETRY, 2)  # the driving host's, and that of the stop
+            lasts(0.3)
+            went_on = time.time()
             bus.order('go', 1)
             since = time.monotonic()
             stopped = board.state('SAFE', 'stop')
@@ -242,6 +257,6 @@ def test_a_stop_overtakes_a_full_queue():
             flood.wait()
             stop.process.stdout.close()
             stop.process.stderr.close()
-        ids = [frame for frame, _ in dump.frames if frame != TELEMETRY]
+        ids = [frame for at, (frame, _) in zip(dump.times, dump.frames) if at > went_on and frame in OF_HOST]
         print(f'{ids.index(STOP)} frames before the stop')
-        assert ids.index(STOP) <= 4  # three mailboxes and the frame that the driver holds
+        assert ids.index(STOP) <= 4, ids  # three mailboxes and the frame that the driver holds

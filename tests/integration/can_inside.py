@@ -44,18 +44,24 @@ def on_vcan():
 
 
 class Dump:
-    """candump: every frame on an interface, as (id, data), seen by something we did not write."""
+    """candump: every frame on an interface, as (id, data), seen by something we did not write.
+
+    `times` has when the kernel got each, as time.time().
+    """
 
     def __init__(self, interface):
         self.process = subprocess.Popen(['candump', '-L', interface], stdout=subprocess.PIPE, text=True)
         self.frames = []
+        self.times = []
         self.came = threading.Event()
         self.reader = threading.Thread(target=self._read, daemon=True)
         self.reader.start()
 
     def _read(self):
         for line in self.process.stdout:
-            frame, _, data = line.split()[2].partition('#')
+            at, _, text = line.split()
+            frame, _, data = text.partition('#')
+            self.times.append(float(at[1:-1]))
             self.frames.append((int(frame, 16), data.lstrip('#')))
             self.came.set()
 

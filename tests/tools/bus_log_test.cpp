@@ -137,7 +137,7 @@ TEST(BusLog, TellsOfTransfersThatFailed) {
   ASSERT_EQ(dump.printed.size(), 2U);
   EXPECT_EQ(dump.printed[1]["reason"], "interrupted by another transfer");
 
-  dump.at_us += 6000;
+  dump.at_us += 101000;
   dump.frame(0x777, "");
   ASSERT_EQ(dump.printed.size(), 3U);
   EXPECT_EQ(dump.printed[2]["reason"], "no consecutive frame in time (N_Cr)");

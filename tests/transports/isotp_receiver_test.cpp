@@ -21,7 +21,7 @@ using Counter = std::uint32_t IsotpReceiverCounters::*;
 
 constexpr std::uint32_t id = 0x180;
 constexpr std::uint32_t flow_control_id = 0x200;
-constexpr std::uint32_t n_cr_us = 5000;
+constexpr std::uint32_t n_cr_us = 100000;
 
 IsotpReceiverOptions controlled() {
   IsotpReceiverOptions options;

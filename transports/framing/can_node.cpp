@@ -9,10 +9,6 @@
 namespace r4 {
 namespace {
 
-// A host is a process that others hold up between two frames. In a dialogue patience costs nothing:
-// a new first frame ends the transfer before, and with flow control two are not taken for one.
-constexpr std::uint32_t dialogue_n_cr_us = 100000;
-
 // What an emergency frame says to a board, whoever sent it.
 constexpr Text stop_datagram("E:STOP;^0x506f0fbe^");
 
@@ -30,7 +26,6 @@ IsotpReceiverOptions receiver_options(std::uint32_t id, std::uint32_t flow_contr
   options.channel.id = id;
   options.channel.flow_control_id = flow_control_id;
   options.channel.fd = fd;
-  options.n_cr_us = dialogue_n_cr_us;
   return options;
 }
 
@@ -42,7 +37,6 @@ IsotpSenderOptions telemetry_sender(std::uint8_t node, bool fd) {
 
 IsotpReceiverOptions telemetry_receiver(std::uint8_t node, bool fd) {
   IsotpReceiverOptions options = receiver_options(telemetry_id(node), max_can_id, fd);
-  options.n_cr_us = IsotpReceiverOptions().n_cr_us;
   options.listen_only = true;
   return options;
 }
@@ -64,7 +58,7 @@ IsotpReceiverOptions listening_to(CanIdKind lane, std::uint8_t node) {
   } else {
     options.channel.id = lane == CanIdKind::command ? command_id(node) : reply_id(node);
     // The sender waits for flow control between its first frames, which this end does not see.
-    options.n_cr_us = dialogue_n_cr_us + IsotpSenderOptions().n_bs_us;
+    options.n_cr_us += IsotpSenderOptions().n_bs_us;
   }
   return options;
 }

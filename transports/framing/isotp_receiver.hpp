@@ -40,11 +40,13 @@ namespace r4 {
 
 struct IsotpReceiverOptions {
   IsotpChannel channel;
-  bool listen_only = false;           // never send flow control
-  std::uint8_t block_size = 0;        // BS: frames between two flow controls; 0: all in one block
-  std::uint8_t stmin = 0;             // STmin as on the wire, see stmin_from_us()
-  std::uint32_t n_ar_us = 20000;      // our flow control is offered at most that long
-  std::uint32_t n_cr_us = 5000;       // wait for a consecutive frame
+  bool listen_only = false;       // never send flow control
+  std::uint8_t block_size = 0;    // BS: frames between two flow controls; 0: all in one block
+  std::uint8_t stmin = 0;         // STmin as on the wire, see stmin_from_us()
+  std::uint32_t n_ar_us = 20000;  // our flow control is offered at most that long
+  // Wait for a consecutive frame: a process that sends may be held up, and so may the system
+  // that tells when a frame came. A new first frame ends a transfer at any time.
+  std::uint32_t n_cr_us = 100000;
   std::uint16_t max_waits = 10;       // N_WFTmax: waits in a row while hold(true)
   std::uint32_t wait_gap_us = 10000;  // between them: less than the sender's N_Bs
 };
