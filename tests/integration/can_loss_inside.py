@@ -46,7 +46,7 @@ def frames_of(first):
 
 
 def test_of_telemetry_arrives_what_its_frames_allow(tmp_path):
-    options = (*PACKED, '--set', 'rate,400')
+    options = (*PACKED, '--set', 'rate,200')
     with netem('loss', '1%'), Board(BOARD, options=options) as board, monitor(HOST) as host:
         in_control(host)
         written = tmp_path / 'frames'
@@ -58,7 +58,7 @@ def test_of_telemetry_arrives_what_its_frames_allow(tmp_path):
             begun = time.monotonic()
             host.skip_past()
             came = []
-            while len(came) < 3000:
+            while len(came) < 2000:
                 came.append(host.next(is_state)['came'])
             dump.terminate()
             dump.wait()
@@ -79,8 +79,8 @@ def test_of_telemetry_arrives_what_its_frames_allow(tmp_path):
     print(f'{len(sent)} states of {sum(sent) / len(sent):.2f} frames: {100 * arrived:.2f} % arrived; '
           f'of 0.99^frames {100 * expected:.2f} %, of the {100 * loss:.2f} % lost '
           f'{100 * with_this_loss:.2f} %')
-    assert abs(arrived - with_this_loss) < 0.01
-    assert abs(arrived - expected) < 0.02  # 0.01, and what the kernel's dice add in so few frames
+    assert abs(arrived - with_this_loss) < 0.015
+    assert abs(arrived - expected) < 0.025  # and what the kernel's dice add in so few frames
 
 
 def executed(log):
