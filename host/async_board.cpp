@@ -292,7 +292,13 @@ void AsyncBoard::start_identify(Duration timeout, CompletionPtr completion) {
              [&] { return impl.session.identify(time_of(timeout), impl.now); });
 }
 
+void AsyncBoard::require_sendable(const Command& command) const {
+  require_valid(command);
+  require_cable(name(), command);
+}
+
 bool AsyncBoard::post(const Command& command) {
+  require_sendable(command);
   Impl& impl = *impl_;
   bool sent = false;
   impl.enter(Completion::How::post,

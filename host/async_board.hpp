@@ -58,10 +58,14 @@ class AsyncBoard {
   // callback follows. Idempotent; the board cannot be opened again.
   void close();
 
-  // void(CommandResult). Throws Error{usage} for a command outside its ranges.
+  // Throws Error{usage} for a command outside its ranges, and for a key or password where others
+  // would see it.
+  void require_sendable(const Command& command) const;
+
+  // void(CommandResult). Throws as require_sendable() does.
   template <class Token>
   auto async_send(const Command& command, Duration timeout, Token&& token) {
-    require_valid(command);
+    require_sendable(command);
     return asio::async_initiate<Token, void(CommandResult)>(
         [this](auto handler, const Command& c, Duration t) {
           start_send(c, t, make_completion(std::move(handler)));

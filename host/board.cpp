@@ -204,7 +204,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   }
 
   bool post(const Command& command) {
-    require_valid(command);
+    async.require_sendable(command);
     const std::lock_guard lock(mutex);
     if (closed || (!in_control && command.kind != CommandKind::stop)) return false;
     return box.put(command);
@@ -273,8 +273,8 @@ void Board::wait_active(Duration timeout) {
 }
 
 void Board::send(const Command& command, Duration timeout) {
-  require_valid(command);
   const auto impl = impl_;
+  impl->async.require_sendable(command);
   impl->execute(command, timeout);
 }
 void Board::send(std::string_view command, Duration timeout) {

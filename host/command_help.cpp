@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "command_help.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 
@@ -168,6 +170,19 @@ void require_valid(const Command& command) {
     throw Error(ErrorKind::usage, command.kind == CommandKind::fields ? "F" : "C",
                 "its text is too long for one datagram, or has bytes that a datagram cannot hold",
                 "use printable ASCII without ; and ^, at most 900 characters");
+  }
+}
+
+void require_cable(std::string_view url, std::string_view secret) {
+  if (!url.starts_with("udp:") && !url.starts_with("can:")) return;
+  throw Error(ErrorKind::usage, std::string(secret),
+              fmt::format("a board takes it over USB only, and at {} others would see it", url),
+              "use serial:auto");
+}
+
+void require_cable(std::string_view url, const Command& command) {
+  if (command.kind == CommandKind::setting && is_secret_setting(command.text)) {
+    require_cable(url, shown(command));
   }
 }
 

@@ -210,6 +210,21 @@ TEST(Board, SaysThatAnotherHostControlsTheBoard) {
 
 // --- commands
 
+TEST(Board, SendsNoKeyAndNoPasswordWhereOthersSeeIt) {
+  BoardInAThread simulated("udp");
+  Board board(simulated.url());
+  board.wait_active();
+  const std::string secret = "1:" + std::string(2 * key_size, 'e');
+  for (const Problem& problem :
+       {problem_of([&] { board.setting("key", secret); }),
+        problem_of([&] { board.setting("password", secret); }),
+        problem_of([&] { board.post(Command::setting("key", Text(secret))); })}) {
+    EXPECT_EQ(problem.kind, ErrorKind::usage);
+    EXPECT_TRUE(contains(problem.reason, "over USB only")) << problem.reason;
+    EXPECT_FALSE(contains(problem.thing, "eee")) << problem.thing;
+  }
+}
+
 TEST(Board, ThrowsForEveryValueOutsideItsRange) {
   Board board("sim:");
   const auto is_usage = [](auto action) {

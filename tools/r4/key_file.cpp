@@ -15,7 +15,6 @@
 #include "options.hpp"
 #include "transports/error.hpp"
 #include "transports/file_descriptor.hpp"
-#include "transports/url.hpp"
 
 namespace r4::tool {
 namespace {
@@ -112,14 +111,6 @@ CLI::Option* add_key(CLI::App& command, std::string& path) {
           "the board's key, in a file made by r4 key new (default: $R4_KEY)")
       ->envname("R4_KEY")
       ->type_name(file_type);
-}
-
-void require_cable(const std::string& url, const std::string& secret) {
-  const std::string scheme = Url::parse(url).scheme();
-  if (scheme != "udp" && scheme != "can") return;
-  throw Error(ErrorKind::usage, secret,
-              fmt::format("a board takes it over USB only, and at {} others would see it", url),
-              "use serial:auto");
 }
 
 BoardOptions with_key(const std::string& path, BoardOptions options) {

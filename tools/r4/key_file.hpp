@@ -18,10 +18,6 @@ Key read_key_file(const std::string& path);
 // never overwritten.
 void make_key_file(const std::string& path, std::uint8_t id);
 
-// A key or password goes over a cable. Throws Error{usage} if that URL is of a network or a bus, whose
-// board would refuse it when all could have read it. `secret` names it.
-void require_cable(const std::string& url, const std::string& secret);
-
 // --key FILE, or R4_KEY in the environment, for a command that opens a board.
 CLI::Option* add_key(CLI::App& command, std::string& path);
 

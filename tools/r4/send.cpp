@@ -40,9 +40,7 @@ Command command_of(const std::string& text, const std::string& url) {
     throw Error(ErrorKind::usage, text, "heartbeats are sent by themselves",
                 "use --hold to keep the link up");
   }
-  if (command.kind == CommandKind::setting && is_secret_setting(command.text)) {
-    require_cable(url, shown(command));
-  }
+  require_cable(url, command);
   return command;
 }
 
