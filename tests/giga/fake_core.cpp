@@ -19,6 +19,7 @@
 #undef max
 #undef min
 #undef round
+#undef word
 
 #include "fake_giga.hpp"
 
@@ -90,7 +91,9 @@ std::int32_t mbed_set_error_hook(void (*hook)(const mbed_error_ctx*)) {
 }
 bool mbed_get_error_in_progress() { return giga().core_error; }
 void r4_fake_core_warning(std::int32_t status, std::uint32_t address) {
-  const mbed_error_ctx context = {status, address, 0};
+  mbed_error_ctx context = {};
+  context.error_status = status;
+  context.error_address = address;
   error_hook(&context);
 }
 void r4_fake_core_error(std::int32_t status, std::uint32_t address) {
@@ -113,7 +116,7 @@ int trng_get_bytes(trng_t*, std::uint8_t* output, std::size_t length, std::size_
 
 namespace mbed {
 
-InterruptIn::InterruptIn(PinName pin, MbedPinMode mode) : pin_(pin) {
+InterruptIn::InterruptIn(PinName pin, PinMode mode) : pin_(pin) {
   GPIO_TypeDef& port = r4_fake_gpio[pin >> 4];
   const int line = pin & 0xF;
   port.MODER &= ~(3U << (2 * line));
@@ -135,6 +138,7 @@ void InterruptIn::rise(Callback<void()> function) { rise_ = function; }
 void InterruptIn::fall(Callback<void()> function) { fall_ = function; }
 
 AnalogIn::AnalogIn(PinName pin, float) : pin_(pin) {}
+AnalogIn::~AnalogIn() = default;
 unsigned short AnalogIn::read_u16() { return giga().analog[pin_]; }
 
 void Ticker::attach(Callback<void()> function, std::chrono::microseconds period) {
@@ -263,7 +267,7 @@ void USBSerial::send_nb(std::uint8_t* buffer, std::uint32_t size, std::uint32_t*
 // --- WiFi
 
 int WiFiClass::begin(const char* ssid) { return begin(ssid, ""); }
-int WiFiClass::begin(const char* ssid, const char* passphrase) {
+int WiFiClass::begin(const char* ssid, const char* passphrase, wl_enc_type) {
   for (;;) {
     {
       const std::lock_guard<std::mutex> lock(giga().mutex);

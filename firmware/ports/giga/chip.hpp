@@ -25,3 +25,4 @@
 #undef max
 #undef min
 #undef round
+#undef word

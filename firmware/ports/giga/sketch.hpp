@@ -14,6 +14,9 @@
 #if !defined(ARDUINO_GIGA) && !defined(TARGET_GIGA)
 #error "R4 Link is for the Arduino Giga R1 WiFi: choose it as the board"
 #endif
+#ifdef CORE_CM4  // ARDUINO_GIGA is defined for either
+#error "R4 Link is for the main core of the Giga (Tools > Target core)"
+#endif
 
 namespace r4 {
 namespace giga {

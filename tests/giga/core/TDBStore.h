@@ -7,7 +7,7 @@ namespace mbed {
 
 class TDBStore {
  public:
-  explicit TDBStore(BlockDevice* device);
+  TDBStore(BlockDevice* device);  // NOLINT
   virtual ~TDBStore();
   virtual int init();
   virtual int set(const char* key, const void* buffer, std::size_t size,

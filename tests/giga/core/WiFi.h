@@ -5,6 +5,7 @@
 
 class NetworkInterface;
 
+enum wl_enc_type { ENC_TYPE_UNKNOWN = 9 };
 enum wl_status_t { WL_IDLE_STATUS = 0, WL_CONNECTED = 3, WL_CONNECT_FAILED = 4 };
 
 namespace arduino {
@@ -12,7 +13,7 @@ namespace arduino {
 class WiFiClass {
  public:
   int begin(const char* ssid);
-  int begin(const char* ssid, const char* passphrase);
+  int begin(const char* ssid, const char* passphrase, wl_enc_type security = ENC_TYPE_UNKNOWN);
   int disconnect();
   std::uint8_t status();
   IPAddress localIP();

@@ -15,7 +15,12 @@ enum PinName : int {
   PC_5 = 0x25,
   PK_7 = 0xA7,
 };
-enum MbedPinMode { PullNone, PullUp, PullDown };
+enum PinMode { PullNone, PullUp, PullDown };
+struct PinMap {
+  PinName pin;
+  int peripheral;
+  int function;
+};
 
 using osStatus = std::int32_t;
 enum osPriority_t {
@@ -31,6 +36,13 @@ struct mbed_error_ctx {
   std::int32_t error_status;
   std::uint32_t error_address;
   std::uint32_t error_value;
+  std::uint32_t thread_id;
+  std::uint32_t thread_entry_address;
+  std::uint32_t thread_stack_size;
+  std::uint32_t thread_stack_mem;
+  std::uint32_t thread_current_sp;
+  char error_filename[16];
+  std::uint32_t error_line_number;
 };
 
 extern "C" {
@@ -47,11 +59,20 @@ namespace mbed {
 
 template <class Signature>
 class Callback;
-// A function, or a method or function with its object; kept inside, as in the original.
+// A function, or a method or function with its object; kept inside, as in the original. Copied and
+// destroyed by code (MBED_CONF_PLATFORM_CALLBACK_NONTRIVIAL is 1 on the Giga).
 template <>
 class Callback<void()> {
  public:
   Callback() = default;
+  Callback(const Callback& other) { *this = other; }
+  Callback& operator=(const Callback& other) {
+    object_ = other.object_;
+    run_ = other.run_;
+    std::memcpy(kept_, other.kept_, sizeof kept_);
+    return *this;
+  }
+  ~Callback() {}  // NOLINT(modernize-use-equals-default): not trivial
   template <class T>
   Callback(T* object, void (T::*method)()) : object_(object), run_(&run_method<T>) {
     static_assert(sizeof method <= sizeof kept_, "room for it");
@@ -61,7 +82,7 @@ class Callback<void()> {
   Callback(void (*function)(T*), T* object) : object_(object), run_(&run_with_object<T>) {
     std::memcpy(kept_, &function, sizeof function);
   }
-  explicit Callback(void (*function)()) : run_(&run_function) {
+  Callback(void (*function)()) : run_(&run_function) {  // NOLINT
     std::memcpy(kept_, &function, sizeof function);
   }
   void operator()() const { run_(*this); }
@@ -100,16 +121,18 @@ Callback<void()> callback(void (*function)(T*), T* object) {
 }
 inline Callback<void()> callback(void (*function)()) { return Callback<void()>(function); }
 
+template <class T>
 class NonCopyable {
- public:
+ protected:
   NonCopyable() = default;
   NonCopyable(const NonCopyable&) = delete;
   NonCopyable& operator=(const NonCopyable&) = delete;
 };
 
-class InterruptIn : private NonCopyable {
+class InterruptIn : private NonCopyable<InterruptIn> {
  public:
-  InterruptIn(PinName pin, MbedPinMode mode);  // NOLINT
+  InterruptIn(PinName pin);                // NOLINT
+  InterruptIn(PinName pin, PinMode mode);  // NOLINT
   virtual ~InterruptIn();
   void rise(Callback<void()> function);
   void fall(Callback<void()> function);
@@ -120,16 +143,19 @@ class InterruptIn : private NonCopyable {
   Callback<void()> fall_;
 };
 
-class AnalogIn : private NonCopyable {
+class AnalogIn {
  public:
+  AnalogIn(const PinMap& pinmap, float reference_volts = 3.3F);  // NOLINT
+  AnalogIn(const PinMap&&, float reference_volts = 3.3F) = delete;
   AnalogIn(PinName pin, float reference_volts = 3.3F);  // NOLINT
+  virtual ~AnalogIn();
   unsigned short read_u16();
 
  private:
   PinName pin_;
 };
 
-class Ticker : private NonCopyable {
+class Ticker : private NonCopyable<Ticker> {
  public:
   Ticker() = default;
   void attach(Callback<void()> function, std::chrono::microseconds period);
@@ -146,9 +172,13 @@ struct Clock {
 };
 }  // namespace Kernel
 
-class Thread : private mbed::NonCopyable {
+class Thread : private mbed::NonCopyable<Thread> {
  public:
-  Thread(osPriority priority, std::uint32_t stack_size, unsigned char* stack_mem, const char* name);
+  Thread(osPriority priority = osPriorityNormal, std::uint32_t stack_size = 4096,  // NOLINT
+         unsigned char* stack_mem = nullptr, const char* name = nullptr);
+  Thread(std::uint32_t tz_module, osPriority priority = osPriorityNormal,  // NOLINT
+         std::uint32_t stack_size = 4096, unsigned char* stack_mem = nullptr,
+         const char* name = nullptr);
   virtual ~Thread();
   osStatus start(mbed::Callback<void()> task);
 
@@ -156,16 +186,18 @@ class Thread : private mbed::NonCopyable {
   void* running_ = nullptr;
 };
 
-class EventFlags : private mbed::NonCopyable {
+class EventFlags : private mbed::NonCopyable<EventFlags> {
  public:
   EventFlags() = default;
+  EventFlags(const char* name);  // NOLINT
   std::uint32_t set(std::uint32_t flags);
   std::uint32_t wait_any_for(std::uint32_t flags, Kernel::Clock::duration_u32 time,
                              bool clear = true);
 };
 
 namespace ThisThread {
+[[deprecated]] void sleep_for(std::uint32_t millisec);
 void sleep_for(Kernel::Clock::duration_u32 time);
-}
+}  // namespace ThisThread
 
 }  // namespace rtos

@@ -9,6 +9,7 @@
 #undef max
 #undef min
 #undef round
+#undef word
 
 #include <cstdio>
 #include <cstdlib>

@@ -12,8 +12,10 @@ struct nsapi_addr_t {
 class SocketAddress {
  public:
   SocketAddress() = default;
-  explicit SocketAddress(const nsapi_addr_t& addr, std::uint16_t port = 0)
+  SocketAddress(const nsapi_addr_t& addr, std::uint16_t port = 0)  // NOLINT
       : addr_(addr), port_(port) {}
+  SocketAddress(const char* addr, std::uint16_t port = 0);  // NOLINT
+  SocketAddress(const void* bytes, nsapi_version_t version, std::uint16_t port = 0);
   nsapi_addr_t get_addr() const { return addr_; }
   std::uint16_t get_port() const { return port_; }
 
