@@ -446,6 +446,25 @@ TEST(GigaReport, IsThePapersFigure3) {
   EXPECT_EQ(lines, expected);
 }
 
+TEST(GigaPins, VoltagesAreConvertedWithoutTheCore) {
+  GigaBench bench;
+  bench.boot();
+  PlainHost host;
+  bench.run_ms(150, host, bench.usb());
+  const int by_core = bench.giga.core_conversions;
+  EXPECT_EQ(by_core, analog_channels) << "when it starts";
+  bench.giga.analog = {{0x24, 6554},  {0x25, 13108}, {0x10, 19662},
+                       {0x11, 26215}, {0x23, 32769}, {0x22, 39322}};
+  bench.usb()(host.command("F:AIN24,AIN12,AIN5,AINDMH,AINSTEER,AIN6"));
+  bench.run_ms(100, host, bench.usb());
+  const std::vector<std::string> lines = bench.usb_lines();
+  for (const char* field : {"AIN24:5.00;", "AIN12:10.00;", "AIN5:15.00;", "AINDMH:20.00;",
+                            "AINSTEER:25.00;", "AIN6:30.00;"}) {
+    EXPECT_TRUE(has_line(lines, field)) << field;
+  }
+  EXPECT_EQ(bench.giga.core_conversions, by_core);
+}
+
 TEST(GigaPins, CarryStepsEncodersEchoesAndVoltages) {
   GigaBench bench;
   bench.giga.analog[0x24] = 0xFFFF;

@@ -139,7 +139,10 @@ void InterruptIn::fall(Callback<void()> function) { fall_ = function; }
 
 AnalogIn::AnalogIn(PinName pin, float) : pin_(pin) {}
 AnalogIn::~AnalogIn() = default;
-unsigned short AnalogIn::read_u16() { return giga().analog[pin_]; }
+unsigned short AnalogIn::read_u16() {
+  ++giga().core_conversions;
+  return giga().analog[pin_];
+}
 
 void Ticker::attach(Callback<void()> function, std::chrono::microseconds period) {
   Giga::Timer& timer = giga().ticker;

@@ -10,6 +10,7 @@
 
 GPIO_TypeDef r4_fake_gpio[11];
 I2C_TypeDef r4_fake_i2c2;
+ADC_TypeDef r4_fake_adc1;
 FDCAN_GlobalTypeDef r4_fake_fdcan2;
 IWDG_TypeDef r4_fake_iwdg1;
 TIM_TypeDef r4_fake_tim7;
@@ -42,6 +43,8 @@ void clear_registers() {
   for (std::size_t i = 0; i < sizeof r4_fake_i2c2 / sizeof(Register); ++i) words[i].clear();
   auto* const can = reinterpret_cast<Register*>(&r4_fake_fdcan2);
   for (std::size_t i = 0; i < sizeof r4_fake_fdcan2 / sizeof(Register); ++i) can[i].clear();
+  auto* const converter = reinterpret_cast<Register*>(&r4_fake_adc1);
+  for (std::size_t i = 0; i < sizeof r4_fake_adc1 / sizeof(Register); ++i) converter[i].clear();
   for (Register* each :
        {&r4_fake_tim7.CR1, &r4_fake_tim7.DIER, &r4_fake_tim7.SR, &r4_fake_tim7.ARR,
         &r4_fake_tim7.PSC, &r4_fake_tim7.EGR, &r4_fake_rcc.AHB4ENR, &r4_fake_rcc.APB1LENR,
@@ -103,6 +106,7 @@ void Giga::connect_registers() {
   }
   i2c.connect();
   can.connect();
+  connect_converter();
   r4_fake_iwdg1.KR.on_write = [this](std::uint32_t key) {
     if (key == 0xCCCC) watchdog_runs = true;
     if (key == 0xAAAA) ++watchdog_feeds;
@@ -118,6 +122,32 @@ void Giga::connect_registers() {
   };
   r4_fake_scb.AIRCR.on_write = [this](std::uint32_t value) {
     if ((value & 0xFFFF0004) == 0x05FA0004) reset();
+  };
+}
+
+// ADC1, switched on and ready at once; it has converted when it is looked at again.
+void Giga::connect_converter() {
+  constexpr std::uint32_t on = 1U << 0;
+  constexpr std::uint32_t convert = 1U << 2;
+  constexpr std::uint32_t ready = 1U << 0;
+  constexpr std::uint32_t converted = 1U << 2;
+  ADC_TypeDef& adc = r4_fake_adc1;
+  adc.CR.on_write = [this, &adc](std::uint32_t value) {
+    static const std::map<std::uint32_t, int> pins = {{4, 0x24}, {5, 0x11},  {8, 0x25},
+                                                      {9, 0x10}, {12, 0x22}, {13, 0x23}};
+    const bool was_on = (adc.CR.value & on) != 0;
+    adc.CR.value = (adc.CR.value | value) & ~convert;
+    if ((value & on) != 0) adc.ISR.value |= ready;
+    if ((value & convert) == 0 || !was_on || (adc.ISR.value & ready) == 0) return;
+    const std::uint32_t input = adc.SQR1.value >> 6 & 0x1FU;
+    const bool selected = (adc.PCSEL.value >> input & 1U) != 0;
+    adc.DR.value = selected ? analog[pins.at(input)] : 0;
+    adc.ISR.value |= converted;
+  };
+  adc.ISR.on_write = [&adc](std::uint32_t value) { adc.ISR.value &= ~value; };
+  adc.DR.on_read = [&adc] {
+    adc.ISR.value &= ~converted;
+    return adc.DR.value;
   };
 }
 

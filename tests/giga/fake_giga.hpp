@@ -132,6 +132,7 @@ class Giga {
   void set_pin(char port, int number, bool level);  // an input, from outside
   bool pin(char port, int number);                  // an output
   std::map<int, unsigned short> analog;             // PinName to counts
+  int core_conversions = 0;                         // those by the core, which keeps interrupts off
 
   // --- USB
   bool usb_open = false;
@@ -183,6 +184,7 @@ class Giga {
   void connect_registers();
 
  private:
+  void connect_converter();
   std::uint64_t now_ns_ = 0;
   std::array<std::uint32_t, 11> outside_{}, driven_{};
 };

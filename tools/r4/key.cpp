@@ -9,6 +9,7 @@
 #include <string>
 
 #include "host/board.hpp"
+#include "host/command_help.hpp"
 #include "key_file.hpp"
 #include "options.hpp"
 #include "subcommands.hpp"

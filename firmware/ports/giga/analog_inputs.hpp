@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The six analog inputs: one conversion a poll, in turn, so that nobody waits for six; each is read
-// from its newest. From the loop only.
+// The six analog inputs: one conversion a poll, in turn; each is read from its newest. From the loop
+// only; nothing waits.
+//
+// The core sets up the pins and the converter, and reads each input once. From then on it is done by
+// the registers of ADC1 (RM0399, chapter ADC): the core locks a PLL anew for each reading and keeps
+// interrupts off until it has locked, which is too long for steps and for the edges of encoders.
 #pragma once
 
 #include <cstdint>
@@ -27,23 +31,68 @@ class AnalogValue final : public firmware::AnalogPin {
 
 class AnalogInputs {
  public:
+  // Before there are interrupts that must come in time.
   explicit AnalogInputs(AnalogValue (&values)[analog_channels]) : values_(values) {
-    for (int i = 0; i < analog_channels; ++i) poll();
+    for (int i = 0; i < analog_channels; ++i) values_[i].newest = converters_[i].read_u16();
+    for (const std::uint32_t input : adc_inputs) {
+      ADC1->PCSEL |= 1U << input;
+      if (input < 10) {
+        ADC1->SMPR1 = (ADC1->SMPR1 & ~(7U << 3 * input)) | sampling_time << 3 * input;
+      } else {
+        ADC1->SMPR2 = (ADC1->SMPR2 & ~(7U << 3 * (input - 10))) | sampling_time << 3 * (input - 10);
+      }
+    }
   }
 
-  // A conversion of the next input: some ten microseconds.
+  // Takes what has been converted since the last call, and has the next input converted.
   void poll() {
-    values_[next_].newest = converters_[next_].read_u16();
-    next_ = (next_ + 1) % analog_channels;
+    const std::uint32_t control = ADC1->CR;
+    if ((control & cr_on) == 0) {  // the core switches it off when it has read
+      ADC1->ISR = isr_ready;
+      command(cr_on);
+      step_ = Step::switching_on;
+      return;
+    }
+    const std::uint32_t status = ADC1->ISR;
+    const bool busy =
+        (control & cr_convert) != 0 || (step_ == Step::switching_on && (status & isr_ready) == 0);
+    if (busy) {
+      if (++late_ >= patience) values_[next_].newest = 0;  // as the core has it
+      return;
+    }
+    late_ = 0;
+    if (step_ == Step::converting && (status & isr_converted) != 0) {
+      values_[next_].newest = static_cast<std::uint16_t>(ADC1->DR);
+      next_ = (next_ + 1) % analog_channels;
+    }
+    ADC1->SQR1 = adc_inputs[next_] << 6;  // one conversion, of this input
+    command(cr_convert);
+    step_ = Step::converting;
   }
 
  private:
+  enum class Step : std::uint8_t { idle, switching_on, converting };
+
+  static constexpr std::uint32_t cr_on = 1U << 0;           // ADEN
+  static constexpr std::uint32_t cr_convert = 1U << 2;      // ADSTART
+  static constexpr std::uint32_t cr_commands = 0x8000003F;  // do something when a 1 is written
+  static constexpr std::uint32_t isr_ready = 1U << 0;       // ADRDY
+  static constexpr std::uint32_t isr_converted = 1U << 2;   // EOC
+  static constexpr std::uint32_t sampling_time = 5;         // 64.5 clocks, as the core's
+  static constexpr int patience = 10;                       // polls; a conversion takes 2 us
+
+  static void command(std::uint32_t bit_to_set) {
+    ADC1->CR = (ADC1->CR & ~cr_commands) | bit_to_set;
+  }
+
   AnalogValue (&values_)[analog_channels];
   static_assert(analog_channels == 6, "as below");
   mbed::AnalogIn converters_[analog_channels] = {
       {pin_name(analog_pins[0])}, {pin_name(analog_pins[1])}, {pin_name(analog_pins[2])},
       {pin_name(analog_pins[3])}, {pin_name(analog_pins[4])}, {pin_name(analog_pins[5])}};
   int next_ = 0;
+  int late_ = 0;
+  Step step_ = Step::idle;
 };
 
 }  // namespace giga

@@ -42,6 +42,8 @@ constexpr Pin handle_pin = {'I', 15};  // D42
 // Analog inputs in the order of protocol/state.hpp: AIN24 AIN12 AIN5 AINDMH AINSTEER AIN6.
 constexpr Pin analog_pins[analog_channels] = {{'C', 4}, {'C', 5}, {'B', 0},
                                               {'B', 1}, {'C', 3}, {'C', 2}};  // A0-A5
+// Which inputs of ADC1 these are.
+constexpr std::uint32_t adc_inputs[analog_channels] = {4, 8, 9, 5, 13, 12};
 
 // The I2C bus of the chips: SCL and SDA (D21, D20), I2C2, alternate function 4.
 constexpr Pin i2c_scl_pin = {'H', 4};

@@ -18,6 +18,9 @@ struct GPIO_TypeDef {
 struct I2C_TypeDef {
   R4Register CR1, CR2, OAR1, OAR2, TIMINGR, TIMEOUTR, ISR, ICR, PECR, RXDR, TXDR;
 };
+struct ADC_TypeDef {
+  R4Register ISR, IER, CR, CFGR, CFGR2, SMPR1, SMPR2, PCSEL, LTR1, HTR1, SQR1, SQR2, SQR3, SQR4, DR;
+};
 struct FDCAN_GlobalTypeDef {
   R4Register CREL, ENDN, DBTP, TEST, RWD, CCCR, NBTP, TSCC, TSCV, TOCC, TOCV, ECR, PSR, TDCR, IR,
       IE, ILS, ILE, GFC, SIDFC, XIDFC, XIDAM, HPMS, NDAT1, NDAT2, RXF0C, RXF0S, RXF0A, RXBC, RXF1C,
@@ -45,6 +48,7 @@ struct SCB_Type {
 
 extern GPIO_TypeDef r4_fake_gpio[11];
 extern I2C_TypeDef r4_fake_i2c2;
+extern ADC_TypeDef r4_fake_adc1;
 extern FDCAN_GlobalTypeDef r4_fake_fdcan2;
 extern IWDG_TypeDef r4_fake_iwdg1;
 extern TIM_TypeDef r4_fake_tim7;
@@ -66,6 +70,7 @@ extern std::uint32_t r4_fake_message_ram[2560];
 #define GPIOJ (&r4_fake_gpio[9])
 #define GPIOK (&r4_fake_gpio[10])
 #define I2C2 (&r4_fake_i2c2)
+#define ADC1 (&r4_fake_adc1)
 #define FDCAN2 (&r4_fake_fdcan2)
 #define IWDG1 (&r4_fake_iwdg1)
 #define TIM7 (&r4_fake_tim7)
