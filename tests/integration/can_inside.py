@@ -185,7 +185,7 @@ def test_a_restarted_board_is_taken_up_again(url, host_url):
 
 def test_packed_and_fd_take_fewer_frames(vcan_board):
     def frames_a_second():
-        with Dump('vcan0') as dump, monitor(vcan_board.host_url, '--duration', '4') as host:
+        with Dump('vcan0') as dump, monitor(vcan_board.host_url) as host:
             in_control(host)
             dump.frames.clear()
             times = [host.next(is_state)['t'] for _ in range(100)]
@@ -198,7 +198,7 @@ def test_packed_and_fd_take_fewer_frames(vcan_board):
     measured = objects(run('bench', vcan_board.host_url, '--duration', '2', '--json', timeout=60).stdout)[0]
     assert measured['transfers']['packed'] > 50 and measured['transfers']['bad_form'] == 0
     print(f'{plain:.0f} frames a second plain, {packed:.0f} packed')
-    assert plain > 2000 and packed < 700
+    assert 3 * packed < plain  # 24 frames and 5 a state; a slow emulated machine leaves states out
 
 
 def test_can_fd_carries_a_state_in_three_frames():
