@@ -463,6 +463,14 @@ TEST(GigaPins, VoltagesAreConvertedWithoutTheCore) {
     EXPECT_TRUE(has_line(lines, field)) << field;
   }
   EXPECT_EQ(bench.giga.core_conversions, by_core);
+
+  bench.giga.converter_hangs = true;
+  bench.run_ms(100, host, bench.usb());
+  const std::vector<std::string> hung = bench.usb_lines();
+  for (const char* field : {"AIN24:0.00;", "AIN12:0.00;", "AIN5:0.00;", "AINDMH:0.00;",
+                            "AINSTEER:0.00;", "AIN6:0.00;"}) {
+    EXPECT_TRUE(has_line(hung, field)) << field << " is an old voltage";
+  }
 }
 
 TEST(GigaPins, CarryStepsEncodersEchoesAndVoltages) {

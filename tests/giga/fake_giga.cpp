@@ -135,6 +135,7 @@ void Giga::connect_converter() {
   adc.CR.on_write = [this, &adc](std::uint32_t value) {
     static const std::map<std::uint32_t, int> pins = {{4, 0x24}, {5, 0x11},  {8, 0x25},
                                                       {9, 0x10}, {12, 0x22}, {13, 0x23}};
+    if (converter_hangs) return;
     const bool was_on = (adc.CR.value & on) != 0;
     adc.CR.value = (adc.CR.value | value) & ~convert;
     if ((value & on) != 0) adc.ISR.value |= ready;

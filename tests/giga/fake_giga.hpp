@@ -132,6 +132,7 @@ class Giga {
   void set_pin(char port, int number, bool level);  // an input, from outside
   bool pin(char port, int number);                  // an output
   std::map<int, unsigned short> analog;             // PinName to counts
+  bool converter_hangs = false;                     // the registers of ADC1 do nothing
   int core_conversions = 0;                         // those by the core, which keeps interrupts off
 
   // --- USB

@@ -44,33 +44,42 @@ class AnalogInputs {
     }
   }
 
-  // Takes what has been converted since the last call, and has the next input converted.
+  // Takes what has been converted since the last call, and has the next input converted. All inputs
+  // are 0 while the converter does nothing: an old voltage would pass for a measured one.
   void poll() {
+    if (convert()) {
+      late_ = 0;
+    } else if (++late_ >= patience) {
+      late_ = 0;
+      for (int i = 0; i < analog_channels; ++i) values_[i].newest = 0;
+    }
+  }
+
+ private:
+  // Was there a value?
+  bool convert() {
     const std::uint32_t control = ADC1->CR;
     if ((control & cr_on) == 0) {  // the core switches it off when it has read
       ADC1->ISR = isr_ready;
       command(cr_on);
       step_ = Step::switching_on;
-      return;
+      return false;
     }
     const std::uint32_t status = ADC1->ISR;
     const bool busy =
         (control & cr_convert) != 0 || (step_ == Step::switching_on && (status & isr_ready) == 0);
-    if (busy) {
-      if (++late_ >= patience) values_[next_].newest = 0;  // as the core has it
-      return;
-    }
-    late_ = 0;
-    if (step_ == Step::converting && (status & isr_converted) != 0) {
+    if (busy) return false;
+    const bool converted = step_ == Step::converting && (status & isr_converted) != 0;
+    if (converted) {
       values_[next_].newest = static_cast<std::uint16_t>(ADC1->DR);
       next_ = (next_ + 1) % analog_channels;
     }
     ADC1->SQR1 = adc_inputs[next_] << 6;  // one conversion, of this input
     command(cr_convert);
     step_ = Step::converting;
+    return converted;
   }
 
- private:
   enum class Step : std::uint8_t { idle, switching_on, converting };
 
   static constexpr std::uint32_t cr_on = 1U << 0;           // ADEN
