@@ -51,7 +51,7 @@ class AnalogInputs {
       late_ = 0;
     } else if (++late_ >= patience) {
       late_ = 0;
-      for (int i = 0; i < analog_channels; ++i) values_[i].newest = 0;
+      for (AnalogValue& value : values_) value.newest = 0;
     }
   }
 
