@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What CanBus tells its members, and what they may do meanwhile. On a vxcan pair of its own: what
-// comes from the far end is from another machine to it, what is sent on the near one is local. For
-// tools/with-can.
+// What CanBus tells its members, when its frames came and how many it missed, and what members may do
+// meanwhile. On a vxcan pair of its own: what comes from the far end is from another machine to it,
+// what is sent on the near one is local. For tools/with-can.
 #include "transports/can_bus.hpp"
 
 #include <gtest/gtest.h>
@@ -11,14 +11,21 @@
 #include <asio/io_context.hpp>
 #include <chrono>
 #include <cstdlib>
+#include <fstream>
 #include <functional>
 #include <initializer_list>
 #include <memory>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
 #include "tests/can/raw_can.hpp"
+#include "tests/transports/recorder.hpp"
+#include "transports/can_carrier.hpp"
+#include "transports/framing/can_ids.hpp"
+#include "transports/framing/can_node.hpp"
+#include "transports/url.hpp"
 
 namespace r4 {
 namespace {
@@ -27,6 +34,7 @@ using Kind = CarrierEvent::Kind;
 
 constexpr char near_end[] = "vxcan7";
 constexpr char far_end[] = "vxcan8";
+constexpr std::uint8_t node = 3;
 constexpr std::uint32_t heard_id = 0x183;
 constexpr std::uint32_t other_id = 0x555;
 constexpr std::chrono::milliseconds soon{200};
@@ -90,8 +98,9 @@ class CanBusTest : public testing::Test {
 // Writes down what it is told.
 class Witness final : public CanBus::Member {
  public:
-  explicit Witness(std::shared_ptr<CanBus> bus) : bus_(std::move(bus)) {
-    bus_->join(*this, {heard_id});
+  explicit Witness(std::shared_ptr<CanBus> bus, std::uint32_t id = heard_id)
+      : bus_(std::move(bus)) {
+    bus_->join(*this, {id});
   }
   ~Witness() { leave(); }
   Witness(const Witness&) = delete;
@@ -105,13 +114,15 @@ class Witness final : public CanBus::Member {
   std::vector<std::pair<Kind, std::string>> events;
   std::string fix;  // of the newest event
   std::vector<std::uint8_t> frames;
+  std::vector<std::uint32_t> came_us;
   std::function<void()> in_event = [] {};
   std::function<void()> in_frame = [] {};
 
  private:
-  void on_frame(const CanFrame& frame, std::uint32_t) override {
+  void on_frame(const CanFrame& frame, std::uint32_t at_us) override {
     EXPECT_TRUE(bus_) << "it has left";
     frames.push_back(frame.data[0]);
+    came_us.push_back(at_us);
     in_frame();
   }
   void on_bus(const CarrierEvent& event) override {
@@ -270,6 +281,130 @@ TEST_F(CanBusTest, OneWhoJoinsInsideACallIsCalledFromThenOn) {
   for (const std::uint8_t byte : Bytes{1, 2}) local.send(data(byte));
   run_until([&] { return first.frames.size() == 2; });
   EXPECT_EQ(second->frames.back(), 2);
+}
+
+// --- when frames came
+
+// A board's datagram in seven frames, on its way while the reader of this thread is held up.
+class CanBusTimes : public CanBusTest {
+ protected:
+  static constexpr std::chrono::milliseconds n_cr{100};  // docs/can.md
+  static constexpr int most_runs = 3;
+
+  struct Sending {
+    std::uint32_t before_us;
+    std::uint32_t after_us;
+  };
+
+  CanBusTimes() {
+    host->open(datagrams);
+    CanNode board(CanEnd::board, node, false);
+    board.begin(Text("AIN24:24.28;AIN12:12.24;AIN5:5.11;AINDMH:12.1;"), 0);
+    for (CanFrame frame; board.offer(0, frame); board.frame_sent(0)) frames.push_back(frame);
+  }
+
+  // Sends the next frames, each that long after the one before.
+  void send(std::size_t count, std::chrono::milliseconds gap) {
+    for (; count != 0; --count) {
+      std::this_thread::sleep_for(gap);
+      const std::uint32_t before_us = CanBus::now_us();
+      remote.send(frames[sendings.size()]);
+      sendings.push_back({before_us, CanBus::now_us()});
+    }
+  }
+  // Of frames n-1 and n: the time between them was that at least, and at most.
+  std::uint32_t least_gap_us(std::size_t n) const {
+    return sendings[n].before_us - sendings[n - 1].after_us;
+  }
+  std::uint32_t most_gap_us(std::size_t n) const {
+    return sendings[n].after_us - sendings[n - 1].before_us;
+  }
+  void read_all() {
+    run_until([&] { return member.frames.size() == sendings.size(); });
+  }
+  std::uint64_t timed_out() const { return host->counters().transfers.value().timed_out; }
+
+  Witness member{bus, telemetry_id(node)};
+  test::Recorder datagrams;
+  std::unique_ptr<Carrier> host =
+      make_can_carrier(io, Url::parse("can://vxcan7?node=3"), Role::host);
+  std::vector<CanFrame> frames;
+  std::vector<Sending> sendings;
+};
+
+TEST_F(CanBusTimes, AreThoseOfTheirComingHoweverLateTheyAreRead) {
+  constexpr std::chrono::milliseconds gap{25};  // six of them are more than N_Cr
+  ASSERT_EQ(frames.size(), 7U);
+  bool in_time = false;
+  for (int run = 0; run < most_runs && !in_time; ++run) {
+    member.frames.clear();
+    member.came_us.clear();
+    sendings.clear();
+    datagrams.datagrams.clear();
+    send(1, gap);
+    read_all();
+    send(frames.size() - 1, gap);
+    read_all();
+    in_time = true;  // but where this machine stood still meanwhile
+    for (std::size_t n = 1; n < frames.size(); ++n) {
+      if (most_gap_us(n) > n_cr / std::chrono::microseconds(1)) in_time = false;
+    }
+  }
+  ASSERT_TRUE(in_time) << "this machine stands still again and again";
+  for (std::size_t n = 2; n < frames.size(); ++n) {  // those that were read together
+    const std::uint32_t gap_us = member.came_us[n] - member.came_us[n - 1];
+    EXPECT_GE(gap_us + 1, least_gap_us(n)) << n;
+    EXPECT_LE(gap_us, most_gap_us(n) + 1) << n;
+  }
+  EXPECT_EQ(datagrams.datagrams.size(), 1U) << timed_out() << " timed out";
+}
+
+TEST_F(CanBusTimes, ShowAPauseOfTheSenderThoughAllIsReadTogether) {
+  send(2, {});
+  send(1, n_cr * 3 / 2);
+  send(frames.size() - 3, {});
+  read_all();
+  EXPECT_TRUE(datagrams.datagrams.empty());
+  EXPECT_EQ(timed_out(), 1U);
+}
+
+// --- frames that are lost because nobody reads
+
+// More frames than a socket holds. How many came to the interface, by its own count.
+class CanBusOverflow : public CanBusTest {
+ protected:
+  static std::uint64_t came() {
+    std::uint64_t count = 0;
+    std::ifstream("/sys/class/net/vxcan7/statistics/rx_packets") >> count;
+    return count;
+  }
+  // Afterwards all that the socket has taken is read. A frame tells of those lost before it.
+  void flood() {
+    const std::size_t before = member.frames.size();
+    for (int i = 0; i < 3000; ++i) remote.send(data(1));
+    run_until([&] { return member.frames.size() > before; });
+    remote.send(data(2));
+    run_until([&] { return member.frames.back() == 2; });
+  }
+  std::uint64_t missed() const { return came() - came_before - member.frames.size(); }
+
+  Witness member{bus};
+  const std::uint64_t came_before = came();
+};
+
+TEST_F(CanBusOverflow, IsCountedToTheFrameAlsoWhenTheInterfaceWasDownMeanwhile) {
+  flood();
+  const std::uint64_t first = missed();
+  EXPECT_GT(first, 0U);
+  EXPECT_EQ(bus->overflows(), first);
+  ASSERT_EQ(0, std::system("ip link set vxcan7 down"));
+  run_until([&] { return !bus->up(); });
+  ASSERT_EQ(0, std::system("ip link set vxcan7 up"));
+  run_until([&] { return bus->up(); });
+  EXPECT_EQ(bus->overflows(), first);
+  flood();
+  EXPECT_GT(missed(), first);
+  EXPECT_EQ(bus->overflows(), missed());
 }
 
 }  // namespace
