@@ -13,7 +13,7 @@ import can
 
 import packed_form
 
-N_BS_S, N_CR_S = 0.020, 0.005
+N_BS_S, N_CR_S = 0.020, 0.100
 EMERGENCY_STOP, WENT_SAFE, TO_BOARD, REPLIES, TELEMETRY = 0x010, 0x020, 0x180, 0x200, 0x400
 FD_SIZES = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 # What proves that a command was not executed; DUPLICATE proves nothing by itself.
@@ -63,7 +63,7 @@ class Receiver:
             self.message, self.serial, self.last, self.block = bytearray(data[2:]), 1, now, 0
             self._flow_control()
         elif kind == 2 and self.message is not None:
-            if data[0] & 15 != self.serial or (self.answer is None and now - self.last > N_CR_S):
+            if data[0] & 15 != self.serial or now - self.last > N_CR_S:
                 self.message = None
                 self.failed += 1
                 return None
@@ -81,6 +81,7 @@ class Receiver:
         if self.answer:
             self.answered += 1
             self.answer(bytes([0x30, self.block_size, self.stmin]))
+            self.last = time.time()  # as the frames' own times are
 
 
 class Peer:
