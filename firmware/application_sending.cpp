@@ -142,7 +142,11 @@ void Application::fill(State& state) const {
   for (int i = 0; i < bldc_channels; ++i) state.bldc[i] = outputs_.bldc[i];
   state.relays = outputs_.relays;
   for (int i = 0; i < stepper_channels; ++i) state.stepper_steps[i] = inputs_.stepper_steps[i];
-  for (int i = 0; i < encoder_channels; ++i) state.encoder_counts[i] = inputs_.encoder_counts[i];
+  for (int i = 0; i < encoder_channels; ++i) {
+    state.encoder_counts[i] = inputs_.encoder_counts[i];
+    state.encoder_hz[i] = inputs_.encoder_hz[i];
+    state.encoder_index_counts[i] = inputs_.encoder_index_counts[i];
+  }
   for (int i = 0; i < ultrasonic_channels; ++i) state.ultrasonic_cm[i] = inputs_.ultrasonic_cm[i];
   state.safe = safety_.reason();
   state.last_command = link_.last_executed();

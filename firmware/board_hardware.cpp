@@ -257,7 +257,11 @@ void BoardHardware::sample(Inputs& inputs) {
   if (pins_.handle->read() != handle_held_level) handle_seen_ = handle_held_ = false;
   inputs.handle_held = handle_held_;
   for (int i = 0; i < stepper_channels; ++i) inputs.stepper_steps[i] = steppers_[i].position();
-  for (int i = 0; i < encoder_channels; ++i) inputs.encoder_counts[i] = encoders_[i].count();
+  for (int i = 0; i < encoder_channels; ++i) {
+    inputs.encoder_counts[i] = encoders_[i].count();
+    inputs.encoder_hz[i] = encoders_[i].frequency_hz();
+    inputs.encoder_index_counts[i] = encoders_[i].index_count();
+  }
   inputs.ultrasonic_blind = 0;
   for (int i = 0; i < ultrasonic_channels; ++i) {
     inputs.ultrasonic_cm[i] = ultrasonic_.distance_cm(i);

@@ -45,7 +45,9 @@ struct Inputs {
   bool handle_held = false;
   std::int32_t stepper_steps[stepper_channels] = {};  // where it is
   std::int32_t encoder_counts[encoder_channels] = {};
-  std::uint16_t ultrasonic_cm[ultrasonic_channels] = {};  // 0: no echo
+  std::int32_t encoder_hz[encoder_channels] = {};            // counts a second; negative backwards
+  std::int32_t encoder_index_counts[encoder_channels] = {};  // where the index line rose last
+  std::uint16_t ultrasonic_cm[ultrasonic_channels] = {};     // 0: no echo
   std::uint8_t ultrasonic_blind = 0;  // bit n-1: sensor n does not answer, nothing is known
   ChipFault fault;                    // the first since the last clear_fault()
 };

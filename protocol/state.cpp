@@ -89,6 +89,14 @@ constexpr Entry table[] = {
     R4_ENTRY(rxdup, u32, "RXDUP", rx_duplicate),
     R4_ENTRY(rxref, u32, "RXREF", rx_refused),
     R4_ENTRY(late, u32, "LATE", late),
+    R4_ENTRY(enc1hz, i32, "ENC1HZ", encoder_hz[0]),
+    R4_ENTRY(enc2hz, i32, "ENC2HZ", encoder_hz[1]),
+    R4_ENTRY(enc3hz, i32, "ENC3HZ", encoder_hz[2]),
+    R4_ENTRY(enc4hz, i32, "ENC4HZ", encoder_hz[3]),
+    R4_ENTRY(enc1idx, i32, "ENC1IDX", encoder_index_counts[0]),
+    R4_ENTRY(enc2idx, i32, "ENC2IDX", encoder_index_counts[1]),
+    R4_ENTRY(enc3idx, i32, "ENC3IDX", encoder_index_counts[2]),
+    R4_ENTRY(enc4idx, i32, "ENC4IDX", encoder_index_counts[3]),
     R4_ENTRY(fault, fault, "FAULT", fault),
 };
 #undef R4_ENTRY
@@ -185,15 +193,15 @@ bool parse_entry(Text text, const Entry& entry, State& state) {
 }  // namespace
 
 FieldSet FieldSet::paper_default() {
+  static_assert(static_cast<int>(StateField::servo1pos) + 1 < word_bits, "all in the first word");
   FieldSet set;
-  set.bits_ = (std::uint64_t{1} << (static_cast<int>(StateField::servo1pos) + 1)) - 1;
+  set.words_[0] = (bit_of(StateField::servo1pos) << 1) - 1;
   return set;
 }
 
 FieldSet FieldSet::all() {
-  static_assert(state_field_count < 64, "a bit for every field");
   FieldSet set;
-  set.bits_ = (std::uint64_t{1} << state_field_count) - 1;
+  for (int i = 0; i < state_field_count; ++i) set.add(static_cast<StateField>(i));
   set.remove(StateField::fault);
   return set;
 }

@@ -83,7 +83,17 @@ enum class StateField : std::uint8_t {
   rxdup,   // received again
   rxref,   // commands refused
   late,    // state periods that the board's loop missed
-  fault,   // chip,trouble: ChipFault; 0,0: none
+  // counts a second over the last tenth of a second; negative backwards
+  enc1hz,
+  enc2hz,
+  enc3hz,
+  enc4hz,
+  // what the encoder counted where its index line rose last; 0 before the first time
+  enc1idx,
+  enc2idx,
+  enc3idx,
+  enc4idx,
+  fault,  // chip,trouble: ChipFault; 0,0: none
   count
 };
 constexpr int state_field_count = static_cast<int>(StateField::count);
@@ -92,36 +102,63 @@ constexpr int state_field_count = static_cast<int>(StateField::count);
 class FieldSet {
  public:
   constexpr FieldSet() = default;
-  constexpr bool has(StateField f) const { return (bits_ >> static_cast<int>(f)) & 1U; }
-  void add(StateField f) { bits_ |= std::uint64_t{1} << static_cast<int>(f); }
-  void remove(StateField f) { bits_ &= ~(std::uint64_t{1} << static_cast<int>(f)); }
-  void add(FieldSet other) { bits_ |= other.bits_; }
-  constexpr bool empty() const { return bits_ == 0; }
+  constexpr bool has(StateField f) const { return (words_[word_of(f)] & bit_of(f)) != 0; }
+  void add(StateField f) { words_[word_of(f)] |= bit_of(f); }
+  void remove(StateField f) { words_[word_of(f)] &= ~bit_of(f); }
+  void add(const FieldSet& other) {
+    for (int i = 0; i < word_count; ++i) words_[i] |= other.words_[i];
+  }
+  bool empty() const { return *this == FieldSet(); }
   // Its fields in the order of the table: `for (StateField field : set)`.
   class Iterator {
    public:
-    explicit constexpr Iterator(std::uint64_t bits) : bits_(bits) {}
-    StateField operator*() const { return static_cast<StateField>(__builtin_ctzll(bits_)); }
+    Iterator(const std::uint32_t* words, int first)
+        : words_(words), word_(first), bits_(first < word_count ? words[first] : 0) {
+      pass_empty_words();
+    }
+    StateField operator*() const {
+      return static_cast<StateField>(word_ * word_bits + __builtin_ctz(bits_));
+    }
     Iterator& operator++() {
       bits_ &= bits_ - 1;
+      pass_empty_words();
       return *this;
     }
-    friend bool operator!=(Iterator a, Iterator b) { return a.bits_ != b.bits_; }
+    friend bool operator!=(const Iterator& a, const Iterator& b) {
+      return a.word_ != b.word_ || a.bits_ != b.bits_;
+    }
 
    private:
-    std::uint64_t bits_;
+    void pass_empty_words() {
+      while (bits_ == 0 && word_ < word_count) bits_ = ++word_ < word_count ? words_[word_] : 0;
+    }
+    const std::uint32_t* words_;
+    int word_;
+    std::uint32_t bits_;  // of that word, those that are still to come
   };
-  constexpr Iterator begin() const { return Iterator(bits_); }
-  constexpr Iterator end() const { return Iterator(0); }
+  Iterator begin() const { return Iterator(words_, 0); }
+  Iterator end() const { return Iterator(words_, word_count); }
 
-  friend bool operator==(FieldSet a, FieldSet b) { return a.bits_ == b.bits_; }
-  friend bool operator!=(FieldSet a, FieldSet b) { return a.bits_ != b.bits_; }
+  friend bool operator==(const FieldSet& a, const FieldSet& b) {
+    for (int i = 0; i < word_count; ++i) {
+      if (a.words_[i] != b.words_[i]) return false;
+    }
+    return true;
+  }
+  friend bool operator!=(const FieldSet& a, const FieldSet& b) { return !(a == b); }
 
   static FieldSet paper_default();  // AIN24 … SERVO1POS
   static FieldSet all();            // but FAULT, which is sent where there is one
 
  private:
-  std::uint64_t bits_ = 0;
+  static constexpr int word_bits = 32;
+  static constexpr int word_count = (state_field_count + word_bits - 1) / word_bits;
+  static constexpr int word_of(StateField f) { return static_cast<int>(f) / word_bits; }
+  static constexpr std::uint32_t bit_of(StateField f) {
+    return std::uint32_t{1} << static_cast<int>(f) % word_bits;
+  }
+
+  std::uint32_t words_[word_count] = {};
 };
 
 // The board's analog inputs in the paper's order; values in hundredths of a volt.
@@ -141,6 +178,8 @@ struct State {
   std::int32_t stepper_steps[stepper_channels] = {};
   std::uint16_t servo_us[servo_channels] = {};
   std::int32_t encoder_counts[encoder_channels] = {};
+  std::int32_t encoder_hz[encoder_channels] = {};            // counts a second
+  std::int32_t encoder_index_counts[encoder_channels] = {};  // where the index line rose last
   std::uint16_t ultrasonic_cm[ultrasonic_channels] = {};
   Bldc bldc[bldc_channels];
   std::uint8_t relays = 0;

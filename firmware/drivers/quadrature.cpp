@@ -6,15 +6,14 @@ namespace firmware {
 
 namespace {
 
-constexpr std::int8_t illegal_step = 2;
-
-// What a change from levels AB (row) to AB (column) counts.
+// What a change from levels AB (row) to AB (column) counts; of both at once nothing, for nobody knows
+// which way.
 constexpr std::int8_t steps[4][4] = {
     // 00 01 10 11
-    {0, -1, 1, illegal_step},
-    {1, 0, illegal_step, -1},
-    {-1, illegal_step, 0, 1},
-    {illegal_step, 1, -1, 0},
+    {0, -1, 1, 0},
+    {1, 0, 0, -1},
+    {-1, 0, 0, 1},
+    {0, 1, -1, 0},
 };
 
 }  // namespace
@@ -24,21 +23,14 @@ void QuadratureEncoder::sample(bool a, bool b) {
   if (levels_ == unknown) levels_ = levels;
   const std::int8_t step = steps[levels_][levels];
   levels_ = levels;
-  if (step == illegal_step) {
-    illegal_.store(illegal() + 1, std::memory_order_relaxed);
-    return;
-  }
   const auto change = static_cast<std::uint32_t>(static_cast<std::int32_t>(step));
-  count_.store(static_cast<std::int32_t>(static_cast<std::uint32_t>(count()) + change),
-               std::memory_order_relaxed);
   travelled_.store(travelled_.load(std::memory_order_relaxed) + change, std::memory_order_relaxed);
 }
 
 void QuadratureEncoder::index(bool active) {
   if (active && !index_active_) {
-    index_pulses_.store(index_pulses() + 1, std::memory_order_relaxed);
-    index_count_.store(count(), std::memory_order_relaxed);
-    if (zero_on_index_.load(std::memory_order_relaxed)) zero();
+    index_at_.store(travelled_.load(std::memory_order_relaxed), std::memory_order_relaxed);
+    index_seen_.store(true, std::memory_order_release);
   }
   index_active_ = active;
 }

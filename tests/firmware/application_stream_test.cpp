@@ -93,6 +93,8 @@ TEST(ApplicationStream, CarriesTheNewestInputs) {
   host.command("F:ALL");
   board.hal.inputs.analog_cv[5] = 33;
   board.hal.inputs.encoder_counts[3] = -7;
+  board.hal.inputs.encoder_hz[2] = -4000;
+  board.hal.inputs.encoder_index_counts[1] = 1000;
   board.hal.inputs.ultrasonic_cm[2] = 123;
   board.hal.inputs.stepper_steps[1] = 2'000'000'000;
   board.take();
@@ -100,6 +102,8 @@ TEST(ApplicationStream, CarriesTheNewestInputs) {
   const State state = state_of(board.take(MessageKind::state).back());
   EXPECT_EQ(state.analog_cv[5], 33);
   EXPECT_EQ(state.encoder_counts[3], -7);
+  EXPECT_EQ(state.encoder_hz[2], -4000);
+  EXPECT_EQ(state.encoder_index_counts[1], 1000);
   EXPECT_EQ(state.ultrasonic_cm[2], 123);
   EXPECT_EQ(state.stepper_steps[1], 2'000'000'000);
 }
@@ -108,7 +112,11 @@ TEST(ApplicationStream, CarriesTheNewestInputs) {
 void fill(TestBoard& board, TestHost& host) {
   for (auto& cv : board.hal.inputs.analog_cv) cv = -327'680;
   for (auto& steps : board.hal.inputs.stepper_steps) steps = -2'000'000'000;
-  for (auto& counts : board.hal.inputs.encoder_counts) counts = -2'000'000'000;
+  for (int i = 0; i < encoder_channels; ++i) {
+    board.hal.inputs.encoder_counts[i] = -2'000'000'000;
+    board.hal.inputs.encoder_hz[i] = -2'000'000'000;
+    board.hal.inputs.encoder_index_counts[i] = -2'000'000'000;
+  }
   for (auto& cm : board.hal.inputs.ultrasonic_cm) cm = 400;
   for (int ch = 1; ch <= 4; ++ch) {
     const std::string n = std::to_string(ch);
@@ -131,7 +139,7 @@ TEST(ApplicationStream, SplitsAStateThatIsTooLongForThePort) {
     board.take();
     board.run(10);
     const std::vector<Heard> parts = board.take(MessageKind::state);
-    EXPECT_EQ(parts.size(), limit == 508 ? 2U : 1U);
+    EXPECT_EQ(parts.size(), limit == 508 ? 3U : 1U);
     FieldSet seen;
     for (std::size_t i = 0; i < parts.size(); ++i) {
       EXPECT_LE(parts[i].bytes.size(), limit);
@@ -179,7 +187,7 @@ TEST(ApplicationStream, EachPortGetsPartsOfItsOwnSize) {
   board.take(1);
   board.run(20);
   EXPECT_EQ(board.take(MessageKind::state, 0).size(), 2U);
-  EXPECT_EQ(board.take(MessageKind::state, 1).size(), 4U);
+  EXPECT_EQ(board.take(MessageKind::state, 1).size(), 6U);
 }
 
 TEST(ApplicationStream, SendsTheFieldsThatWereAskedFor) {

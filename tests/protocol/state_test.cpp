@@ -55,7 +55,11 @@ State numbered_state() {
   for (int i = 0; i < servo_channels; ++i) {
     state.servo_us[i] = static_cast<std::uint16_t>(1501 + i);
   }
-  for (int i = 0; i < encoder_channels; ++i) state.encoder_counts[i] = -(5001 + i);
+  for (int i = 0; i < encoder_channels; ++i) {
+    state.encoder_counts[i] = -(5001 + i);
+    state.encoder_hz[i] = -(7001 + i);
+    state.encoder_index_counts[i] = -(8001 + i);
+  }
   for (int i = 0; i < ultrasonic_channels; ++i) {
     state.ultrasonic_cm[i] = static_cast<std::uint16_t>(101 + i);
   }
@@ -88,7 +92,8 @@ const char* const numbered_fields[] = {
     "US2:102",         "US3:103",         "US4:104",         "BLDC1:6,1,1",     "BLDC2:7,1,1",
     "BLDC3:8,1,1",     "BLDC4:9,1,1",     "RELAYS:129",      "SAFE:4",          "CMD:11",
     "RXOK:12",         "RXCRC:13",        "RXLOST:14",       "RXDUP:15",        "RXREF:16",
-    "LATE:17",         "FAULT:64,1"};
+    "LATE:17",         "ENC1HZ:-7001",    "ENC2HZ:-7002",    "ENC3HZ:-7003",    "ENC4HZ:-7004",
+    "ENC1IDX:-8001",   "ENC2IDX:-8002",   "ENC3IDX:-8003",   "ENC4IDX:-8004",   "FAULT:64,1"};
 
 TEST(State, AReasonThatIsNotKnownIsAFault) {
   State state;
@@ -187,6 +192,8 @@ TEST(State, ValuesAreTakenToTheEdgesOfTheirRange) {
                              "SAFE:6;",
                              "CMD:4294967295;",
                              "LATE:4294967295;",
+                             "ENC1HZ:-2147483648;",
+                             "ENC4IDX:2147483647;",
                              "FAULT:0,0;",
                              "FAULT:127,255;",
                              "T:4294967295;"}) {
@@ -218,6 +225,8 @@ TEST(State, AValueOutsideItsRangeOrFormRefusesTheWhole) {
                                   "SERVO1POS:2501",
                                   "SERVO1POS:-1",
                                   "ENC1:",
+                                  "ENC1HZ:1.5",
+                                  "ENC4IDX:2147483648",
                                   "US1:65536",
                                   "US1:-1",
                                   "BLDC1:4096,1,1",
@@ -285,13 +294,14 @@ TEST(State, ThePapersSetIsTheFirstTenFields) {
 TEST(State, ASetGivesItsFieldsInTheOrderOfTheTable) {
   FieldSet set;
   for (const StateField field : set) FAIL() << str(name_of(field));
-  for (const StateField field : {StateField::late, StateField::cmd, StateField::ain24}) {
+  for (const StateField field :
+       {StateField::enc4idx, StateField::late, StateField::cmd, StateField::ain24}) {
     set.add(field);
   }
   std::vector<StateField> fields;
   for (const StateField field : set) fields.push_back(field);
-  EXPECT_EQ(fields,
-            (std::vector<StateField>{StateField::ain24, StateField::cmd, StateField::late}));
+  EXPECT_EQ(fields, (std::vector<StateField>{StateField::ain24, StateField::cmd, StateField::late,
+                                             StateField::enc4idx}));
   fields.clear();
   FieldSet every = FieldSet::all();
   every.add(StateField::fault);

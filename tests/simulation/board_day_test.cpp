@@ -150,7 +150,10 @@ class Day final : private firmware::Port {
     }
     for (int i = 0; i < encoder_channels; ++i) {
       EXPECT_EQ(state_.encoder_counts[i], board_.shaft_count(i + 1)) << i;
-      EXPECT_EQ(hardware_.hal().encoder(i + 1).illegal(), 0U) << i;
+      EXPECT_EQ(state_.encoder_index_counts[i] % sim::BoardModel::counts_a_turn, 0) << i;
+      const std::int32_t beyond = state_.encoder_counts[i] - state_.encoder_index_counts[i];
+      EXPECT_TRUE(std::abs(beyond) < sim::BoardModel::counts_a_turn) << i << ": " << beyond;
+      EXPECT_NEAR(state_.encoder_hz[i], 0, 10) << i << ": it has run out";
     }
   }
 

@@ -56,6 +56,8 @@ class Voice {
       us = static_cast<std::uint16_t>(random_.between(500, 2500));
     }
     for (std::int32_t& count : state.encoder_counts) count = moving(200000);
+    for (std::int32_t& hz : state.encoder_hz) hz = moving(4000);
+    for (std::int32_t& count : state.encoder_index_counts) count = moving(200000);
     for (std::uint16_t& cm : state.ultrasonic_cm) {
       cm = static_cast<std::uint16_t>(random_.between(5, 400));
     }

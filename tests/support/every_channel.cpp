@@ -27,13 +27,19 @@ State await(const ControlledBoard& board, const std::function<bool(const State&)
   return state;
 }
 
+// Another for each, whole turns and a part; encoders 2 and 4 turn backwards.
+std::int32_t turns_of(int channel) {
+  return (channel % 2 == 0 ? -channel : channel) * sim::BoardModel::counts_a_turn;
+}
+std::int32_t part_of(int channel) { return channel % 2 == 0 ? -100 * channel : 100 * channel; }
+
 void expect_inputs(const ControlledBoard& board) {
   board.at_board([](sim::SimulatedBoard& at) {
     for (int i = 0; i < analog_channels; ++i) {
       at.model().pin_analog(static_cast<Analog>(i), 100 * (i + 1) + i);
     }
     for (int channel = 1; channel <= encoder_channels; ++channel) {
-      at.model().turn_encoder(channel, channel % 2 == 0 ? -100 * channel : 100 * channel);
+      at.model().turn_encoder(channel, turns_of(channel) + part_of(channel));
     }
     for (int channel = 1; channel <= ultrasonic_channels; ++channel) {
       at.model().set_ultrasonic(channel, static_cast<std::uint16_t>(50 * channel));
@@ -46,15 +52,34 @@ void expect_inputs(const ControlledBoard& board) {
   EXPECT_TRUE(again.handle_held);
   for (int i = 0; i < analog_channels; ++i) EXPECT_EQ(again.analog_cv[i], 100 * (i + 1) + i);
   for (int channel = 1; channel <= encoder_channels; ++channel) {
-    EXPECT_EQ(again.encoder_counts[channel - 1], channel % 2 == 0 ? -100 * channel : 100 * channel);
+    EXPECT_EQ(again.encoder_counts[channel - 1], turns_of(channel) + part_of(channel));
+    EXPECT_EQ(again.encoder_index_counts[channel - 1], turns_of(channel));
+    EXPECT_EQ(again.encoder_hz[channel - 1], 0);
   }
   for (int channel = 1; channel <= ultrasonic_channels; ++channel) {
     EXPECT_EQ(again.ultrasonic_cm[channel - 1], 50 * channel);
   }
   for (int channel = 1; channel <= encoder_channels; ++channel) {
     board.command(fmt::format("Z:{}", channel));
-    EXPECT_EQ(board.next_state().encoder_counts[channel - 1], 0);
+    const State zeroed = board.next_state();
+    EXPECT_EQ(zeroed.encoder_counts[channel - 1], 0);
+    EXPECT_EQ(zeroed.encoder_index_counts[channel - 1], -part_of(channel));
   }
+}
+
+// Each motor turns its own encoder, each at another speed.
+void expect_speeds(const ControlledBoard& board) {
+  for (int channel = 1; channel <= osmc_channels; ++channel) {
+    board.command(fmt::format("O:{},{},{}", 1000 * channel, channel % 2, channel));
+  }
+  await(board, [](const State& s) {
+    for (int channel = 1; channel <= encoder_channels; ++channel) {
+      const int speed = 1000 * channel * sim::MotorModel::top_speed / pwm_max;
+      const int hz = channel % 2 == 0 ? -s.encoder_hz[channel - 1] : s.encoder_hz[channel - 1];
+      if (hz < speed - speed / 8 || hz > speed + speed / 8) return false;
+    }
+    return true;
+  });
 }
 
 void expect_drives(const ControlledBoard& board) {
@@ -149,6 +174,7 @@ ControlledBoard controlled(BoardInAThread& simulated, Board& host) {
 void expect_every_channel(const ControlledBoard& board) {
   board.command("F:ALL");
   expect_inputs(board);
+  expect_speeds(board);
   expect_drives(board);
   expect_servos_and_relays(board);
   expect_brushless(board);

@@ -101,6 +101,8 @@ class Speaker {
       us = static_cast<std::uint16_t>(between(500, servo_max_us));
     }
     for (std::int32_t& counts : state.encoder_counts) counts = position(200000);
+    for (std::int32_t& hz : state.encoder_hz) hz = position(4000);
+    for (std::int32_t& counts : state.encoder_index_counts) counts = position(200000);
     for (std::uint16_t& cm : state.ultrasonic_cm) cm = static_cast<std::uint16_t>(between(5, 400));
     for (Bldc& bldc : state.bldc) bldc.speed = static_cast<std::uint16_t>(between(0, pwm_max));
     state.relays = static_cast<std::uint8_t>(between(0, 255));

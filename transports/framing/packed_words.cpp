@@ -50,8 +50,12 @@ constexpr PackedWord words[word_count] = {
     {"UNKNOWN"}, {"FORMAT"}, {"RANGE"}, {"CHANNEL"}, {"STALE"}, {"DUPLICATE"}, {"BUSY"}, {"AUTH"},
     // 63
     {"R4"}, {"sim"}, {"udp"}, {"serial"}, {"pty"}, {"can"},
-    // 69
+    // 69: more of the state
     {"FAULT"},
+    {"ENC1HZ", Form::steps}, {"ENC2HZ", Form::steps}, {"ENC3HZ", Form::steps},
+    {"ENC4HZ", Form::steps},
+    {"ENC1IDX", Form::steps}, {"ENC2IDX", Form::steps}, {"ENC3IDX", Form::steps},
+    {"ENC4IDX", Form::steps},
 };
 // clang-format on
 

@@ -40,14 +40,14 @@ struct PackedWord {
 
 namespace packed {
 
-// Codes that the layouts name; the state fields are the first, in the order of the wire.
+// Codes that the layouts name; the first are state fields, in the order of the wire.
 constexpr unsigned code_servo1pos = 0x09;
 constexpr unsigned code_safe = 0x30;
 constexpr unsigned code_cmd = 0x31;
 constexpr unsigned state_words = 0x38;
 constexpr unsigned code_r4_ros2 = 0x4B;
 constexpr unsigned code_ros2_r4 = 0x4C;
-constexpr unsigned word_count = 0x6A;
+constexpr unsigned word_count = 0x72;
 constexpr unsigned no_word = 0xFF;
 
 extern const PackedWord words[word_count];

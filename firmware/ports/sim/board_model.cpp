@@ -152,8 +152,10 @@ void BoardModel::turn(int channel, std::int32_t counts, Interrupts& interrupts) 
 
 // Forward, A leads B: 00 10 11 01.
 void BoardModel::tell_levels(int channel, Interrupts& interrupts) {
-  const unsigned quarter = static_cast<unsigned>(shafts_[channel - 1].count) & 3U;
-  interrupts.on_encoder(channel, quarter == 1 || quarter == 2, quarter == 2 || quarter == 3);
+  const std::int32_t count = shafts_[channel - 1].count;
+  const unsigned quarter = static_cast<unsigned>(count) & 3U;
+  interrupts.on_encoder(channel, quarter == 1 || quarter == 2, quarter == 2 || quarter == 3,
+                        count % counts_a_turn == 0);
 }
 
 void BoardModel::tell_levels(Interrupts& interrupts) {

@@ -5,7 +5,8 @@
 //
 // Connected is the vehicle of the paper's capture (section 4.4), standing on the bench:
 //
-//     OSMC 1-4    a motor each, whose shaft turns encoder 1-4: 4000 counts a second at full duty
+//     OSMC 1-4    a motor each, whose shaft turns encoder 1-4: 4000 counts a second at full duty;
+//                 the index line is high for one of the 1000 counts of a turn, count 0
 //     DHB1A       the steering motor; AINSTEER tells where it stands: 1 V, where forward ends, to 4 V,
 //                 1.5 s from end to end at full duty
 //     battery     AIN24 sags with the current of the OSMC motors (20 mOhm)
@@ -45,7 +46,7 @@ class BoardModel {
   // Where edges interrupt the microcontroller. Channels count from 1.
   class Interrupts {
    public:
-    virtual void on_encoder(int channel, bool a, bool b) = 0;
+    virtual void on_encoder(int channel, bool a, bool b, bool index) = 0;
     virtual void on_echo(int channel, bool high, std::uint32_t at_us) = 0;
 
    protected:
@@ -53,6 +54,7 @@ class BoardModel {
   };
   static constexpr std::uint32_t stepper_pause_ms = 100;
   static constexpr std::int32_t hand_speed = 1000;  // counts a millisecond
+  static constexpr std::int32_t counts_a_turn = 1000;
 
   explicit BoardModel(std::uint64_t seed);
 

@@ -28,7 +28,10 @@ class SimulatedHardware final : private BoardModel::Interrupts {
   static constexpr int boot_ms = 100;
 
  private:
-  void on_encoder(int channel, bool a, bool b) override { hardware_.encoder(channel).sample(a, b); }
+  void on_encoder(int channel, bool a, bool b, bool index) override {
+    hardware_.encoder(channel).sample(a, b);
+    hardware_.encoder(channel).index(index);
+  }
   void on_echo(int channel, bool high, std::uint32_t at_us) override {
     hardware_.ultrasonic().echo(channel - 1, high, at_us);
   }

@@ -227,6 +227,7 @@ TEST(BoardHardware, InputsComeFromPinsAndInterrupts) {
   bench.board.analog[0].counts = 31733;
   bench.hardware.encoder(2).sample(false, false);
   bench.hardware.encoder(2).sample(true, false);
+  bench.hardware.encoder(2).index(true);
   while (!bench.board.trigger[2].high) bench.run(1);
   bench.run(1);
   const std::uint32_t at = bench.now();
@@ -241,6 +242,7 @@ TEST(BoardHardware, InputsComeFromPinsAndInterrupts) {
   bench.hardware.sample(inputs);
   EXPECT_EQ(inputs.analog_cv[0], 2421);
   EXPECT_EQ(inputs.encoder_counts[1], 1);
+  EXPECT_EQ(inputs.encoder_index_counts[1], 1);
   EXPECT_EQ(inputs.ultrasonic_cm[2], 120);
   EXPECT_EQ(inputs.stepper_steps[3], 5);
   EXPECT_EQ(bench.board.step[3].rises, 5);

@@ -30,7 +30,6 @@ TEST(QuadratureEncoder, CountsFourACycleBothWays) {
   EXPECT_EQ(shaft.encoder.count(), 8);
   shaft.turn(-13);
   EXPECT_EQ(shaft.encoder.count(), -5);
-  EXPECT_EQ(shaft.encoder.illegal(), 0U);
 }
 
 TEST(QuadratureEncoder, TheFirstLevelsCountNothing) {
@@ -38,18 +37,19 @@ TEST(QuadratureEncoder, TheFirstLevelsCountNothing) {
     QuadratureEncoder encoder;
     encoder.sample((levels & 2) != 0, (levels & 1) != 0);
     EXPECT_EQ(encoder.count(), 0);
-    EXPECT_EQ(encoder.illegal(), 0U);
   }
 }
 
-TEST(QuadratureEncoder, AJumpOverBothLinesIsIllegalAndCountsNothing) {
+TEST(QuadratureEncoder, AJumpOverBothLinesCountsNothing) {
   QuadratureEncoder encoder;
   encoder.sample(false, false);
   encoder.sample(true, true);
+  EXPECT_EQ(encoder.count(), 0);
   encoder.sample(false, false);
+  EXPECT_EQ(encoder.count(), 0);
   encoder.sample(false, true);
+  EXPECT_EQ(encoder.count(), -1);
   encoder.sample(true, false);
-  EXPECT_EQ(encoder.illegal(), 3U);
   EXPECT_EQ(encoder.count(), -1);
 }
 
@@ -60,21 +60,35 @@ TEST(QuadratureEncoder, TheSameLevelsAgainCountNothing) {
   EXPECT_EQ(shaft.encoder.count(), 3);
 }
 
-TEST(QuadratureEncoder, TheIndexLatchesAndMaySetToZero) {
+TEST(QuadratureEncoder, TheIndexIsWhereItsLineRoseLast) {
   Shaft shaft;
   shaft.turn(5);
+  EXPECT_EQ(shaft.encoder.index_count(), 0) << "none yet";
   shaft.encoder.index(true);
+  shaft.turn(1);
   shaft.encoder.index(true);
-  EXPECT_EQ(shaft.encoder.index_pulses(), 1U);
   EXPECT_EQ(shaft.encoder.index_count(), 5);
-  EXPECT_EQ(shaft.encoder.count(), 5);
+  EXPECT_EQ(shaft.encoder.count(), 6);
   shaft.encoder.index(false);
-  shaft.encoder.zero_on_index(true);
-  shaft.turn(2);
+  shaft.turn(-8);
+  EXPECT_EQ(shaft.encoder.index_count(), 5);
   shaft.encoder.index(true);
-  EXPECT_EQ(shaft.encoder.index_count(), 7);
+  EXPECT_EQ(shaft.encoder.index_count(), -2);
+}
+
+TEST(QuadratureEncoder, TheIndexStaysWhereItIsWhenCountingBeginsElsewhere) {
+  Shaft shaft;
+  shaft.encoder.zero();
+  EXPECT_EQ(shaft.encoder.index_count(), 0);
+  shaft.turn(100);
+  shaft.encoder.zero();
+  EXPECT_EQ(shaft.encoder.index_count(), 0) << "none yet";
+  shaft.turn(5);
+  shaft.encoder.index(true);
+  shaft.turn(7);
+  shaft.encoder.zero();
   EXPECT_EQ(shaft.encoder.count(), 0);
-  EXPECT_EQ(shaft.encoder.index_pulses(), 2U);
+  EXPECT_EQ(shaft.encoder.index_count(), -7);
 }
 
 TEST(QuadratureEncoder, FrequencyIsThatOfTheWindowAndZeroDoesNotDisturbIt) {
@@ -100,7 +114,6 @@ RC_GTEST_PROP(QuadratureEncoder, CountsWhatTheShaftTurns, (const std::vector<std
     sum += counts;
   }
   RC_ASSERT(shaft.encoder.count() == sum);
-  RC_ASSERT(shaft.encoder.illegal() == 0U);
 }
 
 }  // namespace
