@@ -473,44 +473,114 @@ TEST(GigaPins, VoltagesAreConvertedWithoutTheCore) {
   }
 }
 
-TEST(GigaPins, CarryStepsEncodersEchoesAndVoltages) {
-  GigaBench bench;
-  bench.giga.analog[0x24] = 0xFFFF;
-  bench.giga.set_pin('J', 0, false);
-  bench.giga.set_pin('J', 1, false);
-  bench.boot();
-  PlainHost host;
-  bench.run_ms(150, host, bench.usb());
-  bench.usb()(host.command("F:STEP1POS,ENC1,US1,AIN24"));
-  bench.usb()(host.command("P:20,1000,1"));
-  bench.run_ms(10);
-  bool levels[2] = {};
-  for (int i = 0; i < 8; ++i) {  // two cycles forward: A leads
-    levels[i % 2] = !levels[i % 2];
-    bench.giga.set_pin('J', i % 2, levels[i % 2]);
-  }
-  bench.run_ms(100, host, bench.usb());
-  const std::vector<std::string> lines = bench.usb_lines();
-  EXPECT_TRUE(has_line(lines, "STEP1POS:20;"));
-  EXPECT_TRUE(has_line(lines, "ENC1:8;"));
-  EXPECT_TRUE(has_line(lines, "AIN24:50.00;"));
-  EXPECT_FALSE(bench.giga.pin('A', 3)) << "the last step's pulse has ended";
-  EXPECT_TRUE(bench.giga.pin('K', 5)) << "forward";
+// --- the wiring, channel by channel, as the table in docs/firmware.md has it
 
+// What is connected to one channel of each kind.
+struct Wires {
+  giga::Pin step, direction, a, b, index, trigger, echo;
+};
+constexpr Wires wires[] = {
+    {{'A', 3}, {'K', 5}, {'J', 0}, {'J', 1}, {'J', 14}, {'I', 14}, {'I', 10}},
+    {{'A', 2}, {'K', 6}, {'J', 2}, {'J', 3}, {'J', 15}, {'H', 15}, {'I', 11}},
+    {{'J', 8}, {'E', 6}, {'J', 4}, {'J', 5}, {'K', 3}, {'G', 12}, {'J', 12}},
+    {{'A', 7}, {'K', 7}, {'J', 6}, {'J', 7}, {'K', 4}, {'I', 13}, {'G', 13}},
+};
+
+class GigaWiring : public testing::TestWithParam<int> {
+ protected:
+  GigaWiring() {
+    for (const Wires& each : wires) {
+      for (const giga::Pin pin : {each.a, each.b, each.index, each.echo}) set(pin, false);
+    }
+    bench.boot();
+    bench.run_ms(150, host, bench.usb());
+  }
+  int channel() const { return GetParam(); }
+  const Wires& mine() const { return wires[channel() - 1]; }
+  void set(giga::Pin pin, bool high) { bench.giga.set_pin(pin.port, pin.number, high); }
+  bool pin(giga::Pin pin) { return bench.giga.pin(pin.port, pin.number); }
+  void command(const std::string& field) { bench.usb()(host.command(field)); }
+  void run_ms(std::uint64_t ms) { bench.run_ms(ms, host, bench.usb()); }
+  // The newest state has these values in the fields of this channel, and 0 in those of the others.
+  void expect_state(const char* name, const char* suffix, int value) {
+    const std::vector<std::string> lines = bench.usb_lines();
+    const auto state = std::find_if(lines.rbegin(), lines.rend(), [&](const std::string& line) {
+      return line.find(std::string(name) + "1" + suffix + ":") != std::string::npos;
+    });
+    ASSERT_NE(state, lines.rend());
+    for (int i = 1; i <= 4; ++i) {
+      const std::string field = name + std::to_string(i) + suffix + ":" +
+                                std::to_string(i == channel() ? value : 0) + ";";
+      EXPECT_NE(state->find(field), std::string::npos) << field << " is not in " << *state;
+    }
+  }
+
+  GigaBench bench;
+  PlainHost host;
+};
+
+TEST_P(GigaWiring, AStepperStepsAtItsOwnPins) {
+  command("F:STEP1POS,STEP2POS,STEP3POS,STEP4POS");
+  command("P:20,1000," + std::to_string(channel()));
+  run_ms(50);
+  expect_state("STEP", "POS", 20);
+  EXPECT_TRUE(pin(mine().direction)) << "forward";
+  command("P:-5,1000," + std::to_string(channel()));
+  run_ms(50);
+  expect_state("STEP", "POS", -5);
+  for (const Wires& each : wires) {
+    EXPECT_EQ(bench.giga.rises(each.step.port, each.step.number), &each == &mine() ? 45 : 0);
+    EXPECT_EQ(bench.giga.rises(each.direction.port, each.direction.number),
+              &each == &mine() ? 1 : 0);
+    EXPECT_FALSE(pin(each.step)) << "the last step's pulse has ended";
+    EXPECT_FALSE(pin(each.direction)) << "backward, or as after power-up";
+  }
+}
+
+TEST_P(GigaWiring, AnEncoderCountsItsOwnLines) {
+  command("F:ENC1,ENC2,ENC3,ENC4,ENC1IDX,ENC2IDX,ENC3IDX,ENC4IDX");
+  bool levels[2] = {};
+  const auto turn = [&](int edges) {  // forward: A leads
+    for (int i = 0; i < edges; ++i) {
+      levels[i % 2] = !levels[i % 2];
+      set(i % 2 == 0 ? mine().a : mine().b, levels[i % 2]);
+    }
+  };
+  turn(8);
+  set(mine().index, true);
+  run_ms(2);
+  set(mine().index, false);
+  turn(4);
+  run_ms(50);
+  const std::vector<std::string> lines = bench.usb_lines();
+  ASSERT_FALSE(lines.empty());
+  for (int i = 1; i <= 4; ++i) {
+    const bool its_own = i == channel();
+    const std::string n = std::to_string(i);
+    EXPECT_TRUE(has_line({lines.back()}, "ENC" + n + (its_own ? ":12;" : ":0;"))) << lines.back();
+    EXPECT_TRUE(has_line({lines.back()}, "ENC" + n + (its_own ? "IDX:8;" : "IDX:0;")))
+        << lines.back();
+  }
+}
+
+TEST_P(GigaWiring, AnEchoIsOfTheSensorThatWasTriggered) {
+  command("F:US1,US2,US3,US4");
   bool answered = false;
   for (int i = 0; i < 600 && !answered; ++i) {
     bench.turn();
-    if (!bench.giga.pin('I', 14)) continue;  // the trigger of sensor 1
-    while (bench.giga.pin('I', 14)) bench.turn();
-    bench.giga.set_pin('I', 10, true);
+    if (!pin(mine().trigger)) continue;
+    while (pin(mine().trigger)) bench.turn();
+    set(mine().echo, true);
     bench.giga.pass_us(100 * 58);
-    bench.giga.set_pin('I', 10, false);
+    set(mine().echo, false);
     answered = true;
   }
   ASSERT_TRUE(answered);
-  bench.run_ms(50, host, bench.usb());
-  EXPECT_TRUE(has_line(bench.usb_lines(), "US1:100;"));
+  run_ms(50);
+  expect_state("US", "", 100);
 }
+
+INSTANTIATE_TEST_SUITE_P(Channels, GigaWiring, testing::Range(1, 5));
 
 TEST(GigaLight, TellsTheState) {
   GigaBench bench;

@@ -84,6 +84,10 @@ void Giga::connect_registers() {
     port.BSRR.on_write = [this, i, &port](std::uint32_t value) {
       const std::uint32_t before = port.ODR.value;
       port.ODR.value = (before & ~(value >> 16)) | (value & 0xFFFF);
+      const std::uint32_t risen = port.ODR.value & ~before;
+      for (std::size_t line = 0; line < 16; ++line) {
+        rises_[static_cast<std::size_t>(i)][line] += static_cast<int>(risen >> line & 1U);
+      }
       const bool scl = i == 'H' - 'A' && (port.MODER.value >> 8 & 3U) == 1;  // PH4 as an output
       if (scl && (before & 1U << 4) == 0 && (port.ODR.value & 1U << 4) != 0) i2c.scl_rose();
     };
@@ -194,6 +198,10 @@ void Giga::set_pin(char port, int number, bool level) {
 
 bool Giga::pin(char port, int number) {
   return (r4_fake_gpio[port - 'A'].ODR.value >> number & 1U) != 0;
+}
+
+int Giga::rises(char port, int number) const {
+  return rises_[static_cast<std::size_t>(port - 'A')][static_cast<std::size_t>(number)];
 }
 
 // Runs what is due, unless interrupts are off or one is running.

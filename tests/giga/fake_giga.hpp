@@ -131,6 +131,7 @@ class Giga {
   CanPeripheral can;
   void set_pin(char port, int number, bool level);  // an input, from outside
   bool pin(char port, int number);                  // an output
+  int rises(char port, int number) const;           // how often it rose so far
   std::map<int, unsigned short> analog;             // PinName to counts
   bool converter_hangs = false;                     // the registers of ADC1 do nothing
   int core_conversions = 0;                         // those by the core, which keeps interrupts off
@@ -188,6 +189,7 @@ class Giga {
   void connect_converter();
   std::uint64_t now_ns_ = 0;
   std::array<std::uint32_t, 11> outside_{}, driven_{};
+  std::array<std::array<int, 16>, 11> rises_{};
 };
 
 Giga& giga();
