@@ -140,22 +140,41 @@ void expect_steppers(const ControlledBoard& board) {
   }
 }
 
+// A motor runs, and the relay of the dead-man's handle is closed.
+void drive(const ControlledBoard& board) {
+  board.command("O:500,1,1");
+  board.command("R:1,On");
+  EXPECT_EQ(pins_of(board).osmc[0].pwm, 500);
+  EXPECT_EQ(pins_of(board).relays, 1);
+  EXPECT_EQ(board.next_state().relays, 1);
+}
+
+// What was on is off, and stays off until it is commanded again.
+void expect_that_nothing_came_back(const ControlledBoard& board) {
+  const State state = board.next_state();
+  EXPECT_EQ(state.relays, 0);
+  EXPECT_EQ(state.osmc[0].pwm, 0);
+  EXPECT_TRUE(pins_of(board).is_safe());
+}
+
 void expect_interlocks(const ControlledBoard& board) {
   for (int channel = 1; channel <= ultrasonic_channels; ++channel) {
-    board.command("O:500,1,1");
-    EXPECT_FALSE(pins_of(board).is_safe());
+    drive(board);
     board.command(fmt::format("U:{},{}", 50 * channel + 1, channel));
     await(board, [](const State& s) { return s.safe == SafeReason::proximity; });
     EXPECT_TRUE(pins_of(board).is_safe()) << channel;
     board.command(fmt::format("U:0,{}", channel));
     await(board, [](const State& s) { return s.safe == SafeReason::none; });
+    expect_that_nothing_came_back(board);
   }
-  board.command("O:500,1,1");
+  drive(board);
   board.at_board([](sim::SimulatedBoard& at) { at.model().hold_handle(false); });
   await(board, [](const State& s) { return s.safe == SafeReason::handle && !s.handle_held; });
   EXPECT_TRUE(pins_of(board).is_safe());
   board.at_board([](sim::SimulatedBoard& at) { at.model().hold_handle(true); });
   await(board, [](const State& s) { return s.safe == SafeReason::none && s.handle_held; });
+  expect_that_nothing_came_back(board);
+  drive(board);
 }
 
 }  // namespace
