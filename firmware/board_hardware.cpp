@@ -291,6 +291,13 @@ void BoardHardware::fit(std::uint8_t chips) {
   }
 }
 
+void BoardHardware::calibrate(const std::uint16_t (&full_scale_cv)[analog_channels]) {
+  constexpr std::uint16_t full_scale = 0xFFFF;
+  for (int i = 0; i < analog_channels; ++i) {
+    config_.calibration[i].set(0, 0, full_scale, full_scale_cv[i]);
+  }
+}
+
 bool BoardHardware::ready() const {
   for (int i = 0; i < chip_count; ++i) {
     if (fitted(i) && !chips_[i]->ready()) return false;

@@ -79,10 +79,8 @@ class BoardHardware final : public Hal {
   // Only these chips are there (bit: Chip): the others are left alone from now on, and what was
   // found wrong before is found again if it still is. Before anything is applied.
   void fit(std::uint8_t chips);
-  // From now on. `input` as in BoardPins::analog.
-  void calibrate(int input, const AnalogCalibration& calibration) {
-    config_.calibration[input] = calibration;
-  }
+  // From now on: hundredths of a volt at full scale, each analog input as in BoardPins::analog.
+  void calibrate(const std::uint16_t (&full_scale_cv)[analog_channels]);
 
   // Every chip is set up and answers.
   bool ready() const;

@@ -235,6 +235,28 @@ TEST(GigaSettings, SurviveARestart) {
   EXPECT_TRUE(has_line(bench.usb_lines(), "AIN24:16.50;"));
 }
 
+TEST(GigaSettings, CalibrateTheirAnalogInputAtOnceAndNoOther) {
+  const std::vector<std::string> names = {"AIN24", "AIN12", "AIN5", "AINDMH", "AINSTEER", "AIN6"};
+  for (const std::string& calibrated : names) {
+    GigaBench bench;
+    for (const int pin : {0x24, 0x25, 0x10, 0x11, 0x23, 0x22}) bench.giga.analog[pin] = 0x8000;
+    bench.boot();
+    PlainHost host;
+    bench.run_ms(150, host, bench.usb());
+    bench.usb()(host.command("F:AIN24,AIN12,AIN5,AINDMH,AINSTEER,AIN6"));
+    bench.run_ms(20);
+    bench.usb_lines();
+    bench.usb()(host.command("C:" + calibrated + ",33.00"));
+    bench.run_ms(20);
+    const std::vector<std::string> lines = bench.usb_lines();
+    ASSERT_FALSE(lines.empty());
+    for (const std::string& name : names) {
+      EXPECT_TRUE(has_line({lines.back()}, name + (name == calibrated ? ":16.50;" : ":25.00;")))
+          << calibrated << " in " << lines.back();
+    }
+  }
+}
+
 TEST(GigaSettings, AreNotKeptWhereAUsersFilesMayBe) {
   GigaBench bench;
   bench.giga.partition_size = 8 * 1024 * 1024;

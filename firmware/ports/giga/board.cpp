@@ -180,12 +180,7 @@ void Board::tell_report() {
 }
 
 void Board::use(const Settings& settings) {
-  for (int i = 0; i < analog_channels; ++i) {
-    firmware::AnalogCalibration calibration;
-    if (calibration.set(0, 0, 0xFFFF, settings.site.full_scale_cv[i])) {
-      machine_.hardware().calibrate(i, calibration);
-    }
-  }
+  machine_.hardware().calibrate(settings.site.full_scale_cv);
   network_.use(settings.site);
 }
 

@@ -45,6 +45,7 @@ class Board {
     for (; passed_ms_ != clock_.now_ms(); ++passed_ms_) hardware_.pass_millisecond();
     link_.receive([this](Text datagram) {
       application_.receive(link_number_, firmware::everyone, datagram, clock_.now_ms());
+      hal().calibrate(application_.settings().site.full_scale_cv);  // it may have been C:AIN24,…
     });
     udp_.receive([this](std::uint32_t peer, Text datagram) {
       application_.receive(udp_number_, peer, datagram, clock_.now_ms());

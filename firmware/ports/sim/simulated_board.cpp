@@ -83,6 +83,8 @@ void SimulatedBoard::reset_microcontroller() {
   told_fault_ = false;
   hardware_.emplace(model_);
   hardware_->power_up();
+  hardware_->hal().fit(options_.settings.site.chips);
+  hardware_->hal().calibrate(options_.settings.site.full_scale_cv);
 
   firmware::Application::Config config;
   config.identity.firmware = Text(options_.firmware_version);
@@ -270,6 +272,9 @@ void SimulatedBoard::on_state(std::uint32_t t_ms, firmware::BoardState state, Sa
 void SimulatedBoard::on_outputs(std::uint32_t, const firmware::Outputs&) { tell_pins(); }
 
 void SimulatedBoard::on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command) {
+  if (command.kind == CommandKind::setting) {
+    hardware_->hal().calibrate(application_->settings().site.full_scale_cv);
+  }
   if (options_.events.on_executed) options_.events.on_executed(t_ms, pnum, command);
 }
 

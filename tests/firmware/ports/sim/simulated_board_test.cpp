@@ -32,7 +32,8 @@ struct Listener final : Carrier::Handler {
 // A board, an echo host at the other end of a memory pair, and the time.
 class SimulatedBoardTest : public testing::Test {
  protected:
-  void build(SimulatedBoard::Options options = {}) {
+  // `link`: what the board's end is called. One that is called pty: is a cable of its own.
+  void build(SimulatedBoard::Options options = {}, const std::string& link = "memory:") {
     options.seed = options.seed.value_or(5);
     options.clock_ms = [this] { return clock_ms_; };
     options.events.on_state = [this](std::uint32_t t_ms, BoardState state, SafeReason reason) {
@@ -57,7 +58,7 @@ class SimulatedBoardTest : public testing::Test {
       events_.push_back(event.kind == CarrierEvent::Kind::up ? "up" : "down");
     };
     board_ = std::make_unique<SimulatedBoard>(io_, std::move(options));
-    auto [host_end, board_end] = make_memory_pair(io_);
+    auto [host_end, board_end] = make_memory_pair(io_, link);
     host_ = std::move(host_end);
     board_->add_carrier(std::move(board_end));
     host_->open(listener_);
@@ -147,6 +148,50 @@ class SimulatedBoardTest : public testing::Test {
 
 using Lines = std::vector<std::string>;
 
+// --- every output register
+
+// Drives nothing: full off.
+bool off(const Pca9685Model& chip, int channel) {
+  const auto off_high = static_cast<std::uint8_t>(0x06 + 4 * channel + 3);
+  return (chip.reg(off_high) & 0x10) != 0;
+}
+
+bool driven(const Pca9685Model& chip, int channel) {
+  return !off(chip, channel) && chip.duty(channel) != 0;
+}
+
+// What is not in its safe value yet, or nothing.
+std::string unsafe_register(BoardChips& chips) {
+  for (const Pca9685Model* chip : {&chips.osmc, &chips.dhb12, &chips.servo}) {
+    for (int i = 0; i < Pca9685Model::channels; ++i) {
+      if (!off(*chip, i)) return "LED" + std::to_string(i);
+    }
+  }
+  using Register = Mcp23017Model::Register;
+  if (chips.expander.reg(0, Register::olat) != firmware::brakes_on) return "OLATA";
+  if (chips.expander.reg(1, Register::olat) != 0) return "OLATB";
+  for (int port = 0; port < Mcp23017Model::ports; ++port) {
+    if (chips.expander.reg(port, Register::iodir) != 0) return "IODIR";
+  }
+  for (int i = 0; i < Mcp4728Model::channels; ++i) {
+    if (chips.dac.input(i).code != 0 || chips.dac.output(i).code != 0) return "DAC";
+  }
+  return "";
+}
+
+void expect_all_driven(BoardChips& chips) {
+  constexpr int lines = 2 * osmc_channels;  // duty and direction
+  for (int i = 0; i < lines; ++i) {
+    EXPECT_TRUE(driven(chips.osmc, i)) << i;
+    EXPECT_TRUE(driven(chips.dhb12, i)) << i;
+  }
+  for (int i = 0; i < Pca9685Model::channels; ++i) EXPECT_TRUE(driven(chips.servo, i)) << i;
+  using Register = Mcp23017Model::Register;
+  EXPECT_EQ(chips.expander.reg(0, Register::olat), 0b01010101) << "forward, no brake";
+  EXPECT_EQ(chips.expander.reg(1, Register::olat), 0xFF);
+  for (int i = 0; i < Mcp4728Model::channels; ++i) EXPECT_NE(chips.dac.output(i).code, 0) << i;
+}
+
 TEST_F(SimulatedBoardTest, WaitsForAHostAndThenStreamsTheInputsOfTheBench) {
   build();
   run(1000);
@@ -183,6 +228,79 @@ TEST_F(SimulatedBoardTest, ObeysItsHostAndGoesSafeWhenItFallsSilent) {
   EXPECT_EQ(events_, (Lines{"outputs 0", "SAFE link"}));
   EXPECT_EQ(event_ms_ - fed, 1000U);
   EXPECT_TRUE(board_->model().pins().is_safe());
+}
+
+TEST_F(SimulatedBoardTest, EveryOutputRegisterIsSafeInTimeWhenTheHostFallsSilent) {
+  for (const std::uint32_t timeout_ms : {1000U, 100U}) {
+    build();
+    connect();
+    command("C:heartbeat,50");
+    command("C:timeout," + std::to_string(timeout_ms));
+    for (int i = 1; i <= 4; ++i) {
+      const std::string channel = std::to_string(i);
+      for (const std::string drive : {"O:4095,1,", "D:1,1,", "B:4095,1,0,", "P:-1000000,20000,"}) {
+        command(drive + channel);
+      }
+    }
+    for (int i = 1; i <= servo_channels; ++i) command("S:2500," + std::to_string(i));
+    for (int i = 1; i <= relay_channels; ++i) command("R:" + std::to_string(i) + ",On");
+    run(10);
+    expect_all_driven(board_->model().chips());
+    for (const Pins::Stepper& stepper : board_->model().pins().stepper) {
+      EXPECT_EQ(stepper.stepping, -1);
+    }
+
+    heartbeat(newest_t());
+    std::uint32_t silence_ms = 0;
+    while (!unsafe_register(board_->model().chips()).empty() && silence_ms < 2 * timeout_ms) {
+      run(1);
+      ++silence_ms;
+    }
+    const Pins safe = board_->model().pins();
+    EXPECT_GE(silence_ms, timeout_ms);
+    EXPECT_LE(silence_ms, timeout_ms + 20) << unsafe_register(board_->model().chips());
+    for (int ms = 0; ms < 500; ++ms) {
+      run(1);
+      EXPECT_EQ(unsafe_register(board_->model().chips()), "") << ms << " ms later";
+    }
+    const Pins later = board_->model().pins();
+    for (int i = 0; i < stepper_channels; ++i) {
+      EXPECT_EQ(later.stepper[i].position, safe.stepper[i].position) << "stepper " << i + 1;
+    }
+  }
+}
+
+TEST_F(SimulatedBoardTest, AnAnalogInputIsCalibratedAtOnceAndNoOther) {
+  SimulatedBoard::Options options;
+  options.settings.site.full_scale_cv[static_cast<int>(Analog::ain12)] = 4000;
+  build(std::move(options), "pty:cable");
+  for (int i = 0; i < analog_channels; ++i) {
+    board_->model().pin_analog(static_cast<Analog>(i), 2000);
+  }
+  connect();
+  command("F:ALL");
+  run(20);
+  EXPECT_EQ(states().back().analog_cv[0], 2000);
+  EXPECT_EQ(states().back().analog_cv[1], 1600) << "as set from the start";
+  command("C:AIN24,55.00");
+  run(20);
+  EXPECT_EQ(states().back().analog_cv[0], 2200);
+  EXPECT_EQ(states().back().analog_cv[1], 1600);
+  for (int i = 2; i < analog_channels; ++i) EXPECT_EQ(states().back().analog_cv[i], 2000) << i;
+}
+
+TEST_F(SimulatedBoardTest, AChipThatIsNotFittedIsNotMissed) {
+  SimulatedBoard::Options options;
+  options.settings.site.chips = 17;  // OSMC and servos
+  options.script = Script::parse("0 chip dhb off\n0 chip expander off\n0 chip dac off\n", "test");
+  build(std::move(options));
+  connect();
+  command("O:358,1,1");
+  command("S:1500,2");
+  run_alive(1000);
+  EXPECT_EQ(board_->application().reason(), SafeReason::none);
+  EXPECT_EQ(board_->model().pins().osmc[0].pwm, 358);
+  EXPECT_NEAR(board_->model().pins().servo_us[1], 1500, 3);
 }
 
 TEST_F(SimulatedBoardTest, TellsOfWhatItRefuses) {
