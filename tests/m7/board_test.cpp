@@ -1,46 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The whole board on the processor: drivers on chips behind a bus in real time, interrupts in the
-// middle of its transfers, and what they must bring about.
-//
-// Timer 1 interrupts every 50 us: five bytes of a line at 1 Mbit/s, and each millisecond the board's
-// own interrupt.
-#include "firmware/ports/mps2/board.hpp"
-
-#include <new>
-
-#include "on_target.hpp"
-#include "protocol/command.hpp"
-#include "protocol/datagram_writer.hpp"
+// The whole board on the processor: interrupts in the middle of its transfers, and what they must
+// bring about.
+#include "board_bench.hpp"
 
 namespace {
 
 using namespace r4;
 using namespace r4::mps2;
-
-constexpr std::uint32_t step_us = 50;
-constexpr std::uint32_t bytes_a_step = 5;
-constexpr std::uint32_t timeout_ms = 200;
-
-void (*on_step)() = nullptr;
-
-// Interrupts come while one lives.
-class Steps {
- public:
-  explicit Steps(void (*handler)(), std::uint32_t first_us = step_us) {
-    on_step = handler;
-    BoardClock::wake_every(step_us, first_us);
-    give_way(Irq::timer1);
-    disable(Irq::timer1);  // and forget what has come before
-    enable(Irq::timer1);
-  }
-  ~Steps() { disable(Irq::timer1); }
-  Steps(const Steps&) = delete;
-  Steps& operator=(const Steps&) = delete;
-};
-
-std::uint32_t us_since(std::uint32_t ticks) {
-  return (BoardClock::ticks() - ticks) / BoardClock::ticks_per_us;
-}
 
 void wait_us(std::uint32_t us) {
   const std::uint32_t began = BoardClock::ticks();
@@ -48,136 +14,7 @@ void wait_us(std::uint32_t us) {
   }
 }
 
-// A board with a host that is lines of text.
-class Bench final : public sim::I2cObserver {
- public:
-  Bench() : board_(1, link_, udp_, config()) {
-    board_.model().chips().bus.set_observer(this);
-    link_.start();
-    board_.power_up();
-    board_.start(SafeReason::none);
-  }
-
-  void on_transfer(const sim::I2cTransfer& transfer) override {
-    cut_ += transfer.result == firmware::I2cResult::timeout ? 1 : 0;
-    const InterruptsHeld held;
-    const bool safe = chips_are_safe();
-    if (safe && !safe_) safe_ticks_ = BoardClock::ticks();
-    safe_ = safe;
-  }
-
-  // Each step_us.
-  void step() {
-    for (std::uint32_t i = 0; i < bytes_a_step && line_sent_ < line_size_; ++i) {
-      link_.on_byte(line_[line_sent_]);
-      line_sent_ = line_sent_ + 1;
-      line_end_ticks_ = BoardClock::ticks();
-    }
-    const bool stop = link_.take_stop();
-    if (stop) board_.on_stop();
-    if ((++steps_ % (1000 / step_us) == 0 || stop) && board_.on_wake()) feedings_ = feedings_ + 1;
-  }
-
-  // A line begins to come.
-  void send(DatagramWriter& writer) {
-    const Text datagram = writer.finish(pnum_, 100000 + pnum_);
-    ++pnum_;
-    line_size_ = line_sent_ = 0;
-    std::size_t size = 0;
-    for (const char c : datagram) line_[size++] = c;
-    line_[size++] = '\n';
-    line_size_ = size;
-  }
-  void heartbeat() {
-    char buffer[max_datagram];
-    DatagramWriter writer(buffer, sizeof buffer);
-    writer.field("H").value(host_heartbeat_word);
-    send(writer);
-  }
-  void command(const Command& command) {
-    char buffer[max_datagram];
-    DatagramWriter writer(buffer, sizeof buffer);
-    write_command(writer, command);
-    send(writer);
-  }
-  // Turns of the loop until the line has come and its effect, too.
-  void run_ms(std::uint32_t ms) {
-    const std::uint32_t began = now_ms();
-    while (now_ms() - began < ms || line_sent_ < line_size_) {
-      board_.turn();
-      board_.rest();
-    }
-  }
-  void execute(const Command& what) {
-    command(what);
-    run_ms(2);
-  }
-  // A session, and every output on.
-  void drive_everything() {
-    heartbeat();
-    run_ms(2);
-    for (int i = 1; i <= 4; ++i) {
-      execute(Command::osmc(1000 + i, Direction::forward, i));
-      execute(Command::dhb12(2000 + i, Direction::forward, i));
-      execute(Command::bldc(3000 + i, Direction::forward, false, i));
-      execute(Command::stepper(1000000, 1000 * i, i));
-    }
-    for (int i = 1; i <= servo_channels; ++i) execute(Command::servo(600 + 100 * i, i));
-    heartbeat();
-    for (int i = 1; i <= relay_channels; ++i) execute(Command::relay(i, true));
-    run_ms(5);
-  }
-
-  sim::ChipPins pins() const { return board_.model().chips().pins(); }
-  bool chips_are_safe() const { return pins().is_safe(); }
-  bool safe() const { return safe_; }
-  std::uint32_t now_ms() { return board_.clock().now_ms(); }
-  std::uint32_t safe_ticks() const { return safe_ticks_; }
-  std::uint32_t line_end_ticks() const { return line_end_ticks_; }
-  bool line_has_come() const { return line_sent_ == line_size_; }
-  std::uint32_t cut() const { return cut_; }
-  std::uint32_t feedings() const { return feedings_; }
-  Board& board() { return board_; }
-
- private:
-  static firmware::Application::Config config() {
-    firmware::Application::Config config;
-    config.settings.timeout_ms = timeout_ms;
-    config.settings.heartbeat_ms = 100;
-    return config;
-  }
-
-  Uart link_{uart0_base};
-  UdpPort udp_{0, 0};
-  mutable Board board_;
-  char line_[128];
-  volatile std::size_t line_size_ = 0;
-  volatile std::size_t line_sent_ = 0;
-  volatile std::uint32_t line_end_ticks_ = 0;
-  std::uint32_t pnum_ = 1;
-  std::uint32_t steps_ = 0;
-  volatile std::uint32_t feedings_ = 0;
-  volatile std::uint32_t cut_ = 0;
-  volatile bool safe_ = true;
-  volatile std::uint32_t safe_ticks_ = 0;
-};
-Bench* bench = nullptr;
-
-// A board that is just on; there is room for one.
-Bench& new_board() {
-  alignas(Bench) static unsigned char room[sizeof(Bench)];
-  bench = new (room) Bench;
-  return *bench;
-}
-
-void step_of_board() { bench->step(); }
-
 }  // namespace
-
-extern "C" void r4_wake() {
-  BoardClock::on_wake_interrupt();
-  on_step();
-}
 
 TEST(Board, EveryCommandReachesItsPins) {
   Bench& host = new_board();
@@ -196,6 +33,10 @@ TEST(Board, EveryCommandReachesItsPins) {
   }
   EXPECT(pins.relays == 0xFF);
   EXPECT(host.feedings() > 30);
+  for (int i = 1; i <= relay_channels; ++i) {
+    host.execute(Command::relay(i, false));
+    EXPECT(host.pins().relays == static_cast<std::uint8_t>(0xFF << i));
+  }
 }
 
 TEST(Board, TheSafeStateInAnInterruptHoldsWhateverTransferItCutsShort) {
