@@ -441,6 +441,7 @@ TEST(GigaReport, IsThePapersFigure3) {
       "MCP23017 0x20 (relays, BLDC direction and brake): ok",
       "MCP4728 0x61 (BLDC speed): ok",
       "PCA9685 0x42 (servos): ok",
+      "Deadlines missed: 0",
       "Last boot ended by: power or reset",
   };
   EXPECT_EQ(lines, expected);

@@ -49,6 +49,48 @@ TEST(GigaWatchdog, ALoopThatHangsIsSafeSoonAndResetsTheBoardWhichStaysSafe) {
   EXPECT_EQ(bench.pins().osmc[0].pwm, 358);
 }
 
+TEST(GigaWatchdog, AStepTimerThatIsDeadStopsTheBoardAndResetsItWhichStaysSafe) {
+  GigaBench bench;
+  bench.boot();
+  PlainHost host;
+  bench.drive(host, bench.usb());
+  std::uint64_t safe_after_ms = 0;
+  const std::uint64_t died_ms = bench.giga.now_ms();
+  EXPECT_TRUE(bench.giga.reset_by([&] {
+    bench.giga.step_timer.period_ns = 0;
+    for (int turns = 0; turns < 5000; ++turns) {
+      bench.turn();
+      if (safe_after_ms == 0 && bench.pins().is_safe()) {
+        safe_after_ms = bench.giga.now_ms() - died_ms;
+      }
+    }
+  }));
+  EXPECT_GT(safe_after_ms, 0U);
+  EXPECT_LE(safe_after_ms, 125U) << "five deadlines of 20 ms";
+  EXPECT_LE(bench.giga.now_ms() - died_ms, 450U);
+  bench.restart();
+  PlainHost again;
+  bench.run_ms(150, again, bench.usb());
+  EXPECT_EQ(bench.reason(), SafeReason::watchdog);
+  bench.run_ms(1100, again, bench.usb());
+  bench.usb()(again.command("E:CLEAR"));
+  bench.usb()(again.command("P:20,1000,1"));
+  bench.run_ms(100, again, bench.usb());
+  EXPECT_EQ(bench.giga.rises('A', 3), 20) << "the timer runs again";
+}
+
+TEST(GigaWatchdog, ADeadlineThatTheLoopMissesIsCountedInTheReport) {
+  GigaBench bench;
+  bench.boot();
+  bench.run_ms(20);
+  bench.giga.pass_ms(50);  // without a turn
+  bench.run_ms(20);
+  bench.usb()("report");
+  bench.run_ms(400);
+  EXPECT_TRUE(has_line(bench.usb_lines(), "Deadlines missed: 2"));
+  EXPECT_EQ(bench.reason(), SafeReason::none) << "so few are forgiven";
+}
+
 TEST(GigaWatchdog, AnEmergencyFrameIsObeyedWhileTheLoopHangs) {
   GigaBench bench;
   bench.boot();

@@ -104,6 +104,7 @@ BootReport::Sources Board::report_sources(const FaultNote& last_boot) {
   sources.can = &fdcan_;
   sources.store = &store_;
   sources.authentication = &application_.authentication();
+  sources.guard = &application_.guard();
   sources.last_boot = last_boot;
   sources.timer_hz = timer_input_hz();
   return sources;
@@ -118,8 +119,8 @@ void Board::start() {
   const std::uint32_t now_ms = BoardClock::now_ms();
   application_.start(now_ms);
   if (last_boot_ != SafeReason::none) application_.fail(last_boot_, now_ms);
+  machine_.start(application_.guard());
   start_guard_timer(application_.guard());
-  machine_.start();
   network_.start();
   if (!has_can) return;
   interrupting = &fdcan_;

@@ -191,6 +191,8 @@ Text BootReport::next(char (&out)[max_line]) {
       if (chip_ + 1 < firmware::chip_count) --step_;
       return chip(out);
     case 22:
+      return line.text("Deadlines missed: ").number(sources_.guard->missed()).done();
+    case 23:
       return keys(out);
     default:
       step_ = 0;

@@ -11,6 +11,7 @@
 #include "../../../protocol/authentication.hpp"
 #include "../../../protocol/settings.hpp"
 #include "../../board_hardware.hpp"
+#include "../../guard.hpp"
 #include "fault.hpp"
 #include "fdcan.hpp"
 #include "network.hpp"
@@ -30,6 +31,7 @@ class BootReport {
     const Fdcan* can;
     const SettingsStore* store;
     const Authentication* authentication;
+    const firmware::Guard* guard;
     FaultNote last_boot;
     std::uint32_t timer_hz;
   };

@@ -90,7 +90,9 @@ firmware::BoardPins Machine::pins() {
   return pins;
 }
 
-void Machine::start() {
+void Machine::start(firmware::Guard& guard) {
+  guard_ = &guard;
+  step_duty_ = guard.add_duty(step_limit_ms);
   for (int i = 0; i < encoder_channels; ++i) {
     Encoder& encoder = *encoders_[i];
     encoder.counter = &hardware_.encoder(i + 1);
@@ -116,6 +118,7 @@ void Machine::poll() {
 }
 
 void Machine::step_tick() {
+  guard_->check_in(step_duty_);
   hardware_.step_tick();
   for (int i = 0; i < encoder_channels; ++i) {
     hardware_.encoder(i + 1).index(encoders_[i]->index.read());

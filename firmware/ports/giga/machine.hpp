@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "../../board_hardware.hpp"
+#include "../../guard.hpp"
 #include "analog_inputs.hpp"
 #include "i2c_controller.hpp"
 #include "pins.hpp"
@@ -18,8 +19,8 @@ class Machine final : public StepTick {
  public:
   // Sets up bus and pins; every output of the board is off when it returns.
   Machine();
-  // The interrupts: edges of encoders and echoes, the step timer.
-  void start();
+  // The interrupts: edges of encoders and echoes, the step timer, which is a duty of the guard's.
+  void start(firmware::Guard& guard);
   // A turn of the loop: at most bus_bytes_per_poll bytes on the bus, one conversion.
   void poll();
 
@@ -48,6 +49,10 @@ class Machine final : public StepTick {
     int sensor = 0;
     void on_edge();
   };
+  // The guard counts the 40 kHz interrupt as missed after this. As long as the loop's: a moment in
+  // which the core keeps interrupts off is none.
+  static constexpr std::uint32_t step_limit_ms = 20;
+
   // Steps of the construction.
   struct PortsOn {
     PortsOn() { start_ports(); }
@@ -69,6 +74,8 @@ class Machine final : public StepTick {
   firmware::BoardHardware hardware_;
   OutputsOff outputs_off_;
   AnalogInputs analog_;
+  firmware::Guard* guard_ = nullptr;
+  firmware::Guard::Duty step_duty_ = 0;
   // GCC 7 and 8 would copy the elements of an array that a constructor makes (GCC bug 63707), and
   // these cannot be copied: each by itself, and their addresses.
   Encoder encoder1_, encoder2_, encoder3_, encoder4_;
