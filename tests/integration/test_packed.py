@@ -49,7 +49,13 @@ def decoded(packed):
     """What r4 makes of packed datagrams: the plain one, or None."""
     result = run('decode', stdin=''.join(f'packed:{each.hex()}\n' for each in packed))
     assert result.stderr == ''
-    return [None if each.get('error') == 'packed' else each['text'] for each in objects(result.stdout)]
+    return [None if each.get('error') == 'packed' else without_escapes(each['text'])
+            for each in objects(result.stdout)]
+
+
+def without_escapes(text):
+    """A backslash in a name is told as \\x5c."""
+    return re.sub(r'\\x([0-9a-f]{2})', lambda found: chr(int(found[1], 16)), text)
 
 
 def expected(packed):
