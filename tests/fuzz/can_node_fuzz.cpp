@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What comes in on a CAN bus: any frames at any times, to a board's end and a host's end that also
-// talk to each other, lose frames, time out and are cancelled. The input is a list of actions.
+// talk to each other, lose frames, time out and are cancelled, and to a third who surveys the bus.
+// The input is a list of actions.
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstring>
 #include <string>
 #include <vector>
 
+#include "protocol/datagram.hpp"
 #include "protocol/datagram_writer.hpp"
 #include "protocol/message.hpp"
 #include "tests/fuzz/input.hpp"
+#include "transports/can_survey.hpp"
 #include "transports/framing/can_node.hpp"
 
 namespace r4 {
@@ -137,6 +141,57 @@ class End {
   std::vector<std::uint32_t> counters_;
 };
 
+// Who hears all of it and says nothing.
+class Listener {
+ public:
+  Listener() {
+    survey_.on_datagram([this](std::uint8_t node, const Datagram& datagram) {
+      Datagram again;
+      require(node < can_nodes && read(datagram.bytes(), again));
+      require(again.has_pnum() && again.has_time());
+      ++datagrams_;
+    });
+    survey_.on_stop([this] { ++stops_; });
+  }
+
+  void on_frame(CanFrame frame, std::uint32_t now_us) {
+    // The kernel passes on no others.
+    frame.id &= frame.extended ? 0x1FFFFFFFU : max_can_id;
+    frame.size = std::min(frame.size, frame.fd ? max_fd_size : max_classic_size);
+    const std::uint64_t datagrams = datagrams_;
+    const std::uint64_t stops = stops_;
+    const std::uint64_t busy_ns = survey_.busy_ns();
+    survey_.on_frame(frame, now_us);
+    ++frames_;
+    const bool stop = classify(frame).kind == CanIdKind::emergency_stop;
+    require(stops_ - stops == (stop ? 1U : 0U) && datagrams_ - datagrams <= (stop ? 0U : 1U));
+    require(survey_.busy_ns() > busy_ns);
+  }
+
+  void check() const {
+    CanTraffic sum;
+    for (const auto& [id, traffic] : survey_.traffic()) {
+      require(id <= CanSurvey::extended_ids && traffic.frames != 0);
+      sum.frames += traffic.frames;
+      sum.busy_ns += traffic.busy_ns;
+    }
+    require(sum.frames == frames_ && sum.busy_ns == survey_.busy_ns());
+    std::uint64_t heard = 0;
+    for (std::uint8_t node = 0; node < can_nodes; ++node) {
+      const HeardBoard& board = survey_.board(node);
+      heard += board.states + board.heartbeats + board.answers;
+      require(board.damaged <= frames_);
+    }
+    require(heard == datagrams_);
+  }
+
+ private:
+  CanSurvey survey_{{1000000, 5000000}};
+  std::uint64_t frames_ = 0;
+  std::uint64_t datagrams_ = 0;
+  std::uint64_t stops_ = 0;
+};
+
 class Fuzz {
  public:
   explicit Fuzz(Input& input) : Fuzz(input, input.byte(), input.byte()) {}
@@ -148,6 +203,7 @@ class Fuzz {
       board_.poll(now_us_);
       host_.poll(now_us_);
     }
+    listener_.check();
   }
 
  private:
@@ -223,6 +279,7 @@ class Fuzz {
   void take(const CanFrame& frame) {
     board_.on_frame(frame, now_us_);
     host_.on_frame(frame, now_us_);
+    listener_.on_frame(frame, now_us_);
   }
 
   // Moves frames between the two; some are lost, or offered and not taken.
@@ -234,7 +291,10 @@ class Fuzz {
         if (!from->offer(now_us_, frame) || (action & 0x40) != 0) continue;
         from->frame_sent(now_us_);
         End& to = from == &board_ ? host_ : board_;
-        if ((action & 0x20) == 0 || i % 5 != 4) to.on_frame(frame, now_us_);
+        if ((action & 0x20) == 0 || i % 5 != 4) {
+          to.on_frame(frame, now_us_);
+          listener_.on_frame(frame, now_us_);
+        }
         moved = true;
       }
       if (!moved) return;
@@ -246,6 +306,7 @@ class Fuzz {
   const std::uint8_t node_;
   End board_;
   End host_;
+  Listener listener_;
   std::uint32_t now_us_ = 0;
 };
 
