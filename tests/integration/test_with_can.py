@@ -12,6 +12,8 @@ import time
 
 import pytest
 
+from inside import run_inside
+
 TOOLS = pathlib.Path(__file__).resolve().parents[2] / 'tools'
 WITH_CAN = [str(TOOLS / 'with-can'), '--guest']
 PATIENCE_S = 60
@@ -120,6 +122,11 @@ ls /sys/class/net
     assert lines[5][1:4] == ['123', '[16]', '00']
     if os.geteuid() == 0:
         assert lines[6:] == [['72'], ['1000'], ['9'], ['can0'], ['can1'], ['lo']]
+
+
+def test_where_the_kernel_has_can_the_command_runs_on_it():
+    if os.geteuid() == 0:  # inside, too; it takes that to make interfaces and to become somebody else
+        run_inside('with_can_inside.py', options=['--guest'])
 
 
 def test_ctrl_c_ends_the_command_and_a_killed_wrapper_leaves_no_guest():
