@@ -12,7 +12,7 @@ import time
 import pytest
 
 from can_inside import SAFE_WITHIN_MS, Dump, in_control
-from r4_process import PATIENCE_S, Board, Running, is_link, is_state, lasts, monitor, run
+from r4_process import PATIENCE_S, Board, Running, is_link, is_state, lasts, monitor, objects, run
 from slcan_bus import SlcanBus
 
 BITRATE = 500000
@@ -93,6 +93,20 @@ def test_a_board_streams_and_obeys_on_a_bus_with_bit_time(bus, board):
           f'{after["frames"] - before["frames"]} frames')
     assert took_ms < 1.5 * 1990  # a slow emulated machine shows the newest of several
     assert after['failed'] == 0
+
+
+def test_the_load_that_is_shown_is_the_time_that_the_bus_was_taken(bus, board):
+    with monitor(HOST) as host:
+        in_control(host)
+        before = bus.status()
+        *_, shown = objects(run('bus', 'can://slcan1', '--json', '--duration', '4', timeout=60).stdout)
+        after = bus.status()
+    busy_us, t_us, frames = (after[each] - before[each] for each in ('busy_us', 't_us', 'frames'))
+    print(f'load {100 * shown["load"]:.2f} %, by the bus {100 * busy_us / t_us:.2f} %; '
+          f'a frame {1e6 * shown["load"] / shown["frames"]:.2f} us, by the bus {busy_us / frames:.2f} us')
+    assert shown['bitrate'] == BITRATE  # as the controller has it: nobody said
+    assert abs(shown['load'] / (busy_us / t_us) - 1) < 0.05
+    assert abs(1e6 * shown['load'] / shown['frames'] / (busy_us / frames) - 1) < 0.01
 
 
 def test_bus_off_of_the_boards_controller(bus, board):
