@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-from r4_process import ERROR, PATIENCE_S, Board, is_link, is_state, monitor, objects, run
+from r4_process import ERROR, PATIENCE_S, R4, Board, is_link, is_state, monitor, objects, run
 
 # The board's timeout, what docs/safety.md promises on top, and what an emulated machine may take.
 SAFE_WITHIN_MS = 1020 + 80
@@ -28,10 +28,10 @@ def on_a_bus(request):
     """A board, on a bus in the kernel, and on one of two controllers with their driver."""
     if request.param == 'vcan':
         board = Board(BUS)
-        board.bus = 'vcan0'
+        board.bus, board.packs = 'vcan0', False
     else:  # each frame costs the emulated machine some 100 us: fewer frames
         board = Board('can://can0?node=3', options=('--set', 'pack,1'))
-        board.bus = 'can1'
+        board.bus, board.packs = 'can1', True
         board.host_url = 'can://can1?node=3'
     with board:
         yield board
@@ -41,6 +41,16 @@ def on_a_bus(request):
 def on_vcan():
     with Board(BUS) as board:
         yield board
+
+
+@contextlib.contextmanager
+def beside(*command, **options):
+    """A program that runs as long as the block, or less."""
+    with subprocess.Popen(command, **options) as process:
+        try:
+            yield process
+        finally:
+            process.terminate()
 
 
 class Dump:
@@ -213,22 +223,22 @@ def test_can_fd_carries_a_state_in_three_frames():
     assert len(states) > 100
 
 
-def test_an_interface_that_goes_down_is_told_of_and_comes_back(vcan_board):
-    with monitor(vcan_board.host_url) as host:
+def test_an_interface_that_goes_down_is_told_of_and_comes_back(board):
+    with monitor(board.host_url) as host:
         in_control(host)
-        ip('link', 'set', 'vcan0', 'down')
+        ip('link', 'set', board.bus, 'down')
         down_at = time.monotonic()
         down = host.next(lambda each: each['type'] == 'link' and not each['fields']['up'])
         print(f'down after {(down["came"] - down_at) * 1000:.0f} ms')
-        vcan_board.state('SAFE', 'link')
-        refused = run('monitor', BUS)
-        assert refused.returncode == 4 and 'ip link set vcan0 up' in refused.stderr, refused
-        ip('link', 'set', 'vcan0', 'up')
+        board.state('SAFE', 'link')
+        refused = run('monitor', board.host_url)
+        assert refused.returncode == 4 and f'ip link set {board.bus} up' in refused.stderr, refused
+        ip('link', 'set', board.bus, 'up')
         up_at = time.monotonic()
         up = host.next(lambda each: each['type'] == 'link' and each['fields']['up'])
         print(f'up after {(up["came"] - up_at) * 1000:.0f} ms')
         assert up['came'] - up_at < 1
-        vcan_board.state('ACTIVE')
+        board.state('ACTIVE')
         host.skip_past()
         host.next(is_state)
 
@@ -266,32 +276,34 @@ def test_what_cannot_be_opened_is_said_with_the_fix(url, code, message):
     assert ERROR.fullmatch(result.stderr.strip()), result.stderr
 
 
-def test_garbage_on_every_id_of_ours_harms_nobody(vcan_board):
-    with monitor(vcan_board.host_url) as host:
+def test_garbage_on_every_id_of_ours_harms_nobody(board):
+    with monitor(board.host_url) as host:
         in_control(host)
         for identifier in (COMMAND, REPLY, TELEMETRY, WENT_SAFE):
-            subprocess.run(['cangen', 'vcan0', '-I', f'{identifier:x}', '-n', '300', '-g', '0'], check=True)
+            subprocess.run(['cangen', board.bus, '-I', f'{identifier:x}', '-n', '300', '-g', '0'], check=True)
         host.skip_past()
         host.next(is_state)
         counts = [each['fields'] for each in host.rest() if each['type'] == 'transfers'][0]
-    assert counts['unexpected'] > 0 and counts['malformed'] > 0 and counts['packed'] == 0, counts
-    vcan_board.state('SAFE', 'link')
-    executed = [each['executed']['command'] for each in vcan_board.log if 'executed' in each]
+    assert counts['unexpected'] > 0 and counts['malformed'] > 0, counts
+    assert board.packs or counts['packed'] == 0, counts
+    board.state('SAFE', 'link')
+    executed = [each['executed']['command'] for each in board.log if 'executed' in each]
     assert executed and all(command.startswith('F:') for command in executed), executed
 
 
-def test_eight_boards_on_one_bus_each_with_its_host():
+@pytest.mark.parametrize('of_boards, of_hosts', [('vcan0', 'vcan0'), ('can0', 'can1')])
+def test_eight_boards_on_one_bus_each_with_its_host(of_boards, of_hosts):
     # At a rate that the emulated machine bears with nine processes: the backbone at 100 Hz is
     # tests/simulation's, in virtual time.
     slowly = ('--set', 'pack,1', '--set', 'rate,20')
     with contextlib.ExitStack() as stack:
-        boards = stack.enter_context(Board('can://vcan0?node=0-7', options=slowly, listens=8))
-        hosts = [stack.enter_context(monitor(f'can://vcan0?node={node}')) for node in range(8)]
+        boards = stack.enter_context(Board(f'can://{of_boards}?node=0-7', options=slowly, listens=8))
+        hosts = [stack.enter_context(monitor(f'can://{of_hosts}?node={node}')) for node in range(8)]
         for host in hosts:
             in_control(host)
         for host in hosts:
             host.skip_past()
-            states = [host.next(is_state) for _ in range(20)]
+            states = [host.next(is_state) for _ in range(10)]
             assert all((later['t'] - earlier['t']) % 50 == 0 for earlier, later in zip(states, states[1:]))
         hosts[5].signal(signal.SIGKILL)
         safe = boards.next(lambda each: each.get('state') == 'SAFE')
@@ -300,10 +312,25 @@ def test_eight_boards_on_one_bus_each_with_its_host():
         for node in (4, 6):
             hosts[node].skip_past()
             assert hosts[node].next(is_state)['fields']['SAFE'] == 0
-        assert run('stop', 'can://vcan0?node=1', timeout=60).returncode == 0
+        assert run('stop', f'can://{of_hosts}?node=1', timeout=60).returncode == 0
         stopped = set()
         while len(stopped) < 8:  # one frame stops all of them
             stopped.add(boards.state('SAFE', 'stop')['board'])
+
+
+def test_none_of_eight_boards_at_100_hz_is_safe_by_mistake():
+    with contextlib.ExitStack() as stack:
+        boards = stack.enter_context(Board('can://vcan0?node=0-7', options=('--set', 'pack,1'), listens=8))
+        for node in range(8):
+            stack.enter_context(beside(R4, 'monitor', f'can://vcan0?node={node}', stdout=subprocess.DEVNULL))
+        for _ in range(8):
+            boards.state('ACTIVE')
+        *rows, total = objects(run('bus', 'can://vcan0', '--json', '--duration', '3', timeout=60).stdout)
+        log = boards.rest()
+    rates = [row['frames'] / 5 for row in rows if row['id'] and 0x400 <= row['id'] < 0x408]
+    print(f'{min(rates):.0f} to {max(rates):.0f} states a second, load {100 * total["load"]:.0f} %')
+    assert len(rates) == 8 and min(rates) > 10  # what a slow emulated machine cannot send is replaced
+    assert not any(each.get('state') == 'SAFE' for each in log)
 
 
 def test_a_bus_is_shown_with_all_of_its_boards():
@@ -330,6 +357,24 @@ def test_a_bus_is_shown_with_all_of_its_boards():
         host.next(is_state)
     silent = run('monitor', 'can://vcan0', '--duration', '1', timeout=60)
     assert silent.returncode == 3 and ERROR.search(silent.stderr), silent
+
+
+def test_the_load_of_a_bus_counts_by_its_controllers_bit_rate():
+    def set_to(rate):
+        ip('link', 'set', 'can0', 'down')
+        ip('link', 'set', 'can0', 'up', 'type', 'can', 'bitrate', str(rate))
+
+    set_to(250000)
+    try:
+        with beside('cangen', 'can1', '-g', '2', '-L', '8'):
+            *rows, total = objects(run('bus', 'can://can0', '--json', '--duration', '0.5', timeout=60).stdout)
+        listed = {each.get('interface'): each for each in objects(run('list', '--json', timeout=60).stdout)}
+        refused = run('bus', 'can://can0', '--bitrate', '1000000')
+    finally:
+        set_to(1000000)
+    assert total['bitrate'] == 250000 == listed['can0']['bitrate'], total
+    assert rows and abs(total['load'] * 250000 / total['bits'] - 1) < 1e-3, total
+    assert refused.returncode == 2 and '250000' in refused.stderr, refused
 
 
 def test_the_demo_plays_over_can_too():
