@@ -6,6 +6,7 @@ netem loses and delays on the pair vxcan0, vxcan1; cangw corrupts what it carrie
 import collections
 import contextlib
 import json
+import re
 import signal
 import socket
 import struct
@@ -15,11 +16,12 @@ import zlib
 
 import pytest
 
-from can_inside import Dump, in_control, ip
-from r4_process import Board, Running, is_link, is_state, lasts, monitor, run
+from can_inside import EMERGENCY, Dump, beside, in_control, ip
+from r4_process import R4, Board, Running, is_link, is_state, lasts, monitor, objects, run
 
 BOARD, HOST = 'can://vxcan0?node=2', 'can://vxcan1?node=2'
-TELEMETRY_OF_2 = '402'
+COMMAND_OF_2 = '182'
+TELEMETRY = 0x400
 PACKED = ('--set', 'pack,1')
 NODE = 4
 COMMAND, REPLY = 0x180 + NODE, 0x200 + NODE
@@ -27,82 +29,134 @@ NEXT_WITHIN_S = 0.5  # a whole heartbeat after a broken one is obeyed; the rest 
 
 
 @contextlib.contextmanager
-def netem(*how):
-    """What `how` says of each frame that leaves, at both ends."""
-    for interface in ('vxcan0', 'vxcan1'):
+def netem(*how, ends=('vxcan0', 'vxcan1')):
+    """What `how` says of each frame that leaves there."""
+    for interface in ends:
         subprocess.run(['tc', 'qdisc', 'add', 'dev', interface, 'root', 'netem', 'limit', '10000', *how],
                        check=True)
     try:
         yield
     finally:
-        for interface in ('vxcan0', 'vxcan1'):
+        for interface in ends:
             subprocess.run(['tc', 'qdisc', 'del', 'dev', interface, 'root'], check=True)
 
 
+# Of 2000 states of five frames, those that arrive differ by 1 % from 0.99^frames in one run of twenty, for
+# the kernel's dice; from what the part of the frames allows that it really lost, in less than one of ten
+# thousand: their standard deviation is 0.13 %.
+STATES, NODES, RATE = 2000, 4, 100
+
+
 def frames_of(first):
-    """How many frames the datagram has whose first or single frame that is (hex)."""
-    size = int(first[1:4], 16)
-    return None if first[0] not in '01' else 1 if first[0] == '0' else 1 + -(-(size - 6) // 7)
+    """How many frames the datagram has whose first frame that is (hex)."""
+    return 1 - -(int(first[1:4], 16) - 6) // 7
 
 
 def test_of_telemetry_arrives_what_its_frames_allow(tmp_path):
-    options = (*PACKED, '--set', 'rate,200')
-    with netem('loss', '1%'), Board(BOARD, options=options) as board, monitor(HOST) as host:
-        in_control(host)
-        written = tmp_path / 'frames'
-        with open(written, 'w', encoding='ascii') as file:
-            dump = subprocess.Popen(['candump', '-L', f'vxcan0,{TELEMETRY_OF_2}:7FF'], stdout=file)
-            while written.stat().st_size == 0:
-                host.next(is_state)
-            wall = time.time() - time.monotonic()
-            begun = time.monotonic()
-            host.skip_past()
-            came = []
-            while len(came) < 2000:
-                came.append(host.next(is_state)['came'])
-            dump.terminate()
-            dump.wait()
-        counted = subprocess.run(['tc', '-s', '-j', 'qdisc', 'show', 'dev', 'vxcan0'],
-                                 capture_output=True, text=True, check=True)
-        assert not any('silence' in each for each in board.rest())
-    netem_told = json.loads(counted.stdout)[0]
+    dumped, heard = tmp_path / 'frames', [tmp_path / str(node) for node in range(NODES)]
+    with netem('loss', '1%'), contextlib.ExitStack() as stack:
+        def runs(path, *command):
+            output = stack.enter_context(open(path, 'wb'))
+            return stack.enter_context(beside(*command, stdout=output))
+
+        dump = runs(dumped, 'candump', '-L', 'vxcan0,400:7E0')
+        boards = stack.enter_context(Board(f'can://vxcan0?node=0-{NODES - 1}', listens=NODES,
+                                           options=(*PACKED, '--set', f'rate,{RATE}')))
+        hosts = [runs(path, R4, 'monitor', f'can://vxcan1?node={node}') for node, path in enumerate(heard)]
+        subprocess.run(['candump', '-n', str(5 * STATES // NODES), f'vxcan0,{TELEMETRY:x}:7FF'],
+                       stdout=subprocess.DEVNULL, check=True, timeout=60)
+        log = boards.rest()
+        for process in (*hosts, dump):
+            process.terminate()
+            process.wait()
+        told = subprocess.run(['tc', '-s', '-j', 'qdisc', 'show', 'dev', 'vxcan0'], capture_output=True,
+                              text=True, check=True)
+    assert not any(each.get('state') == 'SAFE' for each in log)
+    firsts = re.findall(r'#(1\w{3})', dumped.read_text(encoding='ascii'))
+    sent = [count for count in map(frames_of, firsts) if count > 3]  # no heartbeat
+    arrived = sum(len(re.findall('^state ', path.read_text(encoding='ascii'), re.MULTILINE)) for path in heard)
+    netem_told = json.loads(told.stdout)[0]
     loss = netem_told['drops'] / (netem_told['packets'] + netem_told['drops'])
-    sent = []
-    for line in written.read_text(encoding='ascii').splitlines():
-        at, _, frame = line.split()
-        count = frames_of(frame.partition('#')[2])
-        if begun <= float(at[1:-1]) - wall <= came[-1] and count and count > 3:  # no heartbeat
-            sent.append(count)
-    arrived = sum(begun <= each for each in came) / len(sent)
+    share = arrived / len(sent)
     expected = sum(0.99 ** count for count in sent) / len(sent)
     with_this_loss = sum((1 - loss) ** count for count in sent) / len(sent)
-    print(f'{len(sent)} states of {sum(sent) / len(sent):.2f} frames: {100 * arrived:.2f} % arrived; '
-          f'of 0.99^frames {100 * expected:.2f} %, of the {100 * loss:.2f} % lost '
-          f'{100 * with_this_loss:.2f} %')
-    assert abs(arrived - with_this_loss) < 0.015
-    assert abs(arrived - expected) < 0.025  # and what the kernel's dice add in so few frames
+    print(f'{len(sent)} states of {sum(sent) / len(sent):.2f} frames: {100 * share:.2f} % arrived; of 0.99^frames '
+          f'{100 * expected:.2f} %, of the {100 * loss:.2f} % lost {100 * with_this_loss:.2f} %')
+    assert 0.005 < loss < 0.015 and abs(share / with_this_loss - 1) < 0.01
 
 
 def executed(log):
     return [each['executed'] for each in log if 'executed' in each]
 
 
-@pytest.mark.parametrize('loss, count', [('1%', 40), ('5%', 20)])
-def test_commands_are_confirmed_or_reported_and_none_is_executed_twice(loss, count):
-    commands = [f'S:{1000 + i},{1 + i % 16}' for i in range(count)]
-    with netem('loss', loss, 'delay', '2ms'), Board(BOARD, options=PACKED) as board:
-        result = run('send', HOST, '--timeout', '5', *commands, timeout=100)
-        log = board.rest()
-    assert result.returncode in (0, 3), result
-    if result.returncode == 3:
-        assert 'r4: ' in result.stderr, result
-    print(f'{result.stdout.count("confirmed")} of {count} confirmed')
+def told_of(results, commands):
+    """What r4 send said of each command: it ends at the first that is not confirmed."""
+    told = ['confirmed' if each['confirmed'] else each['reason'] for each in results if each['type'] == 'result']
+    return told + ['not sent'] * (len(commands) - len(told))
+
+
+def agrees_with_the_board(told, commands, log):
+    """What was confirmed was executed once; what was not confirmed or not sent, not twice or not at all."""
     pnums = [each['pnum'] for each in executed(log)]
     assert len(pnums) == len(set(pnums))
-    done = [each['command'] for each in executed(log) if each['command'] in commands]
-    assert done == commands[:len(done)]
-    if result.returncode == 0:
-        assert done == commands
+    times = collections.Counter(each['command'] for each in executed(log))
+    for command, outcome in zip(commands, told):
+        if outcome == 'confirmed':
+            assert times[command] == 1, (command, outcome)
+        elif outcome.startswith('not confirmed'):
+            assert times[command] <= 1, (command, outcome)
+        else:
+            assert outcome.startswith(('refused', 'not sent')) and times[command] == 0, (command, outcome)
+
+
+@pytest.mark.parametrize('loss, count', [('1%', 40), ('5%', 20)])
+def test_a_confirmed_command_was_executed_exactly_once(loss, count):
+    commands = [f'S:{1000 + i},{1 + i % 16}' for i in range(count)]
+    with netem('loss', loss, 'delay', '2ms'), Board(BOARD, options=PACKED) as board, \
+            Dump(f'vxcan1,{COMMAND_OF_2}:7FF') as dump:
+        result = run('send', HOST, '--json', '--timeout', '10', *commands, timeout=200)
+        log = board.rest()
+    told = told_of(objects(result.stdout), commands)
+    # The first frames of what begins with S:
+    begun = sum(data.startswith('10') and data[4:8] == '533A' for _, data in dump.frames)
+    print(f'{told.count("confirmed")} of {count} confirmed, begun {begun} times')
+    agrees_with_the_board(told, commands, log)
+    if loss == '1%':
+        assert result.returncode == 0 and told == ['confirmed'] * count, result
+    else:  # ten heartbeats in a row may be lost
+        assert begun > count - told.count('not sent'), 'nothing was repeated'
+
+
+def test_a_command_that_is_not_confirmed_is_reported_and_those_behind_it_are_not_sent():
+    commands = [f'S:{1000 + i},{1 + i % 16}' for i in range(300)]
+    with Board(BOARD, options=PACKED) as board, \
+            Running('send', HOST, '--json', '--timeout', '3', *commands) as sender:
+        board.executed(commands[3])
+        with netem('loss', '100%'):
+            assert sender.wait() == 3
+            while sender.next()['confirmed']:
+                pass
+            board.state('SAFE', 'link')
+        log = board.rest()
+    told = told_of(sender.log, commands)
+    print(next(each for each in told if each != 'confirmed'))
+    agrees_with_the_board(told, commands, log)
+    assert sum(each.startswith('not confirmed within 3') for each in told) == 1 and told[-1] == 'not sent', told
+
+
+def test_a_stop_whose_first_frames_are_lost_is_repeated_until_the_board_confirms_it():
+    with Board(BOARD, options=PACKED) as board, monitor(HOST) as host, \
+            Dump(f'vxcan1,{EMERGENCY:03x}:7FF') as sent, Dump(f'vxcan0,{EMERGENCY:03x}:7FF') as arrived:
+        in_control(host)
+        with netem('loss', '100%', ends=['vxcan1']):
+            stop = Running('stop', HOST, '--timeout', '20')
+            sent.more(5)
+            assert stop.process.poll() is None and not arrived.frames
+        board.state('SAFE', 'stop')
+        with stop:
+            assert stop.wait() == 0, stop.errors
+        arrived.more(1 - len(arrived.frames))
+    print(f'{len(sent.frames)} sent, {len(arrived.frames)} arrived')
 
 
 class Gateway:
