@@ -493,18 +493,18 @@ class GigaWiring : public testing::TestWithParam<int> {
     for (const Wires& each : wires) {
       for (const giga::Pin pin : {each.a, each.b, each.index, each.echo}) set(pin, false);
     }
-    bench.boot();
-    bench.run_ms(150, host, bench.usb());
+    bench_.boot();
+    bench_.run_ms(150, host_, bench_.usb());
   }
   int channel() const { return GetParam(); }
   const Wires& mine() const { return wires[channel() - 1]; }
-  void set(giga::Pin pin, bool high) { bench.giga.set_pin(pin.port, pin.number, high); }
-  bool pin(giga::Pin pin) { return bench.giga.pin(pin.port, pin.number); }
-  void command(const std::string& field) { bench.usb()(host.command(field)); }
-  void run_ms(std::uint64_t ms) { bench.run_ms(ms, host, bench.usb()); }
+  void set(giga::Pin pin, bool high) { bench_.giga.set_pin(pin.port, pin.number, high); }
+  bool pin(giga::Pin pin) { return bench_.giga.pin(pin.port, pin.number); }
+  void command(const std::string& field) { bench_.usb()(host_.command(field)); }
+  void run_ms(std::uint64_t ms) { bench_.run_ms(ms, host_, bench_.usb()); }
   // The newest state has these values in the fields of this channel, and 0 in those of the others.
   void expect_state(const char* name, const char* suffix, int value) {
-    const std::vector<std::string> lines = bench.usb_lines();
+    const std::vector<std::string> lines = bench_.usb_lines();
     const auto state = std::find_if(lines.rbegin(), lines.rend(), [&](const std::string& line) {
       return line.find(std::string(name) + "1" + suffix + ":") != std::string::npos;
     });
@@ -516,8 +516,8 @@ class GigaWiring : public testing::TestWithParam<int> {
     }
   }
 
-  GigaBench bench;
-  PlainHost host;
+  GigaBench bench_;
+  PlainHost host_;
 };
 
 TEST_P(GigaWiring, AStepperStepsAtItsOwnPins) {
@@ -530,8 +530,8 @@ TEST_P(GigaWiring, AStepperStepsAtItsOwnPins) {
   run_ms(50);
   expect_state("STEP", "POS", -5);
   for (const Wires& each : wires) {
-    EXPECT_EQ(bench.giga.rises(each.step.port, each.step.number), &each == &mine() ? 45 : 0);
-    EXPECT_EQ(bench.giga.rises(each.direction.port, each.direction.number),
+    EXPECT_EQ(bench_.giga.rises(each.step.port, each.step.number), &each == &mine() ? 45 : 0);
+    EXPECT_EQ(bench_.giga.rises(each.direction.port, each.direction.number),
               &each == &mine() ? 1 : 0);
     EXPECT_FALSE(pin(each.step)) << "the last step's pulse has ended";
     EXPECT_FALSE(pin(each.direction)) << "backward, or as after power-up";
@@ -553,7 +553,7 @@ TEST_P(GigaWiring, AnEncoderCountsItsOwnLines) {
   set(mine().index, false);
   turn(4);
   run_ms(50);
-  const std::vector<std::string> lines = bench.usb_lines();
+  const std::vector<std::string> lines = bench_.usb_lines();
   ASSERT_FALSE(lines.empty());
   for (int i = 1; i <= 4; ++i) {
     const bool its_own = i == channel();
@@ -568,11 +568,11 @@ TEST_P(GigaWiring, AnEchoIsOfTheSensorThatWasTriggered) {
   command("F:US1,US2,US3,US4");
   bool answered = false;
   for (int i = 0; i < 600 && !answered; ++i) {
-    bench.turn();
+    bench_.turn();
     if (!pin(mine().trigger)) continue;
-    while (pin(mine().trigger)) bench.turn();
+    while (pin(mine().trigger)) bench_.turn();
     set(mine().echo, true);
-    bench.giga.pass_us(100 * 58);
+    bench_.giga.pass_us(100 * 58);
     set(mine().echo, false);
     answered = true;
   }
