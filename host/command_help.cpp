@@ -174,7 +174,9 @@ void require_valid(const Command& command) {
 }
 
 void require_cable(std::string_view url, std::string_view secret) {
-  if (!url.starts_with("udp:") && !url.starts_with("can:")) return;
+  for (const std::string_view own : {"serial:", "sim:", "memory:"}) {
+    if (url.starts_with(own)) return;
+  }
   throw Error(ErrorKind::usage, std::string(secret),
               fmt::format("a board takes it over USB only, and at {} others would see it", url),
               "use serial:auto");

@@ -45,8 +45,8 @@ Problem bad_command(std::string_view text, Refusal refusal);
 // datagram. What it lets pass can be sent.
 void require_valid(const Command& command);
 
-// Throws Error{usage} if `url` is of a network or a bus, where others would see what a board takes
-// over its own cable only: `secret`, in words.
+// Throws Error{usage} unless `url` is of a board's own cable: elsewhere, on a network or a bus, others
+// would see what the board does not even take there: `secret`, in words.
 void require_cable(std::string_view url, std::string_view secret);
 // The same for a command with a secret; others may go anywhere.
 void require_cable(std::string_view url, const Command& command);

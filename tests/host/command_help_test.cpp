@@ -65,6 +65,19 @@ TEST(CommandHelp, SaysWhatIsWrongWithAKeyOrAPasswordWithoutShowingIt) {
   EXPECT_NE(problem.fix.find("64 hexadecimal digits"), std::string::npos) << problem.fix;
 }
 
+TEST(CommandHelp, SendsASecretOnlyOverABoardsOwnCable) {
+  const Command secret = Command::setting("password", "eeeeeeee");
+  for (const char* url : {"serial:auto", "serial:///dev/ttyACM0", "sim:", "memory:"}) {
+    EXPECT_NO_THROW(require_cable(url, secret)) << url;
+  }
+  for (const char* url :
+       {"udp://192.168.4.1", "can://can0?node=3", "UDP://192.168.4.1", "both:", ""}) {
+    EXPECT_NE(error_of([&] { require_cable(url, secret); }).find("over USB only"),
+              std::string::npos);
+    EXPECT_NO_THROW(require_cable(url, Command::setting("rate", "100"))) << url;
+  }
+}
+
 TEST(CommandHelp, TellsWhatASettingTakes) {
   EXPECT_NE(bad_command("C:rate,0", Refusal::range).fix.find("1-1000"), std::string::npos);
   EXPECT_NE(bad_command("C:AINSTEER,x", Refusal::range).fix.find("volts"), std::string::npos);
