@@ -83,6 +83,7 @@ void CanBus::leave(Member& member) noexcept {
   for (Place& place : members_) {
     if (place.member == &member) place.member = nullptr;
   }
+  std::replace(out_of_.begin(), out_of_.end(), &member, static_cast<Member*>(nullptr));
   clear_places();
 }
 
@@ -204,6 +205,7 @@ void CanBus::on_error_frame(const CanSocket::Received& received) {
   if ((received.error & CAN_ERR_RESTARTED) != 0) return come_up();
   if ((received.error & CAN_ERR_CRTL) != 0) {
     const std::uint8_t controller = received.frame.data[1];
+    if ((controller & CAN_ERR_CRTL_RX_OVERFLOW) != 0) ++controller_overflows_;
     if ((controller & CAN_ERR_CRTL_ACTIVE) != 0) {
       come_up();
     } else if ((controller & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0) {
@@ -246,7 +248,7 @@ bool CanBus::refill(std::uint32_t now_us) {
     next_ %= members_.size();
     Member* const member = members_[next_].member;
     if (member != nullptr && member->offer(now_us, out_[out_count_])) {
-      ++out_count_;
+      out_of_[out_count_++] = member;
       quiet = 0;
       member->frame_sent(now_us);
     } else {
@@ -255,6 +257,25 @@ bool CanBus::refill(std::uint32_t now_us) {
     }
   }
   return out_count_ != 0;
+}
+
+// The first ones of the queue have got to the interface.
+void CanBus::have_left(std::size_t count) {
+  if (count != 0) progress_ = Clock::now();
+  for (std::size_t i = 0; late_ && i < count; ++i) {
+    if (out_of_[i] != nullptr) out_of_[i]->on_late_frame(to_us(progress_));
+  }
+  const auto gone = static_cast<std::ptrdiff_t>(count);
+  const auto end = static_cast<std::ptrdiff_t>(out_count_);
+  std::move(out_.begin() + gone, out_.begin() + end, out_.begin());
+  std::move(out_of_.begin() + gone, out_of_.begin() + end, out_of_.begin());
+  out_count_ -= count;
+  late_ = out_count_ != 0;
+}
+
+void CanBus::drop_queue() {
+  out_count_ = 0;
+  late_ = false;
 }
 
 void CanBus::send() {
@@ -267,10 +288,7 @@ void CanBus::send() {
     std::size_t sent = 0;
     outcome = socket_.send(out_.data(), out_count_, sent);
     const int error = errno;
-    if (sent != 0) progress_ = Clock::now();
-    std::move(out_.begin() + static_cast<std::ptrdiff_t>(sent),
-              out_.begin() + static_cast<std::ptrdiff_t>(out_count_), out_.begin());
-    out_count_ -= sent;
+    have_left(sent);
     if (outcome == CanSocket::Outcome::failed) {
       asio::post(
           io_, retrying_.handler([this, error] { go_down(can_problem(interface_, error), true); }));
@@ -289,7 +307,7 @@ void CanBus::send() {
 // A socket that is writable tells so; a full interface queue does not.
 void CanBus::send_later() {
   if (Clock::now() - progress_ > patience) {
-    out_count_ = 0;
+    drop_queue();
     progress_ = Clock::now();
     for_each_member([](Member& member) { member.on_stuck(); });
   }
@@ -318,7 +336,7 @@ SendResult CanBus::send_stop() {
 
 void CanBus::go_down(Problem problem, bool reopen) {
   const std::shared_ptr<CanBus> alive = shared_from_this();
-  out_count_ = 0;
+  drop_queue();
   retrying_.cancel();
   writable_.stop();
   if (reopen) {

@@ -41,6 +41,8 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
     // The same, of those that may overtake what was accepted before.
     virtual bool offer_urgent(std::uint32_t now_us, CanFrame& frame) = 0;
     virtual void frame_sent(std::uint32_t now_us) = 0;
+    // A frame of its that waited for the interface has got there.
+    virtual void on_late_frame(std::uint32_t now_us) { static_cast<void>(now_us); }
     virtual void on_sent() = 0;  // all was asked for what they offer: time to set a timer
     // The bus came up or went down (transfers are over), or the controller is in trouble.
     virtual void on_bus(const CarrierEvent& event) = 0;
@@ -83,7 +85,9 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   bool up() const { return up_; }
   // Frames wait for the interface. None is asked for until it has taken them.
   bool full() const { return out_count_ != 0; }
-  std::uint32_t overflows() const { return socket_.overflows(); }
+  // Frames that were dropped, for nobody took them in time: by the kernel, and times that the
+  // controller told of some.
+  std::uint32_t overflows() const { return socket_.overflows() + controller_overflows_; }
 
  private:
   struct Place {
@@ -99,6 +103,8 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   void on_error_frame(const CanSocket::Received& received);
   void send_urgent(std::uint32_t now_us);
   bool refill(std::uint32_t now_us);
+  void have_left(std::size_t count);
+  void drop_queue();
   void send_later();
   void set_trouble(std::string reason, std::string fix);
   void go_down(Problem problem, bool reopen);
@@ -130,11 +136,14 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   bool receiving_ = false;
   Clock::time_point look_from_;  // not before: it was in vain
   std::array<CanFrame, ahead> out_;
+  std::array<Member*, ahead> out_of_{};  // whose frame it is; null: has left
+  bool late_ = false;                    // they have been refused once
   std::size_t out_count_ = 0;
   Clock::time_point progress_;
 
   bool up_ = true;
   std::string trouble_;
+  std::uint32_t controller_overflows_ = 0;
   std::array<CanSocket::Received, CanSocket::batch> in_;
 };
 

@@ -53,6 +53,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
     return node_.offer_urgent(now_us, frame);
   }
   void frame_sent(std::uint32_t now_us) override { node_.frame_sent(now_us); }
+  void on_late_frame(std::uint32_t now_us) override { node_.late_frame_sent(now_us); }
   void on_bus(const CarrierEvent& event) override;
   void on_stuck() override;
 
@@ -115,6 +116,7 @@ TransferCounters transfers_of(const CanNode& node) {
                      out.flow_control_timeout + out.send_timeout + out.too_many_waits;
     sum.overflow += in.overflow + out.overflow;
     sum.interrupted += in.interrupted;
+    sum.cancelled += in.cancelled + out.cancelled;
     sum.unexpected += in.unexpected_frame + out.unexpected_frame;
     sum.malformed += in.malformed + out.malformed + out.invalid_flow_status;
   }
@@ -234,7 +236,8 @@ void CanCarrier::arm() {
     armed_ = false;
     const std::shared_ptr<CanBus> bus = bus_;
     bus->take();
-    if (handler_ == nullptr) return;
+    // While frames wait for the bus, nothing can be late that answers them.
+    if (handler_ == nullptr || bus->full()) return;
     node_.poll(CanBus::now_us());
     bus->send();
   }));

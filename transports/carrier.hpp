@@ -44,6 +44,7 @@ struct TransferCounters {
   std::uint64_t timed_out = 0;       // a frame, or leave to send one, did not come in time
   std::uint64_t overflow = 0;        // longer than a datagram may be
   std::uint64_t interrupted = 0;     // another began in its place
+  std::uint64_t cancelled = 0;       // the bus went down, or took nothing for 100 ms
   // Frames that were passed over.
   std::uint64_t unexpected = 0;  // of no transfer
   std::uint64_t malformed = 0;
@@ -57,7 +58,8 @@ struct CarrierCounters {
   std::uint64_t rx_bytes = 0;
   std::uint64_t rx_oversize = 0;   // lines or packets that were too long, thrown away
   std::uint64_t rx_foreign = 0;    // packets from an address that is not the board's, thrown away
-  std::uint64_t rx_overflows = 0;  // frames that the system dropped, for nobody took them (CAN)
+  std::uint64_t rx_overflows = 0;  // frames that the system or the controller dropped, for nobody
+                                   // took them in time (CAN)
   std::uint64_t tx_datagrams = 0;
   std::uint64_t tx_bytes = 0;
   std::uint64_t tx_dropped = 0;  // replaced by newer state, expired or refused

@@ -142,6 +142,61 @@ class Witness final : public CanBus::Member {
   std::shared_ptr<CanBus> bus_;
 };
 
+// Offers a number of frames, and writes down what becomes of them.
+class Talker final : public CanBus::Member {
+ public:
+  Talker(std::shared_ptr<CanBus> bus, int frames) : left_(frames), bus_(std::move(bus)) {
+    bus_->join(*this, {});
+  }
+  ~Talker() { bus_->leave(*this); }
+  Talker(const Talker&) = delete;
+  Talker& operator=(const Talker&) = delete;
+
+  int accepted = 0;
+  int late = 0;
+  int stuck = 0;
+
+ private:
+  bool offer(std::uint32_t, CanFrame& frame) override {
+    if (left_ == 0) return false;
+    frame = CanFrame{};
+    frame.id = other_id;
+    frame.size = 1;
+    frame.data[0] = static_cast<std::uint8_t>(accepted);
+    return true;
+  }
+  bool offer_urgent(std::uint32_t, CanFrame&) override { return false; }
+  void frame_sent(std::uint32_t) override {
+    --left_;
+    ++accepted;
+  }
+  void on_late_frame(std::uint32_t) override { ++late; }
+  void on_stuck() override {
+    left_ = 0;
+    ++stuck;
+  }
+  void on_frame(const CanFrame&, std::uint32_t) override {}
+  void on_drained() override {}
+  void on_sent() override {}
+  void on_bus(const CarrierEvent&) override {}
+
+  int left_;
+  std::shared_ptr<CanBus> bus_;
+};
+
+// A bus of so many bits a second, 128 a frame.
+class SlowBus {
+ public:
+  explicit SlowBus(int rate) {
+    EXPECT_EQ(0, std::system(("tc qdisc add dev vxcan7 root tbf burst 80 limit 10000 rate " +
+                              std::to_string(rate) + "bit")
+                                 .c_str()));
+  }
+  ~SlowBus() { (void)std::system("tc qdisc del dev vxcan7 root"); }
+  SlowBus(const SlowBus&) = delete;
+  SlowBus& operator=(const SlowBus&) = delete;
+};
+
 using Told = std::vector<std::pair<Kind, std::string>>;
 using Bytes = std::vector<std::uint8_t>;
 
@@ -222,6 +277,53 @@ TEST_F(CanBusTest, NoAcknowledgeIsAWarningUntilAnotherNodeIsHeard) {
   local.send(error(CAN_ERR_ACK));
   run_until([&] { return member.events.size() == 3; });
   EXPECT_EQ(member.events.back().second, lonely);
+}
+
+TEST_F(CanBusTest, TellsOfFramesThatWaitedAndSendsThemAllInOrder) {
+  const SlowBus slow(16000);
+  Talker talker(bus, CanBus::ahead);
+  bus->send();
+  EXPECT_EQ(talker.accepted, static_cast<int>(CanBus::ahead));
+  EXPECT_TRUE(bus->full());
+  EXPECT_EQ(talker.late, 0);
+  run_until([&] { return !bus->full(); });
+  EXPECT_GT(talker.late, talker.accepted / 2) << "the kernel takes few at a time";
+  EXPECT_LT(talker.late, talker.accepted) << "the first ones did not wait";
+  CanFrame frame;
+  for (int i = 0; i < talker.accepted; ++i) {
+    ASSERT_TRUE(remote.receive(frame, CanBus::now_us() + 1000000)) << i;
+    ASSERT_EQ(frame.data[0], i);
+  }
+  EXPECT_EQ(talker.stuck, 0);
+}
+
+TEST_F(CanBusTest, DropsWhatABusDoesNotTakeForLong) {
+  Talker talker(bus, CanBus::ahead);
+  const auto start = CanBus::Clock::now();
+  {
+    const SlowBus slow(800);
+    bus->send();
+    run_until([&] { return talker.stuck != 0; });
+    EXPECT_GE(CanBus::Clock::now() - start, CanBus::patience);
+    EXPECT_FALSE(bus->full());
+    EXPECT_EQ(talker.late, 0);
+  }
+  // What the kernel had is gone with its queue, or comes; nothing else does.
+  Talker next(bus, 1);
+  run_until([&] {
+    bus->send();
+    return next.accepted == 1 && !bus->full();
+  });
+}
+
+TEST_F(CanBusTest, CountsWhatTheControllerLost) {
+  Witness member(bus);
+  EXPECT_EQ(bus->overflows(), 0U);
+  local.send(error(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_OVERFLOW));
+  local.send(data(1));
+  run_until([&] { return !member.frames.empty(); });
+  EXPECT_EQ(bus->overflows(), 1U);
+  EXPECT_TRUE(member.events.empty()) << "it is counted, not told";
 }
 
 TEST_F(CanBusTest, MembersMayLeaveInsideADownEventAndNobodyIsSkipped) {

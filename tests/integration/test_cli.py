@@ -221,6 +221,17 @@ def test_a_scenario_that_is_wrong_is_bad_data():
     assert f'{file.name}:2' in result.stderr and ERROR.match(result.stderr)
 
 
+def test_a_board_tells_at_its_end_what_passed_over_its_transports(tmp_path):
+    urls = ['udp://127.0.0.1:0', f'pty:{tmp_path}/r4']
+    result = run('sim', '--json', '--duration', '0.1', *urls)
+    assert result.returncode == 0, result.stderr
+    udp, cable = [each for each in objects(result.stdout) if each['type'] == 'counters']
+    assert udp['transport'].startswith('udp://127.0.0.1:') and cable['transport'].startswith('pty:')
+    assert udp['received'] == cable['received'] == 0 and 'transfers' not in udp
+    in_words = run('sim', '--duration', '0.1', *urls).stdout.splitlines()[-1]
+    assert 'pty:' in in_words and '0 datagrams received' in in_words and 'dropped' in in_words
+
+
 @pytest.mark.parametrize('command', [['sim', 'udp://127.0.0.1:{}'],
                                      ['monitor', 'udp://127.0.0.1:9?listen={}']])
 def test_a_port_in_use_is_named(command):

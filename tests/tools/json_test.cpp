@@ -61,5 +61,21 @@ TEST(Json, TellsOfTransfersWhereThereAreSome) {
   EXPECT_EQ(json["dropped_frames"], 3);
 }
 
+TEST(Json, CountsTheDatagramsOfATransport) {
+  CarrierCounters counters;
+  counters.rx_datagrams = 5;
+  counters.tx_datagrams = 7;
+  counters.tx_dropped = 2;
+  Json json = counters_json(counters);
+  EXPECT_EQ(json["received"], 5);
+  EXPECT_EQ(json["sent"], 7);
+  EXPECT_EQ(json["dropped"], 2);
+  EXPECT_FALSE(json.contains("transfers"));
+  counters.transfers = TransferCounters();
+  counters.transfers->cancelled = 4;
+  json = counters_json(counters);
+  EXPECT_EQ(json["transfers"]["cancelled"], 4);
+}
+
 }  // namespace
 }  // namespace r4::tool

@@ -383,6 +383,7 @@ TEST(IsotpReceiver, AnOverflowInterruptsAndIsForgottenByTheNextTransfer) {
   CanFrame frame;
   EXPECT_TRUE(receiver.isotp.offer(0, frame));
   EXPECT_EQ(receiver.isotp.poll(20000), IsotpError::send_timeout) << "nobody was told";
+  EXPECT_EQ(receiver.counted(&IsotpReceiverCounters::refusal_timeout), 1U);
   EXPECT_FALSE(receiver.isotp.deadline().armed);
   expect_counters_add_up(receiver.isotp);
 }

@@ -335,6 +335,19 @@ TEST(IsotpSender, GivesUpWithoutFlowControl) {
   EXPECT_EQ(sender.counters().unexpected_frame, 1U);
 }
 
+TEST(IsotpSender, WaitsAnewWhenItsFrameGotToTheBusLate) {
+  Sender sender(classic());
+  sender.start(counted(30));
+  sender.take();
+  sender.wait_anew(15000);
+  EXPECT_EQ(sender.deadline().at_us, 35000U);
+  sender.now = 34999;
+  EXPECT_EQ(sender.answer("30 00 7F"), IsotpError::none);
+  sender.wait_anew(40000);
+  EXPECT_EQ(sender.deadline().at_us, 34999U) << "it waits for nobody";
+  EXPECT_EQ(sender.take().size(), 1U);
+}
+
 // 9.7, 9.8.4.
 TEST(IsotpSender, WaitsWhenToldToButNotForEver) {
   IsotpSenderOptions options = classic();

@@ -230,12 +230,14 @@ class Bench {
     const TransferCounters& transfers = *counters.transfers;
     fmt::print(
         "  transfers lost        {:>9}       {} wrong sequence, {} timed out, {} overflow, "
-        "{} interrupted\n",
-        transfers.wrong_sequence + transfers.timed_out + transfers.overflow + transfers.interrupted,
-        transfers.wrong_sequence, transfers.timed_out, transfers.overflow, transfers.interrupted);
+        "{} interrupted, {} cancelled\n",
+        transfers.wrong_sequence + transfers.timed_out + transfers.overflow +
+            transfers.interrupted + transfers.cancelled,
+        transfers.wrong_sequence, transfers.timed_out, transfers.overflow, transfers.interrupted,
+        transfers.cancelled);
     fmt::print(
-        "  frames passed over    {:>9}       {} unexpected, {} malformed; dropped by the "
-        "system {}\n",
+        "  frames passed over    {:>9}       {} unexpected, {} malformed; dropped unread "
+        "{}\n",
         transfers.unexpected + transfers.malformed, transfers.unexpected, transfers.malformed,
         counters.rx_overflows);
     fmt::print("  packed datagrams      {:>9}       {} of bad form\n", transfers.packed,

@@ -122,11 +122,25 @@ Json transfers_json(const CarrierCounters& counters) {
           {"timed_out", transfers.timed_out},
           {"overflow", transfers.overflow},
           {"interrupted", transfers.interrupted},
+          {"cancelled", transfers.cancelled},
           {"unexpected", transfers.unexpected},
           {"malformed", transfers.malformed},
           {"packed", transfers.packed},
           {"bad_form", transfers.bad_form},
           {"dropped_frames", counters.rx_overflows}};
+}
+
+Json counters_json(const CarrierCounters& counters) {
+  Json object{{"received", counters.rx_datagrams},
+              {"sent", counters.tx_datagrams},
+              {"dropped", counters.tx_dropped},
+              {"errors", counters.tx_errors},
+              {"oversize", counters.rx_oversize},
+              {"foreign", counters.rx_foreign},
+              {"downs", counters.downs}};
+  Json transfers = transfers_json(counters);
+  if (!transfers.is_null()) object["transfers"] = std::move(transfers);
+  return object;
 }
 
 Json problem_json(const Problem& problem) {

@@ -39,9 +39,14 @@ bool add_datagram_json(Json& object, const std::uint8_t* bytes, std::size_t size
 // {"type":"error","kind":…,"thing":…,"reason":…,"fix":…}
 Json problem_json(const Problem& problem);
 
-// {"wrong_sequence":…,"timed_out":…,"overflow":…,"interrupted":…,"unexpected":…,"malformed":…,
-//  "packed":…,"bad_form":…,"dropped_frames":…}; null where datagrams do not travel in frames.
+// {"wrong_sequence":…,"timed_out":…,"overflow":…,"interrupted":…,"cancelled":…,"unexpected":…,
+//  "malformed":…,"packed":…,"bad_form":…,"dropped_frames":…}; null where datagrams do not travel in
+//  frames.
 Json transfers_json(const CarrierCounters& counters);
+
+// {"received":…,"sent":…,"dropped":…,"errors":…,"oversize":…,"foreign":…,"downs":…}, datagrams; with
+// "transfers" where they travel in frames.
+Json counters_json(const CarrierCounters& counters);
 
 // Any bytes as printable ASCII: what is not, and the backslash, as \xNN.
 std::string escaped(std::string_view bytes);

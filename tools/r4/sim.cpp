@@ -129,6 +129,10 @@ class Board {
     for (const Carrier* const carrier : carriers_) listening.push_back(carrier->name());
   }
 
+  void end() {
+    for (const Carrier* const carrier : carriers_) log_.on_end(*carrier);
+  }
+
  private:
   sim::SimulatedBoard::Options options_of(const Options& options, const Plan& plan) {
     sim::SimulatedBoard::Options board_options;
@@ -170,6 +174,7 @@ int simulate(const Options& options) {
       end.async_wait([&io](const std::error_code&) { io.stop(); });
     }
     io.run();
+    for (const auto& board : boards) board->end();
   }
   return 0;
 }
@@ -182,7 +187,9 @@ the paper's capture. It prints where it listens and what it does; with --json on
 with "board" if there are several, "outputs" when a pin of a chip or a stepper does something else,
 "fault" when a chip is in trouble, "executed" or "refused" for a command, "rejected" (missing, unknown
 key, wrong tag, replayed, old) for what was not signed as a key asks, "transport" when one went down or
-came up, and "silence" (ms since the host was last heard) when the board goes safe for that.
+came up, and "silence" (ms since the host was last heard) when the board goes safe for that. At the end
+  {"type":"counters","transport":…,"received":…,"sent":…,"dropped":…,…}   datagrams of a transport
+with "transfers" on CAN.
 
 A scenario (--script) has lines such as: 0.5 handle released / 1 us 1 15 / 2 chip dac off / 3 reboot
 

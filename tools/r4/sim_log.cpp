@@ -149,6 +149,21 @@ Json SimLog::event(std::uint32_t t_ms) const {
   return object;
 }
 
+void SimLog::on_end(const Carrier& carrier) {
+  if (quiet_) return;
+  const CarrierCounters& counters = carrier.counters();
+  if (output_.json()) {
+    Json object{{"type", "counters"}};
+    if (!name_.empty()) object["board"] = name_;
+    object["transport"] = carrier.name();
+    object.update(counters_json(counters));
+    return print(object);
+  }
+  output_.print(fmt::format("{}{}{}: {} datagrams received, {} sent, {} dropped\n", name_,
+                            name_.empty() ? "" : ": ", carrier.name(), counters.rx_datagrams,
+                            counters.tx_datagrams, counters.tx_dropped));
+}
+
 void SimLog::on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason reason) {
   const bool silent = state == firmware::BoardState::safe && reason == SafeReason::link;
   const std::uint32_t silence_ms = silent ? t_ms - board_->application().link().fed_ms() : 0;

@@ -43,6 +43,8 @@ class SimLog {
   sim::SimulatedBoard::Events events();
   // The board they belong to, before its start().
   void watch(const sim::SimulatedBoard& board) { board_ = &board; }
+  // What passed over one of its transports, at the end.
+  void on_end(const Carrier& carrier);
 
  private:
   Json event(std::uint32_t t_ms) const;

@@ -20,12 +20,12 @@ import tempfile
 
 from trouble import Trouble
 
-FORMAT = 1  # of the cached folder: a new one where older programs cannot use it
+FORMAT = 2  # of the cached folder: a new one where older programs cannot use it
 PACKAGE = 'linux-image-amd64'
 BUSYBOX = '/bin/busybox'
 BASE_MODULES = ('virtio_pci', '9pnet_virtio', '9p', 'virtio_console')
 CAN_MODULES = ('can-raw', 'can-bcm', 'can-isotp', 'can-gw', 'can-dev', 'vcan', 'vxcan', 'slcan',
-               'sch_netem', 'kvaser_pci')
+               'sch_netem', 'sch_tbf', 'kvaser_pci')
 USB_MODULES = ('xhci-pci', 'ftdi_sio')
 XZ_MAGIC = b'\xfd7zXZ\x00'
 

@@ -64,6 +64,8 @@ class CanNode {
   bool offer_urgent(std::uint32_t now_us, CanFrame& frame);
   // The frame that was offered last was accepted.
   void frame_sent(std::uint32_t now_us);
+  // A frame that was accepted earlier has only now got to the bus: what answers it may come later.
+  void late_frame_sent(std::uint32_t now_us) { dialogue_out_.wait_anew(now_us); }
   // Takes a frame; one that is none of its own is passed over. Returns the datagram that it
   // completes, valid up to the next call, or an empty text.
   Text on_frame(const CanFrame& frame, std::uint32_t now_us);

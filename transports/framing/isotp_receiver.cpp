@@ -197,8 +197,7 @@ IsotpError IsotpReceiver::time_out() {
       return fail(IsotpError::too_many_waits, counters_.too_many_waits);
     case State::offered:
       if (!refusing()) return fail(IsotpError::send_timeout, counters_.send_timeout);
-      rest();
-      return IsotpError::send_timeout;
+      return fail(IsotpError::send_timeout, counters_.refusal_timeout);
     case State::receiving:
       return fail(IsotpError::consecutive_timeout, counters_.consecutive_timeout);
     case State::idle:

@@ -67,6 +67,7 @@ struct IsotpReceiverCounters {
   std::uint32_t cancelled = 0;
   // What was refused or ignored.
   std::uint32_t overflow = 0;          // a datagram longer than the buffer
+  std::uint32_t refusal_timeout = 0;   // of those, the sender could not be told: N_Ar
   std::uint32_t unexpected_frame = 0;  // a consecutive frame that belongs to no transfer
   std::uint32_t malformed = 0;
 };

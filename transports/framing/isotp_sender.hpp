@@ -74,6 +74,10 @@ class IsotpSender {
   bool offer(std::uint32_t now_us, CanFrame& frame);
   // The offered frame was accepted. Without one: nothing happens.
   void frame_sent(std::uint32_t now_us);
+  // What was accepted has only now got to the bus: N_Bs begins anew, if flow control is waited for.
+  void wait_anew(std::uint32_t now_us) {
+    if (state_ == State::waiting) deadline_us_ = now_us + options_.n_bs_us;
+  }
   // Takes flow control; other frames are passed over. What was wrong, the first of several.
   IsotpError on_frame(const CanFrame& frame, std::uint32_t now_us);
   // Ends a transfer that has timed out, and tells of it.
