@@ -179,12 +179,13 @@ int CanSocket::receive(std::array<Received, batch>& frames) {
   const int count = ::recvmmsg(descriptor_.get(), messages.data(), batch, MSG_DONTWAIT, nullptr);
   if (count < 0) return -errno;
 
+  // In this order: who is held up between the two takes frames for older than they are.
+  const Clock::time_point now = Clock::now();
   timespec real{};
   ::clock_gettime(CLOCK_REALTIME, &real);
   const auto since_epoch = [](const timespec& t) {
     return std::chrono::seconds(t.tv_sec) + std::chrono::nanoseconds(t.tv_nsec);
   };
-  const Clock::time_point now = Clock::now();
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     Received& received = frames[i];
     received.at = now;

@@ -4,11 +4,16 @@
 Bounds of real time are what r4 promises, so they are tested; a virtual machine that is paused breaks
 them all. A thread that only looks at the clock tells; a failure without a standstill counts at once.
 """
+import signal
 import threading
 import time
 
 import pytest
 from _pytest.runner import runtestprotocol
+
+# What the tests run is interrupted; under nohup, or in the background of a shell, it would ignore that.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 LOOK_S = 0.025  # seldom enough for the emulated machine of tools/with-can
 STANDSTILL_S = 0.02 + LOOK_S  # as exact as the promises are
