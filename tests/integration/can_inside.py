@@ -291,14 +291,13 @@ def test_garbage_on_every_id_of_ours_harms_nobody(board):
     assert executed and all(command.startswith('F:') for command in executed), executed
 
 
-@pytest.mark.parametrize('of_boards, of_hosts', [('vcan0', 'vcan0'), ('can0', 'can1')])
-def test_eight_boards_on_one_bus_each_with_its_host(of_boards, of_hosts):
+def test_eight_boards_on_one_bus_each_with_its_host():
     # At a rate that the emulated machine bears with nine processes: the backbone at 100 Hz is
     # tests/simulation's, in virtual time.
     slowly = ('--set', 'pack,1', '--set', 'rate,20')
     with contextlib.ExitStack() as stack:
-        boards = stack.enter_context(Board(f'can://{of_boards}?node=0-7', options=slowly, listens=8))
-        hosts = [stack.enter_context(monitor(f'can://{of_hosts}?node={node}')) for node in range(8)]
+        boards = stack.enter_context(Board('can://vcan0?node=0-7', options=slowly, listens=8))
+        hosts = [stack.enter_context(monitor(f'can://vcan0?node={node}')) for node in range(8)]
         for host in hosts:
             in_control(host)
         for host in hosts:
@@ -312,15 +311,16 @@ def test_eight_boards_on_one_bus_each_with_its_host(of_boards, of_hosts):
         for node in (4, 6):
             hosts[node].skip_past()
             assert hosts[node].next(is_state)['fields']['SAFE'] == 0
-        assert run('stop', f'can://{of_hosts}?node=1', timeout=60).returncode == 0
+        assert run('stop', 'can://vcan0?node=1', timeout=60).returncode == 0
         stopped = set()
         while len(stopped) < 8:  # one frame stops all of them
             stopped.add(boards.state('SAFE', 'stop')['board'])
 
 
-def test_none_of_eight_boards_at_100_hz_is_safe_by_mistake():
+def test_none_of_eight_boards_at_50_hz_is_safe_by_mistake():
+    often = ('--set', 'pack,1', '--set', 'rate,50')
     with contextlib.ExitStack() as stack:
-        boards = stack.enter_context(Board('can://vcan0?node=0-7', options=('--set', 'pack,1'), listens=8))
+        boards = stack.enter_context(Board('can://vcan0?node=0-7', options=often, listens=8))
         for node in range(8):
             stack.enter_context(beside(R4, 'monitor', f'can://vcan0?node={node}', stdout=subprocess.DEVNULL))
         for _ in range(8):
