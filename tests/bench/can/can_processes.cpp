@@ -239,23 +239,22 @@ void CanSenderProcess::serve_ours(Form form, Lane lane, const std::string& datag
   write_all(control_, "r", 1);
   for (;;) {
     const std::uint32_t count = next_count();
-    const CarrierCounters before = carrier->counters();
-    for (std::uint32_t sent = 0;;) {
-      const CarrierCounters& now = carrier->counters();
-      // What failed is sent again: an emulated processor may miss the times of ISO-TP.
-      const std::uint64_t failed = now.transfers->timed_out - before.transfers->timed_out;
-      if (sent - failed < count) {
-        if (lane == Lane::telemetry) await_room(sent);
-        if (carrier->send(datagram, Priority::normal) == SendResult::sent) {
-          ++sent;
-        } else {
-          io.run_one_for(1s);
-        }
-      } else if (now.tx_datagrams - before.tx_datagrams < sent) {
-        io.run_one_for(1s);
+    std::uint32_t sent = 0, seen = 0;
+    Clock::time_point since = Clock::now();
+    for (;;) {
+      const std::uint32_t received = shared_->received.load(std::memory_order_acquire);
+      if (received >= count) break;
+      if (received != seen) since = Clock::now();
+      seen = received;
+      // What was lost is sent again: an emulated processor may miss the times of ISO-TP.
+      if (Clock::now() - since > 200ms) sent = received;
+      const bool room = sent < count && sent - received < ahead;
+      if (room && carrier->send(datagram, Priority::normal) == SendResult::sent) {
+        ++sent;
+      } else if (lane == Lane::telemetry) {
+        if (io.poll() == 0) ::sched_yield();
       } else {
-        io.run_for(30ms);  // longer than N_Bs: the last transfer
-        if (carrier->counters().transfers->timed_out - before.transfers->timed_out == failed) break;
+        io.run_one_for(1ms);
       }
     }
   }
