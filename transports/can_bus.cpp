@@ -6,6 +6,7 @@
 #include <sched.h>
 
 #include <algorithm>
+#include <asio/defer.hpp>
 #include <asio/post.hpp>
 #include <cerrno>
 #include <map>
@@ -20,12 +21,9 @@ namespace {
 constexpr const char* not_acknowledged = "nobody acknowledges";
 constexpr std::chrono::milliseconds retry_interval{1};
 constexpr std::chrono::milliseconds look_interval{100};
-// Frames of a transfer often come closer together than a loop goes to sleep and is woken up.
-constexpr int most_looks = 8;
-constexpr int most_rounds = 16;
-// Less than a full frame takes at 1 Mbit/s: on a real bus it is in vain, and tried only that often.
-constexpr std::chrono::microseconds little_while{50};
-constexpr std::chrono::milliseconds after_in_vain{20};
+constexpr int most_looks = 8;  // others of the loop wait
+// What a program on an emulated processor takes to answer.
+constexpr std::chrono::microseconds most_polling{400};
 
 // The buses of one event loop.
 class Buses : public asio::execution_context::service {
@@ -58,7 +56,8 @@ CanBus::CanBus(asio::io_context& io, std::string interface, bool fd)
       readable_(io),
       writable_(io),
       retry_timer_(io),
-      look_timer_(io) {
+      look_timer_(io),
+      polling_(most_polling) {
   socket_.open(interface_, fd_);
   readable_.assign(socket_.number());
   listen();
@@ -127,31 +126,11 @@ void CanBus::listen() {
 
 void CanBus::receive() {
   const std::shared_ptr<CanBus> alive = shared_from_this();
-  for (int rounds = 0; rounds < most_rounds; ++rounds) {  // others of the loop wait
-    take();
-    if (socket_.number() < 0) return;
-    send();
-    if (!look_a_little()) break;
-  }
-  if (socket_.number() >= 0) listen();
-}
-
-// In a burst on a virtual bus the next frame comes sooner than a process sleeps and wakes up. The
-// sender is given the processor, if they share one.
-bool CanBus::look_a_little() {
-  const bool awaited = std::any_of(members_.begin(), members_.end(), [](const Place& place) {
-    return place.member != nullptr && place.member->awaits_frame();
-  });
-  if (!awaited) return false;
-  const Clock::time_point start = Clock::now();
-  if (start < look_from_) return false;
-  do {
-    ::sched_yield();
-    if (socket_.number() < 0) return false;
-    if (take()) return true;
-  } while (Clock::now() < start + little_while);
-  look_from_ = Clock::now() + after_in_vain;
-  return false;
+  if (take()) send();
+  if (socket_.number() < 0) return;
+  if (!socket_.simulated() || !polling_.worthwhile(Clock::now())) return listen();
+  ::sched_yield();  // to the sender, if they share a processor
+  asio::defer(io_, reading_.handler([this] { receive(); }));
 }
 
 bool CanBus::take() {
@@ -164,11 +143,18 @@ bool CanBus::take() {
       go_down(can_problem(interface_, -count), true);
       return true;
     }
+    if (!std::exchange(any, true)) polling_.on_arrival(Clock::now());
     hand_over(static_cast<std::size_t>(count));
-    any = true;
+    if (static_cast<std::size_t>(count) < in_.size()) break;
   }
   if (any && socket_.number() >= 0) {
     for_each_member([](Member& member) { member.on_drained(); });
+    const bool awaited = std::any_of(members_.begin(), members_.end(), [](const Place& place) {
+      return place.member != nullptr && place.member->awaits_frame();
+    });
+    polling_.on_silence(
+        awaited ? AdaptivePolling::Silence::within : AdaptivePolling::Silence::between,
+        Clock::now());
   }
   return any;
 }
@@ -271,6 +257,11 @@ void CanBus::have_left(std::size_t count) {
   std::move(out_of_.begin() + gone, out_of_.begin() + end, out_of_.begin());
   out_count_ -= count;
   late_ = out_count_ != 0;
+}
+
+bool CanBus::holds_frames_of(const Member& member) const {
+  const auto end = out_of_.begin() + static_cast<std::ptrdiff_t>(out_count_);
+  return std::find(out_of_.begin(), end, &member) != end;
 }
 
 void CanBus::drop_queue() {

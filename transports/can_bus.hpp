@@ -6,6 +6,8 @@
 // leave in the order in which members offer them; a member's transfer is not interrupted by
 // another's. At most `ahead` frames are taken from members at a time, the next when the interface has
 // them; after 100 ms without progress they are dropped.
+//
+// On a bus without a wire (vcan, vxcan) it stays awake for what is about to come.
 #pragma once
 
 #include <array>
@@ -17,6 +19,7 @@
 #include <string>
 #include <vector>
 
+#include "adaptive_polling.hpp"
 #include "can_socket.hpp"
 #include "carrier.hpp"
 #include "operation_slot.hpp"
@@ -34,7 +37,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
    public:
     virtual void on_frame(const CanFrame& frame, std::uint32_t at_us) = 0;
     virtual void on_drained() = 0;  // all frames that had arrived were handed over
-    // Is in the middle of a transfer whose next frame may come at once.
+    // Is in the middle of a transfer whose next frame is another's, and may come at once.
     virtual bool awaits_frame() const { return false; }
     // The frame to send now, accepted with frame_sent().
     virtual bool offer(std::uint32_t now_us, CanFrame& frame) = 0;
@@ -85,6 +88,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   bool up() const { return up_; }
   // Frames wait for the interface. None is asked for until it has taken them.
   bool full() const { return out_count_ != 0; }
+  bool holds_frames_of(const Member& member) const;
   // Frames that were dropped, for nobody took them in time: by the kernel, and times that the
   // controller told of some.
   std::uint32_t overflows() const { return socket_.overflows() + controller_overflows_; }
@@ -98,7 +102,6 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
 
   void listen();
   void receive();
-  bool look_a_little();
   void hand_over(std::size_t count);
   void on_error_frame(const CanSocket::Received& received);
   void send_urgent(std::uint32_t now_us);
@@ -134,7 +137,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   int calling_ = 0;       // members are being called: their places stay
   bool sending_ = false;
   bool receiving_ = false;
-  Clock::time_point look_from_;  // not before: it was in vain
+  AdaptivePolling polling_;
   std::array<CanFrame, ahead> out_;
   std::array<Member*, ahead> out_of_{};  // whose frame it is; null: has left
   bool late_ = false;                    // they have been refused once

@@ -53,7 +53,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
     return node_.offer_urgent(now_us, frame);
   }
   void frame_sent(std::uint32_t now_us) override { node_.frame_sent(now_us); }
-  void on_late_frame(std::uint32_t now_us) override { node_.late_frame_sent(now_us); }
+  void on_late_frame(std::uint32_t now_us) override { node_.wait_anew(now_us); }
   void on_bus(const CarrierEvent& event) override;
   void on_stuck() override;
 
@@ -236,9 +236,10 @@ void CanCarrier::arm() {
     armed_ = false;
     const std::shared_ptr<CanBus> bus = bus_;
     bus->take();
-    // While frames wait for the bus, nothing can be late that answers them.
-    if (handler_ == nullptr || bus->full()) return;
-    node_.poll(CanBus::now_us());
+    if (handler_ == nullptr) return;
+    const std::uint32_t now_us = CanBus::now_us();
+    if (bus->holds_frames_of(*this)) node_.wait_anew(now_us);
+    node_.poll(now_us);
     bus->send();
   }));
 }

@@ -148,6 +148,7 @@ void CanSocket::open(const std::string& interface, bool fd) {
              set_option(first.get(), SOL_SOCKET, SO_PRIORITY, highest_priority);
   if (!set) fail(interface, errno);
   index_ = state.index;
+  simulated_ = !state.has_controller;
   overflows_before_ += std::exchange(overflows_, 0);  // the kernel counts anew
   descriptor_ = std::move(socket);
   first_ = std::move(first);

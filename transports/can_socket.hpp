@@ -48,6 +48,8 @@ class CanSocket {
   void close() noexcept;
   int number() const { return descriptor_.get(); }
   int interface_index() const { return index_; }
+  // No controller and no wire: frames come as fast as programs make them.
+  bool simulated() const { return simulated_; }
 
   // Hears the frames with exactly these 11-bit ids, or with `everything` all of them, extended and
   // remote ones too.
@@ -69,6 +71,7 @@ class CanSocket {
   FileDescriptor descriptor_;
   FileDescriptor first_;  // with a priority and a queue of its own
   int index_ = 0;
+  bool simulated_ = false;
   std::uint32_t overflows_ = 0;         // of this opening
   std::uint32_t overflows_before_ = 0;  // of those before
   const std::unique_ptr<Inbox> inbox_;

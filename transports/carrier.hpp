@@ -44,7 +44,7 @@ struct TransferCounters {
   std::uint64_t timed_out = 0;       // a frame, or leave to send one, did not come in time
   std::uint64_t overflow = 0;        // longer than a datagram may be
   std::uint64_t interrupted = 0;     // another began in its place
-  std::uint64_t cancelled = 0;       // the bus went down, or took nothing for 100 ms
+  std::uint64_t cancelled = 0;       // the bus went down or took nothing, or another host is there
   // Frames that were passed over.
   std::uint64_t unexpected = 0;  // of no transfer
   std::uint64_t malformed = 0;

@@ -68,9 +68,8 @@ std::string link_options(const Form& form) {
          " " + can_interface;
 }
 
-// With padding, and in blocks.
 class CanUtils : public testing::TestWithParam<Form> {};
-INSTANTIATE_TEST_SUITE_P(, CanUtils, testing::Values(forms[1], forms[3]),
+INSTANTIATE_TEST_SUITE_P(, CanUtils, testing::ValuesIn(forms),
                          [](const auto& form) { return form.param.name; });
 
 TEST_P(CanUtils, IsotprecvPrintsWhatTheEngineSends) {

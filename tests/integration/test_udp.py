@@ -193,11 +193,11 @@ def test_noise_at_the_host_is_counted_and_shown_and_the_link_goes_on(board):
 
 
 def test_measures_a_link(board):
-    result = run('bench', board.host_url, '--duration', '1.5', '--json', timeout=PATIENCE_S + 10)
+    result = run('bench', board.host_url, '--duration', '5', '--json', timeout=PATIENCE_S + 10)
     assert result.returncode == 0, result
     measured = objects(result.stdout)[0]
     print(result.stdout)
-    assert SANITIZED or measured['state_hz'] == pytest.approx(100, abs=10)
+    assert SANITIZED or measured['state_hz'] == pytest.approx(100, abs=3)
     assert measured['round_trip_us']['count'] > 100 and measured['unanswered'] == 0
     assert measured['confirmation_us']['count'] > 5 and measured['unconfirmed'] == 0
     assert measured['lost'] == 0 and measured['damaged'] == 0

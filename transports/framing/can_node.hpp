@@ -64,14 +64,16 @@ class CanNode {
   bool offer_urgent(std::uint32_t now_us, CanFrame& frame);
   // The frame that was offered last was accepted.
   void frame_sent(std::uint32_t now_us);
-  // A frame that was accepted earlier has only now got to the bus: what answers it may come later.
-  void late_frame_sent(std::uint32_t now_us) { dialogue_out_.wait_anew(now_us); }
+  // Frames that were accepted wait for the bus, or have only now got there: what answers them may
+  // come later.
+  void wait_anew(std::uint32_t now_us) { dialogue_out_.wait_anew(now_us); }
   // Takes a frame; one that is none of its own is passed over. Returns the datagram that it
   // completes, valid up to the next call, or an empty text.
   Text on_frame(const CanFrame& frame, std::uint32_t now_us);
-  // Is a transfer being received whose next frame may come at once?
+  // Is the next frame of a transfer the other end's, which may come at once?
   bool awaits_frame() const {
-    return telemetry_in_.awaits_consecutive() || dialogue_in_.awaits_consecutive();
+    return telemetry_in_.awaits_consecutive() || dialogue_in_.awaits_consecutive() ||
+           dialogue_out_.busy();
   }
   // Ends what has timed out.
   void poll(std::uint32_t now_us);

@@ -15,6 +15,7 @@ namespace r4::bench {
 
 namespace {
 
+using Clock = std::chrono::steady_clock;
 constexpr std::uint8_t bare_node = 8;
 constexpr int batch = 64;
 
@@ -91,7 +92,6 @@ BareEchoProcess::BareEchoProcess(Wait wait, int question_frames, int answer_fram
 }
 
 std::vector<double> bare_round_trips(Wait wait, int question_frames, int answer_frames, int count) {
-  using Clock = std::chrono::steady_clock;
   const BareEchoProcess echo(wait, question_frames, answer_frames);
   BareEnd end(reply_id(bare_node), command_id(bare_node), wait);
   std::vector<double> seconds;
@@ -104,6 +104,47 @@ std::vector<double> bare_round_trips(Wait wait, int question_frames, int answer_
     seconds.push_back(std::chrono::duration<double>(Clock::now() - start).count());
   }
   return seconds;
+}
+
+BareSenderProcess::BareSenderProcess(Lane lane, int frames) : lane_(lane), frames_(frames) {
+  if (!fork_child()) {
+    char ready = 0;
+    read_all(control_, &ready, 1);
+    return;
+  }
+  BareEnd end(command_id(bare_node), reply_id(bare_node), Wait::looking);
+  write_all(control_, "r", 1);
+  for (;;) {
+    const std::uint32_t count = next_count(control_);
+    for (std::uint32_t sent = 0; sent < count; ++sent) {
+      if (lane == Lane::dialogue) {
+        end.send(1);
+        end.receive(1);
+        end.send(frames - 1);
+      } else {
+        await_room(received_, sent);
+        end.send(frames);
+      }
+    }
+  }
+}
+
+double BareSenderProcess::rate(std::uint32_t count) const {
+  BareEnd end(reply_id(bare_node), command_id(bare_node), Wait::looking);
+  received_.set(0);
+  const auto start = Clock::now();
+  write_all(control_, &count, sizeof count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (lane_ == Lane::dialogue) {
+      end.receive(1);
+      end.send(1);
+      end.receive(frames_ - 1);
+    } else {
+      end.receive(frames_);
+    }
+    received_.add_one();
+  }
+  return count / std::chrono::duration<double>(Clock::now() - start).count();
 }
 
 }  // namespace r4::bench

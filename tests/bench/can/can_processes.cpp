@@ -2,7 +2,6 @@
 #include "can_processes.hpp"
 
 #include <sched.h>
-#include <sys/mman.h>
 
 #include <array>
 #include <asio/io_context.hpp>
@@ -13,7 +12,6 @@
 #include <cstring>
 #include <functional>
 #include <memory>
-#include <new>
 
 #include "firmware/ports/sim/simulated_board.hpp"
 #include "protocol/units.hpp"
@@ -197,12 +195,18 @@ KernelEchoProcess::KernelEchoProcess() {
 
 // --- senders
 
+std::uint32_t next_count(int control) {
+  std::uint32_t count = 0;
+  read_all(control, &count, sizeof count);
+  return count;
+}
+
+void await_room(const SharedCount& received, std::uint32_t sent) {
+  while (sent - received.get() >= ahead) ::sched_yield();
+}
+
 CanSenderProcess::CanSenderProcess(std::optional<Form> ours, Lane lane,
                                    const std::string& datagram) {
-  void* const memory =
-      ::mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-  require(memory != MAP_FAILED, "mmap");
-  shared_ = new (memory) Shared;
   if (fork_child()) {
     if (ours) serve_ours(*ours, lane, datagram);
     serve_kernel(lane, datagram);
@@ -211,21 +215,9 @@ CanSenderProcess::CanSenderProcess(std::optional<Form> ours, Lane lane,
   read_all(control_, &ready, 1);
 }
 
-CanSenderProcess::~CanSenderProcess() { ::munmap(shared_, sizeof(Shared)); }
-
 void CanSenderProcess::begin(std::uint32_t count) const {
-  shared_->received = 0;
+  received_.set(0);
   write_all(control_, &count, sizeof count);
-}
-
-std::uint32_t CanSenderProcess::next_count() {
-  std::uint32_t count = 0;
-  read_all(control_, &count, sizeof count);
-  return count;
-}
-
-void CanSenderProcess::await_room(std::uint32_t sent) const {
-  while (sent - shared_->received.load(std::memory_order_acquire) >= ahead) ::sched_yield();
 }
 
 void CanSenderProcess::serve_ours(Form form, Lane lane, const std::string& datagram) {
@@ -238,11 +230,11 @@ void CanSenderProcess::serve_ours(Form form, Lane lane, const std::string& datag
   carrier->open(handler);
   write_all(control_, "r", 1);
   for (;;) {
-    const std::uint32_t count = next_count();
+    const std::uint32_t count = next_count(control_);
     std::uint32_t sent = 0, seen = 0;
     Clock::time_point since = Clock::now();
     for (;;) {
-      const std::uint32_t received = shared_->received.load(std::memory_order_acquire);
+      const std::uint32_t received = received_.get();
       if (received >= count) break;
       if (received != seen) since = Clock::now();
       seen = received;
@@ -265,9 +257,9 @@ void CanSenderProcess::serve_kernel(Lane lane, const std::string& datagram) {
       lane == Lane::telemetry ? kernel_telemetry(true) : kernel_dialogue(false);
   write_all(control_, "r", 1);
   for (;;) {
-    const std::uint32_t count = next_count();
+    const std::uint32_t count = next_count(control_);
     for (std::uint32_t sent = 0; sent < count; ++sent) {
-      if (lane == Lane::telemetry) await_room(sent);
+      if (lane == Lane::telemetry) await_room(received_, sent);
       socket.send(datagram);
     }
   }

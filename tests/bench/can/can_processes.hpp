@@ -3,7 +3,6 @@
 // carrier of ours alone, a plain program on the kernel's ISO-TP sockets, and senders of both kinds.
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -72,31 +71,27 @@ class KernelEchoProcess : public ChildProcess {
 
 enum class Lane { telemetry, dialogue };
 
-// Sends datagrams, as many as go. In the telemetry, which has no flow control, it keeps at most
-// `ahead` datagrams ahead of their receiver, so that nothing is lost: it is told of each.
+// A sender of the telemetry, which has no flow control, keeps at most so many datagrams ahead of their
+// receiver, so that nothing is lost: it is told of each.
+constexpr std::uint32_t ahead = 8;
+void await_room(const SharedCount& received, std::uint32_t sent);
+// How many datagrams a sender is to send next.
+std::uint32_t next_count(int control);
+
+// Sends datagrams, as many as go.
 class CanSenderProcess : public ChildProcess {
  public:
-  static constexpr std::uint32_t ahead = 8;
-
   // On our stack, or (no form) on the kernel's.
   CanSenderProcess(std::optional<Form> ours, Lane lane, const std::string& datagram);
-  ~CanSenderProcess();
-  CanSenderProcess(const CanSenderProcess&) = delete;
-  CanSenderProcess& operator=(const CanSenderProcess&) = delete;
 
   void begin(std::uint32_t count) const;
-  void received() const { shared_->received.fetch_add(1, std::memory_order_release); }
+  void received() const { received_.add_one(); }
 
  private:
-  struct Shared {
-    std::atomic<std::uint32_t> received{0};
-  };
-  void await_room(std::uint32_t sent) const;
   void serve_ours(Form form, Lane lane, const std::string& datagram);
   void serve_kernel(Lane lane, const std::string& datagram);
-  std::uint32_t next_count();
 
-  Shared* shared_;
+  SharedCount received_;
 };
 
 }  // namespace r4::bench

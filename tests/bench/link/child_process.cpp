@@ -2,6 +2,7 @@
 #include "child_process.hpp"
 
 #include <sched.h>
+#include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -9,6 +10,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <new>
 
 namespace r4::bench {
 namespace {
@@ -62,6 +64,14 @@ void place(Placement placement) {
   child_core = placement == Placement::two_cores ? 1 : 0;
   run_on_core(0);
 }
+
+SharedCount::SharedCount() {
+  void* const memory =
+      ::mmap(nullptr, sizeof *at_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  require(memory != MAP_FAILED, "mmap");
+  at_ = new (memory) std::atomic<std::uint32_t>(0);
+}
+SharedCount::~SharedCount() { ::munmap(at_, sizeof *at_); }
 
 bool ChildProcess::fork_child() {
   int ends[2];

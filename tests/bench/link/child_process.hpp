@@ -5,7 +5,9 @@
 
 #include <sys/types.h>
 
+#include <atomic>
 #include <cstddef>
+#include <cstdint>
 
 namespace r4::bench {
 
@@ -21,6 +23,22 @@ void require(bool ok, const char* what);
 // All of it, however long that takes.
 void write_all(int fd, const void* data, std::size_t size);
 void read_all(int fd, void* data, std::size_t size);
+
+// A number that this process shares with those that it forks afterwards.
+class SharedCount {
+ public:
+  SharedCount();
+  ~SharedCount();
+  SharedCount(const SharedCount&) = delete;
+  SharedCount& operator=(const SharedCount&) = delete;
+
+  void set(std::uint32_t count) const { at_->store(count, std::memory_order_release); }
+  void add_one() const { at_->fetch_add(1, std::memory_order_release); }
+  std::uint32_t get() const { return at_->load(std::memory_order_acquire); }
+
+ private:
+  std::atomic<std::uint32_t>* at_;
+};
 
 class ChildProcess {
  public:
