@@ -19,11 +19,16 @@ namespace r4 {
 namespace {
 
 constexpr const char* not_acknowledged = "nobody acknowledges";
+constexpr const char* error_passive = "the controller is error-passive";
+constexpr const char* error_warning = "the controller warns of errors";
+constexpr const char* look_at_the_wire = "look at wiring, termination and bit rate";
 constexpr std::chrono::milliseconds retry_interval{1};
 constexpr std::chrono::milliseconds look_interval{100};
 constexpr int most_looks = 8;  // others of the loop wait
 // What a program on an emulated processor takes to answer.
 constexpr std::chrono::microseconds most_polling{400};
+// Then the loop sleeps if nothing is there: who calls its poll() gets back.
+constexpr std::chrono::milliseconds most_awake{10};
 
 // The buses of one event loop.
 class Buses : public asio::execution_context::service {
@@ -45,6 +50,7 @@ std::shared_ptr<CanBus> CanBus::of(asio::io_context& io, const std::string& inte
   if (!bus) {
     bus = std::make_shared<CanBus>(io, interface, fd);
     known = bus;
+    bus->look_at_controller();
   }
   return bus;
 }
@@ -120,15 +126,28 @@ void CanBus::for_each_member(Action action) {
 // --- receiving
 
 void CanBus::listen() {
-  readable_.async_wait(asio::posix::descriptor_base::wait_read,
-                       reading_.handler([this] { receive(); }));
+  readable_.async_wait(asio::posix::descriptor_base::wait_read, reading_.handler([this] {
+    woken_ = Clock::now();
+    receive();
+  }));
+}
+
+bool CanBus::someone_awaits_a_frame() const {
+  return std::any_of(members_.begin(), members_.end(), [](const Place& place) {
+    return place.member != nullptr && place.member->awaits_frame();
+  });
 }
 
 void CanBus::receive() {
   const std::shared_ptr<CanBus> alive = shared_from_this();
   if (take()) send();
   if (socket_.number() < 0) return;
-  if (!socket_.simulated() || !polling_.worthwhile(Clock::now())) return listen();
+  const Clock::time_point now = Clock::now();
+  polling_.on_silence(someone_awaits_a_frame() ? AdaptivePolling::Silence::within
+                                               : AdaptivePolling::Silence::between,
+                      now);
+  const bool tired = now - woken_ >= most_awake;
+  if (!socket_.simulated() || tired || !polling_.worthwhile(now)) return listen();
   ::sched_yield();  // to the sender, if they share a processor
   asio::defer(io_, reading_.handler([this] { receive(); }));
 }
@@ -149,12 +168,6 @@ bool CanBus::take() {
   }
   if (any && socket_.number() >= 0) {
     for_each_member([](Member& member) { member.on_drained(); });
-    const bool awaited = std::any_of(members_.begin(), members_.end(), [](const Place& place) {
-      return place.member != nullptr && place.member->awaits_frame();
-    });
-    polling_.on_silence(
-        awaited ? AdaptivePolling::Silence::within : AdaptivePolling::Silence::between,
-        Clock::now());
   }
   return any;
 }
@@ -168,7 +181,7 @@ void CanBus::hand_over(std::size_t count) {
     }
     if (!in_[i].local) {
       // Whoever hears others is on the bus, whatever was told of before.
-      if (!up_ || trouble_ == not_acknowledged) come_up();
+      if (!up_ || (standing_ && standing_->problem.reason == not_acknowledged)) come_up();
     } else if (!up_ && in_[i].frame.id != emergency_stop_id) {
       continue;  // it did not get to the bus
     }
@@ -179,15 +192,7 @@ void CanBus::hand_over(std::size_t count) {
 }
 
 void CanBus::on_error_frame(const CanSocket::Received& received) {
-  constexpr const char* look = "look at wiring, termination and bit rate";
-  if ((received.error & CAN_ERR_BUSOFF) != 0) {
-    return go_down(
-        {ErrorKind::open, "can://" + interface_, "the controller is bus-off: too many errors",
-         fmt::format("{}, then: ip link set {} type can restart (slcan: down, and up); with "
-                     "restart-ms 100 it does so by itself",
-                     look, interface_)},
-        false);
-  }
+  if ((received.error & CAN_ERR_BUSOFF) != 0) return go_bus_off();
   if ((received.error & CAN_ERR_RESTARTED) != 0) return come_up();
   if ((received.error & CAN_ERR_CRTL) != 0) {
     const std::uint8_t controller = received.frame.data[1];
@@ -195,21 +200,37 @@ void CanBus::on_error_frame(const CanSocket::Received& received) {
     if ((controller & CAN_ERR_CRTL_ACTIVE) != 0) {
       come_up();
     } else if ((controller & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0) {
-      set_trouble("the controller is error-passive", look);
+      set_trouble(error_passive, look_at_the_wire);
     } else if ((controller & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING)) != 0) {
-      set_trouble("the controller warns of errors", look);
+      set_trouble(error_warning, look_at_the_wire);
     }
   } else if ((received.error & CAN_ERR_ACK) != 0) {
     set_trouble(not_acknowledged, "see that another node is on the bus, at this bit rate");
   }
 }
 
+// An error frame comes when the state changes; who opens the socket later asks.
+void CanBus::look_at_controller() {
+  const std::string state = can_controller(can_interface(interface_)).state;
+  if (state == "bus-off") go_bus_off();
+  if (state == "error-passive") set_trouble(error_passive, look_at_the_wire);
+  if (state == "error-warning") set_trouble(error_warning, look_at_the_wire);
+}
+
+void CanBus::go_bus_off() {
+  go_down({ErrorKind::open, "can://" + interface_, "the controller is bus-off: too many errors",
+           fmt::format("{}, then: ip link set {} type can restart (slcan: down, and up); with "
+                       "restart-ms 100 it does so by itself",
+                       look_at_the_wire, interface_)},
+          false);
+}
+
 // Told once until it changes.
 void CanBus::set_trouble(std::string reason, std::string fix) {
-  if (reason == trouble_) return;
-  trouble_ = reason;
-  tell({CarrierEvent::Kind::warning,
-        Problem{ErrorKind::open, "can://" + interface_, std::move(reason), std::move(fix)}});
+  if (!up_ || (standing_ && standing_->problem.reason == reason)) return;
+  standing_ = {CarrierEvent::Kind::warning,
+               Problem{ErrorKind::open, "can://" + interface_, std::move(reason), std::move(fix)}};
+  tell(*standing_);
 }
 
 // --- sending
@@ -249,7 +270,7 @@ bool CanBus::refill(std::uint32_t now_us) {
 void CanBus::have_left(std::size_t count) {
   if (count != 0) progress_ = Clock::now();
   for (std::size_t i = 0; late_ && i < count; ++i) {
-    if (out_of_[i] != nullptr) out_of_[i]->on_late_frame(to_us(progress_));
+    if (out_of_[i] != nullptr) out_of_[i]->on_late_frame(out_[i], to_us(progress_));
   }
   const auto gone = static_cast<std::ptrdiff_t>(count);
   const auto end = static_cast<std::ptrdiff_t>(out_count_);
@@ -259,9 +280,9 @@ void CanBus::have_left(std::size_t count) {
   late_ = out_count_ != 0;
 }
 
-bool CanBus::holds_frames_of(const Member& member) const {
-  const auto end = out_of_.begin() + static_cast<std::ptrdiff_t>(out_count_);
-  return std::find(out_of_.begin(), end, &member) != end;
+bool CanBus::holds(std::uint32_t id) const {
+  const auto end = out_.begin() + static_cast<std::ptrdiff_t>(out_count_);
+  return std::any_of(out_.begin(), end, [&](const CanFrame& frame) { return frame.id == id; });
 }
 
 void CanBus::drop_queue() {
@@ -336,18 +357,20 @@ void CanBus::go_down(Problem problem, bool reopen) {
     socket_.close();
     look_later();
   }
-  if (std::exchange(up_, false)) tell({CarrierEvent::Kind::down, std::move(problem)});
+  if (!std::exchange(up_, false)) return;
+  standing_ = {CarrierEvent::Kind::down, std::move(problem)};
+  tell(*standing_);
 }
 
 // Also when nothing was wrong but a warning.
 void CanBus::come_up() {
-  const bool troubled = !std::exchange(trouble_, {}).empty();
-  if (std::exchange(up_, true)) {
-    if (!troubled) return;
-    return tell({CarrierEvent::Kind::warning,
-                 Problem{ErrorKind::open, "can://" + interface_, "the trouble is over", ""}});
-  }
-  tell({CarrierEvent::Kind::up, Problem{ErrorKind::open, "can://" + interface_, "", ""}});
+  const bool troubled = standing_.has_value();
+  standing_.reset();
+  Problem problem{ErrorKind::open, "can://" + interface_, "", ""};
+  if (!std::exchange(up_, true)) return tell({CarrierEvent::Kind::up, std::move(problem)});
+  if (!troubled) return;
+  problem.reason = "the trouble is over";
+  tell({CarrierEvent::Kind::warning, std::move(problem)});
 }
 
 void CanBus::look_later() {
@@ -355,21 +378,26 @@ void CanBus::look_later() {
   look_timer_.async_wait(looking_.handler([this] { look(); }));
 }
 
-// Opened anew: the interface may be another one of the same name.
+// Opened anew: the interface may be another one of the same name. What keeps it from coming back may
+// change: it was down, and now its adapter is gone.
 void CanBus::look() {
   const std::shared_ptr<CanBus> alive = shared_from_this();
   try {
     socket_.open(interface_, fd_);
-  } catch (const Error&) {
-    return look_later();
+  } catch (const Error& error) {
+    look_later();
+    if (standing_ && standing_->problem.reason == error.problem().reason) return;
+    standing_ = {CarrierEvent::Kind::down, error.problem()};
+    return tell({CarrierEvent::Kind::warning, error.problem()});
   }
   hear();
   readable_.assign(socket_.number());
   listen();
   come_up();
+  look_at_controller();
 }
 
-void CanBus::tell(const CarrierEvent& event) {
+void CanBus::tell(CarrierEvent event) {  // a copy: it may be over before all know
   for_each_member([&](Member& member) { member.on_bus(event); });
 }
 

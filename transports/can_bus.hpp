@@ -16,6 +16,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -44,8 +45,11 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
     // The same, of those that may overtake what was accepted before.
     virtual bool offer_urgent(std::uint32_t now_us, CanFrame& frame) = 0;
     virtual void frame_sent(std::uint32_t now_us) = 0;
-    // A frame of its that waited for the interface has got there.
-    virtual void on_late_frame(std::uint32_t now_us) { static_cast<void>(now_us); }
+    // That frame of its waited for the interface, and has got there.
+    virtual void on_late_frame(const CanFrame& frame, std::uint32_t now_us) {
+      static_cast<void>(frame);
+      static_cast<void>(now_us);
+    }
     virtual void on_sent() = 0;  // all was asked for what they offer: time to set a timer
     // The bus came up or went down (transfers are over), or the controller is in trouble.
     virtual void on_bus(const CarrierEvent& event) = 0;
@@ -86,9 +90,12 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   SendResult send_stop();
 
   bool up() const { return up_; }
+  // What was told of last, if that is still so: for who has joined since.
+  const std::optional<CarrierEvent>& standing() const { return standing_; }
   // Frames wait for the interface. None is asked for until it has taken them.
   bool full() const { return out_count_ != 0; }
-  bool holds_frames_of(const Member& member) const;
+  bool holds(std::uint32_t id) const;
+  bool heard_rate_switch() const { return socket_.heard_rate_switch(); }
   // Frames that were dropped, for nobody took them in time: by the kernel, and times that the
   // controller told of some.
   std::uint32_t overflows() const { return socket_.overflows() + controller_overflows_; }
@@ -102,6 +109,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
 
   void listen();
   void receive();
+  bool someone_awaits_a_frame() const;
   void hand_over(std::size_t count);
   void on_error_frame(const CanSocket::Received& received);
   void send_urgent(std::uint32_t now_us);
@@ -109,12 +117,14 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   void have_left(std::size_t count);
   void drop_queue();
   void send_later();
+  void go_bus_off();
   void set_trouble(std::string reason, std::string fix);
   void go_down(Problem problem, bool reopen);
   void come_up();
   void look_later();
   void look();
-  void tell(const CarrierEvent& event);
+  void look_at_controller();
+  void tell(CarrierEvent event);
   void hear();
   void clear_places();
   template <class Action>
@@ -138,6 +148,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   bool sending_ = false;
   bool receiving_ = false;
   AdaptivePolling polling_;
+  Clock::time_point woken_;  // when it slept last, and was
   std::array<CanFrame, ahead> out_;
   std::array<Member*, ahead> out_of_{};  // whose frame it is; null: has left
   bool late_ = false;                    // they have been refused once
@@ -145,7 +156,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   Clock::time_point progress_;
 
   bool up_ = true;
-  std::string trouble_;
+  std::optional<CarrierEvent> standing_;  // down, or a warning
   std::uint32_t controller_overflows_ = 0;
   std::array<CanSocket::Received, CanSocket::batch> in_;
 };

@@ -6,6 +6,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <random>
 #include <string>
 #include <utility>
@@ -53,7 +54,9 @@ class CanCarrier final : public Carrier, private CanBus::Member {
     return node_.offer_urgent(now_us, frame);
   }
   void frame_sent(std::uint32_t now_us) override { node_.frame_sent(now_us); }
-  void on_late_frame(std::uint32_t now_us) override { node_.wait_anew(now_us); }
+  void on_late_frame(const CanFrame& frame, std::uint32_t now_us) override {
+    if (frame.id == node_.dialogue_id()) node_.wait_anew(now_us);
+  }
   void on_bus(const CarrierEvent& event) override;
   void on_stuck() override;
 
@@ -133,9 +136,8 @@ void CanCarrier::open(Handler& handler) {
                         ? std::vector<std::uint32_t>{emergency_stop_id, command_id(number_)}
                         : std::vector<std::uint32_t>{reply_id(number_), telemetry_id(number_),
                                                      command_id(number_)});
-  turn_.listen(Clock::now());
-  ++counters_.ups;
-  handler_->on_carrier_event({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
+  if (bus_->up()) on_bus({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
+  if (const std::optional<CarrierEvent> standing = bus_->standing()) on_bus(*standing);
 }
 
 void CanCarrier::close() noexcept {
@@ -236,11 +238,10 @@ void CanCarrier::arm() {
     armed_ = false;
     const std::shared_ptr<CanBus> bus = bus_;
     bus->take();
-    if (handler_ == nullptr) return;
     const std::uint32_t now_us = CanBus::now_us();
-    if (bus->holds_frames_of(*this)) node_.wait_anew(now_us);
+    if (bus->holds(node_.dialogue_id())) node_.wait_anew(now_us);
     node_.poll(now_us);
-    bus->send();
+    bus->send();  // also what others owe by now
   }));
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "can_listener.hpp"
 
+#include <optional>
 #include <utility>
 
 #include "can_interface.hpp"
@@ -16,6 +17,7 @@ CanListener::~CanListener() { bus_->leave(*this); }
 
 void CanListener::on_event(std::function<void(const CarrierEvent&)> callback) {
   event_callback_ = std::move(callback);
+  if (const std::optional<CarrierEvent> standing = bus_->standing()) on_bus(*standing);
 }
 
 void CanListener::on_bus(const CarrierEvent& event) {

@@ -24,6 +24,9 @@ class CanListener : private CanBus::Member {
 
   CanSurvey& survey() { return survey_; }
   const CanSurvey& survey() const { return survey_; }
+  // CAN FD frames came that switch their bit rate: the survey's sums need rate.data.
+  bool heard_rate_switch() const { return bus_->heard_rate_switch(); }
+  // Also of what is the matter already.
   void on_event(std::function<void(const CarrierEvent&)> callback);
 
  private:

@@ -207,6 +207,7 @@ int CanSocket::receive(std::array<Received, batch>& frames) {
     received.error = (raw[i].can_id & CAN_ERR_FLAG) != 0 ? raw[i].can_id & CAN_ERR_MASK : 0;
     received.local = (messages[i].msg_hdr.msg_flags & MSG_DONTROUTE) != 0;
     received.frame = from_kernel(raw[i], messages[i].msg_len == CANFD_MTU);
+    if (received.frame.fd && (raw[i].flags & CANFD_BRS) != 0) heard_rate_switch_ = true;
   }
   return count;
 }

@@ -50,6 +50,8 @@ class CanSocket {
   int interface_index() const { return index_; }
   // No controller and no wire: frames come as fast as programs make them.
   bool simulated() const { return simulated_; }
+  // A CAN FD frame came whose data travelled at a bit rate of their own (BRS).
+  bool heard_rate_switch() const { return heard_rate_switch_; }
 
   // Hears the frames with exactly these 11-bit ids, or with `everything` all of them, extended and
   // remote ones too.
@@ -72,6 +74,7 @@ class CanSocket {
   FileDescriptor first_;  // with a priority and a queue of its own
   int index_ = 0;
   bool simulated_ = false;
+  bool heard_rate_switch_ = false;
   std::uint32_t overflows_ = 0;         // of this opening
   std::uint32_t overflows_before_ = 0;  // of those before
   const std::unique_ptr<Inbox> inbox_;

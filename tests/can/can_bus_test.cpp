@@ -170,7 +170,7 @@ class Talker final : public CanBus::Member {
     --left_;
     ++accepted;
   }
-  void on_late_frame(std::uint32_t) override { ++late; }
+  void on_late_frame(const CanFrame&, std::uint32_t) override { ++late; }
   void on_stuck() override {
     left_ = 0;
     ++stuck;
@@ -297,47 +297,138 @@ TEST_F(CanBusTest, TellsOfFramesThatWaitedAndSendsThemAllInOrder) {
   EXPECT_EQ(talker.stuck, 0);
 }
 
-// The first frames of all hosts together take the bus three times as long as each may be unanswered.
+// A host and its board, at the two ends.
+struct Link {
+  Link(asio::io_context& io, std::size_t number)
+      : host(make_can_carrier(io, url(near_end, number), Role::host)),
+        board(make_can_carrier(io, url(far_end, number), Role::board)) {
+    host->open(at_host);
+    board->open(at_board);
+  }
+  static Url url(const std::string& end, std::size_t number) {
+    return Url::parse("can://" + end + "?node=" + std::to_string(number));
+  }
+  static std::uint64_t timed_out(const Carrier& carrier) {
+    return carrier.counters().transfers.value().timed_out;
+  }
+
+  test::Recorder at_host, at_board;
+  std::unique_ptr<Carrier> host, board;
+};
+
+const std::string in_two_frames = "0123456789";
+
+// The first frames of all hosts together take the bus longer than each may be unanswered.
 TEST_F(CanBusTest, AFirstFrameThatWaitedForTheBusHasAllOfItsTimeToBeAnswered) {
   constexpr int most_runs = 3;
+  constexpr std::size_t hosts = 16;
   const SlowBus slow(64000);
-  const std::string in_two_frames = "0123456789";
-  struct Link {
-    test::Recorder at_host, at_board;
-    std::unique_ptr<Carrier> host, board;
-  };
-  std::vector<Link> links(can_nodes);
-  for (std::size_t n = 0; n < links.size(); ++n) {
-    const std::string end = "?node=" + std::to_string(n);
-    links[n].host = make_can_carrier(io, Url::parse("can://vxcan7" + end), Role::host);
-    links[n].board = make_can_carrier(io, Url::parse("can://vxcan8" + end), Role::board);
-    links[n].host->open(links[n].at_host);
-    links[n].board->open(links[n].at_board);
-  }
-  run_for(soon);  // hosts listen before they speak
   bool in_time = false;
   for (int run = 0; run < most_runs && !in_time; ++run) {  // a machine may stand still
-    const auto timed_out = [&] {
-      std::uint64_t sum = 0;
-      for (const Link& link : links) sum += link.host->counters().transfers.value().timed_out;
-      return sum;
-    };
-    const auto arrived = [&] {
-      std::uint64_t sum = 0;
-      for (const Link& link : links) sum += link.at_board.datagrams.size();
-      return sum;
-    };
-    const std::uint64_t timed_out_before = timed_out(), arrived_before = arrived();
-    for (const Link& link : links) {
-      ASSERT_EQ(link.host->send(in_two_frames, Priority::normal), SendResult::sent);
+    std::vector<std::unique_ptr<Link>> links;
+    while (links.size() < hosts) links.push_back(std::make_unique<Link>(io, links.size()));
+    run_for(soon);  // hosts listen before they speak
+    for (const auto& link : links) {
+      ASSERT_EQ(link->host->send(in_two_frames, Priority::normal), SendResult::sent);
     }
     EXPECT_TRUE(bus->full());
+    std::uint64_t arrived = 0, timed_out = 0;
     run_until([&] {
-      return arrived() - arrived_before + timed_out() - timed_out_before == links.size();
+      arrived = timed_out = 0;
+      for (const auto& link : links) {
+        arrived += link->at_board.datagrams.size();
+        timed_out += Link::timed_out(*link->host) + Link::timed_out(*link->board);
+      }
+      return arrived + timed_out >= links.size();
     });
-    in_time = timed_out() == timed_out_before;
+    in_time = arrived == links.size();
   }
   EXPECT_TRUE(in_time);
+}
+
+TEST_F(CanBusTest, AFirstFrameThatNobodyAnswersTimesOutThoughOthersKeepTheBusFull) {
+  Link link(io, node);
+  link.board->close();
+  run_for(soon);
+  const SlowBus slow(16000);
+  ASSERT_EQ(link.host->send(in_two_frames, Priority::normal), SendResult::sent);
+  Talker talker(bus, 200);
+  bus->send();
+  run_until([&] { return Link::timed_out(*link.host) == 1; });
+  EXPECT_TRUE(bus->full());
+  EXPECT_LT(talker.accepted, 200);
+}
+
+// The frame came in time, by its stamp: what this process did meanwhile does not make it late.
+TEST_F(CanBusTest, FlowControlThatCameInTimeIsObeyedHoweverLateItIsRead) {
+  Link link(io, node);
+  link.board->close();
+  run_for(soon);
+  CanFrame first{};
+  test::RawCan far(command_id(node), far_end);
+  ASSERT_EQ(link.host->send(in_two_frames, Priority::normal), SendResult::sent);
+  ASSERT_TRUE(far.receive(first, CanBus::now_us() + 1000000));
+  const std::uint32_t had_us = CanBus::now_us();
+  CanFrame go{};
+  go.id = reply_id(node);
+  go.size = 3;
+  go.data[0] = 0x30;
+  far.send(go);
+  ASSERT_LT(CanBus::now_us() - had_us, 20000U) << "this machine stood still";
+  std::this_thread::sleep_for(std::chrono::milliseconds(40));  // held up, twice as long as N_Bs
+  EXPECT_EQ(link.host->send(in_two_frames, Priority::normal), SendResult::sent);
+  CanFrame second{};
+  io.restart();
+  while (io.run_one_for(soon) != 0 && !far.receive(second, CanBus::now_us())) continue;
+  EXPECT_EQ(second.data[0], 0x21) << "the consecutive frame";
+  EXPECT_EQ(Link::timed_out(*link.host), 0U);
+}
+
+// --- who comes later
+
+TEST_F(CanBusTest, OneWhoOpensABusThatIsDownIsToldThatAndThenThatItIsUp) {
+  Witness first(bus);
+  local.send(error(CAN_ERR_BUSOFF));
+  run_until([&] { return !bus->up(); });
+  test::Recorder told;
+  const auto host = make_can_carrier(io, Url::parse("can://vxcan7?node=3"), Role::host);
+  host->open(told);
+  ASSERT_EQ(told.events.size(), 1U);
+  EXPECT_EQ(told.events[0].kind, Kind::down);
+  EXPECT_EQ(told.events[0].problem.reason, bus_off);
+  EXPECT_FALSE(host->up());
+  local.send(error(CAN_ERR_RESTARTED));
+  run_until([&] { return told.events.size() == 2; });
+  EXPECT_EQ(told.events[1].kind, Kind::up);
+  EXPECT_TRUE(host->up());
+}
+
+TEST_F(CanBusTest, OneWhoOpensABusInTroubleIsToldOfIt) {
+  Witness first(bus);
+  local.send(error(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE));
+  run_until([&] { return !first.events.empty(); });
+  test::Recorder told;
+  const auto host = make_can_carrier(io, Url::parse("can://vxcan7?node=3"), Role::host);
+  host->open(told);
+  ASSERT_EQ(told.events.size(), 2U);
+  EXPECT_EQ(told.events[0].kind, Kind::up);
+  EXPECT_EQ(told.events[1].kind, Kind::warning);
+  EXPECT_EQ(told.events[1].problem.reason, passive);
+}
+
+TEST_F(CanBusTest, AnInterfaceThatGoesDownAndThenAwayIsToldOfTwiceAndItsReturnOnce) {
+  Witness member(bus);
+  ASSERT_EQ(0, std::system("ip link set vxcan7 down"));
+  run_until([&] { return !bus->up(); });
+  TearDownTestSuite();
+  run_until([&] { return member.events.size() == 2; });
+  EXPECT_EQ(member.events.back(),
+            (std::pair<Kind, std::string>{Kind::warning, "there is no interface vxcan7"}));
+  EXPECT_EQ(member.fix.find("plug its adapter in"), 0U) << member.fix;
+  SetUpTestSuite();
+  run_until([&] { return bus->up(); });
+  EXPECT_EQ(member.events.size(), 3U);
+  EXPECT_EQ(member.events.back().first, Kind::up);
 }
 
 TEST_F(CanBusTest, DropsWhatABusDoesNotTakeForLong) {

@@ -107,6 +107,8 @@ inline Course drive(RawCan& bus, IsotpSender& sender, const std::string& datagra
       sender.on_frame(frame, clock_us());
       ++course.answers;
       follows = false;
+    } else {
+      sender.poll(clock_us());
     }
   }
   course.error = sender.error();

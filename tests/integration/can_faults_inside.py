@@ -109,6 +109,15 @@ def test_the_load_that_is_shown_is_the_time_that_the_bus_was_taken(bus, board):
     assert abs(1e6 * shown['load'] / shown['frames'] / (busy_us / frames) - 1) < 0.01
 
 
+def test_who_opens_a_controller_that_is_bus_off_is_told(bus):
+    bus.order('spoil', 1)
+    subprocess.run(['cansend', 'slcan1', f'{FLOOD:X}#00'], check=True)
+    bus.state(1, 'bus-off')
+    with monitor(HOST) as host:
+        down = host.next(told('bus-off'))
+    assert 'ip link set slcan1' in down['fields']['fix'], down
+
+
 def test_bus_off_of_the_boards_controller(bus, board):
     with driving_host(board):
         bus.order('spoil', 0)

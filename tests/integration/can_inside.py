@@ -359,6 +359,14 @@ def test_a_bus_is_shown_with_all_of_its_boards():
     assert silent.returncode == 3 and ERROR.search(silent.stderr), silent
 
 
+def test_r4_bus_tells_that_it_needs_the_data_bit_rate():
+    with beside('cangen', 'vcan0', '-b', '-g', '20'):
+        warned = run('bus', 'can://vcan0', '--duration', '1', timeout=60)
+        assert warned.returncode == 0 and '--dbitrate' in warned.stderr, warned
+        told = run('bus', 'can://vcan0', '--duration', '1', '--dbitrate', '5000000', timeout=60)
+        assert told.returncode == 0 and told.stderr == '', told
+
+
 def test_the_load_of_a_bus_counts_by_its_controllers_bit_rate():
     def set_to(rate):
         ip('link', 'set', 'can0', 'down')

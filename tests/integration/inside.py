@@ -1,21 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs test files where SocketCAN is: here, or in the guest of tools/with-can.
+"""Runs test files where SocketCAN is: in the guest of tools/with-can, or here if this is it.
 
+Nowhere else: on a machine's own CAN interfaces there may be motors.
 A run in which one of their tests was not executed fails.
 """
+import os
 import pathlib
 import re
 import subprocess
 
 HERE = pathlib.Path(__file__).resolve().parent
-WITH_CAN = HERE.parents[1] / 'tools' / 'with-can'
+TOOL = HERE.parents[1] / 'tools' / 'with-can'
+WITH_CAN = [TOOL] if 'R4_CAN_GUEST' in os.environ else [TOOL, '--guest']
 
 
-def run_inside(*names, options=(), seconds=240):
-    """`names`: files beside this one; `options`: of tools/with-can."""
+def run_inside(*names, seconds=240):
+    """`names`: files beside this one."""
     files = [HERE / name for name in names]
     inside = subprocess.run(
-        [WITH_CAN, *options, '--time', str(seconds), '/usr/bin/python3', '-m', 'pytest', *files, '-q', '-ra',
+        [*WITH_CAN, '--time', str(seconds), '/usr/bin/python3', '-m', 'pytest', *files, '-q', '-ra',
          '-s', '-p', 'no:cacheprovider'], stdin=subprocess.DEVNULL, capture_output=True, text=True,
         timeout=min(seconds + 50, 290), check=False)
     print(inside.stdout)

@@ -8,9 +8,9 @@ import pathlib
 import re
 import subprocess
 
+from inside import WITH_CAN
 from r4_process import R4
 
-WITH_CAN = pathlib.Path(__file__).resolve().parents[2] / 'tools' / 'with-can'
 CAN_TEST = pathlib.Path(os.environ.get('R4_CAN_TEST') or pathlib.Path(R4).parent / 'tests/can_test')
 FILTERS = ('GTEST_FILTER', 'GTEST_TOTAL_SHARDS', 'GTEST_SHARD_INDEX', 'GTEST_REPEAT')
 
@@ -21,7 +21,7 @@ def test_every_test_of_can_test_is_executed_and_passes():
     count = len(re.findall(r'^  \w', listed, re.MULTILINE))
     assert count > 0
     environment = {key: value for key, value in os.environ.items() if key not in FILTERS}
-    result = subprocess.run([WITH_CAN, '--time', '200', CAN_TEST], env=environment,
+    result = subprocess.run([*WITH_CAN, '--time', '200', CAN_TEST], env=environment,
                             stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=280,
                             check=False)
     print(result.stdout[-20000:])

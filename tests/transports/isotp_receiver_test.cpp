@@ -293,6 +293,19 @@ TEST(IsotpReceiver, AMalformedFrameDoesNotInterrupt) {
   expect_counters_add_up(receiver.isotp);
 }
 
+// What arrived in time may be read late; meanwhile there may be other things to send.
+TEST(IsotpReceiver, DoesNotGiveUpForBeingAskedForAFrameTooLate) {
+  Receiver receiver(controlled());
+  receiver.take("10 0A 01 02 03 04 05 06");
+  EXPECT_EQ(receiver.answer(), "30 00 00");
+  receiver.now = 2 * n_cr_us;
+  EXPECT_EQ(receiver.answer(), "");
+  receiver.now = n_cr_us - 1;  // the stamp of the frame
+  EXPECT_EQ(receiver.take("21 07 08 09 0A"), IsotpError::none);
+  EXPECT_EQ(receiver.datagrams.size(), 1U);
+  expect_counters_add_up(receiver.isotp);
+}
+
 // 9.8.2, N_Cr: from the flow control or the frame before.
 TEST(IsotpReceiver, GivesUpWhenFramesStayAway) {
   for (const IsotpReceiverOptions& options : {controlled(), listening()}) {

@@ -217,6 +217,19 @@ TEST(IsotpSender, GivesUpAFrameThatTheBusDoesNotAccept) {
   }
 }
 
+// What arrived in time may be read late; meanwhile there may be other things to send.
+TEST(IsotpSender, DoesNotGiveUpForBeingAskedForAFrameTooLate) {
+  Sender sender(classic());
+  sender.start(counted(10));
+  EXPECT_EQ(sender.take().size(), 1U);
+  sender.now = 30000;
+  EXPECT_TRUE(sender.take().empty());
+  sender.now = 19999;  // the stamp of the flow control
+  EXPECT_EQ(sender.answer("30 00 00"), IsotpError::none);
+  EXPECT_EQ(sender.take().size(), 1U);
+  expect_counters_add_up(sender);
+}
+
 // 9.6.5.3: flow control after the first frame and after each block of BS frames but the last.
 TEST(IsotpSender, SendsBlocksAsLongAsTheReceiverSays) {
   const struct {

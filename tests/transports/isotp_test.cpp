@@ -145,6 +145,8 @@ class Bus {
       }
     }
     now += wait;
+    sender.poll(now);
+    receiver.poll(now);
   }
 
   std::string buffer_;

@@ -177,7 +177,7 @@ comes above 80 % of load: damaged frames are sent again, and what has a high id 
 
 Of a real bus: on a terminal the last second, redrawn until Ctrl-C; else, or with --duration, one table.
 The bit rate is the controller's; a virtual bus has none and is taken for one of 1 Mbit/s. Frames of
-CAN FD are counted as switching to --dbitrate, if that is given.
+CAN FD are counted as switching to --dbitrate; if some do and it is not given, that is told.
 
 Exit codes: 0 it fits; 1 it does not, more than 100 %; 2 an option is wrong; 4, 5, 6 the interface
 cannot be opened.)";

@@ -88,7 +88,7 @@ class LiveBus {
       for (const std::string& row : table(window)) print_text(row + "\n");
     }
     std::fflush(stdout);
-    if (!problem_.empty()) fmt::print(stderr, "r4: warning: {}\n", problem_);
+    for (const std::string& trouble : troubles()) fmt::print(stderr, "r4: warning: {}\n", trouble);
     if (window.load(window.total) > nearly_full_) {
       fmt::print(stderr, "r4: warning: {}\n", fullness(window));
     }
@@ -120,7 +120,7 @@ class LiveBus {
         std::vector<std::string> rows = table(window);
         if (window.load(window.total) > nearly_full_)
           rows.push_back("warning: " + fullness(window));
-        if (!problem_.empty()) rows.push_back(problem_);
+        for (const std::string& trouble : troubles()) rows.push_back(trouble);
         screen_.draw(std::move(rows));
       }
       wait();
@@ -184,6 +184,18 @@ class LiveBus {
     bus["dbitrate"] = rate_.data;
     bus["nearly_full"] = window.load(window.total) > nearly_full_;
     print_line(bus);
+  }
+
+  std::vector<std::string> troubles() const {
+    std::vector<std::string> found;
+    if (!problem_.empty()) found.push_back(problem_);
+    if (rate_.data == 0 && listener_.heard_rate_switch()) {
+      found.push_back(fmt::format(
+          "{0}: CAN FD frames switch their bit rate, and all of them is counted at {1} kbit/s; add "
+          "--dbitrate, of which `ip -details link show {2}` tells",
+          options_.url, rate_.nominal / 1000.0, url_.host()));
+    }
+    return found;
   }
 
   std::string fullness(const Window& window) const {

@@ -72,6 +72,8 @@ CanNode::CanNode(CanEnd end, std::uint8_t node, bool fd)
                    sizeof dialogue_in_bytes_),
       telemetry_in_(telemetry_receiver(node, fd), telemetry_bytes_, sizeof telemetry_bytes_) {}
 
+std::uint32_t CanNode::dialogue_id() const { return own_id(end_, node_); }
+
 CanLane CanNode::lane_of(Text datagram) const {
   if (end_ == CanEnd::host) return CanLane::dialogue;
   const bool answer = datagram.size() > 1 && datagram.data()[1] == ':' &&

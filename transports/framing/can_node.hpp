@@ -64,8 +64,10 @@ class CanNode {
   bool offer_urgent(std::uint32_t now_us, CanFrame& frame);
   // The frame that was offered last was accepted.
   void frame_sent(std::uint32_t now_us);
-  // Frames that were accepted wait for the bus, or have only now got there: what answers them may
-  // come later.
+  // The id of what this end sends in the dialogue.
+  std::uint32_t dialogue_id() const;
+  // Frames of that id that were accepted still wait for the bus, or have only now got there: what
+  // answers them may come later.
   void wait_anew(std::uint32_t now_us) { dialogue_out_.wait_anew(now_us); }
   // Takes a frame; one that is none of its own is passed over. Returns the datagram that it
   // completes, valid up to the next call, or an empty text.
@@ -73,7 +75,7 @@ class CanNode {
   // Is the next frame of a transfer the other end's, which may come at once?
   bool awaits_frame() const {
     return telemetry_in_.awaits_consecutive() || dialogue_in_.awaits_consecutive() ||
-           dialogue_out_.busy();
+           dialogue_out_.awaits_flow_control();
   }
   // Ends what has timed out.
   void poll(std::uint32_t now_us);

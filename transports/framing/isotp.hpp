@@ -13,7 +13,7 @@
 //     offer(now, frame)      is there a frame to send? The same one is offered until …
 //     frame_sent(now)        … the bus, or the queue before it, has accepted it
 //     deadline()             when to call offer() again, so that a loop needs one timer
-//     poll(now)              ends what has timed out (offer() and on_frame() do so too)
+//     poll(now)              ends what has timed out (on_frame() does so too, offer() if it is its frame)
 //
 // frame_sent() means accepted, and is called before what arrives after that is handed in. A queue
 // that is full costs time, never a frame in the middle.

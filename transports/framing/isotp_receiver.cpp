@@ -125,6 +125,7 @@ IsotpArrival IsotpReceiver::on_consecutive(const CanFrame& frame, std::uint32_t 
 }
 
 bool IsotpReceiver::offer(std::uint32_t now_us, CanFrame& frame) {
+  if (state_ == State::receiving) return false;
   poll(now_us);
   if (state_ == State::owing && reached(now_us, deadline_us_)) {
     if (!refusing()) status_ = held_ ? IsotpFlowStatus::wait : IsotpFlowStatus::clear_to_send;

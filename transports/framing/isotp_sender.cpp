@@ -36,7 +36,7 @@ bool IsotpSender::offer(std::uint32_t now_us, CanFrame& frame) {
   if (state_ == State::ready && reached(now_us, deadline_us_)) {
     state_ = State::offered;
     deadline_us_ = now_us + options_.n_as_us;
-  } else if (poll(now_us) != IsotpError::none || state_ != State::offered) {
+  } else if (state_ != State::offered || poll(now_us) != IsotpError::none) {
     return false;
   }
   std::uint32_t used = 0;

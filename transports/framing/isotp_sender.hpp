@@ -67,6 +67,7 @@ class IsotpSender {
     return begin(datagram.data(), static_cast<std::uint32_t>(datagram.size()), now_us);
   }
   bool busy() const { return state_ != State::idle; }
+  bool awaits_flow_control() const { return state_ == State::waiting; }
   // What ended the last transfer; `none` while one is on its way and when all frames were accepted.
   IsotpError error() const { return error_; }
 
