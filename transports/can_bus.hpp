@@ -94,7 +94,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   const std::optional<CarrierEvent>& standing() const { return standing_; }
   // Frames wait for the interface. None is asked for until it has taken them.
   bool full() const { return out_count_ != 0; }
-  bool holds(std::uint32_t id) const;
+  bool holds(std::uint32_t id) const;  // some of that id wait
   bool heard_rate_switch() const { return socket_.heard_rate_switch(); }
   // Frames that were dropped, for nobody took them in time: by the kernel, and times that the
   // controller told of some.
