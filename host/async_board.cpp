@@ -213,6 +213,7 @@ struct AsyncBoard::Impl final : Carrier::Handler,
                   "make another one for the same URL");
     }
     carrier->open(*this);
+    if (closed) return;  // by the callback that was told that it is open
     is_open = true;
     enter(Completion::How::post, [this] { due = session.poll(now); });
   }

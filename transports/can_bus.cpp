@@ -112,11 +112,11 @@ void CanBus::hear() {
   socket_.hear(ids);
 }
 
-// Members may leave, and others join, in any call of theirs.
+// Members may leave, and others join, in any call of theirs: those come later than what is told.
 template <class Action>
 void CanBus::for_each_member(Action action) {
   ++calling_;
-  for (std::size_t i = 0; i < members_.size(); ++i) {  // NOLINT(modernize-loop-convert): it grows
+  for (std::size_t i = 0, count = members_.size(); i < count; ++i) {
     if (members_[i].member != nullptr) action(*members_[i].member);
   }
   --calling_;
@@ -142,12 +142,13 @@ void CanBus::receive() {
   const std::shared_ptr<CanBus> alive = shared_from_this();
   if (take()) send();
   if (socket_.number() < 0) return;
+  if (!socket_.simulated()) return listen();
   const Clock::time_point now = Clock::now();
   polling_.on_silence(someone_awaits_a_frame() ? AdaptivePolling::Silence::within
                                                : AdaptivePolling::Silence::between,
                       now);
   const bool tired = now - woken_ >= most_awake;
-  if (!socket_.simulated() || tired || !polling_.worthwhile(now)) return listen();
+  if (tired || !polling_.worthwhile(now)) return listen();
   ::sched_yield();  // to the sender, if they share a processor
   asio::defer(io_, reading_.handler([this] { receive(); }));
 }
@@ -204,7 +205,7 @@ void CanBus::on_error_frame(const CanSocket::Received& received) {
     } else if ((controller & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING)) != 0) {
       set_trouble(error_warning, look_at_the_wire);
     }
-  } else if ((received.error & CAN_ERR_ACK) != 0) {
+  } else if ((received.error & CAN_ERR_ACK) != 0 && !standing_) {  // the least of them
     set_trouble(not_acknowledged, "see that another node is on the bus, at this bit rate");
   }
 }
@@ -212,7 +213,8 @@ void CanBus::on_error_frame(const CanSocket::Received& received) {
 // An error frame comes when the state changes; who opens the socket later asks.
 void CanBus::look_at_controller() {
   const std::string state = can_controller(can_interface(interface_)).state;
-  if (state == "bus-off") go_bus_off();
+  if (state == "bus-off") return go_bus_off();
+  if (!up_) come_up();
   if (state == "error-passive") set_trouble(error_passive, look_at_the_wire);
   if (state == "error-warning") set_trouble(error_warning, look_at_the_wire);
 }
@@ -278,11 +280,6 @@ void CanBus::have_left(std::size_t count) {
   std::move(out_of_.begin() + gone, out_of_.begin() + end, out_of_.begin());
   out_count_ -= count;
   late_ = out_count_ != 0;
-}
-
-bool CanBus::holds(std::uint32_t id) const {
-  const auto end = out_.begin() + static_cast<std::ptrdiff_t>(out_count_);
-  return std::any_of(out_.begin(), end, [&](const CanFrame& frame) { return frame.id == id; });
 }
 
 void CanBus::drop_queue() {
@@ -357,9 +354,15 @@ void CanBus::go_down(Problem problem, bool reopen) {
     socket_.close();
     look_later();
   }
-  if (!std::exchange(up_, false)) return;
-  standing_ = {CarrierEvent::Kind::down, std::move(problem)};
-  tell(*standing_);
+  be_down(std::move(problem));
+}
+
+// What keeps it down may change: it was bus-off or down, and now its adapter is gone.
+void CanBus::be_down(Problem problem) {
+  const bool was_up = std::exchange(up_, false);
+  if (!was_up && standing_ && standing_->problem.reason == problem.reason) return;
+  standing_ = {CarrierEvent::Kind::down, problem};
+  tell({was_up ? CarrierEvent::Kind::down : CarrierEvent::Kind::warning, std::move(problem)});
 }
 
 // Also when nothing was wrong but a warning.
@@ -378,22 +381,18 @@ void CanBus::look_later() {
   look_timer_.async_wait(looking_.handler([this] { look(); }));
 }
 
-// Opened anew: the interface may be another one of the same name. What keeps it from coming back may
-// change: it was down, and now its adapter is gone.
+// Opened anew: the interface may be another one of the same name.
 void CanBus::look() {
   const std::shared_ptr<CanBus> alive = shared_from_this();
   try {
     socket_.open(interface_, fd_);
   } catch (const Error& error) {
     look_later();
-    if (standing_ && standing_->problem.reason == error.problem().reason) return;
-    standing_ = {CarrierEvent::Kind::down, error.problem()};
-    return tell({CarrierEvent::Kind::warning, error.problem()});
+    return be_down(error.problem());
   }
   hear();
   readable_.assign(socket_.number());
   listen();
-  come_up();
   look_at_controller();
 }
 

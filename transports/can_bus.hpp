@@ -10,6 +10,7 @@
 // On a bus without a wire (vcan, vxcan) it stays awake for what is about to come.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <asio/io_context.hpp>
 #include <chrono>
@@ -94,7 +95,12 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   const std::optional<CarrierEvent>& standing() const { return standing_; }
   // Frames wait for the interface. None is asked for until it has taken them.
   bool full() const { return out_count_ != 0; }
-  bool holds(std::uint32_t id) const;  // some of that id wait
+  // Does one of them fulfil it?
+  template <class Predicate>
+  bool holds(Predicate predicate) const {
+    const auto end = out_.begin() + static_cast<std::ptrdiff_t>(out_count_);
+    return std::any_of(out_.begin(), end, predicate);
+  }
   bool heard_rate_switch() const { return socket_.heard_rate_switch(); }
   // Frames that were dropped, for nobody took them in time: by the kernel, and times that the
   // controller told of some.
@@ -120,6 +126,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   void go_bus_off();
   void set_trouble(std::string reason, std::string fix);
   void go_down(Problem problem, bool reopen);
+  void be_down(Problem problem);
   void come_up();
   void look_later();
   void look();

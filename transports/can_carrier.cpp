@@ -23,6 +23,7 @@ namespace {
 
 constexpr std::size_t normal_entries = 32;
 constexpr std::size_t state_entries = 1;  // newest wins
+constexpr std::uint32_t look_again_us = 20000;
 
 class CanCarrier final : public Carrier, private CanBus::Member {
  public:
@@ -55,7 +56,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   }
   void frame_sent(std::uint32_t now_us) override { node_.frame_sent(now_us); }
   void on_late_frame(const CanFrame& frame, std::uint32_t now_us) override {
-    if (frame.id == node_.dialogue_id()) node_.wait_anew(now_us);
+    if (node_.may_be_answered(frame)) node_.wait_anew(now_us);
   }
   void on_bus(const CarrierEvent& event) override;
   void on_stuck() override;
@@ -65,6 +66,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   bool begin_waiting(std::uint32_t now_us);
   void listen_for_others(const CanFrame& frame);
   void arm();
+  void on_deadline();
 
   asio::io_context& io_;
   const Url url_;
@@ -130,14 +132,16 @@ TransferCounters transfers_of(const CanNode& node) {
 
 void CanCarrier::open(Handler& handler) {
   close();
-  bus_ = CanBus::of(io_, url_.host(), fd_);
+  const std::shared_ptr<CanBus> bus = CanBus::of(io_, url_.host(), fd_);
+  bus_ = bus;
   handler_ = &handler;
-  bus_->join(*this, role_ == Role::board
-                        ? std::vector<std::uint32_t>{emergency_stop_id, command_id(number_)}
-                        : std::vector<std::uint32_t>{reply_id(number_), telemetry_id(number_),
-                                                     command_id(number_)});
-  if (bus_->up()) on_bus({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
-  if (const std::optional<CarrierEvent> standing = bus_->standing()) on_bus(*standing);
+  bus->join(*this, role_ == Role::board
+                       ? std::vector<std::uint32_t>{emergency_stop_id, command_id(number_)}
+                       : std::vector<std::uint32_t>{reply_id(number_), telemetry_id(number_),
+                                                    command_id(number_)});
+  if (bus->up()) on_bus({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
+  const std::optional<CarrierEvent> standing = bus->standing();
+  if (standing && bus_ == bus) on_bus(*standing);  // not closed meanwhile
 }
 
 void CanCarrier::close() noexcept {
@@ -225,24 +229,28 @@ const CarrierCounters& CanCarrier::counters() const {
 void CanCarrier::on_drained() { handler_->on_drained(); }
 
 void CanCarrier::arm() {
-  const IsotpDeadline deadline = node_.deadline();
+  IsotpDeadline deadline = node_.deadline();
   if (handler_ == nullptr || !deadline.armed) return;
-  // What is due to be sent waits for the bus, which asks for it.
-  if (bus_->full() && reached(CanBus::now_us(), deadline.at_us)) return;
+  const std::uint32_t now_us = CanBus::now_us();
+  // What is due to be sent waits for the bus, which asks for it; behind it something may time out.
+  if (bus_->full() && reached(now_us, deadline.at_us)) deadline.at_us = now_us + look_again_us;
   if (armed_ && reached(deadline.at_us, armed_for_us_)) return;
   armed_ = true;
   armed_for_us_ = deadline.at_us;
-  const auto in_us = static_cast<std::int32_t>(deadline.at_us - CanBus::now_us());
+  const auto in_us = static_cast<std::int32_t>(deadline.at_us - now_us);
   timer_.expires_after(std::chrono::microseconds(in_us > 0 ? in_us : 0));
-  timer_.async_wait(timing_.handler([this] {
-    armed_ = false;
-    const std::shared_ptr<CanBus> bus = bus_;
-    bus->take();
-    const std::uint32_t now_us = CanBus::now_us();
-    if (bus->holds(node_.dialogue_id())) node_.wait_anew(now_us);
-    node_.poll(now_us);
-    bus->send();  // also what others owe by now
-  }));
+  timer_.async_wait(timing_.handler([this] { on_deadline(); }));
+}
+
+void CanCarrier::on_deadline() {
+  armed_ = false;
+  const std::shared_ptr<CanBus> bus = bus_;
+  bus->take();
+  const std::uint32_t now_us = CanBus::now_us();
+  const auto answerable = [this](const CanFrame& frame) { return node_.may_be_answered(frame); };
+  if (bus->holds(answerable)) node_.wait_anew(now_us);
+  node_.poll(now_us);
+  bus->send();  // also what others owe by now
 }
 
 void CanCarrier::on_bus(const CarrierEvent& event) {

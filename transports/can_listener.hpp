@@ -26,6 +26,8 @@ class CanListener : private CanBus::Member {
   const CanSurvey& survey() const { return survey_; }
   // CAN FD frames came that switch their bit rate: the survey's sums need rate.data.
   bool heard_rate_switch() const { return bus_->heard_rate_switch(); }
+  // Down, or warned of.
+  bool in_trouble() const { return bus_->standing().has_value(); }
   // Also of what is the matter already.
   void on_event(std::function<void(const CarrierEvent&)> callback);
 

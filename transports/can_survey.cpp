@@ -73,7 +73,6 @@ void CanSurvey::receive(std::uint8_t node, const CanFrame& frame, CanIdKind kind
   if (!lanes) lanes = std::make_unique<Lanes>(node);
   IsotpReceiver& receiver = kind == CanIdKind::reply ? lanes->replies : lanes->telemetry;
   const std::uint64_t before = errors(receiver.counters());
-  receiver.poll(at_us);
   const bool complete = receiver.on_frame(frame, at_us).datagram;
   boards_[node].damaged += errors(receiver.counters()) - before;
   if (!complete) return;

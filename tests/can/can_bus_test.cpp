@@ -279,6 +279,18 @@ TEST_F(CanBusTest, NoAcknowledgeIsAWarningUntilAnotherNodeIsHeard) {
   EXPECT_EQ(member.events.back().second, lonely);
 }
 
+TEST_F(CanBusTest, NoAcknowledgeIsNotToldOfAControllerInTroubleNorEndsIt) {
+  Witness member(bus);
+  local.send(error(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE));
+  local.send(error(CAN_ERR_ACK));
+  remote.send(data(1));
+  run_until([&] { return !member.frames.empty(); });
+  EXPECT_EQ(member.events, (Told{{Kind::warning, passive}}));
+  local.send(error(CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE));
+  run_until([&] { return member.events.size() == 2; });
+  EXPECT_EQ(member.events.back().second, over);
+}
+
 TEST_F(CanBusTest, TellsOfFramesThatWaitedAndSendsThemAllInOrder) {
   const SlowBus slow(16000);
   Talker talker(bus, CanBus::ahead);
@@ -359,6 +371,18 @@ TEST_F(CanBusTest, AFirstFrameThatNobodyAnswersTimesOutThoughOthersKeepTheBusFul
   EXPECT_LT(talker.accepted, 200);
 }
 
+// A board that always has a state to send sets no timer for that, but for the answer that it waits for.
+TEST_F(CanBusTest, WhatNobodyAnswersTimesOutAlsoBehindAStateThatTakesTheBusLong) {
+  test::Recorder told;
+  const auto board = make_can_carrier(io, Link::url(near_end, node), Role::board);
+  board->open(told);
+  const SlowBus slow(32000);
+  ASSERT_EQ(board->send(std::string(max_datagram, 'A'), Priority::state), SendResult::sent);
+  ASSERT_EQ(board->send("N:" + in_two_frames, Priority::normal), SendResult::sent);
+  run_until([&] { return Link::timed_out(*board) == 1; });
+  EXPECT_TRUE(bus->full()) << "the state was over before";
+}
+
 // The frame came in time, by its stamp: what this process did meanwhile does not make it late.
 TEST_F(CanBusTest, FlowControlThatCameInTimeIsObeyedHoweverLateItIsRead) {
   Link link(io, node);
@@ -414,6 +438,29 @@ TEST_F(CanBusTest, OneWhoOpensABusInTroubleIsToldOfIt) {
   EXPECT_EQ(told.events[0].kind, Kind::up);
   EXPECT_EQ(told.events[1].kind, Kind::warning);
   EXPECT_EQ(told.events[1].problem.reason, passive);
+}
+
+TEST_F(CanBusTest, OneWhoClosesWhenItIsToldThatItIsUpIsToldNoMore) {
+  Witness first(bus);
+  local.send(error(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE));
+  run_until([&] { return !first.events.empty(); });
+  test::Recorder told;
+  const auto host = make_can_carrier(io, Url::parse("can://vxcan7?node=3"), Role::host);
+  told.then_event = [&] { host->close(); };
+  host->open(told);
+  EXPECT_EQ(told.events.size(), 1U);
+  EXPECT_FALSE(host->up());
+}
+
+TEST_F(CanBusTest, OneWhoOpensInsideAnEventIsToldOfItOnce) {
+  Witness first(bus);
+  test::Recorder told;
+  const auto host = make_can_carrier(io, Url::parse("can://vxcan7?node=3"), Role::host);
+  first.in_event = [&] { host->open(told); };
+  local.send(error(CAN_ERR_BUSOFF));
+  run_until([&] { return !bus->up(); });
+  ASSERT_EQ(told.events.size(), 1U);
+  EXPECT_EQ(told.events[0].kind, Kind::down);
 }
 
 TEST_F(CanBusTest, AnInterfaceThatGoesDownAndThenAwayIsToldOfTwiceAndItsReturnOnce) {

@@ -273,6 +273,19 @@ TEST_P(DestroyedIn, SurvivesIt) {
   }
 }
 
+// The transport is up at once, and tells so inside of open().
+TEST(AsyncBoardEnd, MayComeWhileItOpens) {
+  asio::io_context io;
+  AsyncBoard closed(io, "sim:");
+  closed.on_event([&](const CarrierEvent&) { closed.close(); });
+  closed.open();
+  auto destroyed = std::make_unique<AsyncBoard>(io, "sim:");
+  destroyed->on_event([&](const CarrierEvent&) { destroyed.reset(); });
+  destroyed->open();
+  EXPECT_FALSE(destroyed);
+  io.run();  // ends: no timer is left
+}
+
 TEST(AsyncBoardEnd, IsDestroyedBeforeOrWithoutItsLoop) {
   asio::io_context io;
   bool called = false;

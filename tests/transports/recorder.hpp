@@ -44,6 +44,7 @@ class Recorder final : public Carrier::Handler {
   }
   void on_carrier_event(const CarrierEvent& event) override {
     events.push_back({event.kind, event.problem, Clock::now()});
+    if (then_event) then_event();
   }
   void on_drained() override { ++drained; }
 
@@ -70,6 +71,7 @@ class Recorder final : public Carrier::Handler {
   std::vector<Event> events;
   int drained = 0;
   std::function<void(const Datagram&)> then;  // also called
+  std::function<void()> then_event;           // also called
 };
 
 // Runs the loop until `done()`; false if it is not within `limit`.

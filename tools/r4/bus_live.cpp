@@ -74,8 +74,13 @@ class LiveBus {
         live_(!options.json && !options.duration && ::isatty(STDOUT_FILENO) != 0) {}
 
   void run() {
+    // A table of what is shows what is; a report of a while also what was.
     listener_.on_event([this](const CarrierEvent& event) {
-      if (event.kind != CarrierEvent::Kind::up) problem_ = event.problem.text();
+      if (listener_.in_trouble()) {
+        problem_ = event.problem.text();
+      } else if (live_) {
+        problem_.clear();
+      }
     });
     signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
     wait();

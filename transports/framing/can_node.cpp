@@ -72,7 +72,9 @@ CanNode::CanNode(CanEnd end, std::uint8_t node, bool fd)
                    sizeof dialogue_in_bytes_),
       telemetry_in_(telemetry_receiver(node, fd), telemetry_bytes_, sizeof telemetry_bytes_) {}
 
-std::uint32_t CanNode::dialogue_id() const { return own_id(end_, node_); }
+bool CanNode::may_be_answered(const CanFrame& frame) const {
+  return frame.id == own_id(end_, node_) && !isotp_frame::is_flow_control(frame);
+}
 
 CanLane CanNode::lane_of(Text datagram) const {
   if (end_ == CanEnd::host) return CanLane::dialogue;

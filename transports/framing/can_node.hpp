@@ -64,10 +64,11 @@ class CanNode {
   bool offer_urgent(std::uint32_t now_us, CanFrame& frame);
   // The frame that was offered last was accepted.
   void frame_sent(std::uint32_t now_us);
-  // The id of what this end sends in the dialogue.
-  std::uint32_t dialogue_id() const;
-  // Frames of that id that were accepted still wait for the bus, or have only now got there: what
-  // answers them may come later.
+  // Is that frame part of a datagram of this end's dialogue, which the other end answers with flow
+  // control?
+  bool may_be_answered(const CanFrame& frame) const;
+  // Such frames that were accepted still wait for the bus, or have only now got there: what answers
+  // them may come later.
   void wait_anew(std::uint32_t now_us) { dialogue_out_.wait_anew(now_us); }
   // Takes a frame; one that is none of its own is passed over. Returns the datagram that it
   // completes, valid up to the next call, or an empty text.

@@ -12,7 +12,7 @@
 //     on_frame(frame, now)   a frame came in; frames of other ids are passed over
 //     offer(now, frame)      is there a frame to send? The same one is offered until …
 //     frame_sent(now)        … the bus, or the queue before it, has accepted it
-//     deadline()             when to call offer() again, so that a loop needs one timer
+//     deadline()             when to call poll() and offer() again, so that a loop needs one timer
 //     poll(now)              ends what has timed out (on_frame() does so too, offer() if it is its frame)
 //
 // frame_sent() means accepted, and is called before what arrives after that is handed in. A queue
@@ -57,7 +57,7 @@ struct IsotpChannel {
   std::uint8_t padding_byte = 0xCC;   // also between 8 and the next FD size (10.4.2.3)
 };
 
-// When to call offer() again. Not armed: only when something else happens.
+// When to call poll() and offer() again. Not armed: only when something else happens.
 struct IsotpDeadline {
   bool armed;
   std::uint32_t at_us;

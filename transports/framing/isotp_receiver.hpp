@@ -19,6 +19,7 @@
 //
 //     const IsotpArrival arrival = receiver.on_frame(frame, now);
 //     if (arrival.datagram) use(receiver.text());
+//     receiver.poll(now);  // also when the timer rings
 //     if (receiver.offer(now, answer) && bus.push(answer)) receiver.frame_sent(now);
 //     timer.arm(receiver.deadline());
 //

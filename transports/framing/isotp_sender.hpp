@@ -19,8 +19,9 @@
 // number of listeners) the frames follow each other at `separation_us`.
 //
 //     sender.begin(bytes, size, now);
+//     sender.poll(now);
 //     while (sender.offer(now, frame) && bus.push(frame)) sender.frame_sent(now);
-//     timer.arm(sender.deadline());  // and again when a frame arrives or the bus has room
+//     timer.arm(sender.deadline());  // and from poll() on when a frame arrives or the bus has room
 #pragma once
 
 #include <cstdint>
