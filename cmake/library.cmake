@@ -17,7 +17,7 @@ target_include_directories(r4link INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_D
                            $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 target_compile_definitions(r4link PUBLIC ${R4_ASIO_DEFINITIONS})
 target_link_libraries(r4link PUBLIC Threads::Threads
-                      PRIVATE fmt::fmt PkgConfig::libserialport PkgConfig::libsocketcan
+                      PRIVATE fmt::fmt PkgConfig::libserialport PkgConfig::libnl-route
                               PkgConfig::libdeflate)
 
 install(TARGETS r4link EXPORT r4link-targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})

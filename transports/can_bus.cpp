@@ -212,7 +212,7 @@ void CanBus::on_error_frame(const CanSocket::Received& received) {
 
 // An error frame comes when the state changes; who opens the socket later asks.
 void CanBus::look_at_controller() {
-  const std::string state = can_controller(can_interface(interface_)).state;
+  const std::string state = can_interface(interface_).state;
   if (state == "bus-off") return go_bus_off();
   if (!up_) come_up();
   if (state == "error-passive") set_trouble(error_passive, look_at_the_wire);

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "can_bus.hpp"
+#include "can_interface.hpp"
 #include "can_turn.hpp"
 #include "framing/can_node.hpp"
 #include "operation_slot.hpp"
@@ -89,10 +90,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
 // Whether a board packs is its setting, not its URL's.
 std::uint8_t node_of(const Url& url, Role role) {
   url.allow_only(role == Role::host ? "node fd pack" : "node fd");
-  if (url.host().empty() || !url.path().empty() || url.port()) {
-    throw Error(ErrorKind::usage, url.text(), "it is not can://INTERFACE",
-                "write it as in can://can0?node=1");
-  }
+  can_interface_of(url);
   return static_cast<std::uint8_t>(url.get_number("node", 0, can_nodes - 1, 1));
 }
 
@@ -150,7 +148,9 @@ void CanCarrier::close() noexcept {
   armed_ = false;
   for (Lane& each : lanes_) each.queue.clear();
   node_.cancel();
-  if (bus_) bus_->leave(*this);
+  if (!bus_) return;
+  counters_.rx_overflows = bus_->overflows();
+  bus_->leave(*this);
   bus_.reset();
 }
 

@@ -2,36 +2,65 @@
 #include "can_interface.hpp"
 
 #include <fmt/format.h>
-#include <libsocketcan.h>
 #include <linux/can.h>
-#include <linux/ethtool.h>
-#include <linux/sockios.h>
+#include <linux/can/netlink.h>
 #include <net/if.h>
 #include <net/if_arp.h>
-#include <sys/ioctl.h>
-#include <sys/socket.h>
+#include <netlink/cache.h>
+#include <netlink/netlink.h>
+#include <netlink/route/link.h>
+#include <netlink/route/link/can.h>
+#include <netlink/socket.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <filesystem>
 #include <iterator>
+#include <memory>
 #include <string_view>
 #include <utility>
-
-#include "file_descriptor.hpp"
 
 namespace r4 {
 
 namespace {
 
-// vcan and vxcan have no controller; their driver's name is the only sign of it.
-bool is_virtual(int socket, ifreq request) {
-  ethtool_drvinfo driver{};
-  driver.cmd = ETHTOOL_GDRVINFO;
-  request.ifr_data = reinterpret_cast<char*>(&driver);
-  if (::ioctl(socket, SIOCETHTOOL, &request) != 0) return true;
-  return std::string_view(driver.driver) == "vcan" || std::string_view(driver.driver) == "vxcan";
+using Netlink = std::unique_ptr<nl_sock, decltype(&nl_socket_free)>;
+using Link = std::unique_ptr<rtnl_link, decltype(&rtnl_link_put)>;
+using Links = std::unique_ptr<nl_cache, decltype(&nl_cache_free)>;
+
+// Null if this system does not let us.
+Netlink connect_netlink() {
+  Netlink netlink(nl_socket_alloc(), nl_socket_free);
+  if (netlink && nl_connect(netlink.get(), NETLINK_ROUTE) < 0) netlink.reset();
+  return netlink;
+}
+
+void describe_controller(rtnl_link* link, CanInterface& result) {
+  constexpr const char* states[] = {"error-active", "error-warning", "error-passive",
+                                    "bus-off",      "stopped",       "sleeping"};
+  std::uint32_t state = 0;
+  if (rtnl_link_can_state(link, &state) >= 0 && state < std::size(states)) {
+    result.state = states[state];
+  }
+  can_bittiming timing{};
+  if (rtnl_link_can_get_bittiming(link, &timing) >= 0) result.bit_rate = timing.bitrate;
+  if (rtnl_link_can_get_data_bittiming(link, &timing) >= 0) result.data_bit_rate = timing.bitrate;
+}
+
+CanInterface describe(rtnl_link* link) {
+  CanInterface result;
+  result.name = rtnl_link_get_name(link);
+  result.exists = true;
+  result.index = rtnl_link_get_ifindex(link);
+  result.is_can = rtnl_link_get_arptype(link) == ARPHRD_CAN;
+  result.up = (rtnl_link_get_flags(link) & IFF_UP) != 0;
+  result.fd = rtnl_link_get_mtu(link) >= CANFD_MTU;
+  const char* const type = rtnl_link_get_type(link);  // null: an slcan of a kernel before 6.0
+  const bool is_virtual =
+      type != nullptr && (std::string_view(type) == "vcan" || std::string_view(type) == "vxcan");
+  result.has_controller = result.is_can && !is_virtual;
+  if (rtnl_link_is_can(link) != 0) describe_controller(link, result);
+  return result;
 }
 
 }  // namespace
@@ -40,49 +69,32 @@ CanInterface can_interface(const std::string& name) {
   CanInterface result;
   result.name = name;
   if (name.empty() || name.size() >= IFNAMSIZ) return result;
-  const FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
-  ifreq request{};
-  std::memcpy(request.ifr_name, name.data(), name.size());
-  if (!socket || ::ioctl(socket.get(), SIOCGIFINDEX, &request) != 0) return result;
-  result.exists = true;
-  result.index = request.ifr_ifindex;
-  if (::ioctl(socket.get(), SIOCGIFHWADDR, &request) == 0) {
-    result.is_can = request.ifr_hwaddr.sa_family == ARPHRD_CAN;
+  const Netlink netlink = connect_netlink();
+  rtnl_link* found = nullptr;
+  if (!netlink || rtnl_link_get_kernel(netlink.get(), 0, name.c_str(), &found) < 0) return result;
+  return describe(Link(found, rtnl_link_put).get());
+}
+
+const std::string& can_interface_of(const Url& url) {
+  if (url.scheme() != "can" || url.host().empty() || !url.path().empty() || url.port()) {
+    throw Error(ErrorKind::usage, url.text(), "it is not can://INTERFACE",
+                "write it as in can://can0");
   }
-  if (::ioctl(socket.get(), SIOCGIFFLAGS, &request) == 0) {
-    result.up = (request.ifr_flags & IFF_UP) != 0;
-  }
-  if (::ioctl(socket.get(), SIOCGIFMTU, &request) == 0) {
-    result.fd = request.ifr_mtu >= static_cast<int>(CANFD_MTU);
-  }
-  result.has_controller = result.is_can && !is_virtual(socket.get(), request);
-  return result;
+  return url.host();
 }
 
 std::vector<CanInterface> list_can_interfaces() {
   std::vector<CanInterface> result;
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator("/sys/class/net", error)) {
-    CanInterface interface = can_interface(entry.path().filename());
-    if (interface.is_can) result.push_back(std::move(interface));
+  const Netlink netlink = connect_netlink();
+  nl_cache* all = nullptr;
+  if (!netlink || rtnl_link_alloc_cache(netlink.get(), AF_UNSPEC, &all) < 0) return result;
+  const Links links(all, nl_cache_free);
+  for (nl_object* each = nl_cache_get_first(all); each != nullptr; each = nl_cache_get_next(each)) {
+    auto* const link = reinterpret_cast<rtnl_link*>(each);  // as libnl has it
+    if (rtnl_link_get_arptype(link) == ARPHRD_CAN) result.push_back(describe(link));
   }
   std::sort(result.begin(), result.end(),
             [](const CanInterface& a, const CanInterface& b) { return a.name < b.name; });
-  return result;
-}
-
-CanController can_controller(const CanInterface& interface) {
-  CanController result;
-  if (!interface.has_controller) return result;  // the library complains about those on stderr
-  constexpr const char* states[] = {"error-active", "error-warning", "error-passive",
-                                    "bus-off",      "stopped",       "sleeping"};
-  int state = -1;
-  if (::can_get_state(interface.name.c_str(), &state) == 0 && state >= 0 &&
-      state < static_cast<int>(std::size(states))) {
-    result.state = states[state];
-  }
-  can_bittiming timing{};
-  if (::can_get_bittiming(interface.name.c_str(), &timing) == 0) result.bit_rate = timing.bitrate;
   return result;
 }
 

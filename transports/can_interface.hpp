@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "error.hpp"
+#include "url.hpp"
 
 namespace r4 {
 
@@ -18,19 +19,19 @@ struct CanInterface {
   bool fd = false;              // takes CAN FD frames
   bool has_controller = false;  // with a bit rate and an error state; not vcan, vxcan
   int index = 0;
+  // What its controller says, as far as the driver tells.
+  std::string state;           // "error-active", "error-warning", … "stopped"; empty: not known
+  std::uint32_t bit_rate = 0;  // bit/s, of FD the nominal one; 0: not known
+  std::uint32_t data_bit_rate = 0;  // bit/s of FD's data phase; 0: not known
 };
 
 CanInterface can_interface(const std::string& name);
 
+// The interface that can://INTERFACE names. Throws Error{usage} if the URL is of another form.
+const std::string& can_interface_of(const Url& url);
+
 // All of this machine, by name.
 std::vector<CanInterface> list_can_interfaces();
-
-// What its controller says, as far as the driver tells.
-struct CanController {
-  std::string state;           // "error-active", "error-warning", … "stopped"; empty: not known
-  std::uint32_t bit_rate = 0;  // bit/s, of FD the nominal one; 0: not known
-};
-CanController can_controller(const CanInterface& interface);
 
 // What an errno of a socket on that interface means, with the fix where there is one.
 Problem can_problem(const std::string& interface, int error);

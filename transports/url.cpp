@@ -115,7 +115,8 @@ Url Url::parse(std::string_view text) {
     const auto [pair, after] = split(query, '&');
     const std::size_t equals = pair.find('=');
     if (equals == std::string_view::npos || equals == 0) {
-      refuse(text, "'" + std::string(pair) + "' is not KEY=VALUE");
+      refuse(text, "'" + std::string(pair) + "' is not KEY=VALUE",
+             "write options as in can://can0?node=1&fd=1");
     }
     const std::string key(pair.substr(0, equals));
     if (!url.query_.emplace(key, decode_percent(text, pair.substr(equals + 1))).second) {
@@ -137,7 +138,9 @@ long Url::get_number(std::string_view key, long min, long max, long fallback) co
   if (!value) return fallback;
   std::int32_t number = 0;
   if (!parse_number(*value, number) || number < min || number > max) {
-    refuse(text_, "'" + std::string(key) + "=" + *value + "' is out of range",
+    refuse(text_,
+           "'" + std::string(key) + "=" + *value +
+               (is_whole_number(*value) ? "' is out of range" : "' is no whole number"),
            "give a whole number from " + std::to_string(min) + " to " + std::to_string(max));
   }
   return number;

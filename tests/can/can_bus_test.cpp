@@ -505,6 +505,13 @@ TEST_F(CanBusTest, CountsWhatTheControllerLost) {
   run_until([&] { return !member.frames.empty(); });
   EXPECT_EQ(bus->overflows(), 1U);
   EXPECT_TRUE(member.events.empty()) << "it is counted, not told";
+
+  test::Recorder told;
+  const auto host = make_can_carrier(io, Url::parse("can://vxcan7?node=3"), Role::host);
+  host->open(told);
+  EXPECT_EQ(host->counters().rx_overflows, 1U);
+  host->close();
+  EXPECT_EQ(host->counters().rx_overflows, 1U) << "also afterwards";
 }
 
 TEST_F(CanBusTest, MembersMayLeaveInsideADownEventAndNobodyIsSkipped) {

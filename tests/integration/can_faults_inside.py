@@ -4,7 +4,9 @@
 slcan0, the board's controller, and slcan1, the host's, are nodes of slcan_bus: error frames, error
 counters, bus-off and the states that the kernel tells of are those of ISO 11898-1.
 """
+import os
 import pathlib
+import pty
 import re
 import subprocess
 import time
@@ -107,6 +109,24 @@ def test_the_load_that_is_shown_is_the_time_that_the_bus_was_taken(bus, board):
     assert shown['bitrate'] == BITRATE  # as the controller has it: nobody said
     assert abs(shown['load'] / (busy_us / t_us) - 1) < 0.05
     assert abs(1e6 * shown['load'] / shown['frames'] / (busy_us / frames) - 1) < 0.01
+
+
+def test_a_bit_rate_that_an_adapter_does_not_tell_is_asked_for():
+    """As slcand sets one up: it tells the adapter its bit rate, and not the kernel."""
+    near, far = pty.openpty()
+    try:
+        name = SlcanBus.attach(os.ttyname(far))
+        subprocess.run(['ip', 'link', 'set', name, 'up'], check=True)
+        guessed = run('bus', f'can://{name}', '--duration', '0.2', timeout=60)
+        given = run('bus', f'can://{name}', '--duration', '0.2', '--bitrate', '500000', timeout=60)
+        listed = run('list', timeout=60)
+    finally:
+        os.close(near)
+        os.close(far)
+    assert guessed.returncode == 0 and '1000 kbit/s' in guessed.stdout, guessed
+    assert re.fullmatch('r4: warning: .* does not tell its bit rate, .*; add --bitrate\n', guessed.stderr), guessed
+    assert given.returncode == 0 and given.stderr == '' and '500 kbit/s' in given.stdout, given
+    assert re.search(f'{name} .* no bit rate', listed.stdout) and listed.stderr == '', listed
 
 
 def test_who_opens_a_controller_that_is_bus_off_is_told(bus):

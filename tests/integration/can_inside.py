@@ -167,6 +167,8 @@ def test_another_host_is_refused_while_the_first_is_there(board):
         result = run('send', board.host_url, '--timeout', '2', 'O:358,1,1', timeout=60)
         assert result.returncode == 3, result
         assert 'another host' in result.stderr, result
+        result = run('bench', board.host_url, '--duration', '1', timeout=60)
+        assert result.returncode == 3 and 'another host' in result.stderr, result
         first.skip_past()
         first.next(is_state)
         assert not any(each['type'] == 'nack' for each in first.log), 'the other one did not even try'
@@ -351,8 +353,9 @@ def test_a_bus_is_shown_with_all_of_its_boards():
         load = {row['id']: row['load'] for row in rows}
         assert load[TELEMETRY] > 0.1 > load[TELEMETRY - 1] > 0
         assert abs(sum(load.values()) - total['load']) < 1e-9 and total['nearly_full'] is False
-        warned = run('bus', 'can://vcan0', '--duration', '1', '--bitrate', '125000', timeout=60)
-        assert warned.returncode == 0 and 'nearly full' in warned.stderr
+        for rate, words in (('340000', 'nearly full'), ('125000', 'more than a bus of 125 kbit/s carries')):
+            warned = run('bus', 'can://vcan0', '--duration', '1', '--bitrate', rate, timeout=60)
+            assert warned.returncode == 0 and words in warned.stderr, warned
         host.skip_past()
         host.next(is_state)
     silent = run('monitor', 'can://vcan0', '--duration', '1', timeout=60)

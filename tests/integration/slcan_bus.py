@@ -38,13 +38,13 @@ class SlcanBus:
         self.reader.start()
         self.interfaces = [f'slcan{number}' for number in range(nodes)]
         for interface, pty in zip(self.interfaces, self.ptys):
-            ip('link', 'set', self._attach(pty), 'name', interface)
+            ip('link', 'set', self.attach(pty), 'name', interface)
             ip('link', 'set', interface, 'txqueuelen', str(txqueuelen), 'type', 'can', 'bitrate',
                str(bitrate))
             ip('link', 'set', interface, 'up')
 
     @staticmethod
-    def _attach(pty):
+    def attach(pty):
         tty = os.open(pty, os.O_RDWR | os.O_NOCTTY)
         try:
             fcntl.ioctl(tty, termios.TIOCSETD, struct.pack('i', N_SLCAN))

@@ -87,8 +87,11 @@ def test_load_follows_the_bit_rate():
     (['--fd', '--dbitrate', '500000'], 'below the nominal'),
     (['can0'], 'a transport and a colon'),
     (['udp://192.168.1.77'], 'as in can://can0'),
-    (['can://can0?node=1'], 'node'),
-    (['can://can0', '--boards', '2'], 'excludes --boards'),
+    (['can://can0?node=1'], 'write can://can0'),
+    (['can://can0:5'], 'as in can://can0'),
+    ([''], 'a transport and a colon'),
+    (['can://can0', '--boards', '2'], '--boards: does not go with URL; leave one of the two out'),
+    (['can://can0', '--bitrate', '500000', '--dbitrate', '250000'], 'below the nominal'),
     (['--duration', '2'], 'as in can://can0'),
 ])
 def test_wrong_options_are_told_with_the_fix(arguments, words):

@@ -202,6 +202,13 @@ def test_what_is_missing_is_told_with_the_fix(tmp_path, arguments, environment, 
     assert words in result.stderr and result.stdout == ''
 
 
+def test_a_package_of_the_user_that_is_none_is_named_and_not_to_be_removed():
+    result = run('true', env={**os.environ, 'R4_CAN_KERNEL': '/etc/passwd'}, text=True)
+    assert result.returncode == 6 and result.stdout == ''
+    assert f'{ERROR}/etc/passwd: it cannot be unpacked' in result.stderr
+    assert '\n  fix: set R4_CAN_KERNEL to the path' in result.stderr
+
+
 def test_a_kernel_that_panics_is_told(tmp_path):
     cache = os.environ.get('XDG_CACHE_HOME') or os.path.expanduser('~/.cache')
     shutil.copytree(f'{cache}/r4link', tmp_path / 'r4link', copy_function=os.symlink)

@@ -58,8 +58,11 @@ TEST(Candump, TellsFramesThatAreNoneOfOurs) {
   EXPECT_TRUE(line.frame.extended);
   ASSERT_EQ(read_candump_line("(1.0) can0 244#R", line), CandumpError::none);
   EXPECT_TRUE(line.frame.remote);
-  ASSERT_EQ(read_candump_line("  can0  244   [4]  remote request", line), CandumpError::none);
-  EXPECT_TRUE(line.frame.remote);
+  for (const char* const size : {"[0]", "[4]"}) {
+    const std::string text = std::string("  can0  244   ") + size + "  remote request";
+    ASSERT_EQ(read_candump_line(text, line), CandumpError::none) << text;
+    EXPECT_TRUE(line.frame.remote) << text;
+  }
   ASSERT_EQ(read_candump_line("(1.0) can0 20000004#0004000000000000", line), CandumpError::none);
   EXPECT_TRUE(line.error_frame);
   ASSERT_EQ(read_candump_line("  can0  20000004   [8]  00 04 00 00 00 00 00 00   ERRORFRAME", line),

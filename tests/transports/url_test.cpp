@@ -125,6 +125,21 @@ TEST(Url, GivesTheValuesOfItsKeys) {
   EXPECT_THROW(url.get_number("empty", 0, 10, 7), Error);
 }
 
+TEST(Url, TellsANumberThatIsNoneFromOneThatIsTooLarge) {
+  const auto text = [](const char* url) {
+    try {
+      Url::parse(url).get_number("node", 0, 31, 1);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(text("can://can0?node=32"),
+            "can://can0?node=32: 'node=32' is out of range; give a whole number from 0 to 31");
+  EXPECT_EQ(text("can://can0?node=0-7"),
+            "can://can0?node=0-7: 'node=0-7' is no whole number; give a whole number from 0 to 31");
+}
+
 TEST(Url, NamesTheKeyThatATransportDoesNotHave) {
   const Url url = Url::parse("udp://host?listen=1&list=2");
   EXPECT_NO_THROW(url.allow_only("peer listen list"));

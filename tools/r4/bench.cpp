@@ -99,21 +99,15 @@ class Bench {
     io_.run();
   }
 
-  bool in_control() const {
-    const LinkStatus& link = board_.link();
-    const bool streams = link.state == HostLinkState::active ||
-                         (link.state == HostLinkState::safe && link.reason != SafeReason::link);
-    return streams && !link.busy;
-  }
-
+  // Proof of control is a state.
   void connect() {
-    board_.on_link([this](const LinkStatus&) {
-      if (in_control()) io_.stop();
+    board_.on_state([this](const State&, const Datagram&) {
+      if (board_.in_control()) io_.stop();
     });
     const Clock::time_point start = Clock::now();
     run_for(connect_timeout);
-    board_.on_link({});
-    if (!in_control()) throw Error(explain(board_.name(), board_.link()));
+    board_.on_state({});
+    if (!board_.in_control()) throw Error(explain(board_.name(), board_.link()));
     connect_us_ = std::chrono::duration<double, std::micro>(Clock::now() - start).count();
   }
 

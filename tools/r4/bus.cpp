@@ -34,7 +34,7 @@ struct Options {
   bool fd = false;
   bool packed = false;
   bool json = false;
-  std::string url;
+  std::optional<std::string> url;
   std::optional<Milliseconds> duration;
 };
 
@@ -128,17 +128,17 @@ std::string remedy(const BusPlan& plan) {
 
 int live(const Options& options) {
   LiveBusOptions bus;
-  bus.url = options.url;
+  bus.url = *options.url;
   bus.json = options.json;
   bus.duration = options.duration;
   if (options.bit_rate) bus.bit_rate = static_cast<std::uint32_t>(*options.bit_rate);
-  bus.data_bit_rate = static_cast<std::uint32_t>(options.data_bit_rate.value_or(0));
+  if (options.data_bit_rate) bus.data_bit_rate = static_cast<std::uint32_t>(*options.data_bit_rate);
   show_live_bus(bus, nearly_full);
   return 0;
 }
 
 int bus(const Options& options) {
-  if (!options.url.empty()) return live(options);
+  if (options.url) return live(options);
   if (options.duration) {
     throw Error(ErrorKind::usage, "--duration", "is for a real bus", "name it, as in can://can0");
   }
@@ -176,8 +176,8 @@ bit. worst is the longest values and the most stuff bits that there can be, all 
 comes above 80 % of load: damaged frames are sent again, and what has a high id waits for longer.
 
 Of a real bus: on a terminal the last second, redrawn until Ctrl-C; else, or with --duration, one table.
-The bit rate is the controller's; a virtual bus has none and is taken for one of 1 Mbit/s. Frames of
-CAN FD are counted as switching to --dbitrate; if some do and it is not given, that is told.
+Its bit rates are the controller's. Where that does not tell (slcan), and for a virtual bus, they are those of
+--bitrate, else 1 Mbit/s, and, for CAN FD frames that switch, --dbitrate; if one is missing, that is told.
 
 Exit codes: 0 it fits; 1 it does not, more than 100 %; 2 an option is wrong; 4, 5, 6 the interface
 cannot be opened.)";

@@ -66,9 +66,10 @@ class LiveBus {
   LiveBus(const LiveBusOptions& options, double nearly_full)
       : options_(options),
         nearly_full_(nearly_full),
-        url_(Url::parse(options.url)),
-        rate_(rate_of(options, url_)),
-        listener_(io_, url_.host(), rate_),
+        interface_(interface_of(options.url)),
+        rate_{rate_of("--bitrate", options.bit_rate, interface_.bit_rate, usual_bit_rate),
+              rate_of("--dbitrate", options.data_bit_rate, interface_.data_bit_rate, 0)},
+        listener_(io_, interface_.name, checked(rate_)),
         signals_(io_, SIGINT, SIGTERM),
         timer_(io_),
         live_(!options.json && !options.duration && ::isatty(STDOUT_FILENO) != 0) {}
@@ -100,19 +101,35 @@ class LiveBus {
   }
 
  private:
-  static CanBitRate rate_of(const LiveBusOptions& options, const Url& url) {
-    if (url.scheme() != "can" || url.host().empty() || !url.path().empty() || url.port()) {
-      throw Error(ErrorKind::usage, options.url, "it is not can://INTERFACE",
-                  "write it as in can://can0");
+  static CanInterface interface_of(const std::string& text) {
+    const Url url = Url::parse(text);
+    const std::string& name = can_interface_of(url);
+    if (text.find('?') != std::string::npos) {
+      throw Error(ErrorKind::usage, text, "all that is on a bus is counted, not a board",
+                  fmt::format("write can://{}", name));
     }
-    url.allow_only("");
-    const std::uint32_t known = can_controller(can_interface(url.host())).bit_rate;
-    if (known != 0 && options.bit_rate && *options.bit_rate != known) {
-      throw Error(ErrorKind::usage, fmt::format("--bitrate {}", *options.bit_rate),
-                  fmt::format("the controller of {} is set to {}", url.host(), known),
+    return can_interface(name);
+  }
+  std::uint32_t rate_of(const char* option, const std::optional<std::uint32_t>& given,
+                        std::uint32_t known, std::uint32_t usual) const {
+    if (known != 0 && given && *given != known) {
+      throw Error(ErrorKind::usage, fmt::format("{} {}", option, *given),
+                  fmt::format("the controller of {} is set to {}", interface_.name, known),
                   "leave the option out");
     }
-    return {known != 0 ? known : options.bit_rate.value_or(usual_bit_rate), options.data_bit_rate};
+    return known != 0 ? known : given.value_or(usual);
+  }
+  const CanBitRate& checked(const CanBitRate& rate) const {
+    if (rate.data != 0 && !interface_.fd && interface_.exists) {
+      throw Error(ErrorKind::usage, fmt::format("--dbitrate {}", rate.data),
+                  interface_.name + " is not set up for CAN FD", "leave the option out");
+    }
+    if (rate.data != 0 && rate.data < rate.nominal) {
+      throw Error(ErrorKind::usage, fmt::format("--dbitrate {}", rate.data),
+                  "is below the nominal bit rate",
+                  fmt::format("write {} or more, or a lower --bitrate", rate.nominal));
+    }
+    return rate;
   }
 
   void wait() {
@@ -194,25 +211,35 @@ class LiveBus {
   std::vector<std::string> troubles() const {
     std::vector<std::string> found;
     if (!problem_.empty()) found.push_back(problem_);
+    if (interface_.has_controller && interface_.bit_rate == 0 && !options_.bit_rate) {
+      found.push_back(fmt::format(
+          "{}: the interface does not tell its bit rate, and is taken for one of {} kbit/s; add "
+          "--bitrate",
+          options_.url, rate_.nominal / 1000.0));
+    }
     if (rate_.data == 0 && listener_.heard_rate_switch()) {
       found.push_back(fmt::format(
-          "{0}: CAN FD frames switch their bit rate, and all of them is counted at {1} kbit/s; add "
-          "--dbitrate, of which `ip -details link show {2}` tells",
-          options_.url, rate_.nominal / 1000.0, url_.host()));
+          "{}: CAN FD frames switch their bit rate, but are counted at {} kbit/s to their end; add "
+          "--dbitrate, the rate of their data phase",
+          options_.url, rate_.nominal / 1000.0));
     }
     return found;
   }
 
   std::string fullness(const Window& window) const {
+    const double load = window.load(window.total);
     return fmt::format(
-        "{}: nearly full, {:.1f} % of its time is taken; fewer boards, fields or states, or "
-        "C:pack,1 on the boards",
-        options_.url, 100 * window.load(window.total));
+        "{}: {}, {:.1f} % of its time is taken; fewer boards, fields or states, or C:pack,1 on the "
+        "boards",
+        options_.url,
+        load > 1 ? fmt::format("more than a bus of {} kbit/s carries", rate_.nominal / 1000.0)
+                 : "nearly full",
+        100 * load);
   }
 
   const LiveBusOptions& options_;
   const double nearly_full_;
-  const Url url_;
+  const CanInterface interface_;
   const CanBitRate rate_;
   asio::io_context io_{1};
   CanListener listener_;

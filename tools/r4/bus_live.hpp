@@ -15,8 +15,9 @@ struct LiveBusOptions {
   bool json = false;
   // On a terminal without: the last second again and again, until Ctrl-C. Else 5 s.
   std::optional<Milliseconds> duration;
-  std::optional<std::uint32_t> bit_rate;  // of a virtual bus: as if it had that (1 Mbit/s)
-  std::uint32_t data_bit_rate = 0;        // of CAN FD; 0: frames do not switch
+  // Where the interface does not tell: of a virtual bus, as if it had that.
+  std::optional<std::uint32_t> bit_rate;       // 1 Mbit/s
+  std::optional<std::uint32_t> data_bit_rate;  // of CAN FD; none: frames do not switch
 };
 
 // `nearly_full`: the load, 0–1, above which a warning is given. Throws Error.

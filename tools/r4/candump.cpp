@@ -146,13 +146,15 @@ CandumpError read_screen_frame(std::string_view size, std::string_view& line, Ca
   if (count > max_fd_size) return CandumpError::size;
   frame.size = static_cast<std::uint8_t>(count);
   if (!has_valid_size(frame)) return CandumpError::size;
+  std::string_view rest = line;
+  if (take_word(rest) == "remote" && take_word(rest) == "request") {
+    line = rest;
+    frame.remote = true;
+    return CandumpError::none;
+  }
   for (std::size_t i = 0; i < count; ++i) {
     const std::string_view word = take_word(line);
     if (word.empty()) return CandumpError::cut;
-    if (i == 0 && word == "remote" && take_word(line) == "request") {
-      frame.remote = true;
-      return CandumpError::none;
-    }
     if (!read_byte(word, frame.data[i])) {
       return word.size() < 2 ? CandumpError::cut : CandumpError::bytes;
     }

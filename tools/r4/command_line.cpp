@@ -72,6 +72,13 @@ Problem usage_problem(const CLI::App& root, const CLI::ParseError& error) {
   } else if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr) {
     problem.thing = std::string(error.what()).substr(0, std::string(error.what()).find(':'));
     problem.reason = "needs a value";
+  } else if (dynamic_cast<const CLI::ExcludesError*>(&error) != nullptr) {
+    const std::string text = error.what();  // "URL excludes --packed"
+    constexpr std::string_view between = " excludes ";
+    const std::size_t at = text.find(between);
+    problem.thing = text.substr(at + between.size());
+    problem.reason = "does not go with " + text.substr(0, at);
+    problem.fix = fmt::format("leave one of the two out; {} tells what they are for", help);
   } else {
     const std::string_view text = error.what();
     const std::size_t colon = text.find(": ");

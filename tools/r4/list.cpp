@@ -35,7 +35,6 @@ constexpr Milliseconds listening{700};
 
 struct CanPort {
   CanInterface interface;
-  CanController controller;
   std::vector<int> boards;
   std::string trouble;  // why nothing could be heard
   std::string fix;
@@ -48,7 +47,6 @@ std::vector<CanPort> list_can_ports() {
   for (const CanInterface& interface : list_can_interfaces()) {
     CanPort& port = ports.emplace_back();
     port.interface = interface;
-    port.controller = can_controller(interface);
     listeners.emplace_back();
     try {
       listeners.back() = std::make_unique<CanListener>(io, interface.name, CanBitRate{1000000, 0});
@@ -84,8 +82,8 @@ void print_json(const std::vector<CanPort>& ports) {
     print_line({{"type", "can"},
                 {"interface", port.interface.name},
                 {"up", port.interface.up},
-                {"state", port.controller.state},
-                {"bitrate", port.controller.bit_rate},
+                {"state", port.interface.state},
+                {"bitrate", port.interface.bit_rate},
                 {"fd", port.interface.fd},
                 {"boards", std::move(boards)},
                 {"reason", port.trouble},
@@ -97,11 +95,11 @@ void print_can(const std::vector<CanPort>& ports) {
   fmt::print("\nCAN interfaces:\n");
   if (ports.empty()) fmt::print("  none\n");
   for (const CanPort& port : ports) {
-    const std::string rate = port.controller.bit_rate == 0
+    const std::string rate = port.interface.bit_rate == 0
                                  ? (port.interface.has_controller ? "no bit rate" : "virtual")
-                                 : fmt::format("{} kbit/s", port.controller.bit_rate / 1000.0);
+                                 : fmt::format("{} kbit/s", port.interface.bit_rate / 1000.0);
     fmt::print("  {:<14} {:<5}{:<14} {:<14}{}{}\n", port.interface.name,
-               port.interface.up ? "up" : "down", port.controller.state, rate,
+               port.interface.up ? "up" : "down", port.interface.state, rate,
                port.interface.fd ? "CAN FD  " : "",
                port.boards.empty() && port.trouble.empty() ? "no board heard" : "");
     for (const int node : port.boards) fmt::print("    R4 board: {}\n", url_of(port, node));

@@ -20,6 +20,7 @@
 #include "monitor_view.hpp"
 #include "options.hpp"
 #include "subcommands.hpp"
+#include "transports/can_interface.hpp"
 #include "transports/error.hpp"
 #include "transports/url.hpp"
 
@@ -141,11 +142,12 @@ bool is_whole_bus(const std::string& text) {
 int monitor(const Options& options) {
   if (options.urls.size() == 1 && is_whole_bus(options.urls.front())) {
     const Url url = Url::parse(options.urls.front());
+    const std::string& interface = can_interface_of(url);
     if (!options.fields.empty()) {
       throw Error(ErrorKind::usage, "--fields", "only one board can be asked for its fields",
                   "name the board: " + url.text() + "?node=1");
     }
-    monitor_bus({url.host(), options.json, options.count, options.duration});
+    monitor_bus({interface, options.json, options.count, options.duration});
     return 0;
   }
   return Monitor(options).run();
@@ -154,7 +156,7 @@ int monitor(const Options& options) {
 constexpr const char* footer =
     R"(On a terminal: a status, redrawn in place. Into a pipe: one line a state. With --json: one object a
 line, with type (state, heartbeat, link, nack, error), transport, pnum, t and fields (numbers as
-numbers, several values as an array); on a CAN bus, at the end, one of type transfers.
+numbers, several values as an array); of one board on a CAN bus, at the end, one of type transfers.
 
 The monitor takes part in the link: it sends heartbeats, so the board streams and, unless another
 host has it, obeys this one. It goes on when the transport is lost and comes back. On a CAN bus without

@@ -97,6 +97,7 @@ class Sender {
         fmt::print("{}  not sent\n", shown(commands_[i]));
       }
       failure_ = problem;
+      failure_->thing = fmt::format("{} to {}", problem.thing, board_.name());
       io_.stop();
       return;
     }

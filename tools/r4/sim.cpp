@@ -118,6 +118,10 @@ class Board {
       : log_(output, options.quiet, named ? plan.id : ""), board_(io, options_of(options, plan)) {
     for (const std::string& url : plan.urls) {
       auto carrier = standard_registry().make(io, url, Role::board);
+      for (const Carrier* const other : carriers_) {
+        if (other->name() != carrier->name() || !url.starts_with("can:")) continue;
+        throw Error(ErrorKind::usage, url, "the board is there already", "name a node once");
+      }
       carriers_.push_back(carrier.get());
       board_.add_carrier(std::move(carrier));
     }

@@ -63,7 +63,7 @@ int stop(const Options& options) {
   const LinkStatus link = board->link();
   board->close();
   if (!result || result->outcome != Outcome::confirmed) {
-    Problem problem = explain("E:STOP", link);
+    Problem problem = explain(fmt::format("E:STOP to {}", board->name()), link);
     problem.reason = fmt::format("the board did not confirm the stop within {} ms: {}",
                                  options.timeout.count(), problem.reason);
     problem.fix =

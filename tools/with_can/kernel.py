@@ -7,6 +7,7 @@ Whoever comes first makes them, under a lock, in a folder that gets its name whe
 """
 import fcntl
 import glob
+import hashlib
 import io
 import lzma
 import os
@@ -28,6 +29,7 @@ CAN_MODULES = ('can-raw', 'can-bcm', 'can-isotp', 'can-gw', 'can-dev', 'vcan', '
                'sch_netem', 'sch_tbf', 'kvaser_pci')
 USB_MODULES = ('xhci-pci', 'ftdi_sio')
 XZ_MAGIC = b'\xfd7zXZ\x00'
+GIVEN_IS = 'set R4_CAN_KERNEL to the path of a Debian linux-image-6.1.*-amd64 package, or leave it out'
 
 
 class Kernel:
@@ -46,7 +48,7 @@ def cache_folder():
 def prepared():
     """The kernel, made ready if nobody has done it before."""
     cache = cache_folder()
-    ready = cache / f'kernel-{FORMAT}'
+    ready = cache / (f'kernel-{FORMAT}' + mark_of_given())
     if not ready.is_dir():
         try:
             cache.mkdir(parents=True, exist_ok=True)
@@ -58,6 +60,19 @@ def prepared():
             raise Trouble(str(error.filename or cache), error.strerror or str(error),
                           'set XDG_CACHE_HOME to a folder you may write to, with 200 MB left') from error
     return Kernel(ready)
+
+
+def mark_of_given():
+    """What sets the kernel of R4_CAN_KERNEL apart from the usual one, and from that file's others."""
+    given = os.environ.get('R4_CAN_KERNEL')
+    if not given:
+        return ''
+    try:
+        state = os.stat(given)
+    except OSError as error:
+        raise Trouble(f'R4_CAN_KERNEL={given}', error.strerror, GIVEN_IS) from error
+    which = f'{os.path.realpath(given)} {state.st_size} {state.st_mtime_ns}'
+    return '-' + hashlib.sha256(os.fsencode(which)).hexdigest()[:16]
 
 
 def prepare(cache, ready):
@@ -72,8 +87,9 @@ def prepare(cache, ready):
     try:
         image, modules = unpacked(package)
     except (tarfile.TarError, EOFError, ValueError) as error:
+        own = package.parent == cache
         raise Trouble(str(package), f'it cannot be unpacked: {error}',
-                      f'rm {package}, then run this again') from error
+                      f'rm {package}, then run this again' if own else GIVEN_IS) from error
     (making / 'vmlinux').write_bytes(elf_inside(package, image))
     (making / 'initrd').write_bytes(initial_ram_disk(modules))
     making.chmod(0o755)
@@ -87,8 +103,7 @@ def fetched(cache):
     given = os.environ.get('R4_CAN_KERNEL')
     if given:
         if not os.path.isfile(given):
-            raise Trouble(f'R4_CAN_KERNEL={given}', 'there is no such file',
-                          'it is for the path of a Debian linux-image-*-amd64 package')
+            raise Trouble(f'R4_CAN_KERNEL={given}', 'it is no file', GIVEN_IS)
         return pathlib.Path(given)
     if shutil.which('apt-get') is None or shutil.which('dpkg-deb') is None:
         raise Trouble('the guest\'s kernel', 'it is a Debian package, and this is no Debian system',
