@@ -92,6 +92,11 @@ void CanBus::leave(Member& member) noexcept {
   clear_places();
 }
 
+bool CanBus::has(const Member* member) const {
+  return std::any_of(members_.begin(), members_.end(),
+                     [member](const Place& place) { return place.member == member; });
+}
+
 // Not while somebody goes through them.
 void CanBus::clear_places() {
   if (calling_ != 0 || sending_) return;

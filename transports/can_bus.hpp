@@ -81,6 +81,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   void join(Member& member, std::vector<std::uint32_t> ids);
   void join_all(Member& member);
   void leave(Member& member) noexcept;
+  bool has(const Member* member) const;
 
   // Members have something to offer.
   void send();

@@ -245,7 +245,9 @@ void CanCarrier::arm() {
 void CanCarrier::on_deadline() {
   armed_ = false;
   const std::shared_ptr<CanBus> bus = bus_;
+  const CanBus::Member* const self = this;
   bus->take();
+  if (!bus->has(self)) return;  // somebody who was told of a frame closed or destroyed this one
   const std::uint32_t now_us = CanBus::now_us();
   const auto answerable = [this](const CanFrame& frame) { return node_.may_be_answered(frame); };
   if (bus->holds(answerable)) node_.wait_anew(now_us);
