@@ -121,7 +121,8 @@ void CanBus::hear() {
 template <class Action>
 void CanBus::for_each_member(Action action) {
   ++calling_;
-  for (std::size_t i = 0, count = members_.size(); i < count; ++i) {
+  const std::size_t count = members_.size();
+  for (std::size_t i = 0; i < count; ++i) {
     if (members_[i].member != nullptr) action(*members_[i].member);
   }
   --calling_;
