@@ -7,6 +7,7 @@
 #include <net/if.h>
 #include <net/if_arp.h>
 #include <netlink/cache.h>
+#include <netlink/errno.h>
 #include <netlink/netlink.h>
 #include <netlink/route/link.h>
 #include <netlink/route/link/can.h>
@@ -28,11 +29,9 @@ using Netlink = std::unique_ptr<nl_sock, decltype(&nl_socket_free)>;
 using Link = std::unique_ptr<rtnl_link, decltype(&rtnl_link_put)>;
 using Links = std::unique_ptr<nl_cache, decltype(&nl_cache_free)>;
 
-// Null if this system does not let us.
-Netlink connect_netlink() {
-  Netlink netlink(nl_socket_alloc(), nl_socket_free);
-  if (netlink && nl_connect(netlink.get(), NETLINK_ROUTE) < 0) netlink.reset();
-  return netlink;
+// 0, or libnl's negative error: this system may not let us.
+int connect(const Netlink& netlink) {
+  return netlink ? nl_connect(netlink.get(), NETLINK_ROUTE) : -NLE_NOMEM;
 }
 
 void describe_controller(rtnl_link* link, CanInterface& result) {
@@ -69,10 +68,13 @@ CanInterface can_interface(const std::string& name) {
   CanInterface result;
   result.name = name;
   if (name.empty() || name.size() >= IFNAMSIZ) return result;
-  const Netlink netlink = connect_netlink();
+  const Netlink netlink(nl_socket_alloc(), nl_socket_free);
   rtnl_link* found = nullptr;
-  if (!netlink || rtnl_link_get_kernel(netlink.get(), 0, name.c_str(), &found) < 0) return result;
-  return describe(Link(found, rtnl_link_put).get());
+  int error = connect(netlink);
+  if (error == 0) error = rtnl_link_get_kernel(netlink.get(), 0, name.c_str(), &found);
+  if (error == 0) return describe(Link(found, rtnl_link_put).get());
+  if (error != -NLE_NODEV && error != -NLE_OBJ_NOTFOUND) result.unknown = nl_geterror(error);
+  return result;
 }
 
 const std::string& can_interface_of(const Url& url) {
@@ -85,9 +87,11 @@ const std::string& can_interface_of(const Url& url) {
 
 std::vector<CanInterface> list_can_interfaces() {
   std::vector<CanInterface> result;
-  const Netlink netlink = connect_netlink();
+  const Netlink netlink(nl_socket_alloc(), nl_socket_free);
   nl_cache* all = nullptr;
-  if (!netlink || rtnl_link_alloc_cache(netlink.get(), AF_UNSPEC, &all) < 0) return result;
+  if (connect(netlink) < 0 || rtnl_link_alloc_cache(netlink.get(), AF_UNSPEC, &all) < 0) {
+    return result;
+  }
   const Links links(all, nl_cache_free);
   for (nl_object* each = nl_cache_get_first(all); each != nullptr; each = nl_cache_get_next(each)) {
     auto* const link = reinterpret_cast<rtnl_link*>(each);  // as libnl has it

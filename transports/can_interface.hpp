@@ -13,6 +13,7 @@ namespace r4 {
 
 struct CanInterface {
   std::string name;
+  std::string unknown;  // why the system tells nothing about it; empty: it does
   bool exists = false;
   bool is_can = false;
   bool up = false;
@@ -30,7 +31,7 @@ CanInterface can_interface(const std::string& name);
 // The interface that can://INTERFACE names. Throws Error{usage} if the URL is of another form.
 const std::string& can_interface_of(const Url& url);
 
-// All of this machine, by name.
+// All of this machine, by name; none if the system does not tell.
 std::vector<CanInterface> list_can_interfaces();
 
 // What an errno of a socket on that interface means, with the fix where there is one.

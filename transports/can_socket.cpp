@@ -117,6 +117,13 @@ void CanSocket::open(const std::string& interface, bool fd) {
   FileDescriptor probe(::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW));
   if (!probe) fail(interface, errno);
   const CanInterface state = can_interface(interface);
+  if (!state.unknown.empty()) {
+    throw Error(
+        ErrorKind::open, "can://" + interface,
+        "the system does not tell about it: netlink: " + state.unknown,
+        "let this program have netlink sockets (of a service: RestrictAddressFamilies= with "
+        "AF_NETLINK) and enough open files (ulimit -n)");
+  }
   if (!state.exists) fail(interface, ENODEV);
   if (!state.is_can) {
     throw Error(ErrorKind::usage, "can://" + interface, interface + " is no CAN interface",
