@@ -31,7 +31,7 @@ inline constexpr std::uint32_t heard_id = 0x183;
 inline constexpr std::uint32_t other_id = 0x555;
 inline constexpr std::chrono::milliseconds soon{200};
 
-// The two interfaces, as long as the tests of this file run.
+// The two interfaces are there as long as the tests of a suite run.
 class CanBusTest : public testing::Test {
  public:
   static void SetUpTestSuite() {
