@@ -105,6 +105,7 @@ TEST_F(CanBusLoad, TellsOfFramesThatWaitedAndSendsThemAllInOrder) {
   }
   EXPECT_EQ(talker.stuck, 0);
 }
+
 const std::string in_two_frames = "0123456789";
 
 // The first frames of all hosts together take the bus longer than each may be unanswered.
@@ -120,7 +121,7 @@ TEST_F(CanBusLoad, AFirstFrameThatWaitedForTheBusHasAllOfItsTimeToBeAnswered) {
     for (const auto& link : links) {
       ASSERT_EQ(link->host->send(in_two_frames, Priority::normal), SendResult::sent);
     }
-    EXPECT_TRUE(bus->full());
+    const bool full = bus->full();
     std::uint64_t arrived = 0, timed_out = 0;
     run_until([&] {
       arrived = timed_out = 0;
@@ -130,7 +131,7 @@ TEST_F(CanBusLoad, AFirstFrameThatWaitedForTheBusHasAllOfItsTimeToBeAnswered) {
       }
       return arrived + timed_out >= links.size();
     });
-    in_time = arrived == links.size();
+    in_time = full && arrived == links.size();
   }
   EXPECT_TRUE(in_time);
 }
