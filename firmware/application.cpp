@@ -243,6 +243,7 @@ void Application::execute(std::uint32_t pnum, const Command& command, std::uint3
       break;
   }
   if (observer_ != nullptr) observer_->on_executed(now_ms, pnum, command);
+  look_at_time(now_ms);  // the silence may be longer already than a new timeout
   check_interlocks(now_ms);
   update_outputs(now_ms);
   report_state(now_ms);

@@ -363,6 +363,20 @@ TEST_F(ApplicationCommand, SettingsTakeEffectAtOnce) {
   EXPECT_EQ(board.reason(), SafeReason::link);
 }
 
+TEST_F(ApplicationCommand, ATimeoutThatIsAlreadyOverMakesTheOutputsSafeAtOnce) {
+  host.command("C:heartbeat,50");
+  host.command("O:358,1,1");
+  host.echo();
+  board.run(200);
+  host.command("C:timeout,201");
+  EXPECT_EQ(board.state(), BoardState::active);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+  host.command("C:timeout,200");
+  EXPECT_EQ(board.log.executed.size(), 4U);
+  EXPECT_EQ(board.reason(), SafeReason::link);
+  EXPECT_TRUE(board.safe());
+}
+
 TEST_F(ApplicationCommand, TheHeartbeatIntervalFollowsItsSetting) {
   TestHost paper(board, 7, Source{0, 4});
   board.run(1500);

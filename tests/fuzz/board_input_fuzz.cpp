@@ -118,6 +118,7 @@ class World final : public firmware::Hal, public firmware::Observer {
     ++executed_;
     executed_pnum_ = pnum;
     stop_ = command.kind == CommandKind::stop;
+    require(stop_ || board().link().has_owner());  // a new timeout may end that, but only behind it
   }
   void on_refused(std::uint32_t, std::uint32_t, Refusal) override { ++refused_; }
   void on_rejected(std::uint32_t, Verdict) override { ++rejected_; }
@@ -204,7 +205,7 @@ class World final : public firmware::Hal, public firmware::Observer {
       if (stop_) {
         require(outputs_ == Outputs() && board().reason() == SafeReason::stop);
       } else {
-        require(signed_ && board().link().has_owner() && board().link().owner() == from);
+        require(signed_ && board().link().in_session(from));
         require(datagram.has_pnum() && board().link().last_executed() == executed_pnum_);
       }
     }
