@@ -293,13 +293,14 @@ def test_garbage_on_every_id_of_ours_harms_nobody(board):
     assert executed and all(command.startswith('F:') for command in executed), executed
 
 
-def test_eight_boards_on_one_bus_each_with_its_host():
+@pytest.mark.parametrize('boards_at, hosts_at', [('vcan0', 'vcan0'), ('can0', 'can1')])
+def test_eight_boards_on_one_bus_each_with_its_host(boards_at, hosts_at):
     # At a rate that the emulated machine bears with nine processes: the backbone at 100 Hz is
     # tests/simulation's, in virtual time.
     slowly = ('--set', 'pack,1', '--set', 'rate,20')
     with contextlib.ExitStack() as stack:
-        boards = stack.enter_context(Board('can://vcan0?node=0-7', options=slowly, listens=8))
-        hosts = [stack.enter_context(monitor(f'can://vcan0?node={node}')) for node in range(8)]
+        boards = stack.enter_context(Board(f'can://{boards_at}?node=0-7', options=slowly, listens=8))
+        hosts = [stack.enter_context(monitor(f'can://{hosts_at}?node={node}')) for node in range(8)]
         for host in hosts:
             in_control(host)
         for host in hosts:
@@ -313,7 +314,7 @@ def test_eight_boards_on_one_bus_each_with_its_host():
         for node in (4, 6):
             hosts[node].skip_past()
             assert hosts[node].next(is_state)['fields']['SAFE'] == 0
-        assert run('stop', 'can://vcan0?node=1', timeout=60).returncode == 0
+        assert run('stop', f'can://{hosts_at}?node=1', timeout=60).returncode == 0
         stopped = set()
         while len(stopped) < 8:  # one frame stops all of them
             stopped.add(boards.state('SAFE', 'stop')['board'])

@@ -117,7 +117,8 @@ def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(b
         safe = board.state('SAFE', 'link')
     print(f"safe {safe['silence']} ms after the last heartbeat, "
           f"{(safe['came'] - killed) * 1000:.0f} ms after the kill")
-    assert off['t'] == safe['t']
+    # The guard may have switched off before the board's loop came to say so.
+    assert (safe['t'] - off['t']) % 2**32 <= SAFE_WITHIN_MS - 1000 or SANITIZED
     assert 1000 <= safe['silence'] <= SAFE_WITHIN_MS or SANITIZED
     assert safe['came'] - killed <= SAFE_WITHIN_MS / 1000 + 0.05 or SANITIZED
 
