@@ -86,6 +86,8 @@ struct Link {
   std::unique_ptr<Carrier> host, board;
 };
 
+constexpr int most_runs = 3;
+
 class CanBusLoad : public CanBusTest {};
 
 TEST_F(CanBusLoad, TellsOfFramesThatWaitedAndSendsThemAllInOrder) {
@@ -110,7 +112,6 @@ const std::string in_two_frames = "0123456789";
 
 // The first frames of all hosts together take the bus longer than each may be unanswered.
 TEST_F(CanBusLoad, AFirstFrameThatWaitedForTheBusHasAllOfItsTimeToBeAnswered) {
-  constexpr int most_runs = 3;
   constexpr std::size_t hosts = 16;
   const SlowBus slow(64000);
   bool in_time = false;
@@ -163,27 +164,32 @@ TEST_F(CanBusLoad, WhatNobodyAnswersTimesOutAlsoBehindAStateThatTakesTheBusLong)
 
 // The frame came in time, by its stamp: what this process did meanwhile does not make it late.
 TEST_F(CanBusLoad, FlowControlThatCameInTimeIsObeyedHoweverLateItIsRead) {
-  Link link(io, node);
-  link.board->close();
-  run_for(soon);
-  CanFrame first{};
-  RawCan far(command_id(node), far_end);
-  ASSERT_EQ(link.host->send(in_two_frames, Priority::normal), SendResult::sent);
-  ASSERT_TRUE(far.receive(first, CanBus::now_us() + 1000000));
-  const std::uint32_t had_us = CanBus::now_us();
-  CanFrame go{};
-  go.id = reply_id(node);
-  go.size = 3;
-  go.data[0] = 0x30;
-  far.send(go);
-  ASSERT_LT(CanBus::now_us() - had_us, 20000U) << "this machine stood still";
-  std::this_thread::sleep_for(std::chrono::milliseconds(40));  // held up, twice as long as N_Bs
-  EXPECT_EQ(link.host->send(in_two_frames, Priority::normal), SendResult::sent);
-  CanFrame second{};
-  io.restart();
-  while (io.run_one_for(soon) != 0 && !far.receive(second, CanBus::now_us())) continue;
-  EXPECT_EQ(second.data[0], 0x21) << "the consecutive frame";
-  EXPECT_EQ(Link::timed_out(*link.host), 0U);
+  bool in_time = false;
+  for (int run = 0; run < most_runs && !in_time; ++run) {  // a machine may stand still
+    Link link(io, node);
+    link.board->close();
+    run_for(soon);
+    CanFrame first{};
+    RawCan far(command_id(node), far_end);
+    ASSERT_EQ(link.host->send(in_two_frames, Priority::normal), SendResult::sent);
+    ASSERT_TRUE(far.receive(first, CanBus::now_us() + 1000000));
+    const std::uint32_t had_us = CanBus::now_us();
+    CanFrame go{};
+    go.id = reply_id(node);
+    go.size = 3;
+    go.data[0] = 0x30;
+    far.send(go);
+    in_time = CanBus::now_us() - had_us < 20000;
+    if (!in_time) continue;
+    std::this_thread::sleep_for(std::chrono::milliseconds(40));  // held up, twice as long as N_Bs
+    EXPECT_EQ(link.host->send(in_two_frames, Priority::normal), SendResult::sent);
+    CanFrame second{};
+    io.restart();
+    while (io.run_one_for(soon) != 0 && !far.receive(second, CanBus::now_us())) continue;
+    EXPECT_EQ(second.data[0], 0x21) << "the consecutive frame";
+    EXPECT_EQ(Link::timed_out(*link.host), 0U);
+  }
+  EXPECT_TRUE(in_time) << "this machine stands still again and again";
 }
 
 TEST_F(CanBusLoad, DropsWhatABusDoesNotTakeForLong) {
@@ -211,7 +217,6 @@ TEST_F(CanBusLoad, DropsWhatABusDoesNotTakeForLong) {
 class CanBusTimes : public CanBusTest {
  protected:
   static constexpr std::chrono::milliseconds n_cr{100};  // docs/can.md
-  static constexpr int most_runs = 3;
 
   struct Sending {
     std::uint32_t before_us;

@@ -14,33 +14,7 @@ using test::TestBoard;
 using test::TestHost;
 using Lines = std::vector<std::string>;
 
-// A board with an echo host in control.
-struct ApplicationCommand : testing::Test {
-  ApplicationCommand() {
-    host.connect();
-    host.stay(300);
-    forget();
-  }
-  void forget() {
-    board.take();
-    board.log.executed.clear();
-    board.log.refused.clear();
-  }
-  // The code of the answers to the datagrams since forget().
-  Lines answers(int port = 0) {
-    Lines codes;
-    for (const Heard& heard : board.take(MessageKind::nack, port)) {
-      Datagram datagram;
-      Nack nack;
-      EXPECT_TRUE(read(heard.bytes, datagram) && read_nack(datagram, nack));
-      codes.push_back(test::str(name_of(nack.code)));
-    }
-    return codes;
-  }
-
-  TestBoard board;
-  TestHost host{board, echo_pnum, Source{0, 4}};
-};
+using ApplicationCommand = test::BoardInControl;
 
 TEST_F(ApplicationCommand, EveryOutputDoesWhatItIsTold) {
   for (const char* field : {"O:4095,1,1", "O:1,0,4", "D:7,1,2", "S:2500,16", "R:1,On", "R:8,1",
@@ -341,78 +315,6 @@ TEST_F(ApplicationCommand, ListensToNoOtherBoard) {
   EXPECT_EQ(board.reason(), SafeReason::link);
 }
 
-// --- settings
-
-TEST_F(ApplicationCommand, SettingsTakeEffectAtOnce) {
-  host.command("C:rate,1000");
-  board.run(10);
-  board.take();
-  board.run(100);
-  EXPECT_EQ(board.take(MessageKind::state).size(), 100U);
-
-  host.command("C:timeout,200");
-  EXPECT_EQ(answers(), Lines{"RANGE"});  // not above the heartbeat's interval
-  host.command("C:heartbeat,50");
-  host.command("C:timeout,200");
-  host.echo();
-  board.run(1);
-  host.echo();
-  board.run(199);
-  EXPECT_EQ(board.state(), BoardState::active);
-  board.run(1);
-  EXPECT_EQ(board.reason(), SafeReason::link);
-}
-
-TEST_F(ApplicationCommand, ATimeoutThatIsAlreadyOverMakesTheOutputsSafeAtOnce) {
-  host.command("C:heartbeat,50");
-  host.command("O:358,1,1");
-  host.echo();
-  board.run(200);
-  host.command("C:timeout,201");
-  EXPECT_EQ(board.state(), BoardState::active);
-  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
-  host.command("C:timeout,200");
-  EXPECT_EQ(board.log.executed.size(), 4U);
-  EXPECT_EQ(board.reason(), SafeReason::link);
-  EXPECT_TRUE(board.safe());
-}
-
-TEST_F(ApplicationCommand, TheHeartbeatIntervalFollowsItsSetting) {
-  TestHost paper(board, 7, Source{0, 4});
-  board.run(1500);
-  paper.heartbeat(5);
-  board.run(1);
-  paper.command("C:heartbeat,90");
-  board.run(200);
-  board.take();
-  for (int i = 0; i < 10; ++i) {
-    paper.heartbeat(6);
-    board.run(90);
-  }
-  EXPECT_EQ(board.take(MessageKind::board_heartbeat).size(), 10U);
-}
-
-TEST_F(ApplicationCommand, RecoveryFollowsItsSetting) {
-  host.command("O:358,1,1");
-  host.command("C:recovery,rearm");
-  board.run(1500);
-  host.echo();
-  EXPECT_EQ(board.state(), BoardState::active);
-  EXPECT_TRUE(board.safe());
-}
-
-TEST_F(ApplicationCommand, SettingsOutlastTheSession) {
-  host.command("C:rate,10");
-  host.command("U:30,1");
-  board.run(1500);
-  TestHost other(board, echo_pnum + 100'000'000, Source{0, 6});
-  other.connect();
-  EXPECT_EQ(board.application->settings().state_rate_hz, 10);
-  board.hal.inputs.ultrasonic_cm[0] = 20;
-  board.run(10);
-  EXPECT_EQ(board.reason(), SafeReason::proximity);
-}
-
 TEST_F(ApplicationCommand, ZeroCountsAnewAndHoldsTheStepper) {
   host.command("P:1000,2");
   host.command("Z:2");
@@ -472,33 +374,6 @@ TEST(ApplicationNumberless, MayBeginAgainAfterAnOutageWithNothingOfTheOldLeft) {
   EXPECT_EQ(board.log.refused, Lines{"0 DUPLICATE"});
   board.receive("S:1700,1;PNum:1;T:1;");
   EXPECT_EQ(board.log.refused.back(), "1 STALE");
-}
-
-TEST(ApplicationSetting, MakesEveryPortSendThePackedForm) {
-  TestBoard board;
-  TestHost host(board, echo_pnum);
-  host.connect();
-  host.command("C:pack,1");
-  EXPECT_TRUE(board.ports[0].packed);
-  host.command("C:rate,50");
-  EXPECT_TRUE(board.ports[0].packed);
-  host.command("C:pack,0");
-  EXPECT_FALSE(board.ports[0].packed);
-}
-
-TEST(ApplicationSetting, TellsHowTheBoardIsReachedOnlyOverItsOwnCable) {
-  TestBoard board;
-  TestHost host(board, echo_pnum);
-  host.connect();
-  host.command("C:network,mine");
-  EXPECT_EQ(board.log.refused.size(), 1U);
-  EXPECT_NE(board.log.refused.back().find("AUTH"), std::string::npos);
-  EXPECT_STREQ(board.application->settings().site.network, "");
-  board.ports[0].cable = true;
-  host.command("C:network,mine");
-  EXPECT_STREQ(board.application->settings().site.network, "mine");
-  host.command("C:rate,50");
-  EXPECT_EQ(board.log.refused.size(), 1U);
 }
 
 TEST(ApplicationNumberless, MayNotBeginAgainWithoutAnOutage) {

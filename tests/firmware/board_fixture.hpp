@@ -2,6 +2,8 @@
 // The board's application on hardware and ports in memory, in virtual time, with hosts to drive it.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <memory>
@@ -246,5 +248,33 @@ class TestHost {
 
 // Where our hosts begin to number.
 constexpr std::uint32_t echo_pnum = echo_host_first_pnum + 12345;
+
+// A board with an echo host in control.
+struct BoardInControl : testing::Test {
+  BoardInControl() {
+    host.connect();
+    host.stay(300);
+    forget();
+  }
+  void forget() {
+    board.take();
+    board.log.executed.clear();
+    board.log.refused.clear();
+  }
+  // The code of the answers to the datagrams since forget().
+  std::vector<std::string> answers(int port = 0) {
+    std::vector<std::string> codes;
+    for (const Heard& heard : board.take(MessageKind::nack, port)) {
+      Datagram datagram;
+      Nack nack;
+      EXPECT_TRUE(read(heard.bytes, datagram) && read_nack(datagram, nack));
+      codes.push_back(str(name_of(nack.code)));
+    }
+    return codes;
+  }
+
+  TestBoard board;
+  TestHost host{board, echo_pnum, Source{0, 4}};
+};
 
 }  // namespace r4::test

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a setting changes, from when on, and for how long.
+#include <gtest/gtest.h>
+
+#include "tests/firmware/board_fixture.hpp"
+
+namespace r4 {
+namespace {
+
+using firmware::BoardState;
+using test::echo_pnum;
+using test::TestHost;
+using Lines = std::vector<std::string>;
+
+using ApplicationSetting = test::BoardInControl;
+
+TEST_F(ApplicationSetting, SettingsTakeEffectAtOnce) {
+  host.command("C:rate,1000");
+  board.run(10);
+  board.take();
+  board.run(100);
+  EXPECT_EQ(board.take(MessageKind::state).size(), 100U);
+
+  host.command("C:timeout,200");
+  EXPECT_EQ(answers(), Lines{"RANGE"});  // not above the heartbeat's interval
+  host.command("C:heartbeat,50");
+  host.command("C:timeout,200");
+  host.echo();
+  board.run(1);
+  host.echo();
+  board.run(199);
+  EXPECT_EQ(board.state(), BoardState::active);
+  board.run(1);
+  EXPECT_EQ(board.reason(), SafeReason::link);
+}
+
+TEST_F(ApplicationSetting, ATimeoutThatIsAlreadyOverMakesTheOutputsSafeAtOnce) {
+  host.command("C:heartbeat,50");
+  host.command("O:358,1,1");
+  host.echo();
+  board.run(200);
+  host.command("C:timeout,201");
+  EXPECT_EQ(board.state(), BoardState::active);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+  host.command("C:timeout,200");
+  EXPECT_EQ(board.log.executed.size(), 4U);
+  EXPECT_EQ(board.reason(), SafeReason::link);
+  EXPECT_TRUE(board.safe());
+}
+
+TEST_F(ApplicationSetting, TheHeartbeatIntervalFollowsItsSetting) {
+  TestHost paper(board, 7, Source{0, 4});
+  board.run(1500);
+  paper.heartbeat(5);
+  board.run(1);
+  paper.command("C:heartbeat,90");
+  board.run(200);
+  board.take();
+  for (int i = 0; i < 10; ++i) {
+    paper.heartbeat(6);
+    board.run(90);
+  }
+  EXPECT_EQ(board.take(MessageKind::board_heartbeat).size(), 10U);
+}
+
+TEST_F(ApplicationSetting, RecoveryFollowsItsSetting) {
+  host.command("O:358,1,1");
+  host.command("C:recovery,rearm");
+  board.run(1500);
+  host.echo();
+  EXPECT_EQ(board.state(), BoardState::active);
+  EXPECT_TRUE(board.safe());
+}
+
+TEST_F(ApplicationSetting, SettingsOutlastTheSession) {
+  host.command("C:rate,10");
+  host.command("U:30,1");
+  board.run(1500);
+  TestHost other(board, echo_pnum + 100'000'000, Source{0, 6});
+  other.connect();
+  EXPECT_EQ(board.application->settings().state_rate_hz, 10);
+  board.hal.inputs.ultrasonic_cm[0] = 20;
+  board.run(10);
+  EXPECT_EQ(board.reason(), SafeReason::proximity);
+}
+
+TEST_F(ApplicationSetting, MakesEveryPortSendThePackedForm) {
+  host.command("C:pack,1");
+  EXPECT_TRUE(board.ports[0].packed);
+  host.command("C:rate,50");
+  EXPECT_TRUE(board.ports[0].packed);
+  host.command("C:pack,0");
+  EXPECT_FALSE(board.ports[0].packed);
+}
+
+TEST_F(ApplicationSetting, TellsHowTheBoardIsReachedOnlyOverItsOwnCable) {
+  host.command("C:network,mine");
+  EXPECT_EQ(board.log.refused.size(), 1U);
+  EXPECT_NE(board.log.refused.back().find("AUTH"), std::string::npos);
+  EXPECT_STREQ(board.application->settings().site.network, "");
+  board.ports[0].cable = true;
+  host.command("C:network,mine");
+  EXPECT_STREQ(board.application->settings().site.network, "mine");
+  host.command("C:rate,50");
+  EXPECT_EQ(board.log.refused.size(), 1U);
+}
+
+}  // namespace
+}  // namespace r4
