@@ -155,7 +155,7 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   SendResult transmit(std::string_view datagram, Priority priority) override {
     return is_open ? carrier->send(datagram, priority) : SendResult::down;
   }
-  void on_state(const State& state, const Datagram& datagram) override {
+  void on_state(const ReceivedState& state, const Datagram& datagram) override {
     if (!is_open) return;
     if (in_backlog) {
       backlog_size = datagram.bytes().size();
@@ -180,6 +180,10 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   }
   void on_link(const LinkStatus& status) override {
     if (is_open) link_callback(status);
+  }
+  void on_restart() override {
+    backlog_size = 0;  // of the boot before
+    if (is_open) restart_callback();
   }
   void on_result(Ticket ticket, const CommandResult& result) override {
     const auto found = std::find_if(waiting.begin(), waiting.end(),
@@ -232,12 +236,13 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   Session session;
   BoardIdentity identity;
 
-  Callback<void(const State&, const Datagram&)> state_callback;
+  Callback<void(const ReceivedState&, const Datagram&)> state_callback;
   Callback<void(const Datagram&)> heartbeat_callback;
   Callback<void(const Nack&, const Datagram&)> nack_callback;
   Callback<void(const ReadResult&, std::string_view)> bad_callback;
   Callback<void(const LinkStatus&)> link_callback;
   Callback<void(const CarrierEvent&)> event_callback;
+  Callback<void()> restart_callback;
 
   bool in_backlog = false;
   std::array<char, max_datagram> backlog;  // the newest state of it
@@ -307,7 +312,7 @@ bool AsyncBoard::post(const Command& command) {
   return sent;
 }
 
-const State& AsyncBoard::state() const { return impl_->session.state(); }
+const ReceivedState& AsyncBoard::state() const { return impl_->session.state(); }
 const LinkStatus& AsyncBoard::link() const { return impl_->session.link(); }
 bool AsyncBoard::in_control() const {
   return impl_->is_open && impl_->session.in_control(steady_now());
@@ -317,7 +322,7 @@ Statistics AsyncBoard::statistics() const { return impl_->session.statistics(ste
 const CarrierCounters& AsyncBoard::carrier_counters() const { return impl_->carrier->counters(); }
 const std::string& AsyncBoard::name() const { return impl_->carrier->name(); }
 
-void AsyncBoard::on_state(std::function<void(const State&, const Datagram&)> callback) {
+void AsyncBoard::on_state(std::function<void(const ReceivedState&, const Datagram&)> callback) {
   impl_->state_callback.set(std::move(callback));
 }
 void AsyncBoard::on_board_heartbeat(std::function<void(const Datagram&)> callback) {
@@ -335,6 +340,9 @@ void AsyncBoard::on_link(std::function<void(const LinkStatus&)> callback) {
 }
 void AsyncBoard::on_event(std::function<void(const CarrierEvent&)> callback) {
   impl_->event_callback.set(std::move(callback));
+}
+void AsyncBoard::on_restart(std::function<void()> callback) {
+  impl_->restart_callback.set(std::move(callback));
 }
 
 void AsyncBoard::watchdog(Duration period) {

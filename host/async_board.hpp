@@ -93,7 +93,7 @@ class AsyncBoard {
   bool post(const Command& command);
 
   // What is known now; after close(), what was known last.
-  const State& state() const;
+  const ReceivedState& state() const;
   const LinkStatus& link() const;
   // The link is up and the board takes our commands: they go out at once.
   bool in_control() const;
@@ -104,12 +104,15 @@ class AsyncBoard {
 
   // One callback for each; an empty function turns it off. Of the states that came while the event
   // loop was held up for more than 50 ms, on_state is told the newest alone.
-  void on_state(std::function<void(const State&, const Datagram&)> callback);
+  void on_state(std::function<void(const ReceivedState&, const Datagram&)> callback);
   void on_board_heartbeat(std::function<void(const Datagram&)> callback);
   void on_nack(std::function<void(const Nack&, const Datagram&)> callback);
   void on_bad_datagram(std::function<void(const ReadResult&, std::string_view)> callback);
   void on_link(std::function<void(const LinkStatus&)> callback);
   void on_event(std::function<void(const CarrierEvent&)> callback);
+  // The board has begun again: what it was told is gone, thresholds of U too. Comes before its new
+  // state.
+  void on_restart(std::function<void()> callback);
 
   // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. feed()
   // may be called from any thread, costs no system call and counts from the next time the loop

@@ -64,7 +64,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
 
   Impl(std::string_view url, BoardOptions options)
       : async(io, url, std::move(options)), box(io, [this](const Command& c) { deliver(c); }) {
-    async.on_state([this](const State& fresh, const Datagram&) {
+    async.on_state([this](const ReceivedState& fresh, const Datagram&) {
       {
         const std::lock_guard lock(mutex);
         state = fresh;
@@ -78,12 +78,20 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
       {
         const std::lock_guard lock(mutex);
         link = fresh;
+        state = async.state();  // heartbeats change its `safe`
         in_control = async.in_control();
       }
       news.notify_all();
       link_callback(fresh);
     });
     async.on_event([this](const CarrierEvent& event) { event_callback(event); });
+    async.on_restart([this] {
+      {
+        const std::lock_guard lock(mutex);
+        state = async.state();
+      }
+      restart_callback();
+    });
     async.open();
   }
 
@@ -239,14 +247,15 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   std::mutex join_mutex;
 
   // Of the loop.
-  Callback<void(const State&)> state_callback;
+  Callback<void(const ReceivedState&)> state_callback;
   Callback<void(const LinkStatus&)> link_callback;
   Callback<void(const CarrierEvent&)> event_callback;
+  Callback<void()> restart_callback;
 
   // What both sides see.
   std::mutex mutex;
   std::condition_variable news;  // state, link or closed has changed
-  State state;
+  ReceivedState state;
   std::uint64_t states = 0;
   LinkStatus link;
   bool in_control = false;
@@ -321,11 +330,11 @@ BoardIdentity Board::identify(Duration timeout) {
   return impl->execute(Command::identify(), timeout)->identity;
 }
 
-State Board::state() const {
+ReceivedState Board::state() const {
   const std::lock_guard lock(impl_->mutex);
   return impl_->state;
 }
-State Board::next_state(Duration timeout) {
+ReceivedState Board::next_state(Duration timeout) {
   const auto impl = impl_;
   const std::uint64_t seen = impl->states_now();
   if (!impl->wait_for_news(name(), timeout, [&] { return impl->states != seen; })) {
@@ -350,7 +359,7 @@ Statistics Board::statistics() const {
   return *report;
 }
 
-void Board::on_state(std::function<void(const State&)> callback) {
+void Board::on_state(std::function<void(const ReceivedState&)> callback) {
   const auto impl = impl_;
   impl->run_on_loop("on_state()", [impl = impl.get(), callback = std::move(callback)]() mutable {
     impl->state_callback.set(std::move(callback));
@@ -366,6 +375,12 @@ void Board::on_event(std::function<void(const CarrierEvent&)> callback) {
   const auto impl = impl_;
   impl->run_on_loop("on_event()", [impl = impl.get(), callback = std::move(callback)]() mutable {
     impl->event_callback.set(std::move(callback));
+  });
+}
+void Board::on_restart(std::function<void()> callback) {
+  const auto impl = impl_;
+  impl->run_on_loop("on_restart()", [impl = impl.get(), callback = std::move(callback)]() mutable {
+    impl->restart_callback.set(std::move(callback));
   });
 }
 

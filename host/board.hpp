@@ -138,17 +138,21 @@ class Board {
   // --- what the board says
 
   BoardIdentity identify(Duration timeout = default_timeout);
-  // The newest state, fields merged over all datagrams so far.
-  State state() const;
+  // The newest state, fields merged over all datagrams since the board began: state().age() tells
+  // how old it is, also while the link is lost.
+  ReceivedState state() const;
   // Waits for a state newer than now; throws Error{refused} when none comes in time.
-  State next_state(Duration timeout = default_timeout);
+  ReceivedState next_state(Duration timeout = default_timeout);
   LinkStatus link() const;
   Statistics statistics() const;
   const std::string& name() const;  // the transport, for people
 
-  void on_state(std::function<void(const State&)> callback);
+  void on_state(std::function<void(const ReceivedState&)> callback);
   void on_link(std::function<void(const LinkStatus&)> callback);
   void on_event(std::function<void(const CarrierEvent&)> callback);
+  // The board has begun again: what it was told is gone, thresholds of U too. Comes before its new
+  // state.
+  void on_restart(std::function<void()> callback);
 
   // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. feed()
   // costs no system call.

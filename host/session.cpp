@@ -84,7 +84,10 @@ bool Session::on_heartbeat_datagram(const Datagram& datagram, Time now) {
   const SafeReason reason = heartbeat_reason(datagram);
   const bool current = is_current(
       link_.on_datagram(datagram.pnum(), connecting ? 0 : t_ms, true, reason, to_ms(now)));
+  notice_restart();
   if (current) {
+    state_.safe = reason;
+    if (reason == SafeReason::none) state_.fault = ChipFault();
     if (key_.on_heartbeat(datagram)) doubt_sent();
     key_.on_board_time(t_ms, now);
     if (!connecting && reason != SafeReason::link) key_.on_host_seen();
@@ -95,7 +98,7 @@ bool Session::on_heartbeat_datagram(const Datagram& datagram, Time now) {
 
 // Returns whether it is the newest datagram of the board.
 bool Session::on_state_datagram(const Datagram& datagram, Time now) {
-  State fresh = state_;
+  ReceivedState fresh = state_;
   if (!read_state(datagram, fresh)) {
     ++collector_.counts.damaged;
     ReadResult result;
@@ -106,6 +109,10 @@ bool Session::on_state_datagram(const Datagram& datagram, Time now) {
   }
   const SafeReason reason = fresh.present.has(StateField::safe) ? fresh.safe : SafeReason::none;
   const Arrival arrival = link_.on_datagram(fresh.pnum, fresh.t_ms, false, reason, to_ms(now));
+  if (notice_restart()) {  // nothing of the boot before
+    fresh = state_;
+    read_state(datagram, fresh);
+  }
   // An older state must not replace a newer one. A late one that only a heartbeat or an answer has
   // overtaken, in a queue where those go first, is still the newest state.
   const bool newest_state = arrival == Arrival::late && newer(fresh.pnum, state_.pnum);
@@ -116,7 +123,10 @@ bool Session::on_state_datagram(const Datagram& datagram, Time now) {
     key_.on_host_seen();
   }
   state_ = fresh;
+  state_.received = ReceivedState::Clock::time_point(now);
   state_.safe = reason;
+  // It is in every state while there is one.
+  if (!state_.present.has(StateField::fault)) state_.fault = ChipFault();
   refresh_status(now);
   confirm_from_state(now);
   select_fields(now);
@@ -186,6 +196,16 @@ bool Session::is_ours(std::uint32_t pnum) const {
 void Session::on_answer(const Datagram& datagram, Time now) {
   if (busy_until_ > now) return;
   link_.on_answer(datagram.pnum(), static_cast<std::uint32_t>(datagram.time_ms()), to_ms(now));
+  notice_restart();
+}
+
+// A board that begins again knows nothing of what it had before. True if it has just been found to.
+bool Session::notice_restart() {
+  if (restarts_ == link_.restarts()) return false;
+  restarts_ = link_.restarts();
+  state_ = ReceivedState();
+  handler_.on_restart();
+  return true;
 }
 
 // --- what the board's state proves

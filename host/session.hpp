@@ -31,10 +31,10 @@
 #include "../protocol/command.hpp"
 #include "../protocol/host_link.hpp"
 #include "../protocol/message.hpp"
-#include "../protocol/state.hpp"
 #include "../transports/carrier.hpp"
 #include "host_key.hpp"
 #include "pending_commands.hpp"
+#include "received_state.hpp"
 #include "statistics.hpp"
 #include "time.hpp"
 
@@ -92,13 +92,16 @@ class Session {
   class Handler {
    public:
     virtual SendResult transmit(std::string_view datagram, Priority priority) = 0;
-    virtual void on_state(const State& state, const Datagram& datagram) = 0;
+    virtual void on_state(const ReceivedState& state, const Datagram& datagram) = 0;
     virtual void on_board_heartbeat(const Datagram& datagram) = 0;
     virtual void on_identity(const Identity& identity) = 0;
     virtual void on_nack(const Nack& nack, const Datagram& datagram) = 0;
     virtual void on_bad_datagram(const ReadResult& result, std::string_view bytes) = 0;
     virtual void on_link(const LinkStatus& status) = 0;
     virtual void on_result(Ticket ticket, const CommandResult& result) = 0;
+    // The board has begun again since it was heard: all that it was told is gone, but for settings
+    // that it stores. Called before its new state.
+    virtual void on_restart() {}
 
    protected:
     ~Handler() = default;
@@ -141,7 +144,7 @@ class Session {
   const LinkStatus& link() const { return status_; }
   // The link is up and the board has executed a command of ours: commands go out at once.
   bool in_control(Time now) const;
-  const State& state() const { return state_; }
+  const ReceivedState& state() const { return state_; }
   Statistics statistics(Time now) const;
 
   static constexpr std::size_t max_pending = 64;
@@ -169,6 +172,7 @@ class Session {
   void on_identity_datagram(const Datagram& datagram, Time now);
   void on_nack_datagram(const Datagram& datagram, Time now);
   void on_answer(const Datagram& datagram, Time now);
+  bool notice_restart();
   bool is_ours(std::uint32_t pnum) const;
   bool is_cable_only(std::uint32_t pnum);
   void confirm_from_state(Time now);
@@ -185,7 +189,8 @@ class Session {
   HostKey key_;
   bool controlled_ = false;  // the board has executed a command of ours since the link came up
   LinkStatus status_;
-  State state_;
+  ReceivedState state_;
+  std::uint32_t restarts_ = 0;  // of the board, those that were told
   StatisticsCollector collector_;
   PendingCommands pending_;
   Ticket next_ticket_ = 1;

@@ -22,7 +22,7 @@ Arrival HostLink::on_datagram(std::uint32_t pnum, std::uint32_t t_ms, bool heart
   if (heartbeat && pnum == 0 && t_ms == 0) {  // the board is booting: it knows nothing of us
     heard_ms_ = now_ms;
     if (tracker_.started()) tracker_.restart();
-    board_clock_known_ = false;
+    booting_ = true;
     state_ = HostLinkState::connecting;
     reason_ = reason;
     echo_ = 0;
@@ -51,17 +51,20 @@ Arrival HostLink::on_answer(std::uint32_t pnum, std::uint32_t t_ms, std::uint32_
 // again, even if its first heartbeats were lost.
 void HostLink::notice_boot(std::uint32_t t_ms, std::uint32_t now_ms) {
   if (board_clock_known_) {
-    const std::uint32_t expected = board_ms_ + (now_ms - heard_ms_);
+    const std::uint32_t expected = board_ms_ + (now_ms - clock_ms_);
     const std::int32_t off = static_cast<std::int32_t>(t_ms - expected);
-    if (off > boot_tolerance_ms || off < -boot_tolerance_ms) {
-      tracker_.restart();
+    const std::int32_t tolerance = booting_ ? booting_tolerance_ms : boot_tolerance_ms;
+    if (off > tolerance || off < -tolerance) {
+      ++restarts_;
+      if (tracker_.started()) tracker_.restart();
       echo_ = 0;
       echoed_ = false;
     }
   }
+  booting_ = false;
   board_clock_known_ = true;
   board_ms_ = t_ms;
-  heard_ms_ = now_ms;
+  clock_ms_ = heard_ms_ = now_ms;
 }
 
 void HostLink::on_transport(bool up) {

@@ -78,11 +78,16 @@ class HostLink {
   HostLinkState state() const { return state_; }
   // Have we echoed a real T of this boot of the board? It executes no command of ours before.
   bool echoed() const { return echoed_; }
+  // How often the board was found to have begun again.
+  std::uint32_t restarts() const { return restarts_; }
   SafeReason reason() const { return reason_; }
   const PacketCounters& counters() const { return tracker_.counters(); }
 
   // A T this far from where the board's clock should be is of another boot.
   static constexpr std::int32_t boot_tolerance_ms = 10000;
+  // The same behind `PNum:0;T:0`, which a network may also have held back since the boot before: the
+  // paper's boards begin at 0 each time, so their T after a quick restart is not far off.
+  static constexpr std::int32_t booting_tolerance_ms = 1000;
   // From a heartbeat that could not be sent to the next attempt.
   static constexpr std::uint32_t retry_ms = 20;
 
@@ -96,8 +101,11 @@ class HostLink {
   PacketTracker tracker_;
   std::uint32_t echo_ = 0;
   std::uint32_t heard_ms_ = 0;
-  std::uint32_t board_ms_ = 0;  // the board's T at heard_ms_
+  std::uint32_t board_ms_ = 0;  // the board's T at clock_ms_
+  std::uint32_t clock_ms_ = 0;
   bool board_clock_known_ = false;
+  bool booting_ = false;  // it said so last
+  std::uint32_t restarts_ = 0;
   std::uint32_t sent_ms_ = 0;
   bool any_sent_ = false;
   bool answer_now_ = true;  // the first heartbeat goes out at once

@@ -154,6 +154,21 @@ TEST_P(BoardOver, FindsTheBoardAgainAfterAReboot) {
   board.osmc(1).set(359, Direction::forward);
 }
 
+TEST(Board, TellsOfARestartBeforeTheNewState) {
+  BoardInAThread simulated("pty", "0.5 reboot\n");
+  Board board(simulated.url());
+  std::promise<ReceivedState> rebooted;
+  board.on_restart([&] { rebooted.set_value(board.state()); });
+  board.fields("OSMC1");
+  board.osmc(1).set(358, Direction::forward);
+  auto told = rebooted.get_future();
+  ASSERT_EQ(told.wait_for(5s), std::future_status::ready);
+  const ReceivedState state = told.get();
+  EXPECT_FALSE(state.any());
+  EXPECT_EQ(state.osmc[0].pwm, 0);
+  EXPECT_LT(board.next_state().age(), 1s);
+}
+
 // --- opening
 
 TEST(Board, SaysWhatIsWrongWithAUrl) {

@@ -29,12 +29,17 @@ void ScriptedLink::pass(Time duration) {
 }
 
 std::uint32_t ScriptedLink::board_clock() const {
-  return static_cast<std::uint32_t>(now.count() / 1000) + 77'000;
+  return static_cast<std::uint32_t>(now.count() / 1000) + clock_offset_;
 }
 
 void ScriptedLink::raw(std::string_view bytes) {
   session.receive(bytes, now);
   due_ = session.poll(now);
+}
+
+void ScriptedLink::reboot() {
+  clock_offset_ += 1'000'000'000;
+  board_pnum = 1;
 }
 
 void ScriptedLink::finish(std::string_view fields) {

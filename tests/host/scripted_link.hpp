@@ -35,7 +35,8 @@ class ScriptedLink final : private Session::Handler {
   std::vector<Sent> sent;
   std::map<Ticket, CommandResult> results;
   std::vector<LinkStatus> links;
-  std::vector<State> states;
+  std::vector<ReceivedState> states;
+  int restarts = 0;
   std::vector<ReadError> bad;
   std::vector<Nack> nacks;
   std::string board_id;
@@ -55,6 +56,8 @@ class ScriptedLink final : private Session::Handler {
   void nack(std::uint32_t pnum, std::string_view code);
   void identity();
   void raw(std::string_view bytes);
+  // It begins again, with another clock and new numbers; nothing is sent.
+  void reboot();
   std::uint32_t board_ms() const { return board_clock(); }
   std::uint32_t board_pnum = 5000;
 
@@ -71,7 +74,8 @@ class ScriptedLink final : private Session::Handler {
   void finish(std::string_view fields);
 
   SendResult transmit(std::string_view datagram, Priority priority) override;
-  void on_state(const State& state, const Datagram&) override { states.push_back(state); }
+  void on_state(const ReceivedState& state, const Datagram&) override { states.push_back(state); }
+  void on_restart() override { ++restarts; }
   void on_board_heartbeat(const Datagram&) override {}
   void on_identity(const Identity& identity) override;
   void on_nack(const Nack& nack, const Datagram&) override { nacks.push_back(nack); }
@@ -84,6 +88,7 @@ class ScriptedLink final : private Session::Handler {
   }
 
   Time due_{0};
+  std::uint32_t clock_offset_ = 77'000;
 };
 
 }  // namespace r4::test

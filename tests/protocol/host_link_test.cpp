@@ -170,6 +170,49 @@ TEST_F(HostLinkTest, NoticesABootWhoseHeartbeatsWereLost) {
   EXPECT_EQ(link.counters().restarts, 1U);
 }
 
+TEST_F(HostLinkTest, CountsEachRestartOfTheBoardOnce) {
+  booting();
+  booting();
+  heartbeat();
+  EXPECT_EQ(link.restarts(), 0U) << "the first boot that is heard is none";
+  now += 500;
+  board_offset += 1'000'000'000;
+  booting();
+  booting();
+  board_pnum = 1;
+  heartbeat();
+  state();
+  EXPECT_EQ(link.restarts(), 1U);
+  now += 500;
+  board_offset += 1'000'000'000;
+  board_pnum = 1;
+  state();
+  EXPECT_EQ(link.restarts(), 2U) << "also when its first heartbeats were lost";
+}
+
+TEST_F(HostLinkTest, ABootHeartbeatThatTheNetworkHeldBackIsNoRestart) {
+  booting();
+  heartbeat();
+  now += 400;
+  state();
+  booting();
+  now += 10;
+  state();
+  EXPECT_EQ(link.restarts(), 0U) << "the clock goes on";
+}
+
+TEST_F(HostLinkTest, ABoardThatCountsItsTimeFromZeroRestartsToo) {
+  board_offset = 0U - now;
+  heartbeat();
+  now += 6000;
+  state();
+  booting();
+  now += 1000;
+  board_offset = 0U - now;
+  heartbeat();
+  EXPECT_EQ(link.restarts(), 1U);
+}
+
 TEST_F(HostLinkTest, ADelayOfSecondsIsNoBoot) {
   heartbeat();
   send_due();

@@ -44,7 +44,7 @@ struct World::Host final : Session::Handler {
     world.transfer(true, index, bytes);
     return SendResult::sent;
   }
-  void on_state(const State&, const Datagram&) override {}
+  void on_state(const ReceivedState&, const Datagram&) override {}
   void on_board_heartbeat(const Datagram&) override {}
   void on_identity(const Identity&) override {}
   void on_nack(const Nack& nack, const Datagram&) override {

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the session keeps of the board's state, how old it is, and what a restart of the board forgets.
+#include <gtest/gtest.h>
+
+#include "scripted_link.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = ReceivedState::Clock;
+
+// How old the session's state is now.
+Clock::duration age(const ScriptedLink& link) {
+  return link.session.state().age(Clock::time_point(link.now));
+}
+
+TEST(ReceivedState, TellsHowOldItIsAlsoWhileTheLinkIsLost) {
+  ScriptedLink link;
+  EXPECT_FALSE(link.session.state().any());
+  EXPECT_EQ(age(link), Clock::duration::max());
+  link.connect();
+  link.state("AIN24:24.28;SAFE:0;CMD:1;");
+  EXPECT_EQ(link.session.state().received, Clock::time_point(link.now));
+  EXPECT_EQ(age(link), 0s);
+  EXPECT_EQ(link.states.back().received, Clock::time_point(link.now)) << "on_state is told it too";
+  link.pass(5s);
+  EXPECT_EQ(link.session.link().state, HostLinkState::lost);
+  EXPECT_EQ(age(link), 5s);
+}
+
+TEST(ReceivedState, FollowsTheReasonOfHeartbeatsWhileNoStatesCome) {
+  ScriptedLink link;
+  link.connect();
+  link.state("ENC1:7;SAFE:0;CMD:1;");
+  const auto received = link.session.state().received;
+  link.pass(1500ms);
+  link.heartbeat(SafeReason::link);
+  EXPECT_EQ(link.session.state().safe, SafeReason::link);
+  EXPECT_EQ(link.session.state().encoder_counts[0], 7);
+  EXPECT_EQ(link.session.state().received, received) << "a heartbeat is no state";
+  link.heartbeat();
+  EXPECT_EQ(link.session.state().safe, SafeReason::none);
+}
+
+TEST(ReceivedState, ForgetsAChipFaultThatTheBoardReportsNoMore) {
+  ScriptedLink link;
+  link.connect();
+  link.state("SAFE:6;FAULT:97,1;CMD:1;");
+  EXPECT_EQ(link.session.state().fault.address, 97);
+  link.state("SAFE:2;FAULT:97,1;CMD:1;");
+  EXPECT_TRUE(link.session.state().fault.any()) << "a graver cause hides the reason, not the chip";
+  link.state("SAFE:0;CMD:1;");
+  EXPECT_FALSE(link.session.state().fault.any());
+  link.state("SAFE:5;CMD:1;");
+  EXPECT_FALSE(link.session.state().fault.any()) << "a watchdog reset is no chip's";
+}
+
+TEST(ReceivedState, MixesNothingOfTwoBoots) {
+  ScriptedLink link;
+  link.connect();
+  link.state("OSMC1:358,1;ENC1:7;SAFE:6;FAULT:97,1;CMD:1;");
+  link.pass(300ms);
+  link.reboot();
+  link.boot_heartbeat();
+  link.heartbeat();
+  EXPECT_EQ(link.restarts, 1);
+  EXPECT_FALSE(link.session.state().any());
+  link.state("AIN24:24.28;");
+  const ReceivedState& state = link.session.state();
+  EXPECT_EQ(state.osmc[0].pwm, 0);
+  EXPECT_EQ(state.encoder_counts[0], 0);
+  EXPECT_FALSE(state.fault.any());
+  EXPECT_EQ(state.safe, SafeReason::none);
+  EXPECT_EQ(link.restarts, 1);
+}
+
+TEST(ReceivedState, BeginsWithTheStateThatTellsOfTheRestart) {
+  ScriptedLink link;
+  link.connect();
+  link.state("OSMC1:358,1;ENC1:7;SAFE:0;CMD:1;");
+  link.reboot();
+  link.state("ENC2:5;SAFE:3;");  // what came before it was lost
+  EXPECT_EQ(link.restarts, 1);
+  const ReceivedState& state = link.states.back();
+  EXPECT_EQ(state.encoder_counts[1], 5);
+  EXPECT_EQ(state.safe, SafeReason::handle);
+  EXPECT_EQ(state.osmc[0].pwm, 0);
+  EXPECT_EQ(state.encoder_counts[0], 0);
+}
+
+TEST(ReceivedState, AnOutageIsNoRestart) {
+  ScriptedLink link;
+  link.connect();
+  link.state("ENC1:7;SAFE:0;CMD:1;");
+  link.pass(60s);
+  link.heartbeat(SafeReason::link);
+  link.pass(10ms);
+  link.executed(1);
+  EXPECT_EQ(link.restarts, 0);
+  EXPECT_EQ(link.session.state().encoder_counts[0], 7);
+}
+
+}  // namespace
+}  // namespace r4::test
