@@ -134,7 +134,7 @@ class Giga {
   int rises(char port, int number) const;           // how often it rose so far
   std::map<int, unsigned short> analog;             // PinName to counts
   bool converter_hangs = false;                     // the registers of ADC1 do nothing
-  int core_conversions = 0;                         // those by the core, which keeps interrupts off
+  int core_conversions = 0;                         // those by the core, which waits
 
   // --- USB
   bool usb_open = false;

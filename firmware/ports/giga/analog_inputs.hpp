@@ -3,8 +3,9 @@
 // only; nothing waits.
 //
 // The core sets up the pins and the converter, and reads each input once. From then on it is done by
-// the registers of ADC1 (RM0399, chapter ADC): the core locks a PLL anew for each reading and keeps
-// interrupts off until it has locked, which is too long for steps and for the edges of encoders.
+// the registers of ADC1 (RM0399, chapter ADC): the core's reading waits for the converter, up to 10 ms
+// for one that does not convert, and one that does not switch on ends the boot (error()). Here such a
+// converter reads 0, and the motors can still be driven.
 #pragma once
 
 #include <cstdint>

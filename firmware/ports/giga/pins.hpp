@@ -50,7 +50,8 @@ constexpr Pin i2c_scl_pin = {'H', 4};
 constexpr Pin i2c_sda_pin = {'B', 11};
 constexpr std::uint32_t i2c_function = 4;
 
-// CAN: FDCAN2, alternate function 9; the transceiver is on the board.
+// CAN: FDCAN2, alternate function 9. The Giga has no transceiver: an SN65HVD230 of the R4 board (paper,
+// section 2) is wired to these two (docs/can.md).
 constexpr Pin can_tx_pin = {'B', 13};
 constexpr Pin can_rx_pin = {'B', 5};
 constexpr std::uint32_t can_function = 9;
