@@ -129,6 +129,7 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
     case HeartbeatEffect::fed:
       break;
     case HeartbeatEffect::new_session:
+      ports_[from.port].port->hold(from.peer);
       // Nothing that another host, or this one before its restart, commanded may come back.
       setpoints_.outputs = Outputs();
       setpoints_.fields = FieldSet::paper_default();

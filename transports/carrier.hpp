@@ -19,7 +19,8 @@
 namespace r4 {
 
 // Who is at the other end, on carriers where several can be (a UDP socket of the board's side). A
-// carrier hands a number out for each sender; `everyone` is its standing audience.
+// carrier hands a number out for each sender of a valid datagram; `everyone` is its standing
+// audience, and whoever sent what is none.
 using Peer = std::uint32_t;
 inline constexpr Peer everyone = 0;
 
@@ -106,6 +107,10 @@ class Carrier {
   // Sends one datagram (no terminator). Never blocks; `bytes` are copied if they must wait. A
   // datagram that could not be written within 100 ms is dropped and counted.
   virtual SendResult send(std::string_view bytes, Priority priority, Peer to = everyone) = 0;
+
+  // At a board: that peer is in control. However many others send, what comes from it keeps its
+  // number, until another is held.
+  virtual void hold(Peer peer) { static_cast<void>(peer); }
 
   // Sends the packed form from now on, where there is one (CAN). Received are both at any time.
   virtual void use_packed_form(bool wanted) { static_cast<void>(wanted); }

@@ -15,9 +15,9 @@
 #include <utility>
 
 #include "../protocol/datagram.hpp"
+#include "framing/peer_table.hpp"
 #include "operation_slot.hpp"
 #include "send_queue.hpp"
-#include "udp_peers.hpp"
 #include "writable_wait.hpp"
 
 namespace r4 {
@@ -30,6 +30,7 @@ constexpr std::uint16_t board_port = 2018;
 constexpr std::uint16_t host_port = 2390;
 constexpr std::size_t normal_entries = 64;
 constexpr std::size_t state_entries = 4;
+constexpr int peer_places = 16;
 constexpr std::chrono::milliseconds probe_interval{200};
 constexpr char network_fix[] = "check the WiFi or cable and the address";
 
@@ -83,6 +84,7 @@ class UdpCarrier final : public Carrier {
   void open(Handler& handler) override;
   void close() noexcept override;
   SendResult send(std::string_view bytes, Priority priority, Peer to) override;
+  void hold(Peer peer) override { peers_.hold(peer); }
   bool up() const override { return up_; }
   std::size_t max_size() const override { return max_datagram; }
   const std::string& name() const override { return name_; }
@@ -126,7 +128,7 @@ class UdpCarrier final : public Carrier {
   OperationSlot reporting_;
   bool standing_known_ = false;
   Endpoint standing_;  // where what is for everyone goes
-  UdpPeers peers_;
+  PeerTable<Endpoint, peer_places> peers_;
   CarrierCounters counters_;
   SendQueue queue_;
 
@@ -276,8 +278,8 @@ void UdpCarrier::received(std::size_t size) {
   }
   Peer peer = everyone;
   if (role_ == Role::board) {
-    peer = peers_.heard(sender_, std::chrono::steady_clock::now());
-    if (peer_host_.empty()) {
+    peer = peers_.heard(sender_, Text(received_.data(), size));
+    if (peer != everyone && peer_host_.empty()) {
       standing_ = sender_;
       standing_known_ = true;
     }

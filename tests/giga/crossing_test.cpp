@@ -10,6 +10,7 @@
 #include "firmware/ports/giga/hand_over.hpp"
 #include "firmware/ports/giga/udp_peers.hpp"
 #include "firmware/ports/giga/udp_port.hpp"
+#include "tests/support/datagrams.hpp"
 
 namespace r4::test {
 namespace {
@@ -18,7 +19,6 @@ using firmware::Urgency;
 
 std::uint32_t now_ms = 0;
 std::uint32_t clock_ms() { return now_ms; }
-std::string str(Text text) { return std::string(text.data(), text.size()); }
 
 TEST(DatagramRing, GivesDatagramsWholeAndInOrder) {
   giga::DatagramRing<256> ring;
@@ -105,30 +105,35 @@ TEST(HandOver, GivesTheNewestOnceAndNeverAMixture) {
   EXPECT_FALSE(place.take(known, value));
 }
 
-TEST(UdpPeers, NumberEveryHostOnceAndForgetTheOneSilentLongest) {
+// A valid datagram.
+const std::string hello = with_crc("H:ROS2-R4;");
+
+TEST(UdpPeers, SendWhatIsForEveryoneToTheHostHeardLast) {
   giga::UdpPeers peers;
-  std::uint32_t numbers[giga::UdpPeers::capacity];
-  for (std::uint16_t i = 0; i < giga::UdpPeers::capacity; ++i) numbers[i] = peers.heard({1, i}, i);
-  EXPECT_EQ(peers.heard({1, 0}, 3000), numbers[0]) << "known";
-  const std::uint32_t fresh = peers.heard({2, 9}, 3001);
-  for (const std::uint32_t number : numbers) EXPECT_NE(fresh, number);
   giga::UdpAddress to;
-  EXPECT_FALSE(peers.find(numbers[1], to)) << "it was silent longest";
-  EXPECT_TRUE(peers.find(numbers[0], to));
-  EXPECT_EQ(to.port, 0);
+  const std::uint32_t first = peers.heard({1, 1}, Text(hello));
+  peers.heard({2, 9}, Text(hello));
+  peers.heard({3, 9}, Text("x"));  // no datagram
+  EXPECT_TRUE(peers.find(first, to));
+  EXPECT_EQ(to.ip, 1U);
   EXPECT_TRUE(peers.find(firmware::everyone, to));
-  EXPECT_EQ(to.ip, 2U) << "the host heard last";
+  EXPECT_EQ(to.ip, 2U);
 }
 
-TEST(UdpPeers, AreNotPushedOutByAFloodFromChangingAddresses) {
+TEST(UdpPeers, KeepTheHostInControlInAFloodFromChangingAddresses) {
   giga::UdpPeers peers;
-  const std::uint32_t owner = peers.heard({1, 1}, 0);
-  for (std::uint32_t i = 0; i < 10; ++i) peers.heard({1, 1}, i);
-  for (std::uint32_t i = 0; i < 5000; ++i) {
-    peers.heard({100 + i, 2}, 10 + i / 10);
-    if (i % 1000 != 0) continue;
-    EXPECT_EQ(peers.heard({1, 1}, 10 + i / 10), owner);
-  }
+  const std::uint32_t owner = peers.heard({1, 1}, Text(hello));
+  peers.hold(owner);
+  for (std::uint32_t i = 0; i < 5000; ++i) peers.heard({100 + i, 2}, Text(hello));
+  EXPECT_EQ(peers.heard({1, 1}, Text(hello)), owner);
+}
+
+TEST(UdpLink, TellsTheNetworkThreadWhoIsInControl) {
+  giga::UdpLink link;
+  giga::UdpPort port(link, &clock_ms);
+  EXPECT_EQ(link.held(), firmware::everyone);
+  port.hold(7);
+  EXPECT_EQ(link.held(), 7U);
 }
 
 TEST(UdpPeers, SendToThePapersClientWhereItListens) {
@@ -139,10 +144,10 @@ TEST(UdpPeers, SendToThePapersClientWhereItListens) {
   ASSERT_TRUE(peers.find(firmware::everyone, to)) << "before it was heard";
   EXPECT_EQ(to.ip, 77U);
   EXPECT_EQ(to.port, 2390);
-  const std::uint32_t number = peers.heard({77, 50000}, 1);
+  const std::uint32_t number = peers.heard({77, 50000}, Text(hello));
   ASSERT_TRUE(peers.find(number, to));
   EXPECT_EQ(to.port, 2390) << "it asks from another socket";
-  const std::uint32_t other = peers.heard({78, 50001}, 2);
+  const std::uint32_t other = peers.heard({78, 50001}, Text(hello));
   ASSERT_TRUE(peers.find(other, to));
   EXPECT_EQ(to.port, 50001);
 }

@@ -35,14 +35,14 @@ void hear_oneself() {
   at(mac_command) = busy | mii_access;
 }
 
-// "hello" from 10.0.2.2:5000 to the board, its UDP checksum 0 (none).
+// A valid datagram from 10.0.2.2:5000 to the board, its UDP checksum 0 (none).
 std::size_t write_hello(const Mac& mac, std::uint8_t* frame) {
   static const std::uint8_t hello[UdpFrames::min_frame] = {
-      0,    0,    0,    0,    0,  0,  0, 0, 0,  0,  0,    0,    8,  0,        // Ethernet
-      0x45, 0,    0,    33,   0,  0,  0, 0, 64, 17, 0x62, 0xBC, 10, 0, 2, 2,  // IP
-      10,   0,    2,    15,                                                   //
-      0x13, 0x88, 0x07, 0xE2, 0,  13, 0, 0,                                   // UDP
-      'h',  'e',  'l',  'l',  'o'};
+      0,    0,    0,    0,    0,   0,   0,   0,   0,   0,   0,    0,    8,   0,  // Ethernet
+      0x45, 0,    0,    43,   0,   0,   0,   0,   64,  17,  0x62, 0xB2, 10,  0,   2,  2,  // IP
+      10,   0,    2,    15,                                                               //
+      0x13, 0x88, 0x07, 0xE2, 0,   23,  0,   0,                                           // UDP
+      'T',  ':',  '1',  ';',  '^', '0', 'x', '1', 'e', 'f', '9',  'a',  'b', 'f', '^'};
   std::memcpy(frame, hello, sizeof hello);
   std::memcpy(frame, mac.bytes, sizeof mac.bytes);
   std::memcpy(frame + 6, mac.bytes, sizeof mac.bytes);
@@ -72,7 +72,7 @@ void Listener::hear() {
     std::uint32_t reply[UdpFrames::min_frame / 4];
     const UdpFrames::Arrival arrival = frames_.take(reinterpret_cast<std::uint8_t*>(words_), size,
                                                     reinterpret_cast<std::uint8_t*>(reply));
-    if (arrival.peer != 0) on_datagram(arrival.datagram);
+    if (arrival.from.host != 0) on_datagram(arrival.datagram);
   }
 }
 

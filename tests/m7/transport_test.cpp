@@ -57,7 +57,13 @@ std::size_t question(std::uint8_t* frame) {
   std::memcpy(frame, bytes, sizeof bytes);
   return sizeof bytes;
 }
-constexpr std::uint32_t asker = 0x0202U << 16 | 5000;
+UdpAddress asker() {
+  UdpAddress address;
+  address.mac = mac(2);
+  address.host = 0x0202;
+  address.port = 5000;
+  return address;
+}
 
 }  // namespace
 
@@ -104,15 +110,15 @@ TEST(UdpFrames, AnswerArpForTheirAddressOnly) {
 
 TEST(UdpFrames, TakeADatagramAndAnswerWhereItCameFrom) {
   static End end;
-  EXPECT(end.board.write(asker, "answer", end.frame) == 0);  // not heard yet
   const std::size_t size = question(end.frame);
   const UdpFrames::Arrival arrival = end.board.take(end.frame, size, end.reply);
-  EXPECT(arrival.peer == asker && arrival.datagram == Text("H:R4"));
-  EXPECT(end.board.write(asker, "answer", end.frame) == UdpFrames::min_frame);
+  EXPECT(arrival.from == asker() && arrival.datagram == Text("H:R4"));
+  EXPECT(end.board.write(arrival.from, "answer", end.frame) == UdpFrames::min_frame);
   // The other end finds both checksums right.
   UdpFrames host(0x0A000202, 5000);
   const UdpFrames::Arrival heard = host.take(end.frame, UdpFrames::min_frame, end.reply);
-  EXPECT(heard.datagram == Text("answer") && heard.peer == (0x020FU << 16 | board_port));
+  EXPECT(heard.datagram == Text("answer"));
+  EXPECT(heard.from.host == 0x020F && heard.from.port == board_port);
   EXPECT(host.bad() == 0);
 }
 
@@ -121,7 +127,7 @@ TEST(UdpFrames, DropWhatIsDamagedCutOrForOthers) {
   const auto refused = [](std::size_t at, std::uint8_t value) {
     const std::size_t size = question(end.frame);
     end.frame[at] = value;
-    return end.board.take(end.frame, size, end.reply).peer == 0;
+    return end.board.take(end.frame, size, end.reply).from.host == 0;
   };
   EXPECT(refused(22, 63));    // the IP checksum no longer fits
   EXPECT(refused(37, 0xE3));  // another port
@@ -130,7 +136,7 @@ TEST(UdpFrames, DropWhatIsDamagedCutOrForOthers) {
   EXPECT(refused(14, 0x65));  // not IPv4
   const std::size_t size = question(end.frame);
   for (std::size_t cut = 0; cut < size; ++cut) {
-    EXPECT(end.board.take(end.frame, cut, end.reply).peer == 0);
+    EXPECT(end.board.take(end.frame, cut, end.reply).from.host == 0);
   }
   EXPECT(!refused(0, 0x52));
 }

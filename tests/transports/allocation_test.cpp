@@ -7,6 +7,7 @@
 #include <new>
 
 #include "recorder.hpp"
+#include "tests/support/datagrams.hpp"
 #include "transports/memory_carrier.hpp"
 
 namespace {
@@ -37,7 +38,7 @@ namespace {
 class Player final : public Carrier::Handler {
  public:
   void on_datagram(std::string_view, Peer from) override {
-    static const std::string text(155, 'x');
+    static const std::string text = captured_state();
     ++received;
     carrier->send(text, received % 2 == 0 ? Priority::state : Priority::normal, from);
   }
@@ -52,7 +53,7 @@ std::size_t allocations_of_1000_rounds(asio::io_context& io, Carrier& board, Car
   at_board.carrier = &board;
   at_host.carrier = &host;
   EXPECT_TRUE(run_until(io, [&] { return board.up() && host.up(); }));
-  host.send("begin", Priority::normal);
+  host.send(captured_state(), Priority::normal);
   EXPECT_TRUE(run_until(io, [&] { return at_host.received >= 100; }));
   const std::size_t before = allocations;
   EXPECT_TRUE(run_until(io, [&] { return at_host.received >= 1100; }));

@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "recorder.hpp"
+#include "tests/support/datagrams.hpp"
 #include "transports/file_descriptor.hpp"
-#include "transports/udp_peers.hpp"
 
 namespace r4::test {
 namespace {
@@ -28,6 +28,9 @@ std::string port_of(const Carrier& board) {
   const std::string address = board.name().substr(0, board.name().find('?'));
   return address.substr(address.rfind(':') + 1);
 }
+
+// A board answers only what is a datagram.
+std::string valid(std::string_view name) { return with_crc(std::string(name) + ":;"); }
 
 // Another program's socket.
 class Socket {
@@ -78,13 +81,13 @@ TEST_F(UdpCarrierTest, CarriesBothWays) {
   open_host();
   EXPECT_TRUE(board->up() && host->up());
   EXPECT_EQ(at_host.count(Kind::up), 1U);
-  EXPECT_EQ(host->send("question", Priority::normal), SendResult::sent);
-  ASSERT_TRUE(wait_for(at_board, "question"));
+  EXPECT_EQ(host->send(valid("question"), Priority::normal), SendResult::sent);
+  ASSERT_TRUE(wait_for(at_board, valid("question")));
   EXPECT_EQ(board->send("answer", Priority::normal, at_board.datagrams[0].from), SendResult::sent);
   ASSERT_TRUE(wait_for(at_host, "answer"));
   EXPECT_EQ(at_host.datagrams[0].from, everyone);
-  EXPECT_EQ(host->counters().tx_bytes, 8U);
-  EXPECT_EQ(board->counters().rx_bytes, 8U);
+  EXPECT_EQ(host->counters().tx_bytes, valid("question").size());
+  EXPECT_EQ(board->counters().rx_bytes, valid("question").size());
   EXPECT_EQ(board->counters().rx_datagrams, 1U);
   EXPECT_GE(at_host.drained, 1);
 }
@@ -93,8 +96,8 @@ TEST_F(UdpCarrierTest, CarriesOverIpv6) {
   board = open_carrier(io, "udp://[::1]:0", Role::board, at_board);
   host = open_carrier(io, "udp://[::1]:" + port_of(*board) + "?listen=0", Role::host, at_host);
   EXPECT_EQ(host->name().find("udp://[::1]:"), 0U);
-  host->send("question", Priority::normal);
-  ASSERT_TRUE(wait_for(at_board, "question"));
+  host->send(valid("question"), Priority::normal);
+  ASSERT_TRUE(wait_for(at_board, valid("question")));
   board->send("answer", Priority::normal);
   ASSERT_TRUE(wait_for(at_host, "answer"));
 }
@@ -118,10 +121,10 @@ TEST_F(UdpCarrierTest, SendsForEveryoneToTheHostHeardLast) {
   open_host();
   const auto second =
       open_carrier(io, "udp://127.0.0.1:" + port_of(*board) + "?listen=0", Role::host, at_second);
-  host->send("first", Priority::normal);
-  ASSERT_TRUE(wait_for(at_board, "first"));
-  second->send("second", Priority::normal);
-  ASSERT_TRUE(wait_for(at_board, "second"));
+  host->send(valid("first"), Priority::normal);
+  ASSERT_TRUE(wait_for(at_board, valid("first")));
+  second->send(valid("second"), Priority::normal);
+  ASSERT_TRUE(wait_for(at_board, valid("second")));
   const Peer first = at_board.datagrams[0].from;
   EXPECT_NE(first, at_board.datagrams[1].from);
   EXPECT_NE(first, everyone);
@@ -137,8 +140,8 @@ TEST_F(UdpCarrierTest, AnswersThePapersClientWhereItListensAndWhereItAsks) {
   Socket listening(io, "127.0.0.1");
   Socket asking(io, "127.0.0.1");
   open_board("?peer=127.0.0.1:" + listening.port());
-  asking.send("command", port_of(*board));
-  ASSERT_TRUE(wait_for(at_board, "command"));
+  asking.send(valid("command"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("command")));
   const Peer peer = at_board.datagrams[0].from;
   board->send("state", Priority::state);
   board->send("answer", Priority::normal, peer);
@@ -151,8 +154,8 @@ TEST_F(UdpCarrierTest, AnswersThePapersClientWhereItListensAndWhereItAsks) {
   EXPECT_EQ(asking.receive(), "answer");
   EXPECT_EQ(asking.receive(), "");
 
-  listening.send("from the peer itself", port_of(*board));
-  ASSERT_TRUE(wait_for(at_board, "from the peer itself"));
+  listening.send(valid("from-the-peer-itself"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("from-the-peer-itself")));
   board->send("once", Priority::normal, at_board.datagrams[1].from);
   ASSERT_TRUE(run_until(io, [&] { return listening.receive() == "once"; }));
   EXPECT_EQ(listening.receive(), "");
@@ -190,14 +193,14 @@ TEST_F(UdpCarrierTest, CountsAndDropsWhatIsTooLong) {
 TEST_F(UdpCarrierTest, ForgetsThePeerThatIsSilentLongest) {
   open_board();
   Socket first(io, "127.0.0.1");
-  first.send("first", port_of(*board));
-  ASSERT_TRUE(wait_for(at_board, "first"));
+  first.send(valid("first"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("first")));
   std::vector<std::unique_ptr<Socket>> crowd;
   for (int i = 0; i < 100; ++i) {
     crowd.push_back(std::make_unique<Socket>(io, "127.0.0.1"));
-    crowd.back()->send(std::to_string(i), port_of(*board));
+    crowd.back()->send(valid(std::to_string(i)), port_of(*board));
   }
-  ASSERT_TRUE(wait_for(at_board, "99"));
+  ASSERT_TRUE(wait_for(at_board, valid("99")));
   EXPECT_EQ(board->send("too late", Priority::normal, at_board.datagrams[0].from),
             SendResult::down);
   EXPECT_EQ(board->send("answer", Priority::normal, at_board.datagrams.back().from),
@@ -206,30 +209,38 @@ TEST_F(UdpCarrierTest, ForgetsThePeerThatIsSilentLongest) {
   EXPECT_TRUE(board->up());
 }
 
-udp::endpoint endpoint(unsigned short port) { return {asio::ip::make_address("127.0.0.1"), port}; }
-
-TEST(UdpPeers, KeepAWorkingHostInAFloodOfNewAddresses) {
-  UdpPeers peers;
-  UdpPeers::Time now{};
-  const Peer working = peers.heard(endpoint(1), now);
-  for (unsigned short i = 0; i < 20; ++i) EXPECT_EQ(peers.heard(endpoint(1), now), working);
-  for (unsigned short i = 0; i < 50000; ++i) {
-    peers.heard(endpoint(static_cast<unsigned short>(1000 + i)), now);
-    now += std::chrono::microseconds(30);
+TEST_F(UdpCarrierTest, AnswersTheHostInControlHoweverManyOthersSend) {
+  open_board();
+  Socket owner(io, "127.0.0.1");
+  owner.send(valid("owner"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("owner")));
+  const Peer number = at_board.datagrams[0].from;
+  board->hold(number);
+  std::vector<std::unique_ptr<Socket>> crowd;
+  for (int i = 0; i < 100; ++i) {
+    crowd.push_back(std::make_unique<Socket>(io, "127.0.0.1"));
+    crowd.back()->send(valid(std::to_string(i)), port_of(*board));
   }
-  EXPECT_EQ(peers.heard(endpoint(1), now), working);
+  ASSERT_TRUE(wait_for(at_board, valid("99")));
+  EXPECT_EQ(board->send("answer", Priority::normal, number), SendResult::sent);
+  EXPECT_TRUE(run_until(io, [&] { return owner.receive() == "answer"; }));
+  owner.send(valid("again"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("again")));
+  EXPECT_EQ(at_board.datagrams.back().from, number);
 }
 
-TEST(UdpPeers, GiveANumberOnlyOnce) {
-  UdpPeers peers;
-  UdpPeers::Time now{};
-  const Peer first = peers.heard(endpoint(1), now);
-  for (unsigned short i = 0; i < UdpPeers::capacity; ++i) {
-    now += std::chrono::seconds(3);
-    EXPECT_NE(peers.heard(endpoint(static_cast<unsigned short>(1000 + i)), now), first);
-  }
-  EXPECT_EQ(peers.find(first), nullptr);
-  EXPECT_NE(peers.heard(endpoint(1), now), first);
+TEST_F(UdpCarrierTest, TakesWhoeverSendsNoDatagramForNobody) {
+  open_board();
+  Socket host_socket(io, "127.0.0.1");
+  Socket stranger(io, "127.0.0.1");
+  host_socket.send(valid("host"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("host")));
+  stranger.send("x", port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, "x"));
+  EXPECT_EQ(at_board.datagrams.back().from, everyone);
+  board->send("for everyone", Priority::state);
+  EXPECT_TRUE(run_until(io, [&] { return host_socket.receive() == "for everyone"; }));
+  EXPECT_EQ(stranger.receive(), "");
 }
 
 TEST_F(UdpCarrierTest, SaysThatThePortIsInUse) {

@@ -118,8 +118,9 @@ bool Network::receive_next() {
   from.port = address.get_port();
   heard_ = true;
   heard_ms_ = BoardClock::now_ms();
-  const std::uint32_t peer = peers_.heard(from, heard_ms_);
-  link_.give(peer, Text(buffer, static_cast<std::size_t>(size)));
+  const Text datagram(buffer, static_cast<std::size_t>(size));
+  peers_.hold(link_.held());
+  link_.give(peers_.heard(from, datagram), datagram);
   return true;
 }
 

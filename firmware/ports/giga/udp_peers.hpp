@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Numbers for the hosts that have sent to the board's socket, and where what is for everyone goes
-// (docs/transports.md, as udp://BIND?peer=HOST does it). A number is never given twice. A new sender
-// takes the place of the one that has been silent longest or, while all have been heard within
-// idle_ms, of the one heard least often: a flood from changing addresses pushes no working host out.
-// Of the network thread alone.
+// The hosts that have sent to the board's socket, and where what is for everyone goes
+// (docs/transports.md, as udp://BIND?peer=HOST does it). Of the network thread alone.
 #pragma once
 
 #include <cstdint>
 
+#include "../../../transports/framing/peer_table.hpp"
 #include "../../port.hpp"
 
 namespace r4 {
@@ -21,30 +19,16 @@ struct UdpAddress {
 
 class UdpPeers {
  public:
-  static constexpr int capacity = 8;
-  static constexpr std::uint32_t idle_ms = 2000;
+  static constexpr int capacity = 16;
   static constexpr std::uint16_t host_port = 2390;  // where the paper's client listens
 
   // A host that gets what is for everyone, at host_port; 0: none.
   void set_host(std::uint32_t ip) { host_ = ip; }
 
-  // The number of whoever has just been heard.
-  std::uint32_t heard(UdpAddress from, std::uint32_t now_ms) {
-    Entry* place = nullptr;
-    for (Entry& entry : entries_) {
-      if (entry.number != firmware::everyone && entry.address == from) place = &entry;
-    }
-    if (place == nullptr) {
-      place = &place_for_new(now_ms);
-      *place = Entry();
-      place->address = from;
-      place->number = ++given_;
-    }
-    place->heard_ms = now_ms;
-    ++place->datagrams;
-    last_ = place->number;
-    return place->number;
-  }
+  // The number of whoever has just sent `bytes`; firmware::everyone if they are no valid datagram.
+  std::uint32_t heard(UdpAddress from, Text bytes) { return hosts_.heard(from, bytes); }
+  // That one is in control, and keeps its number.
+  void hold(std::uint32_t peer) { hosts_.hold(peer); }
 
   // Where to send what is for `peer`. False: nowhere.
   bool find(std::uint32_t peer, UdpAddress& to) const {
@@ -53,39 +37,17 @@ class UdpPeers {
       to.port = host_port;
       return true;
     }
-    const std::uint32_t number = peer == firmware::everyone ? last_ : peer;
-    for (const Entry& entry : entries_) {
-      if (number == firmware::everyone || entry.number != number) continue;
-      to = entry.address;
-      if (to.ip == host_) to.port = host_port;  // it asks from another port than it listens at
-      return true;
-    }
-    return false;
+    const UdpAddress* const at = hosts_.find(peer == firmware::everyone ? hosts_.last() : peer);
+    if (at == nullptr) return false;
+    to = *at;
+    if (to.ip == host_) to.port = host_port;  // it asks from another port than it listens at
+    return true;
   }
 
  private:
-  struct Entry {
-    UdpAddress address;
-    std::uint32_t number = firmware::everyone;  // everyone: free
-    std::uint32_t heard_ms = 0;
-    std::uint32_t datagrams = 0;
-  };
-
-  // A free place; that of the one silent longest, if that is long; else of the one heard least.
-  Entry& place_for_new(std::uint32_t now_ms) {
-    Entry* silent = &entries_[0];
-    Entry* seldom = &entries_[0];
-    for (Entry& entry : entries_) {
-      if (entry.number == firmware::everyone) return entry;
-      if (now_ms - entry.heard_ms > now_ms - silent->heard_ms) silent = &entry;
-      if (entry.datagrams < seldom->datagrams) seldom = &entry;
-    }
-    return now_ms - silent->heard_ms >= idle_ms ? *silent : *seldom;
-  }
-
-  Entry entries_[capacity];
-  std::uint32_t given_ = 0;
-  std::uint32_t last_ = firmware::everyone;
+  using Hosts = PeerTable<UdpAddress, capacity>;
+  static_assert(Hosts::nobody == firmware::everyone, "numbers go through unchanged");
+  Hosts hosts_;
   std::uint32_t host_ = 0;
 };
 

@@ -45,6 +45,8 @@ class UdpLink {
     note.peer = peer;
     if (!from_network_.put(note, datagram)) lost_.fetch_add(1, std::memory_order_relaxed);
   }
+  // Who keeps its number: the host in control.
+  std::uint32_t held() const { return held_.load(std::memory_order_relaxed); }
   // Is the network there?
   void set_up(bool up) { up_.store(up, std::memory_order_release); }
 
@@ -57,6 +59,7 @@ class UdpLink {
   DatagramRing<ring_bytes> to_network_;
   DatagramRing<ring_bytes> from_network_;
   std::atomic<bool> up_{false};
+  std::atomic<std::uint32_t> held_{firmware::everyone};
   std::atomic<std::uint32_t> lost_{0};
 };
 
@@ -92,6 +95,7 @@ class UdpPort final : public firmware::Port {
     const std::uint32_t keep = urgency == firmware::Urgency::state ? kept_for_answers : 0;
     if (!link_.to_network_.put(note, datagram, keep)) ++dropped_;
   }
+  void hold(std::uint32_t peer) override { link_.held_.store(peer, std::memory_order_relaxed); }
   std::size_t max_size() const override { return udp_max_size; }
 
   std::uint32_t dropped() const { return dropped_; }

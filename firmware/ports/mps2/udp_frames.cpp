@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "udp_frames.hpp"
 
-#include <cstring>
-
 namespace r4 {
 namespace mps2 {
 
@@ -55,20 +53,6 @@ std::uint32_t udp_checksum(const std::uint8_t* ip_header, const std::uint8_t* ud
 }
 
 }  // namespace
-
-void UdpFrames::note(std::uint32_t address, const std::uint8_t* mac) {
-  const std::uint16_t host = static_cast<std::uint16_t>(address);
-  Neighbour* place = nullptr;
-  for (Neighbour& each : neighbours_) {
-    if (each.host == host) place = &each;
-  }
-  if (place == nullptr) {
-    place = &neighbours_[next_neighbour_];
-    next_neighbour_ = (next_neighbour_ + 1) % neighbour_count;
-  }
-  place->host = host;
-  std::memcpy(place->mac.bytes, mac, sizeof place->mac.bytes);
-}
 
 std::size_t UdpFrames::answer_arp(const std::uint8_t* frame, std::size_t size,
                                   std::uint8_t* reply) {
@@ -129,22 +113,17 @@ UdpFrames::Arrival UdpFrames::take(const std::uint8_t* frame, std::size_t size,
     ++bad_;
     return arrival;
   }
-  note(from, frame + 6);
-  arrival.peer = from << 16 | get16(udp);
+  std::memcpy(arrival.from.mac.bytes, frame + 6, sizeof arrival.from.mac.bytes);
+  arrival.from.host = static_cast<std::uint16_t>(from);
+  arrival.from.port = static_cast<std::uint16_t>(get16(udp));
   arrival.datagram = Text(reinterpret_cast<const char*>(udp + udp_size), length - udp_size);
   return arrival;
 }
 
-std::size_t UdpFrames::write(std::uint32_t peer, Text datagram, std::uint8_t* frame) {
+std::size_t UdpFrames::write(const UdpAddress& to, Text datagram, std::uint8_t* frame) {
   if (datagram.size() > max_datagram) return 0;
-  const Neighbour* to = nullptr;
-  for (const Neighbour& each : neighbours_) {
-    if (each.host != 0 && each.host == peer >> 16) to = &each;
-  }
-  if (to == nullptr) return 0;
-
   const std::uint32_t udp_length = static_cast<std::uint32_t>(udp_size + datagram.size());
-  std::memcpy(frame, to->mac.bytes, 6);
+  std::memcpy(frame, to.mac.bytes, 6);
   std::memcpy(frame + 6, mac_.bytes, 6);
   put16(frame + ethernet_type, type_ip);
   std::uint8_t* const header = frame + ip;
@@ -155,11 +134,11 @@ std::size_t UdpFrames::write(std::uint32_t peer, Text datagram, std::uint8_t* fr
   put16(header + 8, 64 << 8 | protocol_udp);
   put16(header + 10, 0);
   put32(header + 12, address_);
-  put32(header + 16, (address_ & 0xFFFF0000U) | peer >> 16);
+  put32(header + 16, (address_ & 0xFFFF0000U) | to.host);
   put16(header + 10, fold(sum(header, ip_size, 0)));
   std::uint8_t* const udp = header + ip_size;
   put16(udp, port_);
-  put16(udp + 2, peer & 0xFFFF);
+  put16(udp + 2, to.port);
   put16(udp + 4, udp_length);
   put16(udp + 6, 0);
   std::memcpy(udp + udp_size, datagram.data(), datagram.size());

@@ -4,11 +4,12 @@
 //
 // Answers ARP for its address; takes UDP datagrams to its port, whole ones with right checksums
 // only; writes datagrams to those who have asked. No fragments, no options to send, no routing:
-// everybody is on its /16, so a peer is the host part of its address and its port, in 32 bits.
+// everybody is on its /16.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 #include "../../../protocol/datagram.hpp"
 
@@ -17,6 +18,17 @@ namespace mps2 {
 
 struct Mac {
   std::uint8_t bytes[6] = {};
+};
+
+// Who sends a datagram.
+struct UdpAddress {
+  Mac mac;
+  std::uint16_t host = 0;  // the host part of its IP address; 0: nobody
+  std::uint16_t port = 0;
+  friend bool operator==(const UdpAddress& a, const UdpAddress& b) {
+    return a.host == b.host && a.port == b.port &&
+           std::memcmp(a.mac.bytes, b.mac.bytes, sizeof a.mac.bytes) == 0;
+  }
 };
 
 class UdpFrames {
@@ -33,35 +45,25 @@ class UdpFrames {
   void set_mac(const Mac& mac) { mac_ = mac; }
 
   struct Arrival {
-    std::uint32_t peer = 0;      // who sent the datagram; 0: there is none
+    UdpAddress from;             // who sent the datagram; nobody: there is none
     Text datagram;               // in the frame
     std::size_t reply_size = 0;  // what is to be sent back at once
   };
   // Takes a frame, without its check sequence. `reply` has room for min_frame bytes.
   Arrival take(const std::uint8_t* frame, std::size_t size, std::uint8_t* reply);
 
-  // Writes the frame that brings `datagram` to `peer`. Returns its size; 0: nobody of that address
-  // has been heard, or the datagram is too long.
-  std::size_t write(std::uint32_t peer, Text datagram, std::uint8_t* frame);
+  // Writes the frame that brings `datagram` to `to`. Returns its size; 0: the datagram is too long.
+  std::size_t write(const UdpAddress& to, Text datagram, std::uint8_t* frame);
 
   std::uint32_t bad() const { return bad_; }  // packets with a wrong checksum or length
 
  private:
-  struct Neighbour {
-    std::uint16_t host = 0;  // 0: none
-    Mac mac;
-  };
-  static constexpr int neighbour_count = 8;
-
   std::size_t answer_arp(const std::uint8_t* frame, std::size_t size, std::uint8_t* reply);
-  void note(std::uint32_t address, const std::uint8_t* mac);
   bool is_neighbour(std::uint32_t address) const { return (address ^ address_) >> 16 == 0; }
 
   const std::uint32_t address_;
   const std::uint16_t port_;
   Mac mac_;
-  Neighbour neighbours_[neighbour_count];
-  int next_neighbour_ = 0;
   std::uint16_t identification_ = 0;
   std::uint32_t bad_ = 0;
 };

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 
+#include "../../../transports/framing/peer_table.hpp"
 #include "../../port.hpp"
 #include "../../stop_detector.hpp"
 #include "lan9118.hpp"
@@ -51,9 +52,8 @@ class UdpPort final : public firmware::Port {
       const UdpFrames::Arrival arrival =
           frames_.take(frame.bytes(), frame.size, reinterpret_cast<std::uint8_t*>(reply));
       if (arrival.reply_size != 0) chip_.send(reply, arrival.reply_size);
-      if (arrival.peer != 0) {
-        last_peer_ = arrival.peer;
-        on_datagram(arrival.peer, arrival.datagram);
+      if (arrival.from.host != 0) {
+        on_datagram(hosts_.heard(arrival.from, arrival.datagram), arrival.datagram);
       }
       taken_ = taken_ + 1;
       const InterruptsHeld held;
@@ -63,11 +63,12 @@ class UdpPort final : public firmware::Port {
   bool has_received() const { return put_ != taken_; }
 
   void send(Text datagram, firmware::Urgency, std::uint32_t peer) override {
-    const std::uint32_t to = peer == firmware::everyone ? last_peer_ : peer;
-    if (to == firmware::everyone) return;
-    const std::size_t size = frames_.write(to, datagram, reinterpret_cast<std::uint8_t*>(out_));
+    const UdpAddress* const to = hosts_.find(peer == firmware::everyone ? hosts_.last() : peer);
+    if (to == nullptr) return;
+    const std::size_t size = frames_.write(*to, datagram, reinterpret_cast<std::uint8_t*>(out_));
     if (size == 0 || !chip_.send(out_, size)) ++dropped_;
   }
+  void hold(std::uint32_t peer) override { hosts_.hold(peer); }
   std::size_t max_size() const override { return max_datagram; }
 
   std::uint32_t dropped() const { return dropped_; }
@@ -87,7 +88,7 @@ class UdpPort final : public firmware::Port {
   volatile std::uint32_t put_ = 0;
   volatile std::uint32_t taken_ = 0;
   volatile bool stop_ = false;
-  std::uint32_t last_peer_ = firmware::everyone;
+  PeerTable<UdpAddress, 16> hosts_;
   std::uint32_t dropped_ = 0;
   std::uint32_t out_[(UdpFrames::max_frame + 3) / 4];
 };

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "transports/framing/peer_table.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+
+#include "tests/support/datagrams.hpp"
+
+namespace r4::test {
+namespace {
+
+using Peers = PeerTable<int, 16>;
+constexpr int owner = -1;
+
+TEST(PeerTable, NumbersEverySenderOnce) {
+  Peers peers;
+  std::set<std::uint32_t> numbers;
+  for (int i = 0; i < Peers::capacity; ++i) numbers.insert(peers.heard(i));
+  EXPECT_EQ(numbers.size(), static_cast<std::size_t>(Peers::capacity));
+  EXPECT_EQ(numbers.count(Peers::nobody), 0U);
+  const std::uint32_t first = peers.heard(0);
+  EXPECT_EQ(numbers.count(first), 1U) << "known";
+  EXPECT_EQ(peers.last(), first);
+  EXPECT_EQ(*peers.find(first), 0);
+}
+
+TEST(PeerTable, GivesTheNextThePlaceOfTheOneSilentLongestAndNoNumberTwice) {
+  Peers peers;
+  std::set<std::uint32_t> numbers;
+  for (int i = 0; i < Peers::capacity; ++i) numbers.insert(peers.heard(i));
+  peers.heard(0);
+  const std::uint32_t silent = peers.heard(1) + 1;  // the number of 2
+  EXPECT_EQ(*peers.find(silent), 2);
+  numbers.insert(peers.heard(100));
+  EXPECT_EQ(peers.find(silent), nullptr);
+  numbers.insert(peers.heard(2));
+  EXPECT_EQ(numbers.size(), static_cast<std::size_t>(Peers::capacity + 2));
+}
+
+TEST(PeerTable, MakesNoPlaceForWhatIsNoDatagram) {
+  Peers peers;
+  const std::uint32_t host = peers.heard(owner, Text(with_crc("H:ROS2-R4;")));
+  ASSERT_NE(host, Peers::nobody);
+  std::string damaged = with_crc("H:ROS2-R4;");
+  damaged[3] = 'x';
+  for (int i = 0; i < 3000; ++i) {
+    EXPECT_EQ(peers.heard(i, Text("x")), Peers::nobody);
+    EXPECT_EQ(peers.heard(i, Text(damaged)), Peers::nobody);
+    EXPECT_EQ(peers.heard(i, Text()), Peers::nobody);
+  }
+  EXPECT_EQ(peers.last(), host);
+  EXPECT_EQ(peers.heard(owner, Text(with_crc("H:ROS2-R4;"))), host);
+}
+
+TEST(PeerTable, KeepsThePlaceOfTheHostInControlInAFlood) {
+  Peers peers;
+  const std::uint32_t number = peers.heard(owner);
+  peers.hold(number);
+  for (int i = 0; i < 50000; ++i) peers.heard(i);
+  ASSERT_NE(peers.find(number), nullptr);
+  EXPECT_EQ(peers.heard(owner), number);
+}
+
+TEST(PeerTable, LetsANewHostInDuringAFlood) {
+  Peers peers;
+  for (int i = 0; i < 5000; ++i) peers.heard(i);
+  const std::uint32_t number = peers.heard(owner);
+  // Until the board has decided who it is, others go on sending.
+  for (int i = 1; i < Peers::capacity; ++i) peers.heard(10000 + i);
+  peers.hold(number);
+  for (int i = 0; i < 5000; ++i) peers.heard(i);
+  EXPECT_EQ(peers.heard(owner), number);
+}
+
+TEST(PeerTable, FreesThePlaceOfTheOneBeforeWhenAnotherIsHeld) {
+  Peers peers;
+  const std::uint32_t before = peers.heard(owner);
+  peers.hold(before);
+  const std::uint32_t now = peers.heard(-2);
+  peers.hold(now);
+  for (int i = 0; i < Peers::capacity; ++i) peers.heard(i);
+  EXPECT_EQ(peers.find(before), nullptr);
+  EXPECT_EQ(peers.heard(-2), now);
+}
+
+}  // namespace
+}  // namespace r4::test

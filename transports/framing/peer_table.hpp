@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Numbers for the hosts that send to a board over UDP, where many can.
+//
+// Whoever has sent a valid datagram gets a place; what is damaged or no datagram at all makes none.
+// The table is bounded: a new sender takes the place of the one that has been silent longest. The
+// place of the host in control is its own, whatever others send: a host whose number changed would
+// be another host to the board. A number is never given twice.
+#pragma once
+
+#include <cstdint>
+
+#include "../../protocol/datagram.hpp"
+
+namespace r4 {
+
+template <class Address, int places>
+class PeerTable {
+ public:
+  static constexpr int capacity = places;
+  static constexpr std::uint32_t nobody = 0;
+
+  // The number of whoever has just sent `bytes`; nobody if they are no valid datagram.
+  std::uint32_t heard(const Address& from, Text bytes) {
+    Datagram datagram;
+    return read(bytes, datagram) ? heard(from) : nobody;
+  }
+  // The same of a datagram that is known to be valid.
+  std::uint32_t heard(const Address& from) {
+    Entry* place = nullptr;
+    for (Entry& entry : entries_) {
+      if (entry.number != nobody && entry.address == from) place = &entry;
+    }
+    if (place == nullptr) {
+      place = &place_for_new();
+      place->address = from;
+      if (++given_ == nobody) ++given_;
+      place->number = given_;
+    }
+    place->heard = ++turn_;
+    last_ = place->number;
+    return last_;
+  }
+
+  // The host of that number is in control: its place is its own until another is held.
+  void hold(std::uint32_t number) { held_ = number; }
+
+  // Where that number sends from; null if it has lost its place.
+  const Address* find(std::uint32_t number) const {
+    for (const Entry& entry : entries_) {
+      if (number != nobody && entry.number == number) return &entry.address;
+    }
+    return nullptr;
+  }
+  // Who was heard last; nobody before the first.
+  std::uint32_t last() const { return last_; }
+
+ private:
+  struct Entry {
+    Address address = Address();
+    std::uint32_t number = nobody;  // nobody: free
+    std::uint64_t heard = 0;        // in which turn
+  };
+
+  Entry& place_for_new() {
+    Entry* silent = nullptr;
+    for (Entry& entry : entries_) {
+      if (entry.number == nobody) return entry;
+      if (entry.number == held_) continue;
+      if (silent == nullptr || entry.heard < silent->heard) silent = &entry;
+    }
+    return *silent;
+  }
+
+  static_assert(places > 1, "one place may be held");
+  Entry entries_[places];
+  std::uint64_t turn_ = 0;
+  std::uint32_t given_ = nobody;
+  std::uint32_t last_ = nobody;
+  std::uint32_t held_ = nobody;
+};
+
+}  // namespace r4
