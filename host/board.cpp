@@ -7,6 +7,7 @@
 #include <asio/post.hpp>
 #include <condition_variable>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "async_board.hpp"
@@ -21,8 +22,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// The session ends every command at its deadline. A call that waits longer than this beyond it is
-// held up by a callback that does not return.
+// The session ends every command at its deadline, which is that of the call. A call that has been
+// begun and waits longer than this beyond it is held up by a callback that does not return.
 constexpr std::chrono::milliseconds grace{500};
 
 // A day is as good as for ever, and cannot overflow.
@@ -35,8 +36,10 @@ Error closed_error(std::string_view what) {
                "open it again with another Board");
 }
 
-Error blocked_error(std::string_view what) {
-  return Error(ErrorKind::refused, std::string(what), "the board's thread does not answer",
+// A callback holds the board's thread. `instead`: what that means for what was asked.
+Error blocked_error(std::string_view what, std::string_view instead) {
+  return Error(ErrorKind::refused, std::string(what),
+               std::string(instead) + ": the board's thread does not answer",
                "a callback must return at once; do the work in another thread");
 }
 
@@ -45,7 +48,8 @@ Error blocked_error(std::string_view what) {
 // The board's thread runs the loop, on which everything of AsyncBoard happens. The threads meet
 // under `mutex`: callers hand work to the loop and wait there for its end, or for news.
 struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
-  // Something asked of the loop, and its answer. Held by both sides, since the caller may give up.
+  // Something asked of the loop, and its answer. Held by both sides, since the caller may give up:
+  // what the loop has not begun by then, it leaves alone.
   struct Call {
     explicit Call(const Command& c)
         : command(c), text(c.text.data(), c.text.size()), text2(c.text2.data(), c.text2.size()) {
@@ -54,6 +58,8 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
     }
     Command command;
     std::string text, text2;
+    bool begun = false;
+    bool abandoned = false;
     bool done = false;
     std::condition_variable ended;
     CommandResult result;
@@ -62,8 +68,10 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   };
   using CallPtr = std::shared_ptr<Call>;
 
-  Impl(std::string_view url, BoardOptions options)
-      : async(io, url, std::move(options)), box(io, [this](const Command& c) { deliver(c); }) {
+  Impl(std::string_view url_given, BoardOptions options)
+      : async(io, url_given, std::move(options)),
+        box(io, [this](const Command& c) { deliver(c); }),
+        url(url_given) {
     async.on_state([this](const ReceivedState& fresh, const Datagram&) {
       {
         const std::lock_guard lock(mutex);
@@ -84,7 +92,16 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
       news.notify_all();
       link_callback(fresh);
     });
-    async.on_event([this](const CarrierEvent& event) { event_callback(event); });
+    async.on_event([this](const CarrierEvent& event) {
+      take_name();  // a board that was plugged in again may be at another port
+      if (event.kind == CarrierEvent::Kind::warning) {
+        last_warning = event;
+      } else {
+        last_event = event;
+        last_warning.reset();
+      }
+      event_callback(event);
+    });
     async.on_restart([this] {
       {
         const std::lock_guard lock(mutex);
@@ -93,6 +110,16 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
       restart_callback();
     });
     async.open();
+    take_name();
+  }
+
+  void take_name() {
+    const std::lock_guard lock(mutex);
+    name = async.name();
+  }
+  std::string name_now() {
+    const std::lock_guard lock(mutex);
+    return name;
   }
 
   LinkStatus link_now() {
@@ -118,14 +145,22 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
     }
   }
 
-  void begin(const CallPtr& call, Duration timeout) {
+  // A stop is sent however late it is; anything else only while its caller waits for it.
+  void begin(const CallPtr& call, Clock::time_point deadline) {
+    const bool stop = call->command.kind == CommandKind::stop;
+    auto left = std::chrono::ceil<Duration>(deadline - Clock::now());
+    {
+      const std::lock_guard lock(mutex);
+      if (!stop && (call->abandoned || left <= Duration{0})) return;
+      call->begun = true;
+    }
     auto end = [this, call](const CommandResult& result) { finish(*call, result); };
-    if (call->command.kind == CommandKind::stop) {
-      async.async_stop(timeout, std::move(end));
+    if (stop) {
+      async.async_stop(left > Duration{0} ? left : default_timeout, std::move(end));
     } else if (call->command.kind == CommandKind::identify) {
-      async.async_identify(timeout, std::move(end));
+      async.async_identify(left, std::move(end));
     } else {
-      async.async_send(call->command, timeout, std::move(end));
+      async.async_send(call->command, left, std::move(end));
     }
   }
 
@@ -165,26 +200,42 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
                 "use post() or stop_async(), or call it from another thread");
   }
 
+  void require_sendable(const Command& command) {
+    require_valid(command);
+    require_cable(url, command);
+  }
+
   // Has the loop carry out a command. Throws if it is not confirmed.
   CallPtr execute(const Command& command, Duration timeout) {
     const std::string text = shown(command);
     must_not_be_in_loop(text);
     CallPtr call = std::make_shared<Call>(command);
-    const auto deadline = Clock::now() + bounded(timeout) + grace;
+    const auto deadline = Clock::now() + bounded(timeout);
     std::unique_lock lock(mutex);
     if (closed) throw closed_error(text);
-    asio::post(io, [this, call, timeout] { begin(call, timeout); });
-    if (!call->ended.wait_until(lock, deadline, [&] { return call->done; })) {
-      throw blocked_error(text);
+    asio::post(io, [this, call, deadline] { begin(call, deadline); });
+    const auto is_done = [&] { return call->done; };
+    if (!call->ended.wait_until(lock, deadline, is_done) &&
+        !(call->begun && call->ended.wait_until(lock, deadline + grace, is_done))) {
+      call->abandoned = true;
+      if (command.kind == CommandKind::stop) {
+        throw Error(ErrorKind::refused, text,
+                    "not confirmed: the board's thread does not answer, and sends it when it does",
+                    std::string(stop_last_resort) + "; a callback must return at once");
+      }
+      throw blocked_error(
+          text, call->begun ? "not confirmed, it may have been executed or not" : "not sent");
     }
     if (call->result.outcome == Outcome::confirmed) return call;
     if (closed && call->result.outcome == Outcome::cancelled) throw closed_error(text);
     throw Error(explain(text, call->result, call->link));
   }
 
-  // Does `action` on the loop and waits until it is done; nothing if the board is closed.
-  template <class Action>
-  void run_on_loop(std::string_view what, Action action) {
+  // Does `action` on the loop and waits until it is done, then has the loop go on with `after`;
+  // nothing if the board is closed. Throws if the loop does not begin in time; then it never will.
+  // On the loop itself it does `action` alone.
+  template <class Action, class After>
+  void run_on_loop(std::string_view what, Action action, After after) {
     if (in_loop()) {
       action();
       return;
@@ -192,13 +243,39 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
     const auto call = std::make_shared<Call>(Command());
     std::unique_lock lock(mutex);
     if (closed) return;
-    asio::post(io, [this, call, action]() mutable {
+    asio::post(io, [this, call, action = std::move(action), after = std::move(after)]() mutable {
+      {
+        const std::lock_guard begin_lock(mutex);
+        if (call->abandoned) return;
+        call->begun = true;
+      }
       action();
       finish(*call, {});
+      after();
     });
-    if (!call->ended.wait_for(lock, default_timeout, [&] { return call->done; })) {
-      throw blocked_error(what);
+    const auto is_done = [&] { return call->done; };
+    if (call->ended.wait_for(lock, default_timeout, is_done)) return;
+    if (!call->begun) {
+      call->abandoned = true;
+      throw blocked_error(what, "not done");
     }
+    call->ended.wait(lock, is_done);
+  }
+  template <class Action>
+  void run_on_loop(std::string_view what, Action action) {
+    run_on_loop(what, std::move(action), [] {});
+  }
+
+  // Installs a callback; then `tell` tells it what there is already.
+  template <class Signature, class Tell>
+  void install(std::string_view what, Callback<Signature>& place, std::function<Signature> callback,
+               Tell tell) {
+    run_on_loop(
+        what,
+        [self = shared_from_this(), &place, callback = std::move(callback)]() mutable {
+          place.set(std::move(callback));
+        },
+        std::move(tell));
   }
 
   // Waits until `arrived` (asked under the lock) is true. False if it was not in time.
@@ -212,7 +289,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   }
 
   bool post(const Command& command) {
-    async.require_sendable(command);
+    require_sendable(command);
     const std::lock_guard lock(mutex);
     if (closed || (!in_control && command.kind != CommandKind::stop)) return false;
     return box.put(command);
@@ -251,10 +328,15 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   Callback<void(const LinkStatus&)> link_callback;
   Callback<void(const CarrierEvent&)> event_callback;
   Callback<void()> restart_callback;
+  std::optional<CarrierEvent> last_event;    // up or down
+  std::optional<CarrierEvent> last_warning;  // since then
+
+  const std::string url;  // as it was given
 
   // What both sides see.
   std::mutex mutex;
   std::condition_variable news;  // state, link or closed has changed
+  std::string name;              // the transport's, as the loop knows it
   ReceivedState state;
   std::uint64_t states = 0;
   LinkStatus link;
@@ -275,15 +357,15 @@ void Board::close() { impl_->close(); }
 
 void Board::wait_active(Duration timeout) {
   const auto impl = impl_;
-  const bool active = impl->wait_for_news(name(), timeout, [&] {
+  const bool active = impl->wait_for_news(impl->name_now(), timeout, [&] {
     return impl->link.state == HostLinkState::active && impl->in_control && !impl->link.gated;
   });
-  if (!active) throw Error(explain(impl->async.name(), impl->link_now()));
+  if (!active) throw Error(explain(impl->name_now(), impl->link_now()));
 }
 
 void Board::send(const Command& command, Duration timeout) {
   const auto impl = impl_;
-  impl->async.require_sendable(command);
+  impl->require_sendable(command);
   impl->execute(command, timeout);
 }
 void Board::send(std::string_view command, Duration timeout) {
@@ -337,8 +419,8 @@ ReceivedState Board::state() const {
 ReceivedState Board::next_state(Duration timeout) {
   const auto impl = impl_;
   const std::uint64_t seen = impl->states_now();
-  if (!impl->wait_for_news(name(), timeout, [&] { return impl->states != seen; })) {
-    Problem problem = explain(impl->async.name(), impl->link_now());
+  if (!impl->wait_for_news(impl->name_now(), timeout, [&] { return impl->states != seen; })) {
+    Problem problem = explain(impl->name_now(), impl->link_now());
     problem.reason = "no state came in time: " + problem.reason;
     throw Error(std::move(problem));
   }
@@ -346,7 +428,7 @@ ReceivedState Board::next_state(Duration timeout) {
   return impl->state;
 }
 LinkStatus Board::link() const { return impl_->link_now(); }
-const std::string& Board::name() const { return impl_->async.name(); }
+std::string Board::name() const { return impl_->name_now(); }
 
 Statistics Board::statistics() const {
   const auto impl = impl_;
@@ -361,27 +443,25 @@ Statistics Board::statistics() const {
 
 void Board::on_state(std::function<void(const ReceivedState&)> callback) {
   const auto impl = impl_;
-  impl->run_on_loop("on_state()", [impl = impl.get(), callback = std::move(callback)]() mutable {
-    impl->state_callback.set(std::move(callback));
+  impl->install("on_state()", impl->state_callback, std::move(callback), [impl = impl.get()] {
+    if (impl->state.any()) impl->state_callback(impl->state);
   });
 }
 void Board::on_link(std::function<void(const LinkStatus&)> callback) {
   const auto impl = impl_;
-  impl->run_on_loop("on_link()", [impl = impl.get(), callback = std::move(callback)]() mutable {
-    impl->link_callback.set(std::move(callback));
-  });
+  impl->install("on_link()", impl->link_callback, std::move(callback),
+                [impl = impl.get()] { impl->link_callback(impl->link); });
 }
 void Board::on_event(std::function<void(const CarrierEvent&)> callback) {
   const auto impl = impl_;
-  impl->run_on_loop("on_event()", [impl = impl.get(), callback = std::move(callback)]() mutable {
-    impl->event_callback.set(std::move(callback));
+  impl->install("on_event()", impl->event_callback, std::move(callback), [impl = impl.get()] {
+    if (impl->last_event) impl->event_callback(*impl->last_event);
+    if (impl->last_warning) impl->event_callback(*impl->last_warning);
   });
 }
 void Board::on_restart(std::function<void()> callback) {
   const auto impl = impl_;
-  impl->run_on_loop("on_restart()", [impl = impl.get(), callback = std::move(callback)]() mutable {
-    impl->restart_callback.set(std::move(callback));
-  });
+  impl->install("on_restart()", impl->restart_callback, std::move(callback), [] {});
 }
 
 void Board::watchdog(Duration period) {

@@ -13,10 +13,14 @@
 // the transport cannot be opened, usage for a wrong URL or a value outside its range, refused when
 // the board refuses a command or does not confirm it in time, or when the Board was closed.
 //
+// A timeout counts from the call. What has not been sent by then is never sent; where a command may
+// have been sent, the error says that it may have been executed. Only a stop goes out in any case.
+//
 // Callbacks run on the board's own thread, one at a time, and must not block: a blocking call in a
 // callback throws Error{usage}; post(), stop_async() and what only looks (state(), link(),
 // statistics()) may be used there, and on_…(), watchdog(), feed() and close(). When on_…() returns
-// on another thread, the callback before it is not running and will not be called again. An
+// on another thread, the callback before it is not running and will not be called again; when it
+// throws, because a callback holds the board's thread, the new one will never be called. An
 // exception out of a callback ends the program, as it does out of any thread.
 #pragma once
 
@@ -145,8 +149,12 @@ class Board {
   ReceivedState next_state(Duration timeout = default_timeout);
   LinkStatus link() const;
   Statistics statistics() const;
-  const std::string& name() const;  // the transport, for people
+  // The transport, for people. A USB board that is plugged in again may have another.
+  std::string name() const;
 
+  // A callback is told at once what there is already: the newest state, the link, the newest
+  // up or down of the transport and the warning since. One that is set in a callback hears only
+  // what comes next.
   void on_state(std::function<void(const ReceivedState&)> callback);
   void on_link(std::function<void(const LinkStatus&)> callback);
   void on_event(std::function<void(const CarrierEvent&)> callback);

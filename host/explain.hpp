@@ -10,6 +10,9 @@
 
 namespace r4 {
 
+// What to do where a stop is not confirmed.
+inline constexpr std::string_view stop_last_resort = "CUT THE POWER if it must stop now";
+
 // How the link is and, where something is wrong with it, what to do: "another host controls the
 // board" and "stop it, or …". `thing` is the board's name. Of kind refused.
 Problem explain(std::string_view name, const LinkStatus& link);

@@ -11,6 +11,7 @@
 #include "host/command_help.hpp"
 #include "tests/support/board_in_a_thread.hpp"
 #include "tests/support/every_channel.hpp"
+#include "tests/support/problems.hpp"
 #include "transports/error.hpp"
 
 namespace r4::test {
@@ -18,23 +19,6 @@ namespace {
 
 using namespace std::chrono_literals;
 using firmware::BoardState;
-
-// The problem that `action` throws.
-template <class Action>
-Problem problem_of(Action action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error.problem();
-  }
-  ADD_FAILURE() << "nothing was thrown";
-  return {};
-}
-
-testing::AssertionResult contains(const std::string& text, const std::string& part) {
-  if (text.find(part) != std::string::npos) return testing::AssertionSuccess();
-  return testing::AssertionFailure() << "\"" << text << "\" has no \"" << part << "\"";
-}
 
 // --- every transport
 

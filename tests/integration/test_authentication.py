@@ -280,7 +280,7 @@ def test_a_key_file_of_somebody_else_is_told_from_one_that_is_missing():
         done = subprocess.run([*program, 'monitor', 'udp://127.0.0.1:9', '--key', key], check=False, text=True,
                               capture_output=True, timeout=10, **options)
     assert done.returncode == 5, done
-    assert 'run r4 as the user whose key it is' in done.stderr and ERROR.match(done.stderr)
+    assert 'run this as the user whose key it is' in done.stderr and ERROR.match(done.stderr)
 
 
 @pytest.mark.parametrize('arguments, code, words', [

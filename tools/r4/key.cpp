@@ -10,6 +10,7 @@
 
 #include "host/board.hpp"
 #include "host/command_help.hpp"
+#include "host/key_file.hpp"
 #include "key_file.hpp"
 #include "options.hpp"
 #include "subcommands.hpp"
@@ -48,7 +49,7 @@ int give(const Options& options) {
                 "a key has its id since it was made", "r4 key new FILE --id N");
   }
   require_cable(options.url, "the key in " + options.file);
-  const Key key = read_key_file(options.file);
+  const Key key = load_key(options.file);
   std::array<char, key_text_size> text;
   write_key(text.data(), key);
   Board board(options.url);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A file with a board's key: one line, `<id>:<64 hexadecimal digits>`, for its owner alone.
+// The file with a board's key (host/key_file.hpp), for its owner alone: how it is made and named.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -9,10 +9,6 @@
 #include "host/board_options.hpp"
 
 namespace r4::tool {
-
-// Throws Error: open if it cannot be read, permission if others than its owner may read it, data if
-// it holds no key.
-Key read_key_file(const std::string& path);
 
 // Makes a file with a new random key. Throws Error: open if it cannot be made; one that is there is
 // never overwritten.

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "key_file.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+
+#include "../transports/error.hpp"
+#include "../transports/file_descriptor.hpp"
+
+namespace r4 {
+namespace {
+
+constexpr const char* new_one = "make one: r4 key new FILE";
+
+Error cannot_be_read(const std::string& path, int error) {
+  const bool denied = error == EACCES || error == EPERM;
+  std::string fix = new_one;
+  if (denied) {
+    fix = "run this as the user whose key it is, or make one of your own: r4 key new FILE";
+  } else if (path.starts_with("~/")) {
+    fix =
+        "a ~ is only known to the shell: write $HOME" + path.substr(1) + " there, or a whole path";
+  }
+  return {denied ? ErrorKind::permission : ErrorKind::open, path, std::strerror(error), fix};
+}
+
+// What is in it, up to a little more than a key is long.
+std::string contents(const FileDescriptor& file, const std::string& path) {
+  std::array<char, 2 * key_text_size> buffer;
+  std::string text;
+  while (text.size() < buffer.size()) {
+    const ssize_t n = ::read(file.get(), buffer.data(), buffer.size());
+    if (n < 0) throw cannot_be_read(path, errno);
+    if (n == 0) break;
+    text.append(buffer.data(), static_cast<std::size_t>(n));
+  }
+  return text;
+}
+
+}  // namespace
+
+Key load_key(const std::string& path) {
+  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  struct stat status {};
+  if (!file || ::fstat(file.get(), &status) != 0) throw cannot_be_read(path, errno);
+  if (S_ISDIR(status.st_mode)) {
+    throw Error(ErrorKind::open, path, "is a directory", "name the file that holds the key");
+  }
+  if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
+    throw Error(ErrorKind::permission, path, "others can read or write this key",
+                "chmod 600 " + path + "; if somebody may have read it, make a new one");
+  }
+  std::string text = contents(file, path);
+  text.erase(text.find_last_not_of("\r\n") + 1);
+  Key key;
+  if (parse_key(Text(text), key) != Refusal::none) {
+    throw Error(
+        ErrorKind::data, path, "holds no key",
+        fmt::format("a key is one line, an id of 1 to {}, a colon and {} hexadecimal digits; {}",
+                    max_key_id, 2 * key_size, new_one));
+  }
+  return key;
+}
+
+}  // namespace r4
