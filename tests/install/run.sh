@@ -28,7 +28,8 @@ check() {
     echo "install: $name failed"
     exit 1
   }
-  for words in 'board sim-1' 'OSMC 1 at 1000 forward' 'link: safe, reason stop' ' us round trip'; do
+  for words in 'board sim-1' 'OSMC 1 at 1000 forward' 'motor 1 has turned by [1-9]' \
+    'link: safe, reason stop' ' us round trip'; do
     grep -q "$words" "$work/out" || {
       cat "$work/out"
       echo "install: $name did not print '$words'"
@@ -50,6 +51,35 @@ export PKG_CONFIG_PATH
 read -ra flags <<<"$(pkg-config --cflags --libs r4link)"
 "$cxx" -std=c++20 -O1 main.cpp "${flags[@]}" -o drive
 check pkg-config ./drive sim:?node=1
+
+# The program in README.md drives a simulated robot, whose motors have supply only while relay 1 is
+# closed.
+mkfifo "$work/board"
+"$build_tree/r4" sim --json --duration 30 udp://127.0.0.1:0 >"$work/board" &
+board=$!
+exec 3<"$work/board"
+read -r listening <&3
+cat <&3 >"$work/events" &
+events=$!
+url=${listening#*\"host_url\":\"}
+url="${url%%\"*}?listen=0"
+awk '/^```/ { inside = /cpp/; next } inside' "$source_tree/README.md" >readme.txt
+{
+  grep '^#include' readme.txt
+  echo 'int main() {'
+  grep -v '^#include' readme.txt | sed "s,udp://192.168.0.125,$url,"
+  echo '}'
+} >readme.cpp
+"$cxx" -std=c++20 -O1 readme.cpp "${flags[@]}" -o readme
+./readme
+kill "$board"
+wait "$board" "$events"
+if ! grep '"osmc":\[\[358,1\]' "$work/events" | grep -q '"supply":true'; then
+  cut -c 1-200 "$work/events"
+  echo 'install: the program in README.md drives a motor that has no supply'
+  exit 1
+fi
+echo 'install: README.md drives a motor'
 
 status=0
 ./drive fax:1 >/dev/null 2>"$work/err" || status=$?

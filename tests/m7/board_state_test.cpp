@@ -58,6 +58,7 @@ TEST(BoardState, BringsEveryInputExactly) {
     EXPECT(state.encoder_counts[channel - 1] == 0);
     EXPECT(state.encoder_index_counts[channel - 1] == -part_of(channel));
   }
+  board.host.execute(Command::relay(1, true));  // closes the motors' supply
   for (int channel = 1; channel <= 4; ++channel) {
     board.host.execute(Command::osmc(1000 * channel, Direction::forward, channel));
   }

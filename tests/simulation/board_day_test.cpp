@@ -99,7 +99,7 @@ class Day final : private firmware::Port {
     command("P:" + std::string(random_.below(2) == 0 ? "-" : "") + "1000000,5000," + channel);
     command("S:1500," + std::to_string(random_.between(1, 16)));
     command("B:2000,1,0,1");
-    command("R:2,On");
+    command("R:1,On");  // the motors have supply
     live(1);
     ASSERT_FALSE(board_.pins().is_safe());
   }

@@ -69,6 +69,7 @@ void expect_inputs(const ControlledBoard& board) {
 
 // Each motor turns its own encoder, each at another speed.
 void expect_speeds(const ControlledBoard& board) {
+  board.command("R:1,On");  // closes their supply
   for (int channel = 1; channel <= osmc_channels; ++channel) {
     board.command(fmt::format("O:{},{},{}", 1000 * channel, channel % 2, channel));
   }

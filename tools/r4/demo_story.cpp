@@ -22,6 +22,8 @@ constexpr double timeout_ms = 1000;
 constexpr double tolerance_ms = 20;
 
 const Drive commanded{358, Direction::forward};
+// Counts of the encoder that a motor without supply would not turn, not even running out.
+constexpr std::int32_t turned = 100;
 
 // A step was not true.
 class NotSo : public std::runtime_error {
@@ -155,6 +157,11 @@ void Story::ask() {
 }
 
 void Story::command() {
+  send(Command::fields("DEFAULT,ENC1"));
+  send(Command::relay(1, true));
+  teller_.say(
+      "supply    R:1,On closes relay 1: it is in the motors' supply, and opens in every safe "
+      "state.");
   result_.confirmed_ms = milliseconds_of(send(Command::osmc(358, Direction::forward, 1)));
   require(state_.osmc[0] == commanded, "the state does not show the command");
   teller_.say(
@@ -162,6 +169,15 @@ void Story::command() {
   teller_.show(state_bytes_);
   teller_.say(
       fmt::format("          That is the confirmation, after {:.1f} ms.", result_.confirmed_ms));
+  require_that_the_motor_turns();
+  teller_.say("          The motor turns; the encoder on its shaft (ENC1) counts:");
+  teller_.show(state_bytes_);
+}
+
+void Story::require_that_the_motor_turns() {
+  const std::int32_t from = state_.encoder_counts[0];
+  require(wait_until([&] { return state_.encoder_counts[0] - from > turned; }, patience),
+          "the motor does not turn");
 }
 
 // Gates the heartbeats as the watchdog of a hung application does.
@@ -214,6 +230,7 @@ void Story::recover() {
   teller_.say("recovery  Heartbeats again: the board takes up its last command by itself:");
   teller_.show(state_bytes_);
   teller_.say(fmt::format("          {:.0f} ms after the first heartbeat.", result_.recovered_ms));
+  require_that_the_motor_turns();
 }
 
 void Story::stop() {
@@ -224,9 +241,10 @@ void Story::stop() {
   require(wait_until(is_off, patience), "the state does not show the stop");
   teller_.say("stop      E:STOP, the emergency stop, which the board obeys from anyone:");
   teller_.show(state_bytes_);
-  teller_.say(
-      fmt::format("          SAFE:2, motor off, confirmed after {:.1f} ms; latched until E:CLEAR.",
-                  result_.stop_ms));
+  teller_.say(fmt::format(
+      "          SAFE:2, motor off and relay 1 open, confirmed after {:.1f} ms; latched until "
+      "E:CLEAR.",
+      result_.stop_ms));
 }
 
 void Story::clear() {
@@ -236,7 +254,9 @@ void Story::clear() {
           "E:CLEAR did not clear the stop");
   require(state_.osmc[0] == Drive(), "a command came back after an emergency stop");
   teller_.say(
-      "clear     E:CLEAR allows it to move again. Nothing comes back by itself: the motor is off.");
+      "clear     E:CLEAR allows it to move again. Nothing comes back by itself: the motor is off, "
+      "and "
+      "has no\n            supply until the next R:1,On.");
 }
 
 }  // namespace r4::tool

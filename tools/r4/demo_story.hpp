@@ -65,6 +65,7 @@ class Story {
   void stream();
   void ask();
   void command();
+  void require_that_the_motor_turns();
   void fall_silent();
   void recover();
   void stop();

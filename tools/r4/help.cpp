@@ -76,7 +76,7 @@ std::string root_footer() {
   return "First steps: r4 sim in one terminal, then in another one\n"
          "  r4 sim                          a simulated board, at udp://127.0.0.1:2018\n"
          "  r4 monitor udp://127.0.0.1      its state, a hundred times a second\n"
-         "  r4 send udp://127.0.0.1 O:358,1,1 --hold 5\n"
+         "  r4 send udp://127.0.0.1 R:1,On O:358,1,1 --hold 5\n"
          "                                  motor 1 forward at 358 of 4095, for five seconds\n"
          "  r4 demo                         all of it explained, over every transport\n"
          "\nURLs, where a board is or where a simulated one listens:\n" +

@@ -81,7 +81,7 @@ taken away: r4 send serial:auto C:key,2:off
 Examples:
   r4 key new ~/.r4-key                  makes it, readable by you alone
   r4 key give ~/.r4-key serial:auto     the board has it, and from now on asks for it
-  r4 send udp://192.168.0.125 O:358,1,1 --key ~/.r4-key
+  r4 send udp://192.168.0.125 R:1,On O:358,1,1 --key ~/.r4-key
 
 Exit codes: 0 done; 1 the file holds no key; 2 usage, also a URL that is no cable; 3 the board did not
 take it; 4, 5 the file or the transport cannot be opened.)";

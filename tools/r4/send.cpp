@@ -161,8 +161,8 @@ confirmed ends the run. All are checked before the first is sent.
 The board goes safe, its outputs off, one second after this program ends: --hold keeps them on.
 
 Examples:
-  r4 send udp://192.168.0.125 O:358,1,1 --hold 5
-  r4 send serial:auto D:1000,1,1 S:1500,3 R:2,On --hold 60
+  r4 send udp://192.168.0.125 R:1,On O:358,1,1 --hold 5      R:1,On: the motors have supply
+  r4 send serial:auto R:1,On D:1000,1,1 S:1500,3 R:2,On --hold 60
   r4 send serial:auto E:CLEAR                 after an emergency stop
   r4 send udp://127.0.0.1 Q:ID                who is it?
 

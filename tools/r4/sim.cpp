@@ -33,6 +33,7 @@ struct Options {
   bool json = false;
   bool quiet = false;
   std::optional<Milliseconds> duration;
+  std::optional<Milliseconds> sensors;
   std::string script;
   std::optional<std::uint64_t> seed;
   std::string board_id;
@@ -133,6 +134,8 @@ class Board {
     for (const Carrier* const carrier : carriers_) listening.push_back(carrier->name());
   }
 
+  void tell_sensors() { log_.tell_sensors(); }
+
   void end() {
     for (const Carrier* const carrier : carriers_) log_.on_end(*carrier);
   }
@@ -155,7 +158,34 @@ class Board {
   std::vector<const Carrier*> carriers_;
 };
 
+// Tells the sensors of all boards again and again.
+class SensorClock {
+ public:
+  SensorClock(asio::io_context& io, Milliseconds period,
+              const std::vector<std::unique_ptr<Board>>& boards)
+      : timer_(io, std::chrono::steady_clock::now()), period_(period), boards_(boards) {
+    wait();
+  }
+
+ private:
+  void wait() {
+    timer_.expires_at(timer_.expiry() + period_);
+    timer_.async_wait([this](const std::error_code& error) {
+      if (error) return;
+      for (const auto& board : boards_) board->tell_sensors();
+      wait();
+    });
+  }
+
+  asio::steady_timer timer_;
+  const Milliseconds period_;
+  const std::vector<std::unique_ptr<Board>>& boards_;
+};
+
 int simulate(const Options& options) {
+  if (options.sensors && (!options.json || options.quiet)) {
+    throw Error(ErrorKind::usage, "--sensors", "is for JSON", "add --json, and leave out --quiet");
+  }
   asio::io_context io(1);
   asio::signal_set signals(io, SIGINT, SIGTERM);
   signals.async_wait([&io](const std::error_code&, int) { io.stop(); });
@@ -177,6 +207,8 @@ int simulate(const Options& options) {
       end.expires_after(*options.duration);
       end.async_wait([&io](const std::error_code&) { io.stop(); });
     }
+    std::optional<SensorClock> sensors;
+    if (options.sensors) sensors.emplace(io, *options.sensors, boards);
     io.run();
     for (const auto& board : boards) board->end();
   }
@@ -188,10 +220,14 @@ constexpr const char* footer =
 the paper's capture. It prints where it listens and what it does; with --json one object a line:
   {"type":"listening","url":…,"host_url":…}
   {"type":"event","t":…,"state":"CONNECTING|ACTIVE|SAFE","reason":…}   t: the board's clock, ms
-with "board" if there are several, "outputs" when a pin of a chip or a stepper does something else,
+with "board" if there are several, "outputs" when a pin of a chip or a stepper does something else, with
+"supply", whether the motors have any (relay 1 closed, handle held: docs/safety.md),
 "fault" when a chip is in trouble, "executed" or "refused" for a command, "rejected" (missing, unknown
 key, wrong tag, replayed, old) for what was not signed as a key asks, "transport" when one went down or
-came up, and "silence" (ms since the host was last heard) when the board goes safe for that. At the end
+came up, and "silence" (ms since the host was last heard) when the board goes safe for that.
+With --sensors, as often as that says
+  {"type":"sensors","t":…,"supply":…,"handle":…,"enc":[…],"stepper":[…],"us":[…],"analog":{"AIN24":…,…}}
+At the end
   {"type":"counters","transport":…,"received":…,"sent":…,"dropped":…,…}   datagrams of a transport
 with "transfers" on CAN.
 
@@ -221,10 +257,13 @@ void add_sim(CLI::App& root, Action& chosen) {
   add_json(*command, options->json, "print events as JSON, one object a line");
   command->add_flag("--quiet", options->quiet, "print only where it listens");
   add_seconds(*command, "--duration", options->duration, "end after that time");
+  add_seconds(*command, "--sensors", options->sensors,
+              "with --json: what the sensors sense, as often as that");
   command->add_option("--script", options->script, "a scenario: what happens around the board")
       ->type_name(file_type);
-  add_number(*command, "--seed", options->seed, 0, ~std::uint64_t{0},
-             "the same seed gives the same clock and inputs");
+  add_number(
+      *command, "--seed", options->seed, 0, ~std::uint64_t{0},
+      "the same seed gives the same clock, inputs and nonces (with a key: for tests)");
   command
       ->add_option("--set", options->settings,
                    "a setting as C:KEY,VALUE makes it, such as pack,1 (can be given again)")

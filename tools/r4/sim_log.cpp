@@ -3,16 +3,30 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
+#include <iterator>
 #include <string_view>
 
 #include "host/command_help.hpp"
 #include "protocol/refusal.hpp"
+#include "protocol/state.hpp"
 #include "protocol/units.hpp"
 #include "transports/url.hpp"
 
 namespace r4::tool {
 namespace {
+
+// Whether a motor is told to turn.
+bool drives(const sim::Pins& pins) {
+  const auto has_duty = [](const Drive& drive) { return drive.pwm != 0; };
+  const auto has_speed = [](const Bldc& bldc) { return bldc.speed != 0; };
+  const auto steps = [](const sim::Pins::Stepper& stepper) { return stepper.stepping != 0; };
+  return std::any_of(std::begin(pins.osmc), std::end(pins.osmc), has_duty) ||
+         std::any_of(std::begin(pins.dhb12), std::end(pins.dhb12), has_duty) ||
+         std::any_of(std::begin(pins.bldc), std::end(pins.bldc), has_speed) ||
+         std::any_of(std::begin(pins.stepper), std::end(pins.stepper), steps);
+}
 
 int number_of(Direction direction) { return static_cast<int>(direction); }
 
@@ -89,6 +103,30 @@ std::string pins_text(const sim::Pins& pins) {
   return text.empty() ? "all off" : text;
 }
 
+Json sensors_json(const sim::BoardModel& model) {
+  static constexpr StateField analog_fields[analog_channels] = {
+      StateField::ain24,  StateField::ain12,    StateField::ain5,
+      StateField::aindmh, StateField::ainsteer, StateField::ain6};
+  Json json{{"supply", model.motors_have_supply()},
+            {"handle", model.handle_held() ? "held" : "released"},
+            {"enc", Json::array()},
+            {"stepper", Json::array()},
+            {"us", Json::array()},
+            {"analog", Json::object()}};
+  for (int i = 1; i <= encoder_channels; ++i) json["enc"].push_back(model.shaft_count(i));
+  for (int i = 1; i <= stepper_channels; ++i) json["stepper"].push_back(model.stepper_shaft(i));
+  for (int i = 1; i <= ultrasonic_channels; ++i) {
+    const sim::UltrasonicModel& sensor = model.ultrasonic(i);
+    json["us"].push_back(sensor.connected() ? Json(sensor.distance()) : Json("off"));
+  }
+  for (int i = 0; i < analog_channels; ++i) {
+    const Text name = name_of(analog_fields[i]);
+    json["analog"][std::string(name.data(), name.size())] =
+        model.analog_cv(static_cast<Analog>(i)) / 100.0;
+  }
+  return json;
+}
+
 sim::SimulatedBoard::Events SimLog::events() {
   sim::SimulatedBoard::Events events;
   if (quiet_) return events;
@@ -149,6 +187,14 @@ Json SimLog::event(std::uint32_t t_ms) const {
   return object;
 }
 
+void SimLog::tell_sensors() {
+  Json object{{"type", "sensors"}};
+  if (!name_.empty()) object["board"] = name_;
+  object["t"] = board_->now_ms();
+  object.update(sensors_json(board_->model()));
+  print(object);
+}
+
 void SimLog::on_end(const Carrier& carrier) {
   if (quiet_) return;
   const CarrierCounters& counters = carrier.counters();
@@ -180,9 +226,15 @@ void SimLog::on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason
 }
 
 void SimLog::on_pins(std::uint32_t t_ms, const sim::Pins& pins) {
-  if (!output_.json()) return print(t_ms, "outputs: " + pins_text(pins));
+  const bool supply = board_->model().motors_have_supply();
+  if (!output_.json()) {
+    const char* const idle =
+        supply || !drives(pins) ? "" : " (the motors have no supply: relay 1 is open)";
+    return print(t_ms, "outputs: " + pins_text(pins) + idle);
+  }
   Json object = event(t_ms);
   object["outputs"] = pins_json(pins);
+  object["supply"] = supply;
   print(object);
 }
 

@@ -43,6 +43,8 @@ class SimLog {
   sim::SimulatedBoard::Events events();
   // The board they belong to, before its start().
   void watch(const sim::SimulatedBoard& board) { board_ = &board; }
+  // What its sensors sense now.
+  void tell_sensors();
   // What passed over one of its transports, at the end.
   void on_end(const Carrier& carrier);
 
@@ -73,5 +75,10 @@ Json pins_json(const sim::Pins& pins);
 
 // "OSMC1:358,1 SERVO1:2001": what is not as in the safe state; "all off".
 std::string pins_text(const sim::Pins& pins);
+
+// {"supply":true,"handle":"held","enc":[counts,…],"stepper":[steps,…],"us":[cm,…],
+//  "analog":{"AIN24":24.28,…}}: the motors' supply, and what sensors would read; "off" for an
+// ultrasonic sensor without its cable.
+Json sensors_json(const sim::BoardModel& model);
 
 }  // namespace r4::tool

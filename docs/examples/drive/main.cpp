@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Drives OSMC channel 1 up and down again, says what happens, and stops.
+// Drives OSMC channel 1 up and down again, says what happens and how far the motor has turned, and
+// stops.
 //
 //     drive [URL]        sim: without a URL; udp://192.168.0.125, serial:auto …
 //
@@ -41,16 +42,27 @@ void drive(r4::Board& board) {
   std::printf("board %s, firmware %s, on %s\n", who.board_id.c_str(), who.firmware.c_str(),
               board.name().c_str());
 
+  // The board is to tell what encoder 1, on the motor's shaft, counts.
+  board.fields("DEFAULT,ENC1");
+  const std::int32_t from = board.next_state().encoder_counts[0];
+
   // From here on this program must show that it is alive. If it hangs for 300 ms, the heartbeats
   // stop and the board switches its outputs off.
   board.watchdog(300ms);
+  // The motors have supply now. Until here, and after each safe state, relay 1 is open, and nothing
+  // turns whatever is commanded.
+  board.relay(1).set(true, 250ms);
+  board.feed();
   for (const int pwm : {0, 500, 1000, 1500, 1000, 500, 0}) {
     board.osmc(1).set(pwm, r4::Direction::forward, 250ms);  // the board's state has confirmed it
     board.feed();
     std::this_thread::sleep_for(50ms);
   }
 
-  board.stop();  // every output safe; latched until board.clear()
+  std::printf("motor 1 has turned by %d counts\n",
+              board.next_state(250ms).encoder_counts[0] - from);
+
+  board.stop();  // every output safe, the motors without supply; latched until board.clear()
   const r4::Statistics statistics = board.statistics();
   std::printf("%llu states, %.1f a second, %.0f us round trip, %.1f %% lost\n",
               static_cast<unsigned long long>(statistics.states), statistics.state_rate_hz,

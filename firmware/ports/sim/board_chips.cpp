@@ -76,6 +76,10 @@ Drive BoardChips::dhb12_drive(int channel) const {
   return drive_of(dhb12, firmware::dhb12_lines[channel - 1]);
 }
 
+bool BoardChips::relay_closed(int channel) const {
+  return bit(expander.level(1) & expander.driven(1), firmware::relay_bits[channel - 1]);
+}
+
 ChipPins BoardChips::pins() const {
   ChipPins pins;
   for (int i = 0; i < osmc_channels; ++i) pins.osmc[i] = osmc_drive(i + 1);
@@ -85,7 +89,6 @@ ChipPins BoardChips::pins() const {
         static_cast<std::uint16_t>((servo.pulse_ns(firmware::servo_lines[i]) + 500) / 1000);
   }
   const unsigned port_a = expander.level(0) & expander.driven(0);
-  const unsigned port_b = expander.level(1) & expander.driven(1);
   for (int i = 0; i < bldc_channels; ++i) {
     const firmware::BldcLines& lines = firmware::bldc_lines[i];
     const Mcp4728Model::Setting& speed = dac.output(lines.speed);
@@ -94,9 +97,7 @@ ChipPins BoardChips::pins() const {
     pins.bldc[i].brake = bit(port_a, lines.brake);
   }
   for (int i = 0; i < relay_channels; ++i) {
-    if (bit(port_b, firmware::relay_bits[i])) {
-      pins.relays = static_cast<std::uint8_t>(pins.relays | 1U << i);
-    }
+    if (relay_closed(i + 1)) pins.relays = static_cast<std::uint8_t>(pins.relays | 1U << i);
   }
   return pins;
 }

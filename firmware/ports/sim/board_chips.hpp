@@ -40,6 +40,7 @@ struct BoardChips {
   // Channels count from 1.
   Drive osmc_drive(int channel) const;
   Drive dhb12_drive(int channel) const;
+  bool relay_closed(int channel) const;
   I2cChipModel& operator[](firmware::Chip chip);
 
   I2cBusModel bus;

@@ -112,9 +112,11 @@ firmware::BoardPins BoardModel::microcontroller_pins() {
 void BoardModel::pass_millisecond(std::uint32_t now_us, Interrupts& interrupts) {
   ++time_ms_;
   chips_.bus.advance(1000);
+  const bool supplied = motors_have_supply();
   for (int i = 0; i < encoder_channels; ++i) {
     Shaft& shaft = shafts_[i];
-    std::int32_t counts = shaft.motor.pass_millisecond(chips_.osmc_drive(i + 1));
+    std::int32_t counts =
+        shaft.motor.pass_millisecond(supplied ? chips_.osmc_drive(i + 1) : Drive());
     if (shaft.by_hand) {
       const std::int64_t left = std::int64_t{shaft.hand_count} - shaft.count;
       shaft.by_hand = left > hand_speed || left < -hand_speed;
@@ -124,12 +126,13 @@ void BoardModel::pass_millisecond(std::uint32_t now_us, Interrupts& interrupts) 
     }
     turn(i + 1, counts, interrupts);
   }
-  steer(chips_.dhb12_drive(1));
+  if (supplied) steer(chips_.dhb12_drive(1));
   for (int i = 0; i < ultrasonic_channels; ++i) {
     sensors_[i].pass(
         now_us, [&](bool high, std::uint32_t at_us) { interrupts.on_echo(i + 1, high, at_us); });
   }
   for (Stepper& stepper : steppers_) {
+    stepper.driver.supply_motor(supplied);
     if (stepper.pulses != stepper.driver.pulses()) {
       stepper.pulses = stepper.driver.pulses();
       stepper.pause_ms = 0;
@@ -168,11 +171,12 @@ void BoardModel::steer(Drive drive) {
   if (steering_ > steering_range) steering_ = steering_range;
 }
 
-std::int32_t BoardModel::analog_cv(int input) const {
+std::int32_t BoardModel::analog_cv(Analog analog) const {
+  const int input = static_cast<int>(analog);
   if ((pinned_ >> input & 1) != 0) return pinned_cv_[input];
   const std::uint64_t random =
       scramble(seed_ ^ scramble(std::uint64_t{time_ms_} << 8 | static_cast<std::uint64_t>(input)));
-  switch (static_cast<Analog>(input)) {
+  switch (analog) {
     case Analog::ain24: {
       std::int32_t current_ca = 0;
       for (const Shaft& shaft : shafts_) current_ca += shaft.motor.current_ca();
@@ -202,7 +206,7 @@ void BoardModel::convert_again() {
 std::uint16_t BoardModel::Converter::read() {
   if (converted && at_ms == model->time_ms_) return counts;
   constexpr std::int32_t range_cv = 5000;
-  const std::int32_t cv = model->analog_cv(input);
+  const std::int32_t cv = model->analog_cv(static_cast<Analog>(input));
   const std::int32_t within = cv < 0 ? 0 : cv > range_cv ? range_cv : cv;
   counts = static_cast<std::uint16_t>((within * 65535 + range_cv / 2) / range_cv);
   at_ms = model->time_ms_;

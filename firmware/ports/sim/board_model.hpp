@@ -5,13 +5,15 @@
 //
 // Connected is the vehicle of the paper's capture (section 4.4), standing on the bench:
 //
+//     supply      of the motors: there while the dead-man's handle is held and relay 1 is closed, as
+//                 docs/safety.md has it. Without it no motor turns, whatever its driver is told.
 //     OSMC 1-4    a motor each, whose shaft turns encoder 1-4: 4000 counts a second at full duty;
 //                 the index line is high for one of the 1000 counts of a turn, count 0
 //     DHB1A       the steering motor; AINSTEER tells where it stands: 1 V, where forward ends, to 4 V,
 //                 1.5 s from end to end at full duty
 //     battery     AIN24 sags with the current of the OSMC motors (20 mOhm)
 //     US 1-4      ultrasonic sensors with nothing in sight
-//     steppers    drivers that count the pulses
+//     steppers    a motor each that takes a step at each pulse
 //
 // Analog inputs take the values of the capture's converters as often as they occur there; which one
 // depends on the seed and the time alone, so the same seed gives the same trace.
@@ -55,6 +57,7 @@ class BoardModel {
   static constexpr std::uint32_t stepper_pause_ms = 100;
   static constexpr std::int32_t hand_speed = 1000;  // counts a millisecond
   static constexpr std::int32_t counts_a_turn = 1000;
+  static constexpr int supply_relay = 1;  // its contact is in the motors' supply
 
   explicit BoardModel(std::uint64_t seed);
 
@@ -68,11 +71,16 @@ class BoardModel {
   BoardChips& chips() { return chips_; }
   firmware::BoardPins microcontroller_pins();
   Pins pins() const;
+  bool motors_have_supply() const { return handle_held_ && chips_.relay_closed(supply_relay); }
   // How far the shaft of an encoder has turned since power came, in the encoder's counts.
   std::int32_t shaft_count(int channel) const { return shafts_[channel - 1].count; }
 
+  // How many steps the stepper motor has taken since power came, forward less backward.
+  std::int32_t stepper_shaft(int channel) const { return steppers_[channel - 1].driver.shaft(); }
+
   // The surroundings. Channels count from 1.
   void hold_handle(bool held);
+  bool handle_held() const { return handle_held_; }
   // Something is `cm` (0: nothing) before the sensor.
   void set_ultrasonic(int channel, std::uint16_t cm) { sensors_[channel - 1].set_distance(cm); }
   void connect_ultrasonic(int channel, bool connected) { sensors_[channel - 1].connect(connected); }
@@ -80,6 +88,9 @@ class BoardModel {
   void turn_encoder(int channel, std::int32_t counts);
   // The input stays at `centivolts` (hundredths of a volt) from now on.
   void pin_analog(Analog input, std::int32_t centivolts);
+  // What the inputs are now: hundredths of a volt, and the sensor with its distance.
+  std::int32_t analog_cv(Analog input) const;
+  const UltrasonicModel& ultrasonic(int channel) const { return sensors_[channel - 1]; }
 
  private:
   static constexpr std::int32_t steering_range = 3 * 1000 * 2048;  // 1.5 s of 4096 a millisecond
@@ -108,7 +119,6 @@ class BoardModel {
   void turn(int channel, std::int32_t counts, Interrupts& interrupts);
   void tell_levels(int channel, Interrupts& interrupts);
   void steer(Drive drive);
-  std::int32_t analog_cv(int input) const;
   void convert_again();
 
   std::uint64_t seed_;

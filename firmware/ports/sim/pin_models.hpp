@@ -32,7 +32,8 @@ class InputPinModel final : public firmware::InputPin {
   bool high_ = false;
 };
 
-// A stepper motor driver with step and direction inputs: a step at each rising edge.
+// A stepper motor and its driver with step and direction inputs: a step at each rising edge, which
+// the motor takes if it has supply.
 class StepperDriverModel {
  public:
   StepperDriverModel() { step_.driver = this; }
@@ -43,9 +44,12 @@ class StepperDriverModel {
   firmware::OutputPin& direction() { return direction_; }
   bool forward() const { return direction_.high(); }
 
-  void power_on() { position_ = 0; }
-  // Steps, forward less backward, since power came; wraps at 32 bits.
+  void power_on() { position_ = shaft_ = 0; }
+  void supply_motor(bool supplied) { supplied_ = supplied; }
+  // Steps that were asked for, forward less backward, since power came; wraps at 32 bits.
   std::int32_t position() const { return static_cast<std::int32_t>(position_); }
+  // The steps of them that the motor took.
+  std::int32_t shaft() const { return static_cast<std::int32_t>(shaft_); }
   std::uint32_t pulses() const { return step_.pin.rises(); }
 
  private:
@@ -53,15 +57,23 @@ class StepperDriverModel {
     void write(bool high) override {
       const std::uint32_t before = pin.rises();
       pin.write(high);
-      if (pin.rises() != before) driver->position_ += driver->forward() ? 1U : ~0U;
+      if (pin.rises() != before) driver->step_once();
     }
     OutputPinModel pin;
     StepperDriverModel* driver = nullptr;
   };
 
+  void step_once() {
+    const std::uint32_t step = forward() ? 1U : ~0U;
+    position_ += step;
+    if (supplied_) shaft_ += step;
+  }
+
   StepPin step_;
   OutputPinModel direction_;
   std::uint32_t position_ = 0;
+  std::uint32_t shaft_ = 0;
+  bool supplied_ = false;
 };
 
 }  // namespace sim

@@ -74,6 +74,7 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   std::uint32_t poll();
 
   BoardModel& model() { return model_; }
+  const BoardModel& model() const { return model_; }
   // The firmware running now; only between start() and stop().
   const firmware::Application& application() const { return *application_; }
   // The board's clock.

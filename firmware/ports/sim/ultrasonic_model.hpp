@@ -19,8 +19,10 @@ class UltrasonicModel {
   OutputPinModel& trigger() { return trigger_; }
   // 0: nothing is in sight.
   void set_distance(std::uint16_t cm) { cm_ = cm; }
+  std::uint16_t distance() const { return cm_; }
   // A sensor without its cable says nothing.
   void connect(bool connected) { connected_ = connected; }
+  bool connected() const { return connected_; }
 
   // It is `now_us`. Reports the edges of the echo line since the last call, with their times:
   // on_edge(bool high, std::uint32_t at_us).

@@ -49,8 +49,15 @@ firmware::Outputs stepper_to(std::int32_t position, std::int32_t speed, int chan
   return outputs;
 }
 
-firmware::Outputs osmc(int channel, std::uint16_t pwm, Direction direction) {
+// Relay 1 closes the motors' supply.
+firmware::Outputs supplied() {
   firmware::Outputs outputs;
+  outputs.relays = 1;
+  return outputs;
+}
+
+firmware::Outputs osmc(int channel, std::uint16_t pwm, Direction direction) {
+  firmware::Outputs outputs = supplied();
   outputs.osmc[channel - 1] = Drive{pwm, direction};
   return outputs;
 }
@@ -180,6 +187,47 @@ TEST(SimulatedHardware, ASafeStepperStaysWhereItIs) {
 
 // --- motors
 
+TEST(SimulatedHardware, WithoutSupplyNoMotorTurnsWhateverItsDriverIsTold) {
+  Bench bench;
+  firmware::Outputs outputs = osmc(1, 4095, Direction::forward);
+  outputs.dhb12[0] = Drive{4095, Direction::reverse};
+  outputs.stepper[0].position = 1000;
+  outputs.stepper[0].speed = 10000;
+  outputs.stepper[0].enabled = true;
+  const std::int32_t idle = bench.mean(Analog::ain24);
+  const std::int32_t straight = bench.mean(Analog::ainsteer);
+  const auto expect_that_all_stand = [&] {
+    EXPECT_FALSE(bench.board.motors_have_supply());
+    const std::int32_t counts = bench.sample().encoder_counts[0];
+    const std::int32_t steps = bench.board.stepper_shaft(1);
+    bench.run(1000);
+    EXPECT_EQ(bench.sample().encoder_counts[0], counts);
+    EXPECT_EQ(bench.board.stepper_shaft(1), steps);
+  };
+
+  outputs.relays = 0xFE;  // all but relay 1
+  bench.hardware.hal().apply(outputs);
+  expect_that_all_stand();
+  EXPECT_EQ(bench.board.pins().osmc[0].pwm, 4095) << "the driver is told to";
+  EXPECT_EQ(bench.board.pins().stepper[0].position, 1000) << "and this one, too";
+  EXPECT_NEAR(bench.mean(Analog::ain24), idle, 5);
+  EXPECT_NEAR(bench.mean(Analog::ainsteer), straight, 5);
+
+  outputs.relays = 1;
+  outputs.stepper[0].position = 0;
+  bench.hardware.hal().apply(outputs);
+  bench.run(1000);
+  EXPECT_TRUE(bench.board.motors_have_supply());
+  EXPECT_GT(bench.sample().encoder_counts[0], 2000);
+  EXPECT_EQ(bench.board.stepper_shaft(1), -1000);
+  EXPECT_GT(bench.mean(Analog::ainsteer), straight + 100);
+
+  // The handle's button cuts the supply by itself; nobody has told the firmware here.
+  bench.board.hold_handle(false);
+  bench.run(4000);  // the motor runs out
+  expect_that_all_stand();
+}
+
 TEST(SimulatedHardware, AMotorTurnsItsEncoderAsFastAsItsDutySays) {
   Bench bench;
   bench.hardware.hal().apply(osmc(2, 2048, Direction::forward));
@@ -224,7 +272,7 @@ TEST(SimulatedHardware, TheBatterySagsMostWhenAMotorStarts) {
 TEST(SimulatedHardware, TheSteeringMotorMovesTheSteeringFromEndToEnd) {
   Bench bench;
   EXPECT_NEAR(bench.mean(Analog::ainsteer), 100, 10);
-  firmware::Outputs outputs;
+  firmware::Outputs outputs = supplied();
   outputs.dhb12[0] = Drive{4095, Direction::reverse};
   bench.hardware.hal().apply(outputs);
   bench.run(750);
