@@ -20,6 +20,8 @@ class StopDetector {
 
   // True at the end of a line that is a stop.
   bool push(char byte);
+  // Forgets an unfinished line.
+  void reset() { size_ = 0; }
 
  private:
   char line_[max_line];

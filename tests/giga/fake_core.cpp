@@ -72,6 +72,14 @@ void NVIC_SetVector(IRQn_Type line, std::uintptr_t vector) {
   giga().vectors[line] = reinterpret_cast<void (*)()>(vector);
 }
 void NVIC_EnableIRQ(IRQn_Type) {}
+void NVIC_SetPriority(IRQn_Type line, std::uint32_t priority) {
+  giga().priorities[line] = priority;
+}
+void NVIC_SetPendingIRQ(IRQn_Type line) { giga().pending[static_cast<std::size_t>(line)] = true; }
+std::uint32_t __StackLimit[MBED_CONF_TARGET_BOOT_STACK_SIZE / 4];
+std::uintptr_t __get_MSP() {
+  return reinterpret_cast<std::uintptr_t>(std::end(__StackLimit)) - Giga::core_stack_in_use;
+}
 
 std::uint32_t HAL_RCC_GetPCLK1Freq() { return 120000000; }
 std::uint32_t HAL_RCC_GetHCLKFreq() { return 240000000; }
@@ -251,6 +259,7 @@ std::uint32_t USBSerial::baud() { return giga().usb_baud; }
 int USBSerial::available() {
   return giga().usb_packets.empty() ? 0 : static_cast<int>(giga().usb_packets.front().size());
 }
+void USBSerial::attach(void (*function)()) { giga().usb_callbacks.push_back(function); }
 int USBSerial::read() {
   auto& packets = giga().usb_packets;
   if (packets.empty()) return -1;

@@ -182,6 +182,9 @@ bool Giga::reset_by(const std::function<void()>& action) {
     watchdog_runs = false;
     edges.clear();
     vectors.clear();
+    priorities.clear();
+    for (std::atomic<bool>& line : pending) line = false;
+    usb_callbacks.clear();
     connect_registers();
   }
   return was_reset;
@@ -222,6 +225,25 @@ void Giga::interrupts_may_come() {
       in_interrupt = false;
     }
   }
+  run_pending();
+}
+
+// What the firmware has asked for, by priority. (One that gives way is not interrupted here.)
+void Giga::run_pending() {
+  for (;;) {
+    int next = -1;
+    for (const auto& [line, vector] : vectors) {
+      if (line < 0 || !pending[static_cast<std::size_t>(line)]) continue;
+      if (next < 0 || priorities[line] < priorities[next]) next = line;
+    }
+    if (next < 0) return;
+    pending[static_cast<std::size_t>(next)] = false;
+    isr_queue = 0;
+    in_interrupt = true;
+    ++interrupts;
+    vectors[next]();
+    in_interrupt = false;
+  }
 }
 
 void Giga::pass_us(std::uint64_t us) {
@@ -234,12 +256,25 @@ void Giga::pass_us(std::uint64_t us) {
         if (timer->period_ns != 0) next = std::min(next, std::max(timer->next_ns, now_ns_ + 1));
       }
     }
+    if (!events_.empty()) next = std::min(next, std::max(events_.begin()->first, now_ns_ + 1));
     now_ns_ = next;
+    let_happen();
     can.pass(now_ns_);
     interrupts_may_come();
   }
 }
 
-void Giga::usb_send(const std::string& bytes) { usb_packets.push_back(bytes); }
+void Giga::let_happen() {
+  while (!events_.empty() && events_.begin()->first <= now_ns_) {
+    const std::function<void()> event = std::move(events_.begin()->second);
+    events_.erase(events_.begin());
+    event();
+  }
+}
+
+void Giga::usb_send(const std::string& bytes) {
+  usb_packets.push_back(bytes);
+  for (void (*callback)() : usb_callbacks) callback();
+}
 
 }  // namespace r4::fake

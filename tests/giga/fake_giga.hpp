@@ -116,6 +116,8 @@ class Giga {
   std::uint64_t now_ms() const { return now_ns_ / 1000000; }
   void pass_us(std::uint64_t us);
   void pass_ms(std::uint64_t ms) { pass_us(ms * 1000); }
+  // Something happens outside then, whatever the firmware is busy with.
+  void at(std::uint64_t when_ns, std::function<void()> event) { events_.emplace(when_ns, event); }
 
   // --- resets
   // Did `action` end in a reset of the chip? The peripherals are then as after one.
@@ -175,6 +177,11 @@ class Giga {
   };
   Timer ticker, step_timer;
   std::map<int, void (*)()> vectors;
+  std::map<int, std::uint32_t> priorities;
+  std::array<std::atomic<bool>, 150>
+      pending{};  // interrupts that the firmware asks for; any thread
+  std::vector<void (*)()> usb_callbacks;
+  static constexpr std::uintptr_t core_stack_in_use = 200;  // bytes, by the core's start
   std::uint32_t primask = 0;
   bool in_interrupt = false;
   int interrupts = 0;
@@ -187,7 +194,10 @@ class Giga {
 
  private:
   void connect_converter();
+  void run_pending();
+  void let_happen();
   std::uint64_t now_ns_ = 0;
+  std::multimap<std::uint64_t, std::function<void()>> events_;
   std::array<std::uint32_t, 11> outside_{}, driven_{};
   std::array<std::array<int, 16>, 11> rises_{};
 };

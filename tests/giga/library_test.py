@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The Arduino library compiles as it stands, for the Giga's processor and dialect, needs no heap, and
-lacks nothing but the core.
+lacks nothing but the core; the stacks of its interrupts suffice.
 
 The core cannot be had here: tests/giga/core declares what the firmware uses of it, with the
 originals' signatures and macros. Usage: library_test.py TREE
@@ -14,6 +14,9 @@ import subprocess
 import sys
 import tempfile
 import zipfile
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+from stack_bounds import stack_bounds  # noqa: E402
 
 CROSS = 'arm-none-eabi-'
 # As the Arduino IDE's for the Giga, and warnings are errors. What is measured is without exceptions.
@@ -67,13 +70,15 @@ def compile_all(tree, library, out):
     sketch = out / 'sketch.cpp'
     example = library / 'examples/R4Board/R4Board.ino'
     sketch.write_text(f'#include <Arduino.h>\n#line 1 "{example}"\n{example.read_text()}')
+    version = int(run(CROSS + 'g++', '-dumpversion').split('.')[0])
+    with_graph = ['-fcallgraph-info=su'] if version >= 10 else []  # older ones cannot tell
     sources = sorted((library / 'src').rglob('*.cpp')) + [sketch]
 
     def compile_one(numbered):
         number, source = numbered
         target = out / f'{number}.o'
         compiler = [CROSS + 'g++', *FLAGS, '-I', library / 'src', '-I', tree / 'tests/giga/core']
-        run(*compiler, '-c', source, '-o', target)
+        run(*compiler, *with_graph, '-c', source, '-o', target)
         run(*compiler, *OTHER_DIALECT, source)
         return source, target
 
@@ -102,6 +107,14 @@ def uses_no_heap(objects, lacking):
             assert str(source).endswith(GIVEN_BACK[symbol]), f'{source} uses {symbol}'
 
 
+def stacks_suffice(out):
+    """What our interrupt handlers need, where the compiler tells."""
+    graphs = list(out.glob('*.ci'))
+    for name, (need, room) in (stack_bounds(graphs) if graphs else {}).items():
+        print(f'stack of the interrupts, {name}: {need} of {room} bytes')
+        assert need <= room, f'{name} is too small'
+
+
 def main():
     tree = pathlib.Path(sys.argv[1]).resolve()
     with tempfile.TemporaryDirectory() as name:
@@ -115,6 +128,7 @@ def main():
         uses_no_heap(objects, lacking)
         ours = [symbol for symbol in lacking if re.match(r'_ZN?K?\w*2r4', symbol)]
         assert not ours, f'the library lacks what it uses: {ours}'
+        stacks_suffice(out)
         text, data, bss = run(CROSS + 'size', together).splitlines()[1].split()[:3]
     print(f'{len(objects)} sources; {int(text)} bytes of code, {int(data) + int(bss)} of RAM, without the core')
 

@@ -3,6 +3,7 @@
 
 #include "../../../transports/framing/can_ids.hpp"
 #include "board_clock.hpp"
+#include "interrupt_stack.hpp"
 #include "true_random.hpp"
 
 namespace r4 {
@@ -55,14 +56,31 @@ bool start_can(Fdcan& fdcan, std::uint8_t node) {
                      command_id(node));
 }
 
-// What the interrupt needs. NOLINTBEGIN(cppcoreguidelines-avoid-non-const-global-variables)
+// What the interrupts need. NOLINTBEGIN(cppcoreguidelines-avoid-non-const-global-variables)
 Fdcan* interrupting = nullptr;
-firmware::Guard* told = nullptr;
+UsbPort* listening = nullptr;
 // NOLINTEND(cppcoreguidelines-avoid-non-const-global-variables)
 
-void on_can() {
-  if (interrupting->on_interrupt()) told->stop();  // also if the loop hangs
+// A stop is obeyed also if the loop hangs.
+void hear_can() {
+  if (interrupting->on_interrupt()) stop_at_once();
   wake_loop();
+}
+void on_can() { on_own_stack(&hear_can); }
+
+void hear_usb_now() {
+  if (listening->take_in()) stop_at_once();
+  if (listening->has_received()) wake_loop();
+}
+void on_usb() { on_own_stack(&hear_usb_now); }
+
+void start_listening(UsbPort& usb) {
+  constexpr std::uint32_t gives_way = 13;  // to all but the core's scheduler
+  listening = &usb;
+  NVIC_SetVector(SWPMI1_IRQn, reinterpret_cast<std::uintptr_t>(&on_usb));
+  NVIC_SetPriority(SWPMI1_IRQn, gives_way);
+  NVIC_EnableIRQ(SWPMI1_IRQn);
+  UsbPort::start();
 }
 
 // What a person asks of the board itself; no datagram is so short.
@@ -73,6 +91,7 @@ SafeReason reason_of(const FaultNote& note) {
     case FaultNote::Kind::none:
       break;
     case FaultNote::Kind::fault:
+    case FaultNote::Kind::stack:
       return SafeReason::fault;
     case FaultNote::Kind::watchdog:
       return SafeReason::watchdog;
@@ -121,10 +140,10 @@ void Board::start() {
   if (last_boot_ != SafeReason::none) application_.fail(last_boot_, now_ms);
   machine_.start(application_.guard());
   start_guard_timer(application_.guard());
+  start_listening(usb_);
   network_.start();
   if (!has_can) return;
   interrupting = &fdcan_;
-  told = &application_.guard();
   NVIC_SetVector(FDCAN2_IT0_IRQn, reinterpret_cast<std::uintptr_t>(&on_can));
   NVIC_EnableIRQ(FDCAN2_IT0_IRQn);
 }

@@ -3,6 +3,7 @@
 
 #include "../../../protocol/message.hpp"
 #include "../../../protocol/numbers.hpp"
+#include "interrupt_stack.hpp"
 
 namespace r4 {
 namespace giga {
@@ -71,6 +72,9 @@ void write_last_boot(LineWriter& line, const FaultNote& note) {
     case FaultNote::Kind::watchdog:
       line.text("watchdog");
       break;
+    case FaultNote::Kind::stack:
+      line.text("a full stack of the interrupts");
+      break;
     case FaultNote::Kind::fault:
       line.text("fault, exception ").number(note.exception).text(", pc ").hex(note.pc);
       line.text(", status ").hex(note.status);
@@ -103,6 +107,15 @@ Text BootReport::chip(char (&out)[max_line]) {
     line.words(to_text(trouble));
   }
   return line.done();
+}
+
+// The most that the interrupts' stacks have held, in bytes.
+Text BootReport::stacks(char (&out)[max_line]) {
+  LineWriter line(out);
+  const StackUse cores = use_of_core_stack();
+  const StackUse own = use_of_own_stack();
+  line.text("Interrupt stacks: the core's ").number(cores.most).text(" of ").number(cores.size);
+  return line.text(", ours ").number(own.most).text(" of ").number(own.size).done();
 }
 
 // Which keys there are, and what was dropped for its signature; nothing to say without a key.
@@ -193,6 +206,8 @@ Text BootReport::next(char (&out)[max_line]) {
     case 22:
       return line.text("Deadlines missed: ").number(sources_.guard->missed()).done();
     case 23:
+      return stacks(out);
+    case 24:
       return keys(out);
     default:
       step_ = 0;

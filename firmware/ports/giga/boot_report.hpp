@@ -54,6 +54,7 @@ class BootReport {
 
   Text scan(char (&out)[max_line]);
   Text chip(char (&out)[max_line]);
+  static Text stacks(char (&out)[max_line]);
   Text keys(char (&out)[max_line]) const;
 
   Sources sources_;

@@ -4,6 +4,7 @@
 #include <atomic>
 
 #include "chip.hpp"
+#include "interrupt_stack.hpp"
 
 namespace r4 {
 namespace giga {
@@ -12,6 +13,7 @@ namespace {
 
 // NOLINTBEGIN(cppcoreguidelines-avoid-non-const-global-variables)
 firmware::Hal* guarded = nullptr;
+FaultNote last_note;
 std::atomic<bool> store_starting{false};
 // NOLINTEND(cppcoreguidelines-avoid-non-const-global-variables)
 
@@ -50,6 +52,12 @@ void keep(const FaultNote& note) {
   }
 }
 
+void switch_off_and_reset() {
+  if (guarded != nullptr) guarded->make_safe();
+  keep(last_note);
+  reset();
+}
+
 // What the processor puts on the stack for an exception: r0-r3, r12, lr, pc, psr.
 constexpr int frame_pc = 6;
 
@@ -84,13 +92,17 @@ extern "C" {
 }
 
 #ifdef __arm__
-// From the vector table: the stack that was in use.
+// From the vector table: with the stack that was in use, on the last one, for it may be what is full.
 [[gnu::naked]] void r4_giga_fault_entry() {
   asm volatile(
       "tst lr, #4\n"
       "ite eq\n"
       "mrseq r0, msp\n"
       "mrsne r0, psp\n"
+      "movw r1, #:lower16:r4_giga_last_stack_top\n"
+      "movt r1, #:upper16:r4_giga_last_stack_top\n"
+      "ldr r1, [r1]\n"
+      "mov sp, r1\n"
       "b r4_giga_on_fault\n");
 }
 #else
@@ -125,8 +137,8 @@ FaultNote take_fault_note() {
   const std::uint32_t kind = kept & ~in_store_mark;
   const bool by_watchdog = (RCC->RSR & rsr_watchdog) != 0;
   RCC->RSR |= rsr_forget;
-  if (kind == static_cast<std::uint32_t>(FaultNote::Kind::fault) ||
-      kind == static_cast<std::uint32_t>(FaultNote::Kind::watchdog)) {
+  if (kind >= static_cast<std::uint32_t>(FaultNote::Kind::fault) &&
+      kind <= static_cast<std::uint32_t>(FaultNote::Kind::stack)) {
     note.kind = static_cast<FaultNote::Kind>(kind);
     note.exception = RTC->BKP21R;
     note.pc = RTC->BKP22R;
@@ -141,11 +153,9 @@ FaultNote take_fault_note() {
 
 void end_boot(const FaultNote& note) {
   __disable_irq();
-  if (guarded != nullptr) guarded->make_safe();
-  FaultNote whole = note;
-  whole.in_store = store_starting.load(std::memory_order_relaxed);
-  keep(whole);
-  reset();
+  last_note = note;
+  last_note.in_store = store_starting.load(std::memory_order_relaxed);
+  on_last_stack(&switch_off_and_reset);
 }
 
 }  // namespace giga

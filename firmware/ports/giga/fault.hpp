@@ -3,6 +3,7 @@
 //
 //     bus, memory or usage fault, hard fault          -> Kind::fault, where and why
 //     the core gives up (mbed error, failed assert)   -> Kind::fault, its status; its warnings: nothing
+//     a stack of the interrupts is full               -> Kind::stack
 //     the duties stay away (the guard starves)        -> Kind::watchdog
 //     the timer interrupt itself is dead              -> the watchdog's reset, seen in RCC_RSR
 //
@@ -18,7 +19,7 @@ namespace r4 {
 namespace giga {
 
 struct FaultNote {
-  enum class Kind : std::uint32_t { none, fault, watchdog };
+  enum class Kind : std::uint32_t { none, fault, watchdog, stack };
   Kind kind = Kind::none;
   std::uint32_t exception = 0;  // the Cortex-M7's number of it; 0: the core's own error
   std::uint32_t pc = 0;         // where it was; 0: unknown

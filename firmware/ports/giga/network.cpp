@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "network.hpp"
 
+#include "../../stop_detector.hpp"
 #include "board_clock.hpp"
+#include "timers.hpp"
 
 namespace r4 {
 namespace giga {
@@ -119,6 +121,7 @@ bool Network::receive_next() {
   heard_ = true;
   heard_ms_ = BoardClock::now_ms();
   const Text datagram(buffer, static_cast<std::size_t>(size));
+  if (firmware::is_stop(datagram)) stop_at_once();  // the loop may be busy
   peers_.hold(link_.held());
   link_.give(peers_.heard(from, datagram), datagram);
   return true;

@@ -5,6 +5,7 @@
 
 #include "board_clock.hpp"
 #include "fault.hpp"
+#include "interrupt_stack.hpp"
 #include "true_random.hpp"
 
 namespace r4 {
@@ -27,6 +28,7 @@ System::~System() {
 
 void System::boot() {
   guard_against_faults(machine_.hardware());
+  mark_interrupt_stacks();
   const FaultNote last_boot = take_fault_note();
   BoardClock::start(random_number());
 

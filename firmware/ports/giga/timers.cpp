@@ -6,6 +6,7 @@
 #include "board_clock.hpp"
 #include "chip.hpp"
 #include "fault.hpp"
+#include "interrupt_stack.hpp"
 #include "watchdog.hpp"
 
 namespace r4 {
@@ -26,24 +27,35 @@ rtos::EventFlags& loop_flags() {
   return flags;
 }
 
-void on_step_timer() {
+void step() {
   TIM7->SR = 0;
   stepping->step_tick();
 }
+void on_step_timer() { on_own_stack(&step); }
 
-void on_millisecond() {
-  BoardClock::advance();
+void look() {
+  FaultNote note;
+  if (!interrupt_stacks_whole()) {
+    note.kind = FaultNote::Kind::stack;
+    end_boot(note);
+  }
   const std::uint32_t now_ms = BoardClock::now_ms();
   if (guarding->tick(now_ms)) {
     Watchdog::feed();
     fed_ms = now_ms;
   } else if (now_ms - fed_ms >= starve_ms) {
-    FaultNote note;
     note.kind = FaultNote::Kind::watchdog;
     end_boot(note);
   }
   wake_loop();
 }
+void on_stop() { on_own_stack(&look); }
+
+void pass_millisecond() {
+  BoardClock::advance();
+  look();
+}
+void on_millisecond() { on_own_stack(&pass_millisecond); }
 
 }  // namespace
 
@@ -76,7 +88,15 @@ void start_guard_timer(firmware::Guard& guard) {
   fed_ms = BoardClock::now_ms();
   awake = false;
   loop_flags();
+  NVIC_SetVector(MDIOS_IRQn, reinterpret_cast<std::uintptr_t>(&on_stop));
+  NVIC_SetPriority(MDIOS_IRQn, 0);  // as the ticker's: neither interrupts the other
+  NVIC_EnableIRQ(MDIOS_IRQn);
   ticker.attach(mbed::callback(&on_millisecond), std::chrono::microseconds(1000));
+}
+
+void stop_at_once() {
+  guarding->stop();
+  NVIC_SetPendingIRQ(MDIOS_IRQn);
 }
 
 // Once is enough, and more than 16 times in one interrupt is an error of the core: its ticker makes up

@@ -4,7 +4,9 @@
 //     1 kHz    mbed::Ticker   the clock; the guard, and with its leave the watchdog is fed;
 //                             wakes the loop
 //     40 kHz   TIM7           steps of the steppers, index lines of the encoders
+//     a stop   MDIOS_IRQn     the guard; the line of a peripheral that nobody uses
 //
+// All on the stack of their own (interrupt_stack.hpp), which the guard's interrupt looks at, too.
 // (A Ticker at 40 kHz would spend most of the time in the core's timer queue.) If the guard keeps its
 // leave back for starve_ms, the board ends its boot by itself and leaves a note why, before the
 // watchdog would without one.
@@ -32,6 +34,10 @@ class StepTick {
 void start_step_timer(StepTick& tick);
 // From now on the watchdog is fed by the guard.
 void start_guard_timer(firmware::Guard& guard);
+
+// E:STOP has come in: the guard makes the outputs safe at once. From any interrupt or thread, once
+// the guard's timer has been started.
+void stop_at_once();
 
 // Hz that TIM7 counts before its divider.
 std::uint32_t timer_input_hz();

@@ -9,14 +9,22 @@
 namespace r4 {
 namespace giga {
 
-std::uint32_t UsbPort::read(char (&chunk)[packet_size]) {
-  std::uint32_t size = 0;
-  while (size < packet_size && _SerialUSB.available() > 0) {
+void UsbPort::start() { _SerialUSB.attach(&UsbPort::listen); }
+
+void UsbPort::listen() { NVIC_SetPendingIRQ(SWPMI1_IRQn); }
+
+bool UsbPort::take_in() {
+  const bool open = _SerialUSB.connected();
+  if (open != heard_open_) detector_.reset();
+  heard_open_ = open;
+  bool stop = false;
+  while (received_.room() != 0) {
     const int byte = _SerialUSB.read();
     if (byte < 0) break;
-    chunk[size++] = static_cast<char>(byte);
+    received_.put(static_cast<char>(byte));
+    if (detector_.push(static_cast<char>(byte))) stop = true;
   }
-  return size;
+  return stop;
 }
 
 void UsbPort::fill_packet() {

@@ -5,13 +5,18 @@
 // the port open and does not read; so lines go out by send_nb(), a packet at a time, whole or not
 // at all, and the newest state wins (transmit_lines.hpp).
 //
-// The line `report` is for the board itself. From the loop only.
+// Input is taken from the core, and a stop among it heard, in an interrupt that gives way to all
+// others: whatever the loop is busy with. When its ring is full, the rest waits at the host.
+//
+// The line `report` is for the board itself. All but take_in() and listen(): from the loop only.
 #pragma once
 
 #include <cstdint>
 
 #include "../../../transports/framing/line_framing.hpp"
+#include "../../byte_ring.hpp"
 #include "../../port.hpp"
+#include "../../stop_detector.hpp"
 #include "../../transmit_lines.hpp"
 
 namespace r4 {
@@ -26,15 +31,27 @@ class UsbPort final : public firmware::Port {
   // rest of the board.
   static constexpr int packets_per_turn = 8;
 
+  static constexpr std::uint32_t receive_capacity = 1024;
+
+  // Has listen() called for each packet that comes.
+  static void start();
+  // Asks for the interrupt (SWPMI1_IRQn, whose peripheral nobody uses) that calls take_in(); from
+  // anywhere.
+  static void listen();
+  // In that interrupt: takes what has come. True: E:STOP is among it.
+  bool take_in();
+  bool has_received() const { return !received_.empty(); }
+
   // Calls `on_line(Text)` for each line that has arrived.
   template <class OnLine>
   void receive(OnLine&& on_line) {
     char chunk[packet_size];
     for (int i = 0; i < packets_per_turn; ++i) {
-      const std::uint32_t size = read(chunk);
-      if (size == 0) return;
+      const std::uint32_t size = received_.take(chunk, sizeof chunk);
+      if (size == 0) break;
       framing_.push(chunk, size, on_line);
     }
+    listen();  // there is room again
   }
 
   // Lets time pass and sends what the host takes now. True: the host has just closed the port, or
@@ -57,12 +74,16 @@ class UsbPort final : public firmware::Port {
   std::uint32_t dropped() const { return lines_.dropped(); }
 
  private:
-  static std::uint32_t read(char (&chunk)[packet_size]);
   void fill_packet();
   void send_packet();
 
   firmware::TransmitLines lines_;
   LineFraming framing_;
+  firmware::ByteRing<receive_capacity> received_;
+  // Of take_in() alone.
+  firmware::StopDetector detector_;
+  bool heard_open_ = false;
+
   bool open_ = false;
   bool upload_asked_ = false;
   std::uint8_t packet_[packet_size];

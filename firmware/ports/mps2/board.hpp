@@ -7,6 +7,8 @@
 #include "../../application.hpp"
 #include "../sim/simulated_hardware.hpp"
 #include "board_clock.hpp"
+#include "fault.hpp"
+#include "startup.hpp"
 #include "uart.hpp"
 #include "udp_port.hpp"
 #include "wire_time.hpp"
@@ -60,8 +62,10 @@ class Board {
     if (!link_.has_received() && !udp_.has_received()) wait_for_interrupt();
   }
 
-  // Each millisecond, in the interrupt of timer 1. True: the watchdog may be fed.
+  // Each millisecond, in the interrupt of timer 1. True: the watchdog may be fed. Ends the boot if the
+  // handlers' stack is full, whatever the loop does.
   bool on_wake() {
+    if (!canary_alive()) halt();
     BoardClock::on_wake_interrupt();
     return started_ && application_.guard().tick(clock_.now_ms());
   }

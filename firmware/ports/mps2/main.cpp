@@ -102,7 +102,6 @@ int main() {
   enable(Irq::ethernet);
   board->start(cause_of(note));
   for (;;) {
-    if (!canary_alive()) halt();
     board->turn();
     if (r4_wants_pins != 0) pins.poll();
     board->rest();

@@ -87,6 +87,8 @@ enum IRQn_Type {
   UsageFault_IRQn = -10,
   FDCAN2_IT0_IRQn = 20,
   TIM7_IRQn = 55,
+  SWPMI1_IRQn = 115,
+  MDIOS_IRQn = 120,
 };
 
 extern "C" {
@@ -95,9 +97,12 @@ void __set_PRIMASK(std::uint32_t mask);
 void __disable_irq();
 void __enable_irq();
 std::uint32_t __get_IPSR();
+std::uintptr_t __get_MSP();  // on the chip an address is 32 bits
 void __DSB();
-void NVIC_SetVector(IRQn_Type line, std::uintptr_t vector);  // on the chip an address is 32 bits
+void NVIC_SetVector(IRQn_Type line, std::uintptr_t vector);  // likewise
 void NVIC_EnableIRQ(IRQn_Type line);
+void NVIC_SetPriority(IRQn_Type line, std::uint32_t priority);
+void NVIC_SetPendingIRQ(IRQn_Type line);
 
 std::uint32_t HAL_RCC_GetPCLK1Freq();
 std::uint32_t HAL_RCC_GetHCLKFreq();

@@ -10,7 +10,9 @@ class USBSerial {
   bool connected();
   int available();
   int read();
-  std::uint32_t baud();  // of the last line coding that the host has sent; 0 before the first
+  void attach(
+      void (*function)());  // called in the USB interrupt when a packet has come; four at most
+  std::uint32_t baud();     // of the last line coding that the host has sent; 0 before the first
   // Gives the driver what it takes now: nothing while a packet is on its way or the port is closed.
   void send_nb(std::uint8_t* buffer, std::uint32_t size, std::uint32_t* actual, bool now = true);
 };
