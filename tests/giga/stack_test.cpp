@@ -3,7 +3,7 @@
 #include "bench.hpp"
 #include "tests/giga/core/registers.hpp"
 
-extern "C" std::uint32_t __StackLimit[];  // NOLINT(bugprone-reserved-identifier)
+extern "C" std::uint32_t __StackLimit[];  // NOLINT
 extern "C" std::uint32_t r4_giga_own_stack[1024];
 
 namespace r4::test {

@@ -8,7 +8,7 @@
 
 extern "C" {
 // Where the core's stack ends, by its linker script.
-extern std::uint32_t __StackLimit[];  // NOLINT(bugprone-reserved-identifier): as it is called
+extern std::uint32_t __StackLimit[];  // NOLINT: as it is called
 
 // NOLINTBEGIN(cppcoreguidelines-avoid-non-const-global-variables)
 alignas(8) std::uint32_t r4_giga_own_stack[1024];
