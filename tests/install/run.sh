@@ -52,6 +52,15 @@ read -ra flags <<<"$(pkg-config --cflags --libs r4link)"
 "$cxx" -std=c++20 -O1 main.cpp "${flags[@]}" -o drive
 check pkg-config ./drive sim:?node=1
 
+# program_of PAGE: the C++ that the page shows, as a whole program.
+program_of() {
+  awk '/^```/ { inside = /cpp/; next } inside' "$1" >shown.txt
+  grep '^#include' shown.txt
+  echo 'int main() {'
+  grep -v '^#include' shown.txt
+  echo '}'
+}
+
 # The program in README.md drives a simulated robot, whose motors have supply only while relay 1 is
 # closed.
 mkfifo "$work/board"
@@ -63,13 +72,7 @@ cat <&3 >"$work/events" &
 events=$!
 url=${listening#*\"host_url\":\"}
 url="${url%%\"*}?listen=0"
-awk '/^```/ { inside = /cpp/; next } inside' "$source_tree/README.md" >readme.txt
-{
-  grep '^#include' readme.txt
-  echo 'int main() {'
-  grep -v '^#include' readme.txt | sed "s,udp://192.168.0.125,$url,"
-  echo '}'
-} >readme.cpp
+program_of "$source_tree/README.md" | sed "s,udp://192.168.0.125,$url," >readme.cpp
 "$cxx" -std=c++20 -O1 readme.cpp "${flags[@]}" -o readme
 ./readme
 kill "$board"
@@ -80,6 +83,13 @@ if ! grep '"osmc":\[\[358,1\]' "$work/events" | grep -q '"supply":true'; then
   exit 1
 fi
 echo 'install: README.md drives a motor'
+
+program_of "$source_tree/docs/simulation.md" >simulation.cpp
+"$cxx" -std=c++20 -O1 simulation.cpp "${flags[@]}" -o simulation
+./simulation || {
+  echo 'install: the program in docs/simulation.md did not see what it says'
+  exit 1
+}
 
 status=0
 ./drive fax:1 >/dev/null 2>"$work/err" || status=$?

@@ -138,9 +138,9 @@ class Running:
 class Board(Running):
     """A simulated board. `url` is where it listens, `host_url` how a host opens that."""
 
-    def __init__(self, *urls, options=(), listens=None):
+    def __init__(self, *urls, options=(), listens=None, **process):
         """`listens`: at how many places, if that is not the number of URLs."""
-        super().__init__('sim', '--json', *urls, *options)
+        super().__init__('sim', '--json', *urls, *options, **process)
         listening = [self.next(lambda each: each['type'] == 'listening') for _ in range(listens or len(urls))]
         self.url = listening[0]['url']
         self.host_url = listening[0]['host_url']

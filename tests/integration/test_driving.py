@@ -3,6 +3,7 @@
 simulated motors have supply only while relay 1 is closed, as on a real robot."""
 import pathlib
 import re
+import subprocess
 
 import pytest
 
@@ -61,3 +62,30 @@ def test_a_motor_turns_only_while_relay_1_is_closed_and_the_handle_held(tmp_path
         turning = sensors(lambda each: each['supply'])
         assert sensors(lambda each: each['enc'][0] > turning['enc'][0])
         assert not sensors(lambda each: each['handle'] == 'released')['supply']
+
+
+def test_what_is_written_to_a_board_happens_around_it_at_once():
+    with Board('udp://127.0.0.1:0', options=['--stdin', '--sensors', '0.05'], stdin=subprocess.PIPE) as board:
+        def write(line):
+            board.process.stdin.write(line + '\n')
+            board.process.stdin.flush()
+
+        write('us 3 15')
+        assert board.next(lambda each: 'happened' in each)['happened'] == 'us 3 15'
+        assert board.next(lambda each: each['type'] == 'sensors')['us'] == [0, 0, 15, 0]
+        write('  # nothing\n\nus 3 far')
+        error = board.next(lambda each: each['type'] == 'error')
+        assert (error['thing'], error['reason']) == ('standard input', "'far' is no distance")
+        write('handle released')
+        board.next(lambda each: each.get('reason') == 'handle')
+        write('handle held')
+        board.next(lambda each: each.get('reason') == 'none')
+        write('motor 1 stalled')
+        board.next(lambda each: each.get('happened') == 'motor 1 stalled')
+        assert run('send', board.host_url, 'R:1,On', 'O:4095,1,1').returncode == 0
+        driven = board.next(lambda each: each['type'] == 'sensors' and each['supply'])
+        assert driven['enc'][0] == 0
+        board.process.stdin.write('fault')  # without an end of line
+        board.process.stdin.close()
+        board.next(lambda each: each.get('reason') == 'fault')
+        assert board.next(lambda each: each['type'] == 'sensors'), 'it goes on'

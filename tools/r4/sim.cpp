@@ -20,6 +20,7 @@
 #include "protocol/numbers.hpp"
 #include "protocol/refusal.hpp"
 #include "protocol/settings.hpp"
+#include "sim_input.hpp"
 #include "sim_log.hpp"
 #include "subcommands.hpp"
 #include "transports/framing/can_ids.hpp"
@@ -35,6 +36,7 @@ struct Options {
   std::optional<Milliseconds> duration;
   std::optional<Milliseconds> sensors;
   std::string script;
+  bool input = false;
   std::optional<std::uint64_t> seed;
   std::string board_id;
   std::vector<std::string> settings;
@@ -135,6 +137,7 @@ class Board {
   }
 
   void tell_sensors() { log_.tell_sensors(); }
+  void happen(const sim::ScriptStep& step) { board_.happen(step); }
 
   void end() {
     for (const Carrier* const carrier : carriers_) log_.on_end(*carrier);
@@ -209,6 +212,15 @@ int simulate(const Options& options) {
     }
     std::optional<SensorClock> sensors;
     if (options.sensors) sensors.emplace(io, *options.sensors, boards);
+    std::optional<SimInput> input;
+    if (options.input) {
+      input.emplace(
+          io,
+          [&boards](const sim::ScriptStep& step) {
+            for (const auto& board : boards) board->happen(step);
+          },
+          [&output](const Problem& problem) { output.problem(problem); });
+    }
     io.run();
     for (const auto& board : boards) board->end();
   }
@@ -232,9 +244,13 @@ At the end
 with "transfers" on CAN.
 
 A scenario (--script) has lines such as: 0.5 handle released / 1 us 1 15 / 2 chip dac off / 3 reboot
+With --stdin the same words without the time make it happen at once: handle released. What happens is an
+event with "happened"; {"type":"error",…} is a line that was not understood.
 
 Examples:
   r4 sim                                       at udp://127.0.0.1:2018
+  r4 sim udp://127.0.0.1:0                     at any free port, which it prints
+  r4 sim --stdin                               and type: us 1 15
   r4 sim udp://0.0.0.0:2018 pty:/tmp/r4        two transports at once; open the second with
                                                r4 monitor serial:///tmp/r4
   r4 sim 'udp://127.0.0.1:2018?peer=127.0.0.1:2390'   streams to that port, as the paper's board
@@ -261,9 +277,10 @@ void add_sim(CLI::App& root, Action& chosen) {
               "with --json: what the sensors sense, as often as that");
   command->add_option("--script", options->script, "a scenario: what happens around the board")
       ->type_name(file_type);
-  add_number(
-      *command, "--seed", options->seed, 0, ~std::uint64_t{0},
-      "the same seed gives the same clock, inputs and nonces (with a key: for tests)");
+  command->add_flag("--stdin", options->input,
+                    "read from standard input what happens around the board");
+  add_number(*command, "--seed", options->seed, 0, ~std::uint64_t{0},
+             "the same seed gives the same clock, inputs and nonces (with a key: for tests)");
   command
       ->add_option("--set", options->settings,
                    "a setting as C:KEY,VALUE makes it, such as pack,1 (can be given again)")

@@ -132,6 +132,7 @@ sim::SimulatedBoard::Events SimLog::events() {
   if (quiet_) return events;
   events.on_state = [this](auto... a) { on_state(a...); };
   events.on_pins = [this](std::uint32_t t_ms, const sim::Pins& pins) { on_pins(t_ms, pins); };
+  events.on_step = [this](std::uint32_t t_ms, const sim::ScriptStep& s) { on_step(t_ms, s); };
   events.on_fault = [this](std::uint32_t t_ms, ChipFault fault) { on_fault(t_ms, fault); };
   events.on_executed = [this](auto... a) { on_executed(a...); };
   events.on_refused = [this](auto... a) { on_refused(a...); };
@@ -176,6 +177,10 @@ void SimOutput::print(std::string line) {
   } else {
     held_.push_back(std::move(line));
   }
+}
+
+void SimOutput::problem(const Problem& problem) {
+  print(json_ ? line_of(problem_json(problem)) : problem.text() + "\n");
 }
 
 Json SimLog::event(std::uint32_t t_ms) const {
@@ -235,6 +240,13 @@ void SimLog::on_pins(std::uint32_t t_ms, const sim::Pins& pins) {
   Json object = event(t_ms);
   object["outputs"] = pins_json(pins);
   object["supply"] = supply;
+  print(object);
+}
+
+void SimLog::on_step(std::uint32_t t_ms, const sim::ScriptStep& step) {
+  if (!output_.json()) return print(t_ms, "happens: " + step.text);
+  Json object = event(t_ms);
+  object["happened"] = step.text;
   print(object);
 }
 

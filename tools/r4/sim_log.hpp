@@ -22,6 +22,8 @@ class SimOutput {
   // Where they listen, known once they have started; what was said before is printed behind it.
   void listening(const std::vector<std::string>& urls);
   void print(std::string line);
+  // What somebody has to mend.
+  void problem(const Problem& problem);
 
   bool json() const { return json_; }
 
@@ -52,6 +54,7 @@ class SimLog {
   Json event(std::uint32_t t_ms) const;
   void on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason reason);
   void on_pins(std::uint32_t t_ms, const sim::Pins& pins);
+  void on_step(std::uint32_t t_ms, const sim::ScriptStep& step);
   void on_fault(std::uint32_t t_ms, ChipFault fault);
   void on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command);
   void on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code);

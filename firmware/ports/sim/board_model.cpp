@@ -77,7 +77,11 @@ void BoardModel::power_on() {
     stepper.driver.power_on();
     stepper.pause_ms = stepper_pause_ms;
   }
-  for (Shaft& shaft : shafts_) shaft = Shaft();
+  for (Shaft& shaft : shafts_) {
+    const bool stalled = shaft.stalled;
+    shaft = Shaft();
+    shaft.stalled = stalled;
+  }
 }
 
 void BoardModel::hold_handle(bool held) {
@@ -117,6 +121,10 @@ void BoardModel::pass_millisecond(std::uint32_t now_us, Interrupts& interrupts) 
     Shaft& shaft = shafts_[i];
     std::int32_t counts =
         shaft.motor.pass_millisecond(supplied ? chips_.osmc_drive(i + 1) : Drive());
+    if (shaft.stalled) {
+      shaft.motor.stop();
+      counts = 0;
+    }
     if (shaft.by_hand) {
       const std::int64_t left = std::int64_t{shaft.hand_count} - shaft.count;
       shaft.by_hand = left > hand_speed || left < -hand_speed;
@@ -171,12 +179,12 @@ void BoardModel::steer(Drive drive) {
   if (steering_ > steering_range) steering_ = steering_range;
 }
 
-std::int32_t BoardModel::analog_cv(Analog analog) const {
-  const int input = static_cast<int>(analog);
-  if ((pinned_ >> input & 1) != 0) return pinned_cv_[input];
+std::int32_t BoardModel::analog_cv(Analog input) const {
+  const int number = static_cast<int>(input);
+  if ((pinned_ >> number & 1) != 0) return pinned_cv_[number];
   const std::uint64_t random =
-      scramble(seed_ ^ scramble(std::uint64_t{time_ms_} << 8 | static_cast<std::uint64_t>(input)));
-  switch (analog) {
+      scramble(seed_ ^ scramble(std::uint64_t{time_ms_} << 8 | static_cast<std::uint64_t>(number)));
+  switch (input) {
     case Analog::ain24: {
       std::int32_t current_ca = 0;
       for (const Shaft& shaft : shafts_) current_ca += shaft.motor.current_ca();

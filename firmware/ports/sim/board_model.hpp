@@ -86,6 +86,8 @@ class BoardModel {
   void connect_ultrasonic(int channel, bool connected) { sensors_[channel - 1].connect(connected); }
   // Somebody turns the shaft to where the encoder has counted `counts` since power came.
   void turn_encoder(int channel, std::int32_t counts);
+  // The motor of that OSMC channel is held fast, however it is driven.
+  void stall_motor(int channel, bool stalled) { shafts_[channel - 1].stalled = stalled; }
   // The input stays at `centivolts` (hundredths of a volt) from now on.
   void pin_analog(Analog input, std::int32_t centivolts);
   // What the inputs are now: hundredths of a volt, and the sensor with its distance.
@@ -98,6 +100,7 @@ class BoardModel {
   struct Shaft {
     MotorModel motor;
     std::int32_t count = 0;
+    bool stalled = false;
     bool by_hand = false;
     std::int32_t hand_count = 0;  // where it is being turned to
   };

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <utility>
 
 #include "../../../protocol/numbers.hpp"
 #include "../../../protocol/state.hpp"
@@ -19,8 +20,9 @@ namespace {
 
 // One line on its way to a step.
 struct Line {
-  std::string where;  // FILE:LINE
-  std::vector<std::string_view> words;
+  std::string where;                    // FILE:LINE
+  std::vector<std::string_view> words;  // without the time
+  bool timed = true;
 };
 
 [[noreturn]] void fail(const Line& line, std::string_view what, const std::string& reason,
@@ -29,7 +31,7 @@ struct Line {
 }
 
 std::vector<std::string_view> words_of(std::string_view line) {
-  constexpr std::string_view blanks = " \t\r";
+  constexpr std::string_view blanks = " \t\r\n";
   line = line.substr(0, line.find('#'));
   std::vector<std::string_view> words;
   for (std::size_t at = line.find_first_not_of(blanks); at != std::string_view::npos;
@@ -58,44 +60,40 @@ std::uint32_t milliseconds_of(const Line& line, std::string_view word, const cha
   return seconds * 1000 + milliseconds;
 }
 
-std::uint32_t time_of(const Line& line) {
-  return milliseconds_of(line, line.words[0], "begin the line with seconds such as 1 or 0.125");
-}
-
 int channel_of(const Line& line, int channels, const char* what) {
   std::uint32_t channel = 0;
-  if (!parse_number(Text(line.words[2]), channel) || channel < 1 ||
+  if (!parse_number(Text(line.words[1]), channel) || channel < 1 ||
       channel > static_cast<std::uint32_t>(channels)) {
-    fail(line, line.words[2], std::string("is no ") + what,
+    fail(line, line.words[1], std::string("is no ") + what,
          "there are 1 to " + std::to_string(channels));
   }
   return static_cast<int>(channel);
 }
 
 void read_handle(const Line& line, ScriptStep& step) {
-  if (line.words[2] != "held" && line.words[2] != "released") {
-    fail(line, line.words[2], "is nothing a handle can be", "write held or released");
+  if (line.words[1] != "held" && line.words[1] != "released") {
+    fail(line, line.words[1], "is nothing a handle can be", "write held or released");
   }
-  step.value = line.words[2] == "held" ? 1 : 0;
+  step.value = line.words[1] == "held" ? 1 : 0;
 }
 
 void read_ultrasonic(const Line& line, ScriptStep& step) {
   step.channel = channel_of(line, ultrasonic_channels, "ultrasonic sensor");
-  if (line.words[3] == "off") {
+  if (line.words[2] == "off") {
     step.value = ScriptStep::off;
     return;
   }
   std::uint32_t cm = 0;
-  if (!parse_number(Text(line.words[3]), cm) || cm > proximity_max_cm) {
-    fail(line, line.words[3], "is no distance", "write 0 (nothing) to 400 cm, or off");
+  if (!parse_number(Text(line.words[2]), cm) || cm > proximity_max_cm) {
+    fail(line, line.words[2], "is no distance", "write 0 (nothing) to 400 cm, or off");
   }
   step.value = static_cast<std::int32_t>(cm);
 }
 
 void read_encoder(const Line& line, ScriptStep& step) {
   step.channel = channel_of(line, encoder_channels, "encoder");
-  if (!parse_number(Text(line.words[3]), step.value)) {
-    fail(line, line.words[3], "is no count", "write a whole number of 32 bits");
+  if (!parse_number(Text(line.words[2]), step.value)) {
+    fail(line, line.words[2], "is no count", "write a whole number of 32 bits");
   }
 }
 
@@ -104,63 +102,72 @@ void read_analog(const Line& line, ScriptStep& step) {
                                                          StateField::ain5,     StateField::aindmh,
                                                          StateField::ainsteer, StateField::ain6};
   const StateField* const name =
-      std::find(std::begin(fields), std::end(fields), state_field(Text(line.words[2])));
+      std::find(std::begin(fields), std::end(fields), state_field(Text(line.words[1])));
   if (name == std::end(fields)) {
-    fail(line, line.words[2], "is no analog input",
+    fail(line, line.words[1], "is no analog input",
          "write AIN24, AIN12, AIN5, AINDMH, AINSTEER or AIN6");
   }
   step.channel = static_cast<int>(name - std::begin(fields));
-  if (!parse_hundredths(Text(line.words[3]), step.value)) {
-    fail(line, line.words[3], "is no voltage", "write volts such as 21.5");
+  if (!parse_hundredths(Text(line.words[2]), step.value)) {
+    fail(line, line.words[2], "is no voltage", "write volts such as 21.5");
   }
+}
+
+void read_motor(const Line& line, ScriptStep& step) {
+  step.channel = channel_of(line, osmc_channels, "motor");
+  if (line.words[2] != "stalled" && line.words[2] != "free") {
+    fail(line, line.words[2], "is nothing that can happen to a motor", "write stalled or free");
+  }
+  step.value = line.words[2] == "stalled" ? 1 : 0;
 }
 
 void read_chip(const Line& line, ScriptStep& step) {
   static constexpr std::string_view chips[firmware::chip_count] = {"osmc", "dhb", "expander", "dac",
                                                                    "servo"};
   static constexpr std::string_view supplies[] = {"off", "on", "reset"};
-  const auto* const chip = std::find(std::begin(chips), std::end(chips), line.words[2]);
+  const auto* const chip = std::find(std::begin(chips), std::end(chips), line.words[1]);
   if (chip == std::end(chips)) {
-    fail(line, line.words[2], "is no chip", "write osmc, dhb, expander, dac or servo");
+    fail(line, line.words[1], "is no chip", "write osmc, dhb, expander, dac or servo");
   }
-  const auto* const supply = std::find(std::begin(supplies), std::end(supplies), line.words[3]);
+  const auto* const supply = std::find(std::begin(supplies), std::end(supplies), line.words[2]);
   if (supply == std::end(supplies)) {
-    fail(line, line.words[3], "is nothing that can happen to a chip", "write off, on or reset");
+    fail(line, line.words[2], "is nothing that can happen to a chip", "write off, on or reset");
   }
   step.channel = static_cast<int>(chip - std::begin(chips));
   step.value = static_cast<std::int32_t>(supply - std::begin(supplies));
 }
 
 void read_i2c(const Line& line, ScriptStep& step) {
-  if (line.words[2] != "held" && line.words[2] != "free") {
-    fail(line, line.words[2], "is nothing a bus can be", "write held or free");
+  if (line.words[1] != "held" && line.words[1] != "free") {
+    fail(line, line.words[1], "is nothing a bus can be", "write held or free");
   }
-  step.value = line.words[2] == "held" ? 1 : 0;
+  step.value = line.words[1] == "held" ? 1 : 0;
 }
 
 void read_hang(const Line& line, ScriptStep& step) {
   step.value = static_cast<std::int32_t>(
-      milliseconds_of(line, line.words[2], "write for how long, in seconds such as 0.3"));
+      milliseconds_of(line, line.words[1], "write for how long, in seconds such as 0.3"));
 }
 
 struct Form {
   std::string_view word;
-  std::size_t words;  // with the time
+  std::size_t words;
   const char* usage;
   ScriptStep::Kind kind;
   void (*read)(const Line&, ScriptStep&);
 };
 constexpr Form forms[] = {
-    {"handle", 3, "TIME handle held|released", ScriptStep::Kind::handle, read_handle},
-    {"us", 4, "TIME us SENSOR CM|off", ScriptStep::Kind::ultrasonic, read_ultrasonic},
-    {"enc", 4, "TIME enc ENCODER COUNTS", ScriptStep::Kind::encoder, read_encoder},
-    {"analog", 4, "TIME analog NAME VOLTS", ScriptStep::Kind::analog, read_analog},
-    {"chip", 4, "TIME chip NAME off|on|reset", ScriptStep::Kind::chip, read_chip},
-    {"i2c", 3, "TIME i2c held|free", ScriptStep::Kind::i2c, read_i2c},
-    {"hang", 3, "TIME hang SECONDS", ScriptStep::Kind::hang, read_hang},
-    {"fault", 2, "TIME fault", ScriptStep::Kind::fault, nullptr},
-    {"watchdog", 2, "TIME watchdog", ScriptStep::Kind::watchdog, nullptr},
-    {"reboot", 2, "TIME reboot", ScriptStep::Kind::reboot, nullptr},
+    {"handle", 2, "handle held|released", ScriptStep::Kind::handle, read_handle},
+    {"us", 3, "us SENSOR CM|off", ScriptStep::Kind::ultrasonic, read_ultrasonic},
+    {"enc", 3, "enc ENCODER COUNTS", ScriptStep::Kind::encoder, read_encoder},
+    {"analog", 3, "analog NAME VOLTS", ScriptStep::Kind::analog, read_analog},
+    {"motor", 3, "motor MOTOR stalled|free", ScriptStep::Kind::motor, read_motor},
+    {"chip", 3, "chip NAME off|on|reset", ScriptStep::Kind::chip, read_chip},
+    {"i2c", 2, "i2c held|free", ScriptStep::Kind::i2c, read_i2c},
+    {"hang", 2, "hang SECONDS", ScriptStep::Kind::hang, read_hang},
+    {"fault", 1, "fault", ScriptStep::Kind::fault, nullptr},
+    {"watchdog", 1, "watchdog", ScriptStep::Kind::watchdog, nullptr},
+    {"reboot", 1, "reboot", ScriptStep::Kind::reboot, nullptr},
 };
 
 // "handle, us, … or reboot".
@@ -173,35 +180,58 @@ std::string words_of_forms() {
   return words;
 }
 
+// "handle released", from the words of the line.
+std::string text_of(const Line& line) {
+  std::string text;
+  for (const std::string_view word : line.words) text.append(text.empty() ? "" : " ").append(word);
+  return text;
+}
+
 ScriptStep step_of(const Line& line) {
   ScriptStep step;
-  step.at_ms = time_of(line);
-  if (line.words.size() < 2) {
-    fail(line, line.words[0], "has nothing to do at that time",
-         "follow the time with " + words_of_forms());
-  }
   const auto* const form = std::find_if(std::begin(forms), std::end(forms),
-                                        [&](const Form& f) { return f.word == line.words[1]; });
+                                        [&](const Form& f) { return f.word == line.words[0]; });
   if (form == std::end(forms)) {
-    fail(line, line.words[1], "is nothing that can happen", "use " + words_of_forms());
+    fail(line, line.words[0], "is nothing that can happen", "use " + words_of_forms());
   }
   if (line.words.size() != form->words) {
-    fail(line, line.words[1], "has too few or too many words", std::string("write ") + form->usage);
+    fail(line, line.words[0], "has too few or too many words",
+         std::string("write ") + (line.timed ? "TIME " : "") + form->usage);
   }
   step.kind = form->kind;
+  step.text = text_of(line);
   if (form->read != nullptr) form->read(line, step);
+  return step;
+}
+
+ScriptStep timed_step_of(Line line) {
+  const std::string_view time = line.words[0];
+  const std::uint32_t at_ms =
+      milliseconds_of(line, time, "begin the line with seconds such as 1 or 0.125");
+  line.words.erase(line.words.begin());
+  if (line.words.empty()) {
+    fail(line, time, "has nothing to do at that time", "follow the time with " + words_of_forms());
+  }
+  ScriptStep step = step_of(line);
+  step.at_ms = at_ms;
   return step;
 }
 
 }  // namespace
 
+std::optional<ScriptStep> Script::parse_now(std::string_view text, const std::string& name) {
+  const Line line{name, words_of(text), false};
+  if (line.words.empty()) return std::nullopt;
+  return step_of(line);
+}
+
 Script Script::parse(std::string_view text, const std::string& name) {
   Script script;
   for (std::size_t number = 1; !text.empty(); ++number) {
     const std::size_t end = std::min(text.find('\n'), text.size());
-    Line line{name + ":" + std::to_string(number), words_of(text.substr(0, end))};
+    Line line{name + ":" + std::to_string(number), words_of(text.substr(0, end)), true};
     text.remove_prefix(std::min(end + 1, text.size()));
-    if (!line.words.empty()) script.steps_.push_back(step_of(line));
+    if (!line.words.empty()) script.steps_.push_back(timed_step_of(std::move(line)));
   }
   std::stable_sort(script.steps_.begin(), script.steps_.end(),
                    [](const ScriptStep& a, const ScriptStep& b) { return a.at_ms < b.at_ms; });

@@ -7,6 +7,7 @@
 //     1   us 1 off              its cable is off: no answer, until there is a distance again
 //     1   enc 2 100             encoder 2 is turned to 100 counts, 1000 counts a millisecond
 //     1   analog AIN24 21.5     that input stays at 21.5 V
+//     1   motor 1 stalled       the motor of OSMC 1 is held fast, until it is free
 //     2   chip dac off          that chip acknowledges nothing, until it is on; reset: it loses its
 //                               supply for a moment. osmc, dhb, servo, expander, dac
 //     2   i2c held              a chip holds the bus until it is free
@@ -19,6 +20,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -31,6 +33,7 @@ struct ScriptStep {
     ultrasonic,
     encoder,
     analog,
+    motor,
     chip,
     i2c,
     hang,
@@ -43,9 +46,10 @@ struct ScriptStep {
 
   Kind kind = Kind::handle;
   std::uint32_t at_ms = 0;
-  int channel = 0;  // ultrasonic, encoder: 1 …; analog: an Analog; chip: a Chip
-  std::int32_t value =
-      0;  // 1 held (handle, i2c); cm or off; counts; hundredths of a volt; Supply; ms
+  int channel = 0;  // ultrasonic, encoder, motor: 1 …; analog: an Analog; chip: a Chip
+  // 1 held (handle, i2c) or stalled; cm or off; counts; hundredths of a volt; a Supply; ms
+  std::int32_t value = 0;
+  std::string text;  // the line without its time, "handle released"
 };
 
 class Script {
@@ -56,6 +60,9 @@ class Script {
   static Script parse(std::string_view text, const std::string& name);
   // Throws Error{usage} if the file cannot be read, Error{data} if it is longer than 1 MB.
   static Script load(const std::string& path);
+  // What happens now: a line without its time, "handle released"; nothing if it is empty or a
+  // comment. Throws Error{data} as "NAME: reason; fix".
+  static std::optional<ScriptStep> parse_now(std::string_view text, const std::string& name);
 
   const std::vector<ScriptStep>& steps() const { return steps_; }  // in the order of time
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The host's way to a simulated board in its own process: `sim:[?node=1&seed=N&script=FILE]`.
+// The host's way to a simulated board in its own process: `sim:[?node=1&seed=N&script=FILE&robot=N]`.
 //
 //     node    0-31, default 1: the board's id is sim-<node>
 //     seed    makes the board's clock and analog inputs the same each time
 //     script  what happens to the board and when (script.hpp)
+//     robot   the world around it belongs to that SimulatedRobot of this program
 #pragma once
 
 #include <asio/io_context.hpp>

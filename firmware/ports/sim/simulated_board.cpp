@@ -160,9 +160,18 @@ void SimulatedBoard::pass_millisecond() {
     boot(SafeReason::watchdog);
   }
   tell_pins();
+  if (options_.events.on_millisecond) options_.events.on_millisecond();
+}
+
+void SimulatedBoard::happen(const ScriptStep& step) {
+  const Milliseconds now = elapsed();
+  advance(now);
+  take(step);
+  poll(now);
 }
 
 void SimulatedBoard::take(const ScriptStep& step) {
+  if (options_.events.on_step) options_.events.on_step(board_ms(passed_), step);
   switch (step.kind) {
     case ScriptStep::Kind::handle:
       model_.hold_handle(step.value != 0);
@@ -178,6 +187,9 @@ void SimulatedBoard::take(const ScriptStep& step) {
       break;
     case ScriptStep::Kind::analog:
       model_.pin_analog(static_cast<Analog>(step.channel), step.value);
+      break;
+    case ScriptStep::Kind::motor:
+      model_.stall_motor(step.channel, step.value != 0);
       break;
     case ScriptStep::Kind::chip: {
       I2cChipModel& chip = model_.chips()[static_cast<firmware::Chip>(step.channel)];

@@ -38,6 +38,8 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   struct Events {
     std::function<void(std::uint32_t t_ms, firmware::BoardState, SafeReason)> on_state;
     std::function<void(std::uint32_t t_ms, const Pins&)> on_pins;
+    std::function<void(std::uint32_t t_ms, const ScriptStep&)> on_step;  // of the script, happen()
+    std::function<void()> on_millisecond;                                // passed on the board
     std::function<void(std::uint32_t t_ms, ChipFault)> on_fault;
     std::function<void(std::uint32_t t_ms, std::uint32_t pnum, const Command&)> on_executed;
     std::function<void(std::uint32_t t_ms, std::uint32_t pnum, Refusal)> on_refused;
@@ -72,6 +74,10 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
 
   // Does everything that is due; returns the milliseconds until the next call is needed.
   std::uint32_t poll();
+
+  // Something happens now, as by a line of the script. Only between start() and stop(), and not
+  // from within an event.
+  void happen(const ScriptStep& step);
 
   BoardModel& model() { return model_; }
   const BoardModel& model() const { return model_; }

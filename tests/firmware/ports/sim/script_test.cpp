@@ -184,8 +184,8 @@ TEST(Script, ReadsTroubleWithChipsBusAndLoop) {
   EXPECT_EQ(error_of("1 hang long"),
             "bench.txt:1: 'long' is no time; write for how long, in seconds such as 0.3");
   EXPECT_EQ(error_of("1 dance"),
-            "bench.txt:1: 'dance' is nothing that can happen; use handle, us, enc, analog, chip, "
-            "i2c, hang, fault, watchdog or reboot");
+            "bench.txt:1: 'dance' is nothing that can happen; use handle, us, enc, analog, motor, "
+            "chip, i2c, hang, fault, watchdog or reboot");
 }
 
 TEST(Script, AFileThatDoesNotEndIsNoScenario) {

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a SimulatedRobot shares with the board of its URL, which lives on another thread.
+#pragma once
+
+#include <asio/io_context.hpp>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "simulated_board.hpp"
+#include "simulated_robot.hpp"
+
+namespace r4::sim {
+
+class SimulatedRobot::World : public std::enable_shared_from_this<World> {
+ public:
+  // The world of a robot=N of this process; empty if it is gone.
+  static std::shared_ptr<World> find(long number);
+  // Takes a number that nobody has.
+  static long enter(const std::shared_ptr<World>& world);
+
+  // --- from any thread
+  void happen(ScriptStep step);
+  Look look() const;
+
+  // --- from the board's thread
+  // Throws Error{open} if another link has the robot.
+  void attach(asio::io_context& io, SimulatedBoard& board);
+  void detach() noexcept;
+  // Looks at the board.
+  void note();
+  // Lets happen what has been said, if the board is on `io`, whose thread calls.
+  void settle(const asio::io_context& io);
+
+ private:
+  mutable std::mutex mutex_;
+  asio::io_context* io_ = nullptr;  // of the board, while it is open
+  SimulatedBoard* board_ = nullptr;
+  std::vector<ScriptStep> said_;
+  Look look_;
+};
+
+}  // namespace r4::sim

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What happens around a simulated board while a program drives it, told by the program's own test.
+#include "firmware/ports/sim/simulated_robot.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "host/board.hpp"
+#include "transports/error.hpp"
+
+namespace r4 {
+namespace {
+
+using sim::SimulatedRobot;
+
+State await(Board& board, const std::function<bool(const State&)>& is_so) {
+  State state;
+  for (int tries = 0; tries < 1000; ++tries) {
+    state = board.next_state();
+    if (is_so(state)) return state;
+  }
+  ADD_FAILURE() << "no state came to be so";
+  return state;
+}
+
+SimulatedRobot::Look await(Board& board, const SimulatedRobot& robot,
+                           const std::function<bool(const SimulatedRobot::Look&)>& is_so) {
+  for (int tries = 0; tries < 1000; ++tries) {
+    if (is_so(robot.look())) return robot.look();
+    board.next_state();
+  }
+  ADD_FAILURE() << "the robot never looked so";
+  return robot.look();
+}
+
+void drive(Board& board) {
+  board.wait_active();
+  board.relay(1).set(true);
+  board.osmc(1).set(4095, Direction::forward);
+}
+
+TEST(SimulatedRobot, LetsTheHandleGoAndShowsThatTheMotorStops) {
+  const SimulatedRobot never_opened;
+  SimulatedRobot robot;
+  EXPECT_FALSE(robot.look().open);
+  Board board(robot.url());
+  drive(board);
+  EXPECT_TRUE(await(board, robot, [](const auto& now) { return now.encoder[0] > 10; }).open);
+  EXPECT_EQ(robot.look().pins.osmc[0].pwm, 4095);
+  EXPECT_TRUE(robot.look().motors_have_supply);
+
+  robot.happen("handle released");
+  EXPECT_FALSE(await(board, [](const State& state) {
+                 return state.safe == SafeReason::handle;
+               }).handle_held);
+  const auto now = await(board, robot, [](const auto& look) { return look.pins.is_safe(); });
+  EXPECT_FALSE(now.motors_have_supply || now.handle_held);
+  robot.happen("handle held");
+  await(board, [](const State& state) { return state.safe == SafeReason::none; });
+  EXPECT_FALSE(never_opened.look().open);
+  board.close();
+  EXPECT_FALSE(robot.look().open);
+}
+
+TEST(SimulatedRobot, MakesObstaclesVoltagesAndFaults) {
+  SimulatedRobot robot;
+  Board board(robot.url());
+  board.wait_active();
+  board.fields("AIN24,US2");
+  robot.happen("analog AIN24 21.5");
+  robot.happen("us 2 15");
+  await(board, [](const State& state) {
+    return state.analog_cv[static_cast<int>(Analog::ain24)] == 2150 && state.ultrasonic_cm[1] == 15;
+  });
+  robot.happen("chip dac off");
+  await(board, [](const State& state) { return state.safe == SafeReason::fault; });
+}
+
+TEST(SimulatedRobot, AMotorThatIsHeldFastStandsAndDrawsItsFullCurrent) {
+  SimulatedRobot robot;
+  robot.happen("motor 1 stalled");  // before the board is opened
+  Board board(robot.url());
+  drive(board);
+  const auto idle = [&] {
+    return await(board, robot, [](const auto& now) { return now.analog_cv[0] < 2400; });
+  };
+  EXPECT_EQ(idle().encoder[0], 0) << "30 A through 20 mOhm, and no turn";
+  robot.happen("motor 1 free");
+  await(board, robot, [](const auto& now) { return now.encoder[0] > 100; });
+}
+
+TEST(SimulatedRobot, MayBeUsedInACallbackAndByBoardsOneAfterTheOther) {
+  SimulatedRobot robot;
+  for (int i = 0; i < 2; ++i) {
+    Board board(robot.url());
+    board.on_state([&](const State& state) {
+      if (state.safe == SafeReason::none) robot.happen("fault");
+    });
+    await(board, [](const State& state) { return state.safe == SafeReason::fault; });
+  }
+}
+
+std::string error_of(const std::function<void()>& what) {
+  try {
+    what();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(SimulatedRobot, SaysWhatIsWrong) {
+  SimulatedRobot robot;
+  EXPECT_EQ(error_of([&] { robot.happen("us 5 10"); }),
+            robot.url() + ": '5' is no ultrasonic sensor; there are 1 to 4");
+  EXPECT_EQ(error_of([&] { robot.happen("handle"); }),
+            robot.url() + ": 'handle' has too few or too many words; write handle held|released");
+  EXPECT_EQ(error_of([&] { robot.happen(" # nothing happens"); }), "");
+  const Board board(robot.url());
+  EXPECT_NE(error_of([&] { const Board second(robot.url()); }).find("another link"),
+            std::string::npos);
+  std::string gone;
+  {
+    const SimulatedRobot other;
+    gone = other.url();
+  }
+  EXPECT_NE(error_of([&] { const Board none(gone); }).find("no such SimulatedRobot"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace r4

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sim_input.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <asio/read_until.hpp>
+#include <cerrno>
+#include <cstring>
+#include <istream>
+#include <utility>
+
+namespace r4::tool {
+namespace {
+
+constexpr std::size_t longest_line = 4096;
+
+// Opened anew where that is possible: it becomes non-blocking, which those who share standard input
+// with us, such as the shell, need not learn. A socket cannot be opened anew.
+int open_input() {
+  const int own = ::open("/proc/self/fd/0", O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  return own >= 0 ? own : ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3);
+}
+
+}  // namespace
+
+SimInput::SimInput(asio::io_context& io, std::function<void(const sim::ScriptStep&)> happen,
+                   std::function<void(const Problem&)> fail)
+    : input_(io), buffer_(longest_line), happen_(std::move(happen)), fail_(std::move(fail)) {
+  const int input = open_input();
+  if (input < 0) {
+    throw Error(ErrorKind::open, "standard input", std::strerror(errno),
+                "give --stdin a terminal, a pipe or a file to read");
+  }
+  input_.assign(input);
+  read_line();
+}
+
+void SimInput::read_line() {
+  asio::async_read_until(
+      input_, buffer_, '\n', [this](const std::error_code& error, std::size_t size) {
+        if (error == asio::error::not_found) {
+          fail_({ErrorKind::data, "standard input", "a line is longer than 4096 bytes",
+                 "write one event a line, such as: handle released"});
+          return;
+        }
+        if (error) size = buffer_.size();  // the last line may lack its end
+        std::string line(size, '\0');
+        std::istream(&buffer_).read(line.data(), static_cast<std::streamsize>(size));
+        take(line);
+        if (!error) read_line();
+      });
+}
+
+void SimInput::take(const std::string& line) {
+  try {
+    if (const auto step = sim::Script::parse_now(line, "standard input")) happen_(*step);
+  } catch (const Error& error) {
+    fail_(error.problem());
+  }
+}
+
+}  // namespace r4::tool
