@@ -5,6 +5,7 @@
 #include <array>
 #include <asio/steady_timer.hpp>
 #include <atomic>
+#include <exception>
 #include <utility>
 #include <vector>
 
@@ -62,6 +63,21 @@ struct AsyncBoard::Impl final : Carrier::Handler,
 
   // --- entering the session
 
+  // Runs the user's code. What it throws leaves io.run() in a handler of its own: through the
+  // transport, whose handler may be below us, it would end reception for ever.
+  template <class Code>
+  void guarded(Code code) {
+    try {
+      code();
+    } catch (...) {
+      asio::post(io, [error = std::current_exception()] { std::rethrow_exception(error); });
+    }
+  }
+  template <class Signature, class... Arguments>
+  void call(const Callback<Signature>& callback, const Arguments&... arguments) {
+    guarded([&] { callback(arguments...); });
+  }
+
   // Every call of the session is made in here. The outermost one tells the results and sets the
   // timer afterwards; so no handler runs inside the session, or inside the call that started its
   // command.
@@ -94,7 +110,7 @@ struct AsyncBoard::Impl final : Carrier::Handler,
       while (!ended.empty()) {
         Ended first = std::move(ended.front());
         ended.erase(ended.begin());
-        first.completion.release()->complete(first.result, how);
+        guarded([&] { first.completion.release()->complete(first.result, how); });
       }
       if (!poll_wanted || !is_open) break;
       poll_wanted = false;
@@ -136,13 +152,13 @@ struct AsyncBoard::Impl final : Carrier::Handler,
     enter(Completion::How::dispatch, [&] {
       Datagram datagram;
       if (is_open && read(Text(backlog.data(), size), datagram)) {
-        state_callback(session.state(), datagram);
+        call(state_callback, session.state(), datagram);
       }
     });
   }
   void on_carrier_event(const CarrierEvent& event) override {
     enter(Completion::How::dispatch, [&] {
-      event_callback(event);
+      call(event_callback, event);
       if (event.kind != CarrierEvent::Kind::warning) {
         session.on_transport(event.kind == CarrierEvent::Kind::up, now);
       }
@@ -161,11 +177,11 @@ struct AsyncBoard::Impl final : Carrier::Handler,
       backlog_size = datagram.bytes().size();
       std::copy_n(datagram.bytes().data(), backlog_size, backlog.data());
     } else {
-      state_callback(state, datagram);
+      call(state_callback, state, datagram);
     }
   }
   void on_board_heartbeat(const Datagram& datagram) override {
-    if (is_open) heartbeat_callback(datagram);
+    if (is_open) call(heartbeat_callback, datagram);
   }
   void on_identity(const Identity& fresh) override {
     identity.firmware.assign(fresh.firmware.data(), fresh.firmware.size());
@@ -173,17 +189,17 @@ struct AsyncBoard::Impl final : Carrier::Handler,
     identity.capabilities.assign(fresh.capabilities.data(), fresh.capabilities.size());
   }
   void on_nack(const Nack& nack, const Datagram& datagram) override {
-    if (is_open) nack_callback(nack, datagram);
+    if (is_open) call(nack_callback, nack, datagram);
   }
   void on_bad_datagram(const ReadResult& result, std::string_view bytes) override {
-    if (is_open) bad_callback(result, bytes);
+    if (is_open) call(bad_callback, result, bytes);
   }
   void on_link(const LinkStatus& status) override {
-    if (is_open) link_callback(status);
+    if (is_open) call(link_callback, status);
   }
   void on_restart() override {
     backlog_size = 0;  // of the boot before
-    if (is_open) restart_callback();
+    if (is_open) call(restart_callback);
   }
   void on_result(Ticket ticket, const CommandResult& result) override {
     const auto found = std::find_if(waiting.begin(), waiting.end(),
@@ -346,6 +362,7 @@ void AsyncBoard::on_restart(std::function<void()> callback) {
 }
 
 void AsyncBoard::watchdog(Duration period) {
+  require_watchdog(period);
   Impl& impl = *impl_;
   impl.enter(Completion::How::post, [&] {
     impl.session.watchdog(period, impl.now);

@@ -13,8 +13,9 @@
 // runs on its associated executor, never inside the call that started it. A failure to execute a
 // command is a result, not an exception: explain.hpp puts it into words.
 //
-// Callbacks and completion handlers may call anything here, destroy the board included. The steady
-// state allocates nothing.
+// Callbacks and completion handlers may call anything here, destroy the board included. What one
+// throws leaves io.run(), as from any handler of Asio, but never by way of the transport: reception
+// and timers go on when run() is called again. The steady state allocates nothing.
 #pragma once
 
 #include <asio/associated_allocator.hpp>
@@ -33,6 +34,7 @@
 
 #include "board_options.hpp"
 #include "command_help.hpp"
+#include "limits.hpp"
 
 namespace r4 {
 
@@ -62,17 +64,19 @@ class AsyncBoard {
   // would see it.
   void require_sendable(const Command& command) const;
 
-  // void(CommandResult). Throws as require_sendable() does.
+  // void(CommandResult). Throws as require_sendable() does, and for a timeout of nothing.
   template <class Token>
   auto async_send(const Command& command, Duration timeout, Token&& token) {
     require_sendable(command);
+    require_timeout("async_send()", timeout);
     return asio::async_initiate<Token, void(CommandResult)>(
         [this](auto handler, const Command& c, Duration t) {
           start_send(c, t, make_completion(std::move(handler)));
         },
         token, command, timeout);
   }
-  // void(CommandResult). E:STOP: overtakes and cancels everything, also before the link is up.
+  // void(CommandResult). E:STOP: overtakes and cancels everything, also before the link is up. It is
+  // sent whatever the timeout.
   template <class Token>
   auto async_stop(Duration timeout, Token&& token) {
     return asio::async_initiate<Token, void(CommandResult)>(
@@ -82,6 +86,7 @@ class AsyncBoard {
   // void(CommandResult). Confirmed by the board's answer; identity() has it.
   template <class Token>
   auto async_identify(Duration timeout, Token&& token) {
+    require_timeout("async_identify()", timeout);
     return asio::async_initiate<Token, void(CommandResult)>(
         [this](auto handler, Duration t) {
           start_identify(t, make_completion(std::move(handler)));
@@ -114,7 +119,8 @@ class AsyncBoard {
   // state.
   void on_restart(std::function<void()> callback);
 
-  // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. feed()
+  // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. Throws
+  // Error{usage} for less than nothing and more than an hour. feed()
   // may be called from any thread, costs no system call and counts from the next time the loop
   // runs.
   void watchdog(Duration period);

@@ -14,6 +14,7 @@
 #include "callback.hpp"
 #include "command_help.hpp"
 #include "explain.hpp"
+#include "limits.hpp"
 #include "post_box.hpp"
 
 namespace r4 {
@@ -72,7 +73,8 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
       : async(io, url_given, std::move(options)),
         box(io, [this](const Command& c) { deliver(c); }),
         url(url_given) {
-    async.on_state([this](const ReceivedState& fresh, const Datagram&) {
+    // An exception of the user's ends the program where it is thrown.
+    async.on_state([this](const ReceivedState& fresh, const Datagram&) noexcept {
       {
         const std::lock_guard lock(mutex);
         state = fresh;
@@ -82,7 +84,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
       news.notify_all();
       state_callback(fresh);
     });
-    async.on_link([this](const LinkStatus& fresh) {
+    async.on_link([this](const LinkStatus& fresh) noexcept {
       {
         const std::lock_guard lock(mutex);
         link = fresh;
@@ -92,7 +94,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
       news.notify_all();
       link_callback(fresh);
     });
-    async.on_event([this](const CarrierEvent& event) {
+    async.on_event([this](const CarrierEvent& event) noexcept {
       take_name();  // a board that was plugged in again may be at another port
       if (event.kind == CarrierEvent::Kind::warning) {
         last_warning = event;
@@ -102,7 +104,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
       }
       event_callback(event);
     });
-    async.on_restart([this] {
+    async.on_restart([this]() noexcept {
       {
         const std::lock_guard lock(mutex);
         state = async.state();
@@ -356,6 +358,7 @@ void Board::close() { impl_->close(); }
 // A call holds the Impl, so that the Board may be destroyed while it waits.
 
 void Board::wait_active(Duration timeout) {
+  require_wait("wait_active()", timeout);
   const auto impl = impl_;
   const bool active = impl->wait_for_news(impl->name_now(), timeout, [&] {
     return impl->link.state == HostLinkState::active && impl->in_control && !impl->link.gated;
@@ -366,6 +369,8 @@ void Board::wait_active(Duration timeout) {
 void Board::send(const Command& command, Duration timeout) {
   const auto impl = impl_;
   impl->require_sendable(command);
+  if (command.kind == CommandKind::stop && timeout.count() <= 0) impl->post(command);
+  require_timeout(shown(command), timeout);
   impl->execute(command, timeout);
 }
 void Board::send(std::string_view command, Duration timeout) {
@@ -408,6 +413,7 @@ void Board::setting(std::string_view key, std::string_view value, Duration timeo
 }
 
 BoardIdentity Board::identify(Duration timeout) {
+  require_timeout("identify()", timeout);
   const auto impl = impl_;
   return impl->execute(Command::identify(), timeout)->identity;
 }
@@ -417,6 +423,7 @@ ReceivedState Board::state() const {
   return impl_->state;
 }
 ReceivedState Board::next_state(Duration timeout) {
+  require_timeout("next_state()", timeout);
   const auto impl = impl_;
   const std::uint64_t seen = impl->states_now();
   if (!impl->wait_for_news(impl->name_now(), timeout, [&] { return impl->states != seen; })) {
@@ -465,6 +472,7 @@ void Board::on_restart(std::function<void()> callback) {
 }
 
 void Board::watchdog(Duration period) {
+  require_watchdog(period);
   const auto impl = impl_;
   impl->run_on_loop("watchdog()", [impl = impl.get(), period] { impl->async.watchdog(period); });
 }

@@ -65,7 +65,8 @@ class Board {
   // be sent. For streams of setpoints where the next one replaces this one. Allocates nothing.
   bool post(const Command& command);
 
-  // Every output safe, at once, repeated until the board confirms it; latched until clear().
+  // Every output safe, at once, repeated until the board confirms it; latched until clear(). Where it
+  // is not confirmed, the error says to cut the power.
   void stop(Duration timeout = default_timeout);
   void stop_async();  // does not wait; repeated for default_timeout
   void clear(Duration timeout = default_timeout);
@@ -162,8 +163,8 @@ class Board {
   // state.
   void on_restart(std::function<void()> callback);
 
-  // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. feed()
-  // costs no system call.
+  // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. Throws
+  // Error{usage} for less than nothing and more than an hour. feed() costs no system call.
   void watchdog(Duration period);
   void feed();
 

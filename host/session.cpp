@@ -8,6 +8,7 @@
 #include "../transports/error.hpp"
 #include "command_evidence.hpp"
 #include "command_help.hpp"
+#include "limits.hpp"
 
 namespace r4 {
 
@@ -32,6 +33,7 @@ Session::Session(Handler& handler, SessionOptions options, std::uint32_t first_p
       link_(options_.timing, first_pnum),
       key_(options_.key, options_.clock_start),
       pending_(max_pending, max_stops) {
+  require_valid(options_);
   if (!options_.fields.empty()) {
     const std::string fields = options_.fields;
     if (FieldSet set; parse_fields(fields, set) != Refusal::none) {

@@ -15,10 +15,14 @@
 namespace r4::tool {
 namespace {
 
-Milliseconds read_seconds(const std::string& name, const std::string& text) {
+Milliseconds read_seconds(const std::string& name, const std::string& text, Zero zero) {
   std::int32_t hundredths = 0;
   if (!parse_hundredths(Text(text), hundredths) || hundredths < 0) {
     throw Error(ErrorKind::usage, fmt::format("{} {}", name, text), "is no time",
+                "write seconds such as 5 or 0.25");
+  }
+  if (hundredths == 0 && zero == Zero::refused) {
+    throw Error(ErrorKind::usage, fmt::format("{} {}", name, text), "is too short for anything",
                 "write seconds such as 5 or 0.25");
   }
   return Milliseconds(std::int64_t{hundredths} * 10);
@@ -38,10 +42,12 @@ std::uint64_t read_number(const std::string& name, const std::string& text, std:
 
 template <class Out>
 CLI::Option* seconds(CLI::App& command, const std::string& name, Out& out,
-                     const std::string& meaning) {
+                     const std::string& meaning, Zero zero) {
   return command
       .add_option_function<std::string>(
-          name, [&out, name](const std::string& text) { out = read_seconds(name, text); }, meaning)
+          name,
+          [&out, name, zero](const std::string& text) { out = read_seconds(name, text, zero); },
+          meaning)
       ->type_name("SECONDS");
 }
 
@@ -68,12 +74,12 @@ CLI::Option* url(CLI::App& command, Out& out) {
 }  // namespace
 
 CLI::Option* add_seconds(CLI::App& command, const std::string& name, Milliseconds& out,
-                         const std::string& meaning) {
-  return seconds(command, name, out, meaning);
+                         const std::string& meaning, Zero zero) {
+  return seconds(command, name, out, meaning, zero);
 }
 CLI::Option* add_seconds(CLI::App& command, const std::string& name,
                          std::optional<Milliseconds>& out, const std::string& meaning) {
-  return seconds(command, name, out, meaning);
+  return seconds(command, name, out, meaning, Zero::refused);
 }
 
 CLI::Option* add_number(CLI::App& command, const std::string& name, std::uint64_t& out,

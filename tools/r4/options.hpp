@@ -16,9 +16,10 @@ namespace r4::tool {
 
 using Milliseconds = std::chrono::milliseconds;
 
-// Seconds such as 5 or 0.25, to the hundredth, at most 10 million.
+// Seconds such as 5 or 0.25, to the hundredth, at most 10 million; 0 only where it means something.
+enum class Zero { refused, allowed };
 CLI::Option* add_seconds(CLI::App& command, const std::string& name, Milliseconds& out,
-                         const std::string& meaning);
+                         const std::string& meaning, Zero zero = Zero::refused);
 CLI::Option* add_seconds(CLI::App& command, const std::string& name,
                          std::optional<Milliseconds>& out, const std::string& meaning);
 

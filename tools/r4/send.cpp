@@ -183,7 +183,8 @@ void add_send(CLI::App& root, Action& chosen) {
       ->type_name("");
   add_seconds(*command, "--timeout", options->timeout,
               "how long to wait for each confirmation (default 3)");
-  add_seconds(*command, "--hold", options->hold, "keep the link up that long after the last");
+  add_seconds(*command, "--hold", options->hold, "keep the link up that long after the last",
+              Zero::allowed);
   add_key(*command, options->key);
   add_json(*command, options->json, "print JSON, one object a command");
 }

@@ -101,7 +101,8 @@ void add_stop(CLI::App& root, Action& chosen) {
       root, chosen, "stop", "Emergency stop: all outputs off, now", footer, options, stop);
   add_urls(*command, options->urls);
   add_seconds(*command, "--timeout", options->timeout,
-              "how long to repeat it for a confirmation (default 2)");
+              "how long to repeat it for a confirmation (default 2); it is sent in any case",
+              Zero::allowed);
   command->add_option("--key", options->key, "not needed: a board obeys a stop from anyone")
       ->type_name(file_type);
   add_json(*command, options->json, "print JSON");

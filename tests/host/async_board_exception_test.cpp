@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a callback or handler of an AsyncBoard throws leaves io.run(); the board goes on.
+#include <gtest/gtest.h>
+
+#include <asio/io_context.hpp>
+#include <stdexcept>
+
+#include "host/async_board.hpp"
+#include "tests/support/board_in_a_thread.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+struct Thrown : std::runtime_error {
+  Thrown() : std::runtime_error("of the user's") {}
+};
+
+struct ThrownIn : testing::TestWithParam<std::tuple<const char*, const char*>> {
+  const std::string place = std::get<0>(GetParam());
+  const std::string transport = std::get<1>(GetParam());
+};
+INSTANTIATE_TEST_SUITE_P(AsyncBoard, ThrownIn,
+                         testing::Combine(testing::Values("state", "heartbeat", "link", "nack",
+                                                          "event", "restart", "handler"),
+                                          testing::Values("udp", "pty")),
+                         [](const auto& p) {
+                           return std::string(std::get<0>(p.param)) + "Over" + std::get<1>(p.param);
+                         });
+
+TEST_P(ThrownIn, LeavesTheLoopAndTheBoardGoesOn) {
+  BoardInAThread simulated(transport, place == "restart" ? "0.3 reboot\n" : "");
+  asio::io_context io;
+  AsyncBoard board(io, simulated.url());
+  int thrown = 0;
+  const auto throw_once = [&](const auto&...) {
+    if (thrown++ == 0) throw Thrown();
+  };
+  int states = 0;
+  int heartbeats = 0;
+  board.on_state([&](const auto&...) {
+    ++states;
+    if (place == "state") throw_once();
+  });
+  board.on_board_heartbeat([&](const auto&...) {
+    ++heartbeats;
+    if (place == "heartbeat") throw_once();
+  });
+  if (place == "link") board.on_link(throw_once);
+  if (place == "nack") board.on_nack(throw_once);
+  if (place == "event") board.on_event(throw_once);
+  if (place == "restart") board.on_restart(throw_once);
+  board.open();
+  const Command drive = Command::osmc(1, Direction::forward, 1);
+  if (place == "handler") board.async_identify(5s, throw_once);
+  if (place == "nack") {
+    board.async_stop(5s, [&](const auto&) { board.async_send(drive, 5s, [](const auto&) {}); });
+  }
+  EXPECT_THROW(io.run_for(5s), Thrown);
+  const int states_then = states;
+  const int heartbeats_then = heartbeats;
+  bool asked = false;
+  // Nothing comes to a session without a timer: the next heartbeats of ours are what keeps it alive.
+  while (states < states_then + 20 || heartbeats < heartbeats_then + 3 || !asked) {
+    ASSERT_NE(io.run_one_for(5s), 0U) << "reception or a timer is gone";
+    if (states < states_then + 10 || asked) continue;
+    asked = true;
+    board.async_identify(
+        5s, [&](const CommandResult& result) { EXPECT_EQ(result.outcome, Outcome::confirmed); });
+  }
+  EXPECT_GE(thrown, 1);
+  EXPECT_NE(board.link().state, HostLinkState::lost);
+}
+
+}  // namespace
+}  // namespace r4::test
