@@ -77,5 +77,13 @@ TEST(StopDetector, FindsTheNextLineAfterOneThatIsTooLong) {
   EXPECT_EQ(stops_in(detector, stop + longest + "x\n" + stop + "\n"), 1);
 }
 
+TEST(StopDetector, ForgetsAnUnfinishedLineWhenItIsReset) {
+  StopDetector detector;
+  const std::string stop = with_crc("E:STOP;PNum:7;T:79146;") + "\n";
+  EXPECT_EQ(stops_in(detector, "O:358,1"), 0);
+  detector.reset();
+  EXPECT_EQ(stops_in(detector, stop), 1);
+}
+
 }  // namespace
 }  // namespace r4::firmware
