@@ -201,6 +201,12 @@ struct AsyncBoard::Impl final : Carrier::Handler,
     backlog_size = 0;  // of the boot before
     if (is_open) call(restart_callback);
   }
+  void on_arming(DisarmCause cause) override {
+    if (is_open) call(arming_callback, cause);
+  }
+  void on_refused(const RefusedPost& refused) override {
+    if (is_open) call(refused_callback, refused);
+  }
   void on_result(Ticket ticket, const CommandResult& result) override {
     const auto found = std::find_if(waiting.begin(), waiting.end(),
                                     [ticket](const Waiting& w) { return w.ticket == ticket; });
@@ -259,6 +265,8 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   Callback<void(const LinkStatus&)> link_callback;
   Callback<void(const CarrierEvent&)> event_callback;
   Callback<void()> restart_callback;
+  Callback<void(DisarmCause)> arming_callback;
+  Callback<void(const RefusedPost&)> refused_callback;
 
   bool in_backlog = false;
   std::array<char, max_datagram> backlog;  // the newest state of it
@@ -308,6 +316,11 @@ void AsyncBoard::start_stop(Duration timeout, CompletionPtr completion) {
   impl.begin(std::move(completion), [&] { return impl.session.stop(time_of(timeout), impl.now); });
 }
 
+void AsyncBoard::start_arm(Duration timeout, CompletionPtr completion) {
+  Impl& impl = *impl_;
+  impl.begin(std::move(completion), [&] { return impl.session.arm(time_of(timeout), impl.now); });
+}
+
 void AsyncBoard::start_identify(Duration timeout, CompletionPtr completion) {
   Impl& impl = *impl_;
   impl.begin(std::move(completion),
@@ -319,13 +332,14 @@ void AsyncBoard::require_sendable(const Command& command) const {
   require_cable(name(), command);
 }
 
-bool AsyncBoard::post(const Command& command) {
+PostResult AsyncBoard::post(const Command& command) {
   require_sendable(command);
   Impl& impl = *impl_;
-  bool sent = false;
-  impl.enter(Completion::How::post,
-             [&] { sent = impl.is_open && impl.session.post(command, impl.now); });
-  return sent;
+  PostResult result = PostResult::no_link;
+  impl.enter(Completion::How::post, [&] {
+    if (impl.is_open) result = impl.session.post(command, impl.now);
+  });
+  return result;
 }
 
 const ReceivedState& AsyncBoard::state() const { return impl_->session.state(); }
@@ -333,6 +347,7 @@ const LinkStatus& AsyncBoard::link() const { return impl_->session.link(); }
 bool AsyncBoard::in_control() const {
   return impl_->is_open && impl_->session.in_control(steady_now());
 }
+DisarmCause AsyncBoard::disarmed_by() const { return impl_->session.disarmed_by(); }
 const BoardIdentity& AsyncBoard::identity() const { return impl_->identity; }
 Statistics AsyncBoard::statistics() const { return impl_->session.statistics(steady_now()); }
 const CarrierCounters& AsyncBoard::carrier_counters() const { return impl_->carrier->counters(); }
@@ -359,6 +374,12 @@ void AsyncBoard::on_event(std::function<void(const CarrierEvent&)> callback) {
 }
 void AsyncBoard::on_restart(std::function<void()> callback) {
   impl_->restart_callback.set(std::move(callback));
+}
+void AsyncBoard::on_arming(std::function<void(DisarmCause)> callback) {
+  impl_->arming_callback.set(std::move(callback));
+}
+void AsyncBoard::on_refused(std::function<void(const RefusedPost&)> callback) {
+  impl_->refused_callback.set(std::move(callback));
 }
 
 void AsyncBoard::watchdog(Duration period) {

@@ -83,6 +83,16 @@ class AsyncBoard {
         [this](auto handler, Duration t) { start_stop(t, make_completion(std::move(handler))); },
         token, timeout);
   }
+  // void(CommandResult). Clears what made the outputs safe, where it can be cleared (stop, watchdog,
+  // fault), and closes relay 1, the motor supply. Confirmed by the board's state: output commands go
+  // out from then on (arming.hpp). Not armed: what stands against it cannot be cleared.
+  template <class Token>
+  auto async_arm(Duration timeout, Token&& token) {
+    require_timeout("async_arm()", timeout);
+    return asio::async_initiate<Token, void(CommandResult)>(
+        [this](auto handler, Duration t) { start_arm(t, make_completion(std::move(handler))); },
+        token, timeout);
+  }
   // void(CommandResult). Confirmed by the board's answer; identity() has it.
   template <class Token>
   auto async_identify(Duration timeout, Token&& token) {
@@ -94,14 +104,17 @@ class AsyncBoard {
         token, timeout);
   }
 
-  // Sends once, without confirmation; false while the link is not up. Throws Error{usage}.
-  bool post(const Command& command);
+  // Sends once, without confirmation, and says why it did not; on_refused() tells if the board refuses
+  // it. Throws Error{usage}.
+  PostResult post(const Command& command);
 
   // What is known now; after close(), what was known last.
   const ReceivedState& state() const;
   const LinkStatus& link() const;
   // The link is up and the board takes our commands: they go out at once.
   bool in_control() const;
+  // Why the session is not armed; none if it is.
+  DisarmCause disarmed_by() const;
   const BoardIdentity& identity() const;
   Statistics statistics() const;
   const CarrierCounters& carrier_counters() const;
@@ -118,6 +131,10 @@ class AsyncBoard {
   // The board has begun again: what it was told is gone, thresholds of U too. Comes before its new
   // state.
   void on_restart(std::function<void()> callback);
+  // The session is armed (none), or not any more.
+  void on_arming(std::function<void(DisarmCause)> callback);
+  // The board refused a command that was posted.
+  void on_refused(std::function<void(const RefusedPost&)> callback);
 
   // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. Throws
   // Error{usage} for less than nothing and more than an hour. feed()
@@ -153,6 +170,7 @@ class AsyncBoard {
   asio::io_context::executor_type executor() const;
   void start_send(const Command& command, Duration timeout, CompletionPtr completion);
   void start_stop(Duration timeout, CompletionPtr completion);
+  void start_arm(Duration timeout, CompletionPtr completion);
   void start_identify(Duration timeout, CompletionPtr completion);
 
   struct Impl;

@@ -61,6 +61,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
     std::string text, text2;
     bool begun = false;
     bool abandoned = false;
+    bool arms = false;  // arm(): there is no command
     bool done = false;
     std::condition_variable ended;
     CommandResult result;
@@ -70,7 +71,8 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   using CallPtr = std::shared_ptr<Call>;
 
   Impl(std::string_view url_given, BoardOptions options)
-      : async(io, url_given, std::move(options)),
+      : arming(options.session.arming),
+        async(io, url_given, std::move(options)),
         box(io, [this](const Command& c) { deliver(c); }),
         url(url_given) {
     // An exception of the user's ends the program where it is thrown.
@@ -104,6 +106,14 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
       }
       event_callback(event);
     });
+    async.on_arming([this](DisarmCause fresh) noexcept {
+      {
+        const std::lock_guard lock(mutex);
+        disarmed_by = fresh;
+      }
+      arming_callback(fresh);
+    });
+    async.on_refused([this](const RefusedPost& refused) noexcept { refused_callback(refused); });
     async.on_restart([this]() noexcept {
       {
         const std::lock_guard lock(mutex);
@@ -142,8 +152,10 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   void deliver(const Command& command) {
     if (command.kind == CommandKind::stop) {
       async.async_stop(default_timeout, [](const CommandResult&) {});
-    } else {
-      async.post(command);
+    } else if (const PostResult result = async.post(command); !result) {
+      RefusedPost refused{command, Refusal::none, result};
+      refused.command.text = refused.command.text2 = Text();
+      refused_callback(refused);
     }
   }
 
@@ -157,7 +169,9 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
       call->begun = true;
     }
     auto end = [this, call](const CommandResult& result) { finish(*call, result); };
-    if (stop) {
+    if (call->arms) {
+      async.async_arm(left, std::move(end));
+    } else if (stop) {
       async.async_stop(left > Duration{0} ? left : default_timeout, std::move(end));
     } else if (call->command.kind == CommandKind::identify) {
       async.async_identify(left, std::move(end));
@@ -209,9 +223,10 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
 
   // Has the loop carry out a command. Throws if it is not confirmed.
   CallPtr execute(const Command& command, Duration timeout) {
-    const std::string text = shown(command);
+    return execute(shown(command), std::make_shared<Call>(command), timeout);
+  }
+  CallPtr execute(const std::string& text, CallPtr call, Duration timeout) {
     must_not_be_in_loop(text);
-    CallPtr call = std::make_shared<Call>(command);
     const auto deadline = Clock::now() + bounded(timeout);
     std::unique_lock lock(mutex);
     if (closed) throw closed_error(text);
@@ -220,7 +235,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
     if (!call->ended.wait_until(lock, deadline, is_done) &&
         !(call->begun && call->ended.wait_until(lock, deadline + grace, is_done))) {
       call->abandoned = true;
-      if (command.kind == CommandKind::stop) {
+      if (call->command.kind == CommandKind::stop) {
         throw Error(ErrorKind::refused, text,
                     "not confirmed: the board's thread does not answer, and sends it when it does",
                     std::string(stop_last_resort) + "; a callback must return at once");
@@ -290,11 +305,17 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
     return woken;
   }
 
-  bool post(const Command& command) {
+  PostResult post(const Command& command) {
     require_sendable(command);
     const std::lock_guard lock(mutex);
-    if (closed || (!in_control && command.kind != CommandKind::stop)) return false;
-    return box.put(command);
+    const bool stop = command.kind == CommandKind::stop;
+    if (closed || (!in_control && !stop)) return PostResult::no_link;
+    if (arming == Arming::required && disarmed_by != DisarmCause::none &&
+        drives_output(command.kind)) {
+      ++refused_here;
+      return PostResult::not_armed;
+    }
+    return box.put(command) ? PostResult::sent : PostResult::queue_full;
   }
 
   void close() {
@@ -318,6 +339,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
     if (thread.joinable()) thread.detach();
   }
 
+  const Arming arming;
   asio::io_context io{1};
   asio::executor_work_guard<asio::io_context::executor_type> work{io.get_executor()};
   AsyncBoard async;
@@ -330,6 +352,8 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   Callback<void(const LinkStatus&)> link_callback;
   Callback<void(const CarrierEvent&)> event_callback;
   Callback<void()> restart_callback;
+  Callback<void(DisarmCause)> arming_callback;
+  Callback<void(const RefusedPost&)> refused_callback;
   std::optional<CarrierEvent> last_event;    // up or down
   std::optional<CarrierEvent> last_warning;  // since then
 
@@ -343,6 +367,8 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   std::uint64_t states = 0;
   LinkStatus link;
   bool in_control = false;
+  DisarmCause disarmed_by = DisarmCause::not_yet;
+  std::uint64_t refused_here = 0;  // posts that did not get as far as the loop
   bool closed = false;
   Statistics last_statistics;
 };
@@ -376,7 +402,18 @@ void Board::send(const Command& command, Duration timeout) {
 void Board::send(std::string_view command, Duration timeout) {
   send(parse_command_text(command), timeout);
 }
-bool Board::post(const Command& command) { return impl_->post(command); }
+PostResult Board::post(const Command& command) { return impl_->post(command); }
+void Board::arm(Duration timeout) {
+  require_timeout("arm()", timeout);
+  const auto impl = impl_;
+  const auto call = std::make_shared<Impl::Call>(Command());
+  call->arms = true;
+  impl->execute("arm()", call, timeout);
+}
+DisarmCause Board::disarmed_by() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->disarmed_by;
+}
 
 void Board::stop(Duration timeout) { send(Command::stop(), timeout); }
 void Board::stop_async() { impl_->post(Command::stop()); }
@@ -445,6 +482,8 @@ Statistics Board::statistics() const {
     *report = impl->last_statistics;
   }
   impl->run_on_loop("statistics()", [impl, report] { *report = impl->async.statistics(); });
+  const std::lock_guard lock(impl->mutex);
+  report->refused += impl->refused_here;
   return *report;
 }
 
@@ -465,6 +504,15 @@ void Board::on_event(std::function<void(const CarrierEvent&)> callback) {
     if (impl->last_event) impl->event_callback(*impl->last_event);
     if (impl->last_warning) impl->event_callback(*impl->last_warning);
   });
+}
+void Board::on_arming(std::function<void(DisarmCause)> callback) {
+  const auto impl = impl_;
+  impl->install("on_arming()", impl->arming_callback, std::move(callback),
+                [impl = impl.get()] { impl->arming_callback(impl->async.disarmed_by()); });
+}
+void Board::on_refused(std::function<void(const RefusedPost&)> callback) {
+  const auto impl = impl_;
+  impl->install("on_refused()", impl->refused_callback, std::move(callback), [] {});
 }
 void Board::on_restart(std::function<void()> callback) {
   const auto impl = impl_;

@@ -3,6 +3,7 @@
 //
 //     r4::Board board("udp://192.168.0.125");
 //     board.wait_active();
+//     board.arm();                                      // closes relay 1, the motor supply
 //     board.osmc(1).set(358, r4::Direction::forward);   // returns when the board's state confirms
 //     it board.on_state([](const r4::State& s) { … }); board.stop(); // every output safe, at once
 //
@@ -61,9 +62,19 @@ class Board {
   void send(const Command& command, Duration timeout = default_timeout);
   // The same from the text of design: "O:358,1,1".
   void send(std::string_view command, Duration timeout = default_timeout);
-  // Sends once, without waiting or confirmation; false while the link is not up or when 256 wait to
-  // be sent. For streams of setpoints where the next one replaces this one. Allocates nothing.
-  bool post(const Command& command);
+  // Sends once, without waiting or confirmation, and says why it did not: also when 256 wait to be
+  // sent. For streams of setpoints where the next one replaces this one; on_refused() tells of those
+  // that the board refuses. Allocates nothing.
+  PostResult post(const Command& command);
+
+  // Before the first output command (O D S R P B Z), and again after whatever made the outputs safe but
+  // a lost link: until then they are refused here, so that a program that goes on commanding drives off
+  // only when it means to. Clears what can be cleared (stop, watchdog, fault), then closes relay 1, the
+  // motor supply. Throws Error{refused} if the handle is released or something is in the way, and when
+  // a stop comes meanwhile. BoardOptions: options.session.arming = Arming::off does without.
+  void arm(Duration timeout = default_timeout);
+  // Why output commands are refused; none when armed.
+  DisarmCause disarmed_by() const;
 
   // Every output safe, at once, repeated until the board confirms it; latched until clear(). Where it
   // is not confirmed, the error says to cut the power.
@@ -162,6 +173,10 @@ class Board {
   // The board has begun again: what it was told is gone, thresholds of U too. Comes before its new
   // state.
   void on_restart(std::function<void()> callback);
+  // Armed (none), or not any more, and why.
+  void on_arming(std::function<void(DisarmCause)> callback);
+  // A command that post() took was refused: by the board, or on its way there.
+  void on_refused(std::function<void(const RefusedPost&)> callback);
 
   // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. Throws
   // Error{usage} for less than nothing and more than an hour. feed() costs no system call.

@@ -59,6 +59,33 @@ Words key_words(KeyTrouble trouble) {
   return {};
 }
 
+// Why outputs are not driven, and what to do before arm() is called.
+Words disarm_words(DisarmCause cause) {
+  switch (cause) {
+    case DisarmCause::not_yet:
+      return {"a session begins disarmed", ""};
+    case DisarmCause::stop:
+      return {"an emergency stop came", "when the danger is over, "};
+    case DisarmCause::handle:
+      return {"the dead-man's handle was released", "hold the handle, "};
+    case DisarmCause::proximity:
+      return {"something came nearer than a proximity threshold", "clear the way, "};
+    case DisarmCause::watchdog:
+      return {"a duty of the board's firmware missed its deadline", "find out why, "};
+    case DisarmCause::fault:
+      return {"the board found a fault in itself", "check its chips and wiring, "};
+    case DisarmCause::link:
+      return {"the link was lost, and the board did not bring its outputs back", ""};
+    case DisarmCause::restart:
+      return {"the board has begun again", "set its thresholds (U) again, "};
+    case DisarmCause::supply:
+      return {"relay 1, the motor supply, was opened", ""};
+    case DisarmCause::none:
+      break;
+  }
+  return {};
+}
+
 Words link_words(const LinkStatus& link) {
   if (link.gated) {
     return {"the application watchdog has stopped our heartbeats",
@@ -150,6 +177,13 @@ Problem explain(KeyTrouble trouble) {
   return {ErrorKind::refused, "key", std::move(words.reason), std::move(words.fix)};
 }
 
+Problem explain(std::string_view command, DisarmCause cause) {
+  const Words words = disarm_words(cause);
+  const bool first = words.fix.empty();
+  return {ErrorKind::refused, std::string(command), "not armed: " + words.reason,
+          words.fix + (first ? "call arm()" : "then call arm()")};
+}
+
 Problem explain(std::string_view name, const LinkStatus& link) {
   Words words = link_words(link);
   return {ErrorKind::refused, std::string(name), std::move(words.reason), std::move(words.fix)};
@@ -186,6 +220,8 @@ Problem explain(std::string_view command, const CommandResult& result, const Lin
           fmt::format("not sent: {} commands are under way already", Session::max_pending);
       words.fix = "wait until some of them are confirmed";
       break;
+    case Outcome::not_armed:
+      return explain(command, result.disarmed);
   }
   return {ErrorKind::refused, std::string(command), std::move(words.reason), std::move(words.fix)};
 }

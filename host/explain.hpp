@@ -20,6 +20,9 @@ Problem explain(std::string_view name, const LinkStatus& link);
 // What is wrong with keys, and what to do; of kind refused. Not for KeyTrouble::none.
 Problem explain(KeyTrouble trouble);
 
+// Why the session is not armed, and what to do; of kind refused. Not for DisarmCause::none.
+Problem explain(std::string_view command, DisarmCause cause);
+
 // Why `command` ("O:358,1,1") was not confirmed. `link` is the link at that time. Of kind refused.
 Problem explain(std::string_view command, const CommandResult& result, const LinkStatus& link);
 

@@ -17,7 +17,11 @@ namespace r4 {
 // One command, from send() until it ends. The times are the session's.
 struct PendingCommand {
   enum class Stage : std::uint8_t { free, queued, sent };
+  // What it is for: a command of the program, an arm() of it (never sent), or a command that arm()
+  // sends.
+  enum class Role : std::uint8_t { command, arm, arm_step };
   Stage stage = Stage::free;
+  Role role = Role::command;
   CommandKind kind = CommandKind::heartbeat;
   bool executed = false;    // the board said DUPLICATE: it has executed this number
   bool overtaken = false;   // CMD is past it: the answer to a retry decides
@@ -50,6 +54,7 @@ class PendingCommands {
     --room;
     PendingCommand& slot = slots_[order_[used_++]];
     slot.stage = PendingCommand::Stage::queued;
+    slot.role = PendingCommand::Role::command;
     slot.kind = kind;
     slot.executed = slot.overtaken = slot.cable_only = slot.doubtful = false;
     slot.pnum = 0;

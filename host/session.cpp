@@ -131,6 +131,7 @@ bool Session::on_state_datagram(const Datagram& datagram, Time now) {
   if (!state_.present.has(StateField::fault)) state_.fault = ChipFault();
   refresh_status(now);
   confirm_from_state(now);
+  look_at_supply();
   select_fields(now);
   handler_.on_state(state_, datagram);
   return is_current(arrival);
@@ -163,6 +164,7 @@ void Session::on_nack_datagram(const Datagram& datagram, Time now) {
                             link_.last_pnum() - pending.pnum < BoardLink::memory;
     if (remembered) finish(pending, Outcome::refused, nack.code, now);
   }
+  if (proof && link_up()) on_post_refused(nack);
 }
 
 void Session::on_identity_datagram(const Datagram& datagram, Time now) {
@@ -206,6 +208,7 @@ bool Session::notice_restart() {
   if (restarts_ == link_.restarts()) return false;
   restarts_ = link_.restarts();
   state_ = ReceivedState();
+  disarm(DisarmCause::restart);
   handler_.on_restart();
   return true;
 }
@@ -279,6 +282,7 @@ Command Session::with_needed_fields(const Command& command) {
   std::string fields(command.text.data(), command.text.size());
   if (!set.has(StateField::safe)) fields += ",SAFE";
   if (!set.has(StateField::cmd)) fields += ",CMD";
+  if (!set.has(StateField::relays) && options_.arming == Arming::required) fields += ",RELAYS";
   if (fields != options_.fields) {
     options_.fields = std::move(fields);
     selections_ = 0;
@@ -292,7 +296,8 @@ Time Session::poll(Time now) {
   link_.poll(to_ms(now));
   refresh_status(now);
   if (link_.heartbeat_due(to_ms(now))) {
-    if (transmit_now(Command::heartbeat(), link_.echo(), Priority::normal, now)) {
+    if (transmit_now(Command::heartbeat(), link_.echo(), Priority::normal, now) ==
+        SendResult::sent) {
       ++collector_.counts.heartbeats;
       key_.on_heartbeat_sent();
       link_.heartbeat_sent(to_ms(now));
@@ -307,6 +312,9 @@ Time Session::poll(Time now) {
   }
   if (!controlled_) select_fields(now);  // the first thing when the link comes up
   send_queued(now);
+  advance_arming(now);
+  refuse_held_back(now);
+  send_queued(now);  // what has waited for arm()
   retry_due(now);
   if (options_.identify_interval.count() != 0 && link_up() && now >= next_identify_) {
     next_identify_ = now + options_.identify_interval;
@@ -362,6 +370,7 @@ void Session::doubt_sent() {
   for (Pending& pending : pending_.under_way()) {
     if (pending.stage == Stage::sent) pending.doubtful = true;
   }
+  posted_.forget();
 }
 
 void Session::refresh_status(Time now) {
@@ -369,6 +378,7 @@ void Session::refresh_status(Time now) {
     controlled_ = false;
     doubt_sent();
   }
+  look_at_arming();
   const LinkStatus fresh{link_.state(), link_.reason(), busy_until_ > now,
                          link_.watchdog_expired(to_ms(now)), key_.trouble(now)};
   if (fresh == status_) return;

@@ -17,6 +17,8 @@
 // With a key (host_key.hpp) all is signed, a board without one is refused, and AUTH says only that one
 // copy was not taken: another may have been executed.
 //
+// Commands that drive outputs are refused here while the session is not armed (arming.hpp).
+//
 // E:STOP does not wait for the link, overtakes everything, discards all commands that wait, and is
 // repeated every 20 ms until the board reports the reason `stop`: in a datagram that comes after it
 // was sent, and not while an E:CLEAR sent before it may still take the reported stop away.
@@ -32,8 +34,11 @@
 #include "../protocol/host_link.hpp"
 #include "../protocol/message.hpp"
 #include "../transports/carrier.hpp"
+#include "arming.hpp"
 #include "host_key.hpp"
 #include "pending_commands.hpp"
+#include "post_result.hpp"
+#include "posted_commands.hpp"
 #include "received_state.hpp"
 #include "statistics.hpp"
 #include "time.hpp"
@@ -57,12 +62,15 @@ enum class Outcome : std::uint8_t {
   timed_out,  // no confirmation until the deadline; it may or may not have been executed
   cancelled,  // given up: a stop, or the end of the session, came first
   full,       // not taken: Session::max_pending commands are under way already
+  not_armed,  // not sent: it drives an output and the session is not armed, because of `disarmed`;
+              // arm() itself: it cannot be armed while that is so
 };
 
 struct CommandResult {
   Outcome outcome = Outcome::timed_out;
-  Refusal code = Refusal::none;  // for refused
-  Time elapsed{0};               // from send() to now
+  Refusal code = Refusal::none;              // for refused
+  Time elapsed{0};                           // from send() to now
+  DisarmCause disarmed = DisarmCause::none;  // for not_armed
 };
 
 // Names a command that send() took; never 0.
@@ -70,8 +78,10 @@ using Ticket = std::uint64_t;
 
 struct SessionOptions {
   HostLink::Timing timing;
-  // The state fields to ask for, as in F; SAFE and CMD are added, to these and to those of any F
-  // that is sent. Empty: leave the board's choice, and every F, alone.
+  // Must a program call arm() before it drives, and again after whatever made the outputs safe?
+  Arming arming = Arming::required;
+  // The state fields to ask for, as in F; SAFE and CMD, and RELAYS for arming, are added, to these and
+  // to those of any F that is sent. Empty: leave the board's choice, and every F, alone.
   std::string fields = "DEFAULT";
   std::chrono::milliseconds command_retry{50};
   std::chrono::milliseconds stop_retry{20};
@@ -102,6 +112,10 @@ class Session {
     // The board has begun again since it was heard: all that it was told is gone, but for settings
     // that it stores. Called before its new state.
     virtual void on_restart() {}
+    // The session is armed (none), or not any more.
+    virtual void on_arming(DisarmCause) {}
+    // The board refused a command that was posted.
+    virtual void on_refused(const RefusedPost&) {}
 
    protected:
     ~Handler() = default;
@@ -124,8 +138,12 @@ class Session {
   // now. Throws Error{usage} for a command outside its ranges; returns 0 when 64 are under way
   // already.
   Ticket send(const Command& command, Time timeout, Time now);
-  // Sends a command once and forgets it. False while the link is not up.
-  bool post(const Command& command, Time now);
+  // Sends a command once and does not wait for it: on_refused() tells if the board refuses it.
+  PostResult post(const Command& command, Time now);
+  // Clears what made the outputs safe, where that can be cleared, and closes relay 1, the motor supply:
+  // confirmed when the board's state shows it. Output commands that are sent behind it wait for it.
+  // Returns 0 when 64 commands are under way already.
+  Ticket arm(Time timeout, Time now);
   // E:STOP, sent before this returns. Confirmed when the board reports the reason stop. Returns 0,
   // with the stop sent all the same, when 16 stops are under way already.
   Ticket stop(Time timeout, Time now);
@@ -144,6 +162,10 @@ class Session {
   const LinkStatus& link() const { return status_; }
   // The link is up and the board has executed a command of ours: commands go out at once.
   bool in_control(Time now) const;
+  // Why the session is not armed; none if it is.
+  DisarmCause disarmed_by() const { return arming_.cause(); }
+  // Are output commands sent?
+  bool may_drive() const;
   const ReceivedState& state() const { return state_; }
   Statistics statistics(Time now) const;
 
@@ -161,8 +183,9 @@ class Session {
   void send_queued(Time now);
   void retry_due(Time now);
   void finish(Pending& pending, Outcome outcome, Refusal code, Time now);
-  bool transmit_now(const Command& command, std::uint32_t t_ms, Priority priority, Time now);
-  bool close_and_transmit(DatagramWriter& writer, CommandKind kind, Priority priority, Time now);
+  SendResult transmit_now(const Command& command, std::uint32_t t_ms, Priority priority, Time now);
+  SendResult close_and_transmit(DatagramWriter& writer, CommandKind kind, Priority priority,
+                                Time now);
   std::uint32_t take_pnum(CommandKind kind);
   bool link_up() const;
   bool speaks_no_cmd() const;
@@ -177,6 +200,19 @@ class Session {
   bool is_cable_only(std::uint32_t pnum);
   void confirm_from_state(Time now);
   void confirm_stop(Ticket before, Time now);
+  bool is_held_back(CommandKind kind) const;
+  void disarm(DisarmCause cause);
+  void tell_arming();
+  void look_at_arming();
+  void look_at_supply();
+  bool supply_closed() const;
+  void advance_arming(Time now);
+  void send_arming_step(const Command& command, Time now);
+  void on_arming_step(CommandKind kind, Outcome outcome, Refusal code, Time now);
+  void end_arming(Outcome outcome, Refusal code, Time now);
+  void give_up_arming();
+  void refuse_held_back(Time now);
+  void on_post_refused(const Nack& nack);
   void select_fields(Time now);
   Command with_needed_fields(const Command& command);
   void doubt_sent();
@@ -192,7 +228,10 @@ class Session {
   ReceivedState state_;
   std::uint32_t restarts_ = 0;  // of the board, those that were told
   StatisticsCollector collector_;
+  ArmingMachine arming_;
+  DisarmCause told_cause_ = DisarmCause::not_yet;
   PendingCommands pending_;
+  PostedCommands posted_;
   Ticket next_ticket_ = 1;
   std::uint32_t newest_clear_ = 0;  // its packet number
   bool clear_open_ = false;         // it may be on its way: neither executed nor overtaken yet

@@ -7,9 +7,9 @@
 
 namespace r4 {
 
-// A datagram of which no copy is kept. Returns whether it was sent.
-bool Session::transmit_now(const Command& command, std::uint32_t t_ms, Priority priority,
-                           Time now) {
+// A datagram of which no copy is kept.
+SendResult Session::transmit_now(const Command& command, std::uint32_t t_ms, Priority priority,
+                                 Time now) {
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   write_command(writer, command);
@@ -18,15 +18,15 @@ bool Session::transmit_now(const Command& command, std::uint32_t t_ms, Priority 
 }
 
 // The one way out: nothing is sent to a board that is refused, but stops.
-bool Session::close_and_transmit(DatagramWriter& writer, CommandKind kind, Priority priority,
-                                 Time now) {
-  if (key_.refuses_board() && kind != CommandKind::stop) return false;
+SendResult Session::close_and_transmit(DatagramWriter& writer, CommandKind kind, Priority priority,
+                                       Time now) {
+  if (key_.refuses_board() && kind != CommandKind::stop) return SendResult::down;
   key_.sign(writer, now);
   const Text bytes = writer.finish();
-  if (bytes.empty()) return false;
+  if (bytes.empty()) return SendResult::down;
   const SendResult result = handler_.transmit({bytes.data(), bytes.size()}, priority);
   if (result == SendResult::busy) busy_until_ = now + busy_memory;
-  return result == SendResult::sent;
+  return result;
 }
 
 std::uint32_t Session::take_pnum(CommandKind kind) {
@@ -63,16 +63,32 @@ Ticket Session::send(const Command& command, Time timeout, Time now) {
   return ticket;
 }
 
-bool Session::post(const Command& command, Time now) {
+PostResult Session::post(const Command& command, Time now) {
   require_valid(command);
   send_queued(now);  // what was asked for earlier goes first
-  if (!in_control(now)) return false;
+  if (!in_control(now)) return PostResult::no_link;
+  if (is_held_back(command.kind)) {
+    ++collector_.counts.refused;
+    return PostResult::not_armed;
+  }
   ++collector_.counts.commands;
-  return transmit_now(command, to_ms(now), Priority::normal, now);
+  switch (transmit_now(command, to_ms(now), Priority::normal, now)) {
+    case SendResult::sent:
+      posted_.add(link_.last_pnum(), command);
+      return PostResult::sent;
+    case SendResult::full:
+      return PostResult::queue_full;
+    case SendResult::down:
+    case SendResult::busy:
+      break;
+  }
+  return PostResult::no_link;
 }
 
 Ticket Session::stop(Time timeout, Time now) {
   ++collector_.counts.commands;
+  give_up_arming();
+  disarm(DisarmCause::stop);
   Ticket ticket = 0;
   if (Pending* pending = allocate(Command::stop(), timeout, now)) {
     ticket = pending->ticket;
@@ -123,7 +139,8 @@ void Session::transmit(Pending& pending, Time now) {
 void Session::send_queued(Time now) {
   if (!in_control(now)) return;
   for (Pending& pending : pending_.under_way()) {
-    if (pending.stage == Stage::queued) transmit(pending, now);
+    if (pending.role == Pending::Role::arm) return;  // it comes first
+    if (pending.stage == Stage::queued && !is_held_back(pending.kind)) transmit(pending, now);
   }
 }
 
@@ -134,11 +151,18 @@ void Session::retry_due(Time now) {
 }
 
 void Session::finish(Pending& pending, Outcome outcome, Refusal code, Time now) {
+  if (pending.role == Pending::Role::arm_step) {
+    const CommandKind kind = pending.kind;
+    pending_.remove(pending);
+    on_arming_step(kind, outcome, code, now);
+    return;
+  }
   switch (outcome) {
     case Outcome::confirmed:
       ++collector_.counts.confirmed;
       break;
     case Outcome::refused:
+    case Outcome::not_armed:
       ++collector_.counts.refused;
       break;
     case Outcome::timed_out:
@@ -149,7 +173,8 @@ void Session::finish(Pending& pending, Outcome outcome, Refusal code, Time now) 
       break;
   }
   const Ticket ticket = pending.ticket;
-  const CommandResult result{outcome, code, now - pending.started};
+  const CommandResult result{outcome, code, now - pending.started,
+                             outcome == Outcome::not_armed ? arming_.cause() : DisarmCause::none};
   pending_.remove(pending);  // before the call: the handler may send again
   handler_.on_result(ticket, result);
 }

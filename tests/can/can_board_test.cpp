@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "host/board.hpp"
+#include "tests/support/at_will.hpp"
 #include "tests/support/every_channel.hpp"
 
 namespace r4::test {
@@ -22,7 +23,7 @@ INSTANTIATE_TEST_SUITE_P(Forms, CanBoard,
 
 TEST_P(CanBoard, EveryChannelReachesItsPinAndComesBack) {
   BoardInAThread simulated(GetParam().url);
-  Board board(simulated.url() + (GetParam().packed ? "&pack=1" : ""));
+  Board board(simulated.url() + (GetParam().packed ? "&pack=1" : ""), at_will());
   board.wait_active();
   if (GetParam().packed) board.setting("pack", "1");
   expect_every_channel(controlled(simulated, board));

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "host/async_board.hpp"
+#include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
 
 namespace r4::test {
@@ -32,7 +33,7 @@ INSTANTIATE_TEST_SUITE_P(AsyncBoard, ThrownIn,
 TEST_P(ThrownIn, LeavesTheLoopAndTheBoardGoesOn) {
   BoardInAThread simulated(transport, place == "restart" ? "0.3 reboot\n" : "");
   asio::io_context io;
-  AsyncBoard board(io, simulated.url());
+  AsyncBoard board(io, simulated.url(), at_will());
   int thrown = 0;
   const auto throw_once = [&](const auto&...) {
     if (thrown++ == 0) throw Thrown();

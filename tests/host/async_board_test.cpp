@@ -17,6 +17,7 @@
 #include <thread>
 
 #include "firmware/ports/sim/simulated_board.hpp"
+#include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
 #include "transports/memory_carrier.hpp"
 #include "transports/registry.hpp"
@@ -42,7 +43,7 @@ bool run_until(asio::io_context& io, Done done) {
 
 struct AsyncBoardTest : testing::Test {
   asio::io_context io;
-  AsyncBoard board{io, "sim:?seed=1"};
+  AsyncBoard board{io, "sim:?seed=1", at_will()};
 };
 
 TEST_F(AsyncBoardTest, SendsItsFirstHeartbeatWhenItOpens) {
@@ -53,7 +54,7 @@ TEST_F(AsyncBoardTest, SendsItsFirstHeartbeatWhenItOpens) {
     std::vector<std::string> heard;
   } listener;
   board_end->open(listener);
-  BoardOptions options;
+  BoardOptions options = at_will();
   options.session.timing.heartbeat_ms = 60'000;  // the second one is far away
   AsyncBoard over_memory(io, std::move(host_end), options);
   over_memory.open();
@@ -248,7 +249,7 @@ TEST_P(DestroyedIn, SurvivesIt) {
   asio::io_context io;
   BoardInAThread over_udp("udp");
   for (const std::string& url : {std::string("sim:"), over_udp.url()}) {
-    auto board = std::make_unique<AsyncBoard>(io, url);
+    auto board = std::make_unique<AsyncBoard>(io, url, at_will());
     int cancelled = 0;
     const auto destroy = [&](const auto&...) { board.reset(); };
     if (place == "state") board->on_state(destroy);
@@ -279,7 +280,7 @@ TEST(AsyncBoardEnd, MayComeWhileItOpens) {
   AsyncBoard closed(io, "sim:");
   closed.on_event([&](const CarrierEvent&) { closed.close(); });
   closed.open();
-  auto destroyed = std::make_unique<AsyncBoard>(io, "sim:");
+  auto destroyed = std::make_unique<AsyncBoard>(io, "sim:", at_will());
   destroyed->on_event([&](const CarrierEvent&) { destroyed.reset(); });
   destroyed->open();
   EXPECT_FALSE(destroyed);
@@ -290,7 +291,7 @@ TEST(AsyncBoardEnd, IsDestroyedBeforeOrWithoutItsLoop) {
   asio::io_context io;
   bool called = false;
   {
-    AsyncBoard board(io, "sim:");
+    AsyncBoard board(io, "sim:", at_will());
     board.open();
     board.async_send(drive, 1s, [&](const CommandResult&) { called = true; });
   }
@@ -310,7 +311,7 @@ TEST(AsyncBoardEnd, ItsHandlersDieWithTheLoop) {
   const auto payload = std::make_shared<int>(1);
   {
     asio::io_context io;
-    AsyncBoard board(io, "sim:");
+    AsyncBoard board(io, "sim:", at_will());
     board.open();
     board.async_send(drive, 1s, [payload](const CommandResult&) {});
     io.poll();
@@ -359,7 +360,7 @@ TEST_F(AsyncBoardTest, GatesItsHeartbeatsAndFeedsFromAnyThread) {
 TEST(AsyncBoardTransport, IsLostAndBackWithItsPty) {
   asio::io_context io;
   auto simulated = std::make_unique<BoardInAThread>("pty");
-  BoardOptions options;
+  BoardOptions options = at_will();
   options.session.timing.timeout_ms = 60'000;  // silence alone would not tell in time
   AsyncBoard board(io, simulated->url(), options);
   std::vector<CarrierEvent::Kind> events;

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "host/command_help.hpp"
+#include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
 #include "tests/support/every_channel.hpp"
 #include "tests/support/problems.hpp"
@@ -28,7 +29,7 @@ INSTANTIATE_TEST_SUITE_P(Transports, BoardOver, testing::Values("udp", "pty"),
 
 TEST_P(BoardOver, ConfirmsEveryCommandOnceExecuted) {
   BoardInAThread simulated(GetParam());
-  Board board(simulated.url());
+  Board board(simulated.url(), at_will());
   board.wait_active();
   board.setting("rate", "1000");
   board.fields("ALL");
@@ -61,14 +62,14 @@ TEST_P(BoardOver, ConfirmsEveryCommandOnceExecuted) {
 
 TEST_P(BoardOver, EveryChannelReachesItsPinAndComesBack) {
   BoardInAThread simulated(GetParam());
-  Board board(simulated.url());
+  Board board(simulated.url(), at_will());
   board.wait_active();
   expect_every_channel(controlled(simulated, board));
 }
 
 TEST_P(BoardOver, StopsUntilCleared) {
   BoardInAThread simulated(GetParam());
-  Board board(simulated.url());
+  Board board(simulated.url(), at_will());
   board.wait_active();
   board.osmc(1).set(1000, Direction::forward);
   board.stop();
@@ -90,7 +91,7 @@ TEST_P(BoardOver, StopsUntilCleared) {
 
 TEST_P(BoardOver, TheBoardGoesSafeWhenTheApplicationHangs) {
   BoardInAThread simulated(GetParam());
-  Board board(simulated.url());
+  Board board(simulated.url(), at_will());
   board.setting("heartbeat", "50");
   board.setting("timeout", "150");
   board.watchdog(100ms);
@@ -113,7 +114,7 @@ TEST_P(BoardOver, TheBoardGoesSafeWhenTheApplicationHangs) {
 TEST_P(BoardOver, TheBoardGoesSafeWhenTheHostIsGone) {
   BoardInAThread simulated(GetParam());
   {
-    Board board(simulated.url());
+    Board board(simulated.url(), at_will());
     board.setting("heartbeat", "50");
     board.setting("timeout", "150");
   }
@@ -122,7 +123,7 @@ TEST_P(BoardOver, TheBoardGoesSafeWhenTheHostIsGone) {
 
 TEST_P(BoardOver, FindsTheBoardAgainAfterAReboot) {
   BoardInAThread simulated(GetParam(), "0.3 reboot\n0.31 enc 1 77\n");
-  Board board(simulated.url());
+  Board board(simulated.url(), at_will());
   board.fields("ENC1");
   board.osmc(1).set(358, Direction::forward);
   std::promise<void> rebooted;
@@ -140,7 +141,7 @@ TEST_P(BoardOver, FindsTheBoardAgainAfterAReboot) {
 
 TEST(Board, TellsOfARestartBeforeTheNewState) {
   BoardInAThread simulated("pty", "0.5 reboot\n");
-  Board board(simulated.url());
+  Board board(simulated.url(), at_will());
   std::promise<ReceivedState> rebooted;
   board.on_restart([&] { rebooted.set_value(board.state()); });
   board.fields("OSMC1");
@@ -168,14 +169,14 @@ TEST(Board, SaysWhatIsWrongWithAUrl) {
 
 TEST(Board, SaysThatAPortIsInUse) {
   BoardInAThread simulated("pty");
-  Board board(simulated.url());
+  Board board(simulated.url(), at_will());
   const Problem problem = problem_of([&] { Board another(simulated.url()); });
   EXPECT_EQ(problem.kind, ErrorKind::open);
   EXPECT_FALSE(problem.fix.empty());
 }
 
 TEST(Board, SaysWhatTheLinkIsInsteadOfActive) {
-  Board board("udp://127.0.0.1:9?listen=0");
+  Board board("udp://127.0.0.1:9?listen=0", at_will());
   const Problem nobody = problem_of([&] { board.wait_active(30ms); });
   EXPECT_EQ(nobody.kind, ErrorKind::refused);
   EXPECT_EQ(nobody.thing, board.name());
@@ -192,9 +193,9 @@ TEST(Board, SaysWhatTheLinkIsInsteadOfActive) {
 
 TEST(Board, SaysThatAnotherHostControlsTheBoard) {
   BoardInAThread simulated("udp");
-  Board owner(simulated.url());
+  Board owner(simulated.url(), at_will());
   owner.wait_active();
-  Board other(simulated.url());
+  Board other(simulated.url(), at_will());
   const Problem problem = problem_of([&] { other.osmc(1).set(1, Direction::forward, 300ms); });
   EXPECT_EQ(problem.kind, ErrorKind::refused);
   EXPECT_TRUE(contains(problem.reason, "another host controls the board"));
@@ -211,7 +212,7 @@ TEST(Board, SaysThatAnotherHostControlsTheBoard) {
 
 TEST(Board, SendsNoKeyAndNoPasswordWhereOthersSeeIt) {
   BoardInAThread simulated("udp");
-  Board board(simulated.url());
+  Board board(simulated.url(), at_will());
   board.wait_active();
   const std::string secret = "1:" + std::string(2 * key_size, 'e');
   for (const Problem& problem :
@@ -225,7 +226,7 @@ TEST(Board, SendsNoKeyAndNoPasswordWhereOthersSeeIt) {
 }
 
 TEST(Board, ThrowsForEveryValueOutsideItsRange) {
-  Board board("sim:");
+  Board board("sim:", at_will());
   const auto is_usage = [](auto action) {
     const Problem problem = problem_of(action);
     EXPECT_EQ(problem.kind, ErrorKind::usage) << problem.text();
@@ -261,14 +262,14 @@ TEST(Board, ThrowsForEveryValueOutsideItsRange) {
 }
 
 TEST(Board, SaysTheRangeInTheFix) {
-  Board board("sim:");
+  Board board("sim:", at_will());
   EXPECT_EQ(problem_of([&] { board.osmc(5).set(1, Direction::forward); }).text(),
             "O:1,1,5: no such channel; use O:pwm,dir,ch with pwm 0-4095, dir 0 or 1, ch 1-4");
 }
 
 TEST(Board, PostsSetpointsWithoutWaiting) {
   BoardInAThread simulated("udp");
-  Board board(simulated.url());
+  Board board(simulated.url(), at_will());
   board.wait_active();
   for (int pwm = 1; pwm <= 100; ++pwm) {
     EXPECT_TRUE(board.post(Command::osmc(pwm, Direction::forward, 1)));
@@ -279,14 +280,14 @@ TEST(Board, PostsSetpointsWithoutWaiting) {
 
 TEST(Board, StopsWithoutWaiting) {
   BoardInAThread simulated("udp");
-  Board board(simulated.url());
+  Board board(simulated.url(), at_will());
   board.wait_active();
   board.stop_async();
   EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::stop));
 }
 
 TEST(Board, TellsWhoItIs) {
-  Board board("sim:?node=3");
+  Board board("sim:?node=3", at_will());
   const BoardIdentity identity = board.identify();
   EXPECT_EQ(identity.board_id, "sim-3");
   EXPECT_EQ(identity.firmware, "0.1.0");
@@ -294,7 +295,7 @@ TEST(Board, TellsWhoItIs) {
 }
 
 TEST(Board, MeasuresTheLink) {
-  Board board("sim:");
+  Board board("sim:", at_will());
   board.wait_active();
   board.identify();
   for (int i = 0; i < 20; ++i) board.next_state();
@@ -312,7 +313,7 @@ TEST(Board, MeasuresTheLink) {
 
 TEST(Board, TakesCommandsFromSeveralThreadsAtOnce) {
   BoardInAThread simulated("udp");
-  Board board(simulated.url());
+  Board board(simulated.url(), at_will());
   board.setting("rate", "1000");
   std::atomic<int> confirmed{0};
   std::vector<std::thread> threads;
@@ -336,7 +337,7 @@ TEST(Board, TakesCommandsFromSeveralThreadsAtOnce) {
 }
 
 TEST(Board, LetsAStopCancelWhatOtherThreadsWaitFor) {
-  Board board("udp://127.0.0.1:9?listen=0");
+  Board board("udp://127.0.0.1:9?listen=0", at_will());
   auto waiting = std::async(std::launch::async, [&] {
     return problem_of([&] { board.osmc(1).set(1, Direction::forward, 20s); });
   });
@@ -347,7 +348,7 @@ TEST(Board, LetsAStopCancelWhatOtherThreadsWaitFor) {
 // --- callbacks
 
 TEST(Board, CallsBackWithStatesAndLinkChanges) {
-  Board board("sim:");
+  Board board("sim:", at_will());
   std::promise<std::thread::id> caller;
   std::atomic<int> states{0};
   std::atomic<bool> active{false};
@@ -366,7 +367,7 @@ TEST(Board, CallsBackWithStatesAndLinkChanges) {
 }
 
 TEST(Board, RefusesToWaitInACallback) {
-  Board board("sim:");
+  Board board("sim:", at_will());
   std::promise<std::vector<Problem>> told;
   board.on_state([&, done = false](const State&) mutable {
     if (done) return;
@@ -393,7 +394,7 @@ TEST(Board, RefusesToWaitInACallback) {
 }
 
 TEST(Board, LetsACallbackReplaceItself) {
-  Board board("sim:");
+  Board board("sim:", at_will());
   std::promise<int> told;
   const auto payload = std::make_shared<int>(42);
   board.on_state([&, payload](const State&) {
@@ -408,7 +409,7 @@ TEST(Board, LetsACallbackReplaceItself) {
 // --- the end
 
 TEST(Board, ClosesTwiceAndThenRefusesEverything) {
-  Board board("sim:");
+  Board board("sim:", at_will());
   board.wait_active();
   board.close();
   board.close();
@@ -425,7 +426,7 @@ TEST(Board, ClosesTwiceAndThenRefusesEverything) {
 }
 
 TEST(Board, CloseWakesAllWhoWait) {
-  Board board("udp://127.0.0.1:9?listen=0");
+  Board board("udp://127.0.0.1:9?listen=0", at_will());
   const auto reason_of = [](auto action) {
     return std::async(std::launch::async, [action] { return problem_of(action).reason; });
   };
@@ -443,7 +444,7 @@ TEST(Board, CloseWakesAllWhoWait) {
 }
 
 TEST(Board, IsDestroyedWhileOthersWait) {
-  auto board = std::make_unique<Board>("udp://127.0.0.1:9?listen=0");
+  auto board = std::make_unique<Board>("udp://127.0.0.1:9?listen=0", at_will());
   std::vector<std::future<std::string>> waiting;
   std::atomic<int> begun{0};
   for (int i = 0; i < 4; ++i) {
@@ -469,7 +470,7 @@ TEST(Board, IsDestroyedWhileOthersWait) {
 }
 
 TEST(Board, ClosesInACallback) {
-  Board board("sim:");
+  Board board("sim:", at_will());
   std::promise<void> closed;
   board.on_state([&, first = true](const State&) mutable {
     EXPECT_TRUE(first) << "no callback after close()";
@@ -482,7 +483,7 @@ TEST(Board, ClosesInACallback) {
 }
 
 TEST(Board, IsDestroyedInACallback) {
-  auto board = std::make_unique<Board>("sim:");
+  auto board = std::make_unique<Board>("sim:", at_will());
   std::promise<void> destroyed;
   // Goes with the board's thread, which must end too.
   struct AtThreadExit {
@@ -501,7 +502,7 @@ TEST(Board, IsDestroyedInACallback) {
 
 TEST(Board, OpensAndClosesAtAnyMoment) {
   for (int i = 0; i < 30; ++i) {
-    Board board("sim:");
+    Board board("sim:", at_will());
     if (i % 3 == 1) board.stop_async();
     if (i % 3 == 2) board.wait_active();
   }

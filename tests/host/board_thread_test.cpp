@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "host/board.hpp"
+#include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
 #include "tests/support/problems.hpp"
 
@@ -49,7 +50,7 @@ struct BoardThread : testing::Test {
     return std::find(all.begin(), all.end(), command) != all.end();
   }
   BoardInAThread simulated{"udp"};
-  Board board{simulated.url()};
+  Board board{simulated.url(), at_will()};
 };
 
 TEST_F(BoardThread, NeverSendsACommandWhoseCallHasThrown) {

@@ -14,6 +14,7 @@ ScriptedLink::ScriptedLink(SessionOptions options)
 SessionOptions ScriptedLink::without_questions() {
   SessionOptions options;
   options.identify_interval = std::chrono::milliseconds{0};
+  options.arming = Arming::off;
   return options;
 }
 

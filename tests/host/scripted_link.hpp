@@ -25,7 +25,8 @@ class ScriptedLink final : private Session::Handler {
   };
 
   explicit ScriptedLink(SessionOptions options = without_questions());
-  // Options with which the session sends nothing by itself but heartbeats and its choice of fields.
+  // Options with which the session sends nothing by itself but heartbeats and its choice of fields,
+  // and sends what it is given without being armed.
   static SessionOptions without_questions();
 
   Session session;
@@ -37,6 +38,8 @@ class ScriptedLink final : private Session::Handler {
   std::vector<LinkStatus> links;
   std::vector<ReceivedState> states;
   int restarts = 0;
+  std::vector<DisarmCause> arming;
+  std::vector<RefusedPost> refused;
   std::vector<ReadError> bad;
   std::vector<Nack> nacks;
   std::string board_id;
@@ -76,6 +79,8 @@ class ScriptedLink final : private Session::Handler {
   SendResult transmit(std::string_view datagram, Priority priority) override;
   void on_state(const ReceivedState& state, const Datagram&) override { states.push_back(state); }
   void on_restart() override { ++restarts; }
+  void on_arming(DisarmCause cause) override { arming.push_back(cause); }
+  void on_refused(const RefusedPost& post) override { refused.push_back(post); }
   void on_board_heartbeat(const Datagram&) override {}
   void on_identity(const Identity& identity) override;
   void on_nack(const Nack& nack, const Datagram&) override { nacks.push_back(nack); }

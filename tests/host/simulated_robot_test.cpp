@@ -38,7 +38,7 @@ SimulatedRobot::Look await(Board& board, const SimulatedRobot& robot,
 
 void drive(Board& board) {
   board.wait_active();
-  board.relay(1).set(true);
+  board.arm();
   board.osmc(1).set(4095, Direction::forward);
 }
 

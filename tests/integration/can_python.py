@@ -317,7 +317,7 @@ class Board(Peer):
             self._send_heartbeat()
         if self.state == 'ACTIVE' and now >= self.next_state:
             self.next_state = now + STATE_PERIOD_S
-            values = {'AIN24': '24.10', 'OSMC1': self.osmc if not self.safe else '0,0', 'SAFE': self.safe,
+            values = {'AIN24': '24.10', 'OSMC1': self.osmc if not self.safe else '0,0', 'RELAYS': 0, 'SAFE': self.safe,
                       'CMD': self.last_command}
             names = self.fields or ['AIN24', 'OSMC1']
             if self.safe and 'SAFE' not in names:

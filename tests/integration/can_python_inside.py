@@ -167,7 +167,7 @@ def test_send_is_confirmed_by_a_python_board(options):
         url = HOST_URL + ('&fd=1' if 'fd' in options else '') + ('&pack=1' if 'packs' in options else '')
         result = run('send', url, 'O:358,1,1', 'Q:ID', timeout=60)
     assert result.returncode == 0 and 'second' in result.stdout, result
-    assert board.executed == ['F:DEFAULT,SAFE,CMD', 'O:358,1,1']
+    assert board.executed == ['F:DEFAULT,RELAYS,SAFE,CMD', 'O:358,1,1']
 
 
 def test_send_tells_of_a_refusal_of_a_python_board():

@@ -26,6 +26,7 @@ struct World::Host final : Session::Handler {
     const auto first =
         echo_host_first_pnum + static_cast<std::uint32_t>(world.random_.below(1U << 30));
     SessionOptions options;
+    options.arming = Arming::off;  // so that more is sent that must not be executed
     if (world.schedule_.attack_interval_us != 0) {
       options.key = key_of_host(index);
       options.clock_start = std::chrono::hours{24} - Time{clock_offset_us};

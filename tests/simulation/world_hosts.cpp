@@ -35,6 +35,7 @@ void World::Host::on_result(Ticket ticket, const CommandResult& result) {
       break;
     case Outcome::cancelled:
     case Outcome::full:
+    case Outcome::not_armed:
       break;
   }
 }

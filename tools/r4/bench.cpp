@@ -61,6 +61,7 @@ class Durations {
 
 BoardOptions board_options(const std::string& key) {
   BoardOptions options = with_key(key);
+  options.session.arming = Arming::off;                 // it drives nothing
   options.session.identify_interval = Milliseconds(0);  // the questions are ours
   return options;
 }

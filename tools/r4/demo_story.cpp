@@ -38,10 +38,17 @@ double milliseconds_of(const CommandResult& result) {
   return std::chrono::duration<double, std::milli>(result.elapsed).count();
 }
 
+// The story is of the link alone.
+BoardOptions without_arming() {
+  BoardOptions options;
+  options.session.arming = Arming::off;
+  return options;
+}
+
 }  // namespace
 
 Story::Story(asio::io_context& io, const std::string& url, const BoardLog* log, Teller teller)
-    : io_(io), log_(log), teller_(std::move(teller)), board_(io, url) {
+    : io_(io), log_(log), teller_(std::move(teller)), board_(io, url, without_arming()) {
   result_.transport = url;
   board_.on_state([this](const State& state, const Datagram& datagram) {
     state_ = state;

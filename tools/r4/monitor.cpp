@@ -77,6 +77,7 @@ class Monitor {
  private:
   static BoardOptions board_options(const Options& options) {
     BoardOptions board_options = with_key(options.key);
+    board_options.session.arming = Arming::off;  // it drives nothing
     if (!options.fields.empty()) board_options.session.fields = options.fields;
     return board_options;
   }

@@ -2,6 +2,7 @@
 // r4 send: commands in order, each confirmed by the board's own state before the next.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <asio/io_context.hpp>
 #include <asio/steady_timer.hpp>
 #include <chrono>
@@ -44,12 +45,37 @@ Command command_of(const std::string& text, const std::string& url) {
   return command;
 }
 
+// Does it turn a motor, which needs the motor supply?
+bool turns_a_motor(const Command& command) {
+  switch (command.kind) {
+    case CommandKind::osmc:
+    case CommandKind::dhb12:
+    case CommandKind::bldc:
+      return command.value != 0;
+    case CommandKind::stepper:
+      return true;
+    default:
+      return false;
+  }
+}
+
+// What a person types is deliberate: it is sent without being armed. Where a motor is to turn, the
+// board is to tell whether relay 1 is closed.
+BoardOptions board_options(const Options& options, const std::vector<Command>& commands) {
+  BoardOptions board_options = with_key(options.key);
+  board_options.session.arming = Arming::off;
+  if (std::any_of(commands.begin(), commands.end(), turns_a_motor)) {
+    board_options.session.fields = "DEFAULT,RELAYS";
+  }
+  return board_options;
+}
+
 class Sender {
  public:
   Sender(const Options& options, const std::vector<Command>& commands)
       : options_(options),
         commands_(commands),
-        board_(io_, options.url, with_key(options.key)),
+        board_(io_, options.url, board_options(options, commands)),
         hold_(io_) {}
 
   int run() {
@@ -102,8 +128,22 @@ class Sender {
       return;
     }
     std::fflush(stdout);
+    if (supply_is_missing() && !options_.json) {
+      fmt::print(
+          stderr,
+          "r4: {}: the motor supply is open (relay 1 is off), so no motor turns; send R:1,On "
+          "before it\n",
+          text);
+    }
     ++next_;
     send_next();
+  }
+
+  // Was the command to turn a motor that has no supply?
+  bool supply_is_missing() const {
+    const State& state = board_.state();
+    return turns_a_motor(commands_[next_]) && state.present.has(StateField::relays) &&
+           (state.relays & 1) == 0;
   }
 
   void print_identity() const {
@@ -127,6 +167,9 @@ class Sender {
       object["code"] = std::string_view(name.data(), name.size());
     }
     if (!confirmed) object["reason"] = problem.reason;
+    if (confirmed && turns_a_motor(commands_[next_])) {
+      object["motor_supply"] = supply_is_missing() ? "open" : "closed";
+    }
     if (confirmed && text == "Q:ID") {
       const BoardIdentity& id = board_.identity();
       object["board_id"] = id.board_id;
@@ -158,7 +201,8 @@ constexpr const char* footer =
     R"(Each command is sent when the board's own state has confirmed the one before it; the first that is not
 confirmed ends the run. All are checked before the first is sent.
 
-The board goes safe, its outputs off, one second after this program ends: --hold keeps them on.
+The board goes safe, its outputs off, one second after this program ends: --hold keeps them on. No motor turns
+while relay 1, the motor supply, is open: it is at first and after each safe state, and R:1,On closes it.
 
 Examples:
   r4 send udp://192.168.0.125 R:1,On O:358,1,1 --hold 5      R:1,On: the motors have supply

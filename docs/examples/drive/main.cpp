@@ -49,9 +49,9 @@ void drive(r4::Board& board) {
   // From here on this program must show that it is alive. If it hangs for 300 ms, the heartbeats
   // stop and the board switches its outputs off.
   board.watchdog(300ms);
-  // The motors have supply now. Until here, and after each safe state, relay 1 is open, and nothing
-  // turns whatever is commanded.
-  board.relay(1).set(true, 250ms);
+  // Closes relay 1: the motors have supply now. Until here, and after whatever has made the outputs
+  // safe, it is open, and commands that drive an output are refused.
+  board.arm(250ms);
   board.feed();
   for (const int pwm : {0, 500, 1000, 1500, 1000, 500, 0}) {
     board.osmc(1).set(pwm, r4::Direction::forward, 250ms);  // the board's state has confirmed it

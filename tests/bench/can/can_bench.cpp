@@ -33,6 +33,7 @@
 #include "can_processes.hpp"
 #include "host/async_board.hpp"
 #include "protocol/datagram_writer.hpp"
+#include "tests/support/at_will.hpp"
 #include "transports/framing/packed_form.hpp"
 #include "transports/registry.hpp"
 
@@ -107,7 +108,7 @@ std::string make_command() {
 // Commands one after the other; each is sent when the state that confirms the one before has come.
 class Host {
  public:
-  explicit Host(const std::string& url) : board_(io_, url) { board_.open(); }
+  explicit Host(const std::string& url) : board_(io_, url, test::at_will()) { board_.open(); }
 
   void await_control() {
     run_until(io_, [this] { return board_.in_control(); });

@@ -20,6 +20,7 @@
 #include "host/async_board.hpp"
 #include "host/board.hpp"
 #include "tests/bench/allocations.hpp"
+#include "tests/support/at_will.hpp"
 #include "transports/error.hpp"
 #include "transports/operation_slot.hpp"
 
@@ -48,7 +49,7 @@ Percentiles percentiles(std::vector<double>& seconds) {
 
 // A board with its loop, in this thread.
 struct AsyncHost {
-  explicit AsyncHost(const std::string& url) : board(io, url) {
+  explicit AsyncHost(const std::string& url) : board(io, url, test::at_will()) {
     board.open();
     run_until([this] { return board.in_control(); });
   }
@@ -123,7 +124,7 @@ void compare_round_trips(Wire wire, int count, bool judged) {
   }
   host.board.close();
   {
-    Board board(board_for_blocking.url());
+    Board board(board_for_blocking.url(), test::at_will());
     board.wait_active();
     for (int i = 0; i < count; ++i) {
       const auto start = Clock::now();
@@ -238,7 +239,7 @@ void count_allocations(Wire wire) {
     });
   }
   BoardProcess other(wire, false);
-  Board board(other.url());
+  Board board(other.url(), test::at_will());
   board.wait_active();
   for (int i = 0; i < 300; ++i) {  // also the deques of the loop have their size now
     board.post(Command::osmc(i, Direction::forward, 1));

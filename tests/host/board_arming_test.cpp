@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A program that streams setpoints to a simulated board in real time: nothing drives off by itself.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <future>
+#include <thread>
+
+#include "host/board.hpp"
+#include "tests/support/at_will.hpp"
+#include "tests/support/board_in_a_thread.hpp"
+#include "transports/error.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+using firmware::BoardState;
+
+// Posts a setpoint every 2 ms, as a teleoperation does, until the end of the test.
+class Stream {
+ public:
+  explicit Stream(Board& board)
+      : thread_([this, &board] {
+          while (!ended_) {
+            last_ = board.post(Command::osmc(500, Direction::forward, 1)).value();
+            ++turns_;
+            std::this_thread::sleep_for(2ms);
+          }
+        }) {}
+  ~Stream() {
+    ended_ = true;
+    thread_.join();
+  }
+  // What became of the last, after another hundred.
+  PostResult::Value later() {
+    for (const int turns = turns_ + 100; turns_ < turns;) std::this_thread::yield();
+    return last_;
+  }
+
+ private:
+  std::atomic<bool> ended_{false};
+  std::atomic<int> turns_{0};
+  std::atomic<PostResult::Value> last_{PostResult::no_link};
+  std::thread thread_;
+};
+
+int driven(Board& board) { return board.next_state().osmc[0].pwm; }
+
+TEST(BoardArming, AStreamDoesNotDriveOffAfterAStopThatSomebodyElseClears) {
+  BoardInAThread simulated("udp");
+  Board board(simulated.url());
+  board.wait_active();
+  Stream stream(board);
+  EXPECT_EQ(stream.later(), PostResult::not_armed);
+  EXPECT_EQ(driven(board), 0);
+  board.arm();
+  EXPECT_EQ(stream.later(), PostResult::sent);
+  EXPECT_EQ(driven(board), 500);
+  Board(simulated.url()).stop();
+  ASSERT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::stop));
+  board.clear();
+  board.wait_active();
+  EXPECT_EQ(stream.later(), PostResult::not_armed);
+  EXPECT_EQ(board.disarmed_by(), DisarmCause::stop);
+  EXPECT_EQ(driven(board), 0);
+  board.arm();
+  EXPECT_EQ(stream.later(), PostResult::sent);
+  EXPECT_EQ(driven(board), 500);
+}
+
+TEST(BoardArming, AStreamDoesNotDriveOffWhenTheHandleIsHeldAgain) {
+  BoardInAThread simulated("pty", "0.6 handle released\n0.8 handle held\n");
+  Board board(simulated.url());
+  board.wait_active();
+  board.arm();
+  Stream stream(board);
+  ASSERT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::handle));
+  ASSERT_TRUE(simulated.wait_for(BoardState::active));
+  EXPECT_EQ(stream.later(), PostResult::not_armed);
+  EXPECT_EQ(board.disarmed_by(), DisarmCause::handle);
+  EXPECT_EQ(driven(board), 0);
+}
+
+TEST(BoardArming, AStreamDoesNotDriveOffAfterAReboot) {
+  BoardInAThread simulated("pty", "0.6 reboot\n");
+  Board board(simulated.url());
+  std::promise<void> restarted;
+  board.on_restart([&] { restarted.set_value(); });
+  board.wait_active();
+  board.arm();
+  Stream stream(board);
+  ASSERT_EQ(restarted.get_future().wait_for(5s), std::future_status::ready);
+  board.wait_active();
+  EXPECT_EQ(stream.later(), PostResult::not_armed);
+  EXPECT_EQ(board.disarmed_by(), DisarmCause::restart);
+  EXPECT_EQ(driven(board), 0);
+}
+
+TEST(BoardArming, SaysWhatStandsAgainstIt) {
+  BoardInAThread simulated("pty", "0 handle released\n");
+  Board board(simulated.url());
+  try {
+    board.arm();
+    ADD_FAILURE() << "it is armed";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.problem().kind, ErrorKind::refused);
+    EXPECT_EQ(error.problem().thing, "arm()");
+    EXPECT_EQ(error.problem().reason, "not armed: the dead-man's handle was released");
+    EXPECT_EQ(error.problem().fix, "hold the handle, then call arm()");
+  }
+  try {
+    board.osmc(1).set(1, Direction::forward);
+    ADD_FAILURE() << "it drives";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.problem().reason, "not armed: the dead-man's handle was released");
+  }
+}
+
+TEST(BoardArming, ArmsABoardThatIsStopped) {
+  Board board("sim:");
+  board.wait_active();
+  board.stop();
+  board.arm();
+  EXPECT_EQ(board.next_state().relays & 1, 1);
+  board.osmc(1).set(358, Direction::forward);
+}
+
+TEST(BoardArming, CountsThePostsThatAreRefusedAndTellsOfThoseThatTheBoardRefuses) {
+  BoardInAThread simulated("pty");
+  Board guarded(simulated.url(), at_will());
+  std::promise<RefusedPost> told;
+  guarded.on_refused([&, done = false](const RefusedPost& post) mutable {
+    if (!std::exchange(done, true)) told.set_value(post);
+  });
+  guarded.wait_active();
+  guarded.stop();
+  ASSERT_TRUE(guarded.post(Command::osmc(5, Direction::forward, 1)));
+  auto refused = told.get_future();
+  ASSERT_EQ(refused.wait_for(5s), std::future_status::ready);
+  const RefusedPost post = refused.get();
+  EXPECT_EQ(post.command.value, 5);
+  EXPECT_EQ(post.code, Refusal::safe);
+  EXPECT_EQ(guarded.statistics().refused, 1U);
+
+  Board board("sim:");
+  board.wait_active();
+  EXPECT_EQ(board.post(Command::osmc(5, Direction::forward, 1)), PostResult::not_armed);
+  EXPECT_EQ(board.statistics().refused, 1U);
+}
+
+}  // namespace
+}  // namespace r4::test
