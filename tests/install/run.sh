@@ -1,8 +1,9 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
 # The installed library is enough for a program outside the tree. Usage: run.sh SOURCE BUILD
-# Installs BUILD into a new prefix, copies docs/examples/drive elsewhere, builds it with
-# find_package and with pkg-config, runs both, and compiles every installed header.
+# Installs BUILD into a new prefix, copies docs/examples elsewhere, builds drive with find_package and
+# with pkg-config and teleop with find_package, runs them, and what the documentation shows, and
+# compiles every installed header.
 set -euo pipefail
 
 source_tree=$(realpath "$1")
@@ -16,7 +17,7 @@ cmake --install "$build_tree" --prefix "$prefix" >"$work/install.log" 2>&1 || {
   tail -n 5 "$work/install.log"
   exit 1
 }
-cp -r "$source_tree/docs/examples/drive" "$work/drive"
+cp -r "$source_tree/docs/examples/drive" "$source_tree/docs/examples/teleop" "$work"
 cd "$work/drive"
 
 # check NAME COMMAND...: the program must end well and say what the README promises.
@@ -45,6 +46,13 @@ cmake --build build >>"$work/cmake.log" || {
   exit 1
 }
 check find_package build/drive
+
+cmake -S ../teleop -B ../teleop/build -DCMAKE_CXX_COMPILER="$cxx" -DCMAKE_PREFIX_PATH="$prefix" >"$work/cmake.log"
+cmake --build ../teleop/build >>"$work/cmake.log" || {
+  cat "$work/cmake.log"
+  exit 1
+}
+R4=$build_tree/r4 /usr/bin/python3 "$source_tree/tests/install/teleop.py" ../teleop/build/teleop
 
 PKG_CONFIG_PATH=$(dirname "$(find "$prefix" -name r4link.pc)")
 export PKG_CONFIG_PATH

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Keys as they are pressed, without the Enter key.
+#pragma once
+
+#include <termios.h>
+
+#include <chrono>
+#include <optional>
+
+class Keyboard {
+ public:
+  // Switches the terminal on standard input to single keys; a pipe or a file is read as it is.
+  Keyboard();
+  // Leaves the terminal as it was.
+  ~Keyboard();
+  Keyboard(const Keyboard&) = delete;
+  Keyboard& operator=(const Keyboard&) = delete;
+
+  // The newest key, waiting at most that long for one; no key, or nobody there any more: at_end().
+  std::optional<char> key(std::chrono::milliseconds at_most);
+  bool at_end() const { return at_end_; }
+
+ private:
+  std::optional<termios> before_;
+  bool at_end_ = false;
+};

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Drives a robot with two motors (OSMC 1 left, 2 right) by hand, streaming setpoints.
+//
+//     teleop [URL]       sim: without a URL; udp://192.168.0.125, serial:auto …
+//
+//     e       arm: the motors get their supply; nothing moves yet
+//     w s     forward, backward      a d     turn left, right        as long as the key is held
+//     space   emergency stop         q       stop and end            any other key: stand still
+//
+// Whatever makes the board safe needs another e. Exit code: 0 done, 2 usage, 3 refused, timed out or
+// the stop was not confirmed (then cut the power), 4 no such transport, 5 permission, 6 not supported.
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <r4link/host/board.hpp>
+#include <r4link/host/explain.hpp>
+#include <r4link/transports/error.hpp>
+
+#include "keyboard.hpp"
+
+using namespace std::chrono_literals;
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int speed = 600;  // of 4095
+constexpr auto period = 20ms;
+// A key that is held is repeated by the terminal, the first time after about half a second.
+constexpr auto hold = 700ms;
+// This program hangs for so long: its heartbeats stop, and the board switches off.
+constexpr auto watchdog = 500ms;
+constexpr auto patience = 300ms;  // with the board, within the watchdog's time
+
+volatile std::sig_atomic_t ended = 0;
+
+struct Setpoint {
+  int left = 0;
+  int right = 0;
+};
+
+// What the hand on the keys asks for; nothing once it has let go of them.
+class Hand {
+ public:
+  void press(char key, Clock::time_point now) {
+    until_ = now + hold;
+    switch (key) {
+      case 'w':
+        wanted_ = {speed, speed};
+        break;
+      case 's':
+        wanted_ = {-speed, -speed};
+        break;
+      case 'a':
+        wanted_ = {-speed, speed};
+        break;
+      case 'd':
+        wanted_ = {speed, -speed};
+        break;
+      default:
+        wanted_ = {};
+    }
+  }
+  void let_go() { wanted_ = {}; }
+  Setpoint setpoint(Clock::time_point now) const { return now < until_ ? wanted_ : Setpoint{}; }
+
+ private:
+  Setpoint wanted_;
+  Clock::time_point until_;
+};
+
+r4::Command motor(int channel, int pwm) {
+  const auto direction = pwm < 0 ? r4::Direction::reverse : r4::Direction::forward;
+  return r4::Command::osmc(std::abs(pwm), direction, channel);
+}
+
+// Sends the newest setpoint once. One that cannot be sent is dropped, not kept: the next, 20 ms later,
+// is newer.
+r4::PostResult post(r4::Board& board, const Setpoint& setpoint) {
+  const r4::PostResult left = board.post(motor(1, setpoint.left));
+  return left ? board.post(motor(2, setpoint.right)) : left;
+}
+
+void say_why(r4::Board& board, r4::PostResult result) {
+  if (result == r4::PostResult::sent) {
+    std::printf("armed: w a s d drive, space stops\n");
+  } else if (result == r4::PostResult::not_armed) {
+    std::printf("not armed (%s): press e\n", r4::to_text(board.disarmed_by()));
+  } else {
+    std::printf("not sent: %s\n", r4::to_text(result));
+  }
+}
+
+void arm(r4::Board& board) {
+  try {
+    board.arm(patience);
+  } catch (const r4::Error& error) {  // the handle is released, something is in the way …
+    std::printf("%s\n", error.what());
+  }
+}
+
+void stop(r4::Board& board) {
+  board.stop(patience);  // throws if the board does not confirm it
+  std::printf("stopped\n");
+}
+
+void teleoperate(r4::Board& board, Keyboard& keyboard) {
+  // Called on the board's own thread: it must be quick and must not wait for the board.
+  board.on_refused([](const r4::RefusedPost& refused) {
+    std::printf("refused by the board or on the way: OSMC %d\n", refused.command.channel);
+  });
+  board.wait_active();
+  // After a lost link nothing comes back by itself: who holds the keys may not see the robot.
+  board.setting("recovery", "rearm");
+  board.watchdog(watchdog);
+  std::printf("e arms, q ends\n");
+
+  Hand hand;
+  bool told = false;
+  r4::PostResult last = r4::PostResult::sent;
+  auto cause = r4::DisarmCause::none;
+  while (ended == 0 && !keyboard.at_end()) {
+    const std::optional<char> key = keyboard.key(period);
+    board.feed();
+    if (key == 'q') break;
+    if (key == ' ') stop(board);
+    if (key == 'e') arm(board);
+    if (key) hand.press(*key, Clock::now());
+
+    const r4::PostResult result = post(board, hand.setpoint(Clock::now()));
+    if (!result) hand.let_go();  // so that arming moves nothing
+    if (!told || result != last || board.disarmed_by() != cause) {
+      say_why(board, result);
+      told = true;
+      last = result;
+      cause = board.disarmed_by();
+    }
+  }
+  stop(board);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, [](int) { ended = 1; });
+  try {
+    Keyboard keyboard;
+    r4::Board board(argc > 1 ? argv[1] : "sim:");
+    teleoperate(board, keyboard);
+  } catch (const r4::Error& error) {  // the thing, the reason and the fix
+    std::fprintf(stderr, "teleop: %s\n", error.what());
+    return static_cast<int>(error.kind());
+  }
+}
