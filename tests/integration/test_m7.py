@@ -12,7 +12,7 @@ import socket
 import pytest
 
 from m7_board import M7, M7Board, Relay, Watcher, m7
-from r4_process import PATIENCE_S, SANITIZED, Running, is_link, is_state, monitor, objects, run
+from r4_process import PATIENCE_S, SANITIZED, driving, is_link, is_state, monitor, objects, run
 
 SAFE_WITHIN_MS = 1020
 
@@ -72,8 +72,7 @@ def test_every_kind_of_command_is_executed(url):
 
 
 def test_what_is_set_is_in_the_state_until_the_board_is_stopped(urls):
-    with Running('send', urls.serial, 'O:358,1,1', 'S:1500,1', '--hold', '60', '--json') as host:
-        host.next(lambda each: each['confirmed'] and each['command'].startswith('S'))
+    with driving(urls.serial, 'O:358,1,1', 'S:1500,1') as host:
         # A host that does not control the board watches what it tells everyone.
         with Watcher(urls.udp) as watcher:
             state = watcher.next(lambda fields: fields.get('OSMC1') == '358,1')
@@ -112,8 +111,7 @@ def test_a_key_given_over_the_uart_is_asked_for_over_udp(urls, tmp_path):
 
 def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(urls):
     with Relay(urls.udp) as relay:
-        with Running('send', relay.url, 'O:358,1,1', '--hold', '60', '--json') as host:
-            host.next(lambda each: each['confirmed'])
+        with driving(relay.url, 'O:358,1,1') as host:
             relay.safe = None
             relay.went_safe.clear()
             host.signal(signal.SIGKILL)
@@ -130,8 +128,7 @@ def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(u
 
 
 def test_a_hung_host_loses_the_outputs_and_gets_them_back_when_it_wakes(urls):
-    with Running('send', urls.serial, 'O:358,1,1', '--hold', '60', '--json') as host:
-        host.next(lambda each: each['confirmed'])
+    with driving(urls.serial, 'O:358,1,1') as host:
         with Watcher(urls.udp) as watcher:
             watcher.next(lambda fields: fields.get('OSMC1') == '358,1')
             host.signal(signal.SIGSTOP)

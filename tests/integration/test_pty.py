@@ -11,7 +11,7 @@ import tty
 
 import pytest
 
-from r4_process import R4, SANITIZED, Board, Running, is_link, is_state, monitor, run
+from r4_process import R4, SANITIZED, Board, driving, is_link, is_state, monitor, run
 
 SAFE_WITHIN_MS = 1020
 
@@ -73,8 +73,7 @@ def test_a_second_program_is_told_that_the_port_is_in_use(board):
 
 
 def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(board):
-    with Running('send', board.host_url, 'O:358,1,1', '--hold', '60', '--json') as host:
-        host.next(lambda each: each['confirmed'])
+    with driving(board.host_url, 'O:358,1,1') as host:
         board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
         killed = host.signal(signal.SIGKILL)
         board.outputs(lambda outputs: outputs['osmc'][0] == [0, 0])
@@ -85,8 +84,7 @@ def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(b
 
 
 def test_the_board_is_safe_within_its_timeout_of_a_hung_hosts_last_heartbeat(board):
-    with Running('send', board.host_url, 'O:358,1,1', '--hold', '60', '--json') as host:
-        host.next(lambda each: each['confirmed'])
+    with driving(board.host_url, 'O:358,1,1') as host:
         host.signal(signal.SIGSTOP)
         safe = board.state('SAFE', 'link')
         print(f"safe {safe['silence']} ms after the last heartbeat")
@@ -113,16 +111,14 @@ def test_a_session_goes_on_when_the_board_is_plugged_in_again(board, path):
 
 def test_a_board_goes_on_when_the_host_comes_back(board):
     for _ in range(3):
-        with Running('send', board.host_url, 'O:358,1,1', '--hold', '60', '--json') as host:
-            host.next(lambda each: each['confirmed'])
+        with driving(board.host_url, 'O:358,1,1') as host:
             board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
             host.signal(signal.SIGKILL)
             board.state('SAFE', 'link')
 
 
 def test_a_new_host_begins_with_the_outputs_off(board):
-    with Running('send', board.host_url, 'O:358,1,1', '--hold', '60', '--json') as host:
-        host.next(lambda each: each['confirmed'])
+    with driving(board.host_url, 'O:358,1,1') as host:
         host.signal(signal.SIGKILL)
     board.state('SAFE', 'link')
     with monitor(board.host_url) as host:

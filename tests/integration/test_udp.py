@@ -7,7 +7,7 @@ import zlib
 
 import pytest
 
-from r4_process import (PATIENCE_S, SANITIZED, Board, Running, is_link, is_state, monitor, objects, run)
+from r4_process import (PATIENCE_S, SANITIZED, Board, driving, is_link, is_state, monitor, objects, run)
 
 # The board's timeout, and what docs/safety.md promises on top.
 SAFE_WITHIN_MS = 1020
@@ -86,8 +86,7 @@ def test_a_stop_switches_every_output_off_and_nothing_comes_back(board):
 
 
 def test_a_stop_during_a_drive_switches_it_off(board):
-    with Running('send', board.host_url, 'O:358,1,1', '--hold', '20', '--json') as host:
-        host.next(lambda each: each['confirmed'])
+    with driving(board.host_url, 'O:358,1,1') as host:
         board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
         assert run('stop', board.host_url).returncode == 0
         board.outputs(lambda outputs: outputs['osmc'][0] == [0, 0])
@@ -109,8 +108,7 @@ def test_a_second_host_is_told_that_the_board_is_busy_and_may_still_stop_it(boar
 
 
 def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(board):
-    with Running('send', board.host_url, 'O:358,1,1', '--hold', '60', '--json') as host:
-        host.next(lambda each: each['confirmed'])
+    with driving(board.host_url, 'O:358,1,1') as host:
         board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
         killed = host.signal(signal.SIGKILL)
         off = board.outputs(lambda outputs: outputs['osmc'][0] == [0, 0])
