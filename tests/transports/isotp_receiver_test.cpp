@@ -248,6 +248,23 @@ TEST(IsotpReceiver, AnyOtherSequenceNumberEndsTheTransfer) {
   }
 }
 
+// The end of one transfer and the beginning of the next are lost: the numbers fit again, but for the
+// short frame between, which has no number that fits.
+TEST(IsotpReceiver, AShortFrameOfAnotherNumberEndsTheTransferToo) {
+  Receiver receiver(listening());
+  receiver.take("10 19 61 61 61 61 61 61");
+  receiver.take("21 61 61 61 61 61 61 61");
+  EXPECT_EQ(receiver.take("23 61 61 61 61 61"), IsotpError::wrong_sequence_number);
+  EXPECT_EQ(receiver.take("22 62 62 62 62 62 62 62"), IsotpError::unexpected_frame);
+  EXPECT_EQ(receiver.take("23 62 62 62 62 62"), IsotpError::unexpected_frame);
+  EXPECT_TRUE(receiver.datagrams.empty());
+
+  receiver.take("10 19 61 61 61 61 61 61");
+  EXPECT_EQ(receiver.take("22 " + counting(11)), IsotpError::wrong_sequence_number) << "or longer";
+  EXPECT_FALSE(receiver.isotp.busy());
+  expect_counters_add_up(receiver.isotp);
+}
+
 // 9.8.3
 TEST(IsotpReceiver, IgnoresConsecutiveFramesThatItDoesNotExpect) {
   Receiver receiver(controlled());

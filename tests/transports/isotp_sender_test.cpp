@@ -7,77 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "tests/transports/can_frames.hpp"
+#include "tests/transports/isotp_sender_fixture.hpp"
 
-namespace r4 {
+namespace r4::test {
 namespace {
-
-using test::counted;
-using test::counting;
-using test::frame_of;
-using test::hex_of;
-
-using Frames = std::vector<std::string>;
-
-constexpr std::uint32_t id = 0x180;
-constexpr std::uint32_t flow_control_id = 0x200;
-
-IsotpSenderOptions classic() {
-  IsotpSenderOptions options;
-  options.channel.id = id;
-  options.channel.flow_control_id = flow_control_id;
-  return options;
-}
-
-IsotpSenderOptions burst() {
-  IsotpSenderOptions options = classic();
-  options.flow_control = false;
-  return options;
-}
-
-IsotpSenderOptions fd(std::uint8_t tx_dl) {
-  IsotpSenderOptions options = classic();
-  options.channel.fd = true;
-  options.tx_dl = tx_dl;
-  return options;
-}
-
-// A sender in virtual time, on a bus that takes every frame at once.
-struct Sender : IsotpSender {
-  explicit Sender(const IsotpSenderOptions& options, std::uint32_t start_us = 0)
-      : IsotpSender(options), now(start_us) {}
-
-  // Takes what is offered now.
-  Frames take() {
-    Frames frames;
-    CanFrame frame;
-    while (offer(now, frame)) {
-      EXPECT_EQ(frame.id, id);
-      EXPECT_TRUE(has_valid_size(frame));
-      EXPECT_FALSE(frame.extended || frame.remote);
-      frames.push_back(hex_of(frame));
-      frame_sent(now);
-    }
-    return frames;
-  }
-  bool start(const std::string& datagram) {
-    bytes = datagram;
-    return begin(bytes, now);
-  }
-  IsotpError answer(const std::string& hex) {
-    return on_frame(frame_of(flow_control_id, hex), now);
-  }
-
-  std::uint32_t now;
-  std::string bytes;
-};
-
-// Every transfer that began ended in one way or is on its way.
-void expect_counters_add_up(const IsotpSender& sender) {
-  const IsotpSenderCounters& c = sender.counters();
-  EXPECT_EQ(c.started, c.datagrams + c.send_timeout + c.flow_control_timeout + c.overflow +
-                           c.invalid_flow_status + c.too_many_waits + c.cancelled + sender.busy());
-}
 
 // 9.6.2.1, 10.4.2: what fits is one frame, in the shortest form.
 TEST(IsotpSender, ASingleFrameHoldsWhatFits) {
@@ -256,78 +189,6 @@ TEST(IsotpSender, SendsBlocksAsLongAsTheReceiverSays) {
   }
 }
 
-// 9.6.5.6: block size and gap may change from flow control to flow control.
-TEST(IsotpSender, ObeysTheNewestFlowControl) {
-  Sender sender(classic());
-  sender.start(counted(6 + 7 * 6));
-  sender.take();
-  sender.answer("30 01 7F");
-  EXPECT_EQ(sender.take(), Frames{"21 07 08 09 0A 0B 0C 0D"});
-  sender.answer("30 02 00");
-  EXPECT_EQ(sender.take().size(), 2U) << "at once, without a gap";
-  sender.answer("30 00 F5");
-  EXPECT_EQ(sender.take().size(), 1U);
-  EXPECT_EQ(sender.deadline().at_us, 500U);
-}
-
-// 9.6.5.4, 9.6.5.5: from the frame that was accepted to the next.
-TEST(IsotpSender, KeepsTheGapThatTheReceiverAsksFor) {
-  for (int stmin = 0; stmin < 256; ++stmin) {
-    const std::uint32_t gap_us = stmin <= 0x7F                    ? stmin * 1000U
-                                 : stmin >= 0xF1 && stmin <= 0xF9 ? (stmin - 0xF0U) * 100U
-                                                                  : 127000U;
-    ASSERT_EQ(stmin_to_us(static_cast<std::uint8_t>(stmin)), gap_us);
-    Sender sender(classic(), 0xFFFFFF80);
-    sender.start(counted(30));
-    sender.take();
-    char flow_control[16];
-    std::snprintf(flow_control, sizeof flow_control, "30 00 %02X", static_cast<unsigned>(stmin));
-    sender.answer(flow_control);
-    if (gap_us == 0) {
-      EXPECT_EQ(sender.take().size(), 4U);
-      continue;
-    }
-    for (int frame = 0; frame < 3; ++frame) {
-      EXPECT_EQ(sender.take().size(), 1U) << "the first without a gap";
-      EXPECT_EQ(sender.deadline().at_us, sender.now + gap_us);
-      CanFrame early;
-      EXPECT_FALSE(sender.offer(sender.now + gap_us - 1, early));
-      sender.now += gap_us;
-    }
-    EXPECT_EQ(sender.take().size(), 1U);
-    EXPECT_FALSE(sender.busy());
-  }
-}
-
-TEST(IsotpSender, KeepsItsOwnGapWithoutFlowControlAndTheLongerOneWith) {
-  IsotpSenderOptions options = burst();
-  options.separation_us = 300;
-  Sender sender(options);
-  sender.start(counted(20));
-  for (int i = 0; i < 3; ++i, sender.now += 300) EXPECT_EQ(sender.take().size(), 1U);
-  EXPECT_FALSE(sender.busy());
-
-  options.flow_control = true;
-  for (const auto& [flow_control, gap_us] : {std::pair{"30 00 F1", 300U}, {"30 00 F9", 900U}}) {
-    Sender slow(options);
-    slow.start(counted(20));
-    slow.take();
-    slow.answer(flow_control);
-    EXPECT_EQ(slow.take().size(), 1U);
-    EXPECT_EQ(slow.deadline().at_us, gap_us);
-  }
-}
-
-TEST(IsotpSender, TheByteForAGapIsTheNextLongerOne) {
-  const struct {
-    std::uint32_t us;
-    std::uint8_t stmin;
-  } cases[] = {{0, 0},        {1, 0xF1},     {100, 0xF1}, {101, 0xF2},   {900, 0xF9},
-               {901, 1},      {1000, 1},     {1001, 2},   {126000, 126}, {126001, 127},
-               {127000, 127}, {127001, 127}, {~0U, 127}};
-  for (const auto& c : cases) EXPECT_EQ(stmin_from_us(c.us), c.stmin) << c.us;
-}
-
 // 9.8.2, N_Bs.
 TEST(IsotpSender, GivesUpWithoutFlowControl) {
   Sender sender(classic());
@@ -488,4 +349,4 @@ TEST(IsotpError, EveryOneHasItsOwnText) {
 }
 
 }  // namespace
-}  // namespace r4
+}  // namespace r4::test

@@ -25,12 +25,16 @@
 //
 // Promise: what is delivered is what was sent, or nothing and a counted error; with one exception
 // that ISO-TP has, as it tells frames apart by four bits only. A frame that is 16 (32, 48 …) places
-// further on in the same stream passes for the one expected. Loss alone brings that about only
-// without flow control and only over the border of two transfers: if the end of one, the first
-// frame of the next and as many after it are lost that the numbers fit, and all within N_Cr, then
-// the datagram is made of both. Where both have 16 frames that is a run of 16 lost ones, where both
-// have 25 it is 9. An N_Cr below the pause between transfers excludes it; the CRC of the datagram
-// finds it.
+// further on in the same stream passes for the one expected.
+//
+// Loss alone brings that about only without flow control and only over the border of two transfers:
+// if the end of one, the first frame of the next and as many after it are lost that the numbers fit,
+// and all within N_Cr, then the datagram is made of both. Where both have n frames that is a run of n
+// lost ones, or of n - 16, n - 32 …, but at least of 2: 4 where both have 4, 9 where both have 25, and
+// 2 where both have 18. An N_Cr below the pause between transfers excludes it.
+//
+// With flow control it takes a flow control that comes later than N_Bs, after its sender has given up
+// and begun another transfer, whose first frame is lost. The CRC of the datagram finds both.
 #pragma once
 
 #include <cstdint>

@@ -22,6 +22,7 @@ bool IsotpSender::begin(const void* data, std::uint32_t size, std::uint32_t now_
   size_ = size;
   sent_ = 0;
   sequence_ = 1;
+  any_consecutive_ = false;
   block_left_ = 0;
   waits_ = 0;
   gap_us_ = options_.separation_us;
@@ -94,14 +95,25 @@ void IsotpSender::frame_sent(std::uint32_t now_us) {
   }
   bool block_ends = was_first;
   if (!was_first) {
+    any_consecutive_ = true;
     sequence_ = (sequence_ + 1) & 0xF;
     block_ends = block_left_ != 0 && --block_left_ == 0;
   }
+  sent_us_ = now_us;
   if (block_ends && options_.flow_control) {
     state_ = State::waiting;
     deadline_us_ = now_us + options_.n_bs_us;
   } else {
     state_ = State::ready;
+    deadline_us_ = now_us + gap_us_;
+  }
+}
+
+void IsotpSender::wait_anew(std::uint32_t now_us) {
+  sent_us_ = now_us;
+  if (state_ == State::waiting) {
+    deadline_us_ = now_us + options_.n_bs_us;
+  } else if (state_ == State::ready && any_consecutive_) {
     deadline_us_ = now_us + gap_us_;
   }
 }
@@ -132,7 +144,10 @@ IsotpError IsotpSender::on_flow_control(const CanFrame& frame, std::uint32_t now
       block_left_ = frame.data[1];
       waits_ = 0;
       state_ = State::ready;
-      deadline_us_ = now_us;
+      // The gap holds over the border of two blocks, too. The frame may have been accepted after
+      // this flow control came: then the time of sending is the later one.
+      const std::uint32_t due_us = sent_us_ + gap_us_;
+      deadline_us_ = any_consecutive_ && !reached(now_us, due_us) ? due_us : now_us;
       return IsotpError::none;
     }
     case IsotpFlowStatus::wait:

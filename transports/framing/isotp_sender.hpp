@@ -76,10 +76,9 @@ class IsotpSender {
   bool offer(std::uint32_t now_us, CanFrame& frame);
   // The offered frame was accepted. Without one: nothing happens.
   void frame_sent(std::uint32_t now_us);
-  // What was accepted has only now got to the bus: N_Bs begins anew, if flow control is waited for.
-  void wait_anew(std::uint32_t now_us) {
-    if (state_ == State::waiting) deadline_us_ = now_us + options_.n_bs_us;
-  }
+  // What was accepted has only now got to the bus: N_Bs begins anew, if flow control is waited for,
+  // and so does the gap to the next consecutive frame.
+  void wait_anew(std::uint32_t now_us);
   // Takes flow control; other frames are passed over. What was wrong, the first of several.
   IsotpError on_frame(const CanFrame& frame, std::uint32_t now_us);
   // Ends a transfer that has timed out, and tells of it.
@@ -107,10 +106,12 @@ class IsotpSender {
   std::uint32_t sent_ = 0;         // bytes in accepted frames
   std::uint32_t deadline_us_ = 0;  // ready: when it may be offered; else: when the wait ends
   std::uint32_t gap_us_ = 0;       // between consecutive frames
+  std::uint32_t sent_us_ = 0;      // when the newest frame was accepted
   std::uint8_t chunk_ = 0;         // bytes of the datagram in the offered frame
   std::uint8_t sequence_ = 0;      // of the next consecutive frame
   std::uint8_t block_left_ = 0;    // frames before the next flow control; 0: no end
   std::uint16_t waits_ = 0;        // in a row
+  bool any_consecutive_ = false;   // accepted so far
   State state_ = State::idle;
   IsotpError error_ = IsotpError::none;
   IsotpSenderCounters counters_;
