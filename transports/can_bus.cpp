@@ -30,6 +30,16 @@ constexpr std::chrono::microseconds most_polling{400};
 // Then the loop sleeps if nothing is there: who calls its poll() gets back.
 constexpr std::chrono::milliseconds most_awake{10};
 
+Problem filter_problem(const std::string& interface, int error) {
+  Problem problem = can_problem(interface, error);
+  if (problem.fix.empty()) {
+    problem.reason =
+        "the kernel does not take the filters for what is to be heard: " + problem.reason;
+    problem.fix = "use fewer nodes of one interface in one program; the kernel takes 512 filters";
+  }
+  return problem;
+}
+
 // The buses of one event loop.
 class Buses : public asio::execution_context::service {
  public:
@@ -104,8 +114,16 @@ void CanBus::clear_places() {
     hear();
 }
 
+// A bus that hears less than its members think is down. They are told from the loop, for one of them
+// may just be joining or leaving.
 void CanBus::hear() {
-  if (socket_.number() < 0) return;
+  if (socket_.number() < 0 || set_filters()) return;
+  asio::post(io_, deafness_.handler(
+                      [this, error = errno] { go_down(filter_problem(interface_, error), true); }));
+}
+
+// False: the kernel does not take them; errno tells why.
+bool CanBus::set_filters() {
   std::vector<std::uint32_t> ids;
   for (const Place& place : members_) {
     if (place.member == nullptr) continue;
@@ -114,7 +132,7 @@ void CanBus::hear() {
   }
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-  socket_.hear(ids);
+  return socket_.hear(ids);
 }
 
 // Members may leave, and others join, in any call of theirs: those come later than what is told.
@@ -353,6 +371,7 @@ void CanBus::go_down(Problem problem, bool reopen) {
   const std::shared_ptr<CanBus> alive = shared_from_this();
   drop_queue();
   retrying_.cancel();
+  deafness_.cancel();
   writable_.stop();
   if (reopen) {
     reading_.cancel();
@@ -392,11 +411,12 @@ void CanBus::look() {
   const std::shared_ptr<CanBus> alive = shared_from_this();
   try {
     socket_.open(interface_, fd_);
+    if (!set_filters()) throw Error(filter_problem(interface_, errno));
   } catch (const Error& error) {
+    socket_.close();
     look_later();
     return be_down(error.problem());
   }
-  hear();
   readable_.assign(socket_.number());
   listen();
   look_at_controller();

@@ -134,6 +134,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   void look_at_controller();
   void tell(CarrierEvent event);
   void hear();
+  bool set_filters();
   void clear_places();
   template <class Action>
   void for_each_member(Action action);
@@ -149,6 +150,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   OperationSlot retrying_;
   LoopTimer look_timer_;
   OperationSlot looking_;
+  OperationSlot deafness_;  // the kernel has refused our filters: it will be told
 
   std::vector<Place> members_;
   std::size_t next_ = 0;  // whose turn it is

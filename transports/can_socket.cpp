@@ -167,19 +167,19 @@ void CanSocket::close() noexcept {
   index_ = 0;
 }
 
-void CanSocket::hear(const std::vector<std::uint32_t>& ids) {
+bool CanSocket::hear(const std::vector<std::uint32_t>& ids) {
   std::vector<can_filter> filters;
   filters.reserve(ids.size());
   for (const std::uint32_t id : ids) {
     filters.push_back({id, CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG});
   }
-  ::setsockopt(descriptor_.get(), SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(),
-               static_cast<socklen_t>(filters.size() * sizeof(can_filter)));
+  return ::setsockopt(descriptor_.get(), SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(),
+                      static_cast<socklen_t>(filters.size() * sizeof(can_filter))) == 0;
 }
 
-void CanSocket::hear_everything() {
+bool CanSocket::hear_everything() {
   const can_filter all{0, 0};
-  set_option(descriptor_.get(), SOL_CAN_RAW, CAN_RAW_FILTER, all);
+  return set_option(descriptor_.get(), SOL_CAN_RAW, CAN_RAW_FILTER, all);
 }
 
 int CanSocket::receive(std::array<Received, batch>& frames) {

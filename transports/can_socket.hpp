@@ -53,10 +53,10 @@ class CanSocket {
   // A CAN FD frame came whose data travelled at a bit rate of their own (BRS).
   bool heard_rate_switch() const { return heard_rate_switch_; }
 
-  // Hears the frames with exactly these 11-bit ids, or with `everything` all of them, extended and
-  // remote ones too.
-  void hear(const std::vector<std::uint32_t>& ids);
-  void hear_everything();
+  // Hears the frames with exactly these 11-bit ids, or everything, extended and remote ones too.
+  // False, and it hears what it heard before: the kernel does not take that; errno tells why.
+  [[nodiscard]] bool hear(const std::vector<std::uint32_t>& ids);
+  [[nodiscard]] bool hear_everything();
 
   // Takes up to `batch` frames; returns how many, or -errno (EAGAIN: none is there).
   int receive(std::array<Received, batch>& frames);

@@ -80,13 +80,17 @@ FileDescriptor open_real(const std::string& path, const std::string& real_path, 
   int descriptor = -1;
   sp_get_port_handle(port.get(), &descriptor);
   FileDescriptor result = duplicate(descriptor);
+  if (!result) {
+    const int error = errno;
+    sp_close(port.get());
+    fail(path, error);
+  }
   const bool plain = sp_set_bits(port.get(), 8) == SP_OK &&
                      sp_set_parity(port.get(), SP_PARITY_NONE) == SP_OK &&
                      sp_set_stopbits(port.get(), 1) == SP_OK &&
                      sp_set_flowcontrol(port.get(), SP_FLOWCONTROL_NONE) == SP_OK;
   const bool rate = plain && sp_set_baudrate(port.get(), static_cast<int>(baud)) == SP_OK;
   sp_close(port.get());
-  if (!result) fail(path, errno);
   if (!plain) fail(path, EIO);
   if (!rate) refuse_baud(path, baud);
   ::ioctl(result.get(), TIOCEXCL);

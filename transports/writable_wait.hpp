@@ -3,37 +3,40 @@
 //
 // It waits on a duplicate that lives only as long as there is something to wait for: asked once,
 // Asio's reactor reports "writable" for a descriptor for good, which would cost a wake-up with each
-// datagram that is received.
+// datagram that is received. A process that has no descriptor left for that looks again and again.
 #pragma once
 
 #include <fcntl.h>
 
 #include <asio/io_context.hpp>
+#include <chrono>
 #include <utility>
 
+#include "file_descriptor.hpp"
 #include "operation_slot.hpp"
 
 namespace r4 {
 
 class WritableWait {
  public:
-  explicit WritableWait(asio::io_context& io) : duplicate_(io) {}
+  explicit WritableWait(asio::io_context& io) : duplicate_(io), timer_(io) {}
 
-  // Calls `function()` once, when `descriptor` is writable. Does nothing if a call is due already.
+  // Calls `function()` once, when `descriptor` is writable, or may be. Does nothing if a call is due
+  // already.
   template <class Function>
   void start(int descriptor, Function function) {
     if (waiting_) return;
-    asio::error_code error;
-    if (!duplicate_.is_open()) {
-      duplicate_.assign(::fcntl(descriptor, F_DUPFD_CLOEXEC, 0), error);
-      if (error) return;
-    }
     waiting_ = true;
-    duplicate_.async_wait(asio::posix::descriptor_base::wait_write,
-                          slot_.handler([this, call = std::move(function)] {
-                            waiting_ = false;
-                            call();
-                          }));
+    auto handler = slot_.handler([this, call = std::move(function)] {
+      waiting_ = false;
+      call();
+    });
+    if (duplicate_.is_open() || duplicate(descriptor)) {
+      duplicate_.async_wait(asio::posix::descriptor_base::wait_write, std::move(handler));
+    } else {
+      timer_.expires_after(look_again);
+      timer_.async_wait(std::move(handler));
+    }
   }
 
   // Nothing waits any more.
@@ -45,7 +48,20 @@ class WritableWait {
   }
 
  private:
+  static constexpr std::chrono::milliseconds look_again{1};
+
+  bool duplicate(int descriptor) {
+    FileDescriptor copy(::fcntl(descriptor, F_DUPFD_CLOEXEC, 0));
+    if (!copy) return false;
+    asio::error_code error;
+    duplicate_.assign(copy.get(), error);
+    if (error) return false;
+    copy.release();
+    return true;
+  }
+
   LoopDescriptor duplicate_;
+  LoopTimer timer_;
   OperationSlot slot_;
   bool waiting_ = false;
 };

@@ -5,6 +5,8 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <numeric>
+
 #include "tests/can/can_bus_fixture.hpp"
 
 namespace r4::test {
@@ -179,6 +181,28 @@ TEST_F(CanBusTest, AnInterfaceOfWhichTheSystemTellsNothingIsNotSaidToBeMissing) 
       << refused->what();
   EXPECT_NE(refused->problem().fix.find("AF_NETLINK"), std::string::npos) << refused->what();
   EXPECT_NO_THROW(socket.open(near_end, false));
+}
+
+// More ids than the kernel has filters for, as an example of what it may refuse.
+TEST_F(CanBusTest, ABusWhoseFiltersTheKernelRefusesIsDownUntilItTakesThem) {
+  Witness member(bus);
+  Witness greedy(bus);
+  std::vector<std::uint32_t> ids(0x700);
+  std::iota(ids.begin(), ids.end(), 0U);
+  bus->join(greedy, ids);
+  EXPECT_TRUE(member.events.empty()) << "told from the loop, not within join()";
+  run_until([&] { return !member.events.empty(); });
+  EXPECT_EQ(member.events.back().first, Kind::down);
+  EXPECT_EQ(member.events.back().second.find("the kernel does not take the filters"), 0U);
+  EXPECT_NE(member.fix.find("fewer nodes"), std::string::npos);
+  run_for(soon);  // it is tried again meanwhile
+  EXPECT_FALSE(bus->up());
+  EXPECT_EQ(member.events.size(), 1U);
+  greedy.leave();
+  run_until([&] { return bus->up(); });
+  remote.send(data(7));
+  run_until([&] { return !member.frames.empty(); });
+  EXPECT_EQ(member.frames, (Bytes{7}));
 }
 
 TEST_F(CanBusTest, AnInterfaceThatGoesDownAndThenAwayIsToldOfTwiceAndItsReturnOnce) {
