@@ -42,6 +42,7 @@ Application::Application(Hal& hal, const Config& config, Observer* observer)
 }
 
 std::uint8_t Application::add_port(Port& port) {
+  if (port_count_ == max_ports) return no_port;
   ports_[port_count_].port = &port;
   return port_count_++;
 }
@@ -71,6 +72,7 @@ BoardState Application::state() const {
 
 void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std::uint32_t now_ms) {
   look_at_time(now_ms);  // silence counts before what ends it
+  if (port >= port_count_) return;
   Datagram datagram;
   if (!read(bytes, datagram)) {
     ++rx_bad_;

@@ -41,15 +41,18 @@ class Application {
     const std::uint8_t* chance = nullptr;
   };
   static constexpr int max_ports = 4;
+  static constexpr std::uint8_t no_port = max_ports;
 
   Application(Hal& hal, const Config& config, Observer* observer = nullptr);
 
-  // Ports are added before start(); returns the port's number. At most max_ports.
+  // Ports are added before start(); returns the port's number, or no_port: there are max_ports
+  // already, it is not served. A board whose ports are known when it is compiled asserts it then.
   std::uint8_t add_port(Port& port);
   // Makes the outputs safe and sends the first heartbeat.
   void start(std::uint32_t now_ms);
 
-  // A datagram from `peer` on `port`. Anything may be in it.
+  // A datagram from `peer` on `port`. Anything may be in it. One of a port that was not added is
+  // passed over.
   void receive(std::uint8_t port, std::uint32_t peer, Text bytes, std::uint32_t now_ms);
   // The transport under `port` is gone.
   void port_down(std::uint8_t port, std::uint32_t now_ms);

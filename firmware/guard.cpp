@@ -5,6 +5,10 @@ namespace r4 {
 namespace firmware {
 
 Guard::Duty Guard::add_duty(std::uint32_t limit_ms) {
+  if (duty_count_ == max_duties) {
+    unwatched_ = true;
+    return no_duty;
+  }
   duties_[duty_count_].limit_ms = limit_ms;
   return duty_count_++;
 }
@@ -20,7 +24,8 @@ bool Guard::tick(std::uint32_t now_ms) {
     for (Watched& duty : duties_) duty.seen_ms = now_ms;
   }
   if (debt_ != 0) --debt_;
-  bool all_seen = true;
+  if (unwatched_) trip(SafeReason::watchdog);
+  bool all_seen = !unwatched_;
   for (int i = 0; i < duty_count_; ++i) {
     Watched& duty = duties_[i];
     if (duty.seen.exchange(false, std::memory_order_relaxed)) {

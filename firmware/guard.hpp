@@ -9,6 +9,8 @@
 //     a duty is often late      2 missed a second for long         outputs safe, cause watchdog
 //     a duty stays away         tick() does not return true        the port starves the hardware
 //                                                                  watchdog, which resets the board
+//     a duty too many           add_duty()                         both, and again, whatever clears
+//                                                                  it: nobody would watch that duty
 //
 // A duty is what must happen again and again: a turn of the loop, of a thread, of another interrupt.
 // It checks in each time. The application learns what the guard did at its next turn (take()).
@@ -29,13 +31,17 @@ class Guard {
  public:
   using Duty = std::uint8_t;
   static constexpr int max_duties = 8;
+  static constexpr Duty no_duty = max_duties;
 
   explicit Guard(Hal& hal) : hal_(hal) {}
 
-  // A duty that checks in at least every `limit_ms` (1 …). Before the first tick(); at most
-  // max_duties.
+  // A duty that checks in at least every `limit_ms` (1 …). Before the first tick(). no_duty, and the
+  // outputs stay safe for good: there are max_duties already.
   Duty add_duty(std::uint32_t limit_ms);
-  void check_in(Duty duty) { duties_[duty].seen.store(true, std::memory_order_relaxed); }
+  // For no_duty nothing happens.
+  void check_in(Duty duty) {
+    if (duty < max_duties) duties_[duty].seen.store(true, std::memory_order_relaxed);
+  }
 
   // Outputs are live until `deadline_ms` unless it is put off, or until disarm().
   void arm(std::uint32_t deadline_ms);
@@ -76,6 +82,7 @@ class Guard {
   Hal& hal_;
   Watched duties_[max_duties];
   std::uint8_t duty_count_ = 0;
+  bool unwatched_ = false;  // a duty was refused
   std::atomic<bool> armed_{false};
   std::atomic<bool> stop_{false};
   std::atomic<std::uint32_t> deadline_ms_{0};

@@ -10,6 +10,7 @@ namespace {
 using firmware::BoardState;
 using test::echo_pnum;
 using test::Heard;
+using test::MemoryPort;
 using test::TestBoard;
 using test::TestHost;
 using Lines = std::vector<std::string>;
@@ -163,6 +164,22 @@ TEST(ApplicationLink, KeepsTwoHeartbeatsASecondForAPaperHost) {
     board.run(100);
   }
   EXPECT_EQ(board.take(MessageKind::board_heartbeat).size(), 4U);
+}
+
+TEST(ApplicationLink, APortTooManyIsRefusedAndWhatItWouldBringIsPassedOver) {
+  TestBoard board(Settings(), firmware::Application::max_ports);
+  MemoryPort more;
+  more.now_ms = &board.now_ms;
+  const std::uint8_t number = board.application->add_port(more);
+  EXPECT_EQ(number, firmware::Application::no_port);
+  board.receive("H:ROS2-R4;PNum:1;T:0;", {number, 0});
+  board.receive("E:STOP;", {number, 0});
+  board.application->port_down(number, board.now_ms);
+  board.run(600);
+  EXPECT_EQ(board.state(), BoardState::connecting);
+  EXPECT_EQ(board.reason(), SafeReason::none);
+  EXPECT_TRUE(more.sent.empty());
+  EXPECT_FALSE(board.take(firmware::Application::max_ports - 1).empty()) << "the last is served";
 }
 
 TEST(ApplicationLink, LosesTheLinkWithTheOwnersTransport) {

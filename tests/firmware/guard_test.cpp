@@ -45,6 +45,18 @@ TEST_F(GuardTest, FeedsTheWatchdogOnlyWhenEveryDutyHasCheckedIn) {
 
 TEST_F(GuardTest, WithoutDutiesThereIsNothingToWaitFor) { EXPECT_EQ(run(3), 3); }
 
+// Outputs that nobody watches must not be live: one who builds such a board sees it at once.
+TEST_F(GuardTest, ADutyTooManyKeepsTheOutputsSafeAndStarvesTheWatchdog) {
+  for (int i = 0; i < Guard::max_duties; ++i) EXPECT_EQ(guard.add_duty(20), i);
+  EXPECT_EQ(run(1, {0, 1, 2, 3, 4, 5, 6, 7}), 1);
+  EXPECT_FALSE(guard.tripped());
+  EXPECT_EQ(guard.add_duty(20), Guard::no_duty);
+  EXPECT_EQ(run(10, {0, 1, 2, 3, 4, 5, 6, 7, Guard::no_duty}), 0);
+  EXPECT_EQ(guard.take(), SafeReason::watchdog);
+  run(1, {0, 1, 2, 3, 4, 5, 6, 7});
+  EXPECT_EQ(guard.take(), SafeReason::watchdog) << "also after it was cleared";
+}
+
 TEST_F(GuardTest, AHangingDutyTripsAfterFiveDeadlines) {
   const Guard::Duty loop = guard.add_duty(20);
   run(50, {loop});

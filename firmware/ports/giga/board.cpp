@@ -130,6 +130,7 @@ BootReport::Sources Board::report_sources(const FaultNote& last_boot) {
 }
 
 void Board::start() {
+  static_assert(firmware::Application::max_ports >= 3, "each port has a place");
   usb_number_ = application_.add_port(usb_);
   udp_number_ = application_.add_port(udp_);
   can_number_ = application_.add_port(can_);

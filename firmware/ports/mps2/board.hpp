@@ -17,6 +17,8 @@ namespace r4 {
 namespace mps2 {
 
 class Board {
+  static_assert(firmware::Application::max_ports >= 2, "each port has a place");
+
  public:
   // The seed's low half is where the clock of this boot begins.
   Board(std::uint64_t seed, Uart& link, UdpPort& udp, const firmware::Application::Config& config)

@@ -140,6 +140,7 @@ int main() {
   config.identity.board_id = Text("mps2-1");
   config.identity.capabilities = Text("serial+can");
   static firmware::Application application(hal, config);
+  static_assert(firmware::Application::max_ports >= 2, "each port has a place");
   const std::uint8_t link_number = application.add_port(link);
   const std::uint8_t can_number = application.add_port(can);
   link.start();
