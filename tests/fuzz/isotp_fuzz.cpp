@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Any frames at any times: a sender and a receiver, each with arbitrary options, keep their
 // promises. The input is a list of actions; what the options are is in its first bytes.
+//
+// As long as frames of the sender's are lost but none is added, what the receiver delivers is a
+// datagram that was sent; or, which four bits of sequence number cannot tell, one of two over whose
+// border no frame was heard. With flow control on both sides it is one that was sent, but for flow
+// control that comes when its sender is at the next already.
 #include <cstdint>
 #include <cstring>
 #include <vector>
@@ -25,9 +30,7 @@ class Fuzz {
         buffer_(capacity_),
         datagram_(input.word() % 6000),
         sender_(sender_options()),
-        receiver_(receiver_options(), buffer_.data(), capacity_) {
-    for (std::size_t i = 0; i < datagram_.size(); ++i) datagram_[i] = static_cast<std::uint8_t>(i);
-  }
+        receiver_(receiver_options(), buffer_.data(), capacity_) {}
 
   void run() {
     now_us_ = input_.word() << 16;
@@ -54,6 +57,7 @@ class Fuzz {
     options.channel = channel();
     options.tx_dl = input_.byte();
     options.flow_control = (input_.byte() & 1) != 0;
+    controlled_ = options.flow_control;
     options.separation_us = time_from(input_);
     options.n_as_us = time_from(input_);
     options.n_bs_us = time_from(input_);
@@ -64,6 +68,7 @@ class Fuzz {
     IsotpReceiverOptions options;
     options.channel = channel();
     options.listen_only = (input_.byte() & 1) != 0;
+    listens_only_ = options.listen_only;
     options.block_size = input_.byte();
     options.stmin = input_.byte();
     options.n_ar_us = time_from(input_);
@@ -80,7 +85,7 @@ class Fuzz {
         now_us_ += input_.word();
         break;
       case 1:
-        sender_.begin(datagram_.data(), static_cast<std::uint32_t>(datagram_.size()), now_us_);
+        begin(action);
         break;
       case 2:
       case 3:
@@ -88,7 +93,7 @@ class Fuzz {
         break;
       case 4:
       case 5:
-        exchange((action & 0x80) == 0);
+        exchange((action & 0x80) == 0, (action & 0x40) != 0 ? input_.word() : 0);
         break;
       case 6:
         receiver_.hold((action & 0x80) != 0, now_us_);
@@ -98,13 +103,27 @@ class Fuzz {
           sender_.cancel();
           receiver_.cancel();
         } else {
-          sender_.frame_sent(now_us_);
+          accept();
           receiver_.frame_sent(now_us_);
         }
     }
   }
 
+  // Each datagram is all of one byte, its number, and of a length of its own: a little less than
+  // the last, or as long.
+  void begin(std::uint8_t action) {
+    if (sender_.busy() || datagram_.empty()) return;
+    const std::size_t less = action >> 4;
+    const std::size_t size = less < datagram_.size() ? datagram_.size() - less : datagram_.size();
+    std::memset(datagram_.data(), ++number_, size);
+    require(sender_.begin(datagram_.data(), static_cast<std::uint32_t>(size), now_us_));
+    size_ = static_cast<std::uint32_t>(size);
+    accepted_ = 0;
+    gap_us_ = 0;
+  }
+
   void take_foreign(std::uint8_t action) {
+    any_foreign_ = true;
     CanFrame frame;
     std::memset(&frame, 0x55, sizeof frame);
     frame.id = 1 + (action >> 3 & 1);
@@ -116,29 +135,72 @@ class Fuzz {
     take(frame);
   }
 
-  // Moves frames between the two, or only offers them.
-  void exchange(bool accepted) {
+  // Moves frames between the two, or only offers them. Those whose bit of `lost` is set get lost.
+  void exchange(bool accepted, std::uint32_t lost) {
     CanFrame frame;
     for (int i = 0; i < 20; ++i) {
       bool moved = false;
       if (sender_.offer(now_us_, frame)) {
         require(has_valid_size(frame) && frame.size != 0 && frame.id == 1);
-        if (accepted) sender_.frame_sent(now_us_);
-        if (accepted) take(frame);
+        if (accepted) accept();
+        if (accepted && (lost >> (i % 16) & 1) == 0) take_own(frame);
         moved = accepted;
       }
       if (receiver_.offer(now_us_, frame)) {
         require(has_valid_size(frame) && frame.size >= 3 && frame.id == 2);
         if (accepted) receiver_.frame_sent(now_us_);
-        if (accepted) take(frame);
+        if (accepted && (lost >> ((i + 5) % 16) & 1) == 0) {
+          flow_control_late_ = flow_control_late_ || heard_number_ != number_;
+          take(frame);
+        }
         moved = moved || accepted;
       }
       if (!moved) return;
     }
   }
 
+  // The bus takes the sender's frame. From one consecutive frame to the next it keeps STmin.
+  void accept() {
+    const std::uint32_t before = sender_.counters().frames;
+    sender_.frame_sent(now_us_);
+    if (sender_.counters().frames == before) return;
+    if (++accepted_ > 2) require(now_us_ - accepted_us_ >= gap_us_);
+    accepted_us_ = now_us_;
+  }
+
+  // A frame of the sender's is heard.
+  void take_own(const CanFrame& frame) {
+    const bool consecutive = frame.data[0] >> 4 == static_cast<int>(IsotpFrameType::consecutive);
+    if (!consecutive) {
+      heard_number_ = number_;
+      next_ = 1;
+      in_order_ = true;
+      flow_control_late_ = false;
+    } else if ((frame.data[0] & 0xF) != next_) {
+      in_order_ = false;
+    }
+    const std::uint32_t passed_over = receiver_.counters().malformed;
+    const std::uint32_t delivered = receiver_.counters().datagrams;
+    take(frame);
+    if (consecutive && receiver_.counters().malformed == passed_over) next_ = (next_ + 1) & 0xF;
+    if (receiver_.counters().datagrams == delivered || any_foreign_) return;
+    require(in_order_);
+    if (controlled_ && !listens_only_ && !flow_control_late_) require(is_of_the_sender());
+  }
+  bool is_of_the_sender() const {
+    if (receiver_.size() != size_) return false;
+    for (std::uint32_t i = 0; i < size_; ++i) {
+      if (receiver_.data()[i] != number_) return false;
+    }
+    return true;
+  }
+
   void take(const CanFrame& frame) {
-    sender_.on_frame(frame, now_us_);
+    const bool waits = sender_.awaits_flow_control();
+    const IsotpError error = sender_.on_frame(frame, now_us_);
+    if (waits && error == IsotpError::none && !sender_.awaits_flow_control()) {
+      gap_us_ = stmin_to_us(frame.data[2]);
+    }
     const IsotpArrival arrival = receiver_.on_frame(frame, now_us_);
     if (!arrival.datagram) return;
     require(receiver_.size() != 0 && receiver_.size() <= capacity_);
@@ -183,12 +245,25 @@ class Fuzz {
   }
 
   Input& input_;
+  bool controlled_ = false;    // the sender waits for flow control
+  bool listens_only_ = false;  // the receiver sends none
   std::uint32_t capacity_;
   std::vector<std::uint8_t> buffer_;
   std::vector<std::uint8_t> datagram_;
   IsotpSender sender_;
   IsotpReceiver receiver_;
   std::uint32_t now_us_ = 0;
+
+  std::uint8_t number_ = 0;        // of the datagram that was begun last; its bytes
+  std::uint32_t size_ = 0;         // and its length
+  bool any_foreign_ = false;       // a frame that is not of the two was handed in
+  std::uint32_t accepted_ = 0;     // frames of it that the bus has taken
+  std::uint32_t accepted_us_ = 0;  // the last of them
+  std::uint32_t gap_us_ = 0;       // that the newest flow control asks for
+  std::uint8_t heard_number_ = 0;  // of the first frame that was heard last
+  int next_ = 0;                   // the number of the frame to come behind it
+  bool in_order_ = false;          // those since then have counted up from 1
+  bool flow_control_late_ = false;
 };
 
 }  // namespace
