@@ -90,7 +90,7 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
     case MessageKind::host_heartbeat:
       if (authentic) {
         on_host_heartbeat(from, datagram, now_ms);
-      } else if (rejected(verdict, now_ms)) {
+      } else if (rejected(verdict, kind, now_ms)) {
         answer_heartbeat(from, now_ms);  // it tells the nonce
       }
       break;
@@ -115,9 +115,9 @@ Verdict Application::judge(std::uint8_t port, MessageKind kind, const Datagram& 
 }
 
 // It is dropped. True if it may be answered.
-bool Application::rejected(Verdict verdict, std::uint32_t now_ms) {
+bool Application::rejected(Verdict verdict, MessageKind kind, std::uint32_t now_ms) {
   if (observer_ != nullptr) observer_->on_rejected(now_ms, verdict);
-  return authentication_.rejected(verdict, now_ms);
+  return authentication_.rejected(verdict, kind == MessageKind::command, now_ms);
 }
 
 void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::uint32_t now_ms) {
@@ -175,7 +175,7 @@ void Application::on_command(Source from, const Datagram& datagram, Verdict verd
     return;
   }
   if (verdict != Verdict::authentic) {
-    if (rejected(verdict, now_ms)) {
+    if (rejected(verdict, MessageKind::command, now_ms)) {
       refuse(from, datagram, Refusal::auth, now_ms);
     } else {
       ++rx_refused_;

@@ -96,7 +96,7 @@ class Application {
   bool may_set(std::uint8_t port, const Command& command) const;
   void execute(std::uint32_t pnum, const Command& command, std::uint32_t now_ms);
   void emergency_stop(Source from, const Datagram& datagram, bool authentic, std::uint32_t now_ms);
-  bool rejected(Verdict verdict, std::uint32_t now_ms);
+  bool rejected(Verdict verdict, MessageKind kind, std::uint32_t now_ms);
   void look_at_time(std::uint32_t now_ms);
   void enter(SafeReason cause, std::uint32_t now_ms);
   void check_interlocks(std::uint32_t now_ms);

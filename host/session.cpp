@@ -92,7 +92,8 @@ bool Session::on_heartbeat_datagram(const Datagram& datagram, Time now) {
     if (reason == SafeReason::none) state_.fault = ChipFault();
     if (key_.on_heartbeat(datagram)) doubt_sent();
     key_.on_board_time(t_ms, now);
-    if (!connecting && reason != SafeReason::link) key_.on_host_seen();
+    if (key_.asked_for()) knows_cmd_ = true;
+    key_.on_reason(connecting ? SafeReason::link : reason, now);
   }
   handler_.on_board_heartbeat(datagram);
   return current;
@@ -122,7 +123,7 @@ bool Session::on_state_datagram(const Datagram& datagram, Time now) {
   collector_.on_state(fresh.t_ms, now);
   if (!newest_state) {
     key_.on_board_time(fresh.t_ms, now);
-    key_.on_host_seen();
+    key_.on_host_seen(now);
   }
   state_ = fresh;
   state_.received = ReceivedState::Clock::time_point(now);
@@ -142,7 +143,10 @@ void Session::on_nack_datagram(const Datagram& datagram, Time now) {
   if (!read_nack(datagram, nack)) return;
   if (!is_ours(nack.pnum)) return;  // on a CAN bus the answers to other hosts are heard too
   knows_cmd_ = true;                // the paper's release answers nothing
-  if (nack.code == Refusal::busy) busy_until_ = now + busy_memory;
+  if (nack.code == Refusal::busy) {
+    busy_until_ = now + busy_memory;
+    key_.on_host_seen(now);
+  }
   on_answer(datagram, now);
   const bool not_taken = nack.code == Refusal::auth && !is_cable_only(nack.pnum);
   if (not_taken) key_.on_refusal(now);

@@ -135,12 +135,13 @@ Verdict Authentication::verify(const Datagram& datagram, std::uint32_t now_ms) {
   return now_ms - board_t <= age_limit_ms ? Verdict::authentic : Verdict::old;
 }
 
-bool Authentication::rejected(Verdict verdict, std::uint32_t now_ms) {
+bool Authentication::rejected(Verdict verdict, bool is_command, std::uint32_t now_ms) {
   ++rejections_[static_cast<std::size_t>(verdict)];
   if (verdict == Verdict::replayed || verdict == Verdict::old) return false;
-  if (any_answered_ && now_ms - answered_ms_ < answer_spacing_ms) return false;
-  any_answered_ = true;
-  answered_ms_ = now_ms;
+  Answered& answered = answered_[is_command ? 1 : 0];
+  if (answered.any && now_ms - answered.at_ms < answer_spacing_ms) return false;
+  answered.any = true;
+  answered.at_ms = now_ms;
   return true;
 }
 

@@ -72,8 +72,9 @@ class Authentication {
   // Is it signed? If so, its counter and those below are used up.
   Verdict verify(const Datagram& datagram, std::uint32_t now_ms);
   // It was not and was needed. True if that may be answered: at most every answer_spacing_ms, and
-  // not what a network has repeated or held back.
-  bool rejected(Verdict verdict, std::uint32_t now_ms);
+  // not what a network has repeated or held back. Commands are answered apart from the rest: a host
+  // whose heartbeats are answered must learn what is wrong as well.
+  bool rejected(Verdict verdict, bool is_command, std::uint32_t now_ms);
   // How many were rejected for that.
   std::uint32_t rejections(Verdict verdict) const {
     return rejections_[static_cast<std::size_t>(verdict)];
@@ -95,8 +96,11 @@ class Authentication {
   char nonce_[nonce_size] = {};
   bool has_nonce_ = false;
   std::uint32_t rejections_[verdict_count] = {};
-  bool any_answered_ = false;
-  std::uint32_t answered_ms_ = 0;
+  struct Answered {
+    bool any = false;
+    std::uint32_t at_ms = 0;
+  };
+  Answered answered_[2];  // heartbeats, commands
 };
 
 // The host's end: signs for one board.

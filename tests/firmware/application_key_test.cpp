@@ -139,6 +139,34 @@ TEST_F(ApplicationKey, AnswersAnUnsignedCommandWithAuthSeldom) {
   EXPECT_EQ(nacks[0].bytes.find("N:0,AUTH;"), 0U) << nacks[0].bytes;
 }
 
+// A host with another key sends heartbeats and commands. Were only the first of a moment answered, it
+// would be told its nonce for ever and never what is wrong.
+TEST_F(ApplicationKey, AnswersACommandWithAuthAlsoWhileItAnswersHeartbeats) {
+  KeyHost wrong(board, key_of(2), {0, 99});
+  board.take();
+  for (int i = 0; i < 3; ++i) {
+    wrong.heartbeat();
+    wrong.command("F:CMD");
+    board.run(100);
+  }
+  EXPECT_EQ(board.take(MessageKind::nack).size(), 3U);
+}
+
+// docs/protocol.md 4.2: the T of a CONNECTING heartbeat is for the signature, not to be echoed.
+TEST_F(ApplicationKey, AnEchoOfWhatItSaysWhileConnectingStartsNothingButAZeroDoes) {
+  for (int i = 0; i < 20; ++i) {
+    host.listen();
+    ASSERT_NE(host.t, 0U);
+    ASSERT_EQ(host.echo, 0U);
+    board.receive(host.signed_fields(host.fields("H:ROS2-R4", host.t)), host.at);
+    EXPECT_EQ(board.state(), BoardState::connecting);
+    board.run(100);
+  }
+  EXPECT_EQ(board.log.rejected, Lines()) << "rightly signed they are";
+  host.heartbeat();
+  EXPECT_EQ(board.state(), BoardState::active);
+}
+
 TEST_F(ApplicationKey, AForgedHeartbeatOfTheOwnerDoesNotFeed) {
   host.connect();
   host.command("O:358,1,1");

@@ -25,9 +25,10 @@ SessionOptions keyed() {
 }
 
 // A board's heartbeat with a nonce.
-void keyed_heartbeat(ScriptedLink& link, const std::string& its_nonce = nonce) {
+void keyed_heartbeat(ScriptedLink& link, const std::string& its_nonce = nonce,
+                     const std::string& reason = "") {
   link.raw(with_crc("H:R4-ROS2;PNum:" + std::to_string(link.board_pnum++) +
-                    ";T:" + std::to_string(link.board_ms()) + ";AN:" + its_nonce + ";"));
+                    ";T:" + std::to_string(link.board_ms()) + reason + ";AN:" + its_nonce + ";"));
 }
 
 void connect(ScriptedLink& link) {
@@ -226,6 +227,62 @@ TEST(SessionKey, FindsOutThatTheBoardTakesNoneOfItsHeartbeats) {
   keyed_heartbeat(link);
   link.pass(0ms);
   EXPECT_EQ(link.session.link().key, KeyTrouble::none);
+}
+
+// The host before ended with a stop: the board's reason hides whether it has a host.
+TEST(SessionKey, FindsOutThatAStoppedBoardTakesNoneOfItsHeartbeats) {
+  ScriptedLink link(keyed());
+  for (int i = 0; i < 12; ++i) {
+    keyed_heartbeat(link, nonce, ";SAFE:2");
+    link.pass(100ms);
+  }
+  EXPECT_EQ(link.session.link().key, KeyTrouble::not_taken);
+  EXPECT_NE(explain("board", link.session.link()).text().find("signed with our key"),
+            std::string::npos);
+  EXPECT_FALSE(link.session.in_control(link.now));
+}
+
+TEST(SessionKey, TakesAStoppedBoardThatAnswersBusyForOneWithAnotherHost) {
+  ScriptedLink link(keyed());
+  for (int i = 0; i < 30; ++i) {
+    keyed_heartbeat(link, nonce, ";SAFE:2");
+    link.nack(link.last('H').pnum, "BUSY");
+    link.pass(100ms);
+    EXPECT_EQ(link.session.link().key, KeyTrouble::none);
+  }
+  EXPECT_TRUE(link.session.link().busy);
+}
+
+// The lowest rate: heartbeats are sent in between, and none of them is in vain.
+TEST(SessionKey, IsTakenByAStoppedBoardThatSendsAStateASecond) {
+  ScriptedLink link(keyed());
+  connect(link);
+  for (int i = 0; i < 10; ++i) {
+    link.state("SAFE:2;CMD:0;");
+    for (int j = 0; j < 10; ++j) {
+      keyed_heartbeat(link, nonce, ";SAFE:2");
+      link.pass(100ms);
+      EXPECT_EQ(link.session.link().key, KeyTrouble::none);
+    }
+  }
+  for (int j = 0; j < 20; ++j) {  // and then it sends none any more
+    keyed_heartbeat(link, nonce, ";SAFE:2");
+    link.pass(100ms);
+  }
+  EXPECT_EQ(link.session.link().key, KeyTrouble::not_taken);
+}
+
+// The paper's release answers nothing, and is commanded all the same. It has no keys.
+TEST(SessionKey, DoesNotTakeABoardWithAKeyForThePapersRelease) {
+  SessionOptions options = keyed();
+  ASSERT_FALSE(options.fields.empty());
+  ScriptedLink link(options);
+  for (int i = 0; i < 30; ++i) {
+    keyed_heartbeat(link);
+    link.pass(100ms);
+    EXPECT_FALSE(link.session.in_control(link.now));
+  }
+  EXPECT_GT(link.count('F'), 5U);
 }
 
 TEST(SessionWithoutKey, FindsOutThatOneIsNeeded) {

@@ -75,6 +75,11 @@ class SigningHost:
         self.send(bytes_)
         return bytes_
 
+    def echo_of(self, heartbeat):
+        """The T for our next heartbeat: of one that says CONNECTING there is none to echo (section 4.2)."""
+        connecting = heartbeat['PNum'] == '0' and (heartbeat['T'] == '0' or 'AN' in heartbeat)
+        return 0 if connecting else int(heartbeat['T'])
+
     def take(self, datagram):
         body, checksum = datagram.split(b'^')[:2]
         assert int(checksum, 16) == zlib.crc32(body + b'^'), datagram
@@ -82,7 +87,7 @@ class SigningHost:
         self.board_t = int(fields['T'])
         if 'H' in fields:
             self.nonce = fields.get('AN')
-            self.echo = 0 if fields['PNum'] == '0' else self.board_t
+            self.echo = self.echo_of(fields)
             self.reasons.append(int(fields.get('SAFE', 0)))
             self.heartbeat()
         elif 'N' in fields:

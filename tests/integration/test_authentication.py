@@ -327,6 +327,36 @@ def test_two_hosts_with_a_key_each_are_told_apart(board, host):
     other.close()
 
 
+def test_the_time_of_a_connecting_board_is_signed_but_not_echoed(board):
+    class Echoing(SigningHost):
+        """Echoes also what a connecting board says, against docs/protocol.md 4.2."""
+        def echo_of(self, heartbeat):
+            return int(heartbeat['T'])
+
+    eager = Echoing(board.url, 3, KEY)
+    assert not eager.run(lambda: eager.state, 2)
+    assert eager.nonce is not None and eager.echo != 0
+    assert 'wrong tag' not in [each.get('rejected') for each in board.log]
+    eager.close()
+    patient = SigningHost(board.url, 3, KEY)
+    patient.connect()
+    patient.close()
+
+
+def test_a_wrong_key_is_told_at_once_also_of_a_board_that_was_just_stopped(board, tmp_path):
+    key = write_key(tmp_path / 'key', f'3:{KEY.hex()}')
+    wrong = write_key(tmp_path / 'wrong', f'3:{OTHER.hex()}')
+    for _ in range(3):
+        assert run('send', board.host_url, 'E:CLEAR', 'O:358,1,1', '--key', key).returncode == 0
+        assert run('stop', board.host_url, '--key', key).returncode == 0
+        with monitor(board.host_url, '--key', wrong) as watcher:
+            told = watcher.next(lambda each: each['type'] == 'link' and 'key' in each['fields'])
+        assert told['fields']['key'] == 'not taken'
+        sent = run('send', board.host_url, 'O:99,1,1', '--timeout', '1', '--key', wrong)
+        assert sent.returncode == 3 and 'signed with our key' in sent.stderr, sent.stderr
+    assert not [each for each in board.log if 'O:99,1,1' in str(each)]
+
+
 def test_a_monitor_says_that_a_key_is_needed(board):
     with monitor(board.host_url) as watcher:
         watcher.next(lambda each: each['type'] == 'link' and each['fields'].get('key') == 'needed')

@@ -150,17 +150,25 @@ TEST(AuthenticationWithoutChance, TakesNothing) {
 }
 
 TEST_F(TestAuthentication, AnswersSeldomAndNeverWhatTheNetworkRepeatedOrHeldBack) {
-  EXPECT_TRUE(board.rejected(Verdict::missing, 0));
-  EXPECT_FALSE(board.rejected(Verdict::wrong_tag, 99));
-  EXPECT_TRUE(board.rejected(Verdict::unknown_key, 100));
-  EXPECT_FALSE(board.rejected(Verdict::replayed, 1000));
-  EXPECT_FALSE(board.rejected(Verdict::old, 1000));
-  EXPECT_TRUE(board.rejected(Verdict::missing, 1000));
+  EXPECT_TRUE(board.rejected(Verdict::missing, false, 0));
+  EXPECT_FALSE(board.rejected(Verdict::wrong_tag, false, 99));
+  EXPECT_TRUE(board.rejected(Verdict::unknown_key, false, 100));
+  EXPECT_FALSE(board.rejected(Verdict::replayed, false, 1000));
+  EXPECT_FALSE(board.rejected(Verdict::old, false, 1000));
+  EXPECT_TRUE(board.rejected(Verdict::missing, false, 1000));
   EXPECT_EQ(board.rejections(Verdict::missing), 2U);
   EXPECT_EQ(board.rejections(Verdict::unknown_key), 1U);
   EXPECT_EQ(board.rejections(Verdict::wrong_tag), 1U);
   EXPECT_EQ(board.rejections(Verdict::replayed), 1U);
   EXPECT_EQ(board.rejections(Verdict::old), 1U);
+}
+
+TEST_F(TestAuthentication, AnswersCommandsApartFromHeartbeats) {
+  EXPECT_TRUE(board.rejected(Verdict::wrong_tag, false, 0));
+  EXPECT_TRUE(board.rejected(Verdict::wrong_tag, true, 0));
+  EXPECT_FALSE(board.rejected(Verdict::wrong_tag, true, 99));
+  EXPECT_TRUE(board.rejected(Verdict::wrong_tag, false, 100));
+  EXPECT_TRUE(board.rejected(Verdict::wrong_tag, true, 100));
 }
 
 class TestSigner : public TestAuthentication {
