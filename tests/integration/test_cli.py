@@ -185,6 +185,8 @@ NO_BOARD = 'udp://127.0.0.1:9?listen=0'
     (['decode', '/no/such/file'], OPEN, '/no/such/file'),
     (['decode', '/'], OPEN, 'directory'),
     (['sim', '--script', '/no/such/file'], USAGE, '/no/such/file'),
+    (['sim', '--sensors', '0.1'], USAGE, 'add --json'),
+    (['sim', '--json', '--sensors', '0'], USAGE, 'too short'),
     (['sim', '--set', 'pack,2'], USAGE, '--set pack,2'),
     (['sim', '--set', 'colour,red'], USAGE, '--set colour'),
     (['sim', '--board-id', 'a,b'], USAGE, 'cannot be sent'),

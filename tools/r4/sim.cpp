@@ -166,13 +166,13 @@ class SensorClock {
  public:
   SensorClock(asio::io_context& io, Milliseconds period,
               const std::vector<std::unique_ptr<Board>>& boards)
-      : timer_(io, std::chrono::steady_clock::now()), period_(period), boards_(boards) {
+      : timer_(io), period_(period), boards_(boards) {
     wait();
   }
 
  private:
   void wait() {
-    timer_.expires_at(timer_.expiry() + period_);
+    timer_.expires_after(period_);
     timer_.async_wait([this](const std::error_code& error) {
       if (error) return;
       for (const auto& board : boards_) board->tell_sensors();
