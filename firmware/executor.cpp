@@ -6,9 +6,20 @@ namespace firmware {
 
 namespace {
 
+constexpr int supply_relay = 1;  // of the motors (docs/safety.md)
+
 void set_relay(std::uint8_t& relays, int channel, bool on) {
   const unsigned bit = 1U << static_cast<unsigned>(channel - 1);
   relays = static_cast<std::uint8_t>(on ? relays | bit : relays & ~bit);
+}
+
+// The motor supply is about to close: a motor that was commanded while it had none, or by a command that
+// a network held back, must not start by that.
+void stop_motors(Outputs& outputs) {
+  for (Drive& channel : outputs.osmc) channel.pwm = 0;
+  for (Drive& channel : outputs.dhb12) channel.pwm = 0;
+  for (Bldc& channel : outputs.bldc) channel.speed = 0;
+  for (StepperTarget& channel : outputs.stepper) channel = StepperTarget();
 }
 
 }  // namespace
@@ -32,6 +43,9 @@ Refusal carry_out(const Command& command, Setpoints& setpoints) {
       outputs.servo_us[i] = value;
       break;
     case CommandKind::relay:
+      if (command.channel == supply_relay && command.on && (outputs.relays & 1) == 0) {
+        stop_motors(outputs);
+      }
       set_relay(outputs.relays, command.channel, command.on);
       break;
     case CommandKind::stepper:

@@ -17,7 +17,7 @@ using Lines = std::vector<std::string>;
 using ApplicationCommand = test::BoardInControl;
 
 TEST_F(ApplicationCommand, EveryOutputDoesWhatItIsTold) {
-  for (const char* field : {"O:4095,1,1", "O:1,0,4", "D:7,1,2", "S:2500,16", "R:1,On", "R:8,1",
+  for (const char* field : {"R:1,On", "O:4095,1,1", "O:1,0,4", "D:7,1,2", "S:2500,16", "R:8,1",
                             "R:2,on", "R:2,Off", "P:-100,20000,1", "P:5,4", "B:4095,1,1,3"}) {
     host.command(field);
   }

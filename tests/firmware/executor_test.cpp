@@ -23,15 +23,16 @@ TEST(Executor, ChangesWhatTheCommandNamesAndNothingElse) {
     EXPECT_TRUE(same(setpoints, expected)) << static_cast<int>(command.kind);
   };
 
+  expected.outputs.relays = 0x01;
+  expect(Command::relay(1, true));
   expected.outputs.osmc[0] = {4095, Direction::forward};
   expect(Command::osmc(4095, Direction::forward, 1));
   expected.outputs.dhb12[3] = {1, Direction::forward};
   expect(Command::dhb12(1, Direction::forward, 4));
   expected.outputs.servo_us[15] = 2500;
   expect(Command::servo(2500, 16));
-  expected.outputs.relays = 0x80;
-  expect(Command::relay(8, true));
   expected.outputs.relays = 0x81;
+  expect(Command::relay(8, true));
   expect(Command::relay(1, true));
   expected.outputs.relays = 0x01;
   expect(Command::relay(8, false));
@@ -54,6 +55,29 @@ TEST(Executor, ChangesWhatTheCommandNamesAndNothingElse) {
        {Command::heartbeat(), Command::stop(), Command::clear(), Command::identify()}) {
     expect(command);
   }
+}
+
+TEST(Executor, ClosingTheMotorSupplyMovesNothing) {
+  Setpoints setpoints;
+  carry_out(Command::osmc(500, Direction::forward, 4), setpoints);
+  carry_out(Command::dhb12(500, Direction::forward, 2), setpoints);
+  carry_out(Command::bldc(500, Direction::forward, false, 3), setpoints);
+  carry_out(Command::stepper(500, 20, 1), setpoints);
+  carry_out(Command::servo(1500, 1), setpoints);
+  carry_out(Command::relay(2, true), setpoints);
+  carry_out(Command::relay(1, true), setpoints);
+  const Outputs& outputs = setpoints.outputs;
+  EXPECT_EQ(outputs.osmc[3].pwm, 0);
+  EXPECT_EQ(outputs.dhb12[1].pwm, 0);
+  EXPECT_EQ(outputs.bldc[2].speed, 0);
+  EXPECT_FALSE(outputs.bldc[2].brake) << "a brake is left as it is";
+  EXPECT_FALSE(outputs.stepper[0].enabled);
+  EXPECT_EQ(outputs.servo_us[0], 1500) << "servos are not on that supply";
+  EXPECT_EQ(outputs.relays, 0b11);
+
+  carry_out(Command::osmc(500, Direction::forward, 4), setpoints);
+  carry_out(Command::relay(1, true), setpoints);
+  EXPECT_EQ(outputs.osmc[3].pwm, 500) << "it is closed already";
 }
 
 TEST(Executor, ChangesNothingWhenItRefuses) {

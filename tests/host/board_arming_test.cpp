@@ -126,6 +126,15 @@ TEST(BoardArming, ArmsABoardThatIsStopped) {
   board.osmc(1).set(358, Direction::forward);
 }
 
+TEST(BoardArming, ClosingTheSupplyStartsNothingThatWasCommandedBefore) {
+  Board board("sim:", at_will());
+  board.wait_active();
+  board.osmc(1).set(500, Direction::forward);  // as a network delivers it that held it back
+  EXPECT_EQ(driven(board), 500);
+  board.arm();
+  EXPECT_EQ(driven(board), 0);
+}
+
 TEST(BoardArming, CountsThePostsThatAreRefusedAndTellsOfThoseThatTheBoardRefuses) {
   BoardInAThread simulated("pty");
   Board guarded(simulated.url(), at_will());

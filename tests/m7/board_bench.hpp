@@ -151,6 +151,7 @@ class Bench final : public sim::I2cObserver {
   void drive_everything() {
     heartbeat();
     run_ms(2);
+    for (int i = 1; i <= relay_channels; ++i) execute(Command::relay(i, true));
     for (int i = 1; i <= 4; ++i) {
       execute(Command::osmc(1000 + i, Direction::forward, i));
       execute(Command::dhb12(2000 + i, Direction::forward, i));
@@ -159,7 +160,6 @@ class Bench final : public sim::I2cObserver {
     }
     for (int i = 1; i <= servo_channels; ++i) execute(Command::servo(600 + 100 * i, i));
     heartbeat();
-    for (int i = 1; i <= relay_channels; ++i) execute(Command::relay(i, true));
     run_ms(5);
   }
 

@@ -89,6 +89,7 @@ class Day final : private firmware::Port {
   }
   // Drives something else than before.
   void drive() {
+    command("R:1,On");  // the motors have supply
     for (int i = 0; i < 8; ++i) {
       const int channel = static_cast<int>(random_.between(1, 4));
       const int pwm = static_cast<int>(random_.between(1, 4095));
@@ -99,7 +100,6 @@ class Day final : private firmware::Port {
     command("P:" + std::string(random_.below(2) == 0 ? "-" : "") + "1000000,5000," + channel);
     command("S:1500," + std::to_string(random_.between(1, 16)));
     command("B:2000,1,0,1");
-    command("R:1,On");  // the motors have supply
     live(1);
     ASSERT_FALSE(board_.pins().is_safe());
   }

@@ -143,8 +143,8 @@ void expect_steppers(const ControlledBoard& board) {
 
 // A motor runs, and the relay of the dead-man's handle is closed.
 void drive(const ControlledBoard& board) {
-  board.command("O:500,1,1");
   board.command("R:1,On");
+  board.command("O:500,1,1");
   EXPECT_EQ(pins_of(board).osmc[0].pwm, 500);
   EXPECT_EQ(pins_of(board).relays, 1);
   EXPECT_EQ(board.next_state().relays, 1);

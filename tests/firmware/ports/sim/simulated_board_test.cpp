@@ -236,6 +236,7 @@ TEST_F(SimulatedBoardTest, EveryOutputRegisterIsSafeInTimeWhenTheHostFallsSilent
     connect();
     command("C:heartbeat,50");
     command("C:timeout," + std::to_string(timeout_ms));
+    for (int i = 1; i <= relay_channels; ++i) command("R:" + std::to_string(i) + ",On");
     for (int i = 1; i <= 4; ++i) {
       const std::string channel = std::to_string(i);
       for (const std::string drive : {"O:4095,1,", "D:1,1,", "B:4095,1,0,", "P:-1000000,20000,"}) {
@@ -243,7 +244,6 @@ TEST_F(SimulatedBoardTest, EveryOutputRegisterIsSafeInTimeWhenTheHostFallsSilent
       }
     }
     for (int i = 1; i <= servo_channels; ++i) command("S:2500," + std::to_string(i));
-    for (int i = 1; i <= relay_channels; ++i) command("R:" + std::to_string(i) + ",On");
     run(10);
     expect_all_driven(board_->model().chips());
     for (const Pins::Stepper& stepper : board_->model().pins().stepper) {
