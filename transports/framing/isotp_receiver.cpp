@@ -98,16 +98,17 @@ IsotpArrival IsotpReceiver::on_consecutive(const CanFrame& frame, std::uint32_t 
     ++counters_.unexpected_frame;
     return {false, IsotpError::unexpected_frame};
   }
-  // Before its length: one that comes in the place of another tells of a loss whatever its length
-  // is, and if it were passed over, a frame of the next transfer could take the lost one's place.
-  if ((frame.data[0] & 0xF) != sequence_) {
-    return {false, fail(IsotpError::wrong_sequence_number, counters_.wrong_sequence_number)};
-  }
   const std::uint32_t left = size_ - received_;
   const std::uint32_t room = rx_dl_ - 1U;
   const std::uint32_t chunk = left < room ? left : room;
+  const bool follows = (frame.data[0] & 0xF) == sequence_;
   // Only the last one may be shorter than the first frame (9.6.4.1).
-  if (frame.size > rx_dl_ || frame.size <= chunk) return malformed();
+  if (frame.size > rx_dl_ || frame.size <= chunk || !follows) {
+    // Its number comes before its length: one in the place of another tells of a loss whatever its
+    // length is. If it were passed over, a frame of the next transfer could take the lost one's place.
+    if (follows) return malformed();
+    return {false, fail(IsotpError::wrong_sequence_number, counters_.wrong_sequence_number)};
+  }
   if (chunk == max_classic_size - 1) {  // nearly always: a copy of known size needs no call
     std::memcpy(buffer_ + received_, frame.data + 1, max_classic_size - 1);
   } else {
