@@ -176,13 +176,16 @@ class Fuzz {
       next_ = 1;
       in_order_ = true;
       flow_control_late_ = false;
-    } else if ((frame.data[0] & 0xF) != next_) {
-      in_order_ = false;
     }
-    const std::uint32_t passed_over = receiver_.counters().malformed;
+    const std::uint32_t malformed = receiver_.counters().malformed;
+    const std::uint32_t unexpected = receiver_.counters().unexpected_frame;
     const std::uint32_t delivered = receiver_.counters().datagrams;
     take(frame);
-    if (consecutive && receiver_.counters().malformed == passed_over) next_ = (next_ + 1) & 0xF;
+    // One that comes while none is waited for is not within a datagram.
+    if (consecutive && receiver_.counters().unexpected_frame == unexpected) {
+      in_order_ = in_order_ && (frame.data[0] & 0xF) == next_;
+      if (receiver_.counters().malformed == malformed) next_ = (next_ + 1) & 0xF;
+    }
     if (receiver_.counters().datagrams == delivered || any_foreign_) return;
     require(in_order_);
     if (controlled_ && !listens_only_ && !flow_control_late_) require(is_of_the_sender());
