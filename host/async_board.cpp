@@ -11,6 +11,7 @@
 
 #include "../transports/registry.hpp"
 #include "callback.hpp"
+#include "link_timing.hpp"
 
 namespace r4 {
 
@@ -47,6 +48,12 @@ struct AsyncBoard::Impl final : Carrier::Handler,
     Ticket ticket = 0;
     CompletionPtr completion;
   };
+  // Who waits until the board is active.
+  struct Waiter {
+    Time started{0};
+    Time deadline{0};
+    CompletionPtr completion;
+  };
   struct Ended {
     CommandResult result;
     CompletionPtr completion;
@@ -55,6 +62,7 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   Impl(asio::io_context& context, std::unique_ptr<Carrier> transport, BoardOptions options)
       : io(context),
         carrier(std::move(transport)),
+        heartbeat_ms(options.session.timing.heartbeat_ms),
         session(*this, with_clock(std::move(options.session)), Session::random_first_pnum()),
         timer(context) {
     waiting.reserve(Session::max_pending + Session::max_stops);
@@ -112,21 +120,48 @@ struct AsyncBoard::Impl final : Carrier::Handler,
         ended.erase(ended.begin());
         guarded([&] { first.completion.release()->complete(first.result, how); });
       }
-      if (!poll_wanted || !is_open) break;
-      poll_wanted = false;
-      due = session.poll(now);
+      if (poll_wanted && is_open) {
+        poll_wanted = false;
+        due = session.poll(now);
+      } else if (!end_waits()) {
+        break;
+      }
     }
     if (is_open) arm();
+  }
+
+  // Ends the waits that are over; false if none is.
+  bool end_waits() {
+    const LinkStatus& link = session.link();
+    const bool active = link.state == HostLinkState::active && link.in_control;
+    bool any = false;
+    for (std::size_t i = 0; i < waiters.size();) {
+      Waiter& waiter = waiters[i];
+      const Outcome outcome = !is_open ? Outcome::cancelled
+                              : active ? Outcome::confirmed
+                                       : Outcome::timed_out;
+      if (outcome == Outcome::timed_out && now < waiter.deadline) {
+        ++i;
+        continue;
+      }
+      any = true;
+      ended.push_back(
+          {{outcome, Refusal::none, now - waiter.started}, std::move(waiter.completion)});
+      waiters.erase(waiters.begin() + static_cast<std::ptrdiff_t>(i));
+    }
+    return any;
   }
 
   // --- time
 
   // The timer is only set when it must ring earlier than it will; ringing early costs one poll.
   void arm() {
-    if (armed && armed_for <= due) return;
+    Time next = due;
+    for (const Waiter& waiter : waiters) next = std::min(next, waiter.deadline);
+    if (armed && armed_for <= next) return;
     armed = true;
-    armed_for = due;
-    timer.expires_at(std::chrono::steady_clock::time_point(due));
+    armed_for = next;
+    timer.expires_at(std::chrono::steady_clock::time_point(next));
     timer.async_wait([self = shared_from_this()](const std::error_code& error) {
       if (!error) self->on_timer();
     });
@@ -255,6 +290,7 @@ struct AsyncBoard::Impl final : Carrier::Handler,
 
   asio::io_context& io;
   std::unique_ptr<Carrier> carrier;
+  const std::uint32_t heartbeat_ms;  // between ours
   Session session;
   BoardIdentity identity;
 
@@ -274,6 +310,7 @@ struct AsyncBoard::Impl final : Carrier::Handler,
 
   std::vector<Waiting> waiting;
   std::vector<Ended> ended;
+  std::vector<Waiter> waiters;
   int depth = 0;  // calls of enter() and settle() under way
   bool poll_wanted = false;
   Completion::How how = Completion::How::post;
@@ -325,6 +362,67 @@ void AsyncBoard::start_identify(Duration timeout, CompletionPtr completion) {
   Impl& impl = *impl_;
   impl.begin(std::move(completion),
              [&] { return impl.session.identify(time_of(timeout), impl.now); });
+}
+
+void AsyncBoard::start_wait_active(Duration timeout, CompletionPtr completion) {
+  Impl& impl = *impl_;
+  impl.enter(Completion::How::post, [&] {
+    impl.waiters.push_back({impl.now, impl.now + time_of(timeout), std::move(completion)});
+  });
+}
+
+// Sets one setting after the other; the user's completion is told how the last ended.
+class AsyncBoard::TimingSteps final : public Completion {
+ public:
+  TimingSteps(Impl& impl, LinkTimingSteps steps, Time timeout, CompletionPtr completion)
+      : impl_(impl),
+        steps_(steps),
+        started_(steady_now()),
+        deadline_(started_ + timeout),
+        completion_(std::move(completion)) {}
+
+  static void begin(std::unique_ptr<TimingSteps, Destroy> self) {
+    TimingSteps& steps = *self;
+    steps.impl_.begin(std::move(self), [&steps] {
+      const LinkTimingStep& step = steps.steps_[steps.done_];
+      const std::string value = std::to_string(step.ms);
+      const Time left = std::max(Time{0}, steps.deadline_ - steps.impl_.now);
+      return steps.impl_.session.send(Command::setting(step.key, Text(value)), left,
+                                      steps.impl_.now);
+    });
+  }
+
+  void complete(const CommandResult& result, How how) override {
+    std::unique_ptr<TimingSteps, Destroy> self(this);
+    if (result.outcome == Outcome::confirmed && ++done_ < steps_.count) {
+      begin(std::move(self));
+      return;
+    }
+    CommandResult whole = result;
+    whole.elapsed = steady_now() - started_;
+    const CompletionPtr::pointer users = completion_.release();
+    self.reset();
+    users->complete(whole, how);
+  }
+  void destroy() noexcept override { delete this; }
+
+ private:
+  Impl& impl_;  // which owns this
+  LinkTimingSteps steps_;
+  std::size_t done_ = 0;
+  Time started_, deadline_;
+  CompletionPtr completion_;
+};
+
+void AsyncBoard::require_link_timing(Duration board_timeout, Duration heartbeat) const {
+  r4::require_link_timing(board_timeout, heartbeat, Duration{impl_->heartbeat_ms});
+}
+
+void AsyncBoard::start_link_timing(Duration board_timeout, Duration heartbeat, Duration timeout,
+                                   CompletionPtr completion) {
+  TimingSteps::begin(std::unique_ptr<TimingSteps, Destroy>(
+      new TimingSteps(*impl_, link_timing_steps(board_timeout, heartbeat), time_of(timeout),
+                      std::move(completion))));
 }
 
 void AsyncBoard::require_sendable(const Command& command) const {

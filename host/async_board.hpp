@@ -104,6 +104,35 @@ class AsyncBoard {
         token, timeout);
   }
 
+  // void(CommandResult). Confirmed as soon as the board is ACTIVE and takes our commands, so that the
+  // first post() goes out; timed out, if it does not come to that. A timeout of 0 only looks.
+  template <class Token>
+  auto async_wait_active(Duration timeout, Token&& token) {
+    require_wait("async_wait_active()", timeout);
+    return asio::async_initiate<Token, void(CommandResult)>(
+        [this](auto handler, Duration t) {
+          start_wait_active(t, make_completion(std::move(handler)));
+        },
+        token, timeout);
+  }
+  // void(CommandResult). Sets the board's timeout and heartbeat interval together, whatever they are
+  // now; one of them alone may be refused, for the interval must stay below the timeout. Throws
+  // Error{usage} for values outside their ranges, and for a timeout that our own heartbeats
+  // (SessionOptions::timing) cannot keep.
+  template <class Token>
+  auto async_link_timing(Duration board_timeout, Duration heartbeat, Duration timeout,
+                         Token&& token) {
+    require_timeout("async_link_timing()", timeout);
+    require_link_timing(board_timeout, heartbeat);
+    return asio::async_initiate<Token, void(CommandResult)>(
+        [this](auto handler, Duration b, Duration h, Duration t) {
+          start_link_timing(b, h, t, make_completion(std::move(handler)));
+        },
+        token, board_timeout, heartbeat, timeout);
+  }
+  // Throws Error{usage} for what async_link_timing() cannot set.
+  void require_link_timing(Duration board_timeout, Duration heartbeat) const;
+
   // Sends once, without confirmation, and says why it did not; on_refused() tells if the board refuses
   // it. Throws Error{usage}.
   PostResult post(const Command& command);
@@ -172,8 +201,12 @@ class AsyncBoard {
   void start_stop(Duration timeout, CompletionPtr completion);
   void start_arm(Duration timeout, CompletionPtr completion);
   void start_identify(Duration timeout, CompletionPtr completion);
+  void start_wait_active(Duration timeout, CompletionPtr completion);
+  void start_link_timing(Duration board_timeout, Duration heartbeat, Duration timeout,
+                         CompletionPtr completion);
 
   struct Impl;
+  class TimingSteps;
   std::shared_ptr<Impl> impl_;
 };
 

@@ -6,6 +6,7 @@
 #include <asio/io_context.hpp>
 #include <asio/post.hpp>
 #include <condition_variable>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -59,6 +60,10 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
     }
     Command command;
     std::string text, text2;
+    const Clock::time_point called = Clock::now();
+    // For what is not one command: has the loop begin it, with the time that is left.
+    using End = std::function<void(const CommandResult&)>;
+    std::function<void(Duration left, End end)> start;
     bool begun = false;
     bool abandoned = false;
     bool arms = false;  // arm(): there is no command
@@ -171,6 +176,8 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
     auto end = [this, call](const CommandResult& result) { finish(*call, result); };
     if (call->arms) {
       async.async_arm(left, std::move(end));
+    } else if (call->start) {
+      call->start(left, std::move(end));
     } else if (stop) {
       async.async_stop(left > Duration{0} ? left : default_timeout, std::move(end));
     } else if (call->command.kind == CommandKind::identify) {
@@ -184,6 +191,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
     {
       const std::lock_guard lock(mutex);
       call.result = result;
+      call.result.elapsed = std::chrono::duration_cast<Time>(Clock::now() - call.called);
       call.link = async.link();
       call.identity = async.identity();
       call.done = true;
@@ -227,7 +235,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   }
   CallPtr execute(const std::string& text, CallPtr call, Duration timeout) {
     must_not_be_in_loop(text);
-    const auto deadline = Clock::now() + bounded(timeout);
+    const auto deadline = call->called + bounded(timeout);
     std::unique_lock lock(mutex);
     if (closed) throw closed_error(text);
     asio::post(io, [this, call, deadline] { begin(call, deadline); });
@@ -447,6 +455,19 @@ void Board::fields(std::string_view names, Duration timeout) {
 }
 void Board::setting(std::string_view key, std::string_view value, Duration timeout) {
   send("C:" + std::string(key) + "," + std::string(value), timeout);
+}
+
+void Board::link_timing(Duration board_timeout, Duration heartbeat, Duration timeout) {
+  const std::string text = "C:timeout," + std::to_string(board_timeout.count()) + " C:heartbeat," +
+                           std::to_string(heartbeat.count());
+  require_timeout(text, timeout);
+  const auto impl = impl_;
+  impl->async.require_link_timing(board_timeout, heartbeat);
+  const auto call = std::make_shared<Impl::Call>(Command());
+  call->start = [&async = impl->async, board_timeout, heartbeat](Duration left, auto end) {
+    async.async_link_timing(board_timeout, heartbeat, left, std::move(end));
+  };
+  impl->execute(text, call, timeout);
 }
 
 BoardIdentity Board::identify(Duration timeout) {

@@ -150,6 +150,10 @@ class Board {
   void proximity(int channel, int threshold_cm, Duration timeout = default_timeout);  // 0: off
   void fields(std::string_view names, Duration timeout = default_timeout);  // "DEFAULT,ENC1"
   void setting(std::string_view key, std::string_view value, Duration timeout = default_timeout);
+  // The board's timeout and heartbeat interval together, whatever they are now: one of them alone may
+  // be refused, for the interval must stay below the timeout. Throws Error{usage} for what cannot be,
+  // and for a timeout that our own heartbeats (SessionOptions::timing) cannot keep.
+  void link_timing(Duration board_timeout, Duration heartbeat, Duration timeout = default_timeout);
 
   // --- what the board says
 
@@ -180,6 +184,10 @@ class Board {
 
   // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. Throws
   // Error{usage} for less than nothing and more than an hour. feed() costs no system call.
+  //
+  // A blocking call does not feed: nobody looks after the robot while its thread waits. If it outlasts
+  // the period, nothing of it is sent any more but a stop, the heartbeats stop with it, and it throws at
+  // its timeout. So give the calls of the thread that feeds timeouts below the period.
   void watchdog(Duration period);
   void feed();
 

@@ -14,8 +14,8 @@ struct Words {
   std::string fix;
 };
 
-Words safe_words(SafeReason reason) {
-  switch (reason) {
+Words safe_words(const LinkStatus& link) {
+  switch (link.reason) {
     case SafeReason::link:
       return {"the board is safe: it does not hear our heartbeats",
               "check the way from here to the board (firewall, cable); the link comes back by "
@@ -26,12 +26,20 @@ Words safe_words(SafeReason reason) {
     case SafeReason::handle:
       return {"the board is safe: the dead-man's handle is released", "hold the handle"};
     case SafeReason::proximity:
-      return {"the board is safe: something is nearer than a proximity threshold",
-              "clear the way, or change the threshold with U:cm,ch (0 turns it off)"};
+      return {
+          "the board is safe: something is nearer than a proximity threshold, or its sensor does "
+          "not answer",
+          "look at US1 to US4 of the state (F:DEFAULT,US1,US2,US3,US4), clear the way, or change "
+          "the threshold with U:cm,ch (0 turns it off)"};
     case SafeReason::watchdog:
       return {"the board is safe: a duty of its firmware missed its deadline",
               "find out why, then send E:CLEAR or restart the board"};
     case SafeReason::fault:
+      if (link.chip.any()) {
+        return {fmt::format("the board is safe: {}: {}", chip_name(link.chip.address),
+                            to_text(link.chip.trouble)),
+                "check that chip's supply and wiring, then send E:CLEAR"};
+      }
       return {"the board is safe: it found a fault in itself",
               "check its chips and wiring, then send E:CLEAR or restart it"};
     case SafeReason::none:
@@ -87,9 +95,15 @@ Words disarm_words(DisarmCause cause) {
 }
 
 Words link_words(const LinkStatus& link) {
+  if (link.transport_down) {
+    return {"the transport is down: unplugged, or its interface is switched off",
+            "plug it in or switch it on; it is opened again by itself"};
+  }
   if (link.gated) {
-    return {"the application watchdog has stopped our heartbeats",
-            "call feed() at least once in the watchdog's period"};
+    return {
+        "the application watchdog has stopped our heartbeats and commands",
+        "call feed() at least once in the watchdog's period; a call that waits does not feed: give "
+        "it a timeout below that period"};
   }
   if (link.busy) {
     return {"another host controls the board",
@@ -107,10 +121,11 @@ Words link_words(const LinkStatus& link) {
       return {"the board has fallen silent",
               "check its power, cable and network; the link comes back by itself"};
     case HostLinkState::safe:
-      return safe_words(link.reason);
+      return safe_words(link);
     case HostLinkState::active:
       break;
   }
+  if (link.in_control) return {"the board is active and takes our commands", ""};
   return {"the board streams its state, but has confirmed no command of ours yet",
           "allow more time; `r4 bench` shows how many datagrams are lost"};
 }
@@ -143,10 +158,16 @@ Words refusal_words(std::string_view command, Refusal code, const LinkStatus& li
         words.reason = fmt::format("refused by the board: RANGE (it holds {} keys)", max_keys);
         words.fix = "take one away: C:key,id:off";
       }
+      if (code == Refusal::range &&
+          (command.starts_with("C:timeout,") || command.starts_with("C:heartbeat,"))) {
+        words.fix =
+            "the board's heartbeat interval must stay below its timeout: set both in one step, "
+            "r4 send URL C:timeout,MS C:heartbeat,MS or link_timing()";
+      }
       break;
     case Refusal::safe:
       if (link.state == HostLinkState::safe) {
-        const Words why = safe_words(link.reason);
+        const Words why = safe_words(link);
         words.reason = fmt::format("refused by the board: SAFE ({})", why.reason);
         words.fix = why.fix;
       } else {
@@ -170,6 +191,27 @@ Words refusal_words(std::string_view command, Refusal code, const LinkStatus& li
   return words;
 }
 
+// What keeps heartbeats and commands back (the watchdog, another host, a key) does not keep a stop.
+Words unconfirmed_stop_words(const CommandResult& result, LinkStatus link) {
+  link.gated = link.busy = false;
+  link.key = KeyTrouble::none;
+  Words why = link_words(link);
+  if (link.state == HostLinkState::active && !link.transport_down) {
+    why = {"the board streams its state, and reports no stop", ""};
+  }
+  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(result.elapsed).count();
+  Words words{
+      result.outcome == Outcome::timed_out
+          ? fmt::format("the stop was not confirmed within {} ms: {}", ms, why.reason)
+          : "the stop was not confirmed: it was given up, for the board was closed or too many "
+            "wait already",
+      std::string(stop_last_resort)};
+  if (!why.fix.empty()) words.fix += "; " + why.fix;
+  return words;
+}
+
+bool is_stop(std::string_view command) { return command.starts_with("E:STOP"); }
+
 }  // namespace
 
 Problem explain(KeyTrouble trouble) {
@@ -191,6 +233,11 @@ Problem explain(std::string_view name, const LinkStatus& link) {
 
 Problem explain(std::string_view command, const CommandResult& result, const LinkStatus& link) {
   Words words;
+  if (is_stop(command) && result.outcome != Outcome::confirmed) {
+    words = unconfirmed_stop_words(result, link);
+    return {ErrorKind::refused, std::string(command), std::move(words.reason),
+            std::move(words.fix)};
+  }
   switch (result.outcome) {
     case Outcome::confirmed:
       words.reason = "confirmed by the board's state";

@@ -13,6 +13,19 @@ namespace r4 {
 // What to do where a stop is not confirmed.
 inline constexpr std::string_view stop_last_resort = "CUT THE POWER if it must stop now";
 
+// "up", "down", "warning".
+constexpr const char* to_text(CarrierEvent::Kind kind) {
+  switch (kind) {
+    case CarrierEvent::Kind::up:
+      return "up";
+    case CarrierEvent::Kind::down:
+      return "down";
+    case CarrierEvent::Kind::warning:
+      break;
+  }
+  return "warning";
+}
+
 // How the link is and, where something is wrong with it, what to do: "another host controls the
 // board" and "stop it, or …". `thing` is the board's name. Of kind refused.
 Problem explain(std::string_view name, const LinkStatus& link);

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "../transports/error.hpp"
+#include "link_timing.hpp"
 #include "session.hpp"
 
 namespace r4 {
@@ -45,6 +46,26 @@ void require_wait(std::string_view what, std::chrono::milliseconds timeout) {
   if (timeout.count() >= 0) return;
   throw Error(ErrorKind::usage, fmt::format("{} within {} ms", what, timeout.count()),
               "is a time in the past", "give a timeout; 0 only looks how it is");
+}
+
+void require_link_timing(std::chrono::milliseconds timeout, std::chrono::milliseconds heartbeat,
+                         std::chrono::milliseconds ours) {
+  require("a board's timeout", timeout.count(), least_timeout_ms, 10'000);
+  require("a board's heartbeat interval", heartbeat.count(), least_heartbeat_ms, 1000);
+  const std::string thing =
+      fmt::format("timeout {} ms, heartbeat {} ms", timeout.count(), heartbeat.count());
+  if (heartbeat >= timeout) {
+    throw Error(ErrorKind::usage, thing, "the heartbeat interval is not below the timeout",
+                "give a shorter interval, such as a third of the timeout");
+  }
+  if (timeout < 2 * ours) {
+    throw Error(
+        ErrorKind::usage, thing,
+        fmt::format("our own heartbeats come every {} ms only: the board would go safe again "
+                    "and again",
+                    ours.count()),
+        fmt::format("set SessionOptions::timing.heartbeat_ms to {} first", timeout.count() / 3));
+  }
 }
 
 void require_watchdog(std::chrono::milliseconds period) {

@@ -23,4 +23,9 @@ void require_wait(std::string_view what, std::chrono::milliseconds timeout);
 // The period of the application watchdog: up to an hour; 0 turns it off.
 void require_watchdog(std::chrono::milliseconds period);
 
+// The board's timeout and heartbeat interval, set together, by a host that sends heartbeats every
+// `ours`: two of them must come in each timeout.
+void require_link_timing(std::chrono::milliseconds timeout, std::chrono::milliseconds heartbeat,
+                         std::chrono::milliseconds ours);
+
 }  // namespace r4

@@ -21,6 +21,24 @@ constexpr Time selection_reminder = std::chrono::seconds{1};
 
 }  // namespace
 
+const char* to_text(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::confirmed:
+      return "confirmed";
+    case Outcome::refused:
+      return "refused";
+    case Outcome::timed_out:
+      return "timed out";
+    case Outcome::cancelled:
+      return "cancelled";
+    case Outcome::full:
+      return "full";
+    case Outcome::not_armed:
+      return "not armed";
+  }
+  return "unknown";
+}
+
 std::uint32_t Session::random_first_pnum() {
   std::random_device random;
   return echo_host_first_pnum + (random() & 0x3fffffffU);
@@ -341,6 +359,7 @@ Time Session::poll(Time now) {
 }
 
 void Session::on_transport(bool up, Time now) {
+  transport_down_ = !up;
   link_.on_transport(up);
   refresh_status(now);
 }
@@ -363,7 +382,7 @@ bool Session::link_up() const {
 // session that the board has not accepted, where a refusal would say nothing.
 bool Session::in_control(Time now) const {
   const bool proven = controlled_ || options_.fields.empty() || speaks_no_cmd();
-  return link_up() && busy_until_ <= now && proven;
+  return link_up() && busy_until_ <= now && proven && !link_.watchdog_expired(to_ms(now));
 }
 
 // The paper's release: it has let our selections pass, and has never answered anything.
@@ -383,8 +402,16 @@ void Session::refresh_status(Time now) {
     doubt_sent();
   }
   look_at_arming();
-  const LinkStatus fresh{link_.state(), link_.reason(), busy_until_ > now,
-                         link_.watchdog_expired(to_ms(now)), key_.trouble(now)};
+  const LinkStatus fresh{
+      .state = link_.state(),
+      .reason = link_.reason(),
+      .busy = busy_until_ > now,
+      .gated = link_.watchdog_expired(to_ms(now)),
+      .key = key_.trouble(now),
+      .in_control = in_control(now),
+      .transport_down = transport_down_,
+      .chip = link_.reason() == SafeReason::fault ? state_.fault : ChipFault(),
+  };
   if (fresh == status_) return;
   status_ = fresh;
   handler_.on_link(status_);

@@ -52,6 +52,9 @@ struct LinkStatus {
   bool busy = false;                     // another host controls the board
   bool gated = false;                    // the application watchdog has stopped our heartbeats
   KeyTrouble key = KeyTrouble::none;
+  bool in_control = false;      // the board takes our commands: they go out at once
+  bool transport_down = false;  // it is gone: unplugged, its interface switched off
+  ChipFault chip{};             // of a fault: the chip that is the cause, if it is one
   friend bool operator==(const LinkStatus&, const LinkStatus&) = default;
 };
 
@@ -65,6 +68,9 @@ enum class Outcome : std::uint8_t {
   not_armed,  // not sent: it drives an output and the session is not armed, because of `disarmed`;
               // arm() itself: it cannot be armed while that is so
 };
+
+// "confirmed", "refused", "timed out" …
+const char* to_text(Outcome outcome);
 
 struct CommandResult {
   Outcome outcome = Outcome::timed_out;
@@ -155,12 +161,13 @@ class Session {
   void cancel_all(Time now);
 
   // The application watchdog: without feed() for `period` the heartbeats stop, and the board goes
-  // safe. 0 turns it off.
+  // safe; commands are held back, too, for nobody looks after what they do. 0 turns it off.
   void watchdog(std::chrono::milliseconds period, Time now);
   void feed(Time now);
 
   const LinkStatus& link() const { return status_; }
-  // The link is up and the board has executed a command of ours: commands go out at once.
+  // The link is up, the board has executed a command of ours, and the watchdog has not expired:
+  // commands go out at once.
   bool in_control(Time now) const;
   // Why the session is not armed; none if it is.
   DisarmCause disarmed_by() const { return arming_.cause(); }
@@ -223,6 +230,7 @@ class Session {
   std::uint32_t first_pnum_;
   HostLink link_;
   HostKey key_;
+  bool transport_down_ = false;
   bool controlled_ = false;  // the board has executed a command of ours since the link came up
   LinkStatus status_;
   ReceivedState state_;

@@ -140,13 +140,21 @@ void Session::send_queued(Time now) {
   if (!in_control(now)) return;
   for (Pending& pending : pending_.under_way()) {
     if (pending.role == Pending::Role::arm) return;  // it comes first
-    if (pending.stage == Stage::queued && !is_held_back(pending.kind)) transmit(pending, now);
+    if (pending.stage == Stage::queued && !is_held_back(pending.kind) && now < pending.deadline) {
+      transmit(pending, now);
+    }
   }
 }
 
 void Session::retry_due(Time now) {
+  const bool gated = link_.watchdog_expired(to_ms(now));
   for (Pending& pending : pending_.under_way()) {
-    if (pending.stage == Stage::sent && now >= pending.retry) transmit(pending, now);
+    if (pending.stage != Stage::sent || now < pending.retry) continue;
+    if (gated && pending.kind != CommandKind::stop) {
+      pending.retry = now + options_.command_retry;
+    } else {
+      transmit(pending, now);
+    }
   }
 }
 

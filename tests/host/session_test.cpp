@@ -52,20 +52,26 @@ TEST(Session, IsConnectingWhileTheBoardBoots) {
 TEST(Session, BecomesActiveWithTheBoardsStateAndSaysSoOnce) {
   ScriptedLink link;
   link.connect();
-  ASSERT_EQ(link.links.size(), 1U);
+  ASSERT_EQ(link.links.size(), 2U);
   EXPECT_EQ(link.links[0].state, HostLinkState::active);
+  EXPECT_FALSE(link.links[0].in_control);
+  EXPECT_TRUE(link.links[1].in_control);
   link.executed(1);
   link.heartbeat();
-  EXPECT_EQ(link.links.size(), 1U);
+  EXPECT_EQ(link.links.size(), 2U);
 }
 
 TEST(Session, SaysWhyTheBoardIsSafe) {
   ScriptedLink link;
   link.connect();
   link.heartbeat(SafeReason::handle);
-  EXPECT_EQ(link.session.link(), (LinkStatus{HostLinkState::safe, SafeReason::handle}));
+  EXPECT_EQ(
+      link.session.link(),
+      (LinkStatus{.state = HostLinkState::safe, .reason = SafeReason::handle, .in_control = true}));
   link.state("SAFE:4;CMD:1;");
-  EXPECT_EQ(link.session.link(), (LinkStatus{HostLinkState::safe, SafeReason::proximity}));
+  EXPECT_EQ(link.session.link(), (LinkStatus{.state = HostLinkState::safe,
+                                             .reason = SafeReason::proximity,
+                                             .in_control = true}));
   EXPECT_EQ(link.session.state().safe, SafeReason::proximity);
   link.state("SAFE:0;CMD:1;");
   EXPECT_EQ(link.session.link().state, HostLinkState::active);

@@ -16,9 +16,11 @@
 #include "host/async_board.hpp"
 #include "host/command_help.hpp"
 #include "host/explain.hpp"
+#include "host/limits.hpp"
 #include "json.hpp"
 #include "key_file.hpp"
 #include "options.hpp"
+#include "protocol/numbers.hpp"
 #include "subcommands.hpp"
 #include "transports/error.hpp"
 
@@ -59,13 +61,44 @@ bool turns_a_motor(const Command& command) {
   }
 }
 
+bool sets(const Command& command, std::string_view key) {
+  return command.kind == CommandKind::setting && command.text == Text(key);
+}
+
+Milliseconds value_of(const Command& setting) {
+  std::uint32_t ms = 0;
+  parse_number(setting.text2, ms);  // checked with the command
+  return Milliseconds(ms);
+}
+
+// The board's timeout and heartbeat interval, given side by side in any order: one step, since the board
+// may refuse either alone.
+struct LinkTiming {
+  Milliseconds timeout{0};
+  Milliseconds heartbeat{0};
+};
+std::optional<LinkTiming> link_timing_at(const std::vector<Command>& commands, std::size_t i) {
+  if (i + 1 >= commands.size()) return std::nullopt;
+  const Command& a = commands[i];
+  const Command& b = commands[i + 1];
+  if (sets(a, "timeout") && sets(b, "heartbeat")) return LinkTiming{value_of(a), value_of(b)};
+  if (sets(a, "heartbeat") && sets(b, "timeout")) return LinkTiming{value_of(b), value_of(a)};
+  return std::nullopt;
+}
+
 // What a person types is deliberate: it is sent without being armed. Where a motor is to turn, the
-// board is to tell whether relay 1 is closed.
+// board is to tell whether relay 1 is closed. Our heartbeats come so often that the shortest timeout
+// among the commands can live on them.
 BoardOptions board_options(const Options& options, const std::vector<Command>& commands) {
   BoardOptions board_options = with_key(options.key);
   board_options.session.arming = Arming::off;
   if (std::any_of(commands.begin(), commands.end(), turns_a_motor)) {
     board_options.session.fields = "DEFAULT,RELAYS";
+  }
+  for (const Command& command : commands) {
+    if (!sets(command, "timeout")) continue;
+    std::uint32_t& ours = board_options.session.timing.heartbeat_ms;
+    ours = std::min(ours, static_cast<std::uint32_t>(value_of(command).count() / 3));
   }
   return board_options;
 }
@@ -96,7 +129,9 @@ class Sender {
     }
     const Command& command = commands_[next_];
     const auto done = [this](const CommandResult& result) { on_result(result); };
-    if (command.kind == CommandKind::stop) {
+    if (const auto timing = link_timing_at(commands_, next_)) {
+      board_.async_link_timing(timing->timeout, timing->heartbeat, options_.timeout, done);
+    } else if (command.kind == CommandKind::stop) {
       board_.async_stop(options_.timeout, done);
     } else if (command.kind == CommandKind::identify) {
       board_.async_identify(options_.timeout, done);
@@ -106,7 +141,9 @@ class Sender {
   }
 
   void on_result(const CommandResult& result) {
-    const std::string text = shown(commands_[next_]);
+    const std::size_t size = link_timing_at(commands_, next_) ? 2 : 1;
+    std::string text = shown(commands_[next_]);
+    if (size == 2) text += " " + shown(commands_[next_ + 1]);
     const bool confirmed = result.outcome == Outcome::confirmed;
     const Problem problem = explain(text, result, board_.link());
     if (options_.json) {
@@ -119,7 +156,7 @@ class Sender {
       fmt::print("{}  {}\n", text, problem.reason);
     }
     if (!confirmed) {
-      for (std::size_t i = next_ + 1; i < commands_.size() && !options_.json; ++i) {
+      for (std::size_t i = next_ + size; i < commands_.size() && !options_.json; ++i) {
         fmt::print("{}  not sent\n", shown(commands_[i]));
       }
       failure_ = problem;
@@ -135,7 +172,7 @@ class Sender {
           "before it\n",
           text);
     }
-    ++next_;
+    next_ += size;
     send_next();
   }
 
@@ -194,6 +231,12 @@ int send(const Options& options) {
     if (is_url(text)) one_url({options.url, text});
     commands.push_back(command_of(text, options.url));
   }
+  for (std::size_t i = 0; i < commands.size(); ++i) {
+    const auto timing = link_timing_at(commands, i);
+    if (!timing) continue;
+    require_link_timing(timing->timeout, timing->heartbeat, Milliseconds{0});
+    ++i;
+  }
   return Sender(options, commands).run();
 }
 
@@ -208,6 +251,7 @@ Examples:
   r4 send udp://192.168.0.125 R:1,On O:358,1,1 --hold 5      R:1,On: the motors have supply
   r4 send serial:auto R:1,On D:1000,1,1 S:1500,3 R:2,On --hold 60
   r4 send serial:auto E:CLEAR                 after an emergency stop
+  r4 send serial:auto C:timeout,300 C:heartbeat,100     side by side: one step, in any order
   r4 send udp://127.0.0.1 Q:ID                who is it?
 
 Exit codes: 0 all confirmed; 3 one was refused or not confirmed in time; 2 a command or option is

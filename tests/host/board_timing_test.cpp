@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A board's timeout and heartbeat interval are set together; waiting until it is active means control.
+#include <gtest/gtest.h>
+
+#include <asio/io_context.hpp>
+#include <optional>
+
+#include "host/async_board.hpp"
+#include "host/board.hpp"
+#include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/problems.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+Settings settings_of(BoardInAThread& simulated) {
+  Settings settings;
+  for (const std::string& command : simulated.executed()) {
+    if (!command.starts_with("C:")) continue;
+    const auto comma = command.find(',');
+    EXPECT_EQ(set(settings, Text(command.substr(2, comma - 2)), Text(command.substr(comma + 1))),
+              Refusal::none)
+        << command;
+  }
+  return settings;
+}
+
+TEST(BoardTiming, IsSetInOneStepInEitherDirection) {
+  BoardInAThread simulated("udp");
+  BoardOptions options;
+  options.session.timing.heartbeat_ms = 30;
+  Board board(simulated.url(), options);
+  board.wait_active();
+  EXPECT_TRUE(contains(problem_of([&] { board.setting("timeout", "300"); }).fix, "link_timing()"));
+  for (const auto& [timeout, heartbeat] :
+       {std::pair(300, 100), std::pair(100, 50), std::pair(10000, 1000), std::pair(1001, 1000),
+        std::pair(100, 99), std::pair(1000, 500)}) {
+    board.link_timing(std::chrono::milliseconds(timeout), std::chrono::milliseconds(heartbeat), 5s);
+    const Settings settings = settings_of(simulated);
+    EXPECT_EQ(settings.timeout_ms, timeout);
+    EXPECT_EQ(settings.heartbeat_ms, heartbeat);
+  }
+}
+
+TEST(BoardTiming, ThatCannotBeIsRefusedBeforeAnythingIsSent) {
+  Board board("sim:");
+  for (const auto& [timeout, heartbeat] :
+       {std::pair(99ms, 50ms), std::pair(10001ms, 50ms), std::pair(300ms, 49ms),
+        std::pair(300ms, 300ms), std::pair(300ms, 1001ms), std::pair(-1ms, -1ms)}) {
+    EXPECT_EQ(problem_of([&] { board.link_timing(timeout, heartbeat); }).kind, ErrorKind::usage);
+  }
+  const Problem slow = problem_of([&] { board.link_timing(150ms, 50ms); });
+  EXPECT_EQ(slow.kind, ErrorKind::usage);
+  EXPECT_TRUE(contains(slow.reason, "our own heartbeats"));
+  EXPECT_TRUE(contains(slow.fix, "heartbeat_ms"));
+}
+
+TEST(AsyncBoardActive, MeansThatTheFirstPostGoesOut) {
+  BoardInAThread simulated("udp");
+  asio::io_context io;
+  AsyncBoard board(io, simulated.url());
+  board.open();
+  bool posted = false;
+  board.async_wait_active(5s, [&](const CommandResult& result) {
+    EXPECT_EQ(result.outcome, Outcome::confirmed);
+    posted = static_cast<bool>(board.post(Command::setting("rate", "50")));
+    io.stop();
+  });
+  io.run_for(10s);
+  EXPECT_TRUE(posted);
+}
+
+TEST(AsyncBoardActive, EndsAtItsDeadlineOrWithTheBoard) {
+  asio::io_context io;
+  AsyncBoard board(io, "udp://127.0.0.1:9?listen=0");
+  board.open();
+  std::optional<CommandResult> timed_out;
+  std::optional<CommandResult> cancelled;
+  const auto begin = std::chrono::steady_clock::now();
+  board.async_wait_active(5s, [&](const CommandResult& result) { cancelled = result; });
+  board.async_wait_active(20ms, [&](const CommandResult& result) {
+    timed_out = result;
+    board.close();
+  });
+  io.run();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, 4s);
+  ASSERT_TRUE(timed_out && cancelled);
+  EXPECT_EQ(timed_out->outcome, Outcome::timed_out);
+  EXPECT_EQ(cancelled->outcome, Outcome::cancelled);
+}
+
+TEST(BoardStop, OfASilentBoardSaysToCutThePowerAndNothingOfTheWatchdog) {
+  Board board("udp://127.0.0.1:9?listen=0");
+  board.watchdog(10ms);
+  const Problem problem = problem_of([&] { board.stop(100ms); });
+  EXPECT_TRUE(contains(problem.fix, "CUT THE POWER"));
+  EXPECT_EQ(problem.text().find("watchdog"), std::string::npos) << problem.text();
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The application watchdog, and what the link's status tells in words.
+#include <gtest/gtest.h>
+
+#include "host/explain.hpp"
+#include "scripted_link.hpp"
+#include "tests/support/problems.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+const Command drive = Command::osmc(358, Direction::forward, 1);
+
+TEST(SessionWatchdog, HoldsCommandsBackOfAProgramThatDoesNotFeed) {
+  ScriptedLink link;
+  link.connect();
+  link.session.watchdog(300ms, link.now);
+  const Time begin = link.now;
+  const Ticket lost =
+      link.session.send(drive, 1s, link.now);  // a call that waits, and is not heard
+  link.pass(400ms);
+  const std::size_t sent = link.count('O');
+  EXPECT_GT(sent, 3U);
+  EXPECT_LE(link.last('O').at - begin, 310ms) << "nobody looks after what it would do";
+  EXPECT_TRUE(link.session.link().gated);
+  EXPECT_FALSE(link.session.in_control(link.now));
+  const Ticket late = link.session.send(drive, 5s, link.now);
+  link.pass(300ms);
+  EXPECT_EQ(link.count('O'), sent);
+  EXPECT_EQ(link.results.count(lost), 0U);
+
+  link.session.stop(1s, link.now);
+  link.pass(100ms);
+  EXPECT_GE(link.count('E'), 4U) << "a stop is never held back";
+  EXPECT_EQ(link.results.at(late).outcome, Outcome::cancelled);
+}
+
+TEST(SessionWatchdog, FedAgainGivesControlBack) {
+  ScriptedLink link;
+  link.connect();
+  link.session.watchdog(100ms, link.now);
+  link.pass(200ms);
+  link.heartbeat();
+  EXPECT_FALSE(link.session.link().in_control);
+  link.session.feed(link.now);
+  EXPECT_TRUE(link.session.link().in_control);
+  link.session.send(drive, 1s, link.now);
+  EXPECT_EQ(link.count('O'), 1U);
+}
+
+TEST(Session, SendsNothingWhoseDeadlineIsOver) {
+  ScriptedLink link;
+  link.session.send(drive, 100ms, link.now);  // waits for control
+  link.heartbeat();
+  link.pass(10ms);
+  link.now += 750ms;  // the loop was held up
+  link.heartbeat();
+  link.executed(link.last('F').pnum);
+  link.session.post(Command::servo(1500, 1), link.now);
+  link.pass(10ms);
+  EXPECT_EQ(link.count('O'), 0U);
+}
+
+TEST(SessionLink, TellsWhenTheBoardTakesCommands) {
+  ScriptedLink link;
+  link.heartbeat();
+  link.pass(10ms);
+  EXPECT_EQ(link.session.link().state, HostLinkState::active);
+  EXPECT_FALSE(link.session.link().in_control);
+  EXPECT_TRUE(contains(explain("board", link.session.link()).reason, "confirmed no command"));
+  link.executed(link.last('F').pnum);
+  EXPECT_TRUE(link.session.link().in_control);
+  EXPECT_TRUE(link.links.back().in_control) << "on_link tells";
+  EXPECT_EQ(explain("board", link.session.link()).reason,
+            "the board is active and takes our commands");
+}
+
+TEST(SessionLink, TellsThatTheTransportIsDown) {
+  ScriptedLink link;
+  link.connect();
+  link.session.on_transport(false, link.now);
+  EXPECT_TRUE(link.session.link().transport_down);
+  const Problem problem = explain("board", link.session.link());
+  EXPECT_TRUE(contains(problem.reason, "transport is down"));
+  EXPECT_FALSE(problem.fix.empty());
+  link.session.on_transport(true, link.now);
+  EXPECT_FALSE(link.session.link().transport_down);
+}
+
+TEST(SessionLink, TellsWhichChipIsTheFault) {
+  ScriptedLink link;
+  link.connect();
+  link.state("AIN24:24.28;SAFE:6;FAULT:97,1;");
+  EXPECT_EQ(link.session.link().chip, (ChipFault{97, ChipTrouble::no_acknowledge}));
+  const Problem problem = explain("board", link.session.link());
+  EXPECT_TRUE(contains(problem.reason, "MCP4728"));
+  EXPECT_TRUE(contains(problem.reason, "no acknowledge"));
+  link.state("AIN24:24.28;SAFE:0;");
+  EXPECT_FALSE(link.session.link().chip.any());
+}
+
+TEST(Explain, OfAStopThatIsNotConfirmedSaysToCutThePower) {
+  LinkStatus link;
+  link.gated = true;
+  link.busy = true;
+  link.key = KeyTrouble::needed;
+  const CommandResult unheard{Outcome::timed_out, Refusal::none, 1s};
+  const Problem silent = explain("E:STOP", unheard, link);
+  EXPECT_TRUE(contains(silent.reason, "not confirmed within 1000 ms: nothing was heard"));
+  EXPECT_TRUE(silent.fix.starts_with("CUT THE POWER")) << silent.fix;
+  EXPECT_EQ(silent.text().find("watchdog"), std::string::npos) << silent.text();
+  link.state = HostLinkState::active;
+  const Problem drives = explain("E:STOP", unheard, link);
+  EXPECT_TRUE(contains(drives.reason, "reports no stop"));
+  EXPECT_TRUE(drives.fix.starts_with("CUT THE POWER"));
+}
+
+TEST(Texts, NameOutcomesAndCarrierEvents) {
+  EXPECT_STREQ(to_text(Outcome::confirmed), "confirmed");
+  EXPECT_STREQ(to_text(Outcome::timed_out), "timed out");
+  EXPECT_STREQ(to_text(CarrierEvent::Kind::up), "up");
+  EXPECT_STREQ(to_text(CarrierEvent::Kind::down), "down");
+  EXPECT_STREQ(to_text(CarrierEvent::Kind::warning), "warning");
+}
+
+}  // namespace
+}  // namespace r4::test
