@@ -55,6 +55,7 @@ void Application::tell_ports() {
 
 void Application::start(std::uint32_t now_ms) {
   hal_.make_safe();
+  safety_.count_from(now_ms);  // the clock begins at random
   tell_ports();
   if (observer_ != nullptr) {
     observer_->on_state(now_ms, BoardState::connecting, SafeReason::none);
@@ -202,15 +203,18 @@ void Application::on_command(Source from, const Datagram& datagram, Verdict verd
     case Admission::execute:
       break;
   }
-  if (command.kind == CommandKind::clear && !may_clear(now_ms)) {
-    ++rx_refused_;  // dropped: it is too early, and a repetition may come
-    return;
-  }
   const bool held = drives_output(command.kind) && safety_.is_safe();
   if (!held && link_.begins_anew(datagram.pnum())) setpoints_.outputs = Outputs();
-  const Refusal outcome = held                           ? Refusal::safe
-                          : !may_set(from.port, command) ? Refusal::auth
-                                                         : carry_out(command, setpoints_);
+  Refusal outcome = Refusal::none;
+  if (held) {
+    outcome = Refusal::safe;
+  } else if (command.kind == CommandKind::clear) {
+    outcome = judge_clear(command, now_ms);
+  } else if (!may_set(from.port, command)) {
+    outcome = Refusal::auth;
+  } else {
+    outcome = carry_out(command, setpoints_);
+  }
   if (outcome != Refusal::none) {
     link_.refused(from, datagram.pnum());
     refuse(from, datagram, outcome, now_ms);
@@ -256,8 +260,16 @@ void Application::execute(std::uint32_t pnum, const Command& command, std::uint3
 void Application::emergency_stop(Source from, const Datagram& datagram, bool authentic,
                                  std::uint32_t now_ms) {
   const bool repeated = safety_.has(SafeReason::stop);
+  std::uint32_t number = 0;
+  const bool has_number = stop_number(datagram, number);
+  const bool same =
+      repeated && has_number && has_stop_number_ && number == stop_number_ && from == stop_from_;
+  if (repeated && !same) safety_.again();  // an E:CLEAR under way knows nothing of this one
+  stop_from_ = from;
+  has_stop_number_ = has_number;
+  stop_number_ = number;
   enter(SafeReason::stop, now_ms);
-  latched_ms_ = now_ms;
+  caused_ms_ = now_ms;
   const bool owner = link_.has_owner() && from == link_.owner();
   if (owner && authentic && datagram.has_pnum()) {
     Refusal code = Refusal::none;
@@ -276,8 +288,12 @@ void Application::port_down(std::uint8_t port, std::uint32_t now_ms) {
 }
 
 void Application::fail(SafeReason cause, std::uint32_t now_ms) {
+  if (safety_.has(cause)) {
+    safety_.again();
+    link_.send_soon();
+  }
   enter(cause, now_ms);
-  latched_ms_ = now_ms;
+  caused_ms_ = now_ms;
 }
 
 std::uint32_t Application::poll(std::uint32_t now_ms) {
@@ -313,6 +329,7 @@ void Application::enter(SafeReason cause, std::uint32_t now_ms) {
     schedule_.stop();
   } else {
     setpoints_.outputs = Outputs();
+    caused_ms_ = now_ms;
   }
   link_.send_soon();
   update_outputs(now_ms);
@@ -320,10 +337,17 @@ void Application::enter(SafeReason cause, std::uint32_t now_ms) {
   report_state(now_ms);
 }
 
-// Nobody clears what they have not heard of: a stop may have been pressed, or a fault have come,
-// while E:CLEAR was on its way. What is older than the timeout the owner has heard of, or is lost.
-bool Application::may_clear(std::uint32_t now_ms) const {
-  return now_ms - latched_ms_ >= setpoints_.settings.timeout_ms || link_.has_heard(latched_ms_);
+// Nobody clears what came after they asked: a stop may have been pressed, or a fault have come, while
+// E:CLEAR was on its way. So it names the newest cause, or says that there is none. One that names
+// none, of a host that does not know of such numbers, must come later than the timeout after the cause:
+// what was sent before it is held back for no longer.
+Refusal Application::judge_clear(const Command& command, std::uint32_t now_ms) const {
+  if (command.value != Command::unnamed_cause) {
+    const bool named = command.value == safety_.newest() || !safety_.latched();
+    return named ? Refusal::none : Refusal::stale;
+  }
+  const bool settled = now_ms - caused_ms_ >= setpoints_.settings.timeout_ms;
+  return settled || !safety_.latched() ? Refusal::none : Refusal::stale;
 }
 
 // E:CLEAR. A fault that is still there stays.

@@ -68,6 +68,7 @@ class Application {
 
   BoardState state() const;
   SafeReason reason() const { return safety_.reason(); }
+  SafeReport safe_report() const;                      // what heartbeats tell
   const Outputs& outputs() const { return outputs_; }  // as the hardware has them
   const Settings& settings() const { return setpoints_.settings; }
   const BoardLink& link() const { return link_; }
@@ -103,7 +104,7 @@ class Application {
   void clear();
   bool any_threshold() const;
   bool obstacle() const;
-  bool may_clear(std::uint32_t now_ms) const;
+  Refusal judge_clear(const Command& command, std::uint32_t now_ms) const;
   void expect_host();
   void update_outputs(std::uint32_t now_ms);
   void tell_ports();
@@ -141,8 +142,12 @@ class Application {
   BoardState reported_state_ = BoardState::connecting;
   SafeReason reported_reason_ = SafeReason::none;
   std::uint32_t obstacle_ms_ = 0;  // when there was one last
-  std::uint32_t latched_ms_ = 0;   // when stop, fault or watchdog came last
-  bool outputs_live_ = false;      // outputs_ follow the setpoints
+  std::uint32_t caused_ms_ = 0;    // when a cause other than link came last
+  // The newest stop, as long as it lasts: who asked for it, and its number if it had one.
+  Source stop_from_;
+  bool has_stop_number_ = false;
+  std::uint32_t stop_number_ = 0;
+  bool outputs_live_ = false;  // outputs_ follow the setpoints
   std::uint32_t rx_ok_ = 0;
   std::uint32_t rx_bad_ = 0;
   std::uint32_t rx_refused_ = 0;

@@ -8,7 +8,7 @@ namespace firmware {
 namespace {
 
 // Room for a heartbeat or a refusal.
-constexpr std::size_t short_datagram = 128;
+constexpr std::size_t short_datagram = 160;
 
 // ";SAFE:6;FAULT:127,255" behind the last field of a state.
 constexpr std::size_t safe_fields_size = 22;
@@ -46,6 +46,7 @@ void Application::refuse(Source to, const Datagram& datagram, Refusal code, std:
   Nack nack;
   nack.pnum = datagram.pnum();
   nack.code = code;
+  nack.has_session = link_.session_of(to, nack.session);
   char buffer[short_datagram];
   DatagramWriter writer(buffer, sizeof buffer);
   write_nack(writer, nack);
@@ -56,6 +57,14 @@ void Application::refuse(Source to, const Datagram& datagram, Refusal code, std:
 // the clock wraps, that millisecond is left out.
 std::uint32_t Application::heartbeat_time(std::uint32_t now_ms) {
   return now_ms != 0 ? now_ms : 0xFFFFFFFFU;
+}
+
+SafeReport Application::safe_report() const {
+  SafeReport report(safety_.reason());
+  if (safety_.latched()) report.cause = safety_.newest();
+  report.has_stop = has_stop_number_ && safety_.has(SafeReason::stop);
+  report.stop = stop_number_;
+  return report;
 }
 
 void Application::send_heartbeats(std::uint32_t now_ms) {
@@ -74,16 +83,17 @@ void Application::send_heartbeat(std::uint8_t port, std::uint32_t peer, bool asi
   PortSlot& slot = ports_[port];
   char buffer[short_datagram];
   Text heartbeat;
+  const SafeReport safe = safe_report();
   const Text nonce = authentication_.nonce();
   const std::uint32_t t_ms = heartbeat_time(now_ms);
   if (link_.state() == BoardLinkState::connecting) {
-    heartbeat = write_board_heartbeat(buffer, sizeof buffer, 0, nonce.empty() ? 0 : t_ms,
-                                      safety_.reason(), nonce);
+    heartbeat =
+        write_board_heartbeat(buffer, sizeof buffer, 0, nonce.empty() ? 0 : t_ms, safe, nonce);
     slot.next_pnum = 1;
   } else {
     std::uint32_t& pnum = aside ? slot.aside_pnum : slot.next_pnum;
     if (pnum == 0 && !nonce.empty()) ++pnum;  // that would say CONNECTING
-    heartbeat = write_board_heartbeat(buffer, sizeof buffer, pnum++, t_ms, safety_.reason(), nonce);
+    heartbeat = write_board_heartbeat(buffer, sizeof buffer, pnum++, t_ms, safe, nonce);
   }
   slot.port->send(heartbeat, Urgency::normal, peer);
 }

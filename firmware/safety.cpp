@@ -4,9 +4,18 @@
 namespace r4 {
 namespace firmware {
 
+namespace {
+
+bool is_latched(SafeReason cause) {
+  return cause == SafeReason::stop || cause == SafeReason::fault || cause == SafeReason::watchdog;
+}
+
+}  // namespace
+
 bool Safety::enter(SafeReason cause) {
   const bool fresh = !has(cause);
   causes_ = static_cast<std::uint8_t>(causes_ | bit(cause));
+  if (fresh && is_latched(cause)) again();
   return fresh;
 }
 
@@ -18,9 +27,11 @@ bool Safety::leave(SafeReason cause) {
 
 void Safety::clear() {
   const SafeReason seen = reason();
-  if (seen == SafeReason::stop || seen == SafeReason::fault || seen == SafeReason::watchdog) {
-    leave(seen);
-  }
+  if (is_latched(seen)) leave(seen);
+}
+
+bool Safety::latched() const {
+  return has(SafeReason::stop) || has(SafeReason::fault) || has(SafeReason::watchdog);
 }
 
 SafeReason Safety::reason() const {

@@ -178,7 +178,9 @@ Words refusal_words(std::string_view command, Refusal code, const LinkStatus& li
       words.fix = link_words(LinkStatus{.busy = true}).fix;
       break;
     case Refusal::stale:
-      words.fix = "send it again if it is still wanted";
+      words.fix = command.substr(0, 7) == "E:CLEAR"
+                      ? "a stop or fault may have come since: look at the robot, then send it again"
+                      : "send it again if it is still wanted";
       break;
     case Refusal::auth:
       words.fix = sets_the_site(command) ? "send it over USB: serial:auto"

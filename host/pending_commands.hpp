@@ -26,9 +26,9 @@ struct PendingCommand {
   bool executed = false;    // the board said DUPLICATE: it has executed this number
   bool overtaken = false;   // CMD is past it: the answer to a retry decides
   bool cable_only = false;  // a setting that is refused elsewhere
-  bool doubtful = false;    // sent before an outage or while BUSY: a refusal proves nothing
   std::uint32_t pnum = 0;
   std::uint64_t ticket = 0;
+  std::int32_t cause = Command::unnamed_cause;  // clear: the cause it names, once one is known
   std::chrono::microseconds started{0}, deadline{0}, retry{0};
   std::size_t size = 0;  // of what is in `bytes`: the command's field; once sent, PNum and T too
   Command command;       // without its texts
@@ -56,8 +56,9 @@ class PendingCommands {
     slot.stage = PendingCommand::Stage::queued;
     slot.role = PendingCommand::Role::command;
     slot.kind = kind;
-    slot.executed = slot.overtaken = slot.cable_only = slot.doubtful = false;
+    slot.executed = slot.overtaken = slot.cable_only = false;
     slot.pnum = 0;
+    slot.cause = Command::unnamed_cause;
     slot.size = 0;
     return &slot;
   }

@@ -25,10 +25,6 @@ class PostedCommands {
     entry.known = false;
     return &entry.command;
   }
-  // What is said of them from now on proves nothing.
-  void forget() {
-    for (Entry& entry : entries_) entry.known = false;
-  }
 
  private:
   // As far back as the board remembers.

@@ -6,6 +6,7 @@
 
 #include "../protocol/board_link.hpp"
 #include "../transports/error.hpp"
+#include "../transports/framing/can_ids.hpp"
 #include "command_evidence.hpp"
 #include "command_help.hpp"
 #include "limits.hpp"
@@ -77,8 +78,6 @@ void Session::receive(std::string_view bytes, Time now) {
   if (!from_board || !datagram.has_pnum() || !datagram.has_time()) return;
   ++collector_.counts.received;
 
-  bool current = false;                // tells the board's reason as it is now
-  const Ticket before = next_ticket_;  // what the handler asks for came after it
   switch (kind) {
     case MessageKind::nack:
       on_nack_datagram(datagram, now);
@@ -87,38 +86,38 @@ void Session::receive(std::string_view bytes, Time now) {
       on_identity_datagram(datagram, now);
       break;
     case MessageKind::board_heartbeat:
-      current = on_heartbeat_datagram(datagram, now);
+      on_heartbeat_datagram(datagram, now);
       break;
     default:
-      current = on_state_datagram(datagram, now);
+      on_state_datagram(datagram, now);
       break;
   }
   refresh_status(now);
-  if (current) confirm_stop(before, now);
 }
 
-// Returns whether it is the newest datagram of the board.
-bool Session::on_heartbeat_datagram(const Datagram& datagram, Time now) {
+void Session::on_heartbeat_datagram(const Datagram& datagram, Time now) {
   const bool connecting = is_connecting_heartbeat(datagram);
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
-  const SafeReason reason = heartbeat_reason(datagram);
+  const SafeReport report = heartbeat_report(datagram);
   const bool current = is_current(
-      link_.on_datagram(datagram.pnum(), connecting ? 0 : t_ms, true, reason, to_ms(now)));
+      link_.on_datagram(datagram.pnum(), connecting ? 0 : t_ms, true, report.reason, to_ms(now)));
   notice_restart();
   if (current) {
-    state_.safe = reason;
-    if (reason == SafeReason::none) state_.fault = ChipFault();
-    if (key_.on_heartbeat(datagram)) doubt_sent();
+    state_.safe = report.reason;
+    if (report.reason == SafeReason::none) state_.fault = ChipFault();
+    key_.on_heartbeat(datagram);
     key_.on_board_time(t_ms, now);
     if (key_.asked_for()) knows_cmd_ = true;
-    key_.on_reason(connecting ? SafeReason::link : reason, now);
+    key_.on_reason(connecting ? SafeReason::link : report.reason, now);
   }
   handler_.on_board_heartbeat(datagram);
-  return current;
+  if (!current) return;
+  refresh_status(now);
+  confirm_stop(report, now);
+  on_causes(report.cause, now);
 }
 
-// Returns whether it is the newest datagram of the board.
-bool Session::on_state_datagram(const Datagram& datagram, Time now) {
+void Session::on_state_datagram(const Datagram& datagram, Time now) {
   ReceivedState fresh = state_;
   if (!read_state(datagram, fresh)) {
     ++collector_.counts.damaged;
@@ -126,7 +125,7 @@ bool Session::on_state_datagram(const Datagram& datagram, Time now) {
     result.error = ReadError::syntax;
     handler_.on_bad_datagram(result,
                              std::string_view(datagram.bytes().data(), datagram.bytes().size()));
-    return false;
+    return;
   }
   const SafeReason reason = fresh.present.has(StateField::safe) ? fresh.safe : SafeReason::none;
   const Arrival arrival = link_.on_datagram(fresh.pnum, fresh.t_ms, false, reason, to_ms(now));
@@ -137,7 +136,7 @@ bool Session::on_state_datagram(const Datagram& datagram, Time now) {
   // An older state must not replace a newer one. A late one that only a heartbeat or an answer has
   // overtaken, in a queue where those go first, is still the newest state.
   const bool newest_state = arrival == Arrival::late && newer(fresh.pnum, state_.pnum);
-  if (!is_current(arrival) && !newest_state) return false;
+  if (!is_current(arrival) && !newest_state) return;
   collector_.on_state(fresh.t_ms, now);
   if (!newest_state) {
     key_.on_board_time(fresh.t_ms, now);
@@ -153,7 +152,6 @@ bool Session::on_state_datagram(const Datagram& datagram, Time now) {
   look_at_supply();
   select_fields(now);
   handler_.on_state(state_, datagram);
-  return is_current(arrival);
 }
 
 void Session::on_nack_datagram(const Datagram& datagram, Time now) {
@@ -168,8 +166,8 @@ void Session::on_nack_datagram(const Datagram& datagram, Time now) {
   on_answer(datagram, now);
   const bool not_taken = nack.code == Refusal::auth && !is_cable_only(nack.pnum);
   if (not_taken) key_.on_refusal(now);
-  const bool proof = !(not_taken && key_.has_key());
-  if (nack.pnum == newest_clear_ && nack.code != Refusal::busy && proof) clear_open_ = false;
+  const bool other_copy = not_taken && key_.has_key();  // may have been executed
+  const bool proof = !other_copy && is_proof(nack);
   handler_.on_nack(nack, datagram);
   for (Pending& pending : pending_.under_way()) {
     if (pending.stage != Stage::sent || pending.pnum != nack.pnum) continue;
@@ -178,15 +176,17 @@ void Session::on_nack_datagram(const Datagram& datagram, Time now) {
       confirm_from_state(now);
       continue;
     }
-    // A refusal proves that the command was not executed only while the board remembers: not over
-    // an outage, a reboot, another host's control, another nonce or too many numbers, nor before
-    // we had control. Then the deadline ends it, as unknown.
-    if (nack.code == Refusal::busy) pending.doubtful = true;
-    const bool remembered = proof && !pending.doubtful && link_up() &&
-                            link_.last_pnum() - pending.pnum < BoardLink::memory;
-    if (remembered) finish(pending, Outcome::refused, nack.code, now);
+    if (proof) finish(pending, Outcome::refused, nack.code, now);
   }
-  if (proof && link_up()) on_post_refused(nack);
+  if (proof) on_post_refused(nack);
+}
+
+// Does the refusal prove that the command was not executed? Only while the board remembers what it
+// executed: in the session in which the command was sent, and not after too many numbers. Without
+// proof the deadline ends it, as unknown.
+bool Session::is_proof(const Nack& nack) const {
+  return nack.has_session && is_ours(nack.session) && newer(nack.pnum, nack.session) &&
+         link_.last_pnum() - nack.pnum < BoardLink::memory;
 }
 
 void Session::on_identity_datagram(const Datagram& datagram, Time now) {
@@ -243,10 +243,7 @@ void Session::confirm_from_state(Time now) {
     command_field_seen_ = now;
     knows_cmd_ = true;
     // The board has executed a command of ours, so we control it.
-    if (link_up() && is_ours(state_.last_command)) {
-      controlled_ = true;
-      if (!newer(newest_clear_, state_.last_command)) clear_open_ = false;
-    }
+    if (link_up() && is_ours(state_.last_command)) controlled_ = true;
   }
   for (Pending& pending : pending_.under_way()) {
     if (pending.stage != Stage::sent || pending.kind == CommandKind::stop ||
@@ -269,15 +266,32 @@ void Session::confirm_from_state(Time now) {
   }
 }
 
-// By a datagram that came when `before` was the next ticket.
-void Session::confirm_stop(Ticket before, Time now) {
-  if (link_.reason() != SafeReason::stop) return;
-  // The report of an earlier stop, which an E:CLEAR of ours may be about to take away.
-  if (clear_open_ && state_.present.has(StateField::cmd)) return;
+// The board names the stop that it has obeyed. On a CAN bus it was told the end of the number only.
+void Session::confirm_stop(const SafeReport& report, Time now) {
+  if (report.reason != SafeReason::stop || !report.has_stop) return;
   for (Pending& pending : pending_.under_way()) {
-    if (pending.stage == Stage::sent && pending.kind == CommandKind::stop &&
-        pending.ticket < before) {
-      finish(pending, Outcome::confirmed, Refusal::none, now);
+    if (pending.stage != Stage::sent || pending.kind != CommandKind::stop) continue;
+    if (report.stop != pending.pnum && report.stop != short_stop_number(pending.pnum)) continue;
+    std::copy_n(pending.bytes.begin(), pending.size, lingering_.begin());
+    lingering_size_ = pending.size;
+    linger_until_ = now + options_.stop_linger;
+    next_linger_ = pending.retry;
+    finish(pending, Outcome::confirmed, Refusal::none, now);
+  }
+}
+
+// The number of the newest cause that only E:CLEAR ends. A newer one than that which an E:CLEAR or an
+// arm() was to clear has come after it was asked for, so that it is given up.
+void Session::on_causes(std::int32_t newest, Time now) {
+  cause_ = newest;
+  for (Pending& pending : pending_.under_way()) {
+    const bool arms = pending.role == Pending::Role::arm;
+    if ((pending.kind != CommandKind::clear && !arms) || !name_cause(pending)) continue;
+    if (newest == 0 || newest == pending.cause) continue;
+    if (arms) {
+      end_arming(Outcome::not_armed, Refusal::none, now);
+    } else {
+      finish(pending, Outcome::cancelled, Refusal::none, now);
     }
   }
 }
@@ -338,6 +352,7 @@ Time Session::poll(Time now) {
   refuse_held_back(now);
   send_queued(now);  // what has waited for arm()
   retry_due(now);
+  linger(now);
   if (options_.identify_interval.count() != 0 && link_up() && now >= next_identify_) {
     next_identify_ = now + options_.identify_interval;
     question_sent_ = now;
@@ -351,6 +366,7 @@ Time Session::poll(Time now) {
   if (next <= now) next = now + Time{1000};
   if (link_up() && options_.identify_interval.count() != 0) next = std::min(next, next_identify_);
   if (busy_until_ > now) next = std::min(next, busy_until_);
+  if (lingering_size_ != 0) next = std::min(next, next_linger_);
   for (const Pending& pending : pending_.under_way()) {
     next = std::min(next, pending.deadline);
     if (pending.stage == Stage::sent) next = std::min(next, pending.retry);
@@ -388,19 +404,8 @@ bool Session::in_control(Time now) const {
 // The paper's release: it has let our selections pass, and has never answered anything.
 bool Session::speaks_no_cmd() const { return !knows_cmd_ && selections_ >= max_selections; }
 
-// From now on a refusal does not prove that what was sent before was not executed.
-void Session::doubt_sent() {
-  for (Pending& pending : pending_.under_way()) {
-    if (pending.stage == Stage::sent) pending.doubtful = true;
-  }
-  posted_.forget();
-}
-
 void Session::refresh_status(Time now) {
-  if (!link_up() || busy_until_ > now) {
-    controlled_ = false;
-    doubt_sent();
-  }
+  if (!link_up() || busy_until_ > now) controlled_ = false;
   look_at_arming();
   const LinkStatus fresh{
       .state = link_.state(),

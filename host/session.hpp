@@ -11,8 +11,9 @@
 //
 // A retry has the bytes and the packet number of the original (signed anew, where there is a key),
 // so the board can execute it only once. When CMD has moved past a command, the retry's answer
-// (DUPLICATE: executed, STALE: not) decides. A board without CMD (the paper's release) confirms by
-// the value that its state shows.
+// (DUPLICATE: executed, STALE: not) decides. A refusal proves that the command was not executed only
+// if it names a session that began before the command was sent: over an outage the board forgets. A
+// board without CMD (the paper's release) confirms by the value that its state shows.
 //
 // With a key (host_key.hpp) all is signed, a board without one is refused, and AUTH says only that one
 // copy was not taken: another may have been executed.
@@ -20,10 +21,12 @@
 // Commands that drive outputs are refused here while the session is not armed (arming.hpp).
 //
 // E:STOP does not wait for the link, overtakes everything, discards all commands that wait, and is
-// repeated every 20 ms until the board reports the reason `stop`: in a datagram that comes after it
-// was sent, and not while an E:CLEAR sent before it may still take the reported stop away.
+// repeated every 20 ms until a heartbeat of the board reports the reason `stop` and this stop's own
+// number, and for a while longer, in case that somebody's E:CLEAR was on its way. E:CLEAR names the
+// cause that was known when it was asked for; when the board tells of a newer one, it is given up.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <optional>
@@ -91,6 +94,8 @@ struct SessionOptions {
   std::string fields = "DEFAULT";
   std::chrono::milliseconds command_retry{50};
   std::chrono::milliseconds stop_retry{20};
+  // For how long a stop is repeated after it was confirmed.
+  std::chrono::milliseconds stop_linger{200};
   // Q:ID, for identity and round-trip time; 0: never.
   std::chrono::milliseconds identify_interval{1000};
   // The board's key. Each host has its own, by its id: of two that share one, the slower is taken for
@@ -150,8 +155,8 @@ class Session {
   // confirmed when the board's state shows it. Output commands that are sent behind it wait for it.
   // Returns 0 when 64 commands are under way already.
   Ticket arm(Time timeout, Time now);
-  // E:STOP, sent before this returns. Confirmed when the board reports the reason stop. Returns 0,
-  // with the stop sent all the same, when 16 stops are under way already.
+  // E:STOP, sent before this returns. Confirmed when the board tells that it has obeyed this very
+  // stop. Returns 0, with the stop sent all the same, when 16 stops are under way already.
   Ticket stop(Time timeout, Time now);
   // Asks who the board is; on_identity() follows. Confirmed by the answer.
   Ticket identify(Time timeout, Time now);
@@ -173,6 +178,9 @@ class Session {
   DisarmCause disarmed_by() const { return arming_.cause(); }
   // Are output commands sent?
   bool may_drive() const;
+  // Has the board told which cause an E:CLEAR would have to name? One that is asked for sooner names the
+  // first that is told.
+  bool knows_cause() const { return cause_ != Command::unnamed_cause; }
   const ReceivedState& state() const { return state_; }
   Statistics statistics(Time now) const;
 
@@ -193,20 +201,19 @@ class Session {
   SendResult transmit_now(const Command& command, std::uint32_t t_ms, Priority priority, Time now);
   SendResult close_and_transmit(DatagramWriter& writer, CommandKind kind, Priority priority,
                                 Time now);
-  std::uint32_t take_pnum(CommandKind kind);
   bool link_up() const;
   bool speaks_no_cmd() const;
 
-  bool on_heartbeat_datagram(const Datagram& datagram, Time now);
-  bool on_state_datagram(const Datagram& datagram, Time now);
+  void on_heartbeat_datagram(const Datagram& datagram, Time now);
+  void on_state_datagram(const Datagram& datagram, Time now);
   void on_identity_datagram(const Datagram& datagram, Time now);
   void on_nack_datagram(const Datagram& datagram, Time now);
   void on_answer(const Datagram& datagram, Time now);
   bool notice_restart();
   bool is_ours(std::uint32_t pnum) const;
+  bool is_proof(const Nack& nack) const;
   bool is_cable_only(std::uint32_t pnum);
   void confirm_from_state(Time now);
-  void confirm_stop(Ticket before, Time now);
   bool is_held_back(CommandKind kind) const;
   void disarm(DisarmCause cause);
   void tell_arming();
@@ -220,9 +227,12 @@ class Session {
   void give_up_arming();
   void refuse_held_back(Time now);
   void on_post_refused(const Nack& nack);
+  void confirm_stop(const SafeReport& report, Time now);
+  void on_causes(std::int32_t newest, Time now);
+  bool name_cause(Pending& pending);
+  void linger(Time now);
   void select_fields(Time now);
   Command with_needed_fields(const Command& command);
-  void doubt_sent();
   void refresh_status(Time now);
 
   Handler& handler_;
@@ -241,8 +251,13 @@ class Session {
   PendingCommands pending_;
   PostedCommands posted_;
   Ticket next_ticket_ = 1;
-  std::uint32_t newest_clear_ = 0;  // its packet number
-  bool clear_open_ = false;         // it may be on its way: neither executed nor overtaken yet
+  // As the newest heartbeat told it; unnamed_cause: none was heard.
+  std::int32_t cause_ = Command::unnamed_cause;
+  // The stop that was confirmed last, repeated until then.
+  std::array<char, max_datagram> lingering_;
+  std::size_t lingering_size_ = 0;  // 0: none
+  Time linger_until_{0};
+  Time next_linger_{0};
   Time busy_until_{0};
   Time next_identify_{0};
   Time question_sent_{0};

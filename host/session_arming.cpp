@@ -15,6 +15,7 @@ Ticket Session::arm(Time timeout, Time now) {
   Pending* const pending = allocate(Command::relay(supply_relay, true), timeout, now);
   if (pending == nullptr) return 0;
   pending->role = Pending::Role::arm;
+  name_cause(*pending);
   return pending->ticket;
 }
 

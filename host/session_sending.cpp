@@ -13,7 +13,7 @@ SendResult Session::transmit_now(const Command& command, std::uint32_t t_ms, Pri
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   write_command(writer, command);
-  writer.stamp(take_pnum(command.kind), t_ms);
+  writer.stamp(link_.take_pnum(), t_ms);
   return close_and_transmit(writer, command.kind, priority, now);
 }
 
@@ -29,15 +29,6 @@ SendResult Session::close_and_transmit(DatagramWriter& writer, CommandKind kind,
   return result;
 }
 
-std::uint32_t Session::take_pnum(CommandKind kind) {
-  const std::uint32_t pnum = link_.take_pnum();
-  if (kind == CommandKind::clear) {
-    newest_clear_ = pnum;
-    clear_open_ = true;
-  }
-  return pnum;
-}
-
 Session::Pending* Session::allocate(const Command& command, Time timeout, Time now) {
   Pending* const slot = pending_.add(command.kind);
   if (slot == nullptr) return nullptr;
@@ -50,7 +41,25 @@ Session::Pending* Session::allocate(const Command& command, Time timeout, Time n
   slot->ticket = next_ticket_++;
   slot->started = now;
   slot->deadline = now + timeout;
+  if (command.kind == CommandKind::clear) {
+    slot->cause = command.value;
+    name_cause(*slot);
+    lingering_size_ = 0;  // who clears a stop repeats it no more
+  }
   return slot;
+}
+
+// Gives an E:CLEAR or an arm() the number of the cause that is known now, if it has none yet. False:
+// nothing of the board has been heard.
+bool Session::name_cause(Pending& pending) {
+  if (pending.cause == Command::unnamed_cause) pending.cause = cause_;
+  if (pending.cause == Command::unnamed_cause) return false;
+  if (pending.stage == Stage::queued && pending.kind == CommandKind::clear) {
+    DatagramWriter writer(pending.bytes.data(), pending.bytes.size());
+    write_command(writer, Command::clear(pending.cause));
+    pending.size = writer.size();
+  }
+  return true;
 }
 
 Ticket Session::send(const Command& command, Time timeout, Time now) {
@@ -72,7 +81,10 @@ PostResult Session::post(const Command& command, Time now) {
     return PostResult::not_armed;
   }
   ++collector_.counts.commands;
-  switch (transmit_now(command, to_ms(now), Priority::normal, now)) {
+  const bool unnamed =
+      command.kind == CommandKind::clear && command.value == Command::unnamed_cause;
+  switch (
+      transmit_now(unnamed ? Command::clear(cause_) : command, to_ms(now), Priority::normal, now)) {
     case SendResult::sent:
       posted_.add(link_.last_pnum(), command);
       return PostResult::sent;
@@ -117,11 +129,10 @@ Ticket Session::identify(Time timeout, Time now) {
 void Session::transmit(Pending& pending, Time now) {
   const bool stop = pending.kind == CommandKind::stop;
   if (pending.stage == Stage::queued) {
-    pending.pnum = take_pnum(pending.kind);
+    pending.pnum = link_.take_pnum();
     // The command's field is there already.
     DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.size);
     pending.size = writer.stamp(pending.pnum, to_ms(now)).size();
-    pending.doubtful = !controlled_ && !options_.fields.empty();
     pending.stage = Stage::sent;
     if (pending.kind == CommandKind::identify) {
       question_sent_ = now;
@@ -140,9 +151,8 @@ void Session::send_queued(Time now) {
   if (!in_control(now)) return;
   for (Pending& pending : pending_.under_way()) {
     if (pending.role == Pending::Role::arm) return;  // it comes first
-    if (pending.stage == Stage::queued && !is_held_back(pending.kind) && now < pending.deadline) {
-      transmit(pending, now);
-    }
+    if (pending.stage != Stage::queued || is_held_back(pending.kind)) continue;
+    if (now < pending.deadline) transmit(pending, now);
   }
 }
 
@@ -156,6 +166,19 @@ void Session::retry_due(Time now) {
       transmit(pending, now);
     }
   }
+}
+
+// A confirmed stop, a few times more: somebody's E:CLEAR may have been on its way.
+void Session::linger(Time now) {
+  if (lingering_size_ == 0 || now < next_linger_) return;
+  if (now >= linger_until_) {
+    lingering_size_ = 0;
+    return;
+  }
+  next_linger_ = now + options_.stop_retry;
+  ++collector_.counts.retries;
+  DatagramWriter writer(lingering_.data(), lingering_.size(), lingering_size_);
+  close_and_transmit(writer, CommandKind::stop, Priority::stop, now);
 }
 
 void Session::finish(Pending& pending, Outcome outcome, Refusal code, Time now) {

@@ -74,6 +74,7 @@ HeartbeatEffect BoardLink::begin_session(const HostHeartbeat& heartbeat, bool ar
   numbers_in_doubt_ = false;
   begun_again_ = false;
   has_heartbeat_pnum_ = heartbeat.has_pnum;
+  first_echo_ = heartbeat.pnum;
   marks_used_ = 0;
   newest_echo_ms_ = now_ms - timing_.timeout_ms;
   state_ = BoardLinkState::active;
@@ -130,6 +131,7 @@ HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uin
       if (continuing && !begun_again_) {
         if (!armed_) {
           armed_ = true;
+          first_echo_ = heartbeat.pnum;
           spend(heartbeat.pnum);
         }
         feed(heartbeat, now_ms);
@@ -281,8 +283,9 @@ void BoardLink::remember_sent(std::uint32_t t_ms) {
   if (sent_used_ < sent_count) ++sent_used_;
 }
 
-bool BoardLink::has_heard(std::uint32_t since_ms) const {
-  return !echo_host_ || at_or_after(newest_echo_ms_, since_ms);
+bool BoardLink::session_of(Source from, std::uint32_t& first_echo) const {
+  first_echo = first_echo_;
+  return in_session(from) && armed_ && has_heartbeat_pnum_;
 }
 
 std::uint32_t BoardLink::due_in(std::uint32_t now_ms) const {

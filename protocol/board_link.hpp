@@ -117,9 +117,11 @@ class BoardLink {
   std::uint32_t fed_ms() const { return fed_ms_; }
   // When it is lost if it stays silent; only while ACTIVE.
   std::uint32_t deadline_ms() const { return fed_ms_ + timing_.timeout_ms; }
-  // Has the owner echoed a T of `since_ms` or later, and so heard what the board said then? Of a paper
-  // host, which need not echo, nobody can tell: true.
-  bool has_heard(std::uint32_t since_ms) const;
+  // With which heartbeat did the session of this host begin to execute commands: the first echo? A
+  // refusal tells it, and the host knows by it that what it has sent since is remembered. (Not the
+  // heartbeat that began the session: its T:0 may have been on its way since before a reboot.)
+  // False: it is not this host's session, it was not echoed yet, or its heartbeats have no numbers.
+  bool session_of(Source from, std::uint32_t& first_echo) const;
   // The number of the last command executed in this session (the CMD field); 0 before the first.
   std::uint32_t last_executed() const { return last_executed_; }
 
@@ -161,6 +163,7 @@ class BoardLink {
   bool echo_host_ = false;
   bool armed_ = false;
   Clock clock_ = Clock::unknown;
+  std::uint32_t first_echo_ = 0;     // the number of the heartbeat that armed the session
   bool has_baseline_ = false;        // numbers up to newest_ are spent
   std::uint32_t newest_ = 0;         // newest executed command, or the session's first heartbeat
   std::uint64_t executed_bits_ = 0;  // bit i: newest_ - i was executed

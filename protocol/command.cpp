@@ -96,6 +96,12 @@ class Values {
     }
     return number;
   }
+  // The number of a cause: from 0.
+  std::int32_t cause(std::size_t i) {
+    const std::int32_t value = number(i);
+    if (value < 0) out_of_range_ = true;
+    return value;
+  }
   bool flag(std::size_t i) {
     const std::int32_t value = number(i);
     if (value != 0 && value != 1) out_of_range_ = true;
@@ -137,6 +143,11 @@ bool read_word(char letter, Text word, CommandKind& out) {
     return false;
   }
   return true;
+}
+
+Command read_clear(Values& v) {
+  if (v.count() == 1) return Command::clear();
+  return v.count_is(2) ? Command::clear(v.cause(1)) : Command();
 }
 
 Command read_stepper(Values& v) {
@@ -182,7 +193,11 @@ Command Command::relay(int channel, bool on) {
   return command;
 }
 Command Command::stop() { return of_kind(CommandKind::stop); }
-Command Command::clear() { return of_kind(CommandKind::clear); }
+Command Command::clear(std::int32_t cause) {
+  Command command = of_kind(CommandKind::clear);
+  command.value = cause;
+  return command;
+}
 Command Command::stepper(std::int32_t target_steps, std::int32_t steps_per_s, int channel) {
   Command command = of_channel(CommandKind::stepper, target_steps, channel);
   command.speed = steps_per_s;
@@ -240,6 +255,13 @@ bool asks_to_stop(const Datagram& datagram) {
   return false;
 }
 
+bool stop_number(const Datagram& datagram, std::uint32_t& out) {
+  const Field field = datagram.find(stop_number_name);
+  if (!field.name().empty() && parse_number(field.values(), out)) return true;
+  out = datagram.pnum();
+  return datagram.has_pnum();
+}
+
 Refusal parse_command(const Field& field, Command& out) {
   if (field.name().size() != 1 || !is_command_letter(field.name()[0])) return Refusal::unknown;
   const char letter = field.name()[0];
@@ -251,7 +273,11 @@ Refusal parse_command(const Field& field, Command& out) {
     case 'Q':
       if (v.text(0).empty()) return Refusal::format;
       if (!read_word(letter, v.text(0), command.kind)) return Refusal::unknown;
-      v.count_is(1);
+      if (command.kind == CommandKind::clear) {
+        command = read_clear(v);
+      } else {
+        v.count_is(1);
+      }
       break;
     case 'O':
       if (v.count_is(3)) command = Command::osmc(v.number(0), v.direction(1), v.number(2));
@@ -300,6 +326,9 @@ Refusal check(const Command& command) {
   if (command.kind == CommandKind::setting) {
     return command.text.empty() || command.text2.empty() ? Refusal::format : Refusal::none;
   }
+  if (command.kind == CommandKind::clear) {
+    return command.value < Command::unnamed_cause ? Refusal::range : Refusal::none;
+  }
   const Limits limits = limits_of(command.kind);
   if (limits.channels == 0) return Refusal::none;
   if (command.channel < 1 || command.channel > limits.channels) return Refusal::channel;
@@ -335,6 +364,7 @@ void write_command(DatagramWriter& writer, const Command& command) {
       break;
     case CommandKind::clear:
       writer.field("E").value(clear_word);
+      if (command.value != Command::unnamed_cause) writer.value(command.value);
       break;
     case CommandKind::stepper:
       writer.field("P").value(command.value).value(command.speed).value(channel);

@@ -25,7 +25,7 @@ enum class CommandKind : std::uint8_t {
   servo,      // S:us,ch
   relay,      // R:ch,On|Off
   stop,       // E:STOP
-  clear,      // E:CLEAR
+  clear,      // E:CLEAR,cause
   stepper,    // P:pos[,speed],ch
   zero,       // Z:ch
   bldc,       // B:speed,dir,brake,ch
@@ -40,8 +40,8 @@ enum class CommandKind : std::uint8_t {
 struct Command {
   Command() {}  // NOLINT(modernize-use-equals-default): else GCC calls memset for it
   CommandKind kind = CommandKind::heartbeat;
-  std::uint8_t channel = 0;                    // 1 … the kind's channel count
-  std::int32_t value = 0;                      // pwm, us, cm, BLDC speed, stepper target
+  std::uint8_t channel = 0;  // 1 … the kind's channel count
+  std::int32_t value = 0;    // pwm, us, cm, BLDC speed, stepper target; clear: the cause it names
   std::int32_t speed = stepper_speed_default;  // stepper, steps per second
   Direction direction = Direction::reverse;    // osmc, dhb12, bldc
   bool on = false;                             // relay; bldc: brake
@@ -54,7 +54,11 @@ struct Command {
   static Command servo(std::int32_t us, int channel);
   static Command relay(int channel, bool on);
   static Command stop();
-  static Command clear();
+  // `cause`: the number of the cause to be cleared, as the board's heartbeats tell it (CAUSE); 0 if
+  // they tell none. unnamed_cause: a host that does not know of such numbers, or Session, which puts
+  // the number in.
+  static constexpr std::int32_t unnamed_cause = -1;
+  static Command clear(std::int32_t cause = unnamed_cause);
   static Command stepper(std::int32_t target_steps, std::int32_t steps_per_s, int channel);
   static Command zero(int channel);
   static Command bldc(std::int32_t speed, Direction direction, bool brake, int channel);
@@ -69,6 +73,10 @@ bool drives_output(CommandKind kind);
 
 // Is there E:STOP among its fields? A stop is obeyed whatever else is in its datagram.
 bool asks_to_stop(const Datagram& datagram);
+
+// By what number does a stop ask to be confirmed? Its field STOP, else its PNum. False: by none.
+constexpr Text stop_number_name("STOP");
+bool stop_number(const Datagram& datagram, std::uint32_t& out);
 
 // Reads a command field. Refusal::unknown (no such letter or word), ::format (number of values, an
 // empty one, not a whole number), ::channel, ::range (also a number too large for any type), in

@@ -11,6 +11,16 @@ namespace {
 constexpr Text board_heartbeat_word("R4-ROS2");
 constexpr Text board_word("R4");
 constexpr Text nonce_name("AN");
+constexpr Text safe_name("SAFE");
+constexpr Text cause_name("CAUSE");
+constexpr Text session_name("SESSION");
+
+// True if there is such a field, of one number.
+template <class Number>
+bool find_number(const Datagram& datagram, Text name, Number& out) {
+  const Field field = datagram.find(name);
+  return !field.name().empty() && parse_number(field.values(), out);
+}
 
 }  // namespace
 
@@ -45,18 +55,29 @@ MessageKind kind_of(const Datagram& datagram) {
 }
 
 Text write_board_heartbeat(char* buffer, std::size_t capacity, std::uint32_t pnum,
-                           std::uint32_t t_ms, SafeReason safe, Text nonce) {
+                           std::uint32_t t_ms, const SafeReport& safe, Text nonce) {
   DatagramWriter writer(buffer, capacity);
   writer.field("H").value(board_heartbeat_word);
   writer.field("PNum").value(pnum);
   writer.field("T").value(t_ms);
-  if (safe != SafeReason::none) writer.field("SAFE").value(static_cast<std::uint32_t>(safe));
+  if (safe.reason != SafeReason::none) {
+    writer.field(safe_name).value(static_cast<std::uint32_t>(safe.reason));
+  }
+  if (safe.cause != 0) writer.field(cause_name).value(safe.cause);
+  if (safe.has_stop) writer.field(stop_number_name).value(safe.stop);
   if (!nonce.empty()) writer.field(nonce_name).value(nonce);
   return writer.finish();
 }
 
+SafeReport heartbeat_report(const Datagram& datagram) {
+  SafeReport report(heartbeat_reason(datagram));
+  if (!find_number(datagram, cause_name, report.cause) || report.cause < 0) report.cause = 0;
+  report.has_stop = find_number(datagram, stop_number_name, report.stop);
+  return report;
+}
+
 SafeReason heartbeat_reason(const Datagram& datagram) {
-  const Field field = datagram.find("SAFE");
+  const Field field = datagram.find(safe_name);
   if (field.name().empty()) return SafeReason::none;
   SafeReason reason = SafeReason::none;
   return parse_safe_reason(field.values(), reason) ? reason : SafeReason::fault;
@@ -78,12 +99,14 @@ bool read_nack(const Datagram& datagram, Nack& out) {
   Nack nack;
   nack.code = refusal_from(values[1]);
   if (nack.code == Refusal::none || !parse_number(values[0], nack.pnum)) return false;
+  nack.has_session = find_number(datagram, session_name, nack.session);
   out = nack;
   return true;
 }
 
 void write_nack(DatagramWriter& writer, const Nack& nack) {
   writer.field("N").value(nack.pnum).value(name_of(nack.code));
+  if (nack.has_session) writer.field(session_name).value(nack.session);
 }
 
 bool read_identity(const Datagram& datagram, Identity& out) {

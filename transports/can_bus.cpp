@@ -207,7 +207,7 @@ void CanBus::hand_over(std::size_t count) {
     if (!in_[i].local) {
       // Whoever hears others is on the bus, whatever was told of before.
       if (!up_ || (standing_ && standing_->problem.reason == not_acknowledged)) come_up();
-    } else if (!up_ && in_[i].frame.id != emergency_stop_id) {
+    } else if (!up_ && classify(in_[i].frame).kind != CanIdKind::emergency_stop) {
       continue;  // it did not get to the bus
     }
     const std::uint32_t at_us = to_us(in_[i].at);
@@ -349,10 +349,8 @@ void CanBus::send_later() {
   writable_.start(socket_.number(), [this] { send(); });
 }
 
-SendResult CanBus::send_stop() {
+SendResult CanBus::send_stop(const CanFrame& frame) {
   if (socket_.number() < 0) return SendResult::down;
-  CanFrame frame{};
-  frame.id = emergency_stop_id;
   switch (socket_.send_first(frame)) {
     case CanSocket::Outcome::done:
       return SendResult::sent;

@@ -88,8 +88,8 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   // Hands over the frames that have arrived. Before somebody gives up waiting for one: a loop that
   // was held up may find the time-out and the frame together. True if there were any.
   bool take();
-  // The emergency stop, ahead of everything that waits in the interface's queue.
-  SendResult send_stop();
+  // A frame of the emergency stop, ahead of everything that waits in the interface's queue.
+  SendResult send_stop(const CanFrame& frame);
 
   bool up() const { return up_; }
   // What was told of last, if that is still so: for who has joined since.

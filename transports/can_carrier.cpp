@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "../protocol/command.hpp"
 #include "can_bus.hpp"
 #include "can_interface.hpp"
 #include "can_turn.hpp"
@@ -63,6 +64,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   void on_stuck() override;
 
   Lane& lane(CanLane which) { return lanes_[which == CanLane::dialogue ? 0 : 1]; }
+  SendResult send_stop(std::string_view bytes);
   bool begin(std::string_view bytes, std::uint32_t now_us);
   bool begin_waiting(std::uint32_t now_us);
   void listen_for_others(const CanFrame& frame);
@@ -80,6 +82,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   mutable CarrierCounters counters_;      // what others count is put in when it is asked for
   std::array<Lane, 2> lanes_;
   std::shared_ptr<CanBus> bus_;
+  std::optional<std::uint32_t> announced_stop_;  // its number
   Handler* handler_ = nullptr;
   LoopTimer timer_;
   OperationSlot timing_;
@@ -161,7 +164,7 @@ SendResult CanCarrier::send(std::string_view bytes, Priority priority, Peer) {
     return SendResult::full;
   }
   if (priority == Priority::stop && role_ == Role::host) {
-    const SendResult result = bus_->send_stop();
+    const SendResult result = send_stop(bytes);
     ++(result == SendResult::sent ? counters_.tx_datagrams : counters_.tx_errors);
     return result;
   }
@@ -175,6 +178,26 @@ SendResult CanCarrier::send(std::string_view bytes, Priority priority, Peer) {
   }
   bus_->send();
   return result;
+}
+
+// The bare frame first, which every board on any version of this plan obeys, and behind it the one with
+// the number by which the stop is confirmed. That alone is repeated: to a board a bare frame is a
+// new stop each time, and who has seen the one would have to look again before they clear it.
+SendResult CanCarrier::send_stop(std::string_view bytes) {
+  CanFrame frame{};
+  frame.id = emergency_stop_id;
+  Datagram stop;
+  std::uint32_t number = 0;
+  const bool numbered = read(Text(bytes.data(), bytes.size()), stop) && stop_number(stop, number);
+  SendResult bare = SendResult::sent;
+  if (!numbered || announced_stop_ != number) {
+    bare = bus_->send_stop(frame);
+    if (bare == SendResult::sent && numbered) announced_stop_ = number;
+  }
+  if (!numbered) return bare;
+  frame.extended = true;
+  frame.id = numbered_stop_id(number);
+  return bus_->send_stop(frame);
 }
 
 bool CanCarrier::begin(std::string_view bytes, std::uint32_t now_us) {

@@ -18,6 +18,7 @@
 
 #include "can_interface.hpp"
 #include "error.hpp"
+#include "framing/can_ids.hpp"
 
 namespace r4 {
 namespace {
@@ -169,9 +170,13 @@ void CanSocket::close() noexcept {
 
 bool CanSocket::hear(const std::vector<std::uint32_t>& ids) {
   std::vector<can_filter> filters;
-  filters.reserve(ids.size());
+  filters.reserve(ids.size() + 1);
   for (const std::uint32_t id : ids) {
     filters.push_back({id, CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG});
+    if (id != emergency_stop_id) continue;
+    constexpr std::uint32_t no_number = CAN_EFF_MASK & ~short_stop_number(CAN_EFF_MASK);
+    filters.push_back(
+        {numbered_stop_id(0) | CAN_EFF_FLAG, no_number | CAN_EFF_FLAG | CAN_RTR_FLAG});
   }
   return ::setsockopt(descriptor_.get(), SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(),
                       static_cast<socklen_t>(filters.size() * sizeof(can_filter))) == 0;

@@ -53,7 +53,8 @@ class CanSocket {
   // A CAN FD frame came whose data travelled at a bit rate of their own (BRS).
   bool heard_rate_switch() const { return heard_rate_switch_; }
 
-  // Hears the frames with exactly these 11-bit ids, or everything, extended and remote ones too.
+  // Hears the frames with exactly these 11-bit ids (and with the emergency stop's, those stops that have
+  // a number), or everything, extended and remote ones too.
   // False, and it hears what it heard before: the kernel does not take that; errno tells why.
   [[nodiscard]] bool hear(const std::vector<std::uint32_t>& ids);
   [[nodiscard]] bool hear_everything();

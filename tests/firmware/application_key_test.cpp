@@ -268,9 +268,10 @@ TEST_F(ApplicationKey, OnlyTheOwnerClearsAStop) {
   board.receive("E:STOP;", {0, 99});
   board.run(5);
   host.heartbeat();
-  board.receive(host.fields("E:CLEAR", 0), host.at);
+  const std::string clear = "E:CLEAR," + std::to_string(board.newest_cause());
+  board.receive(host.fields(clear, 0), host.at);
   EXPECT_EQ(board.reason(), SafeReason::stop);
-  host.command("E:CLEAR");
+  host.command(clear);
   EXPECT_EQ(board.reason(), SafeReason::none);
 }
 

@@ -396,7 +396,7 @@ TEST(ApplicationLink, AnswersToOthersDoNotCountInTheOwnersNumbers) {
   for (int i = 0; i < 50; ++i) {
     other.command("Q:ID");
     other.heartbeat(0);
-    other.command("E:CLEAR");
+    other.clear();
     owner.command("Q:ID");
     owner.echo();
     board.run(10);

@@ -34,8 +34,8 @@ struct ApplicationSafety : testing::Test {
   }
   // E:CLEAR by an owner that has heard what there is to clear.
   std::uint32_t clear() {
-    host.echo();
-    return host.command("E:CLEAR");
+    board.run(0);
+    return host.clear();
   }
   // Nothing comes back by itself, whatever the host does but command.
   void expect_nothing_restored() {
@@ -144,7 +144,7 @@ TEST_F(ApplicationSafety, AStopIsObeyedBeforeThereIsAHost) {
   EXPECT_EQ(fresh.log.states.back(), "SAFE stop");
   first.command("O:1,1,1");
   EXPECT_TRUE(fresh.safe());
-  first.command("E:CLEAR");
+  first.clear();
   first.command("O:1,1,1");
   EXPECT_FALSE(fresh.safe());
 }
@@ -186,39 +186,114 @@ TEST_F(ApplicationSafety, ARepeatedClearDoesNotClearALaterStop) {
 
 TEST_F(ApplicationSafety, AClearOnItsWayDoesNotClearWhatCameMeanwhile) {
   host.command("E:STOP");
-  host.echo();
-  board.run(50);
+  const std::string asked = host.clear_field();
   board.receive("E:STOP;PNum:1;T:1;", Source{0, 99});  // pressed again, by somebody else
-  board.take();
-  const std::uint32_t number = host.command("E:CLEAR");
+  board.log.refused.clear();
+  std::uint32_t number = host.command(asked);
   EXPECT_EQ(board.reason(), SafeReason::stop);
-  EXPECT_EQ(board.take(MessageKind::nack).size(), 0U);  // the host repeats it
-  for (int ms = 0; board.reason() == SafeReason::stop && ms < 1000; ms += 50) {
-    board.run(50);
-    host.echo();
-    host.resend("E:CLEAR", number);
-    if (board.log.refused.size() != 0) break;  // overtaken by then
-  }
+  EXPECT_EQ(board.log.refused, Lines{std::to_string(number) + " STALE"});
+  host.echo();  // also when the host has heard of the second, and asks for the first
+  board.run(2000);
+  host.connect();
+  number = host.command(asked);
+  EXPECT_EQ(board.reason(), SafeReason::stop);
   clear();
   EXPECT_EQ(board.state(), BoardState::active);
 }
 
-TEST_F(ApplicationSafety, AClearCountsOnceTheStopHasBeenHeardOf) {
-  board.receive("E:STOP;PNum:1;T:1;", Source{0, 99});
-  const std::uint32_t number = host.command("E:CLEAR");
+TEST_F(ApplicationSafety, AClearOnItsWayDoesNotClearAFaultThatCameMeanwhile) {
+  for (const SafeReason cause : {SafeReason::fault, SafeReason::watchdog}) {
+    host.command("E:STOP");
+    const std::string asked = host.clear_field();
+    board.application->fail(cause, board.now_ms);
+    host.command(asked);
+    EXPECT_EQ(board.reason(), SafeReason::stop);
+    clear();
+    EXPECT_EQ(board.reason(), cause);
+    const std::string again = host.clear_field();
+    board.application->fail(cause, board.now_ms);  // once more
+    host.command(again);
+    EXPECT_EQ(board.reason(), cause);
+    clear();
+    EXPECT_EQ(board.state(), BoardState::active);
+  }
+}
+
+TEST_F(ApplicationSafety, ARepetitionOfAStopIsNoNewCause) {
+  const std::uint32_t stop = host.command("E:STOP");
+  const std::string asked = host.clear_field();
+  host.resend("E:STOP", stop);
+  host.command(asked);
+  EXPECT_EQ(board.state(), BoardState::active);
+  host.resend("E:STOP", stop);  // behind the E:CLEAR it is one
   EXPECT_EQ(board.reason(), SafeReason::stop);
-  host.echo();  // of the heartbeat that told of it
-  host.resend("E:CLEAR", number);
+  host.command(asked);
+  EXPECT_EQ(board.reason(), SafeReason::stop);
+}
+
+TEST_F(ApplicationSafety, AStopWithoutANumberIsANewCauseEachTime) {
+  board.receive("E:STOP;", Source{0, 99});
+  const std::string asked = host.clear_field();
+  board.receive("E:STOP;", Source{0, 99});
+  host.command(asked);
+  EXPECT_EQ(board.reason(), SafeReason::stop);
+  clear();
   EXPECT_EQ(board.state(), BoardState::active);
 }
 
-TEST_F(ApplicationSafety, APaperHostsClearIsTakenAtItsWord) {
+TEST_F(ApplicationSafety, AClearThatNamesNoneMustComeLaterThanTheTimeoutAfterTheCause) {
   TestBoard fresh;
   TestHost paper(fresh, 1);
   paper.heartbeat(4000);
   paper.command("E:STOP");
+  for (int i = 0; i < 9; ++i) {
+    fresh.run(100);
+    paper.heartbeat(4000);
+  }
+  paper.command("E:CLEAR");
+  EXPECT_EQ(fresh.reason(), SafeReason::stop);
+  EXPECT_EQ(fresh.log.refused.size(), 1U);
+  fresh.run(100);
   paper.command("E:CLEAR");
   EXPECT_EQ(fresh.state(), BoardState::active);
+}
+
+TEST_F(ApplicationSafety, AClearOfNothingIsExecutedWhereThereIsNothingElse) {
+  host.command("E:CLEAR,0");
+  EXPECT_EQ(board.log.refused, Lines{});
+  host.command("E:STOP");
+  host.command("E:CLEAR,0");
+  EXPECT_EQ(board.reason(), SafeReason::stop);
+}
+
+TEST_F(ApplicationSafety, CausesAreNumberedOtherwiseAtEachBoot) {
+  board.receive("E:STOP;", Source{0, 99});
+  TestBoard other(Settings(), 1, 123'456'789);
+  other.receive("E:STOP;", Source{0, 99});
+  EXPECT_NE(other.newest_cause(), board.newest_cause());
+}
+
+TEST_F(ApplicationSafety, HeartbeatsNameTheNewestStop) {
+  auto newest = [&] {
+    Datagram datagram;
+    EXPECT_TRUE(read(board.take(MessageKind::board_heartbeat).back().bytes, datagram));
+    return heartbeat_report(datagram);
+  };
+  board.receive("E:STOP;PNum:77;T:1;", Source{0, 99});
+  EXPECT_EQ(newest().stop, 77U);
+  board.receive("E:STOP;PNum:78;T:1;", Source{0, 98});
+  EXPECT_EQ(newest().stop, 78U);
+  board.receive("E:STOP;PNum:77;T:1;", Source{0, 99});  // a late copy
+  EXPECT_EQ(newest().stop, 77U);
+  board.receive("E:STOP;STOP:200000;", Source{0, 99});  // as a frame on a CAN bus tells it
+  EXPECT_EQ(newest().stop, 200000U);
+  board.receive("E:STOP;", Source{0, 99});
+  EXPECT_FALSE(newest().has_stop);
+  board.receive("E:STOP;PNum:79;T:1;", Source{0, 99});
+  clear();
+  board.take();
+  host.stay(600);
+  EXPECT_FALSE(newest().has_stop);
 }
 
 TEST_F(ApplicationSafety, AStopIsConfirmedByItsNumberToo) {

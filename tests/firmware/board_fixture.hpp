@@ -172,9 +172,16 @@ class TestBoard {
       Datagram datagram;
       if (read(sent.bytes, datagram) && kind_of(datagram) == MessageKind::board_heartbeat) {
         newest_t_[port] = static_cast<std::uint32_t>(datagram.time_ms());
+        newest_cause_ = heartbeat_report(datagram).cause;
       }
     }
     return newest_t_[port];
+  }
+
+  // The cause that the newest heartbeat tells of; 0: none.
+  std::int32_t newest_cause() {
+    for (int i = 0; i < firmware::Application::max_ports; ++i) newest_t(i);
+    return newest_cause_;
   }
 
   const firmware::Outputs& outputs() const { return hal.outputs; }
@@ -190,6 +197,7 @@ class TestBoard {
 
  private:
   std::uint32_t newest_t_[firmware::Application::max_ports] = {};
+  std::int32_t newest_cause_ = 0;
 };
 
 // The state that a datagram of the board carries.
@@ -222,6 +230,9 @@ class TestHost {
     resend(field, pnum);
     return pnum++;
   }
+  // E:CLEAR of the cause that the board has told of.
+  std::uint32_t clear() { return command(clear_field()); }
+  std::string clear_field() { return "E:CLEAR," + std::to_string(board.newest_cause()); }
   void resend(const std::string& field, std::uint32_t number) {
     board.receive(field + ";PNum:" + std::to_string(number) + ";T:1699276044383;", at);
   }

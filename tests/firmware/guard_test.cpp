@@ -168,7 +168,7 @@ TEST_F(GuardedBoard, AHungLoopEndsInTheSafeStateWithoutTheLoop) {
   host.command("O:400,1,1");
   EXPECT_TRUE(board.safe());
   host.echo();
-  host.command("E:CLEAR");
+  host.clear();
   host.command("O:400,1,1");
   EXPECT_EQ(board.outputs().osmc[0].pwm, 400);
 }
@@ -196,7 +196,7 @@ TEST_F(GuardedBoard, AStopThatAnInterruptHasHeardIsDoneBeforeTheLoopReadsIt) {
   EXPECT_TRUE(board.safe());
   board.run(10);
   host.echo();
-  host.command("E:CLEAR");
+  host.clear();
   host.command("O:400,1,1");
   EXPECT_EQ(board.outputs().osmc[0].pwm, 400);
 }

@@ -362,7 +362,7 @@ TEST(GigaWiFi, AnotherCalibrationDoesNotDropIt) {
 }
 
 TEST(GigaStop, IsObeyedOverEachTransport) {
-  for (const char* transport : {"usb", "can", "emergency frame", "udp"}) {
+  for (const char* transport : {"usb", "can", "emergency frame", "numbered frame", "udp"}) {
     GigaBench bench;
     bench.giga.stored["r4-settings"] = "network,lab\npassword,correct%20horse\n";
     bench.boot();
@@ -379,9 +379,10 @@ TEST(GigaStop, IsObeyedOverEachTransport) {
     if (name == "usb") bench.usb()(stop);
     if (name == "can") bench.can()(stop);
     if (name == "udp") bench.udp()(stop);
-    if (name == "emergency frame") {
+    if (name == "emergency frame" || name == "numbered frame") {
       CanFrame frame{};
-      frame.id = emergency_stop_id;
+      frame.extended = name == "numbered frame";
+      frame.id = frame.extended ? numbered_stop_id(200000) : emergency_stop_id;
       ASSERT_TRUE(bench.giga.can.deliver(frame));
     }
     if (name == "udp") {

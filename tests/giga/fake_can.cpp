@@ -82,7 +82,7 @@ CanFrame CanPeripheral::element(std::uint32_t word) const {
 
 void CanPeripheral::store(std::uint32_t base, std::uint32_t index, const CanFrame& frame) {
   std::uint32_t* const word = &r4_fake_message_ram[base + index * 4];
-  word[0] = frame.id << 18;
+  word[0] = frame.extended ? 1U << 30 | frame.id : frame.id << 18;
   word[1] = std::uint32_t{frame.size} << 16;
   for (int half = 0; half < 2; ++half) {
     word[2 + half] = 0;
@@ -91,13 +91,32 @@ void CanPeripheral::store(std::uint32_t base, std::uint32_t index, const CanFram
   }
 }
 
-bool CanPeripheral::deliver(const CanFrame& frame) {
-  if (in_init() || bus_off_) return false;
+// What the filters do with a frame: 1 and 2 are FIFO 0 and 1, 0 is no match.
+std::uint32_t CanPeripheral::filter_result(const CanFrame& frame) const {
+  if (frame.extended) {
+    const std::uint32_t filters = can.XIDFC.value >> 16 & 0x7F;
+    for (std::uint32_t i = 0; i < filters; ++i) {
+      const std::uint32_t* const filter = &r4_fake_message_ram[start_word(can.XIDFC) + 2 * i];
+      if (filter[1] >> 30 != 2) continue;  // id and mask: the kind that this firmware uses
+      const std::uint32_t mask = filter[1] & 0x1FFFFFFF & can.XIDAM.value;
+      if ((frame.id & mask) == (filter[0] & mask)) return filter[0] >> 29 & 7U;
+    }
+    return 0;
+  }
   const std::uint32_t filters = can.SIDFC.value >> 16 & 0xFF;
   for (std::uint32_t i = 0; i < filters; ++i) {
     const std::uint32_t filter = r4_fake_message_ram[start_word(can.SIDFC) + i];
-    if (frame.id != (filter >> 16 & 0x7FF) && frame.id != (filter & 0x7FF)) continue;
-    if ((filter >> 27 & 7U) == 1) {
+    if (frame.id == (filter >> 16 & 0x7FF) || frame.id == (filter & 0x7FF))
+      return filter >> 27 & 7U;
+  }
+  return 0;
+}
+
+bool CanPeripheral::deliver(const CanFrame& frame) {
+  if (in_init() || bus_off_) return false;
+  const std::uint32_t to = filter_result(frame);
+  if (to != 0) {
+    if (to == 1) {
       if (fifo0_fill_ == fifo_size(can.RXF0C)) {
         interrupt(1U << 3);
         return true;

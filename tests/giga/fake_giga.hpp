@@ -88,6 +88,7 @@ class CanPeripheral {
  private:
   CanFrame element(std::uint32_t word) const;
   void store(std::uint32_t base, std::uint32_t index, const CanFrame& frame);
+  std::uint32_t filter_result(const CanFrame& frame) const;
 
   std::uint32_t pending_ = 0;
   std::uint32_t put_ = 1;  // of the queue's elements 1 … 8

@@ -37,7 +37,7 @@ class StopBench : public GigaBench {
   }
   void clear_and_drive() {
     run_ms(120, host, usb());
-    usb()(host.command("E:CLEAR"));
+    usb()(host.command("E:CLEAR," + std::to_string(application().safe_report().cause)));
     run_ms(5);
     drive(host, usb());
   }

@@ -197,7 +197,9 @@ TEST(Board, SaysThatAnotherHostControlsTheBoard) {
   BoardInAThread simulated("udp");
   Board owner(simulated.url(), at_will());
   owner.wait_active();
-  Board other(simulated.url(), at_will());
+  BoardOptions options = at_will();
+  options.session.stop_linger = 0ms;  // the owner clears it at once
+  Board other(simulated.url(), options);
   const Problem problem = problem_of([&] { other.osmc(1).set(1, Direction::forward, 300ms); });
   EXPECT_EQ(problem.kind, ErrorKind::refused);
   EXPECT_TRUE(contains(problem.reason, "another host controls the board"));

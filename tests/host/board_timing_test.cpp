@@ -46,10 +46,11 @@ TEST(BoardTiming, IsSetInOneStepInEitherDirection) {
 
 TEST(BoardTiming, ThatCannotBeIsRefusedBeforeAnythingIsSent) {
   Board board("sim:");
-  for (const auto& [timeout, heartbeat] :
+  for (const auto& wrong :
        {std::pair(99ms, 50ms), std::pair(10001ms, 50ms), std::pair(300ms, 49ms),
         std::pair(300ms, 300ms), std::pair(300ms, 1001ms), std::pair(-1ms, -1ms)}) {
-    EXPECT_EQ(problem_of([&] { board.link_timing(timeout, heartbeat); }).kind, ErrorKind::usage);
+    EXPECT_EQ(problem_of([&] { board.link_timing(wrong.first, wrong.second); }).kind,
+              ErrorKind::usage);
   }
   const Problem slow = problem_of([&] { board.link_timing(150ms, 50ms); });
   EXPECT_EQ(slow.kind, ErrorKind::usage);

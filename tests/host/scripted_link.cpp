@@ -57,6 +57,12 @@ void ScriptedLink::heartbeat(SafeReason reason) {
                ";T:" + std::to_string(board_clock()) + ";" + safe));
 }
 
+void ScriptedLink::stopped(std::uint32_t stop, int cause) {
+  raw(with_crc("H:R4-ROS2;PNum:" + std::to_string(board_pnum++) +
+               ";T:" + std::to_string(board_clock()) + ";SAFE:2;CAUSE:" + std::to_string(cause) +
+               ";STOP:" + std::to_string(stop) + ";"));
+}
+
 void ScriptedLink::state(std::string_view fields) { finish(fields); }
 
 void ScriptedLink::executed(std::uint32_t pnum) {
@@ -64,7 +70,9 @@ void ScriptedLink::executed(std::uint32_t pnum) {
 }
 
 void ScriptedLink::nack(std::uint32_t pnum, std::string_view code) {
-  finish("N:" + std::to_string(pnum) + "," + std::string(code) + ";");
+  const std::string began =
+      session_pnum == 0 ? "" : "SESSION:" + std::to_string(session_pnum) + ";";
+  finish("N:" + std::to_string(pnum) + "," + std::string(code) + ";" + began);
 }
 
 void ScriptedLink::identity() { finish("I:R4,0.1.0,board-7,udp;"); }
@@ -74,6 +82,7 @@ void ScriptedLink::connect() {
   pass(std::chrono::milliseconds{10});
   ASSERT_EQ(count('F'), 1U) << "the session chooses its fields as soon as the link is up";
   executed(last('F').pnum);
+  session_pnum = last('H').pnum;
   ASSERT_TRUE(session.in_control(now));
   sent.clear();
 }

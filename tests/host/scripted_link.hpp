@@ -53,10 +53,13 @@ class ScriptedLink final : private Session::Handler {
   // The board speaks. Its clock runs with the host's; its packet numbers count by themselves.
   void boot_heartbeat();  // H:R4-ROS2;PNum:0;T:0;
   void heartbeat(SafeReason reason = SafeReason::none);
+  void stopped(std::uint32_t stop, int cause = 1);  // SAFE:2 of the E:STOP with that number
   // "AIN24:24.28;CMD:7;"; the safe reason is a field as any other.
   void state(std::string_view fields);
   void executed(std::uint32_t pnum);  // a state with SAFE 0 and this CMD
+  // To the host of the session that began with its heartbeat session_pnum, or with 0 to another.
   void nack(std::uint32_t pnum, std::string_view code);
+  std::uint32_t session_pnum = 0;  // connect() begins one
   void identity();
   void raw(std::string_view bytes);
   // It begins again, with another clock and new numbers; nothing is sent.

@@ -245,16 +245,30 @@ TEST_F(SessionArming, AStopCancelsIt) {
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::stop);
 }
 
-TEST_F(SessionArming, AfterAStopOfItsOwnItWaitsForTheStopsConfirmation) {
+TEST_F(SessionArming, ThatIsAskedForBeforeAStopOfItsOwnIsConfirmedEnds) {
   link.session.stop(1s, link.now);
-  const Ticket ticket = arm();
+  const std::uint32_t stop = link.last('E').pnum;
+  Ticket ticket = arm();
   EXPECT_EQ(link.count('R'), 0U);
-  link.heartbeat(SafeReason::stop);
-  link.pass(1ms);
-  EXPECT_EQ(link.last('E').command, "E:CLEAR");
+  link.stopped(stop, 7);
+  EXPECT_EQ(outcome(ticket), Outcome::not_armed);
+  ticket = arm();
+  EXPECT_EQ(link.last('E').command, "E:CLEAR,7");
   execute('E');
   execute('R', SafeReason::none, true);
   EXPECT_EQ(outcome(ticket), Outcome::confirmed);
+}
+
+TEST_F(SessionArming, AStopOfSomebodyElseThatComesMeanwhileEndsIt) {
+  link.stopped(1, 7);
+  state(SafeReason::stop, cmd, false);
+  const Ticket ticket = arm();
+  EXPECT_EQ(link.last('E').command, "E:CLEAR,7");
+  link.stopped(2, 8);
+  EXPECT_EQ(outcome(ticket), Outcome::not_armed);
+  link.sent.clear();
+  link.pass(500ms);
+  EXPECT_EQ(link.count('E') + link.count('R'), 0U);
 }
 
 TEST_F(SessionArming, OutputCommandsBehindItWaitForIt) {
@@ -345,6 +359,7 @@ TEST_F(SessionArming, ARefusalOverAnOutageProvesNothingOfAPost) {
   link.heartbeat();
   link.pass(10ms);
   state(SafeReason::none, link.last('F').pnum, true);
+  link.session_pnum = link.last('H').pnum;  // the board has begun another
   link.nack(pnum, "STALE");
   EXPECT_TRUE(link.refused.empty());
 }

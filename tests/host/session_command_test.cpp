@@ -4,6 +4,7 @@
 
 #include "host/command_help.hpp"
 #include "host/session.hpp"
+#include "protocol/board_link.hpp"
 #include "scripted_link.hpp"
 #include "tests/support/datagrams.hpp"
 #include "transports/error.hpp"
@@ -305,52 +306,138 @@ TEST(SessionStop, IsRepeatedEveryTwentyMillisecondsUntilTheBoardReportsIt) {
     EXPECT_EQ(sent[i].bytes, sent[0].bytes);
   }
   link.heartbeat(SafeReason::stop);
+  EXPECT_TRUE(under_way(link, ticket)) << "of whose stop that speaks is not known";
+  link.stopped(sent[0].pnum);
   EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
-  link.pass(1s);
-  EXPECT_EQ(link.count('E'), 5U);
 }
 
-TEST(SessionStop, IsNotConfirmedByWhatWasKnownBeforeIt) {
+TEST(SessionStop, IsRepeatedForAWhileAfterItsConfirmation) {
   ScriptedLink link;
   link.connect();
-  link.heartbeat(SafeReason::stop);
+  link.session.stop(1s, link.now);
+  link.stopped(link.last('E').pnum);
+  link.pass(1s);
+  EXPECT_EQ(link.count('E'), 10U) << "every 20 ms for 200 ms";
+  EXPECT_EQ(link.last('E').bytes, link.all('E').front().bytes);
+
+  link.session.stop(1s, link.now);
+  link.stopped(link.last('E').pnum);
+  link.pass(30ms);
+  link.session.send(Command::clear(), 1s, link.now);
+  const std::size_t stops = link.count('E');
+  link.pass(40ms);
+  EXPECT_EQ(link.count('E'), stops) << "not past an E:CLEAR of its own";
+}
+
+TEST(SessionStop, IsNotConfirmedByTheReportOfAnother) {
+  ScriptedLink link;
+  link.connect();
+  const Ticket first = link.session.stop(1s, link.now);
+  const std::uint32_t number = link.last('E').pnum;
+  link.stopped(number);
+  EXPECT_EQ(result_of(link, first).outcome, Outcome::confirmed);
+  link.heartbeat();  // somebody has cleared it
+
   const Ticket ticket = link.session.stop(1s, link.now);
+  link.stopped(number);  // a late copy, of a board that drives
+  link.heartbeat(SafeReason::stop);
+  link.state("SAFE:2;");
   link.nack(1, "STALE");
   link.identity();
+  link.stopped(link.last('E').pnum - 1);
   EXPECT_TRUE(under_way(link, ticket));
-  link.heartbeat(SafeReason::stop);
+  link.stopped(link.last('E').pnum, 2);
   EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
 }
 
-TEST(SessionStop, IsNotConfirmedByAnEarlierStopThatAClearMayTakeAway) {
+TEST(SessionStop, IsConfirmedByTheEndOfItsNumberAsACanBusCarriesIt) {
   ScriptedLink link;
   link.connect();
-  const std::string stopped = "SAFE:2;CMD:";
-  const std::string before = std::to_string(link.session.state().last_command) + ";";
-  link.state(stopped + before);
-  link.session.send(Command::clear(), 1s, link.now);
-  const std::uint32_t clear = link.last('E').pnum;
   const Ticket ticket = link.session.stop(1s, link.now);
-  link.state(stopped + before);  // left the board before the E:CLEAR came
-  link.heartbeat(SafeReason::stop);
+  link.stopped((link.last('E').pnum + 1) & 0x3FFFF);
   EXPECT_TRUE(under_way(link, ticket));
-  link.executed(clear);
-  link.pass(50ms);
-  EXPECT_TRUE(under_way(link, ticket));
-  EXPECT_GE(link.count('E'), 4U) << "the E:STOP is still repeated";
-  link.state(stopped + std::to_string(link.last('E').pnum) + ";");
+  link.stopped(link.last('E').pnum & 0x3FFFF);
   EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
 }
 
-TEST(SessionStop, IsConfirmedByAHeartbeatOnceTheClearIsKnownToBeRefused) {
+// --- what an E:CLEAR clears
+
+TEST(SessionClear, NamesTheCauseThatWasKnownWhenItWasAskedFor) {
   ScriptedLink link;
   link.connect();
+  link.stopped(1, 7);
   link.session.send(Command::clear(), 1s, link.now);
-  const std::uint32_t clear = link.last('E').pnum;
-  const Ticket ticket = link.session.stop(1s, link.now);
-  link.nack(clear, "SAFE");
-  link.heartbeat(SafeReason::stop);
-  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
+  EXPECT_EQ(link.last('E').command, "E:CLEAR,7");
+  link.heartbeat();
+  link.session.post(Command::clear(), link.now);
+  EXPECT_EQ(link.last('E').command, "E:CLEAR,0");
+}
+
+TEST(SessionClear, ThatIsAskedForBeforeTheBoardIsHeardNamesTheFirstThatItTells) {
+  ScriptedLink link;
+  const Ticket ticket = link.session.send(Command::clear(), 1s, link.now);
+  link.stopped(1, 7);
+  link.pass(10ms);
+  link.state("SAFE:2;CMD:" + std::to_string(link.last('F').pnum) + ";");
+  EXPECT_EQ(link.last('E').command, "E:CLEAR,7");
+  EXPECT_TRUE(under_way(link, ticket));
+}
+
+TEST(SessionClear, IsGivenUpWhenTheBoardTellsOfANewerCause) {
+  ScriptedLink link;
+  link.connect();
+  link.stopped(1, 7);
+  const Ticket sent = link.session.send(Command::clear(), 1s, link.now);
+  link.stopped(1, 7);
+  EXPECT_TRUE(under_way(link, sent));
+  link.stopped(2, 8);  // pressed again
+  EXPECT_EQ(result_of(link, sent).outcome, Outcome::cancelled);
+  const std::size_t clears = link.count('E');
+  link.pass(500ms);
+  EXPECT_EQ(link.count('E'), clears) << "it is not repeated";
+}
+
+TEST(SessionClear, ThatWaitsForControlIsNotSentPastANewerCause) {
+  ScriptedLink link;
+  link.stopped(1, 7);
+  const Ticket waits = link.session.send(Command::clear(), 1s, link.now);
+  link.stopped(2, 8);
+  EXPECT_EQ(result_of(link, waits).outcome, Outcome::cancelled);
+  EXPECT_EQ(link.count('E'), 0U);
+}
+
+TEST(SessionClear, ThatIsAskedForBeforeAStopOfItsOwnIsConfirmedIsGivenUp) {
+  ScriptedLink link;
+  link.connect();
+  link.heartbeat();
+  const Ticket stop = link.session.stop(1s, link.now);
+  const std::uint32_t number = link.last('E').pnum;
+  const Ticket clear = link.session.send(Command::clear(), 1s, link.now);
+  link.stopped(number, 7);  // of which it was not known what else it would take away
+  EXPECT_EQ(result_of(link, stop).outcome, Outcome::confirmed);
+  EXPECT_EQ(result_of(link, clear).outcome, Outcome::cancelled);
+}
+
+// --- refusals
+
+TEST(SessionRefusal, ProvesNothingOfASessionThatBeganAfterTheCommand) {
+  ScriptedLink link;
+  link.connect();
+  const Ticket ticket = link.session.send(drive, 5s, link.now);
+  const std::uint32_t pnum = link.last('O').pnum;
+  link.pass(100ms);
+  link.session_pnum = 0;  // the board takes us for a stranger: our address has changed
+  link.nack(pnum, "SAFE");
+  EXPECT_TRUE(under_way(link, ticket));
+  link.session_pnum = pnum + 1;  // a heartbeat of ours that came after an outage
+  link.nack(pnum, "STALE");
+  EXPECT_TRUE(under_way(link, ticket));
+  link.session_pnum = echo_host_first_pnum + 99;  // not ours
+  link.nack(pnum, "STALE");
+  EXPECT_TRUE(under_way(link, ticket));
+  link.session_pnum = echo_host_first_pnum + 100;
+  link.nack(pnum, "STALE");
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::refused);
 }
 
 TEST(SessionStop, CancelsEveryCommandUnderWayAndNoneFollowsIt) {
@@ -391,7 +478,7 @@ TEST(SessionBusy, AHostWhosePlaceOnTheBusIsTakenMayOnlyStopTheBoard) {
   EXPECT_FALSE(link.session.in_control(link.now));
   const Ticket stop = link.session.stop(1s, link.now);
   EXPECT_EQ(link.count('E'), 1U);
-  link.heartbeat(SafeReason::stop);
+  link.stopped(link.last('E').pnum);
   EXPECT_EQ(result_of(link, stop).outcome, Outcome::confirmed);
   EXPECT_EQ(result_of(link, ticket).outcome, Outcome::cancelled);
 
@@ -418,7 +505,7 @@ TEST(SessionBusy, CommandsWaitUntilTheOtherHostHasGone) {
   EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
 }
 
-TEST(SessionBusy, ARefusalAfterAnOutageProvesNothing) {
+TEST(SessionBusy, ARefusalAfterAnOutageProvesNothingUnlessTheSessionIsTheSame) {
   ScriptedLink link;
   link.connect();
   const Ticket ticket = link.session.send(drive, 10s, link.now);
@@ -426,10 +513,13 @@ TEST(SessionBusy, ARefusalAfterAnOutageProvesNothing) {
   link.pass(1100ms);
   ASSERT_EQ(link.session.link().state, HostLinkState::lost);
   link.heartbeat();
+  const std::uint32_t before = link.session_pnum;
+  link.session_pnum = link.last('H').pnum;
   link.nack(pnum, "STALE");
   EXPECT_TRUE(under_way(link, ticket)) << "the board may have executed it before the outage";
-  link.pass(10s);
-  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::timed_out);
+  link.session_pnum = before;  // the line was cut towards us only: the board remembers
+  link.nack(pnum, "STALE");
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::refused);
 }
 
 }  // namespace

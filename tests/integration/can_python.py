@@ -28,8 +28,8 @@ def datagram(fields, pnum, time_ms):
     return f'{text}0x{zlib.crc32(text.encode()):x}^'
 
 
-def heartbeat(fields, pnum, time_ms, safe=0):
-    text = f'{fields};PNum:{pnum};T:{time_ms};' + (f'SAFE:{safe};' if safe else '') + '^'
+def heartbeat(fields, pnum, time_ms, safe=''):
+    text = f'{fields};PNum:{pnum};T:{time_ms};{safe}^'
     return f'{text}0x{zlib.crc32(text.encode()):x}^'
 
 
@@ -90,7 +90,8 @@ class Peer:
     def __init__(self, interface, own_id, other_id, ids, fd=False):
         self.fd, self.own_id, self.other_id = fd, own_id, other_id
         self.bus = can.Bus(interface='socketcan', channel=interface, fd=True,
-                           can_filters=[{'can_id': each, 'can_mask': 0x7FF} for each in ids])
+                           can_filters=[{'can_id': each, 'can_mask': 0x7FF, 'extended': False} for each in ids] +
+                          [{'can_id': EMERGENCY_STOP << 18, 'can_mask': 0x7FF << 18, 'extended': True}])
         self.receivers = {}
         self.flow_control = None  # the newest one, while we wait for it
         self.failed_sends = 0
@@ -148,8 +149,11 @@ class Peer:
         while not done():
             left = deadline - time.monotonic()
             frame = self.bus.recv(timeout=max(0, left))
-            if frame is not None and not frame.is_extended_id and not frame.is_remote_frame:
-                self.on_frame(frame)
+            if frame is not None and not frame.is_remote_frame:
+                if not frame.is_extended_id:
+                    self.on_frame(frame)
+                elif frame.arbitration_id >> 18 == EMERGENCY_STOP:
+                    self.on_numbered_stop(frame.arbitration_id & 0x3FFFF)
             elif left <= 0:
                 return False
         return True
@@ -171,6 +175,9 @@ class Peer:
     def on_raw_frame(self, identifier, data):
         raise NotImplementedError
 
+    def on_numbered_stop(self, number):
+        pass
+
     def on_text(self, text, packed):
         raise NotImplementedError
 
@@ -187,6 +194,7 @@ class Host(Peer):
                           TELEMETRY + node: Receiver()}
         self.pnum = 2 ** 31 + random.randrange(2 ** 30)
         self.board_time = 0
+        self.cause = 0  # as the newest heartbeat told it
         self.beats = True
         self.echoed = False
         self.packs = False
@@ -205,6 +213,7 @@ class Host(Peer):
         self.heard.append((text, fields, packed))
         if fields.get('H') == 'R4-ROS2':
             self.board_time = int(fields['T'])
+            self.cause = int(fields.get('CAUSE', 0))
             self.next_beat = 0.0  # each is answered at once
 
     def send(self, fields):
@@ -276,6 +285,8 @@ class Board(Peer):
         self.began = time.monotonic()
         self.state, self.safe, self.pnum = 'CONNECTING', 0, 0
         self.echoable, self.armed, self.host_heard, self.newest = [], False, 0.0, None
+        self.session = 0     # the number of the heartbeat that began it
+        self.cause, self.stop_number = random.randrange(2 ** 30), None
         self.fields, self.osmc, self.last_command = [], '0,0', 0
         self.next_state = self.next_beat = 0.0
         self.answers = []    # what is to be sent
@@ -327,11 +338,19 @@ class Board(Peer):
 
     def _send_heartbeat(self):
         if self.state == 'CONNECTING':
-            text = heartbeat('H:R4-ROS2', 0, 0, self.safe)
+            text = heartbeat('H:R4-ROS2', 0, 0, self._safe_fields())
         else:
             self.echoable = [*self.echoable[-63:], self._time()]
-            text = heartbeat('H:R4-ROS2', self._number(), self.echoable[-1], self.safe)
+            text = heartbeat('H:R4-ROS2', self._number(), self.echoable[-1], self._safe_fields())
         self._send(TELEMETRY + self.node, text, False)
+
+    def _safe_fields(self):
+        fields = f'SAFE:{self.safe};' if self.safe else ''
+        if self.safe == 2:
+            fields += f'CAUSE:{self.cause};'
+            if self.stop_number is not None:
+                fields += f'STOP:{self.stop_number};'
+        return fields
 
     def _send(self, identifier, text, flow_control):
         self.send_message(identifier, (packed_form.pack(text) if self.packs else None) or text.encode(), flow_control)
@@ -344,7 +363,16 @@ class Board(Peer):
 
     def on_raw_frame(self, identifier, data):
         assert identifier == EMERGENCY_STOP
+        self._stop(None)
+
+    def on_numbered_stop(self, number):
+        self._stop(number)
+
+    def _stop(self, number):
         self.stops += 1
+        if self.safe != 2 or number is None or number != self.stop_number:
+            self.cause += 1
+        self.stop_number = number
         self.osmc = '0,0'
         self._go_safe(2)
 
@@ -353,14 +381,15 @@ class Board(Peer):
         if fields is None:
             return
         if fields.get('H') == 'ROS2-R4':
-            self._on_heartbeat(int(fields['T']))
+            self._on_heartbeat(int(fields['T']), int(fields['PNum']))
         elif 'Q' in fields:
             self.answers.append('I:R4,python,second,none')
         elif self.armed:
             self._on_command(fields)
 
-    def _on_heartbeat(self, echo):
+    def _on_heartbeat(self, echo, pnum):
         if self.state == 'CONNECTING' and echo == 0:
+            self.session = pnum
             self.state, self.armed, self.next_beat = 'ACTIVE', False, 0.0
             self.host_heard = time.monotonic()
         elif echo in self.echoable:
@@ -374,12 +403,15 @@ class Board(Peer):
         if not self.obeys:
             return
         if self.newest is not None and not 0 < (pnum - self.newest) % 2 ** 32 <= 65536:
-            self.answers.append(f'N:{pnum},{"DUPLICATE" if pnum == self.newest else "STALE"}')
+            self._refuse(pnum, 'DUPLICATE' if pnum == self.newest else 'STALE')
             return
         self.newest = pnum
         letter = next(iter(fields))
         if letter in self.refuses:
-            self.answers.append(f'N:{pnum},{"SAFE" if self.safe else "RANGE"}')
+            self._refuse(pnum, 'SAFE' if self.safe else 'RANGE')
+            return
+        if letter == 'E' and fields[letter] != f'CLEAR,{self.cause if self.safe == 2 else 0}':
+            self._refuse(pnum, 'STALE')
             return
         self.executed.append(f'{letter}:{fields[letter]}')
         self.last_command = pnum
@@ -387,5 +419,8 @@ class Board(Peer):
             self.fields = [name for name in fields[letter].replace('DEFAULT', 'AIN24,OSMC1').split(',')]
         elif letter == 'O':
             self.osmc = fields[letter].rpartition(',')[0]
-        elif self.executed[-1] == 'E:CLEAR':
+        elif letter == 'E':
             self.safe = 0
+
+    def _refuse(self, pnum, code):
+        self.answers.append(f'N:{pnum},{code};SESSION:{self.session}')

@@ -103,7 +103,7 @@ def test_the_emergency_frame_stops_is_told_in_one_frame_and_can_be_cleared(board
         assert (state['SAFE'], state['OSMC1']) == ('2', '0,0')
         assert host.command('O:358,1,1') == 'SAFE'
         host.next(lambda fields: 'H' in fields)
-        assert host.command('E:CLEAR') == 'done'
+        assert host.command(f'E:CLEAR,{host.cause}') == 'done'
         assert host.command('O:200,0,1') == 'done'
     board.state('SAFE', 'stop')
     board.outputs(lambda outputs: outputs['osmc'][0] == [200, 0])

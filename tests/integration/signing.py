@@ -43,6 +43,7 @@ class SigningHost:
         self.state = {}
         self.refused = []  # (PNum, code)
         self.reasons = []  # of the heartbeats, as they came
+        self.cause = 0  # of the newest
 
     def close(self):
         self.socket.close()
@@ -89,6 +90,7 @@ class SigningHost:
             self.nonce = fields.get('AN')
             self.echo = self.echo_of(fields)
             self.reasons.append(int(fields.get('SAFE', 0)))
+            self.cause = int(fields.get('CAUSE', 0))
             self.heartbeat()
         elif 'N' in fields:
             number, code = fields['N'].split(',')

@@ -143,7 +143,7 @@ def test_a_stop_needs_no_signature_and_is_cleared_with_one(board, host, stranger
     assert host.nonce != nonce, 'another nonce for the safe state'
     host.send(closed('E:CLEAR;PNum:1;T:1;'), stranger)
     board.next(lambda each: each.get('rejected') == 'missing')
-    number, _ = host.command('E:CLEAR')
+    number, _ = host.command(f'E:CLEAR,{host.cause}')
     assert host.executed(number)
     assert host.run(lambda: host.state.get('SAFE') == '0')
 

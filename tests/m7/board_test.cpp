@@ -123,7 +123,7 @@ TEST(Board, AStopIsDoneWithinTwoMillisecondsOfItsLastByte) {
   const Steps steps(step_of_board);
   std::uint32_t longest_us = 0;
   for (std::uint32_t at_us = 0; at_us < 6000; at_us += 370) {
-    host.execute(Command::clear());
+    host.execute(Command::clear(host.board().application().safe_report().cause));
     host.drive_everything();
     host.run_ms(timeout_ms + 10);
     EXPECT(host.safe());

@@ -604,22 +604,33 @@ TEST_F(BoardLinkTest, ANewSessionForgetsTheNumbersOfTheOld) {
   EXPECT_EQ(command(echo_pnum + 100'000'001, there), "execute");
 }
 
-TEST_F(BoardLinkTest, KnowsWhatAnEchoHostHasHeard) {
-  connect();
-  const std::uint32_t heard = sent.back();
-  EXPECT_TRUE(link.has_heard(heard));
-  EXPECT_FALSE(link.has_heard(heard + 1));
-  run(100);
-  link.send_soon();
+TEST_F(BoardLinkTest, TellsItsHostSinceWhichEchoItRemembersCommands) {
+  std::uint32_t first = 0;
+  EXPECT_FALSE(link.session_of(here, first));
+  heartbeat(echo_pnum, 0);
+  EXPECT_FALSE(link.session_of(here, first)) << "it may be of before a reboot";
   send_due();
-  EXPECT_FALSE(link.has_heard(now));
-  heartbeat(echo_pnum + 2, now);
-  EXPECT_TRUE(link.has_heard(now));
+  heartbeat(echo_pnum + 1, sent.back());
+  EXPECT_TRUE(link.session_of(here, first));
+  EXPECT_EQ(first, echo_pnum + 1);
+  EXPECT_FALSE(link.session_of(there, first));
+  run(1000);  // lost, and resumed
+  heartbeat(echo_pnum + 2, sent.back());
+  EXPECT_TRUE(link.session_of(here, first));
+  EXPECT_EQ(first, echo_pnum + 1);
+  run(1000);
+  heartbeat(echo_pnum + 3, sent.back(), there);  // from another address: another session
+  EXPECT_FALSE(link.session_of(here, first));
+  EXPECT_TRUE(link.session_of(there, first));
+  EXPECT_EQ(first, echo_pnum + 3);
 }
 
-TEST_F(BoardLinkTest, OfAPaperHostNobodyCanTellWhatItHasHeard) {
-  heartbeat(1, 4000);
-  EXPECT_TRUE(link.has_heard(now + 1000));
+TEST_F(BoardLinkTest, ASessionWithoutNumbersHasNoneToTell) {
+  BoardLink::HostHeartbeat plain;
+  plain.from = here;
+  link.on_heartbeat(plain, now);
+  std::uint32_t first = 0;
+  EXPECT_FALSE(link.session_of(here, first));
 }
 
 // --- the board's own heartbeats

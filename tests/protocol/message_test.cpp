@@ -72,6 +72,53 @@ TEST(Message, BoardHeartbeatCarriesTheReasonBehindTheTime) {
   }
 }
 
+TEST(Message, BoardHeartbeatCarriesWhatAStopAndAClearHaveToKnow) {
+  SafeReport report(SafeReason::stop);
+  report.cause = 734003;
+  report.has_stop = true;
+  report.stop = 4294967295U;
+  char buffer[max_datagram];
+  const Text bytes = write_board_heartbeat(buffer, sizeof buffer, 12, 790, report);
+  EXPECT_EQ(str(bytes), with_crc("H:R4-ROS2;PNum:12;T:790;SAFE:2;CAUSE:734003;STOP:4294967295;"));
+  Datagram datagram;
+  ASSERT_TRUE(read(bytes, datagram));
+  const SafeReport again = heartbeat_report(datagram);
+  EXPECT_EQ(again.reason, SafeReason::stop);
+  EXPECT_EQ(again.cause, 734003);
+  EXPECT_TRUE(again.has_stop);
+  EXPECT_EQ(again.stop, 4294967295U);
+}
+
+TEST(Message, ACauseOrAStopThatCannotBeReadIsNone) {
+  for (const char* value : {"", "-1", "x", "1,2", "4294967296"}) {
+    const SafeReport report = heartbeat_report(
+        Read("H:R4-ROS2;SAFE:2;CAUSE:" + std::string(value) + ";STOP:" + value + ";").datagram);
+    EXPECT_EQ(report.cause, 0) << value;
+    EXPECT_FALSE(report.has_stop) << value;
+  }
+}
+
+TEST(Message, ARefusalTellsTheHostOfTheSessionWhichOneItIs) {
+  Nack nack;
+  nack.pnum = 7;
+  nack.code = Refusal::stale;
+  nack.has_session = true;
+  nack.session = 2147484600U;
+  char buffer[max_datagram];
+  DatagramWriter writer(buffer, sizeof buffer);
+  write_nack(writer, nack);
+  Datagram datagram;
+  const Text bytes = writer.finish(1, 2);
+  EXPECT_EQ(str(bytes), with_crc("N:7,STALE;SESSION:2147484600;PNum:1;T:2;"));
+  ASSERT_TRUE(read(bytes, datagram));
+  Nack again;
+  ASSERT_TRUE(read_nack(datagram, again));
+  EXPECT_TRUE(again.has_session);
+  EXPECT_EQ(again.session, nack.session);
+  ASSERT_TRUE(read_nack(Read("N:7,STALE;").datagram, again));
+  EXPECT_FALSE(again.has_session);
+}
+
 TEST(Message, BoardHeartbeatCarriesTheNonceBehindTheReason) {
   char buffer[max_datagram];
   const Text bytes =

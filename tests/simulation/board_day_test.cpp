@@ -132,7 +132,7 @@ class Day final : private firmware::Port {
         reason == SafeReason::watchdog) {
       ASSERT_EQ(application_.reason(), reason) << static_cast<int>(incident);
       live(1000);
-      command("E:CLEAR");
+      command("E:CLEAR," + std::to_string(application_.safe_report().cause));
     }
     live(1500);
     ASSERT_EQ(application_.state(), BoardState::active) << static_cast<int>(incident);
@@ -142,7 +142,7 @@ class Day final : private firmware::Port {
   void expect_that_counters_are_those_of_the_board() {
     command("E:STOP");
     live(2000);
-    command("E:CLEAR");
+    command("E:CLEAR," + std::to_string(application_.safe_report().cause));
     live(500);
     const sim::Pins pins = board_.pins();
     for (int i = 0; i < stepper_channels; ++i) {

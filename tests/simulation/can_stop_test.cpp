@@ -150,6 +150,7 @@ class StoppingHost {
     pump();
   }
   void stop() { ASSERT_TRUE(bus_.send(controller_, stop_frame())); }
+  std::int32_t cause(int board) const { return links_[static_cast<std::size_t>(board)]->cause; }
 
   std::uint32_t timeouts() const {
     std::uint32_t count = 0;
@@ -171,12 +172,15 @@ class StoppingHost {
     void hear(Text bytes) {
       Datagram datagram;
       if (bytes.empty() || !read(bytes, datagram)) return;
-      if (kind_of(datagram) == MessageKind::board_heartbeat) board_t = datagram.time_ms();
+      if (kind_of(datagram) != MessageKind::board_heartbeat) return;
+      board_t = datagram.time_ms();
+      cause = heartbeat_report(datagram).cause;
     }
     CanNode node;
     std::deque<std::string> waiting;
     std::uint32_t pnum = echo_pnum;
     std::uint64_t board_t = 0;  // of its newest heartbeat: what ours echo
+    std::int32_t cause = 0;     // of that too
   };
 
   void heartbeats() {
@@ -204,13 +208,16 @@ class StoppingHost {
 
 using Boards = std::vector<std::unique_ptr<StoppedBoard>>;
 
-// Lets all boards drive again. A board obeys once it heard the host echo that it has stopped; what
+// Lets all boards drive again. A board obeys an E:CLEAR that names the stop that it has told of; what
 // says so may be lost when all boards tell of their stop at once, and is repeated.
 void drive(CanBusModel& bus, const Boards& boards, StoppingHost& host) {
   for (int attempt = 0; attempt < 20; ++attempt) {
     for (int board = 0; board < board_count; ++board) {
       if (boards[static_cast<std::size_t>(board)]->drives()) continue;
-      for (const char* field : {"H:ROS2-R4", "E:CLEAR", "O:358,1,1"}) host.command(board, field);
+      const std::string clear = "E:CLEAR," + std::to_string(host.cause(board));
+      for (const std::string& field : {std::string("H:ROS2-R4"), clear, std::string("O:358,1,1")}) {
+        host.command(board, field);
+      }
       bus.run_until(bus.now_ns() + 3 * ms_ns);
     }
     bus.run_until(bus.now_ns() + 20 * ms_ns);

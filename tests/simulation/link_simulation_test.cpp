@@ -51,6 +51,9 @@ TEST(LinkSimulation, KeepsEveryPromiseUnderRandomFaults) {
       mine.link_losses += report.link_losses;
       mine.restores += report.restores;
       mine.stops += report.stops;
+      mine.stops_confirmed += report.stops_confirmed;
+      mine.clears += report.clears;
+      mine.clears_refused += report.clears_refused;
       mine.busy += report.busy;
       mine.stale += report.stale;
       mine.duplicate += report.duplicate;
@@ -71,6 +74,9 @@ TEST(LinkSimulation, KeepsEveryPromiseUnderRandomFaults) {
     sum.link_losses += mine.link_losses;
     sum.restores += mine.restores;
     sum.stops += mine.stops;
+    sum.stops_confirmed += mine.stops_confirmed;
+    sum.clears += mine.clears;
+    sum.clears_refused += mine.clears_refused;
     sum.busy += mine.busy;
     sum.stale += mine.stale;
     sum.duplicate += mine.duplicate;
@@ -87,12 +93,14 @@ TEST(LinkSimulation, KeepsEveryPromiseUnderRandomFaults) {
 
   fmt::print(
       "{} schedules: {} violations; {} commands executed, {} confirmed, {} refused, {} timed out; "
-      "{} links lost, {} outputs restored, {} stops; answers {} BUSY, {} STALE, {} DUPLICATE; "
+      "{} links lost, {} outputs restored, {} stops obeyed, {} confirmed, {} cleared, {} clears "
+      "refused; answers {} BUSY, {} STALE, {} DUPLICATE; "
       "{} forged or replayed datagrams, {} rejected, {} signed commands executed; "
       "longest silence to safe {:.1f} ms\n",
       schedules, failing.size(), sum.executed, sum.confirmed, sum.refused, sum.timed_out,
-      sum.link_losses, sum.restores, sum.stops, sum.busy, sum.stale, sum.duplicate, sum.attacks,
-      sum.rejected, sum.executed_signed, static_cast<double>(sum.worst_silence_us) / 1000);
+      sum.link_losses, sum.restores, sum.stops, sum.stops_confirmed, sum.clears, sum.clears_refused,
+      sum.busy, sum.stale, sum.duplicate, sum.attacks, sum.rejected, sum.executed_signed,
+      static_cast<double>(sum.worst_silence_us) / 1000);
   std::sort(failing.begin(), failing.end());
   for (std::size_t i = 0; i < failing.size() && i < 3; ++i) {
     const Report report = World(failing[i], true).run();
@@ -104,6 +112,9 @@ TEST(LinkSimulation, KeepsEveryPromiseUnderRandomFaults) {
   // The schedules must reach what they are to test.
   EXPECT_GT(sum.executed, schedules);
   EXPECT_GT(sum.restores, schedules / 100);
+  EXPECT_GT(sum.stops_confirmed, schedules / 10);
+  EXPECT_GT(sum.clears, schedules / 20);
+  EXPECT_GT(sum.clears_refused, schedules / 100);
   EXPECT_GT(sum.stale, schedules / 100);
   EXPECT_GT(sum.duplicate, schedules / 100);
   EXPECT_GT(sum.busy, schedules / 100);

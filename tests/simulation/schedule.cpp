@@ -41,11 +41,30 @@ Schedule Schedule::random(Random& random) {
   const int count = static_cast<int>(random.below(6));
   for (int i = 0; i < count; ++i) {
     Happening h;
-    h.kind = static_cast<Happening::Kind>(random.below(10));
+    h.kind = static_cast<Happening::Kind>(random.below(12));
     h.at_us = random.below(s.duration_us);
     h.length_us = random.between(1'000, 2'500'000);
     h.host = static_cast<int>(random.below(static_cast<std::uint64_t>(s.hosts)));
     s.happenings.push_back(h);
+  }
+  s.shared_place = random.chance(0.3);
+  // Stops that cross an E:CLEAR of the stop before them.
+  if (random.chance(0.3)) {
+    Happening stop;
+    stop.kind = random.chance(0.5) ? Happening::Kind::stop : Happening::Kind::stopper;
+    stop.at_us = random.below(s.duration_us);
+    stop.length_us = random.between(1'000, 1'000'000);
+    stop.host = static_cast<int>(random.below(static_cast<std::uint64_t>(s.hosts)));
+    s.happenings.push_back(stop);
+    Happening clear = stop;
+    clear.kind = Happening::Kind::stop;
+    s.happenings.push_back(clear);
+    for (std::uint64_t n = random.between(1, 2); n != 0; --n) {
+      Happening crossing = stop;
+      crossing.kind = Happening::Kind::stopper;
+      crossing.at_us += stop.length_us + random.below(300'000);
+      s.happenings.push_back(crossing);
+    }
   }
   if (random.chance(0.3)) {
     s.attack_interval_us = static_cast<std::uint32_t>(random.between(2'000, 200'000));
@@ -75,6 +94,10 @@ const char* to_text(Happening::Kind kind) {
       return "handle";
     case Happening::Kind::obstacle:
       return "obstacle";
+    case Happening::Kind::address:
+      return "address";
+    case Happening::Kind::stopper:
+      return "stopper";
   }
   return "?";
 }

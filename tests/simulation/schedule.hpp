@@ -34,6 +34,8 @@ struct Happening {
     stop,       // the host asks for an emergency stop, and clears it after `length_us`
     handle,     // the dead-man's handle is released for `length_us`
     obstacle,   // something stands before sensor 1 for `length_us`
+    address,    // the host's datagrams come from another address, for good or for `length_us`
+    stopper,  // another process asks for an emergency stop and goes, after `length_us` at the latest
   };
   Kind kind;
   std::uint64_t at_us;
@@ -43,7 +45,8 @@ struct Happening {
 
 struct Schedule {
   std::uint64_t duration_us = 0;
-  int hosts = 1;  // the second one meddles
+  int hosts = 1;              // the second one meddles
+  bool shared_place = false;  // the stopper's place is the first host's, as on a CAN bus
   Settings settings;
   ChannelFaults to_board, to_host;
   std::vector<Happening> happenings;

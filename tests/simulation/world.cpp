@@ -28,9 +28,13 @@ Report World::run() {
   boot_board();
   for (int i = 0; i < schedule_.hosts; ++i) {
     hosts_.push_back(std::make_unique<Host>(*this, i));
+    hosts_.back()->peer = next_peer_++;
     start_host(i);
     at(random_.below(300'000), Event::Kind::command, i);
   }
+  hosts_.push_back(std::make_unique<Host>(*this, schedule_.hosts));
+  hosts_.back()->stopper = true;
+  hosts_.back()->peer = schedule_.shared_place ? hosts_.front()->peer : next_peer_++;
   for (std::size_t i = 0; i < schedule_.happenings.size(); ++i) {
     at(schedule_.happenings[i].at_us, Event::Kind::happening, static_cast<int>(i));
   }

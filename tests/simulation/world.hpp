@@ -11,14 +11,19 @@
 //   fresh      and sent at most 2 timeouts + 250 ms before
 //   late       nor one that a heartbeat which fed overtook more than 250 ms before
 //   truth      confirmed means executed; refused means not executed, then and later
+//   stop       a stop that is confirmed was obeyed: that one, not another; and no E:CLEAR takes away a
+//              stop that came after it was asked for
 //   restore    outputs that come back belong to a host that was alive a timeout ago
 //   forged     of a board with a key: nothing that an attacker sends is executed, feeds or takes
 //              control, but a stop
 #pragma once
 
+#include <compare>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <queue>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -42,6 +47,9 @@ struct Report {
   std::uint32_t link_losses = 0;  // SAFE with reason link
   std::uint32_t restores = 0;     // outputs came back by recovery=last
   std::uint32_t stops = 0;
+  std::uint32_t stops_confirmed = 0;
+  std::uint32_t clears = 0;
+  std::uint32_t clears_refused = 0;  // by the board: a stop had come since
   std::uint32_t busy = 0;
   std::uint32_t stale = 0;
   std::uint32_t duplicate = 0;
@@ -75,6 +83,7 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   struct Packet {
     bool to_board = false;
     int host = 0;
+    std::uint32_t peer = 0;         // the host's address when it was sent
     std::uint32_t incarnation = 0;  // of the host when it was sent
     bool intact = true;
     bool heartbeat = false;
@@ -87,7 +96,7 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   struct Process {
     int host = -1;
     std::uint32_t incarnation = 0;
-    bool operator==(const Process&) const = default;
+    auto operator<=>(const Process&) const = default;
   };
   // A heartbeat that the board took as a sign of life.
   struct Fed {
@@ -131,15 +140,19 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   void boot_board();
   void poll_board();
   void check_silence();
+  void on_stop(std::uint32_t pnum);
   // world_hosts.cpp
   void start_host(int index);
   void poll_host(int index);
   void issue_command(int index);
   // world_happenings.cpp
+  void stop(Host& host);
+  void clear_stop(Host& host);
+  void call_stopper(Host& stopper, bool over);
   void happen(const Happening& happening, bool over);
   void attack();
   // world_channel.cpp
-  void transfer(bool to_board, int host, std::string_view bytes);
+  void transfer(bool to_board, int host, std::uint32_t peer, std::string_view bytes);
   void deliver(int slot);
 
   Random random_;
@@ -166,14 +179,20 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   std::uint64_t heartbeat_sent_us_ = 0;  // when the newest to arrive was sent
   std::vector<Fed> fed_;                 // by this boot of the board
   Process delivering_;                   // whose packet the board has before it
-  Process stop_from_;                    // of the last stop executed
+  std::uint32_t delivering_peer_ = 0;
+  Process stop_from_;  // of the last stop executed
   std::uint32_t stop_pnum_ = 0;
   int newest_executed_ = -1;
+  bool stopped_ = false;
+  std::uint64_t new_stop_us_ = 0;  // when one came that is no repetition of the one before
+  std::map<Process, std::uint64_t> clear_asked_us_;
+  std::uint32_t next_peer_ = 1;
 
   std::vector<std::unique_ptr<Host>> hosts_;
   std::vector<Sent> commands_;
   Attacker attacker_;
   bool attacking_ = false;
+  std::set<std::uint32_t> attacker_stops_;  // their numbers
   std::uint64_t cut_to_board_until_us_ = 0;
   std::uint64_t cut_to_host_until_us_ = 0;
 };

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "world_host.hpp"
 
@@ -22,7 +23,7 @@ void World::boot_board() {
   boot_us_ = now_us_;
   boot_offset_ms_ = static_cast<std::uint32_t>(random_.next());
   outputs_ = firmware::Outputs();
-  live_ = false;
+  live_ = stopped_ = false;
   fed_.clear();
   firmware::Application::Config config;
   config.identity = Identity{Text("simulated"), Text("0"), Text("sim")};
@@ -92,9 +93,8 @@ void World::check_silence() {
 void World::send(Text datagram, firmware::Urgency, std::uint32_t peer) {
   const std::string_view bytes(datagram.data(), datagram.size());
   for (int i = 0; i < static_cast<int>(hosts_.size()); ++i) {
-    if (peer == firmware::everyone || peer == static_cast<std::uint32_t>(i + 1)) {
-      transfer(false, i, bytes);
-    }
+    const std::uint32_t at_host = hosts_[static_cast<std::size_t>(i)]->peer;
+    if (peer == firmware::everyone || peer == at_host) transfer(false, i, at_host, bytes);
   }
 }
 
@@ -114,8 +114,16 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
   if (attacking_ && command.kind != CommandKind::stop) return violate("forged: executed");
   if (command.kind == CommandKind::stop) {
     ++report_.stops;
-    stop_from_ = delivering_;
-    stop_pnum_ = pnum;
+    on_stop(pnum);
+  }
+  if (command.kind == CommandKind::clear) {
+    ++report_.clears;
+    const bool was_stopped = std::exchange(stopped_, board_->reason() == SafeReason::stop);
+    const std::uint64_t asked_us = clear_asked_us_[delivering_];
+    if (was_stopped && new_stop_us_ > asked_us) {
+      violate(fmt::format("stop: taken away by an E:CLEAR that was asked for {} us before it",
+                          new_stop_us_ - asked_us));
+    }
   }
   if (command.kind != CommandKind::stepper) return;
   ++report_.executed;
@@ -148,10 +156,23 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
       break;
     }
   }
-  if (board_->link().owner().peer != static_cast<std::uint32_t>(sent.host + 1)) {
+  if (board_->link().owner().peer != delivering_peer_ || delivering_.host != sent.host) {
     violate(fmt::format("intact: command {} is of a host that does not control", id));
   }
   newest_executed_ = std::max(newest_executed_, id);
+}
+
+// A stop that is obeyed. A repetition of the last one adds nothing to it.
+void World::on_stop(std::uint32_t pnum) {
+  if (!stopped_ || stop_from_ != delivering_ || stop_pnum_ != pnum) new_stop_us_ = now_us_;
+  stopped_ = true;
+  stop_from_ = delivering_;
+  stop_pnum_ = pnum;
+  if (attacking_) attacker_stops_.insert(pnum);
+  if (delivering_.host < 0) return;
+  Host& host = *hosts_[static_cast<std::size_t>(delivering_.host)];
+  if (host.incarnation != delivering_.incarnation) return;
+  for (auto& [ticket, stop] : host.stops) stop.executed = stop.executed || stop.pnum == pnum;
 }
 
 void World::on_refused(std::uint32_t, std::uint32_t pnum, Refusal code) {

@@ -9,7 +9,7 @@
 
 namespace r4::simulation {
 
-void World::transfer(bool to_board, int host, std::string_view bytes) {
+void World::transfer(bool to_board, int host, std::uint32_t peer, std::string_view bytes) {
   if (to_board) {
     attacker_.on_sent(host, bytes);
   } else {
@@ -25,6 +25,7 @@ void World::transfer(bool to_board, int host, std::string_view bytes) {
   if (to_board && read(Text(bytes), datagram)) {
     heartbeat = kind_of(datagram) == MessageKind::host_heartbeat;
     pnum = datagram.pnum();
+    if (asks_to_stop(datagram)) hosts_[static_cast<std::size_t>(host)]->stop_pnum = pnum;
     Command parsed;
     if (datagram.command_count() == 1 &&
         parse_command(datagram.command(), parsed) == Refusal::none &&
@@ -49,6 +50,7 @@ void World::transfer(bool to_board, int host, std::string_view bytes) {
     Packet& packet = packets_[static_cast<std::size_t>(slot)];
     packet.to_board = to_board;
     packet.host = host;
+    packet.peer = peer;
     packet.incarnation = hosts_[static_cast<std::size_t>(host)]->incarnation;
     packet.heartbeat = heartbeat;
     packet.pnum = pnum;
@@ -97,9 +99,10 @@ void World::deliver(int slot) {
       heartbeat_in_us_ = now_us_;
       heartbeat_sent_us_ = std::max(heartbeat_sent_us_, packet.sent_us);
     }
-    const auto peer = static_cast<std::uint32_t>(packet.host + 1);
+    const std::uint32_t peer = packet.peer;
     const std::uint32_t fed_before = board_->link().fed_ms();
     delivering_ = {packet.host, packet.incarnation};
+    delivering_peer_ = peer;
     board_->receive(0, peer, Text(packet.bytes), board_ms());
     attacker_.on_received(packet.host, packet.bytes);
     const BoardLink& link = board_->link();
@@ -109,7 +112,7 @@ void World::deliver(int slot) {
     }
   } else {
     Host& host = *hosts_[static_cast<std::size_t>(packet.host)];
-    if (host.alive) {
+    if (host.alive && host.peer == packet.peer) {
       host.session->receive(packet.bytes, host.time());
       poll_host(packet.host);
     }

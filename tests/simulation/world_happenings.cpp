@@ -2,6 +2,8 @@
 // What comes from outside: the happenings of the schedule, and the attacker.
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "world_host.hpp"
 
 namespace r4::simulation {
@@ -43,11 +45,10 @@ void World::happen(const Happening& happening, bool over) {
     case Happening::Kind::stop:
       if (!host.alive) return;
       if (over) {
-        host.session->send(Command::clear(), Time{500'000}, host.time());
+        clear_stop(host);
       } else {
-        host.session->stop(Time{500'000}, host.time());
+        stop(host);
       }
-      poll_host(happening.host);
       break;
     case Happening::Kind::handle:
       handle_held_ = over;
@@ -57,8 +58,41 @@ void World::happen(const Happening& happening, bool over) {
       if (!over && host.alive) host.session->post(Command::proximity(50, 1), host.time());
       distance_cm_ = over ? 200 : 10;
       break;
+    case Happening::Kind::address:
+      if (over && random_.chance(0.5)) return;
+      std::swap(host.peer, host.other_peer);
+      if (host.peer == 0) host.peer = next_peer_++;
+      break;
+    case Happening::Kind::stopper:
+      call_stopper(*hosts_.back(), over);
+      break;
   }
   if (!over) at(end_us, Event::Kind::over, index);
+}
+
+void World::stop(Host& host) {
+  const Ticket ticket = host.session->stop(Time{500'000}, host.time());
+  if (ticket != 0) host.stops[ticket].pnum = host.stop_pnum;
+  poll_host(host.index);
+}
+
+// Somebody who has seen what there is to clear asks for it.
+void World::clear_stop(Host& host) {
+  if (!host.session->knows_cause() || host.clear_ticket != 0) return;
+  clear_asked_us_[{host.index, host.incarnation}] = now_us_;
+  host.clear_ticket = host.session->send(Command::clear(), Time{500'000}, host.time());
+  poll_host(host.index);
+}
+
+// `r4 stop` of another process, and its end.
+void World::call_stopper(Host& stopper, bool over) {
+  if (over) {
+    if (stopper.alive) stopper.die();
+    return;
+  }
+  if (stopper.alive) return;
+  stopper.begin();
+  stop(stopper);
 }
 
 void World::attack() {
@@ -76,9 +110,10 @@ void World::attack() {
   const bool lost = link.state() != state;
   attacking_ = true;
   delivering_ = {attack.host, 0};  // no process has that incarnation
-  constexpr std::uint32_t own_address = 99;
-  board_->receive(0, attack.host < 0 ? own_address : static_cast<std::uint32_t>(attack.host + 1),
-                  Text(attack.bytes), board_ms());
+  constexpr std::uint32_t own_address = 0xFFFF;
+  const std::uint32_t address =
+      attack.host < 0 ? own_address : hosts_[static_cast<std::size_t>(attack.host)]->peer;
+  board_->receive(0, address, Text(attack.bytes), board_ms());
   attacking_ = false;
   Datagram datagram;
   if (attack.kind != Attack::Kind::stop && read(Text(attack.bytes), datagram) &&

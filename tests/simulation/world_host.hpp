@@ -23,11 +23,14 @@ struct World::Host final : Session::Handler {
     ++incarnation;
     alive = true;
     clock_offset_us = world.random_.below(1'000'000'000);
+    leaving = false;
+    stops.clear();
+    clear_ticket = 0;
     const auto first =
         echo_host_first_pnum + static_cast<std::uint32_t>(world.random_.below(1U << 30));
     SessionOptions options;
     options.arming = Arming::off;  // so that more is sent that must not be executed
-    if (world.schedule_.attack_interval_us != 0) {
+    if (world.schedule_.attack_interval_us != 0 && !stopper) {
       options.key = key_of_host(index);
       options.clock_start = std::chrono::hours{24} - Time{clock_offset_us};
     }
@@ -41,8 +44,12 @@ struct World::Host final : Session::Handler {
   }
   Time time() const { return Time{static_cast<std::int64_t>(world.now_us_ + clock_offset_us)}; }
 
-  SendResult transmit(std::string_view bytes, Priority) override {
-    world.transfer(true, index, bytes);
+  SendResult transmit(std::string_view bytes, Priority priority) override {
+    // Who shares a place with the host in control sends nothing but a stop (docs/can.md).
+    if (stopper && world.schedule_.shared_place && priority != Priority::stop) {
+      return SendResult::busy;
+    }
+    world.transfer(true, index, peer, bytes);
     return SendResult::sent;
   }
   void on_state(const ReceivedState&, const Datagram&) override {}
@@ -65,12 +72,23 @@ struct World::Host final : Session::Handler {
   std::uint32_t incarnation = 0;
   bool alive = false;
   bool frozen = false;
+  bool stopper = false;
+  bool leaving = false;          // a stopper whose stop is confirmed
+  std::uint32_t peer = 0;        // its address
+  std::uint32_t other_peer = 0;  // the one before or next; 0: none yet
   std::uint64_t died_us = 0;
   std::uint64_t clock_offset_us = 0;
   std::uint64_t next_poll_us = 0;
   std::uint32_t poll_generation = 0;
   std::unique_ptr<Session> session;
   std::map<Ticket, int> tickets;
+  struct Stop {
+    std::uint32_t pnum = 0;
+    bool executed = false;
+  };
+  std::map<Ticket, Stop> stops;
+  std::uint32_t stop_pnum = 0;  // of the newest that was sent
+  Ticket clear_ticket = 0;      // 0: none is under way
 };
 
 }  // namespace r4::simulation

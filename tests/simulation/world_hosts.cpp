@@ -9,6 +9,22 @@
 namespace r4::simulation {
 
 void World::Host::on_result(Ticket ticket, const CommandResult& result) {
+  if (ticket == clear_ticket) {
+    clear_ticket = 0;
+    if (result.outcome == Outcome::refused) ++world.report_.clears_refused;
+    return;
+  }
+  if (const auto stop = stops.find(ticket); stop != stops.end()) {
+    world.note(fmt::format("host {} stop outcome {}", index, static_cast<int>(result.outcome)));
+    if (result.outcome == Outcome::confirmed) {
+      ++world.report_.stops_confirmed;
+      // An attacker may have guessed its number: the board's words are not signed anyway.
+      const bool guessed = world.attacker_stops_.count(stop->second.pnum) != 0;
+      if (!stop->second.executed && !guessed) world.violate("stop: confirmed but not obeyed");
+      leaving = stopper && world.random_.chance(0.5);
+    }
+    return;
+  }
   const auto found = tickets.find(ticket);
   if (found == tickets.end()) return;
   const int id = found->second;
@@ -49,8 +65,10 @@ void World::start_host(int index) {
 void World::poll_host(int index) {
   Host& host = *hosts_[static_cast<std::size_t>(index)];
   if (!host.alive) return;
+  if (host.leaving) return host.die();
   if (!host.frozen) host.session->feed(host.time());
   const Time next = host.session->poll(host.time());
+  if (host.leaving) return host.die();
   const std::uint64_t at_us = std::max<std::uint64_t>(
       static_cast<std::uint64_t>(next.count()) - host.clock_offset_us, now_us_ + 1);
   at(at_us, Event::Kind::host, index, ++host.poll_generation);

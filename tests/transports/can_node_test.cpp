@@ -56,6 +56,26 @@ const std::string command_line = with_crc("O:358,1,1;PNum:2147483650;T:81234;");
 const std::string answer_line = with_crc("N:2147483650,RANGE;PNum:78;T:81240;");
 const std::string heartbeat_line = with_crc("H:R4-ROS2;PNum:79;T:81300;");
 
+TEST(CanNodeStop, IsTheEmergencyFrameBareOrWithANumberBehindItsId) {
+  CanNode board(CanEnd::board, 3, false);
+  CanNode host(CanEnd::host, 3, false);
+  CanFrame frame{};
+  frame.id = emergency_stop_id;
+  EXPECT_EQ(str(board.on_frame(frame, 0)), with_crc("E:STOP;"));
+  frame.extended = true;
+  frame.id = numbered_stop_id(2147484650U);
+  EXPECT_EQ(str(board.on_frame(frame, 0)), with_crc("E:STOP;STOP:1002;"));
+  EXPECT_EQ(board.counters().stops, 2U);
+  EXPECT_TRUE(host.on_frame(frame, 0).empty());
+  for (const std::uint32_t other : {0x010U, 0x011U << 18, 0x00FU << 18 | 0x3FFFFU, 0x180U << 18}) {
+    frame.id = other;
+    EXPECT_TRUE(board.on_frame(frame, 0).empty()) << other;
+  }
+  frame.id = numbered_stop_id(5);
+  frame.remote = true;
+  EXPECT_TRUE(board.on_frame(frame, 0).empty()) << "a remote request is none";
+}
+
 class CanNodeForms : public testing::TestWithParam<std::pair<bool, bool>> {};
 
 TEST_P(CanNodeForms, CarryEveryDatagramUnchanged) {

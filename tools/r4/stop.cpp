@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <asio/io_context.hpp>
+#include <asio/steady_timer.hpp>
 #include <chrono>
+#include <cstdio>
 #include <memory>
 #include <optional>
 #include <string>
@@ -29,20 +31,19 @@ struct Options {
   bool json = false;
 };
 
-// Another program on this machine may hold the port at which hosts listen; a stop can do without.
-std::string any_port(const std::string& url) {
+// A port of its own for each stop: another program may hold the one at which hosts listen, and what is
+// still under way to that is of no use here.
+std::string own_port(const std::string& url) {
   const Url parsed = Url::parse(url);
-  if (parsed.scheme() != "udp" || parsed.get("listen")) return "";
+  if (parsed.scheme() != "udp" || parsed.get("listen")) return url;
   return url + (url.find('?') == std::string::npos ? "?listen=0" : "&listen=0");
 }
 
 std::unique_ptr<AsyncBoard> open(asio::io_context& io, const std::string& url) {
-  auto board = std::make_unique<AsyncBoard>(io, url);
+  auto board = std::make_unique<AsyncBoard>(io, own_port(url));
   try {
     board->open();
   } catch (const Error& error) {
-    const std::string other = any_port(url);
-    if (error.kind() == ErrorKind::open && !other.empty()) return open(io, other);
     Problem problem = error.problem();
     problem.fix = fmt::format("{}; {}", last_resort, problem.fix);
     throw Error(problem);
@@ -50,14 +51,32 @@ std::unique_ptr<AsyncBoard> open(asio::io_context& io, const std::string& url) {
   return board;
 }
 
+void print_confirmed(const Options& options, const CommandResult& result) {
+  const double ms = std::chrono::duration<double, std::milli>(result.elapsed).count();
+  if (options.json) {
+    print_line({{"type", "result"}, {"command", "E:STOP"}, {"confirmed", true}, {"ms", ms}});
+  } else {
+    fmt::print(
+        "stopped: the board reports SAFE (stop), after {:.1f} ms\n"
+        "it stays so until: r4 send {} E:CLEAR\n",
+        ms, one_url(options.urls));
+    std::fflush(stdout);
+  }
+}
+
 int stop(const Options& options) {
   asio::io_context io(1);
   const std::string& url = one_url(options.urls);
   const std::unique_ptr<AsyncBoard> board = open(io, url);
   std::optional<CommandResult> result;
+  asio::steady_timer repeating(io);
   board->async_stop(options.timeout, [&](const CommandResult& r) {
     result = r;
-    io.stop();
+    if (r.outcome != Outcome::confirmed) return io.stop();
+    print_confirmed(options, r);
+    // The library repeats it for a while longer.
+    repeating.expires_after(SessionOptions().stop_linger);
+    repeating.async_wait([&](const std::error_code&) { io.stop(); });
   });
   io.run();
   const LinkStatus link = board->link();
@@ -70,21 +89,13 @@ int stop(const Options& options) {
         problem.fix.empty() ? last_resort : fmt::format("{}; {}", last_resort, problem.fix);
     throw Error(problem);
   }
-  const double ms = std::chrono::duration<double, std::milli>(result->elapsed).count();
-  if (options.json) {
-    print_line({{"type", "result"}, {"command", "E:STOP"}, {"confirmed", true}, {"ms", ms}});
-  } else {
-    fmt::print(
-        "stopped: the board reports SAFE (stop), after {:.1f} ms\n"
-        "it stays so until: r4 send {} E:CLEAR\n",
-        ms, url);
-  }
   return 0;
 }
 
 constexpr const char* footer =
     R"(Works whoever controls the board, and without waiting for a link: the stop is repeated every 20 ms
-until the board reports it. It stays stopped until E:CLEAR.
+until the board reports that it has obeyed this one, and for a moment longer. It stays stopped until
+E:CLEAR.
 
 Examples:
   r4 stop udp://192.168.0.125

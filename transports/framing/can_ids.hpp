@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Who says what on the bus: the plan of 11-bit ids (docs/can.md). Lower wins.
 //
-//     0x010    emergency stop from a host   one raw frame, any content, obeyed by every board
+//     0x010    emergency stop from a host   one raw frame, any content, obeyed by every board; with 29
+//                                           bits, the same with a number by which it is confirmed
 //     0x020+n  board n went safe            one raw frame: the reason
 //     0x180+n  host to board n              ISO-TP; the board's flow control on 0x200+n
 //     0x200+n  board n's replies            ISO-TP; the host's flow control on 0x180+n
@@ -20,6 +21,12 @@ constexpr std::uint32_t can_nodes = 32;
 
 // `node` must be below can_nodes: what is above is cut off.
 constexpr std::uint32_t emergency_stop_id = 0x010;
+// A stop with a number has it in the 18 low bits of a 29-bit id, behind 0x010. In the content it would
+// be wrong: two that begin at once would differ behind their ids, and destroy each other for ever.
+constexpr std::uint32_t short_stop_number(std::uint32_t pnum) { return pnum & 0x3FFFF; }
+constexpr std::uint32_t numbered_stop_id(std::uint32_t pnum) {
+  return emergency_stop_id << 18 | short_stop_number(pnum);
+}
 constexpr std::uint32_t went_safe_id(std::uint32_t node) { return 0x020 | (node % can_nodes); }
 constexpr std::uint32_t command_id(std::uint32_t node) { return 0x180 | (node % can_nodes); }
 constexpr std::uint32_t reply_id(std::uint32_t node) { return 0x200 | (node % can_nodes); }
@@ -53,9 +60,13 @@ constexpr CanIdMeaning classify(std::uint32_t id) {
   return meaning;
 }
 
-// The same for a frame: one with a 29-bit id, or a remote request, is none of ours.
+// The same for a frame. A remote request is none of ours, and of those with a 29-bit id only a stop.
 constexpr CanIdMeaning classify(const CanFrame& frame) {
-  return frame.extended || frame.remote ? CanIdMeaning() : classify(frame.id);
+  if (frame.remote) return CanIdMeaning();
+  if (!frame.extended) return classify(frame.id);
+  CanIdMeaning meaning;
+  if (frame.id >> 18 == emergency_stop_id) meaning.kind = CanIdKind::emergency_stop;
+  return meaning;
 }
 
 }  // namespace r4

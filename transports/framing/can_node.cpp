@@ -3,13 +3,15 @@
 
 #include <cstring>
 
+#include "../../protocol/command.hpp"
+#include "../../protocol/datagram_writer.hpp"
 #include "../../protocol/message.hpp"
 #include "packed_form.hpp"
 
 namespace r4 {
 namespace {
 
-// What an emergency frame says to a board, whoever sent it.
+// What an emergency frame without a number says to a board, whoever sent it.
 constexpr Text stop_datagram("E:STOP;^0x506f0fbe^");
 
 IsotpSenderOptions sender_options(std::uint32_t id, std::uint32_t flow_control_id, bool fd) {
@@ -157,7 +159,11 @@ Text CanNode::on_frame(const CanFrame& frame, std::uint32_t now_us) {
   if (meaning.kind == CanIdKind::emergency_stop) {
     if (end_ != CanEnd::board) return Text();
     ++counters_.stops;
-    return stop_datagram;
+    if (!frame.extended) return stop_datagram;
+    DatagramWriter writer(plain_, sizeof plain_);
+    writer.field("E").value(Text("STOP"));
+    writer.field(stop_number_name).value(short_stop_number(frame.id));
+    return writer.finish();
   }
   if (end_ == CanEnd::host && meaning.kind == CanIdKind::telemetry) {
     return telemetry_in_.on_frame(frame, now_us).datagram ? plain(telemetry_in_) : Text();

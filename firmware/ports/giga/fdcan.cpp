@@ -25,11 +25,14 @@ constexpr std::uint32_t txfqs_full = 1U << 21;
 // The message RAM, in words. Elements for 8 bytes of data take four.
 constexpr std::uint32_t element_words = 4;
 constexpr std::uint32_t filters = 2;
+constexpr std::uint32_t extended_filters = 1;
+constexpr std::uint32_t extended_filter_words = 2;
 constexpr std::uint32_t fifo0_size = 64;
 constexpr std::uint32_t fifo1_size = 8;
 constexpr std::uint32_t transmit_size = 8;
 constexpr std::uint32_t filter_word = 0;
-constexpr std::uint32_t fifo0_word = filter_word + filters;
+constexpr std::uint32_t extended_word = filter_word + filters;
+constexpr std::uint32_t fifo0_word = extended_word + extended_filters * extended_filter_words;
 constexpr std::uint32_t fifo1_word = fifo0_word + fifo0_size * element_words;
 constexpr std::uint32_t urgent_word = fifo1_word + fifo1_size * element_words;
 constexpr std::uint32_t end_word = urgent_word + (1 + transmit_size) * element_words;
@@ -39,6 +42,13 @@ static_assert(end_word == Fdcan::words_used, "the layout of the message RAM");
 constexpr std::uint32_t filter_element(std::uint32_t id, std::uint32_t fifo) {
   return 1U << 30 | (fifo + 1) << 27 | id << 16 | id;
 }
+
+// The two words of an extended message ID filter element: an id and which of its bits count; to FIFO 0
+// or 1.
+constexpr std::uint32_t extended_element(std::uint32_t id, std::uint32_t fifo) {
+  return (fifo + 1) << 29 | id;
+}
+constexpr std::uint32_t extended_mask(std::uint32_t mask) { return 2U << 30 | mask; }
 
 // Bits of an Rx FIFO or Tx buffer element.
 constexpr std::uint32_t element_extended = 1U << 30;
@@ -106,9 +116,12 @@ bool Fdcan::start(const CanBitTiming& timing, std::uint32_t stop_id, std::uint32
   for (std::uint32_t i = 0; i < words_used; ++i) ram_[i] = 0;
   ram_[filter_word] = filter_element(stop_id, 1);
   ram_[filter_word + 1] = filter_element(command_id, 0);
+  ram_[extended_word] = extended_element(stop_id << element_id_shift, 1);  // with a number
+  ram_[extended_word + 1] = extended_mask(max_can_id << element_id_shift);
   registers_.GFC = gfc_reject_everything_else;
   registers_.SIDFC = filters << 16 | filter_word << 2;
-  registers_.XIDFC = 0;
+  registers_.XIDFC = extended_filters << 16 | extended_word << 2;
+  registers_.XIDAM = 0x1FFFFFFF;
   registers_.RXF0C = fifo0_size << 16 | fifo0_word << 2;
   registers_.RXF1C = overwrite | fifo1_size << 16 | fifo1_word << 2;
   registers_.RXESC = 0;  // 8 bytes

@@ -79,7 +79,7 @@ class Fdcan {
   std::uint32_t receive_errors() const { return registers_.ECR >> 8 & 0x7FU; }
   const FdcanCounters& counters() const { return counters_; }
 
-  static constexpr std::uint32_t words_used = 2 + 64 * 4 + 8 * 4 + 9 * 4;
+  static constexpr std::uint32_t words_used = 2 + 2 + 64 * 4 + 8 * 4 + 9 * 4;
 
  private:
   bool set_init(bool wanted);

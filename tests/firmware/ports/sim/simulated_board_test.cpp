@@ -108,6 +108,10 @@ class SimulatedBoardTest : public testing::Test {
     listener_.heard.clear();
   }
 
+  // E:CLEAR of the newest cause.
+  std::string clear_field() const {
+    return "E:CLEAR," + std::to_string(board_->application().safe_report().cause);
+  }
   // The T of the board's newest heartbeat.
   std::uint32_t newest_t() const {
     for (auto line = listener_.heard.rbegin(); line != listener_.heard.rend(); ++line) {
@@ -449,9 +453,9 @@ TEST_F(SimulatedBoardTest, EveryChannelReachesItsPinAndComesBack) {
   connect();
   test::expect_every_channel({
       [this](const std::string& text) {
-        heartbeat(newest_t());  // E:CLEAR counts only from who has heard
+        heartbeat(newest_t());
         events_.clear();
-        command(text);
+        command(text == "E:CLEAR" ? clear_field() : text);
         EXPECT_EQ(std::count(events_.begin(), events_.end(),
                              "executed " + std::to_string(pnum_ - 1 - first_pnum)),
                   1)
@@ -495,7 +499,7 @@ class TroubledBoardTest : public SimulatedBoardTest {
   }
   void expect_drives_after_clear() {
     heartbeat(newest_t());
-    command("E:CLEAR");
+    command(clear_field());
     command("O:400,1,1");
     EXPECT_EQ(board_->model().pins().osmc[0].pwm, 400);
   }
@@ -507,7 +511,7 @@ TEST_F(TroubledBoardTest, AChipThatStopsAnsweringIsAFaultUntilItIsBackAndCleared
   EXPECT_EQ(events_, (Lines{"no acknowledge", "outputs 0", "SAFE fault"}));
   EXPECT_TRUE(board_->model().pins().is_safe());
   heartbeat(newest_t());
-  command("E:CLEAR");  // executed, and the fault is still there
+  command(clear_field());  // executed, and the fault is still there
   EXPECT_EQ(board_->application().reason(), SafeReason::fault);
   events_.clear();
   command("O:400,1,1");
