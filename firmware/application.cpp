@@ -262,9 +262,10 @@ void Application::emergency_stop(Source from, const Datagram& datagram, bool aut
   const bool repeated = safety_.has(SafeReason::stop);
   std::uint32_t number = 0;
   const bool has_number = stop_number(datagram, number);
-  const bool same =
-      repeated && has_number && has_stop_number_ && number == stop_number_ && from == stop_from_;
-  if (repeated && !same) safety_.again();  // an E:CLEAR under way knows nothing of this one
+  const bool same = has_number && has_stop_number_ && number == stop_number_ && from == stop_from_;
+  // An E:CLEAR under way knows nothing of this one.
+  if (repeated && !same && !stop_unread_) safety_.again();
+  stop_unread_ = false;
   stop_from_ = from;
   has_stop_number_ = has_number;
   stop_number_ = number;
@@ -317,7 +318,12 @@ void Application::look_at_time(std::uint32_t now_ms) {
   bool lost = link_.poll(now_ms);
   if (guard_.tripped()) {
     const SafeReason cause = guard_.take();
-    if (cause == SafeReason::watchdog || cause == SafeReason::stop) fail(cause, now_ms);
+    if (cause == SafeReason::watchdog) fail(cause, now_ms);
+    if (cause == SafeReason::stop && !safety_.has(cause)) {
+      fail(cause, now_ms);
+      has_stop_number_ = false;
+      stop_unread_ = true;
+    }
     if (cause == SafeReason::link) lost = lost || link_.port_lost(link_.owner().port, now_ms);
   }
   if (lost) enter(SafeReason::link, now_ms);

@@ -147,6 +147,7 @@ class Application {
   Source stop_from_;
   bool has_stop_number_ = false;
   std::uint32_t stop_number_ = 0;
+  bool stop_unread_ = false;   // the guard has heard it, and its datagram is yet to be read
   bool outputs_live_ = false;  // outputs_ follow the setpoints
   std::uint32_t rx_ok_ = 0;
   std::uint32_t rx_bad_ = 0;

@@ -229,7 +229,7 @@ class Session {
   void on_post_refused(const Nack& nack);
   void confirm_stop(const SafeReport& report, Time now);
   void on_causes(std::int32_t newest, Time now);
-  bool name_cause(Pending& pending);
+  bool name_cause(Pending& pending) const;
   void linger(Time now);
   void select_fields(Time now);
   Command with_needed_fields(const Command& command);

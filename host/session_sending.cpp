@@ -51,7 +51,7 @@ Session::Pending* Session::allocate(const Command& command, Time timeout, Time n
 
 // Gives an E:CLEAR or an arm() the number of the cause that is known now, if it has none yet. False:
 // nothing of the board has been heard.
-bool Session::name_cause(Pending& pending) {
+bool Session::name_cause(Pending& pending) const {
   if (pending.cause == Command::unnamed_cause) pending.cause = cause_;
   if (pending.cause == Command::unnamed_cause) return false;
   if (pending.stage == Stage::queued && pending.kind == CommandKind::clear) {
@@ -98,6 +98,7 @@ PostResult Session::post(const Command& command, Time now) {
 }
 
 Ticket Session::stop(Time timeout, Time now) {
+  lingering_size_ = 0;  // this one goes on from here
   ++collector_.counts.commands;
   give_up_arming();
   disarm(DisarmCause::stop);

@@ -201,6 +201,33 @@ TEST_F(GuardedBoard, AStopThatAnInterruptHasHeardIsDoneBeforeTheLoopReadsIt) {
   EXPECT_EQ(board.outputs().osmc[0].pwm, 400);
 }
 
+TEST_F(GuardedBoard, AStopThatAnInterruptHasHeardIsOneCauseWithItsDatagramAndSoAreItsRepetitions) {
+  const auto heard = [&](std::uint32_t number) {
+    guard().stop();
+    guard().tick(board.now_ms);
+    board.run(1);
+    host.resend("E:STOP", number);
+    board.run(1);
+  };
+  const std::uint32_t number = host.pnum++;
+  heard(number);
+  const firmware::Application& application = *board.application;
+  const std::int32_t cause = application.safe_report().cause;
+  EXPECT_EQ(application.safe_report().stop, number);
+  for (int i = 0; i < 5; ++i) heard(number);
+  EXPECT_EQ(application.safe_report().cause, cause);
+  heard(host.pnum++);
+  EXPECT_EQ(application.safe_report().cause, cause + 1);
+  host.echo();
+  host.clear();
+  EXPECT_EQ(board.reason(), SafeReason::none);
+  guard().stop();  // the next: its number is not known before it is read
+  guard().tick(board.now_ms);
+  board.run(1);
+  EXPECT_EQ(board.reason(), SafeReason::stop);
+  EXPECT_FALSE(application.safe_report().has_stop);
+}
+
 TEST_F(GuardedBoard, WhatTheGuardTookOffStaysOffUntilTheApplicationKnows) {
   // The guard trips between the loop's look at the time and its command.
   class Trip final : public firmware::Observer {
