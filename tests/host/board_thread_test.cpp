@@ -6,8 +6,12 @@
 
 #include <algorithm>
 #include <atomic>
+#include <condition_variable>
+#include <cstdint>
 #include <filesystem>
 #include <future>
+#include <memory>
+#include <mutex>
 #include <thread>
 
 #include "host/board.hpp"
@@ -25,22 +29,39 @@ using firmware::BoardState;
 class Hold {
  public:
   template <class When>
-  Hold(Board& board, When when) : released_(release_.get_future().share()) {
-    board.on_state([this, when, done = false, released = released_](const State&) mutable {
+  Hold(Board& board, When when) {
+    board.on_state([turn = turn_, when, done = false](const State&) mutable {
       if (done || !when()) return;
       done = true;
-      begun_.set_value();
-      released.wait();
+      turn->reach(Turn::Stage::held);
+      turn->wait_for(Turn::Stage::released);
     });
   }
   explicit Hold(Board& board) : Hold(board, [] { return true; }) {}
-  void wait_until_held() { ASSERT_EQ(begun_.get_future().wait_for(5s), std::future_status::ready); }
-  void release() { release_.set_value(); }
+  void wait_until_held() { ASSERT_TRUE(turn_->wait_for(Turn::Stage::held)); }
+  void release() { turn_->reach(Turn::Stage::released); }
 
  private:
-  std::promise<void> begun_;
-  std::promise<void> release_;
-  std::shared_future<void> released_;
+  // It outlives both threads' use of it.
+  class Turn {
+   public:
+    enum class Stage : std::uint8_t { free, held, released };
+    void reach(Stage stage) {
+      const std::lock_guard lock(mutex_);
+      stage_ = stage;
+      changed_.notify_all();
+    }
+    bool wait_for(Stage stage) {
+      std::unique_lock lock(mutex_);
+      return changed_.wait_for(lock, 5s, [&] { return stage_ >= stage; });
+    }
+
+   private:
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    Stage stage_ = Stage::free;
+  };
+  std::shared_ptr<Turn> turn_ = std::make_shared<Turn>();
 };
 
 struct BoardThread : testing::Test {
