@@ -166,7 +166,7 @@ void Application::on_command(Source from, const Datagram& datagram, Verdict verd
   const Field& field = datagram.command();
   // A stop is obeyed beside other commands, too. A single one of another letter is none.
   if ((count != 1 || field.name() == "E") && asks_to_stop(datagram)) {
-    emergency_stop(from, datagram, verdict == Verdict::authentic, now_ms);
+    emergency_stop(from, datagram, verdict, now_ms);
     return;
   }
   Command command;
@@ -256,23 +256,31 @@ void Application::execute(std::uint32_t pnum, const Command& command, std::uint3
   report_state(now_ms);
 }
 
-// One that is not authentic spends no number: CMD would prove to its host what was not executed.
-void Application::emergency_stop(Source from, const Datagram& datagram, bool authentic,
+// One that is not authentic spends no number: CMD would prove to its host what was not executed. Nor
+// does one whose number is not the next: another program at the owner's place (a bus, a port that is
+// shared) takes its own at random, and the board must not forget the owner's for it.
+void Application::emergency_stop(Source from, const Datagram& datagram, Verdict verdict,
                                  std::uint32_t now_ms) {
   const bool repeated = safety_.has(SafeReason::stop);
   std::uint32_t number = 0;
   const bool has_number = stop_number(datagram, number);
-  const bool same = has_number && has_stop_number_ && number == stop_number_ && from == stop_from_;
+  // The owner's is no repetition of one that somebody without a key sent under its number before.
+  const bool of_a_key =
+      verdict == Verdict::authentic || verdict == Verdict::replayed || verdict == Verdict::old;
+  const bool same = has_number && has_stop_number_ && number == stop_number_ &&
+                    from == stop_from_ && (stop_of_a_key_ || !of_a_key);
   // An E:CLEAR under way knows nothing of this one.
   if (repeated && !same && !stop_unread_) safety_.again();
   stop_unread_ = false;
+  if (!repeated || !same) stop_of_a_key_ = of_a_key;
   stop_from_ = from;
   has_stop_number_ = has_number;
   stop_number_ = number;
   enter(SafeReason::stop, now_ms);
   caused_ms_ = now_ms;
   const bool owner = link_.has_owner() && from == link_.owner();
-  if (owner && authentic && datagram.has_pnum()) {
+  if (owner && verdict == Verdict::authentic && datagram.has_pnum() &&
+      link_.is_next(datagram.pnum())) {
     Refusal code = Refusal::none;
     if (link_.admit(from, datagram.pnum(), now_ms, code) == Admission::execute) {
       link_.executed(datagram.pnum());

@@ -96,7 +96,7 @@ class Application {
   void on_command(Source from, const Datagram& datagram, Verdict verdict, std::uint32_t now_ms);
   bool may_set(std::uint8_t port, const Command& command) const;
   void execute(std::uint32_t pnum, const Command& command, std::uint32_t now_ms);
-  void emergency_stop(Source from, const Datagram& datagram, bool authentic, std::uint32_t now_ms);
+  void emergency_stop(Source from, const Datagram& datagram, Verdict verdict, std::uint32_t now_ms);
   bool rejected(Verdict verdict, MessageKind kind, std::uint32_t now_ms);
   void look_at_time(std::uint32_t now_ms);
   void enter(SafeReason cause, std::uint32_t now_ms);
@@ -147,6 +147,7 @@ class Application {
   Source stop_from_;
   bool has_stop_number_ = false;
   std::uint32_t stop_number_ = 0;
+  bool stop_of_a_key_ = false;
   bool stop_unread_ = false;   // the guard has heard it, and its datagram is yet to be read
   bool outputs_live_ = false;  // outputs_ follow the setpoints
   std::uint32_t rx_ok_ = 0;

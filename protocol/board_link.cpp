@@ -173,6 +173,11 @@ bool BoardLink::in_window(std::uint32_t pnum) const {
   return !has_baseline_ || (newer(pnum, newest_) && pnum - newest_ <= command_window);
 }
 
+bool BoardLink::is_next(std::uint32_t pnum) const {
+  return (has_baseline_ && pnum - newest_ <= memory) ||
+         (has_heartbeat_pnum_ && pnum - newest_heartbeat_ <= memory);
+}
+
 bool BoardLink::begins_anew(std::uint32_t pnum) const {
   return numbers_in_doubt_ && !in_window(pnum) && newest_ - pnum >= memory;
 }

@@ -82,6 +82,8 @@ class BoardLink {
   // A command was refused, for its content or the safe state: if it is the session's, it and all
   // older ones are spent, so that no copy of it is executed when the reason is gone.
   void refused(Source from, std::uint32_t pnum);
+  // Is this number one of the next `memory` of the session's?
+  bool is_next(std::uint32_t pnum) const;
   // Is this admitted command of a host that has begun again? One that does not number its
   // heartbeats shows that only by its first command after an outage. Nothing set before may remain.
   bool begins_anew(std::uint32_t pnum) const;

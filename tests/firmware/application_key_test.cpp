@@ -263,6 +263,28 @@ TEST_F(ApplicationKey, AnUnsignedStopProvesNothingOfTheOwnersCommands) {
   EXPECT_EQ(board.application->link().last_executed(), stop) << "a signed one is a command";
 }
 
+TEST_F(ApplicationKey, TheOwnersStopIsNoRepetitionOfOneThatWasForgedUnderItsNumber) {
+  host.connect();
+  const std::uint32_t next = host.pnum + 1;
+  board.receive("E:STOP;PNum:" + std::to_string(next) + ";T:0;", host.at);
+  host.heartbeat();
+  const std::string clear = "E:CLEAR," + std::to_string(board.newest_cause());
+  ASSERT_EQ(host.pnum, next);
+  host.command("E:STOP");
+  host.command(clear);  // it was asked for before the stop
+  EXPECT_EQ(board.reason(), SafeReason::stop);
+}
+
+TEST_F(ApplicationKey, ACopyOfTheOwnersStopIsARepetitionWhateverItsSignatureIsWorth) {
+  host.connect();
+  const std::string stop = host.signed_fields(host.fields("E:STOP", host.pnum++));
+  board.receive(stop, host.at);
+  const std::int32_t cause = board.newest_cause();
+  board.receive(stop, host.at);  // signed for the nonce before
+  board.receive(stop.substr(0, stop.find("A:")), host.at);
+  EXPECT_EQ(board.newest_cause(), cause);
+}
+
 TEST_F(ApplicationKey, OnlyTheOwnerClearsAStop) {
   host.connect();
   board.receive("E:STOP;", {0, 99});

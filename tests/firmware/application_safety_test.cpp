@@ -105,6 +105,18 @@ TEST_F(ApplicationSafety, AStopOvertakesTheCommandsBeforeIt) {
   EXPECT_EQ(board.log.refused, Lines{std::to_string(before) + " STALE"});
 }
 
+TEST_F(ApplicationSafety, AStopOfAnotherProgramAtTheOwnersPlaceSpendsNoneOfItsNumbers) {
+  const std::uint32_t executed = host.command("O:1,1,1");
+  board.receive("E:STOP;PNum:" + std::to_string(host.pnum + 1000) + ";T:0;", host.at);
+  EXPECT_EQ(board.reason(), SafeReason::stop);
+  EXPECT_EQ(board.application->link().last_executed(), executed);
+  board.log.refused.clear();
+  host.resend("O:1,1,1", executed);
+  EXPECT_EQ(board.log.refused, Lines{std::to_string(executed) + " DUPLICATE"});
+  clear();
+  EXPECT_EQ(board.state(), BoardState::active);
+}
+
 TEST_F(ApplicationSafety, AStopIsAnsweredToEveryoneAndToWhoAsked) {
   TestBoard two(Settings(), 2);
   TestHost owner(two, echo_pnum, Source{0, 4});

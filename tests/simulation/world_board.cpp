@@ -162,8 +162,10 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
   newest_executed_ = std::max(newest_executed_, id);
 }
 
-// A stop that is obeyed. A repetition of the last one adds nothing to it.
+// A stop that is obeyed. A repetition of the last one adds nothing to it, nor does an attacker's that
+// copies its number.
 void World::on_stop(std::uint32_t pnum) {
+  if (attacking_ && stopped_ && stop_pnum_ == pnum) return;
   if (!stopped_ || stop_from_ != delivering_ || stop_pnum_ != pnum) new_stop_us_ = now_us_;
   stopped_ = true;
   stop_from_ = delivering_;
