@@ -52,14 +52,13 @@ TEST(SessionWatchdog, FedAgainGivesControlBack) {
 
 TEST(Session, SendsNothingWhoseDeadlineIsOver) {
   ScriptedLink link;
-  link.session.send(drive, 100ms, link.now);  // waits for control
-  link.heartbeat();
-  link.pass(10ms);
+  link.connect();
+  link.place_taken = true;
+  link.session.post(Command::servo(1500, 1), link.now);  // finds the place taken
+  link.session.send(drive, 100ms, link.now);             // waits for it
+  link.place_taken = false;
   link.now += 750ms;  // the loop was held up
-  link.heartbeat();
-  link.executed(link.last('F').pnum);
-  link.session.post(Command::servo(1500, 1), link.now);
-  link.pass(10ms);
+  EXPECT_EQ(link.session.post(Command::servo(1500, 1), link.now), PostResult::sent);
   EXPECT_EQ(link.count('O'), 0U);
 }
 
