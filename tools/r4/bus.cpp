@@ -197,7 +197,8 @@ void add_bus(CLI::App& root, Action& chosen) {
              "states a second of each board (default 100)");
   add_fields(*command, options->fields);
   command->get_option("--fields")
-      ->description("state fields (default DEFAULT,SAFE,CMD, what our host asks for)");
+      ->description(
+          "state fields (default DEFAULT,SAFE,CMD, what our host asks for; arming adds RELAYS)");
   add_number(*command, "--commands", options->commands, 0, 1000,
              "commands a second to each board (default 20)");
   add_number(*command, "--bitrate", options->bit_rate, 10000, 1000000,
