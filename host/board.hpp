@@ -3,9 +3,10 @@
 //
 //     r4::Board board("udp://192.168.0.125");
 //     board.wait_active();
-//     board.arm();                                      // closes relay 1, the motor supply
-//     board.osmc(1).set(358, r4::Direction::forward);   // returns when the board's state confirms
-//     it board.on_state([](const r4::State& s) { … }); board.stop(); // every output safe, at once
+//     board.arm();                                     // closes relay 1, the motor supply
+//     board.osmc(1).set(358, r4::Direction::forward);  // the board's state has confirmed it
+//     board.on_state([](const r4::State& s) { … });
+//     board.stop();                                    // every output safe, at once
 //
 // A board with a key obeys only who has it: BoardOptions options; options.session.key = key;
 //

@@ -50,7 +50,7 @@ class Teleop:
                 raise AssertionError(f'it does not say {pattern!r}: {seen}') from None
             assert seen[-1], f'it has ended without {pattern!r}: {seen}'
             if re.search(pattern, seen[-1]):
-                return
+                return seen[-1]
 
 
 def driven(left, right):
@@ -66,7 +66,8 @@ def stands(each):
 
 def arm_and_drive(teleop, board):
     teleop.press('e')
-    teleop.says('^armed')
+    while not teleop.says('^armed|handle was released').startswith('armed'):
+        teleop.press('e')  # it has not heard yet that the handle is held
     board.next(lambda each: each.get('supply') and stands(each))
     teleop.press('w')
     each = board.next(lambda each: 'outputs' in each and not stands(each))
@@ -112,6 +113,11 @@ def main(program):
 
         os.close(teleop.keyboard)  # the terminal is closed
         board.next(lambda each: each.get('reason') == 'stop')
+        assert teleop.process.wait(PATIENCE_S) == 0
+        teleop = Teleop(program, board.host_url)  # begins while that stop is latched
+        teleop.says(r'^not armed')
+        arm_and_drive(teleop, board)
+        teleop.press('q')
         assert teleop.process.wait(PATIENCE_S) == 0
         unsafe = [each for each in board.rest() if 'outputs' in each and not stands(each) and not each['supply']]
         assert not unsafe, unsafe

@@ -111,7 +111,7 @@ void teleoperate(r4::Board& board, Keyboard& keyboard) {
   board.on_refused([](const r4::RefusedPost& refused) {
     std::printf("refused by the board or on the way: OSMC %d\n", refused.command.channel);
   });
-  board.wait_active();
+  board.next_state(3s);  // it is there; a stop that is latched is cleared by e
   // After a lost link nothing comes back by itself: who holds the keys may not see the robot.
   board.setting("recovery", "rearm");
   board.watchdog(watchdog);
