@@ -18,6 +18,7 @@
 #include "framing/peer_table.hpp"
 #include "operation_slot.hpp"
 #include "send_queue.hpp"
+#include "udp_host_socket.hpp"
 #include "writable_wait.hpp"
 
 namespace r4 {
@@ -76,6 +77,16 @@ int probe_route(const Endpoint& to) {
   return error;
 }
 
+// 0 if the system has taken it, else errno.
+int send_packet(int socket, std::string_view bytes, const Endpoint& to) {
+  ssize_t sent = 0;
+  do {
+    sent = ::sendto(socket, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL, to.data(),
+                    static_cast<socklen_t>(to.size()));
+  } while (sent < 0 && errno == EINTR);
+  return sent >= 0 ? 0 : errno;
+}
+
 class UdpCarrier final : public Carrier {
  public:
   UdpCarrier(asio::io_context& io, Url url, Role role);
@@ -113,7 +124,8 @@ class UdpCarrier final : public Carrier {
   std::uint16_t peer_port_ = host_port;
   std::string name_;
 
-  asio::basic_datagram_socket<udp, LoopExecutor> socket_;
+  UdpSocket socket_;
+  UdpHostSocket host_socket_{socket_};
   OperationSlot reception_;
   WritableWait writable_;
   LoopTimer probe_timer_;
@@ -217,12 +229,16 @@ void UdpCarrier::bind(const Endpoint& local) {
   if (!error && local.protocol() == udp::v6()) {
     socket_.set_option(asio::ip::v6_only(role_ == Role::host), error);
   }
-  if (!error) socket_.bind(local, error);
   if (!error) socket_.native_non_blocking(true, error);
+  if (!error && role_ == Role::board) socket_.bind(local, error);
+  if (!error && role_ == Role::host) error = host_socket_.bind(local.port(), standing_);
   if (!error) return;
 
-  asio::error_code ignored;
-  socket_.close(ignored);
+  host_socket_.close();
+  if (error == asio::error::already_open) {
+    throw Error(ErrorKind::open, url_.text(), "this program has that board open already",
+                "use the one that is open, or ?listen=0 for another host to the board");
+  }
   const std::string port = fmt::format("UDP port {}", local.port());
   if (error == asio::error::address_in_use) {
     throw Error(ErrorKind::open, url_.text(), port + " is in use by another program",
@@ -249,8 +265,7 @@ void UdpCarrier::close() noexcept {
   probe_.cancel();
   writable_.stop();
   queue_.clear();
-  asio::error_code ignored;
-  socket_.close(ignored);
+  host_socket_.close();
 }
 
 // The attempt to receive at once with which Asio begins tells whether more is there, at no cost: it
@@ -268,7 +283,7 @@ bool UdpCarrier::begin_to_receive() {
 }
 
 void UdpCarrier::received(std::size_t size) {
-  if (role_ == Role::host && sender_.address() != standing_.address()) {
+  if (role_ == Role::host && !host_socket_.hears(sender_)) {
     ++counters_.rx_foreign;
     return;
   }
@@ -341,13 +356,9 @@ UdpCarrier::Outcome UdpCarrier::transmit(std::string_view bytes, Peer to) {
 
 UdpCarrier::Outcome UdpCarrier::transmit_to(std::string_view bytes, const Endpoint& to,
                                             bool standing) {
-  ssize_t sent = 0;
-  do {
-    sent = ::sendto(socket_.native_handle(), bytes.data(), bytes.size(),
-                    MSG_DONTWAIT | MSG_NOSIGNAL, to.data(), static_cast<socklen_t>(to.size()));
-  } while (sent < 0 && errno == EINTR);
-  const int error = sent >= 0 ? 0 : errno;
-  // ECONNREFUSED is about an earlier packet: no program listens there yet.
+  int error = send_packet(socket_.native_handle(), bytes, to);
+  // That is about an earlier packet, no program listens there yet; this one was not sent for it.
+  if (error == ECONNREFUSED) error = send_packet(socket_.native_handle(), bytes, to);
   if (error == 0 || error == ECONNREFUSED) {
     ++counters_.tx_datagrams;
     counters_.tx_bytes += bytes.size();
@@ -412,7 +423,8 @@ void UdpCarrier::report() {
 void UdpCarrier::probe_later() {
   probe_timer_.expires_after(probe_interval);
   probe_timer_.async_wait(probe_.handler([this] {
-    if (probe_route(standing_) == 0) {
+    const int error = host_socket_.connected() ? host_socket_.reconnect() : probe_route(standing_);
+    if (error == 0) {
       set_up(true);
       report();
     } else {

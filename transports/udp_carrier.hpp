@@ -3,7 +3,8 @@
 //
 //     host    udp://HOST[:2018][?listen=2390]        sends to HOST:2018 from port 2390 and hears
 //                                                    HOST there, from any of its ports; listen=0
-//                                                    takes any free port
+//                                                    takes any free port. Boards of one program
+//                                                    share the port (udp_host_socket.hpp)
 //     board   udp://BIND[:2018][?peer=HOST[:2390]]   port 0 takes any free port; name() tells it
 //
 // A board knows the last 16 hosts that sent a valid datagram, and the one in control in any case.

@@ -13,6 +13,7 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <future>
 #include <vector>
 
 #include "recorder.hpp"
@@ -345,6 +346,216 @@ TEST_F(UdpCarrierTest, LeaksNoDescriptorsOver100Reopenings) {
   board->close();
   host->close();
   EXPECT_LE(open_descriptors(), before);
+}
+
+// Two boards of one program, which hears both at one port.
+class UdpTwoBoardsTest : public testing::Test {
+ protected:
+  struct Link {
+    Recorder at_board, at_host;
+    std::unique_ptr<Carrier> board, host;
+  };
+
+  UdpTwoBoardsTest() { listen = Socket(io, "0.0.0.0").port(); }
+
+  void open_board(Link& link, const std::string& address) {
+    link.board = open_carrier(io, "udp://" + address + ":0", Role::board, link.at_board);
+    link.at_board.then = [&link](const Recorder::Datagram& datagram) {
+      link.board->send("answer to " + datagram.text, Priority::normal, datagram.from);
+    };
+  }
+  std::string url(const Link& link) const { return link.board->name() + "?listen=" + listen; }
+  void open_host(Link& link) { link.host = open_carrier(io, url(link), Role::host, link.at_host); }
+  // What both ask at once is answered to the one that asked; `count` times.
+  void talk(const std::string& name, int count) {
+    const std::size_t before[] = {links[0].at_host.datagrams.size(),
+                                  links[1].at_host.datagrams.size()};
+    for (int i = 0; i < count; ++i) {
+      for (std::size_t which : {0U, 1U}) {
+        links[which].host->send(question(name, which, i), Priority::normal);
+      }
+    }
+    for (std::size_t which : {0U, 1U}) {
+      const Recorder& heard = links[which].at_host;
+      ASSERT_TRUE(run_until(io, [&] {
+        return heard.datagrams.size() >= before[which] + static_cast<std::size_t>(count);
+      })) << name;
+    }
+    run_for(io, std::chrono::milliseconds(1));
+    for (std::size_t which : {0U, 1U}) {
+      const Recorder& heard = links[which].at_host;
+      ASSERT_EQ(heard.datagrams.size(), before[which] + static_cast<std::size_t>(count)) << name;
+      for (int i = 0; i < count; ++i) {
+        EXPECT_EQ(heard.datagrams[before[which] + static_cast<std::size_t>(i)].text,
+                  "answer to " + question(name, which, i));
+      }
+    }
+  }
+  static std::string question(const std::string& name, std::size_t which, int i) {
+    return valid(name + std::to_string(which) + "x" + std::to_string(i));
+  }
+
+  asio::io_context io;
+  std::string listen;
+  Link links[2];
+};
+
+TEST_F(UdpTwoBoardsTest, AreToldApartByTheirAddress) {
+  open_board(links[0], "127.0.0.1");
+  open_board(links[1], "127.0.0.2");
+  for (Link& link : links) open_host(link);
+  talk("both", 50);
+  // The first is heard from any port of its board, as if it were alone.
+  Socket other_port(io, "127.0.0.1");
+  other_port.send("other port", listen);
+  EXPECT_TRUE(run_until(io, [&] { return links[0].at_host.has("other port"); }));
+  // The further one from the port to which it is addressed.
+  Socket of_the_second(io, "127.0.0.2");
+  of_the_second.send("other port of the second", listen);
+  EXPECT_TRUE(run_until(io, [&] { return links[0].host->counters().rx_foreign == 1; }));
+  EXPECT_FALSE(links[1].at_host.has("other port of the second"));
+}
+
+TEST_F(UdpTwoBoardsTest, AreToldApartByTheirPortAtOneAddressInEitherOrder) {
+  for (Link& link : links) open_board(link, "127.0.0.1");
+  for (const std::size_t first : {0U, 1U}) {
+    open_host(links[first]);
+    open_host(links[1 - first]);
+    talk("order", 50);
+    // A third board's of that address is for neither.
+    Socket third(io, "127.0.0.1");
+    const std::uint64_t foreign = links[first].host->counters().rx_foreign;
+    third.send("of a third", listen);
+    EXPECT_TRUE(
+        run_until(io, [&] { return links[first].host->counters().rx_foreign == foreign + 1; }));
+    for (Link& link : links) EXPECT_FALSE(link.at_host.has("of a third"));
+    for (Link& link : links) link.host->close();
+  }
+}
+
+TEST_F(UdpTwoBoardsTest, OfWhichTheFirstClosesAndOpensAgain) {
+  for (Link& link : links) open_board(link, "127.0.0.1");
+  for (Link& link : links) open_host(link);
+  links[0].host->close();
+  const std::size_t before = links[1].at_host.datagrams.size();
+  links[0].board->send("nobody is there", Priority::normal);
+  links[1].host->send(valid("alone"), Priority::normal);
+  ASSERT_TRUE(run_until(io, [&] { return links[1].at_host.has("answer to " + valid("alone")); }));
+  EXPECT_EQ(links[1].at_host.datagrams.size(), before + 1);
+  links[0].host->open(links[0].at_host);
+  talk("again", 50);
+}
+
+TEST_F(UdpTwoBoardsTest, OfWhichTheSecondCloses) {
+  for (Link& link : links) open_board(link, "127.0.0.1");
+  for (Link& link : links) open_host(link);
+  talk("both", 1);
+  links[1].host->close();
+  const std::size_t before = links[0].at_host.datagrams.size();
+  links[1].board->send("to the closed one", Priority::normal);
+  ASSERT_TRUE(run_until(io, [&] { return links[0].host->counters().rx_foreign == 1; }));
+  EXPECT_EQ(links[0].at_host.datagrams.size(), before);
+  links[1].host->open(links[1].at_host);
+  talk("again", 50);
+}
+
+// What came from the second board before it was opened is not the first's.
+TEST_F(UdpTwoBoardsTest, OfWhichTheSecondSpeaksBeforeItIsOpened) {
+  for (Link& link : links) open_board(link, "127.0.0.1");
+  open_host(links[0]);
+  Socket raw(io, "127.0.0.1");
+  raw.send("early", listen);
+  const std::string second = "udp://127.0.0.1:" + raw.port() + "?listen=" + listen;
+  const auto other = open_carrier(io, second, Role::host, links[1].at_host);
+  ASSERT_TRUE(run_until(io, [&] { return links[0].host->counters().rx_foreign == 1; }));
+  EXPECT_TRUE(links[0].at_host.datagrams.empty());
+}
+
+TEST_F(UdpTwoBoardsTest, MustNotBeTheSame) {
+  open_board(links[0], "127.0.0.1");
+  open_host(links[0]);
+  const auto error =
+      error_of([&] { open_carrier(io, url(links[0]), Role::host, links[1].at_host); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->kind(), ErrorKind::open);
+  EXPECT_EQ(error->problem().reason, "this program has that board open already");
+  EXPECT_FALSE(error->problem().fix.empty());
+  links[0].host->close();
+  open_carrier(io, url(links[0]), Role::host, links[1].at_host);
+}
+
+TEST_F(UdpTwoBoardsTest, KeepThePortFromOtherPrograms) {
+  open_board(links[0], "127.0.0.1");
+  open_board(links[1], "127.0.0.2");
+  for (Link& link : links) open_host(link);
+  const auto tries_to_share = [&](const char* address) {
+    udp::socket other(io, udp::v4());
+    other.set_option(udp::socket::reuse_address(true));
+    asio::error_code error;
+    other.bind(udp::endpoint(asio::ip::make_address(address),
+                             static_cast<unsigned short>(std::stoi(listen))),
+               error);
+    return error;
+  };
+  EXPECT_EQ(tries_to_share("0.0.0.0"), asio::error::address_in_use);
+  EXPECT_EQ(tries_to_share("127.0.0.1"), asio::error::address_in_use);
+  links[0].host->close();
+  EXPECT_EQ(tries_to_share("0.0.0.0"), asio::error::address_in_use) << "the second is still there";
+  links[1].host->close();
+  EXPECT_FALSE(tries_to_share("0.0.0.0"));
+}
+
+// The system tells a connected socket that its board is off, and that costs no datagram.
+TEST_F(UdpTwoBoardsTest, OfWhichTheSecondIsOff) {
+  open_board(links[0], "127.0.0.1");
+  open_host(links[0]);
+  const std::string port = Socket(io, "127.0.0.1").port();
+  Link& off = links[1];
+  off.host =
+      open_carrier(io, "udp://127.0.0.1:" + port + "?listen=" + listen, Role::host, off.at_host);
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_EQ(off.host->send("is anybody there", Priority::normal), SendResult::sent);
+    run_for(io, std::chrono::milliseconds(1));
+  }
+  EXPECT_EQ(off.host->send("is anybody there", Priority::normal), SendResult::sent);
+  EXPECT_TRUE(off.host->up());
+  off.board = open_carrier(io, "udp://127.0.0.1:" + port, Role::board, off.at_board);
+  EXPECT_EQ(off.host->send("now", Priority::normal), SendResult::sent);
+  EXPECT_TRUE(run_until(io, [&] { return off.at_board.has("now"); }));
+  EXPECT_EQ(off.at_host.events.size(), 1U);
+}
+
+// As r4::Board has it: a loop and a thread for each.
+TEST_F(UdpTwoBoardsTest, OpenAndCloseInThreadsOfTheirOwn) {
+  const auto worker = [this](const char* address) {
+    asio::io_context own;
+    Recorder at_board, at_host;
+    const auto board =
+        open_carrier(own, std::string("udp://") + address + ":0", Role::board, at_board);
+    const auto host =
+        Registry::standard().make(own, board->name() + "?listen=" + listen, Role::host);
+    int heard = 0;
+    for (int i = 0; i < 100; ++i) {
+      const std::string text = valid(std::to_string(i));
+      host->open(at_host);
+      // On its way to a socket that closes or opens there it may be lost.
+      const auto arrives = [&](Carrier& from, const Recorder& at) {
+        for (int tries = 0; tries < 1000; ++tries) {
+          from.send(text, Priority::normal);
+          const auto heard_it = [&] { return at.has(text); };
+          if (run_until(own, heard_it, std::chrono::milliseconds(5))) return true;
+        }
+        return false;
+      };
+      if (arrives(*host, at_board) && arrives(*board, at_host)) ++heard;
+      host->close();
+    }
+    return heard;
+  };
+  auto first = std::async(std::launch::async, worker, "127.0.0.1");
+  auto second = std::async(std::launch::async, worker, "127.0.0.2");
+  EXPECT_EQ(first.get(), 100);
+  EXPECT_EQ(second.get(), 100);
 }
 
 // Gives the loopback interface of a network of our own its address, or takes it away.

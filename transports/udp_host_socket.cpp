@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "udp_host_socket.hpp"
+
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <mutex>
+#include <vector>
+
+namespace r4 {
+namespace {
+
+// What the process has bound. Ports belong to the process, and its boards may have a thread each;
+// entered at open and close only. Never destroyed: a board may be static.
+struct Bound {
+  std::mutex mutex;
+  std::vector<UdpHostSocket*> sockets;
+};
+Bound& bound() {
+  static Bound& of_this_process = *new Bound;
+  return of_this_process;
+}
+
+void set_reuse(int descriptor, bool on) {
+  const int value = on ? 1 : 0;
+  ::setsockopt(descriptor, SOL_SOCKET, SO_REUSEADDR, &value, sizeof value);
+}
+
+}  // namespace
+
+asio::error_code UdpHostSocket::bind(std::uint16_t port, const Endpoint& board) {
+  Bound& all = bound();
+  const std::lock_guard lock(all.mutex);
+  asio::error_code error;
+  local_ = Endpoint(board.protocol(), port);
+  board_ = board;
+  connected_ = neighbours_ = false;
+  std::vector<UdpHostSocket*> others;
+  for (UdpHostSocket* const each : all.sockets) {
+    if (each->local_ != local_) continue;
+    if (each->board_ == board) return asio::error::already_open;
+    others.push_back(each);
+  }
+  if (others.empty()) {
+    socket_.bind(local_, error);
+  } else {
+    // Only for this moment: a program that would share the port is to be noticed.
+    for (const UdpHostSocket* const each : others) set_reuse(each->descriptor_, true);
+    set_reuse(socket_.native_handle(), true);
+    for (UdpHostSocket* const each : others) {
+      if (each->board_.address() == board.address()) each->neighbours_ = true;
+    }
+    socket_.bind(local_, error);
+    if (!error) socket_.connect(board, error);
+    set_reuse(socket_.native_handle(), false);
+    for (const UdpHostSocket* const each : others) set_reuse(each->descriptor_, false);
+    connected_ = neighbours_ = true;
+  }
+  if (!error) local_.port(socket_.local_endpoint(error).port());
+  if (error) return error;
+  all.sockets.push_back(this);
+  descriptor_ = socket_.native_handle();
+  return error;
+}
+
+void UdpHostSocket::close() noexcept {
+  asio::error_code ignored;
+  if (descriptor_ < 0) {
+    socket_.close(ignored);
+    return;
+  }
+  // Whoever binds next finds the port free or shares it, never in between.
+  Bound& all = bound();
+  const std::lock_guard lock(all.mutex);
+  all.sockets.erase(std::remove(all.sockets.begin(), all.sockets.end(), this), all.sockets.end());
+  descriptor_ = -1;
+  socket_.close(ignored);
+}
+
+int UdpHostSocket::reconnect() {
+  sockaddr none{};
+  none.sa_family = AF_UNSPEC;
+  ::connect(descriptor_, &none, sizeof none);
+  const int done = ::connect(descriptor_, board_.data(), static_cast<socklen_t>(board_.size()));
+  return done == 0 ? 0 : errno;
+}
+
+}  // namespace r4
