@@ -143,6 +143,7 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
       schedule_.start(now_ms, period_of(setpoints_.settings));
       break;
     case HeartbeatEffect::resumed:
+      ports_[from.port].port->hold(from.peer);
       if (setpoints_.settings.recovery == Recovery::rearm) setpoints_.outputs = Outputs();
       safety_.leave(SafeReason::link);
       schedule_.start(now_ms, period_of(setpoints_.settings));
@@ -341,6 +342,7 @@ void Application::enter(SafeReason cause, std::uint32_t now_ms) {
   if (!safety_.enter(cause)) return;
   if (cause == SafeReason::link) {
     schedule_.stop();
+    ports_[link_.owner().port].port->hold(everyone);
   } else {
     setpoints_.outputs = Outputs();
     caused_ms_ = now_ms;

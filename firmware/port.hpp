@@ -26,7 +26,8 @@ class Port {
   virtual void send(Text datagram, Urgency urgency, std::uint32_t peer) = 0;
   // The longest datagram the port carries: 508 on the Giga's WiFi, 1024 elsewhere.
   virtual std::size_t max_size() const = 0;
-  // That peer is in control: it keeps its number, however many others send, until another is held.
+  // That peer is in control: it keeps its number, however many others send, until another is held, and
+  // gets what is for everyone where that has no place of its own. everyone: nobody here is any more.
   virtual void hold(std::uint32_t peer) { static_cast<void>(peer); }
   // The setting `pack`: send the packed form from now on, on a port that has one (CAN).
   virtual void use_packed_form(bool wanted) { static_cast<void>(wanted); }

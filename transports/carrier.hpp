@@ -109,7 +109,8 @@ class Carrier {
   virtual SendResult send(std::string_view bytes, Priority priority, Peer to = everyone) = 0;
 
   // At a board: that peer is in control. However many others send, what comes from it keeps its
-  // number, until another is held.
+  // number, until another is held, and what is for everyone goes to it where there is no standing
+  // audience. `everyone`: nobody here is in control any more.
   virtual void hold(Peer peer) { static_cast<void>(peer); }
 
   // Sends the packed form from now on, where there is one (CAN). Received are both at any time.

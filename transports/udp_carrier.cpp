@@ -95,7 +95,7 @@ class UdpCarrier final : public Carrier {
   void open(Handler& handler) override;
   void close() noexcept override;
   SendResult send(std::string_view bytes, Priority priority, Peer to) override;
-  void hold(Peer peer) override { peers_.hold(peer); }
+  void hold(Peer peer) override;
   bool up() const override { return up_; }
   std::size_t max_size() const override { return max_datagram; }
   const std::string& name() const override { return name_; }
@@ -107,6 +107,7 @@ class UdpCarrier final : public Carrier {
   void bind(const Endpoint& local);
   bool begin_to_receive();
   void received(std::size_t size);
+  void follow_audience();
   Outcome transmit(std::string_view bytes, Peer to);
   Outcome transmit_to(std::string_view bytes, const Endpoint& to, bool standing);
   void send_waiting();
@@ -294,14 +295,23 @@ void UdpCarrier::received(std::size_t size) {
   Peer peer = everyone;
   if (role_ == Role::board) {
     peer = peers_.heard(sender_, Text(received_.data(), size));
-    if (peer != everyone && peer_host_.empty()) {
-      standing_ = sender_;
-      standing_known_ = true;
-    }
+    follow_audience();
   }
   ++counters_.rx_datagrams;
   counters_.rx_bytes += size;
   handler_->on_datagram({received_.data(), size}, peer);
+}
+
+void UdpCarrier::hold(Peer peer) {
+  peers_.hold(peer);
+  follow_audience();
+}
+
+void UdpCarrier::follow_audience() {
+  const Endpoint* const audience = peers_.find(peers_.audience());
+  if (audience == nullptr || !peer_host_.empty()) return;
+  standing_ = *audience;
+  standing_known_ = true;
 }
 
 SendResult UdpCarrier::send(std::string_view bytes, Priority priority, Peer to) {

@@ -8,8 +8,8 @@
 //     board   udp://BIND[:2018][?peer=HOST[:2390]]   port 0 takes any free port; name() tells it
 //
 // A board knows the last 16 hosts that sent a valid datagram, and the one in control in any case.
-// A board with a peer sends to it what is for everyone; one without sends that to the host heard
-// last. An answer goes to where the question came from. The paper's Python client asks from a port
+// A board with a peer sends to it what is for everyone; one without sends that to the host in control,
+// else to the one heard last. An answer goes to where the question came from. The paper's Python client asks from a port
 // at which it does not listen, so an answer to another port of the peer's address goes to the peer
 // as well.
 //

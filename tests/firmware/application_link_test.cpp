@@ -182,6 +182,27 @@ TEST(ApplicationLink, APortTooManyIsRefusedAndWhatItWouldBringIsPassedOver) {
   EXPECT_FALSE(board.take(firmware::Application::max_ports - 1).empty()) << "the last is served";
 }
 
+TEST(ApplicationLink, TellsThePortWhoIsInControlAndWhenNobodyIs) {
+  TestBoard board({}, 2);
+  TestHost host(board, 66, {1, 7});
+  TestHost other(board, 900, {1, 8});
+  host.echo();
+  host.echo();
+  EXPECT_EQ(board.ports[1].held, 7U);
+  other.echo();
+  EXPECT_EQ(board.ports[1].held, 7U);
+  board.run(1001);
+  ASSERT_EQ(board.reason(), SafeReason::link);
+  EXPECT_EQ(board.ports[1].held, firmware::everyone);
+  host.echo();
+  EXPECT_EQ(board.ports[1].held, 7U) << "it is back";
+  board.application->port_down(1, board.now_ms);
+  EXPECT_EQ(board.ports[1].held, firmware::everyone);
+  other.echo();
+  EXPECT_EQ(board.ports[1].held, 8U);
+  EXPECT_EQ(board.ports[0].held, firmware::everyone);
+}
+
 TEST(ApplicationLink, LosesTheLinkWithTheOwnersTransport) {
   TestBoard board(Settings(), 2);
   TestHost host(board, echo_pnum, Source{1, 4});

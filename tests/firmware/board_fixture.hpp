@@ -57,10 +57,12 @@ class MemoryPort final : public firmware::Port {
   }
   std::size_t max_size() const override { return limit; }
   void use_packed_form(bool wanted) override { packed = wanted; }
+  void hold(std::uint32_t peer) override { held = peer; }
   bool may_configure() const override { return cable; }
 
   bool packed = false;
   bool cable = false;
+  std::uint32_t held = 0;  // who is in control
   const std::uint32_t* now_ms = nullptr;
   std::size_t limit = max_datagram;
   std::vector<Sent> sent;

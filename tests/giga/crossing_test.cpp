@@ -125,7 +125,14 @@ TEST(UdpPeers, KeepTheHostInControlInAFloodFromChangingAddresses) {
   const std::uint32_t owner = peers.heard({1, 1}, Text(hello));
   peers.hold(owner);
   for (std::uint32_t i = 0; i < 5000; ++i) peers.heard({100 + i, 2}, Text(hello));
+  giga::UdpAddress to;
+  ASSERT_TRUE(peers.find(firmware::everyone, to));
+  EXPECT_EQ(to.ip, 1U) << "what is for everyone is not led away";
   EXPECT_EQ(peers.heard({1, 1}, Text(hello)), owner);
+  peers.hold(firmware::everyone);  // it has gone
+  peers.heard({7, 2}, Text(hello));
+  ASSERT_TRUE(peers.find(firmware::everyone, to));
+  EXPECT_EQ(to.ip, 7U);
 }
 
 TEST(UdpLink, TellsTheNetworkThreadWhoIsInControl) {

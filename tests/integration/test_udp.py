@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A simulated board and hosts as separate processes over UDP."""
+import contextlib
+import itertools
 import signal
 import socket
+import threading
 import time
 import zlib
 
@@ -11,6 +14,72 @@ from r4_process import (PATIENCE_S, SANITIZED, Board, driving, is_link, is_state
 
 # The board's timeout, and what docs/safety.md promises on top.
 SAFE_WITHIN_MS = 1020
+
+
+def port_of(board):
+    return int(board.url.rsplit(':', 1)[1])
+
+
+@contextlib.contextmanager
+def flood(board, rate_hz, datagrams, at_once=0, places=0):
+    """Others send to the board: that many at once, then so many a second for as long as it is entered.
+
+    From so many ports by turns; 0: each from another. The list tells when they were sent.
+    """
+    sent = []
+    end = threading.Event()
+    sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(places)]
+    begun = time.monotonic()
+
+    def send():
+        for datagram in datagrams:
+            while len(sent) >= at_once + (time.monotonic() - begun) * rate_hz:
+                if end.wait(0.01):
+                    return
+            if places:
+                sockets[len(sent) % places].sendto(datagram, ('127.0.0.1', port_of(board)))
+            else:
+                with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as another:
+                    another.sendto(datagram, ('127.0.0.1', port_of(board)))
+            sent.append(time.monotonic())
+
+    thread = threading.Thread(target=send)
+    thread.start()
+    try:
+        yield sent
+    finally:
+        end.set()
+        thread.join()
+        for each in sockets:
+            each.close()
+
+
+def stays_with_its_host_in(board, flooded):
+    """The host in control keeps the board in that flood; the next gets in when it has left."""
+    with monitor(board.host_url) as host:
+        host.next(is_link('active'))
+        board.state('ACTIVE')
+        with flooded as sent:
+            begun = time.monotonic()
+            before = len(host.log)
+            while host.next(is_state)['came'] < begun + 1.5:
+                pass
+            during = host.log[before:]
+            assert all((each['fields']['state'], each['fields']['busy']) == ('active', False)
+                       for each in during if each['type'] == 'link')
+            assert not any(each['fields'].get('SAFE') for each in during if is_state(each))
+            steps = [later['t'] - earlier['t'] for earlier, later in itertools.pairwise(
+                each for each in during if is_state(each))]
+            print(f'{len(sent)} datagrams of others; {len(steps) + 1} states, at most {max(steps)} ms apart')
+            assert max(steps) < 500 or SANITIZED
+            left = host.signal(signal.SIGKILL)
+            safe = board.next(lambda each: each.get('state') in ('SAFE', 'CONNECTING'))
+            assert (safe['state'], safe['reason']) == ('SAFE', 'link') and safe['came'] > left
+            assert len([each for each in sent if begun < each < left]) > 40
+            entered = run('send', board.host_url, 'C:rate,50')
+            assert entered.returncode == 0, entered
+            board.executed('C:rate,50')
+    assert not any(each.get('executed', {}).get('command', '').startswith('O:') for each in board.log)
 
 
 @pytest.fixture(name='board')
@@ -190,6 +259,19 @@ def test_noise_at_the_host_is_counted_and_shown_and_the_link_goes_on(board):
         error = host.next(lambda each: each['type'] == 'error')
         assert error['fields']['error'] == 'crc' and error['fields']['found'] == '0x1'
         host.next(is_state)
+
+
+def test_a_flood_of_bytes_from_ever_other_ports_takes_nothing_from_the_host_in_control(board):
+    stays_with_its_host_in(board, flood(board, 45, itertools.repeat(b'x'), at_once=3000))
+
+
+def test_a_flood_of_valid_datagrams_takes_nothing_from_the_host_in_control(board):
+    def commands():
+        for number in itertools.count(1):
+            fields = b'O:358,1,1;PNum:%d;T:%d;^' % (number, number)
+            yield fields + hex(zlib.crc32(fields)).encode() + b'^'
+
+    stays_with_its_host_in(board, flood(board, 960, commands(), places=40))
 
 
 def test_measures_a_link(board):

@@ -22,7 +22,7 @@ TEST(PeerTable, NumbersEverySenderOnce) {
   EXPECT_EQ(numbers.count(Peers::nobody), 0U);
   const std::uint32_t first = peers.heard(0);
   EXPECT_EQ(numbers.count(first), 1U) << "known";
-  EXPECT_EQ(peers.last(), first);
+  EXPECT_EQ(peers.audience(), first);
   EXPECT_EQ(*peers.find(first), 0);
 }
 
@@ -50,7 +50,7 @@ TEST(PeerTable, MakesNoPlaceForWhatIsNoDatagram) {
     EXPECT_EQ(peers.heard(i, Text(damaged)), Peers::nobody);
     EXPECT_EQ(peers.heard(i, Text()), Peers::nobody);
   }
-  EXPECT_EQ(peers.last(), host);
+  EXPECT_EQ(peers.audience(), host);
   EXPECT_EQ(peers.heard(owner, Text(with_crc("H:ROS2-R4;"))), host);
 }
 
@@ -61,6 +61,26 @@ TEST(PeerTable, KeepsThePlaceOfTheHostInControlInAFlood) {
   for (int i = 0; i < 50000; ++i) peers.heard(i);
   ASSERT_NE(peers.find(number), nullptr);
   EXPECT_EQ(peers.heard(owner), number);
+}
+
+TEST(PeerTable, SendsWhatIsForEveryoneToTheHostInControlWhateverOthersSend) {
+  Peers peers;
+  const std::uint32_t number = peers.heard(owner);
+  const std::uint32_t stranger = peers.heard(1);
+  EXPECT_EQ(peers.audience(), stranger) << "nobody is in control";
+  peers.hold(number);
+  EXPECT_EQ(peers.audience(), number);
+  for (int i = 0; i < 1000; ++i) peers.heard(i, Text(with_crc("H:ROS2-R4;")));
+  EXPECT_EQ(peers.audience(), number);
+  peers.heard(owner);
+  EXPECT_EQ(peers.audience(), number);
+
+  peers.hold(Peers::nobody);
+  EXPECT_EQ(peers.audience(), number) << "until another speaks";
+  const std::uint32_t next = peers.heard(2000);
+  EXPECT_EQ(peers.audience(), next);
+  for (int i = 0; i < 1000; ++i) peers.heard(i);
+  EXPECT_EQ(peers.heard(owner), number) << "it may come back";
 }
 
 TEST(PeerTable, LetsANewHostInDuringAFlood) {

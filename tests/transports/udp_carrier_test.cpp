@@ -244,6 +244,39 @@ TEST_F(UdpCarrierTest, TakesWhoeverSendsNoDatagramForNobody) {
   EXPECT_EQ(stranger.receive(), "");
 }
 
+TEST_F(UdpCarrierTest, SendsForEveryoneToTheHostInControlAndToNoStranger) {
+  open_board();
+  Socket owner(io, "127.0.0.1");
+  Socket stranger(io, "127.0.0.1");
+  owner.send(valid("owner"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("owner")));
+  board->hold(at_board.datagrams[0].from);
+  stranger.send(valid("stranger"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("stranger")));
+  board->send("state", Priority::state);
+  EXPECT_TRUE(run_until(io, [&] { return owner.receive() == "state"; }));
+  EXPECT_EQ(stranger.receive(), "");
+
+  board->hold(everyone);  // it has gone
+  stranger.send(valid("again"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("again")));
+  board->send("for anybody", Priority::state);
+  EXPECT_TRUE(run_until(io, [&] { return stranger.receive() == "for anybody"; }));
+  EXPECT_EQ(owner.receive(), "");
+}
+
+TEST_F(UdpCarrierTest, SendsForEveryoneToTheHostInControlThatWasNotHeardLast) {
+  open_board();
+  Socket owner(io, "127.0.0.1");
+  Socket stranger(io, "127.0.0.1");
+  owner.send(valid("owner"), port_of(*board));
+  stranger.send(valid("stranger"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("stranger")));
+  board->hold(at_board.datagrams[0].from);
+  board->send("state", Priority::state);
+  EXPECT_TRUE(run_until(io, [&] { return owner.receive() == "state"; }));
+}
+
 TEST_F(UdpCarrierTest, SaysThatThePortIsInUse) {
   Socket other(io, "0.0.0.0");
   const auto error = error_of(

@@ -4,7 +4,8 @@
 // Whoever has sent a valid datagram gets a place; what is damaged or no datagram at all makes none.
 // The table is bounded: a new sender takes the place of the one that has been silent longest. The
 // place of the host in control is its own, whatever others send: a host whose number changed would
-// be another host to the board. A number is never given twice.
+// be another host to the board. It is also the audience of what is for everyone: no stranger's
+// datagram, however valid, takes that away. A number is never given twice.
 #pragma once
 
 #include <cstdint>
@@ -37,12 +38,16 @@ class PeerTable {
       place->number = given_;
     }
     place->heard = ++turn_;
-    last_ = place->number;
-    return last_;
+    if (!in_control_ || place->number == held_) audience_ = place->number;
+    return place->number;
   }
 
-  // The host of that number is in control: its place is its own until another is held.
-  void hold(std::uint32_t number) { held_ = number; }
+  // The host of that number is in control: its place is its own until another is held. nobody: it is
+  // in control no longer, and may come back.
+  void hold(std::uint32_t number) {
+    in_control_ = number != nobody;
+    if (in_control_) audience_ = held_ = number;
+  }
 
   // Where that number sends from; null if it has lost its place.
   const Address* find(std::uint32_t number) const {
@@ -51,8 +56,9 @@ class PeerTable {
     }
     return nullptr;
   }
-  // Who was heard last; nobody before the first.
-  std::uint32_t last() const { return last_; }
+  // Who gets what is for everyone: the host in control, else the one heard last; nobody before the
+  // first.
+  std::uint32_t audience() const { return audience_; }
 
  private:
   struct Entry {
@@ -75,8 +81,9 @@ class PeerTable {
   Entry entries_[places];
   std::uint64_t turn_ = 0;
   std::uint32_t given_ = nobody;
-  std::uint32_t last_ = nobody;
+  std::uint32_t audience_ = nobody;
   std::uint32_t held_ = nobody;
+  bool in_control_ = false;  // is the one that is held
 };
 
 }  // namespace r4

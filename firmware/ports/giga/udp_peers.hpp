@@ -27,7 +27,7 @@ class UdpPeers {
 
   // The number of whoever has just sent `bytes`; firmware::everyone if they are no valid datagram.
   std::uint32_t heard(UdpAddress from, Text bytes) { return hosts_.heard(from, bytes); }
-  // That one is in control, and keeps its number.
+  // That one is in control, and keeps its number; firmware::everyone: none is any more.
   void hold(std::uint32_t peer) { hosts_.hold(peer); }
 
   // Where to send what is for `peer`. False: nowhere.
@@ -37,7 +37,7 @@ class UdpPeers {
       to.port = host_port;
       return true;
     }
-    const UdpAddress* const at = hosts_.find(peer == firmware::everyone ? hosts_.last() : peer);
+    const UdpAddress* const at = hosts_.find(peer == firmware::everyone ? hosts_.audience() : peer);
     if (at == nullptr) return false;
     to = *at;
     if (to.ip == host_) to.port = host_port;  // it asks from another port than it listens at

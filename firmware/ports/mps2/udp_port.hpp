@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// UDP over the LAN9118 as a port of the application. What is for everyone goes to the host heard
-// last; before one was heard, nowhere.
+// UDP over the LAN9118 as a port of the application. What is for everyone goes to the host in control,
+// else to the one heard last; before one was heard, nowhere.
 #pragma once
 
 #include <cstdint>
@@ -63,7 +63,7 @@ class UdpPort final : public firmware::Port {
   bool has_received() const { return put_ != taken_; }
 
   void send(Text datagram, firmware::Urgency, std::uint32_t peer) override {
-    const UdpAddress* const to = hosts_.find(peer == firmware::everyone ? hosts_.last() : peer);
+    const UdpAddress* const to = hosts_.find(peer == firmware::everyone ? hosts_.audience() : peer);
     if (to == nullptr) return;
     const std::size_t size = frames_.write(*to, datagram, reinterpret_cast<std::uint8_t*>(out_));
     if (size == 0 || !chip_.send(out_, size)) ++dropped_;
