@@ -176,6 +176,25 @@ TEST(BoardCallbacks, AreToldThatTheTransportIsUp) {
   }
 }
 
+// Each has a loop and a thread of its own; the port at which hosts listen is one.
+TEST(TwoBoards, OfOneProgramShareThePortAndGetWhatIsTheirs) {
+  BoardInAThread left("udp");
+  BoardInAThread right("udp");
+  Board first(left.url());
+  first.wait_active();
+  const std::string listen = first.name().substr(first.name().find('?'));
+  Board second(right.url().substr(0, right.url().find('?')) + listen);
+  second.wait_active();
+  first.send("C:rate,50");
+  second.send("C:rate,20");
+  EXPECT_EQ(left.executed().back(), "C:rate,50");
+  EXPECT_EQ(right.executed().back(), "C:rate,20");
+  first.stop();
+  EXPECT_EQ(second.state().safe, SafeReason::none);
+  EXPECT_EQ(problem_of([&] { Board again(first.name()); }).reason,
+            "this program has that board open already");
+}
+
 TEST(BoardCallbacks, AreToldTheLinkAndTheNewestStateOfABoardThatIsSilentNow) {
   BoardInAThread simulated("udp");
   BoardOptions options;
