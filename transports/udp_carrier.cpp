@@ -5,6 +5,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <asio/ip/udp.hpp>
 #include <asio/ip/v6_only.hpp>
@@ -16,9 +17,11 @@
 
 #include "../protocol/datagram.hpp"
 #include "framing/peer_table.hpp"
+#include "host_lookup.hpp"
 #include "operation_slot.hpp"
 #include "send_queue.hpp"
 #include "udp_host_socket.hpp"
+#include "udp_url.hpp"
 #include "writable_wait.hpp"
 
 namespace r4 {
@@ -27,8 +30,6 @@ namespace {
 using asio::ip::udp;
 using Endpoint = udp::endpoint;
 
-constexpr std::uint16_t board_port = 2018;
-constexpr std::uint16_t host_port = 2390;
 constexpr std::size_t normal_entries = 64;
 constexpr std::size_t state_entries = 4;
 constexpr int peer_places = 16;
@@ -45,27 +46,8 @@ asio::ip::address mapped_to_v6(const asio::ip::address& address) {
   return asio::ip::make_address_v6(asio::ip::v4_mapped, address.to_v4());
 }
 
-// IPv4 first, as the board's WiFi has it.
-Endpoint look_up(asio::io_context& io, const std::string& thing, const std::string& host,
-                 std::uint16_t port) {
-  asio::error_code error;
-  const auto found =
-      udp::resolver(io).resolve(host, std::to_string(port), udp::resolver::numeric_service, error);
-  if (error || found.empty()) {
-    throw Error(ErrorKind::open, thing,
-                fmt::format("there is no host '{}' ({})", host, error.message()),
-                "check the name, or give the IP address");
-  }
-  Endpoint endpoint = found.begin()->endpoint();
-  for (const auto& result : found) {
-    if (endpoint.protocol() != udp::v4()) endpoint = result.endpoint();
-  }
-  const asio::ip::address address = endpoint.address();
-  if (address.is_multicast() || address == asio::ip::address_v4::broadcast()) {
-    throw Error(ErrorKind::usage, thing, host + " is the address of many, not of one",
-                "give the IP address of the board itself");
-  }
-  return endpoint;
+std::string bracketed(const std::string& host) {
+  return host.find(':') == std::string::npos ? host : "[" + host + "]";
 }
 
 // 0 if the system knows a way to that address, else errno. Sends nothing.
@@ -89,7 +71,7 @@ int send_packet(int socket, std::string_view bytes, const Endpoint& to) {
 
 class UdpCarrier final : public Carrier {
  public:
-  UdpCarrier(asio::io_context& io, Url url, Role role);
+  UdpCarrier(asio::io_context& io, const Url& url, Role role, HostLookup lookup);
   ~UdpCarrier() override { close(); }
 
   void open(Handler& handler) override;
@@ -104,6 +86,11 @@ class UdpCarrier final : public Carrier {
  private:
   enum class Outcome { sent, busy, failed };
 
+  void open_host();
+  void open_board();
+  void begin(const Endpoint& board);
+  void found(const FoundHost& answer);
+  void watch();
   void bind(const Endpoint& local);
   bool begin_to_receive();
   void received(std::size_t size);
@@ -112,18 +99,18 @@ class UdpCarrier final : public Carrier {
   Outcome transmit_to(std::string_view bytes, const Endpoint& to, bool standing);
   void send_waiting();
   void set_up(bool up);
+  void warn(const std::string& reason, const std::string& fix);
+  void tell_why_down(const Problem& problem);
   void report_later();
   void report();
   void probe_later();
 
   asio::io_context& io_;
-  const Url url_;
+  const UdpUrl url_;
   const Role role_;
-  std::uint16_t port_;    // of the board
-  std::uint16_t listen_;  // of the host
-  std::string peer_host_;
-  std::uint16_t peer_port_ = host_port;
   std::string name_;
+  const HostLookup lookup_;
+  HostWatch watch_;
 
   UdpSocket socket_;
   UdpHostSocket host_socket_{socket_};
@@ -139,6 +126,8 @@ class UdpCarrier final : public Carrier {
   int refused_error_ = 0;  // why the system refused the last packet; 0 once one has passed
   int reported_refusal_ = 0;
   OperationSlot reporting_;
+  std::string down_reason_;  // why it cannot be opened, as told last
+  bool named_ = false;       // the URL has the board's name, not its address
   bool standing_known_ = false;
   Endpoint standing_;  // where what is for everyone goes
   PeerTable<Endpoint, peer_places> peers_;
@@ -149,79 +138,113 @@ class UdpCarrier final : public Carrier {
   Endpoint sender_;
 };
 
-UdpCarrier::UdpCarrier(asio::io_context& io, Url url, Role role)
+UdpCarrier::UdpCarrier(asio::io_context& io, const Url& url, Role role, HostLookup lookup)
     : io_(io),
-      url_(std::move(url)),
+      url_(url, role),
       role_(role),
-      port_(url_.port().value_or(board_port)),
-      listen_(static_cast<std::uint16_t>(url_.get_number("listen", 0, 65535, host_port))),
+      name_(url_.text),
+      lookup_(std::move(lookup)),
+      watch_(io, lookup_),
       socket_(io),
       writable_(io),
       probe_timer_(io),
-      queue_(normal_entries, state_entries, counters_.tx_dropped) {
-  if (url_.host().empty() || !url_.path().empty()) {
-    throw Error(ErrorKind::usage, url_.text(), "it is not udp://HOST or udp://HOST:PORT",
-                "write it as in udp://192.168.1.77:2018");
-  }
-  if (role == Role::host) {
-    url_.allow_only("listen");
-    if (port_ == 0) {
-      throw Error(ErrorKind::usage, url_.text(), "port 0 is no board's", "the board's is 2018");
-    }
-  } else {
-    url_.allow_only("peer");
-    if (const auto peer = url_.get("peer")) {
-      const Url parsed = Url::parse("udp://" + *peer);
-      peer_host_ = parsed.host();
-      peer_port_ = parsed.port().value_or(host_port);
-      if (peer_host_.empty() || peer_port_ == 0 || !parsed.path().empty()) {
-        throw Error(ErrorKind::usage, url_.text(), "'peer=" + *peer + "' is not HOST or HOST:PORT",
-                    "write it as in peer=192.168.1.10:2390");
-      }
-    }
-  }
-  name_ = url_.text();
-}
+      queue_(normal_entries, state_entries, counters_.tx_dropped) {}
 
 void UdpCarrier::open(Handler& handler) {
   close();
-  const Endpoint url_endpoint = look_up(io_, url_.text(), url_.host(), port_);
-  if (role_ == Role::host) {
-    standing_ = url_endpoint;
-    if (const int error = probe_route(standing_); error != 0) {
-      throw Error(ErrorKind::open, url_.text(), std::strerror(error), network_fix);
-    }
-    bind(Endpoint(standing_.protocol(), listen_));
-    standing_known_ = true;
+  if (role_ == Role::board) {
+    open_board();
   } else {
-    standing_known_ = false;
-    if (!peer_host_.empty()) {
-      standing_ = look_up(io_, url_.text(), peer_host_, peer_port_);
-      const bool v6_socket = url_endpoint.protocol() == udp::v6();
-      if (v6_socket && standing_.protocol() == udp::v4()) {
-        standing_.address(mapped_to_v6(standing_.address()));
-      } else if (!v6_socket && standing_.protocol() == udp::v6()) {
-        throw Error(ErrorKind::usage, url_.text(), "an IPv4 socket cannot send to an IPv6 peer",
-                    "listen on [::]");
-      }
-      standing_known_ = true;
-    }
-    bind(url_endpoint);
-  }
-  const std::uint16_t local_port = socket_.local_endpoint().port();
-  const std::string host =
-      url_.host().find(':') == std::string::npos ? url_.host() : "[" + url_.host() + "]";
-  if (role_ == Role::host) {
-    name_ = fmt::format("udp://{}:{}", host, port_);
-    if (local_port != host_port) name_ += fmt::format("?listen={}", local_port);
-  } else {
-    name_ = fmt::format("udp://{}:{}", host, local_port);
-    if (const auto peer = url_.get("peer")) name_ += "?peer=" + *peer;
+    open_host();
   }
   handler_ = &handler;
+  if (!socket_.is_open()) return watch();  // its address is asked for
   begin_to_receive();
   set_up(true);
   report();
+  if (handler_ != nullptr && role_ == Role::host) watch();
+}
+
+void UdpCarrier::open_board() {
+  const Endpoint local(lookup_.find(url_.host, url_.text), url_.port);
+  standing_known_ = false;
+  if (!url_.peer_host.empty()) {
+    standing_ = Endpoint(lookup_.find(url_.peer_host, url_.text), url_.peer_port);
+    const bool v6_socket = local.protocol() == udp::v6();
+    if (v6_socket && standing_.protocol() == udp::v4()) {
+      standing_.address(mapped_to_v6(standing_.address()));
+    } else if (!v6_socket && standing_.protocol() == udp::v6()) {
+      throw Error(ErrorKind::usage, url_.text, "an IPv4 socket cannot send to an IPv6 peer",
+                  "listen on [::]");
+    }
+    standing_known_ = true;
+  }
+  bind(local);
+  name_ = fmt::format("udp://{}:{}", bracketed(url_.host), socket_.local_endpoint().port());
+  if (!url_.peer.empty()) name_ += "?peer=" + url_.peer;
+}
+
+// Whoever opens it in a handler of the loop has others on that loop, whom a name must not hold up.
+void UdpCarrier::open_host() {
+  named_ = !is_address(url_.host);
+  if (named_ && io_.get_executor().running_in_this_thread()) return;
+  begin(Endpoint(lookup_.find(url_.host, url_.text), url_.port));
+}
+
+// The socket of a host whose board is there.
+void UdpCarrier::begin(const Endpoint& board) {
+  standing_ = board;
+  if (const int error = probe_route(board); error != 0) {
+    throw Error(ErrorKind::open, url_.text, std::strerror(error), network_fix);
+  }
+  bind(Endpoint(board.protocol(), url_.listen));
+  standing_known_ = true;
+  const std::uint16_t local_port = socket_.local_endpoint().port();
+  name_ = fmt::format("udp://{}:{}", bracketed(url_.host), url_.port);
+  if (local_port != UdpUrl::host_port) name_ += fmt::format("?listen={}", local_port);
+}
+
+void UdpCarrier::watch() {
+  if (named_) {
+    watch_.start(url_.host, socket_.is_open(), [this](const FoundHost& answer) { found(answer); });
+  } else if (host_socket_.connected()) {
+    // The address of this computer may be another now.
+    watch_.start([this] { host_socket_.reconnect(); });
+  }
+}
+
+// Where the board of that name is, now.
+void UdpCarrier::found(const FoundHost& answer) {
+  const auto& addresses = answer.addresses;
+  const bool is_open = socket_.is_open();
+  if (is_open) {
+    host_socket_.reconnect();  // or it is this computer that has moved
+    const bool same =
+        std::find(addresses.begin(), addresses.end(), standing_.address()) != addresses.end();
+    if (same || addresses.empty()) return;
+  }
+  const std::string before = is_open ? standing_.address().to_string() : "";
+  try {
+    const Endpoint board(address_of(answer, url_.host, url_.text), url_.port);
+    reception_.cancel();
+    writable_.stop();
+    host_socket_.close();
+    begin(board);
+  } catch (const Error& error) {
+    watch_.set_known(socket_.is_open());
+    if (!socket_.is_open()) tell_why_down(error.problem());
+    return;
+  }
+  watch_.set_known(true);
+  down_reason_.clear();
+  begin_to_receive();
+  if (!up_) set_up(true);
+  if (is_open) {
+    warn(fmt::format("the board is at {} now; it was at {}", standing_.address().to_string(),
+                     before),
+         "");
+  }
+  if (handler_ != nullptr) report();
 }
 
 void UdpCarrier::bind(const Endpoint& local) {
@@ -237,21 +260,21 @@ void UdpCarrier::bind(const Endpoint& local) {
 
   host_socket_.close();
   if (error == asio::error::already_open) {
-    throw Error(ErrorKind::open, url_.text(), "this program has that board open already",
+    throw Error(ErrorKind::open, url_.text, "this program has that board open already",
                 "use the one that is open, or ?listen=0 for another host to the board");
   }
   const std::string port = fmt::format("UDP port {}", local.port());
   if (error == asio::error::address_in_use) {
-    throw Error(ErrorKind::open, url_.text(), port + " is in use by another program",
+    throw Error(ErrorKind::open, url_.text, port + " is in use by another program",
                 role_ == Role::host
                     ? "end that program, or use ?listen=0 to hear the board on any free port"
                     : "end that program, or listen on another port");
   }
   if (error == asio::error::access_denied) {
-    throw Error(ErrorKind::permission, url_.text(), port + " may not be opened: permission denied",
+    throw Error(ErrorKind::permission, url_.text, port + " may not be opened: permission denied",
                 "use a port from 1024 up");
   }
-  throw Error(ErrorKind::open, url_.text(),
+  throw Error(ErrorKind::open, url_.text,
               fmt::format("{} cannot be opened on {}: {}", port, local.address().to_string(),
                           error.message()),
               "use an address of this machine, or 0.0.0.0 for all of them");
@@ -260,6 +283,9 @@ void UdpCarrier::bind(const Endpoint& local) {
 void UdpCarrier::close() noexcept {
   handler_ = nullptr;
   up_ = reported_up_ = false;
+  standing_known_ = false;
+  down_reason_.clear();
+  watch_.stop();
   refused_error_ = reported_refusal_ = 0;
   reporting_.cancel();
   reception_.cancel();
@@ -297,6 +323,10 @@ void UdpCarrier::received(std::size_t size) {
     peer = peers_.heard(sender_, Text(received_.data(), size));
     follow_audience();
   }
+  if (watch_.listens()) {
+    Datagram datagram;
+    if (read(Text(received_.data(), size), datagram)) watch_.heard();
+  }
   ++counters_.rx_datagrams;
   counters_.rx_bytes += size;
   handler_->on_datagram({received_.data(), size}, peer);
@@ -309,7 +339,7 @@ void UdpCarrier::hold(Peer peer) {
 
 void UdpCarrier::follow_audience() {
   const Endpoint* const audience = peers_.find(peers_.audience());
-  if (audience == nullptr || !peer_host_.empty()) return;
+  if (audience == nullptr || !url_.peer_host.empty()) return;
   standing_ = *audience;
   standing_known_ = true;
 }
@@ -320,6 +350,7 @@ SendResult UdpCarrier::send(std::string_view bytes, Priority priority, Peer to) 
     ++counters_.tx_errors;
     return SendResult::full;
   }
+  if (!socket_.is_open()) return SendResult::down;
   if (queue_.empty()) {
     switch (transmit(bytes, to)) {
       case Outcome::sent:
@@ -359,7 +390,7 @@ UdpCarrier::Outcome UdpCarrier::transmit(std::string_view bytes, Peer to) {
   }
   const Outcome outcome = transmit_to(bytes, *asker, false);
   if (outcome == Outcome::busy) return outcome;
-  const bool same_machine = !peer_host_.empty() && asker->address() == standing_.address();
+  const bool same_machine = !url_.peer_host.empty() && asker->address() == standing_.address();
   if (same_machine && asker->port() != standing_.port()) return transmit_to(bytes, standing_, true);
   return outcome;
 }
@@ -403,6 +434,20 @@ void UdpCarrier::set_up(bool up) {
   probe_.cancel();
 }
 
+void UdpCarrier::warn(const std::string& reason, const std::string& fix) {
+  handler_->on_carrier_event(
+      {CarrierEvent::Kind::warning, Problem{ErrorKind::open, name_, reason, fix}});
+}
+
+// It is tried again and again, and told once.
+void UdpCarrier::tell_why_down(const Problem& problem) {
+  if (up_) set_up(false);
+  reported_up_ = false;
+  if (down_reason_ == problem.reason) return;
+  down_reason_ = problem.reason;
+  handler_->on_carrier_event({CarrierEvent::Kind::down, problem});
+}
+
 void UdpCarrier::report_later() {
   asio::post(io_, reporting_.handler([this] { report(); }));
 }
@@ -411,11 +456,8 @@ void UdpCarrier::report() {
   if (refused_error_ != reported_refusal_) {
     reported_refusal_ = refused_error_;
     if (refused_error_ != 0) {
-      handler_->on_carrier_event(
-          {CarrierEvent::Kind::warning,
-           Problem{ErrorKind::open, name_,
-                   fmt::format("the system does not send: {}", std::strerror(refused_error_)),
-                   refused_error_ == EPERM ? "let UDP to this address through the firewall" : ""}});
+      warn(fmt::format("the system does not send: {}", std::strerror(refused_error_)),
+           refused_error_ == EPERM ? "let UDP to this address through the firewall" : "");
     }
   }
   if (handler_ == nullptr || up_ == reported_up_) return;
@@ -446,7 +488,12 @@ void UdpCarrier::probe_later() {
 }  // namespace
 
 std::unique_ptr<Carrier> make_udp_carrier(asio::io_context& io, const Url& url, Role role) {
-  return std::make_unique<UdpCarrier>(io, url, role);
+  return make_udp_carrier_with(io, url, role, HostLookup());
+}
+
+std::unique_ptr<Carrier> make_udp_carrier_with(asio::io_context& io, const Url& url, Role role,
+                                               HostLookup lookup) {
+  return std::make_unique<UdpCarrier>(io, url, role, std::move(lookup));
 }
 
 }  // namespace r4

@@ -13,7 +13,9 @@
 // at which it does not listen, so an answer to another port of the peer's address goes to the peer
 // as well.
 //
-// A name is looked up in open(), IPv4 first. A board that is off (port unreachable) is a quiet
+// A name is looked up in open(), IPv4 first. A host's open() within a handler of the loop does not
+// wait for that: it is `down` until the name is known, asked for each second. A host that has heard
+// nothing valid for 3 to 6 s looks again, and goes to where the board is then. A board that is off (port unreachable) is a quiet
 // board, no failure; an unreachable network is: `down`, tried again five times a second.
 #pragma once
 
@@ -21,6 +23,7 @@
 #include <memory>
 
 #include "carrier.hpp"
+#include "host_lookup.hpp"
 #include "registry.hpp"
 #include "url.hpp"
 
@@ -28,5 +31,9 @@ namespace r4 {
 
 // Throws Error{usage} for a URL that UDP does not take.
 std::unique_ptr<Carrier> make_udp_carrier(asio::io_context& io, const Url& url, Role role);
+
+// The same, with names looked up in that way.
+std::unique_ptr<Carrier> make_udp_carrier_with(asio::io_context& io, const Url& url, Role role,
+                                               HostLookup lookup);
 
 }  // namespace r4

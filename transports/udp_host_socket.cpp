@@ -79,11 +79,13 @@ void UdpHostSocket::close() noexcept {
 }
 
 int UdpHostSocket::reconnect() {
+  if (!connected_) return 0;
   sockaddr none{};
   none.sa_family = AF_UNSPEC;
-  ::connect(descriptor_, &none, sizeof none);
-  const int done = ::connect(descriptor_, board_.data(), static_cast<socklen_t>(board_.size()));
-  return done == 0 ? 0 : errno;
+  const bool done =
+      ::connect(descriptor_, &none, sizeof none) == 0 &&
+      ::connect(descriptor_, board_.data(), static_cast<socklen_t>(board_.size())) == 0;
+  return done ? 0 : errno;
 }
 
 }  // namespace r4

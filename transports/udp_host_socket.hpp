@@ -37,7 +37,7 @@ class UdpHostSocket {
 
   // Connected: the kernel has chosen the address that it sends from, which may be gone.
   bool connected() const { return connected_; }
-  // Has it chosen again. 0, or errno.
+  // Has it chosen again, if it has. 0, or errno.
   int reconnect();
 
   // Does the board send from there?
