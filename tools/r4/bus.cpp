@@ -198,7 +198,7 @@ void add_bus(CLI::App& root, Action& chosen) {
   add_fields(*command, options->fields);
   command->get_option("--fields")
       ->description(
-          "state fields (default DEFAULT,SAFE,CMD, what our host asks for; arming adds RELAYS)");
+          "state fields (default DEFAULT,SAFE,CMD, as our host asks; arming adds RELAYS)");
   add_number(*command, "--commands", options->commands, 0, 1000,
              "commands a second to each board (default 20)");
   add_number(*command, "--bitrate", options->bit_rate, 10000, 1000000,
