@@ -56,6 +56,7 @@ void Application::tell_ports() {
 void Application::start(std::uint32_t now_ms) {
   hal_.make_safe();
   safety_.count_from(now_ms);  // the clock begins at random
+  turned_ms_ = now_ms;
   tell_ports();
   if (observer_ != nullptr) {
     observer_->on_state(now_ms, BoardState::connecting, SafeReason::none);
@@ -72,6 +73,7 @@ BoardState Application::state() const {
 // --- what comes in
 
 void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std::uint32_t now_ms) {
+  turn(now_ms);
   look_at_time(now_ms);  // silence counts before what ends it
   if (port >= port_count_) return;
   Datagram datagram;
@@ -106,6 +108,32 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
   }
 }
 
+// What arrives while the loop stands still waits in an interrupt's ring or in the system, which tell
+// nothing of when it came: only that it was not there when the loop last looked.
+void Application::turn(std::uint32_t now_ms) {
+  if (now_ms - turned_ms_ > standstill_ms) {
+    for (PortSlot& slot : ports_) {
+      if (!slot.behind) slot.waiting_ms = turned_ms_;  // else what came before may wait still
+      slot.behind = true;
+    }
+    any_behind_ = true;
+    went_on_ms_ = now_ms;
+  } else if (any_behind_ && now_ms - went_on_ms_ >= catch_up_ms) {
+    for (PortSlot& slot : ports_) slot.behind = false;
+    any_behind_ = false;
+  }
+  turned_ms_ = now_ms;
+}
+
+void Application::drained(std::uint8_t port) {
+  if (port < port_count_) ports_[port].behind = false;
+}
+
+// For how long may what comes from that port now have waited?
+std::uint32_t Application::waited_ms(std::uint8_t port, std::uint32_t now_ms) const {
+  return ports_[port].behind ? now_ms - ports_[port].waiting_ms : 0;
+}
+
 // Is the datagram of a host that may command? Without a key all are, and at a cable of the board's
 // own: who is there can set a key.
 Verdict Application::judge(std::uint8_t port, MessageKind kind, const Datagram& datagram,
@@ -128,6 +156,7 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
   heartbeat.pnum = datagram.pnum();
   heartbeat.has_time = datagram.has_time();
   heartbeat.t = datagram.time_ms();
+  heartbeat.waited_ms = waited_ms(from.port, now_ms);
   switch (link_.on_heartbeat(heartbeat, now_ms)) {
     case HeartbeatEffect::fed:
       break;
@@ -210,7 +239,7 @@ void Application::on_command(Source from, const Datagram& datagram, Verdict verd
   if (held) {
     outcome = Refusal::safe;
   } else if (command.kind == CommandKind::clear) {
-    outcome = judge_clear(command, now_ms);
+    outcome = judge_clear(command, waited_ms(from.port, now_ms), now_ms);
   } else if (!may_set(from.port, command)) {
     outcome = Refusal::auth;
   } else {
@@ -308,6 +337,7 @@ void Application::fail(SafeReason cause, std::uint32_t now_ms) {
 
 std::uint32_t Application::poll(std::uint32_t now_ms) {
   guard_.check_in(loop_duty);
+  turn(now_ms);
   look_at_time(now_ms);
   check_interlocks(now_ms);
   update_outputs(now_ms);
@@ -357,12 +387,13 @@ void Application::enter(SafeReason cause, std::uint32_t now_ms) {
 // E:CLEAR was on its way. So it names the newest cause, or says that there is none. One that names
 // none, of a host that does not know of such numbers, must come later than the timeout after the cause:
 // what was sent before it is held back for no longer.
-Refusal Application::judge_clear(const Command& command, std::uint32_t now_ms) const {
+Refusal Application::judge_clear(const Command& command, std::uint32_t waited_ms,
+                                 std::uint32_t now_ms) const {
   if (command.value != Command::unnamed_cause) {
     const bool named = command.value == safety_.newest() || !safety_.latched();
     return named ? Refusal::none : Refusal::stale;
   }
-  const bool settled = now_ms - caused_ms_ >= setpoints_.settings.timeout_ms;
+  const bool settled = now_ms - caused_ms_ >= setpoints_.settings.timeout_ms + waited_ms;
   return settled || !safety_.latched() ? Refusal::none : Refusal::stale;
 }
 

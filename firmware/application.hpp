@@ -53,7 +53,14 @@ class Application {
 
   // A datagram from `peer` on `port`. Anything may be in it. One of a port that was not added is
   // passed over.
+  //
+  // The loop turns as often as this or poll() is called. If it stood still for longer than
+  // standstill_ms, what comes then may have waited all that time: a heartbeat counts from when the
+  // loop last turned, until the port is drained or the loop has turned for catch_up_ms.
   void receive(std::uint8_t port, std::uint32_t peer, Text bytes, std::uint32_t now_ms);
+  // All that had arrived on `port` has been handed over. A port that can tell saves the next
+  // heartbeat from being taken for one that waited.
+  void drained(std::uint8_t port);
   // The transport under `port` is gone.
   void port_down(std::uint8_t port, std::uint32_t now_ms);
   // Something is wrong with the board itself: cause is fault or watchdog.
@@ -78,6 +85,11 @@ class Application {
   static constexpr std::uint32_t interlock_period_ms = 10;
   // The guard counts a turn of the loop as missed after this.
   static constexpr std::uint32_t loop_limit_ms = 20;
+  // A loop that turns as it should does not stand still. By so much may a heartbeat be taken for
+  // younger than it is.
+  static constexpr std::uint32_t standstill_ms = 15;
+  // No port holds more than is read in this time.
+  static constexpr std::uint32_t catch_up_ms = 50;
   // A proximity cause leaves when the obstacle is this much beyond the threshold.
   static constexpr int proximity_hysteresis_cm = 5;
   // … for this long: two turns of each sensor (drivers/ultrasonic.hpp), for one may miss an echo.
@@ -88,8 +100,12 @@ class Application {
     Port* port = nullptr;
     std::uint32_t next_pnum = 0;   // of the stream and of the controlling host's answers
     std::uint32_t aside_pnum = 0;  // of answers to others
+    bool behind = false;           // what comes may have waited, since `waiting_ms`
+    std::uint32_t waiting_ms = 0;
   };
 
+  void turn(std::uint32_t now_ms);
+  std::uint32_t waited_ms(std::uint8_t port, std::uint32_t now_ms) const;
   Verdict judge(std::uint8_t port, MessageKind kind, const Datagram& datagram,
                 std::uint32_t now_ms);
   void on_host_heartbeat(Source from, const Datagram& datagram, std::uint32_t now_ms);
@@ -104,7 +120,7 @@ class Application {
   void clear();
   bool any_threshold() const;
   bool obstacle() const;
-  Refusal judge_clear(const Command& command, std::uint32_t now_ms) const;
+  Refusal judge_clear(const Command& command, std::uint32_t waited_ms, std::uint32_t now_ms) const;
   void expect_host();
   void update_outputs(std::uint32_t now_ms);
   void tell_ports();
@@ -139,6 +155,9 @@ class Application {
   PacketTracker tracker_;  // the controlling host's numbers
   PortSlot ports_[max_ports];
   std::uint8_t port_count_ = 0;
+  bool any_behind_ = false;       // one of them, perhaps
+  std::uint32_t turned_ms_ = 0;   // when the loop last turned
+  std::uint32_t went_on_ms_ = 0;  // … and when it went on after it had stood still
   BoardState reported_state_ = BoardState::connecting;
   SafeReason reported_reason_ = SafeReason::none;
   std::uint32_t obstacle_ms_ = 0;  // when there was one last

@@ -56,7 +56,7 @@ bool BoardLink::is_echo_host(const HostHeartbeat& heartbeat) const {
 }
 
 HeartbeatEffect BoardLink::begin_session(const HostHeartbeat& heartbeat, bool armed,
-                                         std::uint32_t now_ms) {
+                                         std::uint32_t at_ms) {
   // Numbers that go on are the same count, whatever else has changed: the gate does not move back.
   echo_host_ = is_echo_host(heartbeat);
   if (continues(heartbeat) && heartbeat.has_pnum) {
@@ -76,15 +76,17 @@ HeartbeatEffect BoardLink::begin_session(const HostHeartbeat& heartbeat, bool ar
   has_heartbeat_pnum_ = heartbeat.has_pnum;
   first_echo_ = heartbeat.pnum;
   marks_used_ = 0;
-  newest_echo_ms_ = now_ms - timing_.timeout_ms;
+  newest_echo_ms_ = at_ms - timing_.timeout_ms;
   state_ = BoardLinkState::active;
   send_now_ = true;
-  feed(heartbeat, now_ms);
+  feed(heartbeat, at_ms);
   return HeartbeatEffect::new_session;
 }
 
-void BoardLink::feed(const HostHeartbeat& heartbeat, std::uint32_t now_ms) {
-  fed_ms_ = now_ms;
+// `at_ms`: when it had come, at the earliest. A command that it overtook is never taken for younger
+// than it is by that, and one that came behind it, in the same backlog, has a newer number.
+void BoardLink::feed(const HostHeartbeat& heartbeat, std::uint32_t at_ms) {
+  fed_ms_ = at_ms;
   const std::uint32_t t = static_cast<std::uint32_t>(heartbeat.t);
   const bool known = is_echo(heartbeat);
   if (known && newer(t, newest_echo_ms_)) newest_echo_ms_ = t;
@@ -97,7 +99,7 @@ void BoardLink::feed(const HostHeartbeat& heartbeat, std::uint32_t now_ms) {
   // come at the earlier one, so a command is never taken for younger than it is. When the oldest
   // mark is dropped, the next is past the limit itself.
   constexpr std::uint32_t spacing_ms = late_limit_ms / (mark_count - 1) + 1;
-  if (marks_used_ != 0 && now_ms - marks_[marks_used_ - 1].at_ms < spacing_ms) {
+  if (marks_used_ != 0 && at_ms - marks_[marks_used_ - 1].at_ms < spacing_ms) {
     marks_[marks_used_ - 1].pnum = heartbeat.pnum;
     return;
   }
@@ -108,13 +110,23 @@ void BoardLink::feed(const HostHeartbeat& heartbeat, std::uint32_t now_ms) {
     for (int i = 1; i < mark_count; ++i) marks_[i - 1] = marks_[i];
     --marks_used_;
   }
-  marks_[marks_used_++] = Mark{heartbeat.pnum, now_ms};
+  marks_[marks_used_++] = Mark{heartbeat.pnum, at_ms};
 }
 
 HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uint32_t now_ms) {
   const bool continuing = continues(heartbeat);
   const bool echo_host = is_echo_host(heartbeat);
-  const Freshness freshness = judge(heartbeat, echo_host, now_ms);
+  Freshness freshness = judge(heartbeat, echo_host, now_ms);
+  std::uint32_t waited_ms = heartbeat.waited_ms;
+  if (freshness == Freshness::fresh) {  // it came after what it echoes was sent
+    const std::uint32_t echo_ms = now_ms - static_cast<std::uint32_t>(heartbeat.t);
+    if (echo_ms < waited_ms) waited_ms = echo_ms;
+  }
+  const bool timely = waited_ms < timing_.timeout_ms;
+  if (!timely) freshness = Freshness::stale;
+  // The session has been heard already, then.
+  const std::uint32_t silent_ms = now_ms - fed_ms_;
+  const std::uint32_t feeds_ms = now_ms - (waited_ms < silent_ms ? waited_ms : silent_ms);
   // Who has echoed and then knows nothing to echo has begun again, even if its numbers would fit.
   if (continuing && echo_host && armed_ && heartbeat.t == 0) begun_again_ = true;
 
@@ -122,8 +134,8 @@ HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uin
     case BoardLinkState::connecting:
       // The first word of a host. An echo host's commands wait for its echo of a T of this boot;
       // one that echoes already speaks of another boot.
-      if (echo_host && heartbeat.t != 0) return HeartbeatEffect::stale;
-      return begin_session(heartbeat, !echo_host, now_ms);
+      if (!timely || (echo_host && heartbeat.t != 0)) return HeartbeatEffect::stale;
+      return begin_session(heartbeat, !echo_host, now_ms - waited_ms);
 
     case BoardLinkState::active:
       if (heartbeat.from != owner_) return HeartbeatEffect::busy;
@@ -134,14 +146,14 @@ HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uin
           first_echo_ = heartbeat.pnum;
           spend(heartbeat.pnum);
         }
-        feed(heartbeat, now_ms);
+        feed(heartbeat, feeds_ms);
         return HeartbeatEffect::fed;
       }
       // The same place, other numbers, and an echo newer than any before: the host has restarted, or
       // it is another, since on a bus all hosts are at one place. It waits until the owner is lost.
       if (echo_host && newer(static_cast<std::uint32_t>(heartbeat.t), newest_echo_ms_) &&
           (continuing || !near_newest_heartbeat(heartbeat.pnum))) {
-        return armed_ ? HeartbeatEffect::busy : begin_session(heartbeat, true, now_ms);
+        return armed_ ? HeartbeatEffect::busy : begin_session(heartbeat, true, now_ms - waited_ms);
       }
       return HeartbeatEffect::stale;
 
@@ -150,13 +162,13 @@ HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uin
       const bool other_clock = clock_ == Clock::echo && freshness == Freshness::no_echo;
       const bool near = !heartbeat.has_pnum || heartbeat.pnum - newest_heartbeat_ <= resume_window;
       const bool same = continuing && near && armed_ && !begun_again_ && !other_clock;
-      if (!same) return begin_session(heartbeat, true, now_ms);
+      if (!same) return begin_session(heartbeat, true, now_ms - waited_ms);
       state_ = BoardLinkState::active;
       send_now_ = true;
-      newest_echo_ms_ = now_ms - timing_.timeout_ms;
+      newest_echo_ms_ = feeds_ms - timing_.timeout_ms;
       if (heartbeat.has_pnum) spend(heartbeat.pnum);  // what was sent before the outage
       numbers_in_doubt_ = !heartbeat.has_pnum;
-      feed(heartbeat, now_ms);
+      feed(heartbeat, feeds_ms);
       return HeartbeatEffect::resumed;
     }
   }

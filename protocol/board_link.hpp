@@ -42,7 +42,7 @@ enum class HeartbeatEffect : std::uint8_t {
   fed,          // the owner is alive
   resumed,      // LOST -> ACTIVE, the same session goes on
   new_session,  // the sender controls the board now; nothing of an earlier host may be restored
-  stale,        // an old echo, or overtaken by a newer heartbeat: no effect
+  stale,        // an old echo, overtaken by a newer heartbeat, or read too late: no effect
   busy,         // another host controls the board
 };
 
@@ -63,13 +63,16 @@ class BoardLink {
   explicit BoardLink(Timing timing) : timing_(timing) {}
   void set_timing(Timing timing) { timing_ = timing; }
 
-  // A host heartbeat. `pnum` and `t` count only where `has_…` says so.
+  // A host heartbeat. `pnum` and `t` count only where `has_…` says so. It came at most `waited_ms`
+  // before it is handed over, and counts from then: one that may have waited for the timeout is
+  // stale.
   struct HostHeartbeat {
     Source from;
     bool has_pnum = false;
     std::uint32_t pnum = 0;
     bool has_time = false;
     std::uint64_t t = 0;
+    std::uint32_t waited_ms = 0;
   };
   HeartbeatEffect on_heartbeat(const HostHeartbeat& heartbeat, std::uint32_t now_ms);
 
@@ -115,7 +118,8 @@ class BoardLink {
   Source owner() const { return owner_; }
   // Is it the owner, or the one that was when the link was lost?
   bool in_session(Source from) const { return has_session_ && from == owner_; }
-  // When the owner was last heard alive: a heartbeat that fed. Only after the first session began.
+  // When the owner was last heard alive: a heartbeat that fed had come then, or later. Only after the
+  // first session began.
   std::uint32_t fed_ms() const { return fed_ms_; }
   // When it is lost if it stays silent; only while ACTIVE.
   std::uint32_t deadline_ms() const { return fed_ms_ + timing_.timeout_ms; }
@@ -148,8 +152,8 @@ class BoardLink {
   bool is_echo(const HostHeartbeat& heartbeat) const;
   bool continues(const HostHeartbeat& heartbeat) const;
   bool is_echo_host(const HostHeartbeat& heartbeat) const;
-  HeartbeatEffect begin_session(const HostHeartbeat& heartbeat, bool armed, std::uint32_t now_ms);
-  void feed(const HostHeartbeat& heartbeat, std::uint32_t now_ms);
+  HeartbeatEffect begin_session(const HostHeartbeat& heartbeat, bool armed, std::uint32_t at_ms);
+  void feed(const HostHeartbeat& heartbeat, std::uint32_t at_ms);
   void lose(std::uint32_t now_ms);
   void spend(std::uint32_t pnum);
   bool near_newest_heartbeat(std::uint32_t pnum) const;
@@ -177,7 +181,7 @@ class BoardLink {
   std::uint32_t newest_echo_ms_ = 0;
   std::uint32_t fed_ms_ = 0;
 
-  // Heartbeat numbers and when they had arrived, as long back as late_limit_ms asks for.
+  // Heartbeat numbers and when they had come at the earliest, as long back as late_limit_ms asks for.
   struct Mark {
     std::uint32_t pnum;
     std::uint32_t at_ms;

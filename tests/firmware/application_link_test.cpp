@@ -90,11 +90,151 @@ TEST(ApplicationLink, SilenceCountsBeforeTheHeartbeatThatEndsIt) {
   TestHost host(board, 1);
   host.heartbeat(5);
   host.command("O:358,1,1");
-  board.now_ms += 5000;  // the board was held up: nothing was polled
+  board.now_ms += 999;  // the board was held up: nothing was polled
+  board.application->poll(board.now_ms);
+  board.now_ms += 1;
+  board.application->drained(0);
   host.heartbeat(6);
   EXPECT_EQ(board.log.states,
             (Lines{"CONNECTING none", "ACTIVE none", "SAFE link", "ACTIVE none"}));
   EXPECT_EQ(board.hal.made_safe, 2);
+}
+
+// --- a loop that stood still
+
+// A host of the paper's in control of a board whose loop turns.
+struct ApplicationStandstill : testing::Test {
+  ApplicationStandstill() {
+    host.heartbeat(5);
+    host.command("O:358,1,1");
+    board.run(500);
+    board.take();
+  }
+  // When the board became safe, after so much from now; 0: it did not within three seconds.
+  std::uint32_t safe_after() {
+    const std::uint32_t from_ms = board.now_ms;
+    board.run(3000);
+    return board.safe() ? board.log.state_ms - from_ms : 0;
+  }
+
+  TestBoard board;
+  TestHost host{board, 1};
+};
+
+TEST_F(ApplicationStandstill, AHeartbeatThatWaitedCountsFromWhenTheLoopStoodStill) {
+  board.now_ms += 300;  // nothing was polled, and it came at the beginning
+  host.heartbeat(6);
+  EXPECT_FALSE(board.safe());
+  EXPECT_EQ(safe_after(), 1000U - 300U);
+}
+
+TEST_F(ApplicationStandstill, SoItDoesBehindATurnOfTheLoop) {
+  board.now_ms += 300;
+  board.application->poll(board.now_ms);  // the timer came before what had arrived was read
+  board.run(20);
+  host.heartbeat(6);
+  EXPECT_EQ(safe_after(), 1000U - 320U);
+}
+
+TEST_F(ApplicationStandstill, AHeartbeatBehindTheBacklogCountsFromNow) {
+  board.now_ms += 300;
+  host.heartbeat(6);
+  board.application->drained(0);
+  board.run(5);
+  host.heartbeat(7);
+  EXPECT_EQ(safe_after(), 1000U);
+}
+
+TEST_F(ApplicationStandstill, APortThatCannotTellHasNoBacklogWhenTheLoopHasTurnedForAWhile) {
+  board.now_ms += 300;
+  board.run(firmware::Application::catch_up_ms);
+  host.heartbeat(6);
+  EXPECT_EQ(safe_after(), 1000U);
+}
+
+TEST_F(ApplicationStandstill, StandingStillAgainMakesNothingYounger) {
+  board.now_ms += 100;
+  board.application->poll(board.now_ms);
+  board.now_ms += 150;
+  host.heartbeat(6);
+  EXPECT_EQ(safe_after(), 1000U - 250U);
+}
+
+TEST_F(ApplicationStandstill, ALoopThatTurnsAsItShouldDoesNotStandStill) {
+  board.now_ms += firmware::Application::standstill_ms;
+  host.heartbeat(6);
+  EXPECT_EQ(safe_after(), 1000U);
+}
+
+TEST_F(ApplicationStandstill, EachPortHasABacklogOfItsOwn) {
+  TestBoard two({}, 2);
+  TestHost driver(two, 1, Source{1, 4});
+  driver.heartbeat(5);
+  driver.command("O:358,1,1");
+  two.now_ms += 300;
+  two.application->poll(two.now_ms);
+  two.application->drained(0);
+  driver.heartbeat(6);
+  const std::uint32_t read_ms = two.now_ms;
+  two.run(3000);
+  EXPECT_EQ(two.log.state_ms - read_ms, 1000U - 300U);
+  two.application->drained(2);  // there is none
+}
+
+TEST_F(ApplicationStandstill, AHeartbeatThatMayBeTooOldGivesNobodyControl) {
+  board.now_ms += 5000;
+  host.heartbeat(6);
+  EXPECT_EQ(board.log.states.back(), "SAFE link");
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(board.take(MessageKind::board_heartbeat).size(), 2U) << "it is asked for another";
+  board.application->drained(0);
+  board.run(1);
+  host.heartbeat(7);
+  EXPECT_EQ(board.log.states.back(), "ACTIVE none");
+  EXPECT_FALSE(board.safe());
+}
+
+TEST_F(ApplicationStandstill, TheGuardExpectsTheHostFromThen) {
+  board.now_ms += 300;
+  host.heartbeat(6);
+  EXPECT_FALSE(board.application->guard().tripped());
+  board.application->guard().tick(board.now_ms + 699);
+  EXPECT_FALSE(board.application->guard().tripped());
+  board.application->guard().tick(board.now_ms + 700);
+  EXPECT_EQ(board.application->guard().take(), SafeReason::link);
+}
+
+TEST_F(ApplicationStandstill, AStopAppliesAtOnceAndAClearThatNamesNoneCountsFromBefore) {
+  board.now_ms += 300;
+  board.receive("E:STOP;", Source{0, 9});
+  EXPECT_EQ(board.log.states.back(), "SAFE stop");
+  board.application->drained(0);
+  host.heartbeat(6);
+  board.run(500);
+  host.heartbeat(7);
+  board.run(300);
+  board.now_ms += 300;  // a second after the stop, but asked for sooner, perhaps
+  host.heartbeat(8);
+  host.command("E:CLEAR");
+  EXPECT_EQ(board.log.states.back(), "SAFE stop");
+  board.application->drained(0);
+  host.command("E:CLEAR");
+  EXPECT_EQ(board.log.states.back(), "ACTIVE none");
+}
+
+TEST_F(ApplicationStandstill, ACommandBehindTheHeartbeatThatWaitedIsExecuted) {
+  board.now_ms += 300;
+  host.heartbeat(6);
+  host.command("O:100,1,1");
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 100);
+}
+
+TEST_F(ApplicationStandstill, OneThatTheHeartbeatOvertookIsStale) {
+  const std::uint32_t overtaken = host.pnum++;
+  board.now_ms += 300;
+  host.heartbeat(6);
+  host.resend("O:100,1,1", overtaken);  // 300 ms behind it, perhaps
+  EXPECT_EQ(board.log.refused, (Lines{std::to_string(overtaken) + " STALE"}));
 }
 
 TEST(ApplicationLink, ACommandAfterTheSilenceComesTooLate) {

@@ -149,6 +149,7 @@ class World final : public firmware::Hal, public firmware::Observer {
       left -= step;
     }
     require(board().poll(now_ms_) <= firmware::Application::interlock_period_ms);
+    for (std::uint8_t port = 0; port < ports; ++port) board().drained(port);
     check();
   }
 

@@ -10,7 +10,8 @@ import zlib
 
 import pytest
 
-from r4_process import (PATIENCE_S, SANITIZED, Board, driving, is_link, is_state, monitor, objects, run)
+from r4_process import (PATIENCE_S, SANITIZED, Board, driving, is_link, is_state, lasts, monitor, objects,
+                        run)
 
 # The board's timeout, and what docs/safety.md promises on top.
 SAFE_WITHIN_MS = 1020
@@ -189,6 +190,32 @@ def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(b
     assert 1000 <= off_after
     assert safe['silence'] <= SAFE_WITHIN_MS or SANITIZED
     assert safe['came'] - killed <= SAFE_WITHIN_MS / 1000 + 0.05 or SANITIZED
+
+
+def test_a_heartbeat_that_waited_while_the_board_stood_still_counts_from_before(board):
+    # A host of the paper's: that its heartbeats arrive is all that the board can know.
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as host:
+        host.connect(('127.0.0.1', int(board.url.rsplit(':', 1)[1])))
+
+        def say(number, field):
+            text = f'{field};PNum:{number};T:5;^'.encode()
+            host.send(text + hex(zlib.crc32(text)).encode() + b'^')
+
+        say(1, 'H:ROS2-R4')
+        board.state('ACTIVE')
+        say(2, 'O:358,1,1')
+        board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
+        lasts(0.5)
+        board.signal(signal.SIGSTOP)
+        say(3, 'H:ROS2-R4')
+        delivered = time.monotonic()
+        lasts(0.3)
+        board.signal(signal.SIGCONT)
+        safe = board.state('SAFE', 'link')
+    after_ms = (safe['came'] - delivered) * 1000
+    print(f'SAFE {after_ms:.0f} ms after the heartbeat was delivered')
+    assert 900 < after_ms  # it did feed
+    assert after_ms <= SAFE_WITHIN_MS or SANITIZED
 
 
 def test_control_is_free_when_the_host_that_had_it_is_gone(board):

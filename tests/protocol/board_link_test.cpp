@@ -42,6 +42,15 @@ struct BoardLinkTest : testing::Test {
     send_due();
     return effect;
   }
+  // … read so late, perhaps.
+  HeartbeatEffect late(std::uint32_t waited_ms, std::uint32_t pnum, std::uint64_t t,
+                       Source from = here) {
+    BoardLink::HostHeartbeat heartbeat = numbered(pnum, t, from);
+    heartbeat.waited_ms = waited_ms;
+    const HeartbeatEffect effect = link.on_heartbeat(heartbeat, now);
+    send_due();
+    return effect;
+  }
   // As in the capture: no number.
   HeartbeatEffect numberless(std::uint64_t t, Source from = here) {
     BoardLink::HostHeartbeat heartbeat = numbered(0, t, from);
@@ -337,6 +346,60 @@ TEST_F(BoardLinkTest, TheKindOfASessionOutlastsTheWrapOfItsNumbers) {
   run(1000);
   ASSERT_EQ(link.state(), BoardLinkState::lost);
   EXPECT_EQ(heartbeat(pnum + 3, sent.back()), HeartbeatEffect::resumed);
+}
+
+// --- heartbeats that may have waited
+
+TEST_F(BoardLinkTest, AHeartbeatFeedsFromWhenItMayHaveCome) {
+  connect();
+  run(900);
+  const std::uint32_t read = now;
+  ASSERT_EQ(late(300, echo_pnum + 2, sent[sent.size() - 4]), HeartbeatEffect::fed);
+  EXPECT_EQ(link.fed_ms(), read - 300);
+  EXPECT_EQ(link.deadline_ms(), read + 700);
+  run(1000);
+  EXPECT_EQ(lost_at, read + 700);
+}
+
+TEST_F(BoardLinkTest, AnEchoCameAfterWhatItEchoes) {
+  connect();
+  run(900);
+  ASSERT_LT(now - sent.back(), 300U);
+  ASSERT_EQ(late(300, echo_pnum + 2, sent.back()), HeartbeatEffect::fed);
+  EXPECT_EQ(link.fed_ms(), sent.back());
+}
+
+TEST_F(BoardLinkTest, AHeartbeatThatWaitedMakesNothingOlder) {
+  connect();
+  run(100);
+  const std::uint32_t fed = link.fed_ms();
+  ASSERT_EQ(late(500, echo_pnum + 2, sent.front()), HeartbeatEffect::fed);
+  EXPECT_EQ(link.fed_ms(), fed);
+}
+
+TEST_F(BoardLinkTest, AHeartbeatThatMayHaveWaitedForTheTimeoutDoesNothing) {
+  EXPECT_EQ(late(1000, 1, 5), HeartbeatEffect::stale);
+  EXPECT_EQ(link.state(), BoardLinkState::connecting);
+  ASSERT_EQ(late(999, 1, 5), HeartbeatEffect::new_session);
+  EXPECT_EQ(link.deadline_ms(), now + 1);
+  run(500);
+  ASSERT_EQ(link.state(), BoardLinkState::lost);
+  EXPECT_EQ(late(1000, 2, 6), HeartbeatEffect::stale);
+  EXPECT_EQ(late(1000, 7, 6, there), HeartbeatEffect::stale);
+  EXPECT_EQ(link.state(), BoardLinkState::lost);
+  ASSERT_EQ(late(400, 2, 6), HeartbeatEffect::resumed);
+  EXPECT_EQ(link.deadline_ms(), now + 600);
+}
+
+TEST_F(BoardLinkTest, ACommandIsNoYoungerForAHeartbeatThatWaited) {
+  heartbeat(1, 5);
+  run(400);
+  late(251, 10, 6);
+  EXPECT_EQ(command(9), "STALE");
+  EXPECT_EQ(command(11), "execute");
+  run(400);
+  late(250, 20, 7);
+  EXPECT_EQ(command(19), "execute");
 }
 
 // --- paper hosts

@@ -28,62 +28,53 @@ std::string tail_of(const Report& report, std::size_t lines) {
   return text;
 }
 
-TEST(LinkSimulation, KeepsEveryPromiseUnderRandomFaults) {
-  if (std::getenv("R4_SEED") != nullptr) {
-    const Report report = World(from_environment("R4_SEED", 0), true).run();
-    fmt::print("{}", tail_of(report, report.trace.size()));
-    EXPECT_EQ(report.violation, "");
-    return;
-  }
-  const std::uint64_t schedules = from_environment("R4_SCHEDULES", 100'000);
+// Into `sum`: what happened.
+void add(Report& sum, const Report& report) {
+  sum.executed += report.executed;
+  sum.confirmed += report.confirmed;
+  sum.refused += report.refused;
+  sum.timed_out += report.timed_out;
+  sum.link_losses += report.link_losses;
+  sum.restores += report.restores;
+  sum.stops += report.stops;
+  sum.stops_confirmed += report.stops_confirmed;
+  sum.clears += report.clears;
+  sum.clears_refused += report.clears_refused;
+  sum.busy += report.busy;
+  sum.stale += report.stale;
+  sum.duplicate += report.duplicate;
+  sum.attacks += report.attacks;
+  sum.rejected += report.rejected;
+  sum.executed_signed += report.executed_signed;
+  sum.standstills += report.standstills;
+  sum.waited += report.waited;
+  sum.waited_to_feed += report.waited_to_feed;
+  sum.worst_silence_us = std::max(sum.worst_silence_us, report.worst_silence_us);
+}
+
+void replay(World::Loop loop) {
+  const Report report = World(from_environment("R4_SEED", 0), true, loop).run();
+  fmt::print("{}", tail_of(report, report.trace.size()));
+  EXPECT_EQ(report.violation, "");
+}
+
+// Runs the schedules of the seeds from 1; no promise may be broken.
+Report run_all(std::uint64_t schedules, World::Loop loop) {
   std::atomic<std::uint64_t> next{1};
   std::mutex mutex;
   Report sum;
   std::vector<std::uint64_t> failing;
   auto work = [&] {
     Report mine;
+    std::vector<std::uint64_t> mine_failing;
     for (std::uint64_t seed = next++; seed <= schedules; seed = next++) {
-      const Report report = World(seed, false).run();
-      mine.executed += report.executed;
-      mine.confirmed += report.confirmed;
-      mine.refused += report.refused;
-      mine.timed_out += report.timed_out;
-      mine.link_losses += report.link_losses;
-      mine.restores += report.restores;
-      mine.stops += report.stops;
-      mine.stops_confirmed += report.stops_confirmed;
-      mine.clears += report.clears;
-      mine.clears_refused += report.clears_refused;
-      mine.busy += report.busy;
-      mine.stale += report.stale;
-      mine.duplicate += report.duplicate;
-      mine.attacks += report.attacks;
-      mine.rejected += report.rejected;
-      mine.executed_signed += report.executed_signed;
-      mine.worst_silence_us = std::max(mine.worst_silence_us, report.worst_silence_us);
-      if (!report.violation.empty()) {
-        const std::lock_guard lock(mutex);
-        failing.push_back(seed);
-      }
+      const Report report = World(seed, false, loop).run();
+      add(mine, report);
+      if (!report.violation.empty()) mine_failing.push_back(seed);
     }
     const std::lock_guard lock(mutex);
-    sum.executed += mine.executed;
-    sum.confirmed += mine.confirmed;
-    sum.refused += mine.refused;
-    sum.timed_out += mine.timed_out;
-    sum.link_losses += mine.link_losses;
-    sum.restores += mine.restores;
-    sum.stops += mine.stops;
-    sum.stops_confirmed += mine.stops_confirmed;
-    sum.clears += mine.clears;
-    sum.clears_refused += mine.clears_refused;
-    sum.busy += mine.busy;
-    sum.stale += mine.stale;
-    sum.duplicate += mine.duplicate;
-    sum.attacks += mine.attacks;
-    sum.rejected += mine.rejected;
-    sum.executed_signed += mine.executed_signed;
-    sum.worst_silence_us = std::max(sum.worst_silence_us, mine.worst_silence_us);
+    add(sum, mine);
+    failing.insert(failing.end(), mine_failing.begin(), mine_failing.end());
   };
   std::vector<std::thread> threads;
   for (unsigned i = 0; i < std::max(1U, std::thread::hardware_concurrency()); ++i) {
@@ -96,14 +87,15 @@ TEST(LinkSimulation, KeepsEveryPromiseUnderRandomFaults) {
       "{} links lost, {} outputs restored, {} stops obeyed, {} confirmed, {} cleared, {} clears "
       "refused; answers {} BUSY, {} STALE, {} DUPLICATE; "
       "{} forged or replayed datagrams, {} rejected, {} signed commands executed; "
-      "longest silence to safe {:.1f} ms\n",
+      "{} standstills, {} datagrams waited, {} of them fed; longest silence to safe {:.1f} ms\n",
       schedules, failing.size(), sum.executed, sum.confirmed, sum.refused, sum.timed_out,
       sum.link_losses, sum.restores, sum.stops, sum.stops_confirmed, sum.clears, sum.clears_refused,
       sum.busy, sum.stale, sum.duplicate, sum.attacks, sum.rejected, sum.executed_signed,
+      sum.standstills, sum.waited, sum.waited_to_feed,
       static_cast<double>(sum.worst_silence_us) / 1000);
   std::sort(failing.begin(), failing.end());
   for (std::size_t i = 0; i < failing.size() && i < 3; ++i) {
-    const Report report = World(failing[i], true).run();
+    const Report report = World(failing[i], true, loop).run();
     ADD_FAILURE() << report.violation << "\nreplay: R4_SEED=" << failing[i]
                   << " with this test; the end of its trace:\n"
                   << tail_of(report, 60);
@@ -121,6 +113,20 @@ TEST(LinkSimulation, KeepsEveryPromiseUnderRandomFaults) {
   EXPECT_GT(sum.attacks, schedules);
   EXPECT_GT(sum.rejected, sum.attacks * 9 / 10);
   EXPECT_GT(sum.executed_signed, schedules / 10);
+  return sum;
+}
+
+TEST(LinkSimulation, KeepsEveryPromiseUnderRandomFaults) {
+  if (std::getenv("R4_SEED") != nullptr) return replay(World::Loop::turns);
+  run_all(from_environment("R4_SCHEDULES", 100'000), World::Loop::turns);
+}
+
+TEST(LinkSimulation, KeepsEveryPromiseOfABoardThatStandsStillNowAndThen) {
+  if (std::getenv("R4_SEED") != nullptr) return replay(World::Loop::stands_still);
+  const std::uint64_t schedules = from_environment("R4_SCHEDULES", 20'000);
+  const Report sum = run_all(schedules, World::Loop::stands_still);
+  EXPECT_GT(sum.standstills, schedules);
+  EXPECT_GT(sum.waited_to_feed, schedules);
 }
 
 TEST(LinkSimulation, RepeatsASeedToTheSameTrace) {
@@ -129,6 +135,8 @@ TEST(LinkSimulation, RepeatsASeedToTheSameTrace) {
     const Report second = World(seed, true).run();
     ASSERT_EQ(first.trace, second.trace) << "seed " << seed;
     ASSERT_EQ(first.trace_hash, World(seed, false).run().trace_hash) << "seed " << seed;
+    ASSERT_EQ(World(seed, true, World::Loop::stands_still).run().trace,
+              World(seed, true, World::Loop::stands_still).run().trace);
   }
 }
 

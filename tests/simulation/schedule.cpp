@@ -72,6 +72,17 @@ Schedule Schedule::random(Random& random) {
   return s;
 }
 
+void Schedule::add_standstills(Random& random) {
+  static constexpr std::uint64_t longest_us[] = {20'000, 50'000, 300'000, 800'000};
+  static constexpr std::uint64_t most_apart_us[] = {60'000, 1'000'000, 3'000'000};
+  const std::uint64_t apart_us = random.pick(most_apart_us);
+  for (std::uint64_t at_us = random.below(apart_us); at_us < duration_us;) {
+    const std::uint64_t length_us = random.between(5'000, random.pick(longest_us));
+    standstills.push_back({at_us, length_us});
+    at_us += length_us + random.between(1, apart_us);
+  }
+}
+
 const char* to_text(Happening::Kind kind) {
   switch (kind) {
     case Happening::Kind::cut:

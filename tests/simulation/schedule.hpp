@@ -43,6 +43,12 @@ struct Happening {
   int host;
 };
 
+// The board's loop does nothing for that long: what arrives waits.
+struct Standstill {
+  std::uint64_t at_us;
+  std::uint64_t length_us;
+};
+
 struct Schedule {
   std::uint64_t duration_us = 0;
   int hosts = 1;              // the second one meddles
@@ -50,6 +56,7 @@ struct Schedule {
   Settings settings;
   ChannelFaults to_board, to_host;
   std::vector<Happening> happenings;
+  std::vector<Standstill> standstills;  // one after the other
   std::uint32_t command_interval_us = 0;
   std::uint32_t command_timeout_us = 0;
   double post_share = 0;                // commands sent without asking for confirmation
@@ -59,6 +66,7 @@ struct Schedule {
   std::uint32_t attack_interval_us = 0;
 
   static Schedule random(Random& random);
+  void add_standstills(Random& random);
 };
 
 const char* to_text(Happening::Kind kind);

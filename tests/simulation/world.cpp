@@ -10,13 +10,15 @@
 
 namespace r4::simulation {
 
-World::World(std::uint64_t seed, bool keep_trace) : random_(seed), keep_trace_(keep_trace) {
+World::World(std::uint64_t seed, bool keep_trace, Loop loop)
+    : random_(seed), loop_random_(~seed), keep_trace_(keep_trace) {
   schedule_ = Schedule::random(random_);
+  if (loop == Loop::stands_still) schedule_.add_standstills(loop_random_);
   report_.seed = seed;
 }
 
 World::World(std::uint64_t seed, Schedule schedule, bool keep_trace)
-    : random_(seed), schedule_(std::move(schedule)), keep_trace_(keep_trace) {
+    : random_(seed), loop_random_(~seed), schedule_(std::move(schedule)), keep_trace_(keep_trace) {
   report_.seed = seed;
 }
 
@@ -39,6 +41,9 @@ Report World::run() {
     at(schedule_.happenings[i].at_us, Event::Kind::happening, static_cast<int>(i));
   }
   if (schedule_.attack_interval_us != 0) at(0, Event::Kind::attack, 0);
+  for (std::size_t i = 0; i < schedule_.standstills.size(); ++i) {
+    at(schedule_.standstills[i].at_us, Event::Kind::standstill, static_cast<int>(i));
+  }
   while (!events_.empty() && report_.violation.empty()) {
     const Event event = events_.top();
     if (event.at_us > schedule_.duration_us) break;
@@ -49,7 +54,13 @@ Report World::run() {
         deliver(event.index);
         break;
       case Event::Kind::board:
-        if (event.generation == board_generation_) poll_board();
+        if (event.generation == board_generation_ && !standing_) poll_board();
+        break;
+      case Event::Kind::standstill:
+        stand_still(schedule_.standstills[static_cast<std::size_t>(event.index)]);
+        break;
+      case Event::Kind::go_on:
+        if (event.generation == board_generation_) go_on();
         break;
       case Event::Kind::host:
         if (event.generation == hosts_[static_cast<std::size_t>(event.index)]->poll_generation) {

@@ -3,8 +3,9 @@
 // joined by a faulty channel in virtual time. One seed is one run, to the last byte.
 //
 // While it runs it checks the promises of docs/safety.md and stops at the first one broken:
-//   silence    outputs are live only while intact host heartbeats arrive: the last one at most
-//              timeout + 20 ms ago, and sent at most 2 timeouts + 20 ms ago
+//   silence    outputs are live only while intact heartbeats of the host in control arrive: the last
+//              one at most timeout + 20 ms ago, however long it waited to be read, and sent at most
+//              2 timeouts + 20 ms ago; or the board stands still, until its first turn
 //   once       no command is executed twice, ever, board reboots included
 //   order      never one older than the newest executed, nor one from before an executed stop
 //   intact     what is executed is what a host sent, by the host that controls the board
@@ -56,12 +57,17 @@ struct Report {
   std::uint32_t attacks = 0;   // datagrams of an attacker
   std::uint32_t rejected = 0;  // for their signatures
   std::uint32_t executed_signed = 0;
+  std::uint32_t standstills = 0;
+  std::uint32_t waited = 0;            // datagrams that arrived meanwhile
+  std::uint32_t waited_to_feed = 0;    // … and fed
   std::uint64_t worst_silence_us = 0;  // last heartbeat in to outputs safe
 };
 
 class World : public firmware::Hal, public firmware::Port, public firmware::Observer {
  public:
-  World(std::uint64_t seed, bool keep_trace);
+  enum class Loop : std::uint8_t { turns, stands_still };  // now and then
+
+  World(std::uint64_t seed, bool keep_trace, Loop loop = Loop::turns);
   // The same with a given scenario.
   World(std::uint64_t seed, Schedule schedule, bool keep_trace);
   ~World();
@@ -73,7 +79,17 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   struct Event {
     std::uint64_t at_us;
     std::uint64_t order;
-    enum class Kind : std::uint8_t { packet, board, host, command, happening, over, attack } kind;
+    enum class Kind : std::uint8_t {
+      packet,
+      board,
+      host,
+      command,
+      happening,
+      over,
+      attack,
+      standstill,
+      go_on,
+    } kind;
     int index;
     std::uint32_t generation;
     bool operator>(const Event& other) const {
@@ -90,6 +106,7 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
     std::uint32_t pnum = 0;  // of a heartbeat
     int command = -1;        // index in commands_
     std::uint64_t sent_us = 0;
+    std::uint64_t arrived_us = 0;
     std::string bytes;
   };
   // One run of a host process: numbers of different ones do not compare.
@@ -139,6 +156,8 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   // world_board.cpp, with what is overridden above
   void boot_board();
   void poll_board();
+  void stand_still(const Standstill& standstill);
+  void go_on();
   void check_silence();
   void on_stop(std::uint32_t pnum);
   // world_hosts.cpp
@@ -154,8 +173,11 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   // world_channel.cpp
   void transfer(bool to_board, int host, std::uint32_t peer, std::string_view bytes);
   void deliver(int slot);
+  void hand_over(int slot);
+  void release(int slot);
 
   Random random_;
+  Random loop_random_;  // of the standstills: what else happens is as without them
   Schedule schedule_;
   Report report_;
   bool keep_trace_;
@@ -175,6 +197,11 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   firmware::Outputs outputs_;
   bool live_ = false;
   bool was_lost_ = false;
+  bool standing_ = false;  // the loop
+  bool port_lost_meanwhile_ = false;
+  std::vector<int> waiting_;  // packets that arrived meanwhile
+  std::map<std::uint32_t, std::uint64_t>
+      heard_us_;                         // when the newest intact heartbeat of a peer came
   std::uint64_t heartbeat_in_us_ = 0;    // the newest intact one to arrive
   std::uint64_t heartbeat_sent_us_ = 0;  // when the newest to arrive was sent
   std::vector<Fed> fed_;                 // by this boot of the board

@@ -25,6 +25,9 @@ void World::boot_board() {
   outputs_ = firmware::Outputs();
   live_ = stopped_ = false;
   fed_.clear();
+  standing_ = port_lost_meanwhile_ = false;
+  for (const int slot : waiting_) release(slot);
+  waiting_.clear();
   firmware::Application::Config config;
   config.identity = Identity{Text("simulated"), Text("0"), Text("sim")};
   config.settings = schedule_.settings;
@@ -45,6 +48,31 @@ void World::poll_board() {
   const std::uint32_t wait_ms = board_->poll(board_ms());
   const std::uint64_t late_us = random_.below(schedule_.board_lateness_us + 1);
   at(now_us_ + wait_ms * 1000 + late_us, Event::Kind::board, 0, board_generation_);
+}
+
+void World::stand_still(const Standstill& standstill) {
+  note("board stands still");
+  ++report_.standstills;
+  standing_ = true;
+  at(now_us_ + standstill.length_us, Event::Kind::go_on, 0, ++board_generation_);
+}
+
+// As a process does that has several sockets: its timer may come before what has arrived is read, or
+// in the midst of it, and it may not know that it has read all.
+void World::go_on() {
+  note("board goes on");
+  standing_ = false;
+  ++board_generation_;
+  const std::vector<int> waiting = std::exchange(waiting_, {});
+  if (loop_random_.chance(0.5)) board_->poll(board_ms());
+  for (const int slot : waiting) {
+    ++report_.waited;
+    hand_over(slot);
+    if (loop_random_.chance(0.1)) board_->poll(board_ms());
+  }
+  if (std::exchange(port_lost_meanwhile_, false)) board_->port_down(0, board_ms());
+  if (loop_random_.chance(0.5)) board_->drained(0);
+  poll_board();
 }
 
 void World::sample(firmware::Inputs& inputs) {
@@ -78,11 +106,11 @@ void World::make_safe() {
 }
 
 void World::check_silence() {
-  if (!live_) return;
+  if (!live_ || standing_) return;
   const std::uint64_t timeout_us = board_->settings().timeout_ms * 1000U;
-  if (now_us_ - heartbeat_in_us_ > timeout_us + slack_us) {
-    violate(fmt::format("silence: outputs live {} us after the last heartbeat came",
-                        now_us_ - heartbeat_in_us_));
+  const std::uint64_t silent_us = now_us_ - heard_us_[board_->link().owner().peer];
+  if (silent_us > timeout_us + slack_us) {
+    violate(fmt::format("silence: outputs live {} us after the last heartbeat came", silent_us));
   }
   if (now_us_ - heartbeat_sent_us_ > 2 * timeout_us + slack_us) {
     violate(fmt::format("silence: outputs live {} us after the last heartbeat was sent",
@@ -149,9 +177,12 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
     violate(fmt::format("fresh: command {} executed {} us after it was sent", id,
                         now_us_ - sent.transmitted_us));
   }
+  const std::uint32_t unseen_ms =
+      schedule_.standstills.empty() ? 0 : firmware::Application::standstill_ms;
+  const std::uint64_t overtaken_us = (BoardLink::late_limit_ms + unseen_ms + 1) * 1000U;
   for (const Fed& fed : fed_) {
     const bool overtook = fed.from == delivering_ && newer(fed.pnum, pnum);
-    if (overtook && now_us_ - fed.at_us > BoardLink::late_limit_ms * 1000U + 1000) {
+    if (overtook && now_us_ - fed.at_us > overtaken_us) {
       violate(fmt::format("late: command {} was overtaken {} us before", id, now_us_ - fed.at_us));
       break;
     }

@@ -90,15 +90,25 @@ void World::transfer(bool to_board, int host, std::uint32_t peer, std::string_vi
 }
 
 void World::deliver(int slot) {
+  Packet& packet = packets_[static_cast<std::size_t>(slot)];
+  mix(packet.bytes.data(), packet.bytes.size());
+  packet.arrived_us = now_us_;
+  if (packet.to_board && packet.intact && packet.heartbeat) {
+    heartbeat_in_us_ = heard_us_[packet.peer] = now_us_;
+    heartbeat_sent_us_ = std::max(heartbeat_sent_us_, packet.sent_us);
+  }
+  if (packet.to_board && standing_) {
+    waiting_.push_back(slot);
+  } else {
+    hand_over(slot);
+  }
+}
+
+void World::hand_over(int slot) {
   // Receiving may transfer, and so move packets_: take the packet out first.
   Packet packet = std::move(packets_[static_cast<std::size_t>(slot)]);
-  mix(packet.bytes.data(), packet.bytes.size());
   if (packet.to_board) {
     if (keep_trace_) show(fmt::format("board receives {}", packet.bytes));
-    if (packet.intact && packet.heartbeat) {
-      heartbeat_in_us_ = now_us_;
-      heartbeat_sent_us_ = std::max(heartbeat_sent_us_, packet.sent_us);
-    }
     const std::uint32_t peer = packet.peer;
     const std::uint32_t fed_before = board_->link().fed_ms();
     delivering_ = {packet.host, packet.incarnation};
@@ -107,8 +117,9 @@ void World::deliver(int slot) {
     attacker_.on_received(packet.host, packet.bytes);
     const BoardLink& link = board_->link();
     if (packet.intact && packet.heartbeat && link.owner().peer == peer &&
-        link.fed_ms() != fed_before && link.fed_ms() == board_ms()) {
-      fed_.push_back({delivering_, packet.pnum, now_us_});
+        link.fed_ms() != fed_before) {
+      fed_.push_back({delivering_, packet.pnum, packet.arrived_us});
+      report_.waited_to_feed += packet.arrived_us != now_us_;
     }
   } else {
     Host& host = *hosts_[static_cast<std::size_t>(packet.host)];
@@ -118,7 +129,9 @@ void World::deliver(int slot) {
     }
   }
   packets_[static_cast<std::size_t>(slot)] = std::move(packet);
-  free_packets_.push_back(slot);
+  release(slot);
 }
+
+void World::release(int slot) { free_packets_.push_back(slot); }
 
 }  // namespace r4::simulation

@@ -40,7 +40,11 @@ void World::happen(const Happening& happening, bool over) {
       boot_board();
       return;
     case Happening::Kind::port_down:
-      board_->port_down(0, board_ms());
+      if (standing_) {
+        port_lost_meanwhile_ = true;
+      } else {
+        board_->port_down(0, board_ms());
+      }
       return;
     case Happening::Kind::stop:
       if (!host.alive) return;
@@ -98,7 +102,7 @@ void World::call_stopper(Host& stopper, bool over) {
 void World::attack() {
   at(now_us_ + random_.between(1, 2ULL * schedule_.attack_interval_us), Event::Kind::attack, 0);
   const Attack attack = attacker_.next(random_);
-  if (attack.bytes.empty()) return;
+  if (attack.bytes.empty() || standing_) return;
   ++report_.attacks;
   note(fmt::format("attacker at {}: {} {}", attack.host, to_text(attack.kind), attack.bytes));
   const BoardLink& link = board_->link();

@@ -20,6 +20,8 @@ void CarrierPort::on_datagram(std::string_view bytes, Peer from) {
   owner_.on_datagram(*this, from, bytes);
 }
 
+void CarrierPort::on_drained() { owner_.on_drained(*this); }
+
 void CarrierPort::on_carrier_event(const CarrierEvent& event) {
   owner_.on_carrier_event(*this, event);
 }

@@ -16,6 +16,7 @@ class CarrierPort final : public firmware::Port, private Carrier::Handler {
   class Owner {
    public:
     virtual void on_datagram(CarrierPort& port, Peer from, std::string_view bytes) = 0;
+    virtual void on_drained(CarrierPort& port) = 0;
     virtual void on_carrier_event(CarrierPort& port, const CarrierEvent& event) = 0;
 
    protected:
@@ -40,6 +41,7 @@ class CarrierPort final : public firmware::Port, private Carrier::Handler {
 
  private:
   void on_datagram(std::string_view bytes, Peer from) override;
+  void on_drained() override;
   void on_carrier_event(const CarrierEvent& event) override;
 
   std::unique_ptr<Carrier> carrier_;

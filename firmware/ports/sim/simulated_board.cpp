@@ -270,6 +270,10 @@ void SimulatedBoard::on_datagram(CarrierPort& port, Peer from, std::string_view 
   poll(now);
 }
 
+void SimulatedBoard::on_drained(CarrierPort& port) {
+  if (application_) application_->drained(port.number);
+}
+
 void SimulatedBoard::on_carrier_event(CarrierPort& port, const CarrierEvent& event) {
   if (options_.events.on_carrier) options_.events.on_carrier(now_ms(), port.carrier(), event);
   if (!application_ || event.kind != CarrierEvent::Kind::down) return;

@@ -109,6 +109,7 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   void arm(Milliseconds at);
 
   void on_datagram(CarrierPort& port, Peer from, std::string_view bytes) override;
+  void on_drained(CarrierPort& port) override;
   void on_carrier_event(CarrierPort& port, const CarrierEvent& event) override;
 
   void on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason reason) override;
