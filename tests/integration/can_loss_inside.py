@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What test_can_faults.py runs where SocketCAN is: frames lost, late and corrupt, ends that vanish.
+"""What test_can_loss.py runs where SocketCAN is: frames lost, late and corrupt, ends that vanish.
 
 netem loses and delays on the pair vxcan0, vxcan1; cangw corrupts what it carries from vcan0 to vcan1.
 """

@@ -8,7 +8,7 @@ import pathlib
 import re
 import subprocess
 
-from inside import WITH_CAN
+from inside import LONGEST_S, WITH_CAN
 from r4_process import R4
 
 CAN_TEST = pathlib.Path(os.environ.get('R4_CAN_TEST') or pathlib.Path(R4).parent / 'tests/can_test')
@@ -21,8 +21,8 @@ def test_every_test_of_can_test_is_executed_and_passes():
     count = len(re.findall(r'^  \w', listed, re.MULTILINE))
     assert count > 0
     environment = {key: value for key, value in os.environ.items() if key not in FILTERS}
-    result = subprocess.run([*WITH_CAN, '--time', '200', CAN_TEST], env=environment,
-                            stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=280,
+    result = subprocess.run([*WITH_CAN, '--time', str(LONGEST_S), CAN_TEST], env=environment,
+                            stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=LONGEST_S + 50,
                             check=False)
     print(result.stdout[-20000:])
     assert result.returncode == 0, result.stderr[-20000:]
