@@ -189,28 +189,23 @@ void add_bus(CLI::App& root, Action& chosen) {
   CLI::App* const command = add_subcommand(
       root, chosen, "bus", "The load of a CAN bus: of a planned one, or of one that is there",
       footer, options, bus);
-  CLI::Option* const url =
-      command->add_option("URL", options->url, "a real bus, such as can://can0; without: a plan")
-          ->type_name(url_type);
+  add_text(
+      *command, "URL", [options](const std::string& url) { options->url = url; },
+      "a real bus, such as can://can0; without: a plan", url_type, Need::optional);
   add_number(*command, "--boards", options->boards, 1, can_nodes, "boards on the bus (default 8)");
   add_number(*command, "--rate", options->rate, 1, 1000,
              "states a second of each board (default 100)");
-  add_fields(*command, options->fields);
-  command->get_option("--fields")
-      ->description(
-          "state fields (default DEFAULT,SAFE,CMD, as our host asks; arming adds RELAYS)");
+  add_fields(*command, options->fields,
+             "state fields (default DEFAULT,SAFE,CMD, as our host asks; arming adds RELAYS)");
   add_number(*command, "--commands", options->commands, 0, 1000,
              "commands a second to each board (default 20)");
   add_number(*command, "--bitrate", options->bit_rate, 10000, 1000000,
              "bit/s, with --fd of the nominal phase (default 1000000)");
-  command->add_flag("--fd", options->fd, "CAN FD with frames of up to 64 bytes");
+  add_flag(*command, "--fd", options->fd, "CAN FD with frames of up to 64 bytes");
   add_number(*command, "--dbitrate", options->data_bit_rate, 10000, 8000000,
              "bit/s of the data phase, with --fd (default 5000000)");
-  command->add_flag("--packed", options->packed, "the packed form (C:pack,1)");
-  for (const char* const of_plan :
-       {"--boards", "--rate", "--fields", "--commands", "--fd", "--packed"}) {
-    url->excludes(command->get_option(of_plan));
-  }
+  add_flag(*command, "--packed", options->packed, "the packed form (C:pack,1)");
+  exclude(*command, "URL", {"--boards", "--rate", "--fields", "--commands", "--fd", "--packed"});
   add_seconds(*command, "--duration", options->duration, "how long to listen to a real bus");
   add_json(*command, options->json, "print JSON, one object a line");
 }

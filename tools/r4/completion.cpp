@@ -3,6 +3,7 @@
 // behind.
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <memory>
 #include <string>
 #include <string_view>

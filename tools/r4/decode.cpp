@@ -196,9 +196,9 @@ void add_decode(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<Options>();
   CLI::App* const command = add_subcommand(
       root, chosen, "decode", "Check datagrams and show them as JSON", footer, options, decode);
-  command->add_option("FILE", options->file, "datagrams, one a line (default: standard input)")
-      ->type_name(file_type);
-  command->add_flag("--candump", options->candump, "the file is what candump printed");
+  add_text(*command, "FILE", options->file, "datagrams, one a line (default: standard input)",
+           file_type);
+  add_flag(*command, "--candump", options->candump, "the file is what candump printed");
 }
 
 }  // namespace r4::tool

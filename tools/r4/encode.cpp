@@ -140,15 +140,13 @@ void add_encode(CLI::App& root, Action& chosen) {
   CLI::App* const command =
       add_subcommand(root, chosen, "encode", "Write a datagram: fields, PNum, T and checksum",
                      footer, options, encode);
-  command
-      ->add_option("CMD", options->fields, "the fields, such as O:358,1,1 or 'AIN24:24.28;AIN12:1'")
-      ->required()
-      ->type_name("");
+  add_text(*command, "CMD", options->fields,
+           "the fields, such as O:358,1,1 or 'AIN24:24.28;AIN12:1'", "", Need::required);
   add_number(*command, "--pnum", options->pnum, 0, 0xFFFFFFFFU, "packet number (default 0)");
   add_number(*command, "--time", options->time, 0, ~std::uint64_t{0},
              "T in milliseconds (default: now, since 1970)");
-  command->add_flag("--packed", options->packed, "in the packed form of a CAN bus, as packed:HEX");
-  command->add_flag("--force", options->force, "do not check commands and their ranges");
+  add_flag(*command, "--packed", options->packed, "in the packed form of a CAN bus, as packed:HEX");
+  add_flag(*command, "--force", options->force, "do not check commands and their ranges");
 }
 
 }  // namespace r4::tool

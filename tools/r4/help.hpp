@@ -2,8 +2,11 @@
 // What `r4 --help` says besides the options: first steps, URLs, commands of the board, exit codes.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
+
+namespace CLI {
+class App;
+}  // namespace CLI
 
 namespace r4::tool {
 

@@ -92,24 +92,19 @@ void add_key_command(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<Options>();
   CLI::App* const command = add_subcommand(
       root, chosen, "key", "Make a key, and give it to a board", footer, options, keys);
-  command
-      ->add_option_function<std::string>(
-          "ACTION",
-          [options](const std::string& action) {
-            if (action != "new" && action != "give") {
-              throw Error(ErrorKind::usage, action, "is nothing to be done with a key",
-                          "use new or give");
-            }
-            options->action = action;
-          },
-          "new or give")
-      ->required()
-      ->type_name("new|give");
-  command->add_option("FILE", options->file, "the file with the key")
-      ->required()
-      ->type_name(file_type);
-  command->add_option("URL", options->url, "give: where the board is, such as serial:auto")
-      ->type_name(url_type);
+  add_text(
+      *command, "ACTION",
+      [options](const std::string& action) {
+        if (action != "new" && action != "give") {
+          throw Error(ErrorKind::usage, action, "is nothing to be done with a key",
+                      "use new or give");
+        }
+        options->action = action;
+      },
+      "new or give", "new|give", Need::required);
+  add_text(*command, "FILE", options->file, "the file with the key", file_type, Need::required);
+  add_text(*command, "URL", options->url, "give: where the board is, such as serial:auto",
+           url_type);
   add_number(*command, "--id", options->id, 1, max_key_id, "new: its id (default 1)");
 }
 

@@ -2,11 +2,15 @@
 // The file with a board's key (host/key_file.hpp), for its owner alone: how it is made and named.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <string>
 
 #include "host/board_options.hpp"
+
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
 
 namespace r4::tool {
 

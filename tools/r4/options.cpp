@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
+#include <utility>
 
 #include "host/async_board.hpp"
 #include "host/command_help.hpp"
@@ -82,6 +84,37 @@ CLI::Option* add_seconds(CLI::App& command, const std::string& name,
   return seconds(command, name, out, meaning, Zero::refused);
 }
 
+void add_text(CLI::App& command, const std::string& name, std::string& out,
+              const std::string& meaning, const char* type, Need need) {
+  command.add_option(name, out, meaning)->type_name(type)->required(need == Need::required);
+}
+void add_texts(CLI::App& command, const std::string& name, std::vector<std::string>& out,
+               const std::string& meaning, const char* type, Need need) {
+  command.add_option(name, out, meaning)->type_name(type)->required(need == Need::required);
+}
+void add_text(CLI::App& command, const std::string& name,
+              std::function<void(const std::string&)> take, const std::string& meaning,
+              const char* type, Need need) {
+  command.add_option_function<std::string>(name, std::move(take), meaning)
+      ->type_name(type)
+      ->required(need == Need::required);
+}
+void add_repeated(CLI::App& command, const std::string& name, std::vector<std::string>& out,
+                  const std::string& meaning, const char* type) {
+  command.add_option(name, out, meaning)->type_name(type)->allow_extra_args(false);
+}
+
+void add_flag(CLI::App& command, const std::string& name, bool& out, const std::string& meaning) {
+  command.add_flag(name, out, meaning);
+}
+
+void exclude(CLI::App& command, const std::string& name,
+             std::initializer_list<const char*> others) {
+  for (const char* const other : others) {
+    command.get_option(name)->excludes(command.get_option(other));
+  }
+}
+
 CLI::Option* add_number(CLI::App& command, const std::string& name, std::uint64_t& out,
                         std::uint64_t min, std::uint64_t max, const std::string& meaning) {
   return number(command, name, out, min, max, meaning);
@@ -116,7 +149,7 @@ const std::string& one_url(const std::vector<std::string>& urls) {
   return urls.front();
 }
 
-CLI::Option* add_fields(CLI::App& command, std::string& out) {
+CLI::Option* add_fields(CLI::App& command, std::string& out, const std::string& meaning) {
   return command
       .add_option_function<std::string>(
           "--fields",
@@ -129,7 +162,7 @@ CLI::Option* add_fields(CLI::App& command, std::string& out) {
             }
             out = text;
           },
-          "state fields to ask for, such as DEFAULT,ENC1,US1 or ALL")
+          meaning)
       ->type_name("NAMES");
 }
 

@@ -1,16 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Options that several subcommands share, and how their values are read. A wrong value throws
-// Error{usage} from the parsing of the command line.
+// Error{usage} from the parsing of the command line. The templates of CLI11 that make options are
+// compiled in options.cpp, once: in each subcommand they would take longer than all the rest of it.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdint>
+#include <functional>
+#include <initializer_list>
 #include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
+
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
 
 namespace r4::tool {
 
@@ -22,6 +29,25 @@ CLI::Option* add_seconds(CLI::App& command, const std::string& name, Millisecond
                          const std::string& meaning, Zero zero = Zero::refused);
 CLI::Option* add_seconds(CLI::App& command, const std::string& name,
                          std::optional<Milliseconds>& out, const std::string& meaning);
+
+// One text, or a list of them; `type` is what the help and the completion call it.
+enum class Need { optional, required };
+void add_text(CLI::App& command, const std::string& name, std::string& out,
+              const std::string& meaning, const char* type, Need need = Need::optional);
+void add_texts(CLI::App& command, const std::string& name, std::vector<std::string>& out,
+               const std::string& meaning, const char* type, Need need = Need::optional);
+// A text that `take` looks at, and throws Error{usage} if it is none of those that can be.
+void add_text(CLI::App& command, const std::string& name,
+              std::function<void(const std::string&)> take, const std::string& meaning,
+              const char* type, Need need);
+// A list of which each is given with the option's name again.
+void add_repeated(CLI::App& command, const std::string& name, std::vector<std::string>& out,
+                  const std::string& meaning, const char* type);
+
+void add_flag(CLI::App& command, const std::string& name, bool& out, const std::string& meaning);
+
+// `name` cannot be given together with one of `others`.
+void exclude(CLI::App& command, const std::string& name, std::initializer_list<const char*> others);
 
 // A whole number from `min` to `max`.
 CLI::Option* add_number(CLI::App& command, const std::string& name, std::uint64_t& out,
@@ -42,7 +68,9 @@ const std::string& one_url(const std::vector<std::string>& urls);
 bool is_url(std::string_view text);
 
 // State fields for `F`, checked.
-CLI::Option* add_fields(CLI::App& command, std::string& out);
+CLI::Option* add_fields(
+    CLI::App& command, std::string& out,
+    const std::string& meaning = "state fields to ask for, such as DEFAULT,ENC1,US1 or ALL");
 
 // What the completion scripts offer for an option's or a positional's value, by its type name.
 inline constexpr const char* url_type = "URL";

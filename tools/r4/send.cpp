@@ -263,12 +263,9 @@ void add_send(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<Options>();
   CLI::App* const command =
       add_subcommand(root, chosen, "send", "Send commands and wait until the board confirms them",
-                     footer, options, send);
-  command->footer("Commands:\n" + command_table() + "\n" + footer);
+                     "Commands:\n" + command_table() + "\n" + footer, options, send);
   add_url(*command, options->url);
-  command->add_option("CMD", options->commands, "commands, such as O:358,1,1")
-      ->required()
-      ->type_name("");
+  add_texts(*command, "CMD", options->commands, "commands, such as O:358,1,1", "", Need::required);
   add_seconds(*command, "--timeout", options->timeout,
               "how long to wait for each confirmation (default 3)");
   add_seconds(*command, "--hold", options->hold, "keep the link up that long after the last",

@@ -266,28 +266,23 @@ void add_sim(CLI::App& root, Action& chosen) {
   options->urls = {"udp://127.0.0.1:2018"};
   CLI::App* const command =
       add_subcommand(root, chosen, "sim", "Run a simulated board", footer, options, simulate);
-  command
-      ->add_option("URL", options->urls,
-                   "where it listens, up to four (default udp://127.0.0.1:2018)")
-      ->type_name(url_type);
+  add_texts(*command, "URL", options->urls,
+            "where it listens, up to four (default udp://127.0.0.1:2018)", url_type);
   add_json(*command, options->json, "print events as JSON, one object a line");
-  command->add_flag("--quiet", options->quiet, "print only where it listens");
+  add_flag(*command, "--quiet", options->quiet, "print only where it listens");
   add_seconds(*command, "--duration", options->duration, "end after that time");
   add_seconds(*command, "--sensors", options->sensors,
               "with --json: what the sensors sense, as often as that");
-  command->add_option("--script", options->script, "a scenario: what happens around the board")
-      ->type_name(file_type);
-  command->add_flag("--stdin", options->input,
-                    "read from standard input what happens around the board");
+  add_text(*command, "--script", options->script, "a scenario: what happens around the board",
+           file_type);
+  add_flag(*command, "--stdin", options->input,
+           "read from standard input what happens around the board");
   add_number(*command, "--seed", options->seed, 0, ~std::uint64_t{0},
              "the same seed gives the same clock, inputs and nonces (with a key: for tests)");
-  command
-      ->add_option("--set", options->settings,
-                   "a setting as C:KEY,VALUE makes it, such as pack,1 (can be given again)")
-      ->type_name("KEY,VALUE")
-      ->allow_extra_args(false);
-  command->add_option("--board-id", options->board_id, "its answer to Q:ID (default sim-1)")
-      ->type_name("ID");
+  add_repeated(*command, "--set", options->settings,
+               "a setting as C:KEY,VALUE makes it, such as pack,1 (can be given again)",
+               "KEY,VALUE");
+  add_text(*command, "--board-id", options->board_id, "its answer to Q:ID (default sim-1)", "ID");
 }
 
 }  // namespace r4::tool

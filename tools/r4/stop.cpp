@@ -114,8 +114,8 @@ void add_stop(CLI::App& root, Action& chosen) {
   add_seconds(*command, "--timeout", options->timeout,
               "how long to repeat it for a confirmation (default 2); it is sent in any case",
               Zero::allowed);
-  command->add_option("--key", options->key, "not needed: a board obeys a stop from anyone")
-      ->type_name(file_type);
+  add_text(*command, "--key", options->key, "not needed: a board obeys a stop from anyone",
+           file_type);
   add_json(*command, options->json, "print JSON");
 }
 

@@ -4,8 +4,13 @@
 // throws Error.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
+#include <memory>
+#include <string>
+
+namespace CLI {
+class App;
+}  // namespace CLI
 
 namespace r4::tool {
 
@@ -24,18 +29,19 @@ void add_key_command(CLI::App& root, Action& chosen);
 void add_demo(CLI::App& root, Action& chosen);
 void add_completion(CLI::App& root, Action& chosen);
 
-// A subcommand with its one-line meaning, the footer of its --help and its action. `options` lives
-// as long as the command line does.
+// A subcommand with its one-line meaning, the footer of its --help and what is to be done when the
+// command line names it.
+CLI::App* add_subcommand(CLI::App& root, const char* name, const char* meaning,
+                         const std::string& footer, std::function<void()> on_chosen);
+
+// The same, whose action is called with its options; they live as long as the command line does.
 template <class Options>
 CLI::App* add_subcommand(CLI::App& root, Action& chosen, const char* name, const char* meaning,
-                         const char* footer, std::shared_ptr<Options> options,
+                         const std::string& footer, std::shared_ptr<Options> options,
                          int (*action)(const Options&)) {
-  CLI::App* const command = root.add_subcommand(name, meaning);
-  command->group("Commands");
-  command->footer(footer);
-  command->callback(
-      [&chosen, options, action] { chosen = [options, action] { return action(*options); }; });
-  return command;
+  return add_subcommand(root, name, meaning, footer, [&chosen, options, action] {
+    chosen = [options, action] { return action(*options); };
+  });
 }
 
 }  // namespace r4::tool
