@@ -4,9 +4,7 @@
 
 #include <string>
 
-namespace CLI {
-class App;
-}  // namespace CLI
+#include "cli_fwd.hpp"
 
 namespace r4::tool {
 

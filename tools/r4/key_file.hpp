@@ -5,12 +5,8 @@
 #include <cstdint>
 #include <string>
 
+#include "cli_fwd.hpp"
 #include "host/board_options.hpp"
-
-namespace CLI {
-class App;
-class Option;
-}  // namespace CLI
 
 namespace r4::tool {
 

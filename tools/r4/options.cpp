@@ -5,7 +5,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <utility>
 
 #include "host/async_board.hpp"
 #include "host/command_help.hpp"
@@ -93,9 +92,9 @@ void add_texts(CLI::App& command, const std::string& name, std::vector<std::stri
   command.add_option(name, out, meaning)->type_name(type)->required(need == Need::required);
 }
 void add_text(CLI::App& command, const std::string& name,
-              std::function<void(const std::string&)> take, const std::string& meaning,
+              const std::function<void(const std::string&)>& take, const std::string& meaning,
               const char* type, Need need) {
-  command.add_option_function<std::string>(name, std::move(take), meaning)
+  command.add_option_function<std::string>(name, take, meaning)
       ->type_name(type)
       ->required(need == Need::required);
 }

@@ -14,10 +14,7 @@
 #include <string_view>
 #include <vector>
 
-namespace CLI {
-class App;
-class Option;
-}  // namespace CLI
+#include "cli_fwd.hpp"
 
 namespace r4::tool {
 
@@ -38,7 +35,7 @@ void add_texts(CLI::App& command, const std::string& name, std::vector<std::stri
                const std::string& meaning, const char* type, Need need = Need::optional);
 // A text that `take` looks at, and throws Error{usage} if it is none of those that can be.
 void add_text(CLI::App& command, const std::string& name,
-              std::function<void(const std::string&)> take, const std::string& meaning,
+              const std::function<void(const std::string&)>& take, const std::string& meaning,
               const char* type, Need need);
 // A list of which each is given with the option's name again.
 void add_repeated(CLI::App& command, const std::string& name, std::vector<std::string>& out,

@@ -8,9 +8,7 @@
 #include <memory>
 #include <string>
 
-namespace CLI {
-class App;
-}  // namespace CLI
+#include "cli_fwd.hpp"
 
 namespace r4::tool {
 
