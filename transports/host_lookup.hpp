@@ -30,7 +30,7 @@ struct HostLookup {
   static FoundHost ask_system(const std::string& host);
 
   Resolve resolve = ask_system;
-  std::chrono::milliseconds patience{5000};  // wait() for an answer
+  std::chrono::milliseconds patience{5000};  // find() waits for an answer
   std::chrono::milliseconds retry{1000};     // ask again where there is none
   std::chrono::milliseconds silence{3000};   // look again when nothing was heard for so long
 

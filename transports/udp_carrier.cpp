@@ -50,15 +50,6 @@ std::string bracketed(const std::string& host) {
   return host.find(':') == std::string::npos ? host : "[" + host + "]";
 }
 
-// 0 if the system knows a way to that address, else errno. Sends nothing.
-int probe_route(const Endpoint& to) {
-  const int probe = ::socket(to.protocol().family(), SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (probe < 0) return errno;
-  const int error = ::connect(probe, to.data(), static_cast<socklen_t>(to.size())) == 0 ? 0 : errno;
-  ::close(probe);
-  return error;
-}
-
 // 0 if the system has taken it, else errno.
 int send_packet(int socket, std::string_view bytes, const Endpoint& to) {
   ssize_t sent = 0;

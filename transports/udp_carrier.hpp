@@ -8,15 +8,16 @@
 //     board   udp://BIND[:2018][?peer=HOST[:2390]]   port 0 takes any free port; name() tells it
 //
 // A board knows the last 16 hosts that sent a valid datagram, and the one in control in any case.
-// A board with a peer sends to it what is for everyone; one without sends that to the host in control,
-// else to the one heard last. An answer goes to where the question came from. The paper's Python client asks from a port
-// at which it does not listen, so an answer to another port of the peer's address goes to the peer
-// as well.
+// A board with a peer sends to it what is for everyone; one without sends that to the host in
+// control, else to the one heard last. An answer goes to where the question came from. The paper's
+// Python client asks from a port at which it does not listen, so an answer to another port of the
+// peer's address goes to the peer as well.
 //
 // A name is looked up in open(), IPv4 first. A host's open() within a handler of the loop does not
 // wait for that: it is `down` until the name is known, asked for each second. A host that has heard
-// nothing valid for 3 to 6 s looks again, and goes to where the board is then. A board that is off (port unreachable) is a quiet
-// board, no failure; an unreachable network is: `down`, tried again five times a second.
+// nothing valid for 3 to 6 s looks again, and goes to where the board is then. A board that is off
+// (port unreachable) is a quiet board, no failure; an unreachable network is: `down`, tried again
+// five times a second.
 #pragma once
 
 #include <asio/io_context.hpp>

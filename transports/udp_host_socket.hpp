@@ -37,7 +37,7 @@ class UdpHostSocket {
 
   // Connected: the kernel has chosen the address that it sends from, which may be gone.
   bool connected() const { return connected_; }
-  // Has it chosen again, if it has. 0, or errno.
+  // Has it chosen again, if it has. 0, or errno: there is no way to the board, and nothing is changed.
   int reconnect();
 
   // Does the board send from there?
@@ -55,5 +55,8 @@ class UdpHostSocket {
   // Another board of this program is, or was, at this one's address: they differ by their port.
   std::atomic<bool> neighbours_{false};
 };
+
+// 0 if the system knows a way to that address, else errno. Sends nothing.
+int probe_route(const UdpHostSocket::Endpoint& to);
 
 }  // namespace r4

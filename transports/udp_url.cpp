@@ -16,8 +16,9 @@ UdpUrl::UdpUrl(const Url& url, Role role)
   }
   if (role == Role::host) {
     url.allow_only("listen");
-    if (port == 0)
+    if (port == 0) {
       throw Error(ErrorKind::usage, text, "port 0 is no board's", "the board's is 2018");
+    }
     return;
   }
   url.allow_only("peer");

@@ -113,8 +113,15 @@ TEST_F(ApplicationSafety, AStopOfAnotherProgramAtTheOwnersPlaceSpendsNoneOfItsNu
   board.log.refused.clear();
   host.resend("O:1,1,1", executed);
   EXPECT_EQ(board.log.refused, Lines{std::to_string(executed) + " DUPLICATE"});
-  clear();
+  // A command that has been on its way for long comes after the E:CLEAR, and stays out.
+  const std::uint32_t under_way = host.pnum++;
+  const std::uint32_t cleared = clear();
   EXPECT_EQ(board.state(), BoardState::active);
+  board.log.refused.clear();
+  host.resend("O:500,1,1", under_way);
+  EXPECT_EQ(board.log.refused, Lines{std::to_string(under_way) + " STALE"});
+  EXPECT_EQ(board.application->link().last_executed(), cleared);
+  EXPECT_TRUE(board.safe());
 }
 
 TEST_F(ApplicationSafety, AStopIsAnsweredToEveryoneAndToWhoAsked) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "transports/udp_carrier.hpp"
 
+#include <arpa/inet.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <net/if.h>
 #include <netinet/in.h>
@@ -244,17 +246,21 @@ TEST_F(UdpCarrierTest, TakesWhoeverSendsNoDatagramForNobody) {
   EXPECT_EQ(stranger.receive(), "");
 }
 
-TEST_F(UdpCarrierTest, SendsForEveryoneToTheHostInControlAndToNoStranger) {
+TEST_F(UdpCarrierTest, SendsForEveryoneToTheHostInControlAlthoughAnotherWasHeardLast) {
   open_board();
   Socket owner(io, "127.0.0.1");
   Socket stranger(io, "127.0.0.1");
   owner.send(valid("owner"), port_of(*board));
-  ASSERT_TRUE(wait_for(at_board, valid("owner")));
-  board->hold(at_board.datagrams[0].from);
   stranger.send(valid("stranger"), port_of(*board));
   ASSERT_TRUE(wait_for(at_board, valid("stranger")));
+  board->hold(at_board.datagrams[0].from);
   board->send("state", Priority::state);
   EXPECT_TRUE(run_until(io, [&] { return owner.receive() == "state"; }));
+
+  stranger.send(valid("later"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("later")));
+  board->send("another state", Priority::state);
+  EXPECT_TRUE(run_until(io, [&] { return owner.receive() == "another state"; }));
   EXPECT_EQ(stranger.receive(), "");
 
   board->hold(everyone);  // it has gone
@@ -263,18 +269,6 @@ TEST_F(UdpCarrierTest, SendsForEveryoneToTheHostInControlAndToNoStranger) {
   board->send("for anybody", Priority::state);
   EXPECT_TRUE(run_until(io, [&] { return stranger.receive() == "for anybody"; }));
   EXPECT_EQ(owner.receive(), "");
-}
-
-TEST_F(UdpCarrierTest, SendsForEveryoneToTheHostInControlThatWasNotHeardLast) {
-  open_board();
-  Socket owner(io, "127.0.0.1");
-  Socket stranger(io, "127.0.0.1");
-  owner.send(valid("owner"), port_of(*board));
-  stranger.send(valid("stranger"), port_of(*board));
-  ASSERT_TRUE(wait_for(at_board, valid("stranger")));
-  board->hold(at_board.datagrams[0].from);
-  board->send("state", Priority::state);
-  EXPECT_TRUE(run_until(io, [&] { return owner.receive() == "state"; }));
 }
 
 TEST_F(UdpCarrierTest, SaysThatThePortIsInUse) {
@@ -591,23 +585,29 @@ TEST_F(UdpTwoBoardsTest, OpenAndCloseInThreadsOfTheirOwn) {
   EXPECT_EQ(second.get(), 100);
 }
 
-// Gives the loopback interface of a network of our own its address, or takes it away.
-bool set_loopback(bool on) {
+// In a child process only, because a process cannot come back from there.
+bool enter_a_network_of_our_own() {
+  return ::unshare(CLONE_NEWNET) == 0 || ::unshare(CLONE_NEWUSER | CLONE_NEWNET) == 0;
+}
+
+// Gives an interface of that network, the loopback or an alias of it, an address, or takes it away.
+bool set_address(const char* interface, const char* dotted) {
   const FileDescriptor control(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   ifreq request{};
   std::snprintf(request.ifr_name, sizeof request.ifr_name, "lo");
   request.ifr_flags = IFF_UP;
   if (::ioctl(control.get(), SIOCSIFFLAGS, &request) != 0) return false;
+  std::snprintf(request.ifr_name, sizeof request.ifr_name, "%s", interface);
   sockaddr_in address{};
   address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(on ? INADDR_LOOPBACK : INADDR_ANY);
+  ::inet_pton(AF_INET, dotted, &address.sin_addr);
   std::memcpy(&request.ifr_addr, &address, sizeof address);
   return ::ioctl(control.get(), SIOCSIFADDR, &request) == 0;
 }
+bool set_loopback(bool on) { return set_address("lo", on ? "127.0.0.1" : "0.0.0.0"); }
 
-// In a child process, because a process cannot come back from a network of its own.
 int lose_and_regain_the_network() {
-  if (::unshare(CLONE_NEWNET) != 0 && ::unshare(CLONE_NEWUSER | CLONE_NEWNET) != 0) return 10;
+  if (!enter_a_network_of_our_own()) return 10;
   asio::io_context io;
   Recorder at_board, at_host;
   const std::string url = "udp://127.0.0.1:20180";
@@ -641,6 +641,47 @@ int lose_and_regain_the_network() {
 
 TEST(UdpNetwork, IsReportedWhenLostAndComesBackByItself) {
   EXPECT_EQ(run_in_child(lose_and_regain_the_network), 0);
+}
+
+// Two boards at one port of the host, and the second's network is lost for half a second.
+int lose_the_network_of_the_second() {
+  constexpr const char* second_interface = "lo:1";
+  constexpr const char* second_address = "10.9.0.1";
+  if (!enter_a_network_of_our_own() || !set_loopback(true)) return 10;
+  if (!set_address(second_interface, second_address)) return 11;
+  asio::io_context io;
+  Recorder at_board[2], at_host[2];
+  std::unique_ptr<Carrier> board[2], host[2];
+  for (const std::size_t which : {0U, 1U}) {
+    const std::string url =
+        fmt::format("udp://{}:20180", which == 0 ? "127.0.0.1" : second_address);
+    board[which] = open_carrier(io, url, Role::board, at_board[which]);
+    host[which] = open_carrier(io, url, Role::host, at_host[which]);
+    at_board[which].then = [&board, which](const Recorder::Datagram& asked) {
+      board[which]->send(asked.text, Priority::normal, asked.from);
+    };
+  }
+  const auto answers = [&](std::size_t which, const std::string& text) {
+    host[which]->send(valid(text), Priority::normal);
+    return run_until(io, [&] { return at_host[which].has(valid(text)); });
+  };
+  if (!answers(0, "both") || !answers(1, "both")) return 12;
+
+  if (!set_address(second_interface, "0.0.0.0")) return 13;
+  if (host[1]->send("into the void", Priority::normal) != SendResult::down) return 14;
+  const auto lost = Clock::now();
+  for (int i = 0; Clock::now() - lost < std::chrono::milliseconds(500); ++i) {
+    if (!answers(0, std::to_string(i))) return 15;
+  }
+  if (host[1]->up() || host[1]->counters().rx_foreign != 0) return 16;
+
+  if (!set_address(second_interface, second_address)) return 17;
+  if (!run_until(io, [&] { return host[1]->up(); })) return 18;
+  return answers(0, "again") && answers(1, "again") ? 0 : 19;
+}
+
+TEST(UdpNetwork, OfASecondBoardIsLostAndTheFirstIsHeardAllTheWhile) {
+  EXPECT_EQ(run_in_child(lose_the_network_of_the_second), 0);
 }
 
 }  // namespace
