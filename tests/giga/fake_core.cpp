@@ -265,7 +265,7 @@ int USBSerial::read() {
   if (packets.empty()) return -1;
   const int byte = static_cast<unsigned char>(packets.front().front());
   packets.front().erase(0, 1);
-  if (packets.front().empty()) packets.erase(packets.begin());
+  if (packets.front().empty()) packets.pop_front();
   return byte;
 }
 void USBSerial::send_nb(std::uint8_t* buffer, std::uint32_t size, std::uint32_t* actual, bool) {

@@ -145,7 +145,7 @@ class Giga {
   bool usb_reads = true;  // the host's program reads
   std::string usb_host;   // what it has read, and not taken yet
   void usb_send(const std::string& bytes);
-  std::vector<std::string> usb_packets;  // to the board
+  std::deque<std::string> usb_packets;  // to the board
   struct UsbPacket {
     std::uint32_t size;
     std::uint64_t at_ms;

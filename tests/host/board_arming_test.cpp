@@ -58,7 +58,7 @@ TEST(BoardArming, AStreamDoesNotDriveOffAfterAStopThatSomebodyElseClears) {
   EXPECT_EQ(stream.later(), PostResult::sent);
   EXPECT_EQ(driven(board), 500);
   Board(simulated.url()).stop();
-  ASSERT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::stop));
+  ASSERT_TRUE(hears_of(board, SafeReason::stop));
   board.clear();
   board.wait_active();
   EXPECT_EQ(stream.later(), PostResult::not_armed);

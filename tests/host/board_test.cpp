@@ -206,7 +206,7 @@ TEST(Board, SaysThatAnotherHostControlsTheBoard) {
   EXPECT_TRUE(other.link().busy);
 
   other.stop();  // which anyone may
-  EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::stop));
+  EXPECT_TRUE(hears_of(owner, SafeReason::stop));
   owner.clear();
   owner.close();
   ASSERT_NO_THROW(other.wait_active(5s)) << "control is free once the owner is silent";

@@ -74,4 +74,11 @@ bool BoardInAThread::wait_for(firmware::BoardState state, SafeReason reason) {
                            [&] { return state_ == state && reason_ == reason; });
 }
 
+bool hears_of(const Board& host, SafeReason reason) {
+  using Clock = std::chrono::steady_clock;
+  const auto end = Clock::now() + std::chrono::seconds{5};
+  while (host.link().reason != reason && Clock::now() < end) std::this_thread::yield();
+  return host.link().reason == reason;
+}
+
 }  // namespace r4::test

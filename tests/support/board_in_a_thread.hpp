@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "firmware/ports/sim/simulated_board.hpp"
+#include "host/board.hpp"
 
 namespace r4::test {
 
@@ -48,5 +49,9 @@ class BoardInAThread {
   std::unique_ptr<sim::SimulatedBoard> board_;
   std::thread thread_;
 };
+
+// Waits until a host has heard that its board is safe for that reason; false after 5 s. What it
+// asks before may be cancelled by the news.
+bool hears_of(const Board& host, SafeReason reason);
 
 }  // namespace r4::test
