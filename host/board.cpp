@@ -305,11 +305,11 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
 
   // Waits until `arrived` (asked under the lock) is true. False if it was not in time.
   template <class Predicate>
-  bool wait_for_news(std::string_view what, Duration timeout, Predicate arrived) {
-    must_not_be_in_loop(what);
+  bool wait_for_news(Duration timeout, Predicate arrived) {
+    if (in_loop()) must_not_be_in_loop(name_now());
     std::unique_lock lock(mutex);
     const bool woken = news.wait_for(lock, bounded(timeout), [&] { return closed || arrived(); });
-    if (closed) throw closed_error(what);
+    if (closed) throw closed_error(name);
     return woken;
   }
 
@@ -394,7 +394,7 @@ void Board::close() { impl_->close(); }
 void Board::wait_active(Duration timeout) {
   require_wait("wait_active()", timeout);
   const auto impl = impl_;
-  const bool active = impl->wait_for_news(impl->name_now(), timeout, [&] {
+  const bool active = impl->wait_for_news(timeout, [&] {
     return impl->link.state == HostLinkState::active && impl->in_control && !impl->link.gated;
   });
   if (!active) throw Error(explain(impl->name_now(), impl->link_now()));
@@ -484,7 +484,7 @@ ReceivedState Board::next_state(Duration timeout) {
   require_timeout("next_state()", timeout);
   const auto impl = impl_;
   const std::uint64_t seen = impl->states_now();
-  if (!impl->wait_for_news(impl->name_now(), timeout, [&] { return impl->states != seen; })) {
+  if (!impl->wait_for_news(timeout, [&] { return impl->states != seen; })) {
     Problem problem = explain(impl->name_now(), impl->link_now());
     problem.reason = "no state came in time: " + problem.reason;
     throw Error(std::move(problem));

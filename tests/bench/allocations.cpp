@@ -8,16 +8,22 @@
 namespace {
 
 std::atomic<std::uint64_t> count{0};
+thread_local std::uint64_t count_of_this_thread = 0;
+
+void add_one() {
+  count.fetch_add(1, std::memory_order_relaxed);
+  ++count_of_this_thread;
+}
 
 void* allocate(std::size_t size) {
-  count.fetch_add(1, std::memory_order_relaxed);
+  add_one();
   void* const memory = std::malloc(size == 0 ? 1 : size);
   if (memory == nullptr) throw std::bad_alloc();
   return memory;
 }
 
 void* allocate(std::size_t size, std::align_val_t alignment) {
-  count.fetch_add(1, std::memory_order_relaxed);
+  add_one();
   const auto align = static_cast<std::size_t>(alignment);
   void* const memory = std::aligned_alloc(align, (size + align - 1) / align * align);
   if (memory == nullptr) throw std::bad_alloc();
@@ -39,5 +45,6 @@ void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std
 namespace r4::bench {
 
 std::uint64_t allocations() { return count.load(std::memory_order_relaxed); }
+std::uint64_t allocations_of_this_thread() { return count_of_this_thread; }
 
 }  // namespace r4::bench

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Counts what goes through the global operator new, for benchmarks that promise to allocate
-// nothing.
+// Counts what goes through the global operator new, for benchmarks and tests of what promises to
+// allocate nothing.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +9,8 @@ namespace r4::bench {
 
 // Calls of operator new in this process so far, all threads.
 std::uint64_t allocations();
+// Those of the thread that asks.
+std::uint64_t allocations_of_this_thread();
 
 // How many of them a call of `work` costs, on average.
 template <class Work>

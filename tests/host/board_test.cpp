@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "host/command_help.hpp"
+#include "tests/bench/allocations.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
 #include "tests/support/every_channel.hpp"
@@ -210,6 +211,19 @@ TEST(Board, SaysThatAnotherHostControlsTheBoard) {
   owner.clear();
   owner.close();
   ASSERT_NO_THROW(other.wait_active(5s)) << "control is free once the owner is silent";
+}
+
+TEST(Board, PostsAndWaitsForStatesWithoutTheHeap) {
+  BoardInAThread simulated("udp");
+  Board board(simulated.url(), at_will());
+  board.wait_active();
+  board.osmc(1).set(1, Direction::forward);
+  const std::uint64_t before = bench::allocations_of_this_thread();
+  for (int i = 0; i < 20; ++i) {
+    board.post(Command::osmc(100 + i, Direction::forward, 1));
+    board.next_state();
+  }
+  EXPECT_EQ(bench::allocations_of_this_thread() - before, 0U);
 }
 
 // --- commands

@@ -1,36 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// No heap for a datagram: each carrier exchanges datagrams while every `new` of this program is
-// counted.
+// No heap for a datagram: each carrier exchanges datagrams while every `new` is counted.
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstdlib>
-#include <new>
-
 #include "recorder.hpp"
+#include "tests/bench/allocations.hpp"
 #include "tests/support/datagrams.hpp"
 #include "transports/memory_carrier.hpp"
-
-namespace {
-
-std::atomic<std::size_t> allocations{0};  // other tests have threads
-
-void* allocate(std::size_t size) {
-  allocations.fetch_add(1, std::memory_order_relaxed);
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-
-}  // namespace
-
-// Not inlined: where gcc sees through one of a pair only, it takes them for mismatched.
-#define R4_OPAQUE [[gnu::noinline]]
-R4_OPAQUE void* operator new(std::size_t size) { return allocate(size); }
-R4_OPAQUE void* operator new[](std::size_t size) { return allocate(size); }
-R4_OPAQUE void operator delete(void* memory) noexcept { std::free(memory); }
-R4_OPAQUE void operator delete[](void* memory) noexcept { std::free(memory); }
-R4_OPAQUE void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-R4_OPAQUE void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace r4::test {
 namespace {
@@ -49,19 +24,19 @@ class Player final : public Carrier::Handler {
   int received = 0;
 };
 
-std::size_t allocations_of_1000_rounds(asio::io_context& io, Carrier& board, Carrier& host,
-                                       Player& at_board, Player& at_host) {
+std::uint64_t allocations_of_1000_rounds(asio::io_context& io, Carrier& board, Carrier& host,
+                                         Player& at_board, Player& at_host) {
   at_board.carrier = &board;
   at_host.carrier = &host;
   EXPECT_TRUE(run_until(io, [&] { return board.up() && host.up(); }));
   host.send(captured_state(), Priority::normal);
   EXPECT_TRUE(run_until(io, [&] { return at_host.received >= 100; }));
-  const std::size_t before = allocations;
+  const std::uint64_t before = bench::allocations_of_this_thread();
   EXPECT_TRUE(run_until(io, [&] { return at_host.received >= 1100; }));
-  return allocations - before;
+  return bench::allocations_of_this_thread() - before;
 }
 
-std::size_t allocations_over(const std::string& board_url, const std::string& host_scheme) {
+std::uint64_t allocations_over(const std::string& board_url, const std::string& host_scheme) {
   asio::io_context io;
   Player at_board, at_host;
   const auto board = Registry::standard().make(io, board_url, Role::board);
