@@ -65,8 +65,8 @@ void BoardHardware::make_safe() {
   }
   busy_ = true;
   drive_safe();
-  look_for_trouble();
-  if (nested) return;
+  if (nested) return;  // whom it came into looks for trouble, and knows what was cut short
+  if (!interrupted_) look_for_trouble();
   leave();
 }
 

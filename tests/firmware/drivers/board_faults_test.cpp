@@ -104,6 +104,33 @@ TEST(BoardHardware, MayBeMadeSafeWhileItIsBeingMadeSafe) {
     };
     bench.hardware.make_safe();
     EXPECT_TRUE(bench.board.pins().is_safe()) << at;
+    EXPECT_FALSE(bench.hardware.fault().any())
+        << "what was cut short is no trouble of transfer " << at;
+    bench.run(150);
+    EXPECT_TRUE(bench.hardware.ready() && !bench.hardware.fault().any()) << at;
+  }
+}
+
+// As where a host repeats its stop: the interrupt of the next cuts into what follows the first.
+TEST(BoardHardware, MayBeMadeSafeAgainWhileAnInterruptMakesItSafe) {
+  for (int at = 0; at < 7; ++at) {
+    for (int again = 0; again < 14; ++again) {
+      Bench bench;
+      bench.boot();
+      bench.apply(full());
+      int times = 0;
+      bench.line.after = at;
+      bench.line.what = [&] {
+        if (++times == 1) bench.line.after = again;
+        bench.hardware.make_safe();
+      };
+      bench.hardware.make_safe();
+      EXPECT_EQ(times, 2) << at << ' ' << again;
+      EXPECT_TRUE(bench.board.pins().is_safe()) << at << ' ' << again;
+      EXPECT_FALSE(bench.hardware.fault().any()) << at << ' ' << again;
+      bench.run(150);
+      EXPECT_TRUE(bench.hardware.ready() && !bench.hardware.fault().any()) << at << ' ' << again;
+    }
   }
 }
 
