@@ -15,26 +15,33 @@ void add_one() {
   ++count_of_this_thread;
 }
 
+// nullptr: there is no memory.
 void* allocate(std::size_t size) {
   add_one();
-  void* const memory = std::malloc(size == 0 ? 1 : size);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
+  return std::malloc(size == 0 ? 1 : size);
 }
 
 void* allocate(std::size_t size, std::align_val_t alignment) {
   add_one();
   const auto align = static_cast<std::size_t>(alignment);
-  void* const memory = std::aligned_alloc(align, (size + align - 1) / align * align);
+  return std::aligned_alloc(align, (size + align - 1) / align * align);
+}
+
+void* or_throw(void* memory) {
   if (memory == nullptr) throw std::bad_alloc();
   return memory;
 }
 
 }  // namespace
 
-// The array and nothrow forms of the standard library call these.
-void* operator new(std::size_t size) { return allocate(size); }
+// The array forms of the standard library call these. Its nothrow forms do, too, but those of the
+// sanitizers do not, and what they gave out would come back here.
+void* operator new(std::size_t size) { return or_throw(allocate(size)); }
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept { return allocate(size); }
 void* operator new(std::size_t size, std::align_val_t alignment) {
+  return or_throw(allocate(size, alignment));
+}
+void* operator new(std::size_t size, std::align_val_t alignment, const std::nothrow_t&) noexcept {
   return allocate(size, alignment);
 }
 void operator delete(void* memory) noexcept { std::free(memory); }
