@@ -306,7 +306,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   // Waits until `arrived` (asked under the lock) is true. False if it was not in time.
   template <class Predicate>
   bool wait_for_news(Duration timeout, Predicate arrived) {
-    if (in_loop()) must_not_be_in_loop(name_now());
+    if (in_loop()) must_not_be_in_loop(name_now());  // a copy, which may need the heap
     std::unique_lock lock(mutex);
     const bool woken = news.wait_for(lock, bounded(timeout), [&] { return closed || arrived(); });
     if (closed) throw closed_error(name);

@@ -37,7 +37,7 @@ class UdpHostSocket {
 
   // Connected: the kernel has chosen the address that it sends from, which may be gone.
   bool connected() const { return connected_; }
-  // Has it chosen again, if it has. 0, or errno: there is no way to the board, and nothing is changed.
+  // Has it chosen again, if it has. 0, or errno. Without a way to the board it stays as it is.
   int reconnect();
 
   // Does the board send from there?

@@ -218,12 +218,14 @@ TEST(Board, PostsAndWaitsForStatesWithoutTheHeap) {
   Board board(simulated.url(), at_will());
   board.wait_active();
   board.osmc(1).set(1, Direction::forward);
+  int sent = 0;
   const std::uint64_t before = bench::allocations_of_this_thread();
   for (int i = 0; i < 20; ++i) {
-    board.post(Command::osmc(100 + i, Direction::forward, 1));
+    if (board.post(Command::osmc(100 + i, Direction::forward, 1))) ++sent;
     board.next_state();
   }
   EXPECT_EQ(bench::allocations_of_this_thread() - before, 0U);
+  EXPECT_EQ(sent, 20);
 }
 
 // --- commands

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Our ISO-TP engine against the kernel's and can-utils', on vcan0: can_test inside tools/with-can.
 
-A run in which a test was not executed fails.
+A run in which a test was not executed fails; under a sanitizer, one of those that TESTS names.
 """
 import os
 import pathlib
