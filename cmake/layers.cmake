@@ -14,7 +14,7 @@ function(r4_warnings target)
                          $<$<BOOL:${R4_WERROR}>:-Werror>)
 endfunction()
 
-# Host code: C++20, the tree's root on the include path ("protocol/crc32.hpp").
+# Host code: C++20, the tree's root on the include path ("protocol/datagram/crc32.hpp").
 function(r4_host_code target)
   r4_warnings(${target})
   target_compile_features(${target} PRIVATE cxx_std_20)

@@ -24,7 +24,7 @@ install(TARGETS r4link EXPORT r4link-targets ARCHIVE DESTINATION ${CMAKE_INSTALL
 install(DIRECTORY protocol transports firmware host
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/r4link
         FILES_MATCHING PATTERN "*.hpp" PATTERN "firmware/ports/giga" EXCLUDE
-        PATTERN "firmware/ports/mps2" EXCLUDE)
+        PATTERN "firmware/ports/m7" EXCLUDE)
 install(EXPORT r4link-targets NAMESPACE r4link::
         DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/r4link)
 

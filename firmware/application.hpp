@@ -17,9 +17,9 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "../protocol/authentication.hpp"
-#include "../protocol/board_link.hpp"
-#include "../protocol/message.hpp"
+#include "../protocol/keys/authentication.hpp"
+#include "../protocol/link/board_link.hpp"
+#include "../protocol/messages/message.hpp"
 #include "executor.hpp"
 #include "guard.hpp"
 #include "hal.hpp"

@@ -29,7 +29,7 @@ std::uint32_t& Application::number_for(Source to) {
 
 void Application::answer(Source to, DatagramWriter& writer, std::uint32_t now_ms) {
   const Text datagram = writer.finish(number_for(to)++, now_ms);
-  if (!datagram.empty()) ports_[to.port].port->send(datagram, Urgency::normal, to.peer);
+  if (!datagram.empty()) ports_[to.port].port->send(datagram, Priority::normal, to.peer);
 }
 
 void Application::identify(Source to, std::uint32_t now_ms) {
@@ -95,7 +95,7 @@ void Application::send_heartbeat(std::uint8_t port, std::uint32_t peer, bool asi
     if (pnum == 0 && !nonce.empty()) ++pnum;  // that would say CONNECTING
     heartbeat = write_board_heartbeat(buffer, sizeof buffer, pnum++, t_ms, safe, nonce);
   }
-  slot.port->send(heartbeat, Urgency::normal, peer);
+  slot.port->send(heartbeat, Priority::normal, peer);
 }
 
 void Application::send_states(std::uint32_t now_ms) {
@@ -140,7 +140,7 @@ void Application::send_part(std::uint8_t port, DatagramWriter& writer, const Sta
     write_field(writer, StateField::fault, state);
   }
   PortSlot& slot = ports_[port];
-  slot.port->send(writer.finish(slot.next_pnum++, t_ms), Urgency::state, audience(port));
+  slot.port->send(writer.finish(slot.next_pnum++, t_ms), Priority::state, audience(port));
 }
 
 void Application::fill(State& state) const {

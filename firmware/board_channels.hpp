@@ -13,7 +13,7 @@
 
 #include <cstdint>
 
-#include "../protocol/units.hpp"
+#include "../protocol/messages/units.hpp"
 
 namespace r4 {
 namespace firmware {

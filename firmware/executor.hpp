@@ -5,8 +5,8 @@
 
 #include <cstdint>
 
-#include "../protocol/command.hpp"
-#include "../protocol/settings.hpp"
+#include "../protocol/messages/command.hpp"
+#include "../protocol/messages/settings.hpp"
 #include "hal.hpp"
 
 namespace r4 {

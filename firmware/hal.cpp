@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "hal.hpp"
 
-#include "../protocol/same_elements.hpp"
+#include "../protocol/datagram/same_elements.hpp"
 
 namespace r4 {
 namespace firmware {

@@ -5,9 +5,9 @@
 
 #include <cstdint>
 
-#include "../protocol/chip_fault.hpp"
-#include "../protocol/state.hpp"
-#include "../protocol/units.hpp"
+#include "../protocol/messages/chip_fault.hpp"
+#include "../protocol/messages/state.hpp"
+#include "../protocol/messages/units.hpp"
 
 namespace r4 {
 namespace firmware {

@@ -4,8 +4,8 @@
 
 #include <cstdint>
 
-#include "../protocol/authentication.hpp"
-#include "../protocol/command.hpp"
+#include "../protocol/keys/authentication.hpp"
+#include "../protocol/messages/command.hpp"
 #include "hal.hpp"
 
 namespace r4 {

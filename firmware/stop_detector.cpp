@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "stop_detector.hpp"
 
-#include "../protocol/command.hpp"
-#include "../protocol/datagram.hpp"
+#include "../protocol/messages/command.hpp"
+#include "../protocol/datagram/datagram.hpp"
 
 namespace r4 {
 namespace firmware {

@@ -5,7 +5,7 @@
 
 #include <cstddef>
 
-#include "../protocol/text.hpp"
+#include "../protocol/datagram/text.hpp"
 
 namespace r4 {
 namespace firmware {

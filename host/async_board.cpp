@@ -11,7 +11,7 @@
 
 #include "../transports/registry.hpp"
 #include "callback.hpp"
-#include "link_timing.hpp"
+#include "session/link_timing.hpp"
 
 namespace r4 {
 

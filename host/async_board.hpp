@@ -33,8 +33,8 @@
 #include <utility>
 
 #include "board_options.hpp"
-#include "command_help.hpp"
-#include "limits.hpp"
+#include "commands/command_help.hpp"
+#include "session/limits.hpp"
 
 namespace r4 {
 

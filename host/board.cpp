@@ -13,9 +13,9 @@
 
 #include "async_board.hpp"
 #include "callback.hpp"
-#include "command_help.hpp"
+#include "commands/command_help.hpp"
 #include "explain.hpp"
-#include "limits.hpp"
+#include "session/limits.hpp"
 #include "post_box.hpp"
 
 namespace r4 {

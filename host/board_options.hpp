@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "session.hpp"
+#include "session/session.hpp"
 
 namespace r4 {
 

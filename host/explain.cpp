@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "command_help.hpp"
+#include "commands/command_help.hpp"
 
 namespace r4 {
 

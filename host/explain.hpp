@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "../transports/error.hpp"
-#include "session.hpp"
+#include "session/session.hpp"
 
 namespace r4 {
 

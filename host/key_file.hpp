@@ -8,7 +8,7 @@
 
 #include <string>
 
-#include "../protocol/key.hpp"
+#include "../protocol/keys/key.hpp"
 
 namespace r4 {
 

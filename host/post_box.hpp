@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "../protocol/command.hpp"
+#include "../protocol/messages/command.hpp"
 
 namespace r4 {
 

@@ -1,29 +1,67 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fails when a source includes what its layer may not. Usage: layers.py TREE
+"""Fails when a source includes what its room may not. Usage: layers.py TREE
 
-tools > host > transports > protocol, tools > firmware > transports/framing > protocol;
-host/sim_carrier* alone may include firmware/ports/sim. The portable layers (protocol,
-transports/framing, firmware without its ports, the chip models) include nothing a C++14 board lacks.
+tools > host > transports > protocol, tools > firmware > transports/framing > protocol, and within each of them
+the rooms in the order of ALLOWED; host/sim_carrier* alone may include firmware/ports/sim. The portable rooms
+(protocol, transports/framing, firmware without its ports, the chip models) include nothing a C++14 board lacks.
+A room holds at most 20 sources.
 """
+import collections
 import pathlib
 import re
 import sys
 
-# layer: the layers it may include besides itself
+PROTOCOL = {'protocol/datagram', 'protocol/keys', 'protocol/messages', 'protocol/link'}
+FRAMING = PROTOCOL | {'transports/framing', 'transports/framing/can'}
+CARRIERS = {'transports/can', 'transports/serial', 'transports/udp'}
+TRANSPORTS = FRAMING | CARRIERS | {'transports'}
+FIRMWARE = FRAMING | {'firmware', 'firmware/drivers'}
+MODELS = {'firmware/ports/sim/chips', 'firmware/ports/sim/robot'}
+HOST = TRANSPORTS | {'host', 'host/commands', 'host/session'}
+SIMULATED = HOST | FIRMWARE | MODELS | {'firmware/ports/sim'}
+SHELL = SIMULATED | {'tools/r4/shell'}
+# room: the rooms it may include besides itself
 ALLOWED = {
-    'protocol': set(),
-    'transports/framing': {'protocol'},
-    'transports': {'transports/framing', 'protocol'},
-    'firmware': {'transports/framing', 'protocol'},
-    'firmware/ports/sim/chips': {'firmware'},
-    'firmware/ports': {'firmware/ports/sim/chips', 'firmware', 'transports', 'transports/framing', 'protocol'},
-    'host': {'transports', 'transports/framing', 'protocol'},
-    'tools': {'host', 'transports', 'firmware', 'firmware/ports', 'firmware/ports/sim/chips', 'transports/framing',
-              'protocol'},
+    'protocol/datagram': set(),
+    'protocol/keys': {'protocol/datagram'},
+    'protocol/messages': {'protocol/datagram', 'protocol/keys'},
+    'protocol/link': PROTOCOL,
+    'transports/framing': PROTOCOL,
+    'transports/framing/can': FRAMING,
+    'transports': FRAMING,
+    'transports/can': FRAMING | {'transports'},
+    'transports/serial': FRAMING | {'transports'},
+    'transports/udp': FRAMING | {'transports'},
+    'firmware/drivers': PROTOCOL,
+    'firmware': FIRMWARE,
+    'firmware/ports': FIRMWARE,
+    'firmware/ports/sim/chips': {'firmware/drivers'},
+    'firmware/ports/sim/robot': FIRMWARE | {'firmware/ports/sim/chips'},
+    'firmware/ports/sim': FIRMWARE | MODELS | TRANSPORTS,
+    'firmware/ports/m7': FIRMWARE | MODELS | {'firmware/ports', 'firmware/ports/sim'},
+    'firmware/ports/giga/chip': FIRMWARE,
+    'firmware/ports/giga/links': FIRMWARE | {'firmware/ports', 'firmware/ports/giga/chip'},
+    'firmware/ports/giga': FIRMWARE | {'firmware/ports/giga/chip', 'firmware/ports/giga/links'},
+    'host/commands': TRANSPORTS,
+    'host/session': TRANSPORTS | {'host/commands'},
+    'host': HOST,
+    'tools/r4/shell': SIMULATED,
+    'tools/r4/drive': SHELL,
+    'tools/r4/bus': SHELL,
+    'tools/r4/watch': SHELL | {'tools/r4/bus'},
+    'tools/r4/sim': SHELL,
+    'tools/r4': SHELL,
 }
-LAYERS = sorted(ALLOWED, key=len, reverse=True)
-PORTABLE = {'protocol', 'transports/framing', 'firmware', 'firmware/ports/sim/chips'}
+# What a file may include although its room may not.
+EXCEPTIONS = {
+    'transports/registry.cpp': CARRIERS,
+    'host/sim_carrier.cpp': {'firmware/ports/sim'},
+    'host/sim_carrier.hpp': {'firmware/ports/sim'},
+}
+# What a room may not include although it is in a room that it may.
+FORBIDDEN = {room: {'transports/registry.hpp'} for room in CARRIERS}
+PORTABLE = FIRMWARE | {'firmware/ports/sim/chips'}
 # No heap, no I/O, no clock, nothing GCC 7 in C++14 lacks; C headers in both spellings.
 PORTABLE_STANDARD = {
     'algorithm', 'array', 'atomic', 'cassert', 'climits', 'cmath', 'cstddef', 'cstdint', 'cstring',
@@ -31,23 +69,21 @@ PORTABLE_STANDARD = {
     'limits.h', 'stddef.h', 'stdint.h', 'string.h',
 }
 PORTABLE_EXCEPTIONS = {
-    ('protocol/crc32.cpp', 'libdeflate.h'),  # only where R4_CRC32_LIBDEFLATE
-    ('protocol/grammar.cpp', 'emmintrin.h'),  # only where __SSE2__
+    ('protocol/datagram/crc32.cpp', 'libdeflate.h'),  # only where R4_CRC32_LIBDEFLATE
+    ('protocol/datagram/grammar.cpp', 'emmintrin.h'),  # only where __SSE2__
 }
+MOST_SOURCES = 20
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 SPDX = '// SPDX-License-Identifier: GPL-3.0-or-later'
 
 
-def layer_of(path):
-    return next((layer for layer in LAYERS if path.startswith(layer + '/')), None)
-
-
 def faults_of(root, path):
     """Yields (line, reason) for each broken rule of the source at `path` below `root`."""
-    layer = layer_of(path)
-    allowed = ALLOWED[layer] | {layer}
-    if path.startswith('host/sim_carrier'):
-        allowed = allowed | {'firmware/ports'}
+    room = str(pathlib.PurePath(path).parent)
+    if room not in ALLOWED:
+        yield 1, f'{room} is no room of ALLOWED in tests/layers.py'
+        return
+    allowed = ALLOWED[room] | {room} | EXCEPTIONS.get(path, set())
     lines = (root / path).read_text().splitlines()
     if not lines or lines[0] != SPDX:
         yield 1, f'the first line is not "{SPDX}"'
@@ -57,19 +93,19 @@ def faults_of(root, path):
             continue
         quote, name = match.groups()
         if quote == '<':
-            if (layer in PORTABLE and name not in PORTABLE_STANDARD
+            if (room in PORTABLE and name not in PORTABLE_STANDARD
                     and (path, name) not in PORTABLE_EXCEPTIONS):
                 yield number, f'<{name}> is not for portable code'
             continue
         target = ((root / path).parent / name).resolve()
-        if not target.is_file() and layer == 'tools':
+        if not target.is_file() and room.startswith('tools/'):
             target = (root / name).resolve()
         if not target.is_file():
             yield number, f'"{name}" is not there (write it relative to this file)'
             continue
-        other = layer_of(str(target.relative_to(root))) if target.is_relative_to(root) else None
-        if other not in allowed:
-            yield number, f'{layer} may not include {other or "what is outside the layers"}: "{name}"'
+        other = target.relative_to(root) if target.is_relative_to(root) else None
+        if other is None or str(other.parent) not in allowed or str(other) in FORBIDDEN.get(room, ()):
+            yield number, f'{room} may not include {other or "what is outside the tree"}'
 
 
 def main():
@@ -77,6 +113,9 @@ def main():
     sources = sorted(str(path.relative_to(root)) for top in ('protocol', 'transports', 'firmware', 'host', 'tools')
                      for path in (root / top).rglob('*') if path.suffix in ('.hpp', '.cpp'))
     faults = [f'{path}:{line}: {reason}' for path in sources for line, reason in faults_of(root, path)]
+    rooms = collections.Counter(str(pathlib.PurePath(path).parent) for path in sources)
+    faults += [f'{room} holds {count} sources, {MOST_SOURCES} at most: make a room of what belongs together'
+               for room, count in rooms.items() if count > MOST_SOURCES]
     print('\n'.join(faults + [f'{len(sources)} sources, {len(faults)} faults']))
     return 1 if faults or not sources else 0
 

@@ -15,21 +15,12 @@
 #include <string_view>
 
 #include "error.hpp"
+#include "framing/delivery.hpp"
 
 namespace r4 {
 
-// Who is at the other end, on carriers where several can be (a UDP socket of the board's side). A
-// carrier hands a number out for each sender of a valid datagram; `everyone` is its standing
-// audience, and whoever sent what is none.
-using Peer = std::uint32_t;
-inline constexpr Peer everyone = 0;
-
-// What a full queue does with a datagram.
-enum class Priority : std::uint8_t {
-  state,   // newest wins: an older waiting state is replaced
-  normal,  // waits its turn; refused when the queue is full
-  stop,    // overtakes everything and is never dropped
-};
+// Which end of the link a carrier serves: a host calls out to a board, a board listens for hosts.
+enum class Role : std::uint8_t { host, board };
 
 enum class SendResult : std::uint8_t {
   sent,  // handed to the system, or waiting for it

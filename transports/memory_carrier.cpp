@@ -6,7 +6,7 @@
 #include <chrono>
 #include <cstring>
 
-#include "../protocol/datagram.hpp"
+#include "../protocol/datagram/datagram.hpp"
 #include "operation_slot.hpp"
 #include "send_queue.hpp"
 

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <utility>
 
-#include "can_carrier.hpp"
-#include "pty_carrier.hpp"
-#include "serial_carrier.hpp"
-#include "udp_carrier.hpp"
+#include "can/can_carrier.hpp"
+#include "serial/pty_carrier.hpp"
+#include "serial/serial_carrier.hpp"
+#include "udp/udp_carrier.hpp"
 
 namespace r4 {
 

@@ -14,9 +14,6 @@
 
 namespace r4 {
 
-// Which end of the link the carrier serves: a host calls out to a board, a board listens for hosts.
-enum class Role : std::uint8_t { host, board };
-
 using CarrierFactory =
     std::function<std::unique_ptr<Carrier>(asio::io_context& io, const Url& url, Role role)>;
 

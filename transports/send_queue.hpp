@@ -14,7 +14,7 @@
 #include <string_view>
 #include <vector>
 
-#include "../protocol/datagram.hpp"
+#include "../protocol/datagram/datagram.hpp"
 #include "carrier.hpp"
 
 namespace r4 {

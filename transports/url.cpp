@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "../protocol/numbers.hpp"
+#include "../protocol/datagram/numbers.hpp"
 
 namespace r4 {
 namespace {

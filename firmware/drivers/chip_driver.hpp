@@ -16,7 +16,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "../../protocol/chip_fault.hpp"
+#include "../../protocol/messages/chip_fault.hpp"
 #include "i2c_bus.hpp"
 
 namespace r4 {

@@ -7,10 +7,10 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "protocol/crc32.hpp"
-#include "protocol/datagram.hpp"
-#include "protocol/datagram_writer.hpp"
-#include "protocol/state.hpp"
+#include "protocol/datagram/crc32.hpp"
+#include "protocol/datagram/datagram.hpp"
+#include "protocol/datagram/datagram_writer.hpp"
+#include "protocol/messages/state.hpp"
 #include "tests/bench/measure.hpp"
 
 namespace r4::bench {

@@ -7,8 +7,8 @@
 #include <cstring>
 
 #include "tests/bench/measure.hpp"
-#include "transports/framing/isotp_receiver.hpp"
-#include "transports/framing/isotp_sender.hpp"
+#include "transports/framing/can/isotp_receiver.hpp"
+#include "transports/framing/can/isotp_sender.hpp"
 
 namespace r4::bench {
 namespace {

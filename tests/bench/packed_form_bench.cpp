@@ -6,7 +6,7 @@
 #include <cstring>
 
 #include "tests/bench/measure.hpp"
-#include "transports/framing/packed_form.hpp"
+#include "transports/framing/can/packed_form.hpp"
 
 namespace r4::bench {
 namespace {

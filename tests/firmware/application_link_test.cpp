@@ -23,7 +23,7 @@ TEST(ApplicationLink, SendsThePapersHeartbeatWhileConnecting) {
   for (std::size_t i = 0; i < heard.size(); ++i) {
     EXPECT_EQ(heard[i].bytes, "H:R4-ROS2;PNum:0;T:0;^0xb10b3a06^");
     EXPECT_EQ(heard[i].at_ms, 500'000 + 500 * i);
-    EXPECT_EQ(heard[i].peer, firmware::everyone);
+    EXPECT_EQ(heard[i].peer, everyone);
   }
   EXPECT_EQ(board.state(), BoardState::connecting);
   EXPECT_EQ(board.hal.made_safe, 1);
@@ -333,14 +333,14 @@ TEST(ApplicationLink, TellsThePortWhoIsInControlAndWhenNobodyIs) {
   EXPECT_EQ(board.ports[1].held, 7U);
   board.run(1001);
   ASSERT_EQ(board.reason(), SafeReason::link);
-  EXPECT_EQ(board.ports[1].held, firmware::everyone);
+  EXPECT_EQ(board.ports[1].held, everyone);
   host.echo();
   EXPECT_EQ(board.ports[1].held, 7U) << "it is back";
   board.application->port_down(1, board.now_ms);
-  EXPECT_EQ(board.ports[1].held, firmware::everyone);
+  EXPECT_EQ(board.ports[1].held, everyone);
   other.echo();
   EXPECT_EQ(board.ports[1].held, 8U);
-  EXPECT_EQ(board.ports[0].held, firmware::everyone);
+  EXPECT_EQ(board.ports[0].held, everyone);
 }
 
 TEST(ApplicationLink, LosesTheLinkWithTheOwnersTransport) {
@@ -588,7 +588,7 @@ TEST(ApplicationLink, StreamsOnEveryPortWithNumbersOfItsOwn) {
       }
       next = heard.pnum + 1;
       states += heard.kind == MessageKind::state;
-      EXPECT_EQ(heard.peer, port == 1 ? 6U : firmware::everyone);
+      EXPECT_EQ(heard.peer, port == 1 ? 6U : everyone);
     }
     EXPECT_EQ(states, 21U) << "port " << port;
   }

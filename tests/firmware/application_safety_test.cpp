@@ -136,7 +136,7 @@ TEST_F(ApplicationSafety, AStopIsAnsweredToEveryoneAndToWhoAsked) {
   ASSERT_EQ(first.size(), 1U);
   EXPECT_EQ(first[0].peer, 4U);
   ASSERT_EQ(second.size(), 2U);
-  EXPECT_EQ(second[0].peer, firmware::everyone);
+  EXPECT_EQ(second[0].peer, everyone);
   EXPECT_EQ(second[1].peer, 99U);
   for (const Heard& heard : {first[0], second[0], second[1]}) {
     EXPECT_EQ(heard.kind, MessageKind::board_heartbeat);

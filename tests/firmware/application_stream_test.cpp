@@ -216,7 +216,7 @@ TEST(ApplicationStream, MarksStatesAsReplaceableAndTheRestNot) {
   for (const test::MemoryPort::Sent& sent : board.ports[0].sent) {
     Datagram datagram;
     ASSERT_TRUE(read(sent.bytes, datagram));
-    EXPECT_EQ(sent.urgency == firmware::Urgency::state, kind_of(datagram) == MessageKind::state);
+    EXPECT_EQ(sent.priority == Priority::state, kind_of(datagram) == MessageKind::state);
   }
 }
 

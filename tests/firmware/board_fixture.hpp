@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "firmware/application.hpp"
-#include "protocol/message.hpp"
+#include "protocol/messages/message.hpp"
 #include "tests/support/datagrams.hpp"
 
 namespace r4::test {
@@ -47,13 +47,13 @@ class MemoryPort final : public firmware::Port {
  public:
   struct Sent {
     std::string bytes;
-    firmware::Urgency urgency;
+    Priority priority;
     std::uint32_t peer;
     std::uint32_t at_ms;
   };
 
-  void send(Text datagram, firmware::Urgency urgency, std::uint32_t peer) override {
-    sent.push_back({str(datagram), urgency, peer, *now_ms});
+  void send(Text datagram, Priority priority, std::uint32_t peer) override {
+    sent.push_back({str(datagram), priority, peer, *now_ms});
   }
   std::size_t max_size() const override { return limit; }
   void use_packed_form(bool wanted) override { packed = wanted; }

@@ -16,8 +16,8 @@
 #include <string>
 
 #include "firmware/application.hpp"
-#include "protocol/authentication.hpp"
-#include "protocol/crc32.hpp"
+#include "protocol/keys/authentication.hpp"
+#include "protocol/datagram/crc32.hpp"
 
 namespace {
 
@@ -87,7 +87,7 @@ class World final : public firmware::Hal, public firmware::Observer {
     World* world = nullptr;
     int number = 0;
     std::size_t limit = max_datagram;
-    void send(Text datagram, firmware::Urgency, std::uint32_t peer) override {
+    void send(Text datagram, Priority, std::uint32_t peer) override {
       world->on_sent(number, datagram, peer);
     }
     std::size_t max_size() const override { return limit; }
@@ -132,7 +132,7 @@ class World final : public firmware::Hal, public firmware::Observer {
     if (kind == MessageKind::state) require(read_state(datagram, state));
     if (kind == MessageKind::board_heartbeat) {
       for (std::uint32_t p = 0; p < peers; ++p) {
-        if (peer != p && peer != firmware::everyone) continue;
+        if (peer != p && peer != everyone) continue;
         hosts_[port][p].board_t = static_cast<std::uint32_t>(datagram.time_ms());
       }
     }

@@ -9,12 +9,12 @@
 #include <string>
 #include <vector>
 
-#include "protocol/datagram.hpp"
-#include "protocol/datagram_writer.hpp"
-#include "protocol/message.hpp"
+#include "protocol/datagram/datagram.hpp"
+#include "protocol/datagram/datagram_writer.hpp"
+#include "protocol/messages/message.hpp"
 #include "tests/fuzz/input.hpp"
-#include "transports/can_survey.hpp"
-#include "transports/framing/can_node.hpp"
+#include "transports/can/can_survey.hpp"
+#include "transports/framing/can/can_node.hpp"
 
 namespace r4 {
 namespace {

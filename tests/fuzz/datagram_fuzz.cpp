@@ -6,14 +6,14 @@
 #include <string>
 #include <vector>
 
-#include "protocol/command.hpp"
-#include "protocol/crc32.hpp"
-#include "protocol/datagram.hpp"
-#include "protocol/datagram_writer.hpp"
-#include "protocol/message.hpp"
-#include "protocol/numbers.hpp"
-#include "protocol/settings.hpp"
-#include "protocol/state.hpp"
+#include "protocol/messages/command.hpp"
+#include "protocol/datagram/crc32.hpp"
+#include "protocol/datagram/datagram.hpp"
+#include "protocol/datagram/datagram_writer.hpp"
+#include "protocol/messages/message.hpp"
+#include "protocol/datagram/numbers.hpp"
+#include "protocol/messages/settings.hpp"
+#include "protocol/messages/state.hpp"
 
 namespace r4 {
 namespace {

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "tests/fuzz/input.hpp"
-#include "transports/framing/isotp_receiver.hpp"
-#include "transports/framing/isotp_sender.hpp"
+#include "transports/framing/can/isotp_receiver.hpp"
+#include "transports/framing/can/isotp_sender.hpp"
 
 namespace r4 {
 namespace {

@@ -7,10 +7,10 @@
 #include <cstring>
 #include <string>
 
-#include "protocol/crc32.hpp"
-#include "protocol/datagram.hpp"
-#include "protocol/numbers.hpp"
-#include "transports/framing/packed_form.hpp"
+#include "protocol/datagram/crc32.hpp"
+#include "protocol/datagram/datagram.hpp"
+#include "protocol/datagram/numbers.hpp"
+#include "transports/framing/can/packed_form.hpp"
 
 namespace r4 {
 namespace {

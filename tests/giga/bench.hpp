@@ -13,9 +13,9 @@
 
 #include "fake_giga.hpp"
 #include "firmware/ports/giga/system.hpp"
-#include "firmware/ports/giga/timers.hpp"
+#include "firmware/ports/giga/chip/timers.hpp"
 #include "tests/support/datagrams.hpp"
-#include "transports/framing/can_node.hpp"
+#include "transports/framing/can/can_node.hpp"
 
 extern "C" void r4_fake_core_error(std::int32_t status, std::uint32_t address);
 extern "C" void r4_fake_core_warning(std::int32_t status, std::uint32_t address);

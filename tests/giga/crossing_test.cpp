@@ -6,16 +6,15 @@
 #include <string>
 #include <thread>
 
-#include "firmware/ports/giga/datagram_ring.hpp"
-#include "firmware/ports/giga/hand_over.hpp"
-#include "firmware/ports/giga/udp_peers.hpp"
-#include "firmware/ports/giga/udp_port.hpp"
+#include "firmware/ports/giga/links/datagram_ring.hpp"
+#include "firmware/ports/giga/links/hand_over.hpp"
+#include "firmware/ports/giga/links/udp_peers.hpp"
+#include "firmware/ports/giga/links/udp_port.hpp"
 #include "tests/support/datagrams.hpp"
 
 namespace r4::test {
 namespace {
 
-using firmware::Urgency;
 
 std::uint32_t now_ms = 0;
 std::uint32_t clock_ms() { return now_ms; }
@@ -25,7 +24,7 @@ TEST(DatagramRing, GivesDatagramsWholeAndInOrder) {
   giga::DatagramNote note;
   note.peer = 7;
   note.time_ms = 5;
-  note.urgency = Urgency::state;
+  note.priority = Priority::state;
   EXPECT_TRUE(ring.put(note, "first"));
   EXPECT_TRUE(ring.put(giga::DatagramNote(), "second"));
   giga::DatagramNote taken;
@@ -35,7 +34,7 @@ TEST(DatagramRing, GivesDatagramsWholeAndInOrder) {
   EXPECT_EQ(str(text), "first");
   EXPECT_EQ(taken.peer, 7U);
   EXPECT_EQ(taken.time_ms, 5U);
-  EXPECT_EQ(taken.urgency, Urgency::state);
+  EXPECT_EQ(taken.priority, Priority::state);
   ASSERT_TRUE(ring.take(taken, buffer, text));
   EXPECT_EQ(str(text), "second");
   EXPECT_FALSE(ring.take(taken, buffer, text));
@@ -116,7 +115,7 @@ TEST(UdpPeers, SendWhatIsForEveryoneToTheHostHeardLast) {
   peers.heard({3, 9}, Text("x"));  // no datagram
   EXPECT_TRUE(peers.find(first, to));
   EXPECT_EQ(to.ip, 1U);
-  EXPECT_TRUE(peers.find(firmware::everyone, to));
+  EXPECT_TRUE(peers.find(everyone, to));
   EXPECT_EQ(to.ip, 2U);
 }
 
@@ -126,19 +125,19 @@ TEST(UdpPeers, KeepTheHostInControlInAFloodFromChangingAddresses) {
   peers.hold(owner);
   for (std::uint32_t i = 0; i < 5000; ++i) peers.heard({100 + i, 2}, Text(hello));
   giga::UdpAddress to;
-  ASSERT_TRUE(peers.find(firmware::everyone, to));
+  ASSERT_TRUE(peers.find(everyone, to));
   EXPECT_EQ(to.ip, 1U) << "what is for everyone is not led away";
   EXPECT_EQ(peers.heard({1, 1}, Text(hello)), owner);
-  peers.hold(firmware::everyone);  // it has gone
+  peers.hold(everyone);  // it has gone
   peers.heard({7, 2}, Text(hello));
-  ASSERT_TRUE(peers.find(firmware::everyone, to));
+  ASSERT_TRUE(peers.find(everyone, to));
   EXPECT_EQ(to.ip, 7U);
 }
 
 TEST(UdpLink, TellsTheNetworkThreadWhoIsInControl) {
   giga::UdpLink link;
   giga::UdpPort port(link, &clock_ms);
-  EXPECT_EQ(link.held(), firmware::everyone);
+  EXPECT_EQ(link.held(), everyone);
   port.hold(7);
   EXPECT_EQ(link.held(), 7U);
 }
@@ -146,9 +145,9 @@ TEST(UdpLink, TellsTheNetworkThreadWhoIsInControl) {
 TEST(UdpPeers, SendToThePapersClientWhereItListens) {
   giga::UdpPeers peers;
   giga::UdpAddress to;
-  EXPECT_FALSE(peers.find(firmware::everyone, to)) << "nobody is there";
+  EXPECT_FALSE(peers.find(everyone, to)) << "nobody is there";
   peers.set_host(77);
-  ASSERT_TRUE(peers.find(firmware::everyone, to)) << "before it was heard";
+  ASSERT_TRUE(peers.find(everyone, to)) << "before it was heard";
   EXPECT_EQ(to.ip, 77U);
   EXPECT_EQ(to.port, 2390);
   const std::uint32_t number = peers.heard({77, 50000}, Text(hello));
@@ -166,8 +165,8 @@ TEST(UdpLink, AThreadThatWasAwaySendsThePresent) {
   EXPECT_FALSE(port.receive([](std::uint32_t, Text) {}));
   for (int i = 0; i < 300; ++i) {
     now_ms += 10;
-    port.send("AIN24:24.28;", Urgency::state, 1);
-    if (i % 50 == 0) port.send("H:R4-ROS2;", Urgency::normal, 1);
+    port.send("AIN24:24.28;", Priority::state, 1);
+    if (i % 50 == 0) port.send("H:R4-ROS2;", Priority::normal, 1);
   }
   EXPECT_GT(port.dropped(), 0U);
   std::uint32_t peer = 0;
@@ -180,7 +179,7 @@ TEST(UdpLink, AThreadThatWasAwaySendsThePresent) {
   }
   EXPECT_EQ(heartbeats, 6) << "states left room for answers";
   now_ms += 10;
-  port.send("AIN24:24.29;", Urgency::state, 1);
+  port.send("AIN24:24.29;", Priority::state, 1);
   ASSERT_TRUE(link.take(now_ms, peer, buffer, text));
   EXPECT_EQ(str(text), "AIN24:24.29;");
 }

@@ -19,8 +19,8 @@
 #include <string>
 #include <vector>
 
-#include "firmware/ports/sim/board_chips.hpp"
-#include "transports/framing/can_frame.hpp"
+#include "firmware/ports/sim/robot/board_chips.hpp"
+#include "transports/framing/can/can_frame.hpp"
 
 namespace r4::fake {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "firmware/ports/giga/fdcan.hpp"
+#include "firmware/ports/giga/chip/fdcan.hpp"
 
 #include <gtest/gtest.h>
 

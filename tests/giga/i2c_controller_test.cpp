@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "firmware/ports/giga/i2c_controller.hpp"
+#include "firmware/ports/giga/chip/i2c_controller.hpp"
 
 #include <gtest/gtest.h>
 
 #include "fake_giga.hpp"
-#include "firmware/ports/giga/board_clock.hpp"
+#include "firmware/ports/giga/chip/board_clock.hpp"
 #include "firmware/ports/giga/pins.hpp"
 #include "tests/giga/core/registers.hpp"
 

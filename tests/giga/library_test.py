@@ -29,7 +29,7 @@ OTHER_DIALECT = ['-fexceptions', '-std=gnu++17', '-fsyntax-only']
 FORBIDDEN = re.compile(r'\b(malloc|calloc|realloc|free|_Zn[wa]\w*|_Zd[la]\w*|__cxa_throw\w*|_ZSt\d+__throw\w*)$')
 # Mbed's SocketAddress gives its text back (delete[]) where one ends; the text is made only for who asks for it,
 # and nobody here does: _ZNK13SocketAddress14get_ip_addressEv is not among what the library lacks.
-GIVEN_BACK = {'_ZdaPv': 'firmware/ports/giga/network.cpp'}
+GIVEN_BACK = {'_ZdaPv': 'firmware/ports/giga/links/network.cpp'}
 TEXT_OF_ADDRESS = '_ZNK13SocketAddress14get_ip_addressEv'
 SHELL = {'library.properties', 'library.json', 'keywords.txt', 'LICENSE', 'src/R4Link.h',
          'examples/R4Board/R4Board.ino', 'extras/firmware.md'}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What our interrupt handlers need of each stack (firmware/ports/giga/interrupt_stack.hpp), by what GCC says."""
+"""What our interrupt handlers need of each stack (firmware/ports/giga/chip/interrupt_stack.hpp), by what GCC says."""
 import pathlib
 import re
 import sys

@@ -8,7 +8,7 @@
 #include <future>
 #include <thread>
 
-#include "host/command_help.hpp"
+#include "host/commands/command_help.hpp"
 #include "tests/bench/allocations.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""slcan_bus (tests/can/slcan_bus.cpp) with its nodes as interfaces slcan0, slcan1, … of this kernel."""
+"""slcan_bus (tests/transports/can/kernel/slcan_bus.cpp) with its nodes as interfaces slcan0, slcan1, … of this kernel."""
 import fcntl
 import json
 import os

@@ -166,7 +166,8 @@ def test_an_ordinary_user_has_it_too_with_his_own_ids(tmp_path_factory):
     cache = os.environ.get('XDG_CACHE_HOME') or os.path.expanduser('~/.cache')
     shutil.copytree(f'{cache}/r4link/with-can', folder / 'r4link' / 'with-can')
     shutil.copy(TOOLS / 'with-can', folder)
-    shutil.copytree(TOOLS / 'with_can', folder / 'with_can')
+    shutil.copy(TOOLS / 'trouble.py', folder)
+    shutil.copytree(TOOLS / 'with-can.d', folder / 'with-can.d')
     result = subprocess.run(
         ['runuser', '-u', 'nobody', '--', 'env', f'XDG_CACHE_HOME={folder}', folder / 'with-can',
          '--guest', 'sh', '-c', 'id -un; ip link set can0 down && echo down; cat /etc/shadow'],

@@ -115,7 +115,8 @@ def test_an_ordinary_user_has_a_vcan0_that_is_there():
     with tempfile.TemporaryDirectory(dir='/run/tmp') as folder:
         os.chmod(folder, 0o755)
         shutil.copy(WITH_CAN, folder)
-        shutil.copytree(TOOLS / 'with_can', f'{folder}/with_can')
+        shutil.copy(TOOLS / 'trouble.py', folder)
+        shutil.copytree(TOOLS / 'with-can.d', f'{folder}/with-can.d')
         before = index('vcan0')
         result = subprocess.run(
             ['setpriv', f'--reuid={NOBODY}', f'--regid={NOBODY}', '--clear-groups', f'{folder}/with-can', 'sh', '-c',

@@ -4,10 +4,10 @@
 #include <cstring>
 #include <new>
 
-#include "protocol/message.hpp"
+#include "protocol/messages/message.hpp"
 
 namespace r4 {
-namespace mps2 {
+namespace m7 {
 
 void (*on_step)() = nullptr;
 Bench* bench = nullptr;
@@ -93,10 +93,10 @@ void Listener::on_datagram(Text bytes) {
   ++states_;
 }
 
-}  // namespace mps2
+}  // namespace m7
 }  // namespace r4
 
 extern "C" void r4_wake() {
-  r4::mps2::BoardClock::on_wake_interrupt();
-  r4::mps2::on_step();
+  r4::m7::BoardClock::on_wake_interrupt();
+  r4::m7::on_step();
 }

@@ -8,13 +8,13 @@
 
 #include <cstdint>
 
-#include "firmware/ports/mps2/board.hpp"
+#include "firmware/ports/m7/board_program.hpp"
 #include "on_target.hpp"
-#include "protocol/command.hpp"
-#include "protocol/datagram_writer.hpp"
+#include "protocol/messages/command.hpp"
+#include "protocol/datagram/datagram_writer.hpp"
 
 namespace r4 {
-namespace mps2 {
+namespace m7 {
 
 constexpr std::uint32_t step_us = 50;
 constexpr std::uint32_t bytes_a_step = 5;
@@ -172,7 +172,7 @@ class Bench final : public sim::I2cObserver {
   bool line_has_come() const { return line_sent_ == line_size_; }
   std::uint32_t cut() const { return cut_; }
   std::uint32_t feedings() const { return feedings_; }
-  Board& board() { return board_; }
+  BoardProgram& board() { return board_; }
   sim::BoardModel& model() { return board_.model(); }
   SafeReason reason() { return board_.application().reason(); }
   // From now on what the board says over UDP is heard.
@@ -192,7 +192,7 @@ class Bench final : public sim::I2cObserver {
 
   Uart link_{uart0_base};
   UdpPort udp_{board_address, board_port};
-  mutable Board board_;
+  mutable BoardProgram board_;
   Listener listener_;
   char line_[128];
   volatile std::size_t line_size_ = 0;
@@ -212,5 +212,5 @@ extern Bench* bench;
 
 inline void step_of_board() { bench->step(); }
 
-}  // namespace mps2
+}  // namespace m7
 }  // namespace r4

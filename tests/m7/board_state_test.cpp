@@ -6,7 +6,7 @@
 namespace {
 
 using namespace r4;
-using namespace r4::mps2;
+using namespace r4::m7;
 
 // Whole turns and a part, another for each; encoders 2 and 4 turn backwards.
 std::int32_t turns_of(int channel) {

@@ -6,7 +6,7 @@
 namespace {
 
 using namespace r4;
-using namespace r4::mps2;
+using namespace r4::m7;
 
 void wait_us(std::uint32_t us) {
   const std::uint32_t began = BoardClock::ticks();

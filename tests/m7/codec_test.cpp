@@ -2,14 +2,14 @@
 // What compiler, C library and byte order could make differ on the board: checksums, signatures,
 // numbers, lines, the packed form.
 #include "on_target.hpp"
-#include "protocol/authentication.hpp"
-#include "protocol/crc32.hpp"
-#include "protocol/datagram.hpp"
-#include "protocol/datagram_writer.hpp"
-#include "protocol/numbers.hpp"
-#include "protocol/state.hpp"
+#include "protocol/keys/authentication.hpp"
+#include "protocol/datagram/crc32.hpp"
+#include "protocol/datagram/datagram.hpp"
+#include "protocol/datagram/datagram_writer.hpp"
+#include "protocol/datagram/numbers.hpp"
+#include "protocol/messages/state.hpp"
 #include "transports/framing/line_framing.hpp"
-#include "transports/framing/packed_form.hpp"
+#include "transports/framing/can/packed_form.hpp"
 
 namespace {
 

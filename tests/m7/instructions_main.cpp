@@ -3,22 +3,22 @@
 // takes 1024 ns of the board's time, so the timer counts them; a loop of known length says how many
 // ticks that are.
 #include "firmware/application.hpp"
-#include "firmware/ports/mps2/board_clock.hpp"
-#include "firmware/ports/mps2/semihosting.hpp"
-#include "firmware/ports/mps2/startup.hpp"
-#include "firmware/ports/sim/board_model.hpp"
+#include "firmware/ports/m7/board_clock.hpp"
+#include "firmware/ports/m7/semihosting.hpp"
+#include "firmware/ports/m7/startup.hpp"
+#include "firmware/ports/sim/robot/board_model.hpp"
 #include "on_target.hpp"
-#include "protocol/crc32.hpp"
-#include "protocol/datagram.hpp"
-#include "protocol/datagram_writer.hpp"
-#include "protocol/state.hpp"
-#include "transports/framing/isotp_sender.hpp"
-#include "transports/framing/packed_form.hpp"
+#include "protocol/datagram/crc32.hpp"
+#include "protocol/datagram/datagram.hpp"
+#include "protocol/datagram/datagram_writer.hpp"
+#include "protocol/messages/state.hpp"
+#include "transports/framing/can/isotp_sender.hpp"
+#include "transports/framing/can/packed_form.hpp"
 
 namespace {
 
 using namespace r4;
-using namespace r4::mps2;
+using namespace r4::m7;
 
 // Runs 2 * `turns` instructions, and a few.
 __attribute__((noinline)) void loop(std::uint32_t turns) {
@@ -55,7 +55,7 @@ std::uint32_t instructions_of(Work&& work) {
 // A port that measures nothing but takes everything.
 class Sink final : public firmware::Port {
  public:
-  void send(Text datagram, firmware::Urgency, std::uint32_t) override { size_ = datagram.size(); }
+  void send(Text datagram, Priority, std::uint32_t) override { size_ = datagram.size(); }
   std::size_t max_size() const override { return max_datagram; }
 
  private:

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "on_target.hpp"
 
-#include "firmware/ports/mps2/semihosting.hpp"
-#include "protocol/numbers.hpp"
+#include "firmware/ports/m7/semihosting.hpp"
+#include "protocol/datagram/numbers.hpp"
 
 namespace r4 {
 namespace on_target {
@@ -23,9 +23,9 @@ std::uint32_t Test::run_all() {
   for (Test* each = first; each != nullptr; each = each->next_) {
     failures_here = 0;
     each->body_();
-    mps2::say(failures_here == 0 ? "passed " : "FAILED ");
-    mps2::say(each->name_);
-    mps2::say("\n");
+    m7::say(failures_here == 0 ? "passed " : "FAILED ");
+    m7::say(each->name_);
+    m7::say("\n");
     if (failures_here != 0) ++bad;
   }
   return bad;
@@ -33,20 +33,20 @@ std::uint32_t Test::run_all() {
 
 void failed(const char* what, const char* file, std::uint32_t line) {
   ++failures_here;
-  mps2::say(file);
+  m7::say(file);
   say_number("", line);
-  mps2::say("  is not so: ");
-  mps2::say(what);
-  mps2::say("\n");
+  m7::say("  is not so: ");
+  m7::say(what);
+  m7::say("\n");
 }
 
 void say_number(const char* what, std::uint32_t number) {
-  mps2::say(what);
+  m7::say(what);
   char digits[max_number_text + 1];
   *write_number(digits, number) = '\0';
-  mps2::say(": ");
-  mps2::say(digits);
-  mps2::say("\n");
+  m7::say(": ");
+  m7::say(digits);
+  m7::say("\n");
 }
 
 }  // namespace on_target

@@ -4,15 +4,15 @@
 #include <cstdint>
 
 #include "board_bench.hpp"
-#include "firmware/ports/mps2/fault.hpp"
-#include "firmware/ports/mps2/registers.hpp"
-#include "firmware/ports/mps2/semihosting.hpp"
-#include "firmware/ports/mps2/startup.hpp"
+#include "firmware/ports/m7/fault.hpp"
+#include "firmware/ports/m7/registers.hpp"
+#include "firmware/ports/m7/semihosting.hpp"
+#include "firmware/ports/m7/startup.hpp"
 
 namespace {
 
 using namespace r4;
-using namespace r4::mps2;
+using namespace r4::m7;
 
 // Over resets.
 struct Story {

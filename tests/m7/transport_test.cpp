@@ -2,15 +2,15 @@
 // The ends of the board's transports, without their chips.
 #include <cstring>
 
-#include "firmware/ports/mps2/udp_frames.hpp"
-#include "firmware/transmit_lines.hpp"
+#include "firmware/ports/m7/udp_frames.hpp"
+#include "firmware/ports/transmit_lines.hpp"
 #include "on_target.hpp"
 
 namespace {
 
 using namespace r4;
 using namespace r4::firmware;
-using namespace r4::mps2;
+using namespace r4::m7;
 
 // All that the UART would send now.
 Text drain(TransmitLines& lines, char* out, std::size_t size) {

@@ -4,11 +4,11 @@
 
 #include <string>
 
-#include "protocol/command.hpp"
-#include "protocol/datagram.hpp"
-#include "protocol/datagram_writer.hpp"
-#include "protocol/message.hpp"
-#include "protocol/state.hpp"
+#include "protocol/messages/command.hpp"
+#include "protocol/datagram/datagram.hpp"
+#include "protocol/datagram/datagram_writer.hpp"
+#include "protocol/messages/message.hpp"
+#include "protocol/messages/state.hpp"
 #include "tests/support/datagrams.hpp"
 
 namespace r4 {

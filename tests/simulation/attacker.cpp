@@ -3,8 +3,8 @@
 
 #include <fmt/format.h>
 
-#include "protocol/command.hpp"
-#include "protocol/message.hpp"
+#include "protocol/messages/command.hpp"
+#include "protocol/messages/message.hpp"
 #include "tests/support/datagrams.hpp"
 #include "tests/support/signing.hpp"
 

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "protocol/authentication.hpp"
+#include "protocol/keys/authentication.hpp"
 #include "random.hpp"
 
 namespace r4::simulation {

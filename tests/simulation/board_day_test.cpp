@@ -12,7 +12,7 @@
 
 #include "firmware/application.hpp"
 #include "firmware/ports/sim/simulated_hardware.hpp"
-#include "protocol/message.hpp"
+#include "protocol/messages/message.hpp"
 #include "random.hpp"
 
 namespace r4::simulation {
@@ -268,7 +268,7 @@ class Day final : private firmware::Port {
     due_ms_ = 0;
   }
 
-  void send(Text bytes, firmware::Urgency, std::uint32_t) override {
+  void send(Text bytes, Priority, std::uint32_t) override {
     Datagram datagram;
     ASSERT_TRUE(read(bytes, datagram));
     const MessageKind kind = kind_of(datagram);

@@ -17,7 +17,7 @@
 
 #include "tests/firmware/board_fixture.hpp"
 #include "tests/support/can_bus_model.hpp"
-#include "transports/framing/can_node.hpp"
+#include "transports/framing/can/can_node.hpp"
 
 namespace r4::test {
 namespace {
@@ -103,8 +103,8 @@ class StoppedBoard final : private firmware::Port {
     }
   }
 
-  void send(Text datagram, firmware::Urgency urgency, std::uint32_t) override {
-    if (urgency == firmware::Urgency::state) {
+  void send(Text datagram, Priority priority, std::uint32_t) override {
+    if (priority == Priority::state) {
       state_ = str(datagram);
     } else {
       waiting_.push_back(str(datagram));

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "firmware/application.hpp"
-#include "host/session.hpp"
-#include "protocol/datagram_writer.hpp"
+#include "host/session/session.hpp"
+#include "protocol/datagram/datagram_writer.hpp"
 #include "random.hpp"
 #include "tests/support/datagrams.hpp"
 #include "tests/support/signing.hpp"
@@ -81,7 +81,7 @@ class Crowd final : public firmware::Hal, public firmware::Port, public firmware
   void zero(int) override {}
   bool clear_fault() override { return true; }
   // firmware::Port
-  void send(Text datagram, firmware::Urgency urgency, std::uint32_t peer) override;
+  void send(Text datagram, Priority priority, std::uint32_t peer) override;
   std::size_t max_size() const override { return max_datagram; }
   void hold(std::uint32_t peer) override { peers_.hold(peer); }
   // firmware::Observer
@@ -276,8 +276,8 @@ void Crowd::receive(int address, const std::string& bytes) {
   receiving_ = 0;
 }
 
-void Crowd::send(Text datagram, firmware::Urgency, std::uint32_t peer) {
-  const int* const address = peers_.find(peer == firmware::everyone ? peers_.audience() : peer);
+void Crowd::send(Text datagram, Priority, std::uint32_t peer) {
+  const int* const address = peers_.find(peer == everyone ? peers_.audience() : peer);
   if (address == nullptr || *address > 0) return;
   to_host_.push_back({now_ms_ + random_.between(1, 3), *address, test::str(datagram)});
 }

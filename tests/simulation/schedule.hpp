@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "protocol/settings.hpp"
+#include "protocol/messages/settings.hpp"
 #include "random.hpp"
 
 namespace r4::simulation {

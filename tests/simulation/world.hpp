@@ -30,7 +30,7 @@
 
 #include "attacker.hpp"
 #include "firmware/application.hpp"
-#include "host/session.hpp"
+#include "host/session/session.hpp"
 #include "schedule.hpp"
 
 namespace r4::simulation {
@@ -138,7 +138,7 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   void zero(int) override {}
   bool clear_fault() override { return true; }
   // firmware::Port
-  void send(Text datagram, firmware::Urgency urgency, std::uint32_t peer) override;
+  void send(Text datagram, Priority priority, std::uint32_t peer) override;
   std::size_t max_size() const override { return max_datagram; }
   // firmware::Observer
   void on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason reason) override;

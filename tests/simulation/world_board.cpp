@@ -118,11 +118,11 @@ void World::check_silence() {
   }
 }
 
-void World::send(Text datagram, firmware::Urgency, std::uint32_t peer) {
+void World::send(Text datagram, Priority, std::uint32_t peer) {
   const std::string_view bytes(datagram.data(), datagram.size());
   for (int i = 0; i < static_cast<int>(hosts_.size()); ++i) {
     const std::uint32_t at_host = hosts_[static_cast<std::size_t>(i)]->peer;
-    if (peer == firmware::everyone || peer == at_host) transfer(false, i, at_host, bytes);
+    if (peer == everyone || peer == at_host) transfer(false, i, at_host, bytes);
   }
 }
 

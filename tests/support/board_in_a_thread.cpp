@@ -5,7 +5,7 @@
 #include <asio/post.hpp>
 #include <future>
 
-#include "host/command_help.hpp"
+#include "host/commands/command_help.hpp"
 #include "transports/registry.hpp"
 
 namespace r4::test {

@@ -9,12 +9,12 @@
 #include <string>
 #include <vector>
 
-#include "protocol/datagram.hpp"
-#include "protocol/message.hpp"
-#include "transports/framing/can_ids.hpp"
-#include "transports/framing/isotp_receiver.hpp"
-#include "transports/framing/isotp_sender.hpp"
-#include "transports/framing/packed_form.hpp"
+#include "protocol/datagram/datagram.hpp"
+#include "protocol/messages/message.hpp"
+#include "transports/framing/can/can_ids.hpp"
+#include "transports/framing/can/isotp_receiver.hpp"
+#include "transports/framing/can/isotp_sender.hpp"
+#include "transports/framing/can/packed_form.hpp"
 
 namespace r4::test {
 namespace {

@@ -24,7 +24,7 @@
 #include <vector>
 
 #include "tests/simulation/random.hpp"
-#include "transports/framing/can_bits.hpp"
+#include "transports/framing/can/can_bits.hpp"
 
 namespace r4::test {
 

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <stdexcept>
 
-#include "protocol/crc32.hpp"
+#include "protocol/datagram/crc32.hpp"
 
 namespace r4::test {
 namespace {

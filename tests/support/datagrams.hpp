@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "protocol/text.hpp"
+#include "protocol/datagram/text.hpp"
 
 namespace r4::test {
 

@@ -9,7 +9,7 @@
 #include "board_in_a_thread.hpp"
 #include "firmware/ports/sim/simulated_board.hpp"
 #include "host/board.hpp"
-#include "protocol/state.hpp"
+#include "protocol/messages/state.hpp"
 
 namespace r4::test {
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
-#include "protocol/authentication.hpp"
-#include "protocol/settings.hpp"
+#include "protocol/keys/authentication.hpp"
+#include "protocol/messages/settings.hpp"
 
 namespace r4::test {
 

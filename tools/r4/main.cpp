@@ -1,4 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "command_line.hpp"
+#include "shell/command_line.hpp"
 
 int main(int argc, char** argv) { return r4::tool::run(argc, argv); }

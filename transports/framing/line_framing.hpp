@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "../../protocol/datagram.hpp"
+#include "../../protocol/datagram/datagram.hpp"
 
 namespace r4 {
 

@@ -10,7 +10,7 @@
 
 #include <cstdint>
 
-#include "chip.hpp"
+#include "chip/chip.hpp"
 #include "pins.hpp"
 
 namespace r4 {

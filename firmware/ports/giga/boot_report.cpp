@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "boot_report.hpp"
 
-#include "../../../protocol/message.hpp"
-#include "../../../protocol/numbers.hpp"
-#include "interrupt_stack.hpp"
+#include "../../../protocol/messages/message.hpp"
+#include "../../../protocol/datagram/numbers.hpp"
+#include "chip/interrupt_stack.hpp"
 
 namespace r4 {
 namespace giga {

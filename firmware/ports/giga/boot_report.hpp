@@ -8,13 +8,13 @@
 
 #include <cstdint>
 
-#include "../../../protocol/authentication.hpp"
-#include "../../../protocol/settings.hpp"
+#include "../../../protocol/keys/authentication.hpp"
+#include "../../../protocol/messages/settings.hpp"
 #include "../../board_hardware.hpp"
 #include "../../guard.hpp"
-#include "fault.hpp"
-#include "fdcan.hpp"
-#include "network.hpp"
+#include "chip/fault.hpp"
+#include "chip/fdcan.hpp"
+#include "links/network.hpp"
 #include "settings_store.hpp"
 
 namespace r4 {

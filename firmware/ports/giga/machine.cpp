@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "machine.hpp"
 
-#include "board_clock.hpp"
+#include "chip/board_clock.hpp"
 
 namespace r4 {
 namespace giga {

@@ -8,9 +8,9 @@
 #include "../../board_hardware.hpp"
 #include "../../guard.hpp"
 #include "analog_inputs.hpp"
-#include "i2c_controller.hpp"
+#include "chip/i2c_controller.hpp"
 #include "pins.hpp"
-#include "timers.hpp"
+#include "chip/timers.hpp"
 
 namespace r4 {
 namespace giga {

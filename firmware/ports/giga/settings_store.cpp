@@ -2,13 +2,13 @@
 #include "settings_store.hpp"
 
 // clang-format off
-#include "chip.hpp"
+#include "chip/chip.hpp"
 #include <BlockDevice.h>
 #include <MBRBlockDevice.h>
 #include <TDBStore.h>
 // clang-format on
 
-#include "fault.hpp"
+#include "chip/fault.hpp"
 
 namespace r4 {
 namespace giga {

@@ -14,9 +14,9 @@
 #include <atomic>
 #include <cstdint>
 
-#include "../../../protocol/settings.hpp"
-#include "chip.hpp"
-#include "hand_over.hpp"
+#include "../../../protocol/messages/settings.hpp"
+#include "chip/chip.hpp"
+#include "links/hand_over.hpp"
 
 namespace r4 {
 namespace giga {

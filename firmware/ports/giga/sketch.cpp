@@ -2,7 +2,7 @@
 #include "sketch.hpp"
 
 #include "system.hpp"
-#include "timers.hpp"
+#include "chip/timers.hpp"
 
 r4::giga::Sketch R4Link;  // NOLINT
 

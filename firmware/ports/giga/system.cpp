@@ -3,10 +3,10 @@
 
 #include <new>
 
-#include "board_clock.hpp"
-#include "fault.hpp"
-#include "interrupt_stack.hpp"
-#include "true_random.hpp"
+#include "chip/board_clock.hpp"
+#include "chip/fault.hpp"
+#include "chip/interrupt_stack.hpp"
+#include "chip/true_random.hpp"
 
 namespace r4 {
 namespace giga {
@@ -23,7 +23,7 @@ std::uint32_t random_number() {
 }  // namespace
 
 System::~System() {
-  if (board_ != nullptr) board_->~Board();
+  if (board_ != nullptr) board_->~BoardProgram();
 }
 
 void System::boot() {
@@ -50,7 +50,7 @@ void System::boot() {
 
   // Above the network's thread: it cannot keep the loop waiting.
   osThreadSetPriority(osThreadGetId(), osPriorityAboveNormal);
-  board_ = new (board_place_) Board(machine_, store_, settings, last_boot);
+  board_ = new (board_place_) BoardProgram(machine_, store_, settings, last_boot);
   board_->start();
 }
 

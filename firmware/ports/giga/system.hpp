@@ -8,10 +8,10 @@
 
 #include <cstdint>
 
-#include "board.hpp"
+#include "board_program.hpp"
 #include "machine.hpp"
 #include "settings_store.hpp"
-#include "watchdog.hpp"
+#include "chip/watchdog.hpp"
 
 namespace r4 {
 namespace giga {
@@ -25,7 +25,7 @@ class System {
 
   void boot();
   void poll() { board_->poll(); }
-  Board& board() { return *board_; }  // after boot()
+  BoardProgram& board() { return *board_; }  // after boot()
 
  private:
   // How long the settings may take; without them the board starts with the defaults.
@@ -37,8 +37,8 @@ class System {
   WatchdogOn watchdog_on_;  // the first of all
   Machine machine_;         // all outputs are off
   SettingsStore store_;
-  alignas(Board) unsigned char board_place_[sizeof(Board)];
-  Board* board_ = nullptr;  // made when the settings are known
+  alignas(BoardProgram) unsigned char board_place_[sizeof(BoardProgram)];
+  BoardProgram* board_ = nullptr;  // made when the settings are known
 };
 
 }  // namespace giga

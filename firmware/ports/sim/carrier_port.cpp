@@ -5,14 +5,10 @@
 
 namespace r4::sim {
 
-static_assert(r4::everyone == firmware::everyone, "peers go through unchanged");
-
 CarrierPort::CarrierPort(std::unique_ptr<Carrier> carrier, Owner& owner)
     : carrier_(std::move(carrier)), owner_(owner) {}
 
-void CarrierPort::send(Text datagram, firmware::Urgency urgency, std::uint32_t peer) {
-  const Priority priority =
-      urgency == firmware::Urgency::state ? Priority::state : Priority::normal;
+void CarrierPort::send(Text datagram, Priority priority, Peer peer) {
   carrier_->send({datagram.data(), datagram.size()}, priority, peer);  // it counts what it drops
 }
 

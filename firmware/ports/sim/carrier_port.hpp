@@ -32,7 +32,7 @@ class CarrierPort final : public firmware::Port, private Carrier::Handler {
   // The application's number for this port.
   std::uint8_t number = 0;
 
-  void send(Text datagram, firmware::Urgency urgency, std::uint32_t peer) override;
+  void send(Text datagram, Priority priority, std::uint32_t peer) override;
   std::size_t max_size() const override { return carrier_->max_size(); }
   void hold(std::uint32_t peer) override { carrier_->hold(peer); }
   void use_packed_form(bool wanted) override { carrier_->use_packed_form(wanted); }

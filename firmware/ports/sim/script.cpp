@@ -8,9 +8,9 @@
 #include <iterator>
 #include <utility>
 
-#include "../../../protocol/numbers.hpp"
-#include "../../../protocol/state.hpp"
-#include "../../../protocol/units.hpp"
+#include "../../../protocol/datagram/numbers.hpp"
+#include "../../../protocol/messages/state.hpp"
+#include "../../../protocol/messages/units.hpp"
 #include "../../../transports/error.hpp"
 #include "../../board_hardware.hpp"
 

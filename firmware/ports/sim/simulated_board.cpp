@@ -7,7 +7,7 @@
 #include <system_error>
 #include <utility>
 
-#include "random.hpp"
+#include "robot/random.hpp"
 
 namespace r4::sim {
 

@@ -24,7 +24,7 @@
 #include <vector>
 
 #include "../../application.hpp"
-#include "board_model.hpp"
+#include "robot/board_model.hpp"
 #include "carrier_port.hpp"
 #include "script.hpp"
 #include "simulated_hardware.hpp"

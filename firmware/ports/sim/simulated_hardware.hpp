@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "../../board_hardware.hpp"
-#include "board_model.hpp"
+#include "robot/board_model.hpp"
 
 namespace r4 {
 namespace sim {

@@ -16,8 +16,8 @@
 #include <string>
 #include <string_view>
 
-#include "../../../protocol/units.hpp"
-#include "board_model.hpp"
+#include "../../../protocol/messages/units.hpp"
+#include "robot/board_model.hpp"
 
 namespace r4::sim {
 

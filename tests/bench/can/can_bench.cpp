@@ -32,9 +32,9 @@
 #include "bare_frames.hpp"
 #include "can_processes.hpp"
 #include "host/async_board.hpp"
-#include "protocol/datagram_writer.hpp"
+#include "protocol/datagram/datagram_writer.hpp"
 #include "tests/support/at_will.hpp"
-#include "transports/framing/packed_form.hpp"
+#include "transports/framing/can/packed_form.hpp"
 #include "transports/registry.hpp"
 
 namespace r4::bench {

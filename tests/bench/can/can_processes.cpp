@@ -14,8 +14,8 @@
 #include <memory>
 
 #include "firmware/ports/sim/simulated_board.hpp"
-#include "protocol/units.hpp"
-#include "transports/framing/can_ids.hpp"
+#include "protocol/messages/units.hpp"
+#include "transports/framing/can/can_ids.hpp"
 #include "transports/registry.hpp"
 
 namespace r4::bench {

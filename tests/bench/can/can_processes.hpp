@@ -9,7 +9,7 @@
 #include <string>
 
 #include "tests/bench/link/child_process.hpp"
-#include "tests/can/kernel_isotp.hpp"
+#include "tests/transports/can/kernel/kernel_isotp.hpp"
 
 namespace r4::bench {
 

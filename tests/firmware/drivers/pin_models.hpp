@@ -8,7 +8,7 @@
 #include "bus_log.hpp"
 #include "firmware/board_hardware.hpp"
 #include "firmware/drivers/pins.hpp"
-#include "firmware/ports/sim/board_chips.hpp"
+#include "firmware/ports/sim/robot/board_chips.hpp"
 
 namespace r4::test {
 

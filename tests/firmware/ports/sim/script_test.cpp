@@ -7,7 +7,7 @@
 #include <fstream>
 
 #include "firmware/board_hardware.hpp"
-#include "protocol/state.hpp"
+#include "protocol/messages/state.hpp"
 #include "transports/error.hpp"
 
 namespace r4::sim {

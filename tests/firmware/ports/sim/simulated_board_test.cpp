@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "protocol/board_link.hpp"
-#include "protocol/message.hpp"
-#include "protocol/state.hpp"
+#include "protocol/link/board_link.hpp"
+#include "protocol/messages/message.hpp"
+#include "protocol/messages/state.hpp"
 #include "tests/support/datagrams.hpp"
 #include "tests/support/every_channel.hpp"
 #include "transports/memory_carrier.hpp"

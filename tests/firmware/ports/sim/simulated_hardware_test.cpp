@@ -7,7 +7,7 @@
 #include <map>
 #include <set>
 
-#include "protocol/state.hpp"
+#include "protocol/messages/state.hpp"
 #include "tests/support/datagrams.hpp"
 
 namespace r4::sim {

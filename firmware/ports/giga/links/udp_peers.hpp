@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The hosts that have sent to the board's socket, and where what is for everyone goes
+// (docs/transports.md, as udp://BIND?peer=HOST does it). Of the network thread alone.
+#pragma once
+
+#include <cstdint>
+
+#include "../../../../transports/framing/peer_table.hpp"
+#include "../../../port.hpp"
+
+namespace r4 {
+namespace giga {
+
+struct UdpAddress {
+  std::uint32_t ip = 0;  // a.b.c.d, a in the highest byte
+  std::uint16_t port = 0;
+  friend bool operator==(UdpAddress a, UdpAddress b) { return a.ip == b.ip && a.port == b.port; }
+};
+
+class UdpPeers {
+ public:
+  static constexpr int capacity = 16;
+  static constexpr std::uint16_t host_port = 2390;  // where the paper's client listens
+
+  // A host that gets what is for everyone, at host_port; 0: none.
+  void set_host(std::uint32_t ip) { host_ = ip; }
+
+  // The number of whoever has just sent `bytes`; everyone if they are no valid datagram.
+  std::uint32_t heard(UdpAddress from, Text bytes) { return hosts_.heard(from, bytes); }
+  // That one is in control, and keeps its number; everyone: none is any more.
+  void hold(std::uint32_t peer) { hosts_.hold(peer); }
+
+  // Where to send what is for `peer`. False: nowhere.
+  bool find(std::uint32_t peer, UdpAddress& to) const {
+    if (peer == everyone && host_ != 0) {
+      to.ip = host_;
+      to.port = host_port;
+      return true;
+    }
+    const UdpAddress* const at = hosts_.find(peer == everyone ? hosts_.audience() : peer);
+    if (at == nullptr) return false;
+    to = *at;
+    if (to.ip == host_) to.port = host_port;  // it asks from another port than it listens at
+    return true;
+  }
+
+ private:
+  using Hosts = PeerTable<UdpAddress, capacity>;
+  static_assert(Hosts::nobody == everyone, "numbers go through unchanged");
+  Hosts hosts_;
+  std::uint32_t host_ = 0;
+};
+
+}  // namespace giga
+}  // namespace r4

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// UDP as a port of the application, and its other side for the thread that has the sockets. WiFi may
+// block that thread for seconds; the loop never notices: datagrams cross in rings without locks.
+//
+//     loop                         network thread
+//     UdpPort::send()     ----->   UdpLink::take()     states older than stale_ms are left out
+//     UdpPort::receive()  <-----   UdpLink::give()
+//     true from receive() <-----   UdpLink::set_up(false)
+//
+// When the ring is full, what is new is dropped and counted; states leave room for answers. So a
+// thread that comes back to work sends the present: what is left of the past are answers.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "datagram_ring.hpp"
+
+namespace r4 {
+namespace giga {
+
+// What the Giga's library can carry at once (WIFI_UDP_BUFFER_SIZE).
+constexpr std::size_t udp_max_size = 508;
+
+class UdpLink {
+ public:
+  static constexpr std::uint32_t stale_ms = 50;
+
+  // --- the network thread's
+
+  // The oldest datagram to send, and to whom. False: none.
+  bool take(std::uint32_t now_ms, std::uint32_t& peer, char (&buffer)[max_datagram],
+            Text& datagram) {
+    DatagramNote note;
+    while (to_network_.take(note, buffer, datagram)) {
+      const bool state = note.priority == Priority::state;
+      if (state && now_ms - note.time_ms > stale_ms) continue;
+      peer = note.peer;
+      return true;
+    }
+    return false;
+  }
+  void give(std::uint32_t peer, Text datagram) {
+    DatagramNote note;
+    note.peer = peer;
+    if (!from_network_.put(note, datagram)) lost_.fetch_add(1, std::memory_order_relaxed);
+  }
+  // Who keeps its number: the host in control.
+  std::uint32_t held() const { return held_.load(std::memory_order_relaxed); }
+  // Is the network there?
+  void set_up(bool up) { up_.store(up, std::memory_order_release); }
+
+  bool up() const { return up_.load(std::memory_order_acquire); }
+  std::uint32_t lost() const { return lost_.load(std::memory_order_relaxed); }  // on the way in
+
+ private:
+  friend class UdpPort;
+  static constexpr std::uint32_t ring_bytes = 4096;
+  DatagramRing<ring_bytes> to_network_;
+  DatagramRing<ring_bytes> from_network_;
+  std::atomic<bool> up_{false};
+  std::atomic<std::uint32_t> held_{everyone};
+  std::atomic<std::uint32_t> lost_{0};
+};
+
+class UdpPort final : public firmware::Port {
+ public:
+  using Clock = std::uint32_t (*)();  // milliseconds that wrap
+  static constexpr std::uint32_t kept_for_answers = 1024;
+  static constexpr int datagrams_per_turn = 8;
+
+  UdpPort(UdpLink& link, Clock now_ms) : link_(link), now_ms_(now_ms) {}
+
+  // Calls `on_datagram(peer, Text)` for each that has arrived; true: the network has gone.
+  template <class OnDatagram>
+  bool receive(OnDatagram&& on_datagram) {
+    DatagramNote note;
+    char buffer[max_datagram];
+    Text datagram;
+    for (int i = 0; i < datagrams_per_turn && link_.from_network_.take(note, buffer, datagram);
+         ++i) {
+      on_datagram(note.peer, datagram);
+    }
+    const bool was_up = up_;
+    up_ = link_.up();
+    return was_up && !up_;
+  }
+
+  void send(Text datagram, Priority priority, std::uint32_t peer) override {
+    if (!up_) return;  // nobody is there to hear it
+    DatagramNote note;
+    note.peer = peer;
+    note.time_ms = now_ms_();
+    note.priority = priority;
+    const std::uint32_t keep = priority == Priority::state ? kept_for_answers : 0;
+    if (!link_.to_network_.put(note, datagram, keep)) ++dropped_;
+  }
+  void hold(std::uint32_t peer) override { link_.held_.store(peer, std::memory_order_relaxed); }
+  std::size_t max_size() const override { return udp_max_size; }
+
+  std::uint32_t dropped() const { return dropped_; }
+
+ private:
+  UdpLink& link_;
+  const Clock now_ms_;
+  bool up_ = false;
+  std::uint32_t dropped_ = 0;
+};
+
+}  // namespace giga
+}  // namespace r4

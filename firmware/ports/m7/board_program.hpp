@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The board: the application on simulated hardware, between a UART and UDP, and a turn of its loop.
+#pragma once
+
+#include <cstdint>
+
+#include "../../application.hpp"
+#include "../sim/simulated_hardware.hpp"
+#include "board_clock.hpp"
+#include "fault.hpp"
+#include "startup.hpp"
+#include "uart.hpp"
+#include "udp_port.hpp"
+#include "wire_time.hpp"
+
+namespace r4 {
+namespace m7 {
+
+class BoardProgram {
+  static_assert(firmware::Application::max_ports >= 2, "each port has a place");
+
+ public:
+  // The seed's low half is where the clock of this boot begins.
+  BoardProgram(std::uint64_t seed, Uart& link, UdpPort& udp, const firmware::Application::Config& config)
+      : clock_(static_cast<std::uint32_t>(seed)),
+        model_(seed),
+        hardware_(model_),
+        application_(hardware_.hal(), config),
+        link_(link),
+        udp_(udp),
+        link_number_(application_.add_port(link)),
+        udp_number_(application_.add_port(udp)) {
+    model_.chips().bus.set_processor(&wire_);
+  }
+
+  // The outputs off, before anything else.
+  void power_up() {
+    clock_.start();
+    hardware_.power_up();
+  }
+  // `cause`: what ended the last boot, none if that was not a fault.
+  void start(SafeReason cause) {
+    application_.start(clock_.now_ms());
+    if (cause != SafeReason::none) application_.fail(cause, clock_.now_ms());
+    passed_ms_ = clock_.now_ms();
+    started_ = true;
+  }
+  void turn() {
+    for (; passed_ms_ != clock_.now_ms(); ++passed_ms_) hardware_.pass_millisecond();
+    link_.receive([this](Text datagram) {
+      application_.receive(link_number_, everyone, datagram, clock_.now_ms());
+      hal().calibrate(application_.settings().site.full_scale_cv);  // it may have been C:AIN24,…
+    });
+    application_.drained(link_number_);
+    udp_.receive([this](std::uint32_t peer, Text datagram) {
+      application_.receive(udp_number_, peer, datagram, clock_.now_ms());
+    });
+    application_.drained(udp_number_);
+    const std::uint32_t now_ms = clock_.now_ms();
+    application_.poll(now_ms);
+    link_.poll(now_ms);
+  }
+  // Sleeps until an interrupt, unless there is work. With interrupts off nothing comes between.
+  void rest() {
+    const InterruptsHeld held;
+    if (!link_.has_received() && !udp_.has_received()) wait_for_interrupt();
+  }
+
+  // Each millisecond, in the interrupt of timer 1. True: the watchdog may be fed. Ends the boot if the
+  // handlers' stack is full, whatever the loop does.
+  bool on_wake() {
+    if (!canary_alive()) halt();
+    BoardClock::on_wake_interrupt();
+    return started_ && application_.guard().tick(clock_.now_ms());
+  }
+
+  // A stop has come, in an interrupt: the timer's follows at once.
+  void on_stop() {
+    application_.guard().stop();
+    pend(Irq::timer1);
+  }
+
+  BoardClock& clock() { return clock_; }
+  sim::BoardModel& model() { return model_; }
+  firmware::BoardHardware& hal() { return hardware_.hal(); }
+  firmware::Application& application() { return application_; }
+
+ private:
+  BoardClock clock_;
+  WireTime wire_;
+  sim::BoardModel model_;
+  sim::SimulatedHardware hardware_;
+  firmware::Application application_;
+  Uart& link_;
+  UdpPort& udp_;
+  std::uint8_t link_number_;
+  std::uint8_t udp_number_;
+  std::uint32_t passed_ms_ = 0;  // on the simulated hardware
+  volatile bool started_ = false;
+};
+
+}  // namespace m7
+}  // namespace r4

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Not a board: what one with CAN, a UART and all chip drivers would link, for `tools/m7 --size`. No
+// machine that QEMU has with a Cortex-M has a CAN controller, and this one has no chips: frames and
+// transfers go nowhere.
+#include "../../../transports/framing/can/can_node.hpp"
+#include "../../application.hpp"
+#include "../../board_hardware.hpp"
+#include "board_clock.hpp"
+#include "fault.hpp"
+#include "registers.hpp"
+#include "startup.hpp"
+#include "uart.hpp"
+
+namespace {
+
+using namespace r4;
+using namespace r4::m7;
+
+constexpr std::uint32_t watchdog_ms = 500;
+Uart link(uart0_base);
+firmware::Guard* watching = nullptr;
+BoardClock* watch = nullptr;
+
+// The place of a controller: two mailboxes.
+struct Controller {
+  volatile bool has_received = false;
+  CanFrame received;
+  CanFrame sent;
+};
+Controller controller;
+
+class CanPort final : public firmware::Port {
+ public:
+  explicit CanPort(BoardClock& clock) : clock_(clock) {}
+  template <class OnDatagram>
+  void receive(OnDatagram&& on_datagram) {
+    if (controller.has_received) {
+      controller.has_received = false;
+      const Text datagram = node_.on_frame(controller.received, clock_.now_us());
+      if (!datagram.empty()) on_datagram(datagram);
+    }
+    node_.poll(clock_.now_us());
+    while (node_.offer(clock_.now_us(), controller.sent)) node_.frame_sent(clock_.now_us());
+  }
+  void send(Text datagram, Priority, std::uint32_t) override {
+    node_.begin(datagram, clock_.now_us());
+  }
+  std::size_t max_size() const override { return max_datagram; }
+  void use_packed_form(bool wanted) override { node_.use_packed_form(wanted); }
+
+ private:
+  BoardClock& clock_;
+  CanNode node_{CanEnd::board, 1, false};
+};
+
+// The places of the I2C bus and the pins.
+class Bus final : public firmware::I2cBus {
+ public:
+  firmware::I2cResult write(std::uint8_t address, const std::uint8_t* bytes,
+                            std::size_t size) override {
+    for (std::size_t i = 0; i < size; ++i)
+      wire_ = static_cast<std::uint32_t>(address << 8 | bytes[i]);
+    return firmware::I2cResult::ok;
+  }
+  firmware::I2cResult write_read(std::uint8_t address, const std::uint8_t* out,
+                                 std::size_t out_size, std::uint8_t* in,
+                                 std::size_t in_size) override {
+    write(address, out, out_size);
+    for (std::size_t i = 0; i < in_size; ++i) in[i] = static_cast<std::uint8_t>(wire_);
+    return firmware::I2cResult::ok;
+  }
+  bool recover() override { return true; }
+
+ private:
+  volatile std::uint32_t wire_ = 0;
+};
+
+class Output final : public firmware::OutputPin {
+ public:
+  void write(bool high) override { level_ = high; }
+
+ private:
+  volatile bool level_ = false;
+};
+class Input final : public firmware::InputPin {
+ public:
+  bool read() override { return level_; }
+
+ private:
+  volatile bool level_ = true;
+};
+class Converter final : public firmware::AnalogPin {
+ public:
+  std::uint16_t read() override { return value_; }
+
+ private:
+  volatile std::uint16_t value_ = 0;
+};
+
+// All channels of the board on them.
+struct Hardware {
+  Bus bus;
+  Output pin;
+  Input handle;
+  Converter converter;
+  firmware::BoardHardware channels{bus, pins(), {}};
+
+  firmware::BoardPins pins() {
+    firmware::BoardPins pins{};
+    for (auto& each : pins.step) each = &pin;
+    for (auto& each : pins.direction) each = &pin;
+    for (auto& each : pins.trigger) each = &pin;
+    for (auto& each : pins.analog) each = &converter;
+    pins.handle = &handle;
+    return pins;
+  }
+};
+
+}  // namespace
+
+extern "C" {
+void r4_uart0_receive() { link.on_receive_interrupt(); }
+void r4_uart0_transmit() { link.on_transmit_interrupt(); }
+void r4_wake() {
+  BoardClock::on_wake_interrupt();
+  if (watching != nullptr && watching->tick(watch->now_ms())) feed_watchdog();
+}
+}
+
+int main() {
+  static BoardClock clock(r4_chance);
+  static Hardware hardware;
+  firmware::BoardHardware& hal = hardware.channels;
+  static CanPort can(clock);
+  clock.start();
+  hal.power_up(clock.now_us());
+  guard(hal);
+  firmware::Application::Config config;
+  config.identity.firmware = Text("0.1.0");
+  config.identity.board_id = Text("m7-1");
+  config.identity.capabilities = Text("serial+can");
+  static firmware::Application application(hal, config);
+  static_assert(firmware::Application::max_ports >= 2, "each port has a place");
+  const std::uint8_t link_number = application.add_port(link);
+  const std::uint8_t can_number = application.add_port(can);
+  link.start();
+  enable(Irq::uart0_rx);
+  enable(Irq::uart0_tx);
+  give_way(Irq::timer1);
+  enable(Irq::timer1);
+  start_watchdog(watchdog_ms);
+  application.start(clock.now_ms());
+  watch = &clock;
+  watching = &application.guard();
+  for (;;) {
+    link.receive([&](Text datagram) {
+      application.receive(link_number, everyone, datagram, clock.now_ms());
+    });
+    can.receive([&](Text datagram) {
+      application.receive(can_number, everyone, datagram, clock.now_ms());
+    });
+    hal.poll(clock.now_us());
+    hal.step_tick();
+    application.poll(clock.now_ms());
+    link.poll(clock.now_ms());
+    wait_for_interrupt();
+  }
+}

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the board's pins do, as they change, on a UART of its own (`tools/m7 --pins`): what tests look
+// at instead of believing what the board says of itself.
+//
+// A line is numbers with a blank between: the board's time in ms and in us, when the last datagram
+// had come (us), the time in ms of the heartbeat that fed last, 1 if the chips' pins are safe; then
+// the outputs in the order of sim::Pins.
+//
+// Changes are noted at the end of the transfer that made them, also in interrupts, and told when the
+// loop has time. When notes_max wait, later ones are left out.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "../../../protocol/link/board_link.hpp"
+#include "../../../protocol/datagram/numbers.hpp"
+#include "../sim/robot/board_model.hpp"
+#include "board_clock.hpp"
+
+namespace r4 {
+namespace m7 {
+
+class PinsReport final : public sim::I2cObserver {
+ public:
+  static constexpr int notes_max = 16;
+
+  // `base` is the UART's address.
+  PinsReport(sim::BoardModel& board, BoardClock& clock, const BoardLink& link, std::uint32_t base);
+  void start();
+
+  void on_transfer(const sim::I2cTransfer&) override { look(); }
+  // To be called in each turn of the loop.
+  void poll();
+
+  // A datagram came at `ticks` of the board's clock; of several the newest counts. In interrupts.
+  static void on_datagram(std::uint32_t ticks) {
+    if (static_cast<std::int32_t>(ticks - datagram_ticks_) > 0) datagram_ticks_ = ticks;
+  }
+
+ private:
+  struct Note {
+    std::uint32_t t_ms = 0;
+    std::uint32_t t_us = 0;
+    std::uint32_t heard_us = 0;
+    std::uint32_t fed_ms = 0;
+    sim::Pins pins;
+  };
+
+  void look();
+  void write_line(const Note& note);
+  void add(const Drive& drive);
+  template <class Number>
+  void add(Number number);
+
+  static volatile std::uint32_t datagram_ticks_;
+
+  sim::BoardModel& board_;
+  BoardClock& clock_;
+  const BoardLink& link_;
+  const std::uint32_t base_;
+  sim::Pins last_;
+  Note notes_[notes_max];
+  volatile std::uint32_t noted_ = 0;  // so far
+  volatile std::uint32_t told_ = 0;
+  // Up to 58 numbers.
+  char line_[58 * (max_number_text + 1)];
+  std::size_t size_ = 0;
+  std::size_t sent_ = 0;
+};
+
+}  // namespace m7
+}  // namespace r4

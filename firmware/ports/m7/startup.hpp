@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// From the reset to main(), and what the linker script says about the memory.
+//
+// The image defines main() and the handlers of the interrupts that it enables.
+#pragma once
+
+#include <cstdint>
+
+extern "C" {
+// The loop's stack, at the bottom of the RAM, and that of the handlers.
+extern std::uint32_t r4_stack[];
+extern std::uint32_t r4_stack_end[];
+extern std::uint32_t r4_handler_stack[];
+extern std::uint32_t r4_handler_stack_end[];
+
+// What chance has put there before the board was started.
+extern std::uint32_t r4_chance;
+extern std::uint32_t r4_wants_pins;
+
+int main();
+void r4_uart0_receive();
+void r4_uart0_transmit();
+void r4_wake();  // each millisecond, from timer 1
+void r4_ethernet();
+}
+
+namespace r4 {
+namespace m7 {
+
+// What the stacks hold where nobody has been yet.
+constexpr std::uint32_t untouched = 0xC0FFEE55;
+
+// The most that the stack from `begin` to `end` has held so far, in bytes.
+inline std::uint32_t used_at_most(const std::uint32_t* begin, const std::uint32_t* end) {
+  const std::uint32_t* at = begin;
+  while (at != end && *at == untouched) ++at;
+  return static_cast<std::uint32_t>((end - at) * 4);
+}
+
+// Is the word between the stacks whole? The handlers' stack grows towards it.
+inline bool canary_alive() { return *r4_handler_stack == untouched; }
+
+}  // namespace m7
+}  // namespace r4

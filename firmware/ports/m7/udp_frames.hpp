@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// As much of Ethernet, ARP, IPv4 and UDP as a board with one port and a static address needs
+// (RFC 826, 791, 768). No I/O: frames come in, frames go out.
+//
+// Answers ARP for its address; takes UDP datagrams to its port, whole ones with right checksums
+// only; writes datagrams to those who have asked. No fragments, no options to send, no routing:
+// everybody is on its /16.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+#include "../../../protocol/datagram/datagram.hpp"
+
+namespace r4 {
+namespace m7 {
+
+struct Mac {
+  std::uint8_t bytes[6] = {};
+};
+
+// Who sends a datagram.
+struct UdpAddress {
+  Mac mac;
+  std::uint16_t host = 0;  // the host part of its IP address; 0: nobody
+  std::uint16_t port = 0;
+  friend bool operator==(const UdpAddress& a, const UdpAddress& b) {
+    return a.host == b.host && a.port == b.port &&
+           std::memcmp(a.mac.bytes, b.mac.bytes, sizeof a.mac.bytes) == 0;
+  }
+};
+
+class UdpFrames {
+ public:
+  // What a frame carries if it is UDP; nothing is checked.
+  static Text peek(const std::uint8_t* frame, std::size_t size);
+  // Ethernet, IPv4 and UDP in front of a datagram.
+  static constexpr std::size_t head_size = 14 + 20 + 8;
+  static constexpr std::size_t max_frame = head_size + max_datagram;
+  static constexpr std::size_t min_frame = 60;
+
+  // `address` as a number: 10.0.2.15 is 0x0A00020F.
+  UdpFrames(std::uint32_t address, std::uint16_t port) : address_(address), port_(port) {}
+  void set_mac(const Mac& mac) { mac_ = mac; }
+
+  struct Arrival {
+    UdpAddress from;             // who sent the datagram; nobody: there is none
+    Text datagram;               // in the frame
+    std::size_t reply_size = 0;  // what is to be sent back at once
+  };
+  // Takes a frame, without its check sequence. `reply` has room for min_frame bytes.
+  Arrival take(const std::uint8_t* frame, std::size_t size, std::uint8_t* reply);
+
+  // Writes the frame that brings `datagram` to `to`. Returns its size; 0: the datagram is too long.
+  std::size_t write(const UdpAddress& to, Text datagram, std::uint8_t* frame);
+
+  std::uint32_t bad() const { return bad_; }  // packets with a wrong checksum or length
+
+ private:
+  std::size_t answer_arp(const std::uint8_t* frame, std::size_t size, std::uint8_t* reply);
+  bool is_neighbour(std::uint32_t address) const { return (address ^ address_) >> 16 == 0; }
+
+  const std::uint32_t address_;
+  const std::uint16_t port_;
+  Mac mac_;
+  std::uint16_t identification_ = 0;
+  std::uint32_t bad_ = 0;
+};
+
+}  // namespace m7
+}  // namespace r4

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Single pins of the microcontroller, as something outside of it sees and sets them.
+#pragma once
+
+#include <cstdint>
+
+#include "../../../drivers/pins.hpp"
+
+namespace r4 {
+namespace sim {
+
+class OutputPinModel final : public firmware::OutputPin {
+ public:
+  void write(bool high) override {
+    if (high && !high_) ++rises_;
+    high_ = high;
+  }
+  bool high() const { return high_; }
+  std::uint32_t rises() const { return rises_; }
+
+ private:
+  bool high_ = false;
+  std::uint32_t rises_ = 0;
+};
+
+class InputPinModel final : public firmware::InputPin {
+ public:
+  bool read() override { return high_; }
+  void set(bool high) { high_ = high; }
+
+ private:
+  bool high_ = false;
+};
+
+// A stepper motor and its driver with step and direction inputs: a step at each rising edge, which
+// the motor takes if it has supply.
+class StepperDriverModel {
+ public:
+  StepperDriverModel() { step_.driver = this; }
+  StepperDriverModel(const StepperDriverModel&) = delete;
+  StepperDriverModel& operator=(const StepperDriverModel&) = delete;
+
+  firmware::OutputPin& step() { return step_; }
+  firmware::OutputPin& direction() { return direction_; }
+  bool forward() const { return direction_.high(); }
+
+  void power_on() { position_ = shaft_ = 0; }
+  void supply_motor(bool supplied) { supplied_ = supplied; }
+  // Steps that were asked for, forward less backward, since power came; wraps at 32 bits.
+  std::int32_t position() const { return static_cast<std::int32_t>(position_); }
+  // The steps of them that the motor took.
+  std::int32_t shaft() const { return static_cast<std::int32_t>(shaft_); }
+  std::uint32_t pulses() const { return step_.pin.rises(); }
+
+ private:
+  struct StepPin final : firmware::OutputPin {
+    void write(bool high) override {
+      const std::uint32_t before = pin.rises();
+      pin.write(high);
+      if (pin.rises() != before) driver->step_once();
+    }
+    OutputPinModel pin;
+    StepperDriverModel* driver = nullptr;
+  };
+
+  void step_once() {
+    const std::uint32_t step = forward() ? 1U : ~0U;
+    position_ += step;
+    if (supplied_) shaft_ += step;
+  }
+
+  StepPin step_;
+  OutputPinModel direction_;
+  std::uint32_t position_ = 0;
+  std::uint32_t shaft_ = 0;
+  bool supplied_ = false;
+};
+
+}  // namespace sim
+}  // namespace r4

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Commands in words: their text form, and what to say when one is wrong or refused.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "../../protocol/keys/authentication.hpp"
+#include "../../protocol/messages/command.hpp"
+#include "../../protocol/messages/settings.hpp"
+#include "../../transports/error.hpp"
+
+namespace r4 {
+
+// One command of the board, for help and for the fix in an error.
+struct CommandHelp {
+  char letter;
+  std::string_view form;     // "O:pwm,dir,ch"
+  std::string_view meaning;  // "OSMC motor driver"
+  std::string_view ranges;   // "pwm 0-4095, dir 0 or 1, ch 1-4"
+};
+
+// The help of the command with that letter; nullptr if there is none.
+const CommandHelp* command_help(char letter);
+// All of them, in the order of docs/protocol.md; terminated by letter 0.
+const CommandHelp* all_command_help();
+
+// The text of a command, as it is on the wire: "O:358,1,1".
+std::string text_of(const Command& command);
+
+// The same for people and logs to see, without what is secret: "C:password,...", "C:key,1:...". The
+// value of a setting that we do not know may be meant for one that is.
+std::string shown(const Command& command);
+std::string shown(std::string_view text);
+
+// Parses "O:358,1,1" (with or without the final ';'). Throws Error{usage} naming what is wrong. The
+// command's texts are views of `text`.
+Command parse_command_text(std::string_view text);
+
+// The problem of a command, given as text, that is refused for its form or its values before it is
+// sent.
+Problem bad_command(std::string_view text, Refusal refusal);
+
+// Throws Error{usage} for a command outside its ranges, and for one whose texts do not go into a
+// datagram. What it lets pass can be sent.
+void require_valid(const Command& command);
+
+// Throws Error{usage} unless `url` is of a board's own cable: elsewhere, on a network or a bus, others
+// would see what the board does not even take there: `secret`, in words.
+void require_cable(std::string_view url, std::string_view secret);
+// The same for a command with a secret; others may go anywhere.
+void require_cable(std::string_view url, const Command& command);
+
+// What a board's refusal means: "no such channel".
+std::string_view meaning_of(Refusal refusal);
+
+}  // namespace r4

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The commands of a session that are under way: a fixed number of slots, walked in the order in
+// which the commands were given. No heap after the construction.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "../../protocol/messages/command.hpp"
+
+namespace r4 {
+
+// One command, from send() until it ends. The times are the session's.
+struct PendingCommand {
+  enum class Stage : std::uint8_t { free, queued, sent };
+  // What it is for: a command of the program, an arm() of it (never sent), or a command that arm()
+  // sends.
+  enum class Role : std::uint8_t { command, arm, arm_step };
+  Stage stage = Stage::free;
+  Role role = Role::command;
+  CommandKind kind = CommandKind::heartbeat;
+  bool executed = false;    // the board said DUPLICATE: it has executed this number
+  bool overtaken = false;   // CMD is past it: the answer to a retry decides
+  bool cable_only = false;  // a setting that is refused elsewhere
+  std::uint32_t pnum = 0;
+  std::uint64_t ticket = 0;
+  std::int32_t cause = Command::unnamed_cause;  // clear: the cause it names, once one is known
+  std::chrono::microseconds started{0}, deadline{0}, retry{0};
+  std::size_t size = 0;  // of what is in `bytes`: the command's field; once sent, PNum and T too
+  Command command;       // without its texts
+  std::array<char, max_datagram> bytes;
+};
+
+class PendingCommands {
+ public:
+  static constexpr std::size_t max_slots = 128;
+
+  // At most max_slots together: `commands` and, in slots of their own, `stops`, so that no number
+  // of commands can keep a stop out.
+  PendingCommands(std::size_t commands, std::size_t stops)
+      : slots_(commands + stops), order_(commands + stops), commands_(commands), stops_(stops) {
+    for (std::size_t i = 0; i < order_.size(); ++i) order_[i] = static_cast<std::uint8_t>(i);
+  }
+
+  // A slot for a command, the last in the order, with everything reset but `bytes`; nullptr if all
+  // are taken.
+  PendingCommand* add(CommandKind kind) {
+    std::size_t& room = room_for(kind);
+    if (room == 0) return nullptr;
+    --room;
+    PendingCommand& slot = slots_[order_[used_++]];
+    slot.stage = PendingCommand::Stage::queued;
+    slot.role = PendingCommand::Role::command;
+    slot.kind = kind;
+    slot.executed = slot.overtaken = slot.cable_only = false;
+    slot.pnum = 0;
+    slot.cause = Command::unnamed_cause;
+    slot.size = 0;
+    return &slot;
+  }
+
+  void remove(PendingCommand& command) {
+    const auto index = static_cast<std::uint8_t>(&command - slots_.data());
+    const auto end = order_.begin() + static_cast<std::ptrdiff_t>(used_);
+    std::rotate(std::find(order_.begin(), end, index), std::find(order_.begin(), end, index) + 1,
+                end);
+    --used_;
+    ++room_for(command.kind);
+    command.stage = PendingCommand::Stage::free;
+  }
+
+  // Those under way now, oldest first. While they are walked, commands may be added, which are not
+  // visited, and removed, which are passed over.
+  class Walk {
+   public:
+    class Iterator {
+     public:
+      Iterator(const Walk& walk, std::size_t at) : walk_(walk), at_(at) { skip(); }
+      PendingCommand& operator*() const { return walk_.command(at_); }
+      Iterator& operator++() {
+        ++at_;
+        skip();
+        return *this;
+      }
+      friend bool operator!=(const Iterator& a, const Iterator& b) { return a.at_ != b.at_; }
+
+     private:
+      void skip() {
+        while (at_ < walk_.count_ && (**this).stage == PendingCommand::Stage::free) ++at_;
+      }
+      const Walk& walk_;
+      std::size_t at_;
+    };
+    explicit Walk(PendingCommands& commands)
+        : slots_(commands.slots_.data()), count_(commands.used_) {
+      std::copy_n(commands.order_.begin(), count_, order_.begin());
+    }
+    Iterator begin() const { return {*this, 0}; }
+    Iterator end() const { return {*this, count_}; }
+
+   private:
+    PendingCommand& command(std::size_t at) const { return slots_[order_[at]]; }
+    PendingCommand* slots_;
+    std::size_t count_;
+    std::array<std::uint8_t, max_slots> order_;
+  };
+  Walk under_way() { return Walk(*this); }
+
+ private:
+  std::size_t& room_for(CommandKind kind) { return kind == CommandKind::stop ? stops_ : commands_; }
+
+  std::vector<PendingCommand> slots_;
+  std::vector<std::uint8_t> order_;  // of slots: those under way, oldest first, then the free ones
+  std::size_t used_ = 0;
+  std::size_t commands_, stops_;  // how many more
+};
+
+}  // namespace r4

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Whether a program may drive outputs, and how it comes to be allowed: without I/O, part of a session.
+//
+// Whatever made the outputs safe may be over by itself (a handle held again, an obstacle gone, a board
+// that has restarted) or by somebody else's E:CLEAR. A program that streams setpoints would then drive
+// off, unasked. So output commands are refused here until the program calls arm(), on purpose:
+//
+//               arm()                no cause is left             R:1,On confirmed
+//     disarmed -------> clearing --------------------> closing -------------------> armed
+//        ^              |  ^  | E:CLEAR of a stop,        |                            |
+//        |              |  +--+ watchdog, fault           |                            |
+//        +--------------+---------------------------------+----------------------------+
+//         a cause other than the link; a restart; relay 1 seen open; the deadline of arm()
+//
+// A lost link does not disarm: whether the board brings its outputs back (`recovery`) is seen by relay 1,
+// the motor supply (docs/safety.md), which every state tells.
+//
+// arm() clears what it finds when it begins, and what that was hiding, each cause once: a stop that is
+// pressed meanwhile stays, and ends it. A released handle and an obstacle cannot be cleared, and end it.
+#pragma once
+
+#include <cstdint>
+
+#include "../../protocol/messages/units.hpp"
+
+namespace r4 {
+
+// Must a program be armed to drive?
+enum class Arming : std::uint8_t {
+  required,
+  off,  // output commands go out whenever the link is up
+};
+
+// Why a session is not armed.
+enum class DisarmCause : std::uint8_t {
+  none,       // it is armed
+  not_yet,    // arm() was not called yet
+  stop,       // an emergency stop
+  handle,     // the dead-man's handle was released
+  proximity,  // something came nearer than a threshold
+  watchdog,   // a duty of the board missed its deadline
+  fault,      // the board found a fault in itself
+  link,       // the link was lost, and the board did not bring its outputs back
+  restart,    // the board has begun again
+  supply,     // relay 1, the motor supply, was opened
+};
+
+// "stop", "not yet" …
+const char* to_text(DisarmCause cause);
+// The cause that a reason of the board is; none for `none` and `link`.
+DisarmCause cause_of(SafeReason reason);
+
+class ArmingMachine {
+ public:
+  // What arm() needs next.
+  enum class Step : std::uint8_t {
+    wait,   // for the link
+    clear,  // E:CLEAR
+    close,  // R:1,On
+    fail,   // it cannot be armed: cause()
+  };
+
+  bool armed() const { return cause_ == DisarmCause::none; }
+  DisarmCause cause() const { return cause_; }
+
+  // --- what disarms
+
+  void disarm(DisarmCause cause);
+  // The board's reason to be safe, as heard last.
+  void on_reason(SafeReason reason);
+  // The link is not up.
+  void on_outage() { outage_ = true; }
+  // A state of a board that has no reason to be safe tells how relay 1 is.
+  void on_supply(bool closed);
+
+  // --- arm()
+
+  void begin();
+  bool under_way() const { return under_way_; }
+  // It ends without success.
+  void give_up() { under_way_ = false; }
+  // `reason`: the board's, as heard last.
+  Step next(SafeReason reason);
+  // R:1,On is confirmed, and nothing speaks against it.
+  void on_closed();
+
+ private:
+  DisarmCause cause_ = DisarmCause::not_yet;
+  bool outage_ = false;  // since relay 1 was last known to be closed
+  bool under_way_ = false;
+  bool looked_ = false;       // this arm() has seen the board's reason
+  std::uint8_t cleared_ = 0;  // bit n: this arm() has cleared reason n
+};
+
+}  // namespace r4

@@ -1,0 +1,441 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "session.hpp"
+
+#include <algorithm>
+#include <random>
+
+#include "../../protocol/link/board_link.hpp"
+#include "../../transports/error.hpp"
+#include "../../transports/framing/can/can_ids.hpp"
+#include "../commands/command_evidence.hpp"
+#include "../commands/command_help.hpp"
+#include "limits.hpp"
+
+namespace r4 {
+
+namespace {
+
+constexpr Time selection_retry = std::chrono::milliseconds{200};
+constexpr int max_selections = 5;  // then the board is taken for one that does not know F
+// Such a board is asked now and then all the same: on a bad line all five may have been lost.
+constexpr Time selection_reminder = std::chrono::seconds{1};
+
+}  // namespace
+
+const char* to_text(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::confirmed:
+      return "confirmed";
+    case Outcome::refused:
+      return "refused";
+    case Outcome::timed_out:
+      return "timed out";
+    case Outcome::cancelled:
+      return "cancelled";
+    case Outcome::full:
+      return "full";
+    case Outcome::not_armed:
+      return "not armed";
+  }
+  return "unknown";
+}
+
+std::uint32_t Session::random_first_pnum() {
+  std::random_device random;
+  return echo_host_first_pnum + (random() & 0x3fffffffU);
+}
+
+Session::Session(Handler& handler, SessionOptions options, std::uint32_t first_pnum)
+    : handler_(handler),
+      options_(std::move(options)),
+      first_pnum_(first_pnum),
+      link_(options_.timing, first_pnum),
+      key_(options_.key, options_.clock_start),
+      pending_(max_pending, max_stops) {
+  require_valid(options_);
+  if (!options_.fields.empty()) {
+    const std::string fields = options_.fields;
+    if (FieldSet set; parse_fields(fields, set) != Refusal::none) {
+      throw Error(bad_command("F:" + fields, Refusal::unknown));
+    }
+    require_valid(with_needed_fields(Command::fields(fields)));
+  }
+}
+
+// --- what comes in
+
+void Session::receive(std::string_view bytes, Time now) {
+  Datagram datagram;
+  const ReadResult result = read(bytes, datagram);
+  if (!result) {
+    ++collector_.counts.damaged;
+    handler_.on_bad_datagram(result, bytes);
+    return;
+  }
+  const MessageKind kind = kind_of(datagram);
+  const bool from_board = kind == MessageKind::board_heartbeat || kind == MessageKind::nack ||
+                          kind == MessageKind::identity || kind == MessageKind::state;
+  if (!from_board || !datagram.has_pnum() || !datagram.has_time()) return;
+  ++collector_.counts.received;
+
+  switch (kind) {
+    case MessageKind::nack:
+      on_nack_datagram(datagram, now);
+      break;
+    case MessageKind::identity:
+      on_identity_datagram(datagram, now);
+      break;
+    case MessageKind::board_heartbeat:
+      on_heartbeat_datagram(datagram, now);
+      break;
+    default:
+      on_state_datagram(datagram, now);
+      break;
+  }
+  refresh_status(now);
+}
+
+void Session::on_heartbeat_datagram(const Datagram& datagram, Time now) {
+  const bool connecting = is_connecting_heartbeat(datagram);
+  const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
+  const SafeReport report = heartbeat_report(datagram);
+  const bool current = is_current(
+      link_.on_datagram(datagram.pnum(), connecting ? 0 : t_ms, true, report.reason, to_ms(now)));
+  notice_restart();
+  if (current) {
+    state_.safe = report.reason;
+    if (report.reason == SafeReason::none) state_.fault = ChipFault();
+    key_.on_heartbeat(datagram);
+    key_.on_board_time(t_ms, now);
+    if (key_.asked_for()) knows_cmd_ = true;
+    key_.on_reason(connecting ? SafeReason::link : report.reason, now);
+  }
+  handler_.on_board_heartbeat(datagram);
+  if (!current) return;
+  refresh_status(now);
+  confirm_stop(report, now);
+  on_causes(report.cause, now);
+}
+
+void Session::on_state_datagram(const Datagram& datagram, Time now) {
+  ReceivedState fresh = state_;
+  if (!read_state(datagram, fresh)) {
+    ++collector_.counts.damaged;
+    ReadResult result;
+    result.error = ReadError::syntax;
+    handler_.on_bad_datagram(result,
+                             std::string_view(datagram.bytes().data(), datagram.bytes().size()));
+    return;
+  }
+  const SafeReason reason = fresh.present.has(StateField::safe) ? fresh.safe : SafeReason::none;
+  const Arrival arrival = link_.on_datagram(fresh.pnum, fresh.t_ms, false, reason, to_ms(now));
+  if (notice_restart()) {  // nothing of the boot before
+    fresh = state_;
+    read_state(datagram, fresh);
+  }
+  // An older state must not replace a newer one. A late one that only a heartbeat or an answer has
+  // overtaken, in a queue where those go first, is still the newest state.
+  const bool newest_state = arrival == Arrival::late && newer(fresh.pnum, state_.pnum);
+  if (!is_current(arrival) && !newest_state) return;
+  collector_.on_state(fresh.t_ms, now);
+  if (!newest_state) {
+    key_.on_board_time(fresh.t_ms, now);
+    key_.on_host_seen(now);
+  }
+  state_ = fresh;
+  state_.received = ReceivedState::Clock::time_point(now);
+  state_.safe = reason;
+  // It is in every state while there is one.
+  if (!state_.present.has(StateField::fault)) state_.fault = ChipFault();
+  refresh_status(now);
+  confirm_from_state(now);
+  look_at_supply();
+  select_fields(now);
+  handler_.on_state(state_, datagram);
+}
+
+void Session::on_nack_datagram(const Datagram& datagram, Time now) {
+  Nack nack;
+  if (!read_nack(datagram, nack)) return;
+  if (!is_ours(nack.pnum)) return;  // on a CAN bus the answers to other hosts are heard too
+  knows_cmd_ = true;                // the paper's release answers nothing
+  if (nack.code == Refusal::busy) {
+    busy_until_ = now + busy_memory;
+    key_.on_host_seen(now);
+  }
+  on_answer(datagram, now);
+  const bool not_taken = nack.code == Refusal::auth && !is_cable_only(nack.pnum);
+  if (not_taken) key_.on_refusal(now);
+  const bool other_copy = not_taken && key_.has_key();  // may have been executed
+  const bool proof = !other_copy && is_proof(nack);
+  handler_.on_nack(nack, datagram);
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.stage != Stage::sent || pending.pnum != nack.pnum) continue;
+    if (nack.code == Refusal::duplicate) {
+      pending.executed = true;
+      confirm_from_state(now);
+      continue;
+    }
+    if (proof) finish(pending, Outcome::refused, nack.code, now);
+  }
+  if (proof) on_post_refused(nack);
+}
+
+// Does the refusal prove that the command was not executed? Only while the board remembers what it
+// executed: in the session in which the command was sent, and not after too many numbers. Without
+// proof the deadline ends it, as unknown.
+bool Session::is_proof(const Nack& nack) const {
+  return nack.has_session && is_ours(nack.session) && newer(nack.pnum, nack.session) &&
+         link_.last_pnum() - nack.pnum < BoardLink::memory;
+}
+
+void Session::on_identity_datagram(const Datagram& datagram, Time now) {
+  Identity identity;
+  if (!read_identity(datagram, identity)) return;
+  knows_cmd_ = true;
+  on_answer(datagram, now);
+  if (question_open_) collector_.on_round_trip(now - question_sent_);
+  question_open_ = false;
+  handler_.on_identity(identity);
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.stage == Stage::sent && pending.kind == CommandKind::identify) {
+      finish(pending, Outcome::confirmed, Refusal::none, now);
+    }
+  }
+}
+
+// Is that one of our settings that the board takes over a cable only?
+bool Session::is_cable_only(std::uint32_t pnum) {
+  for (const Pending& pending : pending_.under_way()) {
+    if (pending.stage == Stage::sent && pending.pnum == pnum) return pending.cable_only;
+  }
+  return false;
+}
+
+// Have we sent a datagram with that number?
+bool Session::is_ours(std::uint32_t pnum) const {
+  return pnum - first_pnum_ <= link_.last_pnum() - first_pnum_;
+}
+
+// An answer counts in the board's packet numbers, but not in those that a host without control
+// sees.
+void Session::on_answer(const Datagram& datagram, Time now) {
+  if (busy_until_ > now) return;
+  link_.on_answer(datagram.pnum(), static_cast<std::uint32_t>(datagram.time_ms()), to_ms(now));
+  notice_restart();
+}
+
+// A board that begins again knows nothing of what it had before. True if it has just been found to.
+bool Session::notice_restart() {
+  if (restarts_ == link_.restarts()) return false;
+  restarts_ = link_.restarts();
+  state_ = ReceivedState();
+  disarm(DisarmCause::restart);
+  handler_.on_restart();
+  return true;
+}
+
+// --- what the board's state proves
+
+void Session::confirm_from_state(Time now) {
+  const bool has_cmd = state_.present.has(StateField::cmd);
+  if (has_cmd) {
+    command_field_seen_ = now;
+    knows_cmd_ = true;
+    // The board has executed a command of ours, so we control it.
+    if (link_up() && is_ours(state_.last_command)) controlled_ = true;
+  }
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.stage != Stage::sent || pending.kind == CommandKind::stop ||
+        pending.kind == CommandKind::identify) {
+      continue;
+    }
+    if (has_cmd) {
+      const bool exact = state_.last_command == pending.pnum;
+      const bool past = newer(state_.last_command, pending.pnum);
+      if (exact || (past && pending.executed)) {
+        finish(pending, Outcome::confirmed, Refusal::none, now);
+      } else if (past && !pending.overtaken) {
+        pending.overtaken = true;
+        pending.retry = now;  // ask at once what became of it
+      }
+    } else if (!knows_cmd_ && (options_.fields.empty() || selections_ >= max_selections) &&
+               state_shows(state_, pending.command)) {
+      finish(pending, Outcome::confirmed, Refusal::none, now);
+    }
+  }
+}
+
+// The board names the stop that it has obeyed. On a CAN bus it was told the end of the number only.
+void Session::confirm_stop(const SafeReport& report, Time now) {
+  if (report.reason != SafeReason::stop || !report.has_stop) return;
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.stage != Stage::sent || pending.kind != CommandKind::stop) continue;
+    if (report.stop != pending.pnum && report.stop != short_stop_number(pending.pnum)) continue;
+    std::copy_n(pending.bytes.begin(), pending.size, lingering_.begin());
+    lingering_size_ = pending.size;
+    linger_until_ = now + options_.stop_linger;
+    next_linger_ = pending.retry;
+    finish(pending, Outcome::confirmed, Refusal::none, now);
+  }
+}
+
+// The number of the newest cause that only E:CLEAR ends. A newer one than that which an E:CLEAR or an
+// arm() was to clear has come after it was asked for, so that it is given up.
+void Session::on_causes(std::int32_t newest, Time now) {
+  cause_ = newest;
+  for (Pending& pending : pending_.under_way()) {
+    const bool arms = pending.role == Pending::Role::arm;
+    if ((pending.kind != CommandKind::clear && !arms) || !name_cause(pending)) continue;
+    if (newest == 0 || newest == pending.cause) continue;
+    if (arms) {
+      end_arming(Outcome::not_armed, Refusal::none, now);
+    } else {
+      finish(pending, Outcome::cancelled, Refusal::none, now);
+    }
+  }
+}
+
+// Sees to it that the state has the fields we need, whoever chose others, and that we are in
+// control.
+void Session::select_fields(Time now) {
+  if (controlled_ && now - command_field_seen_ < selection_retry) {
+    selections_ = 0;
+    return;
+  }
+  if (options_.fields.empty() || !link_up() || busy_until_ > now) return;
+  if (now < next_selection_) return;
+  ++selections_;
+  next_selection_ = now + (speaks_no_cmd() ? selection_reminder : selection_retry);
+  transmit_now(Command::fields(options_.fields), to_ms(now), Priority::normal, now);
+}
+
+// A command that chooses fields, with those that we need; the choice is remembered.
+Command Session::with_needed_fields(const Command& command) {
+  if (command.kind != CommandKind::fields || options_.fields.empty()) return command;
+  FieldSet set;
+  parse_fields(command.text, set);
+  std::string fields(command.text.data(), command.text.size());
+  if (!set.has(StateField::safe)) fields += ",SAFE";
+  if (!set.has(StateField::cmd)) fields += ",CMD";
+  if (!set.has(StateField::relays) && options_.arming == Arming::required) fields += ",RELAYS";
+  if (fields != options_.fields) {
+    options_.fields = std::move(fields);
+    selections_ = 0;
+  }
+  return Command::fields(options_.fields);
+}
+
+// --- time
+
+Time Session::poll(Time now) {
+  link_.poll(to_ms(now));
+  refresh_status(now);
+  if (link_.heartbeat_due(to_ms(now))) {
+    if (transmit_now(Command::heartbeat(), link_.echo(), Priority::normal, now) ==
+        SendResult::sent) {
+      ++collector_.counts.heartbeats;
+      key_.on_heartbeat_sent();
+      link_.heartbeat_sent(to_ms(now));
+    } else {
+      link_.heartbeat_not_sent(to_ms(now));
+    }
+  }
+  for (Pending& pending : pending_.under_way()) {
+    if (now >= pending.deadline) {
+      finish(pending, Outcome::timed_out, Refusal::none, now);
+    }
+  }
+  if (!controlled_) select_fields(now);  // the first thing when the link comes up
+  send_queued(now);
+  advance_arming(now);
+  refuse_held_back(now);
+  send_queued(now);  // what has waited for arm()
+  retry_due(now);
+  linger(now);
+  if (options_.identify_interval.count() != 0 && link_up() && now >= next_identify_) {
+    next_identify_ = now + options_.identify_interval;
+    question_sent_ = now;
+    question_open_ = true;
+    transmit_now(Command::identify(), to_ms(now), Priority::normal, now);
+  }
+
+  Time next = now + std::chrono::milliseconds{link_.due_in(to_ms(now))};
+  // due_in() counts whole milliseconds; aim behind the edge, not before it.
+  next = std::chrono::duration_cast<std::chrono::milliseconds>(next) + Time{0};
+  if (next <= now) next = now + Time{1000};
+  if (link_up() && options_.identify_interval.count() != 0) next = std::min(next, next_identify_);
+  if (busy_until_ > now) next = std::min(next, busy_until_);
+  if (lingering_size_ != 0) next = std::min(next, next_linger_);
+  for (const Pending& pending : pending_.under_way()) {
+    next = std::min(next, pending.deadline);
+    if (pending.stage == Stage::sent) next = std::min(next, pending.retry);
+  }
+  return next;
+}
+
+void Session::on_transport(bool up, Time now) {
+  transport_down_ = !up;
+  link_.on_transport(up);
+  refresh_status(now);
+}
+
+bool Session::link_up() const {
+  if (!link_.echoed() || key_.refuses_board()) return false;
+  switch (link_.state()) {
+    case HostLinkState::active:
+      return true;
+    case HostLinkState::safe:
+      return link_.reason() != SafeReason::link;
+    case HostLinkState::connecting:
+    case HostLinkState::lost:
+      return false;
+  }
+  return false;
+}
+
+// Commands wait for proof of control: the session's own F, executed. So none is ever sent into a
+// session that the board has not accepted, where a refusal would say nothing.
+bool Session::in_control(Time now) const {
+  const bool proven = controlled_ || options_.fields.empty() || speaks_no_cmd();
+  return link_up() && busy_until_ <= now && proven && !link_.watchdog_expired(to_ms(now));
+}
+
+// The paper's release: it has let our selections pass, and has never answered anything.
+bool Session::speaks_no_cmd() const { return !knows_cmd_ && selections_ >= max_selections; }
+
+void Session::refresh_status(Time now) {
+  if (!link_up() || busy_until_ > now) controlled_ = false;
+  look_at_arming();
+  const LinkStatus fresh{
+      .state = link_.state(),
+      .reason = link_.reason(),
+      .busy = busy_until_ > now,
+      .gated = link_.watchdog_expired(to_ms(now)),
+      .key = key_.trouble(now),
+      .in_control = in_control(now),
+      .transport_down = transport_down_,
+      .chip = link_.reason() == SafeReason::fault ? state_.fault : ChipFault(),
+  };
+  if (fresh == status_) return;
+  status_ = fresh;
+  handler_.on_link(status_);
+}
+
+void Session::watchdog(std::chrono::milliseconds period, Time now) {
+  link_.watchdog(static_cast<std::uint32_t>(period.count()), to_ms(now));
+  refresh_status(now);
+}
+
+void Session::feed(Time now) {
+  link_.feed(to_ms(now));
+  refresh_status(now);
+}
+
+Statistics Session::statistics(Time now) const {
+  Statistics report = collector_.report(now);
+  report.packets = link_.counters();
+  return report;
+}
+
+}  // namespace r4

@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The host's side of one board, without I/O: datagrams and time in, datagrams and events out.
+//
+// It keeps the link alive (protocol/host_link), takes control, chooses the state fields it needs,
+// sends commands and finds out whether the board executed them:
+//
+//     queued --control--> sent --CMD == PNum in the board's state--> confirmed
+//                          |  ^                  N:…,<code>  ------> refused
+//                          +--+ the same bytes   deadline    ------> timed out
+//                         every 50 ms
+//
+// A retry has the bytes and the packet number of the original (signed anew, where there is a key),
+// so the board can execute it only once. When CMD has moved past a command, the retry's answer
+// (DUPLICATE: executed, STALE: not) decides. A refusal proves that the command was not executed only
+// if it names a session that began before the command was sent: over an outage the board forgets. A
+// board without CMD (the paper's release) confirms by the value that its state shows.
+//
+// With a key (host_key.hpp) all is signed, a board without one is refused, and AUTH says only that one
+// copy was not taken: another may have been executed.
+//
+// Commands that drive outputs are refused here while the session is not armed (arming.hpp).
+//
+// E:STOP does not wait for the link, overtakes everything, discards all commands that wait, and is
+// repeated every 20 ms until a heartbeat of the board reports the reason `stop` and this stop's own
+// number, and for a while longer, in case that somebody's E:CLEAR was on its way. E:CLEAR names the
+// cause that was known when it was asked for; when the board tells of a newer one, it is given up.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "../../protocol/messages/command.hpp"
+#include "../../protocol/link/host_link.hpp"
+#include "../../protocol/messages/message.hpp"
+#include "../../transports/carrier.hpp"
+#include "arming.hpp"
+#include "host_key.hpp"
+#include "../commands/pending_commands.hpp"
+#include "../commands/post_result.hpp"
+#include "../commands/posted_commands.hpp"
+#include "received_state.hpp"
+#include "statistics.hpp"
+#include "time.hpp"
+
+namespace r4 {
+
+// What the host knows of the link.
+struct LinkStatus {
+  HostLinkState state = HostLinkState::connecting;
+  SafeReason reason = SafeReason::none;  // why the board is safe
+  bool busy = false;                     // another host controls the board
+  bool gated = false;                    // the application watchdog has stopped our heartbeats
+  KeyTrouble key = KeyTrouble::none;
+  bool in_control = false;      // the board takes our commands: they go out at once
+  bool transport_down = false;  // it is gone: unplugged, its interface switched off
+  ChipFault chip{};             // of a fault: the chip that is the cause, if it is one
+  friend bool operator==(const LinkStatus&, const LinkStatus&) = default;
+};
+
+// How a command ended.
+enum class Outcome : std::uint8_t {
+  confirmed,  // the board's own state says so
+  refused,    // the board refused it, and did not execute it: `code`
+  timed_out,  // no confirmation until the deadline; it may or may not have been executed
+  cancelled,  // given up: a stop, or the end of the session, came first
+  full,       // not taken: Session::max_pending commands are under way already
+  not_armed,  // not sent: it drives an output and the session is not armed, because of `disarmed`;
+              // arm() itself: it cannot be armed while that is so
+};
+
+// "confirmed", "refused", "timed out" …
+const char* to_text(Outcome outcome);
+
+struct CommandResult {
+  Outcome outcome = Outcome::timed_out;
+  Refusal code = Refusal::none;              // for refused
+  Time elapsed{0};                           // from send() to now
+  DisarmCause disarmed = DisarmCause::none;  // for not_armed
+};
+
+// Names a command that send() took; never 0.
+using Ticket = std::uint64_t;
+
+struct SessionOptions {
+  HostLink::Timing timing;
+  // Must a program call arm() before it drives, and again after whatever made the outputs safe?
+  Arming arming = Arming::required;
+  // The state fields to ask for, as in F; SAFE and CMD, and RELAYS for arming, are added, to these and
+  // to those of any F that is sent. Empty: leave the board's choice, and every F, alone.
+  std::string fields = "DEFAULT";
+  std::chrono::milliseconds command_retry{50};
+  std::chrono::milliseconds stop_retry{20};
+  // For how long a stop is repeated after it was confirmed.
+  std::chrono::milliseconds stop_linger{200};
+  // Q:ID, for identity and round-trip time; 0: never.
+  std::chrono::milliseconds identify_interval{1000};
+  // The board's key. Each host has its own, by its id: of two that share one, the slower is taken for
+  // a replay.
+  std::optional<Key> key;
+  // When the session's clock began, in microseconds since 1970: a host that begins again must go on
+  // counting above what it has used.
+  Time clock_start{0};
+};
+
+class Session {
+ public:
+  // What the session does and tells. The calls come from receive(), poll(), send() and stop(); the
+  // views are valid in the call.
+  class Handler {
+   public:
+    virtual SendResult transmit(std::string_view datagram, Priority priority) = 0;
+    virtual void on_state(const ReceivedState& state, const Datagram& datagram) = 0;
+    virtual void on_board_heartbeat(const Datagram& datagram) = 0;
+    virtual void on_identity(const Identity& identity) = 0;
+    virtual void on_nack(const Nack& nack, const Datagram& datagram) = 0;
+    virtual void on_bad_datagram(const ReadResult& result, std::string_view bytes) = 0;
+    virtual void on_link(const LinkStatus& status) = 0;
+    virtual void on_result(Ticket ticket, const CommandResult& result) = 0;
+    // The board has begun again since it was heard: all that it was told is gone, but for settings
+    // that it stores. Called before its new state.
+    virtual void on_restart() {}
+    // The session is armed (none), or not any more.
+    virtual void on_arming(DisarmCause) {}
+    // The board refused a command that was posted.
+    virtual void on_refused(const RefusedPost&) {}
+
+   protected:
+    ~Handler() = default;
+  };
+
+  // `first_pnum`: echo_host_first_pnum plus 30 random bits (random_first_pnum()).
+  // Throws Error{usage} if options.fields are no state fields.
+  Session(Handler& handler, SessionOptions options, std::uint32_t first_pnum);
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  // A datagram has come. poll() is needed then.
+  void receive(std::string_view bytes, Time now);
+  // Does what is due. Returns when it is needed next, at the latest.
+  Time poll(Time now);
+  // The transport has gone or come; poll() is needed now.
+  void on_transport(bool up, Time now);
+
+  // Sends a command and finds out what became of it, by on_result() at the latest at `timeout` from
+  // now. Throws Error{usage} for a command outside its ranges; returns 0 when 64 are under way
+  // already.
+  Ticket send(const Command& command, Time timeout, Time now);
+  // Sends a command once and does not wait for it: on_refused() tells if the board refuses it.
+  PostResult post(const Command& command, Time now);
+  // Clears what made the outputs safe, where that can be cleared, and closes relay 1, the motor supply:
+  // confirmed when the board's state shows it. Output commands that are sent behind it wait for it.
+  // Returns 0 when 64 commands are under way already.
+  Ticket arm(Time timeout, Time now);
+  // E:STOP, sent before this returns. Confirmed when the board tells that it has obeyed this very
+  // stop. Returns 0, with the stop sent all the same, when 16 stops are under way already.
+  Ticket stop(Time timeout, Time now);
+  // Asks who the board is; on_identity() follows. Confirmed by the answer.
+  Ticket identify(Time timeout, Time now);
+  // Gives a command up without on_result().
+  void forget(Ticket ticket);
+  // Ends every command under way as cancelled.
+  void cancel_all(Time now);
+
+  // The application watchdog: without feed() for `period` the heartbeats stop, and the board goes
+  // safe; commands are held back, too, for nobody looks after what they do. 0 turns it off.
+  void watchdog(std::chrono::milliseconds period, Time now);
+  void feed(Time now);
+
+  const LinkStatus& link() const { return status_; }
+  // The link is up, the board has executed a command of ours, and the watchdog has not expired:
+  // commands go out at once.
+  bool in_control(Time now) const;
+  // Why the session is not armed; none if it is.
+  DisarmCause disarmed_by() const { return arming_.cause(); }
+  // Are output commands sent?
+  bool may_drive() const;
+  // Has the board told which cause an E:CLEAR would have to name? One that is asked for sooner names the
+  // first that is told.
+  bool knows_cause() const { return cause_ != Command::unnamed_cause; }
+  const ReceivedState& state() const { return state_; }
+  Statistics statistics(Time now) const;
+
+  static constexpr std::size_t max_pending = 64;
+  static constexpr std::size_t max_stops = 16;
+  static std::uint32_t random_first_pnum();
+
+ private:
+  using Pending = PendingCommand;
+  using Stage = PendingCommand::Stage;
+  static constexpr Time busy_memory = std::chrono::milliseconds{300};
+
+  Pending* allocate(const Command& command, Time timeout, Time now);
+  void transmit(Pending& pending, Time now);
+  void send_queued(Time now);
+  void retry_due(Time now);
+  void finish(Pending& pending, Outcome outcome, Refusal code, Time now);
+  SendResult transmit_now(const Command& command, std::uint32_t t_ms, Priority priority, Time now);
+  SendResult close_and_transmit(DatagramWriter& writer, CommandKind kind, Priority priority,
+                                Time now);
+  bool link_up() const;
+  bool speaks_no_cmd() const;
+
+  void on_heartbeat_datagram(const Datagram& datagram, Time now);
+  void on_state_datagram(const Datagram& datagram, Time now);
+  void on_identity_datagram(const Datagram& datagram, Time now);
+  void on_nack_datagram(const Datagram& datagram, Time now);
+  void on_answer(const Datagram& datagram, Time now);
+  bool notice_restart();
+  bool is_ours(std::uint32_t pnum) const;
+  bool is_proof(const Nack& nack) const;
+  bool is_cable_only(std::uint32_t pnum);
+  void confirm_from_state(Time now);
+  bool is_held_back(CommandKind kind) const;
+  void disarm(DisarmCause cause);
+  void tell_arming();
+  void look_at_arming();
+  void look_at_supply();
+  bool supply_closed() const;
+  void advance_arming(Time now);
+  void send_arming_step(const Command& command, Time now);
+  void on_arming_step(CommandKind kind, Outcome outcome, Refusal code, Time now);
+  void end_arming(Outcome outcome, Refusal code, Time now);
+  void give_up_arming();
+  void refuse_held_back(Time now);
+  void on_post_refused(const Nack& nack);
+  void confirm_stop(const SafeReport& report, Time now);
+  void on_causes(std::int32_t newest, Time now);
+  bool name_cause(Pending& pending) const;
+  void linger(Time now);
+  void select_fields(Time now);
+  Command with_needed_fields(const Command& command);
+  void refresh_status(Time now);
+
+  Handler& handler_;
+  SessionOptions options_;
+  std::uint32_t first_pnum_;
+  HostLink link_;
+  HostKey key_;
+  bool transport_down_ = false;
+  bool controlled_ = false;  // the board has executed a command of ours since the link came up
+  LinkStatus status_;
+  ReceivedState state_;
+  std::uint32_t restarts_ = 0;  // of the board, those that were told
+  StatisticsCollector collector_;
+  ArmingMachine arming_;
+  DisarmCause told_cause_ = DisarmCause::not_yet;
+  PendingCommands pending_;
+  PostedCommands posted_;
+  Ticket next_ticket_ = 1;
+  // As the newest heartbeat told it; unnamed_cause: none was heard.
+  std::int32_t cause_ = Command::unnamed_cause;
+  // The stop that was confirmed last, repeated until then.
+  std::array<char, max_datagram> lingering_;
+  std::size_t lingering_size_ = 0;  // 0: none
+  Time linger_until_{0};
+  Time next_linger_{0};
+  Time busy_until_{0};
+  Time next_identify_{0};
+  Time question_sent_{0};
+  bool question_open_ = false;
+  Time command_field_seen_{0};
+  Time next_selection_{0};
+  int selections_ = 0;
+  bool knows_cmd_ = false;  // the board speaks this protocol, not only the paper's release of it
+};
+
+}  // namespace r4

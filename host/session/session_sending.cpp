@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the session sends, and how a command of it ends.
+#include <array>
+
+#include "../commands/command_help.hpp"
+#include "session.hpp"
+
+namespace r4 {
+
+// A datagram of which no copy is kept.
+SendResult Session::transmit_now(const Command& command, std::uint32_t t_ms, Priority priority,
+                                 Time now) {
+  std::array<char, max_datagram> buffer;
+  DatagramWriter writer(buffer.data(), buffer.size());
+  write_command(writer, command);
+  writer.stamp(link_.take_pnum(), t_ms);
+  return close_and_transmit(writer, command.kind, priority, now);
+}
+
+// The one way out: nothing is sent to a board that is refused, but stops.
+SendResult Session::close_and_transmit(DatagramWriter& writer, CommandKind kind, Priority priority,
+                                       Time now) {
+  if (key_.refuses_board() && kind != CommandKind::stop) return SendResult::down;
+  key_.sign(writer, now);
+  const Text bytes = writer.finish();
+  if (bytes.empty()) return SendResult::down;
+  const SendResult result = handler_.transmit({bytes.data(), bytes.size()}, priority);
+  if (result == SendResult::busy) busy_until_ = now + busy_memory;
+  return result;
+}
+
+Session::Pending* Session::allocate(const Command& command, Time timeout, Time now) {
+  Pending* const slot = pending_.add(command.kind);
+  if (slot == nullptr) return nullptr;
+  DatagramWriter writer(slot->bytes.data(), slot->bytes.size());
+  write_command(writer, command);
+  slot->size = writer.size();
+  slot->command = command;
+  slot->cable_only = command.kind == CommandKind::setting && is_site_setting(command.text);
+  slot->command.text = slot->command.text2 = Text();
+  slot->ticket = next_ticket_++;
+  slot->started = now;
+  slot->deadline = now + timeout;
+  if (command.kind == CommandKind::clear) {
+    slot->cause = command.value;
+    name_cause(*slot);
+    lingering_size_ = 0;  // who clears a stop repeats it no more
+  }
+  return slot;
+}
+
+// Gives an E:CLEAR or an arm() the number of the cause that is known now, if it has none yet. False:
+// nothing of the board has been heard.
+bool Session::name_cause(Pending& pending) const {
+  if (pending.cause == Command::unnamed_cause) pending.cause = cause_;
+  if (pending.cause == Command::unnamed_cause) return false;
+  if (pending.stage == Stage::queued && pending.kind == CommandKind::clear) {
+    DatagramWriter writer(pending.bytes.data(), pending.bytes.size());
+    write_command(writer, Command::clear(pending.cause));
+    pending.size = writer.size();
+  }
+  return true;
+}
+
+Ticket Session::send(const Command& command, Time timeout, Time now) {
+  require_valid(command);
+  Pending* pending = allocate(with_needed_fields(command), timeout, now);
+  if (pending == nullptr) return 0;
+  ++collector_.counts.commands;
+  const Ticket ticket = pending->ticket;
+  send_queued(now);
+  return ticket;
+}
+
+PostResult Session::post(const Command& command, Time now) {
+  require_valid(command);
+  send_queued(now);  // what was asked for earlier goes first
+  if (!in_control(now)) return PostResult::no_link;
+  if (is_held_back(command.kind)) {
+    ++collector_.counts.refused;
+    return PostResult::not_armed;
+  }
+  ++collector_.counts.commands;
+  const bool unnamed =
+      command.kind == CommandKind::clear && command.value == Command::unnamed_cause;
+  switch (
+      transmit_now(unnamed ? Command::clear(cause_) : command, to_ms(now), Priority::normal, now)) {
+    case SendResult::sent:
+      posted_.add(link_.last_pnum(), command);
+      return PostResult::sent;
+    case SendResult::full:
+      return PostResult::queue_full;
+    case SendResult::down:
+    case SendResult::busy:
+      break;
+  }
+  return PostResult::no_link;
+}
+
+Ticket Session::stop(Time timeout, Time now) {
+  lingering_size_ = 0;  // this one goes on from here
+  ++collector_.counts.commands;
+  give_up_arming();
+  disarm(DisarmCause::stop);
+  Ticket ticket = 0;
+  if (Pending* pending = allocate(Command::stop(), timeout, now)) {
+    ticket = pending->ticket;
+    transmit(*pending, now);
+  } else {
+    transmit_now(Command::stop(), to_ms(now), Priority::stop, now);
+  }
+  // Nothing that was asked for before a stop may follow it.
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.kind != CommandKind::stop) {
+      finish(pending, Outcome::cancelled, Refusal::none, now);
+    }
+  }
+  return ticket;
+}
+
+Ticket Session::identify(Time timeout, Time now) {
+  Pending* pending = allocate(Command::identify(), timeout, now);
+  if (pending == nullptr) return 0;
+  const Ticket ticket = pending->ticket;
+  transmit(*pending, now);
+  return ticket;
+}
+
+// Sends a pending command: the first time with a number of its own, then the same again.
+void Session::transmit(Pending& pending, Time now) {
+  const bool stop = pending.kind == CommandKind::stop;
+  if (pending.stage == Stage::queued) {
+    pending.pnum = link_.take_pnum();
+    // The command's field is there already.
+    DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.size);
+    pending.size = writer.stamp(pending.pnum, to_ms(now)).size();
+    pending.stage = Stage::sent;
+    if (pending.kind == CommandKind::identify) {
+      question_sent_ = now;
+      question_open_ = true;
+    }
+  } else {
+    ++collector_.counts.retries;
+  }
+  pending.retry = now + (stop ? Time{options_.stop_retry} : Time{options_.command_retry});
+  DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.size);
+  close_and_transmit(writer, pending.kind, stop ? Priority::stop : Priority::normal, now);
+}
+
+// In the order of send(): tickets rise.
+void Session::send_queued(Time now) {
+  if (!in_control(now)) return;
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.role == Pending::Role::arm) return;  // it comes first
+    if (pending.stage != Stage::queued || is_held_back(pending.kind)) continue;
+    if (now < pending.deadline) transmit(pending, now);
+  }
+}
+
+void Session::retry_due(Time now) {
+  const bool gated = link_.watchdog_expired(to_ms(now));
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.stage != Stage::sent || now < pending.retry) continue;
+    if (gated && pending.kind != CommandKind::stop) {
+      pending.retry = now + options_.command_retry;
+    } else {
+      transmit(pending, now);
+    }
+  }
+}
+
+// A confirmed stop, a few times more: somebody's E:CLEAR may have been on its way.
+void Session::linger(Time now) {
+  if (lingering_size_ == 0 || now < next_linger_) return;
+  if (now >= linger_until_) {
+    lingering_size_ = 0;
+    return;
+  }
+  next_linger_ = now + options_.stop_retry;
+  ++collector_.counts.retries;
+  DatagramWriter writer(lingering_.data(), lingering_.size(), lingering_size_);
+  close_and_transmit(writer, CommandKind::stop, Priority::stop, now);
+}
+
+void Session::finish(Pending& pending, Outcome outcome, Refusal code, Time now) {
+  if (pending.role == Pending::Role::arm_step) {
+    const CommandKind kind = pending.kind;
+    pending_.remove(pending);
+    on_arming_step(kind, outcome, code, now);
+    return;
+  }
+  switch (outcome) {
+    case Outcome::confirmed:
+      ++collector_.counts.confirmed;
+      break;
+    case Outcome::refused:
+    case Outcome::not_armed:
+      ++collector_.counts.refused;
+      break;
+    case Outcome::timed_out:
+      ++collector_.counts.timed_out;
+      break;
+    case Outcome::cancelled:
+    case Outcome::full:
+      break;
+  }
+  const Ticket ticket = pending.ticket;
+  const CommandResult result{outcome, code, now - pending.started,
+                             outcome == Outcome::not_armed ? arming_.cause() : DisarmCause::none};
+  pending_.remove(pending);  // before the call: the handler may send again
+  handler_.on_result(ticket, result);
+}
+
+void Session::forget(Ticket ticket) {
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.ticket == ticket) pending_.remove(pending);
+  }
+}
+
+void Session::cancel_all(Time now) {
+  for (Pending& pending : pending_.under_way()) {
+    finish(pending, Outcome::cancelled, Refusal::none, now);
+  }
+}
+
+}  // namespace r4

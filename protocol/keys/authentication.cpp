@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "authentication.hpp"
+
+#include "../datagram/numbers.hpp"
+
+namespace r4 {
+namespace {
+
+constexpr Text version("R4A1");
+constexpr Text host_to_board("R4 host to board");
+constexpr Text field_name("A");
+constexpr std::size_t tag_bytes = 8;
+
+// Base64url without padding of 8 bytes: six bits a character, the last two bits are 0.
+void write_base64url(const std::uint8_t (&bytes)[tag_bytes], char (&out)[tag_size]) {
+  constexpr Text digits("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_");
+  std::uint64_t bits = 0;
+  for (const std::uint8_t byte : bytes) bits = bits << 8 | byte;
+  out[tag_size - 1] = digits[bits << 2 & 0x3FU];
+  bits >>= 4;
+  for (std::size_t i = tag_size - 1; i-- != 0; bits >>= 6) out[i] = digits[bits & 0x3FU];
+}
+
+// In the same time, wherever they differ.
+bool same(Text tag, const char (&expected)[tag_size]) {
+  if (tag.size() != tag_size) return false;
+  unsigned difference = 0;
+  for (std::size_t i = 0; i < tag_size; ++i) {
+    difference |= static_cast<unsigned char>(tag[i]) ^ static_cast<unsigned char>(expected[i]);
+  }
+  return difference == 0;
+}
+
+Field last_field(const Datagram& datagram) {
+  Field last;
+  for (const Field& field : datagram) last = field;
+  return last;
+}
+
+}  // namespace
+
+const char* to_text(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::authentic:
+      break;
+    case Verdict::missing:
+      return "missing";
+    case Verdict::unknown_key:
+      return "unknown key";
+    case Verdict::wrong_tag:
+      return "wrong tag";
+    case Verdict::replayed:
+      return "replayed";
+    case Verdict::old:
+      return "old";
+  }
+  return "authentic";
+}
+
+void write_tag(const Blake2sKey& key, Text nonce, Text before, char (&tag)[tag_size]) {
+  Blake2s hash(key);
+  hash.update(version);
+  hash.update(nonce);
+  hash.update(before);
+  hash.update(",");
+  std::uint8_t digest[tag_bytes];
+  hash.finish(digest);
+  write_base64url(digest, tag);
+}
+
+Blake2sKey signing_key(const Key& key) {
+  Blake2s derivation(key_size, key.bytes, key_size);
+  derivation.update(host_to_board);
+  std::uint8_t derived[key_size];
+  derivation.finish(derived);
+  return Blake2sKey(tag_bytes, derived, sizeof derived);
+}
+
+// --- the board's end
+
+Authentication::Authentication(const std::uint8_t* chance) : has_chance_(chance != nullptr) {
+  if (has_chance_) chance_ = Blake2sKey(nonce_size / 2, chance, chance_size);
+}
+
+void Authentication::use(const Key (&keys)[max_keys]) {
+  required_ = false;
+  for (int i = 0; i < max_keys; ++i) {
+    entries_[i].id = keys[i].id;
+    if (keys[i].id == 0) continue;
+    entries_[i].key = signing_key(keys[i]);
+    required_ = true;
+  }
+  renew();
+}
+
+void Authentication::renew() {
+  has_nonce_ = required_ && has_chance_;
+  for (Entry& entry : entries_) entry.newest = 0;
+  if (!has_nonce_) return;
+  char number[max_number_text];
+  const char* const end = write_number(number, ++nonces_);
+  Blake2s hash(chance_);
+  hash.update(Text(number, static_cast<std::size_t>(end - number)));
+  std::uint8_t digest[nonce_size / 2];
+  hash.finish(digest);
+  write_hex(nonce_, digest, sizeof digest);
+}
+
+Authentication::Entry* Authentication::find(Text id) {
+  if (id.size() != 1 || id[0] < '1' || id[0] > '0' + max_key_id) return nullptr;
+  for (Entry& entry : entries_) {
+    if (entry.id == id[0] - '0') return &entry;
+  }
+  return nullptr;
+}
+
+Verdict Authentication::verify(const Datagram& datagram, std::uint32_t now_ms) {
+  const Field field = last_field(datagram);
+  Text values[4];
+  std::uint64_t counter = 0;
+  std::uint32_t board_t = 0;
+  if (!has_nonce_ || field.name() != field_name || field.split(values, 4) != 4 ||
+      !parse_number(values[1], counter) || !parse_number(values[2], board_t)) {
+    return Verdict::missing;
+  }
+  Entry* const entry = find(values[0]);
+  if (entry == nullptr) return Verdict::unknown_key;
+  const char* const begin = datagram.bytes().begin();
+  const Text before(begin, static_cast<std::size_t>(values[2].end() - begin));
+  char expected[tag_size];
+  write_tag(entry->key, nonce(), before, expected);
+  if (!same(values[3], expected)) return Verdict::wrong_tag;
+  if (counter <= entry->newest) return Verdict::replayed;
+  entry->newest = counter;
+  return now_ms - board_t <= age_limit_ms ? Verdict::authentic : Verdict::old;
+}
+
+bool Authentication::rejected(Verdict verdict, bool is_command, std::uint32_t now_ms) {
+  ++rejections_[static_cast<std::size_t>(verdict)];
+  if (verdict == Verdict::replayed || verdict == Verdict::old) return false;
+  Answered& answered = answered_[is_command ? 1 : 0];
+  if (answered.any && now_ms - answered.at_ms < answer_spacing_ms) return false;
+  answered.any = true;
+  answered.at_ms = now_ms;
+  return true;
+}
+
+// --- the host's end
+
+bool Signer::on_nonce(Text nonce) {
+  if (has_nonce_ && nonce == Text(nonce_, nonce_size)) return false;
+  const bool had = has_nonce_;
+  has_nonce_ = nonce.size() == nonce_size;
+  if (has_nonce_) std::memcpy(nonce_, nonce.data(), nonce_size);
+  return had || has_nonce_;
+}
+
+void Signer::on_board_time(std::uint32_t t_ms, std::uint32_t now_ms) {
+  t_ms_ = t_ms;
+  heard_ms_ = now_ms;
+}
+
+// What the board's clock shows at least: what it has said, and the time since, as long as our clock
+// is not 3 % fast. A T of the future is refused.
+std::uint32_t Signer::board_time(std::uint32_t now_ms) const {
+  const std::uint32_t passed = now_ms - heard_ms_;
+  return passed == 0 ? t_ms_ : t_ms_ + (passed - passed / 32 - 1);
+}
+
+void Signer::sign(DatagramWriter& writer, std::uint64_t counter_floor, std::uint32_t now_ms) {
+  counter_ = counter_ + 1 > counter_floor ? counter_ + 1 : counter_floor;
+  writer.field(field_name);
+  writer.value(std::uint32_t{id_}).value(counter_).value(board_time(now_ms));
+  char tag[tag_size];
+  write_tag(key_, Text(nonce_, nonce_size), writer.written(), tag);
+  writer.value(Text(tag, tag_size));
+}
+
+}  // namespace r4

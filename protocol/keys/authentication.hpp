@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Proof that a datagram is of a host that has the board's key, made just now and not seen before
+// (docs/protocol.md "Authentication"). Both ends; only hosts sign.
+//
+// The board tells a nonce in its heartbeats, 64 random bits as `AN:<16 hex digits>;`. The host
+// signs with the last field of its datagrams:
+//
+//     A:<key id>,<counter>,<board T>,<tag>;
+//
+// The tag is 64 bits of BLAKE2s, keyed, over "R4A1", the digits of AN and every byte of the
+// datagram before the tag; in base64url without padding (RFC 4648, 5), 11 characters.
+//
+// What it does not do: hide anything, or prove what the board says.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "blake2s.hpp"
+#include "../datagram/datagram.hpp"
+#include "../datagram/datagram_writer.hpp"
+#include "key.hpp"
+
+namespace r4 {
+
+constexpr std::size_t nonce_size = 16;  // its digits
+constexpr std::size_t tag_size = 11;    // its characters
+
+// The longest `A` field: ";A:9,18446744073709551615,4294967295,<tag>".
+constexpr std::size_t signature_max = 3 + 1 + 1 + 20 + 1 + 10 + 1 + tag_size;
+
+// The tag of a datagram whose bytes before the tag are `before` and a comma. `key` is of
+// signing_key().
+void write_tag(const Blake2sKey& key, Text nonce, Text before, char (&tag)[tag_size]);
+// The key of the direction host to board, which is made of the shared one.
+Blake2sKey signing_key(const Key& key);
+
+// What a board finds out about a datagram.
+enum class Verdict : std::uint8_t {
+  authentic,
+  missing,      // its last field is no A of the form above
+  unknown_key,  // no key of that id
+  wrong_tag,    // changed, of another key, or for another nonce
+  replayed,     // the counter is not above the newest of its key
+  old,          // its board T is more than 250 ms ago, or yet to come
+};
+constexpr int verdict_count = 6;
+// "authentic", "missing", "unknown key", "wrong tag", "replayed", "old".
+const char* to_text(Verdict verdict);
+
+// The board's end.
+class Authentication {
+ public:
+  static constexpr std::size_t chance_size = 32;
+  static constexpr std::uint32_t age_limit_ms = 250;
+  static constexpr std::uint32_t answer_spacing_ms = 100;
+
+  // `chance`: random bytes, others at each boot, from which the nonces are made. nullptr: the board
+  // has none; then it tells no nonce, and nothing is ever authentic.
+  explicit Authentication(const std::uint8_t* chance);
+
+  // The board's keys; those with id 0 are none. Takes a new nonce.
+  void use(const Key (&keys)[max_keys]);
+  // Is there a key, and so a signature needed?
+  bool required() const { return required_; }
+
+  // The nonce that heartbeats tell; empty while no signature is needed.
+  Text nonce() const { return Text(nonce_, has_nonce_ ? nonce_size : 0); }
+  // Another nonce: what was signed before is of no use then. Counters begin anew.
+  void renew();
+
+  // Is it signed? If so, its counter and those below are used up.
+  Verdict verify(const Datagram& datagram, std::uint32_t now_ms);
+  // It was not and was needed. True if that may be answered: at most every answer_spacing_ms, and
+  // not what a network has repeated or held back. Commands are answered apart from the rest: a host
+  // whose heartbeats are answered must learn what is wrong as well.
+  bool rejected(Verdict verdict, bool is_command, std::uint32_t now_ms);
+  // How many were rejected for that.
+  std::uint32_t rejections(Verdict verdict) const {
+    return rejections_[static_cast<std::size_t>(verdict)];
+  }
+
+ private:
+  struct Entry {
+    Blake2sKey key;
+    std::uint64_t newest = 0;  // counter
+    std::uint8_t id = 0;
+  };
+  Entry* find(Text id);
+
+  Entry entries_[max_keys];
+  bool required_ = false;
+  Blake2sKey chance_;
+  bool has_chance_;
+  std::uint32_t nonces_ = 0;  // made so far
+  char nonce_[nonce_size] = {};
+  bool has_nonce_ = false;
+  std::uint32_t rejections_[verdict_count] = {};
+  struct Answered {
+    bool any = false;
+    std::uint32_t at_ms = 0;
+  };
+  Answered answered_[2];  // heartbeats, commands
+};
+
+// The host's end: signs for one board.
+class Signer {
+ public:
+  explicit Signer(const Key& key) : key_(signing_key(key)), id_(key.id) {}
+
+  // The newest heartbeat of the board has this nonce (heartbeat_nonce()); empty: none, it has no
+  // key. True if it is not the one before.
+  bool on_nonce(Text nonce);
+  // The newest datagram of the board has this T. `now_ms`: the host's clock, which wraps.
+  void on_board_time(std::uint32_t t_ms, std::uint32_t now_ms);
+  // Has a nonce been heard? Nothing can be signed before.
+  bool ready() const { return has_nonce_; }
+
+  // Writes the field A behind all others: finish() of the writer is to follow. `counter_floor` is
+  // the least that the counter may be: microseconds since 1970, so that a host which begins again
+  // goes on above what it has used. Only while ready().
+  void sign(DatagramWriter& writer, std::uint64_t counter_floor, std::uint32_t now_ms);
+
+ private:
+  std::uint32_t board_time(std::uint32_t now_ms) const;
+
+  Blake2sKey key_;
+  std::uint8_t id_;
+  char nonce_[nonce_size] = {};
+  bool has_nonce_ = false;
+  std::uint32_t t_ms_ = 0;
+  std::uint32_t heard_ms_ = 0;
+  std::uint64_t counter_ = 0;
+};
+
+}  // namespace r4

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A key that a board and its hosts share (docs/protocol.md "Authentication"), and its text:
+//
+//     <id>:<64 hexadecimal digits>      "1:00112233…", the id 1-9
+//
+// The text is what a key file holds and what the setting `key` takes.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "../datagram/refusal.hpp"
+#include "../datagram/text.hpp"
+
+namespace r4 {
+
+constexpr std::size_t key_size = 32;
+constexpr std::uint8_t max_key_id = 9;
+constexpr int max_keys = 4;  // of a board
+
+struct Key {
+  std::uint8_t id = 0;  // 1-9; 0: no key
+  std::uint8_t bytes[key_size] = {};
+};
+bool operator==(const Key& a, const Key& b);
+inline bool operator!=(const Key& a, const Key& b) { return !(a == b); }
+
+// Refusal::format for what is not of that form, ::range for another id; `out` is only written on
+// Refusal::none.
+Refusal parse_key(Text text, Key& out);
+// Splits a text "<id>:<rest>" whose id is in range; as parse_key.
+Refusal split_key(Text text, std::uint8_t& id, Text& rest);
+
+constexpr std::size_t key_text_size = 2 + 2 * key_size;
+// Writes the text of a key and returns the position behind it.
+char* write_key(char* out, const Key& key);
+
+}  // namespace r4

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The host's end of the link: heartbeats, their gate, and what the host knows of the board
+// (paper section 4.3; docs/protocol.md "The link").
+//
+//     connecting --> active <--> safe        active, safe --> lost --> active, safe, connecting
+//
+//     connecting  nothing heard yet, or the board sends `PNum:0;T:0`: it is booting
+//     active      the board streams its state and reports no reason to be safe
+//     safe        the board reports a reason
+//     lost        nothing valid from the board for the timeout
+//
+// Times are the host's clock in ms; it wraps.
+#pragma once
+
+#include <cstdint>
+
+#include "packet_tracker.hpp"
+#include "../messages/units.hpp"
+
+namespace r4 {
+
+enum class HostLinkState : std::uint8_t { connecting, active, safe, lost };
+
+// "connecting", "active", "safe", "lost".
+const char* to_text(HostLinkState state);
+
+class HostLink {
+ public:
+  struct Timing {
+    std::uint32_t heartbeat_ms = 100;  // 10 Hz: one lost packet must not be a race with the timeout
+    std::uint32_t timeout_ms = 1000;   // silence of the board until `lost`
+  };
+
+  // `first_pnum` must be echo_host_first_pnum (board_link.hpp) plus 30 random bits.
+  HostLink(Timing timing, std::uint32_t first_pnum) : timing_(timing), next_pnum_(first_pnum) {}
+
+  // A valid datagram of the board. Returns what its number says; a late, old or duplicate one does
+  // not change the state. `heartbeat`: it is a board heartbeat, answered at once by
+  // heartbeat_due(). `reason`: its SAFE, none if it carries none.
+  Arrival on_datagram(std::uint32_t pnum, std::uint32_t t_ms, bool heartbeat, SafeReason reason,
+                      std::uint32_t now_ms);
+
+  // A valid answer of the board to us (N, I): it counts in the packet numbers and shows that the
+  // board is there, but says nothing of its state.
+  Arrival on_answer(std::uint32_t pnum, std::uint32_t t_ms, std::uint32_t now_ms);
+
+  // The transport has gone (`lost` at once) or come (a heartbeat is due at once).
+  void on_transport(bool up);
+
+  // Lets time pass: silence of the board. True if the state changed.
+  bool poll(std::uint32_t now_ms);
+
+  // Should a heartbeat be sent now? False while the watchdog has expired.
+  bool heartbeat_due(std::uint32_t now_ms) const;
+  // A heartbeat was sent.
+  void heartbeat_sent(std::uint32_t now_ms);
+  // It could not be: it is due again soon.
+  void heartbeat_not_sent(std::uint32_t now_ms);
+  // The T that it carries: the T of the board's newest heartbeat, 0 before the first.
+  std::uint32_t echo() const { return echo_; }
+
+  // The application watchdog: heartbeats stop when feed() stays away for `period_ms`, until it is
+  // called again; 0 turns it off.
+  void watchdog(std::uint32_t period_ms, std::uint32_t now_ms);
+  void feed(std::uint32_t now_ms);
+  bool watchdog_expired(std::uint32_t now_ms) const {
+    return watchdog_ms_ != 0 && (hung_ || now_ms - fed_ms_ > watchdog_ms_);
+  }
+
+  // The number for the next datagram that the host sends.
+  std::uint32_t take_pnum() { return next_pnum_++; }
+  // The number that was taken last.
+  std::uint32_t last_pnum() const { return next_pnum_ - 1; }
+
+  // Milliseconds until poll() or heartbeat_due() may have something to say; 0 is now.
+  std::uint32_t due_in(std::uint32_t now_ms) const;
+
+  HostLinkState state() const { return state_; }
+  // Have we echoed a real T of this boot of the board? It executes no command of ours before.
+  bool echoed() const { return echoed_; }
+  // How often the board was found to have begun again.
+  std::uint32_t restarts() const { return restarts_; }
+  SafeReason reason() const { return reason_; }
+  const PacketCounters& counters() const { return tracker_.counters(); }
+
+  // A T this far from where the board's clock should be is of another boot.
+  static constexpr std::int32_t boot_tolerance_ms = 10000;
+  // The same behind `PNum:0;T:0`, which a network may also have held back since the boot before: the
+  // paper's boards begin at 0 each time, so their T after a quick restart is not far off.
+  static constexpr std::int32_t booting_tolerance_ms = 1000;
+  // From a heartbeat that could not be sent to the next attempt.
+  static constexpr std::uint32_t retry_ms = 20;
+
+ private:
+  void notice_boot(std::uint32_t t_ms, std::uint32_t now_ms);
+
+  Timing timing_;
+  std::uint32_t next_pnum_;
+  HostLinkState state_ = HostLinkState::connecting;
+  SafeReason reason_ = SafeReason::none;
+  PacketTracker tracker_;
+  std::uint32_t echo_ = 0;
+  std::uint32_t heard_ms_ = 0;
+  std::uint32_t board_ms_ = 0;  // the board's T at clock_ms_
+  std::uint32_t clock_ms_ = 0;
+  bool board_clock_known_ = false;
+  bool booting_ = false;  // it said so last
+  std::uint32_t restarts_ = 0;
+  std::uint32_t sent_ms_ = 0;
+  bool any_sent_ = false;
+  bool answer_now_ = true;  // the first heartbeat goes out at once
+  bool echoed_ = false;
+  std::uint32_t watchdog_ms_ = 0;
+  std::uint32_t fed_ms_ = 0;
+  bool hung_ = false;  // the watchdog had expired at a poll(): the clock's wrap does not undo it
+};
+
+}  // namespace r4

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What kind of message a datagram is, and the small ones that are neither state nor command:
+// heartbeats, refusals and identification.
+#pragma once
+
+#include <cstdint>
+
+#include "../keys/authentication.hpp"
+#include "../datagram/datagram.hpp"
+#include "../datagram/datagram_writer.hpp"
+#include "../datagram/refusal.hpp"
+#include "units.hpp"
+
+namespace r4 {
+
+enum class MessageKind : std::uint8_t {
+  board_heartbeat,  // H:R4-ROS2
+  host_heartbeat,   // H:ROS2-R4
+  command,          // one of command.hpp's letters
+  nack,             // N:<PNum>,<code>
+  identity,         // I:R4,<firmware>,<board id>,<capabilities>
+  state,            // anything else
+};
+
+// "heartbeat" (both sides'), "command", "nack", "identity", "state": the `type` of `r4 decode`.
+const char* to_text(MessageKind kind);
+
+MessageKind kind_of(const Datagram& datagram);
+
+// Why the board is safe, as its heartbeats tell it.
+struct SafeReport {
+  SafeReport() = default;
+  SafeReport(SafeReason why) : reason(why) {}  // NOLINT(google-explicit-constructor)
+  SafeReason reason = SafeReason::none;
+  // The number of the newest cause that only E:CLEAR ends, which E:CLEAR has to name; 0: there is none.
+  std::int32_t cause = 0;
+  // The number of the newest E:STOP that was obeyed, if that had one, while the stop lasts.
+  bool has_stop = false;
+  std::uint32_t stop = 0;
+};
+
+// The board's heartbeat: `H:R4-ROS2;PNum:…;T:…;`, and behind the T what there is of `SAFE:n;`,
+// `CAUSE:n;`, `STOP:n;` and `AN:<nonce>;` (authentication.hpp).
+Text write_board_heartbeat(char* buffer, std::size_t capacity, std::uint32_t pnum,
+                           std::uint32_t t_ms, const SafeReport& safe, Text nonce = Text());
+// What a board heartbeat tells of it. A SAFE that cannot be read is taken for a fault, a CAUSE or STOP
+// for none.
+SafeReport heartbeat_report(const Datagram& datagram);
+// Its reason alone; none if it carries no SAFE.
+SafeReason heartbeat_reason(const Datagram& datagram);
+// The nonce that it carries; empty if it carries none.
+Text heartbeat_nonce(const Datagram& datagram);
+// Does it say that the board waits for a host, in CONNECTING? Its PNum is 0 then, and its T too,
+// unless it carries a nonce.
+bool is_connecting_heartbeat(const Datagram& datagram);
+
+// A refusal: which command of ours, and why; and to the host of the session, the number of its first
+// echo (SESSION), so that a host knows whether the board still remembers what it executed. False if the datagram's N field is not of that form.
+struct Nack {
+  std::uint32_t pnum = 0;
+  Refusal code = Refusal::none;
+  bool has_session = false;
+  std::uint32_t session = 0;
+};
+bool read_nack(const Datagram& datagram, Nack& out);
+void write_nack(DatagramWriter& writer, const Nack& nack);
+
+// Who the board is; views of the datagram.
+struct Identity {
+  Text firmware;      // "0.1.0"
+  Text board_id;      // serial number, unique
+  Text capabilities;  // words joined by '+': "udp+serial"
+};
+bool read_identity(const Datagram& datagram, Identity& out);
+void write_identity(DatagramWriter& writer, const Identity& identity);
+
+}  // namespace r4

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The board's settings (`C:key,value`): keys, ranges, defaults (paper section 8.1: 100 Hz state,
+// 2 Hz heartbeat, 1 s timeout).
+//
+//     key        value         default  meaning
+//     rate       1-1000        100      state datagrams a second; 1000/rate is rounded down to
+//                                       whole milliseconds
+//     heartbeat  50-1000       500      ms between the board's heartbeats; below the timeout
+//     timeout    100-10000     1000     ms of silence until the safe state; above `heartbeat`
+//     recovery   last | rearm  last     outputs after SAFE(link)
+//     pack       0 | 1         0        1: on CAN the board sends the packed form
+//
+// Beside them those of the place where the board stands: site_settings.hpp.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "../datagram/refusal.hpp"
+#include "site_settings.hpp"
+#include "../datagram/text.hpp"
+
+namespace r4 {
+
+enum class Recovery : std::uint8_t { last, rearm };
+
+struct Settings {
+  std::uint16_t state_rate_hz = 100;
+  std::uint16_t heartbeat_ms = 500;
+  std::uint16_t timeout_ms = 1000;
+  Recovery recovery = Recovery::last;
+  bool pack = false;
+  SiteSettings site;
+};
+bool operator==(const Settings& a, const Settings& b);
+inline bool operator!=(const Settings& a, const Settings& b) { return !(a == b); }
+
+// Changes one setting. Refusal::unknown for a key, ::format for a value that is not of the key's
+// kind, ::range outside its range; `settings` only changes on Refusal::none.
+Refusal set(Settings& settings, Text key, Text value);
+
+// All settings as lines "key,value", each ended by a line feed, so that they can be kept. False:
+// more than `capacity` bytes.
+constexpr std::size_t max_settings_text = 960;
+bool write_settings(const Settings& settings, char* out, std::size_t capacity, Text& text);
+// Takes such lines, in any order. What is not known or not allowed is passed over: the text may be
+// of an older or newer firmware.
+void read_settings(Text text, Settings& settings);
+
+}  // namespace r4

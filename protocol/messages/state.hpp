@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The board's state as typed values, and the fields that carry it (paper section 4.1).
+//
+// One table (state.cpp) names every field, its unit and where it lives in State; the board writes
+// with it, the host reads with it, the `F` command selects from it.
+#pragma once
+
+#include <cstdint>
+
+#include "chip_fault.hpp"
+#include "../datagram/datagram.hpp"
+#include "../datagram/datagram_writer.hpp"
+#include "units.hpp"
+
+namespace r4 {
+
+// Every state field, in the order in which the board sends them. The first ten are the paper's
+// default set.
+enum class StateField : std::uint8_t {
+  // volts, two decimals
+  ain24,
+  ain12,
+  ain5,
+  aindmh,
+  // 1: the dead-man's handle is held, 0: released
+  dmhsta,
+  // volts
+  ainsteer,
+  // pwm,direction
+  dhb1a,
+  osmc1,
+  // steps
+  step1pos,
+  // microseconds of pulse width
+  servo1pos,
+  // the rest, in the same forms
+  ain6,
+  dhb1b,
+  dhb2a,
+  dhb2b,
+  osmc2,
+  osmc3,
+  osmc4,
+  step2pos,
+  step3pos,
+  step4pos,
+  servo2pos,
+  servo3pos,
+  servo4pos,
+  servo5pos,
+  servo6pos,
+  servo7pos,
+  servo8pos,
+  servo9pos,
+  servo10pos,
+  servo11pos,
+  servo12pos,
+  servo13pos,
+  servo14pos,
+  servo15pos,
+  servo16pos,
+  // counts
+  enc1,
+  enc2,
+  enc3,
+  enc4,
+  // centimetres; 0: no echo
+  us1,
+  us2,
+  us3,
+  us4,
+  // speed,direction,brake
+  bldc1,
+  bldc2,
+  bldc3,
+  bldc4,
+  relays,  // bit n-1 is relay n, 0-255
+  safe,    // SafeReason
+  cmd,     // PNum of the last command executed
+  rxok,    // datagrams accepted since boot
+  rxcrc,   // dropped: bad checksum, syntax or length
+  rxlost,  // gaps in the host's packet numbers
+  rxdup,   // received again
+  rxref,   // commands refused
+  late,    // state periods that the board's loop missed
+  // counts a second over the last tenth of a second; negative backwards
+  enc1hz,
+  enc2hz,
+  enc3hz,
+  enc4hz,
+  // what the encoder counted where its index line rose last; 0 before the first time
+  enc1idx,
+  enc2idx,
+  enc3idx,
+  enc4idx,
+  fault,  // chip,trouble: ChipFault; 0,0: none
+  count
+};
+constexpr int state_field_count = static_cast<int>(StateField::count);
+
+// A set of state fields: the preamble's selection, or what a datagram brought.
+class FieldSet {
+ public:
+  constexpr FieldSet() = default;
+  constexpr bool has(StateField f) const { return (words_[word_of(f)] & bit_of(f)) != 0; }
+  void add(StateField f) { words_[word_of(f)] |= bit_of(f); }
+  void remove(StateField f) { words_[word_of(f)] &= ~bit_of(f); }
+  void add(const FieldSet& other) {
+    for (int i = 0; i < word_count; ++i) words_[i] |= other.words_[i];
+  }
+  bool empty() const { return *this == FieldSet(); }
+  // Its fields in the order of the table: `for (StateField field : set)`.
+  class Iterator {
+   public:
+    Iterator(const std::uint32_t* words, int first)
+        : words_(words), word_(first), bits_(first < word_count ? words[first] : 0) {
+      pass_empty_words();
+    }
+    StateField operator*() const {
+      return static_cast<StateField>(word_ * word_bits + __builtin_ctz(bits_));
+    }
+    Iterator& operator++() {
+      bits_ &= bits_ - 1;
+      pass_empty_words();
+      return *this;
+    }
+    friend bool operator!=(const Iterator& a, const Iterator& b) {
+      return a.word_ != b.word_ || a.bits_ != b.bits_;
+    }
+
+   private:
+    void pass_empty_words() {
+      while (bits_ == 0 && word_ < word_count) bits_ = ++word_ < word_count ? words_[word_] : 0;
+    }
+    const std::uint32_t* words_;
+    int word_;
+    std::uint32_t bits_;  // of that word, those that are still to come
+  };
+  Iterator begin() const { return Iterator(words_, 0); }
+  Iterator end() const { return Iterator(words_, word_count); }
+
+  friend bool operator==(const FieldSet& a, const FieldSet& b) {
+    for (int i = 0; i < word_count; ++i) {
+      if (a.words_[i] != b.words_[i]) return false;
+    }
+    return true;
+  }
+  friend bool operator!=(const FieldSet& a, const FieldSet& b) { return !(a == b); }
+
+  static FieldSet paper_default();  // AIN24 … SERVO1POS
+  static FieldSet all();            // but FAULT, which is sent where there is one
+
+ private:
+  static constexpr int word_bits = 32;
+  static constexpr int word_count = (state_field_count + word_bits - 1) / word_bits;
+  static constexpr int word_of(StateField f) { return static_cast<int>(f) / word_bits; }
+  static constexpr std::uint32_t bit_of(StateField f) {
+    return std::uint32_t{1} << static_cast<int>(f) % word_bits;
+  }
+
+  std::uint32_t words_[word_count] = {};
+};
+
+// The board's analog inputs in the paper's order; values in hundredths of a volt.
+enum class Analog : std::uint8_t { ain24, ain12, ain5, aindmh, ainsteer, ain6, count };
+constexpr int analog_channels = static_cast<int>(Analog::count);
+
+// What the board reports. On the host, `present` tells which members the datagram carried; the
+// others keep the value of earlier datagrams. Channel n of the board is element n-1.
+struct State {
+  FieldSet present;
+  std::uint32_t pnum = 0;
+  std::uint32_t t_ms = 0;                        // the board's clock; wraps
+  std::int32_t analog_cv[analog_channels] = {};  // hundredths of a volt
+  bool handle_held = false;
+  Drive dhb12[dhb12_channels];
+  Drive osmc[osmc_channels];
+  std::int32_t stepper_steps[stepper_channels] = {};
+  std::uint16_t servo_us[servo_channels] = {};
+  std::int32_t encoder_counts[encoder_channels] = {};
+  std::int32_t encoder_hz[encoder_channels] = {};            // counts a second
+  std::int32_t encoder_index_counts[encoder_channels] = {};  // where the index line rose last
+  std::uint16_t ultrasonic_cm[ultrasonic_channels] = {};
+  Bldc bldc[bldc_channels];
+  std::uint8_t relays = 0;
+  SafeReason safe = SafeReason::none;
+  std::uint32_t last_command = 0;  // CMD
+  std::uint32_t rx_ok = 0;
+  std::uint32_t rx_crc = 0;
+  std::uint32_t rx_lost = 0;
+  std::uint32_t rx_duplicate = 0;
+  std::uint32_t rx_refused = 0;
+  std::uint32_t late = 0;
+  ChipFault fault;
+};
+
+// The field's name on the wire, "AIN24".
+Text name_of(StateField field);
+// The field of that name; StateField::count if there is none. Constant time.
+StateField state_field(Text name);
+
+// Appends one field with its values from `state`.
+void write_field(DatagramWriter& writer, StateField field, const State& state);
+
+// The value of SAFE. A number without a meaning here, a newer board's, is a fault. False if it is
+// no number.
+bool parse_safe_reason(Text text, SafeReason& out);
+
+// Reads the state fields of `datagram` into `state` and sets `present`, `pnum` and `t_ms`. Unknown
+// fields are passed over (they stay reachable through the datagram). Returns false, with `state`
+// untouched, when a known field has values that are not of its form or range, or stands twice.
+bool read_state(const Datagram& datagram, State& state);
+
+}  // namespace r4

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "host/commands/command_help.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+
+#include "protocol/keys/key.hpp"
+
+namespace r4::test {
+namespace {
+
+// What people would see of an Error; fails if there is none.
+std::string error_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  ADD_FAILURE() << "no error";
+  return "";
+}
+
+TEST(CommandHelp, ShowsNoKeyAndNoPassword) {
+  const std::string digits(2 * key_size, 'e');
+  const struct {
+    std::string text;
+    std::string shown;
+  } cases[] = {
+      {"C:key,3:" + digits, "C:key,3:..."},
+      {"C:key,3:off", "C:key,3:off"},
+      {"C:key," + digits, "C:key,..."},
+      {"C:key," + digits + ":3", "C:key,..."},
+      {"C:key=3:" + digits, "C:key=3:..."},
+      {"C:3:" + digits, "C:3:..."},
+      {"C:Key,3:" + digits, "C:Key,..."},
+      {"C:password,letmein!", "C:password,..."},
+      {"C:pasword,letmein!", "C:pasword,..."},
+      {"C:password", "C:password"},
+      {"C:network,letmein!", "C:network,letmein!"},
+      {"C:rate,50", "C:rate,50"},
+      {"C:rate,100000", "C:rate,100000"},
+      {"O:358,1,1", "O:358,1,1"},
+  };
+  for (const auto& c : cases) {
+    EXPECT_EQ(shown(c.text), c.shown);
+    EXPECT_EQ(shown(c.shown), c.shown) << "once more";
+  }
+  EXPECT_EQ(shown(Command::setting("key", Text("3:" + digits))), "C:key,3:...");
+}
+
+TEST(CommandHelp, SaysWhatIsWrongWithAKeyOrAPasswordWithoutShowingIt) {
+  const std::string secret(2 * key_size - 1, 'e');
+  for (const std::string& text : {"C:key,3:" + secret, "C:key," + secret, "C:kee,3:" + secret,
+                                  "C:password," + secret + "e", "C:pass," + secret}) {
+    const std::string said = error_of([&] { parse_command_text(text); });
+    EXPECT_EQ(said.find("eeee"), std::string::npos) << said;
+    EXPECT_EQ(said.substr(0, 3), "C:" + text.substr(2, 1)) << said;
+  }
+  const std::string said = error_of([&] { require_valid(Command::setting("", Text(secret))); });
+  EXPECT_EQ(said.find("eeee"), std::string::npos) << said;
+  const Problem problem = bad_command("C:key,3:" + secret, Refusal::format);
+  EXPECT_EQ(problem.thing, "C:key,3:...");
+  EXPECT_NE(problem.fix.find("64 hexadecimal digits"), std::string::npos) << problem.fix;
+}
+
+TEST(CommandHelp, SendsASecretOnlyOverABoardsOwnCable) {
+  const Command secret = Command::setting("password", "eeeeeeee");
+  for (const char* url : {"serial:auto", "serial:///dev/ttyACM0", "sim:", "memory:"}) {
+    EXPECT_NO_THROW(require_cable(url, secret)) << url;
+  }
+  for (const char* url :
+       {"udp://192.168.4.1", "can://can0?node=3", "UDP://192.168.4.1", "both:", ""}) {
+    EXPECT_NE(error_of([&] { require_cable(url, secret); }).find("over USB only"),
+              std::string::npos);
+    EXPECT_NO_THROW(require_cable(url, Command::setting("rate", "100"))) << url;
+  }
+}
+
+TEST(CommandHelp, TellsWhatASettingTakes) {
+  EXPECT_NE(bad_command("C:rate,0", Refusal::range).fix.find("1-1000"), std::string::npos);
+  EXPECT_NE(bad_command("C:AINSTEER,x", Refusal::range).fix.find("volts"), std::string::npos);
+  const std::string all = bad_command("C:colour,1", Refusal::unknown).fix;
+  Text key;
+  Text value;
+  char buffer[max_site_value];
+  for (int i = 0; get(SiteSettings(), i, key, buffer, value); ++i) {
+    const std::string name(key.data(), key.size());
+    EXPECT_TRUE(all.find(" " + name + " ") != std::string::npos || name.starts_with("AIN")) << name;
+  }
+}
+
+}  // namespace
+}  // namespace r4::test

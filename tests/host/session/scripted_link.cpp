@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "scripted_link.hpp"
+
+#include <gtest/gtest.h>
+
+#include "protocol/link/board_link.hpp"
+#include "tests/support/datagrams.hpp"
+
+namespace r4::test {
+
+ScriptedLink::ScriptedLink(SessionOptions options)
+    : session(*this, std::move(options), echo_host_first_pnum + 100), due_(session.poll(now)) {}
+
+SessionOptions ScriptedLink::without_questions() {
+  SessionOptions options;
+  options.identify_interval = std::chrono::milliseconds{0};
+  options.arming = Arming::off;
+  return options;
+}
+
+void ScriptedLink::pass(Time duration) {
+  const Time end = now + duration;
+  due_ = session.poll(now);  // the test may have asked for something
+  while (due_ <= end) {
+    now = std::max(now, due_);
+    due_ = session.poll(now);
+    ASSERT_GT(due_, now) << "the session asks for the same moment again";
+  }
+  now = end;
+}
+
+std::uint32_t ScriptedLink::board_clock() const {
+  return static_cast<std::uint32_t>(now.count() / 1000) + clock_offset_;
+}
+
+void ScriptedLink::raw(std::string_view bytes) {
+  session.receive(bytes, now);
+  due_ = session.poll(now);
+}
+
+void ScriptedLink::reboot() {
+  clock_offset_ += 1'000'000'000;
+  board_pnum = 1;
+}
+
+void ScriptedLink::finish(std::string_view fields) {
+  raw(with_crc(std::string(fields) + "PNum:" + std::to_string(board_pnum++) +
+               ";T:" + std::to_string(board_clock()) + ";"));
+}
+
+void ScriptedLink::boot_heartbeat() { raw("H:R4-ROS2;PNum:0;T:0;^0xb10b3a06^"); }
+
+void ScriptedLink::heartbeat(SafeReason reason) {
+  const std::string safe =
+      reason == SafeReason::none ? "" : "SAFE:" + std::to_string(static_cast<int>(reason)) + ";";
+  raw(with_crc("H:R4-ROS2;PNum:" + std::to_string(board_pnum++) +
+               ";T:" + std::to_string(board_clock()) + ";" + safe));
+}
+
+void ScriptedLink::stopped(std::uint32_t stop, int cause) {
+  raw(with_crc("H:R4-ROS2;PNum:" + std::to_string(board_pnum++) +
+               ";T:" + std::to_string(board_clock()) + ";SAFE:2;CAUSE:" + std::to_string(cause) +
+               ";STOP:" + std::to_string(stop) + ";"));
+}
+
+void ScriptedLink::state(std::string_view fields) { finish(fields); }
+
+void ScriptedLink::executed(std::uint32_t pnum) {
+  finish("AIN24:24.28;SAFE:0;CMD:" + std::to_string(pnum) + ";");
+}
+
+void ScriptedLink::nack(std::uint32_t pnum, std::string_view code) {
+  const std::string began =
+      session_pnum == 0 ? "" : "SESSION:" + std::to_string(session_pnum) + ";";
+  finish("N:" + std::to_string(pnum) + "," + std::string(code) + ";" + began);
+}
+
+void ScriptedLink::identity() { finish("I:R4,0.1.0,board-7,udp;"); }
+
+void ScriptedLink::connect() {
+  heartbeat();
+  pass(std::chrono::milliseconds{10});
+  ASSERT_EQ(count('F'), 1U) << "the session chooses its fields as soon as the link is up";
+  executed(last('F').pnum);
+  session_pnum = last('H').pnum;
+  ASSERT_TRUE(session.in_control(now));
+  sent.clear();
+}
+
+std::vector<ScriptedLink::Sent> ScriptedLink::all(char letter) const {
+  std::vector<Sent> found;
+  for (const Sent& each : sent) {
+    if (each.command.front() == letter) found.push_back(each);
+  }
+  return found;
+}
+
+ScriptedLink::Sent ScriptedLink::last(char letter) const {
+  const std::vector<Sent> found = all(letter);
+  if (found.empty()) {
+    ADD_FAILURE() << "nothing was sent with the letter " << letter;
+    return {};
+  }
+  return found.back();
+}
+
+SendResult ScriptedLink::transmit(std::string_view bytes, Priority priority) {
+  if (place_taken && priority != Priority::stop) return SendResult::busy;
+  Datagram datagram;
+  EXPECT_TRUE(read(bytes, datagram)) << bytes;
+  const Field field = *datagram.begin();
+  sent.push_back({str(field.name()) + ":" + str(field.values()), datagram.pnum(),
+                  datagram.time_ms(), priority, now, std::string(bytes)});
+  return SendResult::sent;
+}
+
+void ScriptedLink::on_identity(const Identity& identity) { board_id = str(identity.board_id); }
+
+}  // namespace r4::test

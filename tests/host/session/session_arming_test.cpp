@@ -1,0 +1,368 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A session that must be armed: what it holds back, what disarms it, and what arm() does.
+#include <gtest/gtest.h>
+
+#include "host/commands/command_help.hpp"
+#include "host/explain.hpp"
+#include "scripted_link.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+const Command drive = Command::osmc(358, Direction::forward, 1);
+
+SessionOptions arming_required() {
+  SessionOptions options = ScriptedLink::without_questions();
+  options.arming = Arming::required;
+  return options;
+}
+
+struct SessionArming : testing::Test {
+  SessionArming() { link.connect(); }
+
+  void state(SafeReason reason, std::uint32_t executed, bool relay) {
+    link.state("RELAYS:" + std::to_string(static_cast<int>(relay)) + ";SAFE:" +
+               std::to_string(static_cast<int>(reason)) + ";CMD:" + std::to_string(executed) + ";");
+  }
+  // The board executes the newest command with that letter.
+  void execute(char letter, SafeReason reason = SafeReason::none, bool relay = false) {
+    cmd = link.last(letter).pnum;
+    state(reason, cmd, relay);
+  }
+  Ticket arm() {
+    const Ticket ticket = link.session.arm(1s, link.now);
+    link.pass(1ms);
+    return ticket;
+  }
+  void armed() {
+    const Ticket ticket = arm();
+    execute('R', SafeReason::none, true);
+    ASSERT_EQ(outcome(ticket), Outcome::confirmed);
+    ASSERT_TRUE(link.session.may_drive());
+    link.sent.clear();
+  }
+  Outcome outcome(Ticket ticket) {
+    EXPECT_EQ(link.results.count(ticket), 1U) << "it has not ended";
+    return link.results[ticket].outcome;
+  }
+  PostResult post() { return link.session.post(drive, link.now); }
+
+  ScriptedLink link{arming_required()};
+  std::uint32_t cmd = 0;
+};
+
+TEST_F(SessionArming, BeginsDisarmedAndSaysWhyNothingIsSent) {
+  EXPECT_EQ(link.session.disarmed_by(), DisarmCause::not_yet);
+  EXPECT_EQ(post(), PostResult::not_armed);
+  const Ticket ticket = link.session.send(drive, 1s, link.now);
+  link.pass(1ms);
+  EXPECT_EQ(outcome(ticket), Outcome::not_armed);
+  const Problem problem = explain("O:358,1,1", link.results[ticket], link.session.link());
+  EXPECT_EQ(problem.reason, "not armed: a session begins disarmed");
+  EXPECT_EQ(problem.fix, "call arm()");
+  EXPECT_EQ(link.count('O'), 0U);
+  EXPECT_EQ(link.session.statistics(link.now).refused, 2U);
+}
+
+TEST_F(SessionArming, HoldsBackWhatDrivesAnOutputAndNothingElse) {
+  for (const char* text : {"D:1,1,1", "S:1500,1", "R:1,1", "P:5,1", "Z:1", "B:1,1,0,1"}) {
+    EXPECT_EQ(link.session.post(parse_command_text(text), link.now), PostResult::not_armed) << text;
+  }
+  for (const char* text : {"U:15,1", "F:ENC1", "C:rate,10", "E:CLEAR"}) {
+    EXPECT_EQ(link.session.post(parse_command_text(text), link.now), PostResult::sent) << text;
+  }
+}
+
+TEST_F(SessionArming, ClosesTheMotorSupplyAndIsArmedOnceTheBoardShowsIt) {
+  const Ticket ticket = arm();
+  EXPECT_EQ(link.last('R').command, "R:1,On");
+  EXPECT_EQ(link.count('E'), 0U) << "there is nothing to clear";
+  EXPECT_EQ(link.results.count(ticket), 0U);
+  EXPECT_EQ(post(), PostResult::not_armed) << "not before the board says so";
+  execute('R', SafeReason::none, true);
+  EXPECT_EQ(outcome(ticket), Outcome::confirmed);
+  EXPECT_EQ(link.session.disarmed_by(), DisarmCause::none);
+  EXPECT_EQ(link.arming, std::vector<DisarmCause>{DisarmCause::none});
+  EXPECT_EQ(post(), PostResult::sent);
+}
+
+TEST_F(SessionArming, AsksForTheFieldThatShowsTheMotorSupply) {
+  link.session.send(Command::fields("ENC1"), 1s, link.now);
+  EXPECT_EQ(link.last('F').command, "F:ENC1,SAFE,CMD,RELAYS");
+}
+
+TEST_F(SessionArming, EveryCauseButTheLinkDisarms) {
+  const std::pair<SafeReason, DisarmCause> causes[] = {
+      {SafeReason::stop, DisarmCause::stop},
+      {SafeReason::handle, DisarmCause::handle},
+      {SafeReason::proximity, DisarmCause::proximity},
+      {SafeReason::watchdog, DisarmCause::watchdog},
+      {SafeReason::fault, DisarmCause::fault}};
+  for (const auto& [reason, cause] : causes) {
+    armed();
+    link.heartbeat(reason);
+    EXPECT_EQ(link.session.disarmed_by(), cause);
+    EXPECT_EQ(post(), PostResult::not_armed);
+    // It is over by itself, or by somebody else's E:CLEAR.
+    state(SafeReason::none, cmd, false);
+    EXPECT_EQ(post(), PostResult::not_armed) << "and nothing drives off";
+    EXPECT_EQ(link.session.disarmed_by(), cause) << "the first cause is told, not what followed";
+  }
+}
+
+TEST_F(SessionArming, StaysArmedOverAnOutageAfterWhichTheBoardBringsItsOutputsBack) {
+  armed();
+  link.pass(1500ms);
+  EXPECT_EQ(post(), PostResult::no_link);
+  link.heartbeat(SafeReason::link);
+  link.pass(10ms);
+  link.heartbeat();
+  link.pass(10ms);
+  state(SafeReason::none, link.last('F').pnum, true);
+  EXPECT_EQ(post(), PostResult::sent);
+}
+
+TEST_F(SessionArming, AnOutageAfterWhichTheOutputsStayOffDisarms) {
+  armed();
+  link.pass(1500ms);
+  link.heartbeat(SafeReason::link);
+  link.pass(10ms);
+  link.heartbeat();
+  link.pass(10ms);
+  state(SafeReason::none, link.last('F').pnum, false);  // recovery=rearm, or another host was there
+  EXPECT_EQ(link.session.disarmed_by(), DisarmCause::link);
+  EXPECT_EQ(post(), PostResult::not_armed);
+}
+
+TEST_F(SessionArming, ARestartOfTheBoardDisarms) {
+  armed();
+  link.reboot();
+  link.boot_heartbeat();
+  link.heartbeat();
+  EXPECT_EQ(link.session.disarmed_by(), DisarmCause::restart);
+}
+
+TEST_F(SessionArming, ACauseThatWasMissedIsSeenByTheOpenRelay) {
+  armed();
+  state(SafeReason::none, cmd, true);
+  EXPECT_EQ(post(), PostResult::sent);
+  state(SafeReason::none, cmd, false);
+  EXPECT_EQ(link.session.disarmed_by(), DisarmCause::supply);
+}
+
+TEST_F(SessionArming, AStopOfItsOwnDisarmsAtOnce) {
+  armed();
+  link.session.stop(1s, link.now);
+  EXPECT_EQ(link.session.disarmed_by(), DisarmCause::stop);
+  EXPECT_EQ(post(), PostResult::not_armed);
+}
+
+TEST_F(SessionArming, ClearsAStopAndWhatItHidEachOnce) {
+  link.heartbeat(SafeReason::stop);
+  const Ticket ticket = arm();
+  EXPECT_EQ(link.count('E'), 1U);
+  execute('E', SafeReason::fault);
+  EXPECT_EQ(link.count('E'), 2U) << "the stop has hidden a fault";
+  execute('E', SafeReason::watchdog);
+  EXPECT_EQ(link.count('E'), 3U);
+  EXPECT_EQ(link.count('R'), 0U) << "not before all is clear";
+  execute('E');
+  execute('R', SafeReason::none, true);
+  EXPECT_EQ(outcome(ticket), Outcome::confirmed);
+}
+
+TEST_F(SessionArming, DoesNotClearAStopThatIsPressedMeanwhile) {
+  link.heartbeat(SafeReason::fault);
+  const Ticket ticket = arm();
+  EXPECT_EQ(link.count('E'), 1U);
+  execute('E', SafeReason::stop);
+  EXPECT_EQ(link.count('E'), 1U);
+  EXPECT_EQ(outcome(ticket), Outcome::not_armed);
+  EXPECT_EQ(link.results[ticket].disarmed, DisarmCause::stop);
+  link.pass(2s);
+  EXPECT_EQ(link.count('E'), 1U);
+  EXPECT_EQ(link.count('R'), 0U);
+}
+
+TEST_F(SessionArming, DoesNotClearTheSameCauseTwice) {
+  link.heartbeat(SafeReason::stop);
+  const Ticket ticket = arm();
+  execute('E', SafeReason::stop);  // pressed again
+  EXPECT_EQ(outcome(ticket), Outcome::not_armed);
+  EXPECT_EQ(link.count('E'), 1U);
+}
+
+TEST_F(SessionArming, FailsAtOnceForWhatCannotBeCleared) {
+  for (const SafeReason reason : {SafeReason::handle, SafeReason::proximity}) {
+    link.heartbeat(reason);
+    const Ticket ticket = arm();
+    EXPECT_EQ(outcome(ticket), Outcome::not_armed);
+    EXPECT_EQ(link.results[ticket].disarmed, cause_of(reason));
+    EXPECT_LT(link.results[ticket].elapsed, 2ms);
+  }
+  EXPECT_EQ(link.count('R'), 0U);
+  link.heartbeat(SafeReason::handle);
+  const Ticket ticket = arm();
+  const Problem problem = explain("arm()", link.results[ticket], link.session.link());
+  EXPECT_EQ(problem.reason, "not armed: the dead-man's handle was released");
+  EXPECT_EQ(problem.fix, "hold the handle, then call arm()");
+}
+
+TEST_F(SessionArming, IsNotArmedWhenTheBoardRefusesTheRelay) {
+  const Ticket ticket = arm();
+  link.nack(link.last('R').pnum, "SAFE");
+  EXPECT_EQ(outcome(ticket), Outcome::refused);
+  EXPECT_EQ(link.results[ticket].code, Refusal::safe);
+  EXPECT_EQ(post(), PostResult::not_armed);
+}
+
+TEST_F(SessionArming, GivesUpAtItsDeadlineAndSendsNothingAfterIt) {
+  const Ticket ticket = arm();
+  link.pass(1s);
+  EXPECT_EQ(outcome(ticket), Outcome::timed_out);
+  link.sent.clear();
+  link.pass(500ms);
+  EXPECT_EQ(link.count('R'), 0U) << "an abandoned call is not repeated";
+}
+
+TEST_F(SessionArming, AForgottenCallSendsNothingMore) {
+  const Ticket ticket = arm();
+  link.session.forget(ticket);
+  link.sent.clear();
+  link.pass(500ms);
+  EXPECT_EQ(link.count('R'), 0U);
+}
+
+TEST_F(SessionArming, AStopCancelsIt) {
+  const Ticket ticket = arm();
+  link.session.stop(1s, link.now);
+  EXPECT_EQ(outcome(ticket), Outcome::cancelled);
+  link.sent.clear();
+  link.pass(500ms);
+  EXPECT_EQ(link.count('R'), 0U);
+  EXPECT_EQ(link.session.disarmed_by(), DisarmCause::stop);
+}
+
+TEST_F(SessionArming, ThatIsAskedForBeforeAStopOfItsOwnIsConfirmedEnds) {
+  link.session.stop(1s, link.now);
+  const std::uint32_t stop = link.last('E').pnum;
+  Ticket ticket = arm();
+  EXPECT_EQ(link.count('R'), 0U);
+  link.stopped(stop, 7);
+  EXPECT_EQ(outcome(ticket), Outcome::not_armed);
+  ticket = arm();
+  EXPECT_EQ(link.last('E').command, "E:CLEAR,7");
+  execute('E');
+  execute('R', SafeReason::none, true);
+  EXPECT_EQ(outcome(ticket), Outcome::confirmed);
+}
+
+TEST_F(SessionArming, AStopOfSomebodyElseThatComesMeanwhileEndsIt) {
+  link.stopped(1, 7);
+  state(SafeReason::stop, cmd, false);
+  const Ticket ticket = arm();
+  EXPECT_EQ(link.last('E').command, "E:CLEAR,7");
+  link.stopped(2, 8);
+  EXPECT_EQ(outcome(ticket), Outcome::not_armed);
+  link.sent.clear();
+  link.pass(500ms);
+  EXPECT_EQ(link.count('E') + link.count('R'), 0U);
+}
+
+TEST_F(SessionArming, OutputCommandsBehindItWaitForIt) {
+  const Ticket ticket = link.session.arm(1s, link.now);
+  const Ticket behind = link.session.send(drive, 1s, link.now);
+  link.pass(1ms);
+  EXPECT_EQ(link.count('O'), 0U);
+  execute('R', SafeReason::none, true);
+  EXPECT_EQ(outcome(ticket), Outcome::confirmed);
+  EXPECT_EQ(link.count('O'), 1U);
+  execute('O', SafeReason::none, true);
+  EXPECT_EQ(outcome(behind), Outcome::confirmed);
+}
+
+TEST_F(SessionArming, OutputCommandsBehindOneThatFailsAreRefused) {
+  link.heartbeat(SafeReason::handle);
+  link.session.arm(1s, link.now);
+  const Ticket behind = link.session.send(drive, 1s, link.now);
+  link.pass(1ms);
+  EXPECT_EQ(outcome(behind), Outcome::not_armed);
+  EXPECT_EQ(link.results[behind].disarmed, DisarmCause::handle);
+}
+
+TEST_F(SessionArming, IsConfirmedAtOnceWhenItIsArmedAlready) {
+  armed();
+  const Ticket ticket = arm();
+  EXPECT_EQ(outcome(ticket), Outcome::confirmed);
+  EXPECT_EQ(link.count('R'), 0U);
+}
+
+TEST_F(SessionArming, WaitsForTheLink) {
+  ScriptedLink fresh(arming_required());
+  const Ticket ticket = fresh.session.arm(1s, fresh.now);
+  fresh.pass(10ms);
+  EXPECT_EQ(fresh.count('R'), 0U);
+  fresh.heartbeat();
+  fresh.pass(10ms);
+  fresh.executed(fresh.last('F').pnum);
+  ASSERT_EQ(fresh.count('R'), 1U);
+  fresh.executed(fresh.last('R').pnum);
+  EXPECT_EQ(fresh.results[ticket].outcome, Outcome::confirmed);
+}
+
+TEST_F(SessionArming, CanBeTurnedOff) {
+  ScriptedLink free;
+  free.connect();
+  EXPECT_EQ(free.session.post(drive, free.now), PostResult::sent);
+  free.heartbeat(SafeReason::stop);
+  free.heartbeat();
+  EXPECT_EQ(free.session.post(drive, free.now), PostResult::sent)
+      << "the way of the paper's clients";
+  const Ticket ticket = free.session.arm(1s, free.now);
+  free.pass(1ms);
+  free.executed(free.last('R').pnum);
+  EXPECT_EQ(free.results[ticket].outcome, Outcome::confirmed) << "arm() does what it does";
+}
+
+// --- posts that the board refuses
+
+TEST_F(SessionArming, TellsOfAPostThatTheBoardRefusesOnce) {
+  armed();
+  ASSERT_EQ(post(), PostResult::sent);
+  const std::uint32_t pnum = link.last('O').pnum;
+  const std::uint64_t before = link.session.statistics(link.now).refused;
+  link.nack(pnum, "SAFE");
+  link.nack(pnum, "SAFE");
+  ASSERT_EQ(link.refused.size(), 1U);
+  EXPECT_EQ(link.refused[0].command.kind, CommandKind::osmc);
+  EXPECT_EQ(link.refused[0].command.value, 358);
+  EXPECT_EQ(link.refused[0].code, Refusal::safe);
+  EXPECT_EQ(link.session.statistics(link.now).refused, before + 1);
+}
+
+TEST_F(SessionArming, APostThatWasExecutedIsNotRefused) {
+  armed();
+  post();
+  link.nack(link.last('O').pnum, "DUPLICATE");
+  EXPECT_TRUE(link.refused.empty());
+}
+
+TEST_F(SessionArming, ARefusalOverAnOutageProvesNothingOfAPost) {
+  armed();
+  post();
+  const std::uint32_t pnum = link.last('O').pnum;
+  link.pass(1500ms);
+  link.heartbeat(SafeReason::link);
+  link.pass(10ms);
+  link.heartbeat();
+  link.pass(10ms);
+  state(SafeReason::none, link.last('F').pnum, true);
+  link.session_pnum = link.last('H').pnum;  // the board has begun another
+  link.nack(pnum, "STALE");
+  EXPECT_TRUE(link.refused.empty());
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,526 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What becomes of commands: confirmed by the board's own state, refused, timed out, cancelled.
+#include <gtest/gtest.h>
+
+#include "host/commands/command_help.hpp"
+#include "host/session/session.hpp"
+#include "protocol/link/board_link.hpp"
+#include "scripted_link.hpp"
+#include "tests/support/datagrams.hpp"
+#include "transports/error.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+const Command drive = Command::osmc(358, Direction::forward, 1);
+
+CommandResult result_of(const ScriptedLink& link, Ticket ticket) {
+  const auto found = link.results.find(ticket);
+  if (found == link.results.end()) {
+    ADD_FAILURE() << "command " << ticket << " has not ended";
+    return {};
+  }
+  return found->second;
+}
+
+bool under_way(const ScriptedLink& link, Ticket ticket) {
+  return link.results.find(ticket) == link.results.end();
+}
+
+TEST(SessionCommand, GoesOutAtOnceAndIsConfirmedByItsNumberInTheState) {
+  ScriptedLink link;
+  link.connect();
+  const Ticket ticket = link.session.send(drive, 1s, link.now);
+  const auto sent = link.last('O');
+  EXPECT_EQ(sent.command, "O:358,1,1");
+  EXPECT_EQ(sent.at, link.now);
+  EXPECT_EQ(sent.priority, Priority::normal);
+  link.pass(7ms);
+  link.executed(sent.pnum - 1);
+  EXPECT_TRUE(under_way(link, ticket));
+  link.executed(sent.pnum);
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
+  EXPECT_EQ(result_of(link, ticket).elapsed, 7ms);
+  link.pass(1s);
+  EXPECT_EQ(link.count('O'), 1U);
+}
+
+TEST(SessionCommand, IsNotConfirmedByItsValueAloneWhereTheBoardHasCmd) {
+  ScriptedLink link;
+  link.connect();
+  const Ticket ticket = link.session.send(drive, 1s, link.now);
+  link.state("OSMC1:358,1;SAFE:0;CMD:1;");
+  EXPECT_TRUE(under_way(link, ticket));
+}
+
+TEST(SessionCommand, WaitsForTheLinkAndKeepsTheOrder) {
+  ScriptedLink link;
+  const Ticket first = link.session.send(drive, 5s, link.now);
+  const Ticket second = link.session.send(Command::servo(1500, 2), 5s, link.now);
+  EXPECT_FALSE(link.session.post(drive, link.now)) << "what is sent once does not wait";
+  link.pass(200ms);
+  EXPECT_EQ(link.count('O') + link.count('S'), 0U);
+  link.heartbeat();
+  link.pass(10ms);
+  EXPECT_EQ(link.count('O'), 0U) << "not before the board has obeyed once";
+  link.executed(link.last('F').pnum);
+  ASSERT_EQ(link.count('O'), 1U);
+  ASSERT_EQ(link.count('S'), 1U);
+  EXPECT_LT(link.last('O').pnum, link.last('S').pnum);
+  link.executed(link.last('O').pnum);
+  link.executed(link.last('S').pnum);
+  EXPECT_EQ(result_of(link, first).outcome, Outcome::confirmed);
+  EXPECT_EQ(result_of(link, second).outcome, Outcome::confirmed);
+}
+
+TEST(SessionCommand, IsRepeatedWithTheSameBytesEveryFiftyMilliseconds) {
+  ScriptedLink link;
+  link.connect();
+  link.session.send(drive, 1s, link.now);
+  const Time start = link.now;
+  link.pass(499ms);
+  const auto sent = link.all('O');
+  ASSERT_EQ(sent.size(), 10U);
+  for (std::size_t i = 0; i < sent.size(); ++i) {
+    EXPECT_EQ(sent[i].bytes, sent[0].bytes);
+    EXPECT_EQ(sent[i].at - start, i * 50ms);
+  }
+  EXPECT_EQ(link.session.statistics(link.now).retries, 9U);
+  EXPECT_EQ(link.session.statistics(link.now).commands, 1U);
+}
+
+TEST(SessionCommand, EndsAtItsDeadline) {
+  ScriptedLink link;
+  link.connect();
+  const Ticket ticket = link.session.send(drive, 120ms, link.now);
+  link.pass(119ms);
+  EXPECT_TRUE(under_way(link, ticket));
+  link.pass(1ms);
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::timed_out);
+  EXPECT_EQ(result_of(link, ticket).elapsed, 120ms);
+  link.pass(1s);
+  EXPECT_EQ(link.count('O'), 3U) << "and is not sent again";
+
+  ScriptedLink silent;
+  const Ticket waiting = silent.session.send(drive, 120ms, silent.now);
+  silent.pass(120ms);
+  EXPECT_EQ(result_of(silent, waiting).outcome, Outcome::timed_out) << "also without a link";
+}
+
+TEST(SessionCommand, IsRefusedWithTheBoardsCode) {
+  ScriptedLink link;
+  link.connect();
+  const Ticket other = link.session.send(drive, 1s, link.now);
+  const Ticket ticket = link.session.send(Command::servo(1500, 2), 1s, link.now);
+  link.pass(3ms);
+  link.nack(link.last('S').pnum, "SAFE");
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::refused);
+  EXPECT_EQ(result_of(link, ticket).code, Refusal::safe);
+  EXPECT_TRUE(under_way(link, other));
+  ASSERT_EQ(link.nacks.size(), 1U);
+  EXPECT_EQ(link.session.statistics(link.now).refused, 1U);
+}
+
+TEST(SessionCommand, ThatWasOvertakenAsksAtOnceAndDuplicateConfirmsIt) {
+  ScriptedLink link;
+  link.connect();
+  const Ticket first = link.session.send(drive, 1s, link.now);
+  link.session.send(Command::servo(1500, 2), 1s, link.now);
+  link.pass(10ms);
+  link.executed(link.last('S').pnum);  // the state between them was lost
+  EXPECT_TRUE(under_way(link, first)) << "CMD past it proves nothing";
+  EXPECT_EQ(link.count('O'), 2U) << "it asks without waiting for the 50 ms";
+  link.nack(link.last('O').pnum, "DUPLICATE");
+  EXPECT_EQ(result_of(link, first).outcome, Outcome::confirmed);
+}
+
+TEST(SessionCommand, ThatWasOvertakenAndNotExecutedIsRefusedAsStale) {
+  ScriptedLink link;
+  link.connect();
+  const Ticket first = link.session.send(drive, 1s, link.now);
+  link.session.send(Command::servo(1500, 2), 1s, link.now);
+  link.executed(link.last('S').pnum);
+  link.nack(link.last('O').pnum, "STALE");
+  EXPECT_EQ(result_of(link, first).outcome, Outcome::refused);
+  EXPECT_EQ(result_of(link, first).code, Refusal::stale);
+}
+
+TEST(SessionCommand, DuplicateAloneWaitsForTheState) {
+  ScriptedLink link;
+  link.connect();
+  const Ticket ticket = link.session.send(drive, 1s, link.now);
+  link.pass(60ms);
+  link.nack(link.last('O').pnum, "DUPLICATE");
+  EXPECT_TRUE(under_way(link, ticket)) << "confirmed only when the board's state says so";
+  link.executed(link.last('O').pnum);
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
+}
+
+TEST(SessionCommand, IsConfirmedByItsValueWhereTheBoardHasNoCmd) {
+  ScriptedLink link;
+  link.heartbeat();
+  const Ticket ticket = link.session.send(drive, 20s, link.now);
+  for (int i = 0; i < 300; ++i) {  // the paper's board knows neither F nor CMD
+    link.pass(10ms);
+    link.state("AIN24:24.28;OSMC1:0,0;");
+  }
+  ASSERT_GE(link.count('O'), 1U) << "at the end it believes in the paper's board";
+  EXPECT_TRUE(under_way(link, ticket));
+  link.state("AIN24:24.28;OSMC1:358,0;");
+  EXPECT_TRUE(under_way(link, ticket)) << "the other direction";
+  link.state("AIN24:24.28;OSMC1:358,1;");
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
+}
+
+TEST(SessionCommand, FieldsAreAskedForUntilTheBoardKnowsHoweverManyAreLost) {
+  ScriptedLink link;
+  link.heartbeat();
+  const auto lose = [&](int states) {
+    for (int i = 0; i < states; ++i) {
+      link.pass(10ms);
+      link.state("AIN24:24.28;");
+    }
+    return link.count('F');
+  };
+  const std::size_t at_first = lose(300);
+  EXPECT_LE(lose(300) - at_first, 4U) << "seldom: the paper's board knows no F";
+  ASSERT_GT(link.count('F'), at_first);
+  link.executed(link.last('F').pnum);
+  const Ticket ticket = link.session.send(drive, 1s, link.now);
+  link.state("AIN24:24.28;CMD:7;OSMC1:358,1;");
+  EXPECT_TRUE(under_way(link, ticket)) << "its value is no proof where there is CMD";
+  link.executed(link.last('O').pnum);
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
+}
+
+TEST(SessionCommand, OutsideItsRangesIsThrownBack) {
+  ScriptedLink link;
+  link.connect();
+  for (const Command& wrong :
+       {Command::osmc(4096, Direction::forward, 1), Command::osmc(-1, Direction::forward, 1),
+        Command::osmc(1, Direction::forward, 5), Command::dhb12(1, Direction::forward, 0),
+        Command::servo(2501, 1), Command::servo(1, 17), Command::relay(9, true),
+        Command::stepper(0, 0, 1), Command::stepper(0, 20001, 1), Command::stepper(0, 1, 5),
+        Command::zero(5), Command::bldc(4096, Direction::forward, false, 1),
+        Command::bldc(1, Direction::forward, false, 5), Command::proximity(401, 1),
+        Command::proximity(1, 5), Command::fields(""), Command::setting("", "1"),
+        Command::fields("A;B"), Command::setting("rate", "1^2")}) {
+    try {
+      link.session.send(wrong, 1s, link.now);
+      ADD_FAILURE() << text_of(wrong) << " was taken";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::usage);
+      EXPECT_FALSE(error.problem().fix.empty()) << error.what();
+    }
+    EXPECT_THROW(link.session.post(wrong, link.now), Error);
+  }
+  const std::string long_text(2000, 'A');
+  EXPECT_THROW(link.session.send(Command::fields(long_text), 1s, link.now), Error);
+  EXPECT_TRUE(link.sent.empty());
+}
+
+TEST(SessionCommand, IsNotTakenBeyondSixtyFour) {
+  ScriptedLink link;
+  for (std::size_t i = 0; i < Session::max_pending; ++i) {
+    EXPECT_NE(link.session.send(drive, 1s, link.now), 0U);
+  }
+  EXPECT_EQ(link.session.send(drive, 1s, link.now), 0U);
+  EXPECT_EQ(link.session.identify(1s, link.now), 0U);
+  EXPECT_NE(link.session.stop(1s, link.now), 0U) << "a stop always is";
+  EXPECT_EQ(link.results.size(), Session::max_pending);
+}
+
+TEST(SessionCommand, SentOnceIsNotRepeated) {
+  ScriptedLink link;
+  link.connect();
+  EXPECT_TRUE(link.session.post(drive, link.now));
+  link.pass(1s);
+  EXPECT_EQ(link.count('O'), 1U);
+  EXPECT_TRUE(link.results.empty());
+}
+
+TEST(SessionCommand, SentOnceDoesNotOvertakeThoseThatWait) {
+  ScriptedLink link;
+  link.connect();
+  link.session.send(drive, 1s, link.now);
+  link.session.post(Command::osmc(0, Direction::forward, 1), link.now);
+  ASSERT_EQ(link.count('O'), 2U);
+  EXPECT_EQ(link.all('O')[0].command, "O:358,1,1");
+  EXPECT_LT(link.all('O')[0].pnum, link.all('O')[1].pnum);
+}
+
+TEST(SessionCommand, IdentifyIsConfirmedByTheAnswerInAnyState) {
+  ScriptedLink link;
+  const Ticket ticket = link.session.identify(1s, link.now);
+  EXPECT_EQ(link.last('Q').command, "Q:ID");
+  link.pass(2ms);
+  link.identity();
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
+  EXPECT_EQ(result_of(link, ticket).elapsed, 2ms);
+  EXPECT_DOUBLE_EQ(link.session.statistics(link.now).round_trip_us, 2000);
+}
+
+TEST(SessionCommand, ForgottenEndsWithoutAWord) {
+  ScriptedLink link;
+  link.connect();
+  const Ticket ticket = link.session.send(drive, 1s, link.now);
+  link.session.forget(ticket);
+  link.pass(2s);
+  EXPECT_TRUE(link.results.empty());
+  EXPECT_EQ(link.count('O'), 1U);
+}
+
+TEST(SessionCommand, AllAreCancelledAtTheEnd) {
+  ScriptedLink link;
+  link.connect();
+  const Ticket ticket = link.session.send(drive, 1s, link.now);
+  const Ticket stop = link.session.stop(1s, link.now);
+  link.session.cancel_all(link.now);
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::cancelled);
+  EXPECT_EQ(result_of(link, stop).outcome, Outcome::cancelled);
+}
+
+TEST(SessionStop, GoesOutBeforeTheLinkIsUpWithTheTopPriority) {
+  ScriptedLink link;
+  link.session.stop(1s, link.now);
+  ASSERT_EQ(link.count('E'), 1U);
+  EXPECT_EQ(link.last('E').command, "E:STOP");
+  EXPECT_EQ(link.last('E').priority, Priority::stop);
+}
+
+TEST(SessionStop, IsRepeatedEveryTwentyMillisecondsUntilTheBoardReportsIt) {
+  ScriptedLink link;
+  link.connect();
+  const Time start = link.now;
+  const Ticket ticket = link.session.stop(1s, link.now);
+  link.pass(50ms);
+  link.executed(1);
+  EXPECT_TRUE(under_way(link, ticket));
+  link.pass(49ms);
+  const auto sent = link.all('E');
+  ASSERT_EQ(sent.size(), 5U);
+  for (std::size_t i = 0; i < sent.size(); ++i) {
+    EXPECT_EQ(sent[i].at - start, i * 20ms);
+    EXPECT_EQ(sent[i].bytes, sent[0].bytes);
+  }
+  link.heartbeat(SafeReason::stop);
+  EXPECT_TRUE(under_way(link, ticket)) << "of whose stop that speaks is not known";
+  link.stopped(sent[0].pnum);
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
+}
+
+TEST(SessionStop, IsRepeatedForAWhileAfterItsConfirmation) {
+  ScriptedLink link;
+  link.connect();
+  link.session.stop(1s, link.now);
+  link.stopped(link.last('E').pnum);
+  link.pass(1s);
+  EXPECT_EQ(link.count('E'), 10U) << "every 20 ms for 200 ms";
+  EXPECT_EQ(link.last('E').bytes, link.all('E').front().bytes);
+
+  link.session.stop(1s, link.now);
+  link.stopped(link.last('E').pnum);
+  link.pass(30ms);
+  link.session.send(Command::clear(), 1s, link.now);
+  const std::size_t stops = link.count('E');
+  link.pass(40ms);
+  EXPECT_EQ(link.count('E'), stops) << "not past an E:CLEAR of its own";
+}
+
+TEST(SessionStop, IsNotConfirmedByTheReportOfAnother) {
+  ScriptedLink link;
+  link.connect();
+  const Ticket first = link.session.stop(1s, link.now);
+  const std::uint32_t number = link.last('E').pnum;
+  link.stopped(number);
+  EXPECT_EQ(result_of(link, first).outcome, Outcome::confirmed);
+  link.heartbeat();  // somebody has cleared it
+
+  const Ticket ticket = link.session.stop(1s, link.now);
+  link.stopped(number);  // a late copy, of a board that drives
+  link.heartbeat(SafeReason::stop);
+  link.state("SAFE:2;");
+  link.nack(1, "STALE");
+  link.identity();
+  link.stopped(link.last('E').pnum - 1);
+  EXPECT_TRUE(under_way(link, ticket));
+  link.stopped(link.last('E').pnum, 2);
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
+}
+
+TEST(SessionStop, IsConfirmedByTheEndOfItsNumberAsACanBusCarriesIt) {
+  ScriptedLink link;
+  link.connect();
+  const Ticket ticket = link.session.stop(1s, link.now);
+  link.stopped((link.last('E').pnum + 1) & 0x3FFFF);
+  EXPECT_TRUE(under_way(link, ticket));
+  link.stopped(link.last('E').pnum & 0x3FFFF);
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
+}
+
+// --- what an E:CLEAR clears
+
+TEST(SessionClear, NamesTheCauseThatWasKnownWhenItWasAskedFor) {
+  ScriptedLink link;
+  link.connect();
+  link.stopped(1, 7);
+  link.session.send(Command::clear(), 1s, link.now);
+  EXPECT_EQ(link.last('E').command, "E:CLEAR,7");
+  link.heartbeat();
+  link.session.post(Command::clear(), link.now);
+  EXPECT_EQ(link.last('E').command, "E:CLEAR,0");
+}
+
+TEST(SessionClear, ThatIsAskedForBeforeTheBoardIsHeardNamesTheFirstThatItTells) {
+  ScriptedLink link;
+  const Ticket ticket = link.session.send(Command::clear(), 1s, link.now);
+  link.stopped(1, 7);
+  link.pass(10ms);
+  link.state("SAFE:2;CMD:" + std::to_string(link.last('F').pnum) + ";");
+  EXPECT_EQ(link.last('E').command, "E:CLEAR,7");
+  EXPECT_TRUE(under_way(link, ticket));
+}
+
+TEST(SessionClear, IsGivenUpWhenTheBoardTellsOfANewerCause) {
+  ScriptedLink link;
+  link.connect();
+  link.stopped(1, 7);
+  const Ticket sent = link.session.send(Command::clear(), 1s, link.now);
+  link.stopped(1, 7);
+  EXPECT_TRUE(under_way(link, sent));
+  link.stopped(2, 8);  // pressed again
+  EXPECT_EQ(result_of(link, sent).outcome, Outcome::cancelled);
+  const std::size_t clears = link.count('E');
+  link.pass(500ms);
+  EXPECT_EQ(link.count('E'), clears) << "it is not repeated";
+}
+
+TEST(SessionClear, ThatWaitsForControlIsNotSentPastANewerCause) {
+  ScriptedLink link;
+  link.stopped(1, 7);
+  const Ticket waits = link.session.send(Command::clear(), 1s, link.now);
+  link.stopped(2, 8);
+  EXPECT_EQ(result_of(link, waits).outcome, Outcome::cancelled);
+  EXPECT_EQ(link.count('E'), 0U);
+}
+
+TEST(SessionClear, ThatIsAskedForBeforeAStopOfItsOwnIsConfirmedIsGivenUp) {
+  ScriptedLink link;
+  link.connect();
+  link.heartbeat();
+  const Ticket stop = link.session.stop(1s, link.now);
+  const std::uint32_t number = link.last('E').pnum;
+  const Ticket clear = link.session.send(Command::clear(), 1s, link.now);
+  link.stopped(number, 7);  // of which it was not known what else it would take away
+  EXPECT_EQ(result_of(link, stop).outcome, Outcome::confirmed);
+  EXPECT_EQ(result_of(link, clear).outcome, Outcome::cancelled);
+}
+
+// --- refusals
+
+TEST(SessionRefusal, ProvesNothingOfASessionThatBeganAfterTheCommand) {
+  ScriptedLink link;
+  link.connect();
+  const Ticket ticket = link.session.send(drive, 5s, link.now);
+  const std::uint32_t pnum = link.last('O').pnum;
+  link.pass(100ms);
+  link.session_pnum = 0;  // the board takes us for a stranger: our address has changed
+  link.nack(pnum, "SAFE");
+  EXPECT_TRUE(under_way(link, ticket));
+  link.session_pnum = pnum + 1;  // a heartbeat of ours that came after an outage
+  link.nack(pnum, "STALE");
+  EXPECT_TRUE(under_way(link, ticket));
+  link.session_pnum = echo_host_first_pnum + 99;  // not ours
+  link.nack(pnum, "STALE");
+  EXPECT_TRUE(under_way(link, ticket));
+  link.session_pnum = echo_host_first_pnum + 100;
+  link.nack(pnum, "STALE");
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::refused);
+}
+
+TEST(SessionStop, CancelsEveryCommandUnderWayAndNoneFollowsIt) {
+  ScriptedLink link;
+  const Ticket queued = link.session.send(drive, 5s, link.now);
+  link.connect();
+  const Ticket sent = link.session.send(Command::servo(1500, 2), 5s, link.now);
+  link.session.stop(1s, link.now);
+  EXPECT_EQ(result_of(link, queued).outcome, Outcome::cancelled);
+  EXPECT_EQ(result_of(link, sent).outcome, Outcome::cancelled);
+  const std::size_t before = link.count('O') + link.count('S');
+  link.pass(500ms);
+  EXPECT_EQ(link.count('O') + link.count('S'), before);
+}
+
+TEST(SessionStop, IsSentEvenWhenSixteenAreUnderWay) {
+  ScriptedLink link;
+  for (std::size_t i = 0; i < Session::max_stops; ++i) {
+    EXPECT_NE(link.session.stop(1s, link.now), 0U);
+  }
+  EXPECT_EQ(link.session.stop(1s, link.now), 0U);
+  EXPECT_EQ(link.count('E'), Session::max_stops + 1);
+}
+
+TEST(SessionBusy, AHostWhosePlaceOnTheBusIsTakenMayOnlyStopTheBoard) {
+  ScriptedLink link;
+  link.connect();
+  link.place_taken = true;
+  const Ticket ticket = link.session.send(drive, 5s, link.now);
+  EXPECT_FALSE(link.session.post(drive, link.now));
+  for (int i = 0; i < 20; ++i) {
+    link.pass(100ms);
+    link.heartbeat();
+    link.executed(0);
+    EXPECT_TRUE(link.session.link().busy);
+  }
+  EXPECT_EQ(link.sent.size(), 0U);
+  EXPECT_FALSE(link.session.in_control(link.now));
+  const Ticket stop = link.session.stop(1s, link.now);
+  EXPECT_EQ(link.count('E'), 1U);
+  link.stopped(link.last('E').pnum);
+  EXPECT_EQ(result_of(link, stop).outcome, Outcome::confirmed);
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::cancelled);
+
+  link.place_taken = false;
+  link.pass(400ms);
+  EXPECT_FALSE(link.session.link().busy);
+}
+
+TEST(SessionBusy, CommandsWaitUntilTheOtherHostHasGone) {
+  ScriptedLink link;
+  link.nack(link.last('H').pnum, "BUSY");
+  const Ticket ticket = link.session.send(drive, 5s, link.now);
+  for (int i = 0; i < 5; ++i) {
+    link.pass(100ms);
+    link.nack(link.last('H').pnum, "BUSY");
+  }
+  EXPECT_EQ(link.count('O'), 0U);
+  link.pass(400ms);
+  link.heartbeat();
+  link.pass(10ms);
+  link.executed(link.last('F').pnum);
+  ASSERT_EQ(link.count('O'), 1U);
+  link.executed(link.last('O').pnum);
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
+}
+
+TEST(SessionBusy, ARefusalAfterAnOutageProvesNothingUnlessTheSessionIsTheSame) {
+  ScriptedLink link;
+  link.connect();
+  const Ticket ticket = link.session.send(drive, 10s, link.now);
+  const std::uint32_t pnum = link.last('O').pnum;
+  link.pass(1100ms);
+  ASSERT_EQ(link.session.link().state, HostLinkState::lost);
+  link.heartbeat();
+  const std::uint32_t before = link.session_pnum;
+  link.session_pnum = link.last('H').pnum;
+  link.nack(pnum, "STALE");
+  EXPECT_TRUE(under_way(link, ticket)) << "the board may have executed it before the outage";
+  link.session_pnum = before;  // the line was cut towards us only: the board remembers
+  link.nack(pnum, "STALE");
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::refused);
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,311 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A session with a key, and one without opposite a board that asks for one.
+#include <gtest/gtest.h>
+
+#include "host/explain.hpp"
+#include "host/session/session.hpp"
+#include "scripted_link.hpp"
+#include "tests/support/datagrams.hpp"
+#include "tests/support/signing.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+const Key key = key_of(2);
+const Command drive = Command::osmc(358, Direction::forward, 1);
+constexpr const char* nonce = "0123456789abcdef";
+
+SessionOptions keyed() {
+  SessionOptions options = ScriptedLink::without_questions();
+  options.key = key;
+  options.clock_start = 1'700'000'000s;
+  return options;
+}
+
+// A board's heartbeat with a nonce.
+void keyed_heartbeat(ScriptedLink& link, const std::string& its_nonce = nonce,
+                     const std::string& reason = "") {
+  link.raw(with_crc("H:R4-ROS2;PNum:" + std::to_string(link.board_pnum++) +
+                    ";T:" + std::to_string(link.board_ms()) + reason + ";AN:" + its_nonce + ";"));
+}
+
+void connect(ScriptedLink& link) {
+  keyed_heartbeat(link);
+  link.pass(10ms);
+  ASSERT_EQ(link.count('F'), 1U);
+  link.executed(link.last('F').pnum);
+  ASSERT_TRUE(link.session.in_control(link.now));
+  link.session_pnum = link.last('H').pnum;
+  link.sent.clear();
+}
+
+// The field A of a datagram; empty if it has none.
+std::string signature_of(const ScriptedLink::Sent& sent) {
+  Datagram datagram;
+  EXPECT_TRUE(read(sent.bytes, datagram));
+  return str(datagram.find("A").values());
+}
+
+// As the board finds it.
+Verdict verdict(const ScriptedLink& link, const ScriptedLink::Sent& sent,
+                const std::string& its_nonce = nonce) {
+  Datagram datagram;
+  EXPECT_TRUE(read(sent.bytes, datagram));
+  const std::string tag = signature_of(sent).substr(signature_of(sent).rfind(',') + 1);
+  const std::string before = sent.bytes.substr(0, sent.bytes.rfind("," + tag));
+  char expected[tag_size];
+  write_tag(signing_key(key), Text(its_nonce), Text(before), expected);
+  if (tag != std::string(expected, tag_size)) return Verdict::wrong_tag;
+  Text values[4];
+  EXPECT_EQ(datagram.find("A").split(values, 4), 4U);
+  const std::uint32_t age =
+      link.board_ms() - static_cast<std::uint32_t>(std::stoul(str(values[2])));
+  return age <= 250 ? Verdict::authentic : Verdict::old;
+}
+
+TEST(SessionKey, AsksForTheNonceWithAnUnsignedHeartbeatAndSignsAllBehindIt) {
+  ScriptedLink link(keyed());
+  ASSERT_EQ(link.count('H'), 1U);
+  EXPECT_EQ(signature_of(link.last('H')), "");
+  keyed_heartbeat(link);
+  link.pass(10ms);
+  EXPECT_EQ(verdict(link, link.last('H')), Verdict::authentic);
+  EXPECT_EQ(verdict(link, link.last('F')), Verdict::authentic);
+}
+
+TEST(SessionKey, SignsWhatABoardThatIsConnectingSays) {
+  ScriptedLink link(keyed());
+  link.raw(
+      with_crc("H:R4-ROS2;PNum:0;T:" + std::to_string(link.board_ms()) + ";AN:" + nonce + ";"));
+  EXPECT_EQ(link.session.link().state, HostLinkState::connecting);
+  const auto heartbeat = link.last('H');
+  EXPECT_EQ(heartbeat.t, 0U) << "it echoes nothing yet";
+  EXPECT_EQ(verdict(link, heartbeat), Verdict::authentic);
+}
+
+TEST(SessionKey, ARetryHasTheSameNumberAndASignatureOfItsOwn) {
+  ScriptedLink link(keyed());
+  connect(link);
+  link.session.send(drive, 1s, link.now);
+  link.pass(60ms);
+  const auto sent = link.all('O');
+  ASSERT_EQ(sent.size(), 2U);
+  EXPECT_EQ(sent[0].pnum, sent[1].pnum);
+  EXPECT_EQ(sent[0].t, sent[1].t);
+  EXPECT_NE(signature_of(sent[0]), signature_of(sent[1]));
+  EXPECT_EQ(verdict(link, sent[1]), Verdict::authentic);
+  link.executed(sent[1].pnum);
+  EXPECT_EQ(link.results.begin()->second.outcome, Outcome::confirmed);
+}
+
+TEST(SessionKey, CountsFromTheTimeSince1970) {
+  ScriptedLink link(keyed());
+  keyed_heartbeat(link);
+  EXPECT_EQ(signature_of(link.last('H')).find("2,1700005000"), 0U) << signature_of(link.last('H'));
+}
+
+TEST(SessionKey, FollowsTheBoardToAnotherNonce) {
+  ScriptedLink link(keyed());
+  connect(link);
+  keyed_heartbeat(link, "fedcba9876543210");
+  EXPECT_EQ(verdict(link, link.last('H'), "fedcba9876543210"), Verdict::authentic);
+}
+
+TEST(SessionKey, ALateHeartbeatDoesNotBringTheOldNonceBack) {
+  ScriptedLink link(keyed());
+  connect(link);
+  const std::uint32_t late = link.board_pnum++;
+  keyed_heartbeat(link, "fedcba9876543210");
+  link.raw(with_crc("H:R4-ROS2;PNum:" + std::to_string(late) +
+                    ";T:" + std::to_string(link.board_ms()) + ";AN:" + nonce + ";"));
+  link.session.send(drive, 1s, link.now);
+  EXPECT_EQ(verdict(link, link.last('O'), "fedcba9876543210"), Verdict::authentic);
+}
+
+TEST(SessionKey, SignsInTimeAlsoWhileTheBoardSaysLittle) {
+  ScriptedLink link(keyed());
+  connect(link);
+  link.pass(700ms);
+  link.session.send(drive, 1s, link.now);
+  EXPECT_EQ(verdict(link, link.last('O')), Verdict::authentic);
+}
+
+TEST(SessionKey, RefusesABoardThatHasNone) {
+  ScriptedLink link(keyed());
+  link.heartbeat();
+  link.sent.clear();
+  const Ticket ticket = link.session.send(drive, 500ms, link.now);
+  EXPECT_FALSE(link.session.post(drive, link.now));
+  link.session.identify(500ms, link.now);
+  for (int i = 0; i < 20; ++i) {
+    link.pass(50ms);
+    link.state("AIN24:24.28;SAFE:0;CMD:1;");
+    link.heartbeat();
+  }
+  EXPECT_TRUE(link.sent.empty()) << link.sent.front().bytes;
+  EXPECT_EQ(link.session.link().key, KeyTrouble::board_has_none);
+  EXPECT_FALSE(link.session.in_control(link.now));
+  EXPECT_EQ(link.results.at(ticket).outcome, Outcome::timed_out);
+  EXPECT_NE(explain("board", link.session.link()).text().find("has no key"), std::string::npos);
+}
+
+TEST(SessionKey, SendsABoardThatHasNoneAStopAllTheSame) {
+  ScriptedLink link(keyed());
+  link.heartbeat();
+  link.sent.clear();
+  const Ticket ticket = link.session.stop(500ms, link.now);
+  ASSERT_EQ(link.count('E'), 1U);
+  EXPECT_EQ(signature_of(link.last('E')), "");
+  link.stopped(link.last('E').pnum);
+  EXPECT_EQ(link.results.at(ticket).outcome, Outcome::confirmed);
+}
+
+TEST(SessionKey, TakesTheBoardAsSoonAsItHasAKey) {
+  ScriptedLink link(keyed());
+  link.heartbeat();
+  EXPECT_EQ(link.session.link().key, KeyTrouble::board_has_none);
+  link.pass(300ms);
+  keyed_heartbeat(link);
+  EXPECT_EQ(link.session.link().key, KeyTrouble::none);
+  EXPECT_EQ(verdict(link, link.last('H')), Verdict::authentic);
+}
+
+TEST(SessionKey, SendsAStopBeforeItKnowsAnything) {
+  ScriptedLink link(keyed());
+  link.sent.clear();
+  link.session.stop(1s, link.now);
+  EXPECT_EQ(signature_of(link.last('E')), "");
+}
+
+// Of two copies, signed each, the board may have executed the first and refused the second.
+TEST(SessionKey, AnAuthDoesNotProveThatTheCommandWasNotExecuted) {
+  ScriptedLink link(keyed());
+  connect(link);
+  const Ticket ticket = link.session.send(drive, 500ms, link.now);
+  const std::uint32_t pnum = link.last('O').pnum;
+  link.nack(pnum, "AUTH");
+  EXPECT_TRUE(link.results.empty());
+  EXPECT_EQ(link.session.link().key, KeyTrouble::not_taken);
+  link.executed(pnum);
+  EXPECT_EQ(link.results.at(ticket).outcome, Outcome::confirmed);
+}
+
+TEST(SessionKey, AnAuthForACablesSettingIsFinalAndSaysNothingOfKeys) {
+  ScriptedLink link(keyed());
+  connect(link);
+  const Ticket ticket = link.session.send(Command::setting("node", "3"), 500ms, link.now);
+  link.nack(link.last('C').pnum, "AUTH");
+  EXPECT_EQ(link.results.at(ticket).outcome, Outcome::refused);
+  EXPECT_EQ(link.session.link().key, KeyTrouble::none);
+}
+
+TEST(SessionKey, FindsOutThatTheBoardTakesNoneOfItsHeartbeats) {
+  ScriptedLink link(keyed());
+  for (int i = 0; i < 4; ++i) {
+    link.raw(
+        with_crc("H:R4-ROS2;PNum:0;T:" + std::to_string(link.board_ms()) + ";AN:" + nonce + ";"));
+    link.pass(500ms);
+  }
+  EXPECT_EQ(link.session.link().key, KeyTrouble::not_taken);
+  keyed_heartbeat(link);
+  link.pass(0ms);
+  EXPECT_EQ(link.session.link().key, KeyTrouble::none);
+}
+
+// The host before ended with a stop: the board's reason hides whether it has a host.
+TEST(SessionKey, FindsOutThatAStoppedBoardTakesNoneOfItsHeartbeats) {
+  ScriptedLink link(keyed());
+  for (int i = 0; i < 12; ++i) {
+    keyed_heartbeat(link, nonce, ";SAFE:2");
+    link.pass(100ms);
+  }
+  EXPECT_EQ(link.session.link().key, KeyTrouble::not_taken);
+  EXPECT_NE(explain("board", link.session.link()).text().find("signed with our key"),
+            std::string::npos);
+  EXPECT_FALSE(link.session.in_control(link.now));
+}
+
+TEST(SessionKey, TakesAStoppedBoardThatAnswersBusyForOneWithAnotherHost) {
+  ScriptedLink link(keyed());
+  for (int i = 0; i < 30; ++i) {
+    keyed_heartbeat(link, nonce, ";SAFE:2");
+    link.nack(link.last('H').pnum, "BUSY");
+    link.pass(100ms);
+    EXPECT_EQ(link.session.link().key, KeyTrouble::none);
+  }
+  EXPECT_TRUE(link.session.link().busy);
+}
+
+// The lowest rate: heartbeats are sent in between, and none of them is in vain.
+TEST(SessionKey, IsTakenByAStoppedBoardThatSendsAStateASecond) {
+  ScriptedLink link(keyed());
+  connect(link);
+  for (int i = 0; i < 10; ++i) {
+    link.state("SAFE:2;CMD:0;");
+    for (int j = 0; j < 10; ++j) {
+      keyed_heartbeat(link, nonce, ";SAFE:2");
+      link.pass(100ms);
+      EXPECT_EQ(link.session.link().key, KeyTrouble::none);
+    }
+  }
+  for (int j = 0; j < 20; ++j) {  // and then it sends none any more
+    keyed_heartbeat(link, nonce, ";SAFE:2");
+    link.pass(100ms);
+  }
+  EXPECT_EQ(link.session.link().key, KeyTrouble::not_taken);
+}
+
+// The paper's release answers nothing, and is commanded all the same. It has no keys.
+TEST(SessionKey, DoesNotTakeABoardWithAKeyForThePapersRelease) {
+  SessionOptions options = keyed();
+  ASSERT_FALSE(options.fields.empty());
+  ScriptedLink link(options);
+  for (int i = 0; i < 30; ++i) {
+    keyed_heartbeat(link);
+    link.pass(100ms);
+    EXPECT_FALSE(link.session.in_control(link.now));
+  }
+  EXPECT_GT(link.count('F'), 5U);
+}
+
+TEST(SessionWithoutKey, FindsOutThatOneIsNeeded) {
+  ScriptedLink link;
+  for (int i = 0; i < 4; ++i) {
+    link.raw(
+        with_crc("H:R4-ROS2;PNum:0;T:" + std::to_string(link.board_ms()) + ";AN:" + nonce + ";"));
+    link.pass(500ms);
+  }
+  EXPECT_EQ(link.session.link().key, KeyTrouble::needed);
+  EXPECT_NE(explain("board", link.session.link()).text().find("--key"), std::string::npos);
+  EXPECT_EQ(signature_of(link.last('H')), "");
+}
+
+TEST(SessionWithoutKey, IsTakenOverACableOfTheBoardAllTheSame) {
+  ScriptedLink link;
+  connect(link);
+  for (int i = 0; i < 30; ++i) {
+    link.pass(100ms);
+    keyed_heartbeat(link);
+  }
+  EXPECT_EQ(link.session.link().key, KeyTrouble::none);
+}
+
+TEST(Explain, TellsThatABoardHasAllTheKeysItCanHold) {
+  const CommandResult refused{Outcome::refused, Refusal::range, Time{0}};
+  EXPECT_NE(explain("C:key,5:...", refused, {}).reason.find("it holds 4 keys"), std::string::npos);
+  EXPECT_NE(explain("C:rate,50", refused, {}).fix.find("1-1000"), std::string::npos);
+}
+
+TEST(Explain, TellsASettingForTheCableFromOneThatWantsAKey) {
+  const CommandResult refused{Outcome::refused, Refusal::auth, Time{0}};
+  EXPECT_EQ(explain("C:key,1:...", refused, {}).fix, "send it over USB: serial:auto");
+  EXPECT_EQ(explain("C:node,5", refused, {}).fix, "send it over USB: serial:auto");
+  for (const char* command : {"C:rate,50", "C:rate", "O:1,1,1"}) {
+    EXPECT_NE(explain(command, refused, {}).fix.find("--key FILE"), std::string::npos) << command;
+  }
+}
+
+}  // namespace
+}  // namespace r4::test

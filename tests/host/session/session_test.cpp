@@ -1,0 +1,322 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The link: how it comes up, stays alive and ends, and what the session tells of it.
+#include "host/session/session.hpp"
+
+#include <gtest/gtest.h>
+
+#include "protocol/link/board_link.hpp"
+#include "scripted_link.hpp"
+#include "tests/support/datagrams.hpp"
+#include "transports/error.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+TEST(Session, SendsAHeartbeatAtOnceAndThenTenASecond) {
+  ScriptedLink link;
+  ASSERT_EQ(link.count('H'), 1U);
+  EXPECT_EQ(link.sent[0].command, "H:ROS2-R4");
+  EXPECT_EQ(link.sent[0].t, 0U) << "nothing heard, nothing to echo";
+  EXPECT_GE(link.sent[0].pnum, echo_host_first_pnum);
+  link.pass(10s);
+  EXPECT_EQ(link.count('H'), 101U);
+  EXPECT_EQ(link.sent.size(), 101U) << "and nothing else";
+  for (std::size_t i = 1; i < link.sent.size(); ++i) {
+    EXPECT_EQ(link.sent[i].pnum, link.sent[i - 1].pnum + 1);
+    EXPECT_EQ(link.sent[i].at - link.sent[i - 1].at, 100ms);
+  }
+}
+
+TEST(Session, AnswersABoardHeartbeatAtOnceWithItsTime) {
+  ScriptedLink link;
+  link.pass(30ms);
+  link.heartbeat();
+  EXPECT_EQ(link.last('H').at, link.now);
+  EXPECT_EQ(link.last('H').t, link.board_ms());
+  const std::uint32_t echoed = link.board_ms();
+  link.pass(100ms);
+  EXPECT_EQ(link.last('H').t, echoed) << "until the board's next one";
+}
+
+TEST(Session, IsConnectingWhileTheBoardBoots) {
+  ScriptedLink link;
+  link.boot_heartbeat();
+  EXPECT_EQ(link.session.link().state, HostLinkState::connecting);
+  EXPECT_EQ(link.count('H'), 2U) << "it answers";
+  link.pass(1s);
+  EXPECT_EQ(link.count('F'), 0U) << "no command before the board knows us";
+}
+
+TEST(Session, BecomesActiveWithTheBoardsStateAndSaysSoOnce) {
+  ScriptedLink link;
+  link.connect();
+  ASSERT_EQ(link.links.size(), 2U);
+  EXPECT_EQ(link.links[0].state, HostLinkState::active);
+  EXPECT_FALSE(link.links[0].in_control);
+  EXPECT_TRUE(link.links[1].in_control);
+  link.executed(1);
+  link.heartbeat();
+  EXPECT_EQ(link.links.size(), 2U);
+}
+
+TEST(Session, SaysWhyTheBoardIsSafe) {
+  ScriptedLink link;
+  link.connect();
+  link.heartbeat(SafeReason::handle);
+  EXPECT_EQ(
+      link.session.link(),
+      (LinkStatus{.state = HostLinkState::safe, .reason = SafeReason::handle, .in_control = true}));
+  link.state("SAFE:4;CMD:1;");
+  EXPECT_EQ(link.session.link(), (LinkStatus{.state = HostLinkState::safe,
+                                             .reason = SafeReason::proximity,
+                                             .in_control = true}));
+  EXPECT_EQ(link.session.state().safe, SafeReason::proximity);
+  link.state("SAFE:0;CMD:1;");
+  EXPECT_EQ(link.session.link().state, HostLinkState::active);
+}
+
+TEST(Session, IsLostWhenTheBoardFallsSilentAndComesBackByItself) {
+  ScriptedLink link;
+  link.connect();
+  const Time heard = link.now;
+  link.pass(999ms);
+  EXPECT_EQ(link.session.link().state, HostLinkState::active);
+  link.pass(2ms);
+  EXPECT_EQ(link.session.link().state, HostLinkState::lost);
+  EXPECT_LE(link.now - heard, 1001ms);
+  link.pass(3s);
+  EXPECT_GE(link.count('H'), 39U) << "it goes on knocking";
+  link.heartbeat(SafeReason::link);
+  EXPECT_EQ(link.session.link(), (LinkStatus{HostLinkState::safe, SafeReason::link}));
+  link.pass(10ms);
+  link.executed(0);
+  EXPECT_EQ(link.session.link().state, HostLinkState::active);
+}
+
+TEST(Session, IsLostAtOnceWithItsTransport) {
+  ScriptedLink link;
+  link.connect();
+  link.session.on_transport(false, link.now);
+  EXPECT_EQ(link.session.link().state, HostLinkState::lost);
+  link.pass(30ms);
+  link.session.on_transport(true, link.now);
+  link.session.poll(link.now);
+  EXPECT_EQ(link.last('H').at, link.now) << "a heartbeat at once when it comes back";
+}
+
+TEST(Session, AsksForItsFieldsWhenTheLinkComesUpAndAgainWhenTheyAreMissing) {
+  ScriptedLink link;
+  link.heartbeat();
+  link.pass(1ms);
+  ASSERT_EQ(link.count('F'), 1U);
+  EXPECT_EQ(link.last('F').command, "F:DEFAULT,SAFE,CMD");
+  link.pass(250ms);
+  link.state("AIN24:24.28;");  // it got lost
+  EXPECT_EQ(link.count('F'), 2U);
+  EXPECT_GT(link.last('F').pnum, link.all('F')[0].pnum) << "a new number each time";
+  link.executed(link.last('F').pnum);
+  for (int i = 0; i < 20; ++i) {
+    link.pass(100ms);
+    link.executed(link.all('F')[1].pnum);
+  }
+  EXPECT_EQ(link.count('F'), 2U) << "the board obeys: no more of it";
+  for (int i = 0; i < 4; ++i) {  // another chose other fields
+    link.pass(100ms);
+    link.state("ENC1:5;");
+  }
+  EXPECT_EQ(link.count('F'), 4U) << "every 200 ms";
+}
+
+TEST(Session, SeldomAsksABoardThatKnowsNoFields) {
+  ScriptedLink link;
+  link.heartbeat();
+  for (int i = 0; i < 500; ++i) {
+    link.pass(10ms);
+    link.state("AIN24:24.28;OSMC1:0,0;");
+  }
+  EXPECT_EQ(link.count('F'), 5U + 4U) << "five in the first second, then one a second";
+}
+
+TEST(Session, AddsWhatItNeedsToTheFieldsOfTheUserAndKeepsThem) {
+  ScriptedLink link;
+  link.connect();
+  link.session.send(Command::fields("ENC1,ENC2"), 1s, link.now);
+  EXPECT_EQ(link.last('F').command, "F:ENC1,ENC2,SAFE,CMD");
+  link.executed(link.last('F').pnum);
+  link.session.send(Command::fields("CMD,ENC1,SAFE"), 1s, link.now);
+  EXPECT_EQ(link.last('F').command, "F:CMD,ENC1,SAFE") << "nothing is missing there";
+  link.executed(link.last('F').pnum);
+  link.pass(2s);  // lost; the board has forgotten
+  link.boot_heartbeat();
+  link.heartbeat();
+  link.pass(10ms);
+  EXPECT_EQ(link.last('F').command, "F:CMD,ENC1,SAFE");
+}
+
+TEST(Session, LeavesTheFieldsAloneWhenToldTo) {
+  SessionOptions options = ScriptedLink::without_questions();
+  options.fields = "";
+  ScriptedLink link(options);
+  link.heartbeat();
+  for (int i = 0; i < 50; ++i) {
+    link.pass(10ms);
+    link.state("AIN24:24.28;");
+  }
+  EXPECT_EQ(link.count('F'), 0U);
+  link.session.send(Command::fields("ENC1"), 1s, link.now);
+  EXPECT_EQ(link.last('F').command, "F:ENC1");
+}
+
+TEST(Session, RefusesOptionsWithFieldsThatDoNotExist) {
+  SessionOptions options;
+  options.fields = "AIN24,AIN25";
+  EXPECT_THROW(ScriptedLink{options}, Error);
+}
+
+TEST(Session, KeepsTheFieldsOfEarlierDatagrams) {
+  ScriptedLink link;
+  link.connect();
+  link.state("AIN24:24.28;ENC1:7;SAFE:0;CMD:1;");
+  link.state("AIN12:12.01;SAFE:0;CMD:1;");
+  const State& state = link.session.state();
+  EXPECT_EQ(state.analog_cv[0], 2428);
+  EXPECT_EQ(state.analog_cv[1], 1201);
+  EXPECT_EQ(state.encoder_counts[0], 7);
+  EXPECT_FALSE(state.present.has(StateField::ain24)) << "present is of the newest datagram";
+}
+
+TEST(Session, LetsNoOlderStateReplaceANewerOne) {
+  ScriptedLink link;
+  link.connect();
+  link.board_pnum += 2;
+  link.state("ENC1:2;SAFE:0;CMD:1;");
+  const std::size_t known = link.states.size();
+  link.board_pnum -= 2;
+  link.state("ENC1:1;SAFE:0;CMD:1;");
+  EXPECT_EQ(link.states.size(), known);
+  EXPECT_EQ(link.session.state().encoder_counts[0], 2);
+  EXPECT_EQ(link.session.statistics(link.now).packets.late, 1U);
+}
+
+TEST(Session, TakesTheNewestStateThatAHeartbeatHasOvertaken) {
+  ScriptedLink link;
+  link.connect();
+  link.state("ENC1:1;SAFE:0;CMD:1;");
+  ++link.board_pnum;
+  link.heartbeat();
+  const std::size_t known = link.states.size();
+  link.board_pnum -= 2;
+  link.state("ENC1:2;SAFE:0;CMD:1;");
+  EXPECT_EQ(link.states.size(), known + 1);
+  EXPECT_EQ(link.session.state().encoder_counts[0], 2);
+}
+
+TEST(Session, CountsDamagedDatagramsAndGoesOn) {
+  ScriptedLink link;
+  link.connect();
+  std::string damaged = captured_state();
+  damaged[6] ^= 1;
+  link.raw(damaged);
+  link.raw("");
+  link.raw("noise");
+  link.raw(with_crc("AIN24:much;PNum:5900;T:5;"));
+  EXPECT_EQ(link.bad, (std::vector<ReadError>{ReadError::crc, ReadError::length, ReadError::syntax,
+                                              ReadError::syntax}));
+  EXPECT_EQ(link.session.statistics(link.now).damaged, 4U);
+  EXPECT_EQ(link.session.link().state, HostLinkState::active);
+}
+
+TEST(Session, PassesOverDatagramsThatAreNotOfABoard) {
+  ScriptedLink link;
+  const auto before = link.sent.size();
+  link.raw(with_crc("H:ROS2-R4;PNum:66;T:5;"));
+  link.raw(with_crc("O:358,1,1;PNum:67;T:5;"));
+  EXPECT_EQ(link.sent.size(), before);
+  EXPECT_EQ(link.session.link().state, HostLinkState::connecting);
+  EXPECT_EQ(link.session.statistics(link.now).received, 0U);
+}
+
+TEST(Session, StopsItsHeartbeatsWhenTheApplicationHangsAndGoesOnWhenItFeeds) {
+  ScriptedLink link;
+  link.connect();
+  link.session.watchdog(500ms, link.now);
+  for (int i = 0; i < 20; ++i) {
+    link.pass(100ms);
+    link.session.feed(link.now);
+    link.heartbeat();
+  }
+  EXPECT_FALSE(link.session.link().gated);
+  const Time fed = link.now;
+  for (int i = 0; i < 20; ++i) {
+    link.pass(100ms);
+    link.heartbeat();
+  }
+  EXPECT_TRUE(link.session.link().gated);
+  EXPECT_LE(link.last('H').at - fed, 501ms);
+  EXPECT_GE(link.last('H').at - fed, 400ms);
+
+  link.session.feed(link.now);
+  link.pass(100ms);
+  EXPECT_FALSE(link.session.link().gated);
+  EXPECT_GE(link.last('H').at, link.now - 100ms);
+
+  link.pass(600ms);
+  EXPECT_TRUE(link.session.link().gated);
+  link.session.watchdog(0ms, link.now);
+  link.pass(3s);
+  EXPECT_FALSE(link.session.link().gated);
+  EXPECT_GE(link.last('H').at, link.now - 100ms);
+}
+
+TEST(Session, IsBusyWhileTheBoardSaysThatAnotherHostControlsIt) {
+  ScriptedLink link;
+  const std::uint32_t ours = link.last('H').pnum;
+  link.nack(ours, "BUSY");
+  EXPECT_TRUE(link.session.link().busy);
+  for (int i = 0; i < 10; ++i) {
+    link.pass(100ms);
+    link.nack(link.last('H').pnum, "BUSY");
+  }
+  EXPECT_TRUE(link.session.link().busy);
+  link.pass(301ms);
+  EXPECT_FALSE(link.session.link().busy) << "the board refuses no more";
+  link.connect();
+}
+
+TEST(Session, AnswersToAnotherHostChangeNothing) {
+  ScriptedLink link;
+  link.connect();
+  link.pass(100ms);
+  const std::uint32_t ours = link.last('H').pnum;
+  for (const std::uint32_t others : {ours + 1000, ours - 1000000, std::uint32_t{7}}) {
+    link.nack(others, "BUSY");
+  }
+  EXPECT_FALSE(link.session.link().busy);
+  EXPECT_TRUE(link.nacks.empty());
+  EXPECT_TRUE(link.session.in_control(link.now));
+  link.nack(ours, "BUSY");
+  EXPECT_TRUE(link.session.link().busy);
+}
+
+TEST(Session, AsksTheBoardWhoItIsOnceASecondAndMeasuresTheRoundTrip) {
+  ScriptedLink link{SessionOptions{}};
+  link.connect();
+  EXPECT_EQ(link.count('Q'), 0U);
+  for (int i = 0; i < 100; ++i) {
+    link.pass(50ms);
+    if (link.count('Q') != 0 && link.last('Q').at == link.now) {
+      ADD_FAILURE() << "the answer below must be later than the question";
+    }
+    link.executed(1);
+  }
+  EXPECT_NEAR(static_cast<double>(link.count('Q')), 5, 1);
+  link.pass(link.last('Q').at + 1s + 3ms - link.now);
+  link.identity();
+  EXPECT_EQ(link.board_id, "board-7");
+  EXPECT_DOUBLE_EQ(link.session.statistics(link.now).round_trip_us, 3000);
+}
+
+}  // namespace
+}  // namespace r4::test

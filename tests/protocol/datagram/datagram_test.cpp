@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "protocol/datagram/datagram.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "tests/support/datagrams.hpp"
+
+namespace r4 {
+namespace {
+
+using test::captured_state;
+using test::str;
+using test::with_crc;
+
+ReadResult result_of(const std::string& bytes) {
+  Datagram datagram;
+  return read(bytes, datagram);
+}
+
+std::vector<std::string> fields_of(const Datagram& datagram) {
+  std::vector<std::string> fields;
+  for (const Field& field : datagram)
+    fields.push_back(str(field.name()) + ':' + str(field.values()));
+  return fields;
+}
+
+std::vector<std::string> values_of(const Field& field) {
+  std::vector<Text> values(field.count());
+  EXPECT_EQ(field.split(values.data(), values.size()), values.size());
+  std::vector<std::string> strings;
+  for (const Text value : values) strings.push_back(str(value));
+  return strings;
+}
+
+TEST(Datagram, GivesItsFieldsInTheOrderOfTheWire) {
+  const std::string bytes = with_crc("T:5;A:;B:1,,2;PNum:9;C:x:y z;");
+  Datagram datagram;
+  ASSERT_TRUE(read(bytes, datagram));
+  EXPECT_EQ(fields_of(datagram),
+            (std::vector<std::string>{"T:5", "A:", "B:1,,2", "PNum:9", "C:x:y z"}));
+  EXPECT_EQ(datagram.pnum(), 9U);
+  EXPECT_EQ(datagram.time_ms(), 5U);
+  EXPECT_EQ(str(datagram.find("B").values()), "1,,2");
+  EXPECT_TRUE(datagram.find("D").name().empty());
+  EXPECT_TRUE(datagram.find("D").values().empty());
+  EXPECT_EQ(datagram.bytes().data(), bytes.data()) << "a view, not a copy";
+}
+
+TEST(Datagram, ValuesAreSplitAtCommas) {
+  EXPECT_EQ(values_of(Field("A", "1,,2")), (std::vector<std::string>{"1", "", "2"}));
+  EXPECT_EQ(values_of(Field("A", "")), (std::vector<std::string>{""}));
+  EXPECT_EQ(values_of(Field("A", ",")), (std::vector<std::string>{"", ""}));
+  EXPECT_EQ(values_of(Field()), (std::vector<std::string>{""}));
+  Text first;
+  EXPECT_EQ(Field("A", "x,y,z").split(&first, 1), 3U);
+  EXPECT_EQ(str(first), "x");
+}
+
+TEST(Datagram, TakesAnyLineTerminatorOrNone) {
+  const std::string bytes = captured_state();
+  for (const std::string end : {"", "\r", "\n", "\r\n"}) {
+    const std::string line = bytes + end;
+    Datagram datagram;
+    ASSERT_TRUE(read(line, datagram));
+    EXPECT_EQ(str(datagram.bytes()), bytes);
+  }
+  EXPECT_EQ(result_of(bytes + "\n\r").error, ReadError::syntax);
+  EXPECT_EQ(result_of(bytes + "\n\n").error, ReadError::syntax);
+}
+
+TEST(Datagram, TakesLeadingZerosAndCapitalsInTheChecksum) {
+  const std::string fields = "O:1,0,1;PNum:67;T:1699276044483;";  // its CRC has seven digits
+  for (const std::string crc : {"a13d0ac", "0a13d0ac", "A13D0AC", "0A13d0aC"}) {
+    EXPECT_TRUE(result_of(fields + "^0x" + crc + "^")) << crc;
+  }
+  EXPECT_EQ(result_of(fields + "^0x00a13d0ac^").error, ReadError::syntax);
+}
+
+TEST(Datagram, ALineOfTheWrongLengthIsTold) {
+  for (const std::string nothing : {"", "\r", "\n", "\r\n"}) {
+    EXPECT_EQ(result_of(nothing).error, ReadError::length);
+    EXPECT_EQ(result_of(nothing).position, 0U);
+  }
+  std::string fields = "A:" + std::string(1100, 'x') + ';';
+  std::string bytes = with_crc(fields);
+  fields.erase(2, bytes.size() - max_datagram);
+  bytes = with_crc(fields);
+  while (bytes.size() < max_datagram) {  // a checksum with a leading zero is shorter
+    fields.insert(2, "x");
+    bytes = with_crc(fields);
+  }
+  ASSERT_EQ(bytes.size(), max_datagram);
+  EXPECT_TRUE(result_of(bytes));
+  EXPECT_TRUE(result_of(bytes + "\r\n")) << "the terminator does not count";
+  fields.insert(2, "x");
+  const ReadResult result = result_of(with_crc(fields));
+  EXPECT_EQ(result.error, ReadError::length);
+  EXPECT_EQ(result.position, max_datagram);
+}
+
+TEST(Datagram, ADamagedTrailerIsTold) {
+  struct Case {
+    const char* bytes;
+    std::size_t position;
+  };
+  for (const Case& c : {Case{"A:1;", 4}, Case{"A:1;^", 5}, Case{"A:1;^0", 6}, Case{"A:1;^0x", 7},
+                        Case{"A:1;^0x^", 7}, Case{"A:1;^1x0^", 5}, Case{"A:1;^0X0^", 6},
+                        Case{"A:1;^0xg^", 7}, Case{"A:1;^0x123456789^", 7}, Case{"A:1;^0x12", 9},
+                        Case{"A:1;^0x12^ ", 10}, Case{"A:1;^0x12^^", 10}, Case{"^^", 1}}) {
+    const ReadResult result = result_of(c.bytes);
+    EXPECT_EQ(result.error, ReadError::syntax) << c.bytes;
+    EXPECT_EQ(result.position, c.position) << c.bytes;
+  }
+}
+
+TEST(Datagram, AWrongChecksumIsToldWithBoth) {
+  const ReadResult result = result_of("H:ROS2-R4;T:79201;^0xf390d9ae^");
+  EXPECT_EQ(result.error, ReadError::crc);
+  EXPECT_EQ(result.position, 21U);
+  EXPECT_EQ(result.crc_expected, 0xF390D9ADU);
+  EXPECT_EQ(result.crc_found, 0xF390D9AEU);
+  EXPECT_FALSE(result);
+}
+
+TEST(Datagram, FieldsOutsideTheGrammarAreRefusedWhereTheyAre) {
+  struct Case {
+    std::string fields;
+    std::size_t position;
+  };
+  for (const Case& c : {Case{"", 0},        Case{";", 0},
+                        Case{":;", 0},      Case{":1;", 0},
+                        Case{"A;", 1},      Case{"A", 1},
+                        Case{"A:", 2},      Case{"A:1", 3},
+                        Case{"A:1;;", 4},   Case{"A:1;B", 5},
+                        Case{"A:1;B:", 6},  Case{"A B:1;", 1},
+                        Case{"A,B:1;", 1},  Case{"A:1\t;", 3},
+                        Case{"A:\x7F;", 2}, Case{"A:\xC3\xA9;", 2},
+                        Case{"\xC3:1;", 0}, Case{std::string("A:\0;", 4), 2},
+                        Case{"A:1\r;", 3},  Case{"A:1\n;B:2;", 3}}) {
+    const ReadResult result = result_of(with_crc(c.fields));
+    EXPECT_EQ(result.error, ReadError::syntax) << c.fields;
+    EXPECT_EQ(result.position, c.position) << c.fields;
+  }
+}
+
+TEST(Datagram, LengthIsCheckedBeforeTheTrailerThenTheChecksumThenTheFields) {
+  EXPECT_EQ(result_of(std::string(max_datagram + 1, 'x')).error, ReadError::length);
+  EXPECT_EQ(result_of("A B;^0x1").error, ReadError::syntax);
+  EXPECT_EQ(result_of("A B;^0x1^").error, ReadError::crc);
+  EXPECT_EQ(result_of(with_crc("A B;")).error, ReadError::syntax);
+}
+
+TEST(Datagram, PacketNumberAndTimeAreWholeNumbersAndStandOnce) {
+  Datagram datagram;
+  const std::string neither = with_crc("A:1;");
+  ASSERT_TRUE(read(neither, datagram));
+  EXPECT_FALSE(datagram.has_pnum());
+  EXPECT_FALSE(datagram.has_time());
+  const std::string largest = with_crc("PNum:4294967295;T:18446744073709551615;");
+  ASSERT_TRUE(read(largest, datagram));
+  EXPECT_TRUE(datagram.has_pnum());
+  EXPECT_EQ(datagram.pnum(), 4294967295U);
+  EXPECT_TRUE(datagram.has_time());
+  EXPECT_EQ(datagram.time_ms(), 18446744073709551615U);
+  for (const char* fields :
+       {"PNum:4294967296;", "PNum:-1;", "PNum:;", "PNum:1,2;", "PNum: 1;", "PNum:+1;", "PNum:x;",
+        "T:18446744073709551616;", "T:-1;", "T:;", "T:1,2;", "T:1.5;"}) {
+    const ReadResult result = result_of(with_crc(fields));
+    EXPECT_EQ(result.error, ReadError::syntax) << fields;
+    EXPECT_EQ(result.position, std::string(fields).find(':') + 1) << fields;
+  }
+  EXPECT_EQ(result_of(with_crc("PNum:1;PNum:1;")).position, 7U);
+  EXPECT_EQ(result_of(with_crc("T:1;A:2;T:1;")).position, 8U);
+}
+
+TEST(Datagram, OnlyThoseNamesAreThePacketNumberAndTheTime) {
+  const std::string bytes = with_crc("pnum:x;t:x;PNUM:x;PNumber:x;TT:x;");
+  Datagram datagram;
+  ASSERT_TRUE(read(bytes, datagram));
+  EXPECT_FALSE(datagram.has_pnum());
+  EXPECT_FALSE(datagram.has_time());
+}
+
+TEST(Datagram, ARefusedLineLeavesTheResultAlone) {
+  const std::string good = captured_state();
+  Datagram datagram;
+  ASSERT_TRUE(read(good, datagram));
+  EXPECT_FALSE(read(std::string("A:1;^0x1^"), datagram));
+  EXPECT_EQ(str(datagram.bytes()), good);
+  EXPECT_EQ(datagram.pnum(), 7434U);
+}
+
+TEST(Datagram, AFieldAloneIsReadFromText) {
+  Field field;
+  ASSERT_TRUE(read_field("O:358,1,1", field));
+  EXPECT_EQ(str(field.name()), "O");
+  EXPECT_EQ(str(field.values()), "358,1,1");
+  ASSERT_TRUE(read_field("E:", field));
+  EXPECT_EQ(str(field.values()), "");
+  for (const std::string text : {"", "O", ":1", "O 1:2", "O:1;", "O:1^", "O:1\n", "O,P:1"}) {
+    Field untouched("X", "y");
+    EXPECT_FALSE(read_field(text, untouched)) << text;
+    EXPECT_EQ(str(untouched.name()), "X") << text;
+  }
+}
+
+TEST(Datagram, ErrorsHaveTheirWords) {
+  EXPECT_STREQ(to_text(ReadError::none), "");
+  EXPECT_STREQ(to_text(ReadError::length), "length");
+  EXPECT_STREQ(to_text(ReadError::syntax), "syntax");
+  EXPECT_STREQ(to_text(ReadError::crc), "crc");
+}
+
+}  // namespace
+}  // namespace r4

@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "protocol/link/host_link.hpp"
+
+#include <gtest/gtest.h>
+
+#include "protocol/link/board_link.hpp"
+
+namespace r4 {
+namespace {
+
+constexpr std::uint32_t first_pnum = echo_host_first_pnum + 5;
+
+struct HostLinkTest : testing::Test {
+  Arrival state(SafeReason reason = SafeReason::none) {
+    return link.on_datagram(board_pnum++, board_t(), false, reason, now);
+  }
+  Arrival heartbeat(SafeReason reason = SafeReason::none) {
+    return link.on_datagram(board_pnum++, board_t(), true, reason, now);
+  }
+  Arrival booting(SafeReason reason = SafeReason::none) {
+    return link.on_datagram(0, 0, true, reason, now);
+  }
+  // Sends what is due; true if a heartbeat was.
+  bool send_due() {
+    if (!link.heartbeat_due(now)) return false;
+    link.heartbeat_sent(now);
+    return true;
+  }
+  std::uint32_t board_t() const { return now + board_offset; }
+
+  HostLink link{HostLink::Timing{}, first_pnum};
+  std::uint32_t now = 5000;
+  std::uint32_t board_offset = 123'456;
+  std::uint32_t board_pnum = 1;
+};
+
+TEST_F(HostLinkTest, BeginsConnectingAndSpeaksFirst) {
+  EXPECT_EQ(link.state(), HostLinkState::connecting);
+  EXPECT_EQ(link.due_in(now), 0U);
+  EXPECT_TRUE(send_due());
+  EXPECT_EQ(link.echo(), 0U);
+  EXPECT_FALSE(link.echoed());
+  EXPECT_FALSE(send_due());
+}
+
+TEST_F(HostLinkTest, SendsTenHeartbeatsASecond) {
+  int sent = 0;
+  for (int ms = 0; ms < 1000; ++ms, ++now) sent += send_due();
+  EXPECT_EQ(sent, 10);
+}
+
+TEST_F(HostLinkTest, TriesAgainSoonWhenAHeartbeatCouldNotBeSent) {
+  heartbeat();
+  ASSERT_TRUE(link.heartbeat_due(now));
+  link.heartbeat_not_sent(now);
+  EXPECT_FALSE(link.echoed()) << "the board has not got its time back";
+  EXPECT_FALSE(link.heartbeat_due(now));
+  EXPECT_EQ(link.due_in(now), HostLink::retry_ms);
+  now += HostLink::retry_ms;
+  EXPECT_TRUE(send_due());
+  EXPECT_TRUE(link.echoed());
+  EXPECT_EQ(link.due_in(now), 100U);
+}
+
+TEST_F(HostLinkTest, AnswersABoardHeartbeatAtOnceWithItsTime) {
+  send_due();
+  now += 30;
+  heartbeat();
+  EXPECT_EQ(link.due_in(now), 0U);
+  EXPECT_EQ(link.echo(), board_t());
+  EXPECT_FALSE(link.echoed());
+  EXPECT_TRUE(send_due());
+  EXPECT_TRUE(link.echoed());
+  EXPECT_EQ(link.due_in(now), 100U);
+}
+
+TEST_F(HostLinkTest, AStateIsNotEchoed) {
+  heartbeat();
+  const std::uint32_t t = link.echo();
+  send_due();
+  now += 10;
+  state();
+  EXPECT_EQ(link.echo(), t);
+  EXPECT_FALSE(link.heartbeat_due(now));
+}
+
+TEST_F(HostLinkTest, FollowsTheBoardsState) {
+  state();
+  EXPECT_EQ(link.state(), HostLinkState::active);
+  EXPECT_EQ(link.reason(), SafeReason::none);
+  heartbeat(SafeReason::handle);
+  EXPECT_EQ(link.state(), HostLinkState::safe);
+  EXPECT_EQ(link.reason(), SafeReason::handle);
+  state(SafeReason::stop);
+  EXPECT_EQ(link.reason(), SafeReason::stop);
+  state();
+  EXPECT_EQ(link.state(), HostLinkState::active);
+}
+
+TEST_F(HostLinkTest, WhatIsNotTheNewestChangesNothing) {
+  state();
+  board_pnum = 10;
+  heartbeat(SafeReason::stop);
+  const std::uint32_t t = link.echo();
+  send_due();
+  now += 5;
+  EXPECT_EQ(link.on_datagram(5, board_t(), true, SafeReason::none, now), Arrival::late);
+  EXPECT_EQ(link.on_datagram(10, board_t(), true, SafeReason::none, now), Arrival::duplicate);
+  EXPECT_EQ(link.state(), HostLinkState::safe);
+  EXPECT_EQ(link.reason(), SafeReason::stop);
+  EXPECT_EQ(link.echo(), t);
+  EXPECT_FALSE(link.heartbeat_due(now));
+}
+
+TEST_F(HostLinkTest, LosesASilentBoardExactlyAtTheTimeout) {
+  state();
+  now += 999;
+  EXPECT_FALSE(link.poll(now));
+  now += 1;
+  EXPECT_TRUE(link.poll(now));
+  EXPECT_EQ(link.state(), HostLinkState::lost);
+  EXPECT_FALSE(link.poll(now));
+  state();
+  EXPECT_EQ(link.state(), HostLinkState::active);
+}
+
+TEST_F(HostLinkTest, AnAnswerShowsThatTheBoardIsThereButNotItsState) {
+  state(SafeReason::stop);
+  now += 900;
+  EXPECT_EQ(link.on_answer(board_pnum++, board_t(), now), Arrival::next);
+  now += 900;
+  EXPECT_FALSE(link.poll(now));
+  EXPECT_EQ(link.state(), HostLinkState::safe);
+  EXPECT_EQ(link.counters().received, 2U);
+}
+
+TEST_F(HostLinkTest, DoesNotLoseABoardThatItHasNotFound) {
+  now += 100'000;
+  EXPECT_FALSE(link.poll(now));
+  EXPECT_EQ(link.state(), HostLinkState::connecting);
+}
+
+TEST_F(HostLinkTest, ABootingBoardKnowsNothingOfUs) {
+  heartbeat();
+  send_due();
+  board_pnum = 500;
+  state();
+  EXPECT_TRUE(link.echoed());
+  booting(SafeReason::handle);
+  EXPECT_EQ(link.state(), HostLinkState::connecting);
+  EXPECT_EQ(link.reason(), SafeReason::handle);
+  EXPECT_EQ(link.echo(), 0U);
+  EXPECT_FALSE(link.echoed());
+  EXPECT_TRUE(link.heartbeat_due(now));
+  board_pnum = 1;
+  board_offset += 1'000'000'000;
+  EXPECT_EQ(state(), Arrival::first);
+  EXPECT_EQ(link.counters().lost, 498U);  // not more for the new numbers
+}
+
+TEST_F(HostLinkTest, NoticesABootWhoseHeartbeatsWereLost) {
+  heartbeat();
+  send_due();
+  board_pnum = 3;
+  board_offset += 1'000'000'000;  // another clock
+  now += 300;
+  EXPECT_EQ(state(), Arrival::first);
+  EXPECT_EQ(link.echo(), 0U);
+  EXPECT_FALSE(link.echoed());
+  EXPECT_EQ(link.counters().restarts, 1U);
+}
+
+TEST_F(HostLinkTest, CountsEachRestartOfTheBoardOnce) {
+  booting();
+  booting();
+  heartbeat();
+  EXPECT_EQ(link.restarts(), 0U) << "the first boot that is heard is none";
+  now += 500;
+  board_offset += 1'000'000'000;
+  booting();
+  booting();
+  board_pnum = 1;
+  heartbeat();
+  state();
+  EXPECT_EQ(link.restarts(), 1U);
+  now += 500;
+  board_offset += 1'000'000'000;
+  board_pnum = 1;
+  state();
+  EXPECT_EQ(link.restarts(), 2U) << "also when its first heartbeats were lost";
+}
+
+TEST_F(HostLinkTest, ABootHeartbeatThatTheNetworkHeldBackIsNoRestart) {
+  booting();
+  heartbeat();
+  now += 400;
+  state();
+  booting();
+  now += 10;
+  state();
+  EXPECT_EQ(link.restarts(), 0U) << "the clock goes on";
+}
+
+TEST_F(HostLinkTest, ABoardThatCountsItsTimeFromZeroRestartsToo) {
+  board_offset = 0U - now;
+  heartbeat();
+  now += 6000;
+  state();
+  booting();
+  now += 1000;
+  board_offset = 0U - now;
+  heartbeat();
+  EXPECT_EQ(link.restarts(), 1U);
+}
+
+TEST_F(HostLinkTest, ADelayOfSecondsIsNoBoot) {
+  heartbeat();
+  send_due();
+  now += 9000;
+  EXPECT_EQ(link.on_datagram(board_pnum++, board_t() - 9000, false, SafeReason::none, now),
+            Arrival::next);
+  EXPECT_TRUE(link.echoed());
+  now += 10;
+  EXPECT_EQ(state(), Arrival::next);
+  EXPECT_TRUE(link.echoed());
+}
+
+TEST_F(HostLinkTest, TheBoardsClockMayWrap) {
+  board_offset = 0xffffffffU - now - 50;
+  heartbeat();
+  send_due();
+  now += 100;
+  EXPECT_EQ(state(), Arrival::next);
+  EXPECT_TRUE(link.echoed());
+}
+
+TEST_F(HostLinkTest, TheTransportsEndIsKnownAtOnce) {
+  link.on_transport(false);
+  EXPECT_EQ(link.state(), HostLinkState::connecting);
+  state();
+  send_due();
+  link.on_transport(false);
+  EXPECT_EQ(link.state(), HostLinkState::lost);
+  EXPECT_FALSE(link.heartbeat_due(now));
+  link.on_transport(true);
+  EXPECT_TRUE(link.heartbeat_due(now));
+}
+
+TEST_F(HostLinkTest, TheWatchdogStopsTheHeartbeatsOfAHungApplication) {
+  link.watchdog(200, now);
+  send_due();
+  for (int ms = 0; ms < 200; ++ms, ++now) send_due();
+  EXPECT_FALSE(link.watchdog_expired(now));
+  ++now;
+  EXPECT_TRUE(link.watchdog_expired(now));
+  for (int ms = 0; ms < 500; ++ms, ++now) EXPECT_FALSE(send_due());
+  heartbeat();
+  EXPECT_FALSE(send_due());  // not even an answer
+  EXPECT_GT(link.due_in(now), 0U);
+  link.feed(now);
+  EXPECT_TRUE(send_due());
+}
+
+TEST_F(HostLinkTest, TheWatchdogOutlastsTheWrapOfTheClock) {
+  link.watchdog(200, now);
+  const std::uint32_t fed = now;
+  for (; now - fed < 0xffff'0000U; now += 0x8000) link.poll(now);
+  for (; now != fed; now += 0x1000) link.poll(now);
+  now += 100;
+  EXPECT_TRUE(link.watchdog_expired(now));
+  EXPECT_FALSE(link.heartbeat_due(now));
+  link.feed(now);
+  EXPECT_TRUE(link.heartbeat_due(now));
+}
+
+TEST_F(HostLinkTest, TheWatchdogCanBeTurnedOff) {
+  link.watchdog(200, now);
+  now += 1000;
+  EXPECT_FALSE(link.heartbeat_due(now));
+  link.watchdog(0, now);
+  EXPECT_TRUE(link.heartbeat_due(now));
+}
+
+TEST_F(HostLinkTest, NumbersEveryDatagramItSends) {
+  EXPECT_EQ(link.take_pnum(), first_pnum);
+  EXPECT_EQ(link.take_pnum(), first_pnum + 1);
+  EXPECT_EQ(link.last_pnum(), first_pnum + 1);
+}
+
+TEST_F(HostLinkTest, TellsExactlyWhenItNeedsTime) {
+  state();
+  send_due();
+  EXPECT_EQ(link.due_in(now), 100U);
+  now += 60;
+  EXPECT_EQ(link.due_in(now), 40U);
+  now += 40;
+  EXPECT_EQ(link.due_in(now), 0U);
+  now += 850;
+  send_due();
+  EXPECT_EQ(link.due_in(now), 50U);  // until the board is lost
+  now += 50;
+  EXPECT_TRUE(link.poll(now));
+}
+
+TEST(HostLinkState, HasANameForEveryState) {
+  EXPECT_STREQ(to_text(HostLinkState::connecting), "connecting");
+  EXPECT_STREQ(to_text(HostLinkState::active), "active");
+  EXPECT_STREQ(to_text(HostLinkState::safe), "safe");
+  EXPECT_STREQ(to_text(HostLinkState::lost), "lost");
+}
+
+}  // namespace
+}  // namespace r4

@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "protocol/messages/command.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "tests/support/datagrams.hpp"
+
+namespace r4 {
+
+// Names in gtest's messages.
+void PrintTo(Refusal refusal, std::ostream* out) { *out << test::str(name_of(refusal)); }
+
+namespace {
+
+using test::str;
+using test::with_crc;
+
+// How the command in `text` ("O:358,1,1") is judged; a refusal must leave the result alone.
+Refusal judged(const std::string& text) {
+  Field field;
+  EXPECT_TRUE(read_field(text, field)) << text;
+  Command command = Command::relay(7, true);
+  const Refusal refusal = parse_command(field, command);
+  if (refusal != Refusal::none) {
+    EXPECT_EQ(command.kind, CommandKind::relay) << text;
+    EXPECT_EQ(command.channel, 7) << text;
+  }
+  return refusal;
+}
+
+std::string written(const Command& command) {
+  char buffer[max_datagram];
+  DatagramWriter writer(buffer, sizeof buffer);
+  write_command(writer, command);
+  return writer.ok() ? std::string(buffer, writer.size()) : "refused";
+}
+
+// The command in `text`, written again; the name of the refusal if it is refused.
+std::string again(const std::string& text) {
+  Field field;
+  EXPECT_TRUE(read_field(text, field)) << text;
+  Command command;
+  const Refusal refusal = parse_command(field, command);
+  return refusal == Refusal::none ? written(command) : str(name_of(refusal));
+}
+
+TEST(Command, EveryCommandIsReadAndWrittenAgain) {
+  for (const std::string text :
+       {"H:ROS2-R4",     "O:358,1,1",     "D:4095,0,4",      "S:1500,16",  "R:1,On",
+        "R:8,Off",       "E:STOP",        "E:CLEAR",         "E:CLEAR,0",  "E:CLEAR,2147483647",
+        "P:-100,2000,4", "Z:4",           "B:4095,1,0,4",    "B:0,0,1,1",  "U:400,4",
+        "F:DEFAULT",     "F:AIN24,OSMC1", "C:recovery,last", "C:rate,100", "Q:ID"}) {
+    EXPECT_EQ(again(text), text);
+  }
+}
+
+TEST(Command, AlternativeFormsAreTheSameCommand) {
+  EXPECT_EQ(again("R:1,1"), "R:1,On");
+  EXPECT_EQ(again("R:1,0"), "R:1,Off");
+  for (const std::string on : {"On", "ON", "on", "oN"}) EXPECT_EQ(again("R:2," + on), "R:2,On");
+  for (const std::string off : {"Off", "OFF", "off"}) EXPECT_EQ(again("R:2," + off), "R:2,Off");
+  EXPECT_EQ(again("P:500,3"), "P:500,1000,3") << "the default speed";
+  EXPECT_EQ(again("O:0358,01,01"), "O:358,1,1");
+}
+
+TEST(Command, TheFactoriesMakeWhatIsWritten) {
+  EXPECT_EQ(written(Command::heartbeat()), "H:ROS2-R4");
+  EXPECT_EQ(written(Command::osmc(358, Direction::forward, 1)), "O:358,1,1");
+  EXPECT_EQ(written(Command::dhb12(4095, Direction::reverse, 4)), "D:4095,0,4");
+  EXPECT_EQ(written(Command::servo(2500, 16)), "S:2500,16");
+  EXPECT_EQ(written(Command::relay(8, true)), "R:8,On");
+  EXPECT_EQ(written(Command::relay(1, false)), "R:1,Off");
+  EXPECT_EQ(written(Command::stop()), "E:STOP");
+  EXPECT_EQ(written(Command::clear()), "E:CLEAR");
+  EXPECT_EQ(written(Command::clear(7)), "E:CLEAR,7");
+  EXPECT_EQ(judged("E:CLEAR,-1"), Refusal::range);
+  EXPECT_EQ(judged("E:CLEAR,2147483648"), Refusal::range);
+  EXPECT_EQ(written(Command::stepper(-2147483647 - 1, 20000, 4)), "P:-2147483648,20000,4");
+  EXPECT_EQ(written(Command::zero(1)), "Z:1");
+  EXPECT_EQ(written(Command::bldc(1, Direction::forward, true, 2)), "B:1,1,1,2");
+  EXPECT_EQ(written(Command::proximity(0, 1)), "U:0,1");
+  EXPECT_EQ(written(Command::fields("DEFAULT,SAFE,CMD")), "F:DEFAULT,SAFE,CMD");
+  EXPECT_EQ(written(Command::setting("rate", "50")), "C:rate,50");
+  EXPECT_EQ(written(Command::identify()), "Q:ID");
+}
+
+// A command whose value stands first, its range, and how its text is made of value and channel.
+struct Ranged {
+  const char* letter;
+  const char* middle;  // between value and channel
+  long long min;
+  long long max;
+  int channels;
+  std::string text(const std::string& value, const std::string& channel) const {
+    return std::string(letter) + ":" + value + middle + "," + channel;
+  }
+};
+constexpr Ranged ranged[] = {
+    {"O", ",1", 0, 4095, 4},
+    {"D", ",0", 0, 4095, 4},
+    {"S", "", 0, 2500, 16},
+    {"B", ",1,0", 0, 4095, 4},
+    {"U", "", 0, 400, 4},
+    {"P", "", -2147483648LL, 2147483647LL, 4},
+    {"P", ",20000", -2147483648LL, 2147483647LL, 4},
+};
+
+TEST(Command, ValuesAreTakenToTheEdgesOfTheirRangeAndNoFurther) {
+  for (const Ranged& c : ranged) {
+    for (const long long value : {c.min, c.max}) {
+      EXPECT_EQ(judged(c.text(std::to_string(value), "1")), Refusal::none) << c.letter << value;
+    }
+    for (const std::string& value :
+         {std::to_string(c.min - 1), std::to_string(c.max + 1), std::string("4294967296"),
+          std::string("18446744073709551616"), std::string("-18446744073709551617")}) {
+      EXPECT_EQ(judged(c.text(value, "1")), Refusal::range) << c.letter << value;
+    }
+  }
+}
+
+TEST(Command, ChannelsBeginAtOneAndEndWithTheBoards) {
+  for (const Ranged& c : ranged) {
+    for (int channel = -1; channel <= 17; ++channel) {
+      const bool exists = channel >= 1 && channel <= c.channels;
+      EXPECT_EQ(judged(c.text("0", std::to_string(channel))),
+                exists ? Refusal::none : Refusal::channel)
+          << c.letter << channel;
+    }
+    for (const std::string channel :
+         {"256", "257", "65537", "4294967297", "99999999999999999999"}) {
+      EXPECT_EQ(judged(c.text("0", channel)), Refusal::channel) << c.letter << channel;
+    }
+  }
+  for (int channel = -1; channel <= 17; ++channel) {
+    const std::string text = std::to_string(channel);
+    EXPECT_EQ(judged("R:" + text + ",On"),
+              channel >= 1 && channel <= 8 ? Refusal::none : Refusal::channel);
+    EXPECT_EQ(judged("Z:" + text), channel >= 1 && channel <= 4 ? Refusal::none : Refusal::channel);
+  }
+  EXPECT_EQ(judged("Z:257"), Refusal::channel);
+  EXPECT_EQ(judged("R:4294967297,On"), Refusal::channel);
+}
+
+TEST(Command, DirectionsBrakesAndSpeedsHaveTheirRange) {
+  for (const std::string text :
+       {"O:1,2,1", "D:1,2,1", "O:1,-1,1", "D:1,4294967297,1", "B:1,2,0,1", "B:1,0,2,1", "P:1,0,1",
+        "P:1,-1,1", "P:1,20001,1", "R:1,2", "R:1,-1", "P:1,4294967297,1"}) {
+    EXPECT_EQ(judged(text), Refusal::range) << text;
+  }
+  EXPECT_EQ(judged("P:1,1,1"), Refusal::none);
+  EXPECT_EQ(judged("P:1,20000,1"), Refusal::none);
+}
+
+TEST(Command, AWrongNumberOfValuesIsAWrongForm) {
+  for (const std::string text :
+       {"O:1",      "O:1,1",       "O:1,1,1,1",   "D:1,1",     "D:1,1,1,1", "S:1",
+        "S:1,1,1",  "R:1",         "R:1,On,1",    "P:1",       "P:1,1,1,1", "Z:1,1",
+        "B:1,1,1",  "B:1,1,1,1,1", "U:1",         "U:1,1,1",   "C:rate",    "C:rate,1,2",
+        "E:STOP,1", "E:CLEAR,",    "E:CLEAR,1,2", "E:CLEAR,x", "Q:ID,1",    "H:ROS2-R4,1"}) {
+    EXPECT_EQ(judged(text), Refusal::format) << text;
+  }
+}
+
+TEST(Command, WhatIsNoNumberIsAWrongForm) {
+  for (const std::string bad : {"", "+5", " 5", "5 ", "x", "5.0", "0x5", "-", "1e3", "5:"}) {
+    for (const Ranged& c : ranged) {
+      EXPECT_EQ(judged(c.text(bad, "1")), Refusal::format) << c.letter << bad;
+      EXPECT_EQ(judged(c.text("0", bad)), Refusal::format) << c.letter << bad;
+    }
+    for (const std::string& text :
+         {"O:1," + bad + ",1", "D:1," + bad + ",1", "B:1," + bad + ",0,1", "B:1,0," + bad + ",1",
+          "P:1," + bad + ",1", "R:" + bad + ",On", "R:1," + bad, "Z:" + bad}) {
+      EXPECT_EQ(judged(text), Refusal::format) << text;
+    }
+  }
+  for (const std::string text : {"E:", "H:", "Q:", "F:", "C:", "C:,", "C:rate,", "C:,1"}) {
+    EXPECT_EQ(judged(text), Refusal::format) << text;
+  }
+}
+
+TEST(Command, OtherLettersAndWordsAreUnknown) {
+  for (const std::string text :
+       {"X:1", "o:1,1,1", "e:STOP", "N:66,RANGE", "I:R4,a,b,c", "T:1", "A:1", "OO:1,1,1", "PNum:1",
+        "1:1", "#:1", "E:stop", "E:STOPP", "E:START", "H:R4-ROS2", "Q:id", "H:x,1"}) {
+    EXPECT_EQ(judged(text), Refusal::unknown) << text;
+  }
+}
+
+TEST(Command, TheFormComesBeforeTheChannelAndTheChannelBeforeTheRange) {
+  EXPECT_EQ(judged("O:9999,x,9"), Refusal::format);
+  EXPECT_EQ(judged("O:9999,1,9"), Refusal::channel);
+  EXPECT_EQ(judged("O:9999,1,1"), Refusal::range);
+}
+
+TEST(Command, CommandsOfTheFactoriesAreCheckedTheSame) {
+  EXPECT_EQ(check(Command::osmc(4095, Direction::forward, 4)), Refusal::none);
+  EXPECT_EQ(check(Command::osmc(4096, Direction::forward, 4)), Refusal::range);
+  EXPECT_EQ(check(Command::osmc(-1, Direction::forward, 4)), Refusal::range);
+  EXPECT_EQ(check(Command::osmc(1, static_cast<Direction>(2), 4)), Refusal::range);
+  for (const int channel : {-1, 0, 5, 256, 257, 65537}) {
+    EXPECT_EQ(check(Command::osmc(1, Direction::forward, channel)), Refusal::channel) << channel;
+    EXPECT_EQ(check(Command::dhb12(1, Direction::forward, channel)), Refusal::channel) << channel;
+    EXPECT_EQ(check(Command::stepper(1, 1, channel)), Refusal::channel) << channel;
+    EXPECT_EQ(check(Command::zero(channel)), Refusal::channel) << channel;
+    EXPECT_EQ(check(Command::bldc(1, Direction::forward, false, channel)), Refusal::channel);
+    EXPECT_EQ(check(Command::proximity(1, channel)), Refusal::channel) << channel;
+  }
+  EXPECT_EQ(check(Command::servo(2500, 16)), Refusal::none);
+  EXPECT_EQ(check(Command::servo(2501, 16)), Refusal::range);
+  EXPECT_EQ(check(Command::servo(2500, 17)), Refusal::channel);
+  EXPECT_EQ(check(Command::relay(9, true)), Refusal::channel);
+  EXPECT_EQ(check(Command::stepper(1, 0, 1)), Refusal::range);
+  EXPECT_EQ(check(Command::stepper(1, 20001, 1)), Refusal::range);
+  EXPECT_EQ(check(Command::proximity(401, 1)), Refusal::range);
+  EXPECT_EQ(check(Command::fields("")), Refusal::format);
+  EXPECT_EQ(check(Command::setting("", "1")), Refusal::format);
+  EXPECT_EQ(check(Command::setting("rate", "")), Refusal::format);
+  for (const Command& command : {Command::heartbeat(), Command::stop(), Command::clear(),
+                                 Command::identify(), Command::fields("ALL")}) {
+    EXPECT_EQ(check(command), Refusal::none);
+  }
+}
+
+TEST(Command, TextsCannotForgeAField) {
+  EXPECT_EQ(written(Command::fields("AIN24;E:CLEAR")), "refused");
+  EXPECT_EQ(written(Command::setting("rate", "1;E:CLEAR")), "refused");
+  EXPECT_EQ(written(Command::setting("rate", "1,2")), "refused");
+}
+
+TEST(Command, OutputsAreDrivenBySevenOfThem) {
+  const std::string driving = "ODSRPBZ";
+  for (const std::string text :
+       {"O:1,1,1", "D:1,1,1", "S:1,1", "R:1,On", "P:1,1", "B:1,1,1,1", "Z:1", "H:ROS2-R4", "E:STOP",
+        "E:CLEAR", "U:1,1", "F:ALL", "C:rate,1", "Q:ID"}) {
+    Field field;
+    ASSERT_TRUE(read_field(text, field));
+    Command command;
+    ASSERT_EQ(parse_command(field, command), Refusal::none);
+    EXPECT_EQ(drives_output(command.kind), driving.find(text[0]) != std::string::npos) << text;
+  }
+}
+
+TEST(Command, TheCommandFieldIsTheOneWithALetterForItsName) {
+  struct Case {
+    const char* fields;
+    int count;
+    const char* name;
+  };
+  for (const Case& c :
+       {Case{"O:1,0,1;PNum:1;T:2;", 1, "O"}, Case{"PNum:1;T:2;A:0f;O:1,0,1;", 1, "O"},
+        Case{"AIN24:1.00;PNum:1;T:2;A:0f;1:2;#:3;", 0, ""}, Case{"O:1,0,1;D:1,0,1;PNum:1;", 2, "O"},
+        Case{"x:1;PNum:1;", 1, "x"}, Case{"O:1,0,1;O:1,0,1;E:STOP;", 3, "O"}}) {
+    const std::string bytes = with_crc(c.fields);
+    Datagram datagram;
+    ASSERT_TRUE(read(bytes, datagram));
+    EXPECT_EQ(datagram.command_count(), c.count) << c.fields;
+    EXPECT_EQ(str(datagram.command().name()), c.name) << c.fields;
+    EXPECT_EQ(str(datagram.command().values()),
+              c.count == 0 ? "" : str(datagram.find(Text(c.name, 1)).values()));
+  }
+}
+
+TEST(Command, ListsOfFieldsAreSets) {
+  FieldSet set;
+  EXPECT_EQ(parse_fields("DEFAULT", set), Refusal::none);
+  EXPECT_EQ(set, FieldSet::paper_default());
+  EXPECT_EQ(parse_fields("ALL", set), Refusal::none);
+  EXPECT_EQ(set, FieldSet::all());
+  EXPECT_EQ(parse_fields("AIN24", set), Refusal::none);
+  FieldSet expected;
+  expected.add(StateField::ain24);
+  EXPECT_EQ(set, expected);
+  EXPECT_EQ(parse_fields("SAFE,DEFAULT,CMD,SAFE", set), Refusal::none);
+  expected = FieldSet::paper_default();
+  expected.add(StateField::safe);
+  expected.add(StateField::cmd);
+  EXPECT_EQ(set, expected);
+  for (const std::string list :
+       {"", ",", "AIN24,", ",AIN24", "AIN24,NEW", "ain24", "default", "DEFAULT ALL", "PNum", "T"}) {
+    EXPECT_EQ(parse_fields(list, set), Refusal::unknown) << list;
+    EXPECT_EQ(set, expected) << list;
+  }
+}
+
+}  // namespace
+}  // namespace r4

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "protocol/messages/message.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/support/datagrams.hpp"
+
+namespace r4 {
+namespace {
+
+using test::captured_state;
+using test::str;
+using test::with_crc;
+
+// A datagram and the bytes that it views.
+struct Read {
+  explicit Read(std::string_view fields) : bytes(with_crc(fields)) {
+    EXPECT_TRUE(read(bytes, datagram)) << fields;
+  }
+  Read(const Read&) = delete;
+  Read& operator=(const Read&) = delete;
+  std::string bytes;
+  Datagram datagram;
+};
+
+TEST(Message, KindsAreToldByTheirField) {
+  struct Case {
+    const char* fields;
+    MessageKind kind;
+    const char* word;
+  };
+  for (const Case& c :
+       {Case{"H:R4-ROS2;PNum:7446;T:79201;", MessageKind::board_heartbeat, "heartbeat"},
+        Case{"H:R4-ROS2;PNum:1;T:2;SAFE:1;", MessageKind::board_heartbeat, "heartbeat"},
+        Case{"H:ROS2-R4;T:79201;", MessageKind::host_heartbeat, "heartbeat"},
+        Case{"PNum:1;T:2;H:ROS2-R4;", MessageKind::host_heartbeat, "heartbeat"},
+        Case{"H:other;", MessageKind::command, "command"},
+        Case{"O:1,0,1;PNum:67;T:1;", MessageKind::command, "command"},
+        Case{"X:1;PNum:67;T:1;", MessageKind::command, "command"},
+        Case{"O:1,0,1;H:ROS2-R4;PNum:1;", MessageKind::command, "command"},
+        Case{"H:ROS2-R4;O:1,0,1;PNum:1;", MessageKind::command, "command"},
+        Case{"N:66,RANGE;PNum:1;T:2;", MessageKind::nack, "nack"},
+        Case{"I:R4,0.1.0,x,udp;PNum:1;T:2;", MessageKind::identity, "identity"},
+        Case{"AIN24:24.28;PNum:1;T:2;", MessageKind::state, "state"},
+        Case{"A:1;T:2;", MessageKind::state, "state"}}) {
+    const Read message(c.fields);
+    EXPECT_EQ(kind_of(message.datagram), c.kind) << c.fields;
+    EXPECT_STREQ(to_text(kind_of(message.datagram)), c.word) << c.fields;
+  }
+}
+
+TEST(Message, BoardHeartbeatIsThePapers) {
+  char buffer[max_datagram];
+  EXPECT_EQ(str(write_board_heartbeat(buffer, sizeof buffer, 0, 0, SafeReason::none)),
+            "H:R4-ROS2;PNum:0;T:0;^0xb10b3a06^");
+  EXPECT_EQ(str(write_board_heartbeat(buffer, sizeof buffer, 7446, 79201, SafeReason::none)),
+            "H:R4-ROS2;PNum:7446;T:79201;^0x369e8e0a^");
+  EXPECT_TRUE(write_board_heartbeat(buffer, 10, 0, 0, SafeReason::none).empty());
+}
+
+TEST(Message, BoardHeartbeatCarriesTheReasonBehindTheTime) {
+  for (int reason = 1; reason < safe_reason_count; ++reason) {
+    char buffer[max_datagram];
+    const Text bytes =
+        write_board_heartbeat(buffer, sizeof buffer, 5, 6, static_cast<SafeReason>(reason));
+    EXPECT_EQ(str(bytes), with_crc("H:R4-ROS2;PNum:5;T:6;SAFE:" + std::to_string(reason) + ";"));
+    Datagram datagram;
+    ASSERT_TRUE(read(bytes, datagram));
+    EXPECT_EQ(heartbeat_reason(datagram), static_cast<SafeReason>(reason));
+  }
+}
+
+TEST(Message, BoardHeartbeatCarriesWhatAStopAndAClearHaveToKnow) {
+  SafeReport report(SafeReason::stop);
+  report.cause = 734003;
+  report.has_stop = true;
+  report.stop = 4294967295U;
+  char buffer[max_datagram];
+  const Text bytes = write_board_heartbeat(buffer, sizeof buffer, 12, 790, report);
+  EXPECT_EQ(str(bytes), with_crc("H:R4-ROS2;PNum:12;T:790;SAFE:2;CAUSE:734003;STOP:4294967295;"));
+  Datagram datagram;
+  ASSERT_TRUE(read(bytes, datagram));
+  const SafeReport again = heartbeat_report(datagram);
+  EXPECT_EQ(again.reason, SafeReason::stop);
+  EXPECT_EQ(again.cause, 734003);
+  EXPECT_TRUE(again.has_stop);
+  EXPECT_EQ(again.stop, 4294967295U);
+}
+
+TEST(Message, ACauseOrAStopThatCannotBeReadIsNone) {
+  for (const char* value : {"", "-1", "x", "1,2", "4294967296"}) {
+    const SafeReport report = heartbeat_report(
+        Read("H:R4-ROS2;SAFE:2;CAUSE:" + std::string(value) + ";STOP:" + value + ";").datagram);
+    EXPECT_EQ(report.cause, 0) << value;
+    EXPECT_FALSE(report.has_stop) << value;
+  }
+}
+
+TEST(Message, ARefusalTellsTheHostOfTheSessionWhichOneItIs) {
+  Nack nack;
+  nack.pnum = 7;
+  nack.code = Refusal::stale;
+  nack.has_session = true;
+  nack.session = 2147484600U;
+  char buffer[max_datagram];
+  DatagramWriter writer(buffer, sizeof buffer);
+  write_nack(writer, nack);
+  Datagram datagram;
+  const Text bytes = writer.finish(1, 2);
+  EXPECT_EQ(str(bytes), with_crc("N:7,STALE;SESSION:2147484600;PNum:1;T:2;"));
+  ASSERT_TRUE(read(bytes, datagram));
+  Nack again;
+  ASSERT_TRUE(read_nack(datagram, again));
+  EXPECT_TRUE(again.has_session);
+  EXPECT_EQ(again.session, nack.session);
+  ASSERT_TRUE(read_nack(Read("N:7,STALE;").datagram, again));
+  EXPECT_FALSE(again.has_session);
+}
+
+TEST(Message, BoardHeartbeatCarriesTheNonceBehindTheReason) {
+  char buffer[max_datagram];
+  const Text bytes =
+      write_board_heartbeat(buffer, sizeof buffer, 12, 790, SafeReason::stop, "0123456789abcdef");
+  Datagram datagram;
+  ASSERT_TRUE(read(bytes, datagram));
+  EXPECT_EQ(test::str(bytes).find("H:R4-ROS2;PNum:12;T:790;SAFE:2;AN:0123456789abcdef;^"), 0U);
+  EXPECT_EQ(test::str(heartbeat_nonce(datagram)), "0123456789abcdef");
+  EXPECT_FALSE(is_connecting_heartbeat(datagram));
+}
+
+TEST(Message, AConnectingHeartbeatHasNumberZeroAndNoTimeOrANonce) {
+  const auto connecting = [](const std::string& fields) {
+    const std::string bytes = test::with_crc(fields);
+    Datagram datagram;
+    EXPECT_TRUE(read(Text(bytes), datagram));
+    return is_connecting_heartbeat(datagram);
+  };
+  EXPECT_TRUE(connecting("H:R4-ROS2;PNum:0;T:0;"));
+  EXPECT_TRUE(connecting("H:R4-ROS2;PNum:0;T:79146;AN:0123456789abcdef;"));
+  EXPECT_FALSE(connecting("H:R4-ROS2;PNum:0;T:79146;"));
+  EXPECT_FALSE(connecting("H:R4-ROS2;PNum:0;T:79146;AN:0123;"));
+  EXPECT_FALSE(connecting("H:R4-ROS2;PNum:1;T:79146;AN:0123456789abcdef;"));
+}
+
+TEST(Message, AHeartbeatWithoutAReasonHasNone) {
+  for (const char* fields : {"H:R4-ROS2;", "H:R4-ROS2;SAFE:0;"}) {
+    EXPECT_EQ(heartbeat_reason(Read(fields).datagram), SafeReason::none) << fields;
+  }
+}
+
+TEST(Message, AReasonThatIsNotKnownIsAFault) {
+  for (const char* fields : {"H:R4-ROS2;SAFE:7;", "H:R4-ROS2;SAFE:4294967295;", "H:R4-ROS2;SAFE:;",
+                             "H:R4-ROS2;SAFE:1,2;", "H:R4-ROS2;SAFE:link;"}) {
+    EXPECT_EQ(heartbeat_reason(Read(fields).datagram), SafeReason::fault) << fields;
+  }
+}
+
+TEST(Message, RefusalsRoundTripWithEveryCode) {
+  for (int code = 1; code <= static_cast<int>(Refusal::auth); ++code) {
+    char buffer[max_datagram];
+    DatagramWriter writer(buffer, sizeof buffer);
+    write_nack(writer, Nack{4294967295U, static_cast<Refusal>(code)});
+    Datagram datagram;
+    ASSERT_TRUE(read(writer.finish(1, 2), datagram));
+    Nack nack;
+    ASSERT_TRUE(read_nack(datagram, nack));
+    EXPECT_EQ(nack.pnum, 4294967295U);
+    EXPECT_EQ(nack.code, static_cast<Refusal>(code));
+  }
+}
+
+TEST(Message, OtherRefusalsAreNotTaken) {
+  for (const char* fields :
+       {"A:1;", "N:;", "N:66;", "N:66,;", "N:66,NONE;", "N:66,range;", "N:66,OTHER;",
+        "N:66,RANGE,1;", "N:-1,RANGE;", "N:4294967296,RANGE;", "N:,RANGE;", "N:x,RANGE;"}) {
+    Nack nack{77, Refusal::busy};
+    EXPECT_FALSE(read_nack(Read(fields).datagram, nack)) << fields;
+    EXPECT_EQ(nack.pnum, 77U) << fields;
+    EXPECT_EQ(nack.code, Refusal::busy) << fields;
+  }
+}
+
+TEST(Message, IdentityRoundTrips) {
+  char buffer[max_datagram];
+  DatagramWriter writer(buffer, sizeof buffer);
+  write_identity(writer, Identity{"0.1.0", "0042AF", "udp+serial"});
+  const Text bytes = writer.finish(1, 2);
+  EXPECT_EQ(str(bytes), with_crc("I:R4,0.1.0,0042AF,udp+serial;PNum:1;T:2;"));
+  Datagram datagram;
+  ASSERT_TRUE(read(bytes, datagram));
+  Identity identity;
+  ASSERT_TRUE(read_identity(datagram, identity));
+  EXPECT_EQ(str(identity.firmware), "0.1.0");
+  EXPECT_EQ(str(identity.board_id), "0042AF");
+  EXPECT_EQ(str(identity.capabilities), "udp+serial");
+}
+
+TEST(Message, OtherIdentitiesAreNotTaken) {
+  for (const char* fields : {"A:1;", "I:;", "I:R4;", "I:R4,a,b;", "I:R5,a,b,c;", "I:R4,a,b,c,d;"}) {
+    Identity identity;
+    identity.firmware = "kept";
+    EXPECT_FALSE(read_identity(Read(fields).datagram, identity)) << fields;
+    EXPECT_EQ(str(identity.firmware), "kept") << fields;
+  }
+}
+
+}  // namespace
+}  // namespace r4

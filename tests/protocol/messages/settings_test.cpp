@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "protocol/messages/settings.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace r4 {
+namespace {
+
+Refusal set_text(Settings& settings, const std::string& key, const std::string& value) {
+  return set(settings, key, value);
+}
+
+TEST(Settings, DefaultsAreThePapers) {
+  const Settings settings;
+  EXPECT_EQ(settings.state_rate_hz, 100);
+  EXPECT_EQ(settings.heartbeat_ms, 500);
+  EXPECT_EQ(settings.timeout_ms, 1000);
+  EXPECT_EQ(settings.recovery, Recovery::last);
+  EXPECT_FALSE(settings.pack);
+}
+
+TEST(Settings, NumbersAreTakenToTheEdgesOfTheirRange) {
+  struct Case {
+    const char* key;
+    int min;
+    int max;
+    std::uint16_t Settings::*member;
+  };
+  for (const Case& c : {Case{"rate", 1, 1000, &Settings::state_rate_hz},
+                        Case{"heartbeat", 50, 1000, &Settings::heartbeat_ms},
+                        Case{"timeout", 100, 10000, &Settings::timeout_ms}}) {
+    Settings settings;
+    settings.heartbeat_ms = 60;   // out of the way of the smallest timeout,
+    settings.timeout_ms = 10000;  // and of the largest heartbeat
+    for (const int value : {c.min, c.max}) {
+      EXPECT_EQ(set_text(settings, c.key, std::to_string(value)), Refusal::none) << c.key;
+      EXPECT_EQ(settings.*c.member, value) << c.key;
+    }
+    for (const std::string& value :
+         {std::to_string(c.min - 1), std::to_string(c.max + 1), std::string("-5"),
+          std::string("65636"), std::string("99999999999999999999")}) {
+      EXPECT_EQ(set_text(settings, c.key, value), Refusal::range) << c.key << ' ' << value;
+    }
+    for (const std::string value : {"", "x", "+5", " 5", "5.0", "5ms"}) {
+      EXPECT_EQ(set_text(settings, c.key, value), Refusal::format) << c.key << ' ' << value;
+    }
+    EXPECT_EQ(settings.*c.member, c.max) << c.key << " changed by a refusal";
+  }
+}
+
+TEST(Settings, TheHeartbeatStaysBelowTheTimeout) {
+  Settings settings;
+  EXPECT_EQ(set_text(settings, "timeout", "500"), Refusal::range);
+  EXPECT_EQ(set_text(settings, "timeout", "501"), Refusal::none);
+  EXPECT_EQ(set_text(settings, "heartbeat", "501"), Refusal::range);
+  EXPECT_EQ(set_text(settings, "heartbeat", "500"), Refusal::none);
+  EXPECT_EQ(settings.heartbeat_ms, 500);
+  EXPECT_EQ(settings.timeout_ms, 501);
+}
+
+TEST(Settings, RecoveryIsOneOfTwoWords) {
+  Settings settings;
+  EXPECT_EQ(set_text(settings, "recovery", "rearm"), Refusal::none);
+  EXPECT_EQ(settings.recovery, Recovery::rearm);
+  for (const std::string value : {"", "Last", "1", "rearm "}) {
+    EXPECT_EQ(set_text(settings, "recovery", value), Refusal::format) << value;
+  }
+  EXPECT_EQ(settings.recovery, Recovery::rearm);
+  EXPECT_EQ(set_text(settings, "recovery", "last"), Refusal::none);
+  EXPECT_EQ(settings.recovery, Recovery::last);
+}
+
+TEST(Settings, PackIsSwitchedOnAndOff) {
+  Settings settings;
+  EXPECT_EQ(set_text(settings, "pack", "1"), Refusal::none);
+  EXPECT_TRUE(settings.pack);
+  for (const std::string value : {"2", "-1", "99999999999999999999"}) {
+    EXPECT_EQ(set_text(settings, "pack", value), Refusal::range) << value;
+  }
+  for (const std::string value : {"", "on", "1.0", "+1"}) {
+    EXPECT_EQ(set_text(settings, "pack", value), Refusal::format) << value;
+  }
+  EXPECT_TRUE(settings.pack);
+  EXPECT_EQ(set_text(settings, "pack", "0"), Refusal::none);
+  EXPECT_FALSE(settings.pack);
+}
+
+TEST(Settings, OtherKeysAreUnknown) {
+  Settings settings;
+  for (const std::string key : {"", "Rate", "rates", "timeout ", "PACK"}) {
+    EXPECT_EQ(set_text(settings, key, "100"), Refusal::unknown) << key;
+  }
+}
+
+}  // namespace
+}  // namespace r4

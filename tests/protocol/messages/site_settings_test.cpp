@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "protocol/messages/site_settings.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "protocol/messages/settings.hpp"
+
+namespace r4 {
+namespace {
+
+Refusal set_text(SiteSettings& settings, const std::string& key, const std::string& value) {
+  return set(settings, Text(key), Text(value));
+}
+
+std::string written(const Settings& settings) {
+  char buffer[max_settings_text];
+  Text text;
+  EXPECT_TRUE(write_settings(settings, buffer, sizeof buffer, text));
+  return std::string(text.data(), text.size());
+}
+
+TEST(SiteSettings, ANetworkIsSetWithItsPassword) {
+  SiteSettings settings;
+  EXPECT_STREQ(settings.network, "");
+  EXPECT_EQ(set_text(settings, "network", "My Net"), Refusal::none);
+  EXPECT_EQ(set_text(settings, "password", "p%2Cq%3Br%5e%25s t"), Refusal::none);
+  EXPECT_STREQ(settings.network, "My Net");
+  EXPECT_STREQ(settings.password, "p,q;r^%s t");
+}
+
+TEST(SiteSettings, AnotherNetworkForgetsThePassword) {
+  SiteSettings settings;
+  set_text(settings, "network", "one");
+  set_text(settings, "password", "12345678");
+  EXPECT_EQ(set_text(settings, "network", "one"), Refusal::none);
+  EXPECT_STREQ(settings.password, "12345678");
+  EXPECT_EQ(set_text(settings, "network", "two"), Refusal::none);
+  EXPECT_STREQ(settings.password, "");
+}
+
+TEST(SiteSettings, OffIsNoNetworkUnlessItIsWrittenOtherwise) {
+  SiteSettings settings;
+  set_text(settings, "network", "one");
+  EXPECT_EQ(set_text(settings, "network", "off"), Refusal::none);
+  EXPECT_STREQ(settings.network, "");
+  EXPECT_EQ(set_text(settings, "network", "%6Fff"), Refusal::none);
+  EXPECT_STREQ(settings.network, "off");
+}
+
+TEST(SiteSettings, EveryAcceptedAndRefusedForm) {
+  struct Case {
+    const char* key;
+    std::string value;
+    Refusal refusal;
+  };
+  const Case cases[] = {
+      {"network", std::string(32, 'n'), Refusal::none},
+      {"network", std::string(33, 'n'), Refusal::range},
+      {"network", "%", Refusal::format},
+      {"network", "%4", Refusal::format},
+      {"network", "%4g", Refusal::format},
+      {"network", "a%00", Refusal::format},
+      {"password", "1234567", Refusal::range},
+      {"password", "12345678", Refusal::none},
+      {"password", std::string(63, 'p'), Refusal::none},
+      {"password", std::string(64, 'p'), Refusal::range},
+      {"password", "off", Refusal::none},
+      {"host", "192.168.0.117", Refusal::none},
+      {"host", "off", Refusal::none},
+      {"host", "192.168.0", Refusal::format},
+      {"host", "192.168.0.1.1", Refusal::format},
+      {"host", "192.168.0.256", Refusal::range},
+      {"host", "192.168..1", Refusal::format},
+      {"host", "name", Refusal::format},
+      {"port", "1", Refusal::none},
+      {"port", "65535", Refusal::none},
+      {"port", "0", Refusal::range},
+      {"port", "65536", Refusal::range},
+      {"port", "x", Refusal::format},
+      {"node", "0", Refusal::none},
+      {"node", "31", Refusal::none},
+      {"node", "32", Refusal::range},
+      {"chips", "0", Refusal::none},
+      {"chips", "31", Refusal::none},
+      {"chips", "32", Refusal::range},
+      {"AIN24", "51.66", Refusal::none},
+      {"AIN6", "650", Refusal::none},
+      {"AIN6", "650.01", Refusal::range},
+      {"AIN6", "0", Refusal::range},
+      {"AIN6", "-1", Refusal::range},
+      {"AIN6", "V", Refusal::format},
+      {"key", "1:" + std::string(64, 'f'), Refusal::none},
+      {"key", "9:" + std::string(64, '0'), Refusal::none},
+      {"key", "1:off", Refusal::none},
+      {"key", "0:" + std::string(64, '0'), Refusal::range},
+      {"key", "10:off", Refusal::range},
+      {"key", "1:" + std::string(63, '0'), Refusal::format},
+      {"key", "1:" + std::string(65, '0'), Refusal::format},
+      {"key", "1:Off", Refusal::format},
+      {"key", "off", Refusal::format},
+      {"OSMC1", "1", Refusal::unknown},
+      {"Network", "x", Refusal::unknown},
+  };
+  for (const Case& c : cases) {
+    SiteSettings settings;
+    SiteSettings before = settings;
+    EXPECT_EQ(set_text(settings, c.key, c.value), c.refusal) << c.key << ' ' << c.value;
+    if (c.refusal != Refusal::none) {
+      EXPECT_TRUE(settings == before) << c.key << ' ' << c.value;
+    }
+  }
+}
+
+TEST(SiteSettings, HoldFourKeysAndReplaceOneOfTheSameId) {
+  SiteSettings settings;
+  for (const char id : {'3', '1', '9', '4'}) {
+    EXPECT_EQ(set_text(settings, "key", std::string(1, id) + ":" + std::string(64, id)),
+              Refusal::none);
+  }
+  EXPECT_EQ(set_text(settings, "key", "5:" + std::string(64, '5')), Refusal::range);
+  EXPECT_EQ(set_text(settings, "key", "1:" + std::string(64, 'e')), Refusal::none);
+  EXPECT_EQ(settings.keys[1].id, 1);
+  EXPECT_EQ(settings.keys[1].bytes[0], 0xEE);
+  EXPECT_EQ(set_text(settings, "key", "3:off"), Refusal::none);
+  EXPECT_EQ(settings.keys[0].id, 1);
+  EXPECT_EQ(settings.keys[2].id, 4);
+  EXPECT_TRUE(settings.keys[3] == Key()) << "nothing of it is left";
+  EXPECT_EQ(set_text(settings, "key", "3:off"), Refusal::none);
+  EXPECT_EQ(set_text(settings, "key", "5:" + std::string(64, '5')), Refusal::none);
+}
+
+TEST(SiteSettings, PasswordAndKeysAreSecret) {
+  EXPECT_TRUE(is_secret_setting("password"));
+  EXPECT_TRUE(is_secret_setting("key"));
+  EXPECT_FALSE(is_secret_setting("network"));
+  EXPECT_FALSE(is_secret_setting("AIN24"));
+  EXPECT_FALSE(is_secret_setting("other"));
+}
+
+TEST(SiteSettings, AreToldFromTheOthers) {
+  for (const char* key :
+       {"network", "password", "host", "port", "node", "chips", "AINDMH", "key"}) {
+    EXPECT_TRUE(is_site_setting(Text(key, std::string(key).size()))) << key;
+  }
+  for (const char* key : {"rate", "heartbeat", "timeout", "recovery", "pack", "DMHSTA", ""}) {
+    EXPECT_FALSE(is_site_setting(Text(key, std::string(key).size()))) << key;
+  }
+}
+
+TEST(KeptSettings, ComeBackAsTheyWere) {
+  Settings settings;
+  settings.state_rate_hz = 50;
+  settings.heartbeat_ms = 1000;
+  settings.timeout_ms = 1500;
+  settings.recovery = Recovery::rearm;
+  settings.pack = true;
+  set_text(settings.site, "network", "off, really: 100%25^;%01");
+  set_text(settings.site, "password", "%ff%fe%fd%fc%fb%fa%f9%f8");
+  set_text(settings.site, "host", "10.0.200.255");
+  set_text(settings.site, "port", "2019");
+  set_text(settings.site, "node", "7");
+  set_text(settings.site, "chips", "5");
+  set_text(settings.site, "AINSTEER", "3.3");
+  set_text(settings.site, "key", "2:00ff" + std::string(60, 'a'));
+  set_text(settings.site, "key", "1:" + std::string(64, 'b'));
+  Settings back;
+  read_settings(Text(written(settings)), back);
+  EXPECT_TRUE(back == settings) << written(back);
+  EXPECT_EQ(back.heartbeat_ms, 1000) << "it had to wait for the timeout";
+}
+
+TEST(KeptSettings, TheLongestFit) {
+  Settings settings;
+  settings.state_rate_hz = 1000;
+  settings.timeout_ms = 10000;
+  settings.heartbeat_ms = 1000;
+  settings.recovery = Recovery::rearm;
+  std::string name;
+  std::string password;
+  for (std::size_t i = 0; i < network_max; ++i) name += "%ff";
+  for (std::size_t i = 0; i < password_max; ++i) password += "%ff";
+  set_text(settings.site, "network", name);
+  set_text(settings.site, "password", password);
+  set_text(settings.site, "host", "255.255.255.255");
+  set_text(settings.site, "port", "65535");
+  set_text(settings.site, "node", "31");
+  for (std::uint16_t& full_scale : settings.site.full_scale_cv) full_scale = 65000;
+  for (const char id : {'1', '2', '3', '4'}) {
+    set_text(settings.site, "key", std::string(1, id) + ":" + std::string(64, 'f'));
+  }
+  Settings back;
+  read_settings(Text(written(settings)), back);
+  EXPECT_TRUE(back == settings);
+  char small[100];
+  Text text;
+  EXPECT_FALSE(write_settings(settings, small, sizeof small, text));
+}
+
+TEST(KeptSettings, WhatIsNotKnownIsPassedOver) {
+  Settings settings;
+  read_settings("rate,50\nfuture,1\nnonsense\n\n,\ntimeout,99\nnode,3", settings);
+  EXPECT_EQ(settings.state_rate_hz, 50);
+  EXPECT_EQ(settings.timeout_ms, 1000);
+  EXPECT_EQ(settings.site.can_node, 3);
+}
+
+}  // namespace
+}  // namespace r4

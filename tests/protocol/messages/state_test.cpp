@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "protocol/messages/state.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "tests/support/datagrams.hpp"
+
+namespace r4 {
+namespace {
+
+using test::str;
+using test::with_crc;
+
+bool read_fields(const std::string& fields, State& state) {
+  const std::string bytes = with_crc(fields);
+  Datagram datagram;
+  EXPECT_TRUE(read(bytes, datagram)) << fields;
+  return read_state(datagram, state);
+}
+
+bool accepts(const std::string& fields) {
+  State state;
+  return read_fields(fields, state);
+}
+
+std::string written(StateField field, const State& state) {
+  char buffer[max_datagram];
+  DatagramWriter writer(buffer, sizeof buffer);
+  write_field(writer, field, state);
+  return {buffer, writer.size()};
+}
+
+std::vector<StateField> every_field() {
+  std::vector<StateField> fields;
+  for (int i = 0; i < state_field_count; ++i) fields.push_back(static_cast<StateField>(i));
+  return fields;
+}
+
+// Every member different from every other, and from zero.
+State numbered_state() {
+  State state;
+  for (int i = 0; i < analog_channels; ++i) state.analog_cv[i] = 1001 + i;
+  state.handle_held = true;
+  for (int i = 0; i < dhb12_channels; ++i) {
+    state.dhb12[i] = {static_cast<std::uint16_t>(2001 + i), Direction::forward};
+  }
+  for (int i = 0; i < osmc_channels; ++i) {
+    state.osmc[i] = {static_cast<std::uint16_t>(3001 + i), Direction::forward};
+  }
+  for (int i = 0; i < stepper_channels; ++i) state.stepper_steps[i] = -(4001 + i);
+  for (int i = 0; i < servo_channels; ++i) {
+    state.servo_us[i] = static_cast<std::uint16_t>(1501 + i);
+  }
+  for (int i = 0; i < encoder_channels; ++i) {
+    state.encoder_counts[i] = -(5001 + i);
+    state.encoder_hz[i] = -(7001 + i);
+    state.encoder_index_counts[i] = -(8001 + i);
+  }
+  for (int i = 0; i < ultrasonic_channels; ++i) {
+    state.ultrasonic_cm[i] = static_cast<std::uint16_t>(101 + i);
+  }
+  for (int i = 0; i < bldc_channels; ++i) {
+    state.bldc[i] = {static_cast<std::uint16_t>(6 + i), Direction::forward, true};
+  }
+  state.relays = 0x81;
+  state.safe = SafeReason::proximity;
+  state.last_command = 11;
+  state.rx_ok = 12;
+  state.rx_crc = 13;
+  state.rx_lost = 14;
+  state.rx_duplicate = 15;
+  state.rx_refused = 16;
+  state.fault = {64, ChipTrouble::no_acknowledge};
+  state.late = 17;
+  return state;
+}
+
+// Each field on the wire as numbered_state() has it, in the order of StateField.
+const char* const numbered_fields[] = {
+    "AIN24:10.01",     "AIN12:10.02",     "AIN5:10.03",      "AINDMH:10.04",    "DMHSTA:1",
+    "AINSTEER:10.05",  "DHB1A:2001,1",    "OSMC1:3001,1",    "STEP1POS:-4001",  "SERVO1POS:1501",
+    "AIN6:10.06",      "DHB1B:2002,1",    "DHB2A:2003,1",    "DHB2B:2004,1",    "OSMC2:3002,1",
+    "OSMC3:3003,1",    "OSMC4:3004,1",    "STEP2POS:-4002",  "STEP3POS:-4003",  "STEP4POS:-4004",
+    "SERVO2POS:1502",  "SERVO3POS:1503",  "SERVO4POS:1504",  "SERVO5POS:1505",  "SERVO6POS:1506",
+    "SERVO7POS:1507",  "SERVO8POS:1508",  "SERVO9POS:1509",  "SERVO10POS:1510", "SERVO11POS:1511",
+    "SERVO12POS:1512", "SERVO13POS:1513", "SERVO14POS:1514", "SERVO15POS:1515", "SERVO16POS:1516",
+    "ENC1:-5001",      "ENC2:-5002",      "ENC3:-5003",      "ENC4:-5004",      "US1:101",
+    "US2:102",         "US3:103",         "US4:104",         "BLDC1:6,1,1",     "BLDC2:7,1,1",
+    "BLDC3:8,1,1",     "BLDC4:9,1,1",     "RELAYS:129",      "SAFE:4",          "CMD:11",
+    "RXOK:12",         "RXCRC:13",        "RXLOST:14",       "RXDUP:15",        "RXREF:16",
+    "LATE:17",         "ENC1HZ:-7001",    "ENC2HZ:-7002",    "ENC3HZ:-7003",    "ENC4HZ:-7004",
+    "ENC1IDX:-8001",   "ENC2IDX:-8002",   "ENC3IDX:-8003",   "ENC4IDX:-8004",   "FAULT:64,1"};
+
+TEST(State, AReasonThatIsNotKnownIsAFault) {
+  State state;
+  ASSERT_TRUE(read_fields("SAFE:7;", state));
+  EXPECT_EQ(state.safe, SafeReason::fault);
+}
+
+TEST(State, EveryFieldHasItsOwnMemberAndItsForm) {
+  const State state = numbered_state();
+  ASSERT_EQ(std::size(numbered_fields), static_cast<std::size_t>(state_field_count));
+  for (const StateField field : every_field()) {
+    EXPECT_EQ(written(field, state), numbered_fields[static_cast<int>(field)]);
+  }
+}
+
+TEST(State, EveryFieldIsReadIntoTheMemberItIsWrittenFrom) {
+  for (const StateField field : every_field()) {
+    const std::string text = numbered_fields[static_cast<int>(field)];
+    State state;
+    ASSERT_TRUE(read_fields("PNum:1;" + text + ";T:2;", state)) << text;
+    EXPECT_EQ(written(field, state), text);
+    FieldSet only;
+    only.add(field);
+    EXPECT_EQ(state.present, only) << text;
+    for (const StateField other : every_field()) {
+      if (other == field) continue;
+      EXPECT_EQ(written(other, state), written(other, State())) << text;
+    }
+  }
+}
+
+TEST(State, AllFieldsFitOneDatagramAndRoundTrip) {
+  const State state = numbered_state();
+  char buffer[max_datagram];
+  DatagramWriter writer(buffer, sizeof buffer);
+  for (const StateField field : every_field()) write_field(writer, field, state);
+  const std::string bytes = str(writer.finish(4294967295U, 4294967295U));
+  ASSERT_FALSE(bytes.empty());
+  Datagram datagram;
+  ASSERT_TRUE(read(bytes, datagram));
+  State back;
+  ASSERT_TRUE(read_state(datagram, back));
+  FieldSet every = FieldSet::all();
+  every.add(StateField::fault);
+  EXPECT_EQ(back.present, every);
+  EXPECT_EQ(back.pnum, 4294967295U);
+  EXPECT_EQ(back.t_ms, 4294967295U);
+  for (const StateField field : every_field()) {
+    EXPECT_EQ(written(field, back), written(field, state));
+  }
+}
+
+TEST(State, FieldsComeInAnyOrderWithUnknownOnesBetween) {
+  State state;
+  ASSERT_TRUE(read_fields(
+      "OSMC1:400,1;NEW:x;T:7;SAFE:2;Z9:;AIN24:1.50;PNum:3;ain24:x;SERVO17POS:99;A:sig;", state));
+  FieldSet expected;
+  expected.add(StateField::osmc1);
+  expected.add(StateField::safe);
+  expected.add(StateField::ain24);
+  EXPECT_EQ(state.present, expected);
+  EXPECT_EQ(state.osmc[0], (Drive{400, Direction::forward}));
+  EXPECT_EQ(state.safe, SafeReason::stop);
+  EXPECT_EQ(state.analog_cv[0], 150);
+  EXPECT_EQ(state.pnum, 3U);
+  EXPECT_EQ(state.t_ms, 7U);
+}
+
+TEST(State, WhatADatagramDoesNotBringKeepsItsValue) {
+  State state = numbered_state();
+  ASSERT_TRUE(read_fields("PNum:1;T:2;RELAYS:3;", state));
+  EXPECT_EQ(state.relays, 3);
+  EXPECT_EQ(state.osmc[3].pwm, 3004);
+  ASSERT_TRUE(read_fields("RELAYS:4;", state));
+  EXPECT_EQ(state.pnum, 1U);
+  EXPECT_EQ(state.t_ms, 2U);
+}
+
+TEST(State, ValuesAreTakenToTheEdgesOfTheirRange) {
+  for (const char* fields : {"AIN24:-19999999.99;",
+                             "AIN24:19999999.99;",
+                             "DMHSTA:0;",
+                             "DHB1A:0,0;",
+                             "DHB2B:4095,1;",
+                             "OSMC4:4095,0;",
+                             "STEP1POS:2147483647;",
+                             "STEP4POS:-2147483648;",
+                             "SERVO1POS:0;",
+                             "SERVO16POS:2500;",
+                             "ENC4:-2147483648;",
+                             "US1:0;",
+                             "US4:65535;",
+                             "BLDC4:4095,0,1;",
+                             "RELAYS:0;",
+                             "RELAYS:255;",
+                             "SAFE:6;",
+                             "CMD:4294967295;",
+                             "LATE:4294967295;",
+                             "ENC1HZ:-2147483648;",
+                             "ENC4IDX:2147483647;",
+                             "FAULT:0,0;",
+                             "FAULT:127,255;",
+                             "T:4294967295;"}) {
+    EXPECT_TRUE(accepts(fields)) << fields;
+  }
+}
+
+TEST(State, AValueOutsideItsRangeOrFormRefusesTheWhole) {
+  for (const std::string field : {"AIN24:",
+                                  "AIN24:x",
+                                  "AIN24:1,2",
+                                  "AIN24:+1.00",
+                                  "AIN24: 1.00",
+                                  "AIN24:20000000.00",
+                                  "DMHSTA:2",
+                                  "DMHSTA:",
+                                  "DMHSTA:1,1",
+                                  "DHB1A:4096,1",
+                                  "DHB1A:1,2",
+                                  "DHB1A:-1,1",
+                                  "DHB1A:1",
+                                  "DHB1A:1,",
+                                  "DHB1A:,1",
+                                  "DHB1A:1,1,1",
+                                  "OSMC1:65536,1",
+                                  "OSMC1:4294967296,1",
+                                  "STEP1POS:2147483648",
+                                  "STEP1POS:1.0",
+                                  "SERVO1POS:2501",
+                                  "SERVO1POS:-1",
+                                  "ENC1:",
+                                  "ENC1HZ:1.5",
+                                  "ENC4IDX:2147483648",
+                                  "US1:65536",
+                                  "US1:-1",
+                                  "BLDC1:4096,1,1",
+                                  "FAULT:128,1",
+                                  "FAULT:64",
+                                  "FAULT:64,256",
+                                  "FAULT:64,1,1",
+                                  "BLDC1:1,2,1",
+                                  "BLDC1:1,1,2",
+                                  "BLDC1:1,1",
+                                  "BLDC1:1,1,1,1",
+                                  "RELAYS:256",
+                                  "SAFE:-1",
+                                  "CMD:4294967296",
+                                  "CMD:-1",
+                                  "RXOK:x"}) {
+    State state = numbered_state();
+    state.pnum = 77;
+    EXPECT_FALSE(read_fields("RELAYS:7;PNum:1;" + field + ";T:2;", state)) << field;
+    EXPECT_EQ(state.relays, 0x81) << "half applied: " << field;
+    EXPECT_EQ(state.pnum, 77U) << field;
+  }
+  EXPECT_FALSE(accepts("AIN24:1.00;T:4294967296;")) << "the board's clock has 32 bits";
+}
+
+TEST(State, AFieldThatStandsTwiceRefusesTheWhole) {
+  EXPECT_FALSE(accepts("AIN24:1.00;AIN24:1.00;"));
+  EXPECT_FALSE(accepts("OSMC1:1,1;AIN24:1.00;OSMC1:1,1;"));
+  EXPECT_TRUE(accepts("NEW:1;NEW:1;")) << "unknown fields are not ours to judge";
+}
+
+TEST(State, NamesAreFoundAndOthersAreNot) {
+  std::set<std::string> names;
+  for (const StateField field : every_field()) {
+    const std::string name = str(name_of(field));
+    EXPECT_EQ(state_field(name), field) << name;
+    names.insert(name);
+    for (const std::string& other : {name + "X", "X" + name, name.substr(1), name + " "}) {
+      const StateField found = state_field(other);
+      EXPECT_TRUE(found == StateField::count || str(name_of(found)) == other) << other;
+    }
+  }
+  EXPECT_EQ(names.size(), static_cast<std::size_t>(state_field_count)) << "no name twice";
+  for (const std::string name : {"", "PNum", "T", "ain24", "SERVO17POS", "SERVO0POS"}) {
+    EXPECT_EQ(state_field(name), StateField::count) << name;
+  }
+  EXPECT_EQ(state_field(std::string(1000, 'A')), StateField::count);
+  EXPECT_EQ(state_field(Text()), StateField::count);
+}
+
+TEST(State, ThePapersSetIsTheFirstTenFields) {
+  const FieldSet paper = FieldSet::paper_default();
+  for (const StateField field : every_field()) {
+    EXPECT_EQ(paper.has(field), static_cast<int>(field) < 10);
+    EXPECT_EQ(FieldSet::all().has(field), field != StateField::fault);  // it comes by itself
+  }
+  FieldSet set = FieldSet::all();
+  for (const StateField field : every_field()) set.remove(field);
+  EXPECT_TRUE(set.empty());
+  set.add(paper);
+  EXPECT_EQ(set, paper);
+  EXPECT_NE(set, FieldSet::all());
+}
+
+TEST(State, ASetGivesItsFieldsInTheOrderOfTheTable) {
+  FieldSet set;
+  for (const StateField field : set) FAIL() << str(name_of(field));
+  for (const StateField field :
+       {StateField::enc4idx, StateField::late, StateField::cmd, StateField::ain24}) {
+    set.add(field);
+  }
+  std::vector<StateField> fields;
+  for (const StateField field : set) fields.push_back(field);
+  EXPECT_EQ(fields, (std::vector<StateField>{StateField::ain24, StateField::cmd, StateField::late,
+                                             StateField::enc4idx}));
+  fields.clear();
+  FieldSet every = FieldSet::all();
+  every.add(StateField::fault);
+  for (const StateField field : every) fields.push_back(field);
+  EXPECT_EQ(fields, every_field());
+}
+
+}  // namespace
+}  // namespace r4

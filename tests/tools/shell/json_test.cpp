@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/r4/shell/json.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/datagrams.hpp"
+
+namespace r4::tool {
+namespace {
+
+std::string as_json(std::string_view value) { return value_json(Text(value)).dump(); }
+
+TEST(Json, ShowsNumbersAsNumbersWithoutLosingADigit) {
+  EXPECT_EQ(as_json("24.28"), "24.28");
+  EXPECT_EQ(as_json("-100"), "-100");
+  EXPECT_EQ(as_json("0"), "0");
+  EXPECT_EQ(as_json("-0.05"), "-0.05");
+  EXPECT_EQ(as_json("4294967295"), "4294967295");
+  EXPECT_EQ(as_json("18446744073709551615"), "18446744073709551615");
+}
+
+TEST(Json, ShowsWhatOnlyLooksLikeANumberAsText) {
+  for (const char* text : {"", "-", ".5", "5.", "007", "1e5", "0x10", "1-2", "1.2.3", "+1", "nan",
+                           "18446744073709551616", "123456789012345678901234567890"}) {
+    EXPECT_EQ(as_json(text), '"' + std::string(text) + '"');
+  }
+}
+
+TEST(Json, ShowsSeveralValuesAsAnArrayAndKeepsTheOrderOfFields) {
+  const std::string bytes = test::with_crc("DHB1A:4095,1;AIN24:24.28;H:R4-ROS2;E:;PNum:1;T:2;");
+  Datagram datagram;
+  ASSERT_TRUE(read(Text(bytes), datagram));
+  EXPECT_EQ(fields_json(datagram).dump(),
+            R"({"DHB1A":[4095,1],"AIN24":24.28,"H":"R4-ROS2","E":""})");
+}
+
+TEST(Json, KeepsBothValuesOfANameThatStandsTwice) {
+  const std::string bytes = test::with_crc("X:1;X:a;");
+  Datagram datagram;
+  ASSERT_TRUE(read(Text(bytes), datagram));
+  EXPECT_EQ(fields_json(datagram).dump(), R"({"X":[1,"a"]})");
+}
+
+TEST(Json, EscapesBytesSoThatTheyCanBeTakenBack) {
+  EXPECT_EQ(escaped(std::string_view("a\\b\0\n\xff ~", 8)), "a\\x5cb\\x00\\x0a\\xff ~");
+}
+
+TEST(Json, ReplacesWhatIsNoUtf8) {
+  EXPECT_EQ(line_of({{"thing", "\xff"}}), "{\"thing\":\"\xEF\xBF\xBD\"}\n");
+}
+
+TEST(Json, TellsOfTransfersWhereThereAreSome) {
+  CarrierCounters counters;
+  EXPECT_TRUE(transfers_json(counters).is_null());
+  counters.rx_overflows = 3;
+  counters.transfers = TransferCounters();
+  counters.transfers->timed_out = 2;
+  const Json json = transfers_json(counters);
+  EXPECT_EQ(json["timed_out"], 2);
+  EXPECT_EQ(json["wrong_sequence"], 0);
+  EXPECT_EQ(json["dropped_frames"], 3);
+}
+
+TEST(Json, CountsTheDatagramsOfATransport) {
+  CarrierCounters counters;
+  counters.rx_datagrams = 5;
+  counters.tx_datagrams = 7;
+  counters.tx_dropped = 2;
+  Json json = counters_json(counters);
+  EXPECT_EQ(json["received"], 5);
+  EXPECT_EQ(json["sent"], 7);
+  EXPECT_EQ(json["dropped"], 2);
+  EXPECT_FALSE(json.contains("transfers"));
+  counters.transfers = TransferCounters();
+  counters.transfers->cancelled = 4;
+  json = counters_json(counters);
+  EXPECT_EQ(json["transfers"]["cancelled"], 4);
+}
+
+}  // namespace
+}  // namespace r4::tool

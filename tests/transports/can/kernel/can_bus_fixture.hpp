@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A CanBus on a vxcan pair of its own: what comes from the far end is from another machine to it, what
+// is sent on the near one is local. For tools/with-can.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <linux/can/error.h>
+
+#include <asio/io_context.hpp>
+#include <chrono>
+#include <cstdint>
+#include <cstdlib>
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/transports/can/kernel/raw_can.hpp"
+#include "tests/transports/recorder.hpp"
+#include "transports/can/can_bus.hpp"
+#include "transports/can/can_carrier.hpp"
+#include "transports/url.hpp"
+
+namespace r4::test {
+
+inline constexpr char near_end[] = "vxcan7";
+inline constexpr char far_end[] = "vxcan8";
+inline constexpr std::uint8_t node = 3;
+inline constexpr std::uint32_t heard_id = 0x183;
+inline constexpr std::uint32_t other_id = 0x555;
+inline constexpr std::chrono::milliseconds soon{200};
+
+// The two interfaces are there as long as the tests of a suite run.
+class CanBusTest : public testing::Test {
+ public:
+  static void SetUpTestSuite() {
+    remove();
+    ASSERT_EQ(0, std::system("ip link add dev vxcan7 type vxcan peer name vxcan8 && "
+                             "ip link set vxcan7 up && ip link set vxcan8 up"))
+        << "it takes root, and vxcan in the kernel: tools/with-can";
+  }
+  static void TearDownTestSuite() { remove(); }
+
+ protected:
+  void run_until(const std::function<bool()>& is_so) {
+    const auto end = std::chrono::steady_clock::now() + patience;
+    while (!is_so()) {
+      io.restart();
+      ASSERT_NE(0U, io.run_one_until(end)) << "it did not come";
+    }
+  }
+  void run_for(std::chrono::milliseconds time) {
+    io.restart();
+    io.run_for(time);
+  }
+
+  static CanFrame data(std::uint8_t byte) {
+    CanFrame frame{};
+    frame.id = heard_id;
+    frame.size = 1;
+    frame.data[0] = byte;
+    return frame;
+  }
+  static CanFrame error(std::uint32_t classes, std::uint8_t controller = 0) {
+    CanFrame frame{};
+    frame.id = CAN_ERR_FLAG | classes;
+    frame.size = CAN_ERR_DLC;
+    frame.data[1] = controller;
+    return frame;
+  }
+
+  void become_passive() {
+    local.send(error(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE));
+    run_until([&] { return bus->standing().has_value(); });
+  }
+  std::unique_ptr<Carrier> host() {
+    return make_can_carrier(io, Url::parse("can://vxcan7?node=3"), Role::host);
+  }
+
+  asio::io_context io{1};
+  RawCan local{other_id, near_end};
+  RawCan remote{other_id, far_end};
+  std::shared_ptr<CanBus> bus = CanBus::of(io, near_end, false);
+
+ private:
+  static void remove() { (void)std::system("ip link del vxcan7 2>/dev/null"); }
+};
+
+// Writes down what it is told.
+class Witness final : public CanBus::Member {
+ public:
+  explicit Witness(std::shared_ptr<CanBus> bus, std::uint32_t id = heard_id)
+      : bus_(std::move(bus)) {
+    bus_->join(*this, {id});
+  }
+  ~Witness() { leave(); }
+  Witness(const Witness&) = delete;
+  Witness& operator=(const Witness&) = delete;
+
+  void leave() {
+    if (bus_) bus_->leave(*this);
+    bus_.reset();
+  }
+
+  std::vector<std::pair<Kind, std::string>> events;
+  std::string fix;  // of the newest event
+  std::vector<std::uint8_t> frames;
+  std::vector<std::uint32_t> came_us;
+  std::function<void()> in_event = [] {};
+  std::function<void()> in_frame = [] {};
+
+ private:
+  void on_frame(const CanFrame& frame, std::uint32_t at_us) override {
+    EXPECT_TRUE(bus_) << "it has left";
+    frames.push_back(frame.data[0]);
+    came_us.push_back(at_us);
+    in_frame();
+  }
+  void on_bus(const CarrierEvent& event) override {
+    EXPECT_TRUE(bus_) << "it has left";
+    events.emplace_back(event.kind, event.problem.reason);
+    fix = event.problem.fix;
+    EXPECT_EQ(event.problem.thing, std::string("can://") + near_end);
+    in_event();
+  }
+  void on_drained() override {}
+  bool offer(std::uint32_t, CanFrame&) override { return false; }
+  bool offer_urgent(std::uint32_t, CanFrame&) override { return false; }
+  void frame_sent(std::uint32_t) override {}
+  void on_sent() override {}
+  void on_stuck() override {}
+
+  std::shared_ptr<CanBus> bus_;
+};
+
+}  // namespace r4::test

@@ -1,0 +1,337 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A CanBus that takes frames slowly, and one whose reader is held up: what waits, what is late, what
+// is lost.
+#include <algorithm>
+#include <fstream>
+#include <thread>
+
+#include "tests/transports/can/kernel/can_bus_fixture.hpp"
+#include "transports/framing/can/can_ids.hpp"
+#include "transports/framing/can/can_node.hpp"
+
+namespace r4::test {
+namespace {
+
+// Offers a number of frames, and writes down what becomes of them.
+class Talker final : public CanBus::Member {
+ public:
+  Talker(std::shared_ptr<CanBus> bus, int frames) : left_(frames), bus_(std::move(bus)) {
+    bus_->join(*this, {});
+  }
+  ~Talker() { bus_->leave(*this); }
+  Talker(const Talker&) = delete;
+  Talker& operator=(const Talker&) = delete;
+
+  int accepted = 0;
+  int late = 0;
+  int stuck = 0;
+
+ private:
+  bool offer(std::uint32_t, CanFrame& frame) override {
+    if (left_ == 0) return false;
+    frame = CanFrame{};
+    frame.id = other_id;
+    frame.size = 1;
+    frame.data[0] = static_cast<std::uint8_t>(accepted);
+    return true;
+  }
+  bool offer_urgent(std::uint32_t, CanFrame&) override { return false; }
+  void frame_sent(std::uint32_t) override {
+    --left_;
+    ++accepted;
+  }
+  void on_late_frame(const CanFrame&, std::uint32_t) override { ++late; }
+  void on_stuck() override {
+    left_ = 0;
+    ++stuck;
+  }
+  void on_frame(const CanFrame&, std::uint32_t) override {}
+  void on_drained() override {}
+  void on_sent() override {}
+  void on_bus(const CarrierEvent&) override {}
+
+  int left_;
+  std::shared_ptr<CanBus> bus_;
+};
+
+// A bus of so many bits a second, 128 a frame.
+class SlowBus {
+ public:
+  explicit SlowBus(int rate) {
+    EXPECT_EQ(0, std::system(("tc qdisc add dev vxcan7 root tbf burst 80 limit 10000 rate " +
+                              std::to_string(rate) + "bit")
+                                 .c_str()));
+  }
+  ~SlowBus() { (void)std::system("tc qdisc del dev vxcan7 root"); }
+  SlowBus(const SlowBus&) = delete;
+  SlowBus& operator=(const SlowBus&) = delete;
+};
+
+// A host and its board, at the two ends.
+struct Link {
+  Link(asio::io_context& io, std::size_t number)
+      : host(make_can_carrier(io, url(near_end, number), Role::host)),
+        board(make_can_carrier(io, url(far_end, number), Role::board)) {
+    host->open(at_host);
+    board->open(at_board);
+  }
+  static Url url(const std::string& end, std::size_t number) {
+    return Url::parse("can://" + end + "?node=" + std::to_string(number));
+  }
+  static std::uint64_t timed_out(const Carrier& carrier) {
+    return carrier.counters().transfers.value().timed_out;
+  }
+
+  Recorder at_host, at_board;
+  std::unique_ptr<Carrier> host, board;
+};
+
+constexpr int most_runs = 3;
+
+class CanBusLoad : public CanBusTest {};
+
+TEST_F(CanBusLoad, TellsOfFramesThatWaitedAndSendsThemAllInOrder) {
+  const SlowBus slow(16000);
+  Talker talker(bus, CanBus::ahead);
+  bus->send();
+  EXPECT_EQ(talker.accepted, static_cast<int>(CanBus::ahead));
+  EXPECT_TRUE(bus->full());
+  EXPECT_EQ(talker.late, 0);
+  run_until([&] { return !bus->full(); });
+  EXPECT_GT(talker.late, talker.accepted / 2) << "the kernel takes few at a time";
+  EXPECT_LT(talker.late, talker.accepted) << "the first ones did not wait";
+  CanFrame frame;
+  for (int i = 0; i < talker.accepted; ++i) {
+    ASSERT_TRUE(remote.receive(frame, CanBus::now_us() + 1000000)) << i;
+    ASSERT_EQ(frame.data[0], i);
+  }
+  EXPECT_EQ(talker.stuck, 0);
+}
+
+const std::string in_two_frames = "0123456789";
+
+// The first frames of all hosts together take the bus longer than each may be unanswered.
+TEST_F(CanBusLoad, AFirstFrameThatWaitedForTheBusHasAllOfItsTimeToBeAnswered) {
+  constexpr std::size_t hosts = 16;
+  const SlowBus slow(64000);
+  bool in_time = false;
+  for (int run = 0; run < most_runs && !in_time; ++run) {  // a machine may stand still
+    std::vector<std::unique_ptr<Link>> links;
+    while (links.size() < hosts) links.push_back(std::make_unique<Link>(io, links.size()));
+    run_for(soon);  // hosts listen before they speak
+    for (const auto& link : links) {
+      ASSERT_EQ(link->host->send(in_two_frames, Priority::normal), SendResult::sent);
+    }
+    const bool full = bus->full();
+    std::uint64_t arrived = 0, timed_out = 0;
+    run_until([&] {
+      arrived = timed_out = 0;
+      for (const auto& link : links) {
+        arrived += link->at_board.datagrams.size();
+        timed_out += Link::timed_out(*link->host) + Link::timed_out(*link->board);
+      }
+      return arrived + timed_out >= links.size();
+    });
+    in_time = full && arrived == links.size();
+  }
+  EXPECT_TRUE(in_time);
+}
+
+TEST_F(CanBusLoad, AFirstFrameThatNobodyAnswersTimesOutThoughOthersKeepTheBusFull) {
+  Link link(io, node);
+  link.board->close();
+  run_for(soon);
+  const SlowBus slow(16000);
+  ASSERT_EQ(link.host->send(in_two_frames, Priority::normal), SendResult::sent);
+  Talker talker(bus, 200);
+  bus->send();
+  run_until([&] { return Link::timed_out(*link.host) == 1; });
+  EXPECT_TRUE(bus->full());
+  EXPECT_LT(talker.accepted, 200);
+}
+
+// A board that always has a state to send sets no timer for that, but for the answer that it waits for.
+TEST_F(CanBusLoad, WhatNobodyAnswersTimesOutAlsoBehindAStateThatTakesTheBusLong) {
+  Recorder told;
+  const auto board = make_can_carrier(io, Link::url(near_end, node), Role::board);
+  board->open(told);
+  const SlowBus slow(32000);
+  ASSERT_EQ(board->send(std::string(max_datagram, 'A'), Priority::state), SendResult::sent);
+  ASSERT_EQ(board->send("N:" + in_two_frames, Priority::normal), SendResult::sent);
+  run_until([&] { return Link::timed_out(*board) == 1; });
+  EXPECT_TRUE(bus->full()) << "the state was over before";
+}
+
+// The frame came in time, by its stamp: what this process did meanwhile does not make it late.
+TEST_F(CanBusLoad, FlowControlThatCameInTimeIsObeyedHoweverLateItIsRead) {
+  bool in_time = false;
+  for (int run = 0; run < most_runs && !in_time; ++run) {  // a machine may stand still
+    Link link(io, node);
+    link.board->close();
+    run_for(soon);
+    CanFrame first{};
+    RawCan far(command_id(node), far_end);
+    ASSERT_EQ(link.host->send(in_two_frames, Priority::normal), SendResult::sent);
+    ASSERT_TRUE(far.receive(first, CanBus::now_us() + 1000000));
+    const std::uint32_t had_us = CanBus::now_us();
+    CanFrame go{};
+    go.id = reply_id(node);
+    go.size = 3;
+    go.data[0] = 0x30;
+    far.send(go);
+    in_time = CanBus::now_us() - had_us < 20000;
+    if (!in_time) continue;
+    std::this_thread::sleep_for(std::chrono::milliseconds(40));  // held up, twice as long as N_Bs
+    EXPECT_EQ(link.host->send(in_two_frames, Priority::normal), SendResult::sent);
+    CanFrame second{};
+    io.restart();
+    while (io.run_one_for(soon) != 0 && !far.receive(second, CanBus::now_us())) continue;
+    EXPECT_EQ(second.data[0], 0x21) << "the consecutive frame";
+    EXPECT_EQ(Link::timed_out(*link.host), 0U);
+  }
+  EXPECT_TRUE(in_time) << "this machine stands still again and again";
+}
+
+TEST_F(CanBusLoad, DropsWhatABusDoesNotTakeForLong) {
+  Talker talker(bus, CanBus::ahead);
+  const auto start = CanBus::Clock::now();
+  {
+    const SlowBus slow(800);
+    bus->send();
+    run_until([&] { return talker.stuck != 0; });
+    EXPECT_GE(CanBus::Clock::now() - start, CanBus::patience);
+    EXPECT_FALSE(bus->full());
+    EXPECT_EQ(talker.late, 0);
+  }
+  // What the kernel had is gone with its queue, or comes; nothing else does.
+  Talker next(bus, 1);
+  run_until([&] {
+    bus->send();
+    return next.accepted == 1 && !bus->full();
+  });
+}
+
+// --- when frames came
+
+// A board's datagram in seven frames, on its way while the reader of this thread is held up.
+class CanBusTimes : public CanBusTest {
+ protected:
+  static constexpr std::chrono::milliseconds n_cr{100};  // docs/can.md
+
+  struct Sending {
+    std::uint32_t before_us;
+    std::uint32_t after_us;
+  };
+
+  CanBusTimes() {
+    reader->open(datagrams);
+    CanNode board(CanEnd::board, node, false);
+    board.begin(Text("AIN24:24.28;AIN12:12.24;AIN5:5.11;AINDMH:12.1;"), 0);
+    for (CanFrame frame; board.offer(0, frame); board.frame_sent(0)) frames.push_back(frame);
+  }
+
+  // Sends the next frames, each that long after the one before.
+  void send(std::size_t count, std::chrono::milliseconds gap) {
+    for (; count != 0; --count) {
+      std::this_thread::sleep_for(gap);  // nothing is waited for: it is what is sent
+      const std::uint32_t before_us = CanBus::now_us();
+      remote.send(frames[sendings.size()]);
+      sendings.push_back({before_us, CanBus::now_us()});
+    }
+  }
+  // Of frames n-1 and n: the time between them was that at least, and at most.
+  std::uint32_t least_gap_us(std::size_t n) const {
+    return sendings[n].before_us - sendings[n - 1].after_us;
+  }
+  std::uint32_t most_gap_us(std::size_t n) const {
+    return sendings[n].after_us - sendings[n - 1].before_us;
+  }
+  void read_all() {
+    run_until([&] { return member.frames.size() == sendings.size(); });
+  }
+  std::uint64_t timed_out() const { return reader->counters().transfers.value().timed_out; }
+
+  Witness member{bus, telemetry_id(node)};
+  Recorder datagrams;
+  std::unique_ptr<Carrier> reader = host();
+  std::vector<CanFrame> frames;
+  std::vector<Sending> sendings;
+};
+
+TEST_F(CanBusTimes, AreThoseOfTheirComingHoweverLateTheyAreRead) {
+  constexpr std::chrono::milliseconds gap{25};  // six of them are more than N_Cr
+  ASSERT_EQ(frames.size(), 7U);
+  bool in_time = false;
+  for (int run = 0; run < most_runs && !in_time; ++run) {
+    member.frames.clear();
+    member.came_us.clear();
+    sendings.clear();
+    datagrams.datagrams.clear();
+    send(1, gap);
+    read_all();
+    send(frames.size() - 1, gap);
+    read_all();
+    in_time = true;  // but where this machine stood still meanwhile
+    for (std::size_t n = 1; n < frames.size(); ++n) {
+      if (most_gap_us(n) > n_cr / std::chrono::microseconds(1)) in_time = false;
+    }
+  }
+  ASSERT_TRUE(in_time) << "this machine stands still again and again";
+  for (std::size_t n = 2; n < frames.size(); ++n) {  // those that were read together
+    const std::uint32_t gap_us = member.came_us[n] - member.came_us[n - 1];
+    EXPECT_GE(gap_us + 1, least_gap_us(n)) << n;
+    EXPECT_LE(gap_us, most_gap_us(n) + 1) << n;
+  }
+  EXPECT_EQ(datagrams.datagrams.size(), 1U) << timed_out() << " timed out";
+}
+
+TEST_F(CanBusTimes, ShowAPauseOfTheSenderThoughAllIsReadTogether) {
+  send(2, {});
+  send(1, n_cr * 3 / 2);
+  send(frames.size() - 3, {});
+  read_all();
+  EXPECT_TRUE(datagrams.datagrams.empty());
+  EXPECT_EQ(timed_out(), 1U);
+}
+
+// --- frames that are lost because nobody reads
+
+// More frames than a socket holds. How many came to the interface, by its own count.
+class CanBusOverflow : public CanBusTest {
+ protected:
+  static std::uint64_t came() {
+    std::uint64_t count = 0;
+    std::ifstream("/sys/class/net/vxcan7/statistics/rx_packets") >> count;
+    return count;
+  }
+  // Afterwards all that the socket has taken is read. A frame tells of those lost before it.
+  void flood() {
+    const std::size_t before = member.frames.size();
+    for (int i = 0; i < 3000; ++i) remote.send(data(1));
+    run_until([&] { return member.frames.size() > before; });
+    remote.send(data(2));
+    run_until([&] { return member.frames.back() == 2; });
+  }
+  std::uint64_t missed() const { return came() - came_before - member.frames.size(); }
+
+  Witness member{bus};
+  const std::uint64_t came_before = came();
+};
+
+TEST_F(CanBusOverflow, IsCountedToTheFrameAlsoWhenTheInterfaceWasDownMeanwhile) {
+  flood();
+  const std::uint64_t first = missed();
+  EXPECT_GT(first, 0U);
+  EXPECT_EQ(bus->overflows(), first);
+  ASSERT_EQ(0, std::system("ip link set vxcan7 down"));
+  run_until([&] { return !bus->up(); });
+  ASSERT_EQ(0, std::system("ip link set vxcan7 up"));
+  run_until([&] { return bus->up(); });
+  EXPECT_EQ(bus->overflows(), first);
+  flood();
+  EXPECT_GT(missed(), first);
+  EXPECT_EQ(bus->overflows(), missed());
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Streams of telemetry in which frames are lost: how many datagrams come out that are made of two.
+// The numbers are printed; docs/can.md has them. Same seed, same numbers.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <random>
+
+#include "transports/framing/can/isotp_receiver.hpp"
+#include "transports/framing/can/isotp_sender.hpp"
+
+namespace r4 {
+namespace {
+
+constexpr std::uint32_t frame_us = 130;     // a classic frame at 1 Mbit/s
+constexpr std::uint32_t period_us = 10000;  // from a datagram to the next
+
+// The lengths of a stream's datagrams: each between the two by chance, and every so often another.
+struct Stream {
+  const char* what;
+  std::uint32_t shortest, longest;
+  std::uint32_t other_every, other;  // 0: none
+  int datagrams;
+};
+
+struct Count {
+  int whole = 0;
+  int joined = 0;
+  int told = 0;  // joined ones between whose frames one of another number was heard
+};
+
+// A board sends, and one listens that hears each frame by chance.
+class LossyLine {
+ public:
+  explicit LossyLine(double loss) : lost_(loss) {}
+
+  Count run(const Stream& stream) {
+    std::uniform_int_distribution<std::uint32_t> length(stream.shortest, stream.longest);
+    for (int number = 0; number < stream.datagrams; ++number) {
+      const bool other = stream.other_every != 0 && number % stream.other_every == 0;
+      const std::uint32_t size = other ? stream.other : length(chance_);
+      // Each is filled with one byte of its own: the next with the same is 251 later.
+      std::memset(bytes_.data(), number % 251, size);
+      send(size, number % 251);
+      now_us_ += period_us;
+    }
+    return count_;
+  }
+
+ private:
+  static IsotpSenderOptions sending() {
+    IsotpSenderOptions options;
+    options.flow_control = false;
+    return options;
+  }
+  static IsotpReceiverOptions listening() {
+    IsotpReceiverOptions options;
+    options.listen_only = true;
+    return options;
+  }
+
+  void send(std::uint32_t size, int filling) {
+    sender_.begin(bytes_.data(), size, now_us_);
+    std::uint32_t at_us = now_us_;
+    for (CanFrame frame; sender_.offer(at_us, frame); at_us += frame_us) {
+      sender_.frame_sent(at_us);
+      if (lost_(chance_)) continue;
+      const std::uint32_t malformed = receiver_.counters().malformed;
+      const bool datagram = receiver_.on_frame(frame, at_us).datagram;
+      const bool fits = note(frame, receiver_.counters().malformed != malformed);
+      if (!datagram) continue;
+      if (is_whole(size, filling)) {
+        ++count_.whole;
+      } else {
+        ++count_.joined;
+        count_.told += !fits;
+      }
+    }
+  }
+
+  // Do the frames heard since the last first frame count up from it? Those that no length allows are
+  // passed over (9.6.4.1).
+  bool note(const CanFrame& frame, bool passed_over) {
+    if (frame.data[0] >> 4 != static_cast<int>(IsotpFrameType::consecutive)) {
+      next_ = 1;
+      fits_ = true;
+    } else if ((frame.data[0] & 0xF) == next_) {
+      if (!passed_over) next_ = (next_ + 1) & 0xF;
+    } else {
+      fits_ = false;
+    }
+    return fits_;
+  }
+
+  bool is_whole(std::uint32_t size, int filling) const {
+    const std::uint8_t* const begin = receiver_.data();
+    return receiver_.size() == size &&
+           std::all_of(begin, begin + size, [filling](std::uint8_t b) { return b == filling; });
+  }
+
+  std::mt19937 chance_{12};
+  std::bernoulli_distribution lost_;
+  std::array<std::uint8_t, 1024> bytes_{}, received_{};
+  IsotpSender sender_{sending()};
+  IsotpReceiver receiver_{listening(), received_.data(), 1024};
+  std::uint32_t now_us_ = 0;
+  int next_ = 0;
+  bool fits_ = true;
+  Count count_;
+};
+
+// No frame of another number is passed over within a datagram. What is left is a run of lost frames
+// over a border after which the numbers fit: its length is the frames of a datagram, less 16 (32 …)
+// if there are more. 18 frames are the worst: two lost ones suffice.
+TEST(IsotpLoss, OnlyARunOfLostFramesOverABorderJoinsTwoDatagrams) {
+  const struct {
+    Stream stream;
+    std::array<double, 3> most_per_million;  // at 1, 5 and 10 % loss
+  } cases[] = {
+      {{"25 bytes, 4 frames", 25, 25, 0, 0, 1000000}, {2, 30, 250}},
+      {{"8-64 bytes, 2-10 frames", 8, 64, 0, 0, 1000000}, {12, 320, 1200}},
+      {{"165-175 bytes, 50th 51: states, 25 frames", 165, 175, 50, 51, 200000}, {0, 0, 10}},
+      {{"119-125 bytes, 18 frames", 119, 125, 0, 0, 200000}, {120, 1200, 2000}},
+  };
+  constexpr std::array<double, 3> losses{0.01, 0.05, 0.1};
+  for (const auto& c : cases) {
+    for (std::size_t i = 0; i < losses.size(); ++i) {
+      const Count count = LossyLine(losses[i]).run(c.stream);
+      const double per_million = 1e6 * count.joined / c.stream.datagrams;
+      std::printf("%-42s %2.0f %% lost: %4.0f in a million joined, %5.2f %% whole\n", c.stream.what,
+                  100 * losses[i], per_million, 100.0 * count.whole / c.stream.datagrams);
+      EXPECT_LE(per_million, c.most_per_million[i]) << c.stream.what;
+      EXPECT_EQ(count.told, 0) << c.stream.what;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace r4

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "transports/serial/port_list.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace r4 {
+namespace {
+
+TEST(PortList, NamesEachPortOnceWithItsDevice) {
+  const auto ports = list_serial_ports();
+  for (const SerialPort& port : ports) {
+    EXPECT_EQ(port.path.find("/dev/"), 0U);
+    EXPECT_EQ(port.is_r4, port.vid == 0x2341 && port.pid == 0x0266);
+  }
+  EXPECT_TRUE(std::is_sorted(ports.begin(), ports.end(),
+                             [](const auto& a, const auto& b) { return a.path < b.path; }));
+}
+
+TEST(PortList, GivesTheUrlThatFindsAPortAgain) {
+  SerialPort port;
+  port.path = "/dev/ttyS0";
+  EXPECT_EQ(url_of(port), "serial:///dev/ttyS0");
+  port.serial_number = "0042";
+  EXPECT_EQ(url_of(port), "serial:?sn=0042");
+}
+
+}  // namespace
+}  // namespace r4

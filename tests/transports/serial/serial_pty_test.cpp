@@ -1,0 +1,515 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// serial and pty joined by a real pseudo-terminal, and each against a terminal in the test's hands.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <sys/stat.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "../recorder.hpp"
+#include "transports/file_descriptor.hpp"
+#include "transports/serial/pty_carrier.hpp"
+#include "transports/serial/serial_carrier.hpp"
+
+namespace r4::test {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::milliseconds;
+
+// "serial:///dev/pts/5" of "pty:/dev/pts/5".
+std::string url_for_host(const Carrier& board) { return "serial://" + board.name().substr(4); }
+
+// A pseudo-terminal in the test's hands: the far end of a serial carrier.
+struct Terminal {
+  Terminal() : master(::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)) {
+    std::array<char, 64> name{};
+    if (::grantpt(master.get()) == 0 && ::unlockpt(master.get()) == 0 &&
+        ::ptsname_r(master.get(), name.data(), name.size()) == 0) {
+      device = name.data();
+    }
+  }
+  FileDescriptor master;
+  std::string device;
+};
+
+FileDescriptor open_raw(const std::string& device) {
+  FileDescriptor terminal(::open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+  termios settings{};
+  ::tcgetattr(terminal.get(), &settings);
+  ::cfmakeraw(&settings);
+  ::tcsetattr(terminal.get(), TCSANOW, &settings);
+  return terminal;
+}
+
+// What can be read at once.
+std::string read_all(const FileDescriptor& terminal) {
+  std::string all;
+  std::array<char, 4096> buffer{};
+  for (ssize_t n; (n = ::read(terminal.get(), buffer.data(), buffer.size())) > 0;) {
+    all.append(buffer.data(), static_cast<std::size_t>(n));
+  }
+  return all;
+}
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find("\r\n", at), text.size());
+    if (end != at) lines.push_back(text.substr(at, end - at));
+    at = end + 2;
+  }
+  return lines;
+}
+
+void write_text(const FileDescriptor& terminal, std::string_view text) {
+  ASSERT_EQ(::write(terminal.get(), text.data(), text.size()), static_cast<ssize_t>(text.size()));
+}
+
+class SerialPtyTest : public testing::Test {
+ protected:
+  SerialPtyTest() {
+    std::string pattern = fs::temp_directory_path() / "r4-serial-test-XXXXXX";
+    folder = ::mkdtemp(pattern.data());
+  }
+  ~SerialPtyTest() override {
+    std::error_code ignored;
+    fs::remove_all(folder, ignored);
+  }
+
+  void open_board(const std::string& url = "pty:") {
+    board = open_carrier(io, url, Role::board, at_board);
+  }
+  void open_host(const std::string& url) { host = open_carrier(io, url, Role::host, at_host); }
+  void connect() {
+    open_board();
+    open_host(url_for_host(*board));
+    ASSERT_TRUE(run_until(io, [&] { return board->up(); }));
+  }
+  bool wait_for(const Recorder& recorder, std::string_view text) {
+    return run_until(io, [&] { return recorder.has(text); });
+  }
+  std::optional<Error> host_error(const std::string& url) {
+    Recorder recorder;
+    return error_of([&] { open_carrier(io, url, Role::host, recorder); });
+  }
+
+  asio::io_context io;
+  Recorder at_board, at_host;
+  std::unique_ptr<Carrier> board, host;
+  fs::path folder;
+};
+
+TEST_F(SerialPtyTest, CarriesBothWays) {
+  connect();
+  EXPECT_TRUE(host->up());
+  EXPECT_EQ(at_host.count(Kind::up), 1U);
+  EXPECT_EQ(at_board.count(Kind::up), 1U);
+  for (int i = 0; i < 50; ++i) {
+    EXPECT_EQ(host->send("command " + std::to_string(i), Priority::normal), SendResult::sent);
+    EXPECT_EQ(board->send("state " + std::to_string(i), Priority::state), SendResult::sent);
+  }
+  ASSERT_TRUE(wait_for(at_board, "command 49"));
+  ASSERT_TRUE(wait_for(at_host, "state 49"));
+  EXPECT_EQ(at_board.datagrams.size(), 50U);
+  EXPECT_EQ(at_host.datagrams.size(), 50U);
+  EXPECT_EQ(at_host.datagrams[0].from, everyone);
+  EXPECT_EQ(board->counters().rx_bytes, host->counters().tx_bytes);
+  EXPECT_GE(at_host.drained, 1);
+}
+
+TEST_F(SerialPtyTest, CarriesTheLongestDatagramAndNoLonger) {
+  connect();
+  const std::string longest(1024, 'x');
+  EXPECT_EQ(host->send(longest + "x", Priority::normal), SendResult::full);
+  EXPECT_EQ(host->send(longest, Priority::normal), SendResult::sent);
+  EXPECT_TRUE(wait_for(at_board, longest));
+}
+
+TEST_F(SerialPtyTest, SetsOneMegabaudRawEightBits) {
+  connect();
+  const FileDescriptor look(
+      ::open(board->name().substr(4).c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+  termios settings{};
+  ASSERT_EQ(::tcgetattr(look.get(), &settings), 0);
+  EXPECT_EQ(::cfgetospeed(&settings), static_cast<speed_t>(B1000000));
+  EXPECT_EQ(::cfgetispeed(&settings), static_cast<speed_t>(B1000000));
+  EXPECT_EQ(settings.c_cflag & CSIZE, static_cast<tcflag_t>(CS8));
+  EXPECT_EQ(settings.c_cflag & (PARENB | CSTOPB | CRTSCTS), 0U);
+  EXPECT_EQ(settings.c_lflag & (ICANON | ECHO | ISIG), 0U);
+  EXPECT_EQ(settings.c_iflag & (IXON | IXOFF | ICRNL | INLCR | IGNCR), 0U);
+  EXPECT_EQ(settings.c_oflag & OPOST, 0U);
+}
+
+TEST_F(SerialPtyTest, NamesTheRateThatIsRefused) {
+  open_board();
+  const auto error = host_error(url_for_host(*board) + "?baud=12345");
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->kind(), ErrorKind::usage);
+  EXPECT_NE(error->problem().reason.find("12345 baud"), std::string::npos) << error->what();
+  open_host(url_for_host(*board) + "?baud=115200");
+  EXPECT_EQ(host->name(), url_for_host(*board) + "?baud=115200");
+}
+
+TEST_F(SerialPtyTest, SeesTheHostCloseAndOpenAgain) {
+  connect();
+  double worst_down = 0;
+  double worst_up = 0;
+  for (std::size_t round = 1; round <= 20; ++round) {
+    const auto closed = Clock::now();
+    host->close();
+    ASSERT_TRUE(run_until(io, [&] { return at_board.count(Kind::down) == round; }));
+    EXPECT_FALSE(board->up());
+    EXPECT_EQ(board->send("nobody is there", Priority::state), SendResult::down);
+    worst_down = std::max(worst_down, in_milliseconds(at_board.last(Kind::down)->when - closed));
+    const auto opened = Clock::now();
+    host->open(at_host);
+    ASSERT_TRUE(run_until(io, [&] { return at_board.count(Kind::up) == round + 1; }));
+    worst_up = std::max(worst_up, in_milliseconds(at_board.last(Kind::up)->when - opened));
+  }
+  std::printf("[ host closed: board's down after %.2f ms; opened again: up after %.2f ms ]\n",
+              worst_down, worst_up);
+  EXPECT_LE(worst_down, 50);
+  EXPECT_LE(worst_up, 1000);
+  EXPECT_EQ(board->counters().downs, 20U);
+  EXPECT_EQ(board->counters().ups, 21U);
+  host->send("still working", Priority::normal);
+  EXPECT_TRUE(wait_for(at_board, "still working"));
+}
+
+TEST_F(SerialPtyTest, SeesTheBoardGoAndComeBackByItsPath) {
+  const std::string link = folder / "board";
+  open_board("pty:" + link);
+  EXPECT_EQ(board->name(), "pty:" + link);
+  open_host("serial://" + link);
+  EXPECT_EQ(host->name(), "serial://" + link);
+  double worst_down = 0;
+  double worst_up = 0;
+  for (std::size_t round = 1; round <= 5; ++round) {
+    ASSERT_TRUE(run_until(io, [&] { return board->up() && host->up(); }));
+    const auto gone = Clock::now();
+    board->close();
+    ASSERT_TRUE(run_until(io, [&] { return at_host.count(Kind::down) == round; }));
+    worst_down = std::max(worst_down, in_milliseconds(at_host.last(Kind::down)->when - gone));
+    EXPECT_EQ(host->send("lost", Priority::normal), SendResult::down);
+    EXPECT_FALSE(at_host.last(Kind::down)->problem.reason.empty());
+    EXPECT_FALSE(fs::exists(fs::symlink_status(link)));
+    run_for(io, milliseconds(150));
+    const auto back = Clock::now();
+    board->open(at_board);
+    ASSERT_TRUE(run_until(io, [&] { return at_host.count(Kind::up) == round + 1; }));
+    worst_up = std::max(worst_up, in_milliseconds(at_host.last(Kind::up)->when - back));
+  }
+  std::printf("[ board gone: host's down after %.2f ms; back: up after %.2f ms ]\n", worst_down,
+              worst_up);
+  EXPECT_LE(worst_down, 50);
+  EXPECT_LE(worst_up, 1000);
+  EXPECT_EQ(at_host.count(Kind::warning), 0U);
+  host->send("works again", Priority::normal);
+  EXPECT_TRUE(wait_for(at_board, "works again"));
+}
+
+TEST_F(SerialPtyTest, ReportsOnceWhatKeepsItFromADeviceThatIsBack) {
+  const std::string link = folder / "board";
+  open_board("pty:" + link);
+  open_host("serial://" + link);
+  board.reset();
+  ASSERT_TRUE(run_until(io, [&] { return at_host.count(Kind::down) == 1; }));
+  std::ofstream(link) << "this is no terminal";
+  ASSERT_TRUE(run_until(io, [&] { return at_host.count(Kind::warning) == 1; }));
+  EXPECT_EQ(at_host.last(Kind::warning)->problem.reason, "it is not a serial port");
+  run_for(io, milliseconds(250));
+  EXPECT_EQ(at_host.count(Kind::warning), 1U);
+  fs::remove(link);
+  open_board("pty:" + link);
+  EXPECT_TRUE(run_until(io, [&] { return at_host.count(Kind::up) == 2; }));
+}
+
+TEST_F(SerialPtyTest, WritesNothingWhileNobodyReads) {
+  open_board();
+  EXPECT_FALSE(board->up());
+  EXPECT_EQ(board->send("stale", Priority::normal), SendResult::down);
+  {
+    const FileDescriptor first = open_raw(board->name().substr(4));
+    ASSERT_TRUE(run_until(io, [&] { return board->up(); }));
+    board->send("unread by the first host", Priority::normal);
+  }
+  board->send("between two hosts", Priority::normal);
+  ASSERT_TRUE(run_until(io, [&] { return !board->up(); }));
+  board->send("stale too", Priority::normal);
+  open_host(url_for_host(*board));
+  ASSERT_TRUE(run_until(io, [&] { return board->up(); }));
+  board->send("fresh", Priority::normal);
+  ASSERT_TRUE(wait_for(at_host, "fresh"));
+  EXPECT_EQ(at_host.datagrams.size(), 1U);
+}
+
+TEST_F(SerialPtyTest, FindsItsFeetAfterNoise) {
+  const Terminal far;
+  open_host("serial://" + far.device);
+  std::string noise;
+  for (int i = 0; i < 2000; ++i) noise += static_cast<char>(i * 31 % 256);
+  write_text(far.master, noise);
+  write_text(far.master, "\ngood 1\r\ncut in the mid");
+  write_text(far.master, "dle\rgood 2\n\n\r\r\ngood 3\r");
+  ASSERT_TRUE(wait_for(at_host, "good 3"));
+  EXPECT_TRUE(at_host.has("good 1") && at_host.has("cut in the middle") && at_host.has("good 2"));
+}
+
+std::size_t resident_bytes() {
+  std::size_t total = 0;
+  std::size_t resident = 0;
+  std::ifstream("/proc/self/statm") >> total >> resident;
+  return resident * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+}
+
+TEST_F(SerialPtyTest, Takes10MegabytesWithoutATerminatorForOneBadLine) {
+  open_board();
+  const FileDescriptor host_end = open_raw(board->name().substr(4));
+  ASSERT_TRUE(run_until(io, [&] { return board->up(); }));
+  const std::string block(2000, 'x');
+  const auto feed = [&](std::size_t bytes) {
+    for (std::size_t written = 0; written < bytes;) {
+      const ssize_t n =
+          ::write(host_end.get(), block.data(), std::min(block.size(), bytes - written));
+      if (n > 0) written += static_cast<std::size_t>(n);
+      io.poll();
+      io.restart();
+    }
+  };
+  // Far below what was fed, far above what a sanitizer's own tables grow by.
+  const std::size_t growth_limit = 2'000'000;
+  feed(100'000);
+  const std::size_t before = resident_bytes();
+  feed(9'900'000);
+  EXPECT_LE(resident_bytes(), before + growth_limit);
+  write_text(host_end, "\r\ngood\r\n");
+  ASSERT_TRUE(wait_for(at_board, "good"));
+  EXPECT_EQ(at_board.datagrams.size(), 1U);
+  EXPECT_EQ(board->counters().rx_oversize, 1U);
+}
+
+TEST_F(SerialPtyTest, GivesAStalledReaderAYoungStateFirst) {
+  open_board();
+  const FileDescriptor reader = open_raw(board->name().substr(4));
+  ASSERT_TRUE(run_until(io, [&] { return board->up(); }));
+  std::vector<Clock::time_point> sent;
+  double oldest = 0;
+  // Stalls of different lengths and phases, a state each 10 ms, a heartbeat each 50.
+  for (const int stall_ms : {5, 35, 41, 47, 53, 120, 250, 503}) {
+    const auto start = Clock::now();
+    for (int i = 0; milliseconds(10 * i) < milliseconds(stall_ms); ++i) {
+      run_to(io, start + milliseconds(10 * i));
+      if (i % 5 == 0) board->send("heartbeat", Priority::normal);
+      board->send("state " + std::to_string(sent.size()) + std::string(150, '.'), Priority::state);
+      sent.push_back(Clock::now());
+    }
+    run_to(io, start + milliseconds(stall_ms));
+    pollfd readable{reader.get(), POLLIN, 0};
+    ASSERT_EQ(::poll(&readable, 1, 1000), 1);
+    const auto woke = Clock::now();
+    const auto lines = lines_of(read_all(reader));
+    const auto first = std::find_if(lines.begin(), lines.end(),
+                                    [](const std::string& l) { return l.starts_with("state "); });
+    ASSERT_NE(first, lines.end());
+    EXPECT_EQ(first->find('.') + 150, first->size()) << "a cut line";
+    const auto index = static_cast<std::size_t>(std::stoul(first->substr(6)));
+    oldest = std::max(oldest, in_milliseconds(woke - sent[index]));
+  }
+  std::printf("[ first state after a stall: at most %.1f ms old ]\n", oldest);
+  EXPECT_LE(oldest, 50);
+  EXPECT_GT(board->counters().tx_dropped, 0U);
+}
+
+TEST_F(SerialPtyTest, LosesNothingToAReaderThatKeepsUp) {
+  connect();
+  const auto start = Clock::now();
+  for (int i = 0; i < 300; ++i) {
+    run_to(io, start + milliseconds(i));
+    board->send("state " + std::to_string(i) + std::string(150, '.'), Priority::state);
+  }
+  ASSERT_TRUE(run_until(io, [&] { return at_host.datagrams.size() == 300; }));
+  EXPECT_EQ(board->counters().tx_dropped, 0U);
+}
+
+// A far end that does not read: the host's lines wait.
+class StalledBoardTest : public SerialPtyTest {
+ protected:
+  StalledBoardTest() {
+    open_host("serial://" + far.device);
+    while (host->send(line(sent), Priority::normal) == SendResult::sent) ++sent;
+  }
+  static std::string line(int i) { return "line " + std::to_string(i) + std::string(150, '.'); }
+  // All that the far end reads until the last of it is `last`.
+  std::vector<std::string> read_until(const std::string& last) {
+    std::string text;
+    const auto deadline = Clock::now() + patience;
+    while (!text.ends_with(last + "\r\n") && Clock::now() < deadline) {
+      text += read_all(far.master);
+      run_for(io, milliseconds(1));
+    }
+    EXPECT_LT(Clock::now(), deadline);
+    return lines_of(text);
+  }
+
+  Terminal far;
+  int sent = 0;
+};
+
+TEST_F(StalledBoardTest, LetsStopOvertakeWhatWaits) {
+  EXPECT_EQ(host->send("one too many", Priority::normal), SendResult::full);
+  EXPECT_EQ(host->send("state 1", Priority::state), SendResult::sent);
+  EXPECT_EQ(host->send("state 2", Priority::state), SendResult::sent);
+  EXPECT_EQ(host->send("stop", Priority::stop), SendResult::sent);
+  const auto lines = read_until("state 2");
+  // In the system: whole lines and the one in progress; then stop; then the 64 that waited.
+  ASSERT_EQ(lines.size(), static_cast<std::size_t>(sent) + 2);
+  const auto in_system = static_cast<std::size_t>(sent - 64);
+  for (std::size_t i = 0; i < lines.size() - 1; ++i) {
+    if (i == in_system) {
+      EXPECT_EQ(lines[i], "stop");
+    } else {
+      EXPECT_EQ(lines[i], line(static_cast<int>(i < in_system ? i : i - 1)));
+    }
+  }
+}
+
+TEST_F(StalledBoardTest, DropsWhatHasWaited100MsButCompletesTheLineBegun) {
+  host->send("state", Priority::state);
+  host->send("stop", Priority::stop);
+  run_for(io, milliseconds(110));
+  const auto lines = read_until("stop");
+  ASSERT_EQ(lines.size(), static_cast<std::size_t>(sent - 64) + 1);
+  for (std::size_t i = 0; i + 1 < lines.size(); ++i) {
+    EXPECT_EQ(lines[i], line(static_cast<int>(i)));
+  }
+  EXPECT_EQ(lines.back(), "stop");
+  EXPECT_EQ(host->send("fresh", Priority::normal), SendResult::sent);
+  EXPECT_EQ(read_until("fresh"), std::vector<std::string>{"fresh"});
+  EXPECT_EQ(host->counters().tx_dropped, 64U + 1 + 1);
+}
+
+TEST_F(SerialPtyTest, SaysThatADeviceIsInUse) {
+  connect();
+  const auto error = host_error(url_for_host(*board));
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->kind(), ErrorKind::open);
+  EXPECT_EQ(error->problem().reason, "it is in use by another program");
+  EXPECT_FALSE(error->problem().fix.empty());
+  host->close();
+  EXPECT_FALSE(host_error(url_for_host(*board)));
+}
+
+TEST_F(SerialPtyTest, SaysWhichDeviceIsMissing) {
+  for (const char* device : {"/dev/ttyACM99", "/dev/pts/99999", "/no/such/folder/tty"}) {
+    const auto error = host_error(std::string("serial://") + device);
+    ASSERT_TRUE(error) << device;
+    EXPECT_EQ(error->kind(), ErrorKind::open);
+    EXPECT_EQ(error->problem().thing, device);
+    EXPECT_EQ(error->problem().reason, "there is no such device");
+    EXPECT_NE(error->problem().fix.find("ports"), std::string::npos) << error->what();
+  }
+  const auto by_number = host_error("serial:?sn=no-such-number");
+  ASSERT_TRUE(by_number);
+  EXPECT_EQ(by_number->kind(), ErrorKind::open);
+  EXPECT_NE(by_number->problem().reason.find("'no-such-number'"), std::string::npos);
+}
+
+TEST_F(SerialPtyTest, SaysWhatIsNoSerialPort) {
+  std::ofstream(folder / "file") << "text";
+  for (const std::string& path :
+       {std::string("/dev/null"), folder.string(), (folder / "file").string()}) {
+    const auto error = host_error("serial://" + path);
+    ASSERT_TRUE(error) << path;
+    EXPECT_EQ(error->kind(), ErrorKind::open);
+    EXPECT_EQ(error->problem().reason, "it is not a serial port") << error->what();
+  }
+}
+
+TEST_F(SerialPtyTest, SaysHowToGetPermission) {
+  const Terminal far;
+  ASSERT_EQ(::chmod(far.device.c_str(), 0), 0);
+  const int status = run_unprivileged([&] {
+    const auto error = host_error("serial://" + far.device);
+    if (!error || error->kind() != ErrorKind::permission) return 1;
+    return error->problem().fix.find("usermod -aG dialout") != std::string::npos ? 0 : 2;
+  });
+  EXPECT_EQ(status, 0);
+}
+
+TEST_F(SerialPtyTest, OpensADeviceThroughALink) {
+  const Terminal far;
+  fs::create_symlink(far.device, folder / "by-id");
+  open_host("serial://" + (folder / "by-id").string());
+  write_text(far.master, "through the link\r\n");
+  EXPECT_TRUE(wait_for(at_host, "through the link"));
+}
+
+TEST_F(SerialPtyTest, ReplacesALinkAndNothingElse) {
+  const fs::path path = folder / "board";
+  std::ofstream(path) << "precious";
+  const auto error = error_of([&] { open_board("pty:" + path.string()); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->kind(), ErrorKind::open);
+  EXPECT_TRUE(fs::is_regular_file(path));
+  fs::rename(path, folder / "precious");
+  fs::create_symlink(folder / "precious", path);
+  ASSERT_TRUE(error_of([&] { open_board("pty:" + path.string()); })) << "no link of a board's";
+  EXPECT_EQ(fs::read_symlink(path), folder / "precious");
+  fs::remove(path);
+  fs::create_symlink("/nowhere", path);
+  open_board("pty:" + path.string());
+  EXPECT_EQ(fs::read_symlink(path).parent_path(), "/dev/pts");
+  Recorder recorder;
+  const auto successor = open_carrier(io, "pty:" + path.string(), Role::board, recorder);
+  board->close();
+  EXPECT_TRUE(fs::exists(path)) << "the link is the successor's now";
+  successor->close();
+  EXPECT_FALSE(fs::exists(fs::symlink_status(path)));
+  const auto no_folder = error_of([&] { open_board("pty:" + (folder / "no" / "board").string()); });
+  ASSERT_TRUE(no_folder);
+  EXPECT_EQ(no_folder->kind(), ErrorKind::open);
+}
+
+TEST_F(SerialPtyTest, CallsNoHandlerAfterClose) {
+  const Terminal far;
+  open_host("serial://" + far.device);
+  at_host.then = [&](const Recorder::Datagram&) { host->close(); };
+  write_text(far.master, "1\r\n2\r\n3\r\n");
+  ASSERT_TRUE(wait_for(at_host, "1"));
+  run_for(io, milliseconds(5));
+  EXPECT_EQ(at_host.datagrams.size(), 1U);
+  EXPECT_EQ(at_host.drained, 0);
+  host->open(at_host);
+  at_host.then = nullptr;
+  write_text(far.master, "4\r\n");
+  EXPECT_TRUE(wait_for(at_host, "4"));
+}
+
+TEST_F(SerialPtyTest, LeaksNoDescriptorsOver100Reopenings) {
+  const std::string link = folder / "board";
+  open_board("pty:" + link);
+  open_host("serial://" + link);
+  ASSERT_TRUE(run_until(io, [&] { return board->up(); }));
+  const std::size_t before = open_descriptors();
+  for (int i = 0; i < 100; ++i) {
+    host->close();
+    board->open(at_board);
+    host->open(at_host);
+    ASSERT_TRUE(run_until(io, [&] { return board->up(); }));
+    host->send(std::to_string(i), Priority::normal);
+    ASSERT_TRUE(wait_for(at_board, std::to_string(i)));
+  }
+  EXPECT_LE(open_descriptors(), before);
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,688 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "transports/udp/udp_carrier.hpp"
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <net/if.h>
+#include <netinet/in.h>
+#include <sched.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <asio/ip/udp.hpp>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <future>
+#include <vector>
+
+#include "../recorder.hpp"
+#include "tests/support/datagrams.hpp"
+#include "transports/file_descriptor.hpp"
+
+namespace r4::test {
+namespace {
+
+using asio::ip::udp;
+
+std::string port_of(const Carrier& board) {
+  const std::string address = board.name().substr(0, board.name().find('?'));
+  return address.substr(address.rfind(':') + 1);
+}
+
+// A board answers only what is a datagram.
+std::string valid(std::string_view name) { return with_crc(std::string(name) + ":;"); }
+
+// Another program's socket.
+class Socket {
+ public:
+  Socket(asio::io_context& io, const char* address, unsigned short port = 0)
+      : socket_(io, udp::endpoint(asio::ip::make_address(address), port)) {
+    socket_.non_blocking(true);
+  }
+  std::string port() const { return std::to_string(socket_.local_endpoint().port()); }
+  void send(std::string_view text, const std::string& port, const char* address = "127.0.0.1") {
+    socket_.send_to(asio::buffer(text),
+                    udp::endpoint(asio::ip::make_address(address),
+                                  static_cast<unsigned short>(std::stoi(port))));
+  }
+  // Empty if nothing is there.
+  std::string receive() {
+    char buffer[2048];
+    asio::error_code error;
+    udp::endpoint from;
+    const std::size_t size = socket_.receive_from(asio::buffer(buffer), from, 0, error);
+    return error ? std::string() : std::string(buffer, size);
+  }
+
+ private:
+  udp::socket socket_;
+};
+
+class UdpCarrierTest : public testing::Test {
+ protected:
+  void open_board(const std::string& query = "") {
+    board = open_carrier(io, "udp://127.0.0.1:0" + query, Role::board, at_board);
+  }
+  void open_host() {
+    host =
+        open_carrier(io, "udp://127.0.0.1:" + port_of(*board) + "?listen=0", Role::host, at_host);
+  }
+  bool wait_for(const Recorder& recorder, std::string_view text) {
+    return run_until(io, [&] { return recorder.has(text); });
+  }
+
+  asio::io_context io;
+  Recorder at_board, at_host;
+  std::unique_ptr<Carrier> board, host;
+};
+
+TEST_F(UdpCarrierTest, CarriesBothWays) {
+  open_board();
+  open_host();
+  EXPECT_TRUE(board->up() && host->up());
+  EXPECT_EQ(at_host.count(Kind::up), 1U);
+  EXPECT_EQ(host->send(valid("question"), Priority::normal), SendResult::sent);
+  ASSERT_TRUE(wait_for(at_board, valid("question")));
+  EXPECT_EQ(board->send("answer", Priority::normal, at_board.datagrams[0].from), SendResult::sent);
+  ASSERT_TRUE(wait_for(at_host, "answer"));
+  EXPECT_EQ(at_host.datagrams[0].from, everyone);
+  EXPECT_EQ(host->counters().tx_bytes, valid("question").size());
+  EXPECT_EQ(board->counters().rx_bytes, valid("question").size());
+  EXPECT_EQ(board->counters().rx_datagrams, 1U);
+  EXPECT_GE(at_host.drained, 1);
+}
+
+TEST_F(UdpCarrierTest, CarriesOverIpv6) {
+  board = open_carrier(io, "udp://[::1]:0", Role::board, at_board);
+  host = open_carrier(io, "udp://[::1]:" + port_of(*board) + "?listen=0", Role::host, at_host);
+  EXPECT_EQ(host->name().find("udp://[::1]:"), 0U);
+  host->send(valid("question"), Priority::normal);
+  ASSERT_TRUE(wait_for(at_board, valid("question")));
+  board->send("answer", Priority::normal);
+  ASSERT_TRUE(wait_for(at_host, "answer"));
+}
+
+TEST_F(UdpCarrierTest, ServesIpv4HostsOnAnIpv6Socket) {
+  Socket peer(io, "127.0.0.1");
+  board = open_carrier(io, "udp://[::]:0?peer=127.0.0.1:" + peer.port(), Role::board, at_board);
+  EXPECT_EQ(board->send("state", Priority::state), SendResult::sent);
+  std::string received;
+  ASSERT_TRUE(run_until(io, [&] { return !(received = peer.receive()).empty(); }));
+  EXPECT_EQ(received, "state");
+  open_host();
+  host->send("question", Priority::normal);
+  ASSERT_TRUE(wait_for(at_board, "question"));
+}
+
+TEST_F(UdpCarrierTest, SendsForEveryoneToTheHostHeardLast) {
+  open_board();
+  EXPECT_EQ(board->send("nobody is there", Priority::state), SendResult::down);
+  Recorder at_second;
+  open_host();
+  const auto second =
+      open_carrier(io, "udp://127.0.0.1:" + port_of(*board) + "?listen=0", Role::host, at_second);
+  host->send(valid("first"), Priority::normal);
+  ASSERT_TRUE(wait_for(at_board, valid("first")));
+  second->send(valid("second"), Priority::normal);
+  ASSERT_TRUE(wait_for(at_board, valid("second")));
+  const Peer first = at_board.datagrams[0].from;
+  EXPECT_NE(first, at_board.datagrams[1].from);
+  EXPECT_NE(first, everyone);
+  board->send("for everyone", Priority::state);
+  board->send("for the first", Priority::normal, first);
+  ASSERT_TRUE(wait_for(at_second, "for everyone"));
+  ASSERT_TRUE(wait_for(at_host, "for the first"));
+  EXPECT_EQ(at_host.datagrams.size(), 1U);
+  EXPECT_EQ(at_second.datagrams.size(), 1U);
+}
+
+TEST_F(UdpCarrierTest, AnswersThePapersClientWhereItListensAndWhereItAsks) {
+  Socket listening(io, "127.0.0.1");
+  Socket asking(io, "127.0.0.1");
+  open_board("?peer=127.0.0.1:" + listening.port());
+  asking.send(valid("command"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("command")));
+  const Peer peer = at_board.datagrams[0].from;
+  board->send("state", Priority::state);
+  board->send("answer", Priority::normal, peer);
+  std::vector<std::string> heard;
+  ASSERT_TRUE(run_until(io, [&] {
+    if (std::string text = listening.receive(); !text.empty()) heard.push_back(text);
+    return heard.size() == 2;
+  }));
+  EXPECT_EQ(heard, (std::vector<std::string>{"state", "answer"}));
+  EXPECT_EQ(asking.receive(), "answer");
+  EXPECT_EQ(asking.receive(), "");
+
+  listening.send(valid("from-the-peer-itself"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("from-the-peer-itself")));
+  board->send("once", Priority::normal, at_board.datagrams[1].from);
+  ASSERT_TRUE(run_until(io, [&] { return listening.receive() == "once"; }));
+  EXPECT_EQ(listening.receive(), "");
+}
+
+TEST_F(UdpCarrierTest, HearsTheBoardFromAnyPortAndNobodyElse) {
+  open_board();
+  open_host();
+  const std::string listen = host->name().substr(host->name().find("listen=") + 7);
+  Socket stranger(io, "127.0.0.2");
+  Socket other_port(io, "127.0.0.1");
+  stranger.send("stranger", listen);
+  other_port.send("board", listen);
+  ASSERT_TRUE(wait_for(at_host, "board"));
+  EXPECT_EQ(at_host.datagrams.size(), 1U);
+  EXPECT_EQ(host->counters().rx_foreign, 1U);
+  EXPECT_EQ(host->counters().rx_datagrams, 1U);
+}
+
+TEST_F(UdpCarrierTest, CountsAndDropsWhatIsTooLong) {
+  open_board();
+  open_host();
+  Socket raw(io, "127.0.0.1");
+  raw.send(std::string(1025, 'x'), port_of(*board));
+  raw.send(std::string(60000, 'x'), port_of(*board));
+  EXPECT_EQ(host->send(std::string(1025, 'y'), Priority::normal), SendResult::full);
+  const std::string longest(1024, 'y');
+  EXPECT_EQ(host->send(longest, Priority::normal), SendResult::sent);
+  ASSERT_TRUE(wait_for(at_board, longest));
+  EXPECT_EQ(at_board.datagrams.size(), 1U);
+  EXPECT_EQ(board->counters().rx_oversize, 2U);
+  EXPECT_EQ(host->counters().tx_errors, 1U);
+}
+
+TEST_F(UdpCarrierTest, ForgetsThePeerThatIsSilentLongest) {
+  open_board();
+  Socket first(io, "127.0.0.1");
+  first.send(valid("first"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("first")));
+  std::vector<std::unique_ptr<Socket>> crowd;
+  for (int i = 0; i < 100; ++i) {
+    crowd.push_back(std::make_unique<Socket>(io, "127.0.0.1"));
+    crowd.back()->send(valid(std::to_string(i)), port_of(*board));
+  }
+  ASSERT_TRUE(wait_for(at_board, valid("99")));
+  EXPECT_EQ(board->send("too late", Priority::normal, at_board.datagrams[0].from),
+            SendResult::down);
+  EXPECT_EQ(board->send("answer", Priority::normal, at_board.datagrams.back().from),
+            SendResult::sent);
+  EXPECT_EQ(board->counters().tx_dropped, 1U);
+  EXPECT_TRUE(board->up());
+}
+
+TEST_F(UdpCarrierTest, AnswersTheHostInControlHoweverManyOthersSend) {
+  open_board();
+  Socket owner(io, "127.0.0.1");
+  owner.send(valid("owner"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("owner")));
+  const Peer number = at_board.datagrams[0].from;
+  board->hold(number);
+  std::vector<std::unique_ptr<Socket>> crowd;
+  for (int i = 0; i < 100; ++i) {
+    crowd.push_back(std::make_unique<Socket>(io, "127.0.0.1"));
+    crowd.back()->send(valid(std::to_string(i)), port_of(*board));
+  }
+  ASSERT_TRUE(wait_for(at_board, valid("99")));
+  EXPECT_EQ(board->send("answer", Priority::normal, number), SendResult::sent);
+  EXPECT_TRUE(run_until(io, [&] { return owner.receive() == "answer"; }));
+  owner.send(valid("again"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("again")));
+  EXPECT_EQ(at_board.datagrams.back().from, number);
+}
+
+TEST_F(UdpCarrierTest, TakesWhoeverSendsNoDatagramForNobody) {
+  open_board();
+  Socket host_socket(io, "127.0.0.1");
+  Socket stranger(io, "127.0.0.1");
+  host_socket.send(valid("host"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("host")));
+  stranger.send("x", port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, "x"));
+  EXPECT_EQ(at_board.datagrams.back().from, everyone);
+  board->send("for everyone", Priority::state);
+  EXPECT_TRUE(run_until(io, [&] { return host_socket.receive() == "for everyone"; }));
+  EXPECT_EQ(stranger.receive(), "");
+}
+
+TEST_F(UdpCarrierTest, SendsForEveryoneToTheHostInControlAlthoughAnotherWasHeardLast) {
+  open_board();
+  Socket owner(io, "127.0.0.1");
+  Socket stranger(io, "127.0.0.1");
+  owner.send(valid("owner"), port_of(*board));
+  stranger.send(valid("stranger"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("stranger")));
+  board->hold(at_board.datagrams[0].from);
+  board->send("state", Priority::state);
+  EXPECT_TRUE(run_until(io, [&] { return owner.receive() == "state"; }));
+
+  stranger.send(valid("later"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("later")));
+  board->send("another state", Priority::state);
+  EXPECT_TRUE(run_until(io, [&] { return owner.receive() == "another state"; }));
+  EXPECT_EQ(stranger.receive(), "");
+
+  board->hold(everyone);  // it has gone
+  stranger.send(valid("again"), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, valid("again")));
+  board->send("for anybody", Priority::state);
+  EXPECT_TRUE(run_until(io, [&] { return stranger.receive() == "for anybody"; }));
+  EXPECT_EQ(owner.receive(), "");
+}
+
+TEST_F(UdpCarrierTest, SaysThatThePortIsInUse) {
+  Socket other(io, "0.0.0.0");
+  const auto error = error_of(
+      [&] { open_carrier(io, "udp://127.0.0.1?listen=" + other.port(), Role::host, at_host); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->kind(), ErrorKind::open);
+  EXPECT_EQ(error->problem().reason, "UDP port " + other.port() + " is in use by another program");
+  EXPECT_NE(error->problem().fix.find("?listen=0"), std::string::npos);
+  const auto at_the_board =
+      error_of([&] { open_carrier(io, "udp://0.0.0.0:" + other.port(), Role::board, at_board); });
+  ASSERT_TRUE(at_the_board);
+  EXPECT_EQ(at_the_board->kind(), ErrorKind::open);
+}
+
+TEST_F(UdpCarrierTest, SaysWhichHostItDoesNotFind) {
+  const auto error = error_of(
+      [&] { open_carrier(io, "udp://no-such-board.invalid?listen=0", Role::host, at_host); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->kind(), ErrorKind::open);
+  EXPECT_NE(error->problem().reason.find("no host 'no-such-board.invalid'"), std::string::npos);
+  EXPECT_FALSE(error->problem().fix.empty());
+}
+
+TEST_F(UdpCarrierTest, SaysThatAnAddressIsNotOfThisMachine) {
+  const auto error =
+      error_of([&] { open_carrier(io, "udp://192.0.2.1:0", Role::board, at_board); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->kind(), ErrorKind::open);
+  EXPECT_NE(error->problem().fix.find("0.0.0.0"), std::string::npos);
+}
+
+TEST_F(UdpCarrierTest, SaysThatAPortIsNotPermitted) {
+  const int status = run_unprivileged([] {
+    asio::io_context child;
+    Recorder recorder;
+    const auto error =
+        error_of([&] { open_carrier(child, "udp://127.0.0.1:1", Role::board, recorder); });
+    return error && error->kind() == ErrorKind::permission ? 0 : 1;
+  });
+  std::ifstream limit("/proc/sys/net/ipv4/ip_unprivileged_port_start");
+  int first_free = 1024;
+  limit >> first_free;
+  EXPECT_EQ(status, first_free > 1 ? 0 : 1);
+}
+
+TEST_F(UdpCarrierTest, TakesABoardThatIsOffForAQuietOne) {
+  std::string port;
+  {
+    Socket gone(io, "127.0.0.1");
+    port = gone.port();
+  }
+  host = open_carrier(io, "udp://127.0.0.1:" + port + "?listen=0", Role::host, at_host);
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_EQ(host->send("is anybody there", Priority::normal), SendResult::sent);
+    run_for(io, std::chrono::milliseconds(1));
+  }
+  EXPECT_TRUE(host->up());
+  EXPECT_EQ(at_host.events.size(), 1U);
+  board = open_carrier(io, "udp://127.0.0.1:" + port, Role::board, at_board);
+  host->send("now", Priority::normal);
+  EXPECT_TRUE(wait_for(at_board, "now"));
+}
+
+TEST_F(UdpCarrierTest, HandsABurstOverWholeAndSaysWhenItIsDone) {
+  open_board();
+  Socket raw(io, "127.0.0.1");
+  for (int i = 0; i < 100; ++i) raw.send(std::to_string(i), port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, "99"));
+  EXPECT_EQ(at_board.datagrams.size(), 100U);
+  for (std::size_t i = 0; i < 100; ++i) EXPECT_EQ(at_board.datagrams[i].text, std::to_string(i));
+  EXPECT_EQ(at_board.drained, 1);
+}
+
+TEST_F(UdpCarrierTest, CallsNoHandlerAfterClose) {
+  open_board();
+  at_board.then = [&](const Recorder::Datagram&) { board->close(); };
+  Socket raw(io, "127.0.0.1");
+  raw.send("1", port_of(*board));
+  raw.send("2", port_of(*board));
+  ASSERT_TRUE(wait_for(at_board, "1"));
+  run_for(io, std::chrono::milliseconds(5));
+  EXPECT_EQ(at_board.datagrams.size(), 1U);
+  EXPECT_EQ(at_board.drained, 0);
+  EXPECT_EQ(board->send("x", Priority::normal), SendResult::down);
+  at_board.then = nullptr;
+  board->open(at_board);
+  raw.send("3", port_of(*board));
+  EXPECT_TRUE(wait_for(at_board, "3"));
+}
+
+TEST_F(UdpCarrierTest, LeaksNoDescriptorsOver100Reopenings) {
+  open_board();
+  open_host();
+  const std::size_t before = open_descriptors();
+  for (int i = 0; i < 100; ++i) {
+    host->open(at_host);
+    board->open(at_board);
+  }
+  host->close();
+  board->close();
+  host->close();
+  EXPECT_LE(open_descriptors(), before);
+}
+
+// Two boards of one program, which hears both at one port.
+class UdpTwoBoardsTest : public testing::Test {
+ protected:
+  struct Link {
+    Recorder at_board, at_host;
+    std::unique_ptr<Carrier> board, host;
+  };
+
+  UdpTwoBoardsTest() { listen = Socket(io, "0.0.0.0").port(); }
+
+  void open_board(Link& link, const std::string& address) {
+    link.board = open_carrier(io, "udp://" + address + ":0", Role::board, link.at_board);
+    link.at_board.then = [&link](const Recorder::Datagram& datagram) {
+      link.board->send("answer to " + datagram.text, Priority::normal, datagram.from);
+    };
+  }
+  std::string url(const Link& link) const { return link.board->name() + "?listen=" + listen; }
+  void open_host(Link& link) { link.host = open_carrier(io, url(link), Role::host, link.at_host); }
+  // What both ask at once is answered to the one that asked; `count` times.
+  void talk(const std::string& name, int count) {
+    const std::size_t before[] = {links[0].at_host.datagrams.size(),
+                                  links[1].at_host.datagrams.size()};
+    for (int i = 0; i < count; ++i) {
+      for (std::size_t which : {0U, 1U}) {
+        links[which].host->send(question(name, which, i), Priority::normal);
+      }
+    }
+    for (std::size_t which : {0U, 1U}) {
+      const Recorder& heard = links[which].at_host;
+      ASSERT_TRUE(run_until(io, [&] {
+        return heard.datagrams.size() >= before[which] + static_cast<std::size_t>(count);
+      })) << name;
+    }
+    run_for(io, std::chrono::milliseconds(1));
+    for (std::size_t which : {0U, 1U}) {
+      const Recorder& heard = links[which].at_host;
+      ASSERT_EQ(heard.datagrams.size(), before[which] + static_cast<std::size_t>(count)) << name;
+      for (int i = 0; i < count; ++i) {
+        EXPECT_EQ(heard.datagrams[before[which] + static_cast<std::size_t>(i)].text,
+                  "answer to " + question(name, which, i));
+      }
+    }
+  }
+  static std::string question(const std::string& name, std::size_t which, int i) {
+    return valid(name + std::to_string(which) + "x" + std::to_string(i));
+  }
+
+  asio::io_context io;
+  std::string listen;
+  Link links[2];
+};
+
+TEST_F(UdpTwoBoardsTest, AreToldApartByTheirAddress) {
+  open_board(links[0], "127.0.0.1");
+  open_board(links[1], "127.0.0.2");
+  for (Link& link : links) open_host(link);
+  talk("both", 50);
+  // The first is heard from any port of its board, as if it were alone.
+  Socket other_port(io, "127.0.0.1");
+  other_port.send("other port", listen);
+  EXPECT_TRUE(run_until(io, [&] { return links[0].at_host.has("other port"); }));
+  // The further one from the port to which it is addressed.
+  Socket of_the_second(io, "127.0.0.2");
+  of_the_second.send("other port of the second", listen);
+  EXPECT_TRUE(run_until(io, [&] { return links[0].host->counters().rx_foreign == 1; }));
+  EXPECT_FALSE(links[1].at_host.has("other port of the second"));
+}
+
+TEST_F(UdpTwoBoardsTest, AreToldApartByTheirPortAtOneAddressInEitherOrder) {
+  for (Link& link : links) open_board(link, "127.0.0.1");
+  for (const std::size_t first : {0U, 1U}) {
+    open_host(links[first]);
+    open_host(links[1 - first]);
+    talk("order", 50);
+    // A third board's of that address is for neither.
+    Socket third(io, "127.0.0.1");
+    const std::uint64_t foreign = links[first].host->counters().rx_foreign;
+    third.send("of a third", listen);
+    EXPECT_TRUE(
+        run_until(io, [&] { return links[first].host->counters().rx_foreign == foreign + 1; }));
+    for (Link& link : links) EXPECT_FALSE(link.at_host.has("of a third"));
+    for (Link& link : links) link.host->close();
+  }
+}
+
+TEST_F(UdpTwoBoardsTest, OfWhichTheFirstClosesAndOpensAgain) {
+  for (Link& link : links) open_board(link, "127.0.0.1");
+  for (Link& link : links) open_host(link);
+  links[0].host->close();
+  const std::size_t before = links[1].at_host.datagrams.size();
+  links[0].board->send("nobody is there", Priority::normal);
+  links[1].host->send(valid("alone"), Priority::normal);
+  ASSERT_TRUE(run_until(io, [&] { return links[1].at_host.has("answer to " + valid("alone")); }));
+  EXPECT_EQ(links[1].at_host.datagrams.size(), before + 1);
+  links[0].host->open(links[0].at_host);
+  talk("again", 50);
+}
+
+TEST_F(UdpTwoBoardsTest, OfWhichTheSecondCloses) {
+  for (Link& link : links) open_board(link, "127.0.0.1");
+  for (Link& link : links) open_host(link);
+  talk("both", 1);
+  links[1].host->close();
+  const std::size_t before = links[0].at_host.datagrams.size();
+  links[1].board->send("to the closed one", Priority::normal);
+  ASSERT_TRUE(run_until(io, [&] { return links[0].host->counters().rx_foreign == 1; }));
+  EXPECT_EQ(links[0].at_host.datagrams.size(), before);
+  links[1].host->open(links[1].at_host);
+  talk("again", 50);
+}
+
+// What came from the second board before it was opened is not the first's.
+TEST_F(UdpTwoBoardsTest, OfWhichTheSecondSpeaksBeforeItIsOpened) {
+  for (Link& link : links) open_board(link, "127.0.0.1");
+  open_host(links[0]);
+  Socket raw(io, "127.0.0.1");
+  raw.send("early", listen);
+  const std::string second = "udp://127.0.0.1:" + raw.port() + "?listen=" + listen;
+  const auto other = open_carrier(io, second, Role::host, links[1].at_host);
+  ASSERT_TRUE(run_until(io, [&] { return links[0].host->counters().rx_foreign == 1; }));
+  EXPECT_TRUE(links[0].at_host.datagrams.empty());
+}
+
+TEST_F(UdpTwoBoardsTest, MustNotBeTheSame) {
+  open_board(links[0], "127.0.0.1");
+  open_host(links[0]);
+  const auto error =
+      error_of([&] { open_carrier(io, url(links[0]), Role::host, links[1].at_host); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->kind(), ErrorKind::open);
+  EXPECT_EQ(error->problem().reason, "this program has that board open already");
+  EXPECT_FALSE(error->problem().fix.empty());
+  links[0].host->close();
+  open_carrier(io, url(links[0]), Role::host, links[1].at_host);
+}
+
+TEST_F(UdpTwoBoardsTest, KeepThePortFromOtherPrograms) {
+  open_board(links[0], "127.0.0.1");
+  open_board(links[1], "127.0.0.2");
+  for (Link& link : links) open_host(link);
+  const auto tries_to_share = [&](const char* address) {
+    udp::socket other(io, udp::v4());
+    other.set_option(udp::socket::reuse_address(true));
+    asio::error_code error;
+    other.bind(udp::endpoint(asio::ip::make_address(address),
+                             static_cast<unsigned short>(std::stoi(listen))),
+               error);
+    return error;
+  };
+  EXPECT_EQ(tries_to_share("0.0.0.0"), asio::error::address_in_use);
+  EXPECT_EQ(tries_to_share("127.0.0.1"), asio::error::address_in_use);
+  links[0].host->close();
+  EXPECT_EQ(tries_to_share("0.0.0.0"), asio::error::address_in_use) << "the second is still there";
+  links[1].host->close();
+  EXPECT_FALSE(tries_to_share("0.0.0.0"));
+}
+
+// The system tells a connected socket that its board is off, and that costs no datagram.
+TEST_F(UdpTwoBoardsTest, OfWhichTheSecondIsOff) {
+  open_board(links[0], "127.0.0.1");
+  open_host(links[0]);
+  const std::string port = Socket(io, "127.0.0.1").port();
+  Link& off = links[1];
+  off.host =
+      open_carrier(io, "udp://127.0.0.1:" + port + "?listen=" + listen, Role::host, off.at_host);
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_EQ(off.host->send("is anybody there", Priority::normal), SendResult::sent);
+    run_for(io, std::chrono::milliseconds(1));
+  }
+  EXPECT_EQ(off.host->send("is anybody there", Priority::normal), SendResult::sent);
+  EXPECT_TRUE(off.host->up());
+  off.board = open_carrier(io, "udp://127.0.0.1:" + port, Role::board, off.at_board);
+  EXPECT_EQ(off.host->send("now", Priority::normal), SendResult::sent);
+  EXPECT_TRUE(run_until(io, [&] { return off.at_board.has("now"); }));
+  EXPECT_EQ(off.at_host.events.size(), 1U);
+}
+
+// As r4::Board has it: a loop and a thread for each.
+TEST_F(UdpTwoBoardsTest, OpenAndCloseInThreadsOfTheirOwn) {
+  const auto worker = [this](const char* address) {
+    asio::io_context own;
+    Recorder at_board, at_host;
+    const auto board =
+        open_carrier(own, std::string("udp://") + address + ":0", Role::board, at_board);
+    const auto host =
+        Registry::standard().make(own, board->name() + "?listen=" + listen, Role::host);
+    int heard = 0;
+    for (int i = 0; i < 100; ++i) {
+      const std::string text = valid(std::to_string(i));
+      host->open(at_host);
+      // On its way to a socket that closes or opens there it may be lost.
+      const auto arrives = [&](Carrier& from, const Recorder& at) {
+        for (int tries = 0; tries < 1000; ++tries) {
+          from.send(text, Priority::normal);
+          const auto heard_it = [&] { return at.has(text); };
+          if (run_until(own, heard_it, std::chrono::milliseconds(5))) return true;
+        }
+        return false;
+      };
+      if (arrives(*host, at_board) && arrives(*board, at_host)) ++heard;
+      host->close();
+    }
+    return heard;
+  };
+  auto first = std::async(std::launch::async, worker, "127.0.0.1");
+  auto second = std::async(std::launch::async, worker, "127.0.0.2");
+  EXPECT_EQ(first.get(), 100);
+  EXPECT_EQ(second.get(), 100);
+}
+
+// In a child process only, because a process cannot come back from there.
+bool enter_a_network_of_our_own() {
+  return ::unshare(CLONE_NEWNET) == 0 || ::unshare(CLONE_NEWUSER | CLONE_NEWNET) == 0;
+}
+
+// Gives an interface of that network, the loopback or an alias of it, an address, or takes it away.
+bool set_address(const char* interface, const char* dotted) {
+  const FileDescriptor control(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  ifreq request{};
+  std::snprintf(request.ifr_name, sizeof request.ifr_name, "lo");
+  request.ifr_flags = IFF_UP;
+  if (::ioctl(control.get(), SIOCSIFFLAGS, &request) != 0) return false;
+  std::snprintf(request.ifr_name, sizeof request.ifr_name, "%s", interface);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  ::inet_pton(AF_INET, dotted, &address.sin_addr);
+  std::memcpy(&request.ifr_addr, &address, sizeof address);
+  return ::ioctl(control.get(), SIOCSIFADDR, &request) == 0;
+}
+bool set_loopback(bool on) { return set_address("lo", on ? "127.0.0.1" : "0.0.0.0"); }
+
+int lose_and_regain_the_network() {
+  if (!enter_a_network_of_our_own()) return 10;
+  asio::io_context io;
+  Recorder at_board, at_host;
+  const std::string url = "udp://127.0.0.1:20180";
+  const auto error = error_of([&] { open_carrier(io, url, Role::host, at_host); });
+  if (!error || error->kind() != ErrorKind::open || error->problem().fix.empty()) return 11;
+  if (!set_loopback(true)) return 12;
+  const auto board = open_carrier(io, url, Role::board, at_board);
+  const auto host = open_carrier(io, url, Role::host, at_host);
+  host->send("1", Priority::normal);
+  if (!run_until(io, [&] { return at_board.has("1"); })) return 13;
+
+  if (!set_loopback(false)) return 14;
+  const auto lost = Clock::now();
+  if (host->send("2", Priority::normal) != SendResult::down) return 15;
+  if (!run_until(io, [&] { return at_host.count(Kind::down) == 1; })) return 16;
+  if (host->up() || at_host.last(Kind::down)->problem.fix.empty()) return 17;
+  std::printf("[ network lost: reported after %.2f ms ]\n",
+              in_milliseconds(at_host.last(Kind::down)->when - lost));
+  if (at_host.last(Kind::down)->when - lost > std::chrono::milliseconds(50)) return 18;
+
+  if (!set_loopback(true)) return 19;
+  const auto back = Clock::now();
+  if (!run_until(io, [&] { return at_host.count(Kind::up) == 2; })) return 20;
+  std::printf("[ network back: reported after %.2f ms ]\n",
+              in_milliseconds(at_host.last(Kind::up)->when - back));
+  if (at_host.last(Kind::up)->when - back > std::chrono::seconds(1)) return 21;
+  host->send("3", Priority::normal);
+  if (!run_until(io, [&] { return at_board.has("3"); })) return 22;
+  return host->counters().downs == 1 && host->counters().ups == 2 ? 0 : 23;
+}
+
+TEST(UdpNetwork, IsReportedWhenLostAndComesBackByItself) {
+  EXPECT_EQ(run_in_child(lose_and_regain_the_network), 0);
+}
+
+// Two boards at one port of the host, and the second's network is lost for half a second.
+int lose_the_network_of_the_second() {
+  constexpr const char* second_interface = "lo:1";
+  constexpr const char* second_address = "10.9.0.1";
+  if (!enter_a_network_of_our_own() || !set_loopback(true)) return 10;
+  if (!set_address(second_interface, second_address)) return 11;
+  asio::io_context io;
+  Recorder at_board[2], at_host[2];
+  std::unique_ptr<Carrier> board[2], host[2];
+  for (const std::size_t which : {0U, 1U}) {
+    const std::string url =
+        fmt::format("udp://{}:20180", which == 0 ? "127.0.0.1" : second_address);
+    board[which] = open_carrier(io, url, Role::board, at_board[which]);
+    host[which] = open_carrier(io, url, Role::host, at_host[which]);
+    at_board[which].then = [&board, which](const Recorder::Datagram& asked) {
+      board[which]->send(asked.text, Priority::normal, asked.from);
+    };
+  }
+  const auto answers = [&](std::size_t which, const std::string& text) {
+    host[which]->send(valid(text), Priority::normal);
+    return run_until(io, [&] { return at_host[which].has(valid(text)); });
+  };
+  if (!answers(0, "both") || !answers(1, "both")) return 12;
+
+  if (!set_address(second_interface, "0.0.0.0")) return 13;
+  if (host[1]->send("into the void", Priority::normal) != SendResult::down) return 14;
+  const auto lost = Clock::now();
+  for (int i = 0; Clock::now() - lost < std::chrono::milliseconds(500); ++i) {
+    if (!answers(0, std::to_string(i))) return 15;
+  }
+  if (host[1]->up() || host[1]->counters().rx_foreign != 0) return 16;
+
+  if (!set_address(second_interface, second_address)) return 17;
+  if (!run_until(io, [&] { return host[1]->up(); })) return 18;
+  return answers(0, "again") && answers(1, "again") ? 0 : 19;
+}
+
+TEST(UdpNetwork, OfASecondBoardIsLostAndTheFirstIsHeardAllTheWhile) {
+  EXPECT_EQ(run_in_child(lose_the_network_of_the_second), 0);
+}
+
+}  // namespace
+}  // namespace r4::test

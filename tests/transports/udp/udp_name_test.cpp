@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A board by its name: how a UDP carrier finds its address, and finds it again.
+#include <gtest/gtest.h>
+
+#include <asio/post.hpp>
+#include <condition_variable>
+#include <mutex>
+
+#include "../recorder.hpp"
+#include "tests/support/datagrams.hpp"
+#include "transports/udp/udp_carrier.hpp"
+
+namespace r4::test {
+namespace {
+
+using std::chrono::milliseconds;
+
+// A name server of the test's. What asks it may outlive the test.
+class Names {
+ public:
+  // Where the host is from now on; "": nowhere.
+  void set(const std::string& address) {
+    const std::lock_guard lock(shared_->mutex);
+    shared_->found = FoundHost();
+    if (address.empty()) {
+      shared_->found.reason = "not known";
+    } else {
+      shared_->found.addresses = {asio::ip::make_address(address)};
+    }
+  }
+  // Lets who asks wait.
+  void hang(bool on) {
+    const std::lock_guard lock(shared_->mutex);
+    shared_->hangs = on;
+    shared_->changed.notify_all();
+  }
+  int asked() const {
+    const std::lock_guard lock(shared_->mutex);
+    return shared_->asked;
+  }
+  HostLookup::Resolve resolve() const {
+    return [shared = shared_](const std::string&) {
+      std::unique_lock lock(shared->mutex);
+      ++shared->asked;
+      shared->changed.wait(lock, [&] { return !shared->hangs; });
+      return shared->found;
+    };
+  }
+  ~Names() { hang(false); }
+
+ private:
+  struct Shared {
+    std::mutex mutex;
+    std::condition_variable changed;
+    FoundHost found;
+    bool hangs = false;
+    int asked = 0;
+  };
+  std::shared_ptr<Shared> shared_ = std::make_shared<Shared>();
+};
+
+std::string valid(const std::string& name) { return with_crc(name + ":;"); }
+
+class UdpNameTest : public testing::Test {
+ protected:
+  UdpNameTest() {
+    names.set("127.0.0.1");
+    lookup.resolve = names.resolve();
+    lookup.retry = lookup.silence = milliseconds(10);
+    board = open_carrier(io, "udp://127.0.0.1:0", Role::board, at_board);
+    port = board->name().substr(board->name().rfind(':') + 1);
+  }
+  std::unique_ptr<Carrier> make() {
+    const Url url = Url::parse("udp://board.test:" + port + "?listen=0");
+    return make_udp_carrier_with(io, url, Role::host, lookup);
+  }
+  // Opens it in a handler of the loop.
+  void open_in_loop() {
+    host = make();
+    asio::post(io, [this] { host->open(at_host); });
+  }
+  void expect_link() {
+    const std::string text = valid("question" + std::to_string(++questions));
+    host->send(text, Priority::normal);
+    EXPECT_TRUE(run_until(io, [&] { return at_board.has(text); }));
+  }
+
+  asio::io_context io;
+  Names names;
+  HostLookup lookup;
+  Recorder at_board, at_host;
+  std::string port;
+  std::unique_ptr<Carrier> board, host;
+  int questions = 0;
+};
+
+TEST_F(UdpNameTest, IsKnownWhenOpenReturnsOutsideOfTheLoop) {
+  host = make();
+  host->open(at_host);
+  EXPECT_TRUE(host->up());
+  EXPECT_EQ(at_host.count(Kind::up), 1U);
+  EXPECT_EQ(host->name().find("udp://board.test:" + port), 0U);
+  expect_link();
+  EXPECT_EQ(names.asked(), 1);
+}
+
+TEST_F(UdpNameTest, IsWaitedForOnlySoLong) {
+  names.hang(true);
+  lookup.patience = milliseconds(20);
+  host = make();
+  const auto begun = Clock::now();
+  const auto error = error_of([&] { host->open(at_host); });
+  EXPECT_LT(Clock::now() - begun, patience);
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->kind(), ErrorKind::open);
+  EXPECT_NE(error->problem().reason.find("no name server answers"), std::string::npos);
+  EXPECT_FALSE(error->problem().fix.empty());
+}
+
+TEST_F(UdpNameTest, HoldsUpNobodyOnTheLoop) {
+  names.hang(true);
+  open_in_loop();
+  Recorder at_other;
+  const auto other = open_carrier(io, board->name() + "?listen=0", Role::host, at_other);
+  other->send(valid("meanwhile"), Priority::normal);
+  ASSERT_TRUE(
+      run_until(io, [&] { return at_board.has(valid("meanwhile")) && names.asked() == 1; }));
+  EXPECT_FALSE(host->up());
+  EXPECT_TRUE(at_host.events.empty());
+  EXPECT_EQ(host->send("too early", Priority::normal), SendResult::down);
+  names.hang(false);
+  ASSERT_TRUE(run_until(io, [&] { return host->up(); }));
+  EXPECT_EQ(at_host.count(Kind::up), 1U);
+  EXPECT_EQ(at_host.count(Kind::down), 0U);
+  expect_link();
+}
+
+TEST_F(UdpNameTest, IsAskedForUntilItIsKnown) {
+  names.set("");
+  open_in_loop();
+  ASSERT_TRUE(run_until(io, [&] { return names.asked() >= 5; }));
+  ASSERT_EQ(at_host.count(Kind::down), 1U) << "told once";
+  const Problem& problem = at_host.last(Kind::down)->problem;
+  EXPECT_EQ(problem.reason, "there is no host 'board.test' (not known)");
+  EXPECT_FALSE(problem.fix.empty());
+  names.set("127.0.0.1");
+  ASSERT_TRUE(run_until(io, [&] { return host->up(); }));
+  expect_link();
+}
+
+TEST_F(UdpNameTest, IsLookedUpAgainWhenTheBoardIsSilentAndFollowed) {
+  host = make();
+  host->open(at_host);
+  expect_link();
+  Recorder at_new_place;
+  const auto moved = open_carrier(io, "udp://127.0.0.2:" + port, Role::board, at_new_place);
+  board->close();
+  names.set("127.0.0.2");
+  ASSERT_TRUE(run_until(io, [&] { return at_host.count(Kind::warning) == 1; }));
+  EXPECT_EQ(at_host.last(Kind::warning)->problem.reason,
+            "the board is at 127.0.0.2 now; it was at 127.0.0.1");
+  EXPECT_EQ(at_host.count(Kind::down), 0U);
+  host->send(valid("there"), Priority::normal);
+  ASSERT_TRUE(run_until(io, [&] { return at_new_place.has(valid("there")); }));
+  moved->send("answer", Priority::normal);
+  EXPECT_TRUE(run_until(io, [&] { return at_host.has("answer"); }));
+}
+
+TEST_F(UdpNameTest, StaysWhileTheNameIsGone) {
+  host = make();
+  host->open(at_host);
+  names.set("");
+  const int before = names.asked();
+  ASSERT_TRUE(run_until(io, [&] { return names.asked() > before + 2; }));
+  EXPECT_TRUE(host->up());
+  EXPECT_EQ(at_host.events.size(), 1U);
+  expect_link();
+}
+
+TEST_F(UdpNameTest, IsNotLookedUpAgainWhileTheBoardIsHeard) {
+  lookup.silence = milliseconds(50);
+  host = make();
+  host->open(at_host);
+  host->send(valid("hello"), Priority::normal);
+  ASSERT_TRUE(run_until(io, [&] { return at_board.has(valid("hello")); }));
+  // Only what is valid counts.
+  const auto speak = [&](const std::string& text, int times) {
+    for (int i = 0; i < times; ++i) {
+      board->send(text, Priority::normal);
+      run_for(io, milliseconds(5));
+    }
+  };
+  speak(valid("state"), 60);
+  EXPECT_EQ(names.asked(), 1);
+  speak("noise", 60);
+  EXPECT_GE(names.asked(), 2);
+}
+
+TEST_F(UdpNameTest, IsForgottenWithTheCarrier) {
+  names.hang(true);
+  open_in_loop();
+  ASSERT_TRUE(run_until(io, [&] { return names.asked() == 1; }));
+  host->close();
+  names.hang(false);
+  run_for(io, milliseconds(20));
+  EXPECT_TRUE(at_host.events.empty());
+  EXPECT_EQ(names.asked(), 1);
+  open_in_loop();
+  EXPECT_TRUE(run_until(io, [&] { return host->up(); }));
+}
+
+TEST_F(UdpNameTest, MayBeAnsweredWhenNothingIsLeft) {
+  names.hang(true);
+  {
+    asio::io_context own;
+    const Url url = Url::parse("udp://board.test:" + port + "?listen=0");
+    const auto carrier = make_udp_carrier_with(own, url, Role::host, lookup);
+    asio::post(own, [&] { carrier->open(at_host); });
+    ASSERT_TRUE(run_until(own, [&] { return names.asked() == 1; }));
+  }
+  names.hang(false);
+}
+
+TEST_F(UdpNameTest, OfThisComputerIsKnownToTheSystem) {
+  host = open_carrier(io, "udp://localhost:" + port + "?listen=0", Role::host, at_host);
+  expect_link();
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 bus: does a planned CAN bus carry its boards? And how full is a real one (bus_live.hpp)?
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "bus_live.hpp"
+#include "bus_plan.hpp"
+#include "../shell/json.hpp"
+#include "../shell/options.hpp"
+#include "protocol/messages/command.hpp"
+#include "../shell/subcommands.hpp"
+#include "transports/error.hpp"
+#include "transports/framing/can/can_ids.hpp"
+
+namespace r4::tool {
+namespace {
+
+constexpr double full = 1.0;
+constexpr double nearly_full = 0.8;  // room for retransmissions, and for what was forgotten
+constexpr std::uint64_t usual_bit_rate = 1000000;
+constexpr std::uint64_t usual_data_rate = 5000000;
+
+struct Options {
+  std::uint64_t boards = 8;
+  std::uint64_t rate = 100;
+  std::uint64_t commands = 20;
+  std::string fields = "DEFAULT,SAFE,CMD";
+  std::optional<std::uint64_t> bit_rate;
+  std::optional<std::uint64_t> data_bit_rate;
+  bool fd = false;
+  bool packed = false;
+  bool json = false;
+  std::optional<std::string> url;
+  std::optional<Milliseconds> duration;
+};
+
+BusPlan plan_of(const Options& options) {
+  const std::uint64_t bit_rate = options.bit_rate.value_or(usual_bit_rate);
+  const std::uint64_t data_rate = options.data_bit_rate.value_or(usual_data_rate);
+  if (options.data_bit_rate && !options.fd) {
+    throw Error(ErrorKind::usage, fmt::format("--dbitrate {}", data_rate),
+                "classic frames have one bit rate only", "add --fd, or leave it out");
+  }
+  if (options.fd && data_rate < bit_rate) {
+    throw Error(ErrorKind::usage, fmt::format("--dbitrate {}", data_rate),
+                "is below the nominal bit rate",
+                fmt::format("write {} or more, or a lower --bitrate", bit_rate));
+  }
+  BusPlan plan;
+  plan.boards = static_cast<std::uint32_t>(options.boards);
+  plan.states_hz = static_cast<std::uint32_t>(options.rate);
+  plan.commands_hz = static_cast<std::uint32_t>(options.commands);
+  parse_fields(Text(options.fields), plan.fields);  // checked when it was read
+  plan.bit_rate.nominal = static_cast<std::uint32_t>(bit_rate);
+  plan.bit_rate.data = options.fd ? static_cast<std::uint32_t>(data_rate) : 0;
+  plan.packed = options.packed;
+  return plan;
+}
+
+std::string bit_rate_text(std::uint32_t rate) {
+  return rate % 1000000 == 0 ? fmt::format("{} Mbit/s", rate / 1000000)
+                             : fmt::format("{} kbit/s", rate / 1000.0);
+}
+
+std::string counted(std::uint32_t count, const char* one) {
+  return fmt::format("{} {}{}", count, one, count == 1 ? "" : "s");
+}
+
+std::string plan_text(const BusPlan& plan, const Options& options) {
+  const bool fd = plan.bit_rate.data != 0;
+  return fmt::format("{}, {} at {} Hz, {} form, {} at {}{}", counted(plan.boards, "board"),
+                     options.fields, plan.states_hz, plan.packed ? "packed" : "plain",
+                     fd ? "CAN FD" : "classic CAN", bit_rate_text(plan.bit_rate.nominal),
+                     fd ? " and " + bit_rate_text(plan.bit_rate.data) : "");
+}
+
+void print_row(const BusTraffic& row) {
+  fmt::print("{:<16}{:>10.0f}{:>8.1f}{:>10.0f}{:>11.0f}{:>9.1f} %{:>8.1f} %\n", row.name,
+             row.datagrams, row.bytes, row.frames, row.bits, 100 * row.load, 100 * row.worst_load);
+}
+
+void print_table(const BusPlan& plan, const Options& options, const BusLoad& load) {
+  fmt::print("{}\n\n", plan_text(plan, options));
+  fmt::print("{:<16}{:>10}{:>8}{:>10}{:>11}{:>11}{:>10}\n", "", "datagrams", "bytes", "frames",
+             "bits", "load", "worst");
+  fmt::print("{:<16}{:>10}{:>8}{:>10}{:>11}\n", "", "/s", "of one", "/s", "/s");
+  for (const BusTraffic& row : load.traffic) print_row(row);
+  print_row(load.total);
+  const std::uint32_t boards = most_boards(plan, nearly_full);
+  const std::uint32_t rate = highest_rate(plan, nearly_full);
+  fmt::print("\nWith 20 % to spare this bus carries {} at {} Hz{}.\n",
+             boards == 0 ? "no board" : counted(boards, "board"), plan.states_hz,
+             rate == 0 ? "" : fmt::format(", or {} at {} Hz", counted(plan.boards, "board"), rate));
+}
+
+Json row_json(const BusTraffic& row) {
+  return {{"type", "traffic"},          {"name", row.name},
+          {"datagrams", row.datagrams}, {"bytes", row.bytes},
+          {"frames", row.frames},       {"bits", row.bits},
+          {"load", row.load},           {"worst_load", row.worst_load}};
+}
+
+void print_json(const BusPlan& plan, const BusLoad& load) {
+  for (const BusTraffic& row : load.traffic) print_line(row_json(row));
+  Json bus = row_json(load.total);
+  bus["type"] = "bus";
+  bus["boards"] = plan.boards;
+  bus["packed"] = plan.packed;
+  bus["bitrate"] = plan.bit_rate.nominal;
+  bus["dbitrate"] = plan.bit_rate.data;
+  bus["most_boards"] = most_boards(plan, nearly_full);
+  bus["highest_rate"] = highest_rate(plan, nearly_full);
+  bus["fits"] = load.total.load <= full;
+  print_line(bus);
+}
+
+// What would make room.
+std::string remedy(const BusPlan& plan) {
+  if (!plan.packed)
+    return "add --packed (C:pack,1 on the boards), or fewer boards, fields or states";
+  if (plan.bit_rate.data == 0) return "fewer boards, fields or states, or CAN FD (--fd)";
+  return "fewer boards, fields or states, or a second bus";
+}
+
+int live(const Options& options) {
+  LiveBusOptions bus;
+  bus.url = *options.url;
+  bus.json = options.json;
+  bus.duration = options.duration;
+  if (options.bit_rate) bus.bit_rate = static_cast<std::uint32_t>(*options.bit_rate);
+  if (options.data_bit_rate) bus.data_bit_rate = static_cast<std::uint32_t>(*options.data_bit_rate);
+  show_live_bus(bus, nearly_full);
+  return 0;
+}
+
+int bus(const Options& options) {
+  if (options.url) return live(options);
+  if (options.duration) {
+    throw Error(ErrorKind::usage, "--duration", "is for a real bus", "name it, as in can://can0");
+  }
+  const BusPlan plan = plan_of(options);
+  const BusLoad load = load_of(plan);
+  if (options.json) {
+    print_json(plan, load);
+  } else {
+    print_table(plan, options, load);
+  }
+  const std::string taken = fmt::format("{:.1f} % of its time", 100 * load.total.load);
+  if (load.total.load > full) {
+    throw Error(ErrorKind::data, "the bus", "would need " + taken, remedy(plan));
+  }
+  if (load.total.load > nearly_full) {
+    std::fflush(stdout);
+    fmt::print(stderr, "r4: warning: the bus: nearly full, {} is taken; {}\n", taken, remedy(plan));
+  }
+  return 0;
+}
+
+constexpr const char* footer = R"(Examples:
+  r4 bus --packed               eight boards on a classic bus of 1 Mbit/s, in the packed form
+  r4 bus --boards 2             two boards in the plain form
+  r4 bus --boards 8 --fd        eight in the plain form on CAN FD
+  r4 bus --boards 3 --packed --bitrate 500000 --rate 50 --fields DEFAULT,ENC1,ENC2
+
+  r4 bus can://can0             a real bus: what is on it, per id, by listening
+
+Of a plan: besides states and commands the link has 2 heartbeats a second from each board and 10 to it. What
+goes to a board is answered by a frame of flow control, which is counted with it.
+
+load is the part of the bus's time that is taken: the frames of boards that drive, counted to the
+bit. worst is the longest values and the most stuff bits that there can be, all at once. A warning
+comes above 80 % of load: damaged frames are sent again, and what has a high id waits for longer.
+
+Of a real bus: on a terminal the last second, redrawn until Ctrl-C; else, or with --duration, one table.
+Its bit rates are the controller's. Where that does not tell (slcan), and for a virtual bus, they are those of
+--bitrate, else 1 Mbit/s, and, for CAN FD frames that switch, --dbitrate; if one is missing, that is told.
+
+Exit codes: 0 it fits; 1 it does not, more than 100 %; 2 an option is wrong; 4, 5, 6 the interface
+cannot be opened.)";
+
+}  // namespace
+
+void add_bus(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* const command = add_subcommand(
+      root, chosen, "bus", "The load of a CAN bus: of a planned one, or of one that is there",
+      footer, options, bus);
+  add_text(
+      *command, "URL", [options](const std::string& url) { options->url = url; },
+      "a real bus, such as can://can0; without: a plan", url_type, Need::optional);
+  add_number(*command, "--boards", options->boards, 1, can_nodes, "boards on the bus (default 8)");
+  add_number(*command, "--rate", options->rate, 1, 1000,
+             "states a second of each board (default 100)");
+  add_fields(*command, options->fields,
+             "state fields (default DEFAULT,SAFE,CMD, as our host asks; arming adds RELAYS)");
+  add_number(*command, "--commands", options->commands, 0, 1000,
+             "commands a second to each board (default 20)");
+  add_number(*command, "--bitrate", options->bit_rate, 10000, 1000000,
+             "bit/s, with --fd of the nominal phase (default 1000000)");
+  add_flag(*command, "--fd", options->fd, "CAN FD with frames of up to 64 bytes");
+  add_number(*command, "--dbitrate", options->data_bit_rate, 10000, 8000000,
+             "bit/s of the data phase, with --fd (default 5000000)");
+  add_flag(*command, "--packed", options->packed, "the packed form (C:pack,1)");
+  exclude(*command, "URL", {"--boards", "--rate", "--fields", "--commands", "--fd", "--packed"});
+  add_seconds(*command, "--duration", options->duration, "how long to listen to a real bus");
+  add_json(*command, options->json, "print JSON, one object a line");
+}
+
+}  // namespace r4::tool

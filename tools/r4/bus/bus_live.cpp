@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bus_live.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <asio/io_context.hpp>
+#include <asio/signal_set.hpp>
+#include <asio/steady_timer.hpp>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "../shell/json.hpp"
+#include "../shell/output.hpp"
+#include "transports/can/can_interface.hpp"
+#include "transports/can/can_listener.hpp"
+#include "transports/url.hpp"
+
+namespace r4::tool {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr Milliseconds usual_duration{5000};
+constexpr Milliseconds interval{1000};
+constexpr std::uint32_t usual_bit_rate = 1000000;
+
+std::string meaning_of_id(std::uint32_t id) {
+  if (id == CanSurvey::extended_ids) return "ids of 29 bits";
+  const CanIdMeaning meaning = classify(id);
+  switch (meaning.kind) {
+    case CanIdKind::emergency_stop:
+      return "emergency stop";
+    case CanIdKind::went_safe:
+      return fmt::format("board {} went safe", meaning.node);
+    case CanIdKind::command:
+      return fmt::format("host to board {}", meaning.node);
+    case CanIdKind::reply:
+      return fmt::format("answers of board {}", meaning.node);
+    case CanIdKind::telemetry:
+      return fmt::format("states of board {}", meaning.node);
+    case CanIdKind::other:
+      break;
+  }
+  return "not R4's";
+}
+
+// What passed since the last look.
+struct Window {
+  std::map<std::uint32_t, CanTraffic> traffic;
+  CanTraffic total;
+  double seconds = 0;
+
+  double load(const CanTraffic& part) const {
+    return static_cast<double>(part.busy_ns) / (seconds * 1e9);
+  }
+};
+
+class LiveBus {
+ public:
+  LiveBus(const LiveBusOptions& options, double nearly_full)
+      : options_(options),
+        nearly_full_(nearly_full),
+        interface_(interface_of(options.url)),
+        rate_{rate_of("--bitrate", options.bit_rate, interface_.bit_rate, usual_bit_rate),
+              rate_of("--dbitrate", options.data_bit_rate, interface_.data_bit_rate, 0)},
+        listener_(io_, interface_.name, checked(rate_)),
+        signals_(io_, SIGINT, SIGTERM),
+        timer_(io_),
+        live_(!options.json && !options.duration && ::isatty(STDOUT_FILENO) != 0) {}
+
+  void run() {
+    // A table of what is shows what is; a report of a while also what was.
+    listener_.on_event([this](const CarrierEvent& event) {
+      if (listener_.in_trouble()) {
+        problem_ = event.problem.text();
+      } else if (live_) {
+        problem_.clear();
+      }
+    });
+    signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
+    wait();
+    io_.run();
+    if (live_) return;
+    const Window window = look();
+    if (options_.json) {
+      print_json(window);
+    } else {
+      for (const std::string& row : table(window)) print_text(row + "\n");
+    }
+    std::fflush(stdout);
+    for (const std::string& trouble : troubles()) fmt::print(stderr, "r4: warning: {}\n", trouble);
+    if (window.load(window.total) > nearly_full_) {
+      fmt::print(stderr, "r4: warning: {}\n", fullness(window));
+    }
+  }
+
+ private:
+  static CanInterface interface_of(const std::string& text) {
+    const Url url = Url::parse(text);
+    const std::string& name = can_interface_of(url);
+    if (text.find('?') != std::string::npos) {
+      throw Error(ErrorKind::usage, text, "all that is on a bus is counted, not a board",
+                  fmt::format("write can://{}", name));
+    }
+    return can_interface(name);
+  }
+  std::uint32_t rate_of(const char* option, const std::optional<std::uint32_t>& given,
+                        std::uint32_t known, std::uint32_t usual) const {
+    if (known != 0 && given && *given != known) {
+      throw Error(ErrorKind::usage, fmt::format("{} {}", option, *given),
+                  fmt::format("the controller of {} is set to {}", interface_.name, known),
+                  "leave the option out");
+    }
+    return known != 0 ? known : given.value_or(usual);
+  }
+  const CanBitRate& checked(const CanBitRate& rate) const {
+    if (rate.data != 0 && !interface_.fd && interface_.exists) {
+      throw Error(ErrorKind::usage, fmt::format("--dbitrate {}", rate.data),
+                  interface_.name + " is not set up for CAN FD", "leave the option out");
+    }
+    if (rate.data != 0 && rate.data < rate.nominal) {
+      throw Error(ErrorKind::usage, fmt::format("--dbitrate {}", rate.data),
+                  "is below the nominal bit rate",
+                  fmt::format("write {} or more, or a lower --bitrate", rate.nominal));
+    }
+    return rate;
+  }
+
+  void wait() {
+    timer_.expires_after(live_ ? interval : options_.duration.value_or(usual_duration));
+    timer_.async_wait([this](const std::error_code& error) {
+      if (error) return;
+      if (!live_) return io_.stop();
+      if (output_has_room()) {
+        const Window window = look();
+        std::vector<std::string> rows = table(window);
+        if (window.load(window.total) > nearly_full_)
+          rows.push_back("warning: " + fullness(window));
+        for (const std::string& trouble : troubles()) rows.push_back(trouble);
+        screen_.draw(std::move(rows));
+      }
+      wait();
+    });
+  }
+
+  Window look() {
+    Window window;
+    const Clock::time_point now = Clock::now();
+    window.seconds = std::chrono::duration<double>(now - std::exchange(looked_, now)).count();
+    for (const auto& [id, traffic] : listener_.survey().traffic()) {
+      CanTraffic& before = before_[id];
+      const CanTraffic part{traffic.frames - before.frames, traffic.bits - before.bits,
+                            traffic.busy_ns - before.busy_ns};
+      before = traffic;
+      window.total.frames += part.frames;
+      window.total.bits += part.bits;
+      window.total.busy_ns += part.busy_ns;
+      window.traffic[id] = part;
+    }
+    return window;
+  }
+
+  std::vector<std::string> table(const Window& window) const {
+    std::vector<std::string> rows;
+    rows.push_back(fmt::format("{} at {} kbit/s, {:.1f} s", options_.url, rate_.nominal / 1000.0,
+                               window.seconds));
+    rows.emplace_back();
+    rows.push_back(fmt::format("{:<26}{:>12}{:>12}{:>11}", "id", "frames/s", "bit/s", "load"));
+    const auto add = [&](const std::string& name, const CanTraffic& part) {
+      rows.push_back(fmt::format("{:<26}{:>12.0f}{:>12.0f}{:>9.1f} %", name,
+                                 static_cast<double>(part.frames) / window.seconds,
+                                 static_cast<double>(part.bits) / window.seconds,
+                                 100 * window.load(part)));
+    };
+    for (const auto& [id, part] : window.traffic) {
+      const std::string number = id > max_can_id ? "" : fmt::format("{:03X}  ", id);
+      add(number + meaning_of_id(id), part);
+    }
+    add("total", window.total);
+    return rows;
+  }
+
+  void print_json(const Window& window) const {
+    const auto object = [&](const char* type, const CanTraffic& part) {
+      return Json{{"type", type},
+                  {"frames", static_cast<double>(part.frames) / window.seconds},
+                  {"bits", static_cast<double>(part.bits) / window.seconds},
+                  {"load", window.load(part)}};
+    };
+    for (const auto& [id, part] : window.traffic) {
+      Json row = object("traffic", part);
+      row["id"] = id > max_can_id ? Json() : Json(id);
+      row["name"] = meaning_of_id(id);
+      print_line(row);
+    }
+    Json bus = object("bus", window.total);
+    bus["transport"] = options_.url;
+    bus["seconds"] = window.seconds;
+    bus["bitrate"] = rate_.nominal;
+    bus["dbitrate"] = rate_.data;
+    bus["nearly_full"] = window.load(window.total) > nearly_full_;
+    print_line(bus);
+  }
+
+  std::vector<std::string> troubles() const {
+    std::vector<std::string> found;
+    if (!problem_.empty()) found.push_back(problem_);
+    if (interface_.has_controller && interface_.bit_rate == 0 && !options_.bit_rate) {
+      found.push_back(fmt::format(
+          "{}: the interface does not tell its bit rate, and is taken for one of {} kbit/s; add "
+          "--bitrate",
+          options_.url, rate_.nominal / 1000.0));
+    }
+    if (rate_.data == 0 && listener_.heard_rate_switch()) {
+      found.push_back(fmt::format(
+          "{}: CAN FD frames switch their bit rate, but are counted at {} kbit/s to their end; add "
+          "--dbitrate, the rate of their data phase",
+          options_.url, rate_.nominal / 1000.0));
+    }
+    return found;
+  }
+
+  std::string fullness(const Window& window) const {
+    const double load = window.load(window.total);
+    return fmt::format(
+        "{}: {}, {:.1f} % of its time is taken; fewer boards, fields or states, or C:pack,1 on the "
+        "boards",
+        options_.url,
+        load > 1 ? fmt::format("more than a bus of {} kbit/s carries", rate_.nominal / 1000.0)
+                 : "nearly full",
+        100 * load);
+  }
+
+  const LiveBusOptions& options_;
+  const double nearly_full_;
+  const CanInterface interface_;
+  const CanBitRate rate_;
+  asio::io_context io_{1};
+  CanListener listener_;
+  asio::signal_set signals_;
+  asio::steady_timer timer_;
+  const bool live_;
+  Screen screen_;
+  std::string problem_;
+  Clock::time_point looked_ = Clock::now();
+  std::map<std::uint32_t, CanTraffic> before_;
+};
+
+}  // namespace
+
+void show_live_bus(const LiveBusOptions& options, double nearly_full) {
+  LiveBus(options, nearly_full).run();
+}
+
+}  // namespace r4::tool

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 key: makes a key, and gives it to a board over a cable.
+#include <fmt/format.h>
+
+#include <array>
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "host/board.hpp"
+#include "host/commands/command_help.hpp"
+#include "host/key_file.hpp"
+#include "../shell/key_file.hpp"
+#include "../shell/options.hpp"
+#include "../shell/subcommands.hpp"
+#include "transports/error.hpp"
+
+namespace r4::tool {
+namespace {
+
+struct Options {
+  std::string action;
+  std::string file;
+  std::string url;
+  std::optional<std::uint64_t> id;
+};
+
+int make(const Options& options) {
+  if (!options.url.empty()) {
+    throw Error(ErrorKind::usage, options.url, "a new key needs no board", "r4 key new FILE");
+  }
+  const auto id = static_cast<std::uint8_t>(options.id.value_or(1));
+  make_key_file(options.file, id);
+  fmt::print(
+      "{}: key {}\n"
+      "give it to the board over USB:   r4 key give {} serial:auto\n"
+      "then open the board with it:     r4 monitor udp://... --key {}\n",
+      options.file, id, options.file, options.file);
+  return 0;
+}
+
+int give(const Options& options) {
+  if (options.url.empty()) {
+    throw Error(ErrorKind::usage, "URL", "is missing", "r4 key give FILE serial:auto");
+  }
+  if (options.id) {
+    throw Error(ErrorKind::usage, fmt::format("--id {}", *options.id),
+                "a key has its id since it was made", "r4 key new FILE --id N");
+  }
+  require_cable(options.url, "the key in " + options.file);
+  const Key key = load_key(options.file);
+  std::array<char, key_text_size> text;
+  write_key(text.data(), key);
+  Board board(options.url);
+  // It need not be active: a board that is stopped takes a key, too.
+  board.setting("key", {text.data(), text.size()}, std::chrono::seconds{5});
+  fmt::print(
+      "the board has key {} now: from networks and buses it obeys only who has it, stops "
+      "excepted\n",
+      key.id);
+  return 0;
+}
+
+int keys(const Options& options) {
+  if (options.file.empty() || is_url(options.file)) {
+    throw Error(ErrorKind::usage, fmt::format("'{}'", options.file), "is no file",
+                options.action == "new" ? "r4 key new FILE" : "r4 key give FILE serial:auto");
+  }
+  return options.action == "new" ? make(options) : give(options);
+}
+
+constexpr const char* footer =
+    R"(A board with a key obeys only hosts that have it, too: with --key FILE, or R4_KEY=FILE in the
+environment, r4 signs its heartbeats and commands. An emergency stop needs no key. Whoever is at
+the board's USB cable needs none either, and can set one.
+
+A key has an id, 1 to 9; a board holds up to four. Give each host its own, so that one can be
+taken away: r4 send serial:auto C:key,2:off
+
+Examples:
+  r4 key new ~/.r4-key                  makes it, readable by you alone
+  r4 key give ~/.r4-key serial:auto     the board has it, and from now on asks for it
+  r4 send udp://192.168.0.125 R:1,On O:358,1,1 --key ~/.r4-key
+
+Exit codes: 0 done; 1 the file holds no key; 2 usage, also a URL that is no cable; 3 the board did not
+take it; 4, 5 the file or the transport cannot be opened.)";
+
+}  // namespace
+
+void add_key_command(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* const command = add_subcommand(
+      root, chosen, "key", "Make a key, and give it to a board", footer, options, keys);
+  add_text(
+      *command, "ACTION",
+      [options](const std::string& action) {
+        if (action != "new" && action != "give") {
+          throw Error(ErrorKind::usage, action, "is nothing to be done with a key",
+                      "use new or give");
+        }
+        options->action = action;
+      },
+      "new or give", "new|give", Need::required);
+  add_text(*command, "FILE", options->file, "the file with the key", file_type, Need::required);
+  add_text(*command, "URL", options->url, "give: where the board is, such as serial:auto",
+           url_type);
+  add_number(*command, "--id", options->id, 1, max_key_id, "new: its id (default 1)");
+}
+
+}  // namespace r4::tool

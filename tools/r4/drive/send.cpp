@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 send: commands in order, each confirmed by the board's own state before the next.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <asio/io_context.hpp>
+#include <asio/steady_timer.hpp>
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "../shell/help.hpp"
+#include "host/async_board.hpp"
+#include "host/commands/command_help.hpp"
+#include "host/explain.hpp"
+#include "host/session/limits.hpp"
+#include "../shell/json.hpp"
+#include "../shell/key_file.hpp"
+#include "../shell/options.hpp"
+#include "protocol/datagram/numbers.hpp"
+#include "../shell/subcommands.hpp"
+#include "transports/error.hpp"
+
+namespace r4::tool {
+namespace {
+
+struct Options {
+  std::string url;
+  std::vector<std::string> commands;
+  Milliseconds timeout{3000};
+  Milliseconds hold{0};
+  std::string key;
+  bool json = false;
+};
+
+// The command, checked; its texts are views of `text`.
+Command command_of(const std::string& text, const std::string& url) {
+  const Command command = parse_command_text(text);
+  if (command.kind == CommandKind::heartbeat) {
+    throw Error(ErrorKind::usage, text, "heartbeats are sent by themselves",
+                "use --hold to keep the link up");
+  }
+  require_cable(url, command);
+  return command;
+}
+
+// Does it turn a motor, which needs the motor supply?
+bool turns_a_motor(const Command& command) {
+  switch (command.kind) {
+    case CommandKind::osmc:
+    case CommandKind::dhb12:
+    case CommandKind::bldc:
+      return command.value != 0;
+    case CommandKind::stepper:
+      return true;
+    default:
+      return false;
+  }
+}
+
+bool sets(const Command& command, std::string_view key) {
+  return command.kind == CommandKind::setting && command.text == Text(key);
+}
+
+Milliseconds value_of(const Command& setting) {
+  std::uint32_t ms = 0;
+  parse_number(setting.text2, ms);  // checked with the command
+  return Milliseconds(ms);
+}
+
+// The board's timeout and heartbeat interval, given side by side in any order: one step, since the board
+// may refuse either alone.
+struct LinkTiming {
+  Milliseconds timeout{0};
+  Milliseconds heartbeat{0};
+};
+std::optional<LinkTiming> link_timing_at(const std::vector<Command>& commands, std::size_t i) {
+  if (i + 1 >= commands.size()) return std::nullopt;
+  const Command& a = commands[i];
+  const Command& b = commands[i + 1];
+  if (sets(a, "timeout") && sets(b, "heartbeat")) return LinkTiming{value_of(a), value_of(b)};
+  if (sets(a, "heartbeat") && sets(b, "timeout")) return LinkTiming{value_of(b), value_of(a)};
+  return std::nullopt;
+}
+
+// What a person types is deliberate: it is sent without being armed. Where a motor is to turn, the
+// board is to tell whether relay 1 is closed. Our heartbeats come so often that the shortest timeout
+// among the commands can live on them.
+BoardOptions board_options(const Options& options, const std::vector<Command>& commands) {
+  BoardOptions board_options = with_key(options.key);
+  board_options.session.arming = Arming::off;
+  if (std::any_of(commands.begin(), commands.end(), turns_a_motor)) {
+    board_options.session.fields = "DEFAULT,RELAYS";
+  }
+  for (const Command& command : commands) {
+    if (!sets(command, "timeout")) continue;
+    std::uint32_t& ours = board_options.session.timing.heartbeat_ms;
+    ours = std::min(ours, static_cast<std::uint32_t>(value_of(command).count() / 3));
+  }
+  return board_options;
+}
+
+class Sender {
+ public:
+  Sender(const Options& options, const std::vector<Command>& commands)
+      : options_(options),
+        commands_(commands),
+        board_(io_, options.url, board_options(options, commands)),
+        hold_(io_) {}
+
+  int run() {
+    board_.open();
+    send_next();
+    io_.run();
+    board_.close();
+    if (failure_) throw Error(*failure_);
+    return 0;
+  }
+
+ private:
+  void send_next() {
+    if (next_ == commands_.size()) {
+      hold_.expires_after(options_.hold);
+      hold_.async_wait([this](const std::error_code&) { io_.stop(); });
+      return;
+    }
+    const Command& command = commands_[next_];
+    const auto done = [this](const CommandResult& result) { on_result(result); };
+    if (const auto timing = link_timing_at(commands_, next_)) {
+      board_.async_link_timing(timing->timeout, timing->heartbeat, options_.timeout, done);
+    } else if (command.kind == CommandKind::stop) {
+      board_.async_stop(options_.timeout, done);
+    } else if (command.kind == CommandKind::identify) {
+      board_.async_identify(options_.timeout, done);
+    } else {
+      board_.async_send(command, options_.timeout, done);
+    }
+  }
+
+  void on_result(const CommandResult& result) {
+    const std::size_t size = link_timing_at(commands_, next_) ? 2 : 1;
+    std::string text = shown(commands_[next_]);
+    if (size == 2) text += " " + shown(commands_[next_ + 1]);
+    const bool confirmed = result.outcome == Outcome::confirmed;
+    const Problem problem = explain(text, result, board_.link());
+    if (options_.json) {
+      print_line(result_json(text, result, problem));
+    } else if (confirmed) {
+      fmt::print("{}  confirmed in {:.1f} ms{}\n", text, milliseconds(result),
+                 next_ == 0 ? ", connecting included" : "");
+      if (commands_[next_].kind == CommandKind::identify) print_identity();
+    } else {
+      fmt::print("{}  {}\n", text, problem.reason);
+    }
+    if (!confirmed) {
+      for (std::size_t i = next_ + size; i < commands_.size() && !options_.json; ++i) {
+        fmt::print("{}  not sent\n", shown(commands_[i]));
+      }
+      failure_ = problem;
+      failure_->thing = fmt::format("{} to {}", problem.thing, board_.name());
+      io_.stop();
+      return;
+    }
+    std::fflush(stdout);
+    if (supply_is_missing() && !options_.json) {
+      fmt::print(
+          stderr,
+          "r4: {}: the motor supply is open (relay 1 is off), so no motor turns; send R:1,On "
+          "before it\n",
+          text);
+    }
+    next_ += size;
+    send_next();
+  }
+
+  // Was the command to turn a motor that has no supply?
+  bool supply_is_missing() const {
+    const State& state = board_.state();
+    return turns_a_motor(commands_[next_]) && state.present.has(StateField::relays) &&
+           (state.relays & 1) == 0;
+  }
+
+  void print_identity() const {
+    const BoardIdentity& id = board_.identity();
+    fmt::print("  board {}, firmware {}, {}\n", id.board_id, id.firmware, id.capabilities);
+  }
+
+  static double milliseconds(const CommandResult& result) {
+    return std::chrono::duration<double, std::milli>(result.elapsed).count();
+  }
+
+  Json result_json(const std::string& text, const CommandResult& result,
+                   const Problem& problem) const {
+    const bool confirmed = result.outcome == Outcome::confirmed;
+    Json object{{"type", "result"},
+                {"command", text},
+                {"confirmed", confirmed},
+                {"ms", milliseconds(result)}};
+    if (result.outcome == Outcome::refused) {
+      const Text name = name_of(result.code);
+      object["code"] = std::string_view(name.data(), name.size());
+    }
+    if (!confirmed) object["reason"] = problem.reason;
+    if (confirmed && turns_a_motor(commands_[next_])) {
+      object["motor_supply"] = supply_is_missing() ? "open" : "closed";
+    }
+    if (confirmed && text == "Q:ID") {
+      const BoardIdentity& id = board_.identity();
+      object["board_id"] = id.board_id;
+      object["firmware"] = id.firmware;
+      object["capabilities"] = id.capabilities;
+    }
+    return object;
+  }
+
+  const Options& options_;
+  const std::vector<Command>& commands_;
+  asio::io_context io_{1};
+  AsyncBoard board_;
+  asio::steady_timer hold_;
+  std::size_t next_ = 0;
+  std::optional<Problem> failure_;
+};
+
+int send(const Options& options) {
+  std::vector<Command> commands;
+  for (const std::string& text : options.commands) {
+    if (is_url(text)) one_url({options.url, text});
+    commands.push_back(command_of(text, options.url));
+  }
+  for (std::size_t i = 0; i < commands.size(); ++i) {
+    const auto timing = link_timing_at(commands, i);
+    if (!timing) continue;
+    require_link_timing(timing->timeout, timing->heartbeat, Milliseconds{0});
+    ++i;
+  }
+  return Sender(options, commands).run();
+}
+
+constexpr const char* footer =
+    R"(Each command is sent when the board's own state has confirmed the one before it; the first that is not
+confirmed ends the run. All are checked before the first is sent.
+
+The board goes safe, its outputs off, one second after this program ends: --hold keeps them on. No motor turns
+while relay 1, the motor supply, is open: it is at first and after each safe state, and R:1,On closes it.
+
+Examples:
+  r4 send udp://192.168.0.125 R:1,On O:358,1,1 --hold 5      R:1,On: the motors have supply
+  r4 send serial:auto R:1,On D:1000,1,1 S:1500,3 R:2,On --hold 60
+  r4 send serial:auto E:CLEAR                 after an emergency stop
+  r4 send serial:auto C:timeout,300 C:heartbeat,100     side by side: one step, in any order
+  r4 send udp://127.0.0.1 Q:ID                who is it?
+
+Exit codes: 0 all confirmed; 3 one was refused or not confirmed in time; 2 a command or option is
+wrong, nothing was sent; 4 the transport cannot be opened; 5 permission denied.)";
+
+}  // namespace
+
+void add_send(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* const command =
+      add_subcommand(root, chosen, "send", "Send commands and wait until the board confirms them",
+                     "Commands:\n" + command_table() + "\n" + footer, options, send);
+  add_url(*command, options->url);
+  add_texts(*command, "CMD", options->commands, "commands, such as O:358,1,1", "", Need::required);
+  add_seconds(*command, "--timeout", options->timeout,
+              "how long to wait for each confirmation (default 3)");
+  add_seconds(*command, "--hold", options->hold, "keep the link up that long after the last",
+              Zero::allowed);
+  add_key(*command, options->key);
+  add_json(*command, options->json, "print JSON, one object a command");
+}
+
+}  // namespace r4::tool

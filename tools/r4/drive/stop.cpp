@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 stop: every output off, now.
+#include <fmt/format.h>
+
+#include <asio/io_context.hpp>
+#include <asio/steady_timer.hpp>
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/async_board.hpp"
+#include "host/explain.hpp"
+#include "../shell/json.hpp"
+#include "../shell/options.hpp"
+#include "../shell/subcommands.hpp"
+#include "transports/error.hpp"
+#include "transports/url.hpp"
+
+namespace r4::tool {
+namespace {
+
+constexpr const char* last_resort = "CUT THE POWER if it must stop now";
+
+struct Options {
+  std::vector<std::string> urls;
+  Milliseconds timeout{2000};
+  std::string key;  // not needed, and so not read: nothing may keep a stop back
+  bool json = false;
+};
+
+// A port of its own for each stop: another program may hold the one at which hosts listen, and what is
+// still under way to that is of no use here.
+std::string own_port(const std::string& url) {
+  const Url parsed = Url::parse(url);
+  if (parsed.scheme() != "udp" || parsed.get("listen")) return url;
+  return url + (url.find('?') == std::string::npos ? "?listen=0" : "&listen=0");
+}
+
+std::unique_ptr<AsyncBoard> open(asio::io_context& io, const std::string& url) {
+  auto board = std::make_unique<AsyncBoard>(io, own_port(url));
+  try {
+    board->open();
+  } catch (const Error& error) {
+    Problem problem = error.problem();
+    problem.fix = fmt::format("{}; {}", last_resort, problem.fix);
+    throw Error(problem);
+  }
+  return board;
+}
+
+void print_confirmed(const Options& options, const CommandResult& result) {
+  const double ms = std::chrono::duration<double, std::milli>(result.elapsed).count();
+  if (options.json) {
+    print_line({{"type", "result"}, {"command", "E:STOP"}, {"confirmed", true}, {"ms", ms}});
+  } else {
+    fmt::print(
+        "stopped: the board reports SAFE (stop), after {:.1f} ms\n"
+        "it stays so until: r4 send {} E:CLEAR\n",
+        ms, one_url(options.urls));
+    std::fflush(stdout);
+  }
+}
+
+int stop(const Options& options) {
+  asio::io_context io(1);
+  const std::string& url = one_url(options.urls);
+  const std::unique_ptr<AsyncBoard> board = open(io, url);
+  std::optional<CommandResult> result;
+  asio::steady_timer repeating(io);
+  board->async_stop(options.timeout, [&](const CommandResult& r) {
+    result = r;
+    if (r.outcome != Outcome::confirmed) return io.stop();
+    print_confirmed(options, r);
+    // The library repeats it for a while longer.
+    repeating.expires_after(SessionOptions().stop_linger);
+    repeating.async_wait([&](const std::error_code&) { io.stop(); });
+  });
+  io.run();
+  const LinkStatus link = board->link();
+  board->close();
+  if (!result || result->outcome != Outcome::confirmed) {
+    Problem problem = explain(fmt::format("E:STOP to {}", board->name()), link);
+    problem.reason = fmt::format("the board did not confirm the stop within {} ms: {}",
+                                 options.timeout.count(), problem.reason);
+    problem.fix =
+        problem.fix.empty() ? last_resort : fmt::format("{}; {}", last_resort, problem.fix);
+    throw Error(problem);
+  }
+  return 0;
+}
+
+constexpr const char* footer =
+    R"(Works whoever controls the board, and without waiting for a link: the stop is repeated every 20 ms
+until the board reports that it has obeyed this one, and for a moment longer. It stays stopped until
+E:CLEAR.
+
+Examples:
+  r4 stop udp://192.168.0.125
+  r4 stop serial:auto
+
+Exit codes: 0 the board reports that it has stopped; 3 it did not confirm: cut the power; 4, 5 the
+transport cannot be opened: cut the power.)";
+
+}  // namespace
+
+void add_stop(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* const command = add_subcommand(
+      root, chosen, "stop", "Emergency stop: all outputs off, now", footer, options, stop);
+  add_urls(*command, options->urls);
+  add_seconds(*command, "--timeout", options->timeout,
+              "how long to repeat it for a confirmation (default 2); it is sent in any case",
+              Zero::allowed);
+  add_text(*command, "--key", options->key, "not needed: a board obeys a stop from anyone",
+           file_type);
+  add_json(*command, options->json, "print JSON");
+}
+
+}  // namespace r4::tool

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "json.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cstdio>
+#include <vector>
+
+#include "protocol/messages/message.hpp"
+#include "transports/framing/can/packed_form.hpp"
+
+namespace r4::tool {
+namespace {
+
+const char* name_of(ErrorKind kind) {
+  switch (kind) {
+    case ErrorKind::data:
+      return "data";
+    case ErrorKind::usage:
+      return "usage";
+    case ErrorKind::refused:
+      return "refused";
+    case ErrorKind::open:
+      return "open";
+    case ErrorKind::permission:
+      return "permission";
+    case ErrorKind::unsupported:
+      return "unsupported";
+  }
+  return "unknown";
+}
+
+std::string_view view(Text text) { return {text.data(), text.size()}; }
+
+}  // namespace
+
+Json value_json(Text value) {
+  const std::string_view text = view(value);
+  const bool plain =
+      !text.empty() && text.find_first_not_of("-.0123456789") == std::string_view::npos;
+  if (plain) {
+    Json number = Json::parse(text, nullptr, false);
+    // A whole number beyond 64 bits would come out rounded.
+    const bool exact = number.is_number_integer() || text.find('.') != std::string_view::npos;
+    if (number.is_number() && exact) return number;
+  }
+  return text;
+}
+
+Json field_json(const Field& field) {
+  std::vector<Text> values(field.count());
+  field.split(values.data(), values.size());
+  if (values.size() == 1) return value_json(values[0]);
+  Json array = Json::array();
+  for (const Text value : values) array.push_back(value_json(value));
+  return array;
+}
+
+Json fields_json(const Datagram& datagram) {
+  Json fields = Json::object();
+  for (const Field& field : datagram) {
+    if (field.name() == Text("PNum") || field.name() == Text("T")) continue;
+    const std::string name(view(field.name()));
+    const auto earlier = fields.find(name);
+    if (earlier == fields.end()) {
+      fields.emplace(name, field_json(field));
+    } else {
+      *earlier = Json::array({std::move(*earlier), field_json(field)});
+    }
+  }
+  return fields;
+}
+
+Json bad_datagram_json(const ReadResult& result) {
+  Json object{{"error", to_text(result.error)}, {"position", result.position}};
+  if (result.error == ReadError::crc) {
+    object["expected"] = fmt::format("{:#x}", result.crc_expected);
+    object["found"] = fmt::format("{:#x}", result.crc_found);
+  }
+  return object;
+}
+
+bool add_datagram_json(Json& object, const std::uint8_t* bytes, std::size_t size,
+                       DatagramForm form) {
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): bytes as characters
+  Text text(reinterpret_cast<const char*>(bytes), size);
+  std::array<char, max_datagram> plain;
+  const bool packed = form == DatagramForm::packed ||
+                      (form == DatagramForm::by_first_byte && size != 0 && is_packed(bytes[0]));
+  if (packed) {
+    const UnpackResult result = unpack(bytes, size, plain.data(), plain.size());
+    if (!result) {
+      object["ok"] = false;
+      object["error"] = "packed";
+      object["reason"] = to_text(result.error);
+      object["text"] = fmt::format("packed:{:02x}", fmt::join(bytes, bytes + size, ""));
+      return false;
+    }
+    text = Text(plain.data(), result.size);
+  }
+  Datagram datagram;
+  const ReadResult result = read(text, datagram);
+  object["ok"] = static_cast<bool>(result);
+  if (packed) object["packed"] = size;
+  if (result) {
+    object["type"] = to_text(kind_of(datagram));
+    object["pnum"] = datagram.has_pnum() ? Json(datagram.pnum()) : Json();
+    object["t"] = datagram.has_time() ? Json(datagram.time_ms()) : Json();
+    object["fields"] = fields_json(datagram);
+  } else {
+    object.update(bad_datagram_json(result));
+  }
+  object["text"] = escaped(view(text));
+  return static_cast<bool>(result);
+}
+
+Json transfers_json(const CarrierCounters& counters) {
+  if (!counters.transfers) return nullptr;
+  const TransferCounters& transfers = *counters.transfers;
+  return {{"wrong_sequence", transfers.wrong_sequence},
+          {"timed_out", transfers.timed_out},
+          {"overflow", transfers.overflow},
+          {"interrupted", transfers.interrupted},
+          {"cancelled", transfers.cancelled},
+          {"unexpected", transfers.unexpected},
+          {"malformed", transfers.malformed},
+          {"packed", transfers.packed},
+          {"bad_form", transfers.bad_form},
+          {"dropped_frames", counters.rx_overflows}};
+}
+
+Json counters_json(const CarrierCounters& counters) {
+  Json object{{"received", counters.rx_datagrams},
+              {"sent", counters.tx_datagrams},
+              {"dropped", counters.tx_dropped},
+              {"errors", counters.tx_errors},
+              {"oversize", counters.rx_oversize},
+              {"foreign", counters.rx_foreign},
+              {"downs", counters.downs}};
+  Json transfers = transfers_json(counters);
+  if (!transfers.is_null()) object["transfers"] = std::move(transfers);
+  return object;
+}
+
+Json problem_json(const Problem& problem) {
+  return {{"type", "error"},
+          {"kind", name_of(problem.kind)},
+          {"thing", problem.thing},
+          {"reason", problem.reason},
+          {"fix", problem.fix}};
+}
+
+std::string escaped(std::string_view bytes) {
+  std::string text;
+  text.reserve(bytes.size());
+  for (const char c : bytes) {
+    if (c >= 0x20 && c <= 0x7E && c != '\\') {
+      text += c;
+    } else {
+      text += fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
+    }
+  }
+  return text;
+}
+
+std::string line_of(const Json& object) {
+  return object.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+void print_text(std::string_view text) {
+  std::fwrite(text.data(), 1, text.size(), stdout);
+  std::fflush(stdout);
+}
+
+void print_line(const Json& object) { print_text(line_of(object)); }
+
+}  // namespace r4::tool

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Datagrams, problems and bytes as JSON: what `--json` prints.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+
+#include "protocol/datagram/datagram.hpp"
+#include "transports/carrier.hpp"
+#include "transports/error.hpp"
+
+namespace r4::tool {
+
+using Json = nlohmann::ordered_json;
+
+// One value of a field: a number if it is one in JSON's grammar too ("24.28", "-100"), else a
+// string.
+Json value_json(Text value);
+
+// A field's values: alone, or several as an array.
+Json field_json(const Field& field);
+
+// All fields but PNum and T, by name, in their order. A name that stands twice has an array of
+// both.
+Json fields_json(const Datagram& datagram);
+
+// {"error":"crc","position":…,"expected":"0x…","found":"0x…"}; the last two only for crc.
+Json bad_datagram_json(const ReadResult& result);
+
+enum class DatagramForm : std::uint8_t { plain, packed, by_first_byte };
+
+// Adds to `object` what the bytes of a datagram are: `ok`; `packed`, their number, if they are in
+// that form; `type`, `pnum`, `t` and `fields`, or `error` and where it is; `text`, the plain form.
+// True if they are a valid datagram.
+bool add_datagram_json(Json& object, const std::uint8_t* bytes, std::size_t size,
+                       DatagramForm form = DatagramForm::by_first_byte);
+
+// {"type":"error","kind":…,"thing":…,"reason":…,"fix":…}
+Json problem_json(const Problem& problem);
+
+// {"wrong_sequence":…,"timed_out":…,"overflow":…,"interrupted":…,"cancelled":…,"unexpected":…,
+//  "malformed":…,"packed":…,"bad_form":…,"dropped_frames":…}; null where datagrams do not travel in
+//  frames.
+Json transfers_json(const CarrierCounters& counters);
+
+// {"received":…,"sent":…,"dropped":…,"errors":…,"oversize":…,"foreign":…,"downs":…}, datagrams; with
+// "transfers" where they travel in frames.
+Json counters_json(const CarrierCounters& counters);
+
+// Any bytes as printable ASCII: what is not, and the backslash, as \xNN.
+std::string escaped(std::string_view bytes);
+
+// One object as a line of text. Bytes that are no UTF-8, as a command line may hold, are replaced.
+std::string line_of(const Json& object);
+
+// Text, or an object on a line of its own, to stdout and handed to the system at once.
+void print_text(std::string_view text);
+void print_line(const Json& object);
+
+}  // namespace r4::tool

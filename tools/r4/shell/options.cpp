@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "options.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+
+#include "host/async_board.hpp"
+#include "host/commands/command_help.hpp"
+#include "protocol/datagram/numbers.hpp"
+#include "protocol/messages/state.hpp"
+#include "transports/error.hpp"
+#include "transports/registry.hpp"
+
+namespace r4::tool {
+namespace {
+
+Milliseconds read_seconds(const std::string& name, const std::string& text, Zero zero) {
+  std::int32_t hundredths = 0;
+  if (!parse_hundredths(Text(text), hundredths) || hundredths < 0) {
+    throw Error(ErrorKind::usage, fmt::format("{} {}", name, text), "is no time",
+                "write seconds such as 5 or 0.25");
+  }
+  if (hundredths == 0 && zero == Zero::refused) {
+    throw Error(ErrorKind::usage, fmt::format("{} {}", name, text), "is too short for anything",
+                "write seconds such as 5 or 0.25");
+  }
+  return Milliseconds(std::int64_t{hundredths} * 10);
+}
+
+std::uint64_t read_number(const std::string& name, const std::string& text, std::uint64_t min,
+                          std::uint64_t max) {
+  std::uint64_t number = 0;
+  if (!parse_number(Text(text), number) || number < min || number > max) {
+    const bool is_number = is_whole_number(Text(text));
+    throw Error(ErrorKind::usage, fmt::format("{} {}", name, text),
+                is_number ? "is out of range" : "is no whole number",
+                fmt::format("write {} to {}", min, max));
+  }
+  return number;
+}
+
+template <class Out>
+CLI::Option* seconds(CLI::App& command, const std::string& name, Out& out,
+                     const std::string& meaning, Zero zero) {
+  return command
+      .add_option_function<std::string>(
+          name,
+          [&out, name, zero](const std::string& text) { out = read_seconds(name, text, zero); },
+          meaning)
+      ->type_name("SECONDS");
+}
+
+template <class Out>
+CLI::Option* number(CLI::App& command, const std::string& name, Out& out, std::uint64_t min,
+                    std::uint64_t max, const std::string& meaning) {
+  return command
+      .add_option_function<std::string>(
+          name,
+          [&out, name, min, max](const std::string& text) {
+            out = read_number(name, text, min, max);
+          },
+          meaning)
+      ->type_name("N");
+}
+
+template <class Out>
+CLI::Option* url(CLI::App& command, Out& out) {
+  return command.add_option("URL", out, "where the board is, such as udp://192.168.0.125")
+      ->required()
+      ->type_name(url_type);
+}
+
+}  // namespace
+
+CLI::Option* add_seconds(CLI::App& command, const std::string& name, Milliseconds& out,
+                         const std::string& meaning, Zero zero) {
+  return seconds(command, name, out, meaning, zero);
+}
+CLI::Option* add_seconds(CLI::App& command, const std::string& name,
+                         std::optional<Milliseconds>& out, const std::string& meaning) {
+  return seconds(command, name, out, meaning, Zero::refused);
+}
+
+void add_text(CLI::App& command, const std::string& name, std::string& out,
+              const std::string& meaning, const char* type, Need need) {
+  command.add_option(name, out, meaning)->type_name(type)->required(need == Need::required);
+}
+void add_texts(CLI::App& command, const std::string& name, std::vector<std::string>& out,
+               const std::string& meaning, const char* type, Need need) {
+  command.add_option(name, out, meaning)->type_name(type)->required(need == Need::required);
+}
+void add_text(CLI::App& command, const std::string& name,
+              const std::function<void(const std::string&)>& take, const std::string& meaning,
+              const char* type, Need need) {
+  command.add_option_function<std::string>(name, take, meaning)
+      ->type_name(type)
+      ->required(need == Need::required);
+}
+void add_repeated(CLI::App& command, const std::string& name, std::vector<std::string>& out,
+                  const std::string& meaning, const char* type) {
+  command.add_option(name, out, meaning)->type_name(type)->allow_extra_args(false);
+}
+
+void add_flag(CLI::App& command, const std::string& name, bool& out, const std::string& meaning) {
+  command.add_flag(name, out, meaning);
+}
+
+void exclude(CLI::App& command, const std::string& name,
+             std::initializer_list<const char*> others) {
+  for (const char* const other : others) {
+    command.get_option(name)->excludes(command.get_option(other));
+  }
+}
+
+CLI::Option* add_number(CLI::App& command, const std::string& name, std::uint64_t& out,
+                        std::uint64_t min, std::uint64_t max, const std::string& meaning) {
+  return number(command, name, out, min, max, meaning);
+}
+CLI::Option* add_number(CLI::App& command, const std::string& name,
+                        std::optional<std::uint64_t>& out, std::uint64_t min, std::uint64_t max,
+                        const std::string& meaning) {
+  return number(command, name, out, min, max, meaning);
+}
+
+CLI::Option* add_json(CLI::App& command, bool& out, const std::string& meaning) {
+  return command.add_flag("--json", out, meaning);
+}
+
+CLI::Option* add_url(CLI::App& command, std::string& out) { return url(command, out); }
+CLI::Option* add_urls(CLI::App& command, std::vector<std::string>& out) {
+  return url(command, out);
+}
+
+bool is_url(std::string_view text) {
+  const std::vector<Registry::Entry>& entries = standard_registry().entries();
+  return std::any_of(entries.begin(), entries.end(), [&](const Registry::Entry& entry) {
+    return text.starts_with(entry.scheme + ":");
+  });
+}
+
+const std::string& one_url(const std::vector<std::string>& urls) {
+  if (urls.size() > 1) {
+    throw Error(ErrorKind::usage, urls[1], "one session over several links is not supported yet",
+                "give one URL");
+  }
+  return urls.front();
+}
+
+CLI::Option* add_fields(CLI::App& command, std::string& out, const std::string& meaning) {
+  return command
+      .add_option_function<std::string>(
+          "--fields",
+          [&out](const std::string& text) {
+            FieldSet set;
+            if (parse_fields(Text(text), set) != Refusal::none) {
+              throw Error(ErrorKind::usage, "--fields " + text, "there is no such state field",
+                          std::string("use ") + std::string(command_help('F')->ranges) +
+                              ", separated by commas");
+            }
+            out = text;
+          },
+          meaning)
+      ->type_name("NAMES");
+}
+
+}  // namespace r4::tool

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One board's part of the demonstration: connect, stream, command, silence, safe state, recovery,
+// stop, clear (paper sections 4.3 and 4.4). Each step is checked; the first that is not true ends
+// it.
+#pragma once
+
+#include <asio/io_context.hpp>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "host/async_board.hpp"
+#include "../shell/json.hpp"
+
+namespace r4::tool {
+
+// What was measured on one transport; 0 where it did not come to that.
+struct StoryResult {
+  std::string transport;
+  double connect_ms = 0;
+  double rate_hz = 0;
+  std::uint64_t lost = 0;
+  double round_trip_us = 0;
+  double confirmed_ms = 0;
+  double safe_ms = 0;          // from the last heartbeat of the host to the safe state
+  bool safe_by_event = false;  // timed by the board's own log, else by the T of its datagrams
+  double recovered_ms = 0;
+  double stop_ms = 0;
+  bool good = false;
+  std::string trouble;  // what was not true
+};
+
+// What the board's own log says, where it is another process.
+struct BoardLog {
+  std::optional<std::uint32_t> silence_ms;  // of the newest SAFE (link)
+  bool outputs_off = false;
+};
+
+class Story {
+ public:
+  // How it tells what happens: a line of explanation, and a line that was on the wire.
+  struct Teller {
+    std::function<void(std::string_view)> say;
+    std::function<void(std::string_view)> show;
+  };
+
+  // `log` is empty for a board without one; else it must be kept up to date by handlers of `io`.
+  Story(asio::io_context& io, const std::string& url, const BoardLog* log, Teller teller);
+
+  StoryResult run();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  using Milliseconds = std::chrono::milliseconds;
+
+  bool wait_until(const std::function<bool()>& is_so, Milliseconds at_most);
+  CommandResult send(const Command& command);
+  void require(bool is_so, const std::string& what) const;
+  bool active() const;
+
+  void connect();
+  void stream();
+  void ask();
+  void command();
+  void require_that_the_motor_turns();
+  void fall_silent();
+  void recover();
+  void stop();
+  void clear();
+
+  asio::io_context& io_;
+  const BoardLog* log_;
+  Teller teller_;
+  AsyncBoard board_;
+  StoryResult result_;
+
+  // The newest state, its bytes and when it came.
+  State state_;
+  std::string state_bytes_;
+  Clock::time_point state_came_;
+  std::uint64_t states_ = 0;
+  // The newest heartbeat of the board that told of a safe state.
+  std::string safe_bytes_;
+  std::uint32_t safe_t_ms_ = 0;
+  std::optional<CommandResult> ended_;  // the command under way
+};
+
+}  // namespace r4::tool

@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 sim: the simulated board as a process, its events on stdout.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <asio/io_context.hpp>
+#include <asio/signal_set.hpp>
+#include <asio/steady_timer.hpp>
+#include <csignal>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "firmware/ports/sim/simulated_board.hpp"
+#include "host/async_board.hpp"
+#include "host/commands/command_help.hpp"
+#include "../shell/options.hpp"
+#include "protocol/datagram/numbers.hpp"
+#include "protocol/datagram/refusal.hpp"
+#include "protocol/messages/settings.hpp"
+#include "sim_input.hpp"
+#include "sim_log.hpp"
+#include "../shell/subcommands.hpp"
+#include "transports/framing/can/can_ids.hpp"
+#include "transports/registry.hpp"
+
+namespace r4::tool {
+namespace {
+
+struct Options {
+  std::vector<std::string> urls;
+  bool json = false;
+  bool quiet = false;
+  std::optional<Milliseconds> duration;
+  std::optional<Milliseconds> sensors;
+  std::string script;
+  bool input = false;
+  std::optional<std::uint64_t> seed;
+  std::string board_id;
+  std::vector<std::string> settings;
+};
+
+constexpr std::size_t longest_id = 64;
+
+void check_id(const std::string& id) {
+  Field field;
+  const bool valid = read_field(Text("I:" + id), field) && field.count() == 1;
+  if (valid && !id.empty() && id.size() <= longest_id) return;
+  throw Error(ErrorKind::usage, "--board-id " + id, "cannot be sent",
+              fmt::format("use 1 to {} printable ASCII characters without , ; and ^", longest_id));
+}
+
+Settings read_settings(const std::vector<std::string>& texts) {
+  Settings settings;
+  for (const std::string& text : texts) {
+    const std::size_t comma = text.find(',');
+    const std::string key = text.substr(0, comma);
+    const std::string value = comma == std::string::npos ? "" : text.substr(comma + 1);
+    const Refusal refusal = set(settings, Text(key), Text(value));
+    if (refusal == Refusal::none) continue;
+    Problem problem = bad_command("C:" + text, refusal);
+    problem.thing.replace(0, 2, "--set ");
+    throw Error(std::move(problem));
+  }
+  return settings;
+}
+
+// A board of the process: what it listens on, and what it answers to Q:ID.
+struct Plan {
+  std::vector<std::string> urls;
+  std::string id;
+  std::uint64_t number = 0;  // of the boards, from 0
+};
+
+// "0-7" of can://can0?node=0-7, if that is such a range. Throws Error{usage} for a wrong one.
+std::optional<std::pair<std::uint32_t, std::uint32_t>> node_range(const Url& url) {
+  const std::string nodes = url.get("node").value_or("");
+  const std::size_t dash = nodes.find('-', 1);
+  if (url.scheme() != "can" || dash == std::string::npos) return std::nullopt;
+  std::uint32_t first = 0;
+  std::uint32_t last = 0;
+  if (!parse_number(Text(nodes.data(), dash), first) ||
+      !parse_number(Text(nodes.data() + dash + 1, nodes.size() - dash - 1), last) || first > last ||
+      last >= can_nodes || url.text().find("node=" + nodes) == std::string::npos) {
+    throw Error(
+        ErrorKind::usage, url.text(), "node=" + nodes + " is no range of nodes",
+        fmt::format("write the lower one first, both 0 to {}, as in node=0-7", can_nodes - 1));
+  }
+  return std::pair(first, last);
+}
+
+std::vector<Plan> plans_of(const Options& options) {
+  const std::string id = options.board_id.empty() ? "sim" : options.board_id;
+  for (const std::string& text : options.urls) {
+    const Url url = Url::parse(text);
+    const auto range = node_range(url);
+    if (!range) continue;
+    if (options.urls.size() > 1) {
+      throw Error(ErrorKind::usage, text, "several boards cannot share the other transports",
+                  "run them as a process of their own");
+    }
+    const std::string nodes = "node=" + *url.get("node");
+    std::vector<Plan> plans;
+    for (std::uint32_t node = range->first; node <= range->second; ++node) {
+      std::string one = text;
+      one.replace(text.find(nodes), nodes.size(), fmt::format("node={}", node));
+      plans.push_back({{std::move(one)}, fmt::format("{}-{}", id, node), node - range->first});
+    }
+    return plans;
+  }
+  return {{options.urls, options.board_id.empty() ? "sim-1" : options.board_id, 0}};
+}
+
+// A board with its log, at its transports.
+class ServedBoard {
+ public:
+  ServedBoard(asio::io_context& io, SimOutput& output, const Options& options, const Plan& plan,
+        bool named)
+      : log_(output, options.quiet, named ? plan.id : ""), board_(io, options_of(options, plan)) {
+    for (const std::string& url : plan.urls) {
+      auto carrier = standard_registry().make(io, url, Role::board);
+      for (const Carrier* const other : carriers_) {
+        if (other->name() != carrier->name() || !url.starts_with("can:")) continue;
+        throw Error(ErrorKind::usage, url, "the board is there already", "name a node once");
+      }
+      carriers_.push_back(carrier.get());
+      board_.add_carrier(std::move(carrier));
+    }
+    log_.watch(board_);
+  }
+
+  void start(std::vector<std::string>& listening) {
+    board_.start();
+    for (const Carrier* const carrier : carriers_) listening.push_back(carrier->name());
+  }
+
+  void tell_sensors() { log_.tell_sensors(); }
+  void happen(const sim::ScriptStep& step) { board_.happen(step); }
+
+  void end() {
+    for (const Carrier* const carrier : carriers_) log_.on_end(*carrier);
+  }
+
+ private:
+  sim::SimulatedBoard::Options options_of(const Options& options, const Plan& plan) {
+    sim::SimulatedBoard::Options board_options;
+    if (options.seed) board_options.seed = *options.seed + plan.number;
+    if (!options.script.empty()) board_options.script = sim::Script::load(options.script);
+    check_id(plan.id);
+    board_options.board_id = plan.id;
+    board_options.settings = read_settings(options.settings);
+    board_options.firmware_version = R4_VERSION;
+    board_options.events = log_.events();
+    return board_options;
+  }
+
+  SimLog log_;
+  sim::SimulatedBoard board_;
+  std::vector<const Carrier*> carriers_;
+};
+
+// Tells the sensors of all boards again and again.
+class SensorClock {
+ public:
+  SensorClock(asio::io_context& io, Milliseconds period,
+              const std::vector<std::unique_ptr<ServedBoard>>& boards)
+      : timer_(io), period_(period), boards_(boards) {
+    wait();
+  }
+
+ private:
+  void wait() {
+    timer_.expires_after(period_);
+    timer_.async_wait([this](const std::error_code& error) {
+      if (error) return;
+      for (const auto& board : boards_) board->tell_sensors();
+      wait();
+    });
+  }
+
+  asio::steady_timer timer_;
+  const Milliseconds period_;
+  const std::vector<std::unique_ptr<ServedBoard>>& boards_;
+};
+
+int simulate(const Options& options) {
+  if (options.sensors && (!options.json || options.quiet)) {
+    throw Error(ErrorKind::usage, "--sensors", "is for JSON", "add --json, and leave out --quiet");
+  }
+  asio::io_context io(1);
+  asio::signal_set signals(io, SIGINT, SIGTERM);
+  signals.async_wait([&io](const std::error_code&, int) { io.stop(); });
+
+  const std::vector<Plan> plans = plans_of(options);
+  {
+    SimOutput output(options.json);
+    std::vector<std::unique_ptr<ServedBoard>> boards;
+    boards.reserve(plans.size());
+    for (const Plan& plan : plans) {
+      boards.push_back(std::make_unique<ServedBoard>(io, output, options, plan, plans.size() > 1));
+    }
+    std::vector<std::string> listening;
+    for (const auto& board : boards) board->start(listening);
+    output.listening(listening);
+
+    asio::steady_timer end(io);
+    if (options.duration) {
+      end.expires_after(*options.duration);
+      end.async_wait([&io](const std::error_code&) { io.stop(); });
+    }
+    std::optional<SensorClock> sensors;
+    if (options.sensors) sensors.emplace(io, *options.sensors, boards);
+    std::optional<SimInput> input;
+    if (options.input) {
+      input.emplace(
+          io,
+          [&boards](const sim::ScriptStep& step) {
+            for (const auto& board : boards) board->happen(step);
+          },
+          [&output](const Problem& problem) { output.problem(problem); });
+    }
+    io.run();
+    for (const auto& board : boards) board->end();
+  }
+  return 0;
+}
+
+constexpr const char* footer =
+    R"(The board streams its state and obeys commands as the real one does, with the inputs of the bench in
+the paper's capture. It prints where it listens and what it does; with --json one object a line:
+  {"type":"listening","url":…,"host_url":…}
+  {"type":"event","t":…,"state":"CONNECTING|ACTIVE|SAFE","reason":…}   t: the board's clock, ms
+with "board" if there are several, "outputs" when a pin of a chip or a stepper does something else, with
+"supply", whether the motors have any (relay 1 closed, handle held: docs/safety.md),
+"fault" when a chip is in trouble, "executed" or "refused" for a command, "rejected" (missing, unknown
+key, wrong tag, replayed, old) for what was not signed as a key asks, "transport" when one went down or
+came up, and "silence" (ms since the host was last heard) when the board goes safe for that.
+With --sensors, as often as that says
+  {"type":"sensors","t":…,"supply":…,"handle":…,"enc":[…],"stepper":[…],"us":[…],"analog":{"AIN24":…,…}}
+At the end
+  {"type":"counters","transport":…,"received":…,"sent":…,"dropped":…,…}   datagrams of a transport
+with "transfers" on CAN.
+
+A scenario (--script) has lines such as: 0.5 handle released / 1 us 1 15 / 2 chip dac off / 3 reboot
+With --stdin the same words without the time make it happen at once: handle released. What happens is an
+event with "happened"; {"type":"error",…} is a line that was not understood.
+
+Examples:
+  r4 sim                                       at udp://127.0.0.1:2018
+  r4 sim udp://127.0.0.1:0                     at any free port, which it prints
+  r4 sim --stdin                               and type: us 1 15
+  r4 sim udp://0.0.0.0:2018 pty:/tmp/r4        two transports at once; open the second with
+                                               r4 monitor serial:///tmp/r4
+  r4 sim 'udp://127.0.0.1:2018?peer=127.0.0.1:2390'   streams to that port, as the paper's board
+  r4 sim 'can://vcan0?node=0-7' --set pack,1   eight boards on one CAN bus
+
+Exit codes: 0 ended by --duration or a signal; 1 the script is wrong; 2 usage; 4, 5 the port or
+device cannot be opened.)";
+
+}  // namespace
+
+void add_sim(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<Options>();
+  options->urls = {"udp://127.0.0.1:2018"};
+  CLI::App* const command =
+      add_subcommand(root, chosen, "sim", "Run a simulated board", footer, options, simulate);
+  add_texts(*command, "URL", options->urls,
+            "where it listens, up to four (default udp://127.0.0.1:2018)", url_type);
+  add_json(*command, options->json, "print events as JSON, one object a line");
+  add_flag(*command, "--quiet", options->quiet, "print only where it listens");
+  add_seconds(*command, "--duration", options->duration, "end after that time");
+  add_seconds(*command, "--sensors", options->sensors,
+              "with --json: what the sensors sense, as often as that");
+  add_text(*command, "--script", options->script, "a scenario: what happens around the board",
+           file_type);
+  add_flag(*command, "--stdin", options->input,
+           "read from standard input what happens around the board");
+  add_number(*command, "--seed", options->seed, 0, ~std::uint64_t{0},
+             "the same seed gives the same clock, inputs and nonces (with a key: for tests)");
+  add_repeated(*command, "--set", options->settings,
+               "a setting as C:KEY,VALUE makes it, such as pack,1 (can be given again)",
+               "KEY,VALUE");
+  add_text(*command, "--board-id", options->board_id, "its answer to Q:ID (default sim-1)", "ID");
+}
+
+}  // namespace r4::tool

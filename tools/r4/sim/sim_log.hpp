@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What `r4 sim` prints: where the boards listen and their own events, in words or as JSON. A slow
+// reader does not hold a board up.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "firmware/ports/sim/simulated_board.hpp"
+#include "../shell/json.hpp"
+#include "../shell/line_writer.hpp"
+
+namespace r4::tool {
+
+// The lines of all boards of the process, in the order in which they were said.
+class SimOutput {
+ public:
+  explicit SimOutput(bool json);
+
+  // Where they listen, known once they have started; what was said before is printed behind it.
+  void listening(const std::vector<std::string>& urls);
+  void print(std::string line);
+  // What somebody has to mend.
+  void problem(const Problem& problem);
+
+  bool json() const { return json_; }
+
+ private:
+  const bool json_;
+  bool started_ = false;
+  std::vector<std::string> held_;  // lines of before listening()
+  LineWriter writer_;
+};
+
+// One board's.
+class SimLog {
+ public:
+  // `name` is told with each event if there are several boards; else it is empty.
+  SimLog(SimOutput& output, bool quiet, std::string name)
+      : output_(output), quiet_(quiet), name_(std::move(name)) {}
+
+  // The callbacks for the board's options; the log must outlive the board.
+  sim::SimulatedBoard::Events events();
+  // The board they belong to, before its start().
+  void watch(const sim::SimulatedBoard& board) { board_ = &board; }
+  // What its sensors sense now.
+  void tell_sensors();
+  // What passed over one of its transports, at the end.
+  void on_end(const Carrier& carrier);
+
+ private:
+  Json event(std::uint32_t t_ms) const;
+  void on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason reason);
+  void on_pins(std::uint32_t t_ms, const sim::Pins& pins);
+  void on_step(std::uint32_t t_ms, const sim::ScriptStep& step);
+  void on_fault(std::uint32_t t_ms, ChipFault fault);
+  void on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command);
+  void on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code);
+  void on_rejected(std::uint32_t t_ms, Verdict verdict);
+  void on_carrier(std::uint32_t t_ms, const Carrier& carrier, const CarrierEvent& event);
+  void print(const Json& object) { output_.print(line_of(object)); }
+  void print(std::uint32_t t_ms, std::string_view text);
+
+  SimOutput& output_;
+  const bool quiet_;
+  const std::string name_;
+  const sim::SimulatedBoard* board_ = nullptr;
+};
+
+// How a host on this machine opens what a board listens on: "serial:///tmp/r4" for "pty:/tmp/r4".
+std::string host_url(const std::string& board_url);
+
+// {"osmc":[[pwm,dir],…],"dhb":…,"servo":[us,…],"relays":bits,"bldc":[[speed,dir,brake],…],
+//  "stepper":[[position,stepping],…]}; stepping: 1 forward, -1 backward, 0 standing
+Json pins_json(const sim::Pins& pins);
+
+// "OSMC1:358,1 SERVO1:2001": what is not as in the safe state; "all off".
+std::string pins_text(const sim::Pins& pins);
+
+// {"supply":true,"handle":"held","enc":[counts,…],"stepper":[steps,…],"us":[cm,…],
+//  "analog":{"AIN24":24.28,…}}: the motors' supply, and what sensors would read; "off" for an
+// ultrasonic sensor without its cable.
+Json sensors_json(const sim::BoardModel& model);
+
+}  // namespace r4::tool

@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 bench: how good the link to a board is, measured on that link.
+//
+//     wait for control | listen: rate, loss, jitter | ask: round trips | command: confirmations
+//                            2/5 of the time             2/5                 1/5
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <asio/io_context.hpp>
+#include <asio/steady_timer.hpp>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "host/async_board.hpp"
+#include "host/explain.hpp"
+#include "../shell/json.hpp"
+#include "../shell/key_file.hpp"
+#include "../shell/options.hpp"
+#include "../shell/subcommands.hpp"
+#include "transports/error.hpp"
+
+namespace r4::tool {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr Milliseconds connect_timeout{3000};
+constexpr Milliseconds answer_timeout{1000};
+// Questions come in bursts with pauses between them: the board takes no packet number that is far
+// ahead of the newest heartbeat's (BoardLink::command_window).
+constexpr std::size_t burst = 100;
+constexpr Milliseconds pause{10};
+
+struct Options {
+  std::vector<std::string> urls;
+  Milliseconds duration{5000};
+  std::string key;
+  bool json = false;
+};
+
+// Durations in microseconds, and the one below which a share of them lies.
+class Durations {
+ public:
+  void add(Time duration) { values_.push_back(static_cast<double>(duration.count())); }
+  std::size_t count() const { return values_.size(); }
+  double quantile(double share) {
+    if (values_.empty()) return 0;
+    const auto at = values_.begin() + std::lround(share * static_cast<double>(values_.size() - 1));
+    std::nth_element(values_.begin(), at, values_.end());
+    return *at;
+  }
+
+ private:
+  std::vector<double> values_;
+};
+
+BoardOptions board_options(const std::string& key) {
+  BoardOptions options = with_key(key);
+  options.session.arming = Arming::off;                 // it drives nothing
+  options.session.identify_interval = Milliseconds(0);  // the questions are ours
+  return options;
+}
+
+class Bench {
+ public:
+  explicit Bench(const Options& options)
+      : options_(options),
+        board_(io_, one_url(options.urls), board_options(options.key)),
+        timer_(io_),
+        pause_(io_) {}
+
+  int run() {
+    board_.open();
+    connect();
+    listen();
+    ask();
+    command();
+    board_.close();
+    if (options_.json) {
+      print_json();
+    } else {
+      print_table();
+    }
+    return 0;
+  }
+
+ private:
+  // Runs the loop for `time`, or until something stops it.
+  void run_for(Milliseconds time) {
+    timer_.expires_after(time);
+    timer_.async_wait([this](const std::error_code& error) {
+      if (!error) io_.stop();
+    });
+    io_.restart();
+    io_.run();
+  }
+
+  // Proof of control is a state.
+  void connect() {
+    board_.on_state([this](const State&, const Datagram&) {
+      if (board_.in_control()) io_.stop();
+    });
+    const Clock::time_point start = Clock::now();
+    run_for(connect_timeout);
+    board_.on_state({});
+    if (!board_.in_control()) throw Error(explain(board_.name(), board_.link()));
+    connect_us_ = std::chrono::duration<double, std::micro>(Clock::now() - start).count();
+  }
+
+  void listen() {
+    const Statistics before = board_.statistics();
+    const Milliseconds time = options_.duration * 2 / 5;
+    const Clock::time_point start = Clock::now();
+    run_for(time);
+    const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    const Statistics after = board_.statistics();
+    states_ = after.states - before.states;
+    lost_ = after.packets.lost - before.packets.lost;
+    damaged_ = after.damaged - before.damaged;
+    state_hz_ = static_cast<double>(states_) / seconds;
+    jitter_us_ = after.jitter_us;
+    if (states_ == 0) throw Error(explain(board_.name(), board_.link()));
+  }
+
+  // In a burst, a question follows as soon as the answer to the last one is there.
+  void ask() {
+    running_ = true;
+    ask_next(burst);
+    run_for(options_.duration * 2 / 5);
+    running_ = false;
+    pause_.cancel();
+  }
+  void ask_next(std::size_t left) {
+    if (left == 0) {
+      pause_.expires_after(pause);
+      pause_.async_wait([this](const std::error_code& error) {
+        if (!error && running_) ask_next(burst);
+      });
+      return;
+    }
+    board_.async_identify(answer_timeout, [this, left](const CommandResult& result) {
+      if (running_ && count(result, round_trips_, unanswered_)) ask_next(left - 1);
+    });
+  }
+
+  // The session's own choice of fields again: a command that changes nothing.
+  void command() {
+    running_ = true;
+    command_next();
+    run_for(options_.duration / 5);
+    running_ = false;
+  }
+  void command_next() {
+    board_.async_send(Command::fields(Text("DEFAULT")), answer_timeout,
+                      [this](const CommandResult& result) {
+                        if (running_ && count(result, confirmations_, unconfirmed_)) command_next();
+                      });
+  }
+
+  // False where going on would only fail again: the board refuses.
+  static bool count(const CommandResult& result, Durations& durations, std::uint64_t& failed) {
+    if (result.outcome == Outcome::confirmed) {
+      durations.add(result.elapsed);
+    } else {
+      ++failed;
+    }
+    return result.outcome == Outcome::confirmed || result.outcome == Outcome::timed_out;
+  }
+
+  double per_second() const {
+    const double seconds = std::chrono::duration<double>(options_.duration / 5).count();
+    return static_cast<double>(confirmations_.count()) / seconds;
+  }
+
+  void print_json() {
+    const auto quantiles = [](Durations& durations) {
+      return Json{{"count", durations.count()},
+                  {"p50", durations.quantile(0.5)},
+                  {"p90", durations.quantile(0.9)},
+                  {"p99", durations.quantile(0.99)},
+                  {"max", durations.quantile(1)}};
+    };
+    Json result{{"type", "bench"},
+                {"transport", board_.name()},
+                {"connect_us", connect_us_},
+                {"round_trip_us", quantiles(round_trips_)},
+                {"unanswered", unanswered_},
+                {"state_hz", state_hz_},
+                {"states", states_},
+                {"lost", lost_},
+                {"damaged", damaged_},
+                {"jitter_us", jitter_us_},
+                {"confirmation_us", quantiles(confirmations_)},
+                {"unconfirmed", unconfirmed_},
+                {"commands_per_s", per_second()}};
+    Json transfers = transfers_json(board_.carrier_counters());
+    if (!transfers.is_null()) result["transfers"] = std::move(transfers);
+    print_line(result);
+  }
+
+  void print_table() {
+    fmt::print("{}\n", board_.name());
+    fmt::print("  in control after      {:>9.1f} ms\n", connect_us_ / 1000);
+    fmt::print("  states                {:>9.1f} Hz    {} received, {} lost, {} damaged\n",
+               state_hz_, states_, lost_, damaged_);
+    fmt::print("  jitter                {:>9.0f} us\n", jitter_us_);
+    const auto row = [](const char* what, Durations& durations, std::uint64_t failed) {
+      fmt::print("  {:<21} {:>9.0f} us    p90 {:.0f}, p99 {:.0f}, max {:.0f}; {} of {} failed\n",
+                 what, durations.quantile(0.5), durations.quantile(0.9), durations.quantile(0.99),
+                 durations.quantile(1), failed, failed + durations.count());
+    };
+    row("round trip, median", round_trips_, unanswered_);
+    row("command confirmed", confirmations_, unconfirmed_);
+    fmt::print("  commands confirmed    {:>9.0f} a second, one at a time\n", per_second());
+    print_transfers(board_.carrier_counters());
+  }
+
+  static void print_transfers(const CarrierCounters& counters) {
+    if (!counters.transfers) return;
+    const TransferCounters& transfers = *counters.transfers;
+    fmt::print(
+        "  transfers lost        {:>9}       {} wrong sequence, {} timed out, {} overflow, "
+        "{} interrupted, {} cancelled\n",
+        transfers.wrong_sequence + transfers.timed_out + transfers.overflow +
+            transfers.interrupted + transfers.cancelled,
+        transfers.wrong_sequence, transfers.timed_out, transfers.overflow, transfers.interrupted,
+        transfers.cancelled);
+    fmt::print(
+        "  frames passed over    {:>9}       {} unexpected, {} malformed; dropped unread "
+        "{}\n",
+        transfers.unexpected + transfers.malformed, transfers.unexpected, transfers.malformed,
+        counters.rx_overflows);
+    fmt::print("  packed datagrams      {:>9}       {} of bad form\n", transfers.packed,
+               transfers.bad_form);
+  }
+
+  const Options& options_;
+  asio::io_context io_{1};
+  AsyncBoard board_;
+  asio::steady_timer timer_;
+  asio::steady_timer pause_;
+  double connect_us_ = 0;
+  std::uint64_t states_ = 0;
+  std::uint64_t lost_ = 0;
+  std::uint64_t damaged_ = 0;
+  double state_hz_ = 0;
+  double jitter_us_ = 0;
+  bool running_ = false;  // a question or command follows the other
+  Durations round_trips_;
+  std::uint64_t unanswered_ = 0;
+  Durations confirmations_;
+  std::uint64_t unconfirmed_ = 0;
+};
+
+int bench(const Options& options) { return Bench(options).run(); }
+
+constexpr const char* footer =
+    R"(Round trips are questions (Q:ID) answered by the board, one at a time. A command is confirmed by the
+board's state, so at 100 Hz that takes up to 10 ms; the command is one that changes nothing.
+
+Examples:
+  r4 bench serial:auto
+  r4 bench udp://127.0.0.1 --duration 10 --json
+
+Exit codes: 0 done; 3 no board answers, or another host has it; 2 usage; 4, 5 the transport cannot be
+opened.)";
+
+}  // namespace
+
+void add_bench(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* const command =
+      add_subcommand(root, chosen, "bench", "Measure the link to a board", footer, options, bench);
+  add_urls(*command, options->urls);
+  add_seconds(*command, "--duration", options->duration, "how long to measure (default 5)");
+  add_key(*command, options->key);
+  add_json(*command, options->json, "print JSON");
+}
+
+}  // namespace r4::tool

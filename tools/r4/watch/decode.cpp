@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 decode: datagrams in, one a line or as the frames of a CAN bus, JSON out. Whatever the input,
+// memory stays bounded.
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "../bus/bus_log.hpp"
+#include "../shell/json.hpp"
+#include "../shell/numbered_lines.hpp"
+#include "../shell/options.hpp"
+#include "protocol/datagram/datagram.hpp"
+#include "protocol/datagram/numbers.hpp"
+#include "../shell/subcommands.hpp"
+
+namespace r4::tool {
+namespace {
+
+struct Options {
+  std::string file = "-";
+  bool candump = false;
+};
+
+class Input {
+ public:
+  explicit Input(const std::string& path)
+      : name_(path == "-" ? "standard input" : path),
+        fd_(path == "-" ? STDIN_FILENO : ::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
+    if (fd_ < 0) fail();
+  }
+  ~Input() {
+    if (fd_ != STDIN_FILENO) ::close(fd_);
+  }
+  Input(const Input&) = delete;
+  Input& operator=(const Input&) = delete;
+
+  // What has arrived, at least one byte; empty at the end. Valid until the next call.
+  std::string_view read() {
+    for (;;) {
+      const ssize_t count = ::read(fd_, buffer_.data(), buffer_.size());
+      if (count >= 0) return {buffer_.data(), static_cast<std::size_t>(count)};
+      if (errno != EINTR) fail();
+    }
+  }
+
+ private:
+  [[noreturn]] void fail() const {
+    const bool denied = errno == EACCES || errno == EPERM;
+    throw Error(
+        denied ? ErrorKind::permission : ErrorKind::open, name_, std::strerror(errno),
+        denied ? "allow reading it: chmod +r" : "give a readable file, or - for standard input");
+  }
+
+  std::string name_;
+  int fd_;
+  std::array<char, 65536> buffer_;
+};
+
+// A line packed:HEX, as r4 encode --packed writes it. No datagram looks so: it has a semicolon.
+constexpr std::string_view packed_prefix = "packed:";
+
+bool is_packed_line(std::string_view line) {
+  return line.starts_with(packed_prefix) && line.find(';') == std::string_view::npos;
+}
+
+void print(const Json& object) {
+  const std::string line = line_of(object);
+  std::fwrite(line.data(), 1, line.size(), stdout);
+}
+
+// Datagrams, one a line.
+class DatagramLines {
+ public:
+  void on_line(std::uint64_t number, std::string_view line) {
+    Json object{{"line", number}};
+    if (!(is_packed_line(line) ? add_packed(object, line) : add_plain(object, line))) {
+      any_bad_ = true;
+    }
+    print(object);
+  }
+  void on_long_line(std::uint64_t number, std::uint64_t size) {
+    any_bad_ = true;
+    ReadResult result;
+    result.error = ReadError::length;
+    result.position = max_datagram;
+    Json object{{"line", number}, {"ok", false}};
+    object.update(bad_datagram_json(result));
+    object["size"] = size;
+    print(object);
+  }
+  void finish() {}
+  bool any_bad() const { return any_bad_; }
+
+ private:
+  static bool add_plain(Json& object, std::string_view line) {
+    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): characters as bytes
+    return add_datagram_json(object, reinterpret_cast<const std::uint8_t*>(line.data()),
+                             line.size(), DatagramForm::plain);
+  }
+  static bool add_packed(Json& object, std::string_view line) {
+    const std::string_view hex = line.substr(packed_prefix.size());
+    std::array<std::uint8_t, max_datagram> bytes;  // a line holds no more characters
+    const std::size_t size = hex.size() / 2;
+    bool good = hex.size() % 2 == 0;
+    for (std::size_t i = 0; good && i < size; ++i) {
+      std::uint32_t byte = 0;
+      good = parse_hex(Text(hex.substr(2 * i, 2)), byte);
+      bytes[i] = static_cast<std::uint8_t>(byte);
+    }
+    if (good) {
+      good = add_datagram_json(object, bytes.data(), size, DatagramForm::packed);
+    } else {
+      object.update({{"ok", false}, {"error", "packed"}, {"reason", "hex"}});
+    }
+    if (object.value("error", "") == "packed") object["text"] = escaped(line);
+    return good;
+  }
+
+  bool any_bad_ = false;
+};
+
+template <class Reader>
+int decode_lines(Input& input, Reader& reader) {
+  NumberedLines lines;
+  const auto line = [&](std::uint64_t number, std::string_view text) {
+    reader.on_line(number, text);
+  };
+  const auto too_long = [&](std::uint64_t number, std::uint64_t size) {
+    reader.on_long_line(number, size);
+  };
+  for (std::string_view bytes = input.read(); !bytes.empty(); bytes = input.read()) {
+    lines.push(bytes, line, too_long);
+    std::fflush(stdout);  // a pipe's reader need not wait for more
+  }
+  lines.finish(line, too_long);
+  reader.finish();
+  return reader.any_bad() ? static_cast<int>(ErrorKind::data) : 0;
+}
+
+int decode(const Options& options) {
+  Input input(options.file);
+  if (options.candump) {
+    BusLog log(print);
+    return decode_lines(input, log);
+  }
+  DatagramLines datagrams;
+  return decode_lines(input, datagrams);
+}
+
+constexpr const char* footer = R"(One JSON object for each line of input that is not empty:
+  line, ok      the line's number from 1; is it a valid datagram
+  type          state, heartbeat, command, nack or identity
+  pnum, t       packet number and time, null where it has none
+  fields        the other fields: numbers as numbers, several values as an array
+  error         length, syntax or crc, with the position of the byte where it went wrong
+  expected, found   for crc: the checksum of the bytes, and the one that they claim
+  packed        of a line packed:HEX (r4 encode --packed, docs/packed.md): its size in bytes;
+                the rest is about the datagram that it holds
+  error packed  it holds none; reason: hex (not pairs of hexadecimal digits), length, version
+                (of a later one: update r4) or syntax
+  text          the datagram; bytes that are no printable ASCII, and \, as \xNN
+
+--candump reads what candump prints, candump -L best, and joins the frames of every interface and
+node to datagrams. Before those keys, and with the line and time of the last frame:
+  time          as in the dump: seconds, or a date as text; null where it has none
+  interface, node, from, lane   from host: command; from board: reply, telemetry
+  frames, took_ms   how many it took, and how long from the first to the last
+  type          also emergency_stop, and went_safe with its reason
+  error isotp   a transfer that failed, and why: a receiver on the bus lost it, too
+  error candump a line that is none of candump's: reason and fix
+The last object is the summary. It counts what is not printed: flow control, orphans (frames
+without the beginning of their transfer), unfinished transfers, frames that are none of ours (other),
+error frames of the controller.
+
+Examples:
+  r4 encode O:358,1,1 | r4 decode
+  r4 encode O:358,1,1 --packed | r4 decode
+  cut -f2 tests/data/paper_capture.tsv | r4 decode
+  candump -L can0 | r4 decode --candump
+  r4 decode --candump bus.log | jq -c 'select(.node == 3 and .lane == "command")'
+
+Exit codes: 0 every datagram is valid; 1 at least one is not, or with --candump a transfer failed or
+a line is damaged; 4, 5 the file cannot be read.)";
+
+}  // namespace
+
+void add_decode(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* const command = add_subcommand(
+      root, chosen, "decode", "Check datagrams and show them as JSON", footer, options, decode);
+  add_text(*command, "FILE", options->file, "datagrams, one a line (default: standard input)",
+           file_type);
+  add_flag(*command, "--candump", options->candump, "the file is what candump printed");
+}
+
+}  // namespace r4::tool

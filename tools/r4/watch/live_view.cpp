@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The status that `r4 monitor` redraws on a terminal.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <deque>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "host/commands/command_help.hpp"
+#include "../shell/json.hpp"
+#include "monitor_view.hpp"
+#include "../shell/output.hpp"
+
+namespace r4::tool {
+namespace {
+
+constexpr std::size_t most_notes = 4;
+// More than a board has: what else a state names is not kept.
+constexpr std::size_t most_fields = 128;
+constexpr std::size_t cell_width = 24;  // "SERVO16POS          2000"
+
+class LiveView final : public MonitorView {
+ public:
+  explicit LiveView(const AsyncBoard& board) : board_(board) {}
+
+  void on_state(const Datagram& datagram) override {
+    for (const Field& field : datagram) {
+      if (field.name() == Text("PNum") || field.name() == Text("T")) continue;
+      if (field.name() == name_of(StateField::fault)) continue;  // the first lines tell
+      std::string name(field.name().data(), field.name().size());
+      const auto known = std::find_if(fields_.begin(), fields_.end(),
+                                      [&](const auto& each) { return each.first == name; });
+      if (known == fields_.end() && fields_.size() == most_fields) continue;
+      std::string& value =
+          known != fields_.end() ? known->second : fields_.emplace_back(std::move(name), "").second;
+      value.assign(field.values().data(), field.values().size());
+    }
+    State state;
+    fault_ = read_state(datagram, state) ? state.fault : ChipFault();
+    pnum_ = datagram.pnum();
+    t_ms_ = datagram.time_ms();
+  }
+  void on_heartbeat(const Datagram&) override { ++heartbeats_; }
+  void on_nack(const Nack& nack, const Datagram&) override {
+    if (nack.code == Refusal::busy) return;  // the first line says so
+    note(fmt::format("refused PNum {}: {}", nack.pnum, meaning_of(nack.code)));
+  }
+  void on_bad_datagram(const ReadResult& result, std::string_view) override {
+    note(fmt::format("a damaged datagram ({})", to_text(result.error)));
+  }
+  void on_link(const LinkStatus& status) override { note(link_text(status)); }
+  void on_event(const CarrierEvent& event) override {
+    note(event.kind == CarrierEvent::Kind::up ? event.problem.thing + ": up"
+                                              : event.problem.text());
+  }
+
+  void on_tick() override {
+    if (!output_has_room()) return;  // Ctrl-S
+    std::vector<std::string> lines = status_lines();
+    add_fields(lines, std::max<std::size_t>(1, Screen::columns() / cell_width));
+    lines.emplace_back();
+    for (const std::string& each : notes_) lines.push_back(each);
+    screen_.draw(std::move(lines));
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void note(std::string text) {
+    const auto seconds = std::chrono::duration<double>(Clock::now() - start_).count();
+    notes_.push_back(fmt::format("{:8.1f} s  {}", seconds, escaped(text)));
+    if (notes_.size() > most_notes) notes_.pop_front();
+  }
+
+  std::vector<std::string> status_lines() const {
+    const Statistics now = board_.statistics();
+    const BoardIdentity& id = board_.identity();
+    std::vector<std::string> lines;
+    lines.push_back(
+        fmt::format("{}   {}   (Ctrl-C ends)", board_.name(), link_text(board_.link())));
+    if (!id.board_id.empty()) {
+      lines.push_back(
+          fmt::format("board {}, firmware {}, {}", id.board_id, id.firmware, id.capabilities));
+    }
+    lines.push_back(
+        fmt::format("{:.1f} Hz   lost {} ({:.2f} %)   damaged {}   round trip {:.0f} us   "
+                    "jitter {:.0f} us   age {:.0f} ms",
+                    now.state_rate_hz, now.packets.lost, now.loss() * 100, now.damaged,
+                    now.round_trip_us, now.jitter_us, now.state_age_us / 1000));
+    lines.push_back(fmt::format("PNum {}   T {} ms   states {}   heartbeats {} in, {} out", pnum_,
+                                t_ms_, now.states, heartbeats_, now.heartbeats));
+    if (fault_.any()) {
+      lines.push_back(fmt::format("{}: {}", chip_name(fault_.address), to_text(fault_.trouble)));
+    }
+    lines.emplace_back();
+    return lines;
+  }
+
+  // The fields in columns, read downwards.
+  void add_fields(std::vector<std::string>& lines, std::size_t columns) const {
+    const std::size_t rows = (fields_.size() + columns - 1) / columns;
+    for (std::size_t row = 0; row < rows; ++row) {
+      std::string line;
+      for (std::size_t i = row; i < fields_.size(); i += rows) {
+        line += fmt::format("{:<11}{:>10}   ", fields_[i].first, fields_[i].second);
+      }
+      lines.push_back(std::move(line));
+    }
+  }
+
+  const AsyncBoard& board_;
+  const Clock::time_point start_ = Clock::now();
+  std::vector<std::pair<std::string, std::string>> fields_;
+  std::deque<std::string> notes_;
+  ChipFault fault_;
+  std::uint32_t pnum_ = 0;
+  std::uint64_t t_ms_ = 0;
+  std::uint64_t heartbeats_ = 0;
+  Screen screen_;
+};
+
+}  // namespace
+
+std::unique_ptr<MonitorView> make_live_view(const AsyncBoard& board) {
+  return std::make_unique<LiveView>(board);
+}
+
+}  // namespace r4::tool

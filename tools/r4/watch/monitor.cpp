@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 monitor: shows what a board says, and keeps its link alive meanwhile.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <asio/io_context.hpp>
+#include <asio/signal_set.hpp>
+#include <asio/steady_timer.hpp>
+#include <chrono>
+#include <csignal>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/async_board.hpp"
+#include "host/explain.hpp"
+#include "../shell/key_file.hpp"
+#include "monitor_bus.hpp"
+#include "monitor_view.hpp"
+#include "../shell/options.hpp"
+#include "../shell/subcommands.hpp"
+#include "transports/can/can_interface.hpp"
+#include "transports/error.hpp"
+#include "transports/url.hpp"
+
+namespace r4::tool {
+namespace {
+
+constexpr Milliseconds tick{100};
+// With --count alone: how long a board may stay silent from the start.
+constexpr Milliseconds patience{5000};
+
+struct Options {
+  std::vector<std::string> urls;
+  bool json = false;
+  std::uint64_t count = 0;  // 0: no end
+  std::optional<Milliseconds> duration;
+  std::string fields;
+  std::string key;
+};
+
+class Monitor {
+ public:
+  explicit Monitor(const Options& options)
+      : options_(options),
+        url_(one_url(options.urls)),
+        board_(io_, url_, board_options(options)),
+        view_(options.json                   ? make_json_view(board_)
+              : ::isatty(STDOUT_FILENO) != 0 ? make_live_view(board_)
+                                             : make_plain_view()),
+        signals_(io_, SIGINT, SIGTERM),
+        tick_(io_),
+        end_(io_) {}
+
+  int run() {
+    connect();
+    board_.open();
+    signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
+    end_after(options_.duration ? *options_.duration : patience);
+    next_tick();
+    io_.run();
+    view_->on_end();
+    view_->on_tick();
+    const std::uint64_t skipped = view_->skipped();
+    if (skipped != 0) {
+      fmt::print(stderr, "r4: {} lines were left out: whoever reads the output is too slow\n",
+                 skipped);
+    }
+    const Statistics statistics = board_.statistics();
+    board_.close();
+    view_.reset();
+    if (statistics.received == 0) throw silence(statistics);
+    return 0;
+  }
+
+ private:
+  static BoardOptions board_options(const Options& options) {
+    BoardOptions board_options = with_key(options.key);
+    board_options.session.arming = Arming::off;  // it drives nothing
+    if (!options.fields.empty()) board_options.session.fields = options.fields;
+    return board_options;
+  }
+
+  void connect() {
+    board_.on_state([this](const State&, const Datagram& datagram) {
+      view_->on_state(datagram);
+      if (++states_ == options_.count) io_.stop();
+    });
+    board_.on_board_heartbeat([this](const Datagram& d) { view_->on_heartbeat(d); });
+    board_.on_nack([this](const Nack& nack, const Datagram& d) { view_->on_nack(nack, d); });
+    board_.on_bad_datagram([this](const ReadResult& result, std::string_view bytes) {
+      view_->on_bad_datagram(result, bytes);
+    });
+    board_.on_link([this](const LinkStatus& status) { view_->on_link(status); });
+    board_.on_event([this](const CarrierEvent& event) { view_->on_event(event); });
+  }
+
+  void end_after(Milliseconds time) {
+    end_.expires_after(time);
+    end_.async_wait([this](const std::error_code& error) {
+      if (error) return;
+      const bool waited_in_vain = options_.count != 0 && board_.statistics().received == 0;
+      if (options_.duration || waited_in_vain) io_.stop();
+    });
+  }
+
+  void next_tick() {
+    tick_.expires_after(tick);
+    tick_.async_wait([this](const std::error_code& error) {
+      if (error) return;
+      view_->on_tick();
+      next_tick();
+    });
+  }
+
+  Error silence(const Statistics& statistics) const {
+    if (statistics.damaged != 0) {
+      return {ErrorKind::refused, url_,
+              fmt::format("{} datagrams came, none of them valid", statistics.damaged),
+              "see that it is an R4 board, and that both ends have the same speed"};
+    }
+    return Error(explain(url_, board_.link()));
+  }
+
+  const Options& options_;
+  const std::string url_;
+  asio::io_context io_{1};
+  AsyncBoard board_;
+  std::unique_ptr<MonitorView> view_;
+  asio::signal_set signals_;
+  asio::steady_timer tick_;
+  asio::steady_timer end_;
+  std::uint64_t states_ = 0;
+};
+
+// can://can0 and nothing else: all boards.
+bool is_whole_bus(const std::string& text) {
+  const Url url = Url::parse(text);
+  return url.scheme() == "can" && text.find('?') == std::string::npos;
+}
+
+int monitor(const Options& options) {
+  if (options.urls.size() == 1 && is_whole_bus(options.urls.front())) {
+    const Url url = Url::parse(options.urls.front());
+    const std::string& interface = can_interface_of(url);
+    if (!options.fields.empty()) {
+      throw Error(ErrorKind::usage, "--fields", "only one board can be asked for its fields",
+                  "name the board: " + url.text() + "?node=1");
+    }
+    monitor_bus({interface, options.json, options.count, options.duration});
+    return 0;
+  }
+  return Monitor(options).run();
+}
+
+constexpr const char* footer =
+    R"(On a terminal: a status, redrawn in place. Into a pipe: one line a state. With --json: one object a
+line, with type (state, heartbeat, link, nack, error), transport, pnum, t and fields (numbers as
+numbers, several values as an array); of one board on a CAN bus, at the end, one of type transfers.
+
+The monitor takes part in the link: it sends heartbeats, so the board streams and, unless another
+host has it, obeys this one. It goes on when the transport is lost and comes back. On a CAN bus without
+a node it only listens, and shows every board that it hears.
+
+Examples:
+  r4 monitor udp://192.168.0.125
+  r4 monitor serial:auto --fields DEFAULT,ENC1,US1
+  r4 monitor can://can0                 every board on the bus; can://can0?node=3 is one
+  r4 monitor udp://127.0.0.1 --json --count 100 | jq .fields.AIN24
+
+Exit codes: 0 ended by --count, --duration or Ctrl-C; 3 nothing was heard; 2 usage; 4 the transport
+cannot be opened; 5 permission denied.)";
+
+}  // namespace
+
+void add_monitor(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* const command = add_subcommand(root, chosen, "monitor", "Show what a board says, live",
+                                           footer, options, monitor);
+  add_urls(*command, options->urls);
+  add_json(*command, options->json, "print JSON, one object a line");
+  add_number(*command, "--count", options->count, 1, ~std::uint64_t{0},
+             "end after that many states (or 5 s in which nothing at all is heard)");
+  add_seconds(*command, "--duration", options->duration, "end after that time");
+  add_fields(*command, options->fields);
+  add_key(*command, options->key);
+}
+
+}  // namespace r4::tool

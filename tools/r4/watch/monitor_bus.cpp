@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "monitor_bus.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <array>
+#include <asio/io_context.hpp>
+#include <asio/signal_set.hpp>
+#include <asio/steady_timer.hpp>
+#include <chrono>
+#include <csignal>
+#include <string>
+#include <vector>
+
+#include "../shell/json.hpp"
+#include "../shell/output.hpp"
+#include "protocol/messages/message.hpp"
+#include "transports/can/can_listener.hpp"
+
+namespace r4::tool {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr Milliseconds tick{100};
+constexpr Milliseconds plain_interval{1000};
+// Boards without a host say so twice a second.
+constexpr Milliseconds patience{5000};
+// The load of the bus is not asked here: `r4 bus` is for that.
+constexpr CanBitRate any_rate{1000000, 0};
+
+class BusMonitor {
+ public:
+  explicit BusMonitor(const BusMonitorOptions& options)
+      : options_(options),
+        listener_(io_, options.interface, any_rate),
+        signals_(io_, SIGINT, SIGTERM),
+        tick_(io_),
+        end_(io_),
+        live_(!options.json && ::isatty(STDOUT_FILENO) != 0) {}
+
+  void run() {
+    listener_.survey().on_datagram(
+        [this](std::uint8_t node, const Datagram& datagram) { on_datagram(node, datagram); });
+    listener_.survey().on_stop([this] { on_stop(); });
+    listener_.on_event([this](const CarrierEvent& event) { on_event(event); });
+    signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
+    end_.expires_after(options_.duration.value_or(patience));
+    end_.async_wait([this](const std::error_code& error) {
+      if (!error && (options_.duration || (options_.count != 0 && !any_heard()))) io_.stop();
+    });
+    next_tick();
+    io_.run();
+    lines_.print_held();
+    if (!any_heard()) {
+      throw Error(ErrorKind::refused, name(), "no board was heard",
+                  "see that boards are connected and have this bus's bit rate; r4 list shows it");
+    }
+    show();
+  }
+
+ private:
+  std::string name() const { return "can://" + options_.interface; }
+  const HeardBoard& board(std::uint8_t node) const { return listener_.survey().board(node); }
+  bool any_heard() const {
+    for (std::uint8_t node = 0; node < can_nodes; ++node) {
+      if (board(node).heard()) return true;
+    }
+    return false;
+  }
+
+  void on_datagram(std::uint8_t node, const Datagram& datagram) {
+    if (io_.stopped()) return;  // frames that came together with the last one
+    if (options_.json) {
+      Json object{{"type", to_text(kind_of(datagram))},
+                  {"transport", fmt::format("{}?node={}", name(), node)},
+                  {"node", node},
+                  {"pnum", datagram.pnum()},
+                  {"t", datagram.time_ms()},
+                  {"fields", fields_json(datagram)}};
+      lines_.print_or_skip(line_of(object));
+    }
+    if (kind_of(datagram) == MessageKind::state && ++states_ == options_.count) io_.stop();
+  }
+  void on_stop() {
+    if (options_.json) {
+      lines_.print(line_of({{"type", "emergency_stop"}, {"transport", name()}}));
+    } else if (!live_) {
+      lines_.print("emergency stop of a host\n");
+    } else {
+      ++stops_;
+    }
+  }
+  void on_event(const CarrierEvent& event) {
+    const Problem& problem = event.problem;
+    const bool up = event.kind == CarrierEvent::Kind::up;
+    note_ = up ? "" : problem.text();
+    if (options_.json) {
+      lines_.print(
+          line_of({{"type", up ? "link" : "error"},
+                   {"transport", name()},
+                   {"fields", {{"up", up}, {"reason", problem.reason}, {"fix", problem.fix}}}}));
+    } else if (!live_) {
+      lines_.print(up ? name() + ": up\n" : note_ + "\n");
+    }
+  }
+
+  void next_tick() {
+    tick_.expires_after(live_ ? tick : plain_interval);
+    tick_.async_wait([this](const std::error_code& error) {
+      if (error) return;
+      lines_.print_held();
+      show();
+      next_tick();
+    });
+  }
+
+  void show() {
+    if (options_.json || !output_has_room()) return;
+    const Clock::time_point now = Clock::now();
+    const double seconds = std::chrono::duration<double>(now - shown_).count();
+    if (live_ && seconds < 1 && !rows_.empty()) return;
+    rows_ = table(seconds);
+    shown_ = now;
+    if (live_) {
+      screen_.draw(rows_);
+    } else {
+      for (const std::string& row : rows_) print_text(row + "\n");
+    }
+  }
+
+  std::vector<std::string> table(double seconds) {
+    std::vector<std::string> rows;
+    if (live_) {
+      rows.push_back(fmt::format("{}   emergency stops {}   (Ctrl-C ends)", name(), stops_));
+      if (!note_.empty()) rows.push_back(note_);
+      rows.emplace_back();
+    }
+    rows.push_back(fmt::format("{:>4}  {:<18}{:>8}  {:>8}{:>9}{:>12}{:>12}", "node", "board", "Hz",
+                               "lost", "damaged", "PNum", "T"));
+    for (std::uint8_t node = 0; node < can_nodes; ++node) {
+      const HeardBoard& heard = board(node);
+      if (!heard.heard()) continue;
+      const std::uint64_t states = heard.states - states_before_[node];
+      states_before_[node] = heard.states;
+      rows.push_back(fmt::format("{:>4}  {:<18}{:>8.1f}  {:>8}{:>9}{:>12}{:>12}", node,
+                                 status(heard), static_cast<double>(states) / seconds, heard.lost,
+                                 heard.damaged, heard.pnum, heard.t_ms));
+    }
+    return rows;
+  }
+
+  static std::string status(const HeardBoard& heard) {
+    constexpr std::uint32_t silence_us = 1500000;  // three heartbeats
+    if (CanBus::now_us() - heard.heard_us > silence_us) return "silent";
+    if (heard.reason != SafeReason::none) return fmt::format("SAFE ({})", to_text(heard.reason));
+    return heard.connected ? "ACTIVE" : "CONNECTING";
+  }
+
+  const BusMonitorOptions& options_;
+  asio::io_context io_{1};
+  CanListener listener_;
+  asio::signal_set signals_;
+  asio::steady_timer tick_;
+  asio::steady_timer end_;
+  const bool live_;
+  OutputLines lines_;
+  Screen screen_;
+  std::vector<std::string> rows_;
+  std::string note_;
+  Clock::time_point shown_ = Clock::now();
+  std::array<std::uint64_t, can_nodes> states_before_{};
+  std::uint64_t states_ = 0;
+  std::uint64_t stops_ = 0;
+};
+
+}  // namespace
+
+void monitor_bus(const BusMonitorOptions& options) { BusMonitor(options).run(); }
+
+}  // namespace r4::tool

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "monitor_view.hpp"
+
+#include <fmt/format.h>
+
+#include <string>
+#include <utility>
+
+#include "host/commands/command_help.hpp"
+#include "host/explain.hpp"
+#include "../shell/json.hpp"
+#include "../shell/output.hpp"
+#include "protocol/link/host_link.hpp"
+
+namespace r4::tool {
+namespace {
+
+std::string_view view(Text text) { return {text.data(), text.size()}; }
+
+// Of a damaged datagram. A byte takes up to five (\\xNN), and a pipe with room has it for 4096.
+constexpr std::size_t most_shown = 600;
+
+std::string shown(std::string_view bytes) {
+  return escaped(bytes.substr(0, most_shown)) + (bytes.size() > most_shown ? "..." : "");
+}
+
+class JsonView final : public MonitorView {
+ public:
+  explicit JsonView(const AsyncBoard& board) : board_(board) {}
+
+  void on_state(const Datagram& datagram) override { print("state", datagram); }
+  void on_heartbeat(const Datagram& datagram) override { print("heartbeat", datagram); }
+  void on_nack(const Nack&, const Datagram& datagram) override { print("nack", datagram); }
+  void on_bad_datagram(const ReadResult& result, std::string_view bytes) override {
+    Json fields = bad_datagram_json(result);
+    fields["text"] = shown(bytes);
+    lines_.print_or_skip(line_of(object("error", std::move(fields))));
+  }
+  void on_link(const LinkStatus& status) override {
+    Json fields{{"up", up_},
+                {"state", to_text(status.state)},
+                {"reason", to_text(status.reason)},
+                {"busy", status.busy},
+                {"gated", status.gated}};
+    if (status.key != KeyTrouble::none) fields["key"] = to_text(status.key);
+    lines_.print(line_of(object("link", std::move(fields))));
+  }
+  void on_event(const CarrierEvent& event) override {
+    if (event.kind != CarrierEvent::Kind::warning) up_ = event.kind == CarrierEvent::Kind::up;
+    if (event.kind != CarrierEvent::Kind::up) {
+      const Problem& problem = event.problem;
+      lines_.print(line_of(object(
+          "error", {{"error", "transport"}, {"reason", problem.reason}, {"fix", problem.fix}})));
+    }
+    on_link(board_.link());
+  }
+  void on_end() override {
+    Json transfers = transfers_json(board_.carrier_counters());
+    if (!transfers.is_null()) lines_.print(line_of(object("transfers", std::move(transfers))));
+  }
+  void on_tick() override { lines_.print_held(); }
+  std::uint64_t skipped() const override { return lines_.skipped(); }
+
+ private:
+  Json object(const char* type, Json fields) const {
+    return {{"type", type},
+            {"transport", board_.name()},
+            {"pnum", nullptr},
+            {"t", nullptr},
+            {"fields", std::move(fields)}};
+  }
+  void print(const char* type, const Datagram& datagram) {
+    Json json = object(type, fields_json(datagram));
+    json["pnum"] = datagram.pnum();
+    json["t"] = datagram.time_ms();
+    lines_.print_or_skip(line_of(json));
+  }
+
+  const AsyncBoard& board_;
+  OutputLines lines_;
+  bool up_ = true;
+};
+
+class PlainView final : public MonitorView {
+ public:
+  void on_state(const Datagram& datagram) override {
+    std::string line = fmt::format("state {:>10} T {:>10} ", datagram.pnum(), datagram.time_ms());
+    for (const Field& field : datagram) {
+      if (field.name() == Text("PNum") || field.name() == Text("T")) continue;
+      line += fmt::format(" {}:{}", view(field.name()), view(field.values()));
+    }
+    line += '\n';
+    lines_.print_or_skip(line);
+  }
+  void on_heartbeat(const Datagram&) override {}
+  void on_nack(const Nack& nack, const Datagram&) override {
+    lines_.print_or_skip(fmt::format("refused PNum {}: {}\n", nack.pnum, meaning_of(nack.code)));
+  }
+  void on_bad_datagram(const ReadResult& result, std::string_view bytes) override {
+    lines_.print_or_skip(fmt::format("damaged datagram ({} at byte {}): {}\n",
+                                     to_text(result.error), result.position, shown(bytes)));
+  }
+  void on_link(const LinkStatus& status) override {
+    lines_.print(fmt::format("link: {}\n", link_text(status)));
+  }
+  void on_event(const CarrierEvent& event) override {
+    if (event.kind == CarrierEvent::Kind::up) {
+      lines_.print(fmt::format("{}: up\n", event.problem.thing));
+    } else {
+      lines_.print(event.problem.text() + "\n");
+    }
+  }
+  void on_tick() override { lines_.print_held(); }
+  std::uint64_t skipped() const override { return lines_.skipped(); }
+
+ private:
+  OutputLines lines_;
+};
+
+}  // namespace
+
+std::unique_ptr<MonitorView> make_json_view(const AsyncBoard& board) {
+  return std::make_unique<JsonView>(board);
+}
+
+std::unique_ptr<MonitorView> make_plain_view() { return std::make_unique<PlainView>(); }
+
+std::string link_text(const LinkStatus& status) {
+  std::string text;
+  switch (status.state) {
+    case HostLinkState::connecting:
+      text = "CONNECTING";
+      break;
+    case HostLinkState::active:
+      text = "ACTIVE";
+      break;
+    case HostLinkState::safe:
+      text = fmt::format("SAFE ({})", to_text(status.reason));
+      break;
+    case HostLinkState::lost:
+      text = "LOST: the board is silent";
+      break;
+  }
+  if (status.busy) text += ", another host controls the board";
+  if (status.gated) text += ", our heartbeats are stopped";
+  if (status.key != KeyTrouble::none) text += ", " + explain(status.key).text();
+  return text;
+}
+
+}  // namespace r4::tool

@@ -1,0 +1,427 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "can_bus.hpp"
+
+#include <fmt/format.h>
+#include <linux/can/error.h>
+#include <sched.h>
+
+#include <algorithm>
+#include <asio/defer.hpp>
+#include <asio/post.hpp>
+#include <cerrno>
+#include <map>
+#include <utility>
+
+#include "can_interface.hpp"
+#include "../framing/can/can_ids.hpp"
+
+namespace r4 {
+namespace {
+
+constexpr const char* not_acknowledged = "nobody acknowledges";
+constexpr const char* error_passive = "the controller is error-passive";
+constexpr const char* error_warning = "the controller warns of errors";
+constexpr const char* look_at_the_wire = "look at wiring, termination and bit rate";
+constexpr std::chrono::milliseconds retry_interval{1};
+constexpr std::chrono::milliseconds look_interval{100};
+constexpr int most_looks = 8;  // others of the loop wait
+// What a program on an emulated processor takes to answer.
+constexpr std::chrono::microseconds most_polling{400};
+// Then the loop sleeps if nothing is there: who calls its poll() gets back.
+constexpr std::chrono::milliseconds most_awake{10};
+
+Problem filter_problem(const std::string& interface, int error) {
+  Problem problem = can_problem(interface, error);
+  if (problem.fix.empty()) {
+    problem.reason =
+        "the kernel does not take the filters for what is to be heard: " + problem.reason;
+    problem.fix = "use fewer nodes of one interface in one program; the kernel takes 512 filters";
+  }
+  return problem;
+}
+
+// The buses of one event loop.
+class Buses : public asio::execution_context::service {
+ public:
+  using key_type = Buses;
+  static asio::execution_context::id id;
+  explicit Buses(asio::execution_context& context) : service(context) {}
+  void shutdown() noexcept override {}
+
+  std::map<std::pair<std::string, bool>, std::weak_ptr<CanBus>> buses;
+};
+asio::execution_context::id Buses::id;
+
+}  // namespace
+
+std::shared_ptr<CanBus> CanBus::of(asio::io_context& io, const std::string& interface, bool fd) {
+  std::weak_ptr<CanBus>& known = asio::use_service<Buses>(io).buses[{interface, fd}];
+  std::shared_ptr<CanBus> bus = known.lock();
+  if (!bus) {
+    bus = std::make_shared<CanBus>(io, interface, fd);
+    known = bus;
+    bus->look_at_controller();
+  }
+  return bus;
+}
+
+CanBus::CanBus(asio::io_context& io, std::string interface, bool fd)
+    : io_(io),
+      interface_(std::move(interface)),
+      fd_(fd),
+      readable_(io),
+      writable_(io),
+      retry_timer_(io),
+      look_timer_(io),
+      polling_(most_polling) {
+  socket_.open(interface_, fd_);
+  readable_.assign(socket_.number());
+  listen();
+}
+
+CanBus::~CanBus() {
+  writable_.stop();
+  if (readable_.is_open()) readable_.release();  // the socket owns it
+}
+
+void CanBus::join(Member& member, std::vector<std::uint32_t> ids) {
+  members_.push_back({&member, std::move(ids), false});
+  hear();
+}
+
+void CanBus::join_all(Member& member) {
+  members_.push_back({&member, {}, true});
+  hear();
+}
+
+void CanBus::leave(Member& member) noexcept {
+  for (Place& place : members_) {
+    if (place.member == &member) place.member = nullptr;
+  }
+  std::replace(out_of_.begin(), out_of_.end(), &member, static_cast<Member*>(nullptr));
+  clear_places();
+}
+
+bool CanBus::has(const Member* member) const {
+  return std::any_of(members_.begin(), members_.end(),
+                     [member](const Place& place) { return place.member == member; });
+}
+
+// Not while somebody goes through them.
+void CanBus::clear_places() {
+  if (calling_ != 0 || sending_) return;
+  if (std::erase_if(members_, [](const Place& place) { return place.member == nullptr; }) != 0)
+    hear();
+}
+
+// A bus that hears less than its members think is down. They are told from the loop, for one of them
+// may just be joining or leaving.
+void CanBus::hear() {
+  if (socket_.number() < 0 || set_filters()) return;
+  asio::post(io_, deafness_.handler(
+                      [this, error = errno] { go_down(filter_problem(interface_, error), true); }));
+}
+
+// False: the kernel does not take them; errno tells why.
+bool CanBus::set_filters() {
+  std::vector<std::uint32_t> ids;
+  for (const Place& place : members_) {
+    if (place.member == nullptr) continue;
+    if (place.all) return socket_.hear_everything();
+    ids.insert(ids.end(), place.ids.begin(), place.ids.end());
+  }
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  return socket_.hear(ids);
+}
+
+// Members may leave, and others join, in any call of theirs: those come later than what is told.
+template <class Action>
+void CanBus::for_each_member(Action action) {
+  ++calling_;
+  const std::size_t count = members_.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (members_[i].member != nullptr) action(*members_[i].member);
+  }
+  --calling_;
+  clear_places();
+}
+
+// --- receiving
+
+void CanBus::listen() {
+  readable_.async_wait(asio::posix::descriptor_base::wait_read, reading_.handler([this] {
+    woken_ = Clock::now();
+    receive();
+  }));
+}
+
+bool CanBus::someone_awaits_a_frame() const {
+  return std::any_of(members_.begin(), members_.end(), [](const Place& place) {
+    return place.member != nullptr && place.member->awaits_frame();
+  });
+}
+
+void CanBus::receive() {
+  const std::shared_ptr<CanBus> alive = shared_from_this();
+  if (take()) send();
+  if (socket_.number() < 0) return;
+  if (!socket_.simulated()) return listen();
+  const Clock::time_point now = Clock::now();
+  polling_.on_silence(someone_awaits_a_frame() ? AdaptivePolling::Silence::within
+                                               : AdaptivePolling::Silence::between,
+                      now);
+  const bool tired = now - woken_ >= most_awake;
+  if (tired || !polling_.worthwhile(now)) return listen();
+  ::sched_yield();  // to the sender, if they share a processor
+  asio::defer(io_, reading_.handler([this] { receive(); }));
+}
+
+bool CanBus::take() {
+  if (receiving_) return false;
+  bool any = false;
+  for (int looks = 0; looks < most_looks && socket_.number() >= 0; ++looks) {
+    const int count = socket_.receive(in_);
+    if (count == -EAGAIN || count == -EINTR) break;
+    if (count < 0) {
+      go_down(can_problem(interface_, -count), true);
+      return true;
+    }
+    if (!std::exchange(any, true)) polling_.on_arrival(Clock::now());
+    hand_over(static_cast<std::size_t>(count));
+    if (static_cast<std::size_t>(count) < in_.size()) break;
+  }
+  if (any && socket_.number() >= 0) {
+    for_each_member([](Member& member) { member.on_drained(); });
+  }
+  return any;
+}
+
+void CanBus::hand_over(std::size_t count) {
+  receiving_ = true;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (in_[i].error != 0) {
+      on_error_frame(in_[i]);
+      continue;
+    }
+    if (!in_[i].local) {
+      // Whoever hears others is on the bus, whatever was told of before.
+      if (!up_ || (standing_ && standing_->problem.reason == not_acknowledged)) come_up();
+    } else if (!up_ && classify(in_[i].frame).kind != CanIdKind::emergency_stop) {
+      continue;  // it did not get to the bus
+    }
+    const std::uint32_t at_us = to_us(in_[i].at);
+    for_each_member([&](Member& member) { member.on_frame(in_[i].frame, at_us); });
+  }
+  receiving_ = false;
+}
+
+void CanBus::on_error_frame(const CanSocket::Received& received) {
+  if ((received.error & CAN_ERR_BUSOFF) != 0) return go_bus_off();
+  if ((received.error & CAN_ERR_RESTARTED) != 0) return come_up();
+  if ((received.error & CAN_ERR_CRTL) != 0) {
+    const std::uint8_t controller = received.frame.data[1];
+    if ((controller & CAN_ERR_CRTL_RX_OVERFLOW) != 0) ++controller_overflows_;
+    if ((controller & CAN_ERR_CRTL_ACTIVE) != 0) {
+      come_up();
+    } else if ((controller & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0) {
+      set_trouble(error_passive, look_at_the_wire);
+    } else if ((controller & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING)) != 0) {
+      set_trouble(error_warning, look_at_the_wire);
+    }
+  } else if ((received.error & CAN_ERR_ACK) != 0 && !standing_) {  // the least of them
+    set_trouble(not_acknowledged, "see that another node is on the bus, at this bit rate");
+  }
+}
+
+// An error frame comes when the state changes; who opens the socket later asks.
+void CanBus::look_at_controller() {
+  const std::string state = can_interface(interface_).state;
+  if (state == "bus-off") return go_bus_off();
+  if (!up_) come_up();
+  if (state == "error-passive") set_trouble(error_passive, look_at_the_wire);
+  if (state == "error-warning") set_trouble(error_warning, look_at_the_wire);
+}
+
+void CanBus::go_bus_off() {
+  go_down({ErrorKind::open, "can://" + interface_, "the controller is bus-off: too many errors",
+           fmt::format("{}, then: ip link set {} type can restart (slcan: down, and up); with "
+                       "restart-ms 100 it does so by itself",
+                       look_at_the_wire, interface_)},
+          false);
+}
+
+// Told once until it changes.
+void CanBus::set_trouble(std::string reason, std::string fix) {
+  if (!up_ || (standing_ && standing_->problem.reason == reason)) return;
+  standing_ = {CarrierEvent::Kind::warning,
+               Problem{ErrorKind::open, "can://" + interface_, std::move(reason), std::move(fix)}};
+  tell(*standing_);
+}
+
+// --- sending
+
+// Flow control behind a whole datagram of telemetry would come too late on a slow bus. What finds no
+// room is offered again with the rest.
+void CanBus::send_urgent(std::uint32_t now_us) {
+  CanFrame frame;
+  for (const Place& place : members_) {
+    while (place.member != nullptr && place.member->offer_urgent(now_us, frame) &&
+           socket_.send_first(frame) == CanSocket::Outcome::done) {
+      place.member->frame_sent(now_us);
+    }
+  }
+}
+
+// Takes what members offer, a transfer of one after the other. True if there is any. Not while some
+// are left: of what waits longer, members choose the newest.
+bool CanBus::refill(std::uint32_t now_us) {
+  std::size_t quiet = 0;
+  while (out_count_ < ahead && quiet < members_.size()) {
+    next_ %= members_.size();
+    Member* const member = members_[next_].member;
+    if (member != nullptr && member->offer(now_us, out_[out_count_])) {
+      out_of_[out_count_++] = member;
+      quiet = 0;
+      member->frame_sent(now_us);
+    } else {
+      ++next_;
+      ++quiet;
+    }
+  }
+  return out_count_ != 0;
+}
+
+// The first ones of the queue have got to the interface.
+void CanBus::have_left(std::size_t count) {
+  if (count != 0) progress_ = Clock::now();
+  for (std::size_t i = 0; late_ && i < count; ++i) {
+    if (out_of_[i] != nullptr) out_of_[i]->on_late_frame(out_[i], to_us(progress_));
+  }
+  const auto gone = static_cast<std::ptrdiff_t>(count);
+  const auto end = static_cast<std::ptrdiff_t>(out_count_);
+  std::move(out_.begin() + gone, out_.begin() + end, out_.begin());
+  std::move(out_of_.begin() + gone, out_of_.begin() + end, out_of_.begin());
+  out_count_ -= count;
+  late_ = out_count_ != 0;
+}
+
+void CanBus::drop_queue() {
+  out_count_ = 0;
+  late_ = false;
+}
+
+void CanBus::send() {
+  if (!up_ || sending_) return;
+  sending_ = true;
+  CanSocket::Outcome outcome = CanSocket::Outcome::done;
+  if (out_count_ == 0) progress_ = Clock::now();
+  send_urgent(now_us());
+  while (outcome == CanSocket::Outcome::done && (out_count_ != 0 || refill(now_us()))) {
+    std::size_t sent = 0;
+    outcome = socket_.send(out_.data(), out_count_, sent);
+    const int error = errno;
+    have_left(sent);
+    if (outcome == CanSocket::Outcome::failed) {
+      asio::post(
+          io_, retrying_.handler([this, error] { go_down(can_problem(interface_, error), true); }));
+    }
+  }
+  sending_ = false;
+  clear_places();
+  if (outcome == CanSocket::Outcome::done) {
+    writable_.stop();
+  } else if (outcome != CanSocket::Outcome::failed) {
+    send_later();
+  }
+  for_each_member([](Member& member) { member.on_sent(); });
+}
+
+// A socket that is writable tells so; a full interface queue does not.
+void CanBus::send_later() {
+  if (Clock::now() - progress_ > patience) {
+    drop_queue();
+    progress_ = Clock::now();
+    for_each_member([](Member& member) { member.on_stuck(); });
+  }
+  retry_timer_.expires_after(retry_interval);
+  retry_timer_.async_wait(retrying_.handler([this] { send(); }));
+  writable_.start(socket_.number(), [this] { send(); });
+}
+
+SendResult CanBus::send_stop(const CanFrame& frame) {
+  if (socket_.number() < 0) return SendResult::down;
+  switch (socket_.send_first(frame)) {
+    case CanSocket::Outcome::done:
+      return SendResult::sent;
+    case CanSocket::Outcome::busy:
+    case CanSocket::Outcome::full:
+      return SendResult::full;
+    case CanSocket::Outcome::failed:
+      break;
+  }
+  return SendResult::down;
+}
+
+// --- the interface
+
+void CanBus::go_down(Problem problem, bool reopen) {
+  const std::shared_ptr<CanBus> alive = shared_from_this();
+  drop_queue();
+  retrying_.cancel();
+  deafness_.cancel();
+  writable_.stop();
+  if (reopen) {
+    reading_.cancel();
+    if (readable_.is_open()) readable_.release();
+    socket_.close();
+    look_later();
+  }
+  be_down(std::move(problem));
+}
+
+// What keeps it down may change: it was bus-off or down, and now its adapter is gone.
+void CanBus::be_down(Problem problem) {
+  const bool was_up = std::exchange(up_, false);
+  if (!was_up && standing_ && standing_->problem.reason == problem.reason) return;
+  standing_ = {CarrierEvent::Kind::down, problem};
+  tell({was_up ? CarrierEvent::Kind::down : CarrierEvent::Kind::warning, std::move(problem)});
+}
+
+// Also when nothing was wrong but a warning.
+void CanBus::come_up() {
+  const bool troubled = standing_.has_value();
+  standing_.reset();
+  Problem problem{ErrorKind::open, "can://" + interface_, "", ""};
+  if (!std::exchange(up_, true)) return tell({CarrierEvent::Kind::up, std::move(problem)});
+  if (!troubled) return;
+  problem.reason = "the trouble is over";
+  tell({CarrierEvent::Kind::warning, std::move(problem)});
+}
+
+void CanBus::look_later() {
+  look_timer_.expires_after(look_interval);
+  look_timer_.async_wait(looking_.handler([this] { look(); }));
+}
+
+// Opened anew: the interface may be another one of the same name.
+void CanBus::look() {
+  const std::shared_ptr<CanBus> alive = shared_from_this();
+  try {
+    socket_.open(interface_, fd_);
+    if (!set_filters()) throw Error(filter_problem(interface_, errno));
+  } catch (const Error& error) {
+    socket_.close();
+    look_later();
+    return be_down(error.problem());
+  }
+  readable_.assign(socket_.number());
+  listen();
+  look_at_controller();
+}
+
+void CanBus::tell(CarrierEvent event) {  // a copy: it may be over before all know
+  for_each_member([&](Member& member) { member.on_bus(event); });
+}
+
+}  // namespace r4

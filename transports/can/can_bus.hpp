@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One CAN interface, shared by everything in an event loop that uses it: one socket with kernel
+// filters for the ids in use, frames read and written in batches, and its state as events.
+//
+// Each member hears all frames that any of them asked for, but none that a member sent. Frames
+// leave in the order in which members offer them; a member's transfer is not interrupted by
+// another's. At most `ahead` frames are taken from members at a time, the next when the interface has
+// them; after 100 ms without progress they are dropped.
+//
+// On a bus without a wire (vcan, vxcan) it stays awake for what is about to come.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <asio/io_context.hpp>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "../adaptive_polling.hpp"
+#include "can_socket.hpp"
+#include "../carrier.hpp"
+#include "../operation_slot.hpp"
+#include "../writable_wait.hpp"
+
+namespace r4 {
+
+class CanBus : public std::enable_shared_from_this<CanBus> {
+ public:
+  using Clock = CanSocket::Clock;
+  static constexpr std::size_t ahead = 32;
+  static constexpr std::chrono::milliseconds patience{100};
+
+  class Member {
+   public:
+    virtual void on_frame(const CanFrame& frame, std::uint32_t at_us) = 0;
+    virtual void on_drained() = 0;  // all frames that had arrived were handed over
+    // Is in the middle of a transfer whose next frame is another's, and may come at once.
+    virtual bool awaits_frame() const { return false; }
+    // The frame to send now, accepted with frame_sent().
+    virtual bool offer(std::uint32_t now_us, CanFrame& frame) = 0;
+    // The same, of those that may overtake what was accepted before.
+    virtual bool offer_urgent(std::uint32_t now_us, CanFrame& frame) = 0;
+    virtual void frame_sent(std::uint32_t now_us) = 0;
+    // That frame of its waited for the interface, and has got there.
+    virtual void on_late_frame(const CanFrame& frame, std::uint32_t now_us) {
+      static_cast<void>(frame);
+      static_cast<void>(now_us);
+    }
+    virtual void on_sent() = 0;  // all was asked for what they offer: time to set a timer
+    // The bus came up or went down (transfers are over), or the controller is in trouble.
+    virtual void on_bus(const CarrierEvent& event) = 0;
+    // The bus took nothing for too long: what was under way is lost.
+    virtual void on_stuck() = 0;
+
+   protected:
+    ~Member() = default;
+  };
+
+  // Microseconds of the clock that members are driven by; wraps.
+  static std::uint32_t to_us(Clock::time_point at) {
+    return static_cast<std::uint32_t>(
+        std::chrono::duration_cast<std::chrono::microseconds>(at.time_since_epoch()).count());
+  }
+  static std::uint32_t now_us() { return to_us(Clock::now()); }
+
+  // The bus of that interface in this event loop, opened if nobody has yet. Throws Error.
+  static std::shared_ptr<CanBus> of(asio::io_context& io, const std::string& interface, bool fd);
+
+  CanBus(asio::io_context& io, std::string interface, bool fd);
+  ~CanBus();
+  CanBus(const CanBus&) = delete;
+  CanBus& operator=(const CanBus&) = delete;
+
+  // A member hears the frames of `ids` (11 bits) until it leaves, or with join_all() every frame
+  // that is on the bus, extended and remote ones too.
+  void join(Member& member, std::vector<std::uint32_t> ids);
+  void join_all(Member& member);
+  void leave(Member& member) noexcept;
+  bool has(const Member* member) const;
+
+  // Members have something to offer.
+  void send();
+  // Hands over the frames that have arrived. Before somebody gives up waiting for one: a loop that
+  // was held up may find the time-out and the frame together. True if there were any.
+  bool take();
+  // A frame of the emergency stop, ahead of everything that waits in the interface's queue.
+  SendResult send_stop(const CanFrame& frame);
+
+  bool up() const { return up_; }
+  // What was told of last, if that is still so: for who has joined since.
+  const std::optional<CarrierEvent>& standing() const { return standing_; }
+  // Frames wait for the interface. None is asked for until it has taken them.
+  bool full() const { return out_count_ != 0; }
+  // Does one of them fulfil it?
+  template <class Predicate>
+  bool holds(Predicate predicate) const {
+    const auto end = out_.begin() + static_cast<std::ptrdiff_t>(out_count_);
+    return std::any_of(out_.begin(), end, predicate);
+  }
+  bool heard_rate_switch() const { return socket_.heard_rate_switch(); }
+  // Frames that were dropped, for nobody took them in time: by the kernel, and times that the
+  // controller told of some.
+  std::uint32_t overflows() const { return socket_.overflows() + controller_overflows_; }
+
+ private:
+  struct Place {
+    Member* member;  // null: has left
+    std::vector<std::uint32_t> ids;
+    bool all;
+  };
+
+  void listen();
+  void receive();
+  bool someone_awaits_a_frame() const;
+  void hand_over(std::size_t count);
+  void on_error_frame(const CanSocket::Received& received);
+  void send_urgent(std::uint32_t now_us);
+  bool refill(std::uint32_t now_us);
+  void have_left(std::size_t count);
+  void drop_queue();
+  void send_later();
+  void go_bus_off();
+  void set_trouble(std::string reason, std::string fix);
+  void go_down(Problem problem, bool reopen);
+  void be_down(Problem problem);
+  void come_up();
+  void look_later();
+  void look();
+  void look_at_controller();
+  void tell(CarrierEvent event);
+  void hear();
+  bool set_filters();
+  void clear_places();
+  template <class Action>
+  void for_each_member(Action action);
+
+  asio::io_context& io_;
+  const std::string interface_;
+  const bool fd_;
+  CanSocket socket_;
+  LoopDescriptor readable_;
+  OperationSlot reading_;
+  WritableWait writable_;
+  LoopTimer retry_timer_;
+  OperationSlot retrying_;
+  LoopTimer look_timer_;
+  OperationSlot looking_;
+  OperationSlot deafness_;  // the kernel has refused our filters: it will be told
+
+  std::vector<Place> members_;
+  std::size_t next_ = 0;  // whose turn it is
+  int calling_ = 0;       // members are being called: their places stay
+  bool sending_ = false;
+  bool receiving_ = false;
+  AdaptivePolling polling_;
+  Clock::time_point woken_;  // when it slept last, and was
+  std::array<CanFrame, ahead> out_;
+  std::array<Member*, ahead> out_of_{};  // whose frame it is; null: has left
+  bool late_ = false;                    // they have been refused once
+  std::size_t out_count_ = 0;
+  Clock::time_point progress_;
+
+  bool up_ = true;
+  std::optional<CarrierEvent> standing_;  // down, or a warning
+  std::uint32_t controller_overflows_ = 0;
+  std::array<CanSocket::Received, CanSocket::batch> in_;
+};
+
+}  // namespace r4

@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "can_carrier.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "../../protocol/messages/command.hpp"
+#include "can_bus.hpp"
+#include "can_interface.hpp"
+#include "can_turn.hpp"
+#include "../framing/can/can_node.hpp"
+#include "../operation_slot.hpp"
+#include "../send_queue.hpp"
+
+namespace r4 {
+namespace {
+
+constexpr std::size_t normal_entries = 32;
+constexpr std::size_t state_entries = 1;  // newest wins
+constexpr std::uint32_t look_again_us = 20000;
+
+class CanCarrier final : public Carrier, private CanBus::Member {
+ public:
+  CanCarrier(asio::io_context& io, Url url, Role role);
+  ~CanCarrier() override { close(); }
+
+  void open(Handler& handler) override;
+  void close() noexcept override;
+  SendResult send(std::string_view bytes, Priority priority, Peer) override;
+  void use_packed_form(bool wanted) override { node_.use_packed_form(wanted); }
+  bool up() const override { return handler_ != nullptr && bus_->up(); }
+  std::size_t max_size() const override { return max_datagram; }
+  const std::string& name() const override { return name_; }
+  const CarrierCounters& counters() const override;
+
+ private:
+  using Clock = CanBus::Clock;
+  struct Lane {
+    CanLane which;
+    SendQueue queue;
+  };
+
+  void on_frame(const CanFrame& frame, std::uint32_t at_us) override;
+  void on_drained() override;
+  bool awaits_frame() const override { return node_.awaits_frame(); }
+  void on_sent() override { arm(); }
+  bool offer(std::uint32_t now_us, CanFrame& frame) override;
+  bool offer_urgent(std::uint32_t now_us, CanFrame& frame) override {
+    return node_.offer_urgent(now_us, frame);
+  }
+  void frame_sent(std::uint32_t now_us) override { node_.frame_sent(now_us); }
+  void on_late_frame(const CanFrame& frame, std::uint32_t now_us) override {
+    if (node_.may_be_answered(frame)) node_.wait_anew(now_us);
+  }
+  void on_bus(const CarrierEvent& event) override;
+  void on_stuck() override;
+
+  Lane& lane(CanLane which) { return lanes_[which == CanLane::dialogue ? 0 : 1]; }
+  SendResult send_stop(std::string_view bytes);
+  bool begin(std::string_view bytes, std::uint32_t now_us);
+  bool begin_waiting(std::uint32_t now_us);
+  void listen_for_others(const CanFrame& frame);
+  void arm();
+  void on_deadline();
+
+  asio::io_context& io_;
+  const Url url_;
+  const Role role_;
+  const std::uint8_t number_;
+  const bool fd_;
+  const std::string name_;
+  CanNode node_;
+  CanTurn turn_{std::random_device{}()};  // of a host
+  mutable CarrierCounters counters_;      // what others count is put in when it is asked for
+  std::array<Lane, 2> lanes_;
+  std::shared_ptr<CanBus> bus_;
+  std::optional<std::uint32_t> announced_stop_;  // its number
+  Handler* handler_ = nullptr;
+  LoopTimer timer_;
+  OperationSlot timing_;
+  bool armed_ = false;
+  std::uint32_t armed_for_us_ = 0;
+};
+
+// Whether a board packs is its setting, not its URL's.
+std::uint8_t node_of(const Url& url, Role role) {
+  url.allow_only(role == Role::host ? "node fd pack" : "node fd");
+  can_interface_of(url);
+  return static_cast<std::uint8_t>(url.get_number("node", 0, can_nodes - 1, 1));
+}
+
+CanCarrier::CanCarrier(asio::io_context& io, Url url, Role role)
+    : io_(io),
+      url_(std::move(url)),
+      role_(role),
+      number_(node_of(url_, role)),
+      fd_(url_.get_number("fd", 0, 1, 0) == 1),
+      name_(fmt::format("can://{}?node={}{}", url_.host(), number_, fd_ ? "&fd=1" : "")),
+      node_(role == Role::board ? CanEnd::board : CanEnd::host, number_, fd_),
+      lanes_{
+          Lane{CanLane::dialogue, SendQueue(normal_entries, state_entries, counters_.tx_dropped)},
+          Lane{CanLane::telemetry, SendQueue(normal_entries, state_entries, counters_.tx_dropped)}},
+      timer_(io) {
+  node_.use_packed_form(url_.get_number("pack", 0, 1, 0) == 1);
+}
+
+TransferCounters transfers_of(const CanNode& node) {
+  TransferCounters sum;
+  for (const CanLane lane : {CanLane::dialogue, CanLane::telemetry}) {
+    const IsotpSenderCounters& out = node.sent(lane);
+    const IsotpReceiverCounters& in = node.received(lane);
+    sum.wrong_sequence += in.wrong_sequence_number;
+    sum.timed_out += in.consecutive_timeout + in.send_timeout + in.too_many_waits +
+                     out.flow_control_timeout + out.send_timeout + out.too_many_waits;
+    sum.overflow += in.overflow + out.overflow;
+    sum.interrupted += in.interrupted;
+    sum.cancelled += in.cancelled + out.cancelled;
+    sum.unexpected += in.unexpected_frame + out.unexpected_frame;
+    sum.malformed += in.malformed + out.malformed + out.invalid_flow_status;
+  }
+  sum.packed = node.counters().unpacked;
+  sum.bad_form = node.counters().bad_form;
+  return sum;
+}
+
+void CanCarrier::open(Handler& handler) {
+  close();
+  const std::shared_ptr<CanBus> bus = CanBus::of(io_, url_.host(), fd_);
+  bus_ = bus;
+  handler_ = &handler;
+  bus->join(*this, role_ == Role::board
+                       ? std::vector<std::uint32_t>{emergency_stop_id, command_id(number_)}
+                       : std::vector<std::uint32_t>{reply_id(number_), telemetry_id(number_),
+                                                    command_id(number_)});
+  if (bus->up()) on_bus({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
+  const std::optional<CarrierEvent> standing = bus->standing();
+  if (standing && bus_ == bus) on_bus(*standing);  // not closed meanwhile
+}
+
+void CanCarrier::close() noexcept {
+  handler_ = nullptr;
+  timing_.cancel();
+  armed_ = false;
+  for (Lane& each : lanes_) each.queue.clear();
+  node_.cancel();
+  if (!bus_) return;
+  counters_.rx_overflows = bus_->overflows();
+  bus_->leave(*this);
+  bus_.reset();
+}
+
+SendResult CanCarrier::send(std::string_view bytes, Priority priority, Peer) {
+  if (handler_ == nullptr || !bus_->up()) return SendResult::down;
+  if (bytes.size() > max_datagram) {
+    ++counters_.tx_errors;
+    return SendResult::full;
+  }
+  if (priority == Priority::stop && role_ == Role::host) {
+    const SendResult result = send_stop(bytes);
+    ++(result == SendResult::sent ? counters_.tx_datagrams : counters_.tx_errors);
+    return result;
+  }
+  if (role_ == Role::host && !turn_.ours(Clock::now())) {
+    return turn_.others() ? SendResult::busy : SendResult::down;
+  }
+  Lane& own = lane(node_.lane_of(Text(bytes.data(), bytes.size())));
+  SendResult result = SendResult::sent;
+  if (!own.queue.empty() || !begin(bytes, CanBus::now_us())) {
+    result = own.queue.push(bytes, priority, everyone, Clock::now());
+  }
+  bus_->send();
+  return result;
+}
+
+// The bare frame first, which every board on any version of this plan obeys, and behind it the one with
+// the number by which the stop is confirmed. That alone is repeated: to a board a bare frame is a
+// new stop each time, and who has seen the one would have to look again before they clear it.
+SendResult CanCarrier::send_stop(std::string_view bytes) {
+  CanFrame frame{};
+  frame.id = emergency_stop_id;
+  Datagram stop;
+  std::uint32_t number = 0;
+  const bool numbered = read(Text(bytes.data(), bytes.size()), stop) && stop_number(stop, number);
+  SendResult bare = SendResult::sent;
+  if (!numbered || announced_stop_ != number) {
+    bare = bus_->send_stop(frame);
+    if (bare == SendResult::sent && numbered) announced_stop_ = number;
+  }
+  if (!numbered) return bare;
+  frame.extended = true;
+  frame.id = numbered_stop_id(number);
+  return bus_->send_stop(frame);
+}
+
+bool CanCarrier::begin(std::string_view bytes, std::uint32_t now_us) {
+  if (!node_.begin(Text(bytes.data(), bytes.size()), now_us)) return false;
+  turn_.on_own(Clock::now());
+  ++counters_.tx_datagrams;
+  counters_.tx_bytes += bytes.size();
+  return true;
+}
+
+// What another host sends to our board: commands; its flow control is the same as ours.
+void CanCarrier::listen_for_others(const CanFrame& frame) {
+  const bool command =
+      classify(frame).kind == CanIdKind::command && !isotp_frame::is_flow_control(frame);
+  if (role_ != Role::host || !command || !turn_.on_other(Clock::now())) return;
+  node_.stop_commanding();
+  lane(CanLane::dialogue).queue.clear();
+}
+
+// Begins the next datagram of each lane that has become idle. True if there was one.
+bool CanCarrier::begin_waiting(std::uint32_t now_us) {
+  bool any = false;
+  for (Lane& each : lanes_) {
+    if (each.queue.empty() || !node_.idle(each.which)) continue;
+    const SendQueue::Entry* const entry = each.queue.front(Clock::now());
+    if (entry == nullptr) continue;
+    any = begin(entry->text(), now_us) || any;
+    each.queue.pop();
+  }
+  return any;
+}
+
+bool CanCarrier::offer(std::uint32_t now_us, CanFrame& frame) {
+  return node_.offer(now_us, frame) || (begin_waiting(now_us) && node_.offer(now_us, frame));
+}
+
+void CanCarrier::on_frame(const CanFrame& frame, std::uint32_t at_us) {
+  listen_for_others(frame);
+  const Text datagram = node_.on_frame(frame, at_us);
+  if (datagram.empty()) return;
+  ++counters_.rx_datagrams;
+  counters_.rx_bytes += datagram.size();
+  handler_->on_datagram({datagram.data(), datagram.size()}, everyone);
+}
+
+const CarrierCounters& CanCarrier::counters() const {
+  if (bus_) counters_.rx_overflows = bus_->overflows();
+  counters_.transfers = transfers_of(node_);
+  return counters_;
+}
+
+void CanCarrier::on_drained() { handler_->on_drained(); }
+
+void CanCarrier::arm() {
+  IsotpDeadline deadline = node_.deadline();
+  if (handler_ == nullptr || !deadline.armed) return;
+  const std::uint32_t now_us = CanBus::now_us();
+  // What is due to be sent waits for the bus, which asks for it; behind it something may time out.
+  if (bus_->full() && reached(now_us, deadline.at_us)) deadline.at_us = now_us + look_again_us;
+  if (armed_ && reached(deadline.at_us, armed_for_us_)) return;
+  armed_ = true;
+  armed_for_us_ = deadline.at_us;
+  const auto in_us = static_cast<std::int32_t>(deadline.at_us - now_us);
+  timer_.expires_after(std::chrono::microseconds(in_us > 0 ? in_us : 0));
+  timer_.async_wait(timing_.handler([this] { on_deadline(); }));
+}
+
+void CanCarrier::on_deadline() {
+  armed_ = false;
+  const std::shared_ptr<CanBus> bus = bus_;
+  const CanBus::Member* const self = this;
+  bus->take();
+  if (!bus->has(self)) return;  // somebody who was told of a frame closed or destroyed this one
+  const std::uint32_t now_us = CanBus::now_us();
+  const auto answerable = [this](const CanFrame& frame) { return node_.may_be_answered(frame); };
+  if (bus->holds(answerable)) node_.wait_anew(now_us);
+  node_.poll(now_us);
+  bus->send();  // also what others owe by now
+}
+
+void CanCarrier::on_bus(const CarrierEvent& event) {
+  CarrierEvent own = event;
+  own.problem.thing = name_;
+  if (event.kind == CarrierEvent::Kind::down) {
+    ++counters_.downs;
+    node_.cancel();
+    for (Lane& each : lanes_) each.queue.clear();
+  } else if (event.kind == CarrierEvent::Kind::up) {
+    ++counters_.ups;
+    turn_.listen(Clock::now());
+  }
+  handler_->on_carrier_event(own);
+}
+
+void CanCarrier::on_stuck() {
+  node_.cancel();
+  ++counters_.tx_dropped;
+}
+
+}  // namespace
+
+std::unique_ptr<Carrier> make_can_carrier(asio::io_context& io, const Url& url, Role role) {
+  return std::make_unique<CanCarrier>(io, url, role);
+}
+
+}  // namespace r4

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// can://INTERFACE[?node=1&fd=0&pack=0]: datagrams of one board on a CAN bus (docs/can.md), by
+// ISO-TP on SocketCAN, at either end. Many may share an interface.
+//
+//     node=N   the board's number on the bus, 0-31 (default 1)
+//     fd=1     sends CAN FD frames; received are both
+//     pack=1   a host sends the packed form; received are both. A board does by its setting: C:pack,1
+//
+// A stop (Priority::stop) of the host's end is the emergency frame, which stops every board on the
+// bus, ahead of all that waits.
+#pragma once
+
+#include <asio/io_context.hpp>
+#include <memory>
+
+#include "../carrier.hpp"
+#include "../url.hpp"
+
+namespace r4 {
+
+std::unique_ptr<Carrier> make_can_carrier(asio::io_context& io, const Url& url, Role role);
+
+}  // namespace r4

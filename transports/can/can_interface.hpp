@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the system knows of a CAN interface, and how it is brought up.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "../error.hpp"
+#include "../url.hpp"
+
+namespace r4 {
+
+struct CanInterface {
+  std::string name;
+  std::string unknown;  // why the system tells nothing about it; empty: it does
+  bool exists = false;
+  bool is_can = false;
+  bool up = false;
+  bool fd = false;              // takes CAN FD frames
+  bool has_controller = false;  // with a bit rate and an error state; not vcan, vxcan
+  int index = 0;
+  // What its controller says, as far as the driver tells.
+  std::string state;           // "error-active", "error-warning", … "stopped"; empty: not known
+  std::uint32_t bit_rate = 0;  // bit/s, of FD the nominal one; 0: not known
+  std::uint32_t data_bit_rate = 0;  // bit/s of FD's data phase; 0: not known
+};
+
+CanInterface can_interface(const std::string& name);
+
+// The interface that can://INTERFACE names. Throws Error{usage} if the URL is of another form.
+const std::string& can_interface_of(const Url& url);
+
+// All of this machine, by name; none if the system does not tell.
+std::vector<CanInterface> list_can_interfaces();
+
+// What an errno of a socket on that interface means, with the fix where there is one.
+Problem can_problem(const std::string& interface, int error);
+
+}  // namespace r4

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A raw SocketCAN socket on one interface: frames in batches with the time at which they came, the
+// controller's error frames apart, and sends that never wait. What it hears is filtered in the
+// kernel.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "../file_descriptor.hpp"
+#include "../framing/can/can_frame.hpp"
+
+namespace r4 {
+
+class CanSocket {
+ public:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::size_t batch = 64;
+
+  CanSocket();
+  ~CanSocket();
+  CanSocket(const CanSocket&) = delete;
+  CanSocket& operator=(const CanSocket&) = delete;
+
+  struct Received {
+    CanFrame frame;           // of an error frame, the data hold its details
+    std::uint32_t error = 0;  // the error classes of <linux/can/error.h>; 0 in a data frame
+    bool local = false;       // sent on this machine: it tells nothing of the wire
+    Clock::time_point at;     // when the kernel got it
+  };
+
+  enum class Outcome : std::uint8_t {
+    done,    // everything was taken
+    busy,    // the socket's share of the queue is used up: wait until it is writable
+    full,    // the interface's queue is full: nothing tells when it is not
+    failed,  // errno tells why
+  };
+
+  // Opens it on `interface` with no id to hear. With `fd`, CAN FD frames can be sent. Throws Error:
+  // unsupported if this kernel has no CAN or there is no such interface, open if the interface is
+  // down, is not CAN or does not do CAN FD, permission.
+  void open(const std::string& interface, bool fd);
+  void close() noexcept;
+  int number() const { return descriptor_.get(); }
+  int interface_index() const { return index_; }
+  // No controller and no wire: frames come as fast as programs make them.
+  bool simulated() const { return simulated_; }
+  // A CAN FD frame came whose data travelled at a bit rate of their own (BRS).
+  bool heard_rate_switch() const { return heard_rate_switch_; }
+
+  // Hears the frames with exactly these 11-bit ids (and with the emergency stop's, those stops that have
+  // a number), or everything, extended and remote ones too.
+  // False, and it hears what it heard before: the kernel does not take that; errno tells why.
+  [[nodiscard]] bool hear(const std::vector<std::uint32_t>& ids);
+  [[nodiscard]] bool hear_everything();
+
+  // Takes up to `batch` frames; returns how many, or -errno (EAGAIN: none is there).
+  int receive(std::array<Received, batch>& frames);
+  // Hands frames over in order. `sent` tells how many were taken.
+  Outcome send(const CanFrame* frames, std::size_t count, std::size_t& sent);
+  // Hands one frame over ahead of everything that waits in the interface's queue.
+  Outcome send_first(const CanFrame& frame);
+
+  // Frames that came while the socket's buffer was full, since it was opened first.
+  std::uint32_t overflows() const { return overflows_before_ + overflows_; }
+
+ private:
+  struct Inbox;
+  FileDescriptor descriptor_;
+  FileDescriptor first_;  // with a priority and a queue of its own
+  int index_ = 0;
+  bool simulated_ = false;
+  bool heard_rate_switch_ = false;
+  std::uint32_t overflows_ = 0;         // of this opening
+  std::uint32_t overflows_before_ = 0;  // of those before
+  const std::unique_ptr<Inbox> inbox_;
+};
+
+}  // namespace r4

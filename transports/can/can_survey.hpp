@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Which boards are on a CAN bus, what they say, and how full it is: from its frames alone. Nothing
+// is ever sent, so it may be used beside hosts that drive.
+//
+//     CanSurvey survey({1000000, 0});
+//     survey.on_datagram([](std::uint8_t node, Text datagram) { … });
+//     survey.on_frame(frame, at_us);         // every frame of the bus, see CanListener
+//     survey.board(3).states; survey.traffic(); survey.busy_ns();
+//
+// No I/O, no clock. Memory is bounded: 32 nodes, at most 2048 ids of 11 bits and all others as one.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+
+#include "../../protocol/datagram/datagram.hpp"
+#include "../../protocol/link/packet_tracker.hpp"
+#include "../../protocol/messages/units.hpp"
+#include "../framing/can/can_bits.hpp"
+#include "../framing/can/can_frame.hpp"
+#include "../framing/can/can_ids.hpp"
+
+namespace r4 {
+
+// What was heard of a board, since it was heard first.
+struct HeardBoard {
+  std::uint64_t states = 0;
+  std::uint64_t heartbeats = 0;
+  std::uint64_t answers = 0;             // N and I
+  std::uint64_t damaged = 0;             // transfers that failed, and datagrams that are none
+  std::uint32_t lost = 0;                // numbers that never came
+  std::uint64_t t_ms = 0;                // T of the newest datagram, by the board's clock
+  std::uint32_t pnum = 0;                // its number
+  std::uint32_t heard_us = 0;            // when, by ours
+  SafeReason reason = SafeReason::none;  // of the newest heartbeat or went-safe frame
+  bool connected = false;                // it has a host: it sends states, or numbered heartbeats
+
+  bool heard() const { return states + heartbeats + answers + damaged != 0; }
+};
+
+// The frames of one id.
+struct CanTraffic {
+  std::uint64_t frames = 0;
+  std::uint64_t bits = 0;     // stuff bits and intermission included
+  std::uint64_t busy_ns = 0;  // that the bus was taken
+};
+
+class CanSurvey {
+ public:
+  // All ids that are none of 11 bits count as this one.
+  static constexpr std::uint32_t extended_ids = max_can_id + 1;
+
+  // With rate.data 0, FD frames count as not switching their rate.
+  explicit CanSurvey(CanBitRate rate);
+  ~CanSurvey();
+  CanSurvey(const CanSurvey&) = delete;
+  CanSurvey& operator=(const CanSurvey&) = delete;
+
+  // A board's datagram (plain form, its CRC good), or an emergency stop of a host.
+  void on_datagram(std::function<void(std::uint8_t node, const Datagram&)> callback);
+  void on_stop(std::function<void()> callback);
+
+  void on_frame(const CanFrame& frame, std::uint32_t at_us);
+
+  const HeardBoard& board(std::uint8_t node) const { return boards_[node % can_nodes]; }
+  const std::map<std::uint32_t, CanTraffic>& traffic() const { return traffic_; }
+  std::uint64_t busy_ns() const { return busy_ns_; }
+
+ private:
+  struct Lanes;
+
+  void count(const CanFrame& frame);
+  void receive(std::uint8_t node, const CanFrame& frame, CanIdKind kind, std::uint32_t at_us);
+  void take(std::uint8_t node, Text bytes, std::uint32_t at_us);
+
+  const CanBitRate rate_;
+  std::function<void(std::uint8_t, const Datagram&)> datagram_callback_;
+  std::function<void()> stop_callback_;
+  std::array<std::unique_ptr<Lanes>, can_nodes> lanes_;  // made when the node is heard first
+  std::array<HeardBoard, can_nodes> boards_;
+  std::map<std::uint32_t, CanTraffic> traffic_;
+  std::uint64_t busy_ns_ = 0;
+};
+
+}  // namespace r4

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "serial_carrier.hpp"
+
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <utility>
+#include <vector>
+
+#include "line_stream.hpp"
+#include "../operation_slot.hpp"
+#include "port_list.hpp"
+#include "serial_device.hpp"
+
+namespace r4 {
+namespace {
+
+constexpr long default_baud = 1'000'000;
+constexpr long min_baud = 9600;
+constexpr long max_baud = 12'000'000;
+constexpr std::chrono::milliseconds look_again{100};
+constexpr int looks_before_warning = 5;
+
+class SerialCarrier final : public Carrier, private LineStream::Owner {
+ public:
+  SerialCarrier(asio::io_context& io, Url url);
+  ~SerialCarrier() override { close(); }
+
+  void open(Handler& handler) override;
+  void close() noexcept override;
+  SendResult send(std::string_view bytes, Priority priority, Peer) override {
+    return stream_.send(bytes, priority);
+  }
+  bool up() const override { return up_; }
+  std::size_t max_size() const override { return max_datagram; }
+  const std::string& name() const override { return name_; }
+  const CarrierCounters& counters() const override { return counters_; }
+
+ private:
+  void on_line(std::string_view line) override { handler_->on_datagram(line, everyone); }
+  void on_drained() override { handler_->on_drained(); }
+  void on_lost(int error) override;
+
+  std::string find_device() const;
+  std::string find_again() const;
+  void open_device(const std::string& path);
+  void look_later();
+  void look();
+
+  asio::io_context& io_;
+  const Url url_;
+  const unsigned baud_;
+  const std::string serial_number_;  // that the URL asks for
+  SerialPort device_;                // that has been open
+  std::string name_;
+  LoopTimer timer_;
+  OperationSlot looking_;
+  std::string obstacle_;  // why it cannot be opened again though it is there
+  int obstructed_ = 0;    // looks at which it was so
+  Handler* handler_ = nullptr;
+  bool up_ = false;
+  CarrierCounters counters_;
+  LineStream stream_;
+};
+
+SerialCarrier::SerialCarrier(asio::io_context& io, Url url)
+    : io_(io),
+      url_(std::move(url)),
+      baud_(static_cast<unsigned>(url_.get_number("baud", min_baud, max_baud, default_baud))),
+      serial_number_(url_.get("sn").value_or("")),
+      name_(url_.text()),
+      timer_(io),
+      stream_(io, *this, counters_) {
+  url_.allow_only("baud sn");
+  const bool by_number = !serial_number_.empty();
+  const bool by_path = url_.path() == "auto" || url_.path().find('/') != std::string::npos;
+  if (!url_.host().empty() || by_number == by_path || (by_number && !url_.path().empty())) {
+    throw Error(ErrorKind::usage, url_.text(), "it names no serial port",
+                url_.host().empty() ? "use serial:auto, serial:///dev/NAME or serial:?sn=SERIAL"
+                                    : "a path has three slashes: serial:///dev/" + url_.host());
+  }
+}
+
+void SerialCarrier::open(Handler& handler) {
+  close();
+  open_device(find_device());
+  handler_ = &handler;
+  up_ = true;
+  ++counters_.ups;
+  handler_->on_carrier_event({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
+}
+
+void SerialCarrier::close() noexcept {
+  handler_ = nullptr;
+  up_ = false;
+  looking_.cancel();
+  stream_.stop();
+}
+
+// The path to open. Throws Error if it is not there, or not the only one.
+std::string SerialCarrier::find_device() const {
+  if (serial_number_.empty() && url_.path() != "auto") return url_.path();
+  std::vector<SerialPort> ports = list_serial_ports();
+  std::erase_if(ports, [this](const SerialPort& port) {
+    return serial_number_.empty() ? !port.is_r4 : port.serial_number != serial_number_;
+  });
+  if (ports.empty()) {
+    throw Error(ErrorKind::open, url_.text(),
+                serial_number_.empty()
+                    ? "no R4 board is connected by USB"
+                    : fmt::format("no device with serial number '{}' is connected", serial_number_),
+                "connect the board and switch it on; r4 list shows the ports");
+  }
+  if (ports.size() > 1) {
+    std::string list;
+    for (const SerialPort& port : ports) {
+      list += fmt::format("{}{} ({})", list.empty() ? "" : ", ", url_of(port), port.path);
+    }
+    throw Error(ErrorKind::usage, url_.text(), "several boards are connected",
+                "use one of " + list);
+  }
+  return ports.front().path;
+}
+
+// The path of the device that has been open; some adapters share one serial number.
+std::string SerialCarrier::find_again() const {
+  if (device_.serial_number.empty()) return find_device();
+  std::string path;
+  for (const SerialPort& port : list_serial_ports()) {
+    if (port.serial_number != device_.serial_number || port.vid != device_.vid ||
+        port.pid != device_.pid) {
+      continue;
+    }
+    if (path.empty() || port.path == device_.path) path = port.path;
+  }
+  if (path.empty()) throw Error(ErrorKind::open, name_, "it is not connected");
+  return path;
+}
+
+void SerialCarrier::open_device(const std::string& path) {
+  stream_.start(open_serial_device(io_, path, baud_));
+  name_ = "serial://" + path;
+  if (baud_ != default_baud) name_ += fmt::format("?baud={}", baud_);
+  const std::string real_path = resolve_links(path);
+  for (const SerialPort& port : list_serial_ports()) {
+    if (port.path == real_path) device_ = port;
+  }
+}
+
+void SerialCarrier::on_lost(int error) {
+  up_ = false;
+  ++counters_.downs;
+  obstructed_ = 0;
+  look_later();
+  handler_->on_carrier_event(
+      {CarrierEvent::Kind::down,
+       Problem{ErrorKind::open, name_,
+               error == 0 ? "unplugged, or closed at the other end"
+                          : fmt::format("unplugged, or closed at the other end ({})",
+                                        std::strerror(error)),
+               "plug it in again; it is opened by itself"}});
+}
+
+void SerialCarrier::look_later() {
+  timer_.expires_after(look_again);
+  timer_.async_wait(looking_.handler([this] { look(); }));
+}
+
+void SerialCarrier::look() {
+  std::string path;
+  try {
+    path = find_again();
+    open_device(path);
+  } catch (const Error& error) {
+    look_later();
+    // Absence is no news; what keeps us from a device that is there needs a hand.
+    const bool there = !path.empty() && ::access(path.c_str(), F_OK) == 0;
+    if (!there || error.what() != obstacle_) obstructed_ = 0;
+    obstacle_ = error.what();
+    if (there && ++obstructed_ == looks_before_warning) {
+      handler_->on_carrier_event({CarrierEvent::Kind::warning, error.problem()});
+    }
+    return;
+  }
+  up_ = true;
+  ++counters_.ups;
+  handler_->on_carrier_event({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
+}
+
+}  // namespace
+
+std::unique_ptr<Carrier> make_serial_carrier(asio::io_context& io, const Url& url, Role) {
+  return std::make_unique<SerialCarrier>(io, url);
+}
+
+}  // namespace r4

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Datagrams as lines on a serial port: the board's USB, or the pty of a simulated board.
+//
+//     serial:///dev/ttyACM0[?baud=1000000]   that device, or a link to one
+//     serial:auto                            the one R4 board on USB (2341:0266)
+//     serial:?sn=SERIAL                      the USB device with that serial number
+//
+// 8N1, raw, no flow control, locked. Rates below 9600 are refused: an Arduino takes 1200 baud as
+// the order to erase its program. An unplugged or hung-up port is `down` at once; it is looked for
+// until it is back, by serial number where it has one, else by its path.
+#pragma once
+
+#include <asio/io_context.hpp>
+#include <memory>
+
+#include "../carrier.hpp"
+#include "../url.hpp"
+
+namespace r4 {
+
+// Throws Error{usage} for a URL that serial does not take.
+std::unique_ptr<Carrier> make_serial_carrier(asio::io_context& io, const Url& url, Role role);
+
+}  // namespace r4

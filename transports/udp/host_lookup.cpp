@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "host_lookup.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <asio/ip/udp.hpp>
+#include <asio/post.hpp>
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include "../error.hpp"
+
+namespace r4 {
+namespace {
+
+// Calls `done(answer)` in a thread of its own. It may outlive everything that it was not given.
+template <class Done>
+void ask_in_a_thread(const HostLookup::Resolve& resolve, const std::string& host, Done done) {
+  try {
+    std::thread([resolve, host, done] { done(resolve(host)); }).detach();
+  } catch (const std::system_error& error) {
+    done(FoundHost{{}, error.what()});
+  }
+}
+
+}  // namespace
+
+FoundHost HostLookup::ask_system(const std::string& host) {
+  asio::io_context io(1);
+  asio::error_code error;
+  const auto results = asio::ip::udp::resolver(io).resolve(host, "", error);
+  FoundHost found;
+  for (const auto& result : results) found.addresses.push_back(result.endpoint().address());
+  if (found.addresses.empty()) found.reason = error.message();
+  return found;
+}
+
+asio::ip::address HostLookup::find(const std::string& host, const std::string& thing) const {
+  if (is_address(host)) return address_of({{asio::ip::make_address(host)}, ""}, host, thing);
+  struct Answer {
+    std::mutex mutex;
+    std::condition_variable came;
+    std::optional<FoundHost> found;
+  };
+  const auto answer = std::make_shared<Answer>();
+  ask_in_a_thread(resolve, host, [answer](FoundHost found) {
+    {
+      const std::lock_guard lock(answer->mutex);
+      answer->found = std::move(found);
+    }
+    answer->came.notify_all();
+  });
+  std::unique_lock lock(answer->mutex);
+  if (!answer->came.wait_for(lock, patience, [&] { return answer->found.has_value(); })) {
+    return address_of({{}, "no name server answers"}, host, thing);
+  }
+  return address_of(*answer->found, host, thing);
+}
+
+asio::ip::address address_of(const FoundHost& found, const std::string& host,
+                             const std::string& thing) {
+  if (found.addresses.empty()) {
+    throw Error(ErrorKind::open, thing,
+                fmt::format("there is no host '{}' ({})", host, found.reason),
+                "check the name, or give the IP address");
+  }
+  const auto v4 = std::find_if(found.addresses.begin(), found.addresses.end(),
+                               [](const asio::ip::address& each) { return each.is_v4(); });
+  asio::ip::address address = v4 != found.addresses.end() ? *v4 : found.addresses.front();
+  if (address.is_multicast() || address == asio::ip::address_v4::broadcast()) {
+    throw Error(ErrorKind::usage, thing, host + " is the address of many, not of one",
+                "give the IP address of the board itself");
+  }
+  return address;
+}
+
+bool is_address(const std::string& host) {
+  asio::error_code error;
+  asio::ip::make_address(host, error);
+  return !error;
+}
+
+// Whoever asked may be gone before the answer comes, and the loop as well.
+struct HostWatch::Question {
+  std::mutex mutex;
+  HostWatch* asker = nullptr;
+};
+
+HostWatch::HostWatch(asio::io_context& io, HostLookup lookup)
+    : io_(io), lookup_(std::move(lookup)), timer_(io) {}
+
+void HostWatch::start(const std::string& host, bool known, OnFound on_found) {
+  stop();
+  host_ = host;
+  known_ = known;
+  on_found_ = std::move(on_found);
+  if (!known) ask();
+  wait();
+}
+
+void HostWatch::start(std::function<void()> on_silence) {
+  stop();
+  known_ = true;
+  on_silence_ = std::move(on_silence);
+  wait();
+}
+
+void HostWatch::stop() {
+  waiting_.cancel();
+  timer_.cancel();
+  heard_ = true;
+  on_found_ = nullptr;
+  on_silence_ = nullptr;
+  if (!question_) return;
+  {
+    const std::lock_guard lock(question_->mutex);
+    question_->asker = nullptr;
+  }
+  question_.reset();
+}
+
+void HostWatch::ask() {
+  if (question_) return;
+  question_ = std::make_shared<Question>();
+  question_->asker = this;
+  ask_in_a_thread(lookup_.resolve, host_, [question = question_](const FoundHost& found) {
+    const std::lock_guard lock(question->mutex);
+    if (question->asker == nullptr) return;
+    asio::post(question->asker->io_, [question, found] {
+      HostWatch* const asker = question->asker;  // its thread alone writes it
+      if (asker == nullptr) return;
+      asker->question_.reset();
+      const OnFound on_found = asker->on_found_;  // it may stop the watch
+      on_found(found);
+    });
+  });
+}
+
+// The timer also keeps the loop running while an answer is under way.
+void HostWatch::wait() {
+  timer_.expires_after(known_ ? lookup_.silence : lookup_.retry);
+  timer_.async_wait(waiting_.handler([this] {
+    const bool silent = !known_ || !heard_;
+    heard_ = !known_;
+    wait();
+    if (!silent) return;
+    if (on_silence_) {
+      const auto on_silence = on_silence_;
+      on_silence();
+    } else {
+      ask();
+    }
+  }));
+}
+
+}  // namespace r4

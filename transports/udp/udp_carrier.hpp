@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Datagrams over UDP, one a packet, on the ports of the paper.
+//
+//     host    udp://HOST[:2018][?listen=2390]        sends to HOST:2018 from port 2390 and hears
+//                                                    HOST there, from any of its ports; listen=0
+//                                                    takes any free port. Boards of one program
+//                                                    share the port (udp_host_socket.hpp)
+//     board   udp://BIND[:2018][?peer=HOST[:2390]]   port 0 takes any free port; name() tells it
+//
+// A board knows the last 16 hosts that sent a valid datagram, and the one in control in any case.
+// A board with a peer sends to it what is for everyone; one without sends that to the host in
+// control, else to the one heard last. An answer goes to where the question came from. The paper's
+// Python client asks from a port at which it does not listen, so an answer to another port of the
+// peer's address goes to the peer as well.
+//
+// A name is looked up in open(), IPv4 first. A host's open() within a handler of the loop does not
+// wait for that: it is `down` until the name is known, asked for each second. A host that has heard
+// nothing valid for 3 to 6 s looks again, and goes to where the board is then. A board that is off
+// (port unreachable) is a quiet board, no failure; an unreachable network is: `down`, tried again
+// five times a second.
+#pragma once
+
+#include <asio/io_context.hpp>
+#include <memory>
+
+#include "../carrier.hpp"
+#include "host_lookup.hpp"
+#include "../url.hpp"
+
+namespace r4 {
+
+// Throws Error{usage} for a URL that UDP does not take.
+std::unique_ptr<Carrier> make_udp_carrier(asio::io_context& io, const Url& url, Role role);
+
+// The same, with names looked up in that way.
+std::unique_ptr<Carrier> make_udp_carrier_with(asio::io_context& io, const Url& url, Role role,
+                                               HostLookup lookup);
+
+}  // namespace r4

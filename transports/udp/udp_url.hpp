@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The URL of a UDP carrier, taken apart (udp_carrier.hpp).
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "../carrier.hpp"
+#include "../url.hpp"
+
+namespace r4 {
+
+struct UdpUrl {
+  static constexpr std::uint16_t board_port = 2018;
+  static constexpr std::uint16_t host_port = 2390;
+
+  // Throws Error{usage} for one that UDP does not take.
+  UdpUrl(const Url& url, Role role);
+
+  std::string text;
+  std::string host;      // the board's; at a board: where it listens
+  std::uint16_t port;    // of the board
+  std::uint16_t listen;  // of the host
+  std::string peer;      // HOST or HOST:PORT; empty: none
+  std::string peer_host;
+  std::uint16_t peer_port = host_port;
+};
+
+}  // namespace r4
