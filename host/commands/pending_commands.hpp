@@ -15,16 +15,26 @@
 namespace r4 {
 
 // One command, from send() until it ends. The times are the session's.
+//
+//     queued --control--> sent --CMD is past it--> overtaken
+//                          |                           |
+//                          +-------DUPLICATE-----------+--> executed
+//
+// It ends out of any of them: confirmed when CMD names it, or is past it and it was executed.
 struct PendingCommand {
-  enum class Stage : std::uint8_t { free, queued, sent };
+  enum class Stage : std::uint8_t {
+    free,       // a slot without a command
+    queued,     // not sent yet
+    sent,       // and repeated
+    overtaken,  // CMD is past it: the answer to a retry decides
+    executed,   // the board said DUPLICATE: it has executed this number
+  };
   // What it is for: a command of the program, an arm() of it (never sent), or a command that arm()
   // sends.
   enum class Role : std::uint8_t { command, arm, arm_step };
   Stage stage = Stage::free;
   Role role = Role::command;
   CommandKind kind = CommandKind::heartbeat;
-  bool executed = false;    // the board said DUPLICATE: it has executed this number
-  bool overtaken = false;   // CMD is past it: the answer to a retry decides
   bool cable_only = false;  // a setting that is refused elsewhere
   std::uint32_t pnum = 0;
   std::uint64_t ticket = 0;
@@ -33,6 +43,9 @@ struct PendingCommand {
   std::size_t size = 0;  // of what is in `bytes`: the command's field; once sent, PNum and T too
   Command command;       // without its texts
   std::array<char, max_datagram> bytes;
+
+  // Has a copy of it gone out?
+  bool is_out() const { return stage != Stage::free && stage != Stage::queued; }
 };
 
 class PendingCommands {
@@ -56,7 +69,7 @@ class PendingCommands {
     slot.stage = PendingCommand::Stage::queued;
     slot.role = PendingCommand::Role::command;
     slot.kind = kind;
-    slot.executed = slot.overtaken = slot.cable_only = false;
+    slot.cable_only = false;
     slot.pnum = 0;
     slot.cause = Command::unnamed_cause;
     slot.size = 0;

@@ -15,11 +15,6 @@ namespace r4 {
 
 namespace {
 
-constexpr Time selection_retry = std::chrono::milliseconds{200};
-constexpr int max_selections = 5;  // then the board is taken for one that does not know F
-// Such a board is asked now and then all the same: on a bad line all five may have been lost.
-constexpr Time selection_reminder = std::chrono::seconds{1};
-
 }  // namespace
 
 const char* to_text(Outcome outcome) {
@@ -51,6 +46,8 @@ Session::Session(Handler& handler, SessionOptions options, std::uint32_t first_p
       first_pnum_(first_pnum),
       link_(options_.timing, first_pnum),
       key_(options_.key, options_.clock_start),
+      selection_(options_.fields),
+      question_(options_.identify_interval),
       pending_(max_pending, max_stops) {
   require_valid(options_);
   if (!options_.fields.empty()) {
@@ -107,7 +104,7 @@ void Session::on_heartbeat_datagram(const Datagram& datagram, Time now) {
     if (report.reason == SafeReason::none) state_.fault = ChipFault();
     key_.on_heartbeat(datagram);
     key_.on_board_time(t_ms, now);
-    if (key_.asked_for()) knows_cmd_ = true;
+    if (key_.asked_for()) selection_.on_answer();
     key_.on_reason(connecting ? SafeReason::link : report.reason, now);
   }
   handler_.on_board_heartbeat(datagram);
@@ -158,9 +155,9 @@ void Session::on_nack_datagram(const Datagram& datagram, Time now) {
   Nack nack;
   if (!read_nack(datagram, nack)) return;
   if (!is_ours(nack.pnum)) return;  // on a CAN bus the answers to other hosts are heard too
-  knows_cmd_ = true;                // the paper's release answers nothing
+  selection_.on_answer();
   if (nack.code == Refusal::busy) {
-    busy_until_ = now + busy_memory;
+    role_.on_busy(now);
     key_.on_host_seen(now);
   }
   on_answer(datagram, now);
@@ -170,9 +167,9 @@ void Session::on_nack_datagram(const Datagram& datagram, Time now) {
   const bool proof = !other_copy && is_proof(nack);
   handler_.on_nack(nack, datagram);
   for (Pending& pending : pending_.under_way()) {
-    if (pending.stage != Stage::sent || pending.pnum != nack.pnum) continue;
+    if (!pending.is_out() || pending.pnum != nack.pnum) continue;
     if (nack.code == Refusal::duplicate) {
-      pending.executed = true;
+      pending.stage = Stage::executed;
       confirm_from_state(now);
       continue;
     }
@@ -192,13 +189,12 @@ bool Session::is_proof(const Nack& nack) const {
 void Session::on_identity_datagram(const Datagram& datagram, Time now) {
   Identity identity;
   if (!read_identity(datagram, identity)) return;
-  knows_cmd_ = true;
+  selection_.on_answer();
   on_answer(datagram, now);
-  if (question_open_) collector_.on_round_trip(now - question_sent_);
-  question_open_ = false;
+  if (const auto round_trip = question_.answered(now)) collector_.on_round_trip(*round_trip);
   handler_.on_identity(identity);
   for (Pending& pending : pending_.under_way()) {
-    if (pending.stage == Stage::sent && pending.kind == CommandKind::identify) {
+    if (pending.is_out() && pending.kind == CommandKind::identify) {
       finish(pending, Outcome::confirmed, Refusal::none, now);
     }
   }
@@ -207,7 +203,7 @@ void Session::on_identity_datagram(const Datagram& datagram, Time now) {
 // Is that one of our settings that the board takes over a cable only?
 bool Session::is_cable_only(std::uint32_t pnum) {
   for (const Pending& pending : pending_.under_way()) {
-    if (pending.stage == Stage::sent && pending.pnum == pnum) return pending.cable_only;
+    if (pending.is_out() && pending.pnum == pnum) return pending.cable_only;
   }
   return false;
 }
@@ -220,7 +216,7 @@ bool Session::is_ours(std::uint32_t pnum) const {
 // An answer counts in the board's packet numbers, but not in those that a host without control
 // sees.
 void Session::on_answer(const Datagram& datagram, Time now) {
-  if (busy_until_ > now) return;
+  if (role_.refused(now)) return;
   link_.on_answer(datagram.pnum(), static_cast<std::uint32_t>(datagram.time_ms()), to_ms(now));
   notice_restart();
 }
@@ -240,26 +236,24 @@ bool Session::notice_restart() {
 void Session::confirm_from_state(Time now) {
   const bool has_cmd = state_.present.has(StateField::cmd);
   if (has_cmd) {
-    command_field_seen_ = now;
-    knows_cmd_ = true;
-    // The board has executed a command of ours, so we control it.
-    if (link_up() && is_ours(state_.last_command)) controlled_ = true;
+    selection_.on_cmd(now);
+    if (link_up() && is_ours(state_.last_command)) role_.on_own_command();
   }
   for (Pending& pending : pending_.under_way()) {
-    if (pending.stage != Stage::sent || pending.kind == CommandKind::stop ||
+    if (!pending.is_out() || pending.kind == CommandKind::stop ||
         pending.kind == CommandKind::identify) {
       continue;
     }
     if (has_cmd) {
       const bool exact = state_.last_command == pending.pnum;
       const bool past = newer(state_.last_command, pending.pnum);
-      if (exact || (past && pending.executed)) {
+      if (exact || (past && pending.stage == Stage::executed)) {
         finish(pending, Outcome::confirmed, Refusal::none, now);
-      } else if (past && !pending.overtaken) {
-        pending.overtaken = true;
+      } else if (past && pending.stage == Stage::sent) {
+        pending.stage = Stage::overtaken;
         pending.retry = now;  // ask at once what became of it
       }
-    } else if (!knows_cmd_ && (options_.fields.empty() || selections_ >= max_selections) &&
+    } else if (!selection_.answers() && selection_.stage() != FieldSelection::Stage::asking &&
                state_shows(state_, pending.command)) {
       finish(pending, Outcome::confirmed, Refusal::none, now);
     }
@@ -270,12 +264,10 @@ void Session::confirm_from_state(Time now) {
 void Session::confirm_stop(const SafeReport& report, Time now) {
   if (report.reason != SafeReason::stop || !report.has_stop) return;
   for (Pending& pending : pending_.under_way()) {
-    if (pending.stage != Stage::sent || pending.kind != CommandKind::stop) continue;
+    if (!pending.is_out() || pending.kind != CommandKind::stop) continue;
     if (report.stop != pending.pnum && report.stop != short_stop_number(pending.pnum)) continue;
-    std::copy_n(pending.bytes.begin(), pending.size, lingering_.begin());
-    lingering_size_ = pending.size;
-    linger_until_ = now + options_.stop_linger;
-    next_linger_ = pending.retry;
+    repetition_.begin({pending.bytes.data(), pending.size}, pending.retry,
+                      now + options_.stop_linger);
     finish(pending, Outcome::confirmed, Refusal::none, now);
   }
 }
@@ -299,31 +291,21 @@ void Session::on_causes(std::int32_t newest, Time now) {
 // Sees to it that the state has the fields we need, whoever chose others, and that we are in
 // control.
 void Session::select_fields(Time now) {
-  if (controlled_ && now - command_field_seen_ < selection_retry) {
-    selections_ = 0;
-    return;
-  }
-  if (options_.fields.empty() || !link_up() || busy_until_ > now) return;
-  if (now < next_selection_) return;
-  ++selections_;
-  next_selection_ = now + (speaks_no_cmd() ? selection_reminder : selection_retry);
-  transmit_now(Command::fields(options_.fields), to_ms(now), Priority::normal, now);
+  if (!selection_.ask(role_.controlling(), link_up() && !role_.refused(now), now)) return;
+  transmit_now(Command::fields(selection_.fields()), to_ms(now), Priority::normal, now);
 }
 
 // A command that chooses fields, with those that we need; the choice is remembered.
 Command Session::with_needed_fields(const Command& command) {
-  if (command.kind != CommandKind::fields || options_.fields.empty()) return command;
+  if (command.kind != CommandKind::fields || selection_.fields().empty()) return command;
   FieldSet set;
   parse_fields(command.text, set);
   std::string fields(command.text.data(), command.text.size());
   if (!set.has(StateField::safe)) fields += ",SAFE";
   if (!set.has(StateField::cmd)) fields += ",CMD";
   if (!set.has(StateField::relays) && options_.arming == Arming::required) fields += ",RELAYS";
-  if (fields != options_.fields) {
-    options_.fields = std::move(fields);
-    selections_ = 0;
-  }
-  return Command::fields(options_.fields);
+  if (fields != selection_.fields()) selection_.choose(std::move(fields));
+  return Command::fields(selection_.fields());
 }
 
 // --- time
@@ -346,17 +328,15 @@ Time Session::poll(Time now) {
       finish(pending, Outcome::timed_out, Refusal::none, now);
     }
   }
-  if (!controlled_) select_fields(now);  // the first thing when the link comes up
+  if (!role_.controlling()) select_fields(now);  // the first thing when the link comes up
   send_queued(now);
   advance_arming(now);
   refuse_held_back(now);
   send_queued(now);  // what has waited for arm()
   retry_due(now);
-  linger(now);
-  if (options_.identify_interval.count() != 0 && link_up() && now >= next_identify_) {
-    next_identify_ = now + options_.identify_interval;
-    question_sent_ = now;
-    question_open_ = true;
+  repeat_stop(now);
+  if (link_up() && question_.due(now)) {
+    question_.ask(now);
     transmit_now(Command::identify(), to_ms(now), Priority::normal, now);
   }
 
@@ -364,12 +344,12 @@ Time Session::poll(Time now) {
   // due_in() counts whole milliseconds; aim behind the edge, not before it.
   next = std::chrono::duration_cast<std::chrono::milliseconds>(next) + Time{0};
   if (next <= now) next = now + Time{1000};
-  if (link_up() && options_.identify_interval.count() != 0) next = std::min(next, next_identify_);
-  if (busy_until_ > now) next = std::min(next, busy_until_);
-  if (lingering_size_ != 0) next = std::min(next, next_linger_);
+  if (link_up()) next = std::min(next, question_.next());
+  if (role_.refused(now)) next = std::min(next, role_.refused_until());
+  next = std::min(next, repetition_.next());
   for (const Pending& pending : pending_.under_way()) {
     next = std::min(next, pending.deadline);
-    if (pending.stage == Stage::sent) next = std::min(next, pending.retry);
+    if (pending.is_out()) next = std::min(next, pending.retry);
   }
   return next;
 }
@@ -397,20 +377,20 @@ bool Session::link_up() const {
 // Commands wait for proof of control: the session's own F, executed. So none is ever sent into a
 // session that the board has not accepted, where a refusal would say nothing.
 bool Session::in_control(Time now) const {
-  const bool proven = controlled_ || options_.fields.empty() || speaks_no_cmd();
-  return link_up() && busy_until_ <= now && proven && !link_.watchdog_expired(to_ms(now));
+  const FieldSelection::Stage stage = selection_.stage();
+  const bool no_proof_to_come =
+      stage == FieldSelection::Stage::left || stage == FieldSelection::Stage::unheard;
+  return link_up() && !role_.refused(now) && (role_.controlling() || no_proof_to_come) &&
+         !link_.watchdog_expired(to_ms(now));
 }
 
-// The paper's release: it has let our selections pass, and has never answered anything.
-bool Session::speaks_no_cmd() const { return !knows_cmd_ && selections_ >= max_selections; }
-
 void Session::refresh_status(Time now) {
-  if (!link_up() || busy_until_ > now) controlled_ = false;
+  role_.on_link(link_up(), now);
   look_at_arming();
   const LinkStatus fresh{
       .state = link_.state(),
       .reason = link_.reason(),
-      .busy = busy_until_ > now,
+      .busy = role_.refused(now),
       .gated = link_.watchdog_expired(to_ms(now)),
       .key = key_.trouble(now),
       .in_control = in_control(now),

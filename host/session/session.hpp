@@ -9,6 +9,11 @@
 //                          +--+ the same bytes   deadline    ------> timed out
 //                         every 50 ms
 //
+// It is put together from machines, each with its own diagram: what the board knows of us
+// (host_role.hpp), the fields that it sends (field_selection.hpp), the commands under way
+// (pending_commands.hpp), arming (arming.hpp), the key (host_key.hpp), the question who the board is
+// (identity_question.hpp) and the stop that lasts (stop_repetition.hpp).
+//
 // A retry has the bytes and the packet number of the original (signed anew, where there is a key),
 // so the board can execute it only once. When CMD has moved past a command, the retry's answer
 // (DUPLICATE: executed, STALE: not) decides. A refusal proves that the command was not executed only
@@ -26,7 +31,6 @@
 // cause that was known when it was asked for; when the board tells of a newer one, it is given up.
 #pragma once
 
-#include <array>
 #include <chrono>
 #include <cstdint>
 #include <optional>
@@ -38,12 +42,16 @@
 #include "../../protocol/messages/message.hpp"
 #include "../../transports/carrier.hpp"
 #include "arming.hpp"
+#include "field_selection.hpp"
 #include "host_key.hpp"
+#include "host_role.hpp"
+#include "identity_question.hpp"
 #include "../commands/pending_commands.hpp"
 #include "../commands/post_result.hpp"
 #include "../commands/posted_commands.hpp"
 #include "received_state.hpp"
 #include "statistics.hpp"
+#include "stop_repetition.hpp"
 #include "time.hpp"
 
 namespace r4 {
@@ -191,7 +199,6 @@ class Session {
  private:
   using Pending = PendingCommand;
   using Stage = PendingCommand::Stage;
-  static constexpr Time busy_memory = std::chrono::milliseconds{300};
 
   Pending* allocate(const Command& command, Time timeout, Time now);
   void transmit(Pending& pending, Time now);
@@ -202,7 +209,6 @@ class Session {
   SendResult close_and_transmit(DatagramWriter& writer, CommandKind kind, Priority priority,
                                 Time now);
   bool link_up() const;
-  bool speaks_no_cmd() const;
 
   void on_heartbeat_datagram(const Datagram& datagram, Time now);
   void on_state_datagram(const Datagram& datagram, Time now);
@@ -230,7 +236,7 @@ class Session {
   void confirm_stop(const SafeReport& report, Time now);
   void on_causes(std::int32_t newest, Time now);
   bool name_cause(Pending& pending) const;
-  void linger(Time now);
+  void repeat_stop(Time now);
   void select_fields(Time now);
   Command with_needed_fields(const Command& command);
   void refresh_status(Time now);
@@ -241,7 +247,10 @@ class Session {
   HostLink link_;
   HostKey key_;
   bool transport_down_ = false;
-  bool controlled_ = false;  // the board has executed a command of ours since the link came up
+  HostRoleMachine role_;
+  FieldSelection selection_;
+  IdentityQuestion question_;
+  StopRepetition repetition_;
   LinkStatus status_;
   ReceivedState state_;
   std::uint32_t restarts_ = 0;  // of the board, those that were told
@@ -253,19 +262,6 @@ class Session {
   Ticket next_ticket_ = 1;
   // As the newest heartbeat told it; unnamed_cause: none was heard.
   std::int32_t cause_ = Command::unnamed_cause;
-  // The stop that was confirmed last, repeated until then.
-  std::array<char, max_datagram> lingering_;
-  std::size_t lingering_size_ = 0;  // 0: none
-  Time linger_until_{0};
-  Time next_linger_{0};
-  Time busy_until_{0};
-  Time next_identify_{0};
-  Time question_sent_{0};
-  bool question_open_ = false;
-  Time command_field_seen_{0};
-  Time next_selection_{0};
-  int selections_ = 0;
-  bool knows_cmd_ = false;  // the board speaks this protocol, not only the paper's release of it
 };
 
 }  // namespace r4

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What the session sends, and how a command of it ends.
+#include <algorithm>
 #include <array>
 
 #include "../commands/command_help.hpp"
@@ -25,7 +26,7 @@ SendResult Session::close_and_transmit(DatagramWriter& writer, CommandKind kind,
   const Text bytes = writer.finish();
   if (bytes.empty()) return SendResult::down;
   const SendResult result = handler_.transmit({bytes.data(), bytes.size()}, priority);
-  if (result == SendResult::busy) busy_until_ = now + busy_memory;
+  if (result == SendResult::busy) role_.on_busy(now);
   return result;
 }
 
@@ -44,7 +45,7 @@ Session::Pending* Session::allocate(const Command& command, Time timeout, Time n
   if (command.kind == CommandKind::clear) {
     slot->cause = command.value;
     name_cause(*slot);
-    lingering_size_ = 0;  // who clears a stop repeats it no more
+    repetition_.cancel();  // who clears a stop repeats it no more
   }
   return slot;
 }
@@ -98,7 +99,7 @@ PostResult Session::post(const Command& command, Time now) {
 }
 
 Ticket Session::stop(Time timeout, Time now) {
-  lingering_size_ = 0;  // this one goes on from here
+  repetition_.cancel();  // this one goes on from here
   ++collector_.counts.commands;
   give_up_arming();
   disarm(DisarmCause::stop);
@@ -135,10 +136,7 @@ void Session::transmit(Pending& pending, Time now) {
     DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.size);
     pending.size = writer.stamp(pending.pnum, to_ms(now)).size();
     pending.stage = Stage::sent;
-    if (pending.kind == CommandKind::identify) {
-      question_sent_ = now;
-      question_open_ = true;
-    }
+    if (pending.kind == CommandKind::identify) question_.asked(now);
   } else {
     ++collector_.counts.retries;
   }
@@ -160,7 +158,7 @@ void Session::send_queued(Time now) {
 void Session::retry_due(Time now) {
   const bool gated = link_.watchdog_expired(to_ms(now));
   for (Pending& pending : pending_.under_way()) {
-    if (pending.stage != Stage::sent || now < pending.retry) continue;
+    if (!pending.is_out() || now < pending.retry) continue;
     if (gated && pending.kind != CommandKind::stop) {
       pending.retry = now + options_.command_retry;
     } else {
@@ -169,16 +167,14 @@ void Session::retry_due(Time now) {
   }
 }
 
-// A confirmed stop, a few times more: somebody's E:CLEAR may have been on its way.
-void Session::linger(Time now) {
-  if (lingering_size_ == 0 || now < next_linger_) return;
-  if (now >= linger_until_) {
-    lingering_size_ = 0;
-    return;
-  }
-  next_linger_ = now + options_.stop_retry;
+// A confirmed stop, a few times more.
+void Session::repeat_stop(Time now) {
+  const std::string_view stop = repetition_.due(options_.stop_retry, now);
+  if (stop.empty()) return;
   ++collector_.counts.retries;
-  DatagramWriter writer(lingering_.data(), lingering_.size(), lingering_size_);
+  std::array<char, max_datagram> buffer;
+  std::copy(stop.begin(), stop.end(), buffer.begin());
+  DatagramWriter writer(buffer.data(), buffer.size(), stop.size());
   close_and_transmit(writer, CommandKind::stop, Priority::stop, now);
 }
 

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The state fields that a session asks its board for, and whether the board listens: without I/O.
+//
+//                  CMD comes, in control                five F without any answer
+//     satisfied <------------------------- asking ----------------------------------> unheard
+//         |                                ^    ^                                        |
+//         +--------------------------------+    +----------------------------------------+
+//          no CMD for 200 ms, or no control      the board answers something after all
+//
+//     left       the board's own choice is left alone: nothing is ever asked for
+//     satisfied  the states bring CMD, and we are in control
+//     asking     F is sent every 200 ms. Executed, it is also the proof that the board obeys us
+//     unheard    the board is taken for one of the paper's release, which does not know F. It is asked
+//                once a second all the same: on a bad line all five may have been lost
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include "time.hpp"
+
+namespace r4 {
+
+class FieldSelection {
+ public:
+  enum class Stage : std::uint8_t { left, satisfied, asking, unheard };
+
+  // `fields` as in F; empty: the board's own choice is left alone.
+  explicit FieldSelection(std::string fields) : fields_(std::move(fields)) {
+    if (fields_.empty()) stage_ = Stage::left;
+  }
+
+  const std::string& fields() const { return fields_; }
+  // The program has chosen others.
+  void choose(std::string fields) {
+    fields_ = std::move(fields);
+    unanswered_ = 0;
+    if (stage_ == Stage::unheard) stage_ = Stage::asking;
+  }
+
+  // A state with CMD.
+  void on_cmd(Time now) {
+    cmd_seen_ = now;
+    on_answer();
+  }
+  // The board has answered something: the paper's release never does.
+  void on_answer() {
+    answers_ = true;
+    if (stage_ == Stage::unheard) stage_ = Stage::asking;
+  }
+
+  // Is F to be sent now? `may_ask`: the link is up, and no other host controls the board.
+  bool ask(bool controlling, bool may_ask, Time now) {
+    if (stage_ == Stage::left) return false;
+    if (controlling && now - cmd_seen_ < retry) {
+      stage_ = Stage::satisfied;
+      unanswered_ = 0;
+      return false;
+    }
+    if (!may_ask || now < next_) return false;
+    ++unanswered_;
+    stage_ = unanswered_ >= most_unanswered && !answers_ ? Stage::unheard : Stage::asking;
+    next_ = now + (stage_ == Stage::unheard ? reminder : retry);
+    return true;
+  }
+
+  Stage stage() const { return stage_; }
+  // The board speaks this protocol, and not the paper's release of it alone.
+  bool answers() const { return answers_; }
+
+ private:
+  static constexpr Time retry = std::chrono::milliseconds{200};
+  static constexpr Time reminder = std::chrono::seconds{1};
+  static constexpr int most_unanswered = 5;
+
+  std::string fields_;
+  Stage stage_ = Stage::asking;
+  bool answers_ = false;
+  int unanswered_ = 0;
+  Time cmd_seen_{0};
+  Time next_{0};
+};
+
+}  // namespace r4
