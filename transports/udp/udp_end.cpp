@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "udp_end.hpp"
+
+#include <fmt/core.h>
+#include <sys/socket.h>
+
+#include <asio/ip/v6_only.hpp>
+#include <asio/post.hpp>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <utility>
+
+namespace r4 {
+namespace {
+
+constexpr std::size_t normal_entries = 64;
+constexpr std::size_t state_entries = 4;
+constexpr std::chrono::milliseconds probe_interval{200};
+
+// The network is not there at the moment, as against one packet that failed.
+bool is_network_loss(int error) {
+  return error == ENETUNREACH || error == ENETDOWN || error == EHOSTUNREACH ||
+         error == EADDRNOTAVAIL || error == ENODEV;
+}
+
+// 0 if the system has taken it, else errno.
+int send_packet(int socket, std::string_view bytes, const asio::ip::udp::endpoint& to) {
+  ssize_t sent = 0;
+  do {
+    sent = ::sendto(socket, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL, to.data(),
+                    static_cast<socklen_t>(to.size()));
+  } while (sent < 0 && errno == EINTR);
+  return sent >= 0 ? 0 : errno;
+}
+
+}  // namespace
+
+std::string bracketed(const std::string& host) {
+  return host.find(':') == std::string::npos ? host : "[" + host + "]";
+}
+
+UdpEnd::UdpEnd(asio::io_context& io, UdpUrl url)
+    : io_(io),
+      url_(std::move(url)),
+      name_(url_.text),
+      socket_(io),
+      writable_(io),
+      probe_timer_(io),
+      queue_(normal_entries, state_entries, counters_.tx_dropped) {}
+
+void UdpEnd::open_socket(const Endpoint& local, bool v6_only) {
+  asio::error_code error;
+  socket_.open(local.protocol(), error);
+  if (!error && local.protocol() == asio::ip::udp::v6()) {
+    socket_.set_option(asio::ip::v6_only(v6_only), error);
+  }
+  if (!error) socket_.native_non_blocking(true, error);
+  if (error) refuse(error, local, "");
+}
+
+void UdpEnd::refuse(const asio::error_code& error, const Endpoint& local, const std::string& fix) {
+  close_socket();
+  const std::string port = fmt::format("UDP port {}", local.port());
+  if (error == asio::error::address_in_use) {
+    throw Error(ErrorKind::open, url_.text, port + " is in use by another program", fix);
+  }
+  if (error == asio::error::access_denied) {
+    throw Error(ErrorKind::permission, url_.text, port + " may not be opened: permission denied",
+                "use a port from 1024 up");
+  }
+  throw Error(ErrorKind::open, url_.text,
+              fmt::format("{} cannot be opened on {}: {}", port, local.address().to_string(),
+                          error.message()),
+              "use an address of this machine, or 0.0.0.0 for all of them");
+}
+
+void UdpEnd::begin(Handler& handler) {
+  handler_ = &handler;
+  begin_to_receive();
+  set_up(true);
+  report();
+}
+
+void UdpEnd::close() noexcept {
+  handler_ = nullptr;
+  up_ = reported_up_ = false;
+  down_reason_.clear();
+  refused_error_ = reported_refusal_ = 0;
+  reporting_.cancel();
+  reception_.cancel();
+  probe_.cancel();
+  writable_.stop();
+  queue_.clear();
+  close_socket();
+}
+
+// The attempt to receive at once with which Asio begins tells whether more is there, at no cost: it
+// fills in the sender.
+bool UdpEnd::begin_to_receive() {
+  sender_.port(0);
+  socket_.async_receive_from(asio::buffer(received_), sender_, MSG_TRUNC,
+                             reception_.handler([this](asio::error_code error, std::size_t size) {
+                               if (!error) received({received_.data(), size});
+                               if (handler_ == nullptr) return;
+                               const bool more = begin_to_receive();
+                               if (!more) handler_->on_drained();
+                             }));
+  return sender_.port() != 0;
+}
+
+void UdpEnd::hand_over(std::string_view bytes, Peer from) {
+  ++counters_.rx_datagrams;
+  counters_.rx_bytes += bytes.size();
+  handler_->on_datagram(bytes, from);
+}
+
+SendResult UdpEnd::send(std::string_view bytes, Priority priority, Peer to) {
+  if (handler_ == nullptr) return SendResult::down;
+  if (bytes.size() > max_datagram) {
+    ++counters_.tx_errors;
+    return SendResult::full;
+  }
+  if (!socket_.is_open()) return SendResult::down;
+  if (queue_.empty()) {
+    switch (transmit(bytes, to)) {
+      case Outcome::sent:
+        return SendResult::sent;
+      case Outcome::failed:
+        return SendResult::down;
+      case Outcome::busy:
+        break;
+    }
+  }
+  const SendResult result = queue_.push(bytes, priority, to, std::chrono::steady_clock::now());
+  writable_.start(socket_.native_handle(), [this] { send_waiting(); });
+  return result;
+}
+
+void UdpEnd::send_waiting() {
+  while (const SendQueue::Entry* entry = queue_.front(std::chrono::steady_clock::now())) {
+    if (transmit(entry->text(), entry->to) == Outcome::busy) {
+      writable_.start(socket_.native_handle(), [this] { send_waiting(); });
+      return;
+    }
+    queue_.pop();
+  }
+  writable_.stop();
+}
+
+UdpEnd::Outcome UdpEnd::transmit_to(std::string_view bytes, const Endpoint& to, bool standing) {
+  int error = send_packet(socket_.native_handle(), bytes, to);
+  // That is about an earlier packet, no program listens there yet; this one was not sent for it.
+  if (error == ECONNREFUSED) error = send_packet(socket_.native_handle(), bytes, to);
+  if (error == 0 || error == ECONNREFUSED) {
+    ++counters_.tx_datagrams;
+    counters_.tx_bytes += bytes.size();
+    refused_error_ = 0;
+    if (!up_) {
+      set_up(true);
+      report_later();
+    }
+    return Outcome::sent;
+  }
+  if (error == EAGAIN || error == EWOULDBLOCK) return Outcome::busy;
+  if (error == ENOBUFS) {  // the interface's queue is full; there is nothing to wait for
+    ++counters_.tx_dropped;
+    return Outcome::sent;
+  }
+  ++counters_.tx_errors;
+  if (!is_network_loss(error)) {
+    refused_error_ = error;
+    report_later();
+  } else if (standing && up_) {
+    down_error_ = error;
+    set_up(false);
+    probe_later();
+    report_later();
+  }
+  return Outcome::failed;
+}
+
+void UdpEnd::set_up(bool up) {
+  up_ = up;
+  ++(up ? counters_.ups : counters_.downs);
+  probe_.cancel();
+}
+
+void UdpEnd::warn(const std::string& reason, const std::string& fix) {
+  handler_->on_carrier_event(
+      {CarrierEvent::Kind::warning, Problem{ErrorKind::open, name_, reason, fix}});
+}
+
+void UdpEnd::tell_why_down(const Problem& problem) {
+  if (up_) set_up(false);
+  reported_up_ = false;
+  if (down_reason_ == problem.reason) return;
+  down_reason_ = problem.reason;
+  handler_->on_carrier_event({CarrierEvent::Kind::down, problem});
+}
+
+void UdpEnd::report_later() {
+  asio::post(io_, reporting_.handler([this] { report(); }));
+}
+
+void UdpEnd::report() {
+  if (refused_error_ != reported_refusal_) {
+    reported_refusal_ = refused_error_;
+    if (refused_error_ != 0) {
+      warn(fmt::format("the system does not send: {}", std::strerror(refused_error_)),
+           refused_error_ == EPERM ? "let UDP to this address through the firewall" : "");
+    }
+  }
+  if (handler_ == nullptr || up_ == reported_up_) return;
+  reported_up_ = up_;
+  if (up_) {
+    handler_->on_carrier_event({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
+  } else {
+    handler_->on_carrier_event(
+        {CarrierEvent::Kind::down,
+         Problem{ErrorKind::open, name_, std::strerror(down_error_), network_fix}});
+  }
+}
+
+// The interface may come back while nobody sends.
+void UdpEnd::probe_later() {
+  probe_timer_.expires_after(probe_interval);
+  probe_timer_.async_wait(probe_.handler([this] {
+    if (probe() == 0) {
+      set_up(true);
+      report();
+    } else {
+      probe_later();
+    }
+  }));
+}
+
+}  // namespace r4

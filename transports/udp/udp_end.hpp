@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What both ends of UDP have in common: a socket, what waits to be sent, and whether the network is
+// there. udp_host.hpp and udp_board.hpp are the ends.
+#pragma once
+
+#include <array>
+#include <asio/io_context.hpp>
+#include <asio/ip/udp.hpp>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "../../protocol/datagram/datagram.hpp"
+#include "../carrier.hpp"
+#include "../operation_slot.hpp"
+#include "../send_queue.hpp"
+#include "../writable_wait.hpp"
+#include "udp_host_socket.hpp"
+#include "udp_url.hpp"
+
+namespace r4 {
+
+class UdpEnd : public Carrier {
+ public:
+  void close() noexcept override;
+  SendResult send(std::string_view bytes, Priority priority, Peer to) override;
+  bool up() const override { return up_; }
+  std::size_t max_size() const override { return max_datagram; }
+  const std::string& name() const override { return name_; }
+  const CarrierCounters& counters() const override { return counters_; }
+
+ protected:
+  using Endpoint = asio::ip::udp::endpoint;
+  enum class Outcome : std::uint8_t { sent, busy, failed };
+
+  UdpEnd(asio::io_context& io, UdpUrl url);
+
+  // --- what the ends do
+
+  // A packet from sender_.
+  virtual void received(std::string_view bytes) = 0;
+  virtual Outcome transmit(std::string_view bytes, Peer to) = 0;
+  // Is the network there again? 0, or errno.
+  virtual int probe() = 0;
+  virtual void close_socket() noexcept = 0;
+
+  // --- what they do it with
+
+  // The socket, not bound. Throws Error.
+  void open_socket(const Endpoint& local, bool v6_only);
+  // Closes the socket; why it cannot be bound, and `fix` for a port that another program has.
+  [[noreturn]] void refuse(const asio::error_code& error, const Endpoint& local,
+                           const std::string& fix);
+  // The socket is bound: receives, and is up.
+  void begin(Handler& handler);
+  // Is there more at once?
+  bool begin_to_receive();
+  void hand_over(std::string_view bytes, Peer from);
+  // `standing`: to where what is for everyone goes. It tells whether the network is there.
+  Outcome transmit_to(std::string_view bytes, const Endpoint& to, bool standing);
+  void set_up(bool up);
+  void report();
+  void warn(const std::string& reason, const std::string& fix);
+  // It is tried again and again, and told once.
+  void tell_why_down(const Problem& problem);
+
+  static constexpr char network_fix[] = "check the WiFi or cable and the address";
+
+  asio::io_context& io_;
+  const UdpUrl url_;
+  std::string name_;
+  Handler* handler_ = nullptr;
+  UdpSocket socket_;
+  OperationSlot reception_;
+  WritableWait writable_;
+  CarrierCounters counters_;
+  Endpoint sender_;
+  std::string down_reason_;  // why it cannot be opened, as told last
+
+ private:
+  void send_waiting();
+  void report_later();
+  void probe_later();
+
+  LoopTimer probe_timer_;
+  OperationSlot probe_;
+  bool up_ = false;
+  bool reported_up_ = false;
+  int down_error_ = 0;
+  int refused_error_ = 0;  // why the system refused the last packet; 0 once one has passed
+  int reported_refusal_ = 0;
+  OperationSlot reporting_;
+  SendQueue queue_;
+  std::array<char, max_datagram> received_;
+};
+
+// "[::1]" for an IPv6 address, as in a URL.
+std::string bracketed(const std::string& host);
+
+}  // namespace r4

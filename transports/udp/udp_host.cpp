@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "udp_host.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+namespace r4 {
+
+UdpHost::UdpHost(asio::io_context& io, const Url& url, HostLookup lookup)
+    : UdpEnd(io, UdpUrl(url, Role::host)), lookup_(std::move(lookup)), watch_(io, lookup_) {}
+
+// Whoever opens it in a handler of the loop has others on that loop, whom a name must not hold up.
+void UdpHost::open(Handler& handler) {
+  close();
+  named_ = !is_address(url_.host);
+  if (named_ && io_.get_executor().running_in_this_thread()) {
+    handler_ = &handler;
+    return watch();  // its address is asked for
+  }
+  bind(Endpoint(lookup_.find(url_.host, url_.text), url_.port));
+  begin(handler);
+  if (handler_ != nullptr) watch();
+}
+
+void UdpHost::close() noexcept {
+  watch_.stop();
+  UdpEnd::close();
+}
+
+// The socket of a host whose board is there.
+void UdpHost::bind(const Endpoint& board) {
+  board_ = board;
+  if (const int error = probe_route(board); error != 0) {
+    throw Error(ErrorKind::open, url_.text, std::strerror(error), network_fix);
+  }
+  const Endpoint local(board.protocol(), url_.listen);
+  open_socket(local, true);
+  const asio::error_code error = host_socket_.bind(local.port(), board);
+  if (error == asio::error::already_open) {
+    close_socket();
+    throw Error(ErrorKind::open, url_.text, "this program has that board open already",
+                "use the one that is open, or ?listen=0 for another host to the board");
+  }
+  if (error) {
+    refuse(error, local, "end that program, or use ?listen=0 to hear the board on any free port");
+  }
+  const std::uint16_t local_port = socket_.local_endpoint().port();
+  name_ = fmt::format("udp://{}:{}", bracketed(url_.host), url_.port);
+  if (local_port != UdpUrl::host_port) name_ += fmt::format("?listen={}", local_port);
+}
+
+void UdpHost::watch() {
+  if (named_) {
+    watch_.start(url_.host, socket_.is_open(), [this](const FoundHost& answer) { found(answer); });
+  } else if (host_socket_.connected()) {
+    // The address of this computer may be another now.
+    watch_.start([this] { host_socket_.reconnect(); });
+  }
+}
+
+// Where the board of that name is, now.
+void UdpHost::found(const FoundHost& answer) {
+  const auto& addresses = answer.addresses;
+  const bool is_open = socket_.is_open();
+  if (is_open) {
+    host_socket_.reconnect();  // or it is this computer that has moved
+    const bool same =
+        std::find(addresses.begin(), addresses.end(), board_.address()) != addresses.end();
+    if (same || addresses.empty()) return;
+  }
+  const std::string before = is_open ? board_.address().to_string() : "";
+  try {
+    const Endpoint board(address_of(answer, url_.host, url_.text), url_.port);
+    reception_.cancel();
+    writable_.stop();
+    close_socket();
+    bind(board);
+  } catch (const Error& error) {
+    watch_.set_known(socket_.is_open());
+    if (!socket_.is_open()) tell_why_down(error.problem());
+    return;
+  }
+  watch_.set_known(true);
+  down_reason_.clear();
+  begin_to_receive();
+  if (!up()) set_up(true);
+  if (is_open) {
+    warn(fmt::format("the board is at {} now; it was at {}", board_.address().to_string(), before),
+         "");
+  }
+  if (handler_ != nullptr) report();
+}
+
+void UdpHost::received(std::string_view bytes) {
+  if (!host_socket_.hears(sender_)) {
+    ++counters_.rx_foreign;
+    return;
+  }
+  if (bytes.size() > max_datagram) {
+    ++counters_.rx_oversize;
+    return;
+  }
+  if (watch_.listens()) {
+    Datagram datagram;
+    if (read(bytes, datagram)) watch_.heard();
+  }
+  hand_over(bytes, everyone);
+}
+
+UdpEnd::Outcome UdpHost::transmit(std::string_view bytes, Peer to) {
+  if (to == everyone) return transmit_to(bytes, board_, true);
+  ++counters_.tx_dropped;
+  return Outcome::failed;
+}
+
+int UdpHost::probe() {
+  return host_socket_.connected() ? host_socket_.reconnect() : probe_route(board_);
+}
+
+}  // namespace r4

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The host's end of UDP: one board, which may be known by its name and may move.
+#pragma once
+
+#include <asio/io_context.hpp>
+
+#include "host_lookup.hpp"
+#include "udp_end.hpp"
+
+namespace r4 {
+
+class UdpHost final : public UdpEnd {
+ public:
+  UdpHost(asio::io_context& io, const Url& url, HostLookup lookup);
+  ~UdpHost() override { close(); }
+
+  void open(Handler& handler) override;
+  void close() noexcept override;
+
+ private:
+  void received(std::string_view bytes) override;
+  Outcome transmit(std::string_view bytes, Peer to) override;
+  int probe() override;
+  void close_socket() noexcept override { host_socket_.close(); }
+
+  void bind(const Endpoint& board);
+  void found(const FoundHost& answer);
+  void watch();
+
+  const HostLookup lookup_;
+  HostWatch watch_;
+  UdpHostSocket host_socket_{socket_};
+  bool named_ = false;  // the URL has the board's name, not its address
+  Endpoint board_;
+};
+
+}  // namespace r4
