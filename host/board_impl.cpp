@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "board_impl.hpp"
+
+#include <algorithm>
+#include <asio/post.hpp>
+#include <utility>
+
+#include "commands/command_help.hpp"
+#include "explain.hpp"
+
+namespace r4 {
+
+namespace {
+
+// The session ends every command at its deadline, which is that of the call. A call that has been
+// begun and waits longer than this beyond it is held up by a transport that does not return.
+constexpr std::chrono::milliseconds grace{500};
+
+// `instead`: what that means for what was asked.
+Error blocked_error(std::string_view what, std::string_view instead) {
+  return Error(ErrorKind::refused, std::string(what),
+               std::string(instead) + ": the board's thread does not answer",
+               "a transport of your own must return at once");
+}
+
+}  // namespace
+
+Board::Impl::Call::Call(const Command& c)
+    : command(c), text(c.text.data(), c.text.size()), text2(c.text2.data(), c.text2.size()) {
+  command.text = text;
+  command.text2 = text2;
+}
+
+Board::Impl::Impl(std::string_view url_given, BoardOptions options, BoardCallbacks first)
+    : url(url_given),
+      arming(options.session.arming),
+      callback_limit(options.callback_limit),
+      async(io, url_given, std::move(options)),
+      box(io, [this](const Command& c) { deliver(c); }),
+      callbacks([this](Clock::duration busy) { on_callback_end(busy); }) {
+  if (first.on_state) callbacks.on_state(std::move(first.on_state));
+  if (first.on_link) callbacks.on_link(std::move(first.on_link));
+  if (first.on_event) callbacks.on_event(std::move(first.on_event));
+  if (first.on_restart) callbacks.on_restart(std::move(first.on_restart));
+  if (first.on_arming) callbacks.on_arming(std::move(first.on_arming));
+  if (first.on_refused) callbacks.on_refused(std::move(first.on_refused));
+  listen();
+  async.open();
+  take_name();
+}
+
+void Board::Impl::start() {
+  thread = std::thread([self = shared_from_this()] { self->io.run(); });
+  callbacks.start(shared_from_this());
+}
+
+// The loop first: it waits for no callback, so that a callback may close the board.
+void Board::Impl::close() {
+  {
+    const std::lock_guard lock(mutex);
+    if (!closed) asio::post(io, [this] { shut(); });
+  }
+  {
+    const std::lock_guard lock(joining);
+    if (thread.joinable()) thread.join();
+  }
+  callbacks.stop();
+}
+
+// --- on the loop
+
+void Board::Impl::listen() {
+  async.on_state([this](const ReceivedState& fresh, const Datagram&) {
+    {
+      const std::lock_guard lock(mutex);
+      state = fresh;
+      ++states;
+      in_control = async.in_control();
+    }
+    news.notify_all();
+    tell(fresh);
+  });
+  async.on_link([this](const LinkStatus& fresh) {
+    {
+      const std::lock_guard lock(mutex);
+      link = fresh;
+      state = async.state();  // heartbeats change its `safe`
+      in_control = async.in_control();
+    }
+    news.notify_all();
+    tell(fresh);
+  });
+  async.on_event([this](const CarrierEvent& event) {
+    take_name();  // a board that was plugged in again may be at another port
+    tell(event);
+  });
+  async.on_arming([this](DisarmCause fresh) {
+    {
+      const std::lock_guard lock(mutex);
+      disarmed_by = fresh;
+    }
+    tell(fresh);
+  });
+  async.on_refused([this](const RefusedPost& refused) { tell(refused); });
+  async.on_restart([this] {
+    {
+      const std::lock_guard lock(mutex);
+      state = async.state();
+    }
+    tell(CallbackThread::Restart{});
+  });
+}
+
+void Board::Impl::take_name() {
+  const std::lock_guard lock(mutex);
+  name = async.name();
+}
+
+void Board::Impl::tell(CallbackThread::Notice notice) {
+  callbacks.tell(std::move(notice));
+  if (looking || callback_limit == Duration{0}) return;
+  looking = true;
+  look_timer.expires_after(callback_limit);
+  look_timer.async_wait([this](const std::error_code& error) {
+    if (!error) look_at_callbacks();
+  });
+}
+
+// Heartbeats say that somebody looks after the robot.
+void Board::Impl::look_at_callbacks() {
+  looking = false;
+  const auto busy = callbacks.busy_for();
+  if (!busy) return;
+  if (*busy >= callback_limit) {
+    async.hold_heartbeats(true);
+    return;  // until the callback ends
+  }
+  looking = true;
+  look_timer.expires_after(callback_limit - *busy);
+  look_timer.async_wait([this](const std::error_code& error) {
+    if (!error) look_at_callbacks();
+  });
+}
+
+// On the callbacks' thread.
+void Board::Impl::on_callback_end(Clock::duration busy) {
+  if (callback_limit == Duration{0} || busy < callback_limit) return;
+  const std::lock_guard lock(mutex);
+  if (closed) return;
+  const auto ms = std::chrono::duration_cast<Duration>(busy).count();
+  asio::post(io, [this, ms] {
+    async.hold_heartbeats(false);
+    tell(CarrierEvent{
+        CarrierEvent::Kind::warning,
+        Problem{ErrorKind::refused, "a callback",
+                "it ran for " + std::to_string(ms) + " ms, and after " +
+                    std::to_string(callback_limit.count()) + " ms the heartbeats stopped",
+                "do the work in another thread, or set BoardOptions::callback_limit"}});
+  });
+}
+
+void Board::Impl::deliver(const Command& command) {
+  if (command.kind == CommandKind::stop) {
+    async.async_stop(default_timeout, [](const CommandResult&) {});
+  } else if (const PostResult result = async.post(command); !result) {
+    RefusedPost refused{command, Refusal::none, result};
+    refused.command.text = refused.command.text2 = Text();
+    tell(refused);
+  }
+}
+
+// A stop is sent however late it is; anything else only while its caller waits for it.
+void Board::Impl::begin(const CallPtr& call, Clock::time_point deadline) {
+  const bool stop = call->command.kind == CommandKind::stop;
+  auto left = std::chrono::ceil<Duration>(deadline - Clock::now());
+  {
+    const std::lock_guard lock(mutex);
+    if (!stop && (call->abandoned || left <= Duration{0})) return;
+    call->begun = true;
+  }
+  auto end = [this, call](const CommandResult& result) { finish(*call, result); };
+  if (call->start) {
+    call->start(left, std::move(end));
+  } else if (stop) {
+    async.async_stop(left > Duration{0} ? left : default_timeout, std::move(end));
+  } else if (call->command.kind == CommandKind::identify) {
+    async.async_identify(left, std::move(end));
+  } else {
+    async.async_send(call->command, left, std::move(end));
+  }
+}
+
+void Board::Impl::finish(Call& call, const CommandResult& result) {
+  {
+    const std::lock_guard lock(mutex);
+    call.result = result;
+    call.result.elapsed = std::chrono::duration_cast<Time>(Clock::now() - call.called);
+    call.link = async.link();
+    call.identity = async.identity();
+    call.done = true;
+  }
+  call.ended.notify_all();
+}
+
+// After this, nothing more is put on the loop; what is on it is carried out, then the loop ends.
+void Board::Impl::shut() {
+  {
+    const std::lock_guard lock(mutex);
+    if (closed) return;
+    closed = true;
+    last_statistics = async.statistics();
+  }
+  news.notify_all();
+  async.close();
+  look_timer.cancel();
+  work.reset();
+  // Twice around: the ends of commands that begin() finds closed come behind this one.
+  asio::post(io, [this] { asio::post(io, [this] { io.stop(); }); });
+}
+
+// --- on any thread
+
+// A day is as good as for ever, and cannot overflow.
+Board::Duration Board::Impl::bounded(Duration timeout) {
+  return std::clamp<Duration>(timeout, Duration{0}, std::chrono::hours{24});
+}
+
+Error Board::Impl::closed_error(std::string_view what) {
+  return Error(ErrorKind::refused, std::string(what), "cancelled: the board was closed",
+               "open it again with another Board");
+}
+
+void Board::Impl::require_sendable(const Command& command) {
+  require_valid(command);
+  require_cable(url, command);
+}
+
+Board::Impl::CallPtr Board::Impl::execute(const Command& command, Duration timeout) {
+  return execute(shown(command), std::make_shared<Call>(command), timeout);
+}
+
+Board::Impl::CallPtr Board::Impl::execute(const std::string& text, CallPtr call,
+                                          Duration timeout) {
+  const auto deadline = call->called + bounded(timeout);
+  std::unique_lock lock(mutex);
+  if (closed) throw closed_error(text);
+  asio::post(io, [this, call, deadline] { begin(call, deadline); });
+  const auto is_done = [&] { return call->done; };
+  if (!call->ended.wait_until(lock, deadline, is_done) &&
+      !(call->begun && call->ended.wait_until(lock, deadline + grace, is_done))) {
+    call->abandoned = true;
+    if (call->command.kind == CommandKind::stop) {
+      throw Error(ErrorKind::refused, text,
+                  "not confirmed: the board's thread does not answer, and sends it when it does",
+                  std::string(stop_last_resort));
+    }
+    throw blocked_error(
+        text, call->begun ? "not confirmed, it may have been executed or not" : "not sent");
+  }
+  if (call->result.outcome == Outcome::confirmed) return call;
+  if (closed && call->result.outcome == Outcome::cancelled) throw closed_error(text);
+  throw Error(explain(text, call->result, call->link));
+}
+
+void Board::Impl::run_on_loop(std::string_view what, std::function<void()> action) {
+  const auto call = std::make_shared<Call>(Command());
+  std::unique_lock lock(mutex);
+  if (closed) return;
+  asio::post(io, [this, call, action = std::move(action)] {
+    {
+      const std::lock_guard begin_lock(mutex);
+      if (call->abandoned) return;
+      call->begun = true;
+    }
+    action();
+    finish(*call, {});
+  });
+  const auto is_done = [&] { return call->done; };
+  if (call->ended.wait_for(lock, default_timeout, is_done)) return;
+  if (!call->begun) {
+    call->abandoned = true;
+    throw blocked_error(what, "not done");
+  }
+  call->ended.wait(lock, is_done);
+}
+
+PostResult Board::Impl::post(const Command& command) {
+  require_sendable(command);
+  const std::lock_guard lock(mutex);
+  const bool stop = command.kind == CommandKind::stop;
+  if (closed || (!in_control && !stop)) return PostResult::no_link;
+  if (arming == Arming::required && disarmed_by != DisarmCause::none &&
+      drives_output(command.kind)) {
+    ++refused_here;
+    return PostResult::not_armed;
+  }
+  return box.put(command) ? PostResult::sent : PostResult::queue_full;
+}
+
+std::string Board::Impl::name_now() {
+  const std::lock_guard lock(mutex);
+  return name;
+}
+LinkStatus Board::Impl::link_now() {
+  const std::lock_guard lock(mutex);
+  return link;
+}
+std::uint64_t Board::Impl::states_now() {
+  const std::lock_guard lock(mutex);
+  return states;
+}
+
+}  // namespace r4

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What is behind a Board: the thread of its link, that of its callbacks, and the calls that wait.
+//
+//     a thread of the program       the link's thread            the callbacks' thread
+//     send() -- Call, post() -->    AsyncBoard on its loop  -->  callback_thread.hpp
+//            <-- ended, news --
+//
+// The link's thread waits for nobody: nothing of the program runs there. The threads meet under `mutex`.
+#pragma once
+
+#include <asio/executor_work_guard.hpp>
+#include <asio/io_context.hpp>
+#include <asio/steady_timer.hpp>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <thread>
+
+#include "async_board.hpp"
+#include "board.hpp"
+#include "callback_thread.hpp"
+#include "post_box.hpp"
+
+namespace r4 {
+
+struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
+  using Clock = std::chrono::steady_clock;
+
+  // Something asked of the loop, and its answer. Held by both sides, since the caller may give up:
+  // what the loop has not begun by then, it leaves alone.
+  struct Call {
+    explicit Call(const Command& c);
+    Command command;
+    std::string text, text2;
+    const Clock::time_point called = Clock::now();
+    // For what is not one command: has the loop begin it, with the time that is left.
+    using End = std::function<void(const CommandResult&)>;
+    std::function<void(Duration left, End end)> start;
+    bool begun = false;
+    bool abandoned = false;
+    bool done = false;
+    std::condition_variable ended;
+    CommandResult result;
+    LinkStatus link;
+    BoardIdentity identity;
+  };
+  using CallPtr = std::shared_ptr<Call>;
+
+  Impl(std::string_view url_given, BoardOptions options, BoardCallbacks first);
+  void start();
+  // Idempotent, from any thread.
+  void close();
+
+  // --- on any thread
+
+  void require_sendable(const Command& command);
+  // Has the loop carry out a command. Throws if it is not confirmed.
+  CallPtr execute(const Command& command, Duration timeout);
+  CallPtr execute(const std::string& text, CallPtr call, Duration timeout);
+  PostResult post(const Command& command);
+  // Does `action` on the loop and waits until it is done; nothing if the board is closed. Throws if
+  // the loop does not begin in time; then it never will.
+  void run_on_loop(std::string_view what, std::function<void()> action);
+  // Waits until `arrived` (asked under the lock) is true. False if it was not in time.
+  template <class Predicate>
+  bool wait_for_news(Duration timeout, Predicate arrived) {
+    std::unique_lock lock(mutex);
+    const bool woken = news.wait_for(lock, bounded(timeout), [&] { return closed || arrived(); });
+    if (closed) throw closed_error(name);
+    return woken;
+  }
+  std::string name_now();
+  LinkStatus link_now();
+  std::uint64_t states_now();
+
+  static Duration bounded(Duration timeout);
+  static Error closed_error(std::string_view what);
+
+  // --- on the loop
+
+  void listen();
+  void take_name();
+  void deliver(const Command& command);
+  void begin(const CallPtr& call, Clock::time_point deadline);
+  void finish(Call& call, const CommandResult& result);
+  void shut();
+  void tell(CallbackThread::Notice notice);
+  void look_at_callbacks();
+  void on_callback_end(Clock::duration busy);
+
+  const std::string url;  // as it was given
+  const Arming arming;
+  const Duration callback_limit;  // 0: none
+  asio::io_context io{1};
+  asio::executor_work_guard<asio::io_context::executor_type> work{io.get_executor()};
+  AsyncBoard async;
+  PostBox box;
+  CallbackThread callbacks;
+  std::thread thread;
+  std::mutex joining;
+
+  // Of the loop.
+  asio::steady_timer look_timer{io};
+  bool looking = false;  // the timer is set
+
+  // What both sides see.
+  std::mutex mutex;
+  std::condition_variable news;  // state, link or closed has changed
+  std::string name;              // the transport's, as the loop knows it
+  ReceivedState state;
+  std::uint64_t states = 0;
+  LinkStatus link;
+  bool in_control = false;
+  DisarmCause disarmed_by = DisarmCause::not_yet;
+  std::uint64_t refused_here = 0;  // posts that did not get as far as the loop
+  bool closed = false;
+  Statistics last_statistics;
+};
+
+}  // namespace r4

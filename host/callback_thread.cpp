@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "callback_thread.hpp"
+
+#include <utility>
+
+namespace r4 {
+
+namespace {
+
+template <class... Calls>
+struct Overloaded : Calls... {
+  using Calls::operator()...;
+};
+template <class... Calls>
+Overloaded(Calls...) -> Overloaded<Calls...>;
+
+}  // namespace
+
+CallbackThread::CallbackThread(std::function<void(Clock::duration)> on_end)
+    : on_end_(std::move(on_end)), ring_(capacity) {}
+
+// The last callback may have destroyed the board.
+CallbackThread::~CallbackThread() {
+  if (thread_.joinable()) thread_.detach();
+}
+
+void CallbackThread::start(std::shared_ptr<void> owner) {
+  thread_ = std::thread([this, owner = std::move(owner)] { run(); });
+}
+
+void CallbackThread::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+    taken_ = told_;
+    tasks_.clear();
+  }
+  news_.notify_all();
+  if (on_it()) return;
+  const std::lock_guard lock(joining_);
+  if (thread_.joinable()) thread_.join();
+}
+
+void CallbackThread::tell(Notice notice) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (ended_) return;
+    const bool waits = told_ > taken_ && (tasks_.empty() || tasks_.back().behind < told_);
+    Notice& newest = ring_[(told_ + capacity - 1) % capacity];
+    if (waits && std::holds_alternative<ReceivedState>(newest) &&
+        std::holds_alternative<ReceivedState>(notice)) {
+      newest = std::move(notice);
+      return;
+    }
+    if (told_ - taken_ == capacity) {
+      ++taken_;
+      ++dropped_;
+    }
+    ring_[told_++ % capacity] = std::move(notice);
+  }
+  news_.notify_one();
+}
+
+std::optional<CallbackThread::Clock::duration> CallbackThread::busy_for() const {
+  const std::lock_guard lock(mutex_);
+  if (!busy_since_) return {};
+  return Clock::now() - *busy_since_;
+}
+
+std::uint64_t CallbackThread::dropped() const {
+  const std::lock_guard lock(mutex_);
+  return dropped_;
+}
+
+void CallbackThread::run() {
+  id_ = std::this_thread::get_id();
+  Notice notice;
+  std::function<void()> task;
+  while (take(notice, task)) {
+    // An exception of the user's ends the program where it is thrown.
+    [&]() noexcept {
+      if (task) {
+        task();
+      } else {
+        call(notice);
+      }
+    }();
+    task = nullptr;
+    Clock::duration busy;
+    {
+      const std::lock_guard lock(mutex_);
+      busy = Clock::now() - *busy_since_;
+      busy_since_.reset();
+    }
+    on_end_(busy);
+  }
+}
+
+// Waits for the next thing to do; false at the end.
+bool CallbackThread::take(Notice& notice, std::function<void()>& task) {
+  std::unique_lock lock(mutex_);
+  news_.wait(lock, [&] { return ended_ || told_ > taken_ || !tasks_.empty(); });
+  if (ended_) return false;
+  if (!tasks_.empty() && tasks_.front().behind <= taken_) {
+    task = std::move(tasks_.front().action);
+    tasks_.pop_front();
+  } else {
+    notice = std::move(ring_[taken_++ % capacity]);
+  }
+  busy_since_ = Clock::now();
+  return true;
+}
+
+void CallbackThread::call(const Notice& notice) {
+  std::visit(Overloaded{
+                 [&](const Restart&) {
+                   state_ = ReceivedState();
+                   restart_callbacks_();
+                 },
+                 [&](const ReceivedState& state) {
+                   state_ = state;
+                   state_callbacks_(state);
+                 },
+                 [&](const LinkStatus& link) {
+                   link_ = link;
+                   link_callbacks_(link);
+                 },
+                 [&](const CarrierEvent& event) {
+                   if (event.kind == CarrierEvent::Kind::warning) {
+                     warning_ = event;
+                   } else {
+                     event_ = event;
+                     warning_.reset();
+                   }
+                   event_callbacks_(event);
+                 },
+                 [&](DisarmCause cause) {
+                   arming_ = cause;
+                   arming_callbacks_(cause);
+                 },
+                 [&](const RefusedPost& refused) { refused_callbacks_(refused); },
+             },
+             notice);
+}
+
+// In its place among the notices, so that nothing is told twice and nothing left out.
+template <class Kind, class Function, class Tell>
+Subscription CallbackThread::add(Kind& kind, Function callback, Tell tell) {
+  const auto one = std::make_shared<typename Kind::One>(std::move(callback));
+  {
+    const std::lock_guard lock(mutex_);
+    if (ended_) return {};
+    tasks_.push_back({told_, [&kind, one, tell] {
+                        kind.add(one);
+                        tell(*one);
+                      }});
+  }
+  news_.notify_one();
+  return Subscription(one);
+}
+
+Subscription CallbackThread::on_state(Subscribers<ReceivedState>::Function callback) {
+  return add(state_callbacks_, std::move(callback), [this](auto& one) {
+    if (state_.any()) one(state_);
+  });
+}
+Subscription CallbackThread::on_link(Subscribers<LinkStatus>::Function callback) {
+  return add(link_callbacks_, std::move(callback), [this](auto& one) { one(link_); });
+}
+Subscription CallbackThread::on_event(Subscribers<CarrierEvent>::Function callback) {
+  return add(event_callbacks_, std::move(callback), [this](auto& one) {
+    if (event_) one(*event_);
+    if (warning_) one(*warning_);
+  });
+}
+Subscription CallbackThread::on_restart(Subscribers<>::Function callback) {
+  return add(restart_callbacks_, std::move(callback), [](auto&) {});
+}
+Subscription CallbackThread::on_arming(Subscribers<DisarmCause>::Function callback) {
+  return add(arming_callbacks_, std::move(callback), [this](auto& one) { one(arming_); });
+}
+Subscription CallbackThread::on_refused(Subscribers<RefusedPost>::Function callback) {
+  return add(refused_callbacks_, std::move(callback), [](auto&) {});
+}
+
+}  // namespace r4

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The thread on which the callbacks of a Board run, beside the thread of its link.
+//
+//     the link's loop --tell()--> notices, 64 at most --> the callbacks, one at a time
+//
+// So a callback may take its time, and may wait for the board: heartbeats and commands go on. It may
+// not take for ever: busy_for() tells the loop how long one has run, and after a limit the loop stops
+// the heartbeats, for nobody looks after the robot.
+//
+// Nothing here waits for a callback. A state that waits is replaced by the next one; of other notices
+// the oldest are dropped, and counted. tell() allocates nothing.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <variant>
+#include <vector>
+
+#include "../transports/carrier.hpp"
+#include "session/session.hpp"
+#include "subscription.hpp"
+
+namespace r4 {
+
+class CallbackThread {
+ public:
+  using Clock = std::chrono::steady_clock;
+  struct Restart {};
+  using Notice =
+      std::variant<Restart, ReceivedState, LinkStatus, CarrierEvent, DisarmCause, RefusedPost>;
+  static constexpr std::size_t capacity = 64;
+
+  // `on_end`: a callback has ended that ran for so long; called on this thread.
+  explicit CallbackThread(std::function<void(Clock::duration)> on_end);
+  ~CallbackThread();
+  CallbackThread(const CallbackThread&) = delete;
+  CallbackThread& operator=(const CallbackThread&) = delete;
+
+  // `owner` is kept until the thread ends.
+  void start(std::shared_ptr<void> owner);
+  // No callback runs any more when this returns, unless it is called in one; none is called again.
+  void stop();
+  // Is this the callbacks' thread?
+  bool on_it() const { return std::this_thread::get_id() == id_.load(); }
+
+  void tell(Notice notice);
+  // How long the callback that runs now has run; nothing if none does.
+  std::optional<Clock::duration> busy_for() const;
+  // Notices that were dropped.
+  std::uint64_t dropped() const;
+
+  // Adds a callback. It is told what there is already, then what comes next.
+  Subscription on_state(Subscribers<ReceivedState>::Function callback);
+  Subscription on_link(Subscribers<LinkStatus>::Function callback);
+  Subscription on_event(Subscribers<CarrierEvent>::Function callback);
+  Subscription on_restart(Subscribers<>::Function callback);
+  Subscription on_arming(Subscribers<DisarmCause>::Function callback);
+  Subscription on_refused(Subscribers<RefusedPost>::Function callback);
+
+ private:
+  // Something to be done between two notices: behind the first `behind` of all.
+  struct Task {
+    std::uint64_t behind;
+    std::function<void()> action;
+  };
+
+  template <class Kind, class Function, class Tell>
+  Subscription add(Kind& kind, Function callback, Tell tell);
+  void run();
+  bool take(Notice& notice, std::function<void()>& task);
+  void call(const Notice& notice);
+
+  const std::function<void(Clock::duration)> on_end_;
+  std::thread thread_;
+  std::atomic<std::thread::id> id_{};
+  std::mutex joining_;
+
+  // Of the thread: the callbacks, and what they were told last.
+  Subscribers<ReceivedState> state_callbacks_;
+  Subscribers<LinkStatus> link_callbacks_;
+  Subscribers<CarrierEvent> event_callbacks_;
+  Subscribers<> restart_callbacks_;
+  Subscribers<DisarmCause> arming_callbacks_;
+  Subscribers<RefusedPost> refused_callbacks_;
+  ReceivedState state_;
+  LinkStatus link_;
+  std::optional<CarrierEvent> event_;    // up or down
+  std::optional<CarrierEvent> warning_;  // since then
+  DisarmCause arming_ = DisarmCause::not_yet;
+
+  mutable std::mutex mutex_;
+  std::condition_variable news_;
+  bool ended_ = false;
+  std::vector<Notice> ring_;
+  std::uint64_t told_ = 0;   // notices so far; the newest is ring_[(told_ - 1) % capacity]
+  std::uint64_t taken_ = 0;  // of them, taken out or dropped
+  std::uint64_t dropped_ = 0;
+  std::deque<Task> tasks_;
+  std::optional<Clock::time_point> busy_since_;
+};
+
+}  // namespace r4

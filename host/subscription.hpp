@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Callbacks, several of a kind, each with a handle by which it is ended.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+namespace r4 {
+
+// What stands behind a Subscription.
+class Subscriber {
+ public:
+  virtual ~Subscriber() = default;
+  void end() {
+    ended_ = true;
+    const std::lock_guard lock(running_);  // waits for a call in another thread
+    if (!called_) drop();                  // else when that call is over
+  }
+  bool ended() const { return ended_; }
+
+ protected:
+  // Calls `function` unless this has ended.
+  template <class Function>
+  void call(Function function) {
+    const std::lock_guard lock(running_);
+    if (ended_) return;
+    const Call under_way(*this);
+    function();
+  }
+  // Lets the callback go, with what it has captured.
+  virtual void drop() = 0;
+
+ private:
+  // Also where the callback throws.
+  class Call {
+   public:
+    explicit Call(Subscriber& subscriber)
+        : subscriber_(subscriber), outermost_(!std::exchange(subscriber.called_, true)) {}
+    Call(const Call&) = delete;
+    Call& operator=(const Call&) = delete;
+    ~Call() {
+      if (!outermost_) return;
+      subscriber_.called_ = false;
+      if (subscriber_.ended_) subscriber_.drop();
+    }
+
+   private:
+    Subscriber& subscriber_;
+    const bool outermost_;
+  };
+
+  std::recursive_mutex running_;
+  std::atomic<bool> ended_{false};
+  bool called_ = false;
+};
+
+// One callback. Letting go of this handle leaves the callback where it is.
+class Subscription {
+ public:
+  Subscription() = default;  // one that has ended
+  explicit Subscription(const std::shared_ptr<Subscriber>& subscriber) : subscriber_(subscriber) {}
+
+  // Ends it. When this returns, the callback will not be called again and, unless this is called
+  // within it, is not running. Idempotent, from any thread, also when the board is gone.
+  void cancel() {
+    if (const std::shared_ptr<Subscriber> subscriber = subscriber_.lock()) subscriber->end();
+    subscriber_.reset();
+  }
+
+ private:
+  std::weak_ptr<Subscriber> subscriber_;
+};
+
+// Ends its subscription with its own end.
+class ScopedSubscription {
+ public:
+  ScopedSubscription() = default;
+  ScopedSubscription(Subscription subscription)  // NOLINT(google-explicit-constructor)
+      : subscription_(std::move(subscription)) {}
+  ScopedSubscription(ScopedSubscription&& other) noexcept
+      : subscription_(std::exchange(other.subscription_, {})) {}
+  ScopedSubscription& operator=(ScopedSubscription&& other) noexcept {
+    std::swap(subscription_, other.subscription_);
+    return *this;
+  }
+  ~ScopedSubscription() { subscription_.cancel(); }
+
+ private:
+  Subscription subscription_;
+};
+
+// The callbacks of one kind. Added from any thread, called from one; a call allocates nothing.
+template <class... Arguments>
+class Subscribers {
+ public:
+  using Function = std::function<void(const Arguments&...)>;
+
+  class One final : public Subscriber {
+   public:
+    explicit One(Function function) : function_(std::move(function)) {}
+    void operator()(const Arguments&... arguments) {
+      call([&] { function_(arguments...); });
+    }
+
+   private:
+    void drop() override { function_ = nullptr; }
+    Function function_;
+  };
+
+  Subscription add(Function function) {
+    const auto one = std::make_shared<One>(std::move(function));
+    add(one);
+    return Subscription(one);
+  }
+  void add(const std::shared_ptr<One>& one) {
+    const std::lock_guard lock(mutex_);
+    List fresh;
+    for (const auto& each : *list_) {
+      if (!each->ended()) fresh.push_back(each);
+    }
+    fresh.push_back(one);
+    list_ = std::make_shared<const List>(std::move(fresh));
+  }
+
+  // Those that are added meanwhile are not called.
+  void operator()(const Arguments&... arguments) const {
+    const std::shared_ptr<const List> now = list();
+    for (const auto& each : *now) (*each)(arguments...);
+  }
+
+ private:
+  using List = std::vector<std::shared_ptr<One>>;
+  std::shared_ptr<const List> list() const {
+    const std::lock_guard lock(mutex_);
+    return list_;
+  }
+
+  mutable std::mutex mutex_;
+  std::shared_ptr<const List> list_ = std::make_shared<const List>();
+};
+
+}  // namespace r4
