@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "../transports/registry.hpp"
-#include "callback.hpp"
 #include "session/link_timing.hpp"
 
 namespace r4 {
@@ -81,9 +80,9 @@ struct AsyncBoard::Impl final : Carrier::Handler,
       asio::post(io, [error = std::current_exception()] { std::rethrow_exception(error); });
     }
   }
-  template <class Signature, class... Arguments>
-  void call(const Callback<Signature>& callback, const Arguments&... arguments) {
-    guarded([&] { callback(arguments...); });
+  template <class... Arguments>
+  void call(const Subscribers<Arguments...>& callbacks, const Arguments&... arguments) {
+    callbacks.each([&](auto& one) { guarded([&] { one(arguments...); }); });
   }
 
   // Every call of the session is made in here. The outermost one tells the results and sets the
@@ -187,13 +186,13 @@ struct AsyncBoard::Impl final : Carrier::Handler,
     enter(Completion::How::dispatch, [&] {
       Datagram datagram;
       if (is_open && read(Text(backlog.data(), size), datagram)) {
-        call(state_callback, session.state(), datagram);
+        call(state_callbacks, session.state(), datagram);
       }
     });
   }
   void on_carrier_event(const CarrierEvent& event) override {
     enter(Completion::How::dispatch, [&] {
-      call(event_callback, event);
+      call(event_callbacks, event);
       if (event.kind != CarrierEvent::Kind::warning) {
         session.on_transport(event.kind == CarrierEvent::Kind::up, now);
       }
@@ -212,11 +211,11 @@ struct AsyncBoard::Impl final : Carrier::Handler,
       backlog_size = datagram.bytes().size();
       std::copy_n(datagram.bytes().data(), backlog_size, backlog.data());
     } else {
-      call(state_callback, state, datagram);
+      call(state_callbacks, state, datagram);
     }
   }
   void on_board_heartbeat(const Datagram& datagram) override {
-    if (is_open) call(heartbeat_callback, datagram);
+    if (is_open) call(heartbeat_callbacks, datagram);
   }
   void on_identity(const Identity& fresh) override {
     identity.firmware.assign(fresh.firmware.data(), fresh.firmware.size());
@@ -224,23 +223,23 @@ struct AsyncBoard::Impl final : Carrier::Handler,
     identity.capabilities.assign(fresh.capabilities.data(), fresh.capabilities.size());
   }
   void on_nack(const Nack& nack, const Datagram& datagram) override {
-    if (is_open) call(nack_callback, nack, datagram);
+    if (is_open) call(nack_callbacks, nack, datagram);
   }
   void on_bad_datagram(const ReadResult& result, std::string_view bytes) override {
-    if (is_open) call(bad_callback, result, bytes);
+    if (is_open) call(bad_callbacks, result, bytes);
   }
   void on_link(const LinkStatus& status) override {
-    if (is_open) call(link_callback, status);
+    if (is_open) call(link_callbacks, status);
   }
   void on_restart() override {
     backlog_size = 0;  // of the boot before
-    if (is_open) call(restart_callback);
+    if (is_open) call(restart_callbacks);
   }
   void on_arming(DisarmCause cause) override {
-    if (is_open) call(arming_callback, cause);
+    if (is_open) call(arming_callbacks, cause);
   }
   void on_refused(const RefusedPost& refused) override {
-    if (is_open) call(refused_callback, refused);
+    if (is_open) call(refused_callbacks, refused);
   }
   void on_result(Ticket ticket, const CommandResult& result) override {
     const auto found = std::find_if(waiting.begin(), waiting.end(),
@@ -294,15 +293,15 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   Session session;
   BoardIdentity identity;
 
-  Callback<void(const ReceivedState&, const Datagram&)> state_callback;
-  Callback<void(const Datagram&)> heartbeat_callback;
-  Callback<void(const Nack&, const Datagram&)> nack_callback;
-  Callback<void(const ReadResult&, std::string_view)> bad_callback;
-  Callback<void(const LinkStatus&)> link_callback;
-  Callback<void(const CarrierEvent&)> event_callback;
-  Callback<void()> restart_callback;
-  Callback<void(DisarmCause)> arming_callback;
-  Callback<void(const RefusedPost&)> refused_callback;
+  Subscribers<ReceivedState, Datagram> state_callbacks;
+  Subscribers<Datagram> heartbeat_callbacks;
+  Subscribers<Nack, Datagram> nack_callbacks;
+  Subscribers<ReadResult, std::string_view> bad_callbacks;
+  Subscribers<LinkStatus> link_callbacks;
+  Subscribers<CarrierEvent> event_callbacks;
+  Subscribers<> restart_callbacks;
+  Subscribers<DisarmCause> arming_callbacks;
+  Subscribers<RefusedPost> refused_callbacks;
 
   bool in_backlog = false;
   std::array<char, max_datagram> backlog;  // the newest state of it
@@ -451,33 +450,32 @@ Statistics AsyncBoard::statistics() const { return impl_->session.statistics(ste
 const CarrierCounters& AsyncBoard::carrier_counters() const { return impl_->carrier->counters(); }
 const std::string& AsyncBoard::name() const { return impl_->carrier->name(); }
 
-void AsyncBoard::on_state(std::function<void(const ReceivedState&, const Datagram&)> callback) {
-  impl_->state_callback.set(std::move(callback));
+Subscription AsyncBoard::on_state(std::function<void(const ReceivedState&, const Datagram&)> callback) {
+  return impl_->state_callbacks.add(std::move(callback));
 }
-void AsyncBoard::on_board_heartbeat(std::function<void(const Datagram&)> callback) {
-  impl_->heartbeat_callback.set(std::move(callback));
+Subscription AsyncBoard::on_board_heartbeat(std::function<void(const Datagram&)> callback) {
+  return impl_->heartbeat_callbacks.add(std::move(callback));
 }
-void AsyncBoard::on_nack(std::function<void(const Nack&, const Datagram&)> callback) {
-  impl_->nack_callback.set(std::move(callback));
+Subscription AsyncBoard::on_nack(std::function<void(const Nack&, const Datagram&)> callback) {
+  return impl_->nack_callbacks.add(std::move(callback));
 }
-void AsyncBoard::on_bad_datagram(
-    std::function<void(const ReadResult&, std::string_view)> callback) {
-  impl_->bad_callback.set(std::move(callback));
+Subscription AsyncBoard::on_bad_datagram(std::function<void(const ReadResult&, std::string_view)> callback) {
+  return impl_->bad_callbacks.add(std::move(callback));
 }
-void AsyncBoard::on_link(std::function<void(const LinkStatus&)> callback) {
-  impl_->link_callback.set(std::move(callback));
+Subscription AsyncBoard::on_link(std::function<void(const LinkStatus&)> callback) {
+  return impl_->link_callbacks.add(std::move(callback));
 }
-void AsyncBoard::on_event(std::function<void(const CarrierEvent&)> callback) {
-  impl_->event_callback.set(std::move(callback));
+Subscription AsyncBoard::on_event(std::function<void(const CarrierEvent&)> callback) {
+  return impl_->event_callbacks.add(std::move(callback));
 }
-void AsyncBoard::on_restart(std::function<void()> callback) {
-  impl_->restart_callback.set(std::move(callback));
+Subscription AsyncBoard::on_restart(std::function<void()> callback) {
+  return impl_->restart_callbacks.add(std::move(callback));
 }
-void AsyncBoard::on_arming(std::function<void(DisarmCause)> callback) {
-  impl_->arming_callback.set(std::move(callback));
+Subscription AsyncBoard::on_arming(std::function<void(DisarmCause)> callback) {
+  return impl_->arming_callbacks.add(std::move(callback));
 }
-void AsyncBoard::on_refused(std::function<void(const RefusedPost&)> callback) {
-  impl_->refused_callback.set(std::move(callback));
+Subscription AsyncBoard::on_refused(std::function<void(const RefusedPost&)> callback) {
+  return impl_->refused_callbacks.add(std::move(callback));
 }
 
 void AsyncBoard::watchdog(Duration period) {
@@ -485,6 +483,14 @@ void AsyncBoard::watchdog(Duration period) {
   Impl& impl = *impl_;
   impl.enter(Completion::How::post, [&] {
     impl.session.watchdog(period, impl.now);
+    impl.poll_wanted = true;
+  });
+}
+
+void AsyncBoard::hold_heartbeats(bool held) {
+  Impl& impl = *impl_;
+  impl.enter(Completion::How::post, [&] {
+    impl.session.hold(held, impl.now);
     impl.poll_wanted = true;
   });
 }

@@ -35,6 +35,7 @@
 #include "board_options.hpp"
 #include "commands/command_help.hpp"
 #include "session/limits.hpp"
+#include "subscription.hpp"
 
 namespace r4 {
 
@@ -149,21 +150,23 @@ class AsyncBoard {
   const CarrierCounters& carrier_counters() const;
   const std::string& name() const;
 
-  // One callback for each; an empty function turns it off. Of the states that came while the event
-  // loop was held up for more than 50 ms, on_state is told the newest alone.
-  void on_state(std::function<void(const ReceivedState&, const Datagram&)> callback);
-  void on_board_heartbeat(std::function<void(const Datagram&)> callback);
-  void on_nack(std::function<void(const Nack&, const Datagram&)> callback);
-  void on_bad_datagram(std::function<void(const ReadResult&, std::string_view)> callback);
-  void on_link(std::function<void(const LinkStatus&)> callback);
-  void on_event(std::function<void(const CarrierEvent&)> callback);
+  // Any number of callbacks of each kind, called in the order in which they were added; the handle ends
+  // one (subscription.hpp). Of the states that came while the event loop was held up for more than
+  // 50 ms, on_state is told the newest alone.
+  Subscription on_state(std::function<void(const ReceivedState&, const Datagram&)> callback);
+  Subscription on_board_heartbeat(std::function<void(const Datagram&)> callback);
+  Subscription on_nack(std::function<void(const Nack&, const Datagram&)> callback);
+  Subscription on_bad_datagram(std::function<void(const ReadResult&, std::string_view)> callback);
+  Subscription on_link(std::function<void(const LinkStatus&)> callback);
+  // The transport, and a warning where the event loop was held up for so long that heartbeats were late.
+  Subscription on_event(std::function<void(const CarrierEvent&)> callback);
   // The board has begun again: what it was told is gone, thresholds of U too. Comes before its new
   // state.
-  void on_restart(std::function<void()> callback);
+  Subscription on_restart(std::function<void()> callback);
   // The session is armed (none), or not any more.
-  void on_arming(std::function<void(DisarmCause)> callback);
+  Subscription on_arming(std::function<void(DisarmCause)> callback);
   // The board refused a command that was posted.
-  void on_refused(std::function<void(const RefusedPost&)> callback);
+  Subscription on_refused(std::function<void(const RefusedPost&)> callback);
 
   // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. Throws
   // Error{usage} for less than nothing and more than an hour. feed()
@@ -171,6 +174,8 @@ class AsyncBoard {
   // runs.
   void watchdog(Duration period);
   void feed();
+  // Stops heartbeats and commands, so that the board goes safe, until it is called with false.
+  void hold_heartbeats(bool held);
 
  private:
   // A completion handler of any type, kept until its command ends.

@@ -18,12 +18,11 @@
 // A timeout counts from the call. What has not been sent by then is never sent; where a command may
 // have been sent, the error says that it may have been executed. Only a stop goes out in any case.
 //
-// Callbacks run on the board's own thread, one at a time, and must not block: a blocking call in a
-// callback throws Error{usage}; post(), stop_async() and what only looks (state(), link(),
-// statistics()) may be used there, and on_…(), watchdog(), feed() and close(). When on_…() returns
-// on another thread, the callback before it is not running and will not be called again; when it
-// throws, because a callback holds the board's thread, the new one will never be called. An
-// exception out of a callback ends the program, as it does out of any thread.
+// Callbacks run on a thread of their own, one at a time, beside the thread of the link: they may call
+// anything here, and what they wait for costs no heartbeat. But a callback that does not return within
+// BoardOptions::callback_limit stops the heartbeats, so that the board goes safe, and on_event() tells of
+// it. States that come while a callback runs are told as one, the newest. An exception out of a callback
+// ends the program, as it does out of any thread.
 #pragma once
 
 #include <chrono>
@@ -34,8 +33,19 @@
 #include <string_view>
 
 #include "board_options.hpp"
+#include "subscription.hpp"
 
 namespace r4 {
+
+// Callbacks that are there before the transport is opened, so that they are told everything.
+struct BoardCallbacks {
+  std::function<void(const ReceivedState&)> on_state;
+  std::function<void(const LinkStatus&)> on_link;
+  std::function<void(const CarrierEvent&)> on_event;
+  std::function<void()> on_restart;
+  std::function<void(DisarmCause)> on_arming;
+  std::function<void(const RefusedPost&)> on_refused;
+};
 
 class Board {
  public:
@@ -43,14 +53,14 @@ class Board {
   static constexpr Duration default_timeout{1000};
 
   // Opens the transport and begins the link; returns without waiting for the board. Throws Error.
-  explicit Board(std::string_view url, BoardOptions options = {});
+  explicit Board(std::string_view url, BoardOptions options = {}, BoardCallbacks callbacks = {});
   ~Board();
   Board(const Board&) = delete;
   Board& operator=(const Board&) = delete;
 
   // Ends heartbeats and closes the transport; the board goes safe within its timeout. Calls that
-  // wait in other threads throw Error{refused}. Idempotent. The destructor does it too, and may run
-  // while other threads wait.
+  // wait in other threads throw Error{refused}. When it returns no callback runs, but one that calls it,
+  // and none will. Idempotent. The destructor does it too, and may run while other threads wait.
   void close();
 
   // Waits until the board is ACTIVE under our control; throws Error{refused} saying what it is
@@ -169,19 +179,19 @@ class Board {
   // The transport, for people. A USB board that is plugged in again may have another.
   std::string name() const;
 
-  // A callback is told at once what there is already: the newest state, the link, the newest
-  // up or down of the transport and the warning since. One that is set in a callback hears only
-  // what comes next.
-  void on_state(std::function<void(const ReceivedState&)> callback);
-  void on_link(std::function<void(const LinkStatus&)> callback);
-  void on_event(std::function<void(const CarrierEvent&)> callback);
+  // Any number of callbacks of each kind, called in the order in which they were added. Each is told
+  // first what there is already: the newest state, the link, the newest up or down of the transport and
+  // the warning since. The handle ends it (subscription.hpp); without one it lasts as long as the board.
+  Subscription on_state(std::function<void(const ReceivedState&)> callback);
+  Subscription on_link(std::function<void(const LinkStatus&)> callback);
+  Subscription on_event(std::function<void(const CarrierEvent&)> callback);
   // The board has begun again: what it was told is gone, thresholds of U too. Comes before its new
   // state.
-  void on_restart(std::function<void()> callback);
+  Subscription on_restart(std::function<void()> callback);
   // Armed (none), or not any more, and why.
-  void on_arming(std::function<void(DisarmCause)> callback);
+  Subscription on_arming(std::function<void(DisarmCause)> callback);
   // A command that post() took was refused: by the board, or on its way there.
-  void on_refused(std::function<void(const RefusedPost&)> callback);
+  Subscription on_refused(std::function<void(const RefusedPost&)> callback);
 
   // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. Throws
   // Error{usage} for less than nothing and more than an hour. feed() costs no system call.

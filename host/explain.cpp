@@ -99,11 +99,15 @@ Words link_words(const LinkStatus& link) {
     return {"the transport is down: unplugged, or its interface is switched off",
             "plug it in or switch it on; it is opened again by itself"};
   }
-  if (link.gated) {
+  if (link.gate == Gate::watchdog) {
     return {
         "the application watchdog has stopped our heartbeats and commands",
         "call feed() at least once in the watchdog's period; a call that waits does not feed: give "
         "it a timeout below that period"};
+  }
+  if (link.gate == Gate::callback) {
+    return {"a callback does not return, so our heartbeats and commands have stopped",
+            "do its work in another thread; BoardOptions::callback_limit is the time that it has"};
   }
   if (link.busy) {
     return {"another host controls the board",
@@ -131,7 +135,7 @@ Words link_words(const LinkStatus& link) {
 }
 
 bool link_is_well(const LinkStatus& link) {
-  return link.state == HostLinkState::active && !link.busy && !link.gated &&
+  return link.state == HostLinkState::active && !link.busy && !link.gated() &&
          link.key == KeyTrouble::none;
 }
 
@@ -195,7 +199,8 @@ Words refusal_words(std::string_view command, Refusal code, const LinkStatus& li
 
 // What keeps heartbeats and commands back (the watchdog, another host, a key) does not keep a stop.
 Words unconfirmed_stop_words(const CommandResult& result, LinkStatus link) {
-  link.gated = link.busy = false;
+  link.gate = Gate::open;
+  link.busy = false;
   link.key = KeyTrouble::none;
   Words why = link_words(link);
   if (link.state == HostLinkState::active && !link.transport_down) {

@@ -128,8 +128,12 @@ class Subscribers {
 
   // Those that are added meanwhile are not called.
   void operator()(const Arguments&... arguments) const {
+    each([&](One& one) { one(arguments...); });
+  }
+  template <class Action>
+  void each(Action action) const {
     const std::shared_ptr<const List> now = list();
-    for (const auto& each : *now) (*each)(arguments...);
+    for (const auto& one : *now) action(*one);
   }
 
  private:

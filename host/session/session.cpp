@@ -381,7 +381,7 @@ bool Session::in_control(Time now) const {
   const bool no_proof_to_come =
       stage == FieldSelection::Stage::left || stage == FieldSelection::Stage::unheard;
   return link_up() && !role_.refused(now) && (role_.controlling() || no_proof_to_come) &&
-         !link_.watchdog_expired(to_ms(now));
+         !link_.gated(to_ms(now));
 }
 
 void Session::refresh_status(Time now) {
@@ -391,7 +391,9 @@ void Session::refresh_status(Time now) {
       .state = link_.state(),
       .reason = link_.reason(),
       .busy = role_.refused(now),
-      .gated = link_.watchdog_expired(to_ms(now)),
+      .gate = link_.watchdog_expired(to_ms(now)) ? Gate::watchdog
+              : link_.gated(to_ms(now))          ? Gate::callback
+                                                 : Gate::open,
       .key = key_.trouble(now),
       .in_control = in_control(now),
       .transport_down = transport_down_,
@@ -404,6 +406,11 @@ void Session::refresh_status(Time now) {
 
 void Session::watchdog(std::chrono::milliseconds period, Time now) {
   link_.watchdog(static_cast<std::uint32_t>(period.count()), to_ms(now));
+  refresh_status(now);
+}
+
+void Session::hold(bool held, Time now) {
+  link_.hold(held);
   refresh_status(now);
 }
 

@@ -56,16 +56,24 @@
 
 namespace r4 {
 
+// Do our heartbeats and commands go out?
+enum class Gate : std::uint8_t {
+  open,
+  watchdog,  // no: the application watchdog was not fed
+  callback,  // no: a callback of the program does not return
+};
+
 // What the host knows of the link.
 struct LinkStatus {
   HostLinkState state = HostLinkState::connecting;
   SafeReason reason = SafeReason::none;  // why the board is safe
   bool busy = false;                     // another host controls the board
-  bool gated = false;                    // the application watchdog has stopped our heartbeats
+  Gate gate = Gate::open;
   KeyTrouble key = KeyTrouble::none;
   bool in_control = false;      // the board takes our commands: they go out at once
   bool transport_down = false;  // it is gone: unplugged, its interface switched off
   ChipFault chip{};             // of a fault: the chip that is the cause, if it is one
+  bool gated() const { return gate != Gate::open; }
   friend bool operator==(const LinkStatus&, const LinkStatus&) = default;
 };
 
@@ -177,6 +185,8 @@ class Session {
   // safe; commands are held back, too, for nobody looks after what they do. 0 turns it off.
   void watchdog(std::chrono::milliseconds period, Time now);
   void feed(Time now);
+  // Stops heartbeats and commands likewise, until it is called with false.
+  void hold(bool held, Time now);
 
   const LinkStatus& link() const { return status_; }
   // The link is up, the board has executed a command of ours, and the watchdog has not expired:

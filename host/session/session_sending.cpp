@@ -156,7 +156,7 @@ void Session::send_queued(Time now) {
 }
 
 void Session::retry_due(Time now) {
-  const bool gated = link_.watchdog_expired(to_ms(now));
+  const bool gated = link_.gated(to_ms(now));
   for (Pending& pending : pending_.under_way()) {
     if (!pending.is_out() || now < pending.retry) continue;
     if (gated && pending.kind != CommandKind::stop) {

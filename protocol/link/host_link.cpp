@@ -84,7 +84,7 @@ bool HostLink::poll(std::uint32_t now_ms) {
 }
 
 bool HostLink::heartbeat_due(std::uint32_t now_ms) const {
-  if (watchdog_expired(now_ms)) return false;
+  if (gated(now_ms)) return false;
   return answer_now_ || !any_sent_ || now_ms - sent_ms_ >= timing_.heartbeat_ms;
 }
 
@@ -114,7 +114,7 @@ void HostLink::feed(std::uint32_t now_ms) {
 std::uint32_t HostLink::due_in(std::uint32_t now_ms) const {
   if (heartbeat_due(now_ms)) return 0;
   std::uint32_t due = timing_.heartbeat_ms;
-  if (!watchdog_expired(now_ms)) due = timing_.heartbeat_ms - (now_ms - sent_ms_);
+  if (!gated(now_ms)) due = timing_.heartbeat_ms - (now_ms - sent_ms_);
   if (state_ == HostLinkState::active || state_ == HostLinkState::safe) {
     const std::uint32_t silent = now_ms - heard_ms_;
     const std::uint32_t left = silent < timing_.timeout_ms ? timing_.timeout_ms - silent : 0;

@@ -50,7 +50,7 @@ class HostLink {
   // Lets time pass: silence of the board. True if the state changed.
   bool poll(std::uint32_t now_ms);
 
-  // Should a heartbeat be sent now? False while the watchdog has expired.
+  // Should a heartbeat be sent now? False while they are gated.
   bool heartbeat_due(std::uint32_t now_ms) const;
   // A heartbeat was sent.
   void heartbeat_sent(std::uint32_t now_ms);
@@ -66,6 +66,9 @@ class HostLink {
   bool watchdog_expired(std::uint32_t now_ms) const {
     return watchdog_ms_ != 0 && (hung_ || now_ms - fed_ms_ > watchdog_ms_);
   }
+  // Stops the heartbeats for another reason, until it is called with false.
+  void hold(bool held) { held_ = held; }
+  bool gated(std::uint32_t now_ms) const { return held_ || watchdog_expired(now_ms); }
 
   // The number for the next datagram that the host sends.
   std::uint32_t take_pnum() { return next_pnum_++; }
@@ -113,6 +116,7 @@ class HostLink {
   std::uint32_t watchdog_ms_ = 0;
   std::uint32_t fed_ms_ = 0;
   bool hung_ = false;  // the watchdog had expired at a poll(): the clock's wrap does not undo it
+  bool held_ = false;
 };
 
 }  // namespace r4

@@ -347,12 +347,12 @@ TEST_F(AsyncBoardTest, TellsOfEverythingThatComes) {
 TEST_F(AsyncBoardTest, GatesItsHeartbeatsAndFeedsFromAnyThread) {
   board.watchdog(30ms);
   board.open();
-  ASSERT_TRUE(run_until(io, [&] { return board.link().gated; }));
+  ASSERT_TRUE(run_until(io, [&] { return board.link().gated(); }));
   std::atomic<bool> stop{false};
   std::thread feeder([&] {
     while (!stop) board.feed();
   });
-  EXPECT_TRUE(run_until(io, [&] { return !board.link().gated && board.in_control(); }));
+  EXPECT_TRUE(run_until(io, [&] { return !board.link().gated() && board.in_control(); }));
   stop = true;
   feeder.join();
 }

@@ -100,7 +100,7 @@ TEST_P(BoardOver, TheBoardGoesSafeWhenTheApplicationHangs) {
   board.watchdog(100ms);
   std::promise<void> gated;
   board.on_link([&, told = false](const LinkStatus& link) mutable {
-    if (link.gated && !told) {
+    if (link.gated() && !told) {
       told = true;
       gated.set_value();
     }

@@ -16,12 +16,12 @@ using namespace std::chrono_literals;
 
 namespace {
 
-// Called on the board's own thread: it must be quick and must not wait for the board.
+// Called on the callbacks' thread.
 void print_link(const r4::LinkStatus& link) {
   std::printf("link: %s%s%s%s\n", r4::to_text(link.state),
               link.state == r4::HostLinkState::safe ? ", reason " : "",
               link.state == r4::HostLinkState::safe ? r4::to_text(link.reason) : "",
-              link.gated ? ", our heartbeats have stopped" : "");
+              link.gated() ? ", our heartbeats have stopped" : "");
 }
 
 void print_state(const r4::State& state) {

@@ -247,26 +247,26 @@ TEST(Session, StopsItsHeartbeatsWhenTheApplicationHangsAndGoesOnWhenItFeeds) {
     link.session.feed(link.now);
     link.heartbeat();
   }
-  EXPECT_FALSE(link.session.link().gated);
+  EXPECT_FALSE(link.session.link().gated());
   const Time fed = link.now;
   for (int i = 0; i < 20; ++i) {
     link.pass(100ms);
     link.heartbeat();
   }
-  EXPECT_TRUE(link.session.link().gated);
+  EXPECT_TRUE(link.session.link().gated());
   EXPECT_LE(link.last('H').at - fed, 501ms);
   EXPECT_GE(link.last('H').at - fed, 400ms);
 
   link.session.feed(link.now);
   link.pass(100ms);
-  EXPECT_FALSE(link.session.link().gated);
+  EXPECT_FALSE(link.session.link().gated());
   EXPECT_GE(link.last('H').at, link.now - 100ms);
 
   link.pass(600ms);
-  EXPECT_TRUE(link.session.link().gated);
+  EXPECT_TRUE(link.session.link().gated());
   link.session.watchdog(0ms, link.now);
   link.pass(3s);
-  EXPECT_FALSE(link.session.link().gated);
+  EXPECT_FALSE(link.session.link().gated());
   EXPECT_GE(link.last('H').at, link.now - 100ms);
 }
 

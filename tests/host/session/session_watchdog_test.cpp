@@ -24,7 +24,7 @@ TEST(SessionWatchdog, HoldsCommandsBackOfAProgramThatDoesNotFeed) {
   const std::size_t sent = link.count('O');
   EXPECT_GT(sent, 3U);
   EXPECT_LE(link.last('O').at - begin, 310ms) << "nobody looks after what it would do";
-  EXPECT_TRUE(link.session.link().gated);
+  EXPECT_TRUE(link.session.link().gated());
   EXPECT_FALSE(link.session.in_control(link.now));
   const Ticket late = link.session.send(drive, 5s, link.now);
   link.pass(300ms);
@@ -102,7 +102,7 @@ TEST(SessionLink, TellsWhichChipIsTheFault) {
 
 TEST(Explain, OfAStopThatIsNotConfirmedSaysToCutThePower) {
   LinkStatus link;
-  link.gated = true;
+  link.gate = Gate::watchdog;
   link.busy = true;
   link.key = KeyTrouble::needed;
   const CommandResult unheard{Outcome::timed_out, Refusal::none, 1s};

@@ -41,7 +41,7 @@ class JsonView final : public MonitorView {
                 {"state", to_text(status.state)},
                 {"reason", to_text(status.reason)},
                 {"busy", status.busy},
-                {"gated", status.gated}};
+                {"gated", status.gated()}};
     if (status.key != KeyTrouble::none) fields["key"] = to_text(status.key);
     lines_.print(line_of(object("link", std::move(fields))));
   }
@@ -142,7 +142,7 @@ std::string link_text(const LinkStatus& status) {
       break;
   }
   if (status.busy) text += ", another host controls the board";
-  if (status.gated) text += ", our heartbeats are stopped";
+  if (status.gated()) text += ", our heartbeats are stopped";
   if (status.key != KeyTrouble::none) text += ", " + explain(status.key).text();
   return text;
 }

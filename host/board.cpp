@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "board.hpp"
+
+#include <utility>
+
+#include "board_impl.hpp"
+#include "commands/command_help.hpp"
+#include "explain.hpp"
+#include "session/limits.hpp"
+
+namespace r4 {
+
+Board::Board(std::string_view url, BoardOptions options, BoardCallbacks callbacks)
+    : impl_(std::make_shared<Impl>(url, std::move(options), std::move(callbacks))) {
+  impl_->start();
+}
+Board::~Board() { impl_->close(); }
+
+void Board::close() { impl_->close(); }
+
+// A call holds the Impl, so that the Board may be destroyed while it waits.
+
+void Board::wait_active(Duration timeout) {
+  require_wait("wait_active()", timeout);
+  const auto impl = impl_;
+  const bool active = impl->wait_for_news(timeout, [&] {
+    return impl->link.state == HostLinkState::active && impl->in_control && !impl->link.gated();
+  });
+  if (!active) throw Error(explain(impl->name_now(), impl->link_now()));
+}
+
+void Board::send(const Command& command, Duration timeout) {
+  const auto impl = impl_;
+  impl->require_sendable(command);
+  if (command.kind == CommandKind::stop && timeout.count() <= 0) impl->post(command);
+  require_timeout(shown(command), timeout);
+  impl->execute(command, timeout);
+}
+void Board::send(std::string_view command, Duration timeout) {
+  send(parse_command_text(command), timeout);
+}
+PostResult Board::post(const Command& command) { return impl_->post(command); }
+void Board::arm(Duration timeout) {
+  require_timeout("arm()", timeout);
+  const auto impl = impl_;
+  const auto call = std::make_shared<Impl::Call>(Command());
+  call->start = [&async = impl->async](Duration left, auto end) {
+    async.async_arm(left, std::move(end));
+  };
+  impl->execute("arm()", call, timeout);
+}
+DisarmCause Board::disarmed_by() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->disarmed_by;
+}
+
+void Board::stop(Duration timeout) { send(Command::stop(), timeout); }
+void Board::stop_async() { impl_->post(Command::stop()); }
+void Board::clear(Duration timeout) { send(Command::clear(), timeout); }
+
+void Board::DriveChannel::set(int pwm, Direction direction, Duration timeout) const {
+  board_.send(kind_ == CommandKind::osmc ? Command::osmc(pwm, direction, channel_)
+                                         : Command::dhb12(pwm, direction, channel_),
+              timeout);
+}
+void Board::ServoChannel::set(int pulse_us, Duration timeout) const {
+  board_.send(Command::servo(pulse_us, channel_), timeout);
+}
+void Board::RelayChannel::set(bool on, Duration timeout) const {
+  board_.send(Command::relay(channel_, on), timeout);
+}
+void Board::StepperChannel::move_to(std::int32_t position, int speed, Duration timeout) const {
+  board_.send(Command::stepper(position, speed, channel_), timeout);
+}
+void Board::StepperChannel::zero(Duration timeout) const {
+  board_.send(Command::zero(channel_), timeout);
+}
+void Board::BldcChannel::set(int speed, Direction direction, bool brake, Duration timeout) const {
+  board_.send(Command::bldc(speed, direction, brake, channel_), timeout);
+}
+void Board::proximity(int channel, int threshold_cm, Duration timeout) {
+  send(Command::proximity(threshold_cm, channel), timeout);
+}
+void Board::fields(std::string_view names, Duration timeout) {
+  send("F:" + std::string(names), timeout);
+}
+void Board::setting(std::string_view key, std::string_view value, Duration timeout) {
+  send("C:" + std::string(key) + "," + std::string(value), timeout);
+}
+
+void Board::link_timing(Duration board_timeout, Duration heartbeat, Duration timeout) {
+  const std::string text = "C:timeout," + std::to_string(board_timeout.count()) + " C:heartbeat," +
+                           std::to_string(heartbeat.count());
+  require_timeout(text, timeout);
+  const auto impl = impl_;
+  impl->async.require_link_timing(board_timeout, heartbeat);
+  const auto call = std::make_shared<Impl::Call>(Command());
+  call->start = [&async = impl->async, board_timeout, heartbeat](Duration left, auto end) {
+    async.async_link_timing(board_timeout, heartbeat, left, std::move(end));
+  };
+  impl->execute(text, call, timeout);
+}
+
+BoardIdentity Board::identify(Duration timeout) {
+  require_timeout("identify()", timeout);
+  const auto impl = impl_;
+  return impl->execute(Command::identify(), timeout)->identity;
+}
+
+ReceivedState Board::state() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->state;
+}
+ReceivedState Board::next_state(Duration timeout) {
+  require_timeout("next_state()", timeout);
+  const auto impl = impl_;
+  const std::uint64_t seen = impl->states_now();
+  if (!impl->wait_for_news(timeout, [&] { return impl->states != seen; })) {
+    Problem problem = explain(impl->name_now(), impl->link_now());
+    problem.reason = "no state came in time: " + problem.reason;
+    throw Error(std::move(problem));
+  }
+  const std::lock_guard lock(impl->mutex);
+  return impl->state;
+}
+LinkStatus Board::link() const { return impl_->link_now(); }
+std::string Board::name() const { return impl_->name_now(); }
+
+Statistics Board::statistics() const {
+  const auto impl = impl_;
+  auto report = std::make_shared<Statistics>();
+  {
+    const std::lock_guard lock(impl->mutex);
+    *report = impl->last_statistics;
+  }
+  impl->run_on_loop("statistics()", [impl, report] { *report = impl->async.statistics(); });
+  const std::lock_guard lock(impl->mutex);
+  report->refused += impl->refused_here;
+  return *report;
+}
+
+Subscription Board::on_state(std::function<void(const ReceivedState&)> callback) {
+  return impl_->callbacks.on_state(std::move(callback));
+}
+Subscription Board::on_link(std::function<void(const LinkStatus&)> callback) {
+  return impl_->callbacks.on_link(std::move(callback));
+}
+Subscription Board::on_event(std::function<void(const CarrierEvent&)> callback) {
+  return impl_->callbacks.on_event(std::move(callback));
+}
+Subscription Board::on_restart(std::function<void()> callback) {
+  return impl_->callbacks.on_restart(std::move(callback));
+}
+Subscription Board::on_arming(std::function<void(DisarmCause)> callback) {
+  return impl_->callbacks.on_arming(std::move(callback));
+}
+Subscription Board::on_refused(std::function<void(const RefusedPost&)> callback) {
+  return impl_->callbacks.on_refused(std::move(callback));
+}
+
+void Board::watchdog(Duration period) {
+  require_watchdog(period);
+  const auto impl = impl_;
+  impl->run_on_loop("watchdog()", [impl = impl.get(), period] { impl->async.watchdog(period); });
+}
+void Board::feed() { impl_->async.feed(); }
+
+}  // namespace r4
