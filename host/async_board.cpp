@@ -30,6 +30,8 @@ SessionOptions with_clock(SessionOptions options) {
 // Not in the event loop for this long: what has come meanwhile is a backlog, and of its states only
 // the newest is told.
 constexpr Time held_up{std::chrono::milliseconds{50}};
+// What was due so long ago is told of: two heartbeats were late.
+constexpr Time very_late{std::chrono::milliseconds{200}};
 
 // A day is as good as for ever, and cannot overflow.
 Time time_of(AsyncBoard::Duration timeout) {
@@ -93,6 +95,7 @@ struct AsyncBoard::Impl final : Carrier::Handler,
     if (depth == 0) how = way;
     const Time before = std::exchange(now, steady_now());
     if (now - before > held_up) in_backlog = true;
+    const Time late = is_open && depth == 0 ? now - due : Time{0};
     {
       const Inside inside(depth);
       if (fed.load(std::memory_order_relaxed) != 0) {
@@ -100,7 +103,19 @@ struct AsyncBoard::Impl final : Carrier::Handler,
       }
       action();
     }
-    if (depth == 0) settle();
+    if (depth != 0) return;
+    if (is_open && late > very_late) tell_that_it_was_held_up(late);
+    settle();
+  }
+  void tell_that_it_was_held_up(Time late) {
+    const Inside inside(depth);
+    const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(late).count();
+    call(event_callbacks,
+         CarrierEvent{CarrierEvent::Kind::warning,
+                      Problem{ErrorKind::refused, "the event loop",
+                              "it was held up: what was due went out " + std::to_string(ms) +
+                                  " ms late, heartbeats too",
+                              "a handler must return at once; do the work in another thread"}});
   }
   struct Inside {
     explicit Inside(int& d) : depth(d) { ++depth; }
