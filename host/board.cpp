@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "../transports/registry.hpp"
 #include "board_impl.hpp"
 #include "commands/command_help.hpp"
 #include "explain.hpp"
@@ -11,7 +12,12 @@
 namespace r4 {
 
 Board::Board(std::string_view url, BoardOptions options, BoardCallbacks callbacks)
-    : impl_(std::make_shared<Impl>(url, std::move(options), std::move(callbacks))) {
+    : Board(CarrierMaker([url](asio::io_context& loop) {
+              return standard_registry().make(loop, url, Role::host);
+            }),
+            std::move(options), std::move(callbacks)) {}
+Board::Board(const CarrierMaker& make, BoardOptions options, BoardCallbacks callbacks)
+    : impl_(std::make_shared<Impl>(make, std::move(options), std::move(callbacks))) {
   impl_->start();
 }
 Board::~Board() { impl_->close(); }
@@ -136,6 +142,17 @@ Statistics Board::statistics() const {
   impl->run_on_loop("statistics()", [impl, report] { *report = impl->async.statistics(); });
   const std::lock_guard lock(impl->mutex);
   report->refused += impl->refused_here;
+  return *report;
+}
+CarrierCounters Board::carrier_counters() const {
+  const auto impl = impl_;
+  auto report = std::make_shared<CarrierCounters>();
+  {
+    const std::lock_guard lock(impl->mutex);
+    *report = impl->last_counters;
+  }
+  impl->run_on_loop("carrier_counters()",
+                    [impl, report] { *report = impl->async.carrier_counters(); });
   return *report;
 }
 

@@ -35,7 +35,15 @@
 #include "board_options.hpp"
 #include "subscription.hpp"
 
+namespace asio {
+class io_context;
+}
+
 namespace r4 {
+
+// A transport of your own for the loop of a board's thread, not yet open. What it does there must not
+// block: while it does, nothing is sent.
+using CarrierMaker = std::function<std::unique_ptr<Carrier>(asio::io_context& loop)>;
 
 // Callbacks that are there before the transport is opened, so that they are told everything.
 struct BoardCallbacks {
@@ -54,6 +62,7 @@ class Board {
 
   // Opens the transport and begins the link; returns without waiting for the board. Throws Error.
   explicit Board(std::string_view url, BoardOptions options = {}, BoardCallbacks callbacks = {});
+  explicit Board(const CarrierMaker& make, BoardOptions options = {}, BoardCallbacks callbacks = {});
   ~Board();
   Board(const Board&) = delete;
   Board& operator=(const Board&) = delete;
@@ -176,6 +185,8 @@ class Board {
   ReceivedState next_state(Duration timeout = default_timeout);
   LinkStatus link() const;
   Statistics statistics() const;
+  // What the transport has carried.
+  CarrierCounters carrier_counters() const;
   // The transport, for people. A USB board that is plugged in again may have another.
   std::string name() const;
 

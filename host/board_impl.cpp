@@ -7,6 +7,7 @@
 
 #include "commands/command_help.hpp"
 #include "explain.hpp"
+#include "session/limits.hpp"
 
 namespace r4 {
 
@@ -31,13 +32,13 @@ Board::Impl::Call::Call(const Command& c)
   command.text2 = text2;
 }
 
-Board::Impl::Impl(std::string_view url_given, BoardOptions options, BoardCallbacks first)
-    : url(url_given),
-      arming(options.session.arming),
+Board::Impl::Impl(const CarrierMaker& make, BoardOptions options, BoardCallbacks first)
+    : arming(options.session.arming),
       callback_limit(options.callback_limit),
-      async(io, url_given, std::move(options)),
+      async(io, make(io), std::move(options)),
       box(io, [this](const Command& c) { deliver(c); }),
       callbacks([this](Clock::duration busy) { on_callback_end(busy); }) {
+  require_callback_limit(callback_limit);
   if (first.on_state) callbacks.on_state(std::move(first.on_state));
   if (first.on_link) callbacks.on_link(std::move(first.on_link));
   if (first.on_event) callbacks.on_event(std::move(first.on_event));
@@ -209,6 +210,7 @@ void Board::Impl::shut() {
     if (closed) return;
     closed = true;
     last_statistics = async.statistics();
+    last_counters = async.carrier_counters();
   }
   news.notify_all();
   async.close();
@@ -232,7 +234,7 @@ Error Board::Impl::closed_error(std::string_view what) {
 
 void Board::Impl::require_sendable(const Command& command) {
   require_valid(command);
-  require_cable(url, command);
+  if (command.kind == CommandKind::setting) require_cable(name_now(), command);
 }
 
 Board::Impl::CallPtr Board::Impl::execute(const Command& command, Duration timeout) {

@@ -51,7 +51,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   };
   using CallPtr = std::shared_ptr<Call>;
 
-  Impl(std::string_view url_given, BoardOptions options, BoardCallbacks first);
+  Impl(const CarrierMaker& make, BoardOptions options, BoardCallbacks first);
   void start();
   // Idempotent, from any thread.
   void close();
@@ -93,7 +93,6 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   void look_at_callbacks();
   void on_callback_end(Clock::duration busy);
 
-  const std::string url;  // as it was given
   const Arming arming;
   const Duration callback_limit;  // 0: none
   asio::io_context io{1};
@@ -120,6 +119,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   std::uint64_t refused_here = 0;  // posts that did not get as far as the loop
   bool closed = false;
   Statistics last_statistics;
+  CarrierCounters last_counters;
 };
 
 }  // namespace r4

@@ -72,4 +72,8 @@ void require_watchdog(std::chrono::milliseconds period) {
   require("watchdog()", period.count(), 1, hour_ms, "0 turns it off");
 }
 
+void require_callback_limit(std::chrono::milliseconds limit) {
+  require("callback_limit", limit.count(), 1, hour_ms, "0 turns it off");
+}
+
 }  // namespace r4

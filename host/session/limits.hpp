@@ -22,6 +22,8 @@ void require_wait(std::string_view what, std::chrono::milliseconds timeout);
 
 // The period of the application watchdog: up to an hour; 0 turns it off.
 void require_watchdog(std::chrono::milliseconds period);
+// The time that a callback has: up to an hour; 0 for any.
+void require_callback_limit(std::chrono::milliseconds limit);
 
 // The board's timeout and heartbeat interval, set together, by a host that sends heartbeats every
 // `ours`: two of them must come in each timeout.

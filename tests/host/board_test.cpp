@@ -373,57 +373,62 @@ TEST(Board, CallsBackWithStatesAndLinkChanges) {
   std::atomic<int> states{0};
   std::atomic<bool> active{false};
   board.on_link([&](const LinkStatus& link) { active = link.state == HostLinkState::active; });
-  board.on_state([&](const State& state) {
+  Subscription subscription = board.on_state([&](const State& state) {
     EXPECT_TRUE(state.present.has(StateField::ain24));
     if (states++ == 0) caller.set_value(std::this_thread::get_id());
   });
   auto future = caller.get_future();
   ASSERT_EQ(future.wait_for(5s), std::future_status::ready);
   EXPECT_NE(future.get(), std::this_thread::get_id());
-  board.on_state({});
+  subscription.cancel();
   const int seen = states;
   for (int i = 0; i < 3; ++i) board.next_state();
-  EXPECT_EQ(states, seen) << "none after it was turned off";
+  EXPECT_EQ(states, seen) << "none after it was ended";
 }
 
-TEST(Board, RefusesToWaitInACallback) {
+TEST(Board, ObeysACallbackThatWaits) {
   Board board("sim:", at_will());
-  std::promise<std::vector<Problem>> told;
+  std::promise<std::string> told;
   board.on_state([&, done = false](const State&) mutable {
     if (done) return;
     done = true;
-    std::vector<Problem> problems;
-    problems.push_back(problem_of([&] { board.osmc(1).set(1, Direction::forward); }));
-    problems.push_back(problem_of([&] { board.wait_active(); }));
-    problems.push_back(problem_of([&] { board.next_state(); }));
-    problems.push_back(problem_of([&] { board.identify(); }));
-    problems.push_back(problem_of([&] { board.stop(); }));
-    static_cast<void>(board.state());
-    static_cast<void>(board.statistics());
-    board.watchdog(0ms);
-    board.post(Command::servo(1, 1));
-    board.stop_async();
-    told.set_value(problems);
+    const Problem problem = problem_of([&] {
+      board.wait_active();
+      board.osmc(1).set(1, Direction::forward);
+      board.next_state();
+      board.identify();
+      static_cast<void>(board.state());
+      static_cast<void>(board.statistics());
+      board.watchdog(0ms);
+      board.post(Command::servo(1, 1));
+      board.stop();
+      throw Error(ErrorKind::usage, "all", "is done");
+    });
+    told.set_value(problem.text());
   });
   auto future = told.get_future();
   ASSERT_EQ(future.wait_for(5s), std::future_status::ready);
-  for (const Problem& problem : future.get()) {
-    EXPECT_EQ(problem.kind, ErrorKind::usage) << problem.text();
-    EXPECT_TRUE(contains(problem.reason, "callback"));
-  }
+  EXPECT_EQ(future.get(), "all: is done");
 }
 
-TEST(Board, LetsACallbackReplaceItself) {
+TEST(Board, LetsACallbackEndItself) {
   Board board("sim:", at_will());
   std::promise<int> told;
   const auto payload = std::make_shared<int>(42);
-  board.on_state([&, payload](const State&) {
-    board.on_state({});
-    told.set_value(*payload);  // of the function that was replaced
+  Subscription subscription;
+  std::promise<void> subscribed;
+  subscription = board.on_state([&, payload, ready = subscribed.get_future().share()](const State&) {
+    ready.wait();
+    subscription.cancel();
+    told.set_value(*payload);  // of the function that was ended
   });
+  subscribed.set_value();
   auto future = told.get_future();
   ASSERT_EQ(future.wait_for(5s), std::future_status::ready);
   EXPECT_EQ(future.get(), 42);
+  board.next_state();
+  board.close();
+  EXPECT_EQ(payload.use_count(), 1);
 }
 
 // --- the end

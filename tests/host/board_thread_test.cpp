@@ -1,22 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::Board and its thread: what becomes of a call while a callback holds the thread, and what a
-// callback is told when it is set.
+// r4::Board and its threads: what becomes of a call while a transport holds the link's, what a callback
+// is told, and what becomes of the board while one runs.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
-#include <condition_variable>
 #include <cstdint>
 #include <filesystem>
 #include <future>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "host/board.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/held_carrier.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::test {
@@ -25,80 +27,37 @@ namespace {
 using namespace std::chrono_literals;
 using firmware::BoardState;
 
-// Holds the board's thread in a callback, from the first state for which `when` is true on.
-class Hold {
- public:
-  template <class When>
-  Hold(Board& board, When when) {
-    board.on_state([turn = turn_, when, done = false](const State&) mutable {
-      if (done || !when()) return;
-      done = true;
-      turn->reach(Turn::Stage::held);
-      turn->wait_for(Turn::Stage::released);
-    });
-  }
-  explicit Hold(Board& board) : Hold(board, [] { return true; }) {}
-  void wait_until_held() { ASSERT_TRUE(turn_->wait_for(Turn::Stage::held)); }
-  void release() { turn_->reach(Turn::Stage::released); }
-
- private:
-  // It outlives both threads' use of it.
-  class Turn {
-   public:
-    enum class Stage : std::uint8_t { free, held, released };
-    void reach(Stage stage) {
-      const std::lock_guard lock(mutex_);
-      stage_ = stage;
-      changed_.notify_all();
-    }
-    bool wait_for(Stage stage) {
-      std::unique_lock lock(mutex_);
-      return changed_.wait_for(lock, 5s, [&] { return stage_ >= stage; });
-    }
-
-   private:
-    std::mutex mutex_;
-    std::condition_variable changed_;
-    Stage stage_ = Stage::free;
-  };
-  std::shared_ptr<Turn> turn_ = std::make_shared<Turn>();
-};
-
 struct BoardThread : testing::Test {
   BoardThread() { board.wait_active(); }
+  void hold_up() {
+    hold.begin();
+    ASSERT_TRUE(hold.wait_until_held());
+  }
   bool has_executed(const std::string& command) {
     const std::vector<std::string> all = simulated.executed();
     return std::find(all.begin(), all.end(), command) != all.end();
   }
   BoardInAThread simulated{"udp"};
-  Board board{simulated.url(), at_will()};
+  Hold hold;
+  Board board{hold.at(simulated.url()), at_will()};
 };
 
 TEST_F(BoardThread, NeverSendsACommandWhoseCallHasThrown) {
-  Hold hold(board);
-  hold.wait_until_held();
+  hold_up();
   const auto begin = std::chrono::steady_clock::now();
   const Problem problem = problem_of([&] { board.send("O:777,1,1", 50ms); });
   EXPECT_LT(std::chrono::steady_clock::now() - begin, 450ms) << "the deadline is that of the call";
   EXPECT_EQ(problem.kind, ErrorKind::refused);
   EXPECT_EQ(problem.thing, "O:777,1,1");
   EXPECT_TRUE(contains(problem.reason, "not sent"));
-  EXPECT_TRUE(contains(problem.fix, "callback"));
+  EXPECT_TRUE(contains(problem.fix, "transport"));
   hold.release();
   board.servo(1).set(1500);  // behind it
   EXPECT_FALSE(has_executed("O:777,1,1"));
 }
 
-TEST_F(BoardThread, SaysWhereACommandMayHaveBeenExecuted) {
-  Hold hold(board, [&] { return has_executed("O:777,1,1"); });
-  const Problem problem = problem_of([&] { board.send("O:777,1,1", 50ms); });
-  EXPECT_TRUE(contains(problem.reason, "it may have been executed"));
-  hold.release();
-}
-
 TEST_F(BoardThread, SendsAStopHoweverLate) {
-  Hold hold(board);
-  hold.wait_until_held();
+  hold_up();
   const Problem problem = problem_of([&] { board.stop(20ms); });
   EXPECT_TRUE(contains(problem.reason, "not confirmed"));
   EXPECT_TRUE(contains(problem.fix, "CUT THE POWER"));
@@ -106,23 +65,21 @@ TEST_F(BoardThread, SendsAStopHoweverLate) {
   EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::stop));
 }
 
-TEST_F(BoardThread, NeverCallsACallbackThatItDidNotTake) {
-  Hold hold(board);
-  hold.wait_until_held();
-  std::atomic<bool> called{false};
-  const auto payload = std::make_shared<int>(1);
-  const auto set_all = [&] {
-    problem_of([&] { board.on_state([&, payload](const State&) { called = true; }); });
-    problem_of([&] { board.on_link([&, payload](const LinkStatus&) { called = true; }); });
-    return problem_of(
-        [&] { board.on_event([&, payload](const CarrierEvent&) { called = true; }); });
-  };
-  EXPECT_TRUE(contains(set_all().reason, "not done"));
+TEST_F(BoardThread, TellsThatItWasHeldUp) {
+  std::promise<Problem> told;
+  board.on_event([&, done = false](const CarrierEvent& event) mutable {
+    if (done || event.kind != CarrierEvent::Kind::warning) return;
+    done = true;
+    told.set_value(event.problem);
+  });
+  hold_up();
+  // Until two heartbeats are late, and a little.
+  const auto end = std::chrono::steady_clock::now() + 350ms;
+  std::this_thread::sleep_until(end);
   hold.release();
-  board.stop();  // a change of the link, and states
-  board.next_state();
-  EXPECT_FALSE(called);
-  EXPECT_EQ(payload.use_count(), 1);
+  auto future = told.get_future();
+  ASSERT_EQ(future.wait_for(5s), std::future_status::ready);
+  EXPECT_TRUE(contains(future.get().reason, "held up"));
 }
 
 // The transport's name is written anew each time a USB board comes back.
@@ -228,6 +185,124 @@ TEST(BoardCallbacks, AreToldNoStateThatNeverCame) {
   board.on_state([&](const State&) { called = true; });
   board.statistics();  // behind it
   EXPECT_FALSE(called);
+}
+
+TEST(BoardCallbacks, AreToldEverythingIfTheyAreThereFirst) {
+  std::mutex mutex;
+  std::vector<std::string> told;
+  const auto note = [&](const std::string& text) {
+    const std::lock_guard lock(mutex);
+    told.push_back(text);
+  };
+  {
+    BoardCallbacks callbacks;
+    callbacks.on_event = [&](const CarrierEvent& event) { note(to_text(event.kind)); };
+    callbacks.on_link = [&](const LinkStatus& link) { note(to_text(link.state)); };
+    Board board("sim:", {}, callbacks);
+    board.wait_active();
+    board.next_state();
+  }
+  ASSERT_GE(told.size(), 3U);
+  EXPECT_EQ(told[0], "connecting") << "how the link was before the transport was opened";
+  EXPECT_EQ(told[1], "up");
+  EXPECT_EQ(told.back(), "active");
+}
+
+TEST(BoardCallbacks, SeveralOfAKindAreCalledInTheirOrderAndEndedOneByOne) {
+  Board board("sim:");
+  std::promise<std::string> told;
+  std::string order;
+  ScopedSubscription first = board.on_state([&](const State&) { order += 'a'; });
+  board.on_state([&](const State&) {
+    order += 'b';
+    if (order.size() == 8) told.set_value(order);
+    if (order.size() == 4) first = {};
+  });
+  auto future = told.get_future();
+  ASSERT_EQ(future.wait_for(5s), std::future_status::ready);
+  EXPECT_EQ(future.get(), "ababbbbb");
+}
+
+// Waits in another thread for a call that runs.
+TEST(BoardCallbacks, AreNotRunningWhenTheirEndHasReturned) {
+  Board board("sim:");
+  std::promise<void> running;
+  std::atomic<bool> over{false};
+  Subscription subscription = board.on_state([&, first = true](const State&) mutable {
+    if (!first) return;
+    first = false;
+    running.set_value();
+    board.next_state();
+    board.next_state();
+    over = true;
+  });
+  ASSERT_EQ(running.get_future().wait_for(5s), std::future_status::ready);
+  subscription.cancel();
+  EXPECT_TRUE(over);
+  subscription.cancel();
+}
+
+TEST(BoardCallbacks, CostNoHeartbeatWhileTheyRun) {
+  BoardInAThread simulated("udp");
+  Board board(simulated.url());
+  board.wait_active();
+  std::promise<std::uint64_t> sent;
+  board.on_state([&, done = false](const State&) mutable {
+    if (done) return;
+    done = true;
+    const std::uint64_t before = board.statistics().heartbeats;
+    const auto end = std::chrono::steady_clock::now() + 5s;
+    std::uint64_t now = before;
+    while (now < before + 3 && std::chrono::steady_clock::now() < end) {
+      now = board.statistics().heartbeats;
+    }
+    sent.set_value(now - before);
+  });
+  auto future = sent.get_future();
+  ASSERT_EQ(future.wait_for(10s), std::future_status::ready);
+  EXPECT_GE(future.get(), 3U);
+  EXPECT_EQ(board.link().state, HostLinkState::active);
+}
+
+TEST(BoardCallbacks, ThatDoNotReturnEndTheHeartbeatsUntilTheyDo) {
+  BoardInAThread simulated("udp");
+  BoardOptions options;
+  options.callback_limit = 50ms;
+  Board board(simulated.url(), options);
+  board.wait_active();
+  std::promise<void> released;
+  std::promise<Problem> told;
+  board.on_event([&, done = false](const CarrierEvent& event) mutable {
+    if (done || event.kind != CarrierEvent::Kind::warning) return;
+    done = true;
+    told.set_value(event.problem);
+  });
+  board.on_state([release = released.get_future().share()](const State&) { release.wait(); });
+  EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::link));
+  EXPECT_EQ(board.link().gate, Gate::callback);
+  EXPECT_TRUE(contains(problem_of([&] { board.wait_active(1ms); }).reason, "a callback"));
+  released.set_value();
+  auto future = told.get_future();
+  ASSERT_EQ(future.wait_for(5s), std::future_status::ready);
+  EXPECT_TRUE(contains(future.get().reason, "heartbeats stopped"));
+  board.wait_active();
+}
+
+TEST(BoardCallbacks, AreToldTheNewestOfTheStatesThatCameMeanwhile) {
+  Board board("sim:");
+  std::promise<void> late;
+  std::promise<std::uint32_t> next;
+  board.on_state([&, calls = 0](const State& state) mutable {
+    ++calls;
+    if (calls == 1) late.get_future().wait_for(5s);
+    if (calls == 2) next.set_value(state.t_ms);
+  });
+  for (int i = 0; i < 5; ++i) board.next_state();
+  const std::uint32_t newest = board.state().t_ms;
+  late.set_value();
+  auto future = next.get_future();
+  ASSERT_EQ(future.wait_for(5s), std::future_status::ready);
+  EXPECT_GE(future.get(), newest);
 }
 
 }  // namespace

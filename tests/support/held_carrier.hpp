@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A transport that holds the loop up when it is told to, as none of ours does.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "host/async_board.hpp"
+#include "host/board.hpp"
+#include "transports/registry.hpp"
+
+namespace r4::test {
+
+class Hold {
+ public:
+  // A transport by that URL.
+  CarrierMaker at(const std::string& url) {
+    return [turn = turn_, url](asio::io_context& loop) {
+      return std::make_unique<Held>(standard_registry().make(loop, url, Role::host), turn);
+    };
+  }
+  // Holds the loop up when it sends next.
+  void begin() { turn_->reach(Turn::Stage::wanted); }
+  bool wait_until_held() { return turn_->wait_for(Turn::Stage::held); }
+  void release() { turn_->reach(Turn::Stage::released); }
+
+ private:
+  // It outlives both threads' use of it.
+  class Turn {
+   public:
+    enum class Stage : std::uint8_t { free, wanted, held, released };
+    void reach(Stage stage) {
+      const std::lock_guard lock(mutex_);
+      stage_ = stage;
+      changed_.notify_all();
+    }
+    bool wait_for(Stage stage) {
+      std::unique_lock lock(mutex_);
+      return changed_.wait_for(lock, std::chrono::seconds{5}, [&] { return stage_ >= stage; });
+    }
+    bool is(Stage stage) {
+      const std::lock_guard lock(mutex_);
+      return stage_ == stage;
+    }
+
+   private:
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    Stage stage_ = Stage::free;
+  };
+
+  class Held final : public Carrier {
+   public:
+    Held(std::unique_ptr<Carrier> below, std::shared_ptr<Turn> turn)
+        : below_(std::move(below)), turn_(std::move(turn)) {}
+    void open(Handler& handler) override { below_->open(handler); }
+    void close() noexcept override { below_->close(); }
+    SendResult send(std::string_view bytes, Priority priority, Peer to) override {
+      if (turn_->is(Turn::Stage::wanted)) {
+        turn_->reach(Turn::Stage::held);
+        turn_->wait_for(Turn::Stage::released);
+      }
+      return below_->send(bytes, priority, to);
+    }
+    bool up() const override { return below_->up(); }
+    std::size_t max_size() const override { return below_->max_size(); }
+    const std::string& name() const override { return below_->name(); }
+    const CarrierCounters& counters() const override { return below_->counters(); }
+
+   private:
+    std::unique_ptr<Carrier> below_;
+    std::shared_ptr<Turn> turn_;
+  };
+
+  std::shared_ptr<Turn> turn_ = std::make_shared<Turn>();
+};
+
+}  // namespace r4::test
