@@ -151,7 +151,7 @@ struct AsyncBoard::Impl final : Carrier::Handler,
     bool any = false;
     for (std::size_t i = 0; i < waiters.size();) {
       Waiter& waiter = waiters[i];
-      const Outcome outcome = !is_open ? Outcome::cancelled
+      const Outcome outcome = !is_open ? Outcome::closed   
                               : active ? Outcome::confirmed
                                        : Outcome::timed_out;
       if (outcome == Outcome::timed_out && now < waiter.deadline) {
@@ -276,7 +276,7 @@ struct AsyncBoard::Impl final : Carrier::Handler,
         waiting.push_back({ticket, std::move(completion)});
         poll_wanted = true;
       } else {
-        const Outcome outcome = is_open ? Outcome::full : Outcome::cancelled;
+        const Outcome outcome = is_open ? Outcome::full : Outcome::closed;
         completion.release()->complete({outcome, Refusal::none, Time{0}}, Completion::How::post);
       }
     });
@@ -299,7 +299,7 @@ struct AsyncBoard::Impl final : Carrier::Handler,
     carrier->close();
     timer.cancel();
     how = Completion::How::post;
-    enter(Completion::How::post, [this] { session.cancel_all(now); });
+    enter(Completion::How::post, [this] { session.end_all(now); });
   }
 
   asio::io_context& io;

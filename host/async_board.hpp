@@ -57,7 +57,7 @@ class AsyncBoard {
   // Opens the transport and begins the link: the first heartbeat goes out at once. Throws Error;
   // once only.
   void open();
-  // Cancels what is under way (outcome cancelled) and closes the transport: the board goes safe. No
+  // Cancels what is under way (outcome closed) and closes the transport: the board goes safe. No
   // callback follows. Idempotent; the board cannot be opened again.
   void close();
 

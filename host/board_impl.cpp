@@ -19,9 +19,9 @@ constexpr std::chrono::milliseconds grace{500};
 
 // `instead`: what that means for what was asked.
 Error blocked_error(std::string_view what, std::string_view instead) {
-  return Error(ErrorKind::refused, std::string(what),
-               std::string(instead) + ": the board's thread does not answer",
-               "a transport of your own must return at once");
+  return Error(Problem{ErrorKind::refused, std::string(what),
+                       std::string(instead) + ": the board's thread does not answer",
+                       "a transport of your own must return at once", Outcome::blocked});
 }
 
 }  // namespace
@@ -228,8 +228,8 @@ Board::Duration Board::Impl::bounded(Duration timeout) {
 }
 
 Error Board::Impl::closed_error(std::string_view what) {
-  return Error(ErrorKind::refused, std::string(what), "cancelled: the board was closed",
-               "open it again with another Board");
+  return Error(Problem{ErrorKind::refused, std::string(what), "the board was closed",
+                       "open it again with another Board", Outcome::closed});
 }
 
 void Board::Impl::require_sendable(const Command& command) {
@@ -252,15 +252,16 @@ Board::Impl::CallPtr Board::Impl::execute(const std::string& text, CallPtr call,
       !(call->begun && call->ended.wait_until(lock, deadline + grace, is_done))) {
     call->abandoned = true;
     if (call->command.kind == CommandKind::stop) {
-      throw Error(ErrorKind::refused, text,
-                  "not confirmed: the board's thread does not answer, and sends it when it does",
-                  std::string(stop_last_resort));
+      throw Error(Problem{ErrorKind::refused, text,
+                          "not confirmed: the board's thread does not answer, and sends it when it "
+                          "does",
+                          std::string(stop_last_resort), Outcome::blocked});
     }
     throw blocked_error(
         text, call->begun ? "not confirmed, it may have been executed or not" : "not sent");
   }
   if (call->result.outcome == Outcome::confirmed) return call;
-  if (closed && call->result.outcome == Outcome::cancelled) throw closed_error(text);
+  if (call->result.outcome == Outcome::closed) throw closed_error(text);
   throw Error(explain(text, call->result, call->link));
 }
 

@@ -219,32 +219,11 @@ Words unconfirmed_stop_words(const CommandResult& result, LinkStatus link) {
 
 bool is_stop(std::string_view command) { return command.starts_with("E:STOP"); }
 
-}  // namespace
-
-Problem explain(KeyTrouble trouble) {
-  Words words = key_words(trouble);
-  return {ErrorKind::refused, "key", std::move(words.reason), std::move(words.fix)};
-}
-
-Problem explain(std::string_view command, DisarmCause cause) {
-  const Words words = disarm_words(cause);
-  const bool first = words.fix.empty();
-  return {ErrorKind::refused, std::string(command), "not armed: " + words.reason,
-          words.fix + (first ? "call arm()" : "then call arm()")};
-}
-
-Problem explain(std::string_view name, const LinkStatus& link) {
-  Words words = link_words(link);
-  return {ErrorKind::refused, std::string(name), std::move(words.reason), std::move(words.fix)};
-}
-
-Problem explain(std::string_view command, const CommandResult& result, const LinkStatus& link) {
-  Words words;
+Words outcome_words(std::string_view command, const CommandResult& result, const LinkStatus& link) {
   if (is_stop(command) && result.outcome != Outcome::confirmed) {
-    words = unconfirmed_stop_words(result, link);
-    return {ErrorKind::refused, std::string(command), std::move(words.reason),
-            std::move(words.fix)};
+    return unconfirmed_stop_words(result, link);
   }
+  Words words;
   switch (result.outcome) {
     case Outcome::confirmed:
       words.reason = "confirmed by the board's state";
@@ -267,17 +246,58 @@ Problem explain(std::string_view command, const CommandResult& result, const Lin
       break;
     }
     case Outcome::cancelled:
-      words.reason = "cancelled: an emergency stop came, or the board was closed";
+      words.reason = "cancelled: an emergency stop came, or the board has a newer reason to be safe";
+      words.fix = "see why the board is safe before it is cleared";
+      break;
+    case Outcome::closed:
+      words.reason = "given up: the board was closed";
+      break;
+    case Outcome::blocked:
+      words.reason = "not sent: the board's thread does not answer";
       break;
     case Outcome::full:
       words.reason =
           fmt::format("not sent: {} commands are under way already", Session::max_pending);
       words.fix = "wait until some of them are confirmed";
       break;
-    case Outcome::not_armed:
-      return explain(command, result.disarmed);
+    case Outcome::not_armed: {
+      Problem why = explain(command, result.disarmed);
+      words = {std::move(why.reason), std::move(why.fix)};
+      break;
+    }
+    case Outcome::none:
+      break;
   }
-  return {ErrorKind::refused, std::string(command), std::move(words.reason), std::move(words.fix)};
+  return words;
+}
+
+}  // namespace
+
+Problem explain(KeyTrouble trouble) {
+  Words words = key_words(trouble);
+  return {ErrorKind::refused, "key", std::move(words.reason), std::move(words.fix)};
+}
+
+Problem explain(std::string_view command, DisarmCause cause) {
+  const Words words = disarm_words(cause);
+  const bool first = words.fix.empty();
+  return {ErrorKind::refused, std::string(command), "not armed: " + words.reason,
+          words.fix + (first ? "call arm()" : "then call arm()")};
+}
+
+Problem explain(std::string_view name, const LinkStatus& link) {
+  Words words = link_words(link);
+  return {ErrorKind::refused, std::string(name), std::move(words.reason), std::move(words.fix)};
+}
+
+Problem explain(std::string_view command, const CommandResult& result, const LinkStatus& link) {
+  Words words = outcome_words(command, result, link);
+  return {.kind = ErrorKind::refused,
+          .thing = std::string(command),
+          .reason = std::move(words.reason),
+          .fix = std::move(words.fix),
+          .outcome = result.outcome,
+          .refusal = result.code};
 }
 
 }  // namespace r4

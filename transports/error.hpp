@@ -2,9 +2,12 @@
 // The one error type of the host: what went wrong, why, and what to do about it.
 #pragma once
 
+#include <cstdint>
 #include <stdexcept>
 #include <string>
 #include <utility>
+
+#include "../protocol/datagram/refusal.hpp"
 
 namespace r4 {
 
@@ -18,12 +21,29 @@ enum class ErrorKind : int {
   unsupported = 6,  // kernel support or interface missing
 };
 
+// How a command ended.
+enum class Outcome : std::uint8_t {
+  none,       // no command is concerned
+  confirmed,  // the board's own state says so
+  refused,    // the board refused it, and did not execute it: `code`
+  timed_out,  // no confirmation until the deadline; it may or may not have been executed
+  cancelled,  // given up: a stop, or a newer cause to be safe, came first
+  closed,     // given up: the board was closed
+  blocked,    // not sent: the board's thread does not answer
+  full,       // not taken: Session::max_pending commands are under way already
+  not_armed,  // not sent: it drives an output and the session is not armed, because of `disarmed`;
+              // arm() itself: it cannot be armed while that is so
+};
+
 // A problem in words: "/dev/ttyACM0: permission denied; add yourself to the group dialout: …".
 struct Problem {
   ErrorKind kind = ErrorKind::open;
   std::string thing;   // what it is about: a URL, a device, a command
   std::string reason;  // why
   std::string fix;     // what to do; empty where nobody can know
+  // For programs, where it is about a command.
+  Outcome outcome = Outcome::none;
+  Refusal refusal = Refusal::none;  // for Outcome::refused
 
   std::string text() const { return thing + ": " + reason + (fix.empty() ? "" : "; " + fix); }
 };
@@ -36,6 +56,8 @@ class Error : public std::runtime_error {
       : Error(Problem{kind, std::move(thing), std::move(reason), std::move(fix)}) {}
   const Problem& problem() const { return problem_; }
   ErrorKind kind() const { return problem_.kind; }
+  Outcome outcome() const { return problem_.outcome; }
+  Refusal refusal() const { return problem_.refusal; }
 
  private:
   Problem problem_;

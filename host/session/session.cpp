@@ -19,6 +19,8 @@ namespace {
 
 const char* to_text(Outcome outcome) {
   switch (outcome) {
+    case Outcome::none:
+      return "none";
     case Outcome::confirmed:
       return "confirmed";
     case Outcome::refused:
@@ -27,6 +29,10 @@ const char* to_text(Outcome outcome) {
       return "timed out";
     case Outcome::cancelled:
       return "cancelled";
+    case Outcome::closed:
+      return "closed";
+    case Outcome::blocked:
+      return "blocked";
     case Outcome::full:
       return "full";
     case Outcome::not_armed:

@@ -41,6 +41,7 @@
 #include "../../protocol/link/host_link.hpp"
 #include "../../protocol/messages/message.hpp"
 #include "../../transports/carrier.hpp"
+#include "../../transports/error.hpp"
 #include "arming.hpp"
 #include "field_selection.hpp"
 #include "host_key.hpp"
@@ -75,17 +76,6 @@ struct LinkStatus {
   ChipFault chip{};             // of a fault: the chip that is the cause, if it is one
   bool gated() const { return gate != Gate::open; }
   friend bool operator==(const LinkStatus&, const LinkStatus&) = default;
-};
-
-// How a command ended.
-enum class Outcome : std::uint8_t {
-  confirmed,  // the board's own state says so
-  refused,    // the board refused it, and did not execute it: `code`
-  timed_out,  // no confirmation until the deadline; it may or may not have been executed
-  cancelled,  // given up: a stop, or the end of the session, came first
-  full,       // not taken: Session::max_pending commands are under way already
-  not_armed,  // not sent: it drives an output and the session is not armed, because of `disarmed`;
-              // arm() itself: it cannot be armed while that is so
 };
 
 // "confirmed", "refused", "timed out" …
@@ -178,8 +168,8 @@ class Session {
   Ticket identify(Time timeout, Time now);
   // Gives a command up without on_result().
   void forget(Ticket ticket);
-  // Ends every command under way as cancelled.
-  void cancel_all(Time now);
+  // Ends every command under way: the board is closed.
+  void end_all(Time now);
 
   // The application watchdog: without feed() for `period` the heartbeats stop, and the board goes
   // safe; commands are held back, too, for nobody looks after what they do. 0 turns it off.

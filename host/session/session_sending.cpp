@@ -196,7 +196,10 @@ void Session::finish(Pending& pending, Outcome outcome, Refusal code, Time now) 
     case Outcome::timed_out:
       ++collector_.counts.timed_out;
       break;
+    case Outcome::none:
     case Outcome::cancelled:
+    case Outcome::closed:
+    case Outcome::blocked:
     case Outcome::full:
       break;
   }
@@ -213,9 +216,9 @@ void Session::forget(Ticket ticket) {
   }
 }
 
-void Session::cancel_all(Time now) {
+void Session::end_all(Time now) {
   for (Pending& pending : pending_.under_way()) {
-    finish(pending, Outcome::cancelled, Refusal::none, now);
+    finish(pending, Outcome::closed, Refusal::none, now);
   }
 }
 

@@ -192,6 +192,24 @@ struct State {
   std::uint32_t rx_refused = 0;
   std::uint32_t late = 0;
   ChipFault fault;
+
+  // The same by the names of channels, as on the board: from 1. A channel that is not there reads 0.
+  double volts(Analog input) const {
+    const int i = static_cast<int>(input);
+    return i < analog_channels ? analog_cv[i] / 100.0 : 0.0;
+  }
+  std::int32_t encoder(int channel) const { return reading(encoder_counts, channel); }
+  std::int32_t steps(int channel) const { return reading(stepper_steps, channel); }
+  int distance_cm(int channel) const { return reading(ultrasonic_cm, channel); }
+  bool relay(int channel) const {
+    return channel >= 1 && channel <= relay_channels && (relays >> (channel - 1) & 1) != 0;
+  }
+
+ private:
+  template <class Value, int count>
+  static Value reading(const Value (&values)[count], int channel) {
+    return channel >= 1 && channel <= count ? values[channel - 1] : Value();
+  }
 };
 
 // The field's name on the wire, "AIN24".

@@ -152,7 +152,7 @@ TEST_F(AsyncBoardTest, RunsAHandlerOnItsExecutor) {
   bool inside = false;
   board.async_send(drive, 1s, asio::bind_executor(strand, [&](const CommandResult& result) {
                      inside = strand.running_in_this_thread();
-                     EXPECT_EQ(result.outcome, Outcome::cancelled) << "the board is closed";
+                     EXPECT_EQ(result.outcome, Outcome::closed) << "the board is closed";
                    }));
   io.restart();
   io.run();
@@ -219,7 +219,7 @@ TEST_F(AsyncBoardTest, CloseCancelsAndNoCallbackFollows) {
   EXPECT_TRUE(outcomes.empty()) << "handlers run on the loop";
   io.restart();
   io.run();  // ends: nothing is left
-  EXPECT_EQ(outcomes, std::vector<Outcome>(4, Outcome::cancelled));
+  EXPECT_EQ(outcomes, std::vector<Outcome>(4, Outcome::closed));
   EXPECT_THROW(board.open(), Error) << "once only";
 }
 
@@ -265,7 +265,7 @@ TEST_P(DestroyedIn, SurvivesIt) {
       });
     }
     board->async_send(Command::fields("ENC1"), 10s, [&](const CommandResult& result) {
-      cancelled += result.outcome == Outcome::cancelled ? 1 : 0;
+      cancelled += result.outcome == Outcome::closed ? 1 : 0;
     });
     io.restart();
     io.run();
@@ -304,7 +304,7 @@ TEST(AsyncBoardEnd, IsDestroyedBeforeOrWithoutItsLoop) {
   never_opened.async_stop(1s, [&](const CommandResult& r) { outcome = r.outcome; });
   io.restart();
   io.run();
-  EXPECT_EQ(outcome, Outcome::cancelled);
+  EXPECT_EQ(outcome, Outcome::closed);
 }
 
 TEST(AsyncBoardEnd, ItsHandlersDieWithTheLoop) {

@@ -49,7 +49,10 @@ void World::Host::on_result(Ticket ticket, const CommandResult& result) {
     case Outcome::timed_out:
       ++world.report_.timed_out;
       break;
+    case Outcome::none:
     case Outcome::cancelled:
+    case Outcome::closed:
+    case Outcome::blocked:
     case Outcome::full:
     case Outcome::not_armed:
       break;

@@ -277,9 +277,9 @@ TEST(SessionCommand, AllAreCancelledAtTheEnd) {
   link.connect();
   const Ticket ticket = link.session.send(drive, 1s, link.now);
   const Ticket stop = link.session.stop(1s, link.now);
-  link.session.cancel_all(link.now);
-  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::cancelled);
-  EXPECT_EQ(result_of(link, stop).outcome, Outcome::cancelled);
+  link.session.end_all(link.now);
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::closed);
+  EXPECT_EQ(result_of(link, stop).outcome, Outcome::closed);
 }
 
 TEST(SessionStop, GoesOutBeforeTheLinkIsUpWithTheTopPriority) {

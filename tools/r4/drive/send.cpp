@@ -198,6 +198,7 @@ class Sender {
     Json object{{"type", "result"},
                 {"command", text},
                 {"confirmed", confirmed},
+                {"outcome", to_text(result.outcome)},
                 {"ms", milliseconds(result)}};
     if (result.outcome == Outcome::refused) {
       const Text name = name_of(result.code);

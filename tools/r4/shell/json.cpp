@@ -144,11 +144,17 @@ Json counters_json(const CarrierCounters& counters) {
 }
 
 Json problem_json(const Problem& problem) {
-  return {{"type", "error"},
-          {"kind", name_of(problem.kind)},
-          {"thing", problem.thing},
-          {"reason", problem.reason},
-          {"fix", problem.fix}};
+  Json object{{"type", "error"},
+              {"kind", name_of(problem.kind)},
+              {"thing", problem.thing},
+              {"reason", problem.reason},
+              {"fix", problem.fix}};
+  if (problem.outcome != Outcome::none) object["outcome"] = to_text(problem.outcome);
+  if (problem.refusal != Refusal::none) {
+    const Text code = name_of(problem.refusal);
+    object["code"] = std::string_view(code.data(), code.size());
+  }
+  return object;
 }
 
 std::string escaped(std::string_view bytes) {
