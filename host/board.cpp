@@ -64,25 +64,42 @@ void Board::stop(Duration timeout) { send(Command::stop(), timeout); }
 void Board::stop_async() { impl_->post(Command::stop()); }
 void Board::clear(Duration timeout) { send(Command::clear(), timeout); }
 
+Command Board::DriveChannel::command(int pwm, Direction direction) const {
+  return kind_ == CommandKind::osmc ? Command::osmc(pwm, direction, channel_)
+                                    : Command::dhb12(pwm, direction, channel_);
+}
 void Board::DriveChannel::set(int pwm, Direction direction, Duration timeout) const {
-  board_.send(kind_ == CommandKind::osmc ? Command::osmc(pwm, direction, channel_)
-                                         : Command::dhb12(pwm, direction, channel_),
-              timeout);
+  board_.send(command(pwm, direction), timeout);
+}
+PostResult Board::DriveChannel::post(int pwm, Direction direction) const {
+  return board_.post(command(pwm, direction));
 }
 void Board::ServoChannel::set(int pulse_us, Duration timeout) const {
   board_.send(Command::servo(pulse_us, channel_), timeout);
 }
+PostResult Board::ServoChannel::post(int pulse_us) const {
+  return board_.post(Command::servo(pulse_us, channel_));
+}
 void Board::RelayChannel::set(bool on, Duration timeout) const {
   board_.send(Command::relay(channel_, on), timeout);
 }
+PostResult Board::RelayChannel::post(bool on) const {
+  return board_.post(Command::relay(channel_, on));
+}
 void Board::StepperChannel::move_to(std::int32_t position, int speed, Duration timeout) const {
   board_.send(Command::stepper(position, speed, channel_), timeout);
+}
+PostResult Board::StepperChannel::post(std::int32_t position, int speed) const {
+  return board_.post(Command::stepper(position, speed, channel_));
 }
 void Board::StepperChannel::zero(Duration timeout) const {
   board_.send(Command::zero(channel_), timeout);
 }
 void Board::BldcChannel::set(int speed, Direction direction, bool brake, Duration timeout) const {
   board_.send(Command::bldc(speed, direction, brake, channel_), timeout);
+}
+PostResult Board::BldcChannel::post(int speed, Direction direction, bool brake) const {
+  return board_.post(Command::bldc(speed, direction, brake, channel_));
 }
 void Board::proximity(int channel, int threshold_cm, Duration timeout) {
   send(Command::proximity(threshold_cm, channel), timeout);

@@ -102,12 +102,15 @@ class Board {
   void stop_async();  // does not wait; repeated for default_timeout
   void clear(Duration timeout = default_timeout);
 
+  // Each channel: set() is send(), confirmed; post() sends once and does not wait.
   class DriveChannel {
    public:
     void set(int pwm, Direction direction, Duration timeout = default_timeout) const;  // pwm 0-4095
+    PostResult post(int pwm, Direction direction) const;
 
    private:
     friend class Board;
+    Command command(int pwm, Direction direction) const;
     DriveChannel(Board& board, CommandKind kind, int channel)
         : board_(board), kind_(kind), channel_(channel) {}
     Board& board_;
@@ -117,6 +120,7 @@ class Board {
   class ServoChannel {
    public:
     void set(int pulse_us, Duration timeout = default_timeout) const;  // 0 (off) to 2500
+    PostResult post(int pulse_us) const;
 
    private:
     friend class Board;
@@ -127,6 +131,7 @@ class Board {
   class RelayChannel {
    public:
     void set(bool on, Duration timeout = default_timeout) const;
+    PostResult post(bool on) const;
 
    private:
     friend class Board;
@@ -139,6 +144,7 @@ class Board {
     // Position in steps, speed in steps per second (1-20000).
     void move_to(std::int32_t position, int speed = stepper_speed_default,
                  Duration timeout = default_timeout) const;
+    PostResult post(std::int32_t position, int speed = stepper_speed_default) const;
     void zero(Duration timeout = default_timeout) const;
 
    private:
@@ -152,6 +158,7 @@ class Board {
     // Speed 0-4095.
     void set(int speed, Direction direction, bool brake = false,
              Duration timeout = default_timeout) const;
+    PostResult post(int speed, Direction direction, bool brake = false) const;
 
    private:
     friend class Board;
