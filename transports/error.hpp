@@ -35,6 +35,9 @@ enum class Outcome : std::uint8_t {
               // arm() itself: it cannot be armed while that is so
 };
 
+// "confirmed", "refused", "timed out" …
+const char* to_text(Outcome outcome);
+
 // A problem in words: "/dev/ttyACM0: permission denied; add yourself to the group dialout: …".
 struct Problem {
   ErrorKind kind = ErrorKind::open;

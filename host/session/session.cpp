@@ -13,34 +13,6 @@
 
 namespace r4 {
 
-namespace {
-
-}  // namespace
-
-const char* to_text(Outcome outcome) {
-  switch (outcome) {
-    case Outcome::none:
-      return "none";
-    case Outcome::confirmed:
-      return "confirmed";
-    case Outcome::refused:
-      return "refused";
-    case Outcome::timed_out:
-      return "timed out";
-    case Outcome::cancelled:
-      return "cancelled";
-    case Outcome::closed:
-      return "closed";
-    case Outcome::blocked:
-      return "blocked";
-    case Outcome::full:
-      return "full";
-    case Outcome::not_armed:
-      return "not armed";
-  }
-  return "unknown";
-}
-
 std::uint32_t Session::random_first_pnum() {
   std::random_device random;
   return echo_host_first_pnum + (random() & 0x3fffffffU);

@@ -78,9 +78,6 @@ struct LinkStatus {
   friend bool operator==(const LinkStatus&, const LinkStatus&) = default;
 };
 
-// "confirmed", "refused", "timed out" …
-const char* to_text(Outcome outcome);
-
 struct CommandResult {
   Outcome outcome = Outcome::timed_out;
   Refusal code = Refusal::none;              // for refused

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <iterator>
 #include <string_view>
+#include <tuple>
 
 #include "host/commands/command_help.hpp"
 #include "protocol/datagram/refusal.hpp"
@@ -289,7 +290,7 @@ void SimLog::on_rejected(std::uint32_t t_ms, Verdict verdict) {
 void SimLog::on_carrier(std::uint32_t t_ms, const Carrier& carrier,
                         const CarrierEvent& carrier_event) {
   const std::string_view kind = name_of_kind(carrier_event.kind);
-  const auto& [error, thing, reason, fix] = carrier_event.problem;
+  const auto& [reason, fix] = std::tie(carrier_event.problem.reason, carrier_event.problem.fix);
   if (!output_.json()) {
     return print(
         t_ms, fmt::format("{} {}{}{}{}{}", carrier.name(), kind, reason.empty() ? "" : ": ", reason,
