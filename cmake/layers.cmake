@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # How a layer is built: r4_portable_layer(NAME FILES...) and r4_host_layer(NAME FILES...).
-# Each makes an OBJECT library; cmake/library.cmake joins their objects into libr4link.a.
+# Each makes an OBJECT library; cmake/library.cmake joins their objects into the library.
 
 # Asio without Boost, its code compiled once (transports/asio.cpp). Whether Asio finds
 # std::aligned_alloc depends on what was included before it: unless that is switched off, objects
@@ -19,7 +19,7 @@ function(r4_host_code target)
   r4_warnings(${target})
   target_compile_features(${target} PRIVATE cxx_std_20)
   set_target_properties(${target} PROPERTIES CXX_STANDARD 20 CXX_EXTENSIONS OFF)
-  target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/include)
 endfunction()
 
 function(r4_layer target)
@@ -28,8 +28,10 @@ function(r4_layer target)
   endif()
   add_library(${target} OBJECT ${ARGN})
   r4_warnings(${target})
+  target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/include)
   # Nobody replaces our functions from a shared library: they may be inlined nevertheless.
-  set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON
+                        CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
   target_compile_options(${target} PRIVATE -fno-semantic-interposition)
   set_property(GLOBAL APPEND PROPERTY R4_LAYERS ${target})
 endfunction()

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "application.hpp"
 
+#include "../protocol/messages/command_field.hpp"
+
 namespace r4 {
 namespace firmware {
 
@@ -77,7 +79,7 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
   look_at_time(now_ms);  // silence counts before what ends it
   if (port >= port_count_) return;
   Datagram datagram;
-  if (!read(bytes, datagram)) {
+  if (!read_datagram(bytes, datagram)) {
     ++rx_bad_;
     return;
   }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What the application sends: heartbeats, states, answers.
+#include "../protocol/messages/state_fields.hpp"
 #include "application.hpp"
 
 namespace r4 {

@@ -13,7 +13,7 @@
 
 #include <cstdint>
 
-#include "../protocol/messages/units.hpp"
+#include "r4link/vocabulary.hpp"
 
 namespace r4 {
 namespace firmware {

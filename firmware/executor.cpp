@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "executor.hpp"
 
+#include "../protocol/messages/command_field.hpp"
+
 namespace r4 {
 namespace firmware {
 
@@ -25,7 +27,7 @@ void stop_motors(Outputs& outputs) {
 }  // namespace
 
 Refusal carry_out(const Command& command, Setpoints& setpoints) {
-  const Refusal refusal = check(command);
+  const Refusal refusal = check_command(command);
   if (refusal != Refusal::none) return refusal;
   const int i = command.channel - 1;
   const std::uint16_t value = static_cast<std::uint16_t>(command.value);

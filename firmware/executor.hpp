@@ -5,9 +5,9 @@
 
 #include <cstdint>
 
-#include "../protocol/messages/command.hpp"
 #include "../protocol/messages/settings.hpp"
 #include "hal.hpp"
+#include "r4link/command.hpp"
 
 namespace r4 {
 namespace firmware {

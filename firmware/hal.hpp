@@ -5,9 +5,8 @@
 
 #include <cstdint>
 
-#include "../protocol/messages/chip_fault.hpp"
-#include "../protocol/messages/state.hpp"
-#include "../protocol/messages/units.hpp"
+#include "r4link/state.hpp"
+#include "r4link/vocabulary.hpp"
 
 namespace r4 {
 namespace firmware {

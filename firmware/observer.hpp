@@ -5,8 +5,8 @@
 #include <cstdint>
 
 #include "../protocol/keys/authentication.hpp"
-#include "../protocol/messages/command.hpp"
 #include "hal.hpp"
+#include "r4link/command.hpp"
 
 namespace r4 {
 namespace firmware {

@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "../protocol/datagram/text.hpp"
-#include "../transports/framing/delivery.hpp"
+#include "r4link/text.hpp"
+#include "r4link/vocabulary.hpp"
 
 namespace r4 {
 namespace firmware {

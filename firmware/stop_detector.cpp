@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "stop_detector.hpp"
 
-#include "../protocol/messages/command.hpp"
-#include "../protocol/datagram/datagram.hpp"
+#include "../protocol/messages/command_field.hpp"
+#include "r4link/command.hpp"
+#include "r4link/datagram.hpp"
 
 namespace r4 {
 namespace firmware {
@@ -23,7 +24,7 @@ bool may_be_stop(Text datagram) {
 
 bool is_stop(Text datagram) {
   Datagram fields;
-  return may_be_stop(datagram) && read(datagram, fields) && asks_to_stop(fields);
+  return may_be_stop(datagram) && read_datagram(datagram, fields) && asks_to_stop(fields);
 }
 
 bool StopDetector::push(char byte) {

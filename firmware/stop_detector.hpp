@@ -5,7 +5,7 @@
 
 #include <cstddef>
 
-#include "../protocol/datagram/text.hpp"
+#include "r4link/text.hpp"
 
 namespace r4 {
 namespace firmware {

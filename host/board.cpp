@@ -1,19 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "board.hpp"
+#include "r4link/board.hpp"
 
 #include <utility>
 
-#include "../transports/registry.hpp"
 #include "board_impl.hpp"
 #include "commands/command_help.hpp"
-#include "explain.hpp"
 #include "session/limits.hpp"
+#include "standard_registry.hpp"
 
 namespace r4 {
 
 Board::Board(std::string_view url, BoardOptions options, BoardCallbacks callbacks)
-    : Board(CarrierMaker([url](asio::io_context& loop) {
-              return standard_registry().make(loop, url, Role::host);
+    : Board(CarrierMaker([url](Loop& loop) {
+              return standard_registry().make(context_of(loop), url, Role::host);
             }),
             std::move(options), std::move(callbacks)) {}
 Board::Board(const CarrierMaker& make, BoardOptions options, BoardCallbacks callbacks)

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "commands/command_help.hpp"
-#include "explain.hpp"
 #include "session/limits.hpp"
 
 namespace r4 {
@@ -35,7 +34,7 @@ Board::Impl::Call::Call(const Command& c)
 Board::Impl::Impl(const CarrierMaker& make, BoardOptions options, BoardCallbacks first)
     : arming(options.session.arming),
       callback_limit(options.callback_limit),
-      async(io, make(io), std::move(options)),
+      async(io, make(loop), std::move(options)),
       box(io, [this](const Command& c) { deliver(c); }),
       callbacks([this](Clock::duration busy) { on_callback_end(busy); }) {
   require_callback_limit(callback_limit);
@@ -133,7 +132,7 @@ void Board::Impl::look_at_callbacks() {
   const auto busy = callbacks.busy_for();
   if (!busy) return;
   if (*busy >= callback_limit) {
-    async.hold_heartbeats(true);
+    async.hold_heartbeats(held_for_callback = true);
     return;  // until the callback ends
   }
   looking = true;
@@ -150,6 +149,7 @@ void Board::Impl::on_callback_end(Clock::duration busy) {
   if (closed) return;
   const auto ms = std::chrono::duration_cast<Duration>(busy).count();
   asio::post(io, [this, ms] {
+    if (!std::exchange(held_for_callback, false)) return;
     async.hold_heartbeats(false);
     tell(CarrierEvent{
         CarrierEvent::Kind::warning,
@@ -241,8 +241,7 @@ Board::Impl::CallPtr Board::Impl::execute(const Command& command, Duration timeo
   return execute(shown(command), std::make_shared<Call>(command), timeout);
 }
 
-Board::Impl::CallPtr Board::Impl::execute(const std::string& text, CallPtr call,
-                                          Duration timeout) {
+Board::Impl::CallPtr Board::Impl::execute(const std::string& text, CallPtr call, Duration timeout) {
   const auto deadline = call->called + bounded(timeout);
   std::unique_lock lock(mutex);
   if (closed) throw closed_error(text);

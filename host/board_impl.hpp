@@ -5,7 +5,7 @@
 //     send() -- Call, post() -->    AsyncBoard on its loop  -->  callback_thread.hpp
 //            <-- ended, news --
 //
-// The link's thread waits for nobody: nothing of the program runs there. The threads meet under `mutex`.
+// The link's thread waits for nobody: nothing of the program runs there but a transport of its own. The threads meet under `mutex`.
 #pragma once
 
 #include <asio/executor_work_guard.hpp>
@@ -21,10 +21,11 @@
 #include <string_view>
 #include <thread>
 
-#include "async_board.hpp"
-#include "board.hpp"
+#include "board_loop.hpp"
 #include "callback_thread.hpp"
 #include "post_box.hpp"
+#include "r4link/async_board.hpp"
+#include "r4link/board.hpp"
 
 namespace r4 {
 
@@ -97,6 +98,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   const Duration callback_limit;  // 0: none
   asio::io_context io{1};
   asio::executor_work_guard<asio::io_context::executor_type> work{io.get_executor()};
+  BoardLoop loop{io};
   AsyncBoard async;
   PostBox box;
   CallbackThread callbacks;
@@ -105,7 +107,8 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
 
   // Of the loop.
   asio::steady_timer look_timer{io};
-  bool looking = false;  // the timer is set
+  bool looking = false;            // the timer is set
+  bool held_for_callback = false;  // the heartbeats
 
   // What both sides see.
   std::mutex mutex;

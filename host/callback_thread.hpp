@@ -25,9 +25,9 @@
 #include <variant>
 #include <vector>
 
-#include "../transports/carrier.hpp"
+#include "r4link/carrier.hpp"
 #include "session/session.hpp"
-#include "subscription.hpp"
+#include "subscribers.hpp"
 
 namespace r4 {
 

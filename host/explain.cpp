@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "explain.hpp"
-
 #include <fmt/format.h>
 
 #include "commands/command_help.hpp"
+#include "r4link/link.hpp"
+#include "session/session.hpp"
 
 namespace r4 {
 
@@ -246,14 +246,15 @@ Words outcome_words(std::string_view command, const CommandResult& result, const
       break;
     }
     case Outcome::cancelled:
-      words.reason = "cancelled: an emergency stop came, or the board has a newer reason to be safe";
+      words.reason =
+          "cancelled: an emergency stop came, or the board has a newer reason to be safe";
       words.fix = "see why the board is safe before it is cleared";
       break;
     case Outcome::closed:
       words.reason = "given up: the board was closed";
       break;
     case Outcome::blocked:
-      words.reason = "not sent: the board's thread does not answer";
+      words.reason = "not confirmed: the board's thread does not answer";
       break;
     case Outcome::full:
       words.reason =

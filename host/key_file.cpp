@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "key_file.hpp"
-
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -10,8 +8,9 @@
 #include <cerrno>
 #include <cstring>
 
-#include "../transports/error.hpp"
 #include "../transports/file_descriptor.hpp"
+#include "r4link/error.hpp"
+#include "r4link/options.hpp"
 
 namespace r4 {
 namespace {

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "../protocol/messages/command.hpp"
+#include "r4link/command.hpp"
 
 namespace r4 {
 

@@ -3,7 +3,7 @@
 """Fails when a source includes what its room may not. Usage: layers.py TREE
 
 tools > host > transports > protocol, tools > firmware > transports/framing > protocol, and within each of them
-the rooms in the order of ALLOWED; host/sim_carrier* alone may include firmware/ports/sim. The portable rooms
+the rooms in the order of ALLOWED; host/standard_registry.cpp alone may include firmware/ports/sim. The portable rooms
 (protocol, transports/framing, firmware without its ports, the chip models) include nothing a C++14 board lacks.
 A room holds at most 20 sources.
 """
@@ -56,8 +56,7 @@ ALLOWED = {
 # What a file may include although its room may not.
 EXCEPTIONS = {
     'transports/registry.cpp': CARRIERS,
-    'host/sim_carrier.cpp': {'firmware/ports/sim'},
-    'host/sim_carrier.hpp': {'firmware/ports/sim'},
+    'host/standard_registry.cpp': {'firmware/ports/sim'},
 }
 # What a room may not include although it is in a room that it may.
 FORBIDDEN = {room: {'transports/registry.hpp'} for room in CARRIERS}

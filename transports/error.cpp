@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "error.hpp"
+#include "r4link/error.hpp"
 
 namespace r4 {
 

@@ -6,8 +6,8 @@
 #include <chrono>
 #include <cstring>
 
-#include "../protocol/datagram/datagram.hpp"
 #include "operation_slot.hpp"
+#include "r4link/datagram.hpp"
 #include "send_queue.hpp"
 
 namespace r4 {

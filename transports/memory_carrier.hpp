@@ -10,7 +10,7 @@
 #include <string>
 #include <utility>
 
-#include "carrier.hpp"
+#include "r4link/carrier.hpp"
 
 namespace r4 {
 

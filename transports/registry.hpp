@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "carrier.hpp"
+#include "r4link/carrier.hpp"
 #include "url.hpp"
 
 namespace r4 {
@@ -26,7 +26,7 @@ class Registry {
     CarrierFactory make;
   };
 
-  // A registry with the transports of this folder: udp, serial, pty.
+  // A registry with the transports of this folder: udp, serial, pty, can.
   static Registry standard();
 
   void add(Entry entry);

@@ -14,8 +14,8 @@
 #include <string_view>
 #include <vector>
 
-#include "../protocol/datagram/datagram.hpp"
-#include "carrier.hpp"
+#include "r4link/carrier.hpp"
+#include "r4link/datagram.hpp"
 
 namespace r4 {
 

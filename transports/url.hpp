@@ -13,7 +13,7 @@
 #include <string>
 #include <string_view>
 
-#include "error.hpp"
+#include "r4link/error.hpp"
 
 namespace r4 {
 

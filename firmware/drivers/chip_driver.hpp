@@ -16,8 +16,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "../../protocol/messages/chip_fault.hpp"
 #include "i2c_bus.hpp"
+#include "r4link/vocabulary.hpp"
 
 namespace r4 {
 namespace firmware {

@@ -10,9 +10,9 @@
 #include <cstdint>
 #include <cstring>
 
-#include "../../protocol/datagram/datagram.hpp"
 #include "../../transports/framing/line_framing.hpp"
 #include "byte_ring.hpp"
+#include "r4link/datagram.hpp"
 
 namespace r4 {
 namespace firmware {

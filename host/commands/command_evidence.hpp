@@ -2,8 +2,8 @@
 // Does the board's state show that a command took effect? For boards that do not report CMD.
 #pragma once
 
-#include "../../protocol/messages/command.hpp"
-#include "../../protocol/messages/state.hpp"
+#include "r4link/command.hpp"
+#include "r4link/state.hpp"
 
 namespace r4 {
 

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 
+#include "../../protocol/messages/command_field.hpp"
+
 namespace r4 {
 
 namespace {
@@ -159,7 +161,7 @@ Problem bad_command(std::string_view text, Refusal refusal) {
 }
 
 void require_valid(const Command& command) {
-  if (const Refusal refusal = check(command); refusal != Refusal::none) {
+  if (const Refusal refusal = check_command(command); refusal != Refusal::none) {
     throw Error(bad_command(text_of(command), refusal));
   }
   if (command.kind != CommandKind::fields && command.kind != CommandKind::setting) return;

@@ -6,9 +6,9 @@
 #include <string_view>
 
 #include "../../protocol/keys/authentication.hpp"
-#include "../../protocol/messages/command.hpp"
 #include "../../protocol/messages/settings.hpp"
-#include "../../transports/error.hpp"
+#include "r4link/command.hpp"
+#include "r4link/error.hpp"
 
 namespace r4 {
 

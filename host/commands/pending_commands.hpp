@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "../../protocol/messages/command.hpp"
+#include "r4link/command.hpp"
 
 namespace r4 {
 

@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "../../protocol/link/board_link.hpp"
-#include "../../protocol/messages/command.hpp"
+#include "r4link/command.hpp"
 
 namespace r4 {
 

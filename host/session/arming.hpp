@@ -21,32 +21,10 @@
 
 #include <cstdint>
 
-#include "../../protocol/messages/units.hpp"
+#include "r4link/link.hpp"
 
 namespace r4 {
 
-// Must a program be armed to drive?
-enum class Arming : std::uint8_t {
-  required,
-  off,  // output commands go out whenever the link is up
-};
-
-// Why a session is not armed.
-enum class DisarmCause : std::uint8_t {
-  none,       // it is armed
-  not_yet,    // arm() was not called yet
-  stop,       // an emergency stop
-  handle,     // the dead-man's handle was released
-  proximity,  // something came nearer than a threshold
-  watchdog,   // a duty of the board missed its deadline
-  fault,      // the board found a fault in itself
-  link,       // the link was lost, and the board did not bring its outputs back
-  restart,    // the board has begun again
-  supply,     // relay 1, the motor supply, was opened
-};
-
-// "stop", "not yet" …
-const char* to_text(DisarmCause cause);
 // The cause that a reason of the board is; none for `none` and `link`.
 DisarmCause cause_of(SafeReason reason);
 

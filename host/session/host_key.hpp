@@ -11,20 +11,10 @@
 #include <optional>
 
 #include "../../protocol/keys/authentication.hpp"
-#include "../../protocol/messages/units.hpp"
+#include "r4link/link.hpp"
 #include "time.hpp"
 
 namespace r4 {
-
-// What is wrong with keys.
-enum class KeyTrouble : std::uint8_t {
-  none,
-  board_has_none,  // we have a key, and the board asks for no signature
-  needed,          // the board asks for a signature, and we have no key
-  not_taken,       // the board takes nothing that we sign, or does not hear it
-};
-// "none", "board has none", "needed", "not taken".
-const char* to_text(KeyTrouble trouble);
 
 class HostKey {
  public:

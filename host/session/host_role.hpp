@@ -8,6 +8,8 @@
 //              last BUSY         |    v                                     |
 //                                refused <----------------------------------+
 //
+//     (BUSY leads to refused from apart, too)
+//
 //     apart        the link is down; every state falls back to it when the link goes down, refused
 //                  once its time is over
 //     asking       the link is up, and nothing shows yet that the board obeys us
@@ -30,9 +32,9 @@ class HostRoleMachine {
     role_ = HostRole::refused;
     refused_until_ = now + busy_memory;
   }
-  // CMD names a command of ours.
-  void on_own_command() {
-    if (role_ == HostRole::asking) role_ = HostRole::controlling;
+  // CMD names a command of ours; the link is up.
+  void on_own_command(Time now) {
+    if (!refused(now)) role_ = HostRole::controlling;
   }
   // The link, as it is now.
   void on_link(bool up, Time now) {

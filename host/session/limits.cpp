@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <string>
 
-#include "../../transports/error.hpp"
 #include "link_timing.hpp"
+#include "r4link/error.hpp"
 #include "session.hpp"
 
 namespace r4 {

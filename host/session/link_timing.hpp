@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "../../protocol/datagram/text.hpp"
+#include "r4link/text.hpp"
 
 namespace r4 {
 

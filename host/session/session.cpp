@@ -5,11 +5,13 @@
 #include <random>
 
 #include "../../protocol/link/board_link.hpp"
-#include "../../transports/error.hpp"
+#include "../../protocol/messages/command_field.hpp"
+#include "../../protocol/messages/state_fields.hpp"
 #include "../../transports/framing/can/can_ids.hpp"
 #include "../commands/command_evidence.hpp"
 #include "../commands/command_help.hpp"
 #include "limits.hpp"
+#include "r4link/error.hpp"
 
 namespace r4 {
 
@@ -41,7 +43,7 @@ Session::Session(Handler& handler, SessionOptions options, std::uint32_t first_p
 
 void Session::receive(std::string_view bytes, Time now) {
   Datagram datagram;
-  const ReadResult result = read(bytes, datagram);
+  const ReadResult result = read_datagram(bytes, datagram);
   if (!result) {
     ++collector_.counts.damaged;
     handler_.on_bad_datagram(result, bytes);
@@ -215,7 +217,7 @@ void Session::confirm_from_state(Time now) {
   const bool has_cmd = state_.present.has(StateField::cmd);
   if (has_cmd) {
     selection_.on_cmd(now);
-    if (link_up() && is_ours(state_.last_command)) role_.on_own_command();
+    if (link_up() && is_ours(state_.last_command)) role_.on_own_command(now);
   }
   for (Pending& pending : pending_.under_way()) {
     if (!pending.is_out() || pending.kind == CommandKind::stop ||

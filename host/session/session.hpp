@@ -37,77 +37,28 @@
 #include <string>
 #include <string_view>
 
-#include "../../protocol/messages/command.hpp"
 #include "../../protocol/link/host_link.hpp"
 #include "../../protocol/messages/message.hpp"
-#include "../../transports/carrier.hpp"
-#include "../../transports/error.hpp"
+#include "../commands/pending_commands.hpp"
+#include "../commands/posted_commands.hpp"
 #include "arming.hpp"
 #include "field_selection.hpp"
 #include "host_key.hpp"
 #include "host_role.hpp"
 #include "identity_question.hpp"
-#include "../commands/pending_commands.hpp"
-#include "../commands/post_result.hpp"
-#include "../commands/posted_commands.hpp"
-#include "received_state.hpp"
+#include "r4link/carrier.hpp"
+#include "r4link/command.hpp"
+#include "r4link/error.hpp"
+#include "r4link/link.hpp"
+#include "r4link/options.hpp"
 #include "statistics.hpp"
 #include "stop_repetition.hpp"
 #include "time.hpp"
 
 namespace r4 {
 
-// Do our heartbeats and commands go out?
-enum class Gate : std::uint8_t {
-  open,
-  watchdog,  // no: the application watchdog was not fed
-  callback,  // no: a callback of the program does not return
-};
-
-// What the host knows of the link.
-struct LinkStatus {
-  HostLinkState state = HostLinkState::connecting;
-  SafeReason reason = SafeReason::none;  // why the board is safe
-  bool busy = false;                     // another host controls the board
-  Gate gate = Gate::open;
-  KeyTrouble key = KeyTrouble::none;
-  bool in_control = false;      // the board takes our commands: they go out at once
-  bool transport_down = false;  // it is gone: unplugged, its interface switched off
-  ChipFault chip{};             // of a fault: the chip that is the cause, if it is one
-  bool gated() const { return gate != Gate::open; }
-  friend bool operator==(const LinkStatus&, const LinkStatus&) = default;
-};
-
-struct CommandResult {
-  Outcome outcome = Outcome::timed_out;
-  Refusal code = Refusal::none;              // for refused
-  Time elapsed{0};                           // from send() to now
-  DisarmCause disarmed = DisarmCause::none;  // for not_armed
-};
-
 // Names a command that send() took; never 0.
 using Ticket = std::uint64_t;
-
-struct SessionOptions {
-  HostLink::Timing timing;
-  // Must a program call arm() before it drives, and again after whatever made the outputs safe?
-  Arming arming = Arming::required;
-  // The state fields to ask for, as in F; SAFE and CMD, and RELAYS for arming, are added, to these and
-  // to those of any F that is sent. Empty: leave the board's choice, and every F, alone.
-  std::string fields = "DEFAULT";
-  std::chrono::milliseconds command_retry{50};
-  std::chrono::milliseconds stop_retry{20};
-  // For how long a stop is repeated after it was confirmed.
-  std::chrono::milliseconds stop_linger{200};
-  // Q:ID, for identity and round-trip time; 0: never.
-  std::chrono::milliseconds identify_interval{1000};
-  // The board's key. Each host has its own, by its id: of two that share one, the slower is taken for
-  // a replay.
-  std::optional<Key> key;
-  // When the session's clock began, in microseconds since 1970: a host that begins again must go on
-  // counting above what it has used.
-  Time clock_start{0};
-};
 
 class Session {
  public:
@@ -163,8 +114,9 @@ class Session {
   Ticket stop(Time timeout, Time now);
   // Asks who the board is; on_identity() follows. Confirmed by the answer.
   Ticket identify(Time timeout, Time now);
-  // Gives a command up without on_result().
-  void forget(Ticket ticket);
+  // Gives a command up, though it may have been executed: on_result() comes before this returns. A stop
+  // goes on.
+  void cancel(Ticket ticket, Time now);
   // Ends every command under way: the board is closed.
   void end_all(Time now);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "../../protocol/messages/command_field.hpp"
 #include "../commands/command_help.hpp"
 #include "session.hpp"
 
@@ -82,6 +83,7 @@ PostResult Session::post(const Command& command, Time now) {
     return PostResult::not_armed;
   }
   ++collector_.counts.commands;
+  if (command.kind == CommandKind::clear) repetition_.cancel();
   const bool unnamed =
       command.kind == CommandKind::clear && command.value == Command::unnamed_cause;
   switch (
@@ -210,9 +212,11 @@ void Session::finish(Pending& pending, Outcome outcome, Refusal code, Time now) 
   handler_.on_result(ticket, result);
 }
 
-void Session::forget(Ticket ticket) {
+void Session::cancel(Ticket ticket, Time now) {
   for (Pending& pending : pending_.under_way()) {
-    if (pending.ticket == ticket) pending_.remove(pending);
+    if (pending.ticket != ticket || pending.kind == CommandKind::stop) continue;
+    finish(pending, Outcome::cancelled, Refusal::none, now);
+    advance_arming(now);
   }
 }
 

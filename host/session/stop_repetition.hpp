@@ -10,7 +10,7 @@
 #include <cstddef>
 #include <string_view>
 
-#include "../../protocol/datagram/datagram.hpp"
+#include "r4link/datagram.hpp"
 #include "time.hpp"
 
 namespace r4 {

@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The host's time.
+// The host's time (r4::Time) for the machines of protocol/, whose milliseconds wrap.
 #pragma once
 
 #include <chrono>
 #include <cstdint>
 
+#include "r4link/link.hpp"
+
 namespace r4 {
 
-// Time of the host's steady clock; any start.
-using Time = std::chrono::microseconds;
-
-// The same for the machines of protocol/, whose milliseconds wrap.
 inline std::uint32_t to_ms(Time time) {
   return static_cast<std::uint32_t>(
       std::chrono::duration_cast<std::chrono::milliseconds>(time).count());

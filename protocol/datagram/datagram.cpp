@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "datagram.hpp"
+#include "r4link/datagram.hpp"
 
 #include "crc32.hpp"
 #include "grammar.hpp"
@@ -163,7 +163,7 @@ const char* Datagram::read_short_names(const std::uint64_t* short_names) {
   return nullptr;
 }
 
-ReadResult read(Text bytes, Datagram& out) {
+ReadResult read_datagram(Text bytes, Datagram& out) {
   ReadResult result;
   const Text whole = without_line_end(bytes);
   const auto fail = [&](ReadError error, const char* where) {

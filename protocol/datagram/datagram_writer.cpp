@@ -2,9 +2,9 @@
 #include "datagram_writer.hpp"
 
 #include "crc32.hpp"
-#include "datagram.hpp"
 #include "grammar.hpp"
 #include "numbers.hpp"
+#include "r4link/datagram.hpp"
 
 namespace r4 {
 namespace {

@@ -14,7 +14,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "text.hpp"
+#include "r4link/text.hpp"
 
 namespace r4 {
 

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "text.hpp"
+#include "r4link/text.hpp"
 
 namespace r4 {
 

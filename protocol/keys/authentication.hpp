@@ -16,10 +16,10 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "blake2s.hpp"
-#include "../datagram/datagram.hpp"
 #include "../datagram/datagram_writer.hpp"
-#include "key.hpp"
+#include "blake2s.hpp"
+#include "r4link/datagram.hpp"
+#include "r4link/key.hpp"
 
 namespace r4 {
 

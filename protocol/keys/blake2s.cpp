@@ -47,15 +47,15 @@ inline void mix(std::uint32_t& a, std::uint32_t& b, std::uint32_t& c, std::uint3
 
 }  // namespace
 
-Blake2s::Blake2s(std::size_t digest_size, const std::uint8_t* key, std::size_t key_size)
+Blake2s::Blake2s(std::size_t digest_size, const std::uint8_t* key, std::size_t key_bytes)
     : digest_size_(static_cast<std::uint8_t>(digest_size)) {
   for (int i = 0; i < 8; ++i) state_[i] = initial[i];
   // The parameter block: sizes of digest and key, fanout 1, depth 1.
-  state_[0] ^= 0x01010000U ^ static_cast<std::uint32_t>(key_size) << 8 ^
+  state_[0] ^= 0x01010000U ^ static_cast<std::uint32_t>(key_bytes) << 8 ^
                static_cast<std::uint32_t>(digest_size);
-  if (key_size == 0) return;
+  if (key_bytes == 0) return;
   std::memset(block_, 0, sizeof block_);
-  std::memcpy(block_, key, key_size);
+  std::memcpy(block_, key, key_bytes);
   used_ = sizeof block_;
 }
 
@@ -63,9 +63,9 @@ Blake2s::Blake2s(const Blake2sKey& key) : digest_size_(key.digest_size_), count_
   std::memcpy(state_, key.state_, sizeof state_);
 }
 
-Blake2sKey::Blake2sKey(std::size_t digest_size, const std::uint8_t* key, std::size_t key_size)
+Blake2sKey::Blake2sKey(std::size_t digest_size, const std::uint8_t* key, std::size_t key_bytes)
     : digest_size_(static_cast<std::uint8_t>(digest_size)) {
-  Blake2s hash(digest_size, key, key_size);
+  Blake2s hash(digest_size, key, key_bytes);
   hash.compress(false);
   std::memcpy(state_, hash.state_, sizeof state_);
 }

@@ -17,7 +17,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "../datagram/text.hpp"
+#include "r4link/text.hpp"
 
 namespace r4 {
 
@@ -29,8 +29,8 @@ constexpr std::size_t blake2s_block = 64;
 class Blake2sKey {
  public:
   Blake2sKey() = default;
-  // Codes of `digest_size` bytes (1-32) by a key of `key_size` bytes (1-32).
-  Blake2sKey(std::size_t digest_size, const std::uint8_t* key, std::size_t key_size);
+  // Codes of `digest_size` bytes (1-32) by a key of `key_bytes` bytes (1-32).
+  Blake2sKey(std::size_t digest_size, const std::uint8_t* key, std::size_t key_bytes);
 
  private:
   friend class Blake2s;
@@ -40,9 +40,9 @@ class Blake2sKey {
 
 class Blake2s {
  public:
-  // A digest of `digest_size` bytes (1-32), with a key of `key_size` bytes (0-32; 0: no key).
+  // A digest of `digest_size` bytes (1-32), with a key of `key_bytes` bytes (0-32; 0: no key).
   explicit Blake2s(std::size_t digest_size, const std::uint8_t* key = nullptr,
-                   std::size_t key_size = 0);
+                   std::size_t key_bytes = 0);
   // With a key made ready. The message must not be empty.
   explicit Blake2s(const Blake2sKey& key);
 

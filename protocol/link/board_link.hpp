@@ -21,7 +21,7 @@
 #include <cstdint>
 
 #include "packet_tracker.hpp"
-#include "../datagram/refusal.hpp"
+#include "r4link/vocabulary.hpp"
 
 namespace r4 {
 

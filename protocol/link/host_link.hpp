@@ -15,21 +15,13 @@
 #include <cstdint>
 
 #include "packet_tracker.hpp"
-#include "../messages/units.hpp"
+#include "r4link/vocabulary.hpp"
 
 namespace r4 {
 
-enum class HostLinkState : std::uint8_t { connecting, active, safe, lost };
-
-// "connecting", "active", "safe", "lost".
-const char* to_text(HostLinkState state);
-
 class HostLink {
  public:
-  struct Timing {
-    std::uint32_t heartbeat_ms = 100;  // 10 Hz: one lost packet must not be a race with the timeout
-    std::uint32_t timeout_ms = 1000;   // silence of the board until `lost`
-  };
+  using Timing = LinkTiming;
 
   // `first_pnum` must be echo_host_first_pnum (board_link.hpp) plus 30 random bits.
   HostLink(Timing timing, std::uint32_t first_pnum) : timing_(timing), next_pnum_(first_pnum) {}

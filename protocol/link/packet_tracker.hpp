@@ -9,6 +9,8 @@
 
 #include <cstdint>
 
+#include "r4link/vocabulary.hpp"
+
 namespace r4 {
 
 // Is `a` newer than `b`? Half the number space is ahead of any number, half behind.
@@ -31,15 +33,6 @@ constexpr bool is_current(Arrival arrival) {
   return arrival == Arrival::first || arrival == Arrival::next || arrival == Arrival::gap ||
          arrival == Arrival::restart;
 }
-
-struct PacketCounters {
-  std::uint32_t received = 0;  // every call of on()
-  std::uint32_t lost = 0;      // in gaps and not arrived late
-  std::uint32_t duplicate = 0;
-  std::uint32_t late = 0;
-  std::uint32_t old = 0;
-  std::uint32_t restarts = 0;
-};
 
 class PacketTracker {
  public:

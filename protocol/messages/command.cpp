@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "command.hpp"
+#include "r4link/command.hpp"
 
 #include "../datagram/numbers.hpp"
+#include "command_field.hpp"
 
 namespace r4 {
 namespace {
@@ -117,7 +118,7 @@ class Values {
   // The verdict on `command`, made of these values.
   Refusal judge(const Command& command) const {
     if (bad_format_) return Refusal::format;
-    const Refusal refusal = check(command);
+    const Refusal refusal = check_command(command);
     return refusal == Refusal::none && out_of_range_ ? Refusal::range : refusal;
   }
 
@@ -319,7 +320,7 @@ Refusal parse_command(const Field& field, Command& out) {
   return refusal;
 }
 
-Refusal check(const Command& command) {
+Refusal check_command(const Command& command) {
   if (command.kind == CommandKind::fields) {
     return command.text.empty() ? Refusal::format : Refusal::none;
   }

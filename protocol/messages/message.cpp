@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "message.hpp"
 
-#include "command.hpp"
 #include "../datagram/numbers.hpp"
-#include "state.hpp"
+#include "command_field.hpp"
+#include "r4link/command.hpp"
+#include "r4link/state.hpp"
+#include "state_fields.hpp"
 
 namespace r4 {
 namespace {

@@ -5,11 +5,10 @@
 
 #include <cstdint>
 
-#include "../keys/authentication.hpp"
-#include "../datagram/datagram.hpp"
 #include "../datagram/datagram_writer.hpp"
-#include "../datagram/refusal.hpp"
-#include "units.hpp"
+#include "../keys/authentication.hpp"
+#include "r4link/datagram.hpp"
+#include "r4link/vocabulary.hpp"
 
 namespace r4 {
 
@@ -54,14 +53,7 @@ Text heartbeat_nonce(const Datagram& datagram);
 // unless it carries a nonce.
 bool is_connecting_heartbeat(const Datagram& datagram);
 
-// A refusal: which command of ours, and why; and to the host of the session, the number of its first
-// echo (SESSION), so that a host knows whether the board still remembers what it executed. False if the datagram's N field is not of that form.
-struct Nack {
-  std::uint32_t pnum = 0;
-  Refusal code = Refusal::none;
-  bool has_session = false;
-  std::uint32_t session = 0;
-};
+// False if the datagram's N field is not of that form.
 bool read_nack(const Datagram& datagram, Nack& out);
 void write_nack(DatagramWriter& writer, const Nack& nack);
 

@@ -16,9 +16,9 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "../datagram/refusal.hpp"
+#include "r4link/text.hpp"
+#include "r4link/vocabulary.hpp"
 #include "site_settings.hpp"
-#include "../datagram/text.hpp"
 
 namespace r4 {
 

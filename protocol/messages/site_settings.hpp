@@ -28,10 +28,10 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "../keys/key.hpp"
-#include "../datagram/refusal.hpp"
-#include "state.hpp"
-#include "../datagram/text.hpp"
+#include "r4link/key.hpp"
+#include "r4link/state.hpp"
+#include "r4link/text.hpp"
+#include "r4link/vocabulary.hpp"
 
 namespace r4 {
 

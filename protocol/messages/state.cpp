@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "state.hpp"
+#include "r4link/state.hpp"
 
 #include "../datagram/numbers.hpp"
 #include "../datagram/word_index.hpp"
+#include "state_fields.hpp"
 
 namespace r4 {
 namespace {

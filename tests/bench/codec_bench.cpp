@@ -8,9 +8,10 @@
 #include <cstring>
 
 #include "protocol/datagram/crc32.hpp"
-#include "protocol/datagram/datagram.hpp"
 #include "protocol/datagram/datagram_writer.hpp"
-#include "protocol/messages/state.hpp"
+#include "protocol/messages/state_fields.hpp"
+#include "r4link/datagram.hpp"
+#include "r4link/state.hpp"
 #include "tests/bench/measure.hpp"
 
 namespace r4::bench {
@@ -23,7 +24,7 @@ constexpr Text line(
 State state_of_line() {
   Datagram datagram;
   State state;
-  if (!read(line, datagram) || !read_state(datagram, state)) std::abort();
+  if (!read_datagram(line, datagram) || !read_state(datagram, state)) std::abort();
   return state;
 }
 
@@ -54,7 +55,7 @@ BENCHMARK(write_state_datagram);
 void read_datagram(benchmark::State& bench) {
   measure(bench, line.size(), [&] {
     Datagram datagram;
-    if (!read(opaque_line(), datagram)) bench.SkipWithError("refused");
+    if (!read_datagram(opaque_line(), datagram)) bench.SkipWithError("refused");
     benchmark::DoNotOptimize(datagram);
   });
 }
@@ -64,7 +65,7 @@ void read_typed_state(benchmark::State& bench) {
   State state;
   measure(bench, line.size(), [&] {
     Datagram datagram;
-    if (!read(opaque_line(), datagram) || !read_state(datagram, state)) {
+    if (!read_datagram(opaque_line(), datagram) || !read_state(datagram, state)) {
       bench.SkipWithError("refused");
     }
     benchmark::DoNotOptimize(state);

@@ -28,7 +28,7 @@ class KeyHost {
   void listen() {
     for (const test::MemoryPort::Sent& sent : board.ports[at.port].sent) {
       Datagram datagram;
-      if (!read(sent.bytes, datagram) || kind_of(datagram) != MessageKind::board_heartbeat)
+      if (!read_datagram(sent.bytes, datagram) || kind_of(datagram) != MessageKind::board_heartbeat)
         continue;
       nonce = test::str(heartbeat_nonce(datagram));
       t = static_cast<std::uint32_t>(datagram.time_ms());

@@ -296,7 +296,7 @@ TEST_F(ApplicationSafety, HeartbeatsNameTheNewestStop) {
   auto newest = [&] {
     const std::string bytes = board.take(MessageKind::board_heartbeat).back().bytes;
     Datagram datagram;
-    EXPECT_TRUE(read(bytes, datagram));
+    EXPECT_TRUE(read_datagram(bytes, datagram));
     return heartbeat_report(datagram);
   };
   board.receive("E:STOP;PNum:77;T:1;", Source{0, 99});

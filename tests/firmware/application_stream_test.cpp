@@ -215,7 +215,7 @@ TEST(ApplicationStream, MarksStatesAsReplaceableAndTheRestNot) {
   board.run(500);
   for (const test::MemoryPort::Sent& sent : board.ports[0].sent) {
     Datagram datagram;
-    ASSERT_TRUE(read(sent.bytes, datagram));
+    ASSERT_TRUE(read_datagram(sent.bytes, datagram));
     EXPECT_EQ(sent.priority == Priority::state, kind_of(datagram) == MessageKind::state);
   }
 }

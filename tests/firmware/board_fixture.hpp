@@ -12,6 +12,7 @@
 
 #include "firmware/application.hpp"
 #include "protocol/messages/message.hpp"
+#include "protocol/messages/state_fields.hpp"
 #include "tests/support/datagrams.hpp"
 
 namespace r4::test {
@@ -149,7 +150,7 @@ class TestBoard {
       Datagram datagram;
       Heard one;
       one.bytes = sent.bytes;
-      if (!read(sent.bytes, datagram)) throw std::runtime_error("bad: " + sent.bytes);
+      if (!read_datagram(sent.bytes, datagram)) throw std::runtime_error("bad: " + sent.bytes);
       one.kind = kind_of(datagram);
       one.pnum = datagram.pnum();
       one.t_ms = static_cast<std::uint32_t>(datagram.time_ms());
@@ -172,7 +173,8 @@ class TestBoard {
   std::uint32_t newest_t(int port = 0) {
     for (const MemoryPort::Sent& sent : ports[port].sent) {
       Datagram datagram;
-      if (read(sent.bytes, datagram) && kind_of(datagram) == MessageKind::board_heartbeat) {
+      if (read_datagram(sent.bytes, datagram) &&
+          kind_of(datagram) == MessageKind::board_heartbeat) {
         newest_t_[port] = static_cast<std::uint32_t>(datagram.time_ms());
         newest_cause_ = heartbeat_report(datagram).cause;
       }
@@ -206,7 +208,7 @@ class TestBoard {
 inline State state_of(const Heard& heard) {
   Datagram datagram;
   State state;
-  if (!read(heard.bytes, datagram) || !read_state(datagram, state)) {
+  if (!read_datagram(heard.bytes, datagram) || !read_state(datagram, state)) {
     throw std::runtime_error("no state: " + heard.bytes);
   }
   return state;
@@ -280,7 +282,7 @@ struct BoardInControl : testing::Test {
     for (const Heard& heard : board.take(MessageKind::nack, port)) {
       Datagram datagram;
       Nack nack;
-      EXPECT_TRUE(read(heard.bytes, datagram) && read_nack(datagram, nack));
+      EXPECT_TRUE(read_datagram(heard.bytes, datagram) && read_nack(datagram, nack));
       codes.push_back(str(name_of(nack.code)));
     }
     return codes;

@@ -16,8 +16,9 @@
 #include <string>
 
 #include "firmware/application.hpp"
-#include "protocol/keys/authentication.hpp"
 #include "protocol/datagram/crc32.hpp"
+#include "protocol/keys/authentication.hpp"
+#include "protocol/messages/state_fields.hpp"
 
 namespace {
 
@@ -126,7 +127,8 @@ class World final : public firmware::Hal, public firmware::Observer {
   void on_sent(int port, Text bytes, std::uint32_t peer) {
     require(bytes.size() <= ports_[port].limit);
     Datagram datagram;
-    require(static_cast<bool>(read(bytes, datagram)) && datagram.has_pnum() && datagram.has_time());
+    require(static_cast<bool>(read_datagram(bytes, datagram)) && datagram.has_pnum() &&
+            datagram.has_time());
     const MessageKind kind = kind_of(datagram);
     State state;
     if (kind == MessageKind::state) require(read_state(datagram, state));
@@ -180,7 +182,7 @@ class World final : public firmware::Hal, public firmware::Observer {
 
   void receive(Source from, const std::string& bytes) {
     Datagram datagram;
-    const bool valid = static_cast<bool>(read(Text(bytes), datagram));
+    const bool valid = static_cast<bool>(read_datagram(Text(bytes), datagram));
     const MessageKind kind = valid ? kind_of(datagram) : MessageKind::state;
     if (kind == MessageKind::host_heartbeat && signed_) {
       heard_any_ = true;

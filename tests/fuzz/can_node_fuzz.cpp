@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "protocol/datagram/datagram.hpp"
 #include "protocol/datagram/datagram_writer.hpp"
 #include "protocol/messages/message.hpp"
+#include "r4link/datagram.hpp"
 #include "tests/fuzz/input.hpp"
 #include "transports/can/can_survey.hpp"
 #include "transports/framing/can/can_node.hpp"
@@ -147,7 +147,7 @@ class Listener {
   Listener() {
     survey_.on_datagram([this](std::uint8_t node, const Datagram& datagram) {
       Datagram again;
-      require(node < can_nodes && read(datagram.bytes(), again));
+      require(node < can_nodes && read_datagram(datagram.bytes(), again));
       require(again.has_pnum() && again.has_time());
       ++datagrams_;
     });

@@ -6,14 +6,16 @@
 #include <string>
 #include <vector>
 
-#include "protocol/messages/command.hpp"
 #include "protocol/datagram/crc32.hpp"
-#include "protocol/datagram/datagram.hpp"
 #include "protocol/datagram/datagram_writer.hpp"
-#include "protocol/messages/message.hpp"
 #include "protocol/datagram/numbers.hpp"
+#include "protocol/messages/command_field.hpp"
+#include "protocol/messages/message.hpp"
 #include "protocol/messages/settings.hpp"
-#include "protocol/messages/state.hpp"
+#include "protocol/messages/state_fields.hpp"
+#include "r4link/command.hpp"
+#include "r4link/datagram.hpp"
+#include "r4link/state.hpp"
 
 namespace r4 {
 namespace {
@@ -57,7 +59,7 @@ void fields_read_equal(const Datagram& datagram) {
   const Text again = writer.finish();
   require(!again.empty());
   Datagram second;
-  require(static_cast<bool>(read(again, second)));
+  require(static_cast<bool>(read_datagram(again, second)));
   require(second.has_pnum() == datagram.has_pnum() && second.pnum() == datagram.pnum());
   require(second.has_time() == datagram.has_time() && second.time_ms() == datagram.time_ms());
   for (auto a = datagram.begin(), b = second.begin(); a != datagram.end(); ++a, ++b) {
@@ -86,7 +88,7 @@ void state_reads_equal(const Datagram& datagram) {
   bytes += "0x" + std::string(hex, hex_end) + '^';
   if (bytes.size() > max_datagram) return;
   Datagram second;
-  require(static_cast<bool>(read(bytes, second)));
+  require(static_cast<bool>(read_datagram(bytes, second)));
   State back;
   require(read_state(second, back));
   require(back.present == state.present && fields_of(back) == fields);
@@ -101,7 +103,7 @@ void command_reads_equal(const Field& field) {
   const Refusal refusal = parse_command(field, command);
   require(refusal_from(name_of(refusal)) == refusal);
   if (refusal != Refusal::none) return;
-  require(check(command) == Refusal::none);
+  require(check_command(command) == Refusal::none);
   const std::string text = text_of(command);
   Command again;
   require(parse_command(field_of(text), again) == Refusal::none);
@@ -143,7 +145,7 @@ void messages_read_equal(const Datagram& datagram) {
 
 void try_bytes(const std::string& bytes) {
   Datagram datagram;
-  const ReadResult result = read(bytes, datagram);
+  const ReadResult result = read_datagram(bytes, datagram);
   if (!result) {
     require(result.position <= bytes.size());
     return;

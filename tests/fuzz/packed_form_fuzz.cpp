@@ -8,8 +8,8 @@
 #include <string>
 
 #include "protocol/datagram/crc32.hpp"
-#include "protocol/datagram/datagram.hpp"
 #include "protocol/datagram/numbers.hpp"
+#include "r4link/datagram.hpp"
 #include "transports/framing/can/packed_form.hpp"
 
 namespace r4 {
@@ -38,7 +38,7 @@ void unpacks_safely(const std::uint8_t* data, std::size_t size) {
   require(static_cast<bool>(result) == (result.size != 0) && result.size <= sizeof out);
   if (!result) return;
   Datagram datagram;
-  const ReadResult read_result = read(Text(out, result.size), datagram);
+  const ReadResult read_result = read_datagram(Text(out, result.size), datagram);
   require(read_result.error != ReadError::length);
   comes_back(Text(out, result.size));
 }
@@ -50,7 +50,7 @@ void fields_come_back(const std::uint8_t* data, std::size_t size) {
   const char* const end = write_hex(hex, crc32(text));
   text += "0x" + std::string(hex, static_cast<std::size_t>(end - hex)) + '^';
   Datagram datagram;
-  if (read(text, datagram)) comes_back(text);
+  if (read_datagram(text, datagram)) comes_back(text);
 }
 
 }  // namespace

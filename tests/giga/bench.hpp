@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "fake_giga.hpp"
-#include "firmware/ports/giga/system.hpp"
 #include "firmware/ports/giga/chip/timers.hpp"
+#include "firmware/ports/giga/system.hpp"
 #include "tests/support/datagrams.hpp"
 #include "transports/framing/can/can_node.hpp"
 

@@ -74,7 +74,7 @@ TEST(GigaUsb, AHostThatStopsReadingNeverHoldsTheLoop) {
   // What had begun ends first; behind it there is nothing from before.
   Datagram datagram;
   const std::string& second = lines[2];
-  ASSERT_TRUE(read(Text(second.data(), second.size()), datagram)) << second;
+  ASSERT_TRUE(read_datagram(Text(second.data(), second.size()), datagram)) << second;
   EXPECT_LT(giga::BoardClock::now_ms() - static_cast<std::uint32_t>(datagram.time_ms()), 100U);
 }
 
@@ -148,7 +148,7 @@ TEST(GigaUsb, AProgramThatOpensThePortHearsThePresentFromItsFirstLineOn) {
   const std::vector<std::string> lines = bench.usb_lines();
   ASSERT_FALSE(lines.empty());
   Datagram datagram;
-  ASSERT_TRUE(read(Text(lines[0].data(), lines[0].size()), datagram)) << lines[0];
+  ASSERT_TRUE(read_datagram(Text(lines[0].data(), lines[0].size()), datagram)) << lines[0];
   EXPECT_LE(giga::BoardClock::now_ms() - static_cast<std::uint32_t>(datagram.time_ms()), 600U);
 }
 

@@ -15,7 +15,6 @@
 namespace r4::test {
 namespace {
 
-
 std::uint32_t now_ms = 0;
 std::uint32_t clock_ms() { return now_ms; }
 

@@ -5,7 +5,7 @@
 #include <asio/io_context.hpp>
 #include <stdexcept>
 
-#include "host/async_board.hpp"
+#include "r4link/async_board.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
 

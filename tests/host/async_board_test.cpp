@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4::AsyncBoard on one event loop with the simulated board.
-#include "host/async_board.hpp"
+#include "r4link/async_board.hpp"
 
 #include <gtest/gtest.h>
 
@@ -219,7 +219,9 @@ TEST_F(AsyncBoardTest, CloseCancelsAndNoCallbackFollows) {
   EXPECT_TRUE(outcomes.empty()) << "handlers run on the loop";
   io.restart();
   io.run();  // ends: nothing is left
-  EXPECT_EQ(outcomes, std::vector<Outcome>(4, Outcome::closed));
+  const std::vector<Outcome> expected{Outcome::cancelled, Outcome::closed, Outcome::closed,
+                                      Outcome::closed};
+  EXPECT_EQ(outcomes, expected) << "the stop cancelled the first";
   EXPECT_THROW(board.open(), Error) << "once only";
 }
 

@@ -6,10 +6,10 @@
 #include <future>
 #include <thread>
 
-#include "host/board.hpp"
+#include "r4link/board.hpp"
+#include "r4link/error.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
-#include "transports/error.hpp"
 
 namespace r4::test {
 namespace {

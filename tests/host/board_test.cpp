@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4::Board opposite simulated boards in real time: in process, over UDP and over a pty.
-#include "host/board.hpp"
+#include "r4link/board.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,12 +9,12 @@
 #include <thread>
 
 #include "host/commands/command_help.hpp"
+#include "r4link/error.hpp"
 #include "tests/bench/allocations.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
 #include "tests/support/every_channel.hpp"
 #include "tests/support/problems.hpp"
-#include "transports/error.hpp"
 
 namespace r4::test {
 namespace {
@@ -417,11 +417,12 @@ TEST(Board, LetsACallbackEndItself) {
   const auto payload = std::make_shared<int>(42);
   Subscription subscription;
   std::promise<void> subscribed;
-  subscription = board.on_state([&, payload, ready = subscribed.get_future().share()](const State&) {
-    ready.wait();
-    subscription.cancel();
-    told.set_value(*payload);  // of the function that was ended
-  });
+  subscription =
+      board.on_state([&, payload, ready = subscribed.get_future().share()](const State&) {
+        ready.wait();
+        subscription.cancel();
+        told.set_value(*payload);  // of the function that was ended
+      });
   subscribed.set_value();
   auto future = told.get_future();
   ASSERT_EQ(future.wait_for(5s), std::future_status::ready);

@@ -15,7 +15,7 @@
 #include <thread>
 #include <vector>
 
-#include "host/board.hpp"
+#include "r4link/board.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
 #include "tests/support/held_carrier.hpp"

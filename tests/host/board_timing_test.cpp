@@ -5,8 +5,8 @@
 #include <asio/io_context.hpp>
 #include <optional>
 
-#include "host/async_board.hpp"
-#include "host/board.hpp"
+#include "r4link/async_board.hpp"
+#include "r4link/board.hpp"
 #include "tests/support/board_in_a_thread.hpp"
 #include "tests/support/problems.hpp"
 
@@ -78,18 +78,18 @@ TEST(AsyncBoardActive, EndsAtItsDeadlineOrWithTheBoard) {
   AsyncBoard board(io, "udp://127.0.0.1:9?listen=0");
   board.open();
   std::optional<CommandResult> timed_out;
-  std::optional<CommandResult> cancelled;
+  std::optional<CommandResult> closed;
   const auto begin = std::chrono::steady_clock::now();
-  board.async_wait_active(5s, [&](const CommandResult& result) { cancelled = result; });
+  board.async_wait_active(5s, [&](const CommandResult& result) { closed = result; });
   board.async_wait_active(20ms, [&](const CommandResult& result) {
     timed_out = result;
     board.close();
   });
   io.run();
   EXPECT_LT(std::chrono::steady_clock::now() - begin, 4s);
-  ASSERT_TRUE(timed_out && cancelled);
+  ASSERT_TRUE(timed_out && closed);
   EXPECT_EQ(timed_out->outcome, Outcome::timed_out);
-  EXPECT_EQ(cancelled->outcome, Outcome::cancelled);
+  EXPECT_EQ(closed->outcome, Outcome::closed);
 }
 
 TEST(BoardStop, OfASilentBoardSaysToCutThePowerAndNothingOfTheWatchdog) {

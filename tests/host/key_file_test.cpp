@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A program reads its key from a file that is for its owner alone.
-#include "host/key_file.hpp"
-
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -9,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "r4link/options.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::test {

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What happens around a simulated board while a program drives it, told by the program's own test.
-#include "firmware/ports/sim/simulated_robot.hpp"
-
 #include <gtest/gtest.h>
 
 #include <functional>
 #include <optional>
 #include <string>
 
-#include "host/board.hpp"
-#include "transports/error.hpp"
+#include "r4link/board.hpp"
+#include "r4link/error.hpp"
+#include "r4link/simulation.hpp"
 
 namespace r4 {
 namespace {

@@ -5,6 +5,7 @@
 #include <new>
 
 #include "protocol/messages/message.hpp"
+#include "protocol/messages/state_fields.hpp"
 
 namespace r4 {
 namespace m7 {
@@ -78,7 +79,7 @@ void Listener::hear() {
 
 void Listener::on_datagram(Text bytes) {
   Datagram datagram;
-  if (!read(bytes, datagram)) {
+  if (!read_datagram(bytes, datagram)) {
     ++bad_;
     return;
   }

@@ -10,8 +10,9 @@
 
 #include "firmware/ports/m7/board_program.hpp"
 #include "on_target.hpp"
-#include "protocol/messages/command.hpp"
 #include "protocol/datagram/datagram_writer.hpp"
+#include "protocol/messages/command_field.hpp"
+#include "r4link/command.hpp"
 
 namespace r4 {
 namespace m7 {

@@ -2,14 +2,15 @@
 // What compiler, C library and byte order could make differ on the board: checksums, signatures,
 // numbers, lines, the packed form.
 #include "on_target.hpp"
-#include "protocol/keys/authentication.hpp"
 #include "protocol/datagram/crc32.hpp"
-#include "protocol/datagram/datagram.hpp"
 #include "protocol/datagram/datagram_writer.hpp"
 #include "protocol/datagram/numbers.hpp"
-#include "protocol/messages/state.hpp"
-#include "transports/framing/line_framing.hpp"
+#include "protocol/keys/authentication.hpp"
+#include "protocol/messages/state_fields.hpp"
+#include "r4link/datagram.hpp"
+#include "r4link/state.hpp"
 #include "transports/framing/can/packed_form.hpp"
+#include "transports/framing/line_framing.hpp"
 
 namespace {
 
@@ -77,7 +78,7 @@ TEST(StateDatagram, IsThatOfTheCapture) {
   EXPECT(datagram.substr(0, sizeof captured - 1) == Text(captured));
   Datagram seen;
   State state;
-  EXPECT(read(datagram, seen));
+  EXPECT(read_datagram(datagram, seen));
   EXPECT(read_state(seen, state) && state.analog_cv[0] == 2428 && state.handle_held);
   EXPECT(state.pnum == 22 && state.t_ms == 79146);
 }
@@ -89,11 +90,11 @@ TEST(StateDatagram, IsRefusedWithOneBitWrong) {
   std::uint32_t accepted = 0;
   for (std::size_t i = 0; i < datagram.size(); ++i) {
     buffer[i] = static_cast<char>(buffer[i] ^ 1);
-    if (read(datagram, seen)) ++accepted;
+    if (read_datagram(datagram, seen)) ++accepted;
     buffer[i] = static_cast<char>(buffer[i] ^ 1);
   }
   EXPECT(accepted == 0);
-  EXPECT(read(datagram, seen));
+  EXPECT(read_datagram(datagram, seen));
 }
 
 TEST(LineFraming, FindsLinesInAnyCut) {

@@ -9,9 +9,10 @@
 #include "firmware/ports/sim/robot/board_model.hpp"
 #include "on_target.hpp"
 #include "protocol/datagram/crc32.hpp"
-#include "protocol/datagram/datagram.hpp"
 #include "protocol/datagram/datagram_writer.hpp"
-#include "protocol/messages/state.hpp"
+#include "protocol/messages/state_fields.hpp"
+#include "r4link/datagram.hpp"
+#include "r4link/state.hpp"
 #include "transports/framing/can/isotp_sender.hpp"
 #include "transports/framing/can/packed_form.hpp"
 
@@ -201,7 +202,7 @@ int main() {
 
   Datagram seen;
   on_target::say_number("that state, read and checked",
-                        instructions_of([&] { read(datagram, seen); }));
+                        instructions_of([&] { read_datagram(datagram, seen); }));
 
   static Hal hal;
   const std::uint32_t command = command_instructions(hal, 1000, 79146);

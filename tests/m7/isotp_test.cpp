@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // ISO-TP on the board: what one end cuts the other joins.
 #include "on_target.hpp"
-#include "protocol/datagram/datagram.hpp"
+#include "r4link/datagram.hpp"
 #include "transports/framing/can/isotp_receiver.hpp"
 #include "transports/framing/can/isotp_sender.hpp"
 

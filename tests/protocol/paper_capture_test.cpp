@@ -4,11 +4,13 @@
 
 #include <string>
 
-#include "protocol/messages/command.hpp"
-#include "protocol/datagram/datagram.hpp"
 #include "protocol/datagram/datagram_writer.hpp"
+#include "protocol/messages/command_field.hpp"
 #include "protocol/messages/message.hpp"
-#include "protocol/messages/state.hpp"
+#include "protocol/messages/state_fields.hpp"
+#include "r4link/command.hpp"
+#include "r4link/datagram.hpp"
+#include "r4link/state.hpp"
 #include "tests/support/datagrams.hpp"
 
 namespace r4 {
@@ -75,7 +77,7 @@ TEST(PaperCapture, EveryDatagramIsReadAndWrittenAgainByteForByte) {
   int good = 0;
   for (const CapturedLine& line : paper_capture()) {
     Datagram datagram;
-    if (!read(line.bytes, datagram)) continue;
+    if (!read_datagram(line.bytes, datagram)) continue;
     ++good;
     EXPECT_EQ(written_again(line, datagram), line.bytes);
   }
@@ -87,7 +89,7 @@ TEST(PaperCapture, TheTwoDamagedInPrintFailByTheirChecksum) {
   std::size_t next = 0;
   for (const CapturedLine& line : paper_capture()) {
     Datagram datagram;
-    const ReadResult result = read(line.bytes, datagram);
+    const ReadResult result = read_datagram(line.bytes, datagram);
     if (result) continue;
     ASSERT_LT(next, std::size(damaged_in_print));
     const Damaged& damaged = damaged_in_print[next++];
@@ -103,7 +105,7 @@ TEST(PaperCapture, TheTwoDamagedInPrintFailByTheirChecksum) {
 TEST(PaperCapture, TheFirstStateHasTheValuesOfThePrint) {
   const std::string bytes = test::captured_state();
   Datagram datagram;
-  ASSERT_TRUE(read(bytes, datagram));
+  ASSERT_TRUE(read_datagram(bytes, datagram));
   State state;
   ASSERT_TRUE(read_state(datagram, state));
   EXPECT_EQ(state.pnum, 7434U);

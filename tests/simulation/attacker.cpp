@@ -3,8 +3,9 @@
 
 #include <fmt/format.h>
 
-#include "protocol/messages/command.hpp"
+#include "protocol/messages/command_field.hpp"
 #include "protocol/messages/message.hpp"
+#include "r4link/command.hpp"
 #include "tests/support/datagrams.hpp"
 #include "tests/support/signing.hpp"
 
@@ -48,14 +49,14 @@ const char* to_text(Attack::Kind kind) {
 // Stops and questions are obeyed from anyone.
 void Attacker::keep(std::vector<Heard>& list, int host, std::string_view bytes) {
   Datagram datagram;
-  if (!read(Text(bytes), datagram) || asks_to_stop(datagram)) return;
+  if (!read_datagram(Text(bytes), datagram) || asks_to_stop(datagram)) return;
   if (datagram.command().name() == Text("Q") || list.size() == memory) return;
   list.push_back({std::string(bytes), host});
 }
 
 void Attacker::on_board(std::string_view bytes) {
   Datagram datagram;
-  if (!read(Text(bytes), datagram)) return;
+  if (!read_datagram(Text(bytes), datagram)) return;
   board_t_ = static_cast<std::uint32_t>(datagram.time_ms());
   if (kind_of(datagram) != MessageKind::board_heartbeat) return;
   nonce_ = test::str(heartbeat_nonce(datagram));
@@ -65,7 +66,7 @@ void Attacker::on_board(std::string_view bytes) {
 // Numbered as the next of that host's.
 std::string Attacker::own(const std::string& field, const Heard& like, Random& random) const {
   Datagram datagram;
-  read(Text(like.bytes), datagram);
+  read_datagram(Text(like.bytes), datagram);
   const auto ahead = static_cast<std::uint32_t>(random.between(1, 3));
   return fmt::format("{};PNum:{};T:{};", field, datagram.pnum() + ahead, echo_);
 }

@@ -13,6 +13,7 @@
 #include "firmware/application.hpp"
 #include "firmware/ports/sim/simulated_hardware.hpp"
 #include "protocol/messages/message.hpp"
+#include "protocol/messages/state_fields.hpp"
 #include "random.hpp"
 
 namespace r4::simulation {
@@ -270,7 +271,7 @@ class Day final : private firmware::Port {
 
   void send(Text bytes, Priority, std::uint32_t) override {
     Datagram datagram;
-    ASSERT_TRUE(read(bytes, datagram));
+    ASSERT_TRUE(read_datagram(bytes, datagram));
     const MessageKind kind = kind_of(datagram);
     if (kind == MessageKind::board_heartbeat) {
       heard_t_ = static_cast<std::uint32_t>(datagram.time_ms());

@@ -171,7 +171,7 @@ class StoppingHost {
     }
     void hear(Text bytes) {
       Datagram datagram;
-      if (bytes.empty() || !read(bytes, datagram)) return;
+      if (bytes.empty() || !read_datagram(bytes, datagram)) return;
       if (kind_of(datagram) != MessageKind::board_heartbeat) return;
       board_t = datagram.time_ms();
       cause = heartbeat_report(datagram).cause;

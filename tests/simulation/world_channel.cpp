@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "protocol/messages/command_field.hpp"
 #include "world_host.hpp"
 
 namespace r4::simulation {
@@ -22,7 +23,7 @@ void World::transfer(bool to_board, int host, std::uint32_t peer, std::string_vi
   bool heartbeat = false;
   std::uint32_t pnum = 0;
   int command = -1;
-  if (to_board && read(Text(bytes), datagram)) {
+  if (to_board && read_datagram(Text(bytes), datagram)) {
     heartbeat = kind_of(datagram) == MessageKind::host_heartbeat;
     pnum = datagram.pnum();
     if (asks_to_stop(datagram)) hosts_[static_cast<std::size_t>(host)]->stop_pnum = pnum;
@@ -80,7 +81,7 @@ void World::transfer(bool to_board, int host, std::uint32_t peer, std::string_vi
       // Still intact if only the case of a checksum digit changed: the content is as it was sent.
       Datagram changed;
       const std::size_t content = bytes.find('^');
-      packet.intact = read(Text(packet.bytes), changed) &&
+      packet.intact = read_datagram(Text(packet.bytes), changed) &&
                       packet.bytes.compare(0, content + 1, bytes, 0, content + 1) == 0;
     }
     std::uint64_t delay = faults.delay_us + random_.below(faults.jitter_us + 1);

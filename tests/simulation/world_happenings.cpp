@@ -120,7 +120,7 @@ void World::attack() {
   board_->receive(0, address, Text(attack.bytes), board_ms());
   attacking_ = false;
   Datagram datagram;
-  if (attack.kind != Attack::Kind::stop && read(Text(attack.bytes), datagram) &&
+  if (attack.kind != Attack::Kind::stop && read_datagram(Text(attack.bytes), datagram) &&
       report_.rejected == rejected) {
     violate(fmt::format("forged: a {} was taken for signed", to_text(attack.kind)));
   }

@@ -2,7 +2,7 @@
 // Options of a board that is driven without being armed first, for tests of something else.
 #pragma once
 
-#include "host/board_options.hpp"
+#include "r4link/options.hpp"
 
 namespace r4::test {
 

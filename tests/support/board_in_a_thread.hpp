@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "firmware/ports/sim/simulated_board.hpp"
-#include "host/board.hpp"
+#include "r4link/board.hpp"
 
 namespace r4::test {
 

@@ -9,8 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "protocol/datagram/datagram.hpp"
 #include "protocol/messages/message.hpp"
+#include "protocol/messages/state_fields.hpp"
+#include "r4link/datagram.hpp"
 #include "transports/framing/can/can_ids.hpp"
 #include "transports/framing/can/isotp_receiver.hpp"
 #include "transports/framing/can/isotp_sender.hpp"

@@ -6,7 +6,7 @@
 
 #include <cstdint>
 
-#include "protocol/messages/state.hpp"
+#include "r4link/state.hpp"
 #include "tests/support/can_bus_model.hpp"
 
 namespace r4::test {

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "protocol/datagram/text.hpp"
+#include "r4link/text.hpp"
 
 namespace r4::test {
 

@@ -8,8 +8,8 @@
 
 #include "board_in_a_thread.hpp"
 #include "firmware/ports/sim/simulated_board.hpp"
-#include "host/board.hpp"
-#include "protocol/messages/state.hpp"
+#include "r4link/board.hpp"
+#include "r4link/state.hpp"
 
 namespace r4::test {
 

@@ -8,9 +8,9 @@
 #include <mutex>
 #include <string>
 
-#include "host/async_board.hpp"
-#include "host/board.hpp"
-#include "transports/registry.hpp"
+#include "host/standard_registry.hpp"
+#include "r4link/async_board.hpp"
+#include "r4link/board.hpp"
 
 namespace r4::test {
 
@@ -18,8 +18,9 @@ class Hold {
  public:
   // A transport by that URL.
   CarrierMaker at(const std::string& url) {
-    return [turn = turn_, url](asio::io_context& loop) {
-      return std::make_unique<Held>(standard_registry().make(loop, url, Role::host), turn);
+    return [turn = turn_, url](Loop& loop) {
+      return std::make_unique<Held>(standard_registry().make(context_of(loop), url, Role::host),
+                                    turn);
     };
   }
   // Holds the loop up when it sends next.

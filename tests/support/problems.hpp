@@ -6,7 +6,7 @@
 
 #include <string>
 
-#include "transports/error.hpp"
+#include "r4link/error.hpp"
 
 namespace r4::test {
 

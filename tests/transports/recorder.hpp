@@ -14,7 +14,7 @@
 #include <string_view>
 #include <vector>
 
-#include "transports/carrier.hpp"
+#include "r4link/carrier.hpp"
 #include "transports/registry.hpp"
 
 namespace r4::test {

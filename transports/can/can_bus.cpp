@@ -12,8 +12,8 @@
 #include <map>
 #include <utility>
 
-#include "can_interface.hpp"
 #include "../framing/can/can_ids.hpp"
+#include "can_interface.hpp"
 
 namespace r4 {
 namespace {

@@ -22,10 +22,10 @@
 #include <vector>
 
 #include "../adaptive_polling.hpp"
-#include "can_socket.hpp"
-#include "../carrier.hpp"
 #include "../operation_slot.hpp"
 #include "../writable_wait.hpp"
+#include "can_socket.hpp"
+#include "r4link/carrier.hpp"
 
 namespace r4 {
 

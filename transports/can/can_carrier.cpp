@@ -12,13 +12,14 @@
 #include <utility>
 #include <vector>
 
-#include "../../protocol/messages/command.hpp"
-#include "can_bus.hpp"
-#include "can_interface.hpp"
-#include "can_turn.hpp"
+#include "../../protocol/messages/command_field.hpp"
 #include "../framing/can/can_node.hpp"
 #include "../operation_slot.hpp"
 #include "../send_queue.hpp"
+#include "can_bus.hpp"
+#include "can_interface.hpp"
+#include "can_turn.hpp"
+#include "r4link/command.hpp"
 
 namespace r4 {
 namespace {
@@ -188,7 +189,8 @@ SendResult CanCarrier::send_stop(std::string_view bytes) {
   frame.id = emergency_stop_id;
   Datagram stop;
   std::uint32_t number = 0;
-  const bool numbered = read(Text(bytes.data(), bytes.size()), stop) && stop_number(stop, number);
+  const bool numbered =
+      read_datagram(Text(bytes.data(), bytes.size()), stop) && stop_number(stop, number);
   SendResult bare = SendResult::sent;
   if (!numbered || announced_stop_ != number) {
     bare = bus_->send_stop(frame);

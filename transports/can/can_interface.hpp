@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "../error.hpp"
 #include "../url.hpp"
+#include "r4link/error.hpp"
 
 namespace r4 {
 

@@ -10,7 +10,7 @@
 
 #include "can_bus.hpp"
 #include "can_survey.hpp"
-#include "../carrier.hpp"
+#include "r4link/carrier.hpp"
 
 namespace r4 {
 

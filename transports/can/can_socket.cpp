@@ -16,9 +16,9 @@
 #include <ctime>
 #include <utility>
 
-#include "can_interface.hpp"
-#include "../error.hpp"
 #include "../framing/can/can_ids.hpp"
+#include "can_interface.hpp"
+#include "r4link/error.hpp"
 
 namespace r4 {
 namespace {

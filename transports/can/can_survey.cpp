@@ -86,7 +86,7 @@ void CanSurvey::receive(std::uint8_t node, const CanFrame& frame, CanIdKind kind
 void CanSurvey::take(std::uint8_t node, Text bytes, std::uint32_t at_us) {
   HeardBoard& board = boards_[node];
   Datagram datagram;
-  if (!read(bytes, datagram) || !datagram.has_pnum() || !datagram.has_time()) {
+  if (!read_datagram(bytes, datagram) || !datagram.has_pnum() || !datagram.has_time()) {
     ++board.damaged;
     return;
   }

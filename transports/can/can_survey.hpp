@@ -3,7 +3,7 @@
 // is ever sent, so it may be used beside hosts that drive.
 //
 //     CanSurvey survey({1000000, 0});
-//     survey.on_datagram([](std::uint8_t node, Text datagram) { … });
+//     survey.on_datagram([](std::uint8_t node, const Datagram& datagram) { … });
 //     survey.on_frame(frame, at_us);         // every frame of the bus, see CanListener
 //     survey.board(3).states; survey.traffic(); survey.busy_ns();
 //
@@ -16,12 +16,12 @@
 #include <map>
 #include <memory>
 
-#include "../../protocol/datagram/datagram.hpp"
 #include "../../protocol/link/packet_tracker.hpp"
-#include "../../protocol/messages/units.hpp"
 #include "../framing/can/can_bits.hpp"
 #include "../framing/can/can_frame.hpp"
 #include "../framing/can/can_ids.hpp"
+#include "r4link/datagram.hpp"
+#include "r4link/vocabulary.hpp"
 
 namespace r4 {
 

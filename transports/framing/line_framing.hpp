@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "../../protocol/datagram/datagram.hpp"
+#include "r4link/datagram.hpp"
 
 namespace r4 {
 

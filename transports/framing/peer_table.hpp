@@ -10,7 +10,7 @@
 
 #include <cstdint>
 
-#include "../../protocol/datagram/datagram.hpp"
+#include "r4link/datagram.hpp"
 
 namespace r4 {
 
@@ -23,7 +23,7 @@ class PeerTable {
   // The number of whoever has just sent `bytes`; nobody if they are no valid datagram.
   std::uint32_t heard(const Address& from, Text bytes) {
     Datagram datagram;
-    return read(bytes, datagram) ? heard(from) : nobody;
+    return read_datagram(bytes, datagram) ? heard(from) : nobody;
   }
   // The same of a datagram that is known to be valid.
   std::uint32_t heard(const Address& from) {

@@ -12,12 +12,12 @@
 #include <cstddef>
 #include <string_view>
 
-#include "../carrier.hpp"
 #include "../file_descriptor.hpp"
 #include "../framing/line_framing.hpp"
 #include "../operation_slot.hpp"
 #include "../send_queue.hpp"
 #include "../writable_wait.hpp"
+#include "r4link/carrier.hpp"
 
 namespace r4 {
 

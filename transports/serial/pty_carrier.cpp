@@ -17,9 +17,9 @@
 #include <utility>
 
 #include "../file_descriptor.hpp"
-#include "line_stream.hpp"
 #include "../operation_slot.hpp"
 #include "../unread_marks.hpp"
+#include "line_stream.hpp"
 
 namespace r4 {
 namespace {

@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "line_stream.hpp"
 #include "../operation_slot.hpp"
+#include "line_stream.hpp"
 #include "port_list.hpp"
 #include "serial_device.hpp"
 

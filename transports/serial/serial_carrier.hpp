@@ -13,8 +13,8 @@
 #include <asio/io_context.hpp>
 #include <memory>
 
-#include "../carrier.hpp"
 #include "../url.hpp"
+#include "r4link/carrier.hpp"
 
 namespace r4 {
 

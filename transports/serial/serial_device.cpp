@@ -15,8 +15,8 @@
 #include <filesystem>
 #include <memory>
 
-#include "../error.hpp"
 #include "port_list.hpp"
+#include "r4link/error.hpp"
 
 namespace r4 {
 namespace {

@@ -13,7 +13,7 @@
 #include <thread>
 #include <utility>
 
-#include "../error.hpp"
+#include "r4link/error.hpp"
 
 namespace r4 {
 namespace {

@@ -23,9 +23,9 @@
 #include <asio/io_context.hpp>
 #include <memory>
 
-#include "../carrier.hpp"
-#include "host_lookup.hpp"
 #include "../url.hpp"
+#include "host_lookup.hpp"
+#include "r4link/carrier.hpp"
 
 namespace r4 {
 

@@ -10,11 +10,11 @@
 #include <string>
 #include <string_view>
 
-#include "../../protocol/datagram/datagram.hpp"
-#include "../carrier.hpp"
 #include "../operation_slot.hpp"
 #include "../send_queue.hpp"
 #include "../writable_wait.hpp"
+#include "r4link/carrier.hpp"
+#include "r4link/datagram.hpp"
 #include "udp_host_socket.hpp"
 #include "udp_url.hpp"
 

@@ -105,7 +105,7 @@ void UdpHost::received(std::string_view bytes) {
   }
   if (watch_.listens()) {
     Datagram datagram;
-    if (read(bytes, datagram)) watch_.heard();
+    if (read_datagram(bytes, datagram)) watch_.heard();
   }
   hand_over(bytes, everyone);
 }

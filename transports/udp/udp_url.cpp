@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "udp_url.hpp"
 
-#include "../error.hpp"
+#include "r4link/error.hpp"
 
 namespace r4 {
 

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <string>
 
-#include "../carrier.hpp"
 #include "../url.hpp"
+#include "r4link/carrier.hpp"
 
 namespace r4 {
 

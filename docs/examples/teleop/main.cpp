@@ -107,7 +107,7 @@ void stop(r4::Board& board) {
 }
 
 void teleoperate(r4::Board& board, Keyboard& keyboard) {
-  // Called on the board's own thread: it must be quick and must not wait for the board.
+  // Called on a thread of its own.
   board.on_refused([](const r4::RefusedPost& refused) {
     std::printf("refused by the board or on the way: OSMC %d\n", refused.command.channel);
   });

@@ -5,6 +5,7 @@
 #include "chip/board_clock.hpp"
 #include "chip/interrupt_stack.hpp"
 #include "chip/true_random.hpp"
+#include "r4link/config.hpp"
 
 namespace r4 {
 namespace giga {
@@ -28,7 +29,7 @@ Text board_id() {
 
 firmware::Application::Config config_of(const Settings& settings) {
   firmware::Application::Config config;
-  config.identity.firmware = Text("0.1.0");
+  config.identity.firmware = Text(R4LINK_VERSION);
   config.identity.board_id = board_id();
   config.identity.capabilities = Text("udp+serial+can");
   config.settings = settings;
@@ -102,7 +103,7 @@ SafeReason reason_of(const FaultNote& note) {
 }  // namespace
 
 BoardProgram::BoardProgram(Machine& machine, SettingsStore& store, const Settings& settings,
-             const FaultNote& last_boot)
+                           const FaultNote& last_boot)
     : machine_(machine),
       store_(store),
       // NOLINTNEXTLINE(performance-no-int-to-ptr): where the message RAM is

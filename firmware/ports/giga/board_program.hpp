@@ -6,14 +6,14 @@
 #include <cstdint>
 
 #include "../../application.hpp"
-#include "chip/board_clock.hpp"
 #include "boot_report.hpp"
+#include "chip/board_clock.hpp"
 #include "links/can_port.hpp"
-#include "machine.hpp"
 #include "links/network.hpp"
+#include "links/usb_port.hpp"
+#include "machine.hpp"
 #include "settings_store.hpp"
 #include "status_light.hpp"
-#include "links/usb_port.hpp"
 
 namespace r4 {
 namespace giga {
@@ -21,7 +21,7 @@ namespace giga {
 class BoardProgram {
  public:
   BoardProgram(Machine& machine, SettingsStore& store, const Settings& settings,
-        const FaultNote& last_boot);
+               const FaultNote& last_boot);
 
   // Transports, application, timers: from now on the guard decides over the watchdog.
   void start();

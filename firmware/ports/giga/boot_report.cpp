@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "boot_report.hpp"
 
-#include "../../../protocol/messages/message.hpp"
 #include "../../../protocol/datagram/numbers.hpp"
+#include "../../../protocol/messages/message.hpp"
 #include "chip/interrupt_stack.hpp"
 
 namespace r4 {

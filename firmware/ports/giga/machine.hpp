@@ -9,8 +9,8 @@
 #include "../../guard.hpp"
 #include "analog_inputs.hpp"
 #include "chip/i2c_controller.hpp"
-#include "pins.hpp"
 #include "chip/timers.hpp"
+#include "pins.hpp"
 
 namespace r4 {
 namespace giga {

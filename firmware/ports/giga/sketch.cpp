@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "sketch.hpp"
 
-#include "system.hpp"
 #include "chip/timers.hpp"
+#include "system.hpp"
 
 r4::giga::Sketch R4Link;  // NOLINT
 

@@ -9,9 +9,9 @@
 #include <cstdint>
 
 #include "board_program.hpp"
+#include "chip/watchdog.hpp"
 #include "machine.hpp"
 #include "settings_store.hpp"
-#include "chip/watchdog.hpp"
 
 namespace r4 {
 namespace giga {

@@ -21,7 +21,8 @@ class BoardProgram {
 
  public:
   // The seed's low half is where the clock of this boot begins.
-  BoardProgram(std::uint64_t seed, Uart& link, UdpPort& udp, const firmware::Application::Config& config)
+  BoardProgram(std::uint64_t seed, Uart& link, UdpPort& udp,
+               const firmware::Application::Config& config)
       : clock_(static_cast<std::uint32_t>(seed)),
         model_(seed),
         hardware_(model_),

@@ -7,6 +7,7 @@
 #include "../../board_hardware.hpp"
 #include "board_clock.hpp"
 #include "fault.hpp"
+#include "r4link/config.hpp"
 #include "registers.hpp"
 #include "startup.hpp"
 #include "uart.hpp"
@@ -136,7 +137,7 @@ int main() {
   hal.power_up(clock.now_us());
   guard(hal);
   firmware::Application::Config config;
-  config.identity.firmware = Text("0.1.0");
+  config.identity.firmware = Text(R4LINK_VERSION);
   config.identity.board_id = Text("m7-1");
   config.identity.capabilities = Text("serial+can");
   static firmware::Application application(hal, config);

@@ -4,6 +4,7 @@
 #include "board_program.hpp"
 #include "fault.hpp"
 #include "pins_report.hpp"
+#include "r4link/config.hpp"
 #include "registers.hpp"
 #include "startup.hpp"
 
@@ -72,7 +73,7 @@ void r4_ethernet() {
 
 int main() {
   firmware::Application::Config config;
-  config.identity.firmware = Text("0.1.0");
+  config.identity.firmware = Text(R4LINK_VERSION);
   config.identity.board_id = Text("m7-1");
   config.identity.capabilities = Text("udp+serial");
   const std::uint64_t seed = sim::scramble(std::uint64_t{boots()} << 32 | r4_chance);

@@ -13,8 +13,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "../../../protocol/link/board_link.hpp"
 #include "../../../protocol/datagram/numbers.hpp"
+#include "../../../protocol/link/board_link.hpp"
 #include "../sim/robot/board_model.hpp"
 #include "board_clock.hpp"
 

@@ -56,9 +56,7 @@ __attribute__((naked, noreturn, used)) void r4_exception() {
 }
 
 // What the compiler refers to, and the C++ library would bring the heap along with.
-[[noreturn]] void __cxa_pure_virtual() {
-  r4::m7::halt();
-}  // NOLINT(bugprone-reserved-identifier)
+[[noreturn]] void __cxa_pure_virtual() { r4::m7::halt(); }  // NOLINT(bugprone-reserved-identifier)
 
 // Of an interrupt that the image does not use.
 [[gnu::weak]] void r4_uart0_receive() { r4::m7::halt(); }

@@ -5,8 +5,8 @@
 #include <memory>
 #include <string_view>
 
-#include "../../../transports/carrier.hpp"
 #include "../../port.hpp"
+#include "r4link/carrier.hpp"
 
 namespace r4::sim {
 

@@ -7,8 +7,8 @@
 #include <mutex>
 #include <vector>
 
+#include "r4link/simulation.hpp"
 #include "simulated_board.hpp"
-#include "simulated_robot.hpp"
 
 namespace r4::sim {
 

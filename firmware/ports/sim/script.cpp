@@ -9,10 +9,10 @@
 #include <utility>
 
 #include "../../../protocol/datagram/numbers.hpp"
-#include "../../../protocol/messages/state.hpp"
-#include "../../../protocol/messages/units.hpp"
-#include "../../../transports/error.hpp"
 #include "../../board_hardware.hpp"
+#include "r4link/error.hpp"
+#include "r4link/state.hpp"
+#include "r4link/vocabulary.hpp"
 
 namespace r4::sim {
 

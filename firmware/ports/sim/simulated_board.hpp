@@ -24,8 +24,9 @@
 #include <vector>
 
 #include "../../application.hpp"
-#include "robot/board_model.hpp"
 #include "carrier_port.hpp"
+#include "r4link/config.hpp"
+#include "robot/board_model.hpp"
 #include "script.hpp"
 #include "simulated_hardware.hpp"
 
@@ -52,7 +53,7 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
     // are others each time.
     std::optional<std::uint64_t> seed;
     std::string board_id = "sim-1";  // the texts of its answer to Q:ID
-    std::string firmware_version = "0.1.0";
+    std::string firmware_version = R4LINK_VERSION;
     std::string capabilities = "sim";
     Script script;
     Settings settings;

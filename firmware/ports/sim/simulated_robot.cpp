@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "simulated_robot.hpp"
-
 #include <asio/post.hpp>
 #include <map>
 #include <utility>
 
-#include "../../../transports/error.hpp"
+#include "r4link/error.hpp"
+#include "r4link/simulation.hpp"
 #include "robot_world.hpp"
 #include "script.hpp"
 

@@ -31,8 +31,8 @@
 
 #include "bare_frames.hpp"
 #include "can_processes.hpp"
-#include "host/async_board.hpp"
 #include "protocol/datagram/datagram_writer.hpp"
+#include "r4link/async_board.hpp"
 #include "tests/support/at_will.hpp"
 #include "transports/framing/can/packed_form.hpp"
 #include "transports/registry.hpp"

@@ -14,7 +14,7 @@
 #include <memory>
 
 #include "firmware/ports/sim/simulated_board.hpp"
-#include "protocol/messages/units.hpp"
+#include "r4link/vocabulary.hpp"
 #include "transports/framing/can/can_ids.hpp"
 #include "transports/registry.hpp"
 

@@ -17,11 +17,11 @@
 #include <vector>
 
 #include "board_process.hpp"
-#include "host/async_board.hpp"
-#include "host/board.hpp"
+#include "r4link/async_board.hpp"
+#include "r4link/board.hpp"
+#include "r4link/error.hpp"
 #include "tests/bench/allocations.hpp"
 #include "tests/support/at_will.hpp"
-#include "transports/error.hpp"
 #include "transports/operation_slot.hpp"
 
 namespace r4::bench {

@@ -6,7 +6,7 @@
 #include <functional>
 #include <string>
 
-#include "protocol/keys/key.hpp"
+#include "r4link/key.hpp"
 
 namespace r4::test {
 namespace {

@@ -7,8 +7,8 @@
 #include <functional>
 #include <limits>
 
-#include "host/async_board.hpp"
-#include "host/board.hpp"
+#include "r4link/async_board.hpp"
+#include "r4link/board.hpp"
 #include "tests/support/board_in_a_thread.hpp"
 #include "tests/support/problems.hpp"
 

@@ -107,7 +107,7 @@ ScriptedLink::Sent ScriptedLink::last(char letter) const {
 SendResult ScriptedLink::transmit(std::string_view bytes, Priority priority) {
   if (place_taken && priority != Priority::stop) return SendResult::busy;
   Datagram datagram;
-  EXPECT_TRUE(read(bytes, datagram)) << bytes;
+  EXPECT_TRUE(read_datagram(bytes, datagram)) << bytes;
   const Field field = *datagram.begin();
   sent.push_back({str(field.name()) + ":" + str(field.values()), datagram.pnum(),
                   datagram.time_ms(), priority, now, std::string(bytes)});

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "host/commands/command_help.hpp"
-#include "host/explain.hpp"
+#include "r4link/link.hpp"
 #include "scripted_link.hpp"
 
 namespace r4::test {
@@ -227,9 +227,10 @@ TEST_F(SessionArming, GivesUpAtItsDeadlineAndSendsNothingAfterIt) {
   EXPECT_EQ(link.count('R'), 0U) << "an abandoned call is not repeated";
 }
 
-TEST_F(SessionArming, AForgottenCallSendsNothingMore) {
+TEST_F(SessionArming, CancelledSendsNothingMore) {
   const Ticket ticket = arm();
-  link.session.forget(ticket);
+  link.session.cancel(ticket, link.now);
+  EXPECT_EQ(outcome(ticket), Outcome::cancelled);
   link.sent.clear();
   link.pass(500ms);
   EXPECT_EQ(link.count('R'), 0U);

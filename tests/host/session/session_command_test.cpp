@@ -5,9 +5,9 @@
 #include "host/commands/command_help.hpp"
 #include "host/session/session.hpp"
 #include "protocol/link/board_link.hpp"
+#include "r4link/error.hpp"
 #include "scripted_link.hpp"
 #include "tests/support/datagrams.hpp"
-#include "transports/error.hpp"
 
 namespace r4::test {
 namespace {
@@ -262,23 +262,34 @@ TEST(SessionCommand, IdentifyIsConfirmedByTheAnswerInAnyState) {
   EXPECT_DOUBLE_EQ(link.session.statistics(link.now).round_trip_us, 2000);
 }
 
-TEST(SessionCommand, ForgottenEndsWithoutAWord) {
+TEST(SessionCommand, CancelledIsRepeatedNoMore) {
   ScriptedLink link;
   link.connect();
   const Ticket ticket = link.session.send(drive, 1s, link.now);
-  link.session.forget(ticket);
+  link.session.cancel(ticket, link.now);
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::cancelled);
   link.pass(2s);
-  EXPECT_TRUE(link.results.empty());
+  EXPECT_EQ(link.results.size(), 1U);
   EXPECT_EQ(link.count('O'), 1U);
 }
 
-TEST(SessionCommand, AllAreCancelledAtTheEnd) {
+TEST(SessionStop, CannotBeCancelled) {
+  ScriptedLink link;
+  link.connect();
+  const Ticket stop = link.session.stop(1s, link.now);
+  link.session.cancel(stop, link.now);
+  EXPECT_TRUE(link.results.empty());
+  link.pass(100ms);
+  EXPECT_GT(link.count('E'), 3U) << "repeated";
+}
+
+TEST(SessionCommand, AllEndWithTheSession) {
   ScriptedLink link;
   link.connect();
   const Ticket ticket = link.session.send(drive, 1s, link.now);
   const Ticket stop = link.session.stop(1s, link.now);
   link.session.end_all(link.now);
-  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::closed);
+  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::cancelled) << "by the stop";
   EXPECT_EQ(result_of(link, stop).outcome, Outcome::closed);
 }
 

@@ -2,8 +2,8 @@
 // A session with a key, and one without opposite a board that asks for one.
 #include <gtest/gtest.h>
 
-#include "host/explain.hpp"
 #include "host/session/session.hpp"
+#include "r4link/link.hpp"
 #include "scripted_link.hpp"
 #include "tests/support/datagrams.hpp"
 #include "tests/support/signing.hpp"
@@ -44,7 +44,7 @@ void connect(ScriptedLink& link) {
 // The field A of a datagram; empty if it has none.
 std::string signature_of(const ScriptedLink::Sent& sent) {
   Datagram datagram;
-  EXPECT_TRUE(read(sent.bytes, datagram));
+  EXPECT_TRUE(read_datagram(sent.bytes, datagram));
   return str(datagram.find("A").values());
 }
 
@@ -52,7 +52,7 @@ std::string signature_of(const ScriptedLink::Sent& sent) {
 Verdict verdict(const ScriptedLink& link, const ScriptedLink::Sent& sent,
                 const std::string& its_nonce = nonce) {
   Datagram datagram;
-  EXPECT_TRUE(read(sent.bytes, datagram));
+  EXPECT_TRUE(read_datagram(sent.bytes, datagram));
   const std::string tag = signature_of(sent).substr(signature_of(sent).rfind(',') + 1);
   const std::string before = sent.bytes.substr(0, sent.bytes.rfind("," + tag));
   char expected[tag_size];

@@ -5,9 +5,9 @@
 #include <gtest/gtest.h>
 
 #include "protocol/link/board_link.hpp"
+#include "r4link/error.hpp"
 #include "scripted_link.hpp"
 #include "tests/support/datagrams.hpp"
-#include "transports/error.hpp"
 
 namespace r4::test {
 namespace {

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "protocol/datagram/datagram.hpp"
 #include "protocol/datagram/datagram_writer.hpp"
+#include "r4link/datagram.hpp"
 #include "tests/support/datagrams.hpp"
 
 namespace r4 {
@@ -41,7 +41,7 @@ Content content_of(const Datagram& datagram) {
 
 std::optional<Content> read_content(const std::string& bytes) {
   Datagram datagram;
-  if (!read(bytes, datagram)) return std::nullopt;
+  if (!read_datagram(bytes, datagram)) return std::nullopt;
   return content_of(datagram);
 }
 
@@ -150,7 +150,7 @@ RC_GTEST_PROP(DatagramProperty, PacketNumberAndTimeOfTheWriterAreRead,
 
 ReadResult result_of(const std::string& bytes) {
   Datagram datagram;
-  return read(bytes, datagram);
+  return read_datagram(bytes, datagram);
 }
 
 // Is there a field PNum or T?

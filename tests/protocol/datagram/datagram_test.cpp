@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "protocol/datagram/datagram.hpp"
+#include "r4link/datagram.hpp"
 
 #include <gtest/gtest.h>
 
@@ -17,7 +17,7 @@ using test::with_crc;
 
 ReadResult result_of(const std::string& bytes) {
   Datagram datagram;
-  return read(bytes, datagram);
+  return read_datagram(bytes, datagram);
 }
 
 std::vector<std::string> fields_of(const Datagram& datagram) {
@@ -38,7 +38,7 @@ std::vector<std::string> values_of(const Field& field) {
 TEST(Datagram, GivesItsFieldsInTheOrderOfTheWire) {
   const std::string bytes = with_crc("T:5;A:;B:1,,2;PNum:9;C:x:y z;");
   Datagram datagram;
-  ASSERT_TRUE(read(bytes, datagram));
+  ASSERT_TRUE(read_datagram(bytes, datagram));
   EXPECT_EQ(fields_of(datagram),
             (std::vector<std::string>{"T:5", "A:", "B:1,,2", "PNum:9", "C:x:y z"}));
   EXPECT_EQ(datagram.pnum(), 9U);
@@ -64,7 +64,7 @@ TEST(Datagram, TakesAnyLineTerminatorOrNone) {
   for (const std::string end : {"", "\r", "\n", "\r\n"}) {
     const std::string line = bytes + end;
     Datagram datagram;
-    ASSERT_TRUE(read(line, datagram));
+    ASSERT_TRUE(read_datagram(line, datagram));
     EXPECT_EQ(str(datagram.bytes()), bytes);
   }
   EXPECT_EQ(result_of(bytes + "\n\r").error, ReadError::syntax);
@@ -156,11 +156,11 @@ TEST(Datagram, LengthIsCheckedBeforeTheTrailerThenTheChecksumThenTheFields) {
 TEST(Datagram, PacketNumberAndTimeAreWholeNumbersAndStandOnce) {
   Datagram datagram;
   const std::string neither = with_crc("A:1;");
-  ASSERT_TRUE(read(neither, datagram));
+  ASSERT_TRUE(read_datagram(neither, datagram));
   EXPECT_FALSE(datagram.has_pnum());
   EXPECT_FALSE(datagram.has_time());
   const std::string largest = with_crc("PNum:4294967295;T:18446744073709551615;");
-  ASSERT_TRUE(read(largest, datagram));
+  ASSERT_TRUE(read_datagram(largest, datagram));
   EXPECT_TRUE(datagram.has_pnum());
   EXPECT_EQ(datagram.pnum(), 4294967295U);
   EXPECT_TRUE(datagram.has_time());
@@ -179,7 +179,7 @@ TEST(Datagram, PacketNumberAndTimeAreWholeNumbersAndStandOnce) {
 TEST(Datagram, OnlyThoseNamesAreThePacketNumberAndTheTime) {
   const std::string bytes = with_crc("pnum:x;t:x;PNUM:x;PNumber:x;TT:x;");
   Datagram datagram;
-  ASSERT_TRUE(read(bytes, datagram));
+  ASSERT_TRUE(read_datagram(bytes, datagram));
   EXPECT_FALSE(datagram.has_pnum());
   EXPECT_FALSE(datagram.has_time());
 }
@@ -187,8 +187,8 @@ TEST(Datagram, OnlyThoseNamesAreThePacketNumberAndTheTime) {
 TEST(Datagram, ARefusedLineLeavesTheResultAlone) {
   const std::string good = captured_state();
   Datagram datagram;
-  ASSERT_TRUE(read(good, datagram));
-  EXPECT_FALSE(read(std::string("A:1;^0x1^"), datagram));
+  ASSERT_TRUE(read_datagram(good, datagram));
+  EXPECT_FALSE(read_datagram(std::string("A:1;^0x1^"), datagram));
   EXPECT_EQ(str(datagram.bytes()), good);
   EXPECT_EQ(datagram.pnum(), 7434U);
 }

@@ -6,7 +6,7 @@
 #include <limits>
 #include <string>
 
-#include "protocol/datagram/datagram.hpp"
+#include "r4link/datagram.hpp"
 #include "tests/support/datagrams.hpp"
 
 namespace r4 {
@@ -169,7 +169,7 @@ TEST(DatagramWriter, NoDatagramIsLongerThanTheLimit) {
     const Text written = writer.finish();
     if (written.size() > longest) longest = written.size();
     Datagram datagram;
-    EXPECT_TRUE(written.empty() || read(written, datagram)) << size;
+    EXPECT_TRUE(written.empty() || read_datagram(written, datagram)) << size;
   }
   EXPECT_GE(longest, max_datagram - 1);
   EXPECT_LE(longest, max_datagram);

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "protocol/datagram/refusal.hpp"
-
 #include <gtest/gtest.h>
 
+#include "r4link/vocabulary.hpp"
 #include "tests/support/datagrams.hpp"
 
 namespace r4 {

@@ -37,7 +37,7 @@ class TestAuthentication : public testing::Test {
   Verdict verdict(const std::string& text, std::uint32_t now_ms = now) {
     const std::string bytes = with_crc(text);
     Datagram datagram;
-    EXPECT_TRUE(read(Text(bytes), datagram)) << bytes;
+    EXPECT_TRUE(read_datagram(Text(bytes), datagram)) << bytes;
     return board.verify(datagram, now_ms);
   }
 
@@ -81,7 +81,7 @@ TEST_F(TestAuthentication, EveryChangedByteIsSeen) {
       changed[i] = other;
       const std::string bytes = with_crc(changed);
       Datagram datagram;
-      if (!read(Text(bytes), datagram)) continue;
+      if (!read_datagram(Text(bytes), datagram)) continue;
       EXPECT_NE(board.verify(datagram, now), Verdict::authentic) << changed;
     }
   }
@@ -145,7 +145,7 @@ TEST(AuthenticationWithoutChance, TakesNothing) {
   EXPECT_EQ(str(board.nonce()), "");
   const std::string bytes = with_crc(with_signature(fields, key_of(3), "", 1, now));
   Datagram datagram;
-  ASSERT_TRUE(read(Text(bytes), datagram));
+  ASSERT_TRUE(read_datagram(Text(bytes), datagram));
   EXPECT_EQ(board.verify(datagram, now), Verdict::missing);
 }
 
@@ -187,7 +187,7 @@ class TestSigner : public TestAuthentication {
   }
   Verdict verdict_of(const std::string& bytes, std::uint32_t now_ms) {
     Datagram datagram;
-    EXPECT_TRUE(read(Text(bytes), datagram)) << bytes;
+    EXPECT_TRUE(read_datagram(Text(bytes), datagram)) << bytes;
     return board.verify(datagram, now_ms);
   }
   Signer signer{key_of(3)};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "protocol/keys/key.hpp"
+#include "r4link/key.hpp"
 
 #include <gtest/gtest.h>
 

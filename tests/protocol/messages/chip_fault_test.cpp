@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "protocol/messages/chip_fault.hpp"
-
 #include <gtest/gtest.h>
 
 #include <set>
 #include <string>
 
 #include "firmware/board_hardware.hpp"
+#include "r4link/vocabulary.hpp"
 
 namespace r4 {
 namespace {

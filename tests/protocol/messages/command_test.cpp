@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "protocol/messages/command.hpp"
+#include "r4link/command.hpp"
 
 #include <gtest/gtest.h>
 
 #include <string>
 #include <vector>
 
+#include "protocol/messages/command_field.hpp"
 #include "tests/support/datagrams.hpp"
 
 namespace r4 {
@@ -196,31 +197,34 @@ TEST(Command, TheFormComesBeforeTheChannelAndTheChannelBeforeTheRange) {
 }
 
 TEST(Command, CommandsOfTheFactoriesAreCheckedTheSame) {
-  EXPECT_EQ(check(Command::osmc(4095, Direction::forward, 4)), Refusal::none);
-  EXPECT_EQ(check(Command::osmc(4096, Direction::forward, 4)), Refusal::range);
-  EXPECT_EQ(check(Command::osmc(-1, Direction::forward, 4)), Refusal::range);
-  EXPECT_EQ(check(Command::osmc(1, static_cast<Direction>(2), 4)), Refusal::range);
+  EXPECT_EQ(check_command(Command::osmc(4095, Direction::forward, 4)), Refusal::none);
+  EXPECT_EQ(check_command(Command::osmc(4096, Direction::forward, 4)), Refusal::range);
+  EXPECT_EQ(check_command(Command::osmc(-1, Direction::forward, 4)), Refusal::range);
+  EXPECT_EQ(check_command(Command::osmc(1, static_cast<Direction>(2), 4)), Refusal::range);
   for (const int channel : {-1, 0, 5, 256, 257, 65537}) {
-    EXPECT_EQ(check(Command::osmc(1, Direction::forward, channel)), Refusal::channel) << channel;
-    EXPECT_EQ(check(Command::dhb12(1, Direction::forward, channel)), Refusal::channel) << channel;
-    EXPECT_EQ(check(Command::stepper(1, 1, channel)), Refusal::channel) << channel;
-    EXPECT_EQ(check(Command::zero(channel)), Refusal::channel) << channel;
-    EXPECT_EQ(check(Command::bldc(1, Direction::forward, false, channel)), Refusal::channel);
-    EXPECT_EQ(check(Command::proximity(1, channel)), Refusal::channel) << channel;
+    EXPECT_EQ(check_command(Command::osmc(1, Direction::forward, channel)), Refusal::channel)
+        << channel;
+    EXPECT_EQ(check_command(Command::dhb12(1, Direction::forward, channel)), Refusal::channel)
+        << channel;
+    EXPECT_EQ(check_command(Command::stepper(1, 1, channel)), Refusal::channel) << channel;
+    EXPECT_EQ(check_command(Command::zero(channel)), Refusal::channel) << channel;
+    EXPECT_EQ(check_command(Command::bldc(1, Direction::forward, false, channel)),
+              Refusal::channel);
+    EXPECT_EQ(check_command(Command::proximity(1, channel)), Refusal::channel) << channel;
   }
-  EXPECT_EQ(check(Command::servo(2500, 16)), Refusal::none);
-  EXPECT_EQ(check(Command::servo(2501, 16)), Refusal::range);
-  EXPECT_EQ(check(Command::servo(2500, 17)), Refusal::channel);
-  EXPECT_EQ(check(Command::relay(9, true)), Refusal::channel);
-  EXPECT_EQ(check(Command::stepper(1, 0, 1)), Refusal::range);
-  EXPECT_EQ(check(Command::stepper(1, 20001, 1)), Refusal::range);
-  EXPECT_EQ(check(Command::proximity(401, 1)), Refusal::range);
-  EXPECT_EQ(check(Command::fields("")), Refusal::format);
-  EXPECT_EQ(check(Command::setting("", "1")), Refusal::format);
-  EXPECT_EQ(check(Command::setting("rate", "")), Refusal::format);
+  EXPECT_EQ(check_command(Command::servo(2500, 16)), Refusal::none);
+  EXPECT_EQ(check_command(Command::servo(2501, 16)), Refusal::range);
+  EXPECT_EQ(check_command(Command::servo(2500, 17)), Refusal::channel);
+  EXPECT_EQ(check_command(Command::relay(9, true)), Refusal::channel);
+  EXPECT_EQ(check_command(Command::stepper(1, 0, 1)), Refusal::range);
+  EXPECT_EQ(check_command(Command::stepper(1, 20001, 1)), Refusal::range);
+  EXPECT_EQ(check_command(Command::proximity(401, 1)), Refusal::range);
+  EXPECT_EQ(check_command(Command::fields("")), Refusal::format);
+  EXPECT_EQ(check_command(Command::setting("", "1")), Refusal::format);
+  EXPECT_EQ(check_command(Command::setting("rate", "")), Refusal::format);
   for (const Command& command : {Command::heartbeat(), Command::stop(), Command::clear(),
                                  Command::identify(), Command::fields("ALL")}) {
-    EXPECT_EQ(check(command), Refusal::none);
+    EXPECT_EQ(check_command(command), Refusal::none);
   }
 }
 
@@ -255,7 +259,7 @@ TEST(Command, TheCommandFieldIsTheOneWithALetterForItsName) {
         Case{"x:1;PNum:1;", 1, "x"}, Case{"O:1,0,1;O:1,0,1;E:STOP;", 3, "O"}}) {
     const std::string bytes = with_crc(c.fields);
     Datagram datagram;
-    ASSERT_TRUE(read(bytes, datagram));
+    ASSERT_TRUE(read_datagram(bytes, datagram));
     EXPECT_EQ(datagram.command_count(), c.count) << c.fields;
     EXPECT_EQ(str(datagram.command().name()), c.name) << c.fields;
     EXPECT_EQ(str(datagram.command().values()),

@@ -17,7 +17,7 @@ using test::with_crc;
 // A datagram and the bytes that it views.
 struct Read {
   explicit Read(std::string_view fields) : bytes(with_crc(fields)) {
-    EXPECT_TRUE(read(bytes, datagram)) << fields;
+    EXPECT_TRUE(read_datagram(bytes, datagram)) << fields;
   }
   Read(const Read&) = delete;
   Read& operator=(const Read&) = delete;
@@ -67,7 +67,7 @@ TEST(Message, BoardHeartbeatCarriesTheReasonBehindTheTime) {
         write_board_heartbeat(buffer, sizeof buffer, 5, 6, static_cast<SafeReason>(reason));
     EXPECT_EQ(str(bytes), with_crc("H:R4-ROS2;PNum:5;T:6;SAFE:" + std::to_string(reason) + ";"));
     Datagram datagram;
-    ASSERT_TRUE(read(bytes, datagram));
+    ASSERT_TRUE(read_datagram(bytes, datagram));
     EXPECT_EQ(heartbeat_reason(datagram), static_cast<SafeReason>(reason));
   }
 }
@@ -81,7 +81,7 @@ TEST(Message, BoardHeartbeatCarriesWhatAStopAndAClearHaveToKnow) {
   const Text bytes = write_board_heartbeat(buffer, sizeof buffer, 12, 790, report);
   EXPECT_EQ(str(bytes), with_crc("H:R4-ROS2;PNum:12;T:790;SAFE:2;CAUSE:734003;STOP:4294967295;"));
   Datagram datagram;
-  ASSERT_TRUE(read(bytes, datagram));
+  ASSERT_TRUE(read_datagram(bytes, datagram));
   const SafeReport again = heartbeat_report(datagram);
   EXPECT_EQ(again.reason, SafeReason::stop);
   EXPECT_EQ(again.cause, 734003);
@@ -110,7 +110,7 @@ TEST(Message, ARefusalTellsTheHostOfTheSessionWhichOneItIs) {
   Datagram datagram;
   const Text bytes = writer.finish(1, 2);
   EXPECT_EQ(str(bytes), with_crc("N:7,STALE;SESSION:2147484600;PNum:1;T:2;"));
-  ASSERT_TRUE(read(bytes, datagram));
+  ASSERT_TRUE(read_datagram(bytes, datagram));
   Nack again;
   ASSERT_TRUE(read_nack(datagram, again));
   EXPECT_TRUE(again.has_session);
@@ -124,7 +124,7 @@ TEST(Message, BoardHeartbeatCarriesTheNonceBehindTheReason) {
   const Text bytes =
       write_board_heartbeat(buffer, sizeof buffer, 12, 790, SafeReason::stop, "0123456789abcdef");
   Datagram datagram;
-  ASSERT_TRUE(read(bytes, datagram));
+  ASSERT_TRUE(read_datagram(bytes, datagram));
   EXPECT_EQ(test::str(bytes).find("H:R4-ROS2;PNum:12;T:790;SAFE:2;AN:0123456789abcdef;^"), 0U);
   EXPECT_EQ(test::str(heartbeat_nonce(datagram)), "0123456789abcdef");
   EXPECT_FALSE(is_connecting_heartbeat(datagram));
@@ -134,7 +134,7 @@ TEST(Message, AConnectingHeartbeatHasNumberZeroAndNoTimeOrANonce) {
   const auto connecting = [](const std::string& fields) {
     const std::string bytes = test::with_crc(fields);
     Datagram datagram;
-    EXPECT_TRUE(read(Text(bytes), datagram));
+    EXPECT_TRUE(read_datagram(Text(bytes), datagram));
     return is_connecting_heartbeat(datagram);
   };
   EXPECT_TRUE(connecting("H:R4-ROS2;PNum:0;T:0;"));
@@ -163,7 +163,7 @@ TEST(Message, RefusalsRoundTripWithEveryCode) {
     DatagramWriter writer(buffer, sizeof buffer);
     write_nack(writer, Nack{4294967295U, static_cast<Refusal>(code)});
     Datagram datagram;
-    ASSERT_TRUE(read(writer.finish(1, 2), datagram));
+    ASSERT_TRUE(read_datagram(writer.finish(1, 2), datagram));
     Nack nack;
     ASSERT_TRUE(read_nack(datagram, nack));
     EXPECT_EQ(nack.pnum, 4294967295U);
@@ -189,7 +189,7 @@ TEST(Message, IdentityRoundTrips) {
   const Text bytes = writer.finish(1, 2);
   EXPECT_EQ(str(bytes), with_crc("I:R4,0.1.0,0042AF,udp+serial;PNum:1;T:2;"));
   Datagram datagram;
-  ASSERT_TRUE(read(bytes, datagram));
+  ASSERT_TRUE(read_datagram(bytes, datagram));
   Identity identity;
   ASSERT_TRUE(read_identity(datagram, identity));
   EXPECT_EQ(str(identity.firmware), "0.1.0");

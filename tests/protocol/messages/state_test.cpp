@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "protocol/messages/state.hpp"
+#include "r4link/state.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "protocol/messages/state_fields.hpp"
 #include "tests/support/datagrams.hpp"
 
 namespace r4 {
@@ -18,7 +19,7 @@ using test::with_crc;
 bool read_fields(const std::string& fields, State& state) {
   const std::string bytes = with_crc(fields);
   Datagram datagram;
-  EXPECT_TRUE(read(bytes, datagram)) << fields;
+  EXPECT_TRUE(read_datagram(bytes, datagram)) << fields;
   return read_state(datagram, state);
 }
 
@@ -133,7 +134,7 @@ TEST(State, AllFieldsFitOneDatagramAndRoundTrip) {
   const std::string bytes = str(writer.finish(4294967295U, 4294967295U));
   ASSERT_FALSE(bytes.empty());
   Datagram datagram;
-  ASSERT_TRUE(read(bytes, datagram));
+  ASSERT_TRUE(read_datagram(bytes, datagram));
   State back;
   ASSERT_TRUE(read_state(datagram, back));
   FieldSet every = FieldSet::all();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "protocol/messages/units.hpp"
-
 #include <gtest/gtest.h>
+
+#include "r4link/vocabulary.hpp"
 
 namespace r4 {
 namespace {

@@ -29,7 +29,7 @@ TEST(Json, ShowsWhatOnlyLooksLikeANumberAsText) {
 TEST(Json, ShowsSeveralValuesAsAnArrayAndKeepsTheOrderOfFields) {
   const std::string bytes = test::with_crc("DHB1A:4095,1;AIN24:24.28;H:R4-ROS2;E:;PNum:1;T:2;");
   Datagram datagram;
-  ASSERT_TRUE(read(Text(bytes), datagram));
+  ASSERT_TRUE(read_datagram(Text(bytes), datagram));
   EXPECT_EQ(fields_json(datagram).dump(),
             R"({"DHB1A":[4095,1],"AIN24":24.28,"H":"R4-ROS2","E":""})");
 }
@@ -37,7 +37,7 @@ TEST(Json, ShowsSeveralValuesAsAnArrayAndKeepsTheOrderOfFields) {
 TEST(Json, KeepsBothValuesOfANameThatStandsTwice) {
   const std::string bytes = test::with_crc("X:1;X:a;");
   Datagram datagram;
-  ASSERT_TRUE(read(Text(bytes), datagram));
+  ASSERT_TRUE(read_datagram(Text(bytes), datagram));
   EXPECT_EQ(fields_json(datagram).dump(), R"({"X":[1,"a"]})");
 }
 

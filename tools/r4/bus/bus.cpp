@@ -7,13 +7,14 @@
 #include <optional>
 #include <string>
 
-#include "bus_live.hpp"
-#include "bus_plan.hpp"
 #include "../shell/json.hpp"
 #include "../shell/options.hpp"
-#include "protocol/messages/command.hpp"
 #include "../shell/subcommands.hpp"
-#include "transports/error.hpp"
+#include "bus_live.hpp"
+#include "bus_plan.hpp"
+#include "protocol/messages/command_field.hpp"
+#include "r4link/command.hpp"
+#include "r4link/error.hpp"
 #include "transports/framing/can/can_ids.hpp"
 
 namespace r4::tool {

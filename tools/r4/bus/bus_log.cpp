@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "protocol/messages/units.hpp"
+#include "r4link/vocabulary.hpp"
 #include "transports/framing/can/can_node.hpp"
 #include "transports/framing/can/packed_form.hpp"
 

@@ -17,9 +17,9 @@
 #include <string_view>
 #include <vector>
 
-#include "candump.hpp"
 #include "../shell/json.hpp"
-#include "protocol/datagram/datagram.hpp"
+#include "candump.hpp"
+#include "r4link/datagram.hpp"
 #include "transports/framing/can/can_ids.hpp"
 #include "transports/framing/can/isotp_receiver.hpp"
 

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "protocol/messages/message.hpp"
+#include "protocol/messages/state_fields.hpp"
 #include "transports/framing/can/can_ids.hpp"
 #include "transports/framing/can/isotp_sender.hpp"
 #include "transports/framing/can/packed_form.hpp"

@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "protocol/messages/state.hpp"
+#include "r4link/state.hpp"
 #include "transports/framing/can/can_bits.hpp"
 
 namespace r4::tool {

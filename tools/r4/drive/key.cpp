@@ -8,13 +8,13 @@
 #include <optional>
 #include <string>
 
-#include "host/board.hpp"
-#include "host/commands/command_help.hpp"
-#include "host/key_file.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
-#include "transports/error.hpp"
+#include "host/commands/command_help.hpp"
+#include "r4link/board.hpp"
+#include "r4link/error.hpp"
+#include "r4link/options.hpp"
 
 namespace r4::tool {
 namespace {

@@ -13,16 +13,16 @@
 #include <vector>
 
 #include "../shell/help.hpp"
-#include "host/async_board.hpp"
-#include "host/commands/command_help.hpp"
-#include "host/explain.hpp"
-#include "host/session/limits.hpp"
 #include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
-#include "protocol/datagram/numbers.hpp"
 #include "../shell/subcommands.hpp"
-#include "transports/error.hpp"
+#include "host/commands/command_help.hpp"
+#include "host/session/limits.hpp"
+#include "protocol/datagram/numbers.hpp"
+#include "r4link/async_board.hpp"
+#include "r4link/error.hpp"
+#include "r4link/link.hpp"
 
 namespace r4::tool {
 namespace {

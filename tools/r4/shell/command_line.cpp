@@ -18,8 +18,9 @@
 #include "help.hpp"
 #include "json.hpp"
 #include "line_writer.hpp"
+#include "r4link/config.hpp"
+#include "r4link/error.hpp"
 #include "subcommands.hpp"
-#include "transports/error.hpp"
 
 namespace r4::tool {
 namespace {
@@ -139,7 +140,7 @@ int run(int argc, const char* const* argv) {
   const bool json = std::any_of(argv, argv + argc, is_json);
   Action chosen;
   CLI::App root("R4 boards: watch them, command them, stop them, simulate them", "r4");
-  root.set_version_flag("--version", "r4 " R4_VERSION, "Print the version and exit");
+  root.set_version_flag("--version", "r4 " R4LINK_VERSION, "Print the version and exit");
   root.set_help_flag("-h,--help", "Print help and exit; also after a command");
   root.footer(root_footer);
   root.require_subcommand(1);

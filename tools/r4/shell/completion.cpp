@@ -9,10 +9,10 @@
 #include <string_view>
 #include <vector>
 
-#include "host/async_board.hpp"
+#include "host/standard_registry.hpp"
 #include "options.hpp"
+#include "r4link/error.hpp"
 #include "subcommands.hpp"
-#include "transports/error.hpp"
 #include "transports/registry.hpp"
 
 namespace r4::tool {

@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
-#include "host/async_board.hpp"
 #include "host/commands/command_help.hpp"
+#include "host/standard_registry.hpp"
 #include "transports/registry.hpp"
 
 namespace r4::tool {

@@ -100,7 +100,7 @@ bool add_datagram_json(Json& object, const std::uint8_t* bytes, std::size_t size
     text = Text(plain.data(), result.size);
   }
   Datagram datagram;
-  const ReadResult result = read(text, datagram);
+  const ReadResult result = read_datagram(text, datagram);
   object["ok"] = static_cast<bool>(result);
   if (packed) object["packed"] = size;
   if (result) {

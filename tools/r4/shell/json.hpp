@@ -6,9 +6,9 @@
 #include <string>
 #include <string_view>
 
-#include "protocol/datagram/datagram.hpp"
-#include "transports/carrier.hpp"
-#include "transports/error.hpp"
+#include "r4link/carrier.hpp"
+#include "r4link/datagram.hpp"
+#include "r4link/error.hpp"
 
 namespace r4::tool {
 
@@ -36,7 +36,8 @@ enum class DatagramForm : std::uint8_t { plain, packed, by_first_byte };
 bool add_datagram_json(Json& object, const std::uint8_t* bytes, std::size_t size,
                        DatagramForm form = DatagramForm::by_first_byte);
 
-// {"type":"error","kind":…,"thing":…,"reason":…,"fix":…}
+// {"type":"error","kind":…,"thing":…,"reason":…,"fix":…}; of a command also its "outcome" and, where the
+// board refused it, the "code".
 Json problem_json(const Problem& problem);
 
 // {"wrong_sequence":…,"timed_out":…,"overflow":…,"interrupted":…,"cancelled":…,"unexpected":…,

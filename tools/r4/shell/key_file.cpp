@@ -10,9 +10,9 @@
 #include <cerrno>
 #include <cstring>
 
-#include "host/key_file.hpp"
 #include "options.hpp"
-#include "transports/error.hpp"
+#include "r4link/error.hpp"
+#include "r4link/options.hpp"
 #include "transports/file_descriptor.hpp"
 
 namespace r4::tool {

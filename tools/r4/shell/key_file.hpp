@@ -6,7 +6,7 @@
 #include <string>
 
 #include "cli_fwd.hpp"
-#include "host/board_options.hpp"
+#include "r4link/options.hpp"
 
 namespace r4::tool {
 

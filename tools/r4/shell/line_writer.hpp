@@ -14,7 +14,7 @@
 #include <string_view>
 #include <thread>
 
-#include "transports/error.hpp"
+#include "r4link/error.hpp"
 
 namespace r4::tool {
 

@@ -6,11 +6,12 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
-#include "host/async_board.hpp"
 #include "host/commands/command_help.hpp"
+#include "host/standard_registry.hpp"
 #include "protocol/datagram/numbers.hpp"
-#include "protocol/messages/state.hpp"
-#include "transports/error.hpp"
+#include "protocol/messages/command_field.hpp"
+#include "r4link/error.hpp"
+#include "r4link/state.hpp"
 #include "transports/registry.hpp"
 
 namespace r4::tool {

@@ -12,7 +12,7 @@
 #include <cstring>
 #include <string_view>
 
-#include "transports/error.hpp"
+#include "r4link/error.hpp"
 
 namespace r4::tool {
 namespace {

@@ -11,16 +11,16 @@
 #include <string_view>
 #include <vector>
 
-#include "child_board.hpp"
-#include "demo_story.hpp"
 #include "../shell/json.hpp"
 #include "../shell/options.hpp"
-#include "protocol/datagram/datagram.hpp"
-#include "protocol/messages/message.hpp"
 #include "../shell/subcommands.hpp"
+#include "child_board.hpp"
+#include "demo_story.hpp"
+#include "protocol/messages/message.hpp"
+#include "r4link/datagram.hpp"
+#include "r4link/error.hpp"
 #include "transports/can/can_interface.hpp"
 #include "transports/can/can_socket.hpp"
-#include "transports/error.hpp"
 #include "transports/framing/can/can_ids.hpp"
 
 namespace r4::tool {
@@ -68,7 +68,7 @@ bool decode_capture(bool json) {
   bool good = true;
   for (const Captured& each : captured) {
     Datagram datagram;
-    const ReadResult result = read(Text(std::string_view(each.bytes)), datagram);
+    const ReadResult result = read_datagram(Text(std::string_view(each.bytes)), datagram);
     const bool as_expected =
         static_cast<bool>(result) == each.good && (each.good || result.error == ReadError::crc);
     good = good && as_expected;

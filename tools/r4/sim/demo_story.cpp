@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "host/explain.hpp"
 #include "protocol/messages/message.hpp"
+#include "r4link/link.hpp"
 
 namespace r4::tool {
 namespace {

@@ -12,8 +12,8 @@
 #include <string>
 #include <string_view>
 
-#include "host/async_board.hpp"
 #include "../shell/json.hpp"
+#include "r4link/async_board.hpp"
 
 namespace r4::tool {
 

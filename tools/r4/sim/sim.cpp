@@ -13,16 +13,17 @@
 #include <utility>
 #include <vector>
 
-#include "firmware/ports/sim/simulated_board.hpp"
-#include "host/async_board.hpp"
-#include "host/commands/command_help.hpp"
 #include "../shell/options.hpp"
+#include "../shell/subcommands.hpp"
+#include "firmware/ports/sim/simulated_board.hpp"
+#include "host/commands/command_help.hpp"
+#include "host/standard_registry.hpp"
 #include "protocol/datagram/numbers.hpp"
-#include "protocol/datagram/refusal.hpp"
 #include "protocol/messages/settings.hpp"
+#include "r4link/config.hpp"
+#include "r4link/vocabulary.hpp"
 #include "sim_input.hpp"
 #include "sim_log.hpp"
-#include "../shell/subcommands.hpp"
 #include "transports/framing/can/can_ids.hpp"
 #include "transports/registry.hpp"
 
@@ -117,7 +118,7 @@ std::vector<Plan> plans_of(const Options& options) {
 class ServedBoard {
  public:
   ServedBoard(asio::io_context& io, SimOutput& output, const Options& options, const Plan& plan,
-        bool named)
+              bool named)
       : log_(output, options.quiet, named ? plan.id : ""), board_(io, options_of(options, plan)) {
     for (const std::string& url : plan.urls) {
       auto carrier = standard_registry().make(io, url, Role::board);
@@ -151,7 +152,7 @@ class ServedBoard {
     check_id(plan.id);
     board_options.board_id = plan.id;
     board_options.settings = read_settings(options.settings);
-    board_options.firmware_version = R4_VERSION;
+    board_options.firmware_version = R4LINK_VERSION;
     board_options.events = log_.events();
     return board_options;
   }

@@ -10,7 +10,7 @@
 #include <string>
 
 #include "firmware/ports/sim/script.hpp"
-#include "transports/error.hpp"
+#include "r4link/error.hpp"
 
 namespace r4::tool {
 

@@ -10,9 +10,8 @@
 #include <tuple>
 
 #include "host/commands/command_help.hpp"
-#include "protocol/datagram/refusal.hpp"
-#include "protocol/messages/state.hpp"
-#include "protocol/messages/units.hpp"
+#include "r4link/state.hpp"
+#include "r4link/vocabulary.hpp"
 #include "transports/url.hpp"
 
 namespace r4::tool {

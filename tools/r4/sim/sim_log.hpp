@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "firmware/ports/sim/simulated_board.hpp"
 #include "../shell/json.hpp"
 #include "../shell/line_writer.hpp"
+#include "firmware/ports/sim/simulated_board.hpp"
 
 namespace r4::tool {
 

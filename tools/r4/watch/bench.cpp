@@ -16,13 +16,13 @@
 #include <utility>
 #include <vector>
 
-#include "host/async_board.hpp"
-#include "host/explain.hpp"
 #include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
-#include "transports/error.hpp"
+#include "r4link/async_board.hpp"
+#include "r4link/error.hpp"
+#include "r4link/link.hpp"
 
 namespace r4::tool {
 namespace {

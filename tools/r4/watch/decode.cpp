@@ -17,9 +17,9 @@
 #include "../shell/json.hpp"
 #include "../shell/numbered_lines.hpp"
 #include "../shell/options.hpp"
-#include "protocol/datagram/datagram.hpp"
-#include "protocol/datagram/numbers.hpp"
 #include "../shell/subcommands.hpp"
+#include "protocol/datagram/numbers.hpp"
+#include "r4link/datagram.hpp"
 
 namespace r4::tool {
 namespace {

@@ -8,12 +8,12 @@
 #include <string>
 #include <string_view>
 
-#include "host/commands/command_help.hpp"
 #include "../shell/options.hpp"
-#include "protocol/datagram/datagram.hpp"
+#include "../shell/subcommands.hpp"
+#include "host/commands/command_help.hpp"
 #include "protocol/datagram/datagram_writer.hpp"
 #include "protocol/messages/message.hpp"
-#include "../shell/subcommands.hpp"
+#include "r4link/datagram.hpp"
 #include "transports/framing/can/packed_form.hpp"
 
 namespace r4::tool {
@@ -102,7 +102,7 @@ int encode(const Options& options) {
   const Text bytes = writer.finish(static_cast<std::uint32_t>(options.pnum),
                                    options.time ? *options.time : epoch_ms());
   Datagram datagram;
-  if (bytes.empty() || !read(bytes, datagram)) {
+  if (bytes.empty() || !read_datagram(bytes, datagram)) {
     fail("the datagram", fmt::format("is longer than {} bytes", max_datagram),
          "put fewer fields into it");
   }

@@ -10,14 +10,14 @@
 #include <vector>
 
 #include "../shell/help.hpp"
-#include "host/async_board.hpp"
 #include "../shell/json.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
+#include "host/standard_registry.hpp"
 #include "transports/can/can_interface.hpp"
 #include "transports/can/can_listener.hpp"
-#include "transports/serial/port_list.hpp"
 #include "transports/registry.hpp"
+#include "transports/serial/port_list.hpp"
 
 namespace r4::tool {
 namespace {

@@ -9,10 +9,11 @@
 #include <utility>
 #include <vector>
 
-#include "host/commands/command_help.hpp"
 #include "../shell/json.hpp"
-#include "monitor_view.hpp"
 #include "../shell/output.hpp"
+#include "host/commands/command_help.hpp"
+#include "monitor_view.hpp"
+#include "protocol/messages/state_fields.hpp"
 
 namespace r4::tool {
 namespace {

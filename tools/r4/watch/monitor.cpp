@@ -13,15 +13,15 @@
 #include <string>
 #include <vector>
 
-#include "host/async_board.hpp"
-#include "host/explain.hpp"
 #include "../shell/key_file.hpp"
-#include "monitor_bus.hpp"
-#include "monitor_view.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
+#include "monitor_bus.hpp"
+#include "monitor_view.hpp"
+#include "r4link/async_board.hpp"
+#include "r4link/error.hpp"
+#include "r4link/link.hpp"
 #include "transports/can/can_interface.hpp"
-#include "transports/error.hpp"
 #include "transports/url.hpp"
 
 namespace r4::tool {

@@ -6,11 +6,11 @@
 #include <string>
 #include <utility>
 
-#include "host/commands/command_help.hpp"
-#include "host/explain.hpp"
 #include "../shell/json.hpp"
 #include "../shell/output.hpp"
+#include "host/commands/command_help.hpp"
 #include "protocol/link/host_link.hpp"
+#include "r4link/link.hpp"
 
 namespace r4::tool {
 namespace {

@@ -5,8 +5,8 @@
 #include <memory>
 #include <string_view>
 
-#include "host/async_board.hpp"
-#include "transports/carrier.hpp"
+#include "r4link/async_board.hpp"
+#include "r4link/carrier.hpp"
 
 namespace r4::tool {
 

@@ -3,10 +3,11 @@
 
 #include <cstring>
 
-#include "../../../protocol/messages/command.hpp"
 #include "../../../protocol/datagram/datagram_writer.hpp"
+#include "../../../protocol/messages/command_field.hpp"
 #include "../../../protocol/messages/message.hpp"
 #include "packed_form.hpp"
+#include "r4link/command.hpp"
 
 namespace r4 {
 namespace {
@@ -103,7 +104,7 @@ bool CanNode::begin(Text datagram, std::uint32_t now_us) {
 // A board that goes safe says so in its next heartbeat, which follows at once.
 void CanNode::note_reason(Text heartbeat) {
   Datagram datagram;
-  if (!read(heartbeat, datagram)) return;
+  if (!read_datagram(heartbeat, datagram)) return;
   const SafeReason reason = heartbeat_reason(datagram);
   if (reason == reason_) return;  // told, or still to be told
   reason_due_ = reason != SafeReason::none;

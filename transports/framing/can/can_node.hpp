@@ -15,12 +15,12 @@
 
 #include <cstdint>
 
-#include "../../../protocol/datagram/datagram.hpp"
-#include "../../../protocol/messages/units.hpp"
 #include "can_frame.hpp"
 #include "can_ids.hpp"
 #include "isotp_receiver.hpp"
 #include "isotp_sender.hpp"
+#include "r4link/datagram.hpp"
+#include "r4link/vocabulary.hpp"
 
 namespace r4 {
 

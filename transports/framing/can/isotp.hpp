@@ -24,8 +24,8 @@
 
 #include <cstdint>
 
-#include "../../../protocol/datagram/text.hpp"
 #include "can_frame.hpp"
+#include "r4link/text.hpp"
 
 namespace r4 {
 

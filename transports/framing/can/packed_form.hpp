@@ -27,7 +27,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "../../../protocol/datagram/datagram.hpp"
+#include "r4link/datagram.hpp"
 
 namespace r4 {
 

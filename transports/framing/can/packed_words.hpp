@@ -5,7 +5,7 @@
 
 #include <cstdint>
 
-#include "../../../protocol/datagram/text.hpp"
+#include "r4link/text.hpp"
 
 namespace r4 {
 

@@ -12,8 +12,8 @@
 #include <cstdint>
 
 #include "../../../../transports/framing/can/can_node.hpp"
-#include "datagram_ring.hpp"
 #include "../chip/fdcan.hpp"
+#include "datagram_ring.hpp"
 
 namespace r4 {
 namespace giga {

@@ -7,9 +7,9 @@
 #include <cstdint>
 #include <cstring>
 
-#include "../../../../protocol/datagram/datagram.hpp"
-#include "../../byte_ring.hpp"
 #include "../../../port.hpp"
+#include "../../byte_ring.hpp"
+#include "r4link/datagram.hpp"
 
 namespace r4 {
 namespace giga {

@@ -14,9 +14,9 @@
 #include <cstdint>
 
 #include "../../../../transports/framing/line_framing.hpp"
-#include "../../byte_ring.hpp"
 #include "../../../port.hpp"
 #include "../../../stop_detector.hpp"
+#include "../../byte_ring.hpp"
 #include "../../transmit_lines.hpp"
 
 namespace r4 {

@@ -10,24 +10,10 @@
 #include "../chips/mcp23017_model.hpp"
 #include "../chips/mcp4728_model.hpp"
 #include "../chips/pca9685_model.hpp"
+#include "r4link/simulated_pins.hpp"
 
 namespace r4 {
 namespace sim {
-
-// What the outputs of the chips do, in the units of the commands.
-struct ChipPins {
-  Drive osmc[osmc_channels];
-  Drive dhb12[dhb12_channels];
-  std::uint16_t servo_us[servo_channels] = {};  // to the nearest; a chip counts in 4.88 us
-  std::uint8_t relays = 0;                      // bit n-1: relay n
-  Bldc bldc[bldc_channels];
-
-  // Nothing is driven, and every brake is on.
-  static ChipPins safe();
-  bool is_safe() const;
-};
-bool operator==(const ChipPins& a, const ChipPins& b);
-inline bool operator!=(const ChipPins& a, const ChipPins& b) { return !(a == b); }
 
 struct BoardChips {
   BoardChips();

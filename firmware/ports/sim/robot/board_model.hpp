@@ -24,24 +24,11 @@
 #include "board_chips.hpp"
 #include "motor_model.hpp"
 #include "pin_models.hpp"
+#include "r4link/simulated_pins.hpp"
 #include "ultrasonic_model.hpp"
 
 namespace r4 {
 namespace sim {
-
-// What all outputs of the board do.
-struct Pins : ChipPins {
-  struct Stepper {
-    std::int32_t position = 0;  // pulses since power came, forward less backward
-    std::int8_t stepping = 0;   // 1 forward, -1 backward, 0: no pulse for stepper_pause_ms
-  };
-  Stepper stepper[stepper_channels];
-
-  bool is_safe() const;
-};
-// Whether the outputs do the same; the steppers' positions do not count.
-bool operator==(const Pins& a, const Pins& b);
-inline bool operator!=(const Pins& a, const Pins& b) { return !(a == b); }
 
 class BoardModel {
  public:

@@ -5,7 +5,7 @@
 
 #include <cstdint>
 
-#include "../../../../protocol/messages/units.hpp"
+#include "r4link/vocabulary.hpp"
 
 namespace r4 {
 namespace sim {

@@ -7,8 +7,8 @@
 #include <fstream>
 
 #include "firmware/board_hardware.hpp"
-#include "protocol/messages/state.hpp"
-#include "transports/error.hpp"
+#include "r4link/error.hpp"
+#include "r4link/state.hpp"
 
 namespace r4::sim {
 namespace {

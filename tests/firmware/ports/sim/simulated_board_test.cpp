@@ -12,7 +12,8 @@
 
 #include "protocol/link/board_link.hpp"
 #include "protocol/messages/message.hpp"
-#include "protocol/messages/state.hpp"
+#include "protocol/messages/state_fields.hpp"
+#include "r4link/state.hpp"
 #include "tests/support/datagrams.hpp"
 #include "tests/support/every_channel.hpp"
 #include "transports/memory_carrier.hpp"
@@ -116,7 +117,7 @@ class SimulatedBoardTest : public testing::Test {
   std::uint32_t newest_t() const {
     for (auto line = listener_.heard.rbegin(); line != listener_.heard.rend(); ++line) {
       Datagram datagram;
-      if (read(*line, datagram) && kind_of(datagram) == MessageKind::board_heartbeat) {
+      if (read_datagram(*line, datagram) && kind_of(datagram) == MessageKind::board_heartbeat) {
         newest_t_ = static_cast<std::uint32_t>(datagram.time_ms());
         break;
       }
@@ -129,7 +130,7 @@ class SimulatedBoardTest : public testing::Test {
     for (const std::string& line : listener_.heard) {
       Datagram datagram;
       State state;
-      if (read(line, datagram) && kind_of(datagram) == MessageKind::state &&
+      if (read_datagram(line, datagram) && kind_of(datagram) == MessageKind::state &&
           read_state(datagram, state)) {
         states.push_back(state);
       }
@@ -471,7 +472,7 @@ TEST_F(SimulatedBoardTest, EveryChannelReachesItsPinAndComesBack) {
           std::uint32_t t_ms = 0;
           for (const std::string& line : listener_.heard) {
             Datagram datagram;
-            if (read(line, datagram) && kind_of(datagram) == MessageKind::state &&
+            if (read_datagram(line, datagram) && kind_of(datagram) == MessageKind::state &&
                 read_state(datagram, whole)) {
               t_ms = whole.t_ms;
             }

@@ -7,7 +7,8 @@
 #include <map>
 #include <set>
 
-#include "protocol/messages/state.hpp"
+#include "protocol/messages/state_fields.hpp"
+#include "r4link/state.hpp"
 #include "tests/support/datagrams.hpp"
 
 namespace r4::sim {
@@ -80,7 +81,8 @@ TEST(SimulatedHardware, AnalogInputsTakeTheValuesOfTheCapture) {
   for (const auto& line : test::paper_capture()) {
     Datagram datagram;
     State state;
-    if (!line.from_board || !read(line.bytes, datagram) || !read_state(datagram, state)) continue;
+    if (!line.from_board || !read_datagram(line.bytes, datagram) || !read_state(datagram, state))
+      continue;
     if (!state.present.has(StateField::ain24)) continue;
     for (int i = 0; i <= static_cast<int>(Analog::ainsteer); ++i) {
       captured[i].insert(state.analog_cv[i]);

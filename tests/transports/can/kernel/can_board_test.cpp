@@ -2,7 +2,7 @@
 // A board on a CAN bus with its host, channel by channel.
 #include <gtest/gtest.h>
 
-#include "host/board.hpp"
+#include "r4link/board.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/every_channel.hpp"
 

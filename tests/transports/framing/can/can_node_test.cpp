@@ -173,7 +173,7 @@ TEST(CanNode, AnEmergencyFrameOfAnyContentIsAStop) {
     frame.size = size;
     Datagram datagram;
     const Text stop = bus.board.on_frame(frame, bus.now_us);
-    ASSERT_TRUE(read(stop, datagram)) << str(stop);
+    ASSERT_TRUE(read_datagram(stop, datagram)) << str(stop);
     EXPECT_EQ(str(datagram.find("E").values()), "STOP");
     EXPECT_TRUE(bus.host.on_frame(frame, bus.now_us).empty());
     frame.extended = true;

@@ -11,9 +11,10 @@
 #include <string>
 #include <vector>
 
-#include "protocol/datagram/refusal.hpp"
 #include "protocol/messages/settings.hpp"
-#include "protocol/messages/state.hpp"
+#include "protocol/messages/state_fields.hpp"
+#include "r4link/state.hpp"
+#include "r4link/vocabulary.hpp"
 #include "tests/support/datagrams.hpp"
 #include "transports/framing/can/packed_layout.hpp"
 #include "transports/framing/can/packed_words.hpp"
@@ -410,7 +411,7 @@ RC_GTEST_PROP(PackedForm, AnyBytesUnpackSafelyToTheGrammarOrARefusal, ()) {
   // With the right checksum it would be a datagram, unless a PNum or T is out of range.
   out.resize(result.size);
   Datagram datagram;
-  const ReadResult read_result = read(out, datagram);
+  const ReadResult read_result = read_datagram(out, datagram);
   RC_ASSERT(read_result.error != ReadError::length);
   if (read_result.error == ReadError::syntax) {
     RC_ASSERT(out.find("PNum:") != std::string::npos || out.find("T:") != std::string::npos);
@@ -459,7 +460,7 @@ Fate fate_of(const Bytes& damaged, const std::string& original) {
   if (!result) return Fate::refused;
   if (Text(out, result.size) == Text(original)) return Fate::same;
   Datagram datagram;
-  return read(Text(out, result.size), datagram) ? Fate::other : Fate::refused;
+  return read_datagram(Text(out, result.size), datagram) ? Fate::other : Fate::refused;
 }
 
 TEST(PackedForm, NoOneOrTwoDamagedBitsMakeAnotherDatagram) {

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "r4link/subscription.hpp"
+
 namespace r4 {
 
 // What stands behind a Subscription.
@@ -56,41 +58,6 @@ class Subscriber {
   std::recursive_mutex running_;
   std::atomic<bool> ended_{false};
   bool called_ = false;
-};
-
-// One callback. Letting go of this handle leaves the callback where it is.
-class Subscription {
- public:
-  Subscription() = default;  // one that has ended
-  explicit Subscription(const std::shared_ptr<Subscriber>& subscriber) : subscriber_(subscriber) {}
-
-  // Ends it. When this returns, the callback will not be called again and, unless this is called
-  // within it, is not running. Idempotent, from any thread, also when the board is gone.
-  void cancel() {
-    if (const std::shared_ptr<Subscriber> subscriber = subscriber_.lock()) subscriber->end();
-    subscriber_.reset();
-  }
-
- private:
-  std::weak_ptr<Subscriber> subscriber_;
-};
-
-// Ends its subscription with its own end.
-class ScopedSubscription {
- public:
-  ScopedSubscription() = default;
-  ScopedSubscription(Subscription subscription)  // NOLINT(google-explicit-constructor)
-      : subscription_(std::move(subscription)) {}
-  ScopedSubscription(ScopedSubscription&& other) noexcept
-      : subscription_(std::exchange(other.subscription_, {})) {}
-  ScopedSubscription& operator=(ScopedSubscription&& other) noexcept {
-    std::swap(subscription_, other.subscription_);
-    return *this;
-  }
-  ~ScopedSubscription() { subscription_.cancel(); }
-
- private:
-  Subscription subscription_;
 };
 
 // The callbacks of one kind. Added from any thread, called from one; a call allocates nothing.

@@ -9,8 +9,9 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "../datagram/refusal.hpp"
-#include "../datagram/text.hpp"
+#include "config.hpp"
+#include "text.hpp"
+#include "vocabulary.hpp"
 
 namespace r4 {
 
@@ -22,17 +23,17 @@ struct Key {
   std::uint8_t id = 0;  // 1-9; 0: no key
   std::uint8_t bytes[key_size] = {};
 };
-bool operator==(const Key& a, const Key& b);
+R4LINK_API bool operator==(const Key& a, const Key& b);
 inline bool operator!=(const Key& a, const Key& b) { return !(a == b); }
 
 // Refusal::format for what is not of that form, ::range for another id; `out` is only written on
 // Refusal::none.
-Refusal parse_key(Text text, Key& out);
+R4LINK_API Refusal parse_key(Text text, Key& out);
 // Splits a text "<id>:<rest>" whose id is in range; as parse_key.
-Refusal split_key(Text text, std::uint8_t& id, Text& rest);
+R4LINK_API Refusal split_key(Text text, std::uint8_t& id, Text& rest);
 
 constexpr std::size_t key_text_size = 2 + 2 * key_size;
 // Writes the text of a key and returns the position behind it.
-char* write_key(char* out, const Key& key);
+R4LINK_API char* write_key(char* out, const Key& key);
 
 }  // namespace r4

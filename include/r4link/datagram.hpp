@@ -6,7 +6,7 @@
 //     name     = 1*(%x21-7E except ":" ";" "," "^")
 //     value    = *(%x20-7E except ";" "," "^")
 //
-// read() accepts a datagram whole or not at all. What it accepts is a view: it holds no copy and is
+// read_datagram() accepts a datagram whole or not at all. What it accepts is a view: it holds no copy and is
 // valid as long as the bytes are. Reading costs no heap and one pass over the bytes besides the
 // CRC; going over the fields costs no second one.
 #pragma once
@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "config.hpp"
 #include "text.hpp"
 
 namespace r4 {
@@ -29,7 +30,7 @@ enum class ReadError : std::uint8_t {
 };
 
 // "length", "syntax", "crc"; "" for none.
-const char* to_text(ReadError error);
+R4LINK_API const char* to_text(ReadError error);
 
 // The outcome of reading: where it went wrong (a byte offset; for crc that of the claimed
 // checksum's first digit) and, for crc, both checksums.
@@ -42,7 +43,7 @@ struct ReadResult {
 };
 
 // One field: its name and its comma-separated values.
-class Field {
+class R4LINK_API Field {
  public:
   Field() = default;
   Field(Text name, Text values) : name_(name), values_(values) {}
@@ -59,14 +60,14 @@ class Field {
 
 // Reads one field that stands alone, without its semicolon: "O:358,1,1". False if it is not of the
 // grammar above; `out` is only written on success.
-bool read_field(Text text, Field& out);
+R4LINK_API bool read_field(Text text, Field& out);
 
 // Is a field with this letter for its name a command? Of T (time) and A (authentication) it is not.
 constexpr bool is_command_letter(char c) {
   return ((c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z')) && c != 'T' && c != 'A';
 }
 
-class Datagram {
+class R4LINK_API Datagram {
  public:
   // Forward iteration over the fields in the order of the wire. Valid as long as the Datagram is.
   class Iterator {
@@ -120,7 +121,7 @@ class Datagram {
   const Field& command() const { return command_; }
 
  private:
-  friend ReadResult read(Text bytes, Datagram& out);
+  friend ReadResult read_datagram(Text bytes, Datagram& out);
   // Reads PNum and T, and finds the letters, which are among the names whose ends are in
   // `short_names`; where a number is wrong, nullptr if none is.
   const char* read_short_names(const std::uint64_t* short_names);
@@ -180,6 +181,6 @@ inline void Datagram::Iterator::load() {
 // Checks `bytes` (one datagram, with or without its line terminator) and makes `out` a view of it.
 // Never fails but by its result; `out` is only written on success. A PNum or T that is not a whole
 // number in range (32 bit, 64 bit), or is there twice, is `syntax`. Linear in the size.
-ReadResult read(Text bytes, Datagram& out);
+R4LINK_API ReadResult read_datagram(Text bytes, Datagram& out);
 
 }  // namespace r4

@@ -32,18 +32,12 @@
 #include <string>
 #include <string_view>
 
-#include "board_options.hpp"
+#include "carrier.hpp"
+#include "config.hpp"
+#include "options.hpp"
 #include "subscription.hpp"
 
-namespace asio {
-class io_context;
-}
-
 namespace r4 {
-
-// A transport of your own for the loop of a board's thread, not yet open. What it does there must not
-// block: while it does, nothing is sent.
-using CarrierMaker = std::function<std::unique_ptr<Carrier>(asio::io_context& loop)>;
 
 // Callbacks that are there before the transport is opened, so that they are told everything.
 struct BoardCallbacks {
@@ -55,14 +49,15 @@ struct BoardCallbacks {
   std::function<void(const RefusedPost&)> on_refused;
 };
 
-class Board {
+class R4LINK_API Board {
  public:
   using Duration = std::chrono::milliseconds;
   static constexpr Duration default_timeout{1000};
 
   // Opens the transport and begins the link; returns without waiting for the board. Throws Error.
   explicit Board(std::string_view url, BoardOptions options = {}, BoardCallbacks callbacks = {});
-  explicit Board(const CarrierMaker& make, BoardOptions options = {}, BoardCallbacks callbacks = {});
+  explicit Board(const CarrierMaker& make, BoardOptions options = {},
+                 BoardCallbacks callbacks = {});
   ~Board();
   Board(const Board&) = delete;
   Board& operator=(const Board&) = delete;

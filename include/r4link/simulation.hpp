@@ -16,12 +16,13 @@
 #include <string>
 #include <string_view>
 
-#include "../../../protocol/messages/units.hpp"
-#include "robot/board_model.hpp"
+#include "config.hpp"
+#include "simulated_pins.hpp"
+#include "state.hpp"
 
 namespace r4::sim {
 
-class SimulatedRobot {
+class R4LINK_API SimulatedRobot {
  public:
   SimulatedRobot();
   ~SimulatedRobot();
@@ -31,7 +32,7 @@ class SimulatedRobot {
   // "sim:?robot=1": a board that is in this world, for one link at a time while this object lives.
   const std::string& url() const;
 
-  // Something happens, "us 1 15" (script.hpp has all of them): at once while the board is open, which
+  // Something happens, "us 1 15" (docs/simulation.md has all of them): at once while the board is open, which
   // does not mean before this returns. Throws Error{data} for words that say nothing of the kind.
   void happen(std::string_view words);
 

@@ -2,20 +2,23 @@
 // How whole datagrams travel: the interface that every transport implements.
 //
 // A carrier moves datagrams like UDP does: it may lose and reorder them, it never blocks, and it
-// never corrupts silently (the datagram's CRC is checked above it). It lives on one io_context and
-// is used from that io_context's thread only. The first open() throws when the transport cannot be
+// never corrupts silently (the datagram's CRC is checked above it). It lives on one event loop (Loop, or
+// an io_context of Asio's) and is used from that loop's thread only. The first open() throws when the transport cannot be
 // opened; after that, trouble is an event, and the carrier comes back by itself when the device
 // does.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 
+#include "config.hpp"
 #include "error.hpp"
-#include "framing/delivery.hpp"
+#include "vocabulary.hpp"
 
 namespace r4 {
 
@@ -67,9 +70,32 @@ struct CarrierEvent {
   Problem problem;  // for up: thing is the transport, the rest is empty
 };
 
-class Carrier {
+// "up", "down", "warning".
+constexpr const char* to_text(CarrierEvent::Kind kind) {
+  switch (kind) {
+    case CarrierEvent::Kind::up:
+      return "up";
+    case CarrierEvent::Kind::down:
+      return "down";
+    case CarrierEvent::Kind::warning:
+      break;
+  }
+  return "warning";
+}
+
+// The loop of a board's thread, on which its carrier lives.
+class Loop {
  public:
-  // Called on the io_context's thread, never from within send(); may call anything of the carrier,
+  // Calls `function()` there, after what was posted before it. From any thread, also from there.
+  virtual void post(std::function<void()> function) = 0;
+
+ protected:
+  ~Loop() = default;
+};
+
+class R4LINK_API Carrier {
+ public:
+  // Called on the loop's thread, never from within send(); may call anything of the carrier,
   // but must not destroy it.
   class Handler {
    public:
@@ -114,5 +140,9 @@ class Carrier {
   virtual const std::string& name() const = 0;
   virtual const CarrierCounters& counters() const = 0;
 };
+
+// Makes a transport of your own for the loop of a board's thread, not yet open. What it does there must
+// not block: while it does, nothing is sent. `loop` outlives it.
+using CarrierMaker = std::function<std::unique_ptr<Carrier>(Loop& loop)>;
 
 }  // namespace r4

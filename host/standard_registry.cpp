@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The one place where the host knows the simulated board.
-#include "../firmware/ports/sim/sim_carrier.hpp"
+#include "standard_registry.hpp"
 
-#include "../transports/registry.hpp"
-#include "async_board.hpp"
+#include "../firmware/ports/sim/sim_carrier.hpp"
 
 namespace r4 {
 

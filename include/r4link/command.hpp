@@ -1,17 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Every command of the board, typed and checked (paper section 4.2; docs/protocol.md).
-//
-// The same parser serves the board, the host's `r4 send` text and the tests, so what one side sends
-// the other side takes.
 #pragma once
 
 #include <cstdint>
 
-#include "../datagram/datagram.hpp"
-#include "../datagram/datagram_writer.hpp"
-#include "../datagram/refusal.hpp"
-#include "state.hpp"
-#include "units.hpp"
+#include "config.hpp"
+#include "vocabulary.hpp"
 
 namespace r4 {
 
@@ -37,7 +31,7 @@ enum class CommandKind : std::uint8_t {
 
 // One command. Which members count depends on `kind`; the factories set them. `text` and `text2`
 // are views: they must outlive the command.
-struct Command {
+struct R4LINK_API Command {
   Command() {}  // NOLINT(modernize-use-equals-default): else GCC calls memset for it
   CommandKind kind = CommandKind::heartbeat;
   std::uint8_t channel = 0;  // 1 … the kind's channel count
@@ -69,28 +63,10 @@ struct Command {
 };
 
 // Does it drive an output? Those are refused in the safe state: O D S R P B Z.
-bool drives_output(CommandKind kind);
+R4LINK_API bool drives_output(CommandKind kind);
 
-// Is there E:STOP among its fields? A stop is obeyed whatever else is in its datagram.
-bool asks_to_stop(const Datagram& datagram);
-
-// By what number does a stop ask to be confirmed? Its field STOP, else its PNum. False: by none.
-constexpr Text stop_number_name("STOP");
-bool stop_number(const Datagram& datagram, std::uint32_t& out);
-
-// Reads a command field. Refusal::unknown (no such letter or word), ::format (number of values, an
-// empty one, not a whole number), ::channel, ::range (also a number too large for any type), in
-// this order; `out` is only written on Refusal::none. Its texts are views of `field`. Ranges of
-// settings and names of fields are checked by settings.hpp and parse_fields.
-Refusal parse_command(const Field& field, Command& out);
-
-// The ranges that parse_command checks, for a command made by a factory.
-Refusal check(const Command& command);
-
-// Appends the command's field: "O:358,1,1;".
-void write_command(DatagramWriter& writer, const Command& command);
-
-// `F` values: "DEFAULT", "ALL" or field names, comma-separated. Refusal::unknown for another name.
-Refusal parse_fields(Text list, FieldSet& out);
+// Is every value of a command, made by a factory, in its range? Refusal::format, ::channel or ::range if
+// not; settings and names of fields are not looked at.
+R4LINK_API Refusal check_command(const Command& command);
 
 }  // namespace r4

@@ -7,7 +7,8 @@
 #include <string>
 #include <utility>
 
-#include "../protocol/datagram/refusal.hpp"
+#include "config.hpp"
+#include "vocabulary.hpp"
 
 namespace r4 {
 
@@ -29,14 +30,14 @@ enum class Outcome : std::uint8_t {
   timed_out,  // no confirmation until the deadline; it may or may not have been executed
   cancelled,  // given up: a stop, or a newer cause to be safe, came first
   closed,     // given up: the board was closed
-  blocked,    // not sent: the board's thread does not answer
+  blocked,    // the board's thread does not answer: not sent, or not confirmed
   full,       // not taken: Session::max_pending commands are under way already
   not_armed,  // not sent: it drives an output and the session is not armed, because of `disarmed`;
               // arm() itself: it cannot be armed while that is so
 };
 
 // "confirmed", "refused", "timed out" …
-const char* to_text(Outcome outcome);
+R4LINK_API const char* to_text(Outcome outcome);
 
 // A problem in words: "/dev/ttyACM0: permission denied; add yourself to the group dialout: …".
 struct Problem {
@@ -51,7 +52,7 @@ struct Problem {
   std::string text() const { return thing + ": " + reason + (fix.empty() ? "" : "; " + fix); }
 };
 
-class Error : public std::runtime_error {
+class R4LINK_API Error : public std::runtime_error {
  public:
   explicit Error(Problem problem)
       : std::runtime_error(problem.text()), problem_(std::move(problem)) {}

@@ -2,7 +2,7 @@
 // r4::AsyncBoard: a board for programs that have an Asio loop of their own.
 //
 //     asio::io_context io;
-//     r4::AsyncBoard board(io, "serial:auto");
+//     r4::AsyncBoard board(io, "serial:auto");       // or io.get_executor()
 //     board.open();
 //     board.async_send(r4::Command::osmc(358, r4::Direction::forward, 1), 500ms,
 //                      [](const r4::CommandResult& result) { … });
@@ -11,7 +11,9 @@
 // Everything happens on the io_context's thread: call it there, or before it runs; the callbacks
 // come there. Completion tokens work: callbacks, asio::use_future, asio::use_awaitable; a handler
 // runs on its associated executor, never inside the call that started it. A failure to execute a
-// command is a result, not an exception: explain.hpp puts it into words.
+// command is a result, not an exception: explain() (link.hpp) puts it into words. A handler's cancellation
+// slot gives the command up: it ends as cancelled and is sent no more, though it may have been executed. A
+// stop goes on all the same; only the wait for it ends.
 //
 // Callbacks and completion handlers may call anything here, destroy the board included. What one
 // throws leaves io.run(), as from any handler of Asio, but never by way of the transport: reception
@@ -19,40 +21,49 @@
 #pragma once
 
 #include <asio/associated_allocator.hpp>
+#include <asio/associated_cancellation_slot.hpp>
 #include <asio/associated_executor.hpp>
 #include <asio/async_result.hpp>
+#include <asio/cancellation_type.hpp>
 #include <asio/dispatch.hpp>
 #include <asio/executor_work_guard.hpp>
 #include <asio/io_context.hpp>
 #include <asio/post.hpp>
 #include <asio/recycling_allocator.hpp>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
 
-#include "board_options.hpp"
-#include "commands/command_help.hpp"
-#include "session/limits.hpp"
+#include "carrier.hpp"
+#include "datagram.hpp"
+#include "options.hpp"
 #include "subscription.hpp"
 
 namespace r4 {
 
-class Registry;
-
 class AsyncBoard {
  public:
   using Duration = std::chrono::milliseconds;
+  using executor_type = asio::io_context::executor_type;
 
-  // A URL of standard_registry(); throws Error{usage} for a wrong one. `io` must outlive the board.
-  AsyncBoard(asio::io_context& io, std::string_view url, BoardOptions options = {});
-  // The same on a transport made elsewhere, not yet open.
-  AsyncBoard(asio::io_context& io, std::unique_ptr<Carrier> carrier, BoardOptions options = {});
+  // Throws Error{usage} for a wrong URL. The io_context must outlive the board.
+  AsyncBoard(const executor_type& executor, std::string_view url, BoardOptions options = {});
+  AsyncBoard(asio::io_context& io, std::string_view url, BoardOptions options = {})
+      : AsyncBoard(io.get_executor(), url, std::move(options)) {}
+  // The same on a transport of your own, not yet open.
+  AsyncBoard(const executor_type& executor, std::unique_ptr<Carrier> carrier,
+             BoardOptions options = {});
+  AsyncBoard(asio::io_context& io, std::unique_ptr<Carrier> carrier, BoardOptions options = {})
+      : AsyncBoard(io.get_executor(), std::move(carrier), std::move(options)) {}
   // Does what close() does.
   ~AsyncBoard();
   AsyncBoard(const AsyncBoard&) = delete;
   AsyncBoard& operator=(const AsyncBoard&) = delete;
+
+  executor_type get_executor() const noexcept;
 
   // Opens the transport and begins the link: the first heartbeat goes out at once. Throws Error;
   // once only.
@@ -178,10 +189,26 @@ class AsyncBoard {
   void hold_heartbeats(bool held);
 
  private:
+  struct Impl;
+
+  // Gives a command up that is under way, unless it has ended.
+  class Cancel {
+   public:
+    Cancel(std::weak_ptr<Impl> impl, std::uint64_t command)
+        : impl_(std::move(impl)), command_(command) {}
+    void operator()(asio::cancellation_type type) const;
+
+   private:
+    std::weak_ptr<Impl> impl_;
+    std::uint64_t command_;
+  };
+
   // A completion handler of any type, kept until its command ends.
   class Completion {
    public:
     enum class How : std::uint8_t { dispatch, post };
+    // Has the handler's cancellation slot give the command up.
+    virtual void listen(const Cancel& cancel) = 0;
     // Frees the memory, then hands the result to the handler's executor.
     virtual void complete(const CommandResult& result, How how) = 0;
     virtual void destroy() noexcept = 0;
@@ -201,7 +228,9 @@ class AsyncBoard {
   template <class Handler>
   CompletionPtr make_completion(Handler handler);
 
-  asio::io_context::executor_type executor() const;
+  // Throw Error{usage} for a time that none can be.
+  static void require_timeout(std::string_view what, Duration timeout);
+  static void require_wait(std::string_view what, Duration timeout);
   void start_send(const Command& command, Duration timeout, CompletionPtr completion);
   void start_stop(Duration timeout, CompletionPtr completion);
   void start_arm(Duration timeout, CompletionPtr completion);
@@ -210,14 +239,12 @@ class AsyncBoard {
   void start_link_timing(Duration board_timeout, Duration heartbeat, Duration timeout,
                          CompletionPtr completion);
 
-  struct Impl;
   class TimingSteps;
   std::shared_ptr<Impl> impl_;
 };
 
-// The transports of the library: those of transports/ and `sim:`, the simulated board in this
-// process.
-const Registry& standard_registry();
+// The loop of a Board's thread, for a transport that is made of Asio's objects.
+asio::io_context& context_of(Loop& loop);
 
 // --- implementation of the templates
 
@@ -236,19 +263,24 @@ struct AsyncBoard::Bound {
 
 template <class Handler>
 class AsyncBoard::Typed final : public Completion {
-  using Executor = asio::associated_executor_t<Handler, asio::io_context::executor_type>;
+  using Executor = asio::associated_executor_t<Handler, executor_type>;
   using Allocator = typename std::allocator_traits<
       typename Bound<Handler>::allocator_type>::template rebind_alloc<Typed>;
   using Traits = std::allocator_traits<Allocator>;
 
  public:
-  static CompletionPtr make(Handler handler, const asio::io_context::executor_type& io) {
+  static CompletionPtr make(Handler handler, const executor_type& loop) {
     Allocator allocator = allocator_of(handler);
     Typed* place = Traits::allocate(allocator, 1);
-    return CompletionPtr(new (place) Typed(std::move(handler), io));
+    return CompletionPtr(new (place) Typed(std::move(handler), loop));
   }
 
+  void listen(const Cancel& cancel) override {
+    auto slot = asio::get_associated_cancellation_slot(handler_);
+    if (slot.is_connected()) slot.assign(cancel);
+  }
   void complete(const CommandResult& result, How how) override {
+    ignore_cancellation();
     Allocator allocator = allocator_of(handler_);
     const auto work = std::move(work_);
     Bound<Handler> bound{std::move(handler_), result};
@@ -260,15 +292,20 @@ class AsyncBoard::Typed final : public Completion {
     }
   }
   void destroy() noexcept override {
+    ignore_cancellation();
     Allocator allocator = allocator_of(handler_);
     free(allocator);
   }
 
  private:
-  Typed(Handler handler, const asio::io_context::executor_type& io)
-      : handler_(std::move(handler)), work_(asio::get_associated_executor(handler_, io)) {}
+  Typed(Handler handler, const executor_type& loop)
+      : handler_(std::move(handler)), work_(asio::get_associated_executor(handler_, loop)) {}
   ~Typed() = default;
 
+  void ignore_cancellation() noexcept {
+    auto slot = asio::get_associated_cancellation_slot(handler_);
+    if (slot.is_connected()) slot.clear();
+  }
   static Allocator allocator_of(const Handler& handler) noexcept {
     return Allocator(asio::get_associated_allocator(handler, asio::recycling_allocator<void>()));
   }
@@ -283,7 +320,7 @@ class AsyncBoard::Typed final : public Completion {
 
 template <class Handler>
 AsyncBoard::CompletionPtr AsyncBoard::make_completion(Handler handler) {
-  return Typed<Handler>::make(std::move(handler), executor());
+  return Typed<Handler>::make(std::move(handler), get_executor());
 }
 
 }  // namespace r4

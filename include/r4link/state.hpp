@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The board's state as typed values, and the fields that carry it (paper section 4.1).
 //
-// One table (state.cpp) names every field, its unit and where it lives in State; the board writes
-// with it, the host reads with it, the `F` command selects from it.
+// One table (protocol/messages/state.cpp) names every field, its unit and where it lives in State; the
+// board writes with it, the host reads with it, the `F` command selects from it.
 #pragma once
 
 #include <cstdint>
 
-#include "chip_fault.hpp"
-#include "../datagram/datagram.hpp"
-#include "../datagram/datagram_writer.hpp"
-#include "units.hpp"
+#include "config.hpp"
+#include "text.hpp"
+#include "vocabulary.hpp"
 
 namespace r4 {
 
@@ -99,7 +98,7 @@ enum class StateField : std::uint8_t {
 constexpr int state_field_count = static_cast<int>(StateField::count);
 
 // A set of state fields: the preamble's selection, or what a datagram brought.
-class FieldSet {
+class R4LINK_API FieldSet {
  public:
   constexpr FieldSet() = default;
   constexpr bool has(StateField f) const { return (words_[word_of(f)] & bit_of(f)) != 0; }
@@ -213,20 +212,8 @@ struct State {
 };
 
 // The field's name on the wire, "AIN24".
-Text name_of(StateField field);
+R4LINK_API Text name_of(StateField field);
 // The field of that name; StateField::count if there is none. Constant time.
-StateField state_field(Text name);
-
-// Appends one field with its values from `state`.
-void write_field(DatagramWriter& writer, StateField field, const State& state);
-
-// The value of SAFE. A number without a meaning here, a newer board's, is a fault. False if it is
-// no number.
-bool parse_safe_reason(Text text, SafeReason& out);
-
-// Reads the state fields of `datagram` into `state` and sets `present`, `pnum` and `t_ms`. Unknown
-// fields are passed over (they stay reachable through the datagram). Returns false, with `state`
-// untouched, when a known field has values that are not of its form or range, or stands twice.
-bool read_state(const Datagram& datagram, State& state);
+R4LINK_API StateField state_field(Text name);
 
 }  // namespace r4

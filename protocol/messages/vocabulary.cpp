@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "units.hpp"
+#include "r4link/vocabulary.hpp"
 
 namespace r4 {
 

@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "async_board_impl.hpp"
+
+#include <algorithm>
+#include <string>
+
+namespace r4 {
+
+namespace {
+
+// The session counts from the steady clock; since 1970 it is this much more.
+SessionOptions with_clock(SessionOptions options, Time now) {
+  const auto epoch = std::chrono::system_clock::now().time_since_epoch();
+  options.clock_start = std::chrono::duration_cast<Time>(epoch) - now;
+  return options;
+}
+
+// Not in the event loop for this long: what has come meanwhile is a backlog, and of its states only
+// the newest is told.
+constexpr Time held_up{std::chrono::milliseconds{50}};
+// What was due so long ago is told of: two heartbeats were late.
+constexpr Time very_late{std::chrono::milliseconds{200}};
+
+}  // namespace
+
+AsyncBoard::Impl::Impl(asio::io_context& context, std::unique_ptr<Carrier> transport,
+                       BoardOptions options)
+    : io(context),
+      carrier(std::move(transport)),
+      heartbeat_ms(options.session.timing.heartbeat_ms),
+      session(*this, with_clock(std::move(options.session), steady_now()),
+              Session::random_first_pnum()),
+      timer(context) {
+  waiting.reserve(Session::max_pending + Session::max_stops);
+  ended.reserve(Session::max_pending + Session::max_stops);
+}
+
+Time AsyncBoard::Impl::time_of(Duration timeout) {
+  return std::clamp<Duration>(timeout, Duration{0}, std::chrono::hours{24});
+}
+
+// --- entering the session
+
+// By how much what was due is late; 0 inside another entry.
+Time AsyncBoard::Impl::begin_entry(Completion::How way) {
+  if (depth == 0) how = way;
+  const Time before = std::exchange(now, steady_now());
+  if (now - before > held_up) in_backlog = true;
+  return is_open && depth == 0 ? now - due : Time{0};
+}
+
+void AsyncBoard::Impl::end_entry(Time late) {
+  if (is_open && late > very_late) tell_that_it_was_held_up(late);
+  settle();
+}
+
+void AsyncBoard::Impl::tell_that_it_was_held_up(Time late) {
+  const Inside inside(depth);
+  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(late).count();
+  call(event_callbacks,
+       CarrierEvent{CarrierEvent::Kind::warning,
+                    Problem{ErrorKind::refused, "the event loop",
+                            "it was held up: what was due went out " + std::to_string(ms) +
+                                " ms late, heartbeats too",
+                            "a handler must return at once; do the work in another thread"}});
+}
+
+void AsyncBoard::Impl::settle() {
+  const Inside inside(depth);
+  for (;;) {
+    // Handlers that are dispatched may start commands, whose ends are appended.
+    while (!ended.empty()) {
+      Ended first = std::move(ended.front());
+      ended.erase(ended.begin());
+      guarded([&] { first.completion.release()->complete(first.result, how); });
+    }
+    if (poll_wanted && is_open) {
+      poll_wanted = false;
+      due = session.poll(now);
+    } else if (!end_waits()) {
+      break;
+    }
+  }
+  if (is_open) arm();
+}
+
+// Ends the waits that are over; false if none is.
+bool AsyncBoard::Impl::end_waits() {
+  const LinkStatus& link = session.link();
+  const bool active = link.state == HostLinkState::active && link.in_control;
+  bool any = false;
+  for (std::size_t i = 0; i < waiters.size();) {
+    Waiter& waiter = waiters[i];
+    const Outcome outcome = !is_open ? Outcome::closed
+                            : active ? Outcome::confirmed
+                                     : Outcome::timed_out;
+    if (outcome == Outcome::timed_out && now < waiter.deadline) {
+      ++i;
+      continue;
+    }
+    any = true;
+    ended.push_back({{outcome, Refusal::none, now - waiter.started}, std::move(waiter.completion)});
+    waiters.erase(waiters.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  return any;
+}
+
+// --- what the user starts
+
+void AsyncBoard::Impl::wait_active(Duration timeout, CompletionPtr completion) {
+  enter(Completion::How::post, [&] {
+    const Ticket ticket = next_waiter++;
+    completion->listen(Cancel(weak_from_this(), ticket));
+    waiters.push_back({ticket, now, now + time_of(timeout), std::move(completion)});
+  });
+}
+
+void AsyncBoard::Impl::cancel(Ticket ticket) {
+  enter(Completion::How::post, [&] {
+    const auto waiter = std::find_if(waiters.begin(), waiters.end(),
+                                     [ticket](const Waiter& w) { return w.ticket == ticket; });
+    if (waiter != waiters.end()) {
+      ended.push_back({{Outcome::cancelled, Refusal::none, now - waiter->started},
+                       std::move(waiter->completion)});
+      waiters.erase(waiter);
+      return;
+    }
+    session.cancel(ticket, now);
+    on_result(ticket, {Outcome::cancelled});  // of a stop, which goes on
+    poll_wanted = true;
+  });
+}
+
+void AsyncBoard::Impl::open() {
+  if (is_open || closed) {
+    throw Error(ErrorKind::usage, carrier->name(), "a board is opened once",
+                "make another one for the same URL");
+  }
+  carrier->open(*this);
+  if (closed) return;  // by the callback that was told that it is open
+  is_open = true;
+  due = steady_now();
+  enter(Completion::How::post, [this] { due = session.poll(now); });
+}
+
+void AsyncBoard::Impl::close() {
+  if (closed) return;
+  closed = true;
+  is_open = false;
+  carrier->close();
+  timer.cancel();
+  how = Completion::How::post;
+  enter(Completion::How::post, [this] { session.end_all(now); });
+}
+
+// --- time
+
+// The timer is only set when it must ring earlier than it will; ringing early costs one poll.
+void AsyncBoard::Impl::arm() {
+  Time next = due;
+  for (const Waiter& waiter : waiters) next = std::min(next, waiter.deadline);
+  if (armed && armed_for <= next) return;
+  armed = true;
+  armed_for = next;
+  timer.expires_at(std::chrono::steady_clock::time_point(next));
+  timer.async_wait([self = shared_from_this()](const std::error_code& error) {
+    if (!error) self->on_timer();
+  });
+}
+
+void AsyncBoard::Impl::on_timer() {
+  if (!is_open) return;
+  armed = false;
+  enter(Completion::How::dispatch, [this] { due = session.poll(now); });
+}
+
+// --- Carrier::Handler
+
+void AsyncBoard::Impl::on_datagram(std::string_view bytes, Peer) {
+  enter(Completion::How::dispatch, [&] {
+    session.receive(bytes, now);
+    poll_wanted = true;
+  });
+}
+
+void AsyncBoard::Impl::on_drained() {
+  in_backlog = false;
+  if (backlog_size == 0) return;
+  const std::size_t size = std::exchange(backlog_size, 0);
+  enter(Completion::How::dispatch, [&] {
+    Datagram datagram;
+    if (is_open && read_datagram(Text(backlog.data(), size), datagram)) {
+      call(state_callbacks, session.state(), datagram);
+    }
+  });
+}
+
+void AsyncBoard::Impl::on_carrier_event(const CarrierEvent& event) {
+  enter(Completion::How::dispatch, [&] {
+    call(event_callbacks, event);
+    if (event.kind != CarrierEvent::Kind::warning) {
+      session.on_transport(event.kind == CarrierEvent::Kind::up, now);
+    }
+    poll_wanted = true;
+  });
+}
+
+// --- Session::Handler
+
+SendResult AsyncBoard::Impl::transmit(std::string_view datagram, Priority priority) {
+  return is_open ? carrier->send(datagram, priority) : SendResult::down;
+}
+
+void AsyncBoard::Impl::on_state(const ReceivedState& state, const Datagram& datagram) {
+  if (!is_open) return;
+  if (in_backlog) {
+    backlog_size = datagram.bytes().size();
+    std::copy_n(datagram.bytes().data(), backlog_size, backlog.data());
+  } else {
+    call(state_callbacks, state, datagram);
+  }
+}
+
+void AsyncBoard::Impl::on_board_heartbeat(const Datagram& datagram) {
+  if (is_open) call(heartbeat_callbacks, datagram);
+}
+
+void AsyncBoard::Impl::on_identity(const Identity& fresh) {
+  identity.firmware.assign(fresh.firmware.data(), fresh.firmware.size());
+  identity.board_id.assign(fresh.board_id.data(), fresh.board_id.size());
+  identity.capabilities.assign(fresh.capabilities.data(), fresh.capabilities.size());
+}
+
+void AsyncBoard::Impl::on_nack(const Nack& nack, const Datagram& datagram) {
+  if (is_open) call(nack_callbacks, nack, datagram);
+}
+
+void AsyncBoard::Impl::on_bad_datagram(const ReadResult& result, std::string_view bytes) {
+  if (is_open) call(bad_callbacks, result, bytes);
+}
+
+void AsyncBoard::Impl::on_link(const LinkStatus& status) {
+  if (is_open) call(link_callbacks, status);
+}
+
+void AsyncBoard::Impl::on_restart() {
+  backlog_size = 0;  // of the boot before
+  if (is_open) call(restart_callbacks);
+}
+
+void AsyncBoard::Impl::on_arming(DisarmCause cause) {
+  if (is_open) call(arming_callbacks, cause);
+}
+
+void AsyncBoard::Impl::on_refused(const RefusedPost& refused) {
+  if (is_open) call(refused_callbacks, refused);
+}
+
+void AsyncBoard::Impl::on_result(Ticket ticket, const CommandResult& result) {
+  const auto found = std::find_if(waiting.begin(), waiting.end(),
+                                  [ticket](const Waiting& w) { return w.ticket == ticket; });
+  if (found == waiting.end()) return;
+  ended.push_back({result, std::move(found->completion)});
+  if (found != waiting.end() - 1) *found = std::move(waiting.back());
+  waiting.pop_back();
+}
+
+}  // namespace r4

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What is behind an AsyncBoard: a session, its carrier and its timer, and who waits for what.
+//
+// Every call of the session is made inside enter(). The outermost one tells the results and sets the
+// timer afterwards; so no handler runs inside the session, or inside the call that started its command.
+#pragma once
+
+#include <array>
+#include <asio/post.hpp>
+#include <asio/steady_timer.hpp>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <memory>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "r4link/async_board.hpp"
+#include "session/session.hpp"
+#include "subscribers.hpp"
+
+namespace r4 {
+
+// Outlives the AsyncBoard where a callback or handler destroys that.
+struct AsyncBoard::Impl final : Carrier::Handler,
+                                Session::Handler,
+                                std::enable_shared_from_this<AsyncBoard::Impl> {
+  // A command under way, and one that has ended.
+  struct Waiting {
+    Ticket ticket = 0;
+    CompletionPtr completion;
+  };
+  // Who waits until the board is active; its ticket is none of the session's.
+  struct Waiter {
+    Ticket ticket = 0;
+    Time started{0};
+    Time deadline{0};
+    CompletionPtr completion;
+  };
+  struct Ended {
+    CommandResult result;
+    CompletionPtr completion;
+  };
+
+  Impl(asio::io_context& context, std::unique_ptr<Carrier> transport, BoardOptions options);
+
+  static Time steady_now() {
+    return std::chrono::duration_cast<Time>(std::chrono::steady_clock::now().time_since_epoch());
+  }
+  // A day is as good as for ever, and cannot overflow.
+  static Time time_of(Duration timeout);
+
+  // --- entering the session
+
+  // Runs the user's code. What it throws leaves io.run() in a handler of its own: through the
+  // transport, whose handler may be below us, it would end reception for ever.
+  template <class Code>
+  void guarded(Code code) {
+    try {
+      code();
+    } catch (...) {
+      asio::post(io, [error = std::current_exception()] { std::rethrow_exception(error); });
+    }
+  }
+  template <class... Arguments>
+  void call(const Subscribers<Arguments...>& callbacks, const Arguments&... arguments) {
+    callbacks.each([&](auto& one) { guarded([&] { one(arguments...); }); });
+  }
+
+  template <class Action>
+  void enter(Completion::How way, Action action) {
+    const Time late = begin_entry(way);
+    {
+      const Inside inside(depth);
+      if (fed.load(std::memory_order_relaxed) != 0) {
+        session.feed(Time{fed.exchange(0, std::memory_order_relaxed)});
+      }
+      action();
+    }
+    if (depth == 0) end_entry(late);
+  }
+  struct Inside {
+    explicit Inside(int& d) : depth(d) { ++depth; }
+    ~Inside() { --depth; }
+    Inside(const Inside&) = delete;
+    Inside& operator=(const Inside&) = delete;
+    int& depth;
+  };
+  Time begin_entry(Completion::How way);
+  void end_entry(Time late);
+  void tell_that_it_was_held_up(Time late);
+  void settle();
+  bool end_waits();
+
+  // --- what the user starts
+
+  // `start` hands the command to the session; its ticket is 0 if there is no room.
+  template <class Start>
+  void begin(CompletionPtr completion, Start start) {
+    enter(Completion::How::post, [&] {
+      const Ticket ticket = is_open ? start() : 0;
+      if (ticket != 0) {
+        completion->listen(Cancel(weak_from_this(), ticket));
+        waiting.push_back({ticket, std::move(completion)});
+        poll_wanted = true;
+      } else {
+        const Outcome outcome = is_open ? Outcome::full : Outcome::closed;
+        completion.release()->complete({outcome, Refusal::none, Time{0}}, Completion::How::post);
+      }
+    });
+  }
+  void wait_active(Duration timeout, CompletionPtr completion);
+  void cancel(Ticket ticket);
+  void open();
+  void close();
+
+  // --- time
+
+  void arm();
+  void on_timer();
+
+  // --- Carrier::Handler
+
+  void on_datagram(std::string_view bytes, Peer from) override;
+  void on_drained() override;
+  void on_carrier_event(const CarrierEvent& event) override;
+
+  // --- Session::Handler
+
+  SendResult transmit(std::string_view datagram, Priority priority) override;
+  void on_state(const ReceivedState& state, const Datagram& datagram) override;
+  void on_board_heartbeat(const Datagram& datagram) override;
+  void on_identity(const Identity& fresh) override;
+  void on_nack(const Nack& nack, const Datagram& datagram) override;
+  void on_bad_datagram(const ReadResult& result, std::string_view bytes) override;
+  void on_link(const LinkStatus& status) override;
+  void on_restart() override;
+  void on_arming(DisarmCause cause) override;
+  void on_refused(const RefusedPost& refused) override;
+  void on_result(Ticket ticket, const CommandResult& result) override;
+
+  asio::io_context& io;
+  std::unique_ptr<Carrier> carrier;
+  const std::uint32_t heartbeat_ms;  // between ours
+  Session session;
+  BoardIdentity identity;
+
+  Subscribers<ReceivedState, Datagram> state_callbacks;
+  Subscribers<Datagram> heartbeat_callbacks;
+  Subscribers<Nack, Datagram> nack_callbacks;
+  Subscribers<ReadResult, std::string_view> bad_callbacks;
+  Subscribers<LinkStatus> link_callbacks;
+  Subscribers<CarrierEvent> event_callbacks;
+  Subscribers<> restart_callbacks;
+  Subscribers<DisarmCause> arming_callbacks;
+  Subscribers<RefusedPost> refused_callbacks;
+
+  bool in_backlog = false;
+  std::array<char, max_datagram> backlog;  // the newest state of it
+  std::size_t backlog_size = 0;
+
+  std::vector<Waiting> waiting;
+  std::vector<Ended> ended;
+  std::vector<Waiter> waiters;
+  Ticket next_waiter = Ticket{1} << 63;
+  int depth = 0;  // calls of enter() and settle() under way
+  bool poll_wanted = false;
+  Completion::How how = Completion::How::post;
+  bool is_open = false;
+  bool closed = false;
+
+  Time now{0};
+  Time due{0};
+  asio::steady_timer timer;
+  bool armed = false;
+  Time armed_for{0};
+  std::atomic<Time::rep> fed{0};  // when feed() was called last; 0: the session knows it
+};
+
+}  // namespace r4

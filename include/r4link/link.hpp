@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a host knows of its link to a board: how it is, how well it does, what became of commands, and the
+// newest state.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "command.hpp"
+#include "config.hpp"
+#include "error.hpp"
+#include "state.hpp"
+#include "vocabulary.hpp"
+
+namespace r4 {
+
+// Time of the host's steady clock; any start.
+using Time = std::chrono::microseconds;
+
+// --- how the link is
+
+// Do our heartbeats and commands go out?
+enum class Gate : std::uint8_t {
+  open,
+  watchdog,  // no: the application watchdog was not fed
+  callback,  // no: a callback of the program does not return
+};
+
+// What is wrong with keys.
+enum class KeyTrouble : std::uint8_t {
+  none,
+  board_has_none,  // we have a key, and the board asks for no signature
+  needed,          // the board asks for a signature, and we have no key
+  not_taken,       // the board takes nothing that we sign, or does not hear it
+};
+// "none", "board has none", "needed", "not taken".
+R4LINK_API const char* to_text(KeyTrouble trouble);
+
+struct LinkStatus {
+  HostLinkState state = HostLinkState::connecting;
+  SafeReason reason = SafeReason::none;  // why the board is safe
+  bool busy = false;                     // another host controls the board
+  Gate gate = Gate::open;
+  KeyTrouble key = KeyTrouble::none;
+  bool in_control = false;      // the board takes our commands: they go out at once
+  bool transport_down = false;  // it is gone: unplugged, its interface switched off
+  ChipFault chip{};             // of a fault: the chip that is the cause, if it is one
+  bool gated() const { return gate != Gate::open; }
+  friend bool operator==(const LinkStatus&, const LinkStatus&) = default;
+};
+
+// --- whether the program may drive
+
+// Must a program be armed to drive?
+enum class Arming : std::uint8_t {
+  required,
+  off,  // output commands go out whenever the link is up
+};
+
+// Why a program is not armed.
+enum class DisarmCause : std::uint8_t {
+  none,       // it is armed
+  not_yet,    // arm() was not called yet
+  stop,       // an emergency stop
+  handle,     // the dead-man's handle was released
+  proximity,  // something came nearer than a threshold
+  watchdog,   // a duty of the board missed its deadline
+  fault,      // the board found a fault in itself
+  link,       // the link was lost, and the board did not bring its outputs back
+  restart,    // the board has begun again
+  supply,     // relay 1, the motor supply, was opened
+};
+// "stop", "not yet" …
+R4LINK_API const char* to_text(DisarmCause cause);
+
+// --- what became of a command
+
+// Of one that was waited for.
+struct CommandResult {
+  Outcome outcome = Outcome::timed_out;
+  Refusal code = Refusal::none;              // for refused
+  Time elapsed{0};                           // from the call to its end
+  DisarmCause disarmed = DisarmCause::none;  // for not_armed
+};
+
+// Of one that is sent once and not waited for. True where it was sent:
+//
+//     if (!board.post(setpoint)) …        if (board.post(setpoint) == PostResult::not_armed) …
+class PostResult {
+ public:
+  enum Value : std::uint8_t {
+    sent,
+    not_armed,   // it drives an output, and the program is not armed: call arm()
+    no_link,     // the link is not up, or the board does not take our commands yet
+    queue_full,  // too many wait to be sent already: try again later
+  };
+  PostResult(Value value) : value_(value) {}        // NOLINT(google-explicit-constructor)
+  operator bool() const { return value_ == sent; }  // NOLINT(google-explicit-constructor)
+  Value value() const { return value_; }            // for a switch
+  friend bool operator==(PostResult a, PostResult b) { return a.value_ == b.value_; }
+  friend bool operator==(PostResult a, Value b) { return a.value_ == b; }
+
+ private:
+  Value value_;
+};
+// "sent", "not armed", "no link", "queue full".
+R4LINK_API const char* to_text(PostResult result);
+
+// A command that post() took and that was not executed.
+struct RefusedPost {
+  Command command;               // without its texts
+  Refusal code = Refusal::none;  // of the board; none where it did not get there: `why`
+  PostResult why = PostResult::sent;
+};
+
+// --- what the board says
+
+// The board's state as the host has it, with the time at which it came.
+//
+// Fields that a datagram does not carry keep their value, as State says, within one boot of the board:
+// with a restart everything is forgotten. `safe` is also kept up to date by heartbeats, which go on when
+// states do not; everything else is as old as age() says, however well it looks.
+struct ReceivedState : State {
+  using Clock = std::chrono::steady_clock;
+
+  // When its newest datagram came.
+  Clock::time_point received = never;
+  // Clock::time_point::min() while none has come since the board began.
+  static constexpr Clock::time_point never = Clock::time_point::min();
+  bool any() const { return received != never; }
+  // How long ago that was; Clock::duration::max() while none has come.
+  Clock::duration age(Clock::time_point now = Clock::now()) const {
+    return any() ? now - received : Clock::duration::max();
+  }
+};
+
+// Who the board is.
+struct BoardIdentity {
+  std::string firmware;
+  std::string board_id;
+  std::string capabilities;  // words joined by '+': "udp+serial"
+};
+
+// How well the link does.
+struct Statistics {
+  // Datagrams of the board
+  std::uint64_t received = 0;  // valid ones
+  std::uint64_t states = 0;
+  std::uint64_t damaged = 0;  // bad checksum, syntax or length
+  PacketCounters packets;     // lost, duplicate, late, restarts
+  double state_rate_hz = 0;   // over the last second
+  // Time, microseconds; 0 where nothing was measured yet
+  double round_trip_us = 0;  // question to answer, the newest
+  double round_trip_min_us = 0;
+  double round_trip_mean_us = 0;
+  double jitter_us = 0;     // interarrival jitter of the states (RFC 3550 6.4.1)
+  double state_age_us = 0;  // since the newest state arrived
+  // Datagrams of ours
+  std::uint64_t heartbeats = 0;
+  std::uint64_t commands = 0;  // retries not counted
+  std::uint64_t retries = 0;
+  std::uint64_t confirmed = 0;
+  std::uint64_t refused = 0;
+  std::uint64_t timed_out = 0;
+  // Lost share of the board's datagrams, 0-1.
+  double loss() const {
+    const double all = static_cast<double>(received) + packets.lost;
+    return all > 0 ? packets.lost / all : 0;
+  }
+};
+
+// --- in words
+
+// What to do where a stop is not confirmed.
+inline constexpr std::string_view stop_last_resort = "CUT THE POWER if it must stop now";
+
+// How the link is and, where something is wrong with it, what to do: "another host controls the
+// board" and "stop it, or …". `thing` is the board's name. Of kind refused.
+R4LINK_API Problem explain(std::string_view name, const LinkStatus& link);
+
+// What is wrong with keys, and what to do; of kind refused. Not for KeyTrouble::none.
+R4LINK_API Problem explain(KeyTrouble trouble);
+
+// Why the session is not armed, and what to do; of kind refused. Not for DisarmCause::none.
+R4LINK_API Problem explain(std::string_view command, DisarmCause cause);
+
+// Why `command` ("O:358,1,1") was not confirmed. `link` is the link at that time. Of kind refused.
+R4LINK_API Problem explain(std::string_view command, const CommandResult& result,
+                           const LinkStatus& link);
+
+}  // namespace r4

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What both forms of the board, blocking (board.hpp) and asynchronous (async_board.hpp), take.
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <string>
+
+#include "config.hpp"
+#include "key.hpp"
+#include "link.hpp"
+
+namespace r4 {
+
+struct SessionOptions {
+  LinkTiming timing;
+  // Must a program call arm() before it drives, and again after whatever made the outputs safe?
+  Arming arming = Arming::required;
+  // The state fields to ask for, as in F; SAFE and CMD, and RELAYS for arming, are added, to these and
+  // to those of any F that is sent. Empty: leave the board's choice, and every F, alone.
+  std::string fields = "DEFAULT";
+  std::chrono::milliseconds command_retry{50};
+  std::chrono::milliseconds stop_retry{20};
+  // For how long a stop is repeated after it was confirmed.
+  std::chrono::milliseconds stop_linger{200};
+  // Q:ID, for identity and round-trip time; 0: never.
+  std::chrono::milliseconds identify_interval{1000};
+  // The board's key. Each host has its own, by its id: of two that share one, the slower is taken for
+  // a replay.
+  std::optional<Key> key;
+  // When the session's clock began, in microseconds since 1970: a host that begins again must go on
+  // counting above what it has used.
+  Time clock_start{0};
+};
+
+struct BoardOptions {
+  SessionOptions session;
+  // Of Board only: after so long in the callbacks of one event the heartbeats stop, and the board goes safe, for
+  // nobody looks after the robot; up to an hour, 0 turns it off. They go on when it returns.
+  std::chrono::milliseconds callback_limit{500};
+};
+
+// A board's key from a file: one line, `<id>:<64 hexadecimal digits>`, as `r4 key new` makes it.
+//
+//     r4::BoardOptions options;
+//     options.session.key = r4::load_key("/home/me/.r4-key");
+//     r4::Board board("udp://192.168.0.125", options);
+//
+// Throws Error: open if it cannot be read, permission if others than its owner may read or write
+// it, data if it holds no key.
+R4LINK_API Key load_key(const std::string& path);
+
+}  // namespace r4

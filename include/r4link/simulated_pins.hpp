@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the pins of a simulated board do, whatever its state says.
+#pragma once
+
+#include <cstdint>
+
+#include "config.hpp"
+#include "vocabulary.hpp"
+
+namespace r4 {
+namespace sim {
+
+// What the outputs of the chips do, in the units of the commands.
+struct R4LINK_API ChipPins {
+  Drive osmc[osmc_channels];
+  Drive dhb12[dhb12_channels];
+  std::uint16_t servo_us[servo_channels] = {};  // to the nearest; a chip counts in 4.88 us
+  std::uint8_t relays = 0;                      // bit n-1: relay n
+  Bldc bldc[bldc_channels];
+
+  // Nothing is driven, and every brake is on.
+  static ChipPins safe();
+  bool is_safe() const;
+};
+R4LINK_API bool operator==(const ChipPins& a, const ChipPins& b);
+inline bool operator!=(const ChipPins& a, const ChipPins& b) { return !(a == b); }
+
+// What all outputs of the board do.
+struct R4LINK_API Pins : ChipPins {
+  struct Stepper {
+    std::int32_t position = 0;  // pulses since power came, forward less backward
+    std::int8_t stepping = 0;   // 1 forward, -1 backward, 0: no pulse for stepper_pause_ms
+  };
+  Stepper stepper[stepper_channels];
+
+  bool is_safe() const;
+};
+// Whether the outputs do the same; the steppers' positions do not count.
+R4LINK_API bool operator==(const Pins& a, const Pins& b);
+inline bool operator!=(const Pins& a, const Pins& b) { return !(a == b); }
+
+}  // namespace sim
+}  // namespace r4

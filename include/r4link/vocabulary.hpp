@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the board has, and the small values that commands, states and the link share: channel counts and
+// ranges (paper section 2; docs/protocol.md has the table), reasons, troubles and refusals.
+#pragma once
+
+#include <cstdint>
+
+#include "config.hpp"
+#include "text.hpp"
+
+namespace r4 {
+
+constexpr int osmc_channels = 4;
+constexpr int dhb12_channels = 4;  // DHB1A DHB1B DHB2A DHB2B
+constexpr int servo_channels = 16;
+constexpr int relay_channels = 8;  // channel 1 is the dead-man's-handle relay
+constexpr int stepper_channels = 4;
+constexpr int encoder_channels = 4;
+constexpr int bldc_channels = 4;
+constexpr int ultrasonic_channels = 4;
+
+constexpr std::int32_t pwm_max = 4095;             // 12 bit duty (PCA9685), DAC code (MCP4728)
+constexpr std::int32_t servo_max_us = 2500;        // pulse width; 0 is off
+constexpr std::int32_t stepper_speed_max = 20000;  // steps per second
+constexpr std::int32_t stepper_speed_default = 1000;
+constexpr std::int32_t proximity_max_cm = 400;  // HC-SR04 range; a threshold of 0 is off
+
+enum class Direction : std::uint8_t { reverse = 0, forward = 1 };
+
+// One H-bridge channel (OSMC or DHB12).
+struct Drive {
+  std::uint16_t pwm = 0;  // 0-4095
+  Direction direction = Direction::reverse;
+  friend bool operator==(Drive a, Drive b) { return a.pwm == b.pwm && a.direction == b.direction; }
+  friend bool operator!=(Drive a, Drive b) { return !(a == b); }
+};
+
+// One brushless driver channel.
+struct Bldc {
+  std::uint16_t speed = 0;  // 0-4095
+  Direction direction = Direction::reverse;
+  bool brake = false;
+  friend bool operator==(Bldc a, Bldc b) {
+    return a.speed == b.speed && a.direction == b.direction && a.brake == b.brake;
+  }
+  friend bool operator!=(Bldc a, Bldc b) { return !(a == b); }
+};
+
+// Why the outputs are safe; the number is what the SAFE field carries.
+enum class SafeReason : std::uint8_t {
+  none = 0,
+  link = 1,       // no valid host heartbeat within the timeout, or the transport is gone
+  stop = 2,       // E:STOP, until E:CLEAR
+  handle = 3,     // the dead-man's handle is released
+  proximity = 4,  // an ultrasonic sensor sees something nearer than its threshold
+  watchdog = 5,   // a duty of the board missed its deadline
+  fault = 6,      // a chip stopped answering, or the firmware found itself broken
+};
+constexpr int safe_reason_count = 7;
+
+// The reason of a number on the wire. One that is not known is taken for a fault.
+constexpr SafeReason to_safe_reason(std::uint32_t number) {
+  return number < static_cast<std::uint32_t>(safe_reason_count) ? static_cast<SafeReason>(number)
+                                                                : SafeReason::fault;
+}
+
+// "none", "link", "stop", "handle", "proximity", "watchdog", "fault"; "unknown" for other numbers.
+R4LINK_API const char* to_text(SafeReason reason);
+
+// --- a chip of the board that is in trouble
+
+// The number is what the FAULT field carries.
+enum class ChipTrouble : std::uint8_t {
+  none = 0,
+  no_acknowledge = 1,  // it does not answer
+  bus_stuck = 2,       // a line of the bus is held
+  was_reset = 3,       // it lost its set-up: it must have been reset under way
+  wrong_register = 4,  // a register holds what was not written
+  not_ready = 5,       // it did not come up in time, or cannot store its power-on values
+};
+// "none", "no acknowledge", "bus stuck", "was reset", "wrong register", "not ready"; "unknown" for
+// other numbers.
+R4LINK_API const char* to_text(ChipTrouble trouble);
+
+// The chip by its I2C address.
+struct ChipFault {
+  std::uint8_t address = 0;
+  ChipTrouble trouble = ChipTrouble::none;
+  bool any() const { return trouble != ChipTrouble::none; }
+  friend bool operator==(ChipFault a, ChipFault b) {
+    return a.address == b.address && a.trouble == b.trouble;
+  }
+  friend bool operator!=(ChipFault a, ChipFault b) { return !(a == b); }
+};
+
+// The chip at an address of the board (paper, Figure 3): "PCA9685 0x40 (OSMC)". "unknown chip" for
+// other addresses.
+R4LINK_API const char* chip_name(std::uint8_t address);
+
+// --- refusals
+
+// Why a board refuses a command: the code of `N:<PNum>,<code>` (docs/protocol.md).
+enum class Refusal : std::uint8_t {
+  none,
+  unknown,    // no such command, field or setting
+  format,     // not the command's form
+  range,      // a value outside its range
+  channel,    // no such channel
+  stale,      // older than what was executed, or delayed too long
+  duplicate,  // this very packet number was executed
+  safe,       // outputs are in the safe state
+  busy,       // another host controls the board
+  auth,       // not authenticated
+};
+
+// "UNKNOWN", "FORMAT" …; "NONE" for none.
+R4LINK_API Text name_of(Refusal refusal);
+// The refusal of that name; Refusal::none if there is none.
+R4LINK_API Refusal refusal_from(Text name);
+
+// A refusal as the board answers it: which command of ours, and why; and to the host of the session, the
+// number of its first echo (SESSION), so that a host knows whether the board still remembers what it
+// executed.
+struct Nack {
+  std::uint32_t pnum = 0;
+  Refusal code = Refusal::none;
+  bool has_session = false;
+  std::uint32_t session = 0;
+};
+
+// --- the link, seen from the host (protocol/link/host_link.hpp has the diagram)
+
+enum class HostLinkState : std::uint8_t { connecting, active, safe, lost };
+
+// "connecting", "active", "safe", "lost".
+R4LINK_API const char* to_text(HostLinkState state);
+
+// What the host keeps to.
+struct LinkTiming {
+  std::uint32_t heartbeat_ms = 100;  // 10 Hz: one lost packet must not be a race with the timeout
+  std::uint32_t timeout_ms = 1000;   // silence of the board until `lost`
+};
+
+struct PacketCounters {
+  std::uint32_t received = 0;  // every call of on()
+  std::uint32_t lost = 0;      // in gaps and not arrived late
+  std::uint32_t duplicate = 0;
+  std::uint32_t late = 0;
+  std::uint32_t old = 0;
+  std::uint32_t restarts = 0;
+};
+
+// --- how a datagram is to be delivered: to whom, and what becomes of it where there is no room
+
+// Who is at the other end, where several can be (hosts at a board's UDP socket). A transport hands a
+// number out for each sender of a valid datagram; `everyone` is its standing audience, and whoever
+// sent what is none.
+using Peer = std::uint32_t;
+constexpr Peer everyone = 0;
+
+// What a full queue does with a datagram.
+enum class Priority : std::uint8_t {
+  state,   // newest wins: an older waiting state is replaced
+  normal,  // waits its turn; refused when the queue is full
+  stop,    // overtakes everything and is never dropped
+};
+
+}  // namespace r4
