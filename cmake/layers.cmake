@@ -4,7 +4,7 @@
 
 # Asio without Boost, its code compiled once (transports/asio.cpp). Whether Asio finds
 # std::aligned_alloc depends on what was included before it: unless that is switched off, objects
-# disagree on how handler memory is freed. Whoever includes Asio beside r4link needs all of these.
+# disagree on how handler memory is freed. Whoever uses r4link::asio needs all of these.
 set(R4_ASIO_DEFINITIONS ASIO_STANDALONE ASIO_SEPARATE_COMPILATION ASIO_NO_DEPRECATED
     ASIO_DISABLE_STD_ALIGNED_ALLOC)
 
@@ -29,6 +29,8 @@ function(r4_layer target)
   add_library(${target} OBJECT ${ARGN})
   r4_warnings(${target})
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/include)
+  # A symbol that is unique in a process could not be local to the library.
+  target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
   # Nobody replaces our functions from a shared library: they may be inlined nevertheless.
   set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON
                         CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
@@ -52,7 +54,8 @@ function(r4_host_layer target)
   if(TARGET ${target})
     set_target_properties(${target} PROPERTIES CXX_STANDARD 20 CXX_STANDARD_REQUIRED ON
                           CXX_EXTENSIONS OFF)
-    target_compile_definitions(${target} PRIVATE ${R4_ASIO_DEFINITIONS})
+    # Asio makes itself visible otherwise, whatever the library exports.
+    target_compile_definitions(${target} PRIVATE ${R4_ASIO_DEFINITIONS} ASIO_DISABLE_VISIBILITY)
     target_link_libraries(${target} PRIVATE Threads::Threads)
   endif()
 endfunction()

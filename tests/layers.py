@@ -3,8 +3,9 @@
 """Fails when a source includes what its room may not. Usage: layers.py TREE
 
 tools > host > transports > protocol, tools > firmware > transports/framing > protocol, and within each of them
-the rooms in the order of ALLOWED; host/standard_registry.cpp alone may include firmware/ports/sim. The portable rooms
-(protocol, transports/framing, firmware without its ports, the chip models) include nothing a C++14 board lacks.
+the rooms in the order of ALLOWED; host/standard_registry.cpp alone may include firmware/ports/sim. What is
+public, include/r4link, is below all of them. The portable rooms (protocol, transports/framing, firmware without
+its ports, the chip models), and what they include of what is public, include nothing a C++14 board lacks.
 A room holds at most 20 sources.
 """
 import collections
@@ -12,7 +13,8 @@ import pathlib
 import re
 import sys
 
-PROTOCOL = {'protocol/datagram', 'protocol/keys', 'protocol/messages', 'protocol/link'}
+PUBLIC = {'include/r4link'}
+PROTOCOL = PUBLIC | {'protocol/datagram', 'protocol/keys', 'protocol/messages', 'protocol/link'}
 FRAMING = PROTOCOL | {'transports/framing', 'transports/framing/can'}
 CARRIERS = {'transports/can', 'transports/serial', 'transports/udp'}
 TRANSPORTS = FRAMING | CARRIERS | {'transports'}
@@ -23,9 +25,10 @@ SIMULATED = HOST | FIRMWARE | MODELS | {'firmware/ports/sim'}
 SHELL = SIMULATED | {'tools/r4/shell'}
 # room: the rooms it may include besides itself
 ALLOWED = {
-    'protocol/datagram': set(),
-    'protocol/keys': {'protocol/datagram'},
-    'protocol/messages': {'protocol/datagram', 'protocol/keys'},
+    'include/r4link': set(),
+    'protocol/datagram': PUBLIC,
+    'protocol/keys': PUBLIC | {'protocol/datagram'},
+    'protocol/messages': PUBLIC | {'protocol/datagram', 'protocol/keys'},
     'protocol/link': PROTOCOL,
     'transports/framing': PROTOCOL,
     'transports/framing/can': FRAMING,
@@ -36,7 +39,7 @@ ALLOWED = {
     'firmware/drivers': PROTOCOL,
     'firmware': FIRMWARE,
     'firmware/ports': FIRMWARE,
-    'firmware/ports/sim/chips': {'firmware/drivers'},
+    'firmware/ports/sim/chips': PUBLIC | {'firmware/drivers'},
     'firmware/ports/sim/robot': FIRMWARE | {'firmware/ports/sim/chips'},
     'firmware/ports/sim': FIRMWARE | MODELS | TRANSPORTS,
     'firmware/ports/m7': FIRMWARE | MODELS | {'firmware/ports', 'firmware/ports/sim'},
@@ -60,7 +63,10 @@ EXCEPTIONS = {
 }
 # What a room may not include although it is in a room that it may.
 FORBIDDEN = {room: {'transports/registry.hpp'} for room in CARRIERS}
-PORTABLE = FIRMWARE | {'firmware/ports/sim/chips'}
+PORTABLE = (FIRMWARE - PUBLIC) | {'firmware/ports/sim/chips'}
+# Those public headers that the board has, too.
+PORTABLE_PUBLIC = {f'include/r4link/{name}.hpp' for name in (
+    'command', 'config', 'datagram', 'key', 'simulated_pins', 'state', 'text', 'vocabulary')}
 # No heap, no I/O, no clock, nothing GCC 7 in C++14 lacks; C headers in both spellings.
 PORTABLE_STANDARD = {
     'algorithm', 'array', 'atomic', 'cassert', 'climits', 'cmath', 'cstddef', 'cstdint', 'cstring',
@@ -83,6 +89,7 @@ def faults_of(root, path):
         yield 1, f'{room} is no room of ALLOWED in tests/layers.py'
         return
     allowed = ALLOWED[room] | {room} | EXCEPTIONS.get(path, set())
+    portable = room in PORTABLE or path in PORTABLE_PUBLIC
     lines = (root / path).read_text().splitlines()
     if not lines or lines[0] != SPDX:
         yield 1, f'the first line is not "{SPDX}"'
@@ -92,11 +99,12 @@ def faults_of(root, path):
             continue
         quote, name = match.groups()
         if quote == '<':
-            if (room in PORTABLE and name not in PORTABLE_STANDARD
-                    and (path, name) not in PORTABLE_EXCEPTIONS):
+            if portable and name not in PORTABLE_STANDARD and (path, name) not in PORTABLE_EXCEPTIONS:
                 yield number, f'<{name}> is not for portable code'
             continue
         target = ((root / path).parent / name).resolve()
+        if not target.is_file():
+            target = (root / 'include' / name).resolve()
         if not target.is_file() and room.startswith('tools/'):
             target = (root / name).resolve()
         if not target.is_file():
@@ -105,11 +113,14 @@ def faults_of(root, path):
         other = target.relative_to(root) if target.is_relative_to(root) else None
         if other is None or str(other.parent) not in allowed or str(other) in FORBIDDEN.get(room, ()):
             yield number, f'{room} may not include {other or "what is outside the tree"}'
+        elif portable and str(other.parent) in PUBLIC and str(other) not in PORTABLE_PUBLIC:
+            yield number, f'{other} is not for portable code'
 
 
 def main():
     root = pathlib.Path(sys.argv[1]).resolve()
-    sources = sorted(str(path.relative_to(root)) for top in ('protocol', 'transports', 'firmware', 'host', 'tools')
+    tops = ('include', 'protocol', 'transports', 'firmware', 'host', 'tools')
+    sources = sorted(str(path.relative_to(root)) for top in tops
                      for path in (root / top).rglob('*') if path.suffix in ('.hpp', '.cpp'))
     faults = [f'{path}:{line}: {reason}' for path in sources for line, reason in faults_of(root, path)]
     rooms = collections.Counter(str(pathlib.PurePath(path).parent) for path in sources)

@@ -6,14 +6,12 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
 #include <thread>
-#include <vector>
 
 namespace {
 
@@ -24,14 +22,15 @@ constexpr milliseconds standstill{20};  // as exact as the promises are
 constexpr int most_runs = 3;
 constexpr const char* run_variable = "R4_TEST_RUN";
 
-// The longest that this process was kept from running, until done() is called.
+// The longest that this process was kept from running since begin().
 class Watch {
  public:
-  milliseconds done() {
+  ~Watch() {
     done_ = true;
     thread_.join();
-    return longest_;
   }
+  void begin() { longest_ = milliseconds{0}; }
+  milliseconds longest() const { return longest_; }
 
  private:
   void look() {
@@ -39,31 +38,56 @@ class Watch {
     for (auto before = Clock::now(); !done_;) {
       std::this_thread::sleep_for(step);
       const auto now = Clock::now();
-      longest_ = std::max(longest_, std::chrono::duration_cast<milliseconds>(now - before));
+      const auto kept = std::chrono::duration_cast<milliseconds>(now - before);
+      if (kept > longest_.load()) longest_ = kept;
       before = now;
     }
   }
 
   std::atomic<bool> done_{false};
-  milliseconds longest_{0};
+  std::atomic<milliseconds> longest_{milliseconds{0}};
   std::thread thread_{[this] { look(); }};
+};
+
+// Which tests failed while the machine stood still, and whether another did.
+class Failures final : public testing::EmptyTestEventListener {
+ public:
+  std::string to_repeat;  // as --gtest_filter has it
+  bool count = false;
+
+ private:
+  void OnTestStart(const testing::TestInfo&) override { watch_.begin(); }
+  void OnTestEnd(const testing::TestInfo& test) override {
+    if (test.result()->Passed() || test.result()->Skipped()) return;
+    const milliseconds stood_still = watch_.longest();
+    if (stood_still < standstill) {
+      count = true;
+      return;
+    }
+    const std::string name = std::string(test.test_suite_name()) + "." + test.name();
+    to_repeat += (to_repeat.empty() ? "" : ":") + name;
+    std::printf("The machine stood still for %lld ms: run again: %s\n",
+                static_cast<long long>(stood_still.count()), name.c_str());
+  }
+
+  Watch watch_;
 };
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::vector<char*> again(argv, argv + argc + 1);  // GoogleTest takes its options out of argv
   testing::InitGoogleTest(&argc, argv);
-  Watch watch;
+  auto* const failures = new Failures;  // GoogleTest's from here on
+  testing::UnitTest::GetInstance()->listeners().Append(failures);
   const int status = RUN_ALL_TESTS();
-  const milliseconds stood_still = watch.done();
   const char* variable = std::getenv(run_variable);
   const int runs = variable == nullptr ? 1 : std::atoi(variable);
-  if (status == 0 || stood_still < standstill || runs >= most_runs) return status;
-  std::printf("The machine stood still for %lld ms: run again.\n",
-              static_cast<long long>(stood_still.count()));
+  if (status == 0 || failures->count || failures->to_repeat.empty() || runs >= most_runs)
+    return status;
   std::fflush(stdout);
   ::setenv(run_variable, std::to_string(runs + 1).c_str(), 1);
-  ::execv("/proc/self/exe", again.data());
+  ::unsetenv("GTEST_TOTAL_SHARDS");
+  const std::string filter = "--gtest_filter=" + failures->to_repeat;
+  ::execl("/proc/self/exe", argv[0], filter.c_str(), nullptr);
   return status;
 }

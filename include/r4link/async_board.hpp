@@ -97,7 +97,7 @@ class AsyncBoard {
   }
   // void(CommandResult). Clears what made the outputs safe, where it can be cleared (stop, watchdog,
   // fault), and closes relay 1, the motor supply. Confirmed by the board's state: output commands go
-  // out from then on (arming.hpp). Not armed: what stands against it cannot be cleared.
+  // out from then on. Not armed: what stands against it cannot be cleared.
   template <class Token>
   auto async_arm(Duration timeout, Token&& token) {
     require_timeout("async_arm()", timeout);

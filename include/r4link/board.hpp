@@ -216,7 +216,7 @@ class R4LINK_API Board {
   void feed();
 
  private:
-  struct Impl;
+  struct R4LINK_PRIVATE Impl;
   std::shared_ptr<Impl> impl_;
 };
 

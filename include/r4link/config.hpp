@@ -6,3 +6,4 @@
 
 // Everything else is hidden; tests/install/exports.txt lists what this is on.
 #define R4LINK_API __attribute__((visibility("default")))
+#define R4LINK_PRIVATE __attribute__((visibility("hidden")))

@@ -26,12 +26,12 @@ enum class ErrorKind : int {
 enum class Outcome : std::uint8_t {
   none,       // no command is concerned
   confirmed,  // the board's own state says so
-  refused,    // the board refused it, and did not execute it: `code`
+  refused,    // the board refused it, and did not execute it: the Refusal
   timed_out,  // no confirmation until the deadline; it may or may not have been executed
-  cancelled,  // given up: a stop, or a newer cause to be safe, came first
+  cancelled,  // given up: a stop, or a newer cause to be safe, came first, or the program did
   closed,     // given up: the board was closed
   blocked,    // the board's thread does not answer: not sent, or not confirmed
-  full,       // not taken: Session::max_pending commands are under way already
+  full,       // not taken: 64 commands are under way already
   not_armed,  // not sent: it drives an output and the session is not armed, because of `disarmed`;
               // arm() itself: it cannot be armed while that is so
 };

@@ -177,7 +177,7 @@ struct Statistics {
 inline constexpr std::string_view stop_last_resort = "CUT THE POWER if it must stop now";
 
 // How the link is and, where something is wrong with it, what to do: "another host controls the
-// board" and "stop it, or …". `thing` is the board's name. Of kind refused.
+// board" and "stop it, or …". `name` is the board's. Of kind refused.
 R4LINK_API Problem explain(std::string_view name, const LinkStatus& link);
 
 // What is wrong with keys, and what to do; of kind refused. Not for KeyTrouble::none.

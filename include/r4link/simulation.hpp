@@ -48,7 +48,7 @@ class R4LINK_API SimulatedRobot {
   // No older than 10 ms.
   Look look() const;
 
-  class World;
+  class R4LINK_PRIVATE World;
 
  private:
   std::shared_ptr<World> world_;

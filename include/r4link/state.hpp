@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The board's state as typed values, and the fields that carry it (paper section 4.1).
 //
-// One table (protocol/messages/state.cpp) names every field, its unit and where it lives in State; the
-// board writes with it, the host reads with it, the `F` command selects from it.
+// One table names every field, its unit and where it lives in State; the board writes with it, the host
+// reads with it, the `F` command selects from it.
 #pragma once
 
 #include <cstdint>

@@ -128,9 +128,14 @@ struct Nack {
   std::uint32_t session = 0;
 };
 
-// --- the link, seen from the host (protocol/link/host_link.hpp has the diagram)
+// --- the link, seen from the host
 
-enum class HostLinkState : std::uint8_t { connecting, active, safe, lost };
+enum class HostLinkState : std::uint8_t {
+  connecting,  // nothing was heard yet, or the board is booting
+  active,      // the board streams its state and reports no reason to be safe
+  safe,        // the board reports a reason
+  lost,        // nothing valid came from the board for the timeout
+};
 
 // "connecting", "active", "safe", "lost".
 R4LINK_API const char* to_text(HostLinkState state);

@@ -17,6 +17,7 @@
 #include <thread>
 
 #include "firmware/ports/sim/simulated_board.hpp"
+#include "host/session/session.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
 #include "transports/memory_carrier.hpp"

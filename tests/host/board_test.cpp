@@ -310,7 +310,7 @@ TEST(Board, TellsWhoItIs) {
   Board board("sim:?node=3", at_will());
   const BoardIdentity identity = board.identify();
   EXPECT_EQ(identity.board_id, "sim-3");
-  EXPECT_EQ(identity.firmware, "0.1.0");
+  EXPECT_EQ(identity.firmware, R4LINK_VERSION);
   EXPECT_FALSE(identity.capabilities.empty());
 }
 

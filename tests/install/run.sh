@@ -1,9 +1,10 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
 # The installed library is enough for a program outside the tree. Usage: run.sh SOURCE BUILD
-# Installs BUILD into a new prefix, copies docs/examples elsewhere, builds drive with find_package and
-# with pkg-config and teleop with find_package, runs them, and what the documentation shows, and
-# compiles every installed header.
+# Installs BUILD into a new prefix, copies docs/examples elsewhere, builds drive with find_package (static)
+# and with pkg-config (shared) and teleop with find_package, runs them, programs that have an Asio of
+# their own, and what the documentation shows. Compiles every installed header alone, and compares what
+# the library exports with exports.txt.
 set -euo pipefail
 
 source_tree=$(realpath "$1")
@@ -54,8 +55,23 @@ cmake --build ../teleop/build >>"$work/cmake.log" || {
 }
 R4=$build_tree/r4 /usr/bin/python3 "$source_tree/tests/install/teleop.py" ../teleop/build/teleop
 
+cp -r "$source_tree/tests/install/own_asio" "$work"
+cmake -S ../own_asio -B ../own_asio/build -DCMAKE_CXX_COMPILER="$cxx" -DCMAKE_PREFIX_PATH="$prefix" >"$work/cmake.log"
+cmake --build ../own_asio/build >>"$work/cmake.log" || {
+  cat "$work/cmake.log"
+  exit 1
+}
+for program in beside shared_with; do
+  if ! ../own_asio/build/$program >"$work/out" || ! grep -q 'own Asio, board sim-1' "$work/out"; then
+    echo "install: a program with an Asio of its own fails: $program: $(cat "$work/out")"
+    exit 1
+  fi
+done
+echo 'install: an Asio of its own disturbs nobody'
+
 PKG_CONFIG_PATH=$(dirname "$(find "$prefix" -name r4link.pc)")
-export PKG_CONFIG_PATH
+LD_LIBRARY_PATH=$(dirname "$(find "$prefix" -name libr4link.so)")
+export PKG_CONFIG_PATH LD_LIBRARY_PATH
 read -ra flags <<<"$(pkg-config --cflags --libs r4link)"
 "$cxx" -std=c++20 -O1 main.cpp "${flags[@]}" -o drive
 check pkg-config ./drive sim:?node=1
@@ -106,11 +122,37 @@ if [[ $status != 2 ]] || ! grep -q 'udp://HOST' "$work/err"; then
   exit 1
 fi
 
-# Every installed header, in one program.
-(cd "$prefix/include" && find r4link -name '*.hpp' | sort | sed 's/.*/#include <&>/') >all.cpp
-read -ra flags <<<"$(pkg-config --cflags r4link)"
-"$cxx" -std=c++20 -fsyntax-only "${flags[@]}" all.cpp || {
-  echo "install: an installed header does not compile"
+# Every installed header, alone.
+read -ra flags <<<"$(pkg-config --cflags r4link-asio)"
+headers=0
+for header in "$prefix"/include/r4link/*.hpp; do
+  echo "#include <r4link/$(basename "$header")>" >alone.cpp
+  "$cxx" -std=c++20 -Wall -Wextra -Wpedantic -Wconversion -Werror -fsyntax-only "${flags[@]}" alone.cpp || {
+    echo "install: $(basename "$header") does not compile alone"
+    exit 1
+  }
+  headers=$((headers + 1))
+done
+if grep -l asio "$prefix"/include/r4link/*.hpp | grep -v '/async_board.hpp$' |
+  xargs -r grep -n '#include.*asio'; then
+  echo 'install: a header of the blocking API includes Asio'
+  exit 1
+fi
+echo "install: $headers headers"
+
+# What the shared library exports: our names, and templates of the standard library, as any program does.
+nm -DC --defined-only "$LD_LIBRARY_PATH/libr4link.so" | cut -d' ' -f3- |
+  grep -vE '^((typeinfo|typeinfo name|vtable|guard variable) for )?std::' | LC_ALL=C sort -u >exports.txt
+diff "$source_tree/tests/install/exports.txt" exports.txt || {
+  echo 'install: the shared library exports other names than tests/install/exports.txt lists'
   exit 1
 }
-echo "install: $(wc -l <all.cpp) headers"
+# The static one has no others that the linker could take for the program's.
+nm -C --defined-only -g "$LD_LIBRARY_PATH/libr4link.a" | grep -E '^[0-9a-f]+ ' | cut -d' ' -f3- |
+  grep -vE '^((typeinfo|typeinfo name|vtable|guard variable) for )?std::' | LC_ALL=C sort -u >globals.txt
+strangers=$(comm -13 exports.txt globals.txt)
+if [[ -n "$strangers" ]]; then
+  echo "install: libr4link.a has global names that libr4link.so does not export: $strangers"
+  exit 1
+fi
+echo "install: $(wc -l <exports.txt) exports"

@@ -192,7 +192,8 @@ int CanSocket::receive(std::array<Received, batch>& frames) {
   const int count = ::recvmmsg(descriptor_.get(), messages.data(), batch, MSG_DONTWAIT, nullptr);
   if (count < 0) return -errno;
 
-  // In this order: who is held up between the two takes frames for older than they are.
+  // The steady clock is read first. If this thread is held up between the two readings, frames are taken for
+  // older than they are, never for younger.
   const Clock::time_point now = Clock::now();
   timespec real{};
   ::clock_gettime(CLOCK_REALTIME, &real);

@@ -58,15 +58,15 @@ class CanTurn {
  private:
   enum class State : std::uint8_t { listening, ours, others };
 
-  // Who was silent for long, held up, may have lost its place.
+  // Do we still speak? A host that was silent for long, because it was held up, may have lost its place.
   bool speaking(Time now) const { return speaking_ && now - last_ < silence; }
 
   std::minstd_rand chance_;
   State state_ = State::ours;
-  Time until_;  // not ours before, if it is not
+  Time until_;  // while others have the turn: it cannot be ours before
   bool speaking_ = false;
-  Time since_;  // spoken: first,
-  Time last_;   // last
+  Time since_;  // when our speaking began
+  Time last_;   // when we spoke last
 };
 
 }  // namespace r4

@@ -8,8 +8,8 @@
 // 6 not supported here.
 #include <chrono>
 #include <cstdio>
-#include <r4link/host/board.hpp>
-#include <r4link/transports/error.hpp>
+#include <r4link/board.hpp>
+#include <r4link/error.hpp>
 #include <thread>
 
 using namespace std::chrono_literals;

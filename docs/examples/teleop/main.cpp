@@ -14,9 +14,9 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
-#include <r4link/host/board.hpp>
-#include <r4link/host/explain.hpp>
-#include <r4link/transports/error.hpp>
+#include <r4link/board.hpp>
+#include <r4link/link.hpp>
+#include <r4link/error.hpp>
 
 #include "keyboard.hpp"
 

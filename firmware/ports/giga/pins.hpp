@@ -39,7 +39,7 @@ constexpr Pin index_pins[encoder_channels] = {
 // The dead-man's handle: high while held; a broken wire is a released handle.
 constexpr Pin handle_pin = {'I', 15};  // D42
 
-// Analog inputs in the order of protocol/messages/state.hpp: AIN24 AIN12 AIN5 AINDMH AINSTEER AIN6.
+// Analog inputs in the order of r4link/state.hpp: AIN24 AIN12 AIN5 AINDMH AINSTEER AIN6.
 constexpr Pin analog_pins[analog_channels] = {{'C', 4}, {'C', 5}, {'B', 0},
                                               {'B', 1}, {'C', 3}, {'C', 2}};  // A0-A5
 // Which inputs of ADC1 these are.

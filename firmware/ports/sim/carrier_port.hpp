@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A carrier (transports/carrier.hpp) as a port of the board's application.
+// A carrier (r4link/carrier.hpp) as a port of the board's application.
 #pragma once
 
 #include <memory>

@@ -340,6 +340,18 @@ TEST(SessionStop, IsRepeatedForAWhileAfterItsConfirmation) {
   EXPECT_EQ(link.count('E'), stops) << "not past an E:CLEAR of its own";
 }
 
+TEST(SessionStop, IsNotRepeatedPastAClearThatIsPosted) {
+  ScriptedLink link;
+  link.connect();
+  link.session.stop(1s, link.now);
+  link.stopped(link.last('E').pnum);
+  link.pass(30ms);
+  EXPECT_EQ(link.session.post(Command::clear(), link.now), PostResult::sent);
+  const std::size_t before = link.count('E');
+  link.pass(40ms);
+  EXPECT_EQ(link.count('E'), before);
+}
+
 TEST(SessionStop, IsNotConfirmedByTheReportOfAnother) {
   ScriptedLink link;
   link.connect();

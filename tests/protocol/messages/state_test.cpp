@@ -310,5 +310,25 @@ TEST(State, ASetGivesItsFieldsInTheOrderOfTheTable) {
   EXPECT_EQ(fields, every_field());
 }
 
+TEST(State, IsReadByTheNamesOfItsChannels) {
+  State state;
+  state.analog_cv[static_cast<int>(Analog::ain6)] = 512;
+  state.encoder_counts[3] = -7;
+  state.stepper_steps[0] = 1000;
+  state.ultrasonic_cm[1] = 42;
+  state.relays = 0x81;
+  EXPECT_DOUBLE_EQ(state.volts(Analog::ain6), 5.12);
+  EXPECT_EQ(state.encoder(4), -7);
+  EXPECT_EQ(state.steps(1), 1000);
+  EXPECT_EQ(state.distance_cm(2), 42);
+  EXPECT_TRUE(state.relay(1) && state.relay(8));
+  EXPECT_FALSE(state.relay(2));
+  for (const int none : {-1, 0, 9}) {
+    EXPECT_EQ(state.encoder(none) + state.steps(none) + state.distance_cm(none), 0) << none;
+    EXPECT_FALSE(state.relay(none)) << none;
+  }
+  EXPECT_EQ(state.volts(Analog::count), 0);
+}
+
 }  // namespace
 }  // namespace r4

@@ -7,6 +7,7 @@
 
 #include <cstdio>
 
+#include "r4link/datagram.hpp"
 #include "tests/support/can_backbone.hpp"
 
 namespace r4::tool {

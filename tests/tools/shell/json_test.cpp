@@ -77,5 +77,17 @@ TEST(Json, CountsTheDatagramsOfATransport) {
   EXPECT_EQ(json["transfers"]["cancelled"], 4);
 }
 
+TEST(Json, OfAProblemTellsHowTheCommandEnded) {
+  Problem problem{ErrorKind::refused, "O:1,1,9", "no such channel", "channels are 1-4"};
+  EXPECT_FALSE(problem_json(problem).contains("outcome"));
+  problem.outcome = Outcome::timed_out;
+  EXPECT_EQ(problem_json(problem)["outcome"], "timed out");
+  EXPECT_FALSE(problem_json(problem).contains("code"));
+  problem.outcome = Outcome::refused;
+  problem.refusal = Refusal::channel;
+  EXPECT_EQ(problem_json(problem)["outcome"], "refused");
+  EXPECT_EQ(problem_json(problem)["code"], "CHANNEL");
+}
+
 }  // namespace
 }  // namespace r4::tool

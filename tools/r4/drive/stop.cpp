@@ -22,8 +22,6 @@
 namespace r4::tool {
 namespace {
 
-constexpr const char* last_resort = "CUT THE POWER if it must stop now";
-
 struct Options {
   std::vector<std::string> urls;
   Milliseconds timeout{2000};
@@ -45,7 +43,7 @@ std::unique_ptr<AsyncBoard> open(asio::io_context& io, const std::string& url) {
     board->open();
   } catch (const Error& error) {
     Problem problem = error.problem();
-    problem.fix = fmt::format("{}; {}", last_resort, problem.fix);
+    problem.fix = fmt::format("{}; {}", stop_last_resort, problem.fix);
     throw Error(problem);
   }
   return board;
@@ -85,8 +83,8 @@ int stop(const Options& options) {
     Problem problem = explain(fmt::format("E:STOP to {}", board->name()), link);
     problem.reason = fmt::format("the board did not confirm the stop within {} ms: {}",
                                  options.timeout.count(), problem.reason);
-    problem.fix =
-        problem.fix.empty() ? last_resort : fmt::format("{}; {}", last_resort, problem.fix);
+    problem.fix = problem.fix.empty() ? stop_last_resort
+                                      : fmt::format("{}; {}", stop_last_resort, problem.fix);
     throw Error(problem);
   }
   return 0;

@@ -6,7 +6,7 @@
 namespace r4::tool {
 
 // Runs `r4` with these arguments and returns its exit code: 0 done, else the ErrorKind of what
-// failed (transports/error.hpp). An error is one line on stderr, "r4: thing: reason; fix", and with
+// failed (r4link/error.hpp). An error is one line on stderr, "r4: thing: reason; fix", and with
 // --json also an object on stdout.
 int run(int argc, const char* const* argv);
 

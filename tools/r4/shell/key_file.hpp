@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The file with a board's key (host/key_file.hpp), for its owner alone: how it is made and named.
+// The file with a board's key (load_key() reads it), for its owner alone: how it is made and named.
 #pragma once
 
 #include <cstdint>

@@ -58,7 +58,7 @@ struct UnpackResult {
 };
 
 // Unpacks into `out`. Any bytes are safe; never more than `capacity` bytes are written, and what is
-// there after an error has no meaning. The checksum is copied, not checked: read() does.
+// there after an error has no meaning. The checksum is copied, not checked: read_datagram() does.
 UnpackResult unpack(const std::uint8_t* bytes, std::size_t size, char* out, std::size_t capacity);
 
 }  // namespace r4

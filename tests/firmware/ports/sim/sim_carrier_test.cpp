@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "r4link/config.hpp"
 #include "tests/support/datagrams.hpp"
 
 namespace r4::sim {
@@ -53,8 +54,8 @@ std::string error_of(const std::string& url) {
 }
 
 TEST(SimCarrier, HasABoardAtTheOtherEnd) {
-  EXPECT_EQ(identity_of("sim:"), "I:R4,0.1.0,sim-1,sim");
-  EXPECT_EQ(identity_of("sim:?node=31&seed=4"), "I:R4,0.1.0,sim-31,sim");
+  EXPECT_EQ(identity_of("sim:"), "I:R4," R4LINK_VERSION ",sim-1,sim");
+  EXPECT_EQ(identity_of("sim:?node=31&seed=4"), "I:R4," R4LINK_VERSION ",sim-31,sim");
 }
 
 TEST(SimCarrier, SaysWhatIsWrongWithItsUrl) {

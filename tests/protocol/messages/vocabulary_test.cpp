@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <gtest/gtest.h>
-
 #include "r4link/vocabulary.hpp"
+
+#include <gtest/gtest.h>
 
 namespace r4 {
 namespace {

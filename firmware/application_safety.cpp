@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the application does for safety: what makes the outputs safe and ends that, and the one place
+// where outputs change.
+#include "application.hpp"
+
+namespace r4 {
+namespace firmware {
+
+// Has the host fallen silent, or has the guard found something while the loop was elsewhere?
+void Application::look_at_time(std::uint32_t now_ms) {
+  bool lost = link_.poll(now_ms);
+  if (guard_.tripped()) {
+    const SafeReason cause = guard_.take();
+    if (cause == SafeReason::watchdog) fail(cause, now_ms);
+    if (cause == SafeReason::stop && !safety_.has(cause)) {
+      fail(cause, now_ms);
+      has_stop_number_ = false;
+      stop_unread_ = true;
+    }
+    if (cause == SafeReason::link) lost = lost || link_.port_lost(link_.owner().port, now_ms);
+  }
+  if (lost) enter(SafeReason::link, now_ms);
+}
+
+void Application::enter(SafeReason cause, std::uint32_t now_ms) {
+  if (!safety_.enter(cause)) return;
+  if (cause == SafeReason::link) {
+    schedule_.stop();
+    ports_[link_.owner().port].port->hold(everyone);
+  } else {
+    setpoints_.outputs = Outputs();
+    caused_ms_ = now_ms;
+  }
+  link_.send_soon();
+  update_outputs(now_ms);
+  authentication_.renew();
+  report_state(now_ms);
+}
+
+// Nobody clears what came after they asked: a stop may have been pressed, or a fault have come, while
+// E:CLEAR was on its way. So it names the newest cause, or says that there is none. One that names
+// none, of a host that does not know of such numbers, must come later than the timeout after the cause:
+// what was sent before it is held back for no longer.
+Refusal Application::judge_clear(const Command& command, std::uint32_t waited_ms,
+                                 std::uint32_t now_ms) const {
+  if (command.value != Command::unnamed_cause) {
+    const bool named = command.value == safety_.newest() || !safety_.latched();
+    return named ? Refusal::none : Refusal::stale;
+  }
+  const bool settled = now_ms - caused_ms_ >= setpoints_.settings.timeout_ms + waited_ms;
+  return settled || !safety_.latched() ? Refusal::none : Refusal::stale;
+}
+
+// E:CLEAR. A fault that is still there stays.
+void Application::clear() {
+  if (safety_.reason() != SafeReason::fault || hal_.clear_fault()) safety_.clear();
+}
+
+bool Application::any_threshold() const {
+  for (const std::uint16_t cm : setpoints_.proximity_cm) {
+    if (cm != 0) return true;
+  }
+  return false;
+}
+
+// A sensor with a threshold must see: one that does not answer is taken for an obstacle.
+bool Application::obstacle() const {
+  const int margin = safety_.has(SafeReason::proximity) ? proximity_hysteresis_cm : 0;
+  for (int i = 0; i < ultrasonic_channels; ++i) {
+    const int threshold = setpoints_.proximity_cm[i];
+    if (threshold == 0) continue;
+    if ((inputs_.ultrasonic_blind >> i & 1) != 0) return true;
+    const int distance = inputs_.ultrasonic_cm[i];
+    if (distance != 0 && distance < threshold + margin) return true;
+  }
+  return false;
+}
+
+void Application::check_interlocks(std::uint32_t now_ms) {
+  hal_.sample(inputs_);
+  if (inputs_.fault.any()) enter(SafeReason::fault, now_ms);
+  if (!inputs_.handle_held) {
+    enter(SafeReason::handle, now_ms);
+  } else {
+    safety_.leave(SafeReason::handle);
+  }
+  if (obstacle()) {
+    obstacle_ms_ = now_ms;
+    enter(SafeReason::proximity, now_ms);
+  } else if (!any_threshold() || now_ms - obstacle_ms_ >= proximity_clear_ms) {
+    safety_.leave(SafeReason::proximity);
+  }
+}
+
+// Until when the guard lets the outputs live without a word of the host.
+void Application::expect_host() {
+  if (outputs_live_) {
+    guard_.arm(link_.deadline_ms());
+  } else {
+    guard_.disarm();
+  }
+}
+
+// The one place where outputs change: safe unless the board is ACTIVE, else the setpoints.
+void Application::update_outputs(std::uint32_t now_ms) {
+  static const Outputs off;
+  const bool live = state() == BoardState::active;
+  const Outputs& wanted = live ? setpoints_.outputs : off;
+  const bool changed = wanted != outputs_;
+  if (!changed && live == outputs_live_) return;
+  outputs_ = wanted;
+  if (live != outputs_live_) {
+    outputs_live_ = live;
+    expect_host();
+  }
+  if (live && !guard_.tripped()) {
+    hal_.apply(outputs_);
+    if (guard_.tripped()) hal_.make_safe();  // it may have come just before
+  } else {
+    hal_.make_safe();
+  }
+  if (changed && observer_ != nullptr) observer_->on_outputs(now_ms, outputs_);
+}
+
+void Application::report_state(std::uint32_t now_ms) {
+  const BoardState state_now = state();
+  const SafeReason reason_now = safety_.reason();
+  if (state_now == reported_state_ && reason_now == reported_reason_) return;
+  reported_state_ = state_now;
+  reported_reason_ = reason_now;
+  if (observer_ != nullptr) observer_->on_state(now_ms, state_now, reason_now);
+}
+
+}  // namespace firmware
+}  // namespace r4

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a handler's cancellation slot does to an AsyncBoard's commands.
+#include <gtest/gtest.h>
+
+#include <asio/bind_cancellation_slot.hpp>
+#include <asio/cancellation_signal.hpp>
+#include <asio/co_spawn.hpp>
+#include <asio/experimental/awaitable_operators.hpp>
+#include <asio/steady_timer.hpp>
+#include <asio/use_awaitable.hpp>
+#include <functional>
+#include <optional>
+
+#include "r4link/async_board.hpp"
+#include "tests/support/at_will.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+const Command drive = Command::osmc(358, Direction::forward, 1);
+
+// A board that nobody answers, on a loop of its own.
+struct AsyncBoardCancellation : testing::Test {
+  AsyncBoardCancellation() { board.open(); }
+
+  // How what `start` begins ends when its handler's slot is told to cancel it.
+  template <class Start>
+  std::optional<CommandResult> cancelled(Start start) {
+    std::optional<CommandResult> result;
+    asio::cancellation_signal signal;
+    start(asio::bind_cancellation_slot(signal.slot(), [&](const CommandResult& r) {
+      result = r;
+      board.close();
+    }));
+    asio::post(io, [&] {
+      signal.emit(asio::cancellation_type::terminal);
+      EXPECT_FALSE(result) << "never inside the call that cancels it";
+    });
+    io.run_for(5s);
+    signal.emit(asio::cancellation_type::terminal);  // of what has ended: nothing
+    return result;
+  }
+
+  asio::io_context io;
+  AsyncBoard board{io.get_executor(), "udp://127.0.0.1:9?listen=0", at_will()};
+};
+
+TEST_F(AsyncBoardCancellation, GivesACommandUp) {
+  const auto result = cancelled([&](auto token) { board.async_send(drive, 1h, token); });
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->outcome, Outcome::cancelled);
+}
+
+TEST_F(AsyncBoardCancellation, GivesAnArmUp) {
+  const auto result = cancelled([&](auto token) { board.async_arm(1h, token); });
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->outcome, Outcome::cancelled);
+}
+
+TEST_F(AsyncBoardCancellation, GivesBothSettingsOfTheLinkTimingUp) {
+  const auto result =
+      cancelled([&](auto token) { board.async_link_timing(800ms, 100ms, 1h, token); });
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->outcome, Outcome::cancelled);
+}
+
+TEST_F(AsyncBoardCancellation, EndsTheWaitForAnActiveBoard) {
+  const auto result = cancelled([&](auto token) { board.async_wait_active(1h, token); });
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->outcome, Outcome::cancelled);
+}
+
+TEST_F(AsyncBoardCancellation, EndsTheWaitForAStopThatGoesOn) {
+  std::optional<CommandResult> result;
+  asio::cancellation_signal signal;
+  board.async_stop(
+      1h, asio::bind_cancellation_slot(signal.slot(), [&](const CommandResult& r) { result = r; }));
+  asio::post(io, [&] { signal.emit(asio::cancellation_type::terminal); });
+  const auto deadline = std::chrono::steady_clock::now() + 5s;
+  while (!result && std::chrono::steady_clock::now() < deadline) io.run_one_for(1s);
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->outcome, Outcome::cancelled);
+  const std::uint64_t sent = board.statistics().retries;
+  while (board.statistics().retries < sent + 3 && std::chrono::steady_clock::now() < deadline) {
+    io.run_one_for(1s);
+  }
+  EXPECT_GE(board.statistics().retries, sent + 3) << "repeated all the same";
+}
+
+TEST_F(AsyncBoardCancellation, IsWhatACoroutineDoesThatWaitsForTheFirstOfTwo) {
+  using namespace asio::experimental::awaitable_operators;
+  std::optional<std::size_t> first;
+  const auto race = [&]() -> asio::awaitable<void> {
+    asio::steady_timer timer(io, 1ms);
+    const auto ended = co_await (board.async_send(drive, 1h, asio::use_awaitable) ||
+                                 timer.async_wait(asio::use_awaitable));
+    first = ended.index();
+    board.close();
+  };
+  asio::co_spawn(io, race(), [](const std::exception_ptr& error) { EXPECT_FALSE(error); });
+  io.run_for(5s);
+  EXPECT_EQ(first, 1U) << "the timer, and the command did not keep it waiting";
+}
+
+}  // namespace
+}  // namespace r4::test
