@@ -146,6 +146,7 @@ void CallbackThread::call(const Notice& notice) {
 // In its place among the notices, so that nothing is told twice and nothing left out.
 template <class Kind, class Function, class Tell>
 Subscription CallbackThread::add(Kind& kind, Function callback, Tell tell) {
+  if (!callback) return {};  // as Subscribers::add()
   const auto one = std::make_shared<typename Kind::One>(std::move(callback));
   {
     const std::lock_guard lock(mutex_);

@@ -78,7 +78,9 @@ class Subscribers {
     Function function_;
   };
 
+  // An empty function is no callback: its handle has ended.
   Subscription add(Function function) {
+    if (!function) return {};
     const auto one = std::make_shared<One>(std::move(function));
     add(one);
     return Subscription(one);

@@ -208,6 +208,21 @@ TEST(BoardCallbacks, AreToldEverythingIfTheyAreThereFirst) {
   EXPECT_EQ(told.back(), "active");
 }
 
+TEST(BoardCallbacks, ThatAreEmptyAreNone) {
+  Board board("sim:");
+  board.on_state(nullptr).cancel();
+  board.on_link({}).cancel();
+  asio::io_context io;
+  AsyncBoard async(io, "sim:");
+  async.on_link({}).cancel();
+  async.on_state(nullptr);
+  async.open();
+  const auto deadline = std::chrono::steady_clock::now() + 5s;
+  while (!async.state().any() && std::chrono::steady_clock::now() < deadline) io.run_one_for(5s);
+  EXPECT_TRUE(async.state().any());
+  board.next_state();
+}
+
 TEST(BoardCallbacks, SeveralOfAKindAreCalledInTheirOrderAndEndedOneByOne) {
   Board board("sim:");
   std::promise<std::string> told;

@@ -102,12 +102,12 @@ class Bench {
 
   // Proof of control is a state.
   void connect() {
-    board_.on_state([this](const State&, const Datagram&) {
+    Subscription waiting = board_.on_state([this](const State&, const Datagram&) {
       if (board_.in_control()) io_.stop();
     });
     const Clock::time_point start = Clock::now();
     run_for(connect_timeout);
-    board_.on_state({});
+    waiting.cancel();
     if (!board_.in_control()) throw Error(explain(board_.name(), board_.link()));
     connect_us_ = std::chrono::duration<double, std::micro>(Clock::now() - start).count();
   }
