@@ -141,7 +141,8 @@ def test_a_command_is_refused_while_a_stop_is_latched(board):
     assert 'emergency stop' in refused.stderr and 'E:CLEAR' in refused.stderr
     assert 'D:1,1,1  not sent' in refused.stdout
     told = objects(run('send', board.host_url, 'O:358,1,1', '--json').stdout)
-    assert [(each['outcome'], each['code']) for each in told] == [('refused', 'SAFE')]
+    assert [(each['type'], each['outcome'], each['code']) for each in told] == [
+        ('result', 'refused', 'SAFE'), ('error', 'refused', 'SAFE')]
     assert run('send', board.host_url, 'E:CLEAR', 'O:358,1,1').returncode == 0
 
 
