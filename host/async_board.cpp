@@ -88,16 +88,22 @@ class AsyncBoard::TimingSteps final : public Completion {
 
   static void begin(std::unique_ptr<TimingSteps, Destroy> self) {
     TimingSteps& steps = *self;
-    steps.impl_.begin(std::move(self), [&steps] {
-      const LinkTimingStep& step = steps.steps_[steps.done_];
-      const std::string value = std::to_string(step.ms);
-      const Time left = std::max(Time{0}, steps.deadline_ - steps.impl_.now);
-      return steps.impl_.session.send(Command::setting(step.key, Text(value)), left,
-                                      steps.impl_.now);
-    });
+    steps.impl_.begin(
+        std::move(self),
+        [&steps] {
+          const LinkTimingStep& step = steps.steps_[steps.done_];
+          const std::string value = std::to_string(step.ms);
+          const Time left = std::max(Time{0}, steps.deadline_ - steps.impl_.now);
+          return steps.impl_.session.send(Command::setting(step.key, Text(value)), left,
+                                          steps.impl_.now);
+        },
+        steps.id_);
   }
 
-  void listen(const Cancel& cancel) override { completion_->listen(cancel); }
+  void listen(const Cancel& cancel) override {
+    id_ = cancel.command();
+    completion_->listen(cancel);
+  }
   void complete(const CommandResult& result, How how) override {
     std::unique_ptr<TimingSteps, Destroy> self(this);
     if (result.outcome == Outcome::confirmed && ++done_ < steps_.count) {
@@ -116,6 +122,7 @@ class AsyncBoard::TimingSteps final : public Completion {
   Impl& impl_;  // which owns this
   LinkTimingSteps steps_;
   std::size_t done_ = 0;
+  Ticket id_ = 0;
   Time started_, deadline_;
   CompletionPtr completion_;
 };

@@ -50,7 +50,10 @@ Time AsyncBoard::Impl::begin_entry(Completion::How way) {
 }
 
 void AsyncBoard::Impl::end_entry(Time late) {
-  if (is_open && late > very_late) tell_that_it_was_held_up(late);
+  if (is_open && late > very_late) {
+    poll_wanted = true;
+    tell_that_it_was_held_up(late);
+  }
   settle();
 }
 
@@ -109,22 +112,26 @@ bool AsyncBoard::Impl::end_waits() {
 
 void AsyncBoard::Impl::wait_active(Duration timeout, CompletionPtr completion) {
   enter(Completion::How::post, [&] {
-    const Ticket ticket = next_waiter++;
-    completion->listen(Cancel(weak_from_this(), ticket));
-    waiters.push_back({ticket, now, now + time_of(timeout), std::move(completion)});
+    const Ticket id = next_waiter++;
+    completion->listen(Cancel(weak_from_this(), id));
+    waiters.push_back({id, now, now + time_of(timeout), std::move(completion)});
   });
 }
 
-void AsyncBoard::Impl::cancel(Ticket ticket) {
+void AsyncBoard::Impl::cancel(Ticket id) {
   enter(Completion::How::post, [&] {
-    const auto waiter = std::find_if(waiters.begin(), waiters.end(),
-                                     [ticket](const Waiter& w) { return w.ticket == ticket; });
+    const auto waiter =
+        std::find_if(waiters.begin(), waiters.end(), [id](const Waiter& w) { return w.id == id; });
     if (waiter != waiters.end()) {
       ended.push_back({{Outcome::cancelled, Refusal::none, now - waiter->started},
                        std::move(waiter->completion)});
       waiters.erase(waiter);
       return;
     }
+    const auto command =
+        std::find_if(waiting.begin(), waiting.end(), [id](const Waiting& w) { return w.id == id; });
+    if (command == waiting.end()) return;
+    const Ticket ticket = command->ticket;
     session.cancel(ticket, now);
     on_result(ticket, {Outcome::cancelled});  // of a stop, which goes on
     poll_wanted = true;
@@ -172,6 +179,7 @@ void AsyncBoard::Impl::on_timer() {
   if (!is_open) return;
   armed = false;
   enter(Completion::How::dispatch, [this] { due = session.poll(now); });
+  tell_backlog();  // of a transport that never tells that it is drained
 }
 
 // --- Carrier::Handler
@@ -185,6 +193,10 @@ void AsyncBoard::Impl::on_datagram(std::string_view bytes, Peer) {
 
 void AsyncBoard::Impl::on_drained() {
   in_backlog = false;
+  tell_backlog();
+}
+
+void AsyncBoard::Impl::tell_backlog() {
   if (backlog_size == 0) return;
   const std::size_t size = std::exchange(backlog_size, 0);
   enter(Completion::How::dispatch, [&] {
@@ -239,8 +251,12 @@ void AsyncBoard::Impl::on_bad_datagram(const ReadResult& result, std::string_vie
   if (is_open) call(bad_callbacks, result, bytes);
 }
 
-void AsyncBoard::Impl::on_link(const LinkStatus& status) {
-  if (is_open) call(link_callbacks, status);
+void AsyncBoard::Impl::on_link(const LinkStatus&) {
+  if (!is_open) return;
+  // As it is by then: the one before may have changed it.
+  link_callbacks.each([&](auto& one) {
+    if (!closed) guarded([&] { one(session.link()); });
+  });
 }
 
 void AsyncBoard::Impl::on_restart() {
@@ -248,8 +264,11 @@ void AsyncBoard::Impl::on_restart() {
   if (is_open) call(restart_callbacks);
 }
 
-void AsyncBoard::Impl::on_arming(DisarmCause cause) {
-  if (is_open) call(arming_callbacks, cause);
+void AsyncBoard::Impl::on_arming(DisarmCause) {
+  if (!is_open) return;
+  arming_callbacks.each([&](auto& one) {
+    if (!closed) guarded([&] { one(session.disarmed_by()); });
+  });
 }
 
 void AsyncBoard::Impl::on_refused(const RefusedPost& refused) {

@@ -27,14 +27,15 @@ namespace r4 {
 struct AsyncBoard::Impl final : Carrier::Handler,
                                 Session::Handler,
                                 std::enable_shared_from_this<AsyncBoard::Impl> {
-  // A command under way, and one that has ended.
+  // A command under way, and one that has ended. By its id it is cancelled: the ticket of its first step.
   struct Waiting {
     Ticket ticket = 0;
+    Ticket id = 0;
     CompletionPtr completion;
   };
-  // Who waits until the board is active; its ticket is none of the session's.
+  // Who waits until the board is active; its id is no ticket of the session's.
   struct Waiter {
-    Ticket ticket = 0;
+    Ticket id = 0;
     Time started{0};
     Time deadline{0};
     CompletionPtr completion;
@@ -66,7 +67,9 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   }
   template <class... Arguments>
   void call(const Subscribers<Arguments...>& callbacks, const Arguments&... arguments) {
-    callbacks.each([&](auto& one) { guarded([&] { one(arguments...); }); });
+    callbacks.each([&](auto& one) {
+      if (!closed) guarded([&] { one(arguments...); });  // the one before may have closed the board
+    });
   }
 
   template <class Action>
@@ -96,14 +99,15 @@ struct AsyncBoard::Impl final : Carrier::Handler,
 
   // --- what the user starts
 
-  // `start` hands the command to the session; its ticket is 0 if there is no room.
+  // `start` hands the command to the session; its ticket is 0 if there is no room. `id`: of the step
+  // before, if it is not the first.
   template <class Start>
-  void begin(CompletionPtr completion, Start start) {
+  void begin(CompletionPtr completion, Start start, Ticket id = 0) {
     enter(Completion::How::post, [&] {
       const Ticket ticket = is_open ? start() : 0;
       if (ticket != 0) {
-        completion->listen(Cancel(weak_from_this(), ticket));
-        waiting.push_back({ticket, std::move(completion)});
+        if (id == 0) completion->listen(Cancel(weak_from_this(), id = ticket));
+        waiting.push_back({ticket, id, std::move(completion)});
         poll_wanted = true;
       } else {
         const Outcome outcome = is_open ? Outcome::full : Outcome::closed;
@@ -112,7 +116,7 @@ struct AsyncBoard::Impl final : Carrier::Handler,
     });
   }
   void wait_active(Duration timeout, CompletionPtr completion);
-  void cancel(Ticket ticket);
+  void cancel(Ticket id);
   void open();
   void close();
 
@@ -125,6 +129,7 @@ struct AsyncBoard::Impl final : Carrier::Handler,
 
   void on_datagram(std::string_view bytes, Peer from) override;
   void on_drained() override;
+  void tell_backlog();
   void on_carrier_event(const CarrierEvent& event) override;
 
   // --- Session::Handler
@@ -135,9 +140,9 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   void on_identity(const Identity& fresh) override;
   void on_nack(const Nack& nack, const Datagram& datagram) override;
   void on_bad_datagram(const ReadResult& result, std::string_view bytes) override;
-  void on_link(const LinkStatus& status) override;
+  void on_link(const LinkStatus&) override;
   void on_restart() override;
-  void on_arming(DisarmCause cause) override;
+  void on_arming(DisarmCause) override;
   void on_refused(const RefusedPost& refused) override;
   void on_result(Ticket ticket, const CommandResult& result) override;
 

@@ -47,11 +47,17 @@ Board::Impl::Impl(const CarrierMaker& make, BoardOptions options, BoardCallbacks
   listen();
   async.open();
   take_name();
+  if (callback_limit != Duration{0}) look_at_callbacks();
 }
 
 void Board::Impl::start() {
-  thread = std::thread([self = shared_from_this()] { self->io.run(); });
   callbacks.start(shared_from_this());
+  try {
+    thread = std::thread([self = shared_from_this()] { self->io.run(); });
+  } catch (...) {
+    callbacks.stop();
+    throw;
+  }
 }
 
 // The loop first: it waits for no callback, so that a callback may close the board.
@@ -116,27 +122,15 @@ void Board::Impl::take_name() {
   name = async.name();
 }
 
-void Board::Impl::tell(CallbackThread::Notice notice) {
-  callbacks.tell(std::move(notice));
-  if (looking || callback_limit == Duration{0}) return;
-  looking = true;
-  look_timer.expires_after(callback_limit);
-  look_timer.async_wait([this](const std::error_code& error) {
-    if (!error) look_at_callbacks();
-  });
-}
+void Board::Impl::tell(CallbackThread::Notice notice) { callbacks.tell(std::move(notice)); }
 
-// Heartbeats say that somebody looks after the robot.
+// Heartbeats say that somebody looks after the robot. Looks again when the callback that runs now, or one
+// that begins at once, reaches the limit.
 void Board::Impl::look_at_callbacks() {
-  looking = false;
   const auto busy = callbacks.busy_for();
-  if (!busy) return;
-  if (*busy >= callback_limit) {
-    async.hold_heartbeats(held_for_callback = true);
-    return;  // until the callback ends
-  }
-  looking = true;
-  look_timer.expires_after(callback_limit - *busy);
+  const bool hangs = busy && *busy >= callback_limit;
+  if (hangs && !held_for_callback) async.hold_heartbeats(held_for_callback = true);
+  look_timer.expires_after(busy && !hangs ? callback_limit - *busy : callback_limit);
   look_timer.async_wait([this](const std::error_code& error) {
     if (!error) look_at_callbacks();
   });
@@ -149,6 +143,8 @@ void Board::Impl::on_callback_end(Clock::duration busy) {
   if (closed) return;
   const auto ms = std::chrono::duration_cast<Duration>(busy).count();
   asio::post(io, [this, ms] {
+    const auto next = callbacks.busy_for();
+    if (next && *next >= callback_limit) return;  // it hangs, too: its own end releases them
     if (!std::exchange(held_for_callback, false)) return;
     async.hold_heartbeats(false);
     tell(CarrierEvent{

@@ -107,7 +107,6 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
 
   // Of the loop.
   asio::steady_timer look_timer{io};
-  bool looking = false;            // the timer is set
   bool held_for_callback = false;  // the heartbeats
 
   // What both sides see.

@@ -29,11 +29,12 @@ void CallbackThread::start(std::shared_ptr<void> owner) {
 }
 
 void CallbackThread::stop() {
+  std::deque<Task> gone;  // with what the callbacks have captured, destroyed without the lock
   {
     const std::lock_guard lock(mutex_);
     ended_ = true;
     taken_ = told_;
-    tasks_.clear();
+    gone.swap(tasks_);
   }
   news_.notify_all();
   if (on_it()) return;
@@ -52,10 +53,11 @@ void CallbackThread::tell(Notice notice) {
       newest = std::move(notice);
       return;
     }
-    if (told_ - taken_ == capacity) {
-      ++taken_;
-      ++dropped_;
-    }
+    const auto* const event = std::get_if<CarrierEvent>(&notice);
+    const bool can_be_missed = std::holds_alternative<RefusedPost>(notice) ||
+                               (event != nullptr && event->kind == CarrierEvent::Kind::warning);
+    if (can_be_missed && told_ - taken_ >= capacity / 2) return;
+    if (told_ - taken_ == capacity) ++taken_;
     ring_[told_++ % capacity] = std::move(notice);
   }
   news_.notify_one();
@@ -65,11 +67,6 @@ std::optional<CallbackThread::Clock::duration> CallbackThread::busy_for() const 
   const std::lock_guard lock(mutex_);
   if (!busy_since_) return {};
   return Clock::now() - *busy_since_;
-}
-
-std::uint64_t CallbackThread::dropped() const {
-  const std::lock_guard lock(mutex_);
-  return dropped_;
 }
 
 void CallbackThread::run() {
@@ -115,15 +112,15 @@ void CallbackThread::call(const Notice& notice) {
   std::visit(Overloaded{
                  [&](const Restart&) {
                    state_ = ReceivedState();
-                   restart_callbacks_();
+                   call_each(restart_callbacks_);
                  },
                  [&](const ReceivedState& state) {
                    state_ = state;
-                   state_callbacks_(state);
+                   call_each(state_callbacks_, state);
                  },
                  [&](const LinkStatus& link) {
                    link_ = link;
-                   link_callbacks_(link);
+                   call_each(link_callbacks_, link);
                  },
                  [&](const CarrierEvent& event) {
                    if (event.kind == CarrierEvent::Kind::warning) {
@@ -132,13 +129,13 @@ void CallbackThread::call(const Notice& notice) {
                      event_ = event;
                      warning_.reset();
                    }
-                   event_callbacks_(event);
+                   call_each(event_callbacks_, event);
                  },
                  [&](DisarmCause cause) {
                    arming_ = cause;
-                   arming_callbacks_(cause);
+                   call_each(arming_callbacks_, cause);
                  },
-                 [&](const RefusedPost& refused) { refused_callbacks_(refused); },
+                 [&](const RefusedPost& refused) { call_each(refused_callbacks_, refused); },
              },
              notice);
 }
@@ -171,7 +168,7 @@ Subscription CallbackThread::on_link(Subscribers<LinkStatus>::Function callback)
 Subscription CallbackThread::on_event(Subscribers<CarrierEvent>::Function callback) {
   return add(event_callbacks_, std::move(callback), [this](auto& one) {
     if (event_) one(*event_);
-    if (warning_) one(*warning_);
+    if (warning_ && !ended_) one(*warning_);
   });
 }
 Subscription CallbackThread::on_restart(Subscribers<>::Function callback) {

@@ -55,8 +55,6 @@ class CallbackThread {
   void tell(Notice notice);
   // How long the callback that runs now has run; nothing if none does.
   std::optional<Clock::duration> busy_for() const;
-  // Notices that were dropped.
-  std::uint64_t dropped() const;
 
   // Adds a callback. It is told what there is already, then what comes next.
   Subscription on_state(Subscribers<ReceivedState>::Function callback);
@@ -78,6 +76,13 @@ class CallbackThread {
   void run();
   bool take(Notice& notice, std::function<void()>& task);
   void call(const Notice& notice);
+  // The one before may have closed the board.
+  template <class... Arguments>
+  void call_each(const Subscribers<Arguments...>& callbacks, const Arguments&... arguments) {
+    callbacks.each([&](auto& one) {
+      if (!ended_) one(arguments...);
+    });
+  }
 
   const std::function<void(Clock::duration)> on_end_;
   std::thread thread_;
@@ -97,13 +102,12 @@ class CallbackThread {
   std::optional<CarrierEvent> warning_;  // since then
   DisarmCause arming_ = DisarmCause::not_yet;
 
-  mutable std::mutex mutex_;
+  mutable std::mutex mutex_;  // of what follows; ended_ is read without it, too
   std::condition_variable news_;
-  bool ended_ = false;
+  std::atomic<bool> ended_{false};
   std::vector<Notice> ring_;
   std::uint64_t told_ = 0;   // notices so far; the newest is ring_[(told_ - 1) % capacity]
   std::uint64_t taken_ = 0;  // of them, taken out or dropped
-  std::uint64_t dropped_ = 0;
   std::deque<Task> tasks_;
   std::optional<Clock::time_point> busy_since_;
 };

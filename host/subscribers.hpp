@@ -19,8 +19,9 @@ class Subscriber {
   virtual ~Subscriber() = default;
   void end() {
     ended_ = true;
+    std::shared_ptr<void> gone;            // destroyed without the lock
     const std::lock_guard lock(running_);  // waits for a call in another thread
-    if (!called_) drop();                  // else when that call is over
+    if (!called_) gone = take();           // else when that call is over
   }
   bool ended() const { return ended_; }
 
@@ -28,30 +29,34 @@ class Subscriber {
   // Calls `function` unless this has ended.
   template <class Function>
   void call(Function function) {
+    std::shared_ptr<void> gone;
     const std::lock_guard lock(running_);
     if (ended_) return;
-    const Call under_way(*this);
+    const Call under_way(*this, gone);
     function();
   }
-  // Lets the callback go, with what it has captured.
-  virtual void drop() = 0;
+  // Takes the callback out, with what it has captured.
+  virtual std::shared_ptr<void> take() = 0;
 
  private:
   // Also where the callback throws.
   class Call {
    public:
-    explicit Call(Subscriber& subscriber)
-        : subscriber_(subscriber), outermost_(!std::exchange(subscriber.called_, true)) {}
+    Call(Subscriber& subscriber, std::shared_ptr<void>& gone)
+        : subscriber_(subscriber),
+          gone_(gone),
+          outermost_(!std::exchange(subscriber.called_, true)) {}
     Call(const Call&) = delete;
     Call& operator=(const Call&) = delete;
     ~Call() {
       if (!outermost_) return;
       subscriber_.called_ = false;
-      if (subscriber_.ended_) subscriber_.drop();
+      if (subscriber_.ended_) gone_ = subscriber_.take();
     }
 
    private:
     Subscriber& subscriber_;
+    std::shared_ptr<void>& gone_;
     const bool outermost_;
   };
 
@@ -68,14 +73,14 @@ class Subscribers {
 
   class One final : public Subscriber {
    public:
-    explicit One(Function function) : function_(std::move(function)) {}
+    explicit One(Function function) : function_(std::make_shared<Function>(std::move(function))) {}
     void operator()(const Arguments&... arguments) {
-      call([&] { function_(arguments...); });
+      call([&] { (*function_)(arguments...); });
     }
 
    private:
-    void drop() override { function_ = nullptr; }
-    Function function_;
+    std::shared_ptr<void> take() override { return std::move(function_); }
+    std::shared_ptr<Function> function_;
   };
 
   // An empty function is no callback: its handle has ended.

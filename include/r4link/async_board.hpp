@@ -197,6 +197,7 @@ class AsyncBoard {
     Cancel(std::weak_ptr<Impl> impl, std::uint64_t command)
         : impl_(std::move(impl)), command_(command) {}
     void operator()(asio::cancellation_type type) const;
+    std::uint64_t command() const { return command_; }
 
    private:
     std::weak_ptr<Impl> impl_;

@@ -101,9 +101,9 @@ class R4LINK_API Carrier {
    public:
     virtual void on_datagram(std::string_view bytes, Peer from) = 0;  // `bytes` valid in the call
     virtual void on_carrier_event(const CarrierEvent& event) = 0;
-    // All datagrams that had arrived have been handed over. A handler that was held up can tell by
-    // it which state of a backlog is the newest. Behind a long burst on a byte stream it may come
-    // with the next datagram only.
+    // All datagrams that had arrived have been handed over: to be called whenever that is so. A handler
+    // that was held up can tell by it which state of a backlog is the newest. Behind a long burst on a
+    // byte stream it may come with the next datagram only.
     virtual void on_drained() {}
 
    protected:

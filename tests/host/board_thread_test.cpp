@@ -223,10 +223,46 @@ TEST(BoardCallbacks, ThatAreEmptyAreNone) {
   board.next_state();
 }
 
-TEST(BoardCallbacks, SeveralOfAKindAreCalledInTheirOrderAndEndedOneByOne) {
+TEST(BoardCallbacks, ThatHangWhenTheyAreAddedEndTheHeartbeatsToo) {
+  BoardInAThread simulated("udp");
+  BoardOptions options;
+  options.callback_limit = 50ms;
+  std::promise<void> released;
+  Board board(simulated.url(), options);
+  board.wait_active();
+  board.on_arming([release = released.get_future().share()](DisarmCause) { release.wait(); });
+  EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::link));
+  released.set_value();
+  board.wait_active();
+}
+
+TEST(BoardCallbacks, NoneFollowsTheOneThatClosesTheBoard) {
+  std::promise<void> closed;
+  std::atomic<bool> called{false};
   Board board("sim:");
+  board.on_state([&](const State&) {
+    board.close();
+    closed.set_value();
+  });
+  board.on_state([&](const State&) { called = true; });
+  closed.get_future().wait();
+  board.close();
+  EXPECT_FALSE(called);
+
+  asio::io_context io;
+  AsyncBoard async(io, "sim:");
+  async.on_state([&](const State&, const Datagram&) { async.close(); });
+  async.on_state([&](const State&, const Datagram&) { called = true; });
+  async.open();
+  io.run_for(5s);
+  EXPECT_TRUE(async.state().any());
+  EXPECT_FALSE(called);
+}
+
+TEST(BoardCallbacks, SeveralOfAKindAreCalledInTheirOrderAndEndedOneByOne) {
   std::promise<std::string> told;
   std::string order;
+  Board board("sim:");
   ScopedSubscription first = board.on_state([&](const State&) { order += 'a'; });
   board.on_state([&](const State&) {
     order += 'b';
