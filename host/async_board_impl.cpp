@@ -179,7 +179,8 @@ void AsyncBoard::Impl::on_timer() {
   if (!is_open) return;
   armed = false;
   enter(Completion::How::dispatch, [this] { due = session.poll(now); });
-  tell_backlog();  // of a transport that never tells that it is drained
+  // Of a transport that never tells that it is drained; while a backlog comes in, its newest is young.
+  if (now - backlog_came > held_up) tell_backlog();
 }
 
 // --- Carrier::Handler
@@ -226,6 +227,7 @@ SendResult AsyncBoard::Impl::transmit(std::string_view datagram, Priority priori
 void AsyncBoard::Impl::on_state(const ReceivedState& state, const Datagram& datagram) {
   if (!is_open) return;
   if (in_backlog) {
+    backlog_came = now;
     backlog_size = datagram.bytes().size();
     std::copy_n(datagram.bytes().data(), backlog_size, backlog.data());
   } else {
