@@ -179,8 +179,9 @@ void AsyncBoard::Impl::on_timer() {
   if (!is_open) return;
   armed = false;
   enter(Completion::How::dispatch, [this] { due = session.poll(now); });
-  // Of a transport that never tells that it is drained; while a backlog comes in, its newest is young.
-  if (now - backlog_came > held_up) tell_backlog();
+  // Twice without a word that the transport is drained: it may be one that never tells.
+  undrained = backlog_size == 0 ? 0 : undrained + 1;
+  if (undrained >= 2) tell_backlog();
 }
 
 // --- Carrier::Handler
@@ -194,6 +195,7 @@ void AsyncBoard::Impl::on_datagram(std::string_view bytes, Peer) {
 
 void AsyncBoard::Impl::on_drained() {
   in_backlog = false;
+  undrained = 0;
   tell_backlog();
 }
 
@@ -227,7 +229,6 @@ SendResult AsyncBoard::Impl::transmit(std::string_view datagram, Priority priori
 void AsyncBoard::Impl::on_state(const ReceivedState& state, const Datagram& datagram) {
   if (!is_open) return;
   if (in_backlog) {
-    backlog_came = now;
     backlog_size = datagram.bytes().size();
     std::copy_n(datagram.bytes().data(), backlog_size, backlog.data());
   } else {

@@ -165,7 +165,7 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   bool in_backlog = false;
   std::array<char, max_datagram> backlog;  // the newest state of it
   std::size_t backlog_size = 0;
-  Time backlog_came{0};
+  int undrained = 0;  // times that the timer rang while there was one
 
   std::vector<Waiting> waiting;
   std::vector<Ended> ended;

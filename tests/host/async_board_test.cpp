@@ -18,6 +18,7 @@
 
 #include "firmware/ports/sim/simulated_board.hpp"
 #include "host/session/session.hpp"
+#include "host/standard_registry.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
 #include "transports/memory_carrier.hpp"
@@ -62,6 +63,42 @@ TEST_F(AsyncBoardTest, SendsItsFirstHeartbeatWhenItOpens) {
   ASSERT_TRUE(run_until(io, [&] { return !listener.heard.empty(); }));
   EXPECT_EQ(listener.heard[0].substr(0, 9), "H:ROS2-R4");
   board_end->close();
+}
+
+// Hands over what another carrier receives, and never tells that it is drained.
+class Undrained final : public Carrier, private Carrier::Handler {
+ public:
+  explicit Undrained(std::unique_ptr<Carrier> below) : below_(std::move(below)) {}
+  void open(Carrier::Handler& handler) override {
+    handler_ = &handler;
+    below_->open(*this);
+  }
+  void close() noexcept override { below_->close(); }
+  SendResult send(std::string_view bytes, Priority priority, Peer to) override {
+    return below_->send(bytes, priority, to);
+  }
+  bool up() const override { return below_->up(); }
+  std::size_t max_size() const override { return below_->max_size(); }
+  const std::string& name() const override { return below_->name(); }
+  const CarrierCounters& counters() const override { return below_->counters(); }
+
+ private:
+  void on_datagram(std::string_view bytes, Peer from) override {
+    handler_->on_datagram(bytes, from);
+  }
+  void on_carrier_event(const CarrierEvent& event) override { handler_->on_carrier_event(event); }
+
+  std::unique_ptr<Carrier> below_;
+  Carrier::Handler* handler_ = nullptr;
+};
+
+TEST_F(AsyncBoardTest, TellsStatesOfATransportThatIsNeverDrained) {
+  AsyncBoard over(io,
+                  std::make_unique<Undrained>(standard_registry().make(io, "sim:", Role::host)));
+  int states = 0;
+  over.on_state([&](const State&, const Datagram&) { ++states; });
+  over.open();
+  EXPECT_TRUE(run_until(io, [&] { return states >= 3; }));
 }
 
 TEST_F(AsyncBoardTest, ConfirmsThroughACallback) {
