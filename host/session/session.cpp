@@ -20,16 +20,25 @@ std::uint32_t Session::random_first_pnum() {
   return echo_host_first_pnum + (random() & 0x3fffffffU);
 }
 
+namespace {
+
+// Before anything is made of them: their times may be too long to be reckoned with.
+SessionOptions checked(SessionOptions options) {
+  require_valid(options);
+  return options;
+}
+
+}  // namespace
+
 Session::Session(Handler& handler, SessionOptions options, std::uint32_t first_pnum)
     : handler_(handler),
-      options_(std::move(options)),
+      options_(checked(std::move(options))),
       first_pnum_(first_pnum),
       link_(options_.timing, first_pnum),
       key_(options_.key, options_.clock_start),
       selection_(options_.fields),
       question_(options_.identify_interval),
       pending_(max_pending, max_stops) {
-  require_valid(options_);
   if (!options_.fields.empty()) {
     const std::string fields = options_.fields;
     if (FieldSet set; parse_fields(fields, set) != Refusal::none) {
