@@ -65,7 +65,8 @@ void AsyncBoard::Impl::tell_that_it_was_held_up(Time late) {
                     Problem{ErrorKind::refused, "the event loop",
                             "it was held up: what was due went out " + std::to_string(ms) +
                                 " ms late, heartbeats too",
-                            "a handler must return at once; do the work in another thread"}});
+                            "a handler on this loop must return at once; where none is slow, the "
+                            "computer had no time for this program"}});
 }
 
 void AsyncBoard::Impl::settle() {

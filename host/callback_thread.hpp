@@ -7,8 +7,9 @@
 // not take for ever: busy_for() tells the loop how long one has run, and after a limit the loop stops
 // the heartbeats, for nobody looks after the robot.
 //
-// Nothing here waits for a callback. A state that waits is replaced by the next one; of other notices
-// the oldest are dropped, and counted. tell() allocates nothing.
+// Nothing here waits for a callback. A state that waits is replaced by the next one. Refusals and warnings
+// are left out where 32 notices wait; of the others, the oldest gives way where 64 do. tell() allocates
+// nothing.
 #pragma once
 
 #include <atomic>

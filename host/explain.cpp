@@ -248,15 +248,17 @@ Words outcome_words(std::string_view command, const CommandResult& result, const
     case Outcome::cancelled:
       words.reason =
           "cancelled: an emergency stop came, the board has a newer reason to be safe, or the "
-          "program gave "
-          "it up";
+          "program "
+          "gave it up";
       words.fix = "see why the board is safe before it is cleared";
       break;
     case Outcome::closed:
       words.reason = "given up: the board was closed";
+      words.fix = "open it again";
       break;
     case Outcome::blocked:
       words.reason = "not confirmed: the board's thread does not answer";
+      words.fix = "a transport of your own must return at once";
       break;
     case Outcome::full:
       words.reason =

@@ -83,12 +83,12 @@ PostResult Session::post(const Command& command, Time now) {
     return PostResult::not_armed;
   }
   ++collector_.counts.commands;
-  if (command.kind == CommandKind::clear) repetition_.cancel();
   const bool unnamed =
       command.kind == CommandKind::clear && command.value == Command::unnamed_cause;
   switch (
       transmit_now(unnamed ? Command::clear(cause_) : command, to_ms(now), Priority::normal, now)) {
     case SendResult::sent:
+      if (command.kind == CommandKind::clear) repetition_.cancel();
       posted_.add(link_.last_pnum(), command);
       return PostResult::sent;
     case SendResult::full:

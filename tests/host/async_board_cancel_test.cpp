@@ -89,6 +89,32 @@ TEST_F(AsyncBoardCancellation, EndsTheWaitForAStopThatGoesOn) {
   EXPECT_GE(board.statistics().retries, sent + 3) << "repeated all the same";
 }
 
+TEST(AsyncBoardCancel, OfALinkTimingIsNotLostBetweenItsSettings) {
+  asio::io_context io;
+  AsyncBoard board(io, "sim:", at_will());
+  asio::cancellation_signal signal;
+  std::optional<CommandResult> result;
+  std::uint64_t confirmed = 0;  // before
+  bool begun = false;
+  board.on_state([&](const State&, const Datagram&) {
+    if (!begun) return;
+    if (board.statistics().confirmed > confirmed) signal.emit(asio::cancellation_type::terminal);
+  });
+  board.open();
+  board.async_wait_active(5s, [&](const CommandResult&) {
+    confirmed = board.statistics().confirmed;
+    begun = true;
+    const auto note = [&](const CommandResult& r) {
+      result = r;
+      board.close();
+    };
+    board.async_link_timing(800ms, 150ms, 5s, asio::bind_cancellation_slot(signal.slot(), note));
+  });
+  io.run_for(10s);
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->outcome, Outcome::cancelled) << "after the first of three";
+}
+
 TEST_F(AsyncBoardCancellation, IsWhatACoroutineDoesThatWaitsForTheFirstOfTwo) {
   using namespace asio::experimental::awaitable_operators;
   std::optional<std::size_t> first;

@@ -101,6 +101,38 @@ TEST_F(AsyncBoardTest, TellsStatesOfATransportThatIsNeverDrained) {
   EXPECT_TRUE(run_until(io, [&] { return states >= 3; }));
 }
 
+TEST_F(AsyncBoardTest, TellsOfAHoldUpOnceHoweverMuchFollowsIt) {
+  int warnings = 0;
+  board.on_event([&](const CarrierEvent& event) {
+    if (event.kind == CarrierEvent::Kind::warning) ++warnings;
+  });
+  board.open();
+  ASSERT_TRUE(run_until(io, [&] { return board.in_control(); }));
+  bool posted = false;
+  asio::post(io, [&] {
+    const auto end = std::chrono::steady_clock::now() + 350ms;
+    while (std::chrono::steady_clock::now() < end) std::this_thread::yield();
+    for (int us = 1000; us < 1100; ++us) board.post(Command::servo(us, 1));
+    posted = true;
+  });
+  ASSERT_TRUE(run_until(io, [&] { return posted && board.state().servo_us[0] == 1099; }));
+  EXPECT_EQ(warnings, 1);
+}
+
+TEST_F(AsyncBoardTest, TellsEverySubscriberLastWhatIsSo) {
+  std::vector<DisarmCause> told;
+  AsyncBoard armed(io, "sim:");
+  armed.on_arming([&](DisarmCause cause) {
+    if (cause == DisarmCause::none) armed.async_stop(1s, [](const CommandResult&) {});
+  });
+  armed.on_arming([&](DisarmCause cause) { told.push_back(cause); });
+  armed.open();
+  armed.async_arm(3s, [](const CommandResult&) {});
+  ASSERT_TRUE(run_until(io, [&] { return armed.link().reason == SafeReason::stop; }));
+  ASSERT_FALSE(told.empty());
+  EXPECT_EQ(told.back(), DisarmCause::stop) << "the first one stopped the board meanwhile";
+}
+
 TEST_F(AsyncBoardTest, ConfirmsThroughACallback) {
   std::optional<CommandResult> result;
   board.open();

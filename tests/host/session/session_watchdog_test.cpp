@@ -50,6 +50,53 @@ TEST(SessionWatchdog, FedAgainGivesControlBack) {
   EXPECT_EQ(link.count('O'), 1U);
 }
 
+TEST(SessionHold, StopsHeartbeatsAndCommandsButNoStopUntilItEnds) {
+  ScriptedLink link;
+  link.connect();
+  link.session.hold(true, link.now);
+  EXPECT_EQ(link.links.back().gate, Gate::callback) << "on_link tells";
+  EXPECT_FALSE(link.session.in_control(link.now));
+  EXPECT_EQ(link.session.post(drive, link.now), PostResult::no_link);
+  const Ticket waits = link.session.send(drive, 5s, link.now);
+  const Ticket late = link.session.send(Command::servo(1500, 1), 300ms, link.now);
+  for (int i = 0; i < 4; ++i) {
+    link.heartbeat();
+    link.pass(100ms);
+  }
+  EXPECT_EQ(link.count('H'), 0U);
+  EXPECT_EQ(link.count('O') + link.count('S'), 0U);
+  EXPECT_EQ(link.results.at(late).outcome, Outcome::timed_out);
+
+  link.session.hold(false, link.now);
+  EXPECT_EQ(link.session.link().gate, Gate::open);
+  link.pass(1ms);
+  EXPECT_EQ(link.count('H'), 1U);
+  EXPECT_EQ(link.count('O'), 1U) << "whose caller still waits";
+  EXPECT_EQ(link.count('S'), 0U);
+  EXPECT_EQ(link.results.count(waits), 0U);
+
+  link.session.hold(true, link.now);
+  link.session.stop(1s, link.now);
+  link.pass(100ms);
+  EXPECT_GE(link.count('E'), 4U) << "a stop is never held back";
+}
+
+TEST(SessionHold, AndWatchdogBothHaveToBeOver) {
+  ScriptedLink link;
+  link.connect();
+  link.session.watchdog(100ms, link.now);
+  link.session.hold(true, link.now);
+  link.pass(200ms);
+  EXPECT_EQ(link.session.link().gate, Gate::watchdog);
+  link.session.hold(false, link.now);
+  EXPECT_TRUE(link.session.link().gated());
+  link.session.hold(true, link.now);
+  link.session.feed(link.now);
+  EXPECT_EQ(link.session.link().gate, Gate::callback);
+  link.session.hold(false, link.now);
+  EXPECT_FALSE(link.session.link().gated());
+}
+
 TEST(Session, SendsNothingWhoseDeadlineIsOver) {
   ScriptedLink link;
   link.connect();

@@ -30,18 +30,6 @@ bool drives(const sim::Pins& pins) {
 
 int number_of(Direction direction) { return static_cast<int>(direction); }
 
-std::string_view name_of_kind(CarrierEvent::Kind kind) {
-  switch (kind) {
-    case CarrierEvent::Kind::up:
-      return "up";
-    case CarrierEvent::Kind::down:
-      return "down";
-    case CarrierEvent::Kind::warning:
-      break;
-  }
-  return "warning";
-}
-
 std::string missing_lines(bool json, std::uint64_t count) {
   if (json) return line_of({{"type", "lost"}, {"lines", count}});
   return fmt::format("({} lines are missing: whoever reads this was too slow)\n", count);
@@ -288,7 +276,7 @@ void SimLog::on_rejected(std::uint32_t t_ms, Verdict verdict) {
 
 void SimLog::on_carrier(std::uint32_t t_ms, const Carrier& carrier,
                         const CarrierEvent& carrier_event) {
-  const std::string_view kind = name_of_kind(carrier_event.kind);
+  const std::string_view kind = to_text(carrier_event.kind);
   const auto& [reason, fix] = std::tie(carrier_event.problem.reason, carrier_event.problem.fix);
   if (!output_.json()) {
     return print(
