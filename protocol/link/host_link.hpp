@@ -21,10 +21,8 @@ namespace r4 {
 
 class HostLink {
  public:
-  using Timing = LinkTiming;
-
   // `first_pnum` must be echo_host_first_pnum (board_link.hpp) plus 30 random bits.
-  HostLink(Timing timing, std::uint32_t first_pnum) : timing_(timing), next_pnum_(first_pnum) {}
+  HostLink(LinkTiming timing, std::uint32_t first_pnum) : timing_(timing), next_pnum_(first_pnum) {}
 
   // A valid datagram of the board. Returns what its number says; a late, old or duplicate one does
   // not change the state. `heartbeat`: it is a board heartbeat, answered at once by
@@ -89,7 +87,7 @@ class HostLink {
  private:
   void notice_boot(std::uint32_t t_ms, std::uint32_t now_ms);
 
-  Timing timing_;
+  LinkTiming timing_;
   std::uint32_t next_pnum_;
   HostLinkState state_ = HostLinkState::connecting;
   SafeReason reason_ = SafeReason::none;

@@ -28,7 +28,7 @@ struct HostLinkTest : testing::Test {
   }
   std::uint32_t board_t() const { return now + board_offset; }
 
-  HostLink link{HostLink::Timing{}, first_pnum};
+  HostLink link{LinkTiming{}, first_pnum};
   std::uint32_t now = 5000;
   std::uint32_t board_offset = 123'456;
   std::uint32_t board_pnum = 1;

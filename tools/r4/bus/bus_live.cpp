@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "../shell/json.hpp"
-#include "../shell/output.hpp"
+#include "../shell/screen.hpp"
 #include "transports/can/can_interface.hpp"
 #include "transports/can/can_listener.hpp"
 #include "transports/url.hpp"
@@ -137,7 +137,7 @@ class LiveBus {
     timer_.async_wait([this](const std::error_code& error) {
       if (error) return;
       if (!live_) return io_.stop();
-      if (output_has_room()) {
+      if (Screen::has_room()) {
         const Window window = look();
         std::vector<std::string> rows = table(window);
         if (window.load(window.total) > nearly_full_)

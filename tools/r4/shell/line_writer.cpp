@@ -22,8 +22,8 @@ std::atomic<int> first_error{0};  // the errno of the first write that failed
 
 }  // namespace
 
-LineWriter::LineWriter(std::function<std::string(std::uint64_t count)> note)
-    : note_(std::move(note)), thread_([this] { run(); }) {}
+LineWriter::LineWriter(std::size_t room, std::function<std::string(std::uint64_t count)> note)
+    : room_(room), note_(std::move(note)), thread_([this] { run(); }) {}
 
 LineWriter::~LineWriter() {
   {
@@ -37,14 +37,20 @@ LineWriter::~LineWriter() {
 void LineWriter::write(std::string_view line) {
   {
     const std::lock_guard lock(mutex_);
-    if (waiting_.size() + line.size() > capacity) {
+    if (waiting_.size() + line.size() > room_) {
       ++lost_;
       return;
     }
-    if (lost_ != 0) waiting_ += note_(std::exchange(lost_, 0));
+    const std::uint64_t missing = lost_ - std::exchange(noted_, lost_);
+    if (missing != 0 && note_) waiting_ += note_(missing);
     waiting_ += line;
   }
   changed_.notify_one();
+}
+
+std::uint64_t LineWriter::lost() const {
+  const std::lock_guard lock(mutex_);
+  return lost_;
 }
 
 void LineWriter::finish() {

@@ -17,6 +17,8 @@
 namespace r4::tool {
 namespace {
 
+constexpr std::size_t room = std::size_t{1} << 20;  // for bytes that wait for a reader
+
 // Whether a motor is told to turn.
 bool drives(const sim::Pins& pins) {
   const auto has_duty = [](const Drive& drive) { return drive.pwm != 0; };
@@ -38,7 +40,8 @@ std::string missing_lines(bool json, std::uint64_t count) {
 }  // namespace
 
 SimOutput::SimOutput(bool json)
-    : json_(json), writer_([json](std::uint64_t count) { return missing_lines(json, count); }) {}
+    : json_(json),
+      writer_(room, [json](std::uint64_t count) { return missing_lines(json, count); }) {}
 
 Json pins_json(const sim::Pins& pins) {
   Json json{{"osmc", Json::array()}, {"dhb", Json::array()},  {"servo", pins.servo_us},

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "../shell/json.hpp"
-#include "../shell/output.hpp"
+#include "../shell/screen.hpp"
 #include "host/commands/command_help.hpp"
 #include "monitor_view.hpp"
 #include "protocol/messages/state_fields.hpp"
@@ -59,7 +59,7 @@ class LiveView final : public MonitorView {
   }
 
   void on_tick() override {
-    if (!output_has_room()) return;  // Ctrl-S
+    if (!Screen::has_room()) return;  // Ctrl-S
     std::vector<std::string> lines = status_lines();
     add_fields(lines, std::max<std::size_t>(1, Screen::columns() / cell_width));
     lines.emplace_back();

@@ -14,7 +14,8 @@
 #include <vector>
 
 #include "../shell/json.hpp"
-#include "../shell/output.hpp"
+#include "../shell/line_writer.hpp"
+#include "../shell/screen.hpp"
 #include "protocol/messages/message.hpp"
 #include "transports/can/can_listener.hpp"
 
@@ -23,6 +24,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr std::size_t unread = 65536;  // bytes that wait for a reader
 constexpr Milliseconds tick{100};
 constexpr Milliseconds plain_interval{1000};
 // Boards without a host say so twice a second.
@@ -52,7 +54,6 @@ class BusMonitor {
     });
     next_tick();
     io_.run();
-    lines_.print_held();
     if (!any_heard()) {
       throw Error(ErrorKind::refused, name(), "no board was heard",
                   "see that boards are connected and have this bus's bit rate; r4 list shows it");
@@ -79,15 +80,15 @@ class BusMonitor {
                   {"pnum", datagram.pnum()},
                   {"t", datagram.time_ms()},
                   {"fields", fields_json(datagram)}};
-      lines_.print_or_skip(line_of(object));
+      lines_.write(line_of(object));
     }
     if (kind_of(datagram) == MessageKind::state && ++states_ == options_.count) io_.stop();
   }
   void on_stop() {
     if (options_.json) {
-      lines_.print(line_of({{"type", "emergency_stop"}, {"transport", name()}}));
+      lines_.write(line_of({{"type", "emergency_stop"}, {"transport", name()}}));
     } else if (!live_) {
-      lines_.print("emergency stop of a host\n");
+      lines_.write("emergency stop of a host\n");
     } else {
       ++stops_;
     }
@@ -97,12 +98,12 @@ class BusMonitor {
     const bool up = event.kind == CarrierEvent::Kind::up;
     note_ = up ? "" : problem.text();
     if (options_.json) {
-      lines_.print(
+      lines_.write(
           line_of({{"type", up ? "link" : "error"},
                    {"transport", name()},
                    {"fields", {{"up", up}, {"reason", problem.reason}, {"fix", problem.fix}}}}));
     } else if (!live_) {
-      lines_.print(up ? name() + ": up\n" : note_ + "\n");
+      lines_.write(up ? name() + ": up\n" : note_ + "\n");
     }
   }
 
@@ -110,14 +111,13 @@ class BusMonitor {
     tick_.expires_after(live_ ? tick : plain_interval);
     tick_.async_wait([this](const std::error_code& error) {
       if (error) return;
-      lines_.print_held();
       show();
       next_tick();
     });
   }
 
   void show() {
-    if (options_.json || !output_has_room()) return;
+    if (options_.json || (live_ && !Screen::has_room())) return;
     const Clock::time_point now = Clock::now();
     const double seconds = std::chrono::duration<double>(now - shown_).count();
     if (live_ && seconds < 1 && !rows_.empty()) return;
@@ -126,7 +126,7 @@ class BusMonitor {
     if (live_) {
       screen_.draw(rows_);
     } else {
-      for (const std::string& row : rows_) print_text(row + "\n");
+      for (const std::string& row : rows_) lines_.write(row + "\n");
     }
   }
 
@@ -165,7 +165,7 @@ class BusMonitor {
   asio::steady_timer tick_;
   asio::steady_timer end_;
   const bool live_;
-  OutputLines lines_;
+  LineWriter lines_{unread};
   Screen screen_;
   std::vector<std::string> rows_;
   std::string note_;

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "../shell/json.hpp"
-#include "../shell/output.hpp"
+#include "../shell/line_writer.hpp"
 #include "host/commands/command_help.hpp"
 #include "protocol/link/host_link.hpp"
 #include "r4link/link.hpp"
@@ -17,8 +17,9 @@ namespace {
 
 std::string_view view(Text text) { return {text.data(), text.size()}; }
 
-// Of a damaged datagram. A byte takes up to five (\\xNN), and a pipe with room has it for 4096.
-constexpr std::size_t most_shown = 600;
+// Bytes that wait for a reader: half a second of states.
+constexpr std::size_t unread = 32768;
+constexpr std::size_t most_shown = 600;  // of a damaged datagram
 
 std::string shown(std::string_view bytes) {
   return escaped(bytes.substr(0, most_shown)) + (bytes.size() > most_shown ? "..." : "");
@@ -34,7 +35,7 @@ class JsonView final : public MonitorView {
   void on_bad_datagram(const ReadResult& result, std::string_view bytes) override {
     Json fields = bad_datagram_json(result);
     fields["text"] = shown(bytes);
-    lines_.print_or_skip(line_of(object("error", std::move(fields))));
+    lines_.write(line_of(object("error", std::move(fields))));
   }
   void on_link(const LinkStatus& status) override {
     Json fields{{"up", up_},
@@ -43,23 +44,22 @@ class JsonView final : public MonitorView {
                 {"busy", status.busy},
                 {"gated", status.gated()}};
     if (status.key != KeyTrouble::none) fields["key"] = to_text(status.key);
-    lines_.print(line_of(object("link", std::move(fields))));
+    lines_.write(line_of(object("link", std::move(fields))));
   }
   void on_event(const CarrierEvent& event) override {
     if (event.kind != CarrierEvent::Kind::warning) up_ = event.kind == CarrierEvent::Kind::up;
     if (event.kind != CarrierEvent::Kind::up) {
       const Problem& problem = event.problem;
-      lines_.print(line_of(object(
+      lines_.write(line_of(object(
           "error", {{"error", "transport"}, {"reason", problem.reason}, {"fix", problem.fix}})));
     }
     on_link(board_.link());
   }
   void on_end() override {
     Json transfers = transfers_json(board_.carrier_counters());
-    if (!transfers.is_null()) lines_.print(line_of(object("transfers", std::move(transfers))));
+    if (!transfers.is_null()) lines_.write(line_of(object("transfers", std::move(transfers))));
   }
-  void on_tick() override { lines_.print_held(); }
-  std::uint64_t skipped() const override { return lines_.skipped(); }
+  std::uint64_t skipped() const override { return lines_.lost(); }
 
  private:
   Json object(const char* type, Json fields) const {
@@ -73,11 +73,11 @@ class JsonView final : public MonitorView {
     Json json = object(type, fields_json(datagram));
     json["pnum"] = datagram.pnum();
     json["t"] = datagram.time_ms();
-    lines_.print_or_skip(line_of(json));
+    lines_.write(line_of(json));
   }
 
   const AsyncBoard& board_;
-  OutputLines lines_;
+  LineWriter lines_{unread};
   bool up_ = true;
 };
 
@@ -90,31 +90,30 @@ class PlainView final : public MonitorView {
       line += fmt::format(" {}:{}", view(field.name()), view(field.values()));
     }
     line += '\n';
-    lines_.print_or_skip(line);
+    lines_.write(line);
   }
   void on_heartbeat(const Datagram&) override {}
   void on_nack(const Nack& nack, const Datagram&) override {
-    lines_.print_or_skip(fmt::format("refused PNum {}: {}\n", nack.pnum, meaning_of(nack.code)));
+    lines_.write(fmt::format("refused PNum {}: {}\n", nack.pnum, meaning_of(nack.code)));
   }
   void on_bad_datagram(const ReadResult& result, std::string_view bytes) override {
-    lines_.print_or_skip(fmt::format("damaged datagram ({} at byte {}): {}\n",
-                                     to_text(result.error), result.position, shown(bytes)));
+    lines_.write(fmt::format("damaged datagram ({} at byte {}): {}\n", to_text(result.error),
+                             result.position, shown(bytes)));
   }
   void on_link(const LinkStatus& status) override {
-    lines_.print(fmt::format("link: {}\n", link_text(status)));
+    lines_.write(fmt::format("link: {}\n", link_text(status)));
   }
   void on_event(const CarrierEvent& event) override {
     if (event.kind == CarrierEvent::Kind::up) {
-      lines_.print(fmt::format("{}: up\n", event.problem.thing));
+      lines_.write(fmt::format("{}: up\n", event.problem.thing));
     } else {
-      lines_.print(event.problem.text() + "\n");
+      lines_.write(event.problem.text() + "\n");
     }
   }
-  void on_tick() override { lines_.print_held(); }
-  std::uint64_t skipped() const override { return lines_.skipped(); }
+  std::uint64_t skipped() const override { return lines_.lost(); }
 
  private:
-  OutputLines lines_;
+  LineWriter lines_{unread};
 };
 
 }  // namespace

@@ -19,12 +19,12 @@ class MonitorView {
 
   virtual void on_state(const Datagram& datagram) = 0;
   virtual void on_heartbeat(const Datagram& datagram) = 0;
-  virtual void on_end() {}  // before the last tick
+  virtual void on_end() {}
   virtual void on_nack(const Nack& nack, const Datagram& datagram) = 0;
   virtual void on_bad_datagram(const ReadResult& result, std::string_view bytes) = 0;
   virtual void on_link(const LinkStatus& status) = 0;
   virtual void on_event(const CarrierEvent& event) = 0;
-  // Ten times a second, and at the end.
+  // Ten times a second.
   virtual void on_tick() {}
   // Lines that were left out because nobody read the output.
   virtual std::uint64_t skipped() const { return 0; }

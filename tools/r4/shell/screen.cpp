@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "output.hpp"
+#include "screen.hpp"
 
 #include <fmt/format.h>
 #include <poll.h>
@@ -7,14 +7,11 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <utility>
 
 #include "json.hpp"
 
 namespace r4::tool {
 namespace {
-
-constexpr std::size_t most_held = 64;
 
 // The terminal's size; that of an old one where it does not tell.
 winsize terminal_size() {
@@ -26,34 +23,9 @@ winsize terminal_size() {
 
 }  // namespace
 
-bool output_has_room() {
+bool Screen::has_room() {
   pollfd out{STDOUT_FILENO, POLLOUT, 0};
   return ::poll(&out, 1, 0) != 0;
-}
-
-void OutputLines::print(std::string line) {
-  held_.push_back(std::move(line));
-  if (held_.size() > most_held) {
-    held_.pop_front();
-    ++skipped_;
-  }
-  print_held();
-}
-
-void OutputLines::print_or_skip(std::string_view line) {
-  print_held();
-  if (held_.empty() && output_has_room()) {
-    print_text(line);
-  } else {
-    ++skipped_;
-  }
-}
-
-void OutputLines::print_held() {
-  while (!held_.empty() && output_has_room()) {
-    print_text(held_.front());
-    held_.pop_front();
-  }
 }
 
 Screen::~Screen() {
