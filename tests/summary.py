@@ -38,7 +38,7 @@ def outcomes(build):
         outcome, name = line.split(' ', 1)
         yield name, outcome
     for report in sorted((build / 'results').glob('*.xml')):
-        preset = report.stem
+        preset = report.stem.split('.')[0]
         junit = (build if preset == 'release' else build / preset) / 'junit'
         for name, outcome in cases(report):
             file = junit / (name.removeprefix('integration.') + '.xml')
