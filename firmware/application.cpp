@@ -151,7 +151,8 @@ bool Application::rejected(Verdict verdict, MessageKind kind, std::uint32_t now_
   return authentication_.rejected(verdict, kind == MessageKind::command, now_ms);
 }
 
-void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::uint32_t now_ms) {
+BoardLink::HostHeartbeat Application::heartbeat_of(Source from, const Datagram& datagram,
+                                                   std::uint32_t now_ms) const {
   BoardLink::HostHeartbeat heartbeat;
   heartbeat.from = from;
   heartbeat.has_pnum = datagram.has_pnum();
@@ -159,6 +160,11 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
   heartbeat.has_time = datagram.has_time();
   heartbeat.t = datagram.time_ms();
   heartbeat.waited_ms = waited_ms(from.port, now_ms);
+  return heartbeat;
+}
+
+void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::uint32_t now_ms) {
+  const BoardLink::HostHeartbeat heartbeat = heartbeat_of(from, datagram, now_ms);
   switch (link_.on_heartbeat(heartbeat, now_ms)) {
     case HeartbeatEffect::fed:
       break;
@@ -242,6 +248,8 @@ void Application::on_command(Source from, const Datagram& datagram, Verdict verd
     outcome = Refusal::safe;
   } else if (command.kind == CommandKind::clear) {
     outcome = judge_clear(command, waited_ms(from.port, now_ms), now_ms);
+  } else if (command.kind == CommandKind::leave) {
+    if (!link_.may_leave(heartbeat_of(from, datagram, now_ms), now_ms)) outcome = Refusal::stale;
   } else if (!may_set(from.port, command)) {
     outcome = Refusal::auth;
   } else {
@@ -270,6 +278,11 @@ void Application::execute(std::uint32_t pnum, const Command& command, std::uint3
       break;
     case CommandKind::clear:
       clear();
+      break;
+    case CommandKind::leave:
+      link_.leave(now_ms);
+      setpoints_.outputs = Outputs();
+      enter(SafeReason::link, now_ms);
       break;
     case CommandKind::setting:
       if (command.text == key_setting) authentication_.use(setpoints_.settings.site.keys);

@@ -108,6 +108,8 @@ class Application {
   std::uint32_t waited_ms(std::uint8_t port, std::uint32_t now_ms) const;
   Verdict judge(std::uint8_t port, MessageKind kind, const Datagram& datagram,
                 std::uint32_t now_ms);
+  BoardLink::HostHeartbeat heartbeat_of(Source from, const Datagram& datagram,
+                                        std::uint32_t now_ms) const;
   void on_host_heartbeat(Source from, const Datagram& datagram, std::uint32_t now_ms);
   void on_command(Source from, const Datagram& datagram, Verdict verdict, std::uint32_t now_ms);
   bool may_set(std::uint8_t port, const Command& command) const;

@@ -37,6 +37,7 @@ void Application::identify(Source to, std::uint32_t now_ms) {
   char buffer[max_datagram];
   DatagramWriter writer(buffer, sizeof buffer);
   write_identity(writer, identity_);
+  writer.more("+").more(leave_capability);
   answer(to, writer, now_ms);
 }
 

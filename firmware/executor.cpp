@@ -73,6 +73,7 @@ Refusal carry_out(const Command& command, Setpoints& setpoints) {
     case CommandKind::heartbeat:
     case CommandKind::stop:
     case CommandKind::clear:
+    case CommandKind::leave:
     case CommandKind::identify:
       break;
   }

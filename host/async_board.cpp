@@ -127,6 +127,33 @@ class AsyncBoard::TimingSteps final : public Completion {
   CompletionPtr completion_;
 };
 
+// Closes the board when the farewell has ended, and hands its result on.
+class AsyncBoard::Farewell final : public Completion {
+ public:
+  Farewell(Impl& impl, CompletionPtr completion)
+      : impl_(impl), completion_(std::move(completion)) {}
+
+  void listen(const Cancel& cancel) override { completion_->listen(cancel); }
+  void complete(const CommandResult& result, How how) override {
+    const CompletionPtr::pointer users = completion_.release();
+    Impl& impl = impl_;
+    delete this;
+    impl.close();
+    users->complete(result, how);
+  }
+  void destroy() noexcept override { delete this; }
+
+ private:
+  Impl& impl_;  // which owns this
+  CompletionPtr completion_;
+};
+
+void AsyncBoard::start_close(Duration timeout, CompletionPtr completion) {
+  Impl& impl = *impl_;
+  impl.begin(CompletionPtr(new Farewell(impl, std::move(completion))),
+             [&] { return impl.leave(Impl::time_of(timeout)); });
+}
+
 void AsyncBoard::require_link_timing(Duration board_timeout, Duration heartbeat) const {
   r4::require_link_timing(board_timeout, heartbeat, Duration{impl_->heartbeat_ms});
 }
@@ -148,7 +175,7 @@ PostResult AsyncBoard::post(const Command& command) {
   Impl& impl = *impl_;
   PostResult result = PostResult::no_link;
   impl.enter(Completion::How::post, [&] {
-    if (impl.is_open) result = impl.session.post(command, impl.now);
+    if (impl.is_open()) result = impl.session.post(command, impl.now);
   });
   return result;
 }
@@ -156,7 +183,7 @@ PostResult AsyncBoard::post(const Command& command) {
 const ReceivedState& AsyncBoard::state() const { return impl_->session.state(); }
 const LinkStatus& AsyncBoard::link() const { return impl_->session.link(); }
 bool AsyncBoard::in_control() const {
-  return impl_->is_open && impl_->session.in_control(Impl::steady_now());
+  return impl_->is_open() && impl_->session.in_control(Impl::steady_now());
 }
 DisarmCause AsyncBoard::disarmed_by() const { return impl_->session.disarmed_by(); }
 const BoardIdentity& AsyncBoard::identity() const { return impl_->identity; }

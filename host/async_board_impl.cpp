@@ -46,11 +46,11 @@ Time AsyncBoard::Impl::begin_entry(Completion::How way) {
   if (depth == 0) how = way;
   const Time before = std::exchange(now, steady_now());
   if (now - before > held_up) in_backlog = true;
-  return is_open && depth == 0 ? now - due : Time{0};
+  return has_link() && depth == 0 ? now - due : Time{0};
 }
 
 void AsyncBoard::Impl::end_entry(Time late) {
-  if (is_open && late > very_late) {
+  if (is_open() && late > very_late) {
     poll_wanted = true;
     tell_that_it_was_held_up(late);
   }
@@ -78,14 +78,14 @@ void AsyncBoard::Impl::settle() {
       ended.erase(ended.begin());
       guarded([&] { first.completion.release()->complete(first.result, how); });
     }
-    if (poll_wanted && is_open) {
+    if (poll_wanted && has_link()) {
       poll_wanted = false;
       due = session.poll(now);
     } else if (!end_waits()) {
       break;
     }
   }
-  if (is_open) arm();
+  if (has_link()) arm();
 }
 
 // Ends the waits that are over; false if none is.
@@ -95,9 +95,9 @@ bool AsyncBoard::Impl::end_waits() {
   bool any = false;
   for (std::size_t i = 0; i < waiters.size();) {
     Waiter& waiter = waiters[i];
-    const Outcome outcome = !is_open ? Outcome::closed
-                            : active ? Outcome::confirmed
-                                     : Outcome::timed_out;
+    const Outcome outcome = !is_open() ? Outcome::closed
+                            : active   ? Outcome::confirmed
+                                       : Outcome::timed_out;
     if (outcome == Outcome::timed_out && now < waiter.deadline) {
       ++i;
       continue;
@@ -140,21 +140,29 @@ void AsyncBoard::Impl::cancel(Ticket id) {
 }
 
 void AsyncBoard::Impl::open() {
-  if (is_open || closed) {
+  if (phase != Phase::made) {
     throw Error(ErrorKind::usage, carrier->name(), "a board is opened once",
                 "make another one for the same URL");
   }
   carrier->open(*this);
-  if (closed) return;  // by the callback that was told that it is open
-  is_open = true;
+  if (phase != Phase::made) return;  // closed by the callback that was told that it is open
+  phase = Phase::open;
   due = steady_now();
   enter(Completion::How::post, [this] { due = session.poll(now); });
 }
 
+Ticket AsyncBoard::Impl::leave(Time timeout) {
+  phase = Phase::leaving;
+  return session.leave(timeout, now);
+}
+
 void AsyncBoard::Impl::close() {
-  if (closed) return;
-  closed = true;
-  is_open = false;
+  if (phase == Phase::closed) return;
+  if (is_open()) {
+    enter(Completion::How::post,
+          [this] { leave(Time{0}); });  // said once; nobody waits for an answer
+  }
+  phase = Phase::closed;
   carrier->close();
   timer.cancel();
   how = Completion::How::post;
@@ -177,7 +185,7 @@ void AsyncBoard::Impl::arm() {
 }
 
 void AsyncBoard::Impl::on_timer() {
-  if (!is_open) return;
+  if (!has_link()) return;
   armed = false;
   enter(Completion::How::dispatch, [this] { due = session.poll(now); });
   // Twice without a word that the transport is drained: it may be one that never tells.
@@ -205,7 +213,7 @@ void AsyncBoard::Impl::tell_backlog() {
   const std::size_t size = std::exchange(backlog_size, 0);
   enter(Completion::How::dispatch, [&] {
     Datagram datagram;
-    if (is_open && read_datagram(Text(backlog.data(), size), datagram)) {
+    if (is_open() && read_datagram(Text(backlog.data(), size), datagram)) {
       call(state_callbacks, session.state(), datagram);
     }
   });
@@ -224,11 +232,11 @@ void AsyncBoard::Impl::on_carrier_event(const CarrierEvent& event) {
 // --- Session::Handler
 
 SendResult AsyncBoard::Impl::transmit(std::string_view datagram, Priority priority) {
-  return is_open ? carrier->send(datagram, priority) : SendResult::down;
+  return has_link() ? carrier->send(datagram, priority) : SendResult::down;
 }
 
 void AsyncBoard::Impl::on_state(const ReceivedState& state, const Datagram& datagram) {
-  if (!is_open) return;
+  if (!is_open()) return;
   if (in_backlog) {
     backlog_size = datagram.bytes().size();
     std::copy_n(datagram.bytes().data(), backlog_size, backlog.data());
@@ -238,7 +246,7 @@ void AsyncBoard::Impl::on_state(const ReceivedState& state, const Datagram& data
 }
 
 void AsyncBoard::Impl::on_board_heartbeat(const Datagram& datagram) {
-  if (is_open) call(heartbeat_callbacks, datagram);
+  if (is_open()) call(heartbeat_callbacks, datagram);
 }
 
 void AsyncBoard::Impl::on_identity(const Identity& fresh) {
@@ -248,35 +256,35 @@ void AsyncBoard::Impl::on_identity(const Identity& fresh) {
 }
 
 void AsyncBoard::Impl::on_nack(const Nack& nack, const Datagram& datagram) {
-  if (is_open) call(nack_callbacks, nack, datagram);
+  if (is_open()) call(nack_callbacks, nack, datagram);
 }
 
 void AsyncBoard::Impl::on_bad_datagram(const ReadResult& result, std::string_view bytes) {
-  if (is_open) call(bad_callbacks, result, bytes);
+  if (is_open()) call(bad_callbacks, result, bytes);
 }
 
 void AsyncBoard::Impl::on_link(const LinkStatus&) {
-  if (!is_open) return;
+  if (!is_open()) return;
   // As it is by then: the one before may have changed it.
   link_callbacks.each([&](auto& one) {
-    if (!closed) guarded([&] { one(session.link()); });
+    if (may_tell()) guarded([&] { one(session.link()); });
   });
 }
 
 void AsyncBoard::Impl::on_restart() {
   backlog_size = 0;  // of the boot before
-  if (is_open) call(restart_callbacks);
+  if (is_open()) call(restart_callbacks);
 }
 
 void AsyncBoard::Impl::on_arming(DisarmCause) {
-  if (!is_open) return;
+  if (!is_open()) return;
   arming_callbacks.each([&](auto& one) {
-    if (!closed) guarded([&] { one(session.disarmed_by()); });
+    if (may_tell()) guarded([&] { one(session.disarmed_by()); });
   });
 }
 
 void AsyncBoard::Impl::on_refused(const RefusedPost& refused) {
-  if (is_open) call(refused_callbacks, refused);
+  if (is_open()) call(refused_callbacks, refused);
 }
 
 void AsyncBoard::Impl::on_result(Ticket ticket, const CommandResult& result) {

@@ -45,6 +45,15 @@ struct AsyncBoard::Impl final : Carrier::Handler,
     CompletionPtr completion;
   };
 
+  // The user is told nothing, and starts nothing, from `leaving` on.
+  //
+  //     made --open()--> open --async_close()--> leaving --the board knows it, or time is up--> closed
+  //                        +-------------------- close() ----------------------------------------^
+  enum class Phase : std::uint8_t { made, open, leaving, closed };
+  bool is_open() const { return phase == Phase::open; }
+  bool has_link() const { return phase == Phase::open || phase == Phase::leaving; }
+  bool may_tell() const { return phase == Phase::made || phase == Phase::open; }
+
   Impl(asio::io_context& context, std::unique_ptr<Carrier> transport, BoardOptions options);
 
   static Time steady_now() {
@@ -68,7 +77,8 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   template <class... Arguments>
   void call(const Subscribers<Arguments...>& callbacks, const Arguments&... arguments) {
     callbacks.each([&](auto& one) {
-      if (!closed) guarded([&] { one(arguments...); });  // the one before may have closed the board
+      if (may_tell())
+        guarded([&] { one(arguments...); });  // the one before may have closed the board
     });
   }
 
@@ -104,13 +114,13 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   template <class Start>
   void begin(CompletionPtr completion, Start start, Ticket id = 0) {
     enter(Completion::How::post, [&] {
-      const Ticket ticket = is_open ? start() : 0;
+      const Ticket ticket = is_open() ? start() : 0;
       if (ticket != 0) {
         if (id == 0) completion->listen(Cancel(weak_from_this(), id = ticket));
         waiting.push_back({ticket, id, std::move(completion)});
         poll_wanted = true;
       } else {
-        const Outcome outcome = is_open ? Outcome::full : Outcome::closed;
+        const Outcome outcome = is_open() ? Outcome::full : Outcome::closed;
         completion.release()->complete({outcome, Refusal::none, Time{0}}, Completion::How::post);
       }
     });
@@ -118,6 +128,8 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   void wait_active(Duration timeout, CompletionPtr completion);
   void cancel(Ticket id);
   void open();
+  // Says farewell: its ticket, or 0 if there is nobody to say it to.
+  Ticket leave(Time timeout);
   void close();
 
   // --- time
@@ -174,8 +186,7 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   int depth = 0;  // calls of enter() and settle() under way
   bool poll_wanted = false;
   Completion::How how = Completion::How::post;
-  bool is_open = false;
-  bool closed = false;
+  Phase phase = Phase::made;
 
   Time now{0};
   Time due{0};

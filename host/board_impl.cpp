@@ -16,6 +16,9 @@ namespace {
 // begun and waits longer than this beyond it is held up by a transport that does not return.
 constexpr std::chrono::milliseconds grace{500};
 
+// So long does close() wait for the board to say that it is free.
+constexpr std::chrono::milliseconds farewell_limit{100};
+
 // `instead`: what that means for what was asked.
 Error blocked_error(std::string_view what, std::string_view instead) {
   return Error(Problem{ErrorKind::refused, std::string(what),
@@ -209,11 +212,12 @@ void Board::Impl::shut() {
     last_counters = async.carrier_counters();
   }
   news.notify_all();
-  async.close();
   look_timer.cancel();
-  work.reset();
-  // Twice around: the ends of commands that begin() finds closed come behind this one.
-  asio::post(io, [this] { asio::post(io, [this] { io.stop(); }); });
+  async.async_close(farewell_limit, [this](const CommandResult&) {
+    work.reset();
+    // Twice around: the ends of commands that begin() finds closed come behind this one.
+    asio::post(io, [this] { asio::post(io, [this] { io.stop(); }); });
+  });
 }
 
 // --- on any thread

@@ -164,6 +164,11 @@ void require_valid(const Command& command) {
   if (const Refusal refusal = check_command(command); refusal != Refusal::none) {
     throw Error(bad_command(text_of(command), refusal));
   }
+  if (command.kind == CommandKind::leave) {
+    throw Error(ErrorKind::usage, "E:LEAVE",
+                "a host says it when it ends, and sends nothing after it",
+                "close the board, or end the program that has it");
+  }
   if (command.kind != CommandKind::fields && command.kind != CommandKind::setting) return;
   std::array<char, max_datagram - DatagramWriter::trailer_max - signature_max> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());

@@ -100,6 +100,7 @@ void Session::on_heartbeat_datagram(const Datagram& datagram, Time now) {
   if (!current) return;
   refresh_status(now);
   confirm_stop(report, now);
+  confirm_leave(report, now);
   on_causes(report.cause, now);
 }
 
@@ -157,6 +158,11 @@ void Session::on_nack_datagram(const Datagram& datagram, Time now) {
   handler_.on_nack(nack, datagram);
   for (Pending& pending : pending_.under_way()) {
     if (!pending.is_out() || pending.pnum != nack.pnum) continue;
+    if (pending.kind == CommandKind::leave) {  // it was executed, or we have no session to leave
+      const bool left = nack.code == Refusal::duplicate;
+      finish(pending, left ? Outcome::confirmed : Outcome::refused, nack.code, now);
+      continue;
+    }
     if (nack.code == Refusal::duplicate) {
       pending.stage = Stage::executed;
       confirm_from_state(now);
@@ -180,6 +186,7 @@ void Session::on_identity_datagram(const Datagram& datagram, Time now) {
   if (!read_identity(datagram, identity)) return;
   selection_.on_answer();
   on_answer(datagram, now);
+  knows_leave_ = has_capability(identity.capabilities, leave_capability);
   if (const auto round_trip = question_.answered(now)) collector_.on_round_trip(*round_trip);
   handler_.on_identity(identity);
   for (Pending& pending : pending_.under_way()) {
@@ -214,6 +221,7 @@ void Session::on_answer(const Datagram& datagram, Time now) {
 bool Session::notice_restart() {
   if (restarts_ == link_.restarts()) return false;
   restarts_ = link_.restarts();
+  knows_leave_ = false;
   state_ = ReceivedState();
   disarm(DisarmCause::restart);
   handler_.on_restart();
@@ -230,7 +238,7 @@ void Session::confirm_from_state(Time now) {
   }
   for (Pending& pending : pending_.under_way()) {
     if (!pending.is_out() || pending.kind == CommandKind::stop ||
-        pending.kind == CommandKind::identify) {
+        pending.kind == CommandKind::identify || pending.kind == CommandKind::leave) {
       continue;
     }
     if (has_cmd) {
@@ -258,6 +266,15 @@ void Session::confirm_stop(const SafeReport& report, Time now) {
     repetition_.begin({pending.bytes.data(), pending.size}, pending.retry,
                       now + options_.stop_linger);
     finish(pending, Outcome::confirmed, Refusal::none, now);
+  }
+}
+
+// A board whose host has left is safe for that reason, unless there is a graver one: then its answer to
+// a repetition tells.
+void Session::confirm_leave(const SafeReport& report, Time now) {
+  if (report.reason != SafeReason::link) return;
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.kind == CommandKind::leave) finish(pending, Outcome::confirmed, Refusal::none, now);
   }
 }
 

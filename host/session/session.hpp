@@ -117,6 +117,11 @@ class Session {
   // Gives a command up, though it may have been executed: on_result() comes before this returns. A stop
   // goes on.
   void cancel(Ticket ticket, Time now);
+  // Ends every command under way but stops, the heartbeats too, and says farewell: the board's outputs are safe at
+  // once, and another host need not wait for the timeout. Confirmed when the board tells so. Returns 0
+  // where there is nobody to tell, or the board does not know of farewells. Nothing but stops is sent
+  // from then on.
+  Ticket leave(Time timeout, Time now);
   // Ends every command under way: the board is closed.
   void end_all(Time now);
 
@@ -183,6 +188,7 @@ class Session {
   void refuse_held_back(Time now);
   void on_post_refused(const Nack& nack);
   void confirm_stop(const SafeReport& report, Time now);
+  void confirm_leave(const SafeReport& report, Time now);
   void on_causes(std::int32_t newest, Time now);
   bool name_cause(Pending& pending) const;
   void repeat_stop(Time now);
@@ -203,6 +209,7 @@ class Session {
   LinkStatus status_;
   ReceivedState state_;
   std::uint32_t restarts_ = 0;  // of the board, those that were told
+  bool knows_leave_ = false;    // does the board?
   StatisticsCollector collector_;
   ArmingMachine arming_;
   DisarmCause told_cause_ = DisarmCause::not_yet;

@@ -9,6 +9,13 @@
 
 namespace r4 {
 
+namespace {
+
+// Those that end what the board does: repeated soon, and sent while the heartbeats are held.
+bool is_urgent(CommandKind kind) { return kind == CommandKind::stop || kind == CommandKind::leave; }
+
+}  // namespace
+
 // A datagram of which no copy is kept.
 SendResult Session::transmit_now(const Command& command, std::uint32_t t_ms, Priority priority,
                                  Time now) {
@@ -136,13 +143,16 @@ void Session::transmit(Pending& pending, Time now) {
     pending.pnum = link_.take_pnum();
     // The command's field is there already.
     DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.size);
-    pending.size = writer.stamp(pending.pnum, to_ms(now)).size();
+    // A farewell proves that it is of this session, as a heartbeat does.
+    const bool echoes = pending.kind == CommandKind::leave;
+    pending.size = writer.stamp(pending.pnum, echoes ? link_.echo() : to_ms(now)).size();
     pending.stage = Stage::sent;
     if (pending.kind == CommandKind::identify) question_.asked(now);
   } else {
     ++collector_.counts.retries;
   }
-  pending.retry = now + (stop ? Time{options_.stop_retry} : Time{options_.command_retry});
+  pending.retry =
+      now + (is_urgent(pending.kind) ? Time{options_.stop_retry} : Time{options_.command_retry});
   DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.size);
   close_and_transmit(writer, pending.kind, stop ? Priority::stop : Priority::normal, now);
 }
@@ -161,7 +171,7 @@ void Session::retry_due(Time now) {
   const bool gated = link_.gated(to_ms(now));
   for (Pending& pending : pending_.under_way()) {
     if (!pending.is_out() || now < pending.retry) continue;
-    if (gated && pending.kind != CommandKind::stop) {
+    if (gated && !is_urgent(pending.kind)) {
       pending.retry = now + options_.command_retry;
     } else {
       transmit(pending, now);
@@ -218,6 +228,20 @@ void Session::cancel(Ticket ticket, Time now) {
     finish(pending, Outcome::cancelled, Refusal::none, now);
     advance_arming(now);
   }
+}
+
+// A heartbeat behind it would take the board again.
+Ticket Session::leave(Time timeout, Time now) {
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.kind != CommandKind::stop) finish(pending, Outcome::closed, Refusal::none, now);
+  }
+  link_.hold(true);
+  refresh_status(now);
+  if (!knows_leave_ || !link_up()) return 0;
+  Pending* pending = allocate(Command::leave(), timeout, now);
+  if (pending == nullptr) return 0;
+  transmit(*pending, now);
+  return pending->ticket;
 }
 
 void Session::end_all(Time now) {

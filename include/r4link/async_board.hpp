@@ -68,9 +68,21 @@ class AsyncBoard {
   // Opens the transport and begins the link: the first heartbeat goes out at once. Throws Error;
   // once only.
   void open();
-  // Cancels what is under way (outcome closed) and closes the transport: the board goes safe. No
-  // callback follows. Idempotent; the board cannot be opened again.
+  // Cancels what is under way (outcome closed), says farewell once and closes the transport: the board
+  // goes safe, when it has heard that or by its timeout. No callback follows. Idempotent; the board cannot
+  // be opened again.
   void close();
+  // void(CommandResult). The same, but repeats the farewell until the board has answered it, so that
+  // another host finds the board free. Confirmed: its outputs are safe and nobody controls it. Closed: it
+  // was not ours to leave, or does not know of farewells. No callback follows from the call on; stops that
+  // are under way go on until then.
+  template <class Token>
+  auto async_close(Duration timeout, Token&& token) {
+    require_timeout("async_close()", timeout);
+    return asio::async_initiate<Token, void(CommandResult)>(
+        [this](auto handler, Duration t) { start_close(t, make_completion(std::move(handler))); },
+        token, timeout);
+  }
 
   // Throws Error{usage} for a command outside its ranges, and for a key or password where others
   // would see it.
@@ -240,7 +252,10 @@ class AsyncBoard {
   void start_link_timing(Duration board_timeout, Duration heartbeat, Duration timeout,
                          CompletionPtr completion);
 
+  void start_close(Duration timeout, CompletionPtr completion);
+
   class TimingSteps;
+  class Farewell;
   std::shared_ptr<Impl> impl_;
 };
 

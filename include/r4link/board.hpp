@@ -62,7 +62,9 @@ class R4LINK_API Board {
   Board(const Board&) = delete;
   Board& operator=(const Board&) = delete;
 
-  // Ends heartbeats and closes the transport; the board goes safe within its timeout. Calls that
+  // Ends heartbeats, says farewell and closes the transport: the board goes safe at once and is free for
+  // another host; one that does not answer, or does not know of farewells, goes safe within its timeout.
+  // Takes at most 100 ms for that. Calls that
   // wait in other threads throw Error{refused}. When it returns no callback runs, but one that calls it,
   // and none will. Idempotent. The destructor does it too, and may run while other threads wait.
   void close();

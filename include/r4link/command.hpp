@@ -20,6 +20,7 @@ enum class CommandKind : std::uint8_t {
   relay,      // R:ch,On|Off
   stop,       // E:STOP
   clear,      // E:CLEAR,cause
+  leave,      // E:LEAVE
   stepper,    // P:pos[,speed],ch
   zero,       // Z:ch
   bldc,       // B:speed,dir,brake,ch
@@ -53,6 +54,8 @@ struct R4LINK_API Command {
   // the number in.
   static constexpr std::int32_t unnamed_cause = -1;
   static Command clear(std::int32_t cause = unnamed_cause);
+  // The controlling host ends: the board is safe at once, and whoever comes next may control it.
+  static Command leave();
   static Command stepper(std::int32_t target_steps, std::int32_t steps_per_s, int channel);
   static Command zero(int channel);
   static Command bldc(std::int32_t speed, Direction direction, bool brake, int channel);

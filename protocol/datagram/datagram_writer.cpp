@@ -74,6 +74,14 @@ DatagramWriter& DatagramWriter::append(Text text, std::uint8_t allowed) {
 DatagramWriter& DatagramWriter::value(Text text) { return append(text, ByteClasses::in_value); }
 DatagramWriter& DatagramWriter::values(Text text) { return append(text, ByteClasses::in_values); }
 
+DatagramWriter& DatagramWriter::more(Text text) {
+  if (!has_value_) ok_ = false;
+  has_value_ = false;
+  append(text, ByteClasses::in_value);
+  has_value_ = true;
+  return *this;
+}
+
 template <class Number>
 DatagramWriter& DatagramWriter::number(Number value, char* (*write)(char*, Number)) {
   if (static_cast<std::size_t>(end_ - at_) <= max_number_text) {

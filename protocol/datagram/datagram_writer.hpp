@@ -66,6 +66,9 @@ class DatagramWriter {
   // A text that may hold commas: "ROS2-R4", "a,b". Copied as it is.
   DatagramWriter& values(Text text);
 
+  // Goes on in the value that was written last.
+  DatagramWriter& more(Text text);
+
   // Bytes written so far, and whether all of them did fit and were allowed.
   std::size_t size() const { return static_cast<std::size_t>(at_ - begin_); }
   Text written() const { return Text(begin_, size()); }

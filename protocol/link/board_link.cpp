@@ -56,7 +56,8 @@ bool BoardLink::is_echo_host(const HostHeartbeat& heartbeat) const {
 }
 
 HeartbeatEffect BoardLink::begin_session(const HostHeartbeat& heartbeat, bool armed,
-                                         std::uint32_t at_ms) {
+                                         std::uint32_t waited_ms, std::uint32_t now_ms) {
+  const std::uint32_t at_ms = now_ms - waited_ms;
   // Numbers that go on are the same count, whatever else has changed: the gate does not move back.
   echo_host_ = is_echo_host(heartbeat);
   if (continues(heartbeat) && heartbeat.has_pnum) {
@@ -75,6 +76,7 @@ HeartbeatEffect BoardLink::begin_session(const HostHeartbeat& heartbeat, bool ar
   begun_again_ = false;
   has_heartbeat_pnum_ = heartbeat.has_pnum;
   first_echo_ = heartbeat.pnum;
+  began_ms_ = now_ms;
   marks_used_ = 0;
   newest_echo_ms_ = at_ms - timing_.timeout_ms;
   state_ = BoardLinkState::active;
@@ -135,7 +137,7 @@ HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uin
       // The first word of a host. An echo host's commands wait for its echo of a T of this boot;
       // one that echoes already speaks of another boot.
       if (!timely || (echo_host && heartbeat.t != 0)) return HeartbeatEffect::stale;
-      return begin_session(heartbeat, !echo_host, now_ms - waited_ms);
+      return begin_session(heartbeat, !echo_host, waited_ms, now_ms);
 
     case BoardLinkState::active:
       if (heartbeat.from != owner_) return HeartbeatEffect::busy;
@@ -153,7 +155,7 @@ HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uin
       // it is another, since on a bus all hosts are at one place. It waits until the owner is lost.
       if (echo_host && newer(static_cast<std::uint32_t>(heartbeat.t), newest_echo_ms_) &&
           (continuing || !near_newest_heartbeat(heartbeat.pnum))) {
-        return armed_ ? HeartbeatEffect::busy : begin_session(heartbeat, true, now_ms - waited_ms);
+        return armed_ ? HeartbeatEffect::busy : begin_session(heartbeat, true, waited_ms, now_ms);
       }
       return HeartbeatEffect::stale;
 
@@ -162,7 +164,7 @@ HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uin
       const bool other_clock = clock_ == Clock::echo && freshness == Freshness::no_echo;
       const bool near = !heartbeat.has_pnum || heartbeat.pnum - newest_heartbeat_ <= resume_window;
       const bool same = continuing && near && armed_ && !begun_again_ && !other_clock;
-      if (!same) return begin_session(heartbeat, true, now_ms - waited_ms);
+      if (!same) return begin_session(heartbeat, true, waited_ms, now_ms);
       state_ = BoardLinkState::active;
       send_now_ = true;
       newest_echo_ms_ = feeds_ms - timing_.timeout_ms;
@@ -263,6 +265,17 @@ bool BoardLink::port_lost(std::uint8_t port, std::uint32_t now_ms) {
   if (state_ != BoardLinkState::active || owner_.port != port) return false;
   lose(now_ms);
   return true;
+}
+
+bool BoardLink::may_leave(const HostHeartbeat& farewell, std::uint32_t now_ms) const {
+  return judge(farewell, echo_host_, now_ms) == Freshness::fresh &&
+         at_or_after(static_cast<std::uint32_t>(farewell.t), began_ms_);
+}
+
+void BoardLink::leave(std::uint32_t now_ms) {
+  if (state_ != BoardLinkState::active) return;
+  begun_again_ = true;
+  lose(now_ms);
 }
 
 bool BoardLink::heartbeat_due(std::uint32_t now_ms) const {

@@ -4,7 +4,7 @@
 //
 //                    host heartbeat                     timeout, or owner's transport lost
 //     CONNECTING ------------------------> ACTIVE ------------------------------------------+
-//         (boot)                             ^                                              v
+//         (boot)                             ^            or the owner's farewell           v
 //                                            +------------------------------------------- LOST
 //                                                fresh host heartbeat
 //
@@ -96,6 +96,13 @@ class BoardLink {
   // The transport under `port` is gone. True if that was the owner's: ACTIVE -> LOST.
   bool port_lost(std::uint8_t port, std::uint32_t now_ms);
 
+  // The owner says that it ends, by a command that was admitted. Does it say so in this session? It
+  // proves that as a heartbeat does: its T must echo one of ours, and one since the session began. The
+  // farewell of an earlier session, held back by a network, does not.
+  bool may_leave(const HostHeartbeat& farewell, std::uint32_t now_ms) const;
+  // It has: ACTIVE -> LOST, and nothing of its session goes on, whoever is heard next.
+  void leave(std::uint32_t now_ms);
+
   // The board's own heartbeats: is one due, and tell when one was sent (its T). Besides the regular
   // ones, an echo that stays away is asked for again every echo_retry_ms; entering ACTIVE and LOST
   // each send one at once.
@@ -152,7 +159,8 @@ class BoardLink {
   bool is_echo(const HostHeartbeat& heartbeat) const;
   bool continues(const HostHeartbeat& heartbeat) const;
   bool is_echo_host(const HostHeartbeat& heartbeat) const;
-  HeartbeatEffect begin_session(const HostHeartbeat& heartbeat, bool armed, std::uint32_t at_ms);
+  HeartbeatEffect begin_session(const HostHeartbeat& heartbeat, bool armed, std::uint32_t waited_ms,
+                                std::uint32_t now_ms);
   void feed(const HostHeartbeat& heartbeat, std::uint32_t at_ms);
   void lose(std::uint32_t now_ms);
   void spend(std::uint32_t pnum);
@@ -169,13 +177,14 @@ class BoardLink {
   bool echo_host_ = false;
   bool armed_ = false;
   Clock clock_ = Clock::unknown;
-  std::uint32_t first_echo_ = 0;     // the number of the heartbeat that armed the session
+  std::uint32_t first_echo_ = 0;  // the number of the heartbeat that armed the session
+  std::uint32_t began_ms_ = 0;
   bool has_baseline_ = false;        // numbers up to newest_ are spent
   std::uint32_t newest_ = 0;         // newest executed command, or the session's first heartbeat
   std::uint64_t executed_bits_ = 0;  // bit i: newest_ - i was executed
   std::uint32_t last_executed_ = 0;
   bool numbers_in_doubt_ = false;  // resumed by a heartbeat without a number
-  bool begun_again_ = false;       // the owner seems to have restarted
+  bool begun_again_ = false;       // the owner has left, or seems to have restarted
   bool has_heartbeat_pnum_ = false;
   std::uint32_t newest_heartbeat_ = 0;
   std::uint32_t newest_echo_ms_ = 0;

@@ -9,6 +9,7 @@ namespace {
 
 constexpr Text stop_word("STOP");
 constexpr Text clear_word("CLEAR");
+constexpr Text leave_word("LEAVE");
 constexpr Text identify_word("ID");
 constexpr Text default_fields("DEFAULT");
 constexpr Text all_fields("ALL");
@@ -44,6 +45,7 @@ Limits limits_of(CommandKind kind) {
     case CommandKind::heartbeat:
     case CommandKind::stop:
     case CommandKind::clear:
+    case CommandKind::leave:
     case CommandKind::fields:
     case CommandKind::setting:
     case CommandKind::identify:
@@ -138,6 +140,8 @@ bool read_word(char letter, Text word, CommandKind& out) {
     out = CommandKind::stop;
   } else if (letter == 'E' && word == clear_word) {
     out = CommandKind::clear;
+  } else if (letter == 'E' && word == leave_word) {
+    out = CommandKind::leave;
   } else if (letter == 'Q' && word == identify_word) {
     out = CommandKind::identify;
   } else {
@@ -199,6 +203,7 @@ Command Command::clear(std::int32_t cause) {
   command.value = cause;
   return command;
 }
+Command Command::leave() { return of_kind(CommandKind::leave); }
 Command Command::stepper(std::int32_t target_steps, std::int32_t steps_per_s, int channel) {
   Command command = of_channel(CommandKind::stepper, target_steps, channel);
   command.speed = steps_per_s;
@@ -240,6 +245,7 @@ bool drives_output(CommandKind kind) {
     case CommandKind::heartbeat:
     case CommandKind::stop:
     case CommandKind::clear:
+    case CommandKind::leave:
     case CommandKind::proximity:
     case CommandKind::fields:
     case CommandKind::setting:
@@ -366,6 +372,9 @@ void write_command(DatagramWriter& writer, const Command& command) {
     case CommandKind::clear:
       writer.field("E").value(clear_word);
       if (command.value != Command::unnamed_cause) writer.value(command.value);
+      break;
+    case CommandKind::leave:
+      writer.field("E").value(leave_word);
       break;
     case CommandKind::stepper:
       writer.field("P").value(command.value).value(command.speed).value(channel);

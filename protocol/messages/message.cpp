@@ -120,6 +120,16 @@ bool read_identity(const Datagram& datagram, Identity& out) {
   return true;
 }
 
+bool has_capability(Text capabilities, Text word) {
+  std::size_t begin = 0;
+  for (std::size_t i = 0; i <= capabilities.size(); ++i) {
+    if (i != capabilities.size() && capabilities[i] != '+') continue;
+    if (Text(capabilities.data() + begin, i - begin) == word) return true;
+    begin = i + 1;
+  }
+  return false;
+}
+
 void write_identity(DatagramWriter& writer, const Identity& identity) {
   writer.field("I")
       .value(board_word)

@@ -61,8 +61,12 @@ void write_nack(DatagramWriter& writer, const Nack& nack);
 struct Identity {
   Text firmware;      // "0.1.0"
   Text board_id;      // serial number, unique
-  Text capabilities;  // words joined by '+': "udp+serial"
+  Text capabilities;  // words joined by '+': "udp+serial+leave"
 };
+// What the firmware can do besides, whatever the board: it obeys E:LEAVE.
+constexpr Text leave_capability("leave");
+// Is it one of those words?
+bool has_capability(Text capabilities, Text word);
 bool read_identity(const Datagram& datagram, Identity& out);
 void write_identity(DatagramWriter& writer, const Identity& identity);
 

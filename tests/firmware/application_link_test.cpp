@@ -100,6 +100,86 @@ TEST(ApplicationLink, SilenceCountsBeforeTheHeartbeatThatEndsIt) {
   EXPECT_EQ(board.hal.made_safe, 2);
 }
 
+// --- farewell
+
+struct ApplicationFarewell : test::BoardInControl {
+  // Its T echoes, as a heartbeat's.
+  void leave(TestHost& from, std::uint32_t pnum) {
+    leave(from, pnum, board.newest_t(from.at.port));
+  }
+  void leave(TestHost& from, std::uint32_t pnum, std::uint32_t t) {
+    board.receive("E:LEAVE;PNum:" + std::to_string(pnum) + ";T:" + std::to_string(t) + ";",
+                  from.at);
+  }
+  TestHost other{board, echo_pnum + 99999, Source{0, 5}};
+};
+
+TEST_F(ApplicationFarewell, MakesTheOutputsSafeAndTheBoardFreeAtOnce) {
+  host.command("O:358,1,1");
+  const int made_safe = board.hal.made_safe;
+  leave(host, host.pnum++);
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(board.hal.made_safe, made_safe + 1);
+  EXPECT_EQ(board.log.states.back(), "SAFE link");
+  board.run(1);
+  EXPECT_EQ(board.take(MessageKind::board_heartbeat).back().at_ms, board.now_ms - 1) << "it tells";
+  other.connect();
+  EXPECT_EQ(board.state(), BoardState::active);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 0);
+  other.command("O:5,1,2");
+  EXPECT_EQ(board.outputs().osmc[1].pwm, 5);
+}
+
+TEST_F(ApplicationFarewell, NothingComesBackWithTheSameHost) {
+  host.command("O:358,1,1");
+  leave(host, host.pnum++);
+  host.connect();
+  EXPECT_EQ(board.state(), BoardState::active);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 0);
+}
+
+TEST_F(ApplicationFarewell, OfAnotherHostIsRefused) {
+  host.command("O:358,1,1");
+  forget();
+  leave(other, other.pnum++);
+  EXPECT_EQ(answers(), (Lines{"BUSY"}));
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+}
+
+TEST_F(ApplicationFarewell, LateOrRepeatedHasNoEffectOnTheNextSession) {
+  const std::uint32_t number = host.pnum++;
+  const std::uint32_t echo = board.newest_t();
+  leave(host, number, echo);
+  forget();
+  leave(host, number, echo);
+  EXPECT_EQ(answers(), (Lines{"DUPLICATE"})) << "its host learns that it was executed";
+  TestHost next(board, number - 50, host.at);  // its numbers are such that the old one would fit
+  next.connect();
+  next.command("O:358,1,1");
+  forget();
+  leave(next, number, echo);
+  EXPECT_EQ(answers(), (Lines{"STALE"}));
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+  leave(next, number + 1);
+  EXPECT_TRUE(board.safe());
+}
+
+TEST_F(ApplicationFarewell, OfAPaperHostProvesNothing) {
+  TestBoard paper_board;
+  TestHost paper(paper_board, 1);
+  paper.heartbeat(5);
+  paper.command("O:358,1,1");
+  paper.command("E:LEAVE");
+  EXPECT_EQ(paper_board.outputs().osmc[0].pwm, 358);
+}
+
+TEST_F(ApplicationFarewell, LeavesAStopLatched) {
+  host.command("E:STOP");
+  leave(host, host.pnum++);
+  EXPECT_EQ(board.application->reason(), SafeReason::stop);
+  EXPECT_FALSE(board.application->link().has_owner());
+}
+
 // --- a loop that stood still
 
 // A host of the paper's in control of a board whose loop turns.

@@ -54,6 +54,16 @@ def test_commands_are_confirmed_refused_and_stopped(board):
     assert run('send', board.host_url, 'E:CLEAR', 'O:1,1,1').returncode == 0
 
 
+@pytest.mark.parametrize('url', ['udp://127.0.0.1:0', 'pty:'])
+def test_the_next_host_need_not_wait_for_the_timeout(url):
+    with Board(url) as each:
+        assert run('send', each.host_url, 'C:timeout,10000').returncode == 0
+        for pwm in (358, 359, 360):
+            assert run('send', each.host_url, f'O:{pwm},1,1', timeout=5).returncode == 0
+            each.outputs(lambda outputs, pwm=pwm: outputs['osmc'][0] == [pwm, 1])
+            each.state('SAFE', 'link')
+
+
 def test_settings_of_the_network_are_taken_over_the_cable_only(board):
     assert run('send', board.host_url, 'C:network,My%2CNet', 'C:password,12345678').returncode == 0
     assert run('send', board.host_url, 'C:password,short').returncode == 2

@@ -40,6 +40,8 @@ void add(Report& sum, const Report& report) {
   sum.stops_confirmed += report.stops_confirmed;
   sum.clears += report.clears;
   sum.clears_refused += report.clears_refused;
+  sum.farewells += report.farewells;
+  sum.farewells_confirmed += report.farewells_confirmed;
   sum.busy += report.busy;
   sum.stale += report.stale;
   sum.duplicate += report.duplicate;
@@ -85,13 +87,13 @@ Report run_all(std::uint64_t schedules, World::Loop loop) {
   fmt::print(
       "{} schedules: {} violations; {} commands executed, {} confirmed, {} refused, {} timed out; "
       "{} links lost, {} outputs restored, {} stops obeyed, {} confirmed, {} cleared, {} clears "
-      "refused; answers {} BUSY, {} STALE, {} DUPLICATE; "
+      "refused; {} farewells obeyed, {} confirmed; answers {} BUSY, {} STALE, {} DUPLICATE; "
       "{} forged or replayed datagrams, {} rejected, {} signed commands executed; "
       "{} standstills, {} datagrams waited, {} of them fed; longest silence to safe {:.1f} ms\n",
       schedules, failing.size(), sum.executed, sum.confirmed, sum.refused, sum.timed_out,
       sum.link_losses, sum.restores, sum.stops, sum.stops_confirmed, sum.clears, sum.clears_refused,
-      sum.busy, sum.stale, sum.duplicate, sum.attacks, sum.rejected, sum.executed_signed,
-      sum.standstills, sum.waited, sum.waited_to_feed,
+      sum.farewells, sum.farewells_confirmed, sum.busy, sum.stale, sum.duplicate, sum.attacks,
+      sum.rejected, sum.executed_signed, sum.standstills, sum.waited, sum.waited_to_feed,
       static_cast<double>(sum.worst_silence_us) / 1000);
   std::sort(failing.begin(), failing.end());
   for (std::size_t i = 0; i < failing.size() && i < 3; ++i) {
@@ -107,6 +109,7 @@ Report run_all(std::uint64_t schedules, World::Loop loop) {
   EXPECT_GT(sum.stops_confirmed, schedules / 10);
   EXPECT_GT(sum.clears, schedules / 20);
   EXPECT_GT(sum.clears_refused, schedules / 100);
+  EXPECT_GT(sum.farewells_confirmed, schedules / 20);
   EXPECT_GT(sum.stale, schedules / 100);
   EXPECT_GT(sum.duplicate, schedules / 100);
   EXPECT_GT(sum.busy, schedules / 100);

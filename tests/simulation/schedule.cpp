@@ -69,6 +69,15 @@ Schedule Schedule::random(Random& random) {
   if (random.chance(0.3)) {
     s.attack_interval_us = static_cast<std::uint32_t>(random.between(2'000, 200'000));
   }
+  // A host that ends and comes back, perhaps before its farewell has arrived.
+  for (std::uint64_t n = random.chance(0.3) ? random.between(1, 3) : 0; n != 0; --n) {
+    Happening leave;
+    leave.kind = Happening::Kind::leave;
+    leave.at_us = random.below(s.duration_us);
+    leave.length_us = random.chance(0.5) ? random.between(1'000, 150'000) : random.below(1'500'000);
+    leave.host = static_cast<int>(random.below(static_cast<std::uint64_t>(s.hosts)));
+    s.happenings.push_back(leave);
+  }
   return s;
 }
 
@@ -109,6 +118,8 @@ const char* to_text(Happening::Kind kind) {
       return "address";
     case Happening::Kind::stopper:
       return "stopper";
+    case Happening::Kind::leave:
+      return "leave";
   }
   return "?";
 }

@@ -36,6 +36,7 @@ struct Happening {
     obstacle,   // something stands before sensor 1 for `length_us`
     address,    // the host's datagrams come from another address, for good or for `length_us`
     stopper,  // another process asks for an emergency stop and goes, after `length_us` at the latest
+    leave,    // the host process says farewell and ends; it comes back after `length_us`
   };
   Kind kind;
   std::uint64_t at_us;

@@ -14,6 +14,7 @@
 //   truth      confirmed means executed; refused means not executed, then and later
 //   stop       a stop that is confirmed was obeyed: that one, not another; and no E:CLEAR takes away a
 //              stop that came after it was asked for
+//   farewell   is obeyed of the process in control alone, and at once; one that is confirmed was obeyed
 //   restore    outputs that come back belong to a host that was alive a timeout ago
 //   forged     of a board with a key: nothing that an attacker sends is executed, feeds or takes
 //              control, but a stop
@@ -51,6 +52,8 @@ struct Report {
   std::uint32_t stops_confirmed = 0;
   std::uint32_t clears = 0;
   std::uint32_t clears_refused = 0;  // by the board: a stop had come since
+  std::uint32_t farewells = 0;       // obeyed
+  std::uint32_t farewells_confirmed = 0;
   std::uint32_t busy = 0;
   std::uint32_t stale = 0;
   std::uint32_t duplicate = 0;
@@ -160,12 +163,14 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   void go_on();
   void check_silence();
   void on_stop(std::uint32_t pnum);
+  bool controls(const Process& process) const;
   // world_hosts.cpp
   void start_host(int index);
   void poll_host(int index);
   void issue_command(int index);
   // world_happenings.cpp
   void stop(Host& host);
+  void leave(Host& host);
   void clear_stop(Host& host);
   void call_stopper(Host& stopper, bool over);
   void happen(const Happening& happening, bool over);

@@ -153,6 +153,13 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
                           new_stop_us_ - asked_us));
     }
   }
+  if (command.kind == CommandKind::leave) {
+    ++report_.farewells;
+    if (fed_.empty() || fed_.back().from != delivering_) {
+      violate("farewell: of a process that does not control the board");
+    }
+    if (live_ || board_->link().has_owner()) violate("farewell: executed, but not obeyed");
+  }
   if (command.kind != CommandKind::stepper) return;
   ++report_.executed;
   if (schedule_.attack_interval_us != 0) ++report_.executed_signed;
@@ -191,6 +198,11 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
     violate(fmt::format("intact: command {} is of a host that does not control", id));
   }
   newest_executed_ = std::max(newest_executed_, id);
+}
+
+// Has the board a host, and is it that process?
+bool World::controls(const Process& process) const {
+  return board_->link().has_owner() && !fed_.empty() && fed_.back().from == process;
 }
 
 // A stop that is obeyed. A repetition of the last one adds nothing to it, nor does an attacker's that

@@ -67,6 +67,13 @@ void World::happen(const Happening& happening, bool over) {
       std::swap(host.peer, host.other_peer);
       if (host.peer == 0) host.peer = next_peer_++;
       break;
+    case Happening::Kind::leave:
+      if (over) {
+        if (!host.alive) start_host(happening.host);
+        return;
+      }
+      if (host.alive && host.farewell_ticket == 0) leave(host);
+      break;
     case Happening::Kind::stopper:
       call_stopper(*hosts_.back(), over);
       break;
@@ -77,6 +84,12 @@ void World::happen(const Happening& happening, bool over) {
 void World::stop(Host& host) {
   const Ticket ticket = host.session->stop(Time{500'000}, host.time());
   if (ticket != 0) host.stops[ticket].pnum = host.stop_pnum;
+  poll_host(host.index);
+}
+
+void World::leave(Host& host) {
+  host.farewell_ticket = host.session->leave(Time{100'000}, host.time());
+  if (host.farewell_ticket == 0) return host.die();
   poll_host(host.index);
 }
 

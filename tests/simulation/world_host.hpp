@@ -25,7 +25,7 @@ struct World::Host final : Session::Handler {
     clock_offset_us = world.random_.below(1'000'000'000);
     leaving = false;
     stops.clear();
-    clear_ticket = 0;
+    clear_ticket = farewell_ticket = 0;
     const auto first =
         echo_host_first_pnum + static_cast<std::uint32_t>(world.random_.below(1U << 30));
     SessionOptions options;
@@ -73,8 +73,8 @@ struct World::Host final : Session::Handler {
   bool alive = false;
   bool frozen = false;
   bool stopper = false;
-  bool leaving = false;          // a stopper whose stop is confirmed
-  std::uint32_t peer = 0;        // its address
+  bool leaving = false;    // ends at its next turn: its stop is confirmed, or its farewell over
+  std::uint32_t peer = 0;  // its address
   std::uint32_t other_peer = 0;  // the one before or next; 0: none yet
   std::uint64_t died_us = 0;
   std::uint64_t clock_offset_us = 0;
@@ -89,6 +89,7 @@ struct World::Host final : Session::Handler {
   std::map<Ticket, Stop> stops;
   std::uint32_t stop_pnum = 0;  // of the newest that was sent
   Ticket clear_ticket = 0;      // 0: none is under way
+  Ticket farewell_ticket = 0;
 };
 
 }  // namespace r4::simulation

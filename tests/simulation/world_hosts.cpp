@@ -14,6 +14,13 @@ void World::Host::on_result(Ticket ticket, const CommandResult& result) {
     if (result.outcome == Outcome::refused) ++world.report_.clears_refused;
     return;
   }
+  if (ticket == farewell_ticket) {
+    leaving = true;
+    if (result.outcome != Outcome::confirmed) return;
+    ++world.report_.farewells_confirmed;
+    if (world.controls({index, incarnation})) world.violate("farewell: confirmed, but not obeyed");
+    return;
+  }
   if (const auto stop = stops.find(ticket); stop != stops.end()) {
     world.note(fmt::format("host {} stop outcome {}", index, static_cast<int>(result.outcome)));
     if (result.outcome == Outcome::confirmed) {

@@ -75,7 +75,9 @@ void ScriptedLink::nack(std::uint32_t pnum, std::string_view code) {
   finish("N:" + std::to_string(pnum) + "," + std::string(code) + ";" + began);
 }
 
-void ScriptedLink::identity() { finish("I:R4,0.1.0,board-7,udp;"); }
+void ScriptedLink::identity(std::string_view capabilities) {
+  finish("I:R4,0.1.0,board-7," + std::string(capabilities) + ";");
+}
 
 void ScriptedLink::connect() {
   heartbeat();

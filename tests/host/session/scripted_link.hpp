@@ -60,7 +60,7 @@ class ScriptedLink final : private Session::Handler {
   // To the host of the session that began with its heartbeat session_pnum, or with 0 to another.
   void nack(std::uint32_t pnum, std::string_view code);
   std::uint32_t session_pnum = 0;  // connect() begins one
-  void identity();
+  void identity(std::string_view capabilities = "udp");
   void raw(std::string_view bytes);
   // It begins again, with another clock and new numbers; nothing is sent.
   void reboot();

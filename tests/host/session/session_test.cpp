@@ -61,6 +61,89 @@ TEST(Session, BecomesActiveWithTheBoardsStateAndSaysSoOnce) {
   EXPECT_EQ(link.links.size(), 2U);
 }
 
+TEST(SessionFarewell, EndsHeartbeatsAndIsRepeatedUntilTheBoardTellsThatItIsFree) {
+  ScriptedLink link;
+  link.connect();
+  link.identity("udp+leave");
+  const Ticket command = link.session.send(Command::servo(1500, 1), 1s, link.now);
+  link.heartbeat();
+  const std::uint32_t echo = link.board_ms();
+  link.pass(5ms);
+  link.sent.clear();
+  const Ticket ticket = link.session.leave(100ms, link.now);
+  ASSERT_NE(ticket, 0U);
+  EXPECT_EQ(link.results.at(command).outcome, Outcome::closed);
+  ASSERT_EQ(link.sent.size(), 1U);
+  EXPECT_EQ(link.sent[0].command, "E:LEAVE");
+  EXPECT_EQ(link.sent[0].t, echo) << "it proves that it is of this session";
+  link.pass(45ms);
+  ASSERT_EQ(link.sent.size(), 3U) << "every 20 ms, and nothing else";
+  EXPECT_EQ(link.sent[2].bytes, link.sent[0].bytes);
+  link.heartbeat(SafeReason::link);
+  EXPECT_EQ(link.results.at(ticket).outcome, Outcome::confirmed);
+  link.pass(2s);
+  EXPECT_EQ(link.sent.size(), 3U) << "a heartbeat would take the board again";
+}
+
+TEST(SessionFarewell, IsConfirmedByTheAnswerToARepetitionToo) {
+  ScriptedLink link;
+  link.connect();
+  link.identity("leave");
+  const Ticket ticket = link.session.leave(100ms, link.now);
+  link.heartbeat(SafeReason::stop);  // graver than the lost link
+  EXPECT_EQ(link.results.count(ticket), 0U);
+  link.nack(link.last('E').pnum, "DUPLICATE");
+  EXPECT_EQ(link.results.at(ticket).outcome, Outcome::confirmed);
+}
+
+TEST(SessionFarewell, TellsThatItWasRefusedOrNotAnswered) {
+  for (const bool answered : {false, true}) {
+    ScriptedLink link;
+    link.connect();
+    link.identity("leave");
+    const Ticket ticket = link.session.leave(100ms, link.now);
+    if (answered) link.nack(link.last('E').pnum, "BUSY");
+    link.pass(100ms);
+    EXPECT_EQ(link.results.at(ticket).outcome, answered ? Outcome::refused : Outcome::timed_out);
+  }
+}
+
+TEST(SessionFarewell, IsNotSaidToABoardThatDoesNotKnowItOrIsNotThere) {
+  ScriptedLink older;
+  older.connect();
+  older.identity("udp+leaves");
+  EXPECT_EQ(older.session.leave(100ms, older.now), 0U);
+  older.pass(1s);
+  EXPECT_EQ(older.count('E'), 0U);
+
+  ScriptedLink silent;
+  silent.connect();
+  silent.identity("leave");
+  silent.pass(1500ms);
+  EXPECT_EQ(silent.session.leave(100ms, silent.now), 0U);
+
+  ScriptedLink rebooted;
+  rebooted.connect();
+  rebooted.identity("leave");
+  rebooted.reboot();
+  rebooted.heartbeat();
+  EXPECT_EQ(rebooted.session.leave(100ms, rebooted.now), 0U) << "it may have other firmware now";
+}
+
+TEST(SessionFarewell, AStopUnderWayGoesOn) {
+  ScriptedLink link;
+  link.connect();
+  link.identity("leave");
+  const Ticket stop = link.session.stop(1s, link.now);
+  link.session.leave(100ms, link.now);
+  link.sent.clear();
+  link.pass(50ms);
+  std::size_t stops = 0;
+  for (const ScriptedLink::Sent& each : link.sent) stops += each.command == "E:STOP" ? 1 : 0;
+  EXPECT_EQ(stops, 2U);
+  EXPECT_EQ(link.results.count(stop), 0U);
+}
+
 TEST(Session, SaysWhyTheBoardIsSafe) {
   ScriptedLink link;
   link.connect();

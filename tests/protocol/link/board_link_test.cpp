@@ -696,6 +696,84 @@ TEST_F(BoardLinkTest, ASessionWithoutNumbersHasNoneToTell) {
   EXPECT_FALSE(link.session_of(here, first));
 }
 
+// --- farewell
+
+struct BoardLinkFarewell : BoardLinkTest {
+  bool may_leave(std::uint64_t t, Source from = here) {
+    return link.may_leave(numbered(echo_pnum + 20, t, from), now);
+  }
+};
+
+TEST_F(BoardLinkFarewell, FreesTheBoardAtOnce) {
+  connect();
+  run(300);
+  ASSERT_TRUE(may_leave(sent.back()));
+  link.leave(now);
+  EXPECT_EQ(link.state(), BoardLinkState::lost);
+  EXPECT_FALSE(link.has_owner());
+  EXPECT_TRUE(link.heartbeat_due(now)) << "which tells it";
+  send_due();
+  EXPECT_EQ(heartbeat(echo_pnum + 5000, sent.back(), there), HeartbeatEffect::new_session);
+}
+
+TEST_F(BoardLinkFarewell, EndsTheSessionEvenIfTheSameNumbersGoOn) {
+  connect();
+  run(300);
+  link.leave(now);
+  run(10);
+  EXPECT_EQ(heartbeat(echo_pnum + 2, sent.back()), HeartbeatEffect::new_session) << "not resumed";
+}
+
+TEST_F(BoardLinkFarewell, AHeartbeatThatItOvertookBeginsNothing) {
+  connect();
+  run(300);
+  const std::uint32_t before = sent.back();
+  run(100);
+  link.leave(now);
+  send_due();
+  EXPECT_EQ(heartbeat(echo_pnum + 2, before), HeartbeatEffect::stale);
+  EXPECT_EQ(link.state(), BoardLinkState::lost);
+}
+
+TEST_F(BoardLinkFarewell, EchoesAHeartbeatOfThisSession) {
+  connect();
+  run(300);
+  const std::uint32_t first_session = sent.back();
+  run(1500);
+  ASSERT_EQ(link.state(), BoardLinkState::lost);
+  ASSERT_EQ(heartbeat(echo_pnum + 70000, sent.back()), HeartbeatEffect::new_session);
+  EXPECT_FALSE(may_leave(first_session)) << "of the session before";
+  EXPECT_TRUE(may_leave(sent.back()));
+  EXPECT_FALSE(may_leave(0));
+  EXPECT_FALSE(may_leave(sent.back() + 1));
+}
+
+TEST_F(BoardLinkFarewell, OfASessionBeforeIsNotTakenHoweverSoonTheNextBegins) {
+  connect();
+  run(300);
+  const std::uint32_t first_session = sent.back();
+  link.leave(now);
+  run(1);
+  ASSERT_EQ(heartbeat(echo_pnum + 30, sent.back()), HeartbeatEffect::new_session);
+  EXPECT_FALSE(may_leave(first_session));
+}
+
+TEST_F(BoardLinkFarewell, TooOldAnEchoProvesNothing) {
+  connect();
+  const std::uint32_t old = sent.back();
+  for (std::uint32_t i = 2; i < 14; ++i) {
+    run(100);
+    heartbeat(echo_pnum + i, sent.back());
+  }
+  EXPECT_FALSE(may_leave(old));
+}
+
+TEST_F(BoardLinkFarewell, OfAClockOfItsOwnProvesNothing) {
+  send_due();
+  ASSERT_EQ(heartbeat(5, 42), HeartbeatEffect::new_session);
+  EXPECT_FALSE(may_leave(43));
+}
+
 // --- the board's own heartbeats
 
 TEST_F(BoardLinkTest, SendsAtOnceAndThenEachInterval) {

@@ -50,10 +50,11 @@ std::string again(const std::string& text) {
 
 TEST(Command, EveryCommandIsReadAndWrittenAgain) {
   for (const std::string text :
-       {"H:ROS2-R4",     "O:358,1,1",     "D:4095,0,4",      "S:1500,16",  "R:1,On",
-        "R:8,Off",       "E:STOP",        "E:CLEAR",         "E:CLEAR,0",  "E:CLEAR,2147483647",
-        "P:-100,2000,4", "Z:4",           "B:4095,1,0,4",    "B:0,0,1,1",  "U:400,4",
-        "F:DEFAULT",     "F:AIN24,OSMC1", "C:recovery,last", "C:rate,100", "Q:ID"}) {
+       {"H:ROS2-R4", "O:358,1,1",     "D:4095,0,4",    "S:1500,16",       "R:1,On",
+        "R:8,Off",   "E:STOP",        "E:CLEAR",       "E:CLEAR,0",       "E:CLEAR,2147483647",
+        "E:LEAVE",   "P:-100,2000,4", "Z:4",           "B:4095,1,0,4",    "B:0,0,1,1",
+        "U:400,4",   "F:DEFAULT",     "F:AIN24,OSMC1", "C:recovery,last", "C:rate,100",
+        "Q:ID"}) {
     EXPECT_EQ(again(text), text);
   }
 }
@@ -157,10 +158,11 @@ TEST(Command, DirectionsBrakesAndSpeedsHaveTheirRange) {
 
 TEST(Command, AWrongNumberOfValuesIsAWrongForm) {
   for (const std::string text :
-       {"O:1",      "O:1,1",       "O:1,1,1,1",   "D:1,1",     "D:1,1,1,1", "S:1",
-        "S:1,1,1",  "R:1",         "R:1,On,1",    "P:1",       "P:1,1,1,1", "Z:1,1",
-        "B:1,1,1",  "B:1,1,1,1,1", "U:1",         "U:1,1,1",   "C:rate",    "C:rate,1,2",
-        "E:STOP,1", "E:CLEAR,",    "E:CLEAR,1,2", "E:CLEAR,x", "Q:ID,1",    "H:ROS2-R4,1"}) {
+       {"O:1",       "O:1,1",       "O:1,1,1,1",  "D:1,1",       "D:1,1,1,1",
+        "S:1",       "S:1,1,1",     "R:1",        "R:1,On,1",    "P:1",
+        "P:1,1,1,1", "Z:1,1",       "B:1,1,1",    "B:1,1,1,1,1", "U:1",
+        "U:1,1,1",   "C:rate",      "C:rate,1,2", "E:STOP,1",    "E:LEAVE,1",
+        "E:CLEAR,",  "E:CLEAR,1,2", "E:CLEAR,x",  "Q:ID,1",      "H:ROS2-R4,1"}) {
     EXPECT_EQ(judged(text), Refusal::format) << text;
   }
 }

@@ -195,6 +195,12 @@ TEST(Message, IdentityRoundTrips) {
   EXPECT_EQ(str(identity.firmware), "0.1.0");
   EXPECT_EQ(str(identity.board_id), "0042AF");
   EXPECT_EQ(str(identity.capabilities), "udp+serial");
+  EXPECT_TRUE(has_capability(identity.capabilities, "udp"));
+  EXPECT_TRUE(has_capability(identity.capabilities, "serial"));
+  for (const char* each : {"ser", "udp+serial", "leave", "erial"}) {
+    const Text word(each, std::char_traits<char>::length(each));
+    EXPECT_FALSE(has_capability(identity.capabilities, word)) << each;
+  }
 }
 
 TEST(Message, OtherIdentitiesAreNotTaken) {

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "../shell/farewell.hpp"
 #include "../shell/help.hpp"
 #include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
@@ -115,7 +116,7 @@ class Sender {
     board_.open();
     send_next();
     io_.run();
-    board_.close();
+    say_farewell(io_, board_);
     if (failure_) throw Error(*failure_);
     return 0;
   }
@@ -245,8 +246,8 @@ constexpr const char* footer =
     R"(Each command is sent when the board's own state has confirmed the one before it; the first that is not
 confirmed ends the run. All are checked before the first is sent.
 
-The board goes safe, its outputs off, one second after this program ends: --hold keeps them on. No motor turns
-while relay 1, the motor supply, is open: it is at first and after each safe state, and R:1,On closes it.
+The board goes safe, its outputs off, as soon as this program ends: --hold keeps them on. No motor turns while
+relay 1, the motor supply, is open: it is at first and after each safe state, and R:1,On closes it.
 
 Examples:
   r4 send udp://192.168.0.125 R:1,On O:358,1,1 --hold 5      R:1,On: the motors have supply

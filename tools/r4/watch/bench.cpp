@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "../shell/farewell.hpp"
 #include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
@@ -80,7 +81,7 @@ class Bench {
     listen();
     ask();
     command();
-    board_.close();
+    say_farewell(io_, board_);
     if (options_.json) {
       print_json();
     } else {

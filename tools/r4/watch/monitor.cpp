@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "../shell/farewell.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
@@ -68,7 +69,7 @@ class Monitor {
                  skipped);
     }
     const Statistics statistics = board_.statistics();
-    board_.close();
+    say_farewell(io_, board_);
     view_.reset();
     if (statistics.received == 0) throw silence(statistics);
     return 0;
