@@ -297,6 +297,7 @@ void Session::on_causes(std::int32_t newest, Time now) {
 // Sees to it that the state has the fields we need, whoever chose others, and that we are in
 // control.
 void Session::select_fields(Time now) {
+  if (leaving_) return;
   if (!selection_.ask(role_.controlling(), link_up() && !role_.refused(now), now)) return;
   transmit_now(Command::fields(selection_.fields()), to_ms(now), Priority::normal, now);
 }
@@ -319,16 +320,7 @@ Command Session::with_needed_fields(const Command& command) {
 Time Session::poll(Time now) {
   link_.poll(to_ms(now));
   refresh_status(now);
-  if (link_.heartbeat_due(to_ms(now))) {
-    if (transmit_now(Command::heartbeat(), link_.echo(), Priority::normal, now) ==
-        SendResult::sent) {
-      ++collector_.counts.heartbeats;
-      key_.on_heartbeat_sent();
-      link_.heartbeat_sent(to_ms(now));
-    } else {
-      link_.heartbeat_not_sent(to_ms(now));
-    }
-  }
+  if (!leaving_) send_heartbeat(now);
   for (Pending& pending : pending_.under_way()) {
     if (now >= pending.deadline) {
       finish(pending, Outcome::timed_out, Refusal::none, now);
@@ -341,22 +333,38 @@ Time Session::poll(Time now) {
   send_queued(now);  // what has waited for arm()
   retry_due(now);
   repeat_stop(now);
-  if (link_up() && question_.due(now)) {
+  if (!leaving_ && link_up() && question_.due(now)) {
     question_.ask(now);
     transmit_now(Command::identify(), to_ms(now), Priority::normal, now);
   }
+  return next_poll(now);
+}
 
-  Time next = now + std::chrono::milliseconds{link_.due_in(to_ms(now))};
-  // due_in() counts whole milliseconds; aim behind the edge, not before it.
-  next = std::chrono::duration_cast<std::chrono::milliseconds>(next) + Time{0};
-  if (next <= now) next = now + Time{1000};
-  if (link_up()) next = std::min(next, question_.next());
-  if (role_.refused(now)) next = std::min(next, role_.refused_until());
-  next = std::min(next, repetition_.next());
+void Session::send_heartbeat(Time now) {
+  if (!link_.heartbeat_due(to_ms(now))) return;
+  if (transmit_now(Command::heartbeat(), link_.echo(), Priority::normal, now) == SendResult::sent) {
+    ++collector_.counts.heartbeats;
+    key_.on_heartbeat_sent();
+    link_.heartbeat_sent(to_ms(now));
+  } else {
+    link_.heartbeat_not_sent(to_ms(now));
+  }
+}
+
+Time Session::next_poll(Time now) {
+  Time next = repetition_.next();
   for (const Pending& pending : pending_.under_way()) {
     next = std::min(next, pending.deadline);
     if (pending.is_out()) next = std::min(next, pending.retry);
   }
+  if (leaving_) return next;
+  Time link = now + std::chrono::milliseconds{link_.due_in(to_ms(now))};
+  // due_in() counts whole milliseconds; aim behind the edge, not before it.
+  link = std::chrono::duration_cast<std::chrono::milliseconds>(link) + Time{0};
+  if (link <= now) link = now + Time{1000};
+  next = std::min(next, link);
+  if (link_up()) next = std::min(next, question_.next());
+  if (role_.refused(now)) next = std::min(next, role_.refused_until());
   return next;
 }
 
@@ -386,8 +394,8 @@ bool Session::in_control(Time now) const {
   const FieldSelection::Stage stage = selection_.stage();
   const bool no_proof_to_come =
       stage == FieldSelection::Stage::left || stage == FieldSelection::Stage::unheard;
-  return link_up() && !role_.refused(now) && (role_.controlling() || no_proof_to_come) &&
-         !link_.gated(to_ms(now));
+  return !leaving_ && link_up() && !role_.refused(now) &&
+         (role_.controlling() || no_proof_to_come) && !link_.gated(to_ms(now));
 }
 
 void Session::refresh_status(Time now) {

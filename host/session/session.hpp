@@ -192,6 +192,8 @@ class Session {
   void on_causes(std::int32_t newest, Time now);
   bool name_cause(Pending& pending) const;
   void repeat_stop(Time now);
+  void send_heartbeat(Time now);
+  Time next_poll(Time now);
   void select_fields(Time now);
   Command with_needed_fields(const Command& command);
   void refresh_status(Time now);
@@ -210,6 +212,7 @@ class Session {
   ReceivedState state_;
   std::uint32_t restarts_ = 0;  // of the board, those that were told
   bool knows_leave_ = false;    // does the board?
+  bool leaving_ = false;
   StatisticsCollector collector_;
   ArmingMachine arming_;
   DisarmCause told_cause_ = DisarmCause::not_yet;

@@ -230,13 +230,11 @@ void Session::cancel(Ticket ticket, Time now) {
   }
 }
 
-// A heartbeat behind it would take the board again.
 Ticket Session::leave(Time timeout, Time now) {
   for (Pending& pending : pending_.under_way()) {
     if (pending.kind != CommandKind::stop) finish(pending, Outcome::closed, Refusal::none, now);
   }
-  link_.hold(true);
-  refresh_status(now);
+  leaving_ = true;  // a heartbeat behind the farewell would take the board again
   if (!knows_leave_ || !link_up()) return 0;
   Pending* pending = allocate(Command::leave(), timeout, now);
   if (pending == nullptr) return 0;

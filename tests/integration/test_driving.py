@@ -53,12 +53,12 @@ def test_a_motor_turns_only_while_relay_1_is_closed_and_the_handle_held(tmp_path
         def sensors(is_it=lambda each: True):
             return board.next(lambda each: each['type'] == 'sensors' and is_it(each))
 
-        assert run('send', board.host_url, 'O:4095,1,1').returncode == 0
+        assert run('send', board.host_url, 'O:4095,1,1', '--hold', '0.2').returncode == 0
         board.next(lambda each: 'outputs' in each and each['outputs']['osmc'][0] == [4095, 1])
         still = sensors()
         assert (still['supply'], still['enc'][0]) == (False, 0)
         assert sensors()['enc'][0] == 0
-        assert run('send', board.host_url, 'R:1,On', 'O:4095,1,1').returncode == 0
+        assert run('send', board.host_url, 'R:1,On', 'O:4095,1,1', '--hold', '1').returncode == 0
         turning = sensors(lambda each: each['supply'])
         assert sensors(lambda each: each['enc'][0] > turning['enc'][0])
         assert not sensors(lambda each: each['handle'] == 'released')['supply']
@@ -82,7 +82,7 @@ def test_what_is_written_to_a_board_happens_around_it_at_once():
         board.next(lambda each: each.get('reason') == 'none')
         write('motor 1 stalled')
         board.next(lambda each: each.get('happened') == 'motor 1 stalled')
-        assert run('send', board.host_url, 'R:1,On', 'O:4095,1,1').returncode == 0
+        assert run('send', board.host_url, 'R:1,On', 'O:4095,1,1', '--hold', '1').returncode == 0
         driven = board.next(lambda each: each['type'] == 'sensors' and each['supply'])
         assert driven['enc'][0] == 0
         board.process.stdin.write('fault')  # without an end of line
