@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What the application sends: heartbeats, states, answers.
+#include <cstring>
+
 #include "../protocol/messages/state_fields.hpp"
 #include "application.hpp"
 
@@ -36,8 +38,14 @@ void Application::answer(Source to, DatagramWriter& writer, std::uint32_t now_ms
 void Application::identify(Source to, std::uint32_t now_ms) {
   char buffer[max_datagram];
   DatagramWriter writer(buffer, sizeof buffer);
-  write_identity(writer, identity_);
+  Identity identity = identity_;
+  const char* const name = settings().site.name;
+  identity.name = Text(name, std::strlen(name));
+  identity.has_busy = true;
+  identity.busy = link_.has_owner() && link_.owner() != to;
+  write_identity(writer, identity);
   writer.more("+").more(leave_capability);
+  write_identity_fields(writer, identity);
   answer(to, writer, now_ms);
 }
 

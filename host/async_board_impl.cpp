@@ -253,6 +253,7 @@ void AsyncBoard::Impl::on_identity(const Identity& fresh) {
   identity.firmware.assign(fresh.firmware.data(), fresh.firmware.size());
   identity.board_id.assign(fresh.board_id.data(), fresh.board_id.size());
   identity.capabilities.assign(fresh.capabilities.data(), fresh.capabilities.size());
+  identity.name.assign(fresh.name.data(), fresh.name.size());
 }
 
 void AsyncBoard::Impl::on_nack(const Nack& nack, const Datagram& datagram) {

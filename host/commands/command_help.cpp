@@ -36,7 +36,7 @@ struct SettingHelp {
   std::string_view values;
 };
 
-constexpr std::array<SettingHelp, 13> settings_table{{
+constexpr std::array<SettingHelp, 14> settings_table{{
     {"rate", "1-1000 states a second"},
     {"heartbeat", "50-1000 ms, below the timeout"},
     {"timeout", "100-10000 ms, above the heartbeat"},
@@ -48,6 +48,7 @@ constexpr std::array<SettingHelp, 13> settings_table{{
     {"port", "1-65535"},
     {"node", "0-31"},
     {"chips", "0-31"},
+    {"name", "1-31 letters, digits, _ and -, or off"},
     {"key", "id:digits, the id 1-9, then 64 hexadecimal digits; or id:off"},
     {"AIN24", "0.01-650 volts; AIN12, AIN5 and the others likewise"},
 }};

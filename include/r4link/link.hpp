@@ -141,6 +141,7 @@ struct BoardIdentity {
   std::string firmware;
   std::string board_id;
   std::string capabilities;  // words joined by '+': "udp+serial"
+  std::string name;          // that its owner gave it; empty: none
 };
 
 // How well the link does.

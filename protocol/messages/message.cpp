@@ -5,6 +5,7 @@
 #include "command_field.hpp"
 #include "r4link/command.hpp"
 #include "r4link/state.hpp"
+#include "site_settings.hpp"
 #include "state_fields.hpp"
 
 namespace r4 {
@@ -16,6 +17,8 @@ constexpr Text nonce_name("AN");
 constexpr Text safe_name("SAFE");
 constexpr Text cause_name("CAUSE");
 constexpr Text session_name("SESSION");
+constexpr Text board_name("NAME");
+constexpr Text busy_name("BUSY");
 
 // True if there is such a field, of one number.
 template <class Number>
@@ -117,6 +120,11 @@ bool read_identity(const Datagram& datagram, Identity& out) {
   out.firmware = values[1];
   out.board_id = values[2];
   out.capabilities = values[3];
+  const Text name = datagram.find(board_name).values();
+  out.name = is_board_name(name) ? name : Text();
+  const Text busy = datagram.find(busy_name).values();
+  out.busy = busy == Text("1");
+  out.has_busy = out.busy || busy == Text("0");
   return true;
 }
 
@@ -136,6 +144,11 @@ void write_identity(DatagramWriter& writer, const Identity& identity) {
       .value(identity.firmware)
       .value(identity.board_id)
       .value(identity.capabilities);
+}
+
+void write_identity_fields(DatagramWriter& writer, const Identity& identity) {
+  if (!identity.name.empty()) writer.field(board_name).value(identity.name);
+  if (identity.has_busy) writer.field(busy_name).value(identity.busy ? Text("1") : Text("0"));
 }
 
 }  // namespace r4

@@ -17,7 +17,7 @@ enum class MessageKind : std::uint8_t {
   host_heartbeat,   // H:ROS2-R4
   command,          // one of command.hpp's letters
   nack,             // N:<PNum>,<code>
-  identity,         // I:R4,<firmware>,<board id>,<capabilities>
+  identity,         // I:R4,<firmware>,<board id>,<capabilities>;NAME:…;BUSY:…
   state,            // anything else
 };
 
@@ -57,17 +57,23 @@ bool is_connecting_heartbeat(const Datagram& datagram);
 bool read_nack(const Datagram& datagram, Nack& out);
 void write_nack(DatagramWriter& writer, const Nack& nack);
 
-// Who the board is; views of the datagram.
+// Who the board is; views of the datagram. `NAME` and `BUSY` are fields of their own: who does not know
+// them passes over them, and not every board tells them.
 struct Identity {
-  Text firmware;      // "0.1.0"
-  Text board_id;      // serial number, unique
-  Text capabilities;  // words joined by '+': "udp+serial+leave"
+  Text firmware;       // "0.1.0"
+  Text board_id;       // serial number, unique
+  Text capabilities;   // words joined by '+': "udp+serial+leave"
+  Text name = Text();  // that its owner gave it (`C:name`); empty: none
+  bool has_busy = false;
+  bool busy = false;  // another host than the one that asked controls it
 };
 // What the firmware can do besides, whatever the board: it obeys E:LEAVE.
 constexpr Text leave_capability("leave");
 // Is it one of those words?
 bool has_capability(Text capabilities, Text word);
 bool read_identity(const Datagram& datagram, Identity& out);
-void write_identity(DatagramWriter& writer, const Identity& identity);
+void write_identity(DatagramWriter& writer, const Identity& identity);  // its `I`
+void write_identity_fields(DatagramWriter& writer,
+                           const Identity& identity);  // and what is behind it
 
 }  // namespace r4

@@ -10,10 +10,10 @@ namespace {
 
 constexpr Text off_word("off");
 
-enum class Site : int { network, password, host, port, node, chips, key, count };
+enum class Site : int { network, password, host, port, node, chips, name, key, count };
 constexpr int site_count = static_cast<int>(Site::count);
-constexpr Text site_keys[site_count] = {"network", "password", "host",     "port",
-                                        "node",    "chips",    key_setting};
+constexpr Text site_keys[site_count] = {"network", "password", "host", "port",
+                                        "node",    "chips",    "name", key_setting};
 
 struct Range {
   std::uint32_t min;
@@ -56,6 +56,11 @@ Refusal decode(Text value, char* out, std::size_t min, std::size_t max) {
   }
   out[size] = '\0';
   return size < min ? Refusal::range : Refusal::none;
+}
+
+bool is_in_board_name(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+         c == '-';
 }
 
 bool is_plain(char c) {
@@ -119,6 +124,17 @@ Refusal set_host(SiteSettings& settings, Text value) {
     if (part < 3) value = value.substr(size + 1);
   }
   settings.host = address;
+  return Refusal::none;
+}
+
+Refusal set_name(SiteSettings& settings, Text value) {
+  if (value == off_word) value = Text();
+  for (const char c : value) {
+    if (!is_in_board_name(c)) return Refusal::format;
+  }
+  if (value.size() > board_name_max) return Refusal::range;
+  std::memset(settings.name, 0, sizeof settings.name);
+  if (!value.empty()) std::memcpy(settings.name, value.data(), value.size());
   return Refusal::none;
 }
 
@@ -193,7 +209,14 @@ bool operator==(const SiteSettings& a, const SiteSettings& b) {
   }
   return std::strcmp(a.network, b.network) == 0 && std::strcmp(a.password, b.password) == 0 &&
          a.host == b.host && a.udp_port == b.udp_port && a.can_node == b.can_node &&
-         a.chips == b.chips;
+         a.chips == b.chips && std::strcmp(a.name, b.name) == 0;
+}
+
+bool is_board_name(Text text) {
+  for (const char c : text) {
+    if (!is_in_board_name(c)) return false;
+  }
+  return !text.empty() && text.size() <= board_name_max && text != off_word;
 }
 
 bool is_site_setting(Text key) { return index_of(key) >= 0; }
@@ -220,6 +243,8 @@ Refusal set(SiteSettings& settings, Text key, Text value) {
       return set_number(settings.can_node, value, Range{0, 31});
     case Site::chips:
       return set_number(settings.chips, value, Range{0, 31});
+    case Site::name:
+      return set_name(settings, value);
     case Site::key:
       return set_key(settings.keys, value);
     case Site::count:
@@ -263,6 +288,9 @@ bool get(const SiteSettings& settings, int index, Text& key, char (&out)[max_sit
       break;
     case Site::node:
       value = write(out, std::uint32_t{settings.can_node});
+      break;
+    case Site::name:
+      value = encode(settings.name, out);
       break;
     case Site::chips:
     case Site::key:

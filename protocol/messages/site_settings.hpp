@@ -14,6 +14,8 @@
 //     node       0-31                  1        its number on the CAN bus
 //     chips      0-31                  31       which chips are fitted: 1 OSMC, 2 DHB12, 4
 //                                               expander, 8 DAC, 16 servos
+//     name       1-31 of A-Z a-z 0-9   off      what its owner calls it, told in its answer to
+//                _ -                            `Q:ID`; `off`: it has no name
 //     AIN24 …    volts, 0.01-650       50.00    of that analog input at full scale
 //     key        id:64 hex digits      none     a key, of id 1-9 (key.hpp); `id:off`: it is none
 //                                               any more. At most four
@@ -21,7 +23,7 @@
 // In a name or password, what the grammar does not allow is written as in URLs: %2C is a comma, %25
 // a percent sign, %6Fff the network that is called "off".
 //
-// network, password, host, port, key and analog inputs count at once, the others when the board
+// network, password, host, port, name, key and analog inputs count at once, the others when the board
 // starts next.
 #pragma once
 
@@ -38,6 +40,7 @@ namespace r4 {
 constexpr std::size_t network_max = 32;
 constexpr std::size_t password_min = 8;
 constexpr std::size_t password_max = 63;
+constexpr std::size_t board_name_max = 31;
 
 struct SiteSettings {
   char network[network_max + 1] = {};    // ends in NUL; empty: off
@@ -46,12 +49,16 @@ struct SiteSettings {
   std::uint16_t udp_port = 2018;
   std::uint8_t can_node = 1;
   std::uint8_t chips = 31;
+  char name[board_name_max + 1] = {};  // ends in NUL; empty: off
   std::uint16_t full_scale_cv[analog_channels] = {5000, 5000, 5000, 5000, 5000, 5000};
   Key keys[max_keys];  // those there are come first
 };
 bool operator==(const SiteSettings& a, const SiteSettings& b);
 
 constexpr Text key_setting("key");
+
+// May a board be called so?
+bool is_board_name(Text text);
 
 bool is_site_setting(Text key);
 // Is it one whose value is for nobody to see: `password`, `key`?

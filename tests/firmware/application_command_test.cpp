@@ -301,6 +301,21 @@ TEST_F(ApplicationCommand, AnswersTheQuestionWhoItIsInAnyState) {
   EXPECT_EQ(heard[0].bytes.rfind(answer, 0), 0U);
 }
 
+TEST_F(ApplicationCommand, TellsWhoAsksWhetherAnotherHostIsInControl) {
+  const auto identity = [this](Source from) {
+    board.take();
+    board.receive("Q:ID;", from);
+    const std::vector<Heard> heard = board.take(MessageKind::identity);
+    EXPECT_EQ(heard.size(), 1U);
+    return heard.empty() ? std::string() : heard[0].bytes;
+  };
+  const Source stranger{0, 99};
+  EXPECT_NE(identity(stranger).find(";BUSY:1;"), std::string::npos);
+  EXPECT_NE(identity(host.at).find(";BUSY:0;"), std::string::npos);
+  board.run(1500);  // the link is lost: anybody may take it
+  EXPECT_NE(identity(stranger).find(";BUSY:0;"), std::string::npos);
+}
+
 TEST_F(ApplicationCommand, ListensToNoOtherBoard) {
   for (const char* fields : {"H:R4-ROS2;PNum:1;T:1;", "N:5,SAFE;PNum:1;T:1;",
                              "I:R4,1,2,3;PNum:1;T:1;", "AIN24:24.28;PNum:1;T:1;", "PNum:1;T:1;"}) {

@@ -93,6 +93,29 @@ TEST_F(ApplicationSetting, MakesEveryPortSendThePackedForm) {
   EXPECT_FALSE(board.ports[0].packed);
 }
 
+TEST_F(ApplicationSetting, ANameIsTakenFromTheBoardsOwnCableAndTold) {
+  const auto identity = [this] {
+    board.take();
+    board.receive("Q:ID;", Source{0, 99});
+    return board.take(MessageKind::identity).at(0).bytes;
+  };
+  host.command("C:name,left");
+  ASSERT_EQ(board.log.refused.size(), 1U);
+  EXPECT_NE(board.log.refused.back().find("AUTH"), std::string::npos);
+  EXPECT_EQ(identity().find("NAME"), std::string::npos);
+  board.ports[0].cable = true;
+  host.command("C:name,left");
+  EXPECT_EQ(board.log.executed.size(), 1U);
+  EXPECT_NE(identity().find(";NAME:left;"), std::string::npos);
+  host.command("C:name," + std::string(300, 'n'));
+  ASSERT_EQ(board.log.refused.size(), 2U);
+  EXPECT_NE(board.log.refused.back().find("RANGE"), std::string::npos);
+  EXPECT_EQ(board.log.executed.size(), 1U);
+  EXPECT_NE(identity().find(";NAME:left;"), std::string::npos);
+  host.command("C:name,off");
+  EXPECT_EQ(identity().find("NAME"), std::string::npos);
+}
+
 TEST_F(ApplicationSetting, TellsHowTheBoardIsReachedOnlyOverItsOwnCable) {
   host.command("C:network,mine");
   EXPECT_EQ(board.log.refused.size(), 1U);

@@ -140,6 +140,7 @@ void messages_read_equal(const Datagram& datagram) {
     const std::string text =
         written([&](DatagramWriter& writer) { write_identity(writer, identity); });
     require(text == "I:" + str(datagram.find("I").values()));
+    require(identity.name.empty() || identity.name == datagram.find("NAME").values());
   }
 }
 

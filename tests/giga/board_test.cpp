@@ -192,6 +192,29 @@ TEST(GigaUsb, EndsNoBurstWithAFullPacket) {
   }
 }
 
+TEST(GigaUsb, KeepsTheNameThatItIsGivenAndTellsIt) {
+  GigaBench bench;
+  bench.giga.stored["r4-settings"] = "name,left-arm\n";
+  bench.boot();
+  PlainHost host;
+  const auto says = [&](const std::string& text) {
+    bench.usb()(with_crc("Q:ID;"));
+    bench.run_ms(20, host, bench.usb());
+    const std::vector<std::string> lines = bench.usb_lines();
+    return std::any_of(lines.begin(), lines.end(), [&](const std::string& line) {
+      return line.find("I:R4,") == 0 && line.find(text) != std::string::npos;
+    });
+  };
+  bench.run_ms(150, host, bench.usb());
+  EXPECT_TRUE(says(";NAME:left-arm;BUSY:0;"));
+  bench.usb()(host.command("C:name,right"));
+  EXPECT_TRUE(says(";NAME:right;BUSY:0;"));
+  EXPECT_TRUE(bench.run_until([&] {
+    const std::lock_guard<std::mutex> lock(bench.giga.mutex);
+    return bench.giga.stored["r4-settings"].find("name,right\n") != std::string::npos;
+  }));
+}
+
 TEST(GigaLink, ASilentHostMakesEverythingSafeInTheTimerInterrupt) {
   GigaBench bench;
   bench.boot();

@@ -203,6 +203,44 @@ TEST(Message, IdentityRoundTrips) {
   }
 }
 
+TEST(Message, AnIdentityTellsTheNameAndWhetherAnotherHostIsInControl) {
+  char buffer[max_datagram];
+  for (const bool busy : {false, true}) {
+    DatagramWriter writer(buffer, sizeof buffer);
+    Identity told{"0.1.0", "0042AF", "udp"};
+    told.name = "left";
+    told.has_busy = true;
+    told.busy = busy;
+    write_identity(writer, told);
+    write_identity_fields(writer, told);
+    const Text bytes = writer.finish(1, 2);
+    EXPECT_EQ(str(bytes), with_crc("I:R4,0.1.0,0042AF,udp;NAME:left;BUSY:" +
+                                   std::to_string(busy ? 1 : 0) + ";PNum:1;T:2;"));
+    Datagram datagram;
+    ASSERT_TRUE(read_datagram(bytes, datagram));
+    EXPECT_EQ(kind_of(datagram), MessageKind::identity);
+    Identity identity;
+    ASSERT_TRUE(read_identity(datagram, identity));
+    EXPECT_EQ(str(identity.name), "left");
+    EXPECT_TRUE(identity.has_busy);
+    EXPECT_EQ(identity.busy, busy);
+  }
+}
+
+TEST(Message, AnIdentityWhoseNameOrBusyCannotBeReadIsOneWithoutThem) {
+  for (const std::string& fields :
+       {std::string(), std::string("NAME:;BUSY:;"), std::string("NAME:a b;BUSY:2;"),
+        std::string("NAME:a,b;BUSY:1,0;"), std::string("NAME:off;BUSY:-1;"),
+        "NAME:" + std::string(32, 'n') + ";BUSY:01;"}) {
+    Identity identity;
+    identity.name = "before";
+    identity.has_busy = identity.busy = true;
+    ASSERT_TRUE(read_identity(Read("I:R4,a,b,c;" + fields).datagram, identity)) << fields;
+    EXPECT_EQ(str(identity.name), "") << fields;
+    EXPECT_FALSE(identity.has_busy || identity.busy) << fields;
+  }
+}
+
 TEST(Message, OtherIdentitiesAreNotTaken) {
   for (const char* fields : {"A:1;", "I:;", "I:R4;", "I:R4,a,b;", "I:R5,a,b,c;", "I:R4,a,b,c,d;"}) {
     Identity identity;

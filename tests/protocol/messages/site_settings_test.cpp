@@ -85,6 +85,16 @@ TEST(SiteSettings, EveryAcceptedAndRefusedForm) {
       {"chips", "0", Refusal::none},
       {"chips", "31", Refusal::none},
       {"chips", "32", Refusal::range},
+      {"name", "a", Refusal::none},
+      {"name", "left-Arm_2", Refusal::none},
+      {"name", std::string(31, 'n'), Refusal::none},
+      {"name", "off", Refusal::none},
+      {"name", std::string(32, 'n'), Refusal::range},
+      {"name", std::string(300, 'n'), Refusal::range},
+      {"name", std::string(300, '.'), Refusal::format},
+      {"name", "left arm", Refusal::format},
+      {"name", "%6Ceft", Refusal::format},
+      {"name", "l\xc3\xa4nge", Refusal::format},
       {"AIN24", "51.66", Refusal::none},
       {"AIN6", "650", Refusal::none},
       {"AIN6", "650.01", Refusal::range},
@@ -111,6 +121,20 @@ TEST(SiteSettings, EveryAcceptedAndRefusedForm) {
       EXPECT_TRUE(settings == before) << c.key << ' ' << c.value;
     }
   }
+}
+
+TEST(SiteSettings, ANameIsReplacedWholeAndTakenAway) {
+  SiteSettings settings;
+  EXPECT_STREQ(settings.name, "");
+  set_text(settings, "name", "a-long-name");
+  set_text(settings, "name", "b");
+  SiteSettings other;
+  set_text(other, "name", "b");
+  EXPECT_STREQ(settings.name, "b");
+  EXPECT_TRUE(settings == other);
+  EXPECT_EQ(set_text(settings, "name", "off"), Refusal::none);
+  EXPECT_STREQ(settings.name, "");
+  EXPECT_FALSE(settings == other);
 }
 
 TEST(SiteSettings, HoldFourKeysAndReplaceOneOfTheSameId) {
@@ -141,7 +165,7 @@ TEST(SiteSettings, PasswordAndKeysAreSecret) {
 
 TEST(SiteSettings, AreToldFromTheOthers) {
   for (const char* key :
-       {"network", "password", "host", "port", "node", "chips", "AINDMH", "key"}) {
+       {"network", "password", "host", "port", "node", "chips", "name", "AINDMH", "key"}) {
     EXPECT_TRUE(is_site_setting(Text(key, std::string(key).size()))) << key;
   }
   for (const char* key : {"rate", "heartbeat", "timeout", "recovery", "pack", "DMHSTA", ""}) {
@@ -162,6 +186,7 @@ TEST(KeptSettings, ComeBackAsTheyWere) {
   set_text(settings.site, "port", "2019");
   set_text(settings.site, "node", "7");
   set_text(settings.site, "chips", "5");
+  set_text(settings.site, "name", "left-arm");
   set_text(settings.site, "AINSTEER", "3.3");
   set_text(settings.site, "key", "2:00ff" + std::string(60, 'a'));
   set_text(settings.site, "key", "1:" + std::string(64, 'b'));
@@ -186,6 +211,7 @@ TEST(KeptSettings, TheLongestFit) {
   set_text(settings.site, "host", "255.255.255.255");
   set_text(settings.site, "port", "65535");
   set_text(settings.site, "node", "31");
+  set_text(settings.site, "name", std::string(board_name_max, 'n'));
   for (std::uint16_t& full_scale : settings.site.full_scale_cv) full_scale = 65000;
   for (const char id : {'1', '2', '3', '4'}) {
     set_text(settings.site, "key", std::string(1, id) + ":" + std::string(64, 'f'));

@@ -186,7 +186,8 @@ class Sender {
 
   void print_identity() const {
     const BoardIdentity& id = board_.identity();
-    fmt::print("  board {}, firmware {}, {}\n", id.board_id, id.firmware, id.capabilities);
+    const std::string name = id.name.empty() ? "" : " (" + id.name + ")";
+    fmt::print("  board {}{}, firmware {}, {}\n", id.board_id, name, id.firmware, id.capabilities);
   }
 
   static double milliseconds(const CommandResult& result) {
@@ -212,6 +213,7 @@ class Sender {
     if (confirmed && text == "Q:ID") {
       const BoardIdentity& id = board_.identity();
       object["board_id"] = id.board_id;
+      object["name"] = id.name;
       object["firmware"] = id.firmware;
       object["capabilities"] = id.capabilities;
     }

@@ -83,8 +83,9 @@ class LiveView final : public MonitorView {
     lines.push_back(
         fmt::format("{}   {}   (Ctrl-C ends)", board_.name(), link_text(board_.link())));
     if (!id.board_id.empty()) {
-      lines.push_back(
-          fmt::format("board {}, firmware {}, {}", id.board_id, id.firmware, id.capabilities));
+      const std::string name = id.name.empty() ? "" : " (" + id.name + ")";
+      lines.push_back(fmt::format("board {}{}, firmware {}, {}", id.board_id, name, id.firmware,
+                                  id.capabilities));
     }
     lines.push_back(
         fmt::format("{:.1f} Hz   lost {} ({:.2f} %)   damaged {}   round trip {:.0f} us   "
