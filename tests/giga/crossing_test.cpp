@@ -108,14 +108,14 @@ const std::string hello = with_crc("H:ROS2-R4;");
 
 TEST(UdpPeers, SendWhatIsForEveryoneToTheHostHeardLast) {
   giga::UdpPeers peers;
-  giga::UdpAddress to;
+  giga::UdpAddress to[2];
   const std::uint32_t first = peers.heard({1, 1}, Text(hello));
   peers.heard({2, 9}, Text(hello));
   peers.heard({3, 9}, Text("x"));  // no datagram
-  EXPECT_TRUE(peers.find(first, to));
-  EXPECT_EQ(to.ip, 1U);
-  EXPECT_TRUE(peers.find(everyone, to));
-  EXPECT_EQ(to.ip, 2U);
+  EXPECT_EQ(peers.find(first, to), 1);
+  EXPECT_EQ(to[0].ip, 1U);
+  EXPECT_EQ(peers.find(everyone, to), 1);
+  EXPECT_EQ(to[0].ip, 2U);
 }
 
 TEST(UdpPeers, KeepTheHostInControlInAFloodFromChangingAddresses) {
@@ -123,14 +123,14 @@ TEST(UdpPeers, KeepTheHostInControlInAFloodFromChangingAddresses) {
   const std::uint32_t owner = peers.heard({1, 1}, Text(hello));
   peers.hold(owner);
   for (std::uint32_t i = 0; i < 5000; ++i) peers.heard({100 + i, 2}, Text(hello));
-  giga::UdpAddress to;
-  ASSERT_TRUE(peers.find(everyone, to));
-  EXPECT_EQ(to.ip, 1U) << "what is for everyone is not led away";
+  giga::UdpAddress to[2];
+  ASSERT_EQ(peers.find(everyone, to), 1);
+  EXPECT_EQ(to[0].ip, 1U) << "what is for everyone is not led away";
   EXPECT_EQ(peers.heard({1, 1}, Text(hello)), owner);
   peers.hold(everyone);  // it has gone
   peers.heard({7, 2}, Text(hello));
-  ASSERT_TRUE(peers.find(everyone, to));
-  EXPECT_EQ(to.ip, 7U);
+  ASSERT_EQ(peers.find(everyone, to), 1);
+  EXPECT_EQ(to[0].ip, 7U);
 }
 
 TEST(UdpLink, TellsTheNetworkThreadWhoIsInControl) {
@@ -141,20 +141,25 @@ TEST(UdpLink, TellsTheNetworkThreadWhoIsInControl) {
   EXPECT_EQ(link.held(), 7U);
 }
 
-TEST(UdpPeers, SendToThePapersClientWhereItListens) {
+TEST(UdpPeers, SendToThePapersClientWhereItListensAndWhereItAsks) {
   giga::UdpPeers peers;
-  giga::UdpAddress to;
-  EXPECT_FALSE(peers.find(everyone, to)) << "nobody is there";
+  giga::UdpAddress to[2];
+  EXPECT_EQ(peers.find(everyone, to), 0) << "nobody is there";
   peers.set_host(77);
-  ASSERT_TRUE(peers.find(everyone, to)) << "before it was heard";
-  EXPECT_EQ(to.ip, 77U);
-  EXPECT_EQ(to.port, 2390);
+  ASSERT_EQ(peers.find(everyone, to), 1) << "before it was heard";
+  EXPECT_EQ(to[0].ip, 77U);
+  EXPECT_EQ(to[0].port, 2390);
   const std::uint32_t number = peers.heard({77, 50000}, Text(hello));
-  ASSERT_TRUE(peers.find(number, to));
-  EXPECT_EQ(to.port, 2390) << "it asks from another socket";
+  ASSERT_EQ(peers.find(number, to), 2);
+  EXPECT_EQ(to[0].port, 50000) << "a search, or another program of that computer";
+  EXPECT_EQ(to[1].ip, 77U);
+  EXPECT_EQ(to[1].port, 2390) << "it asks from another socket";
+  const std::uint32_t same = peers.heard({77, 2390}, Text(hello));
+  ASSERT_EQ(peers.find(same, to), 1);
+  EXPECT_EQ(to[0].port, 2390);
   const std::uint32_t other = peers.heard({78, 50001}, Text(hello));
-  ASSERT_TRUE(peers.find(other, to));
-  EXPECT_EQ(to.port, 50001);
+  ASSERT_EQ(peers.find(other, to), 1);
+  EXPECT_EQ(to[0].port, 50001);
 }
 
 TEST(UdpLink, AThreadThatWasAwaySendsThePresent) {

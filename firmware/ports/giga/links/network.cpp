@@ -133,9 +133,10 @@ bool Network::send_next() {
   char buffer[max_datagram];
   Text datagram;
   if (!link_.take(BoardClock::now_ms(), peer, buffer, datagram)) return false;
-  UdpAddress to;
-  if (peers_.find(peer, to)) {
-    socket_.sendto(address_of(to), datagram.data(), static_cast<unsigned>(datagram.size()));
+  UdpAddress to[UdpPeers::most_places];
+  const int places = peers_.find(peer, to);
+  for (int i = 0; i < places; ++i) {
+    socket_.sendto(address_of(to[i]), datagram.data(), static_cast<unsigned>(datagram.size()));
   }
   return true;
 }

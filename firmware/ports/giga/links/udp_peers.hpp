@@ -30,18 +30,20 @@ class UdpPeers {
   // That one is in control, and keeps its number; everyone: none is any more.
   void hold(std::uint32_t peer) { hosts_.hold(peer); }
 
-  // Where to send what is for `peer`. False: nowhere.
-  bool find(std::uint32_t peer, UdpAddress& to) const {
+  // Where to send what is for `peer`; how many places that are.
+  static constexpr int most_places = 2;
+  int find(std::uint32_t peer, UdpAddress (&to)[most_places]) const {
+    to[1].ip = host_;
+    to[1].port = host_port;
     if (peer == everyone && host_ != 0) {
-      to.ip = host_;
-      to.port = host_port;
-      return true;
+      to[0] = to[1];
+      return 1;
     }
     const UdpAddress* const at = hosts_.find(peer == everyone ? hosts_.audience() : peer);
-    if (at == nullptr) return false;
-    to = *at;
-    if (to.ip == host_) to.port = host_port;  // it asks from another port than it listens at
-    return true;
+    if (at == nullptr) return 0;
+    to[0] = *at;
+    // The paper's client asks from another port than it listens at.
+    return at->ip == host_ && at->port != host_port ? 2 : 1;
   }
 
  private:
