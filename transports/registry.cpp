@@ -13,7 +13,7 @@ namespace r4 {
 
 Registry Registry::standard() {
   Registry registry;
-  registry.add({"udp", "udp://HOST[:2018][?listen=2390]",
+  registry.add({"udp", "udp://HOST[:2018][?listen=2390], udp:auto, udp:?id=NAME",
                 "WiFi or Ethernet; for a board: udp://BIND[:2018][?peer=HOST[:2390]]",
                 make_udp_carrier});
   registry.add({"serial", "serial:///dev/ttyACM0[?baud=1000000], serial:auto, serial:?sn=SERIAL",

@@ -171,16 +171,16 @@ class Board(Running):
         return self.next(lambda each: each.get('executed', {}).get('command') == command, timeout)
 
 
-def driving(url, *commands):
+def driving(url, *commands, **process):
     """A host that has closed the motors' supply and driven the outputs, and stays."""
-    host = Running('send', url, 'R:1,On', *commands, '--hold', '60', '--json')
+    host = Running('send', url, 'R:1,On', *commands, '--hold', '60', '--json', **process)
     for command in ('R:1,On', *commands):
         assert host.next(lambda each: each['confirmed'])['command'] == command
     return host
 
 
-def monitor(url, *options):
-    return Running('monitor', url, '--json', *options)
+def monitor(url, *options, **process):
+    return Running('monitor', url, '--json', *options, **process)
 
 
 def is_state(each):

@@ -16,6 +16,8 @@ TEST(Registry, MakesACarrierForEachTransport) {
   asio::io_context io;
   const Registry registry = Registry::standard();
   EXPECT_NE(registry.make(io, "udp://127.0.0.1", Role::host), nullptr);
+  EXPECT_NE(registry.make(io, "udp:auto", Role::host), nullptr);
+  EXPECT_NE(registry.make(io, "udp:?id=left&port=2019&listen=0", Role::host), nullptr);
   EXPECT_NE(registry.make(io, "serial:auto", Role::host), nullptr);
   EXPECT_NE(registry.make(io, "pty:", Role::board), nullptr);
   EXPECT_NE(registry.make(io, "can://can0?node=31&fd=1&pack=1", Role::host), nullptr);
@@ -55,6 +57,17 @@ TEST(Registry, RefusesAUrlThatItsTransportDoesNotTake) {
   const std::vector<Refusal> table = {
       {"udp:", Role::host, "it is not udp://HOST"},
       {"udp:192.168.1.77", Role::host, "it is not udp://HOST"},
+      {"udp:auto", Role::board, "it is not udp://HOST"},
+      {"udp:?id=left", Role::board, "it is not udp://HOST"},
+      {"udp:auto?id=left", Role::host, "does not name one board"},
+      {"udp:left?id=left", Role::host, "does not name one board"},
+      {"udp:?id=", Role::host, "does not name one board"},
+      {"udp:?id=" + std::string(300, 'n'), Role::host, "does not name one board"},
+      {"udp:?id=left&peer=x", Role::host, "no option 'peer'"},
+      {"udp:auto?port=0", Role::host, "out of range"},
+      {"udp:auto?listen=any", Role::host, "no whole number"},
+      {"udp://host?id=left", Role::host, "no option 'id'"},
+      {"udp://host?port=2018", Role::host, "no option 'port'"},
       {"udp://host/path", Role::host, "it is not udp://HOST"},
       {"udp://host:0", Role::host, "port 0"},
       {"udp://host?listen=65536", Role::host, "out of range"},

@@ -19,10 +19,10 @@ namespace r4 {
 namespace {
 
 // Calls `done(answer)` in a thread of its own. It may outlive everything that it was not given.
-template <class Done>
-void ask_in_a_thread(const HostLookup::Resolve& resolve, const std::string& host, Done done) {
+template <class Question, class Done>
+void ask_in_a_thread(Question question, Done done) {
   try {
-    std::thread([resolve, host, done] { done(resolve(host)); }).detach();
+    std::thread([question, done] { done(question()); }).detach();
   } catch (const std::system_error& error) {
     done(FoundHost{{}, error.what()});
   }
@@ -48,7 +48,8 @@ asio::ip::address HostLookup::find(const std::string& host, const std::string& t
     std::optional<FoundHost> found;
   };
   const auto answer = std::make_shared<Answer>();
-  ask_in_a_thread(resolve, host, [answer](FoundHost found) {
+  const auto question = [ask = resolve, host] { return ask(host); };
+  ask_in_a_thread(question, [answer](FoundHost found) {
     {
       const std::lock_guard lock(answer->mutex);
       answer->found = std::move(found);
@@ -64,6 +65,9 @@ asio::ip::address HostLookup::find(const std::string& host, const std::string& t
 
 asio::ip::address address_of(const FoundHost& found, const std::string& host,
                              const std::string& thing) {
+  if (found.problem) {
+    throw Error(found.problem->kind, thing, found.problem->reason, found.problem->fix);
+  }
   if (found.addresses.empty()) {
     throw Error(ErrorKind::open, thing,
                 fmt::format("there is no host '{}' ({})", host, found.reason),
@@ -86,7 +90,7 @@ bool is_address(const std::string& host) {
 }
 
 // Whoever asked may be gone before the answer comes, and the loop as well.
-struct HostWatch::Question {
+struct HostWatch::Asked {
   std::mutex mutex;
   HostWatch* asker = nullptr;
 };
@@ -94,9 +98,9 @@ struct HostWatch::Question {
 HostWatch::HostWatch(asio::io_context& io, HostLookup lookup)
     : io_(io), lookup_(std::move(lookup)), timer_(io) {}
 
-void HostWatch::start(const std::string& host, bool known, OnFound on_found) {
+void HostWatch::start(Question question, bool known, OnFound on_found) {
   stop();
-  host_ = host;
+  what_to_ask_ = std::move(question);
   known_ = known;
   on_found_ = std::move(on_found);
   if (!known) ask();
@@ -116,25 +120,25 @@ void HostWatch::stop() {
   heard_ = true;
   on_found_ = nullptr;
   on_silence_ = nullptr;
-  if (!question_) return;
+  if (!asked_) return;
   {
-    const std::lock_guard lock(question_->mutex);
-    question_->asker = nullptr;
+    const std::lock_guard lock(asked_->mutex);
+    asked_->asker = nullptr;
   }
-  question_.reset();
+  asked_.reset();
 }
 
 void HostWatch::ask() {
-  if (question_) return;
-  question_ = std::make_shared<Question>();
-  question_->asker = this;
-  ask_in_a_thread(lookup_.resolve, host_, [question = question_](const FoundHost& found) {
-    const std::lock_guard lock(question->mutex);
-    if (question->asker == nullptr) return;
-    asio::post(question->asker->io_, [question, found] {
-      HostWatch* const asker = question->asker;  // its thread alone writes it
+  if (asked_) return;
+  asked_ = std::make_shared<Asked>();
+  asked_->asker = this;
+  ask_in_a_thread(what_to_ask_, [asked = asked_](const FoundHost& found) {
+    const std::lock_guard lock(asked->mutex);
+    if (asked->asker == nullptr) return;
+    asio::post(asked->asker->io_, [asked, found] {
+      HostWatch* const asker = asked->asker;  // its thread alone writes it
       if (asker == nullptr) return;
-      asker->question_.reset();
+      asker->asked_.reset();
       const OnFound on_found = asker->on_found_;  // it may stop the watch
       on_found(found);
     });

@@ -11,16 +11,21 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "../operation_slot.hpp"
+#include "r4link/error.hpp"
 
 namespace r4 {
 
 struct FoundHost {
   std::vector<asio::ip::address> addresses;  // empty: there is none
   std::string reason;                        // why there is none
+  // Of a search for boards (board_search.hpp):
+  std::string board_id = {};            // of the board that was found
+  std::optional<Problem> problem = {};  // why it cannot be told which one it is; its thing is empty
 };
 
 // Who knows where hosts are, and how long things take.
@@ -47,7 +52,7 @@ asio::ip::address address_of(const FoundHost& found, const std::string& host,
 // Is it an address, not a name?
 bool is_address(const std::string& host);
 
-// Keeps asking where a host is: until it is known, and again when it is silent.
+// Keeps asking where a board is: until it is known, and again when it is silent.
 class HostWatch {
  public:
   HostWatch(asio::io_context& io, HostLookup lookup);
@@ -55,12 +60,15 @@ class HostWatch {
   HostWatch& operator=(const HostWatch&) = delete;
   ~HostWatch() { stop(); }
 
+  using Question = std::function<FoundHost()>;  // blocks; asked in threads of their own
   using OnFound = std::function<void(const FoundHost&)>;
-  // Calls `on_found`, on the loop, with each answer about `host`. It begins by asking, unless it is
-  // known where it is.
-  void start(const std::string& host, bool known, OnFound on_found);
-  // The same without a name: calls `on_silence` each time.
+  // Calls `on_found`, on the loop, with each answer. It begins by asking, unless it is known where the
+  // board is.
+  void start(Question question, bool known, OnFound on_found);
+  // The same without a question: calls `on_silence` each time.
   void start(std::function<void()> on_silence);
+  // From now on that is asked.
+  void ask_for(Question question) { what_to_ask_ = std::move(question); }
   // No call follows. What was asked is left to itself.
   void stop();
 
@@ -70,20 +78,20 @@ class HostWatch {
   void heard() { heard_ = true; }
 
  private:
-  struct Question;
+  struct Asked;
   void ask();
   void wait();
 
   asio::io_context& io_;
   const HostLookup lookup_;
-  std::string host_;
+  Question what_to_ask_;
   OnFound on_found_;
   std::function<void()> on_silence_;
   bool known_ = false;
   bool heard_ = true;
   LoopTimer timer_;
   OperationSlot waiting_;
-  std::shared_ptr<Question> question_;  // null: none is under way
+  std::shared_ptr<Asked> asked_;  // null: none is under way
 };
 
 }  // namespace r4

@@ -13,9 +13,9 @@ std::unique_ptr<Carrier> make_udp_carrier(asio::io_context& io, const Url& url, 
 }
 
 std::unique_ptr<Carrier> make_udp_carrier_with(asio::io_context& io, const Url& url, Role role,
-                                               HostLookup lookup) {
+                                               HostLookup lookup, BoardSearch search) {
   if (role == Role::board) return std::make_unique<UdpBoard>(io, url, std::move(lookup));
-  return std::make_unique<UdpHost>(io, url, std::move(lookup));
+  return std::make_unique<UdpHost>(io, url, std::move(lookup), std::move(search));
 }
 
 }  // namespace r4

@@ -5,6 +5,9 @@
 //                                                    HOST there, from any of its ports; listen=0
 //                                                    takes any free port. Boards of one program
 //                                                    share the port (udp_host_socket.hpp)
+//             udp:auto[?port=2018&listen=…]      the one board that is on the networks of this
+//                                                computer (board_search.hpp)
+//             udp:?id=NAME[&port=…&listen=…]     the board of that name, or of that board id
 //     board   udp://BIND[:2018][?peer=HOST[:2390]]   port 0 takes any free port; name() tells it
 //
 // A board knows the last 16 hosts that sent a valid datagram, and the one in control in any case.
@@ -15,7 +18,8 @@
 //
 // A name is looked up in open(), IPv4 first. A host's open() within a handler of the loop does not
 // wait for that: it is `down` until the name is known, asked for each second. A host that has heard
-// nothing valid for 3 to 6 s looks again, and goes to where the board is then. A board that is off
+// nothing valid for 3 to 6 s looks again, and goes to where the board is then: so it does, too, where
+// the board is searched for. What a search has found is that board until close(). A board that is off
 // (port unreachable) is a quiet board, no failure; an unreachable network is: `down`, tried again
 // five times a second.
 #pragma once
@@ -24,6 +28,7 @@
 #include <memory>
 
 #include "../url.hpp"
+#include "board_search.hpp"
 #include "host_lookup.hpp"
 #include "r4link/carrier.hpp"
 
@@ -32,8 +37,8 @@ namespace r4 {
 // Throws Error{usage} for a URL that UDP does not take.
 std::unique_ptr<Carrier> make_udp_carrier(asio::io_context& io, const Url& url, Role role);
 
-// The same, with names looked up in that way.
+// The same, with names looked up and boards searched for in that way.
 std::unique_ptr<Carrier> make_udp_carrier_with(asio::io_context& io, const Url& url, Role role,
-                                               HostLookup lookup);
+                                               HostLookup lookup, BoardSearch search = {});
 
 }  // namespace r4

@@ -9,18 +9,30 @@
 
 namespace r4 {
 
-UdpHost::UdpHost(asio::io_context& io, const Url& url, HostLookup lookup)
-    : UdpEnd(io, UdpUrl(url, Role::host)), lookup_(std::move(lookup)), watch_(io, lookup_) {}
+UdpHost::UdpHost(asio::io_context& io, const Url& url, HostLookup lookup, BoardSearch search)
+    : UdpEnd(io, UdpUrl(url, Role::host)),
+      lookup_(std::move(lookup)),
+      search_(std::move(search)),
+      watch_(io, lookup_) {
+  search_.port = url_.port;
+}
 
 // Whoever opens it in a handler of the loop has others on that loop, whom a name must not hold up.
 void UdpHost::open(Handler& handler) {
   close();
-  named_ = !is_address(url_.host);
+  wanted_ = {url_.called, ""};
+  named_ = url_.search || !is_address(url_.host);
   if (named_ && io_.get_executor().running_in_this_thread()) {
     handler_ = &handler;
     return watch();  // its address is asked for
   }
-  bind(Endpoint(lookup_.find(url_.host, url_.text), url_.port));
+  if (url_.search) {
+    const FoundHost board = find_board(search_, wanted_);
+    bind(Endpoint(address_of(board, "", url_.text), url_.port));
+    remember(board);
+  } else {
+    bind(Endpoint(lookup_.find(url_.host, url_.text), url_.port));
+  }
   begin(handler);
   if (handler_ != nullptr) watch();
 }
@@ -48,17 +60,33 @@ void UdpHost::bind(const Endpoint& board) {
     refuse(error, local, "end that program, or use ?listen=0 to hear the board on any free port");
   }
   const std::uint16_t local_port = socket_.local_endpoint().port();
-  name_ = fmt::format("udp://{}:{}", bracketed(url_.host), url_.port);
+  const std::string host = url_.search ? board.address().to_string() : url_.host;
+  name_ = fmt::format("udp://{}:{}", bracketed(host), url_.port);
   if (local_port != UdpUrl::host_port) name_ += fmt::format("?listen={}", local_port);
 }
 
 void UdpHost::watch() {
   if (named_) {
-    watch_.start(url_.host, socket_.is_open(), [this](const FoundHost& answer) { found(answer); });
+    watch_.start(question(), socket_.is_open(), [this](const FoundHost& answer) { found(answer); });
   } else if (host_socket_.connected()) {
     // The address of this computer may be another now.
     watch_.start([this] { host_socket_.reconnect(); });
   }
+}
+
+// What is asked to know where the board is. It must not need this object: nobody waits for the answer.
+HostWatch::Question UdpHost::question() const {
+  if (url_.search) {
+    return [search = search_, wanted = wanted_] { return find_board(search, wanted); };
+  }
+  return [resolve = lookup_.resolve, host = url_.host] { return resolve(host); };
+}
+
+// Which board it is. The next search is for that one, whatever else is there by then.
+void UdpHost::remember(const FoundHost& answer) {
+  if (!url_.search) return;
+  wanted_.board_id = answer.board_id;
+  watch_.ask_for(question());
 }
 
 // Where the board of that name is, now.
@@ -83,6 +111,7 @@ void UdpHost::found(const FoundHost& answer) {
     if (!socket_.is_open()) tell_why_down(error.problem());
     return;
   }
+  remember(answer);
   watch_.set_known(true);
   down_reason_.clear();
   begin_to_receive();

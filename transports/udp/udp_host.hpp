@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The host's end of UDP: one board, which may be known by its name and may move.
+// The host's end of UDP: one board, which may be known by the name of its address, or by its own
+// (board_search.hpp), and may move.
 #pragma once
 
 #include <asio/io_context.hpp>
 
+#include "board_search.hpp"
 #include "host_lookup.hpp"
 #include "udp_end.hpp"
 
@@ -11,7 +13,7 @@ namespace r4 {
 
 class UdpHost final : public UdpEnd {
  public:
-  UdpHost(asio::io_context& io, const Url& url, HostLookup lookup);
+  UdpHost(asio::io_context& io, const Url& url, HostLookup lookup, BoardSearch search);
   ~UdpHost() override { close(); }
 
   void open(Handler& handler) override;
@@ -25,12 +27,16 @@ class UdpHost final : public UdpEnd {
 
   void bind(const Endpoint& board);
   void found(const FoundHost& answer);
+  void remember(const FoundHost& answer);
+  HostWatch::Question question() const;
   void watch();
 
   const HostLookup lookup_;
+  BoardSearch search_;
+  WantedBoard wanted_;  // where the URL leaves it to a search
   HostWatch watch_;
   UdpHostSocket host_socket_{socket_};
-  bool named_ = false;  // the URL has the board's name, not its address
+  bool named_ = false;  // the URL has a name or leaves it to a search: where the board is, is asked
   Endpoint board_;
 };
 

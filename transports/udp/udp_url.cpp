@@ -4,15 +4,42 @@
 #include "r4link/error.hpp"
 
 namespace r4 {
+namespace {
+
+constexpr std::size_t longest_id = 64;
+
+bool is_search(const Url& url, Role role) {
+  return role == Role::host && url.host().empty() && (url.path() == "auto" || url.get("id"));
+}
+
+std::uint16_t port_of(const Url& url, Role role) {
+  if (!is_search(url, role)) return url.port().value_or(UdpUrl::board_port);
+  return static_cast<std::uint16_t>(url.get_number("port", 1, 65535, UdpUrl::board_port));
+}
+
+}  // namespace
 
 UdpUrl::UdpUrl(const Url& url, Role role)
     : text(url.text()),
+      search(is_search(url, role)),
+      called(url.get("id").value_or("")),
       host(url.host()),
-      port(url.port().value_or(board_port)),
+      port(port_of(url, role)),
       listen(static_cast<std::uint16_t>(url.get_number("listen", 0, 65535, host_port))) {
+  if (search) {
+    const bool by_id = url.get("id").has_value();
+    url.allow_only(by_id ? "id port listen" : "port listen");
+    if (by_id && (!url.path().empty() || called.empty() || called.size() > longest_id)) {
+      throw Error(ErrorKind::usage, text, "it does not name one board",
+                  "write udp:auto, or udp:?id=NAME with a name or id that r4 list shows");
+    }
+    return;
+  }
   if (host.empty() || !url.path().empty()) {
     throw Error(ErrorKind::usage, text, "it is not udp://HOST or udp://HOST:PORT",
-                "write it as in udp://192.168.1.77:2018");
+                role == Role::host
+                    ? "write it as in udp://192.168.1.77:2018, or udp:auto, or udp:?id=NAME"
+                    : "write it as in udp://192.168.1.77:2018");
   }
   if (role == Role::host) {
     url.allow_only("listen");

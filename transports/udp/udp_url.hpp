@@ -18,6 +18,8 @@ struct UdpUrl {
   UdpUrl(const Url& url, Role role);
 
   std::string text;
+  bool search = false;   // udp:auto, udp:?id=NAME: the board is to be found
+  std::string called;    // its name or board id; empty: the only one
   std::string host;      // the board's; at a board: where it listens
   std::uint16_t port;    // of the board
   std::uint16_t listen;  // of the host

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 list: the serial ports and CAN interfaces of this machine, the boards heard on them, and the
-// URLs that r4 knows.
+// r4 list: the serial ports, CAN interfaces and networks of this machine, the boards on them, and the URLs
+// that r4 knows.
 #include <fmt/format.h>
 
 #include <asio/io_context.hpp>
+#include <cstdint>
+#include <future>
 #include <memory>
 #include <string>
 #include <utility>
@@ -18,12 +20,14 @@
 #include "transports/can/can_listener.hpp"
 #include "transports/registry.hpp"
 #include "transports/serial/port_list.hpp"
+#include "transports/udp/board_search.hpp"
 
 namespace r4::tool {
 namespace {
 
 struct Options {
   bool json = false;
+  std::uint64_t port = BoardSearch().port;
 };
 
 std::string usb_id(const SerialPort& port) {
@@ -109,6 +113,71 @@ void print_can(const std::vector<CanPort>& ports) {
   }
 }
 
+// --- UDP
+
+using Network = BoardSearch::Network;
+
+constexpr const char* network_fix = "check the network and the firewall";
+
+std::vector<FoundBoard> boards_on(const Network& network, const BoardSearch::Result& found) {
+  std::vector<FoundBoard> boards;
+  for (const FoundBoard& board : found.boards) {
+    if (board.heard_at == network.from) boards.push_back(board);
+  }
+  return boards;
+}
+
+Json board_json(const FoundBoard& board, const BoardSearch::Result& found, std::uint16_t port) {
+  Json object{{"address", board.address.to_string()},
+              {"board_id", board.board_id},
+              {"name", board.name},
+              {"firmware", board.firmware},
+              {"capabilities", board.capabilities}};
+  if (board.busy) object["busy"] = *board.busy;
+  object["url"] = url_of(board, found.boards, port);
+  return object;
+}
+
+void print_json(const BoardSearch::Result& found, std::uint16_t port) {
+  for (const Network& network : found.networks) {
+    Json boards = Json::array();
+    for (const FoundBoard& board : boards_on(network, found)) {
+      boards.push_back(board_json(board, found, port));
+    }
+    print_line({{"type", "udp"},
+                {"interface", network.interface},
+                {"address", network.from.to_string()},
+                {"boards", std::move(boards)},
+                {"reason", network.trouble},
+                {"fix", network.trouble.empty() ? "" : network_fix}});
+  }
+}
+
+const char* control_of(const FoundBoard& board) {
+  if (!board.busy) return "";
+  return *board.busy ? ", controlled by a host" : ", free";
+}
+
+void print_udp(const BoardSearch::Result& found, std::uint16_t port) {
+  fmt::print("\nNetworks (UDP):\n");
+  if (found.networks.empty()) fmt::print("  none\n");
+  for (const Network& network : found.networks) {
+    const std::vector<FoundBoard> boards = boards_on(network, found);
+    fmt::print("  {:<14} {:<19}{}\n", network.interface, network.from.to_string(),
+               boards.empty() && network.trouble.empty() ? "no board answered" : "");
+    for (const FoundBoard& board : boards) {
+      fmt::print("    R4 board: {}  at {}, id {}{}, firmware {}{}\n",
+                 url_of(board, found.boards, port), board.address.to_string(), board.board_id,
+                 board.name.empty() ? "" : ", name " + board.name, board.firmware,
+                 control_of(board));
+    }
+    if (!network.trouble.empty()) fmt::print("    {}; {}\n", network.trouble, network_fix);
+  }
+  if (found.more) fmt::print("  more than {} answered\n", BoardSearch::most_boards);
+}
+
+// --- serial
+
 void print_json(const std::vector<SerialPort>& ports) {
   for (const SerialPort& port : ports) {
     print_line({{"type", "port"},
@@ -131,11 +200,16 @@ void print_schemes() {
 }
 
 int list(const Options& options) {
+  BoardSearch search;
+  search.port = static_cast<std::uint16_t>(options.port);
+  auto answers = std::async(std::launch::async, [&search] { return search.run(); });
   const std::vector<SerialPort> ports = list_serial_ports();
   const std::vector<CanPort> can_ports = list_can_ports();
+  const BoardSearch::Result found = answers.get();
   if (options.json) {
     print_json(ports);
     print_json(can_ports);
+    print_json(found, search.port);
     print_schemes();
     return 0;
   }
@@ -146,13 +220,20 @@ int list(const Options& options) {
                port.description, port.is_r4 ? fmt::format("  R4 board: {}", url_of(port)) : "");
   }
   print_can(can_ports);
+  print_udp(found, search.port);
   fmt::print("\nURLs:\n{}", url_table());
   return 0;
 }
 
 constexpr const char* footer =
     R"(An R4 board on USB is found by its id, 2341:0266 (Arduino Giga R1). On CAN interfaces that are up
-it listens for 0.7 s, without sending anything, for boards.
+it listens for 0.7 s, without sending anything, for boards. On networks it asks for boards by IPv4
+broadcast, three times within half a second; a board is listed with its name (C:name, over USB) and whether
+a host controls it. Broadcast passes no router, and often no VPN, container or WiFi with client isolation:
+there give the board's address, as in udp://192.168.1.77. A firewall must let in UDP from port 2018.
+
+With --json one object a line: {"type":"port"…} of a serial port, {"type":"can"…} of a CAN interface,
+{"type":"udp"…} of a network, with their boards, {"type":"scheme"…} of a transport.
 
 Exit codes: 0 done, also when there are none.)";
 
@@ -160,9 +241,12 @@ Exit codes: 0 done, also when there are none.)";
 
 void add_list(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<Options>();
-  CLI::App* const command = add_subcommand(
-      root, chosen, "list", "List serial ports and CAN interfaces, and the boards on them", footer,
-      options, list);
+  CLI::App* const command =
+      add_subcommand(root, chosen, "list",
+                     "List serial ports, CAN interfaces and networks, and the boards on them",
+                     footer, options, list);
+  add_number(*command, "--port", options->port, 1, 65535,
+             "the UDP port at which boards listen (default 2018)");
   add_json(*command, options->json, "print JSON, one object a line");
 }
 

@@ -167,6 +167,7 @@ a node it only listens, and shows every board that it hears.
 Examples:
   r4 monitor udp://192.168.0.125
   r4 monitor serial:auto --fields DEFAULT,ENC1,US1
+  r4 monitor 'udp:?id=left-arm'         the board of that name, wherever it is; r4 list shows them
   r4 monitor can://can0                 every board on the bus; can://can0?node=3 is one
   r4 monitor udp://127.0.0.1 --json --count 100 | jq .fields.AIN24
 

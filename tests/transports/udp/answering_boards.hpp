@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Boards on the loopback, each at an address of its own and all at one port, that answer whatever they
+// are asked: on a thread of their own, for a search blocks.
+#pragma once
+
+#include <asio/executor_work_guard.hpp>
+#include <asio/io_context.hpp>
+#include <asio/ip/udp.hpp>
+#include <asio/post.hpp>
+#include <cstdint>
+#include <future>
+#include <map>
+#include <memory>
+#include <string>
+#include <thread>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "tests/support/datagrams.hpp"
+#include "transports/udp/board_search.hpp"
+
+namespace r4::test {
+
+// What a board says of itself. `more` such as "NAME:left;BUSY:0;".
+inline std::string identity(const std::string& id, const std::string& more = "") {
+  return with_crc("I:R4,0.1.0," + id + ",udp;" + more + "PNum:1;T:2;");
+}
+
+class AnsweringBoards {
+ public:
+  using Answers = std::vector<std::string>;
+
+  AnsweringBoards() : thread_([this] { io_.run(); }) {}
+  ~AnsweringBoards() {
+    io_.stop();
+    thread_.join();
+  }
+  AnsweringBoards(const AnsweringBoards&) = delete;
+  AnsweringBoards& operator=(const AnsweringBoards&) = delete;
+
+  // A board at 127.0.<address>, such as "0.2", which answers all that, from the question `first` on. One
+  // that is there already goes.
+  void add(const std::string& address, Answers answers, int first = 1) {
+    on_thread([&] {
+      boards_.erase(address);
+      const asio::ip::udp::endpoint at(asio::ip::make_address("127.0." + address), port_);
+      auto board = std::make_unique<One>(io_, at);
+      board->answers = std::move(answers);
+      board->first = first;
+      port_ = board->socket.local_endpoint().port();
+      receive(*board);
+      boards_[address] = std::move(board);
+    });
+  }
+  void remove(const std::string& address) {
+    on_thread([&] { boards_.erase(address); });
+  }
+  int asked(const std::string& address) {
+    return on_thread([&] { return boards_.at(address)->asked; });
+  }
+
+  std::uint16_t port() const { return port_; }
+
+  // A search that is over soon, of those that there are now and of `others`.
+  BoardSearch search(const std::vector<std::string>& others = {}) {
+    BoardSearch search;
+    search.port = port_;
+    search.between = std::chrono::milliseconds(20);
+    search.patience = std::chrono::milliseconds(200);
+    std::vector<BoardSearch::Network> networks;
+    const auto add_network = [&](const std::string& address) {
+      networks.push_back({"lo" + std::to_string(networks.size()), 0,
+                          asio::ip::address_v4::loopback(),
+                          asio::ip::make_address_v4("127.0." + address), ""});
+    };
+    on_thread([&] {
+      for (const auto& [address, board] : boards_) add_network(address);
+    });
+    for (const std::string& address : others) add_network(address);
+    search.networks = [networks] { return networks; };
+    return search;
+  }
+
+ private:
+  struct One {
+    One(asio::io_context& io, const asio::ip::udp::endpoint& at) : socket(io, at) {}
+    asio::ip::udp::socket socket;
+    asio::ip::udp::endpoint asker;
+    char buffer[2048];
+    Answers answers;
+    int first = 1;
+    int asked = 0;
+  };
+
+  void receive(One& board) {
+    board.socket.async_receive_from(asio::buffer(board.buffer), board.asker,
+                                    [this, &board](const asio::error_code& error, std::size_t) {
+                                      if (error) return;  // it may be gone
+                                      if (++board.asked >= board.first) {
+                                        asio::error_code ignored;
+                                        for (const std::string& answer : board.answers) {
+                                          board.socket.send_to(asio::buffer(answer), board.asker, 0,
+                                                               ignored);
+                                        }
+                                      }
+                                      receive(board);
+                                    });
+  }
+
+  template <class Action>
+  std::invoke_result_t<Action> on_thread(Action action) {
+    std::packaged_task<std::invoke_result_t<Action>()> task(action);
+    auto done = task.get_future();
+    asio::post(io_, [&task] { task(); });
+    return done.get();
+  }
+
+  asio::io_context io_{1};
+  asio::executor_work_guard<asio::io_context::executor_type> work_{io_.get_executor()};
+  std::map<std::string, std::unique_ptr<One>> boards_;
+  std::uint16_t port_ = 0;
+  std::thread thread_;
+};
+
+}  // namespace r4::test

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A UDP carrier that searches for its board: udp:auto and udp:?id=NAME.
+#include <gtest/gtest.h>
+
+#include <asio/post.hpp>
+
+#include "../recorder.hpp"
+#include "answering_boards.hpp"
+#include "transports/udp/udp_carrier.hpp"
+
+namespace r4::test {
+namespace {
+
+using std::chrono::milliseconds;
+
+class UdpSearchTest : public testing::Test {
+ protected:
+  UdpSearchTest() { lookup.retry = lookup.silence = milliseconds(20); }
+
+  // Not open. Boards may be at `places`.
+  void make(const std::string& url, const std::vector<std::string>& places = {"0.2", "0.3"}) {
+    BoardSearch search = boards.search();
+    search.patience = milliseconds(60);
+    search.between = milliseconds(10);
+    std::vector<BoardSearch::Network> networks;
+    networks.reserve(places.size());
+    for (const std::string& place : places) {
+      networks.push_back({"lo", 0, asio::ip::address_v4::loopback(),
+                          asio::ip::make_address_v4("127.0." + place), ""});
+    }
+    search.networks = [networks] { return networks; };
+    const std::string options = (url.find('?') == std::string::npos ? "?" : "&") +
+                                std::string("listen=0&port=") + std::to_string(boards.port());
+    host = make_udp_carrier_with(io, Url::parse(url + options), Role::host, lookup, search);
+  }
+  void open_in_loop() {
+    asio::post(io, [this] { host->open(at_host); });
+  }
+  // Does that board hear us, and we it?
+  bool has_link(const std::string& id) {
+    const std::size_t before = at_host.datagrams.size();
+    host->send(with_crc("Q:ID;"), Priority::normal);
+    const auto heard = [&] {
+      for (std::size_t i = before; i < at_host.datagrams.size(); ++i) {
+        if (at_host.datagrams[i].text.find("," + id + ",") != std::string::npos) return true;
+      }
+      return false;
+    };
+    return run_until(io, heard);
+  }
+
+  AnsweringBoards boards;
+  asio::io_context io;
+  HostLookup lookup;
+  Recorder at_host;
+  std::unique_ptr<Carrier> host;
+};
+
+TEST_F(UdpSearchTest, TheOnlyBoardIsFoundWhenOpenReturns) {
+  boards.add("0.2", {identity("one")});
+  make("udp:auto");
+  host->open(at_host);
+  EXPECT_TRUE(host->up());
+  EXPECT_EQ(host->name().find("udp://127.0.0.2:" + std::to_string(boards.port())), 0U)
+      << host->name();
+  EXPECT_TRUE(has_link("one"));
+}
+
+TEST_F(UdpSearchTest, ABoardIsFoundByItsName) {
+  boards.add("0.2", {identity("one", "NAME:left;")});
+  boards.add("0.3", {identity("two", "NAME:right;")});
+  make("udp:?id=right");
+  host->open(at_host);
+  EXPECT_TRUE(has_link("two"));
+}
+
+TEST_F(UdpSearchTest, SaysThatThereIsNone) {
+  boards.add("0.9", {identity("elsewhere")});
+  make("udp:auto");
+  const auto error = error_of([&] { host->open(at_host); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->kind(), ErrorKind::open);
+  EXPECT_EQ(error->problem().thing.find("udp:auto"), 0U);
+  EXPECT_EQ(error->problem().reason, "no R4 board answered (asked on lo)");
+  EXPECT_NE(error->problem().fix.find("udp://"), std::string::npos);
+}
+
+TEST_F(UdpSearchTest, SaysThatThereAreSeveral) {
+  boards.add("0.2", {identity("one")});
+  boards.add("0.3", {identity("two")});
+  make("udp:auto");
+  const auto error = error_of([&] { host->open(at_host); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->kind(), ErrorKind::usage);
+  EXPECT_NE(error->problem().fix.find("udp:?id=one"), std::string::npos) << error->what();
+}
+
+TEST_F(UdpSearchTest, InAHandlerOfTheLoopItIsDownUntilTheBoardIsThere) {
+  boards.add("0.9", {identity("elsewhere")});
+  make("udp:auto");
+  open_in_loop();
+  ASSERT_TRUE(run_until(io, [&] { return at_host.count(Kind::down) == 1; }));
+  EXPECT_EQ(at_host.last(Kind::down)->problem.reason, "no R4 board answered (asked on lo)");
+  EXPECT_EQ(host->send("too early", Priority::normal), SendResult::down);
+  run_for(io, milliseconds(300));
+  EXPECT_EQ(at_host.count(Kind::down), 1U) << "told once";
+  boards.add("0.3", {identity("one")});
+  ASSERT_TRUE(run_until(io, [&] { return at_host.count(Kind::up) == 1; }));
+  EXPECT_TRUE(has_link("one"));
+}
+
+TEST_F(UdpSearchTest, ABoardThatMovesIsFollowedAndSaidToHaveMoved) {
+  boards.add("0.2", {identity("one", "NAME:left;")});
+  for (const char* url : {"udp:auto", "udp:?id=left"}) {
+    SCOPED_TRACE(url);
+    boards.remove("0.3");
+    boards.add("0.2", {identity("one", "NAME:left;")});
+    at_host = Recorder();
+    make(url);
+    host->open(at_host);
+    ASSERT_TRUE(has_link("one"));
+    boards.remove("0.2");
+    boards.add("0.3", {identity("one", "NAME:left;")});
+    ASSERT_TRUE(run_until(io, [&] { return at_host.count(Kind::warning) == 1; }));
+    EXPECT_EQ(at_host.last(Kind::warning)->problem.reason,
+              "the board is at 127.0.0.3 now; it was at 127.0.0.2");
+    EXPECT_EQ(host->name().find("udp://127.0.0.3:"), 0U) << host->name();
+    EXPECT_TRUE(has_link("one"));
+    EXPECT_EQ(at_host.count(Kind::down), 0U);
+  }
+}
+
+TEST_F(UdpSearchTest, AnotherBoardThatComesIsNotTakenForIt) {
+  boards.add("0.2", {identity("one")});
+  make("udp:auto");
+  host->open(at_host);
+  ASSERT_TRUE(has_link("one"));
+  boards.add("0.3", {identity("two")});
+  boards.remove("0.2");
+  const int before = boards.asked("0.3");
+  ASSERT_TRUE(run_until(io, [&] { return boards.asked("0.3") > before + 6; })) << "two searches";
+  EXPECT_EQ(host->name().find("udp://127.0.0.2:"), 0U) << host->name();
+  EXPECT_EQ(at_host.count(Kind::warning), 0U);
+  boards.add("0.2", {identity("one")});
+  EXPECT_TRUE(has_link("one"));
+}
+
+TEST_F(UdpSearchTest, SendsNothingButWhatItIsToldWhileTheBoardIsHeard) {
+  boards.add("0.2", {identity("one")});
+  lookup.silence = milliseconds(100);
+  make("udp:auto");
+  host->open(at_host);
+  const int before = boards.asked("0.2");
+  int sent = 0;
+  for (; sent < 50; ++sent) {
+    host->send(with_crc("Q:ID;"), Priority::normal);
+    run_for(io, milliseconds(10));
+  }
+  run_until(io, [&] { return boards.asked("0.2") >= before + sent; });
+  EXPECT_EQ(boards.asked("0.2"), before + sent);
+}
+
+TEST_F(UdpSearchTest, IsForgottenWithTheCarrier) {
+  boards.add("0.9", {identity("elsewhere")});
+  make("udp:auto");
+  open_in_loop();
+  run_for(io, milliseconds(10));
+  host.reset();
+  run_for(io, milliseconds(100));
+  EXPECT_TRUE(at_host.events.empty());
+}
+
+}  // namespace
+}  // namespace r4::test
