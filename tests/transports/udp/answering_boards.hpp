@@ -53,6 +53,13 @@ class AnsweringBoards {
       boards_[address] = std::move(board);
     });
   }
+  // What is asked there is answered from another port, too, before the board does.
+  void add_elsewhere(const std::string& address, const std::string& answer) {
+    on_thread([&] {
+      boards_.at(address)->elsewhere = answer;
+      boards_.at(address)->other.bind({asio::ip::make_address("127.0." + address), 0});
+    });
+  }
   void remove(const std::string& address) {
     on_thread([&] { boards_.erase(address); });
   }
@@ -84,8 +91,11 @@ class AnsweringBoards {
 
  private:
   struct One {
-    One(asio::io_context& io, const asio::ip::udp::endpoint& at) : socket(io, at) {}
+    One(asio::io_context& io, const asio::ip::udp::endpoint& at)
+        : socket(io, at), other(io, at.protocol()) {}
     asio::ip::udp::socket socket;
+    asio::ip::udp::socket other;
+    std::string elsewhere;
     asio::ip::udp::endpoint asker;
     char buffer[2048];
     Answers answers;
@@ -94,18 +104,21 @@ class AnsweringBoards {
   };
 
   void receive(One& board) {
-    board.socket.async_receive_from(asio::buffer(board.buffer), board.asker,
-                                    [this, &board](const asio::error_code& error, std::size_t) {
-                                      if (error) return;  // it may be gone
-                                      if (++board.asked >= board.first) {
-                                        asio::error_code ignored;
-                                        for (const std::string& answer : board.answers) {
-                                          board.socket.send_to(asio::buffer(answer), board.asker, 0,
-                                                               ignored);
-                                        }
-                                      }
-                                      receive(board);
-                                    });
+    board.socket.async_receive_from(
+        asio::buffer(board.buffer), board.asker,
+        [this, &board](const asio::error_code& error, std::size_t) {
+          if (error) return;  // it may be gone
+          if (++board.asked >= board.first) {
+            asio::error_code ignored;
+            if (!board.elsewhere.empty()) {
+              board.other.send_to(asio::buffer(board.elsewhere), board.asker, 0, ignored);
+            }
+            for (const std::string& answer : board.answers) {
+              board.socket.send_to(asio::buffer(answer), board.asker, 0, ignored);
+            }
+          }
+          receive(board);
+        });
   }
 
   template <class Action>
