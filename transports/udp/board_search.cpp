@@ -186,7 +186,7 @@ class Round {
   // Each address once, with its first answer.
   void keep(FoundBoard board) {
     if (!called_.empty() && board.board_id != called_ && board.name != called_) {
-      others_.insert(board.address);
+      others_.insert(board.board_id);
       if (others_.size() > BoardSearch::most_boards) others_.erase(others_.begin());
       return;
     }
@@ -220,7 +220,7 @@ class Round {
 
   const BoardSearch& search_;
   const std::string_view called_;
-  std::set<address_v4> others_;
+  std::set<std::string> others_;  // by their ids: one may answer from several addresses
   BoardSearch::Result result_;
   std::vector<FileDescriptor> sockets_;
   std::vector<pollfd> polled_;

@@ -153,6 +153,7 @@ TEST(BoardSearch, CountsABoardOnceThatListensOnAllAddressesOfThisComputer) {
     return std::vector<BoardSearch::Network>{own("127.0.0.2"), own("127.0.0.3")};
   };
   EXPECT_EQ(search.run().boards.size(), 1U);
+  EXPECT_EQ(search.run("another").others, 1U);
 }
 
 TEST(BoardSearch, SaysWhatKeepsItFromAsking) {
