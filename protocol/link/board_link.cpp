@@ -33,9 +33,12 @@ BoardLink::Freshness BoardLink::judge(const HostHeartbeat& heartbeat, bool echo_
   if (is_echo(heartbeat)) {
     const std::uint32_t t = static_cast<std::uint32_t>(heartbeat.t);
     const bool recent = at_or_after(now_ms, t) && now_ms - t <= timing_.timeout_ms;
-    // What was sent before the link was lost says nothing of the host's being alive now.
-    const bool this_episode = state_ != BoardLinkState::lost ||
-                              now_ms - t <= now_ms - lost_ms_;  // by age: it may be weeks
+    // What was sent before the link was lost says nothing of the host's being alive now. Of the same
+    // millisecond, it may have been: where the host has left, that begins nothing.
+    const std::uint32_t age_ms = now_ms - t;  // by age: it may be weeks
+    const std::uint32_t lost_for_ms = now_ms - lost_ms_;
+    const bool this_episode = state_ != BoardLinkState::lost || age_ms < lost_for_ms ||
+                              (age_ms == lost_for_ms && !begun_again_);
     return recent && this_episode ? Freshness::fresh : Freshness::stale;
   }
   const bool should_echo = echo_host || (ours && clock_ == Clock::echo && has_owner());

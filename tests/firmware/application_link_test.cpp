@@ -133,6 +133,7 @@ TEST_F(ApplicationFarewell, MakesTheOutputsSafeAndTheBoardFreeAtOnce) {
 TEST_F(ApplicationFarewell, NothingComesBackWithTheSameHost) {
   host.command("O:358,1,1");
   leave(host, host.pnum++);
+  board.run(1);
   host.connect();
   EXPECT_EQ(board.state(), BoardState::active);
   EXPECT_EQ(board.outputs().osmc[0].pwm, 0);
@@ -153,6 +154,7 @@ TEST_F(ApplicationFarewell, LateOrRepeatedHasNoEffectOnTheNextSession) {
   forget();
   leave(host, number, echo);
   EXPECT_EQ(answers(), (Lines{"DUPLICATE"})) << "its host learns that it was executed";
+  board.run(1);
   TestHost next(board, number - 50, host.at);  // its numbers are such that the old one would fit
   next.connect();
   next.command("O:358,1,1");

@@ -712,7 +712,7 @@ TEST_F(BoardLinkFarewell, FreesTheBoardAtOnce) {
   EXPECT_EQ(link.state(), BoardLinkState::lost);
   EXPECT_FALSE(link.has_owner());
   EXPECT_TRUE(link.heartbeat_due(now)) << "which tells it";
-  send_due();
+  run(1);
   EXPECT_EQ(heartbeat(echo_pnum + 5000, sent.back(), there), HeartbeatEffect::new_session);
 }
 
@@ -733,6 +733,21 @@ TEST_F(BoardLinkFarewell, AHeartbeatThatItOvertookBeginsNothing) {
   send_due();
   EXPECT_EQ(heartbeat(echo_pnum + 2, before), HeartbeatEffect::stale);
   EXPECT_EQ(link.state(), BoardLinkState::lost);
+}
+
+TEST_F(BoardLinkFarewell, AHeartbeatThatItOvertookBeginsNothingInItsMillisecondEither) {
+  connect();
+  run(300);
+  link.heartbeat_answered(now);
+  link.leave(now);
+  send_due();
+  EXPECT_EQ(heartbeat(echo_pnum + 2, now), HeartbeatEffect::stale);
+  run(1);
+  EXPECT_EQ(heartbeat(echo_pnum + 2, now - 1), HeartbeatEffect::stale);
+  EXPECT_EQ(link.state(), BoardLinkState::lost);
+  link.heartbeat_answered(now);
+  EXPECT_EQ(heartbeat(echo_pnum + 3, now), HeartbeatEffect::new_session)
+      << "another host may begin";
 }
 
 TEST_F(BoardLinkFarewell, EchoesAHeartbeatOfThisSession) {
