@@ -119,7 +119,10 @@ class World final : public firmware::Hal, public firmware::Observer {
     ++executed_;
     executed_pnum_ = pnum;
     stop_ = command.kind == CommandKind::stop;
-    require(stop_ || board().link().has_owner());  // a new timeout may end that, but only behind it
+    const bool leaves = command.kind == CommandKind::leave;
+    // A new timeout may end that, but only behind it.
+    require(stop_ || board().link().has_owner() != leaves);
+    require(!leaves || outputs_ == Outputs());
   }
   void on_refused(std::uint32_t, std::uint32_t, Refusal) override { ++refused_; }
   void on_rejected(std::uint32_t, Verdict) override { ++rejected_; }
