@@ -158,10 +158,8 @@ Ticket AsyncBoard::Impl::leave(Time timeout) {
 
 void AsyncBoard::Impl::close() {
   if (phase == Phase::closed) return;
-  if (is_open()) {
-    enter(Completion::How::post,
-          [this] { leave(Time{0}); });  // said once; nobody waits for an answer
-  }
+  // Said once; nobody waits for an answer.
+  if (is_open()) enter(Completion::How::post, [this] { leave(Time{0}); });
   phase = Phase::closed;
   carrier->close();
   timer.cancel();

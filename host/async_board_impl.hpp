@@ -77,8 +77,8 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   template <class... Arguments>
   void call(const Subscribers<Arguments...>& callbacks, const Arguments&... arguments) {
     callbacks.each([&](auto& one) {
-      if (may_tell())
-        guarded([&] { one(arguments...); });  // the one before may have closed the board
+      // The one before may have closed the board.
+      if (may_tell()) guarded([&] { one(arguments...); });
     });
   }
 

@@ -248,8 +248,7 @@ Words outcome_words(std::string_view command, const CommandResult& result, const
     case Outcome::cancelled:
       words.reason =
           "cancelled: an emergency stop came, the board has a newer reason to be safe, or the "
-          "program "
-          "gave it up";
+          "program gave it up";
       words.fix = "see why the board is safe before it is cleared";
       break;
     case Outcome::closed:

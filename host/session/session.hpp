@@ -117,10 +117,10 @@ class Session {
   // Gives a command up, though it may have been executed: on_result() comes before this returns. A stop
   // goes on.
   void cancel(Ticket ticket, Time now);
-  // Ends every command under way but stops, the heartbeats too, and says farewell: the board's outputs are safe at
-  // once, and another host need not wait for the timeout. Confirmed when the board tells so. Returns 0
-  // where there is nobody to tell, or the board does not know of farewells. Nothing but stops is sent
-  // from then on.
+  // Ends every command under way but stops, the heartbeats too, and says farewell: the board's outputs are
+  // safe at once, and another host need not wait for the timeout. Confirmed when the board tells so.
+  // Returns 0 where there is nobody to tell, or the board has not told that it knows of farewells. Nothing
+  // but stops is sent from then on.
   Ticket leave(Time timeout, Time now);
   // Ends every command under way: the board is closed.
   void end_all(Time now);

@@ -238,6 +238,7 @@ Ticket Session::leave(Time timeout, Time now) {
   if (!knows_leave_ || !link_up()) return 0;
   Pending* pending = allocate(Command::leave(), timeout, now);
   if (pending == nullptr) return 0;
+  ++collector_.counts.commands;
   transmit(*pending, now);
   return pending->ticket;
 }

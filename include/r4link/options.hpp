@@ -23,7 +23,8 @@ struct SessionOptions {
   std::chrono::milliseconds stop_retry{20};
   // For how long a stop is repeated after it was confirmed.
   std::chrono::milliseconds stop_linger{200};
-  // Q:ID, for identity and round-trip time; 0: never.
+  // Q:ID, for identity and round-trip time; 0: never. Then it is not known either that the board takes a
+  // farewell, and none is said, unless the program asks who it is.
   std::chrono::milliseconds identify_interval{1000};
   // The board's key. Each host has its own, by its id: of two that share one, the slower is taken for
   // a replay.

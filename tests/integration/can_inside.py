@@ -117,6 +117,16 @@ def test_commands_are_confirmed_by_the_boards_state(board):
     board.outputs(lambda outputs: outputs['servo'][15] == 1498)
 
 
+def test_the_next_host_need_not_wait_for_the_timeout(board):
+    assert run('send', board.host_url, 'C:timeout,10000', timeout=60).returncode == 0
+    for pwm in (358, 359):
+        began = time.monotonic()
+        assert run('send', board.host_url, f'O:{pwm},1,1', timeout=60).returncode == 0
+        assert time.monotonic() - began < 9
+        board.outputs(lambda outputs, pwm=pwm: outputs['osmc'][0] == [pwm, 1])
+        board.state('SAFE', 'link')
+
+
 def test_a_refusal_comes_back(board):
     result = run('send', board.host_url, 'E:STOP', 'O:1,1,1', timeout=60)
     assert result.returncode == 3 and 'SAFE' in result.stderr, result

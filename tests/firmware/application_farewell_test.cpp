@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A host that says that it ends: what becomes of the outputs, of control, and of what follows it.
+#include <gtest/gtest.h>
+
+#include "tests/firmware/board_fixture.hpp"
+#include "tests/support/signing.hpp"
+
+namespace r4 {
+namespace {
+
+using firmware::BoardState;
+using test::echo_pnum;
+using test::TestBoard;
+using test::TestHost;
+using Lines = std::vector<std::string>;
+
+struct ApplicationFarewell : test::BoardInControl {
+  // Its T echoes, as a heartbeat's.
+  void leave(TestHost& from, std::uint32_t pnum) {
+    leave(from, pnum, board.newest_t(from.at.port));
+  }
+  void leave(TestHost& from, std::uint32_t pnum, std::uint32_t t) {
+    board.receive("E:LEAVE;PNum:" + std::to_string(pnum) + ";T:" + std::to_string(t) + ";",
+                  from.at);
+  }
+  TestHost other{board, echo_pnum + 99999, Source{0, 5}};
+};
+
+TEST_F(ApplicationFarewell, MakesTheOutputsSafeAndTheBoardFreeAtOnce) {
+  host.command("O:358,1,1");
+  const int made_safe = board.hal.made_safe;
+  leave(host, host.pnum++);
+  EXPECT_TRUE(board.safe());
+  EXPECT_EQ(board.hal.made_safe, made_safe + 1);
+  EXPECT_EQ(board.log.states.back(), "SAFE link");
+  board.run(1);
+  EXPECT_EQ(board.take(MessageKind::board_heartbeat).back().at_ms, board.now_ms - 1) << "it tells";
+  other.connect();
+  EXPECT_EQ(board.state(), BoardState::active);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 0);
+  other.command("O:5,1,2");
+  EXPECT_EQ(board.outputs().osmc[1].pwm, 5);
+}
+
+TEST_F(ApplicationFarewell, NothingComesBackWithTheSameHost) {
+  host.command("O:358,1,1");
+  leave(host, host.pnum++);
+  board.run(1);
+  host.connect();
+  EXPECT_EQ(board.state(), BoardState::active);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 0);
+}
+
+TEST_F(ApplicationFarewell, OfAnotherHostIsRefused) {
+  host.command("O:358,1,1");
+  forget();
+  leave(other, other.pnum++);
+  EXPECT_EQ(answers(), (Lines{"BUSY"}));
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+}
+
+TEST_F(ApplicationFarewell, LateOrRepeatedHasNoEffectOnTheNextSession) {
+  const std::uint32_t number = host.pnum++;
+  const std::uint32_t echo = board.newest_t();
+  leave(host, number, echo);
+  forget();
+  leave(host, number, echo);
+  EXPECT_EQ(answers(), (Lines{"DUPLICATE"})) << "its host learns that it was executed";
+  board.run(1);
+  TestHost next(board, number - 50, host.at);  // its numbers are such that the old one would fit
+  next.connect();
+  next.command("O:358,1,1");
+  forget();
+  leave(next, number, echo);
+  EXPECT_EQ(answers(), (Lines{"STALE"}));
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+  leave(next, number + 1);
+  EXPECT_TRUE(board.safe());
+}
+
+TEST_F(ApplicationFarewell, OfAPaperHostProvesNothing) {
+  TestBoard paper_board;
+  TestHost paper(paper_board, 1);
+  paper.heartbeat(5);
+  paper.command("O:358,1,1");
+  paper.command("E:LEAVE");
+  EXPECT_EQ(paper_board.outputs().osmc[0].pwm, 358);
+}
+
+TEST_F(ApplicationFarewell, LeavesAStopLatched) {
+  host.command("E:STOP");
+  leave(host, host.pnum++);
+  EXPECT_EQ(board.application->reason(), SafeReason::stop);
+  EXPECT_FALSE(board.application->link().has_owner());
+}
+
+// --- of a board with a key
+
+struct SignedFarewell : testing::Test {
+  // A signed datagram, as it may be repeated.
+  std::string say(const std::string& field, std::uint32_t t) {
+    Datagram heartbeat;
+    for (const test::MemoryPort::Sent& sent : board.ports[0].sent) {
+      Datagram datagram;
+      if (!read_datagram(sent.bytes, datagram) || heartbeat_nonce(datagram).empty()) continue;
+      nonce = test::str(heartbeat_nonce(datagram));
+    }
+    const std::string text =
+        field + ";PNum:" + std::to_string(pnum++) + ";T:" + std::to_string(t) + ";";
+    const std::string whole =
+        test::with_signature(text, test::key_of(1), nonce, ++counter, board.now_ms);
+    board.receive(whole, at);
+    return whole;
+  }
+  void drive() {
+    board.run(600);
+    say("H:ROS2-R4", 0);
+    say("H:ROS2-R4", board.newest_t());
+    say("O:358,1,1", 1);
+    ASSERT_EQ(board.outputs().osmc[0].pwm, 358);
+  }
+
+  TestBoard board{test::settings_with(test::key_of(1))};
+  Source at{0, 7};
+  std::uint32_t pnum = echo_pnum;
+  std::uint64_t counter = 1000;
+  std::string nonce;
+};
+
+TEST_F(SignedFarewell, IsObeyedIfItIsSigned) {
+  drive();
+  const std::string unsigned_one =
+      "E:LEAVE;PNum:" + std::to_string(pnum) + ";T:" + std::to_string(board.newest_t()) + ";";
+  board.receive(unsigned_one, at);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+  EXPECT_EQ(board.log.rejected, Lines{"missing"});
+  say("E:LEAVE", board.newest_t());
+  EXPECT_TRUE(board.safe());
+  EXPECT_FALSE(board.application->link().has_owner());
+}
+
+TEST_F(SignedFarewell, ReplayedItEndsNoSession) {
+  drive();
+  const std::string farewell = say("E:LEAVE", board.newest_t());
+  board.run(10);
+  drive();
+  const std::uint16_t pwm = board.outputs().osmc[0].pwm;
+  board.receive(farewell, at);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, pwm);
+  EXPECT_TRUE(board.application->link().has_owner());
+}
+
+}  // namespace
+}  // namespace r4

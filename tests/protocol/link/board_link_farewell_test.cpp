@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A host that says that it ends: what proves it, and what it ends.
+#include "board_link_fixture.hpp"
+
+namespace r4 {
+namespace {
+
+struct BoardLinkFarewell : BoardLinkTest {
+  bool may_leave(std::uint64_t t, Source from = here) {
+    return link.may_leave(numbered(echo_pnum + 20, t, from), now);
+  }
+};
+
+TEST_F(BoardLinkFarewell, FreesTheBoardAtOnce) {
+  connect();
+  run(300);
+  ASSERT_TRUE(may_leave(sent.back()));
+  link.leave(now);
+  EXPECT_EQ(link.state(), BoardLinkState::lost);
+  EXPECT_FALSE(link.has_owner());
+  EXPECT_TRUE(link.heartbeat_due(now)) << "which tells it";
+  run(1);
+  EXPECT_EQ(heartbeat(echo_pnum + 5000, sent.back(), there), HeartbeatEffect::new_session);
+}
+
+TEST_F(BoardLinkFarewell, EndsTheSessionEvenIfTheSameNumbersGoOn) {
+  connect();
+  run(300);
+  link.leave(now);
+  run(10);
+  EXPECT_EQ(heartbeat(echo_pnum + 2, sent.back()), HeartbeatEffect::new_session) << "not resumed";
+}
+
+TEST_F(BoardLinkFarewell, AHeartbeatThatItOvertookBeginsNothing) {
+  connect();
+  run(300);
+  const std::uint32_t before = sent.back();
+  run(100);
+  link.leave(now);
+  send_due();
+  EXPECT_EQ(heartbeat(echo_pnum + 2, before), HeartbeatEffect::stale);
+  EXPECT_EQ(link.state(), BoardLinkState::lost);
+}
+
+TEST_F(BoardLinkFarewell, AHeartbeatThatItOvertookBeginsNothingInItsMillisecondEither) {
+  connect();
+  run(300);
+  link.heartbeat_answered(now);
+  link.leave(now);
+  send_due();
+  EXPECT_EQ(heartbeat(echo_pnum + 2, now), HeartbeatEffect::stale);
+  run(1);
+  EXPECT_EQ(heartbeat(echo_pnum + 2, now - 1), HeartbeatEffect::stale);
+  EXPECT_EQ(link.state(), BoardLinkState::lost);
+  link.heartbeat_answered(now);
+  EXPECT_EQ(heartbeat(echo_pnum + 3, now), HeartbeatEffect::new_session)
+      << "another host may begin";
+}
+
+TEST_F(BoardLinkFarewell, EchoesAHeartbeatOfThisSession) {
+  connect();
+  run(300);
+  const std::uint32_t first_session = sent.back();
+  run(1500);
+  ASSERT_EQ(link.state(), BoardLinkState::lost);
+  ASSERT_EQ(heartbeat(echo_pnum + 70000, sent.back()), HeartbeatEffect::new_session);
+  EXPECT_FALSE(may_leave(first_session)) << "of the session before";
+  EXPECT_TRUE(may_leave(sent.back()));
+  EXPECT_FALSE(may_leave(0));
+  EXPECT_FALSE(may_leave(sent.back() + 1));
+}
+
+TEST_F(BoardLinkFarewell, OfASessionBeforeIsNotTakenHoweverSoonTheNextBegins) {
+  connect();
+  run(300);
+  const std::uint32_t first_session = sent.back();
+  link.leave(now);
+  run(1);
+  ASSERT_EQ(heartbeat(echo_pnum + 30, sent.back()), HeartbeatEffect::new_session);
+  EXPECT_FALSE(may_leave(first_session));
+}
+
+TEST_F(BoardLinkFarewell, TooOldAnEchoProvesNothing) {
+  connect();
+  const std::uint32_t old = sent.back();
+  for (std::uint32_t i = 2; i < 14; ++i) {
+    run(100);
+    heartbeat(echo_pnum + i, sent.back());
+  }
+  EXPECT_FALSE(may_leave(old));
+}
+
+TEST_F(BoardLinkFarewell, OfAClockOfItsOwnProvesNothing) {
+  send_due();
+  ASSERT_EQ(heartbeat(5, 42), HeartbeatEffect::new_session);
+  EXPECT_FALSE(may_leave(43));
+}
+
+}  // namespace
+}  // namespace r4
