@@ -2,6 +2,7 @@
 #include "application.hpp"
 
 #include "../protocol/messages/command_field.hpp"
+#include "../protocol/messages/command_group.hpp"
 
 namespace r4 {
 namespace firmware {
@@ -198,6 +199,41 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
   poll(now_ms);
 }
 
+// May what a command datagram says be executed, as far as it depends on who sent it, and when? If not, it
+// is answered or dropped. `refusal`: what its content has come to, and `at` for which command of a group.
+bool Application::admit(Source from, const Datagram& datagram, Verdict verdict, Refusal refusal,
+                        std::uint8_t at, std::uint32_t now_ms) {
+  if (verdict != Verdict::authentic) {
+    if (rejected(verdict, MessageKind::command, now_ms)) {
+      refuse(from, datagram, Refusal::auth, now_ms);
+    } else {
+      ++rx_refused_;
+    }
+    return false;
+  }
+  if (!datagram.has_pnum()) {  // nothing to execute it once by, and nothing to answer to
+    ++rx_refused_;
+    return false;
+  }
+  if (refusal != Refusal::none) {
+    refuse(from, datagram, refusal, now_ms, at);
+    return false;
+  }
+  Refusal code = Refusal::none;
+  switch (link_.admit(from, datagram.pnum(), now_ms, code)) {
+    case Admission::refuse:
+      if (code == Refusal::safe) link_.refused(from, datagram.pnum());
+      refuse(from, datagram, code, now_ms);
+      return false;
+    case Admission::drop:
+      ++rx_refused_;
+      return false;
+    case Admission::execute:
+      break;
+  }
+  return true;
+}
+
 void Application::on_command(Source from, const Datagram& datagram, Verdict verdict,
                              std::uint32_t now_ms) {
   const int count = datagram.command_count();
@@ -207,40 +243,17 @@ void Application::on_command(Source from, const Datagram& datagram, Verdict verd
     emergency_stop(from, datagram, verdict, now_ms);
     return;
   }
+  if (count != 1) {
+    on_group(from, datagram, verdict, now_ms);
+    return;
+  }
   Command command;
-  const Refusal refusal = count == 1 ? parse_command(field, command) : Refusal::format;
+  const Refusal refusal = parse_command(field, command);
   if (refusal == Refusal::none && command.kind == CommandKind::identify) {
     identify(from, now_ms);
     return;
   }
-  if (verdict != Verdict::authentic) {
-    if (rejected(verdict, MessageKind::command, now_ms)) {
-      refuse(from, datagram, Refusal::auth, now_ms);
-    } else {
-      ++rx_refused_;
-    }
-    return;
-  }
-  if (!datagram.has_pnum()) {  // nothing to execute it once by, and nothing to answer to
-    ++rx_refused_;
-    return;
-  }
-  if (refusal != Refusal::none) {
-    refuse(from, datagram, refusal, now_ms);
-    return;
-  }
-  Refusal code = Refusal::none;
-  switch (link_.admit(from, datagram.pnum(), now_ms, code)) {
-    case Admission::refuse:
-      if (code == Refusal::safe) link_.refused(from, datagram.pnum());
-      refuse(from, datagram, code, now_ms);
-      return;
-    case Admission::drop:
-      ++rx_refused_;
-      return;
-    case Admission::execute:
-      break;
-  }
+  if (!admit(from, datagram, verdict, refusal, 0, now_ms)) return;
   const bool held = drives_output(command.kind) && safety_.is_safe();
   if (!held && link_.begins_anew(datagram.pnum())) setpoints_.outputs = Outputs();
   Refusal outcome = Refusal::none;
@@ -263,6 +276,28 @@ void Application::on_command(Source from, const Datagram& datagram, Verdict verd
   execute(datagram.pnum(), command, now_ms);
 }
 
+// Several commands in one datagram. The hardware hears of them when all have changed the setpoints, in one
+// go.
+void Application::on_group(Source from, const Datagram& datagram, Verdict verdict,
+                           std::uint32_t now_ms) {
+  CommandGroup group;
+  std::uint8_t at = 0;
+  const Refusal refusal = read_group(datagram, group, at);
+  if (!admit(from, datagram, verdict, refusal, at, now_ms)) return;
+  if (safety_.is_safe()) {
+    link_.refused(from, datagram.pnum());
+    refuse(from, datagram, Refusal::safe, now_ms);
+    return;
+  }
+  if (link_.begins_anew(datagram.pnum())) setpoints_.outputs = Outputs();
+  link_.executed(datagram.pnum());
+  for (const Command& command : group) {
+    carry_out(command, setpoints_);  // it was checked: none of them can fail
+    take_effect(datagram.pnum(), command, now_ms);
+  }
+  bring_about(now_ms);
+}
+
 // May a command be given by this port?
 bool Application::may_set(std::uint8_t port, const Command& command) const {
   return command.kind != CommandKind::setting || !is_site_setting(command.text) ||
@@ -272,6 +307,12 @@ bool Application::may_set(std::uint8_t port, const Command& command) const {
 // The command has changed the setpoints; the rest of its effect.
 void Application::execute(std::uint32_t pnum, const Command& command, std::uint32_t now_ms) {
   link_.executed(pnum);
+  take_effect(pnum, command, now_ms);
+  bring_about(now_ms);
+}
+
+// What is no setpoint, and who is told.
+void Application::take_effect(std::uint32_t pnum, const Command& command, std::uint32_t now_ms) {
   switch (command.kind) {
     case CommandKind::zero:
       hal_.zero(command.channel);
@@ -295,6 +336,10 @@ void Application::execute(std::uint32_t pnum, const Command& command, std::uint3
       break;
   }
   if (observer_ != nullptr) observer_->on_executed(now_ms, pnum, command);
+}
+
+// The setpoints have changed.
+void Application::bring_about(std::uint32_t now_ms) {
   look_at_time(now_ms);  // the silence may be longer already than a new timeout
   check_interlocks(now_ms);
   update_outputs(now_ms);

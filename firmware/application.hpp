@@ -112,8 +112,13 @@ class Application {
                                         std::uint32_t now_ms) const;
   void on_host_heartbeat(Source from, const Datagram& datagram, std::uint32_t now_ms);
   void on_command(Source from, const Datagram& datagram, Verdict verdict, std::uint32_t now_ms);
+  void on_group(Source from, const Datagram& datagram, Verdict verdict, std::uint32_t now_ms);
+  bool admit(Source from, const Datagram& datagram, Verdict verdict, Refusal refusal,
+             std::uint8_t at, std::uint32_t now_ms);
   bool may_set(std::uint8_t port, const Command& command) const;
   void execute(std::uint32_t pnum, const Command& command, std::uint32_t now_ms);
+  void take_effect(std::uint32_t pnum, const Command& command, std::uint32_t now_ms);
+  void bring_about(std::uint32_t now_ms);
   void emergency_stop(Source from, const Datagram& datagram, Verdict verdict, std::uint32_t now_ms);
   bool rejected(Verdict verdict, MessageKind kind, std::uint32_t now_ms);
   void look_at_time(std::uint32_t now_ms);
@@ -139,7 +144,8 @@ class Application {
   void fill(State& state) const;
   void answer(Source to, DatagramWriter& writer, std::uint32_t now_ms);
   void identify(Source to, std::uint32_t now_ms);
-  void refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms);
+  void refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms,
+              std::uint8_t at = 0);
   std::uint32_t& number_for(Source to);
   std::uint32_t audience(std::uint8_t port) const;
 

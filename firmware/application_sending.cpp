@@ -2,6 +2,7 @@
 // What the application sends: heartbeats, states, answers.
 #include <cstring>
 
+#include "../protocol/messages/command_group.hpp"
 #include "../protocol/messages/state_fields.hpp"
 #include "application.hpp"
 
@@ -44,18 +45,21 @@ void Application::identify(Source to, std::uint32_t now_ms) {
   identity.has_busy = true;
   identity.busy = link_.has_owner() && link_.owner() != to;
   write_identity(writer, identity);
-  writer.more("+").more(leave_capability);
+  writer.more("+").more(leave_capability).more("+").more(group_capability);
   write_identity_fields(writer, identity);
   answer(to, writer, now_ms);
 }
 
-void Application::refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms) {
+// `at`: which command of a group it is, from 1; 0: none in particular.
+void Application::refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms,
+                         std::uint8_t at) {
   ++rx_refused_;
   if (!datagram.has_pnum()) return;
   if (observer_ != nullptr) observer_->on_refused(now_ms, datagram.pnum(), code);
   Nack nack;
   nack.pnum = datagram.pnum();
   nack.code = code;
+  nack.at = at;
   nack.has_session = link_.session_of(to, nack.session);
   char buffer[short_datagram];
   DatagramWriter writer(buffer, sizeof buffer);

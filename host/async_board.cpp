@@ -48,10 +48,19 @@ void AsyncBoard::require_wait(std::string_view what, Duration timeout) {
   r4::require_wait(what, timeout);
 }
 
+void AsyncBoard::require_any(const Setpoints& setpoints) { r4::require_any(setpoints); }
+
 void AsyncBoard::start_send(const Command& command, Duration timeout, CompletionPtr completion) {
   Impl& impl = *impl_;
   impl.begin(std::move(completion),
              [&] { return impl.session.send(command, Impl::time_of(timeout), impl.now); });
+}
+
+void AsyncBoard::start_apply(const Setpoints& setpoints, Duration timeout,
+                             CompletionPtr completion) {
+  Impl& impl = *impl_;
+  impl.begin(std::move(completion),
+             [&] { return impl.session.send(setpoints, Impl::time_of(timeout), impl.now); });
 }
 
 void AsyncBoard::start_stop(Duration timeout, CompletionPtr completion) {
@@ -176,6 +185,15 @@ PostResult AsyncBoard::post(const Command& command) {
   PostResult result = PostResult::no_link;
   impl.enter(Completion::How::post, [&] {
     if (impl.is_open()) result = impl.session.post(command, impl.now);
+  });
+  return result;
+}
+PostResult AsyncBoard::post(const Setpoints& setpoints) {
+  require_any(setpoints);
+  Impl& impl = *impl_;
+  PostResult result = PostResult::no_link;
+  impl.enter(Completion::How::post, [&] {
+    if (impl.is_open()) result = impl.session.post(setpoints, impl.now);
   });
   return result;
 }

@@ -42,9 +42,22 @@ void Board::send(const Command& command, Duration timeout) {
   impl->execute(command, timeout);
 }
 void Board::send(std::string_view command, Duration timeout) {
+  if (is_group_text(command)) return apply(parse_group_text(command), timeout);
   send(parse_command_text(command), timeout);
 }
 PostResult Board::post(const Command& command) { return impl_->post(command); }
+void Board::apply(const Setpoints& setpoints, Duration timeout) {
+  require_any(setpoints);
+  const std::string text = text_of(setpoints);
+  require_timeout(text, timeout);
+  const auto impl = impl_;
+  const auto call = std::make_shared<Impl::Call>(Command());
+  call->start = [&async = impl->async, setpoints](Duration left, auto end) {
+    async.async_apply(setpoints, left, std::move(end));
+  };
+  impl->execute(text, call, timeout);
+}
+PostResult Board::post(const Setpoints& setpoints) { return impl_->post(setpoints); }
 void Board::arm(Duration timeout) {
   require_timeout("arm()", timeout);
   const auto impl = impl_;

@@ -38,7 +38,8 @@ Board::Impl::Impl(const CarrierMaker& make, BoardOptions options, BoardCallbacks
     : arming(options.session.arming),
       callback_limit(options.callback_limit),
       async(io, make(loop), std::move(options)),
-      box(io, [this](const Command& c) { deliver(c); }),
+      box(
+          io, [this](const Command& c) { deliver(c); }, [this](const Setpoints& s) { deliver(s); }),
       callbacks([this](Clock::duration busy) { on_callback_end(busy); }) {
   require_callback_limit(callback_limit);
   if (first.on_state) callbacks.on_state(std::move(first.on_state));
@@ -169,6 +170,14 @@ void Board::Impl::deliver(const Command& command) {
   }
 }
 
+void Board::Impl::deliver(const Setpoints& setpoints) {
+  if (const PostResult result = async.post(setpoints); !result) {
+    RefusedPost refused{setpoints[0], Refusal::none, result};
+    refused.group = static_cast<std::uint8_t>(setpoints.size());
+    tell(refused);
+  }
+}
+
 // A stop is sent however late it is; anything else only while its caller waits for it.
 void Board::Impl::begin(const CallPtr& call, Clock::time_point deadline) {
   const bool stop = call->command.kind == CommandKind::stop;
@@ -291,12 +300,21 @@ PostResult Board::Impl::post(const Command& command) {
   const std::lock_guard lock(mutex);
   const bool stop = command.kind == CommandKind::stop;
   if (closed || (!in_control && !stop)) return PostResult::no_link;
-  if (arming == Arming::required && disarmed_by != DisarmCause::none &&
-      drives_output(command.kind)) {
-    ++refused_here;
-    return PostResult::not_armed;
-  }
+  if (drives_output(command.kind) && is_held_back()) return PostResult::not_armed;
   return box.put(command) ? PostResult::sent : PostResult::queue_full;
+}
+PostResult Board::Impl::post(const Setpoints& setpoints) {
+  require_any(setpoints);
+  const std::lock_guard lock(mutex);
+  if (closed || !in_control) return PostResult::no_link;
+  if (is_held_back()) return PostResult::not_armed;
+  return box.put(setpoints) ? PostResult::sent : PostResult::queue_full;
+}
+// Are output commands refused here? Under the lock.
+bool Board::Impl::is_held_back() {
+  if (arming != Arming::required || disarmed_by == DisarmCause::none) return false;
+  ++refused_here;
+  return true;
 }
 
 std::string Board::Impl::name_now() {

@@ -64,6 +64,8 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   CallPtr execute(const Command& command, Duration timeout);
   CallPtr execute(const std::string& text, CallPtr call, Duration timeout);
   PostResult post(const Command& command);
+  PostResult post(const Setpoints& setpoints);
+  bool is_held_back();
   // Does `action` on the loop and waits until it is done; nothing if the board is closed. Throws if
   // the loop does not begin in time; then it never will.
   void run_on_loop(std::string_view what, std::function<void()> action);
@@ -87,6 +89,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   void listen();
   void take_name();
   void deliver(const Command& command);
+  void deliver(const Setpoints& setpoints);
   void begin(const CallPtr& call, Clock::time_point deadline);
   void finish(Call& call, const CommandResult& result);
   void shut();

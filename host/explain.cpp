@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "commands/command_help.hpp"
 #include "r4link/link.hpp"
 #include "session/session.hpp"
@@ -275,6 +277,17 @@ Words outcome_words(std::string_view command, const CommandResult& result, const
   return words;
 }
 
+// What became of the other commands of a group.
+std::string group_words(std::string_view group, const CommandResult& result) {
+  const auto size = 1 + std::count(group.begin(), group.end(), ';');
+  if (result.executed != 0) {
+    return fmt::format("; it is command {} of {}, and those before it were executed", result.at,
+                       size);
+  }
+  if (result.outcome != Outcome::refused && result.outcome != Outcome::not_armed) return "";
+  return fmt::format("; none of the {} commands was executed", size);
+}
+
 }  // namespace
 
 Problem explain(KeyTrouble trouble) {
@@ -295,13 +308,16 @@ Problem explain(std::string_view name, const LinkStatus& link) {
 }
 
 Problem explain(std::string_view command, const CommandResult& result, const LinkStatus& link) {
-  Words words = outcome_words(command, result, link);
+  const std::string_view failed = part_of(command, result.at);
+  Words words = outcome_words(failed, result, link);
+  if (is_group_text(command)) words.reason += group_words(command, result);
   return {.kind = ErrorKind::refused,
-          .thing = std::string(command),
+          .thing = std::string(failed),
           .reason = std::move(words.reason),
           .fix = std::move(words.fix),
           .outcome = result.outcome,
-          .refusal = result.code};
+          .refusal = result.code,
+          .at = result.at};
 }
 
 }  // namespace r4

@@ -9,9 +9,11 @@
 #include <functional>
 #include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "r4link/command.hpp"
+#include "r4link/setpoints.hpp"
 
 namespace r4 {
 
@@ -19,10 +21,11 @@ class PostBox {
  public:
   static constexpr std::size_t capacity = 256;
 
-  // `deliver` is called on the loop, once for each command. The loop must not run any more when the
-  // box is destroyed.
-  PostBox(asio::io_context& io, std::function<void(const Command&)> deliver)
-      : io_(io), deliver_(std::move(deliver)) {
+  // `deliver` is called on the loop, once for each command, and `deliver_group` for each group. The loop
+  // must not run any more when the box is destroyed.
+  PostBox(asio::io_context& io, std::function<void(const Command&)> deliver,
+          std::function<void(const Setpoints&)> deliver_group)
+      : io_(io), deliver_(std::move(deliver)), deliver_group_(std::move(deliver_group)) {
     waiting_.reserve(capacity);
     taken_.reserve(capacity);
   }
@@ -36,12 +39,18 @@ class PostBox {
     } else if (waiting_.size() >= capacity) {
       return false;
     }
-    waiting_.push_back({command, std::string(command.text.data(), command.text.size()),
-                        std::string(command.text2.data(), command.text2.size())});
-    if (!woken_) {
-      woken_ = true;
-      asio::post(io_, Wake{this});
-    }
+    Letter& letter = waiting_.emplace_back();
+    letter.command = command;
+    letter.text.assign(command.text.data(), command.text.size());
+    letter.text2.assign(command.text2.data(), command.text2.size());
+    wake();
+    return true;
+  }
+  bool put(const Setpoints& group) {
+    const std::lock_guard lock(mutex_);
+    if (waiting_.size() >= capacity) return false;
+    waiting_.emplace_back().group = group;
+    wake();
     return true;
   }
 
@@ -49,7 +58,13 @@ class PostBox {
   struct Letter {
     Command command;
     std::string text, text2;
+    Setpoints group;  // empty: it is the command
   };
+
+  void wake() {
+    if (std::exchange(woken_, true)) return;
+    asio::post(io_, Wake{this});
+  }
 
   // Room for the one wake-up that can be on its way.
   template <class T>
@@ -85,6 +100,10 @@ class PostBox {
       taken_.swap(waiting_);
     }
     for (Letter& letter : taken_) {
+      if (!letter.group.empty()) {
+        deliver_group_(letter.group);
+        continue;
+      }
       letter.command.text = letter.text;
       letter.command.text2 = letter.text2;
       deliver_(letter.command);
@@ -94,6 +113,7 @@ class PostBox {
 
   asio::io_context& io_;
   std::function<void(const Command&)> deliver_;
+  std::function<void(const Setpoints&)> deliver_group_;
   std::mutex mutex_;
   std::vector<Letter> waiting_;
   std::vector<Letter> taken_;

@@ -100,6 +100,15 @@ std::string text_of(const Command& command) {
   return std::string(field.substr(0, field.find_last_of(';')));
 }
 
+std::string text_of(const Setpoints& group) {
+  std::string text;
+  for (std::size_t i = 0; i < group.size(); ++i) {
+    if (i != 0) text += ';';
+    text += text_of(group[i]);
+  }
+  return text;
+}
+
 std::string shown(std::string_view text) {
   if (!SettingText::is_one(text)) return std::string(text);
   const SettingText setting(text);
@@ -181,6 +190,11 @@ void require_valid(const Command& command) {
   }
 }
 
+void require_any(const Setpoints& group) {
+  if (!group.empty()) return;
+  throw Error(ErrorKind::usage, "the group", "has no command", "add one: Setpoints{}.osmc(…)");
+}
+
 void require_cable(std::string_view url, std::string_view secret) {
   for (const std::string_view own : {"serial:", "sim:", "memory:"}) {
     if (url.starts_with(own)) return;
@@ -217,6 +231,31 @@ Command parse_command_text(std::string_view text) {
   // Nothing that the grammar forbids may hide in a text: what cannot be written is not a command.
   if (text_of(command).empty()) throw Error(bad_command(trimmed, Refusal::format));
   return command;
+}
+
+bool is_group_text(std::string_view text) {
+  return text.substr(0, text.size() - (text.ends_with(';') ? 1 : 0)).find(';') !=
+         std::string_view::npos;
+}
+
+Setpoints parse_group_text(std::string_view text) {
+  if (text.ends_with(';')) text.remove_suffix(1);
+  Setpoints group;
+  for (;;) {
+    const std::size_t end = text.find(';');
+    group.add(parse_command_text(text.substr(0, end)));
+    if (end == std::string_view::npos) return group;
+    text.remove_prefix(end + 1);
+  }
+}
+
+std::string_view part_of(std::string_view text, std::size_t at) {
+  std::string_view rest = text;
+  for (std::size_t i = 1; i < at && !rest.empty(); ++i) {
+    rest.remove_prefix(std::min(rest.find(';'), rest.size() - 1) + 1);
+  }
+  const std::string_view part = rest.substr(0, rest.find(';'));
+  return at == 0 || part.empty() ? text : part;
 }
 
 }  // namespace r4

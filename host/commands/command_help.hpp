@@ -9,6 +9,7 @@
 #include "../../protocol/messages/settings.hpp"
 #include "r4link/command.hpp"
 #include "r4link/error.hpp"
+#include "r4link/setpoints.hpp"
 
 namespace r4 {
 
@@ -27,6 +28,8 @@ const CommandHelp* all_command_help();
 
 // The text of a command, as it is on the wire: "O:358,1,1".
 std::string text_of(const Command& command);
+// "O:358,1,1;O:358,1,2"
+std::string text_of(const Setpoints& group);
 
 // The same for people and logs to see, without what is secret: "C:password,...", "C:key,1:...". The
 // value of a setting that we do not know may be meant for one that is.
@@ -37,6 +40,13 @@ std::string shown(std::string_view text);
 // command's texts are views of `text`.
 Command parse_command_text(std::string_view text);
 
+// Is that several commands, separated by semicolons: "O:358,1,1;O:358,1,2"?
+bool is_group_text(std::string_view text);
+// Parses it. Throws Error{usage} naming the command that is wrong, or cannot be in a group.
+Setpoints parse_group_text(std::string_view text);
+// The `at`th command of such a text, from 1; the whole text if it has no such command.
+std::string_view part_of(std::string_view text, std::size_t at);
+
 // The problem of a command, given as text, that is refused for its form or its values before it is
 // sent.
 Problem bad_command(std::string_view text, Refusal refusal);
@@ -44,6 +54,8 @@ Problem bad_command(std::string_view text, Refusal refusal);
 // Throws Error{usage} for a command outside its ranges, and for one whose texts do not go into a
 // datagram. What it lets pass can be sent.
 void require_valid(const Command& command);
+// Throws Error{usage} for a group of no commands. There are none with wrong ones.
+void require_any(const Setpoints& group);
 
 // Throws Error{usage} unless `url` is of a board's own cable: elsewhere, on a network or a bus, others
 // would see what the board does not even take there: `secret`, in words.

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "r4link/command.hpp"
+#include "r4link/setpoints.hpp"
 
 namespace r4 {
 
@@ -21,6 +22,9 @@ namespace r4 {
 //                          +-------DUPLICATE-----------+--> executed
 //
 // It ends out of any of them: confirmed when CMD names it, or is past it and it was executed.
+//
+// A group is one command as long as the board takes it as one datagram. Where it does not, each of its
+// commands goes this way in turn: it is queued again when the one before is confirmed.
 struct PendingCommand {
   enum class Stage : std::uint8_t {
     free,       // a slot without a command
@@ -41,11 +45,19 @@ struct PendingCommand {
   std::int32_t cause = Command::unnamed_cause;  // clear: the cause it names, once one is known
   std::chrono::microseconds started{0}, deadline{0}, retry{0};
   std::size_t size = 0;  // of what is in `bytes`: the command's field; once sent, PNum and T too
-  Command command;       // without its texts
+  Command command;       // without its texts; of a group the first, or the one under way
+  Setpoints group;       // empty: it is none
+  // Of a group whose commands go one after the other, which of them, from 1; else 0.
+  std::uint8_t step = 0;
+  // Of a group that is one datagram, which of its commands the board has refused, from 1.
+  std::uint8_t failed = 0;
   std::array<char, max_datagram> bytes;
 
   // Has a copy of it gone out?
   bool is_out() const { return stage != Stage::free && stage != Stage::queued; }
+  bool is_group() const { return !group.empty(); }
+  // Do more commands follow this one, one after the other?
+  bool has_more() const { return step != 0 && step < group.size(); }
 };
 
 class PendingCommands {
@@ -73,6 +85,8 @@ class PendingCommands {
     slot.pnum = 0;
     slot.cause = Command::unnamed_cause;
     slot.size = 0;
+    slot.group = Setpoints();
+    slot.step = slot.failed = 0;
     return &slot;
   }
 

@@ -168,7 +168,9 @@ void Session::on_nack_datagram(const Datagram& datagram, Time now) {
       confirm_from_state(now);
       continue;
     }
-    if (proof) finish(pending, Outcome::refused, nack.code, now);
+    if (!proof) continue;
+    if (nack.at <= pending.group.size()) pending.failed = nack.at;
+    finish(pending, Outcome::refused, nack.code, now);
   }
   if (proof) on_post_refused(nack);
 }
@@ -187,6 +189,7 @@ void Session::on_identity_datagram(const Datagram& datagram, Time now) {
   selection_.on_answer();
   on_answer(datagram, now);
   knows_leave_ = has_capability(identity.capabilities, leave_capability);
+  groups_.on_identity(identity.capabilities);
   if (const auto round_trip = question_.answered(now)) collector_.on_round_trip(*round_trip);
   handler_.on_identity(identity);
   for (Pending& pending : pending_.under_way()) {
@@ -223,6 +226,7 @@ bool Session::notice_restart() {
   restarts_ = link_.restarts();
   knows_leave_ = false;
   state_ = ReceivedState();
+  groups_.on_restart();
   disarm(DisarmCause::restart);
   handler_.on_restart();
   return true;
@@ -365,6 +369,7 @@ Time Session::next_poll(Time now) {
   next = std::min(next, link);
   if (link_up()) next = std::min(next, question_.next());
   if (role_.refused(now)) next = std::min(next, role_.refused_until());
+  if (group_waits_) next = std::min(next, groups_.next());
   return next;
 }
 

@@ -25,6 +25,9 @@
 //
 // Commands that drive outputs are refused here while the session is not armed (arming.hpp).
 //
+// A group of them is one datagram, and one pending command, where the board executes groups
+// (group_support.hpp).
+//
 // E:STOP does not wait for the link, overtakes everything, discards all commands that wait, and is
 // repeated every 20 ms until a heartbeat of the board reports the reason `stop` and this stop's own
 // number, and for a while longer, in case that somebody's E:CLEAR was on its way. E:CLEAR names the
@@ -39,6 +42,7 @@
 
 #include "../../protocol/link/host_link.hpp"
 #include "../../protocol/messages/message.hpp"
+#include "../commands/group_support.hpp"
 #include "../commands/pending_commands.hpp"
 #include "../commands/posted_commands.hpp"
 #include "arming.hpp"
@@ -103,8 +107,15 @@ class Session {
   // now. Throws Error{usage} for a command outside its ranges; returns 0 when 64 are under way
   // already.
   Ticket send(const Command& command, Time timeout, Time now);
+  // The same of several that the board executes together or not at all; a board that knows no groups is
+  // sent one after the other, each when the one before is confirmed, and what is asked for later waits for
+  // the last. Throws Error{usage} for none.
+  Ticket send(const Setpoints& group, Time timeout, Time now);
   // Sends a command once and does not wait for it: on_refused() tells if the board refuses it.
   PostResult post(const Command& command, Time now);
+  // A board that knows no groups is sent one after the other, up to the first that is not sent. no_link
+  // also as long as it is not known whether it does.
+  PostResult post(const Setpoints& group, Time now);
   // Clears what made the outputs safe, where that can be cleared, and closes relay 1, the motor supply:
   // confirmed when the board's state shows it. Output commands that are sent behind it wait for it.
   // Returns 0 when 64 commands are under way already.
@@ -160,6 +171,13 @@ class Session {
   void retry_due(Time now);
   void finish(Pending& pending, Outcome outcome, Refusal code, Time now);
   SendResult transmit_now(const Command& command, std::uint32_t t_ms, Priority priority, Time now);
+  static PostResult post_result(SendResult result);
+  // session_groups.cpp
+  bool knows_groups(Time now);
+  bool choose_form(Pending& pending, Time now);
+  static void write_group(Pending& pending);
+  bool go_on(Pending& pending);
+  bool group_is_ahead();
   SendResult close_and_transmit(DatagramWriter& writer, CommandKind kind, Priority priority,
                                 Time now);
   bool link_up() const;
@@ -218,6 +236,8 @@ class Session {
   DisarmCause told_cause_ = DisarmCause::not_yet;
   PendingCommands pending_;
   PostedCommands posted_;
+  GroupSupport groups_;
+  bool group_waits_ = false;  // for the answer to Q:ID
   Ticket next_ticket_ = 1;
   // As the newest heartbeat told it; unnamed_cause: none was heard.
   std::int32_t cause_ = Command::unnamed_cause;

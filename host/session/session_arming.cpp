@@ -150,10 +150,16 @@ const char* to_text(PostResult result) {
 
 // The board refused a command that was posted.
 void Session::on_post_refused(const Nack& nack) {
-  const Command* const command = posted_.take(nack.pnum);
-  if (command == nullptr || nack.code == Refusal::duplicate) return;
+  const PostedCommands::Entry* const posted = posted_.take(nack.pnum);
+  if (posted == nullptr || nack.code == Refusal::duplicate) return;
   ++collector_.counts.refused;
-  handler_.on_refused({*command, nack.code, PostResult::sent});
+  RefusedPost refused{posted->command, nack.code, PostResult::sent};
+  if (!posted->group.empty()) {
+    refused.group = static_cast<std::uint8_t>(posted->group.size());
+    if (nack.at <= posted->group.size()) refused.at = nack.at;
+    if (refused.at != 0) refused.command = posted->group[refused.at - 1U];
+  }
+  handler_.on_refused(refused);
 }
 
 }  // namespace r4

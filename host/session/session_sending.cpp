@@ -89,14 +89,22 @@ PostResult Session::post(const Command& command, Time now) {
     ++collector_.counts.refused;
     return PostResult::not_armed;
   }
+  if (group_is_ahead()) return PostResult::queue_full;
   ++collector_.counts.commands;
   const bool unnamed =
       command.kind == CommandKind::clear && command.value == Command::unnamed_cause;
-  switch (
-      transmit_now(unnamed ? Command::clear(cause_) : command, to_ms(now), Priority::normal, now)) {
+  const SendResult result =
+      transmit_now(unnamed ? Command::clear(cause_) : command, to_ms(now), Priority::normal, now);
+  if (result == SendResult::sent) {
+    if (command.kind == CommandKind::clear) repetition_.cancel();
+    posted_.add(link_.last_pnum(), command);
+  }
+  return post_result(result);
+}
+
+PostResult Session::post_result(SendResult result) {
+  switch (result) {
     case SendResult::sent:
-      if (command.kind == CommandKind::clear) repetition_.cancel();
-      posted_.add(link_.last_pnum(), command);
       return PostResult::sent;
     case SendResult::full:
       return PostResult::queue_full;
@@ -140,6 +148,7 @@ Ticket Session::identify(Time timeout, Time now) {
 void Session::transmit(Pending& pending, Time now) {
   const bool stop = pending.kind == CommandKind::stop;
   if (pending.stage == Stage::queued) {
+    if (pending.is_group()) write_group(pending);
     pending.pnum = link_.take_pnum();
     // The command's field is there already.
     DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.size);
@@ -159,11 +168,15 @@ void Session::transmit(Pending& pending, Time now) {
 
 // In the order of send(): tickets rise.
 void Session::send_queued(Time now) {
+  group_waits_ = false;
   if (!in_control(now)) return;
   for (Pending& pending : pending_.under_way()) {
     if (pending.role == Pending::Role::arm) return;  // it comes first
-    if (pending.stage != Stage::queued || is_held_back(pending.kind)) continue;
-    if (now < pending.deadline) transmit(pending, now);
+    if (pending.stage == Stage::queued && !is_held_back(pending.kind) && now < pending.deadline) {
+      if (pending.is_group() && !choose_form(pending, now)) return;
+      transmit(pending, now);
+    }
+    if (pending.has_more()) return;
   }
 }
 
@@ -197,6 +210,7 @@ void Session::finish(Pending& pending, Outcome outcome, Refusal code, Time now) 
     on_arming_step(kind, outcome, code, now);
     return;
   }
+  if (outcome == Outcome::confirmed && go_on(pending)) return;
   switch (outcome) {
     case Outcome::confirmed:
       ++collector_.counts.confirmed;
@@ -216,8 +230,12 @@ void Session::finish(Pending& pending, Outcome outcome, Refusal code, Time now) 
       break;
   }
   const Ticket ticket = pending.ticket;
-  const CommandResult result{outcome, code, now - pending.started,
-                             outcome == Outcome::not_armed ? arming_.cause() : DisarmCause::none};
+  CommandResult result{outcome, code, now - pending.started,
+                       outcome == Outcome::not_armed ? arming_.cause() : DisarmCause::none};
+  if (outcome != Outcome::confirmed) {
+    result.at = pending.step != 0 ? pending.step : pending.failed;
+    if (pending.step != 0) result.executed = static_cast<std::uint8_t>(pending.step - 1);
+  }
   pending_.remove(pending);  // before the call: the handler may send again
   handler_.on_result(ticket, result);
 }

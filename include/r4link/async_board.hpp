@@ -40,6 +40,7 @@
 #include "carrier.hpp"
 #include "datagram.hpp"
 #include "options.hpp"
+#include "setpoints.hpp"
 #include "subscription.hpp"
 
 namespace r4 {
@@ -98,6 +99,19 @@ class AsyncBoard {
           start_send(c, t, make_completion(std::move(handler)));
         },
         token, command, timeout);
+  }
+  // void(CommandResult). Several output commands that the board executes together, in one pass over its chips,
+  // or not at all; a board that knows no groups is sent one after the other, up to the first that fails:
+  // CommandResult::at, executed. Throws Error{usage} for none, and for a timeout of nothing.
+  template <class Token>
+  auto async_apply(const Setpoints& setpoints, Duration timeout, Token&& token) {
+    require_any(setpoints);
+    require_timeout("async_apply()", timeout);
+    return asio::async_initiate<Token, void(CommandResult)>(
+        [this](auto handler, const Setpoints& s, Duration t) {
+          start_apply(s, t, make_completion(std::move(handler)));
+        },
+        token, setpoints, timeout);
   }
   // void(CommandResult). E:STOP: overtakes and cancels everything, also before the link is up. It is
   // sent whatever the timeout.
@@ -160,6 +174,9 @@ class AsyncBoard {
   // Sends once, without confirmation, and says why it did not; on_refused() tells if the board refuses
   // it. Throws Error{usage}.
   PostResult post(const Command& command);
+  // The same of several that are executed together; where the board knows no groups, they are posted one by one,
+  // up to the first that is not sent.
+  PostResult post(const Setpoints& setpoints);
 
   // What is known now; after close(), what was known last.
   const ReceivedState& state() const;
@@ -244,7 +261,9 @@ class AsyncBoard {
   // Throw Error{usage} for a time that none can be.
   static void require_timeout(std::string_view what, Duration timeout);
   static void require_wait(std::string_view what, Duration timeout);
+  static void require_any(const Setpoints& setpoints);
   void start_send(const Command& command, Duration timeout, CompletionPtr completion);
+  void start_apply(const Setpoints& setpoints, Duration timeout, CompletionPtr completion);
   void start_stop(Duration timeout, CompletionPtr completion);
   void start_arm(Duration timeout, CompletionPtr completion);
   void start_identify(Duration timeout, CompletionPtr completion);

@@ -35,6 +35,7 @@
 #include "carrier.hpp"
 #include "config.hpp"
 #include "options.hpp"
+#include "setpoints.hpp"
 #include "subscription.hpp"
 
 namespace r4 {
@@ -77,12 +78,20 @@ class R4LINK_API Board {
   // otherwise
 
   void send(const Command& command, Duration timeout = default_timeout);
-  // The same from the text of design: "O:358,1,1".
+  // The same from the text of design: "O:358,1,1"; "O:358,1,1;O:358,1,2" is a group.
   void send(std::string_view command, Duration timeout = default_timeout);
   // Sends once, without waiting or confirmation, and says why it did not: also when 256 wait to be
   // sent. For streams of setpoints where the next one replaces this one; on_refused() tells of those
   // that the board refuses. Allocates nothing.
   PostResult post(const Command& command);
+
+  // Several output commands that the board executes together, in one pass over its chips, or not at all:
+  // all wheels of a robot, say. apply() is confirmed as one, and its Error names the command that was in the
+  // way: Error::at(), from 1. A board that knows no groups (without `group` in BoardIdentity::capabilities)
+  // is sent one after the other: then those before it were executed, and the Error says so. It is asked when
+  // the link comes up; until it has answered, what is posted is not sent (no_link).
+  void apply(const Setpoints& setpoints, Duration timeout = default_timeout);
+  PostResult post(const Setpoints& setpoints);
 
   // Before the first output command (O D S R P B Z), and again after whatever made the outputs safe but
   // a lost link: until then they are refused here, so that a program that goes on commanding drives off

@@ -68,6 +68,10 @@ struct R4LINK_API Command {
 // Does it drive an output? Those are refused in the safe state: O D S R P B Z.
 R4LINK_API bool drives_output(CommandKind kind);
 
+// The most commands of one datagram. Several are a group: output commands, no two of them for the same
+// channel, that are executed together, or none of them (docs/protocol.md; setpoints.hpp).
+constexpr int max_group = 16;
+
 // Is every value of a command, made by a factory, in its range? Refusal::format, ::channel or ::range if
 // not; settings and names of fields are not looked at.
 R4LINK_API Refusal check_command(const Command& command);

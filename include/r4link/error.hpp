@@ -48,6 +48,7 @@ struct Problem {
   // For programs, where it is about a command.
   Outcome outcome = Outcome::none;
   Refusal refusal = Refusal::none;  // for Outcome::refused
+  std::uint8_t at = 0;              // which command of a group, from 1; 0: none in particular
 
   std::string text() const { return thing + ": " + reason + (fix.empty() ? "" : "; " + fix); }
 };
@@ -62,6 +63,7 @@ class R4LINK_API Error : public std::runtime_error {
   ErrorKind kind() const { return problem_.kind; }
   Outcome outcome() const { return problem_.outcome; }
   Refusal refusal() const { return problem_.refusal; }
+  int at() const { return problem_.at; }
 
  private:
   Problem problem_;

@@ -83,6 +83,10 @@ struct CommandResult {
   Refusal code = Refusal::none;              // for refused
   Time elapsed{0};                           // from the call to its end
   DisarmCause disarmed = DisarmCause::none;  // for not_armed
+  // Of a group: which of its commands it was that the board refused, or that was under way where they are
+  // sent one after the other, from 1; 0: none in particular. Of those before it, how many were executed.
+  std::uint8_t at = 0;
+  std::uint8_t executed = 0;
 };
 
 // Of one that is sent once and not waited for. True where it was sent:
@@ -92,9 +96,10 @@ class PostResult {
  public:
   enum Value : std::uint8_t {
     sent,
-    not_armed,   // it drives an output, and the program is not armed: call arm()
-    no_link,     // the link is not up, or the board does not take our commands yet
-    queue_full,  // too many wait to be sent already: try again later
+    not_armed,  // it drives an output, and the program is not armed: call arm()
+    no_link,    // the link is not up, or the board does not take our commands yet
+    queue_full,  // too many wait to be sent already, or a group waits, or is sent command by command:
+                 // try again later
   };
   PostResult(Value value) : value_(value) {}        // NOLINT(google-explicit-constructor)
   operator bool() const { return value_ == sent; }  // NOLINT(google-explicit-constructor)
@@ -113,6 +118,10 @@ struct RefusedPost {
   Command command;               // without its texts
   Refusal code = Refusal::none;  // of the board; none where it did not get there: `why`
   PostResult why = PostResult::sent;
+  // Of a group none was executed. `command` is the one that the board could not execute, the `at`th; its
+  // first, if none in particular was in the way (at 0).
+  std::uint8_t at = 0;
+  std::uint8_t group = 1;  // how many commands it has
 };
 
 // --- what the board says

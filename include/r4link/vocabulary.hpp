@@ -118,12 +118,13 @@ R4LINK_API Text name_of(Refusal refusal);
 // The refusal of that name; Refusal::none if there is none.
 R4LINK_API Refusal refusal_from(Text name);
 
-// A refusal as the board answers it: which command of ours, and why; and to the host of the session, the
-// number of its first echo (SESSION), so that a host knows whether the board still remembers what it
-// executed.
+// A refusal as the board answers it: which command of ours, and why; of a group, which of its commands
+// (AT); and to the host of the session, the number of its first echo (SESSION), so that a host knows
+// whether the board still remembers what it executed.
 struct Nack {
   std::uint32_t pnum = 0;
   Refusal code = Refusal::none;
+  std::uint8_t at = 0;  // from 1; 0: it is none of a group, or the group was refused as a whole
   bool has_session = false;
   std::uint32_t session = 0;
 };

@@ -270,7 +270,7 @@ bool stop_number(const Datagram& datagram, std::uint32_t& out) {
 }
 
 Refusal parse_command(const Field& field, Command& out) {
-  if (field.name().size() != 1 || !is_command_letter(field.name()[0])) return Refusal::unknown;
+  if (!is_command(field)) return Refusal::unknown;
   const char letter = field.name()[0];
   Values v(field);
   Command command;

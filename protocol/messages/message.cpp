@@ -19,6 +19,7 @@ constexpr Text cause_name("CAUSE");
 constexpr Text session_name("SESSION");
 constexpr Text board_name("NAME");
 constexpr Text busy_name("BUSY");
+constexpr Text at_name("AT");
 
 // True if there is such a field, of one number.
 template <class Number>
@@ -48,7 +49,8 @@ const char* to_text(MessageKind kind) {
 
 MessageKind kind_of(const Datagram& datagram) {
   if (datagram.command_count() == 0) return MessageKind::state;
-  if (datagram.command_count() > 1) return MessageKind::command;  // to be refused as one
+  if (datagram.command_count() > 1)
+    return MessageKind::command;  // a group, or to be refused as one
   const Field& field = datagram.command();
   if (field.name() == Text("H")) {
     if (field.values() == board_heartbeat_word) return MessageKind::board_heartbeat;
@@ -104,6 +106,8 @@ bool read_nack(const Datagram& datagram, Nack& out) {
   Nack nack;
   nack.code = refusal_from(values[1]);
   if (nack.code == Refusal::none || !parse_number(values[0], nack.pnum)) return false;
+  std::uint32_t at = 0;
+  if (find_number(datagram, at_name, at) && at <= 0xFF) nack.at = static_cast<std::uint8_t>(at);
   nack.has_session = find_number(datagram, session_name, nack.session);
   out = nack;
   return true;
@@ -111,6 +115,7 @@ bool read_nack(const Datagram& datagram, Nack& out) {
 
 void write_nack(DatagramWriter& writer, const Nack& nack) {
   writer.field("N").value(nack.pnum).value(name_of(nack.code));
+  if (nack.at != 0) writer.field(at_name).value(std::uint32_t{nack.at});
   if (nack.has_session) writer.field(session_name).value(nack.session);
 }
 

@@ -15,7 +15,7 @@ namespace r4 {
 enum class MessageKind : std::uint8_t {
   board_heartbeat,  // H:R4-ROS2
   host_heartbeat,   // H:ROS2-R4
-  command,          // one of command.hpp's letters
+  command,          // one of command.hpp's letters, or several
   nack,             // N:<PNum>,<code>
   identity,         // I:R4,<firmware>,<board id>,<capabilities>;NAME:…;BUSY:…
   state,            // anything else

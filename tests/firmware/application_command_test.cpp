@@ -52,7 +52,7 @@ TEST_F(ApplicationCommand, RefusesWhatIsNoCommandOfTheBoard) {
       {"U:401,1", "RANGE"},      {"U:1,5", "CHANNEL"},          {"F:", "FORMAT"},
       {"F:AIN25", "UNKNOWN"},    {"F:AIN24,", "UNKNOWN"},       {"C:colour,red", "UNKNOWN"},
       {"C:rate,0", "RANGE"},     {"C:rate,fast", "FORMAT"},     {"C:rate", "FORMAT"},
-      {"E:STOP,1", "FORMAT"},    {"O:1,1,1;O:2,1,2", "FORMAT"},
+      {"E:STOP,1", "FORMAT"},    {"O:1,1,1;O:2,1,1", "FORMAT"},
   };
   const Settings before = board.application->settings();
   for (const auto& [field, code] : cases) {
@@ -284,7 +284,7 @@ TEST_F(ApplicationCommand, AnswersWhereTheQuestionCameFrom) {
 }
 
 TEST_F(ApplicationCommand, AnswersTheQuestionWhoItIsInAnyState) {
-  const std::string answer = "I:R4,1.2.3,R4-7,udp+serial+leave;";
+  const std::string answer = "I:R4,1.2.3,R4-7,udp+serial+leave+group;";
   TestBoard fresh;
   fresh.take();
   fresh.receive("Q:ID;PNum:6;T:1;", Source{0, 9});

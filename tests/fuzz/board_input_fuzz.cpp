@@ -116,8 +116,10 @@ class World final : public firmware::Hal, public firmware::Observer {
   void on_state(std::uint32_t, BoardState, SafeReason) override {}
   void on_outputs(std::uint32_t, const Outputs& outputs) override { require(outputs == outputs_); }
   void on_executed(std::uint32_t, std::uint32_t pnum, const Command& command) override {
+    require(executed_ == 0 || pnum == executed_pnum_);  // those of a group have one number
     ++executed_;
     executed_pnum_ = pnum;
+    require(executed_ == 1 || drives_output(command.kind));
     stop_ = command.kind == CommandKind::stop;
     const bool leaves = command.kind == CommandKind::leave;
     // A new timeout may end that, but only behind it.
@@ -201,9 +203,10 @@ class World final : public firmware::Hal, public firmware::Observer {
     if (!valid) require(executed_ == 0 && sent_ == sent);
     // Outputs move by a command that is executed, come back with a heartbeat, or become safe.
     if (outputs_ != before && outputs_ != Outputs()) {
-      require(executed_ == 1 || kind == MessageKind::host_heartbeat);
+      require(executed_ != 0 || kind == MessageKind::host_heartbeat);
     }
-    require(executed_ + refused_ <= 1 && rejected_ <= (keyed_ ? 1 : 0));
+    require(executed_ == 0 || refused_ == 0);
+    require(refused_ <= 1 && rejected_ <= (keyed_ ? 1 : 0));
     if (!signed_)
       require(board().link().state() == state || board().link().state() == BoardLinkState::lost);
     if (executed_ != 0) {
@@ -212,6 +215,8 @@ class World final : public firmware::Hal, public firmware::Observer {
         require(outputs_ == Outputs() && board().reason() == SafeReason::stop);
       } else {
         require(signed_ && board().link().in_session(from));
+        require(executed_ == datagram.command_count());  // all of a group, or none
+        require(executed_ <= max_group);
         require(datagram.has_pnum() && board().link().last_executed() == executed_pnum_);
       }
     }

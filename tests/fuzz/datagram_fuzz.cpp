@@ -10,6 +10,7 @@
 #include "protocol/datagram/datagram_writer.hpp"
 #include "protocol/datagram/numbers.hpp"
 #include "protocol/messages/command_field.hpp"
+#include "protocol/messages/command_group.hpp"
 #include "protocol/messages/message.hpp"
 #include "protocol/messages/settings.hpp"
 #include "protocol/messages/state_fields.hpp"
@@ -124,6 +125,18 @@ void command_reads_equal(const Field& field) {
   }
 }
 
+void group_reads_equal(const Datagram& datagram) {
+  std::uint8_t at = 0;
+  CommandGroup group;
+  const bool good = read_group(datagram, group, at) == Refusal::none;
+  require(good == (at == 0) && at <= datagram.command_count() && at <= max_group + 1);
+  if (!good) return;
+  require(group.count == datagram.command_count());
+  for (const Command& command : group) {
+    require(check_command(command) == Refusal::none && drives_output(command.kind));
+  }
+}
+
 void messages_read_equal(const Datagram& datagram) {
   require(to_text(kind_of(datagram)) != nullptr);
   require(static_cast<int>(heartbeat_reason(datagram)) < safe_reason_count);
@@ -154,6 +167,7 @@ void try_bytes(const std::string& bytes) {
   fields_read_equal(datagram);
   state_reads_equal(datagram);
   messages_read_equal(datagram);
+  group_reads_equal(datagram);
   int commands = 0;
   for (const Field& field : datagram) {
     command_reads_equal(field);

@@ -77,11 +77,17 @@ def test_decodes_numbers_as_numbers_and_several_values_as_an_array():
 @pytest.mark.parametrize('fields, kind', [
     ('O:358,1,1', 'command'), ('H:ROS2-R4', 'heartbeat'), ('H:R4-ROS2', 'heartbeat'),
     ('N:66,RANGE', 'nack'), ('I:R4,0.1.0,sim-1,sim', 'identity'), ('AIN24:24.28;AIN12:1', 'state'),
-    ('X:1', 'command')])
+    ('X:1', 'command'), ('O:358,1,1;O:358,1,2;S:1500,3', 'command')])
 def test_decode_takes_what_encode_writes_and_names_its_type(fields, kind):
     decoded = objects(run('decode', stdin=run('encode', fields).stdout).stdout)
     assert len(decoded) == 1 and decoded[0]['ok'] and decoded[0]['type'] == kind
     assert decoded[0]['pnum'] == 0 and decoded[0]['t'] > 1_600_000_000_000
+
+
+def test_decodes_the_commands_of_a_group_in_their_order():
+    datagram = run('encode', 'O:1,1,1;S:1500,3;O:2,1,2;O:3,1,3').stdout
+    assert objects(run('decode', stdin=datagram).stdout)[0]['fields'] == {
+        'O': [[1, 1, 1], [2, 1, 2], [3, 1, 3]], 'S': [1500, 3]}
 
 
 def test_decodes_a_heartbeat_without_a_packet_number():
@@ -164,7 +170,15 @@ NO_BOARD = 'udp://127.0.0.1:9?listen=0'
     (['send', NO_BOARD, 'O:358,1'], USAGE, 'O:pwm,dir,ch'),
     (['send', NO_BOARD, 'O:358,1,5'], USAGE, 'no such channel.*ch 1-4'),
     (['send', NO_BOARD, 'O:5000,1,1'], USAGE, 'outside its range.*pwm 0-4095'),
-    (['send', NO_BOARD, 'O:358,1,1;D:1,1,1'], USAGE, 'O:358,1,1;D:1,1,1'),
+    (['send', NO_BOARD, 'O:358,1,1;O:1,0,1'], USAGE, '^r4: O:1,0,1: is the second command for the same channel'),
+    (['send', NO_BOARD, 'O:358,1,1;O:358,1,5'], USAGE, '^r4: O:358,1,5: no such channel'),
+    (['send', NO_BOARD, 'O:358,1,1;C:rate,50'], USAGE, '^r4: C:rate,50: drives no output'),
+    (['send', NO_BOARD, 'O:358,1,1;U:10,1'], USAGE, '^r4: U:10,1: drives no output'),
+    (['send', NO_BOARD, 'O:358,1,1;E:STOP'], USAGE, '^r4: E:STOP: drives no output'),
+    (['send', NO_BOARD, 'Q:ID;O:358,1,1'], USAGE, '^r4: Q:ID: drives no output'),
+    (['send', NO_BOARD, 'O:358,1,1;;O:358,1,2'], USAGE, 'no such command'),
+    (['send', NO_BOARD, ';'.join(f'S:1500,{i}' for i in range(1, 17)) + ';R:1,On'], USAGE, 'one more than the 16'),
+    (['send', NO_BOARD, 'O:358,1,1;O:358,1,2', '--timeout', '0.3'], REFUSED, 'not confirmed within 3'),
     (['send', NO_BOARD, 'X:1'], USAGE, 'no such command; the commands are O:'),
     (['send', NO_BOARD, 'hello'], USAGE, 'no such command'),
     (['send', NO_BOARD, 'O'], USAGE, 'O:pwm,dir,ch'),
@@ -174,7 +188,10 @@ NO_BOARD = 'udp://127.0.0.1:9?listen=0'
     (['send', NO_BOARD, 'O:1,1,1^'], USAGE, 'O:'),
     (['encode', 'O:358,1,5'], USAGE, 'no such channel'),
     (['encode', 'O:5000,1,1'], USAGE, 'outside its range'),
-    (['encode', 'O:1,1,1;D:1,1,1'], USAGE, 'one command a datagram'),
+    (['encode', 'O:1,1,1;O:2,1,1'], USAGE, '^r4: O:2,1,1: is the second command for the same channel'),
+    (['encode', 'O:1,1,1;D:1,1,5'], USAGE, '^r4: D:1,1,5: no such channel'),
+    (['encode', 'O:1,1,1;C:rate,50'], USAGE, '^r4: C:rate,50: drives no output'),
+    (['encode', 'E:STOP;O:1,1,1'], USAGE, '^r4: E:STOP: drives no output'),
     (['encode', 'AIN24'], USAGE, 'is no field'),
     (['encode', 'A:1;^0x0^'], USAGE, 'is no field'),
     (['encode', 'A:1\nB:2'], USAGE, 'is no field'),

@@ -12,7 +12,7 @@ from r4_process import Board, run
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').rglob('*.md'))]
 SENDS = re.compile(r'r4 send (.*)')
-COMMANDS = re.compile(r'(?<![\w/:])[A-Z]:[\w,.-]+')
+COMMANDS = re.compile(r'(?<![\w/:;])[A-Z]:[\w,.-]+(?:;[A-Z]:[\w,.-]+)*')  # a group is one
 DRIVES = re.compile(r'[ODPB]:')
 
 

@@ -64,7 +64,8 @@ def test_streams_at_1000_hz_over_udp_with_nothing_lost(urls):
 
 def test_every_kind_of_command_is_executed(url):
     commands = ['O:1,1,4', 'D:2,0,4', 'S:2500,16', 'R:8,On', 'P:-100,500,4', 'Z:4', 'B:4095,1,1,4',
-                'U:10,4', 'F:ENC1', 'C:rate,50', 'C:rate,100', 'C:recovery,last', 'Q:ID', 'E:STOP', 'E:CLEAR']
+                'O:1,1,1;O:2,1,2;S:1500,3', 'U:10,4', 'F:ENC1',
+                'C:rate,50', 'C:rate,100', 'C:recovery,last', 'Q:ID', 'E:STOP', 'E:CLEAR']
     result = run('send', url, *commands, '--json')
     assert result.returncode == 0, result
     assert [(each['command'], each['confirmed']) for each in objects(result.stdout)] == [

@@ -127,11 +127,28 @@ def test_a_command_is_confirmed_by_the_boards_state(board):
 
 def test_every_kind_of_command_is_executed(board):
     commands = ['O:1,1,4', 'D:2,0,4', 'S:2500,16', 'R:8,On', 'P:-100,500,4', 'Z:4', 'B:4095,1,1,4',
-                'U:10,4', 'F:ENC1', 'C:rate,50', 'C:recovery,rearm', 'E:STOP', 'E:CLEAR']
+                'O:1,1,1;O:2,1,2;S:1500,3', 'U:10,4', 'F:ENC1', 'C:rate,50', 'C:recovery,rearm', 'E:STOP', 'E:CLEAR']
     result = run('send', board.host_url, *commands, '--json')
     assert result.returncode == 0, result
     assert [(each['command'], each['confirmed']) for each in objects(result.stdout)] == [
         (command, True) for command in commands]
+
+
+def test_the_commands_of_a_group_are_executed_together_or_not_at_all(board):
+    result = run('send', board.host_url, 'R:1,On', 'O:358,1,1;O:358,1,2;O:358,0,3;O:358,0,4', 'E:STOP', '--json')
+    assert result.returncode == 0, result
+    assert objects(result.stdout)[1]['motor_supply'] == 'closed'
+    first = board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
+    assert first['outputs']['osmc'] == [[358, 1], [358, 1], [358, 0], [358, 0]], 'not one before the others'
+    result = run('send', board.host_url, 'O:1,1,1;O:1,1,2')
+    assert result.returncode == 3 and 'none of the 2 commands was executed' in result.stderr, result
+    # What another program makes of the rules, the board judges.
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.settimeout(PATIENCE_S)
+        for fields, answer in (('O:1,1,1;O:1,1,5', 'N:5,CHANNEL;AT:2;'), ('O:1,1,1;C:rate,9', 'N:5,FORMAT;AT:2;')):
+            body = f'{fields};PNum:5;T:1;^'.encode()
+            other.sendto(body + b'0x%x^' % zlib.crc32(body), ('127.0.0.1', port_of(board)))
+            assert other.recv(1024).decode().startswith(answer)
 
 
 def test_a_command_is_refused_while_a_stop_is_latched(board):

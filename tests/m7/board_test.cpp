@@ -39,6 +39,48 @@ TEST(Board, EveryCommandReachesItsPins) {
   }
 }
 
+namespace {
+
+// When the wheels, the four OSMC channels, change.
+struct Wheels {
+  std::uint32_t first_ticks = 0;
+  std::uint32_t last_ticks = 0;
+  int changed = 0;
+  void look() {
+    const sim::ChipPins pins = bench->pins();
+    int now = 0;
+    for (const Drive& drive : pins.osmc) now += drive.pwm == 358 ? 1 : 0;
+    if (now == changed) return;
+    if (changed == 0) first_ticks = BoardClock::ticks();
+    last_ticks = BoardClock::ticks();
+    changed = now;
+  }
+};
+Wheels wheels;
+
+}  // namespace
+
+TEST(Board, AGroupMovesFourWheelsAtOnce) {
+  Bench& host = new_board();
+  wheels = Wheels();
+  const Steps steps([] {
+    bench->step();
+    wheels.look();
+  });
+  host.heartbeat();
+  host.run_ms(2);
+  char buffer[max_datagram];
+  DatagramWriter writer(buffer, sizeof buffer);
+  for (int i = 1; i <= osmc_channels; ++i) {
+    write_command(writer, Command::osmc(358, Direction::forward, i));
+  }
+  host.send(writer);
+  host.run_ms(5);
+  const std::uint32_t skew_us = (wheels.last_ticks - wheels.first_ticks) / BoardClock::ticks_per_us;
+  on_target::say_number("us from the first of four wheels to the last", skew_us);
+  EXPECT(wheels.changed == 4 && skew_us <= 1000);
+}
+
 TEST(Board, TheSafeStateInAnInterruptHoldsWhateverTransferItCutsShort) {
   Bench& host = new_board();
   std::uint32_t cut = 0;

@@ -126,9 +126,9 @@ void sign(Signer* signer, DatagramWriter& writer) {
 }
 
 // One command after the other, each with its own number; what reading, checking and executing
-// costs. With a key they are signed.
+// costs. With a key they are signed. `group`: so many commands are one datagram.
 std::uint32_t command_instructions(firmware::Hal& hal, std::uint32_t first, std::uint64_t t,
-                                   const Key* key = nullptr) {
+                                   const Key* key = nullptr, std::uint32_t group = 1) {
   Sink sink;
   firmware::Application::Config config;
   const std::uint8_t chance[Authentication::chance_size] = {1};
@@ -151,10 +151,9 @@ std::uint32_t command_instructions(firmware::Hal& hal, std::uint32_t first, std:
   application.receive(port, 1, writer.finish(), 1000);
   for (std::uint32_t i = 0; i <= repetitions; ++i) {
     DatagramWriter command(commands[i], sizeof commands[i]);
-    command.field("O")
-        .value(std::uint32_t{358 + i % 2})
-        .value(std::uint32_t{1})
-        .value(std::uint32_t{1});
+    for (std::uint32_t channel = 1; channel <= group; ++channel) {
+      command.field("O").value(std::uint32_t{358 + i % 2}).value(std::uint32_t{1}).value(channel);
+    }
     command.stamp(first + i, t);
     sign(signer, command);
     texts[i] = command.finish();
@@ -165,7 +164,7 @@ std::uint32_t command_instructions(firmware::Hal& hal, std::uint32_t first, std:
   // It has cost what it should only if it was done.
   const bool done = application.state() == firmware::BoardState::active &&
                     application.link().last_executed() == first + repetitions &&
-                    application.outputs().osmc[0].pwm == 358;
+                    application.outputs().osmc[group - 1].pwm == 358;
   return done ? count : 0;
 }
 
@@ -216,6 +215,9 @@ int main() {
   const std::uint32_t signed_command = command_instructions(hal, 1500001000, 1699276044383, &key);
   if (signed_command == 0) exit_emulator(6);
   on_target::say_number("that command signed, on a board with a key", signed_command);
+  const std::uint32_t group = command_instructions(hal, 1500001000, 1699276044383, nullptr, 4);
+  if (group == 0) exit_emulator(7);
+  on_target::say_number("a group of four commands, all executed", group);
 
   static char bytes[170];
   for (std::size_t i = 0; i < sizeof bytes; ++i) bytes[i] = static_cast<char>(i);

@@ -31,6 +31,8 @@ std::string tail_of(const Report& report, std::size_t lines) {
 // Into `sum`: what happened.
 void add(Report& sum, const Report& report) {
   sum.executed += report.executed;
+  sum.executed_groups += report.executed_groups;
+  sum.groups_apart += report.groups_apart;
   sum.confirmed += report.confirmed;
   sum.refused += report.refused;
   sum.timed_out += report.timed_out;
@@ -85,16 +87,18 @@ Report run_all(std::uint64_t schedules, World::Loop loop) {
   for (std::thread& thread : threads) thread.join();
 
   fmt::print(
-      "{} schedules: {} violations; {} commands executed, {} confirmed, {} refused, {} timed out; "
+      "{} schedules: {} violations; {} commands executed ({} groups, {} went apart), {} confirmed, "
+      "{} refused, {} "
+      "timed out; "
       "{} links lost, {} outputs restored, {} stops obeyed, {} confirmed, {} cleared, {} clears "
       "refused; {} farewells obeyed, {} confirmed; answers {} BUSY, {} STALE, {} DUPLICATE; "
       "{} forged or replayed datagrams, {} rejected, {} signed commands executed; "
       "{} standstills, {} datagrams waited, {} of them fed; longest silence to safe {:.1f} ms\n",
-      schedules, failing.size(), sum.executed, sum.confirmed, sum.refused, sum.timed_out,
-      sum.link_losses, sum.restores, sum.stops, sum.stops_confirmed, sum.clears, sum.clears_refused,
-      sum.farewells, sum.farewells_confirmed, sum.busy, sum.stale, sum.duplicate, sum.attacks,
-      sum.rejected, sum.executed_signed, sum.standstills, sum.waited, sum.waited_to_feed,
-      static_cast<double>(sum.worst_silence_us) / 1000);
+      schedules, failing.size(), sum.executed, sum.executed_groups, sum.groups_apart, sum.confirmed,
+      sum.refused, sum.timed_out, sum.link_losses, sum.restores, sum.stops, sum.stops_confirmed,
+      sum.clears, sum.clears_refused, sum.farewells, sum.farewells_confirmed, sum.busy, sum.stale,
+      sum.duplicate, sum.attacks, sum.rejected, sum.executed_signed, sum.standstills, sum.waited,
+      sum.waited_to_feed, static_cast<double>(sum.worst_silence_us) / 1000);
   std::sort(failing.begin(), failing.end());
   for (std::size_t i = 0; i < failing.size() && i < 3; ++i) {
     const Report report = World(failing[i], true, loop).run();
@@ -105,6 +109,8 @@ Report run_all(std::uint64_t schedules, World::Loop loop) {
   EXPECT_EQ(failing.size(), 0U);
   // The schedules must reach what they are to test.
   EXPECT_GT(sum.executed, schedules);
+  EXPECT_GT(sum.executed_groups, schedules / 2);
+  EXPECT_LT(sum.groups_apart, sum.executed_groups / 100);
   EXPECT_GT(sum.restores, schedules / 100);
   EXPECT_GT(sum.stops_confirmed, schedules / 10);
   EXPECT_GT(sum.clears, schedules / 20);

@@ -37,6 +37,7 @@ Schedule Schedule::random(Random& random) {
   s.command_interval_us = static_cast<std::uint32_t>(random.between(5'000, 400'000));
   s.command_timeout_us = static_cast<std::uint32_t>(random.between(100'000, 2'500'000));
   s.post_share = random.chance(0.5) ? 0.5 : 0;
+  s.group_share = random.chance(0.5) ? 0.5 : 0;
   s.board_lateness_us = static_cast<std::uint32_t>(random.below(3'000));
   const int count = static_cast<int>(random.below(6));
   for (int i = 0; i < count; ++i) {

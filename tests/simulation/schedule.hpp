@@ -60,7 +60,8 @@ struct Schedule {
   std::vector<Standstill> standstills;  // one after the other
   std::uint32_t command_interval_us = 0;
   std::uint32_t command_timeout_us = 0;
-  double post_share = 0;                // commands sent without asking for confirmation
+  double post_share = 0;   // commands sent without asking for confirmation
+  double group_share = 0;  // commands that are a group: the same target for all steppers
   std::uint32_t board_lateness_us = 0;  // the board's loop comes up to this much late
   // The board has a key for each host, and there is an attacker, who acts about so often; 0:
   // neither.

@@ -7,6 +7,7 @@
 //              one at most timeout + 20 ms ago, however long it waited to be read, and sent at most
 //              2 timeouts + 20 ms ago; or the board stands still, until its first turn
 //   once       no command is executed twice, ever, board reboots included
+//   whole      a group of commands is executed wholly or not at all, and reaches the hardware in one go
 //   order      never one older than the newest executed, nor one from before an executed stop
 //   intact     what is executed is what a host sent, by the host that controls the board
 //   fresh      and sent at most 2 timeouts + 250 ms before
@@ -43,6 +44,8 @@ struct Report {
   std::vector<std::string> trace;  // only when asked for
   // What happened, to see that the schedules reach what they are to test.
   std::uint32_t executed = 0;
+  std::uint32_t executed_groups = 0;
+  std::uint32_t groups_apart = 0;  // sent command by command
   std::uint32_t confirmed = 0;
   std::uint32_t refused = 0;
   std::uint32_t timed_out = 0;
@@ -124,14 +127,18 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
     std::uint32_t pnum;
     std::uint64_t at_us;
   };
-  // One command that a host asked for, named by its stepper target.
+  // One command that a host asked for, named by its stepper target: that of channel 1, or, if it is a
+  // group, of all.
   struct Sent {
     int host = 0;
     std::uint32_t incarnation = 0;
     std::uint64_t asked_us = 0;
     std::uint64_t transmitted_us = 0;  // the last time
     int executed = 0;
-    bool dead = false;  // a refusal was reported
+    bool group = false;
+    bool apart = false;  // its host takes the board for one without groups: so bad is the line
+    std::uint8_t channels = 0;  // bit n-1: it was executed on that one
+    bool dead = false;          // a refusal was reported
   };
 
   // firmware::Hal
@@ -164,6 +171,8 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   void check_silence();
   void on_stop(std::uint32_t pnum);
   bool controls(const Process& process) const;
+  void check_whole(int id);
+  void check_steppers();
   // world_hosts.cpp
   void start_host(int index);
   void poll_host(int index);

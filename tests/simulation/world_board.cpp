@@ -85,6 +85,7 @@ void World::apply(const firmware::Outputs& outputs) {
   const bool came_back = !live_ && driven(outputs);
   outputs_ = outputs;
   live_ = driven(outputs);
+  if (report_.groups_apart == 0) check_steppers();
   if (!came_back) return;
   const int id = outputs.stepper[0].position;
   if (id < 0 || id >= static_cast<int>(commands_.size())) return violate("intact: unknown output");
@@ -94,6 +95,19 @@ void World::apply(const firmware::Outputs& outputs) {
   const bool gone = host.incarnation != sent.incarnation || !host.alive;
   if (gone && now_us_ - host.died_us > schedule_.settings.timeout_ms * 1000U + slack_us) {
     violate(fmt::format("restore: outputs of command {} came back long after its host died", id));
+  }
+}
+
+// Steppers 2 to 4 are told by groups alone, which tell them all the same, and stepper 1, too.
+void World::check_steppers() {
+  const firmware::StepperTarget(&steppers)[stepper_channels] = outputs_.stepper;
+  for (int i = 2; i < stepper_channels; ++i) {
+    if (steppers[i] != steppers[1]) violate("whole: the hardware got part of a group");
+  }
+  const std::size_t newest = static_cast<std::size_t>(steppers[0].position);
+  if (steppers[0].enabled && newest < commands_.size() && commands_[newest].group &&
+      steppers[1] != steppers[0]) {
+    violate("whole: the hardware got the first of a group");
   }
 }
 
@@ -161,13 +175,20 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
     if (live_ || board_->link().has_owner()) violate("farewell: executed, but not obeyed");
   }
   if (command.kind != CommandKind::stepper) return;
-  ++report_.executed;
-  if (schedule_.attack_interval_us != 0) ++report_.executed_signed;
   const int id = command.value;
-  if (id < 0 || id >= static_cast<int>(commands_.size()) || command.channel != 1) {
+  if (id < 0 || id >= static_cast<int>(commands_.size())) {
     return violate("intact: executed a command that nobody sent");
   }
   Sent& sent = commands_[static_cast<std::size_t>(id)];
+  sent.channels = static_cast<std::uint8_t>(sent.channels | 1U << (command.channel - 1));
+  if (command.channel != 1) {  // the others of a group come behind its first
+    if (!sent.group || (sent.executed == 0 && !sent.apart))
+      violate("intact: executed a command that nobody sent");
+    return;
+  }
+  ++report_.executed;
+  if (sent.group) ++report_.executed_groups;
+  if (schedule_.attack_interval_us != 0) ++report_.executed_signed;
   if (++sent.executed > 1) violate(fmt::format("once: command {} executed again", id));
   if (sent.dead) violate(fmt::format("truth: command {} executed after its refusal", id));
   if (id < newest_executed_) {
@@ -203,6 +224,15 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
 // Has the board a host, and is it that process?
 bool World::controls(const Process& process) const {
   return board_->link().has_owner() && !fed_.empty() && fed_.back().from == process;
+}
+
+// A command that was handed over: was it executed as a whole, if it was?
+void World::check_whole(int id) {
+  const Sent& sent = commands_[static_cast<std::size_t>(id)];
+  const std::uint8_t all = sent.group ? (1U << stepper_channels) - 1 : 1;
+  if (!sent.apart && sent.channels != 0 && sent.channels != all) {
+    violate(fmt::format("whole: of command {} channels {:04b} were executed", id, sent.channels));
+  }
 }
 
 // A stop that is obeyed. A repetition of the last one adds nothing to it, nor does an attacker's that

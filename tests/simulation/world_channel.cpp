@@ -28,11 +28,15 @@ void World::transfer(bool to_board, int host, std::uint32_t peer, std::string_vi
     pnum = datagram.pnum();
     if (asks_to_stop(datagram)) hosts_[static_cast<std::size_t>(host)]->stop_pnum = pnum;
     Command parsed;
-    if (datagram.command_count() == 1 &&
+    if (datagram.command_count() >= 1 &&
         parse_command(datagram.command(), parsed) == Refusal::none &&
         parsed.kind == CommandKind::stepper) {
       command = parsed.value;
-      commands_[static_cast<std::size_t>(command)].transmitted_us = now_us_;
+      Sent& sent = commands_[static_cast<std::size_t>(command)];
+      sent.transmitted_us = now_us_;
+      if (sent.group && datagram.command_count() == 1 && !std::exchange(sent.apart, true)) {
+        ++report_.groups_apart;
+      }
     }
   }
   const std::uint64_t cut_until = to_board ? cut_to_board_until_us_ : cut_to_host_until_us_;
@@ -115,6 +119,7 @@ void World::hand_over(int slot) {
     delivering_ = {packet.host, packet.incarnation};
     delivering_peer_ = peer;
     board_->receive(0, peer, Text(packet.bytes), board_ms());
+    if (packet.command >= 0) check_whole(packet.command);
     attacker_.on_received(packet.host, packet.bytes);
     const BoardLink& link = board_->link();
     if (packet.intact && packet.heartbeat && link.owner().peer == peer &&

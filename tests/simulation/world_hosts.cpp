@@ -94,14 +94,16 @@ void World::issue_command(int index) {
   sent.host = index;
   sent.incarnation = host.incarnation;
   sent.asked_us = now_us_;
+  sent.group = random_.chance(schedule_.group_share);
   commands_.push_back(sent);
-  const Command command = Command::stepper(id, 1000, 1);
+  Setpoints setpoints;
+  for (int i = 1; i <= (sent.group ? stepper_channels : 1); ++i) setpoints.stepper(i, id, 1000);
   if (random_.chance(schedule_.post_share)) {
-    host.session->post(command, host.time());
+    host.session->post(setpoints, host.time());
   } else {
     const Time timeout{schedule_.command_timeout_us};
     // The ticket is known only after send(), which may already transmit.
-    const Ticket ticket = host.session->send(command, timeout, host.time());
+    const Ticket ticket = host.session->send(setpoints, timeout, host.time());
     if (ticket != 0) host.tickets[ticket] = id;
   }
   poll_host(index);

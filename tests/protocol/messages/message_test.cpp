@@ -119,6 +119,28 @@ TEST(Message, ARefusalTellsTheHostOfTheSessionWhichOneItIs) {
   EXPECT_FALSE(again.has_session);
 }
 
+TEST(Message, ARefusalOfAGroupTellsWhichCommandItIs) {
+  Nack nack;
+  nack.pnum = 7;
+  nack.code = Refusal::range;
+  nack.at = 3;
+  nack.has_session = true;
+  nack.session = 9;
+  char buffer[max_datagram];
+  DatagramWriter writer(buffer, sizeof buffer);
+  write_nack(writer, nack);
+  const Text bytes = writer.finish(1, 2);
+  EXPECT_EQ(str(bytes), with_crc("N:7,RANGE;AT:3;SESSION:9;PNum:1;T:2;"));
+  Nack again;
+  ASSERT_TRUE(read_nack(Read("N:7,RANGE;SESSION:9;AT:3;").datagram, again)) << "in any order";
+  EXPECT_EQ(again.at, 3);
+  for (const char* fields :
+       {"N:7,RANGE;", "N:7,RANGE;AT:256;", "N:7,RANGE;AT:x;", "N:7,RANGE;AT:;"}) {
+    ASSERT_TRUE(read_nack(Read(fields).datagram, again)) << fields;
+    EXPECT_EQ(again.at, 0) << fields;
+  }
+}
+
 TEST(Message, BoardHeartbeatCarriesTheNonceBehindTheReason) {
   char buffer[max_datagram];
   const Text bytes =

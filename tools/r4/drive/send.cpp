@@ -24,6 +24,7 @@
 #include "r4link/async_board.hpp"
 #include "r4link/error.hpp"
 #include "r4link/link.hpp"
+#include "r4link/setpoints.hpp"
 
 namespace r4::tool {
 namespace {
@@ -37,15 +38,26 @@ struct Options {
   bool json = false;
 };
 
-// The command, checked; its texts are views of `text`.
-Command command_of(const std::string& text, const std::string& url) {
+// What one argument says: a command, or several that are executed together.
+struct Order {
+  Command command;
+  Setpoints group;  // empty: it is one command
+};
+
+std::string shown(const Order& order) {
+  return order.group.empty() ? shown(order.command) : text_of(order.group);
+}
+
+// Checked; the texts of a command are views of `text`.
+Order order_of(const std::string& text, const std::string& url) {
+  if (is_group_text(text)) return {Command(), parse_group_text(text)};
   const Command command = parse_command_text(text);
   if (command.kind == CommandKind::heartbeat) {
     throw Error(ErrorKind::usage, text, "heartbeats are sent by themselves",
                 "use --hold to keep the link up");
   }
   require_cable(url, command);
-  return command;
+  return {command, Setpoints()};
 }
 
 // Does it turn a motor, which needs the motor supply?
@@ -62,7 +74,15 @@ bool turns_a_motor(const Command& command) {
   }
 }
 
-bool sets(const Command& command, std::string_view key) {
+bool turns_a_motor(const Order& order) {
+  bool turns = turns_a_motor(order.command);
+  for (std::size_t i = 0; i < order.group.size(); ++i)
+    turns = turns || turns_a_motor(order.group[i]);
+  return turns;
+}
+
+bool sets(const Order& order, std::string_view key) {
+  const Command& command = order.command;
   return command.kind == CommandKind::setting && command.text == Text(key);
 }
 
@@ -78,38 +98,40 @@ struct LinkTiming {
   Milliseconds timeout{0};
   Milliseconds heartbeat{0};
 };
-std::optional<LinkTiming> link_timing_at(const std::vector<Command>& commands, std::size_t i) {
-  if (i + 1 >= commands.size()) return std::nullopt;
-  const Command& a = commands[i];
-  const Command& b = commands[i + 1];
-  if (sets(a, "timeout") && sets(b, "heartbeat")) return LinkTiming{value_of(a), value_of(b)};
-  if (sets(a, "heartbeat") && sets(b, "timeout")) return LinkTiming{value_of(b), value_of(a)};
+std::optional<LinkTiming> link_timing_at(const std::vector<Order>& orders, std::size_t i) {
+  if (i + 1 >= orders.size()) return std::nullopt;
+  const Order& a = orders[i];
+  const Order& b = orders[i + 1];
+  const Milliseconds first = value_of(a.command);
+  const Milliseconds second = value_of(b.command);
+  if (sets(a, "timeout") && sets(b, "heartbeat")) return LinkTiming{first, second};
+  if (sets(a, "heartbeat") && sets(b, "timeout")) return LinkTiming{second, first};
   return std::nullopt;
 }
 
 // What a person types is deliberate: it is sent without being armed. Where a motor is to turn, the
 // board is to tell whether relay 1 is closed. Our heartbeats come so often that the shortest timeout
 // among the commands can live on them.
-BoardOptions board_options(const Options& options, const std::vector<Command>& commands) {
+BoardOptions board_options(const Options& options, const std::vector<Order>& orders) {
   BoardOptions board_options = with_key(options.key);
   board_options.session.arming = Arming::off;
-  if (std::any_of(commands.begin(), commands.end(), turns_a_motor)) {
-    board_options.session.fields = "DEFAULT,RELAYS";
-  }
-  for (const Command& command : commands) {
-    if (!sets(command, "timeout")) continue;
+  const bool turns =
+      std::any_of(orders.begin(), orders.end(), [](const Order& o) { return turns_a_motor(o); });
+  if (turns) board_options.session.fields = "DEFAULT,RELAYS";
+  for (const Order& order : orders) {
+    if (!sets(order, "timeout")) continue;
     std::uint32_t& ours = board_options.session.timing.heartbeat_ms;
-    ours = std::min(ours, static_cast<std::uint32_t>(value_of(command).count() / 3));
+    ours = std::min(ours, static_cast<std::uint32_t>(value_of(order.command).count() / 3));
   }
   return board_options;
 }
 
 class Sender {
  public:
-  Sender(const Options& options, const std::vector<Command>& commands)
+  Sender(const Options& options, const std::vector<Order>& orders)
       : options_(options),
-        commands_(commands),
-        board_(io_, options.url, board_options(options, commands)),
+        orders_(orders),
+        board_(io_, options.url, board_options(options, orders)),
         hold_(io_) {}
 
   int run() {
@@ -123,15 +145,18 @@ class Sender {
 
  private:
   void send_next() {
-    if (next_ == commands_.size()) {
+    if (next_ == orders_.size()) {
       hold_.expires_after(options_.hold);
       hold_.async_wait([this](const std::error_code&) { io_.stop(); });
       return;
     }
-    const Command& command = commands_[next_];
+    const Order& order = orders_[next_];
+    const Command& command = order.command;
     const auto done = [this](const CommandResult& result) { on_result(result); };
-    if (const auto timing = link_timing_at(commands_, next_)) {
+    if (const auto timing = link_timing_at(orders_, next_)) {
       board_.async_link_timing(timing->timeout, timing->heartbeat, options_.timeout, done);
+    } else if (!order.group.empty()) {
+      board_.async_apply(order.group, options_.timeout, done);
     } else if (command.kind == CommandKind::stop) {
       board_.async_stop(options_.timeout, done);
     } else if (command.kind == CommandKind::identify) {
@@ -142,9 +167,9 @@ class Sender {
   }
 
   void on_result(const CommandResult& result) {
-    const std::size_t size = link_timing_at(commands_, next_) ? 2 : 1;
-    std::string text = shown(commands_[next_]);
-    if (size == 2) text += " " + shown(commands_[next_ + 1]);
+    const std::size_t size = link_timing_at(orders_, next_) ? 2 : 1;
+    std::string text = shown(orders_[next_]);
+    if (size == 2) text += " " + shown(orders_[next_ + 1]);
     const bool confirmed = result.outcome == Outcome::confirmed;
     const Problem problem = explain(text, result, board_.link());
     if (options_.json) {
@@ -152,13 +177,13 @@ class Sender {
     } else if (confirmed) {
       fmt::print("{}  confirmed in {:.1f} ms{}\n", text, milliseconds(result),
                  next_ == 0 ? ", connecting included" : "");
-      if (commands_[next_].kind == CommandKind::identify) print_identity();
+      if (orders_[next_].command.kind == CommandKind::identify) print_identity();
     } else {
       fmt::print("{}  {}\n", text, problem.reason);
     }
     if (!confirmed) {
-      for (std::size_t i = next_ + size; i < commands_.size() && !options_.json; ++i) {
-        fmt::print("{}  not sent\n", shown(commands_[i]));
+      for (std::size_t i = next_ + size; i < orders_.size() && !options_.json; ++i) {
+        fmt::print("{}  not sent\n", shown(orders_[i]));
       }
       failure_ = problem;
       failure_->thing = fmt::format("{} to {}", problem.thing, board_.name());
@@ -180,7 +205,7 @@ class Sender {
   // Was the command to turn a motor that has no supply?
   bool supply_is_missing() const {
     const State& state = board_.state();
-    return turns_a_motor(commands_[next_]) && state.present.has(StateField::relays) &&
+    return turns_a_motor(orders_[next_]) && state.present.has(StateField::relays) &&
            (state.relays & 1) == 0;
   }
 
@@ -206,8 +231,12 @@ class Sender {
       const Text name = name_of(result.code);
       object["code"] = std::string_view(name.data(), name.size());
     }
+    if (result.at != 0) {
+      object["at"] = result.at;
+      object["executed"] = result.executed;
+    }
     if (!confirmed) object["reason"] = problem.reason;
-    if (confirmed && turns_a_motor(commands_[next_])) {
+    if (confirmed && turns_a_motor(orders_[next_])) {
       object["motor_supply"] = supply_is_missing() ? "open" : "closed";
     }
     if (confirmed && text == "Q:ID") {
@@ -221,7 +250,7 @@ class Sender {
   }
 
   const Options& options_;
-  const std::vector<Command>& commands_;
+  const std::vector<Order>& orders_;
   asio::io_context io_{1};
   AsyncBoard board_;
   asio::steady_timer hold_;
@@ -230,23 +259,24 @@ class Sender {
 };
 
 int send(const Options& options) {
-  std::vector<Command> commands;
+  std::vector<Order> orders;
   for (const std::string& text : options.commands) {
     if (is_url(text)) one_url({options.url, text});
-    commands.push_back(command_of(text, options.url));
+    orders.push_back(order_of(text, options.url));
   }
-  for (std::size_t i = 0; i < commands.size(); ++i) {
-    const auto timing = link_timing_at(commands, i);
+  for (std::size_t i = 0; i < orders.size(); ++i) {
+    const auto timing = link_timing_at(orders, i);
     if (!timing) continue;
     require_link_timing(timing->timeout, timing->heartbeat, Milliseconds{0});
     ++i;
   }
-  return Sender(options, commands).run();
+  return Sender(options, orders).run();
 }
 
 constexpr const char* footer =
     R"(Each command is sent when the board's own state has confirmed the one before it; the first that is not
-confirmed ends the run. All are checked before the first is sent.
+confirmed ends the run. All are checked before the first is sent. Several in one argument, separated by
+semicolons, are a group: up to 16 of O D S R P B Z that the board executes together, or none of them.
 
 The board goes safe, its outputs off, as soon as this program ends: --hold keeps them on. No motor turns while
 relay 1, the motor supply, is open: it is at first and after each safe state, and R:1,On closes it.
@@ -254,6 +284,7 @@ relay 1, the motor supply, is open: it is at first and after each safe state, an
 Examples:
   r4 send udp://192.168.0.125 R:1,On O:358,1,1 --hold 5      R:1,On: the motors have supply
   r4 send serial:auto R:1,On D:1000,1,1 S:1500,3 R:2,On --hold 60
+  r4 send serial:auto R:1,On 'O:358,1,1;O:358,1,2' --hold 5  both wheels at once
   r4 send serial:auto E:CLEAR                 after an emergency stop
   r4 send serial:auto C:timeout,300 C:heartbeat,100     side by side: one step, in any order
   r4 send udp://127.0.0.1 Q:ID                who is it?
@@ -269,7 +300,8 @@ void add_send(CLI::App& root, Action& chosen) {
       add_subcommand(root, chosen, "send", "Send commands and wait until the board confirms them",
                      "Commands:\n" + command_table() + "\n" + footer, options, send);
   add_url(*command, options->url);
-  add_texts(*command, "CMD", options->commands, "commands, such as O:358,1,1", "", Need::required);
+  add_texts(*command, "CMD", options->commands,
+            "commands, such as O:358,1,1; 'O:358,1,1;O:358,1,2' is a group", "", Need::required);
   add_seconds(*command, "--timeout", options->timeout,
               "how long to wait for each confirmation (default 3)");
   add_seconds(*command, "--hold", options->hold, "keep the link up that long after the last",

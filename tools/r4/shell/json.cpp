@@ -5,6 +5,8 @@
 
 #include <array>
 #include <cstdio>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "protocol/messages/message.hpp"
@@ -59,14 +61,17 @@ Json field_json(const Field& field) {
 
 Json fields_json(const Datagram& datagram) {
   Json fields = Json::object();
+  std::set<std::string> repeated;
   for (const Field& field : datagram) {
     if (field.name() == Text("PNum") || field.name() == Text("T")) continue;
     const std::string name(view(field.name()));
     const auto earlier = fields.find(name);
     if (earlier == fields.end()) {
       fields.emplace(name, field_json(field));
-    } else {
+    } else if (repeated.insert(name).second) {
       *earlier = Json::array({std::move(*earlier), field_json(field)});
+    } else {
+      earlier->push_back(field_json(field));
     }
   }
   return fields;
@@ -154,6 +159,7 @@ Json problem_json(const Problem& problem) {
     const Text code = name_of(problem.refusal);
     object["code"] = std::string_view(code.data(), code.size());
   }
+  if (problem.at != 0) object["at"] = problem.at;
   return object;
 }
 

@@ -12,8 +12,10 @@
 #include "../shell/subcommands.hpp"
 #include "host/commands/command_help.hpp"
 #include "protocol/datagram/datagram_writer.hpp"
+#include "protocol/messages/command_field.hpp"
 #include "protocol/messages/message.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/setpoints.hpp"
 #include "transports/framing/can/packed_form.hpp"
 
 namespace r4::tool {
@@ -52,18 +54,26 @@ void write_fields(DatagramWriter& writer, std::string_view text) {
   }
 }
 
+std::string text_of(const Field& field) {
+  return fmt::format("{}:{}", std::string_view(field.name().data(), field.name().size()),
+                     std::string_view(field.values().data(), field.values().size()));
+}
+
+// Would a board execute these commands together?
+void check_all(const Datagram& datagram) {
+  Setpoints group;
+  for (const Field& field : datagram) {
+    if (is_command(field)) group.add(parse_command_text(text_of(field)));
+  }
+}
+
 // Would a board or a host take it for what its letter says? Letters that nobody knows may pass.
 void check(const Datagram& datagram) {
   const int count = datagram.command_count();
   const Field& field = datagram.command();
   if (count == 0) return;
-  const std::string text =
-      fmt::format("{}:{}", std::string_view(field.name().data(), 1),
-                  std::string_view(field.values().data(), field.values().size()));
-  if (count > 1) {
-    fail(shown(text), "is not the only command in the datagram",
-         "a board takes one command a datagram; --force encodes it all the same");
-  }
+  if (count > 1) return check_all(datagram);
+  const std::string text = text_of(field);
   bool good = true;
   switch (kind_of(datagram)) {
     case MessageKind::nack: {
@@ -120,6 +130,8 @@ int encode(const Options& options) {
 constexpr const char* footer = R"(Examples:
   r4 encode O:358,1,1 --pnum 66 --time 1699276044383
                               O:358,1,1;PNum:66;T:1699276044383;^0x7fefae81^
+  r4 encode 'O:358,1,1;O:358,1,2'
+                              two commands that are executed together
   r4 encode H:ROS2-R4         a host's heartbeat
   r4 encode 'AIN24:24.28;AIN12:12.15'
                               a board's state, of any fields

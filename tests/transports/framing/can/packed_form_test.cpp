@@ -140,6 +140,8 @@ TEST(PackedForm, EveryKindOfDatagramIsCompact) {
       {"paper's host heartbeat", "H:ROS2-R4;T:79201;^0xf390d9ad^", 12},
       {"O:358,1,1", with_crc("O:358,1,1;PNum:2523456789;T:4012345670;"), 18},
       {"paper's O:358,1,1", "O:358,1,1;PNum:66;T:1699276044383;^0x7fefae81^", 18},
+      {"four wheels, a group",
+       with_crc("O:358,1,1;O:358,1,2;O:358,1,3;O:358,1,4;PNum:2523456789;T:4012345670;"), 33},
       {"R:2,On", with_crc("R:2,On;PNum:2523456789;T:4012345670;"), 17},
       {"E:STOP", with_crc("E:STOP;PNum:2523456789;T:4012345670;"), 16},
       {"F:DEFAULT,SAFE,CMD", with_crc("F:DEFAULT,SAFE,CMD;PNum:2523456789;T:4012345670;"), 20},

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "r4link/setpoints.hpp"
+
+#include <fmt/format.h>
+
+#include "../../protocol/messages/command_group.hpp"
+#include "command_help.hpp"
+
+namespace r4 {
+
+namespace {
+
+// Why it may not come behind that many others.
+Problem bad_group_member(const Command& command, std::size_t others) {
+  Problem problem{ErrorKind::usage, shown(command), "", ""};
+  if (!drives_output(command.kind)) {
+    problem.reason = "drives no output, so it cannot be part of a group";
+    problem.fix = "send it by itself; a group is made of O D S R P B Z";
+  } else if (others == max_group) {
+    problem.reason = fmt::format("is one more than the {} that a group may have", max_group);
+    problem.fix = "send a second group";
+  } else {
+    problem.reason = "is the second command for the same channel in this group";
+    problem.fix = "leave one of them out";
+  }
+  return problem;
+}
+
+}  // namespace
+
+Setpoints& Setpoints::osmc(int channel, int pwm, Direction direction) {
+  return add(Command::osmc(pwm, direction, channel));
+}
+Setpoints& Setpoints::dhb12(int channel, int pwm, Direction direction) {
+  return add(Command::dhb12(pwm, direction, channel));
+}
+Setpoints& Setpoints::servo(int channel, int pulse_us) {
+  return add(Command::servo(pulse_us, channel));
+}
+Setpoints& Setpoints::relay(int channel, bool on) { return add(Command::relay(channel, on)); }
+Setpoints& Setpoints::stepper(int channel, std::int32_t position, int speed) {
+  return add(Command::stepper(position, speed, channel));
+}
+Setpoints& Setpoints::zero(int channel) { return add(Command::zero(channel)); }
+Setpoints& Setpoints::bldc(int channel, int speed, Direction direction, bool brake) {
+  return add(Command::bldc(speed, direction, brake, channel));
+}
+
+Setpoints& Setpoints::add(const Command& command) {
+  require_valid(command);
+  GroupRules rules;
+  for (std::size_t i = 0; i < size_; ++i) rules.add((*this)[i]);
+  if (rules.add(command) != Refusal::none) throw Error(bad_group_member(command, size_));
+  Setpoint& setpoint = setpoints_[size_++];
+  setpoint.kind = command.kind;
+  setpoint.channel = command.channel;
+  setpoint.direction = command.direction;
+  setpoint.on = command.on;
+  setpoint.value = command.value;
+  setpoint.speed = command.speed;
+  return *this;
+}
+
+Command Setpoints::operator[](std::size_t i) const {
+  const Setpoint& setpoint = setpoints_[i];
+  Command command;
+  command.kind = setpoint.kind;
+  command.channel = setpoint.channel;
+  command.direction = setpoint.direction;
+  command.on = setpoint.on;
+  command.value = setpoint.value;
+  command.speed = setpoint.speed;
+  return command;
+}
+
+}  // namespace r4

@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Groups of commands: one datagram where the board executes groups, one after the other where not.
+#include <gtest/gtest.h>
+
+#include "host/commands/command_help.hpp"
+#include "r4link/setpoints.hpp"
+#include "scripted_link.hpp"
+#include "tests/support/datagrams.hpp"
+#include "tests/support/problems.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr Direction forward = Direction::forward;
+const Setpoints wheels = Setpoints{}.osmc(1, 358, forward).osmc(2, 359, forward).servo(3, 1500);
+
+struct SessionGroup : testing::Test {
+  // A link to a board of which is known whether it executes groups.
+  void connect(std::string_view capabilities) {
+    link.connect();
+    link.identity(capabilities);
+  }
+  Ticket send(Time timeout = 1s) { return link.session.send(wheels, timeout, link.now); }
+  PostResult post() { return link.session.post(wheels, link.now); }
+  bool under_way(Ticket ticket) const { return link.results.find(ticket) == link.results.end(); }
+  CommandResult result(Ticket ticket) {
+    EXPECT_FALSE(under_way(ticket)) << "it has not ended";
+    return link.results[ticket];
+  }
+  // The command fields of a datagram.
+  static std::string fields(const ScriptedLink::Sent& sent) {
+    return sent.bytes.substr(0, sent.bytes.find("PNum:"));
+  }
+  // The board answers with the command of a group that it refuses.
+  void nack_at(std::uint32_t pnum, const std::string& code, int at) {
+    link.raw(with_crc("N:" + std::to_string(pnum) + "," + code + ";AT:" + std::to_string(at) +
+                      ";SESSION:" + std::to_string(link.session_pnum) +
+                      ";PNum:" + std::to_string(link.board_pnum++) +
+                      ";T:" + std::to_string(link.board_ms()) + ";"));
+  }
+
+  ScriptedLink link;
+};
+
+TEST_F(SessionGroup, IsOneDatagramAndOneCommand) {
+  connect("udp+group");
+  const Ticket ticket = send();
+  ASSERT_EQ(link.sent.size(), 1U);
+  EXPECT_EQ(fields(link.sent[0]), "O:358,1,1;O:359,1,2;S:1500,3;");
+  link.pass(60ms);
+  ASSERT_EQ(link.all('O').size(), 2U);
+  EXPECT_EQ(link.all('O')[1].bytes, link.sent[0].bytes) << "repeated with the same bytes";
+  link.executed(link.last('O').pnum);
+  EXPECT_EQ(result(ticket).outcome, Outcome::confirmed);
+  EXPECT_EQ(result(ticket).at, 0);
+  EXPECT_EQ(link.session.statistics(link.now).commands, 1U);
+  EXPECT_EQ(link.session.statistics(link.now).confirmed, 1U);
+}
+
+TEST_F(SessionGroup, ARefusalNamesTheCommandAndThatNoneWasExecuted) {
+  connect("group");
+  const Ticket ticket = send();
+  nack_at(link.last('O').pnum, "CHANNEL", 2);
+  EXPECT_EQ(result(ticket).outcome, Outcome::refused);
+  EXPECT_EQ(result(ticket).at, 2);
+  EXPECT_EQ(result(ticket).executed, 0);
+  const Problem problem = explain(text_of(wheels), result(ticket), link.session.link());
+  EXPECT_EQ(problem.thing, "O:359,1,2");
+  EXPECT_EQ(problem.at, 2);
+  EXPECT_TRUE(contains(problem.reason, "CHANNEL"));
+  EXPECT_TRUE(contains(problem.reason, "none of the 3 commands was executed"));
+  EXPECT_TRUE(contains(problem.fix, "O:pwm,dir,ch"));
+
+  const Ticket other = send();
+  link.nack(link.last('O').pnum, "SAFE");
+  EXPECT_EQ(result(other).at, 0);
+  EXPECT_EQ(explain(text_of(wheels), result(other), link.session.link()).thing, text_of(wheels));
+
+  const Ticket wrong = send();
+  nack_at(link.last('O').pnum, "RANGE", 4);
+  EXPECT_EQ(result(wrong).at, 0) << "it has no fourth command";
+}
+
+TEST_F(SessionGroup, AsksFirstWhetherTheBoardExecutesGroups) {
+  link.connect();
+  const Ticket ticket = send();
+  EXPECT_EQ(link.count('O'), 0U);
+  EXPECT_EQ(link.count('Q'), 1U);
+  const Ticket behind = link.session.send(Command::servo(1, 1), 1s, link.now);
+  EXPECT_EQ(link.session.post(Command::servo(0, 1), link.now), PostResult::queue_full)
+      << "it would overtake them";
+  EXPECT_EQ(post(), PostResult::queue_full);
+  link.pass(250ms);
+  EXPECT_EQ(link.count('Q'), 3U) << "the first questions may have been lost";
+  EXPECT_EQ(link.count('S'), 0U) << "the order is kept";
+  link.identity("group");
+  ASSERT_EQ(link.count('O'), 1U);
+  ASSERT_EQ(link.count('S'), 1U);
+  EXPECT_LT(link.last('O').pnum, link.last('S').pnum);
+  link.executed(link.last('O').pnum);
+  link.executed(link.last('S').pnum);
+  EXPECT_EQ(result(ticket).outcome, Outcome::confirmed);
+  EXPECT_EQ(result(behind).outcome, Outcome::confirmed);
+  link.pass(1s);
+  EXPECT_EQ(link.count('Q'), 3U);
+}
+
+TEST_F(SessionGroup, OfABoardWithoutGroupsGoesOneAfterTheOther) {
+  connect("udp");
+  const Ticket ticket = send();
+  EXPECT_EQ(fields(link.sent.back()), "O:358,1,1;");
+  const Ticket behind = link.session.send(Command::servo(7, 7), 1s, link.now);
+  link.pass(60ms);
+  EXPECT_EQ(link.sent.size(), 2U) << "the first, twice";
+  link.executed(link.last('O').pnum);
+  EXPECT_EQ(fields(link.sent.back()), "O:359,1,2;");
+  EXPECT_TRUE(under_way(ticket));
+  EXPECT_EQ(link.session.post(Command::osmc(0, forward, 1), link.now), PostResult::queue_full)
+      << "the commands that are left would come after it";
+  link.executed(link.last('O').pnum);
+  EXPECT_EQ(link.count('S'), 2U) << "behind the last nothing need wait";
+  link.executed(link.all('S')[0].pnum);
+  link.executed(link.all('S')[1].pnum);
+  EXPECT_EQ(result(ticket).outcome, Outcome::confirmed);
+  EXPECT_EQ(result(behind).outcome, Outcome::confirmed);
+}
+
+TEST_F(SessionGroup, OfABoardWithoutGroupsEndsAtTheFirstThatFails) {
+  connect("udp");
+  const Ticket ticket = send();
+  link.executed(link.last('O').pnum);
+  link.nack(link.last('O').pnum, "SAFE");
+  EXPECT_EQ(result(ticket).outcome, Outcome::refused);
+  EXPECT_EQ(result(ticket).at, 2);
+  EXPECT_EQ(result(ticket).executed, 1);
+  EXPECT_EQ(link.count('S'), 0U);
+  const Problem problem = explain(text_of(wheels), result(ticket), link.session.link());
+  EXPECT_EQ(problem.thing, "O:359,1,2");
+  EXPECT_TRUE(contains(problem.reason, "command 2 of 3, and those before it were executed"));
+
+  const Ticket late = send(100ms);
+  link.pass(100ms);
+  EXPECT_EQ(result(late).outcome, Outcome::timed_out);
+  EXPECT_EQ(result(late).at, 1);
+  EXPECT_EQ(result(late).executed, 0);
+}
+
+TEST_F(SessionGroup, IsNotTornApartWhereTheAnswerIsLostAgainAndAgain) {
+  link.connect();
+  const Ticket ticket = send();
+  link.pass(900ms);
+  EXPECT_GE(link.count('Q'), 9U);
+  EXPECT_EQ(link.count('O'), 0U);
+  link.identity("group");
+  EXPECT_EQ(fields(link.last('O')), "O:358,1,1;O:359,1,2;S:1500,3;");
+  EXPECT_TRUE(under_way(ticket));
+}
+
+TEST_F(SessionGroup, OfABoardThatAnswersNothingGoesOneAfterTheOther) {
+  link.heartbeat();
+  send(20s);
+  for (int i = 0; i < 300; ++i) {  // the paper's board knows neither F nor Q
+    link.pass(10ms);
+    link.state("AIN24:24.28;OSMC1:0,0;");
+  }
+  ASSERT_GE(link.count('O'), 1U);
+  EXPECT_EQ(fields(link.last('O')), "O:358,1,1;");
+  EXPECT_EQ(link.count('Q'), 5U);
+  link.state("AIN24:24.28;OSMC1:358,1;");
+  EXPECT_EQ(fields(link.last('O')), "O:359,1,2;") << "confirmed by its value";
+}
+
+TEST_F(SessionGroup, IsAskedForAnewWhenTheBoardHasBegunAgain) {
+  connect("group");
+  link.reboot();
+  link.boot_heartbeat();
+  link.pass(300ms);
+  link.sent.clear();
+  link.connect();
+  send();
+  EXPECT_EQ(link.count('O'), 0U);
+  EXPECT_EQ(link.count('Q'), 1U);
+}
+
+TEST_F(SessionGroup, AStopEndsItWhereverItIs) {
+  connect("udp");
+  const Ticket ticket = send();
+  link.executed(link.last('O').pnum);
+  link.session.stop(1s, link.now);
+  EXPECT_EQ(result(ticket).outcome, Outcome::cancelled);
+  const std::size_t sent = link.count('O');
+  link.pass(1s);
+  EXPECT_EQ(link.count('O'), sent);
+}
+
+TEST_F(SessionGroup, IsPostedOnceAndItsRefusalIsTold) {
+  connect("group");
+  ASSERT_TRUE(post());
+  EXPECT_EQ(fields(link.sent.back()), "O:358,1,1;O:359,1,2;S:1500,3;");
+  link.pass(150ms);
+  EXPECT_EQ(link.count('O'), 1U);
+  nack_at(link.last('O').pnum, "RANGE", 3);
+  ASSERT_EQ(link.refused.size(), 1U);
+  EXPECT_EQ(text_of(link.refused[0].command), "S:1500,3");
+  EXPECT_EQ(link.refused[0].at, 3);
+  EXPECT_EQ(link.refused[0].group, 3);
+  ASSERT_TRUE(post());
+  link.nack(link.last('O').pnum, "SAFE");
+  ASSERT_EQ(link.refused.size(), 2U);
+  EXPECT_EQ(text_of(link.refused[1].command), "O:358,1,1");
+  EXPECT_EQ(link.refused[1].at, 0);
+}
+
+TEST_F(SessionGroup, IsPostedOneByOneToABoardWithoutGroups) {
+  link.connect();
+  EXPECT_EQ(post(), PostResult::no_link) << "not known yet";
+  EXPECT_EQ(link.count('Q'), 1U);
+  link.identity("udp");
+  EXPECT_TRUE(post());
+  ASSERT_EQ(link.count('O'), 2U);
+  EXPECT_EQ(fields(link.all('O')[1]), "O:359,1,2;");
+  EXPECT_EQ(fields(link.last('S')), "S:1500,3;");
+}
+
+TEST_F(SessionGroup, OfOneCommandIsThatCommandAndOfNoneIsThrownBack) {
+  link.connect();
+  link.session.send(Setpoints{}.osmc(1, 358, forward), 1s, link.now);
+  EXPECT_EQ(fields(link.sent.back()), "O:358,1,1;") << "whatever the board knows";
+  EXPECT_TRUE(link.session.post(Setpoints{}.servo(1, 5), link.now));
+  EXPECT_THROW(link.session.send(Setpoints{}, 1s, link.now), Error);
+  EXPECT_THROW(link.session.post(Setpoints{}, link.now), Error);
+}
+
+TEST(SessionGroupArming, IsHeldBackUntilTheProgramIsArmed) {
+  SessionOptions options = ScriptedLink::without_questions();
+  options.arming = Arming::required;
+  ScriptedLink link(options);
+  link.connect();
+  link.identity("group");
+  EXPECT_EQ(link.session.post(wheels, link.now), PostResult::not_armed);
+  const Ticket ticket = link.session.send(wheels, 1s, link.now);
+  link.pass(1ms);
+  ASSERT_EQ(link.results.count(ticket), 1U);
+  EXPECT_EQ(link.results[ticket].outcome, Outcome::not_armed);
+  EXPECT_EQ(link.count('O'), 0U);
+}
+
+}  // namespace
+}  // namespace r4::test
