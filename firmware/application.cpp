@@ -50,9 +50,11 @@ std::uint8_t Application::add_port(Port& port) {
   return port_count_++;
 }
 
+// Who comes to a board without a host may know the text only, and wait for the board to speak first.
 void Application::tell_ports() {
+  const bool packed = setpoints_.settings.pack && link_.has_owner();
   for (std::uint8_t i = 0; i < port_count_; ++i) {
-    ports_[i].port->use_packed_form(setpoints_.settings.pack);
+    ports_[i].port->use_packed_form(packed);
   }
 }
 
@@ -171,6 +173,7 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
       break;
     case HeartbeatEffect::new_session:
       ports_[from.port].port->hold(from.peer);
+      tell_ports();
       // Nothing that another host, or this one before its restart, commanded may come back.
       setpoints_.outputs = Outputs();
       setpoints_.fields = FieldSet::paper_default();
@@ -182,6 +185,7 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
       break;
     case HeartbeatEffect::resumed:
       ports_[from.port].port->hold(from.peer);
+      tell_ports();
       if (setpoints_.settings.recovery == Recovery::rearm) setpoints_.outputs = Outputs();
       safety_.leave(SafeReason::link);
       schedule_.start(now_ms, period_of(setpoints_.settings));

@@ -27,6 +27,7 @@ void Application::enter(SafeReason cause, std::uint32_t now_ms) {
   if (cause == SafeReason::link) {
     schedule_.stop();
     ports_[link_.owner().port].port->hold(everyone);
+    tell_ports();
   } else {
     setpoints_.outputs = Outputs();
     caused_ms_ = now_ms;

@@ -20,7 +20,7 @@ Registry Registry::standard() {
                 "USB serial, or the pty of a simulated board", make_serial_carrier});
   registry.add(
       {"pty", "pty:[PATH]", "for a board: a pty that a host opens as serial", make_pty_carrier});
-  registry.add({"can", "can://can0[?node=1&fd=0&pack=0]", "ISO-TP on a CAN bus (SocketCAN)",
+  registry.add({"can", "can://can0[?node=1&fd=0&pack=1]", "ISO-TP on a CAN bus (SocketCAN)",
                 make_can_carrier});
   return registry;
 }

@@ -8,7 +8,7 @@
 //     heartbeat  50-1000       500      ms between the board's heartbeats; below the timeout
 //     timeout    100-10000     1000     ms of silence until the safe state; above `heartbeat`
 //     recovery   last | rearm  last     outputs after SAFE(link)
-//     pack       0 | 1         0        1: on CAN the board sends the packed form
+//     pack       0 | 1         1        1: on CAN the board packs for a host that packs; 0: never
 //
 // Beside them those of the place where the board stands: site_settings.hpp.
 #pragma once
@@ -29,7 +29,7 @@ struct Settings {
   std::uint16_t heartbeat_ms = 500;
   std::uint16_t timeout_ms = 1000;
   Recovery recovery = Recovery::last;
-  bool pack = false;
+  bool pack = true;
   SiteSettings site;
 };
 bool operator==(const Settings& a, const Settings& b);

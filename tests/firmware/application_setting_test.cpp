@@ -9,6 +9,7 @@ namespace {
 
 using firmware::BoardState;
 using test::echo_pnum;
+using test::TestBoard;
 using test::TestHost;
 using Lines = std::vector<std::string>;
 
@@ -85,11 +86,43 @@ TEST_F(ApplicationSetting, SettingsOutlastTheSession) {
 }
 
 TEST_F(ApplicationSetting, MakesEveryPortSendThePackedForm) {
-  host.command("C:pack,1");
-  EXPECT_TRUE(board.ports[0].packed);
-  host.command("C:rate,50");
   EXPECT_TRUE(board.ports[0].packed);
   host.command("C:pack,0");
+  EXPECT_FALSE(board.ports[0].packed);
+  host.command("C:rate,50");
+  EXPECT_FALSE(board.ports[0].packed);
+  host.command("C:pack,1");
+  EXPECT_TRUE(board.ports[0].packed);
+}
+
+// Another host may come then, that knows the text only.
+TEST_F(ApplicationSetting, WithoutAHostABoardSpeaksPlainText) {
+  board.run(1000);
+  ASSERT_EQ(board.reason(), SafeReason::link);
+  EXPECT_FALSE(board.ports[0].packed);
+  host.echo();
+  ASSERT_EQ(board.state(), BoardState::active);
+  EXPECT_TRUE(board.ports[0].packed) << "the same host goes on";
+  host.command("C:pack,0");
+  board.run(1000);
+  host.echo();
+  ASSERT_EQ(board.state(), BoardState::active);
+  EXPECT_FALSE(board.ports[0].packed);
+
+  TestBoard alone;
+  EXPECT_FALSE(alone.ports[0].packed);
+  TestHost first(alone, echo_pnum, Source{0, 4});
+  first.connect();
+  EXPECT_TRUE(alone.ports[0].packed) << "a new session";
+  alone.application->port_down(0, alone.now_ms);
+  EXPECT_FALSE(alone.ports[0].packed);
+}
+
+TEST_F(ApplicationSetting, ABoardThatWasStoppedSpeaksPlainTextWhenItsHostIsGone) {
+  host.command("E:STOP");
+  EXPECT_TRUE(board.ports[0].packed);
+  board.run(1000);
+  EXPECT_EQ(board.reason(), SafeReason::stop);
   EXPECT_FALSE(board.ports[0].packed);
 }
 

@@ -225,14 +225,22 @@ TEST(GigaLink, ASilentHostMakesEverythingSafeInTheTimerInterrupt) {
   EXPECT_LE(bench.giga.now_ms() - fed_ms, 1000U + 20U);
 }
 
-TEST(GigaCan, DrivesAMotorAndTellsItsState) {
+class GigaCanForm : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(PackedAndPlain, GigaCanForm, testing::Bool());
+
+TEST_P(GigaCanForm, DrivesAMotorAndTellsItsStateInTheHostsForm) {
   GigaBench bench;
+  bench.can_node.use_packed_form(GetParam());
   bench.boot();
   PlainHost host;
   bench.drive(host, bench.can());
+  bench.can_datagrams.clear();
+  const std::uint32_t unpacked = bench.can_node.counters().unpacked;
   bench.run_ms(50);
   ASSERT_FALSE(bench.can_datagrams.empty());
   EXPECT_NE(bench.can_datagrams.back().find("OSMC1:358,1;"), std::string::npos);
+  EXPECT_EQ(bench.can_node.counters().unpacked - unpacked,
+            GetParam() ? bench.can_datagrams.size() : 0);
 }
 
 TEST(GigaCan, LeavesBusOffByItself) {

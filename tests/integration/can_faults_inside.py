@@ -36,12 +36,8 @@ def running_bus():
 @pytest.fixture(name='board')
 def running_board(bus):
     assert bus.interfaces == ['slcan0', 'slcan1']
-    with packed_board() as board:
+    with Board(BOARD) as board:
         yield board
-
-
-def packed_board():
-    return Board(BOARD, options=('--set', 'pack,1'))
 
 
 def driving_host(board, hold=60):
@@ -232,7 +228,7 @@ def test_damaged_frames_cost_time_and_no_datagram(bus, board, percent):
 
 
 def test_a_babbling_node_of_top_priority_leaves_the_board_safe():
-    with SlcanBus(2, 250000) as bus, packed_board() as board, driving_host(board):
+    with SlcanBus(2, 250000) as bus, Board(BOARD) as board, driving_host(board):
         bus.order('babble', f'{BABBLE:x}')
         since = time.monotonic()
         safe = goes_safe_in_time(board)
@@ -243,7 +239,7 @@ def test_a_babbling_node_of_top_priority_leaves_the_board_safe():
 
 
 def test_a_full_queue_drops_old_states_and_no_frame_within_a_datagram():
-    with SlcanBus(2, BITRATE, txqueuelen=10) as bus, packed_board() as board, monitor(HOST) as host:
+    with SlcanBus(2, BITRATE, txqueuelen=10) as bus, Board(BOARD) as board, monitor(HOST) as host:
         in_control(host)
         # Another program keeps the queue of the board's interface full.
         flood = subprocess.Popen(['cangen', 'slcan0', '-g', '0', '-i', '-I', f'{FLOOD:X}', '-L', '8'])
@@ -283,7 +279,7 @@ def wait_for_sockets(interface, identifier, count):
 
 
 def test_a_stop_overtakes_a_full_queue():
-    with SlcanBus(2, BITRATE, txqueuelen=10) as bus, packed_board() as board, Dump('slcan0') as dump:
+    with SlcanBus(2, BITRATE, txqueuelen=10) as bus, Board(BOARD) as board, Dump('slcan0') as dump:
         with driving_host(board):
             bus.order('stall', 1)
             flood = subprocess.Popen(['cangen', 'slcan1', '-g', '0', '-i', '-I', f'{FLOOD:X}', '-L', '8'])

@@ -4,6 +4,7 @@
 vcan0 is a bus in the kernel, can0 and can1 are two controllers with their driver on one bus.
 """
 import contextlib
+import re
 import signal
 import subprocess
 import threading
@@ -16,6 +17,7 @@ from r4_process import ERROR, PATIENCE_S, R4, Board, is_link, is_state, monitor,
 # The board's timeout, what docs/safety.md promises on top, and what an emulated machine may take.
 SAFE_WITHIN_MS = 1020 + 80
 BUS = 'can://vcan0?node=3'
+IN_PLAIN_TEXT = BUS + '&pack=0'
 EMERGENCY, WENT_SAFE, COMMAND, REPLY, TELEMETRY = 0x010, 0x023, 0x183, 0x203, 0x403
 
 
@@ -25,12 +27,13 @@ def ip(*arguments):
 
 @pytest.fixture(name='board', params=['vcan', 'controllers'])
 def on_a_bus(request):
-    """A board, on a bus in the kernel, and on one of two controllers with their driver."""
+    """A board, on a bus in the kernel in plain text, and packed on one of two controllers with their driver."""
     if request.param == 'vcan':
         board = Board(BUS)
         board.bus, board.packs = 'vcan0', False
+        board.host_url = IN_PLAIN_TEXT
     else:  # each frame costs the emulated machine some 100 us: fewer frames
-        board = Board('can://can0?node=3', options=('--set', 'pack,1'))
+        board = Board('can://can0?node=3')
         board.bus, board.packs = 'can1', True
         board.host_url = 'can://can1?node=3'
     with board:
@@ -193,46 +196,49 @@ def test_another_host_is_refused_while_the_first_is_there(board):
 
 @pytest.mark.parametrize('url, host_url', [(BUS, BUS), ('can://can0?node=3', 'can://can1?node=3')])
 def test_a_restarted_board_is_taken_up_again(url, host_url):
-    options = ('--set', 'pack,1')
     with contextlib.ExitStack() as stack:
-        first = stack.enter_context(Board(url, options=options))
+        first = stack.enter_context(Board(url))
         host = stack.enter_context(monitor(host_url))
         in_control(host)
         first.signal(signal.SIGKILL)
         first.wait()
         host.next(lambda each: each['type'] == 'link' and each['fields']['state'] != 'active', timeout=20)
-        stack.enter_context(Board(url, options=options))
+        stack.enter_context(Board(url))
         host.next(is_link('active'), timeout=20)
 
 
 def test_packed_and_fd_take_fewer_frames(vcan_board):
-    def frames_a_second():
-        with Dump('vcan0') as dump, monitor(vcan_board.host_url) as host:
+    def frames_a_second(url):
+        with Dump('vcan0') as dump, monitor(url) as host:
             in_control(host)
             dump.frames.clear()
             times = [host.next(is_state)['t'] for _ in range(100)]
             telemetry = [data for frame, data in dump.frames if frame == TELEMETRY]
             return len(telemetry) / (times[-1] - times[0]) * 1000
 
-    plain = frames_a_second()
-    assert run('send', vcan_board.host_url, 'C:pack,1', timeout=60).returncode == 0
-    packed = frames_a_second()
+    plain = frames_a_second(IN_PLAIN_TEXT)
+    packed = frames_a_second(BUS)
     measured = objects(run('bench', vcan_board.host_url, '--duration', '2', '--json', timeout=60).stdout)[0]
     assert measured['transfers']['packed'] > 50 and measured['transfers']['bad_form'] == 0
     print(f'{plain:.0f} frames a second plain, {packed:.0f} packed')
     assert 3 * packed < plain  # 24 frames and 5 a state; a slow emulated machine leaves states out
+    assert run('send', BUS, 'C:pack,0', timeout=60).returncode == 0
+    assert 3 * packed < frames_a_second(BUS), 'the board packs, and was told not to'
 
 
-def test_can_fd_carries_a_state_in_three_frames():
+def test_can_fd_carries_a_plain_state_in_three_frames_and_a_packed_one_in_one():
     with Board('can://vcan0?node=3&fd=1') as board, Dump('vcan0') as dump:
-        with monitor(board.host_url) as host:
+        with monitor(board.host_url + '&pack=0') as host:
             in_control(host)
             for _ in range(50):
                 host.next(is_state)
-        result = run('send', board.host_url + '&pack=1', 'O:358,1,1', timeout=60)
+        states = [data for frame, data in dump.frames if frame == TELEMETRY and len(data) > 100]
+        assert len(states) > 100
+        dump.frames.clear()
+        result = run('send', board.host_url, 'O:358,1,1', timeout=60)
         assert result.returncode == 0, result
-    states = [data for frame, data in dump.frames if frame == TELEMETRY and len(data) > 100]
-    assert len(states) > 100
+    # Flags, the length behind a zero, and the head of a default state (docs/packed.md, layouts 2 and 3).
+    assert any(frame == TELEMETRY and re.match('.00..9', data) for frame, data in dump.frames)
 
 
 def test_an_interface_that_goes_down_is_told_of_and_comes_back(board):
@@ -307,10 +313,10 @@ def test_garbage_on_every_id_of_ours_harms_nobody(board):
 def test_eight_boards_on_one_bus_each_with_its_host(boards_at, hosts_at):
     # At a rate that the emulated machine bears with nine processes, and with patience for frames that
     # its controllers lose: the backbone at 100 Hz is tests/simulation's, in virtual time.
-    slowly = ('--set', 'pack,1', '--set', 'rate,20', '--set', 'timeout,3000')
+    slowly = ('--set', 'rate,20', '--set', 'timeout,3000')
     with contextlib.ExitStack() as stack:
         boards = stack.enter_context(Board(f'can://{boards_at}?node=0-7', options=slowly, listens=8))
-        hosts = [stack.enter_context(monitor(f'can://{hosts_at}?node={node}&pack=1')) for node in range(8)]
+        hosts = [stack.enter_context(monitor(f'can://{hosts_at}?node={node}')) for node in range(8)]
         for host in hosts:
             in_control(host)
         for host in hosts:
@@ -331,7 +337,7 @@ def test_eight_boards_on_one_bus_each_with_its_host(boards_at, hosts_at):
 
 
 def test_none_of_eight_boards_at_50_hz_is_safe_by_mistake():
-    often = ('--set', 'pack,1', '--set', 'rate,50')
+    often = ('--set', 'rate,50')
     with contextlib.ExitStack() as stack:
         boards = stack.enter_context(Board('can://vcan0?node=0-7', options=often, listens=8))
         for node in range(8):
@@ -347,7 +353,7 @@ def test_none_of_eight_boards_at_50_hz_is_safe_by_mistake():
 
 
 def test_a_bus_is_shown_with_all_of_its_boards():
-    with Board('can://vcan0?node=2-4', listens=3), monitor('can://vcan0?node=3') as host:
+    with Board('can://vcan0?node=2-4', listens=3), monitor(IN_PLAIN_TEXT) as host:  # to have some load
         in_control(host)
         listed = {each.get('interface'): each for each in objects(run('list', '--json', timeout=60).stdout)}
         assert [board['node'] for board in listed['vcan0']['boards']] == [2, 3, 4]

@@ -22,7 +22,6 @@ from r4_process import R4, Board, Running, is_link, is_state, lasts, monitor, ob
 BOARD, HOST = 'can://vxcan0?node=2', 'can://vxcan1?node=2'
 COMMAND_OF_2 = '182'
 TELEMETRY = 0x400
-PACKED = ('--set', 'pack,1')
 NODE = 4
 COMMAND, REPLY = 0x180 + NODE, 0x200 + NODE
 NEXT_WITHIN_S = 0.5  # a whole heartbeat after a broken one is obeyed; the rest is the emulated machine
@@ -52,6 +51,10 @@ def frames_of(first):
     return 1 - -(int(first[1:4], 16) - 6) // 7
 
 
+def is_packed(first):
+    return int(first[4:6], 16) >= 0x80
+
+
 def test_of_telemetry_arrives_what_its_frames_allow(tmp_path):
     dumped, heard = tmp_path / 'frames', [tmp_path / str(node) for node in range(NODES)]
     with netem('loss', '1%'), contextlib.ExitStack() as stack:
@@ -61,7 +64,7 @@ def test_of_telemetry_arrives_what_its_frames_allow(tmp_path):
 
         dump = runs(dumped, 'candump', '-L', 'vxcan0,400:7E0')
         boards = stack.enter_context(Board(f'can://vxcan0?node=0-{NODES - 1}', listens=NODES,
-                                           options=(*PACKED, '--set', f'rate,{RATE}')))
+                                           options=('--set', f'rate,{RATE}')))
         hosts = [runs(path, R4, 'monitor', f'can://vxcan1?node={node}') for node, path in enumerate(heard)]
         subprocess.run(['candump', '-n', str(5 * STATES // NODES), f'vxcan0,{TELEMETRY:x}:7FF'],
                        stdout=subprocess.DEVNULL, check=True, timeout=60)
@@ -72,8 +75,9 @@ def test_of_telemetry_arrives_what_its_frames_allow(tmp_path):
         told = subprocess.run(['tc', '-s', '-j', 'qdisc', 'show', 'dev', 'vxcan0'], capture_output=True,
                               text=True, check=True)
     assert not any(each.get('state') == 'SAFE' for each in log)
-    firsts = re.findall(r'#(1\w{3})', dumped.read_text(encoding='ascii'))
-    sent = [count for count in map(frames_of, firsts) if count > 3]  # no heartbeat
+    firsts = re.findall(r'#(1\w{5})', dumped.read_text(encoding='ascii'))
+    # No heartbeats: packed they are shorter, and before there was a host they were plain text.
+    sent = [frames_of(first) for first in firsts if is_packed(first) and frames_of(first) > 3]
     arrived = sum(len(re.findall('^state ', path.read_text(encoding='ascii'), re.MULTILINE)) for path in heard)
     netem_told = json.loads(told.stdout)[0]
     loss = netem_told['drops'] / (netem_told['packets'] + netem_told['drops'])
@@ -112,13 +116,14 @@ def agrees_with_the_board(told, commands, log):
 @pytest.mark.parametrize('loss, count', [('1%', 40), ('5%', 20)])
 def test_a_confirmed_command_was_executed_exactly_once(loss, count):
     commands = [f'S:{1000 + i},{1 + i % 16}' for i in range(count)]
-    with netem('loss', loss, 'delay', '2ms'), Board(BOARD, options=PACKED) as board, \
+    with netem('loss', loss, 'delay', '2ms'), Board(BOARD) as board, \
             Dump(f'vxcan1,{COMMAND_OF_2}:7FF') as dump:
         result = run('send', HOST, '--json', '--timeout', '10', *commands, timeout=200)
         log = board.rest()
     told = told_of(objects(result.stdout), commands)
-    # The first frames of what begins with S:
-    begun = sum(data.startswith('10') and data[4:8] == '533A' for _, data in dump.frames)
+    # The first frames of commands (docs/packed.md, layout 1), but for the F that the host sends first.
+    firsts = [data for _, data in dump.frames if re.match('10..8[8-F]', data)]
+    begun = sum(first != firsts[0] for first in firsts)
     print(f'{told.count("confirmed")} of {count} confirmed, begun {begun} times')
     agrees_with_the_board(told, commands, log)
     if loss == '1%':
@@ -129,7 +134,7 @@ def test_a_confirmed_command_was_executed_exactly_once(loss, count):
 
 def test_a_command_that_is_not_confirmed_is_reported_and_those_behind_it_are_not_sent():
     commands = [f'S:{1000 + i},{1 + i % 16}' for i in range(300)]
-    with Board(BOARD, options=PACKED) as board, \
+    with Board(BOARD) as board, \
             Running('send', HOST, '--json', '--timeout', '3', *commands) as sender:
         board.executed(commands[3])
         with netem('loss', '100%'):
@@ -149,7 +154,7 @@ NUMBERED_STOPS = f'{EMERGENCY << 18:08x}:{0x7FF << 18:08x}'
 
 
 def test_a_stop_whose_first_frames_are_lost_is_repeated_until_the_board_confirms_it():
-    with Board(BOARD, options=PACKED) as board, monitor(HOST) as host, \
+    with Board(BOARD) as board, monitor(HOST) as host, \
             Dump(f'vxcan1,{NUMBERED_STOPS}') as sent, Dump(f'vxcan0,{NUMBERED_STOPS}') as arrived:
         in_control(host)
         with netem('loss', '100%', ends=['vxcan1']):
@@ -186,10 +191,9 @@ class Gateway:
 
 @pytest.mark.parametrize('form', ['plain', 'packed'])
 def test_nothing_corrupt_is_ever_applied(form):
-    options = PACKED if form == 'packed' else ()
-    host_url = f'can://vcan1?node={NODE}' + ('&pack=1' if options else '')
+    host_url = f'can://vcan1?node={NODE}' + ('&pack=0' if form == 'plain' else '')
     commands = [f'S:{1000 + i},{1 + i % 16}' for i in range(400)]
-    with Gateway() as gateway, Board(f'can://vcan0?node={NODE}', options=options) as board:
+    with Gateway() as gateway, Board(f'can://vcan0?node={NODE}') as board:
         with Running('send', host_url, '--timeout', '20', '--json', *commands) as sender, Dump('vcan1') as dump:
             board.executed(commands[0], timeout=20)
             for byte in range(8):
@@ -265,8 +269,9 @@ def test_the_datagram_after_a_broken_one_is_taken(break_off):
 
 def test_an_end_that_is_killed_within_a_transfer_is_followed_by_the_next_one():
     url = f'can://vcan0?node={NODE}'
+    plain = url + '&pack=0'
     options = ('--set', 'rate,500')  # of 26 frames each: there is always one on its way
-    with monitor_of_several(url) as host:
+    with monitor_of_several(url, plain) as host:
         for _ in range(3):
             with Board(url, options=options) as board:
                 host.next(is_link('active'), timeout=20)
@@ -282,15 +287,15 @@ def test_an_end_that_is_killed_within_a_transfer_is_followed_by_the_next_one():
             host.signal(signal.SIGKILL)
             host.wait()
             board.state('SAFE', 'link')
-            result = run('send', url, 'O:358,1,1', timeout=60)
+            result = run('send', plain, 'O:358,1,1', timeout=60)
             assert result.returncode == 0, result
     kinds = collections.Counter(each['type'] for each in host.log)
     print(dict(kinds))
 
 
 @contextlib.contextmanager
-def monitor_of_several(url):
-    with Board(url) as board, monitor(url) as host:
+def monitor_of_several(url, host_url):
+    with Board(url) as board, monitor(host_url) as host:
         in_control(host)
         board.signal(signal.SIGKILL)
         board.wait()

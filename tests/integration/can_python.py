@@ -187,7 +187,7 @@ class Peer:
 class Host(Peer):
     """An echo host (protocol.md, 4.2) of one board."""
 
-    def __init__(self, interface, node, fd=False, block_size=0, stmin=0):
+    def __init__(self, interface, node, fd=False, block_size=0, stmin=0, packs=True):
         super().__init__(interface, TO_BOARD + node, REPLIES + node,
                          [REPLIES + node, TELEMETRY + node, WENT_SAFE + node], fd)
         self.receivers = {REPLIES + node: Receiver(lambda data: self.send_frame(self.own_id, data), block_size, stmin),
@@ -197,7 +197,7 @@ class Host(Peer):
         self.cause = 0  # as the newest heartbeat told it
         self.beats = True
         self.echoed = False
-        self.packs = False
+        self.packs = packs
         self.next_beat = 0.0
         self.newest_command = ''
         self.heard = []      # (text, fields, packed), in their order
@@ -277,10 +277,11 @@ class Host(Peer):
 class Board(Peer):
     """Enough of a board for r4: the link, F, O, Q, E:STOP, E:CLEAR. Runs in a thread as a context."""
 
-    def __init__(self, interface, node, fd=False, packs=False, obeys=True, refuses=()):
+    def __init__(self, interface, node, fd=False, packs=True, obeys=True, refuses=()):
         super().__init__(interface, REPLIES + node, TO_BOARD + node, [EMERGENCY_STOP, TO_BOARD + node], fd)
         self.receivers = {TO_BOARD + node: Receiver(lambda data: self.send_frame(self.own_id, data))}
         self.node, self.packs, self.obeys, self.refuses = node, packs, obeys, refuses
+        self.host_packs = False  # its newest datagram was packed
         self.offset = random.randrange(2 ** 31)
         self.began = time.monotonic()
         self.state, self.safe, self.pnum = 'CONNECTING', 0, 0
@@ -290,7 +291,7 @@ class Board(Peer):
         self.fields, self.osmc, self.last_command = [], '0,0', 0
         self.next_state = self.next_beat = 0.0
         self.answers = []    # what is to be sent
-        self.executed, self.stops = [], 0
+        self.executed, self.stops, self.heard_packed = [], 0, []
         self.ends = threading.Event()
         self.thread = threading.Thread(target=self._run)
 
@@ -353,7 +354,8 @@ class Board(Peer):
         return fields
 
     def _send(self, identifier, text, flow_control):
-        self.send_message(identifier, (packed_form.pack(text) if self.packs else None) or text.encode(), flow_control)
+        packs = self.packs and self.host_packs and self.state == 'ACTIVE'
+        self.send_message(identifier, (packed_form.pack(text) if packs else None) or text.encode(), flow_control)
 
     def _go_safe(self, reason):
         if self.safe != reason:
@@ -377,6 +379,8 @@ class Board(Peer):
         self._go_safe(2)
 
     def on_text(self, text, packed):
+        self.host_packs = packed
+        self.heard_packed.append(packed)
         fields = read(text)
         if fields is None:
             return

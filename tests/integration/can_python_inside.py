@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What test_can_python.py runs where SocketCAN is: r4 against the host and the board of can_python.py."""
 import contextlib
+import socket
+import struct
 import subprocess
 import sys
 import time
@@ -8,7 +10,9 @@ import time
 import pytest
 
 import can_python
-from r4_process import Board, is_state, monitor, objects, run
+import packed_form
+from paper_client import PaperClient
+from r4_process import PATIENCE_S, Board, is_state, monitor, objects, run
 
 BOARD_URL, HOST_URL = 'can://vcan0?node=3', 'can://vcan0?node=4'
 SLOWLY = ('--set', 'rate,20')  # python takes half a millisecond a frame in an emulated machine
@@ -43,17 +47,21 @@ def running_board():
 
 # --- python is the host, r4 sim the board
 
-def test_host_connects_commands_and_sees_it_in_the_state(board, tmp_path):
-    with recording(tmp_path / 'bus.log'), python_host() as host:
+@pytest.mark.parametrize('packs', [True, False])
+def test_host_connects_commands_and_sees_it_in_the_state(board, tmp_path, packs):
+    with recording(tmp_path / 'bus.log'), python_host(packs=packs) as host:
         host.beats = False
         host.next(lambda fields: 'H' in fields)
         assert host.heard[-1][0] == 'H:R4-ROS2;PNum:0;T:0;^0xb10b3a06^'
+        assert not host.heard[-1][2], 'a board without a host is read by all'
         host.beats = True
         host.take_control()
+        in_control = len(host.heard)
         assert host.command('O:358,1,1') == 'done'
         state = host.next(lambda fields: 'OSMC1' in fields)
         assert (state['OSMC1'], state['SAFE'], state['DMHSTA']) == ('358,1', '0', '1')
         heard = [text for text, _, _ in host.heard]
+        assert {packed for _, _, packed in host.heard[in_control:]} == {packs}
     board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
     executed = [each['executed']['command'] for each in board.log if 'executed' in each]
     assert executed == ['F:DEFAULT,SAFE,CMD', 'O:358,1,1']
@@ -85,7 +93,10 @@ def test_the_board_obeys_blocks_and_gaps_of_the_hosts_flow_control(board):
         asked, replies = time.monotonic(), host.receivers[0x203]
         _, question = host.send('Q:ID')
         assert host.next(lambda fields: 'I' in fields, retry=question)['I'].startswith('R4,')
-        frames = -(-(len(host.heard[-1][0]) - 6) // 7)  # of which the gap is within each pair
+        text, _, packed = host.heard[-1]
+        assert packed
+        frames = -(-(len(packed_form.pack(text)) - 6) // 7)  # of which the gap is within each pair
+        assert frames >= 3
         assert time.monotonic() - asked >= frames // 2 * 0.003
         assert replies.answered >= -(-frames // 2)
         assert host.command('O:358,1,9') == 'CHANNEL'
@@ -118,28 +129,59 @@ def test_a_host_that_falls_silent_leaves_the_board_safe_and_comes_back(board):
         print(f'silence to the went-safe frame {(at - silent) * 1000:.0f} ms')
         assert reason == 1 and 0.85 <= at - silent <= 1.2
         assert host.next(lambda fields: 'H' in fields)['SAFE'] == '1'
+        assert not host.heard[-1][2], 'who comes now may know the text only'
         host.beats = True
         assert host.next(lambda fields: 'OSMC1' in fields)['SAFE'] == '0'
+        assert host.heard[-1][2]
     assert board.state('SAFE', 'link')['silence'] >= 1000
 
 
-def test_both_ends_pack(board):
+def test_the_board_speaks_in_the_form_in_which_it_is_spoken_to(board):
     with python_host() as host:
         host.take_control()
-        assert host.command('C:pack,1') == 'done'
-        host.next(lambda fields: 'H' in fields)
-        host.packs = True
-        assert host.command('O:358,1,1') == 'done'
-        assert host.command('O:358,1,9') == 'CHANNEL'
-        host.next(lambda fields: fields.get('OSMC1') == '358,1')
-        assert all(packed for _, _, packed in host.heard[-3:])
+        for packs, pwm in ((True, 358), (False, 359), (True, 360)):
+            host.packs = packs
+            assert host.command(f'O:{pwm},1,1') == 'done'
+            assert host.command(f'O:{pwm},1,9') == 'CHANNEL'
+            host.next(lambda fields: fields.get('OSMC1') == f'{pwm},1')
+            assert {packed for _, _, packed in host.heard[-3:]} == {packs}
         assert host.command('C:pack,0') == 'done'
         host.next(lambda fields: 'OSMC1' in fields and not host.heard[-1][2])
-    board.executed('O:358,1,1')
+        assert host.command('C:pack,1') == 'done'
+        host.next(lambda fields: 'OSMC1' in fields and host.heard[-1][2])
+    board.executed('O:360,1,1')
 
 
-def test_a_host_that_speaks_fd_is_understood_and_hears_fd():
-    with Board(BOARD_URL + '&fd=1', options=SLOWLY) as board, python_host(fd=True) as host:
+def kernel_isotp(hears, own, flags=0):
+    """A socket of the kernel's ISO-TP."""
+    isotp, options, classic = 106, 1, struct.pack('=IIBBBB', flags, 0, 0, 0, 0, 0)
+    peer = socket.socket(socket.AF_CAN, socket.SOCK_DGRAM, socket.CAN_ISOTP)
+    peer.setsockopt(isotp, options, classic)
+    peer.bind(('vcan0', hears, own))
+    peer.settimeout(PATIENCE_S)
+    return peer
+
+
+def test_the_papers_client_drives_a_board_as_it_is_delivered_by_the_kernels_iso_tp():
+    # Seven commands for each datagram that comes take the emulated machine long.
+    options, listen_mode, states = ('--set', 'rate,2', '--set', 'timeout,3000'), 1, 6
+    with Board(BOARD_URL, options=options) as board, \
+            contextlib.closing(kernel_isotp(0x403, 0x7FF, listen_mode)) as telemetry, \
+            contextlib.closing(kernel_isotp(0x203, 0x183)) as dialogue:
+        client = PaperClient(dialogue.send)
+        while len(client.states) < states:
+            client.take(telemetry.recv(1024))
+        log = board.rest()
+    active = [each for each in log if each.get('state') == 'ACTIVE']
+    assert active and not any(each.get('state') == 'SAFE' for each in log)
+    assert ';DHB1A:1000,1;' in client.states[-1] and ';SERVO1POS:300;' in client.states[-1]
+    outputs = [each['outputs'] for each in active if 'outputs' in each][-1]
+    assert outputs['dhb'] == [[1000, 1], [1000, 0], [1000, 1], [1000, 0]]
+
+
+@pytest.mark.parametrize('packs', [True, False])
+def test_a_host_that_speaks_fd_is_understood_and_hears_fd(packs):
+    with Board(BOARD_URL + '&fd=1', options=SLOWLY) as board, python_host(fd=True, packs=packs) as host:
         host.take_control()
         assert host.command('O:358,1,1') == 'done'
         assert host.command('O:358,1,9') == 'CHANNEL'
@@ -161,11 +203,12 @@ def test_monitor_follows_a_python_board():
     assert board.executed == ['F:DEFAULT,SAFE,CMD'] and board.stops == 0
 
 
-@pytest.mark.parametrize('options', [{}, {'packs': True}, {'fd': True}])
-def test_send_is_confirmed_by_a_python_board(options):
+@pytest.mark.parametrize('options, url', [
+    ({}, HOST_URL), ({}, HOST_URL + '&pack=0'), ({'packs': False}, HOST_URL), ({'fd': True}, HOST_URL + '&fd=1')])
+def test_send_is_confirmed_by_a_python_board(options, url):
     with can_python.Board('vcan0', 4, **options) as board:
-        url = HOST_URL + ('&fd=1' if 'fd' in options else '') + ('&pack=1' if 'packs' in options else '')
         result = run('send', url, 'O:358,1,1', 'Q:ID', timeout=60)
+    assert set(board.heard_packed) == {'pack=0' not in url}
     assert result.returncode == 0 and 'second' in result.stdout, result
     assert board.executed == ['F:DEFAULT,RELAYS,SAFE,CMD', 'O:358,1,1']
 

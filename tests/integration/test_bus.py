@@ -19,20 +19,20 @@ def planned(*arguments):
 
 
 def test_eight_boards_in_packed_form_fit_and_in_plain_form_do_not():
-    rows, result = planned('--packed')
-    assert result.returncode == 0 and result.stderr == ''
+    rows, result = planned()
+    assert result.returncode == 0 and result.stderr == '' and rows['total']['packed'] is True
     assert rows['total']['boards'] == 8 and rows['total']['fits'] is True
     assert rows['total']['load'] < 0.6 and rows['total']['worst_load'] < 0.8
-    rows, result = planned()
-    assert result.returncode == DATA_BAD and ERROR.search(result.stderr) and '--packed' in result.stderr
+    rows, result = planned('--plain')
+    assert result.returncode == DATA_BAD and ERROR.search(result.stderr) and '--plain' in result.stderr
     assert rows['total']['load'] > 2 and rows['total']['fits'] is False
     assert objects(result.stdout)[-1]['type'] == 'error'
-    rows, result = planned('--boards', '2')
+    rows, result = planned('--plain', '--boards', '2')
     assert result.returncode == 0 and rows['total']['fits'] is True
 
 
 def test_the_rows_add_up_to_the_total():
-    rows, _ = planned('--packed', '--boards', '3', '--commands', '5', '--rate', '40')
+    rows, _ = planned('--boards', '3', '--commands', '5', '--rate', '40')
     total = rows.pop('total')
     assert list(rows) == ['state', 'board heartbeat', 'host heartbeat', 'command']
     assert [rows[name]['datagrams'] for name in rows] == [120, 6, 30, 15]
@@ -43,37 +43,37 @@ def test_the_rows_add_up_to_the_total():
 
 def test_frames_are_those_of_iso_tp():
     """The board's plain heartbeat: a first frame of 6 bytes, then 7 a frame."""
-    rows, _ = planned('--boards', '1')
+    rows, _ = planned('--plain', '--boards', '1')
     heartbeat = rows['board heartbeat']
     assert math.isclose(heartbeat['frames'] / heartbeat['datagrams'],
                         1 + math.ceil((heartbeat['bytes'] - 6) / 7), abs_tol=1)
-    rows, _ = planned('--boards', '1', '--fd')
+    rows, _ = planned('--plain', '--boards', '1', '--fd')
     assert rows['board heartbeat']['frames'] == rows['board heartbeat']['datagrams']  # one FD frame
 
 
 def test_above_80_percent_it_warns_and_still_fits():
-    result = run('bus', '--packed', '--boards', '13')
+    result = run('bus', '--boards', '13')
     assert result.returncode == 0
     assert re.fullmatch(r'r4: warning: the bus: .+; .+\n', result.stderr)
-    assert run('bus', '--packed', '--boards', '11').stderr == ''
+    assert run('bus', '--boards', '11').stderr == ''
 
 
 def test_what_it_says_fits_does_fit():
-    rows, _ = planned('--packed')
+    rows, _ = planned()
     boards, rate = rows['total']['most_boards'], rows['total']['highest_rate']
     for more in (('--boards', str(boards)), ('--rate', str(rate))):
-        rows, result = planned('--packed', *more)
+        rows, result = planned(*more)
         assert rows['total']['load'] <= 0.8 and result.stderr == ''
     for more in (('--boards', str(boards + 1)), ('--rate', str(rate + 1))):
-        rows, result = planned('--packed', *more)
+        rows, result = planned(*more)
         assert rows['total']['load'] > 0.8 and 'warning' in result.stderr
 
 
 def test_load_follows_the_bit_rate():
-    fast, _ = planned('--packed', '--boards', '4')
-    slow, _ = planned('--packed', '--boards', '4', '--bitrate', '500000')
+    fast, _ = planned('--boards', '4')
+    slow, _ = planned('--boards', '4', '--bitrate', '500000')
     assert math.isclose(slow['total']['load'], 2 * fast['total']['load'], rel_tol=1e-6)
-    fd, _ = planned('--packed', '--boards', '4', '--fd', '--dbitrate', '8000000')
+    fd, _ = planned('--boards', '4', '--fd', '--dbitrate', '8000000')
     assert fd['total']['load'] < fast['total']['load'] and fd['total']['dbitrate'] == 8000000
 
 

@@ -65,7 +65,6 @@ class StoppedBoard final : private firmware::Port {
     firmware::Application::Config config;
     config.identity.firmware = "1";
     config.identity.board_id = "R4";
-    config.settings.pack = true;
     return config;
   }
   void again() {

@@ -20,7 +20,9 @@ TEST(Registry, MakesACarrierForEachTransport) {
   EXPECT_NE(registry.make(io, "udp:?id=left&port=2019&listen=0", Role::host), nullptr);
   EXPECT_NE(registry.make(io, "serial:auto", Role::host), nullptr);
   EXPECT_NE(registry.make(io, "pty:", Role::board), nullptr);
-  EXPECT_NE(registry.make(io, "can://can0?node=31&fd=1&pack=1", Role::host), nullptr);
+  const auto on_can = registry.make(io, "can://can0?node=31&fd=1&pack=1", Role::host);
+  EXPECT_EQ(on_can->name(), "can://can0?node=31&fd=1") << "to pack is the default";
+  EXPECT_EQ(registry.make(io, "can://can0?pack=0", Role::host)->name(), "can://can0?node=1&pack=0");
   EXPECT_NE(registry.make(io, "can://can0?node=0", Role::board), nullptr);
   EXPECT_EQ(registry.entries().size(), 4U);
 }

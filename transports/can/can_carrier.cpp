@@ -77,6 +77,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   const Role role_;
   const std::uint8_t number_;
   const bool fd_;
+  const bool packs_;  // a host; a board is told by its setting
   const std::string name_;
   CanNode node_;
   CanTurn turn_{std::random_device{}()};  // of a host
@@ -104,13 +105,15 @@ CanCarrier::CanCarrier(asio::io_context& io, Url url, Role role)
       role_(role),
       number_(node_of(url_, role)),
       fd_(url_.get_number("fd", 0, 1, 0) == 1),
-      name_(fmt::format("can://{}?node={}{}", url_.host(), number_, fd_ ? "&fd=1" : "")),
+      packs_(role == Role::host && url_.get_number("pack", 0, 1, 1) == 1),
+      name_(fmt::format("can://{}?node={}{}{}", url_.host(), number_, fd_ ? "&fd=1" : "",
+                        role == Role::board || packs_ ? "" : "&pack=0")),
       node_(role == Role::board ? CanEnd::board : CanEnd::host, number_, fd_),
       lanes_{
           Lane{CanLane::dialogue, SendQueue(normal_entries, state_entries, counters_.tx_dropped)},
           Lane{CanLane::telemetry, SendQueue(normal_entries, state_entries, counters_.tx_dropped)}},
       timer_(io) {
-  node_.use_packed_form(url_.get_number("pack", 0, 1, 0) == 1);
+  node_.use_packed_form(packs_);
 }
 
 TransferCounters transfers_of(const CanNode& node) {

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// can://INTERFACE[?node=1&fd=0&pack=0]: datagrams of one board on a CAN bus (docs/can.md), by
+// can://INTERFACE[?node=1&fd=0&pack=1]: datagrams of one board on a CAN bus (docs/can.md), by
 // ISO-TP on SocketCAN, at either end. Many may share an interface.
 //
 //     node=N   the board's number on the bus, 0-31 (default 1)
 //     fd=1     sends CAN FD frames; received are both
-//     pack=1   a host sends the packed form; received are both. A board does by its setting: C:pack,1
+//     pack=0   a host sends text, and is answered so; else the packed form. Received are both. A board
+//              goes by its setting: C:pack,0
 //
 // A stop (Priority::stop) of the host's end is the emergency frame, which stops every board on the
 // bus, ahead of all that waits.

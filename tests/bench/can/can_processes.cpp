@@ -43,7 +43,7 @@ std::string board_url(Form form, Above above) {
 }
 
 std::string host_url(Form form, Above above) {
-  return board_url(form, above) + (form == Form::packed ? "&pack=1" : "");
+  return board_url(form, above) + (form == Form::plain ? "&pack=0" : "");
 }
 
 test::KernelIsotp kernel_dialogue(bool board) {

@@ -12,13 +12,13 @@ Refusal set_text(Settings& settings, const std::string& key, const std::string& 
   return set(settings, key, value);
 }
 
-TEST(Settings, DefaultsAreThePapers) {
+TEST(Settings, DefaultsAreThePapersAndPackedOnCan) {
   const Settings settings;
   EXPECT_EQ(settings.state_rate_hz, 100);
   EXPECT_EQ(settings.heartbeat_ms, 500);
   EXPECT_EQ(settings.timeout_ms, 1000);
   EXPECT_EQ(settings.recovery, Recovery::last);
-  EXPECT_FALSE(settings.pack);
+  EXPECT_TRUE(settings.pack);
 }
 
 TEST(Settings, NumbersAreTakenToTheEdgesOfTheirRange) {
@@ -72,19 +72,19 @@ TEST(Settings, RecoveryIsOneOfTwoWords) {
   EXPECT_EQ(settings.recovery, Recovery::last);
 }
 
-TEST(Settings, PackIsSwitchedOnAndOff) {
+TEST(Settings, PackIsSwitchedOffAndOn) {
   Settings settings;
-  EXPECT_EQ(set_text(settings, "pack", "1"), Refusal::none);
-  EXPECT_TRUE(settings.pack);
+  EXPECT_EQ(set_text(settings, "pack", "0"), Refusal::none);
+  EXPECT_FALSE(settings.pack);
   for (const std::string value : {"2", "-1", "99999999999999999999"}) {
     EXPECT_EQ(set_text(settings, "pack", value), Refusal::range) << value;
   }
   for (const std::string value : {"", "on", "1.0", "+1"}) {
     EXPECT_EQ(set_text(settings, "pack", value), Refusal::format) << value;
   }
-  EXPECT_TRUE(settings.pack);
-  EXPECT_EQ(set_text(settings, "pack", "0"), Refusal::none);
   EXPECT_FALSE(settings.pack);
+  EXPECT_EQ(set_text(settings, "pack", "1"), Refusal::none);
+  EXPECT_TRUE(settings.pack);
 }
 
 TEST(Settings, OtherKeysAreUnknown) {

@@ -179,7 +179,7 @@ TEST(KeptSettings, ComeBackAsTheyWere) {
   settings.heartbeat_ms = 1000;
   settings.timeout_ms = 1500;
   settings.recovery = Recovery::rearm;
-  settings.pack = true;
+  settings.pack = false;
   set_text(settings.site, "network", "off, really: 100%25^;%01");
   set_text(settings.site, "password", "%ff%fe%fd%fc%fb%fa%f9%f8");
   set_text(settings.site, "host", "10.0.200.255");
@@ -194,6 +194,15 @@ TEST(KeptSettings, ComeBackAsTheyWere) {
   read_settings(Text(written(settings)), back);
   EXPECT_TRUE(back == settings) << written(back);
   EXPECT_EQ(back.heartbeat_ms, 1000) << "it had to wait for the timeout";
+}
+
+TEST(KeptSettings, AFirmwareWithOtherDefaultsTakesThemAsTheyWereKept) {
+  Settings back;
+  read_settings("rate,50\nrecovery,last\npack,0\n", back);
+  EXPECT_FALSE(back.pack);
+  EXPECT_EQ(back.state_rate_hz, 50);
+  read_settings("rate,50\n", back = Settings());
+  EXPECT_TRUE(back.pack) << "of a firmware that did not know of it";
 }
 
 TEST(KeptSettings, TheLongestFit) {

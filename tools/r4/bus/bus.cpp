@@ -33,7 +33,7 @@ struct Options {
   std::optional<std::uint64_t> bit_rate;
   std::optional<std::uint64_t> data_bit_rate;
   bool fd = false;
-  bool packed = false;
+  bool plain = false;
   bool json = false;
   std::optional<std::string> url;
   std::optional<Milliseconds> duration;
@@ -58,7 +58,7 @@ BusPlan plan_of(const Options& options) {
   parse_fields(Text(options.fields), plan.fields);  // checked when it was read
   plan.bit_rate.nominal = static_cast<std::uint32_t>(bit_rate);
   plan.bit_rate.data = options.fd ? static_cast<std::uint32_t>(data_rate) : 0;
-  plan.packed = options.packed;
+  plan.packed = !options.plain;
   return plan;
 }
 
@@ -121,8 +121,7 @@ void print_json(const BusPlan& plan, const BusLoad& load) {
 
 // What would make room.
 std::string remedy(const BusPlan& plan) {
-  if (!plan.packed)
-    return "add --packed (C:pack,1 on the boards), or fewer boards, fields or states";
+  if (!plan.packed) return "leave out --plain, or fewer boards, fields or states";
   if (plan.bit_rate.data == 0) return "fewer boards, fields or states, or CAN FD (--fd)";
   return "fewer boards, fields or states, or a second bus";
 }
@@ -162,10 +161,10 @@ int bus(const Options& options) {
 }
 
 constexpr const char* footer = R"(Examples:
-  r4 bus --packed               eight boards on a classic bus of 1 Mbit/s, in the packed form
-  r4 bus --boards 2             two boards in the plain form
-  r4 bus --boards 8 --fd        eight in the plain form on CAN FD
-  r4 bus --boards 3 --packed --bitrate 500000 --rate 50 --fields DEFAULT,ENC1,ENC2
+  r4 bus                        eight boards on a classic bus of 1 Mbit/s, in the packed form
+  r4 bus --boards 2 --plain     two boards in plain text (pack=0)
+  r4 bus --plain --fd           eight in plain text on CAN FD
+  r4 bus --boards 3 --bitrate 500000 --rate 50 --fields DEFAULT,ENC1,ENC2
 
   r4 bus can://can0             a real bus: what is on it, per id, by listening
 
@@ -205,8 +204,8 @@ void add_bus(CLI::App& root, Action& chosen) {
   add_flag(*command, "--fd", options->fd, "CAN FD with frames of up to 64 bytes");
   add_number(*command, "--dbitrate", options->data_bit_rate, 10000, 8000000,
              "bit/s of the data phase, with --fd (default 5000000)");
-  add_flag(*command, "--packed", options->packed, "the packed form (C:pack,1)");
-  exclude(*command, "URL", {"--boards", "--rate", "--fields", "--commands", "--fd", "--packed"});
+  add_flag(*command, "--plain", options->plain, "plain text (pack=0) instead of the packed form");
+  exclude(*command, "URL", {"--boards", "--rate", "--fields", "--commands", "--fd", "--plain"});
   add_seconds(*command, "--duration", options->duration, "how long to listen to a real bus");
   add_json(*command, options->json, "print JSON, one object a line");
 }

@@ -229,8 +229,8 @@ class LiveBus {
   std::string fullness(const Window& window) const {
     const double load = window.load(window.total);
     return fmt::format(
-        "{}: {}, {:.1f} % of its time is taken; fewer boards, fields or states, or C:pack,1 on the "
-        "boards",
+        "{}: {}, {:.1f} % of its time is taken; fewer boards, fields or states, or "
+        "pack=1 where it is 0",
         options_.url,
         load > 1 ? fmt::format("more than a bus of {} kbit/s carries", rate_.nominal / 1000.0)
                  : "nearly full",

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The load of a CAN bus that is only planned: every datagram of the link is written, packed if it
-// shall be, cut into frames, and the bits of the frames are counted.
+// The load of a CAN bus that is only planned: every datagram of the link is written, packed unless it
+// shall be plain, cut into frames, and the bits of the frames are counted.
 //
 // Average: datagrams of boards that drive, bit by bit. Worst: the longest that each can get, and as
 // many stuff bits as its frames can have; a bus that has room for that is never late for its load.
@@ -20,7 +20,7 @@ struct BusPlan {
   std::uint32_t commands_hz = 20;
   FieldSet fields;                  // not empty
   CanBitRate bit_rate{1000000, 0};  // with a data rate the frames are FD frames of 64 bytes
-  bool packed = false;
+  bool packed = true;
 };
 
 // What the link adds by itself (docs/protocol.md).

@@ -75,7 +75,7 @@ Problem usage_problem(const CLI::App& root, const CLI::ParseError& error) {
     problem.thing = std::string(error.what()).substr(0, std::string(error.what()).find(':'));
     problem.reason = "needs a value";
   } else if (dynamic_cast<const CLI::ExcludesError*>(&error) != nullptr) {
-    const std::string text = error.what();  // "URL excludes --packed"
+    const std::string text = error.what();  // "URL excludes --plain"
     constexpr std::string_view between = " excludes ";
     const std::size_t at = text.find(between);
     problem.thing = text.substr(at + between.size());

@@ -255,7 +255,7 @@ Examples:
   r4 sim udp://0.0.0.0:2018 pty:/tmp/r4        two transports at once; open the second with
                                                r4 monitor serial:///tmp/r4
   r4 sim 'udp://127.0.0.1:2018?peer=127.0.0.1:2390'   streams to that port, as the paper's board
-  r4 sim 'can://vcan0?node=0-7' --set pack,1   eight boards on one CAN bus
+  r4 sim 'can://vcan0?node=0-7'                eight boards on one CAN bus
 
 Exit codes: 0 ended by --duration or a signal; 1 the script is wrong; 2 usage; 4, 5 the port or
 device cannot be opened.)";
@@ -281,7 +281,7 @@ void add_sim(CLI::App& root, Action& chosen) {
   add_number(*command, "--seed", options->seed, 0, ~std::uint64_t{0},
              "the same seed gives the same clock, inputs and nonces (with a key: for tests)");
   add_repeated(*command, "--set", options->settings,
-               "a setting as C:KEY,VALUE makes it, such as pack,1 (can be given again)",
+               "a setting as C:KEY,VALUE makes it, such as rate,50 (can be given again)",
                "KEY,VALUE");
   add_text(*command, "--board-id", options->board_id, "its answer to Q:ID (default sim-1)", "ID");
 }

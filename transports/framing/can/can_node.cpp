@@ -92,7 +92,7 @@ bool CanNode::begin(Text datagram, std::uint32_t now_us) {
   const CanLane lane = lane_of(datagram);
   if (!idle(lane) || datagram.empty() || datagram.size() > max_datagram) return false;
   std::uint8_t* const bytes = lane == CanLane::dialogue ? dialogue_out_bytes_ : telemetry_bytes_;
-  std::size_t size = packed_ ? pack(datagram, bytes, max_datagram) : 0;
+  std::size_t size = packed_ && !host_is_plain_ ? pack(datagram, bytes, max_datagram) : 0;
   if (size == 0) {
     size = datagram.size();
     std::memcpy(bytes, datagram.data(), size);
@@ -171,7 +171,9 @@ Text CanNode::on_frame(const CanFrame& frame, std::uint32_t now_us) {
   }
   // Both directions of the dialogue share the two ids; each end passes over what is not for it.
   dialogue_out_.on_frame(frame, now_us);
-  return dialogue_in_.on_frame(frame, now_us).datagram ? plain(dialogue_in_) : Text();
+  if (!dialogue_in_.on_frame(frame, now_us).datagram) return Text();
+  if (end_ == CanEnd::board) host_is_plain_ = !is_packed(dialogue_in_.data()[0]);
+  return plain(dialogue_in_);
 }
 
 Text CanNode::plain(const IsotpReceiver& receiver) {

@@ -7,7 +7,8 @@
 //
 // Two raw frames stand beside them: the emergency stop, which a board's end takes for E:STOP, and
 // the reason, which it sends when a heartbeat first tells that the board went safe. Datagrams are
-// taken plain and packed, and sent packed where that is wanted.
+// taken plain and packed, and sent packed where that is wanted; a board answers a host that writes
+// plain text in plain text.
 //
 // Driven like the ISO-TP ends that it is made of (isotp.hpp). Sans-I/O, no heap, about 4.5 KB. Which
 // datagram goes next is up to a queue before it. Not for several threads.
@@ -41,7 +42,7 @@ class CanNode {
   // `node` is 0-31. With `fd`, frames of up to 64 bytes are sent; received are both.
   CanNode(CanEnd end, std::uint8_t node, bool fd);
 
-  // Sends packed from the next datagram on.
+  // Sends packed from the next datagram on; a board, unless the newest one of its host was plain.
   void use_packed_form(bool wanted) { packed_ = wanted; }
 
   // --- datagrams to send
@@ -107,6 +108,7 @@ class CanNode {
   const CanEnd end_;
   const std::uint8_t node_;
   bool packed_ = false;
+  bool host_is_plain_ = false;  // at a board
 
   std::uint8_t dialogue_out_bytes_[max_datagram];
   std::uint8_t dialogue_in_bytes_[max_datagram];

@@ -12,21 +12,23 @@ namespace {
 struct Form {
   const char* name;
   const char* url;
-  bool packed;
+  const char* pack;  // of the host's URL
+  bool packed;       // what the host hears
 };
 class CanBoard : public testing::TestWithParam<Form> {};
 INSTANTIATE_TEST_SUITE_P(Forms, CanBoard,
-                         testing::Values(Form{"plain", "can://vcan0?node=9", false},
-                                         Form{"packed", "can://vcan0?node=9", true},
-                                         Form{"fd", "can://vcan0?node=9&fd=1", false}),
+                         testing::Values(Form{"plain", "can://vcan0?node=9", "&pack=0", false},
+                                         Form{"packed", "can://vcan0?node=9", "", true},
+                                         Form{"fd", "can://vcan0?node=9&fd=1", "&pack=0", false},
+                                         Form{"fd_packed", "can://vcan0?node=9&fd=1", "", true}),
                          [](const auto& form) { return std::string(form.param.name); });
 
 TEST_P(CanBoard, EveryChannelReachesItsPinAndComesBack) {
   BoardInAThread simulated(GetParam().url);
-  Board board(simulated.url() + (GetParam().packed ? "&pack=1" : ""), at_will());
+  Board board(simulated.url() + GetParam().pack, at_will());
   board.wait_active();
-  if (GetParam().packed) board.setting("pack", "1");
   expect_every_channel(controlled(simulated, board));
+  EXPECT_EQ(board.carrier_counters().transfers->packed != 0, GetParam().packed);
 }
 
 }  // namespace

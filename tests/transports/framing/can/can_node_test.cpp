@@ -98,6 +98,61 @@ INSTANTIATE_TEST_SUITE_P(ClassicAndFd, CanNodeForms,
                          testing::Values(std::pair(false, false), std::pair(false, true),
                                          std::pair(true, false), std::pair(true, true)));
 
+// What a board sends goes by its host's form: by that of the newest datagram that came from there.
+TEST(CanNode, ABoardAnswersAHostThatWritesPlainTextInPlainText) {
+  Bus bus;
+  bus.board.use_packed_form(true);
+  const auto packed_at_host = [&](const std::string& line) {
+    const std::uint32_t before = bus.host.counters().unpacked;
+    EXPECT_TRUE(bus.board.begin(line, bus.now_us));
+    bus.settle();
+    EXPECT_EQ(bus.at_host.back(), line);
+    return bus.host.counters().unpacked != before;
+  };
+  const auto host_says = [&](bool packed) {
+    bus.host.use_packed_form(packed);
+    EXPECT_TRUE(bus.host.begin(command_line, bus.now_us));
+    bus.settle();
+  };
+  EXPECT_TRUE(packed_at_host(state_line)) << "nobody has spoken yet";
+  host_says(false);
+  for (const std::string& line : {state_line, heartbeat_line, answer_line}) {
+    EXPECT_FALSE(packed_at_host(line)) << line;
+  }
+  host_says(true);
+  for (const std::string& line : {state_line, heartbeat_line, answer_line}) {
+    EXPECT_TRUE(packed_at_host(line)) << line;
+  }
+  bus.board.use_packed_form(false);
+  EXPECT_FALSE(packed_at_host(state_line)) << "its setting says never";
+}
+
+TEST(CanNode, AHostPacksForABoardThatDoesNot) {
+  Bus bus;
+  bus.host.use_packed_form(true);
+  for (const std::string& line : {state_line, answer_line}) {
+    bus.board.begin(line, bus.now_us);
+    bus.settle();
+  }
+  EXPECT_EQ(bus.at_host.size(), 2U);
+  bus.host.begin(command_line, bus.now_us);
+  bus.settle();
+  EXPECT_EQ(bus.at_board, (std::vector<std::string>{command_line}));
+  EXPECT_EQ(bus.board.counters().unpacked, 1U);
+}
+
+// It is in no form, and anybody's.
+TEST(CanNode, AnEmergencyFrameDoesNotChangeTheForm) {
+  Bus bus;
+  bus.board.use_packed_form(true);
+  CanFrame frame{};
+  frame.id = emergency_stop_id;
+  bus.board.on_frame(frame, bus.now_us);
+  bus.board.begin(state_line, bus.now_us);
+  bus.settle();
+  EXPECT_EQ(bus.host.counters().unpacked, 1U);
+}
+
 TEST(CanNode, StatesAndAnswersHaveIdsOfTheirOwn) {
   Bus bus;
   bus.board.begin(state_line, bus.now_us);
