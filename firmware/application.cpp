@@ -93,7 +93,9 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
   const MessageKind kind = kind_of(datagram);
   const Verdict verdict = judge(port, kind, datagram, now_ms);
   const bool authentic = verdict == Verdict::authentic;
-  if (authentic && link_.in_session(from) && datagram.has_pnum()) tracker_.on(datagram.pnum());
+  // A watcher at the place of the host in control, as on a bus, has numbers of its own.
+  const bool counts = authentic && link_.in_session(from) && !asks_to_watch(datagram);
+  if (counts && datagram.has_pnum()) tracker_.on(datagram.pnum());
   switch (kind) {
     case MessageKind::host_heartbeat:
       if (authentic) {
@@ -174,6 +176,7 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
     case HeartbeatEffect::new_session:
       ports_[from.port].port->hold(from.peer);
       tell_ports();
+      watchers_.end_of(from);
       // Nothing that another host, or this one before its restart, commanded may come back.
       setpoints_.outputs = Outputs();
       setpoints_.fields = FieldSet::paper_default();
@@ -186,6 +189,7 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
     case HeartbeatEffect::resumed:
       ports_[from.port].port->hold(from.peer);
       tell_ports();
+      watchers_.end_of(from);
       if (setpoints_.settings.recovery == Recovery::rearm) setpoints_.outputs = Outputs();
       safety_.leave(SafeReason::link);
       schedule_.start(now_ms, period_of(setpoints_.settings));
@@ -257,6 +261,10 @@ void Application::on_command(Source from, const Datagram& datagram, Verdict verd
     identify(from, now_ms);
     return;
   }
+  if (refusal == Refusal::none && command.kind == CommandKind::watch) {
+    on_watch(from, datagram, command, now_ms);
+    return;
+  }
   if (!admit(from, datagram, verdict, refusal, 0, now_ms)) return;
   const bool held = drives_output(command.kind) && safety_.is_safe();
   if (!held && link_.begins_anew(datagram.pnum())) setpoints_.outputs = Outputs();
@@ -300,6 +308,40 @@ void Application::on_group(Source from, const Datagram& datagram, Verdict verdic
     take_effect(datagram.pnum(), command, now_ms);
   }
   bring_about(now_ms);
+}
+
+// Of anyone, also of a board with a key: what is streamed is no secret, and nothing is commanded by it.
+void Application::on_watch(Source from, const Datagram& datagram, const Command& command,
+                           std::uint32_t now_ms) {
+  if (!authentication_.has_chance()) return refuse(from, datagram, Refusal::unknown, now_ms);
+  FieldSet fields;
+  if (!command.text.empty()) {
+    const Refusal refusal = parse_fields(command.text, fields);
+    if (refusal != Refusal::none) return refuse(from, datagram, refusal, now_ms);
+  }
+  if (link_.has_owner() && from == link_.owner()) return;  // all goes there
+  const std::uint32_t rate_hz = static_cast<std::uint32_t>(command.value);
+  switch (watchers_.on_lease(from, rate_hz, datagram.time_ms(), now_ms)) {
+    case Watchers::Effect::watching: {
+      Watcher& watcher = *watchers_.find(from);
+      watcher.chooses = !command.text.empty();
+      watcher.fields = fields;
+      if (!schedule_.running()) schedule_.start(now_ms, period_of(setpoints_.settings));
+      break;
+    }
+    case Watchers::Effect::unproven: {
+      const std::uint32_t token = authentication_.random();
+      watchers_.tell(from, token, now_ms);
+      refuse(from, datagram, Refusal::stale, now_ms, 0, token);
+      break;
+    }
+    case Watchers::Effect::full:
+      refuse(from, datagram, Refusal::busy, now_ms);
+      break;
+    case Watchers::Effect::ended:
+    case Watchers::Effect::ignored:
+      break;
+  }
 }
 
 // May a command be given by this port?
@@ -406,6 +448,8 @@ std::uint32_t Application::poll(std::uint32_t now_ms) {
   check_interlocks(now_ms);
   update_outputs(now_ms);
   report_state(now_ms);
+  watchers_.poll(now_ms);
+  if (!link_.has_owner() && !watchers_.any()) schedule_.stop();
   send_states(now_ms);
   if (link_.heartbeat_due(now_ms)) send_heartbeats(now_ms);
 

@@ -19,6 +19,7 @@
 
 #include "../protocol/keys/authentication.hpp"
 #include "../protocol/link/board_link.hpp"
+#include "../protocol/link/watchers.hpp"
 #include "../protocol/messages/message.hpp"
 #include "executor.hpp"
 #include "guard.hpp"
@@ -115,6 +116,8 @@ class Application {
   void on_group(Source from, const Datagram& datagram, Verdict verdict, std::uint32_t now_ms);
   bool admit(Source from, const Datagram& datagram, Verdict verdict, Refusal refusal,
              std::uint8_t at, std::uint32_t now_ms);
+  void on_watch(Source from, const Datagram& datagram, const Command& command,
+                std::uint32_t now_ms);
   bool may_set(std::uint8_t port, const Command& command) const;
   void execute(std::uint32_t pnum, const Command& command, std::uint32_t now_ms);
   void take_effect(std::uint32_t pnum, const Command& command, std::uint32_t now_ms);
@@ -137,22 +140,30 @@ class Application {
   static std::uint32_t heartbeat_time(std::uint32_t now_ms);
   void send_heartbeats(std::uint32_t now_ms);
   void answer_heartbeat(Source to, std::uint32_t now_ms);
-  void send_heartbeat(std::uint8_t port, std::uint32_t peer, bool aside, std::uint32_t now_ms);
+  void send_heartbeat(Source to, std::uint32_t& pnum, std::uint32_t now_ms);
+  void write_heartbeat(Source to, std::uint32_t& pnum, const SafeReport& safe,
+                       std::uint32_t now_ms);
+  SafeReport shown_to_watchers() const;
   void send_states(std::uint32_t now_ms);
-  void send_state(std::uint8_t port, const State& state, std::uint32_t t_ms);
-  void send_part(std::uint8_t port, DatagramWriter& writer, const State& state, std::uint32_t t_ms);
+  void send_state(Source to, std::uint32_t& pnum, FieldSet fields, const State& state,
+                  std::uint32_t t_ms);
+  void send_part(Source to, std::uint32_t& pnum, DatagramWriter& writer, const State& state,
+                 std::uint32_t t_ms);
   void fill(State& state) const;
   void answer(Source to, DatagramWriter& writer, std::uint32_t now_ms);
   void identify(Source to, std::uint32_t now_ms);
   void refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms,
-              std::uint8_t at = 0);
+              std::uint8_t at = 0, std::uint32_t lease = 0);
   std::uint32_t& number_for(Source to);
+  bool reaches(Source watcher) const;
+  bool hears_all(Source watcher) const;
   std::uint32_t audience(std::uint8_t port) const;
 
   Hal& hal_;
   Observer* observer_;
   Identity identity_;
   BoardLink link_;
+  Watchers watchers_;
   Authentication authentication_;
   Guard guard_;
   Safety safety_;

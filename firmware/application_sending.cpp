@@ -25,10 +25,23 @@ std::uint32_t Application::audience(std::uint8_t port) const {
   return owned ? link_.owner().peer : everyone;
 }
 
-// The answers to a host that does not control the board count apart.
+// A watcher has numbers of its own, but where it hears those of everyone at its port; the answers to other
+// hosts that do not control the board count apart.
 std::uint32_t& Application::number_for(Source to) {
+  Watcher* const watcher = watchers_.find(to);
+  if (watcher != nullptr && !hears_all(to)) return watcher->pnum;
   const bool aside = link_.has_owner() && to != link_.owner();
   return aside ? ports_[to.port].aside_pnum : ports_[to.port].next_pnum;
+}
+
+// Does what is for everyone at its port come to it, too?
+bool Application::reaches(Source watcher) const {
+  return audience(watcher.port) == everyone && ports_[watcher.port].port->reaches(watcher.peer);
+}
+
+// And does that count? In CONNECTING it does not.
+bool Application::hears_all(Source watcher) const {
+  return link_.state() != BoardLinkState::connecting && reaches(watcher);
 }
 
 void Application::answer(Source to, DatagramWriter& writer, std::uint32_t now_ms) {
@@ -46,13 +59,14 @@ void Application::identify(Source to, std::uint32_t now_ms) {
   identity.busy = link_.has_owner() && link_.owner() != to;
   write_identity(writer, identity);
   writer.more("+").more(leave_capability).more("+").more(group_capability);
+  if (authentication_.has_chance()) writer.more("+").more(watch_capability);
   write_identity_fields(writer, identity);
   answer(to, writer, now_ms);
 }
 
-// `at`: which command of a group it is, from 1; 0: none in particular.
+// `at`: which command of a group it is, from 1; 0: none in particular. `lease`: what a W has to echo; 0: none.
 void Application::refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms,
-                         std::uint8_t at) {
+                         std::uint8_t at, std::uint32_t lease) {
   ++rx_refused_;
   if (!datagram.has_pnum()) return;
   if (observer_ != nullptr) observer_->on_refused(now_ms, datagram.pnum(), code);
@@ -60,7 +74,9 @@ void Application::refuse(Source to, const Datagram& datagram, Refusal code, std:
   nack.pnum = datagram.pnum();
   nack.code = code;
   nack.at = at;
-  nack.has_session = link_.session_of(to, nack.session);
+  // A W needs no key: what answers it must prove nothing of the command whose number it has.
+  nack.has_session = !asks_to_watch(datagram) && link_.session_of(to, nack.session);
+  nack.lease = lease;
   char buffer[short_datagram];
   DatagramWriter writer(buffer, sizeof buffer);
   write_nack(writer, nack);
@@ -82,34 +98,54 @@ SafeReport Application::safe_report() const {
 }
 
 void Application::send_heartbeats(std::uint32_t now_ms) {
-  for (std::uint8_t i = 0; i < port_count_; ++i) send_heartbeat(i, audience(i), false, now_ms);
+  for (std::uint8_t i = 0; i < port_count_; ++i) {
+    Source to;
+    to.port = i;
+    to.peer = audience(i);
+    send_heartbeat(to, ports_[i].next_pnum, now_ms);
+  }
+  for (Watcher& watcher : watchers_) {
+    if (watcher.period_ms != 0 && !reaches(watcher.at)) {
+      write_heartbeat(watcher.at, watcher.pnum, shown_to_watchers(), now_ms);
+    }
+  }
   link_.heartbeat_sent(heartbeat_time(now_ms));
 }
 
 void Application::answer_heartbeat(Source to, std::uint32_t now_ms) {
-  const bool aside = link_.has_owner() && to != link_.owner();
-  send_heartbeat(to.port, to.peer, aside, now_ms);
+  send_heartbeat(to, number_for(to), now_ms);
   link_.heartbeat_answered(heartbeat_time(now_ms));
 }
 
-void Application::send_heartbeat(std::uint8_t port, std::uint32_t peer, bool aside,
-                                 std::uint32_t now_ms) {
-  PortSlot& slot = ports_[port];
-  char buffer[short_datagram];
-  Text heartbeat;
-  const SafeReport safe = safe_report();
-  const Text nonce = authentication_.nonce();
-  const std::uint32_t t_ms = heartbeat_time(now_ms);
-  if (link_.state() == BoardLinkState::connecting) {
-    heartbeat =
-        write_board_heartbeat(buffer, sizeof buffer, 0, nonce.empty() ? 0 : t_ms, safe, nonce);
-    slot.next_pnum = 1;
-  } else {
-    std::uint32_t& pnum = aside ? slot.aside_pnum : slot.next_pnum;
-    if (pnum == 0 && !nonce.empty()) ++pnum;  // that would say CONNECTING
-    heartbeat = write_board_heartbeat(buffer, sizeof buffer, pnum++, t_ms, safe, nonce);
+// In CONNECTING it says so, and packet numbers begin anew behind it.
+void Application::send_heartbeat(Source to, std::uint32_t& pnum, std::uint32_t now_ms) {
+  if (link_.state() != BoardLinkState::connecting) {
+    return write_heartbeat(to, pnum, safe_report(), now_ms);
   }
-  slot.port->send(heartbeat, Priority::normal, peer);
+  char buffer[short_datagram];
+  const Text nonce = authentication_.nonce();
+  const std::uint32_t t_ms = nonce.empty() ? 0 : heartbeat_time(now_ms);
+  ports_[to.port].port->send(
+      write_board_heartbeat(buffer, sizeof buffer, 0, t_ms, safe_report(), nonce), Priority::normal,
+      to.peer);
+  ports_[to.port].next_pnum = 1;
+}
+
+void Application::write_heartbeat(Source to, std::uint32_t& pnum, const SafeReport& safe,
+                                  std::uint32_t now_ms) {
+  char buffer[short_datagram];
+  const Text nonce = authentication_.nonce();
+  if (pnum == 0 && !nonce.empty()) ++pnum;  // that would say CONNECTING
+  ports_[to.port].port->send(
+      write_board_heartbeat(buffer, sizeof buffer, pnum++, heartbeat_time(now_ms), safe, nonce),
+      Priority::normal, to.peer);
+}
+
+// To them a board that has no host yet is safe for the same reason as one that has lost it.
+SafeReport Application::shown_to_watchers() const {
+  SafeReport report = safe_report();
+  if (report.reason == SafeReason::none && !link_.has_owner()) report.reason = SafeReason::link;
+  return report;
 }
 
 void Application::send_states(std::uint32_t now_ms) {
@@ -117,16 +153,31 @@ void Application::send_states(std::uint32_t now_ms) {
   if (!schedule_.take(now_ms, t_ms)) return;
   State state;
   fill(state);
-  for (std::uint8_t i = 0; i < port_count_; ++i) send_state(i, state, t_ms);
+  if (link_.has_owner()) {
+    for (std::uint8_t i = 0; i < port_count_; ++i) {
+      Source to;
+      to.port = i;
+      to.peer = audience(i);
+      send_state(to, ports_[i].next_pnum, setpoints_.fields, state, t_ms);
+    }
+  } else if (state.safe == SafeReason::none) {
+    state.safe = SafeReason::link;
+  }
+  for (Watcher& watcher : watchers_) {
+    if (watcher.period_ms == 0 || !watcher.take(t_ms)) continue;
+    if (link_.has_owner() && reaches(watcher.at)) continue;
+    const FieldSet& fields = watcher.chooses ? watcher.fields : setpoints_.fields;
+    send_state(watcher.at, number_for(watcher.at), fields, state, t_ms);
+  }
 }
 
 // One state, in as many datagrams of the same T as the port's limit asks for.
-void Application::send_state(std::uint8_t port, const State& state, std::uint32_t t_ms) {
+void Application::send_state(Source to, std::uint32_t& pnum, FieldSet fields, const State& state,
+                             std::uint32_t t_ms) {
   char buffer[max_datagram];
-  const std::size_t carried = ports_[port].port->max_size();
+  const std::size_t carried = ports_[to.port].port->max_size();
   const std::size_t limit = carried < sizeof buffer ? carried : sizeof buffer;
   const std::size_t room = limit - DatagramWriter::trailer_max - safe_fields_size;
-  FieldSet fields = setpoints_.fields;
   if (state.safe != SafeReason::none) {  // these end every part
     fields.remove(StateField::safe);
     fields.remove(StateField::fault);
@@ -139,22 +190,21 @@ void Application::send_state(std::uint8_t port, const State& state, std::uint32_
     write_field(writer, field, state);
     if (writer.ok() && writer.size() <= room) continue;
     writer.truncate(before);
-    send_part(port, writer, state, t_ms);
+    send_part(to, pnum, writer, state, t_ms);
     writer = DatagramWriter(buffer, limit);
     write_field(writer, field, state);
   }
-  send_part(port, writer, state, t_ms);
+  send_part(to, pnum, writer, state, t_ms);
 }
 
 // Each part tells by itself whether the outputs are safe, and why.
-void Application::send_part(std::uint8_t port, DatagramWriter& writer, const State& state,
-                            std::uint32_t t_ms) {
+void Application::send_part(Source to, std::uint32_t& pnum, DatagramWriter& writer,
+                            const State& state, std::uint32_t t_ms) {
   if (state.safe != SafeReason::none) write_field(writer, StateField::safe, state);
   if (state.safe != SafeReason::none && state.fault.any()) {
     write_field(writer, StateField::fault, state);
   }
-  PortSlot& slot = ports_[port];
-  slot.port->send(writer.finish(slot.next_pnum++, t_ms), Priority::state, audience(port));
+  ports_[to.port].port->send(writer.finish(pnum++, t_ms), Priority::state, to.peer);
 }
 
 void Application::fill(State& state) const {

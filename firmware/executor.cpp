@@ -75,6 +75,7 @@ Refusal carry_out(const Command& command, Setpoints& setpoints) {
     case CommandKind::clear:
     case CommandKind::leave:
     case CommandKind::identify:
+    case CommandKind::watch:
       break;
   }
   return Refusal::none;

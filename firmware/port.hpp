@@ -21,6 +21,8 @@ class Port {
   // That peer is in control: it keeps its number, however many others send, until another is held, and
   // gets what is for everyone where that has no place of its own. everyone: nobody here is any more.
   virtual void hold(Peer peer) { static_cast<void>(peer); }
+  // Does what is for everyone come to that peer?
+  virtual bool reaches(Peer peer) const { return peer == everyone; }
   // Send the packed form from now on, on a port that has one (CAN), to a host that does: the setting
   // `pack`, while a host is in control.
   virtual void use_packed_form(bool wanted) { static_cast<void>(wanted); }

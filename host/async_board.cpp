@@ -15,8 +15,7 @@
 namespace r4 {
 
 AsyncBoard::AsyncBoard(const executor_type& executor, std::string_view url, BoardOptions options)
-    : AsyncBoard(executor, standard_registry().make(executor.context(), url, Role::host),
-                 std::move(options)) {}
+    : AsyncBoard(executor, make_host_carrier(executor.context(), url, options.role), options) {}
 
 AsyncBoard::AsyncBoard(const executor_type& executor, std::unique_ptr<Carrier> carrier,
                        BoardOptions options)
@@ -43,6 +42,9 @@ void AsyncBoard::Cancel::operator()(asio::cancellation_type) const {
 
 void AsyncBoard::require_timeout(std::string_view what, Duration timeout) {
   r4::require_timeout(what, timeout);
+}
+void AsyncBoard::require_control(std::string_view what) const {
+  r4::require_control(impl_->session.board_role(), what);
 }
 void AsyncBoard::require_wait(std::string_view what, Duration timeout) {
   r4::require_wait(what, timeout);
@@ -176,6 +178,7 @@ void AsyncBoard::start_link_timing(Duration board_timeout, Duration heartbeat, D
 
 void AsyncBoard::require_sendable(const Command& command) const {
   require_valid(command);
+  r4::require_control(impl_->session.board_role(), command);
   require_cable(name(), command);
 }
 

@@ -29,7 +29,7 @@ AsyncBoard::Impl::Impl(asio::io_context& context, std::unique_ptr<Carrier> trans
       carrier(std::move(transport)),
       heartbeat_ms(options.session.timing.heartbeat_ms),
       session(*this, with_clock(std::move(options.session), steady_now()),
-              Session::random_first_pnum()),
+              Session::random_first_pnum(), options.role),
       timer(context) {
   waiting.reserve(Session::max_pending + Session::max_stops);
   ended.reserve(Session::max_pending + Session::max_stops);
@@ -91,7 +91,9 @@ void AsyncBoard::Impl::settle() {
 // Ends the waits that are over; false if none is.
 bool AsyncBoard::Impl::end_waits() {
   const LinkStatus& link = session.link();
-  const bool active = link.state == HostLinkState::active && link.in_control;
+  const bool active = session.board_role() == BoardRole::watch
+                          ? is_heard(link.state)
+                          : link.state == HostLinkState::active && link.in_control;
   bool any = false;
   for (std::size_t i = 0; i < waiters.size();) {
     Waiter& waiter = waiters[i];
@@ -230,7 +232,10 @@ void AsyncBoard::Impl::on_carrier_event(const CarrierEvent& event) {
 // --- Session::Handler
 
 SendResult AsyncBoard::Impl::transmit(std::string_view datagram, Priority priority) {
-  return has_link() ? carrier->send(datagram, priority) : SendResult::down;
+  if (!has_link()) return SendResult::down;
+  const bool listens = session.board_role() == BoardRole::watch && carrier->is_shared();
+  if (listens && priority != Priority::stop) return SendResult::busy;
+  return carrier->send(datagram, priority);
 }
 
 void AsyncBoard::Impl::on_state(const ReceivedState& state, const Datagram& datagram) {

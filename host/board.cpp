@@ -11,8 +11,8 @@
 namespace r4 {
 
 Board::Board(std::string_view url, BoardOptions options, BoardCallbacks callbacks)
-    : Board(CarrierMaker([url](Loop& loop) {
-              return standard_registry().make(context_of(loop), url, Role::host);
+    : Board(CarrierMaker([url, role = options.role](Loop& loop) {
+              return make_host_carrier(context_of(loop), url, role);
             }),
             std::move(options), std::move(callbacks)) {}
 Board::Board(const CarrierMaker& make, BoardOptions options, BoardCallbacks callbacks)
@@ -29,7 +29,9 @@ void Board::wait_active(Duration timeout) {
   require_wait("wait_active()", timeout);
   const auto impl = impl_;
   const bool active = impl->wait_for_news(timeout, [&] {
-    return impl->link.state == HostLinkState::active && impl->in_control && !impl->link.gated();
+    const LinkStatus& link = impl->link;
+    if (impl->role == BoardRole::watch) return is_heard(link.state);
+    return link.state == HostLinkState::active && impl->in_control && !link.gated();
   });
   if (!active) throw Error(explain(impl->name_now(), impl->link_now()));
 }
@@ -61,6 +63,7 @@ PostResult Board::post(const Setpoints& setpoints) { return impl_->post(setpoint
 void Board::arm(Duration timeout) {
   require_timeout("arm()", timeout);
   const auto impl = impl_;
+  require_control(impl->role, "arm()");
   const auto call = std::make_shared<Impl::Call>(Command());
   call->start = [&async = impl->async](Duration left, auto end) {
     async.async_arm(left, std::move(end));
@@ -128,6 +131,7 @@ void Board::link_timing(Duration board_timeout, Duration heartbeat, Duration tim
                            std::to_string(heartbeat.count());
   require_timeout(text, timeout);
   const auto impl = impl_;
+  require_control(impl->role, text);
   impl->async.require_link_timing(board_timeout, heartbeat);
   const auto call = std::make_shared<Impl::Call>(Command());
   call->start = [&async = impl->async, board_timeout, heartbeat](Duration left, auto end) {

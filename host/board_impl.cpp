@@ -35,7 +35,8 @@ Board::Impl::Call::Call(const Command& c)
 }
 
 Board::Impl::Impl(const CarrierMaker& make, BoardOptions options, BoardCallbacks first)
-    : arming(options.session.arming),
+    : role(options.role),
+      arming(options.session.arming),
       callback_limit(options.callback_limit),
       async(io, make(loop), std::move(options)),
       box(
@@ -243,6 +244,7 @@ Error Board::Impl::closed_error(std::string_view what) {
 
 void Board::Impl::require_sendable(const Command& command) {
   require_valid(command);
+  require_control(role, command);
   if (command.kind == CommandKind::setting) require_cable(name_now(), command);
 }
 

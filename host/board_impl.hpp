@@ -97,6 +97,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   void look_at_callbacks();
   void on_callback_end(Clock::duration busy);
 
+  const BoardRole role;
   const Arming arming;
   const Duration callback_limit;  // 0: none
   asio::io_context io{1};

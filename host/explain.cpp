@@ -69,6 +69,15 @@ Words key_words(KeyTrouble trouble) {
   return {};
 }
 
+Words lease_words(LeaseTrouble trouble) {
+  if (trouble == LeaseTrouble::full) {
+    return {"as many programs watch the board as it serves",
+            "end one of them; its place is free two seconds later"};
+  }
+  return {"the board's firmware streams to the host that controls it, and to nobody else",
+          "bring it up to date, or take control: r4 monitor --control, BoardRole::control"};
+}
+
 // Why outputs are not driven, and what to do before arm() is called.
 Words disarm_words(DisarmCause cause) {
   switch (cause) {
@@ -119,6 +128,7 @@ Words link_words(const LinkStatus& link) {
   if (link.key != KeyTrouble::none && link.state != HostLinkState::lost) {
     return key_words(link.key);
   }
+  if (link.lease != LeaseTrouble::none) return lease_words(link.lease);
   switch (link.state) {
     case HostLinkState::connecting:
       return {"nothing was heard from the board yet",
@@ -293,6 +303,23 @@ std::string group_words(std::string_view group, const CommandResult& result) {
 Problem explain(KeyTrouble trouble) {
   Words words = key_words(trouble);
   return {ErrorKind::refused, "key", std::move(words.reason), std::move(words.fix)};
+}
+
+const char* to_text(LeaseTrouble trouble) {
+  switch (trouble) {
+    case LeaseTrouble::none:
+      break;
+    case LeaseTrouble::full:
+      return "full";
+    case LeaseTrouble::unknown:
+      return "unknown";
+  }
+  return "none";
+}
+
+Problem explain(LeaseTrouble trouble) {
+  Words words = lease_words(trouble);
+  return {ErrorKind::refused, "watching", std::move(words.reason), std::move(words.fix)};
 }
 
 Problem explain(std::string_view command, DisarmCause cause) {

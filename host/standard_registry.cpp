@@ -3,6 +3,7 @@
 #include "standard_registry.hpp"
 
 #include "../firmware/ports/sim/sim_carrier.hpp"
+#include "../transports/udp/udp_url.hpp"
 
 namespace r4 {
 
@@ -26,6 +27,13 @@ Registry with_simulated_board() {
 const Registry& standard_registry() {
   static const Registry registry = with_simulated_board();
   return registry;
+}
+
+std::unique_ptr<Carrier> make_host_carrier(asio::io_context& io, std::string_view url,
+                                           BoardRole role) {
+  const std::string text(url);
+  return standard_registry().make(io, role == BoardRole::watch ? with_own_port(text) : text,
+                                  Role::host);
 }
 
 }  // namespace r4

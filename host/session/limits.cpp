@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <string>
 
+#include "../commands/command_help.hpp"
 #include "link_timing.hpp"
 #include "r4link/error.hpp"
 #include "session.hpp"
@@ -30,9 +31,27 @@ void require(std::string_view what, std::int64_t value_ms, std::int64_t min_ms, 
 void require_valid(const SessionOptions& options) {
   require("timing.heartbeat_ms", options.timing.heartbeat_ms, 1, minute_ms);
   require("timing.timeout_ms", options.timing.timeout_ms, 1, hour_ms);
+  if (options.watch_rate_hz < 1 || options.watch_rate_hz > state_rate_max_hz) {
+    throw Error(ErrorKind::usage, fmt::format("watch_rate_hz of {}", options.watch_rate_hz),
+                "is out of range", fmt::format("give 1 to {} states a second", state_rate_max_hz));
+  }
   require("command_retry", options.command_retry.count(), 1, minute_ms);
   require("stop_retry", options.stop_retry.count(), 1, 1000);
   require("identify_interval", options.identify_interval.count(), 1, hour_ms, "0 turns it off");
+}
+
+void require_control(BoardRole role, std::string_view what) {
+  if (role == BoardRole::control) return;
+  throw Error(ErrorKind::usage, std::string(what), "this program only watches the board",
+              "open the board with BoardRole::control");
+}
+
+void require_control(BoardRole role, const Command& command) {
+  if (role == BoardRole::control || command.kind == CommandKind::stop ||
+      command.kind == CommandKind::identify) {
+    return;
+  }
+  require_control(role, shown(command));
 }
 
 void require_timeout(std::string_view what, std::chrono::milliseconds timeout) {

@@ -4,14 +4,21 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <string_view>
 
 namespace r4 {
 
+enum class BoardRole : std::uint8_t;
+struct Command;
 struct SessionOptions;
 
 // SessionOptions and what is in them; the constructors of the boards and of Session call it.
 void require_valid(const SessionOptions& options);
+
+// A program that only watches stops its board, asks who it is, and commands nothing else.
+void require_control(BoardRole role, std::string_view what);
+void require_control(BoardRole role, const Command& command);
 
 // The time in which a command is to be confirmed, or something is to come: more than none. A stop has
 // no such limit: it goes out whatever its timeout.

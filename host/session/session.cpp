@@ -30,15 +30,17 @@ SessionOptions checked(SessionOptions options) {
 
 }  // namespace
 
-Session::Session(Handler& handler, SessionOptions options, std::uint32_t first_pnum)
+Session::Session(Handler& handler, SessionOptions options, std::uint32_t first_pnum, BoardRole role)
     : handler_(handler),
       options_(checked(std::move(options))),
+      board_role_(role),
       first_pnum_(first_pnum),
       link_(options_.timing, first_pnum),
       key_(options_.key, options_.clock_start),
       selection_(options_.fields),
       question_(options_.identify_interval),
       pending_(max_pending, max_stops) {
+  link_.hold(watches());
   if (!options_.fields.empty()) {
     const std::string fields = options_.fields;
     if (FieldSet set; parse_fields(fields, set) != Refusal::none) {
@@ -83,8 +85,10 @@ void Session::receive(std::string_view bytes, Time now) {
 
 void Session::on_heartbeat_datagram(const Datagram& datagram, Time now) {
   const bool connecting = is_connecting_heartbeat(datagram);
-  const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
+  // Said to hosts, on a wire that others listen to; who watches is told by the states that there is none.
   const SafeReport report = heartbeat_report(datagram);
+  if (connecting && watches() && lease_.streaming(now)) return confirm_stop(report, now);
+  const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
   const bool current = is_current(
       link_.on_datagram(datagram.pnum(), connecting ? 0 : t_ms, true, report.reason, to_ms(now)));
   notice_restart();
@@ -124,6 +128,7 @@ void Session::on_state_datagram(const Datagram& datagram, Time now) {
   // overtaken, in a queue where those go first, is still the newest state.
   const bool newest_state = arrival == Arrival::late && newer(fresh.pnum, state_.pnum);
   if (!is_current(arrival) && !newest_state) return;
+  lease_.on_state(now);
   collector_.on_state(fresh.t_ms, now);
   if (!newest_state) {
     key_.on_board_time(fresh.t_ms, now);
@@ -145,6 +150,7 @@ void Session::on_nack_datagram(const Datagram& datagram, Time now) {
   Nack nack;
   if (!read_nack(datagram, nack)) return;
   if (!is_ours(nack.pnum)) return;  // on a CAN bus the answers to other hosts are heard too
+  if (watches()) return on_lease_refused(nack, datagram, now);
   selection_.on_answer();
   if (nack.code == Refusal::busy) {
     role_.on_busy(now);
@@ -173,6 +179,16 @@ void Session::on_nack_datagram(const Datagram& datagram, Time now) {
     finish(pending, Outcome::refused, nack.code, now);
   }
   if (proof) on_post_refused(nack);
+}
+
+// Of all that a session sends which only watches, the board refuses leases alone. What those codes say the
+// link tells.
+void Session::on_lease_refused(const Nack& nack, const Datagram& datagram, Time now) {
+  on_answer(datagram, now);
+  lease_.on_refusal(nack, now);
+  const bool told =
+      nack.code == Refusal::stale || nack.code == Refusal::busy || nack.code == Refusal::unknown;
+  if (!told) handler_.on_nack(nack, datagram);
 }
 
 // Does the refusal prove that the command was not executed? Only while the board remembers what it
@@ -301,7 +317,7 @@ void Session::on_causes(std::int32_t newest, Time now) {
 // Sees to it that the state has the fields we need, whoever chose others, and that we are in
 // control.
 void Session::select_fields(Time now) {
-  if (leaving_) return;
+  if (leaving_ || watches()) return;
   if (!selection_.ask(role_.controlling(), link_up() && !role_.refused(now), now)) return;
   transmit_now(Command::fields(selection_.fields()), to_ms(now), Priority::normal, now);
 }
@@ -324,7 +340,7 @@ Command Session::with_needed_fields(const Command& command) {
 Time Session::poll(Time now) {
   link_.poll(to_ms(now));
   refresh_status(now);
-  if (!leaving_) send_heartbeat(now);
+  if (!leaving_) watches() ? send_lease(now) : send_heartbeat(now);
   for (Pending& pending : pending_.under_way()) {
     if (now >= pending.deadline) {
       finish(pending, Outcome::timed_out, Refusal::none, now);
@@ -337,11 +353,19 @@ Time Session::poll(Time now) {
   send_queued(now);  // what has waited for arm()
   retry_due(now);
   repeat_stop(now);
-  if (!leaving_ && link_up() && question_.due(now)) {
+  if (!leaving_ && hears_board() && question_.due(now)) {
     question_.ask(now);
     transmit_now(Command::identify(), to_ms(now), Priority::normal, now);
   }
   return next_poll(now);
+}
+
+void Session::send_lease(Time now) {
+  if (!lease_.due(now)) return;
+  const bool others = options_.fields != "DEFAULT";
+  const Text list = others ? Text(options_.fields.data(), options_.fields.size()) : Text();
+  transmit_now(Command::watch(options_.watch_rate_hz, list), lease_.echo(), Priority::normal, now);
+  lease_.sent(now);
 }
 
 void Session::send_heartbeat(Time now) {
@@ -367,7 +391,8 @@ Time Session::next_poll(Time now) {
   link = std::chrono::duration_cast<std::chrono::milliseconds>(link) + Time{0};
   if (link <= now) link = now + Time{1000};
   next = std::min(next, link);
-  if (link_up()) next = std::min(next, question_.next());
+  if (watches()) next = std::min(next, lease_.next());
+  if (hears_board()) next = std::min(next, question_.next());
   if (role_.refused(now)) next = std::min(next, role_.refused_until());
   if (group_waits_) next = std::min(next, groups_.next());
   return next;
@@ -393,6 +418,12 @@ bool Session::link_up() const {
   return false;
 }
 
+// Is the board there, whatever it thinks of us?
+bool Session::hears_board() const {
+  if (!watches()) return link_up();
+  return is_heard(link_.state());
+}
+
 // Commands wait for proof of control: the session's own F, executed. So none is ever sent into a
 // session that the board has not accepted, where a refusal would say nothing.
 bool Session::in_control(Time now) const {
@@ -410,10 +441,12 @@ void Session::refresh_status(Time now) {
       .state = link_.state(),
       .reason = link_.reason(),
       .busy = role_.refused(now),
-      .gate = link_.watchdog_expired(to_ms(now)) ? Gate::watchdog
-              : link_.gated(to_ms(now))          ? Gate::callback
-                                                 : Gate::open,
-      .key = key_.trouble(now),
+      .gate = watches()                            ? Gate::open
+              : link_.watchdog_expired(to_ms(now)) ? Gate::watchdog
+              : link_.gated(to_ms(now))            ? Gate::callback
+                                                   : Gate::open,
+      .key = watches() ? KeyTrouble::none : key_.trouble(now),
+      .lease = lease_.trouble(now),
       .in_control = in_control(now),
       .transport_down = transport_down_,
       .chip = link_.reason() == SafeReason::fault ? state_.fault : ChipFault(),
@@ -429,6 +462,7 @@ void Session::watchdog(std::chrono::milliseconds period, Time now) {
 }
 
 void Session::hold(bool held, Time now) {
+  if (watches()) return;
   link_.hold(held);
   refresh_status(now);
 }

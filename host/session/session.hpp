@@ -12,7 +12,8 @@
 // It is put together from machines, each with its own diagram: what the board knows of us
 // (host_role.hpp), the fields that it sends (field_selection.hpp), the commands under way
 // (pending_commands.hpp), arming (arming.hpp), the key (host_key.hpp), the question who the board is
-// (identity_question.hpp) and the stop that lasts (stop_repetition.hpp).
+// (identity_question.hpp), the stop that lasts (stop_repetition.hpp) and, where the session only watches, its
+// lease at the board (lease.hpp).
 //
 // A retry has the bytes and the packet number of the original (signed anew, where there is a key),
 // so the board can execute it only once. When CMD has moved past a command, the retry's answer
@@ -50,6 +51,7 @@
 #include "host_key.hpp"
 #include "host_role.hpp"
 #include "identity_question.hpp"
+#include "lease.hpp"
 #include "r4link/carrier.hpp"
 #include "r4link/command.hpp"
 #include "r4link/error.hpp"
@@ -92,7 +94,8 @@ class Session {
 
   // `first_pnum`: echo_host_first_pnum plus 30 random bits (random_first_pnum()).
   // Throws Error{usage} if options.fields are no state fields.
-  Session(Handler& handler, SessionOptions options, std::uint32_t first_pnum);
+  Session(Handler& handler, SessionOptions options, std::uint32_t first_pnum,
+          BoardRole role = BoardRole::control);
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
@@ -143,6 +146,7 @@ class Session {
   // Stops heartbeats and commands likewise, until it is called with false.
   void hold(bool held, Time now);
 
+  BoardRole board_role() const { return board_role_; }
   const LinkStatus& link() const { return status_; }
   // The link is up, the board has executed a command of ours, and the watchdog has not expired:
   // commands go out at once.
@@ -210,7 +214,11 @@ class Session {
   void on_causes(std::int32_t newest, Time now);
   bool name_cause(Pending& pending) const;
   void repeat_stop(Time now);
+  bool watches() const { return board_role_ == BoardRole::watch; }
+  bool hears_board() const;
   void send_heartbeat(Time now);
+  void send_lease(Time now);
+  void on_lease_refused(const Nack& nack, const Datagram& datagram, Time now);
   Time next_poll(Time now);
   void select_fields(Time now);
   Command with_needed_fields(const Command& command);
@@ -218,6 +226,7 @@ class Session {
 
   Handler& handler_;
   SessionOptions options_;
+  const BoardRole board_role_;
   std::uint32_t first_pnum_;
   HostLink link_;
   HostKey key_;
@@ -225,6 +234,7 @@ class Session {
   HostRoleMachine role_;
   FieldSelection selection_;
   IdentityQuestion question_;
+  Lease lease_;
   StopRepetition repetition_;
   LinkStatus status_;
   ReceivedState state_;

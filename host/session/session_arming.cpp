@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // How the session comes to be armed, and what it refuses while it is not (arming.hpp).
+#include "limits.hpp"
 #include "session.hpp"
 
 namespace r4 {
@@ -12,6 +13,7 @@ constexpr int supply_relay = 1;
 
 // An arm() is a command that is never sent: it waits in its slot while its steps are.
 Ticket Session::arm(Time timeout, Time now) {
+  require_control(board_role_, "arm()");
   Pending* const pending = allocate(Command::relay(supply_relay, true), timeout, now);
   if (pending == nullptr) return 0;
   pending->role = Pending::Role::arm;

@@ -5,6 +5,7 @@
 
 #include "../../protocol/messages/command_field.hpp"
 #include "../commands/command_help.hpp"
+#include "limits.hpp"
 #include "session.hpp"
 
 namespace r4 {
@@ -30,7 +31,7 @@ SendResult Session::transmit_now(const Command& command, std::uint32_t t_ms, Pri
 SendResult Session::close_and_transmit(DatagramWriter& writer, CommandKind kind, Priority priority,
                                        Time now) {
   if (key_.refuses_board() && kind != CommandKind::stop) return SendResult::down;
-  key_.sign(writer, now);
+  if (!watches()) key_.sign(writer, now);  // nobody's counter goes on by it
   const Text bytes = writer.finish();
   if (bytes.empty()) return SendResult::down;
   const SendResult result = handler_.transmit({bytes.data(), bytes.size()}, priority);
@@ -73,6 +74,7 @@ bool Session::name_cause(Pending& pending) const {
 
 Ticket Session::send(const Command& command, Time timeout, Time now) {
   require_valid(command);
+  require_control(board_role_, command);
   Pending* pending = allocate(with_needed_fields(command), timeout, now);
   if (pending == nullptr) return 0;
   ++collector_.counts.commands;
@@ -83,6 +85,7 @@ Ticket Session::send(const Command& command, Time timeout, Time now) {
 
 PostResult Session::post(const Command& command, Time now) {
   require_valid(command);
+  require_control(board_role_, command);
   send_queued(now);  // what was asked for earlier goes first
   if (!in_control(now)) return PostResult::no_link;
   if (is_held_back(command.kind)) {
@@ -252,6 +255,7 @@ Ticket Session::leave(Time timeout, Time now) {
   for (Pending& pending : pending_.under_way()) {
     if (pending.kind != CommandKind::stop) finish(pending, Outcome::closed, Refusal::none, now);
   }
+  if (watches()) transmit_now(Command::watch(0), lease_.echo(), Priority::normal, now);
   leaving_ = true;  // a heartbeat behind the farewell would take the board again
   if (!knows_leave_ || !link_up()) return 0;
   Pending* pending = allocate(Command::leave(), timeout, now);

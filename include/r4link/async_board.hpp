@@ -127,6 +127,7 @@ class AsyncBoard {
   template <class Token>
   auto async_arm(Duration timeout, Token&& token) {
     require_timeout("async_arm()", timeout);
+    require_control("async_arm()");
     return asio::async_initiate<Token, void(CommandResult)>(
         [this](auto handler, Duration t) { start_arm(t, make_completion(std::move(handler))); },
         token, timeout);
@@ -143,7 +144,8 @@ class AsyncBoard {
   }
 
   // void(CommandResult). Confirmed as soon as the board is ACTIVE and takes our commands, so that the
-  // first post() goes out; timed out, if it does not come to that. A timeout of 0 only looks.
+  // first post() goes out, or, where the program only watches, as soon as it is heard; timed out, if it does not
+  // come to that. A timeout of 0 only looks.
   template <class Token>
   auto async_wait_active(Duration timeout, Token&& token) {
     require_wait("async_wait_active()", timeout);
@@ -161,6 +163,7 @@ class AsyncBoard {
   auto async_link_timing(Duration board_timeout, Duration heartbeat, Duration timeout,
                          Token&& token) {
     require_timeout("async_link_timing()", timeout);
+    require_control("async_link_timing()");
     require_link_timing(board_timeout, heartbeat);
     return asio::async_initiate<Token, void(CommandResult)>(
         [this](auto handler, Duration b, Duration h, Duration t) {
@@ -262,6 +265,8 @@ class AsyncBoard {
   static void require_timeout(std::string_view what, Duration timeout);
   static void require_wait(std::string_view what, Duration timeout);
   static void require_any(const Setpoints& setpoints);
+  // Throws Error{usage} for a program that only watches.
+  void require_control(std::string_view what) const;
   void start_send(const Command& command, Duration timeout, CompletionPtr completion);
   void start_apply(const Setpoints& setpoints, Duration timeout, CompletionPtr completion);
   void start_stop(Duration timeout, CompletionPtr completion);

@@ -70,8 +70,8 @@ class R4LINK_API Board {
   // run while other threads wait.
   void close();
 
-  // Waits until the board is ACTIVE under our control; throws Error{refused} saying what it is
-  // instead.
+  // Waits until the board is ACTIVE under our control, or, where the program only watches, until it is heard;
+  // throws Error{refused} saying what it is instead.
   void wait_active(Duration timeout = Duration{3000});
 
   // --- commands: each returns when the board's own state confirms it, throws Error{refused}

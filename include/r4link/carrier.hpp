@@ -130,6 +130,13 @@ class R4LINK_API Carrier {
   // audience. `everyone`: nobody here is in control any more.
   virtual void hold(Peer peer) { static_cast<void>(peer); }
 
+  // At a board: does what is for everyone come to that peer?
+  virtual bool reaches(Peer peer) const { return peer == everyone; }
+
+  // At a host: is its place to send from that of every host, as on a CAN bus? Then who only watches sends nothing
+  // but a stop.
+  virtual bool is_shared() const { return false; }
+
   // Sends the packed form from now on, where there is one (CAN). Received are both at any time.
   virtual void use_packed_form(bool wanted) { static_cast<void>(wanted); }
 

@@ -28,6 +28,7 @@ enum class CommandKind : std::uint8_t {
   fields,     // F:name,name…
   setting,    // C:key,value
   identify,   // Q:ID
+  watch,      // W:rate[,name,name…]
 };
 
 // One command. Which members count depends on `kind`; the factories set them. `text` and `text2`
@@ -36,11 +37,11 @@ struct R4LINK_API Command {
   Command() {}  // NOLINT(modernize-use-equals-default): else GCC calls memset for it
   CommandKind kind = CommandKind::heartbeat;
   std::uint8_t channel = 0;  // 1 … the kind's channel count
-  std::int32_t value = 0;    // pwm, us, cm, BLDC speed, stepper target; clear: the cause it names
+  std::int32_t value = 0;  // pwm, us, cm, BLDC speed, stepper target, Hz; clear: the cause it names
   std::int32_t speed = stepper_speed_default;  // stepper, steps per second
   Direction direction = Direction::reverse;    // osmc, dhb12, bldc
   bool on = false;                             // relay; bldc: brake
-  Text text;                                   // fields: the list; setting: the key
+  Text text;                                   // fields, watch: the list; setting: the key
   Text text2;                                  // setting: the value
 
   static Command heartbeat();
@@ -63,6 +64,9 @@ struct R4LINK_API Command {
   static Command fields(Text list);
   static Command setting(Text key, Text value);
   static Command identify();
+  // For two seconds the board streams to whoever sends it, without control; 0: no more. `list`: the fields;
+  // empty: those that the host in control has chosen.
+  static Command watch(std::int32_t rate_hz, Text list = Text());
 };
 
 // Does it drive an output? Those are refused in the safe state: O D S R P B Z.

@@ -38,12 +38,22 @@ enum class KeyTrouble : std::uint8_t {
 // "none", "board has none", "needed", "not taken".
 R4LINK_API const char* to_text(KeyTrouble trouble);
 
+// Why the board does not stream to a program that only watches.
+enum class LeaseTrouble : std::uint8_t {
+  none,
+  full,     // as many watch it already as it serves
+  unknown,  // its firmware serves nobody who does not control it
+};
+// "none", "full", "unknown".
+R4LINK_API const char* to_text(LeaseTrouble trouble);
+
 struct LinkStatus {
   HostLinkState state = HostLinkState::connecting;
   SafeReason reason = SafeReason::none;  // why the board is safe
   bool busy = false;                     // another host controls the board
   Gate gate = Gate::open;
   KeyTrouble key = KeyTrouble::none;
+  LeaseTrouble lease = LeaseTrouble::none;
   bool in_control = false;      // the board takes our commands: they go out at once
   bool transport_down = false;  // it is gone: unplugged, its interface switched off
   ChipFault chip{};             // of a fault: the chip that is the cause, if it is one
@@ -192,6 +202,10 @@ R4LINK_API Problem explain(std::string_view name, const LinkStatus& link);
 
 // What is wrong with keys, and what to do; of kind refused. Not for KeyTrouble::none.
 R4LINK_API Problem explain(KeyTrouble trouble);
+
+// Why the board does not stream to a program that only watches, and what to do; of kind refused. Not for
+// LeaseTrouble::none.
+R4LINK_API Problem explain(LeaseTrouble trouble);
 
 // Why the session is not armed, and what to do; of kind refused. Not for DisarmCause::none.
 R4LINK_API Problem explain(std::string_view command, DisarmCause cause);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -12,12 +13,22 @@
 
 namespace r4 {
 
+// What a program is to its board.
+enum class BoardRole : std::uint8_t {
+  control,  // sends heartbeats, and commands the board as soon as no other host does
+  watch,  // gets what the board says, and takes no control: it may stop the board, and nothing else
+};
+
 struct SessionOptions {
+  // States a second for a program that watches, 1-1000; the board sends no more than its own `rate`. What else is
+  // carried to the same place, as on a CAN bus, comes as well.
+  int watch_rate_hz = 100;
   LinkTiming timing;
   // Must a program call arm() before it drives, and again after whatever made the outputs safe?
   Arming arming = Arming::required;
   // The state fields to ask for, as in F; SAFE and CMD, and RELAYS for arming, are added, to these and
-  // to those of any F that is sent. Empty: leave the board's choice, and every F, alone.
+  // to those of any F that is sent. Empty: leave the board's choice, and every F, alone. One that watches gets
+  // the fields that the host in control has chosen, but for others than "DEFAULT" here.
   std::string fields = "DEFAULT";
   std::chrono::milliseconds command_retry{50};
   std::chrono::milliseconds stop_retry{20};
@@ -35,6 +46,7 @@ struct SessionOptions {
 };
 
 struct BoardOptions {
+  BoardRole role = BoardRole::control;
   SessionOptions session;
   // Of Board only: after so long in the callbacks of one event the heartbeats stop, and the board goes safe, for
   // nobody looks after the robot; up to an hour, 0 turns it off. They go on when it returns.

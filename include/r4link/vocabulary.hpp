@@ -23,6 +23,7 @@ constexpr std::int32_t pwm_max = 4095;             // 12 bit duty (PCA9685), DAC
 constexpr std::int32_t servo_max_us = 2500;        // pulse width; 0 is off
 constexpr std::int32_t stepper_speed_max = 20000;  // steps per second
 constexpr std::int32_t stepper_speed_default = 1000;
+constexpr std::int32_t state_rate_max_hz = 1000;
 constexpr std::int32_t proximity_max_cm = 400;  // HC-SR04 range; a threshold of 0 is off
 
 enum class Direction : std::uint8_t { reverse = 0, forward = 1 };
@@ -127,6 +128,7 @@ struct Nack {
   std::uint8_t at = 0;  // from 1; 0: it is none of a group, or the group was refused as a whole
   bool has_session = false;
   std::uint32_t session = 0;
+  std::uint32_t lease = 0;  // what a W has to echo (LEASE); 0: none is told
 };
 
 // --- the link, seen from the host
@@ -138,6 +140,10 @@ enum class HostLinkState : std::uint8_t {
   lost,        // nothing valid came from the board for the timeout
 };
 
+// Is the board there, and knows what it does?
+constexpr bool is_heard(HostLinkState state) {
+  return state == HostLinkState::active || state == HostLinkState::safe;
+}
 // "connecting", "active", "safe", "lost".
 R4LINK_API const char* to_text(HostLinkState state);
 

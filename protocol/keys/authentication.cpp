@@ -97,13 +97,26 @@ void Authentication::renew() {
   has_nonce_ = required_ && has_chance_;
   for (Entry& entry : entries_) entry.newest = 0;
   if (!has_nonce_) return;
-  char number[max_number_text];
-  const char* const end = write_number(number, ++nonces_);
-  Blake2s hash(chance_);
-  hash.update(Text(number, static_cast<std::size_t>(end - number)));
   std::uint8_t digest[nonce_size / 2];
-  hash.finish(digest);
+  draw(Text(), digest);
   write_hex(nonce_, digest, sizeof digest);
+}
+
+std::uint32_t Authentication::random() {
+  std::uint8_t digest[nonce_size / 2];
+  draw("W", digest);
+  std::uint32_t number = 0;
+  for (int i = 0; i < 4; ++i) number = number << 8 | digest[i];
+  return number != 0 ? number : 1;
+}
+
+void Authentication::draw(Text purpose, std::uint8_t (&digest)[nonce_size / 2]) {
+  char number[max_number_text];
+  const char* const end = write_number(number, ++draws_);
+  Blake2s hash(chance_);
+  hash.update(purpose);
+  hash.update(Text(number, static_cast<std::size_t>(end - number)));
+  hash.finish(digest);
 }
 
 Authentication::Entry* Authentication::find(Text id) {

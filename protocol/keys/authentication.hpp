@@ -69,6 +69,12 @@ class Authentication {
   // Another nonce: what was signed before is of no use then. Counters begin anew.
   void renew();
 
+  // Is there chance to make random numbers of?
+  bool has_chance() const { return has_chance_; }
+  // Another random number each time, which cannot be told from those before; never 0. Only where
+  // there is chance.
+  std::uint32_t random();
+
   // Is it signed? If so, its counter and those below are used up.
   Verdict verify(const Datagram& datagram, std::uint32_t now_ms);
   // It was not and was needed. True if that may be answered: at most every answer_spacing_ms, and
@@ -87,12 +93,13 @@ class Authentication {
     std::uint8_t id = 0;
   };
   Entry* find(Text id);
+  void draw(Text purpose, std::uint8_t (&digest)[nonce_size / 2]);
 
   Entry entries_[max_keys];
   bool required_ = false;
   Blake2sKey chance_;
   bool has_chance_;
-  std::uint32_t nonces_ = 0;  // made so far
+  std::uint32_t draws_ = 0;  // so far
   char nonce_[nonce_size] = {};
   bool has_nonce_ = false;
   std::uint32_t rejections_[verdict_count] = {};

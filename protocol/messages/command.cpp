@@ -49,6 +49,7 @@ Limits limits_of(CommandKind kind) {
     case CommandKind::fields:
     case CommandKind::setting:
     case CommandKind::identify:
+    case CommandKind::watch:
       break;
   }
   return {0, 0, 0};
@@ -161,6 +162,14 @@ Command read_stepper(Values& v) {
   return Command::stepper(v.number(0), v.number(1), v.number(2));
 }
 
+// The rate, and behind it a list.
+Command read_watch(Values& v, Text values) {
+  const std::size_t rate = v.text(0).size();
+  const bool has_list = values.size() > rate;
+  return Command::watch(
+      v.number(0), has_list ? Text(values.data() + rate + 1, values.size() - rate - 1) : Text());
+}
+
 std::uint32_t number_of(Direction direction) { return static_cast<std::uint32_t>(direction); }
 
 bool add_fields(Text word, FieldSet& set) {
@@ -230,6 +239,12 @@ Command Command::setting(Text key, Text value) {
   command.text2 = value;
   return command;
 }
+Command Command::watch(std::int32_t rate_hz, Text list) {
+  Command command = of_kind(CommandKind::watch);
+  command.value = rate_hz;
+  command.text = list;
+  return command;
+}
 Command Command::identify() { return of_kind(CommandKind::identify); }
 
 bool drives_output(CommandKind kind) {
@@ -250,6 +265,7 @@ bool drives_output(CommandKind kind) {
     case CommandKind::fields:
     case CommandKind::setting:
     case CommandKind::identify:
+    case CommandKind::watch:
       break;
   }
   return false;
@@ -312,6 +328,9 @@ Refusal parse_command(const Field& field, Command& out) {
     case 'U':
       if (v.count_is(2)) command = Command::proximity(v.number(0), v.number(1));
       break;
+    case 'W':
+      command = read_watch(v, field.values());
+      break;
     case 'F':
       command = Command::fields(field.values());
       break;
@@ -335,6 +354,10 @@ Refusal check_command(const Command& command) {
   }
   if (command.kind == CommandKind::clear) {
     return command.value < Command::unnamed_cause ? Refusal::range : Refusal::none;
+  }
+  if (command.kind == CommandKind::watch) {
+    const bool rate = command.value >= 0 && command.value <= state_rate_max_hz;
+    return rate ? Refusal::none : Refusal::range;
   }
   const Limits limits = limits_of(command.kind);
   if (limits.channels == 0) return Refusal::none;
@@ -400,6 +423,10 @@ void write_command(DatagramWriter& writer, const Command& command) {
       break;
     case CommandKind::identify:
       writer.field("Q").value(identify_word);
+      break;
+    case CommandKind::watch:
+      writer.field("W").value(command.value);
+      if (!command.text.empty()) writer.values(command.text);
       break;
   }
 }

@@ -30,6 +30,7 @@ int GroupRules::row_of(CommandKind kind) {
     case CommandKind::fields:
     case CommandKind::setting:
     case CommandKind::identify:
+    case CommandKind::watch:
       break;
   }
   return -1;

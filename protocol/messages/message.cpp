@@ -17,6 +17,7 @@ constexpr Text nonce_name("AN");
 constexpr Text safe_name("SAFE");
 constexpr Text cause_name("CAUSE");
 constexpr Text session_name("SESSION");
+constexpr Text lease_name("LEASE");
 constexpr Text board_name("NAME");
 constexpr Text busy_name("BUSY");
 constexpr Text at_name("AT");
@@ -45,6 +46,10 @@ const char* to_text(MessageKind kind) {
       break;
   }
   return "state";
+}
+
+bool asks_to_watch(const Datagram& datagram) {
+  return datagram.command_count() == 1 && datagram.command().name() == Text("W");
 }
 
 MessageKind kind_of(const Datagram& datagram) {
@@ -109,6 +114,7 @@ bool read_nack(const Datagram& datagram, Nack& out) {
   std::uint32_t at = 0;
   if (find_number(datagram, at_name, at) && at <= 0xFF) nack.at = static_cast<std::uint8_t>(at);
   nack.has_session = find_number(datagram, session_name, nack.session);
+  if (!find_number(datagram, lease_name, nack.lease)) nack.lease = 0;
   out = nack;
   return true;
 }
@@ -117,6 +123,7 @@ void write_nack(DatagramWriter& writer, const Nack& nack) {
   writer.field("N").value(nack.pnum).value(name_of(nack.code));
   if (nack.at != 0) writer.field(at_name).value(std::uint32_t{nack.at});
   if (nack.has_session) writer.field(session_name).value(nack.session);
+  if (nack.lease != 0) writer.field(lease_name).value(nack.lease);
 }
 
 bool read_identity(const Datagram& datagram, Identity& out) {

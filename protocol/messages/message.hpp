@@ -26,6 +26,9 @@ const char* to_text(MessageKind kind);
 
 MessageKind kind_of(const Datagram& datagram);
 
+// Is it a single command, W?
+bool asks_to_watch(const Datagram& datagram);
+
 // Why the board is safe, as its heartbeats tell it.
 struct SafeReport {
   SafeReport() = default;
@@ -67,8 +70,9 @@ struct Identity {
   bool has_busy = false;
   bool busy = false;  // another host than the one that asked controls it
 };
-// What the firmware can do besides, whatever the board: it obeys E:LEAVE.
+// What the firmware can do besides, whatever the board: it obeys E:LEAVE, and serves who watches by W.
 constexpr Text leave_capability("leave");
+constexpr Text watch_capability("watch");
 // Is it one of those words?
 bool has_capability(Text capabilities, Text word);
 bool read_identity(const Datagram& datagram, Identity& out);

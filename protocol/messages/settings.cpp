@@ -16,7 +16,7 @@ struct NumberSetting {
 };
 
 constexpr NumberSetting number_settings[] = {
-    {"rate", 1, 1000, &Settings::state_rate_hz},
+    {"rate", 1, state_rate_max_hz, &Settings::state_rate_hz},
     {"heartbeat", 50, 1000, &Settings::heartbeat_ms},
     {"timeout", 100, 10000, &Settings::timeout_ms},
 };

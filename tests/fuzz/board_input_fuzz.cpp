@@ -7,12 +7,13 @@
 // that begins with '!' is something that happens around the board. In others, to reach what only a
 // host in session reaches: $T stands for the T of the newest heartbeat that the peer heard, $N for
 // its next packet number in the upper half, $L for its last, $P for its next in the lower half, $A
-// for a right signature of what is before it. If the first payload is "!k", the board has a key:
+// for a right signature of what is before it, $W for the newest LEASE that the peer was told. If the first payload is "!k", the board has a key:
 // then nothing is executed, and no heartbeat feeds, without such a signature, but a stop.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 #include <memory>
+#include <set>
 #include <string>
 
 #include "firmware/application.hpp"
@@ -97,6 +98,10 @@ class World final : public firmware::Hal, public firmware::Observer {
     std::uint32_t board_t = 0;
     std::uint32_t high = echo_host_first_pnum + 1000;
     std::uint32_t low = 0;
+    std::set<std::uint32_t> told;  // LEASEs
+    std::uint32_t newest_told = 0;
+    bool watches = false;  // it has echoed one
+    std::uint32_t watches_ms = 0;
   };
 
   firmware::Application& board() { return *board_; }
@@ -136,7 +141,16 @@ class World final : public firmware::Hal, public firmware::Observer {
             datagram.has_time());
     const MessageKind kind = kind_of(datagram);
     State state;
-    if (kind == MessageKind::state) require(read_state(datagram, state));
+    if (kind == MessageKind::state) {
+      require(read_state(datagram, state));
+      require(peer < peers && may_get_states(port, peer));
+      require(board().link().has_owner() || state.safe != SafeReason::none);
+    }
+    Nack nack;
+    if (read_nack(datagram, nack) && nack.lease != 0) {
+      hosts_[port][peer].told.insert(nack.lease);
+      hosts_[port][peer].newest_told = nack.lease;
+    }
     if (kind == MessageKind::board_heartbeat) {
       for (std::uint32_t p = 0; p < peers; ++p) {
         if (peer != p && peer != everyone) continue;
@@ -144,6 +158,23 @@ class World final : public firmware::Hal, public firmware::Observer {
       }
     }
     ++sent_;
+  }
+
+  // The host in control gets states, everyone at the ports where it is not, and who has echoed what it was
+  // told, for the time of a lease.
+  bool may_get_states(int port, std::uint32_t peer) const {
+    const BoardLink& link = board_->link();
+    const Host& host = hosts_[port][peer];
+    if (host.watches && now_ms_ - host.watches_ms < Watchers::lease_ms) return true;
+    if (!link.has_owner()) return false;
+    return peer == (link.owner().port == port ? link.owner().peer : everyone);
+  }
+  void on_lease(Source from, const Datagram& datagram) {
+    Host& watcher = host(from);
+    if (datagram.time_ms() > 0xFFFFFFFFU) return;
+    if (watcher.told.count(static_cast<std::uint32_t>(datagram.time_ms())) == 0) return;
+    watcher.watches = true;
+    watcher.watches_ms = now_ms_;
   }
 
   // Time passes; the board is polled as it asks, but not more often than fuzzing has patience for.
@@ -196,6 +227,8 @@ class World final : public firmware::Hal, public firmware::Observer {
     const Outputs before = outputs_;
     const BoardLinkState state = board().link().state();
     const int sent = sent_;
+    const bool watches = valid && asks_to_watch(datagram);
+    if (watches) on_lease(from, datagram);
     executed_ = refused_ = rejected_ = 0;
     stop_ = false;
     board().receive(from.port, from.peer, Text(bytes), now_ms_);
@@ -205,6 +238,7 @@ class World final : public firmware::Hal, public firmware::Observer {
     if (outputs_ != before && outputs_ != Outputs()) {
       require(executed_ != 0 || kind == MessageKind::host_heartbeat);
     }
+    if (watches) require(executed_ == 0 && (outputs_ == before || outputs_ == Outputs()));
     require(executed_ == 0 || refused_ == 0);
     require(refused_ <= 1 && rejected_ <= (keyed_ ? 1 : 0));
     if (!signed_)
@@ -254,6 +288,9 @@ class World final : public firmware::Hal, public firmware::Observer {
           break;
         case 'P':
           bytes += std::to_string(host.low++);
+          break;
+        case 'W':
+          bytes += std::to_string(host.newest_told);
           break;
         case 'A':
           sign(bytes);

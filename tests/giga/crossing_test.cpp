@@ -162,6 +162,31 @@ TEST(UdpPeers, SendToThePapersClientWhereItListensAndWhereItAsks) {
   EXPECT_EQ(to[0].port, 50001);
 }
 
+TEST(UdpPeers, SendToAWatcherAloneBesideThePapersClient) {
+  giga::UdpPeers peers;
+  giga::UdpAddress to[2];
+  peers.set_host(77);
+  const std::uint32_t watcher = peers.heard({77, 50000}, Text(with_crc("W:50;PNum:5;T:0;")));
+  ASSERT_EQ(peers.find(watcher, to), 1);
+  EXPECT_EQ(to[0].port, 50000);
+}
+
+TEST(UdpLink, StatesForWatchersLeaveRoomForThoseOfTheHost) {
+  giga::UdpLink link;
+  giga::UdpPort port(link, &clock_ms);
+  link.set_up(true);
+  EXPECT_FALSE(port.receive([](std::uint32_t, Text) {}));
+  port.hold(1);
+  const std::string state(300, 'x');
+  for (int i = 0; i < 20; ++i) port.send(Text(state), Priority::state, 2);
+  const std::uint32_t dropped = port.dropped();
+  EXPECT_GT(dropped, 0U) << "the thread is away";
+  for (int i = 0; i < 3; ++i) port.send(Text(state), Priority::state, 1);
+  EXPECT_EQ(port.dropped(), dropped);
+  for (int i = 0; i < 3; ++i) port.send(Text(state), Priority::normal, 2);
+  EXPECT_EQ(port.dropped(), dropped) << "and for answers";
+}
+
 TEST(UdpLink, AThreadThatWasAwaySendsThePresent) {
   giga::UdpLink link;
   giga::UdpPort port(link, &clock_ms);

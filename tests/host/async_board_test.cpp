@@ -92,6 +92,43 @@ class Undrained final : public Carrier, private Carrier::Handler {
   Carrier::Handler* handler_ = nullptr;
 };
 
+// As a CAN bus: all hosts send from one place.
+class Bus final : public Carrier {
+ public:
+  explicit Bus(std::vector<std::string>& sent) : sent_(sent) {}
+  void open(Handler&) override {}
+  void close() noexcept override {}
+  SendResult send(std::string_view bytes, Priority, Peer) override {
+    sent_.emplace_back(bytes);
+    return SendResult::sent;
+  }
+  bool is_shared() const override { return true; }
+  bool up() const override { return true; }
+  std::size_t max_size() const override { return max_datagram; }
+  const std::string& name() const override { return name_; }
+  const CarrierCounters& counters() const override { return counters_; }
+
+ private:
+  std::vector<std::string>& sent_;
+  const std::string name_ = "bus";
+  CarrierCounters counters_;
+};
+
+TEST_F(AsyncBoardTest, WhoOnlyWatchesSendsNothingButAStopWhereAllHostsHaveOnePlace) {
+  std::vector<std::string> sent;
+  BoardOptions options;
+  options.role = BoardRole::watch;
+  AsyncBoard watching(io, std::make_unique<Bus>(sent), options);
+  watching.open();
+  bool asked = false;
+  watching.async_identify(600ms, [&](const CommandResult&) { asked = true; });
+  ASSERT_TRUE(run_until(io, [&] { return asked; }));
+  EXPECT_TRUE(sent.empty()) << sent[0];
+  watching.async_stop(50ms, [](const CommandResult&) {});
+  ASSERT_TRUE(run_until(io, [&] { return !sent.empty(); }));
+  EXPECT_EQ(sent[0].substr(0, 7), "E:STOP;");
+}
+
 TEST_F(AsyncBoardTest, TellsStatesOfATransportThatIsNeverDrained) {
   AsyncBoard over(io,
                   std::make_unique<Undrained>(standard_registry().make(io, "sim:", Role::host)));

@@ -12,7 +12,8 @@ import time
 
 import pytest
 
-from r4_process import ERROR, PATIENCE_S, R4, Board, is_link, is_state, monitor, objects, run
+from r4_process import (ERROR, PATIENCE_S, R4, Board, driving, is_link, is_state, monitor, objects, run,
+                        watch)
 
 # The board's timeout, what docs/safety.md promises on top, and what an emulated machine may take.
 SAFE_WITHIN_MS = 1020 + 80
@@ -261,6 +262,16 @@ def test_an_interface_that_goes_down_is_told_of_and_comes_back(board):
         host.next(is_state)
 
 
+def test_who_watches_is_in_nobodys_way(board):
+    with watch(board.host_url) as early:
+        with driving(board.host_url, 'O:358,1,1') as host, watch(board.host_url) as late:
+            for each in (early, late):
+                each.next(lambda state: is_state(state) and state['fields'].get('OSMC1') == [358, 1])
+            host.process.kill()
+            board.state('SAFE', 'link')
+        assert run('send', board.host_url, 'O:1,1,1', timeout=60).returncode == 0
+
+
 def test_bus_off_is_safe_at_once_and_a_restart_brings_it_back(vcan_board):
     def error_frame(classes):
         subprocess.run(['cansend', 'vcan0', f'{0x20000000 | classes:08x}#0000000000000000'], check=True)
@@ -341,7 +352,8 @@ def test_none_of_eight_boards_at_50_hz_is_safe_by_mistake():
     with contextlib.ExitStack() as stack:
         boards = stack.enter_context(Board('can://vcan0?node=0-7', options=often, listens=8))
         for node in range(8):
-            stack.enter_context(beside(R4, 'monitor', f'can://vcan0?node={node}', stdout=subprocess.DEVNULL))
+            stack.enter_context(beside(R4, 'monitor', '--control', f'can://vcan0?node={node}',
+                                       stdout=subprocess.DEVNULL))
         for _ in range(8):
             boards.state('ACTIVE')
         *rows, total = objects(run('bus', 'can://vcan0', '--json', '--duration', '3', timeout=60).stdout)

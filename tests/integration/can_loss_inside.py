@@ -65,7 +65,7 @@ def test_of_telemetry_arrives_what_its_frames_allow(tmp_path):
         dump = runs(dumped, 'candump', '-L', 'vxcan0,400:7E0')
         boards = stack.enter_context(Board(f'can://vxcan0?node=0-{NODES - 1}', listens=NODES,
                                            options=('--set', f'rate,{RATE}')))
-        hosts = [runs(path, R4, 'monitor', f'can://vxcan1?node={node}') for node, path in enumerate(heard)]
+        hosts = [runs(path, R4, 'monitor', '--control', f'can://vxcan1?node={node}') for node, path in enumerate(heard)]
         subprocess.run(['candump', '-n', str(5 * STATES // NODES), f'vxcan0,{TELEMETRY:x}:7FF'],
                        stdout=subprocess.DEVNULL, check=True, timeout=60)
         log = boards.rest()

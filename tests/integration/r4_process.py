@@ -180,6 +180,11 @@ def driving(url, *commands, **process):
 
 
 def monitor(url, *options, **process):
+    """As a host that controls the board and commands nothing."""
+    return Running('monitor', url, '--json', '--control', *options, **process)
+
+
+def watch(url, *options, **process):
     return Running('monitor', url, '--json', *options, **process)
 
 

@@ -80,7 +80,7 @@ def read_screen(master, until, timeout=PATIENCE_S):
 def test_on_a_terminal_the_monitor_draws_a_status_and_leaves_the_cursor_as_it_was():
     with Board('udp://127.0.0.1:0') as board:
         master, slave = pty.openpty()
-        with subprocess.Popen([R4, 'monitor', board.host_url], stdout=slave) as process:
+        with subprocess.Popen([R4, 'monitor', '--control', board.host_url], stdout=slave) as process:
             os.close(slave)
             screen = read_screen(master, r'ACTIVE[^$]*1[0-9][0-9]\.[0-9] Hz[^$]*AIN24 +24')
             run('stop', board.host_url)

@@ -30,7 +30,7 @@ def test_noise_and_a_stalled_pipe_do_not_stall_the_heartbeats():
     port = free_port()
     with Board('udp://127.0.0.1:0') as board, \
             socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as noise, \
-            subprocess.Popen([R4, 'monitor', f'{board.url}?listen={port}', '--json'], text=True,
+            subprocess.Popen([R4, 'monitor', f'{board.url}?listen={port}', '--json', '--control'], text=True,
                              stdout=subprocess.PIPE, stderr=subprocess.PIPE) as host:
         assert host.stdout.readline()
         board.state('ACTIVE')

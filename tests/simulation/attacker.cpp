@@ -46,11 +46,12 @@ const char* to_text(Attack::Kind kind) {
   return "?";
 }
 
-// Stops and questions are obeyed from anyone.
+// Stops and questions are obeyed from anyone, and anyone may watch.
 void Attacker::keep(std::vector<Heard>& list, int host, std::string_view bytes) {
   Datagram datagram;
   if (!read_datagram(Text(bytes), datagram) || asks_to_stop(datagram)) return;
-  if (datagram.command().name() == Text("Q") || list.size() == memory) return;
+  if (datagram.command().name() == Text("Q") || asks_to_watch(datagram)) return;
+  if (list.size() == memory) return;
   list.push_back({std::string(bytes), host});
 }
 

@@ -82,6 +82,28 @@ Schedule Schedule::random(Random& random) {
   return s;
 }
 
+// They come and go; some are more than the board has places for.
+void Schedule::add_watchers(Random& random) {
+  watchers = static_cast<int>(random.between(1, 6));
+  for (int i = 0; i < watchers; ++i) {
+    for (std::uint64_t n = random.between(1, 2); n != 0; --n) {
+      Happening watch;
+      watch.kind = Happening::Kind::watch;
+      watch.at_us = random.below(duration_us);
+      watch.length_us = random.between(1'000, 3'000'000);
+      watch.host = i;
+      happenings.push_back(watch);
+      if (!random.chance(0.05)) continue;
+      watch.kind = Happening::Kind::watcher_stops;
+      watch.at_us += random.below(watch.length_us);
+      happenings.push_back(watch);
+    }
+  }
+  if (random.chance(0.7)) {
+    forge_interval_us = static_cast<std::uint32_t>(random.between(2'000, 100'000));
+  }
+}
+
 void Schedule::add_standstills(Random& random) {
   static constexpr std::uint64_t longest_us[] = {20'000, 50'000, 300'000, 800'000};
   static constexpr std::uint64_t most_apart_us[] = {60'000, 1'000'000, 3'000'000};
@@ -121,6 +143,10 @@ const char* to_text(Happening::Kind kind) {
       return "stopper";
     case Happening::Kind::leave:
       return "leave";
+    case Happening::Kind::watch:
+      return "watch";
+    case Happening::Kind::watcher_stops:
+      return "watcher_stops";
   }
   return "?";
 }

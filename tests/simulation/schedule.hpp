@@ -37,6 +37,8 @@ struct Happening {
     address,    // the host's datagrams come from another address, for good or for `length_us`
     stopper,  // another process asks for an emergency stop and goes, after `length_us` at the latest
     leave,    // the host process says farewell and ends; it comes back after `length_us`
+    watch,    // a program watches for `length_us`; `host` is the number of it
+    watcher_stops,  // … and asks for an emergency stop
   };
   Kind kind;
   std::uint64_t at_us;
@@ -66,9 +68,13 @@ struct Schedule {
   // The board has a key for each host, and there is an attacker, who acts about so often; 0:
   // neither.
   std::uint32_t attack_interval_us = 0;
+  int watchers = 0;
+  // Somebody asks for leases in the name of others about so often; 0: nobody.
+  std::uint32_t forge_interval_us = 0;
 
   static Schedule random(Random& random);
   void add_standstills(Random& random);
+  void add_watchers(Random& random);
 };
 
 const char* to_text(Happening::Kind kind);

@@ -13,6 +13,8 @@ namespace r4::simulation {
 World::World(std::uint64_t seed, bool keep_trace, Loop loop)
     : random_(seed), loop_random_(~seed), keep_trace_(keep_trace) {
   schedule_ = Schedule::random(random_);
+  Random watch_random(seed + 0x5eed);  // what else happens in a schedule without them is as it was
+  if (watch_random.chance(0.3)) schedule_.add_watchers(watch_random);
   if (loop == Loop::stands_still) schedule_.add_standstills(loop_random_);
   report_.seed = seed;
 }
@@ -37,6 +39,7 @@ Report World::run() {
   hosts_.push_back(std::make_unique<Host>(*this, schedule_.hosts));
   hosts_.back()->stopper = true;
   hosts_.back()->peer = schedule_.shared_place ? hosts_.front()->peer : next_peer_++;
+  add_watchers();
   for (std::size_t i = 0; i < schedule_.happenings.size(); ++i) {
     at(schedule_.happenings[i].at_us, Event::Kind::happening, static_cast<int>(i));
   }
@@ -75,6 +78,9 @@ Report World::run() {
         break;
       case Event::Kind::attack:
         attack();
+        break;
+      case Event::Kind::forge:
+        forge_lease();
         break;
       case Event::Kind::over:
         happen(schedule_.happenings[static_cast<std::size_t>(event.index)], true);

@@ -19,6 +19,11 @@
 //   restore    outputs that come back belong to a host that was alive a timeout ago
 //   forged     of a board with a key: nothing that an attacker sends is executed, feeds or takes
 //              control, but a stop
+//   watch      states go to the host in control, and to four places at most that have echoed, at most a
+//              lease ago, what they were told themselves, to each once; without a host they tell that the
+//              board is safe.
+//              Who watches sends no heartbeat and no command: what it feeds or drives breaks silence or
+//              intact
 #pragma once
 
 #include <compare>
@@ -63,6 +68,9 @@ struct Report {
   std::uint32_t attacks = 0;   // datagrams of an attacker
   std::uint32_t rejected = 0;  // for their signatures
   std::uint32_t executed_signed = 0;
+  std::uint32_t leases = 0;   // begun
+  std::uint32_t watched = 0;  // states that came to watchers
+  std::uint32_t forged_leases = 0;
   std::uint32_t standstills = 0;
   std::uint32_t waited = 0;            // datagrams that arrived meanwhile
   std::uint32_t waited_to_feed = 0;    // … and fed
@@ -93,6 +101,7 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
       happening,
       over,
       attack,
+      forge,
       standstill,
       go_on,
     } kind;
@@ -184,6 +193,15 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   void call_stopper(Host& stopper, bool over);
   void happen(const Happening& happening, bool over);
   void attack();
+  // world_watchers.cpp
+  Host& watcher(int number);
+  void add_watchers();
+  void watch(Host& watcher, bool over);
+  void forge_lease();
+  static bool asks_to_watch(std::string_view bytes);
+  void on_told(std::uint32_t peer, const Datagram& datagram);
+  void on_lease(std::uint32_t peer, std::string_view bytes);
+  void check_stream(std::uint32_t peer, const Datagram& datagram);
   // world_channel.cpp
   void transfer(bool to_board, int host, std::uint32_t peer, std::string_view bytes);
   void deliver(int slot);
@@ -228,6 +246,20 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   std::uint64_t new_stop_us_ = 0;  // when one came that is no repetition of the one before
   std::map<Process, std::uint64_t> clear_asked_us_;
   std::uint32_t next_peer_ = 1;
+
+  // What a place was told to echo by this boot of the board, and the lease that it has by that.
+  struct Lease {
+    std::map<std::uint32_t, std::uint64_t> told_us;
+    std::uint32_t token = 0;  // 0: it never had one
+    std::uint64_t renewed_us = 0;
+  };
+  std::map<std::uint32_t, Lease> leases_;
+  std::uint32_t newest_token_ = 0;
+  std::set<std::uint32_t>
+      streamed_;  // where states went at streamed_us_, besides to the host in control
+  std::uint64_t streamed_us_ = 0;
+  std::uint64_t owner_streamed_us_ = 0;
+  std::uint32_t newest_heartbeat_t_ = 0;
 
   std::vector<std::unique_ptr<Host>> hosts_;
   std::vector<Sent> commands_;

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "world_host.hpp"
@@ -32,8 +33,11 @@ void World::boot_board() {
   config.identity = Identity{Text("simulated"), Text("0"), Text("sim")};
   config.settings = schedule_.settings;
   std::uint8_t chance[Authentication::chance_size];
+  leases_.clear();
   if (schedule_.attack_interval_us != 0) {
     for (int i = 0; i < schedule_.hosts; ++i) config.settings.site.keys[i] = key_of_host(i);
+  }
+  if (schedule_.attack_interval_us != 0 || schedule_.watchers != 0) {
     for (std::uint8_t& byte : chance) byte = static_cast<std::uint8_t>(random_.next());
     config.chance = chance;
   }
@@ -87,7 +91,10 @@ void World::apply(const firmware::Outputs& outputs) {
   live_ = driven(outputs);
   if (report_.groups_apart == 0) check_steppers();
   if (!came_back) return;
-  const int id = outputs.stepper[0].position;
+  // Of a group that went command by command another may be the first.
+  const auto first = std::find_if(std::begin(outputs.stepper), std::end(outputs.stepper),
+                                  [](const firmware::StepperTarget& each) { return each.enabled; });
+  const int id = first != std::end(outputs.stepper) ? first->position : 0;
   if (id < 0 || id >= static_cast<int>(commands_.size())) return violate("intact: unknown output");
   const Sent& sent = commands_[static_cast<std::size_t>(id)];
   const Host& host = *hosts_[static_cast<std::size_t>(sent.host)];
@@ -132,11 +139,20 @@ void World::check_silence() {
   }
 }
 
-void World::send(Text datagram, Priority, std::uint32_t peer) {
+void World::send(Text datagram, Priority priority, std::uint32_t peer) {
   const std::string_view bytes(datagram.data(), datagram.size());
+  Datagram sent;
+  if (schedule_.watchers != 0 && read_datagram(datagram, sent)) {
+    if (priority == Priority::state) check_stream(peer, sent);
+    if (kind_of(sent) == MessageKind::nack) on_told(peer, sent);
+    if (kind_of(sent) == MessageKind::board_heartbeat) {
+      newest_heartbeat_t_ = static_cast<std::uint32_t>(sent.time_ms());
+    }
+  }
   for (int i = 0; i < static_cast<int>(hosts_.size()); ++i) {
     const std::uint32_t at_host = hosts_[static_cast<std::size_t>(i)]->peer;
-    if (peer == everyone || peer == at_host) transfer(false, i, at_host, bytes);
+    const bool hears_all = !hosts_[static_cast<std::size_t>(i)]->watcher;
+    if (peer == everyone ? hears_all : peer == at_host) transfer(false, i, at_host, bytes);
   }
 }
 

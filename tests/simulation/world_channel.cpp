@@ -26,6 +26,7 @@ void World::transfer(bool to_board, int host, std::uint32_t peer, std::string_vi
   if (to_board && read_datagram(Text(bytes), datagram)) {
     heartbeat = kind_of(datagram) == MessageKind::host_heartbeat;
     pnum = datagram.pnum();
+    if (heartbeat) hosts_[static_cast<std::size_t>(host)]->heartbeat_pnum = pnum;
     if (asks_to_stop(datagram)) hosts_[static_cast<std::size_t>(host)]->stop_pnum = pnum;
     Command parsed;
     if (datagram.command_count() >= 1 &&
@@ -118,10 +119,12 @@ void World::hand_over(int slot) {
     const std::uint32_t fed_before = board_->link().fed_ms();
     delivering_ = {packet.host, packet.incarnation};
     delivering_peer_ = peer;
+    on_lease(peer, packet.bytes);
     board_->receive(0, peer, Text(packet.bytes), board_ms());
     if (packet.command >= 0) check_whole(packet.command);
     attacker_.on_received(packet.host, packet.bytes);
     const BoardLink& link = board_->link();
+    if (asks_to_watch(packet.bytes) && link.fed_ms() != fed_before) violate("watch: a W feeds");
     if (packet.intact && packet.heartbeat && link.owner().peer == peer &&
         link.fed_ms() != fed_before) {
       fed_.push_back({delivering_, packet.pnum, packet.arrived_us});

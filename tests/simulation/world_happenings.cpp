@@ -12,7 +12,10 @@ void World::happen(const Happening& happening, bool over) {
   const int index = static_cast<int>(&happening - schedule_.happenings.data());
   note(fmt::format("{} {} {}", to_text(happening.kind), over ? "over" : "begins", happening.host));
   const std::uint64_t end_us = now_us_ + happening.length_us;
-  Host& host = *hosts_[static_cast<std::size_t>(happening.host)];
+  const bool watches =
+      happening.kind == Happening::Kind::watch || happening.kind == Happening::Kind::watcher_stops;
+  Host& host =
+      watches ? watcher(happening.host) : *hosts_[static_cast<std::size_t>(happening.host)];
   switch (happening.kind) {
     case Happening::Kind::cut:
       cut_to_board_until_us_ = cut_to_host_until_us_ = end_us;
@@ -75,8 +78,14 @@ void World::happen(const Happening& happening, bool over) {
       if (host.alive && host.farewell_ticket == 0) leave(host);
       break;
     case Happening::Kind::stopper:
-      call_stopper(*hosts_.back(), over);
+      call_stopper(*hosts_[static_cast<std::size_t>(schedule_.hosts)], over);
       break;
+    case Happening::Kind::watch:
+      watch(host, over);
+      break;
+    case Happening::Kind::watcher_stops:
+      if (host.alive && !over) stop(host);
+      return;
   }
   if (!over) at(end_us, Event::Kind::over, index);
 }

@@ -30,11 +30,13 @@ struct World::Host final : Session::Handler {
         echo_host_first_pnum + static_cast<std::uint32_t>(world.random_.below(1U << 30));
     SessionOptions options;
     options.arming = Arming::off;  // so that more is sent that must not be executed
-    if (world.schedule_.attack_interval_us != 0 && !stopper) {
+    if (watcher) options.watch_rate_hz = static_cast<int>(world.random_.between(1, 100));
+    if (world.schedule_.attack_interval_us != 0 && !stopper && !watcher) {
       options.key = key_of_host(index);
       options.clock_start = std::chrono::hours{24} - Time{clock_offset_us};
     }
-    session = std::make_unique<Session>(*this, options, first);
+    session = std::make_unique<Session>(*this, options, first,
+                                        watcher ? BoardRole::watch : BoardRole::control);
     tickets.clear();
   }
   void die() {
@@ -52,7 +54,9 @@ struct World::Host final : Session::Handler {
     world.transfer(true, index, peer, bytes);
     return SendResult::sent;
   }
-  void on_state(const ReceivedState&, const Datagram&) override {}
+  void on_state(const ReceivedState&, const Datagram&) override {
+    world.report_.watched += watcher;
+  }
   void on_board_heartbeat(const Datagram&) override {}
   void on_identity(const Identity&) override {}
   void on_nack(const Nack& nack, const Datagram&) override {
@@ -73,6 +77,7 @@ struct World::Host final : Session::Handler {
   bool alive = false;
   bool frozen = false;
   bool stopper = false;
+  bool watcher = false;
   bool leaving = false;    // ends at its next turn: its stop is confirmed, or its farewell over
   std::uint32_t peer = 0;  // its address
   std::uint32_t other_peer = 0;  // the one before or next; 0: none yet
@@ -87,8 +92,9 @@ struct World::Host final : Session::Handler {
     bool executed = false;
   };
   std::map<Ticket, Stop> stops;
-  std::uint32_t stop_pnum = 0;  // of the newest that was sent
-  Ticket clear_ticket = 0;      // 0: none is under way
+  std::uint32_t stop_pnum = 0;       // of the newest that was sent
+  std::uint32_t heartbeat_pnum = 0;  // likewise
+  Ticket clear_ticket = 0;           // 0: none is under way
   Ticket farewell_ticket = 0;
 };
 

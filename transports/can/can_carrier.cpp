@@ -39,6 +39,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   void use_packed_form(bool wanted) override { node_.use_packed_form(wanted); }
   bool up() const override { return handler_ != nullptr && bus_->up(); }
   std::size_t max_size() const override { return max_datagram; }
+  bool is_shared() const override { return true; }
   const std::string& name() const override { return name_; }
   const CarrierCounters& counters() const override;
 

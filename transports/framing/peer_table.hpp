@@ -5,7 +5,8 @@
 // The table is bounded: a new sender takes the place of the one that has been silent longest. The
 // place of the host in control is its own, whatever others send: a host whose number changed would
 // be another host to the board. It is also the audience of what is for everyone: no stranger's
-// datagram, however valid, takes that away. A number is never given twice.
+// datagram, however valid, takes that away. Nor does one who only watches ever become it, who gets all by
+// its lease. A number is never given twice.
 #pragma once
 
 #include <cstdint>
@@ -23,23 +24,22 @@ class PeerTable {
   // The number of whoever has just sent `bytes`; nobody if they are no valid datagram.
   std::uint32_t heard(const Address& from, Text bytes) {
     Datagram datagram;
-    return read_datagram(bytes, datagram) ? heard(from) : nobody;
+    if (!read_datagram(bytes, datagram)) return nobody;
+    const bool one = datagram.command_count() == 1;
+    const Text name = datagram.command().name();
+    return heard(from, one && name == "W"   ? Says::watch
+                       : one && name == "H" ? Says::heartbeat
+                                            : Says::other);
   }
-  // The same of a datagram that is known to be valid.
-  std::uint32_t heard(const Address& from) {
-    Entry* place = nullptr;
-    for (Entry& entry : entries_) {
-      if (entry.number != nobody && entry.address == from) place = &entry;
+  // The same of a datagram that is known to be valid, and no W.
+  std::uint32_t heard(const Address& from) { return heard(from, Says::other); }
+
+  // Has that one asked to watch, and sent no heartbeat since?
+  bool watches(std::uint32_t number) const {
+    for (const Entry& entry : entries_) {
+      if (number != nobody && entry.number == number) return entry.watches;
     }
-    if (place == nullptr) {
-      place = &place_for_new();
-      place->address = from;
-      if (++given_ == nobody) ++given_;
-      place->number = given_;
-    }
-    place->heard = ++turn_;
-    if (!in_control_ || place->number == held_) audience_ = place->number;
-    return place->number;
+    return false;
   }
 
   // The host of that number is in control: its place is its own until another is held. nobody: it is
@@ -64,8 +64,29 @@ class PeerTable {
   struct Entry {
     Address address = Address();
     std::uint32_t number = nobody;  // nobody: free
-    std::uint64_t heard = 0;        // in which turn
+    bool watches = false;
+    std::uint64_t heard = 0;  // in which turn
   };
+  enum class Says : std::uint8_t { other, watch, heartbeat };
+
+  std::uint32_t heard(const Address& from, Says says) {
+    Entry* place = nullptr;
+    for (Entry& entry : entries_) {
+      if (entry.number != nobody && entry.address == from) place = &entry;
+    }
+    if (place == nullptr) {
+      place = &place_for_new();
+      place->address = from;
+      place->watches = false;
+      if (++given_ == nobody) ++given_;
+      place->number = given_;
+    }
+    place->heard = ++turn_;
+    const bool controls = in_control_ && place->number == held_;
+    if (says != Says::other) place->watches = says == Says::watch && !controls;
+    if (controls || (!in_control_ && !place->watches)) audience_ = place->number;
+    return place->number;
+  }
 
   Entry& place_for_new() {
     Entry* silent = nullptr;

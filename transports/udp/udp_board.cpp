@@ -67,6 +67,11 @@ void UdpBoard::hold(Peer peer) {
   follow_audience();
 }
 
+bool UdpBoard::reaches(Peer peer) const {
+  const Endpoint* const at = peers_.find(peer);
+  return peer == everyone || (at != nullptr && audience_known_ && *at == audience_);
+}
+
 void UdpBoard::follow_audience() {
   const Endpoint* const audience = peers_.find(peers_.audience());
   if (audience == nullptr || !url_.peer_host.empty()) return;
@@ -87,7 +92,8 @@ UdpEnd::Outcome UdpBoard::transmit(std::string_view bytes, Peer to) {
   }
   const Outcome outcome = transmit_to(bytes, *asker, false);
   if (outcome == Outcome::busy) return outcome;
-  const bool same_machine = !url_.peer_host.empty() && asker->address() == audience_.address();
+  const bool same_machine =
+      !url_.peer_host.empty() && asker->address() == audience_.address() && !peers_.watches(to);
   if (same_machine && asker->port() != audience_.port()) {
     return transmit_to(bytes, audience_, true);
   }

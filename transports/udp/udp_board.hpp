@@ -18,6 +18,7 @@ class UdpBoard final : public UdpEnd {
   void open(Handler& handler) override;
   void close() noexcept override;
   void hold(Peer peer) override;
+  bool reaches(Peer peer) const override;
 
  private:
   void received(std::string_view bytes) override;

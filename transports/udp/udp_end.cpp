@@ -15,7 +15,7 @@ namespace r4 {
 namespace {
 
 constexpr std::size_t normal_entries = 64;
-constexpr std::size_t state_entries = 4;
+constexpr std::size_t state_entries = 20;  // four for the host, and for each that watches
 constexpr std::chrono::milliseconds probe_interval{200};
 
 // The network is not there at the moment, as against one packet that failed.

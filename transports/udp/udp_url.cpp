@@ -60,4 +60,10 @@ UdpUrl::UdpUrl(const Url& url, Role role)
   }
 }
 
+std::string with_own_port(std::string url) {
+  const Url parsed = Url::parse(url);
+  if (parsed.scheme() != "udp" || parsed.get("listen")) return url;
+  return url + (url.find('?') == std::string::npos ? "?listen=0" : "&listen=0");
+}
+
 }  // namespace r4

@@ -28,4 +28,7 @@ struct UdpUrl {
   std::uint16_t peer_port = host_port;
 };
 
+// A URL of a host, whatever its scheme: over UDP with any free port, if it names none.
+std::string with_own_port(std::string url);
+
 }  // namespace r4

@@ -8,8 +8,9 @@
 
 namespace r4::test {
 
-ScriptedLink::ScriptedLink(SessionOptions options)
-    : session(*this, std::move(options), echo_host_first_pnum + 100), due_(session.poll(now)) {}
+ScriptedLink::ScriptedLink(SessionOptions options, BoardRole role)
+    : session(*this, std::move(options), echo_host_first_pnum + 100, role),
+      due_(session.poll(now)) {}
 
 SessionOptions ScriptedLink::without_questions() {
   SessionOptions options;

@@ -24,7 +24,8 @@ class ScriptedLink final : private Session::Handler {
     std::string bytes;
   };
 
-  explicit ScriptedLink(SessionOptions options = without_questions());
+  explicit ScriptedLink(SessionOptions options = without_questions(),
+                        BoardRole role = BoardRole::control);
   // Options with which the session sends nothing by itself but heartbeats and its choice of fields,
   // and sends what it is given without being armed.
   static SessionOptions without_questions();

@@ -83,6 +83,31 @@ TEST(PeerTable, SendsWhatIsForEveryoneToTheHostInControlWhateverOthersSend) {
   EXPECT_EQ(peers.heard(owner), number) << "it may come back";
 }
 
+TEST(PeerTable, WhoOnlyWatchesIsNoAudience) {
+  const std::string watch = with_crc("W:50;PNum:5;T:0;");
+  const std::string heartbeat = with_crc("H:ROS2-R4;");
+  Peers peers;
+  const std::uint32_t watcher = peers.heard(1, Text(watch));
+  EXPECT_TRUE(peers.watches(watcher));
+  EXPECT_EQ(peers.audience(), Peers::nobody);
+  peers.heard(1, Text(with_crc("Q:ID;")));
+  EXPECT_EQ(peers.audience(), Peers::nobody) << "it asks, and watches on";
+  const std::uint32_t host = peers.heard(owner, Text(heartbeat));
+  peers.heard(1, Text(watch));
+  EXPECT_EQ(peers.audience(), host);
+  peers.heard(1, Text(heartbeat));
+  EXPECT_FALSE(peers.watches(watcher));
+  EXPECT_EQ(peers.audience(), watcher) << "it is a host now";
+}
+
+TEST(PeerTable, NobodyMakesAWatcherOfTheHostInControl) {
+  Peers peers;
+  const std::uint32_t host = peers.heard(owner, Text(with_crc("H:ROS2-R4;")));
+  peers.hold(host);
+  peers.heard(owner, Text(with_crc("W:50;PNum:5;T:0;")));
+  EXPECT_FALSE(peers.watches(host)) << "its address was forged";
+}
+
 TEST(PeerTable, LetsANewHostInDuringAFlood) {
   Peers peers;
   for (int i = 0; i < 5000; ++i) peers.heard(i);

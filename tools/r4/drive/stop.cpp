@@ -17,7 +17,7 @@
 #include "r4link/async_board.hpp"
 #include "r4link/error.hpp"
 #include "r4link/link.hpp"
-#include "transports/url.hpp"
+#include "transports/udp/udp_url.hpp"
 
 namespace r4::tool {
 namespace {
@@ -29,16 +29,9 @@ struct Options {
   bool json = false;
 };
 
-// A port of its own for each stop: another program may hold the one at which hosts listen, and what is
-// still under way to that is of no use here.
-std::string own_port(const std::string& url) {
-  const Url parsed = Url::parse(url);
-  if (parsed.scheme() != "udp" || parsed.get("listen")) return url;
-  return url + (url.find('?') == std::string::npos ? "?listen=0" : "&listen=0");
-}
-
 std::unique_ptr<AsyncBoard> open(asio::io_context& io, const std::string& url) {
-  auto board = std::make_unique<AsyncBoard>(io, own_port(url));
+  // Another program may hold the port of hosts, and what is still under way to that is of no use here.
+  auto board = std::make_unique<AsyncBoard>(io, with_own_port(url));
   try {
     board->open();
   } catch (const Error& error) {

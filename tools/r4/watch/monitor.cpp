@@ -35,6 +35,7 @@ constexpr Milliseconds patience{5000};
 struct Options {
   std::vector<std::string> urls;
   bool json = false;
+  bool control = false;
   std::uint64_t count = 0;  // 0: no end
   std::optional<Milliseconds> duration;
   std::string fields;
@@ -78,6 +79,7 @@ class Monitor {
  private:
   static BoardOptions board_options(const Options& options) {
     BoardOptions board_options = with_key(options.key);
+    board_options.role = options.control ? BoardRole::control : BoardRole::watch;
     board_options.session.arming = Arming::off;  // it drives nothing
     if (!options.fields.empty()) board_options.session.fields = options.fields;
     return board_options;
@@ -160,9 +162,11 @@ constexpr const char* footer =
 line, with type (state, heartbeat, link, nack, error), transport, pnum, t and fields (numbers as
 numbers, several values as an array); of one board on a CAN bus, at the end, one of type transfers.
 
-The monitor takes part in the link: it sends heartbeats, so the board streams and, unless another
-host has it, obeys this one. It goes on when the transport is lost and comes back. On a CAN bus without
-a node it only listens, and shows every board that it hears.
+The monitor watches: it sends no heartbeats and takes no control, and a board that no host controls
+streams to it all the same. With --control it takes part in the link, as a host that commands nothing:
+the board is ACTIVE. It goes on when the transport is lost and comes back. On a CAN bus it only
+listens: a board streams there while a host controls it; without a node it shows every board that it
+hears.
 
 Examples:
   r4 monitor udp://192.168.0.125
@@ -186,6 +190,8 @@ void add_monitor(CLI::App& root, Action& chosen) {
              "end after that many states (or 5 s in which nothing at all is heard)");
   add_seconds(*command, "--duration", options->duration, "end after that time");
   add_fields(*command, options->fields);
+  add_flag(*command, "--control", options->control,
+           "take control: send heartbeats, so that the board is ACTIVE");
   add_key(*command, options->key);
 }
 

@@ -44,6 +44,7 @@ class JsonView final : public MonitorView {
                 {"busy", status.busy},
                 {"gated", status.gated()}};
     if (status.key != KeyTrouble::none) fields["key"] = to_text(status.key);
+    if (status.lease != LeaseTrouble::none) fields["lease"] = to_text(status.lease);
     lines_.write(line_of(object("link", std::move(fields))));
   }
   void on_event(const CarrierEvent& event) override {
@@ -143,6 +144,7 @@ std::string link_text(const LinkStatus& status) {
   if (status.busy) text += ", another host controls the board";
   if (status.gated()) text += ", our heartbeats are stopped";
   if (status.key != KeyTrouble::none) text += ", " + explain(status.key).text();
+  if (status.lease != LeaseTrouble::none) text += ", " + explain(status.lease).text();
   return text;
 }
 

@@ -43,7 +43,7 @@ class UdpPeers {
     if (at == nullptr) return 0;
     to[0] = *at;
     // The paper's client asks from another port than it listens at.
-    return at->ip == host_ && at->port != host_port ? 2 : 1;
+    return at->ip == host_ && at->port != host_port && !hosts_.watches(peer) ? 2 : 1;
   }
 
  private:

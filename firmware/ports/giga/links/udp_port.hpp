@@ -7,7 +7,8 @@
 //     UdpPort::receive()  <-----   UdpLink::give()
 //     true from receive() <-----   UdpLink::set_up(false)
 //
-// When the ring is full, what is new is dropped and counted; states leave room for answers. So a
+// When the ring is full, what is new is dropped and counted; states leave room for answers, and those to
+// who is not in control room for those to the host that is. So a
 // thread that comes back to work sends the present: what is left of the past are answers.
 #pragma once
 
@@ -67,6 +68,7 @@ class UdpPort final : public firmware::Port {
  public:
   using Clock = std::uint32_t (*)();  // milliseconds that wrap
   static constexpr std::uint32_t kept_for_answers = 1024;
+  static constexpr std::uint32_t kept_for_host = 2048;
   static constexpr int datagrams_per_turn = 8;
 
   UdpPort(UdpLink& link, Clock now_ms) : link_(link), now_ms_(now_ms) {}
@@ -92,8 +94,7 @@ class UdpPort final : public firmware::Port {
     note.peer = peer;
     note.time_ms = now_ms_();
     note.priority = priority;
-    const std::uint32_t keep = priority == Priority::state ? kept_for_answers : 0;
-    if (!link_.to_network_.put(note, datagram, keep)) ++dropped_;
+    if (!link_.to_network_.put(note, datagram, kept_from(priority, peer))) ++dropped_;
   }
   void hold(std::uint32_t peer) override { link_.held_.store(peer, std::memory_order_relaxed); }
   std::size_t max_size() const override { return udp_max_size; }
@@ -101,6 +102,11 @@ class UdpPort final : public firmware::Port {
   std::uint32_t dropped() const { return dropped_; }
 
  private:
+  std::uint32_t kept_from(Priority priority, std::uint32_t peer) const {
+    if (priority != Priority::state) return 0;
+    return peer == everyone || peer == link_.held() ? kept_for_answers : kept_for_host;
+  }
+
   UdpLink& link_;
   const Clock now_ms_;
   bool up_ = false;

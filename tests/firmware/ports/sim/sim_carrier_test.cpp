@@ -54,8 +54,9 @@ std::string error_of(const std::string& url) {
 }
 
 TEST(SimCarrier, HasABoardAtTheOtherEnd) {
-  EXPECT_EQ(identity_of("sim:"), "I:R4," R4LINK_VERSION ",sim-1,sim+leave+group");
-  EXPECT_EQ(identity_of("sim:?node=31&seed=4"), "I:R4," R4LINK_VERSION ",sim-31,sim+leave+group");
+  EXPECT_EQ(identity_of("sim:"), "I:R4," R4LINK_VERSION ",sim-1,sim+leave+group+watch");
+  EXPECT_EQ(identity_of("sim:?node=31&seed=4"),
+            "I:R4," R4LINK_VERSION ",sim-31,sim+leave+group+watch");
 }
 
 TEST(SimCarrier, SaysWhatIsWrongWithItsUrl) {

@@ -438,7 +438,8 @@ TEST_F(SimulatedBoardTest, AnswersWhoItIs) {
   options.firmware_version = "9.9";
   build(std::move(options));
   command("Q:ID");
-  EXPECT_EQ(listener_.heard.back().substr(0, 41), "I:R4,9.9,bench-3,sim+leave+group;BUSY:0;P");
+  EXPECT_EQ(listener_.heard.back().substr(0, 47),
+            "I:R4,9.9,bench-3,sim+leave+group+watch;BUSY:0;P");
 }
 
 TEST_F(SimulatedBoardTest, RefusesAFifthCarrier) {

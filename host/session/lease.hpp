@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How a program that watches a board keeps its lease there: without I/O, part of a session.
+//
+//           STALE: its LEASE is to be echoed         states come
+//     asking <------------------------------> asking ------------> watching
+//        ^                                                            |
+//        +------------------------------------------------------------+
+//                        no state for 1 s
+//
+//     asking    W is sent every 500 ms, and at once with a LEASE to echo
+//     watching  likewise: a lease lasts 2 s
+//     full      the board has no room for another watcher; it is asked once a second
+//     unknown   the board does not know of watchers; likewise, for another may come to its place
+#pragma once
+
+#include <cstdint>
+
+#include "r4link/link.hpp"
+#include "time.hpp"
+
+namespace r4 {
+
+class Lease {
+ public:
+  bool due(Time now) const { return now >= next_; }
+  Time next() const { return next_; }
+  void sent(Time now) {
+    const bool hopeless = state_ == State::full || state_ == State::unknown;
+    next_ = now + (hopeless ? reminder : renewal);
+  }
+  // The T to put into the next one.
+  std::uint32_t echo() const { return echo_; }
+
+  void on_state(Time now) {
+    state_ = State::watching;
+    heard_ = now;
+  }
+  // Our W was answered so.
+  void on_refusal(const Nack& nack, Time now);
+  // Do states come?
+  bool streaming(Time now) const { return state_ == State::watching && now - heard_ < silence; }
+  LeaseTrouble trouble(Time now) const;
+
+ private:
+  enum class State : std::uint8_t { asking, watching, full, unknown };
+  static constexpr Time renewal = std::chrono::milliseconds{500};
+  static constexpr Time reminder = std::chrono::seconds{1};
+  static constexpr Time silence = std::chrono::seconds{1};
+
+  State state_ = State::asking;
+  Time next_{0};
+  Time heard_{0};
+  std::uint32_t echo_ = 0;
+};
+
+inline void Lease::on_refusal(const Nack& nack, Time now) {
+  if (nack.lease != 0) {
+    echo_ = nack.lease;
+    next_ = now;
+  } else if (!streaming(now)) {  // else a host's control brings us the states
+    state_ = nack.code == Refusal::busy ? State::full : State::unknown;
+  }
+}
+
+inline LeaseTrouble Lease::trouble(Time now) const {
+  if (streaming(now)) return LeaseTrouble::none;
+  if (state_ == State::full) return LeaseTrouble::full;
+  return state_ == State::unknown ? LeaseTrouble::unknown : LeaseTrouble::none;
+}
+
+}  // namespace r4

@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Programs that watch a board: beside one that drives it, in either order, and without any."""
+import itertools
+import re
+import signal
+import socket
+import zlib
+
+import pytest
+
+from r4_process import PATIENCE_S, Board, driving, is_state, lasts, monitor, run, watch
+
+
+@pytest.fixture(name='board')
+def a_board():
+    with Board('udp://127.0.0.1:0') as board:
+        yield board
+
+
+def drives(each):
+    return is_state(each) and each['fields'].get('OSMC1') == [358, 1]
+
+
+def is_safe_for_the_link(each):
+    return is_state(each) and each['fields'].get('SAFE') == 1
+
+
+def test_a_robot_that_nobody_drives_is_shown(board):
+    with watch(board.host_url) as watcher:
+        watcher.next(is_safe_for_the_link)
+        watcher.skip_past()
+        times = [watcher.next(is_state)['t'] for _ in range(200)]
+        assert sorted(times) == times and 1900 <= times[-1] - times[0] <= 2600
+    assert not [each for each in board.log if each.get('state') == 'ACTIVE']
+
+
+def test_a_monitor_and_a_send_in_either_order(board):
+    with watch(board.host_url) as early:
+        early.next(is_safe_for_the_link)
+        with driving(board.host_url, 'O:358,1,1') as host, watch(board.host_url) as late:
+            late.next(drives)
+            early.next(drives)
+            host.end()
+            for each in (early, late):
+                each.next(is_safe_for_the_link)
+            assert run('send', board.host_url, 'R:1,On', 'O:100,1,1').returncode == 0
+        early.next(lambda each: is_state(each) and each['fields'].get('OSMC1') == [100, 1])
+        early.next(is_safe_for_the_link)
+
+
+def test_the_first_steps_of_the_help_work_as_printed():
+    """At the ports of the protocol, which are one each: only where they are free."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe, \
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as host_probe:
+        try:
+            probe.bind(('127.0.0.1', 2018))
+            host_probe.bind(('0.0.0.0', 2390))
+        except OSError:
+            pytest.skip('another program has port 2018 or 2390')
+    with Board('udp://127.0.0.1'):
+        with watch('udp://127.0.0.1') as watcher:
+            watcher.next(is_state)
+            sent = run('send', 'udp://127.0.0.1', 'R:1,On', 'O:358,1,1', '--hold', '0.5')
+            assert sent.returncode == 0, sent.stderr
+            watcher.next(drives)
+        with driving('udp://127.0.0.1', 'O:358,1,1'), watch('udp://127.0.0.1') as watcher:
+            watcher.next(drives)
+
+
+def test_watchers_come_and_go_and_the_host_loses_nothing(board):
+    with driving(board.host_url, 'O:358,1,1'), watch(board.host_url) as frozen:
+        frozen.next(drives)
+        frozen.signal(signal.SIGSTOP)
+        for _ in range(3):
+            with watch(board.host_url, '--fields', 'ENC1,US1') as watcher:
+                fields = watcher.next(is_state)['fields']
+                assert set(fields) == {'ENC1', 'US1'}
+                watcher.process.kill()
+        board.never('SAFE', 2.5)
+        frozen.signal(signal.SIGCONT)
+        frozen.skip_past()
+        frozen.next(drives)
+
+
+def test_a_fifth_watcher_is_told_so_and_gets_a_place_that_becomes_free(board):
+    watchers = [watch(board.host_url) for _ in range(4)]
+    try:
+        for each in watchers:
+            each.next(is_state)
+        refused = run('monitor', board.host_url, '--duration', '1')
+        assert 'as many programs watch the board as it serves' in refused.stdout + refused.stderr, refused
+        assert watchers.pop().end() == 0
+        with watch(board.host_url) as next_one:
+            next_one.next(is_state)
+    finally:
+        for each in watchers:
+            each.__exit__()
+
+
+def test_a_stop_beside_a_driving_program(board):
+    with driving(board.host_url, 'O:358,1,1'), watch(board.host_url) as watcher:
+        watcher.next(drives)
+        assert run('stop', board.host_url).returncode == 0
+        watcher.next(lambda each: is_state(each) and each['fields'].get('SAFE') == 2)
+
+
+def test_a_monitor_with_control_is_a_host(board):
+    with monitor(board.host_url) as host:
+        board.state('ACTIVE')
+        host.next(is_state)
+        assert run('send', board.host_url, 'O:358,1,1').returncode == 3
+
+
+def test_a_watcher_finds_the_board_again_after_a_reboot():
+    with Board('udp://127.0.0.1:0', options=['--stdin'], stdin=-1) as board, watch(board.host_url) as watcher:
+        watcher.next(is_safe_for_the_link)
+        board.process.stdin.write('reboot\n')
+        board.process.stdin.flush()
+        board.next(lambda each: 'happened' in each)
+        watcher.skip_past()
+        watcher.next(is_safe_for_the_link)
+
+
+def test_over_a_cable(tmp_path):
+    with Board(f'pty:{tmp_path}/r4', 'udp://127.0.0.1:0') as board:
+        cable, network = [each['host_url'] for each in board.log if each.get('type') == 'listening'][:2]
+        with watch(cable) as watcher:
+            watcher.next(is_safe_for_the_link)
+            with driving(network + '?listen=0', 'O:358,1,1'):
+                watcher.next(drives)
+            watcher.next(is_safe_for_the_link)
+            numbers = [each['pnum'] for each in itertools.islice(iter(watcher.next, None), 50)]
+            assert numbers == list(range(numbers[0], numbers[0] + 50)), 'of the line, all of one count'
+
+
+class Stranger:
+    """Asks by itself, from a port of its own."""
+
+    def __init__(self, board):
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.settimeout(0.3)
+        self.to = ('127.0.0.1', int(board.url.rsplit(':', 1)[1]))
+        self.pnum = itertools.count(5)
+
+    def ask(self, lease, echo):
+        text = f'W:{lease};PNum:{next(self.pnum)};T:{echo};^'.encode()
+        self.socket.sendto(text + hex(zlib.crc32(text)).encode() + b'^', self.to)
+
+    def hears(self):
+        try:
+            return self.socket.recv(2000).decode()
+        except TimeoutError:
+            return ''
+
+
+def test_nothing_streams_to_who_has_not_echoed_what_it_was_told(board):
+    stranger, other = Stranger(board), Stranger(board)
+    stranger.ask('1000', 0)
+    answer = stranger.hears()
+    told = int(re.search(r'N:5,STALE;LEASE:(\d+);', answer)[1])
+    now = int(re.search(r';T:(\d+);', answer)[1])
+    for echo in (now, now + 1, told + 1):
+        lasts(0.03)
+        stranger.ask('1000', echo)
+        assert stranger.hears().startswith('N:')
+    lasts(0.03)
+    other.ask('1000', told)
+    assert other.hears().startswith('N:') and not other.hears()
+    stranger.ask('100', told)
+    assert 'SAFE:1' in stranger.hears()
+    stranger.ask('0', told)
+    lasts(0.1)
+    while stranger.hears():
+        pass
+
+
+def test_who_is_killed_is_streamed_to_for_two_seconds_at_most(board):
+    stranger = Stranger(board)
+    stranger.ask('50', 0)
+    stranger.ask('50', int(re.search(r'LEASE:(\d+)', stranger.hears())[1]))
+    heard = list(itertools.takewhile(bool, iter(stranger.hears, None)))
+    times = [int(re.search(r';T:(\d+);', each)[1]) for each in heard]
+    assert PATIENCE_S and 1900 <= times[-1] - times[0] <= 2020
+
+
+def test_beside_a_standing_host_of_the_same_machine_a_watcher_is_no_copy(board):
+    del board
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as standing:
+        standing.bind(('127.0.0.1', 0))
+        standing.settimeout(1)
+        with Board(f'udp://127.0.0.1:0?peer=127.0.0.1:{standing.getsockname()[1]}') as paired, \
+                watch(paired.host_url) as watcher:
+            for _ in range(100):
+                watcher.next(is_state)
+            standing.setblocking(False)
+            heard = []
+            try:
+                while True:
+                    heard.append(standing.recv(2000).decode())
+            except BlockingIOError:
+                pass
+            assert heard and all(each.startswith('H:R4-ROS2;PNum:0;T:0;') for each in heard), heard[:5]
