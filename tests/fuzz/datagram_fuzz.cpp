@@ -142,11 +142,15 @@ void messages_read_equal(const Datagram& datagram) {
   require(static_cast<int>(heartbeat_reason(datagram)) < safe_reason_count);
   Nack nack;
   if (read_nack(datagram, nack)) {
-    const std::string text = written([&](DatagramWriter& writer) { write_nack(writer, nack); });
-    Text values[2];
-    std::uint32_t pnum = 0;
-    require(field_of(text).split(values, 2) == 2 && parse_number(values[0], pnum));
-    require(pnum == nack.pnum && refusal_from(values[1]) == nack.code);
+    static char buffer[max_datagram];
+    DatagramWriter writer(buffer, sizeof buffer);
+    write_nack(writer, nack);
+    Datagram again;
+    Nack back;
+    require(static_cast<bool>(read_datagram(writer.finish(1, 2), again)) && read_nack(again, back));
+    require(back.pnum == nack.pnum && back.code == nack.code && back.at == nack.at &&
+            back.lease == nack.lease && back.has_session == nack.has_session &&
+            (!nack.has_session || back.session == nack.session));
   }
   Identity identity;
   if (read_identity(datagram, identity)) {
