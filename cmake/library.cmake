@@ -14,7 +14,8 @@ set(objects)
 foreach(layer IN LISTS layers)
   list(APPEND objects $<TARGET_OBJECTS:${layer}>)
 endforeach()
-set(needed fmt::fmt PkgConfig::libserialport PkgConfig::libnl-route PkgConfig::libdeflate)
+set(needed fmt::fmt PkgConfig::libserialport PkgConfig::libnl-route PkgConfig::libdeflate
+    PkgConfig::libzstd)
 
 # COMDAT groups would let the linker take another object's copy of what is local.
 set(joined ${PROJECT_BINARY_DIR}/r4link.o)

@@ -50,8 +50,6 @@ void AsyncBoard::require_wait(std::string_view what, Duration timeout) {
   r4::require_wait(what, timeout);
 }
 
-void AsyncBoard::require_any(const Setpoints& setpoints) { r4::require_any(setpoints); }
-
 void AsyncBoard::start_send(const Command& command, Duration timeout, CompletionPtr completion) {
   Impl& impl = *impl_;
   impl.begin(std::move(completion),
@@ -181,6 +179,10 @@ void AsyncBoard::require_sendable(const Command& command) const {
   r4::require_control(impl_->session.board_role(), command);
   require_cable(name(), command);
 }
+void AsyncBoard::require_sendable(const Setpoints& setpoints) const {
+  require_any(setpoints);
+  r4::require_control(impl_->session.board_role(), setpoints);
+}
 
 PostResult AsyncBoard::post(const Command& command) {
   require_sendable(command);
@@ -192,7 +194,7 @@ PostResult AsyncBoard::post(const Command& command) {
   return result;
 }
 PostResult AsyncBoard::post(const Setpoints& setpoints) {
-  require_any(setpoints);
+  require_sendable(setpoints);
   Impl& impl = *impl_;
   PostResult result = PostResult::no_link;
   impl.enter(Completion::How::post, [&] {
@@ -212,6 +214,8 @@ Statistics AsyncBoard::statistics() const { return impl_->session.statistics(Imp
 const CarrierCounters& AsyncBoard::carrier_counters() const { return impl_->carrier->counters(); }
 const std::string& AsyncBoard::name() const { return impl_->carrier->name(); }
 
+void AsyncBoard::record(Recording& recording) { impl_->record(recording.recorder_); }
+
 Subscription AsyncBoard::on_state(
     std::function<void(const ReceivedState&, const Datagram&)> callback) {
   return impl_->state_callbacks.add(std::move(callback));
@@ -225,6 +229,9 @@ Subscription AsyncBoard::on_nack(std::function<void(const Nack&, const Datagram&
 Subscription AsyncBoard::on_bad_datagram(
     std::function<void(const ReadResult&, std::string_view)> callback) {
   return impl_->bad_callbacks.add(std::move(callback));
+}
+Subscription AsyncBoard::on_overheard(std::function<void(std::string_view)> callback) {
+  return impl_->overheard_callbacks.add(std::move(callback));
 }
 Subscription AsyncBoard::on_link(std::function<void(const LinkStatus&)> callback) {
   return impl_->link_callbacks.add(std::move(callback));

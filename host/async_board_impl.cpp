@@ -169,6 +169,25 @@ void AsyncBoard::Impl::close() {
   enter(Completion::How::post, [this] { session.end_all(now); });
 }
 
+// What is known already comes first.
+void AsyncBoard::Impl::record(const std::shared_ptr<Recorder>& recorder) {
+  tap.attach(recorder, carrier->name());
+  if (carrier->up()) tap.on_carrier_event({CarrierEvent::Kind::up, {{}, carrier->name(), {}, {}}});
+  tap.on_link(session.link());
+  name_in_recording();
+}
+
+void AsyncBoard::Impl::name_in_recording() {
+  const std::string& name = identity.name.empty() ? identity.board_id : identity.name;
+  if (!name.empty()) tap.on_name(name);
+}
+
+// The link goes on without it.
+void AsyncBoard::Impl::tell_that_a_recording_ended() {
+  const std::optional<Problem> problem = tap.take_end();
+  if (problem) call(event_callbacks, CarrierEvent{CarrierEvent::Kind::warning, *problem});
+}
+
 // --- time
 
 // The timer is only set when it must ring earlier than it will; ringing early costs one poll.
@@ -187,7 +206,10 @@ void AsyncBoard::Impl::arm() {
 void AsyncBoard::Impl::on_timer() {
   if (!has_link()) return;
   armed = false;
-  enter(Completion::How::dispatch, [this] { due = session.poll(now); });
+  enter(Completion::How::dispatch, [this] {
+    due = session.poll(now);
+    tell_that_a_recording_ended();
+  });
   // Twice without a word that the transport is drained: it may be one that never tells.
   undrained = backlog_size == 0 ? 0 : undrained + 1;
   if (undrained >= 2) tell_backlog();
@@ -197,7 +219,9 @@ void AsyncBoard::Impl::on_timer() {
 
 void AsyncBoard::Impl::on_datagram(std::string_view bytes, Peer) {
   enter(Completion::How::dispatch, [&] {
+    tap.on_received(bytes);
     session.receive(bytes, now);
+    tap.on_packets(session.packets());
     poll_wanted = true;
   });
 }
@@ -221,11 +245,19 @@ void AsyncBoard::Impl::tell_backlog() {
 
 void AsyncBoard::Impl::on_carrier_event(const CarrierEvent& event) {
   enter(Completion::How::dispatch, [&] {
+    tap.on_carrier_event(event);
     call(event_callbacks, event);
     if (event.kind != CarrierEvent::Kind::warning) {
       session.on_transport(event.kind == CarrierEvent::Kind::up, now);
     }
     poll_wanted = true;
+  });
+}
+
+void AsyncBoard::Impl::on_overheard(std::string_view bytes) {
+  enter(Completion::How::dispatch, [&] {
+    tap.on_sent(bytes);
+    call(overheard_callbacks, bytes);
   });
 }
 
@@ -235,7 +267,9 @@ SendResult AsyncBoard::Impl::transmit(std::string_view datagram, Priority priori
   if (!has_link()) return SendResult::down;
   const bool listens = session.board_role() == BoardRole::watch && carrier->is_shared();
   if (listens && priority != Priority::stop) return SendResult::busy;
-  return carrier->send(datagram, priority);
+  const SendResult result = carrier->send(datagram, priority);
+  if (result == SendResult::sent) tap.on_sent(datagram);
+  return result;
 }
 
 void AsyncBoard::Impl::on_state(const ReceivedState& state, const Datagram& datagram) {
@@ -257,6 +291,7 @@ void AsyncBoard::Impl::on_identity(const Identity& fresh) {
   identity.board_id.assign(fresh.board_id.data(), fresh.board_id.size());
   identity.capabilities.assign(fresh.capabilities.data(), fresh.capabilities.size());
   identity.name.assign(fresh.name.data(), fresh.name.size());
+  if (tap.attached()) name_in_recording();
 }
 
 void AsyncBoard::Impl::on_nack(const Nack& nack, const Datagram& datagram) {
@@ -267,7 +302,8 @@ void AsyncBoard::Impl::on_bad_datagram(const ReadResult& result, std::string_vie
   if (is_open()) call(bad_callbacks, result, bytes);
 }
 
-void AsyncBoard::Impl::on_link(const LinkStatus&) {
+void AsyncBoard::Impl::on_link(const LinkStatus& status) {
+  tap.on_link(status);
   if (!is_open()) return;
   // As it is by then: the one before may have changed it.
   link_callbacks.each([&](auto& one) {

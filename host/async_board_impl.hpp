@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "r4link/async_board.hpp"
+#include "recording/recording_tap.hpp"
 #include "session/session.hpp"
 #include "subscribers.hpp"
 
@@ -132,6 +133,10 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   Ticket leave(Time timeout);
   void close();
 
+  void record(const std::shared_ptr<Recorder>& recorder);
+  void name_in_recording();
+  void tell_that_a_recording_ended();
+
   // --- time
 
   void arm();
@@ -143,6 +148,7 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   void on_drained() override;
   void tell_backlog();
   void on_carrier_event(const CarrierEvent& event) override;
+  void on_overheard(std::string_view bytes) override;
 
   // --- Session::Handler
 
@@ -163,11 +169,13 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   const std::uint32_t heartbeat_ms;  // between ours
   Session session;
   BoardIdentity identity;
+  RecordingTap tap;
 
   Subscribers<ReceivedState, Datagram> state_callbacks;
   Subscribers<Datagram> heartbeat_callbacks;
   Subscribers<Nack, Datagram> nack_callbacks;
   Subscribers<ReadResult, std::string_view> bad_callbacks;
+  Subscribers<std::string_view> overheard_callbacks;
   Subscribers<LinkStatus> link_callbacks;
   Subscribers<CarrierEvent> event_callbacks;
   Subscribers<> restart_callbacks;

@@ -53,6 +53,7 @@ void Board::apply(const Setpoints& setpoints, Duration timeout) {
   const std::string text = text_of(setpoints);
   require_timeout(text, timeout);
   const auto impl = impl_;
+  require_control(impl->role, text);
   const auto call = std::make_shared<Impl::Call>(Command());
   call->start = [&async = impl->async, setpoints](Duration left, auto end) {
     async.async_apply(setpoints, left, std::move(end));
@@ -187,6 +188,18 @@ CarrierCounters Board::carrier_counters() const {
   impl->run_on_loop("carrier_counters()",
                     [impl, report] { *report = impl->async.carrier_counters(); });
   return *report;
+}
+
+void Board::record(const std::string& path, RecordingOptions options) {
+  const auto impl = impl_;
+  auto own = std::make_unique<Recording>(path, options);
+  impl->run_on_loop("record()", [&] { impl->async.record(*own); });
+  impl->keep(std::move(own));
+}
+void Board::record(Recording& recording) {
+  const auto impl = impl_;
+  impl->run_on_loop("record()", [&] { impl->async.record(recording); });
+  impl->keep(nullptr);
 }
 
 Subscription Board::on_state(std::function<void(const ReceivedState&)> callback) {

@@ -74,8 +74,14 @@ void Board::Impl::close() {
   {
     const std::lock_guard lock(joining);
     if (thread.joinable()) thread.join();
+    recording.reset();  // with the farewell in it
   }
   callbacks.stop();
+}
+
+void Board::Impl::keep(std::unique_ptr<Recording> own) {
+  const std::lock_guard lock(joining);
+  recording.swap(own);
 }
 
 // --- on the loop
@@ -307,6 +313,7 @@ PostResult Board::Impl::post(const Command& command) {
 }
 PostResult Board::Impl::post(const Setpoints& setpoints) {
   require_any(setpoints);
+  require_control(role, setpoints);
   const std::lock_guard lock(mutex);
   if (closed || !in_control) return PostResult::no_link;
   if (is_held_back()) return PostResult::not_armed;

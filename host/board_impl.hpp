@@ -84,6 +84,9 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   static Duration bounded(Duration timeout);
   static Error closed_error(std::string_view what);
 
+  // A recording of this board's own, until another one takes its place.
+  void keep(std::unique_ptr<Recording> own);
+
   // --- on the loop
 
   void listen();
@@ -107,7 +110,8 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   PostBox box;
   CallbackThread callbacks;
   std::thread thread;
-  std::mutex joining;
+  std::mutex joining;  // also of the recording
+  std::unique_ptr<Recording> recording;
 
   // Of the loop.
   asio::steady_timer look_timer{io};

@@ -152,8 +152,8 @@ Subscription CallbackThread::add(Kind& kind, Function callback, Tell tell) {
                         kind.add(one);
                         tell(*one);
                       }});
+    news_.notify_one();  // with the lock: the callback may be called at once, and destroy this
   }
-  news_.notify_one();
   return Subscription(one);
 }
 

@@ -16,11 +16,11 @@ import sys
 PUBLIC = {'include/r4link'}
 PROTOCOL = PUBLIC | {'protocol/datagram', 'protocol/keys', 'protocol/messages', 'protocol/link'}
 FRAMING = PROTOCOL | {'transports/framing', 'transports/framing/can'}
-CARRIERS = {'transports/can', 'transports/serial', 'transports/udp'}
+CARRIERS = {'transports/can', 'transports/serial', 'transports/share', 'transports/udp'}
 TRANSPORTS = FRAMING | CARRIERS | {'transports'}
 FIRMWARE = FRAMING | {'firmware', 'firmware/drivers'}
 MODELS = {'firmware/ports/sim/chips', 'firmware/ports/sim/robot'}
-HOST = TRANSPORTS | {'host', 'host/commands', 'host/session'}
+HOST = TRANSPORTS | {'host', 'host/commands', 'host/recording', 'host/session'}
 SIMULATED = HOST | FIRMWARE | MODELS | {'firmware/ports/sim'}
 SHELL = SIMULATED | {'tools/r4/shell'}
 # room: the rooms it may include besides itself
@@ -35,6 +35,7 @@ ALLOWED = {
     'transports': FRAMING,
     'transports/can': FRAMING | {'transports'},
     'transports/serial': FRAMING | {'transports'},
+    'transports/share': FRAMING | {'transports'},
     'transports/udp': FRAMING | {'transports'},
     'firmware/drivers': PROTOCOL,
     'firmware': FIRMWARE,
@@ -47,11 +48,13 @@ ALLOWED = {
     'firmware/ports/giga/links': FIRMWARE | {'firmware/ports', 'firmware/ports/giga/chip'},
     'firmware/ports/giga': FIRMWARE | {'firmware/ports/giga/chip', 'firmware/ports/giga/links'},
     'host/commands': TRANSPORTS,
+    'host/recording': TRANSPORTS,
     'host/session': TRANSPORTS | {'host/commands'},
     'host': HOST,
     'tools/r4/shell': SIMULATED,
     'tools/r4/drive': SHELL,
     'tools/r4/bus': SHELL,
+    'tools/r4/recording': SHELL,
     'tools/r4/watch': SHELL | {'tools/r4/bus'},
     'tools/r4/sim': SHELL,
     'tools/r4': SHELL,

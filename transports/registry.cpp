@@ -7,7 +7,9 @@
 #include "can/can_carrier.hpp"
 #include "serial/pty_carrier.hpp"
 #include "serial/serial_carrier.hpp"
+#include "share/shared_carrier.hpp"
 #include "udp/udp_carrier.hpp"
+#include "udp/udp_url.hpp"
 
 namespace r4 {
 
@@ -15,30 +17,45 @@ Registry Registry::standard() {
   Registry registry;
   registry.add({"udp", "udp://HOST[:2018][?listen=2390], udp:auto, udp:?id=NAME",
                 "WiFi or Ethernet; for a board: udp://BIND[:2018][?peer=HOST[:2390]]",
-                make_udp_carrier});
+                make_udp_carrier, udp_wire});
   registry.add({"serial", "serial:///dev/ttyACM0[?baud=1000000], serial:auto, serial:?sn=SERIAL",
-                "USB serial, or the pty of a simulated board", make_serial_carrier});
+                "USB serial, or the pty of a simulated board", make_serial_carrier, serial_wire});
   registry.add(
       {"pty", "pty:[PATH]", "for a board: a pty that a host opens as serial", make_pty_carrier});
   registry.add({"can", "can://can0[?node=1&fd=0&pack=1]", "ISO-TP on a CAN bus (SocketCAN)",
-                make_can_carrier});
+                make_can_carrier, can_wire});
   return registry;
 }
 
 void Registry::add(Entry entry) { entries_.push_back(std::move(entry)); }
 
+const Registry::Entry& Registry::entry_of(const Url& url) const {
+  const auto entry = std::find_if(entries_.begin(), entries_.end(),
+                                  [&](const Entry& e) { return e.scheme == url.scheme(); });
+  if (entry != entries_.end()) return *entry;
+  std::string known;
+  for (const Entry& e : entries_) known += (known.empty() ? "" : ", ") + e.usage;
+  throw Error(ErrorKind::usage, url.text(), "there is no transport '" + url.scheme() + "'",
+              "use one of " + known);
+}
+
 std::unique_ptr<Carrier> Registry::make(asio::io_context& io, std::string_view url,
                                         Role role) const {
   const Url parsed = Url::parse(url);
-  const auto entry = std::find_if(entries_.begin(), entries_.end(),
-                                  [&](const Entry& e) { return e.scheme == parsed.scheme(); });
-  if (entry == entries_.end()) {
-    std::string known;
-    for (const Entry& e : entries_) known += (known.empty() ? "" : ", ") + e.usage;
-    throw Error(ErrorKind::usage, parsed.text(), "there is no transport '" + parsed.scheme() + "'",
-                "use one of " + known);
-  }
-  return entry->make(io, parsed, role);
+  return entry_of(parsed).make(io, parsed, role);
+}
+
+std::unique_ptr<Carrier> Registry::make_shared(asio::io_context& io, std::string_view url,
+                                               BoardRole role) const {
+  const Url parsed = Url::parse(url);
+  const Entry& entry = entry_of(parsed);
+  // Who watches has no need of the port of hosts.
+  std::unique_ptr<Carrier> own = role == BoardRole::watch
+                                     ? make(io, with_own_port(std::string(url)), Role::host)
+                                     : entry.make(io, parsed, Role::host);
+  if (!entry.wire) return own;
+  return make_shared_carrier(
+      io, std::move(own), [wire = entry.wire, parsed] { return wire(parsed); }, role);
 }
 
 }  // namespace r4

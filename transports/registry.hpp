@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "r4link/carrier.hpp"
+#include "r4link/options.hpp"
+#include "shared_wire.hpp"
 #include "url.hpp"
 
 namespace r4 {
@@ -24,6 +26,9 @@ class Registry {
     std::string usage;    // "udp://HOST[:2018][?listen=2390]"
     std::string meaning;  // one line for --help
     CarrierFactory make;
+    // What the wire is called that programs of this machine share (shared_wire.hpp). None: they
+    // do not. Throws Error where it is not to be found.
+    std::function<SharedWire(const Url& url)> wire = nullptr;
   };
 
   // A registry with the transports of this folder: udp, serial, pty, can.
@@ -35,8 +40,13 @@ class Registry {
   // The carrier for a URL, not yet opened. Throws Error{usage} for an unknown scheme, naming those
   // that exist, and for a URL that its scheme does not take.
   std::unique_ptr<Carrier> make(asio::io_context& io, std::string_view url, Role role) const;
+  // The same for a host's program, which shares the wire with others of this machine.
+  std::unique_ptr<Carrier> make_shared(asio::io_context& io, std::string_view url,
+                                       BoardRole role) const;
 
  private:
+  const Entry& entry_of(const Url& url) const;
+
   std::vector<Entry> entries_;
 };
 

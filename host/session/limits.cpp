@@ -54,6 +54,10 @@ void require_control(BoardRole role, const Command& command) {
   require_control(role, shown(command));
 }
 
+void require_control(BoardRole role, const Setpoints& group) {
+  if (role != BoardRole::control) require_control(role, text_of(group));
+}
+
 void require_timeout(std::string_view what, std::chrono::milliseconds timeout) {
   if (timeout.count() > 0) return;
   throw Error(ErrorKind::usage, fmt::format("{} within {} ms", what, timeout.count()),

@@ -11,6 +11,7 @@ namespace r4 {
 
 enum class BoardRole : std::uint8_t;
 struct Command;
+class Setpoints;
 struct SessionOptions;
 
 // SessionOptions and what is in them; the constructors of the boards and of Session call it.
@@ -19,6 +20,7 @@ void require_valid(const SessionOptions& options);
 // A program that only watches stops its board, asks who it is, and commands nothing else.
 void require_control(BoardRole role, std::string_view what);
 void require_control(BoardRole role, const Command& command);
+void require_control(BoardRole role, const Setpoints& group);
 
 // The time in which a command is to be confirmed, or something is to come: more than none. A stop has
 // no such limit: it goes out whatever its timeout.

@@ -401,6 +401,8 @@ Time Session::next_poll(Time now) {
 void Session::on_transport(bool up, Time now) {
   transport_down_ = !up;
   link_.on_transport(up);
+  // A program that shares the wire hears the board from elsewhere, in other numbers.
+  if (up && watches()) link_.forget_numbers();
   refresh_status(now);
 }
 

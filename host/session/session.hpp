@@ -160,6 +160,8 @@ class Session {
   bool knows_cause() const { return cause_ != Command::unnamed_cause; }
   const ReceivedState& state() const { return state_; }
   Statistics statistics(Time now) const;
+  // Of the board's datagrams.
+  const PacketCounters& packets() const { return link_.counters(); }
 
   static constexpr std::size_t max_pending = 64;
   static constexpr std::size_t max_stops = 16;

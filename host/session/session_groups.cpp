@@ -4,12 +4,14 @@
 
 #include "../../protocol/messages/command_field.hpp"
 #include "../commands/command_help.hpp"
+#include "limits.hpp"
 #include "session.hpp"
 
 namespace r4 {
 
 Ticket Session::send(const Setpoints& group, Time timeout, Time now) {
   require_any(group);
+  require_control(board_role_, group);
   if (group.size() == 1) return send(group[0], timeout, now);
   Pending* const pending = allocate(group[0], timeout, now);
   if (pending == nullptr) return 0;
@@ -22,6 +24,7 @@ Ticket Session::send(const Setpoints& group, Time timeout, Time now) {
 
 PostResult Session::post(const Setpoints& group, Time now) {
   require_any(group);
+  require_control(board_role_, group);
   if (group.size() == 1) return post(group[0], now);
   send_queued(now);  // what was asked for earlier goes first
   if (!in_control(now)) return PostResult::no_link;

@@ -40,6 +40,7 @@
 #include "carrier.hpp"
 #include "datagram.hpp"
 #include "options.hpp"
+#include "recording.hpp"
 #include "setpoints.hpp"
 #include "subscription.hpp"
 
@@ -88,6 +89,7 @@ class AsyncBoard {
   // Throws Error{usage} for a command outside its ranges, and for a key or password where others
   // would see it.
   void require_sendable(const Command& command) const;
+  void require_sendable(const Setpoints& setpoints) const;
 
   // void(CommandResult). Throws as require_sendable() does, and for a timeout of nothing.
   template <class Token>
@@ -105,7 +107,7 @@ class AsyncBoard {
   // CommandResult::at, executed. Throws Error{usage} for none, and for a timeout of nothing.
   template <class Token>
   auto async_apply(const Setpoints& setpoints, Duration timeout, Token&& token) {
-    require_any(setpoints);
+    require_sendable(setpoints);
     require_timeout("async_apply()", timeout);
     return asio::async_initiate<Token, void(CommandResult)>(
         [this](auto handler, const Setpoints& s, Duration t) {
@@ -200,6 +202,9 @@ class AsyncBoard {
   Subscription on_board_heartbeat(std::function<void(const Datagram&)> callback);
   Subscription on_nack(std::function<void(const Nack&, const Datagram&)> callback);
   Subscription on_bad_datagram(std::function<void(const ReadResult&, std::string_view)> callback);
+  // What other programs send to the board on a wire that is shared with them (docs/sharing.md), as it stands:
+  // heartbeats and commands of the one that controls, stops of others.
+  Subscription on_overheard(std::function<void(std::string_view)> callback);
   Subscription on_link(std::function<void(const LinkStatus&)> callback);
   // The transport, and a warning where the event loop was held up for so long that heartbeats were late.
   Subscription on_event(std::function<void(const CarrierEvent&)> callback);
@@ -210,6 +215,10 @@ class AsyncBoard {
   Subscription on_arming(std::function<void(DisarmCause)> callback);
   // The board refused a command that was posted.
   Subscription on_refused(std::function<void(const RefusedPost&)> callback);
+
+  // Every datagram from now on, in both directions, goes into that recording too, until it is closed or gone, or
+  // another one is named. Where it ends by itself on_event() tells, and the link goes on.
+  void record(Recording& recording);
 
   // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. Throws
   // Error{usage} for less than nothing and more than an hour. feed()
@@ -264,7 +273,6 @@ class AsyncBoard {
   // Throw Error{usage} for a time that none can be.
   static void require_timeout(std::string_view what, Duration timeout);
   static void require_wait(std::string_view what, Duration timeout);
-  static void require_any(const Setpoints& setpoints);
   // Throws Error{usage} for a program that only watches.
   void require_control(std::string_view what) const;
   void start_send(const Command& command, Duration timeout, CompletionPtr completion);

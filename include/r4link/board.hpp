@@ -35,6 +35,7 @@
 #include "carrier.hpp"
 #include "config.hpp"
 #include "options.hpp"
+#include "recording.hpp"
 #include "setpoints.hpp"
 #include "subscription.hpp"
 
@@ -216,6 +217,13 @@ class R4LINK_API Board {
   Subscription on_arming(std::function<void(DisarmCause)> callback);
   // A command that post() took was refused: by the board, or on its way there.
   Subscription on_refused(std::function<void(const RefusedPost&)> callback);
+
+  // Every datagram from now on, in both directions, goes into a file, too (recording.hpp, docs/recordings.md), or
+  // into a recording that other boards have as well: until close(), until that is closed or gone, or until another is
+  // named. Where it ends by itself, because the disk is full, on_event() tells, and the link goes on. Throws Error if
+  // the file cannot be written.
+  void record(const std::string& path, RecordingOptions options = {});
+  void record(Recording& recording);
 
   // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. Throws
   // Error{usage} for less than nothing and more than an hour. feed() costs no system call.

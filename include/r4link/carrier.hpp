@@ -105,6 +105,8 @@ class R4LINK_API Carrier {
     // that was held up can tell by it which state of a backlog is the newest. Behind a long burst on a
     // byte stream it may come with the next datagram only.
     virtual void on_drained() {}
+    // What another program sent to the board, on a wire that programs share.
+    virtual void on_overheard(std::string_view bytes) { static_cast<void>(bytes); }
 
    protected:
     ~Handler() = default;

@@ -11,6 +11,7 @@
 #include "key.hpp"
 #include "link.hpp"
 #include "options.hpp"
+#include "recording.hpp"
 #include "setpoints.hpp"
 #include "simulated_pins.hpp"
 #include "simulation.hpp"

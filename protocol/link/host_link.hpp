@@ -36,6 +36,10 @@ class HostLink {
 
   // The transport has gone (`lost` at once) or come (a heartbeat is due at once).
   void on_transport(bool up);
+  // What comes from now on may have other packet numbers.
+  void forget_numbers() {
+    if (tracker_.started()) tracker_.restart();
+  }
 
   // Lets time pass: silence of the board. True if the state changed.
   bool poll(std::uint32_t now_ms);

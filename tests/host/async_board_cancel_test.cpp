@@ -19,7 +19,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-const Command drive = Command::osmc(358, Direction::forward, 1);
+const Command run_motor = Command::osmc(358, Direction::forward, 1);
 
 // A board that nobody answers, on a loop of its own.
 struct AsyncBoardCancellation : testing::Test {
@@ -48,7 +48,7 @@ struct AsyncBoardCancellation : testing::Test {
 };
 
 TEST_F(AsyncBoardCancellation, GivesACommandUp) {
-  const auto result = cancelled([&](auto token) { board.async_send(drive, 1h, token); });
+  const auto result = cancelled([&](auto token) { board.async_send(run_motor, 1h, token); });
   ASSERT_TRUE(result);
   EXPECT_EQ(result->outcome, Outcome::cancelled);
 }
@@ -120,7 +120,7 @@ TEST_F(AsyncBoardCancellation, IsWhatACoroutineDoesThatWaitsForTheFirstOfTwo) {
   std::optional<std::size_t> first;
   const auto race = [&]() -> asio::awaitable<void> {
     asio::steady_timer timer(io, 1ms);
-    const auto ended = co_await (board.async_send(drive, 1h, asio::use_awaitable) ||
+    const auto ended = co_await (board.async_send(run_motor, 1h, asio::use_awaitable) ||
                                  timer.async_wait(asio::use_awaitable));
     first = ended.index();
     board.close();

@@ -29,7 +29,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-const Command drive = Command::osmc(358, Direction::forward, 1);
+const Command start_motor = Command::osmc(358, Direction::forward, 1);
 
 // Runs the loop until `done()`; false after 5 s.
 template <class Done>
@@ -173,7 +173,7 @@ TEST_F(AsyncBoardTest, TellsEverySubscriberLastWhatIsSo) {
 TEST_F(AsyncBoardTest, ConfirmsThroughACallback) {
   std::optional<CommandResult> result;
   board.open();
-  board.async_send(drive, 1s, [&](const CommandResult& r) { result = r; });
+  board.async_send(start_motor, 1s, [&](const CommandResult& r) { result = r; });
   EXPECT_FALSE(result) << "never inside the call that starts it";
   ASSERT_TRUE(run_until(io, [&] { return result.has_value(); }));
   EXPECT_EQ(result->outcome, Outcome::confirmed);
@@ -188,8 +188,8 @@ TEST_F(AsyncBoardTest, ConfirmsThroughAFuture) {
     io.run();
   });
   auto sent =
-      asio::post(io,
-                 asio::use_future([&] { return board.async_send(drive, 1s, asio::use_future); }))
+      asio::post(
+          io, asio::use_future([&] { return board.async_send(start_motor, 1s, asio::use_future); }))
           .get();
   EXPECT_EQ(sent.get().outcome, Outcome::confirmed);
   auto stopped =
@@ -213,7 +213,7 @@ TEST_F(AsyncBoardTest, ConfirmsThroughACoroutine) {
     }
     result = co_await board.async_stop(1s, asio::use_awaitable);
     outcomes.push_back(result.outcome);
-    result = co_await board.async_send(drive, 1s, asio::use_awaitable);
+    result = co_await board.async_send(start_motor, 1s, asio::use_awaitable);
     outcomes.push_back(result.outcome);
     EXPECT_EQ(result.code, Refusal::safe);
     board.close();
@@ -246,7 +246,8 @@ TEST_F(AsyncBoardTest, RunsAHandlerOnItsExecutor) {
   std::atomic<bool> done{false};
   std::thread::id where;
   board.open();
-  board.async_send(drive, 1s, asio::bind_executor(pool.get_executor(), [&](const CommandResult&) {
+  board.async_send(start_motor, 1s,
+                   asio::bind_executor(pool.get_executor(), [&](const CommandResult&) {
                      where = std::this_thread::get_id();
                      done = true;
                    }));
@@ -257,7 +258,7 @@ TEST_F(AsyncBoardTest, RunsAHandlerOnItsExecutor) {
 
   auto strand = asio::make_strand(io);
   bool inside = false;
-  board.async_send(drive, 1s, asio::bind_executor(strand, [&](const CommandResult& result) {
+  board.async_send(start_motor, 1s, asio::bind_executor(strand, [&](const CommandResult& result) {
                      inside = strand.running_in_this_thread();
                      EXPECT_EQ(result.outcome, Outcome::closed) << "the board is closed";
                    }));
@@ -269,7 +270,7 @@ TEST_F(AsyncBoardTest, RunsAHandlerOnItsExecutor) {
 TEST_F(AsyncBoardTest, TakesMoveOnlyHandlers) {
   std::optional<Outcome> outcome;
   board.open();
-  board.async_send(drive, 1s, [&, owned = std::make_unique<int>(7)](const CommandResult& r) {
+  board.async_send(start_motor, 1s, [&, owned = std::make_unique<int>(7)](const CommandResult& r) {
     outcome = r.outcome;
     EXPECT_EQ(*owned, 7);
   });
@@ -292,7 +293,7 @@ TEST_F(AsyncBoardTest, CallbacksMaySend) {
   board.on_state([&, sent = false](const State&, const Datagram&) mutable {
     if (sent) return;
     sent = true;
-    board.async_send(drive, 1s, [&](const CommandResult& r) { outcome = r.outcome; });
+    board.async_send(start_motor, 1s, [&](const CommandResult& r) { outcome = r.outcome; });
   });
   board.open();
   ASSERT_TRUE(run_until(io, [&] { return outcome.has_value(); }));
@@ -303,7 +304,8 @@ TEST_F(AsyncBoardTest, IsNotInTheWayWithSixtyFiveCommands) {
   std::vector<Outcome> outcomes;
   const auto note = [&](const CommandResult& result) { outcomes.push_back(result.outcome); };
   board.open();
-  for (std::size_t i = 0; i < Session::max_pending + 1; ++i) board.async_send(drive, 1s, note);
+  for (std::size_t i = 0; i < Session::max_pending + 1; ++i)
+    board.async_send(start_motor, 1s, note);
   ASSERT_TRUE(run_until(io, [&] { return outcomes.size() == Session::max_pending + 1; }));
   EXPECT_EQ(outcomes[0], Outcome::full) << "said at once";
   EXPECT_EQ(std::count(outcomes.begin(), outcomes.end(), Outcome::confirmed),
@@ -315,14 +317,14 @@ TEST_F(AsyncBoardTest, CloseCancelsAndNoCallbackFollows) {
   const auto note = [&](const CommandResult& result) { outcomes.push_back(result.outcome); };
   board.open();
   ASSERT_TRUE(run_until(io, [&] { return board.in_control(); }));
-  board.async_send(drive, 10s, note);
+  board.async_send(start_motor, 10s, note);
   board.async_stop(10s, note);
   board.on_state([](const State&, const Datagram&) { ADD_FAILURE() << "called after close()"; });
   board.close();
   board.close();
-  board.async_send(drive, 1s, note);
+  board.async_send(start_motor, 1s, note);
   board.async_stop(1s, note);
-  EXPECT_FALSE(board.post(drive));
+  EXPECT_FALSE(board.post(start_motor));
   EXPECT_TRUE(outcomes.empty()) << "handlers run on the loop";
   io.restart();
   io.run();  // ends: nothing is left
@@ -370,7 +372,7 @@ TEST_P(DestroyedIn, SurvivesIt) {
       board->async_identify(10s, destroy);
     } else if (place == "nack") {
       board->async_stop(1s, [&](const CommandResult&) {
-        if (board) board->async_send(drive, 1s, [](const CommandResult&) {});
+        if (board) board->async_send(start_motor, 1s, [](const CommandResult&) {});
       });
     }
     board->async_send(Command::fields("ENC1"), 10s, [&](const CommandResult& result) {
@@ -402,7 +404,7 @@ TEST(AsyncBoardEnd, IsDestroyedBeforeOrWithoutItsLoop) {
   {
     AsyncBoard board(io, "sim:", at_will());
     board.open();
-    board.async_send(drive, 1s, [&](const CommandResult&) { called = true; });
+    board.async_send(start_motor, 1s, [&](const CommandResult&) { called = true; });
   }
   EXPECT_FALSE(called);
   io.run();
@@ -422,7 +424,7 @@ TEST(AsyncBoardEnd, ItsHandlersDieWithTheLoop) {
     asio::io_context io;
     AsyncBoard board(io, "sim:", at_will());
     board.open();
-    board.async_send(drive, 1s, [payload](const CommandResult&) {});
+    board.async_send(start_motor, 1s, [payload](const CommandResult&) {});
     io.poll();
   }
   EXPECT_EQ(payload.use_count(), 1);
@@ -444,8 +446,9 @@ TEST_F(AsyncBoardTest, TellsOfEverythingThatComes) {
     ++nacks;
   });
   board.open();
-  board.async_stop(
-      1s, [&](const CommandResult&) { board.async_send(drive, 1s, [](const CommandResult&) {}); });
+  board.async_stop(1s, [&](const CommandResult&) {
+    board.async_send(start_motor, 1s, [](const CommandResult&) {});
+  });
   ASSERT_TRUE(
       run_until(io, [&] { return states > 3 && heartbeats > 1 && links > 1 && nacks > 0; }));
   EXPECT_EQ(board.carrier_counters().rx_oversize, 0U);

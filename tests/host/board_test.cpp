@@ -2,7 +2,9 @@
 // r4::Board opposite simulated boards in real time: in process, over UDP and over a pty.
 #include "r4link/board.hpp"
 
+#include <fmt/core.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <future>
@@ -181,11 +183,12 @@ TEST(Board, SaysWhatIsWrongWithAUrl) {
   EXPECT_EQ(problem_of([] { Board("sim:?node=99"); }).kind, ErrorKind::usage);
 }
 
-TEST(Board, SaysThatAPortIsInUse) {
+TEST(Board, SaysWhoControlsItAlready) {
   BoardInAThread simulated("pty");
   Board board(simulated.url(), at_will());
   const Problem problem = problem_of([&] { Board another(simulated.url()); });
-  EXPECT_EQ(problem.kind, ErrorKind::open);
+  EXPECT_EQ(problem.kind, ErrorKind::refused);
+  EXPECT_TRUE(contains(problem.reason, fmt::format("(pid {})", ::getpid())));
   EXPECT_FALSE(problem.fix.empty());
 }
 

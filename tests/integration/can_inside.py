@@ -97,6 +97,11 @@ class Dump:
         self.process.wait()
 
 
+def elsewhere(board):
+    """Where a program of another computer would be, and why it is refused."""
+    return [('can://can0?node=3', 'another host')] if board.bus == 'can1' else []
+
+
 def in_control(host):
     host.next(is_link('active'))
     return host.next(lambda each: is_state(each) and 'CMD' in each['fields'])
@@ -178,11 +183,13 @@ def test_a_stop_of_a_foreign_program_is_obeyed(board):
 def test_another_host_is_refused_while_the_first_is_there(board):
     with monitor(board.host_url) as first:
         in_control(first)
-        result = run('send', board.host_url, '--timeout', '2', 'O:358,1,1', timeout=60)
-        assert result.returncode == 3, result
-        assert 'another host' in result.stderr, result
-        result = run('bench', board.host_url, '--duration', '1', timeout=60)
-        assert result.returncode == 3 and 'another host' in result.stderr, result
+        # From this computer, and from another on the same bus.
+        here = f'controlled by r4 (pid {first.process.pid})'
+        for url, why in [(board.host_url, here), *elsewhere(board)]:
+            result = run('send', url, '--timeout', '2', 'O:358,1,1', timeout=60)
+            assert result.returncode == 3 and why in result.stderr, result
+            result = run('bench', url, '--duration', '1', timeout=60)
+            assert result.returncode == 3 and why in result.stderr, result
         first.skip_past()
         first.next(is_state)
         assert not any(each['type'] == 'nack' for each in first.log), 'the other one did not even try'
@@ -250,7 +257,7 @@ def test_an_interface_that_goes_down_is_told_of_and_comes_back(board):
         down = host.next(lambda each: each['type'] == 'link' and not each['fields']['up'])
         print(f'down after {(down["came"] - down_at) * 1000:.0f} ms')
         board.state('SAFE', 'link')
-        refused = run('monitor', board.host_url)
+        refused = run('stop', board.host_url)
         assert refused.returncode == 4 and f'ip link set {board.bus} up' in refused.stderr, refused
         ip('link', 'set', board.bus, 'up')
         up_at = time.monotonic()

@@ -72,13 +72,13 @@ def test_settings_of_the_network_are_taken_over_the_cable_only(board):
         assert refused.returncode == 3 and 'USB' in refused.stderr
 
 
-def test_a_second_program_is_told_that_the_port_is_in_use(board):
+def test_a_second_host_is_told_who_controls_the_board_and_may_stop_it(board):
     with monitor(board.host_url) as host:
         host.next(is_state)
-        result = run('monitor', board.host_url, '--duration', '1')
-        assert result.returncode == 4 and 'in use' in result.stderr
-        stopped = run('stop', board.host_url)
-        assert stopped.returncode == 4 and 'CUT THE POWER' in stopped.stderr
+        refused = run('send', board.host_url, 'O:1,1,1')
+        assert refused.returncode == 3 and f'(pid {host.process.pid})' in refused.stderr
+        assert run('stop', board.host_url).returncode == 0
+        board.state('SAFE', 'stop')
         host.next(is_state)
 
 

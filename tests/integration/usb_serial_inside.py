@@ -10,7 +10,7 @@ import subprocess
 import threading
 import time
 
-from r4_process import is_link, is_state, monitor, run
+from r4_process import driving, is_link, is_state, monitor, run, watch
 
 NETLINK_KOBJECT_UEVENT = 15
 PORT = '/dev/ttyUSB0'
@@ -82,7 +82,32 @@ def unplugged_and_plugged_in_again(url, times):
         assert host.end() == 0, host.errors
 
 
+def shared_by_programs():
+    by_path, by_number = f'serial://{PORT}', 'serial:?sn=R4-0001'
+
+    def drives(each):
+        return is_state(each) and each['fields'].get('OSMC1') == [358, 1]
+
+    with watch(by_path) as early:
+        early.next(is_state)
+        with driving(by_number, 'O:358,1,1') as host, watch(by_number) as late:
+            for watcher in (early, late):
+                watcher.next(drives)
+            refused = run('send', by_path, 'O:1,1,1')
+            assert refused.returncode == 3, refused
+            assert f'controlled by r4 (pid {host.process.pid})' in refused.stderr, refused
+            stopped = run('stop', by_path)
+            assert stopped.returncode == 0, stopped
+            print(stopped.stdout.splitlines()[0])
+            host.process.kill()
+            early.skip_past()
+            early.next(is_link('safe', 'stop'))
+            early.next(is_state)
+        assert run('send', by_path, 'E:CLEAR').returncode == 0
+
+
 listed()
 streams_at_the_boards_rate()
+shared_by_programs()
 unplugged_and_plugged_in_again('serial:?sn=R4-0001', times=3)
 unplugged_and_plugged_in_again(f'serial://{PORT}', times=1)

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
@@ -177,7 +178,7 @@ class Day final : private firmware::Port {
   void pass_millisecond() {
     ++passed_ms_;
     ++now_ms_;
-    const sim::Pins before = board_.pins();
+    const auto before = shafts();
     hardware_.pass_millisecond(!hangs_);
     application_.guard().tick(now_ms_);
     const bool active = application_.state() == BoardState::active;
@@ -186,16 +187,19 @@ class Day final : private firmware::Port {
       application_.guard().check_in(firmware::Application::loop_duty);
     }
     if (speaks_ && passed_ms_ % 100 == 0) say("H:ROS2-R4", heard_t_);
-    const sim::Pins after = board_.pins();
-    stand_ = true;
-    for (int i = 0; i < stepper_channels; ++i) {
-      stand_ = stand_ && before.stepper[i].position == after.stepper[i].position;
-    }
+    stand_ = before == shafts();
     const bool back = passed_ms_ - ended_ms_ > firmware::BoardHardware::retry_us / 1000 + 2;
     if (!active && application_.state() != BoardState::active && back && passed_ms_ % 16 == 0) {
       ++watched_ms;
       if (!all_off()) ++unsafe_ms;
     }
+  }
+
+  // Where the stepper motors are.
+  std::array<std::int32_t, stepper_channels> shafts() const {
+    std::array<std::int32_t, stepper_channels> steps{};
+    for (int i = 0; i < stepper_channels; ++i) steps[i] = board_.stepper_shaft(i + 1);
+    return steps;
   }
 
   void begin(Incident incident, Chip chip) {

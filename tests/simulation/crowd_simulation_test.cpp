@@ -2,7 +2,7 @@
 // A board on a network where a crowd sends to it: up to 60 addresses, before the 16 places that a UDP
 // port has for its peers. Whoever is in control keeps it, whatever the others send, and when they have
 // left another gets it. How soon depends on how many ask for it as well, for the board answers 50 of
-// them a second, with a key 10. R4_SCHEDULES sets how many crowds there are, R4_SEED replays one.
+// them a second, with a key 10. R4_CROWDS sets how many crowds there are, R4_SEED replays one.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -320,7 +320,7 @@ std::uint64_t from_environment(const char* name, std::uint64_t fallback) {
 TEST(CrowdSimulation, StrangersTakeNobodysControlAndKeepNobodyFromIt) {
   const bool one = std::getenv("R4_SEED") != nullptr;
   const std::uint64_t from = one ? from_environment("R4_SEED", 0) : 1;
-  const std::uint64_t to = one ? from : from_environment("R4_SCHEDULES", 150);
+  const std::uint64_t to = one ? from : from_environment("R4_CROWDS", 150);
   std::uint64_t sent = 0;
   std::uint64_t renumbered = 0;
   std::vector<std::uint32_t> first_ms;

@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstring>
 #include <utility>
 
 #include "world_host.hpp"
@@ -101,12 +103,18 @@ std::uint32_t World::board_ms() const {
 }
 
 void World::mix(const void* data, std::size_t size) {
-  const auto* bytes = static_cast<const unsigned char*>(data);
-  auto add = [this](unsigned char byte) {
-    report_.trace_hash = (report_.trace_hash ^ byte) * 0x100000001b3U;
+  const auto* bytes = static_cast<const char*>(data);
+  auto add = [this](std::uint64_t word) {
+    report_.trace_hash = (report_.trace_hash ^ word) * 0x100000001b3U;
+    report_.trace_hash ^= report_.trace_hash >> 32;
   };
-  for (int i = 0; i < 8; ++i) add(static_cast<unsigned char>(now_us_ >> (8 * i)));
-  for (std::size_t i = 0; i < size; ++i) add(bytes[i]);
+  add(now_us_);
+  add(size);
+  for (std::size_t i = 0; i < size; i += sizeof(std::uint64_t)) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, bytes + i, std::min(size - i, sizeof word));
+    add(word);
+  }
 }
 
 void World::note(const std::string& line) {

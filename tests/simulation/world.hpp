@@ -45,7 +45,7 @@ namespace r4::simulation {
 struct Report {
   std::uint64_t seed = 0;
   std::string violation;           // empty: every promise held
-  std::uint64_t trace_hash = 0;    // FNV-1a over every datagram and event with its time
+  std::uint64_t trace_hash = 0;    // over every datagram and event with its time
   std::vector<std::string> trace;  // only when asked for
   // What happened, to see that the schedules reach what they are to test.
   std::uint32_t executed = 0;

@@ -47,6 +47,7 @@ class Recorder final : public Carrier::Handler {
     if (then_event) then_event();
   }
   void on_drained() override { ++drained; }
+  void on_overheard(std::string_view bytes) override { overheard.emplace_back(bytes); }
 
   bool has(std::string_view text) const {
     for (const Datagram& datagram : datagrams) {
@@ -70,6 +71,7 @@ class Recorder final : public Carrier::Handler {
   std::vector<Datagram> datagrams;
   std::vector<Event> events;
   int drained = 0;
+  std::vector<std::string> overheard;
   std::function<void(const Datagram&)> then;  // also called
   std::function<void()> then_event;           // also called
 };

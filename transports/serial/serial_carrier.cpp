@@ -24,6 +24,31 @@ constexpr long max_baud = 12'000'000;
 constexpr std::chrono::milliseconds look_again{100};
 constexpr int looks_before_warning = 5;
 
+// The path to open. Throws Error if it is not there, or not the only one.
+std::string find_device(const Url& url) {
+  const std::string number = url.get("sn").value_or("");
+  if (number.empty() && url.path() != "auto") return url.path();
+  std::vector<SerialPort> ports = list_serial_ports();
+  std::erase_if(ports, [&](const SerialPort& port) {
+    return number.empty() ? !port.is_r4 : port.serial_number != number;
+  });
+  if (ports.empty()) {
+    throw Error(ErrorKind::open, url.text(),
+                number.empty()
+                    ? "no R4 board is connected by USB"
+                    : fmt::format("no device with serial number '{}' is connected", number),
+                "connect the board and switch it on; r4 list shows the ports");
+  }
+  if (ports.size() > 1) {
+    std::string list;
+    for (const SerialPort& port : ports) {
+      list += fmt::format("{}{} ({})", list.empty() ? "" : ", ", url_of(port), port.path);
+    }
+    throw Error(ErrorKind::usage, url.text(), "several boards are connected", "use one of " + list);
+  }
+  return ports.front().path;
+}
+
 class SerialCarrier final : public Carrier, private LineStream::Owner {
  public:
   SerialCarrier(asio::io_context& io, Url url);
@@ -44,7 +69,6 @@ class SerialCarrier final : public Carrier, private LineStream::Owner {
   void on_drained() override { handler_->on_drained(); }
   void on_lost(int error) override;
 
-  std::string find_device() const;
   std::string find_again() const;
   void open_device(const std::string& path);
   void look_later();
@@ -86,7 +110,7 @@ SerialCarrier::SerialCarrier(asio::io_context& io, Url url)
 
 void SerialCarrier::open(Handler& handler) {
   close();
-  open_device(find_device());
+  open_device(find_device(url_));
   handler_ = &handler;
   up_ = true;
   ++counters_.ups;
@@ -100,34 +124,9 @@ void SerialCarrier::close() noexcept {
   stream_.stop();
 }
 
-// The path to open. Throws Error if it is not there, or not the only one.
-std::string SerialCarrier::find_device() const {
-  if (serial_number_.empty() && url_.path() != "auto") return url_.path();
-  std::vector<SerialPort> ports = list_serial_ports();
-  std::erase_if(ports, [this](const SerialPort& port) {
-    return serial_number_.empty() ? !port.is_r4 : port.serial_number != serial_number_;
-  });
-  if (ports.empty()) {
-    throw Error(ErrorKind::open, url_.text(),
-                serial_number_.empty()
-                    ? "no R4 board is connected by USB"
-                    : fmt::format("no device with serial number '{}' is connected", serial_number_),
-                "connect the board and switch it on; r4 list shows the ports");
-  }
-  if (ports.size() > 1) {
-    std::string list;
-    for (const SerialPort& port : ports) {
-      list += fmt::format("{}{} ({})", list.empty() ? "" : ", ", url_of(port), port.path);
-    }
-    throw Error(ErrorKind::usage, url_.text(), "several boards are connected",
-                "use one of " + list);
-  }
-  return ports.front().path;
-}
-
 // The path of the device that has been open; some adapters share one serial number.
 std::string SerialCarrier::find_again() const {
-  if (device_.serial_number.empty()) return find_device();
+  if (device_.serial_number.empty()) return find_device(url_);
   std::string path;
   for (const SerialPort& port : list_serial_ports()) {
     if (port.serial_number != device_.serial_number || port.vid != device_.vid ||
@@ -194,6 +193,16 @@ void SerialCarrier::look() {
 
 std::unique_ptr<Carrier> make_serial_carrier(asio::io_context& io, const Url& url, Role) {
   return std::make_unique<SerialCarrier>(io, url);
+}
+
+SharedWire serial_wire(const Url& url) {
+  const std::string path = resolve_links(find_device(url));
+  for (const SerialPort& port : list_serial_ports()) {
+    if (port.path == path && port.is_r4 && !port.serial_number.empty()) {
+      return {"serial/sn=" + port.serial_number, true};
+    }
+  }
+  return {"serial/" + path, true};
 }
 
 }  // namespace r4

@@ -13,6 +13,7 @@
 #include <asio/io_context.hpp>
 #include <memory>
 
+#include "../shared_wire.hpp"
 #include "../url.hpp"
 #include "r4link/carrier.hpp"
 
@@ -20,5 +21,9 @@ namespace r4 {
 
 // Throws Error{usage} for a URL that serial does not take.
 std::unique_ptr<Carrier> make_serial_carrier(asio::io_context& io, const Url& url, Role role);
+
+// What programs that share the port call it: a board by its serial number, so that it may be plugged into
+// another socket, anything else by its device. Throws Error where there is none, or more than one.
+SharedWire serial_wire(const Url& url);
 
 }  // namespace r4

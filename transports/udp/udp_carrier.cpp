@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "udp_carrier.hpp"
 
+#include <fmt/core.h>
+
 #include <utility>
 
 #include "udp_board.hpp"
 #include "udp_host.hpp"
+#include "udp_url.hpp"
 
 namespace r4 {
 
@@ -16,6 +19,13 @@ std::unique_ptr<Carrier> make_udp_carrier_with(asio::io_context& io, const Url& 
                                                HostLookup lookup, BoardSearch search) {
   if (role == Role::board) return std::make_unique<UdpBoard>(io, url, std::move(lookup));
   return std::make_unique<UdpHost>(io, url, std::move(lookup), std::move(search));
+}
+
+SharedWire udp_wire(const Url& text) {
+  const UdpUrl url(text, Role::host);
+  if (url.listen == 0) return {};
+  return {fmt::format("udp/{}{}/{}/{}", url.search ? "?" : "", url.search ? url.called : url.host,
+                      url.port, url.listen)};
 }
 
 }  // namespace r4

@@ -27,6 +27,7 @@
 #include <asio/io_context.hpp>
 #include <memory>
 
+#include "../shared_wire.hpp"
 #include "../url.hpp"
 #include "board_search.hpp"
 #include "host_lookup.hpp"
@@ -40,5 +41,9 @@ std::unique_ptr<Carrier> make_udp_carrier(asio::io_context& io, const Url& url, 
 // The same, with names looked up and boards searched for in that way.
 std::unique_ptr<Carrier> make_udp_carrier_with(asio::io_context& io, const Url& url, Role role,
                                                HostLookup lookup, BoardSearch search = {});
+
+// What programs that share the wire call it: the board, as it is written, and the port of hosts. Empty
+// where that is any free one: then each has its own.
+SharedWire udp_wire(const Url& text);
 
 }  // namespace r4

@@ -66,4 +66,14 @@ std::string with_own_port(std::string url) {
   return url + (url.find('?') == std::string::npos ? "?listen=0" : "&listen=0");
 }
 
+std::string with_any_port(std::string url) {
+  url = with_own_port(std::move(url));
+  if (Url::parse(url).scheme() != "udp") return url;
+  constexpr std::string_view key = "listen=";
+  std::size_t at = url.find('?');
+  while (url.compare(at + 1, key.size(), key) != 0) at = url.find('&', at + 1);
+  at += 1 + key.size();
+  return url.replace(at, std::min(url.find('&', at), url.size()) - at, "0");
+}
+
 }  // namespace r4

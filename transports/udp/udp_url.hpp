@@ -30,5 +30,7 @@ struct UdpUrl {
 
 // A URL of a host, whatever its scheme: over UDP with any free port, if it names none.
 std::string with_own_port(std::string url);
+// The same, even if it names one.
+std::string with_any_port(std::string url);
 
 }  // namespace r4

@@ -15,8 +15,8 @@ using Lines = std::vector<std::string>;
 constexpr std::uint8_t safe_a = 0xAA;
 constexpr std::uint8_t safe_b = 0x00;
 
-struct Bench {
-  Bench() { bus.attach(chip); }
+struct Mcp23017Bench {
+  Mcp23017Bench() { bus.attach(chip); }
   void set_up() {
     expander.begin();
     test::run(expander, bus, 1);
@@ -42,7 +42,7 @@ struct Bench {
 };
 
 TEST(Mcp23017, WritesTheLatchesBeforeTheDirections) {
-  Bench bench;
+  Mcp23017Bench bench;
   bench.expander.begin();
   test::run(bench.expander, bench.bus, 1);
   EXPECT_EQ(test::lines(bench.log),
@@ -54,7 +54,7 @@ TEST(Mcp23017, WritesTheLatchesBeforeTheDirections) {
 }
 
 TEST(Mcp23017, NoPinIsEverDrivenToAnythingButItsSafeLevelInTheSetUp) {
-  Bench bench;
+  Mcp23017Bench bench;
   bench.expander.begin();
   for (int i = 0; i < 10; ++i) {
     BusBudget budget(6);
@@ -66,7 +66,7 @@ TEST(Mcp23017, NoPinIsEverDrivenToAnythingButItsSafeLevelInTheSetUp) {
 }
 
 TEST(Mcp23017, BringsBackAChipOfTheOtherRegisterLayout) {
-  Bench bench;
+  Mcp23017Bench bench;
   const std::uint8_t bank[] = {0x0A, 0x80};
   bench.bus.write(0x20, bank, 2);
   bench.set_up();
@@ -76,7 +76,7 @@ TEST(Mcp23017, BringsBackAChipOfTheOtherRegisterLayout) {
 }
 
 TEST(Mcp23017, WritesOnlyTheLatchThatChanged) {
-  Bench bench;
+  Mcp23017Bench bench;
   bench.set_up();
   EXPECT_EQ(bench.write(safe_a, safe_b), Lines{});
   EXPECT_EQ(bench.write(safe_a, 0x81), Lines{"20 <- 15 81"});
@@ -89,7 +89,7 @@ TEST(Mcp23017, WritesOnlyTheLatchThatChanged) {
 }
 
 TEST(Mcp23017, SafeStateIsRightAlsoForAChipThatWasReset) {
-  Bench bench;
+  Mcp23017Bench bench;
   bench.set_up();
   bench.write(0x55, 0xFF);
   bench.chip.power_on();
@@ -102,7 +102,7 @@ TEST(Mcp23017, SafeStateIsRightAlsoForAChipThatWasReset) {
 }
 
 TEST(Mcp23017, NoticesAReset) {
-  Bench bench;
+  Mcp23017Bench bench;
   bench.set_up();
   bench.chip.power_on();
   EXPECT_EQ(bench.verify(), ChipTrouble::was_reset);
@@ -110,7 +110,7 @@ TEST(Mcp23017, NoticesAReset) {
 
 TEST(Mcp23017, NoticesALatchAndADirectionThatChangedByThemselves) {
   for (const int number : {0x00, 0x01, 0x14, 0x15}) {
-    Bench bench;
+    Mcp23017Bench bench;
     bench.set_up();
     const std::uint8_t bytes[] = {static_cast<std::uint8_t>(number), 0x21};
     bench.bus.write(0x20, bytes, 2);
@@ -119,7 +119,7 @@ TEST(Mcp23017, NoticesALatchAndADirectionThatChangedByThemselves) {
 }
 
 TEST(Mcp23017, RefusedBytesAndAHeldBusAreTrouble) {
-  Bench bench;
+  Mcp23017Bench bench;
   bench.set_up();
   bench.bus.refuse(0x20, 1);
   EXPECT_EQ(bench.write(1, 2), Lines{"20 <- 14 NACK"});

@@ -18,8 +18,8 @@ const std::string factory_eeprom =
 const std::string zero_eeprom =
     "61 -> C1 00 00 C1 00 00 D1 00 00 D1 00 00 E1 00 00 E1 00 00 F1 00 00 F1 00 00";
 
-struct Bench {
-  Bench() { bus.attach(chip); }
+struct Mcp4728Bench {
+  Mcp4728Bench() { bus.attach(chip); }
   void provisioned() {
     for (int i = 0; i < Mcp4728::channels; ++i) chip.set_eeprom(i, {});
     chip.power_on();
@@ -48,7 +48,7 @@ struct Bench {
 };
 
 TEST(Mcp4728, ProvisionsTheEepromOfANewChipWithZerosOnce) {
-  Bench bench;
+  Mcp4728Bench bench;
   bench.dac.begin();
   test::run(bench.dac, bench.bus, 70);
   EXPECT_TRUE(bench.dac.ready());
@@ -71,7 +71,7 @@ TEST(Mcp4728, ProvisionsTheEepromOfANewChipWithZerosOnce) {
 }
 
 TEST(Mcp4728, LeavesAProvisionedEepromAlone) {
-  Bench bench;
+  Mcp4728Bench bench;
   bench.provisioned();
   bench.dac.begin();
   test::run(bench.dac, bench.bus, 1);
@@ -81,7 +81,7 @@ TEST(Mcp4728, LeavesAProvisionedEepromAlone) {
 }
 
 TEST(Mcp4728, DoesNotWearOutAnEepromThatKeepsNothing) {
-  Bench bench;
+  Mcp4728Bench bench;
   bench.chip.wear_out();
   for (int i = 0; i < 5; ++i) {
     bench.dac.begin();
@@ -92,7 +92,7 @@ TEST(Mcp4728, DoesNotWearOutAnEepromThatKeepsNothing) {
 }
 
 TEST(Mcp4728, WaitsForAWriteThatWasUnderWayAtBoot) {
-  Bench bench;
+  Mcp4728Bench bench;
   const std::uint8_t provision[] = {0x50, 0, 0, 0, 0, 0, 0, 0, 0};
   bench.bus.write(0x61, provision, sizeof provision);
   bench.dac.begin();
@@ -104,7 +104,7 @@ TEST(Mcp4728, WaitsForAWriteThatWasUnderWayAtBoot) {
 }
 
 TEST(Mcp4728, WritesOnlyTheChannelsThatChanged) {
-  Bench bench;
+  Mcp4728Bench bench;
   bench.provisioned();
   bench.set_up();
   bench.dac.set_code(1, 0xABC);
@@ -122,7 +122,7 @@ TEST(Mcp4728, WritesOnlyTheChannelsThatChanged) {
 }
 
 TEST(Mcp4728, SafeStateIsZeroVoltsOnAllFour) {
-  Bench bench;
+  Mcp4728Bench bench;
   bench.provisioned();
   bench.set_up();
   for (int i = 0; i < Mcp4728::channels; ++i) bench.dac.set_code(i, 4095);
@@ -135,7 +135,7 @@ TEST(Mcp4728, SafeStateIsZeroVoltsOnAllFour) {
 }
 
 TEST(Mcp4728, NoticesAResetAndAWrongRegister) {
-  Bench bench;
+  Mcp4728Bench bench;
   bench.provisioned();
   bench.set_up();
   bench.dac.set_code(2, 100);
@@ -151,7 +151,7 @@ TEST(Mcp4728, NoticesAResetAndAWrongRegister) {
 }
 
 TEST(Mcp4728, RefusedBytesAndAHeldBusAreTrouble) {
-  Bench bench;
+  Mcp4728Bench bench;
   bench.provisioned();
   bench.set_up();
   bench.dac.set_code(0, 100);

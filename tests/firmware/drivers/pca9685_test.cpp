@@ -18,8 +18,8 @@ using sim::Pca9685Model;
 using Lines = std::vector<std::string>;
 
 // A chip, its driver and the bus between them.
-struct Bench {
-  explicit Bench(std::uint32_t hz = 1000, int group = 1) : pwm(bus, 0x40, hz, group) {
+struct Pca9685Bench {
+  explicit Pca9685Bench(std::uint32_t hz = 1000, int group = 1) : pwm(bus, 0x40, hz, group) {
     bus.attach(chip);
   }
   void set_up() {
@@ -45,7 +45,7 @@ struct Bench {
 };
 
 TEST(Pca9685, SetsTheFrequencyInSleepAndRestartsHalfAMillisecondLater) {
-  Bench bench(50);
+  Pca9685Bench bench(50);
   bench.pwm.begin();
   test::run(bench.pwm, bench.bus, 5);
   EXPECT_EQ(test::lines(bench.log),
@@ -66,7 +66,7 @@ TEST(Pca9685, ComputesThePrescaleOfTheDataSheet) {
 }
 
 TEST(Pca9685, TakesAChipThatIsDrivingToOffFirst) {
-  Bench bench;
+  Pca9685Bench bench;
   bench.set_up();
   for (int i = 0; i < Pca9685::channels; ++i) bench.pwm.set_duty(i, 4095);
   bench.write();
@@ -81,7 +81,7 @@ TEST(Pca9685, TakesAChipThatIsDrivingToOffFirst) {
 }
 
 TEST(Pca9685, DutyUsesTheFullBitsAtBothEnds) {
-  Bench bench;
+  Pca9685Bench bench;
   bench.set_up();
   bench.pwm.set_duty(3, 0x5A3);
   EXPECT_EQ(bench.write(), (Lines{"40 <- 14 A3 05"}));
@@ -98,7 +98,7 @@ TEST(Pca9685, DutyUsesTheFullBitsAtBothEnds) {
 }
 
 TEST(Pca9685, PulsesAreInMicrosecondsToTheNearestCount) {
-  Bench bench(50);
+  Pca9685Bench bench(50);
   bench.set_up();
   for (int us = 3; us <= 2500; ++us) {
     bench.pwm.set_pulse_us(0, static_cast<std::uint16_t>(us));
@@ -111,7 +111,7 @@ TEST(Pca9685, PulsesAreInMicrosecondsToTheNearestCount) {
 }
 
 TEST(Pca9685, WritesNothingWhenNothingChanged) {
-  Bench bench;
+  Pca9685Bench bench;
   bench.set_up();
   bench.pwm.set_duty(0, 100);
   bench.write();
@@ -121,7 +121,7 @@ TEST(Pca9685, WritesNothingWhenNothingChanged) {
 }
 
 TEST(Pca9685, WritesNeighboursInOneBurstAndOthersInTheirOwn) {
-  Bench bench;
+  Pca9685Bench bench;
   bench.set_up();
   bench.pwm.set_duty(0, 0x111);
   bench.pwm.set_duty(1, 0x222);
@@ -130,7 +130,7 @@ TEST(Pca9685, WritesNeighboursInOneBurstAndOthersInTheirOwn) {
 }
 
 TEST(Pca9685, DutyAndDirectionOfAGroupChangeInOneTransfer) {
-  Bench bench(1000, 2);
+  Pca9685Bench bench(1000, 2);
   bench.set_up();
   bench.pwm.set_duty(2, 0x800);
   bench.pwm.set_level(3, true);
@@ -143,7 +143,7 @@ TEST(Pca9685, DutyAndDirectionOfAGroupChangeInOneTransfer) {
 }
 
 TEST(Pca9685, ASmallBudgetCutsBetweenGroupsOnly) {
-  Bench bench(1000, 2);
+  Pca9685Bench bench(1000, 2);
   bench.set_up();
   for (int i = 0; i < 8; i += 2) {
     bench.pwm.set_duty(i, 0x0FF);
@@ -187,7 +187,7 @@ TEST(Pca9685, AllOffReachesEveryChipInThreeBytes) {
 }
 
 TEST(Pca9685, SafeStateIsOneTransferAndCleansUpForTheNextDuty) {
-  Bench bench;
+  Pca9685Bench bench;
   bench.set_up();
   bench.pwm.set_duty(0, 4095);
   bench.pwm.set_duty(5, 77);
@@ -206,7 +206,7 @@ TEST(Pca9685, SafeStateIsOneTransferAndCleansUpForTheNextDuty) {
 }
 
 TEST(Pca9685, AChipThatDoesNotAnswerIsTrouble) {
-  Bench bench;
+  Pca9685Bench bench;
   bench.set_up();
   bench.bus.refuse(0x40, 0, 1);
   bench.pwm.set_duty(0, 1);
@@ -221,7 +221,7 @@ TEST(Pca9685, AChipThatDoesNotAnswerIsTrouble) {
 TEST(Pca9685, AByteThatIsRefusedIsTroubleAtEachStepOfTheSetUp) {
   for (std::size_t after = 0; after < 5; ++after) {
     for (int step = 0; step < 6; ++step) {
-      Bench bench;
+      Pca9685Bench bench;
       bench.pwm.begin();
       for (int i = 0; i < 20 && static_cast<int>(bench.log.transfers().size()) < step; ++i) {
         BusBudget one(7);
@@ -238,7 +238,7 @@ TEST(Pca9685, AByteThatIsRefusedIsTroubleAtEachStepOfTheSetUp) {
 }
 
 TEST(Pca9685, NoticesAChipThatWasResetUnderWay) {
-  Bench bench;
+  Pca9685Bench bench;
   bench.set_up();
   bench.verify();
   EXPECT_EQ(bench.pwm.trouble(), ChipTrouble::none);
@@ -248,7 +248,7 @@ TEST(Pca9685, NoticesAChipThatWasResetUnderWay) {
 }
 
 TEST(Pca9685, AChipThatIsResetInATransferStopsAcknowledging) {
-  Bench bench;
+  Pca9685Bench bench;
   bench.set_up();
   bench.pwm.set_duty(4, 0x456);
   bench.bus.reset_after(bench.chip, 2);
@@ -258,7 +258,7 @@ TEST(Pca9685, AChipThatIsResetInATransferStopsAcknowledging) {
 }
 
 TEST(Pca9685, NoticesARegisterThatChangedByItself) {
-  Bench bench;
+  Pca9685Bench bench;
   bench.set_up();
   const std::uint8_t bytes[] = {0x06 + 4 * 7 + 2, 0x55};
   bench.bus.write(0x40, bytes, 2);
@@ -267,7 +267,7 @@ TEST(Pca9685, NoticesARegisterThatChangedByItself) {
 }
 
 TEST(Pca9685, AHeldBusIsToldApartFromASilentChip) {
-  Bench bench;
+  Pca9685Bench bench;
   bench.set_up();
   bench.bus.hold();
   bench.pwm.set_duty(0, 1);
@@ -279,7 +279,7 @@ RC_GTEST_PROP(Pca9685, PinsAreWhatTheyWereToldWhateverTheBudget,
               (const std::vector<std::array<std::uint16_t, 3>>& changes)) {
   const int group = *rc::gen::element(1, 2, 4);
   const auto budget = *rc::gen::inRange<std::size_t>(20, 80);
-  Bench bench(1000, group);
+  Pca9685Bench bench(1000, group);
   bench.set_up();
   std::array<int, Pca9685::channels> duty{};
   for (const auto& [channel, value, kind] : changes) {

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::int32_t tick_hz = 40000;
 
-struct Bench {
+struct StepperBench {
   void tick(std::int64_t ticks) {
     for (std::int64_t i = 0; i < ticks; ++i) stepper.tick();
   }
@@ -22,7 +22,7 @@ struct Bench {
 };
 
 TEST(Stepper, GoesToItsPositionAndStays) {
-  Bench bench;
+  StepperBench bench;
   bench.stepper.go(100, 1000);
   EXPECT_TRUE(bench.stepper.moving());
   bench.tick(tick_hz / 10 + 1);  // one tick for the direction
@@ -53,7 +53,7 @@ TEST(Stepper, SpeedIsExactOverDays) {
 }
 
 TEST(Stepper, SpeedIsLimited) {
-  Bench bench;
+  StepperBench bench;
   bench.stepper.go(1'000'000, 2'000'000'000);
   bench.tick(1 + tick_hz);
   EXPECT_EQ(bench.stepper.position(), 20000);
@@ -67,7 +67,7 @@ TEST(Stepper, SpeedIsLimited) {
 }
 
 TEST(Stepper, DirectionIsThereATickBeforeTheStep) {
-  Bench bench;
+  StepperBench bench;
   bench.stepper.go(10, 20000);
   bench.tick(30);
   bench.stepper.go(-10, 20000);
@@ -82,7 +82,7 @@ TEST(Stepper, DirectionIsThereATickBeforeTheStep) {
 }
 
 TEST(Stepper, StopEndsWithTheStepThatHasBegun) {
-  Bench bench;
+  StepperBench bench;
   bench.stepper.go(1000, 20000);
   while (!bench.step.high) bench.tick(1);
   const std::int32_t at = bench.stepper.position();
@@ -93,7 +93,7 @@ TEST(Stepper, StopEndsWithTheStepThatHasBegun) {
 }
 
 TEST(Stepper, ZeroHoldsWhereItIs) {
-  Bench bench;
+  StepperBench bench;
   bench.stepper.go(1000, 20000);
   bench.tick(100);
   bench.stepper.zero();
@@ -106,7 +106,7 @@ TEST(Stepper, ZeroHoldsWhereItIs) {
 }
 
 TEST(Stepper, NoSpeedOrANegativeOneIsStandingStill) {
-  Bench bench;
+  StepperBench bench;
   for (const std::int32_t speed : {0, -1, -20000}) {
     bench.stepper.go(1000, speed);
     bench.tick(1000);
@@ -115,7 +115,7 @@ TEST(Stepper, NoSpeedOrANegativeOneIsStandingStill) {
 }
 
 RC_GTEST_PROP(Stepper, ThePinsCountWhatThePositionSays, ()) {
-  Bench bench;
+  StepperBench bench;
   std::int32_t by_pins = 0;
   const auto legs = *rc::gen::inRange(1, 12);
   for (int leg = 0; leg < legs; ++leg) {

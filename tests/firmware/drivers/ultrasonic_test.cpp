@@ -12,8 +12,8 @@ namespace r4::firmware {
 namespace {
 
 // Four sensors with obstacles; the echo rises 450 us after the trigger fell.
-struct Bench {
-  explicit Bench(std::uint8_t fitted = 0x0F)
+struct UltrasonicBench {
+  explicit UltrasonicBench(std::uint8_t fitted = 0x0F)
       : sensors(trigger[0], trigger[1], trigger[2], trigger[3], fitted) {}
   void run(int ms, std::uint32_t step_us = 1000) {
     for (std::uint32_t end = now_us + static_cast<std::uint32_t>(ms) * 1000; now_us != end;
@@ -44,7 +44,7 @@ struct Bench {
 };
 
 TEST(UltrasonicSensors, DistanceIsTheEchoBy58) {
-  Bench bench;
+  UltrasonicBench bench;
   bench.echo_us = {58 * 2, 58 * 100 + 57, 58 * 400, 58 * 4};
   bench.run(250);
   EXPECT_EQ(bench.sensors.distance_cm(0), 2);
@@ -54,7 +54,7 @@ TEST(UltrasonicSensors, DistanceIsTheEchoBy58) {
 }
 
 TEST(UltrasonicSensors, TakesTurnsSixtyMillisecondsApart) {
-  Bench bench;
+  UltrasonicBench bench;
   bench.echo_us = {1000, 1000, 1000, 1000};
   bench.run(1000);
   ASSERT_GE(bench.turns.size(), 16U);
@@ -66,7 +66,7 @@ TEST(UltrasonicSensors, TakesTurnsSixtyMillisecondsApart) {
 }
 
 TEST(UltrasonicSensors, TheTriggerLastsTenMicrosecondsOrMore) {
-  Bench bench(0x01);
+  UltrasonicBench bench(0x01);
   bench.run(1, 2);
   EXPECT_EQ(bench.trigger[0].rises, 1);
   bench.now_us = 0;
@@ -81,7 +81,7 @@ TEST(UltrasonicSensors, TheTriggerLastsTenMicrosecondsOrMore) {
 }
 
 TEST(UltrasonicSensors, NothingInRangeASilentSensorAndAStuckLineAreToldApart) {
-  Bench bench;
+  UltrasonicBench bench;
   bench.echo_us = {58 * 401, 39000, 0, 580};
   bench.run(200);
   bench.sensors.echo(3, true, bench.now_us);
@@ -94,26 +94,26 @@ TEST(UltrasonicSensors, NothingInRangeASilentSensorAndAStuckLineAreToldApart) {
 }
 
 TEST(UltrasonicSensors, SomethingRightAtTheSensorIsNotNothing) {
-  Bench bench(0x01);
+  UltrasonicBench bench(0x01);
   bench.echo_us = {20, 0, 0, 0};
   bench.run(70);
   EXPECT_EQ(bench.sensors.distance_cm(0), 1);
 }
 
 TEST(UltrasonicSensors, OnlyThoseThatAreFittedHaveATurn) {
-  Bench bench(0b1010);
+  UltrasonicBench bench(0b1010);
   bench.run(500);
   EXPECT_EQ(bench.trigger[0].rises, 0);
   EXPECT_GT(bench.trigger[1].rises, 2);
   EXPECT_EQ(bench.trigger[2].rises, 0);
   EXPECT_GT(bench.trigger[3].rises, 2);
-  Bench none(0);
+  UltrasonicBench none(0);
   none.run(500);
   EXPECT_TRUE(none.turns.empty());
 }
 
 TEST(UltrasonicSensors, ALateEchoOfAnotherSensorIsNotTakenForOnesOwn) {
-  Bench bench(0b0011);
+  UltrasonicBench bench(0b0011);
   bench.echo_us = {0, 0, 0, 0};
   bench.run(65);
   bench.sensors.echo(0, true, bench.now_us);

@@ -11,19 +11,17 @@
 namespace r4::test {
 namespace {
 
-constexpr Direction forward = Direction::forward;
-
 TEST(Setpoints, AreTheCommandsInTheirOrder) {
   const Setpoints all = Setpoints{}
-                            .osmc(1, 358, forward)
+                            .osmc(1, 358, Direction::forward)
                             .dhb12(2, 7, Direction::reverse)
                             .servo(3, 1500)
                             .relay(1, true)
                             .stepper(4, -100, 500)
                             .stepper(3, 5)
                             .zero(4)
-                            .bldc(2, 9, forward, true)
-                            .add(Command::osmc(0, forward, 2));
+                            .bldc(2, 9, Direction::forward, true)
+                            .add(Command::osmc(0, Direction::forward, 2));
   EXPECT_EQ(text_of(all),
             "O:358,1,1;D:7,0,2;S:1500,3;R:1,On;P:-100,500,4;P:5,1000,3;Z:4;B:9,1,1,2;O:0,1,2");
   EXPECT_EQ(text_of(parse_group_text(text_of(all) + ";")), text_of(all));
@@ -33,10 +31,11 @@ TEST(Setpoints, AreTheCommandsInTheirOrder) {
 
 TEST(Setpoints, CanBeSentAsTheyAre) {
   Setpoints setpoints;
-  setpoints.osmc(1, 358, forward);
-  EXPECT_TRUE(contains(problem_of([&] { setpoints.osmc(5, 1, forward); }).reason, "channel"));
+  setpoints.osmc(1, 358, Direction::forward);
+  EXPECT_TRUE(
+      contains(problem_of([&] { setpoints.osmc(5, 1, Direction::forward); }).reason, "channel"));
   EXPECT_TRUE(contains(problem_of([&] { setpoints.servo(1, 2501); }).reason, "range"));
-  const Problem twice = problem_of([&] { setpoints.osmc(1, 5, forward); });
+  const Problem twice = problem_of([&] { setpoints.osmc(1, 5, Direction::forward); });
   EXPECT_EQ(twice.kind, ErrorKind::usage);
   EXPECT_EQ(twice.thing, "O:5,1,1");
   EXPECT_TRUE(contains(twice.reason, "same channel"));

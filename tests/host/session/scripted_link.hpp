@@ -12,6 +12,9 @@
 
 namespace r4::test {
 
+// What tests send that need any command.
+inline const Command turn_motor = Command::osmc(358, Direction::forward, 1);
+
 class ScriptedLink final : private Session::Handler {
  public:
   // A datagram of the host.

@@ -11,8 +11,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-const Command drive = Command::osmc(358, Direction::forward, 1);
-
 SessionOptions arming_required() {
   SessionOptions options = ScriptedLink::without_questions();
   options.arming = Arming::required;
@@ -47,7 +45,7 @@ struct SessionArming : testing::Test {
     EXPECT_EQ(link.results.count(ticket), 1U) << "it has not ended";
     return link.results[ticket].outcome;
   }
-  PostResult post() { return link.session.post(drive, link.now); }
+  PostResult post() { return link.session.post(turn_motor, link.now); }
 
   ScriptedLink link{arming_required()};
   std::uint32_t cmd = 0;
@@ -56,7 +54,7 @@ struct SessionArming : testing::Test {
 TEST_F(SessionArming, BeginsDisarmedAndSaysWhyNothingIsSent) {
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::not_yet);
   EXPECT_EQ(post(), PostResult::not_armed);
-  const Ticket ticket = link.session.send(drive, 1s, link.now);
+  const Ticket ticket = link.session.send(turn_motor, 1s, link.now);
   link.pass(1ms);
   EXPECT_EQ(outcome(ticket), Outcome::not_armed);
   const Problem problem = explain("O:358,1,1", link.results[ticket], link.session.link());
@@ -274,7 +272,7 @@ TEST_F(SessionArming, AStopOfSomebodyElseThatComesMeanwhileEndsIt) {
 
 TEST_F(SessionArming, OutputCommandsBehindItWaitForIt) {
   const Ticket ticket = link.session.arm(1s, link.now);
-  const Ticket behind = link.session.send(drive, 1s, link.now);
+  const Ticket behind = link.session.send(turn_motor, 1s, link.now);
   link.pass(1ms);
   EXPECT_EQ(link.count('O'), 0U);
   execute('R', SafeReason::none, true);
@@ -287,7 +285,7 @@ TEST_F(SessionArming, OutputCommandsBehindItWaitForIt) {
 TEST_F(SessionArming, OutputCommandsBehindOneThatFailsAreRefused) {
   link.heartbeat(SafeReason::handle);
   link.session.arm(1s, link.now);
-  const Ticket behind = link.session.send(drive, 1s, link.now);
+  const Ticket behind = link.session.send(turn_motor, 1s, link.now);
   link.pass(1ms);
   EXPECT_EQ(outcome(behind), Outcome::not_armed);
   EXPECT_EQ(link.results[behind].disarmed, DisarmCause::handle);
@@ -316,10 +314,10 @@ TEST_F(SessionArming, WaitsForTheLink) {
 TEST_F(SessionArming, CanBeTurnedOff) {
   ScriptedLink free;
   free.connect();
-  EXPECT_EQ(free.session.post(drive, free.now), PostResult::sent);
+  EXPECT_EQ(free.session.post(turn_motor, free.now), PostResult::sent);
   free.heartbeat(SafeReason::stop);
   free.heartbeat();
-  EXPECT_EQ(free.session.post(drive, free.now), PostResult::sent)
+  EXPECT_EQ(free.session.post(turn_motor, free.now), PostResult::sent)
       << "the way of the paper's clients";
   const Ticket ticket = free.session.arm(1s, free.now);
   free.pass(1ms);

@@ -14,8 +14,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-const Command drive = Command::osmc(358, Direction::forward, 1);
-
 CommandResult result_of(const ScriptedLink& link, Ticket ticket) {
   const auto found = link.results.find(ticket);
   if (found == link.results.end()) {
@@ -32,7 +30,7 @@ bool under_way(const ScriptedLink& link, Ticket ticket) {
 TEST(SessionCommand, GoesOutAtOnceAndIsConfirmedByItsNumberInTheState) {
   ScriptedLink link;
   link.connect();
-  const Ticket ticket = link.session.send(drive, 1s, link.now);
+  const Ticket ticket = link.session.send(turn_motor, 1s, link.now);
   const auto sent = link.last('O');
   EXPECT_EQ(sent.command, "O:358,1,1");
   EXPECT_EQ(sent.at, link.now);
@@ -50,16 +48,16 @@ TEST(SessionCommand, GoesOutAtOnceAndIsConfirmedByItsNumberInTheState) {
 TEST(SessionCommand, IsNotConfirmedByItsValueAloneWhereTheBoardHasCmd) {
   ScriptedLink link;
   link.connect();
-  const Ticket ticket = link.session.send(drive, 1s, link.now);
+  const Ticket ticket = link.session.send(turn_motor, 1s, link.now);
   link.state("OSMC1:358,1;SAFE:0;CMD:1;");
   EXPECT_TRUE(under_way(link, ticket));
 }
 
 TEST(SessionCommand, WaitsForTheLinkAndKeepsTheOrder) {
   ScriptedLink link;
-  const Ticket first = link.session.send(drive, 5s, link.now);
+  const Ticket first = link.session.send(turn_motor, 5s, link.now);
   const Ticket second = link.session.send(Command::servo(1500, 2), 5s, link.now);
-  EXPECT_FALSE(link.session.post(drive, link.now)) << "what is sent once does not wait";
+  EXPECT_FALSE(link.session.post(turn_motor, link.now)) << "what is sent once does not wait";
   link.pass(200ms);
   EXPECT_EQ(link.count('O') + link.count('S'), 0U);
   link.heartbeat();
@@ -78,7 +76,7 @@ TEST(SessionCommand, WaitsForTheLinkAndKeepsTheOrder) {
 TEST(SessionCommand, IsRepeatedWithTheSameBytesEveryFiftyMilliseconds) {
   ScriptedLink link;
   link.connect();
-  link.session.send(drive, 1s, link.now);
+  link.session.send(turn_motor, 1s, link.now);
   const Time start = link.now;
   link.pass(499ms);
   const auto sent = link.all('O');
@@ -94,7 +92,7 @@ TEST(SessionCommand, IsRepeatedWithTheSameBytesEveryFiftyMilliseconds) {
 TEST(SessionCommand, EndsAtItsDeadline) {
   ScriptedLink link;
   link.connect();
-  const Ticket ticket = link.session.send(drive, 120ms, link.now);
+  const Ticket ticket = link.session.send(turn_motor, 120ms, link.now);
   link.pass(119ms);
   EXPECT_TRUE(under_way(link, ticket));
   link.pass(1ms);
@@ -104,7 +102,7 @@ TEST(SessionCommand, EndsAtItsDeadline) {
   EXPECT_EQ(link.count('O'), 3U) << "and is not sent again";
 
   ScriptedLink silent;
-  const Ticket waiting = silent.session.send(drive, 120ms, silent.now);
+  const Ticket waiting = silent.session.send(turn_motor, 120ms, silent.now);
   silent.pass(120ms);
   EXPECT_EQ(result_of(silent, waiting).outcome, Outcome::timed_out) << "also without a link";
 }
@@ -112,7 +110,7 @@ TEST(SessionCommand, EndsAtItsDeadline) {
 TEST(SessionCommand, IsRefusedWithTheBoardsCode) {
   ScriptedLink link;
   link.connect();
-  const Ticket other = link.session.send(drive, 1s, link.now);
+  const Ticket other = link.session.send(turn_motor, 1s, link.now);
   const Ticket ticket = link.session.send(Command::servo(1500, 2), 1s, link.now);
   link.pass(3ms);
   link.nack(link.last('S').pnum, "SAFE");
@@ -126,7 +124,7 @@ TEST(SessionCommand, IsRefusedWithTheBoardsCode) {
 TEST(SessionCommand, ThatWasOvertakenAsksAtOnceAndDuplicateConfirmsIt) {
   ScriptedLink link;
   link.connect();
-  const Ticket first = link.session.send(drive, 1s, link.now);
+  const Ticket first = link.session.send(turn_motor, 1s, link.now);
   link.session.send(Command::servo(1500, 2), 1s, link.now);
   link.pass(10ms);
   link.executed(link.last('S').pnum);  // the state between them was lost
@@ -139,7 +137,7 @@ TEST(SessionCommand, ThatWasOvertakenAsksAtOnceAndDuplicateConfirmsIt) {
 TEST(SessionCommand, ThatWasOvertakenAndNotExecutedIsRefusedAsStale) {
   ScriptedLink link;
   link.connect();
-  const Ticket first = link.session.send(drive, 1s, link.now);
+  const Ticket first = link.session.send(turn_motor, 1s, link.now);
   link.session.send(Command::servo(1500, 2), 1s, link.now);
   link.executed(link.last('S').pnum);
   link.nack(link.last('O').pnum, "STALE");
@@ -150,7 +148,7 @@ TEST(SessionCommand, ThatWasOvertakenAndNotExecutedIsRefusedAsStale) {
 TEST(SessionCommand, DuplicateAloneWaitsForTheState) {
   ScriptedLink link;
   link.connect();
-  const Ticket ticket = link.session.send(drive, 1s, link.now);
+  const Ticket ticket = link.session.send(turn_motor, 1s, link.now);
   link.pass(60ms);
   link.nack(link.last('O').pnum, "DUPLICATE");
   EXPECT_TRUE(under_way(link, ticket)) << "confirmed only when the board's state says so";
@@ -161,7 +159,7 @@ TEST(SessionCommand, DuplicateAloneWaitsForTheState) {
 TEST(SessionCommand, IsConfirmedByItsValueWhereTheBoardHasNoCmd) {
   ScriptedLink link;
   link.heartbeat();
-  const Ticket ticket = link.session.send(drive, 20s, link.now);
+  const Ticket ticket = link.session.send(turn_motor, 20s, link.now);
   for (int i = 0; i < 300; ++i) {  // the paper's board knows neither F nor CMD
     link.pass(10ms);
     link.state("AIN24:24.28;OSMC1:0,0;");
@@ -188,7 +186,7 @@ TEST(SessionCommand, FieldsAreAskedForUntilTheBoardKnowsHoweverManyAreLost) {
   EXPECT_LE(lose(300) - at_first, 4U) << "seldom: the paper's board knows no F";
   ASSERT_GT(link.count('F'), at_first);
   link.executed(link.last('F').pnum);
-  const Ticket ticket = link.session.send(drive, 1s, link.now);
+  const Ticket ticket = link.session.send(turn_motor, 1s, link.now);
   link.state("AIN24:24.28;CMD:7;OSMC1:358,1;");
   EXPECT_TRUE(under_way(link, ticket)) << "its value is no proof where there is CMD";
   link.executed(link.last('O').pnum);
@@ -224,9 +222,9 @@ TEST(SessionCommand, OutsideItsRangesIsThrownBack) {
 TEST(SessionCommand, IsNotTakenBeyondSixtyFour) {
   ScriptedLink link;
   for (std::size_t i = 0; i < Session::max_pending; ++i) {
-    EXPECT_NE(link.session.send(drive, 1s, link.now), 0U);
+    EXPECT_NE(link.session.send(turn_motor, 1s, link.now), 0U);
   }
-  EXPECT_EQ(link.session.send(drive, 1s, link.now), 0U);
+  EXPECT_EQ(link.session.send(turn_motor, 1s, link.now), 0U);
   EXPECT_EQ(link.session.identify(1s, link.now), 0U);
   EXPECT_NE(link.session.stop(1s, link.now), 0U) << "a stop always is";
   EXPECT_EQ(link.results.size(), Session::max_pending);
@@ -235,7 +233,7 @@ TEST(SessionCommand, IsNotTakenBeyondSixtyFour) {
 TEST(SessionCommand, SentOnceIsNotRepeated) {
   ScriptedLink link;
   link.connect();
-  EXPECT_TRUE(link.session.post(drive, link.now));
+  EXPECT_TRUE(link.session.post(turn_motor, link.now));
   link.pass(1s);
   EXPECT_EQ(link.count('O'), 1U);
   EXPECT_TRUE(link.results.empty());
@@ -244,7 +242,7 @@ TEST(SessionCommand, SentOnceIsNotRepeated) {
 TEST(SessionCommand, SentOnceDoesNotOvertakeThoseThatWait) {
   ScriptedLink link;
   link.connect();
-  link.session.send(drive, 1s, link.now);
+  link.session.send(turn_motor, 1s, link.now);
   link.session.post(Command::osmc(0, Direction::forward, 1), link.now);
   ASSERT_EQ(link.count('O'), 2U);
   EXPECT_EQ(link.all('O')[0].command, "O:358,1,1");
@@ -265,7 +263,7 @@ TEST(SessionCommand, IdentifyIsConfirmedByTheAnswerInAnyState) {
 TEST(SessionCommand, CancelledIsRepeatedNoMore) {
   ScriptedLink link;
   link.connect();
-  const Ticket ticket = link.session.send(drive, 1s, link.now);
+  const Ticket ticket = link.session.send(turn_motor, 1s, link.now);
   link.session.cancel(ticket, link.now);
   EXPECT_EQ(result_of(link, ticket).outcome, Outcome::cancelled);
   link.pass(2s);
@@ -286,7 +284,7 @@ TEST(SessionStop, CannotBeCancelled) {
 TEST(SessionCommand, AllEndWithTheSession) {
   ScriptedLink link;
   link.connect();
-  const Ticket ticket = link.session.send(drive, 1s, link.now);
+  const Ticket ticket = link.session.send(turn_motor, 1s, link.now);
   const Ticket stop = link.session.stop(1s, link.now);
   link.session.end_all(link.now);
   EXPECT_EQ(result_of(link, ticket).outcome, Outcome::cancelled) << "by the stop";
@@ -446,7 +444,7 @@ TEST(SessionClear, ThatIsAskedForBeforeAStopOfItsOwnIsConfirmedIsGivenUp) {
 TEST(SessionRefusal, ProvesNothingOfASessionThatBeganAfterTheCommand) {
   ScriptedLink link;
   link.connect();
-  const Ticket ticket = link.session.send(drive, 5s, link.now);
+  const Ticket ticket = link.session.send(turn_motor, 5s, link.now);
   const std::uint32_t pnum = link.last('O').pnum;
   link.pass(100ms);
   link.session_pnum = 0;  // the board takes us for a stranger: our address has changed
@@ -465,7 +463,7 @@ TEST(SessionRefusal, ProvesNothingOfASessionThatBeganAfterTheCommand) {
 
 TEST(SessionStop, CancelsEveryCommandUnderWayAndNoneFollowsIt) {
   ScriptedLink link;
-  const Ticket queued = link.session.send(drive, 5s, link.now);
+  const Ticket queued = link.session.send(turn_motor, 5s, link.now);
   link.connect();
   const Ticket sent = link.session.send(Command::servo(1500, 2), 5s, link.now);
   link.session.stop(1s, link.now);
@@ -489,8 +487,8 @@ TEST(SessionBusy, AHostWhosePlaceOnTheBusIsTakenMayOnlyStopTheBoard) {
   ScriptedLink link;
   link.connect();
   link.place_taken = true;
-  const Ticket ticket = link.session.send(drive, 5s, link.now);
-  EXPECT_FALSE(link.session.post(drive, link.now));
+  const Ticket ticket = link.session.send(turn_motor, 5s, link.now);
+  EXPECT_FALSE(link.session.post(turn_motor, link.now));
   for (int i = 0; i < 20; ++i) {
     link.pass(100ms);
     link.heartbeat();
@@ -513,7 +511,7 @@ TEST(SessionBusy, AHostWhosePlaceOnTheBusIsTakenMayOnlyStopTheBoard) {
 TEST(SessionBusy, CommandsWaitUntilTheOtherHostHasGone) {
   ScriptedLink link;
   link.nack(link.last('H').pnum, "BUSY");
-  const Ticket ticket = link.session.send(drive, 5s, link.now);
+  const Ticket ticket = link.session.send(turn_motor, 5s, link.now);
   for (int i = 0; i < 5; ++i) {
     link.pass(100ms);
     link.nack(link.last('H').pnum, "BUSY");
@@ -531,7 +529,7 @@ TEST(SessionBusy, CommandsWaitUntilTheOtherHostHasGone) {
 TEST(SessionBusy, ARefusalAfterAnOutageProvesNothingUnlessTheSessionIsTheSame) {
   ScriptedLink link;
   link.connect();
-  const Ticket ticket = link.session.send(drive, 10s, link.now);
+  const Ticket ticket = link.session.send(turn_motor, 10s, link.now);
   const std::uint32_t pnum = link.last('O').pnum;
   link.pass(1100ms);
   ASSERT_EQ(link.session.link().state, HostLinkState::lost);

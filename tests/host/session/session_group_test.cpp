@@ -13,8 +13,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr Direction forward = Direction::forward;
-const Setpoints wheels = Setpoints{}.osmc(1, 358, forward).osmc(2, 359, forward).servo(3, 1500);
+const Setpoints two_motors =
+    Setpoints{}.osmc(1, 358, Direction::forward).osmc(2, 359, Direction::forward).servo(3, 1500);
 
 struct SessionGroup : testing::Test {
   // A link to a board of which is known whether it executes groups.
@@ -22,8 +22,8 @@ struct SessionGroup : testing::Test {
     link.connect();
     link.identity(capabilities);
   }
-  Ticket send(Time timeout = 1s) { return link.session.send(wheels, timeout, link.now); }
-  PostResult post() { return link.session.post(wheels, link.now); }
+  Ticket send(Time timeout = 1s) { return link.session.send(two_motors, timeout, link.now); }
+  PostResult post() { return link.session.post(two_motors, link.now); }
   bool under_way(Ticket ticket) const { return link.results.find(ticket) == link.results.end(); }
   CommandResult result(Ticket ticket) {
     EXPECT_FALSE(under_way(ticket)) << "it has not ended";
@@ -66,7 +66,7 @@ TEST_F(SessionGroup, ARefusalNamesTheCommandAndThatNoneWasExecuted) {
   EXPECT_EQ(result(ticket).outcome, Outcome::refused);
   EXPECT_EQ(result(ticket).at, 2);
   EXPECT_EQ(result(ticket).executed, 0);
-  const Problem problem = explain(text_of(wheels), result(ticket), link.session.link());
+  const Problem problem = explain(text_of(two_motors), result(ticket), link.session.link());
   EXPECT_EQ(problem.thing, "O:359,1,2");
   EXPECT_EQ(problem.at, 2);
   EXPECT_TRUE(contains(problem.reason, "CHANNEL"));
@@ -76,7 +76,8 @@ TEST_F(SessionGroup, ARefusalNamesTheCommandAndThatNoneWasExecuted) {
   const Ticket other = send();
   link.nack(link.last('O').pnum, "SAFE");
   EXPECT_EQ(result(other).at, 0);
-  EXPECT_EQ(explain(text_of(wheels), result(other), link.session.link()).thing, text_of(wheels));
+  EXPECT_EQ(explain(text_of(two_motors), result(other), link.session.link()).thing,
+            text_of(two_motors));
 
   const Ticket wrong = send();
   nack_at(link.last('O').pnum, "RANGE", 4);
@@ -117,7 +118,8 @@ TEST_F(SessionGroup, OfABoardWithoutGroupsGoesOneAfterTheOther) {
   link.executed(link.last('O').pnum);
   EXPECT_EQ(fields(link.sent.back()), "O:359,1,2;");
   EXPECT_TRUE(under_way(ticket));
-  EXPECT_EQ(link.session.post(Command::osmc(0, forward, 1), link.now), PostResult::queue_full)
+  EXPECT_EQ(link.session.post(Command::osmc(0, Direction::forward, 1), link.now),
+            PostResult::queue_full)
       << "the commands that are left would come after it";
   link.executed(link.last('O').pnum);
   EXPECT_EQ(link.count('S'), 2U) << "behind the last nothing need wait";
@@ -136,7 +138,7 @@ TEST_F(SessionGroup, OfABoardWithoutGroupsEndsAtTheFirstThatFails) {
   EXPECT_EQ(result(ticket).at, 2);
   EXPECT_EQ(result(ticket).executed, 1);
   EXPECT_EQ(link.count('S'), 0U);
-  const Problem problem = explain(text_of(wheels), result(ticket), link.session.link());
+  const Problem problem = explain(text_of(two_motors), result(ticket), link.session.link());
   EXPECT_EQ(problem.thing, "O:359,1,2");
   EXPECT_TRUE(contains(problem.reason, "command 2 of 3, and those before it were executed"));
 
@@ -226,7 +228,7 @@ TEST_F(SessionGroup, IsPostedOneByOneToABoardWithoutGroups) {
 
 TEST_F(SessionGroup, OfOneCommandIsThatCommandAndOfNoneIsThrownBack) {
   link.connect();
-  link.session.send(Setpoints{}.osmc(1, 358, forward), 1s, link.now);
+  link.session.send(Setpoints{}.osmc(1, 358, Direction::forward), 1s, link.now);
   EXPECT_EQ(fields(link.sent.back()), "O:358,1,1;") << "whatever the board knows";
   EXPECT_TRUE(link.session.post(Setpoints{}.servo(1, 5), link.now));
   EXPECT_THROW(link.session.send(Setpoints{}, 1s, link.now), Error);
@@ -239,8 +241,8 @@ TEST(SessionGroupArming, IsHeldBackUntilTheProgramIsArmed) {
   ScriptedLink link(options);
   link.connect();
   link.identity("group");
-  EXPECT_EQ(link.session.post(wheels, link.now), PostResult::not_armed);
-  const Ticket ticket = link.session.send(wheels, 1s, link.now);
+  EXPECT_EQ(link.session.post(two_motors, link.now), PostResult::not_armed);
+  const Ticket ticket = link.session.send(two_motors, 1s, link.now);
   link.pass(1ms);
   ASSERT_EQ(link.results.count(ticket), 1U);
   EXPECT_EQ(link.results[ticket].outcome, Outcome::not_armed);

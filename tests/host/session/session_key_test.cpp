@@ -14,7 +14,6 @@ namespace {
 using namespace std::chrono_literals;
 
 const Key key = key_of(2);
-const Command drive = Command::osmc(358, Direction::forward, 1);
 constexpr const char* nonce = "0123456789abcdef";
 
 SessionOptions keyed() {
@@ -88,7 +87,7 @@ TEST(SessionKey, SignsWhatABoardThatIsConnectingSays) {
 TEST(SessionKey, ARetryHasTheSameNumberAndASignatureOfItsOwn) {
   ScriptedLink link(keyed());
   connect(link);
-  link.session.send(drive, 1s, link.now);
+  link.session.send(turn_motor, 1s, link.now);
   link.pass(60ms);
   const auto sent = link.all('O');
   ASSERT_EQ(sent.size(), 2U);
@@ -120,7 +119,7 @@ TEST(SessionKey, ALateHeartbeatDoesNotBringTheOldNonceBack) {
   keyed_heartbeat(link, "fedcba9876543210");
   link.raw(with_crc("H:R4-ROS2;PNum:" + std::to_string(late) +
                     ";T:" + std::to_string(link.board_ms()) + ";AN:" + nonce + ";"));
-  link.session.send(drive, 1s, link.now);
+  link.session.send(turn_motor, 1s, link.now);
   EXPECT_EQ(verdict(link, link.last('O'), "fedcba9876543210"), Verdict::authentic);
 }
 
@@ -128,7 +127,7 @@ TEST(SessionKey, SignsInTimeAlsoWhileTheBoardSaysLittle) {
   ScriptedLink link(keyed());
   connect(link);
   link.pass(700ms);
-  link.session.send(drive, 1s, link.now);
+  link.session.send(turn_motor, 1s, link.now);
   EXPECT_EQ(verdict(link, link.last('O')), Verdict::authentic);
 }
 
@@ -136,8 +135,8 @@ TEST(SessionKey, RefusesABoardThatHasNone) {
   ScriptedLink link(keyed());
   link.heartbeat();
   link.sent.clear();
-  const Ticket ticket = link.session.send(drive, 500ms, link.now);
-  EXPECT_FALSE(link.session.post(drive, link.now));
+  const Ticket ticket = link.session.send(turn_motor, 500ms, link.now);
+  EXPECT_FALSE(link.session.post(turn_motor, link.now));
   link.session.identify(500ms, link.now);
   for (int i = 0; i < 20; ++i) {
     link.pass(50ms);
@@ -183,7 +182,7 @@ TEST(SessionKey, SendsAStopBeforeItKnowsAnything) {
 TEST(SessionKey, AnAuthDoesNotProveThatTheCommandWasNotExecuted) {
   ScriptedLink link(keyed());
   connect(link);
-  const Ticket ticket = link.session.send(drive, 500ms, link.now);
+  const Ticket ticket = link.session.send(turn_motor, 500ms, link.now);
   const std::uint32_t pnum = link.last('O').pnum;
   link.nack(pnum, "AUTH");
   EXPECT_TRUE(link.results.empty());

@@ -109,7 +109,12 @@ TEST_F(SessionWatch, StopsAndAsksWhoItIsAndCommandsNothing) {
   refused([&] { link.session.send(Command::servo(1500, 1), 1s, link.now); });
   refused([&] { link.session.post(Command::clear(), link.now); });
   refused([&] { link.session.arm(1s, link.now); });
+  const Setpoints wheels =
+      Setpoints{}.osmc(1, 358, Direction::forward).osmc(2, 358, Direction::forward);
+  refused([&] { link.session.send(wheels, 1s, link.now); });
+  refused([&] { link.session.post(wheels, link.now); });
   EXPECT_EQ(link.count('S'), 0U);
+  EXPECT_EQ(link.count('O'), 0U);
 }
 
 TEST_F(SessionWatch, EndsItsLeaseWhenItEnds) {

@@ -11,22 +11,20 @@ namespace {
 
 using namespace std::chrono_literals;
 
-const Command drive = Command::osmc(358, Direction::forward, 1);
-
 TEST(SessionWatchdog, HoldsCommandsBackOfAProgramThatDoesNotFeed) {
   ScriptedLink link;
   link.connect();
   link.session.watchdog(300ms, link.now);
   const Time begin = link.now;
   const Ticket lost =
-      link.session.send(drive, 1s, link.now);  // a call that waits, and is not heard
+      link.session.send(turn_motor, 1s, link.now);  // a call that waits, and is not heard
   link.pass(400ms);
   const std::size_t sent = link.count('O');
   EXPECT_GT(sent, 3U);
   EXPECT_LE(link.last('O').at - begin, 310ms) << "nobody looks after what it would do";
   EXPECT_TRUE(link.session.link().gated());
   EXPECT_FALSE(link.session.in_control(link.now));
-  const Ticket late = link.session.send(drive, 5s, link.now);
+  const Ticket late = link.session.send(turn_motor, 5s, link.now);
   link.pass(300ms);
   EXPECT_EQ(link.count('O'), sent);
   EXPECT_EQ(link.results.count(lost), 0U);
@@ -46,7 +44,7 @@ TEST(SessionWatchdog, FedAgainGivesControlBack) {
   EXPECT_FALSE(link.session.link().in_control);
   link.session.feed(link.now);
   EXPECT_TRUE(link.session.link().in_control);
-  link.session.send(drive, 1s, link.now);
+  link.session.send(turn_motor, 1s, link.now);
   EXPECT_EQ(link.count('O'), 1U);
 }
 
@@ -56,8 +54,8 @@ TEST(SessionHold, StopsHeartbeatsAndCommandsButNoStopUntilItEnds) {
   link.session.hold(true, link.now);
   EXPECT_EQ(link.links.back().gate, Gate::callback) << "on_link tells";
   EXPECT_FALSE(link.session.in_control(link.now));
-  EXPECT_EQ(link.session.post(drive, link.now), PostResult::no_link);
-  const Ticket waits = link.session.send(drive, 5s, link.now);
+  EXPECT_EQ(link.session.post(turn_motor, link.now), PostResult::no_link);
+  const Ticket waits = link.session.send(turn_motor, 5s, link.now);
   const Ticket late = link.session.send(Command::servo(1500, 1), 300ms, link.now);
   for (int i = 0; i < 4; ++i) {
     link.heartbeat();
@@ -102,7 +100,7 @@ TEST(Session, SendsNothingWhoseDeadlineIsOver) {
   link.connect();
   link.place_taken = true;
   link.session.post(Command::servo(1500, 1), link.now);  // finds the place taken
-  link.session.send(drive, 100ms, link.now);             // waits for it
+  link.session.send(turn_motor, 100ms, link.now);        // waits for it
   link.place_taken = false;
   link.now += 750ms;                     // the loop was held up
   link.executed(link.session_pnum + 1);  // its choice of fields

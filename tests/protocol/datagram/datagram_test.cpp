@@ -15,7 +15,7 @@ using test::captured_state;
 using test::str;
 using test::with_crc;
 
-ReadResult result_of(const std::string& bytes) {
+ReadResult read_of(const std::string& bytes) {
   Datagram datagram;
   return read_datagram(bytes, datagram);
 }
@@ -67,22 +67,22 @@ TEST(Datagram, TakesAnyLineTerminatorOrNone) {
     ASSERT_TRUE(read_datagram(line, datagram));
     EXPECT_EQ(str(datagram.bytes()), bytes);
   }
-  EXPECT_EQ(result_of(bytes + "\n\r").error, ReadError::syntax);
-  EXPECT_EQ(result_of(bytes + "\n\n").error, ReadError::syntax);
+  EXPECT_EQ(read_of(bytes + "\n\r").error, ReadError::syntax);
+  EXPECT_EQ(read_of(bytes + "\n\n").error, ReadError::syntax);
 }
 
 TEST(Datagram, TakesLeadingZerosAndCapitalsInTheChecksum) {
   const std::string fields = "O:1,0,1;PNum:67;T:1699276044483;";  // its CRC has seven digits
   for (const std::string crc : {"a13d0ac", "0a13d0ac", "A13D0AC", "0A13d0aC"}) {
-    EXPECT_TRUE(result_of(fields + "^0x" + crc + "^")) << crc;
+    EXPECT_TRUE(read_of(fields + "^0x" + crc + "^")) << crc;
   }
-  EXPECT_EQ(result_of(fields + "^0x00a13d0ac^").error, ReadError::syntax);
+  EXPECT_EQ(read_of(fields + "^0x00a13d0ac^").error, ReadError::syntax);
 }
 
 TEST(Datagram, ALineOfTheWrongLengthIsTold) {
   for (const std::string nothing : {"", "\r", "\n", "\r\n"}) {
-    EXPECT_EQ(result_of(nothing).error, ReadError::length);
-    EXPECT_EQ(result_of(nothing).position, 0U);
+    EXPECT_EQ(read_of(nothing).error, ReadError::length);
+    EXPECT_EQ(read_of(nothing).position, 0U);
   }
   std::string fields = "A:" + std::string(1100, 'x') + ';';
   std::string bytes = with_crc(fields);
@@ -93,10 +93,10 @@ TEST(Datagram, ALineOfTheWrongLengthIsTold) {
     bytes = with_crc(fields);
   }
   ASSERT_EQ(bytes.size(), max_datagram);
-  EXPECT_TRUE(result_of(bytes));
-  EXPECT_TRUE(result_of(bytes + "\r\n")) << "the terminator does not count";
+  EXPECT_TRUE(read_of(bytes));
+  EXPECT_TRUE(read_of(bytes + "\r\n")) << "the terminator does not count";
   fields.insert(2, "x");
-  const ReadResult result = result_of(with_crc(fields));
+  const ReadResult result = read_of(with_crc(fields));
   EXPECT_EQ(result.error, ReadError::length);
   EXPECT_EQ(result.position, max_datagram);
 }
@@ -110,14 +110,14 @@ TEST(Datagram, ADamagedTrailerIsTold) {
                         Case{"A:1;^0x^", 7}, Case{"A:1;^1x0^", 5}, Case{"A:1;^0X0^", 6},
                         Case{"A:1;^0xg^", 7}, Case{"A:1;^0x123456789^", 7}, Case{"A:1;^0x12", 9},
                         Case{"A:1;^0x12^ ", 10}, Case{"A:1;^0x12^^", 10}, Case{"^^", 1}}) {
-    const ReadResult result = result_of(c.bytes);
+    const ReadResult result = read_of(c.bytes);
     EXPECT_EQ(result.error, ReadError::syntax) << c.bytes;
     EXPECT_EQ(result.position, c.position) << c.bytes;
   }
 }
 
 TEST(Datagram, AWrongChecksumIsToldWithBoth) {
-  const ReadResult result = result_of("H:ROS2-R4;T:79201;^0xf390d9ae^");
+  const ReadResult result = read_of("H:ROS2-R4;T:79201;^0xf390d9ae^");
   EXPECT_EQ(result.error, ReadError::crc);
   EXPECT_EQ(result.position, 21U);
   EXPECT_EQ(result.crc_expected, 0xF390D9ADU);
@@ -140,17 +140,17 @@ TEST(Datagram, FieldsOutsideTheGrammarAreRefusedWhereTheyAre) {
                         Case{"A:\x7F;", 2}, Case{"A:\xC3\xA9;", 2},
                         Case{"\xC3:1;", 0}, Case{std::string("A:\0;", 4), 2},
                         Case{"A:1\r;", 3},  Case{"A:1\n;B:2;", 3}}) {
-    const ReadResult result = result_of(with_crc(c.fields));
+    const ReadResult result = read_of(with_crc(c.fields));
     EXPECT_EQ(result.error, ReadError::syntax) << c.fields;
     EXPECT_EQ(result.position, c.position) << c.fields;
   }
 }
 
 TEST(Datagram, LengthIsCheckedBeforeTheTrailerThenTheChecksumThenTheFields) {
-  EXPECT_EQ(result_of(std::string(max_datagram + 1, 'x')).error, ReadError::length);
-  EXPECT_EQ(result_of("A B;^0x1").error, ReadError::syntax);
-  EXPECT_EQ(result_of("A B;^0x1^").error, ReadError::crc);
-  EXPECT_EQ(result_of(with_crc("A B;")).error, ReadError::syntax);
+  EXPECT_EQ(read_of(std::string(max_datagram + 1, 'x')).error, ReadError::length);
+  EXPECT_EQ(read_of("A B;^0x1").error, ReadError::syntax);
+  EXPECT_EQ(read_of("A B;^0x1^").error, ReadError::crc);
+  EXPECT_EQ(read_of(with_crc("A B;")).error, ReadError::syntax);
 }
 
 TEST(Datagram, PacketNumberAndTimeAreWholeNumbersAndStandOnce) {
@@ -168,12 +168,12 @@ TEST(Datagram, PacketNumberAndTimeAreWholeNumbersAndStandOnce) {
   for (const char* fields :
        {"PNum:4294967296;", "PNum:-1;", "PNum:;", "PNum:1,2;", "PNum: 1;", "PNum:+1;", "PNum:x;",
         "T:18446744073709551616;", "T:-1;", "T:;", "T:1,2;", "T:1.5;"}) {
-    const ReadResult result = result_of(with_crc(fields));
+    const ReadResult result = read_of(with_crc(fields));
     EXPECT_EQ(result.error, ReadError::syntax) << fields;
     EXPECT_EQ(result.position, std::string(fields).find(':') + 1) << fields;
   }
-  EXPECT_EQ(result_of(with_crc("PNum:1;PNum:1;")).position, 7U);
-  EXPECT_EQ(result_of(with_crc("T:1;A:2;T:1;")).position, 8U);
+  EXPECT_EQ(read_of(with_crc("PNum:1;PNum:1;")).position, 7U);
+  EXPECT_EQ(read_of(with_crc("T:1;A:2;T:1;")).position, 8U);
 }
 
 TEST(Datagram, OnlyThoseNamesAreThePacketNumberAndTheTime) {

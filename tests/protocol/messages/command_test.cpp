@@ -19,8 +19,8 @@ namespace {
 using test::str;
 using test::with_crc;
 
-// How the command in `text` ("O:358,1,1") is judged; a refusal must leave the result alone.
-Refusal judged(const std::string& text) {
+// How the command in `text` ("O:358,1,1") is command_judged; a refusal must leave the result alone.
+Refusal command_judged(const std::string& text) {
   Field field;
   EXPECT_TRUE(read_field(text, field)) << text;
   Command command = Command::relay(7, true);
@@ -78,8 +78,8 @@ TEST(Command, TheFactoriesMakeWhatIsWritten) {
   EXPECT_EQ(written(Command::stop()), "E:STOP");
   EXPECT_EQ(written(Command::clear()), "E:CLEAR");
   EXPECT_EQ(written(Command::clear(7)), "E:CLEAR,7");
-  EXPECT_EQ(judged("E:CLEAR,-1"), Refusal::range);
-  EXPECT_EQ(judged("E:CLEAR,2147483648"), Refusal::range);
+  EXPECT_EQ(command_judged("E:CLEAR,-1"), Refusal::range);
+  EXPECT_EQ(command_judged("E:CLEAR,2147483648"), Refusal::range);
   EXPECT_EQ(written(Command::stepper(-2147483647 - 1, 20000, 4)), "P:-2147483648,20000,4");
   EXPECT_EQ(written(Command::zero(1)), "Z:1");
   EXPECT_EQ(written(Command::bldc(1, Direction::forward, true, 2)), "B:1,1,1,2");
@@ -113,12 +113,13 @@ constexpr Ranged ranged[] = {
 TEST(Command, ValuesAreTakenToTheEdgesOfTheirRangeAndNoFurther) {
   for (const Ranged& c : ranged) {
     for (const long long value : {c.min, c.max}) {
-      EXPECT_EQ(judged(c.text(std::to_string(value), "1")), Refusal::none) << c.letter << value;
+      EXPECT_EQ(command_judged(c.text(std::to_string(value), "1")), Refusal::none)
+          << c.letter << value;
     }
     for (const std::string& value :
          {std::to_string(c.min - 1), std::to_string(c.max + 1), std::string("4294967296"),
           std::string("18446744073709551616"), std::string("-18446744073709551617")}) {
-      EXPECT_EQ(judged(c.text(value, "1")), Refusal::range) << c.letter << value;
+      EXPECT_EQ(command_judged(c.text(value, "1")), Refusal::range) << c.letter << value;
     }
   }
 }
@@ -127,33 +128,34 @@ TEST(Command, ChannelsBeginAtOneAndEndWithTheBoards) {
   for (const Ranged& c : ranged) {
     for (int channel = -1; channel <= 17; ++channel) {
       const bool exists = channel >= 1 && channel <= c.channels;
-      EXPECT_EQ(judged(c.text("0", std::to_string(channel))),
+      EXPECT_EQ(command_judged(c.text("0", std::to_string(channel))),
                 exists ? Refusal::none : Refusal::channel)
           << c.letter << channel;
     }
     for (const std::string channel :
          {"256", "257", "65537", "4294967297", "99999999999999999999"}) {
-      EXPECT_EQ(judged(c.text("0", channel)), Refusal::channel) << c.letter << channel;
+      EXPECT_EQ(command_judged(c.text("0", channel)), Refusal::channel) << c.letter << channel;
     }
   }
   for (int channel = -1; channel <= 17; ++channel) {
     const std::string text = std::to_string(channel);
-    EXPECT_EQ(judged("R:" + text + ",On"),
+    EXPECT_EQ(command_judged("R:" + text + ",On"),
               channel >= 1 && channel <= 8 ? Refusal::none : Refusal::channel);
-    EXPECT_EQ(judged("Z:" + text), channel >= 1 && channel <= 4 ? Refusal::none : Refusal::channel);
+    EXPECT_EQ(command_judged("Z:" + text),
+              channel >= 1 && channel <= 4 ? Refusal::none : Refusal::channel);
   }
-  EXPECT_EQ(judged("Z:257"), Refusal::channel);
-  EXPECT_EQ(judged("R:4294967297,On"), Refusal::channel);
+  EXPECT_EQ(command_judged("Z:257"), Refusal::channel);
+  EXPECT_EQ(command_judged("R:4294967297,On"), Refusal::channel);
 }
 
 TEST(Command, DirectionsBrakesAndSpeedsHaveTheirRange) {
   for (const std::string text :
        {"O:1,2,1", "D:1,2,1", "O:1,-1,1", "D:1,4294967297,1", "B:1,2,0,1", "B:1,0,2,1", "P:1,0,1",
         "P:1,-1,1", "P:1,20001,1", "R:1,2", "R:1,-1", "P:1,4294967297,1"}) {
-    EXPECT_EQ(judged(text), Refusal::range) << text;
+    EXPECT_EQ(command_judged(text), Refusal::range) << text;
   }
-  EXPECT_EQ(judged("P:1,1,1"), Refusal::none);
-  EXPECT_EQ(judged("P:1,20000,1"), Refusal::none);
+  EXPECT_EQ(command_judged("P:1,1,1"), Refusal::none);
+  EXPECT_EQ(command_judged("P:1,20000,1"), Refusal::none);
 }
 
 TEST(Command, AWrongNumberOfValuesIsAWrongForm) {
@@ -163,24 +165,24 @@ TEST(Command, AWrongNumberOfValuesIsAWrongForm) {
         "P:1,1,1,1", "Z:1,1",       "B:1,1,1",    "B:1,1,1,1,1", "U:1",
         "U:1,1,1",   "C:rate",      "C:rate,1,2", "E:STOP,1",    "E:LEAVE,1",
         "E:CLEAR,",  "E:CLEAR,1,2", "E:CLEAR,x",  "Q:ID,1",      "H:ROS2-R4,1"}) {
-    EXPECT_EQ(judged(text), Refusal::format) << text;
+    EXPECT_EQ(command_judged(text), Refusal::format) << text;
   }
 }
 
 TEST(Command, WhatIsNoNumberIsAWrongForm) {
   for (const std::string bad : {"", "+5", " 5", "5 ", "x", "5.0", "0x5", "-", "1e3", "5:"}) {
     for (const Ranged& c : ranged) {
-      EXPECT_EQ(judged(c.text(bad, "1")), Refusal::format) << c.letter << bad;
-      EXPECT_EQ(judged(c.text("0", bad)), Refusal::format) << c.letter << bad;
+      EXPECT_EQ(command_judged(c.text(bad, "1")), Refusal::format) << c.letter << bad;
+      EXPECT_EQ(command_judged(c.text("0", bad)), Refusal::format) << c.letter << bad;
     }
     for (const std::string& text :
          {"O:1," + bad + ",1", "D:1," + bad + ",1", "B:1," + bad + ",0,1", "B:1,0," + bad + ",1",
           "P:1," + bad + ",1", "R:" + bad + ",On", "R:1," + bad, "Z:" + bad}) {
-      EXPECT_EQ(judged(text), Refusal::format) << text;
+      EXPECT_EQ(command_judged(text), Refusal::format) << text;
     }
   }
   for (const std::string text : {"E:", "H:", "Q:", "F:", "C:", "C:,", "C:rate,", "C:,1"}) {
-    EXPECT_EQ(judged(text), Refusal::format) << text;
+    EXPECT_EQ(command_judged(text), Refusal::format) << text;
   }
 }
 
@@ -188,14 +190,14 @@ TEST(Command, OtherLettersAndWordsAreUnknown) {
   for (const std::string text :
        {"X:1", "o:1,1,1", "e:STOP", "N:66,RANGE", "I:R4,a,b,c", "T:1", "A:1", "OO:1,1,1", "PNum:1",
         "1:1", "#:1", "E:stop", "E:STOPP", "E:START", "H:R4-ROS2", "Q:id", "H:x,1"}) {
-    EXPECT_EQ(judged(text), Refusal::unknown) << text;
+    EXPECT_EQ(command_judged(text), Refusal::unknown) << text;
   }
 }
 
 TEST(Command, TheFormComesBeforeTheChannelAndTheChannelBeforeTheRange) {
-  EXPECT_EQ(judged("O:9999,x,9"), Refusal::format);
-  EXPECT_EQ(judged("O:9999,1,9"), Refusal::channel);
-  EXPECT_EQ(judged("O:9999,1,1"), Refusal::range);
+  EXPECT_EQ(command_judged("O:9999,x,9"), Refusal::format);
+  EXPECT_EQ(command_judged("O:9999,1,9"), Refusal::channel);
+  EXPECT_EQ(command_judged("O:9999,1,1"), Refusal::range);
 }
 
 TEST(Command, CommandsOfTheFactoriesAreCheckedTheSame) {

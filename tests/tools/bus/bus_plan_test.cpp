@@ -105,10 +105,10 @@ TEST(BusPlan, ABusThatCannotEvenCarryTheHeartbeatsCarriesNoBoard) {
 TEST(BusPlan, AllFieldsAreSplitWhereTheBoardSplitsThem) {
   BusPlan plan = plan_for(1, false);
   plan.fields = FieldSet::all();
-  const BusTraffic state = load_of(plan).traffic.front();
-  EXPECT_GE(state.datagrams, 100);
-  EXPECT_LE(state.bytes, max_datagram);
-  EXPECT_GT(load_of(plan).total.worst_load, state.load);
+  const BusTraffic states = load_of(plan).traffic.front();
+  EXPECT_GE(states.datagrams, 100);
+  EXPECT_LE(states.bytes, max_datagram);
+  EXPECT_GT(load_of(plan).total.worst_load, states.load);
 }
 
 }  // namespace

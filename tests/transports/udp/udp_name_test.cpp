@@ -59,7 +59,7 @@ class Names {
   std::shared_ptr<Shared> shared_ = std::make_shared<Shared>();
 };
 
-std::string valid(const std::string& name) { return with_crc(name + ":;"); }
+std::string valid_answer(const std::string& name) { return with_crc(name + ":;"); }
 
 class UdpNameTest : public testing::Test {
  protected:
@@ -80,7 +80,7 @@ class UdpNameTest : public testing::Test {
     asio::post(io, [this] { host->open(at_host); });
   }
   void expect_link() {
-    const std::string text = valid("question" + std::to_string(++questions));
+    const std::string text = valid_answer("question" + std::to_string(++questions));
     host->send(text, Priority::normal);
     EXPECT_TRUE(run_until(io, [&] { return at_board.has(text); }));
   }
@@ -122,9 +122,9 @@ TEST_F(UdpNameTest, HoldsUpNobodyOnTheLoop) {
   open_in_loop();
   Recorder at_other;
   const auto other = open_carrier(io, board->name() + "?listen=0", Role::host, at_other);
-  other->send(valid("meanwhile"), Priority::normal);
+  other->send(valid_answer("meanwhile"), Priority::normal);
   ASSERT_TRUE(
-      run_until(io, [&] { return at_board.has(valid("meanwhile")) && names.asked() == 1; }));
+      run_until(io, [&] { return at_board.has(valid_answer("meanwhile")) && names.asked() == 1; }));
   EXPECT_FALSE(host->up());
   EXPECT_TRUE(at_host.events.empty());
   EXPECT_EQ(host->send("too early", Priority::normal), SendResult::down);
@@ -160,8 +160,8 @@ TEST_F(UdpNameTest, IsLookedUpAgainWhenTheBoardIsSilentAndFollowed) {
   EXPECT_EQ(at_host.last(Kind::warning)->problem.reason,
             "the board is at 127.0.0.2 now; it was at 127.0.0.1");
   EXPECT_EQ(at_host.count(Kind::down), 0U);
-  host->send(valid("there"), Priority::normal);
-  ASSERT_TRUE(run_until(io, [&] { return at_new_place.has(valid("there")); }));
+  host->send(valid_answer("there"), Priority::normal);
+  ASSERT_TRUE(run_until(io, [&] { return at_new_place.has(valid_answer("there")); }));
   moved->send("answer", Priority::normal);
   EXPECT_TRUE(run_until(io, [&] { return at_host.has("answer"); }));
 }
@@ -181,8 +181,8 @@ TEST_F(UdpNameTest, IsNotLookedUpAgainWhileTheBoardIsHeard) {
   lookup.silence = milliseconds(50);
   host = make();
   host->open(at_host);
-  host->send(valid("hello"), Priority::normal);
-  ASSERT_TRUE(run_until(io, [&] { return at_board.has(valid("hello")); }));
+  host->send(valid_answer("hello"), Priority::normal);
+  ASSERT_TRUE(run_until(io, [&] { return at_board.has(valid_answer("hello")); }));
   // Only what is valid counts.
   const auto speak = [&](const std::string& text, int times) {
     for (int i = 0; i < times; ++i) {
@@ -190,7 +190,7 @@ TEST_F(UdpNameTest, IsNotLookedUpAgainWhileTheBoardIsHeard) {
       run_for(io, milliseconds(5));
     }
   };
-  speak(valid("state"), 60);
+  speak(valid_answer("state"), 60);
   EXPECT_EQ(names.asked(), 1);
   speak("noise", 60);
   EXPECT_GE(names.asked(), 2);

@@ -75,10 +75,10 @@ bool turns_a_motor(const Command& command) {
 }
 
 bool turns_a_motor(const Order& order) {
-  bool turns = turns_a_motor(order.command);
-  for (std::size_t i = 0; i < order.group.size(); ++i)
-    turns = turns || turns_a_motor(order.group[i]);
-  return turns;
+  for (std::size_t i = 0; i < order.group.size(); ++i) {
+    if (turns_a_motor(order.group[i])) return true;
+  }
+  return turns_a_motor(order.command);
 }
 
 bool sets(const Order& order, std::string_view key) {

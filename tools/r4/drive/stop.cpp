@@ -14,10 +14,12 @@
 #include "../shell/json.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
+#include "host/standard_registry.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/error.hpp"
 #include "r4link/link.hpp"
 #include "transports/udp/udp_url.hpp"
+#include "transports/url.hpp"
 
 namespace r4::tool {
 namespace {
@@ -30,8 +32,13 @@ struct Options {
 };
 
 std::unique_ptr<AsyncBoard> open(asio::io_context& io, const std::string& url) {
-  // Another program may hold the port of hosts, and what is still under way to that is of no use here.
-  auto board = std::make_unique<AsyncBoard>(io, with_own_port(url));
+  // Beside whatever program controls the board, and on a way of its own where there is one: that may hang.
+  BoardOptions watching;
+  watching.role = BoardRole::watch;
+  const bool only_way = Url::parse(url).scheme() == "serial";
+  auto board = only_way ? std::make_unique<AsyncBoard>(io, url, watching)
+                        : std::make_unique<AsyncBoard>(
+                              io, standard_registry().make(io, with_any_port(url), Role::host));
   try {
     board->open();
   } catch (const Error& error) {

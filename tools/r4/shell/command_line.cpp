@@ -32,6 +32,8 @@ void add_subcommands(CLI::App& root, Action& chosen) {
   add_list(root, chosen);
   add_bus(root, chosen);
   add_bench(root, chosen);
+  add_record(root, chosen);
+  add_info(root, chosen);
   add_sim(root, chosen);
   add_key_command(root, chosen);
   add_demo(root, chosen);

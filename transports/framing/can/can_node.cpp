@@ -172,8 +172,12 @@ Text CanNode::on_frame(const CanFrame& frame, std::uint32_t now_us) {
   // Both directions of the dialogue share the two ids; each end passes over what is not for it.
   dialogue_out_.on_frame(frame, now_us);
   if (!dialogue_in_.on_frame(frame, now_us).datagram) return Text();
-  if (end_ == CanEnd::board) host_is_plain_ = !is_packed(dialogue_in_.data()[0]);
-  return plain(dialogue_in_);
+  const Text datagram = plain(dialogue_in_);
+  // What is neither tells nothing of the form that the host writes.
+  if (end_ == CanEnd::board && datagram.size() != 0) {
+    host_is_plain_ = !is_packed(dialogue_in_.data()[0]);
+  }
+  return datagram;
 }
 
 Text CanNode::plain(const IsotpReceiver& receiver) {

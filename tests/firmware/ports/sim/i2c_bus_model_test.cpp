@@ -42,8 +42,8 @@ struct Memory final : I2cChipModel {
   std::function<void()> on_byte;
 };
 
-struct Bench {
-  Bench() { bus.attach(chip); }
+struct I2cBusModelBench {
+  I2cBusModelBench() { bus.attach(chip); }
   I2cResult write(std::vector<std::uint8_t> bytes, std::uint8_t address = 0x11) {
     return bus.write(address, bytes.data(), bytes.size());
   }
@@ -53,7 +53,7 @@ struct Bench {
 };
 
 TEST(I2cBusModel, ATransferTakesItsClocksAt400Kilohertz) {
-  Bench bench;
+  I2cBusModelBench bench;
   EXPECT_EQ(bench.write({1, 2}), I2cResult::ok);
   const test::BusLog::Transfer write = bench.log.transfers().back();
   EXPECT_EQ(write.bytes, 3U);
@@ -70,7 +70,7 @@ TEST(I2cBusModel, ATransferTakesItsClocksAt400Kilohertz) {
 }
 
 TEST(I2cBusModel, NobodyAtAnAddressIsNoAcknowledge) {
-  Bench bench;
+  I2cBusModelBench bench;
   EXPECT_EQ(bench.write({1}, 0x12), I2cResult::no_acknowledge);
   EXPECT_EQ(bench.log.transfers().back().bytes, 1U);
   std::uint8_t in = 0;
@@ -78,7 +78,7 @@ TEST(I2cBusModel, NobodyAtAnAddressIsNoAcknowledge) {
 }
 
 TEST(I2cBusModel, RefusesAfterAsManyBytesAsAsked) {
-  Bench bench;
+  I2cBusModelBench bench;
   bench.bus.refuse(0x11, 0);
   EXPECT_EQ(bench.write({1, 2, 3}), I2cResult::no_acknowledge);
   EXPECT_TRUE(bench.chip.bytes.empty());
@@ -89,7 +89,7 @@ TEST(I2cBusModel, RefusesAfterAsManyBytesAsAsked) {
 }
 
 TEST(I2cBusModel, AHeldBusTimesOutUntilItIsRecovered) {
-  Bench bench;
+  I2cBusModelBench bench;
   bench.bus.hold(2);
   const std::uint64_t began = bench.bus.now_us();
   EXPECT_EQ(bench.write({1}), I2cResult::timeout);
@@ -100,7 +100,7 @@ TEST(I2cBusModel, AHeldBusTimesOutUntilItIsRecovered) {
 }
 
 TEST(I2cBusModel, MayBeHeldInTheMiddleOfATransfer) {
-  Bench bench;
+  I2cBusModelBench bench;
   bench.bus.hold_after(2);
   EXPECT_EQ(bench.write({1, 2, 3}), I2cResult::timeout);
   EXPECT_EQ(bench.chip.bytes.size(), 1U);
@@ -108,7 +108,7 @@ TEST(I2cBusModel, MayBeHeldInTheMiddleOfATransfer) {
 }
 
 TEST(I2cBusModel, AChipThatIsResetInATransferIsOutOfIt) {
-  Bench bench;
+  I2cBusModelBench bench;
   bench.bus.reset_after(bench.chip, 2);
   EXPECT_EQ(bench.write({1, 2, 3}), I2cResult::no_acknowledge);
   EXPECT_EQ(bench.chip.power_ons, 2);
@@ -121,7 +121,7 @@ TEST(I2cBusModel, AChipThatIsResetInATransferIsOutOfIt) {
 }
 
 TEST(I2cBusModel, TheStopOfARecoveryReachesTheChipThatWasCutOff) {
-  Bench bench;
+  I2cBusModelBench bench;
   bench.bus.hold_after(2, 2);
   EXPECT_EQ(bench.write({1, 2, 3}), I2cResult::timeout);
   EXPECT_FALSE(bench.bus.recover());
@@ -131,7 +131,7 @@ TEST(I2cBusModel, TheStopOfARecoveryReachesTheChipThatWasCutOff) {
 }
 
 TEST(I2cBusModel, ATransferInTheMiddleOfAnotherCutsItShort) {
-  Bench bench;
+  I2cBusModelBench bench;
   Memory other(0x22);
   bench.bus.attach(other);
   std::vector<std::uint8_t> in(2);
@@ -156,7 +156,7 @@ TEST(I2cBusModel, ATransferInTheMiddleOfAnotherCutsItShort) {
 }
 
 TEST(I2cBusModel, AReadIsCutShortToo) {
-  Bench bench;
+  I2cBusModelBench bench;
   const std::uint8_t out = 1;
   std::uint8_t in[3] = {};
   bench.chip.on_byte = [&] {
@@ -168,7 +168,7 @@ TEST(I2cBusModel, AReadIsCutShortToo) {
 }
 
 TEST(I2cBusModel, OfSeveralChipsAtAnAddressTheInterruptCutsOffAll) {
-  Bench bench;
+  I2cBusModelBench bench;
   Memory twin(0x11);
   bench.bus.attach(twin);
   bench.chip.on_byte = [&] { bench.bus.recover(); };
@@ -195,7 +195,7 @@ struct ProcessorModel final : I2cProcessor {
 };
 
 TEST(I2cBusModel, NoInterruptComesWithinAByteButBetweenTwo) {
-  Bench bench;
+  I2cBusModelBench bench;
   ProcessorModel processor;
   bench.bus.set_processor(&processor);
   bench.chip.on_byte = [&] { EXPECT_EQ(processor.depth, 1U); };
@@ -205,7 +205,7 @@ TEST(I2cBusModel, NoInterruptComesWithinAByteButBetweenTwo) {
 }
 
 TEST(I2cBusModel, AProcessorWaitsAsLongAsTheWireIsBusyAndNotForTimeThatPassesOtherwise) {
-  Bench bench;
+  I2cBusModelBench bench;
   ProcessorModel processor;
   bench.bus.set_processor(&processor);
   bench.write({1, 2, 3});
@@ -218,7 +218,7 @@ TEST(I2cBusModel, AProcessorWaitsAsLongAsTheWireIsBusyAndNotForTimeThatPassesOth
 }
 
 TEST(I2cBusModel, AnInterruptWhileTheProcessorWaitsCutsTheTransferShort) {
-  Bench bench;
+  I2cBusModelBench bench;
   ProcessorModel processor;
   bench.bus.set_processor(&processor);
   processor.on_wait = [&] { EXPECT_EQ(bench.write({7}), I2cResult::ok); };

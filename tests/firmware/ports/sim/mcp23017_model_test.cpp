@@ -13,8 +13,8 @@ namespace {
 using Bytes = std::vector<std::uint8_t>;
 using Register = Mcp23017Model::Register;
 
-struct Bench {
-  Bench() { bus.attach(chip); }
+struct Mcp23017ModelBench {
+  Mcp23017ModelBench() { bus.attach(chip); }
   void write(const Bytes& bytes) { bus.write(0x20, bytes.data(), bytes.size()); }
   Bytes read(std::uint8_t first, std::size_t size) {
     Bytes bytes(size);
@@ -26,7 +26,7 @@ struct Bench {
 };
 
 TEST(Mcp23017Model, IsAllInputsAfterPowerOn) {
-  Bench bench;
+  Mcp23017ModelBench bench;
   Bytes expected(22, 0);
   expected[0] = expected[1] = 0xFF;
   EXPECT_EQ(bench.read(0, 22), expected);
@@ -34,7 +34,7 @@ TEST(Mcp23017Model, IsAllInputsAfterPowerOn) {
 }
 
 TEST(Mcp23017Model, CountsUpAndRollsOverToZero) {
-  Bench bench;
+  Mcp23017ModelBench bench;
   bench.write({0x14, 0x0F, 0xF0, 0x00, 0x33});
   EXPECT_EQ(bench.chip.reg(0, Register::olat), 0x0F);
   EXPECT_EQ(bench.chip.reg(1, Register::olat), 0xF0);
@@ -45,7 +45,7 @@ TEST(Mcp23017Model, CountsUpAndRollsOverToZero) {
 }
 
 TEST(Mcp23017Model, ByteModeAlternatesBetweenTheTwoPorts) {
-  Bench bench;
+  Mcp23017ModelBench bench;
   bench.write({0x0A, 0x20});
   bench.write({0x14, 1, 2, 3});
   EXPECT_EQ(bench.chip.reg(0, Register::olat), 3);
@@ -53,7 +53,7 @@ TEST(Mcp23017Model, ByteModeAlternatesBetweenTheTwoPorts) {
 }
 
 TEST(Mcp23017Model, BankSeparatesThePorts) {
-  Bench bench;
+  Mcp23017ModelBench bench;
   bench.write({0x0A, 0x80});
   bench.write({0x00, 0x00});
   bench.write({0x0A, 0x11});
@@ -68,7 +68,7 @@ TEST(Mcp23017Model, BankSeparatesThePorts) {
 }
 
 TEST(Mcp23017Model, InputsArePulledUpAndInvertedAsToldAndWritesToThePortAreToTheLatch) {
-  Bench bench;
+  Mcp23017ModelBench bench;
   bench.chip.set_outside(0, 0x05);
   EXPECT_EQ(bench.read(0x12, 1), Bytes{0x05});
   bench.write({0x0C, 0x80});

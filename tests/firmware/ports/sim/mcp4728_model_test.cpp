@@ -13,8 +13,8 @@ namespace {
 using firmware::I2cResult;
 using Bytes = std::vector<std::uint8_t>;
 
-struct Bench {
-  explicit Bench(bool ldac_low = false) : chip(0x61, ldac_low) { bus.attach(chip); }
+struct Mcp4728ModelBench {
+  explicit Mcp4728ModelBench(bool ldac_low = false) : chip(0x61, ldac_low) { bus.attach(chip); }
   I2cResult write(const Bytes& bytes, std::uint8_t address = 0x61) {
     return bus.write(address, bytes.data(), bytes.size());
   }
@@ -29,7 +29,7 @@ struct Bench {
 
 TEST(Mcp4728Model, SequentialWriteOfTheDataSheetsExample) {
   // Figure 7-4: A VDD/2, B VDD full, C 2.048 V reference gain 2 half, D full.
-  Bench bench;
+  Mcp4728ModelBench bench;
   EXPECT_EQ(bench.write({0x50, 0x08, 0x00, 0x0F, 0xFF, 0x98, 0x00, 0x9F, 0xFF}), I2cResult::ok);
   EXPECT_NEAR(bench.chip.volts(0), 2.5, 1e-6);
   EXPECT_NEAR(bench.chip.volts(1), 5 - 5.0 / 4096, 1e-6);
@@ -44,7 +44,7 @@ TEST(Mcp4728Model, SequentialWriteOfTheDataSheetsExample) {
 }
 
 TEST(Mcp4728Model, IgnoresWritesWhileTheEepromIsWritten) {
-  Bench bench;
+  Mcp4728ModelBench bench;
   bench.write({0x5E, 0x01, 0x23});  // single write, channel D
   bench.write({0x40, 0x0F, 0xFF});
   EXPECT_EQ(bench.chip.output(0).code, 0);
@@ -53,20 +53,20 @@ TEST(Mcp4728Model, IgnoresWritesWhileTheEepromIsWritten) {
 }
 
 TEST(Mcp4728Model, FastWriteWaitsForLdacOrTheGeneralCall) {
-  Bench bench;
+  Mcp4728ModelBench bench;
   bench.write({0x01, 0x00, 0x02, 0x00, 0x33, 0x00});
   EXPECT_EQ(bench.chip.input(1).code, 0x200);
   EXPECT_EQ(bench.chip.input(2).power_down, 3);
   EXPECT_EQ(bench.chip.output(1).code, 0);
   EXPECT_EQ(bench.write({0x08}, 0), I2cResult::ok);
   EXPECT_EQ(bench.chip.output(1).code, 0x200);
-  Bench low(true);
+  Mcp4728ModelBench low(true);
   low.write({0x01, 0x00});
   EXPECT_EQ(low.chip.output(0).code, 0x100);
 }
 
 TEST(Mcp4728Model, MultiWriteRepeatsChannelAndDataAndUdacHoldsTheOutput) {
-  Bench bench;
+  Mcp4728ModelBench bench;
   bench.write({0x41, 0x01, 0x00, 0x06, 0x02, 0x00});
   EXPECT_EQ(bench.chip.input(0).code, 0x100);
   EXPECT_EQ(bench.chip.output(0).code, 0);
@@ -75,7 +75,7 @@ TEST(Mcp4728Model, MultiWriteRepeatsChannelAndDataAndUdacHoldsTheOutput) {
 }
 
 TEST(Mcp4728Model, ReferenceGainAndPowerDownHaveTheirOwnCommands) {
-  Bench bench;
+  Mcp4728ModelBench bench;
   bench.write({0x8A});
   EXPECT_TRUE(bench.chip.output(0).internal_reference);
   EXPECT_FALSE(bench.chip.output(1).internal_reference);
@@ -91,7 +91,7 @@ TEST(Mcp4728Model, ReferenceGainAndPowerDownHaveTheirOwnCommands) {
 }
 
 TEST(Mcp4728Model, GeneralCallResetLoadsTheEepromAndTheAddressStays) {
-  Bench bench;
+  Mcp4728ModelBench bench;
   bench.write({0x40, 0x0F, 0xFF});
   EXPECT_EQ(bench.write({0x06}, 0), I2cResult::ok);
   EXPECT_EQ(bench.chip.output(0).code, 0);
@@ -100,7 +100,7 @@ TEST(Mcp4728Model, GeneralCallResetLoadsTheEepromAndTheAddressStays) {
 }
 
 TEST(Mcp4728Model, ReadsInputRegistersAndEepromOfAllChannelsInTurn) {
-  Bench bench;
+  Mcp4728ModelBench bench;
   bench.write({0x42, 0x0A, 0xBC});
   EXPECT_EQ(bench.read(), (Bytes{0xC1, 0x80, 0, 0xC1, 0x80, 0, 0xD1, 0x0A, 0xBC, 0xD1, 0x80, 0,
                                  0xE1, 0x80, 0, 0xE1, 0x80, 0, 0xF1, 0x80, 0,    0xF1, 0x80, 0}));

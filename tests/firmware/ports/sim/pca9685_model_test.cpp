@@ -13,8 +13,8 @@ namespace {
 using firmware::I2cResult;
 using Bytes = std::vector<std::uint8_t>;
 
-struct Bench {
-  Bench() { bus.attach(chip); }
+struct Pca9685ModelBench {
+  Pca9685ModelBench() { bus.attach(chip); }
   I2cResult write(const Bytes& bytes, std::uint8_t address = 0x40) {
     return bus.write(address, bytes.data(), bytes.size());
   }
@@ -32,7 +32,7 @@ struct Bench {
 };
 
 TEST(Pca9685Model, HasTheDataSheetsValuesAfterPowerOn) {
-  Bench bench;
+  Pca9685ModelBench bench;
   EXPECT_EQ(bench.read(0x00, 1), Bytes{0x11});
   EXPECT_EQ(bench.read(0x01, 1), Bytes{0x04});
   EXPECT_EQ(bench.read(0x02, 1), Bytes{0xE2});
@@ -46,7 +46,7 @@ TEST(Pca9685Model, HasTheDataSheetsValuesAfterPowerOn) {
 }
 
 TEST(Pca9685Model, CountsUpOnlyWithAutoIncrementAndWrapsAtBothEnds) {
-  Bench bench;
+  Pca9685ModelBench bench;
   bench.write({0x06, 0x01, 0x02, 0x03});
   EXPECT_EQ(bench.chip.reg(0x06), 0x03);
   EXPECT_EQ(bench.chip.reg(0x07), 0x00);
@@ -60,19 +60,19 @@ TEST(Pca9685Model, CountsUpOnlyWithAutoIncrementAndWrapsAtBothEnds) {
 }
 
 TEST(Pca9685Model, TurnsOnAutoIncrementWithinTheTransferThatWritesIt) {
-  Bench bench;
+  Pca9685ModelBench bench;
   bench.write({0x00, 0x31, 0x14});
   EXPECT_EQ(bench.chip.reg(0x01), 0x14);
 }
 
 TEST(Pca9685Model, RefusesReservedRegisters) {
-  Bench bench;
+  Pca9685ModelBench bench;
   EXPECT_EQ(bench.write({0x46, 1}), I2cResult::no_acknowledge);
   EXPECT_EQ(bench.write({0xF9, 1}), I2cResult::no_acknowledge);
 }
 
 TEST(Pca9685Model, TakesThePrescaleOnlyInSleepAndNotBelowThree) {
-  Bench bench;
+  Pca9685ModelBench bench;
   bench.write({0xFE, 0x79});
   EXPECT_EQ(bench.chip.reg(0xFE), 0x79);
   bench.write({0xFE, 0x01});
@@ -83,7 +83,7 @@ TEST(Pca9685Model, TakesThePrescaleOnlyInSleepAndNotBelowThree) {
 }
 
 TEST(Pca9685Model, FullOffWinsOverFullOnAndBothOverTheCounts) {
-  Bench bench;
+  Pca9685ModelBench bench;
   bench.wake();
   bench.write({0x06, 0x00, 0x00, 0x00, 0x08});
   EXPECT_EQ(bench.chip.duty(0), 2048);
@@ -94,7 +94,7 @@ TEST(Pca9685Model, FullOffWinsOverFullOnAndBothOverTheCounts) {
 }
 
 TEST(Pca9685Model, APulseMayBeginAnywhereInTheCycle) {
-  Bench bench;
+  Pca9685ModelBench bench;
   bench.wake();
   bench.write({0x06, 0x99, 0x01, 0xCC, 0x04});  // data sheet, example 1: 409 to 1228
   EXPECT_EQ(bench.chip.duty(0), 819);
@@ -103,7 +103,7 @@ TEST(Pca9685Model, APulseMayBeginAnywhereInTheCycle) {
 }
 
 TEST(Pca9685Model, OutputsChangeOnStopOrOnAcknowledge) {
-  Bench bench;
+  Pca9685ModelBench bench;
   bench.wake();
   bench.bus.hold_after(5);  // address, register, three bytes
   bench.write({0x06, 0x00, 0x10, 0x00, 0x00});
@@ -116,7 +116,7 @@ TEST(Pca9685Model, OutputsChangeOnStopOrOnAcknowledge) {
 }
 
 TEST(Pca9685Model, NothingRunsInSleepNorHalfAMillisecondAfter) {
-  Bench bench;
+  Pca9685ModelBench bench;
   bench.write({0x00, 0x31});
   bench.write({0x06, 0x00, 0x10, 0x00, 0x00});
   EXPECT_EQ(bench.chip.duty(0), 0);
@@ -127,7 +127,7 @@ TEST(Pca9685Model, NothingRunsInSleepNorHalfAMillisecondAfter) {
 }
 
 TEST(Pca9685Model, ChannelsThatWereRunningWaitForRestart) {
-  Bench bench;
+  Pca9685ModelBench bench;
   bench.wake();
   bench.write({0x06, 0x00, 0x10, 0x00, 0x00});
   bench.write({0x00, 0x31});
@@ -143,7 +143,7 @@ TEST(Pca9685Model, ChannelsThatWereRunningWaitForRestart) {
 }
 
 TEST(Pca9685Model, AnOrderlyShutdownLeavesNothingToRestart) {
-  Bench bench;
+  Pca9685ModelBench bench;
   bench.wake();
   bench.write({0x06, 0x00, 0x10, 0x00, 0x00});
   bench.write({0xFD, 0x10});
@@ -152,7 +152,7 @@ TEST(Pca9685Model, AnOrderlyShutdownLeavesNothingToRestart) {
 }
 
 TEST(Pca9685Model, AnswersToAllCallAndToSubAddressesAsItIsTold) {
-  Bench bench;
+  Pca9685ModelBench bench;
   EXPECT_EQ(bench.write({0xFD, 0x10}, 0x70), I2cResult::ok);
   EXPECT_EQ(bench.write({0xFD, 0x10}, 0x71), I2cResult::no_acknowledge);
   bench.write({0x00, 0x18});  // SUB1, no ALLCALL
@@ -165,7 +165,7 @@ TEST(Pca9685Model, AnswersToAllCallAndToSubAddressesAsItIsTold) {
 }
 
 TEST(Pca9685Model, SoftwareResetIsOneByteByTheGeneralCall) {
-  Bench bench;
+  Pca9685ModelBench bench;
   bench.write({0xFE, 0x79});
   EXPECT_EQ(bench.write({0x07}, 0), I2cResult::no_acknowledge);
   EXPECT_EQ(bench.write({0x06, 0x06}, 0), I2cResult::no_acknowledge);
@@ -175,7 +175,7 @@ TEST(Pca9685Model, SoftwareResetIsOneByteByTheGeneralCall) {
 }
 
 TEST(Pca9685Model, AllLedRegistersWriteAllAndReadZero) {
-  Bench bench;
+  Pca9685ModelBench bench;
   bench.wake();
   bench.write({0xFA, 0x00, 0x00, 0x34, 0x02});
   for (int i = 0; i < Pca9685Model::channels; ++i) EXPECT_EQ(bench.chip.duty(i), 0x234);

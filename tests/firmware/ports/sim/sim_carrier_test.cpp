@@ -43,7 +43,7 @@ std::string identity_of(const std::string& url) {
   return "";
 }
 
-std::string error_of(const std::string& url) {
+std::string url_error(const std::string& url) {
   asio::io_context io;
   try {
     make_sim_carrier(io, Url::parse(url));
@@ -63,7 +63,7 @@ TEST(SimCarrier, SaysWhatIsWrongWithItsUrl) {
   for (const char* url :
        {"sim:?node=32", "sim:?node=-1", "sim:?node=x", "sim:?seed=x", "sim:?colour=red",
         "sim:/dev/ttyACM0", "sim://host", "sim:?script=/nonexistent/script.txt"}) {
-    EXPECT_NE(error_of(url), "") << url;
+    EXPECT_NE(url_error(url), "") << url;
   }
 }
 

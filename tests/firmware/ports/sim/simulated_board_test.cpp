@@ -24,7 +24,7 @@ namespace {
 using firmware::BoardState;
 
 // What the host's end of a carrier hears.
-struct Listener final : Carrier::Handler {
+struct BoardListener final : Carrier::Handler {
   std::vector<std::string> heard;
   void on_datagram(std::string_view bytes, Peer) override { heard.emplace_back(bytes); }
   void on_carrier_event(const CarrierEvent&) override {}
@@ -143,7 +143,7 @@ class SimulatedBoardTest : public testing::Test {
   std::uint32_t clock_ms_ = 0;
   std::uint32_t pnum_ = first_pnum;
   mutable std::uint32_t newest_t_ = 0;
-  Listener listener_;
+  BoardListener listener_;
   std::unique_ptr<Carrier> host_;
   std::unique_ptr<SimulatedBoard> board_;
   std::vector<std::string> events_;

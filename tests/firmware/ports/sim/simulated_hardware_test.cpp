@@ -14,8 +14,8 @@
 namespace r4::sim {
 namespace {
 
-struct Bench {
-  explicit Bench(std::uint64_t seed = 1) : board(seed) {
+struct HardwareBench {
+  explicit HardwareBench(std::uint64_t seed = 1) : board(seed) {
     board.power_on();
     hardware.power_up();
   }
@@ -64,7 +64,7 @@ firmware::Outputs osmc(int channel, std::uint16_t pwm, Direction direction) {
 }
 
 TEST(SimulatedHardware, StandsOnTheBenchAsInTheCaptureAtFirst) {
-  Bench bench;
+  HardwareBench bench;
   EXPECT_TRUE(bench.hardware.hal().ready());
   EXPECT_FALSE(bench.hardware.hal().fault().any());
   EXPECT_TRUE(bench.board.pins().is_safe());
@@ -90,7 +90,7 @@ TEST(SimulatedHardware, AnalogInputsTakeTheValuesOfTheCapture) {
   }
   ASSERT_EQ(captured.size(), 5U);
 
-  Bench bench(7);
+  HardwareBench bench(7);
   std::map<int, std::set<std::int32_t>> simulated;
   for (int i = 0; i < 1000; ++i) {
     bench.run(10);
@@ -104,9 +104,9 @@ TEST(SimulatedHardware, AnalogInputsTakeTheValuesOfTheCapture) {
 }
 
 TEST(SimulatedHardware, GivesTheSameInputsForTheSameSeedHoweverOftenItIsAsked) {
-  Bench a(3);
-  Bench b(3);
-  Bench other(4);
+  HardwareBench a(3);
+  HardwareBench b(3);
+  HardwareBench other(4);
   int differences = 0;
   for (int t = 0; t < 100; ++t) {
     a.run(10);
@@ -125,7 +125,7 @@ TEST(SimulatedHardware, GivesTheSameInputsForTheSameSeedHoweverOftenItIsAsked) {
 }
 
 TEST(SimulatedHardware, TheHandlesVoltageFollowsTheHandle) {
-  Bench bench;
+  HardwareBench bench;
   EXPECT_GT(bench.volts(Analog::aindmh), 1100);
   bench.board.hold_handle(false);
   EXPECT_FALSE(bench.sample().handle_held);
@@ -138,7 +138,7 @@ TEST(SimulatedHardware, TheHandlesVoltageFollowsTheHandle) {
 }
 
 TEST(SimulatedHardware, APinnedAnalogInputStaysWithinWhatTheDividerCarries) {
-  Bench bench;
+  HardwareBench bench;
   bench.board.pin_analog(Analog::ain24, 2150);
   bench.board.pin_analog(Analog::ain12, 2'000'000'000);
   bench.board.pin_analog(Analog::ain5, -100);
@@ -153,7 +153,7 @@ TEST(SimulatedHardware, APinnedAnalogInputStaysWithinWhatTheDividerCarries) {
 // --- steppers
 
 TEST(SimulatedHardware, AStepperMovesAtItsSpeedAndStopsAtItsTarget) {
-  Bench bench;
+  HardwareBench bench;
   bench.hardware.hal().apply(stepper_to(-100, 1000));
   bench.run(50);
   EXPECT_NEAR(bench.sample().stepper_steps[0], -50, 1);
@@ -168,7 +168,7 @@ TEST(SimulatedHardware, AStepperMovesAtItsSpeedAndStopsAtItsTarget) {
 }
 
 TEST(SimulatedHardware, ASlowStepperLosesNoPartOfAStep) {
-  Bench bench;
+  HardwareBench bench;
   bench.hardware.hal().apply(stepper_to(1000, 7, 3));
   bench.run(10'010);
   EXPECT_EQ(bench.sample().stepper_steps[2], 70);
@@ -176,7 +176,7 @@ TEST(SimulatedHardware, ASlowStepperLosesNoPartOfAStep) {
 }
 
 TEST(SimulatedHardware, ASafeStepperStaysWhereItIs) {
-  Bench bench;
+  HardwareBench bench;
   bench.hardware.hal().apply(stepper_to(100, 1000));
   bench.run(50);
   const std::int32_t there = bench.board.pins().stepper[0].position;
@@ -190,7 +190,7 @@ TEST(SimulatedHardware, ASafeStepperStaysWhereItIs) {
 // --- motors
 
 TEST(SimulatedHardware, WithoutSupplyNoMotorTurnsWhateverItsDriverIsTold) {
-  Bench bench;
+  HardwareBench bench;
   firmware::Outputs outputs = osmc(1, 4095, Direction::forward);
   outputs.dhb12[0] = Drive{4095, Direction::reverse};
   outputs.stepper[0].position = 1000;
@@ -231,7 +231,7 @@ TEST(SimulatedHardware, WithoutSupplyNoMotorTurnsWhateverItsDriverIsTold) {
 }
 
 TEST(SimulatedHardware, AMotorTurnsItsEncoderAsFastAsItsDutySays) {
-  Bench bench;
+  HardwareBench bench;
   bench.hardware.hal().apply(osmc(2, 2048, Direction::forward));
   bench.run(2000);  // up to speed
   const std::int32_t before = bench.sample().encoder_counts[1];
@@ -250,7 +250,7 @@ TEST(SimulatedHardware, AMotorTurnsItsEncoderAsFastAsItsDutySays) {
 }
 
 TEST(SimulatedHardware, AMotorRunsOutInTheSafeState) {
-  Bench bench;
+  HardwareBench bench;
   bench.hardware.hal().apply(osmc(1, 4095, Direction::forward));
   bench.run(2000);
   bench.hardware.hal().make_safe();
@@ -261,7 +261,7 @@ TEST(SimulatedHardware, AMotorRunsOutInTheSafeState) {
 }
 
 TEST(SimulatedHardware, TheBatterySagsMostWhenAMotorStarts) {
-  Bench bench;
+  HardwareBench bench;
   const std::int32_t idle = bench.mean(Analog::ain24);
   bench.hardware.hal().apply(osmc(1, 4095, Direction::forward));
   bench.run(5);
@@ -272,7 +272,7 @@ TEST(SimulatedHardware, TheBatterySagsMostWhenAMotorStarts) {
 }
 
 TEST(SimulatedHardware, TheSteeringMotorMovesTheSteeringFromEndToEnd) {
-  Bench bench;
+  HardwareBench bench;
   EXPECT_NEAR(bench.mean(Analog::ainsteer), 100, 10);
   firmware::Outputs outputs = supplied();
   outputs.dhb12[0] = Drive{4095, Direction::reverse};
@@ -287,7 +287,7 @@ TEST(SimulatedHardware, TheSteeringMotorMovesTheSteeringFromEndToEnd) {
 }
 
 TEST(SimulatedHardware, AShaftIsTurnedByHandToAnyCount) {
-  Bench bench;
+  HardwareBench bench;
   bench.board.turn_encoder(2, 2500);
   bench.board.turn_encoder(3, -0x7fffffff - 1);
   bench.run(2);
@@ -302,7 +302,7 @@ TEST(SimulatedHardware, AShaftIsTurnedByHandToAnyCount) {
 }
 
 TEST(SimulatedHardware, ZeroCountsFromHereAndHoldsTheStepper) {
-  Bench bench;
+  HardwareBench bench;
   bench.hardware.hal().apply(stepper_to(100, 1000, 2));
   bench.board.turn_encoder(2, 1234);
   bench.board.turn_encoder(1, 99);
@@ -318,7 +318,7 @@ TEST(SimulatedHardware, ZeroCountsFromHereAndHoldsTheStepper) {
 // --- ultrasonic sensors
 
 TEST(SimulatedHardware, EachSensorIsHeardInItsTurn) {
-  Bench bench;
+  HardwareBench bench;
   for (int channel = 1; channel <= ultrasonic_channels; ++channel) {
     bench.board.set_ultrasonic(channel, static_cast<std::uint16_t>(100 * channel));
   }
@@ -330,7 +330,7 @@ TEST(SimulatedHardware, EachSensorIsHeardInItsTurn) {
 }
 
 TEST(SimulatedHardware, ASensorWithoutItsCableIsBlind) {
-  Bench bench;
+  HardwareBench bench;
   bench.board.set_ultrasonic(3, 42);
   bench.run(500);
   bench.board.connect_ultrasonic(3, false);
@@ -344,7 +344,7 @@ TEST(SimulatedHardware, ASensorWithoutItsCableIsBlind) {
 }
 
 TEST(SimulatedHardware, PowerOnStartsAfreshButTheSurroundingsStay) {
-  Bench bench;
+  HardwareBench bench;
   bench.hardware.hal().apply(osmc(1, 4095, Direction::forward));
   bench.board.turn_encoder(2, 5);
   bench.board.hold_handle(false);

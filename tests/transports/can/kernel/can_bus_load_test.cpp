@@ -171,15 +171,15 @@ TEST_F(CanBusLoad, FlowControlThatCameInTimeIsObeyedHoweverLateItIsRead) {
     run_for(soon);
     CanFrame first{};
     RawCan far(command_id(node), far_end);
+    const std::uint32_t began_us = CanBus::now_us();
     ASSERT_EQ(link.host->send(in_two_frames, Priority::normal), SendResult::sent);
     ASSERT_TRUE(far.receive(first, CanBus::now_us() + 1000000));
-    const std::uint32_t had_us = CanBus::now_us();
     CanFrame go{};
     go.id = reply_id(node);
     go.size = 3;
     go.data[0] = 0x30;
     far.send(go);
-    in_time = CanBus::now_us() - had_us < 20000;
+    in_time = CanBus::now_us() - began_us < 20000;
     if (!in_time) continue;
     std::this_thread::sleep_for(std::chrono::milliseconds(40));  // held up, twice as long as N_Bs
     EXPECT_EQ(link.host->send(in_two_frames, Priority::normal), SendResult::sent);

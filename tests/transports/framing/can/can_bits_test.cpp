@@ -18,7 +18,7 @@
 namespace r4 {
 namespace {
 
-constexpr CanBitRate one_mbit{1000000, 0};
+constexpr CanBitRate at_one_mbit{1000000, 0};
 constexpr CanBitRate half_mbit{500000, 0};
 constexpr CanBitRate one_and_five_mbit{1000000, 5000000};
 
@@ -167,13 +167,13 @@ TEST(CanBits, TheWorstHeaderOfAnFdFrameExists) {
 }
 
 TEST(CanBits, TakeTheirTime) {
-  EXPECT_EQ(time_ns(CanBits{135, 0}, one_mbit), 135000U);
+  EXPECT_EQ(time_ns(CanBits{135, 0}, at_one_mbit), 135000U);
   EXPECT_EQ(time_ns(CanBits{135, 0}, half_mbit), 270000U);
   EXPECT_EQ(time_ns(CanBits{30, 100}, one_and_five_mbit), 50000U);
   EXPECT_EQ(time_ns(CanBits{1, 0}, {3, 0}), 333333334U) << "rounded up";
   CanFrame frame{};
   frame.fd = true;
-  EXPECT_EQ(time_ns(frame, one_mbit), 1000U * total(can_bits(frame, false)))
+  EXPECT_EQ(time_ns(frame, at_one_mbit), 1000U * total(can_bits(frame, false)))
       << "no data rate: it does not switch";
 }
 
@@ -194,16 +194,16 @@ std::uint64_t worst_ns(std::size_t size, std::uint8_t tx_dl, CanBitRate rate) {
 }
 
 TEST(CanBits, OfADatagramGiveTheCapacityOfABus) {
-  EXPECT_EQ(worst_ns(170, 8, one_mbit), 3420000U) << "25 frames and a flow control";
+  EXPECT_EQ(worst_ns(170, 8, at_one_mbit), 3420000U) << "25 frames and a flow control";
   EXPECT_EQ(worst_ns(170, 8, half_mbit), 6840000U);
-  EXPECT_EQ(1000000000U / worst_ns(170, 8, one_mbit), 292U) << "a second";
-  EXPECT_EQ(worst_ns(45, 8, one_mbit), 1000000U) << "7 frames and a flow control";
+  EXPECT_EQ(1000000000U / worst_ns(170, 8, at_one_mbit), 292U) << "a second";
+  EXPECT_EQ(worst_ns(45, 8, at_one_mbit), 1000000U) << "7 frames and a flow control";
   EXPECT_EQ(worst_ns(170, 64, one_and_five_mbit), 516200U) << "3 frames and a flow control";
 }
 
 // Design: an emergency stop waits for one frame in progress and takes its own time, in 270 us.
 TEST(CanBits, TwoFramesAreLessThan270Microseconds) {
-  EXPECT_LE(2 * time_ns(worst_can_bits(8, false, false), one_mbit), 270000U);
+  EXPECT_LE(2 * time_ns(worst_can_bits(8, false, false), at_one_mbit), 270000U);
 }
 
 }  // namespace

@@ -15,8 +15,8 @@ using test::str;
 using test::with_crc;
 
 // A board and a host on a bus in virtual time, which can lose frames.
-struct Bus {
-  explicit Bus(bool fd = false, std::uint8_t host_node = 3)
+struct NodeBus {
+  explicit NodeBus(bool fd = false, std::uint8_t host_node = 3)
       : board(CanEnd::board, 3, fd), host(CanEnd::host, host_node, fd) {}
 
   // Moves every frame that either has to send, until none has.
@@ -80,7 +80,7 @@ class CanNodeForms : public testing::TestWithParam<std::pair<bool, bool>> {};
 
 TEST_P(CanNodeForms, CarryEveryDatagramUnchanged) {
   const auto [fd, packed] = GetParam();
-  Bus bus(fd);
+  NodeBus bus(fd);
   bus.board.use_packed_form(packed);
   bus.host.use_packed_form(packed);
   for (const std::string& line : {state_line, heartbeat_line, answer_line}) {
@@ -100,7 +100,7 @@ INSTANTIATE_TEST_SUITE_P(ClassicAndFd, CanNodeForms,
 
 // What a board sends goes by its host's form: by that of the newest datagram that came from there.
 TEST(CanNode, ABoardAnswersAHostThatWritesPlainTextInPlainText) {
-  Bus bus;
+  NodeBus bus;
   bus.board.use_packed_form(true);
   const auto packed_at_host = [&](const std::string& line) {
     const std::uint32_t before = bus.host.counters().unpacked;
@@ -125,10 +125,17 @@ TEST(CanNode, ABoardAnswersAHostThatWritesPlainTextInPlainText) {
   }
   bus.board.use_packed_form(false);
   EXPECT_FALSE(packed_at_host(state_line)) << "its setting says never";
+  bus.board.use_packed_form(true);
+  host_says(false);
+  const std::uint32_t bad = bus.board.counters().bad_form;
+  EXPECT_TRUE(bus.host.begin(std::string("\x80\xff\x12", 3), bus.now_us));
+  bus.settle();
+  EXPECT_EQ(bus.board.counters().bad_form, bad + 1);
+  EXPECT_FALSE(packed_at_host(state_line)) << "garbage is no packed datagram";
 }
 
 TEST(CanNode, AHostPacksForABoardThatDoesNot) {
-  Bus bus;
+  NodeBus bus;
   bus.host.use_packed_form(true);
   for (const std::string& line : {state_line, answer_line}) {
     bus.board.begin(line, bus.now_us);
@@ -143,7 +150,7 @@ TEST(CanNode, AHostPacksForABoardThatDoesNot) {
 
 // It is in no form, and anybody's.
 TEST(CanNode, AnEmergencyFrameDoesNotChangeTheForm) {
-  Bus bus;
+  NodeBus bus;
   bus.board.use_packed_form(true);
   CanFrame frame{};
   frame.id = emergency_stop_id;
@@ -154,7 +161,7 @@ TEST(CanNode, AnEmergencyFrameDoesNotChangeTheForm) {
 }
 
 TEST(CanNode, StatesAndAnswersHaveIdsOfTheirOwn) {
-  Bus bus;
+  NodeBus bus;
   bus.board.begin(state_line, bus.now_us);
   bus.settle();
   for (const std::uint32_t id : bus.ids) EXPECT_EQ(id, telemetry_id(3));
@@ -166,7 +173,7 @@ TEST(CanNode, StatesAndAnswersHaveIdsOfTheirOwn) {
 }
 
 TEST(CanNode, TelemetryGoesOnWhileAnAnswerWaitsForFlowControl) {
-  Bus bus(false, 4);  // nobody answers for node 3
+  NodeBus bus(false, 4);  // nobody answers for node 3
   bus.board.begin(answer_line, bus.now_us);
   bus.settle();
   EXPECT_FALSE(bus.board.idle(CanLane::dialogue));
@@ -181,11 +188,11 @@ TEST(CanNode, TelemetryGoesOnWhileAnAnswerWaitsForFlowControl) {
 }
 
 TEST(CanNode, EveryLostFrameCostsOneDatagramAndNoMore) {
-  Bus whole;
+  NodeBus whole;
   whole.board.begin(state_line, whole.now_us);
   whole.settle();
   for (std::size_t lost = 1; lost <= whole.ids.size(); ++lost) {
-    Bus bus;
+    NodeBus bus;
     bus.lose = lost;
     bus.board.begin(state_line, bus.now_us);
     bus.settle();
@@ -222,7 +229,7 @@ TEST(CanNode, ACommandIsTakenIfItsFramesAreLateByLessThan100Ms) {
 
 TEST(CanNode, AnEmergencyFrameOfAnyContentIsAStop) {
   for (const std::uint8_t size : std::vector<std::uint8_t>{0, 1, 8}) {
-    Bus bus;
+    NodeBus bus;
     CanFrame frame{};
     frame.id = emergency_stop_id;
     frame.size = size;
@@ -237,7 +244,7 @@ TEST(CanNode, AnEmergencyFrameOfAnyContentIsAStop) {
 }
 
 TEST(CanNode, ABoardThatGoesSafeSaysSoAheadInOneFrame) {
-  Bus bus;
+  NodeBus bus;
   const auto beat = [&](const std::string& end) {
     bus.ids.clear();
     bus.board.begin(with_crc("H:R4-ROS2;PNum:79;T:81300;" + end), bus.now_us);
@@ -254,7 +261,7 @@ TEST(CanNode, ABoardThatGoesSafeSaysSoAheadInOneFrame) {
 }
 
 TEST(CanNode, AReasonThatTheBusDidNotTakeIsToldLater) {
-  Bus bus;
+  NodeBus bus;
   const std::string safe = with_crc("H:R4-ROS2;PNum:79;T:81300;SAFE:2;");
   bus.board.begin(safe, bus.now_us);
   bus.board.cancel();  // the bus went down first
@@ -265,7 +272,7 @@ TEST(CanNode, AReasonThatTheBusDidNotTakeIsToldLater) {
 }
 
 TEST(CanNode, TakesNothingWhileALaneIsBusyAndNothingTooLong) {
-  Bus bus;
+  NodeBus bus;
   EXPECT_TRUE(bus.board.begin(state_line, bus.now_us));
   EXPECT_FALSE(bus.board.begin(heartbeat_line, bus.now_us));
   EXPECT_TRUE(bus.board.begin(answer_line, bus.now_us));
@@ -276,7 +283,7 @@ TEST(CanNode, TakesNothingWhileALaneIsBusyAndNothingTooLong) {
 }
 
 TEST(CanNode, APackedDatagramThatIsDamagedIsDropped) {
-  Bus bus;
+  NodeBus bus;
   CanFrame frame{};
   frame.id = telemetry_id(3);
   frame.size = 5;

@@ -100,9 +100,9 @@ Outcome receive(const Options& options, const std::vector<CanFrame>& frames,
 }
 
 // Both ends on one bus, with whatever happens to their frames.
-class Bus {
+class IsotpBus {
  public:
-  Bus(const Options& options, std::uint32_t capacity)
+  IsotpBus(const Options& options, std::uint32_t capacity)
       : sender(options.sender),
         buffer_(capacity, '\0'),
         receiver(options.receiver, buffer_.data(), capacity) {}
@@ -165,7 +165,7 @@ RC_GTEST_PROP(Isotp, AnyDatagramArrivesByteForByte, ()) {
   const std::string datagram = random_bytes(size, *rc::gen::arbitrary<std::uint32_t>());
   std::mt19937 random(*rc::gen::arbitrary<std::uint32_t>());
   const bool busy_bus = *rc::gen::arbitrary<bool>();
-  Bus bus(options, 4100);
+  IsotpBus bus(options, 4100);
   const auto refuses = [&] { return busy_bus && random() % 4 == 0; };
   for (int round = 0; round < 2; ++round) {
     RC_ASSERT(bus.transfer(datagram, refuses, [] { return false; }) == Datagrams{datagram});
@@ -206,7 +206,7 @@ RC_GTEST_PROP(Isotp, WithFlowControlALossCostsTheDatagramAndIsToldOf, ()) {
   const auto size = static_cast<std::size_t>(*rc::gen::inRange(1, 1025));
   const auto loss = static_cast<unsigned>(*rc::gen::inRange(1, 60));
   std::mt19937 random(*rc::gen::arbitrary<std::uint32_t>());
-  Bus bus(options, 1024);
+  IsotpBus bus(options, 1024);
   std::uint32_t delivered = 0;
   for (std::uint32_t round = 0; round < 10; ++round) {
     const std::string datagram = random_bytes(size, round);

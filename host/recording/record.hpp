@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a recording is made of (docs/recordings.md): records, each at its time and of one wire.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "r4link/link.hpp"
+
+namespace r4 {
+
+enum class RecordKind : std::uint8_t {
+  from_board,  // a datagram, damaged ones too
+  to_board,    // a datagram of whichever host
+  event,       // what happened, in words
+};
+
+// The recording itself, of which some events are.
+constexpr std::uint16_t no_wire = 0;
+
+struct Record {
+  Time time{0};  // microseconds since 1970, UTC
+  std::uint16_t wire = no_wire;
+  RecordKind kind = RecordKind::event;
+  std::string_view bytes;  // the datagram without its terminator, or the event's words
+};
+
+// How one board is reached.
+struct RecordedWire {
+  std::uint16_t number = 1;
+  std::string url;
+  std::string name;  // the board's, or its id; empty while it has not told
+};
+
+}  // namespace r4

@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "record_line.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <limits>
+
+#include "../../protocol/datagram/numbers.hpp"
+#include "r4link/config.hpp"
+
+namespace r4 {
+namespace {
+
+using std::chrono::days;
+using std::chrono::sys_days;
+using std::chrono::year_month_day;
+
+constexpr std::chrono::seconds second{1};
+constexpr std::size_t decimals = 6;
+constexpr std::string_view header_words = "# r4log ";
+constexpr std::string_view wire_words = "# wire ";
+constexpr std::string_view hex_digits = "0123456789abcdef";
+
+constexpr Time end_of_time =
+    sys_days{year_month_day{std::chrono::year{9999}, std::chrono::month{12}, std::chrono::day{31}}}
+        .time_since_epoch() +
+    days{1} - Time{1};
+
+char mark_of(RecordKind kind) {
+  switch (kind) {
+    case RecordKind::from_board:
+      return '<';
+    case RecordKind::to_board:
+      return '>';
+    case RecordKind::event:
+      break;
+  }
+  return '!';
+}
+
+bool kind_of(char mark, RecordKind& out) {
+  if (mark == '<') {
+    out = RecordKind::from_board;
+  } else if (mark == '>') {
+    out = RecordKind::to_board;
+  } else if (mark == '!') {
+    out = RecordKind::event;
+  } else {
+    return false;
+  }
+  return true;
+}
+
+bool is_plain(char c) { return c >= ' ' && c <= '~' && c != '\\'; }
+
+void append_number(std::string& out, std::uint32_t number) {
+  std::array<char, max_number_text> text;
+  out.append(text.data(), write_number(text.data(), number));
+}
+
+// `blank`: what separates words; then it is escaped, too.
+void append_escaped(std::string& out, std::string_view bytes, bool blank = false) {
+  for (const char c : bytes) {
+    if (is_plain(c) && !(blank && c == ' ')) {
+      out += c;
+    } else {
+      const auto byte = static_cast<unsigned char>(c);
+      out += {'\\', 'x', hex_digits[byte >> 4], hex_digits[byte & 15]};
+    }
+  }
+}
+
+int hex_value(char c) {
+  const std::size_t at = hex_digits.find(c);
+  return at == std::string_view::npos ? -1 : static_cast<int>(at);
+}
+
+// Appends the bytes that are written so; false for what is not.
+bool append_unescaped(std::string& out, std::string_view text) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (is_plain(text[i])) {
+      out += text[i];
+      continue;
+    }
+    if (text[i] != '\\' || text.size() - i < 4 || text[i + 1] != 'x') return false;
+    const int high = hex_value(text[i + 2]);
+    const int low = hex_value(text[i + 3]);
+    if (high < 0 || low < 0) return false;
+    out += static_cast<char>(high << 4 | low);
+    i += 3;
+  }
+  return true;
+}
+
+void put_digits(char* at, std::size_t count, std::int64_t value) {
+  for (; count > 0; --count, value /= 10) at[count - 1] = static_cast<char>('0' + value % 10);
+}
+
+// "1795468293.404765" at `out`; what is behind its end.
+char* write_time(char* out, Time time) {
+  time = std::clamp(time, Time{0}, end_of_time);
+  out = write_number(out, static_cast<std::uint64_t>(time / second));
+  *out = '.';
+  put_digits(out + 1, decimals, (time % second).count());
+  return out + 1 + decimals;
+}
+
+bool read_time(std::string_view text, Time& out) {
+  const std::size_t point = text.find('.');
+  std::uint64_t seconds = 0;
+  std::uint32_t micros = 0;
+  if (point == std::string_view::npos || text.size() != point + 1 + decimals) return false;
+  if (!parse_number(Text(text.substr(0, point)), seconds) ||
+      seconds > static_cast<std::uint64_t>(end_of_time / second) ||
+      !parse_number(Text(text.substr(point + 1)), micros)) {
+    return false;
+  }
+  out = Time{seconds * 1'000'000 + micros};
+  return true;
+}
+
+// Takes the number at the front of `text`, as far as `end`.
+bool take_number(std::string_view& text, char end, std::uint32_t limit, std::uint32_t& out) {
+  const std::size_t size = text.find(end);
+  const std::string_view digits = text.substr(0, size);
+  if (!parse_number(Text(digits), out) || out > limit) return false;
+  text.remove_prefix(size == std::string_view::npos ? text.size() : size + 1);
+  return true;
+}
+
+constexpr std::uint32_t max_wire = std::numeric_limits<std::uint16_t>::max();
+
+bool read_wire(std::string_view text, RecordLine& out) {
+  std::uint32_t number = 0;
+  if (!take_number(text, ' ', max_wire, number) || number == no_wire) return false;
+  out.wire.number = static_cast<std::uint16_t>(number);
+  out.wire.url.clear();
+  out.wire.name.clear();
+  const std::size_t blank = text.find(' ');
+  if (!append_unescaped(out.wire.url, text.substr(0, blank))) return false;
+  return blank == std::string_view::npos || append_unescaped(out.wire.name, text.substr(blank + 1));
+}
+
+LineKind damaged(RecordLine& out, const char* why) {
+  out.problem = why;
+  return LineKind::damaged;
+}
+
+LineKind read_comment(std::string_view line, RecordLine& out) {
+  if (line.starts_with(header_words)) {
+    line.remove_prefix(header_words.size());
+    return take_number(line, ' ', std::numeric_limits<std::uint32_t>::max(), out.version)
+               ? LineKind::header
+               : damaged(out, "a header without a version");
+  }
+  if (line.starts_with(wire_words)) {
+    line.remove_prefix(wire_words.size());
+    return read_wire(line, out) ? LineKind::wire : damaged(out, "no wire is written so");
+  }
+  return LineKind::comment;
+}
+
+LineKind read_record(std::string_view line, RecordLine& out) {
+  const std::size_t time_size = line.find(' ');
+  if (time_size == std::string_view::npos ||
+      !read_time(line.substr(0, time_size), out.record.time)) {
+    return damaged(out, "it begins with no time");
+  }
+  line.remove_prefix(time_size + 1);
+  const std::size_t blank = line.find(' ');
+  if (blank == std::string_view::npos || blank < 2 || !kind_of(line[blank - 1], out.record.kind)) {
+    return damaged(out, "no wire and direction behind the time");
+  }
+  std::uint32_t wire = 0;
+  if (!parse_number(Text(line.substr(0, blank - 1)), wire) || wire > max_wire) {
+    return damaged(out, "no wire and direction behind the time");
+  }
+  out.record.wire = static_cast<std::uint16_t>(wire);
+  out.text.clear();
+  if (!append_unescaped(out.text, line.substr(blank + 1))) {
+    return damaged(out, "what is not printable is not written as \\xNN");
+  }
+  if (out.text.size() > max_record_bytes) return damaged(out, "it is longer than any record");
+  out.record.bytes = out.text;
+  return LineKind::record;
+}
+
+}  // namespace
+
+void write_record_header(std::string& out) {
+  out += header_words;
+  append_number(out, record_version);
+  out += " by r4 " R4LINK_VERSION
+         "\n# seconds since 1970 (UTC), the number of the wire, < from the board > to the board ! "
+         "event; \\xNN is a byte\n";
+}
+
+void write_wire(std::string& out, const RecordedWire& wire) {
+  out += wire_words;
+  append_number(out, wire.number);
+  out += ' ';
+  append_escaped(out, wire.url, true);
+  if (!wire.name.empty()) {
+    out += ' ';
+    append_escaped(out, wire.name, true);
+  }
+  out += '\n';
+}
+
+void write_record(std::string& out, const Record& record) {
+  std::array<char, 2 * max_number_text + decimals> head;
+  char* end = write_time(head.data(), record.time);
+  *end++ = ' ';
+  end = write_number(end, std::uint32_t{record.wire});
+  *end++ = mark_of(record.kind);
+  *end++ = ' ';
+  out.append(head.data(), static_cast<std::size_t>(end - head.data()));
+  append_escaped(out, record.bytes.substr(0, max_record_bytes));
+  out += '\n';
+}
+
+void write_beginning(std::string& out, Time time) {
+  out += "# from ";
+  out += record_time_text(time);
+  out += '\n';
+}
+
+bool read_record_line(std::string_view line, RecordLine& out) {
+  out.kind = line.starts_with('#') ? read_comment(line, out) : read_record(line, out);
+  return out.kind != LineKind::damaged;
+}
+
+std::string record_time_text(Time time) {
+  time = std::clamp(time, Time{0}, end_of_time);
+  const auto day = std::chrono::floor<days>(time);
+  const year_month_day date{sys_days{day}};
+  const std::chrono::hh_mm_ss clock{time - day};
+  std::string text = "0000-00-00T00:00:00.000000Z";
+  put_digits(text.data(), 4, int{date.year()});
+  put_digits(&text[5], 2, unsigned{date.month()});
+  put_digits(&text[8], 2, unsigned{date.day()});
+  put_digits(&text[11], 2, clock.hours().count());
+  put_digits(&text[14], 2, clock.minutes().count());
+  put_digits(&text[17], 2, clock.seconds().count());
+  put_digits(&text[20], decimals, clock.subseconds().count());
+  return text;
+}
+
+}  // namespace r4

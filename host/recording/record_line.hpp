@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The lines of a recording: written, and read back.
+//
+//     # r4log 1 by r4 0.1.0
+//     # wire 1 serial:///dev/ttyACM0 left-arm
+//     # from 2026-11-23T21:11:33.404765Z
+//     1795468293.404765 1< AIN24:24.28;PNum:7434;T:79090;^0xf07cfd9a^
+//
+// Any bytes come back as they were: what is not printable ASCII, and a backslash, stands as \xNN.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "record.hpp"
+
+namespace r4 {
+
+constexpr std::uint32_t record_version = 1;
+// What a record may hold; a datagram is shorter, what a damaged stream gives may not be.
+constexpr std::size_t max_record_bytes = 4096;
+// The longest line there is, without its end: all of it escaped, and its time and wire before it.
+constexpr std::size_t max_record_line = 4 * max_record_bytes + 64;
+
+// --- writing; each appends one line with its end
+
+void write_record_header(std::string& out);
+// For people: when the first record is from.
+void write_beginning(std::string& out, Time time);
+void write_wire(std::string& out, const RecordedWire& wire);
+// Bytes beyond max_record_bytes are left out. A time outside of the years 1970 to 9999 is written as the next
+// that is inside.
+void write_record(std::string& out, const Record& record);
+
+// --- reading
+
+enum class LineKind : std::uint8_t {
+  damaged,  // none of these: `problem` says why
+  record,
+  header,
+  wire,
+  comment,  // another line that begins with #; of a later version, or a person's
+};
+
+// One line as it was read; used again for the next one, so that reading allocates nothing.
+struct RecordLine {
+  LineKind kind = LineKind::damaged;
+  const char* problem = "";
+  Record record;  // its bytes are in `text`
+  RecordedWire wire;
+  std::uint32_t version = 0;
+  std::string text;
+};
+
+// Reads a line without its end. False if it is damaged.
+bool read_record_line(std::string_view line, RecordLine& out);
+
+// "2026-11-23T21:11:33.404765Z"
+std::string record_time_text(Time time);
+
+}  // namespace r4

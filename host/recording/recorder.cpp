@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "recorder.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstring>
+#include <ctime>
+#include <exception>
+#include <utility>
+
+#include "record_line.hpp"
+
+namespace r4 {
+namespace {
+
+// What a crash may cost, with the time that the disk takes, is less than a second.
+constexpr std::chrono::milliseconds interval{250};
+// A wall clock that was set by less is only told of when more has come together.
+constexpr Time clock_step{std::chrono::milliseconds{100}};
+
+// A signal is for the program's own threads. SIGXFSZ, of a file that reaches the limit of its size, comes to the
+// thread that writes, and would end the program.
+class NoSignals {
+ public:
+  NoSignals() {
+    sigset_t all;
+    ::sigfillset(&all);
+    ::pthread_sigmask(SIG_SETMASK, &all, &before_);
+  }
+  ~NoSignals() {
+    sigset_t limit;
+    ::sigemptyset(&limit);
+    ::sigaddset(&limit, SIGXFSZ);
+    const timespec at_once{};
+    ::sigtimedwait(&limit, nullptr, &at_once);
+    ::pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+  }
+  NoSignals(const NoSignals&) = delete;
+  NoSignals& operator=(const NoSignals&) = delete;
+
+ private:
+  sigset_t before_;
+};
+
+}  // namespace
+
+Recorder::Recorder(const std::string& path, const RecordingOptions& options)
+    : writer_(path, options), began_(wall_clock()) {
+  waiting_.reserve(capacity);
+  const NoSignals inherited;
+  writer_.flush();
+  thread_ = std::thread([this] { run(); });
+}
+
+Recorder::~Recorder() { close(); }
+
+Time Recorder::wall_clock() {
+  return std::chrono::duration_cast<Time>(std::chrono::system_clock::now().time_since_epoch());
+}
+
+Time Recorder::now() const {
+  return began_ +
+         std::chrono::duration_cast<Time>(std::chrono::steady_clock::now() - began_steady_);
+}
+
+// --- any thread
+
+std::uint16_t Recorder::add_wire(std::string url) {
+  const std::lock_guard lock(mutex_);
+  const auto number = static_cast<std::uint16_t>(wires_.size() + 1);
+  wires_.push_back({number, std::move(url), {}});
+  undeclared_.push_back(number);
+  return number;
+}
+
+void Recorder::name_wire(std::uint16_t wire, std::string name) {
+  const std::lock_guard lock(mutex_);
+  RecordedWire& known = wires_[wire - 1U];
+  if (known.name == name) return;
+  known.name = std::move(name);
+  undeclared_.push_back(wire);
+}
+
+void Recorder::record(std::uint16_t wire, RecordKind kind, std::string_view bytes) {
+  if (ended()) return;
+  bytes = bytes.substr(0, max_record_bytes);
+  const std::lock_guard lock(mutex_);
+  if (closing_) return;
+  const std::size_t before = waiting_.size();
+  if (before + sizeof(Head) + bytes.size() > capacity) {
+    ++dropped_;
+    return;
+  }
+  const Head head{now(), static_cast<std::uint32_t>(bytes.size()), wire, kind};
+  waiting_.resize(before + sizeof head + bytes.size());
+  std::memcpy(&waiting_[before], &head, sizeof head);
+  std::copy(bytes.begin(), bytes.end(), &waiting_[before + sizeof head]);
+  ++records_;
+  if (waiting_.size() > capacity / 2 && before <= capacity / 2) wanted_.notify_one();
+}
+
+void Recorder::close() {
+  {
+    const std::lock_guard lock(mutex_);
+    closing_ = true;
+  }
+  wanted_.notify_one();
+  const std::lock_guard lock(joining_);
+  if (thread_.joinable()) thread_.join();
+}
+
+std::optional<Problem> Recorder::problem() const {
+  const std::lock_guard lock(mutex_);
+  return problem_;
+}
+std::uint64_t Recorder::records() const {
+  const std::lock_guard lock(mutex_);
+  return records_;
+}
+std::uint64_t Recorder::dropped() const {
+  const std::lock_guard lock(mutex_);
+  return dropped_;
+}
+
+// --- the writer's thread
+
+void Recorder::run() {
+  std::vector<char> batch;
+  batch.reserve(capacity);
+  try {
+    for (bool last = false; !last;) {
+      std::vector<RecordedWire> fresh;
+      {
+        std::unique_lock lock(mutex_);
+        wanted_.wait_for(lock, interval,
+                         [this] { return closing_ || waiting_.size() > capacity / 2; });
+        last = closing_;
+        batch.swap(waiting_);
+        for (const std::uint16_t number : undeclared_) fresh.push_back(wires_[number - 1U]);
+        undeclared_.clear();
+      }
+      for (const RecordedWire& wire : fresh) writer_.declare(wire);
+      write(batch);
+      batch.clear();
+      tell_of_what_was_dropped();
+      tell_of_the_clock();
+      writer_.flush();
+    }
+    write_event("end");
+    writer_.close();
+  } catch (const Error& error) {
+    const std::lock_guard lock(mutex_);
+    problem_ = error.problem();
+  } catch (const std::exception& error) {
+    const std::lock_guard lock(mutex_);
+    problem_ = Problem{ErrorKind::open, writer_.path(), error.what(), "record again"};
+  }
+  ended_ = true;
+}
+
+void Recorder::write(const std::vector<char>& batch) {
+  for (std::size_t at = 0; at < batch.size();) {
+    Head head{};
+    std::memcpy(&head, &batch[at], sizeof head);
+    at += sizeof head;
+    writer_.append({head.time, head.wire, head.kind, {batch.data() + at, head.size}});
+    at += head.size;
+  }
+}
+
+void Recorder::write_event(const std::string& text) {
+  writer_.append({now(), no_wire, RecordKind::event, text});
+}
+
+void Recorder::tell_of_what_was_dropped() {
+  const std::uint64_t all = dropped();
+  if (all == dropped_told_) return;
+  write_event(fmt::format("dropped {}", all - dropped_told_));
+  dropped_told_ = all;
+}
+
+void Recorder::tell_of_the_clock() {
+  const Time set = wall_clock() - now();
+  if (std::chrono::abs(set - clock_told_) < clock_step) return;
+  write_event(fmt::format("clock {:+} us", set.count()));
+  clock_told_ = set;
+}
+
+}  // namespace r4

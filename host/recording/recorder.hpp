@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What is behind a Recording: boards put records in, from any thread and without waiting; a thread of its own writes
+// them.
+//
+//     record() -- 4 MiB at most --> the writer's thread --> RecordingWriter --> the disk
+//
+// The two meet for as long as it takes to copy a datagram. Times are those of the steady clock, from the wall clock
+// at the beginning: whoever sets the wall clock moves no record, and is told of in the recording.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include "r4link/error.hpp"
+#include "record.hpp"
+#include "recording_writer.hpp"
+
+namespace r4 {
+
+class Recorder {
+ public:
+  // Opens the file. Throws Error.
+  Recorder(const std::string& path, const RecordingOptions& options);
+  ~Recorder();
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  // The number of a new wire.
+  std::uint16_t add_wire(std::string url);
+  // What the board there calls itself.
+  void name_wire(std::uint16_t wire, std::string name);
+  // Copies it. Allocates nothing; beyond max_record_bytes it is cut.
+  void record(std::uint16_t wire, RecordKind kind, std::string_view bytes);
+
+  // Writes what waits and ends the file.
+  void close();
+
+  // It records nothing any more. No lock: for every datagram.
+  bool ended() const { return ended_.load(std::memory_order_relaxed); }
+  std::optional<Problem> problem() const;
+  std::uint64_t records() const;
+  std::uint64_t dropped() const;
+
+  static constexpr std::size_t capacity = 4 << 20;
+
+ private:
+  // Before each record's bytes in the buffer.
+  struct Head {
+    Time time;
+    std::uint32_t size;
+    std::uint16_t wire;
+    RecordKind kind;
+  };
+
+  static Time wall_clock();
+  Time now() const;
+  void run();
+  void write(const std::vector<char>& batch);
+  void write_event(const std::string& text);
+  void tell_of_the_clock();
+  void tell_of_what_was_dropped();
+
+  RecordingWriter writer_;  // of the writer's thread
+  Time clock_told_{0};      // by how much the wall clock was set, as the recording has it
+  std::uint64_t dropped_told_ = 0;
+  const Time began_;  // by the wall clock
+  const std::chrono::steady_clock::time_point began_steady_ = std::chrono::steady_clock::now();
+
+  std::atomic<bool> ended_{false};
+  mutable std::mutex mutex_;  // of what follows
+  std::condition_variable wanted_;
+  std::vector<char> waiting_;
+  std::vector<RecordedWire> wires_;
+  std::vector<std::uint16_t> undeclared_;
+  std::uint64_t records_ = 0;
+  std::uint64_t dropped_ = 0;
+  bool closing_ = false;
+  std::optional<Problem> problem_;
+
+  std::mutex joining_;
+  std::thread thread_;
+};
+
+}  // namespace r4

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "recording_parts.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "../../protocol/datagram/numbers.hpp"
+#include "r4link/error.hpp"
+
+namespace r4 {
+namespace {
+
+constexpr std::uint64_t least_kept = 1 << 20;
+constexpr std::uint64_t least_parts = 4;  // of what is kept
+
+// Where the number goes in: before the endings that say what the file is.
+std::size_t ending_of(std::string_view path) {
+  for (const std::string_view ending : {".r4log.zst", ".r4log", ".zst"}) {
+    if (path.ends_with(ending)) return path.size() - ending.size();
+  }
+  const std::size_t slash = path.rfind('/');
+  const std::size_t dot = path.rfind('.');
+  const bool has_one = dot != std::string_view::npos && dot != 0 &&
+                       (slash == std::string_view::npos || dot > slash + 1);
+  return has_one ? dot : path.size();
+}
+
+bool has_limits(const RecordingOptions& options) {
+  return options.rotate_bytes != 0 || options.rotate_after.count() != 0 || options.keep_bytes != 0;
+}
+
+void require_limits(const RecordingOptions& options) {
+  if (options.rotate_after.count() < 0) {
+    throw Error(ErrorKind::usage, "rotate_after", "is less than nothing", "give 1 s or more");
+  }
+  if (options.keep_bytes == 0) return;
+  if (options.keep_bytes < least_kept) {
+    throw Error(ErrorKind::usage, fmt::format("keep {}", options.keep_bytes), "is too little",
+                "keep 1M or more");
+  }
+  if (options.rotate_bytes > options.keep_bytes / least_parts) {
+    throw Error(ErrorKind::usage, fmt::format("keep {}", options.keep_bytes),
+                "the files are too large for it", "keep four times as much as a file may hold");
+  }
+}
+
+}  // namespace
+
+RecordingParts::RecordingParts(std::string path, RecordingOptions options)
+    : stem_(path.substr(0, ending_of(path))),
+      ending_(path.substr(stem_.size())),
+      options_(options),
+      most_bytes_(options.rotate_bytes != 0 ? options.rotate_bytes
+                                            : options.keep_bytes / least_parts) {
+  require_limits(options);
+}
+
+std::string RecordingParts::path_of(std::uint64_t number) const {
+  return fmt::format("{}-{:05}{}", stem_, number, ending_);
+}
+
+std::string RecordingParts::next() {
+  if (!has_limits(options_)) return stem_ + ending_;
+  if (number_ == 0) {
+    const std::vector<Part> parts = found();
+    if (!parts.empty()) number_ = parts.back().number;
+  }
+  return path_of(++number_);
+}
+
+std::vector<RecordingParts::Part> RecordingParts::found() const {
+  namespace fs = std::filesystem;
+  std::vector<Part> parts;
+  std::error_code error;  // what cannot be listed holds none; opening a file there tells why
+  const fs::path stem(stem_);
+  const std::string prefix = stem.filename().string() + "-";
+  const fs::path folder = stem.has_parent_path() ? stem.parent_path() : fs::path(".");
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    const std::string name = at->path().filename().string();
+    if (!name.starts_with(prefix) || !name.ends_with(ending_)) continue;
+    if (name.size() <= prefix.size() + ending_.size()) continue;
+    const std::string digits =
+        name.substr(prefix.size(), name.size() - prefix.size() - ending_.size());
+    std::uint64_t number = 0;
+    if (digits.size() < 5 || !parse_number(Text(digits), number)) continue;
+    std::error_code gone;
+    const std::uintmax_t size =
+        fs::is_regular_file(at->path(), gone) ? fs::file_size(at->path(), gone) : 0;
+    if (!gone) parts.push_back({number, size, at->path().string()});
+  }
+  std::sort(parts.begin(), parts.end(),
+            [](const Part& a, const Part& b) { return a.number < b.number; });
+  return parts;
+}
+
+void RecordingParts::make_room() {
+  if (options_.keep_bytes == 0) return;
+  const std::vector<Part> parts = found();
+  std::uint64_t sum = most_bytes_;  // of the one that comes
+  for (const Part& part : parts) sum += part.size;
+  for (const Part& part : parts) {
+    if (sum <= options_.keep_bytes) return;
+    std::error_code error;
+    std::filesystem::remove(part.path, error);
+    if (error) {
+      throw Error(ErrorKind::open, part.path, "cannot be removed: " + error.message(),
+                  "remove it, or record elsewhere");
+    }
+    sum -= part.size;
+  }
+}
+
+}  // namespace r4

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The files of a recording that has limits: drive-00001.r4log, drive-00002.r4log …
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "r4link/recording.hpp"
+
+namespace r4 {
+
+class RecordingParts {
+ public:
+  // Throws Error{usage} for limits that cannot be kept.
+  RecordingParts(std::string path, RecordingOptions options);
+
+  // The path of the next file: `path` itself, where there are no limits.
+  std::string next();
+  // Removes the oldest until there is room for another one. Throws Error.
+  void make_room();
+
+  // As asked for, or, where only keep_bytes was, chosen; 0: none.
+  std::uint64_t most_bytes() const { return most_bytes_; }
+
+ private:
+  struct Part {
+    std::uint64_t number;
+    std::uint64_t size;
+    std::string path;
+  };
+  std::vector<Part> found() const;  // oldest first
+  std::string path_of(std::uint64_t number) const;
+
+  std::string stem_, ending_;  // of the path
+  RecordingOptions options_;
+  std::uint64_t most_bytes_ = 0;
+  std::uint64_t number_ = 0;
+};
+
+}  // namespace r4

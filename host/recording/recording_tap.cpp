@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "recording_tap.hpp"
+
+#include <fmt/format.h>
+
+#include <string>
+#include <utility>
+
+namespace r4 {
+
+void RecordingTap::attach(std::shared_ptr<Recorder> recorder, const std::string& url) {
+  recorder_ = std::move(recorder);
+  wire_ = recorder_->add_wire(url);
+  state_ = HostLinkState::connecting;
+  reason_ = SafeReason::none;
+}
+
+std::optional<Problem> RecordingTap::take_end() {
+  if (!recorder_ || !recorder_->ended()) return std::nullopt;
+  return std::exchange(recorder_, nullptr)->problem();
+}
+
+void RecordingTap::on_carrier_event(const CarrierEvent& event) {
+  if (!recorder_) return;
+  const std::string words =
+      event.kind == CarrierEvent::Kind::up ? event.problem.thing : event.problem.text();
+  record(RecordKind::event, fmt::format("{} {}", to_text(event.kind), words));
+}
+
+void RecordingTap::on_link(const LinkStatus& link) {
+  if (!recorder_ || (link.state == state_ && link.reason == reason_)) return;
+  state_ = link.state;
+  reason_ = link.reason;
+  const bool safe = reason_ != SafeReason::none;
+  record(RecordKind::event, fmt::format("link {}{}{}", to_text(state_), safe ? " " : "",
+                                        safe ? to_text(reason_) : ""));
+}
+
+void RecordingTap::on_packets(const PacketCounters& packets) {
+  if (packets.lost == lost_) return;
+  if (recorder_ && packets.lost > lost_) {
+    record(RecordKind::event, fmt::format("lost {}", packets.lost - lost_));
+  }
+  lost_ = packets.lost;  // less than before, where one came late
+}
+
+void RecordingTap::on_name(std::string_view name) {
+  if (recorder_) recorder_->name_wire(wire_, std::string(name));
+}
+
+}  // namespace r4

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Where a board's link is tapped for a recording: between the transport and the session, so that what comes is
+// recorded before anybody judges it.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string_view>
+
+#include "r4link/carrier.hpp"
+#include "r4link/link.hpp"
+#include "recorder.hpp"
+
+namespace r4 {
+
+class RecordingTap {
+ public:
+  // From now on into that recording, instead of another one. `url`: how the board is reached.
+  void attach(std::shared_ptr<Recorder> recorder, const std::string& url);
+  void detach() { recorder_.reset(); }
+  bool attached() const { return recorder_ != nullptr; }
+  // Why the recording has ended; told once, and nothing if it was closed. Then it is let go.
+  std::optional<Problem> take_end();
+
+  void on_received(std::string_view bytes) { record(RecordKind::from_board, bytes); }
+  // By whoever: this program, or another one on the same wire.
+  void on_sent(std::string_view bytes) { record(RecordKind::to_board, bytes); }
+  void on_carrier_event(const CarrierEvent& event);
+  void on_link(const LinkStatus& link);
+  void on_packets(const PacketCounters& packets);
+  void on_name(std::string_view name);
+
+ private:
+  void record(RecordKind kind, std::string_view bytes) {
+    if (recorder_) recorder_->record(wire_, kind, bytes);
+  }
+
+  std::shared_ptr<Recorder> recorder_;
+  std::uint16_t wire_ = no_wire;
+  HostLinkState state_ = HostLinkState::connecting;
+  SafeReason reason_ = SafeReason::none;
+  std::uint32_t lost_ = 0;
+};
+
+}  // namespace r4

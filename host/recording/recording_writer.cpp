@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "recording_writer.hpp"
+
+#include <algorithm>
+
+#include "record_line.hpp"
+
+namespace r4 {
+namespace {
+
+// So much text waits at most.
+constexpr std::size_t most_text = 65536;
+// A frame is lost as a whole where its beginning is damaged.
+constexpr std::size_t frame_text = 1 << 20;
+
+}  // namespace
+
+RecordingWriter::RecordingWriter(const std::string& path, const RecordingOptions& options)
+    : options_(options), parts_(path, options) {
+  text_.reserve(most_text + max_record_line);
+  begin_file();
+}
+
+void RecordingWriter::begin_file() {
+  parts_.make_room();
+  file_.emplace(parts_.next());
+  zstd_.reset();
+  if (file_->path().ends_with(".zst")) zstd_.emplace();
+  frame_ = 0;
+  begun_.reset();
+  // Whoever wrote the last line was ended in the midst of it; it stays a line of its own.
+  if (file_->torn()) text_ += '\n';
+  write_record_header(text_);
+  for (const RecordedWire& wire : wires_) write_wire(text_, wire);
+}
+
+void RecordingWriter::declare(const RecordedWire& wire) {
+  const auto known = std::find_if(wires_.begin(), wires_.end(), [&](const RecordedWire& each) {
+    return each.number == wire.number;
+  });
+  if (known == wires_.end()) {
+    wires_.push_back(wire);
+  } else {
+    *known = wire;
+  }
+  write_wire(text_, wire);
+}
+
+bool RecordingWriter::is_due(Time time) const {
+  if (!begun_) return false;
+  if (options_.rotate_after.count() != 0 && time - *begun_ >= options_.rotate_after) return true;
+  return parts_.most_bytes() != 0 &&
+         file_->size() + (zstd_ ? 0 : text_.size()) >= parts_.most_bytes();
+}
+
+void RecordingWriter::append(const Record& record) {
+  if (is_due(record.time)) {
+    close();
+    begin_file();
+  }
+  if (!begun_) {
+    begun_ = record.time;
+    write_beginning(text_, record.time);
+  }
+  write_record(text_, record);
+  if (text_.size() >= most_text) write_out(false);
+}
+
+void RecordingWriter::flush() { write_out(false); }
+
+void RecordingWriter::close() { write_out(true); }
+
+void RecordingWriter::write_out(bool end_frame) {
+  if (!zstd_) {
+    if (!text_.empty()) file_->append(text_);
+  } else if (!text_.empty() || (end_frame && frame_ != 0)) {
+    frame_ += text_.size();
+    if (frame_ >= frame_text) end_frame = true;
+    compressed_.clear();
+    zstd_->write(text_, end_frame, compressed_);
+    file_->append(compressed_);
+    if (end_frame) frame_ = 0;
+  }
+  text_.clear();
+}
+
+}  // namespace r4

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Turns records into files: compressed where their name says so, one after the other where there are limits. Blocks
+// while the disk is slow. Knows no clock: time is that of the records.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "r4link/recording.hpp"
+#include "record.hpp"
+#include "recording_file.hpp"
+#include "recording_parts.hpp"
+#include "zstd_stream.hpp"
+
+namespace r4 {
+
+class RecordingWriter {
+ public:
+  // Opens the file. Throws Error.
+  RecordingWriter(const std::string& path, const RecordingOptions& options);
+
+  // A wire, before its first record, or with more that is known of it. Throws as append() does.
+  void declare(const RecordedWire& wire);
+  // Each may write, and throws Error when that cannot be done.
+  void append(const Record& record);
+  // What was appended is on the disk when this returns. Throws Error.
+  void flush();
+  // The same, and ends what is compressed.
+  void close();
+
+  const std::string& path() const { return file_->path(); }
+
+ private:
+  bool is_due(Time time) const;
+  void begin_file();
+  void write_out(bool end_frame);
+
+  const RecordingOptions options_;
+  RecordingParts parts_;
+  std::optional<RecordingFile> file_;
+  std::optional<ZstdWriter> zstd_;
+  std::vector<RecordedWire> wires_;
+  std::string text_;           // not written yet
+  std::string compressed_;     // used again and again
+  std::size_t frame_ = 0;      // text in the frame so far
+  std::optional<Time> begun_;  // the first record of this file
+};
+
+}  // namespace r4

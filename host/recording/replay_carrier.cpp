@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "replay_carrier.hpp"
+
+#include <asio/steady_timer.hpp>
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "../../protocol/datagram/numbers.hpp"
+#include "r4link/datagram.hpp"
+#include "recording_file.hpp"
+#include "recording_reader.hpp"
+
+namespace r4 {
+namespace {
+
+std::int32_t hundredths_of(const Url& url, const char* key, std::int32_t min,
+                           std::int32_t fallback) {
+  constexpr std::int32_t max = 100'000'000;
+  const std::optional<std::string> text = url.get(key);
+  std::int32_t value = fallback;
+  if (text && (!parse_hundredths(Text(*text), value) || value < min || value > max)) {
+    throw Error(ErrorKind::usage, url.text(), std::string(key) + " " + *text + " is no such number",
+                "write replay:FILE?speed=0.5&from=12");
+  }
+  return value;
+}
+
+class ReplayCarrier final : public Carrier, RecordingReader::Handler {
+ public:
+  ReplayCarrier(asio::io_context& io, const Url& url)
+      : name_(url.text()),
+        path_(url.host().empty() ? url.path() : std::string()),
+        wire_(static_cast<std::uint16_t>(url.get_number("wire", 1, 65535, 1))),
+        speed_(hundredths_of(url, "speed", 1, 100) / 100.0),
+        from_(std::int64_t{hundredths_of(url, "from", 0, 0)} * 10'000),
+        timer_(io) {
+    url.allow_only("speed wire from");
+    if (path_.empty()) {
+      throw Error(ErrorKind::usage, name_, "names no recording", "write replay:drive.r4log");
+    }
+  }
+  ~ReplayCarrier() override { close(); }
+
+  void open(Carrier::Handler& handler) override {
+    input_.emplace(path_);
+    RecordingReader::Handler& self = *this;
+    reader_.emplace(self, path_);
+    while (waiting_.empty() && !ended_) read_on();
+    if (waiting_.empty()) {
+      throw Error(ErrorKind::data, name_, "nothing of that wire is there",
+                  "r4 info " + path_ + " lists the wires; leave from= out");
+    }
+    handler_ = &handler;
+    first_ = waiting_.front().time;
+    began_ = std::chrono::steady_clock::now();
+    change(true, {});
+    if (handler_ != nullptr) wait();
+  }
+
+  void close() noexcept override {
+    handler_ = nullptr;
+    alive_.reset();
+    timer_.cancel();
+    up_ = false;
+  }
+
+  SendResult send(std::string_view bytes, Priority, Peer) override {
+    if (!up_) return SendResult::down;
+    ++counters_.tx_datagrams;
+    counters_.tx_bytes += bytes.size();
+    return SendResult::sent;
+  }
+
+  bool up() const override { return up_; }
+  std::size_t max_size() const override { return max_datagram; }
+  const std::string& name() const override { return name_; }
+  const CarrierCounters& counters() const override { return counters_; }
+
+ private:
+  struct Waiting {
+    Time time;
+    RecordKind kind;
+    std::string bytes;
+  };
+
+  // --- RecordingReader::Handler
+
+  void on_record(const Record& record) override {
+    if (!beginning_) beginning_ = record.time;
+    if (record.wire != wire_ || record.kind == RecordKind::to_board) return;
+    if (record.time - *beginning_ < from_) return;
+    if (record.kind == RecordKind::event && !is_of_the_transport(record.bytes)) return;
+    waiting_.push_back({record.time, record.kind, std::string(record.bytes)});
+  }
+  void on_wire(const RecordedWire&) override {}
+  void on_damage(const RecordingDamage& damage) override {
+    if (waiting_.empty()) return;
+    waiting_.push_back(
+        {waiting_.back().time, RecordKind::event,
+         "warning line " + std::to_string(damage.line) + ": " + std::string(damage.reason)});
+  }
+
+  static bool is_of_the_transport(std::string_view event) {
+    return event.starts_with("up ") || event.starts_with("down ") || event.starts_with("warning ");
+  }
+
+  void read_on() {
+    const std::string_view piece = input_->read();
+    if (!piece.empty()) return reader_->feed(piece);
+    ended_ = true;
+    reader_->finish();
+  }
+
+  // --- playing
+
+  void wait() {
+    const std::chrono::duration<double, std::micro> later =
+        (waiting_.front().time - first_) / speed_;
+    timer_.expires_at(began_ +
+                      std::chrono::duration_cast<std::chrono::steady_clock::duration>(later));
+    timer_.async_wait([this, alive = std::weak_ptr<int>(alive_)](const std::error_code& error) {
+      if (!error && !alive.expired()) play();
+    });
+  }
+
+  // All that is due.
+  void play() {
+    const auto now = std::chrono::steady_clock::now();
+    while (handler_ != nullptr) {
+      if (!fill()) return;
+      const std::chrono::duration<double, std::micro> later =
+          (waiting_.front().time - first_) / speed_;
+      if (began_ + later > now) break;
+      const Waiting next = std::move(waiting_.front());
+      waiting_.pop_front();
+      play(next);
+    }
+    if (handler_ != nullptr) handler_->on_drained();
+    if (handler_ != nullptr) wait();
+  }
+
+  // False at the end, which is told.
+  bool fill() {
+    try {
+      while (waiting_.empty() && !ended_) read_on();
+    } catch (const Error& error) {
+      change(false, error.problem());
+      return false;
+    }
+    if (!waiting_.empty()) return true;
+    change(false, {ErrorKind::open, name_, "the recording has ended", "open it again"});
+    return false;
+  }
+
+  void play(const Waiting& next) {
+    const std::string_view words = next.bytes;
+    if (next.kind == RecordKind::from_board) {
+      ++counters_.rx_datagrams;
+      counters_.rx_bytes += words.size();
+      handler_->on_datagram(words, everyone);
+    } else if (words.starts_with("up ")) {
+      if (!up_) change(true, {});
+    } else if (words.starts_with("down ")) {
+      if (up_) change(false, {ErrorKind::open, name_, std::string(words.substr(5)), ""});
+    } else {
+      handler_->on_carrier_event({CarrierEvent::Kind::warning,
+                                  {ErrorKind::open, name_, std::string(words.substr(8)), ""}});
+    }
+  }
+
+  void change(bool up, Problem problem) {
+    up_ = up;
+    ++(up ? counters_.ups : counters_.downs);
+    if (up) problem.thing = name_;
+    handler_->on_carrier_event({up ? CarrierEvent::Kind::up : CarrierEvent::Kind::down, problem});
+  }
+
+  const std::string name_;
+  const std::string path_;
+  const std::uint16_t wire_;
+  const double speed_;
+  const Time from_;
+  asio::steady_timer timer_;
+  std::shared_ptr<int> alive_ = std::make_shared<int>(0);
+  Carrier::Handler* handler_ = nullptr;
+  bool up_ = false;
+  CarrierCounters counters_;
+
+  std::optional<RecordingInput> input_;
+  std::optional<RecordingReader> reader_;
+  bool ended_ = false;
+  std::optional<Time> beginning_;  // of the recording
+  std::deque<Waiting> waiting_;
+  Time first_{0};  // of what is played
+  std::chrono::steady_clock::time_point began_;
+};
+
+}  // namespace
+
+std::unique_ptr<Carrier> make_replay_carrier(asio::io_context& io, const Url& url, Role role) {
+  if (role == Role::board) {
+    throw Error(ErrorKind::usage, url.text(), "a recording cannot listen",
+                "give the board a transport to listen on, such as udp://:2018");
+  }
+  return std::make_unique<ReplayCarrier>(io, url);
+}
+
+}  // namespace r4

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "zstd_stream.hpp"
+
+#include <algorithm>
+#include <new>
+
+namespace r4 {
+namespace {
+
+// The first bytes of a frame (RFC 8878, 3.1.1).
+constexpr std::string_view magic = "\x28\xb5\x2f\xfd";
+// What a frame may ask of a reader: 8 MiB, as the RFC recommends.
+constexpr int window_log = 23;
+constexpr int level = 3;
+// The frames that are written here; a longer window gains nothing.
+constexpr int frame_window_log = 20;
+// So much is read at once: what it holds before damage may be lost with it.
+constexpr std::size_t slice = 512;
+
+// Up to where another frame may begin: where the one before has no end, all of that is read. At least a byte.
+std::string_view until_a_frame(std::string_view bytes) {
+  std::size_t size = std::min(bytes.size(), bytes.find(magic, 1));
+  for (std::size_t left = 1; left < magic.size() && size == bytes.size() && left < size; ++left) {
+    if (magic.starts_with(bytes.substr(bytes.size() - left))) size -= left;
+  }
+  return bytes.substr(0, size);
+}
+
+}  // namespace
+
+ZstdWriter::ZstdWriter() : context_(ZSTD_createCCtx()) {
+  if (!context_) throw std::bad_alloc();
+  ZSTD_CCtx_setParameter(context_.get(), ZSTD_c_compressionLevel, level);
+  ZSTD_CCtx_setParameter(context_.get(), ZSTD_c_windowLog, frame_window_log);
+  ZSTD_CCtx_setParameter(context_.get(), ZSTD_c_checksumFlag, 1);
+}
+
+void ZstdWriter::write(std::string_view bytes, bool end_frame, std::string& out) {
+  ZSTD_inBuffer input{bytes.data(), bytes.size(), 0};
+  const ZSTD_EndDirective how = end_frame ? ZSTD_e_end : ZSTD_e_flush;
+  std::size_t left = 0;
+  do {
+    const std::size_t before = out.size();
+    out.resize(before + ZSTD_CStreamOutSize());
+    ZSTD_outBuffer output{out.data() + before, out.size() - before, 0};
+    left = ZSTD_compressStream2(context_.get(), &output, &input, how);
+    out.resize(before + output.pos);
+    // Of these calls none can fail but for want of memory.
+    if (ZSTD_isError(left) != 0) throw std::bad_alloc();
+  } while (left != 0);
+}
+
+ZstdReader::ZstdReader() : context_(ZSTD_createDCtx()) {
+  if (!context_) throw std::bad_alloc();
+  ZSTD_DCtx_setParameter(context_.get(), ZSTD_d_windowLogMax, window_log);
+  output_.resize(ZSTD_DStreamOutSize());
+}
+
+ZstdReader::Step ZstdReader::step(std::string_view& bytes) {
+  size_ = 0;
+  if (searching_ && !find_frame(bytes)) return Step::more;
+  const bool from_found = !found_.empty();
+  if (bytes.empty() && !from_found) return Step::more;
+  const std::string_view source =
+      from_found ? std::string_view(found_) : until_a_frame(bytes.substr(0, slice));
+  ZSTD_inBuffer input{source.data(), source.size(), 0};
+  ZSTD_outBuffer output{output_.data(), output_.size(), 0};
+  const std::size_t left = ZSTD_decompressStream(context_.get(), &output, &input);
+  if (ZSTD_isError(left) != 0) {
+    search(bytes, from_found);
+    return Step::damaged;
+  }
+  in_frame_ = left != 0;
+  size_ = output.pos;
+  last_.append(source.substr(0, input.pos));
+  last_.erase(0, last_.size() - std::min(last_.size(), magic.size() - 1));
+  if (from_found) {
+    found_.erase(0, input.pos);
+  } else {
+    bytes.remove_prefix(input.pos);
+  }
+  return Step::text;
+}
+
+// The next frame may begin in what was taken already, where the one before it has no end.
+void ZstdReader::search(std::string_view& bytes, bool from_found) {
+  ZSTD_DCtx_reset(context_.get(), ZSTD_reset_session_only);
+  searching_ = true;
+  tail_.clear();
+  if (from_found) {
+    found_.clear();
+  } else if (in_frame_) {
+    tail_ = last_;
+    while (!magic.starts_with(tail_)) tail_.erase(0, 1);
+  } else {
+    bytes.remove_prefix(1);  // not the beginning again that is damaged
+  }
+  in_frame_ = false;
+  last_.clear();
+}
+
+// Takes what is before the next frame, and its first bytes.
+bool ZstdReader::find_frame(std::string_view& bytes) {
+  while (!bytes.empty()) {
+    tail_ += bytes.front();
+    bytes.remove_prefix(1);
+    while (!magic.starts_with(tail_)) tail_.erase(0, 1);
+    if (tail_.size() == magic.size()) {
+      found_.swap(tail_);
+      tail_.clear();
+      searching_ = false;
+      return true;
+    }
+  }
+  return false;
+}
+
+bool is_zstd(std::string_view beginning) { return beginning.starts_with(magic); }
+
+}  // namespace r4

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a reader of recordings has told.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "host/recording/recording_reader.hpp"
+
+namespace r4::test {
+
+struct Heard final : RecordingReader::Handler {
+  struct Damage {
+    RecordingDamage::Kind kind;
+    std::uint64_t line, offset;
+    bool operator==(const Damage&) const = default;
+  };
+  void on_record(const Record& record) override {
+    std::string line;
+    write_record(line, record);
+    records += line;
+    ++count;
+    if (record.kind == RecordKind::event) events.emplace_back(record.bytes);
+  }
+  void on_wire(const RecordedWire& wire) override { wires.push_back(wire); }
+  void on_damage(const RecordingDamage& each) override {
+    damage.push_back({each.kind, each.line, each.offset});
+  }
+  void on_header() override { ++headers; }
+
+  std::string records;  // as lines
+  int count = 0;
+  int headers = 0;
+  std::vector<std::string> events;
+  std::vector<RecordedWire> wires;
+  std::vector<Damage> damage;
+};
+
+// All that can be read of it, fed in pieces of that size.
+inline Heard heard_in(std::string_view bytes, std::size_t piece = 1000) {
+  Heard heard;
+  RecordingReader reader(heard, "test");
+  for (; !bytes.empty(); bytes.remove_prefix(std::min(piece, bytes.size()))) {
+    reader.feed(bytes.substr(0, piece));
+  }
+  reader.finish();
+  return heard;
+}
+
+}  // namespace r4::test

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The lines of a recording.
+#include "host/recording/record_line.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <string>
+
+namespace r4 {
+namespace {
+
+const Time sample{1795468293404765};
+
+std::string line_of(const Record& record) {
+  std::string line;
+  write_record(line, record);
+  EXPECT_EQ(line.back(), '\n');
+  line.pop_back();
+  return line;
+}
+
+TEST(RecordLine, IsTimeWireDirectionAndTheDatagramAsItStands) {
+  EXPECT_EQ(line_of({sample, 1, RecordKind::from_board, "AIN24:24.28;PNum:1;T:2;^0xf07cfd9a^"}),
+            "1795468293.404765 1< AIN24:24.28;PNum:1;T:2;^0xf07cfd9a^");
+  EXPECT_EQ(line_of({Time{5}, 12, RecordKind::to_board, ""}), "0.000005 12> ");
+  EXPECT_EQ(line_of({sample, 0, RecordKind::event, "end"}), "1795468293.404765 0! end");
+  EXPECT_EQ(record_time_text(sample), "2026-11-23T21:11:33.404765Z");
+}
+
+TEST(RecordLine, OfAStateHasTwoHundredBytesAtMost) {
+  // With what a host in control asks for besides the paper's fields, after a day.
+  const std::string state =
+      "AIN24:24.56;AIN12:12.15;AIN5:5.11;AINDMH:12.16;DMHSTA:1;AINSTEER:0.95;DHB1A:4095,1;"
+      "OSMC1:358,1;STEP1POS:-100;SERVO1POS:2000;CMD:2541659426;PNum:8640000;T:86400000;^"
+      "0x36f0e204^";
+  EXPECT_LE(line_of({sample, 1, RecordKind::from_board, state}).size() + 1, 200);
+}
+
+RC_GTEST_PROP(RecordLine, GivesAnyBytesBack, (const std::string& bytes, std::uint16_t wire)) {
+  const auto kind =
+      *rc::gen::element(RecordKind::from_board, RecordKind::to_board, RecordKind::event);
+  const Time time{*rc::gen::inRange<std::int64_t>(0, 253402300799999999)};
+  const std::string line = line_of({time, wire, kind, bytes});
+  for (const char c : line) RC_ASSERT(c >= ' ' && c <= '~');
+  RecordLine read;
+  RC_ASSERT(read_record_line(line, read));
+  RC_ASSERT(read.kind == LineKind::record);
+  RC_ASSERT(read.record.time == time);
+  RC_ASSERT(read.record.wire == wire);
+  RC_ASSERT(read.record.kind == kind);
+  RC_ASSERT(read.record.bytes == bytes);
+}
+
+TEST(RecordLine, GivesEveryByteBackInTheLongestRecord) {
+  std::string bytes;
+  for (std::size_t i = 0; i < max_record_bytes; ++i) bytes += static_cast<char>(i * 7);
+  const std::string line = line_of({sample, 65535, RecordKind::from_board, bytes + "more"});
+  EXPECT_LE(line.size(), max_record_line);
+  RecordLine read;
+  ASSERT_TRUE(read_record_line(line, read));
+  EXPECT_EQ(read.record.bytes, bytes) << "what is longer is cut";
+}
+
+TEST(RecordLine, TellsWhatIsNoLineOfARecording) {
+  for (const char* const line : {
+           "x",
+           "1795468293.404765",
+           "1795468293.404765 ",
+           "1795468293.404765 1 x",
+           "1795468293.404765 < x",
+           "1795468293.404765 1? x",
+           "1795468293.404765 65536< x",
+           "1795468293.40476 1< x",
+           "1795468293.4047650 1< x",
+           "-1.000000 1< x",
+           ".000000 1< x",
+           "253402300800.000000 1< x",
+           "1795468293.40476x 1< x",
+           "1795468293.404765 1< a\\",
+           "1795468293.404765 1< \\x1",
+           "1795468293.404765 1< \\x1G",
+           "1795468293.404765 1< \\xAB",
+           "1795468293.404765 1< \x80",
+           "# r4log",
+           "# r4log x",
+           "# r4log 99999999999 by r4",
+           "# wire 0 udp://x",
+           "# wire 65536 udp://x",
+           "# wire x",
+       }) {
+    RecordLine read;
+    const bool good = read_record_line(line, read);
+    EXPECT_TRUE(!good || read.kind == LineKind::comment) << line;
+    if (!good) {
+      EXPECT_STRNE(read.problem, "") << line;
+    }
+  }
+}
+
+TEST(RecordLine, OfAWireHasItsUrlAndTheBoardsName) {
+  for (const std::string& name :
+       {std::string(), std::string("left-arm"), std::string("a b\n\xff")}) {
+    std::string text;
+    write_wire(text, {7, "udp:?id=a b", name});
+    text.pop_back();
+    EXPECT_EQ(text.find('\n'), std::string::npos);
+    RecordLine read;
+    ASSERT_TRUE(read_record_line(text, read)) << text;
+    EXPECT_EQ(read.kind, LineKind::wire);
+    EXPECT_EQ(read.wire.number, 7);
+    EXPECT_EQ(read.wire.url, "udp:?id=a b");
+    EXPECT_EQ(read.wire.name, name);
+  }
+}
+
+TEST(RecordLine, OfALaterVersionSaysWhichItIs) {
+  RecordLine read;
+  ASSERT_TRUE(read_record_line("# r4log 2 by r4 9.0.0", read));
+  EXPECT_EQ(read.kind, LineKind::header);
+  EXPECT_EQ(read.version, 2);
+}
+
+}  // namespace
+}  // namespace r4

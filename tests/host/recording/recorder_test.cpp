@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A board's link is recorded as it runs, and runs on whatever becomes of the recording.
+#include "host/recording/recorder.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <mutex>
+#include <optional>
+#include <regex>
+#include <string>
+
+#include "heard.hpp"
+#include "host/recording/recording_tap.hpp"
+#include "r4link/board.hpp"
+#include "tests/bench/allocations.hpp"
+#include "tests/support/at_will.hpp"
+#include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/problems.hpp"
+
+namespace r4::test {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+
+struct RecordingOfABoard : testing::Test {
+  RecordingOfABoard() { fs::create_directory(folder); }
+  ~RecordingOfABoard() override { fs::remove_all(folder); }
+  std::string path(const std::string& name = "a.r4log") const { return (folder / name).string(); }
+  Heard heard(const std::string& name = "a.r4log") const {
+    std::ifstream file(path(name), std::ios::binary);
+    return heard_in(std::string{std::istreambuf_iterator<char>(file), {}});
+  }
+  const fs::path folder =
+      fs::path(testing::TempDir()) / ("r4-recorder-" + std::to_string(::getpid()));
+};
+
+bool has(const Heard& heard, const std::string& pattern) {
+  return std::regex_search(heard.records, std::regex(pattern));
+}
+
+TEST_F(RecordingOfABoard, HasBothDirectionsAndWhatHappened) {
+  {
+    Board board("sim:", at_will());
+    board.record(path());
+    board.wait_active();
+    board.osmc(1).set(358, Direction::forward);
+    board.stop();
+    board.identify();
+    board.close();
+  }
+  const Heard all = heard();
+  EXPECT_TRUE(all.damage.empty());
+  ASSERT_FALSE(all.wires.empty());
+  EXPECT_EQ(all.wires.front().number, 1);
+  EXPECT_TRUE(contains(all.wires.front().url, "sim:"));
+  EXPECT_EQ(all.wires.back().name, "sim-1");
+  for (const char* const line :
+       {" 1! up sim:", " 1> H:ROS2-R4;", " 1< AIN24:", " 1> O:358,1,1;", " 1! link active",
+        " 1> E:STOP;", " 1! link safe stop", " 1< I:R4,", " 1> E:LEAVE;", " 0! end"}) {
+    EXPECT_TRUE(has(all, line)) << line;
+  }
+}
+
+TEST_F(RecordingOfABoard, OfSeveralIsOneFileWithAWireEach) {
+  Recording recording(path("two.r4log.zst"));
+  {
+    Board left("sim:?node=1", at_will());
+    Board right("sim:?node=2", at_will());
+    left.record(recording);
+    right.record(recording);
+    left.wait_active();
+    right.wait_active();
+    left.next_state();
+    right.next_state();
+  }
+  recording.close();
+  EXPECT_FALSE(recording.problem());
+  const Heard all = heard("two.r4log.zst");
+  EXPECT_TRUE(all.damage.empty());
+  EXPECT_EQ(static_cast<std::uint64_t>(all.count), recording.records() + 1) << "and its end";
+  EXPECT_TRUE(has(all, " 1< AIN24:") && has(all, " 2< AIN24:"));
+}
+
+TEST_F(RecordingOfABoard, ThatTheDiskEndsIsToldAndTheLinkGoesOn) {
+  std::mutex mutex;
+  std::condition_variable told;
+  std::optional<Problem> problem;
+  Board board("sim:", at_will());
+  const ScopedSubscription events = board.on_event([&](const CarrierEvent& event) {
+    const std::lock_guard lock(mutex);
+    if (event.kind == CarrierEvent::Kind::warning) problem = event.problem;
+    told.notify_all();
+  });
+  board.wait_active();
+  rlimit before{};
+  ::getrlimit(RLIMIT_FSIZE, &before);
+  rlimit limit = before;
+  limit.rlim_cur = 5000;
+  ::setrlimit(RLIMIT_FSIZE,
+              &limit);  // SIGXFSZ, which would end this process, is blocked where it is written
+  board.record(path());
+  {
+    std::unique_lock lock(mutex);
+    EXPECT_TRUE(told.wait_for(lock, 10s, [&] { return problem.has_value(); }));
+  }
+  ::setrlimit(RLIMIT_FSIZE, &before);
+  ASSERT_TRUE(problem);
+  EXPECT_EQ(problem->kind, ErrorKind::open);
+  EXPECT_EQ(problem->thing, path());
+  EXPECT_TRUE(contains(problem->fix, "--keep"));
+  board.osmc(1).set(358, Direction::forward);
+  EXPECT_TRUE(heard().damage.empty());
+  board.record(path("next.r4log"));
+  board.next_state();
+  board.close();
+  EXPECT_TRUE(has(heard("next.r4log"), " 1< AIN24:"));
+}
+
+TEST_F(RecordingOfABoard, ThatCannotBeOpenedIsAnErrorAtTheCall) {
+  Board board("sim:", at_will());
+  EXPECT_EQ(problem_of([&] { board.record(path("no/where")); }).kind, ErrorKind::open);
+  board.wait_active();
+}
+
+TEST_F(RecordingOfABoard, MayBeGoneBeforeTheBoard) {
+  Board board("sim:", at_will());
+  {
+    Recording recording(path());
+    board.record(recording);
+    board.wait_active();
+  }
+  board.next_state();
+  EXPECT_TRUE(has(heard(), " 0! end"));
+}
+
+TEST_F(RecordingOfABoard, HoldsDamagedDatagramsByteForByte) {
+  const std::string damaged("\x00\xff\n\r AIN24:\\x00;^0x0^", 20);
+  {
+    const auto recorder = std::make_shared<Recorder>(path(), RecordingOptions{});
+    RecordingTap tap;
+    tap.attach(recorder, "sim:");
+    tap.on_received(damaged);
+  }
+  const Heard all = heard();
+  std::string line;
+  write_record(line, {Time{0}, 1, RecordKind::from_board, damaged});
+  EXPECT_NE(all.records.find(line.substr(line.find(' '))), std::string::npos) << all.records;
+}
+
+TEST_F(RecordingOfABoard, TakesADatagramWithoutMemoryAndTellsWhatItHadNoRoomFor) {
+  Recorder recorder(path(), {});
+  const std::uint16_t wire = recorder.add_wire("sim:");
+  const std::string datagram(1000, 'x');
+  const std::uint64_t before = bench::allocations_of_this_thread();
+  // Sooner than any disk takes them.
+  for (int i = 0; i < 50'000; ++i) recorder.record(wire, RecordKind::from_board, datagram);
+  EXPECT_EQ(bench::allocations_of_this_thread(), before);
+  recorder.close();
+  const Heard all = heard();
+  EXPECT_TRUE(all.damage.empty());
+  std::uint64_t dropped = 0;
+  for (const std::string& event : all.events) {
+    if (event.starts_with("dropped ")) dropped += std::stoull(event.substr(8));
+  }
+  EXPECT_EQ(dropped, recorder.dropped());
+  EXPECT_EQ(recorder.records() + dropped, 50'000);
+}
+
+}  // namespace
+}  // namespace r4::test

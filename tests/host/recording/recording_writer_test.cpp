@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Records become files, within the limits that were asked for. Time is that of the records.
+#include "host/recording/recording_writer.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include "heard.hpp"
+#include "tests/support/problems.hpp"
+
+namespace r4::test {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+
+struct RecordingWriterTest : testing::Test {
+  RecordingWriterTest() { fs::create_directory(folder); }
+  ~RecordingWriterTest() override { fs::remove_all(folder); }
+
+  std::string path(const std::string& name) const { return (folder / name).string(); }
+  std::string content(const std::string& name) const {
+    std::ifstream file(path(name), std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  std::vector<std::string> names() const {
+    std::vector<std::string> found;
+    for (const auto& each : fs::directory_iterator(folder)) {
+      found.push_back(each.path().filename().string());
+    }
+    std::sort(found.begin(), found.end());
+    return found;
+  }
+  std::uint64_t size_of_all() const {
+    std::uint64_t sum = 0;
+    for (const std::string& name : names()) sum += fs::file_size(path(name));
+    return sum;
+  }
+  // A state, 10 ms after the one before.
+  void append(RecordingWriter& writer) {
+    const std::string bytes = "AIN24:24.28;OSMC1:" + std::to_string(number * 7919 % 4096) +
+                              ",1;PNum:" + std::to_string(number) + ";T:1;^0x0^";
+    const Record record{Time{1795468293000000} + number * Time{10ms}, 1, RecordKind::from_board,
+                        bytes};
+    ++number;
+    writer.append(record);
+    write_record(all, record);
+  }
+
+  const fs::path folder = fs::path(testing::TempDir()) / ("r4-rec-" + std::to_string(::getpid()));
+  int number = 0;
+  std::string all;  // the lines of what was appended
+};
+
+TEST_F(RecordingWriterTest, WhatWasFlushedIsInTheFile) {
+  for (const char* const name : {"a.r4log", "a.r4log.zst"}) {
+    all.clear();
+    RecordingWriter writer(path(name), {});
+    writer.declare({1, "udp://robot", ""});
+    for (int i = 0; i < 10; ++i) {
+      append(writer);
+      writer.flush();
+      const Heard heard = heard_in(content(name));
+      EXPECT_EQ(heard.records, all) << name;
+      EXPECT_EQ(heard.wires.size(), 1);
+    }
+    writer.close();
+    EXPECT_TRUE(heard_in(content(name)).damage.empty());
+  }
+}
+
+TEST_F(RecordingWriterTest, GoesOnWhereARecordingIs) {
+  for (const char* const name : {"a.r4log", "a.r4log.zst"}) {
+    all.clear();
+    for (int run = 0; run < 3; ++run) {
+      RecordingWriter writer(path(name), {});
+      append(writer);
+      writer.close();
+    }
+    const Heard heard = heard_in(content(name));
+    EXPECT_EQ(heard.records, all) << name;
+    EXPECT_EQ(heard.headers, 3);
+    EXPECT_TRUE(heard.damage.empty());
+  }
+}
+
+TEST_F(RecordingWriterTest, GoesOnBehindATornLine) {
+  {
+    RecordingWriter writer(path("a.r4log"), {});
+    append(writer);
+    writer.close();
+  }
+  std::ofstream(path("a.r4log"), std::ios::app) << "1795468293.4";
+  RecordingWriter writer(path("a.r4log"), {});
+  append(writer);
+  writer.close();
+  const Heard heard = heard_in(content("a.r4log"));
+  EXPECT_EQ(heard.records, all);
+  ASSERT_EQ(heard.damage.size(), 1);
+  EXPECT_EQ(heard.damage[0].kind, RecordingDamage::Kind::line);
+}
+
+TEST_F(RecordingWriterTest, WritesOverNothingElse) {
+  for (const char* const name : {"notes.txt", "a.r4log.zst"}) {
+    std::ofstream(path(name)) << "something else";
+    const Problem problem = problem_of([&] { RecordingWriter(path(name), {}); });
+    EXPECT_EQ(problem.kind, ErrorKind::data);
+    EXPECT_EQ(problem.thing, path(name));
+    EXPECT_EQ(content(name), "something else");
+  }
+  const RecordingWriter first(path("a.r4log"), {});
+  EXPECT_TRUE(contains(problem_of([&] { RecordingWriter(path("a.r4log"), {}); }).reason,
+                       "another program records into it"));
+  EXPECT_EQ(problem_of([&] { RecordingWriter(folder.string(), {}); }).reason, "is a directory");
+  ASSERT_EQ(::mkfifo(path("fifo").c_str(), 0600), 0);
+  EXPECT_EQ(problem_of([&] { RecordingWriter(path("fifo"), {}); }).reason, "is no file");
+  EXPECT_EQ(problem_of([&] { RecordingWriter(path("no/where.r4log"), {}); }).kind, ErrorKind::open);
+}
+
+TEST_F(RecordingWriterTest, BeginsANewFileAfterASize) {
+  for (const char* const ending : {".r4log", ".r4log.zst"}) {
+    RecordingOptions options;
+    options.rotate_bytes = 20'000;
+    RecordingWriter writer(path("drive") + ending, options);
+    writer.declare({1, "udp://robot", "left"});
+    for (int i = 0; i < 3000; ++i) {
+      append(writer);
+      if (i % 50 == 0) writer.flush();
+    }
+    writer.close();
+  }
+  std::string read, read_zst;
+  for (const std::string& name : names()) {
+    EXPECT_LE(fs::file_size(path(name)), 30'000) << name;
+    const Heard heard = heard_in(content(name));
+    EXPECT_EQ(heard.headers, 1) << "each is whole in itself: " << name;
+    EXPECT_EQ(heard.wires.back().name, "left") << name;
+    (name.ends_with(".zst") ? read_zst : read) += heard.records;
+  }
+  EXPECT_EQ(names().front(), "drive-00001.r4log");
+  EXPECT_GE(names().size(), 10);
+  EXPECT_EQ(read + read_zst, all);
+}
+
+TEST_F(RecordingWriterTest, BeginsANewFileAfterATime) {
+  RecordingOptions options;
+  options.rotate_after = 2s;
+  RecordingWriter writer(path("drive.r4log"), options);
+  for (int i = 0; i < 1000; ++i) append(writer);
+  writer.close();
+  ASSERT_EQ(names().size(), 5);
+  for (const std::string& name : names()) EXPECT_EQ(heard_in(content(name)).count, 200) << name;
+}
+
+TEST_F(RecordingWriterTest, KeepsWhatItMayAndNoMore) {
+  std::ofstream(path("drive-notes.r4log")) << "of somebody else";
+  RecordingOptions options;
+  options.keep_bytes = 1 << 20;
+  for (int run = 0; run < 2; ++run) {
+    RecordingWriter writer(path("drive.r4log"), options);
+    for (int i = 0; i < 20'000; ++i) {
+      append(writer);
+      if (i % 1000 == 0) {
+        writer.flush();
+        ASSERT_LE(size_of_all(), options.keep_bytes + 70'000);
+      }
+    }
+    writer.close();
+  }
+  EXPECT_GE(size_of_all(), options.keep_bytes / 2);
+  std::string read;
+  for (const std::string& name : names()) {
+    if (name != "drive-notes.r4log") read += heard_in(content(name)).records;
+  }
+  EXPECT_TRUE(all.ends_with(read)) << "the newest is kept";
+  EXPECT_EQ(content("drive-notes.r4log"), "of somebody else");
+}
+
+TEST_F(RecordingWriterTest, RefusesLimitsThatCannotBeKept) {
+  RecordingOptions options;
+  options.keep_bytes = 1000;
+  EXPECT_EQ(problem_of([&] { RecordingWriter(path("a"), options); }).kind, ErrorKind::usage);
+  options.keep_bytes = 2'000'000;
+  options.rotate_bytes = 1'000'000;
+  EXPECT_EQ(problem_of([&] { RecordingWriter(path("a"), options); }).kind, ErrorKind::usage);
+  EXPECT_TRUE(names().empty());
+}
+
+// The process may write no more than so many bytes into a file.
+struct FileLimit {
+  explicit FileLimit(rlim_t bytes) {
+    ::getrlimit(RLIMIT_FSIZE, &before);
+    rlimit limit = before;
+    limit.rlim_cur = bytes;
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    handler = std::signal(SIGXFSZ, SIG_IGN);
+  }
+  ~FileLimit() {
+    ::setrlimit(RLIMIT_FSIZE, &before);
+    std::signal(SIGXFSZ, handler);
+  }
+  rlimit before{};
+  void (*handler)(int);
+};
+
+TEST_F(RecordingWriterTest, AFullDiskIsAnErrorAndWhatIsWrittenStaysWhole) {
+  RecordingWriter writer(path("a.r4log"), {});
+  std::string flushed;
+  const Problem problem = problem_of([&] {
+    const FileLimit limit(10'000);
+    for (int i = 0; i < 1000; ++i) {
+      append(writer);
+      writer.flush();
+      flushed = all;
+    }
+  });
+  EXPECT_EQ(problem.kind, ErrorKind::open);
+  EXPECT_EQ(problem.thing, path("a.r4log"));
+  EXPECT_TRUE(contains(problem.reason, "the recording has ended"));
+  EXPECT_TRUE(contains(problem.fix, "--keep"));
+  const Heard heard = heard_in(content("a.r4log"));
+  EXPECT_EQ(heard.records, flushed);
+  EXPECT_TRUE(heard.damage.empty());
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A recording is a transport.
+#include <gtest/gtest.h>
+
+#include <asio/io_context.hpp>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "host/recording/record_line.hpp"
+#include "host/standard_registry.hpp"
+#include "r4link/board.hpp"
+#include "tests/support/at_will.hpp"
+#include "tests/support/problems.hpp"
+#include "tests/transports/recorder.hpp"
+#include "transports/registry.hpp"
+
+namespace r4::test {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+
+struct Replay : testing::Test {
+  Replay() { write_record_header(text); }
+  ~Replay() override { fs::remove(path); }
+  void add(Time at, const std::string& bytes, RecordKind kind = RecordKind::from_board,
+           std::uint16_t wire = 1) {
+    write_record(text, {Time{1795468293s} + at, wire, kind, bytes});
+  }
+  // All of it, as fast as that.
+  void play(const std::string& options) {
+    std::ofstream(path) << text;
+    const auto carrier = standard_registry().make(io, "replay:" + path + options, Role::host);
+    carrier->open(heard);
+    io.run_for(10s);
+    EXPECT_FALSE(carrier->up());
+    counters = carrier->counters();
+  }
+
+  const std::string path = testing::TempDir() + "r4-replay-" + std::to_string(::getpid());
+  std::string text;
+  asio::io_context io;
+  Recorder heard;
+  CarrierCounters counters;
+};
+
+TEST_F(Replay, GivesWhatTheBoardSaidAndWhatHappenedToTheTransport) {
+  const std::string damaged("\x00\xff x", 4);
+  add(0ms, "up udp://x", RecordKind::event);
+  add(1ms, "one");
+  add(2ms, "ours", RecordKind::to_board);
+  add(3ms, "of another", RecordKind::from_board, 2);
+  add(4ms, damaged);
+  add(5ms, "down udp://x: unplugged", RecordKind::event);
+  add(6ms, "up udp://x", RecordKind::event);
+  add(7ms, "link active", RecordKind::event);
+  add(8ms, "two");
+  play("");
+  ASSERT_EQ(heard.datagrams.size(), 3);
+  EXPECT_EQ(heard.datagrams[0].text, "one");
+  EXPECT_EQ(heard.datagrams[1].text, damaged);
+  EXPECT_EQ(heard.datagrams[2].text, "two");
+  EXPECT_EQ(counters.rx_datagrams, 3);
+  EXPECT_EQ(counters.ups, 2);
+  EXPECT_EQ(counters.downs, 2) << "and one at the end";
+  EXPECT_GE(heard.drained, 1);
+}
+
+TEST_F(Replay, KeepsThePaceThatIsAskedFor) {
+  for (int i = 0; i <= 10; ++i) add(i * 1s, std::to_string(i));
+  const auto began = std::chrono::steady_clock::now();
+  play("?speed=100");
+  const auto took = std::chrono::steady_clock::now() - began;
+  EXPECT_EQ(heard.datagrams.size(), 11);
+  EXPECT_GE(took, 99ms);
+  EXPECT_LE(took, 5s);
+}
+
+TEST_F(Replay, BeginsWhereItIsAskedToAndWithThatWire) {
+  for (int i = 0; i < 10; ++i)
+    add(i * 1s, std::to_string(i), RecordKind::from_board, i % 2 == 0 ? 1 : 2);
+  play("?speed=1000&from=4.5&wire=2");
+  ASSERT_EQ(heard.datagrams.size(), 3);
+  EXPECT_EQ(heard.datagrams[0].text, "5");
+}
+
+TEST_F(Replay, OfABoardIsThatBoardForAProgramThatWatches) {
+  {
+    Board board("sim:", at_will());
+    board.record(path);
+    board.wait_active();
+    board.osmc(1).set(358, Direction::forward);
+    for (int i = 0; i < 50; ++i) board.next_state();
+  }
+  BoardOptions options;
+  options.role = BoardRole::watch;
+  Board again("replay:" + path, options);
+  again.wait_active();
+  while (again.next_state().osmc[0].pwm != 358) {
+  }
+  EXPECT_EQ(again.statistics().packets.lost, 0);
+}
+
+TEST_F(Replay, RefusesWhatItCannotPlay) {
+  add(0ms, "one");
+  EXPECT_EQ(problem_of([&] { play("?wire=3"); }).reason, "nothing of that wire is there");
+  EXPECT_EQ(problem_of([&] { play("?speed=0"); }).kind, ErrorKind::usage);
+  EXPECT_EQ(problem_of([&] { play("?pace=2"); }).kind, ErrorKind::usage);
+  EXPECT_EQ(problem_of([&] { Board("replay:"); }).kind, ErrorKind::usage);
+  EXPECT_EQ(problem_of([&] { Board("replay:/no/where"); }).kind, ErrorKind::open);
+  text = "something else";
+  EXPECT_EQ(problem_of([&] { play(""); }).reason, "no recording");
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Recordings: r4 record beside a program that drives, killed, on a full disk; r4 info of what came of it."""
+import contextlib
+import re
+import resource
+import signal
+import subprocess
+import time
+
+import pytest
+
+from r4_process import ERROR, PATIENCE_S, Board, Running, driving, lasts, objects, run
+
+DATA_BAD, USAGE, REFUSED, OPEN, PERMISSION = 1, 2, 3, 4, 5
+
+
+@pytest.fixture(name='board')
+def a_board():
+    with Board('udp://127.0.0.1:0') as board:
+        yield board
+
+
+def text_of(path):
+    """What can be read of it."""
+    if path.suffix != '.zst':
+        return path.read_bytes().decode('ascii')
+    unpacked = subprocess.run(['zstd', '-dcq', path], capture_output=True, check=False).stdout
+    return unpacked.decode('ascii')
+
+
+def wait_for(path, pattern):
+    """Until a line of the recording has it."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not (path.exists() and re.search(pattern, text_of(path), re.MULTILINE)):
+        assert time.monotonic() < deadline, f'{pattern} is not in {path}'
+        lasts(0.02)
+
+
+@contextlib.contextmanager
+def record(*arguments, **options):
+    with Running('record', *map(str, arguments), **options) as recorder:
+        yield recorder
+
+
+def info(*paths):
+    """The objects of r4 info, and its exit code."""
+    told = run('info', '--json', *map(str, paths))
+    return objects(told.stdout), told.returncode
+
+
+def test_has_what_a_program_sends_by_the_wire_that_both_share(tmp_path):
+    path = tmp_path / 'drive.r4log'
+    with Board(f'pty:{tmp_path}/r4') as board, record(board.host_url, '-o', path) as recorder:
+        wait_for(path, r'^[0-9.]+ 1< AIN24')
+        with driving(board.host_url, 'O:358,1,1') as host:
+            wait_for(path, r'^[0-9.]+ 1> H:ROS2-R4')
+            wait_for(path, r'^[0-9.]+ 1> O:358,1,1')
+            host.end()
+        wait_for(path, r'OSMC1:0,.*SAFE:1;')
+        assert recorder.end() == 0, recorder.errors
+    (told,), code = info(path)
+    assert code == 0 and told['ended'] and told['wires'][0]['heartbeats'] > 0, told
+
+
+@pytest.mark.parametrize('name', ['drive.r4log', 'drive.r4log.zst'])
+def test_records_beside_a_program_that_drives(board, tmp_path, name):
+    path = tmp_path / name
+    with record(board.host_url, '-o', path) as recorder:
+        wait_for(path, r'^[0-9.]+ 1< AIN24')
+        with driving(board.host_url, 'O:358,1,1') as host:
+            wait_for(path, r'OSMC1:358,1;')
+            host.end()
+        wait_for(path, r'OSMC1:0,.*SAFE:1;')
+        assert recorder.end() == 0, recorder.errors
+    assert not [each for each in board.log if each.get('reason') == 'watchdog']
+    (told,), code = info(path)
+    assert code == 0 and told['ended'] and not told['damage'], told
+    wire = told['wires'][0]
+    assert wire['name'] == 'sim-1' and wire['url'].startswith('udp://127.0.0.1:')
+    assert wire['damaged'] == 0 and wire['lost'] == 0 and wire['states'] >= 10, wire
+    assert wire['safe']['link'] >= 1
+    assert wire['heartbeats'] == 0, 'who watches sends none'
+    lines = [line for line in text_of(path).splitlines() if ' 1< ' in line]
+    assert run('decode', stdin='\n'.join(line.split('< ', 1)[1] for line in lines)).returncode == 0
+    assert lines == sorted(lines, key=lambda line: float(line.split(' ')[0]))
+
+
+def test_a_recording_is_a_transport(board, tmp_path):
+    path = tmp_path / 'drive.r4log.zst'
+    with record(board.host_url, '-o', path) as recorder, driving(board.host_url, 'O:358,1,1'):
+        wait_for(path, 'OSMC1:358,1;')
+        assert recorder.end() == 0
+    recorded = re.findall(r' 1< (AIN24.*)$', text_of(path), re.MULTILINE)
+    decoded = objects(run('decode', stdin='\n'.join(recorded)).stdout)
+    shown = objects(run('monitor', f'replay:{path}?speed=2', '--json', '--count', str(len(recorded))).stdout)
+    states = [each for each in shown if each['type'] == 'state']
+    assert [(each['pnum'], each['fields']) for each in states] == \
+        [(each['pnum'], each['fields']) for each in decoded]
+    assert run('send', f'replay:{path}', 'O:1,1,1', '--timeout', '0.5').returncode == REFUSED
+
+
+def test_records_several_boards_into_one_file(tmp_path):
+    path = tmp_path / 'two.r4log'
+    with Board('udp://127.0.0.1:0') as left, Board(f'pty:{tmp_path}/r4') as right:
+        ended = run('record', left.host_url, right.host_url, '-o', str(path), '--for', '1')
+        assert ended.returncode == 0, ended.stderr
+        assert re.search(r'two.r4log: \d+ datagrams and events in 1\.\d s', ended.stdout)
+    (told,), code = info(path)
+    assert code == 0 and [wire['wire'] for wire in told['wires']] == [1, 2]
+    assert all(wire['states'] >= 10 for wire in told['wires']), told
+
+
+@pytest.mark.parametrize('name', ['drive.r4log', 'drive.r4log.zst'])
+def test_who_is_killed_has_lost_a_second_at_most(board, tmp_path, name):
+    path = tmp_path / name
+    with driving(board.host_url, 'O:358,1,1'):
+        for run_number in range(3):
+            with record(board.host_url, '-o', path) as recorder:
+                wait_for(path, r'OSMC1:358,1')
+                lasts(0.3 + 0.17 * run_number)
+                before = time.time()
+                recorder.signal(signal.SIGKILL)
+                recorder.wait()
+            newest = max(float(line.split(' ')[0]) for line in text_of(path).splitlines() if ' 1< ' in line)
+            print(f'{name}: {before - newest:.3f} s of it are missing')
+            assert before - newest <= 1.0
+            (told,), code = info(path)
+            assert not told['ended'] and told['records'] > 0
+            for each in told['damage']:
+                assert each['kind'] in ('torn', 'zstd'), told['damage']
+            assert code == (DATA_BAD if told['damage'] else 0)
+            if name == 'drive.r4log':
+                assert len(told['damage']) <= run_number + 1
+            if name.endswith('.zst'):
+                path.unlink()
+
+
+def test_a_full_disk_ends_the_recording_with_a_reason(board, tmp_path):
+    path = tmp_path / 'drive.r4log'
+    limit = (20_000, 20_000)
+    full = run('record', board.host_url, '-o', str(path), '--for', '20', timeout=15,
+               preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limit))
+    assert full.returncode == OPEN, full
+    assert ERROR.search(full.stderr) and 'the recording has ended: File too large' in full.stderr
+    (told,), code = info(path)
+    assert code == 0 and told['records'] >= 10 and not told['damage']
+    tiny = run('record', board.host_url, '-o', str(tmp_path / 'tiny'), '--for', '20',
+               preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10)))
+    assert tiny.returncode == OPEN, 'not ended by SIGXFSZ'
+
+
+def test_files_that_follow_one_another_are_whole_in_themselves(board, tmp_path):
+    with record(board.host_url, '-o', tmp_path / 'drive.r4log', '--rotate', '1s', '--rotate', '1M'):
+        wait_for(tmp_path / 'drive-00003.r4log', ' 1< AIN24')
+    told, _ = info(*sorted(tmp_path.glob('drive-*.r4log')))
+    assert len(told) >= 3 and all(each['wires'][0]['name'] == 'sim-1' for each in told[1:])
+    assert all(each['seconds'] <= 1.0 for each in told)
+
+
+def test_a_board_that_says_nothing_is_named(tmp_path):
+    silent = run('record', 'udp://127.0.0.1:9?listen=0', '-o', str(tmp_path / 'x.r4log'), '--for', '0.3')
+    assert silent.returncode == REFUSED and ERROR.search(silent.stderr), silent
+
+
+def test_damage_has_a_place_and_the_rest_is_read(tmp_path):
+    path = tmp_path / 'x.r4log'
+    good = '1795468293.404765 1< H:R4-ROS2;PNum:0;T:0;^0x1^\n'
+    path.write_text('# r4log 1 by r4\n' + good + '17954x\n' + good + good[:20])
+    result = run('info', str(path))
+    assert result.returncode == DATA_BAD
+    assert 'line 3, byte 64: it begins with no time' in result.stdout
+    assert 'line 5, byte 119: the last line is not whole' in result.stdout
+    assert info(path)[0][0]['records'] == 2
+
+
+def test_info_reads_a_pipe():
+    text = '# r4log 1 by r4\n1795468293.404765 1! up x\n'
+    result = run('info', '-', stdin=text)
+    assert result.returncode == 0 and '2026-11-23T21:11:33.404765Z' in result.stdout
+
+
+@pytest.mark.parametrize('make, code, message', [
+    (lambda path: path.write_bytes(b'\0' * 100_000), DATA_BAD, 'no recording'),
+    (lambda path: path.write_bytes(b''), DATA_BAD, 'no recording'),
+    (lambda path: path.write_text('# r4log 2 by r4 9.0\n'), DATA_BAD, 'a recording of a later version: # r4log 2'),
+    (lambda path: path.mkdir(), OPEN, 'Is a directory'),
+    (lambda path: None, OPEN, 'No such file'),
+])
+def test_info_says_what_is_no_recording(tmp_path, make, code, message):
+    make(tmp_path / 'x')
+    result = run('info', str(tmp_path / 'x'))
+    assert result.returncode == code and ERROR.search(result.stderr) and message in result.stderr, result
+
+
+@pytest.mark.parametrize('arguments, message', [
+    (['sim:'], '--output: is missing'),
+    (['can://can0', '-o', 'x'], 'which boards of this bus'),
+    (['sim:', '-o', 'x', '--rotate', '5'], 'is neither a size nor a time'),
+    (['sim:', '-o', 'x', '--keep', '1K'], 'is too little'),
+    (['sim:', '-o', 'x', '--keep', '2M', '--rotate', '1M'], 'the files are too large for it'),
+    (['sim:', '-o', 'x', '--for', '0'], 'is too short for anything'),
+])
+def test_wrong_uses_are_refused_before_anything_is_opened(tmp_path, arguments, message):
+    result = run('record', *arguments, cwd=tmp_path)
+    assert result.returncode == USAGE and message in result.stderr and ERROR.search(result.stderr), result
+    assert not list(tmp_path.iterdir())
+
+
+def test_nothing_else_is_written_over(tmp_path):
+    (tmp_path / 'notes').write_text('something else')
+    for path, code in ((tmp_path / 'notes', DATA_BAD), (tmp_path, OPEN), ('/dev/null', OPEN)):
+        assert run('record', 'sim:', '-o', str(path), '--for', '1').returncode == code
+    assert (tmp_path / 'notes').read_text() == 'something else'

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Programs that share a wire: what one user runs in several terminals, on the same URL."""
+import re
+import signal
+import socket
+
+import pytest
+
+from r4_process import Board, driving, is_state, run, watch
+
+
+@pytest.fixture(name='board', params=['pty', 'udp'])
+def on_a_wire(request, tmp_path):
+    url = f'pty:{tmp_path}/r4' if request.param == 'pty' else 'udp://127.0.0.1:0'
+    with Board(url) as board:
+        if request.param == 'udp':
+            # One port for all, as the port of hosts is.
+            board.host_url = re.sub(r'\?listen=0$', f'?listen={free_port()}', board.host_url)
+        yield board
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(('0.0.0.0', 0))
+        return probe.getsockname()[1]
+
+
+def drives(pwm):
+    return lambda each: is_state(each) and each['fields'].get('OSMC1') == [pwm, 1]
+
+
+def is_safe(each):
+    return is_state(each) and each['fields'].get('SAFE') == 1
+
+
+def test_monitors_and_sends_in_any_order(board):
+    with watch(board.host_url) as early:
+        early.next(is_safe)
+        for pwm in (100, 200, 300):
+            sent = run('send', board.host_url, 'R:1,On', f'O:{pwm},1,1')
+            assert sent.returncode == 0, sent.stderr
+            early.next(drives(pwm))
+        with driving(board.host_url, 'O:358,1,1') as host, watch(board.host_url) as late:
+            late.next(drives(358))
+            early.next(drives(358))
+            host.end()
+            late.next(is_safe)
+        early.next(is_safe)
+        early.skip_past()
+        early.next(is_state)
+
+
+def test_a_third_is_refused_with_the_name_and_pid_of_who_controls(board):
+    with watch(board.host_url), driving(board.host_url, 'O:358,1,1') as host:
+        for command in (['send', board.host_url, 'O:1,1,1'], ['monitor', board.host_url, '--control']):
+            refused = run(*command)
+            assert refused.returncode == 3, refused
+            assert f'controlled by r4 (pid {host.process.pid})' in refused.stderr + refused.stdout
+        board.never('SAFE', 1)
+
+
+def test_a_stop_from_the_second_terminal(board):
+    with watch(board.host_url) as watcher, driving(board.host_url, 'O:358,1,1'):
+        watcher.next(drives(358))
+        assert run('stop', board.host_url).returncode == 0
+        board.state('SAFE', 'stop')
+        watcher.next(lambda each: is_state(each) and each['fields'].get('SAFE') == 2)
+
+
+def test_of_five_that_watch_one_sleeps_one_dies_and_nobody_else_notices(board):
+    watchers = [watch(board.host_url) for _ in range(5)]
+    try:
+        for each in watchers:
+            each.next(is_state)
+        with driving(board.host_url, 'O:358,1,1') as host:
+            for each in watchers:
+                each.next(drives(358))
+            watchers[0].signal(signal.SIGSTOP)
+            watchers[1].signal(signal.SIGKILL)
+            board.never('SAFE', 3)
+            for each in watchers[2:]:
+                each.skip_past()
+                states = [each.next(is_state) for _ in range(50)]
+                assert states[-1]['pnum'] - states[0]['pnum'] < 100
+            watchers[0].signal(signal.SIGCONT)
+            watchers[0].skip_past()
+            watchers[0].next(drives(358))
+            killed = host.signal(signal.SIGKILL)
+            assert board.state('SAFE', 'link')['came'] - killed < 1.1
+            for each in watchers[2:]:
+                # The next state, of a board that nobody controls: another has taken the wire over.
+                each.next(is_safe)
+    finally:
+        for each in watchers:
+            each.__exit__()
+
+
+def test_a_driving_program_that_is_stopped_is_named(board):
+    with driving(board.host_url, 'O:358,1,1') as host:
+        host.signal(signal.SIGSTOP)
+        try:
+            refused = run('send', board.host_url, 'O:1,1,1')
+            assert refused.returncode != 0
+            assert f'(pid {host.process.pid}) does not answer' in refused.stderr, refused
+        finally:
+            host.signal(signal.SIGCONT)

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What `r4 info` tells of a recording.
+#include "tools/r4/recording/recording_summary.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <string>
+
+#include "host/recording/record_line.hpp"
+#include "protocol/datagram/datagram_writer.hpp"
+#include "tests/support/datagrams.hpp"
+#include "tests/support/problems.hpp"
+
+namespace r4::tool {
+namespace {
+
+using namespace std::chrono_literals;
+
+struct RecordingSummaryTest : testing::Test {
+  RecordingSummaryTest() {
+    summary.on_header();
+    summary.on_wire({1, "udp://robot", "left"});
+  }
+  void add(RecordKind kind, const std::string& bytes, std::uint16_t wire = 1) {
+    summary.on_record({now, wire, kind, bytes});
+  }
+  // From the board, 10 ms after the one before.
+  void hear(const std::string& fields) {
+    now += 10ms;
+    add(RecordKind::from_board,
+        test::with_crc(fields + ";PNum:" + std::to_string(++pnum) + ";T:5;"));
+  }
+  Json wire() const { return summary.json("x")["wires"][0]; }
+
+  RecordingSummary summary;
+  Time now{std::chrono::hours{24 * 365 * 50}};
+  std::uint32_t pnum = 100;
+};
+
+TEST_F(RecordingSummaryTest, HasTheRateOfStatesAndWhatWasLostAndDamaged) {
+  for (int i = 0; i < 101; ++i) hear("AIN24:24.28");
+  pnum += 3;
+  hear("AIN24:24.28");
+  add(RecordKind::from_board, "AIN24:24.28;PNum:1;T:5;^0x1^");
+  EXPECT_EQ(wire()["states"], 102);
+  EXPECT_NEAR(wire()["states_hz"].get<double>(), 100, 0.01);
+  EXPECT_EQ(wire()["lost"], 3);
+  EXPECT_EQ(wire()["damaged"], 1);
+}
+
+TEST_F(RecordingSummaryTest, HasTheSafeStatesAndHowLongTheyWere) {
+  hear("AIN24:24.28");
+  for (int i = 0; i < 51; ++i) hear("AIN24:24.28;SAFE:2");
+  hear("AIN24:24.28");
+  hear("AIN24:24.28;SAFE:1");
+  hear("AIN24:24.28;SAFE:0");
+  EXPECT_EQ(wire()["safe"]["stop"], 1);
+  EXPECT_EQ(wire()["safe"]["link"], 1);
+  EXPECT_NEAR(wire()["safe_s"].get<double>(), 0.52, 0.001);
+  EXPECT_TRUE(test::contains(summary.text("x"), "safe for 0.5 s, link (1 times), stop (1 times)"));
+}
+
+TEST_F(RecordingSummaryTest, HasTheGaps) {
+  hear("AIN24:24.28");
+  now += 1s;
+  hear("AIN24:24.28");
+  now += 3s;
+  hear("AIN24:24.28");
+  EXPECT_EQ(wire()["gaps"], 2);
+  EXPECT_NEAR(wire()["longest_gap_s"].get<double>(), 3.01, 0.001);
+}
+
+TEST_F(RecordingSummaryTest, HasWhatWasSentToTheBoard) {
+  add(RecordKind::to_board, test::with_crc("H:ROS2-R4;PNum:1;T:5;"));
+  add(RecordKind::to_board, test::with_crc("E:STOP;PNum:2;T:5;"));
+  EXPECT_EQ(wire()["sent"], 2);
+  EXPECT_EQ(wire()["heartbeats"], 1);
+  EXPECT_EQ(wire()["stops"], 1);
+}
+
+TEST_F(RecordingSummaryTest, CountsARebootAsNoLoss) {
+  hear("AIN24:24.28");
+  add(RecordKind::from_board, test::with_crc("H:R4-ROS2;PNum:0;T:0;"));
+  pnum = 5000;
+  hear("AIN24:24.28");
+  EXPECT_EQ(wire()["lost"], 0);
+}
+
+TEST_F(RecordingSummaryTest, SaysWhetherItWasEndedAndWhatTheDiskWasTooSlowFor) {
+  EXPECT_FALSE(summary.json("x")["ended"]);
+  add(RecordKind::event, "dropped 17", 0);
+  add(RecordKind::event, "end", 0);
+  EXPECT_TRUE(summary.json("x")["ended"]);
+  EXPECT_EQ(summary.json("x")["dropped"], 17);
+  add(RecordKind::event, "down udp://robot: gone", 1);
+  EXPECT_EQ(wire()["downs"], 1);
+}
+
+TEST_F(RecordingSummaryTest, TellsTwentyPlacesOfDamageAndCountsTheRest) {
+  for (std::uint64_t i = 1; i <= 1000; ++i) {
+    summary.on_damage({RecordingDamage::Kind::line, i, 10 * i, "it begins with no time"});
+  }
+  EXPECT_TRUE(summary.damaged());
+  EXPECT_EQ(summary.json("x")["damage"].size(), 20);
+  EXPECT_EQ(summary.json("x")["damage_count"], 1000);
+  EXPECT_TRUE(test::contains(summary.text("x"), "line 20, byte 200: it begins with no time"));
+  EXPECT_TRUE(test::contains(summary.text("x"), "and 980 more"));
+}
+
+}  // namespace
+}  // namespace r4::tool

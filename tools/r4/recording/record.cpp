@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 record: watches boards, and writes down what is said.
+#include <fmt/format.h>
+
+#include <asio/io_context.hpp>
+#include <asio/signal_set.hpp>
+#include <asio/steady_timer.hpp>
+#include <chrono>
+#include <csignal>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "../shell/key_file.hpp"
+#include "../shell/options.hpp"
+#include "../shell/subcommands.hpp"
+#include "limits.hpp"
+#include "r4link/async_board.hpp"
+#include "r4link/error.hpp"
+#include "r4link/recording.hpp"
+#include "transports/url.hpp"
+
+namespace r4::tool {
+namespace {
+
+struct Options {
+  std::vector<std::string> urls;
+  std::string file;
+  std::vector<std::string> rotate;
+  std::string keep;
+  std::optional<Milliseconds> duration;
+  std::string fields;
+  std::string key;
+};
+
+RecordingOptions limits_of(const Options& options) {
+  RecordingOptions limits;
+  for (const std::string& each : options.rotate) take_rotation(each, limits);
+  if (!options.keep.empty()) limits.keep_bytes = read_size("--keep", options.keep);
+  return limits;
+}
+
+BoardOptions board_options(const Options& options) {
+  BoardOptions board_options = with_key(options.key);
+  board_options.role = BoardRole::watch;
+  board_options.session.arming = Arming::off;  // it drives nothing
+  if (!options.fields.empty()) board_options.session.fields = options.fields;
+  return board_options;
+}
+
+void require_boards(const std::vector<std::string>& urls) {
+  for (const std::string& text : urls) {
+    const Url url = Url::parse(text);
+    if (url.scheme() == "can" && text.find('?') == std::string::npos) {
+      throw Error(ErrorKind::usage, text, "it is not said which boards of this bus",
+                  fmt::format("name each of them: {0}?node=1 {0}?node=2", text));
+    }
+  }
+}
+
+class Recorders {
+ public:
+  explicit Recorders(const Options& options) : signals_(io_), end_(io_) {
+    require_boards(options.urls);
+    for (const std::string& url : options.urls) {
+      boards_.push_back(std::make_unique<AsyncBoard>(io_, url, board_options(options)));
+    }
+    recording_.emplace(options.file, limits_of(options));
+  }
+
+  int run(const Options& options) {
+    for (const auto& board : boards_) {
+      board->on_event([this](const CarrierEvent&) {
+        if (recording_->problem()) io_.stop();
+      });
+      board->record(*recording_);
+      board->open();
+    }
+    for (const int number : {SIGINT, SIGTERM, SIGHUP}) signals_.add(number);
+    signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
+    if (options.duration) {
+      end_.expires_after(*options.duration);
+      end_.async_wait([this](const std::error_code&) { io_.stop(); });
+    }
+    const auto began = std::chrono::steady_clock::now();
+    io_.run();
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
+    for (const auto& board : boards_) board->close();
+    recording_->close();
+    if (const std::optional<Problem> problem = recording_->problem()) throw Error(*problem);
+    fmt::print("{}: {} datagrams and events in {:.1f} s\n", options.file, recording_->records(),
+               took.count());
+    if (recording_->dropped() != 0) {
+      fmt::print(stderr, "r4: {} more were left out: the disk is too slow\n",
+                 recording_->dropped());
+    }
+    for (const auto& board : boards_) {
+      if (board->statistics().received == 0) throw Error(explain(board->name(), board->link()));
+    }
+    return 0;
+  }
+
+ private:
+  asio::io_context io_{1};
+  std::optional<Recording> recording_;
+  std::vector<std::unique_ptr<AsyncBoard>> boards_;
+  asio::signal_set signals_;
+  asio::steady_timer end_;
+};
+
+int record(const Options& options) { return Recorders(options).run(options); }
+
+constexpr const char* footer =
+    R"(Every datagram of every board, in both directions, with the host's time and the wire that it came
+by; damaged ones, too; and what happened to the links. It watches, as r4 monitor does: it takes no
+control, and a program that drives a board is not disturbed. It goes on when a transport is lost and
+comes back.
+
+The file is text, one line a datagram (docs/recordings.md); one whose name ends in .zst is compressed.
+A recording that is there goes on at its end. A crash costs at most the last second. With --rotate or
+--keep the files are drive-00001.r4log, drive-00002.r4log …, each whole in itself.
+
+Examples:
+  r4 record udp://192.168.0.125 -o drive.r4log
+  r4 record serial:auto 'can://can0?node=3' -o drive.r4log.zst --for 60
+  r4 record udp:auto -o /var/log/robot.r4log.zst --rotate 1h --rotate 100M --keep 2G
+  grep ' 1> ' drive.r4log               what was sent to the first board
+  r4 info drive.r4log                   what is in it
+
+Exit codes: 0 ended by --for or Ctrl-C; 3 a board was not heard; 2 usage; 4 the file or the transport
+cannot be opened, or the disk is full; 5 permission denied.)";
+
+}  // namespace
+
+void add_record(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* const command =
+      add_subcommand(root, chosen, "record", "Write down what is said, in both directions", footer,
+                     options, record);
+  add_urls(*command, options->urls);
+  add_text(*command, "-o,--output", options->file, "the recording", file_type, Need::required);
+  add_seconds(*command, "--for", options->duration, "end after that time");
+  add_repeated(*command, "--rotate", options->rotate,
+               "begin a new file after a size (100M) or a time (10min); give it twice for both",
+               "LIMIT");
+  add_text(*command, "--keep", options->keep, "remove the oldest files beyond that size (2G)",
+           "SIZE");
+  add_fields(*command, options->fields);
+  add_key(*command, options->key);
+}
+
+}  // namespace r4::tool

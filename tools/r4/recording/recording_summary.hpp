@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What is in a recording, as `r4 info` tells it. In memory that does not grow with it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "../shell/json.hpp"
+#include "host/recording/recording_reader.hpp"
+#include "protocol/link/packet_tracker.hpp"
+
+namespace r4::tool {
+
+// A board that says nothing for longer than this has a gap: it speaks at least twice a second.
+constexpr Time shortest_gap{std::chrono::seconds{1}};
+
+struct WireSummary {
+  RecordedWire wire;
+  // From the board.
+  std::uint64_t received = 0;  // valid ones
+  std::uint64_t states = 0;
+  std::uint64_t damaged = 0;
+  PacketTracker packets;
+  Time first{0}, last{0};  // that it was heard
+  // To the board.
+  std::uint64_t sent = 0;
+  std::uint64_t heartbeats = 0;
+  std::uint64_t stops = 0;
+  // What the board was.
+  SafeReason safe = SafeReason::none;  // now
+  Time safe_since{0};
+  Time safe_for{0};  // in all
+  std::array<std::uint64_t, safe_reason_count> safe_times{};
+  std::uint64_t downs = 0;  // of the transport
+  std::uint64_t gaps = 0;
+  Time longest_gap{0};
+  Time longest_gap_at{0};
+};
+
+class RecordingSummary final : public RecordingReader::Handler {
+ public:
+  void on_header() override;
+  void on_wire(const RecordedWire& wire) override;
+  void on_record(const Record& record) override;
+  void on_damage(const RecordingDamage& damage) override;
+
+  // What people read, and what programs do.
+  std::string text(const std::string& name) const;
+  Json json(const std::string& name) const;
+  bool damaged() const { return damage_count_ != 0; }
+
+ private:
+  struct Damage {
+    std::string where;
+    std::uint64_t line, offset;
+    std::string reason;
+  };
+
+  WireSummary& of(std::uint16_t number);
+  std::size_t add(std::uint16_t number);
+  void on_event(const Record& record);
+  static void on_received(WireSummary& wire, const Record& record);
+  static void on_sent(WireSummary& wire, const Record& record);
+  static void be_safe(WireSummary& wire, SafeReason reason, Time now);
+
+  // By the number that a wire has since the last header, and all of them, by number and URL.
+  std::map<std::uint16_t, std::size_t> numbers_;
+  std::vector<WireSummary> wires_;
+  bool any_ = false;
+  Time first_{0}, last_{0};
+  std::uint64_t records_ = 0;
+  std::uint64_t dropped_ = 0;  // by a disk that was too slow
+  std::uint64_t unended_ = 0;  // recordings in the file that have no end
+  bool ended_ = true;
+  std::uint64_t damage_count_ = 0;
+  std::vector<Damage> damage_;  // the first of it
+};
+
+}  // namespace r4::tool

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "share_socket.hpp"
+
+#include <fmt/core.h>
+#include <sys/socket.h>
+#include <sys/uio.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstddef>
+#include <cstring>
+
+namespace r4 {
+namespace {
+
+constexpr int most_waiting = 16;
+// About eighty states: who sleeps and wakes up hears nothing much older than a second.
+constexpr int buffer_bytes = 32 * 1024;
+
+struct Address {
+  sockaddr_un bytes{};
+  socklen_t size = 0;
+};
+
+// A name that is too long for the kernel ends in a number made of the whole.
+Address address_of(uid_t user, const std::string& wire) {
+  Address address;
+  address.bytes.sun_family = AF_UNIX;
+  std::string name = fmt::format("r4link/{}/{}", user, wire);
+  constexpr std::size_t most = sizeof(address.bytes.sun_path) - 1;
+  if (name.size() > most) {
+    std::uint64_t hash = 14695981039346656037U;  // FNV-1a
+    for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211U;
+    name = fmt::format("{}{:016x}", name.substr(0, most - 16), hash);
+  }
+  std::memcpy(address.bytes.sun_path + 1, name.data(), name.size());
+  address.size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
+  return address;
+}
+
+FileDescriptor local_socket() {
+  FileDescriptor descriptor(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  if (descriptor) {
+    ::setsockopt(descriptor.get(), SOL_SOCKET, SO_SNDBUF, &buffer_bytes, sizeof buffer_bytes);
+  }
+  return descriptor;
+}
+
+}  // namespace
+
+FileDescriptor hold_wire(const std::string& wire) {
+  FileDescriptor descriptor = local_socket();
+  const Address address = address_of(::geteuid(), wire);
+  if (!descriptor ||
+      ::bind(descriptor.get(), reinterpret_cast<const sockaddr*>(&address.bytes), address.size) !=
+          0 ||
+      ::listen(descriptor.get(), most_waiting) != 0) {
+    return {};
+  }
+  return descriptor;
+}
+
+FileDescriptor reach_holder(const std::string& wire) {
+  FileDescriptor descriptor = local_socket();
+  const Address address = address_of(::geteuid(), wire);
+  if (!descriptor ||
+      ::connect(descriptor.get(), reinterpret_cast<const sockaddr*>(&address.bytes),
+                address.size) != 0 ||
+      credentials_of(descriptor.get()).uid != ::geteuid()) {
+    return {};
+  }
+  return descriptor;
+}
+
+FileDescriptor accept_sharer(int holder) {
+  while (true) {
+    FileDescriptor descriptor(::accept4(holder, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+    if (!descriptor && (errno == EINTR || errno == ECONNABORTED)) continue;
+    if (!descriptor) return {};
+    const uid_t user = credentials_of(descriptor.get()).uid;
+    if (user != ::geteuid() && user != 0) continue;
+    ::setsockopt(descriptor.get(), SOL_SOCKET, SO_SNDBUF, &buffer_bytes, sizeof buffer_bytes);
+    return descriptor;
+  }
+}
+
+ShareCredentials credentials_of(int connection) {
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  if (::getsockopt(connection, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
+    return {0, static_cast<uid_t>(-1)};
+  }
+  return {peer.pid, peer.uid};
+}
+
+int send_message(int connection, ShareMessage::Kind kind, std::string_view text) {
+  char letter = static_cast<char>(kind);
+  iovec parts[2] = {{&letter, 1}, {const_cast<char*>(text.data()), text.size()}};
+  msghdr message{};
+  message.msg_iov = parts;
+  message.msg_iovlen = 2;
+  ssize_t sent = 0;
+  do {
+    sent = ::sendmsg(connection, &message, MSG_DONTWAIT | MSG_NOSIGNAL);
+  } while (sent < 0 && errno == EINTR);
+  return sent < 0 ? errno : 0;
+}
+
+ssize_t receive_packet(int connection, char* out, std::size_t size) {
+  ssize_t received = 0;
+  do {
+    received = ::recv(connection, out, size, MSG_DONTWAIT | MSG_TRUNC);
+  } while (received < 0 && errno == EINTR);
+  return received;
+}
+
+}  // namespace r4

@@ -1,0 +1,345 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "shared_carrier.hpp"
+
+#include <asio/post.hpp>
+#include <cerrno>
+#include <chrono>
+#include <optional>
+#include <utility>
+
+#include "../operation_slot.hpp"
+#include "r4link/datagram.hpp"
+#include "share_message.hpp"
+#include "wire_holder.hpp"
+#include "wire_sharer.hpp"
+
+namespace r4 {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Kind = ShareMessage::Kind;
+using std::chrono::milliseconds;
+
+constexpr milliseconds answer_within{200};
+constexpr milliseconds look_again{5};
+constexpr milliseconds look_again_slowly{100};
+// So long the wire may be nobody's before that is told.
+constexpr milliseconds take_over_within{100};
+// To others the wire is left for so long, when a program that controls is about to take it.
+constexpr milliseconds courtesy{20};
+
+// Of states the newest matters most; heartbeats and answers are short and few.
+Priority priority_of(std::string_view bytes) {
+  const bool other = bytes.size() > 1 && bytes[1] == ':' &&
+                     (bytes[0] == 'H' || bytes[0] == 'N' || bytes[0] == 'I');
+  return other ? Priority::normal : Priority::state;
+}
+
+class SharedCarrier final : public Carrier,
+                            private Carrier::Handler,
+                            private WireHolder::Owner,
+                            private WireSharer::Owner {
+ public:
+  SharedCarrier(asio::io_context& io, std::unique_ptr<Carrier> own, FindWire find, BoardRole role)
+      : io_(io),
+        own_(std::move(own)),
+        find_(std::move(find)),
+        role_(role),
+        name_(own_->name()),
+        holder_(io, *this, program_invocation_short_name),
+        sharer_(io, *this),
+        timer_(io) {}
+  ~SharedCarrier() override { close(); }
+
+  void open(Carrier::Handler& handler) override;
+  void close() noexcept override;
+  SendResult send(std::string_view bytes, Priority priority, Peer to) override;
+  void use_packed_form(bool wanted) override { own_->use_packed_form(wanted); }
+  bool up() const override { return up_; }
+  // What is sent on a wire that another program holds the board would take for the holder's.
+  bool is_shared() const override { return state_ == State::sharing || own_->is_shared(); }
+  std::size_t max_size() const override { return own_->max_size(); }
+  const std::string& name() const override { return name_; }
+  const CarrierCounters& counters() const override {
+    return state_ == State::sharing ? shared_counters_ : own_->counters();
+  }
+
+ private:
+  enum class State { closed, attaching, holding, sharing };
+
+  // The carrier of our own.
+  void on_datagram(std::string_view bytes, Peer from) override;
+  void on_carrier_event(const CarrierEvent& event) override;
+  void on_drained() override { handler_->on_drained(); }
+  // Those who share our wire.
+  Kind standing(std::string& text) const override;
+  void on_stop_of_another(std::string_view datagram) override;
+  bool gives_way() override;
+  void on_given_away() override { attach_later(courtesy); }
+  // The holder of the wire that we share.
+  void on_message(const ShareMessage& message) override;
+  void on_all_heard() override { handler_->on_drained(); }
+  void on_holder_lost() override;
+
+  void attach();
+  void take_part();
+  bool try_to_share();
+  bool try_to_hold();
+  void on_no_answer();
+  void leave_holder(const Problem& problem);
+  void attach_later(milliseconds delay);
+  void look();
+  void tell(const CarrierEvent& event);
+
+  asio::io_context& io_;
+  const std::unique_ptr<Carrier> own_;
+  const FindWire find_;
+  SharedWire wire_;  // as it was found when it was opened
+  const BoardRole role_;
+  std::string name_;
+  WireHolder holder_;
+  WireSharer sharer_;
+  LoopTimer timer_;
+  OperationSlot looking_;
+  State state_ = State::closed;
+  bool up_ = false;
+  bool moved_ = false;
+  std::optional<Problem> trouble_;  // why it is down, or the warning that stands
+  Clock::time_point since_;         // nobody holds the wire, as far as we know
+  Carrier::Handler* handler_ = nullptr;
+  CarrierCounters shared_counters_;
+};
+
+void SharedCarrier::open(Carrier::Handler& handler) {
+  close();
+  handler_ = &handler;
+  state_ = State::attaching;
+  try {
+    wire_ = find_();
+    attach();
+  } catch (...) {
+    close();
+    throw;
+  }
+}
+
+void SharedCarrier::close() noexcept {
+  state_ = State::closed;
+  handler_ = nullptr;
+  up_ = moved_ = false;
+  trouble_.reset();
+  looking_.cancel();
+  sharer_.leave();
+  own_->close();  // the wire is free before others are told so
+  holder_.release();
+}
+
+// Throws Error where neither will do.
+void SharedCarrier::attach() {
+  try {
+    take_part();
+  } catch (const Error& error) {
+    if (wire_.exclusive || error.kind() != ErrorKind::open) throw;
+    // The holder is no help: beside it, then.
+    sharer_.leave();
+    wire_.name.clear();
+    try {
+      try_to_hold();
+    } catch (const Error&) {
+      throw error;
+    }
+  }
+}
+
+void SharedCarrier::take_part() {
+  // Between our two questions others may come and go.
+  const Clock::time_point deadline = Clock::now() + take_over_within;
+  do {
+    if (try_to_share() || try_to_hold()) return;
+  } while (Clock::now() < deadline);
+  throw Error(ErrorKind::open, name_, "other programs take it, one after the other",
+              "end those that control the board");
+}
+
+// True if we share it now, or may do so soon. Throws Error if the holder does not let us.
+bool SharedCarrier::try_to_share() {
+  if (wire_.name.empty() || !sharer_.join(wire_.name, role_, program_invocation_short_name)) {
+    return false;
+  }
+  if (role_ == BoardRole::control) {
+    const ShareMessage answer = sharer_.wait_for_answer(name_);
+    const std::string who = sharer_.holder(answer.text);
+    sharer_.leave();
+    if (answer.kind != Kind::busy) return false;  // it has let the wire go
+    throw Error(ErrorKind::refused, name_, "controlled by " + who,
+                "end that program, or watch beside it, as r4 monitor does");
+  }
+  state_ = State::sharing;
+  sharer_.listen();
+  timer_.expires_after(answer_within);
+  timer_.async_wait(looking_.handler([this] { on_no_answer(); }));
+  return true;
+}
+
+void SharedCarrier::on_no_answer() { leave_holder(sharer_.silence(name_)); }
+
+// Until it is another.
+void SharedCarrier::leave_holder(const Problem& problem) {
+  sharer_.leave();
+  attach_later(look_again_slowly);
+  if (wire_.exclusive) return tell({CarrierEvent::Kind::down, problem});
+  wire_.name.clear();
+}
+
+bool SharedCarrier::try_to_hold() {
+  if (!wire_.name.empty() && !holder_.hold(wire_.name)) return false;
+  state_ = State::holding;
+  try {
+    own_->open(*this);
+  } catch (...) {
+    state_ = State::attaching;
+    holder_.release();
+    throw;
+  }
+  return true;
+}
+
+void SharedCarrier::attach_later(milliseconds delay) {
+  state_ = State::attaching;
+  since_ = Clock::now() + delay;
+  timer_.expires_after(delay);
+  timer_.async_wait(looking_.handler([this] { look(); }));
+}
+
+void SharedCarrier::look() {
+  try {
+    if (try_to_share() || try_to_hold()) return;
+  } catch (const Error& error) {
+    const bool late = Clock::now() - since_ >= take_over_within;
+    if (late) tell({CarrierEvent::Kind::down, error.problem()});
+    if (handler_ == nullptr) return;
+  }
+  const bool late = Clock::now() - since_ >= take_over_within;
+  timer_.expires_after(late ? look_again_slowly : look_again);
+  timer_.async_wait(looking_.handler([this] { look(); }));
+}
+
+SendResult SharedCarrier::send(std::string_view bytes, Priority priority, Peer to) {
+  switch (state_) {
+    case State::holding: {
+      const SendResult result = own_->send(bytes, priority, to);
+      if (result == SendResult::sent) holder_.tell(Kind::sent, bytes);
+      return result;
+    }
+    case State::sharing:
+      // Nothing else is ours to say: the board would take it for the holder's.
+      if (priority != Priority::stop) return SendResult::sent;
+      ++shared_counters_.tx_datagrams;
+      shared_counters_.tx_bytes += bytes.size();
+      return sharer_.send_stop(bytes);
+    case State::attaching:
+    case State::closed:
+      break;
+  }
+  return SendResult::down;
+}
+
+// --- we hold the wire
+
+void SharedCarrier::on_datagram(std::string_view bytes, Peer from) {
+  // Ours first: it may be driving.
+  handler_->on_datagram(bytes, from);
+  if (state_ == State::holding) holder_.tell(Kind::received, bytes, priority_of(bytes));
+}
+
+void SharedCarrier::on_carrier_event(const CarrierEvent& event) {
+  // A board that is found elsewhere is another name.
+  const bool renamed = name_ != own_->name();
+  name_ = own_->name();
+  tell(event);
+  if (renamed && up_ && state_ == State::holding) holder_.tell(Kind::up, name_);
+}
+
+// To those who share the wire and to our program, unless it knows that already. `up` is told anew when
+// the datagrams come from elsewhere.
+void SharedCarrier::tell(const CarrierEvent& event) {
+  const bool down = event.kind == CarrierEvent::Kind::down;
+  const bool known = down && !up_ && trouble_ && trouble_->reason == event.problem.reason;
+  if (event.kind != CarrierEvent::Kind::warning) up_ = event.kind == CarrierEvent::Kind::up;
+  trouble_.reset();
+  if (event.kind != CarrierEvent::Kind::up) trouble_ = event.problem;
+  if (state_ == State::holding && holder_.sharers() != 0) {
+    std::string text;
+    const Kind kind = standing(text);
+    holder_.tell(kind, text);
+  }
+  if (!known) handler_->on_carrier_event(event);
+}
+
+Kind SharedCarrier::standing(std::string& text) const {
+  text = trouble_ ? problem_text(*trouble_) : name_;
+  if (!up_) return Kind::down;
+  return trouble_ ? Kind::warning : Kind::up;
+}
+
+void SharedCarrier::on_stop_of_another(std::string_view datagram) {
+  if (own_->send(datagram, Priority::stop, everyone) == SendResult::sent) {
+    holder_.tell(Kind::sent, datagram);
+    handler_->on_overheard(datagram);
+  }
+}
+
+bool SharedCarrier::gives_way() {
+  if (role_ == BoardRole::control) return false;
+  own_->close();
+  return true;
+}
+
+// --- we share the wire
+
+void SharedCarrier::on_message(const ShareMessage& message) {
+  switch (message.kind) {
+    case Kind::welcome:
+      looking_.cancel();
+      if (message.same_version) break;
+      leave_holder(sharer_.other_version(name_));
+      break;
+    case Kind::received:
+      ++shared_counters_.rx_datagrams;
+      shared_counters_.rx_bytes += message.text.size();
+      handler_->on_datagram(message.text, everyone);
+      break;
+    case Kind::sent:
+      handler_->on_overheard(message.text);
+      break;
+    case Kind::up:
+      name_ = std::string(message.text);
+      tell({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
+      break;
+    case Kind::down:
+      tell({CarrierEvent::Kind::down, message.problem});
+      break;
+    case Kind::warning:
+      tell({CarrierEvent::Kind::warning, message.problem});
+      break;
+    case Kind::moved:
+      moved_ = true;
+      break;
+    default:
+      break;
+  }
+}
+
+void SharedCarrier::on_holder_lost() {
+  looking_.cancel();
+  attach_later(std::exchange(moved_, false) ? courtesy : milliseconds(0));
+}
+
+}  // namespace
+
+std::unique_ptr<Carrier> make_shared_carrier(asio::io_context& io, std::unique_ptr<Carrier> own,
+                                             FindWire find, BoardRole role) {
+  return std::make_unique<SharedCarrier>(io, std::move(own), std::move(find), role);
+}
+
+}  // namespace r4

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The end of a shared wire at the program that holds it: tells the others all that passes, and takes stops
+// from them. What they cost is bounded: at most 16, for each a few datagrams that wait, and who takes
+// nothing for a second, or sends more than 100 messages in one, is let go.
+#pragma once
+
+#include <asio/io_context.hpp>
+#include <chrono>
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "../operation_slot.hpp"
+#include "r4link/carrier.hpp"
+#include "share_message.hpp"
+
+namespace r4 {
+
+class WireHolder {
+ public:
+  static constexpr std::size_t most_sharers = 16;
+  static constexpr std::chrono::milliseconds patience{1000};
+  static constexpr int most_messages = 100;  // in a second, of one
+
+  // Called on the loop's thread.
+  class Owner {
+   public:
+    // A program has come that wants to know how the wire is: a message for it.
+    virtual ShareMessage::Kind standing(std::string& text) const = 0;
+    // Another program's E:STOP, which is one.
+    virtual void on_stop_of_another(std::string_view datagram) = 0;
+    // A program has come that wants to control the board. True: let it; the wire must be down by then.
+    virtual bool gives_way() = 0;
+    // The wire was given to it, and this holder has let it go.
+    virtual void on_given_away() = 0;
+
+   protected:
+    ~Owner() = default;
+  };
+
+  // `program`: what this one is called.
+  WireHolder(asio::io_context& io, Owner& owner, std::string program);
+  ~WireHolder();
+  WireHolder(const WireHolder&) = delete;
+  WireHolder& operator=(const WireHolder&) = delete;
+
+  // Holds the wire of that name, instead of another. False if another program does.
+  bool hold(const std::string& wire);
+  // Lets it go.
+  void release() noexcept;
+
+  bool holds() const { return !wire_.empty(); }
+  const std::string& wire() const { return wire_; }
+  std::size_t sharers() const { return sharers_.size(); }
+  // To all who share it. `state`: only the newest waits for who is slow.
+  void tell(ShareMessage::Kind kind, std::string_view text, Priority priority = Priority::normal);
+
+ private:
+  class Sharer;
+
+  void listen();
+  void accept();
+  void on_message(Sharer& from, const ShareMessage& message);
+  void on_hello(Sharer& from, const ShareMessage& hello);
+  void remove_lost_later();
+
+  asio::io_context& io_;
+  Owner& owner_;
+  const std::string program_;
+  std::string wire_;
+  LoopDescriptor listener_;
+  OperationSlot accepting_;
+  OperationSlot removing_;
+  OperationSlot giving_away_;
+  std::vector<std::unique_ptr<Sharer>> sharers_;
+};
+
+}  // namespace r4

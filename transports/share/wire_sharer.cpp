@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "wire_sharer.hpp"
+
+#include <fmt/core.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <optional>
+#include <utility>
+
+#include "../file_descriptor.hpp"
+#include "share_socket.hpp"
+
+namespace r4 {
+namespace {
+
+constexpr int messages_in_a_turn = 64;
+constexpr int answer_within_ms = 200;
+
+bool would_block(int error) { return error == EAGAIN || error == EWOULDBLOCK; }
+
+}  // namespace
+
+bool WireSharer::join(const std::string& wire, BoardRole role, std::string_view program) {
+  leave();
+  FileDescriptor connection = reach_holder(wire);
+  if (!connection ||
+      send_message(connection.get(), ShareMessage::Kind::hello, hello_text(role, program)) != 0) {
+    return false;
+  }
+  holder_pid_ = credentials_of(connection.get()).pid;
+  connection_.assign(connection.release());
+  return true;
+}
+
+ShareMessage WireSharer::wait_for_answer(const std::string& thing) {
+  pollfd waiting{connection_.native_handle(), POLLIN, 0};
+  int ready = 0;
+  do {
+    ready = ::poll(&waiting, 1, answer_within_ms);
+  } while (ready < 0 && errno == EINTR);
+  if (ready <= 0) throw Error(silence(thing));
+  const ssize_t size = receive_packet(connection_.native_handle(), packet_.data(), packet_.size());
+  if (size <= 0) {
+    ShareMessage ended;  // before it saw us
+    ended.kind = ShareMessage::Kind::moved;
+    return ended;
+  }
+  const std::optional<ShareMessage> message =
+      read_share_message({packet_.data(), static_cast<std::size_t>(size)});
+  if (!message || !message->same_version) throw Error(other_version(thing));
+  return *message;
+}
+
+std::string WireSharer::holder(std::string_view program) const {
+  return fmt::format("{} (pid {})", program, holder_pid_);
+}
+
+Problem WireSharer::silence(const std::string& thing) const {
+  if (holder_pid_ == ::getpid()) {
+    return {ErrorKind::open, thing, "this program has it open already",
+            "use that one, or close it first"};
+  }
+  return {ErrorKind::open, thing,
+          fmt::format("the program that holds it (pid {}) does not answer", holder_pid_),
+          fmt::format("let it go on, if it was stopped (kill -CONT {0}), or end it", holder_pid_)};
+}
+
+Problem WireSharer::other_version(const std::string& thing) const {
+  return {ErrorKind::open, thing,
+          fmt::format("the program that holds it (pid {}) is of another version of R4 link",
+                      holder_pid_),
+          "end it, or use the same version for both"};
+}
+
+void WireSharer::listen() {
+  connection_.async_wait(asio::posix::descriptor_base::wait_read,
+                         readable_.handler([this] { receive(); }));
+}
+
+void WireSharer::receive() {
+  for (int i = 0; i < messages_in_a_turn; ++i) {
+    const ssize_t size =
+        receive_packet(connection_.native_handle(), packet_.data(), packet_.size());
+    if (size < 0 && would_block(errno)) {
+      owner_.on_all_heard();
+      break;
+    }
+    if (size <= 0 || static_cast<std::size_t>(size) > packet_.size()) return lost();
+    const std::optional<ShareMessage> message =
+        read_share_message({packet_.data(), static_cast<std::size_t>(size)});
+    if (!message) return lost();
+    owner_.on_message(*message);
+    if (!connection_.is_open()) return;  // left by it
+  }
+  if (connection_.is_open()) listen();
+}
+
+SendResult WireSharer::send_stop(std::string_view datagram) {
+  if (!connection_.is_open()) return SendResult::down;
+  const int error = send_message(connection_.native_handle(), ShareMessage::Kind::stop, datagram);
+  if (error == 0) return SendResult::sent;
+  return would_block(error) ? SendResult::full : SendResult::down;
+}
+
+void WireSharer::lost() {
+  leave();
+  owner_.on_holder_lost();
+}
+
+void WireSharer::leave() noexcept {
+  readable_.cancel();
+  asio::error_code ignored;
+  connection_.close(ignored);
+}
+
+}  // namespace r4

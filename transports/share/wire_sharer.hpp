@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The end of a shared wire at a program that another lets share it.
+#pragma once
+
+#include <array>
+#include <asio/io_context.hpp>
+#include <string>
+#include <string_view>
+
+#include "../operation_slot.hpp"
+#include "r4link/carrier.hpp"
+#include "share_message.hpp"
+
+namespace r4 {
+
+class WireSharer {
+ public:
+  // Called on the loop's thread.
+  class Owner {
+   public:
+    virtual void on_message(const ShareMessage& message) = 0;
+    virtual void on_all_heard() = 0;  // what had arrived was handed over
+    // The holder has ended, or let us go: the connection is closed.
+    virtual void on_holder_lost() = 0;
+
+   protected:
+    ~Owner() = default;
+  };
+
+  WireSharer(asio::io_context& io, Owner& owner) : owner_(owner), connection_(io) {}
+  ~WireSharer() { leave(); }
+  WireSharer(const WireSharer&) = delete;
+  WireSharer& operator=(const WireSharer&) = delete;
+
+  // Goes to the holder of that wire and says hello. False if there is none.
+  bool join(const std::string& wire, BoardRole role, std::string_view program);
+  // Waits for its first answer; blocks, for 200 ms at most. `moved` where it has ended. Throws Error{open},
+  // naming `thing`, if none comes, or one of another version. `text` is valid until the next message.
+  ShareMessage wait_for_answer(const std::string& thing);
+  // "r4 (pid 123)": the holder.
+  std::string holder(std::string_view program) const;
+  // It does not answer, or not as we do: what to say of it.
+  Problem silence(const std::string& thing) const;
+  Problem other_version(const std::string& thing) const;
+  // Messages are handed over from now on.
+  void listen();
+  // An E:STOP for the board.
+  SendResult send_stop(std::string_view datagram);
+  void leave() noexcept;
+
+ private:
+  void receive();
+  void lost();
+
+  Owner& owner_;
+  LoopDescriptor connection_;
+  int holder_pid_ = 0;
+  OperationSlot readable_;
+  std::array<char, ShareMessage::max_size + 1> packet_;
+};
+
+}  // namespace r4

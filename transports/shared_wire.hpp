@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a wire is called that the programs of a machine share (share/shared_carrier.hpp).
+#pragma once
+
+#include <functional>
+#include <string>
+
+namespace r4 {
+
+struct SharedWire {
+  // The same for all who mean it, and for nobody else. Empty: it is not shared.
+  std::string name;
+  // Only one can have it open. If not, a program goes its own way where the holder does not answer.
+  bool exclusive = false;
+};
+// Throws Error where it is not to be found.
+using FindWire = std::function<SharedWire()>;
+
+}  // namespace r4
