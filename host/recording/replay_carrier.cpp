@@ -5,10 +5,12 @@
 #include <chrono>
 #include <cstdint>
 #include <deque>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "../../protocol/datagram/numbers.hpp"
@@ -18,6 +20,11 @@
 
 namespace r4 {
 namespace {
+
+using SteadyTime = std::chrono::steady_clock::time_point;
+
+// Others use the loop, too: after so many records, or pieces of the file, it is their turn.
+constexpr int steps_in_a_turn = 32;
 
 std::int32_t hundredths_of(const Url& url, const char* key, std::int32_t min,
                            std::int32_t fallback) {
@@ -48,6 +55,17 @@ class ReplayCarrier final : public Carrier, RecordingReader::Handler {
   ~ReplayCarrier() override { close(); }
 
   void open(Carrier::Handler& handler) override {
+    // What is read here must not wait for anybody: the loop would.
+    std::error_code error;
+    const std::filesystem::file_status file = std::filesystem::status(path_, error);
+    if (!std::filesystem::is_regular_file(file)) {
+      const bool directory = std::filesystem::is_directory(file);
+      throw Error(ErrorKind::open, name_,
+                  error       ? error.message()
+                  : directory ? "is a directory"
+                              : "is no regular file",
+                  "name a file that r4 record has written");
+    }
     input_.emplace(path_);
     RecordingReader::Handler& self = *this;
     reader_.emplace(self, path_);
@@ -96,13 +114,14 @@ class ReplayCarrier final : public Carrier, RecordingReader::Handler {
     if (record.wire != wire_ || record.kind == RecordKind::to_board) return;
     if (record.time - *beginning_ < from_) return;
     if (record.kind == RecordKind::event && !is_of_the_transport(record.bytes)) return;
+    latest_ = record.time;
     waiting_.push_back({record.time, record.kind, std::string(record.bytes)});
   }
   void on_wire(const RecordedWire&) override {}
   void on_damage(const RecordingDamage& damage) override {
-    if (waiting_.empty()) return;
+    if (!latest_) return;
     waiting_.push_back(
-        {waiting_.back().time, RecordKind::event,
+        {*latest_, RecordKind::event,
          "warning line " + std::to_string(damage.line) + ": " + std::string(damage.reason)});
   }
 
@@ -119,42 +138,52 @@ class ReplayCarrier final : public Carrier, RecordingReader::Handler {
 
   // --- playing
 
-  void wait() {
+  SteadyTime due() const {
+    if (waiting_.empty()) return began_;
     const std::chrono::duration<double, std::micro> later =
         (waiting_.front().time - first_) / speed_;
-    timer_.expires_at(began_ +
-                      std::chrono::duration_cast<std::chrono::steady_clock::duration>(later));
+    return began_ + std::chrono::duration_cast<std::chrono::steady_clock::duration>(later);
+  }
+
+  void wait() {
+    timer_.expires_at(due());
     timer_.async_wait([this, alive = std::weak_ptr<int>(alive_)](const std::error_code& error) {
       if (!error && !alive.expired()) play();
     });
   }
 
-  // All that is due.
+  // What is due, a turn's worth.
   void play() {
-    const auto now = std::chrono::steady_clock::now();
-    while (handler_ != nullptr) {
-      if (!fill()) return;
-      const std::chrono::duration<double, std::micro> later =
-          (waiting_.front().time - first_) / speed_;
-      if (began_ + later > now) break;
+    const SteadyTime now = std::chrono::steady_clock::now();
+    for (int i = 0; i < steps_in_a_turn && handler_ != nullptr; ++i) {
+      if (waiting_.empty()) {
+        if (!continue_reading()) return;
+        continue;
+      }
+      if (due() > now) {
+        handler_->on_drained();
+        break;
+      }
       const Waiting next = std::move(waiting_.front());
       waiting_.pop_front();
       play(next);
     }
-    if (handler_ != nullptr) handler_->on_drained();
     if (handler_ != nullptr) wait();
   }
 
   // False at the end, which is told.
-  bool fill() {
+  bool continue_reading() {
+    Problem end{ErrorKind::open, name_, "the recording has ended", "open it again"};
     try {
-      while (waiting_.empty() && !ended_) read_on();
+      if (!ended_) {
+        read_on();
+        return true;
+      }
     } catch (const Error& error) {
-      change(false, error.problem());
-      return false;
+      end = error.problem();
     }
-    if (!waiting_.empty()) return true;
-    change(false, {ErrorKind::open, name_, "the recording has ended", "open it again"});
+    handler_->on_drained();
+    if (handler_ != nullptr) change(false, end);
     return false;
   }
 
@@ -197,8 +226,9 @@ class ReplayCarrier final : public Carrier, RecordingReader::Handler {
   bool ended_ = false;
   std::optional<Time> beginning_;  // of the recording
   std::deque<Waiting> waiting_;
-  Time first_{0};  // of what is played
-  std::chrono::steady_clock::time_point began_;
+  std::optional<Time> latest_;  // of what is played, as far as it was read
+  Time first_{0};               // of what is played
+  SteadyTime began_;
 };
 
 }  // namespace

@@ -7,7 +7,7 @@
 //        +------------------------------------------------------------+
 //                        no state for 1 s
 //
-//     asking    W is sent every 500 ms, and at once with a LEASE to echo
+//     asking    W is sent every 500 ms; at once with a LEASE to echo, and on a transport that has come up
 //     watching  likewise: a lease lasts 2 s
 //     full      the board has no room for another watcher; it is asked once a second
 //     unknown   the board does not know of watchers; likewise, for another may come to its place
@@ -28,6 +28,7 @@ class Lease {
     const bool hopeless = state_ == State::full || state_ == State::unknown;
     next_ = now + (hopeless ? reminder : renewal);
   }
+  void renew(Time now) { next_ = now; }
   // The T to put into the next one.
   std::uint32_t echo() const { return echo_; }
 
@@ -56,7 +57,7 @@ class Lease {
 inline void Lease::on_refusal(const Nack& nack, Time now) {
   if (nack.lease != 0) {
     echo_ = nack.lease;
-    next_ = now;
+    renew(now);
   } else if (!streaming(now)) {  // else a host's control brings us the states
     state_ = nack.code == Refusal::busy ? State::full : State::unknown;
   }

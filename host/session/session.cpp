@@ -401,8 +401,12 @@ Time Session::next_poll(Time now) {
 void Session::on_transport(bool up, Time now) {
   transport_down_ = !up;
   link_.on_transport(up);
-  // A program that shares the wire hears the board from elsewhere, in other numbers.
-  if (up && watches()) link_.forget_numbers();
+  if (up && watches()) {
+    // A program that shares a wire hears the board from elsewhere, in other numbers; and who held the wire
+    // may have ended the lease, if that one controlled the board.
+    link_.forget_numbers();
+    lease_.renew(now);
+  }
   refresh_status(now);
 }
 

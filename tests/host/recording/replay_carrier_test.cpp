@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A recording is a transport.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <asio/io_context.hpp>
+#include <asio/post.hpp>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -86,6 +88,31 @@ TEST_F(Replay, BeginsWhereItIsAskedToAndWithThatWire) {
   EXPECT_EQ(heard.datagrams[0].text, "5");
 }
 
+TEST_F(Replay, LeavesTheLoopToOthersHoweverMuchIsDue) {
+  constexpr std::size_t all = 1000;
+  for (std::size_t i = 0; i < all; ++i) add(0ms, "at once");
+  std::size_t at_the_turn_of_others = 0;
+  heard.then = [&](const Recorder::Datagram&) {
+    if (heard.datagrams.size() != 1) return;
+    asio::post(io, [&] { at_the_turn_of_others = heard.datagrams.size(); });
+  };
+  play("");
+  EXPECT_EQ(heard.datagrams.size(), all);
+  EXPECT_LT(at_the_turn_of_others, all / 10);
+  EXPECT_EQ(heard.drained, 1) << "before the end";
+}
+
+TEST_F(Replay, TellsOfDamageThatIsFarBehindWhatIsPlayed) {
+  add(0ms, "one");
+  for (int i = 0; i < 2000; ++i) add(0ms, std::string(200, 'x'), RecordKind::from_board, 2);
+  text += "no record\n";
+  add(1ms, "two");
+  play("");
+  ASSERT_EQ(heard.count(Kind::warning), 1U);
+  EXPECT_EQ(heard.last(Kind::warning)->problem.reason, "line 2004: it begins with no time");
+  EXPECT_EQ(heard.datagrams.size(), 2U);
+}
+
 TEST_F(Replay, OfABoardIsThatBoardForAProgramThatWatches) {
   {
     Board board("sim:", at_will());
@@ -109,7 +136,14 @@ TEST_F(Replay, RefusesWhatItCannotPlay) {
   EXPECT_EQ(problem_of([&] { play("?speed=0"); }).kind, ErrorKind::usage);
   EXPECT_EQ(problem_of([&] { play("?pace=2"); }).kind, ErrorKind::usage);
   EXPECT_EQ(problem_of([&] { Board("replay:"); }).kind, ErrorKind::usage);
-  EXPECT_EQ(problem_of([&] { Board("replay:/no/where"); }).kind, ErrorKind::open);
+  for (const char* none : {"replay:/no/where", "replay:-"}) {
+    EXPECT_EQ(problem_of([&] { Board board(none); }).reason, "No such file or directory");
+  }
+  EXPECT_EQ(problem_of([&] { Board("replay:" + testing::TempDir()); }).reason, "is a directory");
+  const std::string fifo = path + "-fifo";
+  ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
+  EXPECT_EQ(problem_of([&] { Board("replay:" + fifo); }).reason, "is no regular file");
+  fs::remove(fifo);
   text = "something else";
   EXPECT_EQ(problem_of([&] { play(""); }).reason, "no recording");
 }

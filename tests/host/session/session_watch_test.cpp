@@ -47,6 +47,17 @@ TEST_F(SessionWatch, EchoesAtOnceWhatItIsSent) {
   EXPECT_EQ(link.last('W').t, 7U);
 }
 
+// So it hears the board again when the program whose wire it shared has ended.
+TEST_F(SessionWatch, AsksAtOnceOnATransportThatHasComeUp) {
+  link.place_taken = true;
+  link.pass(600ms);
+  link.place_taken = false;
+  link.sent.clear();
+  link.session.on_transport(true, link.now);
+  link.pass(0ms);
+  EXPECT_EQ(link.count('W'), 1U);
+}
+
 TEST_F(SessionWatch, OnALineAStopIsConfirmedByABoardWithoutAHost) {
   link.state("AIN24:24.28;SAFE:1;");
   const Ticket ticket = link.session.stop(1s, link.now);
