@@ -52,7 +52,9 @@ def test_has_what_a_program_sends_by_the_wire_that_both_share(tmp_path):
     path = tmp_path / 'drive.r4log'
     with Board(f'pty:{tmp_path}/r4') as board, record(board.host_url, '-o', path) as recorder:
         wait_for(path, r'^[0-9.]+ 1< AIN24')
-        with driving(board.host_url, 'O:358,1,1') as host:
+        # It hears those that are sent when it has come to the program that has taken the wire.
+        commands = [f'O:{pwm},1,1' for pwm in range(319, 359)]
+        with driving(board.host_url, *commands) as host:
             wait_for(path, r'^[0-9.]+ 1> H:ROS2-R4')
             wait_for(path, r'^[0-9.]+ 1> O:358,1,1')
             host.end()
