@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The formats of recordings that r4 reads and writes, by the endings of their files.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "../formats/conversion.hpp"
+
+namespace r4::tool {
+
+// Reads the file of that name; "-", and what has none of the endings of other formats, is a native recording.
+// Throws Error{usage} for a format that is only written.
+std::unique_ptr<Source> make_source(const std::string& path, RecordingReader::Handler& handler);
+
+// Writes the file of that name. Throws Error{usage} where its ending is none that is written.
+std::unique_ptr<Sink> make_sink(const std::string& path, Output& output);
+
+}  // namespace r4::tool
