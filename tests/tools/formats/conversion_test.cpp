@@ -31,7 +31,7 @@ TEST(Conversion, TellsThePlaceOfDamageAndConvertsTheRest) {
   EXPECT_EQ(result.damage[1].reason, "the last line is not whole");
 }
 
-TEST(Conversion, GivesWhatHasNoHeaderOne) {
+TEST(Conversion, GivesWhatHasNoHeaderOneAndAnEnd) {
   StringOutput output;
   const auto sink = tool::make_sink("x.r4log", output);
   tool::Conversion conversion(*sink, {});
@@ -42,7 +42,8 @@ TEST(Conversion, GivesWhatHasNoHeaderOne) {
   EXPECT_TRUE(
       output.bytes.ends_with("# wire 1 can://can0?node=1\n"
                              "# from 2026-11-23T21:11:33.404765Z\n"
-                             "1795468293.404765 1! up\n"));
+                             "1795468293.404765 1! up\n"
+                             "1795468293.404765 0! end\n"));
 }
 
 TEST(Conversion, RefusesEndingsThatAreNoFormat) {

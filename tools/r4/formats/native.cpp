@@ -18,12 +18,12 @@ NativeSink::NativeSink(Output& output, bool compressed) : output_(output) {
 
 void NativeSink::begin() {
   if (begun_) return;
-  begun_ = true;
+  begun_ = ours_ = true;
   write_record_header(text_);
 }
 
 void NativeSink::on_comment(std::string_view line, Time) {
-  if (!begun_ && line.starts_with("# r4log ")) begun_ = told_when_ = true;
+  if (!begun_ && line.starts_with("# r4log ")) begun_ = true;
   begin();
   text_ += line;
   text_ += '\n';
@@ -38,14 +38,16 @@ void NativeSink::on_wire(const RecordedWire& wire, Time) {
 
 void NativeSink::on_record(const Record& record) {
   begin();
-  if (!told_when_) write_beginning(text_, record.time);
+  if (ours_ && !told_when_) write_beginning(text_, record.time);
   told_when_ = true;
+  time_ = record.time;
   write_record(text_, record);
   write_out(false);
 }
 
 void NativeSink::finish() {
   begin();
+  if (ours_) write_record(text_, {time_, no_wire, RecordKind::event, "end"});
   write_out(true);
 }
 

@@ -21,7 +21,7 @@ class NativeSource final : public Source {
   RecordingReader reader_;
 };
 
-// Writes the lines that it is told as they were. What comes from another format gets a header of its own.
+// Writes the lines that it is told as they were. What comes from another format gets a header and an end of its own.
 class NativeSink final : public Sink {
  public:
   NativeSink(Output& output, bool compressed);
@@ -37,7 +37,9 @@ class NativeSink final : public Sink {
   Output& output_;
   std::optional<ZstdWriter> zstd_;
   bool begun_ = false;
-  bool told_when_ = false;  // the recording begins; only if the header is ours
+  bool ours_ = false;       // the header
+  bool told_when_ = false;  // it begins
+  Time time_{0};            // of the newest record
   std::string text_, compressed_;
 };
 

@@ -122,6 +122,7 @@ int convert(const Options& options) {
 constexpr const char* footer =
     R"(The endings of the two names tell the formats (docs/recordings.md):
   .r4log .r4log.zst   the native one; also of the standard input, -
+  .log                the frames of a CAN bus as candump -L writes them
   .csv                the states, a row each, a column a value with its unit in the header
   .jsonl              every record, a JSON object a line, as r4 decode shows it
 

@@ -3,6 +3,7 @@
 
 #include <string_view>
 
+#include "../formats/candump_log.hpp"
 #include "../formats/csv.hpp"
 #include "../formats/json_lines.hpp"
 #include "../formats/native.hpp"
@@ -17,6 +18,7 @@ std::unique_ptr<Source> make_source(const std::string& path, RecordingReader::Ha
                   "convert the recording that it was made of");
     }
   }
+  if (path.ends_with(".log")) return std::make_unique<CandumpSource>(handler, path);
   return std::make_unique<NativeSource>(handler, path == "-" ? "standard input" : path);
 }
 
@@ -24,10 +26,11 @@ std::unique_ptr<Sink> make_sink(const std::string& path, Output& output) {
   const std::string_view name = path;
   if (name.ends_with(".r4log")) return std::make_unique<NativeSink>(output, false);
   if (name.ends_with(".r4log.zst")) return std::make_unique<NativeSink>(output, true);
+  if (name.ends_with(".log")) return std::make_unique<CandumpSink>(output);
   if (name.ends_with(".csv")) return std::make_unique<CsvSink>(output);
   if (name.ends_with(".jsonl")) return std::make_unique<JsonLinesSink>(output);
   throw Error(ErrorKind::usage, path, "no format has that ending",
-              "end it in .r4log, .r4log.zst, .csv or .jsonl");
+              "end it in .r4log, .r4log.zst, .csv, .jsonl or .log");
 }
 
 }  // namespace r4::tool
