@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 convert as a program, and its files as others read them: pandas."""
+"""r4 convert as a program, and its files as others read them: pandas, Wireshark."""
+import subprocess
+
 import pandas
 import pytest
 
@@ -44,6 +46,45 @@ def test_pandas_reads_csv_with_the_right_types(native, tmp_path):
     first = table.iloc[0]
     assert (first['board'], first['PNum'], first['AIN24 [V]']) == ('left-arm', 7434, 24.28)
     assert first['time [s]'] == 1795468293.5
+
+
+def tshark(*arguments):
+    """The lines that it prints."""
+    result = subprocess.run(['tshark', *map(str, arguments)], capture_output=True, text=True, check=True)
+    return result.stdout.splitlines()
+
+
+def datagrams(path):
+    """Of a native recording: its lines, without the times."""
+    lines = path.read_text().splitlines()
+    return [line.split(' ', 1)[1] for line in lines if line[0] != '#' and '! ' not in line]
+
+
+def test_wireshark_reads_the_datagrams_and_the_events(native, tmp_path):
+    packets = tmp_path / 'drive.pcapng'
+    convert(native, packets)
+    read = tshark('-r', packets, '-Y', 'udp', '-T', 'fields', '-e', 'frame.time_epoch', '-e', 'udp.srcport',
+                  '-e', 'ip.checksum.status', '-e', 'udp.payload', '-o', 'ip.check_checksum:TRUE')
+    rows = [line.split('\t') for line in read]
+    assert [(bytes.fromhex(row[3]).decode(), '<' if row[1] == '2018' else '>') for row in rows] == \
+        [(line.split(' ', 1)[1], line[1]) for line in datagrams(native)]
+    assert rows[0][0] == '1795468293.500000000' and {row[2] for row in rows} == {'1'}, 'checksums are right'
+    assert not tshark('-r', packets, '-Y', '_ws.malformed')
+    events = tshark('-r', packets, '-Y', 'syslog.msg contains "! "', '-T', 'fields', '-e', 'syslog.msg')
+    assert events == [line for line in native.read_text().splitlines() if '! ' in line and line[0] != '#']
+
+
+def test_what_wireshark_writes_is_read(native, tmp_path):
+    packets, again = tmp_path / 'drive.pcapng', tmp_path / 'again.pcapng'
+    convert(native, packets)
+    tshark('-r', packets, '-w', again)
+    convert(again, tmp_path / 'again.r4log')
+    assert (tmp_path / 'again.r4log').read_bytes() == native.read_bytes()
+    # A capture that knows nothing of recordings: one link, and no names.
+    subprocess.run(['editcap', '-F', 'pcap', '-T', 'rawip4', '-r', packets, tmp_path / 'plain.pcap', '5-75'],
+                   check=True)
+    convert(tmp_path / 'plain.pcap', tmp_path / 'plain.r4log')
+    assert datagrams(tmp_path / 'plain.r4log') == datagrams(native)
 
 
 def test_damage_has_a_place_and_the_rest_is_converted(native, tmp_path):

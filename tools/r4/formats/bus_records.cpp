@@ -71,10 +71,14 @@ void BusRecords::on_raw_frame(const std::string& interface, const CanIdMeaning& 
 }
 
 std::uint16_t BusRecords::wire_of(const std::string& interface, std::uint8_t node) {
-  const auto next = static_cast<std::uint16_t>(wires_.size() + 1);
-  const auto [known, added] = wires_.try_emplace({interface, node}, next);
-  if (added) handler_.on_wire({next, fmt::format("can://{}?node={}", interface, node), ""});
+  const auto [known, added] = wires_.try_emplace({interface, node}, no_wire);
+  if (added) known->second = add_wire(fmt::format("can://{}?node={}", interface, node));
   return known->second;
+}
+
+std::uint16_t BusRecords::add_wire(const std::string& url) {
+  handler_.on_wire({++last_wire_, url, ""});
+  return last_wire_;
 }
 
 void BusRecords::damage(const BusTransfers::Place& place, const std::string& reason) {

@@ -25,6 +25,8 @@ class BusRecords final : BusTransfers::Handler {
                 const BusTransfers::Place& place);
   // No more frames come.
   void finish();
+  // The number of a wire that is told of now; those of other sources of the same recording count on.
+  std::uint16_t add_wire(const std::string& url);
 
  private:
   void on_datagram(const BusTransfers::Lane& lane) override;
@@ -38,6 +40,7 @@ class BusRecords final : BusTransfers::Handler {
   RecordingReader::Handler& handler_;
   BusTransfers transfers_{*this};
   std::map<std::pair<std::string, std::uint8_t>, std::uint16_t> wires_;
+  std::uint16_t last_wire_ = 0;
 };
 
 }  // namespace r4::tool

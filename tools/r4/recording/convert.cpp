@@ -24,6 +24,7 @@ struct Options {
   std::string input;
   std::string output;
   bool force = false;
+  std::uint64_t port = board_port;
 };
 
 // So many places of damage are told; of more than that, how many.
@@ -75,9 +76,10 @@ class Progress {
   std::chrono::steady_clock::time_point drawn_at_ = std::chrono::steady_clock::now();
 };
 
-void read_all(const std::string& path, RecordingReader::Handler& handler, Progress& progress) {
-  const std::unique_ptr<Source> source = make_source(path, handler);
-  RecordingInput input(path);
+void read_all(const Options& options, RecordingReader::Handler& handler, Progress& progress) {
+  const std::unique_ptr<Source> source =
+      make_source(options.input, handler, {static_cast<std::uint16_t>(options.port)});
+  RecordingInput input(options.input);
   for (std::string_view piece = input.read(); !piece.empty(); piece = input.read()) {
     source->feed(piece);
     progress.advance(piece.size());
@@ -97,7 +99,7 @@ int convert(const Options& options) {
   if (sink->wants_survey() && can_be_read_twice(options.input)) {
     progress.begin("looking");
     Survey survey(*sink);
-    read_all(options.input, survey, progress);
+    read_all(options, survey, progress);
   }
   progress.begin("converting");
   std::uint64_t told = 0;
@@ -108,7 +110,7 @@ int convert(const Options& options) {
     fmt::print(stderr, "r4: {}: {}byte {}: {}; it is left out\n", options.input, line,
                damage.offset, damage.reason);
   });
-  read_all(options.input, conversion, progress);
+  read_all(options, conversion, progress);
   conversion.finish();
   output.finish();
   progress.clear();
@@ -123,6 +125,8 @@ constexpr const char* footer =
     R"(The endings of the two names tell the formats (docs/recordings.md):
   .r4log .r4log.zst   the native one; also of the standard input, -
   .log                the frames of a CAN bus as candump -L writes them
+  .pcapng             packets that Wireshark opens, with all of the recording in them; read are
+                      also captures, .pcap too, of UDP to and from --port, and of SocketCAN
   .csv                the states, a row each, a column a value with its unit in the header
   .jsonl              every record, a JSON object a line, as r4 decode shows it
 
@@ -133,6 +137,8 @@ file is told with its place, and the rest is converted. A file that is there is 
 Examples:
   r4 convert drive.r4log -o drive.csv
   r4 convert drive.r4log.zst -o drive.r4log
+  r4 convert drive.r4log -o drive.pcapng && wireshark drive.pcapng
+  tcpdump -w arm.pcap udp port 2018; r4 convert arm.pcap -o arm.csv
   zstdcat robot-*.r4log.zst | r4 convert - -o robot.jsonl
 
 Exit codes: 0 all of it was converted; 1 some could not be read, or it is no recording; 2 usage; 4, 5 a
@@ -148,6 +154,8 @@ void add_convert(CLI::App& root, Action& chosen) {
            Need::required);
   add_text(*command, "-o,--output", options->output, "the file that is made", file_type,
            Need::required);
+  add_number(*command, "--port", options->port, 1, 65535,
+             "the boards' UDP port in a capture (default: 2018)");
   add_flag(*command, "--force", options->force, "replace a file that is there");
 }
 
