@@ -59,14 +59,18 @@ void append_number(std::string& out, std::uint32_t number) {
   out.append(text.data(), write_number(text.data(), number));
 }
 
-// `blank`: what separates words; then it is escaped, too.
-void append_escaped(std::string& out, std::string_view bytes, bool blank = false) {
-  for (const char c : bytes) {
-    if (is_plain(c) && !(blank && c == ' ')) {
+void append_byte(std::string& out, char c) {
+  const auto byte = static_cast<unsigned char>(c);
+  out += {'\\', 'x', hex_digits[byte >> 4], hex_digits[byte & 15]};
+}
+
+// A blank separates words, so it is escaped, too.
+void append_word(std::string& out, std::string_view word) {
+  for (const char c : word) {
+    if (is_plain(c) && c != ' ') {
       out += c;
     } else {
-      const auto byte = static_cast<unsigned char>(c);
-      out += {'\\', 'x', hex_digits[byte >> 4], hex_digits[byte & 15]};
+      append_byte(out, c);
     }
   }
 }
@@ -74,23 +78,6 @@ void append_escaped(std::string& out, std::string_view bytes, bool blank = false
 int hex_value(char c) {
   const std::size_t at = hex_digits.find(c);
   return at == std::string_view::npos ? -1 : static_cast<int>(at);
-}
-
-// Appends the bytes that are written so; false for what is not.
-bool append_unescaped(std::string& out, std::string_view text) {
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    if (is_plain(text[i])) {
-      out += text[i];
-      continue;
-    }
-    if (text[i] != '\\' || text.size() - i < 4 || text[i + 1] != 'x') return false;
-    const int high = hex_value(text[i + 2]);
-    const int low = hex_value(text[i + 3]);
-    if (high < 0 || low < 0) return false;
-    out += static_cast<char>(high << 4 | low);
-    i += 3;
-  }
-  return true;
 }
 
 void put_digits(char* at, std::size_t count, std::int64_t value) {
@@ -188,6 +175,32 @@ LineKind read_record(std::string_view line, RecordLine& out) {
 
 }  // namespace
 
+void append_escaped(std::string& out, std::string_view bytes) {
+  for (const char c : bytes) {
+    if (is_plain(c)) {
+      out += c;
+    } else {
+      append_byte(out, c);
+    }
+  }
+}
+
+bool append_unescaped(std::string& out, std::string_view text) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (is_plain(text[i])) {
+      out += text[i];
+      continue;
+    }
+    if (text[i] != '\\' || text.size() - i < 4 || text[i + 1] != 'x') return false;
+    const int high = hex_value(text[i + 2]);
+    const int low = hex_value(text[i + 3]);
+    if (high < 0 || low < 0) return false;
+    out += static_cast<char>(high << 4 | low);
+    i += 3;
+  }
+  return true;
+}
+
 void write_record_header(std::string& out) {
   out += header_words;
   append_number(out, record_version);
@@ -200,10 +213,10 @@ void write_wire(std::string& out, const RecordedWire& wire) {
   out += wire_words;
   append_number(out, wire.number);
   out += ' ';
-  append_escaped(out, wire.url, true);
+  append_word(out, wire.url);
   if (!wire.name.empty()) {
     out += ' ';
-    append_escaped(out, wire.name, true);
+    append_word(out, wire.name);
   }
   out += '\n';
 }

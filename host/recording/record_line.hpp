@@ -57,6 +57,13 @@ struct RecordLine {
 // Reads a line without its end. False if it is damaged.
 bool read_record_line(std::string_view line, RecordLine& out);
 
+// --- bytes as a record has them
+
+// What is no printable ASCII, and a backslash, as \xNN.
+void append_escaped(std::string& out, std::string_view bytes);
+// Appends the bytes that are written so; false for what is not.
+bool append_unescaped(std::string& out, std::string_view text);
+
 // "2026-11-23T21:11:33.404765Z"
 std::string record_time_text(Time time);
 

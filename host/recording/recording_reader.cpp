@@ -95,11 +95,12 @@ void RecordingReader::on_line(std::string_view line) {
                     "read it with a newer r4");
       }
       recognised_ = true;
-      return handler_.on_header();
+      handler_.on_header();
+      return handler_.on_comment(line);
     case LineKind::wire:
       return handler_.on_wire(read_.wire);
     case LineKind::comment:
-      break;
+      return handler_.on_comment(line);
   }
 }
 

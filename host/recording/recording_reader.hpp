@@ -21,7 +21,7 @@ struct RecordingDamage {
     zstd,  // a part of a compressed recording; the lines in it are not counted
   };
   Kind kind = Kind::line;
-  std::uint64_t line = 1;    // from 1
+  std::uint64_t line = 1;    // from 1; 0 in a file of another format, which has none
   std::uint64_t offset = 0;  // of its first byte: in the text; for zstd in the file
   std::string_view reason;
 };
@@ -38,6 +38,8 @@ class RecordingReader {
     virtual void on_damage(const RecordingDamage& damage) = 0;
     // A recording begins here, or goes on: one file may hold several.
     virtual void on_header() {}
+    // Another line that begins with #, and behind on_header() the header's own.
+    virtual void on_comment(std::string_view line) { static_cast<void>(line); }
 
    protected:
     ~Handler() = default;

@@ -193,9 +193,9 @@ TEST(BusLog, GoesOnAfterDamagedLinesAndJumpsInTime) {
 TEST(BusLog, BoundsTheNumberOfInterfaces) {
   Dump dump;
   for (int i = 0; i < 100; ++i) dump.frame(0x010, "", fmt::format("can{}", i).c_str());
-  EXPECT_EQ(dump.printed[BusLog::max_interfaces - 1]["ok"], true);
-  EXPECT_EQ(dump.printed[BusLog::max_interfaces]["error"], "candump");
-  EXPECT_EQ(dump.summary()["damaged_lines"], 100 - BusLog::max_interfaces);
+  EXPECT_EQ(dump.printed[BusTransfers::max_interfaces - 1]["ok"], true);
+  EXPECT_EQ(dump.printed[BusTransfers::max_interfaces]["error"], "candump");
+  EXPECT_EQ(dump.summary()["damaged_lines"], 100 - BusTransfers::max_interfaces);
 }
 
 }  // namespace

@@ -32,11 +32,14 @@ class NumberedLines {
       if (size_ > max_datagram) too_long(number_, size_);
       const bool second_half = bytes[end] == '\n' && end == 0 && after_cr_;  // of CR LF
       if (!second_half) ++number_;
+      begin_ += size_ + 1;
       size_ = 0;
       after_cr_ = bytes[end] == '\r';
       bytes.remove_prefix(taken);
     }
   }
+  // The byte of the input, from 0, where the line begins that is told of.
+  std::uint64_t begin() const { return begin_; }
   // The input has ended, perhaps within a line.
   template <class Line, class TooLong>
   void finish(Line line, TooLong too_long) {
@@ -46,6 +49,7 @@ class NumberedLines {
  private:
   LineFraming framing_;
   std::uint64_t number_ = 1;
+  std::uint64_t begin_ = 0;
   std::uint64_t size_ = 0;  // of the line so far
   bool after_cr_ = false;
 };

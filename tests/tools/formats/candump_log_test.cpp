@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// CAN frames to records, and records to the frames that carry them.
+#include <gtest/gtest.h>
+
+#include "converted.hpp"
+#include "tests/support/problems.hpp"
+
+namespace r4::test {
+namespace {
+
+// The lines of a recording that have datagrams.
+std::string datagram_lines(const std::string& native) {
+  std::string lines;
+  for (std::size_t at = 0, end = 0; at < native.size(); at = end + 1) {
+    end = native.find('\n', at);
+    const std::string line = native.substr(at, end - at + 1);
+    const std::size_t mark = line.find_first_of("<>!");
+    if (line[0] != '#' && line[mark] != '!') lines += line;
+  }
+  return lines;
+}
+
+TEST(CandumpLog, CarriesEveryDatagramOfTheCaptureThereAndBack) {
+  for (const char* url : {"can://can0?node=3", "can://can0", "can://vcan1?pack=0&node=31",
+                          "can://can0?node=0&fd=1"}) {
+    const std::string native = recorded_capture(url);
+    const Converted log = converted(native, ".r4log", ".log");
+    EXPECT_EQ(log.left_out, "2 that have no frames on a bus") << url;
+    const Converted back = converted(log.bytes, ".log", ".r4log", 7);
+    EXPECT_TRUE(back.damage.empty()) << url;
+    EXPECT_EQ(datagram_lines(back.bytes), datagram_lines(native)) << url;
+  }
+}
+
+TEST(CandumpLog, HasTheFramesThatAreOnTheBus) {
+  std::string native;
+  write_record_header(native);
+  write_wire(native, {7, "can://can0?node=3&pack=0", "arm"});
+  write_record(native, {Time{1436509052249713}, 7, RecordKind::to_board, "E:1;^0x1^"});
+  EXPECT_EQ(converted(native, ".r4log", ".log").bytes,
+            "(1436509052.249713) can0 183#1009453A313B5E30\n"
+            "(1436509052.249713) can0 203#300000\n"
+            "(1436509052.249713) can0 183#2178315E\n");
+}
+
+TEST(CandumpLog, TellsOfStopsAndOfBoardsThatWentSafe) {
+  const std::string native = converted(
+                                 "(1436509052.249713) can0 010#\n"
+                                 "(1436509052.250713) can0 023#02\n"
+                                 "(1436509052.250713) can0 20000004#0000000000000000\n",
+                                 ".log", ".r4log")
+                                 .bytes;
+  EXPECT_TRUE(contains(native, "1436509052.249713 0! stop can0\n"));
+  EXPECT_TRUE(contains(native, "1436509052.250713 1! link safe stop\n"));
+  EXPECT_TRUE(contains(native, "# wire 1 can://can0?node=3\n"));
+}
+
+TEST(CandumpLog, TellsThePlaceOfWhatCannotBeRead) {
+  const std::string log = converted(recorded_capture("can://can0"), ".r4log", ".log").bytes;
+  const std::size_t second = log.find('\n') + 1;
+  const std::size_t third = log.find('\n', second) + 1;
+  // A line that is none, one without a time, and a frame that is lost.
+  const Converted result =
+      converted("x\n can0 010#\n" + log.substr(0, second) + log.substr(third), ".log", ".r4log");
+  ASSERT_EQ(result.damage.size(), 3);
+  EXPECT_EQ(result.damage[0].line, 1);
+  EXPECT_EQ(result.damage[1].offset, 2);
+  EXPECT_TRUE(contains(result.damage[1].reason, "no time since 1970"));
+  EXPECT_EQ(result.damage[2].line, 4);
+  EXPECT_TRUE(contains(result.damage[2].reason, "a datagram of node 1 that is not whole"));
+  EXPECT_EQ(
+      datagram_lines(result.bytes),
+      datagram_lines(recorded_capture()).substr(datagram_lines(recorded_capture()).find('\n') + 1));
+}
+
+TEST(CandumpLog, RefusesWhatIsNoneAndWhatItCannotHold) {
+  for (const std::string& text :
+       {std::string(), std::string("hello\n"), std::string(100'000, '\n')}) {
+    EXPECT_EQ(problem_of([&] { converted(text, ".log", ".r4log"); }).reason,
+              "no log of CAN frames");
+  }
+  const Problem problem = problem_of([] { converted(recorded_capture(), ".r4log", ".log"); });
+  EXPECT_EQ(problem.kind, ErrorKind::data);
+  EXPECT_EQ(problem.thing, "udp://192.168.0.125");
+  EXPECT_TRUE(contains(problem.fix, ".pcapng"));
+}
+
+TEST(CandumpLog, LeavesOutWhatNoTransferCanHold) {
+  std::string native;
+  write_record_header(native);
+  write_wire(native, {1, "can://can0", ""});
+  for (const std::string& bytes : {std::string(), std::string("\x80 x"), std::string(1025, 'x')}) {
+    write_record(native, {Time{1}, 1, RecordKind::from_board, bytes});
+  }
+  write_record(native, {Time{1}, 1, RecordKind::from_board, "fits"});
+  EXPECT_EQ(converted(native, ".r4log", ".log").left_out, "3 that have no frames on a bus");
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The native format as a source and a sink, and what all formats have in common.
+#include "tools/r4/formats/conversion.hpp"
+
+#include <gtest/gtest.h>
+
+#include "converted.hpp"
+#include "tests/support/problems.hpp"
+
+namespace r4::test {
+namespace {
+
+TEST(Conversion, GivesANativeRecordingAsItWas) {
+  for (const std::string& native : {recorded_capture(), generated_recording(1, 3000)}) {
+    EXPECT_EQ(and_back(native, ".r4log"), native);
+    EXPECT_EQ(and_back(native, ".r4log.zst"), native);
+  }
+}
+
+TEST(Conversion, TellsThePlaceOfDamageAndConvertsTheRest) {
+  const std::string native = recorded_capture();
+  const std::size_t second = native.find('\n', native.find("AIN24")) + 1;
+  const std::string damaged =
+      native.substr(0, second) + "nonsense\n" + native.substr(second) + "1795468293.4047";
+  const Converted result = converted(damaged, ".r4log", ".r4log");
+  EXPECT_EQ(result.bytes, native);
+  ASSERT_EQ(result.damage.size(), 2);
+  EXPECT_EQ(result.damage[0].offset, second);
+  EXPECT_EQ(result.damage[0].line,
+            1 + std::count(native.begin(), native.begin() + static_cast<long>(second), '\n'));
+  EXPECT_EQ(result.damage[1].reason, "the last line is not whole");
+}
+
+TEST(Conversion, GivesWhatHasNoHeaderOneAndAnEnd) {
+  StringOutput output;
+  const auto sink = tool::make_sink("x.r4log", output);
+  tool::Conversion conversion(*sink, {});
+  conversion.on_wire({1, "can://can0?node=1", ""});
+  conversion.on_record({Time{1795468293404765}, 1, RecordKind::event, "up"});
+  conversion.finish();
+  EXPECT_TRUE(output.bytes.starts_with("# r4log 1 by r4 "));
+  EXPECT_TRUE(
+      output.bytes.ends_with("# wire 1 can://can0?node=1\n"
+                             "# from 2026-11-23T21:11:33.404765Z\n"
+                             "1795468293.404765 1! up\n"
+                             "1795468293.404765 0! end\n"));
+}
+
+TEST(Conversion, RefusesEndingsThatAreNoFormat) {
+  StringOutput output;
+  for (const char* name : {"x", "x.zst", "x.xlsx", "-", "r4log/x"}) {
+    const Problem problem = problem_of([&] { tool::make_sink(name, output); });
+    EXPECT_EQ(problem.kind, ErrorKind::usage) << name;
+    EXPECT_TRUE(contains(problem.fix, ".r4log.zst"));
+  }
+  struct Nobody final : RecordingReader::Handler {
+    void on_record(const Record&) override {}
+    void on_wire(const RecordedWire&) override {}
+    void on_damage(const RecordingDamage&) override {}
+  } nobody;
+  for (const char* name : {"x.csv", "x.jsonl"}) {
+    EXPECT_TRUE(
+        contains(problem_of([&] { tool::make_source(name, nobody); }).reason, "only written"));
+  }
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Recordings for tests, and what the formats make of them.
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "host/recording/record_line.hpp"
+#include "tests/support/datagrams.hpp"
+#include "tools/r4/recording/formats.hpp"
+
+namespace r4::test {
+
+struct StringOutput final : tool::Output {
+  void write(std::string_view written) override { bytes += written; }
+  std::string bytes;
+};
+
+struct Converted {
+  std::string bytes;
+  std::string left_out;
+  struct Damage {
+    std::uint64_t line, offset;
+    std::string reason;
+  };
+  std::vector<Damage> damage;
+};
+
+// What `r4 convert` makes of the bytes of a file, by the endings of both; fed in pieces of that size.
+inline Converted converted(std::string_view bytes, const std::string& from, const std::string& to,
+                           std::size_t piece = 1000) {
+  StringOutput output;
+  Converted result;
+  const std::unique_ptr<tool::Sink> sink = tool::make_sink("test" + to, output);
+  const auto read = [&](RecordingReader::Handler& handler) {
+    const std::unique_ptr<tool::Source> source = tool::make_source("test" + from, handler);
+    for (std::string_view rest = bytes; !rest.empty();
+         rest.remove_prefix(std::min(piece, rest.size()))) {
+      source->feed(rest.substr(0, piece));
+    }
+    source->finish();
+  };
+  if (sink->wants_survey()) {
+    tool::Survey survey(*sink);
+    read(survey);
+  }
+  tool::Conversion conversion(*sink, [&](const RecordingDamage& each) {
+    result.damage.push_back({each.line, each.offset, std::string(each.reason)});
+  });
+  read(conversion);
+  conversion.finish();
+  result.bytes = std::move(output.bytes);
+  result.left_out = sink->left_out();
+  return result;
+}
+
+// There and back again.
+inline std::string and_back(const std::string& native, const std::string& by) {
+  return converted(converted(native, ".r4log", by).bytes, by, ".r4log").bytes;
+}
+
+// The paper's capture as a recording of one board, of both directions, with the two damaged datagrams.
+std::string recorded_capture(const std::string& url = "udp://192.168.0.125");
+
+// A recording of that many records of three wires, by a seed: datagrams, damaged ones, any bytes, events, comments,
+// wires that get a name, times that go back.
+std::string generated_recording(unsigned seed, int records);
+
+}  // namespace r4::test

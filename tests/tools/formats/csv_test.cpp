@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/r4/formats/csv.hpp"
+
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+#include "converted.hpp"
+
+namespace r4::test {
+namespace {
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+std::string one_state(const std::string& fields) {
+  std::string native;
+  write_record_header(native);
+  write_wire(native, {1, "udp://robot", ""});
+  write_record(native, {Time{1795468293000001}, 1, RecordKind::from_board, with_crc(fields)});
+  write_wire(native, {1, "udp://robot", "left, \"old\" arm"});
+  return native;
+}
+
+TEST(Csv, HasARowForEachStateAndAColumnForEachValue) {
+  const Converted csv = converted(recorded_capture(), ".r4log", ".csv");
+  const std::vector<std::string> lines = lines_of(csv.bytes);
+  EXPECT_EQ(lines[0],
+            "time [s],wire,board,PNum,T [ms],AIN24 [V],AIN12 [V],AIN5 [V],AINDMH [V],DMHSTA [0/1],"
+            "AINSTEER [V],DHB1A pwm [0-4095],DHB1A direction [0/1],OSMC1 pwm [0-4095],"
+            "OSMC1 direction [0/1],STEP1POS [steps],SERVO1POS [us]");
+  EXPECT_EQ(lines[1],
+            "1795468293.414765,1,left-arm,7434,79090,24.28,12.12,5.12,12.11,1,1.03,4095,1,400,1,"
+            "-100,2000");
+  // What is damaged, and what is none, is counted.
+  const auto states = lines.size() - 1;
+  EXPECT_EQ(csv.left_out,
+            std::to_string(paper_capture().size() + 2 - states) + " that are no state");
+  EXPECT_GT(states, 50);
+  for (const std::string& line : lines) {
+    EXPECT_EQ(std::count(line.begin(), line.end(), ','), 16) << line;
+  }
+}
+
+TEST(Csv, HasTheFieldsThatAreThereAndLeavesAPlaceWhereOneIsMissing) {
+  const std::string native = one_state("ENC1:-5;BLDC1:1,0,1;PNum:1;T:2;");
+  std::string two = native;
+  write_record(two, {Time{1795468293000002}, 1, RecordKind::from_board,
+                     with_crc("US2:30;NEWFIELD:1;PNum:2;T:3;")});
+  const std::vector<std::string> lines = lines_of(converted(two, ".r4log", ".csv").bytes);
+  ASSERT_EQ(lines.size(), 3);
+  EXPECT_EQ(lines[0],
+            "time [s],wire,board,PNum,T [ms],ENC1 [counts],US2 [cm],BLDC1 speed [0-4095],"
+            "BLDC1 direction [0/1],BLDC1 brake [0/1]");
+  EXPECT_EQ(lines[1], "1795468293.000001,1,\"left, \"\"old\"\" arm\",1,2,-5,,1,0,1");
+  EXPECT_EQ(lines[2], "1795468293.000002,1,\"left, \"\"old\"\" arm\",2,3,,30,,,");
+}
+
+TEST(Csv, HasNoRowForAStateWhoseValuesAreNone) {
+  // The checksum is right: a column of numbers stays one.
+  const Converted csv = converted(one_state("AIN24:abc;PNum:1;T:2;"), ".r4log", ".csv");
+  EXPECT_EQ(lines_of(csv.bytes).size(), 1);
+  EXPECT_EQ(csv.left_out, "1 that are no state");
+}
+
+TEST(Csv, HasEveryColumnWhereTheFileCannotBeReadTwice) {
+  StringOutput output;
+  tool::CsvSink sink(output);
+  sink.on_record({Time{1}, 1, RecordKind::event, "up"});
+  EXPECT_EQ(std::count(output.bytes.begin(), output.bytes.end(), ','), 4 + 82);
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Joins the recorded frames of CAN buses to datagrams, by the ISO-TP receivers that boards and hosts have
+// (docs/can.md).
+//
+// Receivers only listen: one for each interface, node and lane that occurs. Time is the recording's. Memory is bounded
+// by max_interfaces, whatever comes in.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <list>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "r4link/datagram.hpp"
+#include "transports/framing/can/can_ids.hpp"
+#include "transports/framing/can/isotp_receiver.hpp"
+
+namespace r4::tool {
+
+class BusTransfers {
+ public:
+  static constexpr std::size_t max_interfaces = 32;
+
+  // Where and when a frame was.
+  struct Place {
+    std::uint64_t line = 0;    // of a text
+    std::uint64_t offset = 0;  // in the file
+    std::optional<std::uint64_t> time_us;
+    std::string date;  // in the place of a time: as it stood there
+  };
+  struct Lane {
+    Lane(std::string name, const CanIdMeaning& what);
+    Lane(const Lane&) = delete;
+    Lane& operator=(const Lane&) = delete;
+
+    const std::string interface;
+    const CanIdMeaning meaning;  // command, reply or telemetry of a node
+    std::array<std::uint8_t, max_datagram> bytes;
+    IsotpReceiver receiver;
+    bool answered = false;     // the other end has sent flow control
+    std::uint32_t frames = 0;  // of the transfer so far
+    Place first, last;
+  };
+  class Handler {
+   public:
+    // The bytes that lane.receiver has are whole: plain or packed.
+    virtual void on_datagram(const Lane& lane) = 0;
+    virtual void on_failure(const Lane& lane, const Place& place, IsotpError error) = 0;
+    // An emergency stop, or a board that went safe.
+    virtual void on_raw_frame(const std::string& interface, const CanIdMeaning& meaning,
+                              const CanFrame& frame, const Place& place) = 0;
+
+   protected:
+    ~Handler() = default;
+  };
+
+  explicit BusTransfers(Handler& handler) : handler_(handler) {}
+
+  enum class Frame : std::uint8_t { taken, other, too_many_interfaces };
+  // A frame of the bus; `other` is none of ours.
+  Frame on_frame(std::string_view interface, const CanFrame& frame, const Place& place);
+  // So late is it.
+  void pass_time(const std::optional<std::uint64_t>& time_us);
+
+  // Transfers that have not ended yet.
+  std::vector<const Lane*> unfinished() const;
+  std::uint64_t flow_control() const { return flow_control_; }
+  // Frames of transfers that were not heard from their beginning.
+  std::uint64_t orphans() const { return orphans_; }
+
+ private:
+  struct Interface {
+    std::string name;
+    // By node: command, reply, telemetry; made when they are first used.
+    std::array<std::array<std::unique_ptr<Lane>, 3>, can_nodes> lanes;
+  };
+
+  void on_lane_frame(Interface& interface, const CanIdMeaning& meaning, const CanFrame& frame,
+                     const Place& place);
+  Interface* interface_of(std::string_view name);
+  Lane& lane_of(Interface& interface, const CanIdMeaning& meaning);
+  void end_late_transfers();
+
+  Handler& handler_;
+  std::list<Interface> interfaces_;
+  std::vector<Lane*> lanes_;  // all of them
+  std::uint32_t now_us_ = 0;
+  std::optional<std::uint64_t> last_time_us_;
+  IsotpDeadline earliest_{false, 0};  // no transfer times out before
+  std::uint64_t flow_control_ = 0;
+  std::uint64_t orphans_ = 0;
+};
+
+}  // namespace r4::tool

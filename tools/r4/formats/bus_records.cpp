@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bus_records.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+
+#include "r4link/vocabulary.hpp"
+#include "transports/framing/can/packed_form.hpp"
+
+namespace r4::tool {
+namespace {
+
+Time time_of(const BusTransfers::Place& place) {
+  return Time{static_cast<std::int64_t>(place.time_us.value_or(0))};
+}
+
+}  // namespace
+
+void BusRecords::on_frame(std::string_view interface, const CanFrame& frame,
+                          const BusTransfers::Place& place) {
+  transfers_.pass_time(place.time_us);
+  if (transfers_.on_frame(interface, frame, place) == BusTransfers::Frame::too_many_interfaces) {
+    damage(place, "more than 32 interfaces");
+  }
+}
+
+void BusRecords::finish() {
+  for (const BusTransfers::Lane* const lane : transfers_.unfinished()) {
+    damage(lane->last, "the rest of this datagram is not there");
+  }
+}
+
+void BusRecords::on_datagram(const BusTransfers::Lane& lane) {
+  const std::uint8_t* const bytes = lane.receiver.data();
+  const std::size_t size = lane.receiver.size();
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): bytes as characters
+  std::string_view datagram(reinterpret_cast<const char*>(bytes), size);
+  std::array<char, max_datagram> plain;
+  if (size != 0 && is_packed(bytes[0])) {
+    const UnpackResult result = unpack(bytes, size, plain.data(), plain.size());
+    if (!result) {
+      return damage(lane.last,
+                    fmt::format("a packed datagram that is none: {}", to_text(result.error)));
+    }
+    datagram = {plain.data(), result.size};
+  }
+  const std::uint16_t wire = wire_of(lane.interface, lane.meaning.node);
+  const bool from_host = lane.meaning.kind == CanIdKind::command;
+  handler_.on_record({time_of(lane.last), wire,
+                      from_host ? RecordKind::to_board : RecordKind::from_board, datagram});
+}
+
+void BusRecords::on_failure(const BusTransfers::Lane& lane, const BusTransfers::Place& place,
+                            IsotpError error) {
+  const Text reason = to_text(error);
+  damage(place, fmt::format("a datagram of node {} that is not whole: {}", lane.meaning.node,
+                            std::string_view(reason.data(), reason.size())));
+}
+
+void BusRecords::on_raw_frame(const std::string& interface, const CanIdMeaning& meaning,
+                              const CanFrame& frame, const BusTransfers::Place& place) {
+  if (meaning.kind == CanIdKind::emergency_stop) {
+    handler_.on_record({time_of(place), no_wire, RecordKind::event, "stop " + interface});
+    return;
+  }
+  const std::uint8_t number = frame.size == 0 ? 0 : frame.data[0];
+  const SafeReason reason = number == 0 ? SafeReason::fault : to_safe_reason(number);
+  const std::string words = fmt::format("link safe {}", to_text(reason));
+  handler_.on_record({time_of(place), wire_of(interface, meaning.node), RecordKind::event, words});
+}
+
+std::uint16_t BusRecords::wire_of(const std::string& interface, std::uint8_t node) {
+  const auto [known, added] = wires_.try_emplace({interface, node}, no_wire);
+  if (added) known->second = add_wire(fmt::format("can://{}?node={}", interface, node));
+  return known->second;
+}
+
+std::uint16_t BusRecords::add_wire(const std::string& url) {
+  handler_.on_wire({++last_wire_, url, ""});
+  return last_wire_;
+}
+
+void BusRecords::damage(const BusTransfers::Place& place, const std::string& reason) {
+  handler_.on_damage({RecordingDamage::Kind::line, place.line, place.offset, reason});
+}
+
+}  // namespace r4::tool

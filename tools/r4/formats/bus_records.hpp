@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The frames of CAN buses as records: a wire for each node of each interface, can://can0?node=3, in the order in which
+// they are first heard. A datagram has the time of its last frame.
+//
+// An emergency stop is an event of no wire, "stop can0"; a board that goes safe one of its own, "link safe stop".
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "../bus/bus_transfers.hpp"
+#include "host/recording/recording_reader.hpp"
+
+namespace r4::tool {
+
+class BusRecords final : BusTransfers::Handler {
+ public:
+  explicit BusRecords(RecordingReader::Handler& handler) : handler_(handler) {}
+
+  // `place` has a time. A frame that is none of ours is passed over.
+  void on_frame(std::string_view interface, const CanFrame& frame,
+                const BusTransfers::Place& place);
+  // No more frames come.
+  void finish();
+  // The number of a wire that is told of now; those of other sources of the same recording count on.
+  std::uint16_t add_wire(const std::string& url);
+
+ private:
+  void on_datagram(const BusTransfers::Lane& lane) override;
+  void on_failure(const BusTransfers::Lane& lane, const BusTransfers::Place& place,
+                  IsotpError error) override;
+  void on_raw_frame(const std::string& interface, const CanIdMeaning& meaning,
+                    const CanFrame& frame, const BusTransfers::Place& place) override;
+  std::uint16_t wire_of(const std::string& interface, std::uint8_t node);
+  void damage(const BusTransfers::Place& place, const std::string& reason);
+
+  RecordingReader::Handler& handler_;
+  BusTransfers transfers_{*this};
+  std::map<std::pair<std::string, std::uint8_t>, std::uint16_t> wires_;
+  std::uint16_t last_wire_ = 0;
+};
+
+}  // namespace r4::tool

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What every format of recordings is to `r4 convert`: a source that tells what is in a file, or a sink that makes a
+// file of it, in constant memory however long the recording is.
+//
+//     file --> Source --(RecordingReader::Handler)--> Conversion --> Sink --> Output
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "host/recording/recording_reader.hpp"
+
+namespace r4::tool {
+
+// Tells a RecordingReader::Handler what is in a file. What cannot be read is told as damage, with the line 0 where
+// the format has none, and the rest is read.
+class Source {
+ public:
+  virtual ~Source() = default;
+  // Takes the next bytes. Throws Error{data} for a file of another kind.
+  virtual void feed(std::string_view bytes) = 0;
+  // The file has ended. Throws Error{data} if it was of another kind.
+  virtual void finish() = 0;
+};
+
+// Where a sink writes to.
+class Output {
+ public:
+  // Throws Error.
+  virtual void write(std::string_view bytes) = 0;
+
+ protected:
+  ~Output() = default;
+};
+
+// Makes a file of what it is told. Each throws Error when the file cannot be written, or cannot hold that.
+class Sink {
+ public:
+  virtual ~Sink() = default;
+  // Does it want to be told of all wires and records by survey() first? Where a file can be read once only, it is not.
+  virtual bool wants_survey() const { return false; }
+  virtual void survey(const RecordedWire& wire) { static_cast<void>(wire); }
+  virtual void survey(const Record& record) { static_cast<void>(record); }
+  // A line that begins with #; such lines have no time of their own, so it is that of the record before, and of the
+  // first one for those at the beginning.
+  virtual void on_comment(std::string_view line, Time time) = 0;
+  virtual void on_wire(const RecordedWire& wire, Time time) = 0;
+  virtual void on_record(const Record& record) = 0;
+  // All was told.
+  virtual void finish() = 0;
+  // What of it the file does not hold, for people: "12 that are no state"; empty: it holds everything.
+  virtual std::string left_out() const { return {}; }
+};
+
+// A first look at a recording for a sink.
+class Survey final : public RecordingReader::Handler {
+ public:
+  explicit Survey(Sink& sink) : sink_(sink) {}
+  void on_record(const Record& record) override { sink_.survey(record); }
+  void on_wire(const RecordedWire& wire) override { sink_.survey(wire); }
+  void on_damage(const RecordingDamage&) override {}
+
+ private:
+  Sink& sink_;
+};
+
+// From a source to a sink.
+class Conversion final : public RecordingReader::Handler {
+ public:
+  using TellDamage = std::function<void(const RecordingDamage&)>;
+
+  Conversion(Sink& sink, TellDamage tell) : sink_(sink), tell_(std::move(tell)) {}
+
+  void on_record(const Record& record) override;
+  void on_wire(const RecordedWire& wire) override;
+  void on_comment(std::string_view line) override;
+  void on_damage(const RecordingDamage& damage) override;
+  // The source has ended.
+  void finish();
+
+  std::uint64_t records() const { return records_; }
+  std::uint64_t damage() const { return damage_; }
+
+ private:
+  // So many lines wait for the first record's time; a file that has more is none that r4 wrote.
+  static constexpr std::size_t most_waiting = 1000;
+  struct Waiting {
+    bool is_wire;
+    RecordedWire wire;
+    std::string comment;
+  };
+  void wait(Waiting line);
+  void begin(Time time);
+
+  Sink& sink_;
+  const TellDamage tell_;
+  std::vector<Waiting> waiting_;  // until begun_
+  bool begun_ = false;
+  Time time_{0};  // of the newest record
+  std::uint64_t records_ = 0;
+  std::uint64_t damage_ = 0;
+};
+
+}  // namespace r4::tool

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// .csv: the states of a recording, a row each, a column a value with its unit in the header (RFC 4180).
+//
+//     time [s],wire,board,PNum,T [ms],AIN24 [V],OSMC1 pwm [0-4095],OSMC1 direction [0/1]
+//     1795468293.405588,1,left-arm,7434,79090,24.28,400,1
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "conversion.hpp"
+#include "r4link/datagram.hpp"
+#include "r4link/state.hpp"
+#include "wire_names.hpp"
+
+namespace r4::tool {
+
+class CsvSink final : public Sink {
+ public:
+  explicit CsvSink(Output& output) : output_(output) {}
+  // The columns are those of the fields that were there; of all fields if nothing was surveyed.
+  bool wants_survey() const override { return true; }
+  void survey(const RecordedWire& wire) override { names_.on_wire(wire); }
+  void survey(const Record& record) override;
+  void on_comment(std::string_view, Time) override {}
+  void on_wire(const RecordedWire& wire, Time) override { names_.on_wire(wire); }
+  void on_record(const Record& record) override;
+  void finish() override;
+  std::string left_out() const override;
+
+ private:
+  bool read(const Record& record);
+  void write_header();
+
+  Output& output_;
+  WireNames names_;
+  Datagram datagram_;
+  State state_;
+  FieldSet columns_;
+  bool begun_ = false;
+  std::string row_;
+  std::uint64_t others_ = 0;  // records that are no state
+};
+
+}  // namespace r4::tool

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "native.hpp"
+
+#include "host/recording/record_line.hpp"
+
+namespace r4::tool {
+namespace {
+
+// A frame of zstd holds so much text: what is damaged costs no more.
+constexpr std::size_t frame_text = 1 << 20;
+
+}  // namespace
+
+NativeSink::NativeSink(Output& output, bool compressed) : output_(output) {
+  if (compressed) zstd_.emplace();
+  text_.reserve(frame_text + max_record_line);
+}
+
+void NativeSink::begin() {
+  if (begun_) return;
+  begun_ = ours_ = true;
+  write_record_header(text_);
+}
+
+void NativeSink::on_comment(std::string_view line, Time) {
+  if (!begun_ && line.starts_with("# r4log ")) begun_ = true;
+  begin();
+  text_ += line;
+  text_ += '\n';
+  write_out(false);
+}
+
+void NativeSink::on_wire(const RecordedWire& wire, Time) {
+  begin();
+  write_wire(text_, wire);
+  write_out(false);
+}
+
+void NativeSink::on_record(const Record& record) {
+  begin();
+  if (ours_ && !told_when_) write_beginning(text_, record.time);
+  told_when_ = true;
+  time_ = record.time;
+  write_record(text_, record);
+  write_out(false);
+}
+
+void NativeSink::finish() {
+  begin();
+  if (ours_) write_record(text_, {time_, no_wire, RecordKind::event, "end"});
+  write_out(true);
+}
+
+void NativeSink::write_out(bool end) {
+  if (text_.size() < frame_text && !end) return;
+  if (zstd_) {
+    compressed_.clear();
+    zstd_->write(text_, true, compressed_);
+    output_.write(compressed_);
+  } else {
+    output_.write(text_);
+  }
+  text_.clear();
+}
+
+}  // namespace r4::tool

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The native format, .r4log and .r4log.zst (docs/recordings.md), as a source and a sink.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "conversion.hpp"
+#include "host/recording/zstd_stream.hpp"
+
+namespace r4::tool {
+
+class NativeSource final : public Source {
+ public:
+  NativeSource(RecordingReader::Handler& handler, std::string name)
+      : reader_(handler, std::move(name)) {}
+  void feed(std::string_view bytes) override { reader_.feed(bytes); }
+  void finish() override { reader_.finish(); }
+
+ private:
+  RecordingReader reader_;
+};
+
+// Writes the lines that it is told as they were. What comes from another format gets a header and an end of its own.
+class NativeSink final : public Sink {
+ public:
+  NativeSink(Output& output, bool compressed);
+  void on_comment(std::string_view line, Time time) override;
+  void on_wire(const RecordedWire& wire, Time time) override;
+  void on_record(const Record& record) override;
+  void finish() override;
+
+ private:
+  void begin();
+  void write_out(bool end);
+
+  Output& output_;
+  std::optional<ZstdWriter> zstd_;
+  bool begun_ = false;
+  bool ours_ = false;       // the header
+  bool told_when_ = false;  // it begins
+  Time time_{0};            // of the newest record
+  std::string text_, compressed_;
+};
+
+}  // namespace r4::tool

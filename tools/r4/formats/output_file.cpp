@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "output_file.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <utility>
+
+#include "r4link/error.hpp"
+
+namespace r4::tool {
+namespace {
+
+constexpr std::size_t most_waiting = 65536;
+
+}  // namespace
+
+OutputFile::OutputFile(std::string path, bool replace)
+    : path_(std::move(path)), part_(path_ + ".part"), replace_(replace) {
+  struct stat status {};
+  if (::lstat(path_.c_str(), &status) == 0) {
+    if (!S_ISREG(status.st_mode)) {
+      throw Error(ErrorKind::open, path_, S_ISDIR(status.st_mode) ? "is a directory" : "is no file",
+                  "name a file that is not there yet");
+    }
+    if (!replace_) {
+      throw Error(ErrorKind::open, path_, "is there already",
+                  "name another file, or replace it: --force");
+    }
+  }
+  file_.reset(::open(part_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666));
+  if (!file_) fail(errno);
+  waiting_.reserve(2 * most_waiting);
+}
+
+OutputFile::~OutputFile() {
+  if (file_) ::unlink(part_.c_str());
+}
+
+void OutputFile::write(std::string_view bytes) {
+  waiting_ += bytes;
+  if (waiting_.size() >= most_waiting) write_out();
+}
+
+void OutputFile::write_out() {
+  std::string_view rest = waiting_;
+  while (!rest.empty()) {
+    const ssize_t n = ::write(file_.get(), rest.data(), rest.size());
+    if (n >= 0) {
+      rest.remove_prefix(static_cast<std::size_t>(n));
+    } else if (errno != EINTR) {
+      fail(errno);
+    }
+  }
+  waiting_.clear();
+}
+
+void OutputFile::finish() {
+  write_out();
+  const unsigned flags = replace_ ? 0 : RENAME_NOREPLACE;
+  if (::renameat2(AT_FDCWD, part_.c_str(), AT_FDCWD, path_.c_str(), flags) != 0) {
+    // Not every file system knows that flag.
+    if (errno != EINVAL || ::rename(part_.c_str(), path_.c_str()) != 0) fail(errno);
+  }
+  file_.reset();
+}
+
+void OutputFile::fail(int error) const {
+  const bool denied = error == EACCES || error == EPERM || error == EROFS;
+  const bool full = error == ENOSPC || error == EDQUOT || error == EFBIG;
+  throw Error(denied ? ErrorKind::permission : ErrorKind::open, path_, std::strerror(error),
+              denied ? "name a directory that you may write to"
+              : full ? "make room there, or name a file on another disk"
+                     : "name a file that can be written");
+}
+
+}  // namespace r4::tool

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The file that a conversion makes. It is there as a whole or not at all: what was not finished is removed.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "conversion.hpp"
+#include "transports/file_descriptor.hpp"
+
+namespace r4::tool {
+
+class OutputFile final : public Output {
+ public:
+  // Makes it. Throws Error if there is such a file, unless `replace`.
+  OutputFile(std::string path, bool replace);
+  ~OutputFile();
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+
+  // Throws Error when the disk is full.
+  void write(std::string_view bytes) override;
+  // All is written. Throws Error.
+  void finish();
+  const std::string& path() const { return path_; }
+
+ private:
+  void write_out();
+  [[noreturn]] void fail(int error) const;
+
+  const std::string path_;
+  std::string part_;  // its name until it is finished
+  FileDescriptor file_;
+  std::string waiting_;
+  const bool replace_;
+};
+
+}  // namespace r4::tool

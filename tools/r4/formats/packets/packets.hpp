@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Numbers of pcapng and of what packets are in (draft-ietf-opsawg-pcapng; www.tcpdump.org/linktypes.html).
+#pragma once
+
+#include <cstdint>
+
+namespace r4::tool {
+
+// The port on which boards listen (the paper's).
+constexpr std::uint16_t board_port = 2018;
+
+// Blocks of pcapng, and options of an interface.
+constexpr std::uint32_t pcapng_section = 0x0A0D0D0A;
+constexpr std::uint32_t pcapng_magic = 0x1A2B3C4D;
+constexpr std::uint32_t pcapng_interface = 1;
+constexpr std::uint32_t pcapng_simple_packet = 3;
+constexpr std::uint32_t pcapng_packet = 6;
+constexpr std::uint16_t pcapng_if_name = 2;
+constexpr std::uint16_t pcapng_if_description = 3;
+constexpr std::uint16_t pcapng_if_tsresol = 9;
+constexpr std::uint16_t pcapng_if_tsoffset = 14;
+
+// The longest block, and packet, that is read.
+constexpr std::uint32_t max_block = 1 << 20;
+
+// Link types.
+constexpr std::uint16_t link_null = 0;
+constexpr std::uint16_t link_ethernet = 1;
+constexpr std::uint16_t link_raw = 101;
+constexpr std::uint16_t link_loop = 108;
+constexpr std::uint16_t link_linux_sll = 113;
+constexpr std::uint16_t link_socketcan = 227;
+constexpr std::uint16_t link_ipv4 = 228;
+constexpr std::uint16_t link_ipv6 = 229;
+constexpr std::uint16_t link_upper_pdu = 252;
+constexpr std::uint16_t link_linux_sll2 = 276;
+
+}  // namespace r4::tool

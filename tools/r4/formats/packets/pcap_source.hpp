@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// .pcapng and .pcap, told apart by their beginning: captures of tcpdump and Wireshark of UDP or of SocketCAN, and what
+// PcapngSink has made of a recording.
+//
+// Where a block of pcapng is damaged, it goes on with the next one that there is; a damaged pcap has no more to tell.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "../byte_order.hpp"
+#include "../conversion.hpp"
+#include "packet_records.hpp"
+#include "packets.hpp"
+
+namespace r4::tool {
+
+class PcapSource final : public Source {
+ public:
+  // `port`: of the boards.
+  PcapSource(RecordingReader::Handler& handler, std::string name, std::uint16_t port = board_port)
+      : handler_(handler), records_(handler, port), name_(std::move(name)) {}
+  void feed(std::string_view bytes) override;
+  void finish() override;
+
+ private:
+  enum class Form : std::uint8_t {
+    unknown,
+    pcapng,
+    pcap,
+    broken
+  };  // broken: the rest cannot be read
+  struct Interface : PacketInterface {
+    std::uint64_t ticks = 1'000'000;  // of its times a second
+    std::int64_t offset_s = 0;
+  };
+
+  void take(bool at_end);
+  void begin(std::string_view bytes);
+  std::size_t take_block(std::string_view bytes, bool at_end);
+  std::size_t take_pcap_packet(std::string_view bytes, bool at_end);
+  std::size_t damaged_block(std::string_view reason);
+  void on_block(std::uint32_t type, std::string_view body);
+  void on_interface(std::string_view body);
+  void on_pcapng_packet(std::string_view body);
+  void damage(std::string_view reason);
+  template <class Number>
+  Number number(std::string_view bytes, std::size_t at) const {
+    return read_number<Number>(bytes.substr(at), order_);
+  }
+  static Time time_of(const Interface& interface, std::uint64_t ticks);
+
+  RecordingReader::Handler& handler_;
+  PacketRecords records_;
+  const std::string name_;
+  Form form_ = Form::unknown;
+  ByteOrder order_ = ByteOrder::little;
+  std::string waiting_;       // what is not taken yet
+  std::uint64_t offset_ = 0;  // where that begins in the file
+  bool searching_ = false;    // for the next block behind a damaged one
+  std::vector<Interface> interfaces_;
+};
+
+}  // namespace r4::tool

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 convert: a recording in another format.
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "../formats/output_file.hpp"
+#include "../shell/options.hpp"
+#include "../shell/subcommands.hpp"
+#include "formats.hpp"
+#include "host/recording/recording_file.hpp"
+#include "r4link/error.hpp"
+
+namespace r4::tool {
+namespace {
+
+struct Options {
+  std::string input;
+  std::string output;
+  bool force = false;
+  std::uint64_t port = board_port;
+};
+
+// So many places of damage are told; of more than that, how many.
+constexpr std::uint64_t most_damage = 20;
+
+// How far it is, on a terminal.
+class Progress {
+ public:
+  explicit Progress(const std::string& path) : shown_(::isatty(STDERR_FILENO) != 0) {
+    struct stat status {};
+    if (::stat(path.c_str(), &status) == 0 && S_ISREG(status.st_mode)) {
+      all_ = static_cast<std::uint64_t>(status.st_size);
+    }
+  }
+  ~Progress() { clear(); }
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  void begin(const char* what) {
+    what_ = what;
+    done_ = 0;
+  }
+  void advance(std::size_t bytes) {
+    done_ += bytes;
+    const auto now = std::chrono::steady_clock::now();
+    if (!shown_ || now - drawn_at_ < std::chrono::milliseconds{100}) return;
+    drawn_at_ = now;
+    drawn_ = true;
+    if (all_ != 0) {
+      constexpr std::size_t width = 30;
+      const std::size_t full = static_cast<std::size_t>(done_ * width / all_);
+      fmt::print(stderr, "\r{} [{:<{}}] {:3} %", what_,
+                 std::string(full < width ? full : width, '='), width, done_ * 100 / all_);
+    } else {
+      fmt::print(stderr, "\r{} {:.1f} MB", what_, static_cast<double>(done_) / 1e6);
+    }
+  }
+  void clear() {
+    if (drawn_) fmt::print(stderr, "\r\x1b[K");
+    drawn_ = false;
+  }
+
+ private:
+  const bool shown_;
+  bool drawn_ = false;
+  const char* what_ = "";
+  std::uint64_t all_ = 0;
+  std::uint64_t done_ = 0;
+  std::chrono::steady_clock::time_point drawn_at_ = std::chrono::steady_clock::now();
+};
+
+void read_all(const Options& options, RecordingReader::Handler& handler, Progress& progress) {
+  const std::unique_ptr<Source> source =
+      make_source(options.input, handler, {static_cast<std::uint16_t>(options.port)});
+  RecordingInput input(options.input);
+  for (std::string_view piece = input.read(); !piece.empty(); piece = input.read()) {
+    source->feed(piece);
+    progress.advance(piece.size());
+  }
+  source->finish();
+}
+
+bool can_be_read_twice(const std::string& path) {
+  struct stat status {};
+  return path != "-" && ::stat(path.c_str(), &status) == 0 && S_ISREG(status.st_mode);
+}
+
+int convert(const Options& options) {
+  OutputFile output(options.output, options.force);
+  const std::unique_ptr<Sink> sink = make_sink(options.output, output);
+  Progress progress(options.input);
+  if (sink->wants_survey() && can_be_read_twice(options.input)) {
+    progress.begin("looking");
+    Survey survey(*sink);
+    read_all(options, survey, progress);
+  }
+  progress.begin("converting");
+  std::uint64_t told = 0;
+  Conversion conversion(*sink, [&](const RecordingDamage& damage) {
+    if (++told > most_damage) return;
+    progress.clear();
+    const std::string line = damage.line == 0 ? "" : fmt::format("line {}, ", damage.line);
+    fmt::print(stderr, "r4: {}: {}byte {}: {}; it is left out\n", options.input, line,
+               damage.offset, damage.reason);
+  });
+  read_all(options, conversion, progress);
+  conversion.finish();
+  output.finish();
+  progress.clear();
+  if (told > most_damage) fmt::print(stderr, "r4: and {} more\n", told - most_damage);
+  const std::string left_out = sink->left_out();
+  fmt::print("{}: {} records{}\n", options.output, conversion.records(),
+             left_out.empty() ? "" : "; left out are " + left_out);
+  return conversion.damage() == 0 ? 0 : static_cast<int>(ErrorKind::data);
+}
+
+constexpr const char* footer =
+    R"(The endings of the two names tell the formats (docs/recordings.md):
+  .r4log .r4log.zst   the native one; also of the standard input, -
+  .log                the frames of a CAN bus as candump -L writes them
+  .pcapng             packets that Wireshark opens, with all of the recording in them; read are
+                      also captures, .pcap too, of UDP to and from --port, and of SocketCAN
+  .csv                the states, a row each, a column a value with its unit in the header
+  .jsonl              every record, a JSON object a line, as r4 decode shows it
+
+It takes no more memory for a long recording than for a short one. What cannot be read of a damaged
+file is told with its place, and the rest is converted. A file that is there is not replaced but with
+--force.
+
+Examples:
+  r4 convert drive.r4log -o drive.csv
+  r4 convert drive.r4log.zst -o drive.r4log
+  r4 convert drive.r4log -o drive.pcapng && wireshark drive.pcapng
+  tcpdump -w arm.pcap udp port 2018; r4 convert arm.pcap -o arm.csv
+  zstdcat robot-*.r4log.zst | r4 convert - -o robot.jsonl
+
+Exit codes: 0 all of it was converted; 1 some could not be read, or it is no recording; 2 usage; 4, 5 a
+file cannot be read or written.)";
+
+}  // namespace
+
+void add_convert(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* const command = add_subcommand(
+      root, chosen, "convert", "Write a recording in another format", footer, options, convert);
+  add_text(*command, "FILE", options->input, "a recording; - is the standard input", file_type,
+           Need::required);
+  add_text(*command, "-o,--output", options->output, "the file that is made", file_type,
+           Need::required);
+  add_number(*command, "--port", options->port, 1, 65535,
+             "the boards' UDP port in a capture (default: 2018)");
+  add_flag(*command, "--force", options->force, "replace a file that is there");
+}
+
+}  // namespace r4::tool

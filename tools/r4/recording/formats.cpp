@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "formats.hpp"
+
+#include <string_view>
+
+#include "../formats/candump_log.hpp"
+#include "../formats/csv.hpp"
+#include "../formats/json_lines.hpp"
+#include "../formats/native.hpp"
+#include "../formats/packets/pcap_source.hpp"
+#include "../formats/packets/pcapng_sink.hpp"
+#include "r4link/error.hpp"
+
+namespace r4::tool {
+
+std::unique_ptr<Source> make_source(const std::string& path, RecordingReader::Handler& handler,
+                                    const SourceOptions& options) {
+  for (const std::string_view ending : {".csv", ".jsonl"}) {
+    if (path.ends_with(ending)) {
+      throw Error(ErrorKind::usage, path, std::string(ending) + " is only written",
+                  "convert the recording that it was made of");
+    }
+  }
+  if (path.ends_with(".log")) return std::make_unique<CandumpSource>(handler, path);
+  if (path.ends_with(".pcapng") || path.ends_with(".pcap")) {
+    return std::make_unique<PcapSource>(handler, path, options.port);
+  }
+  return std::make_unique<NativeSource>(handler, path == "-" ? "standard input" : path);
+}
+
+std::unique_ptr<Sink> make_sink(const std::string& path, Output& output) {
+  const std::string_view name = path;
+  if (name.ends_with(".r4log")) return std::make_unique<NativeSink>(output, false);
+  if (name.ends_with(".r4log.zst")) return std::make_unique<NativeSink>(output, true);
+  if (name.ends_with(".log")) return std::make_unique<CandumpSink>(output);
+  if (name.ends_with(".pcapng")) return std::make_unique<PcapngSink>(output);
+  if (name.ends_with(".csv")) return std::make_unique<CsvSink>(output);
+  if (name.ends_with(".jsonl")) return std::make_unique<JsonLinesSink>(output);
+  throw Error(ErrorKind::usage, path, "no format has that ending",
+              "end it in .r4log, .r4log.zst, .csv, .jsonl, .log or .pcapng");
+}
+
+}  // namespace r4::tool

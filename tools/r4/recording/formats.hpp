@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The formats of recordings that r4 reads and writes, by the endings of their files.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "../formats/conversion.hpp"
+#include "../formats/packets/packets.hpp"
+
+namespace r4::tool {
+
+struct SourceOptions {
+  std::uint16_t port = board_port;  // of boards in a capture of UDP
+};
+
+// Reads the file of that name; "-", and what has none of the endings of other formats, is a native recording.
+// Throws Error{usage} for a format that is only written.
+std::unique_ptr<Source> make_source(const std::string& path, RecordingReader::Handler& handler,
+                                    const SourceOptions& options = {});
+
+// Writes the file of that name. Throws Error{usage} where its ending is none that is written.
+std::unique_ptr<Sink> make_sink(const std::string& path, Output& output);
+
+}  // namespace r4::tool
