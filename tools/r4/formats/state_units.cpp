@@ -30,7 +30,8 @@ StateUnits units_of(StateField field) {
   if (field == F::rxref) return one("[commands]");
   if (field == F::late) return one("[periods]");
   if (within(F::enc1hz, F::enc4hz)) return one("[counts/s]");
-  return {{"chip [address]", "trouble [bits]", {}}, 2};  // FAULT
+  if (field == F::fault) return {{"chip [address]", "trouble [bits]", {}}, 2};
+  return one("");
 }
 
 }  // namespace r4::tool

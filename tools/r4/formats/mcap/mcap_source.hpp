@@ -31,7 +31,7 @@ class McapSource final : public Source {
   void on_channel(std::string_view content);
   void on_message(std::string_view content);
   void on_chunk(std::string_view content);
-  void on_line(std::string_view escaped);
+  void on_line(std::string_view line);
   bool unpack(std::string_view compression, std::string_view bytes, std::uint64_t size);
   void damage(std::string_view reason);
   [[noreturn]] void fail_as_none() const;
