@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 convert as a program, and its files as others read them: pandas, Wireshark."""
+"""r4 convert as a program, and its files as others read them: pandas, Wireshark, and a reader of MCAP."""
 import subprocess
 
 import pandas
 import pytest
 
+import mcap_reader
 from r4_process import DATA, ERROR, run
 
 DATA_BAD, USAGE, OPEN = 1, 2, 4
@@ -85,6 +86,24 @@ def test_what_wireshark_writes_is_read(native, tmp_path):
                    check=True)
     convert(tmp_path / 'plain.pcap', tmp_path / 'plain.r4log')
     assert datagrams(tmp_path / 'plain.r4log') == datagrams(native)
+
+
+def test_every_index_and_checksum_of_mcap_is_right(native, tmp_path):
+    # Several chunks: the capture's lines again and again, and a second board.
+    lines = native.read_text().splitlines(True)
+    native.write_text(''.join(lines[:2]) + '# wire 2 can://can0?node=2\n' +
+                      ''.join(lines[2:] + [line.replace(' 1', ' 2', 1) for line in lines[4:-1]]) * 40)
+    convert(native, tmp_path / 'drive.mcap')
+    topics, messages = mcap_reader.read(tmp_path / 'drive.mcap')
+    assert topics == {'/r4log': ('r4.Line', {'wire': '0'}),
+                      '/left-arm': ('r4.Record', {'wire': '1', 'url': 'udp://192.168.0.125'}),
+                      '/board2': ('r4.Record', {'wire': '2', 'url': 'can://can0?node=2'})}
+    told = [(topic, ns, each) for topic, ns, each in messages if topic == '/left-arm']
+    assert len(told) == 40 * 72 and told[0][2] == {'type': 'event', 'event': 'up udp://192.168.0.125'}
+    _, when, state = told[1]
+    assert when == 1795468293_500000000 and state['fields']['DHB1A'] == [4095, 1] and state['pnum'] == 7434
+    convert(tmp_path / 'drive.mcap', tmp_path / 'again.r4log')
+    assert (tmp_path / 'again.r4log').read_bytes() == native.read_bytes()
 
 
 def test_damage_has_a_place_and_the_rest_is_converted(native, tmp_path):

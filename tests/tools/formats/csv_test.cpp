@@ -6,6 +6,8 @@
 #include <sstream>
 
 #include "converted.hpp"
+#include "protocol/messages/state_fields.hpp"
+#include "tools/r4/formats/state_units.hpp"
 
 namespace r4::test {
 namespace {
@@ -65,6 +67,22 @@ TEST(Csv, HasNoRowForAStateWhoseValuesAreNone) {
   const Converted csv = converted(one_state("AIN24:abc;PNum:1;T:2;"), ".r4log", ".csv");
   EXPECT_EQ(lines_of(csv.bytes).size(), 1);
   EXPECT_EQ(csv.left_out, "1 that are no state");
+}
+
+TEST(Csv, HasAUnitForEachValueOfEveryField) {
+  for (int i = 0; i < state_field_count; ++i) {
+    const auto field = static_cast<StateField>(i);
+    char buffer[100];
+    DatagramWriter writer(buffer, sizeof buffer);
+    write_field(writer, field, State());
+    Datagram datagram;
+    ASSERT_TRUE(read_datagram(writer.finish(), datagram));
+    const tool::StateUnits units = tool::units_of(field);
+    EXPECT_EQ(units.count, (*datagram.begin()).count()) << str(name_of(field));
+    for (std::size_t value = 0; value < units.count; ++value) {
+      EXPECT_FALSE(units.values[value].empty()) << str(name_of(field));
+    }
+  }
 }
 
 TEST(Csv, HasEveryColumnWhereTheFileCannotBeReadTwice) {

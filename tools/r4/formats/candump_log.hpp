@@ -35,7 +35,6 @@ class CandumpSource final : public Source {
   const std::string name_;
   NumberedLines lines_;
   bool recognised_ = false;
-  std::uint64_t last_line_ = 0;
 };
 
 class CandumpSink final : public Sink {

@@ -27,6 +27,10 @@ class Source {
   virtual void finish() = 0;
 };
 
+// Tells the handler of a line of the native format that another format carries; nullptr, or why it is none. `read` is
+// used again for the next one.
+const char* tell_line(std::string_view line, RecordLine& read, RecordingReader::Handler& handler);
+
 // Where a sink writes to.
 class Output {
  public:

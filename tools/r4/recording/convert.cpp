@@ -127,6 +127,8 @@ constexpr const char* footer =
   .log                the frames of a CAN bus as candump -L writes them
   .pcapng             packets that Wireshark opens, with all of the recording in them; read are
                       also captures, .pcap too, of UDP to and from --port, and of SocketCAN
+  .mcap               a topic a board for Foxglove and PlotJuggler, with all of the recording
+                      in it; read is what r4 has made
   .csv                the states, a row each, a column a value with its unit in the header
   .jsonl              every record, a JSON object a line, as r4 decode shows it
 

@@ -6,6 +6,8 @@
 #include "../formats/candump_log.hpp"
 #include "../formats/csv.hpp"
 #include "../formats/json_lines.hpp"
+#include "../formats/mcap/mcap_sink.hpp"
+#include "../formats/mcap/mcap_source.hpp"
 #include "../formats/native.hpp"
 #include "../formats/packets/pcap_source.hpp"
 #include "../formats/packets/pcapng_sink.hpp"
@@ -22,6 +24,7 @@ std::unique_ptr<Source> make_source(const std::string& path, RecordingReader::Ha
     }
   }
   if (path.ends_with(".log")) return std::make_unique<CandumpSource>(handler, path);
+  if (path.ends_with(".mcap")) return std::make_unique<McapSource>(handler, path);
   if (path.ends_with(".pcapng") || path.ends_with(".pcap")) {
     return std::make_unique<PcapSource>(handler, path, options.port);
   }
@@ -34,10 +37,11 @@ std::unique_ptr<Sink> make_sink(const std::string& path, Output& output) {
   if (name.ends_with(".r4log.zst")) return std::make_unique<NativeSink>(output, true);
   if (name.ends_with(".log")) return std::make_unique<CandumpSink>(output);
   if (name.ends_with(".pcapng")) return std::make_unique<PcapngSink>(output);
+  if (name.ends_with(".mcap")) return std::make_unique<McapSink>(output);
   if (name.ends_with(".csv")) return std::make_unique<CsvSink>(output);
   if (name.ends_with(".jsonl")) return std::make_unique<JsonLinesSink>(output);
   throw Error(ErrorKind::usage, path, "no format has that ending",
-              "end it in .r4log, .r4log.zst, .csv, .jsonl, .log or .pcapng");
+              "end it in .r4log, .r4log.zst, .csv, .jsonl, .log, .pcapng or .mcap");
 }
 
 }  // namespace r4::tool

@@ -8,6 +8,7 @@
 #include <array>
 
 #include "../byte_order.hpp"
+#include "../conversion.hpp"
 #include "packets.hpp"
 #include "pcapng_sink.hpp"
 #include "protocol/datagram/numbers.hpp"
@@ -102,11 +103,8 @@ void PacketRecords::on_line(const Packet& packet) {
     if (tag == 0) break;
   }
   if (packet.cut) return damage(packet, "the packet is cut");
-  if (!read_record_line(bytes, line_)) return damage(packet, line_.problem);
-  if (line_.kind == LineKind::record) return handler_.on_record(line_.record);
-  if (line_.kind == LineKind::wire) return handler_.on_wire(line_.wire);
-  if (line_.kind == LineKind::header) handler_.on_header();
-  handler_.on_comment(bytes);
+  const char* const problem = tell_line(bytes, line_, handler_);
+  if (problem != nullptr) damage(packet, problem);
 }
 
 // A datagram of that wire, as PcapngSink writes it.

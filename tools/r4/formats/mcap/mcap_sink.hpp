@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// .mcap: a recording that Foxglove, Lichtblick, PlotJuggler and `mcap` open, in chunks compressed by zstd, with every
+// index and checksum. The index of the chunks, which the end of the file has, is all that grows: a few hundred bytes
+// for each MiB of JSON.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include "../conversion.hpp"
+#include "../wire_names.hpp"
+#include "host/recording/zstd_stream.hpp"
+#include "mcap.hpp"
+
+namespace r4::tool {
+
+class McapSink final : public Sink {
+ public:
+  explicit McapSink(Output& output) : output_(output) {}
+  bool wants_survey() const override { return true; }
+  void survey(const RecordedWire& wire) override { names_.on_wire(wire); }
+  void survey(const Record&) override {}
+  void on_comment(std::string_view line, Time time) override;
+  void on_wire(const RecordedWire& wire, Time time) override;
+  // Throws Error{data} for a time beyond the year 2554, which MCAP cannot write.
+  void on_record(const Record& record) override;
+  void finish() override;
+
+ private:
+  static constexpr std::size_t chunk_size = 1 << 20;
+  struct Channel {
+    std::uint16_t id = 0;
+    std::uint64_t messages = 0;
+    std::string
+        record;         // is in every chunk that has messages of it, so that each can be read alone
+    std::string index;  // of the chunk that is being made
+  };
+  using ChannelKey = std::pair<std::uint16_t, std::string>;  // wire and topic
+
+  void begin();
+  void write(std::string_view bytes);
+  void write_message(Channel& channel, Time time, std::string_view json);
+  void write_line(std::string_view line, Time time);
+  void write_chunk();
+  void write_group(mcap::Op op, std::string_view records);
+  void write_summary();
+  std::string topic_of(std::uint16_t wire);
+  Channel& channel_of(std::uint16_t wire);
+  Channel& add_channel(std::uint16_t wire, const std::string& topic, std::uint16_t schema);
+
+  Output& output_;
+  WireNames names_;
+  ZstdWriter zstd_;
+  bool begun_ = false;
+  std::map<ChannelKey, Channel> channels_;
+  std::map<std::uint16_t, Channel*> current_;  // by wire
+  Channel* lines_ = nullptr;
+
+  std::uint64_t offset_ = 0;                // in the file
+  std::uint32_t crc_ = 0;                   // of all of it so far
+  std::string chunk_;                       // records, not compressed yet
+  std::string record_, text_, compressed_;  // used again and again
+  std::uint64_t chunk_first_ns_ = 0, chunk_last_ns_ = 0;
+  bool chunk_has_messages_ = false;
+
+  // The summary.
+  std::string schemas_, channel_records_, chunk_indexes_, offsets_;
+  std::uint64_t messages_ = 0;
+  std::uint32_t chunks_ = 0;
+  std::uint64_t first_ns_ = 0, last_ns_ = 0;
+};
+
+}  // namespace r4::tool

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "schemas.hpp"
+
+#include <fmt/format.h>
+
+#include "../../shell/json.hpp"
+#include "../state_units.hpp"
+#include "mcap.hpp"
+
+namespace r4::tool::mcap {
+namespace {
+
+Json of_type(const char* type, const char* description) {
+  return {{"type", type}, {"description", description}};
+}
+
+Json field_schema(StateField field) {
+  const StateUnits units = units_of(field);
+  if (units.count == 1) return of_type("number", std::string(units.values[0]).c_str());
+  std::string all;
+  for (std::size_t i = 0; i < units.count; ++i) {
+    all += fmt::format("{}{}", i == 0 ? "" : ", ", units.values[i]);
+  }
+  Json schema = of_type("array", all.c_str());
+  schema["items"] = {{"type", "number"}};
+  return schema;
+}
+
+std::string text_of(std::string_view title, const Json& properties) {
+  return Json{{"$schema", "https://json-schema.org/draft/2020-12/schema"},
+              {"title", title},
+              {"type", "object"},
+              {"properties", properties}}
+      .dump();
+}
+
+}  // namespace
+
+std::string record_schema_text() {
+  Json fields = Json::object();
+  for (int i = 0; i < state_field_count; ++i) {
+    const auto field = static_cast<StateField>(i);
+    const Text name = name_of(field);
+    fields[std::string(name.data(), name.size())] = field_schema(field);
+  }
+  Json all = of_type("object", "of the datagram, but PNum and T");
+  all["properties"] = fields;
+  return text_of(record_schema,
+                 {{"from", of_type("string", "board or host")},
+                  {"ok", of_type("boolean", "is it a valid datagram")},
+                  {"type", of_type("string", "state, heartbeat, command, nack, identity or event")},
+                  {"pnum", of_type("integer", "packet number")},
+                  {"t", of_type("integer", "the board's clock [ms]")},
+                  {"fields", all},
+                  {"error", of_type("string", "of a damaged datagram: length, syntax or crc")},
+                  {"position", of_type("integer", "the byte where it went wrong")},
+                  {"text", of_type("string", "the datagram as it was")},
+                  {"event", of_type("string", "what happened to the link")}});
+}
+
+std::string line_schema_text() {
+  return text_of(line_schema, {{"line", of_type("string", "of the native format")}});
+}
+
+}  // namespace r4::tool::mcap
