@@ -23,7 +23,7 @@ MODELS = {'firmware/ports/sim/chips', 'firmware/ports/sim/robot'}
 HOST = TRANSPORTS | {'host', 'host/commands', 'host/recording', 'host/session'}
 SIMULATED = HOST | FIRMWARE | MODELS | {'firmware/ports/sim'}
 SHELL = SIMULATED | {'tools/r4/shell'}
-FORMATS = {'tools/r4/formats', 'tools/r4/formats/packets'}
+FORMATS = {'tools/r4/formats', 'tools/r4/formats/mcap', 'tools/r4/formats/packets'}
 # room: the rooms it may include besides itself
 ALLOWED = {
     'include/r4link': set(),
@@ -56,6 +56,7 @@ ALLOWED = {
     'tools/r4/drive': SHELL,
     'tools/r4/bus': SHELL,
     'tools/r4/formats': SHELL | {'tools/r4/bus'},
+    'tools/r4/formats/mcap': SHELL | {'tools/r4/bus', 'tools/r4/formats'},
     'tools/r4/formats/packets': SHELL | {'tools/r4/bus', 'tools/r4/formats'},
     'tools/r4/recording': SHELL | FORMATS,
     'tools/r4/watch': SHELL | {'tools/r4/bus'},

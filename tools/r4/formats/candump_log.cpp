@@ -126,7 +126,7 @@ void CandumpSink::finish() {
   if (written_ != 0) return;
   throw Error(ErrorKind::data, elsewhere_.empty() ? "the recording" : elsewhere_,
               "nothing of it went over a CAN bus, whose frames this format holds",
-              "convert it to .pcapng, .csv or .jsonl");
+              "convert it to .mcap, .pcapng, .csv or .jsonl");
 }
 
 std::string CandumpSink::left_out() const {
