@@ -3,7 +3,8 @@
 // keeps (abstract, unix(7)), where a name is free as soon as its program is gone. Like UDP ports and CAN
 // interfaces these belong to a network namespace.
 //
-// The name holds the user's number, and both ends look who the other is: the same user, or root that asks.
+// The name holds the user's number, but anyone may take a name. So both ends look who the other is: the same user,
+// or root that asks.
 #pragma once
 
 #include <sys/types.h>
@@ -25,7 +26,8 @@ struct ShareCredentials {
 // Takes the place of the holder of that wire. None, if another program has it.
 FileDescriptor hold_wire(const std::string& wire);
 
-// A connection to its holder, a program of this user. None, if there is none.
+// A connection to its holder, or to a stranger who has taken that name: credentials_of() tells. None, if there
+// is none.
 FileDescriptor reach_holder(const std::string& wire);
 
 // The next one who has come to a holder, or none: strangers are turned away.

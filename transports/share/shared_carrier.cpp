@@ -104,8 +104,9 @@ class SharedCarrier final : public Carrier,
   State state_ = State::closed;
   bool up_ = false;
   bool moved_ = false;
-  std::optional<Problem> trouble_;  // why it is down, or the warning that stands
-  Clock::time_point since_;         // nobody holds the wire, as far as we know
+  std::optional<Problem> trouble_;     // why it is down, or the warning that stands
+  std::optional<Problem> not_shared_;  // why, until it is told
+  Clock::time_point since_;            // nobody holds the wire, as far as we know
   Carrier::Handler* handler_ = nullptr;
   CarrierCounters shared_counters_;
 };
@@ -128,6 +129,7 @@ void SharedCarrier::close() noexcept {
   handler_ = nullptr;
   up_ = moved_ = false;
   trouble_.reset();
+  not_shared_.reset();
   looking_.cancel();
   sharer_.leave();
   own_->close();  // the wire is free before others are told so
@@ -163,8 +165,17 @@ void SharedCarrier::take_part() {
 
 // True if we share it now, or may do so soon. Throws Error if the holder does not let us.
 bool SharedCarrier::try_to_share() {
-  if (wire_.name.empty() || !sharer_.join(wire_.name, role_, program_invocation_short_name)) {
-    return false;
+  if (wire_.name.empty()) return false;
+  switch (sharer_.join(wire_.name, role_, program_invocation_short_name)) {
+    case WireSharer::Joined::none:
+      return false;
+    case WireSharer::Joined::stranger:
+      // Its place is no use to us, and the wire itself is not the stranger's.
+      wire_.name.clear();
+      not_shared_ = sharer_.stranger(name_);
+      return false;
+    case WireSharer::Joined::holder:
+      break;
   }
   if (role_ == BoardRole::control) {
     const ShareMessage answer = sharer_.wait_for_answer(name_);
@@ -257,6 +268,7 @@ void SharedCarrier::on_carrier_event(const CarrierEvent& event) {
   const bool renamed = name_ != own_->name();
   name_ = own_->name();
   tell(event);
+  if (up_ && not_shared_) tell({CarrierEvent::Kind::warning, *std::exchange(not_shared_, {})});
   if (renamed && up_ && state_ == State::holding) holder_.tell(Kind::up, name_);
 }
 

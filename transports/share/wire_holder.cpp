@@ -83,13 +83,14 @@ class WireHolder::Sharer {
           receive_packet(connection_.native_handle(), packet.data(), packet.size());
       if (size < 0 && would_block(errno)) break;
       if (size < 0 && errno == ECONNRESET) continue;  // it has not read all: ours is still there
-      if (size <= 0 || static_cast<std::size_t>(size) > packet.size() || !may_speak()) {
-        return lose();
-      }
+      if (size <= 0 || static_cast<std::size_t>(size) > packet.size()) return lose();
       const std::optional<ShareMessage> message =
           read_share_message({packet.data(), static_cast<std::size_t>(size)});
       if (!message) return lose();
-      holder_.on_message(*this, *message);
+      // The last word of one that says too much may be a stop.
+      const bool too_much = !may_speak();
+      if (!too_much || message->kind == Kind::stop) holder_.on_message(*this, *message);
+      if (too_much) return lose();
     }
     if (!lost_) listen();
   }

@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "../file_descriptor.hpp"
-#include "share_socket.hpp"
 
 namespace r4 {
 namespace {
@@ -23,16 +22,18 @@ bool would_block(int error) { return error == EAGAIN || error == EWOULDBLOCK; }
 
 }  // namespace
 
-bool WireSharer::join(const std::string& wire, BoardRole role, std::string_view program) {
+WireSharer::Joined WireSharer::join(const std::string& wire, BoardRole role,
+                                    std::string_view program) {
   leave();
   FileDescriptor connection = reach_holder(wire);
-  if (!connection ||
-      send_message(connection.get(), ShareMessage::Kind::hello, hello_text(role, program)) != 0) {
-    return false;
+  if (!connection) return Joined::none;
+  holder_ = credentials_of(connection.get());
+  if (holder_.uid != ::geteuid()) return Joined::stranger;
+  if (send_message(connection.get(), ShareMessage::Kind::hello, hello_text(role, program)) != 0) {
+    return Joined::none;
   }
-  holder_pid_ = credentials_of(connection.get()).pid;
   connection_.assign(connection.release());
-  return true;
+  return Joined::holder;
 }
 
 ShareMessage WireSharer::wait_for_answer(const std::string& thing) {
@@ -55,24 +56,31 @@ ShareMessage WireSharer::wait_for_answer(const std::string& thing) {
 }
 
 std::string WireSharer::holder(std::string_view program) const {
-  return fmt::format("{} (pid {})", program, holder_pid_);
+  return fmt::format("{} (pid {})", program, holder_.pid);
 }
 
 Problem WireSharer::silence(const std::string& thing) const {
-  if (holder_pid_ == ::getpid()) {
+  if (holder_.pid == ::getpid()) {
     return {ErrorKind::open, thing, "this program has it open already",
             "use that one, or close it first"};
   }
   return {ErrorKind::open, thing,
-          fmt::format("the program that holds it (pid {}) does not answer", holder_pid_),
-          fmt::format("let it go on, if it was stopped (kill -CONT {0}), or end it", holder_pid_)};
+          fmt::format("the program that holds it (pid {}) does not answer", holder_.pid),
+          fmt::format("let it go on, if it was stopped (kill -CONT {0}), or end it", holder_.pid)};
 }
 
 Problem WireSharer::other_version(const std::string& thing) const {
   return {ErrorKind::open, thing,
           fmt::format("the program that holds it (pid {}) is of another version of R4 link",
-                      holder_pid_),
+                      holder_.pid),
           "end it, or use the same version for both"};
+}
+
+Problem WireSharer::stranger(const std::string& thing) const {
+  return {ErrorKind::permission, thing,
+          fmt::format("user {} (pid {}) has taken the name by which programs of user {} share it",
+                      holder_.uid, holder_.pid, ::geteuid()),
+          "it works, but for this program alone; have that program ended, and begin again"};
 }
 
 void WireSharer::listen() {

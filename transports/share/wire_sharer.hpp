@@ -10,6 +10,7 @@
 #include "../operation_slot.hpp"
 #include "r4link/carrier.hpp"
 #include "share_message.hpp"
+#include "share_socket.hpp"
 
 namespace r4 {
 
@@ -32,16 +33,18 @@ class WireSharer {
   WireSharer(const WireSharer&) = delete;
   WireSharer& operator=(const WireSharer&) = delete;
 
-  // Goes to the holder of that wire and says hello. False if there is none.
-  bool join(const std::string& wire, BoardRole role, std::string_view program);
+  enum class Joined { none, holder, stranger };
+  // Goes to the holder of that wire and says hello. A stranger, who is another user, is told nothing.
+  Joined join(const std::string& wire, BoardRole role, std::string_view program);
   // Waits for its first answer; blocks, for 200 ms at most. `moved` where it has ended. Throws Error{open},
   // naming `thing`, if none comes, or one of another version. `text` is valid until the next message.
   ShareMessage wait_for_answer(const std::string& thing);
   // "r4 (pid 123)": the holder.
   std::string holder(std::string_view program) const;
-  // It does not answer, or not as we do: what to say of it.
+  // It does not answer, or not as we do, or is a stranger: what to say of it.
   Problem silence(const std::string& thing) const;
   Problem other_version(const std::string& thing) const;
+  Problem stranger(const std::string& thing) const;
   // Messages are handed over from now on.
   void listen();
   // An E:STOP for the board.
@@ -54,7 +57,7 @@ class WireSharer {
 
   Owner& owner_;
   LoopDescriptor connection_;
-  int holder_pid_ = 0;
+  ShareCredentials holder_;
   OperationSlot readable_;
   std::array<char, ShareMessage::max_size + 1> packet_;
 };

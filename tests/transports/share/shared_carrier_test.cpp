@@ -3,6 +3,8 @@
 
 #include <fmt/core.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include <array>
@@ -10,6 +12,7 @@
 #include <asio/post.hpp>
 #include <atomic>
 #include <cerrno>
+#include <cstddef>
 #include <future>
 #include <mutex>
 #include <set>
@@ -456,7 +459,20 @@ TEST_F(SharedCarrier, AFloodOfStopsEndsAtAHundredASecond) {
     return error != 0 && error != EAGAIN;
   });
   EXPECT_GE(device.all_sent().size(), 1U);
-  EXPECT_LE(device.all_sent().size(), 200U);
+  EXPECT_LE(device.all_sent().size(), 202U);
+}
+
+TEST_F(SharedCarrier, TheLastWordOfOneThatSaysTooMuchMayBeAStop) {
+  const auto holder = opened(BoardRole::control);
+  const FileDescriptor connection = raw();
+  const auto say = [&](ShareMessage::Kind kind, std::string_view text) {
+    return in_time([&] { return send_message(connection.get(), kind, text) == 0; });
+  };
+  ASSERT_TRUE(say(ShareMessage::Kind::hello, hello_text(BoardRole::watch, "chatterbox")));
+  const std::string stop = datagram_of("E", "STOP");
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(say(ShareMessage::Kind::stop, stop));
+  EXPECT_TRUE(is_cut_off(connection));
+  EXPECT_EQ(device.all_sent().size(), 100U);
 }
 
 TEST_F(SharedCarrier, SixteenMayShareIt) {
@@ -477,6 +493,32 @@ TEST_F(SharedCarrier, IsNotForOtherUsers) {
   const auto holder = opened(BoardRole::control);
   const int result = run_unprivileged([&] { return reach_holder(wire) ? 1 : 0; });
   EXPECT_EQ(result, 0);
+}
+
+// Anyone may take a name: it must keep nobody from a wire, and be told.
+TEST_F(SharedCarrier, AStrangerWhoTakesTheNameKeepsNobodyFromTheWire) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can be a stranger, too";
+  const std::string name = fmt::format("r4link/0/{}", wire);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  name.copy(address.sun_path + 1, name.size());
+  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
+  ASSERT_EQ(::seteuid(65534), 0);
+  const FileDescriptor squatter(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
+  ::bind(squatter.get(), reinterpret_cast<const sockaddr*>(&address), size);
+  const int listening = ::listen(squatter.get(), 1);
+  ASSERT_EQ(::seteuid(0), 0);
+  ASSERT_EQ(listening, 0);
+  const auto driver = opened(BoardRole::control);
+  EXPECT_EQ(driver->carrier->send("hello", Priority::normal), SendResult::sent);
+  EXPECT_EQ(device.all_sent(), std::vector<std::string>{"hello"});
+  const auto& warning = driver->heard.events.back();
+  EXPECT_EQ(warning.kind, CarrierEvent::Kind::warning);
+  EXPECT_EQ(warning.problem.kind, ErrorKind::permission);
+  EXPECT_EQ(
+      warning.problem.reason,
+      fmt::format("user 65534 (pid {}) has taken the name by which programs of user 0 share it",
+                  ::getpid()));
 }
 
 }  // namespace
