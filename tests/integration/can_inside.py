@@ -363,6 +363,11 @@ def test_none_of_eight_boards_at_50_hz_is_safe_by_mistake():
                                        stdout=subprocess.DEVNULL))
         for _ in range(8):
             boards.state('ACTIVE')
+        recording = tmp_path / 'bus.r4log'
+        assert run('record', 'can://vcan0', '-o', str(recording), '--for', '1.5', timeout=60).returncode == 0
+        [told] = objects(run('info', '--json', str(recording)).stdout)
+        assert sorted(each['url'] for each in told['wires']) == [f'can://vcan0?node={node}' for node in (2, 3, 4)]
+
         *rows, total = objects(run('bus', 'can://vcan0', '--json', '--duration', '3', timeout=60).stdout)
         log = boards.rest()
     rates = [row['frames'] / 5 for row in rows if row['id'] and 0x400 <= row['id'] < 0x408]
@@ -371,7 +376,7 @@ def test_none_of_eight_boards_at_50_hz_is_safe_by_mistake():
     assert not any(each.get('state') == 'SAFE' for each in log)
 
 
-def test_a_bus_is_shown_with_all_of_its_boards():
+def test_a_bus_is_shown_with_all_of_its_boards(tmp_path):
     with Board('can://vcan0?node=2-4', listens=3), monitor(IN_PLAIN_TEXT) as host:  # to have some load
         in_control(host)
         listed = {each.get('interface'): each for each in objects(run('list', '--json', timeout=60).stdout)}
@@ -397,6 +402,8 @@ def test_a_bus_is_shown_with_all_of_its_boards():
         host.next(is_state)
     silent = run('monitor', 'can://vcan0', '--duration', '1', timeout=60)
     assert silent.returncode == 3 and ERROR.search(silent.stderr), silent
+    silent = run('record', 'can://vcan0', '-o', str(tmp_path / 'silence'), '--for', '1', timeout=60)
+    assert silent.returncode == 3 and 'no board was heard' in silent.stderr, silent
 
 
 def test_r4_bus_tells_that_it_needs_the_data_bit_rate():

@@ -196,7 +196,6 @@ def test_info_says_what_is_no_recording(tmp_path, make, code, message):
 
 @pytest.mark.parametrize('arguments, message', [
     (['sim:'], '--output: is missing'),
-    (['can://can0', '-o', 'x'], 'which boards of this bus'),
     (['sim:', '-o', 'x', '--rotate', '5'], 'is neither a size nor a time'),
     (['sim:', '-o', 'x', '--keep', '1K'], 'is too little'),
     (['sim:', '-o', 'x', '--keep', '2M', '--rotate', '1M'], 'the files are too large for it'),

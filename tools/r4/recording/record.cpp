@@ -2,14 +2,19 @@
 // r4 record: watches boards, and writes down what is said.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <asio/io_context.hpp>
 #include <asio/signal_set.hpp>
 #include <asio/steady_timer.hpp>
 #include <chrono>
 #include <csignal>
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "../shell/key_file.hpp"
@@ -19,6 +24,8 @@
 #include "r4link/async_board.hpp"
 #include "r4link/error.hpp"
 #include "r4link/recording.hpp"
+#include "transports/can/can_interface.hpp"
+#include "transports/can/can_listener.hpp"
 #include "transports/url.hpp"
 
 namespace r4::tool {
@@ -49,34 +56,57 @@ BoardOptions board_options(const Options& options) {
   return board_options;
 }
 
-void require_boards(const std::vector<std::string>& urls) {
-  for (const std::string& text : urls) {
-    const Url url = Url::parse(text);
-    if (url.scheme() == "can" && text.find('?') == std::string::npos) {
-      throw Error(ErrorKind::usage, text, "it is not said which boards of this bus",
-                  fmt::format("name each of them: {0}?node=1 {0}?node=2", text));
-    }
-  }
+// can://can0, without a node: all boards that are heard on it.
+bool is_whole_bus(const std::string& text) {
+  return Url::parse(text).scheme() == "can" && text.find('?') == std::string::npos;
 }
+
+// Tells the nodes of the boards on a bus, when they are heard first.
+class BusListener {
+ public:
+  BusListener(asio::io_context& io, const std::string& url,
+              std::function<void(std::uint8_t node)> on_board)
+      : url_(url), listener_(io, can_interface_of(Url::parse(url)), any_rate) {
+    listener_.survey().on_datagram(
+        [this, on_board = std::move(on_board)](std::uint8_t node, const Datagram&) {
+          if (!std::exchange(heard_[node % can_nodes], true)) on_board(node);
+        });
+  }
+
+  void require_boards() const {
+    if (std::find(heard_.begin(), heard_.end(), true) != heard_.end()) return;
+    throw Error(ErrorKind::refused, url_, "no board was heard",
+                "see that boards are connected and have this bus's bit rate; r4 list shows it");
+  }
+
+ private:
+  // The load of the bus is not asked here.
+  static constexpr CanBitRate any_rate{1000000, 0};
+
+  const std::string url_;
+  CanListener listener_;
+  std::array<bool, can_nodes> heard_{};
+};
 
 class Recorders {
  public:
-  explicit Recorders(const Options& options) : signals_(io_), end_(io_) {
-    require_boards(options.urls);
+  explicit Recorders(const Options& options)
+      : board_options_(board_options(options)), signals_(io_), end_(io_) {
+    std::vector<std::string> buses;
     for (const std::string& url : options.urls) {
-      boards_.push_back(std::make_unique<AsyncBoard>(io_, url, board_options(options)));
+      is_whole_bus(url) ? buses.push_back(url) : add(url);
     }
     recording_.emplace(options.file, limits_of(options));
+    for (const std::string& bus : buses) {
+      buses_.push_back(std::make_unique<BusListener>(io_, bus, [this, bus](std::uint8_t node) {
+        add(fmt::format("{}?node={}", bus, node));
+        open(*boards_.back());
+      }));
+    }
   }
 
   int run(const Options& options) {
-    for (const auto& board : boards_) {
-      board->on_event([this](const CarrierEvent&) {
-        if (recording_->problem()) io_.stop();
-      });
-      board->record(*recording_);
-      board->open();
-    }
+    for (const auto& board : boards_) open(*board);
     for (const int number : {SIGINT, SIGTERM, SIGHUP}) signals_.add(number);
     signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
     if (options.duration) {
@@ -95,6 +125,7 @@ class Recorders {
       fmt::print(stderr, "r4: {} more were left out: the disk is too slow\n",
                  recording_->dropped());
     }
+    for (const auto& bus : buses_) bus->require_boards();
     for (const auto& board : boards_) {
       if (board->statistics().received == 0) throw Error(explain(board->name(), board->link()));
     }
@@ -102,9 +133,22 @@ class Recorders {
   }
 
  private:
+  void add(const std::string& url) {
+    boards_.push_back(std::make_unique<AsyncBoard>(io_, url, board_options_));
+  }
+  void open(AsyncBoard& board) {
+    board.on_event([this](const CarrierEvent&) {
+      if (recording_->problem()) io_.stop();
+    });
+    board.record(*recording_);
+    board.open();
+  }
+
+  const BoardOptions board_options_;
   asio::io_context io_{1};
   std::optional<Recording> recording_;
   std::vector<std::unique_ptr<AsyncBoard>> boards_;
+  std::vector<std::unique_ptr<BusListener>> buses_;
   asio::signal_set signals_;
   asio::steady_timer end_;
 };
@@ -124,6 +168,7 @@ A recording that is there goes on at its end. A crash costs at most the last sec
 Examples:
   r4 record udp://192.168.0.125 -o drive.r4log
   r4 record serial:auto 'can://can0?node=3' -o drive.r4log.zst --for 60
+  r4 record can://can0 -o bus.r4log     every board that is heard on the bus
   r4 record udp:auto -o /var/log/robot.r4log.zst --rotate 1h --rotate 100M --keep 2G
   grep ' 1> ' drive.r4log               what was sent to the first board
   r4 info drive.r4log                   what is in it
