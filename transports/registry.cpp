@@ -7,6 +7,7 @@
 #include "can/can_carrier.hpp"
 #include "serial/pty_carrier.hpp"
 #include "serial/serial_carrier.hpp"
+#include "share/share_group.hpp"
 #include "share/shared_carrier.hpp"
 #include "udp/udp_carrier.hpp"
 #include "udp/udp_url.hpp"
@@ -47,15 +48,19 @@ std::unique_ptr<Carrier> Registry::make(asio::io_context& io, std::string_view u
 
 std::unique_ptr<Carrier> Registry::make_shared(asio::io_context& io, std::string_view url,
                                                BoardRole role) const {
-  const Url parsed = Url::parse(url);
+  Url parsed = Url::parse(url);
   const Entry& entry = entry_of(parsed);
+  if (!entry.wire) return entry.make(io, parsed, Role::host);
   // Who watches has no need of the port of hosts.
-  std::unique_ptr<Carrier> own = role == BoardRole::watch
-                                     ? make(io, with_own_port(std::string(url)), Role::host)
-                                     : entry.make(io, parsed, Role::host);
-  if (!entry.wire) return own;
-  return make_shared_carrier(
-      io, std::move(own), [wire = entry.wire, parsed] { return wire(parsed); }, role);
+  Url alone = role == BoardRole::watch ? Url::parse(with_own_port(std::string(url))) : parsed;
+  alone.take("share");
+  ShareGroup group = take_share_group(parsed);
+  FindWire find = [wire = entry.wire, parsed = std::move(parsed), group = std::move(group)] {
+    SharedWire found = wire(parsed);
+    found.group = group;
+    return found;
+  };
+  return make_shared_carrier(io, entry.make(io, alone, Role::host), std::move(find), role);
 }
 
 }  // namespace r4

@@ -133,6 +133,12 @@ std::optional<std::string> Url::get(std::string_view key) const {
   return found->second;
 }
 
+std::optional<std::string> Url::take(std::string_view key) {
+  const auto found = query_.find(key);
+  if (found == query_.end()) return std::nullopt;
+  return std::move(query_.extract(found).mapped());
+}
+
 long Url::get_number(std::string_view key, long min, long max, long fallback) const {
   const std::optional<std::string> value = get(key);
   if (!value) return fallback;

@@ -30,6 +30,8 @@ class Url {
 
   // The value of a key, if it is there.
   std::optional<std::string> get(std::string_view key) const;
+  // The same, and it is no longer there.
+  std::optional<std::string> take(std::string_view key);
   // As a whole number within [min, max], or `fallback`; throws Error{usage} otherwise.
   long get_number(std::string_view key, long min, long max, long fallback) const;
   // Throws Error{usage} naming the first key that is not in the space-separated `allowed`.

@@ -49,6 +49,24 @@ TEST(Registry, TakesFurtherTransports) {
   EXPECT_EQ(registry.make(io, "memory:", Role::host)->name(), "memory:");
 }
 
+TEST(Registry, SharesAWireWithAGroupThatIsThere) {
+  asio::io_context io;
+  const Registry registry = Registry::standard();
+  EXPECT_NE(registry.make_shared(io, "can://can0?node=2&share=root", BoardRole::watch), nullptr);
+  const auto error =
+      error_of([&] { registry.make_shared(io, "serial:auto?share=nobodys", BoardRole::control); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->kind(), ErrorKind::usage);
+  EXPECT_EQ(error->problem().reason, "there is no group 'nobodys' on this machine");
+  EXPECT_EQ(run_unprivileged([&] {
+              const auto refused = error_of([&] {
+                registry.make_shared(io, "udp://127.0.0.1?share=daemon", BoardRole::control);
+              });
+              return refused && refused->kind() == ErrorKind::permission ? 0 : 1;
+            }),
+            0);
+}
+
 struct Refusal {
   std::string url;
   Role role;

@@ -9,8 +9,11 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <climits>
 #include <cstddef>
 #include <cstring>
+#include <string>
+#include <vector>
 
 namespace r4 {
 namespace {
@@ -25,10 +28,12 @@ struct Address {
 };
 
 // A name that is too long for the kernel ends in a number made of the whole.
-Address address_of(uid_t user, const std::string& wire) {
+Address address_of(const SharedWire& wire) {
   Address address;
   address.bytes.sun_family = AF_UNIX;
-  std::string name = fmt::format("r4link/{}/{}", user, wire);
+  const std::string whose =
+      wire.group.name.empty() ? std::to_string(::geteuid()) : "@" + wire.group.name;
+  std::string name = fmt::format("r4link/{}/{}", whose, wire.name);
   constexpr std::size_t most = sizeof(address.bytes.sun_path) - 1;
   if (name.size() > most) {
     std::uint64_t hash = 14695981039346656037U;  // FNV-1a
@@ -50,9 +55,9 @@ FileDescriptor local_socket() {
 
 }  // namespace
 
-FileDescriptor hold_wire(const std::string& wire) {
+FileDescriptor hold_wire(const SharedWire& wire) {
   FileDescriptor descriptor = local_socket();
-  const Address address = address_of(::geteuid(), wire);
+  const Address address = address_of(wire);
   if (!descriptor ||
       ::bind(descriptor.get(), reinterpret_cast<const sockaddr*>(&address.bytes), address.size) !=
           0 ||
@@ -62,9 +67,9 @@ FileDescriptor hold_wire(const std::string& wire) {
   return descriptor;
 }
 
-FileDescriptor reach_holder(const std::string& wire) {
+FileDescriptor reach_holder(const SharedWire& wire) {
   FileDescriptor descriptor = local_socket();
-  const Address address = address_of(::geteuid(), wire);
+  const Address address = address_of(wire);
   if (!descriptor || ::connect(descriptor.get(), reinterpret_cast<const sockaddr*>(&address.bytes),
                                address.size) != 0) {
     return {};
@@ -72,13 +77,13 @@ FileDescriptor reach_holder(const std::string& wire) {
   return descriptor;
 }
 
-FileDescriptor accept_sharer(int holder) {
+FileDescriptor accept_sharer(int holder, const SharedWire& wire) {
   while (true) {
     FileDescriptor descriptor(::accept4(holder, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
     if (!descriptor && (errno == EINTR || errno == ECONNABORTED)) continue;
     if (!descriptor) return {};
-    const uid_t user = credentials_of(descriptor.get()).uid;
-    if (user != ::geteuid() && user != 0) continue;
+    if (!is_one_of_us(descriptor.get(), wire) && credentials_of(descriptor.get()).uid != 0)
+      continue;
     ::setsockopt(descriptor.get(), SOL_SOCKET, SO_SNDBUF, &buffer_bytes, sizeof buffer_bytes);
     return descriptor;
   }
@@ -88,9 +93,21 @@ ShareCredentials credentials_of(int connection) {
   ucred peer{};
   socklen_t size = sizeof peer;
   if (::getsockopt(connection, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
-    return {0, static_cast<uid_t>(-1)};
+    return {0, static_cast<uid_t>(-1), static_cast<gid_t>(-1)};
   }
-  return {peer.pid, peer.uid};
+  return {peer.pid, peer.uid, peer.gid};
+}
+
+bool is_one_of_us(int connection, const SharedWire& wire) {
+  const ShareCredentials peer = credentials_of(connection);
+  if (peer.uid == ::geteuid()) return true;
+  if (wire.group.name.empty()) return false;
+  if (peer.uid == 0 || peer.gid == wire.group.id) return true;
+  std::vector<gid_t> groups(NGROUPS_MAX);
+  auto size = static_cast<socklen_t>(groups.size() * sizeof(gid_t));
+  if (::getsockopt(connection, SOL_SOCKET, SO_PEERGROUPS, groups.data(), &size) != 0) return false;
+  groups.resize(size / sizeof(gid_t));
+  return std::find(groups.begin(), groups.end(), wire.group.id) != groups.end();
 }
 
 int send_message(int connection, ShareMessage::Kind kind, std::string_view text) {

@@ -3,16 +3,16 @@
 // keeps (abstract, unix(7)), where a name is free as soon as its program is gone. Like UDP ports and CAN
 // interfaces these belong to a network namespace.
 //
-// The name holds the user's number, but anyone may take a name. So both ends look who the other is: the same user,
-// or root that asks.
+// The name holds the user's number, or the group's name where it is shared with one. But anyone may take a name: so
+// both ends look who the other is, as the kernel tells it.
 #pragma once
 
 #include <sys/types.h>
 
-#include <string>
 #include <string_view>
 
 #include "../file_descriptor.hpp"
+#include "../shared_wire.hpp"
 #include "share_message.hpp"
 
 namespace r4 {
@@ -21,19 +21,22 @@ namespace r4 {
 struct ShareCredentials {
   pid_t pid = 0;
   uid_t uid = 0;
+  gid_t gid = 0;
 };
 
 // Takes the place of the holder of that wire. None, if another program has it.
-FileDescriptor hold_wire(const std::string& wire);
+FileDescriptor hold_wire(const SharedWire& wire);
 
-// A connection to its holder, or to a stranger who has taken that name: credentials_of() tells. None, if there
-// is none.
-FileDescriptor reach_holder(const std::string& wire);
+// A connection to its holder, or to a stranger who has taken that name: is_one_of_us() tells. None, if there is
+// none.
+FileDescriptor reach_holder(const SharedWire& wire);
 
 // The next one who has come to a holder, or none: strangers are turned away.
-FileDescriptor accept_sharer(int holder);
+FileDescriptor accept_sharer(int holder, const SharedWire& wire);
 
 ShareCredentials credentials_of(int connection);
+// The other end is of the same user or, if the wire is shared with a group, of one of its members or root.
+bool is_one_of_us(int connection, const SharedWire& wire);
 
 // None of these blocks. send_message(): 0, or errno. receive_packet(): the packet's size, which may be more
 // than `size` and was cut then; 0 at the end of the connection; -1 with errno.

@@ -166,13 +166,13 @@ void SharedCarrier::take_part() {
 // True if we share it now, or may do so soon. Throws Error if the holder does not let us.
 bool SharedCarrier::try_to_share() {
   if (wire_.name.empty()) return false;
-  switch (sharer_.join(wire_.name, role_, program_invocation_short_name)) {
+  switch (sharer_.join(wire_, role_, program_invocation_short_name)) {
     case WireSharer::Joined::none:
       return false;
     case WireSharer::Joined::stranger:
       // Its place is no use to us, and the wire itself is not the stranger's.
+      not_shared_ = sharer_.stranger(name_, wire_);
       wire_.name.clear();
-      not_shared_ = sharer_.stranger(name_);
       return false;
     case WireSharer::Joined::holder:
       break;
@@ -203,7 +203,7 @@ void SharedCarrier::leave_holder(const Problem& problem) {
 }
 
 bool SharedCarrier::try_to_hold() {
-  if (!wire_.name.empty() && !holder_.hold(wire_.name)) return false;
+  if (!wire_.name.empty() && !holder_.hold(wire_)) return false;
   state_ = State::holding;
   try {
     own_->open(*this);

@@ -154,7 +154,7 @@ WireHolder::WireHolder(asio::io_context& io, Owner& owner, std::string program)
 
 WireHolder::~WireHolder() { release(); }
 
-bool WireHolder::hold(const std::string& wire) {
+bool WireHolder::hold(const SharedWire& wire) {
   FileDescriptor descriptor = hold_wire(wire);
   if (!descriptor) return false;
   release();
@@ -165,7 +165,7 @@ bool WireHolder::hold(const std::string& wire) {
 }
 
 void WireHolder::release() noexcept {
-  wire_.clear();
+  wire_ = {};
   accepting_.cancel();
   removing_.cancel();
   giving_away_.cancel();
@@ -187,7 +187,7 @@ void WireHolder::listen() {
 
 // One that has closed its end, or is one too many, is told by the end of its connection.
 void WireHolder::accept() {
-  if (FileDescriptor connection = accept_sharer(listener_.native_handle());
+  if (FileDescriptor connection = accept_sharer(listener_.native_handle(), wire_);
       connection && sharers_.size() < most_sharers) {
     sharers_.push_back(std::make_unique<Sharer>(*this, io_, std::move(connection)));
   }

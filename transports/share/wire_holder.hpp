@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "../operation_slot.hpp"
+#include "../shared_wire.hpp"
 #include "r4link/carrier.hpp"
 #include "share_message.hpp"
 
@@ -47,12 +48,12 @@ class WireHolder {
   WireHolder& operator=(const WireHolder&) = delete;
 
   // Holds the wire of that name, instead of another. False if another program does.
-  bool hold(const std::string& wire);
+  bool hold(const SharedWire& wire);
   // Lets it go.
   void release() noexcept;
 
-  bool holds() const { return !wire_.empty(); }
-  const std::string& wire() const { return wire_; }
+  bool holds() const { return !wire_.name.empty(); }
+  const std::string& wire() const { return wire_.name; }
   std::size_t sharers() const { return sharers_.size(); }
   // To all who share it. `state`: only the newest waits for who is slow.
   void tell(ShareMessage::Kind kind, std::string_view text, Priority priority = Priority::normal);
@@ -69,7 +70,7 @@ class WireHolder {
   asio::io_context& io_;
   Owner& owner_;
   const std::string program_;
-  std::string wire_;
+  SharedWire wire_;
   LoopDescriptor listener_;
   OperationSlot accepting_;
   OperationSlot removing_;

@@ -22,13 +22,13 @@ bool would_block(int error) { return error == EAGAIN || error == EWOULDBLOCK; }
 
 }  // namespace
 
-WireSharer::Joined WireSharer::join(const std::string& wire, BoardRole role,
+WireSharer::Joined WireSharer::join(const SharedWire& wire, BoardRole role,
                                     std::string_view program) {
   leave();
   FileDescriptor connection = reach_holder(wire);
   if (!connection) return Joined::none;
   holder_ = credentials_of(connection.get());
-  if (holder_.uid != ::geteuid()) return Joined::stranger;
+  if (!is_one_of_us(connection.get(), wire)) return Joined::stranger;
   if (send_message(connection.get(), ShareMessage::Kind::hello, hello_text(role, program)) != 0) {
     return Joined::none;
   }
@@ -76,10 +76,12 @@ Problem WireSharer::other_version(const std::string& thing) const {
           "end it, or use the same version for both"};
 }
 
-Problem WireSharer::stranger(const std::string& thing) const {
+Problem WireSharer::stranger(const std::string& thing, const SharedWire& wire) const {
+  const std::string sharers = wire.group.name.empty() ? fmt::format("user {}", ::geteuid())
+                                                      : "the group " + wire.group.name;
   return {ErrorKind::permission, thing,
-          fmt::format("user {} (pid {}) has taken the name by which programs of user {} share it",
-                      holder_.uid, holder_.pid, ::geteuid()),
+          fmt::format("user {} (pid {}) has taken the name by which programs of {} share it",
+                      holder_.uid, holder_.pid, sharers),
           "it works, but for this program alone; have that program ended, and begin again"};
 }
 

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "../operation_slot.hpp"
+#include "../shared_wire.hpp"
 #include "r4link/carrier.hpp"
 #include "share_message.hpp"
 #include "share_socket.hpp"
@@ -34,8 +35,8 @@ class WireSharer {
   WireSharer& operator=(const WireSharer&) = delete;
 
   enum class Joined { none, holder, stranger };
-  // Goes to the holder of that wire and says hello. A stranger, who is another user, is told nothing.
-  Joined join(const std::string& wire, BoardRole role, std::string_view program);
+  // Goes to the holder of that wire and says hello. A stranger is told nothing.
+  Joined join(const SharedWire& wire, BoardRole role, std::string_view program);
   // Waits for its first answer; blocks, for 200 ms at most. `moved` where it has ended. Throws Error{open},
   // naming `thing`, if none comes, or one of another version. `text` is valid until the next message.
   ShareMessage wait_for_answer(const std::string& thing);
@@ -44,7 +45,7 @@ class WireSharer {
   // It does not answer, or not as we do, or is a stranger: what to say of it.
   Problem silence(const std::string& thing) const;
   Problem other_version(const std::string& thing) const;
-  Problem stranger(const std::string& thing) const;
+  Problem stranger(const std::string& thing, const SharedWire& wire) const;
   // Messages are handed over from now on.
   void listen();
   // An E:STOP for the board.

@@ -127,7 +127,7 @@ class SharedCarrier : public testing::Test {
     made->carrier = make_shared_carrier(
         loop, std::make_unique<Device::Wire>(loop, device),
         [this] {
-          return SharedWire{wire, exclusive};
+          return SharedWire{wire, exclusive, group};
         },
         role);
     return made;
@@ -151,7 +151,7 @@ class SharedCarrier : public testing::Test {
   }
   // A connection of no carrier: what a forger has.
   FileDescriptor raw() {
-    FileDescriptor connection = reach_holder(wire);
+    FileDescriptor connection = reach_holder({wire});
     EXPECT_TRUE(connection);
     return connection;
   }
@@ -176,6 +176,7 @@ class SharedCarrier : public testing::Test {
   asio::io_context io;
   Device device;
   bool exclusive = true;
+  ShareGroup group;  // none
   const std::string wire = fmt::format("test/{}/{}", ::getpid(), next());
 };
 
@@ -216,7 +217,7 @@ TEST_F(SharedCarrier, WhoComesFirstHasTheWire) {
   EXPECT_TRUE(run_until(io, [&] { return only->has("answer"); }));
   only->carrier->close();
   EXPECT_EQ(device.open, nullptr);
-  EXPECT_FALSE(reach_holder(wire));
+  EXPECT_FALSE(reach_holder({wire}));
 }
 
 TEST_F(SharedCarrier, ThoseThatWatchHearBothDirections) {
@@ -491,8 +492,33 @@ TEST_F(SharedCarrier, SixteenMayShareIt) {
 
 TEST_F(SharedCarrier, IsNotForOtherUsers) {
   const auto holder = opened(BoardRole::control);
-  const int result = run_unprivileged([&] { return reach_holder(wire) ? 1 : 0; });
+  const int result = run_unprivileged([&] { return reach_holder({wire}) ? 1 : 0; });
   EXPECT_EQ(result, 0);
+}
+
+TEST_F(SharedCarrier, IsForTheMembersOfTheGroupThatTheHolderNames) {
+  const std::string stop = datagram_of("E", "STOP");
+  // A user in the group nobody has (65534), and in no other.
+  const auto stop_it = [&](const ShareGroup& of) {
+    return run_unprivileged([&] {
+      const SharedWire shared{wire, exclusive, of};
+      const FileDescriptor connection = reach_holder(shared);
+      if (!connection || !is_one_of_us(connection.get(), shared)) return 1;
+      return send_message(connection.get(), ShareMessage::Kind::stop, stop);
+    });
+  };
+  group = {"members", 65534};
+  const auto holder = opened(BoardRole::control);
+  EXPECT_NE(stop_it({"others", 65534}), 0) << "another name";
+  EXPECT_EQ(stop_it(group), 0);
+  EXPECT_TRUE(run_until(io, [&] { return !device.all_sent().empty(); }));
+  EXPECT_EQ(device.all_sent(), std::vector<std::string>{stop});
+  holder->carrier->close();
+  group.id = 0;
+  const auto strict = opened(BoardRole::control);
+  stop_it(group);
+  run_for(io, 20ms);
+  EXPECT_EQ(device.all_sent().size(), 1U);
 }
 
 // Anyone may take a name: it must keep nobody from a wire, and be told.
