@@ -149,7 +149,8 @@ void Session::on_state_datagram(const Datagram& datagram, Time now) {
 void Session::on_nack_datagram(const Datagram& datagram, Time now) {
   Nack nack;
   if (!read_nack(datagram, nack)) return;
-  if (!is_ours(nack.pnum)) return;  // on a CAN bus the answers to other hosts are heard too
+  // On a CAN bus, on a wire that is shared and in a recording the answers to other hosts are heard, too.
+  if (!is_ours(nack.pnum)) return watches() ? on_answer(datagram, now) : void();
   if (watches()) return on_lease_refused(nack, datagram, now);
   selection_.on_answer();
   if (nack.code == Refusal::busy) {

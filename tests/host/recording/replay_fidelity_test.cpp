@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a program is told by a recording is what it was told when that was made.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <asio/io_context.hpp>
+#include <asio/steady_timer.hpp>
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "host/standard_registry.hpp"
+#include "protocol/messages/state_fields.hpp"
+#include "r4link/async_board.hpp"
+#include "r4link/recording.hpp"
+#include "tests/support/at_will.hpp"
+#include "transports/registry.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+// Damages, loses and doubles what the board says.
+class Troubled final : public Carrier, private Carrier::Handler {
+ public:
+  explicit Troubled(std::unique_ptr<Carrier> below) : below_(std::move(below)) {}
+  ~Troubled() override { below_->close(); }
+
+  void open(Carrier::Handler& handler) override {
+    handler_ = &handler;
+    below_->open(*this);
+  }
+  void close() noexcept override { below_->close(); }
+  SendResult send(std::string_view bytes, Priority priority, Peer to) override {
+    return below_->send(bytes, priority, to);
+  }
+  bool up() const override { return below_->up(); }
+  std::size_t max_size() const override { return below_->max_size(); }
+  const std::string& name() const override { return below_->name(); }
+  const CarrierCounters& counters() const override { return below_->counters(); }
+
+ private:
+  void on_datagram(std::string_view bytes, Peer from) override {
+    ++count_;
+    if (count_ % 23 == 0) return;
+    std::string text(bytes);
+    if (count_ % 17 == 0) text[text.size() / 2] ^= 4;
+    handler_->on_datagram(text, from);
+    if (count_ % 29 == 0) handler_->on_datagram(text, from);
+  }
+  void on_carrier_event(const CarrierEvent& event) override { handler_->on_carrier_event(event); }
+  void on_drained() override { handler_->on_drained(); }
+
+  const std::unique_ptr<Carrier> below_;
+  Carrier::Handler* handler_ = nullptr;
+  int count_ = 0;
+};
+
+// All that a program is told of the board.
+struct Told {
+  explicit Told(AsyncBoard& board) {
+    board.on_state(
+        [this](const ReceivedState& state, const Datagram&) { states.push_back(text_of(state)); });
+    board.on_board_heartbeat(
+        [this](const Datagram& datagram) { heartbeats.push_back(datagram.pnum()); });
+    board.on_bad_datagram(
+        [this](const ReadResult&, std::string_view bytes) { damaged.emplace_back(bytes); });
+    board.on_event([this](const CarrierEvent& event) { events.emplace_back(to_text(event.kind)); });
+  }
+
+  // Every field, those too that this datagram has not brought.
+  static std::string text_of(const State& state) {
+    char buffer[4 * max_datagram];
+    DatagramWriter writer(buffer, sizeof buffer);
+    for (int i = 0; i < state_field_count; ++i) {
+      write_field(writer, static_cast<StateField>(i), state);
+    }
+    const Text text = writer.finish(state.pnum, state.t_ms);
+    std::string present;
+    for (const StateField field : state.present)
+      present += std::to_string(static_cast<int>(field)) + " ";
+    return present + std::string(text.data(), text.size());
+  }
+
+  std::vector<std::string> states, damaged, events;
+  std::vector<std::uint32_t> heartbeats;
+};
+
+TEST(ReplayFidelity, TheSameStatesEventsAndStatisticsAsLive) {
+  const std::string path = testing::TempDir() + "r4-fidelity-" + std::to_string(::getpid());
+  asio::io_context io;
+  AsyncBoard board(
+      io, std::make_unique<Troubled>(standard_registry().make(io, "sim:?seed=7", Role::host)),
+      at_will());
+  Told live(board);
+  Recording recording(path);
+  board.record(recording);
+  board.open();
+  const auto ignore = [](const CommandResult&) {};
+  board.async_send(Command::fields("DEFAULT,ENC1,SAFE,RXOK"), 1s, ignore);
+  board.async_send(Command::relay(1, true), 1s, ignore);
+  board.async_send(Command::osmc(358, Direction::forward, 1), 1s, ignore);
+  io.run_for(1s);
+  board.async_stop(1s, ignore);
+  io.run_for(300ms);
+  board.close();
+  recording.close();
+  const Statistics then = board.statistics();
+
+  BoardOptions watching;
+  watching.role = BoardRole::watch;
+  AsyncBoard again(io, "replay:" + path, watching);
+  Told played(again);
+  again.on_event([&](const CarrierEvent& event) {
+    if (event.kind == CarrierEvent::Kind::down) io.stop();
+  });
+  again.open();
+  io.restart();
+  io.run_for(10s);
+  const Statistics now = again.statistics();
+  std::filesystem::remove(path);
+
+  EXPECT_GT(live.states.size(), 80U);
+  EXPECT_EQ(played.states, live.states);
+  EXPECT_EQ(played.heartbeats, live.heartbeats);
+  EXPECT_GT(live.damaged.size(), 3U);
+  EXPECT_EQ(played.damaged, live.damaged);
+  live.events.emplace_back("down");  // the end
+  EXPECT_EQ(played.events, live.events);
+
+  EXPECT_EQ(now.received, then.received);
+  EXPECT_EQ(now.states, then.states);
+  EXPECT_EQ(now.damaged, then.damaged);
+  EXPECT_EQ(now.packets.received, then.packets.received);
+  EXPECT_EQ(now.packets.lost, then.packets.lost);
+  EXPECT_EQ(now.packets.duplicate, then.packets.duplicate);
+  EXPECT_EQ(now.packets.late, then.packets.late);
+  EXPECT_EQ(now.packets.old, then.packets.old);
+  EXPECT_EQ(now.packets.restarts, then.packets.restarts);
+  EXPECT_GT(then.packets.lost, 0U);
+  EXPECT_GT(then.packets.duplicate, 0U);
+  EXPECT_NEAR(now.state_rate_hz, then.state_rate_hz, 10);
+}
+
+}  // namespace
+}  // namespace r4::test
