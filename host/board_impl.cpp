@@ -38,6 +38,7 @@ Board::Impl::Impl(const CarrierMaker& make, BoardOptions options, BoardCallbacks
     : role(options.role),
       arming(options.session.arming),
       callback_limit(options.callback_limit),
+      on_wait(std::move(options.on_wait)),
       async(io, make(loop), std::move(options)),
       box(
           io, [this](const Command& c) { deliver(c); }, [this](const Setpoints& s) { deliver(s); }),
@@ -194,7 +195,8 @@ void Board::Impl::begin(const CallPtr& call, Clock::time_point deadline) {
     if (!stop && (call->abandoned || left <= Duration{0})) return;
     call->begun = true;
   }
-  auto end = [this, call](const CommandResult& result) { finish(*call, result); };
+  Call::End end(call->cancelled.slot(),
+                [this, call](const CommandResult& result) { finish(*call, result); });
   if (call->start) {
     call->start(left, std::move(end));
   } else if (stop) {
@@ -264,8 +266,15 @@ Board::Impl::CallPtr Board::Impl::execute(const std::string& text, CallPtr call,
   if (closed) throw closed_error(text);
   asio::post(io, [this, call, deadline] { begin(call, deadline); });
   const auto is_done = [&] { return call->done; };
-  if (!call->ended.wait_until(lock, deadline, is_done) &&
-      !(call->begun && call->ended.wait_until(lock, deadline + grace, is_done))) {
+  bool done = false;
+  try {
+    done = wait_until(lock, call->ended, deadline, is_done) ||
+           (call->begun && wait_until(lock, call->ended, deadline + grace, is_done));
+  } catch (...) {
+    abandon(call);
+    throw;
+  }
+  if (!done) {
     call->abandoned = true;
     if (call->command.kind == CommandKind::stop) {
       throw Error(Problem{ErrorKind::refused, text,
@@ -279,6 +288,13 @@ Board::Impl::CallPtr Board::Impl::execute(const std::string& text, CallPtr call,
   if (call->result.outcome == Outcome::confirmed) return call;
   if (call->result.outcome == Outcome::closed) throw closed_error(text);
   throw Error(explain(text, call->result, call->link));
+}
+
+void Board::Impl::abandon(const CallPtr& call) {
+  const std::lock_guard lock(mutex);
+  call->abandoned = true;
+  if (closed) return;
+  asio::post(io, [call] { call->cancelled.emit(asio::cancellation_type::terminal); });
 }
 
 void Board::Impl::run_on_loop(std::string_view what, std::function<void()> action) {

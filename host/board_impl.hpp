@@ -8,6 +8,9 @@
 // The link's thread waits for nobody: nothing of the program runs there but a transport of its own. The threads meet under `mutex`.
 #pragma once
 
+#include <algorithm>
+#include <asio/bind_cancellation_slot.hpp>
+#include <asio/cancellation_signal.hpp>
 #include <asio/executor_work_guard.hpp>
 #include <asio/io_context.hpp>
 #include <asio/steady_timer.hpp>
@@ -31,6 +34,7 @@ namespace r4 {
 
 struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   using Clock = std::chrono::steady_clock;
+  static constexpr Duration wait_interval{50};
 
   // Something asked of the loop, and its answer. Held by both sides, since the caller may give up:
   // what the loop has not begun by then, it leaves alone.
@@ -40,8 +44,10 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
     std::string text, text2;
     const Clock::time_point called = Clock::now();
     // For what is not one command: has the loop begin it, with the time that is left.
-    using End = std::function<void(const CommandResult&)>;
+    using End = asio::cancellation_slot_binder<std::function<void(const CommandResult&)>,
+                                               asio::cancellation_slot>;
     std::function<void(Duration left, End end)> start;
+    asio::cancellation_signal cancelled;
     bool begun = false;
     bool abandoned = false;
     bool done = false;
@@ -73,10 +79,27 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   template <class Predicate>
   bool wait_for_news(Duration timeout, Predicate arrived) {
     std::unique_lock lock(mutex);
-    const bool woken = news.wait_for(lock, bounded(timeout), [&] { return closed || arrived(); });
+    const bool woken = wait_until(lock, news, Clock::now() + bounded(timeout),
+                                  [&] { return closed || arrived(); });
     if (closed) throw closed_error(name);
     return woken;
   }
+  // Waits for what `done` is asked under the lock; false at the deadline. Throws what on_wait() throws, without
+  // the lock.
+  template <class Predicate>
+  bool wait_until(std::unique_lock<std::mutex>& lock, std::condition_variable& ended,
+                  Clock::time_point deadline, Predicate done) {
+    if (!on_wait) return ended.wait_until(lock, deadline, done);
+    while (!ended.wait_until(lock, std::min(deadline, Clock::now() + wait_interval), done)) {
+      if (Clock::now() >= deadline) return false;
+      lock.unlock();
+      on_wait();
+      lock.lock();
+    }
+    return true;
+  }
+  // Its caller does not wait for it any more.
+  void abandon(const CallPtr& call);
   std::string name_now();
   LinkStatus link_now();
   std::uint64_t states_now();
@@ -103,6 +126,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   const BoardRole role;
   const Arming arming;
   const Duration callback_limit;  // 0: none
+  const std::function<void()> on_wait;
   asio::io_context io{1};
   asio::executor_work_guard<asio::io_context::executor_type> work{io.get_executor()};
   BoardLoop loop{io};

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -51,6 +52,9 @@ struct BoardOptions {
   // Of Board only: after so long in the callbacks of one event the heartbeats stop, and the board goes safe, for
   // nobody looks after the robot; up to an hour, 0 turns it off. They go on when it returns.
   std::chrono::milliseconds callback_limit{500};
+  // Of Board only: called by each call that waits, on its thread, every 50 ms. What it throws ends that call, as
+  // its timeout does: what has not been sent by then never is, but for a stop. None: it just waits.
+  std::function<void()> on_wait;
 };
 
 // A board's key from a file: one line, `<id>:<64 hexadecimal digits>`, as `r4 key new` makes it.

@@ -56,6 +56,31 @@ TEST_F(BoardThread, NeverSendsACommandWhoseCallHasThrown) {
   EXPECT_FALSE(has_executed("O:777,1,1"));
 }
 
+TEST(BoardWait, EndsWithWhatOnWaitThrowsAndNothingIsSentAfterwards) {
+  struct Enough {};
+  BoardInAThread simulated("udp");
+  std::atomic<bool> enough{false};
+  BoardOptions options = at_will();
+  options.on_wait = [&] {
+    if (enough) throw Enough();
+  };
+  Hold hold;
+  Board board(hold.at(simulated.url()), options);
+  board.wait_active();
+  hold.begin();
+  ASSERT_TRUE(hold.wait_until_held());
+  enough = true;
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_THROW(board.send("O:777,1,1", 5s), Enough);
+  EXPECT_THROW(board.next_state(5s), Enough);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, 2s);
+  enough = false;
+  hold.release();
+  board.servo(1).set(1500);  // behind it
+  const std::vector<std::string> all = simulated.executed();
+  EXPECT_EQ(std::find(all.begin(), all.end(), "O:777,1,1"), all.end());
+}
+
 TEST_F(BoardThread, SendsAStopHoweverLate) {
   hold_up();
   const Problem problem = problem_of([&] { board.stop(20ms); });

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The module r4link._core: r4::Board for Python, times in milliseconds, enumerations as their names. What a
+// program uses is in r4link/*.py, on top of it.
+//
+// The thread of the link never takes the GIL; that of the callbacks does, for each of them.
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+#include "r4link/board.hpp"
+
+namespace r4::python {
+
+namespace py = pybind11;
+
+void bind_errors(py::module_& module);
+void bind_values(py::module_& module);
+void bind_state(py::module_& module);
+void bind_board(py::module_& module);
+void bind_simulation(py::module_& module);
+
+inline py::str to_str(Text text) { return {text.data(), text.size()}; }
+py::object to_python(Drive drive);
+py::object to_python(const Bldc& bldc);
+
+// A field of a state, in its unit (state.hpp): float of volts, bool of the handle, Drive, Bldc, int.
+py::object value_of(const State& state, StateField field);
+// "osmc1": an attribute.
+std::string attribute_of(StateField field);
+
+}  // namespace r4::python

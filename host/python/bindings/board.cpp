@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "r4link/board.hpp"
+
+#include <pybind11/stl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bindings.hpp"
+#include "callback.hpp"
+#include "states.hpp"
+
+namespace r4::python {
+namespace {
+
+using Ms = std::chrono::milliseconds;
+using Released = py::call_guard<py::gil_scoped_release>;
+
+// A board of this process. One that was inherited by a fork is none: its threads are not here, and the wire is
+// the parent's.
+class PyBoard {
+ public:
+  PyBoard(const std::string& url, BoardOptions options) {
+    options.on_wait = [this] { on_wait(); };
+    const py::gil_scoped_release free;
+    board_ = std::make_unique<Board>(url, std::move(options));
+  }
+  ~PyBoard() {
+    if (::getpid() != process_) {
+      static_cast<void>(board_.release());
+      return;
+    }
+    const py::gil_scoped_release free;
+    end_states();
+    board_.reset();
+  }
+  PyBoard(const PyBoard&) = delete;
+  PyBoard& operator=(const PyBoard&) = delete;
+
+  Board* operator->() {
+    if (::getpid() == process_) return board_.get();
+    throw Error(Problem{ErrorKind::refused, "the board",
+                        "it was opened by the process " + std::to_string(process_) +
+                            ", of which this one is a fork",
+                        "open it here, after the fork", Outcome::closed});
+  }
+
+  // The GIL is not held.
+  void close() {
+    if (::getpid() != process_) return;
+    end_states();
+    board_->close();
+  }
+
+  // What a call that waits asks on its thread: was it interrupted, by a signal or by another thread?
+  void on_wait() {
+    const py::gil_scoped_acquire gil;
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    unsigned long self = PyThread_get_thread_ident();
+    if (interrupted_.compare_exchange_strong(self, 0)) {
+      throw Error(Problem{ErrorKind::refused, "the call", "it was cancelled", "", Outcome::cancelled});
+    }
+  }
+  void interrupt(unsigned long thread) { interrupted_ = thread; }
+
+  template <class Subscribe>
+  Subscription subscribe(py::object function, Subscribe to) {
+    const Callback callback(std::move(function));
+    std::erase_if(callbacks_, [](const auto& each) { return each.expired(); });
+    callbacks_.push_back(callback.held());
+    const py::gil_scoped_release free;
+    return to(callback);
+  }
+
+  std::shared_ptr<States> states(std::size_t most) {
+    const auto states = std::make_shared<States>(most);
+    const std::weak_ptr<States> weak = states;
+    const std::lock_guard lock(mutex_);
+    std::erase_if(states_, [](const auto& each) { return each.second.expired(); });
+    const Subscription subscription = (*this)->on_state([weak](const ReceivedState& state) {
+      if (const auto alive = weak.lock(); alive && state.any()) alive->put(state);
+    });
+    states_.emplace_back(subscription, weak);
+    return states;
+  }
+
+  // For the garbage collector: functions of Python that refer to the board are circles.
+  int traverse(visitproc visit, void* arg) const {
+    for (const auto& each : callbacks_) {
+      if (const auto held = each.lock()) Py_VISIT(held->function.ptr());
+    }
+    return 0;
+  }
+  void clear() {
+    for (const auto& each : callbacks_) {
+      if (const auto held = each.lock()) held->function = py::none();
+    }
+  }
+
+ private:
+  void end_states() {
+    const std::lock_guard lock(mutex_);
+    for (auto& [subscription, weak] : states_) {
+      subscription.cancel();
+      if (const auto states = weak.lock()) states->end();
+    }
+    states_.clear();
+  }
+
+  const pid_t process_ = ::getpid();
+  std::unique_ptr<Board> board_;
+  std::vector<std::weak_ptr<Callback::Held>> callbacks_;  // with the GIL
+  std::atomic<unsigned long> interrupted_{0};             // a thread
+  std::mutex mutex_;                                      // of what follows; nobody waits for the GIL under it
+  std::vector<std::pair<Subscription, std::weak_ptr<States>>> states_;
+};
+
+// None while the constructor has not made one.
+PyBoard* board_in(PyObject* self) {
+  auto* const instance = reinterpret_cast<py::detail::instance*>(self);
+  return instance->simple_layout ? static_cast<PyBoard*>(instance->simple_value_holder[0]) : nullptr;
+}
+
+void collect_garbage(PyHeapTypeObject* heap) {
+  PyTypeObject& type = heap->ht_type;
+  type.tp_flags |= Py_TPFLAGS_HAVE_GC;
+  type.tp_traverse = [](PyObject* self, visitproc visit, void* arg) {
+    Py_VISIT(Py_TYPE(self));
+    const PyBoard* const board = board_in(self);
+    return board != nullptr ? board->traverse(visit, arg) : 0;
+  };
+  type.tp_clear = [](PyObject* self) {
+    if (PyBoard* const board = board_in(self)) board->clear();
+    return 0;
+  };
+}
+
+BoardOptions options_of(bool watch, bool arming, const std::string& fields,
+                        const std::optional<std::string>& key, int watch_rate_hz, int heartbeat_ms,
+                        int timeout_ms, int command_retry_ms, int stop_retry_ms, int stop_linger_ms,
+                        int identify_interval_ms, int callback_limit_ms) {
+  BoardOptions options;
+  options.role = watch ? BoardRole::watch : BoardRole::control;
+  options.callback_limit = Ms(callback_limit_ms);
+  SessionOptions& session = options.session;
+  session.arming = arming ? Arming::required : Arming::off;
+  session.fields = fields;
+  if (key) session.key = load_key(*key);
+  session.watch_rate_hz = watch_rate_hz;
+  session.timing = {static_cast<std::uint32_t>(heartbeat_ms), static_cast<std::uint32_t>(timeout_ms)};
+  session.command_retry = Ms(command_retry_ms);
+  session.stop_retry = Ms(stop_retry_ms);
+  session.stop_linger = Ms(stop_linger_ms);
+  session.identify_interval = Ms(identify_interval_ms);
+  return options;
+}
+
+void bind_recording(py::module_& module) {
+  py::class_<Recording>(module, "Recording")
+      .def(py::init([](const std::string& path, std::uint64_t rotate_bytes, std::int64_t rotate_after_s,
+                       std::uint64_t keep_bytes) {
+             return std::make_unique<Recording>(
+                 path, RecordingOptions{rotate_bytes, std::chrono::seconds(rotate_after_s), keep_bytes});
+           }),
+           Released())
+      .def("close", &Recording::close, Released())
+      .def_property_readonly("problem",
+                             [](const Recording& recording) -> std::optional<std::string> {
+                               const auto problem = recording.problem();
+                               if (!problem) return std::nullopt;
+                               return problem->text();
+                             })
+      .def_property_readonly("records", &Recording::records)
+      .def_property_readonly("dropped", &Recording::dropped);
+}
+
+}  // namespace
+
+void bind_board(py::module_& module) {
+  py::class_<Subscription>(module, "Subscription").def("cancel", &Subscription::cancel, Released());
+  bind_recording(module);
+  py::class_<States, std::shared_ptr<States>>(module, "States")
+      .def_property_readonly("ended", &States::ended)
+      .def_property_readonly("dropped", &States::dropped);
+
+  py::class_<PyBoard>(module, "Board", py::custom_type_setup(collect_garbage))
+      .def(py::init([](const std::string& url, bool watch, bool arming, const std::string& fields,
+                       const std::optional<std::string>& key, int watch_rate_hz, int heartbeat,
+                       int timeout, int command_retry, int stop_retry, int stop_linger,
+                       int identify_interval, int callback_limit) {
+             return std::make_unique<PyBoard>(
+                 url, options_of(watch, arming, fields, key, watch_rate_hz, heartbeat, timeout,
+                                 command_retry, stop_retry, stop_linger, identify_interval,
+                                 callback_limit));
+           }),
+           py::arg("url"), py::kw_only(), py::arg("watch"), py::arg("arming"), py::arg("fields"),
+           py::arg("key"), py::arg("watch_rate_hz"), py::arg("heartbeat"), py::arg("timeout"),
+           py::arg("command_retry"), py::arg("stop_retry"), py::arg("stop_linger"),
+           py::arg("identify_interval"), py::arg("callback_limit"))
+      .def("close", &PyBoard::close, Released())
+      .def("interrupt", &PyBoard::interrupt)
+      .def("wait_active", [](PyBoard& board, int ms) { board->wait_active(Ms(ms)); }, Released())
+      .def("send", [](PyBoard& board, const std::string& text, int ms) { board->send(text, Ms(ms)); },
+           Released())
+      .def("send", [](PyBoard& board, const Command& command, int ms) { board->send(command, Ms(ms)); },
+           Released())
+      .def("post", [](PyBoard& board, const Command& command) {
+        return to_text(board->post(command));
+      })
+      .def("apply",
+           [](PyBoard& board, const Setpoints& setpoints, int ms) { board->apply(setpoints, Ms(ms)); },
+           Released())
+      .def("post", [](PyBoard& board, const Setpoints& setpoints) {
+        return to_text(board->post(setpoints));
+      })
+      .def("arm", [](PyBoard& board, int ms) { board->arm(Ms(ms)); }, Released())
+      .def("disarmed_by", [](PyBoard& board) { return to_text(board->disarmed_by()); })
+      .def("stop", [](PyBoard& board, int ms) { board->stop(Ms(ms)); }, Released())
+      .def("stop_async", [](PyBoard& board) { board->stop_async(); })
+      .def("link_timing",
+           [](PyBoard& board, int timeout, int heartbeat, int ms) {
+             board->link_timing(Ms(timeout), Ms(heartbeat), Ms(ms));
+           },
+           Released())
+      .def("identify", [](PyBoard& board, int ms) { return board->identify(Ms(ms)); }, Released())
+      .def("state", [](PyBoard& board) { return board->state(); })
+      .def("next_state", [](PyBoard& board, int ms) { return board->next_state(Ms(ms)); }, Released())
+      .def("link", [](PyBoard& board) { return board->link(); })
+      .def("statistics", [](PyBoard& board) { return board->statistics(); }, Released())
+      .def("carrier_counters", [](PyBoard& board) { return board->carrier_counters(); }, Released())
+      .def("name", [](PyBoard& board) { return board->name(); })
+      .def("record",
+           [](PyBoard& board, const std::string& path, std::uint64_t rotate_bytes,
+              std::int64_t rotate_after_s, std::uint64_t keep_bytes) {
+             board->record(path, {rotate_bytes, std::chrono::seconds(rotate_after_s), keep_bytes});
+           },
+           Released())
+      .def("record", [](PyBoard& board, Recording& recording) { board->record(recording); },
+           py::keep_alive<1, 2>(), Released())
+      .def("watchdog", [](PyBoard& board, int ms) { board->watchdog(Ms(ms)); }, Released())
+      .def("feed", [](PyBoard& board) { board->feed(); })
+      .def("states", &PyBoard::states, Released())
+      .def("take",
+           [](PyBoard& board, States& states, int ms) {
+             return states.take(Ms(ms), [&board] { board.on_wait(); });
+           },
+           Released())
+      .def("on_state",
+           [](PyBoard& board, py::object function) {
+             return board.subscribe(std::move(function),
+                                    [&](const Callback& each) { return board->on_state(each); });
+           })
+      .def("on_link",
+           [](PyBoard& board, py::object function) {
+             return board.subscribe(std::move(function),
+                                    [&](const Callback& each) { return board->on_link(each); });
+           })
+      .def("on_event",
+           [](PyBoard& board, py::object function) {
+             return board.subscribe(std::move(function),
+                                    [&](const Callback& each) { return board->on_event(each); });
+           })
+      .def("on_restart",
+           [](PyBoard& board, py::object function) {
+             return board.subscribe(std::move(function),
+                                    [&](const Callback& each) { return board->on_restart(each); });
+           })
+      .def("on_arming",
+           [](PyBoard& board, py::object function) {
+             return board.subscribe(std::move(function), [&](const Callback& each) {
+               return board->on_arming([each](DisarmCause cause) { each(to_text(cause)); });
+             });
+           })
+      .def("on_refused", [](PyBoard& board, py::object function) {
+        return board.subscribe(std::move(function),
+                               [&](const Callback& each) { return board->on_refused(each); });
+      });
+}
+
+}  // namespace r4::python

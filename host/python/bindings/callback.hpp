@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A Python function that another thread calls.
+#pragma once
+
+#include <memory>
+#include <utility>
+
+#include "bindings.hpp"
+
+namespace r4::python {
+
+// Copied, called and destroyed by any thread. The function is touched with the GIL alone; what it raises is told
+// as Python tells of what it cannot raise (sys.unraisablehook).
+class Callback {
+ public:
+  struct Held {
+    py::object function;  // none after clear(), of the garbage collector
+  };
+
+  explicit Callback(py::object function)
+      : held_(new Held{std::move(function)}, [](Held* held) {
+          if (!Py_IsInitialized()) return;  // the interpreter has ended: it is gone
+          const py::gil_scoped_acquire gil;
+          delete held;
+        }) {}
+
+  const std::shared_ptr<Held>& held() const { return held_; }
+
+  template <class... Arguments>
+  void operator()(const Arguments&... arguments) const {
+    const py::gil_scoped_acquire gil;
+    const py::object function = held_->function;
+    if (!function || function.is_none()) return;
+    try {
+      function(arguments...);
+    } catch (py::error_already_set& error) {
+      error.discard_as_unraisable(function);
+    }
+  }
+
+ private:
+  std::shared_ptr<Held> held_;
+};
+
+}  // namespace r4::python

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bindings.hpp"
+
+PYBIND11_MODULE(_core, module) {
+  module.doc() = "r4::Board for Python; see r4link";
+  module.attr("__version__") = R4LINK_VERSION;
+  r4::python::bind_errors(module);
+  r4::python::bind_values(module);
+  r4::python::bind_state(module);
+  r4::python::bind_board(module);
+  r4::python::bind_simulation(module);
+}

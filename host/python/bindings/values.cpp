@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Commands, setpoints and the small values of link and statistics.
+#include <pybind11/stl.h>
+
+#include "bindings.hpp"
+
+namespace r4::python {
+namespace {
+
+// With its members as attributes and as a dict.
+template <class Value>
+class Record {
+ public:
+  Record(py::module_& module, const char* name) : class_(module, name) {
+    class_.def("as_dict", [members = members_](const py::object& self) {
+      py::dict dict;
+      for (const py::handle member : members) dict[member] = self.attr(member);
+      return dict;
+    });
+    class_.def("__repr__", [](const py::object& self) {
+      py::list parts;
+      const py::dict dict = self.attr("as_dict")();
+      for (const auto& [member, value] : dict) {
+        parts.append(py::str("{}={!r}").format(member, value));
+      }
+      return py::str("{}({})").format(py::type::of(self).attr("__name__"),
+                                      py::str(", ").attr("join")(parts));
+    });
+  }
+  template <class Getter>
+  Record& has(const char* member, Getter getter) {
+    members_.append(member);
+    class_.def_property_readonly(member, getter);
+    return *this;
+  }
+  template <class Member>
+  Record& has(const char* member, Member Value::*which) {
+    return has(member, [which](const Value& value) { return value.*which; });
+  }
+
+ private:
+  py::class_<Value> class_;
+  py::list members_;  // shared with as_dict
+};
+
+Direction direction_of(int number) {
+  if (number != 0 && number != 1) {
+    throw Error(ErrorKind::usage, "direction " + std::to_string(number), "there is no such one",
+                "give Direction.FORWARD or Direction.REVERSE");
+  }
+  return static_cast<Direction>(number);
+}
+
+void bind_commands(py::module_& module) {
+  py::class_<Command>(module, "Command")
+      .def_static("osmc", [](int channel, int pwm, int direction) {
+        return Command::osmc(pwm, direction_of(direction), channel);
+      })
+      .def_static("dhb12", [](int channel, int pwm, int direction) {
+        return Command::dhb12(pwm, direction_of(direction), channel);
+      })
+      .def_static("servo", [](int channel, int us) { return Command::servo(us, channel); })
+      .def_static("relay", [](int channel, bool on) { return Command::relay(channel, on); })
+      .def_static("stepper", [](int channel, std::int32_t position, int speed) {
+        return Command::stepper(position, speed, channel);
+      })
+      .def_static("zero", [](int channel) { return Command::zero(channel); })
+      .def_static("bldc", [](int channel, int speed, int direction, bool brake) {
+        return Command::bldc(speed, direction_of(direction), brake, channel);
+      })
+      .def_static("proximity", [](int channel, int cm) { return Command::proximity(cm, channel); })
+      .def_static("stop", &Command::stop)
+      .def_static("clear", [] { return Command::clear(); });
+  py::class_<Setpoints>(module, "Setpoints")
+      .def(py::init<>())
+      .def("add", &Setpoints::add, py::return_value_policy::reference_internal)
+      .def("__len__", &Setpoints::size);
+}
+
+}  // namespace
+
+py::object to_python(Drive drive) {
+  static const py::handle type =
+      py::module_::import("r4link.values").attr("Drive").cast<py::object>().release();
+  return type(drive.pwm, static_cast<int>(drive.direction));
+}
+py::object to_python(const Bldc& bldc) {
+  static const py::handle type =
+      py::module_::import("r4link.values").attr("Bldc").cast<py::object>().release();
+  return type(bldc.speed, static_cast<int>(bldc.direction), bldc.brake);
+}
+
+void bind_values(py::module_& module) {
+  bind_commands(module);
+  Record<LinkStatus>(module, "LinkStatus")
+      .has("state", [](const LinkStatus& link) { return to_text(link.state); })
+      .has("reason", [](const LinkStatus& link) { return to_text(link.reason); })
+      .has("busy", &LinkStatus::busy)
+      .has("gated", [](const LinkStatus& link) { return link.gated(); })
+      .has("key", [](const LinkStatus& link) { return to_text(link.key); })
+      .has("lease", [](const LinkStatus& link) { return to_text(link.lease); })
+      .has("in_control", &LinkStatus::in_control)
+      .has("transport_down", &LinkStatus::transport_down)
+      .has("chip", [](const LinkStatus& link) -> py::object {
+        if (!link.chip.any()) return py::none();
+        return py::str("{}: {}").format(chip_name(link.chip.address), to_text(link.chip.trouble));
+      });
+  Record<BoardIdentity>(module, "Identity")
+      .has("firmware", &BoardIdentity::firmware)
+      .has("board_id", &BoardIdentity::board_id)
+      .has("capabilities",
+           [](const BoardIdentity& identity) {
+             return py::tuple(py::str(identity.capabilities).attr("split")("+"));
+           })
+      .has("name", &BoardIdentity::name);
+  Record<Statistics>(module, "Statistics")
+      .has("received", &Statistics::received)
+      .has("states", &Statistics::states)
+      .has("damaged", &Statistics::damaged)
+      .has("lost", [](const Statistics& all) { return all.packets.lost; })
+      .has("duplicate", [](const Statistics& all) { return all.packets.duplicate; })
+      .has("late", [](const Statistics& all) { return all.packets.late; })
+      .has("restarts", [](const Statistics& all) { return all.packets.restarts; })
+      .has("loss", [](const Statistics& all) { return all.loss(); })
+      .has("state_rate_hz", &Statistics::state_rate_hz)
+      .has("round_trip_us", &Statistics::round_trip_us)
+      .has("round_trip_min_us", &Statistics::round_trip_min_us)
+      .has("round_trip_mean_us", &Statistics::round_trip_mean_us)
+      .has("jitter_us", &Statistics::jitter_us)
+      .has("state_age_us", &Statistics::state_age_us)
+      .has("heartbeats", &Statistics::heartbeats)
+      .has("commands", &Statistics::commands)
+      .has("retries", &Statistics::retries)
+      .has("confirmed", &Statistics::confirmed)
+      .has("refused", &Statistics::refused)
+      .has("timed_out", &Statistics::timed_out);
+  Record<CarrierCounters>(module, "CarrierCounters")
+      .has("rx_datagrams", &CarrierCounters::rx_datagrams)
+      .has("rx_bytes", &CarrierCounters::rx_bytes)
+      .has("rx_oversize", &CarrierCounters::rx_oversize)
+      .has("rx_foreign", &CarrierCounters::rx_foreign)
+      .has("rx_overflows", &CarrierCounters::rx_overflows)
+      .has("tx_datagrams", &CarrierCounters::tx_datagrams)
+      .has("tx_bytes", &CarrierCounters::tx_bytes)
+      .has("tx_dropped", &CarrierCounters::tx_dropped)
+      .has("tx_errors", &CarrierCounters::tx_errors)
+      .has("downs", &CarrierCounters::downs)
+      .has("ups", &CarrierCounters::ups);
+  Record<CarrierEvent>(module, "Event")
+      .has("kind", [](const CarrierEvent& event) { return to_text(event.kind); })
+      .has("thing", [](const CarrierEvent& event) { return event.problem.thing; })
+      .has("reason", [](const CarrierEvent& event) { return event.problem.reason; })
+      .has("fix", [](const CarrierEvent& event) { return event.problem.fix; });
+  Record<RefusedPost>(module, "RefusedPost")
+      .has("refusal", [](const RefusedPost& post) { return to_str(name_of(post.code)); })
+      .has("why", [](const RefusedPost& post) { return to_text(post.why); })
+      .has("at", [](const RefusedPost& post) { return static_cast<int>(post.at); })
+      .has("group", [](const RefusedPost& post) { return static_cast<int>(post.group); });
+}
+
+}  // namespace r4::python

@@ -1,0 +1,362 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""r4link.Board: a board, opened by URL. Blocking calls with timeouts, and callbacks.
+
+Times are seconds. A call that waits releases the GIL and obeys Ctrl-C. Callbacks run on a thread of their own, one
+at a time; one that does not return within `callback_limit` stops the heartbeats, so that the board goes safe.
+"""
+from __future__ import annotations
+
+import atexit
+import math
+import os
+import weakref
+from types import TracebackType
+from typing import Any, Callable, Iterator, Type, TypeVar
+
+from . import _core
+from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State, Statistics,
+                    Subscription)
+from .errors import UsageError
+from .values import Direction, PostResult
+
+F = TypeVar('F', bound=Callable[..., Any])
+_MOST_S = 24 * 3600.0
+_open: weakref.WeakSet[Board] = weakref.WeakSet()
+
+
+def _ms(seconds: float) -> int:
+    """Whole milliseconds, rounded up: a timeout of a little is not one of nothing."""
+    if math.isnan(seconds):
+        raise UsageError('a time of nan seconds', 'it is no number', 'give seconds')
+    return math.ceil(max(-_MOST_S, min(seconds, _MOST_S)) * 1000)
+
+
+@atexit.register
+def _close_all() -> None:
+    """Farewells are said while the interpreter is whole."""
+    for board in list(_open):
+        board.close()
+
+
+class Setpoints:
+    """Output commands that a board executes together, in one pass over its chips, or not at all.
+
+        board.apply(r4link.Setpoints().osmc(1, 358, FORWARD).osmc(2, 358, FORWARD).servo(3, 1500))
+    """
+
+    def __init__(self) -> None:
+        self._core = _core.Setpoints()
+
+    def add(self, command: Command) -> Setpoints:
+        """Any output command."""
+        self._core.add(command)
+        return self
+
+    def osmc(self, channel: int, pwm: int, direction: int = Direction.FORWARD) -> Setpoints:
+        return self.add(Command.osmc(channel, pwm, direction))
+
+    def dhb12(self, channel: int, pwm: int, direction: int = Direction.FORWARD) -> Setpoints:
+        return self.add(Command.dhb12(channel, pwm, direction))
+
+    def servo(self, channel: int, pulse_us: int) -> Setpoints:
+        return self.add(Command.servo(channel, pulse_us))
+
+    def relay(self, channel: int, on: bool) -> Setpoints:
+        return self.add(Command.relay(channel, on))
+
+    def stepper(self, channel: int, position: int, speed: int = 1000) -> Setpoints:
+        return self.add(Command.stepper(channel, position, speed))
+
+    def zero(self, channel: int) -> Setpoints:
+        return self.add(Command.zero(channel))
+
+    def bldc(self, channel: int, speed: int, direction: int = Direction.FORWARD, brake: bool = False) -> Setpoints:
+        return self.add(Command.bldc(channel, speed, direction, brake))
+
+    def __len__(self) -> int:
+        return len(self._core)
+
+
+class _Channel:
+    def __init__(self, board: Board, channel: int) -> None:
+        self._board = board
+        self._channel = channel
+
+
+class DriveChannel(_Channel):
+    """An H-bridge: pwm 0-4095."""
+
+    def __init__(self, board: Board, channel: int, make: Callable[[int, int, int], Command]) -> None:
+        super().__init__(board, channel)
+        self._make = make
+
+    def set(self, pwm: int, direction: int = Direction.FORWARD, timeout: float = 1.0) -> None:
+        self._board.send(self._make(self._channel, pwm, direction), timeout)
+
+    def post(self, pwm: int, direction: int = Direction.FORWARD) -> PostResult:
+        return self._board.post(self._make(self._channel, pwm, direction))
+
+
+class ServoChannel(_Channel):
+    """A servo: pulse width in microseconds, 0 (off) to 2500."""
+
+    def set(self, pulse_us: int, timeout: float = 1.0) -> None:
+        self._board.send(Command.servo(self._channel, pulse_us), timeout)
+
+    def post(self, pulse_us: int) -> PostResult:
+        return self._board.post(Command.servo(self._channel, pulse_us))
+
+
+class RelayChannel(_Channel):
+    """A relay; 1 is the motor supply."""
+
+    def set(self, on: bool, timeout: float = 1.0) -> None:
+        self._board.send(Command.relay(self._channel, on), timeout)
+
+    def post(self, on: bool) -> PostResult:
+        return self._board.post(Command.relay(self._channel, on))
+
+
+class StepperChannel(_Channel):
+    """A stepper: position in steps, speed in steps a second (1-20000)."""
+
+    def move_to(self, position: int, speed: int = 1000, timeout: float = 1.0) -> None:
+        self._board.send(Command.stepper(self._channel, position, speed), timeout)
+
+    def post(self, position: int, speed: int = 1000) -> PostResult:
+        return self._board.post(Command.stepper(self._channel, position, speed))
+
+    def zero(self, timeout: float = 1.0) -> None:
+        self._board.send(Command.zero(self._channel), timeout)
+
+
+class BldcChannel(_Channel):
+    """A brushless motor: speed 0-4095."""
+
+    def set(self, speed: int, direction: int = Direction.FORWARD, brake: bool = False, timeout: float = 1.0) -> None:
+        self._board.send(Command.bldc(self._channel, speed, direction, brake), timeout)
+
+    def post(self, speed: int, direction: int = Direction.FORWARD, brake: bool = False) -> PostResult:
+        return self._board.post(Command.bldc(self._channel, speed, direction, brake))
+
+
+class States:
+    """The states of a board from now on: `for state in board.states(): …`, until the board is closed.
+
+    As many as `most` wait for a loop that is slow, then the oldest give way: `dropped`.
+    """
+
+    def __init__(self, board: _core.Board, most: int, timeout: float) -> None:
+        self._board = board
+        self._states = board.states(most)
+        self._timeout_ms = _ms(timeout)
+
+    def __iter__(self) -> Iterator[State]:
+        return self
+
+    def __next__(self) -> State:
+        """Raises NotConfirmedError when none comes within the timeout."""
+        state = self._board.take(self._states, self._timeout_ms)
+        if state is not None:
+            return state
+        if self._states.ended:
+            raise StopIteration
+        self._board.next_state(1)  # says why there is none
+        return next(self)
+
+    @property
+    def dropped(self) -> int:
+        return self._states.dropped
+
+
+class Board:
+    """A board, opened by URL (docs/transports.md); see the options of include/r4link/options.hpp.
+
+    Returns without waiting for the board: wait_active(). `role` is 'control', or 'watch' for a program that only
+    looks, and may stop the board. `key` is the path of a key file. Raises UsageError, OpenError, DeniedError.
+
+        with r4link.Board('udp://192.168.0.125') as board:
+            board.wait_active()
+            board.arm()                 # closes relay 1, the motor supply
+            board.osmc(1).set(358)      # the board's own state has confirmed it
+    """
+
+    def __init__(self, url: str, *, role: str = 'control', arming: bool = True, fields: str = 'DEFAULT',
+                 key: str | os.PathLike[str] | None = None, watch_rate_hz: int = 100, heartbeat: float = 0.1,
+                 timeout: float = 1.0, command_retry: float = 0.05, stop_retry: float = 0.02,
+                 stop_linger: float = 0.2, identify_interval: float = 1.0, callback_limit: float = 0.5) -> None:
+        if role not in ('control', 'watch'):
+            raise UsageError(f'role {role!r}', 'there is no such role', "give 'control' or 'watch'")
+        self._core = _core.Board(
+            url, watch=role == 'watch', arming=arming, fields=fields, key=None if key is None else os.fspath(key),
+            watch_rate_hz=watch_rate_hz, heartbeat=_ms(heartbeat), timeout=_ms(timeout),
+            command_retry=_ms(command_retry), stop_retry=_ms(stop_retry), stop_linger=_ms(stop_linger),
+            identify_interval=_ms(identify_interval), callback_limit=_ms(callback_limit))
+        _open.add(self)
+
+    def close(self) -> None:
+        """Says farewell and closes the transport: the board goes safe at once. Calls that wait in other threads
+        raise ClosedError. Idempotent; a callback may call it."""
+        self._core.close()
+
+    def __enter__(self) -> Board:
+        return self
+
+    def __exit__(self, kind: Type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f'<r4link.Board {self.name}: {self.link.state}>'
+
+    def wait_active(self, timeout: float = 3.0) -> None:
+        """Until the board is under our control or, where we only watch, is heard. Raises RefusedError that says what
+        it is instead."""
+        self._core.wait_active(_ms(timeout))
+
+    # --- commands: each returns when the board's own state confirms it, raises RefusedError otherwise
+
+    def send(self, command: str | Command, timeout: float = 1.0) -> None:
+        """A command, or its text: 'O:358,1,1'; 'O:358,1,1;O:358,1,2' is a group."""
+        self._core.send(command, _ms(timeout))
+
+    def post(self, command: Command | Setpoints) -> PostResult:
+        """Sends once, without waiting or confirmation. on_refused() tells of what the board refuses."""
+        return PostResult(self._core.post(command._core if isinstance(command, Setpoints) else command))
+
+    def apply(self, setpoints: Setpoints, timeout: float = 1.0) -> None:
+        """All of them in one pass, confirmed as one, or none."""
+        self._core.apply(setpoints._core, _ms(timeout))
+
+    def arm(self, timeout: float = 1.0) -> None:
+        """Before the first output command, and again after whatever made the outputs safe but a lost link."""
+        self._core.arm(_ms(timeout))
+
+    @property
+    def disarmed_by(self) -> str:
+        """Why output commands are refused; 'none' when armed."""
+        return self._core.disarmed_by()
+
+    def stop(self, timeout: float = 1.0) -> None:
+        """Every output safe, at once, repeated until the board confirms it; latched until clear()."""
+        self._core.stop(_ms(timeout))
+
+    def stop_async(self) -> None:
+        """The same, without waiting."""
+        self._core.stop_async()
+
+    def clear(self, timeout: float = 1.0) -> None:
+        """Clears a stop."""
+        self.send(Command.clear(), timeout)
+
+    def osmc(self, channel: int) -> DriveChannel:
+        return DriveChannel(self, channel, Command.osmc)
+
+    def dhb12(self, channel: int) -> DriveChannel:
+        return DriveChannel(self, channel, Command.dhb12)
+
+    def servo(self, channel: int) -> ServoChannel:
+        return ServoChannel(self, channel)
+
+    def relay(self, channel: int) -> RelayChannel:
+        return RelayChannel(self, channel)
+
+    def stepper(self, channel: int) -> StepperChannel:
+        return StepperChannel(self, channel)
+
+    def bldc(self, channel: int) -> BldcChannel:
+        return BldcChannel(self, channel)
+
+    def proximity(self, channel: int, threshold_cm: int, timeout: float = 1.0) -> None:
+        """The board goes safe when something is nearer than that; 0: off."""
+        self.send(Command.proximity(channel, threshold_cm), timeout)
+
+    def fields(self, names: str, timeout: float = 1.0) -> None:
+        """The state fields to ask for: 'DEFAULT,ENC1'."""
+        self.send(f'F:{names}', timeout)
+
+    def setting(self, key: str, value: str, timeout: float = 1.0) -> None:
+        self.send(f'C:{key},{value}', timeout)
+
+    def link_timing(self, board_timeout: float, heartbeat: float, timeout: float = 1.0) -> None:
+        """The board's timeout and heartbeat interval together."""
+        self._core.link_timing(_ms(board_timeout), _ms(heartbeat), _ms(timeout))
+
+    # --- what the board says
+
+    def identify(self, timeout: float = 1.0) -> Identity:
+        return self._core.identify(_ms(timeout))
+
+    @property
+    def state(self) -> State:
+        """The newest; false while none has come. `received` is when, on the clock of time.monotonic()."""
+        return self._core.state()
+
+    def next_state(self, timeout: float = 1.0) -> State:
+        return self._core.next_state(_ms(timeout))
+
+    def states(self, most: int = 1, timeout: float = 1.0) -> States:
+        """Every state from now on, of which `most` wait: 1 is the newest alone. States that come while a callback
+        runs are one."""
+        if most < 1:
+            raise UsageError(f'states(most={most})', 'at least one has to wait', 'give 1 or more')
+        return States(self._core, most, timeout)
+
+    @property
+    def link(self) -> LinkStatus:
+        return self._core.link()
+
+    @property
+    def statistics(self) -> Statistics:
+        return self._core.statistics()
+
+    @property
+    def carrier_counters(self) -> CarrierCounters:
+        """What the transport has carried."""
+        return self._core.carrier_counters()
+
+    @property
+    def name(self) -> str:
+        """The transport, for people."""
+        return self._core.name()
+
+    # --- callbacks: each is told first what there is already. As functions or as decorators.
+
+    def on_state(self, callback: Callable[[State], object]) -> Subscription:
+        return self._core.on_state(callback)
+
+    def on_link(self, callback: Callable[[LinkStatus], object]) -> Subscription:
+        return self._core.on_link(callback)
+
+    def on_event(self, callback: Callable[[Event], object]) -> Subscription:
+        """The transport went up or down, or something is to be warned of."""
+        return self._core.on_event(callback)
+
+    def on_restart(self, callback: Callable[[], object]) -> Subscription:
+        """The board has begun again: what it was told is gone."""
+        return self._core.on_restart(callback)
+
+    def on_arming(self, callback: Callable[[str], object]) -> Subscription:
+        """Armed ('none'), or not any more, and why."""
+        return self._core.on_arming(callback)
+
+    def on_refused(self, callback: Callable[[RefusedPost], object]) -> Subscription:
+        """A command that was posted was refused: by the board, or on its way there."""
+        return self._core.on_refused(callback)
+
+    def record(self, to: str | os.PathLike[str] | Recording, *, rotate_bytes: int = 0, rotate_after: int = 0,
+               keep_bytes: int = 0) -> None:
+        """Every datagram from now on, in both directions, into a file (docs/recordings.md)."""
+        if isinstance(to, Recording):
+            self._core.record(to)
+        else:
+            self._core.record(os.fspath(to), rotate_bytes, rotate_after, keep_bytes)
+
+    def watchdog(self, period: float) -> None:
+        """Without feed() for so long our heartbeats stop and the board goes safe; 0 turns it off."""
+        self._core.watchdog(_ms(period))
+
+    def feed(self) -> None:
+        self._core.feed()
+
+

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What can go wrong. Each error names the thing, the reason and the fix.
+
+    Error
+      DataError            a datagram, a recording or a file is bad
+      UsageError           a URL, an option or a command is wrong (a ValueError, too)
+      RefusedError         the board refused, or did not confirm; `refusal` is its code: 'SAFE', 'RANGE' …
+        NotConfirmedError  no confirmation in time: it may have been executed or not (a TimeoutError, too)
+        CancelledError     given up: a stop or a newer cause to be safe came first, or the program did
+        ClosedError        the board was closed, or belongs to another process
+        NotArmedError      not sent: it drives an output, and the program is not armed: arm()
+      OpenError            the transport cannot be opened or is gone (an OSError, too)
+      DeniedError          the system denies it (an OSError, too)
+      UnsupportedError     kernel support or an interface is missing
+"""
+
+
+class Error(Exception):
+    """What went wrong (`thing`, `reason`), and what to do about it (`fix`, '' where nobody can know).
+
+    `outcome` tells how a command ended ('timed out', 'cancelled' …; 'none': it is about no command), `refusal`
+    why the board refused it ('NONE': it did not), and `at` which command of a group that was, from 1 (0: none in
+    particular).
+    """
+
+    def __init__(self, thing: str, reason: str, fix: str = '', *, outcome: str = 'none', refusal: str = 'NONE',
+                 at: int = 0) -> None:
+        super().__init__(f'{thing}: {reason}' + (f'; {fix}' if fix else ''))
+        self.thing = thing
+        self.reason = reason
+        self.fix = fix
+        self.outcome = outcome
+        self.refusal = refusal
+        self.at = at
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+class DataError(Error):
+    """A datagram, a recording or a file is bad."""
+
+
+class UsageError(Error, ValueError):
+    """A URL, an option or a command is wrong."""
+
+
+class RefusedError(Error):
+    """The board refused, or did not confirm."""
+
+
+class NotConfirmedError(RefusedError, TimeoutError):
+    """No confirmation in time: it may have been executed or not."""
+
+
+class CancelledError(RefusedError):
+    """Given up: a stop or a newer cause to be safe came first, or the program did."""
+
+
+class ClosedError(RefusedError):
+    """The board was closed, or belongs to another process."""
+
+
+class NotArmedError(RefusedError):
+    """Not sent: it drives an output, and the program is not armed."""
+
+
+class OpenError(Error, OSError):
+    """The transport cannot be opened or is gone."""
+
+
+class DeniedError(Error, OSError):
+    """The system denies it."""
+
+
+class UnsupportedError(Error):
+    """Kernel support or an interface is missing."""
+
+
+_OF_KIND = {1: DataError, 2: UsageError, 3: RefusedError, 4: OpenError, 5: DeniedError, 6: UnsupportedError}
+_OF_OUTCOME = {'timed out': NotConfirmedError, 'cancelled': CancelledError, 'closed': ClosedError,
+               'not armed': NotArmedError}
+
+
+def error_of(kind: int, thing: str, reason: str, fix: str, outcome: str, refusal: str, at: int) -> Error:
+    """The error of that ErrorKind and Outcome (include/r4link/error.hpp)."""
+    return _OF_OUTCOME.get(outcome, _OF_KIND.get(kind, Error))(thing, reason, fix, outcome=outcome, refusal=refusal,
+                                                               at=at)

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Small values: what a channel is told, and what it says."""
+import enum
+from typing import NamedTuple
+
+
+class Direction(enum.IntEnum):
+    REVERSE = 0
+    FORWARD = 1
+
+
+class Drive(NamedTuple):
+    """An H-bridge: pwm 0-4095."""
+    pwm: int
+    direction: int
+
+    @property
+    def duty(self) -> float:
+        """-1 to 1, negative in reverse."""
+        return self.pwm / 4095 * (1 if self.direction else -1)
+
+
+class Bldc(NamedTuple):
+    """A brushless motor: speed 0-4095."""
+    speed: int
+    direction: int
+    brake: bool
+
+
+class PostResult(enum.Enum):
+    """What became of what was posted; true where it was sent."""
+    SENT = 'sent'
+    NOT_ARMED = 'not armed'  # it drives an output, and the program is not armed: arm()
+    NO_LINK = 'no link'  # the link is not up, or the board does not take our commands yet
+    QUEUE_FULL = 'queue full'  # too many wait to be sent already: try again later
+
+    def __bool__(self) -> bool:
+        return self is PostResult.SENT
