@@ -58,6 +58,8 @@ class PyBoard {
     if (::getpid() != process_) return;
     end_states();
     board_->close();
+    const py::gil_scoped_acquire gil;
+    clear();  // they may refer to this board
   }
 
   // What a call that waits asks on its thread: was it interrupted, by a signal or by another thread?

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """R4 link: the R4 robot control board over UDP, USB serial and CAN (docs/python.md)."""
+from . import aio
 from ._core import (FIELDS, CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State,
                     Statistics, Subscription, __version__)
 from .board import (BldcChannel, Board, DriveChannel, RelayChannel, ServoChannel, Setpoints, States, StepperChannel)
@@ -16,5 +17,5 @@ __all__ = [
     'ClosedError', 'Command', 'DataError', 'DeniedError', 'Direction', 'Drive', 'DriveChannel', 'Error', 'Event',
     'Identity', 'LinkStatus', 'Look', 'NotArmedError', 'NotConfirmedError', 'OpenError', 'PostResult', 'Recording',
     'RefusedError', 'RefusedPost', 'RelayChannel', 'ServoChannel', 'Setpoints', 'SimBoard', 'State', 'States',
-    'Statistics', 'StepperChannel', 'Subscription', 'UnsupportedError', 'UsageError', '__version__',
+    'Statistics', 'StepperChannel', 'Subscription', 'UnsupportedError', 'UsageError', '__version__', 'aio',
 ]

@@ -1,0 +1,321 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""r4link.aio.Board: the same for asyncio.
+
+    async with r4link.aio.Board('udp://192.168.0.125') as board:
+        await board.wait_active()
+        await board.arm()
+        await board.osmc(1).set(358)
+        async for state in board.states():
+            …
+
+Commands of a board go out in the order in which they were begun, each when the one before has ended; stop() waits for
+none of them. A task that is cancelled takes its command back: it is sent no more, though it may have been executed.
+"""
+from __future__ import annotations
+
+import asyncio
+import collections
+import os
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from types import TracebackType
+from typing import Any, AsyncIterator, Callable, Type, TypeVar
+
+from . import board as blocking
+from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State, Statistics,
+                    Subscription)
+from .board import Setpoints
+from .values import Direction, PostResult
+
+T = TypeVar('T')
+
+
+class _Lane:
+    """Calls, one after the other, in a thread of their own."""
+
+    def __init__(self, interrupt: Callable[[int], None]) -> None:
+        self._thread = ThreadPoolExecutor(1, 'r4link')
+        self._interrupt = interrupt
+        self._lock = threading.Lock()
+        self._running: object = None
+
+    async def call(self, function: Callable[[], T]) -> T:
+        token = object()
+        thread = 0
+
+        def run() -> T:
+            nonlocal thread
+            with self._lock:
+                self._running, thread = token, threading.get_ident()
+            try:
+                return function()
+            finally:
+                with self._lock:
+                    self._running = None
+                    self._interrupt(0)
+
+        future = self._thread.submit(run)
+        try:
+            return await asyncio.wrap_future(future)
+        except asyncio.CancelledError:
+            with self._lock:
+                if self._running is token:
+                    self._interrupt(thread)
+            raise
+
+    def end(self) -> None:
+        self._thread.shutdown(wait=False)
+
+
+class _Channel:
+    def __init__(self, board: Board, channel: int) -> None:
+        self._board = board
+        self._channel = channel
+
+
+class DriveChannel(_Channel):
+    """An H-bridge: pwm 0-4095."""
+
+    def __init__(self, board: Board, channel: int, make: Callable[[int, int, int], Command]) -> None:
+        super().__init__(board, channel)
+        self._make = make
+
+    async def set(self, pwm: int, direction: int = Direction.FORWARD, timeout: float = 1.0) -> None:
+        await self._board.send(self._make(self._channel, pwm, direction), timeout)
+
+    def post(self, pwm: int, direction: int = Direction.FORWARD) -> PostResult:
+        return self._board.post(self._make(self._channel, pwm, direction))
+
+
+class ServoChannel(_Channel):
+    """A servo: pulse width in microseconds, 0 (off) to 2500."""
+
+    async def set(self, pulse_us: int, timeout: float = 1.0) -> None:
+        await self._board.send(Command.servo(self._channel, pulse_us), timeout)
+
+    def post(self, pulse_us: int) -> PostResult:
+        return self._board.post(Command.servo(self._channel, pulse_us))
+
+
+class RelayChannel(_Channel):
+    """A relay; 1 is the motor supply."""
+
+    async def set(self, on: bool, timeout: float = 1.0) -> None:
+        await self._board.send(Command.relay(self._channel, on), timeout)
+
+    def post(self, on: bool) -> PostResult:
+        return self._board.post(Command.relay(self._channel, on))
+
+
+class StepperChannel(_Channel):
+    """A stepper: position in steps, speed in steps a second (1-20000)."""
+
+    async def move_to(self, position: int, speed: int = 1000, timeout: float = 1.0) -> None:
+        await self._board.send(Command.stepper(self._channel, position, speed), timeout)
+
+    def post(self, position: int, speed: int = 1000) -> PostResult:
+        return self._board.post(Command.stepper(self._channel, position, speed))
+
+    async def zero(self, timeout: float = 1.0) -> None:
+        await self._board.send(Command.zero(self._channel), timeout)
+
+
+class BldcChannel(_Channel):
+    """A brushless motor: speed 0-4095."""
+
+    async def set(self, speed: int, direction: int = Direction.FORWARD, brake: bool = False,
+                  timeout: float = 1.0) -> None:
+        await self._board.send(Command.bldc(self._channel, speed, direction, brake), timeout)
+
+    def post(self, speed: int, direction: int = Direction.FORWARD, brake: bool = False) -> PostResult:
+        return self._board.post(Command.bldc(self._channel, speed, direction, brake))
+
+
+class Board:
+    """r4link.Board for asyncio; takes the same options. What does not wait is no coroutine there either."""
+
+    def __init__(self, url: str, **options: Any) -> None:
+        self._board = blocking.Board(url, **options)
+        interrupt = self._board._core.interrupt
+        self._commands = _Lane(interrupt)
+        self._waits = _Lane(interrupt)
+        self._stops = _Lane(interrupt)
+        self._streams: set[_Stream] = set()
+
+    async def close(self) -> None:
+        """Says farewell; calls that wait raise ClosedError, loops over states end."""
+        await asyncio.get_running_loop().run_in_executor(None, self._board.close)
+        for lane in (self._commands, self._waits, self._stops):
+            lane.end()
+        for stream in list(self._streams):
+            stream.end()
+
+    async def __aenter__(self) -> Board:
+        return self
+
+    async def __aexit__(self, kind: Type[BaseException] | None, error: BaseException | None,
+                        trace: TracebackType | None) -> None:
+        await asyncio.shield(self.close())
+
+    async def wait_active(self, timeout: float = 3.0) -> None:
+        await self._waits.call(lambda: self._board.wait_active(timeout))
+
+    async def next_state(self, timeout: float = 1.0) -> State:
+        return await self._waits.call(lambda: self._board.next_state(timeout))
+
+    async def send(self, command: str | Command, timeout: float = 1.0) -> None:
+        await self._commands.call(lambda: self._board.send(command, timeout))
+
+    async def apply(self, setpoints: Setpoints, timeout: float = 1.0) -> None:
+        await self._commands.call(lambda: self._board.apply(setpoints, timeout))
+
+    async def arm(self, timeout: float = 1.0) -> None:
+        await self._commands.call(lambda: self._board.arm(timeout))
+
+    async def clear(self, timeout: float = 1.0) -> None:
+        await self.send(Command.clear(), timeout)
+
+    async def identify(self, timeout: float = 1.0) -> Identity:
+        return await self._commands.call(lambda: self._board.identify(timeout))
+
+    async def proximity(self, channel: int, threshold_cm: int, timeout: float = 1.0) -> None:
+        await self.send(Command.proximity(channel, threshold_cm), timeout)
+
+    async def fields(self, names: str, timeout: float = 1.0) -> None:
+        await self.send(f'F:{names}', timeout)
+
+    async def setting(self, key: str, value: str, timeout: float = 1.0) -> None:
+        await self.send(f'C:{key},{value}', timeout)
+
+    async def link_timing(self, board_timeout: float, heartbeat: float, timeout: float = 1.0) -> None:
+        await self._commands.call(lambda: self._board.link_timing(board_timeout, heartbeat, timeout))
+
+    async def stop(self, timeout: float = 1.0) -> None:
+        """Overtakes all that is under way. It goes on being sent when the task is cancelled."""
+        await self._stops.call(lambda: self._board.stop(timeout))
+
+    def stop_async(self) -> None:
+        self._board.stop_async()
+
+    def post(self, command: Command | Setpoints) -> PostResult:
+        return self._board.post(command)
+
+    def osmc(self, channel: int) -> DriveChannel:
+        return DriveChannel(self, channel, Command.osmc)
+
+    def dhb12(self, channel: int) -> DriveChannel:
+        return DriveChannel(self, channel, Command.dhb12)
+
+    def servo(self, channel: int) -> ServoChannel:
+        return ServoChannel(self, channel)
+
+    def relay(self, channel: int) -> RelayChannel:
+        return RelayChannel(self, channel)
+
+    def stepper(self, channel: int) -> StepperChannel:
+        return StepperChannel(self, channel)
+
+    def bldc(self, channel: int) -> BldcChannel:
+        return BldcChannel(self, channel)
+
+    @property
+    def disarmed_by(self) -> str:
+        return self._board.disarmed_by
+
+    @property
+    def state(self) -> State:
+        return self._board.state
+
+    @property
+    def link(self) -> LinkStatus:
+        return self._board.link
+
+    @property
+    def statistics(self) -> Statistics:
+        return self._board.statistics
+
+    @property
+    def carrier_counters(self) -> CarrierCounters:
+        return self._board.carrier_counters
+
+    @property
+    def name(self) -> str:
+        return self._board.name
+
+    async def states(self, most: int = 1) -> AsyncIterator[State]:
+        """Every state from now on, of which `most` wait: 1 is the newest alone. Ends with the board."""
+        stream = _Stream(most)
+        subscription = self.on_state(stream.put)
+        self._streams.add(stream)
+        try:
+            while (state := await stream.take()) is not None:
+                yield state
+        finally:
+            self._streams.discard(stream)
+            subscription.cancel()
+
+    # --- callbacks, on the loop of the task that adds them
+
+    def on_state(self, callback: Callable[[State], object]) -> Subscription:
+        return self._board.on_state(_on_loop(callback))
+
+    def on_link(self, callback: Callable[[LinkStatus], object]) -> Subscription:
+        return self._board.on_link(_on_loop(callback))
+
+    def on_event(self, callback: Callable[[Event], object]) -> Subscription:
+        return self._board.on_event(_on_loop(callback))
+
+    def on_restart(self, callback: Callable[[], object]) -> Subscription:
+        return self._board.on_restart(_on_loop(callback))
+
+    def on_arming(self, callback: Callable[[str], object]) -> Subscription:
+        return self._board.on_arming(_on_loop(callback))
+
+    def on_refused(self, callback: Callable[[RefusedPost], object]) -> Subscription:
+        return self._board.on_refused(_on_loop(callback))
+
+    def record(self, to: str | os.PathLike[str] | Recording, **limits: int) -> None:
+        self._board.record(to, **limits)
+
+    def watchdog(self, period: float) -> None:
+        """What gates the heartbeats is feed(), not the loop: feed where the robot is looked after."""
+        self._board.watchdog(period)
+
+    def feed(self) -> None:
+        self._board.feed()
+
+
+class _Stream:
+    """States for one loop, which is slower or faster than they come."""
+
+    def __init__(self, most: int) -> None:
+        self._waiting: collections.deque[State] = collections.deque(maxlen=most)
+        self._news = asyncio.Event()
+        self._ended = False
+
+    def put(self, state: State) -> None:
+        if state:
+            self._waiting.append(state)
+            self._news.set()
+
+    def end(self) -> None:
+        self._ended = True
+        self._news.set()
+
+    async def take(self) -> State | None:
+        while not self._waiting:
+            if self._ended:
+                return None
+            self._news.clear()
+            await self._news.wait()
+        return self._waiting.popleft()
+
+
+def _on_loop(callback: Callable[..., object]) -> Callable[..., None]:
+    loop = asyncio.get_running_loop()
+
+    def call(*arguments: object) -> None:
+        if not loop.is_closed():
+            loop.call_soon_threadsafe(callback, *arguments)
+
+    return call

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import time
+
+import pytest
+
+import r4link
+
+PATIENCE_S = 10
+
+
+@pytest.fixture(name='sim')
+def a_simulated_board():
+    return r4link.SimBoard()
+
+
+@pytest.fixture(name='board')
+def under_control(sim):
+    with r4link.Board(sim.url) as board:
+        board.wait_active()
+        yield board
+
+
+@pytest.fixture(name='wait')
+def until():
+    def wait(done):
+        deadline = time.monotonic() + PATIENCE_S
+        while not done():
+            assert time.monotonic() < deadline, 'it did not come'
+            time.sleep(0.005)
+    return wait

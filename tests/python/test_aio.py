@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""r4link.aio.Board."""
+import asyncio
+import time
+
+import pytest
+
+import r4link
+from r4link import aio
+
+SILENT = 'udp://127.0.0.1:9?listen=0'
+
+
+def test_drives(sim):
+    async def main():
+        async with aio.Board(sim.url) as board:
+            await board.wait_active()
+            with pytest.raises(r4link.NotArmedError):
+                await board.osmc(1).set(1)
+            await board.arm()
+            await board.apply(r4link.Setpoints().osmc(1, 10).osmc(2, 20))
+            await board.servo(1).set(1500)
+            await board.bldc(1).set(9)
+            assert board.osmc(3).post(30)
+            await board.relay(2).set(True)
+            state = await board.next_state()
+            assert (state.osmc1.pwm, state.servo1pos, state.relay(2)) == (10, 1500, True)
+            assert (await board.identify()).board_id == 'sim-1'
+            await board.stop()
+            assert board.link.reason == 'stop'
+            await board.clear()
+        with pytest.raises((r4link.ClosedError, RuntimeError)):
+            await board.identify()
+    asyncio.run(main())
+
+
+def test_commands_go_out_in_the_order_in_which_they_were_begun(sim):
+    async def main():
+        async with aio.Board(sim.url) as board:
+            await board.wait_active()
+            await board.arm()
+            for last in (7, 0):
+                await asyncio.gather(*(board.osmc(1).set(pwm) for pwm in [100, 5, 60, last]))
+                assert (await board.next_state()).osmc1.pwm == last
+    asyncio.run(main())
+
+
+def test_iterates_over_states_and_tells_callbacks_on_the_loop(sim):
+    async def main():
+        loop_of = []
+        async with aio.Board(sim.url) as board:
+            board.on_state(lambda state: loop_of.append(asyncio.get_running_loop()))
+            numbers = []
+            async for state in board.states(most=100):
+                numbers.append(state.pnum)
+                if len(numbers) == 10:
+                    break
+            assert numbers == sorted(set(numbers))
+            rest = asyncio.create_task(count(board.states()))
+            await board.next_state()
+            await board.close()
+            assert await asyncio.wait_for(rest, 5) >= 0
+        assert set(loop_of) == {asyncio.get_running_loop()}
+    asyncio.run(main())
+
+
+async def count(states):
+    number = 0
+    async for _ in states:
+        number += 1
+    return number
+
+
+def test_a_task_that_is_cancelled_takes_its_command_back_and_no_other(sim):
+    async def main():
+        async with aio.Board(sim.url) as board:
+            await board.wait_active()
+            await board.arm()
+            first = asyncio.create_task(board.osmc(1).set(1))
+            given_up = asyncio.create_task(board.osmc(1).set(999))
+            last = asyncio.create_task(board.osmc(2).set(2))
+            await asyncio.sleep(0)
+            given_up.cancel()
+            await asyncio.gather(first, last)
+            with pytest.raises(asyncio.CancelledError):
+                await given_up
+            assert (await board.next_state()).osmc1.pwm == 1
+    asyncio.run(main())
+
+
+def test_waiting_ends_at_once_when_it_is_cancelled_and_the_next_call_waits():
+    async def main():
+        async with aio.Board(SILENT) as board:
+            for _ in range(3):
+                begin = time.monotonic()
+                with pytest.raises(asyncio.TimeoutError):
+                    await asyncio.wait_for(board.wait_active(60), 0.02)
+                assert time.monotonic() - begin < 1
+            with pytest.raises(r4link.RefusedError):
+                await board.wait_active(0.05)
+    asyncio.run(main())

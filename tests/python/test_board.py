@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""r4link.Board on a simulated board in the process."""
+import math
+import sys
+import threading
+import time
+
+import pytest
+
+import r4link
+from r4link import FORWARD, REVERSE
+
+
+def test_drives_and_tells_what_the_chips_do(sim, board, wait):
+    board.arm()
+    board.osmc(1).set(358)
+    board.dhb12(2).set(700, REVERSE)
+    board.servo(3).set(1500)
+    board.relay(2).set(True)
+    board.bldc(4).set(2000, FORWARD, brake=False)
+    board.stepper(1).move_to(100, speed=5000)
+    assert board.state.osmc1 == (358, FORWARD) and board.state.osmc1.duty == pytest.approx(358 / 4095)
+    assert board.state.relay(1) and not board.state.relay(3)
+    wait(lambda: sim.look().bldc[3].speed == 2000)  # it is 10 ms old
+    look = sim.look()
+    assert look.osmc[0] == (358, FORWARD) and look.dhb12[1] == (700, REVERSE) and look.bldc[3].speed == 2000
+    assert look.servo_us[2] == pytest.approx(1500, abs=3) and look.relays[1] and look.supply and not look.is_safe
+    board.stop()
+    assert board.link.reason == 'stop' and board.disarmed_by == 'stop'
+    wait(lambda: sim.look().is_safe)
+    board.clear()
+    board.arm()
+    board.send('O:5,1,1;O:6,0,2')
+    assert board.state.osmc1 == (5, 1)
+    wait(lambda: sim.look().osmc[:2] == ((5, 1), (6, 0)))
+
+
+def test_a_group_is_executed_as_one_or_not_at_all(sim, board, wait):
+    board.arm()
+    board.apply(r4link.Setpoints().osmc(1, 100).osmc(2, 200, REVERSE).servo(1, 900))
+    wait(lambda: [each.pwm for each in sim.look().osmc[:2]] == [100, 200])
+    with pytest.raises(r4link.UsageError, match='channel'):
+        r4link.Setpoints().osmc(1, 1).osmc(5, 1)
+    assert board.post(r4link.Setpoints().osmc(1, 7).osmc(2, 8))
+    board.osmc(3).set(1)  # behind it
+    wait(lambda: [each.pwm for each in sim.look().osmc[:3]] == [7, 8, 1])
+
+
+def test_errors_name_the_thing_the_reason_and_the_fix(board):
+    with pytest.raises(r4link.NotArmedError) as not_armed:
+        board.osmc(1).set(1)
+    assert not_armed.value.thing == 'O:1,1,1' and 'arm()' in not_armed.value.fix
+    assert isinstance(not_armed.value, r4link.RefusedError) and not_armed.value.outcome == 'not armed'
+    assert board.osmc(1).post(1) is r4link.PostResult.NOT_ARMED and not board.osmc(1).post(1)
+    for wrong, error in [(lambda: board.servo(17).set(1), ValueError), (lambda: board.osmc(1).set(4096), ValueError),
+                         (lambda: board.osmc(1).set(1, 2), r4link.UsageError),
+                         (lambda: board.osmc(1).set(1 << 40), TypeError),
+                         (lambda: board.send('nonsense'), r4link.UsageError),
+                         (lambda: board.send('F:NOSUCH'), r4link.UsageError),
+                         (lambda: board.send('E:STOP\0'), r4link.Error),
+                         (lambda: board.wait_active(math.nan), r4link.UsageError),
+                         (lambda: board.states(0), r4link.UsageError),
+                         (lambda: board.record('/no/where'), OSError),
+                         (lambda: r4link.Board('tcp://x'), r4link.UsageError),
+                         (lambda: r4link.Board('sim:', role='drive'), r4link.UsageError),
+                         (lambda: r4link.Board('sim:', key='/no/where'), r4link.OpenError),
+                         (lambda: r4link.Board('serial:///dev/null/x'), r4link.OpenError)]:
+        with pytest.raises(error):
+            wrong()
+    with pytest.raises(r4link.RefusedError):
+        r4link.Board('udp://127.0.0.1:9?listen=0').wait_active(timeout=0.05)
+
+
+def test_the_board_refuses(sim, board):
+    board.arm()
+    sim.happen('handle released')
+    with pytest.raises(r4link.RefusedError) as refused:
+        for _ in range(1000):
+            board.osmc(1).set(1)
+    assert refused.value.outcome in ('refused', 'cancelled', 'not armed')
+    assert board.next_state().dmhsta is False
+    with pytest.raises(r4link.DataError):
+        sim.happen('no such thing')
+
+
+def test_a_state_is_all_that_the_board_says(board):
+    board.fields('DEFAULT,ENC1,US1')
+    state = board.next_state()
+    assert 'enc1' in state.present and state.as_dict()['ain24'] == pytest.approx(24.28, abs=0.5)
+    assert list(state.as_dict())[:3] == ['pnum', 't_ms', 'ain24']
+    assert repr(state).startswith('State(pnum=') and 'osmc1=Drive(pwm=0, direction=0)' in repr(state)
+    assert 0 <= time.monotonic() - state.received < 5
+    assert state.safe == 'none' and state.fault is None
+    for name in r4link.FIELDS:
+        getattr(state, name)
+
+
+def test_iterates_over_states(board):
+    numbers = []
+    for state in board.states(most=100):
+        numbers.append(state.pnum)
+        if len(numbers) == 20:
+            break
+    assert numbers == sorted(set(numbers))
+    newest = board.states()
+    time.sleep(0.1)  # of them
+    assert next(newest).pnum > numbers[-1] + 5 and newest.dropped > 3
+    rest = board.states()
+    board.close()
+    assert len(list(rest)) <= 1
+
+
+def test_callbacks_come_on_a_thread_of_their_own(sim, board, wait):
+    told = {name: [] for name in ('state', 'link', 'event', 'arming', 'refused')}
+    threads = set()
+
+    def tell(name):
+        def callback(value):
+            threads.add(threading.current_thread())
+            told[name].append(value)
+        return callback
+
+    subscriptions = [getattr(board, f'on_{name}')(tell(name)) for name in told]
+    board.arm()
+    sim.happen('handle released')
+    wait(lambda: board.link.reason == 'handle')
+    wait(lambda: told['arming'][-1:] == ['handle'] and told['state'] and told['link'][-1].reason == 'handle')
+    assert told['event'][0].kind == 'up' and told['arming'][0] == 'not yet' and 'none' in told['arming']
+    assert threading.main_thread() not in threads and len(threads) == 1
+    for each in subscriptions:
+        each.cancel()
+    count = len(told['state'])
+    board.next_state()
+    board.next_state()
+    assert len(told['state']) == count
+
+
+def test_what_a_callback_raises_is_told_and_it_is_called_again(board, monkeypatch, wait):
+    raised = []
+    monkeypatch.setattr(sys, 'unraisablehook', lambda each: raised.append(each.exc_value))
+
+    @board.on_state
+    def _broken(_):
+        raise KeyError('mine')
+
+    wait(lambda: len(raised) > 2)
+    assert all(isinstance(each, KeyError) for each in raised)
+    board.next_state()
+
+
+def test_a_callback_may_command(sim, board, wait):
+    board.arm()
+    done = []
+
+    def once(_):
+        if not done:
+            board.osmc(2).set(77)
+            done.append(True)
+
+    board.on_state(once)
+    wait(lambda: done and sim.look().osmc[1].pwm == 77)
+
+
+def test_a_callback_that_hangs_makes_the_board_safe(sim, wait):
+    with r4link.Board(sim.url, callback_limit=0.05) as board:
+        board.wait_active()
+        board.arm()
+        board.osmc(1).set(100)
+        go_on = threading.Event()
+        board.on_link(lambda _: go_on.wait(20))
+        wait(lambda: sim.look().is_safe)
+        assert board.link.gated
+        go_on.set()
+        wait(lambda: not board.link.gated)
+
+
+def test_without_feed_the_board_goes_safe(sim, board, wait):
+    board.arm()
+    board.osmc(1).set(100)
+    board.watchdog(0.05)
+    wait(lambda: sim.look().is_safe)
+    board.watchdog(0)
+    board.feed()
+    board.wait_active()
+
+
+def test_who_watches_commands_nothing(sim):
+    with r4link.Board(sim.url, role='watch') as board:
+        board.wait_active()
+        assert board.next_state().safe == 'link'
+        with pytest.raises(r4link.UsageError):
+            board.arm()
+        board.stop()
+
+
+def test_records_and_plays_again(sim, tmp_path):
+    path = tmp_path / 'drive.r4log.zst'
+    with r4link.Board(sim.url, arming=False) as board:
+        board.record(path)
+        board.wait_active()
+        board.osmc(1).set(358)
+        board.next_state()
+        statistics, counters = board.statistics.as_dict(), board.carrier_counters
+        assert statistics['states'] > 0 and statistics['lost'] == 0 and counters.rx_datagrams >= statistics['received']
+        assert board.identify().board_id == 'sim-1'
+    with r4link.Board(f'replay:{path}', role='watch') as again:
+        assert any(state.osmc1.pwm == 358 for state in again.states(most=100))
+    log = r4link.Recording(str(tmp_path / 'two.r4log'), 0, 0, 0)
+    with r4link.Board('sim:') as one, r4link.Board('sim:') as two:
+        for each in (one, two):
+            each.record(log)
+            each.wait_active()
+        assert log.records > 2 and log.problem is None
+        log.close()
