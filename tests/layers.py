@@ -51,6 +51,7 @@ ALLOWED = {
     'host/commands': TRANSPORTS,
     'host/recording': TRANSPORTS,
     'host/session': TRANSPORTS | {'host/commands'},
+    'host/python/bindings': PUBLIC,
     'host': HOST,
     'tools/r4/shell': SIMULATED,
     'tools/r4/drive': SHELL,

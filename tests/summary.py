@@ -41,8 +41,9 @@ def outcomes(build):
         preset = report.stem.split('.')[0]
         junit = (build if preset == 'release' else build / preset) / 'junit'
         for name, outcome in cases(report):
-            file = junit / (name.removeprefix('integration.') + '.xml')
-            inner = list(cases(file)) if name.startswith('integration.') and file.exists() else []
+            suite, _, stem = name.partition('.')
+            file = junit / f'{stem}.xml'
+            inner = list(cases(file)) if suite in ('integration', 'python') and file.exists() else []
             if outcome == 'failed' and all(each == 'passed' for _, each in inner):
                 inner = []  # the process failed, whatever its tests say
             for each, its_outcome in [(f'{name}.{case}', o) for case, o in inner] or [(name, outcome)]:

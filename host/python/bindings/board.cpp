@@ -68,7 +68,8 @@ class PyBoard {
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
     unsigned long self = PyThread_get_thread_ident();
     if (interrupted_.compare_exchange_strong(self, 0)) {
-      throw Error(Problem{ErrorKind::refused, "the call", "it was cancelled", "", Outcome::cancelled});
+      throw Error(
+          Problem{ErrorKind::refused, "the call", "it was cancelled", "", Outcome::cancelled});
     }
   }
   void interrupt(unsigned long thread) { interrupted_ = thread; }
@@ -121,14 +122,15 @@ class PyBoard {
   std::unique_ptr<Board> board_;
   std::vector<std::weak_ptr<Callback::Held>> callbacks_;  // with the GIL
   std::atomic<unsigned long> interrupted_{0};             // a thread
-  std::mutex mutex_;                                      // of what follows; nobody waits for the GIL under it
+  std::mutex mutex_;  // of what follows; nobody waits for the GIL under it
   std::vector<std::pair<Subscription, std::weak_ptr<States>>> states_;
 };
 
 // None while the constructor has not made one.
 PyBoard* board_in(PyObject* self) {
   auto* const instance = reinterpret_cast<py::detail::instance*>(self);
-  return instance->simple_layout ? static_cast<PyBoard*>(instance->simple_value_holder[0]) : nullptr;
+  return instance->simple_layout ? static_cast<PyBoard*>(instance->simple_value_holder[0])
+                                 : nullptr;
 }
 
 void collect_garbage(PyHeapTypeObject* heap) {
@@ -157,7 +159,8 @@ BoardOptions options_of(bool watch, bool arming, const std::string& fields,
   session.fields = fields;
   if (key) session.key = load_key(*key);
   session.watch_rate_hz = watch_rate_hz;
-  session.timing = {static_cast<std::uint32_t>(heartbeat_ms), static_cast<std::uint32_t>(timeout_ms)};
+  session.timing = {static_cast<std::uint32_t>(heartbeat_ms),
+                    static_cast<std::uint32_t>(timeout_ms)};
   session.command_retry = Ms(command_retry_ms);
   session.stop_retry = Ms(stop_retry_ms);
   session.stop_linger = Ms(stop_linger_ms);
@@ -167,10 +170,11 @@ BoardOptions options_of(bool watch, bool arming, const std::string& fields,
 
 void bind_recording(py::module_& module) {
   py::class_<Recording>(module, "Recording")
-      .def(py::init([](const std::string& path, std::uint64_t rotate_bytes, std::int64_t rotate_after_s,
-                       std::uint64_t keep_bytes) {
+      .def(py::init([](const std::string& path, std::uint64_t rotate_bytes,
+                       std::int64_t rotate_after_s, std::uint64_t keep_bytes) {
              return std::make_unique<Recording>(
-                 path, RecordingOptions{rotate_bytes, std::chrono::seconds(rotate_after_s), keep_bytes});
+                 path,
+                 RecordingOptions{rotate_bytes, std::chrono::seconds(rotate_after_s), keep_bytes});
            }),
            Released())
       .def("close", &Recording::close, Released())
@@ -209,52 +213,70 @@ void bind_board(py::module_& module) {
            py::arg("identify_interval"), py::arg("callback_limit"))
       .def("close", &PyBoard::close, Released())
       .def("interrupt", &PyBoard::interrupt)
-      .def("wait_active", [](PyBoard& board, int ms) { board->wait_active(Ms(ms)); }, Released())
-      .def("send", [](PyBoard& board, const std::string& text, int ms) { board->send(text, Ms(ms)); },
-           Released())
-      .def("send", [](PyBoard& board, const Command& command, int ms) { board->send(command, Ms(ms)); },
-           Released())
-      .def("post", [](PyBoard& board, const Command& command) {
-        return to_text(board->post(command));
-      })
-      .def("apply",
-           [](PyBoard& board, const Setpoints& setpoints, int ms) { board->apply(setpoints, Ms(ms)); },
-           Released())
-      .def("post", [](PyBoard& board, const Setpoints& setpoints) {
-        return to_text(board->post(setpoints));
-      })
-      .def("arm", [](PyBoard& board, int ms) { board->arm(Ms(ms)); }, Released())
+      .def(
+          "wait_active", [](PyBoard& board, int ms) { board->wait_active(Ms(ms)); }, Released())
+      .def(
+          "send",
+          [](PyBoard& board, const std::string& text, int ms) { board->send(text, Ms(ms)); },
+          Released())
+      .def(
+          "send",
+          [](PyBoard& board, const Command& command, int ms) { board->send(command, Ms(ms)); },
+          Released())
+      .def("post",
+           [](PyBoard& board, const Command& command) { return to_text(board->post(command)); })
+      .def(
+          "apply",
+          [](PyBoard& board, const Setpoints& setpoints, int ms) {
+            board->apply(setpoints, Ms(ms));
+          },
+          Released())
+      .def("post", [](PyBoard& board,
+                      const Setpoints& setpoints) { return to_text(board->post(setpoints)); })
+      .def(
+          "arm", [](PyBoard& board, int ms) { board->arm(Ms(ms)); }, Released())
       .def("disarmed_by", [](PyBoard& board) { return to_text(board->disarmed_by()); })
-      .def("stop", [](PyBoard& board, int ms) { board->stop(Ms(ms)); }, Released())
+      .def(
+          "stop", [](PyBoard& board, int ms) { board->stop(Ms(ms)); }, Released())
       .def("stop_async", [](PyBoard& board) { board->stop_async(); })
-      .def("link_timing",
-           [](PyBoard& board, int timeout, int heartbeat, int ms) {
-             board->link_timing(Ms(timeout), Ms(heartbeat), Ms(ms));
-           },
-           Released())
-      .def("identify", [](PyBoard& board, int ms) { return board->identify(Ms(ms)); }, Released())
+      .def(
+          "link_timing",
+          [](PyBoard& board, int timeout, int heartbeat, int ms) {
+            board->link_timing(Ms(timeout), Ms(heartbeat), Ms(ms));
+          },
+          Released())
+      .def(
+          "identify", [](PyBoard& board, int ms) { return board->identify(Ms(ms)); }, Released())
       .def("state", [](PyBoard& board) { return board->state(); })
-      .def("next_state", [](PyBoard& board, int ms) { return board->next_state(Ms(ms)); }, Released())
+      .def(
+          "next_state", [](PyBoard& board, int ms) { return board->next_state(Ms(ms)); },
+          Released())
       .def("link", [](PyBoard& board) { return board->link(); })
-      .def("statistics", [](PyBoard& board) { return board->statistics(); }, Released())
-      .def("carrier_counters", [](PyBoard& board) { return board->carrier_counters(); }, Released())
+      .def(
+          "statistics", [](PyBoard& board) { return board->statistics(); }, Released())
+      .def(
+          "carrier_counters", [](PyBoard& board) { return board->carrier_counters(); }, Released())
       .def("name", [](PyBoard& board) { return board->name(); })
-      .def("record",
-           [](PyBoard& board, const std::string& path, std::uint64_t rotate_bytes,
-              std::int64_t rotate_after_s, std::uint64_t keep_bytes) {
-             board->record(path, {rotate_bytes, std::chrono::seconds(rotate_after_s), keep_bytes});
-           },
-           Released())
-      .def("record", [](PyBoard& board, Recording& recording) { board->record(recording); },
-           py::keep_alive<1, 2>(), Released())
-      .def("watchdog", [](PyBoard& board, int ms) { board->watchdog(Ms(ms)); }, Released())
+      .def(
+          "record",
+          [](PyBoard& board, const std::string& path, std::uint64_t rotate_bytes,
+             std::int64_t rotate_after_s, std::uint64_t keep_bytes) {
+            board->record(path, {rotate_bytes, std::chrono::seconds(rotate_after_s), keep_bytes});
+          },
+          Released())
+      .def(
+          "record", [](PyBoard& board, Recording& recording) { board->record(recording); },
+          py::keep_alive<1, 2>(), Released())
+      .def(
+          "watchdog", [](PyBoard& board, int ms) { board->watchdog(Ms(ms)); }, Released())
       .def("feed", [](PyBoard& board) { board->feed(); })
       .def("states", &PyBoard::states, Released())
-      .def("take",
-           [](PyBoard& board, States& states, int ms) {
-             return states.take(Ms(ms), [&board] { board.on_wait(); });
-           },
-           Released())
+      .def(
+          "take",
+          [](PyBoard& board, States& states, int ms) {
+            return states.take(Ms(ms), [&board] { board.on_wait(); });
+          },
+          Released())
       .def("on_state",
            [](PyBoard& board, py::object function) {
              return board.subscribe(std::move(function),

@@ -30,8 +30,10 @@ py::object value_of(const State& state, F field) {
   if (const int n = nth(field, F::ain24, F::aindmh); n >= 0) {
     return volts(state, static_cast<Analog>(n));
   }
-  if (const int n = nth(field, F::osmc1, F::osmc2, F::osmc4); n >= 0) return to_python(state.osmc[n]);
-  if (const int n = nth(field, F::dhb1a, F::dhb1b, F::dhb2b); n >= 0) return to_python(state.dhb12[n]);
+  if (const int n = nth(field, F::osmc1, F::osmc2, F::osmc4); n >= 0)
+    return to_python(state.osmc[n]);
+  if (const int n = nth(field, F::dhb1a, F::dhb1b, F::dhb2b); n >= 0)
+    return to_python(state.dhb12[n]);
   if (const int n = nth(field, F::bldc1, F::bldc4); n >= 0) return to_python(state.bldc[n]);
   if (const int n = nth(field, F::step1pos, F::step2pos, F::step4pos); n >= 0) {
     return py::int_(state.stepper_steps[n]);
@@ -92,8 +94,8 @@ void bind_state(py::module_& module) {
     const F field = static_cast<F>(i);
     const std::string name = attribute_of(field);
     names.append(name);
-    state.def_property_readonly(name.c_str(),
-                                [field](const ReceivedState& self) { return value_of(self, field); });
+    state.def_property_readonly(
+        name.c_str(), [field](const ReceivedState& self) { return value_of(self, field); });
   }
   module.attr("FIELDS") = py::tuple(names);
   state.def_readonly("pnum", &ReceivedState::pnum)
@@ -101,19 +103,20 @@ void bind_state(py::module_& module) {
       .def_property_readonly("present",
                              [](const ReceivedState& self) {
                                py::list present;
-                               for (const F field : self.present) present.append(attribute_of(field));
+                               for (const F field : self.present)
+                                 present.append(attribute_of(field));
                                return py::tuple(present);
                              })
       .def("relay", &ReceivedState::relay)
       .def("__bool__", &ReceivedState::any)
       // On the clock of time.monotonic().
-      .def_property_readonly("received",
-                             [](const ReceivedState& self) -> py::object {
-                               if (!self.any()) return py::none();
-                               return py::float_(std::chrono::duration<double>(
-                                                     self.received.time_since_epoch())
-                                                     .count());
-                             })
+      .def_property_readonly(
+          "received",
+          [](const ReceivedState& self) -> py::object {
+            if (!self.any()) return py::none();
+            return py::float_(
+                std::chrono::duration<double>(self.received.time_since_epoch()).count());
+          })
       .def("as_dict",
            [](const ReceivedState& self) {
              py::dict dict;

@@ -53,21 +53,23 @@ Direction direction_of(int number) {
 
 void bind_commands(py::module_& module) {
   py::class_<Command>(module, "Command")
-      .def_static("osmc", [](int channel, int pwm, int direction) {
-        return Command::osmc(pwm, direction_of(direction), channel);
-      })
-      .def_static("dhb12", [](int channel, int pwm, int direction) {
-        return Command::dhb12(pwm, direction_of(direction), channel);
-      })
+      .def_static("osmc",
+                  [](int channel, int pwm, int direction) {
+                    return Command::osmc(pwm, direction_of(direction), channel);
+                  })
+      .def_static("dhb12",
+                  [](int channel, int pwm, int direction) {
+                    return Command::dhb12(pwm, direction_of(direction), channel);
+                  })
       .def_static("servo", [](int channel, int us) { return Command::servo(us, channel); })
       .def_static("relay", [](int channel, bool on) { return Command::relay(channel, on); })
-      .def_static("stepper", [](int channel, std::int32_t position, int speed) {
-        return Command::stepper(position, speed, channel);
-      })
+      .def_static("stepper", [](int channel, std::int32_t position,
+                                int speed) { return Command::stepper(position, speed, channel); })
       .def_static("zero", [](int channel) { return Command::zero(channel); })
-      .def_static("bldc", [](int channel, int speed, int direction, bool brake) {
-        return Command::bldc(speed, direction_of(direction), brake, channel);
-      })
+      .def_static("bldc",
+                  [](int channel, int speed, int direction, bool brake) {
+                    return Command::bldc(speed, direction_of(direction), brake, channel);
+                  })
       .def_static("proximity", [](int channel, int cm) { return Command::proximity(cm, channel); })
       .def_static("stop", &Command::stop)
       .def_static("clear", [] { return Command::clear(); });

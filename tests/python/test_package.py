@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The package's types, and that it is built and installed with what Debian has, without a network."""
+import ast
+import os
+import pathlib
+import subprocess
+import sys
+import tarfile
+
+import pytest
+
+import r4link
+from r4link import _core
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+OFFLINE = {**os.environ, 'PIP_NO_INDEX': '1', 'PIP_DISABLE_PIP_VERSION_CHECK': '1'}
+OFFLINE.pop('PYTHONPATH')
+
+
+def run(*command, cwd=ROOT, env=None):
+    ended = subprocess.run([str(each) for each in command], cwd=cwd, env=env or os.environ, capture_output=True, text=True,
+                           check=False)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    return ended.stdout
+
+
+def test_types_are_strict(tmp_path):
+    strict = [sys.executable, '-m', 'mypy', '--strict', '--python-version', '3.11', '--cache-dir', tmp_path]
+    env = {**os.environ, 'MYPYPATH': str(ROOT / 'host/python')}
+    run(*strict, '-p', 'r4link', env=env)
+    run(*strict, *sorted((ROOT / 'docs/examples/python').glob('*.py')), env=env)
+
+
+def test_the_stub_has_what_the_module_has():
+    stub = ast.parse((ROOT / 'host/python/r4link/_core.pyi').read_text())
+    classes = {each.name: each for each in stub.body if isinstance(each, ast.ClassDef)}
+    runtime = {name: each for name, each in vars(_core).items() if isinstance(each, type)}
+    assert set(classes) - {'_Record'} == set(runtime)
+    for name, each in runtime.items():
+        told = [classes[name], classes['_Record']] if hasattr(each, 'as_dict') else [classes[name]]
+        stubbed = {getattr(one, 'name', None) or one.target.id for part in told for one in part.body
+                   if isinstance(one, (ast.FunctionDef, ast.AnnAssign))}
+        assert public(stubbed) == public(dir(each)), name
+
+
+def public(names):
+    return {each for each in names if not each.startswith('_')}
+
+
+@pytest.mark.parametrize('example', sorted((ROOT / 'docs/examples/python').glob('*.py')), ids=lambda path: path.stem)
+def test_examples_run(example, sim, tmp_path):
+    told = run(sys.executable, example, 'sim:', cwd=tmp_path)
+    assert 'OSMC 1: 358 forward' in told, told
+
+
+def test_installs_into_a_venv_and_builds_a_wheel_and_a_source_distribution(tmp_path):
+    run(sys.executable, '-m', 'venv', tmp_path / 'venv')
+    python = tmp_path / 'venv/bin/python'
+    run(python, '-m', 'pip', 'install', '--quiet', ROOT, env=OFFLINE)
+    told = run(python, '-c', 'import r4link; print(r4link.__version__, r4link.__file__); '
+                             'board = r4link.Board("sim:"); board.wait_active(); print(board)', cwd=tmp_path, env=OFFLINE)
+    assert told.startswith(f'{r4link.__version__} {tmp_path}') and 'active' in told
+    run(sys.executable, '-m', 'build', '--outdir', tmp_path / 'dist', '--sdist', '--wheel', ROOT, env=OFFLINE)
+    source, wheel = sorted((tmp_path / 'dist').iterdir())[::-1]
+    assert wheel.name.startswith('r4link-') and wheel.suffix == '.whl', wheel
+    with tarfile.open(source) as archive:
+        names = archive.getnames()
+    assert f'r4link-{r4link.__version__}/host/python/bindings/board.cpp' in names
+    assert not any('__pycache__' in each or each.endswith('.so') for each in names)
