@@ -3,9 +3,11 @@
 import ast
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import tarfile
+import textwrap
 
 import pytest
 
@@ -51,6 +53,18 @@ def public(names):
 def test_examples_run(example, sim, tmp_path):
     told = run(sys.executable, example, 'sim:', cwd=tmp_path)
     assert 'OSMC 1: 358 forward' in told, told
+
+
+@pytest.mark.parametrize('page', ['README.md', 'docs/python.md'])
+def test_what_the_documentation_shows_runs(page):
+    shown = re.findall(r'^```python\n(.*?)^```', (ROOT / page).read_text(), re.MULTILINE | re.DOTALL)
+    assert shown
+    for program in shown:
+        program = program.replace('udp://192.168.0.125', 'sim:')
+        if 'async with' in program:
+            program = 'import asyncio\nasync def main():\n' + textwrap.indent(
+                program.replace('        ...', '        break'), '    ') + 'asyncio.run(main())\n'
+        run(sys.executable, '-c', 'import r4link\n' + program)
 
 
 def test_installs_into_a_venv_and_builds_a_wheel_and_a_source_distribution(tmp_path):

@@ -84,7 +84,7 @@ class PyBoard {
   }
 
   std::shared_ptr<States> states(std::size_t most) {
-    const auto states = std::make_shared<States>(most);
+    auto states = std::make_shared<States>(most);
     const std::weak_ptr<States> weak = states;
     const std::lock_guard lock(mutex_);
     std::erase_if(states_, [](const auto& each) { return each.second.expired(); });
