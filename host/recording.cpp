@@ -1,7 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "r4link/recording.hpp"
 
+#include <map>
+#include <string>
+
+#include "../protocol/messages/message.hpp"
+#include "../protocol/messages/state_fields.hpp"
+#include "r4link/datagram.hpp"
 #include "recording/recorder.hpp"
+#include "recording/recording_file.hpp"
+#include "recording/recording_reader.hpp"
 
 namespace r4 {
 
@@ -13,5 +21,52 @@ void Recording::close() { recorder_->close(); }
 std::optional<Problem> Recording::problem() const { return recorder_->problem(); }
 std::uint64_t Recording::records() const { return recorder_->records(); }
 std::uint64_t Recording::dropped() const { return recorder_->dropped(); }
+
+namespace {
+
+// Hands a recording to its visitor.
+class Tour final : public RecordingReader::Handler {
+ public:
+  explicit Tour(RecordingVisitor& visitor) : visitor_(visitor) {}
+
+  void on_header() override { states_.clear(); }
+  void on_wire(const RecordedWire& wire) override {
+    visitor_.on_wire(wire.number, wire.url, wire.name);
+  }
+  void on_record(const Record& record) override {
+    if (record.kind == RecordKind::event) {
+      return visitor_.on_event(record.wire, record.time, record.bytes);
+    }
+    const bool from_board = record.kind == RecordKind::from_board;
+    visitor_.on_datagram(record.wire, record.time, from_board, record.bytes);
+    Datagram datagram;
+    if (!from_board || !read_datagram(record.bytes, datagram) ||
+        kind_of(datagram) != MessageKind::state) {
+      return;
+    }
+    State& state = states_[record.wire];
+    if (read_state(datagram, state)) visitor_.on_state(record.wire, record.time, state);
+  }
+  void on_damage(const RecordingDamage& damage) override {
+    visitor_.on_damage("line " + std::to_string(damage.line) + ", byte " +
+                       std::to_string(damage.offset) + ": " + std::string(damage.reason));
+  }
+
+ private:
+  RecordingVisitor& visitor_;
+  std::map<std::uint16_t, State> states_;
+};
+
+}  // namespace
+
+void read_recording(const std::string& path, RecordingVisitor& visitor) {
+  RecordingInput input(path);
+  Tour tour(visitor);
+  RecordingReader reader(tour, input.name());
+  for (std::string_view bytes = input.read(); !bytes.empty(); bytes = input.read()) {
+    reader.feed(bytes);
+  }
+  reader.finish();
+}
 
 }  // namespace r4

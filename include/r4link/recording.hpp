@@ -20,9 +20,11 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "config.hpp"
 #include "error.hpp"
+#include "link.hpp"
 
 namespace r4 {
 
@@ -37,6 +39,36 @@ struct RecordingOptions {
   // least 1 MiB, and four times rotate_bytes; 0: all are kept.
   std::uint64_t keep_bytes = 0;
 };
+
+// What read_recording() finds, in the order of the file. Times are microseconds since 1970 (UTC); what is handed over
+// is valid within the call.
+class RecordingVisitor {
+ public:
+  virtual ~RecordingVisitor() = default;
+  // How a board is reached, before the first record of that wire, and again when its name is known: its own or its id.
+  virtual void on_wire(int wire, const std::string& url, const std::string& name) {
+    static_cast<void>(wire), static_cast<void>(url), static_cast<void>(name);
+  }
+  // A state, whose fields are merged over those before.
+  virtual void on_state(int wire, Time at, const State& state) {
+    static_cast<void>(wire), static_cast<void>(at), static_cast<void>(state);
+  }
+  // Every datagram, also of states and damaged ones.
+  virtual void on_datagram(int wire, Time at, bool from_board, std::string_view bytes) {
+    static_cast<void>(wire), static_cast<void>(at), static_cast<void>(from_board),
+        static_cast<void>(bytes);
+  }
+  // "up udp://192.168.0.125", "link safe stop": docs/recordings.md. Wire 0 is the recording itself.
+  virtual void on_event(int wire, Time at, std::string_view words) {
+    static_cast<void>(wire), static_cast<void>(at), static_cast<void>(words);
+  }
+  // A place that cannot be read, in words; what is behind it is read again.
+  virtual void on_damage(const std::string& words) { static_cast<void>(words); }
+};
+
+// Reads a recording, compressed or not; "-" is the standard input. In constant memory, however long it is. Throws
+// Error: open, permission, data for what is none.
+R4LINK_API void read_recording(const std::string& path, RecordingVisitor& visitor);
 
 class R4LINK_API Recording {
  public:

@@ -56,7 +56,7 @@ def test_examples_run(example, sim, tmp_path):
 
 
 @pytest.mark.parametrize('page', ['README.md', 'docs/python.md'])
-def test_what_the_documentation_shows_runs(page):
+def test_what_the_documentation_shows_runs(page, tmp_path):
     shown = re.findall(r'^```python\n(.*?)^```', (ROOT / page).read_text(), re.MULTILINE | re.DOTALL)
     assert shown
     for program in shown:
@@ -64,7 +64,7 @@ def test_what_the_documentation_shows_runs(page):
         if 'async with' in program:
             program = 'import asyncio\nasync def main():\n' + textwrap.indent(
                 program.replace('        ...', '        break'), '    ') + 'asyncio.run(main())\n'
-        run(sys.executable, '-c', 'import r4link\n' + program)
+        run(sys.executable, '-c', 'import r4link\n' + program, cwd=tmp_path)
 
 
 def test_installs_into_a_venv_and_builds_a_wheel_and_a_source_distribution(tmp_path):

@@ -7,6 +7,10 @@
 
 #include <pybind11/pybind11.h>
 
+#include <array>
+#include <cstdint>
+#include <string>
+
 #include "r4link/board.hpp"
 
 namespace r4::python {
@@ -17,11 +21,18 @@ void bind_errors(py::module_& module);
 void bind_values(py::module_& module);
 void bind_state(py::module_& module);
 void bind_board(py::module_& module);
+void bind_recording(py::module_& module);
 void bind_simulation(py::module_& module);
 
 inline py::str to_str(Text text) { return {text.data(), text.size()}; }
 py::object to_python(Drive drive);
 py::object to_python(const Bldc& bldc);
+
+// What a field holds, and its numbers as they are on the wire: volts in hundredths.
+enum class Form : std::uint8_t { volts, flag, number, drive, bldc, safe, fault };
+using Numbers = std::array<std::int64_t, 3>;
+Form form_of(StateField field);
+Numbers numbers_of(const State& state, StateField field);
 
 // A field of a state, in its unit (state.hpp): float of volts, bool of the handle, Drive, Bldc, int.
 py::object value_of(const State& state, StateField field);

@@ -168,31 +168,10 @@ BoardOptions options_of(bool watch, bool arming, const std::string& fields,
   return options;
 }
 
-void bind_recording(py::module_& module) {
-  py::class_<Recording>(module, "Recording")
-      .def(py::init([](const std::string& path, std::uint64_t rotate_bytes,
-                       std::int64_t rotate_after_s, std::uint64_t keep_bytes) {
-             return std::make_unique<Recording>(
-                 path,
-                 RecordingOptions{rotate_bytes, std::chrono::seconds(rotate_after_s), keep_bytes});
-           }),
-           Released())
-      .def("close", &Recording::close, Released())
-      .def_property_readonly("problem",
-                             [](const Recording& recording) -> std::optional<std::string> {
-                               const auto problem = recording.problem();
-                               if (!problem) return std::nullopt;
-                               return problem->text();
-                             })
-      .def_property_readonly("records", &Recording::records)
-      .def_property_readonly("dropped", &Recording::dropped);
-}
-
 }  // namespace
 
 void bind_board(py::module_& module) {
   py::class_<Subscription>(module, "Subscription").def("cancel", &Subscription::cancel, Released());
-  bind_recording(module);
   py::class_<States, std::shared_ptr<States>>(module, "States")
       .def_property_readonly("ended", &States::ended)
       .def_property_readonly("dropped", &States::dropped);

@@ -8,5 +8,6 @@ PYBIND11_MODULE(_core, module) {
   r4::python::bind_values(module);
   r4::python::bind_state(module);
   r4::python::bind_board(module);
+  r4::python::bind_recording(module);
   r4::python::bind_simulation(module);
 }

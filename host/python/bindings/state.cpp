@@ -22,62 +22,100 @@ int nth(F field, F first, F second, F last) {
   return n < 0 ? -1 : n + 1;
 }
 
-py::object volts(const State& state, Analog input) { return py::float_(state.volts(input)); }
-
 }  // namespace
 
-py::object value_of(const State& state, F field) {
-  if (const int n = nth(field, F::ain24, F::aindmh); n >= 0) {
-    return volts(state, static_cast<Analog>(n));
+Form form_of(F field) {
+  if (nth(field, F::ain24, F::aindmh) >= 0 || field == F::ainsteer || field == F::ain6) {
+    return Form::volts;
   }
-  if (const int n = nth(field, F::osmc1, F::osmc2, F::osmc4); n >= 0)
-    return to_python(state.osmc[n]);
-  if (const int n = nth(field, F::dhb1a, F::dhb1b, F::dhb2b); n >= 0)
-    return to_python(state.dhb12[n]);
-  if (const int n = nth(field, F::bldc1, F::bldc4); n >= 0) return to_python(state.bldc[n]);
+  if (nth(field, F::osmc1, F::osmc2, F::osmc4) >= 0 ||
+      nth(field, F::dhb1a, F::dhb1b, F::dhb2b) >= 0) {
+    return Form::drive;
+  }
+  if (nth(field, F::bldc1, F::bldc4) >= 0) return Form::bldc;
+  if (field == F::dmhsta) return Form::flag;
+  if (field == F::safe) return Form::safe;
+  return field == F::fault ? Form::fault : Form::number;
+}
+
+Numbers numbers_of(const State& state, F field) {
+  if (const int n = nth(field, F::ain24, F::aindmh); n >= 0) return {state.analog_cv[n]};
+  if (const int n = nth(field, F::osmc1, F::osmc2, F::osmc4); n >= 0) {
+    return {state.osmc[n].pwm, static_cast<int>(state.osmc[n].direction)};
+  }
+  if (const int n = nth(field, F::dhb1a, F::dhb1b, F::dhb2b); n >= 0) {
+    return {state.dhb12[n].pwm, static_cast<int>(state.dhb12[n].direction)};
+  }
+  if (const int n = nth(field, F::bldc1, F::bldc4); n >= 0) {
+    const Bldc& bldc = state.bldc[n];
+    return {bldc.speed, static_cast<int>(bldc.direction), bldc.brake ? 1 : 0};
+  }
   if (const int n = nth(field, F::step1pos, F::step2pos, F::step4pos); n >= 0) {
-    return py::int_(state.stepper_steps[n]);
+    return {state.stepper_steps[n]};
   }
   if (const int n = nth(field, F::servo1pos, F::servo2pos, F::servo16pos); n >= 0) {
-    return py::int_(state.servo_us[n]);
+    return {state.servo_us[n]};
   }
-  if (const int n = nth(field, F::enc1, F::enc4); n >= 0) return py::int_(state.encoder_counts[n]);
-  if (const int n = nth(field, F::enc1hz, F::enc4hz); n >= 0) return py::int_(state.encoder_hz[n]);
+  if (const int n = nth(field, F::enc1, F::enc4); n >= 0) return {state.encoder_counts[n]};
+  if (const int n = nth(field, F::enc1hz, F::enc4hz); n >= 0) return {state.encoder_hz[n]};
   if (const int n = nth(field, F::enc1idx, F::enc4idx); n >= 0) {
-    return py::int_(state.encoder_index_counts[n]);
+    return {state.encoder_index_counts[n]};
   }
-  if (const int n = nth(field, F::us1, F::us4); n >= 0) return py::int_(state.ultrasonic_cm[n]);
+  if (const int n = nth(field, F::us1, F::us4); n >= 0) return {state.ultrasonic_cm[n]};
   switch (field) {
     case F::ainsteer:
-      return volts(state, Analog::ainsteer);
+      return {state.analog_cv[static_cast<int>(Analog::ainsteer)]};
     case F::ain6:
-      return volts(state, Analog::ain6);
+      return {state.analog_cv[static_cast<int>(Analog::ain6)]};
     case F::dmhsta:
-      return py::bool_(state.handle_held);
+      return {state.handle_held ? 1 : 0};
     case F::relays:
-      return py::int_(state.relays);
+      return {state.relays};
     case F::safe:
-      return py::str(to_text(state.safe));
+      return {static_cast<int>(state.safe)};
     case F::cmd:
-      return py::int_(state.last_command);
+      return {state.last_command};
     case F::rxok:
-      return py::int_(state.rx_ok);
+      return {state.rx_ok};
     case F::rxcrc:
-      return py::int_(state.rx_crc);
+      return {state.rx_crc};
     case F::rxlost:
-      return py::int_(state.rx_lost);
+      return {state.rx_lost};
     case F::rxdup:
-      return py::int_(state.rx_duplicate);
+      return {state.rx_duplicate};
     case F::rxref:
-      return py::int_(state.rx_refused);
+      return {state.rx_refused};
     case F::late:
-      return py::int_(state.late);
+      return {state.late};
     case F::fault:
+      return {state.fault.address, static_cast<int>(state.fault.trouble)};
+    default:
+      return {};
+  }
+}
+
+py::object value_of(const State& state, F field) {
+  const Numbers numbers = numbers_of(state, field);
+  switch (form_of(field)) {
+    case Form::volts:
+      return py::float_(static_cast<double>(numbers[0]) / 100.0);
+    case Form::flag:
+      return py::bool_(numbers[0] != 0);
+    case Form::drive:
+      return to_python(
+          Drive{static_cast<std::uint16_t>(numbers[0]), static_cast<Direction>(numbers[1])});
+    case Form::bldc:
+      return to_python(Bldc{static_cast<std::uint16_t>(numbers[0]),
+                            static_cast<Direction>(numbers[1]), numbers[2] != 0});
+    case Form::safe:
+      return py::str(to_text(state.safe));
+    case Form::fault:
       if (!state.fault.any()) return py::none();
       return py::str("{}: {}").format(chip_name(state.fault.address), to_text(state.fault.trouble));
-    default:
-      return py::none();
+    case Form::number:
+      break;
   }
+  return py::int_(numbers[0]);
 }
 
 std::string attribute_of(F field) {

@@ -6,6 +6,7 @@ from ._core import (FIELDS, CarrierCounters, Command, Event, Identity, LinkStatu
 from .board import (BldcChannel, Board, DriveChannel, RelayChannel, ServoChannel, Setpoints, States, StepperChannel)
 from .errors import (CancelledError, ClosedError, DataError, DeniedError, Error, NotArmedError, NotConfirmedError,
                      OpenError, RefusedError, UnsupportedError, UsageError)
+from .recording import Log, RecordedBoard, RecordedDatagram, RecordedEvent, read
 from .simulation import Look, SimBoard
 from .values import Bldc, Direction, Drive, PostResult
 
@@ -15,7 +16,7 @@ REVERSE = Direction.REVERSE
 __all__ = [
     'FIELDS', 'FORWARD', 'REVERSE', 'Bldc', 'BldcChannel', 'Board', 'CancelledError', 'CarrierCounters',
     'ClosedError', 'Command', 'DataError', 'DeniedError', 'Direction', 'Drive', 'DriveChannel', 'Error', 'Event',
-    'Identity', 'LinkStatus', 'Look', 'NotArmedError', 'NotConfirmedError', 'OpenError', 'PostResult', 'Recording',
-    'RefusedError', 'RefusedPost', 'RelayChannel', 'ServoChannel', 'Setpoints', 'SimBoard', 'State', 'States',
-    'Statistics', 'StepperChannel', 'Subscription', 'UnsupportedError', 'UsageError', '__version__', 'aio',
+    'Identity', 'LinkStatus', 'Log', 'Look', 'NotArmedError', 'NotConfirmedError', 'OpenError', 'PostResult', 'Recording',
+    'RecordedBoard', 'RecordedDatagram', 'RecordedEvent', 'RefusedError', 'RefusedPost', 'RelayChannel', 'ServoChannel', 'Setpoints', 'SimBoard', 'State', 'States',
+    'Statistics', 'StepperChannel', 'Subscription', 'UnsupportedError', 'UsageError', '__version__', 'aio', 'read',
 ]

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Recordings: written, and read into columns of numbers.
+#include "r4link/recording.hpp"
+
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "bindings.hpp"
+#include "r4link/datagram.hpp"
+
+namespace r4::python {
+namespace {
+
+// One of the numbers of a field, in all states. Before the first one that has the field it is 0.
+struct Column {
+  StateField field;
+  std::size_t which;
+  std::vector<std::int32_t> numbers;
+};
+
+// What a recording has of one board.
+struct RecordedBoard {
+  std::string url, name;
+  std::vector<std::int64_t> times_us;  // since 1970
+  std::vector<std::uint32_t> t_ms, pnum;
+  FieldSet fields;
+  std::vector<Column> columns;
+  std::uint64_t damaged = 0;
+  std::vector<std::pair<std::int64_t, std::string>> events;
+  std::vector<std::tuple<std::int64_t, bool, std::string>> datagrams;
+};
+
+std::size_t count_of(Form form) {
+  if (form == Form::bldc) return 3;
+  return form == Form::drive || form == Form::fault ? 2 : 1;
+}
+
+class Columns final : public RecordingVisitor {
+ public:
+  explicit Columns(bool datagrams) : with_datagrams_(datagrams) {}
+
+  void on_wire(int wire, const std::string& url, const std::string& name) override {
+    const auto known = std::find_if(boards_.begin(), boards_.end(),
+                                    [&url](const RecordedBoard& each) { return each.url == url; });
+    const auto index = static_cast<std::size_t>(known - boards_.begin());
+    if (known == boards_.end()) boards_.emplace_back().url = url;
+    if (!name.empty()) boards_[index].name = name;
+    index_of_[wire] = index;
+  }
+  void on_state(int wire, Time at, const State& state) override {
+    RecordedBoard& board = of(wire);
+    for (const StateField field : state.present) {
+      if (board.fields.has(field)) continue;
+      board.fields.add(field);
+      for (std::size_t which = 0; which < count_of(form_of(field)); ++which) {
+        board.columns.push_back({field, which, std::vector<std::int32_t>(board.pnum.size())});
+      }
+    }
+    board.times_us.push_back(at.count());
+    board.t_ms.push_back(state.t_ms);
+    board.pnum.push_back(state.pnum);
+    for (Column& column : board.columns) {
+      const std::int64_t number = numbers_of(state, column.field)[column.which];
+      column.numbers.push_back(static_cast<std::int32_t>(number));
+    }
+  }
+  void on_datagram(int wire, Time at, bool from_board, std::string_view bytes) override {
+    Datagram datagram;
+    RecordedBoard& board = of(wire);
+    if (!read_datagram(Text(bytes.data(), bytes.size()), datagram)) ++board.damaged;
+    if (with_datagrams_) board.datagrams.emplace_back(at.count(), from_board, bytes);
+  }
+  void on_event(int wire, Time at, std::string_view words) override {
+    (wire == 0 ? events_ : of(wire).events).emplace_back(at.count(), words);
+  }
+  void on_damage(const std::string& words) override { damage_.push_back(words); }
+
+  py::tuple take();
+
+ private:
+  RecordedBoard& of(int wire) {
+    if (!index_of_.contains(wire)) on_wire(wire, "wire " + std::to_string(wire), "");
+    return boards_[index_of_[wire]];
+  }
+
+  const bool with_datagrams_;
+  std::vector<RecordedBoard> boards_;
+  std::map<int, std::size_t> index_of_;
+  std::vector<std::pair<std::int64_t, std::string>> events_;
+  std::vector<std::string> damage_;
+};
+
+// Without a copy.
+template <class Number>
+py::array_t<Number> to_array(std::vector<Number>&& numbers) {
+  auto owned = std::make_unique<std::vector<Number>>(std::move(numbers));
+  const std::vector<Number>& all = *owned;
+  const py::capsule owner(owned.get(), [](void* pointer) {
+    std::default_delete<std::vector<Number>>()(static_cast<std::vector<Number>*>(pointer));
+  });
+  static_cast<void>(owned.release());
+  return py::array_t<Number>(static_cast<py::ssize_t>(all.size()), all.data(), owner);
+}
+
+// "osmc1_pwm", and numpy's type of it.
+std::pair<std::string, const char*> column_of(StateField field, std::size_t which) {
+  const std::string name = attribute_of(field);
+  switch (form_of(field)) {
+    case Form::volts:
+      return {name, "f8"};
+    case Form::flag:
+      return {name, "?"};
+    case Form::drive:
+      return which == 0 ? std::pair{name + "_pwm", "u2"} : std::pair{name + "_dir", "u1"};
+    case Form::bldc:
+      if (which == 0) return {name + "_speed", "u2"};
+      return which == 1 ? std::pair{name + "_dir", "u1"} : std::pair{name + "_brake", "?"};
+    case Form::safe:
+      return {name, "u1"};
+    case Form::fault:
+      return which == 0 ? std::pair{name + "_chip", "u1"} : std::pair{name + "_trouble", "u1"};
+    case Form::number:
+      break;
+  }
+  const bool counts_up = field >= StateField::relays && field <= StateField::late;
+  return {name, counts_up ? "u4" : "i4"};
+}
+
+// (boards, events, damage); a board: (url, name, damaged, times, t_ms, pnum, [(column, type, numbers)], events,
+// datagrams). The numbers of volts are hundredths.
+py::tuple Columns::take() {
+  py::list boards;
+  for (RecordedBoard& board : boards_) {
+    py::list columns;
+    for (Column& column : board.columns) {
+      const auto [name, type] = column_of(column.field, column.which);
+      columns.append(py::make_tuple(name, type, to_array(std::move(column.numbers))));
+    }
+    py::list datagrams;
+    for (const auto& [at, from_board, bytes] : board.datagrams) {
+      datagrams.append(py::make_tuple(at, from_board ? "<" : ">", py::bytes(bytes)));
+    }
+    boards.append(py::make_tuple(board.url, board.name, board.damaged,
+                                 to_array(std::move(board.times_us)),
+                                 to_array(std::move(board.t_ms)), to_array(std::move(board.pnum)),
+                                 columns, board.events, datagrams));
+  }
+  return py::make_tuple(boards, events_, damage_);
+}
+
+}  // namespace
+
+void bind_recording(py::module_& module) {
+  py::class_<Recording>(module, "Recording")
+      .def(py::init([](const std::string& path, std::uint64_t rotate_bytes,
+                       std::int64_t rotate_after_s, std::uint64_t keep_bytes) {
+             return std::make_unique<Recording>(
+                 path,
+                 RecordingOptions{rotate_bytes, std::chrono::seconds(rotate_after_s), keep_bytes});
+           }),
+           py::call_guard<py::gil_scoped_release>())
+      .def("close", &Recording::close, py::call_guard<py::gil_scoped_release>())
+      .def_property_readonly("problem",
+                             [](const Recording& recording) -> std::optional<std::string> {
+                               const auto problem = recording.problem();
+                               if (!problem) return std::nullopt;
+                               return problem->text();
+                             })
+      .def_property_readonly("records", &Recording::records)
+      .def_property_readonly("dropped", &Recording::dropped);
+  module.def("read", [](const std::string& path, bool datagrams) {
+    Columns columns(datagrams);
+    {
+      const py::gil_scoped_release free;
+      read_recording(path, columns);
+    }
+    return columns.take();
+  });
+}
+
+}  // namespace r4::python

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""r4link.read: recordings as arrays."""
+import zlib
+
+import numpy as np
+import pytest
+
+import r4link
+
+HEADER = '# r4log 1 by r4 0.1.0\n# wire 1 udp://192.168.0.125 left-arm\n'
+
+
+def line(at, fields, wire=1, direction='<'):
+    body = f'{fields}^'
+    return f'{1795468293 + at:.6f} {wire}{direction} {body}0x{zlib.crc32(body.encode()):x}^\n'
+
+
+def test_what_was_recorded_is_there(sim, tmp_path):
+    path = tmp_path / 'drive.r4log.zst'
+    with r4link.Board(sim.url, arming=False, fields='DEFAULT,ENC1,BLDC1,US1') as board:
+        board.record(path)
+        board.wait_active()
+        board.osmc(1).set(358, r4link.REVERSE)
+        board.bldc(1).set(100)
+        live = [board.next_state() for _ in range(20)]
+        board.stop()
+        board.next_state()
+    log = r4link.read(path, datagrams=True)
+    assert log.damage == [] and log.events[-1].words == 'end'
+    [robot] = log.boards
+    assert log[robot.name] is robot and log[robot.url] is robot and robot.damaged == 0
+    assert robot.events[-2].words.startswith('down') or any(each.words == 'link safe stop' for each in robot.events)
+    rows = {row['pnum']: row for row in robot.states}
+    for state in live:
+        row = rows[state.pnum]
+        assert (row['t_ms'], row['ain24'], row['enc1'], row['us1']) == (state.t_ms, state.ain24, state.enc1, state.us1)
+        assert (row['osmc1_pwm'], row['osmc1_dir'], row['bldc1_speed'], row['bldc1_brake']) == (358, 0, 100, False)
+        assert row['dmhsta'] == state.dmhsta and row['cmd'] == state.cmd
+    assert (np.diff(robot.states['time']) > np.timedelta64(0)).all()
+    assert sum(each.direction == '<' and b'OSMC1:' in each.data for each in robot.datagrams) == len(robot.states)
+    assert any(each.data.startswith(b'O:358,0,1') for each in robot.datagrams)
+    frame = robot.to_pandas()
+    assert frame.index.tz is not None and frame.osmc1_pwm.dtype == np.uint16 and frame.ain24.dtype == np.float64
+    assert frame.osmc1_pwm.iloc[-1] == 0  # stopped
+
+
+def test_fields_that_come_later_two_boards_and_damage(tmp_path):
+    path = tmp_path / 'two.r4log'
+    path.write_text(HEADER + '# wire 2 serial:auto\n' + line(0.5, 'AIN24:24.10;PNum:1;T:10;')
+                    + line(0.6, 'AIN24:24.20;STEP1POS:-7;SAFE:2;PNum:4294967295;T:4294967295;')
+                    + line(0.7, 'AIN24:1.00;PNum:1;T:5;', wire=2) + 'no line of a recording\n'
+                    + line(0.8, 'AIN24:24.30;PNum:3;T:30;').replace('24.30', '24.31'))
+    log = r4link.read(path)
+    left, other = log.boards
+    assert left.name == 'left-arm' and log['serial:auto'] is other and other.name == ''
+    assert left.states['ain24'].tolist() == [24.10, 24.20] and left.states['step1pos'].tolist() == [0, -7]
+    assert left.states['safe'].tolist() == [0, 2] and left.states['pnum'].tolist() == [1, 2**32 - 1]
+    assert left.states['time'][0] == np.datetime64('2026-11-23T21:11:33.500000')
+    assert other.states.dtype.names == ('time', 't_ms', 'pnum', 'ain24')
+    assert left.damaged == 1 and len(log.damage) == 1 and log.damage[0].startswith('line 7, byte ')
+    with pytest.raises(KeyError, match='left-arm'):
+        log['right-arm']  # pylint: disable=pointless-statement
+
+
+@pytest.mark.parametrize('content, error', [(b'\0' * 100_000, r4link.DataError), (b'', r4link.DataError),
+                                            (b'# r4log 2 by r4 9\n', r4link.DataError), (None, r4link.OpenError)])
+def test_what_is_no_recording_is_told(tmp_path, content, error):
+    path = tmp_path / 'x.r4log'
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(error) as raised:
+        r4link.read(path)
+    assert str(path) in raised.value.thing
+    with pytest.raises(r4link.Error):
+        r4link.read(tmp_path)
