@@ -55,7 +55,9 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     python = f'cp{sys.version_info.major}{sys.version_info.minor}'
     tag = f'{python}-{python}-{sysconfig.get_platform().replace("-", "_").replace(".", "_")}'
     info = f'{NAME}.dist-info'
-    files = [*_built(), (f'{info}/METADATA', METADATA.encode()),
+    entries = ''.join(f'[{group}]\n' + ''.join(f'{name} = {where}\n' for name, where in each.items())
+                      for group, each in PROJECT['entry-points'].items())
+    files = [*_built(), (f'{info}/entry_points.txt', entries.encode()), (f'{info}/METADATA', METADATA.encode()),
              (f'{info}/LICENSE', (ROOT / 'LICENSE').read_bytes()),
              (f'{info}/WHEEL', f'Wheel-Version: 1.0\nGenerator: r4link\nRoot-Is-Purelib: false\nTag: {tag}\n'.encode())]
     record = ''

@@ -19,7 +19,7 @@ import os
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
-from typing import Any, AsyncIterator, Callable, Type, TypeVar
+from typing import Any, AsyncIterator, Callable, Self, Type, TypeVar
 
 from . import board as blocking
 from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State, Statistics,
@@ -150,7 +150,7 @@ class Board:
         for stream in list(self._streams):
             stream.end()
 
-    async def __aenter__(self) -> Board:
+    async def __aenter__(self) -> Self:
         return self
 
     async def __aexit__(self, kind: Type[BaseException] | None, error: BaseException | None,

@@ -11,7 +11,7 @@ import math
 import os
 import weakref
 from types import TracebackType
-from typing import Any, Callable, Iterator, Type, TypeVar
+from typing import Any, Callable, Iterator, Self, Type, TypeVar
 
 from . import _core
 from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State, Statistics,
@@ -199,7 +199,7 @@ class Board:
         raise ClosedError. Idempotent; a callback may call it."""
         self._core.close()
 
-    def __enter__(self) -> Board:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: Type[BaseException] | None, error: BaseException | None,

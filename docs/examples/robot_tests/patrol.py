@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The program under test: a robot that goes forward until something is near, and then back. Usage: patrol.py URL"""
+import sys
+
+import r4link
+
+SPEED = 1000
+NEAR_CM = 40
+
+
+def patrol(url: str, turns: int = 1) -> None:
+    with r4link.Board(url, fields='DEFAULT,US1') as board:
+        board.wait_active()
+        board.watchdog(0.3)
+        board.arm()
+        direction = r4link.FORWARD
+        board.osmc(1).set(SPEED, direction, timeout=0.25)
+        for state in board.states():
+            board.feed()
+            near = 0 < state.us1 < NEAR_CM
+            wanted = r4link.REVERSE if near else r4link.FORWARD
+            if wanted != direction:
+                if turns == 0:
+                    return
+                turns -= 1
+                direction = wanted
+                board.osmc(1).set(SPEED, direction, timeout=0.25)
+
+
+if __name__ == '__main__':
+    patrol(sys.argv[1], turns=1000)

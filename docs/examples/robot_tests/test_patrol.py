@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a team has in its repository: pytest finds the fixtures by itself where r4link is installed."""
+import threading
+import time
+
+import patrol
+import pytest
+
+
+def until(done, within=3.0):
+    deadline = time.monotonic() + within
+    while not done():
+        assert time.monotonic() < deadline, 'it did not happen'
+        time.sleep(0.002)
+
+
+def test_it_goes_back_when_something_is_near(r4_robot):
+    program = threading.Thread(target=patrol.patrol, args=(r4_robot.url,))
+    program.start()
+    until(lambda: r4_robot.look().osmc[0] == (patrol.SPEED, 1))
+    r4_robot.happen('us 1 15')  # a wall
+    until(lambda: r4_robot.look().osmc[0] == (patrol.SPEED, 0))
+    r4_robot.happen('us 1 0')
+    program.join(5)
+    assert not program.is_alive()
+
+
+def test_a_released_handle_stops_the_robot(r4_board):
+    r4_board.arm()
+    r4_board.osmc(1).set(358)
+    r4_board.expect(osmc1=358, ain24=lambda volts: volts > 20)
+    r4_board.robot.happen('handle released')
+    r4_board.expect_safe('handle', within=0.5)
+
+
+@pytest.mark.r4(boards=3, arming=False)
+def test_the_wheels_of_three_boards_turn(r4_bus):
+    for board in r4_bus:
+        board.relay(1).set(True)
+        board.osmc(1).set(2000)
+    for board in r4_bus:
+        board.expect(osmc1=2000, within=0.2)
+        until(lambda board=board: board.robot.look().encoder[0] > 10)
+
+
+@pytest.mark.r4(transport='pty')
+def test_over_a_serial_line(r4_board):
+    r4_board.arm()
+    r4_board.servo(3).set(1500)
+    r4_board.expect(relays=1)
+    r4_board.stop()
+    r4_board.expect_safe('stop')

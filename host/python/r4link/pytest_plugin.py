@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fixtures for tests of a robot's program (docs/testing.md):
+
+    r4_robot    a simulated robot, for a program that opens its URL
+    r4_board    a board of such a robot, under control, that expects
+    r4_bus      several of them: @pytest.mark.r4(boards=3)
+
+on the transport of the mark, @pytest.mark.r4(transport='udp'), or of --r4-transport: sim (in this process), udp,
+pty, can (a bus in the kernel, --r4-interface).
+"""
+from __future__ import annotations
+
+import contextlib
+import pathlib
+from typing import Any, Iterator
+
+import pytest
+
+from .testing import TRANSPORTS, Robot, SimProcess, TestBoard, make_robot
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    group = parser.getgroup('r4link')
+    group.addoption('--r4-transport', choices=TRANSPORTS, default='sim', help='where simulated R4 boards are (sim)')
+    group.addoption('--r4-interface', default='vcan0', help='the CAN interface of --r4-transport can (vcan0)')
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line('markers', 'r4(transport, boards, **options): where the simulated boards are, how many '
+                                       'r4_bus has, and options of r4link.Board')
+
+
+def _marked(request: pytest.FixtureRequest) -> dict[str, Any]:
+    mark = request.node.get_closest_marker('r4')
+    return dict(mark.kwargs) if mark else {}
+
+
+@contextlib.contextmanager
+def _robot(request: pytest.FixtureRequest, folder: pathlib.Path, node: int) -> Iterator[Robot]:
+    config = request.config
+    transport = _marked(request).get('transport', config.getoption('--r4-transport'))
+    robot = make_robot(transport, folder, interface=config.getoption('--r4-interface'), node=node)
+    try:
+        yield robot
+    finally:
+        if isinstance(robot, SimProcess):
+            robot.close()
+
+
+@contextlib.contextmanager
+def _board(request: pytest.FixtureRequest, robot: Robot) -> Iterator[TestBoard]:
+    options = {name: value for name, value in _marked(request).items() if name not in ('transport', 'boards')}
+    with TestBoard(robot.url, **options) as board:
+        board.robot = robot
+        board.wait_active()
+        yield board
+
+
+@pytest.fixture
+def r4_robot(request: pytest.FixtureRequest, tmp_path: pathlib.Path) -> Iterator[Robot]:
+    """A simulated robot: `url` to be opened by the program under test, happen(), look()."""
+    with _robot(request, tmp_path, 1) as robot:
+        yield robot
+
+
+@pytest.fixture
+def r4_board(request: pytest.FixtureRequest, r4_robot: Robot) -> Iterator[TestBoard]:
+    """A board under control of the test, not armed yet."""
+    with _board(request, r4_robot) as board:
+        yield board
+
+
+@pytest.fixture
+def r4_bus(request: pytest.FixtureRequest, tmp_path: pathlib.Path) -> Iterator[list[TestBoard]]:
+    """Several boards under control of the test: two, or as the mark says."""
+    with contextlib.ExitStack() as stack:
+        yield [stack.enter_context(_board(request, stack.enter_context(_robot(request, tmp_path, node))))
+               for node in range(1, 1 + _marked(request).get('boards', 2))]

@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What tests of a robot's program need (docs/testing.md): a simulated robot on any transport, and expectations."""
+from __future__ import annotations
+
+import collections
+import json
+import math
+import os
+import pathlib
+import shutil
+import subprocess
+import threading
+import time
+from types import TracebackType
+from typing import Any, Protocol, Self, Type
+
+from ._core import FIELDS
+from .board import Board
+from .errors import DataError, Error, OpenError, UsageError
+from .simulation import Look, SimBoard
+from .values import Bldc, Drive
+
+TRANSPORTS = ('sim', 'udp', 'pty', 'can')
+
+
+class Robot(Protocol):
+    """A simulated board with its motors, sensors and chips."""
+
+    @property
+    def url(self) -> str: ...
+
+    def happen(self, words: str) -> None: ...
+
+    def look(self) -> Look: ...
+
+
+class SimProcess:
+    """A simulated board in a process of its own, which is `r4 sim`: R4 in the environment, or on PATH.
+
+    `url` is where it listens, 'udp://127.0.0.1:0', 'pty:PATH', 'can://vcan0?node=3'; its `url` is then what a host
+    opens. Raises OpenError if it does not listen.
+    """
+
+    def __init__(self, url: str, *options: str) -> None:
+        command = os.environ.get('R4') or shutil.which('r4')
+        if not command:
+            raise UsageError('the command r4', 'it is not on PATH', 'set R4=FILE, such as build/r4')
+        self._process = subprocess.Popen(  # pylint: disable=consider-using-with
+            [command, 'sim', url, '--json', '--stdin', '--sensors', '0.01', *options], stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=1)
+        assert self._process.stdin and self._process.stdout and self._process.stderr
+        first = self._process.stdout.readline()
+        told: dict[str, Any] = json.loads(first) if first else {}
+        if told.get('type') != 'listening':
+            self.close()
+            raise OpenError(url, str(told.get('reason', 'r4 sim ended')), str(told.get('fix', 'see r4 sim --help')))
+        self._url: str = told['host_url']
+        self._lock = threading.Lock()
+        self._outputs: dict[str, Any] = {}
+        self._sensors: dict[str, Any] = {}
+        self.errors: collections.deque[str] = collections.deque(maxlen=100)
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    @property
+    def url(self) -> str:
+        return self._url
+
+    def happen(self, words: str) -> None:
+        """A line of a scenario (docs/simulation.md), without its time. Raises DataError where it has ended."""
+        assert self._process.stdin
+        try:
+            self._process.stdin.write(words + '\n')
+        except OSError as error:
+            raise DataError('r4 sim', 'it has ended', f'exit code {self._process.poll()}') from error
+
+    def look(self) -> Look:
+        """What its pins did last, and what its sensors sensed 10 ms ago or later."""
+        deadline = time.monotonic() + 5
+        while not self._outputs or not self._sensors:  # the first line of each
+            if time.monotonic() > deadline:
+                raise OpenError('r4 sim', 'it tells nothing', 'is it stopped?')
+            time.sleep(0.002)
+        with self._lock:
+            pins, senses = dict(self._outputs), dict(self._sensors)
+        osmc, dhb12 = (tuple(Drive(*each) for each in pins[kind]) for kind in ('osmc', 'dhb'))
+        bldc = tuple(Bldc(speed, direction, bool(brake)) for speed, direction, brake in pins['bldc'])
+        relays = tuple(bool(pins['relays'] >> i & 1) for i in range(8))
+        driven = any(each.pwm for each in osmc + dhb12) or any(pins['servo']) or any(relays) or any(
+            each.speed or not each.brake for each in bldc) or any(each[1] for each in pins['stepper'])
+        return Look(open=self._process.poll() is None, supply=senses['supply'], handle_held=senses['handle'] == 'held',
+                    is_safe=not driven, osmc=osmc, dhb12=dhb12, servo_us=tuple(pins['servo']), relays=relays, bldc=bldc,
+                    encoder=tuple(senses['enc']), stepper=tuple(senses['stepper']),
+                    volts=tuple(senses['analog'].values()))
+
+    def close(self) -> None:
+        """Ends it. Idempotent."""
+        self._process.kill()
+        self._process.wait()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: Type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()
+
+    def _read(self) -> None:
+        assert self._process.stdout
+        for line in self._process.stdout:
+            told = json.loads(line)
+            with self._lock:
+                if told['type'] == 'sensors':
+                    self._sensors = told
+                elif 'outputs' in told:
+                    self._outputs = told['outputs']
+                elif told['type'] == 'error':
+                    self.errors.append(line)
+
+
+def make_robot(transport: str, folder: pathlib.Path, *, interface: str = 'vcan0', node: int = 1) -> Robot:
+    """A simulated robot: 'sim' in this process, else as a process on UDP, a pty in `folder` or a CAN bus."""
+    if transport == 'sim':
+        return SimBoard()
+    if transport not in TRANSPORTS:
+        raise UsageError(f'transport {transport!r}', 'there is no such one', f'use one of {", ".join(TRANSPORTS)}')
+    where = {'udp': 'udp://127.0.0.1:0', 'pty': f'pty:{folder}/r4-{node}', 'can': f'can://{interface}?node={node}'}
+    return SimProcess(where[transport])
+
+
+class TestBoard(Board):
+    """A board that expects. `robot` is what is around it."""
+
+    __test__ = False  # it is no test
+    robot: Robot
+
+    def expect(self, within: float = 0.5, **fields: Any) -> None:
+        """That a state comes in time that has all of these: `board.expect(osmc1=358, enc1=lambda n: n > 10)`.
+
+        A number is the pwm of a drive or the speed of a BLDC motor; volts are right to 0.02. Raises AssertionError,
+        which tells what came instead.
+        """
+        for name in fields:
+            if name not in FIELDS:
+                raise UsageError(f'expect({name}=…)', 'the board has no such field', 'see r4link.FIELDS')
+        begin = time.monotonic()
+        count = 0
+        state = self.state
+        while True:
+            if state and all(_is(getattr(state, name), wanted) for name, wanted in fields.items()):
+                return
+            left = begin + within - time.monotonic()
+            if left <= 0:
+                break
+            try:
+                state = self.next_state(left)
+                count += 1
+            except Error as error:
+                if self.link.state not in ('active', 'safe'):
+                    raise AssertionError(f'no state came within {within} s: {error}') from None
+        wrong = [f'{name} is {getattr(state, name)!r}, not {_words(wanted)}' for name, wanted in fields.items()
+                 if not _is(getattr(state, name), wanted)]
+        raise AssertionError(f'after {within} s and {count} states: {"; ".join(wrong)} '
+                             f'(link {self.link.state}, reason {self.link.reason}; {state!r})')
+
+    def expect_safe(self, reason: str | None = None, within: float = 1.1) -> None:
+        """That the board is safe in time, for that reason, and that no pin of its chips drives anything."""
+        deadline = time.monotonic() + within
+        while True:
+            link, look = self.link, self.robot.look()
+            if link.state == 'safe' and reason in (None, link.reason) and look.is_safe:
+                return
+            if time.monotonic() >= deadline:
+                raise AssertionError(f'after {within} s the board is not safe{f" ({reason})" if reason else ""}: the '
+                                     f'link is {link.state}, its reason {link.reason}, the pins are {look!r}')
+            time.sleep(0.002)
+
+
+def _is(value: Any, wanted: Any) -> bool:
+    if callable(wanted):
+        return bool(wanted(value))
+    if isinstance(value, (Drive, Bldc)) and isinstance(wanted, int):
+        return bool(value[0] == wanted)
+    if isinstance(value, float):
+        return math.isclose(value, wanted, abs_tol=0.02)
+    return bool(value == wanted)
+
+
+def _words(wanted: Any) -> str:
+    return 'as it should be' if callable(wanted) else repr(wanted)
