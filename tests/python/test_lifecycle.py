@@ -26,22 +26,19 @@ def test_a_call_that_waits_obeys_ctrl_c():
     program = f"""
 import r4link
 board = r4link.Board({SILENT!r})
-print('waits', flush=True)
-try:
-    board.wait_active(60)
-except KeyboardInterrupt:
-    print('interrupted', flush=True)
-try:
-    for state in board.states(timeout=60):
-        pass
-except KeyboardInterrupt:
-    print('twice')
+for call in (lambda: board.wait_active(60), lambda: next(board.states(timeout=60)), lambda: board.identify(60)):
+    try:
+        print('waits', flush=True)
+        call()
+    except KeyboardInterrupt:
+        print('interrupted', flush=True)
 """
     with run(program) as process:
-        for told in ('waits', 'interrupted'):
-            assert process.stdout.readline() == f'{told}\n'
+        for _ in range(3):
+            assert process.stdout.readline() == 'waits\n'
             process.send_signal(signal.SIGINT)
-        assert process.communicate(timeout=10) == ('twice\n', '')
+            assert process.stdout.readline() == 'interrupted\n'
+        assert process.communicate(timeout=10) == ('', '')
         assert process.returncode == 0
 
 
