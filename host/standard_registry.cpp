@@ -3,7 +3,7 @@
 #include "standard_registry.hpp"
 
 #include "../firmware/ports/sim/sim_carrier.hpp"
-#include "recording/replay_carrier.hpp"
+#include "replay/replay_carrier.hpp"
 
 namespace r4 {
 

@@ -101,6 +101,43 @@ def test_a_recording_is_a_transport(board, tmp_path):
     assert run('send', f'replay:{path}', 'O:1,1,1', '--timeout', '0.5').returncode == REFUSED
 
 
+@pytest.fixture(name='recorded')
+def a_recording(board, tmp_path):
+    path = tmp_path / 'drive.r4log'
+    with driving(board.host_url, 'O:358,1,1'):
+        assert run('record', board.host_url, '-o', str(path), '--for', '0.5').returncode == 0
+    return path
+
+
+@pytest.mark.parametrize('where', ['udp://127.0.0.1:0', 'pty'])
+def test_a_recording_is_a_board_for_hosts_elsewhere(recorded, tmp_path, where):
+    was = re.findall(r' 1< AIN24.*PNum:(\d+)', recorded.read_text())
+    url = f'pty:{tmp_path}/r4' if where == 'pty' else where
+    with Running('replay', str(recorded), url, '--speed', '0.2', '--json') as replay:
+        host_url = replay.next(lambda each: each['type'] == 'listening')['host_url']
+        host_url += '?listen=0' if where.startswith('udp') else ''
+        shown = objects(run('monitor', host_url, '--json', '--count', '10').stdout)
+        states = [each for each in shown if each['type'] == 'state']
+        assert len(states) == 10 and {str(each['pnum']) for each in states} <= set(was)
+        refused = run('send', host_url, 'O:1,1,1', '--timeout', '0.3')
+        assert refused.returncode == 3, refused
+        assert replay.end() == 0, replay.errors
+
+
+def test_a_replay_goes_step_by_step_from_anywhere_and_tells_damage(recorded):
+    with recorded.open('a') as file:
+        file.write('no line of a recording\n' + recorded.read_text().splitlines()[-2] + '\n')
+    was = re.findall(r'^[\d.]+ 1< (.*)$', recorded.read_text(), re.MULTILINE)
+    ended = run('replay', str(recorded), 'udp://127.0.0.1:0', '--step', stdin='\n' * 1000)
+    assert [line.split(' ', 1)[1] for line in ended.stdout.splitlines()[1:-1]] == was
+    assert ended.returncode == DATA_BAD and re.search(r'line \d+: it begins with no time', ended.stderr), ended
+    late = run('replay', str(recorded), 'udp://127.0.0.1:0', '--step', '--from', '0.3', stdin='\n')
+    assert late.stdout.splitlines()[1].split(' ', 1)[1] in was[20:], late
+    for arguments, code in ((['--wire', '7'], DATA_BAD), (['--speed', '0'], USAGE), (['--from', 'x'], USAGE)):
+        wrong = run('replay', str(recorded), *arguments)
+        assert wrong.returncode == code and ERROR.search(wrong.stderr), wrong
+
+
 def test_records_several_boards_into_one_file(tmp_path):
     path = tmp_path / 'two.r4log'
     with Board('udp://127.0.0.1:0') as left, Board(f'pty:{tmp_path}/r4') as right:

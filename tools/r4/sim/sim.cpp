@@ -18,11 +18,11 @@
 #include "firmware/ports/sim/simulated_board.hpp"
 #include "host/commands/command_help.hpp"
 #include "host/standard_registry.hpp"
+#include "input_lines.hpp"
 #include "protocol/datagram/numbers.hpp"
 #include "protocol/messages/settings.hpp"
 #include "r4link/config.hpp"
 #include "r4link/vocabulary.hpp"
-#include "sim_input.hpp"
 #include "sim_log.hpp"
 #include "transports/framing/can/can_ids.hpp"
 #include "transports/registry.hpp"
@@ -213,14 +213,22 @@ int simulate(const Options& options) {
     }
     std::optional<SensorClock> sensors;
     if (options.sensors) sensors.emplace(io, *options.sensors, boards);
-    std::optional<SimInput> input;
+    std::optional<InputLines> input;
     if (options.input) {
       input.emplace(
           io,
-          [&boards](const sim::ScriptStep& step) {
-            for (const auto& board : boards) board->happen(step);
+          [&](const std::string& line) {
+            try {
+              const auto step = sim::Script::parse_now(line, "standard input");
+              if (!step) return;
+              for (const auto& board : boards) board->happen(*step);
+            } catch (const Error& error) {
+              output.problem(error.problem());
+            }
           },
-          [&output](const Problem& problem) { output.problem(problem); });
+          [&output](const Problem* problem) {
+            if (problem != nullptr) output.problem(*problem);
+          });
     }
     io.run();
     for (const auto& board : boards) board->end();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "sim_input.hpp"
+#include "input_lines.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -24,40 +24,33 @@ int open_input() {
 
 }  // namespace
 
-SimInput::SimInput(asio::io_context& io, std::function<void(const sim::ScriptStep&)> happen,
-                   std::function<void(const Problem&)> fail)
-    : input_(io), buffer_(longest_line), happen_(std::move(happen)), fail_(std::move(fail)) {
+InputLines::InputLines(asio::io_context& io, std::function<void(const std::string&)> on_line,
+                       std::function<void(const Problem*)> on_end)
+    : input_(io), buffer_(longest_line), on_line_(std::move(on_line)), on_end_(std::move(on_end)) {
   const int input = open_input();
   if (input < 0) {
     throw Error(ErrorKind::open, "standard input", std::strerror(errno),
-                "give --stdin a terminal, a pipe or a file to read");
+                "give it a terminal, a pipe or a file to read");
   }
   input_.assign(input);
   read_line();
 }
 
-void SimInput::read_line() {
+void InputLines::read_line() {
   asio::async_read_until(
       input_, buffer_, '\n', [this](const std::error_code& error, std::size_t size) {
+        if (error == asio::error::operation_aborted) return;
         if (error == asio::error::not_found) {
-          fail_({ErrorKind::data, "standard input", "a line is longer than 4096 bytes",
-                 "write one event a line, such as: handle released"});
-          return;
+          const Problem problem{ErrorKind::data, "standard input",
+                                "a line is longer than 4096 bytes", "write shorter ones"};
+          return on_end_(&problem);
         }
         if (error) size = buffer_.size();  // the last line may lack its end
         std::string line(size, '\0');
         std::istream(&buffer_).read(line.data(), static_cast<std::streamsize>(size));
-        take(line);
-        if (!error) read_line();
+        if (!line.empty()) on_line_(line);
+        error ? on_end_(nullptr) : read_line();
       });
-}
-
-void SimInput::take(const std::string& line) {
-  try {
-    if (const auto step = sim::Script::parse_now(line, "standard input")) happen_(*step);
-  } catch (const Error& error) {
-    fail_(error.problem());
-  }
 }
 
 }  // namespace r4::tool

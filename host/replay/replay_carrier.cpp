@@ -4,19 +4,15 @@
 #include <asio/steady_timer.hpp>
 #include <chrono>
 #include <cstdint>
-#include <deque>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <utility>
 
 #include "../../protocol/datagram/numbers.hpp"
 #include "r4link/datagram.hpp"
-#include "recording_file.hpp"
-#include "recording_reader.hpp"
+#include "replay_records.hpp"
 
 namespace r4 {
 namespace {
@@ -38,7 +34,7 @@ std::int32_t hundredths_of(const Url& url, const char* key, std::int32_t min,
   return value;
 }
 
-class ReplayCarrier final : public Carrier, RecordingReader::Handler {
+class ReplayCarrier final : public Carrier {
  public:
   ReplayCarrier(asio::io_context& io, const Url& url)
       : name_(url.text()),
@@ -55,27 +51,9 @@ class ReplayCarrier final : public Carrier, RecordingReader::Handler {
   ~ReplayCarrier() override { close(); }
 
   void open(Carrier::Handler& handler) override {
-    // What is read here must not wait for anybody: the loop would.
-    std::error_code error;
-    const std::filesystem::file_status file = std::filesystem::status(path_, error);
-    if (!std::filesystem::is_regular_file(file)) {
-      const bool directory = std::filesystem::is_directory(file);
-      throw Error(ErrorKind::open, name_,
-                  error       ? error.message()
-                  : directory ? "is a directory"
-                              : "is no regular file",
-                  "name a file that r4 record has written");
-    }
-    input_.emplace(path_);
-    RecordingReader::Handler& self = *this;
-    reader_.emplace(self, path_);
-    while (waiting_.empty() && !ended_) read_on();
-    if (waiting_.empty()) {
-      throw Error(ErrorKind::data, name_, "nothing of that wire is there",
-                  "r4 info " + path_ + " lists the wires; leave from= out");
-    }
+    records_.emplace(name_, path_, wire_, from_);
     handler_ = &handler;
-    first_ = waiting_.front().time;
+    first_ = records_->next()->time;
     began_ = std::chrono::steady_clock::now();
     change(true, {});
     if (handler_ != nullptr) wait();
@@ -101,47 +79,10 @@ class ReplayCarrier final : public Carrier, RecordingReader::Handler {
   const CarrierCounters& counters() const override { return counters_; }
 
  private:
-  struct Waiting {
-    Time time;
-    RecordKind kind;
-    std::string bytes;
-  };
-
-  // --- RecordingReader::Handler
-
-  void on_record(const Record& record) override {
-    if (!beginning_) beginning_ = record.time;
-    if (record.wire != wire_ || record.kind == RecordKind::to_board) return;
-    if (record.time - *beginning_ < from_) return;
-    if (record.kind == RecordKind::event && !is_of_the_transport(record.bytes)) return;
-    latest_ = record.time;
-    waiting_.push_back({record.time, record.kind, std::string(record.bytes)});
-  }
-  void on_wire(const RecordedWire&) override {}
-  void on_damage(const RecordingDamage& damage) override {
-    if (!latest_) return;
-    waiting_.push_back(
-        {*latest_, RecordKind::event,
-         "warning line " + std::to_string(damage.line) + ": " + std::string(damage.reason)});
-  }
-
-  static bool is_of_the_transport(std::string_view event) {
-    return event.starts_with("up ") || event.starts_with("down ") || event.starts_with("warning ");
-  }
-
-  void read_on() {
-    const std::string_view piece = input_->read();
-    if (!piece.empty()) return reader_->feed(piece);
-    ended_ = true;
-    reader_->finish();
-  }
-
-  // --- playing
-
   SteadyTime due() const {
-    if (waiting_.empty()) return began_;
-    const std::chrono::duration<double, std::micro> later =
-        (waiting_.front().time - first_) / speed_;
+    const ReplayRecords::Item* const next = records_->next();
+    if (next == nullptr) return began_;
+    const std::chrono::duration<double, std::micro> later = (next->time - first_) / speed_;
     return began_ + std::chrono::duration_cast<std::chrono::steady_clock::duration>(later);
   }
 
@@ -156,7 +97,7 @@ class ReplayCarrier final : public Carrier, RecordingReader::Handler {
   void play() {
     const SteadyTime now = std::chrono::steady_clock::now();
     for (int i = 0; i < steps_in_a_turn && handler_ != nullptr; ++i) {
-      if (waiting_.empty()) {
+      if (records_->next() == nullptr) {
         if (!continue_reading()) return;
         continue;
       }
@@ -164,9 +105,7 @@ class ReplayCarrier final : public Carrier, RecordingReader::Handler {
         handler_->on_drained();
         break;
       }
-      const Waiting next = std::move(waiting_.front());
-      waiting_.pop_front();
-      play(next);
+      play(records_->take());
     }
     if (handler_ != nullptr) wait();
   }
@@ -175,10 +114,7 @@ class ReplayCarrier final : public Carrier, RecordingReader::Handler {
   bool continue_reading() {
     Problem end{ErrorKind::open, name_, "the recording has ended", "open it again"};
     try {
-      if (!ended_) {
-        read_on();
-        return true;
-      }
+      if (records_->read_on()) return true;
     } catch (const Error& error) {
       end = error.problem();
     }
@@ -187,7 +123,7 @@ class ReplayCarrier final : public Carrier, RecordingReader::Handler {
     return false;
   }
 
-  void play(const Waiting& next) {
+  void play(const ReplayRecords::Item& next) {
     const std::string_view words = next.bytes;
     if (next.kind == RecordKind::from_board) {
       ++counters_.rx_datagrams;
@@ -221,13 +157,8 @@ class ReplayCarrier final : public Carrier, RecordingReader::Handler {
   bool up_ = false;
   CarrierCounters counters_;
 
-  std::optional<RecordingInput> input_;
-  std::optional<RecordingReader> reader_;
-  bool ended_ = false;
-  std::optional<Time> beginning_;  // of the recording
-  std::deque<Waiting> waiting_;
-  std::optional<Time> latest_;  // of what is played, as far as it was read
-  Time first_{0};               // of what is played
+  std::optional<ReplayRecords> records_;
+  Time first_{0};  // of what is played
   SteadyTime began_;
 };
 

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What one board of a recording said, and what happened to its transport: one after the other, as it is asked for.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+
+#include "../recording/recording_file.hpp"
+#include "../recording/recording_reader.hpp"
+
+namespace r4 {
+
+class ReplayRecords : private RecordingReader::Handler {
+ public:
+  struct Item {
+    Time time;  // as recorded
+    RecordKind kind = RecordKind::event;
+    // A datagram of the board, or an event: "up …", "down …", "warning …", damage of the file among those.
+    std::string bytes;
+  };
+
+  // What is read must not wait for anybody: only files are. Reads as far as the first of that wire, `from` after the
+  // beginning of the recording. Throws Error, about `thing`.
+  ReplayRecords(const std::string& thing, const std::string& path, std::uint16_t wire, Time from);
+
+  // The next one, if the file has been read so far: then take() it.
+  const Item* next() const { return waiting_.empty() ? nullptr : &waiting_.front(); }
+  Item take();
+  // Reads on, 16 KiB at most; false at the end of the file. Throws Error.
+  bool read_on();
+
+ private:
+  void on_record(const Record& record) override;
+  void on_wire(const RecordedWire&) override {}
+  void on_damage(const RecordingDamage& damage) override;
+
+  const std::uint16_t wire_;
+  const Time from_;
+  RecordingInput input_;
+  RecordingReader reader_;
+  bool ended_ = false;
+  std::optional<Time> beginning_;  // of the recording
+  std::optional<Time> latest_;     // of what is there, as far as it was read
+  std::deque<Item> waiting_;
+};
+
+}  // namespace r4

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 replay: a recording as a board that listens.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <asio/io_context.hpp>
+#include <asio/signal_set.hpp>
+#include <asio/steady_timer.hpp>
+#include <chrono>
+#include <csignal>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "../shell/options.hpp"
+#include "../shell/subcommands.hpp"
+#include "host/replay/replay_records.hpp"
+#include "host/standard_registry.hpp"
+#include "input_lines.hpp"
+#include "protocol/datagram/numbers.hpp"
+#include "sim_log.hpp"
+#include "transports/registry.hpp"
+
+namespace r4::tool {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct Options {
+  std::string file;
+  std::string url = "udp://127.0.0.1:2018";
+  std::uint64_t wire = 1;
+  double speed = 1;
+  std::optional<Milliseconds> from;
+  bool step = false;
+  bool json = false;
+};
+
+// The loop has other work, too: after so many records, or pieces of the file, it is its turn.
+constexpr int steps_in_a_turn = 32;
+// Who has said nothing for so long gets nothing more, and so many get something at a time.
+constexpr std::chrono::seconds audience_for{2};
+constexpr std::size_t most_peers = 8;
+
+// Says what the board said, to whoever has said something. Nothing that it hears does anything.
+class Replay : private Carrier::Handler {
+ public:
+  explicit Replay(const Options& options)
+      : options_(options),
+        records_(options.file, options.file, static_cast<std::uint16_t>(options.wire),
+                 options.from.value_or(Milliseconds(0))),
+        carrier_(standard_registry().make(io_, options.url, Role::board)),
+        timer_(io_),
+        signals_(io_, SIGINT, SIGTERM),
+        first_(records_.next()->time) {}
+  ~Replay() { carrier_->close(); }
+
+  int run() {
+    signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
+    carrier_->open(*this);
+    {
+      SimOutput output(options_.json);
+      output.listening({carrier_->name()});
+    }
+    std::optional<InputLines> lines;
+    if (options_.step) {
+      lines.emplace(
+          io_, [this](const std::string&) { step(); }, [this](const Problem*) { io_.stop(); });
+    } else {
+      wait();
+    }
+    began_ = Clock::now();
+    io_.run();
+    if (!options_.json) fmt::print("{}: {} datagrams\n", options_.file, sent_);
+    return damaged_ ? static_cast<int>(ErrorKind::data) : 0;
+  }
+
+ private:
+  // --- Carrier::Handler
+
+  void on_datagram(std::string_view, Peer from) override {
+    if (from == everyone || (!audience_.contains(from) && audience_.size() == most_peers)) return;
+    audience_[from] = Clock::now();
+  }
+  void on_carrier_event(const CarrierEvent& event) override {
+    // That nobody listens yet is no trouble.
+    if (event.kind == CarrierEvent::Kind::warning)
+      fmt::print(stderr, "r4: {}\n", event.problem.text());
+  }
+
+  // --- playing
+
+  Clock::time_point due() const {
+    const ReplayRecords::Item* const next = records_.next();
+    if (next == nullptr) return began_;
+    const std::chrono::duration<double, std::micro> later = (next->time - first_) / options_.speed;
+    return began_ + std::chrono::duration_cast<Clock::duration>(later);
+  }
+
+  void wait() {
+    timer_.expires_at(due());
+    timer_.async_wait([this](const std::error_code& error) {
+      if (error) return;
+      for (int i = 0; i < steps_in_a_turn && !io_.stopped(); ++i) {
+        if (records_.next() == nullptr) {
+          if (!read_on()) return io_.stop();
+        } else if (due() > Clock::now()) {
+          break;
+        } else {
+          play(records_.take());
+        }
+      }
+      wait();
+    });
+  }
+
+  // As far as the next datagram.
+  void step() {
+    while (records_.next() != nullptr || read_on()) {
+      if (records_.next() == nullptr) continue;
+      const ReplayRecords::Item item = records_.take();
+      play(item);
+      if (item.kind != RecordKind::from_board) continue;
+      const std::chrono::duration<double> at = item.time - first_;
+      fmt::print("{:.6f} {}\n", at.count(), item.bytes);
+      std::fflush(stdout);
+      return;
+    }
+    io_.stop();
+  }
+
+  // False at the end of the file.
+  bool read_on() {
+    try {
+      return records_.read_on();
+    } catch (const Error& error) {
+      return tell_damage(error.problem().text()), false;
+    }
+  }
+
+  void play(const ReplayRecords::Item& item) {
+    if (item.kind != RecordKind::from_board) {
+      constexpr std::string_view damage = "warning line ";
+      if (item.bytes.starts_with(damage)) tell_damage(options_.file + ": " + item.bytes.substr(8));
+      return;
+    }
+    ++sent_;
+    const Clock::time_point now = Clock::now();
+    std::erase_if(audience_, [&](const auto& peer) { return now - peer.second > audience_for; });
+    carrier_->send(item.bytes, Priority::normal, everyone);
+    for (const auto& [peer, heard] : audience_) {
+      if (!carrier_->reaches(peer)) carrier_->send(item.bytes, Priority::normal, peer);
+    }
+  }
+
+  void tell_damage(const std::string& words) {
+    damaged_ = true;
+    fmt::print(stderr, "r4: {}\n", words);
+  }
+
+  const Options& options_;
+  asio::io_context io_{1};
+  ReplayRecords records_;
+  const std::unique_ptr<Carrier> carrier_;
+  asio::steady_timer timer_;
+  asio::signal_set signals_;
+  const Time first_;
+  Clock::time_point began_;
+  std::map<Peer, Clock::time_point> audience_;
+  std::uint64_t sent_ = 0;
+  bool damaged_ = false;
+};
+
+int replay(const Options& options) { return Replay(options).run(); }
+
+double read_speed(const std::string& text) {
+  std::int32_t hundredths = 0;
+  if (parse_hundredths(Text(text), hundredths) && hundredths > 0) return hundredths / 100.0;
+  throw Error(ErrorKind::usage, "--speed " + text, "is no such speed",
+              "write one such as 0.5 or 10");
+}
+
+constexpr const char* footer =
+    R"(What a board of a recording said is said again, at its pace, on a transport where hosts find it: they
+see the states, heartbeats and answers of then, damaged ones too. A replayed board obeys nothing and
+answers nothing: a command is never confirmed, a stop stops nothing. Over UDP it speaks to whoever has
+spoken to it within two seconds, eight at most; on a pty and a CAN bus to all.
+
+For a program on this machine replay:FILE is simpler: r4 monitor replay:drive.r4log
+
+With --step each line on standard input is one datagram more, which is shown.
+
+Examples:
+  r4 replay drive.r4log                         at udp://127.0.0.1:2018
+  r4 replay drive.r4log.zst pty:/tmp/r4 --from 12 --speed 0.5
+  r4 replay robots.r4log 'can://vcan0?node=3' --wire 2
+  r4 replay drive.r4log --step                  press Return
+
+Exit codes: 0 the recording has ended, or Ctrl-C; 1 some of it could not be read, or it is no recording;
+2 usage; 4, 5 the file or the transport cannot be opened.)";
+
+}  // namespace
+
+void add_replay(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* const command = add_subcommand(root, chosen, "replay", "Play a recording as a board",
+                                           footer, options, replay);
+  add_text(*command, "FILE", options->file, "a recording", file_type, Need::required);
+  add_text(*command, "URL", options->url, "where it listens (default udp://127.0.0.1:2018)",
+           url_type);
+  add_number(*command, "--wire", options->wire, 1, 65535,
+             "which board of the recording: its number in r4 info (default 1)");
+  add_text(
+      *command, "--speed",
+      [options](const std::string& text) { options->speed = read_speed(text); },
+      "so many times as fast as it was (default 1)", "TIMES", Need::optional);
+  add_seconds(*command, "--from", options->from, "so much of the recording is passed over");
+  add_flag(*command, "--step", options->step, "a datagram for each line on standard input");
+  add_json(*command, options->json, "print where it listens as JSON");
+}
+
+}  // namespace r4::tool
