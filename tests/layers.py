@@ -16,7 +16,7 @@ import sys
 PUBLIC = {'include/r4link'}
 PROTOCOL = PUBLIC | {'protocol/datagram', 'protocol/keys', 'protocol/messages', 'protocol/link'}
 FRAMING = PROTOCOL | {'transports/framing', 'transports/framing/can'}
-CARRIERS = {'transports/can', 'transports/serial', 'transports/share', 'transports/udp'}
+CARRIERS = {'transports/can', 'transports/impaired', 'transports/serial', 'transports/share', 'transports/udp'}
 TRANSPORTS = FRAMING | CARRIERS | {'transports'}
 FIRMWARE = FRAMING | {'firmware', 'firmware/drivers'}
 MODELS = {'firmware/ports/sim/chips', 'firmware/ports/sim/robot'}
@@ -35,6 +35,7 @@ ALLOWED = {
     'transports/framing/can': FRAMING,
     'transports': FRAMING,
     'transports/can': FRAMING | {'transports'},
+    'transports/impaired': FRAMING | {'transports'},
     'transports/serial': FRAMING | {'transports'},
     'transports/share': FRAMING | {'transports'},
     'transports/udp': FRAMING | {'transports'},

@@ -149,8 +149,12 @@ void Session::on_state_datagram(const Datagram& datagram, Time now) {
 void Session::on_nack_datagram(const Datagram& datagram, Time now) {
   Nack nack;
   if (!read_nack(datagram, nack)) return;
-  // On a CAN bus, on a wire that is shared and in a recording the answers to other hosts are heard, too.
-  if (!is_ours(nack.pnum)) return watches() ? on_answer(datagram, now) : void();
+  if (!is_ours(nack.pnum)) {
+    // On a CAN bus, on a wire that is shared and in a recording the answers to other hosts are heard, too. One to
+    // the host in control has a number among those of the states; one to who has no lease yet has not.
+    if (watches() && nack.has_session) on_answer(datagram, now);
+    return;
+  }
   if (watches()) return on_lease_refused(nack, datagram, now);
   selection_.on_answer();
   if (nack.code == Refusal::busy) {

@@ -2,6 +2,7 @@
 """The pytest plugin, by the example of docs/testing.md and tests that fail."""
 import os
 import pathlib
+import re
 import subprocess
 import sys
 
@@ -19,7 +20,7 @@ def run_pytest(*arguments, cwd, **env):
 @pytest.mark.parametrize('transport', ['sim', 'udp', 'pty'])
 def test_the_example_passes(transport):
     ended = run_pytest(EXAMPLE, '--r4-transport', transport, cwd=EXAMPLE)
-    assert ended.returncode == 0 and '4 passed' in ended.stdout, ended.stdout
+    assert ended.returncode == 0 and '5 passed' in ended.stdout, ended.stdout
 
 
 def test_what_is_not_as_expected_is_told(tmp_path):
@@ -35,6 +36,9 @@ def test_unknown(r4_board):
 def test_safe(r4_board):
     r4_board.expect_safe('stop', within=0.05)
 
+def test_link(r4_link):
+    assert False
+
 def test_can(request, tmp_path):
     import pytest
     from r4link.testing import make_robot
@@ -43,7 +47,8 @@ def test_can(request, tmp_path):
     assert 'nocan0' in str(raised.value)
 ''')
     ended = run_pytest('test_wrong.py', cwd=tmp_path)
-    assert '3 failed, 1 passed' in ended.stdout, ended.stdout
+    assert '4 failed, 1 passed' in ended.stdout, ended.stdout
+    assert re.search(r"@pytest.mark.r4\(link='loss=2%,delay=5ms±5,seed=\d+'\)", ended.stdout)
     for words in ('osmc1 is Drive(pwm=0, direction=0), not 358 (link active, reason none; State(pnum=',
                   'the board has no such field; see r4link.FIELDS',
                   'after 0.05 s the board is not safe (stop): the link is active, its reason none'):

@@ -43,6 +43,14 @@ def test_the_wheels_of_three_boards_turn(r4_bus):
         until(lambda board=board: board.robot.look().encoder[0] > 10)
 
 
+@pytest.mark.r4(link='loss=10%,delay=10ms±10,duplicate=5%,seed=7')
+def test_it_drives_over_a_bad_link(r4_link):
+    r4_link.arm(timeout=3)
+    for pwm in (100, 200, 300):
+        r4_link.osmc(1).set(pwm, timeout=3)
+        r4_link.expect(osmc1=pwm)
+
+
 @pytest.mark.r4(transport='pty')
 def test_over_a_serial_line(r4_board):
     r4_board.arm()

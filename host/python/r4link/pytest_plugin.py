@@ -4,6 +4,8 @@
     r4_robot    a simulated robot, for a program that opens its URL
     r4_board    a board of such a robot, under control, that expects
     r4_bus      several of them: @pytest.mark.r4(boards=3)
+    r4_link     a board behind a bad link: @pytest.mark.r4(link='loss=5%,delay=20ms±10,seed=7'); a test that fails
+                tells which
 
 on the transport of the mark, @pytest.mark.r4(transport='udp'), or of --r4-transport: sim (in this process), udp,
 pty, can (a bus in the kernel, --r4-interface).
@@ -12,6 +14,7 @@ from __future__ import annotations
 
 import contextlib
 import pathlib
+import random
 from typing import Any, Iterator
 
 import pytest
@@ -26,8 +29,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line('markers', 'r4(transport, boards, **options): where the simulated boards are, how many '
-                                       'r4_bus has, and options of r4link.Board')
+    config.addinivalue_line('markers', 'r4(transport, boards, link, **options): where the simulated boards are, how '
+                                       'many r4_bus has, what is wrong with the link of r4_link, and options of '
+                                       'r4link.Board')
 
 
 def _marked(request: pytest.FixtureRequest) -> dict[str, Any]:
@@ -36,10 +40,12 @@ def _marked(request: pytest.FixtureRequest) -> dict[str, Any]:
 
 
 @contextlib.contextmanager
-def _robot(request: pytest.FixtureRequest, folder: pathlib.Path, node: int) -> Iterator[Robot]:
+def _robot(request: pytest.FixtureRequest, folder: pathlib.Path, node: int, link: str = '') -> Iterator[Robot]:
     config = request.config
     transport = _marked(request).get('transport', config.getoption('--r4-transport'))
-    robot = make_robot(transport, folder, interface=config.getoption('--r4-interface'), node=node)
+    if link and transport == 'sim':
+        transport = 'udp'
+    robot = make_robot(transport, folder, interface=config.getoption('--r4-interface'), node=node, link=link)
     try:
         yield robot
     finally:
@@ -49,7 +55,7 @@ def _robot(request: pytest.FixtureRequest, folder: pathlib.Path, node: int) -> I
 
 @contextlib.contextmanager
 def _board(request: pytest.FixtureRequest, robot: Robot) -> Iterator[TestBoard]:
-    options = {name: value for name, value in _marked(request).items() if name not in ('transport', 'boards')}
+    options = {name: value for name, value in _marked(request).items() if name not in ('transport', 'boards', 'link')}
     with TestBoard(robot.url, **options) as board:
         board.robot = robot
         board.wait_active()
@@ -67,6 +73,15 @@ def r4_robot(request: pytest.FixtureRequest, tmp_path: pathlib.Path) -> Iterator
 def r4_board(request: pytest.FixtureRequest, r4_robot: Robot) -> Iterator[TestBoard]:
     """A board under control of the test, not armed yet."""
     with _board(request, r4_robot) as board:
+        yield board
+
+
+@pytest.fixture
+def r4_link(request: pytest.FixtureRequest, tmp_path: pathlib.Path) -> Iterator[TestBoard]:
+    """A board behind a bad link: as the mark says, or one that loses and delays a little, with a seed of its own."""
+    link = _marked(request).get('link') or f'loss=2%,delay=5ms±5,seed={random.randrange(1 << 32)}'
+    request.node.add_report_section('setup', 'r4_link', f"@pytest.mark.r4(link='{link}')")
+    with _robot(request, tmp_path, 1, link) as robot, _board(request, robot) as board:
         yield board
 
 

@@ -118,14 +118,18 @@ class SimProcess:
                     self.errors.append(line)
 
 
-def make_robot(transport: str, folder: pathlib.Path, *, interface: str = 'vcan0', node: int = 1) -> Robot:
-    """A simulated robot: 'sim' in this process, else as a process on UDP, a pty in `folder` or a CAN bus."""
+def make_robot(transport: str, folder: pathlib.Path, *, interface: str = 'vcan0', node: int = 1,
+               link: str = '') -> Robot:
+    """A simulated robot: 'sim' in this process, else as a process on UDP, a pty in `folder` or a CAN bus, behind
+    such a `link` as r4 sim --link says."""
+    if link and transport == 'sim':
+        raise UsageError(f'link {link!r}', "transport 'sim' has no link", "use 'udp', 'pty' or 'can'")
     if transport == 'sim':
         return SimBoard()
     if transport not in TRANSPORTS:
         raise UsageError(f'transport {transport!r}', 'there is no such one', f'use one of {", ".join(TRANSPORTS)}')
     where = {'udp': 'udp://127.0.0.1:0', 'pty': f'pty:{folder}/r4-{node}', 'can': f'can://{interface}?node={node}'}
-    return SimProcess(where[transport])
+    return SimProcess(where[transport], *(('--link', link) if link else ()))
 
 
 class TestBoard(Board):

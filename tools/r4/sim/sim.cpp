@@ -25,6 +25,7 @@
 #include "r4link/vocabulary.hpp"
 #include "sim_log.hpp"
 #include "transports/framing/can/can_ids.hpp"
+#include "transports/impaired/impaired_carrier.hpp"
 #include "transports/registry.hpp"
 
 namespace r4::tool {
@@ -41,6 +42,7 @@ struct Options {
   std::optional<std::uint64_t> seed;
   std::string board_id;
   std::vector<std::string> settings;
+  std::optional<Impairment> link;
 };
 
 constexpr std::size_t longest_id = 64;
@@ -126,6 +128,7 @@ class ServedBoard {
         if (other->name() != carrier->name() || !url.starts_with("can:")) continue;
         throw Error(ErrorKind::usage, url, "the board is there already", "name a node once");
       }
+      if (options.link) carrier = impaired(io, std::move(carrier), *options.link);
       carriers_.push_back(carrier.get());
       board_.add_carrier(std::move(carrier));
     }
@@ -142,9 +145,18 @@ class ServedBoard {
 
   void end() {
     for (const Carrier* const carrier : carriers_) log_.on_end(*carrier);
+    for (const ImpairedCarrier* const link : links_) log_.on_impairment(*link);
   }
 
  private:
+  std::unique_ptr<Carrier> impaired(asio::io_context& io, std::unique_ptr<Carrier> carrier,
+                                    Impairment link) {
+    link.seed += links_.size();  // each transport of its own
+    auto made = make_impaired_carrier(io, std::move(carrier), link);
+    links_.push_back(made.get());
+    return made;
+  }
+
   sim::SimulatedBoard::Options options_of(const Options& options, const Plan& plan) {
     sim::SimulatedBoard::Options board_options;
     if (options.seed) board_options.seed = *options.seed + plan.number;
@@ -160,6 +172,7 @@ class ServedBoard {
   SimLog log_;
   sim::SimulatedBoard board_;
   std::vector<const Carrier*> carriers_;
+  std::vector<const ImpairedCarrier*> links_;
 };
 
 // Tells the sensors of all boards again and again.
@@ -252,6 +265,10 @@ At the end
   {"type":"counters","transport":…,"received":…,"sent":…,"dropped":…,…}   datagrams of a transport
 with "transfers" on CAN.
 
+With --link the datagrams of each direction suffer: of 100 so many are lost, doubled or damaged, each takes so
+long give or take, and nothing passes from 10 s after the start for 2 s. The same seed does the same; at the
+end {"type":"impairment","transport":…,"received":{"passed":…,"lost":…,…},"sent":{…}} tells what it did.
+
 A scenario (--script) has lines such as: 0.5 handle released / 1 us 1 15 / 2 chip dac off / 3 reboot
 With --stdin the same words without the time make it happen at once: handle released. What happens is an
 event with "happened"; {"type":"error",…} is a line that was not understood.
@@ -259,6 +276,7 @@ event with "happened"; {"type":"error",…} is a line that was not understood.
 Examples:
   r4 sim                                       at udp://127.0.0.1:2018
   r4 sim udp://127.0.0.1:0                     at any free port, which it prints
+  r4 sim --link loss=5%,delay=20ms±10          over a bad WiFi
   r4 sim --stdin                               and type: us 1 15
   r4 sim udp://0.0.0.0:2018 pty:/tmp/r4        two transports at once; open the second with
                                                r4 monitor serial:///tmp/r4
@@ -291,6 +309,11 @@ void add_sim(CLI::App& root, Action& chosen) {
   add_repeated(*command, "--set", options->settings,
                "a setting as C:KEY,VALUE makes it, such as rate,50 (can be given again)",
                "KEY,VALUE");
+  add_text(
+      *command, "--link",
+      [options](const std::string& text) { options->link = Impairment::parse(text); },
+      "a bad one: loss=5%,delay=20ms±10,duplicate=1%,corrupt=0.1%,cut=10s+2s,seed=7", "HOW",
+      Need::optional);
   add_text(*command, "--board-id", options->board_id, "its answer to Q:ID (default sim-1)", "ID");
 }
 

@@ -206,6 +206,31 @@ void SimLog::on_end(const Carrier& carrier) {
                             counters.tx_datagrams, counters.tx_dropped));
 }
 
+void SimLog::on_impairment(const ImpairedCarrier& link) {
+  if (quiet_) return;
+  const auto json = [](const ImpairmentCounters& counters) {
+    return Json{{"passed", counters.passed},
+                {"lost", counters.lost},
+                {"duplicated", counters.duplicated},
+                {"corrupted", counters.corrupted},
+                {"cut", counters.cut},
+                {"overflow", counters.overflow}};
+  };
+  if (output_.json()) {
+    Json object{{"type", "impairment"}};
+    if (!name_.empty()) object["board"] = name_;
+    object["transport"] = link.name();
+    object["received"] = json(link.received());
+    object["sent"] = json(link.sent());
+    return print(object);
+  }
+  for (const auto& [way, counters] : {std::pair("in", link.received()), {"out", link.sent()}}) {
+    output_.print(fmt::format("{}: {} passed {}, {} lost, {} doubled, {} damaged, {} cut\n",
+                              link.name(), counters.passed, way, counters.lost, counters.duplicated,
+                              counters.corrupted, counters.cut));
+  }
+}
+
 void SimLog::on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason reason) {
   const bool silent = state == firmware::BoardState::safe && reason == SafeReason::link;
   const std::uint32_t silence_ms = silent ? t_ms - board_->application().link().fed_ms() : 0;

@@ -11,6 +11,7 @@
 #include "../shell/json.hpp"
 #include "../shell/line_writer.hpp"
 #include "firmware/ports/sim/simulated_board.hpp"
+#include "transports/impaired/impaired_carrier.hpp"
 
 namespace r4::tool {
 
@@ -49,6 +50,8 @@ class SimLog {
   void tell_sensors();
   // What passed over one of its transports, at the end.
   void on_end(const Carrier& carrier);
+  // What became of datagrams on a link that is bad on purpose, at the end.
+  void on_impairment(const ImpairedCarrier& link);
 
  private:
   Json event(std::uint32_t t_ms) const;
