@@ -14,7 +14,7 @@
 namespace r4::test {
 namespace {
 
-struct Visitor final : RecordingVisitor {
+struct VisitorOfAll final : RecordingVisitor {
   void on_wire(int wire, const std::string& url, const std::string& name) override {
     wires.push_back(std::to_string(wire) + " " + url + " " + name);
   }
@@ -50,7 +50,7 @@ TEST(ReadRecording, VisitsAllThatWasRecorded) {
     board.osmc(1).set(10, Direction::forward);
     live = board.statistics();
   }
-  Visitor visitor;
+  VisitorOfAll visitor;
   read_recording(path, visitor);
   std::filesystem::remove(path);
   EXPECT_EQ(visitor.wires.back(), "1 sim: sim-1");

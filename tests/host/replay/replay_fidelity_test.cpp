@@ -26,10 +26,10 @@ namespace {
 using namespace std::chrono_literals;
 
 // Damages, loses and doubles what the board says.
-class Troubled final : public Carrier, private Carrier::Handler {
+class TroubledCarrier final : public Carrier, private Carrier::Handler {
  public:
-  explicit Troubled(std::unique_ptr<Carrier> below) : below_(std::move(below)) {}
-  ~Troubled() override { below_->close(); }
+  explicit TroubledCarrier(std::unique_ptr<Carrier> below) : below_(std::move(below)) {}
+  ~TroubledCarrier() override { below_->close(); }
 
   void open(Carrier::Handler& handler) override {
     handler_ = &handler;
@@ -62,8 +62,8 @@ class Troubled final : public Carrier, private Carrier::Handler {
 };
 
 // All that a program is told of the board.
-struct Told {
-  explicit Told(AsyncBoard& board) {
+struct ToldOfABoard {
+  explicit ToldOfABoard(AsyncBoard& board) {
     board.on_state(
         [this](const ReceivedState& state, const Datagram&) { states.push_back(text_of(state)); });
     board.on_board_heartbeat(
@@ -95,9 +95,10 @@ TEST(ReplayFidelity, TheSameStatesEventsAndStatisticsAsLive) {
   const std::string path = testing::TempDir() + "r4-fidelity-" + std::to_string(::getpid());
   asio::io_context io;
   AsyncBoard board(
-      io, std::make_unique<Troubled>(standard_registry().make(io, "sim:?seed=7", Role::host)),
+      io,
+      std::make_unique<TroubledCarrier>(standard_registry().make(io, "sim:?seed=7", Role::host)),
       at_will());
-  Told live(board);
+  ToldOfABoard live(board);
   Recording recording(path);
   board.record(recording);
   board.open();
@@ -115,7 +116,7 @@ TEST(ReplayFidelity, TheSameStatesEventsAndStatisticsAsLive) {
   BoardOptions watching;
   watching.role = BoardRole::watch;
   AsyncBoard again(io, "replay:" + path, watching);
-  Told played(again);
+  ToldOfABoard played(again);
   again.on_event([&](const CarrierEvent& event) {
     if (event.kind == CarrierEvent::Kind::down) io.stop();
   });

@@ -18,17 +18,17 @@ namespace {
 
 using namespace std::chrono_literals;
 
-struct Arrival {
+struct OnItsWay {
   Time at;
   std::string bytes;
-  bool operator==(const Arrival&) const = default;
+  bool operator==(const OnItsWay&) const = default;
 };
 
 // A datagram a millisecond, each of 20 bytes, and what of them comes when.
-std::vector<Arrival> arrivals(const std::string& how, int count, ImpairmentCounters& counters,
-                              std::uint64_t stream = 1) {
+std::vector<OnItsWay> arrivals(const std::string& how, int count, ImpairmentCounters& counters,
+                               std::uint64_t stream = 1) {
   ImpairedDirection direction(Impairment::parse(how), stream, 0ms);
-  std::vector<Arrival> all;
+  std::vector<OnItsWay> all;
   const auto take = [&](Time until) {
     while (direction.due() && *direction.due() <= until) {
       const Time at = *direction.due();
@@ -50,7 +50,7 @@ std::vector<Arrival> arrivals(const std::string& how, int count, ImpairmentCount
 TEST(Impairment, DoesWhatItSaysAndTheSameForTheSameSeed) {
   ImpairmentCounters counters;
   const std::string how = "loss=5%,delay=20ms±10,duplicate=1%,corrupt=2%,seed=7";
-  const std::vector<Arrival> all = arrivals(how, 100'000, counters);
+  const std::vector<OnItsWay> all = arrivals(how, 100'000, counters);
   EXPECT_NEAR(static_cast<double>(counters.lost), 5000, 300);
   EXPECT_NEAR(static_cast<double>(counters.duplicated), 950, 150);
   EXPECT_NEAR(static_cast<double>(counters.corrupted), 1900, 200);
@@ -60,7 +60,7 @@ TEST(Impairment, DoesWhatItSaysAndTheSameForTheSameSeed) {
   Time most = 0ms;
   int overtaken = 0;
   int last = 0;
-  for (const Arrival& each : all) {
+  for (const OnItsWay& each : all) {
     int number = 0;
     if (std::sscanf(each.bytes.c_str(), "%d.", &number) != 1 || number > 100'000) continue;
     if (each.bytes.find_first_not_of("0123456789.") != std::string::npos) continue;
@@ -85,14 +85,14 @@ TEST(Impairment, DoesWhatItSaysAndTheSameForTheSameSeed) {
 
 TEST(Impairment, OfNothingPassesAllAtOnce) {
   ImpairmentCounters counters;
-  const std::vector<Arrival> all = arrivals("seed=3", 1000, counters);
+  const std::vector<OnItsWay> all = arrivals("seed=3", 1000, counters);
   ASSERT_EQ(all.size(), 1000U);
   EXPECT_EQ(all[500].at, 500ms);
 }
 
 TEST(Impairment, IsCutForAWhile) {
   ImpairmentCounters counters;
-  const std::vector<Arrival> all = arrivals("cut=0.1s+0.2s", 1000, counters);
+  const std::vector<OnItsWay> all = arrivals("cut=0.1s+0.2s", 1000, counters);
   EXPECT_EQ(counters.cut, 200U);
   EXPECT_EQ(all[99].at, 99ms);
   EXPECT_EQ(all[100].at, 300ms);

@@ -152,7 +152,8 @@ std::string host_url(const std::string& board_url) {
   if (url.scheme() == "pty") return "serial://" + url.path();
   if (url.scheme() == "can") return board_url;
   const bool any = url.host() == "0.0.0.0" || url.host() == "::";
-  const bool v6 = url.host().find(':') != std::string::npos;
+  // GCC 12 warns falsely of find() here.
+  const bool v6 = std::count(url.host().begin(), url.host().end(), ':') != 0;
   const std::string host = any ? (v6 ? "::1" : "127.0.0.1") : url.host();
   return fmt::format("{}://{}:{}", url.scheme(), v6 ? "[" + host + "]" : host,
                      url.port().value_or(0));
