@@ -144,11 +144,14 @@ def test_ctrl_c_ends_the_command_and_a_killed_wrapper_leaves_no_guest():
 def test_a_terminal_is_a_terminal_inside():
     process, terminal = pty.fork()
     if process == 0:
+        termios.tcsetwinsize(0, (33, 99))  # here: the parent may come too late to it
         os.execv(WITH_CAN[0], [*WITH_CAN, 'sh', '-c', 'tty; stty size; sleep 60'])
-    termios.tcsetwinsize(terminal, (33, 99))
     seen = b''
     while b'33 99' not in seen:
-        seen += os.read(terminal, 4096)
+        try:
+            seen += os.read(terminal, 4096)
+        except OSError as error:
+            pytest.fail(f'it ended, and said {seen!r}: {error}')
     assert b'/dev/hvc0\r\n' in seen
     os.write(terminal, b'\x03')
     assert os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]) == 128 + signal.SIGINT

@@ -64,6 +64,7 @@ def test_errors_name_the_thing_the_reason_and_the_fix(board):
                          (lambda: r4link.Board('tcp://x'), r4link.UsageError),
                          (lambda: r4link.Board('sim:', role='drive'), r4link.UsageError),
                          (lambda: r4link.Board('sim:', key='/no/where'), r4link.OpenError),
+                         (lambda: r4link.Board('sim:', key='~/no/where'), r4link.OpenError),
                          (lambda: r4link.Board('serial:///dev/null/x'), r4link.OpenError)]:
         with pytest.raises(error):
             wrong()

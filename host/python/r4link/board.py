@@ -173,7 +173,7 @@ class Board:
     """A board, opened by URL (docs/transports.md); see the options of include/r4link/options.hpp.
 
     Returns without waiting for the board: wait_active(). `role` is 'control', or 'watch' for a program that only
-    looks, and may stop the board. `key` is the path of a key file. Raises UsageError, OpenError, DeniedError.
+    looks, and may stop the board. `key` is the path of a key file (`~` is yours). Raises UsageError, OpenError, DeniedError.
 
         with r4link.Board('udp://192.168.0.125') as board:
             board.wait_active()
@@ -188,7 +188,8 @@ class Board:
         if role not in ('control', 'watch'):
             raise UsageError(f'role {role!r}', 'there is no such role', "give 'control' or 'watch'")
         self._core = _core.Board(
-            url, watch=role == 'watch', arming=arming, fields=fields, key=None if key is None else os.fspath(key),
+            url, watch=role == 'watch', arming=arming, fields=fields,
+            key=None if key is None else os.path.expanduser(os.fspath(key)),
             watch_rate_hz=watch_rate_hz, heartbeat=_ms(heartbeat), timeout=_ms(timeout),
             command_retry=_ms(command_retry), stop_retry=_ms(stop_retry), stop_linger=_ms(stop_linger),
             identify_interval=_ms(identify_interval), callback_limit=_ms(callback_limit))
