@@ -258,7 +258,7 @@ void Application::on_command(Source from, const Datagram& datagram, Verdict verd
   Command command;
   const Refusal refusal = parse_command(field, command);
   if (refusal == Refusal::none && command.kind == CommandKind::identify) {
-    identify(from, now_ms);
+    identify(from, datagram, now_ms);
     return;
   }
   if (refusal == Refusal::none && command.kind == CommandKind::watch) {

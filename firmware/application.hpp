@@ -151,7 +151,7 @@ class Application {
                  std::uint32_t t_ms);
   void fill(State& state) const;
   void answer(Source to, DatagramWriter& writer, std::uint32_t now_ms);
-  void identify(Source to, std::uint32_t now_ms);
+  void identify(Source to, const Datagram& question, std::uint32_t now_ms);
   void refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms,
               std::uint8_t at = 0, std::uint32_t lease = 0);
   std::uint32_t& number_for(Source to);

@@ -49,7 +49,7 @@ void Application::answer(Source to, DatagramWriter& writer, std::uint32_t now_ms
   if (!datagram.empty()) ports_[to.port].port->send(datagram, Priority::normal, to.peer);
 }
 
-void Application::identify(Source to, std::uint32_t now_ms) {
+void Application::identify(Source to, const Datagram& question, std::uint32_t now_ms) {
   char buffer[max_datagram];
   DatagramWriter writer(buffer, sizeof buffer);
   Identity identity = identity_;
@@ -57,6 +57,8 @@ void Application::identify(Source to, std::uint32_t now_ms) {
   identity.name = Text(name, std::strlen(name));
   identity.has_busy = true;
   identity.busy = link_.has_owner() && link_.owner() != to;
+  identity.has_asked = question.has_pnum();
+  identity.asked = question.pnum();
   write_identity(writer, identity);
   writer.more("+").more(leave_capability).more("+").more(group_capability);
   if (authentication_.has_chance()) writer.more("+").more(watch_capability);

@@ -20,7 +20,7 @@ CARRIERS = {'transports/can', 'transports/impaired', 'transports/serial', 'trans
 TRANSPORTS = FRAMING | CARRIERS | {'transports'}
 FIRMWARE = FRAMING | {'firmware', 'firmware/drivers'}
 MODELS = {'firmware/ports/sim/chips', 'firmware/ports/sim/robot'}
-HOST = TRANSPORTS | {'host', 'host/commands', 'host/recording', 'host/replay', 'host/session'}
+HOST = TRANSPORTS | {'host', 'host/commands', 'host/measurement', 'host/recording', 'host/replay', 'host/session'}
 SIMULATED = HOST | FIRMWARE | MODELS | {'firmware/ports/sim'}
 SHELL = SIMULATED | {'tools/r4/shell'}
 FORMATS = {'tools/r4/formats', 'tools/r4/formats/mcap', 'tools/r4/formats/packets'}
@@ -50,9 +50,10 @@ ALLOWED = {
     'firmware/ports/giga/links': FIRMWARE | {'firmware/ports', 'firmware/ports/giga/chip'},
     'firmware/ports/giga': FIRMWARE | {'firmware/ports/giga/chip', 'firmware/ports/giga/links'},
     'host/commands': TRANSPORTS,
+    'host/measurement': TRANSPORTS,
     'host/recording': TRANSPORTS,
     'host/replay': TRANSPORTS | {'host/recording'},
-    'host/session': TRANSPORTS | {'host/commands'},
+    'host/session': TRANSPORTS | {'host/commands', 'host/measurement'},
     'host/python/bindings': PUBLIC,
     'host': HOST,
     'tools/r4/shell': SIMULATED,

@@ -22,6 +22,13 @@ std::uint32_t Session::random_first_pnum() {
 
 namespace {
 
+// To know the board's clock, questions are asked more often than the program wants them: at first, until
+// the error is small, and later where it is not. The interval is no whole number of milliseconds: the board's
+// clock counts those, and so shows where they begin.
+constexpr Time soon_interval{102'300};
+constexpr Time first_goal{500}, later_goal{1'000};
+constexpr int first_questions = 100, questions_in_vain = 10;
+
 // Before anything is made of them: their times may be too long to be reckoned with.
 SessionOptions checked(SessionOptions options) {
   require_valid(options);
@@ -93,6 +100,7 @@ void Session::on_heartbeat_datagram(const Datagram& datagram, Time now) {
       link_.on_datagram(datagram.pnum(), connecting ? 0 : t_ms, true, report.reason, to_ms(now)));
   notice_restart();
   if (current) {
+    if (!connecting) clock_.heard(t_ms, now);
     state_.safe = report.reason;
     if (report.reason == SafeReason::none) state_.fault = ChipFault();
     key_.on_heartbeat(datagram);
@@ -135,6 +143,10 @@ void Session::on_state_datagram(const Datagram& datagram, Time now) {
     key_.on_host_seen(now);
   }
   state_ = fresh;
+  clock_.heard(state_.t_ms, now);
+  const BoardClock::Instant sampled = clock_.at(state_.t_ms);
+  state_.sampled = ReceivedState::Clock::time_point(sampled.at);
+  state_.sampled_error = sampled.error ? *sampled.error : ReceivedState::unknown;
   state_.received = ReceivedState::Clock::time_point(now);
   state_.safe = reason;
   // It is in every state while there is one.
@@ -211,7 +223,12 @@ void Session::on_identity_datagram(const Datagram& datagram, Time now) {
   on_answer(datagram, now);
   knows_leave_ = has_capability(identity.capabilities, leave_capability);
   groups_.on_identity(identity.capabilities);
-  if (const auto round_trip = question_.answered(now)) collector_.on_round_trip(*round_trip);
+  if (const auto asked = question_.answered(identity)) {
+    collector_.on_round_trip(now - *asked);
+    const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
+    clock_.heard(t_ms, now);
+    if (identity.has_asked) clock_.answered(t_ms, *asked);
+  }
   handler_.on_identity(identity);
   for (Pending& pending : pending_.under_way()) {
     if (pending.is_out() && pending.kind == CommandKind::identify) {
@@ -247,6 +264,8 @@ bool Session::notice_restart() {
   restarts_ = link_.restarts();
   knows_leave_ = false;
   state_ = ReceivedState();
+  clock_.restart();
+  questions_of_clock_ = 0;
   groups_.on_restart();
   disarm(DisarmCause::restart);
   handler_.on_restart();
@@ -358,9 +377,10 @@ Time Session::poll(Time now) {
   send_queued(now);  // what has waited for arm()
   retry_due(now);
   repeat_stop(now);
-  if (!leaving_ && hears_board() && question_.due(now)) {
-    question_.ask(now);
+  if (!leaving_ && hears_board() && question_.due(question_interval(), now)) {
     transmit_now(Command::identify(), to_ms(now), Priority::normal, now);
+    question_.ask(link_.last_pnum(), now);
+    ++questions_of_clock_;
   }
   return next_poll(now);
 }
@@ -397,7 +417,7 @@ Time Session::next_poll(Time now) {
   if (link <= now) link = now + Time{1000};
   next = std::min(next, link);
   if (watches()) next = std::min(next, lease_.next());
-  if (hears_board()) next = std::min(next, question_.next());
+  if (hears_board()) next = std::min(next, question_.next(question_interval()));
   if (role_.refused(now)) next = std::min(next, role_.refused_until());
   if (group_waits_) next = std::min(next, groups_.next());
   return next;
@@ -433,6 +453,14 @@ bool Session::link_up() const {
 bool Session::hears_board() const {
   if (!watches()) return link_up();
   return is_heard(link_.state());
+}
+
+Time Session::question_interval() const {
+  const bool first = questions_of_clock_ < first_questions;
+  const bool known = state_.sampled_error != ReceivedState::unknown;
+  const Time enough = first ? first_goal : later_goal;
+  const bool soon = known ? state_.sampled_error > enough : questions_of_clock_ < questions_in_vain;
+  return soon ? soon_interval : Time{options_.identify_interval};
 }
 
 // Commands wait for proof of control: the session's own F, executed. So none is ever sent into a
@@ -486,6 +514,10 @@ void Session::feed(Time now) {
 Statistics Session::statistics(Time now) const {
   Statistics report = collector_.report(now);
   report.packets = link_.counters();
+  if (state_.sampled_error != ReceivedState::unknown) {
+    report.clock_drift_ppm = clock_.drift_ppm();
+    report.clock_drift_error_ppm = clock_.drift_error_ppm();
+  }
   return report;
 }
 

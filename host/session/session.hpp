@@ -12,7 +12,7 @@
 // It is put together from machines, each with its own diagram: what the board knows of us
 // (host_role.hpp), the fields that it sends (field_selection.hpp), the commands under way
 // (pending_commands.hpp), arming (arming.hpp), the key (host_key.hpp), the question who the board is
-// (identity_question.hpp), the stop that lasts (stop_repetition.hpp) and, where the session only watches, its
+// (measurement/identity_question.hpp), the board's clock on ours (measurement/board_clock.hpp), the stop that lasts (stop_repetition.hpp) and, where the session only watches, its
 // lease at the board (lease.hpp).
 //
 // A retry has the bytes and the packet number of the original (signed anew, where there is a key),
@@ -46,18 +46,19 @@
 #include "../commands/group_support.hpp"
 #include "../commands/pending_commands.hpp"
 #include "../commands/posted_commands.hpp"
+#include "../measurement/board_clock.hpp"
+#include "../measurement/identity_question.hpp"
+#include "../measurement/statistics.hpp"
 #include "arming.hpp"
 #include "field_selection.hpp"
 #include "host_key.hpp"
 #include "host_role.hpp"
-#include "identity_question.hpp"
 #include "lease.hpp"
 #include "r4link/carrier.hpp"
 #include "r4link/command.hpp"
 #include "r4link/error.hpp"
 #include "r4link/link.hpp"
 #include "r4link/options.hpp"
-#include "statistics.hpp"
 #include "stop_repetition.hpp"
 #include "time.hpp"
 
@@ -218,6 +219,7 @@ class Session {
   void repeat_stop(Time now);
   bool watches() const { return board_role_ == BoardRole::watch; }
   bool hears_board() const;
+  Time question_interval() const;
   void send_heartbeat(Time now);
   void send_lease(Time now);
   void on_lease_refused(const Nack& nack, const Datagram& datagram, Time now);
@@ -236,6 +238,8 @@ class Session {
   HostRoleMachine role_;
   FieldSelection selection_;
   IdentityQuestion question_;
+  BoardClock clock_;
+  int questions_of_clock_ = 0;  // asked for its sake since the board began
   Lease lease_;
   StopRepetition repetition_;
   LinkStatus status_;

@@ -53,8 +53,8 @@ PostResult Session::post(const Setpoints& group, Time now) {
 // Is it known whether the board executes groups? If not, it is asked.
 bool Session::knows_groups(Time now) {
   if (groups_.ask(selection_.answers(), now)) {
-    question_.asked(now);
     transmit_now(Command::identify(), to_ms(now), Priority::normal, now);
+    question_.asked(link_.last_pnum(), now);
   }
   return groups_.state() != GroupSupport::State::unknown;
 }

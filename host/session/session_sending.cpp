@@ -159,7 +159,7 @@ void Session::transmit(Pending& pending, Time now) {
     const bool echoes = pending.kind == CommandKind::leave;
     pending.size = writer.stamp(pending.pnum, echoes ? link_.echo() : to_ms(now)).size();
     pending.stage = Stage::sent;
-    if (pending.kind == CommandKind::identify) question_.asked(now);
+    if (pending.kind == CommandKind::identify) question_.asked(pending.pnum, now);
   } else {
     ++collector_.counts.retries;
   }

@@ -148,10 +148,23 @@ struct ReceivedState : State {
   Clock::time_point received = never;
   // Clock::time_point::min() while none has come since the board began.
   static constexpr Clock::time_point never = Clock::time_point::min();
+  // When the board sampled it: the instant at which its clock began to show t_ms, estimated on this
+  // computer's from when its datagrams came and questions were answered. The board reads its inputs in the
+  // first turn of its loop after that instant, within a millisecond.
+  Clock::time_point sampled = never;
+  // The instant is no farther from `sampled` than this; `unknown` where nothing has been answered yet, and
+  // for who watches on CAN, who asks nothing: then it was not later.
+  Clock::duration sampled_error = unknown;
+  static constexpr Clock::duration unknown = Clock::duration::max();
   bool any() const { return received != never; }
   // How long ago that was; Clock::duration::max() while none has come.
   Clock::duration age(Clock::time_point now = Clock::now()) const {
     return any() ? now - received : Clock::duration::max();
+  }
+  // The same instant by the calendar's clock as it is set now. Only if any().
+  std::chrono::system_clock::time_point sampled_at_wall_time() const {
+    return std::chrono::system_clock::now() +
+           std::chrono::round<std::chrono::system_clock::duration>(sampled - Clock::now());
   }
 };
 
@@ -177,6 +190,9 @@ struct Statistics {
   double round_trip_mean_us = 0;
   double jitter_us = 0;     // interarrival jitter of the states (RFC 3550 6.4.1)
   double state_age_us = 0;  // since the newest state arrived
+  // Parts in a million by which the board's clock is slower than this computer's; both 0 until known
+  double clock_drift_ppm = 0;
+  double clock_drift_error_ppm = 0;
   // Datagrams of ours
   std::uint64_t heartbeats = 0;
   std::uint64_t commands = 0;  // retries not counted

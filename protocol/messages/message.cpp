@@ -20,6 +20,7 @@ constexpr Text session_name("SESSION");
 constexpr Text lease_name("LEASE");
 constexpr Text board_name("NAME");
 constexpr Text busy_name("BUSY");
+constexpr Text asked_name("ASKED");
 constexpr Text at_name("AT");
 
 // True if there is such a field, of one number.
@@ -136,6 +137,7 @@ bool read_identity(const Datagram& datagram, Identity& out) {
   const Text busy = datagram.find(busy_name).values();
   out.busy = busy == Text("1");
   out.has_busy = out.busy || busy == Text("0");
+  out.has_asked = parse_number(datagram.find(asked_name).values(), out.asked);
   return true;
 }
 
@@ -160,6 +162,7 @@ void write_identity(DatagramWriter& writer, const Identity& identity) {
 void write_identity_fields(DatagramWriter& writer, const Identity& identity) {
   if (!identity.name.empty()) writer.field(board_name).value(identity.name);
   if (identity.has_busy) writer.field(busy_name).value(identity.busy ? Text("1") : Text("0"));
+  if (identity.has_asked) writer.field(asked_name).value(identity.asked);
 }
 
 }  // namespace r4

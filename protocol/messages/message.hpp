@@ -17,7 +17,7 @@ enum class MessageKind : std::uint8_t {
   host_heartbeat,   // H:ROS2-R4
   command,          // one of command.hpp's letters, or several
   nack,             // N:<PNum>,<code>
-  identity,         // I:R4,<firmware>,<board id>,<capabilities>;NAME:…;BUSY:…
+  identity,         // I:R4,<firmware>,<board id>,<capabilities>;NAME:…;BUSY:…;ASKED:…
   state,            // anything else
 };
 
@@ -69,6 +69,8 @@ struct Identity {
   Text name = Text();  // that its owner gave it (`C:name`); empty: none
   bool has_busy = false;
   bool busy = false;  // another host than the one that asked controls it
+  bool has_asked = false;
+  std::uint32_t asked = 0;  // the number of the question
 };
 // What the firmware can do besides, whatever the board: it obeys E:LEAVE, and serves who watches by W.
 constexpr Text leave_capability("leave");

@@ -316,6 +316,16 @@ TEST_F(ApplicationCommand, TellsWhoAsksWhetherAnotherHostIsInControl) {
   EXPECT_NE(identity(stranger).find(";BUSY:0;"), std::string::npos);
 }
 
+TEST_F(ApplicationCommand, TellsWhoAsksWhichQuestionItAnswers) {
+  board.take();
+  board.receive("Q:ID;PNum:4294967295;T:3;", host.at);
+  board.receive("Q:ID;", host.at);
+  const std::vector<Heard> heard = board.take(MessageKind::identity);
+  ASSERT_EQ(heard.size(), 2U);
+  EXPECT_NE(heard[0].bytes.find(";ASKED:4294967295;"), std::string::npos);
+  EXPECT_EQ(heard[1].bytes.find("ASKED"), std::string::npos) << "it has no number";
+}
+
 TEST_F(ApplicationCommand, ListensToNoOtherBoard) {
   for (const char* fields : {"H:R4-ROS2;PNum:1;T:1;", "N:5,SAFE;PNum:1;T:1;",
                              "I:R4,1,2,3;PNum:1;T:1;", "AIN24:24.28;PNum:1;T:1;", "PNum:1;T:1;"}) {

@@ -92,8 +92,21 @@ def test_a_state_is_all_that_the_board_says(board):
     assert repr(state).startswith('State(pnum=') and 'osmc1=Drive(pwm=0, direction=0)' in repr(state)
     assert 0 <= time.monotonic() - state.received < 5
     assert state.safe == 'none' and state.fault is None
+    assert time.monotonic() - 5 < state.sampled <= state.received
+    assert abs(state.sampled_utc.timestamp() - time.time()) < 5
     for name in r4link.FIELDS:
         getattr(state, name)
+
+
+def test_a_state_tells_when_it_was_sampled_and_how_well_that_is_known(board):
+    deadline = time.monotonic() + 10
+    while (state := board.next_state()).sampled_error is None or state.sampled_error > 0.002:
+        assert time.monotonic() < deadline, state.sampled_error
+    following = board.next_state()
+    apart = (following.t_ms - state.t_ms) / 1000
+    assert abs(following.sampled - state.sampled - apart) <= state.sampled_error + following.sampled_error
+    statistics = board.statistics
+    assert abs(statistics.clock_drift_ppm) <= 100 and 0 < statistics.clock_drift_error_ppm <= 100
 
 
 def test_iterates_over_states(board):

@@ -53,6 +53,8 @@ void add(Report& sum, const Report& report) {
   sum.leases += report.leases;
   sum.watched += report.watched;
   sum.forged_leases += report.forged_leases;
+  sum.sampled += report.sampled;
+  sum.sampled_wrongly += report.sampled_wrongly;
   sum.standstills += report.standstills;
   sum.waited += report.waited;
   sum.waited_to_feed += report.waited_to_feed;
@@ -97,14 +99,14 @@ Report run_all(std::uint64_t schedules, World::Loop loop) {
       "refused; {} farewells obeyed, {} confirmed; answers {} BUSY, {} STALE, {} DUPLICATE; "
       "{} forged or replayed datagrams, {} rejected, {} signed commands executed; {} leases, {} "
       "states "
-      "watched, {} leases forged; "
+      "watched, {} leases forged; {} samples timed, {} wrongly; "
       "{} standstills, {} datagrams waited, {} of them fed; longest silence to safe {:.1f} ms\n",
       schedules, failing.size(), sum.executed, sum.executed_groups, sum.groups_apart, sum.confirmed,
       sum.refused, sum.timed_out, sum.link_losses, sum.restores, sum.stops, sum.stops_confirmed,
       sum.clears, sum.clears_refused, sum.farewells, sum.farewells_confirmed, sum.busy, sum.stale,
       sum.duplicate, sum.attacks, sum.rejected, sum.executed_signed, sum.leases, sum.watched,
-      sum.forged_leases, sum.standstills, sum.waited, sum.waited_to_feed,
-      static_cast<double>(sum.worst_silence_us) / 1000);
+      sum.forged_leases, sum.sampled, sum.sampled_wrongly, sum.standstills, sum.waited,
+      sum.waited_to_feed, static_cast<double>(sum.worst_silence_us) / 1000);
   std::sort(failing.begin(), failing.end());
   for (std::size_t i = 0; i < failing.size() && i < 3; ++i) {
     const Report report = World(failing[i], true, loop).run();
@@ -131,6 +133,8 @@ Report run_all(std::uint64_t schedules, World::Loop loop) {
   EXPECT_GT(sum.leases, schedules / 10);
   EXPECT_GT(sum.watched, schedules);
   EXPECT_GT(sum.forged_leases, schedules);
+  EXPECT_GT(sum.sampled, schedules);
+  EXPECT_EQ(sum.sampled_wrongly, 0U);
   return sum;
 }
 

@@ -71,6 +71,8 @@ struct Report {
   std::uint32_t leases = 0;   // begun
   std::uint32_t watched = 0;  // states that came to watchers
   std::uint32_t forged_leases = 0;
+  std::uint32_t sampled = 0;  // states whose time on the host's clock was told with its error
+  std::uint32_t sampled_wrongly = 0;  // and was farther from the truth
   std::uint32_t standstills = 0;
   std::uint32_t waited = 0;            // datagrams that arrived meanwhile
   std::uint32_t waited_to_feed = 0;    // … and fed

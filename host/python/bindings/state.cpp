@@ -155,6 +155,29 @@ void bind_state(py::module_& module) {
             return py::float_(
                 std::chrono::duration<double>(self.received.time_since_epoch()).count());
           })
+      .def_property_readonly(
+          "sampled",
+          [](const ReceivedState& self) -> py::object {
+            if (!self.any()) return py::none();
+            return py::float_(
+                std::chrono::duration<double>(self.sampled.time_since_epoch()).count());
+          })
+      .def_property_readonly(
+          "sampled_error",
+          [](const ReceivedState& self) -> py::object {
+            if (self.sampled_error == ReceivedState::unknown) return py::none();
+            return py::float_(std::chrono::duration<double>(self.sampled_error).count());
+          })
+      .def_property_readonly(
+          "sampled_utc",
+          [](const ReceivedState& self) -> py::object {
+            if (!self.any()) return py::none();
+            const auto since_1970 = self.sampled_at_wall_time().time_since_epoch();
+            const py::module_ datetime = py::module_::import("datetime");
+            return datetime.attr("datetime")
+                .attr("fromtimestamp")(std::chrono::duration<double>(since_1970).count(),
+                                       datetime.attr("timezone").attr("utc"));
+          })
       .def("as_dict",
            [](const ReceivedState& self) {
              py::dict dict;

@@ -130,6 +130,8 @@ void bind_values(py::module_& module) {
       .has("round_trip_mean_us", &Statistics::round_trip_mean_us)
       .has("jitter_us", &Statistics::jitter_us)
       .has("state_age_us", &Statistics::state_age_us)
+      .has("clock_drift_ppm", &Statistics::clock_drift_ppm)
+      .has("clock_drift_error_ppm", &Statistics::clock_drift_error_ppm)
       .has("heartbeats", &Statistics::heartbeats)
       .has("commands", &Statistics::commands)
       .has("retries", &Statistics::retries)

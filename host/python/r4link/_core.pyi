@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """host/python/bindings: times in milliseconds. Programs use what r4link/__init__.py names."""
+from datetime import datetime
 from typing import Any, Callable, overload
 
 from .values import Bldc, Drive
@@ -78,6 +79,11 @@ class Statistics(_Record):
     @property
     def state_age_us(self) -> float: ...
     @property
+    def clock_drift_ppm(self) -> float:
+        """By how much the board's clock is slower than this computer's; this and its error are 0 until known."""
+    @property
+    def clock_drift_error_ppm(self) -> float: ...
+    @property
     def heartbeats(self) -> int: ...
     @property
     def commands(self) -> int: ...
@@ -147,6 +153,15 @@ class State:
     @property
     def received(self) -> float | None:
         """When it came, on the clock of time.monotonic(); None while none has come."""
+    @property
+    def sampled(self) -> float | None:
+        """When the board sampled it, as its clock and the round trips tell, on the clock of time.monotonic()."""
+    @property
+    def sampled_error(self) -> float | None:
+        """Seconds that `sampled` may be wrong by; None where that is not known: then it was not later."""
+    @property
+    def sampled_utc(self) -> datetime | None:
+        """`sampled` by the calendar's clock as it is set now."""
     @property
     def present(self) -> tuple[str, ...]: ...
     @property

@@ -76,8 +76,10 @@ void ScriptedLink::nack(std::uint32_t pnum, std::string_view code) {
   finish("N:" + std::to_string(pnum) + "," + std::string(code) + ";" + began);
 }
 
-void ScriptedLink::identity(std::string_view capabilities) {
-  finish("I:R4,0.1.0,board-7," + std::string(capabilities) + ";");
+void ScriptedLink::identity(std::string_view capabilities, bool names_question) {
+  const bool names = names_question && count('Q') != 0;
+  finish("I:R4,0.1.0,board-7," + std::string(capabilities) + ";" +
+         (names ? "ASKED:" + std::to_string(last('Q').pnum) + ";" : ""));
 }
 
 void ScriptedLink::connect() {

@@ -64,7 +64,8 @@ class ScriptedLink final : private Session::Handler {
   // To the host of the session that began with its heartbeat session_pnum, or with 0 to another.
   void nack(std::uint32_t pnum, std::string_view code);
   std::uint32_t session_pnum = 0;  // connect() begins one
-  void identity(std::string_view capabilities = "udp");
+  // As the answer to our newest question, or of a board that does not tell which it answers.
+  void identity(std::string_view capabilities = "udp", bool names_question = true);
   void raw(std::string_view bytes);
   // It begins again, with another clock and new numbers; nothing is sent.
   void reboot();

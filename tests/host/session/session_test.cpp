@@ -383,22 +383,59 @@ TEST(Session, AnswersToAnotherHostChangeNothing) {
   EXPECT_TRUE(link.session.link().busy);
 }
 
+// It answers each question after `delay`. How often it was asked in the last five seconds of twenty.
+std::size_t questions_of(ScriptedLink& link, Time delay, bool answers, bool names_question) {
+  if (!link.session.in_control(link.now)) link.connect();
+  std::size_t asked = 0, before = 0;
+  for (int ms = 0; ms < 20'000; ++ms) {
+    if (ms == 15'000) before = link.count('Q');
+    link.pass(1ms);
+    if (ms % 10 == 0) link.executed(1);
+    if (answers && link.count('Q') > asked && link.last('Q').at + delay <= link.now) {
+      asked = link.count('Q');
+      link.identity("udp", names_question);
+    }
+  }
+  return link.count('Q') - before;
+}
+
 TEST(Session, AsksTheBoardWhoItIsOnceASecondAndMeasuresTheRoundTrip) {
   ScriptedLink link{SessionOptions{}};
-  link.connect();
-  EXPECT_EQ(link.count('Q'), 0U);
-  for (int i = 0; i < 100; ++i) {
-    link.pass(50ms);
-    if (link.count('Q') != 0 && link.last('Q').at == link.now) {
-      ADD_FAILURE() << "the answer below must be later than the question";
-    }
-    link.executed(1);
-  }
-  EXPECT_NEAR(static_cast<double>(link.count('Q')), 5, 1);
-  link.pass(link.last('Q').at + 1s + 3ms - link.now);
-  link.identity();
+  EXPECT_NEAR(static_cast<double>(questions_of(link, 0ms, true, true)), 5, 1);
   EXPECT_EQ(link.board_id, "board-7");
-  EXPECT_DOUBLE_EQ(link.session.statistics(link.now).round_trip_us, 3000);
+  EXPECT_NEAR(link.session.statistics(link.now).round_trip_us, 1000, 1000);
+}
+
+TEST(Session, AsksMoreOftenWhereTheBoardsClockIsHardToTell) {
+  ScriptedLink slow{SessionOptions{}}, silent{SessionOptions{}}, old{SessionOptions{}};
+  EXPECT_NEAR(static_cast<double>(questions_of(slow, 8ms, true, true)), 49, 2);
+  EXPECT_NEAR(static_cast<double>(questions_of(silent, 0ms, false, false)), 5, 1);
+  EXPECT_NEAR(static_cast<double>(questions_of(old, 3ms, true, false)), 5, 1);
+  EXPECT_EQ(silent.session.state().sampled_error, ReceivedState::unknown);
+  EXPECT_EQ(old.session.state().sampled_error, ReceivedState::unknown)
+      << "it is not known which question it answered";
+  EXPECT_GT(old.session.statistics(old.now).round_trip_us, 2000);
+}
+
+TEST(Session, AStateTellsWhenItWasSampled) {
+  ScriptedLink link{SessionOptions{}};
+  link.connect();
+  EXPECT_LE(link.session.state().sampled, link.session.state().received);
+  EXPECT_EQ(link.session.state().sampled_error, ReceivedState::unknown);
+  questions_of(link, 1ms, true, true);
+  const ReceivedState& state = link.session.state();
+  EXPECT_LE(state.sampled_error, 1300us);
+  EXPECT_LE(std::chrono::abs(state.received - state.sampled), state.sampled_error);
+  EXPECT_LE(std::chrono::abs(state.sampled_at_wall_time() - std::chrono::system_clock::now() -
+                             (state.sampled - ReceivedState::Clock::now())),
+            1s);
+  const Statistics statistics = link.session.statistics(link.now);
+  EXPECT_NEAR(statistics.clock_drift_ppm, 0, statistics.clock_drift_error_ppm);
+  EXPECT_GT(statistics.clock_drift_error_ppm, 0);
+  link.reboot();
+  link.state("AIN24:24;SAFE:1;CMD:1;");
+  EXPECT_EQ(link.session.state().sampled_error, ReceivedState::unknown) << "it is another clock";
+  EXPECT_EQ(link.session.state().sampled, link.session.state().received);
 }
 
 }  // namespace

@@ -225,7 +225,7 @@ TEST(Message, IdentityRoundTrips) {
   }
 }
 
-TEST(Message, AnIdentityTellsTheNameAndWhetherAnotherHostIsInControl) {
+TEST(Message, AnIdentityTellsTheNameWhetherAnotherHostIsInControlAndWhatWasAsked) {
   char buffer[max_datagram];
   for (const bool busy : {false, true}) {
     DatagramWriter writer(buffer, sizeof buffer);
@@ -233,11 +233,13 @@ TEST(Message, AnIdentityTellsTheNameAndWhetherAnotherHostIsInControl) {
     told.name = "left";
     told.has_busy = true;
     told.busy = busy;
+    told.has_asked = true;
+    told.asked = 4294967295;
     write_identity(writer, told);
     write_identity_fields(writer, told);
     const Text bytes = writer.finish(1, 2);
     EXPECT_EQ(str(bytes), with_crc("I:R4,0.1.0,0042AF,udp;NAME:left;BUSY:" +
-                                   std::to_string(busy ? 1 : 0) + ";PNum:1;T:2;"));
+                                   std::to_string(busy ? 1 : 0) + ";ASKED:4294967295;PNum:1;T:2;"));
     Datagram datagram;
     ASSERT_TRUE(read_datagram(bytes, datagram));
     EXPECT_EQ(kind_of(datagram), MessageKind::identity);
@@ -246,20 +248,22 @@ TEST(Message, AnIdentityTellsTheNameAndWhetherAnotherHostIsInControl) {
     EXPECT_EQ(str(identity.name), "left");
     EXPECT_TRUE(identity.has_busy);
     EXPECT_EQ(identity.busy, busy);
+    EXPECT_TRUE(identity.has_asked);
+    EXPECT_EQ(identity.asked, 4294967295U);
   }
 }
 
-TEST(Message, AnIdentityWhoseNameOrBusyCannotBeReadIsOneWithoutThem) {
+TEST(Message, AnIdentityWhoseOtherFieldsCannotBeReadIsOneWithoutThem) {
   for (const std::string& fields :
        {std::string(), std::string("NAME:;BUSY:;"), std::string("NAME:a b;BUSY:2;"),
-        std::string("NAME:a,b;BUSY:1,0;"), std::string("NAME:off;BUSY:-1;"),
-        "NAME:" + std::string(32, 'n') + ";BUSY:01;"}) {
+        std::string("NAME:a,b;BUSY:1,0;ASKED:1,2;"), std::string("NAME:off;BUSY:-1;ASKED:-1;"),
+        "NAME:" + std::string(32, 'n') + ";BUSY:01;ASKED:4294967296;"}) {
     Identity identity;
     identity.name = "before";
-    identity.has_busy = identity.busy = true;
+    identity.has_busy = identity.busy = identity.has_asked = true;
     ASSERT_TRUE(read_identity(Read("I:R4,a,b,c;" + fields).datagram, identity)) << fields;
     EXPECT_EQ(str(identity.name), "") << fields;
-    EXPECT_FALSE(identity.has_busy || identity.busy) << fields;
+    EXPECT_FALSE(identity.has_busy || identity.busy || identity.has_asked) << fields;
   }
 }
 

@@ -27,7 +27,7 @@ class LiveView final : public MonitorView {
  public:
   explicit LiveView(const AsyncBoard& board) : board_(board) {}
 
-  void on_state(const Datagram& datagram) override {
+  void on_state(const ReceivedState&, const Datagram& datagram) override {
     for (const Field& field : datagram) {
       if (field.name() == Text("PNum") || field.name() == Text("T")) continue;
       if (field.name() == name_of(StateField::fault)) continue;  // the first lines tell

@@ -86,8 +86,8 @@ class Monitor {
   }
 
   void connect() {
-    board_.on_state([this](const State&, const Datagram& datagram) {
-      view_->on_state(datagram);
+    board_.on_state([this](const ReceivedState& state, const Datagram& datagram) {
+      view_->on_state(state, datagram);
       if (++states_ == options_.count) io_.stop();
     });
     board_.on_board_heartbeat([this](const Datagram& d) { view_->on_heartbeat(d); });

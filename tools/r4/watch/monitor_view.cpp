@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -29,7 +31,17 @@ class JsonView final : public MonitorView {
  public:
   explicit JsonView(const AsyncBoard& board) : board_(board) {}
 
-  void on_state(const Datagram& datagram) override { print("state", datagram); }
+  void on_state(const ReceivedState& state, const Datagram& datagram) override {
+    Json json = object_of("state", datagram);
+    const auto since_1970 = state.sampled_at_wall_time().time_since_epoch();
+    json["sampled"] = std::round(std::chrono::duration<double>(since_1970).count() * 1e6) / 1e6;
+    json["sampled_error_ms"] = nullptr;
+    if (state.sampled_error != ReceivedState::unknown) {
+      json["sampled_error_ms"] =
+          std::chrono::duration<double, std::milli>(state.sampled_error).count();
+    }
+    lines_.write(line_of(json));
+  }
   void on_heartbeat(const Datagram& datagram) override { print("heartbeat", datagram); }
   void on_nack(const Nack&, const Datagram& datagram) override { print("nack", datagram); }
   void on_bad_datagram(const ReadResult& result, std::string_view bytes) override {
@@ -70,11 +82,14 @@ class JsonView final : public MonitorView {
             {"t", nullptr},
             {"fields", std::move(fields)}};
   }
-  void print(const char* type, const Datagram& datagram) {
+  Json object_of(const char* type, const Datagram& datagram) const {
     Json json = object(type, fields_json(datagram));
     json["pnum"] = datagram.pnum();
     json["t"] = datagram.time_ms();
-    lines_.write(line_of(json));
+    return json;
+  }
+  void print(const char* type, const Datagram& datagram) {
+    lines_.write(line_of(object_of(type, datagram)));
   }
 
   const AsyncBoard& board_;
@@ -84,7 +99,7 @@ class JsonView final : public MonitorView {
 
 class PlainView final : public MonitorView {
  public:
-  void on_state(const Datagram& datagram) override {
+  void on_state(const ReceivedState&, const Datagram& datagram) override {
     std::string line = fmt::format("state {:>10} T {:>10} ", datagram.pnum(), datagram.time_ms());
     for (const Field& field : datagram) {
       if (field.name() == Text("PNum") || field.name() == Text("T")) continue;

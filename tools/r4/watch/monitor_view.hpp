@@ -17,7 +17,7 @@ class MonitorView {
   MonitorView(const MonitorView&) = delete;
   MonitorView& operator=(const MonitorView&) = delete;
 
-  virtual void on_state(const Datagram& datagram) = 0;
+  virtual void on_state(const ReceivedState& state, const Datagram& datagram) = 0;
   virtual void on_heartbeat(const Datagram& datagram) = 0;
   virtual void on_end() {}
   virtual void on_nack(const Nack& nack, const Datagram& datagram) = 0;

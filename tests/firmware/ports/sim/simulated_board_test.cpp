@@ -439,7 +439,7 @@ TEST_F(SimulatedBoardTest, AnswersWhoItIs) {
   build(std::move(options));
   command("Q:ID");
   EXPECT_EQ(listener_.heard.back().substr(0, 47),
-            "I:R4,9.9,bench-3,sim+leave+group+watch;BUSY:0;P");
+            "I:R4,9.9,bench-3,sim+leave+group+watch;BUSY:0;A");
 }
 
 TEST_F(SimulatedBoardTest, RefusesAFifthCarrier) {

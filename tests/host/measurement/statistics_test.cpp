@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "host/session/statistics.hpp"
+#include "host/measurement/statistics.hpp"
 
 #include <gtest/gtest.h>
 
-#include "scripted_link.hpp"
+#include "tests/host/session/scripted_link.hpp"
 
 namespace r4::test {
 namespace {

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "board_clock.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace r4 {
+
+namespace {
+
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+// Microseconds of the board's clock. An older T, too: datagrams overtake each other.
+double BoardClock::since_first(std::uint32_t t_ms) const {
+  const auto later = static_cast<std::int32_t>(t_ms - newest_t_ms_);
+  return static_cast<double>(newest_board_ms_ + later) * 1000;
+}
+
+void BoardClock::limit(Limits& limits, std::uint32_t t_ms, Time host, Time margin) {
+  if (!any_) {
+    any_ = true;
+    newest_t_ms_ = t_ms;
+    first_ = host;
+  }
+  const auto later = static_cast<std::int32_t>(t_ms - newest_t_ms_);
+  if (later > 0) {
+    newest_board_ms_ += later;
+    newest_t_ms_ = t_ms;
+  }
+  if (place(limits, t_ms, host, margin)) return;
+  // No clock that drifts by 100 ppm has shown all of that: one of the two has been set, or stood still
+  // while the computer slept. What is new is true.
+  restart();
+  limit(limits, t_ms, host, margin);
+}
+
+// False: it contradicts what is known.
+bool BoardClock::place(Limits& limits, std::uint32_t t_ms, Time host, Time margin) {
+  Limit fresh;
+  fresh.at = since_first(t_ms);
+  fresh.second = static_cast<std::int64_t>(std::floor(fresh.at / 1e6));
+  fresh.offset = static_cast<double>((host - first_ + margin).count()) - fresh.at;
+  if (is_old(fresh)) return false;  // no datagram is under way for so long
+  const bool is_upper = &limits == &upper_;
+  if (is_upper ? fresh.offset < lowest(fresh.at) : fresh.offset > highest(fresh.at)) return false;
+  const bool next_second = fresh.second > newest_second_;
+  newest_second_ = std::max(newest_second_, fresh.second);
+  const auto slot = static_cast<std::size_t>((fresh.second % seconds + seconds) % seconds);
+  Limit& kept = limits[slot];
+  const double later = fresh.at - kept.at;
+  const double moved = kept.offset + later * (is_upper == (later > 0) ? fastest_ : slowest_);
+  const bool tighter = is_upper ? fresh.offset < moved : fresh.offset > moved;
+  if (kept.second != fresh.second || tighter) kept = fresh;
+  if (next_second) narrow_drift();
+  return true;
+}
+
+// A line through the gap between an upper and a lower limit cannot be steeper than from the one to the other.
+void BoardClock::narrow_drift() {
+  slowest_ = -most_drift;
+  fastest_ = most_drift;
+  for (const Limit& upper : upper_) {
+    if (upper.second == none || is_old(upper)) continue;
+    for (const Limit& lower : lower_) {
+      if (lower.second == none || is_old(lower) || lower.at == upper.at) continue;
+      const double slope = (lower.offset - upper.offset) / (lower.at - upper.at);
+      if (lower.at > upper.at) {
+        slowest_ = std::max(slowest_, slope);
+      } else {
+        fastest_ = std::min(fastest_, slope);
+      }
+    }
+  }
+  if (slowest_ > fastest_) slowest_ = fastest_ = (slowest_ + fastest_) / 2;  // of rounding
+}
+
+double BoardClock::highest(double at) const {
+  double offset = infinite;
+  for (const Limit& each : upper_) {
+    if (each.second == none || is_old(each)) continue;
+    const double later = at - each.at;
+    offset = std::min(offset, each.offset + later * (later > 0 ? fastest_ : slowest_));
+  }
+  return offset;
+}
+
+double BoardClock::lowest(double at) const {
+  double offset = -infinite;
+  for (const Limit& each : lower_) {
+    if (each.second == none || is_old(each)) continue;
+    const double later = at - each.at;
+    offset = std::max(offset, each.offset + later * (later > 0 ? slowest_ : fastest_));
+  }
+  return offset;
+}
+
+BoardClock::Instant BoardClock::at(std::uint32_t t_ms) const {
+  const double board = since_first(t_ms);
+  const double high = highest(board);
+  const double low = lowest(board);
+  const bool bounded = std::isfinite(high) && std::isfinite(low);
+  const double offset = bounded ? (high + low) / 2 : std::isfinite(high) ? high : low;
+  Instant instant;
+  instant.at = first_ + Time{std::llround(board + offset)};
+  if (bounded) instant.error = Time{std::llround(std::ceil((high - low) / 2)) + 1};
+  return instant;
+}
+
+}  // namespace r4

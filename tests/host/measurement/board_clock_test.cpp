@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The board's clock as the host knows it, against one whose truth the test knows.
+#include "host/measurement/board_clock.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <random>
+#include <vector>
+
+namespace r4 {
+namespace {
+
+using namespace std::chrono_literals;
+
+// A board, a link with a random delay each way, and a host that asks; in virtual time.
+struct ClockBench {
+  struct Options {
+    double drift_ppm = 0;  // the board's clock is slower
+    double least_us = 100, most_us = 300;
+    double least_back_us = -1;  // of the board's datagrams, where it is another
+    unsigned seed = 1;
+  };
+
+  explicit ClockBench(const Options& of) : options(of), random(of.seed) {
+    offset_us = std::uniform_real_distribution<>(1e6, 9e6)(random);
+  }
+
+  double board_us(double host_us) const {
+    return (host_us - offset_us) * (1 - options.drift_ppm * 1e-6);
+  }
+  double host_us(double board_us) const {
+    return board_us / (1 - options.drift_ppm * 1e-6) + offset_us;
+  }
+  double delay(bool back) {
+    const bool other = back && options.least_back_us >= 0;
+    const double least = other ? options.least_back_us : options.least_us;
+    return std::uniform_real_distribution<>(least,
+                                            least + options.most_us - options.least_us)(random);
+  }
+  static std::uint32_t shown(double board_us) {
+    return first_t + static_cast<std::uint32_t>(static_cast<std::int64_t>(board_us / 1000));
+  }
+  static Time time(double us) { return Time{static_cast<std::int64_t>(us)}; }
+
+  // The state at that time of the board's has come. Its error, us, against the truth.
+  double state(int board_ms) {
+    const double sent = host_us(board_ms * 1000.0);
+    clock.heard(first_t + static_cast<std::uint32_t>(board_ms), time(sent + delay(true)));
+    const auto instant = clock.at(first_t + static_cast<std::uint32_t>(board_ms));
+    const double error = static_cast<double>(instant.at.count()) - sent;
+    ++states;
+    bounded += instant.error.has_value();
+    if (instant.error) bound_us = static_cast<double>(instant.error->count());
+    honest += instant.error && std::abs(error) <= bound_us + 1;
+    return error;
+  }
+  void question(double board_ms) {
+    const double sent = host_us(board_ms * 1000.0);
+    const double came = sent + delay(false);
+    const std::uint32_t t_ms = shown(board_us(came));
+    clock.heard(t_ms, time(came + delay(true)));
+    clock.answered(t_ms, time(sent));
+  }
+  // States a hundred times a second, and questions as a session asks. The greatest error of those after `from`.
+  double run(int from_ms, int to_ms, int settled_ms) {
+    double worst = 0;
+    for (int ms = from_ms; ms < to_ms; ms += 10) {
+      while (next_question < ms) {
+        question(next_question);
+        next_question += bound_us <= (asked < 100 ? 500 : 1000) ? 1000 : 102.3;
+        ++asked;
+      }
+      const double error = state(ms);
+      if (ms >= settled_ms) worst = std::max(worst, std::abs(error));
+    }
+    return worst;
+  }
+
+  static constexpr std::uint32_t first_t = 0xffffff00U;  // it wraps at once
+  Options options;
+  std::mt19937 random;
+  double offset_us;
+  BoardClock clock;
+  double next_question = 5;
+  int asked = 0;
+  int states = 0, bounded = 0, honest = 0;
+  double bound_us = 1e9;
+};
+
+TEST(BoardClock, WithoutAnAnswerItIsTheFastestDatagramThatTells) {
+  BoardClock clock;
+  clock.heard(1000, 5s + 7ms);
+  EXPECT_EQ(clock.at(1000).at, 5s + 7ms);
+  EXPECT_FALSE(clock.at(1000).error);
+  clock.heard(1010, 5s + 12ms);
+  EXPECT_NEAR(static_cast<double>(clock.at(1020).at.count()), 5'022'000, 2);
+  clock.heard(1020, 5s + 100ms);
+  EXPECT_NEAR(static_cast<double>(clock.at(1020).at.count()), 5'022'000, 3)
+      << "one that was held up";
+}
+
+TEST(BoardClock, ARoundTripBoundsItFromBothSides) {
+  BoardClock clock;
+  clock.heard(1000, 5s);
+  clock.answered(1000, 4999ms);
+  ASSERT_TRUE(clock.at(1000).error);
+  EXPECT_EQ(clock.at(1000).at, 4999ms) << "between 4998, asked less T's millisecond, and 5000";
+  EXPECT_NEAR(static_cast<double>(clock.at(1000).error->count()), 1000, 2);
+}
+
+TEST(BoardClock, OnAFastWireItIsWithinSevenTenthsOfAMillisecond) {
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    ClockBench bench({.drift_ppm = static_cast<double>(seed % 201) - 100, .seed = seed});
+    EXPECT_LE(bench.run(0, 20'000, 2'000), 700) << "seed " << seed;
+    EXPECT_EQ(bench.honest, bench.bounded) << "seed " << seed;
+    EXPECT_LE(bench.bound_us, 1000) << "seed " << seed;
+  }
+}
+
+TEST(BoardClock, WithADelayOfUpTo20MillisecondsItIsWithinTwoAfterTenSeconds) {
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    ClockBench bench({.drift_ppm = static_cast<double>(seed % 201) - 100,
+                      .least_us = 0,
+                      .most_us = 20'000,
+                      .seed = seed});
+    EXPECT_LE(bench.run(0, 60'000, 10'000), 2000) << "seed " << seed;
+    EXPECT_EQ(bench.honest, bench.bounded) << "seed " << seed;
+    EXPECT_GE(bench.bounded, bench.states - 20) << "seed " << seed;
+  }
+}
+
+TEST(BoardClock, ALinkThatIsSlowerOneWayIsToldByTheBound) {
+  ClockBench bench({.least_us = 100, .most_us = 300, .least_back_us = 30'000});
+  EXPECT_GE(bench.run(0, 20'000, 10'000), 10'000) << "nothing could know";
+  EXPECT_EQ(bench.honest, bench.bounded);
+}
+
+TEST(BoardClock, TheDriftIsFoundWithinItsError) {
+  ClockBench bench({.drift_ppm = 60});
+  bench.run(0, 40'000, 0);
+  EXPECT_NEAR(bench.clock.drift_ppm(), 60, bench.clock.drift_error_ppm());
+  EXPECT_LE(bench.clock.drift_error_ppm(), 40);
+}
+
+TEST(BoardClock, ThroughAnOutageTheBoundGrowsAndStaysTrue) {
+  ClockBench bench({.drift_ppm = -80});
+  bench.run(0, 10'000, 0);
+  const double before = bench.bound_us;
+  bench.next_question = 35'000;
+  bench.state(30'000);
+  EXPECT_GT(bench.bound_us, before);
+  EXPECT_LE(bench.bound_us, 4000);
+  bench.run(30'010, 40'000, 0);
+  EXPECT_EQ(bench.honest, bench.bounded);
+}
+
+TEST(BoardClock, AClockThatIsSetIsFollowedFromThen) {
+  for (const Time step : {Time{5s}, Time{-5s}}) {  // the host slept, or the board's clock was set
+    BoardClock clock;
+    clock.heard(1000, 100s);
+    clock.answered(1000, 100s - 1ms);
+    clock.heard(2000, 101s + step);
+    clock.answered(2000, 101s + step - 1ms);
+    clock.heard(2010, 101s + step + 10ms);
+    ASSERT_TRUE(clock.at(2000).error);
+    EXPECT_LE(*clock.at(2000).error, 1002us);
+    EXPECT_LE(std::abs((clock.at(2000).at - 101s - step).count()), 1000);
+  }
+}
+
+TEST(BoardClock, WhatComesLateAndOutOfOrderDoesNoHarm) {
+  ClockBench bench({.drift_ppm = 30});
+  bench.run(0, 5'000, 0);
+  const auto before = bench.clock.at(ClockBench::shown(5e6));
+  bench.clock.heard(ClockBench::shown(1e6), ClockBench::time(bench.host_us(5e6)));
+  bench.clock.answered(ClockBench::shown(4.9e6), ClockBench::time(bench.host_us(1e6)));
+  EXPECT_EQ(bench.clock.at(ClockBench::shown(5e6)).at, before.at);
+  bench.run(5'000, 10'000, 0);
+  EXPECT_EQ(bench.honest, bench.bounded);
+}
+
+TEST(BoardClock, EightBoardsHaveOneTimeAxis) {
+  std::vector<ClockBench> boards;
+  for (unsigned i = 0; i < 8; ++i) {
+    boards.emplace_back(ClockBench::Options{
+        .drift_ppm = -90 + 25.0 * i, .least_us = 200, .most_us = 1500, .seed = i + 1});
+  }
+  for (auto& board : boards) EXPECT_LE(board.run(0, 15'000, 10'000), 500);
+}
+
+}  // namespace
+}  // namespace r4
