@@ -35,6 +35,7 @@ void add_subcommands(CLI::App& root, Action& chosen) {
   add_record(root, chosen);
   add_info(root, chosen);
   add_convert(root, chosen);
+  add_plot(root, chosen);
   add_replay(root, chosen);
   add_sim(root, chosen);
   add_key_command(root, chosen);

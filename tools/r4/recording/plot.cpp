@@ -1,0 +1,366 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 plot: curves of a recording as a picture, which Python's matplotlib draws.
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cerrno>
+#include <charconv>
+#include <cstdint>
+#include <cstring>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "../formats/output_file.hpp"
+#include "../formats/state_units.hpp"
+#include "../shell/json.hpp"
+#include "../shell/options.hpp"
+#include "../shell/subcommands.hpp"
+#include "host/recording/recording_reader.hpp"
+#include "plot_script.hpp"
+#include "protocol/messages/message.hpp"
+#include "protocol/messages/state_fields.hpp"
+#include "r4link/error.hpp"
+#include "recording_summary.hpp"
+#include "transports/file_descriptor.hpp"
+
+namespace r4::tool {
+namespace {
+
+struct Options {
+  std::string file;
+  std::vector<std::string> fields;
+  std::string output;
+  bool force = false;
+};
+
+// A field as it was asked for: "AIN24", "left-arm:AIN24".
+struct Wanted {
+  std::string board;  // its name, URL or number of wire; empty: all
+  StateField field;
+};
+
+Wanted to_wanted(const std::string& text) {
+  const std::size_t colon = text.rfind(':');
+  std::string name = colon == std::string::npos ? text : text.substr(colon + 1);
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  const StateField field = state_field(Text(name));
+  if (field == StateField::count) {
+    throw Error(ErrorKind::usage, text, "is no field of a state",
+                "name one of docs/protocol.md, such as AIN24, OSMC1 or ENC1");
+  }
+  return {colon == std::string::npos ? std::string() : text.substr(0, colon), field};
+}
+
+std::string format_of(const std::string& path) {
+  for (const char* format : {"svg", "png", "pdf"}) {
+    if (path.ends_with(std::string(".") + format)) return format;
+  }
+  throw Error(ErrorKind::usage, "--output " + path, "has no ending that tells what to draw",
+              "let it end in .svg, .png or .pdf");
+}
+
+// What a curve is drawn of: seconds and values.
+struct Curve {
+  std::vector<double> times, values;
+};
+
+struct Span {
+  int reason;  // SafeReason; -1: the board said nothing
+  Time from, to;
+};
+
+struct PlottedWire {
+  RecordedWire wire;
+  std::map<StateField, Curve> curves;
+  std::vector<Span> spans;
+  SafeReason safe = SafeReason::none;
+  Time safe_since{0};
+  Time last{0};  // that it was heard
+  bool heard = false;
+};
+
+class Curves final : public RecordingReader::Handler {
+ public:
+  explicit Curves(const std::vector<Wanted>& wanted) : wanted_(wanted) {}
+
+  void on_wire(const RecordedWire& wire) override { wires_[wire.number].wire = wire; }
+  void on_damage(const RecordingDamage&) override { ++damage_; }
+  void on_record(const Record& record) override {
+    if (!any_) first_ = record.time;
+    any_ = true;
+    last_ = std::max(last_, record.time);
+    if (record.kind != RecordKind::from_board) return;
+    Datagram datagram;
+    if (!read_datagram(Text(record.bytes), datagram)) return;
+    PlottedWire& wire = wires_[record.wire];
+    wire.wire.number = record.wire;
+    if (wire.heard && record.time - wire.last > shortest_gap) {
+      end_safe(wire, wire.last);
+      wire.spans.push_back({-1, wire.last, record.time});
+      wire.safe_since = record.time;
+    }
+    wire.heard = true;
+    wire.last = record.time;
+    const MessageKind kind = kind_of(datagram);
+    if (kind != MessageKind::state && kind != MessageKind::board_heartbeat) return;
+    State state;
+    if (kind == MessageKind::state && !read_state(datagram, state)) return;
+    be_safe(wire, heartbeat_report(datagram).reason, record.time);
+    if (kind == MessageKind::state) take(wire, datagram, state, record.time);
+  }
+  // All is read.
+  void finish() {
+    for (auto& [number, wire] : wires_) end_safe(wire, wire.last);
+  }
+
+  bool damaged() const { return damage_ != 0; }
+  double seconds_of(Time time) const {
+    return std::chrono::duration<double>(time - first_).count();
+  }
+  Time first() const { return first_; }
+  Time last() const { return last_; }
+  const std::map<std::uint16_t, PlottedWire>& wires() const { return wires_; }
+
+  static std::string name_of(const PlottedWire& wire) {
+    if (!wire.wire.name.empty()) return wire.wire.name;
+    return wire.wire.url.empty() ? fmt::format("wire {}", wire.wire.number) : wire.wire.url;
+  }
+  static bool is_called(const PlottedWire& wire, const std::string& name) {
+    return name.empty() || name == wire.wire.name || name == wire.wire.url ||
+           name == std::to_string(wire.wire.number);
+  }
+
+ private:
+  static void end_safe(PlottedWire& wire, Time now) {
+    if (wire.safe == SafeReason::none || now <= wire.safe_since) return;
+    wire.spans.push_back({static_cast<int>(wire.safe), wire.safe_since, now});
+  }
+  static void be_safe(PlottedWire& wire, SafeReason reason, Time now) {
+    if (reason == wire.safe) return;
+    end_safe(wire, now);
+    wire.safe = reason;
+    wire.safe_since = now;
+  }
+  void take(PlottedWire& wire, const Datagram& datagram, const State& state, Time now) {
+    for (const Wanted& each : wanted_) {
+      if (!state.present.has(each.field) || !is_called(wire, each.board)) continue;
+      std::array<Text, 3> values;
+      const Text text = datagram.find(r4::name_of(each.field)).values();
+      const std::size_t count = datagram.find(r4::name_of(each.field)).split(values.data(), 3);
+      double value = 0;
+      const Text first = count > 1 ? values[0] : text;
+      std::from_chars(first.begin(), first.end(), value);
+      if (is_signed(each.field) && values[1] == Text("0")) value = -value;
+      Curve& curve = wire.curves[each.field];
+      const double at = seconds_of(now);
+      if (!curve.times.empty() && curve.times.back() == at) continue;  // it was asked for twice
+      curve.times.push_back(at);
+      curve.values.push_back(value);
+    }
+  }
+  // Has it a direction beside its first number?
+  static bool is_signed(StateField field) {
+    return units_of(field).count > 1 && units_of(field).values[1].starts_with("direction");
+  }
+
+  const std::vector<Wanted>& wanted_;
+  std::map<std::uint16_t, PlottedWire> wires_;
+  bool any_ = false;
+  Time first_{0}, last_{0};
+  std::uint64_t damage_ = 0;
+};
+
+// "V", "pwm [-4095-4095]".
+std::string unit_of(StateField field) {
+  const StateUnits units = units_of(field);
+  std::string unit(units.values[0]);
+  if (units.count > 1 && units.values[1].starts_with("direction")) {
+    const std::size_t bracket = unit.find('[');
+    return unit.substr(0, bracket) + "[±" + unit.substr(unit.rfind('-') + 1);
+  }
+  if (unit.size() > 2 && unit.front() == '[') unit = unit.substr(1, unit.size() - 2);
+  return unit;
+}
+
+// A file without a name, for what a program reads or writes.
+FileDescriptor make_memory(const char* name) {
+  FileDescriptor memory(::memfd_create(name, MFD_CLOEXEC));
+  if (!memory) {
+    throw Error(ErrorKind::open, "memory for the picture", std::strerror(errno),
+                "free some memory");
+  }
+  return memory;
+}
+
+void write_all(const FileDescriptor& memory, const void* bytes, std::size_t size) {
+  const char* next = static_cast<const char*>(bytes);
+  while (size != 0) {
+    const ssize_t n = ::write(memory.get(), next, size);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) {
+      throw Error(ErrorKind::open, "memory for the picture", std::strerror(errno),
+                  "free some memory, or plot fewer fields");
+    }
+    next += n;
+    size -= static_cast<std::size_t>(n);
+  }
+}
+
+// What Python is told (plot.py); the spans are those of the boards that have curves.
+FileDescriptor make_plan(const Curves& curves, const std::vector<Wanted>& wanted,
+                         const std::string& title, const std::string& format) {
+  Json plan{{"title", title},
+            {"format", format},
+            {"seconds", curves.seconds_of(curves.last())},
+            {"step", std::chrono::duration<double>(shortest_gap).count()},
+            {"curves", Json::array()},
+            {"spans", Json::array()}};
+  std::vector<const Curve*> drawn;
+  const auto plotted = static_cast<std::size_t>(
+      std::count_if(curves.wires().begin(), curves.wires().end(),
+                    [](const auto& each) { return !each.second.curves.empty(); }));
+  for (const auto& [number, wire] : curves.wires()) {
+    if (wire.curves.empty()) continue;
+    const std::string board = plotted > 1 ? Curves::name_of(wire) + " " : "";
+    for (const Wanted& each : wanted) {
+      const auto found = wire.curves.find(each.field);
+      if (found == wire.curves.end() || !Curves::is_called(wire, each.board)) continue;
+      const Curve& curve = found->second;
+      if (std::find(drawn.begin(), drawn.end(), &curve) != drawn.end()) continue;
+      const Text name = name_of(each.field);
+      plan["curves"].push_back({{"label", board + std::string(name.data(), name.size())},
+                                {"unit", unit_of(each.field)},
+                                {"count", curve.times.size()}});
+      drawn.push_back(&curve);
+    }
+    for (const Span& span : wire.spans) {
+      const char* const reason =
+          span.reason < 0 ? "no data" : to_text(static_cast<SafeReason>(span.reason));
+      plan["spans"].push_back({{"label", board + (span.reason < 0 ? "" : "safe: ") + reason},
+                               {"reason", span.reason},
+                               {"from", curves.seconds_of(span.from)},
+                               {"to", curves.seconds_of(span.to)}});
+    }
+  }
+  FileDescriptor input = make_memory("plan");
+  const std::string line = plan.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+  write_all(input, line.data(), line.size());
+  for (const Curve* curve : drawn) {
+    for (const std::vector<double>* numbers : {&curve->times, &curve->values}) {
+      write_all(input, numbers->data(), numbers->size() * sizeof(double));
+    }
+  }
+  return input;
+}
+
+// Runs plot.py; its exit code, or nothing if there is no such Python.
+std::optional<int> run_python(const char* python, const FileDescriptor& plan,
+                              const FileDescriptor& picture) {
+  ::lseek(plan.get(), 0, SEEK_SET);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, plan.get(), STDIN_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, picture.get(), STDOUT_FILENO);
+  const char* const arguments[] = {python, "-c", plot_script, nullptr};
+  pid_t pid = 0;
+  const int error =
+      ::posix_spawnp(&pid, python, &actions, nullptr, const_cast<char* const*>(arguments), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (error != 0) return {};
+  int status = 0;
+  while (::waitpid(pid, &status, 0) < 0 && errno == EINTR) {
+  }
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
+}
+
+// What plot.py draws. Who has a Python of their own, in which there is no matplotlib, may have the system's.
+FileDescriptor draw(const FileDescriptor& plan) {
+  constexpr int no_matplotlib = 3;  // of plot.py
+  FileDescriptor picture = make_memory("picture");
+  std::optional<int> code = run_python("python3", plan, picture);
+  if (!code || *code == no_matplotlib) code = run_python("/usr/bin/python3", plan, picture);
+  if (!code || *code == no_matplotlib) {
+    throw Error(ErrorKind::unsupported, "matplotlib", "is not there, which draws the picture",
+                "as root: apt-get install python3-matplotlib");
+  }
+  if (*code != 0) {
+    throw Error(ErrorKind::unsupported, "matplotlib", "could not draw the picture",
+                "see above what it said");
+  }
+  return picture;
+}
+
+int plot(const Options& options) {
+  const std::string format = format_of(options.output);
+  std::vector<Wanted> wanted;
+  for (const std::string& text : options.fields) wanted.push_back(to_wanted(text));
+  OutputFile output(options.output, options.force);
+  Curves curves(wanted);
+  read_recording(options.file, curves);
+  curves.finish();
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    const bool found = std::any_of(curves.wires().begin(), curves.wires().end(), [&](auto& each) {
+      return Curves::is_called(each.second, wanted[i].board) &&
+             each.second.curves.contains(wanted[i].field);
+    });
+    if (found) continue;
+    throw Error(ErrorKind::data, options.fields[i], "is in no state of " + options.file,
+                "see `r4 info` for its boards; a program chooses the fields of its states (F)");
+  }
+  const FileDescriptor plan = make_plan(
+      curves, wanted, options.file + ", from " + record_time_text(curves.first()), format);
+  const FileDescriptor picture = draw(plan);
+  ::lseek(picture.get(), 0, SEEK_SET);
+  std::array<char, 65536> piece;
+  ssize_t n = 0;
+  while ((n = ::read(picture.get(), piece.data(), piece.size())) > 0) {
+    output.write({piece.data(), static_cast<std::size_t>(n)});
+  }
+  output.finish();
+  if (curves.damaged()) {
+    fmt::print(stderr, "r4: {}: some of it could not be read; see r4 info\n", options.file);
+  }
+  return curves.damaged() ? static_cast<int>(ErrorKind::data) : 0;
+}
+
+constexpr const char* footer =
+    R"(A field of docs/protocol.md, in small letters if you like; of one board only, where the recording has
+several: left-arm:AIN24, by its name, its URL or the number of its wire. A drive is drawn with its
+direction, backwards below zero. What has the same unit shares an axis. Safe states are shaded by their
+reason, and so is where a board said nothing for more than a second. It takes python3-matplotlib.
+
+Examples:
+  r4 plot drive.r4log AIN24 OSMC1 -o drive.svg
+  r4 plot robot.r4log.zst left-arm:ENC1HZ right-arm:ENC1HZ -o arms.png
+
+Exit codes: 0 drawn; 1 drawn, but some could not be read, or it is no recording, or has no such field;
+2 usage; 4, 5 a file cannot be read or written; 6 there is no matplotlib.)";
+
+}  // namespace
+
+void add_plot(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* const command =
+      add_subcommand(root, chosen, "plot", "Draw what a recording has", footer, options, plot);
+  add_text(*command, "FILE", options->file, "a recording; - is the standard input", file_type,
+           Need::required);
+  add_texts(*command, "FIELD", options->fields, "what is drawn, such as AIN24", "FIELD",
+            Need::required);
+  add_text(*command, "-o,--output", options->output, "the picture: .svg, .png or .pdf", file_type,
+           Need::required);
+  add_flag(*command, "--force", options->force, "replace a file that is there");
+}
+
+}  // namespace r4::tool
