@@ -16,6 +16,7 @@
 #include <string>
 #include <string_view>
 
+#include "carrier.hpp"
 #include "config.hpp"
 #include "simulated_pins.hpp"
 #include "state.hpp"
@@ -54,5 +55,13 @@ class R4LINK_API SimulatedRobot {
   std::shared_ptr<World> world_;
   std::string url_;
 };
+
+// A board behind a bad link, whatever transport it is on:
+//
+//     r4::Board board(r4::sim::with_link(robot.url(), "loss=5%,delay=20ms±10,seed=7"));
+//
+// docs/simulation.md has the words; the same seed does the same to the same datagrams at the same times. Throws
+// Error{usage} for others. A board that only watches needs a URL of its own for that: `?listen=0` on UDP.
+R4LINK_API CarrierMaker with_link(std::string_view url, std::string_view link);
 
 }  // namespace r4::sim

@@ -9,6 +9,7 @@
 #include "r4link/board.hpp"
 #include "r4link/error.hpp"
 #include "r4link/simulation.hpp"
+#include "tests/support/at_will.hpp"
 
 namespace r4 {
 namespace {
@@ -128,6 +129,31 @@ TEST(SimulatedRobot, SaysWhatIsWrong) {
   }
   EXPECT_NE(error_of([&] { const Board none(gone); }).find("no such SimulatedRobot"),
             std::string::npos);
+}
+
+TEST(BadLink, StandsBeforeAnyBoard) {
+  sim::SimulatedRobot robot;
+  Board board(sim::with_link(robot.url(), "loss=20%,duplicate=20%,corrupt=10%,seed=3"),
+              test::at_will());
+  board.wait_active(std::chrono::seconds{10});
+  for (int i = 0; i < 50; ++i) board.next_state();
+  const Statistics statistics = board.statistics();
+  EXPECT_GT(statistics.packets.lost, 3U);
+  EXPECT_GT(statistics.packets.duplicate, 3U);
+  EXPECT_GT(statistics.damaged, 1U);
+  board.osmc(1).set(358, Direction::forward, std::chrono::seconds{10});  // it is repeated until it is confirmed
+  EXPECT_EQ(robot.look().pins.osmc[0].pwm, 358);
+}
+
+TEST(BadLink, WordsThatSayNothingAreRefused) {
+  for (const char* link : {"", "loss", "loss=120%", "speed=3"}) {
+    try {
+      sim::with_link("sim:", link);
+      ADD_FAILURE() << link;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::usage) << link;
+    }
+  }
 }
 
 }  // namespace
