@@ -46,16 +46,29 @@ bool BoardClock::place(Limits& limits, std::uint32_t t_ms, Time host, Time margi
   if (is_old(fresh)) return false;  // no datagram is under way for so long
   const bool is_upper = &limits == &upper_;
   if (is_upper ? fresh.offset < lowest(fresh.at) : fresh.offset > highest(fresh.at)) return false;
-  const bool next_second = fresh.second > newest_second_;
-  newest_second_ = std::max(newest_second_, fresh.second);
+  if (fresh.second > newest_second_) next_second(fresh.second);
   const auto slot = static_cast<std::size_t>((fresh.second % seconds + seconds) % seconds);
   Limit& kept = limits[slot];
   const double later = fresh.at - kept.at;
   const double moved = kept.offset + later * (is_upper == (later > 0) ? fastest_ : slowest_);
   const bool tighter = is_upper ? fresh.offset < moved : fresh.offset > moved;
   if (kept.second != fresh.second || tighter) kept = fresh;
-  if (next_second) narrow_drift();
+  if (is_upper && fresh.at >= high_.at && fresh.offset < highest(fresh.at)) {
+    high_ = {fresh.at, fresh.offset};
+  }
+  if (!is_upper && fresh.at >= low_.at && fresh.offset > lowest(fresh.at)) {
+    low_ = {fresh.at, fresh.offset};
+  }
   return true;
+}
+
+// What has been learned in the last one tells more of the drift, and the oldest is forgotten.
+void BoardClock::next_second(std::int64_t second) {
+  newest_second_ = second;
+  narrow_drift();
+  const double at = static_cast<double>(second) * 1e6;
+  high_ = {at, highest_of_all(at)};
+  low_ = {at, lowest_of_all(at)};
 }
 
 // A line through the gap between an upper and a lower limit cannot be steeper than from the one to the other.
@@ -78,6 +91,14 @@ void BoardClock::narrow_drift() {
 }
 
 double BoardClock::highest(double at) const {
+  return at < high_.at ? highest_of_all(at) : high_.offset + (at - high_.at) * fastest_;
+}
+
+double BoardClock::lowest(double at) const {
+  return at < low_.at ? lowest_of_all(at) : low_.offset + (at - low_.at) * slowest_;
+}
+
+double BoardClock::highest_of_all(double at) const {
   double offset = infinite;
   for (const Limit& each : upper_) {
     if (each.second == none || is_old(each)) continue;
@@ -87,7 +108,7 @@ double BoardClock::highest(double at) const {
   return offset;
 }
 
-double BoardClock::lowest(double at) const {
+double BoardClock::lowest_of_all(double at) const {
   double offset = -infinite;
   for (const Limit& each : lower_) {
     if (each.second == none || is_old(each)) continue;

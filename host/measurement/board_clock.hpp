@@ -18,6 +18,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <limits>
 #include <optional>
 
 #include "r4link/link.hpp"
@@ -59,14 +60,23 @@ class BoardClock {
   static constexpr int seconds = 64;
   using Limits = std::array<Limit, seconds>;
 
+  // The tightest limit as it is now: at later times it is that much looser.
+  struct Front {
+    double at = 0;
+    double offset = 0;
+  };
+
   void limit(Limits& limits, std::uint32_t t_ms, Time host, Time margin);
   bool place(Limits& limits, std::uint32_t t_ms, Time host, Time margin);
+  void next_second(std::int64_t second);
   void narrow_drift();
   double since_first(std::uint32_t t_ms) const;
   bool is_old(const Limit& limit) const { return limit.second + seconds <= newest_second_; }
   // The limits of the offset at that time of the board.
   double highest(double at) const;
   double lowest(double at) const;
+  double highest_of_all(double at) const;
+  double lowest_of_all(double at) const;
 
   bool any_ = false;
   std::uint32_t newest_t_ms_ = 0;
@@ -74,6 +84,8 @@ class BoardClock {
   std::int64_t newest_second_ = 0;
   Time first_{0};
   Limits upper_, lower_;
+  Front high_{0, std::numeric_limits<double>::infinity()};
+  Front low_{0, -std::numeric_limits<double>::infinity()};
   // What the offset may change by in one unit of time.
   double slowest_ = -most_drift;
   double fastest_ = most_drift;
