@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What comes in, and what it proves.
+#include "../../protocol/link/board_link.hpp"
+#include "../../protocol/messages/state_fields.hpp"
+#include "../../transports/framing/can/can_ids.hpp"
+#include "../commands/command_evidence.hpp"
+#include "session.hpp"
+
+namespace r4 {
+
+void Session::receive(std::string_view bytes, Time now) {
+  Datagram datagram;
+  const ReadResult result = read_datagram(bytes, datagram);
+  if (!result) {
+    ++collector_.counts.damaged;
+    handler_.on_bad_datagram(result, bytes);
+    return;
+  }
+  const MessageKind kind = kind_of(datagram);
+  const bool from_board = kind == MessageKind::board_heartbeat || kind == MessageKind::nack ||
+                          kind == MessageKind::identity || kind == MessageKind::state;
+  if (!from_board || !datagram.has_pnum() || !datagram.has_time()) return;
+  ++collector_.counts.received;
+
+  switch (kind) {
+    case MessageKind::nack:
+      on_nack_datagram(datagram, now);
+      break;
+    case MessageKind::identity:
+      on_identity_datagram(datagram, now);
+      break;
+    case MessageKind::board_heartbeat:
+      on_heartbeat_datagram(datagram, now);
+      break;
+    default:
+      on_state_datagram(datagram, now);
+      break;
+  }
+  refresh_status(now);
+}
+
+void Session::on_heartbeat_datagram(const Datagram& datagram, Time now) {
+  const bool connecting = is_connecting_heartbeat(datagram);
+  // Said to hosts, on a wire that others listen to; who watches is told by the states that there is none.
+  const SafeReport report = heartbeat_report(datagram);
+  if (connecting && watches() && lease_.streaming(now)) return confirm_stop(report, now);
+  const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
+  const bool current = is_current(
+      link_.on_datagram(datagram.pnum(), connecting ? 0 : t_ms, true, report.reason, to_ms(now)));
+  notice_restart();
+  if (current) {
+    if (!connecting) clock_.heard(t_ms, now);
+    state_.safe = report.reason;
+    if (report.reason == SafeReason::none) state_.fault = ChipFault();
+    key_.on_heartbeat(datagram);
+    key_.on_board_time(t_ms, now);
+    if (key_.asked_for()) selection_.on_answer();
+    key_.on_reason(connecting ? SafeReason::link : report.reason, now);
+  }
+  handler_.on_board_heartbeat(datagram);
+  if (!current) return;
+  refresh_status(now);
+  confirm_stop(report, now);
+  confirm_leave(report, now);
+  on_causes(report.cause, now);
+}
+
+void Session::on_state_datagram(const Datagram& datagram, Time now) {
+  ReceivedState fresh = state_;
+  if (!read_state(datagram, fresh)) {
+    ++collector_.counts.damaged;
+    ReadResult result;
+    result.error = ReadError::syntax;
+    handler_.on_bad_datagram(result,
+                             std::string_view(datagram.bytes().data(), datagram.bytes().size()));
+    return;
+  }
+  const SafeReason reason = fresh.present.has(StateField::safe) ? fresh.safe : SafeReason::none;
+  const Arrival arrival = link_.on_datagram(fresh.pnum, fresh.t_ms, false, reason, to_ms(now));
+  if (notice_restart()) {  // nothing of the boot before
+    fresh = state_;
+    read_state(datagram, fresh);
+  }
+  // An older state must not replace a newer one. A late one that only a heartbeat or an answer has
+  // overtaken, in a queue where those go first, is still the newest state.
+  const bool newest_state = arrival == Arrival::late && newer(fresh.pnum, state_.pnum);
+  if (!is_current(arrival) && !newest_state) return;
+  lease_.on_state(now);
+  collector_.on_state(fresh.t_ms, now);
+  if (!newest_state) {
+    key_.on_board_time(fresh.t_ms, now);
+    key_.on_host_seen(now);
+  }
+  state_ = fresh;
+  clock_.heard(state_.t_ms, now);
+  const BoardClock::Instant sampled = clock_.at(state_.t_ms);
+  state_.sampled = ReceivedState::Clock::time_point(sampled.at);
+  state_.sampled_error = sampled.error ? *sampled.error : ReceivedState::unknown;
+  state_.received = ReceivedState::Clock::time_point(now);
+  state_.safe = reason;
+  // It is in every state while there is one.
+  if (!state_.present.has(StateField::fault)) state_.fault = ChipFault();
+  refresh_status(now);
+  confirm_from_state(now);
+  look_at_supply();
+  select_fields(now);
+  handler_.on_state(state_, datagram);
+}
+
+void Session::on_nack_datagram(const Datagram& datagram, Time now) {
+  Nack nack;
+  if (!read_nack(datagram, nack)) return;
+  if (!is_ours(nack.pnum)) {
+    // On a CAN bus, on a wire that is shared and in a recording the answers to other hosts are heard, too. One to
+    // the host in control has a number among those of the states; one to who has no lease yet has not.
+    if (watches() && nack.has_session) on_answer(datagram, now);
+    return;
+  }
+  if (watches()) return on_lease_refused(nack, datagram, now);
+  selection_.on_answer();
+  if (nack.code == Refusal::busy) {
+    role_.on_busy(now);
+    key_.on_host_seen(now);
+  }
+  on_answer(datagram, now);
+  const bool not_taken = nack.code == Refusal::auth && !is_cable_only(nack.pnum);
+  if (not_taken) key_.on_refusal(now);
+  const bool other_copy = not_taken && key_.has_key();  // may have been executed
+  const bool proof = !other_copy && is_proof(nack);
+  handler_.on_nack(nack, datagram);
+  for (Pending& pending : pending_.under_way()) {
+    if (!pending.is_out() || pending.pnum != nack.pnum) continue;
+    if (pending.kind == CommandKind::leave) {  // it was executed, or we have no session to leave
+      const bool left = nack.code == Refusal::duplicate;
+      finish(pending, left ? Outcome::confirmed : Outcome::refused, nack.code, now);
+      continue;
+    }
+    if (nack.code == Refusal::duplicate) {
+      pending.stage = Stage::executed;
+      confirm_from_state(now);
+      continue;
+    }
+    if (!proof) continue;
+    if (nack.at <= pending.group.size()) pending.failed = nack.at;
+    finish(pending, Outcome::refused, nack.code, now);
+  }
+  if (proof) on_post_refused(nack);
+}
+
+// Of all that a session sends which only watches, the board refuses leases alone. What those codes say the
+// link tells.
+void Session::on_lease_refused(const Nack& nack, const Datagram& datagram, Time now) {
+  on_answer(datagram, now);
+  lease_.on_refusal(nack, now);
+  const bool told =
+      nack.code == Refusal::stale || nack.code == Refusal::busy || nack.code == Refusal::unknown;
+  if (!told) handler_.on_nack(nack, datagram);
+}
+
+// Does the refusal prove that the command was not executed? Only while the board remembers what it
+// executed: in the session in which the command was sent, and not after too many numbers. Without
+// proof the deadline ends it, as unknown.
+bool Session::is_proof(const Nack& nack) const {
+  return nack.has_session && is_ours(nack.session) && newer(nack.pnum, nack.session) &&
+         link_.last_pnum() - nack.pnum < BoardLink::memory;
+}
+
+void Session::on_identity_datagram(const Datagram& datagram, Time now) {
+  Identity identity;
+  if (!read_identity(datagram, identity)) return;
+  selection_.on_answer();
+  on_answer(datagram, now);
+  knows_leave_ = has_capability(identity.capabilities, leave_capability);
+  groups_.on_identity(identity.capabilities);
+  if (const auto asked = question_.answered(identity)) {
+    collector_.on_round_trip(now - *asked);
+    const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
+    clock_.heard(t_ms, now);
+    if (identity.has_asked) clock_.answered(t_ms, *asked);
+  }
+  handler_.on_identity(identity);
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.is_out() && pending.kind == CommandKind::identify) {
+      finish(pending, Outcome::confirmed, Refusal::none, now);
+    }
+  }
+}
+
+// Is that one of our settings that the board takes over a cable only?
+bool Session::is_cable_only(std::uint32_t pnum) {
+  for (const Pending& pending : pending_.under_way()) {
+    if (pending.is_out() && pending.pnum == pnum) return pending.cable_only;
+  }
+  return false;
+}
+
+// Have we sent a datagram with that number?
+bool Session::is_ours(std::uint32_t pnum) const {
+  return pnum - first_pnum_ <= link_.last_pnum() - first_pnum_;
+}
+
+// An answer counts in the board's packet numbers, but not in those that a host without control
+// sees.
+void Session::on_answer(const Datagram& datagram, Time now) {
+  if (role_.refused(now)) return;
+  link_.on_answer(datagram.pnum(), static_cast<std::uint32_t>(datagram.time_ms()), to_ms(now));
+  notice_restart();
+}
+
+// A board that begins again knows nothing of what it had before. True if it has just been found to.
+bool Session::notice_restart() {
+  if (restarts_ == link_.restarts()) return false;
+  restarts_ = link_.restarts();
+  knows_leave_ = false;
+  state_ = ReceivedState();
+  clock_.restart();
+  questions_of_clock_ = 0;
+  groups_.on_restart();
+  disarm(DisarmCause::restart);
+  handler_.on_restart();
+  return true;
+}
+
+// --- what the board's state proves
+
+void Session::confirm_from_state(Time now) {
+  const bool has_cmd = state_.present.has(StateField::cmd);
+  if (has_cmd) {
+    selection_.on_cmd(now);
+    if (link_up() && is_ours(state_.last_command)) role_.on_own_command(now);
+  }
+  for (Pending& pending : pending_.under_way()) {
+    if (!pending.is_out() || pending.kind == CommandKind::stop ||
+        pending.kind == CommandKind::identify || pending.kind == CommandKind::leave) {
+      continue;
+    }
+    if (has_cmd) {
+      const bool exact = state_.last_command == pending.pnum;
+      const bool past = newer(state_.last_command, pending.pnum);
+      if (exact || (past && pending.stage == Stage::executed)) {
+        finish(pending, Outcome::confirmed, Refusal::none, now);
+      } else if (past && pending.stage == Stage::sent) {
+        pending.stage = Stage::overtaken;
+        pending.retry = now;  // ask at once what became of it
+      }
+    } else if (!selection_.answers() && selection_.stage() != FieldSelection::Stage::asking &&
+               state_shows(state_, pending.command)) {
+      finish(pending, Outcome::confirmed, Refusal::none, now);
+    }
+  }
+}
+
+// The board names the stop that it has obeyed. On a CAN bus it was told the end of the number only.
+void Session::confirm_stop(const SafeReport& report, Time now) {
+  if (report.reason != SafeReason::stop || !report.has_stop) return;
+  for (Pending& pending : pending_.under_way()) {
+    if (!pending.is_out() || pending.kind != CommandKind::stop) continue;
+    if (report.stop != pending.pnum && report.stop != short_stop_number(pending.pnum)) continue;
+    repetition_.begin({pending.bytes.data(), pending.size}, pending.retry,
+                      now + options_.stop_linger);
+    finish(pending, Outcome::confirmed, Refusal::none, now);
+  }
+}
+
+// A board whose host has left is safe for that reason, unless there is a graver one: then its answer to
+// a repetition tells.
+void Session::confirm_leave(const SafeReport& report, Time now) {
+  if (report.reason != SafeReason::link) return;
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.kind == CommandKind::leave) finish(pending, Outcome::confirmed, Refusal::none, now);
+  }
+}
+
+// The number of the newest cause that only E:CLEAR ends. A newer one than that which an E:CLEAR or an
+// arm() was to clear has come after it was asked for, so that it is given up.
+void Session::on_causes(std::int32_t newest, Time now) {
+  cause_ = newest;
+  for (Pending& pending : pending_.under_way()) {
+    const bool arms = pending.role == Pending::Role::arm;
+    if ((pending.kind != CommandKind::clear && !arms) || !name_cause(pending)) continue;
+    if (newest == 0 || newest == pending.cause) continue;
+    if (arms) {
+      end_arming(Outcome::not_armed, Refusal::none, now);
+    } else {
+      finish(pending, Outcome::cancelled, Refusal::none, now);
+    }
+  }
+}
+
+}  // namespace r4
