@@ -42,8 +42,10 @@ const Registry::Entry& Registry::entry_of(const Url& url) const {
 
 std::unique_ptr<Carrier> Registry::make(asio::io_context& io, std::string_view url,
                                         Role role) const {
-  const Url parsed = Url::parse(url);
-  return entry_of(parsed).make(io, parsed, role);
+  Url parsed = Url::parse(url);
+  const Entry& entry = entry_of(parsed);
+  if (role == Role::host && entry.wire) parsed.take("share");
+  return entry.make(io, parsed, role);
 }
 
 std::unique_ptr<Carrier> Registry::make_shared(asio::io_context& io, std::string_view url,

@@ -38,7 +38,7 @@ class Registry {
   const std::vector<Entry>& entries() const { return entries_; }
 
   // The carrier for a URL, not yet opened. Throws Error{usage} for an unknown scheme, naming those
-  // that exist, and for a URL that its scheme does not take.
+  // that exist, and for a URL that its scheme does not take. A host's is of its own: `share` is passed over.
   std::unique_ptr<Carrier> make(asio::io_context& io, std::string_view url, Role role) const;
   // The same for a host's program, which shares the wire with others of this machine.
   std::unique_ptr<Carrier> make_shared(asio::io_context& io, std::string_view url,

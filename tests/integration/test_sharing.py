@@ -1,17 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Programs that share a wire: what one user runs in several terminals, on the same URL."""
+import os
 import re
+import shutil
 import signal
 import socket
+import subprocess
+import tempfile
 
 import pytest
 
-from r4_process import Board, driving, is_state, run, watch
+from r4_process import ERROR, PATIENCE_S, R4, Board, driving, is_state, run, watch
+
+
+@pytest.fixture(name='folder')
+def where_anybody_may_look():
+    with tempfile.TemporaryDirectory() as folder:
+        os.chmod(folder, 0o755)
+        yield folder
 
 
 @pytest.fixture(name='board', params=['pty', 'udp'])
-def on_a_wire(request, tmp_path):
-    url = f'pty:{tmp_path}/r4' if request.param == 'pty' else 'udp://127.0.0.1:0'
+def on_a_wire(request, folder):
+    url = f'pty:{folder}/tty' if request.param == 'pty' else 'udp://127.0.0.1:0'
     with Board(url) as board:
         if request.param == 'udp':
             # One port for all, as the port of hosts is.
@@ -104,3 +115,31 @@ def test_a_driving_program_that_is_stopped_is_named(board):
             assert f'(pid {host.process.pid}) does not answer' in refused.stderr, refused
         finally:
             host.signal(signal.SIGCONT)
+
+
+@pytest.fixture(name='nobody')
+def as_another_user(folder):
+    """Runs r4 as the user nobody, of the group nogroup alone."""
+    if os.geteuid() != 0:
+        pytest.skip('only root may run programs as another user')
+    r4 = shutil.copy(R4, folder)
+
+    def run_as_nobody(*arguments):
+        return subprocess.run([r4, *arguments], user='nobody', group='nogroup', extra_groups=[], cwd=folder,
+                              capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    return run_as_nobody
+
+
+def test_another_user_shares_a_wire_where_both_say_so(board, nobody):
+    shared = board.host_url + ('&' if '?' in board.host_url else '?') + 'share=nogroup'
+    with driving(shared, 'O:358,1,1') as host:
+        watched = nobody('monitor', shared, '--json', '--count', '3')
+        assert watched.returncode == 0 and '"OSMC1":[358,1]' in watched.stdout, watched
+        refused = nobody('send', shared, 'O:1,1,1')
+        assert refused.returncode == 3 and f'controlled by r4 (pid {host.process.pid})' in refused.stderr, refused
+        outside = nobody('monitor', board.host_url, '--json', '--count', '3')
+        if board.host_url.startswith('serial:'):
+            assert outside.returncode in (4, 5) and ERROR.search(outside.stderr), outside
+        stopped = nobody('stop', shared)
+        assert stopped.returncode == 0, stopped
+        board.state('SAFE', 'stop')

@@ -49,6 +49,17 @@ TEST(Registry, TakesFurtherTransports) {
   EXPECT_EQ(registry.make(io, "memory:", Role::host)->name(), "memory:");
 }
 
+TEST(Registry, ACarrierOfOnesOwnIsSharedWithNobodyWhateverTheUrlSays) {
+  asio::io_context io;
+  const Registry registry = Registry::standard();
+  for (const char* url :
+       {"udp://127.0.0.1?listen=0&share=nobodys", "can://can0?node=2&share=lab"}) {
+    EXPECT_NE(registry.make(io, url, Role::host), nullptr) << url;
+  }
+  EXPECT_TRUE(error_of([&] { registry.make(io, "udp://:2018?share=lab", Role::board); }))
+      << "a board shares nothing";
+}
+
 TEST(Registry, SharesAWireWithAGroupThatIsThere) {
   asio::io_context io;
   const Registry registry = Registry::standard();
