@@ -234,12 +234,10 @@ class Session {
   std::uint32_t first_pnum_;
   HostLink link_;
   HostKey key_;
-  bool transport_down_ = false;
   HostRoleMachine role_;
   FieldSelection selection_;
   IdentityQuestion question_;
   BoardClock clock_;
-  int questions_of_clock_ = 0;  // asked for its sake since the board began
   Lease lease_;
   StopRepetition repetition_;
   LinkStatus status_;
@@ -247,16 +245,18 @@ class Session {
   std::uint32_t restarts_ = 0;  // of the board, those that were told
   bool knows_leave_ = false;    // does the board?
   bool leaving_ = false;
+  bool transport_down_ = false;
+  bool group_waits_ = false;  // for the answer to Q:ID
   StatisticsCollector collector_;
   ArmingMachine arming_;
   DisarmCause told_cause_ = DisarmCause::not_yet;
   PendingCommands pending_;
   PostedCommands posted_;
   GroupSupport groups_;
-  bool group_waits_ = false;  // for the answer to Q:ID
   Ticket next_ticket_ = 1;
   // As the newest heartbeat told it; unnamed_cause: none was heard.
   std::int32_t cause_ = Command::unnamed_cause;
+  int questions_of_clock_ = 0;  // asked for its sake since the board began
 };
 
 }  // namespace r4

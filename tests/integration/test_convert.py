@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """r4 convert as a program, and its files as others read them: pandas, Wireshark, and a reader of MCAP."""
+import signal
 import subprocess
 
 import pandas
 import pytest
 
 import mcap_reader
-from r4_process import DATA, ERROR, run
+from r4_process import DATA, ERROR, PATIENCE_S, R4, run
 
 DATA_BAD, USAGE, OPEN = 1, 2, 4
 
@@ -145,3 +146,15 @@ def test_what_is_no_recording_makes_no_file(tmp_path, name, content, code, messa
 def test_what_cannot_be_written_is_said(native, tmp_path, target, code):
     result = convert(native, tmp_path / target, code=code)
     assert ERROR.search(result.stderr), result
+
+
+def test_what_is_broken_off_leaves_nothing(native, tmp_path):
+    with subprocess.Popen([R4, 'convert', '-', '-o', str(tmp_path / 'drive.csv')], stdin=subprocess.PIPE) as process:
+        text = native.read_bytes()
+        for _ in range(2 * 65536 // len(text) + 1):  # more than a pipe holds: it has begun
+            process.stdin.write(text)
+        process.stdin.flush()
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE_S) != 0
+        process.stdin = None
+    assert [path.name for path in tmp_path.iterdir()] == [native.name]

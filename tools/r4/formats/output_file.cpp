@@ -32,13 +32,20 @@ OutputFile::OutputFile(std::string path, bool replace)
                   "name another file, or replace it: --force");
     }
   }
-  file_.reset(::open(part_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666));
+  // Without a name, so that nothing is left of it whatever ends this program. Not every file system has that.
+  const std::size_t slash = path_.rfind('/');
+  const std::string folder = slash == std::string::npos ? "." : path_.substr(0, slash + 1);
+  file_.reset(::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666));
+  named_ = !file_;
+  if (named_) {
+    file_.reset(::open(part_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666));
+  }
   if (!file_) fail(errno);
   waiting_.reserve(2 * most_waiting);
 }
 
 OutputFile::~OutputFile() {
-  if (file_) ::unlink(part_.c_str());
+  if (file_ && named_) ::unlink(part_.c_str());
 }
 
 void OutputFile::write(std::string_view bytes) {
@@ -61,6 +68,14 @@ void OutputFile::write_out() {
 
 void OutputFile::finish() {
   write_out();
+  if (!named_) {
+    const std::string here = "/proc/self/fd/" + std::to_string(file_.get());
+    ::unlink(part_.c_str());
+    if (::linkat(AT_FDCWD, here.c_str(), AT_FDCWD, part_.c_str(), AT_SYMLINK_FOLLOW) != 0) {
+      fail(errno);
+    }
+    named_ = true;
+  }
   const unsigned flags = replace_ ? 0 : RENAME_NOREPLACE;
   if (::renameat2(AT_FDCWD, part_.c_str(), AT_FDCWD, path_.c_str(), flags) != 0) {
     // Not every file system knows that flag.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The file that a conversion makes. It is there as a whole or not at all: what was not finished is removed.
+// The file that a conversion makes. It is there as a whole or not at all.
 #pragma once
 
 #include <string>
@@ -29,7 +29,8 @@ class OutputFile final : public Output {
   [[noreturn]] void fail(int error) const;
 
   const std::string path_;
-  std::string part_;  // its name until it is finished
+  std::string part_;  // its name before that, if it has one
+  bool named_ = false;
   FileDescriptor file_;
   std::string waiting_;
   const bool replace_;
