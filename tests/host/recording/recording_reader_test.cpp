@@ -13,7 +13,7 @@
 namespace r4::test {
 namespace {
 
-using Kind = RecordingDamage::Kind;
+using DamageKind = RecordingDamage::Kind;
 
 std::string head() {
   std::string text;
@@ -57,7 +57,7 @@ TEST(RecordingReader, TellsThePlaceOfADamagedLineAndGoesOn) {
   const std::string before = head() + lines(0, 3);
   const Heard heard = heard_in(before + "nonsense\n" + lines(3, 3), 10);
   EXPECT_EQ(heard.records, lines(0, 6));
-  const Heard::Damage expected{Kind::line, 7, before.size()};
+  const Heard::Damage expected{DamageKind::line, 7, before.size()};
   ASSERT_EQ(heard.damage.size(), 1);
   EXPECT_EQ(heard.damage[0], expected);
 }
@@ -69,7 +69,7 @@ TEST(RecordingReader, TellsOfALastLineWithoutAnEnd) {
     const Heard heard = heard_in(whole + next.substr(0, cut));
     EXPECT_EQ(heard.records, lines(0, 3));
     ASSERT_EQ(heard.damage.size(), 1) << cut;
-    EXPECT_EQ(heard.damage[0], (Heard::Damage{Kind::torn, 7, whole.size()})) << cut;
+    EXPECT_EQ(heard.damage[0], (Heard::Damage{DamageKind::torn, 7, whole.size()})) << cut;
   }
 }
 
@@ -80,7 +80,7 @@ TEST(RecordingReader, PassesOverALineThatIsLongerThanAnyInLittleMemory) {
     const Heard heard = heard_in(before + junk + "\n" + lines(1, 1));
     EXPECT_EQ(heard.records, lines(0, 2));
     ASSERT_EQ(heard.damage.size(), 1);
-    EXPECT_EQ(heard.damage[0], (Heard::Damage{Kind::line, 5, before.size()}));
+    EXPECT_EQ(heard.damage[0], (Heard::Damage{DamageKind::line, 5, before.size()}));
   }
 }
 
@@ -99,7 +99,7 @@ TEST(RecordingReader, ReadsAllThatWasFlushedOfAFrameWithoutAnEnd) {
   const Heard heard = heard_in(cut);
   EXPECT_EQ(heard.records, lines(0, 20));
   ASSERT_EQ(heard.damage.size(), 1);
-  EXPECT_EQ(heard.damage[0].kind, Kind::torn);
+  EXPECT_EQ(heard.damage[0].kind, DamageKind::torn);
 }
 
 TEST(RecordingReader, GoesOnWithTheNextFrameWhereOneHasNoEnd) {
@@ -108,7 +108,7 @@ TEST(RecordingReader, GoesOnWithTheNextFrameWhereOneHasNoEnd) {
         compressed(head() + lines(0, 20), false) + compressed(head() + lines(20, 5)), piece);
     EXPECT_EQ(heard.records, lines(0, 25)) << piece;
     ASSERT_EQ(heard.damage.size(), 1) << piece;
-    EXPECT_EQ(heard.damage[0].kind, Kind::zstd) << piece;
+    EXPECT_EQ(heard.damage[0].kind, DamageKind::zstd) << piece;
   }
 }
 
