@@ -141,7 +141,8 @@ TEST(BadLink, StandsBeforeAnyBoard) {
   EXPECT_GT(statistics.packets.lost, 3U);
   EXPECT_GT(statistics.packets.duplicate, 3U);
   EXPECT_GT(statistics.damaged, 1U);
-  board.osmc(1).set(358, Direction::forward, std::chrono::seconds{10});  // it is repeated until it is confirmed
+  board.osmc(1).set(358, Direction::forward,
+                    std::chrono::seconds{10});  // it is repeated until it is confirmed
   EXPECT_EQ(robot.look().pins.osmc[0].pwm, 358);
 }
 
