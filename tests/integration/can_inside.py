@@ -9,10 +9,11 @@ import signal
 import subprocess
 import threading
 import time
+import urllib.request
 
 import pytest
 
-from r4_process import (ERROR, PATIENCE_S, R4, Board, driving, is_link, is_state, monitor, objects, run,
+from r4_process import (ERROR, PATIENCE_S, R4, Board, Running, driving, is_link, is_state, monitor, objects, run,
                         watch)
 
 # The board's timeout, what docs/safety.md promises on top, and what an emulated machine may take.
@@ -404,6 +405,22 @@ def test_a_bus_is_shown_with_all_of_its_boards(tmp_path):
     assert silent.returncode == 3 and ERROR.search(silent.stderr), silent
     silent = run('record', 'can://vcan0', '-o', str(tmp_path / 'silence'), '--for', '1', timeout=60)
     assert silent.returncode == 3 and 'no board was heard' in silent.stderr, silent
+
+
+def test_prometheus_is_told_how_busy_a_bus_is_and_for_whom():
+    boards = 'can://vcan0?node=2-3'
+    with Board(boards, listens=2), driving('can://vcan0?node=3', 'O:358,1,1'):
+        with Running('metrics', boards, '--json', '--listen', '127.0.0.1:0') as metrics:
+            url = metrics.next(lambda each: each['type'] == 'listening')['url']
+
+            def busy_seconds():
+                with urllib.request.urlopen(url, timeout=PATIENCE_S) as answer:
+                    found = re.findall(r'r4_can_busy_seconds_total\{interface="vcan0",node="(\d+)"\} (\S+)', answer.read().decode())
+                return {int(node): float(seconds) for node, seconds in found}
+            deadline = time.monotonic() + PATIENCE_S
+            while busy_seconds().get(3, 0) < 0.01:
+                assert time.monotonic() < deadline, busy_seconds()
+            assert busy_seconds()[3] > busy_seconds().get(2, 0), 'the one that nobody drives sends heartbeats alone'
 
 
 def test_r4_bus_tells_that_it_needs_the_data_bit_rate():

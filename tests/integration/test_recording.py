@@ -149,6 +149,18 @@ def test_records_several_boards_into_one_file(tmp_path):
     assert all(wire['states'] >= 10 for wire in told['wires']), told
 
 
+def test_records_many_boards_by_one_pattern(tmp_path):
+    path = tmp_path / 'many.r4log'
+    first = 28600
+    ports = f'udp://127.0.0.1:{first}-{first + 9}'
+    with Board(ports, listens=10):
+        ended = run('record', f'{ports}?listen=0', '-o', str(path), '--for', '1')
+        assert ended.returncode == 0, ended.stderr
+    (told,), code = info(path)
+    assert code == 0 and [wire['name'] for wire in told['wires']] == [f'sim-{first + i}' for i in range(10)]
+    assert all(wire['states'] >= 10 for wire in told['wires']), told
+
+
 @pytest.mark.parametrize('name', ['drive.r4log', 'drive.r4log.zst'])
 def test_who_is_killed_has_lost_a_second_at_most(board, tmp_path, name):
     path = tmp_path / name

@@ -27,6 +27,7 @@
 #include "transports/can/can_interface.hpp"
 #include "transports/can/can_listener.hpp"
 #include "transports/url.hpp"
+#include "transports/url_pattern.hpp"
 
 namespace r4::tool {
 namespace {
@@ -93,8 +94,10 @@ class Recorders {
   explicit Recorders(const Options& options)
       : board_options_(board_options(options)), signals_(io_), end_(io_) {
     std::vector<std::string> buses;
-    for (const std::string& url : options.urls) {
-      is_whole_bus(url) ? buses.push_back(url) : add(url);
+    for (const std::string& pattern : options.urls) {
+      for (const PatternUrl& each : expand_urls(pattern)) {
+        is_whole_bus(each.url) ? buses.push_back(each.url) : add(each.url);
+      }
     }
     recording_.emplace(options.file, limits_of(options));
     for (const std::string& bus : buses) {
@@ -169,6 +172,7 @@ Examples:
   r4 record udp://192.168.0.125 -o drive.r4log
   r4 record serial:auto 'can://can0?node=3' -o drive.r4log.zst --for 60
   r4 record can://can0 -o bus.r4log     every board that is heard on the bus
+  r4 record 'udp://10.0.0.{1-30}?listen=0' -o lab.r4log.zst     thirty boards
   r4 record udp:auto -o /var/log/robot.r4log.zst --rotate 1h --rotate 100M --keep 2G
   grep ' 1> ' drive.r4log               what was sent to the first board
   r4 info drive.r4log                   what is in it

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4 sim: the simulated board as a process, its events on stdout.
 #include <fmt/format.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <asio/io_context.hpp>
 #include <asio/signal_set.hpp>
 #include <asio/steady_timer.hpp>
@@ -19,14 +21,13 @@
 #include "host/commands/command_help.hpp"
 #include "host/standard_registry.hpp"
 #include "input_lines.hpp"
-#include "protocol/datagram/numbers.hpp"
 #include "protocol/messages/settings.hpp"
 #include "r4link/config.hpp"
 #include "r4link/vocabulary.hpp"
 #include "sim_log.hpp"
-#include "transports/framing/can/can_ids.hpp"
 #include "transports/impaired/impaired_carrier.hpp"
 #include "transports/registry.hpp"
+#include "transports/url_pattern.hpp"
 
 namespace r4::tool {
 namespace {
@@ -77,43 +78,34 @@ struct Plan {
   std::uint64_t number = 0;  // of the boards, from 0
 };
 
-// "0-7" of can://can0?node=0-7, if that is such a range. Throws Error{usage} for a wrong one.
-std::optional<std::pair<std::uint32_t, std::uint32_t>> node_range(const Url& url) {
-  const std::string nodes = url.get("node").value_or("");
-  const std::size_t dash = nodes.find('-', 1);
-  if (url.scheme() != "can" || dash == std::string::npos) return std::nullopt;
-  std::uint32_t first = 0;
-  std::uint32_t last = 0;
-  if (!parse_number(Text(nodes.data(), dash), first) ||
-      !parse_number(Text(nodes.data() + dash + 1, nodes.size() - dash - 1), last) || first > last ||
-      last >= can_nodes || url.text().find("node=" + nodes) == std::string::npos) {
-    throw Error(
-        ErrorKind::usage, url.text(), "node=" + nodes + " is no range of nodes",
-        fmt::format("write the lower one first, both 0 to {}, as in node=0-7", can_nodes - 1));
-  }
-  return std::pair(first, last);
-}
-
 std::vector<Plan> plans_of(const Options& options) {
   const std::string id = options.board_id.empty() ? "sim" : options.board_id;
   for (const std::string& text : options.urls) {
-    const Url url = Url::parse(text);
-    const auto range = node_range(url);
-    if (!range) continue;
+    std::vector<PatternUrl> urls = expand_urls(text);
+    if (urls.front().number.empty()) continue;
     if (options.urls.size() > 1) {
       throw Error(ErrorKind::usage, text, "several boards cannot share the other transports",
                   "run them as a process of their own");
     }
-    const std::string nodes = "node=" + *url.get("node");
     std::vector<Plan> plans;
-    for (std::uint32_t node = range->first; node <= range->second; ++node) {
-      std::string one = text;
-      one.replace(text.find(nodes), nodes.size(), fmt::format("node={}", node));
-      plans.push_back({{std::move(one)}, fmt::format("{}-{}", id, node), node - range->first});
+    for (PatternUrl& each : urls) {
+      plans.push_back({{std::move(each.url)}, id + "-" + each.number, plans.size()});
     }
     return plans;
   }
   return {{options.urls, options.board_id.empty() ? "sim-1" : options.board_id, 0}};
+}
+
+// Each board has files of the system open, and by default a program may have 1024.
+void allow_files_for(std::size_t boards) {
+  constexpr std::size_t of_the_program = 64;
+  constexpr std::size_t of_a_board = 4;
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  const rlim_t wanted = of_the_program + of_a_board * boards;
+  if (limit.rlim_cur >= wanted) return;
+  limit.rlim_cur = std::min<rlim_t>(wanted, limit.rlim_max);
+  ::setrlimit(RLIMIT_NOFILE, &limit);  // if that is too few, opening says which board has none
 }
 
 // A board with its log, at its transports.
@@ -208,6 +200,7 @@ int simulate(const Options& options) {
   signals.async_wait([&io](const std::error_code&, int) { io.stop(); });
 
   const std::vector<Plan> plans = plans_of(options);
+  allow_files_for(plans.size());
   {
     SimOutput output(options.json);
     std::vector<std::unique_ptr<ServedBoard>> boards;
@@ -282,6 +275,7 @@ Examples:
                                                r4 monitor serial:///tmp/r4
   r4 sim 'udp://127.0.0.1:2018?peer=127.0.0.1:2390'   streams to that port, as the paper's board
   r4 sim 'can://vcan0?node=0-7'                eight boards on one CAN bus
+  r4 sim udp://127.0.0.1:20000-20099           a hundred boards at a port each
 
 Exit codes: 0 ended by --duration or a signal; 1 the script is wrong; 2 usage; 4, 5 the port or
 device cannot be opened.)";

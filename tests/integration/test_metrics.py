@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""r4 metrics as a program, read by Prometheus' own parser."""
+import time
+import urllib.error
+import urllib.request
+
+import pytest
+from prometheus_client.parser import text_string_to_metric_families
+
+from r4_process import ERROR, PATIENCE_S, Board, Running, driving, run
+
+USAGE, OPEN = 2, 4
+
+
+class Metrics(Running):
+    def __init__(self, *urls):
+        super().__init__('metrics', '--json', '--listen', '127.0.0.1:0', *urls)
+        self.url = self.next(lambda each: each['type'] == 'listening')['url']
+
+    def read(self):
+        """The samples: (name, the labels but the URL) to value; {url: those} where there are several boards."""
+        with urllib.request.urlopen(self.url, timeout=PATIENCE_S) as answer:
+            text = answer.read().decode()
+        samples = {}
+        for family in text_string_to_metric_families(text):
+            if family.name.startswith('exposer_'):  # of the server itself
+                continue
+            assert family.documentation and family.type in ('gauge', 'counter'), family
+            for sample in family.samples:
+                labels = dict(sample.labels)
+                key = (sample.name, *(value for name, value in sorted(labels.items()) if name != 'url'))
+                of_board = samples.setdefault(labels.get('url'), {})
+                assert key not in of_board, key
+                of_board[key] = sample.value
+        return samples
+
+    def until(self, is_so):
+        deadline = time.monotonic() + PATIENCE_S
+        while not is_so(samples := self.read()):
+            assert time.monotonic() < deadline, samples
+        return samples
+
+
+def test_tells_of_boards_what_a_host_knows():
+    with Board('udp://127.0.0.1:0') as left, Board('udp://127.0.0.1:0') as right:
+        with Metrics(left.host_url, right.host_url) as metrics, driving(left.host_url, 'O:358,1,1'):
+            def both_are_heard(samples):
+                return len(samples) == 2 and all(each.get(('r4_state_rate_hertz',), 0) > 90 for each in samples.values())
+            samples = metrics.until(both_are_heard)
+            driven, idle = (samples[url] for url in sorted(samples, key=lambda url: samples[url][('r4_safe', 'link')]))
+            assert driven[('r4_safe', 'none')] == 1 and driven[('r4_safe', 'link')] == 0
+            assert idle[('r4_safe', 'none')] == 0 and idle[('r4_safe', 'link')] == 1
+            for each in (driven, idle):
+                assert each[('r4_up',)] == 1
+                assert 23 < each[('r4_analog_volts', 'AIN24')] < 26
+                assert each[('r4_states_total',)] > 0 and each[('r4_damaged_total',)] == 0
+                assert 0 < each[('r4_round_trip_seconds',)] < 0.1
+                assert 0 <= each[('r4_clock_error_seconds',)] < 0.1
+                assert any(key[0] == 'r4_info' and 'sim-1' in key for key in each)
+            right.end()
+            metrics.until(lambda samples: sorted(each[('r4_up',)] for each in samples.values()) == [0, 1])
+
+
+def test_a_board_that_is_not_there_is_down():
+    with Metrics('udp://127.0.0.1:9?listen=0') as metrics:
+        (samples,) = metrics.read().values()
+        assert samples[('r4_up',)] == 0 and ('r4_safe', 'none') not in samples
+        with pytest.raises(urllib.error.HTTPError):
+            urllib.request.urlopen(metrics.url.replace('/metrics', '/other'), timeout=PATIENCE_S)
+
+
+def test_wrong_uses_are_refused(tmp_path):
+    for listen, code in (('nowhere', USAGE), ('127.0.0.1:', USAGE), ('192.0.2.1:9618', OPEN)):
+        result = run('metrics', 'udp://127.0.0.1?listen=0', '--listen', listen, cwd=tmp_path)
+        assert result.returncode == code and ERROR.search(result.stderr), result
+    with Metrics('sim:') as metrics:
+        taken = metrics.url.split('/')[2]
+        result = run('metrics', 'sim:', '--listen', taken)
+        assert result.returncode == OPEN and ERROR.search(result.stderr), result

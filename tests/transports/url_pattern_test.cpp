@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "transports/url_pattern.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "r4link/error.hpp"
+
+namespace r4 {
+namespace {
+
+using Texts = std::vector<std::string>;
+
+Texts urls_of(std::string_view pattern) {
+  Texts urls;
+  for (const PatternUrl& each : expand_urls(pattern)) urls.push_back(each.url);
+  return urls;
+}
+
+TEST(UrlPattern, AUrlStandsForItself) {
+  for (const char* url :
+       {"udp://192.168.0.125", "udp://[fe80::1]:2018", "serial:///dev/serial/by-id/usb-R4-1-if00",
+        "can://can0?node=3&fd=1", "sim:", "udp:?id=arm-1-3", "udp://robot-1-3", "pty:/tmp/a-1-2"}) {
+    const std::vector<PatternUrl> all = expand_urls(url);
+    ASSERT_EQ(all.size(), 1U) << url;
+    EXPECT_EQ(all[0].url, url);
+    EXPECT_EQ(all[0].number, "") << url;
+  }
+}
+
+TEST(UrlPattern, RangesOfNodesAndPortsNeedNoBraces) {
+  EXPECT_EQ(urls_of("can://can0?node=2-4"),
+            (Texts{"can://can0?node=2", "can://can0?node=3", "can://can0?node=4"}));
+  EXPECT_EQ(urls_of("can://can0?fd=1&node=0-1&pack=0"),
+            (Texts{"can://can0?fd=1&node=0&pack=0", "can://can0?fd=1&node=1&pack=0"}));
+  EXPECT_EQ(urls_of("udp://127.0.0.1:9-11?listen=0"),
+            (Texts{"udp://127.0.0.1:9?listen=0", "udp://127.0.0.1:10?listen=0",
+                   "udp://127.0.0.1:11?listen=0"}));
+  EXPECT_EQ(urls_of("udp://[::1]:9-10"), (Texts{"udp://[::1]:9", "udp://[::1]:10"}));
+  EXPECT_EQ(urls_of("udp://127.0.0.1:20000-20999").size(), 1000U);
+}
+
+TEST(UrlPattern, BracesHaveNumbersAndRangesAndTheLastCountsFastest) {
+  EXPECT_EQ(urls_of("udp://arm-{1,3,09-11}"),
+            (Texts{"udp://arm-1", "udp://arm-3", "udp://arm-09", "udp://arm-10", "udp://arm-11"}));
+  const std::vector<PatternUrl> all = expand_urls("can://can{0-1}?node=0-2");
+  ASSERT_EQ(all.size(), 6U);
+  EXPECT_EQ(all[0].url, "can://can0?node=0");
+  EXPECT_EQ(all[1].url, "can://can0?node=1");
+  EXPECT_EQ(all[5].url, "can://can1?node=2");
+  EXPECT_EQ(all[5].number, "1-2");
+  EXPECT_EQ(expand_urls("udp://10.0.0.{1-250}")[6].number, "7");
+}
+
+TEST(UrlPattern, WhatIsNoneIsRefusedWithTheReason) {
+  struct Refused {
+    const char* pattern;
+    const char* reason;
+  };
+  for (const auto& [pattern, reason] : {
+           Refused{"can://can0?node=7-0", "'7-0' is no number and no range"},
+           Refused{"udp://arm-{}", "'' is no number and no range"},
+           Refused{"udp://arm-{1-}", "'1-' is no number and no range"},
+           Refused{"udp://arm-{a-c}", "'a-c' is no number and no range"},
+           Refused{"udp://arm-{1,}", "'' is no number and no range"},
+           Refused{"udp://arm-{1-2-3}", "'1-2-3' is no number and no range"},
+           Refused{"udp://arm-{+1-2}", "'+1-2' is no number and no range"},
+           Refused{"udp://arm-{1", "has a brace without the other one"},
+           Refused{"udp://arm-1}{2", "has a brace without the other one"},
+           Refused{"udp://arm-{{1}}", "'{1' is no number and no range"},
+           Refused{"udp://10.{0-255}.{0-255}.1", "stands for more than 10000 boards"},
+           Refused{"udp://arm-{0-4294967295}", "stands for more than 10000 boards"},
+           Refused{"udp://127.0.0.1:65535-65536", "'65536' is not a port"},
+       }) {
+    try {
+      expand_urls(pattern);
+      ADD_FAILURE() << pattern;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::usage) << pattern;
+      EXPECT_EQ(error.problem().reason, reason) << pattern;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace r4

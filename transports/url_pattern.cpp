@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "url_pattern.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <utility>
+
+#include "../protocol/datagram/numbers.hpp"
+#include "r4link/error.hpp"
+#include "url.hpp"
+
+namespace r4 {
+namespace {
+
+[[noreturn]] void refuse(std::string_view pattern, std::string reason) {
+  throw Error(ErrorKind::usage, std::string(pattern), std::move(reason),
+              "write ranges as in node=0-7, :20000-20999 or {1-250}, the lower number first");
+}
+
+[[noreturn]] void refuse_as_too_many(std::string_view pattern) {
+  throw Error(ErrorKind::usage, std::string(pattern),
+              "stands for more than " + std::to_string(most_pattern_urls) + " boards",
+              "name fewer in one URL");
+}
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+// The end of "0-7" at the beginning of the text; 0 if that is no range.
+std::size_t range_size(std::string_view text) {
+  const auto digits = [&text](std::size_t from) {
+    while (from < text.size() && is_digit(text[from])) ++from;
+    return from;
+  };
+  const std::size_t dash = digits(0);
+  if (dash == 0 || dash == text.size() || text[dash] != '-') return 0;
+  const std::size_t end = digits(dash + 1);
+  return end == dash + 1 ? 0 : end;
+}
+
+// Braces about the range at that place, if there is one that ends there.
+void brace(std::string& text, std::size_t at) {
+  const std::size_t size = range_size(std::string_view(text).substr(at));
+  const std::size_t end = at + size;
+  if (size == 0 || (end < text.size() && text[end] != '&' && text[end] != '?')) return;
+  text.insert(end, "}");
+  text.insert(at, "{");
+}
+
+// With braces where they may be left out.
+std::string with_braces(std::string_view pattern) {
+  std::string text(pattern);
+  for (const char* key : {"?node=", "&node="}) {
+    const std::size_t at = text.find(key);
+    if (at != std::string::npos) brace(text, at + std::string_view(key).size());
+  }
+  if (text.starts_with("udp://")) {
+    const std::size_t end = std::min(text.find_first_of("/?", 6), text.size());
+    const std::size_t colon = text.rfind(':', end);
+    if (colon != std::string::npos && colon > 5) brace(text, colon + 1);
+  }
+  return text;
+}
+
+// The numbers of "1,3,07-12", as they are written.
+std::vector<std::string> numbers_of(std::string_view pattern, std::string_view list) {
+  std::vector<std::string> numbers;
+  for (bool more = true; more;) {
+    const std::size_t comma = std::min(list.find(','), list.size());
+    const std::string_view part = list.substr(0, comma);
+    more = comma != list.size();
+    list.remove_prefix(more ? comma + 1 : comma);
+    const std::size_t dash = std::min(part.find('-'), part.size());
+    const std::string_view lower = part.substr(0, dash);
+    const std::string_view upper = dash == part.size() ? lower : part.substr(dash + 1);
+    std::uint32_t first = 0;
+    std::uint32_t last = 0;
+    const auto is_number = [](std::string_view text) {
+      return !text.empty() && std::all_of(text.begin(), text.end(), is_digit);
+    };
+    if (!is_number(lower) || !is_number(upper) || !parse_number(lower, first) ||
+        !parse_number(upper, last) || first > last) {
+      refuse(pattern, "'" + std::string(part) + "' is no number and no range");
+    }
+    if (last - first >= most_pattern_urls) refuse_as_too_many(pattern);
+    const std::size_t width = lower.front() == '0' ? lower.size() : 0;
+    for (std::uint32_t number = first; number <= last; ++number) {
+      std::string digits = std::to_string(number);
+      if (digits.size() < width) digits.insert(0, width - digits.size(), '0');
+      numbers.push_back(std::move(digits));
+      if (numbers.size() > most_pattern_urls) refuse_as_too_many(pattern);
+    }
+  }
+  return numbers;
+}
+
+}  // namespace
+
+std::vector<PatternUrl> expand_urls(std::string_view pattern) {
+  std::vector<PatternUrl> all{{"", ""}};
+  std::string text = with_braces(pattern);
+  std::string_view rest = text;
+  while (true) {
+    const std::size_t open = rest.find('{');
+    const std::size_t close = rest.find('}');
+    if (open == std::string_view::npos && close == std::string_view::npos) break;
+    if (open == std::string_view::npos || close == std::string_view::npos || close < open) {
+      refuse(pattern, "has a brace without the other one");
+    }
+    const std::vector<std::string> numbers =
+        numbers_of(pattern, rest.substr(open + 1, close - open - 1));
+    if (all.size() * numbers.size() > most_pattern_urls) refuse_as_too_many(pattern);
+    std::vector<PatternUrl> more;
+    more.reserve(all.size() * numbers.size());
+    for (const PatternUrl& each : all) {
+      for (const std::string& number : numbers) {
+        more.push_back({each.url + std::string(rest.substr(0, open)) + number,
+                        each.number.empty() ? number : each.number + "-" + number});
+      }
+    }
+    all = std::move(more);
+    rest.remove_prefix(close + 1);
+  }
+  for (PatternUrl& each : all) {
+    each.url += rest;
+    Url::parse(each.url);
+  }
+  return all;
+}
+
+}  // namespace r4
