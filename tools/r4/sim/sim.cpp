@@ -88,6 +88,7 @@ std::vector<Plan> plans_of(const Options& options) {
                   "run them as a process of their own");
     }
     std::vector<Plan> plans;
+    plans.reserve(urls.size());
     for (PatternUrl& each : urls) {
       plans.push_back({{std::move(each.url)}, id + "-" + each.number, plans.size()});
     }
