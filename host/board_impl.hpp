@@ -5,7 +5,8 @@
 //     send() -- Call, post() -->    AsyncBoard on its loop  -->  callback_thread.hpp
 //            <-- ended, news --
 //
-// The link's thread waits for nobody: nothing of the program runs there but a transport of its own. The threads meet under `mutex`.
+// The link's thread waits for nobody: nothing of the program runs there but a transport of its own. The
+// threads meet under `mutex`.
 #pragma once
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The host's side of one board, without I/O: datagrams and time in, datagrams and events out.
 //
-// It keeps the link alive (protocol/host_link), takes control, chooses the state fields it needs,
+// It keeps the link alive (protocol/link/host_link), takes control, chooses the state fields it needs,
 // sends commands and finds out whether the board executed them:
 //
 //     queued --control--> sent --CMD == PNum in the board's state--> confirmed
@@ -12,8 +12,8 @@
 // It is put together from machines, each with its own diagram: what the board knows of us
 // (host_role.hpp), the fields that it sends (field_selection.hpp), the commands under way
 // (pending_commands.hpp), arming (arming.hpp), the key (host_key.hpp), the question who the board is
-// (measurement/identity_question.hpp), the board's clock on ours (measurement/board_clock.hpp), the stop that lasts (stop_repetition.hpp) and, where the session only watches, its
-// lease at the board (lease.hpp).
+// (measurement/identity_question.hpp), the board's clock on ours (measurement/board_clock.hpp), the stop that
+// lasts (stop_repetition.hpp) and, where the session only watches, its lease at the board (lease.hpp).
 //
 // A retry has the bytes and the packet number of the original (signed anew, where there is a key),
 // so the board can execute it only once. When CMD has moved past a command, the retry's answer

@@ -66,9 +66,9 @@ class R4LINK_API Board {
 
   // Ends heartbeats, says farewell and closes the transport: the board goes safe at once and is free for
   // another host; one that does not answer, or does not know of farewells, goes safe within its timeout.
-  // Takes at most 100 ms for that. Calls that wait in other threads throw Error{refused}. When it returns
-  // no callback runs, but one that calls it, and none will. Idempotent. The destructor does it too, and may
-  // run while other threads wait.
+  // Takes at most 100 ms for that. Calls that wait in other threads throw Error{refused}. When it has
+  // returned, no callback runs or will run, except the one that called it. Idempotent. The destructor does it,
+  // too, and may run while other threads wait.
   void close();
 
   // Waits until the board is ACTIVE under our control, or, where the program only watches, until it is heard;

@@ -3,9 +3,9 @@
 //
 // A carrier moves datagrams like UDP does: it may lose and reorder them, it never blocks, and it
 // never corrupts silently (the datagram's CRC is checked above it). It lives on one event loop (Loop, or
-// an io_context of Asio's) and is used from that loop's thread only. The first open() throws when the transport cannot be
-// opened; after that, trouble is an event, and the carrier comes back by itself when the device
-// does.
+// an io_context of Asio's) and is used from that loop's thread only. The first open() throws when the
+// transport cannot be opened; after that, trouble is an event, and the carrier comes back by itself when the
+// device does.
 #pragma once
 
 #include <cstddef>
@@ -127,12 +127,12 @@ class R4LINK_API Carrier {
   // datagram that could not be written within 100 ms is dropped and counted.
   virtual SendResult send(std::string_view bytes, Priority priority, Peer to = everyone) = 0;
 
-  // At a board: that peer is in control. However many others send, what comes from it keeps its
-  // number, until another is held, and what is for everyone goes to it where there is no standing
-  // audience. `everyone`: nobody here is in control any more.
+  // At a board: that peer is in control. It keeps its number, however many others send, until another peer is
+  // held. Where nothing reaches everyone at once (UDP), what is sent to everyone goes to it. `everyone`: nobody
+  // on this carrier is in control any more.
   virtual void hold(Peer peer) { static_cast<void>(peer); }
 
-  // At a board: does what is for everyone come to that peer?
+  // At a board: does that peer get what is sent to everyone?
   virtual bool reaches(Peer peer) const { return peer == everyone; }
 
   // At a host: is its place to send from that of every host, as on a CAN bus? Then who only watches sends nothing

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "firmware/application.hpp"
+#include "firmware/application/application.hpp"
 #include "protocol/messages/message.hpp"
 #include "protocol/messages/state_fields.hpp"
 #include "tests/support/datagrams.hpp"

@@ -101,8 +101,7 @@ def shared_by_programs():
             print(stopped.stdout.splitlines()[0])
             host.process.kill()
             early.skip_past()
-            early.next(is_link('safe', 'stop'))
-            early.next(is_state)
+            early.next(lambda each: is_state(each) and each['fields'].get('SAFE') == 2)
         assert run('send', by_path, 'E:CLEAR').returncode == 0
 
 

@@ -36,7 +36,7 @@
 #include <vector>
 
 #include "attacker.hpp"
-#include "firmware/application.hpp"
+#include "firmware/application/application.hpp"
 #include "host/session/session.hpp"
 #include "schedule.hpp"
 

@@ -35,7 +35,7 @@ struct I2cTransfer {
 
 class I2cObserver {
  public:
-  // After its STOP. One that was cut short comes after those that cut it.
+  // A transfer has ended. One that an interrupt's transfers cut short is told after those.
   virtual void on_transfer(const I2cTransfer& transfer) = 0;
 
  protected:

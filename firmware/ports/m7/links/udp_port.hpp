@@ -5,11 +5,11 @@
 
 #include <cstdint>
 
-#include "../../../transports/framing/peer_table.hpp"
-#include "../../port.hpp"
-#include "../../stop_detector.hpp"
+#include "../../../../transports/framing/peer_table.hpp"
+#include "../../../port.hpp"
+#include "../../../stop_detector.hpp"
+#include "../chip/registers.hpp"
 #include "lan9118.hpp"
-#include "registers.hpp"
 #include "udp_frames.hpp"
 
 namespace r4 {

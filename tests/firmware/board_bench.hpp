@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <functional>
 
-#include "pin_models.hpp"
+#include "drivers/pin_models.hpp"
 
 namespace r4::test {
 

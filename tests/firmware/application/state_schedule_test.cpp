@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "firmware/state_schedule.hpp"
+#include "firmware/application/state_schedule.hpp"
 
 #include <gtest/gtest.h>
 

@@ -4,8 +4,8 @@
 
 #include <cstdint>
 
-#include "../protocol/keys/authentication.hpp"
-#include "hal.hpp"
+#include "../../protocol/keys/authentication.hpp"
+#include "../hal.hpp"
 #include "r4link/command.hpp"
 
 namespace r4 {

@@ -7,11 +7,11 @@
 
 #include <cstdint>
 
-#include "../../../transports/framing/line_framing.hpp"
-#include "../../port.hpp"
-#include "../../stop_detector.hpp"
-#include "../byte_ring.hpp"
-#include "../transmit_lines.hpp"
+#include "../../../../transports/framing/line_framing.hpp"
+#include "../../../port.hpp"
+#include "../../../stop_detector.hpp"
+#include "../../byte_ring.hpp"
+#include "../../transmit_lines.hpp"
 
 namespace r4 {
 namespace m7 {

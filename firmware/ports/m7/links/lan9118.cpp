@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "lan9118.hpp"
 
-#include "registers.hpp"
+#include "../chip/registers.hpp"
 
 namespace r4 {
 namespace m7 {

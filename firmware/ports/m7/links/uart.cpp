@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "uart.hpp"
 
-#include "../../../protocol/datagram/numbers.hpp"
-#include "board_clock.hpp"
-#include "registers.hpp"
+#include "../../../../protocol/datagram/numbers.hpp"
+#include "../chip/board_clock.hpp"
+#include "../chip/registers.hpp"
 
 namespace r4 {
 namespace m7 {

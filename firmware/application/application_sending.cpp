@@ -2,8 +2,8 @@
 // What the application sends: heartbeats, states, answers.
 #include <cstring>
 
-#include "../protocol/messages/command_group.hpp"
-#include "../protocol/messages/state_fields.hpp"
+#include "../../protocol/messages/command_group.hpp"
+#include "../../protocol/messages/state_fields.hpp"
 #include "application.hpp"
 
 namespace r4 {
@@ -143,7 +143,7 @@ void Application::write_heartbeat(Source to, std::uint32_t& pnum, const SafeRepo
       Priority::normal, to.peer);
 }
 
-// To them a board that has no host yet is safe for the same reason as one that has lost it.
+// A board that has had no host yet tells watchers `link`, as one that has lost its host does.
 SafeReport Application::shown_to_watchers() const {
   SafeReport report = safe_report();
   if (report.reason == SafeReason::none && !link_.has_owner()) report.reason = SafeReason::link;

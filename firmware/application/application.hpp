@@ -17,16 +17,16 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "../protocol/keys/authentication.hpp"
-#include "../protocol/link/board_link.hpp"
-#include "../protocol/link/watchers.hpp"
-#include "../protocol/messages/message.hpp"
-#include "executor.hpp"
-#include "guard.hpp"
-#include "hal.hpp"
+#include "../../protocol/keys/authentication.hpp"
+#include "../../protocol/link/board_link.hpp"
+#include "../../protocol/link/watchers.hpp"
+#include "../../protocol/messages/message.hpp"
+#include "../executor.hpp"
+#include "../guard.hpp"
+#include "../hal.hpp"
+#include "../port.hpp"
+#include "../safety.hpp"
 #include "observer.hpp"
-#include "port.hpp"
-#include "safety.hpp"
 #include "state_schedule.hpp"
 
 namespace r4 {
@@ -105,6 +105,7 @@ class Application {
     std::uint32_t waiting_ms = 0;
   };
 
+  static BoardLink::Timing timing_of(const Settings& settings);
   void turn(std::uint32_t now_ms);
   std::uint32_t waited_ms(std::uint8_t port, std::uint32_t now_ms) const;
   Verdict judge(std::uint8_t port, MessageKind kind, const Datagram& datagram,
@@ -112,6 +113,10 @@ class Application {
   BoardLink::HostHeartbeat heartbeat_of(Source from, const Datagram& datagram,
                                         std::uint32_t now_ms) const;
   void on_host_heartbeat(Source from, const Datagram& datagram, std::uint32_t now_ms);
+  bool rejected(Verdict verdict, MessageKind kind, std::uint32_t now_ms);
+  void tell_ports();
+
+  // application_commands.cpp
   void on_command(Source from, const Datagram& datagram, Verdict verdict, std::uint32_t now_ms);
   void on_group(Source from, const Datagram& datagram, Verdict verdict, std::uint32_t now_ms);
   bool admit(Source from, const Datagram& datagram, Verdict verdict, Refusal refusal,
@@ -123,7 +128,8 @@ class Application {
   void take_effect(std::uint32_t pnum, const Command& command, std::uint32_t now_ms);
   void bring_about(std::uint32_t now_ms);
   void emergency_stop(Source from, const Datagram& datagram, Verdict verdict, std::uint32_t now_ms);
-  bool rejected(Verdict verdict, MessageKind kind, std::uint32_t now_ms);
+
+  // application_safety.cpp
   void look_at_time(std::uint32_t now_ms);
   void enter(SafeReason cause, std::uint32_t now_ms);
   void check_interlocks(std::uint32_t now_ms);
@@ -133,7 +139,6 @@ class Application {
   Refusal judge_clear(const Command& command, std::uint32_t waited_ms, std::uint32_t now_ms) const;
   void expect_host();
   void update_outputs(std::uint32_t now_ms);
-  void tell_ports();
   void report_state(std::uint32_t now_ms);
 
   // application_sending.cpp
