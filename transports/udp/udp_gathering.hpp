@@ -19,7 +19,7 @@ class UdpGathering {
  public:
   using SteadyTime = std::chrono::steady_clock::time_point;
   using Endpoint = asio::ip::udp::endpoint;
-  static constexpr std::chrono::milliseconds interval{8};
+  static constexpr std::chrono::milliseconds interval{16};
 
   explicit UdpGathering(asio::io_context& io) : timer_(io) {}
 
