@@ -121,8 +121,9 @@ def main():
     least = statistics.median(share for share, _, _ in measured['floor'])
     for form, each in measured.items():
         share, rate, size = (statistics.median(one) for one in zip(*each))
-        print(f'{form:6} {100 * share:5.2f} % of a core, {share / least:.2f} times the floor; {rate:.0f} states a second'
-              + (f', {size:.1f} bytes each' if size else ''))
+        bytes_each = f', {size:.1f} bytes each' if size else ''
+        print(f'{form:6} {100 * share:5.2f} % of a core, {share / least:.2f} times the floor; '
+              f'{rate:.0f} states a second{bytes_each}')
 
 
 main()

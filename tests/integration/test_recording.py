@@ -206,9 +206,11 @@ def test_a_full_disk_ends_the_recording_with_a_reason(board, tmp_path):
 
 def test_a_disk_without_space_ends_the_recording_with_a_reason(board, tmp_path):
     # A file system of its own, which goes with the namespace; where that is refused, unshare says why.
-    script = 'mount -t tmpfs -o size=16k none "$1" && "$2" record "$3" -o "$1/drive.r4log"; echo $?; "$2" info "$1/drive.r4log"'
-    full = subprocess.run(['unshare', '--map-root-user', '--mount', 'sh', '-c', script, 'sh', tmp_path, R4, board.host_url],
-                          capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    script = ('mount -t tmpfs -o size=16k none "$1" && cd "$1" && "$2" record "$3" -o drive.r4log; echo $?;'
+              ' "$2" info drive.r4log')
+    full = subprocess.run(['unshare', '--map-root-user', '--mount', 'sh', '-c', script, 'sh', tmp_path, R4,
+                           board.host_url], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    assert full.stdout, f'there is no file system to fill: {full.stderr}'
     code, *told = full.stdout.splitlines()
     assert int(code) == OPEN and 'the recording has ended: No space left on device' in full.stderr, full
     assert ERROR.search(full.stderr) and full.returncode == 0, full
