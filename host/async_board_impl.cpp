@@ -44,7 +44,7 @@ Time AsyncBoard::Impl::time_of(Duration timeout) {
 // By how much what was due is late; 0 inside another entry.
 Time AsyncBoard::Impl::begin_entry(Completion::How way) {
   if (depth == 0) how = way;
-  const Time before = std::exchange(now, steady_now());
+  before = std::exchange(now, steady_now());
   if (now - before > held_up) in_backlog = true;
   return has_link() && depth == 0 ? now - due : Time{0};
 }
@@ -219,8 +219,10 @@ void AsyncBoard::Impl::on_timer() {
 
 void AsyncBoard::Impl::on_datagram(std::string_view bytes, Peer) {
   enter(Completion::How::dispatch, [&] {
-    tap.on_received(bytes);
-    session.receive(bytes, now);
+    const auto arrival = carrier->arrival();
+    const Time at = arrival ? std::chrono::duration_cast<Time>(arrival->time_since_epoch()) : now;
+    tap.on_received(bytes, at);
+    session.receive(bytes, std::clamp(at, before, now));  // its time never goes back
     tap.on_packets(session.packets());
     poll_wanted = true;
   });

@@ -8,6 +8,7 @@
 // device does.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -107,6 +108,8 @@ class R4LINK_API Carrier {
     virtual void on_drained() {}
     // What another program sent to the board, on a wire that programs share.
     virtual void on_overheard(std::string_view bytes) { static_cast<void>(bytes); }
+    // The first 1024 bytes of a line or packet that was longer, and so no datagram; the rest is thrown away.
+    virtual void on_oversize(std::string_view beginning) { static_cast<void>(beginning); }
 
    protected:
     ~Handler() = default;
@@ -141,6 +144,14 @@ class R4LINK_API Carrier {
 
   // Sends the packed form from now on, where there is one (CAN). Received are both at any time.
   virtual void use_packed_form(bool wanted) { static_cast<void>(wanted); }
+
+  // At a host that records and does not drive, before open(): what comes may be handed over some milliseconds late, so
+  // that many boards wake the processor up no more often than one. A carrier that does so tells when it came.
+  virtual void gather() {}
+  // Of the datagram that is being handed over: when it came, unless that is now.
+  virtual std::optional<std::chrono::steady_clock::time_point> arrival() const {
+    return std::nullopt;
+  }
 
   virtual bool up() const = 0;
   // The longest datagram it carries, in bytes.

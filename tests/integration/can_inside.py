@@ -13,7 +13,7 @@ import urllib.request
 
 import pytest
 
-from r4_process import (ERROR, PATIENCE_S, R4, Board, Running, driving, is_link, is_state, monitor, objects, run,
+from r4_process import (ERROR, PATIENCE_S, R4, Board, Running, driving, is_link, is_state, lasts, monitor, objects, run,
                         watch)
 
 # The board's timeout, what docs/safety.md promises on top, and what an emulated machine may take.
@@ -278,6 +278,18 @@ def test_who_watches_is_in_nobodys_way(board):
             host.process.kill()
             board.state('SAFE', 'link')
         assert run('send', board.host_url, 'O:1,1,1', timeout=60).returncode == 0
+
+
+def test_what_a_host_of_another_computer_says_is_recorded(tmp_path):
+    path = tmp_path / 'drive.r4log'
+    said = [re.compile(rf'^[0-9.]+ 1> {what};PNum:\d+;T:\d+;\^0x', re.MULTILINE) for what in ('H:ROS2-R4', 'Q:ID')]
+    with Board('can://can0?node=3'), monitor('can://can0?node=3'), \
+            Running('record', 'can://can1?node=3', '-o', str(path)) as recorder:
+        deadline = time.monotonic() + PATIENCE_S
+        while not (path.exists() and all(each.search(path.read_text()) for each in said)):
+            assert time.monotonic() < deadline, path.read_text()
+            lasts(0.05)
+        assert recorder.end() == 0, recorder.errors
 
 
 def test_bus_off_is_safe_at_once_and_a_restart_brings_it_back(vcan_board):

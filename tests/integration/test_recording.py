@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Recordings: r4 record beside a program that drives, killed, on a full disk; r4 info of what came of it."""
 import contextlib
+import datetime
 import re
 import resource
 import signal
+import socket
 import subprocess
 import time
 
 import pytest
 
-from r4_process import ERROR, PATIENCE_S, Board, Running, driving, lasts, objects, run
+from r4_process import ERROR, PATIENCE_S, R4, Board, Running, driving, lasts, objects, run
 
 DATA_BAD, USAGE, REFUSED, OPEN, PERMISSION = 1, 2, 3, 4, 5
 
@@ -131,8 +133,10 @@ def test_a_replay_goes_step_by_step_from_anywhere_and_tells_damage(recorded):
     ended = run('replay', str(recorded), 'udp://127.0.0.1:0', '--step', stdin='\n' * 1000)
     assert [line.split(' ', 1)[1] for line in ended.stdout.splitlines()[1:-1]] == was
     assert ended.returncode == DATA_BAD and re.search(r'line \d+: it begins with no time', ended.stderr), ended
-    late = run('replay', str(recorded), 'udp://127.0.0.1:0', '--step', '--from', '0.3', stdin='\n')
-    assert late.stdout.splitlines()[1].split(' ', 1)[1] in was[20:], late
+    first = float(re.search(r'^([\d.]+) 1', recorded.read_text(), re.MULTILINE)[1])
+    for start in ('0.3', datetime.datetime.fromtimestamp(first + 0.3, datetime.timezone.utc).isoformat()[:26]):
+        late = run('replay', str(recorded), 'udp://127.0.0.1:0', '--step', '--from', start, stdin='\n')
+        assert late.stdout.splitlines()[1].split(' ', 1)[1] in was[20:], late
     for arguments, code in ((['--wire', '7'], DATA_BAD), (['--speed', '0'], USAGE), (['--from', 'x'], USAGE)):
         wrong = run('replay', str(recorded), *arguments)
         assert wrong.returncode == code and ERROR.search(wrong.stderr), wrong
@@ -198,6 +202,32 @@ def test_a_full_disk_ends_the_recording_with_a_reason(board, tmp_path):
     tiny = run('record', board.host_url, '-o', str(tmp_path / 'tiny'), '--for', '20',
                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10)))
     assert tiny.returncode == OPEN, 'not ended by SIGXFSZ'
+
+
+def test_a_disk_without_space_ends_the_recording_with_a_reason(board, tmp_path):
+    # A file system of its own, which goes with the namespace; where that is refused, unshare says why.
+    script = ('mount -t tmpfs -o size=16k none "$1" && cd "$1" && "$2" record "$3" -o drive.r4log; echo $?;'
+              ' "$2" info drive.r4log')
+    full = subprocess.run(['unshare', '--map-root-user', '--mount', 'sh', '-c', script, 'sh', tmp_path, R4,
+                           board.host_url], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    assert full.stdout, f'there is no file system to fill: {full.stderr}'
+    code, *told = full.stdout.splitlines()
+    assert int(code) == OPEN and 'the recording has ended: No space left on device' in full.stderr, full
+    assert ERROR.search(full.stderr) and full.returncode == 0, full
+    assert not any('damage' == line.split()[0] for line in told), told
+
+
+def test_keeps_the_beginning_of_what_is_too_long_for_a_datagram(tmp_path):
+    path = tmp_path / 'drive.r4log'
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as talker:
+        talker.bind(('127.0.0.1', 0))
+        talker.settimeout(PATIENCE_S)
+        with record(f'udp://127.0.0.1:{talker.getsockname()[1]}?listen=0', '-o', path):
+            _, host = talker.recvfrom(2048)
+            talker.sendto(b'x' * 3000, host)
+            wait_for(path, r'^[0-9.]+ 1! oversize x{1024}$')
+    (told,), _ = info(path)
+    assert told['wires'][0]['oversize'] == 1 and told['wires'][0]['damaged'] == 0, told
 
 
 def test_files_that_follow_one_another_are_whole_in_themselves(board, tmp_path):

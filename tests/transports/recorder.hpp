@@ -48,6 +48,7 @@ class Recorder final : public Carrier::Handler {
   }
   void on_drained() override { ++drained; }
   void on_overheard(std::string_view bytes) override { overheard.emplace_back(bytes); }
+  void on_oversize(std::string_view beginning) override { oversize.emplace_back(beginning); }
 
   bool has(std::string_view text) const {
     for (const Datagram& datagram : datagrams) {
@@ -72,6 +73,7 @@ class Recorder final : public Carrier::Handler {
   std::vector<Event> events;
   int drained = 0;
   std::vector<std::string> overheard;
+  std::vector<std::string> oversize;
   std::function<void(const Datagram&)> then;  // also called
   std::function<void()> then_event;           // also called
 };

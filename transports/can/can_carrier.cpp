@@ -19,6 +19,7 @@
 #include "can_bus.hpp"
 #include "can_interface.hpp"
 #include "can_turn.hpp"
+#include "overheard_commands.hpp"
 #include "r4link/command.hpp"
 
 namespace r4 {
@@ -82,6 +83,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   const std::string name_;
   CanNode node_;
   CanTurn turn_{std::random_device{}()};  // of a host
+  OverheardCommands others_;              // to the same board
   mutable CarrierCounters counters_;      // what others count is put in when it is asked for
   std::array<Lane, 2> lanes_;
   std::shared_ptr<CanBus> bus_;
@@ -110,6 +112,7 @@ CanCarrier::CanCarrier(asio::io_context& io, Url url, Role role)
       name_(fmt::format("can://{}?node={}{}{}", url_.host(), number_, fd_ ? "&fd=1" : "",
                         role == Role::board || packs_ ? "" : "&pack=0")),
       node_(role == Role::board ? CanEnd::board : CanEnd::host, number_, fd_),
+      others_(number_),
       lanes_{
           Lane{CanLane::dialogue, SendQueue(normal_entries, state_entries, counters_.tx_dropped)},
           Lane{CanLane::telemetry, SendQueue(normal_entries, state_entries, counters_.tx_dropped)}},
@@ -242,6 +245,11 @@ bool CanCarrier::offer(std::uint32_t now_us, CanFrame& frame) {
 
 void CanCarrier::on_frame(const CanFrame& frame, std::uint32_t at_us) {
   listen_for_others(frame);
+  if (role_ == Role::host && classify(frame).kind == CanIdKind::command) {
+    const std::string_view command = others_.on_frame(frame, at_us);
+    if (!command.empty()) handler_->on_overheard(command);
+    return;
+  }
   const Text datagram = node_.on_frame(frame, at_us);
   if (datagram.empty()) return;
   ++counters_.rx_datagrams;

@@ -76,6 +76,7 @@ std::optional<ShareMessage> read_share_message(std::string_view packet) {
       return message;
     case Kind::received:
     case Kind::sent:
+    case Kind::oversize:
     case Kind::stop:
       if (rest.empty()) return std::nullopt;
       break;

@@ -12,6 +12,7 @@
 //     warning   ! KIND THING 0 REASON 0 FIX
 //     received  r DATAGRAM                      from the board
 //     sent      s DATAGRAM                      to the board, by the holder or for another
+//     oversize  o BEGINNING                     from the board: too long for a datagram
 //     stop      S DATAGRAM                      to the holder: an E:STOP for the board
 #pragma once
 
@@ -42,6 +43,7 @@ struct ShareMessage {
     warning = '!',
     received = 'r',
     sent = 's',
+    oversize = 'o',
     stop = 'S',
   };
 

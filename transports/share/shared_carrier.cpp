@@ -55,6 +55,10 @@ class SharedCarrier final : public Carrier,
   void close() noexcept override;
   SendResult send(std::string_view bytes, Priority priority, Peer to) override;
   void use_packed_form(bool wanted) override { own_->use_packed_form(wanted); }
+  void gather() override { own_->gather(); }
+  std::optional<Clock::time_point> arrival() const override {
+    return state_ == State::holding ? own_->arrival() : std::nullopt;
+  }
   bool up() const override { return up_; }
   // What is sent on a wire that another program holds the board would take for the holder's.
   bool is_shared() const override { return state_ == State::sharing || own_->is_shared(); }
@@ -71,6 +75,8 @@ class SharedCarrier final : public Carrier,
   void on_datagram(std::string_view bytes, Peer from) override;
   void on_carrier_event(const CarrierEvent& event) override;
   void on_drained() override { handler_->on_drained(); }
+  void on_overheard(std::string_view bytes) override;
+  void on_oversize(std::string_view beginning) override;
   // Those who share our wire.
   Kind standing(std::string& text) const override;
   void on_stop_of_another(std::string_view datagram) override;
@@ -263,6 +269,16 @@ void SharedCarrier::on_datagram(std::string_view bytes, Peer from) {
   if (state_ == State::holding) holder_.tell(Kind::received, bytes, priority_of(bytes));
 }
 
+void SharedCarrier::on_overheard(std::string_view bytes) {
+  handler_->on_overheard(bytes);
+  if (state_ == State::holding) holder_.tell(Kind::sent, bytes);
+}
+
+void SharedCarrier::on_oversize(std::string_view beginning) {
+  handler_->on_oversize(beginning);
+  if (state_ == State::holding) holder_.tell(Kind::oversize, beginning);
+}
+
 void SharedCarrier::on_carrier_event(const CarrierEvent& event) {
   // A board that is found elsewhere is another name.
   const bool renamed = name_ != own_->name();
@@ -323,6 +339,10 @@ void SharedCarrier::on_message(const ShareMessage& message) {
       break;
     case Kind::sent:
       handler_->on_overheard(message.text);
+      break;
+    case Kind::oversize:
+      ++shared_counters_.rx_oversize;
+      handler_->on_oversize(message.text);
       break;
     case Kind::up:
       name_ = std::string(message.text);

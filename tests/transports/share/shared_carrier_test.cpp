@@ -42,6 +42,7 @@ struct Device {
     return sent;
   }
   void deliver(const std::string& datagram);
+  void overhear(const std::string& datagram);
   void report(const CarrierEvent& event);
 };
 
@@ -93,7 +94,19 @@ void Device::deliver(const std::string& datagram) {
   const std::lock_guard lock(mutex);
   ASSERT_NE(open, nullptr) << "nobody has it open";
   asio::post(open->io_, [this, wire = open, datagram] {
-    if (wire->handler_ != nullptr) wire->handler_->on_datagram(datagram, everyone);
+    if (wire->handler_ == nullptr) return;
+    if (datagram.size() > max_datagram) {
+      wire->handler_->on_oversize(std::string_view(datagram).substr(0, max_datagram));
+    } else {
+      wire->handler_->on_datagram(datagram, everyone);
+    }
+  });
+}
+
+void Device::overhear(const std::string& datagram) {
+  const std::lock_guard lock(mutex);
+  asio::post(open->io_, [wire = open, datagram] {
+    if (wire->handler_ != nullptr) wire->handler_->on_overheard(datagram);
   });
 }
 
@@ -240,6 +253,20 @@ TEST_F(SharedCarrier, ThoseThatWatchHearBothDirections) {
     EXPECT_GT(each->heard.drained, 0);
   }
   EXPECT_TRUE(driver->heard.overheard.empty());
+}
+
+TEST_F(SharedCarrier, AllHearWhatAnotherHostSaysOnTheWireAndWhatIsTooLong) {
+  const auto driver = opened(BoardRole::control);
+  const auto watcher = opened(BoardRole::watch);
+  device.overhear("O:358,1,1;");
+  device.deliver(std::string(2000, 'x'));
+  device.deliver("last");
+  ASSERT_TRUE(run_until(io, [&] { return watcher->has("last"); }));
+  for (const auto& each : {driver.get(), watcher.get()}) {
+    EXPECT_EQ(each->heard.overheard, std::vector<std::string>{"O:358,1,1;"});
+    EXPECT_EQ(each->heard.oversize, std::vector<std::string>{std::string(max_datagram, 'x')});
+  }
+  EXPECT_EQ(watcher->carrier->counters().rx_oversize, 1U);
 }
 
 TEST_F(SharedCarrier, WhoWatchesStopsTheBoardAndSaysNothingElse) {
