@@ -13,6 +13,7 @@
 //     received  r DATAGRAM                      from the board
 //     sent      s DATAGRAM                      to the board, by the holder or for another
 //     stop      S DATAGRAM                      to the holder: an E:STOP for the board
+//     alive     a                               to the holder, who says it back: it does not hang
 #pragma once
 
 #include <cstdint>
@@ -27,7 +28,7 @@
 namespace r4 {
 
 struct ShareMessage {
-  static constexpr char version = '1';
+  static constexpr char version = '2';
   static constexpr std::size_t max_size = 1 + max_datagram;
   static constexpr std::size_t max_name = 64;
 
@@ -43,6 +44,7 @@ struct ShareMessage {
     received = 'r',
     sent = 's',
     stop = 'S',
+    alive = 'a',
   };
 
   Kind kind = Kind::hello;
