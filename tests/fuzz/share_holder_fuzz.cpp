@@ -155,7 +155,7 @@ class Holder final : private WireHolder::Owner {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   r4::Input input(data, size);
   r4::Holder holder(input.byte() % 2 != 0);
-  for (int i = 0; i < 500 && !input.empty(); ++i) holder.act(input);
+  for (int i = 0; i < 200 && !input.empty(); ++i) holder.act(input);
   holder.end();
   return 0;
 }
