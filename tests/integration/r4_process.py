@@ -39,6 +39,22 @@ def lasts(seconds):
     time.sleep(seconds)
 
 
+def text_of(path):
+    """What can be read of a recording."""
+    if path.suffix != '.zst':
+        return path.read_bytes().decode('ascii')
+    unpacked = subprocess.run(['zstd', '-dcq', path], capture_output=True, check=False).stdout
+    return unpacked.decode('ascii')
+
+
+def wait_for(path, pattern):
+    """Until a line of the recording has it."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not (path.exists() and re.search(pattern, text_of(path), re.MULTILINE)):
+        assert time.monotonic() < deadline, f'{pattern} is not in {path}'
+        lasts(0.02)
+
+
 class Running:
     """r4 as it runs. Each line of its stdout is kept with the time at which it came."""
 

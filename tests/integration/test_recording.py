@@ -11,7 +11,8 @@ import time
 
 import pytest
 
-from r4_process import ERROR, PATIENCE_S, R4, Board, Running, driving, lasts, objects, run
+from r4_process import (ERROR, PATIENCE_S, R4, Board, Running, driving, lasts, objects, run, text_of,
+                        wait_for)
 
 DATA_BAD, USAGE, REFUSED, OPEN, PERMISSION = 1, 2, 3, 4, 5
 
@@ -20,22 +21,6 @@ DATA_BAD, USAGE, REFUSED, OPEN, PERMISSION = 1, 2, 3, 4, 5
 def a_board():
     with Board('udp://127.0.0.1:0') as board:
         yield board
-
-
-def text_of(path):
-    """What can be read of it."""
-    if path.suffix != '.zst':
-        return path.read_bytes().decode('ascii')
-    unpacked = subprocess.run(['zstd', '-dcq', path], capture_output=True, check=False).stdout
-    return unpacked.decode('ascii')
-
-
-def wait_for(path, pattern):
-    """Until a line of the recording has it."""
-    deadline = time.monotonic() + PATIENCE_S
-    while not (path.exists() and re.search(pattern, text_of(path), re.MULTILINE)):
-        assert time.monotonic() < deadline, f'{pattern} is not in {path}'
-        lasts(0.02)
 
 
 @contextlib.contextmanager

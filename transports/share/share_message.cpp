@@ -65,6 +65,7 @@ std::optional<ShareMessage> read_share_message(std::string_view packet) {
       break;
     case Kind::yours:
     case Kind::moved:
+    case Kind::alive:
       if (!rest.empty()) return std::nullopt;
       break;
     case Kind::up:

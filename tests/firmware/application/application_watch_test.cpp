@@ -128,9 +128,13 @@ TEST_F(ApplicationWatched, AWatcherCommandsNothingButStops) {
   board.take();
   board.receive("O:5,1,2;PNum:70;T:1;", watcher.at);
   board.receive("H:ROS2-R4;PNum:71;T:1;", watcher.at);
+  // A farewell that echoes as one of the host's does.
+  const std::string t = std::to_string(board.newest_t());
+  board.receive("E:LEAVE;PNum:72;T:" + t + ";", watcher.at);
   EXPECT_EQ(board.outputs().osmc[1].pwm, 0);
   EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
-  board.receive("E:STOP;PNum:72;T:1;", watcher.at);
+  EXPECT_EQ(board.state(), BoardState::active);
+  board.receive("E:STOP;PNum:73;T:1;", watcher.at);
   EXPECT_EQ(board.outputs().osmc[0].pwm, 0);
   EXPECT_EQ(board.application->reason(), SafeReason::stop);
 }
