@@ -27,8 +27,8 @@ namespace {
 constexpr std::size_t normal_entries = 32;
 constexpr std::size_t state_entries = 1;  // newest wins
 constexpr std::uint32_t look_again_us = 20000;
-// Of a board two heartbeats, of its host three: who was not heard for so long is not there.
-constexpr std::chrono::milliseconds board_silence{1000};
+// Of a board six heartbeats, of its host three: who was not heard for so long is not there.
+constexpr std::chrono::milliseconds board_silence{3000};
 constexpr std::chrono::milliseconds host_silence{300};
 
 class CanCarrier final : public Carrier, private CanBus::Member {
