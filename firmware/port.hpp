@@ -27,6 +27,9 @@ class Port {
   // Send the packed form from now on, on a port that has one (CAN), to a host that does: the setting
   // `pack`, while a host is in control.
   virtual void use_packed_form(bool wanted) { static_cast<void>(wanted); }
+  // Is it a bus (CAN), where what it sends is heard by all that are there, and by nobody else? Then who asks
+  // for states need not prove where it is.
+  virtual bool is_bus() const { return false; }
   // Is it a cable of the board's own? Only from there are the settings taken that tell how the board
   // is wired and reached (site_settings.hpp).
   virtual bool may_configure() const { return false; }

@@ -268,7 +268,7 @@ void AsyncBoard::Impl::on_overheard(std::string_view bytes) {
 SendResult AsyncBoard::Impl::transmit(std::string_view datagram, Priority priority) {
   if (!has_link()) return SendResult::down;
   const bool listens = session.board_role() == BoardRole::watch && carrier->is_shared();
-  if (listens && priority != Priority::stop) return SendResult::busy;
+  if (listens && priority != Priority::stop && !datagram.starts_with("W:")) return SendResult::down;
   const SendResult result = carrier->send(datagram, priority);
   if (result == SendResult::sent) tap.on_sent(datagram);
   return result;

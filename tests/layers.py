@@ -62,6 +62,7 @@ ALLOWED = {
     'host': HOST,
     'tools/r4/shell': SIMULATED,
     'tools/r4/drive': SHELL,
+    'tools/r4/list': SHELL,
     'tools/r4/bus': SHELL,
     'tools/r4/formats': SHELL | {'tools/r4/bus'},
     'tools/r4/formats/mcap': SHELL | {'tools/r4/bus', 'tools/r4/formats'},

@@ -113,7 +113,10 @@ void Application::on_group(Source from, const Datagram& datagram, Verdict verdic
 // Of anyone, also of a board with a key: what is streamed is no secret, and nothing is commanded by it.
 void Application::on_watch(Source from, const Datagram& datagram, const Command& command,
                            std::uint32_t now_ms) {
-  if (!authentication_.has_chance()) return refuse(from, datagram, Refusal::unknown, now_ms);
+  const bool proven = ports_[from.port].port->is_bus();
+  if (!proven && !authentication_.has_chance()) {
+    return refuse(from, datagram, Refusal::unknown, now_ms);
+  }
   FieldSet fields;
   if (!command.text.empty()) {
     const Refusal refusal = parse_fields(command.text, fields);
@@ -121,7 +124,7 @@ void Application::on_watch(Source from, const Datagram& datagram, const Command&
   }
   if (link_.has_owner() && from == link_.owner()) return;  // all goes there
   const std::uint32_t rate_hz = static_cast<std::uint32_t>(command.value);
-  switch (watchers_.on_lease(from, rate_hz, datagram.time_ms(), now_ms)) {
+  switch (watchers_.on_lease(from, rate_hz, datagram.time_ms(), proven, now_ms)) {
     case Watchers::Effect::watching: {
       Watcher& watcher = *watchers_.find(from);
       watcher.chooses = !command.text.empty();

@@ -138,8 +138,8 @@ class R4LINK_API Carrier {
   // At a board: does that peer get what is sent to everyone?
   virtual bool reaches(Peer peer) const { return peer == everyone; }
 
-  // At a host: is its place to send from that of every host, as on a CAN bus? Then who only watches sends nothing
-  // but a stop.
+  // Is it a bus (CAN), on which what a board says is heard by all, and all its hosts send from one place? Then who
+  // only watches sends nothing but stops and leases (W), and a board asks for no proof of those.
   virtual bool is_shared() const { return false; }
 
   // Sends the packed form from now on, where there is one (CAN). Received are both at any time.

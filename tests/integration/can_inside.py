@@ -13,14 +13,14 @@ import urllib.request
 
 import pytest
 
-from r4_process import (ERROR, PATIENCE_S, R4, Board, Running, driving, is_link, is_state, lasts, monitor, objects, run,
-                        watch)
+from r4_process import (ERROR, PATIENCE_S, R4, Board, Running, driving, is_link, is_state, lasts, monitor, objects,
+                        run, stop_takes_ms, watch)
 
 # The board's timeout, what docs/safety.md promises on top, and what an emulated machine may take.
 SAFE_WITHIN_MS = 1020 + 80
 BUS = 'can://vcan0?node=3'
 IN_PLAIN_TEXT = BUS + '&pack=0'
-EMERGENCY, WENT_SAFE, COMMAND, REPLY, TELEMETRY = 0x010, 0x023, 0x183, 0x203, 0x403
+EMERGENCY, WENT_SAFE, COMMAND, REPLY, TELEMETRY, WATCH = 0x010, 0x023, 0x183, 0x203, 0x403, 0x603
 
 
 def ip(*arguments):
@@ -270,14 +270,48 @@ def test_an_interface_that_goes_down_is_told_of_and_comes_back(board):
         host.next(is_state)
 
 
-def test_who_watches_is_in_nobodys_way(board):
+def drives(pwm):
+    return lambda each: is_state(each) and each['fields'].get('OSMC1') == [pwm, 1]
+
+
+def test_first_steps_in_either_order(board):
+    def nobody_drives(watcher):
+        watcher.skip_past()
+        watcher.next(lambda each: is_state(each) and each['fields']['SAFE'] == 1)
+
     with watch(board.host_url) as early:
+        nobody_drives(early)
+        for pwm in (100, 200):
+            sent = run('send', board.host_url, 'R:1,On', f'O:{pwm},1,1', timeout=60)
+            assert sent.returncode == 0, sent
+            early.next(drives(pwm))
+            nobody_drives(early)
         with driving(board.host_url, 'O:358,1,1') as host, watch(board.host_url) as late:
             for each in (early, late):
-                each.next(lambda state: is_state(state) and state['fields'].get('OSMC1') == [358, 1])
+                each.next(drives(358))
+            stop_takes_ms(board.host_url)
+            for each in (early, late):
+                each.next(lambda state: is_state(state) and state['fields'].get('SAFE') == 2)
             host.process.kill()
-            board.state('SAFE', 'link')
-        assert run('send', board.host_url, 'O:1,1,1', timeout=60).returncode == 0
+            board.state('SAFE', 'stop')
+        assert run('send', board.host_url, 'E:CLEAR', 'O:1,1,1', timeout=60).returncode == 0
+
+
+def test_who_watches_sends_a_frame_of_its_own_and_only_while_nobody_drives(board):
+    # As of another computer, where the bus has two ends: it shares no wire with who drives.
+    url = elsewhere(board)[0][0] if elsewhere(board) else board.host_url
+    with watch(url) as watcher, Dump(board.bus) as dump:
+        watcher.next(is_state)
+        assert {(frame, data) for frame, data in dump.frames if frame in (COMMAND, WATCH)} <= {(WATCH, '')}
+        with driving(board.host_url, 'O:358,1,1'):
+            watcher.next(drives(358))
+            dump.frames.clear()
+            dump.more(500)
+            assert any(frame == COMMAND for frame, _ in dump.frames)
+            assert not any(frame == WATCH for frame, _ in dump.frames)
+        watcher.skip_past()
+        watcher.next(lambda each: is_state(each) and each['fields']['SAFE'] == 1)
+        assert any(frame == WATCH for frame, _ in dump.frames)
 
 
 def test_what_a_host_of_another_computer_says_is_recorded(tmp_path):
@@ -388,7 +422,11 @@ def test_a_bus_is_shown_with_all_of_its_boards(tmp_path):
     with Board('can://vcan0?node=2-4', listens=3), monitor(IN_PLAIN_TEXT) as host:  # to have some load
         in_control(host)
         listed = {each.get('interface'): each for each in objects(run('list', '--json', timeout=60).stdout)}
-        assert [board['node'] for board in listed['vcan0']['boards']] == [2, 3, 4]
+        boards = listed['vcan0']['boards']
+        assert [(each['node'], each['board_id'], each['busy']) for each in boards] == [
+            (2, 'sim-0', False), (3, 'sim-1', True), (4, 'sim-2', False)], boards
+        assert boards[1]['held_by'] == {'program': 'r4', 'pid': host.process.pid, 'controls': True}, boards
+        assert 'held_by' not in boards[0], boards
         assert listed['can0']['state'] == 'error-active' and listed['can0']['bitrate'] == 1000000
         assert listed['can0']['boards'] == []
 
@@ -432,7 +470,7 @@ def test_prometheus_is_told_how_busy_a_bus_is_and_for_whom():
             deadline = time.monotonic() + PATIENCE_S
             while busy_seconds().get(3, 0) < 0.01:
                 assert time.monotonic() < deadline, busy_seconds()
-            assert busy_seconds()[3] > busy_seconds().get(2, 0), 'the one that nobody drives sends heartbeats alone'
+            assert busy_seconds()[3] > busy_seconds().get(2, 0), 'the one that nobody drives sends few states'
 
 
 def test_r4_bus_tells_that_it_needs_the_data_bit_rate():

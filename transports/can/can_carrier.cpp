@@ -28,6 +28,9 @@ namespace {
 constexpr std::size_t normal_entries = 32;
 constexpr std::size_t state_entries = 1;  // newest wins
 constexpr std::uint32_t look_again_us = 20000;
+// Of a board six heartbeats, of its host three: who was not heard for so long is not there.
+constexpr std::chrono::milliseconds board_silence{3000};
+constexpr std::chrono::milliseconds host_silence{300};
 
 class CanCarrier final : public Carrier, private CanBus::Member {
  public:
@@ -68,6 +71,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
 
   Lane& lane(CanLane which) { return lanes_[which == CanLane::dialogue ? 0 : 1]; }
   SendResult send_stop(std::string_view bytes);
+  SendResult send_lease(std::string_view bytes);
   bool begin(std::string_view bytes, std::uint32_t now_us);
   bool begin_waiting(std::uint32_t now_us);
   void listen_for_others(const CanFrame& frame);
@@ -88,12 +92,18 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   std::array<Lane, 2> lanes_;
   std::shared_ptr<CanBus> bus_;
   std::optional<std::uint32_t> announced_stop_;  // its number
+  // When they were heard last, by a host's end.
+  Clock::time_point board_heard_;
+  Clock::time_point host_heard_;
   Handler* handler_ = nullptr;
   LoopTimer timer_;
   OperationSlot timing_;
   bool armed_ = false;
   std::uint32_t armed_for_us_ = 0;
 };
+
+bool is_lease(std::string_view bytes) { return bytes.starts_with("W:"); }
+bool ends_lease(std::string_view bytes) { return bytes.starts_with("W:0;"); }
 
 // Whether a board packs is its setting, not its URL's.
 std::uint8_t node_of(const Url& url, Role role) {
@@ -145,7 +155,8 @@ void CanCarrier::open(Handler& handler) {
   bus_ = bus;
   handler_ = &handler;
   bus->join(*this, role_ == Role::board
-                       ? std::vector<std::uint32_t>{emergency_stop_id, command_id(number_)}
+                       ? std::vector<std::uint32_t>{emergency_stop_id, command_id(number_),
+                                                    watch_id(number_)}
                        : std::vector<std::uint32_t>{reply_id(number_), telemetry_id(number_),
                                                     command_id(number_)});
   if (bus->up()) on_bus({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
@@ -176,6 +187,7 @@ SendResult CanCarrier::send(std::string_view bytes, Priority priority, Peer) {
     ++(result == SendResult::sent ? counters_.tx_datagrams : counters_.tx_errors);
     return result;
   }
+  if (role_ == Role::host && is_lease(bytes)) return send_lease(bytes);
   if (role_ == Role::host && !turn_.ours(Clock::now())) {
     return turn_.others() ? SendResult::busy : SendResult::down;
   }
@@ -217,11 +229,30 @@ bool CanCarrier::begin(std::string_view bytes, std::uint32_t now_us) {
   return true;
 }
 
+// By a frame that is the same whoever sends it, so that it collides with nobody's; where the board is, and no
+// host for whom it streams anyway.
+SendResult CanCarrier::send_lease(std::string_view bytes) {
+  const Clock::time_point now = Clock::now();
+  if (ends_lease(bytes)) return SendResult::down;  // others may watch, too: it runs out
+  if (now - board_heard_ > board_silence || now - host_heard_ < host_silence) {
+    return SendResult::down;
+  }
+  node_.ask_for_states();
+  bus_->send();
+  return SendResult::sent;
+}
+
 // What another host sends to our board: commands; its flow control is the same as ours.
 void CanCarrier::listen_for_others(const CanFrame& frame) {
-  const bool command =
-      classify(frame).kind == CanIdKind::command && !isotp_frame::is_flow_control(frame);
-  if (role_ != Role::host || !command || !turn_.on_other(Clock::now())) return;
+  if (role_ != Role::host) return;
+  const Clock::time_point now = Clock::now();
+  if (classify(frame).kind != CanIdKind::command) {
+    board_heard_ = now;
+    return;
+  }
+  if (isotp_frame::is_flow_control(frame)) return;
+  host_heard_ = now;
+  if (!turn_.on_other(now)) return;
   node_.stop_commanding();
   lane(CanLane::dialogue).queue.clear();
 }

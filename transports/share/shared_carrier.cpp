@@ -288,7 +288,7 @@ SendResult SharedCarrier::send(std::string_view bytes, Priority priority, Peer t
     }
     case State::sharing:
       // Nothing else is ours to say: the board would take it for the holder's.
-      if (priority != Priority::stop) return SendResult::sent;
+      if (priority != Priority::stop) return SendResult::down;
       ++shared_counters_.tx_datagrams;
       shared_counters_.tx_bytes += bytes.size();
       return sharer_.send_stop(bytes);

@@ -40,6 +40,8 @@ class WireSharer {
   // Waits for its first answer; blocks, for 200 ms at most. `moved` where it has ended. Throws Error{open},
   // naming `thing`, if none comes, or one of another version. `text` is valid until the next message.
   ShareMessage wait_for_answer(const std::string& thing);
+  // The process that holds the wire.
+  pid_t holder_pid() const { return holder_.pid; }
   // "r4 (pid 123)": the holder.
   std::string holder(std::string_view program) const;
   // It does not answer, or not as we do, or ends what we begin, or is a stranger: what to say of it.

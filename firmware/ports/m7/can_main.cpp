@@ -48,6 +48,7 @@ class CanPort final : public firmware::Port {
   }
   std::size_t max_size() const override { return max_datagram; }
   void use_packed_form(bool wanted) override { node_.use_packed_form(wanted); }
+  bool is_bus() const override { return true; }
 
  private:
   BoardClock& clock_;

@@ -84,6 +84,42 @@ TEST(ApplicationWatch, ABoardWithoutAHostStreamsToWhoWatchesItAndIsSafe) {
   EXPECT_TRUE(watcher.take(MessageKind::state).empty()) << "its lease is over";
 }
 
+// Who asks says nothing but that somebody watches (docs/can.md).
+TEST(ApplicationWatch, OnABusABoardStreamsToWhoAsksUntilAHostIsThere) {
+  TestBoard board({}, 2);
+  board.ports[1].bus = true;
+  board.run(100);
+  board.receive("W:5;", Source{0, 0});
+  board.run(1000);
+  EXPECT_TRUE(board.take(MessageKind::state, 0).empty()) << "elsewhere it proves nothing";
+  board.receive("W:5;", Source{1, 0});
+  board.run(1000);
+  const std::vector<Heard> states = board.take(MessageKind::state, 1);
+  EXPECT_NEAR(static_cast<double>(states.size()), 5, 1);
+  EXPECT_EQ(state_of(states.back()).safe, SafeReason::link);
+  EXPECT_EQ(board.state(), BoardState::connecting) << "nobody controls it";
+
+  TestHost host(board, echo_pnum, Source{1, 0});
+  host.connect();
+  EXPECT_EQ(board.state(), BoardState::active);
+  board.take(1);
+  host.stay(200);
+  board.receive("W:5;", Source{1, 0});
+  host.stay(800);
+  const std::vector<Heard> all = board.take(1);
+  for (std::size_t i = 1; i < all.size(); ++i) EXPECT_EQ(all[i].pnum, all[i - 1].pnum + 1);
+  EXPECT_NEAR(static_cast<double>(all.size()), 110, 10) << "the host's, once";
+  board.run(3000);
+  board.take(1);
+  board.receive("W:5;", Source{1, 0});
+  board.run(1000);
+  EXPECT_NEAR(static_cast<double>(board.take(MessageKind::state, 1).size()), 5, 1);
+  board.run(3000);
+  board.take(1);
+  board.run(1000);
+  EXPECT_TRUE(board.take(MessageKind::state, 1).empty()) << "nobody asks any more";
+}
+
 struct ApplicationWatched : BoardInControl {
   TestWatcher watcher{board, Source{0, 9}};
 };

@@ -164,8 +164,8 @@ numbers, several values as an array); of one board on a CAN bus, at the end, one
 
 The monitor watches: it sends no heartbeats and takes no control, and a board that no host controls
 streams to it all the same. With --control it takes part in the link, as a host that commands nothing:
-the board is ACTIVE. It goes on when the transport is lost and comes back. On a CAN bus it only
-listens: a board streams there while a host controls it; without a node it shows every board that it
+the board is ACTIVE. It goes on when the transport is lost and comes back. On a CAN bus a board that
+no host controls streams five times a second; without a node it only listens, and shows every board that it
 hears.
 
 Examples:
