@@ -3,6 +3,8 @@
 // program's.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
@@ -11,7 +13,6 @@
 #include <functional>
 #include <mutex>
 #include <optional>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -79,8 +80,8 @@ class States::Queue {
     }
     if (gap_ == 0) return std::nullopt;
     throw Error(ErrorKind::data, "states()",
-                std::to_string(most_) + " waited, and there was no room for the next " +
-                    std::to_string(std::exchange(gap_, 0)),
+                fmt::format("{} waited, and there was no room for the next {}", most_,
+                            std::exchange(gap_, 0)),
                 "take them faster, or let more wait: StatesOptions::most");
   }
   bool ended() const {

@@ -248,10 +248,10 @@ def drive_in_a_child(told):
 def test_no_reference_is_lost_or_left():
     """On the interpreter that counts them, python3.11-dbg, with the module built for it."""
     build = pathlib.Path(os.environ['R4_BUILD'])
-    ended = subprocess.run(['/usr/bin/python3.11-dbg', '-X', 'showrefcount',
-                            pathlib.Path(__file__).with_name('reference_counts.py')], capture_output=True, text=True,
-                           env={**os.environ, 'PYTHONPATH': str(build / 'python-debug')}, timeout=60, check=False)
-    assert ended.returncode == 0, ended.stdout + ended.stderr
+    ended = subprocess.run(['/usr/bin/python3.11-dbg', pathlib.Path(__file__).with_name('reference_counts.py')],
+                           capture_output=True, text=True, timeout=120, check=False,
+                           env={**os.environ, 'PYTHONPATH': str(build / 'python-debug')})
+    assert ended.returncode == 0 and ended.stderr == '', ended.stdout + ended.stderr
 
 
 def test_nothing_grows(sim):
@@ -263,7 +263,7 @@ def test_nothing_grows(sim):
     gc.collect()
     objects, threads = len(gc.get_objects()), threading.active_count()
     kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # the most so far
-    for _ in range(200):
+    for _ in range(60):
         use()
     gc.collect()
     assert len(gc.get_objects()) - objects < 50 and threading.active_count() == threads
