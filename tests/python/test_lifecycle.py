@@ -91,7 +91,7 @@ def test_a_board_in_a_circle_is_collected(sim):
     circle = []
     board.on_state(lambda state, circle=circle: circle)  # the board knows the function, the function the board
     board.wait_active()
-    circle.append(board)
+    circle += [board, board.states()]
     gone = weakref.ref(board)
     del board, circle
     for _ in range(3):

@@ -235,12 +235,11 @@ void bind_board(py::module_& module) {
       .def(
           "watchdog", [](PyBoard& board, int ms) { board->watchdog(Ms(ms)); }, Released())
       .def("feed", [](PyBoard& board) { board->feed(); })
-      .def(
-          "states",
-          [](PyBoard& board, bool lossless, std::size_t most) {
-            return board->states({lossless, most});
-          },
-          py::keep_alive<0, 1>())  // which it asks while it waits
+      // Its on_wait() is that of the board, and asked in take() alone.
+      .def("states",
+           [](PyBoard& board, bool lossless, std::size_t most) {
+             return board->states({lossless, most});
+           })
       .def(
           "take",
           [](PyBoard& board, States& states, int ms) {
