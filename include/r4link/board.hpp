@@ -21,8 +21,8 @@
 // Callbacks run on a thread of their own, one at a time, beside the thread of the link: they may call
 // anything here, and what they wait for costs no heartbeat. But a callback that does not return within
 // BoardOptions::callback_limit stops the heartbeats, so that the board goes safe, and on_event() tells of
-// it. States that come while a callback runs are told as one, the newest. An exception out of a callback
-// ends the program, as it does out of any thread.
+// it. States that come while a callback runs are told as one, the newest; states() has each of them. An
+// exception out of a callback ends the program, as it does out of any thread.
 #pragma once
 
 #include <chrono>
@@ -37,6 +37,7 @@
 #include "options.hpp"
 #include "recording.hpp"
 #include "setpoints.hpp"
+#include "states.hpp"
 #include "subscription.hpp"
 
 namespace r4 {
@@ -197,6 +198,8 @@ class R4LINK_API Board {
   ReceivedState state() const;
   // Waits for a state newer than now; throws Error{refused} when none comes in time.
   ReceivedState next_state(Duration timeout = default_timeout);
+  // The states from now on, for a loop: the newest at a time, or each of them (states.hpp).
+  States states(StatesOptions options = {});
   LinkStatus link() const;
   Statistics statistics() const;
   // What the transport has carried.

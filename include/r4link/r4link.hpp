@@ -16,6 +16,7 @@
 #include "simulated_pins.hpp"
 #include "simulation.hpp"
 #include "state.hpp"
+#include "states.hpp"
 #include "subscription.hpp"
 #include "text.hpp"
 #include "vocabulary.hpp"

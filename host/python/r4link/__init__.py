@@ -7,7 +7,7 @@ from .board import (BldcChannel, Board, DriveChannel, RelayChannel, ServoChannel
 from .errors import (CancelledError, ClosedError, DataError, DeniedError, Error, NotArmedError, NotConfirmedError,
                      OpenError, RefusedError, UnsupportedError, UsageError)
 from .recording import Log, RecordedBoard, RecordedDatagram, RecordedEvent, read
-from .simulation import Look, SimBoard
+from .simulation import LinkedUrl, Look, SimBoard, with_link
 from .values import Bldc, Direction, Drive, PostResult
 
 FORWARD = Direction.FORWARD
@@ -16,7 +16,8 @@ REVERSE = Direction.REVERSE
 __all__ = [
     'FIELDS', 'FORWARD', 'REVERSE', 'Bldc', 'BldcChannel', 'Board', 'CancelledError', 'CarrierCounters',
     'ClosedError', 'Command', 'DataError', 'DeniedError', 'Direction', 'Drive', 'DriveChannel', 'Error', 'Event',
-    'Identity', 'LinkStatus', 'Log', 'Look', 'NotArmedError', 'NotConfirmedError', 'OpenError', 'PostResult', 'Recording',
-    'RecordedBoard', 'RecordedDatagram', 'RecordedEvent', 'RefusedError', 'RefusedPost', 'RelayChannel', 'ServoChannel', 'Setpoints', 'SimBoard', 'State', 'States',
-    'Statistics', 'StepperChannel', 'Subscription', 'UnsupportedError', 'UsageError', '__version__', 'aio', 'read',
+    'Identity', 'LinkStatus', 'LinkedUrl', 'Log', 'Look', 'NotArmedError', 'NotConfirmedError', 'OpenError', 'PostResult',
+    'RecordedBoard', 'RecordedDatagram', 'RecordedEvent', 'Recording', 'RefusedError', 'RefusedPost', 'RelayChannel',
+    'ServoChannel', 'Setpoints', 'SimBoard', 'State', 'States', 'Statistics', 'StepperChannel', 'Subscription',
+    'UnsupportedError', 'UsageError', '__version__', 'aio', 'read', 'with_link',
 ]
