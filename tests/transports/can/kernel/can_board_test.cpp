@@ -35,18 +35,18 @@ TEST_P(CanBoard, EveryChannelReachesItsPinAndComesBack) {
   EXPECT_EQ(board.carrier_counters().transfers->packed != 0, GetParam().packed);
 }
 
-// An emulated machine takes milliseconds for a datagram, and tells so.
+// An emulated machine takes longer for a datagram than a real one, and tells so.
 TEST(CanSampledTime, IsWithinItsErrorAlways) {
   using namespace std::chrono_literals;
   BoardInAThread simulated("can://vcan0?node=9");
-  const SampledTruth found = look_at_sampled(simulated, simulated.url(), 700us);
+  const SampledTruth found = look_at_sampled(simulated, simulated.url(), 1500us);
   fmt::print(
       "{} states, {} farther from the truth than told; told {} us, were {} us (median), {} us "
       "(worst)\n",
       found.states, found.dishonest, found.bound / 1us, found.median_error / 1us,
       found.worst_error / 1us);
   EXPECT_EQ(found.dishonest, 0U);
-  EXPECT_LE(found.median_error, 700us);
+  EXPECT_LE(found.median_error, 1ms);
 }
 
 }  // namespace
