@@ -5,10 +5,10 @@
 //     dialogue    host to board, and the board's answers (N, I) back: ISO-TP with flow control
 //     telemetry   the board's states and heartbeats: ISO-TP without, for any number of listeners
 //
-// Three raw frames stand beside them: the emergency stop, which a board's end takes for E:STOP, and
-// the reason, which it sends when a heartbeat first tells that the board went safe; and from who
-// watches, the request for states. Datagrams are taken plain and packed, and sent packed where that is wanted; a board answers a host that writes
-// plain text in plain text.
+// Three raw frames stand beside them: the emergency stop, which a board's end takes for E:STOP; the
+// reason, which it sends when a heartbeat first tells that the board went safe; and the request for
+// states of who watches. Datagrams are taken plain and packed, and sent packed where that is wanted; a
+// board answers a host that writes plain text in plain text.
 //
 // Driven like the ISO-TP ends that it is made of (isotp.hpp). Sans-I/O, no heap, about 4.5 KB. Which
 // datagram goes next is up to a queue before it. Not for several threads.
