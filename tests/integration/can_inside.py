@@ -13,8 +13,8 @@ import urllib.request
 
 import pytest
 
-from r4_process import (ERROR, PATIENCE_S, R4, Board, Running, driving, is_link, is_state, lasts, monitor, objects,
-                        run, stop_takes_ms, watch)
+from r4_process import (DATA, ERROR, PATIENCE_S, R4, Board, Running, driving, is_link, is_state, lasts, monitor,
+                        objects, run, stop_takes_ms, watch)
 
 # The board's timeout, what docs/safety.md promises on top, and what an emulated machine may take.
 SAFE_WITHIN_MS = 1020 + 80
@@ -455,6 +455,25 @@ def test_a_bus_is_shown_with_all_of_its_boards(tmp_path):
     assert silent.returncode == 3 and ERROR.search(silent.stderr), silent
     silent = run('record', 'can://vcan0', '-o', str(tmp_path / 'silence'), '--for', '1', timeout=60)
     assert silent.returncode == 3 and 'no board was heard' in silent.stderr, silent
+
+
+def test_a_recording_is_a_board_on_the_bus(tmp_path):
+    with open(f'{DATA}/paper_capture.tsv', encoding='ascii') as capture:
+        said = [line.rstrip('\n').split('\t')[1] for line in capture if line.startswith('board')]
+    path = tmp_path / 'drive.r4log'
+    lines = ['# r4log 1 by r4', '1795468293.000000 2> E:STOP;^0x506f0fbe^',
+             *(f'{1795468293 + number / 5:.6f} 2< {datagram}' for number, datagram in enumerate(said))]
+    path.write_text('\n'.join(lines + ['']), encoding='ascii')
+    was = {each['pnum']: each['fields'] for each in objects(run('decode', stdin='\n'.join(said)).stdout)
+           if each.get('type') == 'state'}
+    with Running('replay', str(path), BUS, '--wire', '2', '--json') as replay, Dump('vcan0') as dump:
+        assert replay.next(lambda each: each['type'] == 'listening')['host_url'] == BUS
+        shown = objects(run('monitor', BUS, '--json', '--count', '5', timeout=60).stdout)
+        assert replay.end() == 0, replay.errors
+    states = [(each['pnum'], each['fields']) for each in shown if each['type'] == 'state']
+    assert len(states) == 5 and all(was[pnum] == fields for pnum, fields in states), states
+    frames = {frame for frame, _ in dump.frames}
+    assert TELEMETRY in frames and EMERGENCY not in frames, 'what hosts sent then is not sent again'
 
 
 def test_prometheus_is_told_how_busy_a_bus_is_and_for_whom():

@@ -9,6 +9,7 @@ import queue
 import re
 import signal
 import subprocess
+import sys
 import threading
 import time
 
@@ -27,6 +28,25 @@ def run(*arguments, stdin='', timeout=PATIENCE_S, **options):
     """Runs r4 to its end; text in and out."""
     return subprocess.run([R4, *arguments], input=stdin, capture_output=True, text=True,
                           timeout=timeout, check=False, **options)
+
+
+# It is a process of its own: what a child has had counts the memory of whoever started it, too.
+MEASURE = '''
+import os, sys
+child = os.posix_spawn(sys.argv[1], sys.argv[1:], os.environ)
+_, status, usage = os.wait4(child, 0)
+sys.stderr.write(f'\\n{usage.ru_maxrss}')
+sys.exit(os.waitstatus_to_exitcode(status) % 256)
+'''
+
+
+def run_measured(*arguments, **options):
+    """As run(); `peak_mib` of the result is the most memory that r4 had."""
+    result = subprocess.run([sys.executable, '-S', '-c', MEASURE, R4, *arguments], capture_output=True, text=True,
+                            timeout=6 * PATIENCE_S, check=False, **options)
+    result.stderr, _, peak_kib = result.stderr.rpartition('\n')
+    result.peak_mib = int(peak_kib) / 1024
+    return result
 
 
 def objects(text):

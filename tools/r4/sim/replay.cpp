@@ -187,7 +187,8 @@ constexpr const char* footer =
     R"(What a board of a recording said is said again, at its pace, on a transport where hosts find it: they
 see the states, heartbeats and answers of then, damaged ones too. A replayed board obeys nothing and
 answers nothing: a command is never confirmed, a stop stops nothing. Over UDP it speaks to whoever has
-spoken to it within two seconds, eight at most; on a pty and a CAN bus to all.
+spoken to it within two seconds, eight at most; on a pty and a CAN bus to all. Where its transport was
+lost then it says nothing for as long; the one that it has now stays open.
 
 For a program on this machine replay:FILE is simpler: r4 monitor replay:drive.r4log
 
