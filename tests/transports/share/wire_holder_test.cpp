@@ -155,7 +155,7 @@ TEST_F(HeldWire, ARefusalIsHeardByWhoSaysMoreThanIsRead) {
 
 TEST_F(HeldWire, AFloodOfStopsEndsAtAHundredASecond) {
   const auto holder = opened(BoardRole::control);
-  const FileDescriptor connection = raw();
+  const FileDescriptor connection = raw_watcher();
   in_time([&] {
     const int error = send_message(connection.get(), Letter::stop, stop);
     return error != 0 && error != EAGAIN;
