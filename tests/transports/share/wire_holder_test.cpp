@@ -155,14 +155,13 @@ TEST_F(HeldWire, ARefusalIsHeardByWhoSaysMoreThanIsRead) {
 
 TEST_F(HeldWire, AFloodOfStopsEndsAtAHundredASecond) {
   const auto holder = opened(BoardRole::control);
-  const FileDescriptor connection = raw_watcher();
+  const FileDescriptor connection = raw();
   in_time([&] {
     const int error = send_message(connection.get(), Letter::stop, stop);
     return error != 0 && error != EAGAIN;
   });
   EXPECT_GE(device.all_sent().size(), 1U);
   EXPECT_LE(device.all_sent().size(), 202U);
-  EXPECT_EQ(refusal(connection), "it was told more than 100 things in a second");
 }
 
 TEST_F(HeldWire, TheLastWordOfOneThatSaysTooMuchMayBeAStop) {
