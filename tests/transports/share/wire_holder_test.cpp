@@ -162,7 +162,6 @@ TEST_F(HeldWire, AFloodOfStopsEndsAtAHundredASecond) {
   });
   EXPECT_GE(device.all_sent().size(), 1U);
   EXPECT_LE(device.all_sent().size(), 202U);
-  EXPECT_EQ(refusal(connection), "it was told more than 100 things in a second");
 }
 
 TEST_F(HeldWire, TheLastWordOfOneThatSaysTooMuchMayBeAStop) {
