@@ -274,36 +274,36 @@ def drives(pwm):
     return lambda each: is_state(each) and each['fields'].get('OSMC1') == [pwm, 1]
 
 
-def test_first_steps_in_either_order(board):
+def test_first_steps_in_either_order(vcan_board):
     def nobody_drives(watcher):
         watcher.skip_past()
         watcher.next(lambda each: is_state(each) and each['fields']['SAFE'] == 1)
 
-    with watch(board.host_url) as early:
+    with watch(BUS) as early:
         nobody_drives(early)
         for pwm in (100, 200):
-            sent = run('send', board.host_url, 'R:1,On', f'O:{pwm},1,1', timeout=60)
+            sent = run('send', BUS, 'R:1,On', f'O:{pwm},1,1', timeout=60)
             assert sent.returncode == 0, sent
             early.next(drives(pwm))
             nobody_drives(early)
-        with driving(board.host_url, 'O:358,1,1') as host, watch(board.host_url) as late:
+        with driving(BUS, 'O:358,1,1') as host, watch(BUS) as late:
             for each in (early, late):
                 each.next(drives(358))
-            stop_takes_ms(board.host_url)
+            stop_takes_ms(BUS)
             for each in (early, late):
                 each.next(lambda state: is_state(state) and state['fields'].get('SAFE') == 2)
             host.process.kill()
-            board.state('SAFE', 'stop')
-        assert run('send', board.host_url, 'E:CLEAR', 'O:1,1,1', timeout=60).returncode == 0
+            vcan_board.state('SAFE', 'stop')
+        assert run('send', BUS, 'E:CLEAR', 'O:1,1,1', timeout=60).returncode == 0
 
 
-def test_who_watches_sends_a_frame_of_its_own_and_only_while_nobody_drives(board):
-    # As of another computer, where the bus has two ends: it shares no wire with who drives.
-    url = elsewhere(board)[0][0] if elsewhere(board) else board.host_url
-    with watch(url) as watcher, Dump(board.bus) as dump:
+# As of two computers, where the bus has two ends: they share no wire.
+@pytest.mark.parametrize('url, host_url', [(BUS, BUS), ('can://can0?node=3', 'can://can1?node=3')])
+def test_who_watches_sends_a_frame_of_its_own_and_only_while_nobody_drives(url, host_url):
+    with Board(url), watch(url) as watcher, Dump(url.split('/')[2].split('?')[0]) as dump:
         watcher.next(is_state)
         assert {(frame, data) for frame, data in dump.frames if frame in (COMMAND, WATCH)} <= {(WATCH, '')}
-        with driving(board.host_url, 'O:358,1,1'):
+        with driving(host_url, 'O:358,1,1'):
             watcher.next(drives(358))
             dump.frames.clear()
             dump.more(500)
