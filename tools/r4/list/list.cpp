@@ -67,7 +67,7 @@ disturbed.
 
 On USB a board is known by its id, 2341:0266 (Arduino Giga R1), and asked who it is; --serial asks at
 a port that has another id: an adapter's, or the pty of a simulated board. On CAN interfaces that are
-up it listens for 0.7 s, and asks once who has no host. On networks it asks by IPv4 broadcast, three
+up it listens for 0.7 s, and asks who has no host. On networks it asks by IPv4 broadcast, three
 times within half a second. Who has a host is heard when that one asks: all takes 1.3 s at most.
 
 Broadcast passes no router, and often no VPN, container or WiFi with client isolation:

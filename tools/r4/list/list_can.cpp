@@ -30,6 +30,8 @@ constexpr milliseconds listening{700};
 // Hosts ask each second who their board is.
 constexpr milliseconds longest{1300};
 constexpr milliseconds look_again{20};
+constexpr milliseconds between_questions{150};
+constexpr int most_questions = 3;
 
 std::string url_of(const ListedBus& bus, std::uint8_t node) {
   return fmt::format("can://{}?node={}", bus.interface.name, node);
@@ -64,13 +66,15 @@ class NodeQuestion final : private Carrier::Handler {
  private:
   // As soon as nobody else was heard for as long as a host listens that comes.
   void ask() {
+    if (board_.identity) return;
     const SendResult result = carrier_->send(identity_question(), Priority::normal);
     if (result == SendResult::busy) {
       board_.other_host = true;
       carrier_.reset();
     }
-    if (result != SendResult::down) return;
-    timer_.expires_after(look_again);
+    if (result == SendResult::sent) ++asked_;
+    if (board_.identity || board_.other_host || asked_ == most_questions) return;
+    timer_.expires_after(result == SendResult::sent ? between_questions : look_again);
     timer_.async_wait([this](const std::error_code& error) {
       if (!error) ask();
     });
@@ -82,6 +86,7 @@ class NodeQuestion final : private Carrier::Handler {
   HeldWire held_;
   std::unique_ptr<Carrier> carrier_;
   asio::steady_timer timer_;
+  int asked_ = 0;
 };
 
 // One interface, while it is listened to.

@@ -20,7 +20,7 @@ struct ListedBus {
 };
 
 // Listens for boards for 0.7 s, and for 1.3 s where one has not told who it is. A board without a host is asked
-// once, as a host sends that comes to the bus; of one that has a host, it hears what that one asks.
+// three times at most, as a host sends that comes to the bus; of one that has a host, it hears what that one asks.
 std::vector<ListedBus> list_buses();
 
 void print_text(const std::vector<ListedBus>& buses);
