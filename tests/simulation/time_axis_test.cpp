@@ -11,7 +11,7 @@
 #include <memory>
 #include <string>
 
-#include "firmware/application.hpp"
+#include "firmware/application/application.hpp"
 #include "host/session/session.hpp"
 #include "random.hpp"
 
