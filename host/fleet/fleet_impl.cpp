@@ -25,6 +25,12 @@ Fleet::Duration bounded(Fleet::Duration timeout) {
   return std::clamp<Fleet::Duration>(timeout, Fleet::Duration{0}, std::chrono::hours{24});
 }
 
+// Where more than this happens in a window, each datagram of hundreds of boards would wake the thread: then it looks
+// again after a pause, and finds several.
+constexpr std::chrono::milliseconds window{10};
+constexpr std::size_t busy_window = 200;
+constexpr std::chrono::microseconds breather{200};
+
 Error closed_error(std::string_view what) {
   return Error(Problem{ErrorKind::refused, std::string(what), "the fleet was closed",
                        "open it again with another Fleet", Outcome::closed});
@@ -66,7 +72,7 @@ Fleet::Impl::Impl(const std::vector<std::string>& patterns, BoardOptions options
     boards.push_back(std::make_unique<AsyncBoard>(io, urls[i], options));
     listen(i);
   }
-  thread = std::thread([this] { io.run(); });
+  thread = std::thread([this] { run(); });
   // On the loop, where no name that is looked up holds the others up.
   std::exception_ptr trouble;
   asio::post(io, [&] {
@@ -98,6 +104,22 @@ void Fleet::Impl::close() {
 }
 
 // --- on the loop
+
+void Fleet::Impl::run() {
+  auto since = Clock::now();
+  std::size_t handled = 0;
+  bool busy = false;
+  while (io.run_one() != 0) {
+    handled += 1 + io.poll();
+    const auto now = Clock::now();
+    if (now - since >= window) {
+      busy = handled >= busy_window && now - since < 2 * window;
+      since = now;
+      handled = 0;
+    }
+    if (busy) std::this_thread::sleep_for(breather);
+  }
+}
 
 void Fleet::Impl::listen(std::size_t board) {
   AsyncBoard& async = *boards[board];

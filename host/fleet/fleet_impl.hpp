@@ -86,6 +86,7 @@ struct Fleet::Impl {
 
   // --- on the loop
 
+  void run();
   void listen(std::size_t board);
   void tell(FleetEvent event);
   CallPtr call_of(std::string text, const Boards& which, Start start) const;
