@@ -228,7 +228,7 @@ void measure(std::size_t count, std::chrono::seconds seconds, double reference_u
               received / length, static_cast<unsigned long long>(lost), host_us,
               host_us / reference_us, cpu_s / length * 100, host_kb, board_us,
               boards_after.kb_a_board, post_ms, stop_ms, stopped ? "" : "!", notice_ms);
-  // What Asio keeps of timers grows once in a while.
+  // What Asio keeps of timers, and the queue of events, grow once in a while.
   if (heap != 0) std::printf("       %llu allocations\n", static_cast<unsigned long long>(heap));
   static const double alone_ms = notice_ms;
   if (count < 1000) return;
@@ -237,7 +237,7 @@ void measure(std::size_t count, std::chrono::seconds seconds, double reference_u
       "%s; "
       "silence within 20 ms of alone: %s\n",
       verdict(lost == 0), verdict(host_us <= 1.25 * reference_us), verdict(host_kb <= 24),
-      verdict(heap < 10), verdict(board_us <= 6), verdict(boards_after.kb_a_board <= 64),
+      verdict(heap < 100), verdict(board_us <= 6), verdict(boards_after.kb_a_board <= 64),
       verdict(notice_ms > 0 && notice_ms <= alone_ms + 20));
 }
 
