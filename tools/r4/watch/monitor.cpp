@@ -147,8 +147,12 @@ bool is_whole_bus(const std::string& text) {
 }
 
 int monitor(const Options& options) {
-  if (options.urls.size() == 1 && is_whole_bus(options.urls.front())) {
-    const Url url = Url::parse(options.urls.front());
+  std::vector<std::string> urls;
+  for (const std::string& pattern : options.urls) {
+    for (PatternUrl& each : expand_urls(pattern)) urls.push_back(std::move(each.url));
+  }
+  if (urls.size() == 1 && is_whole_bus(urls.front())) {
+    const Url url = Url::parse(urls.front());
     const std::string& interface = can_interface_of(url);
     if (!options.fields.empty()) {
       throw Error(ErrorKind::usage, "--fields", "only one board can be asked for its fields",
@@ -156,10 +160,6 @@ int monitor(const Options& options) {
     }
     monitor_bus({interface, options.json, options.count, options.duration});
     return 0;
-  }
-  std::vector<std::string> urls;
-  for (const std::string& pattern : options.urls) {
-    for (PatternUrl& each : expand_urls(pattern)) urls.push_back(std::move(each.url));
   }
   if (urls.size() > 1) {
     monitor_boards({urls, board_options(options), options.json, options.count, options.duration});
