@@ -30,10 +30,7 @@ AsyncBoard::Impl::Impl(asio::io_context& context, std::unique_ptr<Carrier> trans
       heartbeat_ms(options.session.timing.heartbeat_ms),
       session(*this, with_clock(std::move(options.session), steady_now()),
               Session::random_first_pnum(), options.role),
-      timer(context) {
-  waiting.reserve(Session::max_pending + Session::max_stops);
-  ended.reserve(Session::max_pending + Session::max_stops);
-}
+      timer(context) {}
 
 Time AsyncBoard::Impl::time_of(Duration timeout) {
   return std::clamp<Duration>(timeout, Duration{0}, std::chrono::hours{24});

@@ -16,8 +16,8 @@
 #include <utility>
 #include <vector>
 
+#include "r4link/board.hpp"
 #include "r4link/error.hpp"
-#include "r4link/states.hpp"
 
 namespace r4 {
 

@@ -54,6 +54,7 @@ ALLOWED = {
     'firmware/ports/giga/links': FIRMWARE | {'firmware/ports', 'firmware/ports/giga/chip'},
     'firmware/ports/giga': FIRMWARE | {'firmware/ports/giga/chip', 'firmware/ports/giga/links'},
     'host/commands': TRANSPORTS,
+    'host/fleet': HOST,
     'host/measurement': TRANSPORTS,
     'host/recording': TRANSPORTS,
     'host/replay': TRANSPORTS | {'host/recording'},

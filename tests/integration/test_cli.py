@@ -148,7 +148,7 @@ NO_BOARD = 'udp://127.0.0.1:9?listen=0'
     (['monitor', 'sim:', '--count', 'many'], USAGE, 'is no whole number'),
     (['monitor', 'sim:', '--duration', '-1'], USAGE, 'is no time'),
     (['monitor', 'sim:', '--fields', 'AIN99'], USAGE, 'no such state field'),
-    (['monitor', 'sim:', 'sim:?node=2'], USAGE, 'several links'),
+    (['bench', 'sim:', 'sim:?node=2'], USAGE, 'several links'),
     (['send', 'sim:', 'sim:?node=2', 'O:1,1,1'], USAGE, 'several links'),
     (['monitor', 'ftp://192.168.1.77'], USAGE, "no transport 'ftp'"),
     (['monitor', 'nonsense'], USAGE, 'nonsense'),

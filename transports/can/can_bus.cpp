@@ -349,7 +349,32 @@ void CanBus::send_later() {
   writable_.start(socket_.number(), [this] { send(); });
 }
 
-SendResult CanBus::send_stop(const CanFrame& frame) {
+SendResult CanBus::announce_stop(std::optional<std::uint32_t> number) {
+  if (!number || announced_stop_ != number) {
+    CanFrame frame{};
+    frame.id = emergency_stop_id;
+    const SendResult bare = send_first(frame);
+    if (bare != SendResult::sent || !number) return bare;
+    announced_stop_ = number;
+  }
+  return repeat_stop(*number);
+}
+
+SendResult CanBus::repeat_stop(std::uint32_t number) {
+  const Clock::time_point now = Clock::now();
+  if (numbered_stop_ == number && now - stop_left_ < stop_spacing) return SendResult::sent;
+  CanFrame frame{};
+  frame.extended = true;
+  frame.id = numbered_stop_id(number);
+  const SendResult result = send_first(frame);
+  if (result == SendResult::sent) {
+    numbered_stop_ = number;
+    stop_left_ = now;
+  }
+  return result;
+}
+
+SendResult CanBus::send_first(const CanFrame& frame) {
   if (socket_.number() < 0) return SendResult::down;
   switch (socket_.send_first(frame)) {
     case CanSocket::Outcome::done:

@@ -200,25 +200,18 @@ SendResult CanCarrier::send(std::string_view bytes, Priority priority, Peer) {
   return result;
 }
 
-// The bare frame first, which every board on any version of this plan obeys, and behind it the one with
-// the number by which the stop is confirmed. That alone is repeated: to a board a bare frame is a
-// new stop each time, and who has seen the one would have to look again before they clear it.
+// Only its number is repeated: to a board a bare frame is a new stop each time, and who has seen the one
+// would have to look again before they clear it.
 SendResult CanCarrier::send_stop(std::string_view bytes) {
-  CanFrame frame{};
-  frame.id = emergency_stop_id;
   Datagram stop;
   std::uint32_t number = 0;
   const bool numbered =
       read_datagram(Text(bytes.data(), bytes.size()), stop) && stop_number(stop, number);
-  SendResult bare = SendResult::sent;
-  if (!numbered || announced_stop_ != number) {
-    bare = bus_->send_stop(frame);
-    if (bare == SendResult::sent && numbered) announced_stop_ = number;
-  }
-  if (!numbered) return bare;
-  frame.extended = true;
-  frame.id = numbered_stop_id(number);
-  return bus_->send_stop(frame);
+  if (!numbered) return bus_->announce_stop({});
+  if (announced_stop_ == number) return bus_->repeat_stop(number);
+  const SendResult result = bus_->announce_stop(number);
+  if (result == SendResult::sent) announced_stop_ = number;
+  return result;
 }
 
 bool CanCarrier::begin(std::string_view bytes, std::uint32_t now_us) {

@@ -79,6 +79,8 @@ class I2cBusModel final : public firmware::I2cBus {
   std::uint64_t now_ns() const;
   std::uint64_t now_us() const { return now_ns() / 1000; }
   void advance(std::uint64_t us);
+  // Begun so far; wraps.
+  std::uint32_t transfers() const { return transfers_; }
 
   // Errors; false if there are max_errors of that kind already. Transfers to `address` are not
   // acknowledged after `after_bytes` bytes of data (0: the address itself), `times` times.
