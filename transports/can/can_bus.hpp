@@ -183,4 +183,16 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   std::array<CanSocket::Received, CanSocket::batch> in_;
 };
 
+// Members may leave, and others join, in any call of theirs: those come later than what is told.
+template <class Action>
+void CanBus::for_each_member(Action action) {
+  ++calling_;
+  const std::size_t count = members_.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (members_[i].member != nullptr) action(*members_[i].member);
+  }
+  --calling_;
+  clear_places();
+}
+
 }  // namespace r4
