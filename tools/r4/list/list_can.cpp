@@ -115,8 +115,12 @@ class BusQuestion {
     }
   }
   bool all_answered() const {
-    return std::all_of(nodes_.begin(), nodes_.end(),
-                       [](const auto& each) { return each.second->answered(); });
+    for (std::uint8_t node = 0; listener_ && node < can_nodes; ++node) {
+      const auto question = nodes_.find(node);
+      const bool answered = question != nodes_.end() && question->second->answered();
+      if (listener_->survey().board(node).heard() && !answered) return false;
+    }
+    return true;
   }
 
  private:
