@@ -433,7 +433,7 @@ def test_a_bus_is_shown_with_all_of_its_boards(tmp_path):
         listed = listed_interfaces(is_told=lambda board: 'board_id' in board)
         boards = listed['vcan0']['boards']
         assert [(each['node'], each.get('board_id'), each.get('busy')) for each in boards] == [
-            (2, 'sim-0', False), (3, 'sim-1', True), (4, 'sim-2', False)], boards
+            (2, 'sim-2', False), (3, 'sim-3', True), (4, 'sim-4', False)], boards
         assert boards[1]['held_by'] == {'program': 'r4', 'pid': host.process.pid, 'controls': True}, boards
         assert 'held_by' not in boards[0], boards
         assert listed['can0']['state'] == 'error-active' and listed['can0']['bitrate'] == 1000000

@@ -57,7 +57,7 @@ def test_tells_what_happens_to_its_boards(fleet):
 
 def test_has_one_recording(fleet, tmp_path):
     path = tmp_path / 'fleet.r4log'
-    recording = r4link.Recording(os.fspath(path), 0, 0, 0)
+    recording = r4link.Recording(path)
     fleet.record(recording)
     fleet.send('E:STOP').require()
     fleet.close()
