@@ -8,6 +8,7 @@ namespace r4::tool::ros2 {
 namespace {
 
 constexpr std::chrono::milliseconds turn{10};
+constexpr int turns_saved = 3;                // by who was quiet
 constexpr std::size_t most_publishers = 256;  // of one topic, that are told apart
 
 }  // namespace
@@ -142,8 +143,8 @@ void Inbox::drain() {
       source->waiting.clear();
     }
   }
-  next_ = Clock::now() + turn;
   if (all.empty()) return;
+  next_ = std::max(next_, Clock::now() - turns_saved * turn) + turn;
   std::sort(all.begin(), all.end(), [](const Waiting& a, const Waiting& b) {
     const bool a_first = a.kind == Kind::urgent;
     const bool b_first = b.kind == Kind::urgent;

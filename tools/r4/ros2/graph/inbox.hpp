@@ -2,8 +2,9 @@
 // What comes from the graph, read by a thread of its own and handed to the loop of the boards.
 //
 // The thread waits for samples, judges their form, and puts them into a queue with little room, in which the newest
-// of a subscription wins. The loop takes them out at once, then not again for 10 ms: however many a network
-// floods, a board's heartbeats wait for no more than one such turn. What is urgent, a stop, is always taken at once.
+// of a subscription wins. The loop takes them out at once, but on average not more often than every 10 ms: however
+// many flood in, a board's heartbeats wait for no more than a few such turns. What is urgent, a stop, is always
+// taken at once.
 #pragma once
 
 #include <dds/dds.h>
