@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Somebody else in a ROS 2 graph: ros2_peer (ros2_peer.cpp) on Fast DDS, and CDR by hand."""
+import itertools
 import json
 import os
 import queue
@@ -11,10 +12,10 @@ import time
 from r4_process import PATIENCE_S, R4, Running
 
 PROGRAM = os.path.join(os.path.dirname(R4), 'tests', 'ros2_peer')
-# Ours alone, as are all on this computer that run at the same time.
-DOMAIN = str(1 + os.getpid() % 200)
-ENVIRONMENT = {**{name: value for name, value in os.environ.items()
-                  if not name.startswith('ROS_') and name != 'CYCLONEDDS_URI'}, 'ROS_DOMAIN_ID': DOMAIN}
+# Of ROS; each graph has its own, for who was killed stays in the old one for a while.
+DOMAINS = itertools.count(os.getpid() * 8)
+ENVIRONMENT = {name: value for name, value in os.environ.items()
+               if not name.startswith('ROS_') and name != 'CYCLONEDDS_URI'}
 # What ROS 2 calls its messages in DDS, and what releases since Iron compare (measured).
 STRING, BOOL, FLOAT32, INT32, UINT32, TWIST = (f'{package}::msg::dds_::{name}_' for package, name in (
     ('std_msgs', 'String'), ('std_msgs', 'Bool'), ('std_msgs', 'Float32'), ('std_msgs', 'Int32'), ('std_msgs', 'UInt32'),
@@ -24,11 +25,16 @@ NODES_HASH = 'typehash=RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c66
 HEAD = bytes((0, 1, 0, 0))  # little-endian XCDR1
 
 
+def own_domain():
+    """The environment of a graph of its own."""
+    return {**ENVIRONMENT, 'ROS_DOMAIN_ID': str(1 + next(DOMAINS) % 200)}
+
+
 class Ros2(Running):
     """r4 ros2. `ready` is what it says of itself."""
 
-    def __init__(self, *arguments, environment=None, **process):
-        super().__init__('ros2', '--json', *arguments, env={**ENVIRONMENT, **(environment or {})}, **process)
+    def __init__(self, domain, *arguments):
+        super().__init__('ros2', '--json', *arguments, env=domain)
         self.ready = self.next(lambda each: each['type'] == 'ready')
 
     def armed(self):
@@ -39,9 +45,9 @@ class Ros2(Running):
 
 
 class Peer:
-    def __init__(self, environment=None):
+    def __init__(self, domain):
         self.process = subprocess.Popen([PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-                                        env={**ENVIRONMENT, **(environment or {})})
+                                        env=domain)
         self.lines = queue.Queue()
         self.endpoints = {}  # (kind, topic): what is there
         self.reader = threading.Thread(target=self._read, daemon=True)

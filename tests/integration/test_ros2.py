@@ -9,8 +9,8 @@ import time
 import pytest
 
 from r4_process import ERROR, SANITIZED, Board, run
-from ros2_peer import (BOOL, DOMAIN, ENVIRONMENT, FLOAT32, INT32, NODES, NODES_HASH, STRING, TWIST, UINT32, Cdr, Peer, Ros2,
-                       float32, nodes_of, text, texts, twist)
+from ros2_peer import (BOOL, FLOAT32, INT32, NODES, NODES_HASH, STRING, TWIST, UINT32, Cdr, Peer, Ros2,
+                       float32, nodes_of, own_domain, text, texts, twist)
 
 USAGE = 2
 ON, OFF = b'\x01', b'\x00'
@@ -22,8 +22,9 @@ REQUEST, RESPONSE = 'std_srvs::srv::dds_::Trigger_Request_', 'std_srvs::srv::dds
 @pytest.fixture(scope='module', name='graph')
 def make_graph():
     """A board, its node, armed, and a peer."""
-    with Board('udp://127.0.0.1:0') as board, Peer() as peer:
-        with Ros2(board.host_url, '--arm', '--counts-per-turn', '4096', '--drive', 'osmc1,-osmc2',
+    domain = own_domain()
+    with Board('udp://127.0.0.1:0') as board, Peer(domain) as peer:
+        with Ros2(domain, board.host_url, '--arm', '--counts-per-turn', '4096', '--drive', 'osmc1,-osmc2',
                   '--wheel-separation', '0.5', '--full-speed', '2') as ros2:
             ros2.armed()
             yield board, ros2, peer
@@ -239,9 +240,9 @@ def test_services_answer_with_the_boards_confirmation(graph):
 @pytest.mark.parametrize('user_data, gid_size', ((NODES_HASH, 16), ('-', 24)))
 def test_its_node_is_listed_for_every_release(user_data, gid_size):
     """`user_data`: what a peer of that release has on its own list of nodes."""
-    own = {'ROS_DOMAIN_ID': str(201 + os.getpid() % 30)}  # where nobody else is of another release
-    with Board('udp://127.0.0.1:0') as board, Peer(own) as peer, \
-            Ros2(board.host_url, '--namespace', 'robot', environment=own) as ros2:
+    domain = own_domain()
+    with Board('udp://127.0.0.1:0') as board, Peer(domain) as peer, \
+            Ros2(domain, board.host_url, '--namespace', 'robot') as ros2:
         assert ros2.ready['nodes'][0]['name'] == '/robot/r4'
         peer.read('ros_discovery_info', NODES, 'reliable', 'transient_local', user_data)
         peer.writer('ros_discovery_info', NODES, 'reliable', 'transient_local', user_data, matched=False)
@@ -260,13 +261,15 @@ def test_its_node_is_listed_for_every_release(user_data, gid_size):
         assert ros2.wait() == 0
         assert SANITIZED or time.monotonic() - left < 1
         # And again, as after a restart.
-        with Ros2(board.host_url, environment=own):
+        with Ros2(domain, board.host_url):
             assert '/r4' in nodes_of(peer.sample('ros_discovery_info', lambda data: b'r4\0' in data), gid_size)
 
 
 def test_not_armed_nothing_drives():
-    with Board('udp://127.0.0.1:0') as board, Peer() as peer, Ros2(board.host_url, '--deadline', '0.3') as ros2:
-        ros2.logged('the board is there')
+    domain = own_domain()
+    with Board('udp://127.0.0.1:0') as board, Peer(domain) as peer, \
+            Ros2(domain, board.host_url, '--deadline', '0.3') as ros2:
+        ros2.logged('the board takes commands')
         join(ros2, peer, 'R4_Command', STRING)
         peer.write('rt/R4_Command', text('O:358,1,1'))
         ros2.logged('not armed (not yet)')
@@ -282,8 +285,9 @@ def test_not_armed_nothing_drives():
 
 
 def test_several_boards_have_namespaces_and_a_lost_one_is_told():
-    with Board('udp://127.0.0.1:0') as left, Board('udp://127.0.0.1:0') as right, Peer() as peer:
-        with Ros2(left.host_url, right.host_url) as ros2:
+    domain = own_domain()
+    with Board('udp://127.0.0.1:0') as left, Board('udp://127.0.0.1:0') as right, Peer(domain) as peer:
+        with Ros2(domain, left.host_url, right.host_url) as ros2:
             assert [node['name'] for node in ros2.ready['nodes']] == ['/board1/r4', '/board2/r4']
             for topic in ('board1', 'board2'):
                 peer.read(f'rt/{topic}/R4_Active', STRING)
@@ -295,9 +299,10 @@ def test_several_boards_have_namespaces_and_a_lost_one_is_told():
 
 
 def test_it_says_what_it_is():
-    result = run('ros2', 'sim:', '--namespace', 'robot', '--for', '0.2', env=ENVIRONMENT)
+    domain = own_domain()
+    result = run('ros2', 'sim:', '--namespace', 'robot', '--for', '0.2', env=domain)
     lines = result.stdout.splitlines()
-    assert result.returncode == 0 and lines[0] == f'/robot/r4 in domain {DOMAIN}, reach: this computer'
+    assert result.returncode == 0 and lines[0] == f'/robot/r4 in domain {domain["ROS_DOMAIN_ID"]}, reach: this computer'
     for line in ('  /robot/R4  std_msgs/msg/String', '  /robot/osmc1/command  std_msgs/msg/Float32',
                  '  /diagnostics  diagnostic_msgs/msg/DiagnosticArray', '  /robot/r4/stop  std_srvs/srv/Trigger'):
         assert line in lines

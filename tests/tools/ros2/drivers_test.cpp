@@ -24,7 +24,7 @@ struct Driven {
   }
   std::vector<std::string> to_stop() {
     std::vector<std::string> texts;
-    for (const Command& each : drivers.to_stop(state, now)) texts.push_back(text_of(each));
+    for (const Command& each : drivers.to_stop(state, now).commands) texts.push_back(text_of(each));
     return texts;
   }
 };
@@ -89,11 +89,12 @@ TEST(Ros2Drivers, AnotherCommandEndsTheStopping) {
   Driven driven;
   driven.sent(Command::osmc(358, Direction::forward, 1), 7);
   driven.now += 2s;
-  const auto commands = driven.drivers.to_stop(driven.state, driven.now);
+  const Drivers::Stop stop = driven.drivers.to_stop(driven.state, driven.now);
   driven.sent(Command::osmc(100, Direction::forward, 1), 8);
   EXPECT_EQ(driven.to_stop(), Texts{});
-  driven.drivers.stopped(commands);
-  EXPECT_TRUE(driven.drivers.any()) << "the confirmation is of what was before";
+  driven.drivers.on_publishers(&driven.topic, {});
+  driven.drivers.stopped(stop);
+  EXPECT_EQ(driven.to_stop(), Texts{"O:0,1,1"}) << "the confirmation is of what was before";
   driven.drivers.forget();
   EXPECT_FALSE(driven.drivers.any());
 }
@@ -113,7 +114,7 @@ TEST(Ros2Drivers, AGroupAtATime) {
   for (int n = 1; n <= osmc_channels; ++n) driven.sent(Command::osmc(1, Direction::forward, n));
   driven.now += 2s;
   const auto first = driven.drivers.to_stop(driven.state, driven.now);
-  EXPECT_EQ(first.size(), static_cast<std::size_t>(max_group));
+  EXPECT_EQ(first.commands.size(), static_cast<std::size_t>(max_group));
   driven.drivers.stopped(first);
   EXPECT_EQ(driven.to_stop().size(), 4U);
 }

@@ -385,15 +385,15 @@ void BoardCommands::tell(const std::string& what, PostResult result) {
 
 void BoardCommands::on_tick() {
   if (resting_ || !drivers_.any()) return;
-  const std::vector<Command> commands = drivers_.to_stop(board_.state(), Clock::now());
-  if (commands.empty()) return;
+  const Drivers::Stop stop = drivers_.to_stop(board_.state(), Clock::now());
+  if (stop.commands.empty()) return;
   Setpoints group;
-  for (const Command& command : commands) group.add(command);
+  for (const Command& command : stop.commands) group.add(command);
   warn(fmt::format("{}: whoever drove it has gone or is silent", text_of(group)));
   resting_ = true;
-  board_.async_apply(group, oldest, [this, commands](const CommandResult& result) {
+  board_.async_apply(group, oldest, [this, stop](const CommandResult& result) {
     resting_ = false;
-    if (result.outcome == Outcome::confirmed) drivers_.stopped(commands);
+    if (result.outcome == Outcome::confirmed) drivers_.stopped(stop);
   });
 }
 

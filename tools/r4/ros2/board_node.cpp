@@ -77,6 +77,8 @@ void BoardNode::on_link(const LinkStatus& link) {
     log(heard ? LogLevel::info : LogLevel::warning,
         heard ? "the board is there" : explain(board_.name(), link).text());
   }
+  if (link.in_control && !in_control_) log(LogLevel::info, "the board takes commands");
+  in_control_ = link.in_control;
   tell_health();
   if (options_.arm && link.in_control && !armed_once_) {
     armed_once_ = true;

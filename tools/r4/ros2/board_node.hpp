@@ -62,6 +62,7 @@ class BoardNode {
   Clock::time_point next_second_{};
   bool armed_once_ = false;
   bool heard_ = false;
+  bool in_control_ = false;
   std::map<std::string, Clock::time_point> said_;  // what was logged lately
 };
 

@@ -83,7 +83,8 @@ std::optional<Command> Drivers::stop_of(std::size_t index, const State& state) {
 void Drivers::on_sent(const Command& command, const void* source, std::uint64_t publisher,
                       Time now) {
   if (const auto index = index_of(command)) {
-    outputs_[*index] = {rests(command) ? Stage::free : Stage::driven, source, publisher, now};
+    outputs_[*index] = {rests(command) ? Stage::free : Stage::driven, source, publisher, now,
+                        ++sent_};
   }
 }
 
@@ -98,22 +99,22 @@ void Drivers::on_publishers(const void* source, const std::vector<std::uint64_t>
 
 void Drivers::forget() { outputs_.fill({}); }
 
-std::vector<Command> Drivers::to_stop(const State& state, Time now) {
-  std::vector<Command> commands;
+Drivers::Stop Drivers::to_stop(const State& state, Time now) {
+  Stop stop{{}, sent_};
   for (std::size_t i = 0; i < outputs; ++i) {
     Output& output = outputs_[i];
     const bool silent = deadline_.count() != 0 && now - output.last >= deadline_;
     if (output.stage == Stage::driven && silent) output.stage = Stage::stopping;
-    if (output.stage != Stage::stopping || commands.size() == max_group) continue;
-    if (const auto command = stop_of(i, state)) commands.push_back(*command);
+    if (output.stage != Stage::stopping || stop.commands.size() == max_group) continue;
+    if (const auto command = stop_of(i, state)) stop.commands.push_back(*command);
   }
-  return commands;
+  return stop;
 }
 
-void Drivers::stopped(const std::vector<Command>& commands) {
-  for (const Command& command : commands) {
+void Drivers::stopped(const Stop& stop) {
+  for (const Command& command : stop.commands) {
     const auto index = index_of(command);
-    if (index && outputs_[*index].stage == Stage::stopping) outputs_[*index] = {};
+    if (index && outputs_[*index].sent <= stop.sent) outputs_[*index] = {};
   }
 }
 

@@ -40,8 +40,13 @@ class Drivers {
 
   // Commands for what is to be stopped now, for each output until stopped() or a command for it. At most
   // max_group. A stepper waits for a `state` with its position.
-  std::vector<Command> to_stop(const State& state, Time now);
-  void stopped(const std::vector<Command>& commands);
+  struct Stop {
+    std::vector<Command> commands;
+    std::uint64_t sent = 0;  // commands before it
+  };
+  Stop to_stop(const State& state, Time now);
+  // The board has confirmed it. What was driven again since is not stopped by that.
+  void stopped(const Stop& stop);
   bool any() const;
 
  private:
@@ -51,6 +56,7 @@ class Drivers {
     const void* source = nullptr;
     std::uint64_t publisher = 0;
     Time last{};
+    std::uint64_t sent = 0;  // which command it was
   };
   static constexpr std::size_t outputs = osmc_channels + dhb12_channels + servo_channels +
                                          relay_channels + stepper_channels + bldc_channels;
@@ -58,6 +64,7 @@ class Drivers {
   static std::optional<Command> stop_of(std::size_t index, const State& state);
 
   const Duration deadline_;
+  std::uint64_t sent_ = 0;
   std::array<Output, outputs> outputs_{};
 };
 

@@ -257,8 +257,8 @@ R4_Active and R4_Command (std_msgs/String), a topic for each component, diagnost
 ~/clear and ~/arm. docs/ros2.md has each topic with its units, and how to drive a robot by cmd_vel.
 
 Nothing drives before it is armed: by --arm, once, when the board is there; by true on the topic arm; by the
-service ~/arm. After a stop or a fault that has to be done again. What a publisher drives is switched off when it
-is gone, or silent for --deadline. Of several boards each has a namespace: board1, board2 …, or a pattern's
+service ~/arm. After a stop or a fault that has to be done again. What a publisher drives is switched off when
+it is gone, or silent for --deadline. Of several boards each has a namespace: board1, board2 …, or a pattern's
 numbers.
 
 The graph is that of ROS_DOMAIN_ID, on this computer alone unless ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET,
@@ -285,11 +285,8 @@ void add_ros2(CLI::App& root, Action& chosen) {
   add_text(*command, "--name", options->name, "the node's name (default r4)", "NAME");
   add_text(*command, "--namespace", options->space, "its namespace (default /)", "NAME");
   add_flag(*command, "--arm", options->arm, "arm as soon as the board is there, once");
-  add_seconds(
-      *command, "--deadline", options->deadline,
-      "silence after which what a publisher drives is switched off (default 1); 0: only when it is "
-      "gone",
-      Zero::allowed);
+  add_seconds(*command, "--deadline", options->deadline,
+              "of a publisher that drives (default 1); 0: none", Zero::allowed);
   add_text(*command, "--drive", options->drive, "the two motor channels of cmd_vel, left and right",
            "LEFT,RIGHT");
   add_text(*command, "--wheel-separation", options->separation, "metres between the two wheels",
@@ -297,14 +294,12 @@ void add_ros2(CLI::App& root, Action& chosen) {
   add_text(*command, "--full-speed", options->full_speed, "metres a second of a wheel at full duty",
            "SPEED");
   add_text(*command, "--servo", options->servo,
-           "what servos turn: us, or MIN_US,MAX_US,RADIANS (default 500,2500,3.14159)", "SERVO");
+           "us, or MIN_US,MAX_US,RADIANS (default 500,2500,3.14159)", "SERVO");
   add_text(*command, "--counts-per-turn", options->counts_per_turn,
            "of the encoders, for joint_states", "COUNTS");
   add_text(*command, "--steps-per-turn", options->steps_per_turn,
            "of the steppers, for joint_states", "STEPS");
-  add_fields(*command, options->fields,
-             "state fields to ask for, which is what topics there are (default: all components; on "
-             "CAN the paper's)");
+  add_fields(*command, options->fields, "state fields to ask for: what topics there are");
   add_seconds(*command, "--for", options->duration, "end after that time");
   add_key(*command, options->key);
   add_json(*command, options->json, "print JSON, one object a line");
