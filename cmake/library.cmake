@@ -12,7 +12,7 @@ include(CMakePackageConfigHelpers)
 get_property(layers GLOBAL PROPERTY R4_LAYERS)
 set(objects)
 foreach(layer IN LISTS layers)
-  list(APPEND objects $<TARGET_OBJECTS:${layer}>)
+  list(APPEND objects $<FILTER:$<TARGET_OBJECTS:${layer}>,EXCLUDE,[.]gch$>)  # without the precompiled header
 endforeach()
 set(needed fmt::fmt PkgConfig::libserialport PkgConfig::libnl-route PkgConfig::libdeflate
     PkgConfig::libzstd)

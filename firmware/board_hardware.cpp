@@ -65,7 +65,7 @@ void BoardHardware::make_safe() {
   }
   busy_ = true;
   drive_safe();
-  if (nested) return;  // whom it came into looks for trouble, and knows what was cut short
+  if (nested) return;  // the call that this one interrupted looks for trouble
   if (!interrupted_) look_for_trouble();
   leave();
 }

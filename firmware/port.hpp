@@ -18,14 +18,18 @@ class Port {
   virtual void send(Text datagram, Priority priority, Peer peer) = 0;
   // The longest datagram the port carries: 508 on the Giga's WiFi, 1024 elsewhere.
   virtual std::size_t max_size() const = 0;
-  // That peer is in control: it keeps its number, however many others send, until another is held, and
-  // gets what is for everyone where that has no place of its own. everyone: nobody here is any more.
+  // That peer is in control. It keeps its number, however many others send, until another peer is held.
+  // Where nothing reaches everyone at once (UDP), what is sent to everyone goes to it. `everyone`: nobody on
+  // this port is in control any more.
   virtual void hold(Peer peer) { static_cast<void>(peer); }
-  // Does what is for everyone come to that peer?
+  // Does that peer get what is sent to everyone?
   virtual bool reaches(Peer peer) const { return peer == everyone; }
   // Send the packed form from now on, on a port that has one (CAN), to a host that does: the setting
   // `pack`, while a host is in control.
   virtual void use_packed_form(bool wanted) { static_cast<void>(wanted); }
+  // Is it a bus (CAN), where what it sends is heard by all that are there, and by nobody else? Then who asks
+  // for states need not prove where it is.
+  virtual bool is_bus() const { return false; }
   // Is it a cable of the board's own? Only from there are the settings taken that tell how the board
   // is wired and reached (site_settings.hpp).
   virtual bool may_configure() const { return false; }

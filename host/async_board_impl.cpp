@@ -30,10 +30,7 @@ AsyncBoard::Impl::Impl(asio::io_context& context, std::unique_ptr<Carrier> trans
       heartbeat_ms(options.session.timing.heartbeat_ms),
       session(*this, with_clock(std::move(options.session), steady_now()),
               Session::random_first_pnum(), options.role),
-      timer(context) {
-  waiting.reserve(Session::max_pending + Session::max_stops);
-  ended.reserve(Session::max_pending + Session::max_stops);
-}
+      timer(context) {}
 
 Time AsyncBoard::Impl::time_of(Duration timeout) {
   return std::clamp<Duration>(timeout, Duration{0}, std::chrono::hours{24});
@@ -44,7 +41,7 @@ Time AsyncBoard::Impl::time_of(Duration timeout) {
 // By how much what was due is late; 0 inside another entry.
 Time AsyncBoard::Impl::begin_entry(Completion::How way) {
   if (depth == 0) how = way;
-  const Time before = std::exchange(now, steady_now());
+  before = std::exchange(now, steady_now());
   if (now - before > held_up) in_backlog = true;
   return has_link() && depth == 0 ? now - due : Time{0};
 }
@@ -219,8 +216,10 @@ void AsyncBoard::Impl::on_timer() {
 
 void AsyncBoard::Impl::on_datagram(std::string_view bytes, Peer) {
   enter(Completion::How::dispatch, [&] {
-    tap.on_received(bytes);
-    session.receive(bytes, now);
+    const auto arrival = carrier->arrival();
+    const Time at = arrival ? std::chrono::duration_cast<Time>(arrival->time_since_epoch()) : now;
+    tap.on_received(bytes, at);
+    session.receive(bytes, std::clamp(at, before, now));  // its time never goes back
     tap.on_packets(session.packets());
     poll_wanted = true;
   });
@@ -266,7 +265,7 @@ void AsyncBoard::Impl::on_overheard(std::string_view bytes) {
 SendResult AsyncBoard::Impl::transmit(std::string_view datagram, Priority priority) {
   if (!has_link()) return SendResult::down;
   const bool listens = session.board_role() == BoardRole::watch && carrier->is_shared();
-  if (listens && priority != Priority::stop) return SendResult::busy;
+  if (listens && priority != Priority::stop && !datagram.starts_with("W:")) return SendResult::down;
   const SendResult result = carrier->send(datagram, priority);
   if (result == SendResult::sent) tap.on_sent(datagram);
   return result;

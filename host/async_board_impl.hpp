@@ -149,6 +149,7 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   void tell_backlog();
   void on_carrier_event(const CarrierEvent& event) override;
   void on_overheard(std::string_view bytes) override;
+  void on_oversize(std::string_view beginning) override { tap.on_oversize(beginning); }
 
   // --- Session::Handler
 
@@ -197,6 +198,7 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   Phase phase = Phase::made;
 
   Time now{0};
+  Time before{0};  // the entry before
   Time due{0};
   asio::steady_timer timer;
   bool armed = false;

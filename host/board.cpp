@@ -163,6 +163,19 @@ ReceivedState Board::next_state(Duration timeout) {
   const std::lock_guard lock(impl->mutex);
   return impl->state;
 }
+States Board::states(StatesOptions options) {
+  const auto queue = std::make_shared<States::Queue>(options, impl_->on_wait);
+  const std::lock_guard lock(impl_->mutex);
+  if (impl_->closed) {
+    queue->end();
+  } else {
+    impl_->queues.push_back(queue);
+  }
+  return States(queue);
+}
+std::optional<ReceivedState> States::take(Duration timeout) { return queue_->take(timeout); }
+bool States::ended() const { return queue_->ended(); }
+std::uint64_t States::missed() const { return queue_->missed(); }
 LinkStatus Board::link() const { return impl_->link_now(); }
 std::string Board::name() const { return impl_->name_now(); }
 

@@ -94,6 +94,7 @@ void Board::Impl::listen() {
       state = fresh;
       ++states;
       in_control = async.in_control();
+      for_each_queue([&](States::Queue& queue) { queue.put(fresh); });
     }
     news.notify_all();
     tell(fresh);
@@ -226,6 +227,7 @@ void Board::Impl::shut() {
     const std::lock_guard lock(mutex);
     if (closed) return;
     closed = true;
+    for_each_queue([](States::Queue& queue) { queue.end(); });
     last_statistics = async.statistics();
     last_counters = async.carrier_counters();
   }

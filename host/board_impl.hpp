@@ -5,7 +5,8 @@
 //     send() -- Call, post() -->    AsyncBoard on its loop  -->  callback_thread.hpp
 //            <-- ended, news --
 //
-// The link's thread waits for nobody: nothing of the program runs there but a transport of its own. The threads meet under `mutex`.
+// The link's thread waits for nobody: nothing of the program runs there but a transport of its own. The
+// threads meet under `mutex`.
 #pragma once
 
 #include <algorithm>
@@ -23,12 +24,14 @@
 #include <string>
 #include <string_view>
 #include <thread>
+#include <vector>
 
 #include "board_loop.hpp"
 #include "callback_thread.hpp"
 #include "post_box.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/board.hpp"
+#include "state_queue.hpp"
 
 namespace r4 {
 
@@ -98,6 +101,15 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
     }
     return true;
   }
+  // Under the lock.
+  template <class Action>
+  void for_each_queue(Action action) {
+    std::erase_if(queues, [&](const std::weak_ptr<States::Queue>& each) {
+      const std::shared_ptr<States::Queue> queue = each.lock();
+      if (queue) action(*queue);
+      return !queue;
+    });
+  }
   // Its caller does not wait for it any more.
   void abandon(const CallPtr& call);
   std::string name_now();
@@ -147,6 +159,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   std::string name;              // the transport's, as the loop knows it
   ReceivedState state;
   std::uint64_t states = 0;
+  std::vector<std::weak_ptr<States::Queue>> queues;
   LinkStatus link;
   bool in_control = false;
   DisarmCause disarmed_by = DisarmCause::not_yet;

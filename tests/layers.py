@@ -6,7 +6,7 @@ tools > host > transports > protocol, tools > firmware > transports/framing > pr
 the rooms in the order of ALLOWED; host/standard_registry.cpp alone may include firmware/ports/sim. What is
 public, include/r4link, is below all of them. The portable rooms (protocol, transports/framing, firmware without
 its ports, the chip models), and what they include of what is public, include nothing a C++14 board lacks.
-A room holds at most 20 sources.
+A room holds at most 20 sources, a source at most 430 lines.
 """
 import collections
 import pathlib
@@ -18,7 +18,7 @@ PROTOCOL = PUBLIC | {'protocol/datagram', 'protocol/keys', 'protocol/messages', 
 FRAMING = PROTOCOL | {'transports/framing', 'transports/framing/can'}
 CARRIERS = {'transports/can', 'transports/impaired', 'transports/serial', 'transports/share', 'transports/udp'}
 TRANSPORTS = FRAMING | CARRIERS | {'transports'}
-FIRMWARE = FRAMING | {'firmware', 'firmware/drivers'}
+FIRMWARE = FRAMING | {'firmware', 'firmware/application', 'firmware/drivers'}
 MODELS = {'firmware/ports/sim/chips', 'firmware/ports/sim/robot'}
 HOST = TRANSPORTS | {'host', 'host/commands', 'host/measurement', 'host/recording', 'host/replay', 'host/session'}
 SIMULATED = HOST | FIRMWARE | MODELS | {'firmware/ports/sim'}
@@ -40,16 +40,21 @@ ALLOWED = {
     'transports/share': FRAMING | {'transports'},
     'transports/udp': FRAMING | {'transports'},
     'firmware/drivers': PROTOCOL,
-    'firmware': FIRMWARE,
+    'firmware': FRAMING | {'firmware/drivers'},
+    'firmware/application': FRAMING | {'firmware'},
     'firmware/ports': FIRMWARE,
     'firmware/ports/sim/chips': PUBLIC | {'firmware/drivers'},
     'firmware/ports/sim/robot': FIRMWARE | {'firmware/ports/sim/chips'},
     'firmware/ports/sim': FIRMWARE | MODELS | TRANSPORTS,
-    'firmware/ports/m7': FIRMWARE | MODELS | {'firmware/ports', 'firmware/ports/sim'},
+    'firmware/ports/m7/chip': FIRMWARE,
+    'firmware/ports/m7/links': FIRMWARE | {'firmware/ports', 'firmware/ports/m7/chip'},
+    'firmware/ports/m7': FIRMWARE | MODELS | {'firmware/ports', 'firmware/ports/m7/chip', 'firmware/ports/m7/links',
+                                              'firmware/ports/sim'},
     'firmware/ports/giga/chip': FIRMWARE,
     'firmware/ports/giga/links': FIRMWARE | {'firmware/ports', 'firmware/ports/giga/chip'},
     'firmware/ports/giga': FIRMWARE | {'firmware/ports/giga/chip', 'firmware/ports/giga/links'},
     'host/commands': TRANSPORTS,
+    'host/fleet': HOST,
     'host/measurement': TRANSPORTS,
     'host/recording': TRANSPORTS,
     'host/replay': TRANSPORTS | {'host/recording'},
@@ -58,6 +63,7 @@ ALLOWED = {
     'host': HOST,
     'tools/r4/shell': SIMULATED,
     'tools/r4/drive': SHELL,
+    'tools/r4/list': SHELL,
     'tools/r4/bus': SHELL,
     'tools/r4/formats': SHELL | {'tools/r4/bus'},
     'tools/r4/formats/mcap': SHELL | {'tools/r4/bus', 'tools/r4/formats'},
@@ -91,6 +97,7 @@ PORTABLE_EXCEPTIONS = {
     ('protocol/datagram/grammar.cpp', 'emmintrin.h'),  # only where __SSE2__
 }
 MOST_SOURCES = 20
+MOST_LINES = 430
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 SPDX = '// SPDX-License-Identifier: GPL-3.0-or-later'
 
@@ -106,6 +113,8 @@ def faults_of(root, path):
     lines = (root / path).read_text().splitlines()
     if not lines or lines[0] != SPDX:
         yield 1, f'the first line is not "{SPDX}"'
+    if len(lines) > MOST_LINES:
+        yield len(lines), f'{MOST_LINES} lines at most: a file holds one idea'
     for number, line in enumerate(lines, 1):
         match = INCLUDE.match(line)
         if not match:

@@ -11,11 +11,7 @@ constexpr std::size_t stop_entries = 8;
 }  // namespace
 
 SendQueue::SendQueue(std::size_t normal, std::size_t states, std::uint64_t& dropped)
-    : dropped_(dropped) {
-  stop_.entries.resize(stop_entries);
-  normal_.entries.resize(normal);
-  state_.entries.resize(states);
-}
+    : stop_(stop_entries), normal_(normal), state_(states), dropped_(dropped) {}
 
 SendResult SendQueue::push(std::string_view bytes, Priority priority, Peer to, Time now) {
   Lane& lane = priority == Priority::stop ? stop_ : priority == Priority::normal ? normal_ : state_;
@@ -25,12 +21,13 @@ SendResult SendQueue::push(std::string_view bytes, Priority priority, Peer to, T
       ++dropped_;
     }
   }
-  if (lane.count == lane.entries.size()) {
+  if (lane.count == lane.capacity) {
     ++dropped_;
     if (priority == Priority::normal) return SendResult::full;
     lane.pop();
   }
-  Entry& entry = lane.entries[(lane.first + lane.count) % lane.entries.size()];
+  if (lane.entries.empty()) lane.entries.resize(lane.capacity);
+  Entry& entry = lane.entries[(lane.first + lane.count) % lane.capacity];
   ++lane.count;
   entry.expires = priority == Priority::stop ? Time::max() : now + lifetime;
   entry.to = to;
@@ -67,7 +64,7 @@ void SendQueue::clear() {
 }
 
 void SendQueue::Lane::pop() {
-  first = (first + 1) % entries.size();
+  first = (first + 1) % capacity;
   --count;
 }
 

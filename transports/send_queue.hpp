@@ -5,7 +5,8 @@
 //     normal  in order; refused when the lane is full
 //     state   last; newest wins: when the lane is full, the oldest makes room
 //
-// Each entry but a stop expires 100 ms after it came. Bounded; all memory is taken at construction.
+// Each entry but a stop expires 100 ms after it came. Bounded. Hardly ever does anything wait, and of many
+// boards each has a queue: a lane takes all its memory when something waits in it for the first time.
 #pragma once
 
 #include <chrono>
@@ -52,7 +53,9 @@ class SendQueue {
  private:
   // A ring of entries, oldest first.
   struct Lane {
-    std::vector<Entry> entries;
+    explicit Lane(std::size_t most) : capacity(most) {}
+    std::size_t capacity;
+    std::vector<Entry> entries;  // none yet, or `capacity`
     std::size_t first = 0;
     std::size_t count = 0;
     void pop();

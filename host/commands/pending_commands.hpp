@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The commands of a session that are under way: a fixed number of slots, walked in the order in
-// which the commands were given. No heap after the construction.
+// which the commands were given. Few are ever under way at once, and a fleet has many sessions: a slot
+// takes its memory when it is used for the first time, and keeps it. One is there from the beginning.
 #pragma once
 
 #include <algorithm>
@@ -8,6 +9,8 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <vector>
 
 #include "r4link/command.hpp"
@@ -41,6 +44,7 @@ struct PendingCommand {
   CommandKind kind = CommandKind::heartbeat;
   bool cable_only = false;  // a setting that is refused elsewhere
   std::uint32_t pnum = 0;
+  std::optional<std::uint32_t> stop_number;  // of a stop that several sessions have in common
   std::uint64_t ticket = 0;
   std::int32_t cause = Command::unnamed_cause;  // clear: the cause it names, once one is known
   std::chrono::microseconds started{0}, deadline{0}, retry{0};
@@ -69,6 +73,7 @@ class PendingCommands {
   PendingCommands(std::size_t commands, std::size_t stops)
       : slots_(commands + stops), order_(commands + stops), commands_(commands), stops_(stops) {
     for (std::size_t i = 0; i < order_.size(); ++i) order_[i] = static_cast<std::uint8_t>(i);
+    slots_[0] = std::make_unique<PendingCommand>();
   }
 
   // A slot for a command, the last in the order, with everything reset but `bytes`; nullptr if all
@@ -77,12 +82,16 @@ class PendingCommands {
     std::size_t& room = room_for(kind);
     if (room == 0) return nullptr;
     --room;
-    PendingCommand& slot = slots_[order_[used_++]];
+    std::unique_ptr<PendingCommand>& place = slots_[order_[used_]];
+    if (!place) place = std::make_unique<PendingCommand>();
+    ++used_;
+    PendingCommand& slot = *place;
     slot.stage = PendingCommand::Stage::queued;
     slot.role = PendingCommand::Role::command;
     slot.kind = kind;
     slot.cable_only = false;
     slot.pnum = 0;
+    slot.stop_number.reset();
     slot.cause = Command::unnamed_cause;
     slot.size = 0;
     slot.group = Setpoints();
@@ -91,10 +100,10 @@ class PendingCommands {
   }
 
   void remove(PendingCommand& command) {
-    const auto index = static_cast<std::uint8_t>(&command - slots_.data());
     const auto end = order_.begin() + static_cast<std::ptrdiff_t>(used_);
-    std::rotate(std::find(order_.begin(), end, index), std::find(order_.begin(), end, index) + 1,
-                end);
+    const auto at = std::find_if(
+        order_.begin(), end, [&](std::uint8_t index) { return slots_[index].get() == &command; });
+    std::rotate(at, at + 1, end);
     --used_;
     ++room_for(command.kind);
     command.stage = PendingCommand::Stage::free;
@@ -130,8 +139,8 @@ class PendingCommands {
     Iterator end() const { return {*this, count_}; }
 
    private:
-    PendingCommand& command(std::size_t at) const { return slots_[order_[at]]; }
-    PendingCommand* slots_;
+    PendingCommand& command(std::size_t at) const { return *slots_[order_[at]]; }
+    const std::unique_ptr<PendingCommand>* slots_;
     std::size_t count_;
     std::array<std::uint8_t, max_slots> order_;
   };
@@ -140,7 +149,7 @@ class PendingCommands {
  private:
   std::size_t& room_for(CommandKind kind) { return kind == CommandKind::stop ? stops_ : commands_; }
 
-  std::vector<PendingCommand> slots_;
+  std::vector<std::unique_ptr<PendingCommand>> slots_;  // null: not used yet
   std::vector<std::uint8_t> order_;  // of slots: those under way, oldest first, then the free ones
   std::size_t used_ = 0;
   std::size_t commands_, stops_;  // how many more

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Q:ID, asked now and then for the round-trip time, and by whoever wants to know: without I/O.
+// Q:ID, asked now and then for the round-trip time, and by whoever wants to know: without I/O. The newest
+// eight questions are remembered, each of them one such machine:
 //
-//     idle --asked--> open --I:…--> idle: the round trip is known
-//                      |  ^
-//                      +--+ asked again
+//     idle --asked--> open --I:… names it--> idle: the round trip is known
+//                      |
+//                      +-- eight newer ones --> forgotten
 //
 // The answer names its question (ASKED). Of a board that does not it counts from the newest question, which
 // is good for a round trip, and not for more.
@@ -25,7 +26,8 @@ class IdentityQuestion {
   // `interval`: from one question of ours to the next; 0: none is asked.
   explicit IdentityQuestion(Time interval) : interval_(interval) {}
 
-  // `sooner`: as long as that it need not be since the newest, where that is sooner.
+  // Is one due: `interval` after the last of ours, or `sooner` after the newest of anyone, whichever is
+  // earlier?
   bool due(Time sooner, Time now) const { return now >= next(sooner); }
   // When due() may be true next; Time::max() for never.
   Time next(Time sooner) const {

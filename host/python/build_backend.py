@@ -36,14 +36,19 @@ def _run(*command):
         sys.exit(f'{ended.stdout}\n{" ".join(command)} failed\n  fix: tools/setup installs what the build needs')
 
 
+def configure(folder):
+    """A build of the package alone."""
+    _run('cmake', '-S', str(ROOT), '-B', str(folder), '-G', 'Ninja', '-DCMAKE_BUILD_TYPE=Release', '-DR4_TESTS=OFF',
+         '-DR4_WERROR=OFF', '-DR4_PYTHON=ON')
+
+
 def _built():
     """The package's files: (name, content)."""
     given = os.environ.get('R4_BUILD')
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(given or temporary)
         if not given:
-            _run('cmake', '-S', str(ROOT), '-B', str(folder), '-G', 'Ninja', '-DCMAKE_BUILD_TYPE=Release',
-                 '-DR4_TESTS=OFF', '-DR4_WERROR=OFF', '-DR4_PYTHON=ON')
+            configure(folder)
         _run('cmake', '--build', str(folder), '--target', 'r4_python')
         package = folder / 'python/r4link'
         for path in sorted(package.iterdir()):

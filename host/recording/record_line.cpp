@@ -260,4 +260,27 @@ std::string record_time_text(Time time) {
   return text;
 }
 
+// What is not right in it is not so in the text of the time that comes of it.
+std::optional<Time> read_record_time(std::string_view text) {
+  constexpr std::string_view form = "0000-00-00T00:00:00.000000Z";
+  constexpr std::size_t whole_seconds = 19;
+  if (text.ends_with('Z')) text.remove_suffix(1);
+  if (text.size() < whole_seconds || text.size() >= form.size() || text.ends_with('.')) {
+    return std::nullopt;
+  }
+  const std::string all = std::string(text) + std::string(form.substr(text.size()));
+  const auto number = [&all](std::size_t at, std::size_t count) {
+    std::uint32_t value = 0;
+    return parse_number(Text(all.data() + at, count), value) ? value : 0;
+  };
+  const year_month_day date{std::chrono::year{static_cast<int>(number(0, 4))},
+                            std::chrono::month{number(5, 2)}, std::chrono::day{number(8, 2)}};
+  if (!date.ok()) return std::nullopt;
+  const Time time = sys_days{date}.time_since_epoch() + std::chrono::hours{number(11, 2)} +
+                    std::chrono::minutes{number(14, 2)} + std::chrono::seconds{number(17, 2)} +
+                    Time{number(20, decimals)};
+  if (record_time_text(time) != all) return std::nullopt;
+  return time;
+}
+
 }  // namespace r4

@@ -11,6 +11,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -66,5 +67,7 @@ bool append_unescaped(std::string& out, std::string_view text);
 
 // "2026-11-23T21:11:33.404765Z"
 std::string record_time_text(Time time);
+// That again, also with fewer decimals or none, and without the Z; none for what is no such time.
+std::optional<Time> read_record_time(std::string_view text);
 
 }  // namespace r4

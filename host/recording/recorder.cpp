@@ -60,9 +60,8 @@ Time Recorder::wall_clock() {
   return std::chrono::duration_cast<Time>(std::chrono::system_clock::now().time_since_epoch());
 }
 
-Time Recorder::now() const {
-  return began_ +
-         std::chrono::duration_cast<Time>(std::chrono::steady_clock::now() - began_steady_);
+Time Recorder::steady_now() {
+  return std::chrono::duration_cast<Time>(std::chrono::steady_clock::now().time_since_epoch());
 }
 
 // --- any thread
@@ -83,7 +82,7 @@ void Recorder::name_wire(std::uint16_t wire, std::string name) {
   undeclared_.push_back(wire);
 }
 
-void Recorder::record(std::uint16_t wire, RecordKind kind, std::string_view bytes) {
+void Recorder::record(std::uint16_t wire, RecordKind kind, std::string_view bytes, Time at) {
   if (ended()) return;
   bytes = bytes.substr(0, max_record_bytes);
   const std::lock_guard lock(mutex_);
@@ -93,7 +92,7 @@ void Recorder::record(std::uint16_t wire, RecordKind kind, std::string_view byte
     ++dropped_;
     return;
   }
-  const Head head{now(), static_cast<std::uint32_t>(bytes.size()), wire, kind};
+  const Head head{recorded(at), static_cast<std::uint32_t>(bytes.size()), wire, kind};
   waiting_.resize(before + sizeof head + bytes.size());
   std::memcpy(&waiting_[before], &head, sizeof head);
   std::copy(bytes.begin(), bytes.end(), &waiting_[before + sizeof head]);
@@ -127,8 +126,7 @@ std::uint64_t Recorder::dropped() const {
 // --- the writer's thread
 
 void Recorder::run() {
-  std::vector<char> batch;
-  batch.reserve(capacity);
+  batch_.reserve(capacity);
   try {
     for (bool last = false; !last;) {
       std::vector<RecordedWire> fresh;
@@ -137,13 +135,13 @@ void Recorder::run() {
         wanted_.wait_for(lock, interval,
                          [this] { return closing_ || waiting_.size() > capacity / 2; });
         last = closing_;
-        batch.swap(waiting_);
+        batch_.swap(waiting_);
         for (const std::uint16_t number : undeclared_) fresh.push_back(wires_[number - 1U]);
         undeclared_.clear();
       }
       for (const RecordedWire& wire : fresh) writer_.declare(wire);
-      write(batch);
-      batch.clear();
+      written_until_ = last ? now() : now() - settled;
+      write();
       tell_of_what_was_dropped();
       tell_of_the_clock();
       writer_.flush();
@@ -160,18 +158,36 @@ void Recorder::run() {
   ended_ = true;
 }
 
-void Recorder::write(const std::vector<char>& batch) {
-  for (std::size_t at = 0; at < batch.size();) {
-    Head head{};
-    std::memcpy(&head, &batch[at], sizeof head);
-    at += sizeof head;
-    writer_.append({head.time, head.wire, head.kind, {batch.data() + at, head.size}});
-    at += head.size;
+// Writes what is of times up to written_until_; the rest waits for what may be told of earlier times.
+void Recorder::write() {
+  order_.clear();
+  put_in_order(unsettled_);
+  put_in_order(batch_);
+  std::stable_sort(order_.begin(), order_.end(),
+                   [](const Place& a, const Place& b) { return a.head.time < b.head.time; });
+  std::vector<char> rest;
+  for (const auto& [head, at] : order_) {
+    if (head.time <= written_until_) {
+      writer_.append({head.time, head.wire, head.kind, {at + sizeof head, head.size}});
+    } else {
+      rest.insert(rest.end(), at, at + sizeof head + head.size);
+    }
+  }
+  unsettled_.swap(rest);
+  batch_.clear();
+}
+
+void Recorder::put_in_order(const std::vector<char>& records) {
+  for (std::size_t at = 0; at < records.size();) {
+    Place place{{}, &records[at]};
+    std::memcpy(&place.head, place.at, sizeof place.head);
+    at += sizeof place.head + place.head.size;
+    order_.push_back(place);
   }
 }
 
 void Recorder::write_event(const std::string& text) {
-  writer_.append({now(), no_wire, RecordKind::event, text});
+  writer_.append({written_until_, no_wire, RecordKind::event, text});
 }
 
 void Recorder::tell_of_what_was_dropped() {

@@ -38,8 +38,12 @@ class Recorder {
   std::uint16_t add_wire(std::string url);
   // What the board there calls itself.
   void name_wire(std::uint16_t wire, std::string name);
-  // Copies it. Allocates nothing; beyond max_record_bytes it is cut.
-  void record(std::uint16_t wire, RecordKind kind, std::string_view bytes);
+  // Copies it. Allocates nothing; beyond max_record_bytes it is cut. `at`: when it was, by the steady clock; records
+  // are written in the order of their times if none is told of more than `settled` later.
+  void record(std::uint16_t wire, RecordKind kind, std::string_view bytes, Time at);
+  void record(std::uint16_t wire, RecordKind kind, std::string_view bytes) {
+    record(wire, kind, bytes, steady_now());
+  }
 
   // Writes what waits and ends the file.
   void close();
@@ -51,6 +55,7 @@ class Recorder {
   std::uint64_t dropped() const;
 
   static constexpr std::size_t capacity = 4 << 20;
+  static constexpr std::chrono::milliseconds settled{50};
 
  private:
   // Before each record's bytes in the buffer.
@@ -60,20 +65,32 @@ class Recorder {
     std::uint16_t wire;
     RecordKind kind;
   };
+  struct Place {
+    Head head;
+    const char* at;
+  };
 
   static Time wall_clock();
-  Time now() const;
+  static Time steady_now();
+  Time recorded(Time steady) const { return began_ + (steady - began_steady_); }
+  Time now() const { return recorded(steady_now()); }
   void run();
-  void write(const std::vector<char>& batch);
+  void write();
+  void put_in_order(const std::vector<char>& records);
   void write_event(const std::string& text);
   void tell_of_the_clock();
   void tell_of_what_was_dropped();
 
-  RecordingWriter writer_;  // of the writer's thread
-  Time clock_told_{0};      // by how much the wall clock was set, as the recording has it
+  // Of the writer's thread.
+  RecordingWriter writer_;
+  std::vector<char> batch_;
+  std::vector<char> unsettled_;  // records that came so late that earlier ones may follow
+  std::vector<Place> order_;
+  Time written_until_{0};
+  Time clock_told_{0};  // by how much the wall clock was set, as the recording has it
   std::uint64_t dropped_told_ = 0;
   const Time began_;  // by the wall clock
-  const std::chrono::steady_clock::time_point began_steady_ = std::chrono::steady_clock::now();
+  const Time began_steady_ = steady_now();
 
   std::atomic<bool> ended_{false};
   mutable std::mutex mutex_;  // of what follows

@@ -20,6 +20,11 @@ std::optional<Problem> RecordingTap::take_end() {
   return std::exchange(recorder_, nullptr)->problem();
 }
 
+// An event, and no datagram: what was thrown away could be one as far as it is kept.
+void RecordingTap::on_oversize(std::string_view beginning) {
+  if (recorder_) record(RecordKind::event, "oversize " + std::string(beginning));
+}
+
 void RecordingTap::on_carrier_event(const CarrierEvent& event) {
   if (!recorder_) return;
   const std::string words =

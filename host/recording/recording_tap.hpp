@@ -22,9 +22,13 @@ class RecordingTap {
   // Why the recording has ended; told once, and nothing if it was closed. Then it is let go.
   std::optional<Problem> take_end();
 
-  void on_received(std::string_view bytes) { record(RecordKind::from_board, bytes); }
+  // `at`: when it came, by the steady clock.
+  void on_received(std::string_view bytes, Time at) {
+    if (recorder_) recorder_->record(wire_, RecordKind::from_board, bytes, at);
+  }
   // By whoever: this program, or another one on the same wire.
   void on_sent(std::string_view bytes) { record(RecordKind::to_board, bytes); }
+  void on_oversize(std::string_view beginning);
   void on_carrier_event(const CarrierEvent& event);
   void on_link(const LinkStatus& link);
   void on_packets(const PacketCounters& packets);

@@ -22,16 +22,15 @@ using SteadyTime = std::chrono::steady_clock::time_point;
 // Others use the loop, too: after so many records, or pieces of the file, it is their turn.
 constexpr int steps_in_a_turn = 32;
 
-std::int32_t hundredths_of(const Url& url, const char* key, std::int32_t min,
-                           std::int32_t fallback) {
+double speed_of(const Url& url) {
   constexpr std::int32_t max = 100'000'000;
-  const std::optional<std::string> text = url.get(key);
-  std::int32_t value = fallback;
-  if (text && (!parse_hundredths(Text(*text), value) || value < min || value > max)) {
-    throw Error(ErrorKind::usage, url.text(), std::string(key) + " " + *text + " is no such number",
-                "write replay:FILE?speed=0.5&from=12");
+  const std::optional<std::string> text = url.get("speed");
+  std::int32_t hundredths = 100;
+  if (text && (!parse_hundredths(Text(*text), hundredths) || hundredths < 1 || hundredths > max)) {
+    throw Error(ErrorKind::usage, url.text(), "speed " + *text + " is no such number",
+                "write replay:FILE?speed=0.5");
   }
-  return value;
+  return hundredths / 100.0;
 }
 
 class ReplayCarrier final : public Carrier {
@@ -40,8 +39,8 @@ class ReplayCarrier final : public Carrier {
       : name_(url.text()),
         path_(url.host().empty() ? url.path() : std::string()),
         wire_(static_cast<std::uint16_t>(url.get_number("wire", 1, 65535, 1))),
-        speed_(hundredths_of(url, "speed", 1, 100) / 100.0),
-        from_(std::int64_t{hundredths_of(url, "from", 0, 0)} * 10'000),
+        speed_(speed_of(url)),
+        start_(ReplayStart::of(url.text(), url.get("from").value_or("0"))),
         timer_(io) {
     url.allow_only("speed wire from");
     if (path_.empty()) {
@@ -51,7 +50,7 @@ class ReplayCarrier final : public Carrier {
   ~ReplayCarrier() override { close(); }
 
   void open(Carrier::Handler& handler) override {
-    records_.emplace(name_, path_, wire_, from_);
+    records_.emplace(name_, path_, wire_, start_);
     handler_ = &handler;
     first_ = records_->next()->time;
     began_ = std::chrono::steady_clock::now();
@@ -150,7 +149,7 @@ class ReplayCarrier final : public Carrier {
   const std::string path_;
   const std::uint16_t wire_;
   const double speed_;
-  const Time from_;
+  const ReplayStart start_;
   asio::steady_timer timer_;
   std::shared_ptr<int> alive_ = std::make_shared<int>(0);
   Carrier::Handler* handler_ = nullptr;

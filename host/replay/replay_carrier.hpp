@@ -3,7 +3,8 @@
 //
 //     speed   so many times as fast as it was, 0.01-1000
 //     wire    the number of the board in the recording
-//     from    so many seconds of the recording are passed over
+//     from    so many seconds of the recording are passed over; or the time at which it begins, in UTC:
+//             2026-11-23T21:20:00
 //
 // What the board said comes again, damaged datagrams too, and that the transport went or came. What is sent goes
 // nowhere: nobody obeys. When the recording has ended the transport is down, and stays so. The file is read on the

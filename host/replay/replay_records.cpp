@@ -5,6 +5,9 @@
 #include <system_error>
 #include <utility>
 
+#include "../../protocol/datagram/numbers.hpp"
+#include "../recording/record_line.hpp"
+
 namespace r4 {
 namespace {
 
@@ -26,14 +29,30 @@ bool is_of_the_transport(std::string_view event) {
 
 }  // namespace
 
+ReplayStart ReplayStart::of(const std::string& thing, const std::string& text) {
+  if (const std::optional<Time> time = read_record_time(text)) return {*time, true};
+  std::int32_t hundredths = 0;
+  if (parse_hundredths(Text(text), hundredths) && hundredths >= 0) {
+    return {Time{std::int64_t{hundredths} * 10'000}, false};
+  }
+  throw Error(ErrorKind::usage, thing, text + " is neither seconds nor a time",
+              "write seconds such as 12.5, or a time in UTC such as 2026-11-23T21:20:00");
+}
+
 ReplayRecords::ReplayRecords(const std::string& thing, const std::string& path, std::uint16_t wire,
-                             Time from)
-    : wire_(wire), from_(from), input_(readable(thing, path)), reader_(*this, path) {
+                             const ReplayStart& start)
+    : wire_(wire), start_(start), input_(readable(thing, path)), reader_(*this, path) {
   while (waiting_.empty() && read_on()) {
   }
   if (!waiting_.empty()) return;
+  if (passed_over_) {
+    throw Error(ErrorKind::data, thing,
+                "the last of that wire is of " + record_time_text(*passed_over_) +
+                    ", before the beginning that was asked for",
+                "begin earlier; r4 info " + path + " tells from when to when it goes");
+  }
   throw Error(ErrorKind::data, thing, "nothing of that wire is there",
-              "r4 info " + path + " lists the wires; begin earlier in it");
+              "r4 info " + path + " lists the wires");
 }
 
 ReplayRecords::Item ReplayRecords::take() {
@@ -51,10 +70,13 @@ bool ReplayRecords::read_on() {
 }
 
 void ReplayRecords::on_record(const Record& record) {
-  if (!beginning_) beginning_ = record.time;
+  if (!std::exchange(start_.absolute, true)) start_.time += record.time;
   if (record.wire != wire_ || record.kind == RecordKind::to_board) return;
-  if (record.time - *beginning_ < from_) return;
   if (record.kind == RecordKind::event && !is_of_the_transport(record.bytes)) return;
+  if (record.time < start_.time) {
+    passed_over_ = record.time;
+    return;
+  }
   latest_ = record.time;
   waiting_.push_back({record.time, record.kind, std::string(record.bytes)});
 }

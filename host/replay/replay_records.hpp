@@ -12,6 +12,15 @@
 
 namespace r4 {
 
+// Where in a recording a replay begins.
+struct ReplayStart {
+  Time time{0};           // after its first record, or
+  bool absolute = false;  // by the clock of the recording
+
+  // Seconds such as "12.5", or a time in UTC such as "2026-11-23T21:20:00". Throws Error{usage} about `thing`.
+  static ReplayStart of(const std::string& thing, const std::string& text);
+};
+
 class ReplayRecords : private RecordingReader::Handler {
  public:
   struct Item {
@@ -21,9 +30,10 @@ class ReplayRecords : private RecordingReader::Handler {
     std::string bytes;
   };
 
-  // What is read must not wait for anybody: only files are. Reads as far as the first of that wire, `from` after the
-  // beginning of the recording. Throws Error, about `thing`.
-  ReplayRecords(const std::string& thing, const std::string& path, std::uint16_t wire, Time from);
+  // What is read must not wait for anybody: only files are. Reads as far as the first of that wire from `start` on.
+  // Throws Error, about `thing`.
+  ReplayRecords(const std::string& thing, const std::string& path, std::uint16_t wire,
+                const ReplayStart& start);
 
   // The next one, if the file has been read so far: then take() it.
   const Item* next() const { return waiting_.empty() ? nullptr : &waiting_.front(); }
@@ -37,12 +47,12 @@ class ReplayRecords : private RecordingReader::Handler {
   void on_damage(const RecordingDamage& damage) override;
 
   const std::uint16_t wire_;
-  const Time from_;
+  ReplayStart start_;  // absolute, once a record was read
   RecordingInput input_;
   RecordingReader reader_;
   bool ended_ = false;
-  std::optional<Time> beginning_;  // of the recording
-  std::optional<Time> latest_;     // of what is there, as far as it was read
+  std::optional<Time> passed_over_;  // the latest record of that wire before the start
+  std::optional<Time> latest_;       // of what is there, as far as it was read
   std::deque<Item> waiting_;
 };
 

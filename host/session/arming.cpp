@@ -65,20 +65,17 @@ void ArmingMachine::on_supply(bool closed) {
 }
 
 void ArmingMachine::begin() {
-  under_way_ = true;
-  looked_ = false;
+  attempt_ = Attempt::begun;
   cleared_ = 0;
 }
 
 ArmingMachine::Step ArmingMachine::next(SafeReason reason) {
-  const bool first = !looked_;
-  looked_ = true;
+  if (reason == SafeReason::link) return Step::wait;
+  const bool first = attempt_ == Attempt::begun;
+  attempt_ = reason == SafeReason::none ? Attempt::closing : Attempt::clearing;
   switch (reason) {
     case SafeReason::none:
       return Step::close;
-    case SafeReason::link:
-      looked_ = !first;
-      return Step::wait;
     case SafeReason::stop:
     case SafeReason::watchdog:
     case SafeReason::fault: {
@@ -88,17 +85,18 @@ ArmingMachine::Step ArmingMachine::next(SafeReason reason) {
       if (may_clear) return Step::clear;
       break;
     }
+    case SafeReason::link:
     case SafeReason::handle:
     case SafeReason::proximity:
       break;
   }
   cause_ = cause_of(reason);
-  under_way_ = false;
+  attempt_ = Attempt::none;
   return Step::fail;
 }
 
 void ArmingMachine::on_closed() {
-  under_way_ = false;
+  attempt_ = Attempt::none;
   outage_ = false;
   cause_ = DisarmCause::none;
 }

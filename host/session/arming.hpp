@@ -5,12 +5,15 @@
 // that has restarted) or by somebody else's E:CLEAR. A program that streams setpoints would then drive
 // off, unasked. So output commands are refused here until the program calls arm(), on purpose:
 //
-//               arm()                no cause is left             R:1,On confirmed
-//     disarmed -------> clearing --------------------> closing -------------------> armed
-//        ^              |  ^  | E:CLEAR of a stop,        |                            |
-//        |              |  +--+ watchdog, fault           |                            |
-//        +--------------+---------------------------------+----------------------------+
-//         a cause other than the link; a restart; relay 1 seen open; the deadline of arm()
+//     cause_      any -------------- R:1,On of an arm() is confirmed ------------> none: armed
+//                  ^                                                                 |
+//                  +-- a cause other than the link; a restart; relay 1 seen open ----+
+//
+//     attempt_    none --arm()--> begun --the link is up--> clearing --no cause is left--> closing
+//                  ^                                        |  ^  | E:CLEAR of a stop,        |
+//                  |                                        |  +--+ watchdog, fault           |
+//                  +----------------------------------------+---------------------------------+
+//                   a cause that cannot be cleared, or is new; the deadline; R:1,On confirmed
 //
 // A lost link does not disarm: whether the board brings its outputs back (`recovery`) is seen by relay 1,
 // the motor supply (docs/safety.md), which every state tells.
@@ -54,19 +57,21 @@ class ArmingMachine {
   // --- arm()
 
   void begin();
-  bool under_way() const { return under_way_; }
+  bool under_way() const { return attempt_ != Attempt::none; }
   // It ends without success.
-  void give_up() { under_way_ = false; }
+  void give_up() { attempt_ = Attempt::none; }
   // `reason`: the board's, as heard last.
   Step next(SafeReason reason);
   // R:1,On is confirmed, and nothing speaks against it.
   void on_closed();
 
  private:
+  // `begun`: the board's reason has not been looked at yet.
+  enum class Attempt : std::uint8_t { none, begun, clearing, closing };
+
   DisarmCause cause_ = DisarmCause::not_yet;
   bool outage_ = false;  // since relay 1 was last known to be closed
-  bool under_way_ = false;
-  bool looked_ = false;       // this arm() has seen the board's reason
+  Attempt attempt_ = Attempt::none;
   std::uint8_t cleared_ = 0;  // bit n: this arm() has cleared reason n
 };
 

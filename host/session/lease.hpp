@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // How a program that watches a board keeps its lease there: without I/O, part of a session.
 //
-//           STALE: its LEASE is to be echoed         states come
-//     asking <------------------------------> asking ------------> watching
-//        ^                                                            |
-//        +------------------------------------------------------------+
-//                        no state for 1 s
+//         +--+ STALE: its LEASE is echoed
+//         v  |          states come
+//        asking ------------------------> watching <--states come-- full, unknown
+//         |                                                              ^
+//         +----------- BUSY: full; refused otherwise: unknown -----------+
+//
+// `watching` is worth nothing when no state has come for 1 s: then a refusal counts, as in `asking`.
 //
 //     asking    W is sent every 500 ms; at once with a LEASE to echo, and on a transport that has come up
 //     watching  likewise: a lease lasts 2 s

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The host's side of one board, without I/O: datagrams and time in, datagrams and events out.
 //
-// It keeps the link alive (protocol/host_link), takes control, chooses the state fields it needs,
+// It keeps the link alive (protocol/link/host_link), takes control, chooses the state fields it needs,
 // sends commands and finds out whether the board executed them:
 //
 //     queued --control--> sent --CMD == PNum in the board's state--> confirmed
@@ -12,8 +12,8 @@
 // It is put together from machines, each with its own diagram: what the board knows of us
 // (host_role.hpp), the fields that it sends (field_selection.hpp), the commands under way
 // (pending_commands.hpp), arming (arming.hpp), the key (host_key.hpp), the question who the board is
-// (measurement/identity_question.hpp), the board's clock on ours (measurement/board_clock.hpp), the stop that lasts (stop_repetition.hpp) and, where the session only watches, its
-// lease at the board (lease.hpp).
+// (measurement/identity_question.hpp), the board's clock on ours (measurement/board_clock.hpp), the stop that
+// lasts (stop_repetition.hpp) and, where the session only watches, its lease at the board (lease.hpp).
 //
 // A retry has the bytes and the packet number of the original (signed anew, where there is a key),
 // so the board can execute it only once. When CMD has moved past a command, the retry's answer
@@ -125,8 +125,9 @@ class Session {
   // Returns 0 when 64 commands are under way already.
   Ticket arm(Time timeout, Time now);
   // E:STOP, sent before this returns. Confirmed when the board tells that it has obeyed this very
-  // stop. Returns 0, with the stop sent all the same, when 16 stops are under way already.
-  Ticket stop(Time timeout, Time now);
+  // stop. Returns 0, with the stop sent all the same, when 16 stops are under way already. `number`: of a stop
+  // that sessions have in common, whose boards hear the same frames (CAN); none: the next of this one.
+  Ticket stop(Time timeout, Time now, std::optional<std::uint32_t> number = {});
   // Asks who the board is; on_identity() follows. Confirmed by the answer.
   Ticket identify(Time timeout, Time now);
   // Gives a command up, though it may have been executed: on_result() comes before this returns. A stop

@@ -156,10 +156,11 @@ void Session::on_post_refused(const Nack& nack) {
   if (posted == nullptr || nack.code == Refusal::duplicate) return;
   ++collector_.counts.refused;
   RefusedPost refused{posted->command, nack.code, PostResult::sent};
-  if (!posted->group.empty()) {
-    refused.group = static_cast<std::uint8_t>(posted->group.size());
-    if (nack.at <= posted->group.size()) refused.at = nack.at;
-    if (refused.at != 0) refused.command = posted->group[refused.at - 1U];
+  if (posted->is_group) {
+    const Setpoints& group = posted_.group_of(*posted);
+    refused.group = static_cast<std::uint8_t>(group.size());
+    if (nack.at <= group.size()) refused.at = nack.at;
+    if (refused.at != 0) refused.command = group[refused.at - 1U];
   }
   handler_.on_refused(refused);
 }

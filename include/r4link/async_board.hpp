@@ -33,6 +33,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -230,6 +231,7 @@ class AsyncBoard {
   void hold_heartbeats(bool held);
 
  private:
+  friend class Fleet;  // its boards on a bus are stopped by one frame
   struct Impl;
 
   // Gives a command up that is under way, unless it has ended.
@@ -277,7 +279,8 @@ class AsyncBoard {
   void require_control(std::string_view what) const;
   void start_send(const Command& command, Duration timeout, CompletionPtr completion);
   void start_apply(const Setpoints& setpoints, Duration timeout, CompletionPtr completion);
-  void start_stop(Duration timeout, CompletionPtr completion);
+  void start_stop(Duration timeout, CompletionPtr completion,
+                  std::optional<std::uint32_t> number = {});
   void start_arm(Duration timeout, CompletionPtr completion);
   void start_identify(Duration timeout, CompletionPtr completion);
   void start_wait_active(Duration timeout, CompletionPtr completion);

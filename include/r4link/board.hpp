@@ -21,19 +21,23 @@
 // Callbacks run on a thread of their own, one at a time, beside the thread of the link: they may call
 // anything here, and what they wait for costs no heartbeat. But a callback that does not return within
 // BoardOptions::callback_limit stops the heartbeats, so that the board goes safe, and on_event() tells of
-// it. States that come while a callback runs are told as one, the newest. An exception out of a callback
-// ends the program, as it does out of any thread.
+// it. States that come while a callback runs are told as one, the newest; states() has each of them. An
+// exception out of a callback ends the program, as it does out of any thread.
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "carrier.hpp"
 #include "config.hpp"
+#include "link.hpp"
 #include "options.hpp"
 #include "recording.hpp"
 #include "setpoints.hpp"
@@ -51,6 +55,44 @@ struct BoardCallbacks {
   std::function<void(const RefusedPost&)> on_refused;
 };
 
+// What becomes of states that come faster than they are taken.
+struct StatesOptions {
+  // None is lost: where no more can wait, take() throws behind the last one that could. Otherwise the oldest gives way.
+  bool lossless = false;
+  // So many wait, of some 400 bytes each. 0: the newest alone or, of those of which none is lost, 65536: eleven minutes
+  // at 100 Hz.
+  std::size_t most = 0;
+};
+
+// From Board::states(): the states of a board, one after the other, for a loop of the program's own.
+//
+//     r4::States states = board.states({.lossless = true});
+//     while (const auto state = states.take(1s)) …
+//
+// Callbacks are told of the newest state where several have come meanwhile. Here the link's thread leaves each, one
+// for each datagram, whatever callbacks do. AsyncBoard::on_state() is called for each anyway. May be moved; may
+// outlive its board. One thread takes.
+class R4LINK_API States {
+ public:
+  using Duration = std::chrono::milliseconds;
+
+  // The next one; waits for it. Nothing if none came in time, or the board was closed and what waited has been
+  // taken. Throws Error{data} where states were lost of which none should be, once for each such gap, and goes on behind
+  // it.
+  std::optional<ReceivedState> take(Duration timeout);
+  // None will come any more, and none waits.
+  bool ended() const;
+  // Those that were not taken, and gave way or found no room.
+  std::uint64_t missed() const;
+
+  class R4LINK_PRIVATE Queue;
+
+ private:
+  friend class Board;
+  explicit States(std::shared_ptr<Queue> queue) : queue_(std::move(queue)) {}
+  std::shared_ptr<Queue> queue_;
+};
+
 class R4LINK_API Board {
  public:
   using Duration = std::chrono::milliseconds;
@@ -66,9 +108,9 @@ class R4LINK_API Board {
 
   // Ends heartbeats, says farewell and closes the transport: the board goes safe at once and is free for
   // another host; one that does not answer, or does not know of farewells, goes safe within its timeout.
-  // Takes at most 100 ms for that. Calls that wait in other threads throw Error{refused}. When it returns
-  // no callback runs, but one that calls it, and none will. Idempotent. The destructor does it too, and may
-  // run while other threads wait.
+  // Takes at most 100 ms for that. Calls that wait in other threads throw Error{refused}. When it has
+  // returned, no callback runs or will run, except the one that called it. Idempotent. The destructor does it,
+  // too, and may run while other threads wait.
   void close();
 
   // Waits until the board is ACTIVE under our control, or, where the program only watches, until it is heard;
@@ -197,6 +239,8 @@ class R4LINK_API Board {
   ReceivedState state() const;
   // Waits for a state newer than now; throws Error{refused} when none comes in time.
   ReceivedState next_state(Duration timeout = default_timeout);
+  // The states from now on, for a loop: the newest at a time, or each of them.
+  States states(StatesOptions options = {});
   LinkStatus link() const;
   Statistics statistics() const;
   // What the transport has carried.

@@ -3,11 +3,12 @@
 //
 // A carrier moves datagrams like UDP does: it may lose and reorder them, it never blocks, and it
 // never corrupts silently (the datagram's CRC is checked above it). It lives on one event loop (Loop, or
-// an io_context of Asio's) and is used from that loop's thread only. The first open() throws when the transport cannot be
-// opened; after that, trouble is an event, and the carrier comes back by itself when the device
-// does.
+// an io_context of Asio's) and is used from that loop's thread only. The first open() throws when the
+// transport cannot be opened; after that, trouble is an event, and the carrier comes back by itself when the
+// device does.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -107,6 +108,8 @@ class R4LINK_API Carrier {
     virtual void on_drained() {}
     // What another program sent to the board, on a wire that programs share.
     virtual void on_overheard(std::string_view bytes) { static_cast<void>(bytes); }
+    // The first 1024 bytes of a line or packet that was longer, and so no datagram; the rest is thrown away.
+    virtual void on_oversize(std::string_view beginning) { static_cast<void>(beginning); }
 
    protected:
     ~Handler() = default;
@@ -127,20 +130,28 @@ class R4LINK_API Carrier {
   // datagram that could not be written within 100 ms is dropped and counted.
   virtual SendResult send(std::string_view bytes, Priority priority, Peer to = everyone) = 0;
 
-  // At a board: that peer is in control. However many others send, what comes from it keeps its
-  // number, until another is held, and what is for everyone goes to it where there is no standing
-  // audience. `everyone`: nobody here is in control any more.
+  // At a board: that peer is in control. It keeps its number, however many others send, until another peer is
+  // held. Where nothing reaches everyone at once (UDP), what is sent to everyone goes to it. `everyone`: nobody
+  // on this carrier is in control any more.
   virtual void hold(Peer peer) { static_cast<void>(peer); }
 
-  // At a board: does what is for everyone come to that peer?
+  // At a board: does that peer get what is sent to everyone?
   virtual bool reaches(Peer peer) const { return peer == everyone; }
 
-  // At a host: is its place to send from that of every host, as on a CAN bus? Then who only watches sends nothing
-  // but a stop.
+  // Is it a bus (CAN), on which what a board says is heard by all, and all its hosts send from one place? Then who
+  // only watches sends nothing but stops and leases (W), and a board asks for no proof of those.
   virtual bool is_shared() const { return false; }
 
   // Sends the packed form from now on, where there is one (CAN). Received are both at any time.
   virtual void use_packed_form(bool wanted) { static_cast<void>(wanted); }
+
+  // At a host that records and does not drive, before open(): what comes may be handed over some milliseconds late, so
+  // that many boards wake the processor up no more often than one. A carrier that does so tells when it came.
+  virtual void gather() {}
+  // Of the datagram that is being handed over: when it came, unless that is now.
+  virtual std::optional<std::chrono::steady_clock::time_point> arrival() const {
+    return std::nullopt;
+  }
 
   virtual bool up() const = 0;
   // The longest datagram it carries, in bytes.

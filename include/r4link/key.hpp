@@ -26,8 +26,8 @@ struct Key {
 R4LINK_API bool operator==(const Key& a, const Key& b);
 inline bool operator!=(const Key& a, const Key& b) { return !(a == b); }
 
-// Refusal::format for what is not of that form, ::range for another id; `out` is only written on
-// Refusal::none.
+// Reads a key's text. Refusal::format: it is not of the form above; Refusal::range: the id is not 1-9. `out`
+// changes only on Refusal::none.
 R4LINK_API Refusal parse_key(Text text, Key& out);
 // Splits a text "<id>:<rest>" whose id is in range; as parse_key.
 R4LINK_API Refusal split_key(Text text, std::uint8_t& id, Text& rest);

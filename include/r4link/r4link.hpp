@@ -8,6 +8,7 @@
 #include "config.hpp"
 #include "datagram.hpp"
 #include "error.hpp"
+#include "fleet.hpp"
 #include "key.hpp"
 #include "link.hpp"
 #include "options.hpp"

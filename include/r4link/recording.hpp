@@ -9,9 +9,9 @@
 //     right.record(recording);
 //
 // What is recorded: datagrams in both directions, damaged ones too, with the host's time; that the transport went
-// or came, how the link is, what was lost. A thread writes it, four times a second and to the disk, so that a crash costs
-// at most the last second. The link waits for no disk: 4 MiB wait for a slow one, and of what is beyond that the
-// recording tells how much it is. When the disk is full the recording ends, on_event() of the board tells so
+// or came, how the link is, what was lost. A thread writes it, four times a second and to the disk, so that a
+// crash costs at most the last second. The link waits for no disk: 4 MiB wait for a slow one, and of what is
+// beyond that the recording tells how much it is. When the disk is full the recording ends, on_event() of the board tells so
 // (Error::kind() open), and the link goes on.
 #pragma once
 

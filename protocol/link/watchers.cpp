@@ -4,10 +4,10 @@
 namespace r4 {
 
 Watchers::Effect Watchers::on_lease(Source from, std::uint32_t rate_hz, std::uint64_t echo,
-                                    std::uint32_t now_ms) {
+                                    bool proven, std::uint32_t now_ms) {
   poll(now_ms);  // silence counts before what ends it
   Watcher* place = find(from);
-  const bool renews = place != nullptr && place->token == echo;
+  const bool renews = proven || (place != nullptr && place->token == echo);
   if (!renews && !is_told(from, echo, now_ms)) {
     if (rate_hz == 0) return Effect::ignored;
     const std::uint32_t newest_ms = told_[(tokens_ - 1) % told_count].at_ms;

@@ -52,8 +52,10 @@ class Watchers {
     ignored,   // so was another just now, or it ends nothing
     full,      // others have all the places
   };
-  // `W:rate` of a place; 0 ends its lease. `echo`: its T.
-  Effect on_lease(Source from, std::uint32_t rate_hz, std::uint64_t echo, std::uint32_t now_ms);
+  // `W:rate` of a place; 0 ends its lease. `echo`: its T. `proven`: it need echo nothing, for it can be nowhere
+  // else (a bus).
+  Effect on_lease(Source from, std::uint32_t rate_hz, std::uint64_t echo, bool proven,
+                  std::uint32_t now_ms);
   // That place is sent this token, which nobody else can know. It is good for lease_ms, and then as long
   // as the lease.
   void tell(Source to, std::uint32_t token, std::uint32_t now_ms);

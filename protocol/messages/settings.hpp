@@ -31,6 +31,8 @@ struct Settings {
   Recovery recovery = Recovery::last;
   bool pack = true;
   SiteSettings site;
+
+  std::uint32_t state_period_ms() const { return 1000U / state_rate_hz; }
 };
 bool operator==(const Settings& a, const Settings& b);
 inline bool operator!=(const Settings& a, const Settings& b) { return !(a == b); }

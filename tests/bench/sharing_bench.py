@@ -2,18 +2,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What it costs a program that drives a board when others watch it by the same wire.
 
-    PYTHONPATH=build/python R4=build/r4 tests/bench/sharing_bench.py udp|pty|URL [SECONDS] [ROUNDS]
+    PYTHONPATH=build/python R4=build/r4 tests/bench/sharing_bench.py udp|pty|URL [SECONDS] [ROUNDS] [--trouble]
 
-In each round the program drives alone, and then with five others beside it: r4 monitor, r4 record, two programs
-that watch, and at the end r4 stop. Of the program's own recording: how old its states are when they come (against
-the fastest of them), and how far apart its heartbeats went out. Then three r4 send in a row, which hold the wire
-by turns. A bus of the kernel is a URL: tools/with-can --guest … can://vcan0. Prints medians over the rounds.
+In each round the program drives alone, then with five others beside it (r4 monitor, r4 record, three programs that
+watch), then alone again: how far the two rounds alone differ is what the machine does by itself. Of the program's
+own recording: how old its states are when they come (against the fastest of them), how far apart its heartbeats went
+out, and how many packet numbers are missing. --trouble: of the five, one is stopped (SIGSTOP) all the time, and one
+is killed half way. Then r4 stop beside all of them, and three r4 send in a row. Prints medians over the rounds.
+
+URL is a bus of the kernel, on which a board is simulated (tools/with-can --guest … can://vcan0), or a serial port
+with a board at its other end (tools/with-can --usb-serial FAR --guest … serial:///dev/ttyUSB0).
 """
+import argparse
 import contextlib
 import json
 import os
 import pathlib
 import queue
+import re
+import signal
 import statistics
 import subprocess
 import sys
@@ -55,7 +62,7 @@ def ms(seconds):
     return f'{seconds * 1e3:.2f}'
 
 
-class Board:
+class SimulatedBoard:
     """r4 sim on a transport; the lines that it prints, with their times."""
 
     def __init__(self, where):
@@ -85,6 +92,19 @@ class Board:
         self.process.wait()
 
 
+class OtherBoard:
+    """A board that is there already."""
+
+    def __init__(self, url):
+        self.url = url
+
+    def when_stopped(self, _):
+        return None
+
+    def close(self):
+        pass
+
+
 @contextlib.contextmanager
 def beside(*arguments):
     process = subprocess.Popen(arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -96,88 +116,105 @@ def beside(*arguments):
 
 
 def of_recording(path):
-    """Ages of the states, spacings of the heartbeats; seconds."""
-    states, beats = [], []
+    """Ages of the states and spacings of the heartbeats, in seconds; packet numbers that are missing."""
+    states, beats, numbers = [], [], []
     for line in pathlib.Path(path).read_text().splitlines():
         if line.startswith('#') or len(line) < 20:
             continue
         at, what, datagram = line.split(' ', 2)
         fields = dict(part.split(':', 1) for part in datagram.split('^')[0].split(';') if ':' in part)
+        if what[-1] == '<' and 'PNum' in fields:
+            numbers.append(int(fields['PNum']))
         if what[-1] == '<' and 'AIN24' in fields:
             states.append((float(at), int(fields['T']) / 1000))
         elif what[-1] == '>' and fields.get('H') == 'ROS2-R4':
             beats.append(float(at))
     offset = min(at - t for at, t in states)
-    return [at - t - offset for at, t in states], [b - a for a, b in zip(beats, beats[1:])]
+    missing = max(numbers) - min(numbers) + 1 - len(set(numbers))
+    return [at - t - offset for at, t in states], [b - a for a, b in zip(beats, beats[1:])], missing
 
 
-def drive(board, seconds, folder, others=()):
+@contextlib.contextmanager
+def five_watchers(url, folder):
+    record = (R4, 'record', url, '-o', os.path.join(folder, f'{time.monotonic_ns()}.w.r4log'))
+    with contextlib.ExitStack() as stack:
+        yield [stack.enter_context(beside(*each)) for each in
+               [(R4, 'monitor', url, '--json'), record] + 3 * [(sys.executable, '-c', WATCHER, url)]]
+
+
+def drive(board, seconds, folder, others=False, trouble=False):
     path = os.path.join(folder, f'{time.monotonic_ns()}.r4log')
     with contextlib.ExitStack() as stack:
-        for each in others:
-            stack.enter_context(beside(*each))
+        watchers = stack.enter_context(five_watchers(board.url, folder)) if others else []
         if others:
-            time.sleep(1)  # they are there before what is measured
+            time.sleep(2)  # they are there before what is measured
+        if trouble:
+            watchers[0].send_signal(signal.SIGSTOP)
+            killer = threading.Timer(seconds / 2, watchers[2].kill)
+            killer.start()
+            stack.callback(killer.cancel)
         subprocess.run([sys.executable, '-c', DRIVER, board.url, path, str(seconds)], check=True,
                        stdout=subprocess.DEVNULL)
     return of_recording(path)
 
 
-def watchers(url, folder):
-    return [(R4, 'monitor', url, '--json'), (R4, 'record', url, '-o', os.path.join(folder, f'{time.monotonic_ns()}.w.r4log')),
-            (sys.executable, '-c', WATCHER, url), (sys.executable, '-c', WATCHER, url)]
-
-
-def stop_beside(board, folder):
-    """From the start of r4 stop to safe outputs, while another program drives."""
+def stop_beside_all(board, folder):
+    """What r4 stop says that it took, and the time from its start to safe outputs, while another program drives and
+    five watch."""
     path = os.path.join(folder, f'{time.monotonic_ns()}.r4log')
-    with subprocess.Popen([sys.executable, '-c', DRIVER, board.url, path, '1', 'wait'], stdin=subprocess.PIPE,
-                          stdout=subprocess.PIPE, text=True) as driver:
+    with five_watchers(board.url, folder), \
+            subprocess.Popen([sys.executable, '-c', DRIVER, board.url, path, '1', 'wait'], stdin=subprocess.PIPE,
+                             stdout=subprocess.PIPE, text=True) as driver:
         driver.stdout.readline()
-        time.sleep(0.3)
+        time.sleep(2)
         began = time.monotonic()
-        with beside(R4, 'stop', board.url) as process:
-            safe = board.when_stopped(began)
-            process.wait()
+        stop = subprocess.run([R4, 'stop', board.url], check=True, capture_output=True, text=True)
+        safe = board.when_stopped(began)
         driver.stdin.close()
         driver.kill()
-    return safe - began
+    said = float(re.search(r'after ([0-9.]+) ms', stop.stdout).group(1)) / 1000
+    return said, None if safe is None else safe - began
+
+
+def time_of(*arguments):
+    began = time.monotonic()
+    subprocess.run(arguments, check=True, stdout=subprocess.DEVNULL)
+    return time.monotonic() - began
 
 
 def main():
-    where = sys.argv[1]
-    seconds = float(sys.argv[2]) if len(sys.argv) > 2 else 10
-    rounds = int(sys.argv[3]) if len(sys.argv) > 3 else 3
-    board = Board(where)
+    parser = argparse.ArgumentParser()
+    parser.add_argument('where')
+    parser.add_argument('seconds', nargs='?', type=float, default=10)
+    parser.add_argument('rounds', nargs='?', type=int, default=3)
+    parser.add_argument('--trouble', action='store_true')
+    chosen = parser.parse_args()
+    board = (OtherBoard if chosen.where.startswith('serial:') else SimulatedBoard)(chosen.where)
     try:
         with tempfile.TemporaryDirectory() as folder:
-            alone, beside_others = [], []
-            for _ in range(rounds):
-                alone.append(drive(board, seconds, folder))
-                beside_others.append(drive(board, seconds, folder, watchers(board.url, folder)))
-            for name, index in (('age of states, p50', 0), ('age of states, p99', 0), ('heartbeats apart, p50', 1),
-                                ('heartbeats apart, p99', 1)):
-                which = p99 if 'p99' in name else statistics.median
-                before, after = (statistics.median(which(each[index]) for each in runs) for runs in (alone, beside_others))
-                print(f'{name:24} {ms(before):>8} ms alone {ms(after):>8} ms with four others, {after / before:.3f} times')
-            version = []
-            for _ in range(5):
-                began = time.monotonic()
-                subprocess.run([R4, '--version'], check=True, stdout=subprocess.DEVNULL)
-                version.append(time.monotonic() - began)
+            runs = [[drive(board, chosen.seconds, folder),
+                     drive(board, chosen.seconds, folder, others=True, trouble=chosen.trouble),
+                     drive(board, chosen.seconds, folder)] for _ in range(chosen.rounds)]
+            for name, which, index in (('age of states, p50', statistics.median, 0), ('age of states, p99', p99, 0),
+                                       ('heartbeats apart, p50', statistics.median, 1),
+                                       ('heartbeats apart, p99', p99, 1)):
+                alone, five, again = (statistics.median(which(each[nth][index]) for each in runs) for nth in range(3))
+                print(f'{name:22} alone {ms(alone):>7} ms, beside five {ms(five):>7} ms ({five / alone:.3f} times), '
+                      f'alone again {ms(again):>7} ms ({again / alone:.3f} times)')
+            print('packet numbers missing: alone {}, beside five {}, alone again {}'.format(
+                *(sum(each[nth][2] for each in runs) for nth in range(3))))
             stops = []
-            for _ in range(rounds):
-                stops.append(stop_beside(board, folder))
+            for _ in range(chosen.rounds):
+                stops.append(stop_beside_all(board, folder))
                 subprocess.run([R4, 'send', board.url, 'E:CLEAR'], check=True, stdout=subprocess.DEVNULL)
-            print(f'r4 stop: outputs safe {ms(statistics.median(stops))} ms after it was started; '
-                  f'r4 --version takes {ms(statistics.median(version))} ms')
-            sends = []
-            for _ in range(3):
-                began = time.monotonic()
-                subprocess.run([R4, 'send', board.url, 'S:1500,3'], check=True,
-                               stdout=subprocess.DEVNULL)
-                sends.append(time.monotonic() - began)
-            print('three r4 send in a row:', ', '.join(f'{ms(each)} ms' for each in sends))
+            version = statistics.median(time_of(R4, '--version') for _ in range(5))
+            print(f'r4 stop beside all: the board reports it {ms(statistics.median(each[0] for each in stops))} ms after '
+                  f'the wire was opened, at most {ms(max(each[0] for each in stops))} ms')
+            if stops[0][1] is not None:
+                print(f'                    outputs safe {ms(statistics.median(each[1] for each in stops))} ms after it '
+                      f'was started; r4 --version takes {ms(version)} ms')
+            print('three r4 send in a row:',
+                  ', '.join(f'{ms(time_of(R4, "send", board.url, "S:1500,3"))} ms' for _ in range(3)))
     finally:
         board.close()
 

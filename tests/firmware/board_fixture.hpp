@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "firmware/application.hpp"
+#include "firmware/application/application.hpp"
 #include "protocol/messages/message.hpp"
 #include "protocol/messages/state_fields.hpp"
 #include "tests/support/datagrams.hpp"
@@ -60,9 +60,11 @@ class MemoryPort final : public firmware::Port {
   void use_packed_form(bool wanted) override { packed = wanted; }
   void hold(std::uint32_t peer) override { held = peer; }
   bool may_configure() const override { return cable; }
+  bool is_bus() const override { return bus; }
 
   bool packed = false;
   bool cable = false;
+  bool bus = false;
   std::uint32_t held = 0;  // who is in control
   const std::uint32_t* now_ms = nullptr;
   std::size_t limit = max_datagram;

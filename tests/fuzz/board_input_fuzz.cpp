@@ -16,7 +16,7 @@
 #include <set>
 #include <string>
 
-#include "firmware/application.hpp"
+#include "firmware/application/application.hpp"
 #include "protocol/datagram/crc32.hpp"
 #include "protocol/keys/authentication.hpp"
 #include "protocol/messages/state_fields.hpp"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whatever a file holds, reading it as a log of frames, a capture or an MCAP file ends, crashes nothing, and gives the
-// same however the bytes come; and what was read comes back byte by byte from the formats that hold all of it.
+// Whatever a file holds, reading it as a recording, a log of frames, a capture or an MCAP file ends, crashes nothing,
+// and gives the same however the bytes come; what was read comes back byte by byte from the formats that hold all of
+// it, and the others are what they should be; and `r4 info` tells as much of it.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -8,9 +9,11 @@
 #include <string>
 #include <string_view>
 
+#include "host/recording/zstd_stream.hpp"
 #include "input.hpp"
 #include "r4link/error.hpp"
 #include "tools/r4/recording/formats.hpp"
+#include "tools/r4/recording/recording_summary.hpp"
 
 namespace r4 {
 namespace {
@@ -19,7 +22,19 @@ struct Made final : tool::Output {
   void write(std::string_view written) override { file += written; }
   std::string file;
   std::string told;  // of damage, and why it was refused
+  std::uint64_t records = 0;
 };
+
+constexpr const char* native = "x.r4log";
+
+void read(std::string_view bytes, const char* from, std::size_t piece,
+          RecordingReader::Handler& handler) {
+  const std::unique_ptr<tool::Source> source = tool::make_source(from, handler);
+  for (; !bytes.empty(); bytes.remove_prefix(std::min(piece, bytes.size()))) {
+    source->feed(bytes.substr(0, piece));
+  }
+  source->finish();
+}
 
 // As `r4 convert` makes it, of bytes that come in pieces of that size.
 Made converted(std::string_view bytes, const char* from, const char* to, std::size_t piece) {
@@ -31,12 +46,13 @@ Made converted(std::string_view bytes, const char* from, const char* to, std::si
       made.told += each.reason;
       made.told += '\n';
     });
-    const std::unique_ptr<tool::Source> source = tool::make_source(from, conversion);
-    for (; !bytes.empty(); bytes.remove_prefix(std::min(piece, bytes.size()))) {
-      source->feed(bytes.substr(0, piece));
+    if (sink->wants_survey()) {
+      tool::Survey survey(*sink);
+      read(bytes, from, piece, survey);
     }
-    source->finish();
+    read(bytes, from, piece, conversion);
     conversion.finish();
+    made.records = conversion.records();
   } catch (const Error& error) {
     made.file.clear();
     made.told += error.what();
@@ -44,25 +60,74 @@ Made converted(std::string_view bytes, const char* from, const char* to, std::si
   return made;
 }
 
+Made converted(const Made& recording, const char* to) {
+  return converted(recording.file, native, to, recording.file.size());
+}
+
+void comes_back(const Made& recording, const char* by) {
+  const Made there = converted(recording, by);
+  if (there.file.empty()) return;  // a time that MCAP cannot write
+  const Made back = converted(there.file, by, native, there.file.size());
+  require(back.file == recording.file && back.told.empty());
+}
+
+// A table: every row has as many columns.
+void is_csv(std::string_view text) {
+  std::size_t columns = 0, in_header = 0;
+  bool quoted = false;
+  for (const char c : text) {
+    if (c == '"') quoted = !quoted;
+    if (quoted) continue;
+    if (c == ',' || c == '\n') ++columns;
+    if (c != '\n') continue;
+    if (in_header == 0) in_header = columns;
+    require(columns == in_header);
+    columns = 0;
+  }
+  require(!quoted && in_header >= 5 && text.ends_with('\n'));
+}
+
+void is_json_lines(std::string_view text, std::uint64_t records) {
+  for (; !text.empty(); --records) {
+    const std::size_t end = text.find('\n');
+    require(end != std::string_view::npos && records != 0);
+    require(tool::Json::parse(text.substr(0, end), nullptr, false).is_object());
+    text.remove_prefix(end + 1);
+  }
+  require(records == 0);
+}
+
+void is_told_of(const Made& recording, std::uint64_t records) {
+  tool::RecordingSummary summary;
+  read(recording.file, native, recording.file.size(), summary);
+  require(!summary.damaged() && !summary.text("x").empty());
+  const tool::Json object = tool::Json::parse(tool::line_of(summary.json("x")), nullptr, false);
+  require(object["records"] == records);
+}
+
 }  // namespace
 }  // namespace r4
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using r4::converted;
-  constexpr std::array<const char*, 3> formats{"x.log", "x.pcapng", "x.mcap"};
-  constexpr const char* native = "x.r4log";
+  constexpr std::array<const char*, 4> formats{"x.log", "x.pcapng", "x.mcap", r4::native};
   if (size < 2) return 0;
   const char* const from = formats[data[0] % formats.size()];
   const std::string_view bytes(reinterpret_cast<const char*>(data) + 2, size - 2);
-  const r4::Made whole = converted(bytes, from, native, size);
-  const r4::Made cut = converted(bytes, from, native, 1 + data[1]);
-  r4::require(whole.file == cut.file && whole.told == cut.told);
+  const r4::Made whole = converted(bytes, from, r4::native, size);
+  const r4::Made cut = converted(bytes, from, r4::native, 1 + data[1]);
+  // Of compression that is damaged, how much is read depends on the pieces.
+  r4::require(r4::is_zstd(bytes) || (whole.file == cut.file && whole.told == cut.told));
   if (whole.file.empty()) return 0;
-  for (const char* const by : {"x.pcapng", "x.mcap"}) {
-    const r4::Made there = converted(whole.file, native, by, whole.file.size());
-    if (there.file.empty()) continue;  // a time that MCAP cannot write
-    const r4::Made back = converted(there.file, by, native, there.file.size());
-    r4::require(back.file == whole.file && back.told.empty());
+  r4::comes_back(whole, "x.pcapng");
+  r4::comes_back(whole, "x.mcap");
+  r4::is_csv(converted(whole, "x.csv").file);
+  const r4::Made lines = converted(whole, "x.jsonl");
+  r4::is_json_lines(lines.file, lines.records);
+  const r4::Made frames = converted(whole, "x.log");
+  if (!frames.file.empty()) {
+    r4::require(converted(frames.file, "x.log", r4::native, frames.file.size()).told.empty());
   }
+  r4::is_told_of(whole, lines.records);
   return 0;
 }

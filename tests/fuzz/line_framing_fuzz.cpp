@@ -18,7 +18,7 @@ void require(bool holds) {
 
 struct Split {
   std::vector<std::string> lines;
-  std::uint32_t oversize = 0;
+  std::vector<std::string> oversize;  // how those begin that are too long
   bool operator==(const Split&) const = default;
 };
 
@@ -28,7 +28,7 @@ Split expected(const std::string& stream) {
   std::string line;
   const auto end_line = [&](bool finished) {
     if (line.size() > max_datagram) {
-      ++split.oversize;
+      split.oversize.push_back(line.substr(0, max_datagram));
     } else if (finished && !line.empty()) {
       split.lines.push_back(line);
     }
@@ -54,11 +54,13 @@ Split framed(const std::string& stream, std::uint32_t cuts) {
     const std::size_t limit = (cuts >> 28) == 0 ? 3000 : (cuts >> 28) * 8;
     const std::string part = stream.substr(at, (cuts >> 8) % limit);
     at += part.size();
-    framing.push(part.data(), part.size(),
-                 [&](Text line) { split.lines.emplace_back(line.data(), line.size()); });
+    framing.push(
+        part.data(), part.size(),
+        [&](Text line) { split.lines.emplace_back(line.data(), line.size()); },
+        [&](Text beginning) { split.oversize.emplace_back(beginning.data(), beginning.size()); });
     require(framing.pending() <= max_datagram);
   }
-  split.oversize = framing.oversize();
+  require(framing.oversize() == split.oversize.size());
   return split;
 }
 

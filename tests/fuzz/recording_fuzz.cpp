@@ -1,12 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Whatever a file holds, reading it as a recording ends, crashes nothing, and gives the same however the bytes come;
-// a record that was read is written and read again as it was.
+// a record that was read is written and read again as it was; and what is played of it is what the board said.
+#include <sys/mman.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "host/recording/recording_reader.hpp"
+#include "host/replay/replay_records.hpp"
 #include "input.hpp"
 #include "r4link/error.hpp"
 
@@ -25,6 +31,9 @@ class Lines final : public RecordingReader::Handler {
             again.record.time == record.time && again.record.wire == record.wire &&
             again.record.kind == record.kind);
     text += line;
+    if (!beginning) beginning = record.time;
+    const bool played = record.kind == RecordKind::from_board && record.time >= *beginning;
+    if (record.wire == 1 && played) said.emplace_back(record.bytes);
   }
   void on_wire(const RecordedWire& wire) override { write_wire(text, wire); }
   void on_damage(const RecordingDamage& damage) override {
@@ -32,10 +41,12 @@ class Lines final : public RecordingReader::Handler {
   }
 
   std::string text;
+  std::optional<Time> beginning;
+  std::vector<std::string> said;  // by the board of the first wire, since then
 };
 
 // What is told of it. Of compression that is damaged, how much is read depends on the pieces.
-std::string told(std::string_view bytes, std::size_t piece) {
+Lines told(std::string_view bytes, std::size_t piece) {
   Lines lines;
   try {
     RecordingReader reader(lines, "input");
@@ -47,7 +58,39 @@ std::string told(std::string_view bytes, std::size_t piece) {
   } catch (const Error& error) {
     lines.text += error.what();
   }
-  return lines.text;
+  return lines;
+}
+
+// A file of these bytes, as long as it is there.
+class File {
+ public:
+  explicit File(std::string_view bytes) : file_(::memfd_create("recording", MFD_CLOEXEC)) {
+    require(::write(file_, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size()));
+  }
+  ~File() { ::close(file_); }
+  File(const File&) = delete;
+  File& operator=(const File&) = delete;
+  std::string path() const { return "/proc/self/fd/" + std::to_string(file_); }
+
+ private:
+  const int file_;
+};
+
+// What is played of the first wire, `from` after the beginning.
+std::vector<std::string> played(const std::string& path, Time from) {
+  std::vector<std::string> said;
+  try {
+    ReplayRecords records(path, path, 1, from);
+    do {
+      while (records.next() != nullptr) {
+        const ReplayRecords::Item item = records.take();
+        require(item.kind != RecordKind::to_board);
+        if (item.kind == RecordKind::from_board) said.push_back(item.bytes);
+      }
+    } while (records.read_on());
+  } catch (const Error&) {
+  }
+  return said;
 }
 
 }  // namespace
@@ -56,8 +99,14 @@ std::string told(std::string_view bytes, std::size_t piece) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   const std::string_view bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
-  const std::string whole = r4::told(bytes, size);
-  const std::string cut = r4::told(bytes, 1 + data[0]);
-  if (!r4::is_zstd(bytes)) r4::require(whole == cut);
+  const r4::Lines whole = r4::told(bytes, size);
+  const r4::Lines cut = r4::told(bytes, 1 + data[0]);
+  if (!r4::is_zstd(bytes)) r4::require(whole.text == cut.text);
+  const r4::File file(bytes);
+  const std::vector<std::string> played = r4::played(file.path(), r4::Time(0));
+  // One of another version, which ends both, is told when what is before it has not been played.
+  r4::require(played.empty() || played == whole.said);
+  const std::vector<std::string> later = r4::played(file.path(), r4::Time(data[0] * 100'000));
+  r4::require(later.size() <= whole.said.size());
   return 0;
 }

@@ -114,7 +114,7 @@ class Bus final : public Carrier {
   CarrierCounters counters_;
 };
 
-TEST_F(AsyncBoardTest, WhoOnlyWatchesSendsNothingButAStopWhereAllHostsHaveOnePlace) {
+TEST_F(AsyncBoardTest, WhoOnlyWatchesSendsNothingButLeasesAndStopsWhereAllHostsHaveOnePlace) {
   std::vector<std::string> sent;
   BoardOptions options;
   options.role = BoardRole::watch;
@@ -123,7 +123,9 @@ TEST_F(AsyncBoardTest, WhoOnlyWatchesSendsNothingButAStopWhereAllHostsHaveOnePla
   bool asked = false;
   watching.async_identify(600ms, [&](const CommandResult&) { asked = true; });
   ASSERT_TRUE(run_until(io, [&] { return asked; }));
-  EXPECT_TRUE(sent.empty()) << sent[0];
+  for (const std::string& each : sent) EXPECT_EQ(each.substr(0, 2), "W:") << each;
+  EXPECT_FALSE(watching.link().busy) << "nobody controls it";
+  sent.clear();
   watching.async_stop(50ms, [](const CommandResult&) {});
   ASSERT_TRUE(run_until(io, [&] { return !sent.empty(); }));
   EXPECT_EQ(sent[0].substr(0, 7), "E:STOP;");

@@ -115,6 +115,13 @@ program_of "$source_tree/docs/simulation.md" >simulation.cpp
   exit 1
 }
 
+program_of "$source_tree/docs/fleet.md" >fleet.cpp
+"$cxx" -std=c++20 -O1 fleet.cpp "${flags[@]}" -o fleet
+if ! ./fleet >fleet.txt || [[ -s fleet.txt ]]; then
+  echo "install: the program in docs/fleet.md did not command its boards: $(cat fleet.txt)"
+  exit 1
+fi
+
 status=0
 ./drive fax:1 >/dev/null 2>"$work/err" || status=$?
 if [[ $status != 2 ]] || ! grep -q 'udp://HOST' "$work/err"; then

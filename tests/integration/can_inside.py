@@ -13,14 +13,14 @@ import urllib.request
 
 import pytest
 
-from r4_process import (ERROR, PATIENCE_S, R4, Board, Running, driving, is_link, is_state, monitor, objects, run,
-                        watch)
+from r4_process import (DATA, ERROR, PATIENCE_S, R4, Board, Running, driving, is_link, is_state, lasts, monitor,
+                        objects, run, stop_takes_ms, watch)
 
 # The board's timeout, what docs/safety.md promises on top, and what an emulated machine may take.
 SAFE_WITHIN_MS = 1020 + 80
 BUS = 'can://vcan0?node=3'
 IN_PLAIN_TEXT = BUS + '&pack=0'
-EMERGENCY, WENT_SAFE, COMMAND, REPLY, TELEMETRY = 0x010, 0x023, 0x183, 0x203, 0x403
+EMERGENCY, WENT_SAFE, COMMAND, REPLY, TELEMETRY, WATCH = 0x010, 0x023, 0x183, 0x203, 0x403, 0x603
 
 
 def ip(*arguments):
@@ -270,14 +270,60 @@ def test_an_interface_that_goes_down_is_told_of_and_comes_back(board):
         host.next(is_state)
 
 
-def test_who_watches_is_in_nobodys_way(board):
-    with watch(board.host_url) as early:
-        with driving(board.host_url, 'O:358,1,1') as host, watch(board.host_url) as late:
+def drives(pwm):
+    return lambda each: is_state(each) and each['fields'].get('OSMC1') == [pwm, 1]
+
+
+def test_first_steps_in_either_order(vcan_board):
+    def nobody_drives(watcher):
+        watcher.skip_past()
+        watcher.next(lambda each: is_state(each) and each['fields']['SAFE'] == 1)
+
+    with watch(BUS) as early:
+        nobody_drives(early)
+        for pwm in (100, 200):
+            sent = run('send', BUS, 'R:1,On', f'O:{pwm},1,1', timeout=60)
+            assert sent.returncode == 0, sent
+            early.next(drives(pwm))
+            nobody_drives(early)
+        with driving(BUS, 'O:358,1,1') as host, watch(BUS) as late:
             for each in (early, late):
-                each.next(lambda state: is_state(state) and state['fields'].get('OSMC1') == [358, 1])
+                each.next(drives(358))
+            stop_takes_ms(BUS)
+            for each in (early, late):
+                each.next(lambda state: is_state(state) and state['fields'].get('SAFE') == 2)
             host.process.kill()
-            board.state('SAFE', 'link')
-        assert run('send', board.host_url, 'O:1,1,1', timeout=60).returncode == 0
+            vcan_board.state('SAFE', 'stop')
+        assert run('send', BUS, 'E:CLEAR', 'O:1,1,1', timeout=60).returncode == 0
+
+
+# As of two computers, where the bus has two ends: they share no wire.
+@pytest.mark.parametrize('url, host_url', [(BUS, BUS), ('can://can0?node=3', 'can://can1?node=3')])
+def test_who_watches_sends_a_frame_of_its_own_and_only_while_nobody_drives(url, host_url):
+    with Board(url), watch(url) as watcher, Dump(url.split('/')[2].split('?')[0]) as dump:
+        watcher.next(is_state)
+        assert {(frame, data) for frame, data in dump.frames if frame in (COMMAND, WATCH)} <= {(WATCH, '')}
+        with driving(host_url, 'O:358,1,1'):
+            watcher.next(drives(358))
+            dump.frames.clear()
+            dump.more(500)
+            assert any(frame == COMMAND for frame, _ in dump.frames)
+            assert not any(frame == WATCH for frame, _ in dump.frames)
+        watcher.skip_past()
+        watcher.next(lambda each: is_state(each) and each['fields']['SAFE'] == 1)
+        assert any(frame == WATCH for frame, _ in dump.frames)
+
+
+def test_what_a_host_of_another_computer_says_is_recorded(tmp_path):
+    path = tmp_path / 'drive.r4log'
+    said = [re.compile(rf'^[0-9.]+ 1> {what};PNum:\d+;T:\d+;\^0x', re.MULTILINE) for what in ('H:ROS2-R4', 'Q:ID')]
+    with Board('can://can0?node=3'), monitor('can://can0?node=3'), \
+            Running('record', 'can://can1?node=3', '-o', str(path)) as recorder:
+        deadline = time.monotonic() + PATIENCE_S
+        while not (path.exists() and all(each.search(path.read_text()) for each in said)):
+            assert time.monotonic() < deadline, path.read_text()
+            lasts(0.05)
+        assert recorder.end() == 0, recorder.errors
 
 
 def test_bus_off_is_safe_at_once_and_a_restart_brings_it_back(vcan_board):
@@ -372,11 +418,24 @@ def test_none_of_eight_boards_at_50_hz_is_safe_by_mistake():
     assert not any(each.get('state') == 'SAFE' for each in log)
 
 
+def listed_interfaces(is_told):
+    """r4 list, again until `is_told` of each board at vcan0: it waits 1.3 s at most, and this machine may be slower."""
+    deadline = time.monotonic() + PATIENCE_S
+    while True:
+        listed = {each.get('interface'): each for each in objects(run('list', '--json', timeout=60).stdout)}
+        if all(map(is_told, listed['vcan0']['boards'])) or time.monotonic() > deadline:
+            return listed
+
+
 def test_a_bus_is_shown_with_all_of_its_boards(tmp_path):
     with Board('can://vcan0?node=2-4', listens=3), monitor(IN_PLAIN_TEXT) as host:  # to have some load
         in_control(host)
-        listed = {each.get('interface'): each for each in objects(run('list', '--json', timeout=60).stdout)}
-        assert [board['node'] for board in listed['vcan0']['boards']] == [2, 3, 4]
+        listed = listed_interfaces(is_told=lambda board: 'board_id' in board)
+        boards = listed['vcan0']['boards']
+        assert [(each['node'], each.get('board_id'), each.get('busy')) for each in boards] == [
+            (2, 'sim-0', False), (3, 'sim-1', True), (4, 'sim-2', False)], boards
+        assert boards[1]['held_by'] == {'program': 'r4', 'pid': host.process.pid, 'controls': True}, boards
+        assert 'held_by' not in boards[0], boards
         assert listed['can0']['state'] == 'error-active' and listed['can0']['bitrate'] == 1000000
         assert listed['can0']['boards'] == []
 
@@ -407,6 +466,25 @@ def test_a_bus_is_shown_with_all_of_its_boards(tmp_path):
     assert silent.returncode == 3 and 'no board was heard' in silent.stderr, silent
 
 
+def test_a_recording_is_a_board_on_the_bus(tmp_path):
+    with open(f'{DATA}/paper_capture.tsv', encoding='ascii') as capture:
+        said = [line.rstrip('\n').split('\t')[1] for line in capture if line.startswith('board')]
+    path = tmp_path / 'drive.r4log'
+    lines = ['# r4log 1 by r4', '1795468293.000000 2> E:STOP;^0x506f0fbe^',
+             *(f'{1795468293 + number / 5:.6f} 2< {datagram}' for number, datagram in enumerate(said))]
+    path.write_text('\n'.join(lines + ['']), encoding='ascii')
+    was = {each['pnum']: each['fields'] for each in objects(run('decode', stdin='\n'.join(said)).stdout)
+           if each.get('type') == 'state'}
+    with Running('replay', str(path), BUS, '--wire', '2', '--json') as replay, Dump('vcan0') as dump:
+        assert replay.next(lambda each: each['type'] == 'listening')['host_url'] == BUS
+        shown = objects(run('monitor', BUS, '--json', '--count', '5', timeout=60).stdout)
+        assert replay.end() == 0, replay.errors
+    states = [(each['pnum'], each['fields']) for each in shown if each['type'] == 'state']
+    assert len(states) == 5 and all(was[pnum] == fields for pnum, fields in states), states
+    frames = {frame for frame, _ in dump.frames}
+    assert TELEMETRY in frames and EMERGENCY not in frames, 'what hosts sent then is not sent again'
+
+
 def test_prometheus_is_told_how_busy_a_bus_is_and_for_whom():
     boards = 'can://vcan0?node=2-3'
     with Board(boards, listens=2), driving('can://vcan0?node=3', 'O:358,1,1'):
@@ -420,7 +498,7 @@ def test_prometheus_is_told_how_busy_a_bus_is_and_for_whom():
             deadline = time.monotonic() + PATIENCE_S
             while busy_seconds().get(3, 0) < 0.01:
                 assert time.monotonic() < deadline, busy_seconds()
-            assert busy_seconds()[3] > busy_seconds().get(2, 0), 'the one that nobody drives sends heartbeats alone'
+            assert busy_seconds()[3] > busy_seconds().get(2, 0), 'the one that nobody drives sends few states'
 
 
 def test_r4_bus_tells_that_it_needs_the_data_bit_rate():

@@ -9,6 +9,7 @@ import queue
 import re
 import signal
 import subprocess
+import sys
 import threading
 import time
 
@@ -29,6 +30,25 @@ def run(*arguments, stdin='', timeout=PATIENCE_S, **options):
                           timeout=timeout, check=False, **options)
 
 
+# It is a process of its own: what a child has had counts the memory of whoever started it, too.
+MEASURE = '''
+import os, sys
+child = os.posix_spawn(sys.argv[1], sys.argv[1:], os.environ)
+_, status, usage = os.wait4(child, 0)
+sys.stderr.write(f'\\n{usage.ru_maxrss}')
+sys.exit(os.waitstatus_to_exitcode(status) % 256)
+'''
+
+
+def run_measured(*arguments, **options):
+    """As run(); `peak_mib` of the result is the most memory that r4 had."""
+    result = subprocess.run([sys.executable, '-S', '-c', MEASURE, R4, *arguments], capture_output=True, text=True,
+                            timeout=6 * PATIENCE_S, check=False, **options)
+    result.stderr, _, peak_kib = result.stderr.rpartition('\n')
+    result.peak_mib = int(peak_kib) / 1024
+    return result
+
+
 def objects(text):
     """The JSON objects of an output, one a line."""
     return [json.loads(line) for line in text.splitlines()]
@@ -37,6 +57,37 @@ def objects(text):
 def lasts(seconds):
     """A fault that is that long: nothing is waited for."""
     time.sleep(seconds)
+
+
+def text_of(path):
+    """What can be read of a recording."""
+    if path.suffix != '.zst':
+        return path.read_bytes().decode('ascii')
+    unpacked = subprocess.run(['zstd', '-dcq', path], capture_output=True, check=False).stdout
+    return unpacked.decode('ascii')
+
+
+def wait_for(path, pattern):
+    """Until a line of the recording has it."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not (path.exists() and re.search(pattern, text_of(path), re.MULTILINE)):
+        assert time.monotonic() < deadline, f'{pattern} is not in {path}'
+        lasts(0.02)
+
+
+# Where a promise of milliseconds can be kept: by programs that no emulated processor runs.
+PROMPT = not SANITIZED and 'R4_CAN_GUEST' not in os.environ
+STOP_WITHIN_MS = 5
+
+
+def stop_takes_ms(url):
+    """From the time at which r4 stop has opened `url` to safe outputs: the best of three, for others want the machine."""
+    stops = [run('stop', url, '--json') for _ in range(3)]
+    assert all(stop.returncode == 0 for stop in stops), stops
+    best = min(objects(stop.stdout)[0]['ms'] for stop in stops)
+    print(f'stopped after {best:.1f} ms')
+    assert best <= STOP_WITHIN_MS or not PROMPT, stops
+    return best
 
 
 class Running:

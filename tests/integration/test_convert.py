@@ -1,15 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 convert as a program, and its files as others read them: pandas, Wireshark, and a reader of MCAP."""
+"""r4 convert as a program, and its files as others read them: pandas, Wireshark, and npm's reader of MCAP."""
+import json
+import os
+import pathlib
+import pty
+import re
 import signal
+import struct
 import subprocess
+import zlib
 
 import pandas
 import pytest
 
-import mcap_reader
-from r4_process import DATA, ERROR, PATIENCE_S, R4, run
+from r4_process import DATA, ERROR, PATIENCE_S, R4, SANITIZED, objects, run, run_measured
 
 DATA_BAD, USAGE, OPEN = 1, 2, 4
+HERE = pathlib.Path(__file__).resolve().parent
+NODE_MODULES = HERE.parents[1] / 'build/mcap/node_modules'
+MOST_MIB = 20
 
 
 def capture(path, url='udp://192.168.0.125'):
@@ -89,22 +98,58 @@ def test_what_wireshark_writes_is_read(native, tmp_path):
     assert datagrams(tmp_path / 'plain.r4log') == datagrams(native)
 
 
-def test_every_index_and_checksum_of_mcap_is_right(native, tmp_path):
-    # Several chunks: the capture's lines again and again, and a second board.
+def read_mcap(path):
+    """What @mcap/core reads of it; all that it says if it does not."""
+    assert NODE_MODULES.is_dir(), f'{NODE_MODULES} is missing; tools/setup --can installs it'
+    return subprocess.run(['node', HERE / 'mcap/read_mcap.cjs', path], capture_output=True, text=True,
+                          env={**os.environ, 'NODE_PATH': str(NODE_MODULES)}, check=False)
+
+
+@pytest.fixture(name='two_boards')
+def in_several_chunks(native):
+    """The capture's lines again and again, and a second board."""
     lines = native.read_text().splitlines(True)
     native.write_text(''.join(lines[:2]) + '# wire 2 can://can0?node=2\n' +
                       ''.join(lines[2:] + [line.replace(' 1', ' 2', 1) for line in lines[4:-1]]) * 40)
-    convert(native, tmp_path / 'drive.mcap')
-    topics, messages = mcap_reader.read(tmp_path / 'drive.mcap')
-    assert topics == {'/r4log': ('r4.Line', {'wire': '0'}),
-                      '/left-arm': ('r4.Record', {'wire': '1', 'url': 'udp://192.168.0.125'}),
-                      '/board2': ('r4.Record', {'wire': '2', 'url': 'can://can0?node=2'})}
-    told = [(topic, ns, each) for topic, ns, each in messages if topic == '/left-arm']
-    assert len(told) == 40 * 72 and told[0][2] == {'type': 'event', 'event': 'up udp://192.168.0.125'}
-    _, when, state = told[1]
-    assert when == 1795468293_500000000 and state['fields']['DHB1A'] == [4095, 1] and state['pnum'] == 7434
+    return native
+
+
+def test_mcaps_own_reader_has_every_message_by_every_index(two_boards, tmp_path):
+    convert(two_boards, tmp_path / 'drive.mcap')
+    read = read_mcap(tmp_path / 'drive.mcap')
+    assert read.returncode == 0, read.stderr
+    told = json.loads(read.stdout)
+    assert told['topics'] == {
+        '/r4log': ['r4.Line', {'wire': '0'}],
+        '/left-arm': ['r4.Record', {'wire': '1', 'url': 'udp://192.168.0.125'}],
+        '/board2': ['r4.Record', {'wire': '2', 'url': 'can://can0?node=2'}]}
+    convert(two_boards, tmp_path / 'drive.jsonl')
+    expected = {1: [], 2: []}
+    for each in objects((tmp_path / 'drive.jsonl').read_text()):
+        time, wire = round(each.pop('time') * 1e6), each.pop('wire')
+        each.pop('board', None)
+        expected.get(wire, []).append([time, each])
+    assert len(expected[1]) == 40 * 72 and expected[1][1][1]['fields']['DHB1A'] == [4095, 1]
+    for wire, topic in (1, '/left-arm'), (2, '/board2'):
+        assert [each[1:] for each in told['messages'] if each[0] == topic] == expected[wire]
+    lines = [each[2]['line'] for each in told['messages'] if each[0] == '/r4log']
+    assert lines == [line for line in two_boards.read_text().splitlines() if line[0] == '#' or ' 0! ' in line]
     convert(tmp_path / 'drive.mcap', tmp_path / 'again.r4log')
-    assert (tmp_path / 'again.r4log').read_bytes() == native.read_bytes()
+    assert (tmp_path / 'again.r4log').read_bytes() == two_boards.read_bytes()
+
+
+def test_mcaps_own_reader_finds_a_byte_that_is_wrong(two_boards, tmp_path):
+    convert(two_boards, tmp_path / 'drive.mcap')
+    whole = (tmp_path / 'drive.mcap').read_bytes()
+    chunk = whole.index(b'\x04\0\0\0zstd') - 37
+    index = chunk + 9 + struct.unpack_from('<Q', whole, chunk + 1)[0]
+    for place, words in ((chunk + 9 + 24, 'Incorrect chunk CRC'), (chunk + 5000, ''), (index + 9 + 6 + 8, ''),
+                         (len(whole) - 100, 'Incorrect summary CRC')):
+        damaged = bytearray(whole)
+        damaged[place] ^= 0x10
+        (tmp_path / 'damaged.mcap').write_bytes(damaged)
+        read = read_mcap(tmp_path / 'damaged.mcap')
+        assert read.returncode != 0 and words in read.stderr, (place, read)
 
 
 def test_damage_has_a_place_and_the_rest_is_converted(native, tmp_path):
@@ -115,6 +160,23 @@ def test_damage_has_a_place_and_the_rest_is_converted(native, tmp_path):
     assert 'the last line is not whole' in result.stderr
     kept = [line for line in good.splitlines(True) if not line.startswith('1795468293.520000')]
     assert (tmp_path / 'again.r4log').read_text() == ''.join(kept)
+    piped = run('convert', '-', '-o', str(tmp_path / 'piped.r4log'), stdin=native.read_text())
+    assert piped.returncode == DATA_BAD and 'r4: standard input: line 7, byte ' in piped.stderr
+
+
+@pytest.mark.parametrize('command', ['info', 'convert'])
+def test_of_a_pipe_whose_writer_is_gone_all_that_is_whole_is_read(native, tmp_path, command):
+    pipe, target = tmp_path / 'pipe', tmp_path / 'again.r4log'
+    os.mkfifo(pipe)
+    output = ['-o', target] if command == 'convert' else []
+    lines = native.read_text().splitlines(True)
+    with subprocess.Popen([R4, command, pipe, *output], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                          text=True) as process:
+        with open(pipe, 'w', encoding='ascii') as writer:
+            writer.write(''.join(lines[:-2]) + lines[-2][:30])
+        told, _ = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == DATA_BAD and 'the last line is not whole' in told, told
+    assert command == 'info' or target.read_text().startswith(''.join(lines[:-2]))
 
 
 def test_a_pipe_is_read_and_nothing_is_replaced_unasked(native, tmp_path):
@@ -133,9 +195,13 @@ def test_a_pipe_is_read_and_nothing_is_replaced_unasked(native, tmp_path):
     ('x.r4log', b'# r4log 2 by r4 9.0\n', DATA_BAD, 'a recording of a later version'),
     ('x.csv', b'time [s],wire\n', USAGE, '.csv is only written'),
     ('x.r4log', None, OPEN, 'No such file'),
+    ('x.r4log', 'directory', OPEN, 'Is a directory'),
+    ('x.mcap', 'directory', OPEN, 'Is a directory'),
 ])
 def test_what_is_no_recording_makes_no_file(tmp_path, name, content, code, message):
-    if content is not None:
+    if content == 'directory':
+        (tmp_path / name).mkdir()
+    elif content is not None:
         (tmp_path / name).write_bytes(bytes(100_000) if content == 'zeros' else content)
     result = convert(tmp_path / name, tmp_path / 'out.jsonl', code=code)
     assert ERROR.search(result.stderr) and message in result.stderr, result
@@ -158,3 +224,87 @@ def test_what_is_broken_off_leaves_nothing(native, tmp_path):
         assert process.wait(PATIENCE_S) != 0
         process.stdin = None
     assert [path.name for path in tmp_path.iterdir()] == [native.name]
+
+
+def claims(ending):
+    """Of files whose headers claim 100 GB, or as much as they can: what is there, and what is said of it."""
+    much, most = 100_000_000_000, 0xFFFFFFFC
+    line = b'# r4log 1 by r4\n1795468293.404765 1! up x\n'
+    mcap = b'\x89MCAP0\r\n\x01' + struct.pack('<QI', 14, 5) + b'r4log' + struct.pack('<I', 1) + b'x'
+    chunk = struct.pack('<QQQII', 0, 0, much, 0, 4) + b'zstd' + struct.pack('<Q', much)
+    section = struct.pack('<IIIIqI', 0x0A0D0D0A, 28, 0x1A2B3C4D, 1, -1, 28)
+    begins = subprocess.run(['zstd', '-cq'], input=line, capture_output=True, check=True).stdout
+    endless = subprocess.run(['zstd', '-cq'], input=line + b'x' * 100_000_000, capture_output=True, check=True).stdout
+    frame = b'\x28\xb5\x2f\xfd'
+    return {
+        '.mcap': [(mcap + b'\x06' + struct.pack('<Q', much), 'a record that is longer than any'),
+                  (mcap + b'\x06' + struct.pack('<Q', len(chunk)) + chunk, 'a chunk that is not whole')],
+        '.pcapng': [(section + struct.pack('<II', 6, most) + bytes(100), 'no block of pcapng')],
+        '.pcap': [(struct.pack('<IIQIIIIII', 0xA1B2C3D4, 0x40002, 0, most, 228, 1, 0, most, most) + bytes(100),
+                   'no packet is that long')],
+        # Of that size; with a window of that size; with a line of 100 MB in it.
+        '.r4log.zst': [(begins + frame + b'\xe0' + struct.pack('<Q', much) + bytes(100), 'damaged compression'),
+                       (begins + frame + b'\0\xa8' + bytes(100), 'damaged compression'),
+                       (endless, 'the last line is not whole')],
+    }[ending]
+
+
+@pytest.mark.parametrize('ending', ['.mcap', '.pcapng', '.pcap', '.r4log.zst'])
+def test_a_size_that_a_header_claims_takes_no_memory(tmp_path, ending):
+    for number, (content, words) in enumerate(claims(ending)):
+        source = tmp_path / f'{number}{ending}'
+        source.write_bytes(content)
+        result = run_measured('convert', str(source), '-o', str(tmp_path / f'{number}.jsonl'))
+        assert result.returncode == DATA_BAD, result
+        assert re.search(f'^r4: {source}: .*byte [0-9]+: {words}', result.stderr, re.MULTILINE), result
+        assert SANITIZED or result.peak_mib < MOST_MIB, result.peak_mib
+
+
+@pytest.fixture(name='eight_boards', scope='module')
+def five_minutes_of_eight_boards(tmp_path_factory):
+    """On a CAN bus, each with a hundred states a second: 40 MB of text."""
+    path = tmp_path_factory.mktemp('long') / 'drive.r4log'
+    lines = ['# r4log 1 by r4 0.1.0', *(f'# wire {1 + node} can://can0?node={node}' for node in range(8))]
+    for number in range(20_000 if SANITIZED else 200_000):
+        pnum, node = divmod(number, 8)
+        fields = (f'AIN24:24.{pnum % 100:02};AIN12:12.12;AIN5:5.12;AINDMH:12.11;DMHSTA:1;AINSTEER:1.03;DHB1A:4095,1;'
+                  f'OSMC1:{pnum % 4096},1;STEP1POS:-{pnum};SERVO1POS:2000;PNum:{pnum};T:{10 * pnum};^')
+        us = 1795468293404765 + 1250 * number
+        lines.append(f'{us // 10**6}.{us % 10**6:06} {1 + node}< {fields}0x{zlib.crc32(fields.encode()):x}^')
+    path.write_text('\n'.join(lines + ['']), encoding='ascii')
+    return path
+
+
+@pytest.mark.parametrize('ending', ['.r4log', '.r4log.zst', '.csv', '.jsonl', '.log', '.pcapng', '.mcap'])
+def test_a_long_recording_takes_little_memory_and_comes_back(eight_boards, tmp_path, ending):
+    there, back = tmp_path / f'there{ending}', tmp_path / 'back.r4log'
+    ways = [(eight_boards, there)] + [(there, back)] * (ending not in ('.csv', '.jsonl'))
+    for source, target in ways:
+        result = run_measured('convert', str(source), '-o', str(target))
+        assert result.returncode == 0 and not result.stderr, result
+        print(f'{source.suffix} to {target.suffix}: {result.peak_mib:.1f} MiB')
+        assert SANITIZED or result.peak_mib < MOST_MIB
+    if ending == '.log':  # its wires are told before their first records
+        assert datagrams(back) == datagrams(eight_boards)
+    elif len(ways) == 2:
+        assert back.read_bytes() == eight_boards.read_bytes()
+
+
+def test_a_terminal_shows_how_far_it_is(eight_boards, tmp_path):
+    terminal, its_end = pty.openpty()
+    with subprocess.Popen([R4, 'convert', eight_boards, '-o', tmp_path / 'drive.jsonl'], stdout=subprocess.DEVNULL,
+                          stderr=its_end) as process:
+        os.close(its_end)
+        shown = b''
+        try:
+            while piece := os.read(terminal, 4096):
+                shown += piece
+        except OSError:  # it has ended
+            pass
+    os.close(terminal)
+    assert process.returncode == 0
+    bars = re.findall(rb'\rconverting \[(=*) *\] +(\d+) %', shown)
+    assert len(bars) >= 2 and shown.endswith(b'\r\x1b[K'), shown
+    done = [int(percent) for _, percent in bars]
+    assert done == sorted(done) and done[-1] > done[0] and done[-1] <= 100
+    assert all(abs(len(bar) - percent * 30 / 100) <= 1 for (bar, _), percent in zip(bars, done))

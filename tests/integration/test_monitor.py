@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The monitor against what a hostile network sends it and a reader who does not read."""
+import json
 import os
 import pty
 import re
@@ -45,6 +46,27 @@ def test_noise_and_a_stalled_pipe_do_not_stall_the_heartbeats():
         host.stdout.read()
         assert 'left out' in host.stderr.read()
         assert host.wait() == 0
+
+
+def test_shows_many_boards_by_one_pattern():
+    ports = 'udp://127.0.0.1:28620-28624'
+    with Board(ports, listens=5):
+        shown = subprocess.run([R4, 'monitor', f'{ports}?listen=0', '--duration', '1.5'], text=True, capture_output=True,
+                               timeout=PATIENCE_S, check=True).stdout
+        last = shown[shown.rindex('5 boards'):].splitlines()
+        assert last[1].split() == ['board', 'Hz', 'lost', 'damaged', 'link'], last
+        rows = [row.split()[:3] for row in last[2:]]
+        assert [url for url, _, _ in rows] == [f'udp://127.0.0.1:{28620 + i}?listen=0' for i in range(5)]
+        assert all(float(rate) > 10 and lost == '0' for _, rate, lost in rows), rows
+
+        told = subprocess.run([R4, 'monitor', f'{ports}?listen=0', '--json', '--count', '100'], text=True,
+                              capture_output=True, timeout=PATIENCE_S, check=True).stdout
+        lines = [json.loads(line) for line in told.splitlines()]
+        states = [line['transport'] for line in lines if line['type'] == 'state']
+        assert len(states) == 100 and len(set(states)) == 5, states
+    gone = subprocess.run([R4, 'monitor', 'udp://127.0.0.1:28620-28621?listen=0', '--duration', '0.2'], text=True,
+                          capture_output=True, timeout=PATIENCE_S, check=False)
+    assert gone.returncode == 3 and 'udp://127.0.0.1:28620?listen=0' in gone.stderr, gone
 
 
 def read_screen(master, until):

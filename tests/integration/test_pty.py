@@ -3,6 +3,7 @@
 import os
 import pty
 import random
+import re
 import signal
 import subprocess
 import threading
@@ -11,7 +12,7 @@ import tty
 
 import pytest
 
-from r4_process import R4, SANITIZED, Board, driving, is_link, is_state, monitor, run
+from r4_process import R4, SANITIZED, Board, driving, is_link, is_state, monitor, objects, run, watch
 
 SAFE_WITHIN_MS = 1020
 
@@ -62,6 +63,49 @@ def test_the_next_host_need_not_wait_for_the_timeout(url):
             assert run('send', each.host_url, f'O:{pwm},1,1', timeout=5).returncode == 0
             each.outputs(lambda outputs, pwm=pwm: outputs['osmc'][0] == [pwm, 1])
             each.state('SAFE', 'link')
+
+
+@pytest.mark.parametrize('url', ['udp://127.0.0.1:0', 'pty:'])
+def test_of_three_commands_in_a_row_none_waits_for_the_timeout(url):
+    with Board(url) as each:
+        taken = []
+        for pwm in (358, 359, 360):
+            began = time.monotonic()
+            assert run('send', each.host_url, f'O:{pwm},1,1').returncode == 0
+            taken.append(time.monotonic() - began)
+        print(', '.join(f'{1000 * seconds:.0f}' for seconds in taken), 'ms')
+        assert max(taken) < 0.5 or SANITIZED, 'without the farewell it is 1.3 s'
+
+
+def listed(path):
+    """What r4 list tells of the pty of a board."""
+    result = run('list', '--serial', path, '--json')
+    return next(each for each in objects(result.stdout) if each.get('path') == path)
+
+
+def test_a_board_is_listed_with_its_name_and_the_program_that_has_it(tmp_path):
+    path = str(tmp_path / 'tty')
+    with Board(f'pty:{path}', options=['--board-id', 'b-1', '--set', 'name,left']) as board:
+        url = board.host_url
+        free = listed(path)
+        assert (free['board_id'], free['name'], free['busy']) == ('b-1', 'left', False), free
+        assert free['url'] == url and re.fullmatch(r'\d+\.\d+\.\d+', free['firmware']), free
+        assert 'held_by' not in free, free
+        with watch(url) as watcher:
+            watcher.next(is_state)
+            watched = listed(path)
+            assert (watched['board_id'], watched['busy']) == ('b-1', False), watched
+            assert watched['held_by'] == {'program': 'r4', 'pid': watcher.process.pid, 'controls': False}
+        with driving(url, 'O:358,1,1') as host:
+            driven = listed(path)
+            assert (driven['board_id'], driven['name'], driven['busy']) == ('b-1', 'left', True), driven
+            assert driven['held_by'] == {'program': 'r4', 'pid': host.process.pid, 'controls': True}
+            text = run('list', '--serial', path).stdout
+            assert re.search(rf'R4 board: {url}  id b-1, name left, firmware .*, '
+                             rf'controlled by r4 \(pid {host.process.pid}\)\n', text), text
+            board.never('SAFE', 0.1)
+        missing = listed(path + '-2')
+        assert missing['fix'] and 'board_id' not in missing, missing
 
 
 def test_settings_of_the_network_are_taken_over_the_cable_only(board):

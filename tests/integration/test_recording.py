@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Recordings: r4 record beside a program that drives, killed, on a full disk; r4 info of what came of it."""
 import contextlib
+import datetime
 import re
 import resource
 import signal
+import socket
 import subprocess
 import time
 
 import pytest
 
-from r4_process import ERROR, PATIENCE_S, Board, Running, driving, lasts, objects, run
+from r4_process import (ERROR, PATIENCE_S, R4, Board, Running, driving, lasts, objects, run, text_of,
+                        wait_for)
 
 DATA_BAD, USAGE, REFUSED, OPEN, PERMISSION = 1, 2, 3, 4, 5
 
@@ -18,22 +21,6 @@ DATA_BAD, USAGE, REFUSED, OPEN, PERMISSION = 1, 2, 3, 4, 5
 def a_board():
     with Board('udp://127.0.0.1:0') as board:
         yield board
-
-
-def text_of(path):
-    """What can be read of it."""
-    if path.suffix != '.zst':
-        return path.read_bytes().decode('ascii')
-    unpacked = subprocess.run(['zstd', '-dcq', path], capture_output=True, check=False).stdout
-    return unpacked.decode('ascii')
-
-
-def wait_for(path, pattern):
-    """Until a line of the recording has it."""
-    deadline = time.monotonic() + PATIENCE_S
-    while not (path.exists() and re.search(pattern, text_of(path), re.MULTILINE)):
-        assert time.monotonic() < deadline, f'{pattern} is not in {path}'
-        lasts(0.02)
 
 
 @contextlib.contextmanager
@@ -124,6 +111,16 @@ def test_a_recording_is_a_board_for_hosts_elsewhere(recorded, tmp_path, where):
         assert replay.end() == 0, replay.errors
 
 
+def test_a_replay_is_faster_when_asked(tmp_path):
+    path = tmp_path / 'slow.r4log'
+    path.write_text('# r4log 1 by r4\n' + ''.join(f'179546829{i}.000000 1< no datagram\n' for i in range(6)))
+    began = time.monotonic()
+    result = run('replay', str(path), 'udp://127.0.0.1:0', '--speed', '5')
+    took = time.monotonic() - began
+    assert result.returncode == 0 and '6 datagrams' in result.stdout, result
+    assert 1 <= took < 3, 'five seconds in one'
+
+
 def test_a_replay_goes_step_by_step_from_anywhere_and_tells_damage(recorded):
     with recorded.open('a') as file:
         file.write('no line of a recording\n' + recorded.read_text().splitlines()[-2] + '\n')
@@ -131,8 +128,12 @@ def test_a_replay_goes_step_by_step_from_anywhere_and_tells_damage(recorded):
     ended = run('replay', str(recorded), 'udp://127.0.0.1:0', '--step', stdin='\n' * 1000)
     assert [line.split(' ', 1)[1] for line in ended.stdout.splitlines()[1:-1]] == was
     assert ended.returncode == DATA_BAD and re.search(r'line \d+: it begins with no time', ended.stderr), ended
-    late = run('replay', str(recorded), 'udp://127.0.0.1:0', '--step', '--from', '0.3', stdin='\n')
-    assert late.stdout.splitlines()[1].split(' ', 1)[1] in was[20:], late
+    first = float(re.search(r'^([\d.]+) 1', recorded.read_text(), re.MULTILINE)[1])
+    said = re.findall(r'^([\d.]+) 1< (.*)$', recorded.read_text(), re.MULTILINE)
+    then = next(datagram for at, datagram in said if float(at) >= first + 0.2)
+    for start in ('0.2', datetime.datetime.fromtimestamp(first + 0.2, datetime.timezone.utc).isoformat()[:26]):
+        late = run('replay', str(recorded), 'udp://127.0.0.1:0', '--step', '--from', start, stdin='\n')
+        assert late.stdout.splitlines()[1].split(' ', 1)[1] == then, late
     for arguments, code in ((['--wire', '7'], DATA_BAD), (['--speed', '0'], USAGE), (['--from', 'x'], USAGE)):
         wrong = run('replay', str(recorded), *arguments)
         assert wrong.returncode == code and ERROR.search(wrong.stderr), wrong
@@ -149,8 +150,9 @@ def test_records_several_boards_into_one_file(tmp_path):
     assert all(wire['states'] >= 10 for wire in told['wires']), told
 
 
-def test_records_many_boards_by_one_pattern(tmp_path):
-    path = tmp_path / 'many.r4log'
+@pytest.mark.parametrize('name, most_bytes', [('many.r4log', 200), ('many.r4log.zst', 40)])
+def test_records_many_boards_by_one_pattern(tmp_path, name, most_bytes):
+    path = tmp_path / name
     first = 28600
     ports = f'udp://127.0.0.1:{first}-{first + 9}'
     with Board(ports, listens=10):
@@ -159,24 +161,40 @@ def test_records_many_boards_by_one_pattern(tmp_path):
     (told,), code = info(path)
     assert code == 0 and [wire['name'] for wire in told['wires']] == [f'sim-{first + i}' for i in range(10)]
     assert all(wire['states'] >= 10 for wire in told['wires']), told
+    text = text_of(path)
+    states = re.findall(r'^[0-9.]+ [0-9]+< AIN24.*\n', text, re.MULTILINE)
+    state_bytes = path.stat().st_size * len(''.join(states)) / len(text) / len(states)
+    print(f'{state_bytes:.0f} bytes a state')
+    assert state_bytes <= most_bytes
+
+
+def newest_states(path):
+    """When the newest state of each wire was heard."""
+    found = re.findall(r'^([\d.]+) (\d+)< AIN24.*\^$', text_of(path), re.MULTILINE) if path.exists() else []
+    return {wire: float(when) for when, wire in found}
 
 
 @pytest.mark.parametrize('name', ['drive.r4log', 'drive.r4log.zst'])
-def test_who_is_killed_has_lost_a_second_at_most(board, tmp_path, name):
+def test_who_is_killed_under_load_has_lost_a_second_at_most(tmp_path, name):
     path = tmp_path / name
-    with driving(board.host_url, 'O:358,1,1'):
+    ports = 'udp://127.0.0.1:28620-28627'
+    with Board(ports, listens=8):
         for run_number in range(3):
-            with record(board.host_url, '-o', path) as recorder:
-                wait_for(path, r'OSMC1:358,1')
+            began = time.time()
+            with record(f'{ports}?listen=0', '-o', path) as recorder:
+                deadline = time.monotonic() + PATIENCE_S
+                while sum(when > began for when in newest_states(path).values()) < 8:
+                    assert time.monotonic() < deadline, newest_states(path)
+                    lasts(0.02)
                 lasts(0.3 + 0.17 * run_number)
                 before = time.time()
                 recorder.signal(signal.SIGKILL)
                 recorder.wait()
-            newest = max(float(line.split(' ')[0]) for line in text_of(path).splitlines() if ' 1< ' in line)
-            print(f'{name}: {before - newest:.3f} s of it are missing')
-            assert before - newest <= 1.0
+            newest = newest_states(path)
+            print(f'{name}: {before - min(newest.values()):.3f} s of it are missing')
+            assert len(newest) == 8 and before - min(newest.values()) <= 1.0
             (told,), code = info(path)
-            assert not told['ended'] and told['records'] > 0
+            assert not told['ended'] and all(wire['states'] >= 10 for wire in told['wires'])
             for each in told['damage']:
                 assert each['kind'] in ('torn', 'zstd'), told['damage']
             assert code == (DATA_BAD if told['damage'] else 0)
@@ -198,6 +216,32 @@ def test_a_full_disk_ends_the_recording_with_a_reason(board, tmp_path):
     tiny = run('record', board.host_url, '-o', str(tmp_path / 'tiny'), '--for', '20',
                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10)))
     assert tiny.returncode == OPEN, 'not ended by SIGXFSZ'
+
+
+def test_a_disk_without_space_ends_the_recording_with_a_reason(board, tmp_path):
+    # A file system of its own, which goes with the namespace; where that is refused, unshare says why.
+    script = ('mount -t tmpfs -o size=16k none "$1" && cd "$1" && "$2" record "$3" -o drive.r4log; echo $?;'
+              ' "$2" info drive.r4log')
+    full = subprocess.run(['unshare', '--map-root-user', '--mount', 'sh', '-c', script, 'sh', tmp_path, R4,
+                           board.host_url], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    assert full.stdout, f'there is no file system to fill: {full.stderr}'
+    code, *told = full.stdout.splitlines()
+    assert int(code) == OPEN and 'the recording has ended: No space left on device' in full.stderr, full
+    assert ERROR.search(full.stderr) and full.returncode == 0, full
+    assert not any('damage' == line.split()[0] for line in told), told
+
+
+def test_keeps_the_beginning_of_what_is_too_long_for_a_datagram(tmp_path):
+    path = tmp_path / 'drive.r4log'
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as talker:
+        talker.bind(('127.0.0.1', 0))
+        talker.settimeout(PATIENCE_S)
+        with record(f'udp://127.0.0.1:{talker.getsockname()[1]}?listen=0', '-o', path):
+            _, host = talker.recvfrom(2048)
+            talker.sendto(b'x' * 3000, host)
+            wait_for(path, r'^[0-9.]+ 1! oversize x{1024}$')
+    (told,), _ = info(path)
+    assert told['wires'][0]['oversize'] == 1 and told['wires'][0]['damaged'] == 0, told
 
 
 def test_files_that_follow_one_another_are_whole_in_themselves(board, tmp_path):
@@ -228,6 +272,7 @@ def test_info_reads_a_pipe():
     text = '# r4log 1 by r4\n1795468293.404765 1! up x\n'
     result = run('info', '-', stdin=text)
     assert result.returncode == 0 and '2026-11-23T21:11:33.404765Z' in result.stdout
+    assert result.stdout.startswith('standard input\n')
 
 
 @pytest.mark.parametrize('make, code, message', [

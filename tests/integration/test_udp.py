@@ -100,8 +100,9 @@ def test_streams_its_state_at_100_hz(board):
     times = [each['t'] for each in states]
     steps = [later - earlier for earlier, later in zip(times, times[1:])]
     print(f'{len(states)} states in {times[-1] - times[0]} ms of the board')
-    # Heartbeats have numbers of the same series: four of them in these two seconds.
-    assert len(states) - 1 <= numbers[-1] - numbers[0] <= len(states) + 6
+    # Of the same series are heartbeats, two a second, and answers to the host's questions of the board's clock:
+    # ten a second at first, as long as a busy machine leaves it uncertain.
+    assert len(states) - 1 <= numbers[-1] - numbers[0] <= len(states) + 4 + 20
     # The grid of 10 ms is kept; a busy machine may leave periods out, but never shifts it.
     assert all(step % 10 == 0 for step in steps)
     assert SANITIZED or steps.count(10) > 0.9 * len(steps)

@@ -8,6 +8,7 @@ import zlib
 
 import pytest
 
+from lan import Lan
 from r4_process import PATIENCE_S, Board, driving, is_state, lasts, monitor, run, watch
 
 
@@ -49,22 +50,17 @@ def test_a_monitor_and_a_send_in_either_order(board):
 
 
 def test_the_first_steps_of_the_help_work_as_printed():
-    """At the ports of the protocol, which are one each: only where they are free."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe, \
-            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as host_probe:
-        try:
-            probe.bind(('127.0.0.1', 2018))
-            host_probe.bind(('0.0.0.0', 2390))
-        except OSError:
-            pytest.skip('another program has port 2018 or 2390')
-    with Board('udp://127.0.0.1'):
-        with watch('udp://127.0.0.1') as watcher:
-            watcher.next(is_state)
-            sent = run('send', 'udp://127.0.0.1', 'R:1,On', 'O:358,1,1', '--hold', '0.5')
-            assert sent.returncode == 0, sent.stderr
-            watcher.next(drives)
-        with driving('udp://127.0.0.1', 'O:358,1,1'), watch('udp://127.0.0.1') as watcher:
-            watcher.next(drives)
+    """At the ports of the protocol, which are one each: on a computer where nobody else has them."""
+    with Lan() as lan:
+        inside = lan.computer('10.77.0.1').inside
+        with Board('udp://127.0.0.1', **inside):
+            with watch('udp://127.0.0.1', **inside) as watcher:
+                watcher.next(is_state)
+                sent = run('send', 'udp://127.0.0.1', 'R:1,On', 'O:358,1,1', '--hold', '0.5', **inside)
+                assert sent.returncode == 0, sent.stderr
+                watcher.next(drives)
+            with driving('udp://127.0.0.1', 'O:358,1,1', **inside), watch('udp://127.0.0.1', **inside) as watcher:
+                watcher.next(drives)
 
 
 def test_watchers_come_and_go_and_the_host_loses_nothing(board):

@@ -10,7 +10,7 @@ import subprocess
 import threading
 import time
 
-from r4_process import driving, is_link, is_state, monitor, run, watch
+from r4_process import driving, is_link, is_state, monitor, objects, run, stop_takes_ms, watch
 
 NETLINK_KOBJECT_UEVENT = 15
 PORT = '/dev/ttyUSB0'
@@ -38,11 +38,24 @@ def is_down(each):
     return each['type'] == 'link' and not each['fields']['up']
 
 
-def listed():
-    result = run('list')
-    line = next(line for line in result.stdout.splitlines() if PORT in line)
-    assert line.split()[:3] == [PORT, '0403:6001', 'R4-0001'], line
-    print(line.strip())
+def listed(*options):
+    """The port in r4 list; with `--serial` the board at it is asked, though its USB id is not a board's."""
+    ports = [each for each in objects(run('list', '--json', *options).stdout) if each['type'] == 'port']
+    port = next(each for each in ports if each['path'] == PORT)
+    assert (port['usb'], port['serial_number']) == ('0403:6001', 'R4-0001'), port
+    return port
+
+
+def listed_with_who_controls_it():
+    assert 'board_id' not in listed(), 'whatever it is, it was asked nothing'
+    free = listed('--serial', PORT)
+    assert free['board_id'] == 'sim-1' and free['firmware'] and free['busy'] is False, free
+    with driving(f'serial://{PORT}', 'O:358,1,1') as host:
+        held = listed()
+        assert held['board_id'] == 'sim-1' and held['busy'], held
+        assert held['held_by'] == {'program': 'r4', 'pid': host.process.pid, 'controls': True}, held
+        print(*run('list').stdout.split('\n\n', maxsplit=1)[0].splitlines(), sep='\n')
+        host.skip_past()
 
 
 def streams_at_the_boards_rate():
@@ -96,17 +109,14 @@ def shared_by_programs():
             refused = run('send', by_path, 'O:1,1,1')
             assert refused.returncode == 3, refused
             assert f'controlled by r4 (pid {host.process.pid})' in refused.stderr, refused
-            stopped = run('stop', by_path)
-            assert stopped.returncode == 0, stopped
-            print(stopped.stdout.splitlines()[0])
+            stop_takes_ms(by_path)
             host.process.kill()
             early.skip_past()
-            early.next(is_link('safe', 'stop'))
-            early.next(is_state)
+            early.next(lambda each: is_state(each) and each['fields'].get('SAFE') == 2)
         assert run('send', by_path, 'E:CLEAR').returncode == 0
 
 
-listed()
+listed_with_who_controls_it()
 streams_at_the_boards_rate()
 shared_by_programs()
 unplugged_and_plugged_in_again('serial:?sn=R4-0001', times=3)

@@ -2,9 +2,9 @@
 // What the protocol costs on a Cortex-M7, in instructions. Under `-icount shift=10` an instruction
 // takes 1024 ns of the board's time, so the timer counts them; a loop of known length says how many
 // ticks that are.
-#include "firmware/application.hpp"
-#include "firmware/ports/m7/board_clock.hpp"
-#include "firmware/ports/m7/semihosting.hpp"
+#include "firmware/application/application.hpp"
+#include "firmware/ports/m7/chip/board_clock.hpp"
+#include "firmware/ports/m7/chip/semihosting.hpp"
 #include "firmware/ports/m7/startup.hpp"
 #include "firmware/ports/sim/robot/board_model.hpp"
 #include "on_target.hpp"

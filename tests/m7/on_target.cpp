@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "on_target.hpp"
 
-#include "firmware/ports/m7/semihosting.hpp"
+#include "firmware/ports/m7/chip/semihosting.hpp"
 #include "protocol/datagram/numbers.hpp"
 
 namespace r4 {

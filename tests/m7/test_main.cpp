@@ -4,9 +4,9 @@
 #include <cstdint>
 
 #include "board_bench.hpp"
+#include "firmware/ports/m7/chip/registers.hpp"
+#include "firmware/ports/m7/chip/semihosting.hpp"
 #include "firmware/ports/m7/fault.hpp"
-#include "firmware/ports/m7/registers.hpp"
-#include "firmware/ports/m7/semihosting.hpp"
 #include "firmware/ports/m7/startup.hpp"
 
 namespace {

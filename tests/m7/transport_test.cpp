@@ -2,7 +2,7 @@
 // The ends of the board's transports, without their chips.
 #include <cstring>
 
-#include "firmware/ports/m7/udp_frames.hpp"
+#include "firmware/ports/m7/links/udp_frames.hpp"
 #include "firmware/ports/transmit_lines.hpp"
 #include "on_target.hpp"
 

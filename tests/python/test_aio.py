@@ -64,6 +64,78 @@ def test_iterates_over_states_and_tells_callbacks_on_the_loop(sim):
     asyncio.run(main())
 
 
+def test_loses_no_state_while_the_loop_is_busy(sim, tmp_path):
+    path = tmp_path / 'all.r4log'
+
+    async def main():
+        async with aio.Board(sim.url) as board:
+            board.record(path)
+            await board.wait_active()
+            states = board.states(lossless=True)
+            time.sleep(0.3)  # of the whole loop
+            async for state in board.states():
+                newest = state.pnum
+                break
+            numbers = []
+            async for state in states:
+                numbers.append(state.pnum)
+                if numbers[-1] > newest:
+                    break
+            assert states.dropped == 0
+        return numbers
+
+    numbers = asyncio.run(main())
+    [robot] = r4link.read(path).boards
+    all_of_them = robot.states['pnum'].tolist()
+    first = all_of_them.index(numbers[0])
+    assert len(numbers) > 20 and numbers == all_of_them[first:first + len(numbers)]
+
+
+def test_a_loop_over_states_that_always_wait_leaves_others_their_turn(sim):
+    async def main():
+        async with aio.Board(sim.url) as board:
+            await board.wait_active()
+            states = board.states(lossless=True)
+            await asyncio.sleep(0.1)
+            turns = []
+            other = asyncio.create_task(tick(turns))
+            for _ in range(5):
+                await anext(states)
+            assert len(turns) >= 4
+            other.cancel()
+    asyncio.run(main())
+
+
+async def tick(turns):
+    while True:
+        turns.append(True)
+        await asyncio.sleep(0)
+
+
+def test_records_watches_and_has_a_watchdog(sim, tmp_path):
+    async def main():
+        async with aio.Board(sim.url) as board:
+            board.record(tmp_path / 'drive.r4log', rotate_bytes=1 << 20)
+            await board.wait_active()
+            await board.arm()
+            await board.osmc(1).set(100)
+            board.watchdog(0.03)
+            board.feed()
+            async for _ in board.states():
+                if board.link.gated:
+                    break
+            board.watchdog(0)
+        async with aio.Board(sim.url, role='watch') as board:
+            await board.wait_active()
+            with pytest.raises(r4link.UsageError):
+                await board.arm()
+            await board.stop()
+        with pytest.raises(r4link.OpenError):
+            aio.Board(sim.url, key='/no/where')
+    asyncio.run(main())
+    assert r4link.read(tmp_path / 'drive-00001.r4log').boards[0].states['osmc1_pwm'].max() == 100
+
+
 async def count(states):
     number = 0
     async for _ in states:

@@ -117,11 +117,41 @@ def test_iterates_over_states(board):
             break
     assert numbers == sorted(set(numbers))
     newest = board.states()
-    time.sleep(0.1)  # of them
+    for _ in range(10):
+        board.next_state()
     assert next(newest).pnum > numbers[-1] + 5 and newest.dropped > 3
     rest = board.states()
     board.close()
     assert len(list(rest)) <= 1
+
+
+def test_loses_no_state_while_a_callback_and_the_loop_sleep(sim, tmp_path):
+    path = tmp_path / 'all.r4log'
+    with r4link.Board(sim.url, callback_limit=0) as board:
+        board.record(path)
+        board.wait_active()
+        awake = threading.Event()
+        board.on_state(lambda _: awake.wait(20))
+        states = board.states(lossless=True)
+        for _ in range(30):
+            board.next_state()
+        awake.set()
+    numbers = [state.pnum for state in states]
+    [robot] = r4link.read(path).boards
+    all_of_them = robot.states['pnum'].tolist()
+    assert len(numbers) >= 30 and states.ended and states.dropped == 0
+    first = all_of_them.index(numbers[0])
+    assert numbers == all_of_them[first:first + len(numbers)]
+
+
+def test_what_is_lost_nevertheless_is_an_error_in_its_place(board):
+    states = board.states(5, lossless=True)
+    for _ in range(8):
+        board.next_state()
+    numbers = [next(states).pnum for _ in range(5)]
+    with pytest.raises(r4link.DataError, match='5 waited.*most'):
+        next(states)
+    assert states.dropped >= 3 and next(states).pnum > numbers[-1] + 3
 
 
 def test_callbacks_come_on_a_thread_of_their_own(sim, board, wait):
@@ -219,10 +249,93 @@ def test_records_and_plays_again(sim, tmp_path):
         assert board.identify().board_id == 'sim-1'
     with r4link.Board(f'replay:{path}', role='watch') as again:
         assert any(state.osmc1.pwm == 358 for state in again.states(most=100))
-    log = r4link.Recording(str(tmp_path / 'two.r4log'), 0, 0, 0)
-    with r4link.Board('sim:') as one, r4link.Board('sim:') as two:
-        for each in (one, two):
-            each.record(log)
-            each.wait_active()
-        assert log.records > 2 and log.problem is None
-        log.close()
+    with r4link.Recording(tmp_path / 'two.r4log', rotate_bytes=1 << 20) as log:
+        other = r4link.SimBoard()
+        with r4link.Board(sim.url) as one, r4link.Board(other.url) as two:
+            for each in (one, two):
+                each.record(log)
+                each.wait_active()
+            assert log.records > 2 and log.dropped == 0 and log.problem is None
+    assert len(r4link.read(tmp_path / 'two-00001.r4log').boards) == 2
+    with pytest.raises(r4link.UsageError):
+        r4link.Recording(tmp_path / 'x.r4log', keep_bytes=1)
+
+
+KEY = '1:' + '5a' * 32
+
+
+def test_a_board_with_a_key_obeys_who_has_it(tmp_path, wait):
+    path = tmp_path / 'key'
+    path.write_text(KEY + '\n')
+    path.chmod(0o600)
+    with r4link.SimBoard('udp://127.0.0.1:0', settings={'key': KEY}) as sim:
+        with r4link.Board(sim.url) as stranger:
+            wait(lambda: stranger.link.key == 'needed')
+            with pytest.raises(r4link.RefusedError, match='key'):
+                stranger.wait_active(0.01)
+        with r4link.Board(sim.url, key=path) as board:
+            board.wait_active()
+            board.arm()
+            board.osmc(1).set(358)
+            assert board.link.key == 'none'
+            wait(lambda: sim.look().osmc[0].pwm == 358)
+        path.write_text(KEY.replace('5a', '5b') + '\n')
+        with r4link.Board(sim.url, key=path) as wrong:
+            wait(lambda: wrong.link.key == 'not taken')
+        assert sim.look().is_safe
+
+
+def test_a_bad_link_loses_what_it_should(sim):
+    url = r4link.with_link(sim.url, 'loss=20%,seed=7')
+    assert url == sim.url
+    with r4link.Board(url) as board:
+        board.wait_active()
+        for _ in range(50):
+            board.next_state()
+        assert 0.05 < board.statistics.loss < 0.5
+    with pytest.raises(r4link.UsageError, match='lost'):
+        r4link.with_link(sim.url, 'lost=5%')
+
+
+def test_settings_proximity_and_link_timing(sim, board, wait):
+    board.setting('rate', '200')
+    wait(lambda: (board.next_state().t_ms - board.state.t_ms) % 5 == 0 and
+         {b.t_ms - a.t_ms for a, b in pairs(board, 4)} == {5})
+    with pytest.raises(r4link.UsageError):
+        board.setting('rate', 'fast')
+    with pytest.raises(r4link.UsageError):
+        board.link_timing(0.3, 0.4)
+    board.link_timing(0.4, 0.1)
+    board.arm()
+    board.watchdog(0.02)
+    silent = time.monotonic()
+    wait(lambda: sim.look().is_safe)
+    assert time.monotonic() - silent < 0.95, 'after the timeout that was set'
+    board.watchdog(0)
+    board.wait_active()
+    board.proximity(1, 30)
+    sim.obstacle(1, 15)
+    wait(lambda: board.link.reason == 'proximity')
+
+
+def pairs(board, count):
+    states = board.states(100)
+    numbers = [next(states) for _ in range(count + 1)]
+    return zip(numbers, numbers[1:])
+
+
+def test_a_stop_that_is_not_waited_for_and_a_restart_that_is_told(sim, board, wait):
+    restarts = []
+    board.on_restart(lambda: restarts.append(True))
+    board.arm()
+    board.osmc(1).set(100)
+    board.stop_async()
+    wait(lambda: board.link.reason == 'stop' and sim.look().is_safe)
+    sim.reboot()
+    wait(lambda: restarts)
+
+
+def test_counts_packets(board):
+    board.next_state()
+    statistics = board.statistics
+    assert statistics.packets_received >= statistics.states > 0 and statistics.old <= statistics.received

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Ends of all kinds: of boards, calls, threads, processes and the interpreter."""
 import gc
+import multiprocessing
 import os
+import pathlib
+import pickle
 import resource
 import signal
 import subprocess
@@ -13,6 +16,7 @@ import weakref
 import pytest
 
 import r4link
+from reference_counts import use_all_of_it
 
 SILENT = 'udp://127.0.0.1:9?listen=0'
 
@@ -87,7 +91,7 @@ def test_a_board_in_a_circle_is_collected(sim):
     circle = []
     board.on_state(lambda state, circle=circle: circle)  # the board knows the function, the function the board
     board.wait_active()
-    circle.append(board)
+    circle += [board, board.states()]
     gone = weakref.ref(board)
     del board, circle
     for _ in range(3):
@@ -157,27 +161,109 @@ def test_many_threads_use_one_board(sim, board, wait):
     wait(lambda: all(abs(pulse - 1029) < 5 for pulse in sim.look().servo_us[:8]))
 
 
+def test_handles_outlive_a_board_that_is_collected(sim, tmp_path):
+    board = r4link.Board(sim.url)
+    recording = r4link.Recording(tmp_path / 'x.r4log')
+    board.record(recording)
+    subscription = board.on_state(lambda state: state)
+    board.wait_active()
+    gone = weakref.ref(board)
+    del board
+    gc.collect()
+    assert gone() is None
+    subscription.cancel()
+    assert recording.records > 2
+    with r4link.Board(sim.url) as again:  # the transport is free
+        again.wait_active()
+    recording.close()
+    assert len(r4link.read(tmp_path / 'x.r4log').boards) == 1
+
+
+def test_a_loop_keeps_its_board(sim):
+    numbers = []
+    for state in r4link.Board(sim.url).states():
+        numbers.append(state.pnum)
+        gc.collect()
+        if len(numbers) == 5:
+            break
+    board = r4link.Board('sim:')
+    states = board.states(lossless=True)
+    board.next_state()
+    core = board._core
+    del board
+    gc.collect()
+    core.next_state(1000)
+    core.close()
+    assert len(list(states)) >= 2 and states.ended
+
+
+def test_a_board_may_be_let_go_in_its_own_callback(sim, wait):
+    last = [r4link.Board(sim.url)]
+    gone = weakref.ref(last[0])
+    last[0].on_state(lambda state: last.clear())
+    wait(lambda: gone() is None)
+    with r4link.Board(sim.url) as again:
+        again.wait_active()
+
+
+@pytest.mark.parametrize('left', ['states = r4link.Board("sim:").states(); next(states)',
+                                  'core = r4link.Board("sim:")._core; core.wait_active(3000)',
+                                  'subscription = r4link.Board("sim:").on_state(print)',
+                                  'import tempfile; log = r4link.Recording(tempfile.mkdtemp() + "/x.r4log"); board.record(log)',
+                                  'import threading; threading.Thread(target=board.identify).start()',
+                                  'board.on_state(lambda state: board.close())',
+                                  'board.circle = board; board.on_state(lambda state, board=board: None)'])
+def test_the_interpreter_may_end_with_anything_open(left):
+    program = f"""
+import r4link
+board = r4link.Board('sim:')
+board.wait_active()
+{left}
+"""
+    with run(program) as process:
+        out, errors = process.communicate(timeout=20)
+    assert process.returncode == 0 and errors == '', (process.returncode, out, errors)
+
+
+def test_a_spawned_process_has_boards_of_its_own(board):
+    with pytest.raises(TypeError, match='pickle'):
+        pickle.dumps(board)
+    spawn = multiprocessing.get_context('spawn')
+    told = spawn.Queue()
+    child = spawn.Process(target=drive_in_a_child, args=(told,))
+    child.start()
+    assert told.get(timeout=30) == 358
+    child.join(10)
+    assert child.exitcode == 0
+    board.identify()
+
+
+def drive_in_a_child(told):
+    board = r4link.Board('sim:', arming=False)
+    board.wait_active()
+    board.osmc(1).set(358)
+    told.put(board.state.osmc1.pwm)
+
+
+def test_no_reference_is_lost_or_left():
+    """On the interpreter that counts them, python3.11-dbg, with the module built for it."""
+    build = pathlib.Path(os.environ['R4_BUILD'])
+    ended = subprocess.run(['/usr/bin/python3.11-dbg', pathlib.Path(__file__).with_name('reference_counts.py')],
+                           capture_output=True, text=True, timeout=120, check=False,
+                           env={**os.environ, 'PYTHONPATH': str(build / 'python-debug')})
+    assert ended.returncode == 0 and ended.stderr == '', ended.stdout + ended.stderr
+
+
 def test_nothing_grows(sim):
     def use():
-        board = r4link.Board(sim.url, arming=False)
-        board.on_state(lambda state: board.name)
-        board.on_event(print if board is None else lambda event: event.as_dict())
-        board.wait_active()
-        for state in board.states():
-            state.as_dict()
-            break
-        try:
-            board.osmc(9).set(1)
-        except r4link.UsageError:
-            pass
-        board.close()
+        use_all_of_it(sim)
 
     for _ in range(20):
         use()
     gc.collect()
     objects, threads = len(gc.get_objects()), threading.active_count()
     kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # the most so far
-    for _ in range(200):
+    for _ in range(60):
         use()
     gc.collect()
     assert len(gc.get_objects()) - objects < 50 and threading.active_count() == threads

@@ -55,7 +55,7 @@ def test_examples_run(example, sim, tmp_path):
     assert 'OSMC 1: 358 forward' in told, told
 
 
-@pytest.mark.parametrize('page', ['README.md', 'docs/python.md'])
+@pytest.mark.parametrize('page', ['README.md', 'docs/fleet.md', 'docs/python.md'])
 def test_what_the_documentation_shows_runs(page, tmp_path):
     shown = re.findall(r'^```python\n(.*?)^```', (ROOT / page).read_text(), re.MULTILINE | re.DOTALL)
     assert shown
@@ -79,5 +79,10 @@ def test_installs_into_a_venv_and_builds_a_wheel_and_a_source_distribution(tmp_p
     assert wheel.name.startswith('r4link-') and wheel.suffix == '.whl', wheel
     with tarfile.open(source) as archive:
         names = archive.getnames()
+        archive.extractall(tmp_path / 'source')
+    # The source distribution is whole: it configures in a folder of its own, as a build without R4_BUILD does.
+    run(sys.executable, '-c', 'import build_backend; build_backend.configure("build")',
+        cwd=tmp_path / 'source' / f'r4link-{r4link.__version__}',
+        env={**OFFLINE, 'PYTHONPATH': 'host/python'})
     assert f'r4link-{r4link.__version__}/host/python/bindings/board.cpp' in names
     assert not any('__pycache__' in each or each.endswith('.so') for each in names)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """r4link.read: recordings as arrays."""
+import os
+import threading
 import zlib
 
 import numpy as np
@@ -62,6 +64,22 @@ def test_fields_that_come_later_two_boards_and_damage(tmp_path):
         log['right-arm']  # pylint: disable=pointless-statement
 
 
+@pytest.mark.parametrize('written, states, damaged', [
+    (HEADER + line(0.5, 'AIN24:24.10;PNum:1;T:10;') + line(0.6, 'AIN24:24.20;PNum:2;T:20;')[:-9], 1, 1), ('', None, 0)])
+def test_a_fifo_whose_writer_goes_away(tmp_path, written, states, damaged):
+    path = tmp_path / 'fifo.r4log'
+    os.mkfifo(path)
+    writer = threading.Thread(target=path.write_text, args=(written,))
+    writer.start()
+    if states is None:
+        with pytest.raises(r4link.DataError, match='fifo.r4log'):
+            r4link.read(path)
+    else:
+        log = r4link.read(path)
+        assert len(log.boards[0].states) == states and len(log.damage) == damaged
+    writer.join()
+
+
 @pytest.mark.parametrize('content, error', [(b'\0' * 100_000, r4link.DataError), (b'', r4link.DataError),
                                             (b'# r4log 2 by r4 9\n', r4link.DataError), (None, r4link.OpenError)])
 def test_what_is_no_recording_is_told(tmp_path, content, error):
@@ -71,5 +89,13 @@ def test_what_is_no_recording_is_told(tmp_path, content, error):
     with pytest.raises(error) as raised:
         r4link.read(path)
     assert str(path) in raised.value.thing
-    with pytest.raises(r4link.Error):
+    with pytest.raises(r4link.OpenError, match='directory'):
         r4link.read(tmp_path)
+
+
+def test_the_form_of_a_later_version_is_told(tmp_path):
+    path = tmp_path / 'x.r4log'
+    path.write_text(HEADER.replace('r4log 1', 'r4log 2'))
+    with pytest.raises(r4link.DataError, match='version') as raised:
+        r4link.read(path)
+    assert raised.value.fix

@@ -11,7 +11,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "firmware/application.hpp"
+#include "firmware/application/application.hpp"
 #include "firmware/ports/sim/simulated_hardware.hpp"
 #include "protocol/messages/message.hpp"
 #include "protocol/messages/state_fields.hpp"

@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "firmware/application.hpp"
+#include "firmware/application/application.hpp"
 #include "host/session/session.hpp"
 #include "protocol/datagram/datagram_writer.hpp"
 #include "random.hpp"

@@ -168,6 +168,7 @@ TEST(LinkSimulation, TripsFalselyLessThanOnceADayAtTenPercentLoss) {
   day.settings.state_rate_hz = 1;
   day.to_board.loss = day.to_host.loss = 0.1;
   day.command_interval_us = 3'600'000'000U;
+  day.board_drift_ppm = Schedule::most_drift_ppm;  // less time for the host
   const Report report = World(1, day, false).run();
   fmt::print("false trips in a day at 10 % loss: {}\n", report.link_losses);
   EXPECT_EQ(report.violation, "");

@@ -115,6 +115,11 @@ void Schedule::add_standstills(Random& random) {
   }
 }
 
+void Schedule::add_drift(Random& random) {
+  board_drift_ppm =
+      static_cast<std::int64_t>(random.below(2 * most_drift_ppm + 1)) - most_drift_ppm;
+}
+
 const char* to_text(Happening::Kind kind) {
   switch (kind) {
     case Happening::Kind::cut:

@@ -65,6 +65,9 @@ struct Schedule {
   double post_share = 0;   // commands sent without asking for confirmation
   double group_share = 0;  // commands that are a group: the same target for all steppers
   std::uint32_t board_lateness_us = 0;  // the board's loop comes up to this much late
+  // The board's clock is faster, or slower, than the hosts'.
+  std::int64_t board_drift_ppm = 0;
+  static constexpr std::int64_t most_drift_ppm = 100;
   // The board has a key for each host, and there is an attacker, who acts about so often; 0:
   // neither.
   std::uint32_t attack_interval_us = 0;
@@ -75,6 +78,7 @@ struct Schedule {
   static Schedule random(Random& random);
   void add_standstills(Random& random);
   void add_watchers(Random& random);
+  void add_drift(Random& random);
 };
 
 const char* to_text(Happening::Kind kind);

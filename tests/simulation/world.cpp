@@ -12,12 +12,20 @@
 
 namespace r4::simulation {
 
+namespace {
+
+constexpr std::int64_t million = 1'000'000;
+
+}  // namespace
+
 World::World(std::uint64_t seed, bool keep_trace, Loop loop)
     : random_(seed), loop_random_(~seed), keep_trace_(keep_trace) {
   schedule_ = Schedule::random(random_);
   Random watch_random(seed + 0x5eed);  // what else happens in a schedule without them is as it was
   if (watch_random.chance(0.3)) schedule_.add_watchers(watch_random);
   if (loop == Loop::stands_still) schedule_.add_standstills(loop_random_);
+  Random drift_random(seed + 0xd21f7);
+  schedule_.add_drift(drift_random);
   report_.seed = seed;
 }
 
@@ -99,7 +107,16 @@ void World::at(std::uint64_t time_us, Event::Kind kind, int index, std::uint32_t
 }
 
 std::uint32_t World::board_ms() const {
-  return boot_offset_ms_ + static_cast<std::uint32_t>((now_us_ - boot_us_) / 1000);
+  const std::uint64_t board_us = (now_us_ - boot_us_) *
+                                 static_cast<std::uint64_t>(million + schedule_.board_drift_ppm) /
+                                 million;
+  return boot_offset_ms_ + static_cast<std::uint32_t>(board_us / 1000);
+}
+
+std::uint64_t World::when_board_shows(std::uint32_t t_ms) const {
+  const auto board_us = std::uint64_t{t_ms - boot_offset_ms_} * 1000;
+  const auto rate = static_cast<std::uint64_t>(million + schedule_.board_drift_ppm);
+  return boot_us_ + (board_us * million + rate - 1) / rate;
 }
 
 void World::mix(const void* data, std::size_t size) {

@@ -36,7 +36,7 @@
 #include <vector>
 
 #include "attacker.hpp"
-#include "firmware/application.hpp"
+#include "firmware/application/application.hpp"
 #include "host/session/session.hpp"
 #include "schedule.hpp"
 
@@ -170,6 +170,8 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
 
   void at(std::uint64_t time_us, Event::Kind kind, int index, std::uint32_t generation = 0);
   std::uint32_t board_ms() const;
+  // Since its boot: when its clock began, or begins, to show that.
+  std::uint64_t when_board_shows(std::uint32_t t_ms) const;
   void mix(const void* data, std::size_t size);
   void note(const std::string& line);
   void show(const std::string& line);

@@ -49,9 +49,11 @@ void World::boot_board() {
 }
 
 void World::poll_board() {
-  const std::uint32_t wait_ms = board_->poll(board_ms());
+  const std::uint32_t now_ms = board_ms();
+  const std::uint32_t wait_ms = board_->poll(now_ms);
   const std::uint64_t late_us = random_.below(schedule_.board_lateness_us + 1);
-  at(now_us_ + wait_ms * 1000 + late_us, Event::Kind::board, 0, board_generation_);
+  const std::uint64_t wait_us = when_board_shows(now_ms + wait_ms) - when_board_shows(now_ms);
+  at(now_us_ + wait_us + late_us, Event::Kind::board, 0, board_generation_);
 }
 
 void World::stand_still(const Standstill& standstill) {
@@ -223,7 +225,8 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
   }
   const std::uint32_t unseen_ms =
       schedule_.standstills.empty() ? 0 : firmware::Application::standstill_ms;
-  const std::uint64_t overtaken_us = (BoardLink::late_limit_ms + unseen_ms + 1) * 1000U;
+  // By the board's clock, which may be slow.
+  const std::uint64_t overtaken_us = (BoardLink::late_limit_ms + unseen_ms + 1) * 1001U;
   for (const Fed& fed : fed_) {
     const bool overtook = fed.from == delivering_ && newer(fed.pnum, pnum);
     if (overtook && now_us_ - fed.at_us > overtaken_us) {

@@ -63,9 +63,8 @@ struct World::Host final : Session::Handler {
     if (state.sampled_error == ReceivedState::unknown) return;
     const auto age_ms = static_cast<std::int32_t>(world.board_ms() - state.t_ms);
     if (age_ms < 0 || age_ms > 60'000) return;  // of a boot before, by another clock
-    const std::int64_t phase_us =
-        static_cast<std::int64_t>((world.now_us_ - world.boot_us_) % 1000);
-    const Time truth = time() - Time{age_ms * 1000LL + phase_us};
+    const Time truth{
+        static_cast<std::int64_t>(world.when_board_shows(state.t_ms) + clock_offset_us)};
     const Time off = std::chrono::round<Time>(state.sampled.time_since_epoch()) - truth;
     ++world.report_.sampled;
     world.report_.sampled_wrongly += std::chrono::abs(off) > state.sampled_error;

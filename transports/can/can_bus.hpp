@@ -88,8 +88,14 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   // Hands over the frames that have arrived. Before somebody gives up waiting for one: a loop that
   // was held up may find the time-out and the frame together. True if there were any.
   bool take();
-  // A frame of the emergency stop, ahead of everything that waits in the interface's queue.
-  SendResult send_stop(const CanFrame& frame);
+  // The emergency stop, which all boards of the bus hear, ahead of everything that waits in the interface's queue.
+  //
+  // The bare frame first, which every board on any version of this plan obeys, and behind it the one with
+  // the number by which the stop is confirmed. Members whose stop has the same number have one of each: none
+  // is sent again within stop_spacing.
+  SendResult announce_stop(std::optional<std::uint32_t> number);
+  SendResult repeat_stop(std::uint32_t number);
+  static constexpr std::chrono::milliseconds stop_spacing{10};
 
   bool up() const { return up_; }
   // What was told of last, if that is still so: for who has joined since.
@@ -124,6 +130,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   void have_left(std::size_t count);
   void drop_queue();
   void send_later();
+  SendResult send_first(const CanFrame& frame);
   void go_bus_off();
   void set_trouble(std::string reason, std::string fix);
   void go_down(Problem problem, bool reopen);
@@ -165,10 +172,27 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   std::size_t out_count_ = 0;
   Clock::time_point progress_;
 
+  // The newest stops: of which the bare frame has left, and which left with its number, and when.
+  std::optional<std::uint32_t> announced_stop_;
+  std::optional<std::uint32_t> numbered_stop_;
+  Clock::time_point stop_left_;
+
   bool up_ = true;
   std::optional<CarrierEvent> standing_;  // down, or a warning
   std::uint32_t controller_overflows_ = 0;
   std::array<CanSocket::Received, CanSocket::batch> in_;
 };
+
+// Members may leave, and others join, in any call of theirs: those come later than what is told.
+template <class Action>
+void CanBus::for_each_member(Action action) {
+  ++calling_;
+  const std::size_t count = members_.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (members_[i].member != nullptr) action(*members_[i].member);
+  }
+  --calling_;
+  clear_places();
+}
 
 }  // namespace r4

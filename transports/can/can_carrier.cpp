@@ -19,6 +19,7 @@
 #include "can_bus.hpp"
 #include "can_interface.hpp"
 #include "can_turn.hpp"
+#include "overheard_commands.hpp"
 #include "r4link/command.hpp"
 
 namespace r4 {
@@ -27,6 +28,9 @@ namespace {
 constexpr std::size_t normal_entries = 32;
 constexpr std::size_t state_entries = 1;  // newest wins
 constexpr std::uint32_t look_again_us = 20000;
+// Of a board six heartbeats, of its host three: who was not heard for so long is not there.
+constexpr std::chrono::milliseconds board_silence{3000};
+constexpr std::chrono::milliseconds host_silence{300};
 
 class CanCarrier final : public Carrier, private CanBus::Member {
  public:
@@ -67,6 +71,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
 
   Lane& lane(CanLane which) { return lanes_[which == CanLane::dialogue ? 0 : 1]; }
   SendResult send_stop(std::string_view bytes);
+  SendResult send_lease(std::string_view bytes);
   bool begin(std::string_view bytes, std::uint32_t now_us);
   bool begin_waiting(std::uint32_t now_us);
   void listen_for_others(const CanFrame& frame);
@@ -82,16 +87,23 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   const std::string name_;
   CanNode node_;
   CanTurn turn_{std::random_device{}()};  // of a host
+  OverheardCommands others_;              // to the same board
   mutable CarrierCounters counters_;      // what others count is put in when it is asked for
   std::array<Lane, 2> lanes_;
   std::shared_ptr<CanBus> bus_;
   std::optional<std::uint32_t> announced_stop_;  // its number
+  // When they were heard last, by a host's end.
+  Clock::time_point board_heard_;
+  Clock::time_point host_heard_;
   Handler* handler_ = nullptr;
   LoopTimer timer_;
   OperationSlot timing_;
   bool armed_ = false;
   std::uint32_t armed_for_us_ = 0;
 };
+
+bool is_lease(std::string_view bytes) { return bytes.starts_with("W:"); }
+bool ends_lease(std::string_view bytes) { return bytes.starts_with("W:0;"); }
 
 // Whether a board packs is its setting, not its URL's.
 std::uint8_t node_of(const Url& url, Role role) {
@@ -110,6 +122,7 @@ CanCarrier::CanCarrier(asio::io_context& io, Url url, Role role)
       name_(fmt::format("can://{}?node={}{}{}", url_.host(), number_, fd_ ? "&fd=1" : "",
                         role == Role::board || packs_ ? "" : "&pack=0")),
       node_(role == Role::board ? CanEnd::board : CanEnd::host, number_, fd_),
+      others_(number_),
       lanes_{
           Lane{CanLane::dialogue, SendQueue(normal_entries, state_entries, counters_.tx_dropped)},
           Lane{CanLane::telemetry, SendQueue(normal_entries, state_entries, counters_.tx_dropped)}},
@@ -142,7 +155,8 @@ void CanCarrier::open(Handler& handler) {
   bus_ = bus;
   handler_ = &handler;
   bus->join(*this, role_ == Role::board
-                       ? std::vector<std::uint32_t>{emergency_stop_id, command_id(number_)}
+                       ? std::vector<std::uint32_t>{emergency_stop_id, command_id(number_),
+                                                    watch_id(number_)}
                        : std::vector<std::uint32_t>{reply_id(number_), telemetry_id(number_),
                                                     command_id(number_)});
   if (bus->up()) on_bus({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
@@ -173,6 +187,7 @@ SendResult CanCarrier::send(std::string_view bytes, Priority priority, Peer) {
     ++(result == SendResult::sent ? counters_.tx_datagrams : counters_.tx_errors);
     return result;
   }
+  if (role_ == Role::host && is_lease(bytes)) return send_lease(bytes);
   if (role_ == Role::host && !turn_.ours(Clock::now())) {
     return turn_.others() ? SendResult::busy : SendResult::down;
   }
@@ -185,25 +200,18 @@ SendResult CanCarrier::send(std::string_view bytes, Priority priority, Peer) {
   return result;
 }
 
-// The bare frame first, which every board on any version of this plan obeys, and behind it the one with
-// the number by which the stop is confirmed. That alone is repeated: to a board a bare frame is a
-// new stop each time, and who has seen the one would have to look again before they clear it.
+// Only its number is repeated: to a board a bare frame is a new stop each time, and who has seen the one
+// would have to look again before they clear it.
 SendResult CanCarrier::send_stop(std::string_view bytes) {
-  CanFrame frame{};
-  frame.id = emergency_stop_id;
   Datagram stop;
   std::uint32_t number = 0;
   const bool numbered =
       read_datagram(Text(bytes.data(), bytes.size()), stop) && stop_number(stop, number);
-  SendResult bare = SendResult::sent;
-  if (!numbered || announced_stop_ != number) {
-    bare = bus_->send_stop(frame);
-    if (bare == SendResult::sent && numbered) announced_stop_ = number;
-  }
-  if (!numbered) return bare;
-  frame.extended = true;
-  frame.id = numbered_stop_id(number);
-  return bus_->send_stop(frame);
+  if (!numbered) return bus_->announce_stop({});
+  if (announced_stop_ == number) return bus_->repeat_stop(number);
+  const SendResult result = bus_->announce_stop(number);
+  if (result == SendResult::sent) announced_stop_ = number;
+  return result;
 }
 
 bool CanCarrier::begin(std::string_view bytes, std::uint32_t now_us) {
@@ -214,11 +222,30 @@ bool CanCarrier::begin(std::string_view bytes, std::uint32_t now_us) {
   return true;
 }
 
+// By a frame that is the same whoever sends it, so that it collides with nobody's; where the board is, and no
+// host for whom it streams anyway.
+SendResult CanCarrier::send_lease(std::string_view bytes) {
+  const Clock::time_point now = Clock::now();
+  if (ends_lease(bytes)) return SendResult::down;  // others may watch, too: it runs out
+  if (now - board_heard_ > board_silence || now - host_heard_ < host_silence) {
+    return SendResult::down;
+  }
+  node_.ask_for_states();
+  bus_->send();
+  return SendResult::sent;
+}
+
 // What another host sends to our board: commands; its flow control is the same as ours.
 void CanCarrier::listen_for_others(const CanFrame& frame) {
-  const bool command =
-      classify(frame).kind == CanIdKind::command && !isotp_frame::is_flow_control(frame);
-  if (role_ != Role::host || !command || !turn_.on_other(Clock::now())) return;
+  if (role_ != Role::host) return;
+  const Clock::time_point now = Clock::now();
+  if (classify(frame).kind != CanIdKind::command) {
+    board_heard_ = now;
+    return;
+  }
+  if (isotp_frame::is_flow_control(frame)) return;
+  host_heard_ = now;
+  if (!turn_.on_other(now)) return;
   node_.stop_commanding();
   lane(CanLane::dialogue).queue.clear();
 }
@@ -242,6 +269,11 @@ bool CanCarrier::offer(std::uint32_t now_us, CanFrame& frame) {
 
 void CanCarrier::on_frame(const CanFrame& frame, std::uint32_t at_us) {
   listen_for_others(frame);
+  if (role_ == Role::host && classify(frame).kind == CanIdKind::command) {
+    const std::string_view command = others_.on_frame(frame, at_us);
+    if (!command.empty()) handler_->on_overheard(command);
+    return;
+  }
   const Text datagram = node_.on_frame(frame, at_us);
   if (datagram.empty()) return;
   ++counters_.rx_datagrams;

@@ -8,7 +8,8 @@
 //              goes by its setting: C:pack,0
 //
 // A stop (Priority::stop) of the host's end is the emergency frame, which stops every board on the
-// bus, ahead of all that waits.
+// bus, ahead of all that waits. A lease (W) of who watches is a frame of its own, and only where the board is
+// heard and no host.
 #pragma once
 
 #include <asio/io_context.hpp>

@@ -52,6 +52,7 @@ void CanSurvey::on_frame(const CanFrame& frame, std::uint32_t at_us) {
       if (stop_callback_) stop_callback_();
       return;
     case CanIdKind::command:
+    case CanIdKind::watch:
     case CanIdKind::other:
       return;
   }
@@ -96,7 +97,8 @@ void CanSurvey::take(std::uint8_t node, Text bytes, std::uint32_t at_us) {
   switch (kind_of(datagram)) {
     case MessageKind::state:
       ++board.states;
-      board.connected = true;
+      // Who watches has a board stream that has no host: its heartbeats tell.
+      if (board.heartbeats == 0) board.connected = true;
       break;
     case MessageKind::board_heartbeat:
       ++board.heartbeats;

@@ -18,9 +18,13 @@ class LineFraming {
  public:
   // Feeds `size` bytes; calls `on_line(Text)` for each line that they complete, without terminator.
   // A line that lies whole in `data` is passed in place, without a copy. The Text is valid in the
-  // call.
+  // call. `on_oversize(Text)` is called for each line that is too long, once it is, with its first max_datagram bytes.
+  template <class OnLine, class OnOversize>
+  void push(const char* data, std::size_t size, OnLine&& on_line, OnOversize&& on_oversize);
   template <class OnLine>
-  void push(const char* data, std::size_t size, OnLine&& on_line);
+  void push(const char* data, std::size_t size, OnLine&& on_line) {
+    push(data, size, on_line, [](Text) {});
+  }
 
   // Forgets an unfinished line (the stream was closed and opened again).
   void reset();
@@ -43,8 +47,9 @@ class LineFraming {
 // What ends a line that we send.
 constexpr Text line_end("\r\n");
 
-template <class OnLine>
-void LineFraming::push(const char* data, std::size_t size, OnLine&& on_line) {
+template <class OnLine, class OnOversize>
+void LineFraming::push(const char* data, std::size_t size, OnLine&& on_line,
+                       OnOversize&& on_oversize) {
   const char* const end = data + size;
   const char* feed = nullptr;  // the next line feed, or the end
   while (data != end) {
@@ -53,8 +58,10 @@ void LineFraming::push(const char* data, std::size_t size, OnLine&& on_line) {
     const std::size_t length = static_cast<std::size_t>(stop - data);
     if (!skipping_ && used_ + length > max_datagram) {
       skipping_ = true;
+      std::memcpy(line_ + used_, data, max_datagram - used_);
       used_ = 0;
       ++oversize_;
+      on_oversize(Text(line_, max_datagram));
     }
     if (stop == end) {
       if (!skipping_ && length != 0) {

@@ -72,6 +72,7 @@ class Impaired final : public ImpairedCarrier, private Carrier::Handler {
   void on_carrier_event(const CarrierEvent& event) override { handler_->on_carrier_event(event); }
   void on_drained() override { handler_->on_drained(); }
   void on_overheard(std::string_view bytes) override { handler_->on_overheard(bytes); }
+  void on_oversize(std::string_view beginning) override { handler_->on_oversize(beginning); }
 
   void deliver() {
     while (handler_ != nullptr) {

@@ -57,11 +57,14 @@ void LineStream::begin_to_receive() {
 
 void LineStream::receive(const asio::error_code& error, std::size_t size) {
   if (error) return lost(error == asio::error::eof ? 0 : error.value());
-  framing_.push(received_.data(), size, [this](Text line) {
+  const auto take = [this](Text line) {
     if (!stream_.is_open()) return;  // closed by the handler of a line before
     ++counters_.rx_datagrams;
     counters_.rx_bytes += line.size();
     owner_.on_line({line.data(), line.size()});
+  };
+  framing_.push(received_.data(), size, take, [this](Text beginning) {
+    if (stream_.is_open()) owner_.on_oversize({beginning.data(), beginning.size()});
   });
   counters_.rx_oversize = framing_.oversize();
   // The system hands a backlog over in pieces of up to 4095 bytes.

@@ -27,6 +27,8 @@ class LineStream {
   class Owner {
    public:
     virtual void on_line(std::string_view line) = 0;
+    // The beginning of a line that is too long: it is thrown away.
+    virtual void on_oversize(std::string_view beginning) = 0;
     virtual void on_drained() = 0;
     // The stream has ended and is closed: errno, or 0 for an end of file.
     virtual void on_lost(int error) = 0;

@@ -66,6 +66,7 @@ class SerialCarrier final : public Carrier, private LineStream::Owner {
 
  private:
   void on_line(std::string_view line) override { handler_->on_datagram(line, everyone); }
+  void on_oversize(std::string_view beginning) override { handler_->on_oversize(beginning); }
   void on_drained() override { handler_->on_drained(); }
   void on_lost(int error) override;
 

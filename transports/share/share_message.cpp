@@ -65,6 +65,7 @@ std::optional<ShareMessage> read_share_message(std::string_view packet) {
       break;
     case Kind::yours:
     case Kind::moved:
+    case Kind::alive:
       if (!rest.empty()) return std::nullopt;
       break;
     case Kind::up:
@@ -76,6 +77,7 @@ std::optional<ShareMessage> read_share_message(std::string_view packet) {
       return message;
     case Kind::received:
     case Kind::sent:
+    case Kind::oversize:
     case Kind::stop:
       if (rest.empty()) return std::nullopt;
       break;

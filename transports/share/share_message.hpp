@@ -12,7 +12,9 @@
 //     warning   ! KIND THING 0 REASON 0 FIX
 //     received  r DATAGRAM                      from the board
 //     sent      s DATAGRAM                      to the board, by the holder or for another
+//     oversize  o BEGINNING                     from the board: too long for a datagram
 //     stop      S DATAGRAM                      to the holder: an E:STOP for the board
+//     alive     a                               to the holder, who says it back: it does not hang
 #pragma once
 
 #include <cstdint>
@@ -27,7 +29,7 @@
 namespace r4 {
 
 struct ShareMessage {
-  static constexpr char version = '1';
+  static constexpr char version = '2';
   static constexpr std::size_t max_size = 1 + max_datagram;
   static constexpr std::size_t max_name = 64;
 
@@ -42,7 +44,9 @@ struct ShareMessage {
     warning = '!',
     received = 'r',
     sent = 's',
+    oversize = 'o',
     stop = 'S',
+    alive = 'a',
   };
 
   Kind kind = Kind::hello;

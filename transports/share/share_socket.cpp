@@ -18,7 +18,8 @@
 namespace r4 {
 namespace {
 
-constexpr int most_waiting = 16;
+// Who comes while the holder hangs waits, too, until it has gone again.
+constexpr int most_waiting = 128;
 // About eighty states: who sleeps and wakes up hears nothing much older than a second.
 constexpr int buffer_bytes = 32 * 1024;
 

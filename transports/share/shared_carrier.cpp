@@ -21,6 +21,8 @@ using Kind = ShareMessage::Kind;
 using std::chrono::milliseconds;
 
 constexpr milliseconds answer_within{200};
+// A holder that says nothing for so long is asked whether it is alive, and has so long again to answer.
+constexpr milliseconds ask_after{400};
 constexpr milliseconds look_again{5};
 constexpr milliseconds look_again_slowly{100};
 // So long the wire may be nobody's before that is told.
@@ -55,6 +57,10 @@ class SharedCarrier final : public Carrier,
   void close() noexcept override;
   SendResult send(std::string_view bytes, Priority priority, Peer to) override;
   void use_packed_form(bool wanted) override { own_->use_packed_form(wanted); }
+  void gather() override { own_->gather(); }
+  std::optional<Clock::time_point> arrival() const override {
+    return state_ == State::holding ? own_->arrival() : std::nullopt;
+  }
   bool up() const override { return up_; }
   // What is sent on a wire that another program holds the board would take for the holder's.
   bool is_shared() const override { return state_ == State::sharing || own_->is_shared(); }
@@ -71,6 +77,8 @@ class SharedCarrier final : public Carrier,
   void on_datagram(std::string_view bytes, Peer from) override;
   void on_carrier_event(const CarrierEvent& event) override;
   void on_drained() override { handler_->on_drained(); }
+  void on_overheard(std::string_view bytes) override;
+  void on_oversize(std::string_view beginning) override;
   // Those who share our wire.
   Kind standing(std::string& text) const override;
   void on_stop_of_another(std::string_view datagram) override;
@@ -85,10 +93,14 @@ class SharedCarrier final : public Carrier,
   void take_part();
   bool try_to_share();
   bool try_to_hold();
-  void on_no_answer();
+  void expect_answer(milliseconds within);
+  void look_after_holder();
   void leave_holder(const Problem& problem);
+  void go_elsewhere();
   void attach_later(milliseconds delay);
   void look();
+  void look_later();
+  bool late() const { return Clock::now() - since_ >= take_over_within; }
   void tell(const CarrierEvent& event);
 
   asio::io_context& io_;
@@ -104,9 +116,13 @@ class SharedCarrier final : public Carrier,
   State state_ = State::closed;
   bool up_ = false;
   bool moved_ = false;
+  // Of the holder whose wire we share.
+  bool welcome_ = false;
+  bool heard_ = false;  // since it was looked after
+  bool asked_ = false;
   std::optional<Problem> trouble_;     // why it is down, or the warning that stands
   std::optional<Problem> not_shared_;  // why, until it is told
-  Clock::time_point since_;            // nobody holds the wire, as far as we know
+  Clock::time_point since_;            // we have no part in the wire
   Carrier::Handler* handler_ = nullptr;
   CarrierCounters shared_counters_;
 };
@@ -115,6 +131,7 @@ void SharedCarrier::open(Carrier::Handler& handler) {
   close();
   handler_ = &handler;
   state_ = State::attaching;
+  since_ = Clock::now();
   try {
     wire_ = find_();
     attach();
@@ -142,12 +159,11 @@ void SharedCarrier::attach() {
     take_part();
   } catch (const Error& error) {
     if (wire_.exclusive || error.kind() != ErrorKind::open) throw;
-    // The holder is no help: beside it, then.
-    sharer_.leave();
-    wire_.name.clear();
+    go_elsewhere();
     try {
-      try_to_hold();
-    } catch (const Error&) {
+      take_part();
+    } catch (const Error& second) {
+      if (second.kind() == ErrorKind::refused) throw;
       throw error;
     }
   }
@@ -186,20 +202,46 @@ bool SharedCarrier::try_to_share() {
                 "end that program, or watch beside it, as r4 monitor does");
   }
   state_ = State::sharing;
+  welcome_ = heard_ = false;
+  asked_ = true;  // by the hello
   sharer_.listen();
-  timer_.expires_after(answer_within);
-  timer_.async_wait(looking_.handler([this] { on_no_answer(); }));
+  expect_answer(answer_within);
   return true;
 }
 
-void SharedCarrier::on_no_answer() { leave_holder(sharer_.silence(name_)); }
+void SharedCarrier::expect_answer(milliseconds within) {
+  timer_.expires_after(within);
+  timer_.async_wait(looking_.handler([this] { look_after_holder(); }));
+}
 
-// Until it is another.
+// A board that says nothing is told by this from a holder that hangs.
+void SharedCarrier::look_after_holder() {
+  if (heard_) {
+    heard_ = asked_ = false;
+  } else if (!asked_) {
+    asked_ = true;
+    sharer_.ask_whether_alive();
+  } else if (!wire_.exclusive || welcome_) {
+    return leave_holder(sharer_.silence(name_));
+  } else {
+    // When it goes on it finds our hello.
+    tell({CarrierEvent::Kind::down, sharer_.silence(name_)});
+    if (state_ != State::sharing) return;
+  }
+  expect_answer(ask_after);
+}
+
+// It is no help to us.
 void SharedCarrier::leave_holder(const Problem& problem) {
+  go_elsewhere();
+  attach_later(wire_.exclusive ? look_again_slowly : milliseconds(0));
+  if (wire_.exclusive) tell({CarrierEvent::Kind::down, problem});
+}
+
+// Where a wire needs no holder, those that this one is no help to meet at another name.
+void SharedCarrier::go_elsewhere() {
   sharer_.leave();
-  attach_later(look_again_slowly);
-  if (wire_.exclusive) return tell({CarrierEvent::Kind::down, problem});
-  wire_.name.clear();
+  if (!wire_.exclusive && !wire_.name.empty()) wire_.name += '+';
 }
 
 bool SharedCarrier::try_to_hold() {
@@ -226,12 +268,14 @@ void SharedCarrier::look() {
   try {
     if (try_to_share() || try_to_hold()) return;
   } catch (const Error& error) {
-    const bool late = Clock::now() - since_ >= take_over_within;
-    if (late) tell({CarrierEvent::Kind::down, error.problem()});
-    if (handler_ == nullptr) return;
+    if (late()) tell({CarrierEvent::Kind::down, error.problem()});
+    if (state_ != State::attaching) return;
   }
-  const bool late = Clock::now() - since_ >= take_over_within;
-  timer_.expires_after(late ? look_again_slowly : look_again);
+  look_later();
+}
+
+void SharedCarrier::look_later() {
+  timer_.expires_after(late() ? look_again_slowly : look_again);
   timer_.async_wait(looking_.handler([this] { look(); }));
 }
 
@@ -244,7 +288,7 @@ SendResult SharedCarrier::send(std::string_view bytes, Priority priority, Peer t
     }
     case State::sharing:
       // Nothing else is ours to say: the board would take it for the holder's.
-      if (priority != Priority::stop) return SendResult::sent;
+      if (priority != Priority::stop) return SendResult::down;
       ++shared_counters_.tx_datagrams;
       shared_counters_.tx_bytes += bytes.size();
       return sharer_.send_stop(bytes);
@@ -261,6 +305,16 @@ void SharedCarrier::on_datagram(std::string_view bytes, Peer from) {
   // Ours first: it may be driving.
   handler_->on_datagram(bytes, from);
   if (state_ == State::holding) holder_.tell(Kind::received, bytes, priority_of(bytes));
+}
+
+void SharedCarrier::on_overheard(std::string_view bytes) {
+  handler_->on_overheard(bytes);
+  if (state_ == State::holding) holder_.tell(Kind::sent, bytes);
+}
+
+void SharedCarrier::on_oversize(std::string_view beginning) {
+  handler_->on_oversize(beginning);
+  if (state_ == State::holding) holder_.tell(Kind::oversize, beginning);
 }
 
 void SharedCarrier::on_carrier_event(const CarrierEvent& event) {
@@ -310,11 +364,11 @@ bool SharedCarrier::gives_way() {
 // --- we share the wire
 
 void SharedCarrier::on_message(const ShareMessage& message) {
+  heard_ = true;
   switch (message.kind) {
     case Kind::welcome:
-      looking_.cancel();
-      if (message.same_version) break;
-      leave_holder(sharer_.other_version(name_));
+      welcome_ = true;
+      if (!message.same_version) leave_holder(sharer_.other_version(name_));
       break;
     case Kind::received:
       ++shared_counters_.rx_datagrams;
@@ -323,6 +377,10 @@ void SharedCarrier::on_message(const ShareMessage& message) {
       break;
     case Kind::sent:
       handler_->on_overheard(message.text);
+      break;
+    case Kind::oversize:
+      ++shared_counters_.rx_oversize;
+      handler_->on_oversize(message.text);
       break;
     case Kind::up:
       name_ = std::string(message.text);
@@ -343,8 +401,12 @@ void SharedCarrier::on_message(const ShareMessage& message) {
 }
 
 void SharedCarrier::on_holder_lost() {
-  looking_.cancel();
-  attach_later(std::exchange(moved_, false) ? courtesy : milliseconds(0));
+  if (std::exchange(moved_, false)) return attach_later(courtesy);
+  if (welcome_) return attach_later(milliseconds(0));
+  // It ends, or has had enough of us.
+  state_ = State::attaching;
+  if (late() && !trouble_) tell({CarrierEvent::Kind::down, sharer_.turned_away(name_)});
+  if (state_ == State::attaching) look_later();
 }
 
 }  // namespace

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "wire_holder.hpp"
 
+#include <fmt/core.h>
+#include <poll.h>
+
+#include <algorithm>
 #include <array>
 #include <asio/post.hpp>
 #include <cerrno>
@@ -24,6 +28,7 @@ using Kind = ShareMessage::Kind;
 constexpr std::size_t normal_entries = 32;
 constexpr std::size_t state_entries = 8;
 constexpr int messages_in_a_turn = 8;
+constexpr const char* same_version = "use the same version of R4 link for both";
 
 bool would_block(int error) { return error == EAGAIN || error == EWOULDBLOCK; }
 
@@ -34,20 +39,27 @@ bool is_stop(std::string_view bytes) {
 
 }  // namespace
 
-// One program that shares the wire.
-class WireHolder::Sharer {
+// One program that has come to the wire.
+class WireHolder::Sharer : public std::enable_shared_from_this<Sharer> {
  public:
+  enum class Standing { silent, turned_away, welcome };
+
   Sharer(WireHolder& holder, asio::io_context& io, FileDescriptor connection)
       : holder_(holder),
         connection_(io, connection.release()),
         writable_(io),
-        queue_(normal_entries, state_entries, dropped_) {
-    listen();
-  }
+        queue_(normal_entries, state_entries, dropped_) {}
 
   bool lost() const { return lost_; }
-  bool welcome() const { return welcome_; }
-  void set_welcome() { welcome_ = true; }
+  Clock::time_point came() const { return came_; }
+  void set_standing(Standing standing) { standing_ = standing; }
+  bool is(Standing standing) const { return !lost_ && standing_ == standing; }
+  bool waits() const { return !lost_ && standing_ != Standing::welcome; }
+
+  bool has_left() {
+    pollfd connection{connection_.native_handle(), 0, 0};
+    return ::poll(&connection, 1, 0) > 0;
+  }
 
   void tell(Kind kind, std::string_view text, Priority priority) {
     if (lost_ || gone_) return;
@@ -69,30 +81,65 @@ class WireHolder::Sharer {
     if (!lost_) send_message(connection_.native_handle(), kind, text);
     lose();
   }
-
- private:
-  void listen() {
-    connection_.async_wait(asio::posix::descriptor_base::wait_read,
-                           readable_.handler([this] { receive(); }));
+  void refuse(const std::string& reason, const std::string& fix) {
+    bid_farewell(Kind::down, refusal(reason, fix));
+  }
+  std::string refusal(const std::string& reason, const std::string& fix) const {
+    return problem_text({ErrorKind::refused, holder_.owner_.name(), reason, fix});
   }
 
+  // What has come from it, and what will.
   void receive() {
+    const auto self = shared_from_this();  // who hears of a stop may close the wire
     std::array<char, ShareMessage::max_size + 1> packet;
     for (int i = 0; i < messages_in_a_turn && !lost_; ++i) {
       const ssize_t size =
           receive_packet(connection_.native_handle(), packet.data(), packet.size());
       if (size < 0 && would_block(errno)) break;
       if (size < 0 && errno == ECONNRESET) continue;  // it has not read all: ours is still there
-      if (size <= 0 || static_cast<std::size_t>(size) > packet.size()) return lose();
-      const std::optional<ShareMessage> message =
-          read_share_message({packet.data(), static_cast<std::size_t>(size)});
-      if (!message) return lose();
+      if (size <= 0) return lose();
+      const std::string_view bytes(packet.data(),
+                                   std::min(static_cast<std::size_t>(size), packet.size()));
+      const std::optional<ShareMessage> message = read_share_message(bytes);
+      if (!message) return refuse("what was said to it is no message", same_version);
       // The last word of one that says too much may be a stop.
       const bool too_much = !may_speak();
       if (!too_much || message->kind == Kind::stop) holder_.on_message(*this, *message);
-      if (too_much) return lose();
+      if (too_much) {
+        return refuse(fmt::format("it was told more than {} things in a second", most_messages),
+                      "stop it once: that is repeated until the board obeys");
+      }
     }
     if (!lost_) listen();
+  }
+
+  // It waits no longer. What it has said is heard.
+  void cut_off() {
+    receive();
+    if (is(Standing::silent))
+      refuse("the program that came to share it said nothing", same_version);
+    if (waits()) lose();
+  }
+
+  void end() noexcept {
+    lost_ = true;
+    readable_.cancel();
+    writable_.stop();
+    asio::error_code ignored;
+    connection_.close(ignored);
+  }
+
+ private:
+  // It is removed when nobody is looking at it.
+  void lose() {
+    if (lost_) return;
+    end();
+    holder_.remove_lost_later();
+  }
+
+  void listen() {
+    connection_.async_wait(asio::posix::descriptor_base::wait_read,
+                           readable_.handler([this] { receive(); }));
   }
 
   bool may_speak() {
@@ -125,16 +172,6 @@ class WireHolder::Sharer {
     writable_.stop();
   }
 
-  // It is removed when nobody is looking at it.
-  void lose() {
-    if (std::exchange(lost_, true)) return;
-    readable_.cancel();
-    writable_.stop();
-    asio::error_code ignored;
-    connection_.close(ignored);
-    holder_.remove_lost_later();
-  }
-
   WireHolder& holder_;
   LoopDescriptor connection_;
   OperationSlot readable_;
@@ -144,13 +181,20 @@ class WireHolder::Sharer {
   Clock::time_point stuck_since_;
   Clock::time_point counted_since_;
   int messages_ = 0;
-  bool welcome_ = false;
+  const Clock::time_point came_ = Clock::now();
+  Standing standing_ = Standing::silent;
   bool gone_ = false;
   bool lost_ = false;
 };
 
+template <class Which>
+std::size_t WireHolder::count(Which which) const {
+  return static_cast<std::size_t>(std::count_if(sharers_.begin(), sharers_.end(),
+                                                [&](const auto& each) { return which(*each); }));
+}
+
 WireHolder::WireHolder(asio::io_context& io, Owner& owner, std::string program)
-    : io_(io), owner_(owner), program_(std::move(program)), listener_(io) {}
+    : io_(io), owner_(owner), program_(std::move(program)), listener_(io), cut_off_timer_(io) {}
 
 WireHolder::~WireHolder() { release(); }
 
@@ -167,16 +211,22 @@ bool WireHolder::hold(const SharedWire& wire) {
 void WireHolder::release() noexcept {
   wire_ = {};
   accepting_.cancel();
-  removing_.cancel();
-  giving_away_.cancel();
   asio::error_code ignored;
   listener_.close(ignored);
+  for (const auto& sharer : sharers_) sharer->end();
   sharers_.clear();
+  removing_.cancel();
+  giving_away_.cancel();
+  cutting_off_.cancel();
+}
+
+std::size_t WireHolder::sharers() const {
+  return count([](const Sharer& each) { return each.is(Sharer::Standing::welcome); });
 }
 
 void WireHolder::tell(Kind kind, std::string_view text, Priority priority) {
   for (const auto& sharer : sharers_) {
-    if (sharer->welcome()) sharer->tell(kind, text, priority);
+    if (sharer->is(Sharer::Standing::welcome)) sharer->tell(kind, text, priority);
   }
 }
 
@@ -185,50 +235,93 @@ void WireHolder::listen() {
                        accepting_.handler([this] { accept(); }));
 }
 
-// One that has closed its end, or is one too many, is told by the end of its connection.
 void WireHolder::accept() {
-  if (FileDescriptor connection = accept_sharer(listener_.native_handle(), wire_);
-      connection && sharers_.size() < most_sharers) {
-    sharers_.push_back(std::make_unique<Sharer>(*this, io_, std::move(connection)));
+  if (FileDescriptor connection = accept_sharer(listener_.native_handle(), wire_)) {
+    const auto sharer = std::make_shared<Sharer>(*this, io_, std::move(connection));
+    sharers_.push_back(sharer);
+    sharer->receive();  // what it comes for is there already, mostly
+    if (count([](const Sharer& each) { return each.waits(); }) > most_waiting)
+      longest_waiting()->cut_off();
+    cut_off_in_time();
   }
-  listen();
+  if (listener_.is_open()) listen();
+}
+
+// Null: nobody waits.
+std::shared_ptr<WireHolder::Sharer> WireHolder::longest_waiting() const {
+  const auto found = std::find_if(sharers_.begin(), sharers_.end(),
+                                  [](const auto& each) { return each->waits(); });
+  return found == sharers_.end() ? nullptr : *found;
+}
+
+void WireHolder::cut_off_in_time() {
+  const Clock::time_point now = Clock::now();
+  std::shared_ptr<Sharer> first;
+  while ((first = longest_waiting()) && now - first->came() >= patience) first->cut_off();
+  if (!first) return cutting_off_.cancel();
+  cut_off_timer_.expires_at(first->came() + patience);
+  cut_off_timer_.async_wait(cutting_off_.handler([this] { cut_off_in_time(); }));
 }
 
 void WireHolder::on_message(Sharer& from, const ShareMessage& message) {
   switch (message.kind) {
     case Kind::hello:
-      if (!from.welcome()) return on_hello(from, message);
+      if (from.is(Sharer::Standing::silent)) return on_hello(from, message);
       break;
     case Kind::stop:
-      if (is_stop(message.text)) return owner_.on_stop_of_another(message.text);
+      if (is_stop(message.text)) return on_stop(from, message.text);
       break;
+    case Kind::alive:
+      return from.tell(Kind::alive, {}, Priority::normal);
     default:
       break;
   }
-  from.bid_farewell(Kind::moved, {});  // it says what no program of ours does
+  from.refuse(
+      "who watches may say nothing to the board but a stop",
+      "control the board; or, if it did not mean to, use the same version of R4 link for both");
 }
 
 void WireHolder::on_hello(Sharer& from, const ShareMessage& hello) {
   if (!hello.same_version) return from.bid_farewell(Kind::welcome, welcome_text(program_));
   if (hello.role == BoardRole::control) {
+    // It may have waited in vain, while this program hung.
+    if (from.has_left()) return from.bid_farewell(Kind::moved, {});
     if (!owner_.gives_way()) return from.bid_farewell(Kind::busy, program_);
-    accepting_.cancel();
-    asio::error_code ignored;
-    listener_.close(ignored);  // the name is free
-    from.bid_farewell(Kind::yours, {});
-    for (const auto& sharer : sharers_) sharer->bid_farewell(Kind::moved, {});
-    // This is called by `from`, which must not go before it returns.
-    asio::post(io_, giving_away_.handler([this] {
-      release();
-      owner_.on_given_away();
-    }));
-    return;
+    return give_away(from);
   }
-  from.set_welcome();
-  from.tell(Kind::welcome, welcome_text(program_), Priority::normal);
+  if (sharers() < most_sharers) return welcome(from);
+  from.set_standing(Sharer::Standing::turned_away);
+  from.tell(Kind::down,
+            from.refusal(fmt::format("{} programs share it already, as many as may", most_sharers),
+                         "end one of them; its place is free at once"),
+            Priority::normal);
+}
+
+void WireHolder::on_stop(Sharer& from, std::string_view datagram) {
+  owner_.on_stop_of_another(datagram);
+  if (from.is(Sharer::Standing::turned_away) && sharers() < most_sharers + most_stoppers)
+    welcome(from);
+}
+
+void WireHolder::welcome(Sharer& sharer) {
+  sharer.set_standing(Sharer::Standing::welcome);
+  sharer.tell(Kind::welcome, welcome_text(program_), Priority::normal);
   std::string text;
   const Kind kind = owner_.standing(text);
-  from.tell(kind, text, Priority::normal);
+  sharer.tell(kind, text, Priority::normal);
+}
+
+void WireHolder::give_away(Sharer& to) {
+  accepting_.cancel();
+  asio::error_code ignored;
+  listener_.close(ignored);  // the name is free
+  to.bid_farewell(Kind::yours, {});
+  for (const auto& sharer : sharers_) sharer->bid_farewell(Kind::moved, {});
+  // This is called by `to`, which must not go before it returns.
+  asio::post(io_, giving_away_.handler([this] {
+    release();
+    owner_.on_given_away();
+  }));
 }
 
 void WireHolder::remove_lost_later() {

@@ -2,6 +2,13 @@
 // The end of a shared wire at the program that holds it: tells the others all that passes, and takes stops
 // from them. What they cost is bounded: at most 16, for each a few datagrams that wait, and who takes
 // nothing for a second, or sends more than 100 messages in one, is let go.
+//
+//     comes --> silent --hello--> welcome              hears all
+//                    \            ^
+//                     +--> turned away (16 are there)  its stop is obeyed, and then it hears how
+//
+// Who is not welcome is cut off after a second, or by eight that came later: whoever comes is heard first, so
+// those keep back neither a stop nor a program that controls.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -22,12 +29,17 @@ namespace r4 {
 class WireHolder {
  public:
   static constexpr std::size_t most_sharers = 16;
+  static constexpr std::size_t most_stoppers =
+      4;  // besides: turned away, but they have stopped the board
+  static constexpr std::size_t most_waiting = 8;  // silent, or turned away
   static constexpr std::chrono::milliseconds patience{1000};
   static constexpr int most_messages = 100;  // in a second, of one
 
   // Called on the loop's thread.
   class Owner {
    public:
+    // What those who share the wire know it by.
+    virtual const std::string& name() const = 0;
     // A program has come that wants to know how the wire is: a message for it.
     virtual ShareMessage::Kind standing(std::string& text) const = 0;
     // Another program's E:STOP, which is one.
@@ -54,7 +66,8 @@ class WireHolder {
 
   bool holds() const { return !wire_.name.empty(); }
   const std::string& wire() const { return wire_.name; }
-  std::size_t sharers() const { return sharers_.size(); }
+  // Those that hear what is told.
+  std::size_t sharers() const;
   // To all who share it. `state`: only the newest waits for who is slow.
   void tell(ShareMessage::Kind kind, std::string_view text, Priority priority = Priority::normal);
 
@@ -65,6 +78,13 @@ class WireHolder {
   void accept();
   void on_message(Sharer& from, const ShareMessage& message);
   void on_hello(Sharer& from, const ShareMessage& hello);
+  void on_stop(Sharer& from, std::string_view datagram);
+  void welcome(Sharer& sharer);
+  void give_away(Sharer& to);
+  std::shared_ptr<Sharer> longest_waiting() const;
+  template <class Which>
+  std::size_t count(Which which) const;
+  void cut_off_in_time();
   void remove_lost_later();
 
   asio::io_context& io_;
@@ -75,7 +95,9 @@ class WireHolder {
   OperationSlot accepting_;
   OperationSlot removing_;
   OperationSlot giving_away_;
-  std::vector<std::unique_ptr<Sharer>> sharers_;
+  LoopTimer cut_off_timer_;
+  OperationSlot cutting_off_;
+  std::vector<std::shared_ptr<Sharer>> sharers_;  // in the order in which they came
 };
 
 }  // namespace r4

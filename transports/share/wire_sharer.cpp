@@ -76,6 +76,12 @@ Problem WireSharer::other_version(const std::string& thing) const {
           "end it, or use the same version for both"};
 }
 
+Problem WireSharer::turned_away(const std::string& thing) const {
+  return {ErrorKind::open, thing,
+          fmt::format("the program that holds it (pid {}) does not share it", holder_.pid),
+          "end it, or try again"};
+}
+
 Problem WireSharer::stranger(const std::string& thing, const SharedWire& wire) const {
   const std::string sharers = wire.group.name.empty() ? fmt::format("user {}", ::geteuid())
                                                       : "the group " + wire.group.name;
@@ -98,6 +104,8 @@ void WireSharer::receive() {
       owner_.on_all_heard();
       break;
     }
+    if (size < 0 && errno == ECONNRESET)
+      continue;  // it has not read all: what it said is still there
     if (size <= 0 || static_cast<std::size_t>(size) > packet_.size()) return lost();
     const std::optional<ShareMessage> message =
         read_share_message({packet_.data(), static_cast<std::size_t>(size)});
@@ -113,6 +121,10 @@ SendResult WireSharer::send_stop(std::string_view datagram) {
   const int error = send_message(connection_.native_handle(), ShareMessage::Kind::stop, datagram);
   if (error == 0) return SendResult::sent;
   return would_block(error) ? SendResult::full : SendResult::down;
+}
+
+void WireSharer::ask_whether_alive() {
+  send_message(connection_.native_handle(), ShareMessage::Kind::alive, {});
 }
 
 void WireSharer::lost() {

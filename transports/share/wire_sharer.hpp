@@ -40,16 +40,21 @@ class WireSharer {
   // Waits for its first answer; blocks, for 200 ms at most. `moved` where it has ended. Throws Error{open},
   // naming `thing`, if none comes, or one of another version. `text` is valid until the next message.
   ShareMessage wait_for_answer(const std::string& thing);
+  // The process that holds the wire.
+  pid_t holder_pid() const { return holder_.pid; }
   // "r4 (pid 123)": the holder.
   std::string holder(std::string_view program) const;
-  // It does not answer, or not as we do, or is a stranger: what to say of it.
+  // It does not answer, or not as we do, or ends what we begin, or is a stranger: what to say of it.
   Problem silence(const std::string& thing) const;
   Problem other_version(const std::string& thing) const;
+  Problem turned_away(const std::string& thing) const;
   Problem stranger(const std::string& thing, const SharedWire& wire) const;
   // Messages are handed over from now on.
   void listen();
   // An E:STOP for the board.
   SendResult send_stop(std::string_view datagram);
+  // It is to say something.
+  void ask_whether_alive();
   void leave() noexcept;
 
  private:

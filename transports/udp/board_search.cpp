@@ -13,11 +13,10 @@
 #include <cerrno>
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <set>
 #include <utility>
 
-#include "../../protocol/datagram/datagram_writer.hpp"
-#include "../../protocol/messages/message.hpp"
 #include "../file_descriptor.hpp"
 #include "r4link/datagram.hpp"
 
@@ -29,7 +28,6 @@ using Network = BoardSearch::Network;
 using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t most_networks = 64;
-constexpr std::size_t longest_id = 64;
 // Read from one socket before the others, and the clock, have their turn.
 constexpr int most_at_once = 64;
 // In an error; `r4 list` has them all.
@@ -47,15 +45,6 @@ address_v4 address_of(const sockaddr* system) {
   sockaddr_in in{};
   std::memcpy(&in, system, sizeof in);
   return address_v4(ntohl(in.sin_addr.s_addr));
-}
-
-// What is asked, without a number: nobody's session goes on by it.
-std::string question() {
-  std::array<char, 64> buffer;
-  DatagramWriter writer(buffer.data(), buffer.size());
-  writer.field("Q").value("ID");
-  const Text text = writer.finish();
-  return {text.data(), text.size()};
 }
 
 // A socket of this computer's address in a network. Not open: `network.trouble` says why.
@@ -96,25 +85,6 @@ void ask(int socket, Network& network, std::uint16_t port, std::string text) {
   network.trouble = sent ? "" : std::strerror(errno);
 }
 
-// A board's answer. False if it is something else.
-bool read_answer(Text bytes, FoundBoard& board) {
-  Datagram datagram;
-  Identity identity;
-  if (!read_datagram(bytes, datagram) || kind_of(datagram) != MessageKind::identity ||
-      !read_identity(datagram, identity) || identity.board_id.empty() ||
-      identity.board_id.size() > longest_id || identity.firmware.size() > longest_id ||
-      identity.capabilities.size() > longest_id) {
-    return false;
-  }
-  const auto str = [](Text text) { return std::string(text.data(), text.size()); };
-  board.board_id = str(identity.board_id);
-  board.name = str(identity.name);
-  board.firmware = str(identity.firmware);
-  board.capabilities = str(identity.capabilities);
-  if (identity.has_busy) board.busy = identity.busy;
-  return true;
-}
-
 // One search: its sockets and what they have heard.
 class Round {
  public:
@@ -127,7 +97,7 @@ class Round {
   }
 
   BoardSearch::Result run() {
-    const std::string text = question();
+    const std::string text = identity_question();
     const auto begun = Clock::now();
     const auto end = begun + search_.patience;
     auto next_question = begun;
@@ -171,12 +141,14 @@ class Round {
           ::recvfrom(sockets_[which].get(), buffer_.data(), buffer_.size(),
                      MSG_DONTWAIT | MSG_TRUNC, reinterpret_cast<sockaddr*>(&from), &from_size);
       if (size < 0) return;
-      FoundBoard board;
       // A board answers from the port at which it listens.
-      if (ntohs(from.sin_port) != search_.port || static_cast<std::size_t>(size) > max_datagram ||
-          !read_answer(Text(buffer_.data(), static_cast<std::size_t>(size)), board)) {
+      if (ntohs(from.sin_port) != search_.port || static_cast<std::size_t>(size) > max_datagram) {
         continue;
       }
+      std::optional<IdentityAnswer> answer =
+          read_identity_answer(Text(buffer_.data(), static_cast<std::size_t>(size)));
+      if (!answer) continue;
+      FoundBoard board{std::move(*answer), {}, {}};
       board.address = address_v4(ntohl(from.sin_addr.s_addr));
       board.heard_at = result_.networks[which].from;
       keep(std::move(board));

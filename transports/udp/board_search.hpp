@@ -18,24 +18,19 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "../identity_answer.hpp"
 #include "host_lookup.hpp"
 
 namespace r4 {
 
 // A board that has answered.
-struct FoundBoard {
+struct FoundBoard : IdentityAnswer {
   asio::ip::address_v4 address;
   asio::ip::address_v4 heard_at;  // ours, in its network
-  std::string board_id;
-  std::string name;  // that its owner gave it; empty: none
-  std::string firmware;
-  std::string capabilities;
-  std::optional<bool> busy;  // a host controls it; none: it does not tell
 };
 
 struct BoardSearch {

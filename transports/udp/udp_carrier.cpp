@@ -24,8 +24,10 @@ std::unique_ptr<Carrier> make_udp_carrier_with(asio::io_context& io, const Url& 
 SharedWire udp_wire(const Url& text) {
   const UdpUrl url(text, Role::host);
   if (url.listen == 0) return {};
+  // Who watches has that port, too, if the URL names it, else one of its own.
   return {fmt::format("udp/{}{}/{}/{}", url.search ? "?" : "", url.search ? url.called : url.host,
-                      url.port, url.listen)};
+                      url.port, url.listen),
+          text.get("listen").has_value()};
 }
 
 }  // namespace r4

@@ -77,7 +77,7 @@ void UdpEnd::refuse(const asio::error_code& error, const Endpoint& local, const 
 
 void UdpEnd::begin(Handler& handler) {
   handler_ = &handler;
-  begin_to_receive();
+  listen();
   set_up(true);
   report();
 }

@@ -43,6 +43,8 @@ class UdpEnd : public Carrier {
   // Is the network there again? 0, or errno.
   virtual int probe() = 0;
   virtual void close_socket() noexcept = 0;
+  // The socket is bound: begins to receive.
+  virtual void listen() { begin_to_receive(); }
 
   // --- what they do it with
 
@@ -53,8 +55,6 @@ class UdpEnd : public Carrier {
                            const std::string& fix);
   // The socket is bound: receives, and is up.
   void begin(Handler& handler);
-  // Is there more at once?
-  bool begin_to_receive();
   void hand_over(std::string_view bytes, Peer from);
   // `standing`: to where what is for everyone goes. It tells whether the network is there.
   Outcome transmit_to(std::string_view bytes, const Endpoint& to, bool standing);
@@ -76,8 +76,11 @@ class UdpEnd : public Carrier {
   CarrierCounters counters_;
   Endpoint sender_;
   std::string down_reason_;  // why it cannot be opened, as told last
+  std::array<char, max_datagram> received_;
 
  private:
+  // Is there more at once?
+  bool begin_to_receive();
   void send_waiting();
   void report_later();
   void probe_later();
@@ -91,7 +94,6 @@ class UdpEnd : public Carrier {
   int reported_refusal_ = 0;
   OperationSlot reporting_;
   SendQueue queue_;
-  std::array<char, max_datagram> received_;
 };
 
 // "[::1]" for an IPv6 address, as in a URL.

@@ -8,6 +8,12 @@
 #include <utility>
 
 namespace r4 {
+namespace {
+
+// Others of the loop wait.
+constexpr int most_in_a_turn = 32;
+
+}  // namespace
 
 UdpHost::UdpHost(asio::io_context& io, const Url& url, HostLookup lookup, BoardSearch search)
     : UdpEnd(io, UdpUrl(url, Role::host)),
@@ -35,6 +41,34 @@ void UdpHost::open(Handler& handler) {
   }
   begin(handler);
   if (handler_ != nullptr) watch();
+}
+
+void UdpHost::gather() {
+  close();
+  socket_ = UdpGathering::quiet_socket(io_);
+  gathering_.emplace(io_);
+}
+
+void UdpHost::listen() {
+  if (!gathering_) return UdpEnd::listen();
+  gathering_->wait(socket_.native_handle(), [this] { take_what_has_gathered(); });
+}
+
+void UdpHost::take_what_has_gathered() {
+  for (int i = 0; i < most_in_a_turn && handler_ != nullptr; ++i) {
+    const auto size = gathering_->read(received_.data(), received_.size(), sender_);
+    if (!size) {
+      handler_->on_drained();
+      break;
+    }
+    received({received_.data(), *size});
+  }
+  if (handler_ != nullptr) listen();
+}
+
+void UdpHost::close_socket() noexcept {
+  if (gathering_) gathering_->stop();
+  host_socket_.close();
 }
 
 void UdpHost::close() noexcept {
@@ -114,7 +148,7 @@ void UdpHost::found(const FoundHost& answer) {
   remember(answer);
   watch_.set_known(true);
   down_reason_.clear();
-  begin_to_receive();
+  listen();
   if (!up()) set_up(true);
   if (is_open) {
     warn(fmt::format("the board is at {} now; it was at {}", board_.address().to_string(), before),
@@ -130,6 +164,7 @@ void UdpHost::received(std::string_view bytes) {
   }
   if (bytes.size() > max_datagram) {
     ++counters_.rx_oversize;
+    handler_->on_oversize({bytes.data(), max_datagram});  // the buffer holds no more
     return;
   }
   if (watch_.listens()) {

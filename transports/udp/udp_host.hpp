@@ -4,10 +4,13 @@
 #pragma once
 
 #include <asio/io_context.hpp>
+#include <chrono>
+#include <optional>
 
 #include "board_search.hpp"
 #include "host_lookup.hpp"
 #include "udp_end.hpp"
+#include "udp_gathering.hpp"
 
 namespace r4 {
 
@@ -18,24 +21,31 @@ class UdpHost final : public UdpEnd {
 
   void open(Handler& handler) override;
   void close() noexcept override;
+  void gather() override;
+  std::optional<std::chrono::steady_clock::time_point> arrival() const override {
+    return gathering_ ? gathering_->arrival() : std::nullopt;
+  }
 
  private:
+  void listen() override;
   void received(std::string_view bytes) override;
   Outcome transmit(std::string_view bytes, Peer to) override;
   int probe() override;
-  void close_socket() noexcept override { host_socket_.close(); }
+  void close_socket() noexcept override;
 
   void bind(const Endpoint& board);
   void found(const FoundHost& answer);
   void remember(const FoundHost& answer);
   HostWatch::Question question() const;
   void watch();
+  void take_what_has_gathered();
 
   const HostLookup lookup_;
   BoardSearch search_;
   WantedBoard wanted_;  // where the URL leaves it to a search
   HostWatch watch_;
   UdpHostSocket host_socket_{socket_};
+  std::optional<UdpGathering> gathering_;  // of what comes; else it is read at once
   bool named_ = false;  // the URL has a name or leaves it to a search: where the board is, is asked
   Endpoint board_;
 };

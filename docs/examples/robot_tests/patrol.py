@@ -11,8 +11,8 @@ NEAR_CM = 40
 def patrol(url: str, turns: int = 1) -> None:
     with r4link.Board(url, fields='DEFAULT,US1') as board:
         board.wait_active()
+        board.arm(timeout=3)  # nothing turns yet; from here on a program that hangs stops the robot
         board.watchdog(0.3)
-        board.arm()
         direction = r4link.FORWARD
         board.osmc(1).set(SPEED, direction, timeout=0.25)
         for state in board.states():

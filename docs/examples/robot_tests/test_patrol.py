@@ -26,8 +26,8 @@ def test_it_goes_back_when_something_is_near(r4_robot):
 
 
 def test_a_released_handle_stops_the_robot(r4_board):
-    r4_board.arm()
-    r4_board.osmc(1).set(358)
+    r4_board.arm(timeout=3)
+    r4_board.osmc(1).set(358, timeout=3)
     r4_board.expect(osmc1=358, ain24=lambda volts: volts > 20)
     r4_board.robot.happen('handle released')
     r4_board.expect_safe('handle', within=0.5)
@@ -36,14 +36,14 @@ def test_a_released_handle_stops_the_robot(r4_board):
 @pytest.mark.r4(boards=3, arming=False)
 def test_the_wheels_of_three_boards_turn(r4_bus):
     for board in r4_bus:
-        board.relay(1).set(True)
-        board.osmc(1).set(2000)
+        board.relay(1).set(True, timeout=3)
+        board.osmc(1).set(2000, timeout=3)
     for board in r4_bus:
-        board.expect(osmc1=2000, within=0.2)
+        board.expect(osmc1=2000)
         until(lambda board=board: board.robot.look().encoder[0] > 10)
 
 
-@pytest.mark.r4(link='loss=10%,delay=10ms±10,duplicate=5%,seed=7')
+@pytest.mark.r4(link='loss=10%,delay=10ms±10,duplicate=5%,corrupt=5%,seed=7')
 def test_it_drives_over_a_bad_link(r4_link):
     r4_link.arm(timeout=3)
     for pwm in (100, 200, 300):
@@ -51,10 +51,28 @@ def test_it_drives_over_a_bad_link(r4_link):
         r4_link.expect(osmc1=pwm)
 
 
+@pytest.mark.r4(link='cut=2s+1.3s')
+def test_the_motors_are_off_while_the_link_is_cut(r4_link):
+    r4_link.arm(timeout=3)
+    r4_link.osmc(1).set(300, timeout=3)
+    until(lambda: r4_link.robot.look().osmc[0] == (300, 1))
+    until(lambda: r4_link.robot.look().is_safe, within=5)
+    until(lambda: r4_link.robot.look().osmc[0] == (300, 1))  # the same program is back (recovery=last)
+
+
+@pytest.mark.r4(transport='pty', link='corrupt=10%,seed=3')
+def test_damage_on_a_serial_line_is_noticed(r4_link):
+    r4_link.arm(timeout=3)
+    for pwm in (100, 200, 300):
+        r4_link.osmc(1).set(pwm, timeout=3)
+        r4_link.expect(osmc1=pwm)
+    until(lambda: r4_link.statistics.damaged > 0)
+
+
 @pytest.mark.r4(transport='pty')
 def test_over_a_serial_line(r4_board):
-    r4_board.arm()
-    r4_board.servo(3).set(1500)
+    r4_board.arm(timeout=3)
+    r4_board.servo(3).set(1500, timeout=3)
     r4_board.expect(relays=1)
     r4_board.stop()
     r4_board.expect_safe('stop')

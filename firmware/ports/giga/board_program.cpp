@@ -54,7 +54,7 @@ bool start_can(Fdcan& fdcan, std::uint8_t node) {
   PLL1_ClocksTypeDef clocks;
   HAL_RCCEx_GetPLL1ClockFreq(&clocks);
   return fdcan.start(can_bit_timing(clocks.PLL1_Q_Frequency, can_bit_rate), emergency_stop_id,
-                     command_id(node));
+                     command_id(node), watch_id(node));
 }
 
 // What the interrupts need. NOLINTBEGIN(cppcoreguidelines-avoid-non-const-global-variables)

@@ -5,7 +5,7 @@
 
 #include <cstdint>
 
-#include "../../application.hpp"
+#include "../../application/application.hpp"
 #include "boot_report.hpp"
 #include "chip/board_clock.hpp"
 #include "links/can_port.hpp"

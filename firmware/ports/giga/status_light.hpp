@@ -8,7 +8,7 @@
 
 #include <cstdint>
 
-#include "../../observer.hpp"
+#include "../../application/observer.hpp"
 #include "pins.hpp"
 
 namespace r4 {

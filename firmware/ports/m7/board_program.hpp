@@ -4,13 +4,13 @@
 
 #include <cstdint>
 
-#include "../../application.hpp"
+#include "../../application/application.hpp"
 #include "../sim/simulated_hardware.hpp"
-#include "board_clock.hpp"
+#include "chip/board_clock.hpp"
 #include "fault.hpp"
+#include "links/uart.hpp"
+#include "links/udp_port.hpp"
 #include "startup.hpp"
-#include "uart.hpp"
-#include "udp_port.hpp"
 #include "wire_time.hpp"
 
 namespace r4 {

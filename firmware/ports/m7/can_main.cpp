@@ -3,14 +3,14 @@
 // machine that QEMU has with a Cortex-M has a CAN controller, and this one has no chips: frames and
 // transfers go nowhere.
 #include "../../../transports/framing/can/can_node.hpp"
-#include "../../application.hpp"
+#include "../../application/application.hpp"
 #include "../../board_hardware.hpp"
-#include "board_clock.hpp"
+#include "chip/board_clock.hpp"
+#include "chip/registers.hpp"
 #include "fault.hpp"
+#include "links/uart.hpp"
 #include "r4link/config.hpp"
-#include "registers.hpp"
 #include "startup.hpp"
-#include "uart.hpp"
 
 namespace {
 
@@ -48,6 +48,7 @@ class CanPort final : public firmware::Port {
   }
   std::size_t max_size() const override { return max_datagram; }
   void use_packed_form(bool wanted) override { node_.use_packed_form(wanted); }
+  bool is_bus() const override { return true; }
 
  private:
   BoardClock& clock_;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fault.hpp"
 
-#include "registers.hpp"
+#include "chip/registers.hpp"
 #include "startup.hpp"
 
 namespace r4 {

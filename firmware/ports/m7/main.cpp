@@ -2,10 +2,10 @@
 // The board on an M7 with AN500: the application between a UART, UDP and the hardware.
 #include "../sim/robot/random.hpp"
 #include "board_program.hpp"
+#include "chip/registers.hpp"
 #include "fault.hpp"
 #include "pins_report.hpp"
 #include "r4link/config.hpp"
-#include "registers.hpp"
 #include "startup.hpp"
 
 namespace {

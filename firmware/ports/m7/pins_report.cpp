@@ -4,7 +4,7 @@
 #include <initializer_list>
 
 #include "../../../protocol/datagram/numbers.hpp"
-#include "uart.hpp"
+#include "links/uart.hpp"
 
 namespace r4 {
 namespace m7 {

@@ -16,7 +16,7 @@
 #include "../../../protocol/datagram/numbers.hpp"
 #include "../../../protocol/link/board_link.hpp"
 #include "../sim/robot/board_model.hpp"
-#include "board_clock.hpp"
+#include "chip/board_clock.hpp"
 
 namespace r4 {
 namespace m7 {

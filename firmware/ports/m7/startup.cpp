@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "startup.hpp"
 
+#include "chip/registers.hpp"
 #include "fault.hpp"
-#include "registers.hpp"
 
 extern "C" {
 

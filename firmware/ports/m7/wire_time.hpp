@@ -6,8 +6,8 @@
 #include <cstdint>
 
 #include "../sim/chips/i2c_bus_model.hpp"
-#include "board_clock.hpp"
-#include "registers.hpp"
+#include "chip/board_clock.hpp"
+#include "chip/registers.hpp"
 
 namespace r4 {
 namespace m7 {

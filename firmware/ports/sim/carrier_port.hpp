@@ -37,6 +37,7 @@ class CarrierPort final : public firmware::Port, private Carrier::Handler {
   void hold(std::uint32_t peer) override { carrier_->hold(peer); }
   bool reaches(std::uint32_t peer) const override { return carrier_->reaches(peer); }
   void use_packed_form(bool wanted) override { carrier_->use_packed_form(wanted); }
+  bool is_bus() const override { return carrier_->is_shared(); }
   // A pseudo-terminal stands for the cable.
   bool may_configure() const override { return carrier_->name().compare(0, 4, "pty:") == 0; }
 

@@ -42,7 +42,8 @@ void SimulatedBoard::add_carrier(std::unique_ptr<Carrier> carrier) {
 void SimulatedBoard::start() {
   stop();
   alive_ = std::make_shared<const bool>(true);
-  start_ = Clock::now();
+  // All boards begin with a millisecond of the clock, so that those of one loop wake up together.
+  start_ = std::chrono::floor<Milliseconds>(Clock::now());
   clock_start_ms_ = options_.clock_ms ? options_.clock_ms() : 0;
   passed_ = hangs_until_ = watchdog_fed_ = Milliseconds(0);
   next_step_ = 0;
@@ -172,6 +173,7 @@ void SimulatedBoard::happen(const ScriptStep& step) {
 
 void SimulatedBoard::take(const ScriptStep& step) {
   if (options_.events.on_step) options_.events.on_step(board_ms(passed_), step);
+  model_.disturb_pins();
   switch (step.kind) {
     case ScriptStep::Kind::handle:
       model_.hold_handle(step.value != 0);
@@ -230,7 +232,7 @@ void SimulatedBoard::tell_pins() {
       options_.events.on_fault(board_ms(passed_), fault);
     }
   }
-  if (!options_.events.on_pins) return;
+  if (!options_.events.on_pins || (told_pins_ && !model_.pins_may_differ())) return;
   const Pins pins = model_.pins();
   if (told_pins_ && *told_pins_ == pins) return;
   told_pins_ = pins;

@@ -23,7 +23,7 @@
 #include <string_view>
 #include <vector>
 
-#include "../../application.hpp"
+#include "../../application/application.hpp"
 #include "carrier_port.hpp"
 #include "r4link/config.hpp"
 #include "robot/board_model.hpp"

@@ -8,7 +8,6 @@
 #include <atomic>
 #include <chrono>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
@@ -16,7 +15,7 @@
 
 #include "bindings.hpp"
 #include "callback.hpp"
-#include "states.hpp"
+#include "r4link/simulation.hpp"
 
 namespace r4::python {
 namespace {
@@ -28,10 +27,12 @@ using Released = py::call_guard<py::gil_scoped_release>;
 // the parent's.
 class PyBoard {
  public:
-  PyBoard(const std::string& url, BoardOptions options) {
+  // `link`: what is wrong with it (sim::with_link()); "": nothing.
+  PyBoard(const std::string& url, const std::string& link, BoardOptions options) {
     options.on_wait = [this] { on_wait(); };
     const py::gil_scoped_release free;
-    board_ = std::make_unique<Board>(url, std::move(options));
+    board_ = link.empty() ? std::make_unique<Board>(url, std::move(options))
+                          : std::make_unique<Board>(sim::with_link(url, link), std::move(options));
   }
   ~PyBoard() {
     if (::getpid() != process_) {
@@ -39,14 +40,17 @@ class PyBoard {
       return;
     }
     const py::gil_scoped_release free;
-    end_states();
     board_.reset();
   }
   PyBoard(const PyBoard&) = delete;
   PyBoard& operator=(const PyBoard&) = delete;
 
   Board* operator->() {
-    if (::getpid() == process_) return board_.get();
+    require_own();
+    return board_.get();
+  }
+  void require_own() const {
+    if (::getpid() == process_) return;
     throw Error(Problem{ErrorKind::refused, "the board",
                         "it was opened by the process " + std::to_string(process_) +
                             ", of which this one is a fork",
@@ -56,7 +60,6 @@ class PyBoard {
   // The GIL is not held.
   void close() {
     if (::getpid() != process_) return;
-    end_states();
     board_->close();
     const py::gil_scoped_acquire gil;
     clear();  // they may refer to this board
@@ -83,18 +86,6 @@ class PyBoard {
     return to(callback);
   }
 
-  std::shared_ptr<States> states(std::size_t most) {
-    auto states = std::make_shared<States>(most);
-    const std::weak_ptr<States> weak = states;
-    const std::lock_guard lock(mutex_);
-    std::erase_if(states_, [](const auto& each) { return each.second.expired(); });
-    const Subscription subscription = (*this)->on_state([weak](const ReceivedState& state) {
-      if (const auto alive = weak.lock(); alive && state.any()) alive->put(state);
-    });
-    states_.emplace_back(subscription, weak);
-    return states;
-  }
-
   // For the garbage collector: functions of Python that refer to the board are circles.
   int traverse(visitproc visit, void* arg) const {
     for (const auto& each : callbacks_) {
@@ -109,21 +100,10 @@ class PyBoard {
   }
 
  private:
-  void end_states() {
-    const std::lock_guard lock(mutex_);
-    for (auto& [subscription, weak] : states_) {
-      subscription.cancel();
-      if (const auto states = weak.lock()) states->end();
-    }
-    states_.clear();
-  }
-
   const pid_t process_ = ::getpid();
   std::unique_ptr<Board> board_;
   std::vector<std::weak_ptr<Callback::Held>> callbacks_;  // with the GIL
   std::atomic<unsigned long> interrupted_{0};             // a thread
-  std::mutex mutex_;  // of what follows; nobody waits for the GIL under it
-  std::vector<std::pair<Subscription, std::weak_ptr<States>>> states_;
 };
 
 // None while the constructor has not made one.
@@ -140,6 +120,11 @@ void collect_garbage(PyHeapTypeObject* heap) {
     Py_VISIT(Py_TYPE(self));
     const PyBoard* const board = board_in(self);
     return board != nullptr ? board->traverse(visit, arg) : 0;
+  };
+  // The collector must not meet what is half gone.
+  type.tp_dealloc = [](PyObject* self) {
+    PyObject_GC_UnTrack(self);
+    py::detail::pybind11_object_dealloc(self);
   };
   type.tp_clear = [](PyObject* self) {
     if (PyBoard* const board = board_in(self)) board->clear();
@@ -172,24 +157,25 @@ BoardOptions options_of(bool watch, bool arming, const std::string& fields,
 
 void bind_board(py::module_& module) {
   py::class_<Subscription>(module, "Subscription").def("cancel", &Subscription::cancel, Released());
-  py::class_<States, std::shared_ptr<States>>(module, "States")
+  py::class_<States>(module, "States")
       .def_property_readonly("ended", &States::ended)
-      .def_property_readonly("dropped", &States::dropped);
+      .def_property_readonly("missed", &States::missed);
 
   py::class_<PyBoard>(module, "Board", py::custom_type_setup(collect_garbage))
-      .def(py::init([](const std::string& url, bool watch, bool arming, const std::string& fields,
-                       const std::optional<std::string>& key, int watch_rate_hz, int heartbeat,
-                       int timeout, int command_retry, int stop_retry, int stop_linger,
-                       int identify_interval, int callback_limit) {
+      .def(py::init([](const std::string& url, const std::string& link, bool watch, bool arming,
+                       const std::string& fields, const std::optional<std::string>& key,
+                       int watch_rate_hz, int heartbeat, int timeout, int command_retry,
+                       int stop_retry, int stop_linger, int identify_interval, int callback_limit) {
              return std::make_unique<PyBoard>(
-                 url, options_of(watch, arming, fields, key, watch_rate_hz, heartbeat, timeout,
-                                 command_retry, stop_retry, stop_linger, identify_interval,
-                                 callback_limit));
+                 url, link,
+                 options_of(watch, arming, fields, key, watch_rate_hz, heartbeat, timeout,
+                            command_retry, stop_retry, stop_linger, identify_interval,
+                            callback_limit));
            }),
-           py::arg("url"), py::kw_only(), py::arg("watch"), py::arg("arming"), py::arg("fields"),
-           py::arg("key"), py::arg("watch_rate_hz"), py::arg("heartbeat"), py::arg("timeout"),
-           py::arg("command_retry"), py::arg("stop_retry"), py::arg("stop_linger"),
-           py::arg("identify_interval"), py::arg("callback_limit"))
+           py::arg("url"), py::kw_only(), py::arg("link"), py::arg("watch"), py::arg("arming"),
+           py::arg("fields"), py::arg("key"), py::arg("watch_rate_hz"), py::arg("heartbeat"),
+           py::arg("timeout"), py::arg("command_retry"), py::arg("stop_retry"),
+           py::arg("stop_linger"), py::arg("identify_interval"), py::arg("callback_limit"))
       .def("close", &PyBoard::close, Released())
       .def("interrupt", &PyBoard::interrupt)
       .def(
@@ -249,11 +235,16 @@ void bind_board(py::module_& module) {
       .def(
           "watchdog", [](PyBoard& board, int ms) { board->watchdog(Ms(ms)); }, Released())
       .def("feed", [](PyBoard& board) { board->feed(); })
-      .def("states", &PyBoard::states, Released())
+      // Its on_wait() is that of the board, and asked in take() alone.
+      .def("states",
+           [](PyBoard& board, bool lossless, std::size_t most) {
+             return board->states({lossless, most});
+           })
       .def(
           "take",
           [](PyBoard& board, States& states, int ms) {
-            return states.take(Ms(ms), [&board] { board.on_wait(); });
+            board.require_own();
+            return states.take(Ms(ms));
           },
           Released())
       .def("on_state",

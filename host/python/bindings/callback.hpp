@@ -9,6 +9,32 @@
 
 namespace r4::python {
 
+// The interpreter's state of a thread that is not its own, kept until the thread ends: making one for each call, with
+// the memory of its first frame, costs more than the call.
+class KeptThreadState {
+ public:
+  KeptThreadState() = default;
+  KeptThreadState(const KeptThreadState&) = delete;
+  KeptThreadState& operator=(const KeptThreadState&) = delete;
+  ~KeptThreadState() {
+    if (!kept_) return;
+    if (Py_IsInitialized() == 0) {  // the interpreter has ended, and taken it along
+      static_cast<void>(kept_.release());
+      return;
+    }
+    const py::gil_scoped_acquire gil;
+    kept_.reset();
+  }
+  // With the GIL.
+  static void of_this_thread() {
+    static thread_local KeptThreadState state;
+    if (!state.kept_) state.kept_ = std::make_unique<py::gil_scoped_acquire>();
+  }
+
+ private:
+  std::unique_ptr<py::gil_scoped_acquire> kept_;
+};
+
 // Copied, called and destroyed by any thread. The function is touched with the GIL alone; what it raises is told
 // as Python tells of what it cannot raise (sys.unraisablehook).
 class Callback {
@@ -29,6 +55,7 @@ class Callback {
   template <class... Arguments>
   void operator()(const Arguments&... arguments) const {
     const py::gil_scoped_acquire gil;
+    KeptThreadState::of_this_thread();
     const py::object function = held_->function;
     if (!function || function.is_none()) return;
     try {

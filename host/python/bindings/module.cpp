@@ -10,4 +10,5 @@ PYBIND11_MODULE(_core, module) {
   r4::python::bind_board(module);
   r4::python::bind_recording(module);
   r4::python::bind_simulation(module);
+  r4::python::bind_fleet(module);
 }

@@ -4,11 +4,13 @@
 
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
@@ -164,13 +166,20 @@ py::tuple Columns::take() {
 
 void bind_recording(py::module_& module) {
   py::class_<Recording>(module, "Recording")
-      .def(py::init([](const std::string& path, std::uint64_t rotate_bytes,
+      .def(py::init([](const std::filesystem::path& path, std::uint64_t rotate_bytes,
                        std::int64_t rotate_after_s, std::uint64_t keep_bytes) {
              return std::make_unique<Recording>(
-                 path,
+                 path.string(),
                  RecordingOptions{rotate_bytes, std::chrono::seconds(rotate_after_s), keep_bytes});
            }),
-           py::call_guard<py::gil_scoped_release>())
+           py::arg("path"), py::kw_only(), py::arg("rotate_bytes") = 0, py::arg("rotate_after") = 0,
+           py::arg("keep_bytes") = 0, py::call_guard<py::gil_scoped_release>())
+      .def("__enter__", [](py::object recording) { return recording; })
+      .def("__exit__",
+           [](Recording& recording, const py::args&) {
+             const py::gil_scoped_release free;
+             recording.close();
+           })
       .def("close", &Recording::close, py::call_guard<py::gil_scoped_release>())
       .def_property_readonly("problem",
                              [](const Recording& recording) -> std::optional<std::string> {

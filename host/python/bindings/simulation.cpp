@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "r4link/simulation.hpp"
 
+#include <string>
+
 #include "bindings.hpp"
 
 namespace r4::python {
@@ -49,6 +51,10 @@ void bind_simulation(py::module_& module) {
       .def_property_readonly("url", &Robot::url)
       .def("happen", &Robot::happen, py::call_guard<py::gil_scoped_release>())
       .def("look", &look);
+  // Throws where with_link() would.
+  module.def("check_link", [](const std::string& url, const std::string& link) {
+    static_cast<void>(sim::with_link(url, link));
+  });
 }
 
 }  // namespace r4::python

@@ -14,12 +14,12 @@ none of them. A task that is cancelled takes its command back: it is sent no mor
 from __future__ import annotations
 
 import asyncio
-import collections
 import os
 import threading
+import weakref
 from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
-from typing import Any, AsyncIterator, Callable, Self, Type, TypeVar
+from typing import Any, Callable, Self, Type, TypeVar
 
 from . import board as blocking
 from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State, Statistics,
@@ -65,6 +65,39 @@ class _Lane:
 
     def end(self) -> None:
         self._thread.shutdown(wait=False)
+
+
+class States:
+    """The states of a board from now on: `async for state in board.states(): …`, until the board is closed.
+
+    The link leaves them beside the callbacks, so that none is lost where these are slow; the callback of this one
+    only tells that there is one.
+    """
+
+    def __init__(self, states: blocking.States, news: asyncio.Event, subscription: Subscription) -> None:
+        self._states = states
+        self._news = news
+        self._end = weakref.finalize(self, subscription.cancel)
+
+    def __aiter__(self) -> Self:
+        return self
+
+    async def __anext__(self) -> State:
+        await asyncio.sleep(0)  # the loop has others to look after, however many states wait
+        while True:
+            self._news.clear()
+            state = self._states.take()
+            if state is not None:
+                return state
+            if self._states.ended:
+                self._end()
+                raise StopAsyncIteration
+            await self._news.wait()
+
+    @property
+    def dropped(self) -> int:
+        """Those that gave way or found no room."""
+        return self._states.dropped
 
 
 class _Channel:
@@ -140,15 +173,15 @@ class Board:
         self._commands = _Lane(interrupt)
         self._waits = _Lane(interrupt)
         self._stops = _Lane(interrupt)
-        self._streams: set[_Stream] = set()
+        self._news: weakref.WeakSet[asyncio.Event] = weakref.WeakSet()  # of loops over states
 
     async def close(self) -> None:
         """Says farewell; calls that wait raise ClosedError, loops over states end."""
         await asyncio.get_running_loop().run_in_executor(None, self._board.close)
         for lane in (self._commands, self._waits, self._stops):
             lane.end()
-        for stream in list(self._streams):
-            stream.end()
+        for news in list(self._news):
+            news.set()
 
     async def __aenter__(self) -> Self:
         return self
@@ -242,17 +275,12 @@ class Board:
     def name(self) -> str:
         return self._board.name
 
-    async def states(self, most: int = 1) -> AsyncIterator[State]:
-        """Every state from now on, of which `most` wait: 1 is the newest alone. Ends with the board."""
-        stream = _Stream(most)
-        subscription = self.on_state(stream.put)
-        self._streams.add(stream)
-        try:
-            while (state := await stream.take()) is not None:
-                yield state
-        finally:
-            self._streams.discard(stream)
-            subscription.cancel()
+    def states(self, most: int | None = None, *, lossless: bool = False) -> States:
+        """The states from now on, until the board is closed: as those of r4link.Board."""
+        news = asyncio.Event()
+        self._news.add(news)
+        return States(self._board.states(most, lossless=lossless), news,
+                      self.on_state(lambda _: news.set()))
 
     # --- callbacks, on the loop of the task that adds them
 
@@ -274,8 +302,9 @@ class Board:
     def on_refused(self, callback: Callable[[RefusedPost], object]) -> Subscription:
         return self._board.on_refused(_on_loop(callback))
 
-    def record(self, to: str | os.PathLike[str] | Recording, **limits: int) -> None:
-        self._board.record(to, **limits)
+    def record(self, to: str | os.PathLike[str] | Recording, *, rotate_bytes: int = 0, rotate_after: int = 0,
+               keep_bytes: int = 0) -> None:
+        self._board.record(to, rotate_bytes=rotate_bytes, rotate_after=rotate_after, keep_bytes=keep_bytes)
 
     def watchdog(self, period: float) -> None:
         """What gates the heartbeats is feed(), not the loop: feed where the robot is looked after."""
@@ -283,32 +312,6 @@ class Board:
 
     def feed(self) -> None:
         self._board.feed()
-
-
-class _Stream:
-    """States for one loop, which is slower or faster than they come."""
-
-    def __init__(self, most: int) -> None:
-        self._waiting: collections.deque[State] = collections.deque(maxlen=most)
-        self._news = asyncio.Event()
-        self._ended = False
-
-    def put(self, state: State) -> None:
-        if state:
-            self._waiting.append(state)
-            self._news.set()
-
-    def end(self) -> None:
-        self._ended = True
-        self._news.set()
-
-    async def take(self) -> State | None:
-        while not self._waiting:
-            if self._ended:
-                return None
-            self._news.clear()
-            await self._news.wait()
-        return self._waiting.popleft()
 
 
 def _on_loop(callback: Callable[..., object]) -> Callable[..., None]:

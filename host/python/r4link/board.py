@@ -21,7 +21,7 @@ from .values import Direction, PostResult
 
 F = TypeVar('F', bound=Callable[..., Any])
 _MOST_S = 24 * 3600.0
-_open: weakref.WeakSet[Board] = weakref.WeakSet()
+_open: weakref.WeakSet[_core.Board] = weakref.WeakSet()
 
 
 def _ms(seconds: float) -> int:
@@ -141,36 +141,45 @@ class BldcChannel(_Channel):
 
 
 class States:
-    """The states of a board from now on: `for state in board.states(): …`, until the board is closed.
-
-    As many as `most` wait for a loop that is slow, then the oldest give way: `dropped`.
+    """The states of a board from now on: `for state in board.states(): …`, until the board is closed. Keeps it open.
     """
 
-    def __init__(self, board: _core.Board, most: int, timeout: float) -> None:
-        self._board = board
-        self._states = board.states(most)
+    def __init__(self, board: Board, most: int | None, timeout: float, lossless: bool) -> None:
+        if most is not None and most < 1:
+            raise UsageError(f'states(most={most})', 'at least one has to wait', 'give 1 or more')
+        self._board = board._core
+        self._states = self._board.states(lossless, most or 0)
         self._timeout_ms = _ms(timeout)
 
     def __iter__(self) -> Iterator[State]:
         return self
 
     def __next__(self) -> State:
-        """Raises NotConfirmedError when none comes within the timeout."""
-        state = self._board.take(self._states, self._timeout_ms)
-        if state is not None:
-            return state
-        if self._states.ended:
-            raise StopIteration
-        self._board.next_state(1)  # says why there is none
-        return next(self)
+        """Raises RefusedError when none comes within the timeout, DataError where one was lost of which none should
+        be; the next call goes on behind it."""
+        while (state := self._board.take(self._states, self._timeout_ms)) is None:
+            if self._states.ended:
+                raise StopIteration
+            self._board.next_state(1)  # says why there is none
+        return state
+
+    def take(self) -> State | None:
+        """The next one if it is there already."""
+        return self._board.take(self._states, 0)
+
+    @property
+    def ended(self) -> bool:
+        """The board was closed, and none waits."""
+        return self._states.ended
 
     @property
     def dropped(self) -> int:
-        return self._states.dropped
+        """Those that gave way or found no room."""
+        return self._states.missed
 
 
 class Board:
-    """A board, opened by URL (docs/transports.md); see the options of include/r4link/options.hpp.
+    """A board, opened by URL (docs/transports.md), or with_link(); see the options of include/r4link/options.hpp.
 
     Returns without waiting for the board: wait_active(). `role` is 'control', or 'watch' for a program that only
     looks, and may stop the board. `key` is the path of a key file (`~` is yours). Raises UsageError, OpenError, DeniedError.
@@ -188,12 +197,12 @@ class Board:
         if role not in ('control', 'watch'):
             raise UsageError(f'role {role!r}', 'there is no such role', "give 'control' or 'watch'")
         self._core = _core.Board(
-            url, watch=role == 'watch', arming=arming, fields=fields,
+            url, link=getattr(url, 'link', ''), watch=role == 'watch', arming=arming, fields=fields,
             key=None if key is None else os.path.expanduser(os.fspath(key)),
             watch_rate_hz=watch_rate_hz, heartbeat=_ms(heartbeat), timeout=_ms(timeout),
             command_retry=_ms(command_retry), stop_retry=_ms(stop_retry), stop_linger=_ms(stop_linger),
             identify_interval=_ms(identify_interval), callback_limit=_ms(callback_limit))
-        _open.add(self)
+        _open.add(self._core)
 
     def close(self) -> None:
         """Says farewell and closes the transport: the board goes safe at once. Calls that wait in other threads
@@ -296,12 +305,11 @@ class Board:
     def next_state(self, timeout: float = 1.0) -> State:
         return self._core.next_state(_ms(timeout))
 
-    def states(self, most: int = 1, timeout: float = 1.0) -> States:
-        """Every state from now on, of which `most` wait: 1 is the newest alone. States that come while a callback
-        runs are one."""
-        if most < 1:
-            raise UsageError(f'states(most={most})', 'at least one has to wait', 'give 1 or more')
-        return States(self._core, most, timeout)
+    def states(self, most: int | None = None, timeout: float = 1.0, *, lossless: bool = False) -> States:
+        """The states from now on, for a loop. The newest at a time; with `most` up to so many wait, then the oldest
+        give way. With `lossless` none does: 65536 wait (eleven minutes at 100 Hz) or `most`, and what found no room is
+        a DataError at its place."""
+        return States(self, most, timeout, lossless)
 
     @property
     def link(self) -> LinkStatus:

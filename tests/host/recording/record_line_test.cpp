@@ -28,6 +28,25 @@ TEST(RecordLine, IsTimeWireDirectionAndTheDatagramAsItStands) {
   EXPECT_EQ(record_time_text(sample), "2026-11-23T21:11:33.404765Z");
 }
 
+RC_GTEST_PROP(RecordLine, TimesAreReadBackFromTheirText, ()) {
+  const Time time{*rc::gen::inRange<std::int64_t>(0, 253402300799999999)};
+  const std::string text = record_time_text(time);
+  RC_ASSERT(read_record_time(text) == time);
+  // By the second, without what is not needed.
+  RC_ASSERT(read_record_time(text.substr(0, 19)) == std::chrono::floor<std::chrono::seconds>(time));
+}
+
+TEST(RecordLine, TellsWhatIsNoTime) {
+  EXPECT_EQ(read_record_time("2026-11-23T21:11:33.4"), Time{1795468293400000});
+  for (const char* const text :
+       {"", "Z", "2026-11-23", "2026-11-23T21:11", "2026-11-23T21:11:33.", "2026-11-23T21:11:33ZZ",
+        "2026-11-23T21:11:33.4047655", "2026-11-23T21:11:33+01", "2026-11-23 21:11:33",
+        "2026-02-29T21:11:33", "2026-13-01T21:11:33", "2026-11-23T24:00:00", "2026-11-23T21:60:00",
+        "1969-12-31T23:59:59", "2026-11-23T21:11:-1", "x026-11-23T21:11:33"}) {
+    EXPECT_FALSE(read_record_time(text)) << text;
+  }
+}
+
 TEST(RecordLine, OfAStateHasTwoHundredBytesAtMost) {
   // With what a host in control asks for besides the paper's fields, after a day.
   const std::string state =

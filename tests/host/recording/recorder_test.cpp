@@ -146,12 +146,28 @@ TEST_F(RecordingOfABoard, HoldsDamagedDatagramsByteForByte) {
     const auto recorder = std::make_shared<Recorder>(path(), RecordingOptions{});
     RecordingTap tap;
     tap.attach(recorder, "sim:");
-    tap.on_received(damaged);
+    tap.on_received(damaged, Time{0});
+    tap.on_oversize(damaged);
   }
   const Heard all = heard();
   std::string line;
   write_record(line, {Time{0}, 1, RecordKind::from_board, damaged});
   EXPECT_NE(all.records.find(line.substr(line.find(' '))), std::string::npos) << all.records;
+  EXPECT_EQ(all.events.front(), "oversize " + damaged) << "what is too long is no datagram";
+}
+
+TEST_F(RecordingOfABoard, IsInTheOrderInWhichItCameAndNotInThatInWhichItWasTold) {
+  const Time began = std::chrono::duration_cast<Time>(
+      (std::chrono::steady_clock::now() - 20ms).time_since_epoch());
+  Recorder recorder(path(), {});
+  const std::uint16_t left = recorder.add_wire("a"), right = recorder.add_wire("b");
+  for (const auto& [wire, at] : {std::pair{left, 5ms}, {left, 15ms}, {right, 1ms}, {right, 15ms}}) {
+    recorder.record(wire, RecordKind::from_board, std::to_string(at.count()), began + at);
+  }
+  recorder.close();
+  const Heard all = heard();
+  const std::regex lines(R"(\S+ 2< 1\n\S+ 1< 5\n\S+ 1< 15\n\S+ 2< 15\n\S+ 0! end\n)");
+  EXPECT_TRUE(std::regex_match(all.records, lines)) << all.records;
 }
 
 TEST_F(RecordingOfABoard, TakesADatagramWithoutMemoryAndTellsWhatItHadNoRoomFor) {

@@ -88,6 +88,22 @@ TEST_F(Replay, BeginsWhereItIsAskedToAndWithThatWire) {
   EXPECT_EQ(heard.datagrams[0].text, "5");
 }
 
+TEST_F(Replay, BeginsAtATimeOfTheRecordingsClock) {
+  for (int i = 0; i < 10; ++i) add(i * 1s, std::to_string(i));
+  play("?speed=1000&from=2026-11-23T21:11:37.5");  // 1795468293 is 21:11:33
+  ASSERT_EQ(heard.datagrams.size(), 5);
+  EXPECT_EQ(heard.datagrams[0].text, "5");
+  const Problem late = problem_of([&] { play("?from=2026-11-23T21:11:42.5Z"); });
+  EXPECT_EQ(late.kind, ErrorKind::data);
+  EXPECT_TRUE(late.reason.starts_with("the last of that wire is of 2026-11-23T21:11:42.000000Z"));
+  EXPECT_EQ(problem_of([&] { play("?from=11"); }).reason, late.reason);
+  for (const char* wrong :
+       {"", "x", "-1", "1795468293", "2026-11-23", "2026-11-23T21:11:37+01:00"}) {
+    EXPECT_EQ(problem_of([&] { play(std::string("?from=") + wrong); }).reason,
+              std::string(wrong) + " is neither seconds nor a time");
+  }
+}
+
 TEST_F(Replay, LeavesTheLoopToOthersHoweverMuchIsDue) {
   constexpr std::size_t all = 1000;
   for (std::size_t i = 0; i < all; ++i) add(0ms, "at once");

@@ -67,10 +67,23 @@ struct ToldOfABoard {
     board.on_state(
         [this](const ReceivedState& state, const Datagram&) { states.push_back(text_of(state)); });
     board.on_board_heartbeat(
-        [this](const Datagram& datagram) { heartbeats.push_back(datagram.pnum()); });
-    board.on_bad_datagram(
-        [this](const ReadResult&, std::string_view bytes) { damaged.emplace_back(bytes); });
-    board.on_event([this](const CarrierEvent& event) { events.emplace_back(to_text(event.kind)); });
+        [this](const Datagram& datagram) { heartbeats.push_back(text_of(datagram)); });
+    board.on_bad_datagram([this](const ReadResult& result, std::string_view bytes) {
+      damaged.push_back(std::to_string(static_cast<int>(result.error)) + " at " +
+                        std::to_string(result.position) + ": " + std::string(bytes));
+    });
+    board.on_event([this](const CarrierEvent& event) {
+      events.push_back(to_text(event.kind) + (" " + event.problem.reason));
+    });
+    board.on_link([this](const LinkStatus& link) {
+      std::string text = to_text(link.state) + (" " + std::string(to_text(link.reason)));
+      if (links.empty() || links.back() != text) links.push_back(std::move(text));
+    });
+    board.on_restart([this] { ++restarts; });
+  }
+
+  static std::string text_of(const Datagram& datagram) {
+    return {datagram.bytes().data(), datagram.bytes().size()};
   }
 
   // Every field, those too that this datagram has not brought.
@@ -87,8 +100,8 @@ struct ToldOfABoard {
     return present + std::string(text.data(), text.size());
   }
 
-  std::vector<std::string> states, damaged, events;
-  std::vector<std::uint32_t> heartbeats;
+  std::vector<std::string> states, heartbeats, damaged, events, links;
+  int restarts = 0;
 };
 
 TEST(ReplayFidelity, TheSameStatesEventsAndStatisticsAsLive) {
@@ -131,8 +144,12 @@ TEST(ReplayFidelity, TheSameStatesEventsAndStatisticsAsLive) {
   EXPECT_EQ(played.heartbeats, live.heartbeats);
   EXPECT_GT(live.damaged.size(), 3U);
   EXPECT_EQ(played.damaged, live.damaged);
-  live.events.emplace_back("down");  // the end
+  live.events.emplace_back("down the recording has ended");
   EXPECT_EQ(played.events, live.events);
+  EXPECT_EQ(live.links, (std::vector<std::string>{"active none", "safe stop"}));
+  live.links.emplace_back("lost stop");
+  EXPECT_EQ(played.links, live.links);
+  EXPECT_EQ(played.restarts, live.restarts);
 
   EXPECT_EQ(now.received, then.received);
   EXPECT_EQ(now.states, then.states);

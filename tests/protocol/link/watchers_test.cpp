@@ -17,7 +17,7 @@ Source place(std::uint32_t peer) { return {0, peer}; }
 
 struct WatchersTest : testing::Test {
   Effect ask(Source from, std::uint64_t echo = 0, std::uint32_t rate_hz = 50) {
-    return watchers.on_lease(from, rate_hz, echo, now);
+    return watchers.on_lease(from, rate_hz, echo, false, now);
   }
   // W, and the token that it is told.
   std::uint32_t told(Source from) {
@@ -112,6 +112,15 @@ TEST_F(WatchersTest, AWatcherEndsItsLeaseAndNobodyElseDoes) {
   EXPECT_EQ(ask(here, 0, 0), Effect::ignored) << "forged";
   EXPECT_EQ(ask(place(2), echo, 0), Effect::ignored);
   EXPECT_EQ(ask(here, echo, 0), Effect::ended);
+  EXPECT_FALSE(watchers.any());
+}
+
+TEST_F(WatchersTest, AtAPlaceThatNobodyCanForgeNothingNeedBeEchoed) {
+  EXPECT_EQ(watchers.on_lease(here, 5, 0, true, now), Effect::watching);
+  now += Watchers::lease_ms - 1;
+  EXPECT_EQ(watchers.on_lease(here, 5, 0, true, now), Effect::watching);
+  now += Watchers::lease_ms;
+  watchers.poll(now);
   EXPECT_FALSE(watchers.any());
 }
 

@@ -106,6 +106,15 @@ TEST(BusLog, UnpacksThePackedForm) {
   EXPECT_TRUE(dump.log.any_bad());
 }
 
+TEST(BusLog, ShowsWhoWatches) {
+  Dump dump;
+  dump.frame(0x605, "");
+  ASSERT_EQ(dump.printed.size(), 1U);
+  EXPECT_EQ(dump.printed[0]["type"], "watch");
+  EXPECT_EQ(dump.printed[0]["node"], 5);
+  EXPECT_FALSE(dump.log.any_bad());
+}
+
 TEST(BusLog, ShowsEmergencyStopsAndBoardsThatWentSafe) {
   Dump dump;
   dump.frame(0x010, "");

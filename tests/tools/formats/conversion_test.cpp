@@ -11,7 +11,7 @@ namespace r4::test {
 namespace {
 
 TEST(Conversion, GivesANativeRecordingAsItWas) {
-  for (const std::string& native : {recorded_capture(), generated_recording(1, 3000)}) {
+  for (const std::string& native : {recorded_capture(), generated_recording(1, 100'000)}) {
     EXPECT_EQ(and_back(native, ".r4log"), native);
     EXPECT_EQ(and_back(native, ".r4log.zst"), native);
   }

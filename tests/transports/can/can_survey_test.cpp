@@ -99,6 +99,14 @@ TEST(CanSurvey, ABoardWithoutAHostIsNotConnected) {
   EXPECT_EQ(bus.survey.board(3).lost, 0U);
 }
 
+TEST(CanSurvey, StatesForWhoWatchesAreNoHost) {
+  Bus bus;
+  bus.heartbeat(0, 0, SafeReason::none);
+  bus.state(7);
+  EXPECT_EQ(bus.survey.board(3).states, 1U);
+  EXPECT_FALSE(bus.survey.board(3).connected);
+}
+
 TEST(CanSurvey, TellsWhyABoardIsSafe) {
   Bus bus;
   bus.heartbeat(5, 900, SafeReason::stop);

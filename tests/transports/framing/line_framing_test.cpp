@@ -101,6 +101,24 @@ TEST(LineFraming, TenMegabytesWithoutATerminatorCostOneLine) {
   }
 }
 
+TEST(LineFraming, TellsOnceHowALineBeginsThatIsTooLong) {
+  std::string longer;
+  for (int i = 0; i < 3000; ++i) longer += static_cast<char>('a' + i % 26);
+  const std::string stream = "first\n" + longer + "\nlast\n";
+  for (const std::size_t piece : {std::size_t{1}, std::size_t{7}, max_datagram, stream.size()}) {
+    LineFraming framing;
+    Lines lines, beginnings;
+    for (std::size_t at = 0; at < stream.size(); at += piece) {
+      const std::string part = stream.substr(at, piece);
+      framing.push(
+          part.data(), part.size(), [&](Text line) { lines.push_back(str(line)); },
+          [&](Text beginning) { beginnings.push_back(str(beginning)); });
+    }
+    EXPECT_EQ(lines, (Lines{"first", "last"})) << piece;
+    EXPECT_EQ(beginnings, Lines{longer.substr(0, max_datagram)}) << piece;
+  }
+}
+
 TEST(LineFraming, ForgetsAnUnfinishedLineOnReset) {
   LineFraming framing;
   lines_of(framing, "half a li");

@@ -295,6 +295,7 @@ TEST_F(SerialPtyTest, Takes10MegabytesWithoutATerminatorForOneBadLine) {
   ASSERT_TRUE(wait_for(at_board, "good"));
   EXPECT_EQ(at_board.datagrams.size(), 1U);
   EXPECT_EQ(board->counters().rx_oversize, 1U);
+  EXPECT_EQ(at_board.oversize, std::vector<std::string>{std::string(1024, 'x')});
 }
 
 TEST_F(SerialPtyTest, GivesAStalledReaderAYoungStateFirst) {

@@ -26,7 +26,7 @@ TEST(ShareMessage, OfAHelloTellsRoleAndName) {
 }
 
 TEST(ShareMessage, OfAnotherVersionIsToldFromDamage) {
-  const auto message = read_share_message("h2whatever comes next");
+  const auto message = read_share_message("h9whatever comes next");
   ASSERT_TRUE(message);
   EXPECT_FALSE(message->same_version);
   EXPECT_TRUE(message->text.empty());
@@ -69,16 +69,17 @@ TEST(ShareMessage, IsRefusedWhereItIsNone) {
            packet_of(Letter::sent),
            packet_of(Letter::sent, longest + "x"),
            packet_of(Letter::hello),
-           packet_of(Letter::hello, "1"),
-           packet_of(Letter::hello, "1x"),
-           packet_of(Letter::hello, "1w"),
-           packet_of(Letter::hello, "1xr4"),
-           packet_of(Letter::welcome, "1"),
-           packet_of(Letter::welcome, "1\033[2J"),
+           packet_of(Letter::hello, "2"),
+           packet_of(Letter::hello, "2x"),
+           packet_of(Letter::hello, "2w"),
+           packet_of(Letter::hello, "2xr4"),
+           packet_of(Letter::welcome, "2"),
+           packet_of(Letter::welcome, "2\033[2J"),
            packet_of(Letter::busy),
            packet_of(Letter::busy, "a\nb"),
            packet_of(Letter::yours, "x"),
            packet_of(Letter::moved, "x"),
+           packet_of(Letter::alive, "x"),
            packet_of(Letter::up),
            packet_of(Letter::up, "udp://\x07"),
            packet_of(Letter::down),

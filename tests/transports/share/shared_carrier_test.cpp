@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "transports/share/shared_carrier.hpp"
-
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
@@ -8,19 +6,10 @@
 #include <unistd.h>
 
 #include <array>
-#include <asio/executor_work_guard.hpp>
-#include <asio/post.hpp>
-#include <atomic>
-#include <cerrno>
 #include <cstddef>
-#include <future>
-#include <mutex>
-#include <set>
-#include <thread>
 #include <utility>
 
-#include "../recorder.hpp"
-#include "protocol/datagram/datagram_writer.hpp"
+#include "shared_wire.hpp"
 #include "transports/share/share_message.hpp"
 #include "transports/share/share_socket.hpp"
 
@@ -29,183 +18,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// A device that one can have open at a time, as a serial port is.
-struct Device {
-  class Wire;
-  std::mutex mutex;
-  Wire* open = nullptr;
-  int opened = 0;
-  std::vector<std::string> sent;
-
-  std::vector<std::string> all_sent() {
-    const std::lock_guard lock(mutex);
-    return sent;
-  }
-  void deliver(const std::string& datagram);
-  void report(const CarrierEvent& event);
-};
-
-class Device::Wire final : public Carrier {
- public:
-  Wire(asio::io_context& io, Device& device) : io_(io), device_(device) {}
-  ~Wire() override { close(); }
-
-  void open(Handler& handler) override {
-    close();
-    {
-      const std::lock_guard lock(device_.mutex);
-      if (device_.open != nullptr) throw Error(ErrorKind::open, name_, "in use", "end the other");
-      device_.open = this;
-      ++device_.opened;
-    }
-    handler_ = &handler;
-    up_ = true;
-    handler.on_carrier_event({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
-  }
-  void close() noexcept override {
-    handler_ = nullptr;
-    up_ = false;
-    const std::lock_guard lock(device_.mutex);
-    if (device_.open == this) device_.open = nullptr;
-  }
-  SendResult send(std::string_view bytes, Priority, Peer) override {
-    const std::lock_guard lock(device_.mutex);
-    device_.sent.emplace_back(bytes);
-    return SendResult::sent;
-  }
-  bool up() const override { return up_; }
-  std::size_t max_size() const override { return max_datagram; }
-  const std::string& name() const override { return name_; }
-  const CarrierCounters& counters() const override { return counters_; }
-
- private:
-  friend Device;
-
-  asio::io_context& io_;
-  Device& device_;
-  const std::string name_ = "device:";
-  Handler* handler_ = nullptr;
-  bool up_ = false;
-  CarrierCounters counters_;
-};
-
-void Device::deliver(const std::string& datagram) {
-  const std::lock_guard lock(mutex);
-  ASSERT_NE(open, nullptr) << "nobody has it open";
-  asio::post(open->io_, [this, wire = open, datagram] {
-    if (wire->handler_ != nullptr) wire->handler_->on_datagram(datagram, everyone);
-  });
-}
-
-void Device::report(const CarrierEvent& event) {
-  const std::lock_guard lock(mutex);
-  asio::post(open->io_, [wire = open, event] {
-    if (wire->handler_ != nullptr) wire->handler_->on_carrier_event(event);
-  });
-}
-
-std::string datagram_of(Text name, Text value) {
-  char buffer[max_datagram];
-  DatagramWriter writer(buffer, sizeof buffer);
-  writer.field(name).value(value);
-  const Text text = writer.finish(7, 1);
-  return {text.data(), text.size()};
-}
-
-class SharedCarrier : public testing::Test {
- protected:
-  // A program: here, in this loop, or in a thread of its own.
-  struct Program {
-    Recorder heard;
-    std::unique_ptr<Carrier> carrier;
-
-    bool has(std::string_view text) const { return heard.has(text); }
-  };
-
-  std::unique_ptr<Program> program(BoardRole role, asio::io_context& loop) {
-    auto made = std::make_unique<Program>();
-    made->carrier = make_shared_carrier(
-        loop, std::make_unique<Device::Wire>(loop, device),
-        [this] {
-          return SharedWire{wire, exclusive, group};
-        },
-        role);
-    return made;
-  }
-  std::unique_ptr<Program> opened(BoardRole role) {
-    auto made = program(role, io);
-    made->carrier->open(made->heard);
-    EXPECT_TRUE(run_until(io, [&] { return made->carrier->up(); }));
-    return made;
-  }
-  // Goes on until `done()`, also while this loop has nothing to wait for.
-  template <class Done>
-  bool in_time(Done done) {
-    const auto deadline = Clock::now() + patience;
-    while (!done()) {
-      if (Clock::now() >= deadline) return false;
-      run_for(io, 1ms);
-      std::this_thread::yield();  // others have loops of their own
-    }
-    return true;
-  }
-  // A connection of no carrier: what a forger has.
-  FileDescriptor raw() {
-    FileDescriptor connection = reach_holder({wire});
-    EXPECT_TRUE(connection);
-    return connection;
-  }
-  // Reads on until the holder ends the connection.
-  bool is_cut_off(const FileDescriptor& connection) {
-    return in_time([&] {
-      std::array<char, 2048> bytes;
-      while (true) {
-        const ssize_t size = receive_packet(connection.get(), bytes.data(), bytes.size());
-        if (size < 0 && errno == EAGAIN) break;
-        if (size <= 0) return true;
-      }
-      return false;
-    });
-  }
-
-  static int next() {
-    static std::atomic<int> count;
-    return ++count;
-  }
-
-  asio::io_context io;
-  Device device;
-  bool exclusive = true;
-  ShareGroup group;  // none
-  const std::string wire = fmt::format("test/{}/{}", ::getpid(), next());
-};
-
-// A loop in a thread of its own, for one that is asked while this thread waits for its answer.
-class OtherThread {
- public:
-  OtherThread() : work_(loop.get_executor()), thread_([this] { loop.run(); }) {}
-  ~OtherThread() {
-    work_.reset();
-    loop.stop();
-    thread_.join();
-  }
-  // Runs there, to its end.
-  template <class Function>
-  void run(Function function) {
-    std::promise<void> done;
-    asio::post(loop, [&] {
-      function();
-      done.set_value();
-    });
-    done.get_future().wait();
-  }
-
-  asio::io_context loop;
-
- private:
-  asio::executor_work_guard<asio::io_context::executor_type> work_;
-  std::thread thread_;
-};
+class SharedCarrier : public SharedWireTest {};
 
 TEST_F(SharedCarrier, WhoComesFirstHasTheWire) {
   const auto only = opened(BoardRole::control);
@@ -240,6 +53,20 @@ TEST_F(SharedCarrier, ThoseThatWatchHearBothDirections) {
     EXPECT_GT(each->heard.drained, 0);
   }
   EXPECT_TRUE(driver->heard.overheard.empty());
+}
+
+TEST_F(SharedCarrier, AllHearWhatAnotherHostSaysOnTheWireAndWhatIsTooLong) {
+  const auto driver = opened(BoardRole::control);
+  const auto watcher = opened(BoardRole::watch);
+  device.overhear("O:358,1,1;");
+  device.deliver(std::string(2000, 'x'));
+  device.deliver("last");
+  ASSERT_TRUE(run_until(io, [&] { return watcher->has("last"); }));
+  for (const auto& each : {driver.get(), watcher.get()}) {
+    EXPECT_EQ(each->heard.overheard, std::vector<std::string>{"O:358,1,1;"});
+    EXPECT_EQ(each->heard.oversize, std::vector<std::string>{std::string(max_datagram, 'x')});
+  }
+  EXPECT_EQ(watcher->carrier->counters().rx_oversize, 1U);
 }
 
 TEST_F(SharedCarrier, WhoWatchesStopsTheBoardAndSaysNothingElse) {
@@ -379,115 +206,93 @@ TEST_F(SharedCarrier, AHolderThatDoesNotAnswerIsNamed) {
   EXPECT_LT(in_milliseconds(Clock::now() - began), 100) << "it blocks the loop";
   ASSERT_TRUE(run_until(io, [&] { return watcher->heard.count(Kind::down) == 1; }));
   EXPECT_EQ(watcher->heard.last(Kind::down)->problem.reason, who);
-  // It goes on.
-  ASSERT_TRUE(in_time([&] {
-    run_for(stopped, 5ms);
-    return watcher->carrier->up();
-  }));
-  EXPECT_EQ(watcher->heard.count(Kind::down), 1U);
-}
-
-TEST_F(SharedCarrier, OneThatSleepsIsLetGoAndComesBack) {
-  const auto holder = opened(BoardRole::control);
-  asio::io_context asleep;
-  const auto sleeper = program(BoardRole::watch, asleep);
-  sleeper->carrier->open(sleeper->heard);
-  in_time([&] {
-    run_for(asleep, 1ms);
-    return sleeper->carrier->up();
-  });
-  const FileDescriptor raw_sleeper = raw();
-  ASSERT_EQ(send_message(raw_sleeper.get(), ShareMessage::Kind::hello,
-                         hello_text(BoardRole::watch, "sleeper")),
-            0);
-  const auto awake = opened(BoardRole::watch);
-  int sent = 0;
-  const auto until = Clock::now() + 1500ms;
-  while (Clock::now() < until) {
-    device.deliver(fmt::format("state {};{}", ++sent, std::string(160, 'x')));
-    run_for(io, 2ms);
-  }
-  EXPECT_EQ(awake->heard.datagrams.size(), static_cast<std::size_t>(sent));
-  // What waits in the kernel, and then the end.
-  std::array<char, 2048> bytes;
-  int old = 0;
-  ssize_t last = 0;
-  while ((last = receive_packet(raw_sleeper.get(), bytes.data(), bytes.size())) > 0) ++old;
-  EXPECT_LT(old, 200);
-  EXPECT_EQ(last, 0) << "still there";
-  ASSERT_TRUE(in_time([&] {
-    device.deliver("again");
-    run_for(asleep, 5ms);
-    return sleeper->has("again");
-  }));
-}
-
-TEST_F(SharedCarrier, WhoSaysWhatNoProgramOfOursDoesIsCutOff) {
-  const auto holder = opened(BoardRole::control);
-  const std::string hello = hello_text(BoardRole::watch, "forger");
-  using Message = std::pair<ShareMessage::Kind, std::string>;
-  for (const auto& [kind, text] : {
-           Message{ShareMessage::Kind::received, "SAFE:0;"},
-           Message{ShareMessage::Kind::sent, "O:358,1,1;"},
-           Message{ShareMessage::Kind::stop, "no datagram"},
-           Message{ShareMessage::Kind::stop, datagram_of("O", "358,1,1")},
-           Message{ShareMessage::Kind::stop, datagram_of("E", "CLEAR")},
-           Message{ShareMessage::Kind::yours, ""},
-           Message{ShareMessage::Kind::up, "device:"},
-           Message{static_cast<ShareMessage::Kind>('?'), "?"},
-           Message{ShareMessage::Kind::stop, std::string(3000, 'x')},
-           Message{ShareMessage::Kind::hello, "2"},
-       }) {
-    const FileDescriptor connection = raw();
-    ASSERT_EQ(send_message(connection.get(), kind, text), 0);
-    EXPECT_TRUE(is_cut_off(connection)) << static_cast<char>(kind) << text.substr(0, 20);
-  }
-  const FileDescriptor twice = raw();
-  send_message(twice.get(), ShareMessage::Kind::hello, hello);
-  send_message(twice.get(), ShareMessage::Kind::hello, hello);
-  EXPECT_TRUE(is_cut_off(twice));
-  EXPECT_TRUE(device.all_sent().empty());
-  EXPECT_TRUE(holder->heard.datagrams.empty());
-  EXPECT_TRUE(holder->carrier->up());
-}
-
-TEST_F(SharedCarrier, AFloodOfStopsEndsAtAHundredASecond) {
-  const auto holder = opened(BoardRole::control);
-  const FileDescriptor connection = raw();
-  const std::string stop = datagram_of("E", "STOP");
-  in_time([&] {
-    const int error = send_message(connection.get(), ShareMessage::Kind::stop, stop);
-    return error != 0 && error != EAGAIN;
-  });
-  EXPECT_GE(device.all_sent().size(), 1U);
-  EXPECT_LE(device.all_sent().size(), 202U);
-}
-
-TEST_F(SharedCarrier, TheLastWordOfOneThatSaysTooMuchMayBeAStop) {
-  const auto holder = opened(BoardRole::control);
-  const FileDescriptor connection = raw();
-  const auto say = [&](ShareMessage::Kind kind, std::string_view text) {
-    return in_time([&] { return send_message(connection.get(), kind, text) == 0; });
+  const auto goes_on = [&] {
+    return in_time([&] {
+      run_for(stopped, 5ms);
+      return watcher->carrier->up();
+    });
   };
-  ASSERT_TRUE(say(ShareMessage::Kind::hello, hello_text(BoardRole::watch, "chatterbox")));
-  const std::string stop = datagram_of("E", "STOP");
-  for (int i = 0; i < 100; ++i) ASSERT_TRUE(say(ShareMessage::Kind::stop, stop));
-  EXPECT_TRUE(is_cut_off(connection));
-  EXPECT_EQ(device.all_sent().size(), 100U);
+  ASSERT_TRUE(goes_on());
+  EXPECT_EQ(watcher->heard.count(Kind::down), 1U);
+  // Again, when the watcher has long shared with it.
+  ASSERT_TRUE(run_until(io, [&] { return watcher->heard.count(Kind::down) == 2; }));
+  EXPECT_EQ(watcher->heard.last(Kind::down)->problem.reason, who);
+  ASSERT_TRUE(goes_on());
+  EXPECT_EQ(watcher->heard.count(Kind::down), 2U);
+  EXPECT_EQ(device.opened, 1);
 }
 
-TEST_F(SharedCarrier, SixteenMayShareIt) {
-  const auto holder = opened(BoardRole::control);
-  std::vector<FileDescriptor> sharers;
-  for (int i = 0; i < 16; ++i) sharers.push_back(raw());
-  run_for(io, 20ms);
-  const FileDescriptor one_too_many = raw();
-  EXPECT_TRUE(is_cut_off(one_too_many));
-  sharers.pop_back();
-  run_for(io, 20ms);
-  const auto next_one = opened(BoardRole::watch);
-  device.deliver("state");
-  EXPECT_TRUE(run_until(io, [&] { return next_one->has("state"); }));
+TEST_F(SharedCarrier, ThoseWhomAHolderThatHangsIsNoHelpToMeetBesideIt) {
+  device.exclusive = false;
+  asio::io_context hanging;
+  const auto holder = program(BoardRole::watch, hanging);
+  holder->carrier->open(holder->heard);
+  OtherThread elsewhere;
+  std::array<std::unique_ptr<Program>, 3> watchers;
+  elsewhere.run([&] {
+    for (auto& each : watchers) {
+      each = program(BoardRole::watch, elsewhere.loop);
+      each->carrier->open(each->heard);
+    }
+  });
+  const auto each_hears = [&](const std::string& text) {
+    return in_time([&] {
+      device.deliver(text);
+      run_for(io, 5ms);
+      bool all = true;
+      elsewhere.run([&] {
+        for (const auto& each : watchers) all = all && each->has(text);
+      });
+      return all;
+    });
+  };
+  // A board that says nothing is no holder that hangs.
+  run_for(hanging, 1500ms);
+  EXPECT_EQ(device.opened, 1);
+  elsewhere.run([&] {
+    for (const auto& each : watchers) EXPECT_EQ(each->heard.count(Kind::up), 1U);
+  });
+
+  const auto hangs_since = Clock::now();
+  EXPECT_TRUE(each_hears("beside it"));
+  EXPECT_LT(in_milliseconds(Clock::now() - hangs_since), 2000);
+  EXPECT_EQ(device.opened, 2) << "one for all of them";
+  // So does who comes to control.
+  const auto driver = program(BoardRole::control, io);
+  driver->carrier->open(driver->heard);
+  EXPECT_TRUE(driver->carrier->up());
+  EXPECT_TRUE(each_hears("driven"));
+  elsewhere.run([&] {
+    EXPECT_EQ(watchers[0]->heard.count(Kind::down), 0U);
+    for (auto& each : watchers) each.reset();
+  });
+}
+
+TEST_F(SharedCarrier, LooksAgainSlowlyWhereTheHolderEndsWhatItBegins) {
+  const FileDescriptor unkind = hold_wire({wire});
+  const auto watcher = program(BoardRole::watch, io);
+  watcher->carrier->open(watcher->heard);
+  int came = 0;
+  const auto until = Clock::now() + 800ms;
+  while (Clock::now() < until) {
+    while (accept_sharer(unkind.get(), {wire})) ++came;
+    run_for(io, 1ms);
+  }
+  EXPECT_GE(came, 5);
+  EXPECT_LE(came, 30);
+  ASSERT_EQ(watcher->heard.count(Kind::down), 1U);
+  EXPECT_EQ(watcher->heard.last(Kind::down)->problem.reason,
+            fmt::format("the program that holds it (pid {}) does not share it", ::getpid()));
+}
+
+TEST_F(SharedCarrier, MayBeClosedByWhoHearsAStopOfAnother) {
+  const auto driver = opened(BoardRole::control);
+  const auto watcher = opened(BoardRole::watch);
+  driver->heard.then_overheard = [&] { driver->carrier->close(); };
+  const std::string stop = datagram_of("E", "STOP");
+  for (int i = 0; i < 3; ++i) watcher->carrier->send(stop, Priority::stop);
+  ASSERT_TRUE(run_until(io, [&] { return watcher->carrier->up() && device.opened == 2; }));
+  EXPECT_EQ(device.all_sent(), std::vector<std::string>{stop});
 }
 
 TEST_F(SharedCarrier, IsNotForOtherUsers) {
@@ -501,7 +306,7 @@ TEST_F(SharedCarrier, IsForTheMembersOfTheGroupThatTheHolderNames) {
   // A user in the group nobody has (65534), and in no other.
   const auto stop_it = [&](const ShareGroup& of) {
     return run_unprivileged([&] {
-      const SharedWire shared{wire, exclusive, of};
+      const SharedWire shared{wire, device.exclusive, of};
       const FileDescriptor connection = reach_holder(shared);
       if (!connection || !is_one_of_us(connection.get(), shared)) return 1;
       return send_message(connection.get(), ShareMessage::Kind::stop, stop);

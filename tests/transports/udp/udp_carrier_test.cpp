@@ -16,6 +16,8 @@
 #include <cstring>
 #include <fstream>
 #include <future>
+#include <optional>
+#include <thread>
 #include <vector>
 
 #include "../recorder.hpp"
@@ -191,6 +193,54 @@ TEST_F(UdpCarrierTest, CountsAndDropsWhatIsTooLong) {
   EXPECT_EQ(at_board.datagrams.size(), 1U);
   EXPECT_EQ(board->counters().rx_oversize, 2U);
   EXPECT_EQ(host->counters().tx_errors, 1U);
+}
+
+TEST_F(UdpCarrierTest, WhatGathersIsHandedOverTogetherAndWithTheTimeAtWhichItCame) {
+  open_board();
+  host =
+      Registry::standard().make(io, "udp://127.0.0.1:" + port_of(*board) + "?listen=0", Role::host);
+  host->gather();
+  host->open(at_host);
+  const std::string listen = host->name().substr(host->name().find("listen=") + 7);
+  std::vector<Clock::time_point> came;
+  at_host.then = [&](const Recorder::Datagram&) { came.push_back(host->arrival().value()); };
+  Socket raw(io, "127.0.0.1");
+  std::vector<Clock::time_point> sent;
+  for (const char* const text : {"one", "two", "three"}) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));  // the loop is held up
+    sent.push_back(Clock::now());
+    raw.send(text, listen);
+  }
+  ASSERT_TRUE(wait_for(at_host, "three"));
+  EXPECT_EQ(at_host.datagrams.size(), 3U);
+  EXPECT_EQ(at_host.drained, 1);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(in_milliseconds(came[i] - sent[i]), 0, 10);
+  }
+  raw.send(std::string(1025, 'x'), listen);
+  raw.send("four", listen);
+  ASSERT_TRUE(wait_for(at_host, "four"));
+  EXPECT_EQ(at_host.oversize.size(), 1U);
+  EXPECT_EQ(host->send("to the board", Priority::normal), SendResult::sent);
+  ASSERT_TRUE(wait_for(at_board, "to the board"));
+  host->open(at_host);  // again, at another port
+  raw.send("five", host->name().substr(host->name().find("listen=") + 7));
+  ASSERT_TRUE(wait_for(at_host, "five"));
+  EXPECT_LE(came.back(), Clock::now());
+}
+
+TEST_F(UdpCarrierTest, TellsTheHostHowWhatIsTooLongBegins) {
+  open_board();
+  open_host();
+  const std::string listen = host->name().substr(host->name().find("listen=") + 7);
+  Socket(io, "127.0.0.2").send(std::string(1025, 's'), listen);
+  Socket raw(io, "127.0.0.1");
+  raw.send(std::string(1025, 'x'), listen);
+  raw.send("board", listen);
+  ASSERT_TRUE(wait_for(at_host, "board"));
+  EXPECT_EQ(at_host.datagrams.size(), 1U);
+  EXPECT_EQ(at_host.oversize, std::vector<std::string>{std::string(1024, 'x')});
+  EXPECT_EQ(host->counters().rx_oversize, 1U);
 }
 
 TEST_F(UdpCarrierTest, ForgetsThePeerThatIsSilentLongest) {

@@ -44,6 +44,8 @@ std::string meaning_of_id(std::uint32_t id) {
       return fmt::format("answers of board {}", meaning.node);
     case CanIdKind::telemetry:
       return fmt::format("states of board {}", meaning.node);
+    case CanIdKind::watch:
+      return fmt::format("who watches board {}", meaning.node);
     case CanIdKind::other:
       break;
   }

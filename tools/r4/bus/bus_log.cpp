@@ -101,6 +101,10 @@ void BusLog::on_raw_frame(const std::string& interface, const CanIdMeaning& mean
     object.update({{"from", "host"}, {"ok", true}, {"type", "emergency_stop"}});
     return print_(object);
   }
+  if (meaning.kind == CanIdKind::watch) {
+    object.update({{"node", meaning.node}, {"from", "host"}, {"ok", true}, {"type", "watch"}});
+    return print_(object);
+  }
   object.update({{"node", meaning.node}, {"from", "board"}, {"ok", frame.size != 0}});
   if (frame.size == 0) {
     ++failed_;

@@ -29,7 +29,9 @@ BusTransfers::Frame BusTransfers::on_frame(std::string_view interface, const Can
   if (meaning.kind == CanIdKind::other) return Frame::other;
   Interface* const known = interface_of(interface);
   if (known == nullptr) return Frame::too_many_interfaces;
-  if (meaning.kind == CanIdKind::emergency_stop || meaning.kind == CanIdKind::went_safe) {
+  const bool raw = meaning.kind == CanIdKind::emergency_stop ||
+                   meaning.kind == CanIdKind::went_safe || meaning.kind == CanIdKind::watch;
+  if (raw) {
     handler_.on_raw_frame(known->name, meaning, frame, place);
   } else {
     on_lane_frame(*known, meaning, frame, place);

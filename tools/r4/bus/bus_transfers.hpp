@@ -50,7 +50,7 @@ class BusTransfers {
     // The bytes that lane.receiver has are whole: plain or packed.
     virtual void on_datagram(const Lane& lane) = 0;
     virtual void on_failure(const Lane& lane, const Place& place, IsotpError error) = 0;
-    // An emergency stop, or a board that went safe.
+    // An emergency stop, a board that went safe, or somebody who watches one.
     virtual void on_raw_frame(const std::string& interface, const CanIdMeaning& meaning,
                               const CanFrame& frame, const Place& place) = 0;
 

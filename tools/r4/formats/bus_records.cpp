@@ -64,6 +64,7 @@ void BusRecords::on_raw_frame(const std::string& interface, const CanIdMeaning& 
     handler_.on_record({time_of(place), no_wire, RecordKind::event, "stop " + interface});
     return;
   }
+  if (meaning.kind == CanIdKind::watch) return;  // no news of the board
   const std::uint8_t number = frame.size == 0 ? 0 : frame.data[0];
   const SafeReason reason = number == 0 ? SafeReason::fault : to_safe_reason(number);
   const std::string words = fmt::format("link safe {}", to_text(reason));

@@ -107,7 +107,7 @@ int convert(const Options& options) {
     if (++told > most_damage) return;
     progress.clear();
     const std::string line = damage.line == 0 ? "" : fmt::format("line {}, ", damage.line);
-    fmt::print(stderr, "r4: {}: {}byte {}: {}; it is left out\n", options.input, line,
+    fmt::print(stderr, "r4: {}: {}byte {}: {}; it is left out\n", called(options.input), line,
                damage.offset, damage.reason);
   });
   read_all(options, conversion, progress);

@@ -15,6 +15,8 @@
 
 namespace r4::tool {
 
+std::string called(const std::string& path) { return path == "-" ? "standard input" : path; }
+
 std::unique_ptr<Source> make_source(const std::string& path, RecordingReader::Handler& handler,
                                     const SourceOptions& options) {
   for (const std::string_view ending : {".csv", ".jsonl"}) {
@@ -28,7 +30,7 @@ std::unique_ptr<Source> make_source(const std::string& path, RecordingReader::Ha
   if (path.ends_with(".pcapng") || path.ends_with(".pcap")) {
     return std::make_unique<PcapSource>(handler, path, options.port);
   }
-  return std::make_unique<NativeSource>(handler, path == "-" ? "standard input" : path);
+  return std::make_unique<NativeSource>(handler, called(path));
 }
 
 std::unique_ptr<Sink> make_sink(const std::string& path, Output& output) {

@@ -11,6 +11,9 @@
 
 namespace r4::tool {
 
+// What people call the file of that name: "-" is the standard input.
+std::string called(const std::string& path);
+
 struct SourceOptions {
   std::uint16_t port = board_port;  // of boards in a capture of UDP
 };

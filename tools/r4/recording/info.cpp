@@ -9,6 +9,7 @@
 #include "../shell/json.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
+#include "formats.hpp"
 #include "r4link/error.hpp"
 #include "recording_summary.hpp"
 
@@ -28,7 +29,7 @@ int info(const Options& options) {
     if (options.json) {
       print_line(summary.json(file));
     } else {
-      fmt::print("{}", summary.text(file));
+      fmt::print("{}", summary.text(called(file)));
     }
     any_damage = any_damage || summary.damaged();
   }

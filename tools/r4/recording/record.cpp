@@ -20,6 +20,7 @@
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
+#include "host/standard_registry.hpp"
 #include "limits.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/error.hpp"
@@ -137,7 +138,9 @@ class Recorders {
 
  private:
   void add(const std::string& url) {
-    boards_.push_back(std::make_unique<AsyncBoard>(io_, url, board_options_));
+    std::unique_ptr<Carrier> carrier = make_host_carrier(io_, url, BoardRole::watch);
+    carrier->gather();
+    boards_.push_back(std::make_unique<AsyncBoard>(io_, std::move(carrier), board_options_));
   }
   void open(AsyncBoard& board) {
     board.on_event([this](const CarrierEvent&) {

@@ -95,6 +95,8 @@ void RecordingSummary::on_event(const Record& record) {
     if (record.bytes == "end") ended_ = true;
   } else if (record.bytes.starts_with("down ")) {
     ++of(record.wire).downs;
+  } else if (record.bytes.starts_with("oversize ")) {
+    ++of(record.wire).oversize;
   }
 }
 
@@ -168,10 +170,11 @@ std::string RecordingSummary::text(const std::string& name) const {
   for (const WireSummary& each : wires_) {
     line(fmt::format("wire {}", each.wire.number).c_str(),
          each.wire.url + (each.wire.name.empty() ? "" : "  " + each.wire.name));
-    line("",
-         fmt::format("{} datagrams from the board: {} states, {:.1f} a second; {} damaged, {} lost",
-                     each.received + each.damaged, each.states, rate_of(each), each.damaged,
-                     each.packets.counters().lost));
+    line("", fmt::format(
+                 "{} datagrams from the board: {} states, {:.1f} a second; {} damaged, {} lost{}",
+                 each.received + each.damaged, each.states, rate_of(each), each.damaged,
+                 each.packets.counters().lost,
+                 each.oversize == 0 ? "" : fmt::format(", {} too long", each.oversize)));
     line("",
          fmt::format("{} to it: {} heartbeats, {} stops", each.sent, each.heartbeats, each.stops));
     std::string safe;
@@ -222,6 +225,7 @@ Json RecordingSummary::json(const std::string& name) const {
                                {"states", each.states},
                                {"states_hz", rate_of(each)},
                                {"damaged", each.damaged},
+                               {"oversize", each.oversize},
                                {"lost", each.packets.counters().lost},
                                {"sent", each.sent},
                                {"heartbeats", each.heartbeats},

@@ -23,6 +23,7 @@ struct WireSummary {
   std::uint64_t received = 0;  // valid ones
   std::uint64_t states = 0;
   std::uint64_t damaged = 0;
+  std::uint64_t oversize = 0;  // too long for a datagram
   PacketTracker packets;
   Time first{0}, last{0};  // that it was heard
   // To the board.

@@ -34,7 +34,7 @@ struct Options {
   std::string url = "udp://127.0.0.1:2018";
   std::uint64_t wire = 1;
   double speed = 1;
-  std::optional<Milliseconds> from;
+  ReplayStart start;
   bool step = false;
   bool json = false;
 };
@@ -51,7 +51,7 @@ class Replay : private Carrier::Handler {
   explicit Replay(const Options& options)
       : options_(options),
         records_(options.file, options.file, static_cast<std::uint16_t>(options.wire),
-                 options.from.value_or(Milliseconds(0))),
+                 options.start),
         carrier_(standard_registry().make(io_, options.url, Role::board)),
         timer_(io_),
         signals_(io_, SIGINT, SIGTERM),
@@ -187,7 +187,8 @@ constexpr const char* footer =
     R"(What a board of a recording said is said again, at its pace, on a transport where hosts find it: they
 see the states, heartbeats and answers of then, damaged ones too. A replayed board obeys nothing and
 answers nothing: a command is never confirmed, a stop stops nothing. Over UDP it speaks to whoever has
-spoken to it within two seconds, eight at most; on a pty and a CAN bus to all.
+spoken to it within two seconds, eight at most; on a pty and a CAN bus to all. Where its transport was
+lost then it says nothing for as long; the one that it has now stays open.
 
 For a program on this machine replay:FILE is simpler: r4 monitor replay:drive.r4log
 
@@ -196,6 +197,7 @@ With --step each line on standard input is one datagram more, which is shown.
 Examples:
   r4 replay drive.r4log                         at udp://127.0.0.1:2018
   r4 replay drive.r4log.zst pty:/tmp/r4 --from 12 --speed 0.5
+  r4 replay drive.r4log --from 2026-11-23T21:20:00
   r4 replay robots.r4log 'can://vcan0?node=3' --wire 2
   r4 replay drive.r4log --step                  press Return
 
@@ -217,7 +219,10 @@ void add_replay(CLI::App& root, Action& chosen) {
       *command, "--speed",
       [options](const std::string& text) { options->speed = read_speed(text); },
       "so many times as fast as it was (default 1)", "TIMES", Need::optional);
-  add_seconds(*command, "--from", options->from, "so much of the recording is passed over");
+  add_text(
+      *command, "--from",
+      [options](const std::string& text) { options->start = ReplayStart::of("--from", text); },
+      "seconds that are passed over, or a time in UTC", "TIME", Need::optional);
   add_flag(*command, "--step", options->step, "a datagram for each line on standard input");
   add_json(*command, options->json, "print where it listens as JSON");
 }

@@ -11,12 +11,14 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "../shell/farewell.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
+#include "monitor_boards.hpp"
 #include "monitor_bus.hpp"
 #include "monitor_view.hpp"
 #include "r4link/async_board.hpp"
@@ -24,6 +26,7 @@
 #include "r4link/link.hpp"
 #include "transports/can/can_interface.hpp"
 #include "transports/url.hpp"
+#include "transports/url_pattern.hpp"
 
 namespace r4::tool {
 namespace {
@@ -42,11 +45,19 @@ struct Options {
   std::string key;
 };
 
+BoardOptions board_options(const Options& options) {
+  BoardOptions board_options = with_key(options.key);
+  board_options.role = options.control ? BoardRole::control : BoardRole::watch;
+  board_options.session.arming = Arming::off;  // it drives nothing
+  if (!options.fields.empty()) board_options.session.fields = options.fields;
+  return board_options;
+}
+
 class Monitor {
  public:
-  explicit Monitor(const Options& options)
+  Monitor(const Options& options, std::string url)
       : options_(options),
-        url_(one_url(options.urls)),
+        url_(std::move(url)),
         board_(io_, url_, board_options(options)),
         view_(options.json                   ? make_json_view(board_)
               : ::isatty(STDOUT_FILENO) != 0 ? make_live_view(board_)
@@ -77,14 +88,6 @@ class Monitor {
   }
 
  private:
-  static BoardOptions board_options(const Options& options) {
-    BoardOptions board_options = with_key(options.key);
-    board_options.role = options.control ? BoardRole::control : BoardRole::watch;
-    board_options.session.arming = Arming::off;  // it drives nothing
-    if (!options.fields.empty()) board_options.session.fields = options.fields;
-    return board_options;
-  }
-
   void connect() {
     board_.on_state([this](const ReceivedState& state, const Datagram& datagram) {
       view_->on_state(state, datagram);
@@ -144,8 +147,12 @@ bool is_whole_bus(const std::string& text) {
 }
 
 int monitor(const Options& options) {
-  if (options.urls.size() == 1 && is_whole_bus(options.urls.front())) {
-    const Url url = Url::parse(options.urls.front());
+  std::vector<std::string> urls;
+  for (const std::string& pattern : options.urls) {
+    for (PatternUrl& each : expand_urls(pattern)) urls.push_back(std::move(each.url));
+  }
+  if (urls.size() == 1 && is_whole_bus(urls.front())) {
+    const Url url = Url::parse(urls.front());
     const std::string& interface = can_interface_of(url);
     if (!options.fields.empty()) {
       throw Error(ErrorKind::usage, "--fields", "only one board can be asked for its fields",
@@ -154,7 +161,11 @@ int monitor(const Options& options) {
     monitor_bus({interface, options.json, options.count, options.duration});
     return 0;
   }
-  return Monitor(options).run();
+  if (urls.size() > 1) {
+    monitor_boards({urls, board_options(options), options.json, options.count, options.duration});
+    return 0;
+  }
+  return Monitor(options, urls.front()).run();
 }
 
 constexpr const char* footer =
@@ -164,15 +175,16 @@ numbers, several values as an array); of one board on a CAN bus, at the end, one
 
 The monitor watches: it sends no heartbeats and takes no control, and a board that no host controls
 streams to it all the same. With --control it takes part in the link, as a host that commands nothing:
-the board is ACTIVE. It goes on when the transport is lost and comes back. On a CAN bus it only
-listens: a board streams there while a host controls it; without a node it shows every board that it
-hears.
+the board is ACTIVE. It goes on when the transport is lost and comes back. On a CAN bus a board that
+no host controls streams five times a second; without a node it only listens, and shows every board that it
+hears. Of several boards, by URLs or a pattern, it is a table, or the JSON of each.
 
 Examples:
   r4 monitor udp://192.168.0.125
   r4 monitor serial:auto --fields DEFAULT,ENC1,US1
   r4 monitor 'udp:?id=left-arm'         the board of that name, wherever it is; r4 list shows them
   r4 monitor can://can0                 every board on the bus; can://can0?node=3 is one
+  r4 monitor 'udp://10.0.0.{1-30}?listen=0'   thirty boards
   r4 monitor udp://127.0.0.1 --json --count 100 | jq .fields.AIN24
 
 Exit codes: 0 ended by --count, --duration or Ctrl-C; 3 nothing was heard; 2 usage; 4 the transport

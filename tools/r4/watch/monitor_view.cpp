@@ -29,7 +29,11 @@ std::string shown(std::string_view bytes) {
 
 class JsonView final : public MonitorView {
  public:
-  explicit JsonView(const AsyncBoard& board) : board_(board) {}
+  // No `shared`: lines of its own.
+  JsonView(const AsyncBoard& board, LineWriter* shared)
+      : board_(board),
+        own_(shared == nullptr ? std::make_unique<LineWriter>(unread) : nullptr),
+        lines_(shared == nullptr ? *own_ : *shared) {}
 
   void on_state(const ReceivedState& state, const Datagram& datagram) override {
     Json json = object_of("state", datagram);
@@ -93,7 +97,8 @@ class JsonView final : public MonitorView {
   }
 
   const AsyncBoard& board_;
-  LineWriter lines_{unread};
+  const std::unique_ptr<LineWriter> own_;
+  LineWriter& lines_;
   bool up_ = true;
 };
 
@@ -135,7 +140,10 @@ class PlainView final : public MonitorView {
 }  // namespace
 
 std::unique_ptr<MonitorView> make_json_view(const AsyncBoard& board) {
-  return std::make_unique<JsonView>(board);
+  return std::make_unique<JsonView>(board, nullptr);
+}
+std::unique_ptr<MonitorView> make_json_view(const AsyncBoard& board, LineWriter& lines) {
+  return std::make_unique<JsonView>(board, &lines);
 }
 
 std::unique_ptr<MonitorView> make_plain_view() { return std::make_unique<PlainView>(); }

@@ -10,6 +10,8 @@
 
 namespace r4::tool {
 
+class LineWriter;
+
 class MonitorView {
  public:
   virtual ~MonitorView() = default;
@@ -32,6 +34,8 @@ class MonitorView {
 
 // One object a line: type, transport, pnum, t, fields.
 std::unique_ptr<MonitorView> make_json_view(const AsyncBoard& board);
+// The same among those of other boards.
+std::unique_ptr<MonitorView> make_json_view(const AsyncBoard& board, LineWriter& lines);
 // One line a state, for people who pipe it.
 std::unique_ptr<MonitorView> make_plain_view();
 // A status of a few lines, redrawn in place.

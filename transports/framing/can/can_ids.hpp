@@ -7,6 +7,7 @@
 //     0x180+n  host to board n              ISO-TP; the board's flow control on 0x200+n
 //     0x200+n  board n's replies            ISO-TP; the host's flow control on 0x180+n
 //     0x400+n  board n's telemetry          ISO-TP without flow control: any number may listen
+//     0x600+n  somebody watches board n     one raw frame, any content; all who watch send the same
 //
 // n, the node, is 0–31. Whatever else is on the bus is `other` and none of ours.
 #pragma once
@@ -31,8 +32,18 @@ constexpr std::uint32_t went_safe_id(std::uint32_t node) { return 0x020 | (node 
 constexpr std::uint32_t command_id(std::uint32_t node) { return 0x180 | (node % can_nodes); }
 constexpr std::uint32_t reply_id(std::uint32_t node) { return 0x200 | (node % can_nodes); }
 constexpr std::uint32_t telemetry_id(std::uint32_t node) { return 0x400 | (node % can_nodes); }
+// Of its own, for a host sends on command_id(): two that begin at once would destroy each other's frames there.
+constexpr std::uint32_t watch_id(std::uint32_t node) { return 0x600 | (node % can_nodes); }
 
-enum class CanIdKind : std::uint8_t { other, emergency_stop, went_safe, command, reply, telemetry };
+enum class CanIdKind : std::uint8_t {
+  other,
+  emergency_stop,
+  went_safe,
+  command,
+  reply,
+  telemetry,
+  watch,
+};
 
 struct CanIdMeaning {
   CanIdKind kind = CanIdKind::other;
@@ -53,6 +64,8 @@ constexpr CanIdMeaning classify(std::uint32_t id) {
     meaning.kind = CanIdKind::reply;
   } else if (id == telemetry_id(node)) {
     meaning.kind = CanIdKind::telemetry;
+  } else if (id == watch_id(node)) {
+    meaning.kind = CanIdKind::watch;
   }
   if (meaning.kind != CanIdKind::other && meaning.kind != CanIdKind::emergency_stop) {
     meaning.node = static_cast<std::uint8_t>(node);

@@ -14,6 +14,8 @@ namespace {
 
 // What an emergency frame without a number says to a board, whoever sent it.
 constexpr Text stop_datagram("E:STOP;^0x506f0fbe^");
+// And one that asks for states: at a rate that also a slow bus carries as text, 24 frames each.
+constexpr Text watch_datagram("W:5;^0x414648b3^");
 
 IsotpSenderOptions sender_options(std::uint32_t id, std::uint32_t flow_control_id, bool fd) {
   IsotpSenderOptions options;
@@ -117,6 +119,10 @@ bool CanNode::offer(std::uint32_t now_us, CanFrame& frame) {
     offered_ = Offered::dialogue;
   } else if (telemetry_out_.offer(now_us, frame)) {
     offered_ = Offered::telemetry;
+  } else if (request_due_) {
+    frame = CanFrame{};
+    frame.id = watch_id(node_);
+    offered_ = Offered::request;
   }
   return offered_ != Offered::nothing;
 }
@@ -151,6 +157,9 @@ void CanNode::frame_sent(std::uint32_t now_us) {
     case Offered::telemetry:
       telemetry_out_.frame_sent(now_us);
       break;
+    case Offered::request:
+      request_due_ = false;
+      break;
   }
   offered_ = Offered::nothing;
 }
@@ -165,6 +174,9 @@ Text CanNode::on_frame(const CanFrame& frame, std::uint32_t now_us) {
     writer.field("E").value(Text("STOP"));
     writer.field(stop_number_name).value(short_stop_number(frame.id));
     return writer.finish();
+  }
+  if (meaning.kind == CanIdKind::watch) {
+    return end_ == CanEnd::board && meaning.node == node_ ? watch_datagram : Text();
   }
   if (end_ == CanEnd::host && meaning.kind == CanIdKind::telemetry) {
     return telemetry_in_.on_frame(frame, now_us).datagram ? plain(telemetry_in_) : Text();
@@ -213,6 +225,7 @@ void CanNode::cancel() {
   telemetry_in_.cancel();
   dialogue_out_.cancel();
   telemetry_out_.cancel();
+  request_due_ = false;
   offered_ = Offered::nothing;
 }
 

@@ -5,10 +5,10 @@
 //     dialogue    host to board, and the board's answers (N, I) back: ISO-TP with flow control
 //     telemetry   the board's states and heartbeats: ISO-TP without, for any number of listeners
 //
-// Two raw frames stand beside them: the emergency stop, which a board's end takes for E:STOP, and
-// the reason, which it sends when a heartbeat first tells that the board went safe. Datagrams are
-// taken plain and packed, and sent packed where that is wanted; a board answers a host that writes
-// plain text in plain text.
+// Three raw frames stand beside them: the emergency stop, which a board's end takes for E:STOP; the
+// reason, which it sends when a heartbeat first tells that the board went safe; and the request for
+// states of who watches. Datagrams are taken plain and packed, and sent packed where that is wanted; a
+// board answers a host that writes plain text in plain text.
 //
 // Driven like the ISO-TP ends that it is made of (isotp.hpp). Sans-I/O, no heap, about 4.5 KB. Which
 // datagram goes next is up to a queue before it. Not for several threads.
@@ -41,6 +41,9 @@ class CanNode {
  public:
   // `node` is 0-31. With `fd`, frames of up to 64 bytes are sent; received are both.
   CanNode(CanEnd end, std::uint8_t node, bool fd);
+
+  // At a host: sends the frame that asks for the board's states (docs/can.md, "Who watches").
+  void ask_for_states() { request_due_ = true; }
 
   // Sends packed from the next datagram on; a board, unless the newest one of its host was plain.
   void use_packed_form(bool wanted) { packed_ = wanted; }
@@ -94,7 +97,14 @@ class CanNode {
   }
 
  private:
-  enum class Offered : std::uint8_t { nothing, flow_control, reason, dialogue, telemetry };
+  enum class Offered : std::uint8_t {
+    nothing,
+    flow_control,
+    reason,
+    dialogue,
+    telemetry,
+    request,
+  };
 
   const IsotpSender& sender(CanLane lane) const {
     return lane == CanLane::dialogue ? dialogue_out_ : telemetry_out_;
@@ -122,6 +132,7 @@ class CanNode {
   Offered offered_ = Offered::nothing;
   SafeReason reason_ = SafeReason::none;  // of the newest heartbeat
   bool reason_due_ = false;
+  bool request_due_ = false;
   CanNodeCounters counters_;
 };
 

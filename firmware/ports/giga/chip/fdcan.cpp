@@ -39,8 +39,8 @@ constexpr std::uint32_t end_word = urgent_word + (1 + transmit_size) * element_w
 static_assert(end_word == Fdcan::words_used, "the layout of the message RAM");
 
 // A standard message ID filter element: two ids; to FIFO 0 or 1.
-constexpr std::uint32_t filter_element(std::uint32_t id, std::uint32_t fifo) {
-  return 1U << 30 | (fifo + 1) << 27 | id << 16 | id;
+constexpr std::uint32_t filter_element(std::uint32_t id, std::uint32_t other, std::uint32_t fifo) {
+  return 1U << 30 | (fifo + 1) << 27 | id << 16 | other;
 }
 
 // The two words of an extended message ID filter element: an id and which of its bits count; to FIFO 0
@@ -105,7 +105,8 @@ bool Fdcan::set_init(bool wanted) {
   return false;
 }
 
-bool Fdcan::start(const CanBitTiming& timing, std::uint32_t stop_id, std::uint32_t command_id) {
+bool Fdcan::start(const CanBitTiming& timing, std::uint32_t stop_id, std::uint32_t command_id,
+                  std::uint32_t watch_id) {
   started_ = false;
   if (!timing.valid || !set_init(true)) return false;
   registers_.CCCR =
@@ -114,8 +115,8 @@ bool Fdcan::start(const CanBitTiming& timing, std::uint32_t stop_id, std::uint32
                     (timing.before_sample - 1) << 8 | (timing.after_sample - 1);
 
   for (std::uint32_t i = 0; i < words_used; ++i) ram_[i] = 0;
-  ram_[filter_word] = filter_element(stop_id, 1);
-  ram_[filter_word + 1] = filter_element(command_id, 0);
+  ram_[filter_word] = filter_element(stop_id, stop_id, 1);
+  ram_[filter_word + 1] = filter_element(command_id, watch_id, 0);
   ram_[extended_word] = extended_element(stop_id << element_id_shift, 1);  // with a number
   ram_[extended_word + 1] = extended_mask(max_can_id << element_id_shift);
   registers_.GFC = gfc_reject_everything_else;

@@ -4,7 +4,8 @@
 // bus-off, and loses frames between polls.
 //
 //     received    the emergency stop   -> FIFO 1,  8 frames, the newest stay
-//                 commands to us       -> FIFO 0, 64 frames: 7 ms of a full bus
+//                 commands to us, and
+//                 who watches us       -> FIFO 0, 64 frames: 7 ms of a full bus
 //                 all else             -> nowhere
 //     to send     what is urgent       -> a buffer of its own, which overtakes the queue by its id
 //                 the rest, in order   -> FIFO of 8 frames
@@ -56,7 +57,8 @@ class Fdcan {
       : registers_(registers), ram_(message_ram) {}
 
   // False: the clock does not fit, or the controller does not follow. Its clock must be on.
-  bool start(const CanBitTiming& timing, std::uint32_t stop_id, std::uint32_t command_id);
+  bool start(const CanBitTiming& timing, std::uint32_t stop_id, std::uint32_t command_id,
+             std::uint32_t watch_id);
 
   // The oldest frame that was received, stops first. False: none.
   bool receive(CanFrame& frame);

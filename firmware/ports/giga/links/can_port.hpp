@@ -44,6 +44,7 @@ class CanPort final : public firmware::Port {
   void send(Text datagram, Priority priority, std::uint32_t peer) override;
   std::size_t max_size() const override { return max_datagram; }
   void use_packed_form(bool wanted) override { node_.use_packed_form(wanted); }
+  bool is_bus() const override { return true; }
 
   std::uint32_t dropped() const { return dropped_; }  // datagrams
   const CanNode& node() const { return node_; }

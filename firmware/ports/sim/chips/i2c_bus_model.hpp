@@ -35,7 +35,7 @@ struct I2cTransfer {
 
 class I2cObserver {
  public:
-  // After its STOP. One that was cut short comes after those that cut it.
+  // A transfer has ended. One that an interrupt's transfers cut short is told after those.
   virtual void on_transfer(const I2cTransfer& transfer) = 0;
 
  protected:
@@ -79,6 +79,8 @@ class I2cBusModel final : public firmware::I2cBus {
   std::uint64_t now_ns() const;
   std::uint64_t now_us() const { return now_ns() / 1000; }
   void advance(std::uint64_t us);
+  // Begun so far; wraps.
+  std::uint32_t transfers() const { return transfers_; }
 
   // Errors; false if there are max_errors of that kind already. Transfers to `address` are not
   // acknowledged after `after_bytes` bytes of data (0: the address itself), `times` times.

@@ -222,6 +222,20 @@ std::uint16_t BoardModel::Converter::read() {
   return counts;
 }
 
+bool BoardModel::pins_may_differ() {
+  const std::uint32_t transfers = chips_.bus.transfers();
+  if (transfers != bus_transfers_) {
+    bus_transfers_ = transfers;
+    disturb_pins();
+  }
+  for (const Stepper& stepper : steppers_) {
+    if (stepper.pause_ms < stepper_pause_ms || stepper.pulses != stepper.driver.pulses()) {
+      disturb_pins();
+    }
+  }
+  return static_cast<std::int32_t>(time_ms_ - settled_ms_) <= 0;
+}
+
 Pins BoardModel::pins() const {
   Pins pins;
   static_cast<ChipPins&>(pins) = chips_.pins();

@@ -58,6 +58,11 @@ class BoardModel {
   BoardChips& chips() { return chips_; }
   firmware::BoardPins microcontroller_pins();
   Pins pins() const;
+  // Could pins() tell something else than when this was asked last? No, while there was nothing on the bus for a while
+  // and all steppers stand: then it is not worth its time, in a process of many boards.
+  bool pins_may_differ();
+  // Something else has happened to the chips.
+  void disturb_pins() { settled_ms_ = time_ms_ + settling_ms; }
   bool motors_have_supply() const { return handle_held_ && chips_.relay_closed(supply_relay); }
   // How far the shaft of an encoder has turned since power came, in the encoder's counts.
   std::int32_t shaft_count(int channel) const { return shafts_[channel - 1].count; }
@@ -82,6 +87,7 @@ class BoardModel {
   const UltrasonicModel& ultrasonic(int channel) const { return sensors_[channel - 1]; }
 
  private:
+  static constexpr std::uint32_t settling_ms = 5;  // of a chip's outputs, behind a transfer
   static constexpr std::int32_t steering_range = 3 * 1000 * 2048;  // 1.5 s of 4096 a millisecond
 
   struct Shaft {
@@ -122,7 +128,9 @@ class BoardModel {
   InputPinModel handle_;
   Converter converters_[analog_channels];
   std::int32_t pinned_cv_[analog_channels] = {};
-  std::uint8_t pinned_ = 0;  // bit n: analog input n stays at pinned_cv_[n]
+  std::uint32_t bus_transfers_ = 0;  // when pins_may_differ() was asked
+  std::uint32_t settled_ms_ = 0;     // since there was one
+  std::uint8_t pinned_ = 0;          // bit n: analog input n stays at pinned_cv_[n]
 };
 
 }  // namespace sim

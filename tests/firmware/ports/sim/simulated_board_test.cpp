@@ -172,11 +172,11 @@ std::string unsafe_register(BoardChips& chips) {
       if (!off(*chip, i)) return "LED" + std::to_string(i);
     }
   }
-  using Register = Mcp23017Model::Register;
-  if (chips.expander.reg(0, Register::olat) != firmware::brakes_on) return "OLATA";
-  if (chips.expander.reg(1, Register::olat) != 0) return "OLATB";
+  using Expander = Mcp23017Model::Register;
+  if (chips.expander.reg(0, Expander::olat) != firmware::brakes_on) return "OLATA";
+  if (chips.expander.reg(1, Expander::olat) != 0) return "OLATB";
   for (int port = 0; port < Mcp23017Model::ports; ++port) {
-    if (chips.expander.reg(port, Register::iodir) != 0) return "IODIR";
+    if (chips.expander.reg(port, Expander::iodir) != 0) return "IODIR";
   }
   for (int i = 0; i < Mcp4728Model::channels; ++i) {
     if (chips.dac.input(i).code != 0 || chips.dac.output(i).code != 0) return "DAC";
@@ -191,9 +191,9 @@ void expect_all_driven(BoardChips& chips) {
     EXPECT_TRUE(driven(chips.dhb12, i)) << i;
   }
   for (int i = 0; i < Pca9685Model::channels; ++i) EXPECT_TRUE(driven(chips.servo, i)) << i;
-  using Register = Mcp23017Model::Register;
-  EXPECT_EQ(chips.expander.reg(0, Register::olat), 0b01010101) << "forward, no brake";
-  EXPECT_EQ(chips.expander.reg(1, Register::olat), 0xFF);
+  using Expander = Mcp23017Model::Register;
+  EXPECT_EQ(chips.expander.reg(0, Expander::olat), 0b01010101) << "forward, no brake";
+  EXPECT_EQ(chips.expander.reg(1, Expander::olat), 0xFF);
   for (int i = 0; i < Mcp4728Model::channels; ++i) EXPECT_NE(chips.dac.output(i).code, 0) << i;
 }
 

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A board on a CAN bus with its host, channel by channel.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+
+#include <chrono>
 
 #include "r4link/board.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/every_channel.hpp"
+#include "tests/support/sampled_truth.hpp"
 
 namespace r4::test {
 namespace {
@@ -29,6 +33,20 @@ TEST_P(CanBoard, EveryChannelReachesItsPinAndComesBack) {
   board.wait_active();
   expect_every_channel(controlled(simulated, board));
   EXPECT_EQ(board.carrier_counters().transfers->packed != 0, GetParam().packed);
+}
+
+// An emulated machine takes longer for a datagram than a real one, and tells so.
+TEST(CanSampledTime, IsWithinItsErrorAlways) {
+  using namespace std::chrono_literals;
+  BoardInAThread simulated("can://vcan0?node=9");
+  const SampledTruth found = look_at_sampled(simulated, simulated.url(), 1500us);
+  fmt::print(
+      "{} states, {} farther from the truth than told; told {} us, were {} us (median), {} us "
+      "(worst)\n",
+      found.states, found.dishonest, found.bound / 1us, found.median_error / 1us,
+      found.worst_error / 1us);
+  EXPECT_EQ(found.dishonest, 0U);
+  EXPECT_LE(found.median_error, 1ms);
 }
 
 }  // namespace

@@ -21,6 +21,8 @@ TEST(CanIds, AreThoseOfThePlan) {
   EXPECT_EQ(reply_id(31), 0x21FU);
   EXPECT_EQ(telemetry_id(0), 0x400U);
   EXPECT_EQ(telemetry_id(31), 0x41FU);
+  EXPECT_EQ(watch_id(0), 0x600U);
+  EXPECT_EQ(watch_id(31), 0x61FU);
 }
 
 TEST(CanIds, WhatIsUrgentWinsTheBus) {
@@ -28,6 +30,7 @@ TEST(CanIds, WhatIsUrgentWinsTheBus) {
   EXPECT_LT(went_safe_id(31), command_id(0));
   EXPECT_LT(command_id(31), reply_id(0));
   EXPECT_LT(reply_id(31), telemetry_id(0));
+  EXPECT_LT(telemetry_id(31), watch_id(0));
 }
 
 TEST(CanIds, EveryIdMeansWhatWasMadeForItAndNothingElse) {
@@ -39,8 +42,9 @@ TEST(CanIds, EveryIdMeansWhatWasMadeForItAndNothingElse) {
     plan[command_id(node)] = {CanIdKind::command, n};
     plan[reply_id(node)] = {CanIdKind::reply, n};
     plan[telemetry_id(node)] = {CanIdKind::telemetry, n};
+    plan[watch_id(node)] = {CanIdKind::watch, n};
   }
-  EXPECT_EQ(plan.size(), 1 + 4 * can_nodes) << "no id has two meanings";
+  EXPECT_EQ(plan.size(), 1 + 5 * can_nodes) << "no id has two meanings";
   for (std::uint32_t id = 0; id <= max_can_id; ++id) {
     const auto found = plan.find(id);
     const auto expected =

@@ -76,6 +76,18 @@ TEST(CanNodeStop, IsTheEmergencyFrameBareOrWithANumberBehindItsId) {
   EXPECT_TRUE(board.on_frame(frame, 0).empty()) << "a remote request is none";
 }
 
+TEST(CanNodeWatch, AsksForStatesByOneFrameOfItsOwnId) {
+  NodeBus bus;
+  bus.host.ask_for_states();
+  bus.settle();
+  EXPECT_EQ(bus.ids, std::vector<std::uint32_t>{watch_id(3)});
+  EXPECT_EQ(bus.at_board, std::vector<std::string>{with_crc("W:5;")});
+  NodeBus other(false, 4);
+  other.host.ask_for_states();
+  other.settle();
+  EXPECT_TRUE(other.at_board.empty()) << "another board is watched";
+}
+
 class CanNodeForms : public testing::TestWithParam<std::pair<bool, bool>> {};
 
 TEST_P(CanNodeForms, CarryEveryDatagramUnchanged) {

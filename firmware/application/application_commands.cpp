@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a command datagram comes to: whether it is executed, and what that changes.
+#include "../../protocol/messages/command_field.hpp"
+#include "../../protocol/messages/command_group.hpp"
+#include "application.hpp"
+
+namespace r4 {
+namespace firmware {
+
+// May what a command datagram says be executed, as far as it depends on who sent it, and when? If not, it
+// is answered or dropped. `refusal`: what its content has come to, and `at` for which command of a group.
+bool Application::admit(Source from, const Datagram& datagram, Verdict verdict, Refusal refusal,
+                        std::uint8_t at, std::uint32_t now_ms) {
+  if (verdict != Verdict::authentic) {
+    if (rejected(verdict, MessageKind::command, now_ms)) {
+      refuse(from, datagram, Refusal::auth, now_ms);
+    } else {
+      ++rx_refused_;
+    }
+    return false;
+  }
+  if (!datagram.has_pnum()) {  // nothing to execute it once by, and nothing to answer to
+    ++rx_refused_;
+    return false;
+  }
+  if (refusal != Refusal::none) {
+    refuse(from, datagram, refusal, now_ms, at);
+    return false;
+  }
+  Refusal code = Refusal::none;
+  switch (link_.admit(from, datagram.pnum(), now_ms, code)) {
+    case Admission::refuse:
+      if (code == Refusal::safe) link_.refused(from, datagram.pnum());
+      refuse(from, datagram, code, now_ms);
+      return false;
+    case Admission::drop:
+      ++rx_refused_;
+      return false;
+    case Admission::execute:
+      break;
+  }
+  return true;
+}
+
+void Application::on_command(Source from, const Datagram& datagram, Verdict verdict,
+                             std::uint32_t now_ms) {
+  const int count = datagram.command_count();
+  const Field& field = datagram.command();
+  // A stop is obeyed beside other commands, too. A single one of another letter is none.
+  if ((count != 1 || field.name() == "E") && asks_to_stop(datagram)) {
+    emergency_stop(from, datagram, verdict, now_ms);
+    return;
+  }
+  if (count != 1) {
+    on_group(from, datagram, verdict, now_ms);
+    return;
+  }
+  Command command;
+  const Refusal refusal = parse_command(field, command);
+  if (refusal == Refusal::none && command.kind == CommandKind::identify) {
+    identify(from, datagram, now_ms);
+    return;
+  }
+  if (refusal == Refusal::none && command.kind == CommandKind::watch) {
+    on_watch(from, datagram, command, now_ms);
+    return;
+  }
+  if (!admit(from, datagram, verdict, refusal, 0, now_ms)) return;
+  const bool held = drives_output(command.kind) && safety_.is_safe();
+  if (!held && link_.begins_anew(datagram.pnum())) setpoints_.outputs = Outputs();
+  Refusal outcome = Refusal::none;
+  if (held) {
+    outcome = Refusal::safe;
+  } else if (command.kind == CommandKind::clear) {
+    outcome = judge_clear(command, waited_ms(from.port, now_ms), now_ms);
+  } else if (command.kind == CommandKind::leave) {
+    if (!link_.may_leave(heartbeat_of(from, datagram, now_ms), now_ms)) outcome = Refusal::stale;
+  } else if (!may_set(from.port, command)) {
+    outcome = Refusal::auth;
+  } else {
+    outcome = carry_out(command, setpoints_);
+  }
+  if (outcome != Refusal::none) {
+    link_.refused(from, datagram.pnum());
+    refuse(from, datagram, outcome, now_ms);
+    return;
+  }
+  execute(datagram.pnum(), command, now_ms);
+}
+
+// Several commands in one datagram. The hardware hears of them when all have changed the setpoints, in one
+// go.
+void Application::on_group(Source from, const Datagram& datagram, Verdict verdict,
+                           std::uint32_t now_ms) {
+  CommandGroup group;
+  std::uint8_t at = 0;
+  const Refusal refusal = read_group(datagram, group, at);
+  if (!admit(from, datagram, verdict, refusal, at, now_ms)) return;
+  if (safety_.is_safe()) {
+    link_.refused(from, datagram.pnum());
+    refuse(from, datagram, Refusal::safe, now_ms);
+    return;
+  }
+  if (link_.begins_anew(datagram.pnum())) setpoints_.outputs = Outputs();
+  link_.executed(datagram.pnum());
+  for (const Command& command : group) {
+    carry_out(command, setpoints_);  // it was checked: none of them can fail
+    take_effect(datagram.pnum(), command, now_ms);
+  }
+  bring_about(now_ms);
+}
+
+// Of anyone, also of a board with a key: what is streamed is no secret, and nothing is commanded by it.
+void Application::on_watch(Source from, const Datagram& datagram, const Command& command,
+                           std::uint32_t now_ms) {
+  const bool proven = ports_[from.port].port->is_bus();
+  if (!proven && !authentication_.has_chance()) {
+    return refuse(from, datagram, Refusal::unknown, now_ms);
+  }
+  FieldSet fields;
+  if (!command.text.empty()) {
+    const Refusal refusal = parse_fields(command.text, fields);
+    if (refusal != Refusal::none) return refuse(from, datagram, refusal, now_ms);
+  }
+  if (link_.has_owner() && from == link_.owner()) return;  // all goes there
+  const std::uint32_t rate_hz = static_cast<std::uint32_t>(command.value);
+  switch (watchers_.on_lease(from, rate_hz, datagram.time_ms(), proven, now_ms)) {
+    case Watchers::Effect::watching: {
+      Watcher& watcher = *watchers_.find(from);
+      watcher.chooses = !command.text.empty();
+      watcher.fields = fields;
+      if (!schedule_.running()) schedule_.start(now_ms, setpoints_.settings.state_period_ms());
+      break;
+    }
+    case Watchers::Effect::unproven: {
+      const std::uint32_t token = authentication_.random();
+      watchers_.tell(from, token, now_ms);
+      refuse(from, datagram, Refusal::stale, now_ms, 0, token);
+      break;
+    }
+    case Watchers::Effect::full:
+      refuse(from, datagram, Refusal::busy, now_ms);
+      break;
+    case Watchers::Effect::ended:
+    case Watchers::Effect::ignored:
+      break;
+  }
+}
+
+// May a command be given by this port?
+bool Application::may_set(std::uint8_t port, const Command& command) const {
+  return command.kind != CommandKind::setting || !is_site_setting(command.text) ||
+         ports_[port].port->may_configure();
+}
+
+// The command has changed the setpoints; the rest of its effect.
+void Application::execute(std::uint32_t pnum, const Command& command, std::uint32_t now_ms) {
+  link_.executed(pnum);
+  take_effect(pnum, command, now_ms);
+  bring_about(now_ms);
+}
+
+// What is no setpoint, and who is told.
+void Application::take_effect(std::uint32_t pnum, const Command& command, std::uint32_t now_ms) {
+  switch (command.kind) {
+    case CommandKind::zero:
+      hal_.zero(command.channel);
+      break;
+    case CommandKind::clear:
+      clear();
+      break;
+    case CommandKind::leave:
+      link_.leave(now_ms);
+      setpoints_.outputs = Outputs();
+      enter(SafeReason::link, now_ms);
+      break;
+    case CommandKind::setting:
+      if (command.text == key_setting) authentication_.use(setpoints_.settings.site.keys);
+      link_.set_timing(timing_of(setpoints_.settings));
+      expect_host();
+      schedule_.set_period(setpoints_.settings.state_period_ms());
+      tell_ports();
+      break;
+    default:
+      break;
+  }
+  if (observer_ != nullptr) observer_->on_executed(now_ms, pnum, command);
+}
+
+// The setpoints have changed.
+void Application::bring_about(std::uint32_t now_ms) {
+  look_at_time(now_ms);  // the silence may be longer already than a new timeout
+  check_interlocks(now_ms);
+  update_outputs(now_ms);
+  report_state(now_ms);
+}
+
+// One that is not authentic spends no number: CMD would prove to its host what was not executed. Nor
+// does one whose number is not the next: another program at the owner's place (a bus, a port that is
+// shared) takes its own at random, and the board must not forget the owner's for it.
+void Application::emergency_stop(Source from, const Datagram& datagram, Verdict verdict,
+                                 std::uint32_t now_ms) {
+  const bool repeated = safety_.has(SafeReason::stop);
+  std::uint32_t number = 0;
+  const bool has_number = stop_number(datagram, number);
+  // The owner's is no repetition of one that somebody without a key sent under its number before.
+  const bool of_a_key =
+      verdict == Verdict::authentic || verdict == Verdict::replayed || verdict == Verdict::old;
+  const bool same = has_number && has_stop_number_ && number == stop_number_ &&
+                    from == stop_from_ && (stop_of_a_key_ || !of_a_key);
+  // An E:CLEAR under way knows nothing of this one.
+  if (repeated && !same && !stop_unread_) safety_.again();
+  stop_unread_ = false;
+  if (!repeated || !same) stop_of_a_key_ = of_a_key;
+  stop_from_ = from;
+  has_stop_number_ = has_number;
+  stop_number_ = number;
+  enter(SafeReason::stop, now_ms);
+  caused_ms_ = now_ms;
+  const bool owner = link_.has_owner() && from == link_.owner();
+  if (owner && verdict == Verdict::authentic && datagram.has_pnum() &&
+      link_.is_next(datagram.pnum())) {
+    Refusal code = Refusal::none;
+    if (link_.admit(from, datagram.pnum(), now_ms, code) == Admission::execute) {
+      link_.executed(datagram.pnum());
+    }
+  }
+  if (observer_ != nullptr) observer_->on_executed(now_ms, datagram.pnum(), Command::stop());
+  // Everyone hears of it once; who asks hears it each time, as often as it takes.
+  if (!repeated) send_heartbeats(now_ms);
+  if (!owner || repeated) answer_heartbeat(from, now_ms);
+}
+
+}  // namespace firmware
+}  // namespace r4

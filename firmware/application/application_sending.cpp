@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the application sends: heartbeats, states, answers.
+#include <cstring>
+
+#include "../../protocol/messages/command_group.hpp"
+#include "../../protocol/messages/state_fields.hpp"
+#include "application.hpp"
+
+namespace r4 {
+namespace firmware {
+
+namespace {
+
+// Room for a heartbeat or a refusal.
+constexpr std::size_t short_datagram = 160;
+
+// ";SAFE:6;FAULT:127,255" behind the last field of a state.
+constexpr std::size_t safe_fields_size = 22;
+
+}  // namespace
+
+// The controlling host where it is, else whoever the port streams to.
+std::uint32_t Application::audience(std::uint8_t port) const {
+  const bool owned = link_.has_owner() && link_.owner().port == port;
+  return owned ? link_.owner().peer : everyone;
+}
+
+// A watcher has numbers of its own, but where it hears those of everyone at its port; the answers to other
+// hosts that do not control the board count apart.
+std::uint32_t& Application::number_for(Source to) {
+  Watcher* const watcher = watchers_.find(to);
+  if (watcher != nullptr && !hears_all(to)) return watcher->pnum;
+  const bool aside = link_.has_owner() && to != link_.owner();
+  return aside ? ports_[to.port].aside_pnum : ports_[to.port].next_pnum;
+}
+
+// Does what is for everyone at its port come to it, too?
+bool Application::reaches(Source watcher) const {
+  return audience(watcher.port) == everyone && ports_[watcher.port].port->reaches(watcher.peer);
+}
+
+// And does that count? In CONNECTING it does not.
+bool Application::hears_all(Source watcher) const {
+  return link_.state() != BoardLinkState::connecting && reaches(watcher);
+}
+
+void Application::answer(Source to, DatagramWriter& writer, std::uint32_t now_ms) {
+  const Text datagram = writer.finish(number_for(to)++, now_ms);
+  if (!datagram.empty()) ports_[to.port].port->send(datagram, Priority::normal, to.peer);
+}
+
+void Application::identify(Source to, const Datagram& question, std::uint32_t now_ms) {
+  char buffer[max_datagram];
+  DatagramWriter writer(buffer, sizeof buffer);
+  Identity identity = identity_;
+  const char* const name = settings().site.name;
+  identity.name = Text(name, std::strlen(name));
+  identity.has_busy = true;
+  identity.busy = link_.has_owner() && link_.owner() != to;
+  identity.has_asked = question.has_pnum();
+  identity.asked = question.pnum();
+  write_identity(writer, identity);
+  writer.more("+").more(leave_capability).more("+").more(group_capability);
+  if (authentication_.has_chance()) writer.more("+").more(watch_capability);
+  write_identity_fields(writer, identity);
+  answer(to, writer, now_ms);
+}
+
+// `at`: which command of a group it is, from 1; 0: none in particular. `lease`: what a W has to echo; 0: none.
+void Application::refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms,
+                         std::uint8_t at, std::uint32_t lease) {
+  ++rx_refused_;
+  if (!datagram.has_pnum()) return;
+  if (observer_ != nullptr) observer_->on_refused(now_ms, datagram.pnum(), code);
+  Nack nack;
+  nack.pnum = datagram.pnum();
+  nack.code = code;
+  nack.at = at;
+  // A W needs no key: what answers it must prove nothing of the command whose number it has.
+  nack.has_session = !asks_to_watch(datagram) && link_.session_of(to, nack.session);
+  nack.lease = lease;
+  char buffer[short_datagram];
+  DatagramWriter writer(buffer, sizeof buffer);
+  write_nack(writer, nack);
+  answer(to, writer, now_ms);
+}
+
+// What a heartbeat says the time is. An echo of 0 would say that its host has heard nothing: when
+// the clock wraps, that millisecond is left out.
+std::uint32_t Application::heartbeat_time(std::uint32_t now_ms) {
+  return now_ms != 0 ? now_ms : 0xFFFFFFFFU;
+}
+
+SafeReport Application::safe_report() const {
+  SafeReport report(safety_.reason());
+  if (safety_.latched()) report.cause = safety_.newest();
+  report.has_stop = has_stop_number_ && safety_.has(SafeReason::stop);
+  report.stop = stop_number_;
+  return report;
+}
+
+void Application::send_heartbeats(std::uint32_t now_ms) {
+  for (std::uint8_t i = 0; i < port_count_; ++i) {
+    Source to;
+    to.port = i;
+    to.peer = audience(i);
+    send_heartbeat(to, ports_[i].next_pnum, now_ms);
+  }
+  for (Watcher& watcher : watchers_) {
+    if (watcher.period_ms != 0 && !reaches(watcher.at)) {
+      write_heartbeat(watcher.at, watcher.pnum, shown_to_watchers(), now_ms);
+    }
+  }
+  link_.heartbeat_sent(heartbeat_time(now_ms));
+}
+
+void Application::answer_heartbeat(Source to, std::uint32_t now_ms) {
+  send_heartbeat(to, number_for(to), now_ms);
+  link_.heartbeat_answered(heartbeat_time(now_ms));
+}
+
+// In CONNECTING it says so, and packet numbers begin anew behind it.
+void Application::send_heartbeat(Source to, std::uint32_t& pnum, std::uint32_t now_ms) {
+  if (link_.state() != BoardLinkState::connecting) {
+    return write_heartbeat(to, pnum, safe_report(), now_ms);
+  }
+  char buffer[short_datagram];
+  const Text nonce = authentication_.nonce();
+  const std::uint32_t t_ms = nonce.empty() ? 0 : heartbeat_time(now_ms);
+  ports_[to.port].port->send(
+      write_board_heartbeat(buffer, sizeof buffer, 0, t_ms, safe_report(), nonce), Priority::normal,
+      to.peer);
+  ports_[to.port].next_pnum = 1;
+}
+
+void Application::write_heartbeat(Source to, std::uint32_t& pnum, const SafeReport& safe,
+                                  std::uint32_t now_ms) {
+  char buffer[short_datagram];
+  const Text nonce = authentication_.nonce();
+  if (pnum == 0 && !nonce.empty()) ++pnum;  // that would say CONNECTING
+  ports_[to.port].port->send(
+      write_board_heartbeat(buffer, sizeof buffer, pnum++, heartbeat_time(now_ms), safe, nonce),
+      Priority::normal, to.peer);
+}
+
+// A board that has had no host yet tells watchers `link`, as one that has lost its host does.
+SafeReport Application::shown_to_watchers() const {
+  SafeReport report = safe_report();
+  if (report.reason == SafeReason::none && !link_.has_owner()) report.reason = SafeReason::link;
+  return report;
+}
+
+void Application::send_states(std::uint32_t now_ms) {
+  std::uint32_t t_ms = 0;
+  if (!schedule_.take(now_ms, t_ms)) return;
+  State state;
+  fill(state);
+  if (link_.has_owner()) {
+    for (std::uint8_t i = 0; i < port_count_; ++i) {
+      Source to;
+      to.port = i;
+      to.peer = audience(i);
+      send_state(to, ports_[i].next_pnum, setpoints_.fields, state, t_ms);
+    }
+  } else if (state.safe == SafeReason::none) {
+    state.safe = SafeReason::link;
+  }
+  for (Watcher& watcher : watchers_) {
+    if (watcher.period_ms == 0 || !watcher.take(t_ms)) continue;
+    if (link_.has_owner() && reaches(watcher.at)) continue;
+    const FieldSet& fields = watcher.chooses ? watcher.fields : setpoints_.fields;
+    send_state(watcher.at, number_for(watcher.at), fields, state, t_ms);
+  }
+}
+
+// One state, in as many datagrams of the same T as the port's limit asks for.
+void Application::send_state(Source to, std::uint32_t& pnum, FieldSet fields, const State& state,
+                             std::uint32_t t_ms) {
+  char buffer[max_datagram];
+  const std::size_t carried = ports_[to.port].port->max_size();
+  const std::size_t limit = carried < sizeof buffer ? carried : sizeof buffer;
+  const std::size_t room = limit - DatagramWriter::trailer_max - safe_fields_size;
+  if (state.safe != SafeReason::none) {  // these end every part
+    fields.remove(StateField::safe);
+    fields.remove(StateField::fault);
+  }
+  DatagramWriter writer(buffer, limit);
+  for (int i = 0; i < state_field_count; ++i) {
+    const StateField field = static_cast<StateField>(i);
+    if (!fields.has(field)) continue;
+    const std::size_t before = writer.size();
+    write_field(writer, field, state);
+    if (writer.ok() && writer.size() <= room) continue;
+    writer.truncate(before);
+    send_part(to, pnum, writer, state, t_ms);
+    writer = DatagramWriter(buffer, limit);
+    write_field(writer, field, state);
+  }
+  send_part(to, pnum, writer, state, t_ms);
+}
+
+// Each part tells by itself whether the outputs are safe, and why.
+void Application::send_part(Source to, std::uint32_t& pnum, DatagramWriter& writer,
+                            const State& state, std::uint32_t t_ms) {
+  if (state.safe != SafeReason::none) write_field(writer, StateField::safe, state);
+  if (state.safe != SafeReason::none && state.fault.any()) {
+    write_field(writer, StateField::fault, state);
+  }
+  ports_[to.port].port->send(writer.finish(pnum++, t_ms), Priority::state, to.peer);
+}
+
+void Application::fill(State& state) const {
+  for (int i = 0; i < analog_channels; ++i) state.analog_cv[i] = inputs_.analog_cv[i];
+  state.handle_held = inputs_.handle_held;
+  for (int i = 0; i < dhb12_channels; ++i) state.dhb12[i] = outputs_.dhb12[i];
+  for (int i = 0; i < osmc_channels; ++i) state.osmc[i] = outputs_.osmc[i];
+  for (int i = 0; i < servo_channels; ++i) state.servo_us[i] = outputs_.servo_us[i];
+  for (int i = 0; i < bldc_channels; ++i) state.bldc[i] = outputs_.bldc[i];
+  state.relays = outputs_.relays;
+  for (int i = 0; i < stepper_channels; ++i) state.stepper_steps[i] = inputs_.stepper_steps[i];
+  for (int i = 0; i < encoder_channels; ++i) {
+    state.encoder_counts[i] = inputs_.encoder_counts[i];
+    state.encoder_hz[i] = inputs_.encoder_hz[i];
+    state.encoder_index_counts[i] = inputs_.encoder_index_counts[i];
+  }
+  for (int i = 0; i < ultrasonic_channels; ++i) state.ultrasonic_cm[i] = inputs_.ultrasonic_cm[i];
+  state.safe = safety_.reason();
+  state.last_command = link_.last_executed();
+  state.rx_ok = rx_ok_;
+  state.rx_crc = rx_bad_;
+  state.rx_lost = tracker_.counters().lost;
+  state.rx_duplicate = tracker_.counters().duplicate;
+  state.rx_refused = rx_refused_;
+  state.late = schedule_.late();
+  state.fault = inputs_.fault;
+}
+
+}  // namespace firmware
+}  // namespace r4

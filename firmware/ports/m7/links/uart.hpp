@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The CMSDK UART as a port of the application: one datagram a line, both ways by interrupts.
+//
+// The handlers are called from the interrupts of the same number; everything else from the loop.
+// Nothing here ever waits for the other side.
+#pragma once
+
+#include <cstdint>
+
+#include "../../../../transports/framing/line_framing.hpp"
+#include "../../../port.hpp"
+#include "../../../stop_detector.hpp"
+#include "../../byte_ring.hpp"
+#include "../../transmit_lines.hpp"
+
+namespace r4 {
+namespace m7 {
+
+class Uart final : public firmware::Port {
+ public:
+  static constexpr std::uint32_t receive_capacity = 2048;
+
+  // `base` is the UART's address. 1 Mbit/s.
+  explicit Uart(std::uint32_t base) : base_(base) {}
+  void start();
+
+  void on_receive_interrupt();
+  void on_transmit_interrupt();
+  // A byte has come.
+  void on_byte(char byte);
+  // Has a stop come since it was asked last? In the same interrupt.
+  bool take_stop() {
+    const bool stop = stop_;
+    stop_ = false;
+    return stop;
+  }
+
+  // Calls `on_datagram(Text)` for each line that has arrived.
+  template <class OnDatagram>
+  void receive(OnDatagram&& on_datagram) {
+    char chunk[64];
+    while (const std::uint32_t size = received_.take(chunk, sizeof chunk)) {
+      framing_.push(chunk, size, on_datagram);
+    }
+  }
+  bool has_received() const { return !received_.empty(); }
+
+  void send(Text datagram, Priority priority, std::uint32_t peer) override;
+  std::size_t max_size() const override { return max_datagram; }
+  bool may_configure() const override { return true; }
+  // Lets time pass.
+  void poll(std::uint32_t now_ms);
+
+  // When, by BoardClock::ticks(), the end of a line came last.
+  std::uint32_t last_line_ticks() const { return last_line_ticks_; }
+  std::uint32_t overruns() const { return overruns_; }  // bytes that were lost on the way in
+  std::uint32_t dropped() const { return lines_.dropped(); }
+
+ private:
+  void fill();
+
+  const std::uint32_t base_;
+  firmware::ByteRing<receive_capacity> received_;
+  firmware::TransmitLines lines_;
+  LineFraming framing_;
+  firmware::StopDetector detector_;
+  bool stop_ = false;
+  volatile std::uint32_t last_line_ticks_ = 0;
+  volatile std::uint32_t overruns_ = 0;
+};
+
+// For the board's log: writes and waits for the UART, though not for ever; a fault handler may call
+// it at any time.
+class Log {
+ public:
+  explicit Log(std::uint32_t base);
+  const Log& text(Text text) const;
+  const Log& hex(std::uint32_t value) const;
+  const Log& number(std::uint32_t value) const;
+
+ private:
+  const std::uint32_t base_;
+};
+
+}  // namespace m7
+}  // namespace r4

@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "r4link/fleet.hpp"
+
+#include <utility>
+
+#include "../commands/command_help.hpp"
+#include "../session/limits.hpp"
+#include "fleet_impl.hpp"
+
+namespace r4 {
+
+namespace {
+
+// A command with its texts.
+struct OwnCommand {
+  explicit OwnCommand(const Command& c)
+      : text(c.text.data(), c.text.size()), text2(c.text2.data(), c.text2.size()), command(c) {
+    command.text = text;
+    command.text2 = text2;
+  }
+  OwnCommand(const OwnCommand&) = delete;
+  OwnCommand& operator=(const OwnCommand&) = delete;
+  std::string text, text2;
+  Command command;
+};
+
+std::vector<std::size_t> boards_of(const std::vector<BoardSetpoints>& setpoints) {
+  std::vector<std::size_t> boards;
+  boards.reserve(setpoints.size());
+  for (const BoardSetpoints& each : setpoints) boards.push_back(each.board);
+  return boards;
+}
+
+}  // namespace
+
+// --- results
+
+bool FleetResults::all_confirmed() const {
+  return std::all_of(results_.begin(), results_.end(), std::mem_fn(&FleetResult::confirmed));
+}
+
+std::vector<std::size_t> FleetResults::failed() const {
+  std::vector<std::size_t> boards;
+  for (const FleetResult& each : results_) {
+    if (!each.confirmed()) boards.push_back(each.board);
+  }
+  return boards;
+}
+
+void FleetResults::require() const {
+  const auto first =
+      std::find_if_not(results_.begin(), results_.end(), std::mem_fn(&FleetResult::confirmed));
+  if (first == results_.end()) return;
+  Problem problem = first->problem;
+  const std::size_t others = failed().size() - 1;
+  if (others != 0) problem.reason += " (and " + std::to_string(others) + " other boards)";
+  throw Error(std::move(problem));
+}
+
+// --- the fleet
+
+Fleet::Fleet(const std::vector<std::string>& patterns, BoardOptions options)
+    : impl_(std::make_unique<Impl>(patterns, std::move(options))) {}
+Fleet::~Fleet() = default;
+void Fleet::close() { impl_->close(); }
+
+std::size_t Fleet::size() const { return impl_->boards.size(); }
+const std::string& Fleet::url(std::size_t board) const {
+  impl_->require_board(board);
+  return impl_->urls[board];
+}
+
+std::size_t Fleet::find(std::string_view url_or_name) const {
+  Boards found;
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (impl_->urls[i] == url_or_name) return i;
+  }
+  impl_->run_on_loop("find()", [&] {
+    for (std::size_t i = 0; i < size(); ++i) {
+      const BoardIdentity& identity = impl_->boards[i]->identity();
+      if (url_or_name.empty()) continue;
+      if (identity.name == url_or_name || identity.board_id == url_or_name) found.push_back(i);
+    }
+  });
+  if (found.size() == 1) return found.front();
+  if (found.empty()) {
+    throw Error(ErrorKind::usage, std::string(url_or_name), "no board of the fleet is called so",
+                "name it by the URL that it was opened by; its name is known when it has answered");
+  }
+  throw Error(ErrorKind::usage, std::string(url_or_name),
+              std::to_string(found.size()) + " boards of the fleet are called so",
+              "name it by its URL");
+}
+
+FleetBoard Fleet::operator[](std::size_t board) {
+  impl_->require_board(board);
+  return FleetBoard(*this, board);
+}
+FleetBoard Fleet::operator[](std::string_view url_or_name) {
+  return FleetBoard(*this, find(url_or_name));
+}
+
+Fleet::Boards Fleet::wait_active(Duration timeout) {
+  require_wait("wait_active()", timeout);
+  return impl_->wait_active(impl_->all_boards, timeout);
+}
+
+std::vector<BoardHealth> Fleet::health() const {
+  std::vector<BoardHealth> all(size());
+  impl_->run_on_loop("health()", [&] {
+    for (std::size_t i = 0; i < all.size(); ++i) all[i] = impl_->health_of(i);
+  });
+  return all;
+}
+
+std::vector<ReceivedState> Fleet::states() const {
+  std::vector<ReceivedState> all(size());
+  impl_->run_on_loop("states()", [&] {
+    for (std::size_t i = 0; i < all.size(); ++i) all[i] = impl_->boards[i]->state();
+  });
+  return all;
+}
+
+FleetResults Fleet::send(const Boards& boards, const Command& command, Duration timeout) {
+  require_valid(command);
+  require_control(impl_->role, command);
+  if (command.kind == CommandKind::stop) return impl_->stop(boards, timeout);
+  require_timeout(shown(command), timeout);
+  const auto own = std::make_shared<OwnCommand>(command);
+  return impl_->execute(
+      shown(command), boards, timeout,
+      [impl = impl_.get(), own](std::size_t board, std::size_t, Duration left, Impl::BoundEnd end) {
+        AsyncBoard& async = *impl->boards[board];
+        if (own->command.kind == CommandKind::identify) {
+          async.async_identify(left, std::move(end));
+        } else {
+          async.async_send(own->command, left, std::move(end));
+        }
+      });
+}
+FleetResults Fleet::send(const Command& command, Duration timeout) {
+  return send(impl_->all_boards, command, timeout);
+}
+FleetResults Fleet::send(const Boards& boards, std::string_view command, Duration timeout) {
+  if (!is_group_text(command)) return send(boards, parse_command_text(command), timeout);
+  std::vector<BoardSetpoints> setpoints;
+  setpoints.reserve(boards.size());
+  const Setpoints group = parse_group_text(command);
+  for (const std::size_t board : boards) setpoints.push_back({board, group});
+  return apply(setpoints, timeout);
+}
+FleetResults Fleet::send(std::string_view command, Duration timeout) {
+  return send(impl_->all_boards, command, timeout);
+}
+
+FleetResults Fleet::arm(const Boards& boards, Duration timeout) {
+  require_timeout("arm()", timeout);
+  require_control(impl_->role, "arm()");
+  return impl_->execute(
+      "arm()", boards, timeout,
+      [impl = impl_.get()](std::size_t board, std::size_t, Duration left, Impl::BoundEnd end) {
+        impl->boards[board]->async_arm(left, std::move(end));
+      });
+}
+FleetResults Fleet::arm(Duration timeout) { return arm(impl_->all_boards, timeout); }
+FleetResults Fleet::clear(Duration timeout) { return send(Command::clear(), timeout); }
+
+FleetResults Fleet::stop(Duration timeout) { return impl_->stop(impl_->all_boards, timeout); }
+void Fleet::stop_async() { impl_->stop_async(); }
+
+FleetResults Fleet::apply(const std::vector<BoardSetpoints>& setpoints, Duration timeout) {
+  for (const BoardSetpoints& each : setpoints) require_any(each.setpoints);
+  require_timeout("apply()", timeout);
+  require_control(impl_->role, "apply()");
+  const auto own = std::make_shared<const std::vector<BoardSetpoints>>(setpoints);
+  return impl_->execute("apply()", boards_of(setpoints), timeout,
+                        [impl = impl_.get(), own](std::size_t board, std::size_t at, Duration left,
+                                                  Impl::BoundEnd end) {
+                          impl->boards[board]->async_apply((*own)[at].setpoints, left,
+                                                           std::move(end));
+                        });
+}
+
+std::vector<PostResult> Fleet::post(const std::vector<BoardSetpoints>& setpoints) {
+  for (const BoardSetpoints& each : setpoints) {
+    impl_->require_board(each.board);
+    require_any(each.setpoints);
+  }
+  require_control(impl_->role, "post()");
+  std::vector<PostResult> results(setpoints.size(), PostResult::no_link);
+  impl_->run_on_loop("post()", [&] {
+    for (std::size_t i = 0; i < setpoints.size(); ++i) {
+      results[i] = impl_->boards[setpoints[i].board]->post(setpoints[i].setpoints);
+    }
+  });
+  return results;
+}
+
+std::optional<FleetEvent> Fleet::next_event(Duration timeout) {
+  require_wait("next_event()", timeout);
+  return impl_->next_event(timeout);
+}
+
+void Fleet::record(Recording& recording) {
+  impl_->run_on_loop("record()", [&] {
+    for (const auto& board : impl_->boards) board->record(recording);
+  });
+}
+
+void Fleet::watchdog(Duration period) {
+  require_watchdog(period);
+  impl_->run_on_loop("watchdog()", [&] {
+    for (const auto& board : impl_->boards) board->watchdog(period);
+  });
+}
+void Fleet::feed() {
+  for (const auto& board : impl_->boards) board->feed();
+}
+
+// --- one board
+
+void FleetBoard::send(const Command& command, Duration timeout) {
+  fleet_->send({board_}, command, timeout).require();
+}
+void FleetBoard::send(std::string_view command, Duration timeout) {
+  fleet_->send({board_}, command, timeout).require();
+}
+void FleetBoard::apply(const Setpoints& setpoints, Duration timeout) {
+  fleet_->apply({{board_, setpoints}}, timeout).require();
+}
+PostResult FleetBoard::post(const Setpoints& setpoints) {
+  return fleet_->post({{board_, setpoints}}).front();
+}
+void FleetBoard::arm(Duration timeout) { fleet_->arm({board_}, timeout).require(); }
+void FleetBoard::stop(Duration timeout) { send(Command::stop(), timeout); }
+void FleetBoard::clear(Duration timeout) { send(Command::clear(), timeout); }
+BoardIdentity FleetBoard::identify(Duration timeout) {
+  send(Command::identify(), timeout);
+  return health().identity;
+}
+void FleetBoard::wait_active(Duration timeout) {
+  require_wait("wait_active()", timeout);
+  if (fleet_->impl_->wait_active({board_}, timeout).empty()) return;
+  throw Error(explain(url(), health().link));
+}
+
+ReceivedState FleetBoard::state() const {
+  ReceivedState state;
+  fleet_->impl_->run_on_loop("state()", [&] { state = fleet_->impl_->boards[board_]->state(); });
+  return state;
+}
+BoardHealth FleetBoard::health() const {
+  BoardHealth health;
+  fleet_->impl_->run_on_loop("health()", [&] { health = fleet_->impl_->health_of(board_); });
+  return health;
+}
+
+}  // namespace r4

@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "r4link/fleet.hpp"
+
+#include <pybind11/stl.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "bindings.hpp"
+
+namespace r4::python {
+namespace {
+
+using Ms = std::chrono::milliseconds;
+using Released = py::call_guard<py::gil_scoped_release>;
+using Boards = Fleet::Boards;
+
+// A fleet of this process. One that was inherited by a fork is none.
+class PyFleet {
+ public:
+  PyFleet(const std::vector<std::string>& urls, BoardOptions options) {
+    options.on_wait = [] {
+      const py::gil_scoped_acquire gil;
+      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    };
+    const py::gil_scoped_release free;
+    fleet_ = std::make_unique<Fleet>(urls, std::move(options));
+  }
+  ~PyFleet() {
+    if (::getpid() != process_) {
+      static_cast<void>(fleet_.release());
+      return;
+    }
+    const py::gil_scoped_release free;
+    fleet_.reset();
+  }
+  PyFleet(const PyFleet&) = delete;
+  PyFleet& operator=(const PyFleet&) = delete;
+
+  Fleet* operator->() {
+    if (::getpid() == process_) return fleet_.get();
+    throw Error(Problem{ErrorKind::refused, "the fleet",
+                        "it was opened by the process " + std::to_string(process_) +
+                            ", of which this one is a fork",
+                        "open it here, after the fork", Outcome::closed});
+  }
+  void close() {
+    if (::getpid() == process_) fleet_->close();
+  }
+
+ private:
+  const pid_t process_ = ::getpid();
+  std::unique_ptr<Fleet> fleet_;
+};
+
+Boards boards_of(PyFleet& fleet, const std::optional<Boards>& boards) {
+  if (boards) return *boards;
+  Boards all(fleet->size());
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
+  return all;
+}
+
+std::vector<BoardSetpoints> setpoints_of(
+    const std::vector<std::pair<std::size_t, Setpoints>>& all) {
+  std::vector<BoardSetpoints> setpoints;
+  setpoints.reserve(all.size());
+  for (const auto& [board, each] : all) setpoints.push_back({board, each});
+  return setpoints;
+}
+
+// What happened, by its kind: another link, the transport's event, why the session is not armed, the refused post,
+// how many were missed.
+py::object subject_of(const FleetEvent& event) {
+  switch (event.kind) {
+    case FleetEvent::Kind::link:
+      return py::cast(event.link);
+    case FleetEvent::Kind::transport:
+      return py::cast(event.transport);
+    case FleetEvent::Kind::arming:
+      return py::str(to_text(event.disarmed_by));
+    case FleetEvent::Kind::refused:
+      return py::cast(event.refused);
+    case FleetEvent::Kind::missed:
+      return py::int_(event.count);
+    case FleetEvent::Kind::restart:
+      break;
+  }
+  return py::none();
+}
+
+const char* kind_of(FleetEvent::Kind kind) {
+  switch (kind) {
+    case FleetEvent::Kind::link:
+      return "link";
+    case FleetEvent::Kind::transport:
+      return "transport";
+    case FleetEvent::Kind::arming:
+      return "arming";
+    case FleetEvent::Kind::restart:
+      return "restart";
+    case FleetEvent::Kind::refused:
+      return "refused";
+    case FleetEvent::Kind::missed:
+      break;
+  }
+  return "missed";
+}
+
+}  // namespace
+
+void bind_fleet(py::module_& module) {
+  py::class_<BoardHealth>(module, "BoardHealth")
+      .def_readonly("board", &BoardHealth::board)
+      .def_readonly("url", &BoardHealth::url)
+      .def_readonly("identity", &BoardHealth::identity)
+      .def_readonly("link", &BoardHealth::link)
+      .def_readonly("in_control", &BoardHealth::in_control)
+      .def_property_readonly("disarmed_by",
+                             [](const BoardHealth& health) { return to_text(health.disarmed_by); })
+      .def_readonly("statistics", &BoardHealth::statistics)
+      .def_property_readonly("well", &BoardHealth::well);
+
+  // The Error of a board that did not confirm is made in r4link/fleet.py.
+  py::class_<FleetResult>(module, "FleetResult")
+      .def_readonly("board", &FleetResult::board)
+      .def_property_readonly(
+          "outcome", [](const FleetResult& result) { return to_text(result.result.outcome); })
+      .def_property_readonly("elapsed",
+                             [](const FleetResult& result) {
+                               return std::chrono::duration<double>(result.result.elapsed).count();
+                             })
+      .def_property_readonly("confirmed", &FleetResult::confirmed)
+      .def_property_readonly("problem", [](const FleetResult& result) {
+        const Problem& problem = result.problem;
+        return std::make_tuple(static_cast<int>(problem.kind), problem.thing, problem.reason,
+                               problem.fix, std::string(to_text(problem.outcome)),
+                               to_str(name_of(problem.refusal)), static_cast<int>(problem.at));
+      });
+
+  using Results = std::vector<FleetResult>;
+  const auto list = [](const FleetResults& results) {
+    return Results(results.begin(), results.end());
+  };
+  py::class_<PyFleet>(module, "Fleet")
+      .def(py::init([](const std::vector<std::string>& urls, bool watch, bool arming,
+                       const std::string& fields, const std::optional<std::string>& key,
+                       int watch_rate_hz, int heartbeat, int timeout) {
+             BoardOptions options;
+             options.role = watch ? BoardRole::watch : BoardRole::control;
+             SessionOptions& session = options.session;
+             session.arming = arming ? Arming::required : Arming::off;
+             session.fields = fields;
+             if (key) session.key = load_key(*key);
+             session.watch_rate_hz = watch_rate_hz;
+             session.timing = {static_cast<std::uint32_t>(heartbeat),
+                               static_cast<std::uint32_t>(timeout)};
+             return std::make_unique<PyFleet>(urls, std::move(options));
+           }),
+           py::arg("urls"), py::kw_only(), py::arg("watch"), py::arg("arming"), py::arg("fields"),
+           py::arg("key"), py::arg("watch_rate_hz"), py::arg("heartbeat"), py::arg("timeout"))
+      .def("close", &PyFleet::close, Released())
+      .def("__len__", [](PyFleet& fleet) { return fleet->size(); })
+      .def("url", [](PyFleet& fleet, std::size_t board) { return fleet->url(board); })
+      .def(
+          "find", [](PyFleet& fleet, const std::string& name) { return fleet->find(name); },
+          Released())
+      .def(
+          "wait_active", [](PyFleet& fleet, int ms) { return fleet->wait_active(Ms(ms)); },
+          Released())
+      .def(
+          "health", [](PyFleet& fleet) { return fleet->health(); }, Released())
+      .def(
+          "states", [](PyFleet& fleet) { return fleet->states(); }, Released())
+      .def(
+          "send",
+          [list](PyFleet& fleet, const std::string& command, const std::optional<Boards>& boards,
+                 int ms) { return list(fleet->send(boards_of(fleet, boards), command, Ms(ms))); },
+          Released())
+      .def(
+          "send",
+          [list](PyFleet& fleet, const Command& command, const std::optional<Boards>& boards,
+                 int ms) { return list(fleet->send(boards_of(fleet, boards), command, Ms(ms))); },
+          Released())
+      .def(
+          "arm",
+          [list](PyFleet& fleet, const std::optional<Boards>& boards, int ms) {
+            return list(fleet->arm(boards_of(fleet, boards), Ms(ms)));
+          },
+          Released())
+      .def(
+          "stop", [list](PyFleet& fleet, int ms) { return list(fleet->stop(Ms(ms))); }, Released())
+      .def("stop_async", [](PyFleet& fleet) { fleet->stop_async(); })
+      .def(
+          "apply",
+          [list](PyFleet& fleet, const std::vector<std::pair<std::size_t, Setpoints>>& setpoints,
+                 int ms) { return list(fleet->apply(setpoints_of(setpoints), Ms(ms))); },
+          Released())
+      .def(
+          "post",
+          [](PyFleet& fleet, const std::vector<std::pair<std::size_t, Setpoints>>& setpoints) {
+            std::vector<std::string> results;
+            for (const PostResult each : fleet->post(setpoints_of(setpoints))) {
+              results.emplace_back(to_text(each));
+            }
+            return results;
+          },
+          Released())
+      .def("next_event",
+           [](PyFleet& fleet, int ms) -> py::object {
+             std::optional<FleetEvent> event;
+             {
+               const py::gil_scoped_release free;
+               event = fleet->next_event(Ms(ms));
+             }
+             if (!event) return py::none();
+             return py::make_tuple(kind_of(event->kind), event->board, subject_of(*event));
+           })
+      .def(
+          "record", [](PyFleet& fleet, Recording& recording) { fleet->record(recording); },
+          py::keep_alive<1, 2>(), Released())
+      .def(
+          "watchdog", [](PyFleet& fleet, int ms) { fleet->watchdog(Ms(ms)); }, Released())
+      .def("feed", [](PyFleet& fleet) { fleet->feed(); });
+}
+
+}  // namespace r4::python

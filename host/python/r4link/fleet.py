@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""r4link.Fleet: many boards on one thread, opened by URLs and patterns of URLs (docs/fleet.md).
+
+    with r4link.Fleet('can://can0?node=0-7', 'udp://10.0.0.{1-250}?listen=0') as fleet:
+        fleet.wait_active()
+        fleet.arm().require()
+        fleet.post({0: left, 1: right})
+        for health in fleet.health(): ...
+        fleet.stop()
+
+Boards count from 0, in the order of the URLs; where a board is meant, its index, URL, name or board id will do.
+Times are seconds. A call that waits releases the GIL and obeys Ctrl-C.
+"""
+from __future__ import annotations
+
+import atexit
+import os
+import weakref
+from types import TracebackType
+from typing import Iterable, Iterator, Mapping, NamedTuple, Self, Sequence, Type
+
+from . import _core
+from ._core import BoardHealth, Command, Event, FleetResult, LinkStatus, Recording, RefusedPost, State
+from .board import Setpoints, _ms
+from .errors import Error, RefusedError, error_of
+from .values import PostResult
+
+_open: weakref.WeakSet[Fleet] = weakref.WeakSet()
+
+
+@atexit.register
+def _close_all() -> None:
+    """Farewells are said while the interpreter is whole."""
+    for fleet in list(_open):
+        fleet.close()
+
+
+class FleetEvent(NamedTuple):
+    """Something that happened to a board."""
+    kind: str  # 'link', 'transport', 'arming', 'restart', 'refused', 'missed'
+    board: int
+    # By its kind: the link; the transport's event; why the board is not armed ('none': it is); nothing; the post that
+    # was refused; how many events were dropped, for nobody took them.
+    what: LinkStatus | Event | str | None | RefusedPost | int
+
+
+class FleetResults(Sequence[FleetResult]):
+    """What became of a command at several boards, in the order in which they were named; true if all confirmed it."""
+
+    def __init__(self, results: list[FleetResult]) -> None:
+        self._results = results
+
+    def __getitem__(self, index):  # type: ignore[no-untyped-def]
+        return self._results[index]
+
+    def __len__(self) -> int:
+        return len(self._results)
+
+    def __bool__(self) -> bool:
+        return all(each.confirmed for each in self._results)
+
+    @property
+    def failed(self) -> list[int]:
+        """The boards that did not."""
+        return [each.board for each in self._results if not each.confirmed]
+
+    def error(self, index: int) -> Error | None:
+        """Why the board at that place did not confirm it."""
+        each = self._results[index]
+        return None if each.confirmed else error_of(*each.problem)
+
+    def require(self) -> None:
+        """Raises the error of the first board that did not confirm it; it tells how many others did not."""
+        first = next((place for place, each in enumerate(self._results) if not each.confirmed), None)
+        if first is None:
+            return
+        kind, thing, reason, fix, outcome, refusal, at = self._results[first].problem
+        others = len(self.failed) - 1
+        raise error_of(kind, thing, reason + (f' (and {others} other boards)' if others else ''), fix, outcome, refusal,
+                       at)
+
+
+class Fleet:
+    def __init__(self, *urls: str, role: str = 'control', arming: bool = True, key: str | os.PathLike[str] | None = None,
+                 fields: str = 'DEFAULT', watch_rate_hz: int = 100, heartbeat: float = 0.1,
+                 timeout: float = 1.0) -> None:
+        """Opens all transports and begins the links; returns without waiting for the boards.
+
+        Each of `urls` is a URL or a pattern of many: 'can://can0?node=0-7'. The options are those of Board.
+        """
+        if role not in ('control', 'watch'):
+            raise ValueError(f"role is 'control' or 'watch', not {role!r}")
+        self._core = _core.Fleet(list(urls), watch=role == 'watch', arming=arming, fields=fields,
+                                 key=None if key is None else os.fspath(key), watch_rate_hz=watch_rate_hz,
+                                 heartbeat=_ms(heartbeat), timeout=_ms(timeout))
+        _open.add(self)
+
+    def close(self) -> None:
+        """Ends heartbeats and says farewell: all boards go safe at once. Idempotent."""
+        _open.discard(self)
+        self._core.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: Type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()
+
+    def __len__(self) -> int:
+        return len(self._core)
+
+    def __repr__(self) -> str:
+        return f'<r4link.Fleet of {len(self)} boards>'
+
+    def index(self, board: int | str) -> int:
+        """Of a URL, a name or a board id; an index is what it is."""
+        return self._core.find(board) if isinstance(board, str) else board
+
+    def url(self, board: int) -> str:
+        return self._core.url(board)
+
+    def wait_active(self, timeout: float = 3.0) -> None:
+        """Waits until all are ACTIVE under our control, or, where the program only watches, are heard."""
+        missing = self._core.wait_active(_ms(timeout))
+        if missing:
+            others = f' (and {len(missing) - 1} other boards)' if len(missing) > 1 else ''
+            health = self._core.health()[missing[0]]
+            state = f'is {health.link.state}' + ('' if health.link.reason == 'none' else f', {health.link.reason}')
+            raise RefusedError(health.url, state + others, 'see health(), and that they are on and reached')
+
+    def health(self) -> list[BoardHealth]:
+        return self._core.health()
+
+    def states(self) -> list[State]:
+        """The newest state of each, at one instant."""
+        return self._core.states()
+
+    def send(self, command: str | Command, timeout: float = 1.0, *,
+             boards: Iterable[int | str] | None = None) -> FleetResults:
+        """A command to all boards, or to those; each is confirmed by its own state."""
+        return FleetResults(self._core.send(command, self._indices(boards), _ms(timeout)))
+
+    def arm(self, timeout: float = 1.0, *, boards: Iterable[int | str] | None = None) -> FleetResults:
+        return FleetResults(self._core.arm(self._indices(boards), _ms(timeout)))
+
+    def clear(self, timeout: float = 1.0) -> FleetResults:
+        return self.send(Command.clear(), timeout)
+
+    def stop(self, timeout: float = 1.0) -> FleetResults:
+        """Every output of every board safe, at once; on a CAN bus by one frame. Does not raise where boards do not
+        confirm: then cut the power."""
+        return FleetResults(self._core.stop(_ms(timeout)))
+
+    def stop_async(self) -> None:
+        """The same without waiting for the boards."""
+        self._core.stop_async()
+
+    def apply(self, setpoints: Mapping[int | str, Setpoints], timeout: float = 1.0) -> FleetResults:
+        """Setpoints of several boards, confirmed."""
+        return FleetResults(self._core.apply(self._pairs(setpoints), _ms(timeout)))
+
+    def post(self, setpoints: Mapping[int | str, Setpoints]) -> list[PostResult]:
+        """The same sent once, in one pass, and not confirmed: for streams."""
+        return [PostResult(each) for each in self._core.post(self._pairs(setpoints))]
+
+    def next_event(self, timeout: float = 0.0) -> FleetEvent | None:
+        """The next thing that has happened, oldest first; None if there is nothing in time."""
+        event = self._core.next_event(_ms(timeout))
+        return None if event is None else FleetEvent(*event)
+
+    def events(self) -> Iterator[FleetEvent]:
+        """What has happened since it was asked last."""
+        while (event := self.next_event()) is not None:
+            yield event
+
+    def record(self, recording: Recording) -> None:
+        """Every datagram of every board goes into that recording, too."""
+        self._core.record(recording)
+
+    def watchdog(self, period: float) -> None:
+        """Without feed() for so long the heartbeats stop, and all boards go safe; 0 turns it off."""
+        self._core.watchdog(_ms(period))
+
+    def feed(self) -> None:
+        self._core.feed()
+
+    def _indices(self, boards: Iterable[int | str] | None) -> list[int] | None:
+        return None if boards is None else [self.index(each) for each in boards]
+
+    def _pairs(self, setpoints: Mapping[int | str, Setpoints]) -> list[tuple[int, _core.Setpoints]]:
+        return [(self.index(board), each._core) for board, each in setpoints.items()]

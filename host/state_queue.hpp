@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What is behind States: a bounded queue between the link's thread, which waits for nobody, and a thread of the
+// program's.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "r4link/board.hpp"
+#include "r4link/error.hpp"
+
+namespace r4 {
+
+class States::Queue {
+ public:
+  // `on_wait`: of BoardOptions.
+  Queue(StatesOptions options, std::function<void()> on_wait)
+      : lossless_(options.lossless),
+        most_(options.most != 0  ? options.most
+              : options.lossless ? most_lossless
+                                 : 1),
+        on_wait_(std::move(on_wait)),
+        ring_(std::min<std::size_t>(most_, 16)) {}
+
+  void put(const ReceivedState& state) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (ended_) return;
+      // Behind a gap none is put before it was told.
+      if (lossless_ && (gap_ != 0 || count_ == most_)) {
+        ++gap_;
+        ++missed_;
+        return;
+      }
+      if (count_ == most_) {
+        drop_first();
+        ++missed_;
+      } else if (count_ == ring_.size()) {
+        grow();
+      }
+      ring_[(first_ + count_++) % ring_.size()] = state;
+    }
+    news_.notify_one();
+  }
+  void end() {
+    {
+      const std::lock_guard lock(mutex_);
+      ended_ = true;
+    }
+    news_.notify_all();
+  }
+
+  std::optional<ReceivedState> take(Duration timeout) {
+    const auto deadline =
+        Clock::now() + std::clamp<Duration>(timeout, Duration{0}, std::chrono::hours{24});
+    std::unique_lock lock(mutex_);
+    const auto news = [&] { return ended_ || count_ != 0 || gap_ != 0; };
+    while (!news_.wait_until(
+        lock, on_wait_ ? std::min(deadline, Clock::now() + interval) : deadline, news)) {
+      if (Clock::now() >= deadline) return std::nullopt;
+      if (!on_wait_) continue;
+      lock.unlock();
+      on_wait_();
+      lock.lock();
+    }
+    if (count_ != 0) {
+      const ReceivedState state = ring_[first_];
+      drop_first();
+      return state;
+    }
+    if (gap_ == 0) return std::nullopt;
+    throw Error(ErrorKind::data, "states()",
+                fmt::format("{} waited, and there was no room for the next {}", most_,
+                            std::exchange(gap_, 0)),
+                "take them faster, or let more wait: StatesOptions::most");
+  }
+  bool ended() const {
+    const std::lock_guard lock(mutex_);
+    return ended_ && count_ == 0 && gap_ == 0;
+  }
+  std::uint64_t missed() const {
+    const std::lock_guard lock(mutex_);
+    return missed_;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::size_t most_lossless = 65536;
+  static constexpr Duration interval{50};
+
+  void drop_first() {
+    first_ = (first_ + 1) % ring_.size();
+    --count_;
+  }
+  // A queue that is short stays small, and one that has grown allocates nothing any more.
+  void grow() {
+    std::rotate(ring_.begin(), ring_.begin() + static_cast<std::ptrdiff_t>(first_), ring_.end());
+    first_ = 0;
+    ring_.resize(std::min(most_, 2 * ring_.size()));
+  }
+
+  const bool lossless_;
+  const std::size_t most_;
+  const std::function<void()> on_wait_;
+  mutable std::mutex mutex_;  // of what follows
+  std::condition_variable news_;
+  std::vector<ReceivedState> ring_;
+  std::size_t first_ = 0;
+  std::size_t count_ = 0;
+  std::uint64_t gap_ = 0;  // so many are lost behind those that wait
+  std::uint64_t missed_ = 0;
+  bool ended_ = false;
+};
+
+}  // namespace r4

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The commands that a program makes: Command::osmc() and its like.
+#include "r4link/command.hpp"
+
+namespace r4 {
+namespace {
+
+Command of_kind(CommandKind kind) {
+  Command command;
+  command.kind = kind;
+  return command;
+}
+
+Command of_channel(CommandKind kind, std::int32_t value, int channel) {
+  Command command = of_kind(kind);
+  command.value = value;
+  // 0 is no channel of any kind.
+  command.channel = channel > 0 && channel <= 0xFF ? static_cast<std::uint8_t>(channel) : 0;
+  return command;
+}
+
+}  // namespace
+
+Command Command::heartbeat() { return of_kind(CommandKind::heartbeat); }
+Command Command::osmc(std::int32_t pwm, Direction direction, int channel) {
+  Command command = of_channel(CommandKind::osmc, pwm, channel);
+  command.direction = direction;
+  return command;
+}
+Command Command::dhb12(std::int32_t pwm, Direction direction, int channel) {
+  Command command = of_channel(CommandKind::dhb12, pwm, channel);
+  command.direction = direction;
+  return command;
+}
+Command Command::servo(std::int32_t us, int channel) {
+  return of_channel(CommandKind::servo, us, channel);
+}
+Command Command::relay(int channel, bool on) {
+  Command command = of_channel(CommandKind::relay, 0, channel);
+  command.on = on;
+  return command;
+}
+Command Command::stop() { return of_kind(CommandKind::stop); }
+Command Command::clear(std::int32_t cause) {
+  Command command = of_kind(CommandKind::clear);
+  command.value = cause;
+  return command;
+}
+Command Command::leave() { return of_kind(CommandKind::leave); }
+Command Command::stepper(std::int32_t target_steps, std::int32_t steps_per_s, int channel) {
+  Command command = of_channel(CommandKind::stepper, target_steps, channel);
+  command.speed = steps_per_s;
+  return command;
+}
+Command Command::zero(int channel) { return of_channel(CommandKind::zero, 0, channel); }
+Command Command::bldc(std::int32_t speed, Direction direction, bool brake, int channel) {
+  Command command = of_channel(CommandKind::bldc, speed, channel);
+  command.direction = direction;
+  command.on = brake;
+  return command;
+}
+Command Command::proximity(std::int32_t cm, int channel) {
+  return of_channel(CommandKind::proximity, cm, channel);
+}
+Command Command::fields(Text list) {
+  Command command = of_kind(CommandKind::fields);
+  command.text = list;
+  return command;
+}
+Command Command::setting(Text key, Text value) {
+  Command command = of_kind(CommandKind::setting);
+  command.text = key;
+  command.text2 = value;
+  return command;
+}
+Command Command::watch(std::int32_t rate_hz, Text list) {
+  Command command = of_kind(CommandKind::watch);
+  command.value = rate_hz;
+  command.text = list;
+  return command;
+}
+Command Command::identify() { return of_kind(CommandKind::identify); }
+
+}  // namespace r4

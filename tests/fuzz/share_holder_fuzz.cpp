@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What other programs do to one that holds a wire: any number of them come, say anything in any order, read
+// or do not, and go. The input is a list of actions. Whatever they do, nothing but a stop gets to the board, one
+// that watches hears all, and a stop of one that comes last is obeyed.
+#include <fmt/core.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <asio/io_context.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "protocol/messages/command_field.hpp"
+#include "r4link/datagram.hpp"
+#include "tests/fuzz/input.hpp"
+#include "transports/share/share_message.hpp"
+#include "transports/share/share_socket.hpp"
+#include "transports/share/wire_holder.hpp"
+
+namespace r4 {
+namespace {
+
+using Kind = ShareMessage::Kind;
+
+constexpr std::string_view stop = "E:STOP;^0x506f0fbe^";
+constexpr std::size_t most_connections = 60;
+
+class Holder final : private WireHolder::Owner {
+ public:
+  explicit Holder(bool gives_way) : gives_way_(gives_way) {
+    require(holder_.hold(wire));
+    watcher_ = come(Kind::hello, hello_text(BoardRole::watch, "watcher"));
+    run();
+    require(holder_.sharers() == 1);
+    hear();
+  }
+  ~Holder() {
+    holder_.release();
+    run();
+  }
+
+  void act(Input& input) {
+    const std::uint8_t action = input.byte();
+    FileDescriptor none;
+    FileDescriptor& one = others_.empty() ? none : others_[input.byte() % others_.size()];
+    switch (action % 8) {
+      case 0:
+        if (others_.size() < most_connections) others_.push_back(reach_holder(wire));
+        break;
+      case 1:
+        say(one, Kind::hello, hello_text(BoardRole::watch, "other"));
+        break;
+      case 2:
+        say(one, Kind::hello, hello_text(BoardRole::control, "other"));
+        break;
+      case 3:
+        say(one, Kind::stop, stop);
+        break;
+      case 4: {
+        std::string bytes;
+        for (std::size_t left = input.byte(); left > 0; --left)
+          bytes += static_cast<char>(input.byte());
+        if (action & 0x80) bytes.resize(bytes.size() * 16, 'x');
+        ::send(one.get(), bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+        break;
+      }
+      case 5:
+        one.reset();
+        break;
+      case 6:
+        holder_.tell(Kind::received, "AIN24:24.28;", Priority::state);
+        told_ += given_away_ ? 0 : 1;
+        hear();
+        break;
+      default:
+        break;
+    }
+    if (action & 0x40) return;  // more is to come before the holder looks
+    run();
+    hear();
+  }
+
+  void end() {
+    run();
+    if (given_away_) return;
+    const int before = stops_;
+    const FileDescriptor last = come(Kind::stop, stop);
+    run();
+    require(stops_ == before + 1);
+    hear();
+  }
+
+ private:
+  const std::string& name() const override { return wire.name; }
+  Kind standing(std::string& text) const override {
+    text = wire.name;
+    return Kind::up;
+  }
+  void on_stop_of_another(std::string_view bytes) override {
+    Datagram datagram;
+    require(read_datagram(Text(bytes.data(), bytes.size()), datagram) && asks_to_stop(datagram));
+    require(!given_away_);
+    ++stops_;
+  }
+  bool gives_way() override {
+    given_away_ = gives_way_;
+    return gives_way_;
+  }
+  void on_given_away() override { require(given_away_ && !holder_.holds()); }
+
+  static FileDescriptor come(Kind kind, std::string_view text) {
+    FileDescriptor connection = reach_holder(wire);
+    require(static_cast<bool>(connection));
+    say(connection, kind, text);
+    return connection;
+  }
+  static void say(const FileDescriptor& connection, Kind kind, std::string_view text) {
+    if (connection) send_message(connection.get(), kind, text);
+  }
+  void run() {
+    io.restart();
+    io.poll();
+    require(holder_.sharers() <= WireHolder::most_sharers + WireHolder::most_stoppers);
+  }
+  // What the one that watches hears.
+  void hear() {
+    std::array<char, ShareMessage::max_size + 1> packet;
+    while (true) {
+      const ssize_t size = receive_packet(watcher_.get(), packet.data(), packet.size());
+      if (size <= 0) break;
+      const auto message = read_share_message({packet.data(), static_cast<std::size_t>(size)});
+      require(message && message->kind != Kind::down);
+      told_ -= message->kind == Kind::received ? 1 : 0;
+    }
+    require(told_ == 0);
+  }
+
+  static inline asio::io_context io{1};
+  static inline const SharedWire wire{fmt::format("fuzz/{}", ::getpid())};
+
+  const bool gives_way_;
+  bool given_away_ = false;
+  int stops_ = 0;
+  int told_ = 0;  // and not yet heard
+  WireHolder holder_{io, *this, "holder"};
+  FileDescriptor watcher_;
+  std::vector<FileDescriptor> others_;
+};
+
+}  // namespace
+}  // namespace r4
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  r4::Input input(data, size);
+  r4::Holder holder(input.byte() % 2 != 0);
+  for (int i = 0; i < 200 && !input.empty(); ++i) holder.act(input);
+  holder.end();
+  return 0;
+}

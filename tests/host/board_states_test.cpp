@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// States, one after the other: what waits, what gives way, what is told where none may be lost.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <future>
+#include <optional>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "host/state_queue.hpp"
+#include "r4link/board.hpp"
+#include "tests/support/at_will.hpp"
+#include "tests/support/problems.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+struct RecordedNumbers : RecordingVisitor {
+  void on_state(int, Time, const State& state) override { numbers.push_back(state.pnum); }
+  std::vector<std::uint32_t> numbers;
+};
+
+std::vector<std::uint32_t> numbers_of(States& states) {
+  std::vector<std::uint32_t> numbers;
+  while (const auto state = states.take(0ms)) numbers.push_back(state->pnum);
+  return numbers;
+}
+
+TEST(BoardStates, HaveNoHolesWhileACallbackAndTheLoopSleep) {
+  const std::string path = std::filesystem::temp_directory_path() /
+                           ("r4-states-" + std::to_string(::getpid()) + ".r4log");
+  BoardOptions options = at_will();
+  options.callback_limit = 0ms;
+  Board board("sim:", options);
+  board.record(path);
+  board.wait_active();
+  std::promise<void> wake;
+  board.on_state([asleep = wake.get_future().share()](const ReceivedState&) { asleep.wait(); });
+  States states = board.states({.lossless = true});
+  for (int i = 0; i < 40; ++i) board.next_state();
+  wake.set_value();
+  board.close();
+  const std::vector<std::uint32_t> taken = numbers_of(states);
+  EXPECT_TRUE(states.ended());
+  EXPECT_EQ(states.missed(), 0);
+  ASSERT_GE(taken.size(), 40);
+  RecordedNumbers recorded;
+  read_recording(path, recorded);
+  std::filesystem::remove(path);
+  auto& all = recorded.numbers;
+  all.erase(all.begin(), std::find(all.begin(), all.end(), taken.front()));
+  ASSERT_GE(all.size(), taken.size());
+  all.resize(taken.size());
+  EXPECT_EQ(taken, all);
+}
+
+TEST(BoardStates, TellOfAGapOnceInItsPlace) {
+  Board board("sim:");
+  board.wait_active();
+  States states = board.states({.lossless = true, .most = 5});
+  for (int i = 0; i < 8; ++i) board.next_state();
+  std::optional<ReceivedState> last;
+  for (int i = 0; i < 5; ++i) last = states.take(0ms);
+  ASSERT_TRUE(last);
+  const Problem problem = problem_of([&] { states.take(0ms); });
+  EXPECT_EQ(problem.kind, ErrorKind::data);
+  EXPECT_TRUE(contains(problem.reason, "5 waited")) << problem.reason;
+  EXPECT_TRUE(contains(problem.fix, "most"));
+  EXPECT_GE(states.missed(), 3);
+  const auto next = states.take(5s);
+  ASSERT_TRUE(next);
+  EXPECT_GE(next->pnum, last->pnum + 4);
+}
+
+TEST(BoardStates, AreTheNewestAtATimeUnlessMoreShallWait) {
+  Board board("sim:");
+  board.wait_active();
+  States states = board.states();
+  std::uint32_t seen = 0;
+  for (int i = 0; i < 4; ++i) seen = board.next_state().pnum;
+  const auto newest = states.take(0ms);
+  ASSERT_TRUE(newest);
+  EXPECT_GE(newest->pnum, seen);
+  EXPECT_GE(states.missed(), 2);
+}
+
+TEST(BoardStates, EndWithTheBoardAndOutliveIt) {
+  std::optional<Board> board("udp://127.0.0.1:9?listen=0");
+  States states = board->states();
+  EXPECT_FALSE(states.take(1ms)) << "there is no such board";
+  EXPECT_FALSE(states.ended());
+  auto waiting = std::async(std::launch::async, [&] { return states.take(60s); });
+  EXPECT_EQ(waiting.wait_for(20ms), std::future_status::timeout);
+  board->close();
+  EXPECT_FALSE(waiting.get());
+  EXPECT_TRUE(board->states().ended());
+  board.reset();
+  EXPECT_TRUE(states.ended());
+  EXPECT_FALSE(states.take(60s));
+}
+
+TEST(BoardStates, EndTheWaitWithWhatOnWaitThrows) {
+  struct EnoughWaited {};
+  BoardOptions options;
+  options.on_wait = [] { throw EnoughWaited(); };
+  Board board("udp://127.0.0.1:9?listen=0", options);
+  States states = board.states();
+  EXPECT_THROW(states.take(60s), EnoughWaited);
+}
+
+// Against a deque, whatever the order of puts and takes.
+TEST(BoardStates, ComeInOrderHoweverTheyArePutAndTaken) {
+  for (std::uint32_t seed = 0; seed < 40; ++seed) {
+    std::mt19937 random(seed);
+    const bool lossless = seed % 2 == 0;
+    const std::size_t most = 1 + random() % 40;
+    States::Queue queue({.lossless = lossless, .most = most}, nullptr);
+    std::deque<std::uint32_t> model;
+    std::uint64_t gap = 0;
+    std::uint64_t missed = 0;
+    const unsigned puts = 1 + random() % 4;
+    for (std::uint32_t pnum = 0; pnum < 200;) {
+      if (random() % 5 < puts) {
+        ReceivedState state;
+        state.pnum = pnum++;
+        queue.put(state);
+        if (lossless && (gap > 0 || model.size() == most)) {
+          ++gap;
+          ++missed;
+          continue;
+        }
+        if (model.size() == most) {
+          model.pop_front();
+          ++missed;
+        }
+        model.push_back(state.pnum);
+      } else if (!model.empty()) {
+        const auto state = queue.take(0ms);
+        ASSERT_TRUE(state) << seed;
+        ASSERT_EQ(state->pnum, model.front()) << seed;
+        model.pop_front();
+      } else if (gap > 0) {
+        ASSERT_THROW(queue.take(0ms), Error) << seed;
+        gap = 0;
+      } else {
+        ASSERT_FALSE(queue.take(0ms)) << seed;
+      }
+      ASSERT_EQ(queue.missed(), missed) << seed;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace r4::test

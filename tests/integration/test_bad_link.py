@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""r4 sim --link: what becomes of the datagrams, and of the link."""
+import pytest
+
+from r4_process import SANITIZED, Board, is_link, is_state, monitor, objects, run
+
+
+def behind(link, url='udp://127.0.0.1:0'):
+    return Board(url, options=('--link', link))
+
+
+def suffered(board):
+    """What the board tells of it at its end: of the datagrams to it, and of its own."""
+    [told] = [each for each in board.rest() if each['type'] == 'impairment']
+    return told['received'], told['sent']
+
+
+def share(of, counters):
+    came_in = counters['passed'] - counters['duplicated'] + counters['lost'] + counters['cut']
+    return counters[of] / came_in
+
+
+def bench(board, *options):
+    result = run('bench', board.host_url, '--duration', '1', '--json', *options, timeout=60)
+    assert result.returncode == 0, result
+    return objects(result.stdout)[0]
+
+
+def test_loss_is_counted_at_both_ends_and_commands_come_through():
+    with behind('loss=20%,seed=3') as board:
+        assert run('send', board.host_url, 'R:1,On', 'O:358,1,1', '--timeout', '5').returncode == 0
+        board.executed('O:358,1,1')
+        with monitor(board.host_url) as host:
+            host.next(is_link('active'))
+            times = [host.next(is_state)['t'] for _ in range(80)]
+        received, sent = suffered(board)
+    assert 0.1 < share('lost', sent) < 0.3 and received['lost'] > 0, (received, sent)
+    missing = (times[-1] - times[0]) / 10 + 1 - len(times)
+    assert missing > 5, 'states that were lost'
+    assert sent['duplicated'] == sent['corrupted'] == sent['cut'] == sent['overflow'] == 0
+
+
+def test_delay_is_in_every_round_trip():
+    with behind('delay=15ms+-5') as board:
+        measured = bench(board)
+        received, sent = suffered(board)
+    assert measured['round_trip_us']['p50'] > 20_000 and measured['unanswered'] == 0, measured
+    assert share('lost', sent) == share('lost', received) == 0
+
+
+def test_a_repeated_command_is_executed_once():
+    with behind('duplicate=100%') as board:
+        assert run('send', board.host_url, 'R:1,On', 'O:358,1,1').returncode == 0
+        board.executed('O:358,1,1')
+        received, sent = suffered(board)
+        executed = [each['executed']['command'] for each in board.log if 'executed' in each]
+    assert executed.count('O:358,1,1') == executed.count('R:1,On') == 1
+    assert share('duplicated', received) == share('duplicated', sent) == 1
+
+
+@pytest.mark.parametrize('transport', ['udp', 'pty'])
+def test_damage_is_noticed_and_never_executed(transport, tmp_path):
+    urls = {'udp': 'udp://127.0.0.1:0', 'pty': f'pty:{tmp_path}/board'}
+    with behind('corrupt=20%,seed=5', urls[transport]) as board:
+        assert run('send', board.host_url, 'R:1,On', 'O:358,1,1', '--timeout', '5').returncode == 0
+        with monitor(board.host_url) as host:
+            damaged = host.next(lambda each: each['type'] == 'error')
+            host.next(is_state)
+        received, sent = suffered(board)
+        executed = [each['executed']['command'] for each in board.log if 'executed' in each]
+    assert damaged['fields']['error'] in ('crc', 'syntax', 'length'), damaged
+    assert 0.1 < share('corrupted', sent) < 0.3 and received['corrupted'] > 0, (received, sent)
+    assert {each for each in executed if each[0] in 'DOPRSB'} == {'R:1,On', 'O:358,1,1'}
+
+
+def test_a_cut_makes_the_board_safe_and_ends_by_itself():
+    with behind('cut=1s+1.5s') as board, monitor(board.host_url) as host:
+        host.next(is_link('active'))
+        safe = board.state('SAFE', 'link')
+        assert safe['silence'] <= 1020 or SANITIZED
+        host.next(is_link('active'))
+        board.state('ACTIVE')
+        host.skip_past()
+        host.next(is_state)
+        assert host.end() == 0
+        received, sent = suffered(board)
+    assert received['cut'] > 10 and sent['cut'] > 10, (received, sent)
+    assert received['lost'] == sent['lost'] == 0

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The calendar's clock of a host is set by an hour under a running link."""
+import os
+import subprocess
+
+from r4_process import SANITIZED, Board, is_link, is_state, monitor
+
+HOUR_S = 3600
+# Between r4 and the C library: as soon as the file is there, it is an hour later.
+ANOTHER_CLOCK = r'''
+#include <stdlib.h>
+#include <sys/syscall.h>
+#include <time.h>
+#include <unistd.h>
+int clock_gettime(clockid_t id, struct timespec* now) {
+  const long result = syscall(SYS_clock_gettime, id, now);
+  if (id == CLOCK_REALTIME && access(getenv("CLOCK_IS_SET"), F_OK) == 0) now->tv_sec += 3600;
+  return (int)result;
+}
+'''
+
+
+def test_a_step_of_the_wall_clock_disturbs_nothing(tmp_path):
+    source, library, is_set = tmp_path / 'clock.c', tmp_path / 'clock.so', tmp_path / 'set'
+    source.write_text(ANOTHER_CLOCK)
+    subprocess.run(['gcc', '-shared', '-fPIC', '-o', library, source], check=True)
+    env = {**os.environ, 'LD_PRELOAD': str(library), 'CLOCK_IS_SET': str(is_set),
+           'ASAN_OPTIONS': 'verify_asan_link_order=0'}
+    with Board('udp://127.0.0.1:0') as board, monitor(board.host_url, env=env) as host:
+        host.next(is_link('active'))
+        before = host.next(lambda each: is_state(each) and each['sampled_error_ms'] is not None
+                           and each['sampled_error_ms'] < 1.5)
+        is_set.touch()
+        after = [host.next(is_state) for _ in range(150)]
+        assert host.end() == 0
+        since = host.log[host.log.index(before):]
+    assert all(each['fields']['up'] and each['fields']['state'] == 'active' and not each['fields']['gated']
+               for each in since if each['type'] == 'link'), 'the link is as it was'
+    steps = [later['t'] - earlier['t'] for earlier, later in zip(after, after[1:])]
+    assert max(steps) < 500 or SANITIZED, 'states go on'
+    last = after[-1]
+    passed = (last['t'] - before['t']) / 1000
+    error = (before['sampled_error_ms'] + last['sampled_error_ms']) / 1000 + 100e-6 * passed
+    assert abs(last['sampled'] - before['sampled'] - HOUR_S - passed) <= error + 5e-3, 'by the clock as it is set'
+    assert all(each['sampled_error_ms'] < 2 for each in after), 'what was known of the board\'s clock is known'

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A fleet on one CAN bus: its boards are stopped by one frame.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "r4link/fleet.hpp"
+#include "tests/support/at_will.hpp"
+#include "tests/support/board_in_a_thread.hpp"
+#include "tests/transports/can/kernel/raw_can.hpp"
+#include "transports/framing/can/can_ids.hpp"
+
+namespace r4::test {
+namespace {
+
+TEST(CanFleet, IsStoppedByOneFrameAndEachBoardConfirmsIt) {
+  std::vector<std::unique_ptr<BoardInAThread>> boards;
+  for (int node = 20; node < 24; ++node) {
+    boards.push_back(std::make_unique<BoardInAThread>("can://vcan0?node=" + std::to_string(node)));
+  }
+  Fleet fleet({"can://vcan0?node=20-23"}, at_will());
+  ASSERT_EQ(fleet.wait_active(std::chrono::seconds{10}), Fleet::Boards{});
+  fleet.send("O:500,1,1", std::chrono::seconds{5}).require();
+
+  RawCan bare(emergency_stop_id);
+  EXPECT_TRUE(fleet.stop(std::chrono::seconds{5}).all_confirmed());
+  std::uint32_t quiet_us = clock_us() + 300000;  // repeated for 200 ms
+  int frames = 0;
+  CanFrame frame;
+  while (bare.receive(frame, quiet_us)) ++frames;
+  EXPECT_EQ(frames, 1) << "of the four boards together";
+  for (const auto& board : boards) {
+    EXPECT_TRUE(board->wait_for(firmware::BoardState::safe, SafeReason::stop));
+    std::vector<std::string> stops = board->executed();
+    std::erase_if(stops, [](const std::string& each) { return !each.starts_with("E:STOP"); });
+    EXPECT_GE(stops.size(), 2U) << "the bare frame, and the one with the number";
+    EXPECT_LE(stops.size(), 25U) << "repeated every 20 ms by all together";
+  }
+  fleet.clear(std::chrono::seconds{5}).require();
+  fleet.send("O:1,1,1", std::chrono::seconds{5}).require();
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What r4 list has heard of a board: who it is, and who has it.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "../shell/json.hpp"
+#include "transports/identity_answer.hpp"
+
+namespace r4::tool {
+
+struct ListedBoard {
+  std::optional<IdentityAnswer> identity;
+  // The program of this machine that holds the wire.
+  int pid = 0;          // 0: none
+  std::string program;  // what it calls itself; empty: it has not said
+  bool controls = false;
+  // A host that is not that program was heard on the bus.
+  bool other_host = false;
+
+  // Does a host control it? None: it is not known.
+  std::optional<bool> busy() const;
+};
+
+// "id 0042af…, name left-arm, firmware 0.1.0, free", or "no answer".
+std::string text_of(const ListedBoard& board);
+// Puts the same into its object.
+void describe(const ListedBoard& board, Json& object);
+
+}  // namespace r4::tool

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How the members of a bus come to send, and the emergency stop ahead of them.
+#include <algorithm>
+#include <asio/post.hpp>
+#include <cerrno>
+
+#include "../framing/can/can_ids.hpp"
+#include "can_bus.hpp"
+#include "can_interface.hpp"
+
+namespace r4 {
+namespace {
+
+constexpr std::chrono::milliseconds retry_interval{1};
+
+}  // namespace
+
+// Flow control behind a whole datagram of telemetry would come too late on a slow bus. What finds no
+// room is offered again with the rest.
+void CanBus::send_urgent(std::uint32_t now_us) {
+  CanFrame frame;
+  for (const Place& place : members_) {
+    while (place.member != nullptr && place.member->offer_urgent(now_us, frame) &&
+           socket_.send_first(frame) == CanSocket::Outcome::done) {
+      place.member->frame_sent(now_us);
+    }
+  }
+}
+
+// Takes what members offer, a transfer of one after the other. True if there is any. Not while some
+// are left: of what waits longer, members choose the newest.
+bool CanBus::refill(std::uint32_t now_us) {
+  std::size_t quiet = 0;
+  while (out_count_ < ahead && quiet < members_.size()) {
+    next_ %= members_.size();
+    Member* const member = members_[next_].member;
+    if (member != nullptr && member->offer(now_us, out_[out_count_])) {
+      out_of_[out_count_++] = member;
+      quiet = 0;
+      member->frame_sent(now_us);
+    } else {
+      ++next_;
+      ++quiet;
+    }
+  }
+  return out_count_ != 0;
+}
+
+// The first ones of the queue have got to the interface.
+void CanBus::have_left(std::size_t count) {
+  if (count != 0) progress_ = Clock::now();
+  for (std::size_t i = 0; late_ && i < count; ++i) {
+    if (out_of_[i] != nullptr) out_of_[i]->on_late_frame(out_[i], to_us(progress_));
+  }
+  const auto gone = static_cast<std::ptrdiff_t>(count);
+  const auto end = static_cast<std::ptrdiff_t>(out_count_);
+  std::move(out_.begin() + gone, out_.begin() + end, out_.begin());
+  std::move(out_of_.begin() + gone, out_of_.begin() + end, out_of_.begin());
+  out_count_ -= count;
+  late_ = out_count_ != 0;
+}
+
+void CanBus::drop_queue() {
+  out_count_ = 0;
+  late_ = false;
+}
+
+void CanBus::send() {
+  if (!up_ || sending_) return;
+  sending_ = true;
+  CanSocket::Outcome outcome = CanSocket::Outcome::done;
+  if (out_count_ == 0) progress_ = Clock::now();
+  send_urgent(now_us());
+  while (outcome == CanSocket::Outcome::done && (out_count_ != 0 || refill(now_us()))) {
+    std::size_t sent = 0;
+    outcome = socket_.send(out_.data(), out_count_, sent);
+    const int error = errno;
+    have_left(sent);
+    if (outcome == CanSocket::Outcome::failed) {
+      asio::post(
+          io_, retrying_.handler([this, error] { go_down(can_problem(interface_, error), true); }));
+    }
+  }
+  sending_ = false;
+  clear_places();
+  if (outcome == CanSocket::Outcome::done) {
+    writable_.stop();
+  } else if (outcome != CanSocket::Outcome::failed) {
+    send_later();
+  }
+  for_each_member([](Member& member) { member.on_sent(); });
+}
+
+// A socket that is writable tells so; a full interface queue does not.
+void CanBus::send_later() {
+  if (Clock::now() - progress_ > patience) {
+    drop_queue();
+    progress_ = Clock::now();
+    for_each_member([](Member& member) { member.on_stuck(); });
+  }
+  retry_timer_.expires_after(retry_interval);
+  retry_timer_.async_wait(retrying_.handler([this] { send(); }));
+  writable_.start(socket_.number(), [this] { send(); });
+}
+
+SendResult CanBus::announce_stop(std::optional<std::uint32_t> number) {
+  if (!number || announced_stop_ != number) {
+    CanFrame frame{};
+    frame.id = emergency_stop_id;
+    const SendResult bare = send_first(frame);
+    if (bare != SendResult::sent || !number) return bare;
+    announced_stop_ = number;
+  }
+  return repeat_stop(*number);
+}
+
+SendResult CanBus::repeat_stop(std::uint32_t number) {
+  const Clock::time_point now = Clock::now();
+  if (numbered_stop_ == number && now - stop_left_ < stop_spacing) return SendResult::sent;
+  CanFrame frame{};
+  frame.extended = true;
+  frame.id = numbered_stop_id(number);
+  const SendResult result = send_first(frame);
+  if (result == SendResult::sent) {
+    numbered_stop_ = number;
+    stop_left_ = now;
+  }
+  return result;
+}
+
+SendResult CanBus::send_first(const CanFrame& frame) {
+  if (socket_.number() < 0) return SendResult::down;
+  switch (socket_.send_first(frame)) {
+    case CanSocket::Outcome::done:
+      return SendResult::sent;
+    case CanSocket::Outcome::busy:
+    case CanSocket::Outcome::full:
+      return SendResult::full;
+    case CanSocket::Outcome::failed:
+      break;
+  }
+  return SendResult::down;
+}
+
+}  // namespace r4
