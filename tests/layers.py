@@ -70,6 +70,8 @@ ALLOWED = {
     'tools/r4/formats/packets': SHELL | {'tools/r4/bus', 'tools/r4/formats'},
     'tools/r4/recording': SHELL | FORMATS,
     'tools/r4/watch': SHELL | {'tools/r4/bus'},
+    'tools/r4/ros2/graph': SHELL,
+    'tools/r4/ros2': SHELL | {'tools/r4/ros2/graph'},
     'tools/r4/sim': SHELL,
     'tools/r4': SHELL,
 }

@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Somebody else in a ROS 2 graph, by Fast DDS: what it reads and writes are bytes, whose form the test knows. For
+// integration/test_ros2.py, which drives it by lines on stdin and reads JSON, one object a line, on stdout:
+//
+//     reader TOPIC TYPE RELIABILITY DURABILITY USERDATA    {"type":"sample","topic":…,"bytes":"0001…"}
+//     writer TOPIC TYPE RELIABILITY DURABILITY USERDATA    {"type":"matched","topic":…,"readers":1}
+//     write TOPIC BYTES              {"type":"written","topic":…}
+//     remove TOPIC                   {"type":"removed","topic":…}
+//
+// RELIABILITY is reliable or best_effort, DURABILITY volatile or transient_local, USERDATA a text or -. What others
+// have it tells of itself: {"type":"endpoint","kind":"writer","topic":…,"of":…,"user_data":…,"gid":…}, and when it
+// goes, "gone":true; of participants {"type":"participant","user_data":…,"gone":…}. Its domain is ROS_DOMAIN_ID's,
+// on 127.0.0.1 alone.
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastrtps/utils/IPLocator.h>
+
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/domain/DomainParticipantListener.hpp>
+#include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/publisher/DataWriterListener.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/subscriber/DataReaderListener.hpp>
+#include <fastdds/dds/subscriber/SampleInfo.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <fastdds/dds/topic/Topic.hpp>
+#include <fastdds/dds/topic/TopicDataType.hpp>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <sstream>
+#include <string>
+#include <vector>
+
+namespace {
+
+using namespace eprosima::fastdds::dds;  // NOLINT(google-build-using-namespace)
+namespace rtps = eprosima::fastrtps::rtps;
+using Bytes = std::vector<std::uint8_t>;
+
+std::mutex output;
+
+void print(const std::string& object) {
+  const std::lock_guard lock(output);
+  std::cout << object << std::endl;
+}
+
+std::string hex(const std::uint8_t* bytes, std::size_t size) {
+  static const char* const digits = "0123456789abcdef";
+  std::string text;
+  for (std::size_t i = 0; i < size; ++i) {
+    text += digits[bytes[i] >> 4];
+    text += digits[bytes[i] & 0xF];
+  }
+  return text;
+}
+
+Bytes from_hex(const std::string& text) {
+  Bytes bytes;
+  for (std::size_t i = 0; i + 1 < text.size(); i += 2) {
+    bytes.push_back(static_cast<std::uint8_t>(std::stoi(text.substr(i, 2), nullptr, 16)));
+  }
+  return bytes;
+}
+
+std::string in_quotes(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c >= ' ' && c <= '~' && c != '"' && c != '\\' ? c : '?';
+  return quoted + '"';
+}
+
+// A type whose samples are bytes, the four of the encapsulation included.
+class RawType final : public TopicDataType {
+ public:
+  explicit RawType(const std::string& name) {
+    setName(name.c_str());
+    m_typeSize = 1024;
+    m_isGetKeyDefined = false;
+  }
+  bool serialize(void* data, rtps::SerializedPayload_t* payload) override {
+    const Bytes& bytes = *static_cast<Bytes*>(data);
+    if (bytes.size() > payload->max_size) return false;
+    std::memcpy(payload->data, bytes.data(), bytes.size());
+    payload->length = static_cast<std::uint32_t>(bytes.size());
+    return true;
+  }
+  bool deserialize(rtps::SerializedPayload_t* payload, void* data) override {
+    static_cast<Bytes*>(data)->assign(payload->data, payload->data + payload->length);
+    return true;
+  }
+  std::function<std::uint32_t()> getSerializedSizeProvider(void* data) override {
+    return [data] { return static_cast<std::uint32_t>(static_cast<Bytes*>(data)->size()); };
+  }
+  void* createData() override { return new Bytes(); }
+  void deleteData(void* data) override { delete static_cast<Bytes*>(data); }
+  bool getKey(void* /*data*/, rtps::InstanceHandle_t* /*handle*/, bool /*md5*/) override {
+    return false;
+  }
+};
+
+std::string gid_of(const rtps::GUID_t& guid) {
+  return hex(guid.guidPrefix.value, 12) + hex(guid.entityId.value, 4);
+}
+
+template <class Octets>
+std::string text_of(const Octets& octets) {
+  return {octets.begin(), octets.end()};
+}
+
+class Graph final : public DomainParticipantListener {
+ public:
+  void on_publisher_discovery(DomainParticipant* /*participant*/,
+                              rtps::WriterDiscoveryInfo&& info) override {
+    tell("writer", info.info, info.status != rtps::WriterDiscoveryInfo::REMOVED_WRITER);
+  }
+  void on_subscriber_discovery(DomainParticipant* /*participant*/,
+                               rtps::ReaderDiscoveryInfo&& info) override {
+    tell("reader", info.info, info.status != rtps::ReaderDiscoveryInfo::REMOVED_READER);
+  }
+  void on_participant_discovery(DomainParticipant* /*participant*/,
+                                rtps::ParticipantDiscoveryInfo&& info) override {
+    const bool there = info.status == rtps::ParticipantDiscoveryInfo::DISCOVERED_PARTICIPANT ||
+                       info.status == rtps::ParticipantDiscoveryInfo::CHANGED_QOS_PARTICIPANT;
+    print(R"({"type":"participant","user_data":)" + in_quotes(text_of(info.info.m_userData)) +
+          R"(,"gone":)" + (there ? "false" : "true") + "}");
+  }
+
+ private:
+  template <class Info>
+  static void tell(const char* kind, const Info& info, bool there) {
+    print(std::string(R"({"type":"endpoint","kind":")") + kind + R"(","topic":)" +
+          in_quotes(info.topicName().to_string()) + R"(,"of":)" +
+          in_quotes(info.typeName().to_string()) + R"(,"user_data":)" +
+          in_quotes(text_of(info.m_qos.m_userData)) + R"(,"gid":)" +
+          in_quotes(gid_of(info.guid())) + R"(,"gone":)" + (there ? "false" : "true") + "}");
+  }
+};
+
+class Samples final : public DataReaderListener {
+ public:
+  void on_data_available(DataReader* reader) override {
+    Bytes bytes;
+    SampleInfo info;
+    while (reader->take_next_sample(&bytes, &info) == ReturnCode_t::RETCODE_OK) {
+      if (!info.valid_data) continue;
+      print(R"({"type":"sample","topic":)" + in_quotes(reader->get_topicdescription()->get_name()) +
+            R"(,"bytes":)" + in_quotes(hex(bytes.data(), bytes.size())) + "}");
+    }
+  }
+};
+
+class Matches final : public DataWriterListener {
+ public:
+  void on_publication_matched(DataWriter* writer, const PublicationMatchedStatus& status) override {
+    print(R"({"type":"matched","topic":)" + in_quotes(writer->get_topic()->get_name()) +
+          R"(,"readers":)" + std::to_string(status.current_count) + "}");
+  }
+};
+
+template <class Q>
+void set(Q& qos, const std::string& reliability, const std::string& durability,
+         const std::string& user_data) {
+  qos.endpoint().history_memory_policy = rtps::DYNAMIC_RESERVE_MEMORY_MODE;
+  qos.reliability().kind =
+      reliability == "reliable" ? RELIABLE_RELIABILITY_QOS : BEST_EFFORT_RELIABILITY_QOS;
+  qos.durability().kind =
+      durability == "volatile" ? VOLATILE_DURABILITY_QOS : TRANSIENT_LOCAL_DURABILITY_QOS;
+  qos.history().kind = KEEP_LAST_HISTORY_QOS;
+  qos.history().depth = 10;
+  if (user_data != "-") {
+    qos.user_data().data_vec(std::vector<rtps::octet>(user_data.begin(), user_data.end()));
+  }
+}
+
+class Peer {
+ public:
+  Peer() {
+    DomainParticipantQos qos;
+    qos.transport().use_builtin_transports = false;
+    const auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
+    udp->interfaceWhiteList.emplace_back("127.0.0.1");
+    qos.transport().user_transports.push_back(udp);
+    rtps::Locator_t here;
+    rtps::IPLocator::setIPv4(here, 127, 0, 0, 1);
+    qos.wire_protocol().builtin.initialPeersList.push_back(here);
+    const std::string enclave = "enclave=/;";
+    qos.user_data().data_vec(std::vector<rtps::octet>(enclave.begin(), enclave.end()));
+    const char* const domain = std::getenv("ROS_DOMAIN_ID");
+    participant_ = DomainParticipantFactory::get_instance()->create_participant(
+        domain == nullptr ? 0 : static_cast<std::uint32_t>(std::stoul(domain)), qos, &graph_,
+        StatusMask::none());
+    publisher_ = participant_->create_publisher(PUBLISHER_QOS_DEFAULT);
+    subscriber_ = participant_->create_subscriber(SUBSCRIBER_QOS_DEFAULT);
+  }
+  ~Peer() {
+    participant_->delete_contained_entities();
+    DomainParticipantFactory::get_instance()->delete_participant(participant_);
+  }
+  Peer(const Peer&) = delete;
+  Peer& operator=(const Peer&) = delete;
+
+  void obey(const std::string& line) {
+    std::istringstream words(line);
+    std::string what;
+    std::string topic;
+    words >> what >> topic;
+    if (what == "write") {
+      std::string bytes;
+      words >> bytes;
+      Bytes sample = from_hex(bytes);
+      writers_.at(topic)->write(&sample);
+      print(R"({"type":"written","topic":)" + in_quotes(topic) + "}");
+      return;
+    }
+    if (what == "remove") {
+      publisher_->delete_datawriter(writers_.at(topic));
+      writers_.erase(topic);
+      print(R"({"type":"removed","topic":)" + in_quotes(topic) + "}");
+      return;
+    }
+    std::string type;
+    std::string reliability;
+    std::string durability;
+    std::string user_data;
+    words >> type >> reliability >> durability >> user_data;
+    TypeSupport(new RawType(type)).register_type(participant_);
+    Topic*& made = topics_[topic];
+    if (made == nullptr) made = participant_->create_topic(topic, type, TOPIC_QOS_DEFAULT);
+    if (what == "reader") {
+      DataReaderQos qos;
+      set(qos, reliability, durability, user_data);
+      subscriber_->create_datareader(made, qos, &samples_, StatusMask::all());
+    } else {
+      DataWriterQos qos;
+      set(qos, reliability, durability, user_data);
+      writers_[topic] = publisher_->create_datawriter(made, qos, &matches_, StatusMask::all());
+    }
+  }
+
+ private:
+  Graph graph_;
+  Samples samples_;
+  Matches matches_;
+  DomainParticipant* participant_ = nullptr;
+  Publisher* publisher_ = nullptr;
+  Subscriber* subscriber_ = nullptr;
+  std::map<std::string, Topic*> topics_;
+  std::map<std::string, DataWriter*> writers_;
+};
+
+}  // namespace
+
+int main() {
+  Peer peer;
+  for (std::string line; std::getline(std::cin, line);) peer.obey(line);
+  return 0;
+}

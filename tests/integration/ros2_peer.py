@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Somebody else in a ROS 2 graph: ros2_peer (ros2_peer.cpp) on Fast DDS, and CDR by hand."""
+import itertools
+import json
+import os
+import queue
+import struct
+import subprocess
+import threading
+import time
+
+from r4_process import PATIENCE_S, R4, Running
+
+PROGRAM = os.path.join(os.path.dirname(R4), 'tests', 'ros2_peer')
+# Of ROS; each graph has its own, for who was killed stays in the old one for a while.
+DOMAINS = itertools.count(os.getpid() * 8)
+ENVIRONMENT = {name: value for name, value in os.environ.items()
+               if not name.startswith('ROS_') and name != 'CYCLONEDDS_URI'}
+# What ROS 2 calls its messages in DDS, and what releases since Iron compare (measured).
+STRING, BOOL, FLOAT32, INT32, UINT32, TWIST = (f'{package}::msg::dds_::{name}_' for package, name in (
+    ('std_msgs', 'String'), ('std_msgs', 'Bool'), ('std_msgs', 'Float32'), ('std_msgs', 'Int32'), ('std_msgs', 'UInt32'),
+    ('geometry_msgs', 'Twist')))
+NODES = 'rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_'
+NODES_HASH = 'typehash=RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e;'
+HEAD = bytes((0, 1, 0, 0))  # little-endian XCDR1
+
+
+def own_domain():
+    """The environment of a graph of its own."""
+    return {**ENVIRONMENT, 'ROS_DOMAIN_ID': str(1 + next(DOMAINS) % 200)}
+
+
+class Ros2(Running):
+    """r4 ros2. `ready` is what it says of itself."""
+
+    def __init__(self, domain, *arguments):
+        super().__init__('ros2', '--json', *arguments, env=domain)
+        self.ready = self.next(lambda each: each['type'] == 'ready')
+
+    def armed(self):
+        return self.next(lambda each: each['type'] == 'log' and each['text'] == 'armed')
+
+    def logged(self, words, **options):
+        return self.next(lambda each: each['type'] == 'log' and words in each['text'], **options)
+
+
+class Peer:
+    def __init__(self, domain):
+        self.process = subprocess.Popen([PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+                                        env=domain)
+        self.lines = queue.Queue()
+        self.endpoints = {}  # (kind, topic): what is there
+        self.reader = threading.Thread(target=self._read, daemon=True)
+        self.reader.start()
+
+    def _read(self):
+        for line in self.process.stdout:
+            self.lines.put((time.monotonic(), json.loads(line)))
+
+    def say(self, *words):
+        self.process.stdin.write(' '.join(words) + '\n')
+        self.process.stdin.flush()
+
+    def read(self, topic, of, reliability='reliable', durability='volatile', user_data='-'):
+        self.say('reader', topic, of, reliability, durability, user_data)
+
+    def writer(self, topic, of, reliability='reliable', durability='volatile', user_data='-', matched=True):
+        self.say('writer', topic, of, reliability, durability, user_data)
+        if matched:
+            self.next(lambda each: each['type'] == 'matched' and each['topic'] == topic and each['readers'] > 0)
+
+    def write(self, topic, payload):
+        self.say('write', topic, (HEAD + payload).hex())
+
+    def next(self, is_it, timeout=PATIENCE_S):
+        deadline = time.monotonic() + timeout
+        while True:
+            try:
+                came, each = self.lines.get(timeout=max(0, deadline - time.monotonic()))
+            except queue.Empty:
+                raise AssertionError(f'nothing of that kind within {timeout} s') from None
+            each['came'] = came
+            if each['type'] == 'endpoint':
+                if each['gone']:
+                    self.endpoints = {key: value for key, value in self.endpoints.items() if value['gid'] != each['gid']}
+                else:
+                    self.endpoints[each['kind'], each['topic']] = each
+            if is_it(each):
+                return each
+
+    def sample(self, topic, is_it=lambda payload: True, timeout=PATIENCE_S):
+        """The payload of the next sample for which `is_it` is true."""
+        found = []
+
+        def matches(each):
+            if each['type'] != 'sample' or each['topic'] != topic:
+                return False
+            data = bytes.fromhex(each['bytes'])
+            assert data[:2] == HEAD[:2], data
+            found.append(data[4:])
+            return is_it(data[4:])
+        each = self.next(matches, timeout)
+        return Payload(found[-1], each['came'])
+
+    def endpoint(self, kind, topic, timeout=PATIENCE_S):
+        """What is told of a reader or writer of others, now or when it comes."""
+        if (kind, topic) not in self.endpoints:
+            self.next(lambda each: (kind, topic) in self.endpoints, timeout)
+        return self.endpoints[kind, topic]
+
+    def end(self):
+        self.process.stdin.close()
+        self.process.wait(timeout=PATIENCE_S)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.wait()
+        self.reader.join(PATIENCE_S)
+        self.process.stdout.close()
+
+
+class Payload(bytes):
+    """A sample's bytes behind the encapsulation, with the time at which they came."""
+
+    def __new__(cls, data, came=0.0):
+        self = super().__new__(cls, data)
+        self.came = came
+        return self
+
+
+class Cdr:
+    """Reads XCDR1, little-endian."""
+
+    def __init__(self, data):
+        self.data, self.at = data, 0
+
+    def take(self, form):
+        size = struct.calcsize(form)
+        self.at += -self.at % size
+        (value,) = struct.unpack_from('<' + form, self.data, self.at)
+        self.at += size
+        return value
+
+    def text(self):
+        size = self.take('I')
+        data = self.data[self.at:self.at + size]
+        self.at += size
+        assert data[-1:] == b'\0', data
+        return data[:-1].decode()
+
+    def list(self, read):
+        return [read() for _ in range(self.take('I'))]
+
+    def header(self):
+        seconds, nanoseconds = self.take('i'), self.take('I')
+        return seconds + nanoseconds / 1e9, self.text()
+
+
+def text(value):
+    data = value.encode() + b'\0'
+    return struct.pack('<I', len(data)) + data
+
+
+def texts(payload):
+    return Cdr(payload).text()
+
+
+def float32(value):
+    return struct.pack('<f', value)
+
+
+def twist(linear, angular):
+    return struct.pack('<6d', linear, 0, 0, 0, 0, angular)
+
+
+def nodes_of(payload, gid_size):
+    """{node: (readers, writers)} of a ros_discovery_info, whose ids have that many bytes."""
+    cdr = Cdr(payload)
+
+    def gid():
+        data = cdr.data[cdr.at:cdr.at + gid_size]
+        cdr.at += gid_size
+        return data
+    gid()
+    nodes = {}
+    for _ in range(cdr.take('I')):
+        space, name = cdr.text(), cdr.text()
+        nodes[space.rstrip('/') + '/' + name] = (cdr.list(gid), cdr.list(gid))
+    assert cdr.at == len(payload), (cdr.at, payload)
+    return nodes

@@ -1,0 +1,317 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""r4 ros2 in a graph with somebody else, who is Fast DDS and knows the bytes of ROS 2's messages."""
+import math
+import os
+import signal
+import struct
+import time
+
+import pytest
+
+from r4_process import ERROR, SANITIZED, Board, run
+from ros2_peer import (BOOL, FLOAT32, INT32, NODES, NODES_HASH, STRING, TWIST, UINT32, Cdr, Peer, Ros2,
+                       float32, nodes_of, own_domain, text, texts, twist)
+
+USAGE = 2
+ON, OFF = b'\x01', b'\x00'
+LOG = 'rcl_interfaces::msg::dds_::Log_'
+DIAGNOSTICS = 'diagnostic_msgs::msg::dds_::DiagnosticArray_'
+REQUEST, RESPONSE = 'std_srvs::srv::dds_::Trigger_Request_', 'std_srvs::srv::dds_::Trigger_Response_'
+
+
+@pytest.fixture(scope='module', name='graph')
+def make_graph():
+    """A board, its node, armed, and a peer."""
+    domain = own_domain()
+    with Board('udp://127.0.0.1:0') as board, Peer(domain) as peer:
+        with Ros2(domain, board.host_url, '--arm', '--counts-per-turn', '4096', '--drive', 'osmc1,-osmc2',
+                  '--wheel-separation', '0.5', '--full-speed', '2') as ros2:
+            ros2.armed()
+            yield board, ros2, peer
+            assert ros2.end() == 0, ros2.errors
+            peer.end()
+
+
+def join(ros2, peer, topic, of):
+    """A publisher of the peer, known at both ends: what is written now is read."""
+    peer.writer(f'rt/{topic}', of)
+    ros2.logged(f'{topic}: 1 publishers')
+
+
+def pwm(outputs, channel):
+    """The signed pwm of an OSMC channel."""
+    value, direction = outputs['osmc'][channel - 1]
+    return value if direction else -value
+
+
+def test_the_papers_topics(graph):
+    _, _, peer = graph
+    for topic in ('R4', 'R4_Heart_Beat', 'R4_Active'):
+        peer.read(f'rt/{topic}', STRING)
+    assert texts(peer.sample('rt/R4_Active')) == 'True'
+    beats = [texts(peer.sample('rt/R4_Heart_Beat')) for _ in range(3)]
+    assert beats in (['True', 'False', 'True'], ['False', 'True', 'False'])
+    line = texts(peer.sample('rt/R4', lambda payload: b'AIN24:' in payload))
+    assert 'PNum:' in line and line.count('^') == 2
+    heartbeat = texts(peer.sample('rt/R4', lambda payload: b'H:R4-ROS2' in payload))
+    assert 'PNum:' in heartbeat
+    first, second = (peer.sample('rt/R4', lambda payload: b'AIN24:' in payload) for _ in range(2))
+    assert second.came - first.came < 0.5
+
+
+def test_types_are_told_as_newer_releases_want_them(graph):
+    _, _, peer = graph
+    for kind, topic, of, hashed in (
+            ('writer', 'R4', STRING, 'df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18'),
+            ('reader', 'R4_Command', STRING, 'df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18'),
+            ('reader', 'cmd_vel', TWIST, '9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a'),
+            ('writer', 'osmc1/state', FLOAT32, '7170d3d8f841f7be3172ce5f4f59f3a4d7f63b0447e8b33327601ad64d83d6e2')):
+        endpoint = peer.endpoint(kind, f'rt/{topic}')
+        assert endpoint['of'] == of and endpoint['user_data'] == f'typehash=RIHS01_{hashed};'
+
+
+def test_what_is_commanded_as_text_is_executed_together(graph):
+    board, ros2, peer = graph
+    join(ros2, peer, 'R4_Command', STRING)
+    peer.write('rt/R4_Command', text('O:358,1,3; S:1500,2 ;'))
+    outputs = board.outputs(lambda each: pwm(each, 3) == 358)['outputs']
+    assert outputs['servo'][1] == pytest.approx(1500, abs=5)
+    peer.write('rt/R4_Command', text('O:100,1,3;O:5000,1,4'))  # one is wrong: neither is executed
+    peer.write('rt/R4_Command', text('O:200,0,3'))
+    assert pwm(board.outputs(lambda each: pwm(each, 3) != 358)['outputs'], 3) == -200
+    peer.say('remove', 'rt/R4_Command')  # and what it drove is off
+    outputs = board.outputs(lambda each: pwm(each, 3) == 0)['outputs']
+    assert outputs['servo'][1] == 0
+
+
+def test_a_component_is_commanded_and_told_in_the_units_of_ros(graph):
+    board, ros2, peer = graph
+    peer.read('rt/osmc1/state', FLOAT32)
+    join(ros2, peer, 'osmc1/command', FLOAT32)
+    peer.write('rt/osmc1/command', float32(-0.5))
+    came = time.monotonic()
+    assert pwm(board.outputs(lambda each: pwm(each, 1) != 0)['outputs'], 1) == -2048
+    told = peer.sample('rt/osmc1/state', lambda payload: struct.unpack('<f', payload)[0] < -0.4)
+    assert struct.unpack('<f', told)[0] == pytest.approx(-2048 / 4095, abs=1e-6)
+    # Silent, but there: off after the deadline of 1 s.
+    off = board.outputs(lambda each: pwm(each, 1) == 0)
+    assert SANITIZED or 0.9 < off['came'] - came < 1.4
+    for wrong in (math.nan, math.inf, 1.5):
+        peer.write('rt/osmc1/command', float32(wrong))
+    peer.write('rt/osmc1/command', float32(0.25))
+    assert pwm(board.outputs(lambda each: pwm(each, 1) != 0)['outputs'], 1) == 1024
+    peer.say('remove', 'rt/osmc1/command')
+    board.outputs(lambda each: pwm(each, 1) == 0)
+
+    join(ros2, peer, 'servo4/command', FLOAT32)
+    peer.write('rt/servo4/command', float32(math.pi / 4))
+    outputs = board.outputs(lambda each: each['servo'][3] != 0)['outputs']
+    assert outputs['servo'][3] == pytest.approx(2000, abs=5)
+    peer.say('remove', 'rt/servo4/command')
+    board.outputs(lambda each: each['servo'][3] == 0)
+
+
+def test_cmd_vel_drives_two_wheels_until_it_is_silent(graph):
+    board, ros2, peer = graph
+    join(ros2, peer, 'cmd_vel', TWIST)
+    peer.write('rt/cmd_vel', twist(1.0, 2.0))  # wheels 0.5 and 1.5 m/s of 2, the right one reversed
+    outputs = board.outputs(lambda each: pwm(each, 2) != 0)['outputs']
+    assert pwm(outputs, 1) == 1024 and pwm(outputs, 2) == -3071
+    peer.write('rt/cmd_vel', twist(math.nan, 0))
+    outputs = board.outputs()['outputs']
+    assert pwm(outputs, 1) == 0 and pwm(outputs, 2) == 0  # both at once
+    peer.say('remove', 'rt/cmd_vel')
+
+
+def test_sensors(graph):
+    _, _, peer = graph
+    peer.read('rt/battery', 'sensor_msgs::msg::dds_::BatteryState_', 'best_effort')
+    cdr = Cdr(peer.sample('rt/battery'))
+    stamp, _ = cdr.header()
+    assert abs(time.time() - stamp) < 2
+    assert 23 < cdr.take('f') < 26 and math.isnan(cdr.take('f'))
+    peer.read('rt/range/us1', 'sensor_msgs::msg::dds_::Range_')
+    cdr = Cdr(peer.sample('rt/range/us1'))
+    assert cdr.header()[1] == 'us1' and cdr.take('B') == 0
+    assert [round(cdr.take('f'), 3) for _ in range(3)] == [0.26, 0.02, 4.0]
+    assert cdr.take('f') > 0 and cdr.take('f') == 0
+    peer.read('rt/joint_states', 'sensor_msgs::msg::dds_::JointState_')
+    cdr = Cdr(peer.sample('rt/joint_states'))
+    assert abs(time.time() - cdr.header()[0]) < 2
+    assert cdr.list(cdr.text) == [f'encoder{n}' for n in range(1, 5)]
+    assert all(math.isfinite(value) for value in cdr.list(lambda: cdr.take('d')))
+    assert all(math.isfinite(value) for value in cdr.list(lambda: cdr.take('d')))
+    peer.read('rt/encoder1', INT32)
+    peer.read('rt/relays', UINT32)
+    peer.read('rt/handle', BOOL)
+    assert len(peer.sample('rt/encoder1')) == 4
+    assert struct.unpack('<I', peer.sample('rt/relays'))[0] & 1 == 1
+    assert peer.sample('rt/handle')[:1] == ON  # and what fills it up to four bytes
+
+
+def test_diagnostics(graph):
+    _, _, peer = graph
+    peer.read('rt/diagnostics', DIAGNOSTICS)
+    cdr = Cdr(peer.sample('rt/diagnostics'))
+    cdr.header()
+    assert cdr.take('I') == 1
+    level, name, message, hardware = cdr.take('B'), cdr.text(), cdr.text(), cdr.text()
+    values = dict((cdr.text(), cdr.text()) for _ in range(cdr.take('I')))
+    assert (level, name, message, hardware) == (0, '/r4: board', 'armed', 'sim-1')
+    assert values['link'] == 'active' and float(values['state rate (Hz)']) > 0 and values['firmware']
+
+
+def test_malformed_samples_change_nothing(graph):
+    board, ros2, peer = graph
+    bad = [b'', b'\x00', b'\x01\x00\x00\x00', b'\x00\x00\x00\x00', b'\xff\xff\xff\xffO:1,1,1\0',
+           struct.pack('<I', 10) + b'O:900,1,1\x01', struct.pack('<I', 10) + b'O:900,1,\0\0',
+           struct.pack('<I', 9) + b'O:900,1,1', bytes(range(256))]
+    for topic, of in (('R4_Command', STRING), ('osmc1/command', FLOAT32), ('stepper1/command', INT32), ('arm', BOOL),
+                      ('relay2/command', BOOL), ('cmd_vel', TWIST)):
+        join(ros2, peer, topic, of)
+        for payload in bad[:-1] if of == STRING else [b'', b'\x02\x00', b'\xff\xff\x7f\x7f']:
+            peer.write(f'rt/{topic}', payload)
+        if of != STRING:
+            peer.say('remove', f'rt/{topic}')
+    peer.write('rt/R4_Command', text('O:77,1,4'))
+    outputs = board.outputs(lambda each: pwm(each, 4) == 77)['outputs']
+    assert [pwm(outputs, n) for n in (1, 2, 3)] == [0, 0, 0]
+    peer.say('remove', 'rt/R4_Command')
+    board.outputs(lambda each: pwm(each, 4) == 0)
+    assert ros2.process.poll() is None
+
+
+def test_a_flood_of_commands_costs_no_heartbeat(graph):
+    board, ros2, peer = graph
+    join(ros2, peer, 'R4_Command', STRING)
+    for value in range(2000):
+        peer.write('rt/R4_Command', text(f'O:{value + 1},1,1'))
+    board.outputs(lambda each: pwm(each, 1) == 2000)
+    peer.say('remove', 'rt/R4_Command')
+    board.outputs(lambda each: pwm(each, 1) == 0)
+    assert not any(each.get('state') == 'SAFE' for each in board.log)
+    assert ros2.process.poll() is None
+
+
+def test_a_stop_is_a_stop_and_repeating_arm_does_not_arm_again(graph):
+    board, ros2, peer = graph
+    join(ros2, peer, 'arm', BOOL)
+    join(ros2, peer, 'stop', BOOL)
+    join(ros2, peer, 'osmc1/command', FLOAT32)
+    peer.write('rt/arm', ON)
+    peer.write('rt/osmc1/command', float32(0.5))
+    board.outputs(lambda each: pwm(each, 1) == 2048)
+    peer.write('rt/stop', OFF)
+    peer.write('rt/stop', ON)
+    assert pwm(board.outputs(lambda each: pwm(each, 1) != 2048)['outputs'], 1) == 0
+    board.state('SAFE', 'stop')
+    ros2.logged('E:STOP: confirmed')
+    peer.write('rt/arm', ON)  # the same publisher, still true
+    peer.write('rt/osmc1/command', float32(0.5))
+    ros2.logged('not armed (stop)')
+    peer.write('rt/arm', OFF)
+    peer.write('rt/arm', ON)
+    ros2.armed()
+    peer.write('rt/osmc1/command', float32(0.5))
+    board.outputs(lambda each: pwm(each, 1) == 2048)
+    for topic in ('arm', 'stop', 'osmc1/command'):
+        peer.say('remove', f'rt/{topic}')
+    board.outputs(lambda each: pwm(each, 1) == 0)
+
+
+def test_services_answer_with_the_boards_confirmation(graph):
+    board, ros2, peer = graph
+    peer.read('rr/r4/stopReply', RESPONSE, user_data='clientid=1;')
+    peer.read('rr/r4/armReply', RESPONSE, user_data='clientid=1;')
+    for name in ('stop', 'arm'):
+        peer.writer(f'rq/r4/{name}Request', REQUEST, user_data='clientid=1;')
+        ros2.logged(f'~/{name}: 1 publishers')
+        own = peer.endpoint('writer', f'rr/r4/{name}Reply')['user_data']
+        assert own.startswith('serviceid=') and 'typehash=RIHS01_2d946c21' in own
+    for number, name in ((7, 'stop'), (8, 'arm')):
+        peer.write(f'rq/r4/{name}Request', struct.pack('<QqB', 0x1122334455667788, number, 0))
+        cdr = Cdr(peer.sample(f'rr/r4/{name}Reply'))
+        assert (cdr.take('Q'), cdr.take('q'), cdr.take('B')) == (0x1122334455667788, number, 1)
+        assert 'confirmed by the board' in cdr.text()
+    board.state('SAFE', 'stop')
+    ros2.armed()
+
+
+@pytest.mark.parametrize('user_data, gid_size', ((NODES_HASH, 16), ('-', 24)))
+def test_its_node_is_listed_for_every_release(user_data, gid_size):
+    """`user_data`: what a peer of that release has on its own list of nodes."""
+    domain = own_domain()
+    with Board('udp://127.0.0.1:0') as board, Peer(domain) as peer, \
+            Ros2(domain, board.host_url, '--namespace', 'robot') as ros2:
+        assert ros2.ready['nodes'][0]['name'] == '/robot/r4'
+        peer.read('ros_discovery_info', NODES, 'reliable', 'transient_local', user_data)
+        peer.writer('ros_discovery_info', NODES, 'reliable', 'transient_local', user_data, matched=False)
+        listed = peer.sample('ros_discovery_info', lambda data: b'/robot\0' in data)
+        nodes = nodes_of(listed, gid_size)
+        readers, writers = nodes.pop('/robot/r4')
+        assert not nodes
+        raw = bytes.fromhex(peer.endpoint('writer', 'rt/robot/R4')['gid'])
+        assert raw.ljust(gid_size, b'\0') in writers
+        assert (len(readers), len(writers)) == tuple(len(ros2.ready[kind]) + 3  # of the services
+                                                    for kind in ('subscriptions', 'publishers'))
+        left = ros2.signal(signal.SIGINT)
+        gone = peer.sample('ros_discovery_info', lambda data: data[:16] == listed[:16])
+        assert nodes_of(gone, gid_size) == {}
+        assert SANITIZED or gone.came - left < 0.2
+        assert ros2.wait() == 0
+        assert SANITIZED or time.monotonic() - left < 1
+        # And again, as after a restart.
+        with Ros2(domain, board.host_url):
+            assert '/r4' in nodes_of(peer.sample('ros_discovery_info', lambda data: b'r4\0' in data), gid_size)
+
+
+def test_not_armed_nothing_drives():
+    domain = own_domain()
+    with Board('udp://127.0.0.1:0') as board, Peer(domain) as peer, \
+            Ros2(domain, board.host_url, '--deadline', '0.3') as ros2:
+        ros2.logged('the board takes commands')
+        join(ros2, peer, 'R4_Command', STRING)
+        peer.write('rt/R4_Command', text('O:358,1,1'))
+        ros2.logged('not armed (not yet)')
+        join(ros2, peer, 'arm', BOOL)
+        peer.write('rt/arm', ON)
+        ros2.armed()
+        peer.write('rt/R4_Command', text('O:358,1,1'))
+        on = board.outputs(lambda each: pwm(each, 1) == 358)
+        off = board.outputs(lambda each: pwm(each, 1) == 0)
+        assert SANITIZED or 0.25 < off['came'] - on['came'] < 0.8
+        peer.write('rt/R4_Command', text('E:STOP'))
+        board.state('SAFE', 'stop')
+
+
+def test_several_boards_have_namespaces_and_a_lost_one_is_told():
+    domain = own_domain()
+    with Board('udp://127.0.0.1:0') as left, Board('udp://127.0.0.1:0') as right, Peer(domain) as peer:
+        with Ros2(domain, left.host_url, right.host_url) as ros2:
+            assert [node['name'] for node in ros2.ready['nodes']] == ['/board1/r4', '/board2/r4']
+            for topic in ('board1', 'board2'):
+                peer.read(f'rt/{topic}/R4_Active', STRING)
+                peer.sample(f'rt/{topic}/R4_Active', lambda payload: texts(payload) == 'True')
+            peer.read('rt/rosout', LOG, 'reliable', 'transient_local')
+            right.signal(signal.SIGKILL)
+            peer.sample('rt/board2/R4_Active', lambda payload: texts(payload) == 'False')
+            peer.sample('rt/rosout', lambda payload: b'board2.r4\0' in payload and b'\0' in payload)
+
+
+def test_it_says_what_it_is():
+    domain = own_domain()
+    result = run('ros2', 'sim:', '--namespace', 'robot', '--for', '0.2', env=domain)
+    lines = result.stdout.splitlines()
+    assert result.returncode == 0 and lines[0] == f'/robot/r4 in domain {domain["ROS_DOMAIN_ID"]}, reach: this computer'
+    for line in ('  /robot/R4  std_msgs/msg/String', '  /robot/osmc1/command  std_msgs/msg/Float32',
+                 '  /diagnostics  diagnostic_msgs/msg/DiagnosticArray', '  /robot/r4/stop  std_srvs/srv/Trigger'):
+        assert line in lines
+
+
+def test_wrong_uses_are_refused():
+    for arguments, environment in ((('--name', '1x'), {}), (('--namespace', 'a//b'), {}), (('--servo', '1,2'), {}),
+                                   (('--drive', 'osmc1,osmc1'), {}), (('--drive', 'osmc1,osmc2'), {}),
+                                   (('--full-speed', '1'), {}), (('--counts-per-turn', 'nan'), {}),
+                                   ((), {'ROS_DOMAIN_ID': '233'}), ((), {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'FAR'})):
+        result = run('ros2', 'sim:', *arguments, env={**os.environ, **environment})
+        assert result.returncode == USAGE and ERROR.search(result.stderr), (arguments, environment, result)

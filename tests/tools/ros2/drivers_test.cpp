@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/r4/ros2/drivers.hpp"
+
+#include <gtest/gtest.h>
+
+#include "host/commands/command_help.hpp"
+
+namespace r4::tool::ros2 {
+namespace {
+
+using namespace std::chrono_literals;
+
+struct Driven {
+  explicit Driven(Drivers::Duration deadline = 1000ms) : drivers(deadline) {}
+
+  Drivers drivers;
+  Drivers::Time now{1h};
+  State state;
+  int topic = 0;
+  int other_topic = 0;
+
+  void sent(const Command& command, std::uint64_t publisher = 7) {
+    drivers.on_sent(command, &topic, publisher, now);
+  }
+  std::vector<std::string> to_stop() {
+    std::vector<std::string> texts;
+    for (const Command& each : drivers.to_stop(state, now).commands) texts.push_back(text_of(each));
+    return texts;
+  }
+};
+using Texts = std::vector<std::string>;
+
+TEST(Ros2Drivers, StopWhatASilentPublisherDrove) {
+  Driven driven;
+  driven.sent(Command::osmc(358, Direction::forward, 2));
+  driven.now += 999ms;
+  EXPECT_EQ(driven.to_stop(), Texts{});
+  driven.now += 1ms;
+  EXPECT_EQ(driven.to_stop(), Texts{"O:0,1,2"});
+  EXPECT_EQ(driven.to_stop(), Texts{"O:0,1,2"}) << "until the board has confirmed it";
+  driven.drivers.stopped(driven.drivers.to_stop(driven.state, driven.now));
+  EXPECT_EQ(driven.to_stop(), Texts{});
+  EXPECT_FALSE(driven.drivers.any());
+}
+
+TEST(Ros2Drivers, StopAtOnceWhatSomebodyDroveWhoHasGone) {
+  Driven driven;
+  driven.sent(Command::osmc(1, Direction::forward, 1), 7);
+  driven.sent(Command::dhb12(1, Direction::reverse, 3), 8);
+  driven.drivers.on_publishers(&driven.other_topic, {});
+  EXPECT_EQ(driven.to_stop(), Texts{}) << "of another topic";
+  driven.drivers.on_publishers(&driven.topic, {8});
+  EXPECT_EQ(driven.to_stop(), Texts{"O:0,1,1"});
+}
+
+TEST(Ros2Drivers, PutEachOutputWhereTheSafeStateHasIt) {
+  Driven driven;
+  driven.sent(Command::dhb12(9, Direction::reverse, 4));
+  driven.sent(Command::servo(1500, 16));
+  driven.sent(Command::relay(8, true));
+  driven.sent(Command::bldc(10, Direction::forward, false, 1));
+  driven.now += 2s;
+  EXPECT_EQ(driven.to_stop(), (Texts{"D:0,1,4", "S:0,16", "R:8,Off", "B:0,1,1,1"}));
+}
+
+TEST(Ros2Drivers, AStepperIsStoppedWhereItIsOnceThatIsKnown) {
+  Driven driven;
+  driven.sent(Command::stepper(100000, 1000, 2));
+  driven.now += 2s;
+  EXPECT_EQ(driven.to_stop(), Texts{});
+  driven.state.present.add(StateField::step2pos);
+  driven.state.stepper_steps[1] = 1234;
+  EXPECT_EQ(driven.to_stop(), Texts{"P:1234,1000,2"});
+}
+
+TEST(Ros2Drivers, LeaveAloneWhatRestsAndTheMotorsSupply) {
+  Driven driven;
+  driven.sent(Command::osmc(0, Direction::forward, 1));
+  driven.sent(Command::servo(0, 1));
+  driven.sent(Command::relay(2, false));
+  driven.sent(Command::relay(1, true));
+  driven.sent(Command::bldc(0, Direction::forward, true, 1));
+  driven.now += 1h;
+  EXPECT_FALSE(driven.drivers.any());
+  EXPECT_EQ(driven.to_stop(), Texts{});
+}
+
+TEST(Ros2Drivers, AnotherCommandEndsTheStopping) {
+  Driven driven;
+  driven.sent(Command::osmc(358, Direction::forward, 1), 7);
+  driven.now += 2s;
+  const Drivers::Stop stop = driven.drivers.to_stop(driven.state, driven.now);
+  driven.sent(Command::osmc(100, Direction::forward, 1), 8);
+  EXPECT_EQ(driven.to_stop(), Texts{});
+  driven.drivers.on_publishers(&driven.topic, {});
+  driven.drivers.stopped(stop);
+  EXPECT_EQ(driven.to_stop(), Texts{"O:0,1,1"}) << "the confirmation is of what was before";
+  driven.drivers.forget();
+  EXPECT_FALSE(driven.drivers.any());
+}
+
+TEST(Ros2Drivers, WithoutADeadlineOnlyWhoHasGoneIsMissed) {
+  Driven driven(0ms);
+  driven.sent(Command::osmc(358, Direction::forward, 1), 7);
+  driven.now += 24h;
+  EXPECT_EQ(driven.to_stop(), Texts{});
+  driven.drivers.on_publishers(&driven.topic, {});
+  EXPECT_EQ(driven.to_stop(), Texts{"O:0,1,1"});
+}
+
+TEST(Ros2Drivers, AGroupAtATime) {
+  Driven driven;
+  for (int n = 1; n <= servo_channels; ++n) driven.sent(Command::servo(1500, n));
+  for (int n = 1; n <= osmc_channels; ++n) driven.sent(Command::osmc(1, Direction::forward, n));
+  driven.now += 2s;
+  const auto first = driven.drivers.to_stop(driven.state, driven.now);
+  EXPECT_EQ(first.commands.size(), static_cast<std::size_t>(max_group));
+  driven.drivers.stopped(first);
+  EXPECT_EQ(driven.to_stop().size(), 4U);
+}
+
+}  // namespace
+}  // namespace r4::tool::ros2

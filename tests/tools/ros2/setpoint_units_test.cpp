@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/r4/ros2/setpoint_units.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "host/commands/command_help.hpp"
+#include "r4link/error.hpp"
+#include "tools/r4/ros2/command_text.hpp"
+
+namespace r4::tool::ros2 {
+namespace {
+
+constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+TEST(Ros2Units, ADutyIsSignedAndNeverRounded) {
+  EXPECT_EQ(from_duty(1)->pwm, 4095);
+  EXPECT_EQ(from_duty(-1)->pwm, 4095);
+  EXPECT_EQ(from_duty(-1)->direction, Direction::reverse);
+  EXPECT_EQ(from_duty(0)->pwm, 0);
+  for (const double wrong : {1.0001, -1.0001, not_a_number, infinite, -infinite}) {
+    EXPECT_FALSE(from_duty(wrong)) << wrong;
+  }
+  for (const int pwm : {0, 1, 358, 4095}) {
+    EXPECT_EQ(from_duty(to_duty(pwm, Direction::forward))->pwm, pwm);
+    EXPECT_EQ(from_duty(to_duty(pwm, Direction::reverse))->pwm, pwm);
+  }
+}
+
+TEST(Ros2Units, AServoTurnsByItsCalibration) {
+  const ServoCalibration usual;
+  EXPECT_EQ(to_pulse(usual, 0), 1500);
+  EXPECT_EQ(to_pulse(usual, M_PI / 2), 2500);
+  EXPECT_EQ(to_pulse(usual, -M_PI / 2), 500);
+  EXPECT_FALSE(to_pulse(usual, 1.6));
+  EXPECT_FALSE(to_pulse(usual, not_a_number));
+  EXPECT_NEAR(from_pulse(usual, 2000), M_PI / 4, 1e-9);
+  EXPECT_TRUE(std::isnan(from_pulse(usual, 0)));
+  const ServoCalibration narrow = servo_calibration("1000,2000,1.0");
+  EXPECT_EQ(to_pulse(narrow, 0.25), 1750);
+  EXPECT_FALSE(to_pulse(narrow, 0.6));
+  const ServoCalibration pulses = servo_calibration("us");
+  EXPECT_EQ(to_pulse(pulses, 1234), 1234);
+  EXPECT_EQ(to_pulse(pulses, 0), 0);
+  EXPECT_FALSE(to_pulse(pulses, 2501));
+  EXPECT_FALSE(to_pulse(pulses, -1));
+  for (const char* wrong :
+       {"", "1,2", "2000,1000,1", "500,2501,1", "500,2500,0", "a,b,c", "1,2,3,4"}) {
+    EXPECT_THROW(servo_calibration(wrong), Error) << wrong;
+  }
+}
+
+TEST(Ros2Units, ATwistDrivesTwoWheelsAndKeepsTheirRatio) {
+  const DifferentialDrive drive = differential_drive("osmc1,-osmc2", 0.5, 2.0);
+  EXPECT_EQ(text_of(*drive.setpoints(1, 0)), "O:2048,1,1;O:2048,0,2");
+  EXPECT_EQ(text_of(*drive.setpoints(0, 2)), "O:1024,0,1;O:1024,0,2");
+  EXPECT_EQ(text_of(*drive.setpoints(4, 0)), "O:4095,1,1;O:4095,0,2");
+  EXPECT_EQ(text_of(*drive.setpoints(4, 8)), "O:1365,1,1;O:4095,0,2") << "1 to 3, as wanted";
+  EXPECT_FALSE(drive.setpoints(not_a_number, 0));
+  EXPECT_FALSE(drive.setpoints(0, infinite));
+  EXPECT_EQ(text_of(*differential_drive("dhb12_3,dhb12_4", 1, 1).setpoints(0.5, 0)),
+            "D:2048,1,3;D:2048,1,4");
+  for (const char* wrong : {"", "osmc1", "osmc1,osmc1", "osmc1,-osmc1", "osmc5,osmc1",
+                            "osmc1,servo1", "osmc1,osmc2,osmc3", "osmc,osmc2"}) {
+    EXPECT_THROW(differential_drive(wrong, 1, 1), Error) << wrong;
+  }
+}
+
+StringMessage sample_of(std::string& bytes) {
+  StringMessage message{};
+  message.data._length = static_cast<std::uint32_t>(bytes.size());
+  message.data._buffer = reinterpret_cast<std::uint8_t*>(bytes.data());
+  return message;
+}
+
+TEST(Ros2CommandText, AStringEndsWithTheOnlyNulInIt) {
+  std::string good("O:1,1,1\0", 8);
+  EXPECT_EQ(text_of(sample_of(good)), "O:1,1,1");
+  std::string empty("\0", 1);
+  EXPECT_EQ(text_of(sample_of(empty)), "");
+  for (std::string bad : {std::string(), std::string("O:1,1,1"), std::string("E:STOP\0x\0", 9),
+                          std::string(2000, 'x') + '\0'}) {
+    EXPECT_FALSE(text_of(sample_of(bad))) << bad;
+  }
+}
+
+TEST(Ros2CommandText, SeveralCommandsStandBesideEachOther) {
+  const auto commands = commands_of(" O:358,1,1 ;S:1500,2;\n");
+  ASSERT_EQ(commands.size(), 2U);
+  EXPECT_EQ(text_of(commands[0]), "O:358,1,1");
+  EXPECT_EQ(text_of(commands[1]), "S:1500,2");
+  EXPECT_TRUE(commands_of(" ; ").empty());
+  for (const char* wrong :
+       {"O:358,1,1;X", "C:timeout,9000", "H:ROS2-R4", "E:LEAVE", "W:100", "O:358,1,9"}) {
+    EXPECT_THROW(commands_of(wrong), Error) << wrong;
+  }
+  EXPECT_TRUE(asks_to_stop("nonsense; E:STOP ;O:1,1,1"));
+  EXPECT_FALSE(asks_to_stop("E:STOPPED;E:CLEAR"));
+}
+
+}  // namespace
+}  // namespace r4::tool::ros2

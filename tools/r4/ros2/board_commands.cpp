@@ -1,0 +1,400 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "board_commands.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "command_text.hpp"
+#include "host/commands/command_help.hpp"
+#include "r4link/error.hpp"
+
+namespace r4::tool::ros2 {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto oldest = 250ms;  // of a command, as it leaves
+constexpr auto patience = 3000ms;
+constexpr auto stop_patience = 5000ms;
+constexpr std::size_t most_texts = 16;  // of R4_Command, that wait
+constexpr std::size_t most_others = 4;  // in one turn
+
+// The same output?
+bool is_same_output(const Command& a, const Command& b) {
+  return a.kind == b.kind && a.channel == b.channel;
+}
+
+std::function<void(const CommandResult&)> in_words(const AsyncBoard& board, std::string what,
+                                                   BoardCommands::Done done) {
+  return [&board, what = std::move(what), done = std::move(done)](const CommandResult& result) {
+    if (result.outcome == Outcome::confirmed) {
+      done(true, fmt::format("{}: confirmed by the board", what));
+    } else {
+      done(false, explain(what, result, board.link()).text());
+    }
+  };
+}
+
+}  // namespace
+
+BoardCommands::BoardCommands(AsyncBoard& board, Graph& graph, std::size_t node, Inbox& inbox,
+                             Outbox& outbox, const NodeOptions& options, Say say)
+    : board_(board),
+      outbox_(outbox),
+      options_(options),
+      say_(std::move(say)),
+      drivers_(options.deadline) {
+  subscribe_stop(graph, node, inbox);
+  subscribe_text(graph, node, inbox);
+  subscribe_arm(graph, node, inbox);
+  subscribe_outputs(graph, node, inbox);
+  if (options_.drive) subscribe_drive(graph, node, inbox);
+  serve(graph, node, inbox, "~/stop", [this](auto done) { stop(std::move(done)); });
+  serve(graph, node, inbox, "~/clear", [this](auto done) { clear(std::move(done)); });
+  serve(graph, node, inbox, "~/arm", [this](auto done) { arm(std::move(done)); });
+  board_.on_arming([this](DisarmCause cause) {
+    if (cause == DisarmCause::none) return;
+    wanted_.clear();
+    drivers_.forget();
+  });
+  board_.on_refused([this](const RefusedPost& refused) {
+    const std::string what = shown(refused.command);
+    warn(refused.code == Refusal::none
+             ? fmt::format("{}: not sent: {}", what, to_text(refused.why))
+             : fmt::format("{}: refused by the board: {}", what, meaning_of(refused.code)));
+  });
+}
+
+// --- topics
+
+void BoardCommands::subscribe_stop(Graph& graph, std::size_t node, Inbox& inbox) {
+  inbox.add<BoolMessage, bool>({
+      .reader = graph.subscribe<BoolMessage>(node, "stop"),
+      .room = 1,
+      .read = [](const BoolMessage& message) { return std::optional(message.data != 0); },
+      .urgent = [](bool pressed) { return pressed; },
+      .take =
+          [this](bool pressed, const Origin&) {
+            if (pressed) stop([](bool, const std::string&) {});
+          },
+      .left = on_publishers("stop"),
+  });
+}
+
+void BoardCommands::subscribe_arm(Graph& graph, std::size_t node, Inbox& inbox) {
+  Qos qos;
+  qos.depth = 10;
+  inbox.add<BoolMessage, bool>({
+      .reader = graph.subscribe<BoolMessage>(node, "arm", qos),
+      .room = 8,
+      .read = [](const BoolMessage& message) { return std::optional(message.data == 1); },
+      .urgent = {},
+      .take =
+          [this](bool pressed, const Origin& origin) {
+            // Who repeats itself does not arm again what has been stopped since: the edge counts.
+            const bool edge = pressed && !pressed_.contains(origin.publisher);
+            if (pressed) {
+              pressed_.insert(origin.publisher);
+            } else {
+              pressed_.erase(origin.publisher);
+            }
+            if (edge && !is_stale(origin)) arm([](bool, const std::string&) {});
+          },
+      .left = on_publishers("arm",
+                            [this](const std::vector<std::uint64_t>& there) {
+                              std::erase_if(pressed_, [&there](std::uint64_t each) {
+                                return std::find(there.begin(), there.end(), each) == there.end();
+                              });
+                            }),
+  });
+}
+
+void BoardCommands::subscribe_text(Graph& graph, std::size_t node, Inbox& inbox) {
+  Qos qos;
+  qos.depth = static_cast<int>(most_texts);  // each may be for another channel
+  const void* const source = sources_.emplace_back(std::make_unique<int>()).get();
+  inbox.add<StringMessage, std::string>({
+      .reader = graph.subscribe<StringMessage>(node, "R4_Command", qos),
+      .room = most_texts,
+      .read = text_of,
+      .urgent = [](const std::string& text) { return asks_to_stop(text); },
+      .take = [this, source](const std::string& text,
+                             const Origin& origin) { on_text(text, source, origin); },
+      .left = on_publishers(
+          "R4_Command",
+          [this, source](const auto& there) { drivers_.on_publishers(source, there); }),
+  });
+}
+
+void BoardCommands::on_text(const std::string& text, const void* source, const Origin& origin) {
+  if (asks_to_stop(text)) {
+    stop([](bool, const std::string&) {});
+    return;
+  }
+  if (is_stale(origin)) return;
+  std::vector<Command> commands;
+  try {
+    commands = commands_of(text);
+    for (const Command& command : commands) board_.require_sendable(command);
+  } catch (const Error& error) {
+    warn(error.problem().text());
+    return;
+  }
+  for (const Command& command : commands) {
+    if (drives_output(command.kind)) {
+      want(command, source, origin);
+    } else if (command.kind == CommandKind::clear) {
+      clear([](bool, const std::string&) {});
+    } else if (others_ < most_others) {
+      ++others_;
+      if (const PostResult result = board_.post(command); !result) tell(shown(command), result);
+    }
+  }
+}
+
+template <class Message, class ToCommand>
+void BoardCommands::subscribe_output(Graph& graph, std::size_t node, Inbox& inbox,
+                                     const std::string& topic, ToCommand to_command) {
+  Qos qos;
+  qos.depth = 1;
+  const void* const source = sources_.emplace_back(std::make_unique<int>()).get();
+  inbox.add<Message, double>({
+      .reader = graph.subscribe<Message>(node, topic, qos),
+      .room = 1,
+      .read =
+          [](const Message& message) { return std::optional(static_cast<double>(message.data)); },
+      .urgent = {},
+      .take =
+          [this, source, topic, to_command](double value, const Origin& origin) {
+            if (is_stale(origin)) return;
+            const std::optional<Command> command = to_command(value);
+            if (command) {
+              want(*command, source, origin);
+            } else {
+              warn(fmt::format("{}: {} is out of range; it changes nothing", topic, value));
+            }
+          },
+      .left = on_publishers(
+          topic, [this, source](const auto& there) { drivers_.on_publishers(source, there); }),
+  });
+}
+
+void BoardCommands::subscribe_outputs(Graph& graph, std::size_t node, Inbox& inbox) {
+  const auto subscribe = [&](auto message, const std::string& topic, auto to_command) {
+    subscribe_output<decltype(message)>(graph, node, inbox, topic, to_command);
+  };
+  for (int n = 1; n <= osmc_channels; ++n) {
+    const auto motor = [&](CommandKind kind, const std::string& topic) {
+      subscribe(Float32Message(), topic, [channel = MotorChannel{kind, n, false}](double duty) {
+        return channel.command(duty);
+      });
+    };
+    motor(CommandKind::osmc, fmt::format("osmc{}/command", n));
+    motor(CommandKind::dhb12, fmt::format("dhb12_{}/command", n));
+    subscribe(Float32Message(), fmt::format("bldc{}/command", n),
+              [n](double duty) -> std::optional<Command> {
+                const auto speed = from_duty(duty);
+                if (!speed) return std::nullopt;
+                return Command::bldc(speed->pwm, speed->direction, speed->pwm == 0, n);
+              });
+    subscribe(Int32Message(), fmt::format("stepper{}/command", n), [n](double steps) {
+      return std::optional(
+          Command::stepper(static_cast<std::int32_t>(steps), stepper_speed_default, n));
+    });
+  }
+  for (int n = 1; n <= servo_channels; ++n) {
+    subscribe(Float32Message(), fmt::format("servo{}/command", n),
+              [n, servo = options_.servo](double value) -> std::optional<Command> {
+                const auto pulse = to_pulse(servo, value);
+                if (!pulse) return std::nullopt;
+                return Command::servo(*pulse, n);
+              });
+  }
+  for (int n = 2; n <= relay_channels; ++n) {  // relay 1 is arming's
+    subscribe(BoolMessage(), fmt::format("relay{}/command", n), [n](double on) {
+      return on == 0 || on == 1 ? std::optional(Command::relay(n, on == 1)) : std::nullopt;
+    });
+  }
+}
+
+void BoardCommands::subscribe_drive(Graph& graph, std::size_t node, Inbox& inbox) {
+  struct Speed {
+    double linear;
+    double angular;
+  };
+  Qos qos;
+  qos.depth = 1;
+  const void* const source = sources_.emplace_back(std::make_unique<int>()).get();
+  inbox.add<TwistMessage, Speed>({
+      .reader = graph.subscribe<TwistMessage>(node, "cmd_vel", qos),
+      .room = 1,
+      .read =
+          [](const TwistMessage& message) {
+            return std::optional(Speed{message.linear.x, message.angular.z});
+          },
+      .urgent = {},
+      .take =
+          [this, source](const Speed& speed, const Origin& origin) {
+            if (is_stale(origin)) return;
+            const auto setpoints = options_.drive->setpoints(speed.linear, speed.angular);
+            if (!setpoints) {
+              warn("cmd_vel: a speed is no number; it changes nothing");
+              return;
+            }
+            for (std::size_t i = 0; i < setpoints->size(); ++i) {
+              want((*setpoints)[i], source, origin);
+            }
+          },
+      .left = on_publishers(
+          "cmd_vel", [this, source](const auto& there) { drivers_.on_publishers(source, there); }),
+  });
+}
+
+// --- services
+
+void BoardCommands::serve(Graph& graph, std::size_t node, Inbox& inbox, std::string_view name,
+                          std::function<void(Done)> act) {
+  const Graph::Service service = graph.serve_trigger(node, name);
+  const bool urgent = name == "~/stop";
+  inbox.add<TriggerRequest, TriggerRequest>({
+      .reader = service.requests,
+      .room = 4,
+      .read = [](const TriggerRequest& request) { return std::optional(request); },
+      .urgent = [urgent](const TriggerRequest&) { return urgent; },
+      .take =
+          [this, act = std::move(act), service, urgent](const TriggerRequest& request,
+                                                        const Origin& origin) {
+            if (!urgent && is_stale(origin)) return;
+            act([this, service, request](bool done, const std::string& text) {
+              outbox_.push([service, request, done, text] {
+                TriggerResponse response{};
+                response.client = request.client;
+                response.number = request.number;
+                response.success = done;
+                response.message = const_cast<char*>(text.c_str());
+                // The reader of a client that has just come may not be known yet.
+                dds_publication_matched_status_t matched{};
+                for (int i = 0; i < 20; ++i) {
+                  (void)dds_get_publication_matched_status(service.replies, &matched);
+                  if (matched.current_count != 0) break;
+                  dds_sleepfor(DDS_MSECS(5));
+                }
+                (void)dds_write(service.replies, &response);
+              });
+            });
+          },
+      .left = on_publishers(std::string(name)),
+  });
+}
+
+void BoardCommands::stop(Done done) {
+  constexpr std::size_t most_waiting = 16;
+  wanted_.clear();
+  drivers_.forget();
+  const bool under_way = !stops_.empty();
+  if (stops_.size() < most_waiting) stops_.push_back(std::move(done));
+  if (under_way) return;  // it is repeated until the board confirms it
+  board_.async_stop(stop_patience,
+                    in_words(board_, "E:STOP", [this](bool stopped, const std::string& text) {
+                      warn(stopped ? text : fmt::format("{}; {}", text, stop_last_resort));
+                      for (const Done& each : std::exchange(stops_, {})) each(stopped, text);
+                    }));
+}
+
+void BoardCommands::clear(Done done) {
+  board_.async_send(Command::clear(), patience, in_words(board_, "E:CLEAR", std::move(done)));
+}
+
+void BoardCommands::arm(Done done) {
+  if (arming_) {
+    done(false, "arm: it is being armed already");
+    return;
+  }
+  arming_ = true;
+  board_.async_arm(
+      patience,
+      in_words(board_, "arm", [this, done = std::move(done)](bool armed, const std::string& text) {
+        arming_ = false;
+        if (!armed) warn(text);
+        done(armed, text);
+      }));
+}
+
+// --- setpoints
+
+BoardCommands::Left BoardCommands::on_publishers(const std::string& topic, Left left) {
+  return [this, topic, left = std::move(left)](const std::vector<std::uint64_t>& there) {
+    say_(LogLevel::info, fmt::format("{}: {} publishers", topic, there.size()));
+    if (left) left(there);
+  };
+}
+
+bool BoardCommands::is_stale(const Origin& origin) {
+  if (Clock::now() - origin.written <= oldest) return false;
+  ++stale_;
+  return true;
+}
+
+void BoardCommands::want(const Command& command, const void* source, const Origin& origin) {
+  std::erase_if(wanted_,
+                [&command](const Setpoint& each) { return is_same_output(each.command, command); });
+  wanted_.push_back({command, source, origin.publisher});
+}
+
+void BoardCommands::flush() {
+  others_ = 0;
+  for (std::size_t first = 0; first < wanted_.size(); first += max_group) {
+    post(first, std::min<std::size_t>(max_group, wanted_.size() - first));
+  }
+  wanted_.clear();
+}
+
+void BoardCommands::post(std::size_t first, std::size_t count) {
+  PostResult result = PostResult::no_link;
+  std::string what = text_of(wanted_[first].command);
+  if (count == 1) {
+    result = board_.post(wanted_[first].command);
+  } else {
+    Setpoints group;
+    for (std::size_t i = first; i < first + count; ++i) group.add(wanted_[i].command);
+    what = text_of(group);
+    result = board_.post(group);
+  }
+  if (!result) {
+    tell(what, result);
+    return;
+  }
+  const Clock::time_point now = Clock::now();
+  for (std::size_t i = first; i < first + count; ++i) {
+    drivers_.on_sent(wanted_[i].command, wanted_[i].source, wanted_[i].publisher, now);
+  }
+}
+
+void BoardCommands::tell(const std::string& what, PostResult result) {
+  if (result == PostResult::not_armed) {
+    const Problem problem = explain("command", board_.disarmed_by());
+    warn(fmt::format("not armed ({}): {}", to_text(board_.disarmed_by()), problem.fix));
+  } else {
+    warn(fmt::format("a command was dropped: {} ({})", to_text(result), what));
+  }
+}
+
+void BoardCommands::on_tick() {
+  if (resting_ || !drivers_.any()) return;
+  const Drivers::Stop stop = drivers_.to_stop(board_.state(), Clock::now());
+  if (stop.commands.empty()) return;
+  Setpoints group;
+  for (const Command& command : stop.commands) group.add(command);
+  warn(fmt::format("{}: whoever drove it has gone or is silent", text_of(group)));
+  resting_ = true;
+  board_.async_apply(group, oldest, [this, stop](const CommandResult& result) {
+    resting_ = false;
+    if (result.outcome == Outcome::confirmed) drivers_.stopped(stop);
+  });
+}
+
+}  // namespace r4::tool::ros2

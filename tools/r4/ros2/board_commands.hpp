@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What ROS tells a board: R4_Command, a topic for each output component, cmd_vel, stop, arm, and the services.
+//
+// All of it runs on the loop of the boards. What drives an output is gathered until the inbox is drained, the
+// newest of a channel, and leaves in as few datagrams as there can be. A sample older than 250 ms is dropped, as is
+// what comes while there is no link: nothing is kept for later. A stop is never too old.
+#pragma once
+
+#include <asio/io_context.hpp>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "drivers.hpp"
+#include "graph/graph.hpp"
+#include "graph/inbox.hpp"
+#include "graph/outbox.hpp"
+#include "log_level.hpp"
+#include "node_options.hpp"
+#include "r4link/async_board.hpp"
+
+namespace r4::tool::ros2 {
+
+class BoardCommands {
+ public:
+  // What a person should know; called on the loop.
+  using Say = std::function<void(LogLevel level, const std::string& text)>;
+
+  BoardCommands(AsyncBoard& board, Graph& graph, std::size_t node, Inbox& inbox, Outbox& outbox,
+                const NodeOptions& options, Say say);
+
+  // The inbox is drained.
+  void flush();
+  // Every 20 ms or so: stops what nobody drives any more.
+  void on_tick();
+  using Done = std::function<void(bool done, const std::string& text)>;
+  void arm(Done done);
+
+  std::uint64_t stale() const { return stale_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Setpoint {
+    Command command;
+    const void* source = nullptr;
+    std::uint64_t publisher = 0;
+  };
+
+  void subscribe_text(Graph& graph, std::size_t node, Inbox& inbox);
+  void subscribe_outputs(Graph& graph, std::size_t node, Inbox& inbox);
+  template <class Message, class ToCommand>
+  void subscribe_output(Graph& graph, std::size_t node, Inbox& inbox, const std::string& topic,
+                        ToCommand to_command);
+  void subscribe_drive(Graph& graph, std::size_t node, Inbox& inbox);
+  void subscribe_stop(Graph& graph, std::size_t node, Inbox& inbox);
+  void subscribe_arm(Graph& graph, std::size_t node, Inbox& inbox);
+  void serve(Graph& graph, std::size_t node, Inbox& inbox, std::string_view name,
+             std::function<void(Done)> act);
+
+  using Left = std::function<void(const std::vector<std::uint64_t>&)>;
+  // Tells of it, too.
+  Left on_publishers(const std::string& topic, Left left = {});
+
+  void warn(const std::string& text) const { say_(LogLevel::warning, text); }
+  bool is_stale(const Origin& origin);
+  void on_text(const std::string& text, const void* source, const Origin& origin);
+  void want(const Command& command, const void* source, const Origin& origin);
+  void post(std::size_t first, std::size_t count);
+  void tell(const std::string& what, PostResult result);
+  void stop(Done done);
+  void clear(Done done);
+
+  AsyncBoard& board_;
+  Outbox& outbox_;
+  const NodeOptions options_;
+  const Say say_;
+  Drivers drivers_;
+  std::vector<Setpoint> wanted_;
+  std::size_t others_ = 0;  // commands since the last flush() that drive nothing
+  bool resting_ = false;    // what nobody drives is on its way to rest
+  bool arming_ = false;
+  std::vector<Done> stops_;          // who waits for the stop that is under way
+  std::set<std::uint64_t> pressed_;  // publishers of `arm` whose newest message is true
+  std::uint64_t stale_ = 0;
+  std::vector<std::unique_ptr<int>> sources_;  // what tells the topics apart
+};
+
+}  // namespace r4::tool::ros2

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One board as one node of ROS 2: what it says goes to the outbox, what is commanded comes from the inbox.
+#pragma once
+
+#include <asio/io_context.hpp>
+#include <asio/steady_timer.hpp>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "board_commands.hpp"
+#include "board_topics.hpp"
+#include "graph/graph.hpp"
+#include "graph/inbox.hpp"
+#include "graph/outbox.hpp"
+#include "node_options.hpp"
+#include "r4link/async_board.hpp"
+
+namespace r4::tool::ros2 {
+
+class BoardNode {
+ public:
+  // What is logged is also told to `logged`, on the loop.
+  using Logged =
+      std::function<void(LogLevel level, const std::string& node, const std::string& text)>;
+
+  BoardNode(asio::io_context& io, const std::string& url, const BoardOptions& board_options,
+            Graph& graph, std::size_t node, Inbox& inbox, Outbox& outbox,
+            const NodeOptions& options, Logged logged);
+
+  // Throws Error if the transport cannot be opened.
+  void open();
+  // The inbox is drained.
+  void flush() { commands_.flush(); }
+  AsyncBoard& board() { return board_; }
+  const std::string& name() const { return name_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void connect();
+  void on_link(const LinkStatus& link);
+  void tick();
+  void tell_health();
+  Health health() const;
+  void log(LogLevel level, const std::string& text);
+  void say(LogLevel level, const std::string& text);
+
+  const NodeOptions options_;
+  const std::string name_;
+  const Inbox& inbox_;
+  Outbox& outbox_;
+  const Logged logged_;
+  AsyncBoard board_;
+  const std::shared_ptr<BoardTopics> topics_;
+  BoardCommands commands_;
+  asio::steady_timer tick_;
+  Clock::time_point next_second_{};
+  bool armed_once_ = false;
+  bool heard_ = false;
+  bool in_control_ = false;
+  std::map<std::string, Clock::time_point> said_;  // what was logged lately
+};
+
+}  // namespace r4::tool::ros2

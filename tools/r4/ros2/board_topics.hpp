@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a board says, on the topics of its node: the paper's three strings (section 8.8), one topic a component in
+// the units of ROS, joints, battery, ranges and diagnostics. Used by the outbox's thread alone, but for its making.
+//
+// The paper's strings and the joints are published with every datagram; a component when it has changed, and once
+// a second, so that who comes later is told. What is not heard of any more is not repeated.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "graph/graph.hpp"
+#include "graph/message_types.hpp"
+#include "log_level.hpp"
+#include "node_options.hpp"
+#include "r4link/link.hpp"
+
+namespace r4::tool::ros2 {
+
+// A status of diagnostics; the levels are ROS's.
+struct Health {
+  enum Level : std::uint8_t { ok = 0, warning = 1, error = 2, stale = 3 };
+  Level level = stale;
+  std::string message;
+  std::string hardware_id;
+  std::vector<std::pair<std::string, std::string>> values;
+};
+
+class BoardTopics {
+ public:
+  using Clock = std::chrono::steady_clock;
+  using WallTime = std::chrono::system_clock::time_point;
+
+  BoardTopics(Graph& graph, std::size_t node, const NodeOptions& options);
+
+  void on_datagram(const std::string& line) const;
+  void on_heartbeat();
+  void on_active(bool active) const;
+  void on_state(const State& state, WallTime sampled);
+  void on_health(const Health& health, WallTime now) const;
+  void log(LogLevel level, const std::string& text, WallTime now) const;
+
+ private:
+  // A value that is published when it changes.
+  template <class Value>
+  struct Changing {
+    dds_entity_t writer = 0;
+    std::optional<Value> last;
+    Clock::time_point sent{};
+    // Is it time to publish this one?
+    bool is_due(const Value& value, Clock::time_point now) {
+      if (writer == 0 || (last == value && now - sent < std::chrono::seconds(1))) return false;
+      last = value;
+      sent = now;
+      return true;
+    }
+  };
+  template <class Message, class Value>
+  static void publish(Changing<Value>& topic, Value value, Clock::time_point now);
+  void publish_battery(const State& state, WallTime sampled, Clock::time_point now);
+  void publish_ranges(const State& state, WallTime sampled, Clock::time_point now);
+  void publish_joints(const State& state, WallTime sampled) const;
+  static void write_text(dds_entity_t writer, std::string_view text);
+
+  const NodeOptions options_;
+  const std::string node_name_;
+  const std::string frame_prefix_;
+  bool beat_ = false;
+
+  dds_entity_t raw_ = 0;
+  dds_entity_t heartbeat_ = 0;
+  dds_entity_t active_ = 0;
+  dds_entity_t diagnostics_ = 0;
+  dds_entity_t rosout_ = 0;
+  dds_entity_t joints_ = 0;
+  std::array<Changing<float>, osmc_channels> osmc_;
+  std::array<Changing<float>, dhb12_channels> dhb12_;
+  std::array<Changing<float>, bldc_channels> bldc_;
+  std::array<Changing<float>, servo_channels> servos_;
+  std::array<Changing<std::int32_t>, encoder_channels> encoders_;
+  std::array<Changing<std::int32_t>, stepper_channels> steppers_;
+  std::array<Changing<float>, analog_channels> analog_;
+  std::array<Changing<std::uint16_t>, ultrasonic_channels> ranges_;
+  Changing<std::uint32_t> relays_;
+  Changing<bool> handle_;
+  Changing<std::int32_t> battery_;
+};
+
+}  // namespace r4::tool::ros2

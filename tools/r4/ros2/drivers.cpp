@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "drivers.hpp"
+
+#include <algorithm>
+
+namespace r4::tool::ros2 {
+namespace {
+
+struct Kind {
+  CommandKind kind;
+  int channels;
+};
+constexpr std::array<Kind, 6> kinds{{{CommandKind::osmc, osmc_channels},
+                                     {CommandKind::dhb12, dhb12_channels},
+                                     {CommandKind::servo, servo_channels},
+                                     {CommandKind::relay, relay_channels},
+                                     {CommandKind::stepper, stepper_channels},
+                                     {CommandKind::bldc, bldc_channels}}};
+constexpr int supply_relay = 1;
+
+// Does the output rest after it?
+bool rests(const Command& command) {
+  switch (command.kind) {
+    case CommandKind::stepper:
+      return false;
+    case CommandKind::relay:
+      return !command.on;
+    case CommandKind::bldc:
+      return command.value == 0 && command.on;
+    default:
+      return command.value == 0;
+  }
+}
+
+bool has_position(const State& state, int channel) {
+  constexpr std::array<StateField, stepper_channels> fields{
+      StateField::step1pos, StateField::step2pos, StateField::step3pos, StateField::step4pos};
+  return state.present.has(fields[static_cast<std::size_t>(channel - 1)]);
+}
+
+}  // namespace
+
+std::optional<std::size_t> Drivers::index_of(const Command& command) {
+  std::size_t first = 0;
+  for (const Kind& each : kinds) {
+    if (command.kind == each.kind) {
+      if (each.kind == CommandKind::relay && command.channel == supply_relay) return std::nullopt;
+      return first + command.channel - 1U;
+    }
+    first += static_cast<std::size_t>(each.channels);
+  }
+  return std::nullopt;
+}
+
+std::optional<Command> Drivers::stop_of(std::size_t index, const State& state) {
+  std::size_t first = 0;
+  for (const Kind& each : kinds) {
+    const auto channels = static_cast<std::size_t>(each.channels);
+    if (index >= first + channels) {
+      first += channels;
+      continue;
+    }
+    const int channel = static_cast<int>(index - first) + 1;
+    switch (each.kind) {
+      case CommandKind::osmc:
+        return Command::osmc(0, Direction::forward, channel);
+      case CommandKind::dhb12:
+        return Command::dhb12(0, Direction::forward, channel);
+      case CommandKind::servo:
+        return Command::servo(0, channel);
+      case CommandKind::relay:
+        return Command::relay(channel, false);
+      case CommandKind::stepper:
+        if (!has_position(state, channel)) return std::nullopt;
+        return Command::stepper(state.steps(channel), stepper_speed_default, channel);
+      default:
+        return Command::bldc(0, Direction::forward, true, channel);
+    }
+  }
+  return std::nullopt;
+}
+
+void Drivers::on_sent(const Command& command, const void* source, std::uint64_t publisher,
+                      Time now) {
+  if (const auto index = index_of(command)) {
+    outputs_[*index] = {rests(command) ? Stage::free : Stage::driven, source, publisher, now,
+                        ++sent_};
+  }
+}
+
+void Drivers::on_publishers(const void* source, const std::vector<std::uint64_t>& there) {
+  for (Output& output : outputs_) {
+    if (output.stage != Stage::driven || output.source != source) continue;
+    if (std::find(there.begin(), there.end(), output.publisher) == there.end()) {
+      output.stage = Stage::stopping;
+    }
+  }
+}
+
+void Drivers::forget() { outputs_.fill({}); }
+
+Drivers::Stop Drivers::to_stop(const State& state, Time now) {
+  Stop stop{{}, sent_};
+  for (std::size_t i = 0; i < outputs; ++i) {
+    Output& output = outputs_[i];
+    const bool silent = deadline_.count() != 0 && now - output.last >= deadline_;
+    if (output.stage == Stage::driven && silent) output.stage = Stage::stopping;
+    if (output.stage != Stage::stopping || stop.commands.size() == max_group) continue;
+    if (const auto command = stop_of(i, state)) stop.commands.push_back(*command);
+  }
+  return stop;
+}
+
+void Drivers::stopped(const Stop& stop) {
+  for (const Command& command : stop.commands) {
+    const auto index = index_of(command);
+    if (index && outputs_[*index].sent <= stop.sent) outputs_[*index] = {};
+  }
+}
+
+bool Drivers::any() const {
+  return std::any_of(outputs_.begin(), outputs_.end(),
+                     [](const Output& output) { return output.stage != Stage::free; });
+}
+
+}  // namespace r4::tool::ros2

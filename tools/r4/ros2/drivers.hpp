@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Which publisher drives which output, and which of them have gone.
+//
+//     free --a command that drives--> driven --its publisher has gone, or is silent for the deadline--> stopping
+//      ^                               |  ^                                                              |
+//      +-- a command that stops -------+  +---------------- a command of somebody -----------------------+
+//      +---------------------------------- stopped, the board has confirmed it ---------------------------+
+//
+// What is stopped goes where the board's safe state puts it: motors to 0, brushless drivers to 0 with their brakes
+// on, servos without pulses, relays open, steppers standing where they are. Relay 1 is no output here: it is the
+// motors' supply, and arming's. No clock: the time is passed in.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "r4link/command.hpp"
+#include "r4link/state.hpp"
+
+namespace r4::tool::ros2 {
+
+class Drivers {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+  using Duration = std::chrono::milliseconds;
+
+  // A deadline of 0: only who has gone is missed.
+  explicit Drivers(Duration deadline) : deadline_(deadline) {}
+
+  // `source`: the topic; `publisher`: of that topic.
+  void on_sent(const Command& command, const void* source, std::uint64_t publisher, Time now);
+  // Those of a topic that are left.
+  void on_publishers(const void* source, const std::vector<std::uint64_t>& there);
+  // Somebody else has made the outputs safe.
+  void forget();
+
+  // Commands for what is to be stopped now, for each output until stopped() or a command for it. At most
+  // max_group. A stepper waits for a `state` with its position.
+  struct Stop {
+    std::vector<Command> commands;
+    std::uint64_t sent = 0;  // commands before it
+  };
+  Stop to_stop(const State& state, Time now);
+  // The board has confirmed it. What was driven again since is not stopped by that.
+  void stopped(const Stop& stop);
+  bool any() const;
+
+ private:
+  enum class Stage : std::uint8_t { free, driven, stopping };
+  struct Output {
+    Stage stage = Stage::free;
+    const void* source = nullptr;
+    std::uint64_t publisher = 0;
+    Time last{};
+    std::uint64_t sent = 0;  // which command it was
+  };
+  static constexpr std::size_t outputs = osmc_channels + dhb12_channels + servo_channels +
+                                         relay_channels + stepper_channels + bldc_channels;
+  static std::optional<std::size_t> index_of(const Command& command);
+  static std::optional<Command> stop_of(std::size_t index, const State& state);
+
+  const Duration deadline_;
+  std::uint64_t sent_ = 0;
+  std::array<Output, outputs> outputs_{};
+};
+
+}  // namespace r4::tool::ros2

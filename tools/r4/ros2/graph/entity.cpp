@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "entity.hpp"
+
+#include <fmt/format.h>
+
+#include "r4link/error.hpp"
+
+namespace r4::tool::ros2 {
+
+Entity::Entity(dds_entity_t made, const std::string& what) : entity_(made) {
+  if (made >= 0) return;
+  entity_ = 0;
+  throw Error(ErrorKind::open, what, fmt::format("Cyclone DDS says: {}", dds_strretcode(-made)),
+              "look at what CYCLONEDDS_URI and the environment of ROS say, and that the network "
+              "interface is "
+              "up (docs/ros2.md)");
+}
+
+void Entity::reset() {
+  if (entity_ > 0) (void)dds_delete(std::exchange(entity_, 0));
+}
+
+QosPtr make_qos(const Qos& qos) {
+  QosPtr made(dds_create_qos());
+  constexpr dds_data_representation_id_t xcdr1 = DDS_DATA_REPRESENTATION_XCDR1;
+  dds_qset_data_representation(made.get(), 1, &xcdr1);
+  dds_qset_reliability(made.get(), DDS_RELIABILITY_RELIABLE, DDS_MSECS(100));
+  dds_qset_history(made.get(), DDS_HISTORY_KEEP_LAST, qos.depth);
+  if (qos.transient_local) dds_qset_durability(made.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
+  if (qos.lifespan != DDS_INFINITY) dds_qset_lifespan(made.get(), qos.lifespan);
+  if (!qos.user_data.empty()) {
+    dds_qset_userdata(made.get(), qos.user_data.data(), qos.user_data.size());
+  }
+  return made;
+}
+
+std::string user_data_of(const dds_qos_t* qos) {
+  void* bytes = nullptr;
+  std::size_t size = 0;
+  if (qos == nullptr || !dds_qget_userdata(qos, &bytes, &size) || bytes == nullptr) return {};
+  std::string text(static_cast<const char*>(bytes), size);
+  dds_free(bytes);
+  return text;
+}
+
+}  // namespace r4::tool::ros2

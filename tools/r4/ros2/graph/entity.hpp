@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What Cyclone DDS made, and what ROS asks of it: an entity that is deleted with its owner, and its quality of
+// service.
+#pragma once
+
+#include <dds/dds.h>
+
+#include <memory>
+#include <string>
+#include <utility>
+
+namespace r4::tool::ros2 {
+
+// Owns an entity. What was made below it goes with it.
+class Entity {
+ public:
+  Entity() = default;
+  // Throws Error{open} naming `what` if it could not be made.
+  Entity(dds_entity_t made, const std::string& what);
+  ~Entity() { reset(); }
+  Entity(Entity&& other) noexcept : entity_(std::exchange(other.entity_, 0)) {}
+  Entity& operator=(Entity&& other) noexcept {
+    if (this != &other) {
+      reset();
+      entity_ = std::exchange(other.entity_, 0);
+    }
+    return *this;
+  }
+  Entity(const Entity&) = delete;
+  Entity& operator=(const Entity&) = delete;
+
+  dds_entity_t get() const { return entity_; }
+  void reset();
+
+ private:
+  dds_entity_t entity_ = 0;
+};
+
+struct Qos {
+  int depth = 10;                // samples that are kept
+  bool transient_local = false;  // who comes later is told the newest, too
+  dds_duration_t lifespan = DDS_INFINITY;
+  std::string user_data;
+};
+
+struct DeleteQos {
+  void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
+};
+using QosPtr = std::unique_ptr<dds_qos_t, DeleteQos>;
+
+// Reliable, as ROS does by default; a write waits for a slow reader for 100 ms at most.
+QosPtr make_qos(const Qos& qos);
+
+// A sample or value of Cyclone's that has to be given back.
+std::string user_data_of(const dds_qos_t* qos);
+
+}  // namespace r4::tool::ros2

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What `ros2 node list` reads: on ros_discovery_info each participant says which nodes it has, and which readers and
+// writers are whose.
+//
+// Up to Humble an id has 24 bytes there and since Iron 16, under one type name, and who is told the other size
+// throws. So nothing is said until somebody else is there to read it, whose own writer tells by its type hash which
+// it is. Of two releases in one graph the first counts; ROS itself does not mix them either.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "entity.hpp"
+#include "names.hpp"
+
+namespace r4::tool::ros2 {
+
+using EntityId = std::array<std::uint8_t, 16>;
+EntityId id_of(dds_entity_t entity);
+
+struct Node {
+  NodeName name;
+  std::vector<EntityId> readers;
+  std::vector<EntityId> writers;
+};
+
+enum class Release : std::uint8_t { before_iron, since_iron };
+// That of ROS_DISTRO; none for an empty value.
+std::optional<Release> release_of(const std::string& distro);
+
+class NodeListing {
+ public:
+  NodeListing(dds_entity_t participant, std::vector<Node> nodes, const std::string& distro);
+
+  // Tells of writers that come and go, to be waited for; look() then.
+  dds_entity_t peers() const { return peers_.get(); }
+  void look();
+
+  // There are no nodes any more.
+  void leave();
+
+ private:
+  std::optional<Release> wanted() const;
+  void speak_to(Release release);
+  void publish() const;
+
+  const dds_entity_t participant_;
+  const EntityId id_;
+  std::vector<Node> nodes_;
+  const std::optional<Release> fixed_;
+  std::map<EntityId, Release> others_;  // who else lists its nodes
+  Entity peers_;
+  std::optional<Release> spoken_;
+  Entity topic_;
+  Entity writer_;
+};
+
+}  // namespace r4::tool::ros2

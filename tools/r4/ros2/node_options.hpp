@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How a board is shown to ROS.
+#pragma once
+
+#include <chrono>
+#include <optional>
+
+#include "r4link/state.hpp"
+#include "setpoint_units.hpp"
+
+namespace r4::tool::ros2 {
+
+struct NodeOptions {
+  FieldSet fields;  // those that the board is asked for
+  ServoCalibration servo;
+  std::optional<double> counts_per_turn;     // of the encoders' joints; none: they are no joints
+  std::optional<double> steps_per_turn;      // of the steppers'
+  std::optional<DifferentialDrive> drive;    // none: there is no cmd_vel
+  std::chrono::milliseconds deadline{1000};  // of a publisher that drives
+  bool arm = false;                          // as soon as the board is there, once
+};
+
+}  // namespace r4::tool::ros2

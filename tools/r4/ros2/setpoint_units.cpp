@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "setpoint_units.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "r4link/error.hpp"
+
+namespace r4::tool::ros2 {
+namespace {
+
+template <class Number>
+bool read(std::string_view text, Number& out) {
+  const char* const end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, out);
+  return error == std::errc() && rest == end;
+}
+
+std::vector<std::string_view> split(std::string_view text) {
+  std::vector<std::string_view> parts;
+  for (;;) {
+    const std::size_t comma = text.find(',');
+    parts.push_back(text.substr(0, comma));
+    if (comma == std::string_view::npos) return parts;
+    text.remove_prefix(comma + 1);
+  }
+}
+
+std::optional<MotorChannel> motor_channel(std::string_view text) {
+  MotorChannel motor;
+  motor.reversed = text.starts_with('-');
+  if (motor.reversed) text.remove_prefix(1);
+  if (text.starts_with("osmc")) {
+    text.remove_prefix(4);
+  } else if (text.starts_with("dhb12_")) {
+    motor.kind = CommandKind::dhb12;
+    text.remove_prefix(6);
+  } else {
+    return std::nullopt;
+  }
+  if (!read(text, motor.channel) || motor.channel < 1 || motor.channel > osmc_channels) {
+    return std::nullopt;
+  }
+  return motor;
+}
+
+}  // namespace
+
+std::optional<SignedDuty> from_duty(double duty) {
+  if (!(std::abs(duty) <= 1.0)) return std::nullopt;  // NaN, too
+  return SignedDuty{static_cast<int>(std::lround(std::abs(duty) * pwm_max)),
+                    duty < 0 ? Direction::reverse : Direction::forward};
+}
+
+double to_duty(int pwm, Direction direction) {
+  const double duty = static_cast<double>(pwm) / pwm_max;
+  return direction == Direction::forward || pwm == 0 ? duty : -duty;
+}
+
+ServoCalibration servo_calibration(std::string_view text) {
+  ServoCalibration servo;
+  if (text == "us") {
+    servo.microseconds = true;
+    return servo;
+  }
+  const auto parts = split(text);
+  const bool valid = parts.size() == 3 && read(parts[0], servo.min_us) &&
+                     read(parts[1], servo.max_us) && read(parts[2], servo.angle) &&
+                     servo.min_us > 0 && servo.max_us > servo.min_us &&
+                     servo.max_us <= servo_max_us && servo.angle > 0 && servo.angle < 100;
+  if (!valid) {
+    throw Error(ErrorKind::usage, "--servo " + std::string(text), "is no calibration",
+                "write us, or two pulse widths and the angle between them in radians, as in "
+                "500,2500,3.14");
+  }
+  return servo;
+}
+
+std::optional<int> to_pulse(const ServoCalibration& servo, double value) {
+  double pulse = value;
+  if (!servo.microseconds) {
+    const double middle = (servo.min_us + servo.max_us) / 2.0;
+    pulse = middle + value / servo.angle * (servo.max_us - servo.min_us);
+  }
+  if (servo.microseconds && pulse == 0) return 0;  // off
+  // Half a microsecond more or less is the same pulse.
+  const double least = servo.microseconds ? 0 : servo.min_us;
+  const double most = servo.microseconds ? servo_max_us : servo.max_us;
+  if (!(pulse >= least - 0.5 && pulse <= most + 0.5)) return std::nullopt;  // NaN, too
+  return static_cast<int>(std::lround(std::clamp(pulse, least, most)));
+}
+
+double from_pulse(const ServoCalibration& servo, int pulse_us) {
+  if (servo.microseconds) return pulse_us;
+  if (pulse_us == 0) return std::numeric_limits<double>::quiet_NaN();
+  const double middle = (servo.min_us + servo.max_us) / 2.0;
+  return (pulse_us - middle) / (servo.max_us - servo.min_us) * servo.angle;
+}
+
+std::optional<Command> MotorChannel::command(double duty) const {
+  const auto signed_duty = from_duty(reversed ? -duty : duty);
+  if (!signed_duty) return std::nullopt;
+  return kind == CommandKind::osmc
+             ? Command::osmc(signed_duty->pwm, signed_duty->direction, channel)
+             : Command::dhb12(signed_duty->pwm, signed_duty->direction, channel);
+}
+
+std::optional<Setpoints> DifferentialDrive::setpoints(double linear, double angular) const {
+  double left_duty = (linear - angular * separation_m / 2) / full_speed_mps;
+  double right_duty = (linear + angular * separation_m / 2) / full_speed_mps;
+  if (!std::isfinite(left_duty) || !std::isfinite(right_duty)) return std::nullopt;
+  const double beyond = std::max({1.0, std::abs(left_duty), std::abs(right_duty)});
+  left_duty = std::clamp(left_duty / beyond, -1.0, 1.0);
+  right_duty = std::clamp(right_duty / beyond, -1.0, 1.0);
+  const auto one = left.command(left_duty);
+  const auto other = right.command(right_duty);
+  if (!one || !other) return std::nullopt;
+  return Setpoints{}.add(*one).add(*other);
+}
+
+DifferentialDrive differential_drive(std::string_view channels, double separation_m,
+                                     double full_speed_mps) {
+  const auto parts = split(channels);
+  const auto left = parts.size() == 2 ? motor_channel(parts[0]) : std::nullopt;
+  const auto right = parts.size() == 2 ? motor_channel(parts[1]) : std::nullopt;
+  const bool same = left && right && left->kind == right->kind && left->channel == right->channel;
+  if (!left || !right || same) {
+    throw Error(
+        ErrorKind::usage, "--drive " + std::string(channels), "does not name two motor channels",
+        "name the left and the right one, as in osmc1,-osmc2 or dhb12_1,dhb12_2; - is for a "
+        "motor that is mounted the other way round");
+  }
+  return {*left, *right, separation_m, full_speed_mps};
+}
+
+double positive_number(std::string_view name, std::string_view text) {
+  double number = 0;
+  if (read(text, number) && std::isfinite(number) && number > 0) return number;
+  throw Error(ErrorKind::usage, std::string(name) + " " + std::string(text),
+              "is no number greater than 0", "write it as in 0.42");
+}
+
+}  // namespace r4::tool::ros2
