@@ -34,7 +34,7 @@ std::optional<UdpGathering::SteadyTime> steady_time_of(const timespec& came) {
   timespec real{};
   ::clock_gettime(CLOCK_REALTIME, &real);
   const std::chrono::nanoseconds age = since_epoch(real) - since_epoch(came);
-  if (age < age.zero() || age > std::chrono::seconds(1)) return std::nullopt;
+  if (age.count() < 0 || age > std::chrono::seconds(1)) return std::nullopt;
   return now - age;
 }
 
@@ -50,6 +50,7 @@ void UdpGathering::note_times(int socket) {
   ::setsockopt(socket, SOL_SOCKET, SO_TIMESTAMPNS, &yes, sizeof yes);
 }
 
+// NOLINTNEXTLINE(readability-non-const-parameter): the kernel writes to it
 std::optional<std::size_t> UdpGathering::read(char* out, std::size_t room, Endpoint& from) {
   alignas(cmsghdr) char control[CMSG_SPACE(sizeof(timespec))];
   iovec part{out, room};

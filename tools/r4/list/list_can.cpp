@@ -148,6 +148,7 @@ std::vector<ListedBus> list_buses() {
   if (buses.empty()) return buses;
   asio::io_context io(1);
   std::vector<std::unique_ptr<BusQuestion>> questions;
+  questions.reserve(buses.size());
   for (ListedBus& bus : buses) questions.push_back(std::make_unique<BusQuestion>(io, bus));
   const auto begun = std::chrono::steady_clock::now();
   io.run_until(begun + listening);

@@ -69,6 +69,9 @@ BoardCommands::BoardCommands(AsyncBoard& board, Graph& graph, std::size_t node, 
   });
 }
 
+// NOLINTBEGIN(clang-analyzer-cplusplus.NewDeleteLeaks): it loses sight of a std::function that is moved from a
+// designated initializer.
+
 // --- topics
 
 void BoardCommands::subscribe_stop(Graph& graph, std::size_t node, Inbox& inbox) {
@@ -290,6 +293,8 @@ void BoardCommands::serve(Graph& graph, std::size_t node, Inbox& inbox, std::str
       .left = on_publishers(std::string(name)),
   });
 }
+
+// NOLINTEND(clang-analyzer-cplusplus.NewDeleteLeaks)
 
 void BoardCommands::stop(Done done) {
   constexpr std::size_t most_waiting = 16;
