@@ -55,6 +55,8 @@ class SimProcess:
             self.close()
             raise OpenError(url, str(told.get('reason', 'r4 sim ended')), str(told.get('fix', 'see r4 sim --help')))
         self._url: str = told['host_url']
+        if self._url.startswith('udp:'):
+            self._url += '?listen=0'  # the paper's port of hosts is one, and several tests may run at a time
         self._lock = threading.Lock()
         self._outputs: dict[str, Any] = {}
         self._sensors: dict[str, Any] = {}
