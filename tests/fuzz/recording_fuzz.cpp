@@ -76,11 +76,11 @@ class File {
   const int file_;
 };
 
-// What is played of the first wire, `from` after the beginning.
-std::vector<std::string> played(const std::string& path, Time from) {
+// What is played of the first wire.
+std::vector<std::string> played(const std::string& path, const ReplayStart& start) {
   std::vector<std::string> said;
   try {
-    ReplayRecords records(path, path, 1, from);
+    ReplayRecords records(path, path, 1, start);
     do {
       while (records.next() != nullptr) {
         const ReplayRecords::Item item = records.take();
@@ -103,10 +103,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const r4::Lines cut = r4::told(bytes, 1 + data[0]);
   if (!r4::is_zstd(bytes)) r4::require(whole.text == cut.text);
   const r4::File file(bytes);
-  const std::vector<std::string> played = r4::played(file.path(), r4::Time(0));
+  const std::vector<std::string> played = r4::played(file.path(), {});
   // One of another version, which ends both, is told when what is before it has not been played.
   r4::require(played.empty() || played == whole.said);
-  const std::vector<std::string> later = r4::played(file.path(), r4::Time(data[0] * 100'000));
+  const std::vector<std::string> later =
+      r4::played(file.path(), {.time = r4::Time(data[0] * 100'000)});
   r4::require(later.size() <= whole.said.size());
   return 0;
 }
