@@ -77,6 +77,13 @@ def test_of_three_commands_in_a_row_none_waits_for_the_timeout(url):
         assert max(taken) < 0.5 or SANITIZED, 'without the farewell it is 1.3 s'
 
 
+def test_a_port_without_a_board_is_listed_as_one(tmp_path):
+    path = tmp_path / 'nothing'
+    listed = run('list', '--serial', path)
+    assert listed.returncode == 0, listed
+    assert f'no R4 board has answered: serial://{path}\n    there is no such device; ' in listed.stdout, listed.stdout
+
+
 def listed(path):
     """What r4 list tells of the pty of a board."""
     result = run('list', '--serial', path, '--json')

@@ -64,6 +64,14 @@ def test_has_one_recording(fleet, tmp_path):
     assert len(r4link.read(path).boards) == 8
 
 
+def test_wrong_options_are_refused_as_a_boards_are(monkeypatch, tmp_path):
+    with pytest.raises(r4link.UsageError, match='there is no such role'):
+        r4link.Fleet('sim:', role='drive')
+    monkeypatch.setenv('HOME', str(tmp_path))
+    with pytest.raises(r4link.Error, match=str(tmp_path / 'none')):
+        r4link.Fleet('sim:', key='~/none')
+
+
 def test_one_that_watches_and_one_that_is_none():
     with r4link.Fleet('sim:?node=0-1', role='watch') as fleet:
         fleet.wait_active()

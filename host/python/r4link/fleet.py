@@ -22,7 +22,7 @@ from typing import Iterable, Iterator, Mapping, NamedTuple, Self, Sequence, Type
 from . import _core
 from ._core import BoardHealth, Command, Event, FleetResult, LinkStatus, Recording, RefusedPost, State
 from .board import Setpoints, _ms
-from .errors import Error, RefusedError, error_of
+from .errors import Error, RefusedError, UsageError, error_of
 from .values import PostResult
 
 _open: weakref.WeakSet[Fleet] = weakref.WeakSet()
@@ -89,10 +89,10 @@ class Fleet:
         Each of `urls` is a URL or a pattern of many: 'can://can0?node=0-7'. The options are those of Board.
         """
         if role not in ('control', 'watch'):
-            raise ValueError(f"role is 'control' or 'watch', not {role!r}")
+            raise UsageError(f'role {role!r}', 'there is no such role', "give 'control' or 'watch'")
         self._core = _core.Fleet(list(urls), watch=role == 'watch', arming=arming, fields=fields,
-                                 key=None if key is None else os.fspath(key), watch_rate_hz=watch_rate_hz,
-                                 heartbeat=_ms(heartbeat), timeout=_ms(timeout))
+                                 key=None if key is None else os.path.expanduser(os.fspath(key)),
+                                 watch_rate_hz=watch_rate_hz, heartbeat=_ms(heartbeat), timeout=_ms(timeout))
         _open.add(self)
 
     def close(self) -> None:

@@ -145,7 +145,12 @@ void print_text(const std::vector<ListedPort>& ports) {
     fmt::print("  {:<14} {:<10} {:<24} {}\n", port.path, usb_id(port), port.serial_number,
                port.description);
     if (!asked) continue;
-    fmt::print("    R4 board: {}  {}\n", url_of(port), text_of(board));
+    // What has not the board's USB id is one if it says so, or if a program of ours has it.
+    if (port.is_r4 || board.identity || board.pid != 0) {
+      fmt::print("    R4 board: {}  {}\n", url_of(port), text_of(board));
+    } else {
+      fmt::print("    no R4 board has answered: {}\n", url_of(port));
+    }
     if (trouble) fmt::print("    {}; {}\n", trouble->reason, trouble->fix);
   }
 }

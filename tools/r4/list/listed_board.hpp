@@ -23,7 +23,7 @@ struct ListedBoard {
   std::optional<bool> busy() const;
 };
 
-// "id 0042af…, name left-arm, firmware 0.1.0, free", or "no answer".
+// "id 0042af…, name left-arm, firmware 0.1.0, free", or "it does not tell who it is".
 std::string text_of(const ListedBoard& board);
 // Puts the same into its object.
 void describe(const ListedBoard& board, Json& object);
