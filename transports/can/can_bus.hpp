@@ -174,6 +174,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
 
   // The newest stops: of which the bare frame has left, and which left with its number, and when.
   std::optional<std::uint32_t> announced_stop_;
+  Clock::time_point announced_at_;
   std::optional<std::uint32_t> numbered_stop_;
   Clock::time_point stop_left_;
 

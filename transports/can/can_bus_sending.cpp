@@ -12,6 +12,9 @@ namespace r4 {
 namespace {
 
 constexpr std::chrono::milliseconds retry_interval{1};
+// Members that announce the same stop do so in one go. What comes later is another one, whose number is the same by
+// chance.
+constexpr std::chrono::seconds one_press{1};
 
 }  // namespace
 
@@ -104,12 +107,15 @@ void CanBus::send_later() {
 }
 
 SendResult CanBus::announce_stop(std::optional<std::uint32_t> number) {
-  if (!number || announced_stop_ != number) {
+  const Clock::time_point now = Clock::now();
+  const bool announced = announced_stop_ == number && now - announced_at_ < one_press;
+  if (!number || !announced) {
     CanFrame frame{};
     frame.id = emergency_stop_id;
     const SendResult bare = send_first(frame);
     if (bare != SendResult::sent || !number) return bare;
     announced_stop_ = number;
+    announced_at_ = now;
   }
   return repeat_stop(*number);
 }
