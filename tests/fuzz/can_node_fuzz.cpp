@@ -20,6 +20,7 @@ namespace r4 {
 namespace {
 
 constexpr Text stop_datagram("E:STOP;^0x506f0fbe^");
+constexpr Text watch_datagram("W:5;^0x414648b3^");
 constexpr std::uint32_t longest_wait_us = 127000;  // STmin; N_As, N_Bs and N_Cr are less
 constexpr CanLane lanes[] = {CanLane::dialogue, CanLane::telemetry};
 
@@ -94,14 +95,18 @@ class End {
     const std::uint32_t whole = completed(node_) - completed_before;
     const std::uint32_t bad = after.bad_form - before.bad_form;
     require(whole <= 1 && bad <= whole && after.unpacked - before.unpacked <= whole);
-    const bool stop = classify(frame).kind == CanIdKind::emergency_stop;
+    const CanIdMeaning meaning = classify(frame);
+    const bool stop = meaning.kind == CanIdKind::emergency_stop;
     require(after.stops - before.stops == (stop && board_ ? 1U : 0U));
     if (stop) {
       require(whole == 0 && datagram == (board_ ? stop_datagram : Text()));
+    } else if (meaning.kind == CanIdKind::watch) {
+      require(whole == 0);
+      require(datagram == (board_ && meaning.node == number_ ? watch_datagram : Text()));
     } else {
       require(datagram.empty() == (whole == bad));
     }
-    if (classify(frame).kind == CanIdKind::other) require(datagram.empty());
+    if (meaning.kind == CanIdKind::other) require(datagram.empty());
     check();
   }
 
@@ -262,7 +267,7 @@ class Fuzz {
 
   CanFrame foreign_frame() {
     const std::uint32_t ids[] = {emergency_stop_id, went_safe_id(node_),   command_id(node_),
-                                 reply_id(node_),   telemetry_id(node_),   command_id(node_),
+                                 reply_id(node_),   telemetry_id(node_),   watch_id(node_),
                                  reply_id(node_),   input_.word() % 0x1000};
     CanFrame frame;
     std::memset(&frame, 0x55, sizeof frame);
