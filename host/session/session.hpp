@@ -135,8 +135,8 @@ class Session {
   void cancel(Ticket ticket, Time now);
   // Ends every command under way but stops, the heartbeats too, and says farewell: the board's outputs are
   // safe at once, and another host need not wait for the timeout. Confirmed when the board tells so.
-  // Returns 0 where there is nobody to tell, or the board has not told that it knows of farewells. Nothing
-  // but stops is sent from then on.
+  // Returns 0 where there is nobody to tell, or the board knows no farewells. Nothing but stops is sent from
+  // then on.
   Ticket leave(Time timeout, Time now);
   // Ends every command under way: the board is closed.
   void end_all(Time now);
@@ -243,8 +243,8 @@ class Session {
   StopRepetition repetition_;
   LinkStatus status_;
   ReceivedState state_;
-  std::uint32_t restarts_ = 0;  // of the board, those that were told
-  bool knows_leave_ = false;    // does the board?
+  std::uint32_t restarts_ = 0;       // of the board, those that were told
+  std::optional<bool> knows_leave_;  // does the board?
   bool leaving_ = false;
   bool transport_down_ = false;
   bool group_waits_ = false;  // for the answer to Q:ID

@@ -211,7 +211,7 @@ void Session::on_answer(const Datagram& datagram, Time now) {
 bool Session::notice_restart() {
   if (restarts_ == link_.restarts()) return false;
   restarts_ = link_.restarts();
-  knows_leave_ = false;
+  knows_leave_.reset();
   state_ = ReceivedState();
   clock_.restart();
   questions_of_clock_ = 0;

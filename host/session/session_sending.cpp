@@ -258,7 +258,9 @@ Ticket Session::leave(Time timeout, Time now) {
   }
   if (watches()) transmit_now(Command::watch(0), lease_.echo(), Priority::normal, now);
   leaving_ = true;  // a heartbeat behind the farewell would take the board again
-  if (!knows_leave_ || !link_up()) return 0;
+  // The answer that tells it may have been lost. A board that confirms commands refuses what it does not know.
+  const bool understands = knows_leave_.value_or(state_.present.has(StateField::cmd));
+  if (!understands || !link_up()) return 0;
   Pending* pending = allocate(Command::leave(), timeout, now);
   if (pending == nullptr) return 0;
   ++collector_.counts.commands;

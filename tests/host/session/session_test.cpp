@@ -130,6 +130,19 @@ TEST(SessionFarewell, IsNotSaidToABoardThatDoesNotKnowItOrIsNotThere) {
   EXPECT_EQ(rebooted.session.leave(100ms, rebooted.now), 0U) << "it may have other firmware now";
 }
 
+TEST(SessionFarewell, IsSaidToABoardWhoseIdentityWasLostIfItConfirmsCommands) {
+  ScriptedLink link;
+  link.connect();
+  EXPECT_NE(link.session.leave(100ms, link.now), 0U);
+  EXPECT_EQ(link.last('E').command, "E:LEAVE");
+
+  ScriptedLink of_the_paper;
+  of_the_paper.heartbeat();
+  of_the_paper.pass(10ms);
+  of_the_paper.state("AIN24:24.10;");
+  EXPECT_EQ(of_the_paper.session.leave(100ms, of_the_paper.now), 0U);
+}
+
 TEST(SessionFarewell, AStopUnderWayGoesOn) {
   ScriptedLink link;
   link.connect();
