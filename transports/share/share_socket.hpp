@@ -9,6 +9,7 @@
 
 #include <sys/types.h>
 
+#include <cerrno>
 #include <string_view>
 
 #include "../file_descriptor.hpp"
@@ -33,6 +34,9 @@ FileDescriptor reach_holder(const SharedWire& wire);
 
 // The next one who has come to a holder, or none: strangers are turned away.
 FileDescriptor accept_sharer(int holder, const SharedWire& wire);
+
+// Of a call on such a socket that does not wait.
+inline bool would_block(int error) { return error == EAGAIN || error == EWOULDBLOCK; }
 
 ShareCredentials credentials_of(int connection);
 // The other end is of the same user or, if the wire is shared with a group, of one of its members or root.

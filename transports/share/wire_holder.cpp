@@ -30,8 +30,6 @@ constexpr std::size_t state_entries = 8;
 constexpr int messages_in_a_turn = 8;
 constexpr const char* same_version = "use the same version of R4 link for both";
 
-bool would_block(int error) { return error == EAGAIN || error == EWOULDBLOCK; }
-
 bool is_stop(std::string_view bytes) {
   Datagram datagram;
   return read_datagram(Text(bytes.data(), bytes.size()), datagram) && asks_to_stop(datagram);

@@ -15,10 +15,8 @@
 namespace r4 {
 namespace {
 
-constexpr int messages_in_a_turn = 64;
+constexpr int most_at_once = 64;
 constexpr int answer_within_ms = 200;
-
-bool would_block(int error) { return error == EAGAIN || error == EWOULDBLOCK; }
 
 }  // namespace
 
@@ -97,7 +95,7 @@ void WireSharer::listen() {
 }
 
 void WireSharer::receive() {
-  for (int i = 0; i < messages_in_a_turn; ++i) {
+  for (int i = 0; i < most_at_once; ++i) {
     const ssize_t size =
         receive_packet(connection_.native_handle(), packet_.data(), packet_.size());
     if (size < 0 && would_block(errno)) {
