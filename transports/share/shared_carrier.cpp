@@ -77,6 +77,7 @@ class SharedCarrier final : public Carrier,
   void on_datagram(std::string_view bytes, Peer from) override;
   void on_carrier_event(const CarrierEvent& event) override;
   void on_drained() override { handler_->on_drained(); }
+  void on_taken() override;
   void on_overheard(std::string_view bytes) override;
   void on_oversize(std::string_view beginning) override;
   // Those who share our wire.
@@ -89,14 +90,20 @@ class SharedCarrier final : public Carrier,
   void on_all_heard() override { handler_->on_drained(); }
   void on_holder_lost() override;
 
-  void attach();
   void take_part();
+  bool try_to_take_part();
   bool try_to_share();
+  void ask_for_wire();
   bool try_to_hold();
+  bool hold_a_place();
+  WireSharer::Joined join(int place);
+  bool is_passed_over(int place) const { return (passed_over_ >> place & 1U) != 0; }
+  void pass_over(int place, Problem why);
+  void forget_places();
   void expect_answer(milliseconds within);
   void look_after_holder();
-  void leave_holder(const Problem& problem);
-  void go_elsewhere();
+  bool leave_holder();
+  void leave_other_version();
   void attach_later(milliseconds delay);
   void look();
   void look_later();
@@ -116,7 +123,11 @@ class SharedCarrier final : public Carrier,
   State state_ = State::closed;
   bool up_ = false;
   bool moved_ = false;
+  unsigned passed_over_ = 0;        // places that are no help to us, since we began to look for one
+  std::optional<Problem> no_help_;  // why
+  bool hangs_ = false;              // a holder at one of them
   // Of the holder whose wire we share.
+  int place_ = 0;
   bool welcome_ = false;
   bool heard_ = false;  // since it was looked after
   bool asked_ = false;
@@ -134,7 +145,7 @@ void SharedCarrier::open(Carrier::Handler& handler) {
   since_ = Clock::now();
   try {
     wire_ = find_();
-    attach();
+    take_part();
   } catch (...) {
     close();
     throw;
@@ -147,6 +158,7 @@ void SharedCarrier::close() noexcept {
   up_ = moved_ = false;
   trouble_.reset();
   not_shared_.reset();
+  forget_places();
   looking_.cancel();
   sharer_.leave();
   own_->close();  // the wire is free before others are told so
@@ -154,59 +166,69 @@ void SharedCarrier::close() noexcept {
 }
 
 // Throws Error where neither will do.
-void SharedCarrier::attach() {
-  try {
-    take_part();
-  } catch (const Error& error) {
-    if (wire_.exclusive || error.kind() != ErrorKind::open) throw;
-    go_elsewhere();
-    try {
-      take_part();
-    } catch (const Error& second) {
-      if (second.kind() == ErrorKind::refused) throw;
-      throw error;
-    }
-  }
-}
-
 void SharedCarrier::take_part() {
   // Between our two questions others may come and go.
-  const Clock::time_point deadline = Clock::now() + take_over_within;
+  const Clock::time_point deadline = Clock::now() + take_over_within + share_places * answer_within;
   do {
-    if (try_to_share() || try_to_hold()) return;
+    if (try_to_take_part()) return;
   } while (Clock::now() < deadline);
   throw Error(ErrorKind::open, name_, "other programs take it, one after the other",
               "end those that control the board");
 }
 
-// True if we share it now, or may do so soon. Throws Error if the holder does not let us.
+bool SharedCarrier::try_to_take_part() {
+  if (role_ == BoardRole::watch && try_to_share()) return true;
+  if (role_ == BoardRole::control) ask_for_wire();
+  try {
+    return try_to_hold();
+  } catch (const Error& error) {
+    if (no_help_ && error.kind() == ErrorKind::open) throw Error(*no_help_);
+    throw;
+  }
+}
+
+WireSharer::Joined SharedCarrier::join(int place) {
+  if (wire_.name.empty() || is_passed_over(place)) return WireSharer::Joined::none;
+  const SharedWire there = at_place(wire_, place);
+  const auto joined = sharer_.join(there, role_, program_invocation_short_name);
+  if (joined == WireSharer::Joined::stranger) {
+    not_shared_ = sharer_.stranger(name_, there);
+    passed_over_ |= 1U << place;
+  }
+  return joined;
+}
+
+// True if we share it now, or may do so soon.
 bool SharedCarrier::try_to_share() {
-  if (wire_.name.empty()) return false;
-  switch (sharer_.join(wire_, role_, program_invocation_short_name)) {
-    case WireSharer::Joined::none:
-      return false;
-    case WireSharer::Joined::stranger:
-      // Its place is no use to us, and the wire itself is not the stranger's.
-      not_shared_ = sharer_.stranger(name_, wire_);
-      wire_.name.clear();
-      return false;
-    case WireSharer::Joined::holder:
-      break;
-  }
-  if (role_ == BoardRole::control) {
-    const ShareMessage answer = sharer_.wait_for_answer(name_);
-    const std::string who = sharer_.holder(answer.text);
-    sharer_.leave();
-    if (answer.kind != Kind::busy) return false;  // it has let the wire go
-    throw Error(ErrorKind::refused, name_, "controlled by " + who,
-                "end that program, or watch beside it, as r4 monitor does");
-  }
+  // The last place was taken last, because a holder hung.
+  int place = share_places;
+  do {
+    if (place-- == 0) return false;
+  } while (join(place) != WireSharer::Joined::holder);
+  place_ = place;
   state_ = State::sharing;
+  not_shared_.reset();
   welcome_ = heard_ = false;
   asked_ = true;  // by the hello
   sharer_.listen();
   expect_answer(answer_within);
   return true;
+}
+
+// Of all holders. Throws Error if one controls the board.
+void SharedCarrier::ask_for_wire() {
+  for (int place = 0; place < share_places; ++place) {
+    if (join(place) != WireSharer::Joined::holder) continue;
+    const std::optional<ShareMessage> answer = sharer_.wait_for_answer();
+    if (!answer || !answer->same_version) {
+      pass_over(place, answer ? sharer_.other_version(name_) : sharer_.silence(name_));
+      hangs_ = hangs_ || !answer;
+    } else if (answer->kind == Kind::busy) {
+      throw Error(ErrorKind::refused, name_, "controlled by " + sharer_.holder(answer->text),
+                  "end that program, or watch beside it, as r4 monitor does");
+    }
+  }
+  sharer_.leave();
 }
 
 void SharedCarrier::expect_answer(milliseconds within) {
@@ -221,44 +243,77 @@ void SharedCarrier::look_after_holder() {
   } else if (!asked_) {
     asked_ = true;
     sharer_.ask_whether_alive();
-  } else if (!wire_.exclusive || welcome_) {
-    return leave_holder(sharer_.silence(name_));
   } else {
+    pass_over(place_, sharer_.silence(name_));
+    hangs_ = true;
+    if (leave_holder()) return;
     // When it goes on it finds our hello.
-    tell({CarrierEvent::Kind::down, sharer_.silence(name_)});
+    tell({CarrierEvent::Kind::down, *no_help_});
     if (state_ != State::sharing) return;
   }
   expect_answer(ask_after);
 }
 
-// It is no help to us.
-void SharedCarrier::leave_holder(const Problem& problem) {
-  go_elsewhere();
-  attach_later(wire_.exclusive ? look_again_slowly : milliseconds(0));
-  if (wire_.exclusive) tell({CarrierEvent::Kind::down, problem});
-}
-
-// Where a wire needs no holder, those that this one is no help to meet at another name.
-void SharedCarrier::go_elsewhere() {
-  sharer_.leave();
-  if (!wire_.exclusive && !wire_.name.empty()) wire_.name += '+';
-}
-
-bool SharedCarrier::try_to_hold() {
-  if (!wire_.name.empty() && !holder_.hold(wire_)) return false;
-  state_ = State::holding;
+// It is no help to us. False: neither is any other, and the wire is not to be had without it.
+bool SharedCarrier::leave_holder() {
+  since_ = Clock::now();
   try {
+    for (int i = 0; i < 3; ++i) {  // one of those that leave it with us may be about to hold another
+      if (try_to_share() || try_to_hold()) return true;
+    }
+  } catch (const Error&) {
+    return false;
+  }
+  return false;
+}
+
+void SharedCarrier::leave_other_version() {
+  sharer_.leave();
+  attach_later(look_again_slowly);
+  pass_over(place_, sharer_.other_version(name_));
+  tell({CarrierEvent::Kind::down, Problem(*no_help_)});
+}
+
+// Where a holder hangs that only watches, it is taken from that one. Throws Error if it cannot be opened.
+bool SharedCarrier::try_to_hold() {
+  if (!wire_.name.empty() && !hold_a_place()) return false;
+  if (holder_.holds()) not_shared_.reset();
+  const State before = std::exchange(state_, State::holding);
+  try {
+    own_->claim({role_ == BoardRole::watch && holder_.holds(), hangs_});
     own_->open(*this);
   } catch (...) {
-    state_ = State::attaching;
+    state_ = before;
     holder_.release();
     throw;
+  }
+  sharer_.leave();
+  return true;
+}
+
+// False: others take them.
+bool SharedCarrier::hold_a_place() {
+  for (int place = 0; place < share_places; ++place) {
+    if (is_passed_over(place)) continue;
+    return holder_.hold(at_place(wire_, place));
   }
   return true;
 }
 
+void SharedCarrier::forget_places() {
+  passed_over_ = 0;
+  no_help_.reset();
+  hangs_ = false;
+}
+
+void SharedCarrier::pass_over(int place, Problem why) {
+  passed_over_ |= 1U << place;
+  no_help_ = std::move(why);
+}
+
 void SharedCarrier::attach_later(milliseconds delay) {
   state_ = State::attaching;
+  forget_places();
   since_ = Clock::now() + delay;
   timer_.expires_after(delay);
   timer_.async_wait(looking_.handler([this] { look(); }));
@@ -266,8 +321,9 @@ void SharedCarrier::attach_later(milliseconds delay) {
 
 void SharedCarrier::look() {
   try {
-    if (try_to_share() || try_to_hold()) return;
+    if (try_to_take_part()) return;
   } catch (const Error& error) {
+    forget_places();
     if (late()) tell({CarrierEvent::Kind::down, error.problem()});
     if (state_ != State::attaching) return;
   }
@@ -355,6 +411,12 @@ void SharedCarrier::on_stop_of_another(std::string_view datagram) {
   }
 }
 
+// It may be from long ago that this program went on last.
+void SharedCarrier::on_taken() {
+  holder_.release();
+  attach_later(milliseconds(0));
+}
+
 bool SharedCarrier::gives_way() {
   if (role_ == BoardRole::control) return false;
   own_->close();
@@ -365,10 +427,18 @@ bool SharedCarrier::gives_way() {
 
 void SharedCarrier::on_message(const ShareMessage& message) {
   heard_ = true;
+  if (is_passed_over(place_)) {
+    forget_places();
+    // It goes on, and tells how the wire is to those that come.
+    if (welcome_) {
+      sharer_.leave();
+      return attach_later(milliseconds(0));
+    }
+  }
   switch (message.kind) {
     case Kind::welcome:
       welcome_ = true;
-      if (!message.same_version) leave_holder(sharer_.other_version(name_));
+      if (!message.same_version) leave_other_version();
       break;
     case Kind::received:
       ++shared_counters_.rx_datagrams;
@@ -405,6 +475,7 @@ void SharedCarrier::on_holder_lost() {
   if (welcome_) return attach_later(milliseconds(0));
   // It ends, or has had enough of us.
   state_ = State::attaching;
+  forget_places();
   if (late() && !trouble_) tell({CarrierEvent::Kind::down, sharer_.turned_away(name_)});
   if (state_ == State::attaching) look_later();
 }
