@@ -189,6 +189,22 @@ def test_a_stopped_holder_loses_the_serial_port_and_takes_no_byte_of_it_when_it_
             path.unlink()
 
 
+def test_two_spellings_of_a_board_are_one_wire():
+    with Board('udp://127.0.0.1:0') as board:
+        listen = free_port()
+        url = board.host_url.replace('?listen=0', f'?listen={listen}')
+        other_url = url.replace('127.0.0.1', 'localhost')
+        with driving(url, 'O:358,1,1') as host, watch(other_url) as watcher:
+            watcher.next(drives(358))
+            refused = run('send', other_url, 'O:1,1,1')
+            assert refused.returncode == 3, refused
+            assert f'controlled by r4 (pid {host.process.pid})' in refused.stderr, refused
+            # One that only a resolver knows is another wire, at the same port.
+            refused = run('send', url.replace('127.0.0.1', '127.1'), 'O:1,1,1')
+            assert refused.returncode == 4, refused
+            assert f'UDP port {listen} is in use by r4 (pid {host.process.pid})' in refused.stderr, refused
+
+
 def test_where_as_many_share_it_as_may_a_stop_is_obeyed_and_control_is_taken(folder):
     with Board(f'pty:{folder}/tty') as board, watch(board.host_url) as holder, contextlib.ExitStack() as others:
         holder.next(is_state)
