@@ -149,8 +149,9 @@ class R4LINK_API Carrier {
 
   // Of a device that one program can have open at a time: how the next open() takes it.
   struct Claim {
-    bool yields = false;  // it may be taken from this program, which then reads and sends nothing more
-    bool takes = false;   // also from a program that yields
+    bool yields =
+        false;  // it may be taken from this program, which then reads and sends nothing more
+    bool takes = false;  // also from a program that yields
   };
   virtual void claim(Claim claim) { static_cast<void>(claim); }
 

@@ -131,8 +131,7 @@ FileDescriptor open_serial_device(asio::io_context& io, const std::string& path,
                                   Carrier::Claim claim, PortLock& lock) {
   const std::string real_path = resolve_links(path);
   const bool real = is_in_sysfs(real_path);
-  FileDescriptor device =
-      real ? open_real(path, real_path, baud) : open_pty(io, real_path, baud);
+  FileDescriptor device = real ? open_real(path, real_path, baud) : open_pty(io, real_path, baud);
   if (!lock.lock(device.get(), claim)) fail(path, errno);
   if (real && !claim.yields && lock.is_first()) ::ioctl(device.get(), TIOCEXCL);
   // libserialport leaves VMIN at 0, where "no data" reads like a hang-up.

@@ -10,6 +10,7 @@
 #include "../operation_slot.hpp"
 #include "r4link/datagram.hpp"
 #include "share_message.hpp"
+#include "share_places.hpp"
 #include "wire_holder.hpp"
 #include "wire_sharer.hpp"
 
@@ -50,6 +51,7 @@ class SharedCarrier final : public Carrier,
         name_(own_->name()),
         holder_(io, *this, program_invocation_short_name),
         sharer_(io, *this),
+        places_(holder_, sharer_),
         timer_(io) {}
   ~SharedCarrier() override { close(); }
 
@@ -93,13 +95,7 @@ class SharedCarrier final : public Carrier,
   void take_part();
   bool try_to_take_part();
   bool try_to_share();
-  void ask_for_wire();
   bool try_to_hold();
-  bool hold_a_place();
-  WireSharer::Joined join(int place);
-  bool is_passed_over(int place) const { return (passed_over_ >> place & 1U) != 0; }
-  void pass_over(int place, Problem why);
-  void forget_places();
   void expect_answer(milliseconds within);
   void look_after_holder();
   bool leave_holder();
@@ -113,27 +109,22 @@ class SharedCarrier final : public Carrier,
   asio::io_context& io_;
   const std::unique_ptr<Carrier> own_;
   const FindWire find_;
-  SharedWire wire_;  // as it was found when it was opened
   const BoardRole role_;
   std::string name_;
   WireHolder holder_;
   WireSharer sharer_;
+  SharePlaces places_;
   LoopTimer timer_;
   OperationSlot looking_;
   State state_ = State::closed;
   bool up_ = false;
   bool moved_ = false;
-  unsigned passed_over_ = 0;        // places that are no help to us, since we began to look for one
-  std::optional<Problem> no_help_;  // why
-  bool hangs_ = false;              // a holder at one of them
   // Of the holder whose wire we share.
-  int place_ = 0;
   bool welcome_ = false;
   bool heard_ = false;  // since it was looked after
   bool asked_ = false;
-  std::optional<Problem> trouble_;     // why it is down, or the warning that stands
-  std::optional<Problem> not_shared_;  // why, until it is told
-  Clock::time_point since_;            // we have no part in the wire
+  std::optional<Problem> trouble_;  // why it is down, or the warning that stands
+  Clock::time_point since_;         // we have no part in the wire
   Carrier::Handler* handler_ = nullptr;
   CarrierCounters shared_counters_;
 };
@@ -144,7 +135,7 @@ void SharedCarrier::open(Carrier::Handler& handler) {
   state_ = State::attaching;
   since_ = Clock::now();
   try {
-    wire_ = find_();
+    places_.begin(find_());
     take_part();
   } catch (...) {
     close();
@@ -157,8 +148,6 @@ void SharedCarrier::close() noexcept {
   handler_ = nullptr;
   up_ = moved_ = false;
   trouble_.reset();
-  not_shared_.reset();
-  forget_places();
   looking_.cancel();
   sharer_.leave();
   own_->close();  // the wire is free before others are told so
@@ -178,57 +167,24 @@ void SharedCarrier::take_part() {
 
 bool SharedCarrier::try_to_take_part() {
   if (role_ == BoardRole::watch && try_to_share()) return true;
-  if (role_ == BoardRole::control) ask_for_wire();
+  if (role_ == BoardRole::control) places_.ask_for_wire(name_);
   try {
     return try_to_hold();
   } catch (const Error& error) {
-    if (no_help_ && error.kind() == ErrorKind::open) throw Error(*no_help_);
+    if (places_.no_help() && error.kind() == ErrorKind::open) throw Error(*places_.no_help());
     throw;
   }
 }
 
-WireSharer::Joined SharedCarrier::join(int place) {
-  if (wire_.name.empty() || is_passed_over(place)) return WireSharer::Joined::none;
-  const SharedWire there = at_place(wire_, place);
-  const auto joined = sharer_.join(there, role_, program_invocation_short_name);
-  if (joined == WireSharer::Joined::stranger) {
-    not_shared_ = sharer_.stranger(name_, there);
-    passed_over_ |= 1U << place;
-  }
-  return joined;
-}
-
 // True if we share it now, or may do so soon.
 bool SharedCarrier::try_to_share() {
-  // The last place was taken last, because a holder hung.
-  int place = share_places;
-  do {
-    if (place-- == 0) return false;
-  } while (join(place) != WireSharer::Joined::holder);
-  place_ = place;
+  if (!places_.join(name_)) return false;
   state_ = State::sharing;
-  not_shared_.reset();
   welcome_ = heard_ = false;
   asked_ = true;  // by the hello
   sharer_.listen();
   expect_answer(answer_within);
   return true;
-}
-
-// Of all holders. Throws Error if one controls the board.
-void SharedCarrier::ask_for_wire() {
-  for (int place = 0; place < share_places; ++place) {
-    if (join(place) != WireSharer::Joined::holder) continue;
-    const std::optional<ShareMessage> answer = sharer_.wait_for_answer();
-    if (!answer || !answer->same_version) {
-      pass_over(place, answer ? sharer_.other_version(name_) : sharer_.silence(name_));
-      hangs_ = hangs_ || !answer;
-    } else if (answer->kind == Kind::busy) {
-      throw Error(ErrorKind::refused, name_, "controlled by " + sharer_.holder(answer->text),
-                  "end that program, or watch beside it, as r4 monitor does");
-    }
-  }
-  sharer_.leave();
 }
 
 void SharedCarrier::expect_answer(milliseconds within) {
@@ -244,11 +200,10 @@ void SharedCarrier::look_after_holder() {
     asked_ = true;
     sharer_.ask_whether_alive();
   } else {
-    pass_over(place_, sharer_.silence(name_));
-    hangs_ = true;
+    places_.pass_over_hanging(name_);
     if (leave_holder()) return;
     // When it goes on it finds our hello.
-    tell({CarrierEvent::Kind::down, *no_help_});
+    tell({CarrierEvent::Kind::down, *places_.no_help()});
     if (state_ != State::sharing) return;
   }
   expect_answer(ask_after);
@@ -258,7 +213,8 @@ void SharedCarrier::look_after_holder() {
 bool SharedCarrier::leave_holder() {
   since_ = Clock::now();
   try {
-    for (int i = 0; i < 3; ++i) {  // one of those that leave it with us may be about to hold another
+    for (int i = 0; i < 3;
+         ++i) {  // one of those that leave it with us may be about to hold another
       if (try_to_share() || try_to_hold()) return true;
     }
   } catch (const Error&) {
@@ -270,17 +226,16 @@ bool SharedCarrier::leave_holder() {
 void SharedCarrier::leave_other_version() {
   sharer_.leave();
   attach_later(look_again_slowly);
-  pass_over(place_, sharer_.other_version(name_));
-  tell({CarrierEvent::Kind::down, Problem(*no_help_)});
+  places_.pass_over_other_version(name_);
+  tell({CarrierEvent::Kind::down, *places_.no_help()});
 }
 
 // Where a holder hangs that only watches, it is taken from that one. Throws Error if it cannot be opened.
 bool SharedCarrier::try_to_hold() {
-  if (!wire_.name.empty() && !hold_a_place()) return false;
-  if (holder_.holds()) not_shared_.reset();
+  if (!places_.hold()) return false;
   const State before = std::exchange(state_, State::holding);
   try {
-    own_->claim({role_ == BoardRole::watch && holder_.holds(), hangs_});
+    own_->claim({role_ == BoardRole::watch && holder_.holds(), places_.one_hangs()});
     own_->open(*this);
   } catch (...) {
     state_ = before;
@@ -291,29 +246,9 @@ bool SharedCarrier::try_to_hold() {
   return true;
 }
 
-// False: others take them.
-bool SharedCarrier::hold_a_place() {
-  for (int place = 0; place < share_places; ++place) {
-    if (is_passed_over(place)) continue;
-    return holder_.hold(at_place(wire_, place));
-  }
-  return true;
-}
-
-void SharedCarrier::forget_places() {
-  passed_over_ = 0;
-  no_help_.reset();
-  hangs_ = false;
-}
-
-void SharedCarrier::pass_over(int place, Problem why) {
-  passed_over_ |= 1U << place;
-  no_help_ = std::move(why);
-}
-
 void SharedCarrier::attach_later(milliseconds delay) {
   state_ = State::attaching;
-  forget_places();
+  places_.forget();
   since_ = Clock::now() + delay;
   timer_.expires_after(delay);
   timer_.async_wait(looking_.handler([this] { look(); }));
@@ -323,7 +258,7 @@ void SharedCarrier::look() {
   try {
     if (try_to_take_part()) return;
   } catch (const Error& error) {
-    forget_places();
+    places_.forget();
     if (late()) tell({CarrierEvent::Kind::down, error.problem()});
     if (state_ != State::attaching) return;
   }
@@ -378,7 +313,8 @@ void SharedCarrier::on_carrier_event(const CarrierEvent& event) {
   const bool renamed = name_ != own_->name();
   name_ = own_->name();
   tell(event);
-  if (up_ && not_shared_) tell({CarrierEvent::Kind::warning, *std::exchange(not_shared_, {})});
+  if (!up_) return;
+  if (auto stranger = places_.take_stranger()) tell({CarrierEvent::Kind::warning, *stranger});
   if (renamed && up_ && state_ == State::holding) holder_.tell(Kind::up, name_);
 }
 
@@ -427,8 +363,8 @@ bool SharedCarrier::gives_way() {
 
 void SharedCarrier::on_message(const ShareMessage& message) {
   heard_ = true;
-  if (is_passed_over(place_)) {
-    forget_places();
+  if (places_.joined_is_passed_over()) {
+    places_.forget();
     // It goes on, and tells how the wire is to those that come.
     if (welcome_) {
       sharer_.leave();
@@ -475,7 +411,7 @@ void SharedCarrier::on_holder_lost() {
   if (welcome_) return attach_later(milliseconds(0));
   // It ends, or has had enough of us.
   state_ = State::attaching;
-  forget_places();
+  places_.forget();
   if (late() && !trouble_) tell({CarrierEvent::Kind::down, sharer_.turned_away(name_)});
   if (state_ == State::attaching) look_later();
 }

@@ -446,10 +446,10 @@ TEST_F(SharedCarrier, AStrangerWhoTakesNamesKeepsNobodyFromTheWire) {
   const auto& warning = alone->heard.events.back();
   EXPECT_EQ(warning.kind, CarrierEvent::Kind::warning);
   EXPECT_EQ(warning.problem.kind, ErrorKind::permission);
-  EXPECT_EQ(warning.problem.reason,
-            fmt::format(
-                "user 65534 (pid {}) has taken the names by which programs of user 0 share it",
-                ::getpid()));
+  EXPECT_EQ(
+      warning.problem.reason,
+      fmt::format("user 65534 (pid {}) has taken the names by which programs of user 0 share it",
+                  ::getpid()));
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ struct Device {
   std::mutex mutex;
   bool exclusive = true;
   bool may_be_taken = false;  // from one that yields
-  Wire* open = nullptr;  // the newest, if it is for several
+  Wire* open = nullptr;       // the newest, if it is for several
   int opened = 0;
   std::vector<std::string> sent;
 
