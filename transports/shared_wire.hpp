@@ -18,8 +18,6 @@ struct ShareGroup {
 struct SharedWire {
   // The same for all who mean it, and for nobody else. Empty: it is not shared.
   std::string name;
-  // Only one can have it open. If not, a program goes its own way where the holder does not answer.
-  bool exclusive = false;
   ShareGroup group{};
 };
 // Throws Error where it is not to be found.

@@ -108,6 +108,8 @@ class R4LINK_API Carrier {
     virtual void on_drained() {}
     // What another program sent to the board, on a wire that programs share.
     virtual void on_overheard(std::string_view bytes) { static_cast<void>(bytes); }
+    // Another program has taken the device (Claim::yields): this carrier has closed it.
+    virtual void on_taken() {}
     // The first 1024 bytes of a line or packet that was longer, and so no datagram; the rest is thrown away.
     virtual void on_oversize(std::string_view beginning) { static_cast<void>(beginning); }
 
@@ -144,6 +146,14 @@ class R4LINK_API Carrier {
 
   // Sends the packed form from now on, where there is one (CAN). Received are both at any time.
   virtual void use_packed_form(bool wanted) { static_cast<void>(wanted); }
+
+  // Of a device that one program can have open at a time: how the next open() takes it.
+  struct Claim {
+    bool yields =
+        false;  // it may be taken from this program, which then reads and sends nothing more
+    bool takes = false;  // also from a program that yields
+  };
+  virtual void claim(Claim claim) { static_cast<void>(claim); }
 
   // At a host that records and does not drive, before open(): what comes may be handed over some milliseconds late, so
   // that many boards wake the processor up no more often than one. A carrier that does so tells when it came.

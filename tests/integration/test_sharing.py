@@ -149,19 +149,60 @@ def with_a_stopped_holder(url, look):
                 each.next(is_state)
 
 
-def test_a_stopped_holder_that_watches_is_named_where_one_can_have_the_wire(board):
+def hears_on(watcher, _, stopped):
+    heard = watcher.next(lambda each: is_state(each) and each['came'] > stopped + 0.5)
+    assert heard['came'] - stopped < 2 or SANITIZED
+
+
+def test_a_stopped_holder_that_watches_is_named_where_it_has_the_only_port():
     def is_told(watcher, pid, _):
         told = watcher.next(lambda each: each['type'] == 'error')['fields']
         assert f'the program that holds it (pid {pid}) does not answer' == told['reason'], told
-    with_a_stopped_holder(board.host_url, is_told)
-
-
-def test_a_stopped_holder_that_watches_keeps_nobody_from_a_board_on_udp():
-    def hears_on(watcher, _, stopped):
-        heard = watcher.next(lambda each: is_state(each) and each['came'] > stopped + 0.5)
-        assert heard['came'] - stopped < 2 or SANITIZED
     with Board('udp://127.0.0.1:0') as board:
-        with_a_stopped_holder(board.host_url.removesuffix('?listen=0'), hears_on)
+        with_a_stopped_holder(board.host_url.replace('?listen=0', f'?listen={free_port()}'), is_told)
+
+
+def test_a_stopped_holder_that_watches_keeps_nobody_from_a_board(folder):
+    for url in 'udp://127.0.0.1:0', f'pty:{folder}/tty':
+        with Board(url) as board:
+            with_a_stopped_holder(board.host_url.removesuffix('?listen=0'), hears_on)
+
+
+def test_a_stopped_holder_loses_the_serial_port_and_takes_no_byte_of_it_when_it_goes_on(folder):
+    path = pathlib.Path(folder, 'all.r4log')
+    with Board(f'pty:{folder}/tty') as board, watch(board.host_url) as holder:
+        holder.next(is_state)
+        holder.signal(signal.SIGSTOP)
+        for _ in range(2):
+            with driving(board.host_url, 'O:358,1,1'), Running('record', board.host_url, '-o', str(path)) as recorder:
+                wait_for(path, 'OSMC1:358,1;')
+                refused = run('send', board.host_url, 'O:1,1,1')
+                assert refused.returncode == 3 and 'controlled by r4 ' in refused.stderr, refused
+                holder.signal(signal.SIGCONT)
+                holder.skip_past()
+                for _ in range(20):
+                    holder.next(drives(358))
+                holder.signal(signal.SIGSTOP)  # it shares now, and keeps nobody from anything
+                assert recorder.end() == 0, recorder.errors
+            numbers = [number for _, number, _ in received(path)]
+            assert len(numbers) > 20 and numbers == list(range(numbers[0], numbers[-1] + 1))
+            path.unlink()
+
+
+def test_two_spellings_of_a_board_are_one_wire():
+    with Board('udp://127.0.0.1:0') as board:
+        listen = free_port()
+        url = board.host_url.replace('?listen=0', f'?listen={listen}')
+        other_url = url.replace('127.0.0.1', 'localhost')
+        with driving(url, 'O:358,1,1') as host, watch(other_url) as watcher:
+            watcher.next(drives(358))
+            refused = run('send', other_url, 'O:1,1,1')
+            assert refused.returncode == 3, refused
+            assert f'controlled by r4 (pid {host.process.pid})' in refused.stderr, refused
+            # One that only a resolver knows is another wire, at the same port.
+            refused = run('send', url.replace('127.0.0.1', '127.1'), 'O:1,1,1')
+            assert refused.returncode == 4, refused
+            assert f'UDP port {listen} is in use by r4 (pid {host.process.pid})' in refused.stderr, refused
 
 
 def test_where_as_many_share_it_as_may_a_stop_is_obeyed_and_control_is_taken(folder):

@@ -136,6 +136,32 @@ def test_records_watches_and_has_a_watchdog(sim, tmp_path):
     assert r4link.read(tmp_path / 'drive-00001.r4log').boards[0].states['osmc1_pwm'].max() == 100
 
 
+def test_with_a_key_it_drives_a_board_that_has_it_and_no_other(tmp_path):
+    right, wrong = tmp_path / 'right', tmp_path / 'wrong'
+    for path, digits in (right, '5a'), (wrong, '5b'):
+        path.write_text(f'1:{digits * 32}\n')
+        path.chmod(0o600)
+
+    async def main():
+        with r4link.SimBoard('udp://127.0.0.1:0', settings={'key': '1:' + '5a' * 32}) as sim:
+            for key, told in (None, 'needed'), (wrong, 'not taken'):
+                async with aio.Board(sim.url, key=key) as stranger:
+                    deadline = time.monotonic() + 10
+                    while stranger.link.key != told:
+                        assert time.monotonic() < deadline, stranger.link
+                        await asyncio.sleep(0.005)
+                    with pytest.raises(r4link.RefusedError, match='key'):
+                        await stranger.wait_active(0.01)
+                    assert sim.look().is_safe
+            async with aio.Board(sim.url, key=right) as board:
+                await board.wait_active()
+                await board.arm()
+                await board.osmc(1).set(358)
+                assert (await board.next_state()).osmc1.pwm == 358
+                assert sim.look().osmc[0].pwm == 358
+    asyncio.run(main())
+
+
 async def count(states):
     number = 0
     async for _ in states:

@@ -28,8 +28,9 @@ LineStream::LineStream(asio::io_context& io, Owner& owner, CarrierCounters& coun
       writable_(io),
       queue_(normal_entries, state_entries, counters.tx_dropped) {}
 
-void LineStream::start(FileDescriptor descriptor) {
+void LineStream::start(FileDescriptor descriptor, bool asks) {
   stop();
+  asks_ = asks;
   stream_.assign(descriptor.get());
   (void)descriptor.release();
   framing_.reset();
@@ -48,11 +49,24 @@ void LineStream::stop() noexcept {
 }
 
 // Asio tries to read at once before it waits: on a tty that costs half as much as a wait, which has
-// to be armed anew each time.
+// to be armed anew each time. It would do so, too, when a program that was stopped goes on.
 void LineStream::begin_to_receive() {
+  if (asks_) {
+    stream_.async_wait(asio::posix::descriptor_base::wait_read,
+                       readable_.handler([this] { ask_and_read(); }));
+    return;
+  }
   stream_.async_read_some(asio::buffer(received_),
                           readable_.handler([this](const asio::error_code& error,
                                                    std::size_t size) { receive(error, size); }));
+}
+
+void LineStream::ask_and_read() {
+  if (!owner_.may_read()) return;
+  const ssize_t size = ::read(stream_.native_handle(), received_.data(), received_.size());
+  if (size < 0 && would_block(errno)) return begin_to_receive();
+  if (size <= 0) return lost(size == 0 ? 0 : errno);
+  receive({}, static_cast<std::size_t>(size));
 }
 
 void LineStream::receive(const asio::error_code& error, std::size_t size) {

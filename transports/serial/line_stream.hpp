@@ -32,6 +32,8 @@ class LineStream {
     virtual void on_drained() = 0;
     // The stream has ended and is closed: errno, or 0 for an end of file.
     virtual void on_lost(int error) = 0;
+    // Of a stream that asks: is what has come ours to read? If not, the owner stops the stream.
+    virtual bool may_read() { return true; }
     // A state is about to be sent.
     virtual void before_state() {}
     // The system has taken that many bytes.
@@ -44,8 +46,8 @@ class LineStream {
   LineStream(asio::io_context& io, Owner& owner, CarrierCounters& counters);
   ~LineStream() { stop(); }
 
-  // Begins to receive. The descriptor must not block.
-  void start(FileDescriptor descriptor);
+  // Begins to receive. The descriptor must not block. `asks`: the owner, before each reading.
+  void start(FileDescriptor descriptor, bool asks = false);
   // Closes it and drops what waits.
   void stop() noexcept;
 
@@ -58,6 +60,7 @@ class LineStream {
   enum class Outcome { written, busy, failed };
 
   void begin_to_receive();
+  void ask_and_read();
   void receive(const asio::error_code& error, std::size_t size);
   void lost(int error);
   Outcome write_line(std::string_view bytes);
@@ -71,6 +74,7 @@ class LineStream {
   OperationSlot readable_;
   OperationSlot failure_;
   WritableWait writable_;
+  bool asks_ = false;
   LineFraming framing_;
   SendQueue queue_;
   std::array<char, 4096> received_;

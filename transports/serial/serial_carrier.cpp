@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <asio/post.hpp>
 #include <chrono>
 #include <cstring>
 #include <utility>
@@ -56,9 +57,8 @@ class SerialCarrier final : public Carrier, private LineStream::Owner {
 
   void open(Handler& handler) override;
   void close() noexcept override;
-  SendResult send(std::string_view bytes, Priority priority, Peer) override {
-    return stream_.send(bytes, priority);
-  }
+  SendResult send(std::string_view bytes, Priority priority, Peer) override;
+  void claim(Claim claim) override { claim_ = claim; }
   bool up() const override { return up_; }
   std::size_t max_size() const override { return max_datagram; }
   const std::string& name() const override { return name_; }
@@ -69,6 +69,7 @@ class SerialCarrier final : public Carrier, private LineStream::Owner {
   void on_oversize(std::string_view beginning) override { handler_->on_oversize(beginning); }
   void on_drained() override { handler_->on_drained(); }
   void on_lost(int error) override;
+  bool may_read() override;
 
   std::string find_again() const;
   void open_device(const std::string& path);
@@ -87,6 +88,9 @@ class SerialCarrier final : public Carrier, private LineStream::Owner {
   int obstructed_ = 0;    // looks at which it was so
   Handler* handler_ = nullptr;
   bool up_ = false;
+  Claim claim_;
+  PortLock lock_;
+  OperationSlot yielding_;
   CarrierCounters counters_;
   LineStream stream_;
 };
@@ -112,6 +116,7 @@ SerialCarrier::SerialCarrier(asio::io_context& io, Url url)
 void SerialCarrier::open(Handler& handler) {
   close();
   open_device(find_device(url_));
+  claim_.takes = false;  // once: another may have it in the right way when it is opened again
   handler_ = &handler;
   up_ = true;
   ++counters_.ups;
@@ -122,7 +127,25 @@ void SerialCarrier::close() noexcept {
   handler_ = nullptr;
   up_ = false;
   looking_.cancel();
+  yielding_.cancel();
   stream_.stop();
+}
+
+SendResult SerialCarrier::send(std::string_view bytes, Priority priority, Peer) {
+  if (claim_.yields && up_ && lock_.is_taken()) {
+    asio::post(io_, yielding_.handler([this] { may_read(); }));
+    return SendResult::down;
+  }
+  return stream_.send(bytes, priority);
+}
+
+// Asked before each reading where the port may be taken from us: we may have been stopped for long.
+bool SerialCarrier::may_read() {
+  if (!lock_.is_taken()) return true;
+  Handler* const handler = handler_;
+  close();
+  handler->on_taken();
+  return false;
 }
 
 // The path of the device that has been open; some adapters share one serial number.
@@ -141,7 +164,7 @@ std::string SerialCarrier::find_again() const {
 }
 
 void SerialCarrier::open_device(const std::string& path) {
-  stream_.start(open_serial_device(io_, path, baud_));
+  stream_.start(open_serial_device(io_, path, baud_, claim_, lock_), claim_.yields);
   name_ = "serial://" + path;
   if (baud_ != default_baud) name_ += fmt::format("?baud={}", baud_);
   const std::string real_path = resolve_links(path);
@@ -152,6 +175,7 @@ void SerialCarrier::open_device(const std::string& path) {
 
 void SerialCarrier::on_lost(int error) {
   up_ = false;
+  yielding_.cancel();
   ++counters_.downs;
   obstructed_ = 0;
   look_later();
@@ -200,10 +224,10 @@ SharedWire serial_wire(const Url& url) {
   const std::string path = resolve_links(find_device(url));
   for (const SerialPort& port : list_serial_ports()) {
     if (port.path == path && port.is_r4 && !port.serial_number.empty()) {
-      return {"serial/sn=" + port.serial_number, true};
+      return {"serial/sn=" + port.serial_number};
     }
   }
-  return {"serial/" + path, true};
+  return {"serial/" + path};
 }
 
 }  // namespace r4

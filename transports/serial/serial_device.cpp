@@ -5,7 +5,6 @@
 #include <fmt/core.h>
 #include <libserialport.h>
 #include <linux/serial.h>
-#include <sys/file.h>
 #include <sys/ioctl.h>
 #include <termios.h>
 
@@ -93,7 +92,6 @@ FileDescriptor open_real(const std::string& path, const std::string& real_path, 
   sp_close(port.get());
   if (!plain) fail(path, EIO);
   if (!rate) refuse_baud(path, baud);
-  ::ioctl(result.get(), TIOCEXCL);
 
   serial_struct settings{};
   if (::ioctl(result.get(), TIOCGSERIAL, &settings) == 0) {
@@ -129,11 +127,13 @@ std::string resolve_links(const std::string& path) {
   return error ? path : real.string();
 }
 
-FileDescriptor open_serial_device(asio::io_context& io, const std::string& path, unsigned baud) {
+FileDescriptor open_serial_device(asio::io_context& io, const std::string& path, unsigned baud,
+                                  Carrier::Claim claim, PortLock& lock) {
   const std::string real_path = resolve_links(path);
-  FileDescriptor device =
-      is_in_sysfs(real_path) ? open_real(path, real_path, baud) : open_pty(io, real_path, baud);
-  if (::flock(device.get(), LOCK_EX | LOCK_NB) != 0) fail(path, errno);
+  const bool real = is_in_sysfs(real_path);
+  FileDescriptor device = real ? open_real(path, real_path, baud) : open_pty(io, real_path, baud);
+  if (!lock.lock(device.get(), claim)) fail(path, errno);
+  if (real && !claim.yields && lock.is_first()) ::ioctl(device.get(), TIOCEXCL);
   // libserialport leaves VMIN at 0, where "no data" reads like a hang-up.
   termios settings{};
   if (::tcgetattr(device.get(), &settings) != 0) fail(path, errno);

@@ -56,6 +56,12 @@ FileDescriptor local_socket() {
 
 }  // namespace
 
+SharedWire at_place(const SharedWire& wire, int place) {
+  SharedWire there = wire;
+  if (place != 0) there.name += fmt::format("+{}", place);
+  return there;
+}
+
 FileDescriptor hold_wire(const SharedWire& wire) {
   FileDescriptor descriptor = local_socket();
   const Address address = address_of(wire);

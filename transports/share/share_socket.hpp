@@ -25,6 +25,10 @@ struct ShareCredentials {
   gid_t gid = 0;
 };
 
+// Where a holder hangs, those that share the wire meet at another place.
+constexpr int share_places = 4;
+SharedWire at_place(const SharedWire& wire, int place);
+
 // Takes the place of the holder of that wire. None, if another program has it.
 FileDescriptor hold_wire(const SharedWire& wire);
 

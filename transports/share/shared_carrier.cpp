@@ -10,6 +10,7 @@
 #include "../operation_slot.hpp"
 #include "r4link/datagram.hpp"
 #include "share_message.hpp"
+#include "share_places.hpp"
 #include "wire_holder.hpp"
 #include "wire_sharer.hpp"
 
@@ -50,6 +51,7 @@ class SharedCarrier final : public Carrier,
         name_(own_->name()),
         holder_(io, *this, program_invocation_short_name),
         sharer_(io, *this),
+        places_(holder_, sharer_),
         timer_(io) {}
   ~SharedCarrier() override { close(); }
 
@@ -77,6 +79,7 @@ class SharedCarrier final : public Carrier,
   void on_datagram(std::string_view bytes, Peer from) override;
   void on_carrier_event(const CarrierEvent& event) override;
   void on_drained() override { handler_->on_drained(); }
+  void on_taken() override;
   void on_overheard(std::string_view bytes) override;
   void on_oversize(std::string_view beginning) override;
   // Those who share our wire.
@@ -89,14 +92,14 @@ class SharedCarrier final : public Carrier,
   void on_all_heard() override { handler_->on_drained(); }
   void on_holder_lost() override;
 
-  void attach();
   void take_part();
+  bool try_to_take_part();
   bool try_to_share();
   bool try_to_hold();
   void expect_answer(milliseconds within);
   void look_after_holder();
-  void leave_holder(const Problem& problem);
-  void go_elsewhere();
+  bool leave_holder();
+  void leave_other_version();
   void attach_later(milliseconds delay);
   void look();
   void look_later();
@@ -106,11 +109,11 @@ class SharedCarrier final : public Carrier,
   asio::io_context& io_;
   const std::unique_ptr<Carrier> own_;
   const FindWire find_;
-  SharedWire wire_;  // as it was found when it was opened
   const BoardRole role_;
   std::string name_;
   WireHolder holder_;
   WireSharer sharer_;
+  SharePlaces places_;
   LoopTimer timer_;
   OperationSlot looking_;
   State state_ = State::closed;
@@ -120,9 +123,8 @@ class SharedCarrier final : public Carrier,
   bool welcome_ = false;
   bool heard_ = false;  // since it was looked after
   bool asked_ = false;
-  std::optional<Problem> trouble_;     // why it is down, or the warning that stands
-  std::optional<Problem> not_shared_;  // why, until it is told
-  Clock::time_point since_;            // we have no part in the wire
+  std::optional<Problem> trouble_;  // why it is down, or the warning that stands
+  Clock::time_point since_;         // we have no part in the wire
   Carrier::Handler* handler_ = nullptr;
   CarrierCounters shared_counters_;
 };
@@ -133,8 +135,8 @@ void SharedCarrier::open(Carrier::Handler& handler) {
   state_ = State::attaching;
   since_ = Clock::now();
   try {
-    wire_ = find_();
-    attach();
+    places_.begin(find_());
+    take_part();
   } catch (...) {
     close();
     throw;
@@ -146,7 +148,6 @@ void SharedCarrier::close() noexcept {
   handler_ = nullptr;
   up_ = moved_ = false;
   trouble_.reset();
-  not_shared_.reset();
   looking_.cancel();
   sharer_.leave();
   own_->close();  // the wire is free before others are told so
@@ -154,53 +155,30 @@ void SharedCarrier::close() noexcept {
 }
 
 // Throws Error where neither will do.
-void SharedCarrier::attach() {
-  try {
-    take_part();
-  } catch (const Error& error) {
-    if (wire_.exclusive || error.kind() != ErrorKind::open) throw;
-    go_elsewhere();
-    try {
-      take_part();
-    } catch (const Error& second) {
-      if (second.kind() == ErrorKind::refused) throw;
-      throw error;
-    }
-  }
-}
-
 void SharedCarrier::take_part() {
   // Between our two questions others may come and go.
-  const Clock::time_point deadline = Clock::now() + take_over_within;
+  const Clock::time_point deadline = Clock::now() + take_over_within + share_places * answer_within;
   do {
-    if (try_to_share() || try_to_hold()) return;
+    if (try_to_take_part()) return;
   } while (Clock::now() < deadline);
   throw Error(ErrorKind::open, name_, "other programs take it, one after the other",
               "end those that control the board");
 }
 
-// True if we share it now, or may do so soon. Throws Error if the holder does not let us.
+bool SharedCarrier::try_to_take_part() {
+  if (role_ == BoardRole::watch && try_to_share()) return true;
+  if (role_ == BoardRole::control) places_.ask_for_wire(name_);
+  try {
+    return try_to_hold();
+  } catch (const Error& error) {
+    if (places_.no_help() && error.kind() == ErrorKind::open) throw Error(*places_.no_help());
+    throw;
+  }
+}
+
+// True if we share it now, or may do so soon.
 bool SharedCarrier::try_to_share() {
-  if (wire_.name.empty()) return false;
-  switch (sharer_.join(wire_, role_, program_invocation_short_name)) {
-    case WireSharer::Joined::none:
-      return false;
-    case WireSharer::Joined::stranger:
-      // Its place is no use to us, and the wire itself is not the stranger's.
-      not_shared_ = sharer_.stranger(name_, wire_);
-      wire_.name.clear();
-      return false;
-    case WireSharer::Joined::holder:
-      break;
-  }
-  if (role_ == BoardRole::control) {
-    const ShareMessage answer = sharer_.wait_for_answer(name_);
-    const std::string who = sharer_.holder(answer.text);
-    sharer_.leave();
-    if (answer.kind != Kind::busy) return false;  // it has let the wire go
-    throw Error(ErrorKind::refused, name_, "controlled by " + who,
-                "end that program, or watch beside it, as r4 monitor does");
-  }
+  if (!places_.join(name_)) return false;
   state_ = State::sharing;
   welcome_ = heard_ = false;
   asked_ = true;  // by the hello
@@ -221,44 +199,56 @@ void SharedCarrier::look_after_holder() {
   } else if (!asked_) {
     asked_ = true;
     sharer_.ask_whether_alive();
-  } else if (!wire_.exclusive || welcome_) {
-    return leave_holder(sharer_.silence(name_));
   } else {
+    places_.pass_over_hanging(name_);
+    if (leave_holder()) return;
     // When it goes on it finds our hello.
-    tell({CarrierEvent::Kind::down, sharer_.silence(name_)});
+    tell({CarrierEvent::Kind::down, *places_.no_help()});
     if (state_ != State::sharing) return;
   }
   expect_answer(ask_after);
 }
 
-// It is no help to us.
-void SharedCarrier::leave_holder(const Problem& problem) {
-  go_elsewhere();
-  attach_later(wire_.exclusive ? look_again_slowly : milliseconds(0));
-  if (wire_.exclusive) tell({CarrierEvent::Kind::down, problem});
-}
-
-// Where a wire needs no holder, those that this one is no help to meet at another name.
-void SharedCarrier::go_elsewhere() {
-  sharer_.leave();
-  if (!wire_.exclusive && !wire_.name.empty()) wire_.name += '+';
-}
-
-bool SharedCarrier::try_to_hold() {
-  if (!wire_.name.empty() && !holder_.hold(wire_)) return false;
-  state_ = State::holding;
+// It is no help to us. False: neither is any other, and the wire is not to be had without it.
+bool SharedCarrier::leave_holder() {
+  since_ = Clock::now();
   try {
+    for (int i = 0; i < 3;
+         ++i) {  // one of those that leave it with us may be about to hold another
+      if (try_to_share() || try_to_hold()) return true;
+    }
+  } catch (const Error&) {
+    return false;
+  }
+  return false;
+}
+
+void SharedCarrier::leave_other_version() {
+  sharer_.leave();
+  attach_later(look_again_slowly);
+  places_.pass_over_other_version(name_);
+  tell({CarrierEvent::Kind::down, *places_.no_help()});
+}
+
+// Where a holder hangs that only watches, it is taken from that one. Throws Error if it cannot be opened.
+bool SharedCarrier::try_to_hold() {
+  if (!places_.hold()) return false;
+  const State before = std::exchange(state_, State::holding);
+  try {
+    own_->claim({role_ == BoardRole::watch && holder_.holds(), places_.one_hangs()});
     own_->open(*this);
   } catch (...) {
-    state_ = State::attaching;
+    state_ = before;
     holder_.release();
     throw;
   }
+  sharer_.leave();
   return true;
 }
 
 void SharedCarrier::attach_later(milliseconds delay) {
   state_ = State::attaching;
+  places_.forget();
   since_ = Clock::now() + delay;
   timer_.expires_after(delay);
   timer_.async_wait(looking_.handler([this] { look(); }));
@@ -266,8 +256,9 @@ void SharedCarrier::attach_later(milliseconds delay) {
 
 void SharedCarrier::look() {
   try {
-    if (try_to_share() || try_to_hold()) return;
+    if (try_to_take_part()) return;
   } catch (const Error& error) {
+    places_.forget();
     if (late()) tell({CarrierEvent::Kind::down, error.problem()});
     if (state_ != State::attaching) return;
   }
@@ -322,7 +313,8 @@ void SharedCarrier::on_carrier_event(const CarrierEvent& event) {
   const bool renamed = name_ != own_->name();
   name_ = own_->name();
   tell(event);
-  if (up_ && not_shared_) tell({CarrierEvent::Kind::warning, *std::exchange(not_shared_, {})});
+  if (!up_) return;
+  if (auto stranger = places_.take_stranger()) tell({CarrierEvent::Kind::warning, *stranger});
   if (renamed && up_ && state_ == State::holding) holder_.tell(Kind::up, name_);
 }
 
@@ -355,6 +347,12 @@ void SharedCarrier::on_stop_of_another(std::string_view datagram) {
   }
 }
 
+// It may be from long ago that this program went on last.
+void SharedCarrier::on_taken() {
+  holder_.release();
+  attach_later(milliseconds(0));
+}
+
 bool SharedCarrier::gives_way() {
   if (role_ == BoardRole::control) return false;
   own_->close();
@@ -365,10 +363,18 @@ bool SharedCarrier::gives_way() {
 
 void SharedCarrier::on_message(const ShareMessage& message) {
   heard_ = true;
+  if (places_.joined_is_passed_over()) {
+    places_.forget();
+    // It goes on, and tells how the wire is to those that come.
+    if (welcome_) {
+      sharer_.leave();
+      return attach_later(milliseconds(0));
+    }
+  }
   switch (message.kind) {
     case Kind::welcome:
       welcome_ = true;
-      if (!message.same_version) leave_holder(sharer_.other_version(name_));
+      if (!message.same_version) leave_other_version();
       break;
     case Kind::received:
       ++shared_counters_.rx_datagrams;
@@ -405,6 +411,7 @@ void SharedCarrier::on_holder_lost() {
   if (welcome_) return attach_later(milliseconds(0));
   // It ends, or has had enough of us.
   state_ = State::attaching;
+  places_.forget();
   if (late() && !trouble_) tell({CarrierEvent::Kind::down, sharer_.turned_away(name_)});
   if (state_ == State::attaching) look_later();
 }

@@ -22,35 +22,39 @@ constexpr int answer_within_ms = 200;
 
 WireSharer::Joined WireSharer::join(const SharedWire& wire, BoardRole role,
                                     std::string_view program) {
-  leave();
   FileDescriptor connection = reach_holder(wire);
   if (!connection) return Joined::none;
-  holder_ = credentials_of(connection.get());
-  if (!is_one_of_us(connection.get(), wire)) return Joined::stranger;
+  const ShareCredentials there = credentials_of(connection.get());
+  if (!is_one_of_us(connection.get(), wire)) {
+    stranger_ = there;
+    return Joined::stranger;
+  }
   if (send_message(connection.get(), ShareMessage::Kind::hello, hello_text(role, program)) != 0) {
     return Joined::none;
   }
+  leave();
+  holder_ = there;
   connection_.assign(connection.release());
   return Joined::holder;
 }
 
-ShareMessage WireSharer::wait_for_answer(const std::string& thing) {
+std::optional<ShareMessage> WireSharer::wait_for_answer() {
   pollfd waiting{connection_.native_handle(), POLLIN, 0};
   int ready = 0;
   do {
     ready = ::poll(&waiting, 1, answer_within_ms);
   } while (ready < 0 && errno == EINTR);
-  if (ready <= 0) throw Error(silence(thing));
+  if (ready <= 0) return std::nullopt;
   const ssize_t size = receive_packet(connection_.native_handle(), packet_.data(), packet_.size());
   if (size <= 0) {
     ShareMessage ended;  // before it saw us
     ended.kind = ShareMessage::Kind::moved;
     return ended;
   }
-  const std::optional<ShareMessage> message =
+  std::optional<ShareMessage> message =
       read_share_message({packet_.data(), static_cast<std::size_t>(size)});
-  if (!message || !message->same_version) throw Error(other_version(thing));
-  return *message;
+  if (!message) message.emplace().same_version = false;
+  return message;
 }
 
 std::string WireSharer::holder(std::string_view program) const {
@@ -84,8 +88,8 @@ Problem WireSharer::stranger(const std::string& thing, const SharedWire& wire) c
   const std::string sharers = wire.group.name.empty() ? fmt::format("user {}", ::geteuid())
                                                       : "the group " + wire.group.name;
   return {ErrorKind::permission, thing,
-          fmt::format("user {} (pid {}) has taken the name by which programs of {} share it",
-                      holder_.uid, holder_.pid, sharers),
+          fmt::format("user {} (pid {}) has taken the names by which programs of {} share it",
+                      stranger_.uid, stranger_.pid, sharers),
           "it works, but for this program alone; have that program ended, and begin again"};
 }
 

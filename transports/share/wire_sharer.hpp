@@ -4,6 +4,7 @@
 
 #include <array>
 #include <asio/io_context.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -35,11 +36,11 @@ class WireSharer {
   WireSharer& operator=(const WireSharer&) = delete;
 
   enum class Joined { none, holder, stranger };
-  // Goes to the holder of that wire and says hello. A stranger is told nothing.
+  // Goes to the holder of that wire and says hello. A stranger is told nothing. Leaves another one only for this.
   Joined join(const SharedWire& wire, BoardRole role, std::string_view program);
-  // Waits for its first answer; blocks, for 200 ms at most. `moved` where it has ended. Throws Error{open},
-  // naming `thing`, if none comes, or one of another version. `text` is valid until the next message.
-  ShareMessage wait_for_answer(const std::string& thing);
+  // Waits for its first answer; blocks, for 200 ms at most. `moved` where it has ended. None if none comes. `text` is
+  // valid until the next message.
+  std::optional<ShareMessage> wait_for_answer();
   // The process that holds the wire.
   pid_t holder_pid() const { return holder_.pid; }
   // "r4 (pid 123)": the holder.
@@ -48,7 +49,7 @@ class WireSharer {
   Problem silence(const std::string& thing) const;
   Problem other_version(const std::string& thing) const;
   Problem turned_away(const std::string& thing) const;
-  Problem stranger(const std::string& thing, const SharedWire& wire) const;
+  Problem stranger(const std::string& thing, const SharedWire& wire) const;  // the last one
   // Messages are handed over from now on.
   void listen();
   // An E:STOP for the board.
@@ -64,6 +65,7 @@ class WireSharer {
   Owner& owner_;
   LoopDescriptor connection_;
   ShareCredentials holder_;
+  ShareCredentials stranger_;
   OperationSlot readable_;
   std::array<char, ShareMessage::max_size + 1> packet_;
 };

@@ -3,6 +3,7 @@
 
 #include <fmt/core.h>
 
+#include <asio/ip/address.hpp>
 #include <utility>
 
 #include "udp_board.hpp"
@@ -10,6 +11,21 @@
 #include "udp_url.hpp"
 
 namespace r4 {
+namespace {
+
+// However it is written. What another name means is known too late for this.
+std::string spelling_of(const std::string& host) {
+  std::string name = host;
+  for (char& c : name) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  if (name == "localhost") return "127.0.0.1";
+  asio::error_code error;
+  const asio::ip::address address = asio::ip::make_address(name, error);
+  return error ? name : address.to_string();
+}
+
+}  // namespace
 
 std::unique_ptr<Carrier> make_udp_carrier(asio::io_context& io, const Url& url, Role role) {
   return make_udp_carrier_with(io, url, role, HostLookup());
@@ -25,9 +41,8 @@ SharedWire udp_wire(const Url& text) {
   const UdpUrl url(text, Role::host);
   if (url.listen == 0) return {};
   // Who watches has that port, too, if the URL names it, else one of its own.
-  return {fmt::format("udp/{}{}/{}/{}", url.search ? "?" : "", url.search ? url.called : url.host,
-                      url.port, url.listen),
-          text.get("listen").has_value()};
+  return {fmt::format("udp/{}{}/{}/{}", url.search ? "?" : "",
+                      url.search ? url.called : spelling_of(url.host), url.port, url.listen)};
 }
 
 }  // namespace r4

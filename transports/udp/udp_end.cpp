@@ -11,6 +11,8 @@
 #include <cstring>
 #include <utility>
 
+#include "udp_port_user.hpp"
+
 namespace r4 {
 namespace {
 
@@ -63,7 +65,8 @@ void UdpEnd::refuse(const asio::error_code& error, const Endpoint& local, const 
   close_socket();
   const std::string port = fmt::format("UDP port {}", local.port());
   if (error == asio::error::address_in_use) {
-    throw Error(ErrorKind::open, url_.text, port + " is in use by another program", fix);
+    throw Error(ErrorKind::open, url_.text,
+                fmt::format("{} is in use by {}", port, user_of_udp_port(local.port())), fix);
   }
   if (error == asio::error::access_denied) {
     throw Error(ErrorKind::permission, url_.text, port + " may not be opened: permission denied",

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // serial and pty joined by a real pseudo-terminal, and each against a terminal in the test's hands.
 #include <fcntl.h>
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <stdlib.h>
@@ -407,6 +408,56 @@ TEST_F(SerialPtyTest, SaysThatADeviceIsInUse) {
   EXPECT_FALSE(error->problem().fix.empty());
   host->close();
   EXPECT_FALSE(host_error(url_for_host(*board)));
+}
+
+TEST_F(SerialPtyTest, MayBeTakenFromOneThatYieldsWhichReadsAndSendsNothingMore) {
+  const Terminal terminal;
+  const Url url = Url::parse("serial://" + terminal.device);
+  const auto opened = [&](Carrier::Claim claim, Carrier::Handler& handler) {
+    auto carrier = make_serial_carrier(io, url, Role::host);
+    carrier->claim(claim);
+    carrier->open(handler);
+    return carrier;
+  };
+  constexpr Carrier::Claim controls, takes{false, true}, yields{true, false},
+      takes_and_yields{true, true};
+  Recorder first, second, third;
+  const auto one = opened(yields, first);
+  write_text(terminal.master, "for the first\r\n");
+  ASSERT_TRUE(wait_for(first, "for the first"));
+  for (const auto claim : {controls, yields})
+    EXPECT_TRUE(error_of([&] { opened(claim, second); })) << "asked to take it, it is not";
+
+  const auto two = opened(takes_and_yields, second);
+  const auto three = opened(takes, third);
+  for (int i = 0; i < 20; ++i) {
+    write_text(terminal.master, fmt::format("for the third {}\r\n", i));
+    ASSERT_TRUE(wait_for(third, fmt::format("for the third {}", i)));
+  }
+  for (const Recorder* each : {&first, &second}) EXPECT_EQ(each->taken, 1);
+  EXPECT_EQ(first.datagrams.size(), 1U);
+  EXPECT_TRUE(second.datagrams.empty());
+  EXPECT_FALSE(one->up());
+  EXPECT_EQ(two->send("late", Priority::normal), SendResult::down);
+  for (const auto claim : {takes, takes_and_yields, yields, controls})
+    EXPECT_TRUE(error_of([&] { opened(claim, second); })) << "it yields to nobody";
+  EXPECT_EQ(read_all(terminal.master), "");
+}
+
+TEST_F(SerialPtyTest, IsTakenAlsoFromOneThatWantsToSend) {
+  const Terminal terminal;
+  const Url url = Url::parse("serial://" + terminal.device);
+  const auto one = make_serial_carrier(io, url, Role::host);
+  one->claim({true, false});
+  one->open(at_host);
+  EXPECT_EQ(one->send("mine", Priority::normal), SendResult::sent);
+  Recorder other;
+  const auto two = make_serial_carrier(io, url, Role::host);
+  two->claim({false, true});
+  two->open(other);
+  EXPECT_EQ(one->send("late", Priority::normal), SendResult::down);
+  EXPECT_EQ(lines_of(read_all(terminal.master)), std::vector<std::string>{"mine"});
+  EXPECT_TRUE(run_until(io, [&] { return !one->up(); }));
 }
 
 TEST_F(SerialPtyTest, SaysWhichDeviceIsMissing) {

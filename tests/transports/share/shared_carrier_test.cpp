@@ -268,6 +268,93 @@ TEST_F(SharedCarrier, ThoseWhomAHolderThatHangsIsNoHelpToMeetBesideIt) {
   });
 }
 
+TEST_F(SharedCarrier, AHolderThatHangsAndOnlyWatchesLosesTheWireAndComesBackAsOneThatShares) {
+  device.may_be_taken = true;
+  asio::io_context hanging;
+  const auto holder = program(BoardRole::watch, hanging);
+  holder->carrier->open(holder->heard);
+  const auto watcher = program(BoardRole::watch, io);
+  watcher->carrier->open(watcher->heard);
+  const auto hear = [&](const std::string& text, const auto&... programs) {
+    return in_time([&] {
+      device.deliver(text);
+      run_for(io, 5ms);
+      return (programs->has(text) && ...);
+    });
+  };
+  EXPECT_TRUE(hear("without it", watcher));
+  EXPECT_EQ(device.opened, 2);
+  OtherThread elsewhere;
+  std::unique_ptr<Program> driver;
+  const auto drive = [&] {
+    driver = program(BoardRole::control, elsewhere.loop);
+    driver->carrier->open(driver->heard);
+  };
+  // This thread answers meanwhile: the watcher gives way.
+  std::atomic<bool> driving = false;
+  asio::post(elsewhere.loop, [&] {
+    drive();
+    driving = true;
+  });
+  ASSERT_TRUE(in_time([&] { return driving.load(); }));
+  EXPECT_TRUE(hear("driven", watcher));
+  EXPECT_FALSE(holder->has("without it"));
+  const auto driven_at = device.opened;
+  // It goes on.
+  ASSERT_TRUE(in_time([&] {
+    run_for(hanging, 5ms);
+    device.deliver("joined");
+    return holder->has("joined");
+  }));
+  EXPECT_TRUE(holder->carrier->is_shared());
+  EXPECT_EQ(device.opened, driven_at);
+  EXPECT_EQ(watcher->heard.count(Kind::down), 0U);
+  EXPECT_EQ(holder->heard.count(Kind::down), 0U);
+  // The driver is not to be had.
+  const auto second = program(BoardRole::control, io);
+  const auto refused = error_of([&] { second->carrier->open(second->heard); });
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->kind(), ErrorKind::refused);
+  elsewhere.run([&] { driver.reset(); });
+}
+
+TEST_F(SharedCarrier, AHolderThatHangsAndControlsKeepsTheWire) {
+  device.may_be_taken = true;
+  asio::io_context hanging;
+  const auto holder = program(BoardRole::control, hanging);
+  holder->carrier->open(holder->heard);
+  for (const BoardRole role : {BoardRole::control, BoardRole::watch}) {
+    const auto other = program(role, io);
+    const auto error = error_of([&] { other->carrier->open(other->heard); });
+    EXPECT_EQ(error.has_value(), role == BoardRole::control);
+    EXPECT_TRUE(error || run_until(io, [&] { return other->heard.count(Kind::down) == 1; }));
+  }
+  EXPECT_EQ(device.opened, 1);
+}
+
+TEST_F(SharedCarrier, HoldersThatHangHaveFourPlacesWhichAreUsedAgain) {
+  device.exclusive = false;
+  std::array<asio::io_context, share_places + 1> loops;  // that go on no more when theirs is up
+  std::vector<std::unique_ptr<Program>> hanging;
+  const auto hangs_in = [&](asio::io_context& loop) {
+    auto made = program(BoardRole::watch, loop);
+    made->carrier->open(made->heard);
+    EXPECT_TRUE(run_until(loop, [&] { return made->carrier->up(); }));
+    return made;
+  };
+  for (int place = 0; place < share_places; ++place) {
+    hanging.push_back(hangs_in(loops[static_cast<std::size_t>(place)]));
+    EXPECT_TRUE(reach_holder(at_place({wire}, place))) << place;
+  }
+  hanging[0]->carrier->close();
+  hanging.push_back(hangs_in(loops.back()));
+  EXPECT_TRUE(reach_holder({wire}));
+  const auto alone = opened(BoardRole::watch);
+  EXPECT_FALSE(alone->carrier->is_shared());
+  EXPECT_EQ(device.opened, share_places + 2);
+  EXPECT_FALSE(reach_holder(at_place({wire}, share_places)));
+}
+
 TEST_F(SharedCarrier, LooksAgainSlowlyWhereTheHolderEndsWhatItBegins) {
   const FileDescriptor unkind = hold_wire({wire});
   const auto watcher = program(BoardRole::watch, io);
@@ -306,7 +393,7 @@ TEST_F(SharedCarrier, IsForTheMembersOfTheGroupThatTheHolderNames) {
   // A user in the group nobody has (65534), and in no other.
   const auto stop_it = [&](const ShareGroup& of) {
     return run_unprivileged([&] {
-      const SharedWire shared{wire, device.exclusive, of};
+      const SharedWire shared{wire, of};
       const FileDescriptor connection = reach_holder(shared);
       if (!connection || !is_one_of_us(connection.get(), shared)) return 1;
       return send_message(connection.get(), ShareMessage::Kind::stop, stop);
@@ -326,29 +413,42 @@ TEST_F(SharedCarrier, IsForTheMembersOfTheGroupThatTheHolderNames) {
   EXPECT_EQ(device.all_sent().size(), 1U);
 }
 
-// Anyone may take a name: it must keep nobody from a wire, and be told.
-TEST_F(SharedCarrier, AStrangerWhoTakesTheNameKeepsNobodyFromTheWire) {
+// Anyone may take a name: it must keep nobody from a wire, and be told where it matters.
+TEST_F(SharedCarrier, AStrangerWhoTakesNamesKeepsNobodyFromTheWire) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root can be a stranger, too";
-  const std::string name = fmt::format("r4link/0/{}", wire);
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  name.copy(address.sun_path + 1, name.size());
-  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
-  ASSERT_EQ(::seteuid(65534), 0);
-  const FileDescriptor squatter(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
-  ::bind(squatter.get(), reinterpret_cast<const sockaddr*>(&address), size);
-  const int listening = ::listen(squatter.get(), 1);
-  ASSERT_EQ(::seteuid(0), 0);
-  ASSERT_EQ(listening, 0);
-  const auto driver = opened(BoardRole::control);
-  EXPECT_EQ(driver->carrier->send("hello", Priority::normal), SendResult::sent);
+  std::vector<FileDescriptor> squatters;
+  const auto take = [&](int place) {
+    const std::string name = "r4link/0/" + at_place({wire}, place).name;
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    name.copy(address.sun_path + 1, name.size());
+    const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
+    ASSERT_EQ(::seteuid(65534), 0);
+    const int squatter =
+        squatters.emplace_back(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0)).get();
+    const bool taken = ::bind(squatter, reinterpret_cast<const sockaddr*>(&address), size) == 0 &&
+                       ::listen(squatter, 1) == 0;
+    ASSERT_EQ(::seteuid(0), 0);
+    ASSERT_TRUE(taken);
+  };
+  take(0);
+  {
+    const auto driver = opened(BoardRole::control);
+    const auto watcher = opened(BoardRole::watch);
+    EXPECT_TRUE(watcher->carrier->is_shared());
+    for (const auto& each : {driver.get(), watcher.get()})
+      EXPECT_EQ(each->heard.count(Kind::warning), 0U);
+  }
+  for (int place = 1; place < share_places; ++place) take(place);
+  const auto alone = opened(BoardRole::control);
+  EXPECT_EQ(alone->carrier->send("hello", Priority::normal), SendResult::sent);
   EXPECT_EQ(device.all_sent(), std::vector<std::string>{"hello"});
-  const auto& warning = driver->heard.events.back();
+  const auto& warning = alone->heard.events.back();
   EXPECT_EQ(warning.kind, CarrierEvent::Kind::warning);
   EXPECT_EQ(warning.problem.kind, ErrorKind::permission);
   EXPECT_EQ(
       warning.problem.reason,
-      fmt::format("user 65534 (pid {}) has taken the name by which programs of user 0 share it",
+      fmt::format("user 65534 (pid {}) has taken the names by which programs of user 0 share it",
                   ::getpid()));
 }
 

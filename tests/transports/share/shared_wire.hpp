@@ -29,7 +29,8 @@ struct Device {
   class Wire;
   std::mutex mutex;
   bool exclusive = true;
-  Wire* open = nullptr;  // the newest, if it is for several
+  bool may_be_taken = false;  // from one that yields
+  Wire* open = nullptr;       // the newest, if it is for several
   int opened = 0;
   std::vector<std::string> sent;
 
@@ -51,8 +52,12 @@ class Device::Wire final : public Carrier {
     close();
     {
       const std::lock_guard lock(device_.mutex);
-      if (device_.exclusive && device_.open != nullptr)
-        throw Error(ErrorKind::open, name_, "in use", "end the other");
+      if (device_.exclusive && device_.open != nullptr) {
+        Wire* const other = device_.open;
+        if (!device_.may_be_taken || !claim_.takes || !other->claim_.yields)
+          throw Error(ErrorKind::open, name_, "in use", "end the other");
+        asio::post(other->io_, [other] { other->lose(); });
+      }
       device_.open = this;
       ++device_.opened;
     }
@@ -71,6 +76,7 @@ class Device::Wire final : public Carrier {
     device_.sent.emplace_back(bytes);
     return SendResult::sent;
   }
+  void claim(Claim claim) override { claim_ = claim; }
   bool up() const override { return up_; }
   std::size_t max_size() const override { return max_datagram; }
   const std::string& name() const override { return name_; }
@@ -79,11 +85,18 @@ class Device::Wire final : public Carrier {
  private:
   friend Device;
 
+  void lose() {
+    Handler* const handler = handler_;
+    close();
+    if (handler != nullptr) handler->on_taken();
+  }
+
   asio::io_context& io_;
   Device& device_;
   const std::string name_ = "device:";
   Handler* handler_ = nullptr;
   bool up_ = false;
+  Claim claim_;
   CarrierCounters counters_;
 };
 
@@ -137,7 +150,7 @@ class SharedWireTest : public testing::Test {
     made->carrier = make_shared_carrier(
         loop, std::make_unique<Device::Wire>(loop, device),
         [this] {
-          return SharedWire{wire, device.exclusive, group};
+          return SharedWire{wire, group};
         },
         role);
     return made;

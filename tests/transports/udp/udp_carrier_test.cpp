@@ -327,12 +327,25 @@ TEST_F(UdpCarrierTest, SaysThatThePortIsInUse) {
       [&] { open_carrier(io, "udp://127.0.0.1?listen=" + other.port(), Role::host, at_host); });
   ASSERT_TRUE(error);
   EXPECT_EQ(error->kind(), ErrorKind::open);
-  EXPECT_EQ(error->problem().reason, "UDP port " + other.port() + " is in use by another program");
+  EXPECT_EQ(error->problem().reason,
+            fmt::format("UDP port {} is in use by {} (pid {})", other.port(),
+                        program_invocation_short_name, ::getpid()));
   EXPECT_NE(error->problem().fix.find("?listen=0"), std::string::npos);
   const auto at_the_board =
       error_of([&] { open_carrier(io, "udp://0.0.0.0:" + other.port(), Role::board, at_board); });
   ASSERT_TRUE(at_the_board);
   EXPECT_EQ(at_the_board->kind(), ErrorKind::open);
+}
+
+TEST_F(UdpCarrierTest, IsOneWireHoweverTheAddressIsWritten) {
+  const auto wire = [](const char* url) { return udp_wire(Url::parse(url)).name; };
+  EXPECT_EQ(wire("udp://localhost"), wire("udp://127.0.0.1:2018?listen=2390"));
+  EXPECT_EQ(wire("udp://LocalHost"), wire("udp://localhost"));
+  EXPECT_EQ(wire("udp://[0:0::1]"), wire("udp://[::1]"));
+  EXPECT_EQ(wire("udp://Robot.local"), wire("udp://robot.local"));
+  EXPECT_NE(wire("udp://127.0.0.2"), wire("udp://127.0.0.1"));
+  EXPECT_NE(wire("udp://127.0.0.1:2019"), wire("udp://127.0.0.1"));
+  EXPECT_NE(wire("udp://127.0.0.1?listen=2391"), wire("udp://127.0.0.1"));
 }
 
 TEST_F(UdpCarrierTest, SaysWhichHostItDoesNotFind) {

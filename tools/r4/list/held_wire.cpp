@@ -19,10 +19,12 @@ bool is_host_heartbeat(std::string_view bytes) {
 }  // namespace
 
 bool HeldWire::join(const SharedWire& wire) {
-  if (sharer_.join(wire, BoardRole::watch, program_invocation_short_name) !=
-      WireSharer::Joined::holder) {
-    return false;
-  }
+  // Those behind have come because one before hangs.
+  int place = share_places;
+  do {
+    if (place-- == 0) return false;
+  } while (sharer_.join(at_place(wire, place), BoardRole::watch, program_invocation_short_name) !=
+           WireSharer::Joined::holder);
   board_.pid = sharer_.holder_pid();
   sharer_.listen();
   return true;

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "port_lock.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+
+#include <cerrno>
+
+namespace r4 {
+namespace {
+
+struct flock bytes_from(off_t first, off_t count) {
+  struct flock bytes {};
+  bytes.l_type = F_WRLCK;
+  bytes.l_whence = SEEK_SET;
+  bytes.l_start = first;
+  bytes.l_len = count;  // 0: all that follow
+  return bytes;
+}
+
+// A lock of another opening from that byte on. Its type is F_UNLCK if there is none.
+struct flock other_from(int device, off_t first) {
+  struct flock bytes = bytes_from(first, 0);
+  if (::fcntl(device, F_OFD_GETLK, &bytes) != 0) bytes.l_type = F_UNLCK;
+  return bytes;
+}
+
+}  // namespace
+
+bool PortLock::lock(int device, Carrier::Claim claim) {
+  // For programs that are not ours, and lock it as a whole.
+  if (::flock(device, LOCK_SH | LOCK_NB) != 0) return false;
+  off_t place = 0;
+  while (true) {
+    const struct flock other = other_from(device, place);
+    if (other.l_type == F_UNLCK) break;
+    if (!claim.takes || other.l_len == 0) {
+      errno = EWOULDBLOCK;
+      return false;
+    }
+    place = other.l_start + 1;
+  }
+  struct flock bytes = bytes_from(place, claim.yields ? 1 : 0);
+  if (::fcntl(device, F_OFD_SETLK, &bytes) != 0) return false;
+  device_ = device;
+  place_ = place;
+  return true;
+}
+
+bool PortLock::is_taken() const { return other_from(device_, place_ + 1).l_type != F_UNLCK; }
+
+}  // namespace r4

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "share_places.hpp"
+
+#include <cerrno>
+#include <utility>
+
+#include "share_message.hpp"
+#include "share_socket.hpp"
+
+namespace r4 {
+
+void SharePlaces::begin(SharedWire wire) {
+  wire_ = std::move(wire);
+  stranger_.reset();
+  forget();
+}
+
+void SharePlaces::forget() {
+  passed_over_ = 0;
+  one_hangs_ = false;
+  no_help_.reset();
+}
+
+WireSharer::Joined SharePlaces::join(int place, BoardRole role, const std::string& thing) {
+  if (wire_.name.empty() || is_passed_over(place)) return WireSharer::Joined::none;
+  const SharedWire there = at_place(wire_, place);
+  const auto joined = sharer_.join(there, role, program_invocation_short_name);
+  if (joined == WireSharer::Joined::stranger) {
+    stranger_ = sharer_.stranger(thing, there);
+    passed_over_ |= 1U << place;
+  }
+  return joined;
+}
+
+bool SharePlaces::join(const std::string& thing) {
+  int place = share_places;
+  do {
+    if (place-- == 0) return false;
+  } while (join(place, BoardRole::watch, thing) != WireSharer::Joined::holder);
+  joined_ = place;
+  stranger_.reset();
+  return true;
+}
+
+// Those that hang come first: who watches has the wire until then.
+void SharePlaces::ask_for_wire(const std::string& thing) {
+  for (int place = 0; place < share_places; ++place) {
+    if (join(place, BoardRole::control, thing) != WireSharer::Joined::holder) continue;
+    joined_ = place;
+    const std::optional<ShareMessage> answer = sharer_.wait_for_answer();
+    if (!answer) {
+      pass_over_hanging(thing);
+    } else if (!answer->same_version) {
+      pass_over_other_version(thing);
+    } else if (answer->kind == ShareMessage::Kind::busy) {
+      throw Error(ErrorKind::refused, thing, "controlled by " + sharer_.holder(answer->text),
+                  "end that program, or watch beside it, as r4 monitor does");
+    }
+  }
+  sharer_.leave();
+}
+
+bool SharePlaces::hold() {
+  if (wire_.name.empty()) return true;
+  for (int place = 0; place < share_places; ++place) {
+    if (is_passed_over(place)) continue;
+    if (!holder_.hold(at_place(wire_, place))) return false;
+    stranger_.reset();
+    return true;
+  }
+  return true;
+}
+
+void SharePlaces::pass_over_hanging(const std::string& thing) {
+  one_hangs_ = true;
+  pass_over(joined_, sharer_.silence(thing));
+}
+
+void SharePlaces::pass_over_other_version(const std::string& thing) {
+  pass_over(joined_, sharer_.other_version(thing));
+}
+
+void SharePlaces::pass_over(int place, Problem why) {
+  passed_over_ |= 1U << place;
+  no_help_ = std::move(why);
+}
+
+std::optional<Problem> SharePlaces::take_stranger() { return std::exchange(stranger_, {}); }
+
+}  // namespace r4
