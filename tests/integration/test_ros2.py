@@ -258,6 +258,10 @@ def test_its_node_is_listed_for_every_release(user_data, gid_size):
         gone = peer.sample('ros_discovery_info', lambda data: data[:16] == listed[:16])
         assert nodes_of(gone, gid_size) == {}
         assert SANITIZED or gone.came - left < 0.2
+        assert 'rt/robot/R4' in (topic for _, topic in peer.endpoints)
+        went = peer.next(lambda _: not any('/robot/' in topic for _, topic in peer.endpoints), timeout=8)  # the lease: 10
+        assert SANITIZED or went['came'] - left < 0.2
+        peer.next(lambda each: each['type'] == 'participant' and each['gone'], timeout=8)
         assert ros2.wait() == 0
         assert SANITIZED or time.monotonic() - left < 1
         # And again, as after a restart.
