@@ -17,6 +17,7 @@ ON, OFF = b'\x01', b'\x00'
 LOG = 'rcl_interfaces::msg::dds_::Log_'
 DIAGNOSTICS = 'diagnostic_msgs::msg::dds_::DiagnosticArray_'
 REQUEST, RESPONSE = 'std_srvs::srv::dds_::Trigger_Request_', 'std_srvs::srv::dds_::Trigger_Response_'
+SEND, SENT = (f'diagnostic_msgs::srv::dds_::AddDiagnostics_{half}_' for half in ('Request', 'Response'))
 
 
 @pytest.fixture(scope='module', name='graph')
@@ -235,6 +236,50 @@ def test_services_answer_with_the_boards_confirmation(graph):
         assert 'confirmed by the board' in cdr.text()
     board.state('SAFE', 'stop')
     ros2.armed()
+    for name in ('stop', 'arm'):
+        peer.say('remove', f'rq/r4/{name}Request')
+
+
+def test_the_service_send_answers_for_the_board(graph):
+    board, ros2, peer = graph
+    peer.read('rr/r4/sendReply', SENT, user_data='clientid=1;')
+    peer.writer('rq/r4/sendRequest', SEND, user_data='clientid=1;')
+    ros2.logged('~/send: 1 publishers')
+    assert 'typehash=RIHS01_e7070a23' in peer.endpoint('writer', 'rr/r4/sendReply')['user_data']
+
+    def send(commands):
+        peer.write('rq/r4/sendRequest', struct.pack('<Qq', 0x1122334455667788, 9) + text(commands))
+        cdr = Cdr(peer.sample('rr/r4/sendReply'))
+        assert (cdr.take('Q'), cdr.take('q')) == (0x1122334455667788, 9)
+        return bool(cdr.take('B')), cdr.text()
+
+    assert send('O:900,1,3; S:1500,2') == (True, 'O:900,1,3; S:1500,2: confirmed by the board')
+    outputs = board.outputs(lambda each: pwm(each, 3) == 900)['outputs']
+    assert outputs['servo'][1] == pytest.approx(1500, abs=5)
+    for wrong, why in (('O:100,1,3;O:5000,1,4', '5000'), ('O:100,1,3;E:CLEAR', 'E:CLEAR'), ('', ''),
+                       ('C:timeout,1000', 'settings'), ('O:1,1,1' * 200, 'no text')):
+        confirmed, told = send(wrong)
+        assert not confirmed and why in told and told, (wrong, told)
+    assert send('Q:ID')[0]
+    # Silent for a second, it counts as gone, as whoever drives: what it drove is off.
+    outputs = board.outputs(lambda each: pwm(each, 3) != 900)['outputs']
+    assert pwm(outputs, 3) == 0 and outputs['servo'][1] == 0
+    assert send('O:900,1,3')[0]
+    board.outputs(lambda each: pwm(each, 3) == 900)
+    assert send('E:STOP')[0]
+    board.state('SAFE', 'stop')
+    confirmed, told = send('O:900,1,3')
+    assert not confirmed and 'stop' in told
+    assert send('E:CLEAR')[0]
+    confirmed, told = send('O:900,1,3')
+    assert not confirmed and 'arm' in told
+    join(ros2, peer, 'arm', BOOL)
+    peer.write('rt/arm', ON)
+    ros2.armed()
+    assert send('O:900,1,3')[0]
+    for topic in ('rt/arm', 'rq/r4/sendRequest'):
+        peer.say('remove', topic)
+    board.outputs(lambda each: pwm(each, 3) == 0)
 
 
 @pytest.mark.parametrize('user_data, gid_size', ((NODES_HASH, 16), ('-', 24)))
@@ -252,12 +297,16 @@ def test_its_node_is_listed_for_every_release(user_data, gid_size):
         assert not nodes
         raw = bytes.fromhex(peer.endpoint('writer', 'rt/robot/R4')['gid'])
         assert raw.ljust(gid_size, b'\0') in writers
-        assert (len(readers), len(writers)) == tuple(len(ros2.ready[kind]) + 3  # of the services
+        assert (len(readers), len(writers)) == tuple(len(ros2.ready[kind]) + 4  # of the services
                                                     for kind in ('subscriptions', 'publishers'))
         left = ros2.signal(signal.SIGINT)
         gone = peer.sample('ros_discovery_info', lambda data: data[:16] == listed[:16])
         assert nodes_of(gone, gid_size) == {}
         assert SANITIZED or gone.came - left < 0.2
+        assert 'rt/robot/R4' in (topic for _, topic in peer.endpoints)
+        went = peer.next(lambda _: not any('/robot/' in topic for _, topic in peer.endpoints), timeout=8)  # the lease: 10
+        assert SANITIZED or went['came'] - left < 0.2
+        peer.next(lambda each: each['type'] == 'participant' and each['gone'], timeout=8)
         assert ros2.wait() == 0
         assert SANITIZED or time.monotonic() - left < 1
         # And again, as after a restart.

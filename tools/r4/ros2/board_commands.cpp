@@ -17,26 +17,12 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto oldest = 250ms;  // of a command, as it leaves
-constexpr auto patience = 3000ms;
-constexpr auto stop_patience = 5000ms;
 constexpr std::size_t most_texts = 16;  // of R4_Command, that wait
 constexpr std::size_t most_others = 4;  // in one turn
 
 // The same output?
 bool is_same_output(const Command& a, const Command& b) {
   return a.kind == b.kind && a.channel == b.channel;
-}
-
-std::function<void(const CommandResult&)> in_words(const AsyncBoard& board, std::string what,
-                                                   BoardCommands::Done done) {
-  return [&board, what = std::move(what), done = std::move(done)](const CommandResult& result) {
-    if (result.outcome == Outcome::confirmed) {
-      done(true, fmt::format("{}: confirmed by the board", what));
-    } else {
-      done(false, explain(what, result, board.link()).text());
-    }
-  };
 }
 
 }  // namespace
@@ -53,9 +39,7 @@ BoardCommands::BoardCommands(AsyncBoard& board, Graph& graph, std::size_t node, 
   subscribe_arm(graph, node, inbox);
   subscribe_outputs(graph, node, inbox);
   if (options_.drive) subscribe_drive(graph, node, inbox);
-  serve(graph, node, inbox, "~/stop", [this](auto done) { stop(std::move(done)); });
-  serve(graph, node, inbox, "~/clear", [this](auto done) { clear(std::move(done)); });
-  serve(graph, node, inbox, "~/arm", [this](auto done) { arm(std::move(done)); });
+  serve_all(graph, node, inbox);
   board_.on_arming([this](DisarmCause cause) {
     if (cause == DisarmCause::none) return;
     wanted_.clear();
@@ -123,7 +107,7 @@ void BoardCommands::subscribe_text(Graph& graph, std::size_t node, Inbox& inbox)
   inbox.add<StringMessage, std::string>({
       .reader = graph.subscribe<StringMessage>(node, "R4_Command", qos),
       .room = most_texts,
-      .read = text_of,
+      .read = [](const StringMessage& message) { return text_of(message.data); },
       .urgent = [](const std::string& text) { return asks_to_stop(text); },
       .take = [this, source](const std::string& text,
                              const Origin& origin) { on_text(text, source, origin); },
@@ -257,77 +241,7 @@ void BoardCommands::subscribe_drive(Graph& graph, std::size_t node, Inbox& inbox
   });
 }
 
-// --- services
-
-void BoardCommands::serve(Graph& graph, std::size_t node, Inbox& inbox, std::string_view name,
-                          std::function<void(Done)> act) {
-  const Graph::Service service = graph.serve_trigger(node, name);
-  const bool urgent = name == "~/stop";
-  inbox.add<TriggerRequest, TriggerRequest>({
-      .reader = service.requests,
-      .room = 4,
-      .read = [](const TriggerRequest& request) { return std::optional(request); },
-      .urgent = [urgent](const TriggerRequest&) { return urgent; },
-      .take =
-          [this, act = std::move(act), service, urgent](const TriggerRequest& request,
-                                                        const Origin& origin) {
-            if (!urgent && is_stale(origin)) return;
-            act([this, service, request](bool done, const std::string& text) {
-              outbox_.push([service, request, done, text] {
-                TriggerResponse response{};
-                response.client = request.client;
-                response.number = request.number;
-                response.success = done;
-                response.message = const_cast<char*>(text.c_str());
-                // The reader of a client that has just come may not be known yet.
-                dds_publication_matched_status_t matched{};
-                for (int i = 0; i < 20; ++i) {
-                  (void)dds_get_publication_matched_status(service.replies, &matched);
-                  if (matched.current_count != 0) break;
-                  dds_sleepfor(DDS_MSECS(5));
-                }
-                (void)dds_write(service.replies, &response);
-              });
-            });
-          },
-      .left = on_publishers(std::string(name)),
-  });
-}
-
 // NOLINTEND(clang-analyzer-cplusplus.NewDeleteLeaks)
-
-void BoardCommands::stop(Done done) {
-  constexpr std::size_t most_waiting = 16;
-  wanted_.clear();
-  drivers_.forget();
-  const bool under_way = !stops_.empty();
-  if (stops_.size() < most_waiting) stops_.push_back(std::move(done));
-  if (under_way) return;  // it is repeated until the board confirms it
-  board_.async_stop(stop_patience,
-                    in_words(board_, "E:STOP", [this](bool stopped, const std::string& text) {
-                      warn(stopped ? text : fmt::format("{}; {}", text, stop_last_resort));
-                      for (const Done& each : std::exchange(stops_, {})) each(stopped, text);
-                    }));
-}
-
-void BoardCommands::clear(Done done) {
-  board_.async_send(Command::clear(), patience, in_words(board_, "E:CLEAR", std::move(done)));
-}
-
-void BoardCommands::arm(Done done) {
-  if (arming_) {
-    done(false, "arm: it is being armed already");
-    return;
-  }
-  arming_ = true;
-  board_.async_arm(
-      patience,
-      in_words(board_, "arm", [this, done = std::move(done)](bool armed, const std::string& text) {
-        arming_ = false;
-        if (!armed) warn(text);
-        done(armed, text);
-      }));
-}
 
 // --- setpoints
 
@@ -352,6 +266,10 @@ void BoardCommands::want(const Command& command, const void* source, const Origi
 
 void BoardCommands::flush() {
   others_ = 0;
+  post_wanted();
+}
+
+void BoardCommands::post_wanted() {
   for (std::size_t first = 0; first < wanted_.size(); first += max_group) {
     post(first, std::min<std::size_t>(max_group, wanted_.size() - first));
   }

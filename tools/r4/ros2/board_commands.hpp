@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -45,6 +46,7 @@ class BoardCommands {
 
  private:
   using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::milliseconds oldest{250};  // of a command, as it leaves
   struct Setpoint {
     Command command;
     const void* source = nullptr;
@@ -59,10 +61,19 @@ class BoardCommands {
   void subscribe_drive(Graph& graph, std::size_t node, Inbox& inbox);
   void subscribe_stop(Graph& graph, std::size_t node, Inbox& inbox);
   void subscribe_arm(Graph& graph, std::size_t node, Inbox& inbox);
-  void serve(Graph& graph, std::size_t node, Inbox& inbox, std::string_view name,
-             std::function<void(Done)> act);
 
   using Left = std::function<void(const std::vector<std::uint64_t>&)>;
+  // What a service does for a request with that text.
+  using Act =
+      std::function<void(const std::optional<std::string>& text, const Origin&, const Done&)>;
+  struct Room {
+    Graph& graph;
+    std::size_t node;
+    Inbox& inbox;
+  };
+  void serve_all(Graph& graph, std::size_t node, Inbox& inbox);
+  template <class RequestMessage, class Response>
+  void serve(const Room& room, std::string name, const char* type, Act act, Left left);
   // Tells of it, too.
   Left on_publishers(const std::string& topic, Left left = {});
 
@@ -70,10 +81,13 @@ class BoardCommands {
   bool is_stale(const Origin& origin);
   void on_text(const std::string& text, const void* source, const Origin& origin);
   void want(const Command& command, const void* source, const Origin& origin);
+  void post_wanted();
   void post(std::size_t first, std::size_t count);
   void tell(const std::string& what, PostResult result);
   void stop(Done done);
   void clear(Done done);
+  void send(const std::optional<std::string>& text, const void* source, const Origin& origin,
+            const Done& done);
 
   AsyncBoard& board_;
   Outbox& outbox_;

@@ -43,12 +43,12 @@ void require_allowed(std::string_view text, const Command& command) {
 
 }  // namespace
 
-std::optional<std::string> text_of(const StringMessage& message) {
-  const std::uint32_t length = message.data._length;
-  if (length == 0 || length > max_datagram || message.data._buffer[length - 1] != 0) {
+std::optional<std::string> text_of(const dds_sequence_octet& string) {
+  const std::uint32_t length = string._length;
+  if (length == 0 || length > max_datagram || string._buffer[length - 1] != 0) {
     return std::nullopt;
   }
-  const auto* const bytes = reinterpret_cast<const char*>(message.data._buffer);
+  const auto* const bytes = reinterpret_cast<const char*>(string._buffer);
   if (std::memchr(bytes, 0, length - 1) != nullptr) return std::nullopt;
   return std::string(bytes, length - 1);
 }

@@ -12,8 +12,9 @@
 
 namespace r4::tool::ros2 {
 
-// The text of a sample; none if it is no string: no NUL at its end, one within it, or longer than a datagram.
-std::optional<std::string> text_of(const StringMessage& message);
+// The text of a string in a sample; none if it is no string: no NUL at its end, one within it, or longer than a
+// datagram.
+std::optional<std::string> text_of(const dds_sequence_octet& string);
 
 // Is there E:STOP in it? It is obeyed whatever else is there.
 bool asks_to_stop(std::string_view text);

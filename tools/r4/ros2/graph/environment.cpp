@@ -76,11 +76,16 @@ std::string configuration(const std::string& general, const std::vector<std::str
   for (const std::string& peer : peers) list += fmt::format("<Peer Address=\"{}\"/>", peer);
   if (!list.empty()) list = "<Peers>" + list + "</Peers>";
   // Participants on one computer take turns at ports; without multicast each asks at all of them.
+  constexpr std::string_view index =
+      "<ParticipantIndex>auto</ParticipantIndex>"
+      "<MaxAutoParticipantIndex>99</MaxAutoParticipantIndex>";
+  // Fast DDS reads who is leaving from the hash of the key alone: without it we leave with our lease only.
+  constexpr std::string_view internal =
+      "<Internal><GenerateKeyhash>true</GenerateKeyhash></Internal>";
   return fmt::format(
-      "<CycloneDDS><Domain><General>{}</General><Discovery><ParticipantIndex>auto</"
-      "ParticipantIndex>"
-      "<MaxAutoParticipantIndex>99</MaxAutoParticipantIndex>{}</Discovery></Domain></CycloneDDS>",
-      general, list);
+      "<CycloneDDS><Domain><General>{}</General><Discovery>{}{}</Discovery>{}</Domain></"
+      "CycloneDDS>",
+      general, index, list, internal);
 }
 
 }  // namespace

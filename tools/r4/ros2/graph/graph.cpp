@@ -101,14 +101,15 @@ dds_entity_t Graph::make_reader(std::size_t node, std::string_view topic, const 
   return add_reader(node, dds_topic(name), type, qos);
 }
 
-Graph::Service Graph::serve_trigger(std::size_t node, std::string_view name) {
+Graph::Service Graph::make_service(std::size_t node, std::string_view name, const char* type,
+                                   const MessageType& request, const MessageType& response) {
   const std::string full = full_name(nodes_[node].name, name);
   Qos qos;
   qos.user_data = service_id(participant_.get(), services_.size() + 1);
-  services_.push_back({full, "std_srvs/srv/Trigger"});
+  services_.push_back({full, type});
   Service service;
-  service.replies = add_writer(node, dds_reply(full), message_type<TriggerResponse>(), qos);
-  service.requests = add_reader(node, dds_request(full), message_type<TriggerRequest>(), qos);
+  service.replies = add_writer(node, dds_reply(full), response, qos);
+  service.requests = add_reader(node, dds_request(full), request, qos);
   return service;
 }
 

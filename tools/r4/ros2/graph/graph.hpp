@@ -52,8 +52,11 @@ class Graph {
     dds_entity_t requests = 0;
     dds_entity_t replies = 0;
   };
-  // Of type std_srvs/srv/Trigger.
-  Service serve_trigger(std::size_t node, std::string_view name);
+  // `type` in words: "std_srvs/srv/Trigger".
+  template <class Request, class Response>
+  Service serve(std::size_t node, std::string_view name, const char* type) {
+    return make_service(node, name, type, message_type<Request>(), message_type<Response>());
+  }
 
   dds_entity_t participant() const { return participant_.get(); }
   NodeListing& list_nodes(const std::string& distro);
@@ -68,6 +71,8 @@ class Graph {
                            const Qos& qos);
   dds_entity_t make_reader(std::size_t node, std::string_view topic, const MessageType& type,
                            const Qos& qos);
+  Service make_service(std::size_t node, std::string_view name, const char* type,
+                       const MessageType& request, const MessageType& response);
   dds_entity_t topic(const std::string& name, const MessageType& type);
   dds_entity_t add_writer(std::size_t node, const std::string& name, const MessageType& type,
                           Qos qos);

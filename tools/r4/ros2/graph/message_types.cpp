@@ -73,6 +73,12 @@ R4_MESSAGE_TYPE(TriggerRequest, "std_srvs/srv/Trigger_Request",
 R4_MESSAGE_TYPE(TriggerResponse, "std_srvs/srv/Trigger_Response",
                 "RIHS01_2d946c21e2fc3f1e9ca6986a8191d85fcc70097a8bb7771a053564bc47009cdf",
                 &std_srvs_srv_dds__Trigger_Response__desc)
+R4_MESSAGE_TYPE(AddDiagnosticsRequest, "diagnostic_msgs/srv/AddDiagnostics_Request",
+                "RIHS01_e0b6572a07c2b3ca2c4f2acf742297661f6ceb50f5baa4f9305b6094cf950146",
+                &diagnostic_msgs_srv_dds__AddDiagnostics_Request__desc)
+R4_MESSAGE_TYPE(AddDiagnosticsResponse, "diagnostic_msgs/srv/AddDiagnostics_Response",
+                "RIHS01_e7070a2373c892c4cf071dcd90405d7696187eb2ff0e40d8b6472a04a4b73d22",
+                &diagnostic_msgs_srv_dds__AddDiagnostics_Response__desc)
 R4_MESSAGE_TYPE(NodesMessage, "rmw_dds_common/msg/ParticipantEntitiesInfo",
                 "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e",
                 &rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc)

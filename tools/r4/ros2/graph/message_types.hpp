@@ -23,6 +23,8 @@ using DiagnosticsMessage = diagnostic_msgs_msg_dds__DiagnosticArray_;
 using LogMessage = rcl_interfaces_msg_dds__Log_;
 using TriggerRequest = std_srvs_srv_dds__Trigger_Request_;
 using TriggerResponse = std_srvs_srv_dds__Trigger_Response_;
+using AddDiagnosticsRequest = diagnostic_msgs_srv_dds__AddDiagnostics_Request_;
+using AddDiagnosticsResponse = diagnostic_msgs_srv_dds__AddDiagnostics_Response_;
 using NodesMessage = rmw_dds_common_msg_dds__ParticipantEntitiesInfo_;
 using NodesBeforeIronMessage = rmw_dds_common_before_iron_msg_dds__ParticipantEntitiesInfo_;
 
@@ -61,6 +63,10 @@ template <>
 const MessageType& message_type<TriggerRequest>();
 template <>
 const MessageType& message_type<TriggerResponse>();
+template <>
+const MessageType& message_type<AddDiagnosticsRequest>();
+template <>
+const MessageType& message_type<AddDiagnosticsResponse>();
 template <>
 const MessageType& message_type<NodesMessage>();
 template <>

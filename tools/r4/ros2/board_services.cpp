@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The services of a board: each answers when the board has confirmed what was asked, or with why it has not.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "board_commands.hpp"
+#include "command_text.hpp"
+#include "host/commands/command_help.hpp"
+#include "r4link/error.hpp"
+
+namespace r4::tool::ros2 {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto patience = 3000ms;
+constexpr auto stop_patience = 5000ms;
+
+std::function<void(const CommandResult&)> in_words(const AsyncBoard& board, std::string what,
+                                                   BoardCommands::Done done) {
+  return [&board, what = std::move(what), done = std::move(done)](const CommandResult& result) {
+    if (result.outcome == Outcome::confirmed) {
+      done(true, fmt::format("{}: confirmed by the board", what));
+    } else {
+      done(false, explain(what, result, board.link()).text());
+    }
+  };
+}
+
+// Whose request it is, and its text: none where it is no string, or the service takes none.
+struct Request {
+  std::uint64_t client = 0;
+  std::int64_t number = 0;
+  std::optional<std::string> text;
+};
+Request request_of(const TriggerRequest& request) { return {request.client, request.number, {}}; }
+Request request_of(const AddDiagnosticsRequest& request) {
+  return {request.client, request.number, text_of(request.load_namespace)};
+}
+
+template <class Response>
+void answer(dds_entity_t replies, const Request& request, bool done, const std::string& text) {
+  Response response{};
+  response.client = request.client;
+  response.number = request.number;
+  response.success = done;
+  response.message = borrowed(text);
+  // The reader of a client that has just come may not be known yet.
+  dds_publication_matched_status_t matched{};
+  for (int i = 0; i < 20; ++i) {
+    (void)dds_get_publication_matched_status(replies, &matched);
+    if (matched.current_count != 0) break;
+    dds_sleepfor(DDS_MSECS(5));
+  }
+  (void)dds_write(replies, &response);
+}
+
+}  // namespace
+
+// NOLINTBEGIN(clang-analyzer-cplusplus.NewDeleteLeaks): as in board_commands.cpp.
+
+template <class RequestMessage, class Response>
+void BoardCommands::serve(const Room& room, std::string name, const char* type, Act act,
+                          Left left) {
+  const Graph::Service service = room.graph.serve<RequestMessage, Response>(room.node, name, type);
+  const bool stops = name == "~/stop";
+  const auto urgent = [stops](const Request& request) {
+    return stops || (request.text && asks_to_stop(*request.text));
+  };
+  room.inbox.add<RequestMessage, Request>({
+      .reader = service.requests,
+      .room = 4,
+      .read = [](const RequestMessage& request) { return std::optional(request_of(request)); },
+      .urgent = urgent,
+      .take =
+          [this, name, urgent, act = std::move(act), replies = service.replies](
+              const Request& request, const Origin& origin) {
+            const Done done = [this, replies, request](bool confirmed, const std::string& text) {
+              outbox_.push([replies, request, confirmed, text] {
+                answer<Response>(replies, request, confirmed, text);
+              });
+            };
+            if (!urgent(request) && is_stale(origin)) {
+              done(false, fmt::format("{}: the request came too late: dropped", name));
+            } else {
+              act(request.text, origin, done);
+            }
+          },
+      .left = on_publishers(name, std::move(left)),
+  });
+}
+
+// NOLINTEND(clang-analyzer-cplusplus.NewDeleteLeaks)
+
+void BoardCommands::serve_all(Graph& graph, std::size_t node, Inbox& inbox) {
+  const Room room{graph, node, inbox};
+  const auto serve_trigger = [&](const char* name, void (BoardCommands::*act)(Done)) {
+    serve<TriggerRequest, TriggerResponse>(
+        room, name, "std_srvs/srv/Trigger",
+        [this, act](const auto&, const Origin&, const Done& done) { (this->*act)(done); }, {});
+  };
+  serve_trigger("~/stop", &BoardCommands::stop);
+  serve_trigger("~/clear", &BoardCommands::clear);
+  serve_trigger("~/arm", &BoardCommands::arm);
+  const void* const source = sources_.emplace_back(std::make_unique<int>()).get();
+  serve<AddDiagnosticsRequest, AddDiagnosticsResponse>(
+      room, "~/send", "diagnostic_msgs/srv/AddDiagnostics",
+      [this, source](const std::optional<std::string>& text, const Origin& origin,
+                     const Done& done) { send(text, source, origin, done); },
+      [this, source](const auto& there) { drivers_.on_publishers(source, there); });
+}
+
+void BoardCommands::stop(Done done) {
+  constexpr std::size_t most_waiting = 16;
+  wanted_.clear();
+  drivers_.forget();
+  const bool under_way = !stops_.empty();
+  if (stops_.size() < most_waiting) stops_.push_back(std::move(done));
+  if (under_way) return;  // it is repeated until the board confirms it
+  board_.async_stop(stop_patience,
+                    in_words(board_, "E:STOP", [this](bool stopped, const std::string& text) {
+                      warn(stopped ? text : fmt::format("{}; {}", text, stop_last_resort));
+                      for (const Done& each : std::exchange(stops_, {})) each(stopped, text);
+                    }));
+}
+
+void BoardCommands::clear(Done done) {
+  board_.async_send(Command::clear(), patience, in_words(board_, "E:CLEAR", std::move(done)));
+}
+
+void BoardCommands::arm(Done done) {
+  if (arming_) {
+    done(false, "arm: it is being armed already");
+    return;
+  }
+  arming_ = true;
+  board_.async_arm(
+      patience,
+      in_words(board_, "arm", [this, done = std::move(done)](bool armed, const std::string& text) {
+        arming_ = false;
+        if (!armed) warn(text);
+        done(armed, text);
+      }));
+}
+
+void BoardCommands::send(const std::optional<std::string>& text, const void* source,
+                         const Origin& origin, const Done& done) {
+  if (!text) {
+    done(false,
+         "~/send: that is no text of a board's commands; write them as in O:358,1,1;S:1500,3");
+    return;
+  }
+  if (asks_to_stop(*text)) {
+    stop(done);
+    return;
+  }
+  const LinkStatus& link = board_.link();
+  if (!link.in_control) {  // nothing is kept for later
+    done(false, explain(*text, link).text());
+    return;
+  }
+  post_wanted();  // what came before goes before
+  try {
+    const std::vector<Command> commands = commands_of(*text);
+    // It is repeated until it is too old to be executed.
+    const auto age = std::chrono::ceil<std::chrono::milliseconds>(Clock::now() - origin.written);
+    const auto left = std::max<AsyncBoard::Duration>(oldest - age, 1ms);
+    if (commands.size() == 1 && !drives_output(commands[0].kind)) {
+      if (commands[0].kind == CommandKind::clear) {
+        clear(done);
+      } else {
+        board_.async_send(commands[0], left, in_words(board_, *text, done));
+      }
+      return;
+    }
+    Setpoints setpoints;
+    for (const Command& command : commands) setpoints.add(command);
+    board_.async_apply(setpoints, left, in_words(board_, *text, done));
+    if (board_.disarmed_by() != DisarmCause::none) return;
+    for (const Command& command : commands) {
+      drivers_.on_sent(command, source, origin.publisher, Clock::now());
+    }
+  } catch (const Error& error) {
+    done(false, error.problem().text());
+  }
+}
+
+}  // namespace r4::tool::ros2
