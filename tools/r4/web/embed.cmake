@@ -13,7 +13,7 @@ foreach(file ${files})
   math(EXPR count "${count} + 1")
 endforeach()
 file(WRITE ${OUTPUT} "// Made of ${FOLDER}.
-#include \"tools/r4/web/page_files.hpp\"
+#include \"tools/r4/web/server/page_files.hpp\"
 
 namespace r4::tool::web {
 namespace {

@@ -13,7 +13,7 @@
 #include <string_view>
 #include <vector>
 
-#include "client_queue.hpp"
+#include "server/client_queue.hpp"
 
 namespace r4::tool::web {
 

@@ -17,7 +17,7 @@
 #include "foxglove.hpp"
 #include "messages.hpp"
 #include "page_request.hpp"
-#include "server.hpp"
+#include "server/server.hpp"
 #include "web_board.hpp"
 #include "web_recording.hpp"
 

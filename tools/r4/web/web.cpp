@@ -16,8 +16,8 @@
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
-#include "access.hpp"
 #include "hub.hpp"
+#include "server/access.hpp"
 #include "transports/url_pattern.hpp"
 
 namespace r4::tool {
@@ -26,6 +26,7 @@ namespace {
 struct Options {
   std::vector<std::string> urls;
   std::string listen = "127.0.0.1:8080";
+  bool token = false;
   std::vector<std::string> origins;
   std::string record_folder = ".";
   std::string page;
@@ -44,8 +45,8 @@ int serve_web(const Options& options) {
   hub_options.server.address = web::listen_address(options.listen);
   hub_options.server.origins = options.origins;
   hub_options.server.page_folder = options.page;
-  const bool remote = !web::is_loopback(hub_options.server.address.host);
-  if (remote) hub_options.server.token = web::random_token();
+  const bool secret = options.token || !web::is_loopback(hub_options.server.address.host);
+  if (secret) hub_options.server.token = web::random_token();
   hub_options.record_folder = options.record_folder;
   hub_options.board = with_key(options.key);
   hub_options.fields = options.fields;
@@ -54,7 +55,7 @@ int serve_web(const Options& options) {
   web::Hub hub(io, urls, hub_options);
   hub.open();
   std::string url = fmt::format("http://{}/", hub.address().text());
-  if (remote) url += "#token=" + hub_options.server.token;
+  if (secret) url += "#token=" + hub_options.server.token;
   if (options.json) {
     print_line({{"type", "listening"}, {"url", url}, {"boards", urls.size()}});
   } else {
@@ -82,8 +83,8 @@ what happens. It watches, as r4 monitor does, until a browser takes control; the
 there, by one browser at a time. If that one is closed, hidden, or silent for half a second, the boards are
 safe at once. Anybody who sees the page may stop them.
 
-It answers at this computer alone. --listen 0.0.0.0:8080 answers others, who need the token in the address
-that it prints. Nothing is encrypted: over a network that is not yours, use ssh -L (docs/web.md).
+It answers at this computer alone, to all its users; with --token to who has the address that it prints.
+--listen 0.0.0.0:8080 answers other computers, and to them always so. Nothing is encrypted: over a network that is not yours, use ssh -L (docs/web.md).
 Programs get the same by ws://ADDRESS/ with the Foxglove protocol, read-only, and Prometheus at /metrics.
 
 Examples:
@@ -103,6 +104,8 @@ void add_web(CLI::App& root, Action& chosen) {
   add_urls(*command, options->urls);
   add_text(*command, "--listen", options->listen, "where it answers (default 127.0.0.1:8080)",
            "ADDRESS:PORT");
+  add_flag(*command, "--token", options->token,
+           "only who has the address that is printed; always so for other computers");
   add_repeated(*command, "--origin", options->origins,
                "of a foreign page that may read by the Foxglove protocol", "URL");
   add_text(*command, "--record-to", options->record_folder,
