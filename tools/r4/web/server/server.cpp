@@ -13,7 +13,8 @@
 namespace r4::tool::web {
 namespace {
 
-constexpr int send_buffer = 128 << 10;
+// What is in the kernel cannot be taken back for newer states.
+constexpr int send_buffer = 64 << 10;
 
 }  // namespace
 
