@@ -4,9 +4,11 @@ import contextlib
 import gzip
 import json
 import os
+import pathlib
 import random
 import signal
 import socket
+import subprocess
 import threading
 import time
 
@@ -17,6 +19,8 @@ from web_client import BINARY, CLOSE, Page, Refused, Web, WebSocket, frame
 
 USAGE, OPEN = 2, 4
 LIMIT_S = 0.5
+TESTS = pathlib.Path(__file__).resolve().parents[1]
+NODE_MODULES = TESTS.parent / 'build/npm/node_modules'
 HOSTILE_S = float(os.environ.get('R4_HOSTILE_S', '3'))
 
 
@@ -339,6 +343,60 @@ def test_hostile_clients_disturb_nobody():
         assert result['ok'], result
         assert web.resident_kib() - before < 16384, (before, web.resident_kib())
         assert web.get('/')[0] == 200
+
+
+def test_foxglove_reads_records_links_and_events():
+    with Board('udp://127.0.0.1:0', options=('--set', 'name,left-arm')) as board:
+        with Web(board.host_url) as web, Page(web) as page:
+            page.next('board', lambda each: each['name'] == 'left-arm')
+            assert NODE_MODULES.is_dir(), f'{NODE_MODULES} is missing; tools/setup --can installs it'
+            reader = subprocess.Popen(['node', TESTS / 'npm/read_foxglove.cjs', f'ws://127.0.0.1:{web.port}', '200'],
+                                      env={**os.environ, 'NODE_PATH': str(NODE_MODULES)}, stdout=subprocess.PIPE,
+                                      stderr=subprocess.PIPE, text=True)
+            page.states(100)  # it begins
+            page.ask(type='stop')
+            output, errors = reader.communicate(timeout=PATIENCE_S)
+            assert reader.returncode == 0, errors
+        read = json.loads(output)
+        channels = {each['topic']: each for each in read['channels']}
+        assert {topic: each['schemaName'] for topic, each in channels.items()} == {
+            '/left-arm': 'r4.Record', '/left-arm/link': 'r4.Link', '/left-arm/events': 'r4.Event'}
+        for topic, channel in channels.items():
+            assert channel['encoding'] == 'json' and channel['schemaEncoding'] == 'jsonschema'
+            known = json.loads(channel['schema'])['properties']
+            for _, message in read['messages'][topic]:
+                assert set(message) - {'type', 'board', 'disarmed'} <= set(known), (topic, message)
+        times = [int(time_ns) for time_ns, _ in read['messages']['/left-arm']]
+        assert times == sorted(times) and abs(times[-1] / 1e9 - time.time()) < 10
+        states = [each for _, each in read['messages']['/left-arm'] if each['type'] == 'state']
+        assert len(states) > 180 and all(23 < each['fields']['AIN24'] < 26 for each in states)
+        assert any(each['safe'] == 'stop' for _, each in read['messages']['/left-arm/link'])
+        assert any('stop' in each['text'] for _, each in read['messages']['/left-arm/events'])
+
+
+def test_who_speaks_foxglove_may_only_read():
+    with one_board() as (_, web):
+        with WebSocket(web.port, '/', ['foxglove.websocket.v1']) as client:
+            assert json.loads(client.receive()[1])['capabilities'] == []
+            channels = json.loads(client.receive()[1])['channels']
+            for message in ({'op': 'advertise', 'channels': []}, {'type': 'stop'},
+                            {'op': 'subscribe', 'subscriptions': [{'id': 1, 'channelId': 99}]}):
+                client.send(json.dumps(message).encode())
+                assert json.loads(client.receive()[1])['op'] == 'status', message
+            client.send(json.dumps({'op': 'subscribe', 'subscriptions': [{'id': 7, 'channelId': channels[0]['id']}]}).encode())
+            opcode, data = client.receive()
+            assert opcode == BINARY and data[:5] == b'\x01\x07\0\0\0'
+            client.send(b'{"op":"subscribe","subscriptions":[{"id":-1}]}')
+            while opcode != CLOSE:
+                opcode, data = client.receive()
+        with pytest.raises(Refused) as refused:
+            WebSocket(web.port, '/', ['foxglove.websocket.v1'], Origin='https://app.example')
+        assert refused.value.status == 403
+    with one_board('--origin', 'https://app.example') as (_, web):
+        with WebSocket(web.port, '/', ['foxglove.websocket.v1'], Origin='https://app.example') as client:
+            assert client.protocol == 'foxglove.websocket.v1'
+        with pytest.raises(Refused):
+            WebSocket(web.port, Origin='https://app.example')
 
 
 def test_wrong_uses_are_refused():
