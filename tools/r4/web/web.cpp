@@ -84,7 +84,8 @@ there, by one browser at a time. If that one is closed, hidden, or silent for ha
 safe at once. Anybody who sees the page may stop them.
 
 It answers at this computer alone, to all its users; with --token to who has the address that it prints.
---listen 0.0.0.0:8080 answers other computers, and to them always so. Nothing is encrypted: over a network that is not yours, use ssh -L (docs/web.md).
+--listen 0.0.0.0:8080 answers other computers, and to them always so. Nothing is encrypted: over a network
+that is not yours, use ssh -L (docs/web.md).
 Programs get the same by ws://ADDRESS/ with the Foxglove protocol, read-only, and Prometheus at /metrics.
 
 Examples:
