@@ -73,6 +73,8 @@ ALLOWED = {
     'tools/r4/ros2/graph': SHELL,
     'tools/r4/ros2': SHELL | {'tools/r4/ros2/graph'},
     'tools/r4/sim': SHELL,
+    'tools/r4/web/server': SHELL,
+    'tools/r4/web': SHELL | FORMATS | {'tools/r4/watch', 'tools/r4/web/server'},
     'tools/r4': SHELL,
 }
 # What a file may include although its room may not.

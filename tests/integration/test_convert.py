@@ -17,7 +17,7 @@ from r4_process import DATA, ERROR, PATIENCE_S, R4, SANITIZED, objects, run, run
 
 DATA_BAD, USAGE, OPEN = 1, 2, 4
 HERE = pathlib.Path(__file__).resolve().parent
-NODE_MODULES = HERE.parents[1] / 'build/mcap/node_modules'
+NODE_MODULES = HERE.parents[1] / 'build/npm/node_modules'
 MOST_MIB = 20
 
 
@@ -101,7 +101,7 @@ def test_what_wireshark_writes_is_read(native, tmp_path):
 def read_mcap(path):
     """What @mcap/core reads of it; all that it says if it does not."""
     assert NODE_MODULES.is_dir(), f'{NODE_MODULES} is missing; tools/setup --can installs it'
-    return subprocess.run(['node', HERE / 'mcap/read_mcap.cjs', path], capture_output=True, text=True,
+    return subprocess.run(['node', HERE.parent / 'npm/read_mcap.cjs', path], capture_output=True, text=True,
                           env={**os.environ, 'NODE_PATH': str(NODE_MODULES)}, check=False)
 
 

@@ -38,6 +38,7 @@ void add_subcommands(CLI::App& root, Action& chosen) {
   add_plot(root, chosen);
   add_replay(root, chosen);
   add_metrics(root, chosen);
+  add_web(root, chosen);
   add_ros2(root, chosen);
   add_sim(root, chosen);
   add_key_command(root, chosen);

@@ -25,6 +25,7 @@ void add_bus(CLI::App& root, Action& chosen);
 void add_bench(CLI::App& root, Action& chosen);
 void add_record(CLI::App& root, Action& chosen);
 void add_metrics(CLI::App& root, Action& chosen);
+void add_web(CLI::App& root, Action& chosen);
 void add_ros2(CLI::App& root, Action& chosen);
 void add_replay(CLI::App& root, Action& chosen);
 void add_info(CLI::App& root, Action& chosen);

@@ -26,7 +26,7 @@
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
-#include "protocol/messages/state_fields.hpp"
+#include "board_metrics.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/error.hpp"
 #include "transports/can/can_interface.hpp"
@@ -37,10 +37,7 @@
 namespace r4::tool {
 namespace {
 
-using prometheus::ClientMetric;
 using prometheus::MetricFamily;
-using prometheus::MetricType;
-using Labels = std::vector<ClientMetric::Label>;
 
 struct Options {
   std::vector<std::string> urls;
@@ -53,117 +50,13 @@ struct Options {
 // Where Prometheus finds no answer it knows that this program hangs.
 constexpr std::chrono::seconds longest_collection{2};
 
-// The families of one answer, by name.
-class Families {
- public:
-  template <class Integer>
-  void count(const char* name, const char* help, Labels labels, Integer value) {
-    counter(name, help, std::move(labels), static_cast<double>(value));
-  }
-  void gauge(const char* name, const char* help, Labels labels, double value) {
-    ClientMetric metric;
-    metric.label = std::move(labels);
-    metric.gauge.value = value;
-    add(name, help, MetricType::Gauge, std::move(metric));
-  }
-  void counter(const char* name, const char* help, Labels labels, double value) {
-    ClientMetric metric;
-    metric.label = std::move(labels);
-    metric.counter.value = value;
-    add(name, help, MetricType::Counter, std::move(metric));
-  }
-  std::vector<MetricFamily> take() { return std::move(families_); }
-
- private:
-  void add(const char* name, const char* help, MetricType type, ClientMetric metric) {
-    const auto [known, fresh] = index_.try_emplace(name, families_.size());
-    if (fresh) {
-      families_.emplace_back();
-      families_.back().name = name;
-      families_.back().help = help;
-      families_.back().type = type;
-    }
-    families_[known->second].metric.push_back(std::move(metric));
-  }
-
-  std::map<std::string, std::size_t> index_;
-  std::vector<MetricFamily> families_;
-};
-
-Labels with(Labels labels, const char* name, std::string value) {
-  labels.push_back({name, std::move(value)});
-  return labels;
-}
-
-// What is told of one board.
-void describe(const AsyncBoard& board, Families& out) {
-  const BoardIdentity& who = board.identity();
-  const LinkStatus& link = board.link();
-  const Statistics statistics = board.statistics();
-  const ReceivedState& state = board.state();
-  const CarrierCounters& carrier = board.carrier_counters();
-  const bool up = link.state == HostLinkState::active || link.state == HostLinkState::safe;
-  const Labels one{{"url", board.name()}};
-
-  out.gauge("r4_up", "The board is heard.", one, up ? 1 : 0);
-  if (!who.board_id.empty()) {
-    Labels info = with(with(one, "board", who.name), "hardware_id", who.board_id);
-    out.gauge("r4_info", "Who the board is; always 1.",
-              with(std::move(info), "firmware", who.firmware), 1);
-  }
-  for (int i = 0; up && i < safe_reason_count; ++i) {
-    const auto reason = static_cast<SafeReason>(i);
-    out.gauge("r4_safe", "Why the outputs are off: 1 for the reason that holds, none included.",
-              with(one, "reason", to_text(reason)), link.reason == reason ? 1 : 0);
-  }
-  out.count("r4_received_total", "Datagrams of the board.", one, statistics.received);
-  out.count("r4_states_total", "Those of them that are states.", one, statistics.states);
-  out.count("r4_damaged_total", "What came and was no datagram.", one, statistics.damaged);
-  out.count("r4_lost_total", "Datagrams of the board that never came.", one,
-            statistics.packets.lost);
-  out.count("r4_duplicates_total", "Datagrams that came again.", one, statistics.packets.duplicate);
-  out.count("r4_late_total", "Datagrams that others overtook.", one, statistics.packets.late);
-  out.count("r4_restarts_total", "Times the board began again.", one, statistics.packets.restarts);
-  out.count("r4_transport_bytes_total", "Bytes of datagrams.", with(one, "direction", "received"),
-            carrier.rx_bytes);
-  out.count("r4_transport_bytes_total", "", with(one, "direction", "sent"), carrier.tx_bytes);
-  out.count("r4_transport_downs_total", "Times the transport was lost.", one, carrier.downs);
-  if (!up) return;
-  out.gauge("r4_state_rate_hertz", "States a second, over the last.", one,
-            statistics.state_rate_hz);
-  if (statistics.round_trip_us > 0) {
-    out.gauge("r4_round_trip_seconds", "From the newest question to its answer.", one,
-              statistics.round_trip_us / 1e6);
-  }
-  if (!state.any()) return;
-  out.gauge("r4_state_age_seconds", "Since the newest state came.", one,
-            statistics.state_age_us / 1e6);
-  out.gauge("r4_jitter_seconds", "Interarrival jitter of the states (RFC 3550).", one,
-            statistics.jitter_us / 1e6);
-  if (state.sampled_error != ReceivedState::unknown) {
-    out.gauge("r4_clock_error_seconds", "How well the time of a sample is known.", one,
-              std::chrono::duration<double>(state.sampled_error).count());
-  }
-  constexpr std::array<StateField, analog_channels> fields{
-      StateField::ain24,  StateField::ain12,    StateField::ain5,
-      StateField::aindmh, StateField::ainsteer, StateField::ain6};  // in the order of Analog
-  for (int i = 0; i < analog_channels; ++i) {
-    const auto input = static_cast<Analog>(i);
-    const StateField field = fields[static_cast<std::size_t>(i)];
-    if (!state.present.has(field)) continue;
-    const Text name = name_of(field);
-    out.gauge("r4_analog_volts", "An analog input.",
-              with(one, "input", std::string(name.data(), name.size())), state.volts(input));
-  }
-}
-
 // A CAN interface: how long it was busy, and for which boards.
 class BusMetrics {
  public:
   BusMetrics(asio::io_context& io, const CanInterface& interface)
       : name_(interface.name), listener_(io, interface.name, rate_of(interface)) {}
 
-  void describe(Families& out) const {
+  void describe(MetricFamilies& out) const {
     std::map<std::string, std::uint64_t> busy_ns;
     for (const auto& [id, traffic] : listener_.survey().traffic()) {
       const CanIdMeaning meaning = classify(id);
@@ -208,8 +101,8 @@ class Metrics final : public prometheus::Collectable {
 
  private:
   std::vector<MetricFamily> describe_all() const {
-    Families families;
-    for (const AsyncBoard* board : boards_) describe(*board, families);
+    MetricFamilies families;
+    for (const AsyncBoard* board : boards_) r4::tool::describe(*board, families);
     for (const BusMetrics* bus : buses_) bus->describe(families);
     return families.take();
   }

@@ -62,4 +62,27 @@ std::string line_schema_text() {
   return text_of(line_schema, {{"line", of_type("string", "of the native format")}});
 }
 
+std::string link_schema_text() {
+  return text_of("r4.Link",
+                 {{"name", of_type("string", "the board's")},
+                  {"firmware", of_type("string", "its version")},
+                  {"id", of_type("string", "of the hardware")},
+                  {"link", of_type("string", "connecting, active, safe, lost or down")},
+                  {"why", of_type("string", "what is wrong, in words")},
+                  {"controlled", of_type("boolean", "it takes this program's commands")},
+                  {"armed", of_type("boolean", "it takes those that drive")},
+                  {"safe", of_type("string", "why its outputs are off; empty: they are not")},
+                  {"rate_hz", of_type("number", "states a second")},
+                  {"loss", of_type("number", "lost share of its datagrams, 0 to 1")},
+                  {"round_trip_ms", of_type("number", "from a question to its answer [ms]")},
+                  {"age_ms", of_type("number", "since the newest state came [ms]")}});
+}
+
+std::string event_schema_text() {
+  return text_of("r4.Event", {{"time_ms", of_type("integer", "since 1970 [ms]")},
+                              {"board", of_type("integer", "from 0")},
+                              {"level", of_type("string", "info, warning or error")},
+                              {"text", of_type("string", "what happened")}});
+}
+
 }  // namespace r4::tool::mcap

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The JSON schemas of the messages in an MCAP file (json-schema.org).
+// The JSON schemas (json-schema.org) of the messages in an MCAP file, and of those that r4 web sends to Foxglove.
 #pragma once
 
 #include <string>
@@ -10,5 +10,8 @@ namespace r4::tool::mcap {
 std::string record_schema_text();
 // Of lines of the native format.
 std::string line_schema_text();
+// Of what r4 web tells Foxglove of a board's link, and of its events.
+std::string link_schema_text();
+std::string event_schema_text();
 
 }  // namespace r4::tool::mcap

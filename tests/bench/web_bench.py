@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What browsers cost r4 web: its share of a processor and its memory, beside eight simulated boards at 100 Hz.
+
+    R4=build/r4 PYTHONPATH=tests/integration /usr/bin/python3 tests/bench/web_bench.py
+"""
+import contextlib
+import selectors
+import time
+
+from r4_process import Board
+from web_client import Web, WebSocket
+
+BOARDS = 8
+SECONDS = 5
+
+
+def drain(clients, seconds):
+    """Reads what comes to all of them, and looks at none of it; bytes a second."""
+    selector = selectors.DefaultSelector()
+    for each in clients:
+        each.socket.setblocking(False)
+        selector.register(each.socket, selectors.EVENT_READ)
+    received = 0
+    until = time.monotonic() + seconds
+    while (left := until - time.monotonic()) > 0:
+        for key, _ in selector.select(left):
+            with contextlib.suppress(BlockingIOError):
+                received += len(key.fileobj.recv(1 << 20))
+    selector.close()
+    return received / seconds
+
+
+def measure(boards, count):
+    with Web(*(each.host_url for each in boards)) as web, contextlib.ExitStack() as stack:
+        clients = [stack.enter_context(WebSocket(web.port)) for _ in range(count)]
+        drain(clients, 1)
+        before, cpu = web.resident_kib(), web.cpu_seconds()
+        rate = drain(clients, SECONDS)
+        share = (web.cpu_seconds() - cpu) / SECONDS
+        print(f'{len(boards)} boards, {count:2} browsers: {share:6.1%} of a core, {rate / 1e6:5.2f} MB/s, '
+              f'{web.resident_kib()} KiB, {web.resident_kib() - before:+} KiB in {SECONDS} s', flush=True)
+
+
+with contextlib.ExitStack() as all_boards:
+    simulated = [all_boards.enter_context(Board('udp://127.0.0.1:0')) for _ in range(BOARDS)]
+    for number in (0, 1, 50):
+        measure(simulated, number)
+    for number in (0, 1):
+        measure(simulated[:1], number)

@@ -1,0 +1,410 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""r4 web as a program: what a page gets, who controls, what makes the board safe, and whom it does not serve."""
+import contextlib
+import gzip
+import json
+import os
+import pathlib
+import random
+import signal
+import socket
+import subprocess
+import threading
+import time
+
+import pytest
+
+from r4_process import ERROR, PATIENCE_S, PROMPT, Board, driving, lasts, run
+from web_client import BINARY, CLOSE, Page, Refused, Web, WebSocket, frame
+
+USAGE, OPEN = 2, 4
+LIMIT_S = 0.5
+TESTS = pathlib.Path(__file__).resolve().parents[1]
+NODE_MODULES = TESTS.parent / 'build/npm/node_modules'
+HOSTILE_S = float(os.environ.get('R4_HOSTILE_S', '3'))
+
+
+@contextlib.contextmanager
+def one_board(*options):
+    """A simulated board, and r4 web before it."""
+    with Board('udp://127.0.0.1:0') as board, Web(board.host_url, options=options) as web:
+        yield board, web
+
+
+def motor_is_driven(outputs):
+    return outputs['osmc'][0] != [0, 0]
+
+
+def test_a_page_gets_every_state_with_its_names():
+    with one_board() as (board, web), Page(web) as page:
+        hello = page.hello
+        assert hello['boards'] == [{'board': 0, 'url': board.host_url, 'name': ''}]
+        assert len(hello['fields']) == len(hello['units']) > 70
+        assert hello['units'][hello['fields'].index('AIN24')] == 'V'
+        kinds = [each['kind'] for each in hello['channels']]
+        assert [kinds.count(each) for each in ('osmc', 'dhb12', 'servo', 'stepper', 'bldc', 'relay')] == [4, 4, 16, 4, 4, 8]
+        for channel in hello['channels']:
+            assert set(channel['fields']) <= set(hello['fields']), channel
+        states = page.states(100)
+        steps = [after['time'] - before['time'] for before, after in zip(states, states[1:])]
+        assert 8 <= sorted(steps)[len(steps) // 2] <= 12, steps  # milliseconds
+        assert all(23 < each['AIN24'] < 26 and each['DMHSTA'] == 1 and each['SERVO16POS'] == 0 for each in states)
+        status = page.next('board', lambda each: each['rate_hz'] > 90)
+        assert status['link'] == 'safe' and status['safe'] == 'link' and not status['armed']
+        assert status['firmware'] and status['id'] == 'sim-1'
+
+
+def test_the_page_comes_with_what_keeps_foreign_scripts_out():
+    with one_board() as (_, web):
+        status, answer = web.get('/')
+        head, _, plain = answer.partition(b'\r\n\r\n')
+        assert status == 200 and b'text/html' in head and plain.lstrip().lower().startswith(b'<!doctype html')
+        for header in (b"Content-Security-Policy: default-src 'none'; script-src 'self'", b'nosniff', b'no-referrer'):
+            assert header in head
+        packed = web.get('/', 'Accept-Encoding: gzip\r\n')[1].partition(b'\r\n\r\n')[2]
+        assert gzip.decompress(packed) == plain
+        etag = next(line for line in head.decode().splitlines() if line.startswith('ETag')).split(': ')[1]
+        assert web.get('/', f'If-None-Match: {etag}\r\n')[0] == 304
+        assert web.get('/../web.cpp')[0] == web.get('/nothing')[0] == 404
+        assert b'r4_up' in web.get('/metrics')[1]
+
+
+def test_one_browser_controls_and_the_others_watch():
+    with one_board() as (board, web), Page(web) as first, Page(web) as second:
+        refused = first.ask(type='command', board=0, command='O:358,1,1')
+        assert not refused['ok'] and 'control' in refused['text']
+        first.drive()
+        board.outputs(motor_is_driven)
+        first.next('states', lambda each: any(row[1 + first.hello['fields'].index('OSMC1.pwm')] == 358
+                                              for one in each['boards'] for row in one['states']))
+        assert 'another browser' in second.control()['why']
+        assert not second.ask(type='command', board=0, command='O:0,1,1')['ok']
+        for wrong in ('O:358,1,9', 'O:9999,1,1', 'C:rate,10', 'E:LEAVE', 'nonsense', 'O:1,1,1;E:STOP'):
+            result = first.ask(type='command', board=0, command=wrong)
+            assert not result['ok'] and result['text'], wrong
+        assert not first.ask(type='command', board=7, command='O:1,1,1')['ok']
+        assert first.ask(type='command', board=0, command='O:100,1,1;O:200,0,2')['ok']
+        first.say(type='control', want=False)
+        board.state('SAFE', 'link')
+        second.next('control', lambda each: each['holder'] is None and each['why'])
+        lasts(0.3)  # until the farewell is over
+        assert second.control()['you']
+
+
+def test_a_browser_that_falls_silent_is_missed_within_its_time():
+    with one_board() as (board, web), Page(web) as page:
+        page.drive()
+        board.outputs(motor_is_driven)
+        page.freeze()
+        silent = time.monotonic()
+        took = board.state('SAFE', 'link')['came'] - silent
+        assert took < LIMIT_S + 0.1 or not PROMPT, took
+        assert '500 ms' in page.next('control', lambda each: not each['you'])['why']
+
+
+def test_a_browser_whose_words_are_old_is_missed_too():
+    with one_board() as (board, web), Page(web) as page:
+        page.drive()
+        page.freeze()
+        heard = page.newest
+        frozen = time.monotonic()
+        while not any(each['type'] == 'control' and not each['you'] for each in page.messages):
+            page.say(type='alive', now=heard)
+            assert time.monotonic() - frozen < 2 * LIMIT_S or not PROMPT
+            lasts(0.02)
+        board.state('SAFE', 'link')
+        page.say(type='alive', now=2**63)
+        assert not page.ask(type='command', board=0, command='O:358,1,1')['ok']
+
+
+def test_a_browser_that_is_gone_leaves_the_board_safe_at_once():
+    with one_board() as (board, web), Page(web) as other:
+        with Page(web) as page:
+            page.drive()
+            board.outputs(motor_is_driven)
+            gone = time.monotonic()
+        took = board.state('SAFE', 'link')['came'] - gone
+        print(f'safe {took * 1000:.1f} ms after the browser was killed')
+        assert took < 0.1 or not PROMPT
+        assert 'gone' in other.next('control', lambda each: each['holder'] is None and each['why'])['why']
+
+
+@pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGKILL])
+def test_the_board_is_safe_when_r4_web_ends(how):
+    with one_board() as (board, web), Page(web) as page:
+        page.drive()
+        ended = web.signal(how)
+        limit = 0.2 if how == signal.SIGINT else 1.1
+        assert board.state('SAFE', 'link')['came'] - ended < limit or not PROMPT
+
+
+def test_who_watches_stops_the_board_at_once_and_it_stays_so():
+    with one_board() as (board, web), Page(web) as page, Page(web) as watcher:
+        page.drive()
+        asked = time.monotonic()
+        result = watcher.ask(type='stop')
+        assert result['ok'], result
+        took = board.state('SAFE', 'stop')['came'] - asked
+        print(f'stopped {took * 1000:.1f} ms after a watcher asked')
+        assert took < 0.1 or not PROMPT
+        assert not page.ask(type='command', board=0, command='O:358,1,1')['ok']
+        assert page.ask(type='clear', board=0)['ok'] and page.ask(type='arm', board=0)['ok']
+        assert page.ask(type='command', board=0, command='O:358,1,1')['ok']
+
+
+def test_several_boards_are_controlled_and_stopped_together():
+    with Board('udp://127.0.0.1:0') as left, Board('udp://127.0.0.1:0') as right:
+        with Web(left.host_url, right.host_url) as web, Page(web) as page:
+            assert page.control()['you']
+            for board, sim in enumerate((left, right)):
+                page.next('board', lambda each, board=board: each['board'] == board and each['controlled'])
+                assert page.ask(type='arm', board=board)['ok']
+                assert page.ask(type='command', board=board, command='O:358,1,1')['ok']
+                sim.outputs(motor_is_driven)
+            page.say(type='stop', request=1)
+            assert {page.next('result')['board'] for _ in range(2)} == {0, 1}
+            left.state('SAFE', 'stop')
+            right.state('SAFE', 'stop')
+
+
+def test_a_program_that_drives_keeps_its_board():
+    with one_board() as (board, web), driving(board.host_url.split('?')[0]) as host:
+        with Page(web) as page:
+            assert page.states(20)[-1]['RELAYS'] == 1
+            page.control()
+            status = page.next('board', lambda each: 'another host' in each['why'])
+            assert not status['controlled']
+            assert not page.ask(type='command', board=0, command='O:358,1,1')['ok']
+            assert host.process.poll() is None
+
+
+def test_a_page_records(tmp_path):
+    with one_board('--record-to', str(tmp_path)) as (_, web), Page(web) as page:
+        page.say(type='record', on=True)
+        path = page.next('recording', lambda each: each['path'])['path']
+        page.states(50)
+        page.say(type='record', on=False)
+        page.next('recording', lambda each: each['path'] is None and not each['why'])
+        assert web.end() == 0
+        assert 'states' in run('info', path).stdout
+    with one_board('--record-to', str(tmp_path / 'nowhere')) as (_, web), Page(web) as page:
+        page.say(type='record', on=True)
+        assert 'nowhere' in page.next('recording', lambda each: each['why'])['why']
+
+
+def test_wrong_hosts_and_origins_are_turned_away():
+    with one_board() as (_, web):
+        for host in ('evil.example', 'evil.example:8080', '192.168.0.1', '127.0.0.1.evil.example', '', 'localhost:x'):
+            with pytest.raises(Refused) as refused:
+                WebSocket(web.port, Host=host)
+            assert refused.value.status == 403, host
+            assert web.request(f'GET / HTTP/1.1\r\nHost: {host}\r\n\r\n'.encode()).split()[1] == b'403'
+        for origin in ('http://evil.example', 'null', 'https://localhost', f'http://localhost:{web.port + 1}', 'http://'):
+            with pytest.raises(Refused) as refused:
+                WebSocket(web.port, Origin=origin)
+            assert refused.value.status == 403, origin
+        assert web.request(b'GET / HTTP/1.1\r\nHost: localhost\r\nHost: localhost\r\n\r\n').split()[1] == b'400'
+        assert web.request(b'GET / HTTP/1.1\r\n\r\n').split()[1] == b'400'
+        # As through ssh -L 9999:localhost:8080.
+        with WebSocket(web.port, Host='localhost:9999', Origin='http://localhost:9999') as tunnel:
+            assert tunnel.protocol == 'r4.web.v1'
+
+
+def test_other_computers_need_the_token():
+    with Board('udp://127.0.0.1:0') as board, Web(board.host_url, listen='0.0.0.0:0') as web:
+        token = web.url.partition('#token=')[2]
+        assert len(token) == 32
+        for protocols in (('r4.web.v1',), ('r4.web.v1', 'r4.token.'), ('r4.web.v1', 'r4.token.' + '0' * 32)):
+            with pytest.raises(Refused) as refused:
+                WebSocket(web.port, protocols=protocols)
+            assert refused.value.status == 401
+        with WebSocket(web.port, protocols=('r4.web.v1', 'r4.token.' + token)) as page:
+            assert page.protocol == 'r4.web.v1'
+        assert web.get('/')[0] == 200
+        assert web.get('/metrics')[0] == web.get('/metrics', 'Authorization: Bearer 0\r\n')[0] == 401
+        assert web.get('/metrics', f'Authorization: Bearer {token}\r\n')[0] == 200
+        with WebSocket(web.port, f'/?token={token}', ['foxglove.websocket.v1'], Host='10.1.2.3:80') as foxglove:
+            assert foxglove.receive()[0] == 1
+
+
+def test_wrong_messages_end_the_connection_and_nothing_else():
+    with one_board() as (_, web), Page(web) as good:
+        for wrong in (b'{', b'[]', b'{}', b'{"type":"fly"}', b'{"type":"control"}', b'{"type":"control","want":1}',
+                      b'{"type":"command","request":-1,"board":0,"command":"E:STOP"}', b'[' * 4000,
+                      b'{"type":"command","request":1,"board":0}', b'\xff\xfe', b' ' * 4097):
+            with Page(web) as page:
+                page.send(wrong)
+                page.until_closed()
+        with Page(web) as page:
+            page.send(b'{"type":"alive","now":1}', BINARY)
+            assert 'text' in page.until_closed()
+        with Page(web) as page:
+            with contextlib.suppress(OSError):
+                for _ in range(1000):
+                    page.say(type='alive', now=1)
+            page.until_closed()
+        assert len(good.states(20)) >= 20
+
+
+def test_64_browsers_are_served():
+    with one_board() as (_, web), contextlib.ExitStack() as stack:
+        pages = [stack.enter_context(Page(web)) for _ in range(64)]
+        with pytest.raises(Refused) as refused:
+            WebSocket(web.port)
+        assert refused.value.status == 503
+        for page in pages[::16]:
+            states = page.states(50)
+            assert states[-1]['time'] - states[0]['time'] < 1000 or not PROMPT
+        pages[0].close()
+        with Page(web) as next_one:
+            next_one.states(1)
+
+
+def test_a_slow_browser_loses_old_states_and_costs_no_memory():
+    with Web(*['sim:'] * 8) as web, WebSocket(web.port, buffer=4096) as slow, Page(web) as page:
+        page.states(50)
+        before = web.resident_kib()
+        states = page.states(150)
+        assert states[-1]['time'] - states[0]['time'] < 2000 or not PROMPT
+        assert web.resident_kib() - before < 2048, (before, web.resident_kib())
+        # What is in the kernel is old; then it hears that it has missed some, and gets what is new.
+        lost = False
+        while True:
+            message = json.loads(slow.receive()[1])
+            lost = lost or message['type'] == 'lost'
+            if lost and message['type'] == 'states':
+                age = page.newest - message['now']
+                assert age < 500 or not PROMPT, age
+                break
+
+
+def hostile_bytes(rng, port):
+    """A request, or the frames of a client, damaged."""
+    handshake = (f'GET /live HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n'
+                 'Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n'
+                 'Sec-WebSocket-Protocol: r4.web.v1\r\n\r\n').encode()
+    frames = b''.join(frame(each, opcode) for each, opcode in (
+        (b'{"type":"control","want":false}', 1), (b'x' * 200, 9), (b'{"type":"alive","now":5}', 1), (b'\x03\xe8', CLOSE)))
+    data = bytearray(rng.choice([handshake, handshake + frames, handshake + frames,
+                                 b'GET / HTTP/1.1\r\nHost: localhost\r\n\r\n' * 3,
+                                 b'POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999999\r\n\r\n',
+                                 b'GET /' + b'a' * 9000, b'GET / HTTP/1.1\r\n' + b'a: b\r\n' * 2000,
+                                 b'POST / HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\nffffffff\r\n',
+                                 rng.randbytes(300)]))
+    for _ in range(rng.randrange(4)):
+        at = rng.randrange(len(data))
+        data[at:at + rng.randrange(3)] = rng.randbytes(rng.randrange(3))
+    return bytes(data[:rng.randrange(len(data) + 1)] if rng.random() < 0.2 else data)
+
+
+def test_hostile_clients_disturb_nobody():
+    seed = int(os.environ.get('R4_SEED', '1'))
+    ended = threading.Event()
+    done = []
+
+    def attack(number, port):
+        rng = random.Random(seed * 100 + number)
+        held = []  # half open: they say no more, and read nothing
+        while not ended.is_set():
+            with contextlib.suppress(OSError):
+                connection = socket.create_connection(('127.0.0.1', port), 1)
+                connection.settimeout(0.05)
+                held.append(connection)
+                data = hostile_bytes(rng, port)
+                if rng.random() < 0.1:  # slowly
+                    for i in range(min(len(data), 20)):
+                        connection.sendall(data[i:i + 1])
+                else:
+                    connection.sendall(data)
+                if rng.random() < 0.3:
+                    connection.recv(100)
+                done.append(1)
+            while len(held) > 8 or (held and rng.random() < 0.5):
+                held.pop(rng.randrange(len(held))).close()
+        for each in held:
+            each.close()
+
+    with one_board() as (board, web), Page(web) as page:
+        page.drive()
+        board.outputs(motor_is_driven)
+        before = web.resident_kib()
+        attackers = [threading.Thread(target=attack, args=(i, web.port)) for i in range(4)]
+        for each in attackers:
+            each.start()
+        try:
+            board.never('SAFE', HOSTILE_S)
+        finally:
+            ended.set()
+            for each in attackers:
+                each.join()
+        print(f'{len(done)} hostile connections in {HOSTILE_S:.0f} s')
+        assert len(done) > 100 * HOSTILE_S or not PROMPT
+        result = page.ask(type='command', board=0, command='O:100,1,1')
+        assert result['ok'], result
+        assert web.resident_kib() - before < 16384, (before, web.resident_kib())
+        assert web.get('/')[0] == 200
+
+
+def test_foxglove_reads_records_links_and_events():
+    with Board('udp://127.0.0.1:0', options=('--set', 'name,left-arm')) as board:
+        with Web(board.host_url) as web, Page(web) as page:
+            page.next('board', lambda each: each['name'] == 'left-arm')
+            assert NODE_MODULES.is_dir(), f'{NODE_MODULES} is missing; tools/setup --can installs it'
+            reader = subprocess.Popen(['node', TESTS / 'npm/read_foxglove.cjs', f'ws://127.0.0.1:{web.port}', '200'],
+                                      env={**os.environ, 'NODE_PATH': str(NODE_MODULES)}, stdout=subprocess.PIPE,
+                                      stderr=subprocess.PIPE, text=True)
+            page.states(100)  # it begins
+            page.ask(type='stop')
+            output, errors = reader.communicate(timeout=PATIENCE_S)
+            assert reader.returncode == 0, errors
+        read = json.loads(output)
+        channels = {each['topic']: each for each in read['channels']}
+        assert {topic: each['schemaName'] for topic, each in channels.items()} == {
+            '/left-arm': 'r4.Record', '/left-arm/link': 'r4.Link', '/left-arm/events': 'r4.Event'}
+        for topic, channel in channels.items():
+            assert channel['encoding'] == 'json' and channel['schemaEncoding'] == 'jsonschema'
+            known = json.loads(channel['schema'])['properties']
+            for _, message in read['messages'][topic]:
+                assert set(message) - {'type', 'board', 'disarmed'} <= set(known), (topic, message)
+        times = [int(time_ns) for time_ns, _ in read['messages']['/left-arm']]
+        assert times == sorted(times) and abs(times[-1] / 1e9 - time.time()) < 10
+        states = [each for _, each in read['messages']['/left-arm'] if each['type'] == 'state']
+        assert len(states) > 180 and all(23 < each['fields']['AIN24'] < 26 for each in states)
+        assert any(each['safe'] == 'stop' for _, each in read['messages']['/left-arm/link'])
+        assert any('stop' in each['text'] for _, each in read['messages']['/left-arm/events'])
+
+
+def test_who_speaks_foxglove_may_only_read():
+    with one_board() as (_, web):
+        with WebSocket(web.port, '/', ['foxglove.websocket.v1']) as client:
+            assert json.loads(client.receive()[1])['capabilities'] == []
+            channels = json.loads(client.receive()[1])['channels']
+            for message in ({'op': 'advertise', 'channels': []}, {'type': 'stop'},
+                            {'op': 'subscribe', 'subscriptions': [{'id': 1, 'channelId': 99}]}):
+                client.send(json.dumps(message).encode())
+                assert json.loads(client.receive()[1])['op'] == 'status', message
+            client.send(json.dumps({'op': 'subscribe', 'subscriptions': [{'id': 7, 'channelId': channels[0]['id']}]}).encode())
+            opcode, data = client.receive()
+            assert opcode == BINARY and data[:5] == b'\x01\x07\0\0\0'
+            client.send(b'{"op":"subscribe","subscriptions":[{"id":-1}]}')
+            while opcode != CLOSE:
+                opcode, data = client.receive()
+        with pytest.raises(Refused) as refused:
+            WebSocket(web.port, '/', ['foxglove.websocket.v1'], Origin='https://app.example')
+        assert refused.value.status == 403
+    with one_board('--origin', 'https://app.example') as (_, web):
+        with WebSocket(web.port, '/', ['foxglove.websocket.v1'], Origin='https://app.example') as client:
+            assert client.protocol == 'foxglove.websocket.v1'
+        with pytest.raises(Refused):
+            WebSocket(web.port, Origin='https://app.example')
+
+
+def test_wrong_uses_are_refused():
+    with Board('udp://127.0.0.1:0') as board, Web(board.host_url) as web:
+        taken = run('web', 'udp://127.0.0.1?listen=0', '--listen', f'127.0.0.1:{web.port}')
+        assert taken.returncode == OPEN and 'another program listens' in taken.stderr and ERROR.search(taken.stderr)
+    for listen in ('8080', '127.0.0.1:', ':8080', '127.0.0.1:99999', '127.0.0.1:http', '::1:80'):
+        result = run('web', 'sim:', '--listen', listen)
+        assert result.returncode == USAGE and ERROR.search(result.stderr), listen
+    result = run('web', 'sim:', '--listen', '192.0.2.1:8080')
+    assert result.returncode == OPEN and ERROR.search(result.stderr)

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "board_metrics.hpp"
+
+#include <prometheus/text_serializer.h>
+
+#include <array>
+#include <chrono>
+#include <utility>
+
+#include "protocol/messages/state_fields.hpp"
+#include "r4link/link.hpp"
+
+namespace r4::tool {
+namespace {
+
+MetricLabels with(MetricLabels labels, const char* name, std::string value) {
+  labels.push_back({name, std::move(value)});
+  return labels;
+}
+
+}  // namespace
+
+void describe(const AsyncBoard& board, MetricFamilies& out) {
+  const BoardIdentity& who = board.identity();
+  const LinkStatus& link = board.link();
+  const Statistics statistics = board.statistics();
+  const ReceivedState& state = board.state();
+  const CarrierCounters& carrier = board.carrier_counters();
+  const bool up = link.state == HostLinkState::active || link.state == HostLinkState::safe;
+  const MetricLabels one{{"url", board.name()}};
+
+  out.gauge("r4_up", "The board is heard.", one, up ? 1 : 0);
+  if (!who.board_id.empty()) {
+    MetricLabels info = with(with(one, "board", who.name), "hardware_id", who.board_id);
+    out.gauge("r4_info", "Who the board is; always 1.",
+              with(std::move(info), "firmware", who.firmware), 1);
+  }
+  for (int i = 0; up && i < safe_reason_count; ++i) {
+    const auto reason = static_cast<SafeReason>(i);
+    out.gauge("r4_safe", "Why the outputs are off: 1 for the reason that holds, none included.",
+              with(one, "reason", to_text(reason)), link.reason == reason ? 1 : 0);
+  }
+  out.count("r4_received_total", "Datagrams of the board.", one, statistics.received);
+  out.count("r4_states_total", "Those of them that are states.", one, statistics.states);
+  out.count("r4_damaged_total", "What came and was no datagram.", one, statistics.damaged);
+  out.count("r4_lost_total", "Datagrams of the board that never came.", one,
+            statistics.packets.lost);
+  out.count("r4_duplicates_total", "Datagrams that came again.", one, statistics.packets.duplicate);
+  out.count("r4_late_total", "Datagrams that others overtook.", one, statistics.packets.late);
+  out.count("r4_restarts_total", "Times the board began again.", one, statistics.packets.restarts);
+  out.count("r4_transport_bytes_total", "Bytes of datagrams.", with(one, "direction", "received"),
+            carrier.rx_bytes);
+  out.count("r4_transport_bytes_total", "", with(one, "direction", "sent"), carrier.tx_bytes);
+  out.count("r4_transport_downs_total", "Times the transport was lost.", one, carrier.downs);
+  if (!up) return;
+  out.gauge("r4_state_rate_hertz", "States a second, over the last.", one,
+            statistics.state_rate_hz);
+  if (statistics.round_trip_us > 0) {
+    out.gauge("r4_round_trip_seconds", "From the newest question to its answer.", one,
+              statistics.round_trip_us / 1e6);
+  }
+  if (!state.any()) return;
+  out.gauge("r4_state_age_seconds", "Since the newest state came.", one,
+            statistics.state_age_us / 1e6);
+  out.gauge("r4_jitter_seconds", "Interarrival jitter of the states (RFC 3550).", one,
+            statistics.jitter_us / 1e6);
+  if (state.sampled_error != ReceivedState::unknown) {
+    out.gauge("r4_clock_error_seconds", "How well the time of a sample is known.", one,
+              std::chrono::duration<double>(state.sampled_error).count());
+  }
+  constexpr std::array<StateField, analog_channels> fields{
+      StateField::ain24,  StateField::ain12,    StateField::ain5,
+      StateField::aindmh, StateField::ainsteer, StateField::ain6};  // in the order of Analog
+  for (int i = 0; i < analog_channels; ++i) {
+    const auto input = static_cast<Analog>(i);
+    const StateField field = fields[static_cast<std::size_t>(i)];
+    if (!state.present.has(field)) continue;
+    const Text name = name_of(field);
+    out.gauge("r4_analog_volts", "An analog input.",
+              with(one, "input", std::string(name.data(), name.size())), state.volts(input));
+  }
+}
+
+std::string metrics_text(const std::vector<const AsyncBoard*>& boards) {
+  MetricFamilies families;
+  for (const AsyncBoard* board : boards) describe(*board, families);
+  return prometheus::TextSerializer().Serialize(families.take());
+}
+
+}  // namespace r4::tool

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# cmake -D FOLDER=… -D OUTPUT=… -P embed.cmake: the page's files as C++.
+file(GLOB files ${FOLDER}/*.html ${FOLDER}/*.js ${FOLDER}/*.css ${FOLDER}/*.svg)
+set(arrays "")
+set(table "")
+set(count 0)
+foreach(file ${files})
+  get_filename_component(name ${file} NAME)
+  file(READ ${file} hex HEX)
+  string(REGEX REPLACE "([0-9a-f][0-9a-f])" "0x\\1," bytes "${hex}")
+  string(APPEND arrays "const unsigned char file${count}[] = {${bytes}0};\n")
+  string(APPEND table "    {\"${name}\", {reinterpret_cast<const char*>(file${count}), sizeof file${count} - 1}},\n")
+  math(EXPR count "${count} + 1")
+endforeach()
+file(WRITE ${OUTPUT} "// Made of ${FOLDER}.
+#include \"tools/r4/web/server/page_files.hpp\"
+
+namespace r4::tool::web {
+namespace {
+${arrays}const EmbeddedFile files[] = {
+${table}};
+}  // namespace
+
+const EmbeddedFile* const embedded_files = files;
+const int embedded_file_count = ${count};
+}  // namespace r4::tool::web
+")

@@ -1,0 +1,413 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hub.hpp"
+
+#include <fmt/format.h>
+
+#include <asio/post.hpp>
+#include <utility>
+
+#include "../formats/json_lines.hpp"
+#include "../watch/board_metrics.hpp"
+#include "host/commands/command_help.hpp"
+#include "r4link/error.hpp"
+#include "r4link/setpoints.hpp"
+#include "transports/url.hpp"
+
+namespace r4::tool::web {
+namespace {
+
+using namespace std::chrono_literals;
+using WallClock = std::chrono::system_clock;
+
+constexpr auto tick_time = 25ms;
+constexpr auto command_time = 1s;
+constexpr auto arm_time = 2s;
+// A page that echoes what it has heard needs to hear something.
+constexpr auto longest_silence = 100ms;
+// Several who ask within that get the same answer.
+constexpr auto metrics_age = 200ms;
+
+std::int64_t wall_ms() {
+  return std::chrono::duration_cast<std::chrono::milliseconds>(WallClock::now().time_since_epoch())
+      .count();
+}
+
+BoardOptions options_for(const std::string& url, const HubOptions& options) {
+  BoardOptions board = options.board;
+  const bool bus = Url::parse(url).scheme() == "can";
+  board.session.fields = !options.fields.empty() ? options.fields : bus ? "DEFAULT" : "ALL";
+  return board;
+}
+
+// What pages may not say: it is for who sets the robot up, or is said by r4 web itself.
+void require_allowed(const Command& command) {
+  switch (command.kind) {
+    case CommandKind::setting:
+      throw Error(ErrorKind::usage, shown(command), "settings are not taken from a page",
+                  "r4 send URL " + shown(command) + " sets it");
+    case CommandKind::heartbeat:
+    case CommandKind::leave:
+    case CommandKind::watch:
+      throw Error(ErrorKind::usage, shown(command), "is said by r4 web itself", "leave it out");
+    default:
+      break;
+  }
+}
+
+}  // namespace
+
+Hub::Hub(asio::io_context& io, const std::vector<std::string>& urls, const HubOptions& options)
+    : io_(io),
+      changed_(urls.size()),
+      tick_(io),
+      deadline_(io),
+      recording_(
+          io, options.record_folder,
+          [this](Recording* recording) {
+            for (const auto& board : boards_) board->record(recording);
+          },
+          [this](const WebRecording::Told&) { tell_recording(); }),
+      foxglove_(
+          urls.size(), std::to_string(wall_ms()),
+          [this](ClientId client, Outgoing message) { server_.send(client, std::move(message)); }),
+      server_(options.server, *this) {
+  for (const std::string& url : urls) {
+    boards_.push_back(std::make_unique<WebBoard>(io, boards_.size(), url, options_for(url, options),
+                                                 static_cast<WebBoard::Events&>(*this)));
+    all_.push_back(boards_.back().get());
+    rows_.emplace_back(columns_);
+  }
+}
+
+Hub::~Hub() = default;
+
+void Hub::open() {
+  for (const auto& board : boards_) board->open();
+  server_.start();
+  tick();
+}
+
+void Hub::close(std::function<void()> done) {
+  closing_ = true;
+  tick_.cancel();
+  deadline_.cancel();
+  recording_.end();
+  const auto left = std::make_shared<std::size_t>(boards_.size());
+  for (const auto& board : boards_) {
+    board->close([left, done] {
+      if (--*left == 0) done();
+    });
+  }
+}
+
+Control::Time Hub::now() const {
+  return std::chrono::duration_cast<Control::Time>(Clock::now() - began_);
+}
+
+// --- on the server's thread
+
+void Hub::on_open(ClientId client, Protocol protocol) {
+  if (protocol == Protocol::foxglove) return foxglove_.on_open(client);
+  asio::post(io_, [this, client] { greet(client); });
+}
+
+void Hub::on_message(ClientId client, Protocol protocol, std::string text) {
+  if (protocol == Protocol::foxglove) {
+    if (!foxglove_.on_message(client, text)) {
+      return server_.drop(client, "that is no message of foxglove.websocket.v1");
+    }
+    return server_.read_on(client);
+  }
+  std::optional<PageRequest> request = page_request(text);
+  if (!request) {
+    server_.send(
+        client, {std::make_shared<const std::string>(error_text("that is no message of r4.web.v1")),
+                 "", Outgoing::Kind::other});
+    return server_.drop(client, "that is no message of r4.web.v1");
+  }
+  asio::post(io_, [this, client, request = std::move(*request)] {
+    obey(client, request);
+    server_.read_on(client);
+  });
+}
+
+void Hub::on_closed(ClientId client, Protocol protocol) {
+  if (protocol == Protocol::foxglove) return foxglove_.on_closed(client);
+  asio::post(io_, [this, client] { leave(client); });
+}
+
+void Hub::on_metrics(std::uint32_t request) {
+  asio::post(io_, [this, request] {
+    if (now() - metrics_made_ > metrics_age) {
+      metrics_made_ = now();
+      std::vector<const AsyncBoard*> boards;
+      for (const auto& each : boards_) {
+        if (each->board() != nullptr) boards.push_back(each->board());
+      }
+      metrics_ = metrics_text(boards);
+    }
+    server_.answer_metrics(request, metrics_);
+  });
+}
+
+// --- what boards say
+
+void Hub::on_state(std::size_t board, const ReceivedState&, const Datagram& datagram) {
+  if (!pages_.empty()) rows_[board].add(datagram, wall_ms());
+  on_datagram(board, datagram);
+}
+
+void Hub::on_datagram(std::size_t board, const Datagram& datagram) {
+  if (!foxglove_.wanted(board, Foxglove::Topic::record)) return;
+  const auto time =
+      std::chrono::duration_cast<std::chrono::microseconds>(WallClock::now().time_since_epoch());
+  server_.run(
+      [this, board, time, bytes = std::string(datagram.bytes().data(), datagram.bytes().size())] {
+        Json object = Json::object();
+        add_record_json(
+            object, {time, static_cast<std::uint16_t>(board + 1), RecordKind::from_board, bytes});
+        foxglove_.publish(board, Foxglove::Topic::record, time.count(), object.dump());
+      });
+}
+
+void Hub::on_change(std::size_t board) { changed_[board] = true; }
+
+void Hub::on_event(std::size_t board, WebBoard::Level level, const std::string& text) {
+  const std::int64_t time = wall_ms();
+  std::string message = event_text(board, level, text, time);
+  if (foxglove_.wanted(board, Foxglove::Topic::event)) {
+    server_.run([this, board, time, message] {
+      foxglove_.publish(board, Foxglove::Topic::event, time * 1000, message);
+    });
+  }
+  tell_all(std::move(message));
+}
+
+// --- clients come and go
+
+void Hub::greet(ClientId client) {
+  pages_.insert(client);
+  tell(client, hello_text(columns_, all_, client, wall_ms()));
+  for (std::size_t i = 0; i < boards_.size(); ++i) tell(client, board_text(i, *boards_[i]));
+  tell_control("");
+  tell_recording();
+}
+
+void Hub::leave(ClientId client) {
+  pages_.erase(client);
+  if (control_.release(client)) end_control("the browser that had control has gone");
+}
+
+void Hub::obey(ClientId client, const PageRequest& request) {
+  if (closing_) return;
+  switch (request.kind) {
+    case PageRequest::Kind::stop:
+      return stop(client, request);
+    case PageRequest::Kind::control:
+      return want_control(client, request.on);
+    case PageRequest::Kind::alive:
+      if (!control_.alive(client, Control::Time(request.now), now())) return;
+      for (const auto& board : boards_) {
+        if (board->board() != nullptr) board->board()->feed();
+      }
+      return;
+    case PageRequest::Kind::record:
+      return request.on ? recording_.begin() : recording_.end();
+    case PageRequest::Kind::command:
+    case PageRequest::Kind::arm:
+    case PageRequest::Kind::clear:
+      return command(client, request);
+  }
+}
+
+// --- control
+
+void Hub::want_control(ClientId client, bool wanted) {
+  if (!wanted) {
+    if (control_.release(client)) end_control("it was given back");
+    return;
+  }
+  if (control_.is_held_by(client)) return;
+  if (!control_.take(client, now())) {
+    return tell_control(control_.leaving() ? "the boards are being left; ask again"
+                                           : "another browser has control");
+  }
+  for (const auto& board : boards_) {
+    try {
+      board->take_control();
+    } catch (const Error& error) {
+      control_.release(client);
+      return end_control(error.what());
+    }
+  }
+  watch_holder();
+  tell_control("");
+}
+
+void Hub::watch_holder() {
+  deadline_.expires_at(began_ + *control_.deadline());
+  deadline_.async_wait([this](const std::error_code& error) {
+    if (error || !control_.holder()) return;
+    if (!control_.expired(now())) return watch_holder();
+    control_.release(*control_.holder());
+    end_control(fmt::format("nothing was heard of the browser for {} ms", Control::limit.count()));
+  });
+}
+
+// Nobody has it: the boards hear a farewell, and are safe.
+void Hub::end_control(const std::string& why) {
+  deadline_.cancel();
+  const auto left = std::make_shared<std::size_t>(boards_.size());
+  for (const auto& board : boards_) {
+    board->leave_control([this, left] {
+      if (--*left == 0) control_.left();
+    });
+  }
+  tell_control(why);
+}
+
+void Hub::tell_control(const std::string& why) {
+  for (const ClientId client : pages_) {
+    Json object{{"type", "control"}, {"holder", nullptr}};
+    if (control_.holder()) object["holder"] = *control_.holder();
+    object["you"] = control_.is_held_by(client);
+    object["why"] = why;
+    tell(client, object.dump());
+  }
+}
+
+// --- commands
+
+void Hub::answer(ClientId client, const PageRequest& request, std::size_t board, bool ok, double ms,
+                 const std::string& text) {
+  tell(client, result_text(request.request, board, ok, ms, text));
+}
+
+WebBoard::OnResult Hub::answering(ClientId client, const PageRequest& request, std::size_t board,
+                                  std::string what) {
+  return [this, client, request, board, what = std::move(what)](const CommandResult& result) {
+    const bool ok = result.outcome == Outcome::confirmed;
+    const double ms = std::chrono::duration<double, std::milli>(result.elapsed).count();
+    LinkStatus link;
+    if (boards_[board]->board() != nullptr) link = boards_[board]->board()->link();
+    const Problem problem = explain(what, result, link);
+    answer(client, request, board, ok, ms,
+           ok                    ? "confirmed"
+           : problem.fix.empty() ? problem.reason
+                                 : problem.reason + "; " + problem.fix);
+  };
+}
+
+void Hub::stop(ClientId client, const PageRequest& request) {
+  for (std::size_t i = 0; i < boards_.size(); ++i) {
+    boards_[i]->stop(answering(client, request, i, "E:STOP"));
+  }
+}
+
+void Hub::command(ClientId client, const PageRequest& request) {
+  const std::size_t number = request.board;
+  if (number >= boards_.size())
+    return answer(client, request, number, false, 0, "there is no such board");
+  AsyncBoard* const board = boards_[number]->board();
+  if (!control_.is_held_by(client) || board == nullptr) {
+    return answer(client, request, number, false, 0, "this browser has no control; take it first");
+  }
+  try {
+    if (request.kind == PageRequest::Kind::arm) {
+      board->async_arm(arm_time, answering(client, request, number, "arm"));
+    } else {
+      send(client, request, *board,
+           request.kind == PageRequest::Kind::clear ? "E:CLEAR" : request.command);
+    }
+  } catch (const Error& error) {
+    answer(client, request, number, false, 0, error.what());
+  }
+}
+
+void Hub::send(ClientId client, const PageRequest& request, AsyncBoard& board,
+               const std::string& text) {
+  const WebBoard::OnResult done = answering(client, request, request.board, text);
+  if (is_group_text(text)) {
+    board.async_apply(parse_group_text(text), command_time, done);
+    return;
+  }
+  const Command command = parse_command_text(text);
+  require_allowed(command);
+  if (command.kind == CommandKind::stop) {
+    board.async_stop(command_time, done);
+  } else if (command.kind == CommandKind::identify) {
+    board.async_identify(command_time, done);
+  } else {
+    board.async_send(command, command_time, done);
+  }
+}
+
+// --- what pages hear
+
+void Hub::tell(ClientId client, std::string text) {
+  server_.send(client,
+               {std::make_shared<const std::string>(std::move(text)), "", Outgoing::Kind::other});
+}
+
+void Hub::tell_all(std::string text, Outgoing::Kind kind) {
+  if (pages_.empty()) return;
+  server_.broadcast(Protocol::page,
+                    {std::make_shared<const std::string>(std::move(text)), "", kind});
+}
+
+void Hub::tell_recording() {
+  const WebRecording::Told& told = recording_.told();
+  Json object{{"type", "recording"}, {"path", nullptr}};
+  if (!told.path.empty()) object["path"] = told.path;
+  object["bytes"] = told.bytes;
+  object["why"] = told.why;
+  tell_all(object.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+void Hub::tick() {
+  tell_states();
+  const bool second = now() >= next_second_;
+  if (second) {
+    next_second_ = now() + 1s;
+    recording_.look();
+  }
+  for (std::size_t i = 0; i < boards_.size(); ++i) {
+    if (second || changed_[i]) tell_board(i);
+    changed_[i] = false;
+  }
+  tick_.expires_after(tick_time);
+  tick_.async_wait([this](const std::error_code& error) {
+    if (!error) tick();
+  });
+}
+
+void Hub::tell_board(std::size_t board) {
+  std::string text = board_text(board, *boards_[board]);
+  const std::string& name = boards_[board]->identity().name;
+  const std::int64_t time = wall_ms() * 1000;
+  server_.run([this, board, name, time, text] {
+    foxglove_.name(board, name);
+    if (foxglove_.wanted(board, Foxglove::Topic::link)) {
+      foxglove_.publish(board, Foxglove::Topic::link, time, text);
+    }
+  });
+  tell_all(std::move(text));
+}
+
+void Hub::tell_states() {
+  if (pages_.empty()) return;
+  std::string text = fmt::format(R"({{"type":"states","now":{},"boards":[)", now().count());
+  bool any = false;
+  for (std::size_t i = 0; i < boards_.size(); ++i) {
+    if (rows_[i].empty()) continue;
+    text += fmt::format(R"({}{{"board":{},"states":)", any ? "," : "", i);
+    rows_[i].take(text);
+    text += '}';
+    any = true;
+  }
+  if (!any && now() - told_states_ < longest_silence) return;
+  told_states_ = now();
+  tell_all(text + "]}", Outgoing::Kind::state);
+}
+
+}  // namespace r4::tool::web

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What r4 web does: the boards on one side, the clients of the server on the other. It lives on the boards' loop; what
+// clients say comes there message by message, checked, and costs it little.
+#pragma once
+
+#include <asio/io_context.hpp>
+#include <asio/steady_timer.hpp>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "columns.hpp"
+#include "control.hpp"
+#include "foxglove.hpp"
+#include "messages.hpp"
+#include "page_request.hpp"
+#include "server/server.hpp"
+#include "web_board.hpp"
+#include "web_recording.hpp"
+
+namespace r4::tool::web {
+
+struct HubOptions {
+  ServerOptions server;
+  std::string record_folder;
+  BoardOptions board;
+  std::string fields;  // empty: all; on a CAN bus the paper's
+};
+
+class Hub final : ServerEvents, WebBoard::Events {
+ public:
+  // Throws Error if it cannot listen, or for a wrong URL.
+  Hub(asio::io_context& io, const std::vector<std::string>& urls, const HubOptions& options);
+  ~Hub();
+
+  // Throws Error for a board that cannot be opened.
+  void open();
+  const ListenAddress& address() const { return server_.address(); }
+  // Nobody is served any more; the boards are free when `done` is called.
+  void close(std::function<void()> done);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  // On the server's thread.
+  void on_open(ClientId client, Protocol protocol) override;
+  void on_message(ClientId client, Protocol protocol, std::string text) override;
+  void on_closed(ClientId client, Protocol protocol) override;
+  void on_metrics(std::uint32_t request) override;
+
+  // On the loop.
+  void on_state(std::size_t board, const ReceivedState& state, const Datagram& datagram) override;
+  void on_datagram(std::size_t board, const Datagram& datagram) override;
+  void on_change(std::size_t board) override;
+  void on_event(std::size_t board, WebBoard::Level level, const std::string& text) override;
+
+  void greet(ClientId client);
+  void leave(ClientId client);
+  void obey(ClientId client, const PageRequest& request);
+  void want_control(ClientId client, bool wanted);
+  void end_control(const std::string& why);
+  void watch_holder();
+  void tell_control(const std::string& why);
+  void command(ClientId client, const PageRequest& request);
+  void send(ClientId client, const PageRequest& request, AsyncBoard& board,
+            const std::string& text);
+  void stop(ClientId client, const PageRequest& request);
+  void answer(ClientId client, const PageRequest& request, std::size_t board, bool ok, double ms,
+              const std::string& text);
+  WebBoard::OnResult answering(ClientId client, const PageRequest& request, std::size_t board,
+                               std::string what);
+  void tell(ClientId client, std::string text);
+  void tell_all(std::string text, Outgoing::Kind kind = Outgoing::Kind::other);
+  void tell_recording();
+  void tick();
+  void tell_states();
+  void tell_board(std::size_t board);
+  Control::Time now() const;
+
+  asio::io_context& io_;
+  const Clock::time_point began_ = Clock::now();
+  const Columns columns_;
+  std::vector<std::unique_ptr<WebBoard>> boards_;
+  std::vector<WebBoard*> all_;
+  std::vector<Rows> rows_;
+  std::vector<bool> changed_;
+  std::set<ClientId> pages_;
+  Control control_;
+  asio::steady_timer tick_;
+  asio::steady_timer deadline_;
+  Control::Time told_states_{0};
+  Control::Time next_second_{0};
+  std::string metrics_;
+  Control::Time metrics_made_{-1000};
+  bool closing_ = false;
+  WebRecording recording_;
+  Foxglove foxglove_;
+  Server server_;
+};
+
+}  // namespace r4::tool::web

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One connection, until it has become a WebSocket; for server.cpp alone.
+#pragma once
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "server_impl.hpp"
+#include "websocket_client.hpp"
+
+namespace r4::tool::web {
+
+constexpr auto answer_time = 10s;
+constexpr const char* content_security_policy =
+    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' "
+    "data:; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+using Response = http::response<http::string_body>;
+
+inline std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
+
+inline std::vector<std::string> protocols_of(const Request& request) {
+  constexpr std::size_t most = 8;
+  std::vector<std::string> all;
+  for (const auto& each : http::token_list(request[http::field::sec_websocket_protocol])) {
+    if (all.size() == most) break;
+    all.emplace_back(each);
+  }
+  return all;
+}
+
+class Server::Impl::Exchange : public std::enable_shared_from_this<Exchange> {
+ public:
+  Exchange(Impl& server, tcp::socket&& socket, std::uint32_t number)
+      : server_(server), number_(number), stream_(std::move(socket)) {}
+
+  void read() {
+    parser_.emplace();
+    parser_->header_limit(most_header_bytes);
+    stream_.expires_after(header_time);
+    http::async_read(
+        stream_, buffer_, *parser_,
+        [self = shared_from_this()](error_code error, std::size_t) { self->on_read(error); });
+  }
+
+  void answer_metrics(std::string text) {
+    Response response = make(http::status::ok, "text/plain; version=0.0.4; charset=utf-8");
+    response.set(http::field::cache_control, "no-store");
+    response.body() = std::move(text);
+    answer(std::move(response));
+  }
+
+  void end() {
+    error_code ignored;
+    stream_.socket().close(ignored);
+    server_.exchanges.erase(number_);
+  }
+
+ private:
+  void on_read(error_code error) {
+    if (error == http::error::header_limit || error == http::error::buffer_overflow) {
+      return refuse(http::status::request_header_fields_too_large, "the request is too long");
+    }
+    if (error == http::error::unexpected_body || error == http::error::body_limit) {
+      return refuse(http::status::payload_too_large, "nothing is taken here");
+    }
+    if (error.category() == http::make_error_code(http::error::bad_version).category() &&
+        error != http::error::end_of_stream && error != http::error::partial_message) {
+      return refuse(http::status::bad_request, "this is no request");
+    }
+    if (error) return end();
+    dispatch();
+  }
+
+  void dispatch() {
+    const Request& request = parser_->get();
+    const auto hosts = request.equal_range(http::field::host);
+    const auto origins = request.equal_range(http::field::origin);
+    if (std::distance(hosts.first, hosts.second) != 1 ||
+        std::distance(origins.first, origins.second) > 1) {
+      return refuse(http::status::bad_request, "there must be one Host");
+    }
+    if (websocket::is_upgrade(request)) return upgrade();
+    const std::string_view host = view(request[http::field::host]);
+    const std::string_view origin = view(request[http::field::origin]);
+    if (const Verdict verdict = server_.access.check(host, origin); verdict != Verdict::allowed) {
+      return refuse(http::status::forbidden, to_text(verdict));
+    }
+    if (request.method() != http::verb::get && request.method() != http::verb::head) {
+      return refuse(http::status::method_not_allowed, "only GET and HEAD are known here");
+    }
+    const std::string_view target = view(request.target());
+    const std::string_view path = target.substr(0, target.find('?'));
+    if (path != "/metrics") return serve(path == "/" ? "/index.html" : path);
+    const Verdict verdict =
+        server_.access.check_token(view(request[http::field::authorization]), target, {});
+    if (verdict != Verdict::allowed) return refuse(http::status::unauthorized, to_text(verdict));
+    stream_.expires_after(answer_time);
+    server_.events.on_metrics(number_);
+  }
+
+  void upgrade() {
+    const Request& request = parser_->get();
+    const std::vector<std::string> protocols = protocols_of(request);
+    const auto asks_for = [&protocols](std::string_view name) {
+      return std::find(protocols.begin(), protocols.end(), name) != protocols.end();
+    };
+    const std::string_view target = view(request.target());
+    const std::string_view path = target.substr(0, target.find('?'));
+    const bool page = path == "/live" && asks_for(page_protocol);
+    const bool foxglove = !page && asks_for(foxglove_protocol);
+    if (!page && !foxglove) {
+      return refuse(http::status::bad_request,
+                    "the subprotocol r4.web.v1 is at /live, foxglove.websocket.v1 anywhere");
+    }
+    const std::string_view host = view(request[http::field::host]);
+    const std::string_view origin = view(request[http::field::origin]);
+    Verdict verdict =
+        page ? server_.access.check(host, origin) : server_.access.check_reader(host, origin);
+    if (verdict != Verdict::allowed) return refuse(http::status::forbidden, to_text(verdict));
+    verdict =
+        server_.access.check_token(view(request[http::field::authorization]), target, protocols);
+    if (verdict != Verdict::allowed) return refuse(http::status::unauthorized, to_text(verdict));
+    if (server_.clients.size() >= most_clients) {
+      return refuse(http::status::service_unavailable,
+                    "64 clients are here already, as many as may");
+    }
+    stream_.expires_never();
+    const ClientId id = server_.next_number++;
+    const auto client = std::make_shared<Client>(server_, std::move(stream_), id,
+                                                 page ? Protocol::page : Protocol::foxglove);
+    server_.clients.emplace(id, client);
+    client->accept(request);
+    server_.exchanges.erase(number_);
+  }
+
+  void serve(std::string_view path) {
+    PageFile changed;
+    const auto found = server_.files.find(path);
+    const PageFile* file = found == server_.files.end() ? nullptr : &found->second;
+    if (!server_.folder.empty() && path.find('/', 1) == std::string_view::npos &&
+        !path.starts_with("/.")) {
+      std::ifstream in(server_.folder + std::string(path), std::ios::binary);
+      if (in) {
+        const std::string content{std::istreambuf_iterator<char>(in), {}};
+        changed = page_file(path, content);
+        file = &changed;
+      }
+    }
+    if (file == nullptr) return refuse(http::status::not_found, "there is nothing here");
+    const Request& request = parser_->get();
+    const bool same = view(request[http::field::if_none_match]) == file->etag;
+    Response response = make(same ? http::status::not_modified : http::status::ok, file->type);
+    response.set(http::field::etag, file->etag);
+    response.set(http::field::cache_control, "no-cache");
+    response.set(http::field::vary, "Accept-Encoding");
+    const bool takes_gzip = http::token_list(request[http::field::accept_encoding]).exists("gzip");
+    if (takes_gzip && !same) response.set(http::field::content_encoding, "gzip");
+    if (!same) response.body() = takes_gzip ? file->gzip : file->content;
+    answer(std::move(response));
+  }
+
+  Response make(http::status status, const std::string& type) const {
+    Response response(status, 11);
+    response.set(http::field::content_type, type);
+    response.set("Content-Security-Policy", content_security_policy);
+    response.set("X-Content-Type-Options", "nosniff");
+    response.set("Referrer-Policy", "no-referrer");
+    response.set("Cross-Origin-Resource-Policy", "same-origin");
+    response.keep_alive(parser_ && parser_->is_header_done() && parser_->get().keep_alive());
+    return response;
+  }
+
+  void refuse(http::status status, const char* why) {
+    Response response = make(status, "text/plain; charset=utf-8");
+    response.keep_alive(false);
+    if (status == http::status::method_not_allowed) response.set(http::field::allow, "GET, HEAD");
+    response.body() = std::string("r4 web: ") + why + "\n";
+    answer(std::move(response));
+  }
+
+  void answer(Response response) {
+    response.prepare_payload();
+    if (parser_->is_header_done() && parser_->get().method() == http::verb::head) {
+      response.body().clear();
+    }
+    response_.emplace(std::move(response));
+    stream_.expires_after(answer_time);
+    serializer_.emplace(*response_);
+    http::async_write(stream_, *serializer_,
+                      [self = shared_from_this()](error_code error, std::size_t) {
+                        if (error || !self->response_->keep_alive()) return self->end();
+                        self->read();
+                      });
+  }
+
+  Impl& server_;
+  const std::uint32_t number_;
+  beast::tcp_stream stream_;
+  beast::flat_buffer buffer_{most_header_bytes};
+  std::optional<http::request_parser<http::empty_body>> parser_;
+  std::optional<Response> response_;
+  std::optional<http::response_serializer<http::string_body>> serializer_;
+};
+
+}  // namespace r4::tool::web

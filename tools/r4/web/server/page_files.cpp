@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "page_files.hpp"
+
+#include <fmt/format.h>
+#include <libdeflate.h>
+
+#include <memory>
+
+#include "protocol/datagram/crc32.hpp"
+#include "r4link/text.hpp"
+
+namespace r4::tool::web {
+namespace {
+
+std::string type_of(std::string_view name) {
+  if (name.ends_with(".html")) return "text/html; charset=utf-8";
+  if (name.ends_with(".js")) return "text/javascript; charset=utf-8";
+  if (name.ends_with(".css")) return "text/css; charset=utf-8";
+  if (name.ends_with(".svg")) return "image/svg+xml";
+  return "application/octet-stream";
+}
+
+std::string gzip(std::string_view content) {
+  constexpr int level = 6;
+  const std::unique_ptr<libdeflate_compressor, void (*)(libdeflate_compressor*)> compressor(
+      libdeflate_alloc_compressor(level), libdeflate_free_compressor);
+  std::string out(libdeflate_gzip_compress_bound(compressor.get(), content.size()), '\0');
+  out.resize(libdeflate_gzip_compress(compressor.get(), content.data(), content.size(), out.data(),
+                                      out.size()));
+  return out;
+}
+
+}  // namespace
+
+PageFile page_file(std::string_view name, std::string_view content) {
+  return {type_of(name), fmt::format("\"{:08x}-{}\"", crc32(Text(content)), content.size()),
+          std::string(content), gzip(content)};
+}
+
+PageFiles page_files() {
+  PageFiles files;
+  for (int i = 0; i < embedded_file_count; ++i) {
+    const EmbeddedFile& each = embedded_files[i];
+    files.emplace("/" + std::string(each.name), page_file(each.name, each.content));
+  }
+  return files;
+}
+
+}  // namespace r4::tool::web

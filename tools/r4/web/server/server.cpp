@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "server.hpp"
+
+#include <boost/asio/dispatch.hpp>
+#include <boost/asio/post.hpp>
+#include <utility>
+
+#include "http_exchange.hpp"
+#include "r4link/error.hpp"
+#include "server_impl.hpp"
+#include "websocket_client.hpp"
+
+namespace r4::tool::web {
+namespace {
+
+// What is in the kernel cannot be taken back for newer states.
+constexpr int send_buffer = 64 << 10;
+
+}  // namespace
+
+void Server::Impl::listen() {
+  const std::string name = "--listen " + listen_address.text();
+  error_code error;
+  tcp::resolver resolver(io);
+  const auto found =
+      resolver.resolve(listen_address.host, std::to_string(listen_address.port), error);
+  if (error || found.empty()) {
+    throw Error(ErrorKind::open, name, "is no address of this computer",
+                "ip address shows which there are");
+  }
+  const tcp::endpoint endpoint = found.begin()->endpoint();
+  acceptor.open(endpoint.protocol(), error);
+  if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
+  if (!error) acceptor.bind(endpoint, error);
+  if (!error) acceptor.listen(net::socket_base::max_listen_connections, error);
+  if (error == net::error::address_in_use) {
+    throw Error(ErrorKind::open, name, "another program listens there",
+                "end it, or name another port; with port 0 a free one is taken");
+  }
+  if (error == net::error::access_denied) {
+    throw Error(ErrorKind::permission, name, "ports below 1024 are root's",
+                "take one above, such as 8080");
+  }
+  if (error) {
+    throw Error(ErrorKind::open, name, error.message(),
+                "ip address shows the addresses of this computer");
+  }
+  listen_address.port = acceptor.local_endpoint().port();
+}
+
+void Server::Impl::accept() {
+  acceptor.async_accept([this](error_code error, tcp::socket socket) {
+    if (error == net::error::operation_aborted) return;
+    if (error) {  // out of files, for one: those that end give some back
+      retry.expires_after(100ms);
+      retry.async_wait([this](error_code cancelled) {
+        if (!cancelled) accept();
+      });
+      return;
+    }
+    error_code ignored;
+    socket.set_option(tcp::no_delay(true), ignored);
+    socket.set_option(net::socket_base::send_buffer_size(send_buffer), ignored);
+    // Who comes is served; who has kept a place for longest without getting on gives it up.
+    if (exchanges.size() >= most_requests) exchanges.begin()->second->end();
+    const std::uint32_t number = next_number++;
+    const auto exchange = std::make_shared<Exchange>(*this, std::move(socket), number);
+    exchanges.emplace(number, exchange);
+    exchange->read();
+    accept();
+  });
+}
+
+Server::Server(const ServerOptions& options, ServerEvents& events)
+    : impl_(std::make_unique<Impl>(options, events)) {
+  impl_->listen();
+}
+
+Server::~Server() {
+  impl_->io.stop();
+  if (impl_->thread.joinable()) impl_->thread.join();
+}
+
+void Server::start() {
+  impl_->accept();
+  impl_->thread = std::thread([this] { impl_->io.run(); });
+}
+
+const ListenAddress& Server::address() const { return impl_->listen_address; }
+
+void Server::run(std::function<void()> task) { net::post(impl_->io, std::move(task)); }
+
+void Server::send(ClientId client, Outgoing message) {
+  net::dispatch(impl_->io, [this, client, message = std::move(message)]() mutable {
+    const auto found = impl_->clients.find(client);
+    if (found == impl_->clients.end()) return;
+    const std::shared_ptr<Impl::Client> alive = found->second;
+    alive->send(std::move(message));
+  });
+}
+
+void Server::broadcast(Protocol protocol, Outgoing message) {
+  net::dispatch(impl_->io, [this, protocol, message = std::move(message)] {
+    const auto all = impl_->clients;  // one may end meanwhile
+    for (const auto& [id, client] : all) {
+      if (client->protocol == protocol) client->send_with_all(message);
+    }
+  });
+}
+
+void Server::read_on(ClientId client) {
+  net::post(impl_->io, [this, client] {
+    const auto found = impl_->clients.find(client);
+    if (found != impl_->clients.end()) found->second->read();
+  });
+}
+
+void Server::drop(ClientId client, std::string why) {
+  net::post(impl_->io, [this, client, why = std::move(why)] {
+    const auto found = impl_->clients.find(client);
+    if (found == impl_->clients.end()) return;
+    const std::shared_ptr<Impl::Client> alive = found->second;
+    alive->drop(why);
+  });
+}
+
+void Server::answer_metrics(std::uint32_t request, std::string text) {
+  net::post(impl_->io, [this, request, text = std::move(text)]() mutable {
+    const auto found = impl_->exchanges.find(request);
+    if (found != impl_->exchanges.end()) found->second->answer_metrics(std::move(text));
+  });
+}
+
+}  // namespace r4::tool::web

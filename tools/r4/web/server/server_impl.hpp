@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The inside of the server, for server.cpp alone: the one file that compiles Boost.Beast. Its event loop is Boost's, the
+// boards' is that of Asio alone: they meet in closures that each hands to the other.
+#pragma once
+
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket.hpp>
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <thread>
+
+#include "page_files.hpp"
+#include "server.hpp"
+
+namespace r4::tool::web {
+
+namespace net = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace websocket = beast::websocket;
+using boost::system::error_code;
+using net::ip::tcp;
+using Clock = std::chrono::steady_clock;
+using namespace std::chrono_literals;
+
+constexpr auto header_time = 5s;
+constexpr std::string_view page_protocol = "r4.web.v1";
+constexpr std::string_view foxglove_protocol = "foxglove.websocket.v1";
+using Request = http::request<http::empty_body>;
+
+struct Server::Impl {
+  class Client;
+  class Exchange;
+
+  Impl(const ServerOptions& options, ServerEvents& server_events)
+      : events(server_events),
+        access(options.address.host, options.token, options.origins),
+        folder(options.page_folder),
+        files(page_files()),
+        listen_address(options.address) {}
+
+  void listen();
+  void accept();
+
+  ServerEvents& events;
+  const Access access;
+  const std::string folder;
+  const PageFiles files;
+  ListenAddress listen_address;
+  net::io_context io{1};
+  tcp::acceptor acceptor{io};
+  net::steady_timer retry{io};
+  std::map<ClientId, std::shared_ptr<Client>> clients;
+  std::map<std::uint32_t, std::shared_ptr<Exchange>> exchanges;  // the oldest first
+  std::uint32_t next_number = 1;
+  std::thread thread;
+};
+
+}  // namespace r4::tool::web

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 web: boards in a browser.
+#include <fmt/format.h>
+
+#include <asio/io_context.hpp>
+#include <asio/signal_set.hpp>
+#include <asio/steady_timer.hpp>
+#include <csignal>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "../shell/json.hpp"
+#include "../shell/key_file.hpp"
+#include "../shell/options.hpp"
+#include "../shell/subcommands.hpp"
+#include "hub.hpp"
+#include "server/access.hpp"
+#include "transports/url_pattern.hpp"
+
+namespace r4::tool {
+namespace {
+
+struct Options {
+  std::vector<std::string> urls;
+  std::string listen = "127.0.0.1:8080";
+  bool token = false;
+  std::vector<std::string> origins;
+  std::string record_folder = ".";
+  std::string page;
+  std::string fields;
+  std::optional<Milliseconds> duration;
+  std::string key;
+  bool json = false;
+};
+
+int serve_web(const Options& options) {
+  std::vector<std::string> urls;
+  for (const std::string& pattern : options.urls) {
+    for (PatternUrl& each : expand_urls(pattern)) urls.push_back(std::move(each.url));
+  }
+  web::HubOptions hub_options;
+  hub_options.server.address = web::listen_address(options.listen);
+  hub_options.server.origins = options.origins;
+  hub_options.server.page_folder = options.page;
+  const bool secret = options.token || !web::is_loopback(hub_options.server.address.host);
+  if (secret) hub_options.server.token = web::random_token();
+  hub_options.record_folder = options.record_folder;
+  hub_options.board = with_key(options.key);
+  hub_options.fields = options.fields;
+
+  asio::io_context io{1};
+  web::Hub hub(io, urls, hub_options);
+  hub.open();
+  std::string url = fmt::format("http://{}/", hub.address().text());
+  if (secret) url += "#token=" + hub_options.server.token;
+  if (options.json) {
+    print_line({{"type", "listening"}, {"url", url}, {"boards", urls.size()}});
+  } else {
+    fmt::print("{}\n", url);
+    std::fflush(stdout);
+  }
+  asio::signal_set signals(io);
+  for (const int number : {SIGINT, SIGTERM, SIGHUP}) signals.add(number);
+  signals.async_wait([&io](const std::error_code&, int) { io.stop(); });
+  asio::steady_timer end(io);
+  if (options.duration) {
+    end.expires_after(*options.duration);
+    end.async_wait([&io](const std::error_code&) { io.stop(); });
+  }
+  io.run();
+  io.restart();
+  hub.close([&io] { io.stop(); });
+  io.run();
+  return 0;
+}
+
+constexpr const char* footer =
+    R"(Shows boards in a browser, at the address that it prints: every value, live and as plots, how the links are,
+what happens. It watches, as r4 monitor does, until a browser takes control; then the boards are driven from
+there, by one browser at a time. If that one is closed, hidden, or silent for half a second, the boards are
+safe at once. Anybody who sees the page may stop them.
+
+It answers at this computer alone, to all its users; with --token to who has the address that it prints.
+--listen 0.0.0.0:8080 answers other computers, and to them always so. Nothing is encrypted: over a network
+that is not yours, use ssh -L (docs/web.md).
+Programs get the same by ws://ADDRESS/ with the Foxglove protocol, read-only, and Prometheus at /metrics.
+
+Examples:
+  r4 web udp://192.168.0.125
+  r4 web 'can://can0?node=0-7' --record-to /var/log/robot
+  r4 web serial:auto --listen 0.0.0.0:8080
+
+Exit codes: 0 ended by --for or Ctrl-C; 2 usage; 4 a transport or the port cannot be opened; 5 permission
+denied.)";
+
+}  // namespace
+
+void add_web(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* const command =
+      add_subcommand(root, chosen, "web", "Boards in a browser", footer, options, serve_web);
+  add_urls(*command, options->urls);
+  add_text(*command, "--listen", options->listen, "where it answers (default 127.0.0.1:8080)",
+           "ADDRESS:PORT");
+  add_flag(*command, "--token", options->token,
+           "only who has the address that is printed; always so for other computers");
+  add_repeated(*command, "--origin", options->origins,
+               "of a foreign page that may read by the Foxglove protocol", "URL");
+  add_text(*command, "--record-to", options->record_folder,
+           "where recordings go that a page begins (default: here)", "FOLDER");
+  add_text(*command, "--page", options->page, "files of the page instead of those in the program",
+           "FOLDER");
+  add_fields(*command, options->fields,
+             "state fields to ask for (default ALL, on a CAN bus DEFAULT)");
+  add_seconds(*command, "--for", options->duration, "end after that time");
+  add_key(*command, options->key);
+  add_json(*command, options->json, "print the address as JSON");
+}
+
+}  // namespace r4::tool

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One board as r4 web has it: watched, and controlled while a browser wants to.
+//
+//      watching --take_control()--> controlling --leave_control()--> leaving --farewell answered, or 200 ms--> watching
+//
+// A board that cannot be opened again is tried once a second. A stop that comes meanwhile goes out as soon as it is.
+#pragma once
+
+#include <asio/io_context.hpp>
+#include <asio/steady_timer.hpp>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "r4link/async_board.hpp"
+#include "r4link/recording.hpp"
+
+namespace r4::tool::web {
+
+class WebBoard {
+ public:
+  enum class Level : std::uint8_t { info, warning, error };
+  class Events {
+   public:
+    virtual void on_state(std::size_t board, const ReceivedState& state,
+                          const Datagram& datagram) = 0;
+    // Of what else comes from the board.
+    virtual void on_datagram(std::size_t board, const Datagram& datagram) = 0;
+    virtual void on_change(std::size_t board) = 0;
+    virtual void on_event(std::size_t board, Level level, const std::string& text) = 0;
+
+   protected:
+    ~Events() = default;
+  };
+  using Done = std::function<void()>;
+  using OnResult = std::function<void(const CommandResult&)>;
+
+  WebBoard(asio::io_context& io, std::size_t number, std::string url, BoardOptions options,
+           Events& events);
+
+  // To watch. Throws Error.
+  void open();
+  // Throws Error where it cannot: then it is watched on.
+  void take_control();
+  // Its heartbeats end now. `done` when the board is free, or does not answer.
+  void leave_control(Done done);
+  // The same at the end of the program: nothing is opened any more.
+  void close(Done done);
+  void stop(OnResult done);
+  // nullptr: goes on recording nowhere.
+  void record(Recording* recording);
+
+  // Null while it cannot be opened.
+  AsyncBoard* board() { return leaving_ ? nullptr : board_.get(); }
+  bool controlling() const { return controlling_; }
+  const std::string& url() const { return url_; }
+  const BoardIdentity& identity() const { return identity_; }
+  // Why it is not there.
+  const std::string& trouble() const { return trouble_; }
+
+ private:
+  void make(BoardRole role);
+  void watch();
+  void leave(Done done);
+  void connect();
+  void on_link(const LinkStatus& link);
+  void say(Level level, const std::string& text) { events_.on_event(number_, level, text); }
+
+  asio::io_context& io_;
+  const std::size_t number_;
+  const std::string url_;
+  const BoardOptions options_;
+  Events& events_;
+  asio::steady_timer retry_;
+  std::unique_ptr<AsyncBoard> board_;
+  Recording* recording_ = nullptr;
+  BoardIdentity identity_;
+  std::string trouble_;
+  std::vector<OnResult> stops_;  // that wait for the board to be there
+  LinkStatus link_;
+  bool heard_ = false;
+  bool controlling_ = false;
+  bool leaving_ = false;
+};
+
+}  // namespace r4::tool::web
