@@ -62,6 +62,7 @@ ALLOWED = {
     'host/python/bindings': PUBLIC,
     'host': HOST,
     'tools/r4/shell': SIMULATED,
+    'tools/r4/manual': SHELL,
     'tools/r4/drive': SHELL,
     'tools/r4/list': SHELL,
     'tools/r4/bus': SHELL,

@@ -17,7 +17,7 @@ from r4_process import DATA, ERROR, PATIENCE_S, R4, SANITIZED, objects, run
 
 DATA_BAD, USAGE, REFUSED, OPEN, PERMISSION = 1, 2, 3, 4, 5
 COMMANDS = ['monitor', 'send', 'stop', 'list', 'bus', 'bench', 'record', 'info', 'convert', 'replay', 'sim', 'key', 'demo',
-            'encode', 'decode', 'completion', 'ros2', 'web']
+            'encode', 'decode', 'completion', 'man', 'ros2', 'web']
 
 
 def captured_lines():
@@ -217,7 +217,9 @@ NO_BOARD = 'udp://127.0.0.1:9?listen=0'
     (['monitor', 'udp://255.255.255.255'], USAGE, 'the address of many'),
     (['monitor', 'udp://224.0.0.1'], USAGE, 'the address of many'),
     (['sim', 'udp://127.0.0.1:0', 'pty:', 'pty:', 'pty:', 'pty:'], USAGE, 'at most 4'),
-    (['completion', 'fish'], USAGE, 'bash or zsh'),
+    (['completion', 'csh'], USAGE, 'bash, zsh or fish'),
+    (['man', 'sned'], USAGE, 'there is no such command'),
+    (['man', '--into', '/nowhere/at/all'], OPEN, 'folder'),
 ])
 def test_bad_input_has_its_exit_code_and_a_message_with_the_fix(arguments, code, message):
     result = run(*arguments)
@@ -406,22 +408,65 @@ def test_bash_completes_commands_options_urls_and_files():
     assert {'--count', '--duration', '--fields', '--help'} <= set(complete('r4', 'monitor', '--'))
     assert complete('r4', 'sim', 'ud') == ['udp://']
     assert complete('r4', 'monitor', '--count', '') == []
-    assert complete('r4', 'completion', '') == ['bash', 'zsh']
+    assert complete('r4', 'completion', '') == ['bash', 'zsh', 'fish']
     assert complete('r4', 'decode', DATA + '/paper_c') == [DATA + '/paper_capture.tsv']
     assert complete('r4', 'key', 'giv') == ['give']
     assert complete('r4', 'send', '--key', DATA + '/paper_c') == [DATA + '/paper_capture.tsv']
     assert complete('r4', 'sim', '--script', DATA + '/paper_c') == [DATA + '/paper_capture.tsv']
 
 
-@pytest.mark.parametrize('shell', ['bash', 'zsh'])
+def test_fish_completes_commands_options_urls_and_files(tmp_path):
+    script = tmp_path / 'r4.fish'
+    script.write_text(run('completion', 'fish').stdout)
+
+    def offered(*lines):
+        """The words that fish offers at the end of each line."""
+        asked = ''.join(f"complete -C '{line}'; echo; " for line in lines)
+        result = subprocess.run(['fish', '--no-config', '-c', f'source {script}; {asked}'], capture_output=True, text=True,
+                                check=True, env={**os.environ, 'HOME': str(tmp_path)})
+        assert result.stderr == ''
+        return [[word.split('\t')[0] for word in each.split('\n') if word]
+                for each in result.stdout.split('\n\n')[:len(lines)]]
+
+    commands, option, values, url, choices, path = offered(
+        'r4 ', 'r4 monitor --co', 'r4 monitor --count ', 'r4 --json monitor ud', 'r4 completion ',
+        f'r4 send --key {DATA}/paper_c')
+    assert set(COMMANDS) <= set(commands) and 'udp://' not in commands
+    assert option == ['--control', '--count']
+    assert not {'monitor', '--json'} & set(values)
+    assert url == ['udp://']
+    assert sorted(choices) == ['bash', 'fish', 'zsh']
+    assert path == [DATA + '/paper_capture.tsv']
+
+
+@pytest.mark.parametrize('shell', ['bash', 'zsh', 'fish'])
 def test_completion_scripts_are_valid_in_their_shell(shell):
     script = run('completion', shell).stdout
     assert all(command in script for command in COMMANDS)
-    if shutil.which(shell) is None:
-        return  # not installed here: nothing to complete for
     result = subprocess.run([shell, '-n', '/dev/stdin'], input=script, capture_output=True, text=True,
                             check=False)
     assert (result.returncode, result.stderr) == (0, '')
+
+
+def test_manual_pages_say_what_the_help_says_and_checkers_find_nothing(tmp_path):
+    assert run('man', '--into', str(tmp_path)).returncode == 0
+    pages = sorted(tmp_path.iterdir())
+    assert {page.name for page in pages} >= {'r4.1', *(f'r4-{command}.1' for command in COMMANDS)}
+    lint = subprocess.run(['mandoc', '-T', 'lint', *pages], capture_output=True, text=True, check=False)
+    assert (lint.returncode, lint.stdout, lint.stderr) == (0, '', '')
+
+    def words_of(text):
+        return set(re.findall(r'[\w./=]{4,}', text.lower()))
+
+    for page in pages:
+        command = page.stem.removeprefix('r4').removeprefix('-')
+        shown = subprocess.run(['mandoc', '-T', 'utf8', '-O', 'width=500', page], capture_output=True, text=True,
+                               check=True).stdout
+        shown = re.sub('.\b', '', shown)  # what is bold or underlined is printed twice
+        told = run(*command.split(), '--help').stdout
+        assert words_of(told) - words_of(shown) <= {'usage', 'codes', 'excludes'}, command
+    assert run('man').stdout == (tmp_path / 'r4.1').read_text()
+    assert run('man', 'send').stdout == (tmp_path / 'r4-send.1').read_text()
 
 
 def test_every_json_line_of_decode_is_ascii():

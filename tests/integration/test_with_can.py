@@ -221,3 +221,12 @@ def test_a_kernel_that_panics_is_told(tmp_path):
         initrd.write_bytes(b'')
     result = run('true', env={**os.environ, 'XDG_CACHE_HOME': str(tmp_path)}, text=True)
     assert result.returncode == 6 and 'Kernel panic' in result.stderr and 'fix: ' in result.stderr
+
+
+def test_the_action_for_workflows_runs_its_commands_and_ends_with_the_first_that_fails():
+    program = TOOLS.parent / '.github/actions/with-can/run.sh'
+    environment = {**os.environ, 'WITH_CAN_OPTIONS': '--guest --time 50',
+                   'WITH_CAN_RUN': 'ip -br link show can1\nfalse\necho and on'}
+    result = subprocess.run([program], env=environment, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    assert (result.returncode, result.stderr) == (1, '')
+    assert result.stdout.startswith('can1 ') and 'and on' not in result.stdout

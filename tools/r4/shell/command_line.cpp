@@ -46,6 +46,7 @@ void add_subcommands(CLI::App& root, Action& chosen) {
   add_encode(root, chosen);
   add_decode(root, chosen);
   add_completion(root, chosen);
+  add_man(root, chosen);
 }
 
 // The text without the ending, if it has it.

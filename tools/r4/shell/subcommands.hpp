@@ -34,6 +34,7 @@ void add_plot(CLI::App& root, Action& chosen);
 void add_key_command(CLI::App& root, Action& chosen);
 void add_demo(CLI::App& root, Action& chosen);
 void add_completion(CLI::App& root, Action& chosen);
+void add_man(CLI::App& root, Action& chosen);
 
 // A subcommand with its one-line meaning, the footer of its --help and what is to be done when the
 // command line names it.

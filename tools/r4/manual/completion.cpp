@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 completion: scripts for bash and zsh, made from the option tree so that they cannot lag
-// behind.
+// r4 completion: scripts for bash, zsh and fish, made from the option tree so that they cannot lag
+// behind. That for fish is in fish_completion.cpp.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -9,11 +9,11 @@
 #include <string_view>
 #include <vector>
 
-#include "host/standard_registry.hpp"
-#include "options.hpp"
+#include "fish_completion.hpp"
+#include "option_tree.hpp"
 #include "r4link/error.hpp"
-#include "subcommands.hpp"
-#include "transports/registry.hpp"
+#include "tools/r4/shell/options.hpp"
+#include "tools/r4/shell/subcommands.hpp"
 
 namespace r4::tool {
 namespace {
@@ -22,35 +22,6 @@ struct Options {
   const CLI::App* root = nullptr;
   std::string shell;
 };
-
-bool takes_value(const CLI::Option& option) { return option.get_expected_max() != 0; }
-
-// "-h", "--help": all the names of an option.
-std::vector<std::string> names_of(const CLI::Option& option) {
-  std::vector<std::string> names;
-  for (const std::string& name : option.get_snames()) names.push_back("-" + name);
-  for (const std::string& name : option.get_lnames()) names.push_back("--" + name);
-  return names;
-}
-
-std::vector<const CLI::Option*> options_of(const CLI::App& command) {
-  return command.get_options([](const CLI::Option* option) { return option->nonpositional(); });
-}
-std::vector<const CLI::Option*> positionals_of(const CLI::App& command) {
-  return command.get_options([](const CLI::Option* option) { return option->get_positional(); });
-}
-
-// What may begin a URL: the fixed start of each usage, "udp://", "serial:auto".
-std::string url_beginnings() {
-  std::string words;
-  for (const Registry::Entry& entry : standard_registry().entries()) {
-    const std::string_view usage = entry.usage;
-    const std::size_t colon = usage.find(':');
-    words += fmt::format("{}{}{}", words.empty() ? "" : " ", usage.substr(0, colon + 1),
-                         usage.substr(colon + 1).starts_with("//") ? "//" : "");
-  }
-  return words;
-}
 
 std::string shell_quoted(std::string_view text) {
   std::string out = "'";
@@ -74,12 +45,6 @@ std::string joined_option_names(const CLI::App& command) {
   return fmt::format("{}", fmt::join(words, " "));
 }
 
-// The choices of a value, as words ("bash zsh"); empty for a free value.
-std::string choices_of(const CLI::Option& option) {
-  const std::string type = option.get_type_name();
-  return type.find('|') == std::string::npos ? "" : CLI::detail::find_and_replace(type, "|", " ");
-}
-
 std::string bash_case(const CLI::App& command) {
   std::string with_file;
   std::string with_value;
@@ -92,7 +57,8 @@ std::string bash_case(const CLI::App& command) {
   std::string files;
   std::string words;
   for (const CLI::Option* const positional : positionals_of(command)) {
-    if (positional->get_type_name() == url_type) urls = url_beginnings();
+    if (positional->get_type_name() == url_type)
+      urls = fmt::format("{}", fmt::join(url_beginnings(), " "));
     if (positional->get_type_name() == file_type) files = "1";
     words += choices_of(*positional);
   }
@@ -204,7 +170,7 @@ std::string zsh_script(const CLI::App& root) {
                          zsh_arguments(*command));
   }
   std::string urls;
-  for (const std::string& url : CLI::detail::split(url_beginnings(), ' ')) {
+  for (const std::string& url : url_beginnings()) {
     urls += " " + shell_quoted(url);
   }
   std::string script = R"(#compdef r4
@@ -244,8 +210,10 @@ if [[ $funcstack[1] == _r4 ]]; then _r4 "$@"; else compdef _r4 r4; fi
 }
 
 int print_completion(const Options& options) {
-  fmt::print("{}",
-             options.shell == "bash" ? bash_script(*options.root) : zsh_script(*options.root));
+  const CLI::App& root = *options.root;
+  fmt::print("{}", options.shell == "bash"  ? bash_script(root)
+                   : options.shell == "zsh" ? zsh_script(root)
+                                            : fish_script(root));
   return 0;
 }
 
@@ -253,6 +221,7 @@ constexpr const char* footer = R"(Examples:
   source <(r4 completion bash)
   r4 completion bash > ~/.local/share/bash-completion/completions/r4
   r4 completion zsh > ~/.zfunc/_r4      with ~/.zfunc in $fpath
+  r4 completion fish > ~/.config/fish/completions/r4.fish
 
 Exit codes: 0 done; 2 no such shell.)";
 
@@ -268,15 +237,15 @@ void add_completion(CLI::App& root, Action& chosen) {
       ->add_option_function<std::string>(
           "SHELL",
           [options](const std::string& shell) {
-            if (shell != "bash" && shell != "zsh") {
+            if (shell != "bash" && shell != "zsh" && shell != "fish") {
               throw Error(ErrorKind::usage, shell, "there is no completion for this shell",
-                          "use bash or zsh");
+                          "use bash, zsh or fish");
             }
             options->shell = shell;
           },
-          "bash or zsh")
+          "bash, zsh or fish")
       ->required()
-      ->type_name("bash|zsh");
+      ->type_name("bash|zsh|fish");
 }
 
 }  // namespace r4::tool

@@ -1,0 +1,113 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a visitor meets first is true. Usage: front_door.py TREE
+
+Workflows, actions and issue forms are YAML of the shape that their reader wants; the tools that they and the pages at
+the top name are there and know the options; the changelog and the packages are of this version; the site can be made,
+so that no link leads nowhere and Doxygen understands the headers.
+"""
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+import yaml
+
+TOOL = re.compile(r'(?<![\w/.])((?:tools|\.ci)/[\w-]+)((?: --[\w-]+)*)(?![\w/])')
+FIELDS = {'dropdown', 'textarea', 'input', 'checkboxes', 'markdown'}
+
+
+def workflow_faults(content):
+    if not {'push', 'pull_request'} <= set(content.get(True) or content.get('on') or ()):
+        yield 'it does not run for pushes and pull requests'
+    for name, job in content['jobs'].items():
+        if not job.get('timeout-minutes'):
+            yield f'job {name} may run for ever'
+        for step in job['steps']:
+            if ('run' in step) == ('uses' in step):
+                yield f'job {name}: a step either runs or uses something'
+
+
+def action_faults(content):
+    if not {'name', 'description', 'inputs', 'runs'} <= set(content):
+        yield 'name, description, inputs or runs is missing'
+    for step in content['runs']['steps']:
+        if 'shell' not in step:
+            yield 'a step of an action has no shell'
+        for used in re.findall(r'inputs\.([\w-]+)', str(step)):
+            if used not in content['inputs']:
+                yield f'there is no input {used}'
+
+
+def form_faults(content):
+    if not {'name', 'description', 'body'} <= set(content):
+        yield 'name, description or body is missing'
+    names = [field.get('id') for field in content['body']]
+    if len(set(names)) != len(names):
+        yield 'two fields have the same id'
+    for field in content['body']:
+        if field['type'] not in FIELDS or not field['attributes'].get('label'):
+            yield f'{field.get("id")}: a field needs a type and a label'
+        options = field['attributes'].get('options', [])
+        if field['type'] in ('dropdown', 'checkboxes') and not options:
+            yield f'{field["id"]}: there is nothing to choose'
+        if not all(isinstance(each, str) or 'label' in each for each in options):
+            yield f'{field["id"]}: an option is no text (quote it)'
+
+
+def yaml_faults(root):
+    kinds = {'workflows': workflow_faults, 'ISSUE_TEMPLATE': form_faults, 'with-can': action_faults}
+    files = sorted((root / '.github').rglob('*.yml'))
+    if {file.parent.name for file in files} != set(kinds):
+        yield f'.github: not all of {", ".join(kinds)} are there'
+    for file in files:
+        try:
+            for fault in kinds[file.parent.name](yaml.safe_load(file.read_text())):
+                yield f'{file.relative_to(root)}: {fault}'
+        except (yaml.YAMLError, KeyError, TypeError, AttributeError) as error:
+            yield f'{file.relative_to(root)}: {type(error).__name__} {error}'
+
+
+def tool_faults(root):
+    for page in ('README.md', 'CONTRIBUTING.md', 'docs/packages.md', '.github/workflows/ci.yml'):
+        for tool, options in TOOL.findall((root / page).read_text()):
+            program = root / tool
+            if not program.exists():
+                yield f'{page}: there is no {tool}'
+            elif program.is_file():
+                text = program.read_text()
+                for option in options.split():
+                    if option not in text:
+                        yield f'{page}: {tool} has no option {option}'
+
+
+def version_faults(root):
+    version = re.search(r'R4LINK_VERSION "([^"]+)"', (root / 'include/r4link/config.hpp').read_text())[1]
+    minor = version.rpartition('.')[0]
+    if not re.search(rf'^## \[.*{re.escape(version)}', (root / 'CHANGELOG.md').read_text(), re.MULTILINE):
+        yield f'CHANGELOG.md has no section of {version}'
+    if not (root / 'debian/changelog').read_text().startswith(f'r4link ({version})'):
+        yield f'debian/changelog does not begin with {version}'
+    if f'Package: libr4link{minor}\n' not in (root / 'debian/control').read_text():
+        yield f'debian/control has no package of the library {minor}'
+
+
+def site_faults(root):
+    with tempfile.TemporaryDirectory() as folder:
+        made = subprocess.run([root / 'tools/site', folder], capture_output=True, text=True, check=False)
+        if made.returncode != 0:
+            yield made.stderr.strip()
+        elif not (pathlib.Path(folder) / 'api/classr4_1_1Board.html').is_file():
+            yield 'tools/site: the reference has no page of r4::Board'
+
+
+def main():
+    root = pathlib.Path(sys.argv[1]).resolve()
+    faults = [fault for faults_of in (yaml_faults, tool_faults, version_faults, site_faults) for fault in faults_of(root)]
+    print('\n'.join([*faults, f'{len(faults)} faults']))
+    return 1 if faults else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,50 @@
+#!/bin/bash
+# SPDX-License-Identifier: GPL-3.0-or-later
+# The Debian packages are as they should be. Usage: packages.sh SOURCE BUILD
+# Packs what is built in BUILD, asks lintian, installs the packages into a copy of this system (its files, with an
+# overlay over them, which takes root or namespaces for users), uses them there (packages_inside.sh), and purges them:
+# nothing is left.
+set -euo pipefail
+
+source_tree=$(realpath "$1")
+build_tree=$(realpath "$2")
+
+if [[ -z "${R4_INSIDE_NAMESPACE-}" ]]; then
+  "$source_tree/tools/package" --built "$build_tree"
+  lintian --fail-on error,warning --tag-display-limit 0 --allow-root "$source_tree"/build/packages/*.changes
+  echo 'packages: lintian finds nothing'
+  as_root=()
+  ((EUID == 0)) || as_root=(--map-root-user)
+  # A network of its own: the ports and boards of this one are not to be found.
+  R4_INSIDE_NAMESPACE=1 exec unshare "${as_root[@]}" --mount --net --pid --fork --kill-child "$0" "$@"
+fi
+
+copy=$(mktemp -d)
+mount -t tmpfs tmpfs "$copy"
+mkdir "$copy/changed" "$copy/work" "$copy/root"
+mount -t overlay overlay -o "lowerdir=/,upperdir=$copy/changed,workdir=$copy/work" "$copy/root" || {
+  echo 'packages: no overlay of / can be mounted: run as root, or where users may mount in namespaces' >&2
+  exit 1
+}
+trap 'umount -R "$copy" && rmdir "$copy"' EXIT
+mount --rbind /dev "$copy/root/dev"
+mount -t proc proc "$copy/root/proc"
+mount -t tmpfs tmpfs "$copy/root/tmp"
+mount -t tmpfs tmpfs "$copy/root/run"
+ip link set lo up
+mkdir "$copy/root/tmp/packages"
+cp "$source_tree"/build/packages/*.deb "$source_tree/tests/install/packages_inside.sh" "$copy/root/tmp/packages"
+cp -r "$source_tree/docs/examples/drive" "$copy/root/tmp/packages"
+# Small images are told to leave pages of manuals out.
+rm -f "$copy"/root/etc/dpkg/dpkg.cfg.d/*
+
+env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 chroot "$copy/root" /tmp/packages/packages_inside.sh
+
+# What the tools of the system write for themselves: lists of packages, of libraries and of manuals.
+left=$(cd "$copy/changed" && find . \( -type f -o -type l \) ! -path './var/lib/dpkg/*' ! -path './var/log/*' \
+  ! -path './var/cache/*' ! -path './etc/ld.so.cache' ! -path './etc/.pwd.lock' ! -path './root/*')
+if [[ -n "$left" ]]; then
+  printf 'packages: purging them leaves\n%s\n' "$left"
+  exit 1
+fi
+echo 'packages: purging them leaves nothing'

@@ -1,0 +1,70 @@
+#!/bin/bash
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Installs the packages that lie beside it, uses each, and purges them. packages.sh runs it in a copy of the system.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")"
+
+# step NAME COMMAND...: what it printed is shown if it fails.
+step() {
+  local name=$1
+  shift
+  "$@" >"$PWD/out" 2>&1 || {
+    tail -n 30 "$PWD/out"
+    echo "packages: $name failed"
+    exit 1
+  }
+  printf '%5ds  packages: %s\n' "$SECONDS" "$name"
+}
+
+step 'install' dpkg --force-unsafe-io --install ./*.deb
+
+step 'man r4-send' bash -c "MANPAGER=cat man r4-send | grep -q 'until the board confirms'"
+completes() {
+  bash -c 'source /usr/share/bash-completion/completions/r4; complete -p r4'
+  fish --no-config -c 'complete -C "r4 mo"' | grep -q '^monitor'
+  zsh -n /usr/share/zsh/vendor-completions/_r4
+}
+step 'completions' completes
+unit_is_safe() {
+  systemd-analyze verify r4-record@left-arm.service
+  systemd-analyze security --offline=true --threshold=25 r4-record@left-arm.service
+}
+step 'r4-record@.service is whole, and exposes little' unit_is_safe
+wireshark_knows_it() {
+  ! compgen -G '/usr/lib/*/wireshark/plugins/r4.lua' >/dev/null || tshark -G protocols 2>/dev/null | grep -P '\tr4\t'
+}
+step 'Wireshark' wireshark_knows_it
+
+python_drives() {
+  cd /
+  python3 -c '
+import importlib.metadata, r4link
+assert list(importlib.metadata.entry_points(group="pytest11", name="r4link"))
+assert r4link.__file__.startswith("/usr/lib/python3"), r4link.__file__
+with r4link.Board("sim:") as board:
+    board.wait_active()
+    board.arm()
+    board.osmc(1).set(358)'
+}
+step 'python3-r4link drives a board' python_drives
+
+in_cpp() {
+  cmake -S drive -B drive/build -DCMAKE_BUILD_TYPE=Release
+  cmake --build drive/build
+  drive/build/drive 'sim:?node=1'
+  local libraries
+  read -ra libraries <<<"$(pkg-config --libs r4link)"
+  g++ -o drive/shared drive/build/CMakeFiles/drive.dir/main.cpp.o "${libraries[@]}"
+  ldd drive/shared | grep -q 'libr4link.so.0.1 => /lib/'
+  drive/shared 'sim:?node=1'
+}
+step 'a C++ program is built by CMake and by pkg-config, and drives a board' in_cpp
+
+test -s /usr/share/doc/r4link-doc/html/index.html
+test -s /usr/share/doc/r4link-doc/html/api/board_8hpp.html
+
+# It measures: where others need the processors it may be too late once.
+demo() { r4 demo || r4 demo; }
+step 'r4 demo' demo
+
+step 'purge' dpkg --force-unsafe-io --purge r4link libr4link-dev libr4link0.1 python3-r4link r4link-doc

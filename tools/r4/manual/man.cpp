@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 man: the manual pages, made of what --help prints from.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "man_page.hpp"
+#include "r4link/error.hpp"
+#include "tools/r4/shell/options.hpp"
+#include "tools/r4/shell/subcommands.hpp"
+
+namespace r4::tool {
+namespace {
+
+struct ManOptions {
+  const CLI::App* root = nullptr;
+  std::string command;
+  std::string folder;
+};
+
+void write_page(const CLI::App& root, const CLI::App& command, const std::string& folder) {
+  const std::string path = fmt::format("{}/{}.1", folder, page_name(root, command));
+  errno = 0;
+  std::ofstream file(path, std::ios::binary);
+  file << man_page(root, command);
+  file.close();
+  if (file) return;
+  throw Error(errno == EACCES ? ErrorKind::permission : ErrorKind::open, path,
+              fmt::format("cannot be written ({})", std::strerror(errno)),
+              "give a folder that is there and that you may write to");
+}
+
+int print_pages(const ManOptions& options) {
+  const CLI::App& root = *options.root;
+  if (!options.folder.empty()) {
+    write_page(root, root, options.folder);
+    for (const CLI::App* const each : root.get_subcommands({})) {
+      write_page(root, *each, options.folder);
+    }
+    return 0;
+  }
+  const CLI::App* shown = &root;
+  for (const CLI::App* const each : root.get_subcommands({})) {
+    if (each->get_name() == options.command) shown = each;
+  }
+  if (shown == &root && !options.command.empty()) {
+    throw Error(ErrorKind::usage, options.command, "there is no such command",
+                "r4 --help lists them");
+  }
+  fmt::print("{}", man_page(root, *shown));
+  return 0;
+}
+
+constexpr const char* man_footer =
+    R"(It says what r4 --help and r4 COMMAND --help say. Where r4 is installed as a package, man r4-send shows it
+without this.
+
+Examples:
+  r4 man send | man -l -
+  r4 man --into ~/.local/share/man/man1       all of them: r4.1, r4-send.1 …
+
+Exit codes: 0 done; 2 no such command; 4, 5 a page cannot be written.)";
+
+}  // namespace
+
+void add_man(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<ManOptions>();
+  options->root = &root;
+  CLI::App* const command = add_subcommand(
+      root, chosen, "man", "Print the manual page of a command", man_footer, options, print_pages);
+  add_text(*command, "COMMAND", options->command, "such as send (default: r4 itself)", "COMMAND");
+  add_text(*command, "--into", options->folder, "write the pages of all commands into this folder",
+           "FOLDER");
+  exclude(*command, "--into", {"COMMAND"});
+}
+
+}  // namespace r4::tool

@@ -1,0 +1,51 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Doxygen's input filter: a public header whose comments are for people, as Doxygen wants them. Usage: comments.py FILE
+
+    // what is above a declaration     becomes     /// …
+    declaration;  // what is behind it             ///< …, also where it goes on in the next lines
+    // after the licence, of the file              /// \\file, then the text
+
+What would be markup is escaped. The number of lines stays.
+"""
+import re
+import sys
+
+ALONE = re.compile(r'^(\s*)//\s?(.*)$')
+BEHIND = re.compile(r'^(.*\S\s*)//\s(.*)$')
+CODE = re.compile(r'(`[^`]*`)')
+MARKUP = re.compile(r'([\\<>#@&%]|(?<!\w)::)')
+
+
+def escaped(text):
+    parts = CODE.split(text)
+    return ''.join(part if part.startswith('`') else MARKUP.sub(r'\\\1', part) for part in parts)
+
+
+def documented(lines):
+    behind = None  # the column of the comment behind a declaration that may go on
+    for line in lines:
+        alone = ALONE.match(line)
+        if alone and 'SPDX' in line:
+            yield r'/// \file'
+        elif alone and 'NOLINT' not in line:
+            goes_on = behind is not None and line.index('//') == behind
+            yield f'{alone[1]}{"///<" if goes_on else "///"} {escaped(alone[2])}'
+            continue
+        else:
+            found = BEHIND.match(line) if '"' not in line.split('//')[0] else None
+            if found and not found[2].startswith('NOLINT') and re.search(r'[;,{}]\s*$|^\s*\w+\s*$', found[1]):
+                behind = len(found[1])
+                yield f'{found[1]}///< {escaped(found[2])}'
+                continue
+            yield line
+        behind = None
+
+
+def main():
+    with open(sys.argv[1], encoding='utf-8') as file:
+        print('\n'.join(documented(file.read().split('\n'))))
+
+
+if __name__ == '__main__':
+    main()
