@@ -9,6 +9,7 @@
 #include <asio/executor_work_guard.hpp>
 #include <asio/post.hpp>
 #include <atomic>
+#include <functional>
 #include <future>
 #include <memory>
 #include <mutex>
@@ -33,6 +34,7 @@ struct Device {
   Wire* open = nullptr;       // the newest, if it is for several
   int opened = 0;
   std::vector<std::string> sent;
+  std::function<void()> then_sent;  // also called
 
   std::vector<std::string> all_sent() {
     const std::lock_guard lock(mutex);
@@ -74,6 +76,7 @@ class Device::Wire final : public Carrier {
   SendResult send(std::string_view bytes, Priority, Peer) override {
     const std::lock_guard lock(device_.mutex);
     device_.sent.emplace_back(bytes);
+    if (device_.then_sent) device_.then_sent();
     return SendResult::sent;
   }
   void claim(Claim claim) override { claim_ = claim; }
