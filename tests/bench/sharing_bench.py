@@ -30,6 +30,7 @@ import sys
 import tempfile
 import threading
 import time
+import zlib
 
 R4 = os.environ.get('R4', 'r4')
 DRIVER = '''
@@ -118,20 +119,27 @@ def beside(*arguments):
         process.wait()
 
 
+def datagrams_of(path):
+    """When each came or went, in what direction, and itself: those that a reader takes."""
+    for line in pathlib.Path(path).read_text('ascii', 'replace').splitlines():
+        at, what, datagram = (line.split(' ', 2) + ['', ''])[:3]
+        body, _, check = datagram.partition('^0x')
+        if not line.startswith('#') and re.fullmatch('[0-9a-f]{1,8}\\^', check) and \
+                int(check[:-1], 16) == zlib.crc32(body.encode() + b'^'):
+            yield float(at), what, datagram
+
+
 def of_recording(path):
     """Ages of the states and spacings of the heartbeats, in seconds; packet numbers that are missing."""
     states, beats, numbers = [], [], []
-    for line in pathlib.Path(path).read_text().splitlines():
-        if line.startswith('#') or len(line) < 20:
-            continue
-        at, what, datagram = line.split(' ', 2)
+    for at, what, datagram in datagrams_of(path):
         fields = dict(part.split(':', 1) for part in datagram.split('^')[0].split(';') if ':' in part)
         if what[-1] == '<' and 'PNum' in fields:
             numbers.append(int(fields['PNum']))
         if what[-1] == '<' and 'AIN24' in fields:
-            states.append((float(at), int(fields['T']) / 1000))
+            states.append((at, int(fields['T']) / 1000))
         elif what[-1] == '>' and fields.get('H') == 'ROS2-R4':
-            beats.append(float(at))
+            beats.append(at)
     offset = min(at - t for at, t in states)
     missing = max(numbers) - min(numbers) + 1 - len(set(numbers))
     return [at - t - offset for at, t in states], [b - a for a, b in zip(beats, beats[1:])], missing
@@ -161,10 +169,8 @@ def killed_holder(board, folder):
         time.sleep(2)
         watchers[1].send_signal(signal.SIGINT)
         watchers[1].wait()
-    came = [(float(at), int(re.search('PNum:([0-9]+);', datagram)[1]))
-            for at, what, datagram in (line.split(' ', 2) for line in pathlib.Path(watched).read_text().splitlines()
-                                       if not line.startswith('#'))
-            if what[-1] == '<' and float(at) > killed - 0.5]
+    came = [(at, int(re.search('PNum:([0-9]+);', datagram)[1])) for at, what, datagram in datagrams_of(watched)
+            if what[-1] == '<' and at > killed - 0.5]
     pairs = list(zip(came, came[1:]))
     # They begin again where the board has no host.
     return sum(max(0, b[1] - a[1] - 1) for a, b in pairs), max(b[0] - a[0] for a, b in pairs)
