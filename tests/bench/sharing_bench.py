@@ -2,16 +2,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What it costs a program that drives a board when others watch it by the same wire.
 
-    PYTHONPATH=build/python R4=build/r4 tests/bench/sharing_bench.py udp|pty|URL [SECONDS] [ROUNDS] [--trouble]
+    PYTHONPATH=build/python R4=build/r4 tests/bench/sharing_bench.py udp|pty|can|usb|URL [SECONDS] [ROUNDS] [--trouble]
+
+udp and pty are here, with a simulated board. can and usb are in a guest of tools/with-can, whose processor is
+emulated: the bus vcan0 with a simulated board, and a serial port of USB with one at its other end. URL is a bus of this
+machine, on which a board is simulated, or a serial port with a board at its other end.
 
 In each round the program drives alone, then with five others beside it (r4 monitor, r4 record, three programs that
 watch), then alone again: how far the two rounds alone differ is what the machine does by itself. Of the program's
 own recording: how old its states are when they come (against the fastest of them), how far apart its heartbeats went
-out, and how many packet numbers are missing. --trouble: of the five, one is stopped (SIGSTOP) all the time, and one
-is killed half way. Then r4 stop beside all of them, and three r4 send in a row. Prints medians over the rounds.
-
-URL is a bus of the kernel, on which a board is simulated (tools/with-can --guest … can://vcan0), or a serial port
-with a board at its other end (tools/with-can --usb-serial FAR --guest … serial:///dev/ttyUSB0).
+out, what processor time it takes, and how many packet numbers are missing. --trouble: of the five, one is stopped
+(SIGSTOP) all the time, and one is killed half way; then the program that drives is killed beside such five: what
+r4 record misses of the board. Then r4 stop beside all of them, and three r4 send in a row. Prints medians over the
+rounds, and of what is missing all.
 """
 import argparse
 import contextlib
@@ -27,6 +30,7 @@ import sys
 import tempfile
 import threading
 import time
+import zlib
 
 R4 = os.environ.get('R4', 'r4')
 DRIVER = '''
@@ -115,31 +119,61 @@ def beside(*arguments):
         process.wait()
 
 
+def datagrams_of(path):
+    """When each came or went, in what direction, and itself: those that a reader takes."""
+    for line in pathlib.Path(path).read_text('ascii', 'replace').splitlines():
+        at, what, datagram = (line.split(' ', 2) + ['', ''])[:3]
+        body, _, check = datagram.partition('^0x')
+        if not line.startswith('#') and re.fullmatch('[0-9a-f]{1,8}\\^', check) and \
+                int(check[:-1], 16) == zlib.crc32(body.encode() + b'^'):
+            yield float(at), what, datagram
+
+
 def of_recording(path):
     """Ages of the states and spacings of the heartbeats, in seconds; packet numbers that are missing."""
     states, beats, numbers = [], [], []
-    for line in pathlib.Path(path).read_text().splitlines():
-        if line.startswith('#') or len(line) < 20:
-            continue
-        at, what, datagram = line.split(' ', 2)
+    for at, what, datagram in datagrams_of(path):
         fields = dict(part.split(':', 1) for part in datagram.split('^')[0].split(';') if ':' in part)
         if what[-1] == '<' and 'PNum' in fields:
             numbers.append(int(fields['PNum']))
         if what[-1] == '<' and 'AIN24' in fields:
-            states.append((float(at), int(fields['T']) / 1000))
+            states.append((at, int(fields['T']) / 1000))
         elif what[-1] == '>' and fields.get('H') == 'ROS2-R4':
-            beats.append(float(at))
+            beats.append(at)
     offset = min(at - t for at, t in states)
     missing = max(numbers) - min(numbers) + 1 - len(set(numbers))
     return [at - t - offset for at, t in states], [b - a for a, b in zip(beats, beats[1:])], missing
 
 
 @contextlib.contextmanager
-def five_watchers(url, folder):
-    record = (R4, 'record', url, '-o', os.path.join(folder, f'{time.monotonic_ns()}.w.r4log'))
+def five_watchers(url, folder, recording=None):
+    record = (R4, 'record', url, '-o', recording or os.path.join(folder, f'{time.monotonic_ns()}.w.r4log'))
     with contextlib.ExitStack() as stack:
         yield [stack.enter_context(beside(*each)) for each in
                [(R4, 'monitor', url, '--json'), record] + 3 * [(sys.executable, '-c', WATCHER, url)]]
+
+
+def killed_holder(board, folder):
+    """What r4 record misses of the board when the program that drives is killed: numbers, and the longest silence."""
+    watched = os.path.join(folder, f'{time.monotonic_ns()}.w.r4log')
+    with five_watchers(board.url, folder, watched) as watchers, \
+            subprocess.Popen([sys.executable, '-c', DRIVER, board.url, watched + '.driver', '1', 'wait'],
+                             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as driver:
+        driver.stdout.readline()
+        time.sleep(2)
+        watchers[0].send_signal(signal.SIGSTOP)
+        watchers[2].kill()
+        time.sleep(1)
+        driver.kill()
+        killed = time.time()
+        time.sleep(2)
+        watchers[1].send_signal(signal.SIGINT)
+        watchers[1].wait()
+    came = [(at, int(re.search('PNum:([0-9]+);', datagram)[1])) for at, what, datagram in datagrams_of(watched)
+            if what[-1] == '<' and at > killed - 0.5]
+    pairs = list(zip(came, came[1:]))
+    # They begin again where the board has no host.
+    return sum(max(0, b[1] - a[1] - 1) for a, b in pairs), max(b[0] - a[0] for a, b in pairs)
 
 
 def drive(board, seconds, folder, others=False, trouble=False):
@@ -153,9 +187,12 @@ def drive(board, seconds, folder, others=False, trouble=False):
             killer = threading.Timer(seconds / 2, watchers[2].kill)
             killer.start()
             stack.callback(killer.cancel)
-        subprocess.run([sys.executable, '-c', DRIVER, board.url, path, str(seconds)], check=True,
-                       stdout=subprocess.DEVNULL)
-    return of_recording(path)
+        driver = subprocess.Popen([sys.executable, '-c', DRIVER, board.url, path, str(seconds)],
+                                  stdout=subprocess.DEVNULL)
+        _, status, usage = os.wait4(driver.pid, 0)
+        driver.returncode = os.waitstatus_to_exitcode(status)
+        assert driver.returncode == 0
+    return *of_recording(path), usage.ru_utime + usage.ru_stime
 
 
 def stop_beside_all(board, folder):
@@ -176,6 +213,21 @@ def stop_beside_all(board, folder):
     return said, None if safe is None else safe - began
 
 
+def run_in_guest(where):
+    """The same there."""
+    with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
+        options, url = [], 'can://vcan0'
+        if where == 'usb':
+            far = os.path.join(folder, 'far')
+            stack.enter_context(beside(R4, 'sim', f'pty:{far}'))
+            while not os.path.exists(far):
+                time.sleep(0.01)
+            options, url = ['--usb-serial', far], 'serial:///dev/ttyUSB0'
+        guest = os.path.join(os.path.dirname(__file__), '..', '..', 'tools', 'with-can')
+        arguments = [url if each == where else each for each in sys.argv]
+        return subprocess.run([guest, '--guest', *options, sys.executable, *arguments], check=False).returncode
+
+
 def time_of(*arguments):
     began = time.monotonic()
     subprocess.run(arguments, check=True, stdout=subprocess.DEVNULL)
@@ -189,6 +241,8 @@ def main():
     parser.add_argument('rounds', nargs='?', type=int, default=3)
     parser.add_argument('--trouble', action='store_true')
     chosen = parser.parse_args()
+    if chosen.where in ('can', 'usb'):
+        return run_in_guest(chosen.where)
     board = (OtherBoard if chosen.where.startswith('serial:') else SimulatedBoard)(chosen.where)
     try:
         with tempfile.TemporaryDirectory() as folder:
@@ -201,8 +255,14 @@ def main():
                 alone, five, again = (statistics.median(which(each[nth][index]) for each in runs) for nth in range(3))
                 print(f'{name:22} alone {ms(alone):>7} ms, beside five {ms(five):>7} ms ({five / alone:.3f} times), '
                       f'alone again {ms(again):>7} ms ({again / alone:.3f} times)')
+            print('processor time of who drives: alone {:.3f} s, beside five {:.3f} s, alone again {:.3f} s'.format(
+                *(statistics.median(each[nth][3] for each in runs) for nth in range(3))))
             print('packet numbers missing: alone {}, beside five {}, alone again {}'.format(
                 *(sum(each[nth][2] for each in runs) for nth in range(3))))
+            if chosen.trouble:
+                killed = [killed_holder(board, folder) for _ in range(chosen.rounds)]
+                print('who drives is killed, what a recorder beside it misses:',
+                      ', '.join(f'{missing} in {ms(silence)} ms' for missing, silence in killed))
             stops = []
             for _ in range(chosen.rounds):
                 stops.append(stop_beside_all(board, folder))
@@ -217,6 +277,7 @@ def main():
                   ', '.join(f'{ms(time_of(R4, "send", board.url, "S:1500,3"))} ms' for _ in range(3)))
     finally:
         board.close()
+    return 0
 
 
-main()
+sys.exit(main())

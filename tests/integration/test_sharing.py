@@ -174,8 +174,11 @@ def test_a_stopped_holder_loses_the_serial_port_and_takes_no_byte_of_it_when_it_
         holder.next(is_state)
         holder.signal(signal.SIGSTOP)
         for _ in range(2):
-            with driving(board.host_url, 'O:358,1,1'), Running('record', board.host_url, '-o', str(path)) as recorder:
+            with driving(board.host_url, 'O:358,1,1') as host, \
+                    Running('record', board.host_url, '-o', str(path)) as recorder:
                 wait_for(path, 'OSMC1:358,1;')
+                listed = run('list', '--json', '--serial', os.path.realpath(f'{folder}/tty')).stdout
+                assert f'"pid":{host.process.pid},' in listed or f'"pid":{host.process.pid}}}' in listed, listed
                 refused = run('send', board.host_url, 'O:1,1,1')
                 assert refused.returncode == 3 and 'controlled by r4 ' in refused.stderr, refused
                 holder.signal(signal.SIGCONT)

@@ -71,6 +71,14 @@ bool SharePlaces::hold() {
   return true;
 }
 
+bool SharePlaces::somebody_has_come() const {
+  if (wire_.name.empty()) return false;
+  for (int place = 0; place < share_places; ++place) {
+    if (!is_passed_over(place) && reach_holder(at_place(wire_, place))) return true;
+  }
+  return false;
+}
+
 void SharePlaces::pass_over_hanging(const std::string& thing) {
   one_hangs_ = true;
   pass_over(joined_, sharer_.silence(thing));

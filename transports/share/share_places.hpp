@@ -32,6 +32,9 @@ class SharePlaces {
   // Takes the first that is of use, or none if none is: then nobody shares what we open. False if another has it.
   bool hold();
 
+  // A place that is of use has a holder.
+  bool somebody_has_come() const;
+
   // The holder that was joined is no help.
   void pass_over_hanging(const std::string& thing);
   void pass_over_other_version(const std::string& thing);

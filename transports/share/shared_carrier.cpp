@@ -171,7 +171,9 @@ bool SharedCarrier::try_to_take_part() {
   try {
     return try_to_hold();
   } catch (const Error& error) {
-    if (places_.no_help() && error.kind() == ErrorKind::open) throw Error(*places_.no_help());
+    if (error.kind() != ErrorKind::open) throw;
+    if (places_.somebody_has_come()) return false;  // and was faster
+    if (places_.no_help()) throw Error(*places_.no_help());
     throw;
   }
 }

@@ -55,6 +55,29 @@ TEST_F(SharedCarrier, ThoseThatWatchHearBothDirections) {
   EXPECT_TRUE(driver->heard.overheard.empty());
 }
 
+// Whoever drives is kept waiting by nobody that watches.
+TEST_F(SharedCarrier, WhoHoldsTheWireHasWhatComesAndSendsWhatGoesBeforeOthersAreTold) {
+  const auto driver = opened(BoardRole::control);
+  const FileDescriptor watcher = reach_holder({wire});
+  send_message(watcher.get(), ShareMessage::Kind::hello, hello_text(BoardRole::watch, "watcher"));
+  std::array<char, ShareMessage::max_size> packet;
+  const auto hear = [&] { return receive_packet(watcher.get(), packet.data(), packet.size()) > 0; };
+  for (int answers = 0; answers < 2;) {  // welcome, up
+    run_for(io, 1ms);
+    answers += hear() ? 1 : 0;
+  }
+  int before = 0;
+  const auto look = [&] { before += hear() ? 0 : 1; };
+  driver->heard.then = [&](const auto&) { look(); };
+  device.then_sent = look;
+  device.deliver("state");
+  ASSERT_TRUE(run_until(io, [&] { return before == 1; }));
+  EXPECT_TRUE(hear());
+  driver->carrier->send("O:358,1,1;", Priority::normal);
+  EXPECT_EQ(before, 2);
+  EXPECT_TRUE(hear());
+}
+
 TEST_F(SharedCarrier, AllHearWhatAnotherHostSaysOnTheWireAndWhatIsTooLong) {
   const auto driver = opened(BoardRole::control);
   const auto watcher = opened(BoardRole::watch);
@@ -316,6 +339,18 @@ TEST_F(SharedCarrier, AHolderThatHangsAndOnlyWatchesLosesTheWireAndComesBackAsOn
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->kind(), ErrorKind::refused);
   elsewhere.run([&] { driver.reset(); });
+}
+
+TEST_F(SharedCarrier, AsksAgainWhereAnotherOpensTheWireInBetween) {
+  OtherThread elsewhere;
+  // It meets at the next place, as one does for which the holder of the first hangs.
+  const auto rival = program(BoardRole::watch, elsewhere.loop, at_place({wire}, 1).name);
+  device.before_open = [&] { elsewhere.run([&] { rival->carrier->open(rival->heard); }); };
+  const auto driver = program(BoardRole::control, io);
+  driver->carrier->open(driver->heard);
+  EXPECT_TRUE(driver->carrier->up());
+  EXPECT_EQ(device.opened, 2);
+  elsewhere.run([&] { rival->carrier->close(); });
 }
 
 TEST_F(SharedCarrier, AHolderThatHangsAndControlsKeepsTheWire) {

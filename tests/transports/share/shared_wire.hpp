@@ -9,6 +9,7 @@
 #include <asio/executor_work_guard.hpp>
 #include <asio/post.hpp>
 #include <atomic>
+#include <functional>
 #include <future>
 #include <memory>
 #include <mutex>
@@ -33,6 +34,8 @@ struct Device {
   Wire* open = nullptr;       // the newest, if it is for several
   int opened = 0;
   std::vector<std::string> sent;
+  std::function<void()> then_sent;    // also called
+  std::function<void()> before_open;  // called by the next that opens it
 
   std::vector<std::string> all_sent() {
     const std::lock_guard lock(mutex);
@@ -50,6 +53,7 @@ class Device::Wire final : public Carrier {
 
   void open(Handler& handler) override {
     close();
+    if (const auto before = std::exchange(device_.before_open, {})) before();
     {
       const std::lock_guard lock(device_.mutex);
       if (device_.exclusive && device_.open != nullptr) {
@@ -74,6 +78,7 @@ class Device::Wire final : public Carrier {
   SendResult send(std::string_view bytes, Priority, Peer) override {
     const std::lock_guard lock(device_.mutex);
     device_.sent.emplace_back(bytes);
+    if (device_.then_sent) device_.then_sent();
     return SendResult::sent;
   }
   void claim(Claim claim) override { claim_ = claim; }
@@ -146,11 +151,15 @@ class SharedWireTest : public testing::Test {
   };
 
   std::unique_ptr<Program> program(BoardRole role, asio::io_context& loop) {
+    return program(role, loop, wire);
+  }
+  std::unique_ptr<Program> program(BoardRole role, asio::io_context& loop,
+                                   const std::string& name) {
     auto made = std::make_unique<Program>();
     made->carrier = make_shared_carrier(
         loop, std::make_unique<Device::Wire>(loop, device),
-        [this] {
-          return SharedWire{wire, group};
+        [this, name] {
+          return SharedWire{name, group};
         },
         role);
     return made;
