@@ -47,7 +47,6 @@ struct UdpCrowd::Batch {
 UdpCrowd::UdpCrowd(asio::execution_context& context)
     : service(context),
       io_(static_cast<asio::io_context&>(context)),
-      batch_(std::make_unique<Batch>()),
       idle_(io_),
       timer_(io_) {}
 
@@ -60,6 +59,7 @@ void UdpCrowd::shutdown() noexcept {
 bool UdpCrowd::enter() {
   if (++hosts_ <= few) return false;
   if (!ready_) ready_.reset(::epoll_create1(EPOLL_CLOEXEC));
+  if (!batch_) batch_ = std::make_unique<Batch>();
   return static_cast<bool>(ready_);
 }
 
