@@ -45,10 +45,7 @@ struct UdpCrowd::Batch {
 };
 
 UdpCrowd::UdpCrowd(asio::execution_context& context)
-    : service(context),
-      io_(static_cast<asio::io_context&>(context)),
-      idle_(io_),
-      timer_(io_) {}
+    : service(context), io_(static_cast<asio::io_context&>(context)), idle_(io_), timer_(io_) {}
 
 UdpCrowd::~UdpCrowd() = default;
 
