@@ -18,7 +18,7 @@ Registry Registry::standard() {
   Registry registry;
   registry.add({"udp", "udp://HOST[:2018][?listen=2390], udp:auto, udp:?id=NAME",
                 "WiFi or Ethernet; for a board: udp://BIND[:2018][?peer=HOST[:2390]]",
-                make_udp_carrier, udp_wire});
+                make_udp_carrier, udp_wire, udp_has_own_port});
   registry.add({"serial", "serial:///dev/ttyACM0[?baud=1000000], serial:auto, serial:?sn=SERIAL",
                 "USB serial, or the pty of a simulated board", make_serial_carrier, serial_wire});
   registry.add(
@@ -57,6 +57,7 @@ std::unique_ptr<Carrier> Registry::make_shared(asio::io_context& io, std::string
   Url alone = role == BoardRole::watch ? Url::parse(with_own_port(std::string(url))) : parsed;
   alone.take("share");
   ShareGroup group = take_share_group(parsed);
+  if (entry.own && entry.own(parsed)) return entry.make(io, parsed, Role::host);
   FindWire find = [wire = entry.wire, parsed = std::move(parsed), group = std::move(group)] {
     SharedWire found = wire(parsed);
     found.group = group;

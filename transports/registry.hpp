@@ -29,6 +29,8 @@ class Registry {
     // What the wire is called that programs of this machine share (shared_wire.hpp). None: they
     // do not. Throws Error where it is not to be found.
     std::function<SharedWire(const Url& url)> wire = nullptr;
+    // Is the wire of this URL its program's own, which nobody shares? None: it never is.
+    std::function<bool(const Url& url)> own = nullptr;
   };
 
   // A registry with the transports of this folder: udp, serial, pty, can.

@@ -100,6 +100,26 @@ TEST(CanCapacity, EightBoardsInPlainFormFitAnFdBus) {
   expect_all_there(result);
 }
 
+// The fields that our host selects need a frame of 48 bytes, and with it more than 5 Mbit/s.
+TEST(CanCapacity, EightBoardsAtAKilohertzFitAnFdBusInPackedForm) {
+  BackboneOptions options;
+  options.tx_dl = 64;
+  options.states_hz = 1000;
+  options.seconds = 1;
+  for (const bool confirmed : {false, true}) {
+    if (confirmed) options.fields = confirmed_fields();
+    options.bus.rate = {1000000, confirmed ? 8000000U : 5000000U};
+    for (const std::uint64_t seed : {1U, 2U}) {
+      options.bus.seed = seed;
+      const BackboneResult result = run_backbone(options);
+      print(confirmed ? "8 boards at 1 kHz, SAFE, CMD, FD 1M/8M" : "8 boards at 1 kHz, FD 1M/5M",
+            result);
+      EXPECT_GE(result.telemetry.sent, 8000U);
+      expect_all_there(result);
+    }
+  }
+}
+
 // Damaged frames are sent again by the controllers: they cost time, and no datagram.
 TEST(CanCapacity, OneDamagedFrameInAHundredLosesNothing) {
   BackboneOptions options;

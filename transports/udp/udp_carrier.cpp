@@ -37,6 +37,8 @@ std::unique_ptr<Carrier> make_udp_carrier_with(asio::io_context& io, const Url& 
   return std::make_unique<UdpHost>(io, url, std::move(lookup), std::move(search));
 }
 
+bool udp_has_own_port(const Url& text) { return UdpUrl(text, Role::host).listen == 0; }
+
 SharedWire udp_wire(const Url& text) {
   const UdpUrl url(text, Role::host);
   if (url.listen == 0) return {};

@@ -45,5 +45,6 @@ std::unique_ptr<Carrier> make_udp_carrier_with(asio::io_context& io, const Url& 
 // What programs that share the wire call it: the board, as it is written, and the port of hosts. Empty
 // where that is any free one: then each has its own.
 SharedWire udp_wire(const Url& text);
+bool udp_has_own_port(const Url& text);
 
 }  // namespace r4

@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstring>
 #include <utility>
 
@@ -19,7 +20,8 @@ UdpHost::UdpHost(asio::io_context& io, const Url& url, HostLookup lookup, BoardS
     : UdpEnd(io, UdpUrl(url, Role::host)),
       lookup_(std::move(lookup)),
       search_(std::move(search)),
-      watch_(io, lookup_) {
+      watch_(io, lookup_),
+      crowd_(UdpCrowd::of(io)) {
   search_.port = url_.port;
 }
 
@@ -50,6 +52,10 @@ void UdpHost::gather() {
 }
 
 void UdpHost::listen() {
+  if (one_of_many_) {
+    if (crowd_.read(socket_.native_handle(), *this)) return;
+    return warn(fmt::format("nothing is heard: {}", std::strerror(errno)), "close some programs");
+  }
   if (!gathering_) return UdpEnd::listen();
   gathering_->wait(socket_.native_handle(), [this] { take_what_has_gathered(); });
 }
@@ -66,14 +72,32 @@ void UdpHost::take_what_has_gathered() {
   if (handler_ != nullptr) listen();
 }
 
+void UdpHost::on_packet(std::string_view bytes, const Endpoint& from) {
+  sender_ = from;
+  received(bytes);
+}
+
 void UdpHost::close_socket() noexcept {
   if (gathering_) gathering_->stop();
+  crowd_.stop(*this);
+  if (std::exchange(entered_, false)) crowd_.leave();
   host_socket_.close();
 }
 
 void UdpHost::close() noexcept {
   watch_.stop();
   UdpEnd::close();
+}
+
+// Before its socket is open, which the loop's reactor is not to watch where it is one of many.
+void UdpHost::enter_crowd() {
+  entered_ = true;
+  one_of_many_ = crowd_.enter();
+  if (one_of_many_) {
+    socket_ = UdpGathering::quiet_socket(io_);
+  } else {
+    socket_ = UdpSocket(io_);
+  }
 }
 
 // The socket of a host whose board is there.
@@ -83,6 +107,7 @@ void UdpHost::bind(const Endpoint& board) {
     throw Error(ErrorKind::open, url_.text, std::strerror(error), network_fix);
   }
   const Endpoint local(board.protocol(), url_.listen);
+  if (!gathering_) enter_crowd();
   open_socket(local, true);
   const asio::error_code error = host_socket_.bind(local.port(), board);
   if (error == asio::error::already_open) {

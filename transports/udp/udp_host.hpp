@@ -9,12 +9,13 @@
 
 #include "board_search.hpp"
 #include "host_lookup.hpp"
+#include "udp_crowd.hpp"
 #include "udp_end.hpp"
 #include "udp_gathering.hpp"
 
 namespace r4 {
 
-class UdpHost final : public UdpEnd {
+class UdpHost final : public UdpEnd, private UdpCrowd::Member {
  public:
   UdpHost(asio::io_context& io, const Url& url, HostLookup lookup, BoardSearch search);
   ~UdpHost() override { close(); }
@@ -29,11 +30,14 @@ class UdpHost final : public UdpEnd {
  private:
   void listen() override;
   void received(std::string_view bytes) override;
+  void on_packet(std::string_view bytes, const Endpoint& from) override;
+  void on_all_read() override { handler_->on_drained(); }
   Outcome transmit(std::string_view bytes, Peer to) override;
   int probe() override;
   void close_socket() noexcept override;
 
   void bind(const Endpoint& board);
+  void enter_crowd();
   void found(const FoundHost& answer);
   void remember(const FoundHost& answer);
   HostWatch::Question question() const;
@@ -46,6 +50,9 @@ class UdpHost final : public UdpEnd {
   HostWatch watch_;
   UdpHostSocket host_socket_{socket_};
   std::optional<UdpGathering> gathering_;  // of what comes; else it is read at once
+  UdpCrowd& crowd_;
+  bool entered_ = false;  // the crowd, which counts it
+  bool one_of_many_ = false;
   bool named_ = false;  // the URL has a name or leaves it to a search: where the board is, is asked
   Endpoint board_;
 };

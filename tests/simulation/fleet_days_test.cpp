@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Days of a fleet of a hundred boards in virtual time: each board's application and its host's session, joined by a
+// network that loses a tenth of the datagrams, with faults of one link and of all at once. No memory grows, no board
+// trips but for a fault, each is safe in time and comes back. R4_FLEET_HOURS makes it longer (168 are seven days),
+// R4_SEED makes it another.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <malloc.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstdlib>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "firmware/application/application.hpp"
+#include "host/session/session.hpp"
+#include "random.hpp"
+
+namespace r4::simulation {
+namespace {
+
+using firmware::BoardState;
+
+constexpr std::size_t fleet_size = 100;
+constexpr std::uint64_t second_us = 1'000'000;
+constexpr std::uint64_t silence_limit_us = 1'020'000;           // the timeout and 20 ms
+constexpr std::uint64_t comes_back_within_us = 15 * second_us;  // through all that is lost
+// A board that has begun anew is fed by a host that echoes its second heartbeat, after half a second. Where that one is
+// lost, the first connection ends after a second, and there is another at once.
+constexpr std::uint64_t connecting_us = 2 * second_us;
+constexpr double lost = 0.1, twice = 0.01, damaged = 0.001;
+
+// One board and its host.
+class FleetLink final : firmware::Hal, firmware::Port, Session::Handler {
+ public:
+  explicit FleetLink(std::uint64_t seed) : random_(seed) {
+    SessionOptions options;
+    options.arming = Arming::off;
+    const auto first = echo_host_first_pnum + static_cast<std::uint32_t>(random_.below(1U << 30));
+    session_.emplace(static_cast<Session::Handler&>(*this), options, first);
+    boot();
+  }
+
+  void run_until(std::uint64_t end_us) {
+    for (;;) {
+      Packet* const packet =
+          &*std::min_element(packets_.begin(), packets_.end(),
+                             [](const Packet& a, const Packet& b) { return a.at_us < b.at_us; });
+      const std::uint64_t host_us = std::max(host_due_us_, held_until_us_);
+      const std::uint64_t next_us = std::min({packet->at_us, board_due_us_, host_us});
+      if (next_us > end_us) break;
+      now_us_ = std::max(now_us_, next_us);
+      if (packet->at_us == next_us) {
+        deliver(*packet);
+      } else if (board_due_us_ == next_us) {
+        poll_board();
+      } else {
+        poll_host();
+      }
+    }
+    now_us_ = end_us;
+    if (now_us_ == fault_ends_us() + comes_back_within_us && !back()) ++stayed_away;
+  }
+
+  // --- faults
+
+  void cut(std::uint64_t length_us) { cut_until_us_ = now_us_ + length_us; }
+  // The thread of all hosts does nothing; what comes waits.
+  void hold_up(std::uint64_t length_us) { held_until_us_ = now_us_ + length_us; }
+  void restart_board() {
+    restarted_us_ = now_us_;
+    boot();
+  }
+  bool well() const { return now_us_ > fault_ends_us() + comes_back_within_us; }
+  void command() {
+    ++asked;
+    session_->send(Command::stepper(static_cast<std::int32_t>(asked), 1000, 1),
+                   std::chrono::seconds(10), time());
+    host_due_us_ = now_us_;
+  }
+  bool back() const {
+    return application_->state() == BoardState::active && session_->in_control(time());
+  }
+  Random& random() { return random_; }
+
+  std::uint64_t asked = 0, confirmed = 0;
+  std::uint64_t trips = 0, while_connecting = 0, false_trips = 0, late_ms = 0, stayed_away = 0,
+                overflows = 0;
+
+ private:
+  struct Packet {
+    std::uint64_t at_us = UINT64_MAX;  // it is free
+    bool to_board = false;
+    bool intact = true;
+    std::size_t size = 0;
+    std::array<char, 512> bytes;
+  };
+
+  std::uint64_t fault_ends_us() const {
+    return std::max({cut_until_us_, held_until_us_, restarted_us_});
+  }
+  Time time() const { return Time{static_cast<std::int64_t>(now_us_ + second_us)}; }
+  std::uint32_t board_ms() const {
+    return boot_ms_ + static_cast<std::uint32_t>((now_us_ - boot_us_) / 1000);
+  }
+
+  void boot() {
+    firmware::Application::Config config;
+    config.identity = Identity{Text("simulated"), Text("0"), Text("sim")};
+    config.settings.state_rate_hz = 1;
+    boot_us_ = now_us_;
+    boot_ms_ = static_cast<std::uint32_t>(random_.next());
+    was_active_ = false;
+    firmware::Hal& hal = *this;
+    application_.emplace(hal, config);
+    application_->add_port(*this);
+    application_->start(board_ms());
+    poll_board();
+  }
+  void poll_board() {
+    board_due_us_ = now_us_ + 1000 * std::max<std::uint64_t>(application_->poll(board_ms()), 1);
+    look();
+  }
+  void poll_host() {
+    const Time due = session_->poll(time());
+    host_due_us_ = std::max(now_us_ + 1, static_cast<std::uint64_t>(due.count()) - second_us);
+  }
+  // What the board makes of the silence.
+  void look() {
+    const bool active = application_->state() == BoardState::active;
+    if (active && now_us_ > heartbeat_us_ + silence_limit_us) ++late_ms;
+    if (was_active_ && !active) {
+      ++trips;
+      if (now_us_ < boot_us_ + connecting_us) {
+        ++while_connecting;
+      } else if (now_us_ > std::max(cut_until_us_, held_until_us_)) {
+        ++false_trips;
+      }
+    }
+    was_active_ = active;
+  }
+
+  void transfer(bool to_board, std::string_view bytes) {
+    if (now_us_ < cut_until_us_) return;
+    for (int copies = random_.chance(twice) ? 2 : 1; copies > 0; --copies) {
+      if (random_.chance(lost)) continue;
+      const auto room = std::find_if(packets_.begin(), packets_.end(),
+                                     [](const Packet& each) { return each.at_us == UINT64_MAX; });
+      if (room == packets_.end() || bytes.size() > room->bytes.size()) {
+        ++overflows;
+        return;
+      }
+      // Up to 20 ms: some overtake others.
+      room->at_us = now_us_ + 500 + random_.below(20'000);
+      room->to_board = to_board;
+      room->size = bytes.size();
+      std::copy(bytes.begin(), bytes.end(), room->bytes.begin());
+      room->intact = !random_.chance(damaged);
+      if (!room->intact) room->bytes[random_.below(bytes.size())] ^= 1;
+    }
+  }
+  void deliver(Packet& packet) {
+    if (!packet.to_board && now_us_ < held_until_us_) {
+      packet.at_us = held_until_us_;
+      return;
+    }
+    packet.at_us = UINT64_MAX;
+    const std::string_view bytes(packet.bytes.data(), packet.size);
+    if (packet.to_board) {
+      if (packet.intact && bytes.starts_with("H:")) heartbeat_us_ = now_us_;
+      application_->receive(0, 1, Text(bytes.data(), bytes.size()), board_ms());
+      poll_board();
+    } else {
+      session_->receive(bytes, time());
+      poll_host();
+    }
+  }
+
+  // firmware::Hal
+  void apply(const firmware::Outputs&) override {}
+  void make_safe() override {}
+  void sample(firmware::Inputs& inputs) override { inputs.handle_held = true; }
+  void zero(int) override {}
+  bool clear_fault() override { return true; }
+  // firmware::Port
+  void send(Text bytes, Priority, std::uint32_t) override {
+    transfer(false, {bytes.data(), bytes.size()});
+  }
+  std::size_t max_size() const override { return max_datagram; }
+  // Session::Handler
+  SendResult transmit(std::string_view bytes, Priority) override {
+    transfer(true, bytes);
+    return SendResult::sent;
+  }
+  void on_state(const ReceivedState&, const Datagram&) override {}
+  void on_board_heartbeat(const Datagram&) override {}
+  void on_identity(const Identity&) override {}
+  void on_nack(const Nack&, const Datagram&) override {}
+  void on_bad_datagram(const ReadResult&, std::string_view) override {}
+  void on_link(const LinkStatus&) override {}
+  void on_result(Ticket, const CommandResult& result) override {
+    confirmed += result.outcome == Outcome::confirmed ? 1 : 0;
+  }
+
+  Random random_;
+  std::uint64_t now_us_ = 0;
+  std::uint64_t boot_us_ = 0, board_due_us_ = 0, host_due_us_ = 0, heartbeat_us_ = 0;
+  std::uint64_t cut_until_us_ = 0, held_until_us_ = 0, restarted_us_ = 0;
+  std::uint32_t boot_ms_ = 0;
+  bool was_active_ = false;
+  std::array<Packet, 48> packets_;
+  std::optional<firmware::Application> application_;
+  std::optional<Session> session_;
+};
+
+double fleet_hours() {
+  const char* const value = std::getenv("R4_FLEET_HOURS");
+  return value == nullptr ? 0.05 : std::strtod(value, nullptr);
+}
+
+TEST(FleetDays, NothingGrowsAndNothingTripsButForAFault) {
+  const char* const seed = std::getenv("R4_SEED");
+  Random random(seed == nullptr ? 1 : std::strtoull(seed, nullptr, 10));
+  const auto seconds = static_cast<std::uint64_t>(fleet_hours() * 3600);
+  std::vector<std::unique_ptr<FleetLink>> fleet;
+  for (std::size_t i = 0; i < fleet_size; ++i) {
+    fleet.push_back(std::make_unique<FleetLink>(random.next()));
+  }
+  // A fault of all and one of each in an hour; a short run has them sooner.
+  const std::uint64_t interval = std::min<std::uint64_t>(3600, seconds / 3);
+  std::uint64_t faults = 0, restarts = 0;
+  std::size_t heap = 0;
+  for (std::uint64_t now = 1; now <= seconds; ++now) {
+    for (const auto& link : fleet) link->run_until(now * second_us);
+    if (now == seconds / 2) heap = ::mallinfo2().uordblks;
+    if (now % interval == interval / 2) {
+      ++faults;
+      const bool held_up = random.chance(0.5);
+      const std::uint64_t length_us = random.between(2, 30) * second_us;
+      for (const auto& link : fleet) held_up ? link->hold_up(length_us) : link->cut(length_us);
+    }
+    for (const auto& link : fleet) {
+      if (!link->well()) continue;
+      if (link->random().chance(0.1)) link->command();
+      if (!link->random().chance(1.0 / static_cast<double>(interval))) continue;
+      ++faults;
+      if (link->random().chance(0.5)) {
+        link->cut(link->random().between(2, 30) * second_us);
+      } else {
+        ++restarts;
+        link->restart_board();
+      }
+    }
+  }
+  const std::size_t heap_after = ::mallinfo2().uordblks;
+
+  std::uint64_t asked = 0, confirmed = 0, trips = 0, connecting = 0, false_trips = 0, late = 0,
+                away = 0, over = 0;
+  for (const auto& link : fleet) {
+    asked += link->asked;
+    confirmed += link->confirmed;
+    trips += link->trips;
+    connecting += link->while_connecting;
+    false_trips += link->false_trips;
+    late += link->late_ms;
+    away += link->stayed_away;
+    over += link->overflows;
+  }
+  const double board_days = static_cast<double>(seconds * fleet_size) / 86400;
+  fmt::print(
+      "{:.2f} days of boards, {} faults ({} restarts): {} trips, {} of them in the first "
+      "second of a board, {} for no reason; {} of {} commands confirmed; the heap grew by {} bytes "
+      "in the second half\n",
+      board_days, faults, restarts, trips, connecting, false_trips, confirmed, asked,
+      static_cast<std::int64_t>(heap_after - heap));
+  EXPECT_EQ(late, 0U) << "a board was not safe in time";
+  EXPECT_EQ(away, 0U) << "a link did not come back";
+  EXPECT_EQ(over, 0U);
+  EXPECT_LT(static_cast<double>(false_trips), std::max(1.0, board_days / 10));
+  EXPECT_LT(connecting * 5, fleet_size + restarts);
+  EXPECT_GT(restarts, 10U);
+  EXPECT_GT(trips, 2 * fleet_size);
+  EXPECT_GT(confirmed * 100, asked * 90);
+  // What a session makes when it is needed first; a byte a datagram would be more.
+  EXPECT_LT(static_cast<std::int64_t>(heap_after - heap), 1024 * std::int64_t{fleet_size});
+}
+
+}  // namespace
+}  // namespace r4::simulation
