@@ -347,6 +347,23 @@ def test_several_boards_have_namespaces_and_a_lost_one_is_told():
             peer.sample('rt/rosout', lambda payload: b'board2.r4\0' in payload and b'\0' in payload)
 
 
+def test_two_of_one_name_are_told_of_each_other():
+    domain = own_domain()
+    with Board('udp://127.0.0.1:0') as one, Board('udp://127.0.0.1:0') as other, Peer(domain) as peer, \
+            Ros2(domain, one.host_url) as first:
+        peer.read('rt/rosout', LOG, 'reliable', 'transient_local')
+        with Ros2(domain, other.host_url) as second:
+            for here, there in ((first, second), (second, first)):
+                told = here.logged(f'process {there.process.pid} on ')
+                assert told['level'] == 'warning' and 'has a node /r4, too' in told['text']
+                assert '--namespace' in told['text']
+            for _ in range(2):  # in either order
+                assert peer.sample('rt/rosout', lambda data: b'has a node /r4, too' in data)[8] == 30
+        with Ros2(domain, other.host_url, '--namespace', 'other') as third:
+            third.logged('the board is there')
+            assert not any(' too: ' in each.get('text', '') for each in third.log)
+
+
 def test_it_says_what_it_is():
     domain = own_domain()
     result = run('ros2', 'sim:', '--namespace', 'robot', '--for', '0.2', env=domain)
