@@ -10,7 +10,7 @@
 namespace r4::tool::ros2 {
 namespace {
 
-constexpr std::size_t most = 64;  // samples at once
+constexpr std::size_t most_samples = 64;  // at once
 
 bool is_same(const dds_guid_t& guid, const EntityId& id) {
   return std::memcmp(guid.v, id.data(), id.size()) == 0;
@@ -39,10 +39,11 @@ Namesakes::Namesakes(dds_entity_t participant, const std::vector<Node>& nodes, T
 }
 
 void Namesakes::look() {
-  std::array<void*, most> samples{};
-  std::array<dds_sample_info_t, most> infos{};
+  std::array<void*, most_samples> samples{};
+  std::array<dds_sample_info_t, most_samples> infos{};
   for (;;) {
-    const dds_return_t count = dds_take(writers_.get(), samples.data(), infos.data(), most, most);
+    const dds_return_t count =
+        dds_take(writers_.get(), samples.data(), infos.data(), most_samples, most_samples);
     if (count <= 0) return;
     for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
       const auto& writer = *static_cast<const dds_builtintopic_endpoint_t*>(samples[i]);
@@ -58,10 +59,10 @@ void Namesakes::look() {
 }
 
 std::string Namesakes::who_is(const dds_guid_t& participant) const {
-  std::array<void*, most> samples{};
-  std::array<dds_sample_info_t, most> infos{};
+  std::array<void*, most_samples> samples{};
+  std::array<dds_sample_info_t, most_samples> infos{};
   const dds_return_t count =
-      dds_read(participants_.get(), samples.data(), infos.data(), most, most);
+      dds_read(participants_.get(), samples.data(), infos.data(), most_samples, most_samples);
   std::string who = "somebody";
   for (std::size_t i = 0; count > 0 && i < static_cast<std::size_t>(count); ++i) {
     const auto& each = *static_cast<const dds_builtintopic_participant_t*>(samples[i]);
