@@ -2,9 +2,13 @@
 """r4 ros2 in a graph with somebody else, who is Fast DDS and knows the bytes of ROS 2's messages."""
 import math
 import os
+import pathlib
+import runpy
 import signal
 import struct
+import sys
 import time
+import types
 
 import pytest
 
@@ -420,6 +424,45 @@ def test_it_says_what_it_is():
     for line in ('  /robot/R4  std_msgs/msg/String', '  /robot/osmc1/command  std_msgs/msg/Float32',
                  '  /diagnostics  diagnostic_msgs/msg/DiagnosticArray', '  /robot/r4/stop  std_srvs/srv/Trigger'):
         assert line in lines
+
+
+def example(name):
+    return runpy.run_path(str(pathlib.Path(__file__).parents[2] / 'docs' / 'examples' / 'ros2' / name))
+
+
+def test_the_launch_example_starts_it(monkeypatch):
+    actions = types.SimpleNamespace(ExecuteProcess=lambda cmd, **options: (cmd, options))
+    monkeypatch.setitem(sys.modules, 'launch', types.SimpleNamespace(LaunchDescription=list, actions=actions))
+    monkeypatch.setitem(sys.modules, 'launch.actions', actions)
+    [(command, options)] = example('robot.launch.py')['generate_launch_description']()
+    assert command[:3] == ['r4', 'ros2', 'serial:auto'] and '--arm' not in command and options['respawn']
+    result = run('ros2', 'sim:', *command[3:], '--for', '0.1', env=own_domain())
+    assert result.returncode == 0 and '  /robot/cmd_vel  geometry_msgs/msg/Twist' in result.stdout.splitlines()
+
+
+def test_the_example_of_a_robot_keeps_the_speeds_of_its_wheels():
+    base = example('wheel_speeds.py')['Base']()
+    speeds, now = [0.0, 0.0], 0.0
+
+    def drive(seconds, *command):
+        """Motors that reach three quarters of what the duty says, with the encoders of the two directions."""
+        nonlocal now
+        for _ in range(int(seconds * 100)):
+            now += 0.01
+            if command:
+                base.command(*command, now)
+            for i, duty in enumerate(base.update(speeds, now)):
+                assert abs(duty) <= 1
+                speeds[i] += (duty * 30 * 0.75 - speeds[i]) * 0.1
+        return speeds
+    assert drive(5, 0.5, 1.0) == pytest.approx([(0.5 - 0.21) / 0.05, -(0.5 + 0.21) / 0.05], rel=0.02)
+    drive(0.1, math.nan, 0)  # no command
+    drive(0.6)
+    assert base.update(speeds, now) == [0, 0]  # silent: off
+    assert drive(10, 9.0, 0.0)[0] == pytest.approx(22.5, rel=0.02)  # all that there is
+    assert drive(5, 0.5, 0.0) == pytest.approx([10, -10], rel=0.05)  # and it comes back from there
+    base.command(1, 0, now)
+    assert base.update((math.nan, 0), now) == [0, 0]
 
 
 def test_wrong_uses_are_refused():
