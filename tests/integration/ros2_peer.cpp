@@ -6,6 +6,8 @@
 //     writer TOPIC TYPE RELIABILITY DURABILITY USERDATA    {"type":"matched","topic":…,"readers":1}
 //     write TOPIC BYTES              {"type":"written","topic":…}
 //     remove TOPIC                   {"type":"removed","topic":…}
+//     crowd TOPIC TYPE COUNT         so many readers more, whose samples are counted
+//     count TOPIC                    {"type":"counted","topic":…,"least":3,"most":4}: of a reader of the crowd
 //
 // RELIABILITY is reliable or best_effort, DURABILITY volatile or transient_local, USERDATA a text or -. What others
 // have it tells of itself: {"type":"endpoint","kind":"writer","topic":…,"of":…,"user_data":…,"gid":…}, and when it
@@ -14,6 +16,8 @@
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastrtps/utils/IPLocator.h>
 
+#include <algorithm>
+#include <atomic>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -154,6 +158,16 @@ class Samples final : public DataReaderListener {
   }
 };
 
+class Count final : public DataReaderListener {
+ public:
+  void on_data_available(DataReader* reader) override {
+    Bytes bytes;
+    SampleInfo info;
+    while (reader->take_next_sample(&bytes, &info) == ReturnCode_t::RETCODE_OK) ++samples;
+  }
+  std::atomic<int> samples{0};
+};
+
 class Matches final : public DataWriterListener {
  public:
   void on_publication_matched(DataWriter* writer, const PublicationMatchedStatus& status) override {
@@ -217,6 +231,15 @@ class Peer {
       print(R"({"type":"written","topic":)" + in_quotes(topic) + "}");
       return;
     }
+    if (what == "count") {
+      const auto [least, most] =
+          std::minmax_element(crowd_.begin(), crowd_.end(),
+                              [](const auto& a, const auto& b) { return a->samples < b->samples; });
+      print(R"({"type":"counted","topic":)" + in_quotes(topic) + R"(,"least":)" +
+            std::to_string((*least)->samples) + R"(,"most":)" + std::to_string((*most)->samples) +
+            "}");
+      return;
+    }
     if (what == "remove") {
       publisher_->delete_datawriter(writers_.at(topic));
       writers_.erase(topic);
@@ -227,10 +250,20 @@ class Peer {
     std::string reliability;
     std::string durability;
     std::string user_data;
+    int count = 0;
+    if (what == "crowd") {
+      words >> type >> count;
+      for (int i = 0; i < count; ++i) {
+        DataReaderQos qos;
+        set(qos, "reliable", "volatile", "-");
+        crowd_.push_back(std::make_unique<Count>());
+        subscriber_->create_datareader(made_topic(topic, type), qos, crowd_.back().get(),
+                                       StatusMask::all());
+      }
+      return;
+    }
     words >> type >> reliability >> durability >> user_data;
-    TypeSupport(new RawType(type)).register_type(participant_);
-    Topic*& made = topics_[topic];
-    if (made == nullptr) made = participant_->create_topic(topic, type, TOPIC_QOS_DEFAULT);
+    Topic* const made = made_topic(topic, type);
     if (what == "reader") {
       DataReaderQos qos;
       set(qos, reliability, durability, user_data);
@@ -243,8 +276,16 @@ class Peer {
   }
 
  private:
+  Topic* made_topic(const std::string& topic, const std::string& type) {
+    Topic*& made = topics_[topic];
+    if (made != nullptr) return made;
+    TypeSupport(new RawType(type)).register_type(participant_);
+    return made = participant_->create_topic(topic, type, TOPIC_QOS_DEFAULT);
+  }
+
   Graph graph_;
   Samples samples_;
+  std::vector<std::unique_ptr<Count>> crowd_;
   Matches matches_;
   DomainParticipant* participant_ = nullptr;
   Publisher* publisher_ = nullptr;

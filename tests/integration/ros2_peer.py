@@ -72,6 +72,15 @@ class Peer:
     def write(self, topic, payload):
         self.say('write', topic, (HEAD + payload).hex())
 
+    def write_raw(self, topic, data):
+        """The four bytes of the encapsulation are in `data`, or are not."""
+        self.say('write', topic, data.hex())
+
+    def counted(self, topic):
+        """The fewest samples that one of the crowd has had."""
+        self.say('count', topic)
+        return self.next(lambda each: each['type'] == 'counted')['least']
+
     def next(self, is_it, timeout=PATIENCE_S):
         deadline = time.monotonic() + timeout
         while True:

@@ -36,6 +36,7 @@ class BoardNode {
   void open();
   // The inbox is drained.
   void flush() { commands_.flush(); }
+  void warn(const std::string& text) { log(LogLevel::warning, text); }
   AsyncBoard& board() { return board_; }
   const std::string& name() const { return name_; }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <asio/io_context.hpp>
+#include <asio/post.hpp>
 #include <asio/signal_set.hpp>
 #include <asio/steady_timer.hpp>
 #include <csignal>
@@ -154,6 +155,11 @@ class Bridge {
     for (const auto& node : nodes_) node->open();
     ros2::NodeListing& listing = graph_.list_nodes(ros2::process_environment("ROS_DISTRO"));
     inbox_.watch(listing.peers(), [&listing] { listing.look(); });
+    ros2::Namesakes& namesakes =
+        graph_.watch_names([this](const ros2::NodeName& node, const std::string& who) {
+          asio::post(io_, [this, name = node.full(), who] { warn_of(name, who); });
+        });
+    inbox_.watch(namesakes.writers(), [&namesakes] { namesakes.look(); });
     inbox_.start();
     introduce();
     for (const int number : {SIGINT, SIGTERM, SIGHUP}) signals_.add(number);
@@ -181,6 +187,16 @@ class Bridge {
         [this](ros2::LogLevel level, const std::string& node, const std::string& text) {
           say(level, node, text);
         }));
+  }
+
+  void warn_of(const std::string& name, const std::string& who) {
+    for (const auto& node : nodes_) {
+      if (node->name() != name) continue;
+      node->warn(fmt::format(
+          "{} has a node {}, too: what is commanded reaches the boards of both; give one of them "
+          "another --namespace, or end it (who was killed is gone after 10 s)",
+          who, name));
+    }
   }
 
   void introduce() {

@@ -26,7 +26,12 @@ QosPtr make_qos(const Qos& qos) {
   dds_qset_data_representation(made.get(), 1, &xcdr1);
   dds_qset_reliability(made.get(), DDS_RELIABILITY_RELIABLE, DDS_MSECS(100));
   dds_qset_history(made.get(), DDS_HISTORY_KEEP_LAST, qos.depth);
-  if (qos.transient_local) dds_qset_durability(made.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
+  if (qos.transient_local) {
+    dds_qset_durability(made.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
+    // Who comes later gets as many as are kept: by default it would be one.
+    dds_qset_durability_service(made.get(), 0, DDS_HISTORY_KEEP_LAST, qos.depth,
+                                DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
+  }
   if (qos.lifespan != DDS_INFINITY) dds_qset_lifespan(made.get(), qos.lifespan);
   if (!qos.user_data.empty()) {
     dds_qset_userdata(made.get(), qos.user_data.data(), qos.user_data.size());

@@ -38,7 +38,7 @@ class Entity {
 
 struct Qos {
   int depth = 10;                // samples that are kept
-  bool transient_local = false;  // who comes later is told the newest, too
+  bool transient_local = false;  // who comes later is told those, too
   dds_duration_t lifespan = DDS_INFINITY;
   std::string user_data;
 };

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <thread>
+#include <utility>
 
 #include "r4link/error.hpp"
 
@@ -115,6 +116,10 @@ Graph::Service Graph::make_service(std::size_t node, std::string_view name, cons
 
 NodeListing& Graph::list_nodes(const std::string& distro) {
   return listing_.emplace(participant_.get(), nodes_, distro);
+}
+
+Namesakes& Graph::watch_names(Namesakes::Tell tell) {
+  return namesakes_.emplace(participant_.get(), nodes_, std::move(tell));
 }
 
 void Graph::leave() {

@@ -17,6 +17,7 @@
 #include "environment.hpp"
 #include "message_types.hpp"
 #include "names.hpp"
+#include "namesakes.hpp"
 #include "node_listing.hpp"
 
 namespace r4::tool::ros2 {
@@ -60,6 +61,7 @@ class Graph {
 
   dds_entity_t participant() const { return participant_.get(); }
   NodeListing& list_nodes(const std::string& distro);
+  Namesakes& watch_names(Namesakes::Tell tell);
   void leave();
 
   const std::vector<Endpoint>& publishers() const { return publishers_; }
@@ -85,6 +87,7 @@ class Graph {
   std::vector<Entity> topics_;
   std::vector<Entity> endpoints_;
   std::optional<NodeListing> listing_;
+  std::optional<Namesakes> namesakes_;
   std::vector<Endpoint> publishers_;
   std::vector<Endpoint> subscriptions_;
   std::vector<Endpoint> services_;
