@@ -44,6 +44,7 @@ TEST(DoctorSystem, AFirewallThatDropsAndNamesNoPortOfOursIsAWarning) {
   made_up.says["nft list ruleset"] = chain + "drop;\n  tcp dport 22 accept\n }\n}\n";
   EXPECT_EQ(firewall().severity, Severity::warning);
   EXPECT_EQ(firewall().mending, Mending::by_hand);
+  EXPECT_EQ(firewall().fix, "nft insert rule inet filter input udp sport 2018 accept");
   made_up.says["nft list ruleset"] = chain + "drop;\n  udp sport 2018 accept\n }\n}\n";
   EXPECT_EQ(firewall().severity, Severity::ok);
   made_up.says["nft list ruleset"] = chain + "accept;\n }\n chain forward { policy drop; }\n}\n";

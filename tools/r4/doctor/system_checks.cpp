@@ -55,6 +55,15 @@ bool lets_in(std::string_view rules) {
          rules.find(board_port) != std::string_view::npos;
 }
 
+// The words behind the last `keyword` before `at`, up to the brace: "inet filter" of "table inet filter {".
+std::string last_named(std::string_view rules, std::string_view keyword, std::size_t at) {
+  const std::size_t begin = rules.rfind(keyword, at);
+  if (begin == std::string_view::npos) return "";
+  const std::string_view rest = rules.substr(begin + keyword.size());
+  const std::size_t end = rest.find(" {");
+  return std::string(rest.substr(0, end));
+}
+
 // Only what is plain: a chain for input that drops by default, and no rule that names our ports.
 void check_firewall(const Machine& machine, Findings& findings) {
   const bool there =
@@ -72,10 +81,11 @@ void check_firewall(const Machine& machine, Findings& findings) {
       hook != std::string::npos && nft.find("policy drop", hook) < nft.find('\n', hook);
   const bool iptables_drops = iptables.starts_with("-P INPUT DROP");
   if (nft_drops && !lets_in(nft)) {
-    findings.push_back(
-        found(Severity::warning, "network.firewall", "nft",
-              "drops what comes from boards: no rule names UDP port 2018 or 2390",
-              fmt::format("nft add rule inet filter input udp sport {} accept", board_port)));
+    findings.push_back(found(
+        Severity::warning, "network.firewall", "nft",
+        "drops what comes from boards: no rule names UDP port 2018 or 2390",
+        fmt::format("nft insert rule {} {} udp sport {} accept", last_named(nft, "table ", hook),
+                    last_named(nft, "chain ", hook), board_port)));
   } else if (iptables_drops && !lets_in(iptables)) {
     findings.push_back(
         found(Severity::warning, "network.firewall", "iptables",
