@@ -16,8 +16,8 @@ import pytest
 from r4_process import DATA, ERROR, PATIENCE_S, R4, SANITIZED, objects, run
 
 DATA_BAD, USAGE, REFUSED, OPEN, PERMISSION = 1, 2, 3, 4, 5
-COMMANDS = ['monitor', 'send', 'stop', 'list', 'bus', 'bench', 'record', 'info', 'convert', 'replay', 'sim', 'key', 'demo',
-            'encode', 'decode', 'completion', 'man', 'ros2', 'web']
+COMMANDS = ['monitor', 'send', 'stop', 'list', 'doctor', 'bus', 'bench', 'record', 'info', 'convert', 'replay', 'sim', 'key',
+            'demo', 'encode', 'decode', 'completion', 'man', 'ros2', 'web']
 
 
 def captured_lines():

@@ -147,11 +147,8 @@ local function show_datagram(text, tvb, pinfo, tree, where)
   local item = tree:add(r4, tvb(), "R4 datagram: " .. (from and from .. ", " or "") .. kind)
   local good = not read.error and read.found == read.expected
   if good then
-    read.kind, read.from, read.named = kind, from, {}
-    for index = 1, #read do
-      read.named[read[index].name] = read[index]
-    end
-    local pnum = read.named.PNum
+    read.kind, read.from = kind, from
+    local pnum = datagram.field(read, "PNum")
     read.pnum = pnum and datagram.whole(pnum.values, 0, 4294967295)
     if not pinfo.visited then
       link.look(where.link, where.bus, read, pinfo.number, pinfo.rel_ts)

@@ -93,6 +93,16 @@ function M.read(text)
   return result
 end
 
+-- The last field of that name, or nil: what is asked for stands near the end.
+function M.field(fields, name)
+  for index = #fields, 1, -1 do
+    if fields[index].name == name then
+      return fields[index]
+    end
+  end
+  return nil
+end
+
 -- A whole number from `lowest` to `highest`, else nil.
 function M.whole(text, lowest, highest)
   if not find(text, "^%-?%d+$") then

@@ -152,7 +152,7 @@ local function look_for_values(link, fields, frame, time)
   for index = #link.shown, 1, -1 do
     local command, all = link.shown[index], true
     for name, values in pairs(command.shows) do
-      local field = fields.named[name]
+      local field = datagram.field(fields, name)
       all = all and field ~= nil and field.values == values
     end
     if all then
@@ -165,7 +165,7 @@ local function look_for_values(link, fields, frame, time)
 end
 
 local function number_of(fields, name)
-  local field = fields.named[name]
+  local field = datagram.field(fields, name)
   return field and datagram.whole(field.values, 0, 4294967295)
 end
 
@@ -214,7 +214,7 @@ end
 -- watcher, who is not heard while another program drives the board over a shared wire.
 local answers = { refusal = true, identity = true }
 
--- A checked datagram: `fields` with kind, from, pnum (or nil) and named, its fields by name. `key` is of the board and
+-- A checked datagram: `fields` with kind, from and pnum (or nil). `key` is of the board and
 -- its host, `bus` of the wire.
 function M.look(key, bus, fields, frame, time)
   local link = links[key]
@@ -222,20 +222,20 @@ function M.look(key, bus, fields, frame, time)
     link = { board = {}, host = {}, beside = {}, pending = {}, last = {}, shown = {} }
     links[key] = link
   end
-  local pnum = fields.pnum
+  local pnum, watches = fields.pnum, fields.kind == "command" and datagram.field(fields, "W") ~= nil
   if pnum and fields.from and not (fields.kind == "heartbeat" and fields.from == "board" and pnum == 0) then
     local last = link.last[pnum % window]
     if fields.from == "board" and (answers[fields.kind] or (link.watched and fields.kind == "heartbeat")) then
       link.beside[pnum] = true
     elseif not (fields.kind == "command" and last and last.pnum == pnum) then
-      local t = fields.from == "board" and fields.named.T and datagram.whole(fields.named.T.values, 0, 4294967295)
-      count(link[fields.from], pnum, t or nil, frame, link.beside, fields.named.W ~= nil)
+      local t = fields.from == "board" and number_of(fields, "T")
+      count(link[fields.from], pnum, t or nil, frame, link.beside, watches)
     end
   end
   if fields.from == "board" then
     on_board(link, bus, fields, frame, time)
   elseif fields.kind == "command" then
-    if fields.named.W then
+    if watches then
       link.watched = true
     elseif pnum then
       on_command(link, fields, frame, time)

@@ -44,6 +44,13 @@ void describe_controller(rtnl_link* link, CanInterface& result) {
   can_bittiming timing{};
   if (rtnl_link_can_get_bittiming(link, &timing) >= 0) result.bit_rate = timing.bitrate;
   if (rtnl_link_can_get_data_bittiming(link, &timing) >= 0) result.data_bit_rate = timing.bitrate;
+  std::uint32_t restart_ms = 0;
+  if (rtnl_link_can_get_restart_ms(link, &restart_ms) >= 0) result.restart_ms = restart_ms;
+  can_berr_counter errors{};
+  if (rtnl_link_can_berr(link, &errors) >= 0) {
+    result.tx_errors = errors.txerr;
+    result.rx_errors = errors.rxerr;
+  }
 }
 
 CanInterface describe(rtnl_link* link) {
@@ -53,6 +60,7 @@ CanInterface describe(rtnl_link* link) {
   result.index = rtnl_link_get_ifindex(link);
   result.is_can = rtnl_link_get_arptype(link) == ARPHRD_CAN;
   result.up = (rtnl_link_get_flags(link) & IFF_UP) != 0;
+  result.tx_queue = rtnl_link_get_txqlen(link);
   result.fd = rtnl_link_get_mtu(link) >= CANFD_MTU;
   const char* const type = rtnl_link_get_type(link);  // null: an slcan of a kernel before 6.0
   const bool is_virtual =

@@ -20,10 +20,14 @@ struct CanInterface {
   bool fd = false;              // takes CAN FD frames
   bool has_controller = false;  // with a bit rate and an error state; not vcan, vxcan
   int index = 0;
+  std::uint32_t tx_queue = 0;  // frames that the kernel keeps for it
   // What its controller says, as far as the driver tells.
   std::string state;           // "error-active", "error-warning", … "stopped"; empty: not known
   std::uint32_t bit_rate = 0;  // bit/s, of FD the nominal one; 0: not known
   std::uint32_t data_bit_rate = 0;  // bit/s of FD's data phase; 0: not known
+  std::uint32_t restart_ms = 0;     // after a bus-off it begins again; 0: never
+  std::uint16_t tx_errors = 0;      // its error counters, 0 where it has none
+  std::uint16_t rx_errors = 0;
 };
 
 CanInterface can_interface(const std::string& name);

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What test_can_doctor.py runs where SocketCAN is: interfaces are made wrong, and r4 doctor tells and mends it."""
+import pathlib
+import subprocess
+
+import pytest
+
+from r4_process import Board, objects, run
+
+WARNINGS, OPEN, UNSUPPORTED = 1, 4, 6
+
+
+def ip(*arguments):
+    subprocess.run(['ip', 'link', *arguments], check=True)
+
+
+def doctor(*arguments, listen='0.01'):
+    """The exit code, and the findings by their checks."""
+    result = run('doctor', *arguments, '--for', listen, '--json', timeout=60)
+    return result.returncode, {each['check']: each for each in objects(result.stdout) if each['type'] == 'finding'}
+
+
+def queue(name):
+    return int(pathlib.Path(f'/sys/class/net/{name}/tx_queue_len').read_text(encoding='ascii'))
+
+
+@pytest.fixture(name='controller')
+def can0():
+    """can0, which is as the guest has set it up again in the end."""
+    yield 'can0'
+    ip('set', 'can0', 'down')
+    ip('set', 'can0', 'up', 'txqueuelen', '1000', 'type', 'can', 'bitrate', '1000000', 'restart-ms', '100')
+
+
+def test_a_controller_without_restart_and_with_a_short_queue(controller):
+    ip('set', controller, 'down')
+    ip('set', controller, 'up', 'txqueuelen', '10', 'type', 'can', 'bitrate', '500000', 'restart-ms', '0')
+    _, found = doctor(f'can://{controller}?node=1')
+    assert found['can.restart']['severity'] == found['can.queue']['severity'] == 'warning'
+    assert 'txqueuelen is 10' in found['can.queue']['reason'] and not found['can.restart']['automatic']
+    _, found = doctor(f'can://{controller}?node=1', '--fix')
+    assert queue(controller) == 1000
+    assert subprocess.run(found['can.restart']['fix'], shell=True, check=False).returncode == 0
+    _, found = doctor(f'can://{controller}?node=1')
+    assert 'can.restart' not in found and 'can.queue' not in found
+    assert found['can.interface']['reason'] == 'up, error-active, 500 kbit/s'
+
+
+def test_a_controller_that_is_down_is_mended(controller):
+    ip('set', controller, 'down')
+    code, found = doctor(f'can://{controller}?node=1')
+    assert code == OPEN and 'its bit rate is' in found['can.down']['reason'], found
+    _, found = doctor(f'can://{controller}?node=1', '--fix')
+    assert 'can.down' not in found and found['can.interface']['severity'] == 'ok'
+
+
+def test_an_interface_that_is_missing():
+    code, found = doctor('can://can7?node=1')
+    assert code == UNSUPPORTED and found['can.missing']['severity'] == 'error'
+
+
+def test_a_virtual_bus_is_brought_up_and_its_board_heard():
+    ip('set', 'vcan0', 'down')
+    code, found = doctor('can://vcan0?node=1')
+    assert code == OPEN and found['can.down']['automatic']
+    run('doctor', 'can://vcan0?node=1', '--fix', '--for', '0.01', timeout=60)
+    with Board('can://vcan0?node=1'):
+        _, found = doctor('can://vcan0?node=1', listen='1.5')
+    assert 'link.silent' not in found and 'link.open' not in found, found
+    assert found['can.load']['severity'] == 'ok' and found['can.interface']['reason'] == 'up, virtual'

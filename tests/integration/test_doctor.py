@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""r4 doctor: a link that is well, and links that are not."""
+import os
+import pathlib
+import socket
+import subprocess
+import sys
+import threading
+import zlib
+
+from r4_process import PATIENCE_S, Board, objects, run
+
+REFUSED, OPEN = 3, 4
+RULES = pathlib.Path(__file__).resolve().parents[2] / 'tools/udev/70-r4.rules'
+HOLDER = 'import os, sys; os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY); print("open", flush=True); sys.stdin.read()'
+
+
+def doctor(*arguments):
+    """The exit code, and the findings by their checks."""
+    result = run('doctor', *arguments, '--json', timeout=2 * PATIENCE_S)
+    assert not result.stderr
+    printed = objects(result.stdout)
+    assert printed[-1]['type'] == 'summary'
+    return result.returncode, {each['check']: each for each in printed if each['type'] == 'finding'}
+
+
+def test_a_serial_link_that_is_well_and_who_else_has_its_port(tmp_path):
+    with Board(f'pty:{tmp_path}/r4') as board:
+        port = os.path.realpath(tmp_path / 'r4')
+        with subprocess.Popen([sys.executable, '-S', '-c', HOLDER, port], stdin=subprocess.PIPE,
+                              stdout=subprocess.PIPE) as other:
+            assert other.stdout.readline() == b'open\n'
+            code, found = doctor(board.host_url, '--for', '0.5')
+            assert f'pid {other.pid}' in found['serial.holder']['reason']
+            assert found['serial.holder']['fix'] == f'kill {other.pid}' and code != 0
+            other.stdin.close()
+        _, found = doctor(board.host_url, '--for', '1')
+    assert found['serial.permission']['severity'] == 'ok' and 'serial.holder' not in found
+    assert not {'link.silent', 'link.open', 'link.damaged'} & set(found), found
+
+
+def state(number, damage=0):
+    fields = f'AIN24:24.28;SAFE:0;PNum:{number};T:{10 * number};^'.encode()
+    return fields + f'0x{zlib.crc32(fields) ^ damage:x}^'.encode()
+
+
+def asks_to_watch(board):
+    """The address of who asks next, twice a second."""
+    while True:
+        bytes_, host = board.recvfrom(2048)
+        if bytes_.startswith(b'W:'):
+            return host
+
+
+def speak(board):
+    """To who asks: first a state, then many of which each fifth is missing, and each seventh is damaged."""
+    board.sendto(state(1), asks_to_watch(board))
+    host = asks_to_watch(board)
+    for number in range(2, 100):
+        if number % 5 != 0:
+            board.sendto(state(number, damage=number % 7 == 0), host)
+
+
+def test_a_link_that_loses_and_damages():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
+        board.bind(('127.0.0.1', 0))
+        board.settimeout(PATIENCE_S)
+        speaker = threading.Thread(target=speak, args=(board,))
+        speaker.start()
+        code, found = doctor(f'udp://127.0.0.1:{board.getsockname()[1]}?listen=0', '--for', '1.5')
+        speaker.join()
+    assert code == REFUSED and found['link.loss']['severity'] == 'error', found
+    assert found['link.damaged']['severity'] == 'warning'
+
+
+def test_a_board_that_says_nothing_and_a_port_that_is_not_there(tmp_path):
+    code, found = doctor('udp://127.0.0.1:9?listen=0', '--for', '0.1')
+    assert code == REFUSED and found['link.silent']['severity'] == 'error'
+    code, found = doctor(f'serial://{tmp_path}/none', '--for', '0.1')
+    assert code == OPEN and found['serial.permission']['reason'] == 'there is no such port'
+
+
+def test_it_brings_its_rules_for_udev():
+    assert run('doctor', '--udev-rules').stdout == RULES.read_text(encoding='ascii')
+    if subprocess.run(['which', 'udevadm'], capture_output=True, check=False).returncode == 0:
+        verify = subprocess.run(['udevadm', 'verify', str(RULES)], capture_output=True, text=True, check=False)
+        assert verify.returncode == 0 or 'Unknown' in verify.stderr or 'unknown' in verify.stderr, verify

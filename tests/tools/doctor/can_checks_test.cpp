@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/r4/doctor/can_checks.hpp"
+
+#include <gtest/gtest.h>
+
+#include "made_up_machine.hpp"
+
+namespace r4::tool {
+namespace {
+
+CanInterface good_interface() {
+  CanInterface interface;
+  interface.name = "can0";
+  interface.exists = interface.is_can = interface.up = interface.has_controller = true;
+  interface.state = "error-active";
+  interface.bit_rate = 1000000;
+  interface.restart_ms = 100;
+  interface.tx_queue = 1000;
+  return interface;
+}
+
+Finding only_finding(const CanInterface& interface) {
+  const MadeUpMachine made_up;
+  const Findings findings = check_can_interface(made_up.machine, interface);
+  EXPECT_EQ(findings.size(), 1U);
+  return findings.front();
+}
+
+TEST(DoctorCan, AnInterfaceAsItShouldBeIsFine) {
+  EXPECT_EQ(only_finding(good_interface()).severity, Severity::ok);
+  CanInterface virtual_bus = good_interface();
+  virtual_bus.has_controller = false;
+  virtual_bus.bit_rate = virtual_bus.restart_ms = virtual_bus.tx_queue = 0;
+  EXPECT_EQ(only_finding(virtual_bus).severity, Severity::ok);
+}
+
+TEST(DoctorCan, AMissingInterfaceIsAnErrorOfItsOwnKind) {
+  CanInterface interface;
+  interface.name = "can7";
+  EXPECT_EQ(only_finding(interface).check, "can.missing");
+  EXPECT_EQ(only_finding(interface).kind, ErrorKind::unsupported);
+}
+
+TEST(DoctorCan, WhatIsDownIsBroughtUpUnlessABitRateHasToBeChosen) {
+  CanInterface interface = good_interface();
+  interface.up = false;
+  EXPECT_EQ(only_finding(interface).check, "can.down");
+  EXPECT_EQ(only_finding(interface).mending, Mending::automatic);
+  EXPECT_EQ(only_finding(interface).fix,
+            "sudo ip link set can0 up txqueuelen 1000 type can restart-ms 100");
+  interface.bit_rate = 0;
+  EXPECT_EQ(only_finding(interface).mending, Mending::by_hand);
+  EXPECT_NE(only_finding(interface).fix.find("bitrate 1000000"), std::string::npos);
+}
+
+TEST(DoctorCan, AControllerThatNeverComesBackAndAShortQueueAreWarnings) {
+  CanInterface interface = good_interface();
+  interface.restart_ms = 0;
+  EXPECT_EQ(only_finding(interface).check, "can.restart");
+  EXPECT_EQ(only_finding(interface).mending, Mending::by_hand) << "it takes the interface down";
+  interface = good_interface();
+  interface.tx_queue = 10;
+  EXPECT_EQ(only_finding(interface).check, "can.queue");
+  EXPECT_EQ(only_finding(interface).fix, "sudo ip link set can0 txqueuelen 1000");
+}
+
+TEST(DoctorCan, BusOffAndErrorsAreTold) {
+  CanInterface interface = good_interface();
+  interface.state = "bus-off";
+  interface.tx_errors = 248;
+  EXPECT_EQ(only_finding(interface).check, "can.busoff");
+  EXPECT_EQ(only_finding(interface).fix, "sudo ip link set can0 type can restart");
+  interface.state = "error-passive";
+  EXPECT_EQ(only_finding(interface).check, "can.errors");
+  EXPECT_NE(only_finding(interface).reason.find("tx 248"), std::string::npos);
+}
+
+TEST(DoctorCan, AFullBusIsAWarning) {
+  EXPECT_EQ(check_can_load("can0", 0.79).front().severity, Severity::ok);
+  EXPECT_EQ(check_can_load("can0", 0.81).front().severity, Severity::warning);
+}
+
+TEST(DoctorCan, AKernelHasCanOrAModuleOrNone) {
+  const MadeUpMachine made_up;
+  made_up.file("/proc/sys/kernel/osrelease", "6.1.0\n");
+  EXPECT_EQ(check_can_kernel(made_up.machine).front().fix, "tools/with-can r4 list");
+  made_up.file("/lib/modules/6.1.0/kernel/net/can/can.ko");
+  EXPECT_EQ(check_can_kernel(made_up.machine).front().fix, "sudo modprobe can-raw");
+  made_up.file("/proc/net/can/stats");
+  EXPECT_EQ(check_can_kernel(made_up.machine).front().severity, Severity::ok);
+}
+
+}  // namespace
+}  // namespace r4::tool

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "can_checks.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace r4::tool {
+namespace {
+
+// Less than this, and programs lose frames of a state that is plain text.
+constexpr std::uint32_t least_queue = 100;
+// From here on a controller only listens where it should speak (ISO 11898-1: error-warning).
+constexpr int many_errors = 96;
+constexpr double nearly_full = 0.8;
+
+Finding about(const CanInterface& interface, Severity severity, const char* check) {
+  return {severity, check, interface.name, "", "", Mending::by_hand, ErrorKind::open};
+}
+
+// A bit rate that is not that of the others destroys their frames, so it is nobody's to choose but the owner's.
+Finding down(const Machine& machine, const CanInterface& interface) {
+  Finding finding = about(interface, Severity::error, "can.down");
+  finding.reason = "the interface is down";
+  if (!interface.has_controller) {
+    finding.fix = machine.as_root(fmt::format("ip link set {} up", interface.name));
+    finding.mending = Mending::automatic;
+  } else if (interface.bit_rate == 0) {
+    finding.reason +=
+        ", and has no bit rate; 1000000 is what boards have where nobody has changed it";
+    finding.fix = machine.as_root(
+        fmt::format("ip link set {} up txqueuelen 1000 type can bitrate 1000000 restart-ms 100",
+                    interface.name));
+  } else {
+    finding.reason += fmt::format("; its bit rate is {}", interface.bit_rate);
+    finding.fix = machine.as_root(
+        fmt::format("ip link set {} up txqueuelen 1000 type can restart-ms 100", interface.name));
+    finding.mending = Mending::automatic;
+  }
+  return finding;
+}
+
+Finding bus_off(const Machine& machine, const CanInterface& interface) {
+  Finding finding = about(interface, Severity::error, "can.busoff");
+  finding.reason =
+      "bus-off: the controller has given up, for nobody acknowledges its frames or the bit rates "
+      "differ";
+  finding.fix = machine.as_root(fmt::format("ip link set {} type can restart", interface.name));
+  finding.mending = Mending::automatic;
+  return finding;
+}
+
+void check_controller(const Machine& machine, const CanInterface& interface, Findings& findings) {
+  if (interface.state == "bus-off") findings.push_back(bus_off(machine, interface));
+  const int errors = std::max(interface.tx_errors, interface.rx_errors);
+  if (interface.state != "bus-off" &&
+      (errors >= many_errors || interface.state == "error-passive" ||
+       interface.state == "error-warning")) {
+    Finding finding = about(interface, Severity::warning, "can.errors");
+    finding.reason = fmt::format(
+        "{}, error counters tx {} rx {}: look for wiring, termination, another bit rate, or nobody "
+        "else on the bus",
+        interface.state, interface.tx_errors, interface.rx_errors);
+    finding.fix = fmt::format("candump -e {},0:0,#FFFFFFFF", interface.name);
+    findings.push_back(finding);
+  }
+  // A kernel's slcan tells no bit rate, and cannot restart.
+  if (interface.restart_ms == 0 && interface.bit_rate != 0) {
+    Finding finding = about(interface, Severity::warning, "can.restart");
+    finding.reason = "restart-ms is 0: a bus-off lasts until somebody restarts the controller";
+    finding.fix = machine.as_root(fmt::format(
+        "ip link set {0} down && ip link set {0} up type can restart-ms 100", interface.name));
+    findings.push_back(finding);
+  }
+}
+
+}  // namespace
+
+Findings check_can_kernel(const Machine& machine) {
+  Finding finding{Severity::ok, "can.kernel", "SocketCAN",           "is there",
+                  "",           {},           ErrorKind::unsupported};
+  if (machine.exists("/proc/net/can")) return {finding};
+  finding.severity = Severity::note;
+  const std::string release = machine.read("/proc/sys/kernel/osrelease").value_or("");
+  if (machine.exists("/lib/modules/" + release + "/kernel/net/can")) {
+    finding.reason = "is not loaded";
+    finding.fix = machine.as_root("modprobe can-raw");
+    finding.mending = Mending::automatic;
+  } else {
+    finding.reason = "this kernel has none";
+    finding.fix = "tools/with-can r4 list";
+  }
+  return {finding};
+}
+
+Findings check_can_interface(const Machine& machine, const CanInterface& interface) {
+  if (!interface.exists) {
+    Finding finding = about(interface, Severity::error, "can.missing");
+    finding.reason = "there is no such interface: plug its adapter in, or make a virtual one";
+    finding.fix = machine.as_root(fmt::format("ip link add {} type vcan", interface.name));
+    finding.kind = ErrorKind::unsupported;
+    return {finding};
+  }
+  if (!interface.is_can) {
+    Finding finding = about(interface, Severity::error, "can.missing");
+    finding.reason = "is no CAN interface";
+    finding.fix = "r4 list";
+    finding.kind = ErrorKind::unsupported;
+    return {finding};
+  }
+  if (!interface.up) return {down(machine, interface)};
+  Findings findings;
+  if (interface.has_controller) check_controller(machine, interface, findings);
+  if (interface.has_controller && interface.tx_queue < least_queue) {
+    Finding finding = about(interface, Severity::warning, "can.queue");
+    finding.reason = fmt::format("txqueuelen is {}: programs lose frames that they send at once",
+                                 interface.tx_queue);
+    finding.fix = machine.as_root(fmt::format("ip link set {} txqueuelen 1000", interface.name));
+    finding.mending = Mending::automatic;
+    findings.push_back(finding);
+  }
+  if (findings.empty()) {
+    Finding finding = about(interface, Severity::ok, "can.interface");
+    finding.reason = interface.has_controller ? fmt::format("up, {}, {} kbit/s", interface.state,
+                                                            interface.bit_rate / 1000.0)
+                                              : "up, virtual";
+    findings.push_back(finding);
+  }
+  return findings;
+}
+
+Findings check_can_load(const std::string& interface, double load) {
+  Finding finding{Severity::ok,
+                  "can.load",
+                  interface,
+                  fmt::format("the bus is taken for {:.1f} % of the time", 100 * load),
+                  "",
+                  {},
+                  ErrorKind::data};
+  if (load > nearly_full) {
+    finding.severity = Severity::warning;
+    finding.fix = fmt::format("r4 bus can://{}", interface);
+  }
+  return {finding};
+}
+
+}  // namespace r4::tool

@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 doctor: what is wrong with this machine and this link, and the command that mends each.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <asio/io_context.hpp>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "../list/held_wire.hpp"
+#include "../shell/json.hpp"
+#include "../shell/options.hpp"
+#include "../shell/subcommands.hpp"
+#include "can_checks.hpp"
+#include "finding.hpp"
+#include "link_check.hpp"
+#include "machine.hpp"
+#include "serial_checks.hpp"
+#include "system_checks.hpp"
+#include "transports/serial/port_list.hpp"
+#include "transports/serial/serial_carrier.hpp"
+#include "transports/url.hpp"
+#include "udev_rules.hpp"
+
+namespace r4::tool {
+namespace {
+
+struct Options {
+  std::vector<std::string> urls;
+  Milliseconds duration{5000};
+  bool fix = false;
+  bool json = false;
+  bool udev_rules = false;
+};
+
+void append(Findings& to, Findings more) {
+  for (Finding& each : more) to.push_back(std::move(each));
+}
+
+// The device behind a symbolic link such as /dev/serial/by-id/….
+std::string device_of(const std::string& path) {
+  std::error_code error;
+  const std::filesystem::path device = std::filesystem::canonical(path, error);
+  return error ? path : device.string();
+}
+
+// Who has it open, and lets the other programs of its user share it.
+pid_t sharing(const std::string& path) {
+  asio::io_context io(1);
+  ListedBoard board;
+  HeldWire held(io, board, [] {});
+  try {
+    held.join(serial_wire(Url::parse("serial://" + path)));
+  } catch (const Error&) {
+    return 0;  // no such port, which the check of its permission tells
+  }
+  return board.pid;
+}
+
+std::vector<std::string> ports_of(const Machine& machine, const Url& url) {
+  if (url.path().starts_with('/')) return {url.path()};
+  std::vector<std::string> ports;
+  const std::optional<std::string> serial_number = url.get("sn");
+  for (const SerialPort& port : list_serial_ports()) {
+    if (serial_number ? port.serial_number == *serial_number : port.is_r4)
+      ports.push_back(port.path);
+  }
+  return ports.empty() ? likely_ports(machine) : ports;
+}
+
+Findings check_ports(const Machine& machine, std::vector<std::string> ports) {
+  std::sort(ports.begin(), ports.end());
+  ports.erase(std::unique(ports.begin(), ports.end()), ports.end());
+  Findings findings;
+  for (const std::string& path : ports) {
+    const std::string device = device_of(path);
+    append(findings, check_port_permission(machine, device));
+    append(findings, check_port_holders(machine, device, sharing(device)));
+    append(findings, check_latency_timer(machine, device));
+  }
+  return findings;
+}
+
+// Of one transport, or, without URLs, of all that this machine has.
+Findings check_machine(const Machine& machine, const std::vector<Url>& urls) {
+  Findings findings;
+  std::vector<std::string> ports;
+  std::vector<CanInterface> buses;
+  bool serial = urls.empty();
+  bool can = urls.empty();
+  bool network = urls.empty();
+  for (const Url& url : urls) {
+    if (url.scheme() == "serial") {
+      serial = true;
+      for (std::string& path : ports_of(machine, url)) ports.push_back(std::move(path));
+    } else if (url.scheme() == "can") {
+      can = true;
+      buses.push_back(can_interface(can_interface_of(url)));
+    } else if (url.scheme() == "udp") {
+      network = true;
+    }
+  }
+  if (urls.empty()) {
+    ports = likely_ports(machine);
+    buses = list_can_interfaces();
+  }
+  if (serial) append(findings, check_ports(machine, std::move(ports)));
+  if (serial) append(findings, check_udev_rules(machine, udev_rules));
+  if (can) append(findings, check_can_kernel(machine));
+  for (const CanInterface& bus : buses) append(findings, check_can_interface(machine, bus));
+  if (network) append(findings, check_network(machine));
+  append(findings, check_clock(clock_is_synchronized()));
+  append(findings, check_processors(machine));
+  return findings;
+}
+
+void print(const Findings& findings, bool json) {
+  for (const Finding& each : findings) {
+    if (json) {
+      print_line({{"type", "finding"},
+                  {"severity", to_text(each.severity)},
+                  {"check", each.check},
+                  {"thing", each.thing},
+                  {"reason", each.reason},
+                  {"fix", each.fix},
+                  {"automatic", each.mending == Mending::automatic}});
+      continue;
+    }
+    print_text(fmt::format("{:<8} {}: {}\n", to_text(each.severity), each.thing, each.reason));
+    if (!each.fix.empty()) print_text(fmt::format("           {}\n", each.fix));
+  }
+}
+
+// Runs what mends without a choice, each command once, and says what for; returns how many did.
+int mend(const Findings& findings, bool json) {
+  std::vector<std::string> done;
+  int mended = 0;
+  for (const Finding& each : findings) {
+    const bool known = std::find(done.begin(), done.end(), each.fix) != done.end();
+    if (each.mending != Mending::automatic || each.severity == Severity::ok || known) continue;
+    done.push_back(each.fix);
+    if (!json) print_text(fmt::format("{}: {}\n$ {}\n", each.thing, each.reason, each.fix));
+    // What it says is for people: with --json it must not get between the objects.
+    const std::string command = json ? "{ " + each.fix + "; } >&2" : each.fix;
+    const bool worked = std::system(command.c_str()) == 0;
+    if (json) {
+      print_line(
+          {{"type", "mended"}, {"check", each.check}, {"command", each.fix}, {"done", worked}});
+    } else if (!worked) {
+      print_text("it failed\n");
+    }
+    mended += worked ? 1 : 0;
+  }
+  return mended;
+}
+
+// By its own name, r4 may not be found.
+void put_r4_into_the_path() {
+  std::error_code error;
+  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+  const char* const path = std::getenv("PATH");
+  if (!error)
+    ::setenv("PATH", (self.parent_path().string() + ":" + (path != nullptr ? path : "")).c_str(),
+             1);
+}
+
+double wall_clock_ahead_s() {
+  const auto wall = std::chrono::system_clock::now().time_since_epoch();
+  const auto steady = std::chrono::steady_clock::now().time_since_epoch();
+  return std::chrono::duration<double>(wall).count() -
+         std::chrono::duration<double>(steady).count();
+}
+
+Findings check_links(const Options& options) {
+  Findings findings;
+  const double before = wall_clock_ahead_s();
+  for (HeardLink& link : listen_to_links(options.urls, options.duration)) {
+    const LinkSample& sample = link.sample;
+    if (options.json) {
+      print_line({{"type", "link"},
+                  {"url", link.url},
+                  {"seconds", sample.seconds},
+                  {"received", sample.received},
+                  {"states", sample.states},
+                  {"lost", sample.lost},
+                  {"damaged", sample.damaged},
+                  {"jitter_us", sample.jitter_us}});
+    }
+    append(findings, std::move(link.findings));
+  }
+  if (!options.urls.empty()) append(findings, check_clock_steps(wall_clock_ahead_s() - before));
+  return findings;
+}
+
+void print_summary(const Findings& findings, bool json) {
+  const auto count = [&](Severity severity) {
+    return std::count_if(findings.begin(), findings.end(),
+                         [severity](const Finding& each) { return each.severity == severity; });
+  };
+  const auto errors = count(Severity::error);
+  const auto warnings = count(Severity::warning);
+  if (json) {
+    print_line({{"type", "summary"}, {"errors", errors}, {"warnings", warnings}});
+  } else if (errors + warnings == 0) {
+    print_text("nothing is wrong\n");
+  } else {
+    print_text(fmt::format("{} errors, {} warnings\n", errors, warnings));
+  }
+}
+
+int doctor(const Options& options) {
+  if (options.udev_rules) {
+    print_text(udev_rules);
+    return 0;
+  }
+  std::vector<Url> urls;
+  for (const std::string& url : options.urls) urls.push_back(Url::parse(url));
+  const Machine machine = Machine::here();
+  put_r4_into_the_path();
+  Findings findings = check_machine(machine, urls);
+  if (options.fix && mend(findings, options.json) > 0) findings = check_machine(machine, urls);
+  append(findings, check_links(options));
+  print(findings, options.json);
+  print_summary(findings, options.json);
+  return exit_code(findings);
+}
+
+constexpr const char* footer =
+    R"(Without a URL it looks at what this machine has: serial ports and who may open them, rules of udev,
+ModemManager, CAN interfaces, network, clock, processors. With URLs it looks at what these need, and
+then listens to each board for 5 s, as one that watches: it commands nothing.
+
+Below each finding is the command that mends it. --fix runs those that need no choice, each shown
+before, and looks again. It kills no program, sets no bit rate and takes no interface down.
+
+Examples:
+  r4 doctor
+  r4 doctor serial:auto can://can0?node=1
+  r4 doctor udp://192.168.0.125 --for 30
+  r4 doctor --fix
+  r4 doctor --udev-rules | sudo tee /etc/udev/rules.d/70-r4.rules
+
+Exit codes: 0 nothing is wrong; 1 there are warnings; 2 usage; else that of the first error: 3 a board
+says nothing, or too much is lost; 4, 5 a transport cannot be opened; 6 an interface is missing.)";
+
+}  // namespace
+
+void add_doctor(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* const command = add_subcommand(
+      root, chosen, "doctor", "Tell what is wrong with this machine and a link, and how to mend it",
+      footer, options, doctor);
+  add_texts(*command, "URL", options->urls, "where boards are, such as serial:auto", url_type);
+  add_seconds(*command, "--for", options->duration, "how long to listen to each link (default 5)");
+  add_flag(*command, "--fix", options->fix, "run what needs no choice, and look again");
+  add_flag(*command, "--udev-rules", options->udev_rules,
+           "print the rules for udev and do nothing else");
+  add_json(*command, options->json, "print JSON, one object a line");
+}
+
+}  // namespace r4::tool

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "link_check.hpp"
+
+#include <fmt/format.h>
+
+#include <asio/io_context.hpp>
+#include <memory>
+#include <utility>
+
+#include "../shell/options.hpp"
+#include "can_checks.hpp"
+#include "r4link/async_board.hpp"
+#include "transports/can/can_interface.hpp"
+#include "transports/can/can_listener.hpp"
+#include "transports/url.hpp"
+
+namespace r4::tool {
+namespace {
+
+// More, and a board whose host is silent for a timeout may go safe by chance; less is what WiFi does now and then.
+constexpr double much_loss = 0.10;
+constexpr double some_loss = 0.005;
+// A state of 100 Hz, and a half.
+constexpr double much_jitter_us = 15000;
+// Where nobody tells the rate, as of a virtual bus.
+constexpr std::uint32_t usual_bit_rate = 1'000'000;
+
+Finding found(const std::string& url, Severity severity, const char* check, std::string reason,
+              std::string fix, ErrorKind kind = ErrorKind::data) {
+  return {severity, check, url, std::move(reason), std::move(fix), Mending::by_hand, kind};
+}
+
+Finding trouble(const std::string& url, const Problem& problem) {
+  return found(url, Severity::error, "link.open", problem.reason, problem.fix, problem.kind);
+}
+
+// One link, while it is listened to.
+class Listening {
+ public:
+  Listening(asio::io_context& io, const std::string& url) : url_(url) {
+    BoardOptions options;
+    options.role = BoardRole::watch;
+    options.session.arming = Arming::off;
+    try {
+      board_ = std::make_unique<AsyncBoard>(io, url, options);
+      first_state_ = board_->on_state([this](const ReceivedState&, const Datagram&) {
+        begun_ = board_->statistics();
+        first_state_.cancel();
+      });
+      board_->open();
+      const Url parsed = Url::parse(url);
+      if (parsed.scheme() == "can") listen_to_bus(io, can_interface_of(parsed));
+    } catch (const Error& error) {
+      if (error.kind() == ErrorKind::usage) throw;
+      findings_.push_back(trouble(url, error.problem()));
+      board_.reset();
+    }
+  }
+
+  HeardLink end(double seconds) {
+    HeardLink result{url_, {}, std::move(findings_)};
+    if (!board_) return result;
+    const Statistics statistics = board_->statistics();
+    result.sample = {seconds,
+                     statistics.received - begun_.received,
+                     statistics.states - begun_.states,
+                     statistics.packets.lost - begun_.packets.lost,
+                     statistics.damaged - begun_.damaged,
+                     statistics.jitter_us};
+    if (statistics.received == 0 && statistics.damaged == 0) {
+      const Problem problem = explain(board_->name(), board_->link());
+      result.findings.push_back(found(url_, Severity::error, "link.silent", problem.reason,
+                                      problem.fix, ErrorKind::refused));
+    } else {
+      result.findings = judge_link(url_, result.sample);
+    }
+    if (bus_) {
+      const double load = static_cast<double>(bus_->survey().busy_ns()) / 1e9 / seconds;
+      for (Finding& each : check_can_load(interface_, load))
+        result.findings.push_back(std::move(each));
+    }
+    return result;
+  }
+
+ private:
+  void listen_to_bus(asio::io_context& io, const std::string& name) {
+    interface_ = name;
+    const CanInterface interface = can_interface(name);
+    const std::uint32_t rate = interface.bit_rate != 0 ? interface.bit_rate : usual_bit_rate;
+    bus_ = std::make_unique<CanListener>(io, name, CanBitRate{rate, interface.data_bit_rate});
+  }
+
+  const std::string url_;
+  std::string interface_;
+  Findings findings_;
+  std::unique_ptr<AsyncBoard> board_;
+  // Before the first state a stream is joined somewhere in its numbers, which is no loss.
+  Subscription first_state_;
+  Statistics begun_;
+  std::unique_ptr<CanListener> bus_;
+};
+
+}  // namespace
+
+Findings judge_link(const std::string& url, const LinkSample& sample) {
+  Findings findings;
+  const double all = static_cast<double>(sample.received + sample.lost + sample.damaged);
+  const double loss = all > 0 ? static_cast<double>(sample.lost) / all : 0;
+  if (sample.damaged > 0) {
+    findings.push_back(found(
+        url, Severity::warning, "link.damaged",
+        fmt::format(
+            "{} datagrams came damaged: wiring, another baud rate, or somebody else reads the port",
+            sample.damaged),
+        fmt::format("r4 monitor {} --json", url)));
+  }
+  if (loss >= some_loss) {
+    const bool much = loss >= much_loss;
+    findings.push_back(
+        found(url, much ? Severity::error : Severity::warning, "link.loss",
+              fmt::format("{} of {:.0f} datagrams are lost, {:.1f} %{}", sample.lost, all,
+                          100 * loss, much ? ": heartbeats are, too, and the board goes safe" : ""),
+              fmt::format("r4 bench {}", url), ErrorKind::refused));
+  }
+  if (sample.jitter_us > much_jitter_us) {
+    findings.push_back(found(
+        url, Severity::warning, "link.jitter",
+        fmt::format("states come {:.1f} ms early or late on average", sample.jitter_us / 1000),
+        fmt::format("r4 bench {}", url)));
+  }
+  if (findings.empty()) {
+    findings.push_back(
+        found(url, Severity::ok, "link",
+              fmt::format("{} states in {:.1f} s, {} lost, none damaged, jitter {:.1f} ms",
+                          sample.states, sample.seconds, sample.lost, sample.jitter_us / 1000),
+              ""));
+  }
+  return findings;
+}
+
+std::vector<HeardLink> listen_to_links(const std::vector<std::string>& urls,
+                                       std::chrono::milliseconds duration) {
+  asio::io_context io(1);
+  std::vector<std::unique_ptr<Listening>> links;
+  links.reserve(urls.size());
+  for (const std::string& url : urls) links.push_back(std::make_unique<Listening>(io, url));
+  const auto begun = std::chrono::steady_clock::now();
+  if (!links.empty()) io.run_for(duration);
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  std::vector<HeardLink> heard;
+  heard.reserve(links.size());
+  for (const auto& each : links) heard.push_back(each->end(seconds));
+  return heard;
+}
+
+}  // namespace r4::tool

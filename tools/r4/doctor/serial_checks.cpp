@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "serial_checks.hpp"
+
+#include <fmt/format.h>
+#include <grp.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <charconv>
+#include <optional>
+#include <sstream>
+
+namespace r4::tool {
+namespace {
+
+constexpr const char* rules_file = "70-r4.rules";
+constexpr const char* dialout = "dialout";
+
+std::string name_of_port(const std::string& path) { return path.substr(path.rfind('/') + 1); }
+
+bool all_digits(const std::string& text) {
+  return !text.empty() &&
+         std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+struct Group {
+  gid_t id = 0;
+  std::vector<std::string> members;
+};
+
+// Of /etc/group.
+std::optional<Group> group_of(const Machine& machine, const std::string& name) {
+  std::istringstream lines(machine.read("/etc/group").value_or(""));
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream parts(line);
+    std::string each;
+    std::string unused;
+    std::string id;
+    std::string members;
+    std::getline(parts, each, ':');
+    std::getline(parts, unused, ':');
+    std::getline(parts, id, ':');
+    std::getline(parts, members);
+    if (each != name) continue;
+    Group group;
+    std::from_chars(id.data(), id.data() + id.size(), group.id);
+    std::istringstream names(members);
+    for (std::string member; std::getline(names, member, ',');) group.members.push_back(member);
+    return group;
+  }
+  return std::nullopt;
+}
+
+bool may_open(const struct stat& file, const User& user) {
+  if (user.is_root()) return true;
+  constexpr mode_t read_write = 06;
+  mode_t bits = file.st_mode;
+  if (file.st_uid == user.id) {
+    bits >>= 6;
+  } else if (user.groups.contains(file.st_gid)) {
+    bits >>= 3;
+  }
+  return (bits & read_write) == read_write;
+}
+
+std::optional<std::string> installed_rules(const Machine& machine) {
+  // The first that has the file counts (man udev).
+  for (const char* folder :
+       {"/etc/udev/rules.d/", "/run/udev/rules.d/", "/usr/local/lib/udev/rules.d/",
+        "/usr/lib/udev/rules.d/", "/lib/udev/rules.d/"}) {
+    if (auto text = machine.read(std::string(folder) + rules_file)) return text;
+  }
+  return std::nullopt;
+}
+
+std::vector<std::string> processes(const Machine& machine) {
+  std::vector<std::string> pids = machine.list("/proc");
+  std::erase_if(pids, [](const std::string& name) { return !all_digits(name); });
+  return pids;
+}
+
+bool is_running(const Machine& machine, std::string_view program) {
+  const std::vector<std::string> pids = processes(machine);
+  return std::any_of(pids.begin(), pids.end(), [&](const std::string& pid) {
+    return machine.read("/proc/" + pid + "/comm").value_or("") == program;
+  });
+}
+
+std::string_view without_end(std::string_view text) {
+  while (text.ends_with('\n')) text.remove_suffix(1);
+  return text;
+}
+
+}  // namespace
+
+std::vector<std::string> likely_ports(const Machine& machine) {
+  std::vector<std::string> ports;
+  for (const std::string& name : machine.list("/sys/class/tty")) {
+    const std::string device = "/sys/class/tty/" + name + "/device";
+    // A tty of USB is below the interface, or, of usb-serial, one further.
+    std::string vendor;
+    std::string product;
+    for (const char* up : {"/../", "/../../"}) {
+      if (!vendor.empty()) break;
+      vendor = machine.read(device + up + "idVendor").value_or("");
+      product = machine.read(device + up + "idProduct").value_or("");
+    }
+    const bool board = vendor == "2341" && (product == "0266" || product == "0366");
+    if (board || machine.exists(device + "/latency_timer")) ports.push_back("/dev/" + name);
+  }
+  return ports;
+}
+
+Findings check_port_permission(const Machine& machine, const std::string& path) {
+  Finding finding{Severity::ok, "serial.permission", path, "may be opened", "",
+                  {},           ErrorKind::open};
+  struct stat file {};
+  if (::stat((machine.root + path).c_str(), &file) != 0) {
+    finding.severity = Severity::error;
+    finding.reason = "there is no such port";
+    finding.fix = "r4 list";
+    return {finding};
+  }
+  if (may_open(file, machine.user)) return {finding};
+  finding.severity = Severity::error;
+  finding.kind = ErrorKind::permission;
+  const std::optional<Group> group = group_of(machine, dialout);
+  const std::string& user = machine.user.name;
+  if (!group || group->id != file.st_gid || (file.st_mode & 060) != 060) {
+    finding.reason =
+        fmt::format("permission denied for {}, and it is not the group {}'s either", user, dialout);
+    finding.fix = machine.as_root(fmt::format("chgrp {0} {1} && chmod g+rw {1}", dialout, path));
+  } else if (std::find(group->members.begin(), group->members.end(), user) !=
+             group->members.end()) {
+    finding.reason =
+        fmt::format("permission denied: {} is in the group {} since the last login", user, dialout);
+    finding.fix = fmt::format("newgrp {}", dialout);
+  } else {
+    finding.reason = fmt::format("permission denied: {} is not in the group {}", user, dialout);
+    finding.fix = machine.as_root(fmt::format("usermod -aG {} {}", dialout, user));
+    finding.mending = Mending::automatic;
+  }
+  return {finding};
+}
+
+Findings check_port_holders(const Machine& machine, const std::string& path, pid_t sharing) {
+  Findings findings;
+  if (sharing != 0) {
+    findings.push_back({Severity::ok,
+                        "serial.holder",
+                        path,
+                        fmt::format("a program of r4 (pid {}) has it open, and shares it", sharing),
+                        "",
+                        {},
+                        ErrorKind::data});
+  }
+  for (const std::string& pid : processes(machine)) {
+    if (pid == fmt::format("{}", ::getpid()) || pid == fmt::format("{}", sharing)) continue;
+    const std::string fds = fmt::format("/proc/{}/fd", pid);
+    for (const std::string& fd : machine.list(fds)) {
+      if (machine.link(fmt::format("{}/{}", fds, fd)) != path) continue;
+      const std::string program = machine.read("/proc/" + pid + "/comm").value_or("a program");
+      findings.push_back(
+          {Severity::warning, "serial.holder", path,
+           fmt::format("{} (pid {}) has it open and reads what the board says", program, pid),
+           "kill " + pid, Mending::by_hand, ErrorKind::open});
+      break;
+    }
+  }
+  return findings;
+}
+
+Findings check_latency_timer(const Machine& machine, const std::string& path) {
+  const std::string file = "/sys/class/tty/" + name_of_port(path) + "/device/latency_timer";
+  const std::optional<std::string> ms = machine.read(file);
+  if (!ms) return {};
+  Finding finding{Severity::ok,
+                  "serial.latency",
+                  path,
+                  fmt::format("the adapter keeps bytes for {} ms", *ms),
+                  "",
+                  {},
+                  ErrorKind::data};
+  if (*ms != "1") {
+    finding.severity = Severity::warning;
+    finding.fix = machine.as_root(fmt::format("echo 1 > {}", file));
+    finding.mending = Mending::automatic;
+  }
+  return {finding};
+}
+
+Findings check_udev_rules(const Machine& machine, std::string_view rules) {
+  Finding finding{Severity::ok, "serial.udev", rules_file, "installed", "", {}, ErrorKind::data};
+  const std::optional<std::string> installed = installed_rules(machine);
+  if (installed && without_end(*installed) == without_end(rules)) return {finding};
+  const bool modems = is_running(machine, "ModemManager");
+  const bool keeps_off = installed && installed->find("ID_MM_DEVICE_IGNORE") != std::string::npos;
+  finding.severity = Severity::warning;
+  finding.reason = installed ? "the rules for udev are those of another version of r4"
+                             : "the rules for udev are missing: who may open a board, and that "
+                               "nobody takes it for a modem";
+  finding.fix =
+      fmt::format("r4 doctor --udev-rules | {}",
+                  machine.as_root(fmt::format(
+                      "tee /etc/udev/rules.d/{} > /dev/null && udevadm control --reload && "
+                      "udevadm trigger",
+                      rules_file)));
+  finding.mending = Mending::automatic;
+  Findings findings{finding};
+  if (modems && !keeps_off) {
+    finding.check = "serial.modemmanager";
+    finding.thing = "ModemManager";
+    finding.reason = "runs, and sends modem commands to each serial port that comes";
+    findings.push_back(finding);
+  }
+  return findings;
+}
+
+}  // namespace r4::tool
