@@ -152,6 +152,20 @@ def test_who_watches_stops_the_board_at_once_and_it_stays_so():
         assert page.ask(type='command', board=0, command='O:358,1,1')['ok']
 
 
+def test_a_stop_while_control_is_given_back_is_not_lost():
+    with one_board() as (board, web), Page(web) as page, Page(web) as watcher:
+        page.drive()
+        page.say(type='control', want=False)
+        assert watcher.ask(type='stop')['ok']
+        board.state('SAFE', 'stop')
+
+
+def test_a_stop_of_a_board_that_is_not_there_is_not_confirmed():
+    with Web('udp://127.0.0.1:9?listen=0') as web, Page(web) as page:
+        result = page.ask(type='stop')
+        assert not result['ok'] and 'CUT THE POWER' in result['text']
+
+
 def test_several_boards_are_controlled_and_stopped_together():
     with Board('udp://127.0.0.1:0') as left, Board('udp://127.0.0.1:0') as right:
         with Web(left.host_url, right.host_url) as web, Page(web) as page:
