@@ -53,7 +53,7 @@ export class Channel {
     this.#number.onblur = () => { this.#typing = false; };
     this.#number.onkeydown = (key) => { if (key.key === 'Enter') this.#enter(); };
     this.#number.onchange = () => this.#enter();
-    const parts = [this.#range, this.#number];
+    const parts = [this.#number];
     if (this.#kind.direction) parts.push(this.#direction = this.#make_choice(label, 'direction', ['rev', 'fwd'], 1));
     if (this.#kind.brake) parts.push(this.#brake = this.#make_choice(label, 'brake', ['free', 'brake'], 0));
     if (this.#kind.speed) {
@@ -65,7 +65,7 @@ export class Channel {
       zero.onclick = () => this.#send(`Z:${this.#channel}`);
       parts.push(this.#speed, zero);
     }
-    return parts;
+    return [this.#range, element('span', {className: 'set'}, ...parts)];
   }
 
   // What turns is stopped before it turns the other way.

@@ -110,7 +110,7 @@ let released_why = '';
 function show_control(control) {
   const words = control.you ? 'You control' : control.holder !== null ? `Browser ${control.holder} controls; you watch` :
     'Nobody controls; you watch';
-  put(at('holder'), [words, control.why || released_why].filter(Boolean).join(': '));
+  put(at('holder'), [words, (control.holder === null && released_why) || control.why].filter(Boolean).join(': '));
   put(at('control'), control.you ? 'Give control back' : 'Take control');
   at('control').setAttribute('aria-pressed', String(control.you));
   put(at('outputs-hint'), control.you ? 'confirmed by the board' : 'take control to set them');

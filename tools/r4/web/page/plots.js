@@ -91,7 +91,7 @@ class Chart {
     const grid = {stroke: css('--grid'), width: 1};
     const axis = {stroke: text, font: '11px system-ui, sans-serif', grid, ticks: {show: false}};
     this.#plot = new uPlot({
-      width, height, ms: 1,
+      width, height, ms: 1, padding: [8, 28, 0, 0],
       legend: {show: false},
       cursor: {drag: {x: true, y: false, setScale: false}, sync: {key: 'r4', setSeries: false}, points: {size: 6}},
       select: {show: true},
