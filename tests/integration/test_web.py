@@ -292,6 +292,14 @@ def test_a_slow_browser_loses_old_states_and_costs_no_memory():
                 break
 
 
+def test_who_does_not_finish_a_request_is_cut_off():
+    with one_board() as (_, web):
+        with (socket.create_connection(('127.0.0.1', web.port), PATIENCE_S) as silent,
+              socket.create_connection(('127.0.0.1', web.port), PATIENCE_S) as slow):
+            slow.sendall(b'GET / HTTP/1.1\r\nHost: localhost\r\n')
+            assert silent.recv(1) == slow.recv(1) == b''
+
+
 def hostile_bytes(rng, port):
     """A request, or the frames of a client, damaged."""
     handshake = (f'GET /live HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n'
