@@ -185,7 +185,7 @@ def test_a_lost_server_and_a_lost_board_are_told_in_words_and_come_back(browser)
             page.until('globalThis.r4_measured?.states > 100')
             port = web.port
             board.process.kill()
-            assert 'does not answer' in page.until_text('#alarm', 'udp://')
+            page.until_text('#alarm', f"{board.url.removeprefix('udp://')} does not answer")
             assert page.text('.card .state strong') == 'Lost'
             with Board(board.url):
                 page.until('document.querySelector("#alarm").hidden')

@@ -44,7 +44,7 @@ class Card {
     this.#arm.onclick = () => ask('arm');
     this.#clear.onclick = () => ask('clear');
     this.node = element('article', {className: 'card', 'aria-label': `Board ${board_name(board)}`},
-      element('div', {className: 'head'}, element('h2', {}, board_name(board)), this.#identity),
+      element('div', {className: 'head'}, element('h2', {title: board.url}, board_name(board)), this.#identity),
       element('p', {className: 'state', role: 'status'}, this.#state, this.#why),
       this.#figures, element('div', {className: 'act'}, this.#arm, this.#clear, this.#answer));
     this.show(null);

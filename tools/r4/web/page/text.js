@@ -25,4 +25,5 @@ export function clock_text(time_ms, digits = 0) {
   return digits ? `${text}.${String(time.getMilliseconds()).padStart(3, '0').slice(0, digits)}` : text;
 }
 
-export const board_name = (board) => board.name || board.url;
+// What its owner calls it, else where it is; its card has the whole URL.
+export const board_name = (board) => board.name || board.url.replace(/^\w+:\/\//, '').replace(/\?listen=\d+$/, '');
