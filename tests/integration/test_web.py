@@ -5,17 +5,16 @@ import gzip
 import json
 import os
 import pathlib
-import random
 import signal
 import socket
 import subprocess
-import threading
+import sys
 import time
 
 import pytest
 
 from r4_process import ERROR, PATIENCE_S, PROMPT, Board, driving, lasts, run
-from web_client import BINARY, CLOSE, Page, Refused, Web, WebSocket, frame
+from web_client import BINARY, CLOSE, Page, Refused, Web, WebSocket
 
 USAGE, OPEN = 2, 4
 LIMIT_S = 0.5
@@ -152,6 +151,20 @@ def test_who_watches_stops_the_board_at_once_and_it_stays_so():
         assert page.ask(type='command', board=0, command='O:358,1,1')['ok']
 
 
+def test_a_stop_while_control_is_given_back_is_not_lost():
+    with one_board() as (board, web), Page(web) as page, Page(web) as watcher:
+        page.drive()
+        page.say(type='control', want=False)
+        assert watcher.ask(type='stop')['ok']
+        board.state('SAFE', 'stop')
+
+
+def test_a_stop_of_a_board_that_is_not_there_is_not_confirmed():
+    with Web('udp://127.0.0.1:9?listen=0') as web, Page(web) as page:
+        result = page.ask(type='stop')
+        assert not result['ok'] and 'CUT THE POWER' in result['text']
+
+
 def test_several_boards_are_controlled_and_stopped_together():
     with Board('udp://127.0.0.1:0') as left, Board('udp://127.0.0.1:0') as right:
         with Web(left.host_url, right.host_url) as web, Page(web) as page:
@@ -266,7 +279,7 @@ def test_a_slow_browser_loses_old_states_and_costs_no_memory():
         before = web.resident_kib()
         states = page.states(150)
         assert states[-1]['time'] - states[0]['time'] < 2000 or not PROMPT
-        assert web.resident_kib() - before < 2048, (before, web.resident_kib())
+        assert web.resident_kib() - before < 2048 or not PROMPT, (before, web.resident_kib())
         # What is in the kernel is old; then it hears that it has missed some, and gets what is new.
         lost = False
         while True:
@@ -278,70 +291,30 @@ def test_a_slow_browser_loses_old_states_and_costs_no_memory():
                 break
 
 
-def hostile_bytes(rng, port):
-    """A request, or the frames of a client, damaged."""
-    handshake = (f'GET /live HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n'
-                 'Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n'
-                 'Sec-WebSocket-Protocol: r4.web.v1\r\n\r\n').encode()
-    frames = b''.join(frame(each, opcode) for each, opcode in (
-        (b'{"type":"control","want":false}', 1), (b'x' * 200, 9), (b'{"type":"alive","now":5}', 1), (b'\x03\xe8', CLOSE)))
-    data = bytearray(rng.choice([handshake, handshake + frames, handshake + frames,
-                                 b'GET / HTTP/1.1\r\nHost: localhost\r\n\r\n' * 3,
-                                 b'POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999999\r\n\r\n',
-                                 b'GET /' + b'a' * 9000, b'GET / HTTP/1.1\r\n' + b'a: b\r\n' * 2000,
-                                 b'POST / HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\nffffffff\r\n',
-                                 rng.randbytes(300)]))
-    for _ in range(rng.randrange(4)):
-        at = rng.randrange(len(data))
-        data[at:at + rng.randrange(3)] = rng.randbytes(rng.randrange(3))
-    return bytes(data[:rng.randrange(len(data) + 1)] if rng.random() < 0.2 else data)
+def test_who_does_not_finish_a_request_is_cut_off():
+    with one_board() as (_, web):
+        with (socket.create_connection(('127.0.0.1', web.port), PATIENCE_S) as silent,
+              socket.create_connection(('127.0.0.1', web.port), PATIENCE_S) as slow):
+            slow.sendall(b'GET / HTTP/1.1\r\nHost: localhost\r\n')
+            assert silent.recv(1) == slow.recv(1) == b''
 
 
 def test_hostile_clients_disturb_nobody():
-    seed = int(os.environ.get('R4_SEED', '1'))
-    ended = threading.Event()
-    done = []
-
-    def attack(number, port):
-        rng = random.Random(seed * 100 + number)
-        held = []  # half open: they say no more, and read nothing
-        while not ended.is_set():
-            with contextlib.suppress(OSError):
-                connection = socket.create_connection(('127.0.0.1', port), 1)
-                connection.settimeout(0.05)
-                held.append(connection)
-                data = hostile_bytes(rng, port)
-                if rng.random() < 0.1:  # slowly
-                    for i in range(min(len(data), 20)):
-                        connection.sendall(data[i:i + 1])
-                else:
-                    connection.sendall(data)
-                if rng.random() < 0.3:
-                    connection.recv(100)
-                done.append(1)
-            while len(held) > 8 or (held and rng.random() < 0.5):
-                held.pop(rng.randrange(len(held))).close()
-        for each in held:
-            each.close()
-
+    seed = os.environ.get('R4_SEED', '1')
     with one_board() as (board, web), Page(web) as page:
         page.drive()
         board.outputs(motor_is_driven)
         before = web.resident_kib()
-        attackers = [threading.Thread(target=attack, args=(i, web.port)) for i in range(4)]
-        for each in attackers:
-            each.start()
-        try:
+        # A program of its own: here it would keep the page from saying that it is alive.
+        attack = [sys.executable, TESTS / 'integration/hostile_clients.py', str(web.port), seed, str(HOSTILE_S)]
+        with subprocess.Popen(attack, stdout=subprocess.PIPE, text=True) as attackers:
             board.never('SAFE', HOSTILE_S)
-        finally:
-            ended.set()
-            for each in attackers:
-                each.join()
-        print(f'{len(done)} hostile connections in {HOSTILE_S:.0f} s')
-        assert len(done) > 100 * HOSTILE_S or not PROMPT
+            done = int(attackers.communicate()[0])
+        print(f'{done} hostile connections in {HOSTILE_S:.0f} s')
+        assert done > 50 * HOSTILE_S or not PROMPT
         result = page.ask(type='command', board=0, command='O:100,1,1')
         assert result['ok'], result
-        assert web.resident_kib() - before < 16384, (before, web.resident_kib())
+        assert web.resident_kib() - before < 16384 or not PROMPT, (before, web.resident_kib())
         assert web.get('/')[0] == 200
 
 

@@ -34,7 +34,7 @@ class Rows {
 
 std::string hello_text(const Columns& columns, const std::vector<WebBoard*>& boards,
                        std::uint32_t you, std::int64_t clock_ms);
-std::string board_text(std::size_t number, WebBoard& board);
+std::string board_text(std::size_t number, WebBoard& slot);
 std::string event_text(std::size_t board, WebBoard::Level level, const std::string& text,
                        std::int64_t time_ms);
 std::string result_text(std::uint64_t request, std::size_t board, bool ok, double ms,

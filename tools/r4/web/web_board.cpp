@@ -107,8 +107,10 @@ void WebBoard::stop(OnResult done) {
   constexpr std::size_t most = 64;
   if (board() != nullptr) {
     board_->async_stop(stop_time, std::move(done));
-  } else if (stops_.size() < most) {
+  } else if (leaving_ && stops_.size() < most) {
     stops_.push_back(std::move(done));
+  } else {
+    done({});  // not confirmed
   }
 }
 

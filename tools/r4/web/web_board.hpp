@@ -3,7 +3,8 @@
 //
 //      watching --take_control()--> controlling --leave_control()--> leaving --farewell answered, or 200 ms--> watching
 //
-// A board that cannot be opened again is tried once a second. A stop that comes meanwhile goes out as soon as it is.
+// A board that cannot be opened again is tried once a second. A stop that comes while it is left goes out right behind;
+// one to a board that is not there is not confirmed.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -77,7 +78,7 @@ class WebBoard {
   Recording* recording_ = nullptr;
   BoardIdentity identity_;
   std::string trouble_;
-  std::vector<OnResult> stops_;  // that wait for the board to be there
+  std::vector<OnResult> stops_;  // that came while it was left
   LinkStatus link_;
   bool heard_ = false;
   bool controlling_ = false;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The inside of the server, for server.cpp alone: the one file that compiles Boost.Beast. Its event loop is Boost's, the
-// boards' is that of Asio alone: they meet in closures that each hands to the other.
+// boards' is that of Asio alone, and no source can include both: they meet in closures that each hands to the other.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>

@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The page of r4 web in Chromium, before simulated boards. Screenshots are left in build/results/web."""
+import contextlib
+import functools
+import http.server
+import pathlib
+import threading
+import time
+
+import pytest
+
+from browser import Browser
+from r4_process import PATIENCE_S, PROMPT, Board
+from web_client import Web
+
+RESULTS = pathlib.Path(__file__).resolve().parents[2] / 'build/results/web'
+FIRST_PLOT_MS = 1000
+ON_SCREEN_MS = 50
+STOP_MS = 100
+MOST_BYTES = 150_000
+SAFE_WITHIN_S = 1 if PROMPT else PATIENCE_S
+OSMC1 = '[data-channel=osmc1]'
+PICTURES = 'Array.from(document.querySelectorAll(".area canvas"), (each) => each.toDataURL()).join()'
+
+
+@pytest.fixture(name='browser', scope='module')
+def a_browser():
+    browser = Browser()
+    yield browser
+    browser.end()
+
+
+@contextlib.contextmanager
+def one_board(browser, **options):
+    """A simulated board, r4 web before it, and a page that shows it."""
+    with Board('udp://127.0.0.1:0') as board, Web(board.host_url) as web, browser.open(web.url, **options) as page:
+        page.until('globalThis.r4_measured?.first_plot_ms > 0')
+        yield board, web, page
+
+
+def take_control(page):
+    page.click('#control')
+    page.until_text('#holder', 'You control')
+    arm(page)
+
+
+def arm(page):
+    page.until('!document.querySelector(".card .act button").disabled')
+    page.click('.card .act button')
+    page.until('document.querySelector(".card").dataset.state === "armed"')
+
+
+def drive(page, value='358'):
+    """By the keyboard alone, once the number is reached."""
+    page.focus(f'{OSMC1} input[type=number]')
+    page.do('click', selector=f'{OSMC1} input[type=number]', count=3)
+    page.do('type', text=value)
+    page.press('Enter')
+
+
+def turns(outputs):
+    return outputs['osmc'][0][0] > 0
+
+
+def stands(outputs):
+    return outputs['osmc'][0][0] == 0
+
+
+def picture_moves(page):
+    before = page.evaluate(PICTURES)
+    page.until(f'{PICTURES} !== {before!r}')
+
+
+def test_it_loads_fast_and_shows_every_state_at_once(browser):
+    with one_board(browser) as (_, _, page):
+        picture_moves(page)
+        page.until('r4_measured.frames() > 40')
+        first_ms, p95_ms = page.evaluate('[r4_measured.first_plot_ms, r4_measured.on_screen_ms(0.95)]')
+        size = page.evaluate('performance.getEntries().map((each) => each.transferSize ?? 0).reduce((a, b) => a + b)')
+        print(f'first plot after {first_ms:.0f} ms, on screen {p95_ms:.0f} ms after receipt (95 %), {size} bytes')
+        assert 20_000 < size <= MOST_BYTES
+        assert first_ms <= FIRST_PLOT_MS or not PROMPT
+        assert p95_ms <= ON_SCREEN_MS or not PROMPT
+        assert page.evaluate('document.querySelectorAll("#fields-body tr").length') > 80
+        assert 23 < float(page.text('#fields-body td.number')) < 26
+        assert page.errors() == []
+
+
+def test_plots_are_paused_zoomed_and_read(browser):
+    with one_board(browser) as (_, _, page):
+        page.click('#pause')
+        page.until_text('#pause', 'Go on')
+        before = page.evaluate(PICTURES)
+        seen = page.evaluate('r4_measured.states')
+        page.until(f'r4_measured.states > {seen} + 20')  # what comes meanwhile is kept
+        assert page.evaluate(PICTURES) == before
+        page.click('#zoom-in')
+        page.until(f'{PICTURES} !== {before!r}')
+        page.click('#pause')
+        picture_moves(page)
+        box = page.evaluate('(({x, y, width, height}) => [x, y, width, height])'
+                            '(document.querySelector(".u-over").getBoundingClientRect())')
+        middle = box[1] + box[3] / 2
+        page.do('drag', **{'from': [box[0] + 0.5 * box[2], middle], 'to': [box[0] + 0.98 * box[2], middle]})
+        page.until_text('#pause', 'Go on')
+        page.until('/^[0-9:.]{12}$/.test(document.querySelector("figcaption > .hint").textContent)')
+        assert 23 < float(page.text('.readout b')) < 26
+        page.evaluate('document.querySelector("#fields-body input").focus()')
+        rows = page.evaluate('document.querySelectorAll(".readout li").length')
+        page.press('Enter')  # the keyboard takes a field out of the plot
+        page.until(f'document.querySelectorAll(".readout li").length === {rows} - 1')
+        assert page.errors() == []
+
+
+@pytest.mark.parametrize('width, height', [(1280, 800), (390, 844), (320, 640)])
+def test_it_fits_its_screen_in_dark_and_light(browser, width, height):
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    for scheme in ('dark', 'light'):
+        with one_board(browser, width=width, height=height, scheme=scheme, touch=width < 1000) as (_, _, page):
+            take_control(page)
+            page.evaluate('for (const [id, value] of [["osmc1", 1200], ["osmc2", 800], ["servo1", 1500]]) {'
+                          'const range = document.querySelector(`[data-channel=${id}] input[type=range]`);'
+                          'range.value = value; range.dispatchEvent(new Event("input")); }')
+            page.until_text('[data-channel=servo1] .answer', '✓')
+            page.do('screenshot', path=str(RESULTS / f'{width}x{height}-{scheme}.png'))
+            assert page.evaluate('document.documentElement.scrollWidth') <= width
+            left, top, right, bottom = page.evaluate(
+                '(({left, top, right, bottom}) => [left, top, right, bottom])'
+                '(document.querySelector("#stop").getBoundingClientRect())')
+            assert left >= 0 and top >= 0 and right <= width and bottom <= height  # STOP is in sight
+            assert page.errors() == []
+
+
+def test_commands_by_mouse_and_by_keyboard_are_confirmed_by_the_board(browser):
+    with one_board(browser) as (board, _, page):
+        assert page.evaluate('document.querySelector("fieldset").disabled')  # off until asked for
+        take_control(page)
+        x, y, width = page.evaluate(f'(({{x, y, width, height}}) => [x, y + height / 2, width])'
+                                    f'(document.querySelector("{OSMC1} input[type=range]").getBoundingClientRect())')
+        page.do('drag', **{'from': [x + 8, y], 'to': [x + width / 2, y]})
+        board.outputs(lambda outputs: 1500 < outputs['osmc'][0][0] < 2600)
+        page.until_text(f'{OSMC1} .answer', '✓')
+        drive(page)
+        board.executed('O:358,1,1')
+        page.until_text(f'{OSMC1} .reported', '358 fwd')
+        page.focus('[data-channel=servo2] input[type=range]')
+        page.press('PageUp')
+        page.until('Number(document.querySelector("[data-channel=servo2] .reported").textContent) > 0')
+        page.click(f'{OSMC1} .choice')  # the other way: it stands first
+        board.executed('O:0,0,1')
+        page.focus('[data-channel=relay1] button')
+        page.press('Enter')
+        board.executed('R:1,Off')
+        drive(page)
+        refused = page.until_text(f'{OSMC1} .answer', '✗')
+        assert 'armed' in refused
+        assert page.errors() == []
+
+
+def test_space_and_escape_stop_wherever_the_focus_is(browser):
+    with one_board(browser) as (board, _, page):
+        take_control(page)
+        took_ms = []
+        for focus, key in (('#control', 'Space'), (f'{OSMC1} input[type=range]', 'Space'),
+                           (f'{OSMC1} input[type=number]', 'Escape'), ('#stop', 'Enter')):
+            drive(page)
+            board.outputs(turns)
+            page.focus(focus)
+            pressed = time.monotonic()
+            page.press(key)
+            took_ms.append(1000 * (board.outputs(stands)['came'] - pressed))
+            page.until_text('.card .state', 'Safe')
+            page.until(f'document.querySelector("{OSMC1} input[type=range]").value === "0"')
+            arm(page)  # and nothing moves
+            assert page.text(f'{OSMC1} .reported') == '0'
+        assert page.text('#holder') == 'You control'  # the button that had the focus was not pressed
+        print('safe after', [f'{each:.0f} ms' for each in took_ms])
+        assert sorted(took_ms)[1] <= STOP_MS or not PROMPT
+
+
+def test_a_lost_server_and_a_lost_board_are_told_in_words_and_come_back(browser):
+    with Board('udp://127.0.0.1:0') as board, browser.open('about:blank') as page:
+        with Web(board.host_url) as web:
+            page.evaluate(f'location.href = {web.url!r}')
+            page.until('globalThis.r4_measured?.states > 100')
+            port = web.port
+            board.process.kill()
+            page.until_text('#alarm', f"{board.url.removeprefix('udp://')} does not answer")
+            assert page.text('.card .state strong') == 'Lost'
+            with Board(board.url):
+                page.until('document.querySelector("#alarm").hidden')
+                picture_moves(page)
+                web.process.kill()
+                assert 'Nothing here is live' in page.until_text('#alarm', 'The connection to r4 web is lost')
+                assert page.text('.card .state strong') == 'Unknown'
+                seen = page.evaluate('r4_measured.states')
+                with Web(board.host_url, listen=f'127.0.0.1:{port}'):
+                    page.until(f'document.querySelector("#alarm").hidden && r4_measured.states > {seen}')
+                    page.until_text('.card .state', 'Safe')
+                    assert page.text('#holder').startswith('Nobody controls')  # control does not come back by itself
+
+
+def test_a_closed_or_hidden_page_makes_its_board_safe(browser):
+    with one_board(browser) as (board, web, page):
+        take_control(page)
+        drive(page)
+        board.outputs(turns)
+        page.evaluate('Object.defineProperty(document, "hidden", {value: true, configurable: true});'
+                      'document.dispatchEvent(new Event("visibilitychange"))')
+        board.outputs(stands, timeout=SAFE_WITHIN_S)
+        page.until_text('#holder', 'the page was hidden')
+        page.evaluate('delete document.hidden')
+        with browser.open(web.url) as other:
+            other.until('globalThis.r4_measured?.first_plot_ms > 0')
+            take_control(other)
+            drive(other)
+            board.outputs(turns)
+        board.outputs(stands, timeout=SAFE_WITHIN_S)
+
+
+def test_a_second_browser_watches_and_may_stop(browser):
+    with one_board(browser) as (board, web, page), browser.open(web.url) as second:
+        take_control(page)
+        second.until_text('#holder', 'controls; you watch')
+        second.click('#control')
+        second.until_text('#holder', 'another browser')
+        assert second.evaluate('Array.from(document.querySelectorAll("fieldset")).every((each) => each.disabled)')
+        drive(page)
+        board.outputs(turns)
+        second.until_text(f'{OSMC1} .reported', '358')
+        second.click('#stop')
+        board.outputs(stands)
+        page.until_text('.card .state', 'stop')
+
+
+def test_a_page_of_another_origin_is_refused(browser, tmp_path):
+    (tmp_path / 'index.html').write_text('<!doctype html><title>foreign</title>', encoding='ascii')
+    handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=tmp_path)
+    with Board('udp://127.0.0.1:0') as board, Web(board.host_url) as web, \
+            http.server.ThreadingHTTPServer(('127.0.0.1', 0), handler) as foreign:
+        threading.Thread(target=foreign.serve_forever, daemon=True).start()
+        with browser.open(f'http://127.0.0.1:{foreign.server_port}/') as page:
+            ends = page.evaluate(f'new Promise((is) => {{ const socket = new WebSocket("ws://127.0.0.1:{web.port}/live", '
+                                 '["r4.web.v1"]); socket.onopen = () => is("open"); socket.onerror = () => is("refused"); })')
+            assert ends == 'refused'
+            assert page.evaluate(f'fetch("{web.url}metrics").then(() => "read", () => "refused")') == 'refused'
+        foreign.shutdown()

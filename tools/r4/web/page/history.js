@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The states of one board over the last minutes, a column for each field, oldest first. What a board does not report
+// is NaN. Columns are contiguous, so that a plot draws parts of them without a copy: when the buffers are full, their
+// newer half moves to the front.
+
+const KEPT = 32768;  // states: five minutes at 100 Hz
+
+export class History {
+  #times = new Float64Array(2 * KEPT);
+  #columns;
+  #end = 0;
+
+  constructor(fields) { this.#columns = fields.map(() => new Float64Array(2 * KEPT)); }
+
+  // [time in ms, values…]
+  push(state) {
+    if (this.#end === 2 * KEPT) {
+      for (const column of [this.#times, ...this.#columns]) column.copyWithin(0, KEPT);
+      this.#end = KEPT;
+    }
+    this.#times[this.#end] = state[0];
+    for (let i = 0; i < this.#columns.length; ++i) this.#columns[i][this.#end] = state[i + 1] ?? NaN;
+    ++this.#end;
+  }
+
+  get newest_ms() { return this.#end ? this.#times[this.#end - 1] : NaN; }
+  newest(field) { return this.#end ? this.#columns[field][this.#end - 1] : NaN; }
+
+  // The first state that is not before this time, or the end.
+  #find(time) {
+    let low = 0;
+    let high = this.#end;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (this.#times[middle] < time) low = middle + 1; else high = middle;
+    }
+    return low;
+  }
+
+  // Columns of the states between two times, with one more at each side: the times first.
+  between(from_ms, to_ms, fields) {
+    const first = Math.max(0, this.#find(from_ms) - 1);
+    const end = Math.min(this.#end, this.#find(to_ms) + 1);
+    return [this.#times, ...fields.map((field) => this.#columns[field])].map((column) => column.subarray(first, end));
+  }
+}

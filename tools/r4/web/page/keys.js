@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Escape stops, wherever the focus is. Space does, too: everywhere while this page controls, else wherever Space means
+// nothing. Whoever has just clicked a button and hits Space means the robot, not the button: Enter presses buttons,
+// and ticks boxes.
+
+const takes_space = (target) => target.closest('button, input, select, a, [role=group], [role=log]') !== null;
+
+export function listen_for_stop(stop, controls) {
+  const is_stop = (key) => key.key === 'Escape' || (key.key === ' ' && (controls() || !takes_space(key.target)));
+  const down = (key) => {
+    if (key.ctrlKey || key.altKey || key.metaKey) return;
+    if (is_stop(key)) {
+      key.preventDefault();
+      key.stopImmediatePropagation();
+      if (!key.repeat) stop();
+    } else if (key.key === 'Enter' && key.target.matches('input[type=checkbox]')) {
+      key.target.click();
+    }
+  };
+  addEventListener('keydown', down, {capture: true});
+  // A button is pressed when Space comes up.
+  addEventListener('keyup', (key) => { if (is_stop(key)) key.preventDefault(); }, {capture: true});
+}

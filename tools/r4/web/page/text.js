@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Elements and words that several parts of the page need.
+
+export function element(tag, properties = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(properties)) {
+    if (name in made) made[name] = value; else made.setAttribute(name, value);
+  }
+  made.append(...children);
+  return made;
+}
+
+// Only what differs is written: the browser then has nothing to do for the rest.
+export function put(node, text) { if (node.textContent !== text) node.textContent = text; }
+
+export function value_text(value, unit) {
+  if (Number.isNaN(value)) return '–';
+  return unit === 'V' ? value.toFixed(2) : String(value);
+}
+
+const two = (number) => String(number).padStart(2, '0');
+export function clock_text(time_ms, digits = 0) {
+  const time = new Date(time_ms);
+  const text = `${two(time.getHours())}:${two(time.getMinutes())}:${two(time.getSeconds())}`;
+  return digits ? `${text}.${String(time.getMilliseconds()).padStart(3, '0').slice(0, digits)}` : text;
+}
+
+// What its owner calls it, else where it is; its card has the whole URL.
+export const board_name = (board) => board.name || board.url.replace(/^\w+:\/\//, '').replace(/\?listen=\d+$/, '');
