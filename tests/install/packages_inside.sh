@@ -31,7 +31,7 @@ unit_is_safe() {
 }
 step 'r4-record@.service is whole, and exposes little' unit_is_safe
 wireshark_knows_it() {
-  ! compgen -G '/usr/lib/*/wireshark/plugins/r4.lua' >/dev/null || tshark -G protocols 2>/dev/null | grep -P '\tr4\t'
+  ! compgen -G '/usr/lib/*/wireshark/plugins/r4.lua' >/dev/null || tshark -G protocols 2>/dev/null | grep -P '\tr4$'
 }
 step 'Wireshark' wireshark_knows_it
 
