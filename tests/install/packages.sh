@@ -11,7 +11,7 @@ build_tree=$(realpath "$2")
 
 if [[ -z "${R4_INSIDE_NAMESPACE-}" ]]; then
   "$source_tree/tools/package" --built "$build_tree"
-  lintian --fail-on error,warning --tag-display-limit 0 --allow-root "$source_tree"/build/packages/*.changes
+  lintian --fail-on error,warning --tag-display-limit 0 --allow-root "$build_tree"/packed/*.changes
   echo 'packages: lintian finds nothing'
   as_root=()
   ((EUID == 0)) || as_root=(--map-root-user)
@@ -27,13 +27,22 @@ mount -t overlay overlay -o "lowerdir=/,upperdir=$copy/changed,workdir=$copy/wor
   exit 1
 }
 trap 'umount -R "$copy" && rmdir "$copy"' EXIT
-mount --rbind /dev "$copy/root/dev"
+for folder in tmp run dev; do
+  mount -t tmpfs tmpfs "$copy/root/$folder"
+done
 mount -t proc proc "$copy/root/proc"
-mount -t tmpfs tmpfs "$copy/root/tmp"
-mount -t tmpfs tmpfs "$copy/root/run"
+# Devices of its own: what is installed and purged there is at this system's no more than its files are.
+for device in null zero full random urandom; do
+  touch "$copy/root/dev/$device"
+  mount --bind "/dev/$device" "$copy/root/dev/$device"
+done
+mkdir "$copy/root/dev/pts" "$copy/root/dev/shm"
+mount -t devpts -o newinstance,ptmxmode=0666 devpts "$copy/root/dev/pts"
+ln -s pts/ptmx "$copy/root/dev/ptmx"
+ln -s /proc/self/fd "$copy/root/dev/fd"
 ip link set lo up
 mkdir "$copy/root/tmp/packages"
-cp "$source_tree"/build/packages/*.deb "$source_tree/tests/install/packages_inside.sh" "$copy/root/tmp/packages"
+cp "$build_tree"/packed/*.deb "$source_tree/tests/install/packages_inside.sh" "$copy/root/tmp/packages"
 cp -r "$source_tree/docs/examples/drive" "$copy/root/tmp/packages"
 # Small images are told to leave pages of manuals out.
 rm -f "$copy"/root/etc/dpkg/dpkg.cfg.d/*

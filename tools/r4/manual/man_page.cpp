@@ -115,25 +115,25 @@ struct Footer {
 };
 
 Footer footer_of(const CLI::App& command) {
-  Footer footer;
-  std::vector<std::string>* section = &footer.description;
+  Footer parts;
+  std::vector<std::string>* section = &parts.description;
   bool begins = true;  // a paragraph
   for (std::string line : CLI::detail::split(command.get_footer(), '\n')) {
     if (begins) {
-      section = &footer.description;
+      section = &parts.description;
       constexpr std::string_view codes = "Exit codes:";
       if (line == "Examples:") {
-        section = &footer.examples;
+        section = &parts.examples;
         line.clear();
       } else if (line.starts_with(codes)) {
-        section = &footer.exit_codes;
+        section = &parts.exit_codes;
         line.erase(0, std::min(codes.size() + 1, line.size()));
       }
     }
     begins = line.empty() && section->empty() ? false : line.empty();
     section->push_back(line);
   }
-  return footer;
+  return parts;
 }
 
 bool several(const CLI::Option& option) { return option.get_expected_max() > 1; }
@@ -188,7 +188,7 @@ std::string page_name(const CLI::App& root, const CLI::App& command) {
 
 std::string man_page(const CLI::App& root, const CLI::App& command) {
   const std::string name = page_name(root, command);
-  const Footer footer = footer_of(command);
+  const Footer parts = footer_of(command);
   std::string title = name;
   std::transform(title.begin(), title.end(), title.begin(), [](char c) {
     return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
@@ -200,12 +200,12 @@ std::string man_page(const CLI::App& root, const CLI::App& command) {
     if (!body.empty()) page += fmt::format(".SH {}\n{}", head, body);
   };
   section("SYNOPSIS", synopsis_of(root, command));
-  section("DESCRIPTION", body_of(footer.description));
+  section("DESCRIPTION", body_of(parts.description));
   if (&command == &root) section("COMMANDS", commands_of(root));
   section("ARGUMENTS", arguments_of(command));
   section("OPTIONS", options_text(command));
-  section("EXAMPLES", body_of(footer.examples));
-  section("\"EXIT STATUS\"", body_of(footer.exit_codes));
+  section("EXAMPLES", body_of(parts.examples));
+  section("\"EXIT STATUS\"", body_of(parts.exit_codes));
   if (&command != &root) section("\"SEE ALSO\"", ".BR r4 (1)\n");
   return page;
 }
