@@ -69,21 +69,21 @@ TEST(Ros2Units, ATwistDrivesTwoWheelsAndKeepsTheirRatio) {
   }
 }
 
-StringMessage sample_of(std::string& bytes) {
-  StringMessage message{};
-  message.data._length = static_cast<std::uint32_t>(bytes.size());
-  message.data._buffer = reinterpret_cast<std::uint8_t*>(bytes.data());
-  return message;
+dds_sequence_octet bytes_of(std::string& text) {
+  dds_sequence_octet bytes{};
+  bytes._length = static_cast<std::uint32_t>(text.size());
+  bytes._buffer = reinterpret_cast<std::uint8_t*>(text.data());
+  return bytes;
 }
 
 TEST(Ros2CommandText, AStringEndsWithTheOnlyNulInIt) {
   std::string good("O:1,1,1\0", 8);
-  EXPECT_EQ(text_of(sample_of(good)), "O:1,1,1");
+  EXPECT_EQ(text_of(bytes_of(good)), "O:1,1,1");
   std::string empty("\0", 1);
-  EXPECT_EQ(text_of(sample_of(empty)), "");
+  EXPECT_EQ(text_of(bytes_of(empty)), "");
   for (std::string bad : {std::string(), std::string("O:1,1,1"), std::string("E:STOP\0x\0", 9),
                           std::string(2000, 'x') + '\0'}) {
-    EXPECT_FALSE(text_of(sample_of(bad))) << bad;
+    EXPECT_FALSE(text_of(bytes_of(bad))) << bad;
   }
 }
 
