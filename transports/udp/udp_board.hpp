@@ -5,7 +5,7 @@
 #include <asio/io_context.hpp>
 
 #include "../framing/peer_table.hpp"
-#include "host_lookup.hpp"
+#include "search/host_lookup.hpp"
 #include "udp_end.hpp"
 
 namespace r4 {

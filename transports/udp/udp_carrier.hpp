@@ -29,9 +29,9 @@
 
 #include "../shared_wire.hpp"
 #include "../url.hpp"
-#include "board_search.hpp"
-#include "host_lookup.hpp"
 #include "r4link/carrier.hpp"
+#include "search/board_search.hpp"
+#include "search/host_lookup.hpp"
 
 namespace r4 {
 

@@ -7,8 +7,8 @@
 #include <chrono>
 #include <optional>
 
-#include "board_search.hpp"
-#include "host_lookup.hpp"
+#include "search/board_search.hpp"
+#include "search/host_lookup.hpp"
 #include "udp_crowd.hpp"
 #include "udp_end.hpp"
 #include "udp_gathering.hpp"

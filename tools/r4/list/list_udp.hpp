@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "transports/udp/board_search.hpp"
+#include "transports/udp/search/board_search.hpp"
 
 namespace r4::tool {
 

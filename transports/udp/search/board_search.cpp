@@ -17,7 +17,7 @@
 #include <set>
 #include <utility>
 
-#include "../file_descriptor.hpp"
+#include "../../file_descriptor.hpp"
 #include "r4link/datagram.hpp"
 
 namespace r4 {

@@ -22,7 +22,7 @@
 #include <string_view>
 #include <vector>
 
-#include "../identity_answer.hpp"
+#include "../../identity_answer.hpp"
 #include "host_lookup.hpp"
 
 namespace r4 {

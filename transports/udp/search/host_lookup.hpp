@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "../operation_slot.hpp"
+#include "../../operation_slot.hpp"
 #include "r4link/error.hpp"
 
 namespace r4 {

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "tests/support/datagrams.hpp"
-#include "transports/udp/board_search.hpp"
+#include "transports/udp/search/board_search.hpp"
 
 namespace r4::test {
 

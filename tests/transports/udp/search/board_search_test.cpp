@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "transports/udp/board_search.hpp"
+#include "transports/udp/search/board_search.hpp"
 
 #include <gtest/gtest.h>
 
