@@ -16,7 +16,8 @@ import sys
 PUBLIC = {'include/r4link'}
 PROTOCOL = PUBLIC | {'protocol/datagram', 'protocol/keys', 'protocol/messages', 'protocol/link'}
 FRAMING = PROTOCOL | {'transports/framing', 'transports/framing/can'}
-CARRIERS = {'transports/can', 'transports/impaired', 'transports/serial', 'transports/share', 'transports/udp'}
+CARRIERS = {'transports/can', 'transports/impaired', 'transports/serial', 'transports/share', 'transports/udp',
+            'transports/udp/search'}
 TRANSPORTS = FRAMING | CARRIERS | {'transports'}
 FIRMWARE = FRAMING | {'firmware', 'firmware/application', 'firmware/drivers'}
 MODELS = {'firmware/ports/sim/chips', 'firmware/ports/sim/robot'}
@@ -38,7 +39,8 @@ ALLOWED = {
     'transports/impaired': FRAMING | {'transports'},
     'transports/serial': FRAMING | {'transports'},
     'transports/share': FRAMING | {'transports'},
-    'transports/udp': FRAMING | {'transports'},
+    'transports/udp/search': FRAMING | {'transports'},
+    'transports/udp': FRAMING | {'transports', 'transports/udp/search'},
     'firmware/drivers': PROTOCOL,
     'firmware': FRAMING | {'firmware/drivers'},
     'firmware/application': FRAMING | {'firmware'},
