@@ -4,7 +4,7 @@
 
 #include <asio/post.hpp>
 
-#include "../recorder.hpp"
+#include "../../recorder.hpp"
 #include "answering_boards.hpp"
 #include "transports/udp/udp_carrier.hpp"
 
