@@ -104,19 +104,21 @@ void UdpCrowd::turn() {
     const int found =
         ::epoll_wait(ready_.get(), batch.events.data(), static_cast<int>(batch.events.size()), 0);
     batch.found = found > 0 ? static_cast<std::size_t>(found) : 0;
-    for (std::size_t i = 0; i < batch.found; ++i) drain(i);
-    if (std::exchange(batch.found, 0) < batch.events.size()) break;
+    bool more = batch.found == batch.events.size();
+    for (std::size_t i = 0; i < batch.found; ++i) more |= !drain(i);
+    batch.found = 0;
+    if (!more) break;
   }
   count_packets();
   if (members_ != 0) wait();
 }
 
-// One that floods gets a further turn behind the others.
-void UdpCrowd::drain(std::size_t event) {
+// True if it left nothing. One that floods gets a further round behind the others.
+bool UdpCrowd::drain(std::size_t event) {
   Batch& batch = *batch_;
   Member* const member = static_cast<Member*>(batch.events[event].data.ptr);
   const auto stopped = [&] { return batch.events[event].data.ptr == nullptr; };
-  if (stopped()) return;
+  if (stopped()) return true;
   for (mmsghdr& each : batch.messages) {
     each.msg_hdr.msg_namelen = static_cast<socklen_t>(batch.from[0].capacity());
   }
@@ -129,12 +131,16 @@ void UdpCrowd::drain(std::size_t event) {
     ++packets_;
     member->on_packet({batch.bytes[at].data(), batch.messages[at].msg_len}, batch.from[at]);
   }
-  if (stopped()) return;
-  if (drained) return member->on_all_read();
+  if (stopped()) return true;
+  if (drained) {
+    member->on_all_read();
+    return true;
+  }
   epoll_event again{};
   again.events = EPOLLIN | EPOLLET;
   again.data.ptr = member;
   ::epoll_ctl(ready_.get(), EPOLL_CTL_MOD, member->watched_, &again);
+  return false;
 }
 
 void UdpCrowd::count_packets() {

@@ -64,7 +64,7 @@ class UdpCrowd final : public asio::execution_context::service {
   void shutdown() noexcept override;
   void wait();
   void turn();
-  void drain(std::size_t event);
+  bool drain(std::size_t event);
   void count_packets();
 
   asio::io_context& io_;
