@@ -10,7 +10,7 @@ import time
 import pytest
 
 from browser import Browser
-from r4_process import PATIENCE_S, PROMPT, Board
+from r4_process import PATIENCE_S, PROMPT, Board, objects, run
 from web_client import Web
 
 RESULTS = pathlib.Path(__file__).resolve().parents[2] / 'build/results/web'
@@ -231,6 +231,30 @@ def test_a_second_browser_watches_and_may_stop(browser):
         second.click('#stop')
         board.outputs(stands)
         page.until_text('.card .state', 'stop')
+
+
+def test_the_button_records_and_tells_where(browser, tmp_path):
+    with Board('udp://127.0.0.1:0') as board, Web(board.host_url, options=('--record-to', str(tmp_path))) as web, \
+            browser.open(web.url) as page:
+        page.until('!document.querySelector("#record").disabled')
+        page.click('#record')
+        page.until_text('#recording', f'recording {tmp_path}/')
+        page.until('r4_measured.states > 20')
+        page.click('#record')
+        page.until('document.querySelector("#record").textContent === "Record"')
+        [path] = tmp_path.iterdir()
+        [told] = objects(run('info', '--json', str(path)).stdout)
+        assert told['wires'][0]['states'] > 0, told
+        assert page.errors() == []
+
+
+def test_a_token_opens_the_page_and_does_not_stay_in_its_address(browser):
+    with Board('udp://127.0.0.1:0') as board, Web(board.host_url, options=('--token',)) as web:
+        with browser.open(web.url) as page:
+            page.until('globalThis.r4_measured?.first_plot_ms > 0')
+            assert '#token=' in web.url and 'token' not in page.evaluate('location.href')
+        with browser.open(web.url.split('#')[0]) as page:
+            page.until('document.body.textContent.includes("refuses this page")')
 
 
 def test_a_page_of_another_origin_is_refused(browser, tmp_path):

@@ -215,8 +215,8 @@ void SharedCarrier::look_after_holder() {
 bool SharedCarrier::leave_holder() {
   since_ = Clock::now();
   try {
-    for (int i = 0; i < 3;
-         ++i) {  // one of those that leave it with us may be about to hold another
+    // One of those that leave it with us may be about to hold another.
+    for (int i = 0; i < 3; ++i) {
       if (try_to_share() || try_to_hold()) return true;
     }
   } catch (const Error&) {
