@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What browsers cost r4 web: its share of a processor and its memory, beside eight simulated boards at 100 Hz.
 
-    R4=build/r4 PYTHONPATH=tests/integration /usr/bin/python3 tests/bench/web_bench.py
+    R4=build/r4 PYTHONPATH=tests/integration /usr/bin/python3 tests/bench/web_bench.py [SECONDS]
 """
 import contextlib
 import selectors
+import sys
 import time
 
 from r4_process import Board
-from web_client import Web, WebSocket
+from web_client import PONG, Web, WebSocket
 
 BOARDS = 8
-SECONDS = 5
+SECONDS = float(sys.argv[1]) if len(sys.argv) > 1 else 5
+ALIVE_S = 5  # r4 web drops who says nothing for longer than 20 s
 
 
 def drain(clients, seconds):
@@ -22,10 +24,17 @@ def drain(clients, seconds):
         selector.register(each.socket, selectors.EVENT_READ)
     received = 0
     until = time.monotonic() + seconds
+    alive = time.monotonic() + ALIVE_S
     while (left := until - time.monotonic()) > 0:
-        for key, _ in selector.select(left):
+        for key, _ in selector.select(min(left, ALIVE_S)):
             with contextlib.suppress(BlockingIOError):
-                received += len(key.fileobj.recv(1 << 20))
+                part = key.fileobj.recv(1 << 20)
+                assert part, 'r4 web has dropped a browser'
+                received += len(part)
+        if time.monotonic() > alive:
+            alive += ALIVE_S
+            for each in clients:
+                each.send(b'', PONG)
     selector.close()
     return received / seconds
 

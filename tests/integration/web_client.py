@@ -11,7 +11,7 @@ import time
 
 from r4_process import PATIENCE_S, Running
 
-TEXT, BINARY, CLOSE, PING = 1, 2, 8, 9
+TEXT, BINARY, CLOSE, PING, PONG = 1, 2, 8, 9, 10
 
 
 class Web(Running):
@@ -101,7 +101,7 @@ class WebSocket:
                 size, = struct.unpack('>Q', self.file.read(8))
             data = self.file.read(size)
             if head[0] & 15 == PING:
-                self.send(data, 10)
+                self.send(data, PONG)
                 continue
             return head[0] & 15, data
 
