@@ -159,6 +159,17 @@ def test_a_stop_while_control_is_given_back_is_not_lost():
         board.state('SAFE', 'stop')
 
 
+def test_a_stop_under_way_while_control_is_taken_is_not_lost():
+    with one_board() as (board, web), Page(web) as page, Page(web) as watcher:
+        page.next('board', lambda each: each['why'] == 'nobody controls it')
+        board.signal(signal.SIGSTOP)  # so that nothing confirms it before control is taken
+        watcher.say(type='stop', request=1)
+        assert page.control()['you']
+        board.signal(signal.SIGCONT)
+        assert watcher.next('result')['ok']
+        board.state('SAFE', 'stop')
+
+
 def test_a_stop_of_a_board_that_is_not_there_is_not_confirmed():
     with Web('udp://127.0.0.1:9?listen=0') as web, Page(web) as page:
         result = page.ask(type='stop')

@@ -106,7 +106,11 @@ void WebBoard::watch() {
 void WebBoard::stop(OnResult done) {
   constexpr std::size_t most = 64;
   if (board() != nullptr) {
-    board_->async_stop(stop_time, std::move(done));
+    board_->async_stop(stop_time, [this, done = std::move(done)](const CommandResult& result) {
+      // Its board was closed for one of another role before it had confirmed the stop: that one says it on.
+      if (result.outcome == Outcome::closed) return stop(done);
+      done(result);
+    });
   } else if (leaving_ && stops_.size() < most) {
     stops_.push_back(std::move(done));
   } else {
