@@ -16,6 +16,7 @@
 
 #include "firmware/application/application.hpp"
 #include "host/session/session.hpp"
+#include "incurious_host.hpp"
 #include "protocol/datagram/datagram_writer.hpp"
 #include "random.hpp"
 #include "tests/support/datagrams.hpp"
@@ -48,20 +49,13 @@ class Crowd final : public firmware::Hal, public firmware::Port, public firmware
 
  private:
   using Peers = PeerTable<int, places>;
-  struct Host final : Session::Handler {
+  struct Host final : IncuriousHost {
     Host(Crowd& c, int at) : crowd(c), address(at) {}
     SendResult transmit(std::string_view bytes, Priority) override {
       crowd.to_board_.push_back(
           {crowd.now_ms_ + crowd.random_.between(1, 3), address, std::string(bytes)});
       return SendResult::sent;
     }
-    void on_state(const ReceivedState&, const Datagram&) override {}
-    void on_board_heartbeat(const Datagram&) override {}
-    void on_identity(const Identity&) override {}
-    void on_nack(const Nack&, const Datagram&) override {}
-    void on_bad_datagram(const ReadResult&, std::string_view) override {}
-    void on_link(const LinkStatus&) override {}
-    void on_result(Ticket, const CommandResult&) override {}
 
     Crowd& crowd;
     int address;

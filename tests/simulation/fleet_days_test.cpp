@@ -18,6 +18,7 @@
 
 #include "firmware/application/application.hpp"
 #include "host/session/session.hpp"
+#include "incurious_host.hpp"
 #include "random.hpp"
 
 namespace r4::simulation {
@@ -35,7 +36,7 @@ constexpr std::uint64_t connecting_us = 2 * second_us;
 constexpr double lost = 0.1, twice = 0.01, damaged = 0.001;
 
 // One board and its host.
-class FleetLink final : firmware::Hal, firmware::Port, Session::Handler {
+class FleetLink final : firmware::Hal, firmware::Port, IncuriousHost {
  public:
   explicit FleetLink(std::uint64_t seed) : random_(seed) {
     SessionOptions options;
@@ -191,17 +192,11 @@ class FleetLink final : firmware::Hal, firmware::Port, Session::Handler {
     transfer(false, {bytes.data(), bytes.size()});
   }
   std::size_t max_size() const override { return max_datagram; }
-  // Session::Handler
+  // IncuriousHost
   SendResult transmit(std::string_view bytes, Priority) override {
     transfer(true, bytes);
     return SendResult::sent;
   }
-  void on_state(const ReceivedState&, const Datagram&) override {}
-  void on_board_heartbeat(const Datagram&) override {}
-  void on_identity(const Identity&) override {}
-  void on_nack(const Nack&, const Datagram&) override {}
-  void on_bad_datagram(const ReadResult&, std::string_view) override {}
-  void on_link(const LinkStatus&) override {}
   void on_result(Ticket, const CommandResult& result) override {
     confirmed += result.outcome == Outcome::confirmed ? 1 : 0;
   }

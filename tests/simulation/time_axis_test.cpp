@@ -13,6 +13,7 @@
 
 #include "firmware/application/application.hpp"
 #include "host/session/session.hpp"
+#include "incurious_host.hpp"
 #include "random.hpp"
 
 namespace r4::simulation {
@@ -62,7 +63,7 @@ struct AxisClock {
 };
 
 // A board, and its session.
-class AxisLink final : public firmware::Hal, public firmware::Port, public Session::Handler {
+class AxisLink final : public firmware::Hal, public firmware::Port, public IncuriousHost {
  public:
   AxisLink(SharedBus& bus, std::size_t number, Random& random)
       : clock{-90 + 25 * static_cast<std::int64_t>(number), random.below(1000),
@@ -125,7 +126,7 @@ class AxisLink final : public firmware::Hal, public firmware::Port, public Sessi
     bus_.put(now_us_, number_, false, {datagram.data(), datagram.size()});
   }
   std::size_t max_size() const override { return max_datagram; }
-  // Session::Handler
+  // IncuriousHost
   SendResult transmit(std::string_view bytes, Priority) override {
     bus_.put(now_us_, number_, true, bytes);
     return SendResult::sent;
@@ -138,12 +139,6 @@ class AxisLink final : public firmware::Hal, public firmware::Port, public Sessi
     ++states;
     dishonest += std::abs(error_us) > bound_us;
   }
-  void on_board_heartbeat(const Datagram&) override {}
-  void on_identity(const Identity&) override {}
-  void on_nack(const Nack&, const Datagram&) override {}
-  void on_bad_datagram(const ReadResult&, std::string_view) override {}
-  void on_link(const LinkStatus&) override {}
-  void on_result(Ticket, const CommandResult&) override {}
 
   SharedBus& bus_;
   const std::size_t number_;
