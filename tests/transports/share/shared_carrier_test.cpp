@@ -344,13 +344,13 @@ TEST_F(SharedCarrier, AHolderThatHangsAndOnlyWatchesLosesTheWireAndComesBackAsOn
 TEST_F(SharedCarrier, AsksAgainWhereAnotherOpensTheWireInBetween) {
   OtherThread elsewhere;
   // It meets at the next place, as one does for which the holder of the first hangs.
-  const auto rival = program(BoardRole::watch, elsewhere.loop, at_place({wire}, 1).name);
+  auto rival = program(BoardRole::watch, elsewhere.loop, at_place({wire}, 1).name);
   device.before_open = [&] { elsewhere.run([&] { rival->carrier->open(rival->heard); }); };
   const auto driver = program(BoardRole::control, io);
   driver->carrier->open(driver->heard);
   EXPECT_TRUE(driver->carrier->up());
   EXPECT_EQ(device.opened, 2);
-  elsewhere.run([&] { rival->carrier->close(); });
+  elsewhere.run([&] { rival.reset(); });  // what it has under way there is its loop's
 }
 
 TEST_F(SharedCarrier, AHolderThatHangsAndControlsKeepsTheWire) {
