@@ -3,6 +3,8 @@
 // 100 Hz each, opposite r4::Fleet on one core.
 //
 //     r4_fleet_bench [boards, default 1, 10, 100 and 1000] [seconds, default 5]
+//     r4_fleet_bench INTERFACE [seconds]      eight boards on a CAN bus, at 1000 Hz or as fast as it goes: a fleet, which
+//                                             has one socket, beside a Board each, which have one each
 //
 // Exit code 1 if a bar of the plan is missed, of a thousand boards: none of their datagrams is lost, a datagram costs
 // the host at most 1.25 times that of one board as fast as it goes and no heap, a board costs the host at most 24 kB
@@ -26,6 +28,7 @@
 #include "../link/board_process.hpp"
 #include "firmware/ports/sim/simulated_board.hpp"
 #include "r4link/async_board.hpp"
+#include "r4link/board.hpp"
 #include "r4link/error.hpp"
 #include "r4link/fleet.hpp"
 #include "tests/bench/allocations.hpp"
@@ -69,13 +72,16 @@ struct BoardsUsage {
   Clock::time_point now{};  // CLOCK_MONOTONIC: the host's, too
 };
 
-// So many boards in a process, on one loop.
+// Boards in a process, on one loop.
 class BoardsProcess : public ChildProcess {
  public:
-  explicit BoardsProcess(std::size_t count) : ports_(count) {
-    if (fork_child()) serve(count);
+  BoardsProcess(const std::vector<std::string>& urls, std::uint16_t rate_hz) : ports_(urls.size()) {
+    if (fork_child()) serve(urls, rate_hz);
     read_all(control_, ports_.data(), ports_.size() * sizeof ports_[0]);
   }
+  explicit BoardsProcess(std::size_t count)
+      : BoardsProcess(std::vector<std::string>(count, "udp://127.0.0.1:0"), 100) {}
+  // Of boards over UDP, for their host.
   std::vector<std::string> urls() const {
     std::vector<std::string> urls;
     for (const std::uint16_t port : ports_) {
@@ -95,21 +101,23 @@ class BoardsProcess : public ChildProcess {
     return usage;
   }
 
-  [[noreturn]] void serve(std::size_t count) {
-    allow_files(count);
+  [[noreturn]] void serve(const std::vector<std::string>& urls, std::uint16_t rate_hz) {
+    allow_files(urls.size());
     const double before_kb = resident_kb();
     asio::io_context io{1};
     std::vector<std::unique_ptr<sim::SimulatedBoard>> boards;
     std::vector<const Carrier*> ends;
-    for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < urls.size(); ++i) {
       sim::SimulatedBoard::Options options;
       options.board_id = "sim-" + std::to_string(i);
+      options.settings.state_rate_hz = rate_hz;
       boards.push_back(std::make_unique<sim::SimulatedBoard>(io, std::move(options)));
-      auto carrier = Registry::standard().make(io, "udp://127.0.0.1:0", Role::board);
+      auto carrier = Registry::standard().make(io, urls[i], Role::board);
       ends.push_back(carrier.get());
       boards.back()->add_carrier(std::move(carrier));
       boards.back()->start();
       const std::string& name = ends.back()->name();
+      if (!name.starts_with("udp:")) continue;
       ports_[i] = static_cast<std::uint16_t>(std::stoi(name.substr(name.rfind(':') + 1)));
     }
     write_all(control_, ports_.data(), ports_.size() * sizeof ports_[0]);
@@ -241,6 +249,61 @@ void measure(std::size_t count, std::chrono::seconds seconds, double reference_u
       verdict(notice_ms > 0 && notice_ms <= alone_ms + 20));
 }
 
+// --- eight boards on a CAN bus
+
+struct Counts {
+  std::uint64_t received = 0, lost = 0;
+};
+
+// What `counts()` and the processors have done in that time.
+void measure_bus(const char* what, const BoardsProcess& boards, std::chrono::seconds seconds,
+                 const std::function<Counts()>& counts) {
+  std::this_thread::sleep_for(1s);
+  const Counts before = counts();
+  const std::uint64_t sent_before = boards.usage().sent;
+  const double cpu_before = own_usage().cpu_s;
+  std::this_thread::sleep_for(seconds);
+  const double cpu_s = own_usage().cpu_s - cpu_before;
+  const Counts after = counts();
+  const std::uint64_t sent = boards.usage().sent - sent_before;
+  const auto received = static_cast<double>(after.received - before.received);
+  std::printf("%-22s %9.0f %9.0f %8llu %10.2f\n", what,
+              static_cast<double>(sent) / static_cast<double>(seconds.count()),
+              received / static_cast<double>(seconds.count()),
+              static_cast<unsigned long long>(after.lost - before.lost), cpu_s / received * 1e6);
+}
+
+int run_bus(const std::string& interface, std::chrono::seconds seconds) {
+  place(Placement::two_cores);
+  std::vector<std::string> urls;
+  for (int node = 0; node < 8; ++node) {
+    urls.push_back("can://" + interface + "?node=" + std::to_string(node));
+  }
+  std::printf("eight boards on %s   sent/s  received/s     lost  us a datagram\n",
+              interface.c_str());
+  {
+    const BoardsProcess boards(urls, 1000);
+    const Fleet fleet(urls, test::at_will());
+    measure_bus("a fleet, one socket", boards, seconds, [&fleet] {
+      const Sums sums = sums_of(fleet);
+      return Counts{sums.received, sums.lost};
+    });
+  }
+  const BoardsProcess boards(urls, 1000);
+  std::vector<std::unique_ptr<Board>> each;
+  for (const std::string& url : urls) each.push_back(std::make_unique<Board>(url, test::at_will()));
+  measure_bus("a socket a board", boards, seconds, [&each] {
+    Counts counts;
+    for (const auto& board : each) {
+      const Statistics statistics = board->statistics();
+      counts.received += statistics.received;
+      counts.lost += statistics.packets.lost;
+    }
+    return counts;
+  });
+  return 0;
+}
+
 int run(std::vector<std::size_t> counts, std::chrono::seconds seconds) {
   place(Placement::two_cores);
   allow_files(*std::max_element(counts.begin(), counts.end()));
@@ -262,9 +325,11 @@ int run(std::vector<std::size_t> counts, std::chrono::seconds seconds) {
 
 int main(int argc, char** argv) {
   std::vector<std::size_t> counts{1, 10, 100, 1000};
+  const std::chrono::seconds seconds(argc > 2 ? std::atoi(argv[2]) : 5);
+  const bool bus = argc > 1 && std::atoi(argv[1]) == 0;
   if (argc > 1) counts = {static_cast<std::size_t>(std::max(1, std::atoi(argv[1])))};
   try {
-    return r4::bench::run(counts, std::chrono::seconds(argc > 2 ? std::atoi(argv[2]) : 5));
+    return bus ? r4::bench::run_bus(argv[1], seconds) : r4::bench::run(counts, seconds);
   } catch (const r4::Error& error) {
     std::fprintf(stderr, "r4_fleet_bench: %s\n", error.what());
     return static_cast<int>(error.kind());
