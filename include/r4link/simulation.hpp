@@ -26,6 +26,9 @@ namespace r4::sim {
 class R4LINK_API SimulatedRobot {
  public:
   SimulatedRobot();
+  // With a robot of the program's own in place of the vehicle on the bench: it is called on the board's thread, a
+  // millisecond at a time, and must outlive every link to it.
+  explicit SimulatedRobot(RobotModel& robot);
   ~SimulatedRobot();
   SimulatedRobot(const SimulatedRobot&) = delete;
   SimulatedRobot& operator=(const SimulatedRobot&) = delete;
@@ -52,6 +55,7 @@ class R4LINK_API SimulatedRobot {
   class R4LINK_PRIVATE World;
 
  private:
+  R4LINK_PRIVATE explicit SimulatedRobot(RobotModel* robot);
   std::shared_ptr<World> world_;
   std::string url_;
 };

@@ -65,6 +65,32 @@ TEST(SimulatedRobot, LetsTheHandleGoAndShowsThatTheMotorStops) {
   EXPECT_FALSE(robot.look().open);
 }
 
+// Its wheels turn at once, and its sensor tells the duty.
+struct LightRobot final : sim::RobotModel {
+  void pass_millisecond(const sim::ChipPins& pins, bool supplied, Senses& senses) override {
+    const int duty = supplied ? pins.osmc[1].pwm : 0;
+    senses.encoder_turned[3] = duty > 0 ? -2 : 0;
+    senses.analog_cv[static_cast<int>(Analog::ainsteer)] = duty / 10;
+    senses.ultrasonic_cm[2] = duty > 0 ? 77 : 0;
+  }
+};
+
+TEST(SimulatedRobot, IsARobotOfTheProgramsOwn) {
+  LightRobot light;
+  SimulatedRobot robot(light);
+  Board board(robot.url());
+  board.wait_active();
+  board.fields("ENC1,ENC4,AINSTEER,US3");
+  EXPECT_EQ(board.next_state().encoder(4), 0);
+  board.arm();
+  board.osmc(1).set(4095, Direction::forward);
+  board.osmc(2).set(4000, Direction::forward);
+  const State state = await(
+      board, [](const State& now) { return now.distance_cm(3) == 77 && now.encoder(4) < -10; });
+  EXPECT_EQ(state.encoder(1), 0) << "the motor of the bench is not there";
+  EXPECT_NEAR(state.volts(Analog::ainsteer), 4.0, 0.02);
+}
+
 TEST(SimulatedRobot, MakesObstaclesVoltagesAndFaults) {
   SimulatedRobot robot;
   Board board(robot.url());

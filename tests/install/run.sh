@@ -122,6 +122,13 @@ program_of "$source_tree/docs/simulation.md" >simulation.cpp
   exit 1
 }
 
+program_of "$source_tree/docs/control.md" >control.cpp
+"$cxx" -std=c++20 -O1 control.cpp "${flags[@]}" -o control
+if ! ./control >control.txt || ! grep -q '^0\.[89].* m, 0\.[45].* m/s; the loop has ended: the step' control.txt; then
+  echo "install: the program in docs/control.md does not control a speed: $(cat control.txt)"
+  exit 1
+fi
+
 program_of "$source_tree/docs/fleet.md" >fleet.cpp
 "$cxx" -std=c++20 -O1 fleet.cpp "${flags[@]}" -o fleet
 if ! ./fleet >fleet.txt || [[ -s fleet.txt ]]; then
@@ -139,15 +146,15 @@ fi
 # Every installed header, alone.
 read -ra flags <<<"$(pkg-config --cflags r4link-asio)"
 headers=0
-for header in "$prefix"/include/r4link/*.hpp; do
-  echo "#include <r4link/$(basename "$header")>" >alone.cpp
+for header in "$prefix"/include/r4link/*.hpp "$prefix"/include/r4link/control/*.hpp; do
+  echo "#include <${header#"$prefix"/include/}>" >alone.cpp
   "$cxx" -std=c++20 -Wall -Wextra -Wpedantic -Wconversion -Werror -fsyntax-only "${flags[@]}" alone.cpp || {
     echo "install: $(basename "$header") does not compile alone"
     exit 1
   }
   headers=$((headers + 1))
 done
-if grep -l asio "$prefix"/include/r4link/*.hpp | grep -v '/async_board.hpp$' |
+if grep -rl asio "$prefix"/include/r4link | grep -v '/async_board.hpp$' |
   xargs -r grep -n '#include.*asio'; then
   echo 'install: a header of the blocking API includes Asio'
   exit 1

@@ -14,6 +14,7 @@ namespace r4::sim {
 
 class SimulatedRobot::World : public std::enable_shared_from_this<World> {
  public:
+  explicit World(RobotModel* robot) : robot_(robot) {}
   // The world of a robot=N of this process; empty if it is gone.
   static std::shared_ptr<World> find(long number);
   // Takes a number that nobody has.
@@ -33,6 +34,7 @@ class SimulatedRobot::World : public std::enable_shared_from_this<World> {
   void settle(const asio::io_context& io);
 
  private:
+  RobotModel* const robot_;  // nullptr: the vehicle on the bench
   mutable std::mutex mutex_;
   asio::io_context* io_ = nullptr;  // of the board, while it is open
   SimulatedBoard* board_ = nullptr;

@@ -63,6 +63,7 @@ void World::attach(asio::io_context& io, SimulatedBoard& board) {
   }
   io_ = &io;
   board_ = &board;
+  board.model().connect(robot_);
   look_.open = true;
 }
 
@@ -100,7 +101,10 @@ void World::settle(const asio::io_context& io) {
   note();
 }
 
-SimulatedRobot::SimulatedRobot() : world_(std::make_shared<World>()) {
+SimulatedRobot::SimulatedRobot() : SimulatedRobot(nullptr) {}
+SimulatedRobot::SimulatedRobot(RobotModel& robot) : SimulatedRobot(&robot) {}
+
+SimulatedRobot::SimulatedRobot(RobotModel* robot) : world_(std::make_shared<World>(robot)) {
   url_ = "sim:?robot=" + std::to_string(World::enter(world_));
 }
 

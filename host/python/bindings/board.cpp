@@ -15,6 +15,7 @@
 
 #include "bindings.hpp"
 #include "callback.hpp"
+#include "r4link/control/loop.hpp"
 #include "r4link/simulation.hpp"
 
 namespace r4::python {
@@ -153,6 +154,22 @@ BoardOptions options_of(bool watch, bool arming, const std::string& fields,
   return options;
 }
 
+// The step is called with the GIL, what is between steps goes without.
+py::tuple run_loop(PyBoard& board, const control::LoopOptions& options, const py::function& step) {
+  control::LoopReport report;
+  {
+    const py::gil_scoped_release free;
+    report = control::run_loop(*board.operator->(), options,
+                               [&](const control::LoopStep& now) -> std::optional<Setpoints> {
+                                 const py::gil_scoped_acquire gil;
+                                 const py::object wanted = step(now.state, now.dt_s);
+                                 if (wanted.is_none()) return std::nullopt;
+                                 return wanted.cast<Setpoints>();
+                               });
+  }
+  return py::make_tuple(to_text(report.end), report.why, report.at_rest, report.steps);
+}
+
 }  // namespace
 
 void bind_board(py::module_& module) {
@@ -235,6 +252,7 @@ void bind_board(py::module_& module) {
       .def(
           "watchdog", [](PyBoard& board, int ms) { board->watchdog(Ms(ms)); }, Released())
       .def("feed", [](PyBoard& board) { board->feed(); })
+      .def("run_loop", &run_loop)
       // Its on_wait() is that of the board, and asked in take() alone.
       .def("states",
            [](PyBoard& board, bool lossless, std::size_t most) {

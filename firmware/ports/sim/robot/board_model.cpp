@@ -117,6 +117,29 @@ void BoardModel::pass_millisecond(std::uint32_t now_us, Interrupts& interrupts) 
   ++time_ms_;
   chips_.bus.advance(1000);
   const bool supplied = motors_have_supply();
+  if (robot_ != nullptr) {
+    pass_millisecond_of(*robot_, interrupts);
+  } else {
+    turn_bench_motors(interrupts);
+    if (supplied) steer(chips_.dhb12_drive(1));
+  }
+  for (int i = 0; i < ultrasonic_channels; ++i) {
+    sensors_[i].pass(
+        now_us, [&](bool high, std::uint32_t at_us) { interrupts.on_echo(i + 1, high, at_us); });
+  }
+  for (Stepper& stepper : steppers_) {
+    stepper.driver.supply_motor(supplied);
+    if (stepper.pulses != stepper.driver.pulses()) {
+      stepper.pulses = stepper.driver.pulses();
+      stepper.pause_ms = 0;
+    } else if (stepper.pause_ms < stepper_pause_ms) {
+      ++stepper.pause_ms;
+    }
+  }
+}
+
+void BoardModel::turn_bench_motors(Interrupts& interrupts) {
+  const bool supplied = motors_have_supply();
   for (int i = 0; i < encoder_channels; ++i) {
     Shaft& shaft = shafts_[i];
     std::int32_t counts =
@@ -134,18 +157,21 @@ void BoardModel::pass_millisecond(std::uint32_t now_us, Interrupts& interrupts) 
     }
     turn(i + 1, counts, interrupts);
   }
-  if (supplied) steer(chips_.dhb12_drive(1));
+}
+
+void BoardModel::connect(RobotModel* robot) {
+  robot_ = robot;
+  senses_ = RobotModel::Senses();
+}
+
+void BoardModel::pass_millisecond_of(RobotModel& robot, Interrupts& interrupts) {
+  const RobotModel::Senses before = senses_;
+  for (std::int32_t& turned : senses_.encoder_turned) turned = 0;
+  robot.pass_millisecond(chips_.pins(), motors_have_supply(), senses_);
+  for (int i = 0; i < encoder_channels; ++i) turn(i + 1, senses_.encoder_turned[i], interrupts);
   for (int i = 0; i < ultrasonic_channels; ++i) {
-    sensors_[i].pass(
-        now_us, [&](bool high, std::uint32_t at_us) { interrupts.on_echo(i + 1, high, at_us); });
-  }
-  for (Stepper& stepper : steppers_) {
-    stepper.driver.supply_motor(supplied);
-    if (stepper.pulses != stepper.driver.pulses()) {
-      stepper.pulses = stepper.driver.pulses();
-      stepper.pause_ms = 0;
-    } else if (stepper.pause_ms < stepper_pause_ms) {
-      ++stepper.pause_ms;
+    if (senses_.ultrasonic_cm[i] != before.ultrasonic_cm[i]) {
+      sensors_[i].set_distance(senses_.ultrasonic_cm[i]);
     }
   }
 }
@@ -182,6 +208,9 @@ void BoardModel::steer(Drive drive) {
 std::int32_t BoardModel::analog_cv(Analog input) const {
   const int number = static_cast<int>(input);
   if ((pinned_ >> number & 1) != 0) return pinned_cv_[number];
+  if (robot_ != nullptr && senses_.analog_cv[number] != RobotModel::Senses::as_on_the_bench) {
+    return senses_.analog_cv[number];
+  }
   const std::uint64_t random =
       scramble(seed_ ^ scramble(std::uint64_t{time_ms_} << 8 | static_cast<std::uint64_t>(number)));
   switch (input) {

@@ -15,6 +15,8 @@
 //     US 1-4      ultrasonic sensors with nothing in sight
 //     steppers    a motor each that takes a step at each pulse
 //
+// or a RobotModel in its place, but for supply, handle and steppers.
+//
 // Analog inputs take the values of the capture's converters as often as they occur there; which one
 // depends on the seed and the time alone, so the same seed gives the same trace.
 #pragma once
@@ -70,7 +72,10 @@ class BoardModel {
   // How many steps the stepper motor has taken since power came, forward less backward.
   std::int32_t stepper_shaft(int channel) const { return steppers_[channel - 1].driver.shaft(); }
 
-  // The surroundings. Channels count from 1.
+  // What is connected from now on; nullptr: the vehicle on the bench. It must outlive this.
+  void connect(RobotModel* robot);
+
+  // The surroundings. Channels count from 1. Of a RobotModel motors and encoders are its own affair.
   void hold_handle(bool held);
   bool handle_held() const { return handle_held_; }
   // Something is `cm` (0: nothing) before the sensor.
@@ -112,12 +117,16 @@ class BoardModel {
     std::uint16_t counts = 0;
   };
 
+  void pass_millisecond_of(RobotModel& robot, Interrupts& interrupts);
+  void turn_bench_motors(Interrupts& interrupts);
   void turn(int channel, std::int32_t counts, Interrupts& interrupts);
   void tell_levels(int channel, Interrupts& interrupts);
   void steer(Drive drive);
   void convert_again();
 
   std::uint64_t seed_;
+  RobotModel* robot_ = nullptr;
+  RobotModel::Senses senses_;  // its
   std::uint32_t time_ms_ = 0;
   BoardChips chips_;
   Stepper steppers_[stepper_channels];

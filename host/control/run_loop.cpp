@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+#include "r4link/control/loop.hpp"
+#include "r4link/error.hpp"
+
+namespace r4::control {
+namespace {
+
+using Clock = LoopGuard::Clock;
+using Milliseconds = std::chrono::milliseconds;
+
+constexpr std::size_t waiting_states = 8;  // a state may come in several datagrams
+constexpr Milliseconds look_interval{20};  // at link and arming, while no state comes
+
+// The loop's own watch over its steps, as long as it runs.
+class StepWatchdog {
+ public:
+  StepWatchdog(Board& board, Milliseconds period) : board_(board), on_(period.count() > 0) {
+    if (on_) board_.watchdog(period);
+  }
+  ~StepWatchdog() {
+    if (on_) board_.watchdog(Milliseconds(0));
+  }
+  StepWatchdog(const StepWatchdog&) = delete;
+  StepWatchdog& operator=(const StepWatchdog&) = delete;
+  void feed() {
+    if (on_) board_.feed();
+  }
+
+ private:
+  Board& board_;
+  bool on_;
+};
+
+// Whatever there is left to say of how the outputs were left.
+std::string come_to_rest(Board& board, const LoopOptions& options, bool& at_rest) {
+  at_rest = true;
+  // They are safe already; nothing would be sent.
+  if (board.disarmed_by() != DisarmCause::none) return {};
+  try {
+    board.apply(options.rest, options.rest_timeout);
+    return {};
+  } catch (const Error&) {
+    if (board.disarmed_by() != DisarmCause::none) return {};
+  }
+  try {
+    board.stop(options.rest_timeout);
+    return "; the board did not confirm that its motors rest, and was stopped";
+  } catch (const Error&) {
+    board.stop_async();
+    at_rest = false;
+    return "; the board confirms no stop: it is asked on, and goes safe by itself when it hears "
+           "nothing; " +
+           std::string(stop_last_resort);
+  }
+}
+
+}  // namespace
+
+LoopReport run_loop(Board& board, const LoopOptions& options,
+                    const std::function<std::optional<Setpoints>(const LoopStep&)>& step) {
+  if (options.rest.empty()) {
+    throw Error(ErrorKind::usage, "LoopOptions::rest",
+                "it is empty: the motors would be left as they are",
+                "name each motor of the loop, with 0");
+  }
+  LoopGuard guard(options);
+  LoopReport report;
+  std::exception_ptr thrown;
+  board.setting("recovery", "rearm", std::chrono::seconds(1));
+  {
+    StepWatchdog watchdog(board, options.watchdog);
+    States states = board.states({.most = waiting_states});
+    guard.start(Clock::now());
+    while (guard.check(board.link().state, board.disarmed_by(), Clock::now()) == LoopEnd::none) {
+      watchdog.feed();
+      const auto left = std::chrono::ceil<Milliseconds>(guard.deadline() - Clock::now());
+      const auto state = states.take(std::clamp(left, Milliseconds(0), look_interval));
+      if (!state) {
+        if (states.ended()) guard.end(LoopEnd::not_active, "the board was closed");
+        continue;
+      }
+      const auto dt_s = guard.on_state(*state, board.disarmed_by(), Clock::now());
+      if (!dt_s) continue;
+      try {
+        const std::optional<Setpoints> wanted = step({*state, *dt_s});
+        if (!wanted) {
+          guard.end(LoopEnd::asked, "the step has ended it");
+          break;
+        }
+        ++report.steps;
+        guard.on_commanded(*wanted);
+        // What is not sent is not missed: the next is newer. The guard sees why.
+        if (!wanted->empty()) static_cast<void>(board.post(*wanted));
+      } catch (...) {
+        thrown = std::current_exception();
+        break;
+      }
+    }
+    report.end = guard.ended();
+    report.why = guard.why() + come_to_rest(board, options, report.at_rest);
+  }
+  if (thrown) std::rethrow_exception(thrown);
+  return report;
+}
+
+}  // namespace r4::control

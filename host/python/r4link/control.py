@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Control loops on the host (docs/control.md): PID, wheels, kinematics, odometry, and a loop that ends itself.
+
+Metres, radians, seconds; x forward, y and angles to the left, as in ROS (REP 103). The classes are those of C++
+(include/r4link/control/); none of them reads a clock.
+"""
+from __future__ import annotations
+
+import math
+from typing import Callable, Literal, NamedTuple, Sequence
+
+from . import _core
+from ._core import State
+from .board import Board, Setpoints, _ms
+
+LoopEnd = Literal['none', 'asked', 'late', 'not active', 'disarmed', 'standstill']
+
+
+class Twist(NamedTuple):
+    """How a robot moves on the ground."""
+    forward: float  # m/s
+    turn: float = 0.0  # rad/s
+
+
+class SideSpeeds(NamedTuple):
+    left: float
+    right: float
+
+
+class WheelSpeeds(NamedTuple):
+    front_left: float
+    rear_left: float
+    front_right: float
+    rear_right: float
+
+
+class CarCommand(NamedTuple):
+    speed: float  # of the middle of the rear axle
+    steering: float
+
+
+class Pose(NamedTuple):
+    x: float
+    y: float
+    yaw: float
+
+
+class Pid:
+    """Proportional, integral and derivative control of one value. The integral stands while the output cannot follow
+    (`minimum`, `maximum`, `rate` a second); the derivative is of the measured value, low-passed."""
+
+    def __init__(self, kp: float = 0.0, ki: float = 0.0, kd: float = 0.0, *, feed_forward: float = 0.0,
+                 minimum: float = -1.0, maximum: float = 1.0, rate: float = math.inf,
+                 derivative_filter: float = 0.0) -> None:
+        self._core = _core.Pid(kp, ki, kd, feed_forward, minimum, maximum, rate, derivative_filter)
+
+    def step(self, setpoint: float, measured: float, dt: float) -> float:
+        """The output, `dt` seconds after the last step. Raises DataError for what is no finite number."""
+        return self._core.step(setpoint, measured, dt)
+
+    def reset(self) -> None:
+        self._core.reset()
+
+    def take_over(self, output: float, setpoint: float, measured: float) -> None:
+        """Goes on from an output that something else has made so far, without a jump."""
+        self._core.take_over(output, setpoint, measured)
+
+    @property
+    def output(self) -> float:
+        return self._core.output
+
+    @property
+    def integral(self) -> float:
+        return self._core.integral
+
+
+class Wheel:
+    """A wheel with an encoder: give it each state, in order."""
+
+    def __init__(self, encoder: int, counts_a_turn: float, radius: float, *, reversed: bool = False,
+                 window: float = 0.05, max_speed: float = 20.0) -> None:
+        self._core = _core.Wheel(encoder, counts_a_turn, radius, reversed, max(0, _ms(window)), max_speed)
+
+    def advance(self, state: State) -> float:
+        """How far it has rolled since the state before, by ENCn."""
+        return self._core.advance(state)
+
+    def measured(self, state: State) -> float:
+        """Its speed as the board measures it, by ENCnHZ: new ten times a second."""
+        return self._core.measured(state)
+
+    def reset(self) -> None:
+        self._core.reset()
+
+    @property
+    def speed(self) -> float:
+        """By the counts of the last `window`: new with each state."""
+        return self._core.speed
+
+
+class SteeringSensor:
+    """The angle by AINSTEER, linear between two ends, (volts, angle) each."""
+
+    def __init__(self, left: tuple[float, float], right: tuple[float, float], margin: float = 0.3) -> None:
+        self._core = _core.SteeringSensor(left, right, margin)
+
+    def angle(self, state: State) -> float | None:
+        """None where the voltage cannot be: a cable is off. Do not drive then."""
+        return self._core.angle(state)
+
+    def volts(self, angle: float) -> float:
+        return self._core.volts(angle)
+
+
+class DifferentialDrive:
+    """Two driven wheels, `separation` apart. What is too fast becomes slower on the same path."""
+
+    def __init__(self, separation: float, max_wheel: float = math.inf) -> None:
+        self._core = _core.DifferentialDrive(separation, max_wheel)
+
+    def wheels(self, twist: Twist) -> SideSpeeds:
+        return SideSpeeds(*self._core.wheels(*twist))
+
+    def twist(self, wheels: SideSpeeds) -> Twist:
+        return Twist(*self._core.twist(*wheels))
+
+
+class FourWheelDrive:
+    """Four driven wheels that slip to turn, as if `track` were wider by `slip`."""
+
+    def __init__(self, track: float, slip: float = 1.5, max_wheel: float = math.inf) -> None:
+        self._core = _core.FourWheelDrive(track, slip, max_wheel)
+
+    def wheels(self, twist: Twist) -> WheelSpeeds:
+        return WheelSpeeds(*self._core.wheels(*twist))
+
+    def twist(self, wheels: WheelSpeeds) -> Twist:
+        return Twist(*self._core.twist(*wheels))
+
+
+class Ackermann:
+    """A car, steered in front; the robot is where the middle of its rear axle is."""
+
+    def __init__(self, wheelbase: float, max_steering: float, *, track: float = 0.0, max_speed: float = math.inf) -> None:
+        self._core = _core.Ackermann(wheelbase, track, max_steering, max_speed)
+
+    def command(self, twist: Twist) -> CarCommand:
+        """It cannot turn on the spot: then it stands."""
+        return CarCommand(*self._core.command(*twist))
+
+    def twist(self, command: CarCommand) -> Twist:
+        return Twist(*self._core.twist(*command))
+
+    def limited_steering(self, steering: float) -> float:
+        return self._core.limited_steering(steering)
+
+    def front_wheels(self, steering: float) -> SideSpeeds:
+        """The angle of each front wheel."""
+        return SideSpeeds(*self._core.front_wheels(steering))
+
+    def rear_wheels(self, command: CarCommand) -> SideSpeeds:
+        return SideSpeeds(*self._core.rear_wheels(*command))
+
+
+class Odometry:
+    """Where a robot is by what its wheels have done, and the covariance of that: variances in m^2 and rad^2 a metre of
+    the way, and rad^2 a radian turned."""
+
+    def __init__(self, *, length_per_m: float = 0.0004, turn_per_m: float = 0.0004, turn_per_rad: float = 0.0025) -> None:
+        self._core = _core.Odometry(length_per_m, turn_per_m, turn_per_rad)
+
+    def advance(self, length: float, turn: float) -> None:
+        self._core.advance(length, turn)
+
+    def reset(self, pose: Pose = Pose(0.0, 0.0, 0.0), covariance: Sequence[float] = (0.0,) * 9) -> None:
+        self._core.reset(*pose, covariance)
+
+    @property
+    def pose(self) -> Pose:
+        return Pose(*self._core.pose)
+
+    @property
+    def covariance(self) -> tuple[float, ...]:
+        """Of x, y and yaw, row by row."""
+        return self._core.covariance
+
+    def ros_covariance(self, unknown: float = 1e6) -> tuple[float, ...]:
+        """The 36 numbers of geometry_msgs/PoseWithCovariance."""
+        return self._core.ros_covariance(unknown)
+
+
+class Standstill(NamedTuple):
+    """A motor that turns an encoder: driven with `pwm` or more, it turns by more than `counts` within `time`."""
+    encoder: int = 1
+    channel: int = 1
+    drive: Literal['osmc', 'dhb12', 'bldc'] = 'osmc'
+    pwm: int = 400
+    counts: int = 3
+    time: float = 0.5
+
+
+class LoopReport(NamedTuple):
+    end: str  # a LoopEnd
+    why: str
+    at_rest: bool  # the outputs are as `rest` has them, or safe; if not, `why` says what to do
+    steps: int
+
+
+def _options(fields: str, late: float, first: float, standstill: Sequence[Standstill], rest: Setpoints,
+             rest_timeout: float, watchdog: float) -> _core.LoopOptions:
+    options = _core.LoopOptions(fields, _ms(late), _ms(first), rest._core, _ms(rest_timeout), _ms(watchdog))
+    for each in standstill:
+        options.add_standstill(each.encoder, each.drive, each.channel, each.pwm, each.counts, _ms(each.time))
+    return options
+
+
+class LoopGuard:
+    """When a loop has to end, for one of your own, with asyncio say; times are those of time.monotonic()."""
+
+    def __init__(self, *, fields: str = '', late: float = 0.1, first: float = 1.0,
+                 standstill: Sequence[Standstill] = ()) -> None:
+        self._core = _core.LoopGuard(_options(fields, late, first, standstill, Setpoints(), 0.2, 0.3))
+
+    def start(self, now: float) -> None:
+        self._core.start(now)
+
+    def on_state(self, state: State, disarmed_by: str, now: float) -> float | None:
+        """The seconds since the last step, on the board's clock, if one is due."""
+        return self._core.on_state(state, disarmed_by, now)
+
+    def on_commanded(self, setpoints: Setpoints) -> None:
+        self._core.on_commanded(setpoints._core)
+
+    def check(self, link: str, disarmed_by: str, now: float) -> str:
+        """A LoopEnd: to be asked at `deadline` at the latest, with Board.link.state and Board.disarmed_by."""
+        return self._core.check(link, disarmed_by, now)
+
+    @property
+    def deadline(self) -> float:
+        return self._core.deadline
+
+    @property
+    def ended(self) -> str:
+        return self._core.ended
+
+    @property
+    def why(self) -> str:
+        return self._core.why
+
+
+def run_loop(board: Board, step: Callable[[State, float], Setpoints | None], *, rest: Setpoints, fields: str = '',
+             late: float = 0.1, first: float = 1.0, standstill: Sequence[Standstill] = (), rest_timeout: float = 0.2,
+             watchdog: float = 0.3) -> LoopReport:
+    """Runs a loop on this thread until it ends: `step(state, dt)` for each new state that has all `fields`, with the
+    seconds since the step before on the board's clock. What it returns is posted; None ends the loop. Then the outputs
+    are left as `rest` has them. What the step raises comes after that; so does Ctrl-C."""
+    options = _options(fields, late, first, standstill, rest, rest_timeout, watchdog)
+
+    def posted(state: State, dt: float) -> _core.Setpoints | None:
+        wanted = step(state, dt)
+        return None if wanted is None else wanted._core
+
+    return LoopReport(*board._core.run_loop(options, posted))
+
+
+def wrapped(angle: float) -> float:
+    """The angle within -pi and pi."""
+    return _core.wrapped(angle)
+
+
+__all__ = ['Ackermann', 'CarCommand', 'DifferentialDrive', 'FourWheelDrive', 'LoopEnd', 'LoopGuard', 'LoopReport',
+           'Odometry', 'Pid', 'Pose', 'SideSpeeds', 'Standstill', 'State', 'SteeringSensor', 'Twist', 'Wheel', 'WheelSpeeds',
+           'run_loop', 'wrapped']

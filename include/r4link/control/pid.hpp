@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4::control::Pid: proportional, integral and derivative control of one value, with the time passed in.
+//
+//     r4::control::Pid speed({.kp = 0.4, .ki = 1.6, .feed_forward = 0.5, .rate = 8});
+//     const double duty = speed.step(wanted_m_s, is_m_s, dt_s);
+//
+// The output is the sum of
+//
+//     feed_forward * setpoint       what would be right if the robot were as its model is
+//     kp * error                    error = setpoint - measured
+//     ki * integral of the error    which stands still while the output cannot follow the error (anti-windup)
+//     -kd * d(measured)/dt          of the measured value, so that a new setpoint gives no kick; low-passed
+//
+// limited in its value and in how fast it changes (Astrom and Murray, Feedback Systems, 2nd ed., chapter 11). Setpoint
+// and measured value have one unit, any; the output another, say -1 to 1 of the duty. No clock, no heap.
+#pragma once
+
+#include <limits>
+
+#include "../config.hpp"
+
+namespace r4::control {
+
+struct PidOptions {
+  double kp = 0;            // output a unit of error
+  double ki = 0;            // output a unit of error and second
+  double kd = 0;            // output a unit a second
+  double feed_forward = 0;  // output a unit of setpoint
+  double minimum = -1;      // of the output
+  double maximum = 1;
+  double rate = std::numeric_limits<double>::infinity();  // of the output a second, up and down
+  double derivative_filter_s = 0;  // time constant of the derivative's low pass; 0: none
+};
+
+class R4LINK_API Pid {
+ public:
+  // Throws Error{usage} for what is no number, limits of which none lies between, and a rate or a filter of less than
+  // nothing.
+  explicit Pid(const PidOptions& options);
+
+  // The output, `dt_s` seconds after the last step. Without time (0, or less) nothing changes, and it is the output of
+  // before. Throws Error{data} for a setpoint or a measured value that is no finite number.
+  double step(double setpoint, double measured, double dt_s);
+  // The newest output.
+  double output() const { return output_; }
+  // Its integral term, in units of the output.
+  double integral() const { return integral_; }
+
+  // Forgets all: the output is 0, or the limit next to it.
+  void reset();
+  // Goes on from an output that something else has made so far: without a jump, for its integral explains it.
+  void take_over(double output, double setpoint, double measured);
+
+ private:
+  double limited(double output) const;
+
+  PidOptions options_;
+  double integral_ = 0;
+  double derivative_ = 0;
+  double measured_ = 0;  // in the last step
+  bool has_measured_ = false;
+  double output_ = 0;
+};
+
+}  // namespace r4::control

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a robot's encoders and its steering sensor say, in metres, metres a second and radians.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "../config.hpp"
+#include "../state.hpp"
+
+namespace r4::control {
+
+struct WheelGeometry {
+  int encoder = 1;           // 1-4
+  double counts_a_turn = 0;  // of the wheel: the encoder's, times the gear's ratio
+  double radius_m = 0;
+  bool reversed = false;  // it counts down when the robot goes forward
+};
+
+// A wheel with an encoder. Give it each state, in order.
+class R4LINK_API Wheel {
+ public:
+  // `window_ms`: speed_m_s() is the mean of at least so much time. `max_speed_m_s`: what is faster is no movement, but an
+  // encoder that was set to zero or a board that began again. Throws Error{usage} for what cannot be.
+  explicit Wheel(const WheelGeometry& geometry, std::uint32_t window_ms = 50,
+                 double max_speed_m_s = 20);
+
+  // How far it has rolled since the state before, m, by ENCn; 0 at first.
+  double advance(const State& state);
+  // Its speed by the counts of the last window: new in each state, and half a window old. It needs ENCn.
+  double speed_m_s() const { return speed_m_s_; }
+  // Its speed as the board measures it, by ENCnHZ: new ten times a second, and 50 to 150 ms old. It needs no states
+  // before, and no ENCn.
+  double measured_m_s(const State& state) const;
+  double metres_a_count() const { return metres_a_count_; }
+  int encoder() const { return geometry_.encoder; }
+  void reset();
+
+ private:
+  struct Sample {
+    std::uint32_t t_ms = 0;
+    std::int32_t counts = 0;
+  };
+  static constexpr std::size_t most_samples = 64;
+
+  WheelGeometry geometry_;
+  std::uint32_t window_ms_;
+  double max_speed_m_s_;
+  double metres_a_count_;
+  std::array<Sample, most_samples> samples_{};  // a ring, the newest at newest_
+  std::size_t newest_ = 0;
+  std::size_t count_ = 0;
+  double speed_m_s_ = 0;
+};
+
+// Where the steering stands, by AINSTEER: linear between two angles whose voltages were measured.
+class R4LINK_API SteeringSensor {
+ public:
+  struct Calibration {
+    double left_volts = 0;   // at left_rad
+    double left_rad = 0;     // above 0
+    double right_volts = 0;  // at right_rad
+    double right_rad = 0;    // below 0
+    // As far beyond these ends it is believed; what is farther is a cable that is off or a sensor that is broken.
+    double margin_volts = 0.3;
+  };
+  // Throws Error{usage} if the ends are one.
+  explicit SteeringSensor(const Calibration& calibration);
+
+  // Nothing where the voltage cannot be: then do not steer by it, and do not drive.
+  std::optional<double> angle_rad(const State& state) const;
+  // The voltage of an angle.
+  double volts(double angle_rad) const;
+
+ private:
+  Calibration calibration_;
+};
+
+}  // namespace r4::control

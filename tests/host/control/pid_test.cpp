@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "r4link/control/pid.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "r4link/error.hpp"
+
+namespace r4::control {
+namespace {
+
+TEST(Pid, AddsItsTermsUp) {
+  Pid pid({.kp = 0.5, .ki = 2, .feed_forward = 0.1, .minimum = -10, .maximum = 10});
+  EXPECT_DOUBLE_EQ(pid.step(4, 3, 0.1), 0.4 + 0.5 + 0.2);
+  EXPECT_DOUBLE_EQ(pid.step(4, 3, 0.1), 0.4 + 0.5 + 0.4);
+  EXPECT_DOUBLE_EQ(pid.integral(), 0.4);
+  EXPECT_DOUBLE_EQ(pid.step(4, 3, 0), 0.4 + 0.5 + 0.4) << "no time has passed";
+}
+
+TEST(Pid, DoesNotWindUpWhileTheOutputIsAtItsLimit) {
+  Pid pid({.kp = 1, .ki = 10});
+  for (int i = 0; i < 1000; ++i) EXPECT_EQ(pid.step(5, 0, 0.01), 1);
+  // What it has wanted in vain it does not make up for: it lets go at once.
+  EXPECT_LT(pid.step(5, 5.5, 0.01), 0);
+  for (int i = 0; i < 1000; ++i) EXPECT_EQ(pid.step(-5, 0, 0.01), -1);
+  EXPECT_GT(pid.step(-5, -5.5, 0.01), 0);
+}
+
+TEST(Pid, ChangesItsOutputNoFasterThanItsRate) {
+  Pid pid({.kp = 1, .ki = 1, .rate = 2});
+  EXPECT_DOUBLE_EQ(pid.step(1, 0, 0.1), 0.2);
+  EXPECT_DOUBLE_EQ(pid.step(1, 0, 0.1), 0.4);
+  EXPECT_DOUBLE_EQ(pid.integral(), 0) << "held by the rate, it does not wind up either";
+  EXPECT_DOUBLE_EQ(pid.step(-1, 0, 0.05), 0.3);
+}
+
+TEST(Pid, TakesTheDerivativeOfWhatIsMeasuredAndSmoothsIt) {
+  Pid pid({.kd = 0.1, .minimum = -10, .maximum = 10});
+  EXPECT_EQ(pid.step(0, 1, 0.1), 0) << "there is no slope of one value";
+  EXPECT_EQ(pid.step(100, 1, 0.1), 0) << "a new setpoint gives no kick";
+  EXPECT_DOUBLE_EQ(pid.step(100, 3, 0.1), -2);
+
+  Pid smooth({.kd = 0.1, .minimum = -10, .maximum = 10, .derivative_filter_s = 0.3});
+  smooth.step(0, 1, 0.1);
+  EXPECT_DOUBLE_EQ(smooth.step(0, 3, 0.1), -0.5) << "a quarter of it, for 0.1 of 0.4 s";
+}
+
+TEST(Pid, TakesOverWithoutAJump) {
+  Pid pid({.kp = 0.5, .ki = 1, .feed_forward = 0.2});
+  pid.take_over(0.7, 2, 1.8);
+  EXPECT_NEAR(pid.step(2, 1.8, 1e-6), 0.7, 1e-6);
+  pid.reset();
+  EXPECT_EQ(pid.output(), 0);
+  EXPECT_EQ(pid.integral(), 0);
+}
+
+TEST(Pid, RefusesWhatIsNoNumber) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  Pid pid({.kp = 1});
+  pid.step(0.3, 0, 0.1);
+  EXPECT_THROW(pid.step(nan, 0, 0.1), Error);
+  EXPECT_THROW(pid.step(0, std::numeric_limits<double>::infinity(), 0.1), Error);
+  EXPECT_DOUBLE_EQ(pid.step(0.3, 0, nan), 0.3) << "no time, as far as is known";
+  EXPECT_THROW(Pid({.kp = nan}), Error);
+  EXPECT_THROW(Pid({.minimum = 1, .maximum = 1}), Error);
+  EXPECT_THROW(Pid({.rate = 0}), Error);
+  EXPECT_THROW(Pid({.derivative_filter_s = -1}), Error);
+}
+
+}  // namespace
+}  // namespace r4::control

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""r4link.control: what tests/host/control asserts of C++ holds here for each class once, and a loop on a board."""
+import math
+import time
+
+import pytest
+
+import r4link
+from r4link import Setpoints, control
+
+
+def test_pid_follows_its_gains_and_limits():
+    pid = control.Pid(0.5, 2.0, feed_forward=0.1, minimum=-10, maximum=10)
+    assert pid.step(4, 3, 0.1) == pytest.approx(1.1)
+    assert (pid.output, pid.integral) == pytest.approx((1.1, 0.2))
+    pid.take_over(3.0, 1, 1)
+    assert pid.step(1, 1, 0.001) == pytest.approx(3.0)
+    assert control.Pid(1.0, rate=2).step(9, 0, 0.1) == pytest.approx(0.2)
+    with pytest.raises(r4link.UsageError, match='minimum'):
+        control.Pid(1.0, minimum=1)
+    with pytest.raises(r4link.DataError):
+        pid.step(math.nan, 0, 0.1)
+
+
+def test_kinematics_go_both_ways():
+    twist = control.Twist(1.0, 0.5)
+    two = control.DifferentialDrive(0.5)
+    assert two.wheels(twist) == control.SideSpeeds(0.875, 1.125)
+    assert two.twist(two.wheels(twist)) == pytest.approx(twist)
+    four = control.FourWheelDrive(0.4, slip=2.0)
+    assert four.wheels(twist).rear_right == pytest.approx(1.2)
+    assert four.twist(four.wheels(twist)) == pytest.approx(twist)
+    car = control.Ackermann(1.0, 0.6, track=0.6, max_speed=2)
+    assert car.twist(car.command(twist)) == pytest.approx(twist)
+    assert car.command(control.Twist(5.0)).speed == 2 and car.limited_steering(1) == 0.6
+    assert car.front_wheels(0.4).left > 0.4 > car.front_wheels(0.4).right
+    assert car.rear_wheels(car.command(twist)).right > 1
+
+
+def test_odometry_knows_where_it_is_and_how_well():
+    odometry = control.Odometry(turn_per_m=0)
+    odometry.advance(math.pi, math.pi)
+    assert odometry.pose == pytest.approx((0, 2, math.pi)) or odometry.pose.yaw == pytest.approx(-math.pi)
+    assert odometry.covariance[8] == pytest.approx(0.0025 * math.pi)
+    assert odometry.ros_covariance(7)[35] == odometry.covariance[8] and odometry.ros_covariance(7)[14] == 7
+    odometry.reset(control.Pose(1, 2, 0))
+    assert odometry.pose == (1, 2, 0) and not any(odometry.covariance)
+    assert control.wrapped(3 * math.pi / 2) == pytest.approx(-math.pi / 2)
+
+
+@pytest.fixture(name='armed')
+def a_board_that_may_drive(sim):
+    with r4link.Board(sim.url, fields='OSMC1,ENC1,ENC1HZ,AINSTEER') as board:
+        board.wait_active()
+        board.arm()
+        yield board
+
+
+def osmc(duty):
+    return Setpoints().osmc(1, round(abs(duty) * 4095), r4link.FORWARD if duty >= 0 else r4link.REVERSE)
+
+
+def test_a_loop_controls_a_speed_and_comes_to_rest(armed, sim):
+    wheel = control.Wheel(1, 4000, 1 / math.pi, window=0.05)  # 2 m/s at full duty
+    pid = control.Pid(0.5, 2.0, feed_forward=0.3)
+    sensor = control.SteeringSensor((4.0, 0.6), (1.0, -0.6))
+    passed, way, measured, angles = 0.0, 0.0, 0.0, []
+
+    def step(state, dt):
+        nonlocal passed, way, measured
+        passed += dt
+        way += wheel.advance(state)
+        measured = wheel.measured(state)
+        angles.append(sensor.angle(state))
+        return osmc(pid.step(1.0, wheel.speed, dt)) if passed < 1.2 else None
+
+    report = control.run_loop(armed, step, rest=osmc(0), fields='ENC1,AINSTEER', late=1.0, watchdog=1.0,
+                              standstill=[control.Standstill(time=2.0)])
+    assert (report.end, report.at_rest) == ('asked', True), report
+    assert wheel.speed == pytest.approx(1.0, rel=0.2) and measured == pytest.approx(1.0, rel=0.3)
+    assert 0.5 < way < 1.4 and report.steps > 10
+    assert angles[-1] == pytest.approx(-0.6, abs=0.1) and sensor.volts(0) == pytest.approx(2.5)
+    assert sim.look().osmc[0].pwm == 0
+
+
+def test_what_a_step_raises_comes_after_the_rest(armed, sim):
+    def step(state, dt):
+        if state.enc1 > 5:
+            raise RuntimeError('no path')
+        return osmc(0.5)
+
+    with pytest.raises(RuntimeError, match='no path'):
+        control.run_loop(armed, step, rest=osmc(0), fields='ENC1', late=1.0, watchdog=1.0)
+    assert sim.look().osmc[0].pwm == 0
+    with pytest.raises(r4link.UsageError, match='rest'):
+        control.run_loop(armed, step, rest=Setpoints())
+
+
+def test_a_loop_ends_when_the_handle_is_released(armed, sim):
+    def step(state, dt):
+        if state.enc1 > 5:
+            sim.handle(False)
+        return osmc(0.5)
+
+    report = control.run_loop(armed, step, rest=osmc(0), fields='ENC1', late=1.0, watchdog=1.0)
+    assert report.end in ('disarmed', 'not active') and 'handle' in report.why and report.at_rest
+    assert sim.look().is_safe
+
+
+def test_a_guard_is_there_for_loops_of_another_kind(armed):
+    guard = control.LoopGuard(fields='ENC1', late=0.2)
+    guard.start(time.monotonic())
+    state = armed.next_state()
+    now = state.sampled
+    assert guard.on_state(state, armed.disarmed_by, now) == 0.0
+    guard.on_commanded(osmc(0.5))
+    assert guard.deadline == pytest.approx(now + 0.2, abs=0.001)
+    assert guard.check('active', 'none', now + 0.1) == 'none'
+    assert guard.check('active', 'none', now + 0.3) == 'late'
+    assert guard.ended == 'late' and '200 ms' in guard.why
+    with pytest.raises(r4link.UsageError):
+        guard.check('well', 'none', now)

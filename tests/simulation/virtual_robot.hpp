@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A robot, its board and its host in virtual time: the firmware on the models of its chips, the session that ships, and
+// between them a link that delays and loses. One seed is one run.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "firmware/application/application.hpp"
+#include "firmware/ports/sim/simulated_hardware.hpp"
+#include "host/session/session.hpp"
+#include "incurious_host.hpp"
+#include "random.hpp"
+
+namespace r4::simulation {
+
+class VirtualRobot final : public firmware::Port, public IncuriousHost {
+ public:
+  using Clock = ReceivedState::Clock;
+  struct Link {
+    std::uint64_t delay_us = 5000;
+    std::uint64_t jitter_us = 2000;  // more or less than the delay, evenly
+    double loss = 0;                 // in each direction
+  };
+
+  // `fields`: as in F. `robot`: in place of the vehicle on the bench.
+  VirtualRobot(std::uint64_t seed, const Link& link, const std::string& fields,
+               sim::RobotModel* robot = nullptr);
+
+  // Until the board is ACTIVE under our control and armed.
+  bool arm();
+  // A millisecond passes at all ends.
+  void pass_millisecond();
+  void pass(std::uint64_t ms) {
+    while (ms-- != 0) pass_millisecond();
+  }
+
+  // Told each state as it comes.
+  std::function<void(const ReceivedState&)> state_came;
+  bool link_cut = false;     // nothing passes, in either direction
+  bool host_lives = true;    // a killed process says nothing any more
+  bool states_stop = false;  // the board's states are lost, and nothing else
+
+  Session& session() { return session_; }
+  Time now() const { return Time{static_cast<std::int64_t>(now_us_)}; }
+  Clock::time_point clock() const { return Clock::time_point(now()); }
+  double seconds() const { return static_cast<double>(now_us_) / 1e6; }
+  sim::BoardModel& model() { return model_; }
+  const firmware::Application& application() const { return *application_; }
+
+ private:
+  struct Packet {
+    std::uint64_t at_us;
+    bool to_board;
+    std::string bytes;
+  };
+  void put(bool to_board, std::string_view bytes);
+  std::uint32_t board_ms() const { return boot_ms_ + static_cast<std::uint32_t>(now_us_ / 1000); }
+
+  // firmware::Port
+  void send(Text datagram, Priority priority, std::uint32_t peer) override;
+  std::size_t max_size() const override { return max_datagram; }
+  // IncuriousHost
+  SendResult transmit(std::string_view bytes, Priority priority) override;
+  void on_state(const ReceivedState& state, const Datagram& datagram) override;
+
+  Random random_;
+  const Link link_;
+  const std::uint32_t boot_ms_;
+  std::uint64_t now_us_ = 1'000'000;
+  std::uint8_t chance_[Authentication::chance_size] = {7};
+  std::vector<Packet> packets_;
+  sim::BoardModel model_;
+  sim::SimulatedHardware hardware_;
+  std::unique_ptr<firmware::Application> application_;
+  Session session_;
+};
+
+}  // namespace r4::simulation
