@@ -31,6 +31,7 @@ void add_subcommands(CLI::App& root, Action& chosen) {
   add_stop(root, chosen);
   add_list(root, chosen);
   add_doctor(root, chosen);
+  add_bridge(root, chosen);
   add_bus(root, chosen);
   add_bench(root, chosen);
   add_record(root, chosen);
