@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::Fleet: many boards on one thread, opened by URLs and by patterns of URLs.
+// r4::Fleet: many boards on one thread, opened by URLs and by patterns of URLs. r4::Bridge: the same boards for hosts on
+// another transport, at the end.
 //
 //     r4::Fleet fleet({"can://can0?node=0-7", "udp://10.0.0.{1-250}?listen=0"});
 //     fleet.wait_active();
@@ -24,6 +25,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -205,6 +207,80 @@ class R4LINK_API FleetBoard {
   FleetBoard(Fleet& fleet, std::size_t board) : fleet_(&fleet), board_(board) {}
   Fleet* fleet_;
   std::size_t board_;
+};
+
+// --- two transports joined: a gateway to a board (docs/bridge.md)
+
+enum class BridgeSide : std::uint8_t { hosts, board };
+
+// What came from one side of a bridge, in datagrams, and what became of it.
+struct BridgeCounters {
+  std::uint64_t passed = 0;  // to the other side
+  std::uint64_t stops = 0;   // of those: emergency stops
+  // Dropped:
+  std::uint64_t damaged = 0;  // a wrong checksum, too long, or no datagram at all
+  std::uint64_t misdirected =
+      0;  // what only a board says from the hosts' side, or the other way round
+  std::uint64_t kept_out = 0;  // heartbeats, commands and leases while another host has the place
+  std::uint64_t late = 0;      // may have waited for more than 100 ms: the bridge was held up
+  std::uint64_t undelivered = 0;  // the other side is away, takes no more, or nobody is known there
+  // Of what passed: a newer state took its place in front of the other side, or it waited there for 100 ms.
+  std::uint64_t outdated = 0;
+};
+
+struct BridgeEnd {
+  std::string name;  // of the transport
+  bool up = false;
+  BridgeCounters from;
+};
+
+// One board and its hosts.
+struct BridgeStatus {
+  BridgeEnd hosts;
+  BridgeEnd board;
+};
+
+// A transport went down, came up or has a warning.
+struct BridgeEvent {
+  std::size_t pair = 0;  // which board, from 0
+  BridgeSide side = BridgeSide::hosts;
+  CarrierEvent event;
+};
+
+struct BridgeOptions {
+  // After so long without a heartbeat of the host that has the place another one gets it: no shorter than the
+  // board's timeout.
+  std::chrono::milliseconds timeout{1000};
+  // Called on the bridge's thread, which it must not hold up.
+  std::function<void(const BridgeEvent&)> on_event;
+};
+
+// Carries the datagrams of hosts to a board and back, as they are, on a thread of its own:
+//
+//     r4::Bridge bridge("udp://0.0.0.0:2018", "can://can0?node=3");
+//     r4::Bridge bus("udp://0.0.0.0:2100-2107", "can://can0?node=0-7");
+//
+// It makes no heartbeat: a board whose host has died goes safe. Of several hosts one at a time is let through, and
+// E:STOP of any. A device that is not there, or goes, is waited for. Thread-safe.
+class R4LINK_API Bridge {
+ public:
+  // `hosts`: where hosts are heard, as r4 sim takes it; `board`: as a host takes it. Patterns of as many boards
+  // (docs/fleet.md) are joined in order. Throws Error: usage, permission, and what a port cannot be opened for.
+  Bridge(std::string_view hosts, std::string_view board, BridgeOptions options = {});
+  ~Bridge();
+  Bridge(const Bridge&) = delete;
+  Bridge& operator=(const Bridge&) = delete;
+
+  // Ends it at once; the boards go safe after their timeout. Can be called twice.
+  void close();
+
+  std::size_t size() const;  // boards
+  // Of each, in order; after close(), how it was then.
+  std::vector<BridgeStatus> status() const;
+
+ private:
+  struct R4LINK_PRIVATE Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace r4

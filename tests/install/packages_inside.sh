@@ -25,11 +25,14 @@ completes() {
   zsh -n /usr/share/zsh/vendor-completions/_r4
 }
 step 'completions' completes
-unit_is_safe() {
-  systemd-analyze verify r4-record@left-arm.service
-  systemd-analyze security --offline=true --threshold=25 r4-record@left-arm.service
+units_are_safe() {
+  local unit
+  for unit in r4-record@left-arm.service r4-bridge@usb.service; do
+    systemd-analyze verify "$unit"
+    systemd-analyze security --offline=true --threshold=25 "$unit"
+  done
 }
-step 'r4-record@.service is whole, and exposes little' unit_is_safe
+step 'r4-record@.service and r4-bridge@.service are whole, and expose little' units_are_safe
 wireshark_knows_it() {
   ! compgen -G '/usr/lib/*/wireshark/plugins/r4.lua' >/dev/null || tshark -G protocols 2>/dev/null | grep -P '\tr4$'
 }

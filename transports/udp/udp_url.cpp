@@ -12,6 +12,12 @@ bool is_search(const Url& url, Role role) {
   return role == Role::host && url.host().empty() && (url.path() == "auto" || url.get("id"));
 }
 
+// A board that is to listen, and no more is said, listens to programs of this machine.
+std::string host_of(const Url& url, Role role) {
+  const bool listens = role == Role::board && url.path().empty() && url.text().find("//") == 4;
+  return url.host().empty() && listens ? "127.0.0.1" : url.host();
+}
+
 std::uint16_t port_of(const Url& url, Role role) {
   if (!is_search(url, role)) return url.port().value_or(UdpUrl::board_port);
   return static_cast<std::uint16_t>(url.get_number("port", 1, 65535, UdpUrl::board_port));
@@ -23,7 +29,7 @@ UdpUrl::UdpUrl(const Url& url, Role role)
     : text(url.text()),
       search(is_search(url, role)),
       called(url.get("id").value_or("")),
-      host(url.host()),
+      host(host_of(url, role)),
       port(port_of(url, role)),
       listen(static_cast<std::uint16_t>(url.get_number("listen", 0, 65535, host_port))) {
   if (search) {

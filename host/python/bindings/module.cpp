@@ -12,4 +12,5 @@ PYBIND11_MODULE(_core, module) {
   r4::python::bind_recording(module);
   r4::python::bind_simulation(module);
   r4::python::bind_fleet(module);
+  r4::python::bind_bridge(module);
 }

@@ -4,6 +4,7 @@ from . import aio, control
 from ._core import (FIELDS, BoardHealth, CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State,
                     Statistics, Subscription, __version__)
 from .board import (BldcChannel, Board, DriveChannel, RelayChannel, ServoChannel, Setpoints, States, StepperChannel)
+from .bridge import Bridge, BridgeCounters, BridgeEnd, BridgeStatus
 from .errors import (CancelledError, ClosedError, DataError, DeniedError, Error, NotArmedError, NotConfirmedError,
                      OpenError, RefusedError, UnsupportedError, UsageError)
 from .fleet import Fleet, FleetEvent, FleetResults
@@ -15,7 +16,7 @@ FORWARD = Direction.FORWARD
 REVERSE = Direction.REVERSE
 
 __all__ = [
-    'FIELDS', 'FORWARD', 'REVERSE', 'Bldc', 'BldcChannel', 'Board', 'BoardHealth', 'CancelledError', 'CarrierCounters',
+    'FIELDS', 'FORWARD', 'REVERSE', 'Bldc', 'BldcChannel', 'Board', 'BoardHealth', 'Bridge', 'BridgeCounters', 'BridgeEnd', 'BridgeStatus', 'CancelledError', 'CarrierCounters',
     'ClosedError', 'Command', 'DataError', 'DeniedError', 'Direction', 'Drive', 'DriveChannel', 'Error', 'Event',
     'Fleet', 'FleetEvent', 'FleetResults', 'Identity', 'LinkStatus', 'LinkedUrl', 'Log', 'Look', 'NotArmedError',
     'NotConfirmedError', 'OpenError', 'PostResult', 'RecordedBoard', 'RecordedDatagram', 'RecordedEvent', 'Recording',

@@ -32,13 +32,17 @@ struct Subcommand {
 };
 
 constexpr std::array subcommands = std::to_array<Subcommand>({
-    {"monitor", add_monitor}, {"send", add_send},       {"stop", add_stop},
-    {"list", add_list},       {"doctor", add_doctor},   {"bus", add_bus},
-    {"bench", add_bench},     {"record", add_record},   {"info", add_info},
-    {"convert", add_convert}, {"plot", add_plot},       {"replay", add_replay},
-    {"metrics", add_metrics}, {"web", add_web},         {"ros2", add_ros2},
-    {"sim", add_sim},         {"key", add_key_command}, {"demo", add_demo},
-    {"encode", add_encode},   {"decode", add_decode},   {"completion", add_completion},
+    {"monitor", add_monitor}, {"send", add_send},
+    {"stop", add_stop},       {"list", add_list},
+    {"doctor", add_doctor},   {"bridge", add_bridge},
+    {"bus", add_bus},         {"bench", add_bench},
+    {"record", add_record},   {"info", add_info},
+    {"convert", add_convert}, {"plot", add_plot},
+    {"replay", add_replay},   {"metrics", add_metrics},
+    {"web", add_web},         {"ros2", add_ros2},
+    {"sim", add_sim},         {"key", add_key_command},
+    {"demo", add_demo},       {"encode", add_encode},
+    {"decode", add_decode},   {"completion", add_completion},
     {"man", add_man},
 });
 

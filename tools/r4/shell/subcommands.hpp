@@ -22,6 +22,7 @@ void add_list(CLI::App& root, Action& chosen);
 void add_encode(CLI::App& root, Action& chosen);
 void add_decode(CLI::App& root, Action& chosen);
 void add_doctor(CLI::App& root, Action& chosen);
+void add_bridge(CLI::App& root, Action& chosen);
 void add_bus(CLI::App& root, Action& chosen);
 void add_bench(CLI::App& root, Action& chosen);
 void add_record(CLI::App& root, Action& chosen);

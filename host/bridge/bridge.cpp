@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4::Bridge: its pairs on one loop, and the thread of that.
+#include <asio/io_context.hpp>
+#include <asio/post.hpp>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "../../transports/operation_slot.hpp"
+#include "../../transports/url.hpp"
+#include "../standard_registry.hpp"
+#include "bridge_urls.hpp"
+#include "bridged_pair.hpp"
+
+namespace r4 {
+namespace {
+
+// A device may be plugged in later; where a program listens is there, or it is a mistake.
+BridgedPair::Absence absence_of(const std::string& url) {
+  const std::string scheme = Url::parse(url).scheme();
+  return scheme == "serial" || scheme == "can" ? BridgedPair::Absence::awaited
+                                               : BridgedPair::Absence::refused;
+}
+
+}  // namespace
+
+struct Bridge::Impl {
+  Impl(std::string_view hosts, std::string_view board, BridgeOptions options)
+      : on_event(std::move(options.on_event)) {
+    if (options.timeout <= std::chrono::milliseconds(0)) {
+      throw Error(ErrorKind::usage, "a bridge's timeout", "it must be more than 0",
+                  "give the board's, which is 1000 ms where nobody has set another");
+    }
+    for (const BridgedUrls& urls : pair_urls(hosts, board)) {
+      BridgedPair::Setup setup;
+      setup.hosts = standard_registry().make(io, urls.hosts, Role::board);
+      setup.board = make_host_carrier(io, urls.board, BoardRole::control);
+      setup.hosts_absence = absence_of(urls.hosts);
+      setup.timeout = options.timeout;
+      setup.on_event = [this, pair = pairs.size()](BridgeSide side, const CarrierEvent& event) {
+        if (on_event) on_event({pair, side, event});
+      };
+      pairs.push_back(std::make_unique<BridgedPair>(std::move(setup)));
+    }
+    open();
+  }
+
+  ~Impl() { close(); }
+
+  // On the loop, where no name that is looked up holds the others up.
+  void open() {
+    tick_later();
+    thread = std::thread([this] { io.run(); });
+    try {
+      on_loop([this] {
+        for (const auto& pair : pairs) pair->open();
+      });
+    } catch (...) {
+      close();
+      throw;
+    }
+  }
+
+  void close() {
+    const std::lock_guard lock(mutex);
+    if (!thread.joinable()) return;
+    on_loop([this] {
+      last = collect();
+      for (const auto& pair : pairs) pair->close();
+      ticking.cancel();
+      io.stop();
+    });
+    thread.join();
+  }
+
+  std::vector<BridgeStatus> status() {
+    const std::lock_guard lock(mutex);
+    if (!thread.joinable()) return last;
+    std::vector<BridgeStatus> now;
+    on_loop([&] { now = collect(); });
+    return now;
+  }
+
+  std::vector<BridgeStatus> collect() const {
+    std::vector<BridgeStatus> all;
+    all.reserve(pairs.size());
+    for (const auto& pair : pairs) all.push_back(pair->status());
+    return all;
+  }
+
+  // Waits until it is done there, which takes no longer than a turn of the loop.
+  template <class Action>
+  void on_loop(Action action) {
+    std::promise<void> done;
+    asio::post(io, [&] {
+      try {
+        action();
+        done.set_value();
+      } catch (...) {
+        done.set_exception(std::current_exception());
+      }
+    });
+    done.get_future().get();
+  }
+
+  void tick_later() {
+    timer.expires_after(WaitingTime::tick_interval);
+    timer.async_wait(ticking.handler([this] {
+      for (const auto& pair : pairs) pair->tick();
+      tick_later();
+    }));
+  }
+
+  const std::function<void(const BridgeEvent&)> on_event;
+  // Other threads do nothing on it but post: what the reactor does needs no locks.
+  asio::io_context io{ASIO_CONCURRENCY_HINT_UNSAFE_IO};
+  LoopTimer timer{io};
+  OperationSlot ticking;
+  std::vector<std::unique_ptr<BridgedPair>> pairs;
+  std::mutex mutex;  // of who calls from outside
+  std::vector<BridgeStatus> last;
+  std::thread thread;
+};
+
+Bridge::Bridge(std::string_view hosts, std::string_view board, BridgeOptions options)
+    : impl_(std::make_unique<Impl>(hosts, board, std::move(options))) {}
+Bridge::~Bridge() = default;
+
+void Bridge::close() { impl_->close(); }
+std::size_t Bridge::size() const { return impl_->pairs.size(); }
+std::vector<BridgeStatus> Bridge::status() const { return impl_->status(); }
+
+}  // namespace r4

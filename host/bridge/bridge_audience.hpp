@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Who hears a board through a bridge besides the host that has the place: who watches (docs/protocol.md, 4.8), and for
+// a second who has stopped it, or asked it something.
+//
+//     W:rate --> is told a LEASE --W:rate that echoes it--> hears everything for two seconds, again by the next W
+//
+// As at the board, nothing is streamed before the echo of a random number that was told to that very place: so nobody has
+// a bridge flood a third by forging where a W comes from.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <random>
+
+#include "r4link/vocabulary.hpp"
+
+namespace r4 {
+
+class BridgeAudience {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+  static constexpr std::chrono::milliseconds lease{2000};
+  static constexpr std::chrono::milliseconds curiosity{1000};  // after a stop or a question
+  static constexpr std::size_t places = 16;
+  static constexpr int most_watchers = 4;
+
+  enum class Effect : std::uint8_t { watching, unproven, full };
+  // `W` of a host, with its T; `rate` 0 ends its lease.
+  Effect on_lease(Peer from, bool ends, std::uint64_t echo, Time now);
+  // That host is told this LEASE: by the board, or a new one by us.
+  void tell(Peer to, std::uint32_t token, Time now);
+  std::uint32_t new_token();
+
+  // That host has stopped the board: it wants to hear how the board takes it.
+  void on_stop(Peer from, Time now) { place_of(from, now).asked_until = now + curiosity; }
+
+  // It has asked something by a datagram of that number.
+  void on_question(Peer from, std::uint32_t pnum, Time now);
+  // Whose question is this an answer to?
+  std::optional<Peer> asker_of(std::uint32_t pnum, Time now) const;
+
+  // Calls `call(peer)` for each that hears states, or heartbeats.
+  template <class Call>
+  void for_each_watcher(Time now, Call call) const {
+    for (const Place& place : places_) {
+      if (place.used && now < place.watches_until) call(place.peer);
+    }
+  }
+  template <class Call>
+  void for_each_listener(Time now, Call call) const {
+    for (const Place& place : places_) {
+      if (place.used && (now < place.watches_until || now < place.asked_until)) call(place.peer);
+    }
+  }
+  // Is there nobody? Then nobody need be looked for.
+  bool empty() const { return !any_; }
+
+ private:
+  struct Place {
+    bool used = false;
+    Peer peer = everyone;
+    Time heard;
+    std::uint32_t token = 0;  // 0: none
+    Time told;
+    Time watches_until;
+    Time asked_until;
+  };
+  struct Question {
+    Peer from = everyone;
+    std::uint32_t pnum = 0;
+    Time at;
+  };
+
+  Place& place_of(Peer peer, Time now);
+
+  std::array<Place, places> places_;
+  std::array<Question, 64> questions_;
+  std::size_t next_question_ = 0;
+  bool any_ = false;
+  std::random_device random_;
+};
+
+}  // namespace r4

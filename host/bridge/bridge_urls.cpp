@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bridge_urls.hpp"
+
+#include <asio/io_context.hpp>
+#include <asio/ip/udp.hpp>
+#include <set>
+#include <utility>
+
+#include "../../transports/serial/serial_device.hpp"
+#include "../../transports/udp/udp_url.hpp"
+#include "../../transports/url.hpp"
+#include "../../transports/url_pattern.hpp"
+#include "r4link/error.hpp"
+
+namespace r4 {
+namespace {
+
+constexpr const char* other_side = "name the board's own transport as the second one";
+
+// Is it an address of this machine? Only those can be bound.
+bool is_ours(const std::string& host) {
+  asio::error_code error;
+  const auto address = asio::ip::make_address(host == "localhost" ? "127.0.0.1" : host, error);
+  if (error) return false;
+  asio::io_context io;
+  asio::ip::udp::socket socket(io);
+  const asio::ip::udp::endpoint any_port(address, 0);
+  socket.open(any_port.protocol(), error);
+  if (!error) socket.bind(any_port, error);
+  return !error;
+}
+
+void require_two_ports(const Url& hosts, const Url& board) {
+  const UdpUrl a(hosts, Role::board);
+  const UdpUrl b(board, Role::host);
+  if (a.port == 0) return;
+  if (!b.search && b.port == a.port && is_ours(b.host)) {
+    throw Error(ErrorKind::usage, b.text, "that is where the bridge itself listens for hosts",
+                other_side);
+  }
+  if (b.listen == a.port) {
+    throw Error(ErrorKind::usage, b.text,
+                "it hears the board at the port where the other side listens for hosts",
+                "use ?listen=0 to hear the board on any free port");
+  }
+}
+
+void require_two_sides(const Url& hosts, const Url& board) {
+  const std::string& scheme = hosts.scheme();
+  bool same = hosts.text() == board.text();
+  if (scheme == "can" && board.scheme() == "can") {
+    const auto node = [](const Url& url) { return url.get_number("node", 0, 31, 1); };
+    same = hosts.host() == board.host() && node(hosts) == node(board);
+  } else if ((scheme == "serial" || scheme == "pty") && board.scheme() == "serial") {
+    same = same || (!hosts.path().empty() && hosts.path() != "auto" &&
+                    resolve_links(hosts.path()) == resolve_links(board.path()));
+  }
+  if (same) {
+    throw Error(ErrorKind::usage, board.text(), "both sides of the bridge are the same",
+                other_side);
+  }
+  if (scheme == "udp" && board.scheme() == "udp") require_two_ports(hosts, board);
+}
+
+void require_board(const Url& board) {
+  if (board.scheme() == "replay") {
+    throw Error(ErrorKind::usage, board.text(), "a recording is no board: nobody can drive it",
+                "r4 replay plays it to programs");
+  }
+  if (board.scheme() == "pty") {
+    throw Error(ErrorKind::usage, board.text(),
+                "pty: is for the side of hosts, which open its other end",
+                "open a board at serial:///dev/NAME");
+  }
+}
+
+void require_once(std::set<std::string>& seen, const std::string& url) {
+  if (seen.insert(url).second) return;
+  throw Error(ErrorKind::usage, url, "it is in the bridge twice", "name it once");
+}
+
+}  // namespace
+
+std::vector<BridgedUrls> pair_urls(std::string_view hosts, std::string_view board) {
+  std::vector<PatternUrl> a = expand_urls(hosts);
+  std::vector<PatternUrl> b = expand_urls(board);
+  if (a.size() != b.size()) {
+    throw Error(ErrorKind::usage, std::string(hosts) + " " + std::string(board),
+                "they stand for " + std::to_string(a.size()) + " and " + std::to_string(b.size()) +
+                    " transports",
+                "each board needs one of its own on both sides, as in udp://0.0.0.0:2100-2107 "
+                "'can://can0?node=0-7'");
+  }
+  std::vector<BridgedUrls> pairs;
+  std::set<std::string> seen_hosts, seen_boards;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    require_once(seen_hosts, a[i].url);
+    require_once(seen_boards, b[i].url);
+    const Url at_board = Url::parse(b[i].url);
+    require_board(at_board);
+    require_two_sides(Url::parse(a[i].url), at_board);
+    pairs.push_back({std::move(a[i].url), std::move(b[i].url)});
+  }
+  return pairs;
+}
+
+}  // namespace r4

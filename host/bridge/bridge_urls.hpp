@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The two URLs or patterns of a bridge as pairs of URLs.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace r4 {
+
+struct BridgedUrls {
+  std::string hosts;
+  std::string board;
+};
+
+// Throws Error{usage} for patterns of different lengths, for a side that would be joined to itself, and for what
+// cannot be a side.
+std::vector<BridgedUrls> pair_urls(std::string_view hosts, std::string_view board);
+
+}  // namespace r4

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Two carriers of one loop joined: on one hosts are heard, at the other is their board.
+//
+//     hosts --> E:STOP                          first of all, of anyone, however old
+//               heartbeats, commands            of the host that has the place (bridge_control.hpp)
+//               Q, W                            of anyone
+//     board --> states, heartbeats              to the host that has the place, and who watches (bridge_audience.hpp)
+//               N, I                            to who has asked, by the number that they name
+//
+// The bytes stay as they are. What may have waited for longer than `oldest` before it was read is dropped, but a stop:
+// so nothing that a bridge held back is executed, or keeps a board alive. What waits to be sent is bounded likewise,
+// by the carriers' queues. No heartbeat is made here. Two answers are: BUSY for who is kept out, and a LEASE for who
+// watches while the board, which takes all hosts for one, tells none.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "../../protocol/datagram/datagram_writer.hpp"
+#include "bridge_audience.hpp"
+#include "bridge_control.hpp"
+#include "r4link/carrier.hpp"
+#include "r4link/datagram.hpp"
+#include "r4link/fleet.hpp"
+#include "waiting_time.hpp"
+
+namespace r4 {
+
+class BridgedPair {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+  static constexpr std::chrono::milliseconds oldest{100};
+  // A side that was not there when it was opened is tried again so often.
+  static constexpr std::chrono::milliseconds try_again{500};
+
+  enum class Absence : std::uint8_t { awaited, refused };
+  struct Setup {
+    std::unique_ptr<Carrier> hosts;
+    std::unique_ptr<Carrier> board;
+    // May the side of hosts be away at the beginning, too? A device may; a port to listen at is an error.
+    Absence hosts_absence = Absence::refused;
+    std::chrono::milliseconds timeout{1000};  // the board's
+    std::function<Time()> now = [] { return std::chrono::steady_clock::now(); };
+    std::function<void(BridgeSide, const CarrierEvent&)> on_event;
+  };
+
+  explicit BridgedPair(Setup setup);
+  ~BridgedPair() { close(); }
+  BridgedPair(const BridgedPair&) = delete;
+  BridgedPair& operator=(const BridgedPair&) = delete;
+
+  // Throws Error for what will not come by itself.
+  void open();
+  void close() noexcept;
+  // To be called every WaitingTime::tick_interval.
+  void tick();
+  BridgeStatus status() const;
+
+ private:
+  struct Side final : Carrier::Handler {
+    Side(BridgedPair& owner, BridgeSide side, std::unique_ptr<Carrier> by)
+        : pair(owner), which(side), carrier(std::move(by)) {}
+    void on_datagram(std::string_view bytes, Peer from) override;
+    void on_carrier_event(const CarrierEvent& event) override;
+    void on_drained() override { waiting.on_drained(pair.now_()); }
+    void on_oversize(std::string_view) override { ++counters.damaged; }
+
+    BridgedPair& pair;
+    const BridgeSide which;
+    const std::unique_ptr<Carrier> carrier;
+    bool opened = false;
+    std::string obstacle;  // why it could not be opened, as told last
+    Time tried;
+    WaitingTime waiting;
+    BridgeCounters counters;
+    std::uint64_t refused = 0;  // of what its carrier dropped: what it did not take
+  };
+
+  void on_host_datagram(const Datagram& datagram, Peer from, Time now);
+  void on_board_datagram(const Datagram& datagram, Time now);
+  void on_command(const Datagram& datagram, Peer from, Time now);
+  void on_lease(const Datagram& datagram, Peer from, Time now);
+  void answer(const Datagram& asked, Refusal code, std::uint32_t lease, Peer to, Time now);
+  void deliver(Side& from, Side& to, const Datagram& datagram, Priority priority,
+               Peer peer = everyone);
+  void pass_on(const Datagram& datagram, Priority priority = Priority::normal) {
+    deliver(hosts_, board_, datagram, priority);
+  }
+  bool send(Side& to, std::string_view bytes, Priority priority, Peer peer);
+  bool is_old(Side& side, Time now);
+  void try_to_open(Side& side, Absence absence, Time now);
+
+  const Absence hosts_absence_;
+  const std::function<Time()> now_;
+  const std::function<void(BridgeSide, const CarrierEvent&)> on_event_;
+  Side hosts_;
+  Side board_;
+  BridgeControl control_;
+  BridgeAudience audience_;
+  // The board's newest number and clock, for answers in its place.
+  bool board_known_ = false;
+  std::uint32_t board_pnum_ = 0;
+  std::uint64_t board_t_ = 0;
+  Time board_heard_;
+};
+
+}  // namespace r4

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// For how long a datagram may have waited to be read, at most.
+//
+// Carriers do not tell when a datagram came. But what is read now came after the input was empty last. It was empty
+// when the carrier said so, and whatever was there at one tick of the loop has been read by the next. A process that was
+// stopped (Ctrl-Z), or got no processor, finds no tick where there should be one.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+
+namespace r4 {
+
+class WaitingTime {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+  static constexpr std::chrono::milliseconds tick_interval{25};
+
+  void begin(Time now) { empty_ = tick_ = now; }
+  void on_drained(Time now) { empty_ = now; }
+  void on_tick(Time now) {
+    empty_ = std::max(empty_, tick_);
+    tick_ = now;
+  }
+  // Of what is read now.
+  std::chrono::steady_clock::duration at_most(Time now) const { return now - empty_; }
+
+ private:
+  Time empty_;  // the input, last
+  Time tick_;
+};
+
+}  // namespace r4

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4::Bridge between real transports: a host, a bridge and a simulated board in one process.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <string>
+#include <thread>
+
+#include "r4link/board.hpp"
+#include "r4link/fleet.hpp"
+#include "tests/support/problems.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+std::string host_url(const Bridge& bridge) {
+  return bridge.status().at(0).hosts.name + "?listen=0";
+}
+
+TEST(Bridge, AHostDrivesTheBoardBehindIt) {
+  Bridge bridge("udp://127.0.0.1:0", "sim:");
+  Board board(host_url(bridge));
+  board.wait_active();
+  board.arm();
+  board.send("O:358,1,1");
+  EXPECT_EQ(board.state().osmc[0].pwm, 358);
+  board.stop();
+  const BridgeStatus status = bridge.status().at(0);
+  EXPECT_TRUE(status.hosts.up && status.board.up);
+  EXPECT_GE(status.hosts.from.stops, 1U);
+  EXPECT_GT(status.board.from.passed, 0U);
+  EXPECT_EQ(status.hosts.from.damaged + status.board.from.damaged, 0U);
+}
+
+TEST(Bridge, ASecondHostIsToldThatTheBoardIsBusyAndMayStopIt) {
+  Bridge bridge("udp://127.0.0.1:0", "sim:");
+  Board board(host_url(bridge));
+  board.wait_active();
+  Board other(host_url(bridge));
+  EXPECT_EQ(problem_of([&] { other.wait_active(500ms); }).kind, ErrorKind::refused);
+  EXPECT_TRUE(other.link().busy);
+  other.stop();  // throws unless the board confirms it
+  EXPECT_GE(bridge.status().at(0).hosts.from.kept_out, 1U);
+}
+
+TEST(Bridge, WhoWatchesHearsTheBoardThatAnotherDrives) {
+  Bridge bridge("udp://127.0.0.1:0", "sim:");
+  Board board(host_url(bridge));
+  board.wait_active();
+  BoardOptions options;
+  options.role = BoardRole::watch;
+  Board watcher(host_url(bridge), options);
+  watcher.wait_active();
+  EXPECT_EQ(watcher.link().state, HostLinkState::active);
+}
+
+TEST(Bridge, TheNextHostNeedNotWaitForTheTimeoutAfterAFarewell) {
+  BridgeOptions options;
+  options.timeout = 1min;
+  Bridge bridge("udp://127.0.0.1:0", "sim:", options);
+  for (int i = 0; i < 3; ++i) {
+    Board board(host_url(bridge));
+    board.wait_active();
+    board.identify();
+  }
+}
+
+TEST(Bridge, JoinsAWholeFleetInOrder) {
+  Bridge bridge("udp://127.0.0.{1-3}:0", "sim:?node=7-9");
+  ASSERT_EQ(bridge.size(), 3U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    Board board(bridge.status().at(i).hosts.name + "?listen=0");
+    EXPECT_EQ(board.identify().board_id, "sim-" + std::to_string(7 + i));
+  }
+}
+
+TEST(Bridge, CanBeClosedTwiceAndTellsHowItWas) {
+  Bridge bridge("udp://127.0.0.1:0", "sim:");
+  const std::string name = bridge.status().at(0).hosts.name;
+  bridge.close();
+  bridge.close();
+  EXPECT_EQ(bridge.status().at(0).hosts.name, name);
+}
+
+TEST(Bridge, RefusesWhatCannotBeJoined) {
+  struct Case {
+    const char* hosts;
+    const char* board;
+    ErrorKind kind;
+    const char* reason;
+  };
+  for (const Case& each : {
+           Case{"udp://127.0.0.1:2018", "udp://127.0.0.1:2018", ErrorKind::usage,
+                "both sides of the bridge are the same"},
+           Case{"udp://0.0.0.0:2018", "udp://localhost", ErrorKind::usage,
+                "that is where the bridge itself listens for hosts"},
+           Case{"udp://0.0.0.0:2390", "udp://192.0.2.1", ErrorKind::usage,
+                "it hears the board at the port where the other side listens for hosts"},
+           Case{"can://can0?node=1", "can://can0", ErrorKind::usage,
+                "both sides of the bridge are the same"},
+           Case{"pty:/tmp/r4", "serial:///tmp/r4", ErrorKind::usage,
+                "both sides of the bridge are the same"},
+           Case{"udp://127.0.0.1:2100-2107", "can://can0?node=0-6", ErrorKind::usage,
+                "they stand for 8 and 7 transports"},
+           Case{"sim:", "udp://192.0.2.1", ErrorKind::usage, "sim: is a board, it cannot listen"},
+           Case{"udp://127.0.0.1:0", "replay:/tmp/x", ErrorKind::usage,
+                "a recording is no board: nobody can drive it"},
+           Case{"udp://127.0.0.1:0", "pty:", ErrorKind::usage,
+                "pty: is for the side of hosts, which open its other end"},
+           Case{"udp://127.0.0.1:0", "can://can0?node={1,1}", ErrorKind::usage,
+                "they stand for 1 and 2 transports"},
+           Case{"udp://127.0.0.{1,1}:0", "can://can0?node=0-1", ErrorKind::usage,
+                "it is in the bridge twice"},
+       }) {
+    const Problem problem = problem_of([&] { Bridge(each.hosts, each.board); });
+    EXPECT_EQ(problem.kind, each.kind) << each.hosts << ' ' << each.board;
+    EXPECT_EQ(problem.reason, each.reason) << each.hosts << ' ' << each.board;
+    EXPECT_FALSE(problem.fix.empty()) << each.hosts << ' ' << each.board;
+  }
+}
+
+TEST(Bridge, SaysWhoHasThePort) {
+  Bridge bridge("udp://127.0.0.1:0", "sim:");
+  const Problem problem = problem_of([&] { Bridge(bridge.status().at(0).hosts.name, "sim:"); });
+  EXPECT_EQ(problem.kind, ErrorKind::open);
+  EXPECT_NE(problem.reason.find("is in use by"), std::string::npos) << problem.reason;
+}
+
+}  // namespace
+}  // namespace r4::test

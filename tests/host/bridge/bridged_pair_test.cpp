@@ -1,0 +1,320 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Which datagrams pass a bridge, in which order, and to whom.
+#include "host/bridge/bridged_pair.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+#include "scripted_bridge.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+using Texts = ScriptedBridge::Texts;
+
+constexpr char heartbeat[] = "H:ROS2-R4;PNum:1;T:0;";
+constexpr char board_state[] = "AIN24:24.28;PNum:7;T:100;";
+constexpr Peer first = 1, second = 2, third = 3;
+
+class BridgedPairTest : public testing::Test, protected ScriptedBridge {
+ protected:
+  void SetUp() override { pair->open(); }
+  // The first host has the place, and the board streams.
+  void begin() {
+    hosts->say(heartbeat, first);
+    board->say(board_state);
+    hosts->take();
+    board->take();
+  }
+};
+
+TEST_F(BridgedPairTest, BytesPassAsTheyAre) {
+  begin();
+  for (const CapturedLine& line : paper_capture()) {
+    Datagram datagram;
+    if (!read_datagram(Text(line.bytes), datagram)) continue;
+    ScriptedCarrier& from = line.from_board ? *board : *hosts;
+    ScriptedCarrier& to = line.from_board ? *hosts : *board;
+    from.say_bytes(line.bytes + "\r\n", line.from_board ? everyone : first);
+    ASSERT_EQ(to.sent.size(), 1U) << line.bytes;
+    EXPECT_EQ(to.sent.front().text, line.bytes);
+    to.take();
+  }
+}
+
+TEST_F(BridgedPairTest, WhatIsDamagedIsDroppedAndCounted) {
+  begin();
+  std::string damaged = with_crc("O:358,1,1;PNum:2;T:0;");
+  damaged[2] = '9';
+  hosts->say_bytes(damaged, first);
+  hosts->say_bytes("E:STOP", first);
+  damaged = with_crc(board_state);
+  damaged[7] = '9';
+  board->say_bytes(damaged);
+  EXPECT_EQ(board->take(), Texts{});
+  EXPECT_EQ(hosts->take(), Texts{});
+  EXPECT_EQ(from_hosts().damaged, 2U);
+  EXPECT_EQ(from_board().damaged, 1U);
+}
+
+TEST_F(BridgedPairTest, NothingOfTheWrongEndPasses) {
+  begin();
+  hosts->say("H:R4-ROS2;PNum:0;T:0;", second);
+  hosts->say("N:66,BUSY;PNum:0;T:0;", second);
+  hosts->say(board_state, second);
+  board->say(heartbeat);
+  board->say("O:358,1,1;PNum:2;T:0;");
+  EXPECT_EQ(board->take(), Texts{});
+  EXPECT_EQ(hosts->take(), Texts{});
+  EXPECT_EQ(from_hosts().misdirected, 3U);
+  EXPECT_EQ(from_board().misdirected, 2U);
+}
+
+TEST_F(BridgedPairTest, ItSaysNothingOfItsOwn) {
+  begin();
+  pass(10s);
+  EXPECT_EQ(board->take(), Texts{});
+  EXPECT_EQ(hosts->take(), Texts{});
+}
+
+// --- one host at a time
+
+TEST_F(BridgedPairTest, TheFirstHostIsLetThroughAlone) {
+  begin();
+  EXPECT_EQ(hosts->held, first);
+  hosts->say("H:ROS2-R4;PNum:50;T:0;", second);
+  hosts->say("O:1,1,1;PNum:51;T:0;", second);
+  EXPECT_EQ(board->take(), Texts{});
+  EXPECT_EQ(hosts->take(), (Texts{"N:50,BUSY;PNum:7;T:100;@2", "N:51,BUSY;PNum:7;T:100;@2"}));
+  EXPECT_EQ(from_hosts().kept_out, 2U);
+  hosts->say("O:1,1,1;PNum:2;T:0;", first);
+  EXPECT_EQ(board->take(), Texts{"O:1,1,1;PNum:2;T:0;"});
+}
+
+TEST_F(BridgedPairTest, AnotherHostGetsThePlaceAfterTheTimeoutAndNotBefore) {
+  begin();
+  pass(975ms);
+  board->say(board_state);
+  hosts->say("H:ROS2-R4;PNum:50;T:0;", second);
+  EXPECT_EQ(board->take(), Texts{});
+  pass(25ms);
+  hosts->say("H:ROS2-R4;PNum:51;T:0;", second);
+  EXPECT_EQ(board->take(), Texts{"H:ROS2-R4;PNum:51;T:0;"});
+  EXPECT_EQ(hosts->held, second);
+  hosts->say("O:1,1,1;PNum:2;T:0;", first);
+  EXPECT_EQ(board->take(), Texts{}) << "it has lost its place";
+}
+
+TEST_F(BridgedPairTest, ACommandWithoutAHeartbeatBeforeItDoesNotPass) {
+  board->say(board_state);
+  hosts->take();
+  hosts->say("O:1,1,1;PNum:2;T:0;", first);
+  EXPECT_EQ(board->take(), Texts{});
+  EXPECT_EQ(hosts->take(), Texts{}) << "its heartbeat may come: it is not kept out";
+  EXPECT_EQ(from_hosts().kept_out, 1U);
+}
+
+TEST_F(BridgedPairTest, AFarewellMakesRoomWhenTheBoardHasConfirmedIt) {
+  begin();
+  hosts->say("E:LEAVE;PNum:9;T:100;", first);
+  hosts->say("H:ROS2-R4;PNum:50;T:0;", second);
+  EXPECT_EQ(board->take(), Texts{"E:LEAVE;PNum:9;T:100;"});
+  board->say("H:R4-ROS2;PNum:8;T:101;SAFE:1;");
+  hosts->say("H:ROS2-R4;PNum:51;T:0;", second);
+  EXPECT_EQ(board->take(), Texts{"H:ROS2-R4;PNum:51;T:0;"});
+}
+
+TEST_F(BridgedPairTest, AHostThatTheBoardDoesNotTakeKeepsNobodyOutForLong) {
+  begin();
+  for (int i = 0; i < 30; ++i) {
+    pass(100ms);
+    hosts->say(heartbeat, first);
+  }
+  board->take();
+  hosts->say("H:ROS2-R4;PNum:50;T:0;", second);
+  EXPECT_EQ(board->take(), Texts{"H:ROS2-R4;PNum:50;T:0;"});
+}
+
+// --- the emergency stop
+
+TEST_F(BridgedPairTest, AStopOfAnyonePassesBeforeEverything) {
+  begin();
+  hosts->say("E:STOP;PNum:70;T:0;", third);
+  ASSERT_EQ(board->sent.size(), 1U);
+  EXPECT_EQ(board->sent.front().priority, Priority::stop);
+  EXPECT_EQ(from_hosts().stops, 1U);
+  hosts->take();
+  board->say("H:R4-ROS2;PNum:8;T:101;SAFE:2;STOP:70;");
+  EXPECT_EQ(hosts->take(), (Texts{"H:R4-ROS2;PNum:8;T:101;SAFE:2;STOP:70;",
+                                  "H:R4-ROS2;PNum:8;T:101;SAFE:2;STOP:70;@3"}))
+      << "who has stopped it hears so";
+  pass(1s);
+  board->say("H:R4-ROS2;PNum:9;T:601;SAFE:2;STOP:70;");
+  EXPECT_EQ(hosts->take(), Texts{"H:R4-ROS2;PNum:9;T:601;SAFE:2;STOP:70;"});
+}
+
+TEST_F(BridgedPairTest, AStopBesideOtherCommandsIsOne) {
+  begin();
+  hosts->say("O:1,1,1;E:STOP;PNum:70;T:0;", third);
+  ASSERT_EQ(board->sent.size(), 1U);
+  EXPECT_EQ(board->sent.front().priority, Priority::stop);
+}
+
+TEST_F(BridgedPairTest, PrioritiesAreThoseOfTheEnds) {
+  begin();
+  hosts->say("O:1,1,1;PNum:2;T:0;", first);
+  EXPECT_EQ(board->sent.front().priority, Priority::normal);
+  board->say(board_state);
+  board->say("H:R4-ROS2;PNum:8;T:101;");
+  EXPECT_EQ(hosts->sent.front().priority, Priority::state);
+  EXPECT_EQ(hosts->sent.back().priority, Priority::normal);
+}
+
+// --- nothing stale
+
+TEST_F(BridgedPairTest, WhatCameWhileTheBridgeWasStoppedIsDroppedButAStop) {
+  begin();
+  pass(1s);
+  sleep(500ms);
+  hosts->say("H:ROS2-R4;PNum:2;T:0;", first);
+  hosts->say("O:1,1,1;PNum:3;T:0;", first);
+  hosts->say("E:STOP;PNum:4;T:0;", first);
+  hosts->drained();
+  board->say(board_state);
+  EXPECT_EQ(board->take(), Texts{"E:STOP;PNum:4;T:0;"});
+  EXPECT_EQ(hosts->take(), Texts{}) << "nor is an old state";
+  EXPECT_EQ(from_hosts().late, 2U);
+  EXPECT_EQ(from_board().late, 1U);
+  hosts->say("O:1,1,1;PNum:5;T:0;", first);
+  EXPECT_EQ(board->take(), Texts{"O:1,1,1;PNum:5;T:0;"}) << "that was read behind all that waited";
+}
+
+TEST_F(BridgedPairTest, WhereNothingWaitedTheFirstDatagramAfterAStandstillPasses) {
+  begin();
+  sleep(500ms);
+  pass(50ms);
+  hosts->say("O:1,1,1;PNum:5;T:0;", first);
+  EXPECT_EQ(board->take(), Texts{"O:1,1,1;PNum:5;T:0;"});
+}
+
+TEST_F(BridgedPairTest, AnIdleBridgeIsNoLateOne) {
+  begin();
+  pass(1h);
+  hosts->say(heartbeat, first);
+  EXPECT_EQ(board->take(), Texts{heartbeat});
+}
+
+// --- the other side
+
+TEST_F(BridgedPairTest, ABoardThatIsAwayIsWaitedFor) {
+  ScriptedBridge other;
+  other.board->absence = Problem{ErrorKind::unsupported, "can:", "there is no such interface", ""};
+  other.pair->open();
+  other.hosts->say(heartbeat, first);
+  EXPECT_EQ(other.from_hosts().undelivered, 1U);
+  other.pass(3s);
+  EXPECT_EQ(other.events, (Texts{"hosts up", "board down"})) << "told once";
+  other.board->absence.reset();
+  other.pass(500ms);
+  EXPECT_EQ(other.events.back(), "board up");
+  other.hosts->say(heartbeat, first);
+  EXPECT_EQ(other.board->take(), Texts{heartbeat});
+}
+
+TEST_F(BridgedPairTest, WhatNoWaitingMendsIsAnError) {
+  ScriptedBridge other;
+  other.board->absence = Problem{ErrorKind::permission, "can:", "denied", ""};
+  EXPECT_THROW(other.pair->open(), Error);
+  ScriptedBridge deaf;
+  deaf.hosts->absence = Problem{ErrorKind::open, "udp:", "in use", ""};
+  EXPECT_THROW(deaf.pair->open(), Error);
+}
+
+TEST_F(BridgedPairTest, CountsWhatDidNotGetThrough) {
+  begin();
+  hosts->counted.tx_dropped = 5;  // states that newer ones have replaced
+  board->result = SendResult::full;
+  hosts->say("O:1,1,1;PNum:2;T:0;", first);
+  EXPECT_EQ(from_hosts().undelivered, 1U);
+  EXPECT_EQ(from_hosts().outdated, 0U);
+  EXPECT_EQ(from_board().outdated, 5U);
+}
+
+// --- who asks
+
+TEST_F(BridgedPairTest, AnAnswerGoesToWhoHasAsked) {
+  begin();
+  hosts->say("Q:ID;PNum:500;T:0;", second);
+  hosts->say("Q:ID;PNum:600;T:0;", third);
+  hosts->say("Q:ID;PNum:3;T:0;", first);
+  EXPECT_EQ(board->take().size(), 3U);
+  board->say("I:R4,1,id,udp;ASKED:600;PNum:8;T:101;");
+  board->say("I:R4,1,id,udp;ASKED:500;PNum:9;T:101;");
+  board->say("I:R4,1,id,udp;ASKED:3;PNum:10;T:101;");
+  board->say("N:2,RANGE;PNum:11;T:101;");
+  EXPECT_EQ(
+      hosts->take(),
+      (Texts{"I:R4,1,id,udp;ASKED:600;PNum:8;T:101;@3", "I:R4,1,id,udp;ASKED:500;PNum:9;T:101;@2",
+             "I:R4,1,id,udp;ASKED:3;PNum:10;T:101;", "N:2,RANGE;PNum:11;T:101;"}));
+}
+
+// --- who watches
+
+TEST_F(BridgedPairTest, WhoWatchesBesideAHostHearsAllAfterAnEchoAndForTwoSeconds) {
+  begin();
+  hosts->say("W:50;PNum:900;T:0;", second);
+  const Texts told = hosts->take();
+  ASSERT_EQ(told.size(), 1U);
+  const std::string prefix = "N:900,STALE;LEASE:";
+  ASSERT_EQ(told[0].substr(0, prefix.size()), prefix);
+  const std::string token = told[0].substr(prefix.size(), told[0].find(";PNum") - prefix.size());
+  board->say(board_state);
+  EXPECT_EQ(hosts->take(), Texts{board_state}) << "not yet";
+  hosts->say("W:50;PNum:901;T:" + token + ";", third);
+  hosts->take();
+  hosts->say("W:50;PNum:901;T:" + token + ";", second);
+  board->say(board_state);
+  EXPECT_EQ(hosts->take(), (Texts{board_state, std::string(board_state) + "@2"}))
+      << "the echo of another proves nothing";
+  EXPECT_EQ(board->take(), Texts{}) << "the board would take it for the first host's";
+  pass(2s);
+  board->say(board_state);
+  EXPECT_EQ(hosts->take(), Texts{board_state});
+}
+
+TEST_F(BridgedPairTest, WithoutAHostTheBoardGivesTheLease) {
+  hosts->say("W:50;PNum:900;T:0;", second);
+  EXPECT_EQ(board->take(), Texts{"W:50;PNum:900;T:0;"});
+  board->say("N:900,STALE;LEASE:77;PNum:1;T:100;");
+  EXPECT_EQ(hosts->take(), Texts{"N:900,STALE;LEASE:77;PNum:1;T:100;@2"});
+  hosts->say("W:50;PNum:901;T:77;", second);
+  EXPECT_EQ(board->take(), Texts{"W:50;PNum:901;T:77;"});
+  board->say(board_state);
+  EXPECT_EQ(hosts->take(), (Texts{board_state, std::string(board_state) + "@2"}));
+}
+
+TEST_F(BridgedPairTest, FourMayWatch) {
+  begin();
+  for (Peer peer = 11; peer <= 15; ++peer) {
+    const std::string number = std::to_string(900 + peer);
+    hosts->say("W:50;PNum:" + number + ";T:0;", peer);
+    const std::string told = hosts->take().at(0);
+    if (peer == 15) {
+      EXPECT_EQ(told, "N:915,BUSY;PNum:7;T:100;@15");
+      break;
+    }
+    const std::size_t at = told.find("LEASE:") + 6;
+    hosts->say("W:50;PNum:1000;T:" + told.substr(at, told.find(';', at) - at) + ";", peer);
+  }
+  for (Peer stranger = 100; stranger < 140; ++stranger) hosts->say("E:STOP;", stranger);
+  hosts->take();
+  board->say(board_state);
+  EXPECT_EQ(hosts->take().size(), 5U) << "strangers take no watcher's place";
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A bridge between two transports that do what a test says, in virtual time.
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "host/bridge/bridged_pair.hpp"
+#include "tests/support/datagrams.hpp"
+
+namespace r4::test {
+
+class ScriptedCarrier final : public Carrier {
+ public:
+  struct Sent {
+    std::string text;
+    Priority priority;
+    Peer to;
+  };
+
+  explicit ScriptedCarrier(std::string name) : name_(std::move(name)) {}
+
+  void open(Handler& handler) override {
+    if (absence) throw Error(*absence);
+    handler_ = &handler;
+    handler.on_carrier_event({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
+  }
+  void close() noexcept override { handler_ = nullptr; }
+  SendResult send(std::string_view bytes, Priority priority, Peer to) override {
+    if (result == SendResult::sent) sent.push_back({std::string(bytes), priority, to});
+    return result;
+  }
+  void hold(Peer peer) override { held = peer; }
+  bool reaches(Peer peer) const override { return peer == everyone || peer == held; }
+  bool up() const override { return handler_ != nullptr; }
+  std::size_t max_size() const override { return max_datagram; }
+  const std::string& name() const override { return name_; }
+  const CarrierCounters& counters() const override { return counted; }
+
+  void say(const std::string& fields, Peer from = everyone) { say_bytes(with_crc(fields), from); }
+  void say_bytes(const std::string& bytes, Peer from = everyone) {
+    handler_->on_datagram(bytes, from);
+  }
+  void drained() { handler_->on_drained(); }
+  void report(CarrierEvent::Kind kind) {
+    handler_->on_carrier_event({kind, Problem{ErrorKind::open, name_, "gone", ""}});
+  }
+  // What was sent since this was asked last, without checksums; with "@peer" where it was to one.
+  std::vector<std::string> take() {
+    std::vector<std::string> texts;
+    for (const Sent& each : std::exchange(sent, {})) {
+      texts.push_back(each.text.substr(0, each.text.find('^')) +
+                      (each.to == everyone ? "" : "@" + std::to_string(each.to)));
+    }
+    return texts;
+  }
+
+  std::optional<Problem> absence;  // why it cannot be opened
+  SendResult result = SendResult::sent;
+  CarrierCounters counted;
+  std::vector<Sent> sent;
+  Peer held = everyone;
+
+ private:
+  const std::string name_;
+  Handler* handler_ = nullptr;
+};
+
+class ScriptedBridge {
+ public:
+  using Texts = std::vector<std::string>;
+
+  ScriptedBridge() {
+    BridgedPair::Setup setup;
+    auto a = std::make_unique<ScriptedCarrier>("udp:");
+    auto b = std::make_unique<ScriptedCarrier>("can:");
+    hosts = a.get();
+    board = b.get();
+    setup.hosts = std::move(a);
+    setup.board = std::move(b);
+    setup.now = [this] { return now; };
+    setup.on_event = [this](BridgeSide side, const CarrierEvent& event) {
+      events.push_back(std::string(side == BridgeSide::hosts ? "hosts " : "board ") +
+                       to_text(event.kind));
+    };
+    pair = std::make_unique<BridgedPair>(std::move(setup));
+  }
+
+  // Time passes, and the loop runs.
+  void pass(std::chrono::milliseconds time) {
+    for (const auto end = now + time; now < end;) {
+      now += std::min<std::chrono::steady_clock::duration>(WaitingTime::tick_interval, end - now);
+      pair->tick();
+    }
+  }
+  // Time passes in which the process is stopped.
+  void sleep(std::chrono::milliseconds time) { now += time; }
+  BridgeCounters from_hosts() const { return pair->status().hosts.from; }
+  BridgeCounters from_board() const { return pair->status().board.from; }
+
+  std::chrono::steady_clock::time_point now{std::chrono::hours(1)};
+  ScriptedCarrier* hosts = nullptr;
+  ScriptedCarrier* board = nullptr;
+  Texts events;
+  std::unique_ptr<BridgedPair> pair;
+};
+
+}  // namespace r4::test

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""r4 bridge: hosts on one transport, their board on another, as processes."""
+import signal
+import socket
+import time
+
+import pytest
+
+from paper_client import PaperClient
+from r4_process import (ERROR, SANITIZED, Board, Running, driving, is_state, lasts, monitor, run, watch)
+
+# The board's timeout, and what docs/safety.md promises on top; a busy machine as much again.
+SAFE_WITHIN_S = 1.02 + (1 if SANITIZED else 0.08)
+LASTS_S = 2
+
+
+class Bridge(Running):
+    """`url`: where it listens."""
+
+    def __init__(self, hosts, board, *options):
+        super().__init__('bridge', hosts, board, '--json', '--every', '0.1', *options)
+        self.url = self.next(lambda each: each['type'] == 'bridge')['hosts']
+        self.host_url = self.url + '?listen=0'
+
+    def transport(self, side, event):
+        return self.next(lambda each: each['type'] == 'transport' and each['side'] == side and each['event'] == event)
+
+    def counters(self, side, is_it=lambda each: True):
+        return self.next(lambda each: each['type'] == 'counters' and each['side'] == side and is_it(each))
+
+
+@pytest.fixture(name='tty')
+def a_path(tmp_path):
+    return tmp_path / 'r4'
+
+
+@pytest.fixture(name='board')
+def at_a_serial_port(tty):
+    with Board(f'pty:{tty}') as board:
+        board.tty = tty
+        yield board
+
+
+@pytest.fixture(name='bridge')
+def from_udp_to_it(board):
+    with Bridge('udp://127.0.0.1:0', f'serial://{board.tty}') as bridge:
+        yield bridge
+
+
+def test_the_papers_udp_client_drives_a_board_on_a_serial_port(board):
+    listening = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    sending = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    listening.bind(('127.0.0.1', 0))
+    listening.settimeout(0.1)
+    peer = f'127.0.0.1:{listening.getsockname()[1]}'
+    with listening, sending, Bridge(f'udp://127.0.0.1:0?peer={peer}', f'serial://{board.tty}') as bridge:
+        port = int(bridge.url.split('?')[0].rsplit(':', 1)[1])
+        client = PaperClient(lambda data: sending.sendto(data, ('127.0.0.1', port)))
+        end = time.monotonic() + LASTS_S
+        while time.monotonic() < end:
+            try:
+                client.take(listening.recv(1024))
+            except TimeoutError:
+                pass
+        log = board.rest()
+        told = bridge.rest()
+    assert not [each for each in log if each.get('state') == 'SAFE'], 'while the client was there'
+    assert [each for each in log if each.get('state') == 'ACTIVE']
+    assert len(client.states) >= 50 * LASTS_S or SANITIZED
+    assert ';DHB1A:1000,1;' in client.states[-1] and ';SERVO1POS:300;' in client.states[-1]
+    hosts = [each for each in told if each.get('side') == 'hosts' and each['type'] == 'counters'][-1]
+    assert hosts['passed'] == client.pnum_sent or SANITIZED
+    assert hosts['damaged'] == hosts['misdirected'] == hosts['kept_out'] == 0
+
+
+def test_one_drives_through_two_bridges_while_another_watches_and_a_third_stops(bridge, board):
+    with Bridge('udp://127.0.0.1:0', bridge.host_url) as far:
+        with driving(far.host_url, 'O:358,1,1'), watch(far.host_url) as watcher:
+            watcher.next(lambda each: is_state(each) and each['fields'].get('OSMC1') == [358, 1])
+            refused = run('send', far.host_url, 'O:1,1,1', '--timeout', '0.5')
+            assert refused.returncode == 3 and ERROR.match(refused.stderr), refused.stderr
+            assert run('stop', far.host_url).returncode == 0
+            board.state('SAFE', 'stop')
+
+
+def test_sends_follow_each_other_at_once(bridge):
+    for pwm in (100, 200, 300):
+        sent = run('send', bridge.host_url, 'R:1,On', f'O:{pwm},1,1')
+        assert sent.returncode == 0, sent.stderr
+
+
+def test_either_side_may_be_away(tty):
+    with Bridge('udp://127.0.0.1:0', f'serial://{tty}') as bridge:
+        absent = bridge.transport('board', 'down')
+        assert str(tty) in absent['thing'] and absent['fix']
+        with monitor(bridge.host_url) as host:
+            for _ in range(2):
+                with Board(f'pty:{tty}'):
+                    bridge.transport('board', 'up')
+                    host.skip_past()
+                    host.next(is_state)
+                bridge.transport('board', 'down')
+
+
+@pytest.mark.parametrize('end', ['bridge', 'host'])
+def test_a_death_on_the_way_makes_the_board_safe_in_time(bridge, board, end):
+    with driving(bridge.host_url, 'O:358,1,1') as host:
+        board.outputs(lambda outputs: outputs['osmc'][0][0] == 358)
+        board.skip_past()
+        died = (bridge if end == 'bridge' else host).signal(signal.SIGKILL)
+        safe = board.state('SAFE', 'link')
+        assert safe['came'] - died <= SAFE_WITHIN_S
+
+
+def test_what_waited_in_a_stopped_bridge_is_not_executed(bridge, board):
+    """Of the paper's clients, whose heartbeats prove nothing, the board could not tell what is old."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sending:
+        address = ('127.0.0.1', int(bridge.url.rsplit(':', 1)[1]))
+        client = PaperClient(lambda data: sending.sendto(data, address))
+        deadline = time.monotonic() + 1
+        while time.monotonic() < deadline:
+            client.send_msg('H:ROS2-R4')
+            lasts(0.1)
+        client.send_msg('S:1000,1')
+        board.executed('S:1000,1')
+        bridge.signal(signal.SIGSTOP)
+        board.state('SAFE', 'link')
+        client.send_msg('H:ROS2-R4')
+        client.send_msg('S:2000,1')
+        lasts(0.2)
+        bridge.skip_past()
+        bridge.signal(signal.SIGCONT)
+        late = bridge.counters('hosts', lambda each: each['late'] == 2)
+        assert late['passed'] < client.pnum_sent
+        client.send_msg('H:ROS2-R4')
+        board.state('ACTIVE')
+        log = board.rest()
+    assert not [each for each in log if each.get('executed', {}).get('command') == 'S:2000,1']
+
+
+def test_by_default_it_listens_to_this_computer_alone(board):
+    with Bridge('udp://:0', f'serial://{board.tty}') as bridge:
+        assert bridge.url.startswith('udp://127.0.0.1:')
+
+
+@pytest.mark.parametrize('hosts, to, code', [
+    ('udp://127.0.0.1:2018', 'udp://127.0.0.1', 2),
+    ('udp://127.0.0.1:2100-2107', 'can://can0?node=0-6', 2),
+    ('udp://127.0.0.1:0', 'pty:', 2),
+    ('sim:', 'serial:auto', 2),
+    ('udp://192.0.2.1:2018', 'serial:auto', 4),
+    ('udp://127.0.0.1:0', 'nothing', 2),
+])
+def test_what_cannot_be_joined_is_one_clear_line(hosts, to, code):
+    ended = run('bridge', hosts, to)
+    assert ended.returncode == code and ended.stdout == ''
+    assert ERROR.fullmatch(ended.stderr.rstrip('\n')), ended.stderr
+
+
+def test_tells_what_passed_for_people_too(board):
+    ended = run('bridge', 'udp://127.0.0.1:0', f'serial://{board.tty}', '--duration', '0.8', '--every', '0.1')
+    assert ended.returncode == 0
+    assert ended.stdout.count(' <-> ') == 1
+    assert ': up\n' in ended.stderr and ' undelivered\n' in ended.stderr, ended.stderr

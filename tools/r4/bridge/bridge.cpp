@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 bridge: a gateway between hosts and a board.
+#include <fmt/format.h>
+
+#include <array>
+#include <asio/io_context.hpp>
+#include <asio/signal_set.hpp>
+#include <asio/steady_timer.hpp>
+#include <csignal>
+#include <cstdio>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "../shell/json.hpp"
+#include "../shell/options.hpp"
+#include "../shell/subcommands.hpp"
+#include "r4link/fleet.hpp"
+
+namespace r4::tool {
+namespace {
+
+struct Options {
+  std::string hosts;
+  std::string board;
+  bool json = false;
+  Milliseconds every{10'000};
+  Milliseconds timeout{1000};
+  std::optional<Milliseconds> duration;
+};
+
+struct NamedCounter {
+  const char* name;
+  std::uint64_t BridgeCounters::*value;
+};
+constexpr std::array<NamedCounter, 8> named_counters{{
+    {"passed", &BridgeCounters::passed},
+    {"stops", &BridgeCounters::stops},
+    {"damaged", &BridgeCounters::damaged},
+    {"misdirected", &BridgeCounters::misdirected},
+    {"kept_out", &BridgeCounters::kept_out},
+    {"late", &BridgeCounters::late},
+    {"undelivered", &BridgeCounters::undelivered},
+    {"outdated", &BridgeCounters::outdated},
+}};
+
+const char* to_text(BridgeSide side) { return side == BridgeSide::hosts ? "hosts" : "board"; }
+
+// What it tells, from two threads: its own and the bridge's.
+class Report {
+ public:
+  explicit Report(bool json) : json_(json) {}
+
+  void joined(const std::vector<BridgeStatus>& all) {
+    const std::lock_guard lock(mutex_);
+    told_.resize(all.size());
+    for (const BridgeStatus& each : all) {
+      if (json_) {
+        print_line({{"type", "bridge"}, {"hosts", each.hosts.name}, {"board", each.board.name}});
+      } else {
+        print_text(fmt::format("{} <-> {}\n", each.hosts.name, each.board.name));
+      }
+    }
+    joined_ = true;
+    for (const BridgeEvent& each : std::exchange(early_, {})) tell(each);
+  }
+
+  void event(const BridgeEvent& event) {
+    const std::lock_guard lock(mutex_);
+    if (joined_) {
+      tell(event);
+    } else {
+      early_.push_back(event);
+    }
+  }
+
+  // Of those that have changed since they were told.
+  void counters(const std::vector<BridgeStatus>& all) {
+    const std::lock_guard lock(mutex_);
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      tell_counters(BridgeSide::hosts, all[i].hosts, told_[i].hosts);
+      tell_counters(BridgeSide::board, all[i].board, told_[i].board);
+    }
+  }
+
+ private:
+  void tell(const BridgeEvent& event) const {
+    const Problem& problem = event.event.problem;
+    const char* const kind = r4::to_text(event.event.kind);
+    if (json_) {
+      Json line = problem_json(problem);
+      line["type"] = "transport";
+      line["event"] = kind;
+      line["side"] = to_text(event.side);
+      print_line(line);
+    } else if (event.event.kind == CarrierEvent::Kind::up) {
+      fmt::print(stderr, "{}: up\n", problem.thing);
+    } else {
+      fmt::print(stderr, "{} ({})\n", problem.text(), kind);
+    }
+  }
+
+  void tell_counters(BridgeSide side, const BridgeEnd& now, BridgeEnd& told) {
+    bool changed = told.name.empty();
+    for (const NamedCounter& each : named_counters) {
+      changed = changed || now.from.*each.value != told.from.*each.value;
+    }
+    if (!changed) return;
+    told = now;
+    if (json_) {
+      Json line{
+          {"type", "counters"}, {"side", to_text(side)}, {"transport", now.name}, {"up", now.up}};
+      for (const NamedCounter& each : named_counters) line[each.name] = now.from.*each.value;
+      return print_line(line);
+    }
+    std::string text;
+    for (const NamedCounter& each : named_counters) {
+      const bool told_always = each.value == &BridgeCounters::passed;
+      if (now.from.*each.value == 0 && !told_always) continue;
+      std::string name = each.name;
+      if (name == "kept_out") name = "kept out";
+      text += fmt::format("{}{} {}", text.empty() ? "" : ", ", now.from.*each.value, name);
+    }
+    fmt::print(stderr, "from {}: {}\n", now.name, text);
+  }
+
+  const bool json_;
+  std::mutex mutex_;
+  bool joined_ = false;
+  std::vector<BridgeEvent> early_;  // until the bridge is told of
+  std::vector<BridgeStatus> told_;
+};
+
+int bridge(const Options& options) {
+  asio::io_context io(1);
+  asio::signal_set signals(io, SIGINT, SIGTERM, SIGHUP);
+  signals.async_wait([&io](const std::error_code&, int) { io.stop(); });
+
+  Report report(options.json);
+  BridgeOptions bridge_options;
+  bridge_options.timeout = options.timeout;
+  bridge_options.on_event = [&report](const BridgeEvent& event) { report.event(event); };
+  Bridge bridge(options.hosts, options.board, std::move(bridge_options));
+  report.joined(bridge.status());
+
+  asio::steady_timer end(io);
+  if (options.duration) {
+    end.expires_after(*options.duration);
+    end.async_wait([&io](const std::error_code&) { io.stop(); });
+  }
+  asio::steady_timer timer(io);
+  const std::function<void()> tell_later = [&] {
+    timer.expires_after(options.every);
+    timer.async_wait([&](const std::error_code& error) {
+      if (error) return;
+      report.counters(bridge.status());
+      tell_later();
+    });
+  };
+  tell_later();
+  io.run();
+  bridge.close();
+  report.counters(bridge.status());
+  return 0;
+}
+
+constexpr const char* footer =
+    R"(The first URL is where hosts are heard, as r4 sim takes it; the second is the board's, as r4 send takes it. So
+any old tool that speaks UDP drives a board on USB or CAN (docs/bridge.md). Datagrams pass as they are, and nothing is
+said for a host that is dead: a board behind a bridge goes safe as any other.
+
+Of several hosts one at a time is let through: the first that sends heartbeats, until it has been silent for
+--timeout. The others may watch, and stop the board: E:STOP of anyone goes first. What has waited for longer than
+0.1 s is dropped. A board that is not there, or goes, is waited for.
+
+On standard error it tells which transports come and go, and every ten seconds, if that has changed, and at the end
+what came from each side and was passed or dropped, and why; with --json on standard output, one object a line:
+  {"type":"bridge","hosts":…,"board":…}                             of each board, at the beginning
+  {"type":"transport","event":"up|down|warning","side":"hosts|board","thing":…,"reason":…,"fix":…}
+  {"type":"counters","side":…,"transport":…,"up":…,"passed":…,"stops":…,"damaged":…,"misdirected":…,
+   "kept_out":…,"late":…,"undelivered":…,"outdated":…}
+
+Examples:
+  r4 bridge udp:// serial:auto                        for programs of this computer
+  r4 bridge udp://0.0.0.0:2018 'can://can0?node=3'    for the network: anybody there may drive the board
+  r4 bridge udp://0.0.0.0:2100-2107 'can://can0?node=0-7'
+  r4 bridge pty:/tmp/r4 udp://192.168.0.125           a serial port for a board on WiFi
+
+Exit codes: 0 ended by --duration or a signal; 2 usage; 4 a port cannot be opened; 5 permission denied.)";
+
+}  // namespace
+
+void add_bridge(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* const command = add_subcommand(
+      root, chosen, "bridge", "Carry datagrams between hosts and a board", footer, options, bridge);
+  add_text(*command, "HOSTS", options->hosts, "where hosts are heard, such as udp://0.0.0.0:2018",
+           url_type, Need::required);
+  add_text(*command, "BOARD", options->board, "the board, such as can://can0?node=3", url_type,
+           Need::required);
+  add_json(*command, options->json, "print what happens as JSON, one object a line");
+  add_seconds(*command, "--every", options->every, "tell what passed so often (default 10)");
+  add_seconds(
+      *command, "--timeout", options->timeout,
+      "after so long without its heartbeat a host makes room for another: the board's (default 1)");
+  add_seconds(*command, "--duration", options->duration, "end after that time");
+}
+
+}  // namespace r4::tool
