@@ -135,6 +135,7 @@ void World::attack() {
   board_->poll(board_ms());  // so that silence is not taken for the attacker's doing
   const bool lost = link.state() != state;
   attacking_ = true;
+  attack_kind_ = attack.kind;
   delivering_ = {attack.host, 0};  // no process has that incarnation
   constexpr std::uint32_t own_address = 0xFFFF;
   const std::uint32_t address =
