@@ -22,6 +22,9 @@ class Port {
   // Where nothing reaches everyone at once (UDP), what is sent to everyone goes to it. `everyone`: nobody on
   // this port is in control any more.
   virtual void hold(Peer peer) { static_cast<void>(peer); }
+  // … and is there a second time, or a third: it is heard from several places (session_wires.hpp). They are held
+  // beside the first until another is held.
+  virtual void also_hold(Peer peer) { static_cast<void>(peer); }
   // Does that peer get what is sent to everyone?
   virtual bool reaches(Peer peer) const { return peer == everyone; }
   // Send the packed form from now on, on a port that has one (CAN), to a host that does: the setting

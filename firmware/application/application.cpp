@@ -83,13 +83,20 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
   from.port = port;
   from.peer = peer;
   const MessageKind kind = kind_of(datagram);
-  const Verdict verdict = judge(port, kind, datagram, now_ms);
+  Verdict verdict = judge(port, kind, datagram, now_ms);
+  const bool waits =
+      kind == MessageKind::host_heartbeat && waits_to_join(from, datagram, verdict, now_ms);
+  const bool ours = wires_.has(from);
+  // The wires of a session carry the same bytes, and the packet number sees to it that they take effect once.
+  // From anywhere else a copy is a replay.
+  if (verdict == Verdict::copy) verdict = ours ? Verdict::authentic : Verdict::replayed;
   const bool authentic = verdict == Verdict::authentic;
   // A watcher at the place of the host in control, as on a bus, has numbers of its own.
-  const bool counts = authentic && link_.in_session(from) && !asks_to_watch(datagram);
-  if (counts && datagram.has_pnum()) tracker_.on(datagram.pnum());
+  const bool counts = authentic && ours && datagram.has_pnum() && !asks_to_watch(datagram);
+  known_ = counts && wires_.count(from, datagram.pnum());
   switch (kind) {
     case MessageKind::host_heartbeat:
+      if (waits) break;
       if (authentic) {
         on_host_heartbeat(from, datagram, now_ms);
       } else if (rejected(verdict, kind, now_ms)) {
@@ -160,13 +167,66 @@ BoardLink::HostHeartbeat Application::heartbeat_of(Source from, const Datagram& 
   return heartbeat;
 }
 
+SessionWires::Heartbeat Application::bytes_of(const Datagram& datagram) {
+  SessionWires::Heartbeat bytes;
+  bytes.pnum = datagram.pnum();
+  bytes.checksum = datagram.checksum();
+  return bytes;
+}
+
+// Of a heartbeat from a place that is none of the session's: becomes it one of them? True: that will show.
+bool Application::waits_to_join(Source from, const Datagram& datagram, Verdict verdict,
+                                std::uint32_t now_ms) {
+  if (verdict != Verdict::authentic && verdict != Verdict::copy) return false;
+  if (!link_.has_echo_host() || wires_.has(from) || !datagram.has_pnum()) return false;
+  const SessionWires::Stranger stranger = wires_.on_stranger(
+      from, bytes_of(datagram), link_.newest_heartbeat(), setpoints_.settings.timeout_ms, now_ms);
+  follow_wires(now_ms);
+  return stranger == SessionWires::Stranger::waits;
+}
+
+// A wire has come or gone: who is told, and where the host is.
+void Application::follow_wires(std::uint32_t now_ms) {
+  SessionWires::Change change;
+  bool any = false;
+  while (wires_.take_change(change)) {
+    any = true;
+    if (change.joined) watchers_.end_of(change.at);
+    if (change.joined) link_.send_soon();  // it is to hear from us
+    if (observer_ != nullptr) observer_->on_wire(now_ms, change.at, change.joined);
+  }
+  if (!any) return;
+  if (!wires_.has(link_.owner())) {
+    if (stop_from_ == link_.owner()) stop_from_ = wires_[0];
+    link_.move_owner(wires_[0]);
+  }
+  hold_wires();
+}
+
+// The places of the session's host are its own, whatever others send.
+void Application::hold_wires() {
+  for (std::uint8_t i = 0; i < port_count_; ++i) {
+    bool held = false;
+    for (int wire = 0; link_.has_owner() && wire < wires_.size(); ++wire) {
+      if (wires_[wire].port != i) continue;
+      held ? ports_[i].port->also_hold(wires_[wire].peer) : ports_[i].port->hold(wires_[wire].peer);
+      held = true;
+    }
+    if (!held) ports_[i].port->hold(everyone);
+  }
+}
+
 void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::uint32_t now_ms) {
-  const BoardLink::HostHeartbeat heartbeat = heartbeat_of(from, datagram, now_ms);
+  const BoardLink::HostHeartbeat heartbeat = heartbeat_of(speaker(from), datagram, now_ms);
+  const std::uint32_t timeout_ms = setpoints_.settings.timeout_ms;
   switch (link_.on_heartbeat(heartbeat, now_ms)) {
     case HeartbeatEffect::fed:
+      wires_.taken(from, bytes_of(datagram), timeout_ms, now_ms);
       break;
     case HeartbeatEffect::new_session:
-      ports_[from.port].port->hold(from.peer);
+      link_.move_owner(from);
+      wires_.begin(from, bytes_of(datagram), now_ms);
+      hold_wires();
       tell_ports();
       watchers_.end_of(from);
       // Nothing that another host, or this one before its restart, commanded may come back.
@@ -174,19 +234,21 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
       setpoints_.fields = FieldSet::paper_default();
       update_outputs(now_ms);
       safety_.leave(SafeReason::link);
-      tracker_.restart();
-      if (heartbeat.has_pnum) tracker_.on(heartbeat.pnum);
+      if (heartbeat.has_pnum) wires_.count(from, heartbeat.pnum);
       schedule_.start(now_ms, setpoints_.settings.state_period_ms());
       break;
     case HeartbeatEffect::resumed:
-      ports_[from.port].port->hold(from.peer);
+      wires_.resume(now_ms);
+      wires_.taken(from, bytes_of(datagram), timeout_ms, now_ms);
+      hold_wires();
       tell_ports();
-      watchers_.end_of(from);
+      for (int i = 0; i < wires_.size(); ++i) watchers_.end_of(wires_[i]);
       if (setpoints_.settings.recovery == Recovery::rearm) setpoints_.outputs = Outputs();
       safety_.leave(SafeReason::link);
       schedule_.start(now_ms, setpoints_.settings.state_period_ms());
       break;
     case HeartbeatEffect::stale:
+      wires_.passed_over(from, bytes_of(datagram), timeout_ms, now_ms);
       if (link_.wants_answer(heartbeat, now_ms)) {
         answer_heartbeat(from, now_ms);
       }
@@ -195,11 +257,13 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
       refuse(from, datagram, Refusal::busy, now_ms);
       break;
   }
+  follow_wires(now_ms);
   expect_host();
   poll(now_ms);
 }
 
 void Application::port_down(std::uint8_t port, std::uint32_t now_ms) {
+  if (link_.has_owner() && wires_.port_lost(port)) return follow_wires(now_ms);
   if (link_.port_lost(port, now_ms)) enter(SafeReason::link, now_ms);
 }
 
@@ -216,6 +280,10 @@ std::uint32_t Application::poll(std::uint32_t now_ms) {
   guard_.check_in(loop_duty);
   turn(now_ms);
   look_at_time(now_ms);
+  if (link_.has_owner()) {
+    wires_.poll(setpoints_.settings.timeout_ms, now_ms);
+    follow_wires(now_ms);
+  }
   check_interlocks(now_ms);
   update_outputs(now_ms);
   report_state(now_ms);

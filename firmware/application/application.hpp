@@ -10,7 +10,8 @@
 //     ACTIVE       a host is alive and nothing is wrong: outputs follow the setpoints
 //     SAFE         a cause of safety.hpp is there: outputs safe; with cause `link` heartbeats only
 //
-// Packet numbers count per port; answers to hosts that do not control the board count apart, so the
+// The host may be heard by several wires (session_wires.hpp): state and heartbeats go to each of them. Packet
+// numbers count per port; answers to hosts that do not control the board count apart, so the
 // controlling host sees no gaps. All times are ms of the board's clock, which wraps.
 #pragma once
 
@@ -19,6 +20,7 @@
 
 #include "../../protocol/keys/authentication.hpp"
 #include "../../protocol/link/board_link.hpp"
+#include "../../protocol/link/session_wires.hpp"
 #include "../../protocol/link/watchers.hpp"
 #include "../../protocol/messages/message.hpp"
 #include "../executor.hpp"
@@ -80,6 +82,7 @@ class Application {
   const Outputs& outputs() const { return outputs_; }  // as the hardware has them
   const Settings& settings() const { return setpoints_.settings; }
   const BoardLink& link() const { return link_; }
+  const SessionWires& wires() const { return wires_; }
   const Authentication& authentication() const { return authentication_; }
 
   // poll() is wanted at least this often, for the interlocks.
@@ -113,6 +116,11 @@ class Application {
   BoardLink::HostHeartbeat heartbeat_of(Source from, const Datagram& datagram,
                                         std::uint32_t now_ms) const;
   void on_host_heartbeat(Source from, const Datagram& datagram, std::uint32_t now_ms);
+  static SessionWires::Heartbeat bytes_of(const Datagram& datagram);
+  bool waits_to_join(Source from, const Datagram& datagram, Verdict verdict, std::uint32_t now_ms);
+  Source speaker(Source from) const { return wires_.has(from) ? link_.owner() : from; }
+  void follow_wires(std::uint32_t now_ms);
+  void hold_wires();
   bool rejected(Verdict verdict, MessageKind kind, std::uint32_t now_ms);
   void tell_ports();
 
@@ -155,6 +163,7 @@ class Application {
   void send_part(Source to, std::uint32_t& pnum, DatagramWriter& writer, const State& state,
                  std::uint32_t t_ms);
   void fill(State& state) const;
+  void transmit(Source to, Text datagram, Priority priority);
   void answer(Source to, DatagramWriter& writer, std::uint32_t now_ms);
   void identify(Source to, const Datagram& question, std::uint32_t now_ms);
   void refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms,
@@ -168,6 +177,7 @@ class Application {
   Observer* observer_;
   Identity identity_;
   BoardLink link_;
+  SessionWires wires_;
   Watchers watchers_;
   Authentication authentication_;
   Guard guard_;
@@ -176,7 +186,6 @@ class Application {
   Setpoints setpoints_;
   Outputs outputs_;  // what the hardware was told last
   Inputs inputs_;
-  PacketTracker tracker_;  // the controlling host's numbers
   PortSlot ports_[max_ports];
   std::uint8_t port_count_ = 0;
   bool any_behind_ = false;       // one of them, perhaps
@@ -193,6 +202,7 @@ class Application {
   bool stop_of_a_key_ = false;
   bool stop_unread_ = false;   // the guard has heard it, and its datagram is yet to be read
   bool outputs_live_ = false;  // outputs_ follow the setpoints
+  bool known_ = false;         // what is being read is a copy of what another wire has brought
   std::uint32_t rx_ok_ = 0;
   std::uint32_t rx_bad_ = 0;
   std::uint32_t rx_refused_ = 0;

@@ -28,9 +28,9 @@ bool Application::admit(Source from, const Datagram& datagram, Verdict verdict, 
     return false;
   }
   Refusal code = Refusal::none;
-  switch (link_.admit(from, datagram.pnum(), now_ms, code)) {
+  switch (link_.admit(speaker(from), datagram.pnum(), now_ms, code)) {
     case Admission::refuse:
-      if (code == Refusal::safe) link_.refused(from, datagram.pnum());
+      if (code == Refusal::safe) link_.refused(speaker(from), datagram.pnum(), code);
       refuse(from, datagram, code, now_ms);
       return false;
     case Admission::drop:
@@ -74,14 +74,15 @@ void Application::on_command(Source from, const Datagram& datagram, Verdict verd
   } else if (command.kind == CommandKind::clear) {
     outcome = judge_clear(command, waited_ms(from.port, now_ms), now_ms);
   } else if (command.kind == CommandKind::leave) {
-    if (!link_.may_leave(heartbeat_of(from, datagram, now_ms), now_ms)) outcome = Refusal::stale;
+    if (!link_.may_leave(heartbeat_of(speaker(from), datagram, now_ms), now_ms))
+      outcome = Refusal::stale;
   } else if (!may_set(from.port, command)) {
     outcome = Refusal::auth;
   } else {
     outcome = carry_out(command, setpoints_);
   }
   if (outcome != Refusal::none) {
-    link_.refused(from, datagram.pnum());
+    link_.refused(speaker(from), datagram.pnum(), outcome);
     refuse(from, datagram, outcome, now_ms);
     return;
   }
@@ -97,7 +98,7 @@ void Application::on_group(Source from, const Datagram& datagram, Verdict verdic
   const Refusal refusal = read_group(datagram, group, at);
   if (!admit(from, datagram, verdict, refusal, at, now_ms)) return;
   if (safety_.is_safe()) {
-    link_.refused(from, datagram.pnum());
+    link_.refused(speaker(from), datagram.pnum(), Refusal::safe);
     refuse(from, datagram, Refusal::safe, now_ms);
     return;
   }
@@ -122,7 +123,7 @@ void Application::on_watch(Source from, const Datagram& datagram, const Command&
     const Refusal refusal = parse_fields(command.text, fields);
     if (refusal != Refusal::none) return refuse(from, datagram, refusal, now_ms);
   }
-  if (link_.has_owner() && from == link_.owner()) return;  // all goes there
+  if (link_.has_owner() && wires_.has(from)) return;  // all goes there
   const std::uint32_t rate_hz = static_cast<std::uint32_t>(command.value);
   switch (watchers_.on_lease(from, rate_hz, datagram.time_ms(), proven, now_ms)) {
     case Watchers::Effect::watching: {
@@ -207,21 +208,21 @@ void Application::emergency_stop(Source from, const Datagram& datagram, Verdict 
   const bool of_a_key =
       verdict == Verdict::authentic || verdict == Verdict::replayed || verdict == Verdict::old;
   const bool same = has_number && has_stop_number_ && number == stop_number_ &&
-                    from == stop_from_ && (stop_of_a_key_ || !of_a_key);
+                    speaker(from) == stop_from_ && (stop_of_a_key_ || !of_a_key);
   // An E:CLEAR under way knows nothing of this one.
   if (repeated && !same && !stop_unread_) safety_.again();
   stop_unread_ = false;
   if (!repeated || !same) stop_of_a_key_ = of_a_key;
-  stop_from_ = from;
+  stop_from_ = speaker(from);
   has_stop_number_ = has_number;
   stop_number_ = number;
   enter(SafeReason::stop, now_ms);
   caused_ms_ = now_ms;
-  const bool owner = link_.has_owner() && from == link_.owner();
+  const bool owner = link_.has_owner() && wires_.has(from);
   if (owner && verdict == Verdict::authentic && datagram.has_pnum() &&
       link_.is_next(datagram.pnum())) {
     Refusal code = Refusal::none;
-    if (link_.admit(from, datagram.pnum(), now_ms, code) == Admission::execute) {
+    if (link_.admit(speaker(from), datagram.pnum(), now_ms, code) == Admission::execute) {
       link_.executed(datagram.pnum());
     }
   }

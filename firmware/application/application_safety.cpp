@@ -25,7 +25,7 @@ void Application::look_at_time(std::uint32_t now_ms) {
 void Application::enter(SafeReason cause, std::uint32_t now_ms) {
   if (!safety_.enter(cause)) return;
   if (cause == SafeReason::link) {
-    ports_[link_.owner().port].port->hold(everyone);
+    hold_wires();
     tell_ports();
   } else {
     setpoints_.outputs = Outputs();

@@ -21,8 +21,21 @@ constexpr std::size_t safe_fields_size = 22;
 
 // The controlling host where it is, else whoever the port streams to.
 std::uint32_t Application::audience(std::uint8_t port) const {
-  const bool owned = link_.has_owner() && link_.owner().port == port;
-  return owned ? link_.owner().peer : everyone;
+  for (int i = 0; link_.has_owner() && i < wires_.size(); ++i) {
+    if (wires_[i].port == port) return wires_[i].peer;
+  }
+  return everyone;
+}
+
+// The controlling host's places on one port share its numbers: each gets all that has one.
+void Application::transmit(Source to, Text datagram, Priority priority) {
+  Port& port = *ports_[to.port].port;
+  if (!link_.has_owner() || wires_.size() == 1 || !wires_.has(to)) {
+    return port.send(datagram, priority, to.peer);
+  }
+  for (int i = 0; i < wires_.size(); ++i) {
+    if (wires_[i].port == to.port) port.send(datagram, priority, wires_[i].peer);
+  }
 }
 
 // A watcher has numbers of its own, but where it hears those of everyone at its port; the answers to other
@@ -30,7 +43,7 @@ std::uint32_t Application::audience(std::uint8_t port) const {
 std::uint32_t& Application::number_for(Source to) {
   Watcher* const watcher = watchers_.find(to);
   if (watcher != nullptr && !hears_all(to)) return watcher->pnum;
-  const bool aside = link_.has_owner() && to != link_.owner();
+  const bool aside = link_.has_owner() && !wires_.has(to);
   return aside ? ports_[to.port].aside_pnum : ports_[to.port].next_pnum;
 }
 
@@ -46,7 +59,7 @@ bool Application::hears_all(Source watcher) const {
 
 void Application::answer(Source to, DatagramWriter& writer, std::uint32_t now_ms) {
   const Text datagram = writer.finish(number_for(to)++, now_ms);
-  if (!datagram.empty()) ports_[to.port].port->send(datagram, Priority::normal, to.peer);
+  if (!datagram.empty()) transmit(to, datagram, Priority::normal);
 }
 
 void Application::identify(Source to, const Datagram& question, std::uint32_t now_ms) {
@@ -56,7 +69,7 @@ void Application::identify(Source to, const Datagram& question, std::uint32_t no
   const char* const name = settings().site.name;
   identity.name = Text(name, std::strlen(name));
   identity.has_busy = true;
-  identity.busy = link_.has_owner() && link_.owner() != to;
+  identity.busy = link_.has_owner() && !wires_.has(to);
   identity.has_asked = question.has_pnum();
   identity.asked = question.pnum();
   write_identity(writer, identity);
@@ -69,15 +82,15 @@ void Application::identify(Source to, const Datagram& question, std::uint32_t no
 // `at`: which command of a group it is, from 1; 0: none in particular. `lease`: what a W has to echo; 0: none.
 void Application::refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms,
                          std::uint8_t at, std::uint32_t lease) {
-  ++rx_refused_;
+  if (!known_) ++rx_refused_;
   if (!datagram.has_pnum()) return;
-  if (observer_ != nullptr) observer_->on_refused(now_ms, datagram.pnum(), code);
+  if (observer_ != nullptr && !known_) observer_->on_refused(now_ms, datagram.pnum(), code);
   Nack nack;
   nack.pnum = datagram.pnum();
   nack.code = code;
   nack.at = at;
   // A W needs no key: what answers it must prove nothing of the command whose number it has.
-  nack.has_session = !asks_to_watch(datagram) && link_.session_of(to, nack.session);
+  nack.has_session = !asks_to_watch(datagram) && link_.session_of(speaker(to), nack.session);
   nack.lease = lease;
   char buffer[short_datagram];
   DatagramWriter writer(buffer, sizeof buffer);
@@ -138,9 +151,9 @@ void Application::write_heartbeat(Source to, std::uint32_t& pnum, const SafeRepo
   char buffer[short_datagram];
   const Text nonce = authentication_.nonce();
   if (pnum == 0 && !nonce.empty()) ++pnum;  // that would say CONNECTING
-  ports_[to.port].port->send(
-      write_board_heartbeat(buffer, sizeof buffer, pnum++, heartbeat_time(now_ms), safe, nonce),
-      Priority::normal, to.peer);
+  transmit(
+      to, write_board_heartbeat(buffer, sizeof buffer, pnum++, heartbeat_time(now_ms), safe, nonce),
+      Priority::normal);
 }
 
 // A board that has had no host yet tells watchers `link`, as one that has lost its host does.
@@ -206,7 +219,7 @@ void Application::send_part(Source to, std::uint32_t& pnum, DatagramWriter& writ
   if (state.safe != SafeReason::none && state.fault.any()) {
     write_field(writer, StateField::fault, state);
   }
-  ports_[to.port].port->send(writer.finish(pnum++, t_ms), Priority::state, to.peer);
+  transmit(to, writer.finish(pnum++, t_ms), Priority::state);
 }
 
 void Application::fill(State& state) const {
@@ -228,8 +241,8 @@ void Application::fill(State& state) const {
   state.last_command = link_.last_executed();
   state.rx_ok = rx_ok_;
   state.rx_crc = rx_bad_;
-  state.rx_lost = tracker_.counters().lost;
-  state.rx_duplicate = tracker_.counters().duplicate;
+  state.rx_lost = wires_.lost();
+  state.rx_duplicate = wires_.repeated();
   state.rx_refused = rx_refused_;
   state.late = schedule_.late();
   state.fault = inputs_.fault;

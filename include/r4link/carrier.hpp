@@ -136,6 +136,8 @@ class R4LINK_API Carrier {
   // held. Where nothing reaches everyone at once (UDP), what is sent to everyone goes to it. `everyone`: nobody
   // on this carrier is in control any more.
   virtual void hold(Peer peer) { static_cast<void>(peer); }
+  // It is that peer, too, for it is heard from several places: held beside the first until another is held.
+  virtual void also_hold(Peer peer) { static_cast<void>(peer); }
 
   // At a board: does that peer get what is sent to everyone?
   virtual bool reaches(Peer peer) const { return peer == everyone; }

@@ -110,6 +110,8 @@ class R4LINK_API Datagram {
   // The first field of that name; a Field with an empty name if there is none.
   Field find(Text name) const;
 
+  // Of all bytes up to and including the first `^`; as the datagram says itself.
+  std::uint32_t checksum() const { return checksum_; }
   // PNum and T, where the datagram has them as whole numbers. A host heartbeat may lack PNum.
   bool has_pnum() const { return has_pnum_; }
   std::uint32_t pnum() const { return pnum_; }
@@ -130,6 +132,7 @@ class R4LINK_API Datagram {
   Text bytes_;
   Text fields_;
   std::uint64_t time_ms_ = 0;
+  std::uint32_t checksum_ = 0;
   std::uint32_t pnum_ = 0;
   bool has_pnum_ = false;
   bool has_time_ = false;

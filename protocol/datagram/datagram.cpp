@@ -114,6 +114,7 @@ Datagram& Datagram::operator=(const Datagram& other) {
   bytes_ = other.bytes_;
   fields_ = other.fields_;
   time_ms_ = other.time_ms_;
+  checksum_ = other.checksum_;
   pnum_ = other.pnum_;
   has_pnum_ = other.has_pnum_;
   has_time_ = other.has_time_;
@@ -189,6 +190,7 @@ ReadResult read_datagram(Text bytes, Datagram& out) {
   Datagram datagram;
   datagram.bytes_ = whole;
   datagram.fields_ = between(whole.begin(), fields_end);
+  datagram.checksum_ = crc;
   std::uint64_t short_names[Datagram::words];
   if (!mark_fields(datagram.fields_, datagram.ends_, short_names)) {
     return fail(ReadError::syntax, first_wrong_byte(datagram.fields_));

@@ -53,6 +53,8 @@ const char* to_text(Verdict verdict) {
       return "replayed";
     case Verdict::old:
       return "old";
+    case Verdict::copy:
+      return "copy";
   }
   return "authentic";
 }
@@ -95,7 +97,9 @@ void Authentication::use(const Key (&keys)[max_keys]) {
 
 void Authentication::renew() {
   has_nonce_ = required_ && has_chance_;
-  for (Entry& entry : entries_) entry.newest = 0;
+  for (Entry& entry : entries_) {
+    for (std::uint64_t& counter : entry.counters) counter = 0;
+  }
   if (!has_nonce_) return;
   std::uint8_t digest[nonce_size / 2];
   draw(Text(), digest);
@@ -143,9 +147,15 @@ Verdict Authentication::verify(const Datagram& datagram, std::uint32_t now_ms) {
   char expected[tag_size];
   write_tag(entry->key, nonce(), before, expected);
   if (!same(values[3], expected)) return Verdict::wrong_tag;
-  if (counter <= entry->newest) return Verdict::replayed;
-  entry->newest = counter;
-  return now_ms - board_t <= age_limit_ms ? Verdict::authentic : Verdict::old;
+  const bool fresh = now_ms - board_t <= age_limit_ms;
+  std::uint64_t* lowest = entry->counters;
+  for (std::uint64_t& used : entry->counters) {
+    if (used == counter) return fresh && counter != 0 ? Verdict::copy : Verdict::replayed;
+    if (used < *lowest) lowest = &used;
+  }
+  if (counter < *lowest) return Verdict::replayed;
+  *lowest = counter;
+  return fresh ? Verdict::authentic : Verdict::old;
 }
 
 bool Authentication::rejected(Verdict verdict, bool is_command, std::uint32_t now_ms) {

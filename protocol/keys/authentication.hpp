@@ -41,11 +41,12 @@ enum class Verdict : std::uint8_t {
   missing,      // its last field is no A of the form above
   unknown_key,  // no key of that id
   wrong_tag,    // changed, of another key, or for another nonce
-  replayed,     // the counter is not above the newest of its key
+  replayed,     // the counter was used, or is below all that are remembered
   old,          // its board T is more than 250 ms ago, or yet to come
+  copy,  // byte for byte one of the last that were signed, and not old: by another wire, perhaps
 };
-constexpr int verdict_count = 6;
-// "authentic", "missing", "unknown key", "wrong tag", "replayed", "old".
+constexpr int verdict_count = 6;  // without `copy`, which is not rejected as such
+// "authentic", "missing", "unknown key", "wrong tag", "replayed", "old", "copy".
 const char* to_text(Verdict verdict);
 
 // The board's end.
@@ -54,6 +55,9 @@ class Authentication {
   static constexpr std::size_t chance_size = 32;
   static constexpr std::uint32_t age_limit_ms = 250;
   static constexpr std::uint32_t answer_spacing_ms = 100;
+  // So many counters of a key are remembered, the highest: a wire that lags by age_limit_ms beside another
+  // brings copies of as many datagrams. What is below them counts as used.
+  static constexpr int counters_remembered = 32;
 
   // `chance`: random bytes, others at each boot, from which the nonces are made. nullptr: the board
   // has none; then it tells no nonce, and nothing is ever authentic.
@@ -75,7 +79,7 @@ class Authentication {
   // there is chance.
   std::uint32_t random();
 
-  // Is it signed? If so, its counter and those below are used up.
+  // Is it signed? If so, its counter is used up.
   Verdict verify(const Datagram& datagram, std::uint32_t now_ms);
   // It was not and was needed. True if that may be answered: at most every answer_spacing_ms, and
   // not what a network has repeated or held back. Commands are answered apart from the rest: a host
@@ -89,7 +93,7 @@ class Authentication {
  private:
   struct Entry {
     Blake2sKey key;
-    std::uint64_t newest = 0;  // counter
+    std::uint64_t counters[counters_remembered] = {};  // in no order; 0: none yet
     std::uint8_t id = 0;
   };
   Entry* find(Text id);

@@ -75,6 +75,7 @@ HeartbeatEffect BoardLink::begin_session(const HostHeartbeat& heartbeat, bool ar
   armed_ = armed;
   clock_ = Clock::unknown;
   last_executed_ = 0;
+  refused_used_ = refused_next_ = 0;
   numbers_in_doubt_ = false;
   begun_again_ = false;
   has_heartbeat_pnum_ = heartbeat.has_pnum;
@@ -208,6 +209,9 @@ Admission BoardLink::admit(Source from, std::uint32_t pnum, std::uint32_t now_ms
     code = Refusal::duplicate;
     return Admission::refuse;
   }
+  const bool spent = ours && has_baseline_ && !newer(pnum, newest_);
+  if (spent) code = code_of_spent(pnum);
+  if (spent && code != Refusal::stale) return Admission::refuse;
   if (state_ != BoardLinkState::active) {
     code = Refusal::safe;
     return Admission::refuse;
@@ -241,8 +245,21 @@ void BoardLink::spend(std::uint32_t pnum) {
   has_baseline_ = true;
 }
 
-void BoardLink::refused(Source from, std::uint32_t pnum) {
-  if (in_session(from) && (in_window(pnum) || begins_anew(pnum))) spend(pnum);
+void BoardLink::refused(Source from, std::uint32_t pnum, Refusal code) {
+  if (!in_session(from) || !(in_window(pnum) || begins_anew(pnum))) return;
+  spend(pnum);
+  refused_[refused_next_] = pnum;
+  refused_codes_[refused_next_] = code;
+  refused_next_ = (refused_next_ + 1) % refused_memory;
+  if (refused_used_ < refused_memory) ++refused_used_;
+}
+
+// Why is a number that is spent not executed?
+Refusal BoardLink::code_of_spent(std::uint32_t pnum) const {
+  for (int i = 0; i < refused_used_; ++i) {
+    if (refused_[i] == pnum) return refused_codes_[i];
+  }
+  return Refusal::stale;
 }
 
 void BoardLink::executed(std::uint32_t pnum) {

@@ -15,6 +15,8 @@
 // numbers from below (or leaves PNum out); its T is an echo if it once was one, else its own clock.
 // A session keeps its kind as long as its numbers continue, also where they wrap.
 //
+// The host may be heard by several wires (session_wires.hpp). Here it has one place, whichever brings it.
+//
 // All times are the board's clock in ms, which wraps; it must start at a random value at boot.
 #pragma once
 
@@ -83,8 +85,9 @@ class BoardLink {
   // The owner's command with this number was carried out: it and all older ones are spent.
   void executed(std::uint32_t pnum);
   // A command was refused, for its content or the safe state: if it is the session's, it and all
-  // older ones are spent, so that no copy of it is executed when the reason is gone.
-  void refused(Source from, std::uint32_t pnum);
+  // older ones are spent, so that no copy of it is executed when the reason is gone. A copy of one of
+  // the last refused_memory is refused with the same code.
+  void refused(Source from, std::uint32_t pnum, Refusal code);
   // Is this number one of the next `memory` of the session's?
   bool is_next(std::uint32_t pnum) const;
   // Is this admitted command of a host that has begun again? One that does not number its
@@ -95,6 +98,8 @@ class BoardLink {
   bool poll(std::uint32_t now_ms);
   // The transport under `port` is gone. True if that was the owner's: ACTIVE -> LOST.
   bool port_lost(std::uint8_t port, std::uint32_t now_ms);
+  // The session's host has another place from now on.
+  void move_owner(Source to) { owner_ = to; }
 
   // The owner says that it ends, by a command that was admitted. Does it say so in this session? It
   // proves that as a heartbeat does: its T must echo one of ours, and one since the session began. The
@@ -122,6 +127,10 @@ class BoardLink {
 
   BoardLinkState state() const { return state_; }
   bool has_owner() const { return state_ == BoardLinkState::active; }
+  // … and is it one that may be heard by several wires?
+  bool has_echo_host() const { return has_owner() && echo_host_; }
+  // The number of the newest heartbeat that fed; only of an echo host.
+  std::uint32_t newest_heartbeat() const { return newest_heartbeat_; }
   Source owner() const { return owner_; }
   // Is it the owner, or the one that was when the link was lost?
   bool in_session(Source from) const { return has_session_ && from == owner_; }
@@ -149,6 +158,7 @@ class BoardLink {
   static constexpr std::uint32_t resume_window = 4096;
   // How far back it is known which numbers were executed: there DUPLICATE and STALE are exact.
   static constexpr std::uint32_t memory = 64;
+  static constexpr int refused_memory = 16;
 
  private:
   enum class Clock : std::uint8_t { unknown, echo, own };  // what a paper host's T turned out to be
@@ -166,6 +176,7 @@ class BoardLink {
   void spend(std::uint32_t pnum);
   bool near_newest_heartbeat(std::uint32_t pnum) const;
   bool in_window(std::uint32_t pnum) const;
+  Refusal code_of_spent(std::uint32_t pnum) const;
   void remember_sent(std::uint32_t t_ms);
 
   Timing timing_;
@@ -182,6 +193,10 @@ class BoardLink {
   bool has_baseline_ = false;        // numbers up to newest_ are spent
   std::uint32_t newest_ = 0;         // newest executed command, or the session's first heartbeat
   std::uint64_t executed_bits_ = 0;  // bit i: newest_ - i was executed
+  std::uint32_t refused_[refused_memory] = {};
+  Refusal refused_codes_[refused_memory] = {};
+  int refused_used_ = 0;
+  int refused_next_ = 0;
   std::uint32_t last_executed_ = 0;
   bool numbers_in_doubt_ = false;  // resumed by a heartbeat without a number
   bool begun_again_ = false;       // the owner has left, or seems to have restarted

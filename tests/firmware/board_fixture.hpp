@@ -58,14 +58,19 @@ class MemoryPort final : public firmware::Port {
   }
   std::size_t max_size() const override { return limit; }
   void use_packed_form(bool wanted) override { packed = wanted; }
-  void hold(std::uint32_t peer) override { held = peer; }
+  void hold(std::uint32_t peer) override {
+    held = peer;
+    also_held.clear();
+  }
+  void also_hold(std::uint32_t peer) override { also_held.push_back(peer); }
   bool may_configure() const override { return cable; }
   bool is_bus() const override { return bus; }
 
   bool packed = false;
   bool cable = false;
   bool bus = false;
-  std::uint32_t held = 0;  // who is in control
+  std::uint32_t held = 0;                // who is in control
+  std::vector<std::uint32_t> also_held;  // … and its other places
   const std::uint32_t* now_ms = nullptr;
   std::size_t limit = max_datagram;
   std::vector<Sent> sent;
@@ -89,6 +94,10 @@ class EventLog final : public firmware::Observer {
   void on_rejected(std::uint32_t, Verdict verdict) override {
     rejected.emplace_back(to_text(verdict));
   }
+  void on_wire(std::uint32_t, Source wire, bool joined) override {
+    wires.push_back((joined ? "joined " : "left ") + std::to_string(wire.port) + "/" +
+                    std::to_string(wire.peer));
+  }
 
   std::vector<std::string> states;
   std::uint32_t state_ms = 0;  // of the newest
@@ -96,6 +105,7 @@ class EventLog final : public firmware::Observer {
   std::vector<std::uint32_t> executed;
   std::vector<std::string> refused;
   std::vector<std::string> rejected;
+  std::vector<std::string> wires;  // "joined 1/4": port and peer
 };
 
 // A datagram of the board, read.

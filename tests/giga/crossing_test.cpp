@@ -136,9 +136,17 @@ TEST(UdpPeers, KeepTheHostInControlInAFloodFromChangingAddresses) {
 TEST(UdpLink, TellsTheNetworkThreadWhoIsInControl) {
   giga::UdpLink link;
   giga::UdpPort port(link, &clock_ms);
-  EXPECT_EQ(link.held(), everyone);
+  EXPECT_EQ(link.held(0), everyone);
   port.hold(7);
-  EXPECT_EQ(link.held(), 7U);
+  EXPECT_EQ(link.held(0), 7U);
+  port.also_hold(9);
+  port.also_hold(7);
+  port.also_hold(everyone);
+  EXPECT_EQ(link.held(1), 9U) << "its second place";
+  EXPECT_EQ(link.held(2), everyone);
+  port.hold(8);
+  EXPECT_EQ(link.held(0), 8U);
+  EXPECT_EQ(link.held(1), everyone);
 }
 
 TEST(UdpPeers, SendToThePapersClientWhereItListensAndWhereItAsks) {

@@ -78,6 +78,7 @@ class Crowd final : public firmware::Hal, public firmware::Port, public firmware
   void send(Text datagram, Priority priority, std::uint32_t peer) override;
   std::size_t max_size() const override { return max_datagram; }
   void hold(std::uint32_t peer) override { peers_.hold(peer); }
+  void also_hold(std::uint32_t peer) override { peers_.also_hold(peer); }
   // firmware::Observer
   void on_state(std::uint32_t, firmware::BoardState, SafeReason) override {}
   void on_outputs(std::uint32_t, const firmware::Outputs&) override {}
@@ -208,7 +209,8 @@ void Crowd::crowd_sends() {
 
 // Anything but a stop, which everybody may ask for. While nobody is in control of a board without a key,
 // a heartbeat would take it: then no stranger knows what to echo. And while nobody is, they ask for it
-// twice as often as is answered, no more.
+// twice as often as is answered, no more. Without a key, who relays what a host has just sent is taken for a
+// wire of that host's, and would be believed: there nobody does.
 std::string Crowd::say_something() {
   const std::string number =
       std::to_string(random_.chance(0.5) ? random_.below(1U << 31)
@@ -240,7 +242,7 @@ std::string Crowd::say_something() {
     case 4:
       return test::with_crc("AIN24:24.2" + end);
     case 5:
-      if (may_take) return overheard_;
+      if (with_key_) return overheard_;
       [[fallthrough]];
     case 6:
       if (may_take) return test::with_crc("H:ROS2-R4;PNum:" + number + ";T:0;");

@@ -269,6 +269,7 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   std::vector<Sent> commands_;
   Attacker attacker_;
   bool attacking_ = false;
+  Attack::Kind attack_kind_ = Attack::Kind::count;
   std::set<std::uint32_t> attacker_stops_;  // their numbers
   std::uint64_t cut_to_board_until_us_ = 0;
   std::uint64_t cut_to_host_until_us_ = 0;

@@ -132,6 +132,8 @@ void World::check_stream(std::uint32_t peer, const Datagram& datagram) {
     owner_streamed_us_ = now_us_;
     return;
   }
+  // A place that brought a heartbeat of the host's that was signed just now: it is taken for another wire.
+  if (link.has_owner() && board_->wires().has(Source{0, peer})) return;
   if (streamed_us_ != now_us_) streamed_.clear();
   streamed_us_ = now_us_;
   streamed_.insert(peer);

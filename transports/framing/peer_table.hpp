@@ -46,7 +46,14 @@ class PeerTable {
   // in control no longer, and may come back.
   void hold(std::uint32_t number) {
     in_control_ = number != nobody;
-    if (in_control_) audience_ = held_ = number;
+    if (!in_control_) return;
+    audience_ = held_[0] = number;
+    held_count_ = 1;
+  }
+  // It has that place, too.
+  void also_hold(std::uint32_t number) {
+    if (!in_control_ || number == nobody || held_count_ == most_held || is_held(number)) return;
+    held_[held_count_++] = number;
   }
 
   // Where that number sends from; null if it has lost its place.
@@ -82,28 +89,37 @@ class PeerTable {
       place->number = given_;
     }
     place->heard = ++turn_;
-    const bool controls = in_control_ && place->number == held_;
+    const bool controls = in_control_ && is_held(place->number);
     if (says != Says::other) place->watches = says == Says::watch && !controls;
     if (controls || (!in_control_ && !place->watches)) audience_ = place->number;
     return place->number;
+  }
+
+  bool is_held(std::uint32_t number) const {
+    for (int i = 0; i < held_count_; ++i) {
+      if (held_[i] == number) return true;
+    }
+    return false;
   }
 
   Entry& place_for_new() {
     Entry* silent = nullptr;
     for (Entry& entry : entries_) {
       if (entry.number == nobody) return entry;
-      if (entry.number == held_) continue;
+      if (is_held(entry.number)) continue;
       if (silent == nullptr || entry.heard < silent->heard) silent = &entry;
     }
     return *silent;
   }
 
-  static_assert(places > 1, "one place may be held");
+  static constexpr int most_held = 4;  // as many wires as a session has
+  static_assert(places > most_held, "all but these may be taken");
   Entry entries_[places];
   std::uint64_t turn_ = 0;
   std::uint32_t given_ = nobody;
   std::uint32_t audience_ = nobody;
-  std::uint32_t held_ = nobody;
+  std::uint32_t held_[most_held] = {};
+  int held_count_ = 0;
   bool in_control_ = false;  // is the one that is held
 };
 

@@ -48,6 +48,7 @@ class Impaired final : public ImpairedCarrier, private Carrier::Handler {
     return SendResult::sent;
   }
   void hold(Peer peer) override { below_->hold(peer); }
+  void also_hold(Peer peer) override { below_->also_hold(peer); }
   bool reaches(Peer peer) const override { return below_->reaches(peer); }
   bool is_shared() const override { return below_->is_shared(); }
   void use_packed_form(bool wanted) override { below_->use_packed_form(wanted); }

@@ -18,6 +18,7 @@ class UdpBoard final : public UdpEnd {
   void open(Handler& handler) override;
   void close() noexcept override;
   void hold(Peer peer) override;
+  void also_hold(Peer peer) override { peers_.also_hold(peer); }
   bool reaches(Peer peer) const override;
 
  private:

@@ -35,6 +35,7 @@ class CarrierPort final : public firmware::Port, private Carrier::Handler {
   void send(Text datagram, Priority priority, std::uint32_t peer) override;
   std::size_t max_size() const override { return carrier_->max_size(); }
   void hold(std::uint32_t peer) override { carrier_->hold(peer); }
+  void also_hold(std::uint32_t peer) override { carrier_->also_hold(peer); }
   bool reaches(std::uint32_t peer) const override { return carrier_->reaches(peer); }
   void use_packed_form(bool wanted) override { carrier_->use_packed_form(wanted); }
   bool is_bus() const override { return carrier_->is_shared(); }

@@ -178,7 +178,7 @@ TEST_F(ApplicationCommand, NothingSentBeforeAnOutageIsExecutedAfterIt) {
   host.resend("O:1,1,1", held_back);
   host.resend("O:1,1,1", in_between);
   EXPECT_TRUE(board.safe());
-  EXPECT_EQ(answers(), (Lines{"STALE", "STALE"}));
+  EXPECT_EQ(answers(), (Lines{"STALE", "SAFE"}));
 }
 
 TEST_F(ApplicationCommand, TellsOfAnExecutedNumberEvenAfterAnOutage) {
@@ -201,7 +201,7 @@ TEST_F(ApplicationCommand, ARefusedCommandStaysRefused) {
   ASSERT_EQ(board.state(), BoardState::active);
   host.resend("O:1,1,1", refused);  // a copy that the network made
   EXPECT_TRUE(board.safe());
-  EXPECT_EQ(answers(), Lines{"STALE"});
+  EXPECT_EQ(answers(), Lines{"SAFE"}) << "why it was refused";
 }
 
 TEST_F(ApplicationCommand, ACommandRefusedInAnOutageStaysRefused) {
@@ -215,7 +215,7 @@ TEST_F(ApplicationCommand, ACommandRefusedInAnOutageStaysRefused) {
   ASSERT_EQ(board.state(), BoardState::active);
   host.resend("O:1,1,1", refused);
   EXPECT_TRUE(board.safe());
-  EXPECT_EQ(answers(), Lines{"STALE"});
+  EXPECT_EQ(answers(), Lines{"SAFE"});
 }
 
 TEST_F(ApplicationCommand, NeedsANumberForAllButStopHeartbeatAndQuestion) {

@@ -96,7 +96,7 @@ TEST_F(ApplicationGroup, IsRefusedAsAWholeWhileTheOutputsAreSafe) {
   board.hal.inputs.handle_held = true;
   board.run(10);
   host.resend("O:1,1,1;Z:1", number);
-  EXPECT_EQ(refusals(), Lines{"STALE"}) << "its number is spent";
+  EXPECT_EQ(refusals(), Lines{"SAFE"}) << "its number is spent";
   EXPECT_TRUE(board.safe());
 }
 

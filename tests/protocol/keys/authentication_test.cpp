@@ -88,21 +88,36 @@ TEST_F(TestAuthentication, EveryChangedByteIsSeen) {
   EXPECT_EQ(verdict(good), Verdict::authentic) << "and none of them has spent its counter";
 }
 
-TEST_F(TestAuthentication, TakesEachCounterOnceAndRising) {
+TEST_F(TestAuthentication, TakesEachCounterOnceAndTellsACopyOfTheLastOnes) {
   EXPECT_EQ(verdict(sign(0)), Verdict::replayed) << "the first counter is 1";
   EXPECT_EQ(verdict(sign(10)), Verdict::authentic);
-  EXPECT_EQ(verdict(sign(10)), Verdict::replayed);
-  EXPECT_EQ(verdict(sign(9)), Verdict::replayed);
-  EXPECT_EQ(verdict(sign(11)), Verdict::authentic);
+  EXPECT_EQ(verdict(sign(10)), Verdict::copy);
+  EXPECT_EQ(verdict(sign(9)), Verdict::authentic) << "it was overtaken";
+  EXPECT_EQ(verdict(sign(9)), Verdict::copy);
+  EXPECT_EQ(verdict(sign(10), now + 251), Verdict::replayed) << "a copy that is old";
   EXPECT_EQ(verdict(sign(0xFFFFFFFFFFFFFFFF)), Verdict::authentic);
-  EXPECT_EQ(verdict(sign(0xFFFFFFFFFFFFFFFF)), Verdict::replayed);
+  EXPECT_EQ(verdict(sign(0xFFFFFFFFFFFFFFFF)), Verdict::copy);
+}
+
+TEST_F(TestAuthentication, WhatIsBelowTheCountersThatAreRememberedWasUsed) {
+  constexpr std::uint64_t remembered = Authentication::counters_remembered;
+  for (std::uint64_t counter = 100; counter < 100 + remembered; ++counter) {
+    EXPECT_EQ(verdict(sign(counter)), Verdict::authentic);
+  }
+  EXPECT_EQ(verdict(sign(100)), Verdict::copy);
+  EXPECT_EQ(verdict(sign(99)), Verdict::replayed) << "it may be one that was forgotten";
+  EXPECT_EQ(verdict(sign(1000)), Verdict::authentic);
+  EXPECT_EQ(verdict(sign(100)), Verdict::replayed) << "the lowest was forgotten for it";
+  EXPECT_EQ(verdict(sign(101)), Verdict::copy);
+  EXPECT_EQ(verdict(sign(500)), Verdict::authentic);
+  EXPECT_EQ(verdict(sign(101)), Verdict::replayed);
 }
 
 TEST_F(TestAuthentication, TakesNothingOlderThan250MsNorOfTheFuture) {
   EXPECT_EQ(verdict(sign(1, now - 250)), Verdict::authentic);
   EXPECT_EQ(verdict(sign(2, now - 251)), Verdict::old);
   EXPECT_EQ(verdict(sign(3, now + 1)), Verdict::old);
-  EXPECT_EQ(verdict(sign(3, now + 1), now + 1), Verdict::replayed) << "nor when its time has come";
+  EXPECT_EQ(verdict(sign(3, now + 1), now + 1), Verdict::copy) << "it was seen before its time";
   EXPECT_EQ(verdict(sign(4, 0xFFFFFF80), 0x20), Verdict::authentic) << "over the clock's wrap";
 }
 

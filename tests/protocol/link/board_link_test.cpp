@@ -545,13 +545,13 @@ TEST_F(BoardLinkTest, ADeadHeartbeatOvertakesNothing) {
 
 TEST_F(BoardLinkTest, ARefusedNumberIsSpent) {
   connect();
-  link.refused(here, echo_pnum + 5);
-  EXPECT_EQ(command(echo_pnum + 5), "STALE");
+  link.refused(here, echo_pnum + 5, Refusal::range);
+  EXPECT_EQ(command(echo_pnum + 5), "RANGE") << "a copy is told why it was refused";
   EXPECT_EQ(command(echo_pnum + 4), "STALE");
   EXPECT_EQ(command(echo_pnum + 6), "execute");
-  link.refused(there, echo_pnum + 50);  // of another host: nothing
+  link.refused(there, echo_pnum + 50, Refusal::range);  // of another host: nothing
   EXPECT_EQ(command(echo_pnum + 7), "execute");
-  link.refused(here, echo_pnum + 7 + 65537);  // from outside the window: nothing
+  link.refused(here, echo_pnum + 7 + 65537, Refusal::range);  // from outside the window: nothing
   EXPECT_EQ(command(echo_pnum + 8), "execute");
   EXPECT_EQ(link.last_executed(), echo_pnum + 8);
 }

@@ -122,7 +122,8 @@ bool Network::receive_next() {
   heard_ms_ = BoardClock::now_ms();
   const Text datagram(buffer, static_cast<std::size_t>(size));
   if (firmware::is_stop(datagram)) stop_at_once();  // the loop may be busy
-  peers_.hold(link_.held());
+  peers_.hold(link_.held(0));
+  for (int i = 1; i < UdpLink::most_held; ++i) peers_.also_hold(link_.held(i));
   link_.give(peers_.heard(from, datagram), datagram);
   return true;
 }

@@ -29,6 +29,7 @@ class UdpPeers {
   std::uint32_t heard(UdpAddress from, Text bytes) { return hosts_.heard(from, bytes); }
   // That one is in control, and keeps its number; everyone: none is any more.
   void hold(std::uint32_t peer) { hosts_.hold(peer); }
+  void also_hold(std::uint32_t peer) { hosts_.also_hold(peer); }
 
   // Where to send what is for `peer`; how many places that are.
   static constexpr int most_places = 2;

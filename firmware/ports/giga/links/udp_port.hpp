@@ -46,8 +46,9 @@ class UdpLink {
     note.peer = peer;
     if (!from_network_.put(note, datagram)) lost_.fetch_add(1, std::memory_order_relaxed);
   }
-  // Who keeps its number: the host in control.
-  std::uint32_t held() const { return held_.load(std::memory_order_relaxed); }
+  // Who keeps its number: the host in control, and its other places; everyone: nobody.
+  static constexpr int most_held = 4;
+  std::uint32_t held(int i) const { return held_[i].load(std::memory_order_relaxed); }
   // Is the network there?
   void set_up(bool up) { up_.store(up, std::memory_order_release); }
 
@@ -60,7 +61,7 @@ class UdpLink {
   DatagramRing<ring_bytes> to_network_;
   DatagramRing<ring_bytes> from_network_;
   std::atomic<bool> up_{false};
-  std::atomic<std::uint32_t> held_{everyone};
+  std::atomic<std::uint32_t> held_[most_held] = {};
   std::atomic<std::uint32_t> lost_{0};
 };
 
@@ -96,7 +97,17 @@ class UdpPort final : public firmware::Port {
     note.priority = priority;
     if (!link_.to_network_.put(note, datagram, kept_from(priority, peer))) ++dropped_;
   }
-  void hold(std::uint32_t peer) override { link_.held_.store(peer, std::memory_order_relaxed); }
+  void hold(std::uint32_t peer) override {
+    link_.held_[0].store(peer, std::memory_order_relaxed);
+    for (int i = 1; i < UdpLink::most_held; ++i) {
+      link_.held_[i].store(everyone, std::memory_order_relaxed);
+    }
+  }
+  void also_hold(std::uint32_t peer) override {
+    int i = 0;
+    while (i < UdpLink::most_held && link_.held(i) != everyone && link_.held(i) != peer) ++i;
+    if (i < UdpLink::most_held) link_.held_[i].store(peer, std::memory_order_relaxed);
+  }
   std::size_t max_size() const override { return udp_max_size; }
 
   std::uint32_t dropped() const { return dropped_; }
@@ -104,7 +115,11 @@ class UdpPort final : public firmware::Port {
  private:
   std::uint32_t kept_from(Priority priority, std::uint32_t peer) const {
     if (priority != Priority::state) return 0;
-    return peer == everyone || peer == link_.held() ? kept_for_answers : kept_for_host;
+    if (peer == everyone) return kept_for_answers;
+    for (int i = 0; i < UdpLink::most_held; ++i) {
+      if (peer == link_.held(i)) return kept_for_answers;
+    }
+    return kept_for_host;
   }
 
   UdpLink& link_;

@@ -69,6 +69,7 @@ class UdpPort final : public firmware::Port {
     if (size == 0 || !chip_.send(out_, size)) ++dropped_;
   }
   void hold(std::uint32_t peer) override { hosts_.hold(peer); }
+  void also_hold(std::uint32_t peer) override { hosts_.also_hold(peer); }
   std::size_t max_size() const override { return max_datagram; }
 
   std::uint32_t dropped() const { return dropped_; }

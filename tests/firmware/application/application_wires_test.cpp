@@ -1,0 +1,478 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A host that the board hears by several wires: how they join and leave, and that there is one session.
+#include "tests/firmware/wired_host.hpp"
+
+namespace r4 {
+namespace {
+
+using firmware::BoardState;
+using test::echo_pnum;
+using test::Heard;
+using test::state_of;
+using test::TestBoard;
+using test::TestHost;
+using test::WiredHost;
+using Lines = std::vector<std::string>;
+using Numbers = std::vector<std::uint32_t>;
+
+constexpr Source wire_a{0, 4};
+constexpr Source wire_b{1, 0};
+constexpr Source wire_c{2, 6};
+
+struct ApplicationWires : testing::Test {
+  const SessionWires& wires() const { return board.application->wires(); }
+  // … with the counters of what came.
+  State newest_state(WiredHost& host, int port = 0) {
+    host.command("F:RXLOST,RXDUP,RXREF");
+    board.take(port);
+    host.run(20);
+    const std::vector<Heard> states = board.take(MessageKind::state, port);
+    if (states.empty()) throw std::runtime_error("no state came");
+    return state_of(states.back());
+  }
+  // The codes of the answers at a port.
+  Lines answers(int port) {
+    Lines codes;
+    for (const Heard& heard : board.take(MessageKind::nack, port)) {
+      Datagram datagram;
+      Nack nack;
+      EXPECT_TRUE(read_datagram(heard.bytes, datagram) && read_nack(datagram, nack));
+      codes.push_back(test::str(name_of(nack.code)));
+    }
+    return codes;
+  }
+  void forget() {
+    for (int i = 0; i < 4; ++i) board.take(i);
+    board.log.refused.clear();
+    board.log.executed.clear();
+    board.log.wires.clear();
+  }
+  std::string heartbeat(std::uint32_t pnum, std::uint32_t t) {
+    return "H:ROS2-R4;PNum:" + std::to_string(pnum) + ";T:" + std::to_string(t) + ";";
+  }
+
+  TestBoard board{{}, 4};
+};
+
+// --- how a wire joins
+
+TEST_F(ApplicationWires, AWireJoinsWithACopyOfAHeartbeatOfTheSession) {
+  TestHost host(board, echo_pnum, wire_a);
+  host.connect();
+  forget();
+  const std::uint32_t t = board.newest_t(0);
+  const std::uint32_t pnum = host.echo();
+  board.receive(heartbeat(pnum, t), wire_b);
+  EXPECT_EQ(board.log.wires, Lines{"joined 1/0"});
+  EXPECT_EQ(wires().size(), 2);
+  EXPECT_EQ(wires().joins(), 1U);
+  EXPECT_EQ(answers(1), Lines());
+  host.resend("O:358,1,1", host.pnum);
+  board.receive("O:5,1,2;PNum:" + std::to_string(host.pnum + 1) + ";T:1;", wire_b);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+  EXPECT_EQ(board.outputs().osmc[1].pwm, 5) << "either wire brings commands";
+}
+
+TEST_F(ApplicationWires, AWireThatIsAheadJoinsWhenTheSameComesByTheSession) {
+  TestHost host(board, echo_pnum, wire_a);
+  host.connect();
+  board.run(400);
+  forget();
+  const std::uint32_t fed_ms = board.application->link().fed_ms();
+  const std::uint32_t t = board.newest_t(0);
+  board.receive(heartbeat(host.pnum, t), wire_b);
+  board.receive(heartbeat(host.pnum + 1, t), wire_b);  // so far ahead
+  EXPECT_EQ(wires().size(), 1);
+  EXPECT_EQ(board.application->link().fed_ms(), fed_ms) << "it feeds nothing before it has joined";
+  EXPECT_EQ(answers(1), Lines()) << "nor is it told BUSY";
+  host.echo();
+  EXPECT_EQ(board.log.wires, Lines{"joined 1/0"});
+}
+
+TEST_F(ApplicationWires, WhoWaitsToJoinKeepsNobodyAlive) {
+  WiredHost host(board, {{wire_a}, {wire_b}});
+  host.wires[1].cut = true;
+  host.connect();
+  host.wires[0].cut = true;
+  host.wires[1].cut = false;
+  const std::uint32_t fed_ms = board.application->link().fed_ms();
+  for (int i = 0; i < 1000 && board.reason() != SafeReason::link; ++i) host.run(1);
+  EXPECT_EQ(board.log.state_ms - fed_ms, 1000U);
+  host.run(200);
+  EXPECT_EQ(board.state(), BoardState::active) << "and begins a session of its own then";
+  EXPECT_EQ(wires()[0], wire_b);
+}
+
+TEST_F(ApplicationWires, AStrangerStaysBusyAndNeverJoins) {
+  TestHost host(board, echo_pnum, wire_a);
+  host.connect();
+  forget();
+  const std::uint32_t t = board.newest_t(0);
+  const std::uint32_t pnum = host.echo();
+  board.receive(heartbeat(echo_pnum + 500'000, t), wire_b);  // numbers of its own
+  board.receive(heartbeat(pnum + 65, t), wire_b);            // too far ahead
+  board.receive(heartbeat(pnum, t + 1), wire_b);             // other bytes
+  board.receive(heartbeat(pnum - 20, t), wire_b);
+  board.receive("O:358,1,1;PNum:" + std::to_string(host.pnum) + ";T:1;", wire_b);
+  EXPECT_EQ(answers(1), Lines(5, "BUSY"));
+  board.receive(heartbeat(host.pnum, t + 1), wire_b);  // the next number, but other bytes
+  EXPECT_EQ(answers(1), Lines());
+  host.stay(2000);
+  EXPECT_EQ(wires().size(), 1);
+  EXPECT_TRUE(board.safe());
+}
+
+TEST_F(ApplicationWires, AHeartbeatFromBeforeTheTimeoutIsNoProof) {
+  TestHost host(board, echo_pnum, wire_a);
+  host.connect();
+  board.run(500);
+  const std::uint32_t t = board.newest_t(0);
+  const std::uint32_t old = host.echo();
+  board.run(500);
+  host.echo();
+  board.run(500);
+  forget();
+  board.receive(heartbeat(old, t), wire_b);
+  EXPECT_EQ(answers(1), Lines{"BUSY"});
+  EXPECT_EQ(wires().size(), 1);
+}
+
+TEST_F(ApplicationWires, NoMoreThanFour) {
+  WiredHost host(board, {{wire_a}, {wire_b}, {wire_c}, {Source{0, 5}}});
+  host.connect();
+  EXPECT_EQ(wires().size(), 4);
+  forget();
+  board.receive_raw(host.last, Source{3, 1});
+  EXPECT_EQ(answers(3), Lines{"BUSY"});
+  EXPECT_EQ(wires().size(), 4);
+}
+
+TEST_F(ApplicationWires, APaperHostHasOne) {
+  TestHost host(board, 5, wire_a);
+  host.connect();
+  forget();
+  const std::uint32_t t = board.newest_t(0);
+  const std::uint32_t pnum = host.echo();
+  board.receive(heartbeat(pnum, t), wire_b);
+  EXPECT_EQ(answers(1), Lines{"BUSY"});
+  EXPECT_EQ(wires().size(), 1);
+}
+
+TEST_F(ApplicationWires, AHostThatBeginsAgainWaitsForTheTimeoutByAllItsWires) {
+  WiredHost host(board, {{wire_a}, {wire_b}});
+  host.connect();
+  host.command("O:358,1,1");
+  WiredHost again(board, {{wire_a}, {wire_b}}, echo_pnum + 9'000'000);
+  forget();
+  again.run(500);
+  const Lines told = answers(0);
+  EXPECT_NE(std::find(told.begin(), told.end(), "BUSY"), told.end());
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358) << "the one before is not lost yet";
+  again.run(1000);
+  EXPECT_EQ(board.state(), BoardState::active);
+  EXPECT_TRUE(board.safe()) << "nothing of it comes back";
+  EXPECT_EQ(wires().size(), 2);
+  again.command("O:7,1,1");
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 7);
+}
+
+TEST_F(ApplicationWires, TheIdentityTellsAWireOfTheSessionThatItIsNotBusy) {
+  WiredHost host(board, {{wire_a}, {wire_b}});
+  host.connect();
+  forget();
+  for (const Source from : {wire_a, wire_b, wire_c}) {
+    board.receive("Q:ID;PNum:7;T:0;", from);
+    const std::vector<Heard> told = board.take(MessageKind::identity, from.port);
+    ASSERT_EQ(told.size(), 1U);
+    const bool busy = told[0].bytes.find(";BUSY:1;") != std::string::npos;
+    EXPECT_EQ(busy, from == wire_c) << told[0].bytes;
+  }
+}
+
+// --- commands over all of them
+
+TEST_F(ApplicationWires, ACommandIsExecutedOnceWhicheverWireBringsIt) {
+  WiredHost host(board, {{wire_a}, {wire_b}});
+  host.connect();
+  forget();
+  const std::uint32_t both = host.command("O:358,1,1");
+  host.wires[0].cut = true;
+  const std::uint32_t second = host.command("Z:1");
+  EXPECT_EQ(board.log.executed, (Numbers{both, second}));
+  EXPECT_EQ(board.hal.zeroed, std::vector<int>{1});
+  EXPECT_EQ(answers(1), Lines{"DUPLICATE"}) << "its copy is answered";
+  EXPECT_EQ(board.log.refused, Lines()) << "and counts as nothing refused";
+  const State state = newest_state(host, 1);
+  EXPECT_EQ(state.rx_duplicate, 0U);
+  EXPECT_EQ(state.rx_refused, 0U);
+  EXPECT_EQ(state.rx_lost, 0U);
+}
+
+TEST_F(ApplicationWires, WhatOneWireRepeatsIsCounted) {
+  WiredHost host(board, {{wire_a}, {wire_b}});
+  host.connect();
+  host.command("Z:1");
+  board.receive_raw(host.last, wire_b);
+  const State state = newest_state(host, 1);
+  EXPECT_EQ(state.rx_duplicate, 1U);
+  EXPECT_EQ(state.rx_refused, 1U);
+}
+
+TEST_F(ApplicationWires, ACopyOfARefusedCommandIsToldTheSame) {
+  WiredHost host(board, {{wire_a}, {wire_b, 200}});
+  host.connect();
+  host.run(1000);
+  forget();
+  board.hal.inputs.handle_held = false;
+  board.run(1);
+  host.command("O:358,1,1");
+  host.command("C:rate,5000");
+  host.command("C:network,home");
+  board.hal.inputs.handle_held = true;
+  host.run(150);
+  const Lines first = answers(0);
+  ASSERT_EQ(first.size(), 3U);
+  EXPECT_EQ(first[0], "SAFE");
+  EXPECT_EQ(first[1], "RANGE");
+  EXPECT_EQ(first[2], "AUTH");
+  host.run(150);
+  EXPECT_EQ(answers(1), first);
+  EXPECT_TRUE(board.safe());
+}
+
+TEST_F(ApplicationWires, AWireThatLagsDelaysRepeatsAndReordersNothing) {
+  WiredHost host(board, {{wire_a}, {wire_b, 200}});
+  host.connect();
+  host.run(1000);
+  ASSERT_EQ(wires().size(), 2);
+  forget();
+  Numbers sent;
+  for (int i = 0; i < 1000; ++i) {  // 10 s at 100 Hz
+    sent.push_back(host.command("O:" + std::to_string(i) + ",1,1"));
+    EXPECT_EQ(board.outputs().osmc[0].pwm, i);
+    host.run(10);
+    EXPECT_EQ(board.outputs().osmc[0].pwm, i) << "an old one has no effect";
+  }
+  EXPECT_EQ(board.log.executed, sent);
+  EXPECT_EQ(board.log.refused, Lines());
+  EXPECT_EQ(board.log.wires, Lines()) << "nobody leaves";
+  const State state = newest_state(host);
+  EXPECT_EQ(state.rx_lost, 0U);
+  EXPECT_EQ(state.rx_duplicate, 0U);
+  EXPECT_EQ(state.rx_refused, 0U);
+}
+
+TEST_F(ApplicationWires, ALateCopyIsNoRestartOfTheHostsNumbers) {
+  WiredHost host(board, {{wire_a}, {wire_b, 200}});
+  host.connect();
+  host.run(1000);
+  for (int i = 0; i < 2000; ++i) {  // at 1000 Hz the wire lags by 200 numbers
+    host.command("Z:1");
+    host.run(1);
+  }
+  EXPECT_EQ(board.hal.zeroed.size(), 2000U);
+  const State state = newest_state(host);
+  EXPECT_EQ(state.rx_lost, 0U);
+  EXPECT_EQ(state.rx_duplicate, 0U);
+}
+
+TEST_F(ApplicationWires, TheCutOfEitherIsNotNoticed) {
+  for (const int cut : {0, 1}) {
+    TestBoard fresh({}, 4);
+    WiredHost host(fresh, {{wire_a}, {wire_b}});
+    host.connect();
+    fresh.log.states.clear();
+    fresh.take(1 - cut);
+    Numbers sent;
+    for (int i = 0; i < 500; ++i) {
+      if (i == 100) host.wires[static_cast<std::size_t>(cut)].cut = true;
+      if (i == 350) host.wires[static_cast<std::size_t>(cut)].cut = false;
+      sent.push_back(host.command("O:" + std::to_string(i) + ",1,1"));
+      EXPECT_EQ(fresh.outputs().osmc[0].pwm, i);
+      host.run(10);
+    }
+    EXPECT_EQ(fresh.log.executed, sent);
+    EXPECT_EQ(fresh.log.states, Lines()) << "no trip";
+    const std::string at = cut == 0 ? "0/4" : "1/0";
+    const Lines changes(fresh.log.wires.begin() + 1, fresh.log.wires.end());
+    EXPECT_EQ(changes, (Lines{"left " + at, "joined " + at}));
+    EXPECT_EQ(fresh.application->wires().losses(), 1U);
+    std::uint32_t before = 0;
+    for (const Heard& heard : fresh.take(MessageKind::state, 1 - cut)) {
+      EXPECT_TRUE(before == 0 || heard.t_ms - before == 10U) << "a gap at " << heard.t_ms;
+      before = heard.t_ms;
+    }
+  }
+}
+
+// --- who floods
+
+TEST_F(ApplicationWires, AFloodFromAnotherPortKeepsNoWireOut) {
+  WiredHost host(board, {{wire_a}, {wire_b}});
+  host.connect();
+  host.wires.push_back({wire_c});
+  host.wires[2].cut = true;
+  std::uint32_t peer = 100;
+  const auto flood = [&] {
+    for (int i = 0; i < 20; ++i) {
+      const Source from{3, ++peer};
+      const std::uint32_t t = board.newest_t(0);
+      board.receive(heartbeat(echo_pnum + 700'000 + peer, t), from);
+      board.receive(heartbeat(host.pnum + static_cast<std::uint32_t>(i) % 64, t + 1), from);
+    }
+  };
+  for (int i = 0; i < 1000; ++i) {
+    flood();
+    host.run(1);
+  }
+  EXPECT_EQ(wires().size(), 2);
+  EXPECT_EQ(board.state(), BoardState::active);
+  host.wires[2].cut = false;
+  host.wires[0].lag_ms = host.wires[1].lag_ms = 30;  // the new one is ahead
+  for (int i = 0; i < 150; ++i) {
+    flood();
+    host.run(1);
+  }
+  EXPECT_EQ(wires().size(), 3) << "it joins with the first heartbeat that both have brought";
+  EXPECT_EQ(wires().losses(), 0U);
+}
+
+// --- the end of wires
+
+TEST_F(ApplicationWires, ALostPortTakesTheLinkOnlyWithTheLastWire) {
+  WiredHost host(board, {{wire_a}, {wire_b}});
+  host.connect();
+  host.command("O:358,1,1");
+  board.application->port_down(0, board.now_ms);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+  EXPECT_EQ(wires().size(), 1);
+  EXPECT_EQ(board.log.wires.back(), "left 0/4");
+  EXPECT_EQ(board.ports[0].held, everyone);
+  board.application->port_down(2, board.now_ms);  // nobody was there
+  EXPECT_EQ(board.state(), BoardState::active);
+  board.application->port_down(1, board.now_ms);
+  EXPECT_EQ(board.reason(), SafeReason::link);
+  EXPECT_TRUE(board.safe());
+}
+
+TEST_F(ApplicationWires, ASessionIsResumedFromAnyOfItsWires) {
+  for (const std::size_t first : {0U, 1U}) {
+    TestBoard fresh({}, 4);
+    WiredHost host(fresh, {{wire_a}, {wire_b}});
+    host.connect();
+    host.command("O:358,1,1");
+    host.wires[0].cut = host.wires[1].cut = true;
+    host.run(1500);
+    ASSERT_EQ(fresh.reason(), SafeReason::link);
+    host.wires[first].cut = false;
+    host.run(300);
+    EXPECT_EQ(fresh.state(), BoardState::active);
+    EXPECT_EQ(fresh.outputs().osmc[0].pwm, 358) << "the same session";
+    host.command("O:7,1,1");
+    EXPECT_EQ(fresh.outputs().osmc[0].pwm, 7);
+    host.wires[1 - first].cut = false;
+    host.run(300);
+    EXPECT_EQ(fresh.application->wires().losses(), 0U) << "it has the timeout to come back, too";
+  }
+}
+
+TEST_F(ApplicationWires, TheFarewellByAllWiresIsObeyedOnce) {
+  WiredHost host(board, {{wire_a}, {wire_b, 80}});
+  host.connect();
+  host.command("O:358,1,1");
+  host.run(85);
+  forget();
+  const std::uint32_t leave = host.send("E:LEAVE", host.echo());
+  EXPECT_EQ(board.reason(), SafeReason::link);
+  EXPECT_TRUE(board.safe());
+  host.wires[0].cut = host.wires[1].cut = true;  // it has ended; what is under way comes
+  host.run(90);
+  EXPECT_EQ(board.log.executed, Numbers{leave});
+  EXPECT_EQ(answers(1), Lines{"DUPLICATE"});
+  EXPECT_EQ(board.reason(), SafeReason::link) << "a heartbeat from before begins nothing";
+}
+
+// --- the stop
+
+TEST_F(ApplicationWires, TheSameStopByAllWiresIsOneCause) {
+  WiredHost host(board, {{wire_a}, {wire_b, 50}, {wire_c, 90}});
+  host.connect();
+  host.command("O:358,1,1");
+  host.run(150);
+  host.command("E:STOP");
+  EXPECT_EQ(board.reason(), SafeReason::stop);
+  const std::int32_t cause = board.newest_cause();
+  host.run(200);
+  EXPECT_EQ(board.newest_cause(), cause);
+  host.command("E:CLEAR," + std::to_string(cause));
+  host.run(200);
+  EXPECT_EQ(board.state(), BoardState::active);
+  host.wires[0].cut = true;
+  host.command("E:STOP");
+  host.run(50);
+  EXPECT_EQ(board.reason(), SafeReason::stop) << "by any of them";
+}
+
+// --- what is sent
+
+TEST_F(ApplicationWires, EachGetsStateAndHeartbeatsWithNumbersThatGoOn) {
+  WiredHost host(board, {{wire_a}, {wire_b}});
+  host.connect();
+  forget();
+  host.run(1000);
+  for (const int port : {0, 1}) {
+    const std::vector<Heard> heard = board.take(port);
+    EXPECT_GE(heard.size(), 102U) << "100 states, two heartbeats";
+    for (std::size_t i = 1; i < heard.size(); ++i) EXPECT_EQ(heard[i].pnum, heard[i - 1].pnum + 1);
+  }
+}
+
+TEST_F(ApplicationWires, TwoPlacesOnOnePortGetTheSame) {
+  const Source other{0, 5};
+  WiredHost host(board, {{wire_a}, {other}});
+  host.connect();
+  EXPECT_EQ(board.ports[0].held, wire_a.peer);
+  EXPECT_EQ(board.ports[0].also_held, std::vector<std::uint32_t>{other.peer});
+  forget();
+  host.command("X:1");
+  host.command("Z:1");
+  host.run(500);
+  Lines at_a;
+  Lines at_other;
+  std::uint32_t pnum = 0;
+  for (const Heard& heard : board.take(0)) {
+    (heard.peer == other.peer ? at_other : at_a).push_back(heard.bytes);
+    if (heard.peer == other.peer) continue;
+    EXPECT_EQ(heard.peer, wire_a.peer);
+    EXPECT_TRUE(pnum == 0 || heard.pnum == pnum + 1) << heard.bytes;
+    pnum = heard.pnum;
+  }
+  EXPECT_GE(at_a.size(), 50U);
+  EXPECT_EQ(at_a, at_other) << "the answers, too: they have numbers of the same count";
+  host.wires[1].cut = true;
+  host.run(1200);
+  EXPECT_EQ(board.ports[0].also_held, std::vector<std::uint32_t>());
+}
+
+TEST_F(ApplicationWires, AWatcherBecomesAWireAndNeedsNoLeaseAnyMore) {
+  TestHost host(board, echo_pnum, wire_a);
+  host.connect();
+  const Source place{2, 6};
+  board.ports[2].bus = true;  // it need prove nothing
+  board.receive("W:100;PNum:1;T:0;", place);
+  forget();
+  board.run(100);
+  EXPECT_EQ(board.take(MessageKind::state, 2).size(), 20U) << "its own, and those for everyone";
+  const std::uint32_t t = board.newest_t(0);
+  const std::uint32_t pnum = host.echo();
+  board.receive(heartbeat(pnum, t), place);
+  ASSERT_EQ(wires().size(), 2);
+  forget();
+  board.run(100);
+  const std::vector<Heard> states = board.take(MessageKind::state, 2);
+  EXPECT_EQ(states.size(), 10U) << "each once";
+  for (const Heard& heard : states) EXPECT_EQ(heard.peer, place.peer);
+}
+
+}  // namespace
+}  // namespace r4

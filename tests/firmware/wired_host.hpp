@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// An echo host that is heard by several wires: each carries the same bytes, some later than others.
+#pragma once
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "tests/firmware/board_fixture.hpp"
+
+namespace r4::test {
+
+class WiredHost {
+ public:
+  struct Wire {
+    Source at;
+    std::uint32_t lag_ms = 0;
+    bool cut = false;
+  };
+
+  WiredHost(TestBoard& to, std::vector<Wire> its_wires, std::uint32_t first_pnum = echo_pnum)
+      : wires(std::move(its_wires)), pnum(first_pnum), board_(to) {}
+
+  // Sends by every wire that is not cut; returns the number.
+  std::uint32_t send(const std::string& field, std::uint64_t t) {
+    const std::uint32_t number = pnum++;
+    const std::string numbered = field + ";PNum:" + std::to_string(number);
+    last = with_crc(seal(numbered + ";T:" + std::to_string(t) + ";"));
+    for (const Wire& wire : wires) {
+      if (!wire.cut) under_way_.push_back({wire.at, last, board_.now_ms + wire.lag_ms});
+    }
+    deliver();
+    return number;
+  }
+  std::uint32_t heartbeat() {
+    next_heartbeat_ms_ = board_.now_ms + 100;
+    return send("H:ROS2-R4", echo());
+  }
+  std::uint32_t command(const std::string& field) { return send(field, 1699276044383); }
+
+  // Takes control.
+  void connect() {
+    heartbeat();
+    run(2);
+    heartbeat();
+    run(250);
+  }
+  // Lets time pass, with a heartbeat every 100 ms.
+  void run(std::uint32_t ms) {
+    for (std::uint32_t i = 0; i < ms; ++i) {
+      board_.run(1);
+      deliver();
+      if (static_cast<std::int32_t>(board_.now_ms - next_heartbeat_ms_) >= 0) heartbeat();
+    }
+  }
+  // The newest T that came by a wire which is not cut.
+  std::uint32_t echo() {
+    std::uint32_t newest = 0;
+    for (const Wire& wire : wires) {
+      if (!wire.cut) newest = std::max(newest, board_.newest_t(wire.at.port));
+    }
+    return newest;
+  }
+
+  std::vector<Wire> wires;
+  std::uint32_t pnum;
+  std::string last;  // that was sent
+  // What is done to the fields before they are sent: nothing, or they are signed.
+  std::function<std::string(const std::string&)> seal = [](const std::string& fields) {
+    return fields;
+  };
+
+ private:
+  struct UnderWay {
+    Source at;
+    std::string bytes;
+    std::uint32_t due_ms;
+  };
+
+  void deliver() {
+    for (std::size_t i = 0; i < under_way_.size();) {
+      const UnderWay next = under_way_[i];
+      if (next.due_ms > board_.now_ms) {
+        ++i;
+        continue;
+      }
+      under_way_.erase(under_way_.begin() + static_cast<std::ptrdiff_t>(i));
+      board_.receive_raw(next.bytes, next.at);
+    }
+  }
+
+  TestBoard& board_;
+  std::vector<UnderWay> under_way_;
+  std::uint32_t next_heartbeat_ms_ = 0;
+};
+
+}  // namespace r4::test
