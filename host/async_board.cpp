@@ -8,18 +8,43 @@
 #include "async_board_impl.hpp"
 #include "board_loop.hpp"
 #include "commands/command_help.hpp"
+#include "commands/link_timing.hpp"
+#include "measurement/carrier_sum.hpp"
 #include "session/limits.hpp"
-#include "session/link_timing.hpp"
 #include "standard_registry.hpp"
 
 namespace r4 {
 
+namespace {
+
+std::vector<std::unique_ptr<Carrier>> only(std::unique_ptr<Carrier> carrier) {
+  std::vector<std::unique_ptr<Carrier>> carriers;
+  carriers.push_back(std::move(carrier));
+  return carriers;
+}
+
+std::vector<std::unique_ptr<Carrier>> checked(std::vector<std::unique_ptr<Carrier>> carriers) {
+  require_wires(carriers.size());
+  return carriers;
+}
+
+}  // namespace
+
 AsyncBoard::AsyncBoard(const executor_type& executor, std::string_view url, BoardOptions options)
     : AsyncBoard(executor, make_host_carrier(executor.context(), url, options.role), options) {}
 
+AsyncBoard::AsyncBoard(const executor_type& executor, const std::vector<std::string>& urls,
+                       BoardOptions options)
+    : AsyncBoard(executor, make_host_carriers(executor.context(), urls, options.role), options) {}
+
 AsyncBoard::AsyncBoard(const executor_type& executor, std::unique_ptr<Carrier> carrier,
                        BoardOptions options)
-    : impl_(std::make_shared<Impl>(executor.context(), std::move(carrier), std::move(options))) {}
+    : AsyncBoard(executor, only(std::move(carrier)), std::move(options)) {}
+
+AsyncBoard::AsyncBoard(const executor_type& executor,
+                       std::vector<std::unique_ptr<Carrier>> carriers, BoardOptions options)
+    : impl_(std::make_shared<Impl>(executor.context(), checked(std::move(carriers)),
+                                   std::move(options))) {}
 
 AsyncBoard::~AsyncBoard() {
   impl_->close();
@@ -178,7 +203,7 @@ void AsyncBoard::start_link_timing(Duration board_timeout, Duration heartbeat, D
 void AsyncBoard::require_sendable(const Command& command) const {
   require_valid(command);
   r4::require_control(impl_->session.board_role(), command);
-  require_cable(name(), command);
+  for (const auto& wire : impl_->wires) require_cable(wire->carrier->name(), command);
 }
 void AsyncBoard::require_sendable(const Setpoints& setpoints) const {
   require_any(setpoints);
@@ -212,8 +237,50 @@ bool AsyncBoard::in_control() const {
 DisarmCause AsyncBoard::disarmed_by() const { return impl_->session.disarmed_by(); }
 const BoardIdentity& AsyncBoard::identity() const { return impl_->identity; }
 Statistics AsyncBoard::statistics() const { return impl_->session.statistics(Impl::steady_now()); }
-const CarrierCounters& AsyncBoard::carrier_counters() const { return impl_->carrier->counters(); }
-const std::string& AsyncBoard::name() const { return impl_->carrier->name(); }
+const CarrierCounters& AsyncBoard::carrier_counters() const { return impl_->counters(); }
+const std::string& AsyncBoard::name() const { return impl_->name(); }
+std::vector<Wire> AsyncBoard::wires() const {
+  std::vector<Wire> reports;
+  for (std::size_t i = 0; i < impl_->wires.size(); ++i) reports.push_back(impl_->report(i));
+  return reports;
+}
+
+// --- the wires
+
+Wire AsyncBoard::Impl::report(std::size_t wire) const {
+  Wire made = session.wire(wire, steady_now());
+  made.name = carrier(wire).name();
+  return made;
+}
+
+const std::string& AsyncBoard::Impl::name() {
+  if (!several()) return carrier(0).name();
+  names.clear();
+  for (const auto& wire : wires) names += (names.empty() ? "" : " ") + wire->carrier->name();
+  return names;
+}
+
+const CarrierCounters& AsyncBoard::Impl::counters() {
+  if (!several()) return carrier(0).counters();
+  counted = CarrierCounters();
+  for (const auto& wire : wires) add(counted, wire->carrier->counters());
+  return counted;
+}
+
+// Which have begun to carry, or ceased to; and that one leads to another board.
+void AsyncBoard::Impl::tell_wires(const LinkStatus& status) {
+  const LinkStatus before_that = std::exchange(told, status);
+  if (!several()) return;
+  for (std::size_t i = 0; i < wires.size(); ++i) {
+    if (((before_that.carrying ^ status.carrying) & wire_bit(i)) == 0) continue;
+    if (is_open()) call(wire_callbacks, report(i));
+  }
+  if (status.two_boards && !before_that.two_boards && is_open()) {
+    std::vector<Wire> reports;
+    for (std::size_t i = 0; i < wires.size(); ++i) reports.push_back(report(i));
+    call(event_callbacks, CarrierEvent{CarrierEvent::Kind::warning, explain(reports)});
+  }
+}
 
 void AsyncBoard::record(Recording& recording) { impl_->record(recording.recorder_); }
 
@@ -236,6 +303,9 @@ Subscription AsyncBoard::on_overheard(std::function<void(std::string_view)> call
 }
 Subscription AsyncBoard::on_link(std::function<void(const LinkStatus&)> callback) {
   return impl_->link_callbacks.add(std::move(callback));
+}
+Subscription AsyncBoard::on_wire(std::function<void(const Wire&)> callback) {
+  return impl_->wire_callbacks.add(std::move(callback));
 }
 Subscription AsyncBoard::on_event(std::function<void(const CarrierEvent&)> callback) {
   return impl_->event_callbacks.add(std::move(callback));

@@ -20,17 +20,23 @@ SessionOptions with_clock(SessionOptions options, Time now) {
 constexpr Time held_up{std::chrono::milliseconds{50}};
 // What was due so long ago is told of: two heartbeats were late.
 constexpr Time very_late{std::chrono::milliseconds{200}};
+// From one attempt to open a wire to the next.
+constexpr std::chrono::seconds open_interval{1};
 
 }  // namespace
 
-AsyncBoard::Impl::Impl(asio::io_context& context, std::unique_ptr<Carrier> transport,
+AsyncBoard::Impl::Impl(asio::io_context& context, std::vector<std::unique_ptr<Carrier>> transports,
                        BoardOptions options)
     : io(context),
-      carrier(std::move(transport)),
       heartbeat_ms(options.session.timing.heartbeat_ms),
       session(*this, with_clock(std::move(options.session), steady_now()),
-              Session::random_first_pnum(), options.role),
-      timer(context) {}
+              Session::random_first_pnum(), options.role, transports.size()),
+      timer(context),
+      reopening(context) {
+  for (std::unique_ptr<Carrier>& each : transports) {
+    wires.push_back(std::make_unique<BoardWire>(*this, wires.size(), std::move(each)));
+  }
+}
 
 Time AsyncBoard::Impl::time_of(Duration timeout) {
   return std::clamp<Duration>(timeout, Duration{0}, std::chrono::hours{24});
@@ -140,14 +146,57 @@ void AsyncBoard::Impl::cancel(Ticket id) {
 
 void AsyncBoard::Impl::open() {
   if (phase != Phase::made) {
-    throw Error(ErrorKind::usage, carrier->name(), "a board is opened once",
+    throw Error(ErrorKind::usage, name(), "a board is opened once",
                 "make another one for the same URL");
   }
-  carrier->open(*this);
-  if (phase != Phase::made) return;  // closed by the callback that was told that it is open
+  std::optional<Problem> problem;
+  bool any = false;
+  bool all = true;
+  for (const auto& wire : wires) {
+    const bool opened = open_wire(*wire, problem);
+    any = any || opened;
+    all = all && opened;
+    if (phase != Phase::made) return;  // closed by the callback that was told that it is open
+  }
+  if (!any) throw Error(*problem);
   phase = Phase::open;
   due = steady_now();
   enter(Completion::How::post, [this] { due = session.poll(now); });
+  if (!all) open_again();
+}
+
+// One of several that cannot be opened yet is tried again. `problem`: the first of all.
+bool AsyncBoard::Impl::open_wire(BoardWire& wire, std::optional<Problem>& problem) {
+  try {
+    wire.carrier->open(wire);
+    wire.opened = true;
+    return true;
+  } catch (const Error& error) {
+    if (!several() || error.kind() == ErrorKind::usage) {
+      for (const auto& each : wires) each->carrier->close();
+      throw;
+    }
+    if (!problem) problem = error.problem();
+    if (wire.trouble != error.problem().text()) {
+      wire.trouble = error.problem().text();
+      on_carrier_event(wire, {CarrierEvent::Kind::down, error.problem()});
+    }
+  }
+  return false;
+}
+
+void AsyncBoard::Impl::open_again() {
+  reopening.expires_after(open_interval);
+  reopening.async_wait([self = shared_from_this()](const std::error_code& error) {
+    if (error || !self->has_link()) return;
+    bool all = true;
+    std::optional<Problem> problem;
+    for (const auto& wire : self->wires) {
+      if (wire->opened || !self->has_link()) continue;
+      self->guarded([&] { all = self->open_wire(*wire, problem) && all; });
+    }
+    if (!all && self->has_link()) self->open_again();
+  });
 }
 
 Ticket AsyncBoard::Impl::leave(Time timeout) {
@@ -160,28 +209,38 @@ void AsyncBoard::Impl::close() {
   // Said once; nobody waits for an answer.
   if (is_open()) enter(Completion::How::post, [this] { leave(Time{0}); });
   phase = Phase::closed;
-  carrier->close();
+  for (const auto& wire : wires) wire->carrier->close();
   timer.cancel();
+  reopening.cancel();
   how = Completion::How::post;
   enter(Completion::How::post, [this] { session.end_all(now); });
 }
 
 // What is known already comes first.
 void AsyncBoard::Impl::record(const std::shared_ptr<Recorder>& recorder) {
-  tap.attach(recorder, carrier->name());
-  if (carrier->up()) tap.on_carrier_event({CarrierEvent::Kind::up, {{}, carrier->name(), {}, {}}});
-  tap.on_link(session.link());
+  for (const auto& wire : wires) {
+    const Carrier& transport = *wire->carrier;
+    wire->tap.attach(recorder, transport.name());
+    if (!transport.up()) continue;
+    wire->tap.on_carrier_event({CarrierEvent::Kind::up, {{}, transport.name(), {}, {}}});
+  }
+  wires[0]->tap.on_link(session.link());
   name_in_recording();
 }
 
 void AsyncBoard::Impl::name_in_recording() {
-  const std::string& name = identity.name.empty() ? identity.board_id : identity.name;
-  if (!name.empty()) tap.on_name(name);
+  const std::string& board = identity.name.empty() ? identity.board_id : identity.name;
+  if (board.empty()) return;
+  for (const auto& wire : wires) wire->tap.on_name(board);
 }
 
 // The link goes on without it.
 void AsyncBoard::Impl::tell_that_a_recording_ended() {
-  const std::optional<Problem> problem = tap.take_end();
+  std::optional<Problem> problem;
+  for (const auto& wire : wires) {
+    std::optional<Problem> end = wire->tap.take_end();
+    if (end && !problem) problem = std::move(end);
+  }
   if (problem) call(event_callbacks, CarrierEvent{CarrierEvent::Kind::warning, *problem});
 }
 
@@ -212,15 +271,15 @@ void AsyncBoard::Impl::on_timer() {
   if (undrained >= 2) tell_backlog();
 }
 
-// --- Carrier::Handler
+// --- BoardWire::Owner
 
-void AsyncBoard::Impl::on_datagram(std::string_view bytes, Peer) {
+void AsyncBoard::Impl::on_datagram(BoardWire& wire, std::string_view bytes) {
   enter(Completion::How::dispatch, [&] {
-    const auto arrival = carrier->arrival();
+    const auto arrival = wire.carrier->arrival();
     const Time at = arrival ? std::chrono::duration_cast<Time>(arrival->time_since_epoch()) : now;
-    tap.on_received(bytes, at);
-    session.receive(bytes, std::clamp(at, before, now));  // its time never goes back
-    tap.on_packets(session.packets());
+    wire.tap.on_received(bytes, at);
+    session.receive(wire.index, bytes, std::clamp(at, before, now));  // its time never goes back
+    wires[0]->tap.on_packets(session.packets());
     poll_wanted = true;
   });
 }
@@ -242,32 +301,39 @@ void AsyncBoard::Impl::tell_backlog() {
   });
 }
 
-void AsyncBoard::Impl::on_carrier_event(const CarrierEvent& event) {
+void AsyncBoard::Impl::on_carrier_event(BoardWire& wire, const CarrierEvent& event) {
   enter(Completion::How::dispatch, [&] {
-    tap.on_carrier_event(event);
+    wire.tap.on_carrier_event(event);
     call(event_callbacks, event);
     if (event.kind != CarrierEvent::Kind::warning) {
-      session.on_transport(event.kind == CarrierEvent::Kind::up, now);
+      session.on_transport(wire.index, event.kind == CarrierEvent::Kind::up, now,
+                           !only_listens(wire.index));
     }
     poll_wanted = true;
   });
 }
 
-void AsyncBoard::Impl::on_overheard(std::string_view bytes) {
+void AsyncBoard::Impl::on_overheard(BoardWire& wire, std::string_view bytes) {
   enter(Completion::How::dispatch, [&] {
-    tap.on_sent(bytes);
+    wire.tap.on_sent(bytes);
     call(overheard_callbacks, bytes);
   });
 }
 
 // --- Session::Handler
 
-SendResult AsyncBoard::Impl::transmit(std::string_view datagram, Priority priority) {
+// Who only watches says nothing on a bus but stops and leases.
+bool AsyncBoard::Impl::only_listens(std::size_t wire) const {
+  return session.board_role() == BoardRole::watch && carrier(wire).is_shared();
+}
+
+SendResult AsyncBoard::Impl::transmit(std::size_t wire, std::string_view datagram,
+                                      Priority priority) {
   if (!has_link()) return SendResult::down;
-  const bool listens = session.board_role() == BoardRole::watch && carrier->is_shared();
+  const bool listens = only_listens(wire);
   if (listens && priority != Priority::stop && !datagram.starts_with("W:")) return SendResult::down;
-  const SendResult result = carrier->send(datagram, priority);
-  if (result == SendResult::sent) tap.on_sent(datagram);
+  const SendResult result = carrier(wire).send(datagram, priority);
+  if (result == SendResult::sent) wires[wire]->tap.on_sent(datagram);
   return result;
 }
 
@@ -290,7 +356,7 @@ void AsyncBoard::Impl::on_identity(const Identity& fresh) {
   identity.board_id.assign(fresh.board_id.data(), fresh.board_id.size());
   identity.capabilities.assign(fresh.capabilities.data(), fresh.capabilities.size());
   identity.name.assign(fresh.name.data(), fresh.name.size());
-  if (tap.attached()) name_in_recording();
+  if (wires[0]->tap.attached()) name_in_recording();
 }
 
 void AsyncBoard::Impl::on_nack(const Nack& nack, const Datagram& datagram) {
@@ -302,7 +368,8 @@ void AsyncBoard::Impl::on_bad_datagram(const ReadResult& result, std::string_vie
 }
 
 void AsyncBoard::Impl::on_link(const LinkStatus& status) {
-  tap.on_link(status);
+  wires[0]->tap.on_link(status);
+  tell_wires(status);
   if (!is_open()) return;
   // As it is by then: the one before may have changed it.
   link_callbacks.each([&](auto& one) {

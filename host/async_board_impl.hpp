@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is behind an AsyncBoard: a session, its carrier and its timer, and who waits for what.
+// What is behind an AsyncBoard: a session, its wires and its timer, and who waits for what.
 //
 // Every call of the session is made inside enter(). The outermost one tells the results and sets the
 // timer afterwards; so no handler runs inside the session, or inside the call that started its command.
@@ -13,19 +13,21 @@
 #include <cstdint>
 #include <exception>
 #include <memory>
+#include <optional>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "board_wire.hpp"
 #include "r4link/async_board.hpp"
-#include "recording/recording_tap.hpp"
 #include "session/session.hpp"
 #include "subscribers.hpp"
 
 namespace r4 {
 
 // Outlives the AsyncBoard where a callback or handler destroys that.
-struct AsyncBoard::Impl final : Carrier::Handler,
+struct AsyncBoard::Impl final : BoardWire::Owner,
                                 Session::Handler,
                                 std::enable_shared_from_this<AsyncBoard::Impl> {
   // A command under way, and one that has ended. By its id it is cancelled: the ticket of its first step.
@@ -55,7 +57,9 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   bool has_link() const { return phase == Phase::open || phase == Phase::leaving; }
   bool may_tell() const { return phase == Phase::made || phase == Phase::open; }
 
-  Impl(asio::io_context& context, std::unique_ptr<Carrier> transport, BoardOptions options);
+  // Throws Error{usage} for none, and for more than a session has.
+  Impl(asio::io_context& context, std::vector<std::unique_ptr<Carrier>> transports,
+       BoardOptions options);
 
   static Time steady_now() {
     return std::chrono::duration_cast<Time>(std::chrono::steady_clock::now().time_since_epoch());
@@ -129,6 +133,8 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   void wait_active(Duration timeout, CompletionPtr completion);
   void cancel(Ticket id);
   void open();
+  bool open_wire(BoardWire& wire, std::optional<Problem>& problem);
+  void open_again();
   // Says farewell: its ticket, or 0 if there is nobody to say it to.
   Ticket leave(Time timeout);
   void close();
@@ -142,18 +148,17 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   void arm();
   void on_timer();
 
-  // --- Carrier::Handler
+  // --- BoardWire::Owner
 
-  void on_datagram(std::string_view bytes, Peer from) override;
+  void on_datagram(BoardWire& wire, std::string_view bytes) override;
   void on_drained() override;
   void tell_backlog();
-  void on_carrier_event(const CarrierEvent& event) override;
-  void on_overheard(std::string_view bytes) override;
-  void on_oversize(std::string_view beginning) override { tap.on_oversize(beginning); }
+  void on_carrier_event(BoardWire& wire, const CarrierEvent& event) override;
+  void on_overheard(BoardWire& wire, std::string_view bytes) override;
 
   // --- Session::Handler
 
-  SendResult transmit(std::string_view datagram, Priority priority) override;
+  SendResult transmit(std::size_t wire, std::string_view datagram, Priority priority) override;
   void on_state(const ReceivedState& state, const Datagram& datagram) override;
   void on_board_heartbeat(const Datagram& datagram) override;
   void on_identity(const Identity& fresh) override;
@@ -165,12 +170,21 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   void on_refused(const RefusedPost& refused) override;
   void on_result(Ticket ticket, const CommandResult& result) override;
 
+  // --- the wires
+
+  bool several() const { return wires.size() > 1; }
+  Carrier& carrier(std::size_t wire) const { return *wires[wire]->carrier; }
+  bool only_listens(std::size_t wire) const;
+  Wire report(std::size_t wire) const;
+  const std::string& name();
+  const CarrierCounters& counters();
+  void tell_wires(const LinkStatus& status);
+
   asio::io_context& io;
-  std::unique_ptr<Carrier> carrier;
+  std::vector<std::unique_ptr<BoardWire>> wires;
   const std::uint32_t heartbeat_ms;  // between ours
   Session session;
   BoardIdentity identity;
-  RecordingTap tap;
 
   Subscribers<ReceivedState, Datagram> state_callbacks;
   Subscribers<Datagram> heartbeat_callbacks;
@@ -178,6 +192,7 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   Subscribers<ReadResult, std::string_view> bad_callbacks;
   Subscribers<std::string_view> overheard_callbacks;
   Subscribers<LinkStatus> link_callbacks;
+  Subscribers<Wire> wire_callbacks;
   Subscribers<CarrierEvent> event_callbacks;
   Subscribers<> restart_callbacks;
   Subscribers<DisarmCause> arming_callbacks;
@@ -201,6 +216,10 @@ struct AsyncBoard::Impl final : Carrier::Handler,
   Time before{0};  // the entry before
   Time due{0};
   asio::steady_timer timer;
+  asio::steady_timer reopening;
+  std::string names;        // of several wires
+  CarrierCounters counted;  // likewise: of all together
+  LinkStatus told;          // of the wires
   bool armed = false;
   Time armed_for{0};
   std::atomic<Time::rep> fed{0};  // when feed() was called last; 0: the session knows it

@@ -11,12 +11,26 @@
 namespace r4 {
 
 Board::Board(std::string_view url, BoardOptions options, BoardCallbacks callbacks)
-    : Board(CarrierMaker([url, role = options.role](Loop& loop) {
-              return make_host_carrier(context_of(loop), url, role);
-            }),
-            std::move(options), std::move(callbacks)) {}
+    : Board(std::vector<std::string>{std::string(url)}, std::move(options), std::move(callbacks)) {}
+Board::Board(const std::vector<std::string>& urls, BoardOptions options, BoardCallbacks callbacks)
+    : impl_(std::make_shared<Impl>(
+          [&urls, role = options.role](Loop& loop) {
+            return make_host_carriers(context_of(loop), urls, role);
+          },
+          std::move(options), std::move(callbacks))) {
+  impl_->start();
+}
 Board::Board(const CarrierMaker& make, BoardOptions options, BoardCallbacks callbacks)
-    : impl_(std::make_shared<Impl>(make, std::move(options), std::move(callbacks))) {
+    : Board(std::vector<CarrierMaker>{make}, std::move(options), std::move(callbacks)) {}
+Board::Board(const std::vector<CarrierMaker>& makers, BoardOptions options,
+             BoardCallbacks callbacks)
+    : impl_(std::make_shared<Impl>(
+          [&makers](Loop& loop) {
+            std::vector<std::unique_ptr<Carrier>> carriers;
+            for (const CarrierMaker& make : makers) carriers.push_back(make(loop));
+            return carriers;
+          },
+          std::move(options), std::move(callbacks))) {
   impl_->start();
 }
 Board::~Board() { impl_->close(); }
@@ -28,12 +42,19 @@ void Board::close() { impl_->close(); }
 void Board::wait_active(Duration timeout) {
   require_wait("wait_active()", timeout);
   const auto impl = impl_;
+  // Its wires lead to two boards, and it never began.
+  const auto refused = [](const LinkStatus& link) {
+    return link.two_boards && link.state == HostLinkState::connecting;
+  };
   const bool active = impl->wait_for_news(timeout, [&] {
     const LinkStatus& link = impl->link;
+    if (refused(link)) return true;
     if (impl->role == BoardRole::watch) return is_heard(link.state);
     return link.state == HostLinkState::active && impl->in_control && !link.gated();
   });
-  if (!active) throw Error(explain(impl->name_now(), impl->link_now()));
+  const LinkStatus link = impl->link_now();
+  if (refused(link)) throw Error(explain(wires()));
+  if (!active) throw Error(explain(impl->name_now(), link));
 }
 
 void Board::send(const Command& command, Duration timeout) {
@@ -203,6 +224,17 @@ CarrierCounters Board::carrier_counters() const {
   return *report;
 }
 
+std::vector<Wire> Board::wires() const {
+  const auto impl = impl_;
+  auto report = std::make_shared<std::vector<Wire>>();
+  {
+    const std::lock_guard lock(impl->mutex);
+    *report = impl->last_wires;
+  }
+  impl->run_on_loop("wires()", [impl, report] { *report = impl->async.wires(); });
+  return *report;
+}
+
 void Board::record(const std::string& path, RecordingOptions options) {
   const auto impl = impl_;
   auto own = std::make_unique<Recording>(path, options);
@@ -223,6 +255,9 @@ Subscription Board::on_link(std::function<void(const LinkStatus&)> callback) {
 }
 Subscription Board::on_event(std::function<void(const CarrierEvent&)> callback) {
   return impl_->callbacks.on_event(std::move(callback));
+}
+Subscription Board::on_wire(std::function<void(const Wire&)> callback) {
+  return impl_->callbacks.on_wire(std::move(callback));
 }
 Subscription Board::on_restart(std::function<void()> callback) {
   return impl_->callbacks.on_restart(std::move(callback));

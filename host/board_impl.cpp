@@ -34,7 +34,7 @@ Board::Impl::Call::Call(const Command& c)
   command.text2 = text2;
 }
 
-Board::Impl::Impl(const CarrierMaker& make, BoardOptions options, BoardCallbacks first)
+Board::Impl::Impl(const CarriersMaker& make, BoardOptions options, BoardCallbacks first)
     : role(options.role),
       arming(options.session.arming),
       callback_limit(options.callback_limit),
@@ -47,6 +47,7 @@ Board::Impl::Impl(const CarrierMaker& make, BoardOptions options, BoardCallbacks
   if (first.on_state) callbacks.on_state(std::move(first.on_state));
   if (first.on_link) callbacks.on_link(std::move(first.on_link));
   if (first.on_event) callbacks.on_event(std::move(first.on_event));
+  if (first.on_wire) callbacks.on_wire(std::move(first.on_wire));
   if (first.on_restart) callbacks.on_restart(std::move(first.on_restart));
   if (first.on_arming) callbacks.on_arming(std::move(first.on_arming));
   if (first.on_refused) callbacks.on_refused(std::move(first.on_refused));
@@ -113,6 +114,7 @@ void Board::Impl::listen() {
     take_name();  // a board that was plugged in again may be at another port
     tell(event);
   });
+  async.on_wire([this](const Wire& wire) { tell(wire); });
   async.on_arming([this](DisarmCause fresh) {
     {
       const std::lock_guard lock(mutex);
@@ -131,8 +133,11 @@ void Board::Impl::listen() {
 }
 
 void Board::Impl::take_name() {
+  const std::vector<Wire> wires = async.wires();
   const std::lock_guard lock(mutex);
   name = async.name();
+  wire_names.clear();
+  for (const Wire& wire : wires) wire_names.push_back(wire.name);
 }
 
 void Board::Impl::tell(CallbackThread::Notice notice) { callbacks.tell(std::move(notice)); }
@@ -230,6 +235,7 @@ void Board::Impl::shut() {
     for_each_queue([](States::Queue& queue) { queue.end(); });
     last_statistics = async.statistics();
     last_counters = async.carrier_counters();
+    last_wires = async.wires();
   }
   news.notify_all();
   look_timer.cancel();
@@ -255,7 +261,9 @@ Error Board::Impl::closed_error(std::string_view what) {
 void Board::Impl::require_sendable(const Command& command) {
   require_valid(command);
   require_control(role, command);
-  if (command.kind == CommandKind::setting) require_cable(name_now(), command);
+  if (command.kind != CommandKind::setting) return;
+  const std::lock_guard lock(mutex);
+  for (const std::string& wire : wire_names) require_cable(wire, command);
 }
 
 Board::Impl::CallPtr Board::Impl::execute(const Command& command, Duration timeout) {

@@ -61,7 +61,8 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   };
   using CallPtr = std::shared_ptr<Call>;
 
-  Impl(const CarrierMaker& make, BoardOptions options, BoardCallbacks first);
+  using CarriersMaker = std::function<std::vector<std::unique_ptr<Carrier>>(Loop& loop)>;
+  Impl(const CarriersMaker& make, BoardOptions options, BoardCallbacks first);
   void start();
   // Idempotent, from any thread.
   void close();
@@ -157,6 +158,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   std::mutex mutex;
   std::condition_variable news;  // state, link or closed has changed
   std::string name;              // the transport's, as the loop knows it
+  std::vector<std::string> wire_names;
   ReceivedState state;
   std::uint64_t states = 0;
   std::vector<std::weak_ptr<States::Queue>> queues;
@@ -167,6 +169,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   bool closed = false;
   Statistics last_statistics;
   CarrierCounters last_counters;
+  std::vector<Wire> last_wires;
 };
 
 }  // namespace r4

@@ -36,8 +36,8 @@ class CallbackThread {
  public:
   using Clock = std::chrono::steady_clock;
   struct Restart {};
-  using Notice =
-      std::variant<Restart, ReceivedState, LinkStatus, CarrierEvent, DisarmCause, RefusedPost>;
+  using Notice = std::variant<Restart, ReceivedState, LinkStatus, CarrierEvent, Wire, DisarmCause,
+                              RefusedPost>;
   static constexpr std::size_t capacity = 64;
 
   // `on_end`: a callback has ended that ran for so long; called on this thread.
@@ -61,6 +61,7 @@ class CallbackThread {
   Subscription on_state(Subscribers<ReceivedState>::Function callback);
   Subscription on_link(Subscribers<LinkStatus>::Function callback);
   Subscription on_event(Subscribers<CarrierEvent>::Function callback);
+  Subscription on_wire(Subscribers<Wire>::Function callback);
   Subscription on_restart(Subscribers<>::Function callback);
   Subscription on_arming(Subscribers<DisarmCause>::Function callback);
   Subscription on_refused(Subscribers<RefusedPost>::Function callback);
@@ -94,6 +95,7 @@ class CallbackThread {
   Subscribers<ReceivedState> state_callbacks_;
   Subscribers<LinkStatus> link_callbacks_;
   Subscribers<CarrierEvent> event_callbacks_;
+  Subscribers<Wire> wire_callbacks_;
   Subscribers<> restart_callbacks_;
   Subscribers<DisarmCause> arming_callbacks_;
   Subscribers<RefusedPost> refused_callbacks_;

@@ -110,6 +110,9 @@ Words link_words(const LinkStatus& link) {
     return {"the transport is down: unplugged, or its interface is switched off",
             "plug it in or switch it on; it is opened again by itself"};
   }
+  if (link.two_boards && !is_heard(link.state)) {
+    return {"its wires lead to two boards", "give the URLs of one board"};
+  }
   if (link.gate == Gate::watchdog) {
     return {
         "the application watchdog has stopped our heartbeats and commands",
@@ -332,6 +335,18 @@ Problem explain(std::string_view command, DisarmCause cause) {
 Problem explain(std::string_view name, const LinkStatus& link) {
   Words words = link_words(link);
   return {ErrorKind::refused, std::string(name), std::move(words.reason), std::move(words.fix)};
+}
+
+Problem explain(const std::vector<Wire>& wires) {
+  std::string names;
+  std::string boards;
+  for (const Wire& wire : wires) {
+    if (wire.board_id.empty()) continue;
+    names += (names.empty() ? "" : ", ") + wire.name;
+    boards += (boards.empty() ? "" : ", ") + wire.name + " to " + wire.board_id;
+  }
+  return {ErrorKind::refused, std::move(names), "they lead to two boards: " + boards,
+          "give the URLs of one board, or open each board by itself"};
 }
 
 Problem explain(std::string_view command, const CommandResult& result, const LinkStatus& link) {

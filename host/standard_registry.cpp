@@ -2,8 +2,15 @@
 // The one place where the host knows the simulated board, and recordings as boards.
 #include "standard_registry.hpp"
 
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <system_error>
+
 #include "../firmware/ports/sim/sim_carrier.hpp"
+#include "../transports/udp/udp_url.hpp"
 #include "replay/replay_carrier.hpp"
+#include "session/session.hpp"
 
 namespace r4 {
 
@@ -29,6 +36,66 @@ Registry with_all() {
 const Registry& standard_registry() {
   static const Registry registry = with_all();
   return registry;
+}
+
+namespace {
+
+std::string lower(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+// The same for URLs of the same wire, as far as they tell.
+std::string wire_of(const std::string& text) {
+  const Url url = Url::parse(text);
+  const auto value = [&url](std::string_view key, std::string_view otherwise) {
+    return "|" + url.get(key).value_or(std::string(otherwise));
+  };
+  if (url.scheme() == "udp") {
+    const UdpUrl udp(url, Role::host);
+    return "udp|" + lower(udp.host) + "|" + udp.called + "|" + std::to_string(udp.port) + "|" +
+           std::to_string(udp.listen);
+  }
+  if (url.scheme() == "can") return "can|" + url.host() + value("node", "1");
+  std::error_code failed;  // then it stays as it is
+  const std::filesystem::path device = std::filesystem::weakly_canonical(url.path(), failed);
+  const std::string path = failed || !url.path().starts_with('/') ? url.path() : device.string();
+  return url.scheme() + "|" + url.host() + "|" + path + value("sn", "");
+}
+
+}  // namespace
+
+void require_wires(std::size_t count) {
+  if (count >= 1 && count <= Session::most_wires) return;
+  throw Error(ErrorKind::usage, std::to_string(count) + " wires to one board",
+              "one to " + std::to_string(Session::most_wires) + " are possible",
+              "give the URLs of one board, at most " + std::to_string(Session::most_wires));
+}
+
+std::vector<std::unique_ptr<Carrier>> make_host_carriers(asio::io_context& io,
+                                                         const std::vector<std::string>& urls,
+                                                         BoardRole role) {
+  require_wires(urls.size());
+  std::vector<std::string> wires;
+  std::vector<std::unique_ptr<Carrier>> carriers;
+  bool has_host_port = false;
+  for (const std::string& url : urls) {
+    const std::string scheme = Url::parse(url).scheme();
+    const bool udp = scheme == "udp";
+    carriers.push_back(
+        make_host_carrier(io, udp && has_host_port ? with_own_port(url) : url, role));
+    has_host_port = has_host_port || udp;
+    if (urls.size() > 1 && (scheme == "sim" || scheme == "replay")) {
+      throw Error(ErrorKind::usage, url, "it is a board of its own, not a wire to another",
+                  "open it alone");
+    }
+    wires.push_back(wire_of(url));
+    if (std::count(wires.begin(), wires.end(), wires.back()) > 1) {
+      throw Error(ErrorKind::usage, url, "the same wire is given twice",
+                  "give each wire to the board once");
+    }
+  }
+  return carriers;
 }
 
 std::unique_ptr<Carrier> make_host_carrier(asio::io_context& io, std::string_view url,

@@ -2,8 +2,11 @@
 // The transports of the library: those of transports/ and `sim:`, the simulated board in this process.
 #pragma once
 
+#include <cstddef>
 #include <memory>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "../transports/registry.hpp"
 #include "r4link/options.hpp"
@@ -16,5 +19,15 @@ const Registry& standard_registry();
 // of hosts (UDP 2390) to those that control: it takes any free one, unless the URL names one.
 std::unique_ptr<Carrier> make_host_carrier(asio::io_context& io, std::string_view url,
                                            BoardRole role);
+
+// Those of several wires to one board. Throws Error{usage} for none, for more than a session has, for the same one
+// twice, and for several of which one is a board of its own (sim:, replay:). Of several udp: URLs only the first
+// has the port of hosts, unless they name one.
+std::vector<std::unique_ptr<Carrier>> make_host_carriers(asio::io_context& io,
+                                                         const std::vector<std::string>& urls,
+                                                         BoardRole role);
+
+// Throws Error{usage} if a session cannot have so many.
+void require_wires(std::size_t count);
 
 }  // namespace r4

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "../commands/command_help.hpp"
-#include "link_timing.hpp"
+#include "../commands/link_timing.hpp"
 #include "r4link/error.hpp"
 #include "session.hpp"
 

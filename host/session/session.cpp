@@ -34,7 +34,8 @@ SessionOptions checked(SessionOptions options) {
 
 }  // namespace
 
-Session::Session(Handler& handler, SessionOptions options, std::uint32_t first_pnum, BoardRole role)
+Session::Session(Handler& handler, SessionOptions options, std::uint32_t first_pnum, BoardRole role,
+                 std::size_t wires)
     : handler_(handler),
       options_(checked(std::move(options))),
       board_role_(role),
@@ -43,6 +44,7 @@ Session::Session(Handler& handler, SessionOptions options, std::uint32_t first_p
       key_(options_.key, options_.clock_start),
       selection_(options_.fields),
       question_(options_.identify_interval),
+      wires_(wires, options_.timing),
       pending_(max_pending, max_stops) {
   link_.hold(watches());
   if (!options_.fields.empty()) {
@@ -79,8 +81,9 @@ Command Session::with_needed_fields(const Command& command) {
 
 Time Session::poll(Time now) {
   link_.poll(to_ms(now));
+  if (wires_.several()) ask_wires(now);
   refresh_status(now);
-  if (!leaving_) watches() ? send_lease(now) : send_heartbeat(now);
+  if (!leaving_ && begun()) watches() ? send_lease(now) : send_heartbeat(now);
   for (Pending& pending : pending_.under_way()) {
     if (now >= pending.deadline) {
       finish(pending, Outcome::timed_out, Refusal::none, now);
@@ -101,12 +104,17 @@ Time Session::poll(Time now) {
   return next_poll(now);
 }
 
+// Each wire has a lease of its own, with its own T to echo.
 void Session::send_lease(Time now) {
-  if (!lease_.due(now)) return;
   const bool others = options_.fields != "DEFAULT";
   const Text list = others ? Text(options_.fields.data(), options_.fields.size()) : Text();
-  transmit_now(Command::watch(options_.watch_rate_hz, list), lease_.echo(), Priority::normal, now);
-  lease_.sent(now);
+  for (std::size_t i = 0; i < wires_.count(); ++i) {
+    Lease& lease = wires_.lease(i);
+    if (!may_speak(i) || !lease.due(now)) continue;
+    transmit_now(Command::watch(options_.watch_rate_hz, list), lease.echo(), Priority::normal, now,
+                 wire_bit(i));
+    lease.sent(now);
+  }
 }
 
 void Session::send_heartbeat(Time now) {
@@ -131,22 +139,24 @@ Time Session::next_poll(Time now) {
   // due_in() counts whole milliseconds; aim behind the edge, not before it.
   link = std::chrono::duration_cast<std::chrono::milliseconds>(link) + Time{0};
   if (link <= now) link = now + Time{1000};
-  next = std::min(next, link);
-  if (watches()) next = std::min(next, lease_.next());
+  if (begun()) next = std::min(next, link);
+  if (watches()) next = std::min(next, next_lease());
+  if (wires_.several()) next = std::min(next, wires_.next(now));
   if (hears_board()) next = std::min(next, question_.next(question_interval()));
   if (role_.refused(now)) next = std::min(next, role_.refused_until());
   if (group_waits_) next = std::min(next, groups_.next());
   return next;
 }
 
-void Session::on_transport(bool up, Time now) {
-  transport_down_ = !up;
-  link_.on_transport(up);
+void Session::on_transport(std::size_t wire, bool up, Time now, bool can_ask) {
+  if (wires_.several()) wires_.on_transport(wire, up, can_ask, now);
+  transport_down_ = wires_.several() ? wires_.all_down() : !up;
+  if (!wires_.several() || transport_down_) link_.on_transport(up);
   if (up && watches()) {
     // A program that shares a wire hears the board from elsewhere, in other numbers; and who held the wire
     // may have ended the lease, if that one controlled the board.
     link_.forget_numbers();
-    lease_.renew(now);
+    wires_.lease(wire).renew(now);
   }
   refresh_status(now);
 }
@@ -201,9 +211,11 @@ void Session::refresh_status(Time now) {
               : link_.gated(to_ms(now))            ? Gate::callback
                                                    : Gate::open,
       .key = watches() ? KeyTrouble::none : key_.trouble(now),
-      .lease = lease_.trouble(now),
+      .lease = lease_trouble(now),
       .in_control = in_control(now),
       .transport_down = transport_down_,
+      .carrying = wires_.carrying(),
+      .two_boards = wires_.two_boards(),
       .chip = link_.reason() == SafeReason::fault ? state_.fault : ChipFault(),
   };
   if (fresh == status_) return;
@@ -229,7 +241,7 @@ void Session::feed(Time now) {
 
 Statistics Session::statistics(Time now) const {
   Statistics report = collector_.report(now);
-  report.packets = link_.counters();
+  report.packets = packets();
   if (state_.sampled_error != ReceivedState::unknown) {
     report.clock_drift_ppm = clock_.drift_ppm();
     report.clock_drift_error_ppm = clock_.drift_error_ppm();

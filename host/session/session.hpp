@@ -15,6 +15,9 @@
 // (measurement/identity_question.hpp), the board's clock on ours (measurement/board_clock.hpp), the stop that
 // lasts (stop_repetition.hpp) and, where the session only watches, its lease at the board (lease.hpp).
 //
+// Over several wires (wires.hpp) every datagram goes out on each, written and signed once; what comes in is taken
+// once, whichever wire brings it first, and newest is what has the newest T. Leases alone are each wire's own.
+//
 // A retry has the bytes and the packet number of the original (signed anew, where there is a key),
 // so the board can execute it only once. When CMD has moved past a command, the retry's answer
 // (DUPLICATE: executed, STALE: not) decides. A refusal proves that the command was not executed only
@@ -35,7 +38,9 @@
 // cause that was known when it was asked for; when the board tells of a newer one, it is given up.
 #pragma once
 
+#include <array>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -53,7 +58,6 @@
 #include "field_selection.hpp"
 #include "host_key.hpp"
 #include "host_role.hpp"
-#include "lease.hpp"
 #include "r4link/carrier.hpp"
 #include "r4link/command.hpp"
 #include "r4link/error.hpp"
@@ -61,6 +65,7 @@
 #include "r4link/options.hpp"
 #include "stop_repetition.hpp"
 #include "time.hpp"
+#include "wires.hpp"
 
 namespace r4 {
 
@@ -73,7 +78,7 @@ class Session {
   // views are valid in the call.
   class Handler {
    public:
-    virtual SendResult transmit(std::string_view datagram, Priority priority) = 0;
+    virtual SendResult transmit(std::size_t wire, std::string_view datagram, Priority priority) = 0;
     virtual void on_state(const ReceivedState& state, const Datagram& datagram) = 0;
     virtual void on_board_heartbeat(const Datagram& datagram) = 0;
     virtual void on_identity(const Identity& identity) = 0;
@@ -96,16 +101,19 @@ class Session {
   // `first_pnum`: echo_host_first_pnum plus 30 random bits (random_first_pnum()).
   // Throws Error{usage} if options.fields are no state fields.
   Session(Handler& handler, SessionOptions options, std::uint32_t first_pnum,
-          BoardRole role = BoardRole::control);
+          BoardRole role = BoardRole::control, std::size_t wires = 1);
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  // A datagram has come. poll() is needed then.
-  void receive(std::string_view bytes, Time now);
+  static constexpr std::size_t most_wires = 4;
+
+  // A datagram has come over that wire. poll() is needed then.
+  void receive(std::size_t wire, std::string_view bytes, Time now);
   // Does what is due. Returns when it is needed next, at the latest.
   Time poll(Time now);
-  // The transport has gone or come; poll() is needed now.
-  void on_transport(bool up, Time now);
+  // The transport of a wire has gone or come; poll() is needed now. One of several is gone until it has come.
+  // `can_ask`: false where who watches may send no question (a bus).
+  void on_transport(std::size_t wire, bool up, Time now, bool can_ask = true);
 
   // Sends a command and finds out what became of it, by on_result() at the latest at `timeout` from
   // now. Throws Error{usage} for a command outside its ranges; returns 0 when 64 are under way
@@ -163,7 +171,13 @@ class Session {
   const ReceivedState& state() const { return state_; }
   Statistics statistics(Time now) const;
   // Of the board's datagrams.
-  const PacketCounters& packets() const { return link_.counters(); }
+  const PacketCounters& packets() const {
+    return wires_.several() ? wires_.counters() : link_.counters();
+  }
+  std::size_t wire_count() const { return wires_.count(); }
+  WireState wire_state(std::size_t wire) const;
+  // All of it but its name.
+  Wire wire(std::size_t wire, Time now) const;
 
   static constexpr std::size_t max_pending = 64;
   static constexpr std::size_t max_stops = 16;
@@ -178,7 +192,8 @@ class Session {
   void send_queued(Time now);
   void retry_due(Time now);
   void finish(Pending& pending, Outcome outcome, Refusal code, Time now);
-  SendResult transmit_now(const Command& command, std::uint32_t t_ms, Priority priority, Time now);
+  SendResult transmit_now(const Command& command, std::uint32_t t_ms, Priority priority, Time now,
+                          WireSet wires = all_wires);
   static PostResult post_result(SendResult result);
   // session_groups.cpp
   bool knows_groups(Time now);
@@ -186,14 +201,37 @@ class Session {
   static void write_group(Pending& pending);
   bool go_on(Pending& pending);
   bool group_is_ahead();
-  SendResult close_and_transmit(DatagramWriter& writer, CommandKind kind, Priority priority,
-                                Time now);
-  bool link_up() const;
+  // What goes out: of which kind, by which number, and to which wires.
+  struct Way {
+    CommandKind kind;
+    std::uint32_t pnum;
+    WireSet wires;
+  };
+  static constexpr WireSet all_wires = 0xFF;
+  SendResult close_and_transmit(DatagramWriter& writer, Way way, Priority priority, Time now);
+  // session_wires.cpp
+  SendResult send_over(std::string_view bytes, Way way, Priority priority, Time now);
+  bool may_speak(std::size_t wire) const;
+  bool begun() const { return !wires_.several() || wires_.begun(); }
+  void ask_wires(Time now);
+  bool admit(std::size_t wire, const Datagram& datagram, Time now);
+  bool admit_identity(std::size_t wire, const Datagram& datagram, const Identity& identity,
+                      Time now);
+  bool is_new_heartbeat(std::size_t wire, std::uint32_t t_ms);
+  bool is_newest_state(std::size_t wire, const Datagram& datagram, Time now);
+  bool take_fields(std::size_t wire, ReceivedState& fresh, const FieldSet& before);
+  Arrival arrival_over(std::uint32_t t_ms, SafeReason reason, Time now);
+  bool is_told(const Nack& nack);
+  void note_busy(std::size_t wire, Time now);
+  bool streams(Time now) const;
+  LeaseTrouble lease_trouble(Time now) const;
+  Time next_lease() const;
 
-  void on_heartbeat_datagram(const Datagram& datagram, Time now);
-  void on_state_datagram(const Datagram& datagram, Time now);
-  void on_identity_datagram(const Datagram& datagram, Time now);
-  void on_nack_datagram(const Datagram& datagram, Time now);
+  bool link_up() const;
+  void on_heartbeat_datagram(std::size_t wire, const Datagram& datagram, Time now);
+  void on_state_datagram(std::size_t wire, const Datagram& datagram, Time now);
+  void on_identity_datagram(std::size_t wire, const Datagram& datagram, Time now);
+  void on_nack_datagram(std::size_t wire, const Datagram& datagram, Time now);
   void on_answer(const Datagram& datagram, Time now);
   bool notice_restart();
   bool is_ours(std::uint32_t pnum) const;
@@ -223,7 +261,7 @@ class Session {
   Time question_interval() const;
   void send_heartbeat(Time now);
   void send_lease(Time now);
-  void on_lease_refused(const Nack& nack, const Datagram& datagram, Time now);
+  void on_lease_refused(std::size_t wire, const Nack& nack, const Datagram& datagram, Time now);
   Time next_poll(Time now);
   void select_fields(Time now);
   Command with_needed_fields(const Command& command);
@@ -239,7 +277,8 @@ class Session {
   FieldSelection selection_;
   IdentityQuestion question_;
   BoardClock clock_;
-  Lease lease_;
+  Wires wires_;
+  FieldSet newest_fields_;  // of several wires: what the states with the newest T have brought
   StopRepetition repetition_;
   LinkStatus status_;
   ReceivedState state_;
@@ -258,6 +297,13 @@ class Session {
   // As the newest heartbeat told it; unnamed_cause: none was heard.
   std::int32_t cause_ = Command::unnamed_cause;
   int questions_of_clock_ = 0;  // asked for its sake since the board began
+  // Of several wires: the answers that were told last, of which others bring copies.
+  struct Answered {
+    std::uint32_t pnum = 0;
+    Refusal code = Refusal::none;
+  };
+  std::array<Answered, 16> answered_{};
+  std::size_t answers_ = 0;
 };
 
 }  // namespace r4

@@ -45,7 +45,8 @@ PostResult Session::post(const Setpoints& group, Time now) {
   DatagramWriter writer(buffer.data(), buffer.size());
   for (std::size_t i = 0; i < group.size(); ++i) write_command(writer, group[i]);
   writer.stamp(link_.take_pnum(), to_ms(now));
-  const SendResult result = close_and_transmit(writer, group[0].kind, Priority::normal, now);
+  const SendResult result = close_and_transmit(
+      writer, {group[0].kind, link_.last_pnum(), all_wires}, Priority::normal, now);
   if (result == SendResult::sent) posted_.add(link_.last_pnum(), group);
   return post_result(result);
 }

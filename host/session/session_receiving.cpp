@@ -8,7 +8,7 @@
 
 namespace r4 {
 
-void Session::receive(std::string_view bytes, Time now) {
+void Session::receive(std::size_t wire, std::string_view bytes, Time now) {
   Datagram datagram;
   const ReadResult result = read_datagram(bytes, datagram);
   if (!result) {
@@ -21,32 +21,44 @@ void Session::receive(std::string_view bytes, Time now) {
                           kind == MessageKind::identity || kind == MessageKind::state;
   if (!from_board || !datagram.has_pnum() || !datagram.has_time()) return;
   ++collector_.counts.received;
+  if (!wires_.several()) wires_.heard(now);
 
   switch (kind) {
     case MessageKind::nack:
-      on_nack_datagram(datagram, now);
+      on_nack_datagram(wire, datagram, now);
       break;
     case MessageKind::identity:
-      on_identity_datagram(datagram, now);
+      on_identity_datagram(wire, datagram, now);
       break;
     case MessageKind::board_heartbeat:
-      on_heartbeat_datagram(datagram, now);
+      on_heartbeat_datagram(wire, datagram, now);
       break;
     default:
-      on_state_datagram(datagram, now);
+      on_state_datagram(wire, datagram, now);
       break;
   }
   refresh_status(now);
 }
 
-void Session::on_heartbeat_datagram(const Datagram& datagram, Time now) {
+void Session::on_heartbeat_datagram(std::size_t wire, const Datagram& datagram, Time now) {
   const bool connecting = is_connecting_heartbeat(datagram);
   // Said to hosts, on a wire that others listen to; who watches is told by the states that there is none.
   const SafeReport report = heartbeat_report(datagram);
-  if (connecting && watches() && lease_.streaming(now)) return confirm_stop(report, now);
+  if (connecting && watches() && streams(now)) return confirm_stop(report, now);
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
-  const bool current = is_current(
-      link_.on_datagram(datagram.pnum(), connecting ? 0 : t_ms, true, report.reason, to_ms(now)));
+  bool current = false;
+  if (wires_.several()) {
+    const bool admitted = admit(wire, datagram, now);
+    if (!admitted || (!connecting && !is_new_heartbeat(wire, t_ms))) {
+      if (wires_.is_known(wire)) confirm_stop(report, now);  // its number is proof enough
+      return;
+    }
+    if (connecting) link_.on_booting(report.reason, to_ms(now));
+    current = connecting || link_.on_newest(t_ms, true, report.reason, to_ms(now));
+  } else {
+    current = is_current(
+        link_.on_datagram(datagram.pnum(), connecting ? 0 : t_ms, true, report.reason, to_ms(now)));
+  }
   notice_restart();
   if (current) {
     if (!connecting) clock_.heard(t_ms, now);
@@ -65,8 +77,11 @@ void Session::on_heartbeat_datagram(const Datagram& datagram, Time now) {
   on_causes(report.cause, now);
 }
 
-void Session::on_state_datagram(const Datagram& datagram, Time now) {
+void Session::on_state_datagram(std::size_t wire, const Datagram& datagram, Time now) {
+  if (wires_.several() && !is_newest_state(wire, datagram, now)) return;
   ReceivedState fresh = state_;
+  FieldSet before;
+  if (wires_.several()) std::swap(before, fresh.present);
   if (!read_state(datagram, fresh)) {
     ++collector_.counts.damaged;
     ReadResult result;
@@ -75,17 +90,21 @@ void Session::on_state_datagram(const Datagram& datagram, Time now) {
                              std::string_view(datagram.bytes().data(), datagram.bytes().size()));
     return;
   }
+  if (wires_.several() && !take_fields(wire, fresh, before)) return;
   const SafeReason reason = fresh.present.has(StateField::safe) ? fresh.safe : SafeReason::none;
-  const Arrival arrival = link_.on_datagram(fresh.pnum, fresh.t_ms, false, reason, to_ms(now));
+  const Arrival arrival =
+      wires_.several() ? arrival_over(fresh.t_ms, reason, now)
+                       : link_.on_datagram(fresh.pnum, fresh.t_ms, false, reason, to_ms(now));
   if (notice_restart()) {  // nothing of the boot before
     fresh = state_;
     read_state(datagram, fresh);
   }
   // An older state must not replace a newer one. A late one that only a heartbeat or an answer has
   // overtaken, in a queue where those go first, is still the newest state.
-  const bool newest_state = arrival == Arrival::late && newer(fresh.pnum, state_.pnum);
+  const bool newest_state =
+      arrival == Arrival::late && (wires_.several() || newer(fresh.pnum, state_.pnum));
   if (!is_current(arrival) && !newest_state) return;
-  lease_.on_state(now);
+  wires_.lease(wire).on_state(now);
   collector_.on_state(fresh.t_ms, now);
   if (!newest_state) {
     key_.on_board_time(fresh.t_ms, now);
@@ -107,19 +126,20 @@ void Session::on_state_datagram(const Datagram& datagram, Time now) {
   handler_.on_state(state_, datagram);
 }
 
-void Session::on_nack_datagram(const Datagram& datagram, Time now) {
+void Session::on_nack_datagram(std::size_t wire, const Datagram& datagram, Time now) {
   Nack nack;
   if (!read_nack(datagram, nack)) return;
+  if (wires_.several() && !admit(wire, datagram, now)) return;
   if (!is_ours(nack.pnum)) {
     // On a CAN bus, on a wire that is shared and in a recording the answers to other hosts are heard, too. One to
     // the host in control has a number among those of the states; one to who has no lease yet has not.
     if (watches() && nack.has_session) on_answer(datagram, now);
     return;
   }
-  if (watches()) return on_lease_refused(nack, datagram, now);
+  if (watches()) return on_lease_refused(wire, nack, datagram, now);
   selection_.on_answer();
   if (nack.code == Refusal::busy) {
-    role_.on_busy(now);
+    note_busy(wire, now);
     key_.on_host_seen(now);
   }
   on_answer(datagram, now);
@@ -127,11 +147,12 @@ void Session::on_nack_datagram(const Datagram& datagram, Time now) {
   if (not_taken) key_.on_refusal(now);
   const bool other_copy = not_taken && key_.has_key();  // may have been executed
   const bool proof = !other_copy && is_proof(nack);
-  handler_.on_nack(nack, datagram);
+  if (!is_told(nack)) handler_.on_nack(nack, datagram);
   for (Pending& pending : pending_.under_way()) {
     if (!pending.is_out() || pending.pnum != nack.pnum) continue;
     if (pending.kind == CommandKind::leave) {  // it was executed, or we have no session to leave
       const bool left = nack.code == Refusal::duplicate;
+      if (!left && wires_.several()) continue;  // of a copy: its heartbeats tell
       finish(pending, left ? Outcome::confirmed : Outcome::refused, nack.code, now);
       continue;
     }
@@ -149,9 +170,10 @@ void Session::on_nack_datagram(const Datagram& datagram, Time now) {
 
 // Of all that a session sends which only watches, the board refuses leases alone. What those codes say the
 // link tells.
-void Session::on_lease_refused(const Nack& nack, const Datagram& datagram, Time now) {
+void Session::on_lease_refused(std::size_t wire, const Nack& nack, const Datagram& datagram,
+                               Time now) {
   on_answer(datagram, now);
-  lease_.on_refusal(nack, now);
+  wires_.lease(wire).on_refusal(nack, now);
   const bool told =
       nack.code == Refusal::stale || nack.code == Refusal::busy || nack.code == Refusal::unknown;
   if (!told) handler_.on_nack(nack, datagram);
@@ -161,13 +183,17 @@ void Session::on_lease_refused(const Nack& nack, const Datagram& datagram, Time 
 // executed: in the session in which the command was sent, and not after too many numbers. Without
 // proof the deadline ends it, as unknown.
 bool Session::is_proof(const Nack& nack) const {
+  // Over another wire than those of the board's session, which may take its copy.
+  const bool of_one_copy = nack.code == Refusal::busy || nack.code == Refusal::auth;
+  if (of_one_copy && wires_.several()) return false;
   return nack.has_session && is_ours(nack.session) && newer(nack.pnum, nack.session) &&
          link_.last_pnum() - nack.pnum < BoardLink::memory;
 }
 
-void Session::on_identity_datagram(const Datagram& datagram, Time now) {
+void Session::on_identity_datagram(std::size_t wire, const Datagram& datagram, Time now) {
   Identity identity;
   if (!read_identity(datagram, identity)) return;
+  if (wires_.several() && !admit_identity(wire, datagram, identity, now)) return;
   selection_.on_answer();
   on_answer(datagram, now);
   knows_leave_ = has_capability(identity.capabilities, leave_capability);
@@ -202,6 +228,7 @@ bool Session::is_ours(std::uint32_t pnum) const {
 // An answer counts in the board's packet numbers, but not in those that a host without control
 // sees.
 void Session::on_answer(const Datagram& datagram, Time now) {
+  if (wires_.several()) return link_.on_heard(to_ms(now));
   if (role_.refused(now)) return;
   link_.on_answer(datagram.pnum(), static_cast<std::uint32_t>(datagram.time_ms()), to_ms(now));
   notice_restart();

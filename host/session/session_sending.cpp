@@ -19,22 +19,23 @@ bool is_urgent(CommandKind kind) { return kind == CommandKind::stop || kind == C
 
 // A datagram of which no copy is kept.
 SendResult Session::transmit_now(const Command& command, std::uint32_t t_ms, Priority priority,
-                                 Time now) {
+                                 Time now, WireSet wires) {
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   write_command(writer, command);
   writer.stamp(link_.take_pnum(), t_ms);
-  return close_and_transmit(writer, command.kind, priority, now);
+  return close_and_transmit(writer, {command.kind, link_.last_pnum(), wires}, priority, now);
 }
 
 // The one way out: nothing is sent to a board that is refused, but stops.
-SendResult Session::close_and_transmit(DatagramWriter& writer, CommandKind kind, Priority priority,
+SendResult Session::close_and_transmit(DatagramWriter& writer, Way way, Priority priority,
                                        Time now) {
-  if (key_.refuses_board() && kind != CommandKind::stop) return SendResult::down;
+  if (key_.refuses_board() && way.kind != CommandKind::stop) return SendResult::down;
   if (!watches()) key_.sign(writer, now);  // nobody's counter goes on by it
   const Text bytes = writer.finish();
   if (bytes.empty()) return SendResult::down;
-  const SendResult result = handler_.transmit({bytes.data(), bytes.size()}, priority);
+  if (wires_.several()) return send_over({bytes.data(), bytes.size()}, way, priority, now);
+  const SendResult result = handler_.transmit(0, {bytes.data(), bytes.size()}, priority);
   if (result == SendResult::busy) role_.on_busy(now);
   return result;
 }
@@ -167,7 +168,8 @@ void Session::transmit(Pending& pending, Time now) {
   pending.retry =
       now + (is_urgent(pending.kind) ? Time{options_.stop_retry} : Time{options_.command_retry});
   DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.size);
-  close_and_transmit(writer, pending.kind, stop ? Priority::stop : Priority::normal, now);
+  close_and_transmit(writer, {pending.kind, pending.pnum, all_wires},
+                     stop ? Priority::stop : Priority::normal, now);
 }
 
 // In the order of send(): tickets rise.
@@ -204,7 +206,7 @@ void Session::repeat_stop(Time now) {
   std::array<char, max_datagram> buffer;
   std::copy(stop.begin(), stop.end(), buffer.begin());
   DatagramWriter writer(buffer.data(), buffer.size(), stop.size());
-  close_and_transmit(writer, CommandKind::stop, Priority::stop, now);
+  close_and_transmit(writer, {CommandKind::stop, 0, all_wires}, Priority::stop, now);
 }
 
 void Session::finish(Pending& pending, Outcome outcome, Refusal code, Time now) {
@@ -256,7 +258,9 @@ Ticket Session::leave(Time timeout, Time now) {
   for (Pending& pending : pending_.under_way()) {
     if (pending.kind != CommandKind::stop) finish(pending, Outcome::closed, Refusal::none, now);
   }
-  if (watches()) transmit_now(Command::watch(0), lease_.echo(), Priority::normal, now);
+  for (std::size_t i = 0; watches() && i < wires_.count(); ++i) {
+    transmit_now(Command::watch(0), wires_.lease(i).echo(), Priority::normal, now, wire_bit(i));
+  }
   leaving_ = true;  // a heartbeat behind the farewell would take the board again
   // The answer that tells it may have been lost. A board that confirms commands refuses what it does not know.
   const bool understands = knows_leave_.value_or(state_.present.has(StateField::cmd));

@@ -32,11 +32,13 @@
 #include <asio/recycling_allocator.hpp>
 #include <cstdint>
 #include <functional>
+#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "carrier.hpp"
 #include "datagram.hpp"
@@ -56,11 +58,27 @@ class AsyncBoard {
   AsyncBoard(const executor_type& executor, std::string_view url, BoardOptions options = {});
   AsyncBoard(asio::io_context& io, std::string_view url, BoardOptions options = {})
       : AsyncBoard(io.get_executor(), url, std::move(options)) {}
+  // Over several wires at once, up to four, all to the same board (docs/redundancy.md). Throws Error{usage} also
+  // for one that is there twice, and for sim: and replay:, which are boards of their own.
+  AsyncBoard(const executor_type& executor, const std::vector<std::string>& urls,
+             BoardOptions options = {});
+  AsyncBoard(asio::io_context& io, const std::vector<std::string>& urls, BoardOptions options = {})
+      : AsyncBoard(io.get_executor(), urls, std::move(options)) {}
+  AsyncBoard(asio::io_context& io, std::initializer_list<std::string_view> urls,
+             BoardOptions options = {})
+      : AsyncBoard(io.get_executor(), std::vector<std::string>(urls.begin(), urls.end()),
+                   std::move(options)) {}
   // The same on a transport of your own, not yet open.
   AsyncBoard(const executor_type& executor, std::unique_ptr<Carrier> carrier,
              BoardOptions options = {});
   AsyncBoard(asio::io_context& io, std::unique_ptr<Carrier> carrier, BoardOptions options = {})
       : AsyncBoard(io.get_executor(), std::move(carrier), std::move(options)) {}
+  // On several.
+  AsyncBoard(const executor_type& executor, std::vector<std::unique_ptr<Carrier>> carriers,
+             BoardOptions options = {});
+  AsyncBoard(asio::io_context& io, std::vector<std::unique_ptr<Carrier>> carriers,
+             BoardOptions options = {})
+      : AsyncBoard(io.get_executor(), std::move(carriers), std::move(options)) {}
   // Does what close() does.
   ~AsyncBoard();
   AsyncBoard(const AsyncBoard&) = delete;
@@ -69,7 +87,8 @@ class AsyncBoard {
   executor_type get_executor() const noexcept;
 
   // Opens the transport and begins the link: the first heartbeat goes out at once. Throws Error;
-  // once only.
+  // once only. Of several, one that cannot be opened yet is tried again every second, and on_event() tells why;
+  // it throws if none can be.
   void open();
   // Cancels what is under way (outcome closed), says farewell once and closes the transport: the board
   // goes safe, when it has heard that or by its timeout. No callback follows. Idempotent; the board cannot
@@ -193,8 +212,10 @@ class AsyncBoard {
   DisarmCause disarmed_by() const;
   const BoardIdentity& identity() const;
   Statistics statistics() const;
-  const CarrierCounters& carrier_counters() const;
-  const std::string& name() const;
+  const CarrierCounters& carrier_counters() const;  // of several wires: of all together
+  const std::string& name() const;                  // of several: all names
+  // How each of its wires does, in the order of the URLs.
+  std::vector<Wire> wires() const;
 
   // Any number of callbacks of each kind, called in the order in which they were added; the handle ends
   // one (subscription.hpp). Of the states that came while the event loop was held up for more than
@@ -207,6 +228,9 @@ class AsyncBoard {
   // heartbeats and commands of the one that controls, stops of others.
   Subscription on_overheard(std::function<void(std::string_view)> callback);
   Subscription on_link(std::function<void(const LinkStatus&)> callback);
+  // One of several wires has begun to carry, or ceased to. A transport that tells that it is gone is told of at
+  // once, any other after SessionOptions::timing's timeout.
+  Subscription on_wire(std::function<void(const Wire&)> callback);
   // The transport, and a warning where the event loop was held up for so long that heartbeats were late.
   Subscription on_event(std::function<void(const CarrierEvent&)> callback);
   // The board has begun again: what it was told is gone, thresholds of U too. Comes before its new

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "command.hpp"
 #include "config.hpp"
@@ -47,6 +48,18 @@ enum class LeaseTrouble : std::uint8_t {
 // "none", "full", "unknown".
 R4LINK_API const char* to_text(LeaseTrouble trouble);
 
+// How one of several wires to the same board is (docs/redundancy.md). Of one wire, asking and other_board do not
+// occur.
+enum class WireState : std::uint8_t {
+  down,         // its transport is gone, or could not be opened yet
+  asking,       // it is up, and the board there has not said yet who it is
+  other_board,  // another board is there: nothing but stops is sent on it
+  silent,       // the board is there, and nothing came for the timeout
+  carrying,
+};
+// "down", "asking", "other board", "silent", "carrying".
+R4LINK_API const char* to_text(WireState state);
+
 struct LinkStatus {
   HostLinkState state = HostLinkState::connecting;
   SafeReason reason = SafeReason::none;  // why the board is safe
@@ -54,9 +67,12 @@ struct LinkStatus {
   Gate gate = Gate::open;
   KeyTrouble key = KeyTrouble::none;
   LeaseTrouble lease = LeaseTrouble::none;
-  bool in_control = false;      // the board takes our commands: they go out at once
-  bool transport_down = false;  // it is gone: unplugged, its interface switched off
-  ChipFault chip{};             // of a fault: the chip that is the cause, if it is one
+  bool in_control = false;  // the board takes our commands: they go out at once
+  bool transport_down =
+      false;  // it is gone: unplugged, its interface switched off. Of several: all are
+  std::uint8_t carrying = 0;  // of several wires those that carry: bit 0 is the first
+  bool two_boards = false;    // a wire leads to another board than the rest
+  ChipFault chip{};           // of a fault: the chip that is the cause, if it is one
   bool gated() const { return gate != Gate::open; }
   friend bool operator==(const LinkStatus&, const LinkStatus&) = default;
 };
@@ -182,8 +198,12 @@ struct Statistics {
   std::uint64_t received = 0;  // valid ones
   std::uint64_t states = 0;
   std::uint64_t damaged = 0;  // bad checksum, syntax or length
-  PacketCounters packets;     // lost, duplicate, late, restarts
-  double state_rate_hz = 0;   // over the last second
+  std::uint64_t copies =
+      0;  // of several wires: what another wire had brought before; not among `received`
+  // lost, duplicate, late, restarts. Of several wires: lost is what none of them brought, a duplicate what another
+  // had brought before.
+  PacketCounters packets;
+  double state_rate_hz = 0;  // over the last second
   // Time, microseconds; 0 where nothing was measured yet
   double round_trip_us = 0;  // question to answer, the newest
   double round_trip_min_us = 0;
@@ -207,6 +227,23 @@ struct Statistics {
   }
 };
 
+// One of the wires to a board, and how well it does.
+struct Wire {
+  std::string name;  // of its transport, for people
+  WireState state = WireState::down;
+  bool busy = false;         // the board there answers that another host controls it
+  std::string board_id;      // of several wires: who answered there last
+  PacketCounters packets;    // of the board's datagrams on this wire
+  std::uint64_t copies = 0;  // of them, what another wire had brought before
+  double round_trip_us = 0;  // question to answer, the newest; 0: none yet
+  double age_us = 0;         // since the newest datagram; 0: none yet
+  // Lost share of the board's datagrams, 0-1.
+  double loss() const {
+    const double all = static_cast<double>(packets.received) + packets.lost;
+    return all > 0 ? packets.lost / all : 0;
+  }
+};
+
 // --- in words
 
 // What to do where a stop is not confirmed.
@@ -215,6 +252,9 @@ inline constexpr std::string_view stop_last_resort = "CUT THE POWER if it must s
 // How the link is and, where something is wrong with it, what to do: "another host controls the
 // board" and "stop it, or …". `name` is the board's. Of kind refused.
 R4LINK_API Problem explain(std::string_view name, const LinkStatus& link);
+
+// Which of the wires leads to another board, and what to do; of kind refused.
+R4LINK_API Problem explain(const std::vector<Wire>& wires);
 
 // What is wrong with keys, and what to do; of kind refused. Not for KeyTrouble::none.
 R4LINK_API Problem explain(KeyTrouble trouble);

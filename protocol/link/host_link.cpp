@@ -19,15 +19,9 @@ const char* to_text(HostLinkState state) {
 
 Arrival HostLink::on_datagram(std::uint32_t pnum, std::uint32_t t_ms, bool heartbeat,
                               SafeReason reason, std::uint32_t now_ms) {
-  if (heartbeat && pnum == 0 && t_ms == 0) {  // the board is booting: it knows nothing of us
-    heard_ms_ = now_ms;
+  if (heartbeat && pnum == 0 && t_ms == 0) {
     if (tracker_.started()) tracker_.restart();
-    booting_ = true;
-    state_ = HostLinkState::connecting;
-    reason_ = reason;
-    echo_ = 0;
-    echoed_ = false;
-    answer_now_ = true;
+    on_booting(reason, now_ms);
     return Arrival::first;
   }
   notice_boot(t_ms, now_ms);
@@ -42,6 +36,50 @@ Arrival HostLink::on_datagram(std::uint32_t pnum, std::uint32_t t_ms, bool heart
   return arrival;
 }
 
+// It knows nothing of us.
+void HostLink::on_booting(SafeReason reason, std::uint32_t now_ms) {
+  heard_ms_ = now_ms;
+  booting_ = true;
+  state_ = HostLinkState::connecting;
+  reason_ = reason;
+  answer_now_ = true;
+  forget_boot();
+}
+
+void HostLink::forget_boot() {
+  echo_ = 0;
+  echoed_ = false;
+  any_newest_ = false;
+}
+
+bool HostLink::on_newest(std::uint32_t t_ms, bool heartbeat, SafeReason reason,
+                         std::uint32_t now_ms) {
+  heard_ms_ = now_ms;
+  if (heartbeat && (echo_ == 0 || newer(t_ms, echo_))) {
+    echo_ = t_ms;
+    answer_now_ = true;
+  }
+  if (any_newest_ && newer(newest_ms_, t_ms)) return false;
+  any_newest_ = true;
+  booting_ = false;
+  newest_ms_ = t_ms;
+  on_clock(t_ms, false, now_ms);
+  reason_ = reason;
+  state_ = reason == SafeReason::none ? HostLinkState::active : HostLinkState::safe;
+  return true;
+}
+
+void HostLink::on_clock(std::uint32_t t_ms, bool restarted, std::uint32_t now_ms) {
+  if (restarted) {
+    ++restarts_;
+    booting_ = false;
+    forget_boot();
+  }
+  board_clock_known_ = true;
+  board_ms_ = t_ms;
+  clock_ms_ = heard_ms_ = now_ms;
+}
+
 Arrival HostLink::on_answer(std::uint32_t pnum, std::uint32_t t_ms, std::uint32_t now_ms) {
   notice_boot(t_ms, now_ms);
   return tracker_.on(pnum);
@@ -50,21 +88,18 @@ Arrival HostLink::on_answer(std::uint32_t pnum, std::uint32_t t_ms, std::uint32_
 // Each boot has a clock of its own: a T that does not fit the last one is of a board that has begun
 // again, even if its first heartbeats were lost.
 void HostLink::notice_boot(std::uint32_t t_ms, std::uint32_t now_ms) {
-  if (board_clock_known_) {
-    const std::uint32_t expected = board_ms_ + (now_ms - clock_ms_);
-    const std::int32_t off = static_cast<std::int32_t>(t_ms - expected);
-    const std::int32_t tolerance = booting_ ? booting_tolerance_ms : boot_tolerance_ms;
-    if (off > tolerance || off < -tolerance) {
-      ++restarts_;
-      if (tracker_.started()) tracker_.restart();
-      echo_ = 0;
-      echoed_ = false;
-    }
-  }
+  const bool restarted = !is_of_this_boot(t_ms, now_ms);
+  if (restarted && tracker_.started()) tracker_.restart();
   booting_ = false;
-  board_clock_known_ = true;
-  board_ms_ = t_ms;
-  clock_ms_ = heard_ms_ = now_ms;
+  on_clock(t_ms, restarted, now_ms);
+}
+
+bool HostLink::is_of_this_boot(std::uint32_t t_ms, std::uint32_t now_ms) const {
+  if (!board_clock_known_) return true;
+  const std::uint32_t expected = board_ms_ + (now_ms - clock_ms_);
+  const std::int32_t off = static_cast<std::int32_t>(t_ms - expected);
+  const std::int32_t tolerance = booting_ ? booting_tolerance_ms : boot_tolerance_ms;
+  return off <= tolerance && off >= -tolerance;
 }
 
 void HostLink::on_transport(bool up) {

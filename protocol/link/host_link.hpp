@@ -34,6 +34,21 @@ class HostLink {
   // board is there, but says nothing of its state.
   Arrival on_answer(std::uint32_t pnum, std::uint32_t t_ms, std::uint32_t now_ms);
 
+  // --- of a board that is heard over several wires (host/session/wires.hpp). Each has packet numbers of its own, so
+  // what is newest is told by T, and who listens to the wires says when the board has begun again.
+
+  // A state or heartbeat of this boot. True if it is the newest so far: what an older one says is no longer so.
+  // The echo is the newest of any heartbeat.
+  bool on_newest(std::uint32_t t_ms, bool heartbeat, SafeReason reason, std::uint32_t now_ms);
+  // The board is there.
+  void on_heard(std::uint32_t now_ms) { heard_ms_ = now_ms; }
+  // It says that it is booting.
+  void on_booting(SafeReason reason, std::uint32_t now_ms);
+  // Is that T of the boot that is known? Of any, before the first.
+  bool is_of_this_boot(std::uint32_t t_ms, std::uint32_t now_ms) const;
+  // The board was found to have this T; `restarted`: it has begun again.
+  void on_clock(std::uint32_t t_ms, bool restarted, std::uint32_t now_ms);
+
   // The transport has gone (`lost` at once) or come (a heartbeat is due at once).
   void on_transport(bool up);
   // What comes from now on may have other packet numbers.
@@ -90,6 +105,7 @@ class HostLink {
 
  private:
   void notice_boot(std::uint32_t t_ms, std::uint32_t now_ms);
+  void forget_boot();
 
   LinkTiming timing_;
   std::uint32_t next_pnum_;
@@ -101,7 +117,9 @@ class HostLink {
   std::uint32_t board_ms_ = 0;  // the board's T at clock_ms_
   std::uint32_t clock_ms_ = 0;
   bool board_clock_known_ = false;
-  bool booting_ = false;  // it said so last
+  bool booting_ = false;         // it said so last
+  std::uint32_t newest_ms_ = 0;  // of several wires: the newest T
+  bool any_newest_ = false;
   std::uint32_t restarts_ = 0;
   std::uint32_t sent_ms_ = 0;
   bool any_sent_ = false;

@@ -51,7 +51,7 @@ class Crowd final : public firmware::Hal, public firmware::Port, public firmware
   using Peers = PeerTable<int, places>;
   struct Host final : IncuriousHost {
     Host(Crowd& c, int at) : crowd(c), address(at) {}
-    SendResult transmit(std::string_view bytes, Priority) override {
+    SendResult transmit(std::size_t, std::string_view bytes, Priority) override {
       crowd.to_board_.push_back(
           {crowd.now_ms_ + crowd.random_.between(1, 3), address, std::string(bytes)});
       return SendResult::sent;
@@ -187,7 +187,7 @@ void Crowd::pass_millisecond() {
   }
   due(to_host_, [this](const Packet& packet) {
     Host& host = packet.address == first_.address ? first_ : second_;
-    if (host.session != nullptr) host.session->receive(packet.bytes, time());
+    if (host.session != nullptr) host.session->receive(0, packet.bytes, time());
   });
   check();
 }

@@ -176,7 +176,7 @@ class FleetLink final : firmware::Hal, firmware::Port, IncuriousHost {
       application_->receive(0, 1, Text(bytes.data(), bytes.size()), board_ms());
       poll_board();
     } else {
-      session_->receive(bytes, time());
+      session_->receive(0, bytes, time());
       poll_host();
     }
   }
@@ -193,7 +193,7 @@ class FleetLink final : firmware::Hal, firmware::Port, IncuriousHost {
   }
   std::size_t max_size() const override { return max_datagram; }
   // IncuriousHost
-  SendResult transmit(std::string_view bytes, Priority) override {
+  SendResult transmit(std::size_t, std::string_view bytes, Priority) override {
     transfer(true, bytes);
     return SendResult::sent;
   }

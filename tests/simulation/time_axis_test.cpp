@@ -100,7 +100,7 @@ class AxisLink final : public firmware::Hal, public firmware::Port, public Incur
       application_->receive(0, 1, Text(bytes), clock.shown(now_us));
       turn_board(now_us);
     } else {
-      session_->receive(bytes, time());
+      session_->receive(0, bytes, time());
       turn_session(now_us);
     }
   }
@@ -127,7 +127,7 @@ class AxisLink final : public firmware::Hal, public firmware::Port, public Incur
   }
   std::size_t max_size() const override { return max_datagram; }
   // IncuriousHost
-  SendResult transmit(std::string_view bytes, Priority) override {
+  SendResult transmit(std::size_t, std::string_view bytes, Priority) override {
     bus_.put(now_us_, number_, true, bytes);
     return SendResult::sent;
   }

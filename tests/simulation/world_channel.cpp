@@ -133,7 +133,7 @@ void World::hand_over(int slot) {
   } else {
     Host& host = *hosts_[static_cast<std::size_t>(packet.host)];
     if (host.alive && host.peer == packet.peer) {
-      host.session->receive(packet.bytes, host.time());
+      host.session->receive(0, packet.bytes, host.time());
       poll_host(packet.host);
     }
   }

@@ -46,7 +46,7 @@ struct World::Host final : Session::Handler {
   }
   Time time() const { return Time{static_cast<std::int64_t>(world.now_us_ + clock_offset_us)}; }
 
-  SendResult transmit(std::string_view bytes, Priority priority) override {
+  SendResult transmit(std::size_t, std::string_view bytes, Priority priority) override {
     // Who shares a place with the host in control sends nothing but a stop (docs/can.md).
     if (stopper && world.schedule_.shared_place && priority != Priority::stop) {
       return SendResult::busy;

@@ -35,7 +35,7 @@ std::uint32_t ScriptedLink::board_clock() const {
 }
 
 void ScriptedLink::raw(std::string_view bytes) {
-  session.receive(bytes, now);
+  session.receive(0, bytes, now);
   due_ = session.poll(now);
 }
 
@@ -109,7 +109,7 @@ ScriptedLink::Sent ScriptedLink::last(char letter) const {
   return found.back();
 }
 
-SendResult ScriptedLink::transmit(std::string_view bytes, Priority priority) {
+SendResult ScriptedLink::transmit(std::size_t, std::string_view bytes, Priority priority) {
   if (place_taken && priority != Priority::stop) return SendResult::busy;
   Datagram datagram;
   EXPECT_TRUE(read_datagram(bytes, datagram)) << bytes;

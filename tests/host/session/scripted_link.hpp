@@ -84,7 +84,7 @@ class ScriptedLink final : private Session::Handler {
   std::uint32_t board_clock() const;
   void finish(std::string_view fields);
 
-  SendResult transmit(std::string_view datagram, Priority priority) override;
+  SendResult transmit(std::size_t, std::string_view datagram, Priority priority) override;
   void on_state(const ReceivedState& state, const Datagram&) override { states.push_back(state); }
   void on_restart() override { ++restarts; }
   void on_arming(DisarmCause cause) override { arming.push_back(cause); }

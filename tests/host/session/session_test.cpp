@@ -194,10 +194,10 @@ TEST(Session, IsLostWhenTheBoardFallsSilentAndComesBackByItself) {
 TEST(Session, IsLostAtOnceWithItsTransport) {
   ScriptedLink link;
   link.connect();
-  link.session.on_transport(false, link.now);
+  link.session.on_transport(0, false, link.now);
   EXPECT_EQ(link.session.link().state, HostLinkState::lost);
   link.pass(30ms);
-  link.session.on_transport(true, link.now);
+  link.session.on_transport(0, true, link.now);
   link.session.poll(link.now);
   EXPECT_EQ(link.last('H').at, link.now) << "a heartbeat at once when it comes back";
 }

@@ -53,7 +53,7 @@ TEST_F(SessionWatch, AsksAtOnceOnATransportThatHasComeUp) {
   link.pass(600ms);
   link.place_taken = false;
   link.sent.clear();
-  link.session.on_transport(true, link.now);
+  link.session.on_transport(0, true, link.now);
   link.pass(0ms);
   EXPECT_EQ(link.count('W'), 1U);
 }

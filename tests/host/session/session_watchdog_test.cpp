@@ -125,12 +125,12 @@ TEST(SessionLink, TellsWhenTheBoardTakesCommands) {
 TEST(SessionLink, TellsThatTheTransportIsDown) {
   ScriptedLink link;
   link.connect();
-  link.session.on_transport(false, link.now);
+  link.session.on_transport(0, false, link.now);
   EXPECT_TRUE(link.session.link().transport_down);
   const Problem problem = explain("board", link.session.link());
   EXPECT_TRUE(contains(problem.reason, "transport is down"));
   EXPECT_FALSE(problem.fix.empty());
-  link.session.on_transport(true, link.now);
+  link.session.on_transport(0, true, link.now);
   EXPECT_FALSE(link.session.link().transport_down);
 }
 

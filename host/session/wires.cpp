@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "wires.hpp"
+
+#include <algorithm>
+
+#include "../../protocol/link/host_link.hpp"
+
+namespace r4 {
+
+// --- the transports
+
+void Wires::on_transport(std::size_t index, bool up, bool can_ask, Time now) {
+  Wire& wire = wires_[index];
+  wire.up = up;
+  wire.can_ask = can_ask;
+  wire.known = up && !can_ask;
+  wire.other = wire.connecting = wire.has_clock = false;
+  wire.heard = wire.busy_until = Time{0};
+  wire.ask_at = can_ask ? now : Time::max();
+  if (wire.known && first_answer_.count() == 0) first_answer_ = now;
+  // It may bring other numbers from now on.
+  if (up && wire.tracker.started()) wire.tracker.restart();
+  look(now);
+}
+
+bool Wires::all_down() const {
+  return std::none_of(wires_.begin(), wires_.end(), [](const Wire& wire) { return wire.up; });
+}
+
+// --- who is there
+
+WireSet Wires::to_ask(Time now) const {
+  WireSet due = 0;
+  for (std::size_t i = 0; i < wires_.size(); ++i) {
+    if (wires_[i].up && wires_[i].can_ask && now >= wires_[i].ask_at) due |= wire_bit(i);
+  }
+  return due;
+}
+
+void Wires::asked(std::size_t index, std::uint32_t pnum, Time now) {
+  Wire& wire = wires_[index];
+  wire.question.asked(pnum, now);
+  wire.asked_at = now;
+  const Time again = now + (wire.other ? ask_other_interval : ask_interval);
+  wire.ask_at = wire.known ? Time::max() : again;
+}
+
+// A wire whose T does not fit.
+void Wires::ask_soon(Wire& wire, Time now) {
+  if (!wire.can_ask) return;
+  wire.ask_at = std::min(wire.ask_at, std::max(now, wire.asked_at + ask_interval));
+}
+
+Wires::Answer Wires::on_identity(std::size_t index, const Identity& identity, std::uint32_t t_ms,
+                                 bool fits, Time now) {
+  Wire& wire = wires_[index];
+  const std::optional<Time> asked = wire.question.answered(identity);
+  if (!wire.up || (!asked && wire.can_ask)) return Answer::nothing;
+  const std::string_view id(identity.board_id.data(), identity.board_id.size());
+  if (wire.board_id != id) wire.board_id = id;
+  if (!has_id_) {
+    has_id_ = true;
+    id_ = id;
+  }
+  wire.other = id_ != id;
+  wire.known = !wire.other;
+  if (wire.other) {
+    wire.ask_at = wire.can_ask ? now + ask_other_interval : Time::max();
+    look(now);
+    return Answer::other;
+  }
+  wire.ask_at = Time::max();
+  if (first_answer_.count() == 0) first_answer_ = now;
+  if (!asked) return Answer::known;
+  wire.round_trip = now - *asked;
+  set_clock(wire, t_ms, now);
+  // Of two boots the later one is that which answered what was asked after the other had answered.
+  const bool later = *asked > proven_;
+  if (!fits && !later) {
+    ask_soon(wire, now);
+    return Answer::known;
+  }
+  if (!fits) ++boot_;
+  wire.boot = boot_;
+  proven_ = now;
+  return fits ? Answer::known : Answer::restarted;
+}
+
+bool Wires::two_boards() const {
+  return std::any_of(wires_.begin(), wires_.end(), [](const Wire& wire) { return wire.other; });
+}
+
+WireSet Wires::known() const {
+  WireSet set = 0;
+  for (std::size_t i = 0; i < wires_.size(); ++i) {
+    if (wires_[i].known) set |= wire_bit(i);
+  }
+  return set;
+}
+
+bool Wires::poll(Time now) {
+  look(now);
+  if (begun_ || known() == 0 || two_boards()) return false;
+  const bool asking = std::any_of(wires_.begin(), wires_.end(),
+                                  [](const Wire& wire) { return wire.up && !wire.known; });
+  if (asking && now < first_answer_ + patience) return false;
+  begun_ = true;
+  return true;
+}
+
+Time Wires::next(Time now) const {
+  Time next = Time::max();
+  for (const Wire& wire : wires_) {
+    if (wire.up && wire.can_ask) next = std::min(next, std::max(wire.ask_at, now + Time{1000}));
+    if (is_heard(wire, now)) next = std::min(next, wire.heard + timeout_);
+  }
+  const Time begins = first_answer_ + patience;
+  if (!begun_ && known() != 0 && begins > now) next = std::min(next, begins);
+  return next;
+}
+
+// --- what comes
+
+bool Wires::in_clock(const Wire& wire, std::uint32_t t_ms, Time now) {
+  if (!wire.has_clock) return false;
+  const std::uint32_t expected = wire.board_ms + (to_ms(now) - wire.clock_ms);
+  const auto off = static_cast<std::int32_t>(t_ms - expected);
+  const std::int32_t most =
+      wire.connecting ? HostLink::booting_tolerance_ms : HostLink::boot_tolerance_ms;
+  return off <= most && off >= -most;
+}
+
+void Wires::set_clock(Wire& wire, std::uint32_t t_ms, Time now) {
+  wire.has_clock = true;
+  wire.board_ms = t_ms;
+  wire.clock_ms = to_ms(now);
+}
+
+// Is it of the board as the session knows it? If not, the wire is asked.
+bool Wires::admits(Wire& wire, std::uint32_t t_ms, Time now) const {
+  if (!wire.known) return false;
+  if (wire.boot == boot_ && in_clock(wire, t_ms, now)) return true;
+  ask_soon(wire, now);
+  return false;
+}
+
+Wires::Take Wires::on_datagram(std::size_t index, std::uint32_t pnum, std::uint32_t t_ms, bool fits,
+                               Time now) {
+  Wire& wire = wires_[index];
+  Take take = Take::yes;
+  if (!admits(wire, t_ms, now)) {
+    // One that cannot be asked is believed, unless another one knows better.
+    if (wire.can_ask || !wire.known || (!fits && others_carry(wire, now))) return Take::no;
+    if (!fits) {
+      ++boot_;
+      proven_ = now;
+      take = Take::restarted;
+    }
+    wire.boot = boot_;
+  }
+  wire.connecting = false;
+  set_clock(wire, t_ms, now);
+  wire.heard = now;
+  look(now);
+  const std::uint32_t lost = wire.tracker.counters().lost;
+  wire.gap = wire.tracker.on(pnum) == Arrival::gap ? wire.tracker.counters().lost - lost : 0;
+  return take;
+}
+
+Wires::Take Wires::on_connecting(std::size_t index, Time now) {
+  Wire& wire = wires_[index];
+  if (!wire.known) return Take::no;
+  wire.heard = now;
+  look(now);
+  if (!wire.connecting) {
+    wire.connecting = true;
+    if (wire.tracker.started()) wire.tracker.restart();
+  }
+  ask_soon(wire, now);  // what it sends next is of another clock
+  return all_connecting(now) ? Take::connecting : Take::no;
+}
+
+Wires::Take Wires::on_answer(std::size_t index, std::uint32_t pnum, std::uint32_t t_ms, bool counts,
+                             Time now) {
+  Wire& wire = wires_[index];
+  if (!admits(wire, t_ms, now)) return Take::no;
+  wire.heard = now;
+  look(now);
+  if (counts && wire.tracker.started()) wire.tracker.on(pnum);
+  return Take::yes;
+}
+
+void Wires::taken(std::size_t index) {
+  Wire& wire = wires_[index];
+  ++counters_.received;
+  if (wire.gap > wire.others) counters_.lost += wire.gap - wire.others;
+  for (Wire& each : wires_) ++each.others;
+  wire.others = 0;
+}
+
+void Wires::copy(std::size_t index) {
+  Wire& wire = wires_[index];
+  ++wire.copies;
+  ++counters_.duplicate;
+  wire.others -= std::min(wire.others, wire.gap + 1);
+}
+
+bool Wires::all_connecting(Time now) const {
+  return std::all_of(wires_.begin(), wires_.end(),
+                     [&](const Wire& wire) { return wire.connecting || !is_heard(wire, now); });
+}
+
+bool Wires::others_carry(const Wire& wire, Time now) const {
+  return std::any_of(wires_.begin(), wires_.end(),
+                     [&](const Wire& each) { return &each != &wire && is_heard(each, now); });
+}
+
+bool Wires::all_busy(Time now) const {
+  return std::all_of(wires_.begin(), wires_.end(), [&](const Wire& wire) {
+    return now < wire.busy_until || !is_heard(wire, now);
+  });
+}
+
+void Wires::look(Time now) {
+  carrying_ = 0;
+  for (std::size_t i = 0; i < wires_.size(); ++i) {
+    if (is_heard(wires_[i], now)) carrying_ |= wire_bit(i);
+  }
+}
+
+WireState Wires::state(std::size_t index) const {
+  const Wire& wire = wires_[index];
+  if (!wire.up) return WireState::down;
+  if (wire.other) return WireState::other_board;
+  if (!wire.known) return WireState::asking;
+  return (carrying_ & wire_bit(index)) != 0 ? WireState::carrying : WireState::silent;
+}
+
+}  // namespace r4
