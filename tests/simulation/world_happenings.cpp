@@ -140,6 +140,8 @@ void World::attack() {
   constexpr std::uint32_t own_address = 0xFFFF;
   const std::uint32_t address =
       attack.host < 0 ? own_address : hosts_[static_cast<std::size_t>(attack.host)]->peer;
+  if (attack.kind == Attack::Kind::replay)
+    heard_us_[address] = now_us_;  // it may be the host's word
   board_->receive(0, address, Text(attack.bytes), board_ms());
   attacking_ = false;
   Datagram datagram;
