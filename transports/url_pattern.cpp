@@ -12,7 +12,7 @@
 namespace r4 {
 namespace {
 
-[[noreturn]] void refuse(std::string_view pattern, std::string reason) {
+[[noreturn]] void refuse_pattern(std::string_view pattern, std::string reason) {
   throw Error(ErrorKind::usage, std::string(pattern), std::move(reason),
               "write ranges as in node=0-7, :20000-20999 or {1-250}, the lower number first");
 }
@@ -23,12 +23,12 @@ namespace {
               "name fewer in one URL");
 }
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
+bool is_decimal(char c) { return c >= '0' && c <= '9'; }
 
 // The end of "0-7" at the beginning of the text; 0 if that is no range.
 std::size_t range_size(std::string_view text) {
   const auto digits = [&text](std::size_t from) {
-    while (from < text.size() && is_digit(text[from])) ++from;
+    while (from < text.size() && is_decimal(text[from])) ++from;
     return from;
   };
   const std::size_t dash = digits(0);
@@ -75,11 +75,11 @@ std::vector<std::string> numbers_of(std::string_view pattern, std::string_view l
     std::uint32_t first = 0;
     std::uint32_t last = 0;
     const auto is_number = [](std::string_view text) {
-      return !text.empty() && std::all_of(text.begin(), text.end(), is_digit);
+      return !text.empty() && std::all_of(text.begin(), text.end(), is_decimal);
     };
     if (!is_number(lower) || !is_number(upper) || !parse_number(lower, first) ||
         !parse_number(upper, last) || first > last) {
-      refuse(pattern, "'" + std::string(part) + "' is no number and no range");
+      refuse_pattern(pattern, "'" + std::string(part) + "' is no number and no range");
     }
     if (last - first >= most_pattern_urls) refuse_as_too_many(pattern);
     const std::size_t width = lower.front() == '0' ? lower.size() : 0;
@@ -104,7 +104,7 @@ std::vector<PatternUrl> expand_urls(std::string_view pattern) {
     const std::size_t close = rest.find('}');
     if (open == std::string_view::npos && close == std::string_view::npos) break;
     if (open == std::string_view::npos || close == std::string_view::npos || close < open) {
-      refuse(pattern, "has a brace without the other one");
+      refuse_pattern(pattern, "has a brace without the other one");
     }
     const std::vector<std::string> numbers =
         numbers_of(pattern, rest.substr(open + 1, close - open - 1));

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What test_can_doctor.py runs where SocketCAN is: interfaces are made wrong, and r4 doctor tells and mends it."""
+"""What test_can.py runs where SocketCAN is: interfaces are made wrong, and r4 doctor tells and mends it."""
 import pathlib
 import subprocess
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What test_can_python.py runs where SocketCAN is: r4 against the host and the board of can_python.py."""
+"""What test_can.py runs where SocketCAN is: r4 against the host and the board of can_python.py."""
 import contextlib
 import socket
 import struct
@@ -16,7 +16,14 @@ from r4_process import PATIENCE_S, Board, is_state, monitor, objects, run
 
 BOARD_URL, HOST_URL = 'can://vcan0?node=3', 'can://vcan0?node=4'
 SLOWLY = ('--set', 'rate,20')  # python takes half a millisecond a frame in an emulated machine
-sys.setswitchinterval(0.0005)
+
+
+@pytest.fixture(scope='module', autouse=True)
+def threads_that_take_turns_often():
+    usual = sys.getswitchinterval()
+    sys.setswitchinterval(0.0005)
+    yield
+    sys.setswitchinterval(usual)
 
 
 @contextlib.contextmanager

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The link over CAN: boards and hosts as processes on buses."""
+"""The link over CAN: boards and hosts as processes on buses; r4 doctor and interfaces that are as they should not be;
+r4 against a host and a board on python-can.
+
+In one guest: until the first test runs in it takes ten seconds.
+"""
 from inside import run_inside
 
 
 def test_the_link_over_can():
-    run_inside('can_inside.py')
+    run_inside('can_inside.py', 'can_doctor_inside.py', 'can_python_inside.py')

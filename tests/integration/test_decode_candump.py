@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """r4 decode --candump: what candump printed in, the datagrams of the bus out.
 
-test_can_python.py decodes what real boards and hosts said.
+can_python_inside.py decodes what real boards and hosts said.
 """
 import random
 import subprocess

@@ -86,14 +86,13 @@ CanSocket::Outcome outcome_of(int error) {
 constexpr std::size_t control_size =
     CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t));
 
-struct Control {
-  alignas(cmsghdr) char bytes[control_size];
-};
-
 }  // namespace
 
 // Where recvmmsg() puts frames. The headers are made once: most calls take few frames.
 struct CanSocket::Inbox {
+  struct Control {
+    alignas(cmsghdr) char bytes[control_size];
+  };
   Inbox() {
     for (std::size_t i = 0; i < batch; ++i) {
       parts[i] = {&raw[i], sizeof(canfd_frame)};
