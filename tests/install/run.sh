@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # The installed library is enough for a program outside the tree. Usage: run.sh SOURCE BUILD
 # Installs BUILD into a new prefix, copies docs/examples elsewhere, builds drive with find_package (static)
-# and with pkg-config (shared) and teleop with find_package, runs them, programs that have an Asio of
+# and with pkg-config (shared), openpodcar and teleop with find_package, runs them, programs that have an Asio of
 # their own, and what the documentation shows. Compiles every installed header alone, and compares what
 # the library exports with exports.txt.
 set -euo pipefail
@@ -18,7 +18,8 @@ cmake --install "$build_tree" --prefix "$prefix" >"$work/install.log" 2>&1 || {
   tail -n 5 "$work/install.log"
   exit 1
 }
-cp -r "$source_tree/docs/examples/drive" "$source_tree/docs/examples/teleop" "$work"
+cp -r "$source_tree/docs/examples/drive" "$source_tree/docs/examples/openpodcar" "$source_tree/docs/examples/teleop" \
+  "$work"
 cd "$work/drive"
 
 # check NAME COMMAND...: the program must end well and say what the README promises.
@@ -61,6 +62,15 @@ R4=$build_tree/r4 /usr/bin/python3 "$source_tree/tests/install/teleop.py" ../tel
   echo 'install: r4 metrics fails'
   exit 1
 }
+cmake -S ../openpodcar -B ../openpodcar/build -DCMAKE_CXX_COMPILER="$cxx" -DCMAKE_PREFIX_PATH="$prefix" >"$work/cmake.log"
+cmake --build ../openpodcar/build >>"$work/cmake.log" || {
+  cat "$work/cmake.log"
+  exit 1
+}
+if ! echo | ../openpodcar/build/openpodcar 1,0 >"$work/out" 2>&1 || ! grep -q '^arrived' "$work/out"; then
+  echo "install: openpodcar does not arrive: $(cat "$work/out")"
+  exit 1
+fi
 
 cp -r "$source_tree/tests/install/own_asio" "$work"
 cmake -S ../own_asio -B ../own_asio/build -DCMAKE_CXX_COMPILER="$cxx" -DCMAKE_PREFIX_PATH="$prefix" >"$work/cmake.log"

@@ -7,6 +7,7 @@ import pytest
 
 import r4link
 from r4link import Setpoints, control
+from r4link.testing import make_state
 
 
 def test_pid_follows_its_gains_and_limits():
@@ -120,3 +121,20 @@ def test_a_guard_is_there_for_loops_of_another_kind(armed):
     assert guard.ended == 'late' and '200 ms' in guard.why
     with pytest.raises(r4link.UsageError):
         guard.check('well', 'none', now)
+
+
+def test_states_can_be_made_up_for_tests():
+    made = make_state(10, enc1=-5, enc3hz=7, ainsteer=2.5, osmc1=(400, 1), dhb2b=(5, 0), us4=9, dmhsta=True, safe='handle',
+                      servo3pos=1500, bldc2=(1, 0, True), relays=3, step2pos=-4, enc4idx=1, ain6=0.5)
+    assert made.as_dict() == {
+        'pnum': 0, 't_ms': 10, 'enc1': -5, 'enc3hz': 7, 'ainsteer': 2.5, 'osmc1': (400, 1), 'dhb2b': (5, 0), 'us4': 9,
+        'dmhsta': True, 'safe': 'handle', 'servo3pos': 1500, 'bldc2': (1, 0, True), 'relays': 3, 'step2pos': -4,
+        'enc4idx': 1, 'ain6': 0.5}
+    assert made.received == made.sampled == 0.01
+    wheel = control.Wheel(1, 1000, 0.5 / math.pi)
+    wheel.advance(make_state(0, enc1=0))
+    assert wheel.advance(make_state(10, enc1=20)) == pytest.approx(0.02) and wheel.speed == pytest.approx(2)
+    with pytest.raises(r4link.UsageError, match='enc9'):
+        make_state(0, enc9=1)
+    with pytest.raises(r4link.UsageError, match='cmd'):
+        make_state(0, cmd=1)

@@ -31,6 +31,7 @@ def test_types_are_strict(tmp_path):
     env = {**os.environ, 'MYPYPATH': str(ROOT / 'host/python')}
     run(*strict, '-p', 'r4link', env=env)
     run(*strict, *sorted((ROOT / 'docs/examples/python').glob('*.py')), env=env)
+    run(*strict, 'openscout.py', cwd=ROOT / 'docs/examples/openscout', env=env)
 
 
 def test_the_stub_has_what_the_module_has():

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A state: each field of the board an attribute, made when it is asked for.
 #include <chrono>
+#include <cmath>
 #include <string>
 
 #include "bindings.hpp"
@@ -125,7 +126,100 @@ std::string attribute_of(F field) {
   return lower;
 }
 
+namespace {
+
+// What numbers_of() reads.
+void set_numbers(State& state, F field, const Numbers& to) {
+  const auto whole = [&](std::size_t i) { return static_cast<std::int32_t>(to[i]); };
+  const auto drive = [&] {
+    return Drive{static_cast<std::uint16_t>(to[0]), static_cast<Direction>(to[1] != 0)};
+  };
+  if (int n = nth(field, F::ain24, F::aindmh); n >= 0) {
+    state.analog_cv[n] = whole(0);
+  } else if (n = nth(field, F::osmc1, F::osmc2, F::osmc4); n >= 0) {
+    state.osmc[n] = drive();
+  } else if (n = nth(field, F::dhb1a, F::dhb1b, F::dhb2b); n >= 0) {
+    state.dhb12[n] = drive();
+  } else if (n = nth(field, F::bldc1, F::bldc4); n >= 0) {
+    state.bldc[n] = {drive().pwm, drive().direction, to[2] != 0};
+  } else if (n = nth(field, F::step1pos, F::step2pos, F::step4pos); n >= 0) {
+    state.stepper_steps[n] = whole(0);
+  } else if (n = nth(field, F::servo1pos, F::servo2pos, F::servo16pos); n >= 0) {
+    state.servo_us[n] = static_cast<std::uint16_t>(to[0]);
+  } else if (n = nth(field, F::enc1, F::enc4); n >= 0) {
+    state.encoder_counts[n] = whole(0);
+  } else if (n = nth(field, F::enc1hz, F::enc4hz); n >= 0) {
+    state.encoder_hz[n] = whole(0);
+  } else if (n = nth(field, F::enc1idx, F::enc4idx); n >= 0) {
+    state.encoder_index_counts[n] = whole(0);
+  } else if (n = nth(field, F::us1, F::us4); n >= 0) {
+    state.ultrasonic_cm[n] = static_cast<std::uint16_t>(to[0]);
+  } else if (field == F::ainsteer || field == F::ain6) {
+    state.analog_cv[static_cast<int>(field == F::ain6 ? Analog::ain6 : Analog::ainsteer)] =
+        whole(0);
+  } else if (field == F::dmhsta) {
+    state.handle_held = to[0] != 0;
+  } else if (field == F::relays) {
+    state.relays = static_cast<std::uint8_t>(to[0]);
+  } else if (field == F::safe) {
+    state.safe = to_safe_reason(static_cast<std::uint32_t>(to[0]));
+  } else {
+    throw Error(ErrorKind::usage, attribute_of(field), "it cannot be made up", "leave it out");
+  }
+}
+
+Numbers numbers_from(F field, const py::handle& value) {
+  switch (form_of(field)) {
+    case Form::volts:
+      return {std::lround(100 * value.cast<double>())};
+    case Form::drive:
+    case Form::bldc: {
+      Numbers numbers{};
+      std::size_t i = 0;
+      for (const py::handle each : value.cast<py::tuple>()) {
+        if (i < numbers.size()) numbers[i++] = each.cast<std::int64_t>();
+      }
+      return numbers;
+    }
+    case Form::safe:
+      for (int i = 0; i < safe_reason_count; ++i) {
+        if (value.cast<std::string>() == to_text(static_cast<SafeReason>(i))) return {i};
+      }
+      throw Error(ErrorKind::usage, "safe", "there is no such reason",
+                  "give one of docs/safety.md");
+    case Form::flag:
+    case Form::number:
+    case Form::fault:
+      break;
+  }
+  return {value.cast<std::int64_t>()};
+}
+
+// A state that no board has sent, for tests of what is done with states.
+ReceivedState make_state(std::uint32_t t_ms, double at, const py::dict& fields) {
+  ReceivedState state;
+  state.t_ms = t_ms;
+  state.received = state.sampled = ReceivedState::Clock::time_point(
+      std::chrono::round<ReceivedState::Clock::duration>(std::chrono::duration<double>(at)));
+  state.sampled_error = ReceivedState::Clock::duration(0);
+  for (const auto& [key, value] : fields) {
+    std::string name = key.cast<std::string>();
+    for (char& c : name) c = c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
+    const F field = state_field(Text(name));
+    if (field == F::count) {
+      throw Error(ErrorKind::usage, key.cast<std::string>(), "there is no such state field",
+                  "give one of r4link.FIELDS");
+    }
+    set_numbers(state, field, numbers_from(field, value));
+    state.present.add(field);
+  }
+  return state;
+}
+
+}  // namespace
+
 void bind_state(py::module_& module) {
+  module.def("make_state", &make_state);
   py::class_<ReceivedState> state(module, "State");
   py::list names;
   for (int i = 0; i < state_field_count; ++i) {

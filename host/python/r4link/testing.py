@@ -14,13 +14,20 @@ import time
 from types import TracebackType
 from typing import Any, Protocol, Self, Type
 
-from ._core import FIELDS
+from . import _core
+from ._core import FIELDS, State
 from .board import Board
 from .errors import DataError, Error, OpenError, UsageError
 from .simulation import Look, SimBoard
 from .values import Bldc, Drive
 
 TRANSPORTS = ('sim', 'udp', 'pty', 'can')
+
+
+def make_state(t_ms: int, **fields: Any) -> State:
+    """A state that no board has sent, to test what is done with states, without a board and in no time: `t_ms` is the
+    board's clock and, in ms, when it was sampled and received. make_state(10, enc1=5, ainsteer=2.5, osmc1=(400, 1))."""
+    return _core.make_state(t_ms, t_ms / 1000, fields)
 
 
 class Robot(Protocol):

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "podcar.hpp"
+
+#include <cmath>
+#include <cstdlib>
+
+namespace {
+
+constexpr double steering_tolerance_rad = 0.004;  // nearer than this the actuator rests
+constexpr double standing_m_s = 0.02;
+
+int pwm_of(double duty) { return static_cast<int>(std::lround(std::abs(duty) * r4::pwm_max)); }
+r4::Direction direction_of(double duty) {
+  return duty < 0 ? r4::Direction::reverse : r4::Direction::forward;
+}
+
+}  // namespace
+
+r4::control::LoopOptions podcar_loop() {
+  using namespace std::chrono_literals;
+  r4::control::LoopOptions options;
+  options.fields = "ENC1,AINSTEER";
+  options.late = 150ms;
+  options.standstill = {{.encoder = 1, .channel = 1, .pwm = 1500, .counts = 5, .time = 1000ms}};
+  options.rest.osmc(1, 0, r4::Direction::forward).dhb12(1, 0, r4::Direction::forward);
+  return options;
+}
+
+bool Podcar::sense(const r4::State& state) {
+  const std::optional<double> angle = sensor_.angle_rad(state);
+  if (!angle) return false;
+  const double length = wheel_.advance(state);
+  // The angle of the middle of the way.
+  const double steering = (*angle + steering_rad_) / 2;
+  odometry_.advance(length, length * std::tan(steering) / podcar_geometry.wheelbase_m);
+  steering_rad_ = *angle;
+  return true;
+}
+
+r4::Setpoints Podcar::drive(const r4::control::Twist& wish, double dt_s) {
+  const auto command = car_.command(wish);
+  double drive = speed_.step(command.speed_m_s, wheel_.speed_m_s(), dt_s);
+  if (command.speed_m_s == 0 && std::abs(wheel_.speed_m_s()) < standing_m_s) {
+    speed_.reset();
+    drive = 0;
+  }
+  // Standing, it keeps the wheels as they are.
+  const double turn =
+      command.speed_m_s == 0 ? 0 : steering_.step(command.steering_rad, steering_rad_, dt_s);
+  const bool steered = std::abs(command.steering_rad - steering_rad_) < steering_tolerance_rad;
+  return r4::Setpoints{}
+      .osmc(1, pwm_of(drive), direction_of(drive))
+      .dhb12(1, steered ? 0 : pwm_of(turn), direction_of(turn));
+}

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The vehicle: what is connected to which channel, how it is controlled, and where it is. Without I/O and clock, so that
+// a test drives it as the program does.
+//
+//     OSMC 1    the motor of the rear axle, which turns encoder 1
+//     DHB1A     the linear actuator of the steering; forward steers to the left
+//     AINSTEER  the actuator's potentiometer
+//     relay 1   the motors' supply, in series with the dead-man's handle; without it the parking brake holds
+//     US 1      looks forward
+#pragma once
+
+#include <optional>
+#include <r4link/control/kinematics.hpp>
+#include <r4link/control/loop.hpp>
+#include <r4link/control/odometry.hpp>
+#include <r4link/control/pid.hpp>
+#include <r4link/control/sensors.hpp>
+#include <r4link/setpoints.hpp>
+#include <r4link/state.hpp>
+
+// A mobility scooter (Shoprider Traverso). Measure yours.
+inline constexpr r4::control::Ackermann::Geometry podcar_geometry{
+    .wheelbase_m = 1.05, .track_m = 0.55, .max_steering_rad = 0.5, .max_speed_m_s = 1.2};
+inline constexpr r4::control::WheelGeometry podcar_wheel{
+    .encoder = 1, .counts_a_turn = 2000, .radius_m = 0.165};
+inline constexpr r4::control::SteeringSensor::Calibration podcar_steering{
+    .left_volts = 1, .left_rad = 0.5, .right_volts = 4, .right_rad = -0.5};
+inline constexpr const char* podcar_fields = "OSMC1,DHB1A,ENC1,AINSTEER,DMHSTA,US1";
+// The board goes safe when US 1 sees something nearer: more than it rolls in the quarter of a second until the sensor's
+// turn, and then to a standstill.
+inline constexpr int podcar_clearance_cm = 150;
+
+// What run_loop() has to look after.
+r4::control::LoopOptions podcar_loop();
+
+class Podcar {
+ public:
+  // It is there, before the first state.
+  void begin_at(const r4::control::Pose& pose) { odometry_.reset(pose); }
+  // A state has come. False if the steering sensor cannot be believed: do not drive then.
+  bool sense(const r4::State& state);
+  // What to post for this motion. After sense().
+  r4::Setpoints drive(const r4::control::Twist& wish, double dt_s);
+
+  const r4::control::Pose& pose() const { return odometry_.pose(); }
+  const r4::control::Odometry& odometry() const { return odometry_; }
+  double speed_m_s() const { return wheel_.speed_m_s(); }
+  double steering_rad() const { return steering_rad_; }
+
+ private:
+  r4::control::Ackermann car_{podcar_geometry};
+  r4::control::Wheel wheel_{podcar_wheel};
+  r4::control::SteeringSensor sensor_{podcar_steering};
+  r4::control::Odometry odometry_;
+  // 2.5 m/s at full duty, after 0.8 s; docs/control.md, Tuning.
+  r4::control::Pid speed_{{.kp = 0.9, .ki = 1.1, .feed_forward = 0.16, .rate = 2}};
+  // The actuator is an integrator, so proportional is enough.
+  r4::control::Pid steering_{{.kp = 30, .rate = 20}};
+  double steering_rad_ = 0;
+};

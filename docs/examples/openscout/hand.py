@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Somebody drives: by the keyboard, or by a gamepad as the kernel has it (evdev, /dev/input/event*)."""
+import fcntl
+import os
+import select
+import struct
+import sys
+import termios
+import time
+import tty
+from typing import Protocol
+
+from r4link import control
+from scout import ARM_REST, Wish
+
+SPEED = 0.5  # m/s
+TURN = 1.5  # rad/s
+ARM_STEP = 20  # microseconds a key
+HOLD = 0.7  # a key that is held is repeated by the terminal, the first time after half a second
+
+
+class Hand(Protocol):
+    ended: bool  # it wants no more, or is gone
+    stop: bool  # an emergency stop was asked for
+
+    def wish(self) -> Wish: ...
+
+
+class Keyboard:
+    """w s a d drive, as long as a key is held; u j, i k, o l move the arm; space stops; q ends."""
+    KEYS = {'w': control.Twist(SPEED), 's': control.Twist(-SPEED), 'a': control.Twist(0, TURN),
+            'd': control.Twist(0, -TURN)}
+    ARM = {'u': (0, 1), 'j': (0, -1), 'i': (1, 1), 'k': (1, -1), 'o': (2, 1), 'l': (2, -1)}
+
+    def __init__(self) -> None:
+        self.ended = self.stop = False
+        self._arm = list(ARM_REST)
+        self._twist = control.Twist(0)
+        self._until = 0.0
+        self._before = termios.tcgetattr(sys.stdin) if sys.stdin.isatty() else None
+        if self._before:
+            tty.setcbreak(sys.stdin)
+
+    def close(self) -> None:
+        if self._before:
+            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
+
+    def wish(self) -> Wish:
+        while not self.ended and select.select([sys.stdin], [], [], 0)[0]:
+            key = os.read(sys.stdin.fileno(), 1).decode(errors='replace')
+            self.ended = self.ended or key in ('', 'q')
+            self.stop = self.stop or key == ' '
+            if key in self.ARM:
+                joint, way = self.ARM[key]
+                self._arm[joint] = max(600, min(2400, self._arm[joint] + way * ARM_STEP))
+            else:
+                self._twist, self._until = self.KEYS.get(key, control.Twist(0)), time.monotonic() + HOLD
+        twist = self._twist if time.monotonic() < self._until else control.Twist(0)
+        return Wish(twist, (self._arm[0], self._arm[1], self._arm[2]))
+
+
+class Gamepad:
+    """The left stick drives while the right shoulder button is held; the right stick and the triggers' cross move the
+    arm; the lower button (A) stops, Start ends."""
+    EVENT = struct.Struct('llHHi')  # input_event of the kernel
+    EV_KEY, EV_ABS = 1, 3
+    ABS_X, ABS_Y, ABS_RX, ABS_RY, ABS_HAT0Y = 0, 1, 3, 4, 17
+    SHOULDER, LOWER, START = 0x137, 0x130, 0x13B
+
+    def __init__(self, path: str) -> None:
+        self.ended = self.stop = False
+        self._arm = [float(each) for each in ARM_REST]
+        self._axes: dict[int, float] = {}
+        self._held = False
+        self._last = time.monotonic()
+        self._file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+        self._ranges = {axis: self._range(axis) for axis in (self.ABS_X, self.ABS_Y, self.ABS_RX, self.ABS_RY,
+                                                             self.ABS_HAT0Y)}
+
+    def close(self) -> None:
+        os.close(self._file)
+
+    def _range(self, axis: int) -> tuple[int, int]:
+        try:
+            told = fcntl.ioctl(self._file, 0x80184540 + axis, bytes(24))  # EVIOCGABS
+        except OSError:
+            return (-1, 1) if axis == self.ABS_HAT0Y else (-32768, 32767)
+        _, low, high, *_ = struct.unpack('6i', told)
+        return low, max(high, low + 1)
+
+    def _take(self, kind: int, code: int, value: int) -> None:
+        if kind == self.EV_ABS and code in self._ranges:
+            low, high = self._ranges[code]
+            share = max(-1.0, min(1.0, 2 * (value - low) / (high - low) - 1))
+            self._axes[code] = share if abs(share) > 0.1 else 0.0  # a stick never rests at 0 quite
+        elif kind == self.EV_KEY:
+            self._held = value != 0 if code == self.SHOULDER else self._held
+            self.stop = self.stop or (code == self.LOWER and value == 1)
+            self.ended = self.ended or (code == self.START and value == 1)
+
+    def wish(self) -> Wish:
+        try:
+            while len(event := os.read(self._file, self.EVENT.size)) == self.EVENT.size:
+                self._take(*self.EVENT.unpack(event)[2:])
+            self.ended = True  # its end
+        except BlockingIOError:
+            pass
+        except OSError:  # unplugged
+            self.ended = True
+        now = time.monotonic()
+        passed, self._last = min(0.1, now - self._last), now
+        for joint, axis in enumerate((self.ABS_RX, self.ABS_RY, self.ABS_HAT0Y)):
+            self._arm[joint] = max(600, min(2400, self._arm[joint] + 600 * passed * self._axes.get(axis, 0)))
+        drives = self._held and not self.ended
+        twist = control.Twist(-SPEED * self._axes.get(self.ABS_Y, 0), -TURN * self._axes.get(self.ABS_X, 0))
+        return Wish(twist if drives else control.Twist(0), (round(self._arm[0]), round(self._arm[1]), round(self._arm[2])))

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The robot: what is connected to which channel, how it is controlled, and where it is. No I/O, no clock.
+
+    DHB1A DHB1B DHB2A DHB2B    wheel motors front left, rear left, front right, rear right; ENC1 to ENC4 in the same order
+    SERVO1 to SERVO3           the arm
+    US1                        looks forward
+"""
+from typing import NamedTuple
+
+import r4link
+from r4link import control
+
+TRACK = 0.30  # m
+SLIP = 1.6  # on the floor it was measured on
+WHEEL_RADIUS = 0.06
+COUNTS_A_TURN = 1200
+TOP_SPEED = 1.2  # of a wheel at full duty
+FIELDS = 'DHB1A,DHB1B,DHB2A,DHB2B,SERVO1POS,SERVO2POS,SERVO3POS,ENC1,ENC2,ENC3,ENC4,US1'
+CLEARANCE_CM = 60  # nearer than this, the board goes safe
+ENCODERS = (1, 2, 3, 4)
+ARM_REST = (1500, 1500, 1500)
+
+# What run_loop() looks after.
+NEEDS = 'ENC1,ENC2,ENC3,ENC4'
+STANDSTILL = [control.Standstill(encoder=n, channel=n, drive='dhb12', pwm=1500, time=1.0) for n in ENCODERS]
+
+
+def motors(duties: tuple[float, ...]) -> r4link.Setpoints:
+    out = r4link.Setpoints()
+    for channel, duty in enumerate(duties, 1):
+        out.dhb12(channel, round(abs(duty) * 4095), r4link.FORWARD if duty >= 0 else r4link.REVERSE)
+    return out
+
+
+REST = motors((0, 0, 0, 0))  # the arm stays where it is: a servo without a pulse would let it fall
+
+
+class Wish(NamedTuple):
+    twist: control.Twist
+    arm: tuple[int, int, int] = ARM_REST  # microseconds
+
+
+class Scout:
+    def __init__(self) -> None:
+        self._drive = control.FourWheelDrive(TRACK, SLIP, max_wheel=TOP_SPEED * 0.9)
+        self._wheels = [control.Wheel(n, COUNTS_A_TURN, WHEEL_RADIUS) for n in ENCODERS]
+        # Each wheel by itself: 1.2 m/s at full duty, after 0.15 s (docs/control.md, Tuning).
+        self._pids = [control.Pid(0.6, 4.0, feed_forward=0.5, rate=10) for _ in ENCODERS]
+        self.odometry = control.Odometry(turn_per_rad=0.02)  # it slips to turn
+
+    def sense(self, state: r4link.State) -> None:
+        rolled = control.WheelSpeeds(*(wheel.advance(state) for wheel in self._wheels))
+        step = self._drive.twist(rolled)  # of ways instead of speeds, it is a way and an angle
+        self.odometry.advance(step.forward, step.turn)
+
+    @property
+    def speed(self) -> float:
+        return self._drive.twist(control.WheelSpeeds(*(wheel.speed for wheel in self._wheels))).forward
+
+    def duties(self, twist: control.Twist, dt: float) -> tuple[float, ...]:
+        """Of the four motors, -1 to 1; after sense()."""
+        if twist == (0, 0) and all(abs(wheel.speed) < 0.02 for wheel in self._wheels):
+            for pid in self._pids:
+                pid.reset()
+            return (0.0,) * 4
+        return tuple(pid.step(to, wheel.speed, dt)
+                     for pid, to, wheel in zip(self._pids, self._drive.wheels(twist), self._wheels))
+
+    def command(self, wish: Wish, dt: float) -> r4link.Setpoints:
+        out = motors(self.duties(wish.twist, dt))
+        for channel, pulse in enumerate(wish.arm, 1):
+            out.servo(channel, pulse)
+        return out
