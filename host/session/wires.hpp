@@ -26,6 +26,7 @@
 #include <string>
 #include <vector>
 
+#include "../../protocol/link/host_link.hpp"
 #include "../../protocol/link/packet_tracker.hpp"
 #include "../../protocol/messages/message.hpp"
 #include "../measurement/identity_question.hpp"
@@ -63,9 +64,9 @@ class Wires {
     known,
     restarted,  // it has begun again
   };
-  // `fits`: that T is of the boot that the session knows.
-  Answer on_identity(std::size_t wire, const Identity& identity, std::uint32_t t_ms, bool fits,
-                     Time now);
+  // `link`: what the session knows of the board's clock.
+  Answer on_identity(std::size_t wire, const Identity& identity, std::uint32_t t_ms,
+                     const HostLink& link, Time now);
 
   // Those to which the session may speak: none before it has begun.
   WireSet speaking() const { return begun_ ? known() : WireSet{0}; }
