@@ -47,12 +47,12 @@ const char* to_text(Attack::Kind kind) {
 }
 
 // Stops and questions are obeyed from anyone, and anyone may watch.
-void Attacker::keep(std::vector<Heard>& list, int host, std::string_view bytes) {
+void Attacker::keep(std::vector<Heard>& list, Origin from, std::string_view bytes) {
   Datagram datagram;
   if (!read_datagram(Text(bytes), datagram) || asks_to_stop(datagram)) return;
   if (datagram.command().name() == Text("Q") || asks_to_watch(datagram)) return;
   if (list.size() == memory) return;
-  list.push_back({std::string(bytes), host});
+  list.push_back({std::string(bytes), from});
 }
 
 void Attacker::on_board(std::string_view bytes) {
@@ -82,7 +82,8 @@ Attack Attacker::next(Random& random) {
   // The newest as likely as all others together.
   const Heard* const heard =
       random.chance(0.5) ? &heard_of.back() : &heard_of[random.below(heard_of.size())];
-  if (random.chance(0.7)) attack.host = heard->host;
+  attack.like = heard->from;
+  if (random.chance(0.7)) attack.host = heard->from.host;
   constexpr const char* drive = "P:-7777,1000,1";
   std::string fields;
   switch (attack.kind) {

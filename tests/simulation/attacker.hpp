@@ -13,6 +13,13 @@
 
 namespace r4::simulation {
 
+// Whose it is, and when it was sent.
+struct Origin {
+  int host = -1;
+  std::uint32_t incarnation = 0;
+  std::uint64_t at_us = 0;
+};
+
 struct Attack {
   enum class Kind : std::uint8_t {
     replay,     // what the board has received before, be it just now
@@ -27,6 +34,7 @@ struct Attack {
   Kind kind = Kind::replay;
   std::string bytes;  // empty: it knows nothing to send
   int host = -1;      // whose address it takes; -1: one of its own
+  Origin like;        // of what it has heard and sends again, changed or not
 };
 const char* to_text(Attack::Kind kind);
 
@@ -34,17 +42,17 @@ class Attacker {
  public:
   // What goes over the network: a host sends, the board has received what a host sent, the board
   // sends.
-  void on_sent(int host, std::string_view bytes) { keep(sent_, host, bytes); }
-  void on_received(int host, std::string_view bytes) { keep(received_, host, bytes); }
+  void on_sent(Origin from, std::string_view bytes) { keep(sent_, from, bytes); }
+  void on_received(Origin from, std::string_view bytes) { keep(received_, from, bytes); }
   void on_board(std::string_view bytes);
   Attack next(Random& random);
 
  private:
   struct Heard {
     std::string bytes;
-    int host;
+    Origin from;
   };
-  static void keep(std::vector<Heard>& list, int host, std::string_view bytes);
+  static void keep(std::vector<Heard>& list, Origin from, std::string_view bytes);
   std::string own(const std::string& field, const Heard& like, Random& random) const;
 
   // What needs a signature.

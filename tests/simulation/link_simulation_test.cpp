@@ -58,17 +58,26 @@ void add(Report& sum, const Report& report) {
   sum.standstills += report.standstills;
   sum.waited += report.waited;
   sum.waited_to_feed += report.waited_to_feed;
+  sum.joins += report.joins;
+  sum.wire_losses += report.wire_losses;
+  sum.failovers += report.failovers;
+  sum.timed_on_good += report.timed_on_good;
+  sum.copies += report.copies;
+  sum.strangers += report.strangers;
+  sum.relayed += report.relayed;
+  sum.replayed += report.replayed;
+  sum.served_us += report.served_us;
   sum.worst_silence_us = std::max(sum.worst_silence_us, report.worst_silence_us);
 }
 
-void replay(World::Loop loop) {
-  const Report report = World(from_environment("R4_SEED", 0), true, loop).run();
+void replay(World::Beside beside) {
+  const Report report = World(from_environment("R4_SEED", 0), true, beside).run();
   fmt::print("{}", tail_of(report, report.trace.size()));
   EXPECT_EQ(report.violation, "");
 }
 
 // Runs the schedules of the seeds from 1; no promise may be broken.
-Report run_all(std::uint64_t schedules, World::Loop loop) {
+Report run_all(std::uint64_t schedules, World::Beside beside) {
   std::atomic<std::uint64_t> next{1};
   std::mutex mutex;
   Report sum;
@@ -77,7 +86,7 @@ Report run_all(std::uint64_t schedules, World::Loop loop) {
     Report mine;
     std::vector<std::uint64_t> mine_failing;
     for (std::uint64_t seed = next++; seed <= schedules; seed = next++) {
-      const Report report = World(seed, false, loop).run();
+      const Report report = World(seed, false, beside).run();
       add(mine, report);
       if (!report.violation.empty()) mine_failing.push_back(seed);
     }
@@ -109,7 +118,7 @@ Report run_all(std::uint64_t schedules, World::Loop loop) {
       sum.waited_to_feed, static_cast<double>(sum.worst_silence_us) / 1000);
   std::sort(failing.begin(), failing.end());
   for (std::size_t i = 0; i < failing.size() && i < 3; ++i) {
-    const Report report = World(failing[i], true, loop).run();
+    const Report report = World(failing[i], true, beside).run();
     ADD_FAILURE() << report.violation << "\nreplay: R4_SEED=" << failing[i]
                   << " with this test; the end of its trace:\n"
                   << tail_of(report, 60);
@@ -139,16 +148,40 @@ Report run_all(std::uint64_t schedules, World::Loop loop) {
 }
 
 TEST(LinkSimulation, KeepsEveryPromiseUnderRandomFaults) {
-  if (std::getenv("R4_SEED") != nullptr) return replay(World::Loop::turns);
-  run_all(from_environment("R4_SCHEDULES", 100'000), World::Loop::turns);
+  if (std::getenv("R4_SEED") != nullptr) return replay(World::Beside::nothing);
+  run_all(from_environment("R4_SCHEDULES", 100'000), World::Beside::nothing);
 }
 
 TEST(LinkSimulation, KeepsEveryPromiseOfABoardThatStandsStillNowAndThen) {
-  if (std::getenv("R4_SEED") != nullptr) return replay(World::Loop::stands_still);
+  if (std::getenv("R4_SEED") != nullptr) return replay(World::Beside::standstills);
   const std::uint64_t schedules = from_environment("R4_SCHEDULES", 20'000);
-  const Report sum = run_all(schedules, World::Loop::stands_still);
+  const Report sum = run_all(schedules, World::Beside::standstills);
   EXPECT_GT(sum.standstills, schedules);
   EXPECT_GT(sum.waited_to_feed, schedules);
+}
+
+TEST(LinkSimulation, KeepsEveryPromiseOverSeveralWires) {
+  if (std::getenv("R4_SEED") != nullptr) return replay(World::Beside::wires);
+  const std::uint64_t schedules = from_environment("R4_SCHEDULES", 100'000);
+  const Report sum = run_all(schedules, World::Beside::wires);
+  fmt::print(
+      "several wires: {} joined, {} lost while the session went on, {} failovers; {} copies at "
+      "hosts; {} "
+      "commands of {} ended beside a wire that met the limits throughout, in {:.1f} h with one; {} "
+      "heartbeats "
+      "of strangers, {} datagrams relayed by an attacker, {} of an hour ago\n",
+      sum.joins, sum.wire_losses, sum.failovers, sum.copies, sum.timed_on_good,
+      sum.confirmed + sum.refused + sum.timed_out, static_cast<double>(sum.served_us) / 3.6e9,
+      sum.strangers, sum.relayed, sum.replayed);
+  EXPECT_GT(sum.joins, schedules);
+  EXPECT_GT(sum.wire_losses, schedules / 5);
+  EXPECT_GT(sum.failovers, schedules / 10);
+  EXPECT_GT(sum.timed_on_good, schedules);
+  EXPECT_GT(sum.copies, 10 * schedules);
+  EXPECT_GT(sum.strangers, schedules);
+  EXPECT_GT(sum.relayed, schedules / 10);
+  EXPECT_GT(sum.replayed, schedules);
+  EXPECT_GT(sum.served_us, schedules * 500'000);
 }
 
 TEST(LinkSimulation, RepeatsASeedToTheSameTrace) {
@@ -157,8 +190,9 @@ TEST(LinkSimulation, RepeatsASeedToTheSameTrace) {
     const Report second = World(seed, true).run();
     ASSERT_EQ(first.trace, second.trace) << "seed " << seed;
     ASSERT_EQ(first.trace_hash, World(seed, false).run().trace_hash) << "seed " << seed;
-    ASSERT_EQ(World(seed, true, World::Loop::stands_still).run().trace,
-              World(seed, true, World::Loop::stands_still).run().trace);
+    for (const World::Beside beside : {World::Beside::standstills, World::Beside::wires}) {
+      ASSERT_EQ(World(seed, true, beside).run().trace, World(seed, true, beside).run().trace);
+    }
   }
 }
 

@@ -120,6 +120,58 @@ void Schedule::add_drift(Random& random) {
       static_cast<std::int64_t>(random.below(2 * most_drift_ppm + 1)) - most_drift_ppm;
 }
 
+const ChannelFaults& Schedule::faults(int wire, bool toward_board) const {
+  if (wire == 0) return toward_board ? to_board : to_host;
+  const WireFaults& faults = more_wires[static_cast<std::size_t>(wire) - 1];
+  return toward_board ? faults.to_board : faults.to_host;
+}
+
+// Mostly one of them is good as long as nothing happens to it; what happens to wires happens to one of them, or to
+// several at once.
+void Schedule::add_wires(Random& random) {
+  for (std::uint64_t n = random.between(1, 2); n != 0; --n) {
+    more_wires.push_back({random_faults(random), random_faults(random)});
+  }
+  const auto count = static_cast<std::uint64_t>(wires());
+  for (std::uint64_t n = random.chance(0.8) ? random.between(1, count) : 0; n != 0; --n) {
+    const std::uint64_t good = random.below(count);
+    for (ChannelFaults* const faults : {good == 0 ? &to_board : &more_wires[good - 1].to_board,
+                                        good == 0 ? &to_host : &more_wires[good - 1].to_host}) {
+      static constexpr std::uint32_t delays_us[] = {100, 1'000, 10'000, 50'000};
+      static constexpr std::uint32_t jitters_us[] = {0, 2'000, 20'000};
+      static constexpr double shares[] = {0, 0.2};
+      *faults = ChannelFaults();
+      faults->delay_us = random.pick(delays_us);
+      faults->jitter_us = random.pick(jitters_us);
+      faults->duplicate = random.pick(shares);
+    }
+  }
+  one_port = random.chance(0.4);
+  const auto some_wires = [&] {
+    if (random.chance(0.2)) return static_cast<std::uint8_t>(random.between(1, 7));
+    return static_cast<std::uint8_t>(1U << random.below(count));
+  };
+  for (Happening& happening : happenings) happening.wires = some_wires();
+  static constexpr Happening::Kind kinds[] = {
+      Happening::Kind::cut,    Happening::Kind::cut,   Happening::Kind::cut_to_board,
+      Happening::Kind::unplug, Happening::Kind::stall, Happening::Kind::cut_to_host};
+  for (std::uint64_t n = random.below(5); n != 0; --n) {
+    Happening happening;
+    happening.kind = random.pick(kinds);
+    happening.at_us = random.below(duration_us);
+    happening.length_us = random.between(1'000, 2'500'000);
+    happening.host = 0;
+    happening.wires = some_wires();
+    happenings.push_back(happening);
+  }
+  attacked_wire = static_cast<int>(random.below(count));
+  if (random.chance(0.2)) replaying_wire = static_cast<int>(random.below(count));
+  reboots_after_capture = random.chance(0.3);
+  if (random.chance(0.3)) {
+    stranger_interval_us = static_cast<std::uint32_t>(random.between(10'000, 200'000));
+  }
+}
+
 const char* to_text(Happening::Kind kind) {
   switch (kind) {
     case Happening::Kind::cut:
@@ -152,6 +204,10 @@ const char* to_text(Happening::Kind kind) {
       return "watch";
     case Happening::Kind::watcher_stops:
       return "watcher_stops";
+    case Happening::Kind::unplug:
+      return "unplug";
+    case Happening::Kind::stall:
+      return "stall";
   }
   return "?";
 }

@@ -18,19 +18,27 @@ constexpr std::int64_t million = 1'000'000;
 
 }  // namespace
 
-World::World(std::uint64_t seed, bool keep_trace, Loop loop)
-    : random_(seed), loop_random_(~seed), keep_trace_(keep_trace) {
+World::World(std::uint64_t seed, bool keep_trace, Beside beside)
+    : random_(seed), loop_random_(~seed), keep_trace_(keep_trace), wires_random_(seed + 0x311e5) {
   schedule_ = Schedule::random(random_);
   Random watch_random(seed + 0x5eed);  // what else happens in a schedule without them is as it was
   if (watch_random.chance(0.3)) schedule_.add_watchers(watch_random);
-  if (loop == Loop::stands_still) schedule_.add_standstills(loop_random_);
+  if (beside == Beside::standstills) schedule_.add_standstills(loop_random_);
+  if (beside == Beside::wires) {
+    schedule_.add_wires(wires_random_);
+    if (wires_random_.chance(0.15)) schedule_.add_standstills(loop_random_);
+  }
   Random drift_random(seed + 0xd21f7);
   schedule_.add_drift(drift_random);
   report_.seed = seed;
 }
 
 World::World(std::uint64_t seed, Schedule schedule, bool keep_trace)
-    : random_(seed), loop_random_(~seed), schedule_(std::move(schedule)), keep_trace_(keep_trace) {
+    : random_(seed),
+      loop_random_(~seed),
+      schedule_(std::move(schedule)),
+      keep_trace_(keep_trace),
+      wires_random_(seed + 0x311e5) {
   report_.seed = seed;
 }
 
@@ -40,66 +48,88 @@ Report World::run() {
   report_.trace_hash = 0xcbf29ce484222325U;
   commands_.emplace_back();  // 0 is where steppers stand: no command is named so
   boot_board();
+  if (schedule_.replaying_wire >= 0) record();
   for (int i = 0; i < schedule_.hosts; ++i) {
-    hosts_.push_back(std::make_unique<Host>(*this, i));
-    hosts_.back()->peer = next_peer_++;
+    if (hosts_.size() == static_cast<std::size_t>(i)) {
+      hosts_.push_back(std::make_unique<Host>(*this, i));
+      place(*hosts_.back());
+    }
     start_host(i);
-    at(random_.below(300'000), Event::Kind::command, i);
+    at(start_us_ + random_.below(300'000), Event::Kind::command, i);
   }
   hosts_.push_back(std::make_unique<Host>(*this, schedule_.hosts));
   hosts_.back()->stopper = true;
-  hosts_.back()->peer = schedule_.shared_place ? hosts_.front()->peer : next_peer_++;
+  place(*hosts_.back());
   add_watchers();
   for (std::size_t i = 0; i < schedule_.happenings.size(); ++i) {
-    at(schedule_.happenings[i].at_us, Event::Kind::happening, static_cast<int>(i));
+    at(start_us_ + schedule_.happenings[i].at_us, Event::Kind::happening, static_cast<int>(i));
   }
-  if (schedule_.attack_interval_us != 0) at(0, Event::Kind::attack, 0);
+  if (schedule_.attack_interval_us != 0) at(start_us_, Event::Kind::attack, 0);
   for (std::size_t i = 0; i < schedule_.standstills.size(); ++i) {
-    at(schedule_.standstills[i].at_us, Event::Kind::standstill, static_cast<int>(i));
+    at(start_us_ + schedule_.standstills[i].at_us, Event::Kind::standstill, static_cast<int>(i));
   }
-  while (!events_.empty() && report_.violation.empty()) {
-    const Event event = events_.top();
-    if (event.at_us > schedule_.duration_us) break;
-    events_.pop();
-    now_us_ = event.at_us;
-    switch (event.kind) {
-      case Event::Kind::packet:
-        deliver(event.index);
-        break;
-      case Event::Kind::board:
-        if (event.generation == board_generation_ && !standing_) poll_board();
-        break;
-      case Event::Kind::standstill:
-        stand_still(schedule_.standstills[static_cast<std::size_t>(event.index)]);
-        break;
-      case Event::Kind::go_on:
-        if (event.generation == board_generation_) go_on();
-        break;
-      case Event::Kind::host:
-        if (event.generation == hosts_[static_cast<std::size_t>(event.index)]->poll_generation) {
-          poll_host(event.index);
-        }
-        break;
-      case Event::Kind::command:
-        issue_command(event.index);
-        break;
-      case Event::Kind::happening:
-        happen(schedule_.happenings[static_cast<std::size_t>(event.index)], false);
-        break;
-      case Event::Kind::attack:
-        attack();
-        break;
-      case Event::Kind::forge:
-        forge_lease();
-        break;
-      case Event::Kind::over:
-        happen(schedule_.happenings[static_cast<std::size_t>(event.index)], true);
-        break;
-    }
-    check_silence();
+  if (schedule_.stranger_interval_us != 0) at(start_us_, Event::Kind::stranger, 0);
+  run_until(start_us_ + schedule_.duration_us);
+  for (const auto& host : hosts_) {
+    if (host->alive) host->count_copies();
   }
   over_ = true;
   return std::move(report_);
+}
+
+void World::run_until(std::uint64_t end_us) {
+  while (!events_.empty() && report_.violation.empty()) {
+    const Event event = events_.top();
+    if (event.at_us > end_us) break;
+    events_.pop();
+    now_us_ = event.at_us;
+    handle(event);
+    check_silence();
+    if (several() && !recording_) check_wires();
+  }
+}
+
+void World::handle(const Event& event) {
+  switch (event.kind) {
+    case Event::Kind::packet:
+      deliver(event.index);
+      break;
+    case Event::Kind::board:
+      if (event.generation == board_generation_ && !standing_) poll_board();
+      break;
+    case Event::Kind::standstill:
+      stand_still(schedule_.standstills[static_cast<std::size_t>(event.index)]);
+      break;
+    case Event::Kind::go_on:
+      if (event.generation == board_generation_) go_on();
+      break;
+    case Event::Kind::host:
+      if (event.generation == hosts_[static_cast<std::size_t>(event.index)]->poll_generation) {
+        poll_host(event.index);
+      }
+      break;
+    case Event::Kind::command:
+      issue_command(event.index);
+      break;
+    case Event::Kind::happening:
+      happen(schedule_.happenings[static_cast<std::size_t>(event.index)], false);
+      break;
+    case Event::Kind::attack:
+      attack();
+      break;
+    case Event::Kind::forge:
+      forge_lease();
+      break;
+    case Event::Kind::over:
+      happen(schedule_.happenings[static_cast<std::size_t>(event.index)], true);
+      break;
+    case Event::Kind::stranger:
+      stranger();
+      break;
+    case Event::Kind::replay:
+      replay(event.index);
+      break;
+  }
 }
 
 void World::at(std::uint64_t time_us, Event::Kind kind, int index, std::uint32_t generation) {

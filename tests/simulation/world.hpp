@@ -24,6 +24,14 @@
 //              board is safe.
 //              Who watches sends no heartbeat and no command: what it feeds or drives breaks silence or
 //              intact
+//   joined     a place becomes a wire of a session only by what that session's host has sent, and nothing that
+//              was recorded an hour ago feeds
+//   wires      a wire meets the limits while it loses, damages and holds back nothing, takes at most 100 ms each
+//              way, is not disturbed, and both ends go on. One that both ends have used for a second and that
+//              meets them is used on; while there is one, there is no false trip, no command times out for
+//              which there was time on that wire alone, and the newest state is never older than the newest
+//              that it has brought, nor than two periods and its delay. Beside one, another that meets them
+//              for 2.5 s is used
 #pragma once
 
 #include <compare>
@@ -77,13 +85,24 @@ struct Report {
   std::uint32_t waited = 0;            // datagrams that arrived meanwhile
   std::uint32_t waited_to_feed = 0;    // … and fed
   std::uint64_t worst_silence_us = 0;  // last heartbeat in to outputs safe
+  // Of several wires.
+  std::uint32_t joins = 0;
+  std::uint32_t wire_losses = 0;    // of sessions that went on
+  std::uint32_t failovers = 0;      // a wire that served was disturbed, and another served on
+  std::uint32_t timed_on_good = 0;  // commands that ended while a wire met the limits all the time
+  std::uint64_t copies = 0;         // that came to hosts
+  std::uint32_t strangers = 0;      // heartbeats of strangers
+  std::uint32_t relayed = 0;        // datagrams that an attacker repeated at once
+  std::uint32_t replayed = 0;       // datagrams of an hour ago
+  std::uint64_t served_us = 0;      // for so long there was a wire that met the limits
 };
 
-class World : public firmware::Hal, public firmware::Port, public firmware::Observer {
+class World : public firmware::Hal, public firmware::Observer {
  public:
-  enum class Loop : std::uint8_t { turns, stands_still };  // now and then
+  // What is beside the usual: the board's loop stands still now and then, or there are several wires.
+  enum class Beside : std::uint8_t { nothing, standstills, wires };
 
-  World(std::uint64_t seed, bool keep_trace, Loop loop = Loop::turns);
+  World(std::uint64_t seed, bool keep_trace, Beside beside = Beside::nothing);
   // The same with a given scenario.
   World(std::uint64_t seed, Schedule schedule, bool keep_trace);
   ~World();
@@ -106,6 +125,8 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
       forge,
       standstill,
       go_on,
+      stranger,
+      replay,
     } kind;
     int index;
     std::uint32_t generation;
@@ -116,12 +137,17 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   struct Packet {
     bool to_board = false;
     int host = 0;
+    int place = 0;                  // which of the host's
+    std::uint8_t port = 0;          // the board's
     std::uint32_t peer = 0;         // the host's address when it was sent
     std::uint32_t incarnation = 0;  // of the host when it was sent
     bool intact = true;
     bool heartbeat = false;
-    std::uint32_t pnum = 0;  // of a heartbeat
-    int command = -1;        // index in commands_
+    bool recorded = false;  // an hour ago
+    bool stop = false;
+    std::uint32_t pnum = 0;
+    int command = -1;  // index in commands_
+    int command_count = 0;
     std::uint64_t sent_us = 0;
     std::uint64_t arrived_us = 0;
     std::string bytes;
@@ -158,16 +184,16 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   void sample(firmware::Inputs& inputs) override;
   void zero(int) override {}
   bool clear_fault() override { return true; }
-  // firmware::Port
-  void send(Text datagram, Priority priority, std::uint32_t peer) override;
-  std::size_t max_size() const override { return max_datagram; }
   // firmware::Observer
   void on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason reason) override;
   void on_outputs(std::uint32_t t_ms, const firmware::Outputs& outputs) override;
   void on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command) override;
   void on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code) override;
   void on_rejected(std::uint32_t t_ms, Verdict verdict) override;
+  void on_wire(std::uint32_t t_ms, Source wire, bool joined) override;
 
+  void run_until(std::uint64_t end_us);
+  void handle(const Event& event);
   void at(std::uint64_t time_us, Event::Kind kind, int index, std::uint32_t generation = 0);
   std::uint32_t board_ms() const;
   // Since its boot: when its clock began, or begins, to show that.
@@ -179,6 +205,8 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   // world_board.cpp, with what is overridden above
   void boot_board();
   void poll_board();
+  void send(std::uint8_t port, Text datagram, Priority priority, std::uint32_t peer);
+  void lose_port(std::uint8_t port);
   void stand_still(const Standstill& standstill);
   void go_on();
   void check_silence();
@@ -205,12 +233,34 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   static bool asks_to_watch(std::string_view bytes);
   void on_told(std::uint32_t peer, const Datagram& datagram);
   void on_lease(std::uint32_t peer, std::string_view bytes);
-  void check_stream(std::uint32_t peer, const Datagram& datagram);
+  void check_stream(std::uint8_t port, std::uint32_t peer, const Datagram& datagram);
   // world_channel.cpp
-  void transfer(bool to_board, int host, std::uint32_t peer, std::string_view bytes);
+  void transfer(bool to_board, int host, int place, std::string_view bytes);
+  int take_slot();
+  void describe(Packet& packet);
   void deliver(int slot);
   void hand_over(int slot);
   void release(int slot);
+  // world_wires.cpp
+  void place(Host& host);
+  std::uint8_t port_of(int wire) const {
+    return static_cast<std::uint8_t>(schedule_.one_port ? 0 : wire);
+  }
+  // For so long both ends have used a wire before it must not be given up.
+  static constexpr std::uint64_t settled_us = 1'000'000;
+  bool several() const { return schedule_.wires() > 1; }
+  bool meets_limits(int wire) const;
+  bool serves_since(std::uint64_t at_us) const;
+  bool is_time_enough() const;
+  void check_wires();
+  void check_age(int wire);
+  void on_told_state(int wire, std::string_view bytes);
+  void disturb(int wire, Happening::Kind kind, std::uint64_t until_us);
+  void unplug(const Happening& happening, bool over);
+  void record();
+  void replay(int index);
+  void relay(const Attack& attack, std::uint8_t port, std::uint32_t peer);
+  void stranger();
 
   Random random_;
   Random loop_random_;  // of the standstills: what else happens is as without them
@@ -234,7 +284,7 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   bool live_ = false;
   bool was_lost_ = false;
   bool standing_ = false;  // the loop
-  bool port_lost_meanwhile_ = false;
+  std::set<std::uint8_t> ports_lost_meanwhile_;
   std::vector<int> waiting_;  // packets that arrived meanwhile
   std::map<std::uint32_t, std::uint64_t>
       heard_us_;                         // when the newest intact heartbeat of a peer came
@@ -242,7 +292,7 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   std::uint64_t heartbeat_sent_us_ = 0;  // when the newest to arrive was sent
   std::vector<Fed> fed_;                 // by this boot of the board
   Process delivering_;                   // whose packet the board has before it
-  std::uint32_t delivering_peer_ = 0;
+  Source delivering_at_;
   Process stop_from_;  // of the last stop executed
   std::uint32_t stop_pnum_ = 0;
   int newest_executed_ = -1;
@@ -262,17 +312,53 @@ class World : public firmware::Hal, public firmware::Port, public firmware::Obse
   std::set<std::uint32_t>
       streamed_;  // where states went at streamed_us_, besides to the host in control
   std::uint64_t streamed_us_ = 0;
-  std::uint64_t owner_streamed_us_ = 0;
+  std::map<std::uint32_t, std::uint64_t> owner_streamed_us_;
   std::uint32_t newest_heartbeat_t_ = 0;
 
   std::vector<std::unique_ptr<Host>> hosts_;
   std::vector<Sent> commands_;
   Attacker attacker_;
   bool attacking_ = false;
-  Attack::Kind attack_kind_ = Attack::Kind::count;
   std::set<std::uint32_t> attacker_stops_;  // their numbers
-  std::uint64_t cut_to_board_until_us_ = 0;
-  std::uint64_t cut_to_host_until_us_ = 0;
+
+  struct BoardPort final : firmware::Port {
+    BoardPort(World& w, std::uint8_t n) : world(w), number(n) {}
+    void send(Text datagram, Priority priority, std::uint32_t peer) override {
+      world.send(number, datagram, priority, peer);
+    }
+    std::size_t max_size() const override { return max_datagram; }
+    World& world;
+    std::uint8_t number;
+  };
+  static constexpr int most_wires = 3;
+  BoardPort ports_[most_wires] = {{*this, 0}, {*this, 1}, {*this, 2}};
+  struct Wire {
+    std::uint64_t cut_to_board_until_us = 0;
+    std::uint64_t cut_to_host_until_us = 0;
+    std::uint64_t stalled_until_us = 0;
+    std::uint64_t unplugged_until_us = 0;
+    // Of the first host.
+    std::uint64_t disturbed_until_us = 0;
+    bool fine = false;  // meets the limits
+    std::uint64_t fine_since_us = 0;
+    bool serves = false;  // … and both ends use it
+    std::uint64_t serves_since_us = 0;
+    bool brought_state = false;
+    std::uint32_t newest_t = 0;  // of the states that it has brought
+  };
+  Wire wires_[most_wires];
+  Random wires_random_;
+  std::uint64_t start_us_ = 0;  // of the schedule: an hour after what was recorded
+  std::uint64_t looked_us_ = 0;
+  struct Recorded {
+    std::uint64_t at_us;
+    bool to_board;
+    std::string bytes;
+  };
+  bool recording_ = false;
+  std::vector<Recorded> recorded_;
+  std::map<std::uint32_t, int> whose_;  // a place: a host's
+  std::set<std::uint32_t> relayed_from_;
 };
 
 }  // namespace r4::simulation

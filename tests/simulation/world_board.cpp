@@ -26,7 +26,9 @@ void World::boot_board() {
   outputs_ = firmware::Outputs();
   live_ = stopped_ = false;
   fed_.clear();
-  standing_ = port_lost_meanwhile_ = false;
+  for (Wire& wire : wires_) wire.brought_state = wire.serves = false;
+  standing_ = false;
+  ports_lost_meanwhile_.clear();
   for (const int slot : waiting_) release(slot);
   waiting_.clear();
   firmware::Application::Config config;
@@ -42,7 +44,8 @@ void World::boot_board() {
     config.chance = chance;
   }
   board_ = std::make_unique<firmware::Application>(*this, config, this);
-  board_->add_port(*this);
+  for (int i = 0; i < (schedule_.one_port ? 1 : schedule_.wires()); ++i)
+    board_->add_port(ports_[i]);
   note("board boots");
   board_->start(board_ms());
   poll_board();
@@ -76,9 +79,21 @@ void World::go_on() {
     hand_over(slot);
     if (loop_random_.chance(0.1)) board_->poll(board_ms());
   }
-  if (std::exchange(port_lost_meanwhile_, false)) board_->port_down(0, board_ms());
-  if (loop_random_.chance(0.5)) board_->drained(0);
+  for (const std::uint8_t port : std::exchange(ports_lost_meanwhile_, {})) {
+    board_->port_down(port, board_ms());
+  }
+  if (loop_random_.chance(0.5)) {
+    for (int w = 0; w < schedule_.wires(); ++w) board_->drained(port_of(w));
+  }
   poll_board();
+}
+
+void World::lose_port(std::uint8_t port) {
+  if (standing_) {
+    ports_lost_meanwhile_.insert(port);
+  } else {
+    board_->port_down(port, board_ms());
+  }
 }
 
 void World::sample(firmware::Inputs& inputs) {
@@ -131,7 +146,7 @@ void World::make_safe() {
 void World::check_silence() {
   if (!live_ || standing_) return;
   const std::uint64_t timeout_us = board_->settings().timeout_ms * 1000U;
-  std::uint64_t heard_us = 0;
+  std::uint64_t heard_us = heard_us_[board_->link().owner().peer];
   for (int i = 0; i < board_->wires().size(); ++i) {
     heard_us = std::max(heard_us, heard_us_[board_->wires()[i].peer]);
   }
@@ -145,26 +160,35 @@ void World::check_silence() {
   }
 }
 
-void World::send(Text datagram, Priority priority, std::uint32_t peer) {
+void World::send(std::uint8_t port, Text datagram, Priority priority, std::uint32_t peer) {
   const std::string_view bytes(datagram.data(), datagram.size());
   Datagram sent;
   if (schedule_.watchers != 0 && read_datagram(datagram, sent)) {
-    if (priority == Priority::state) check_stream(peer, sent);
+    if (priority == Priority::state) check_stream(port, peer, sent);
     if (kind_of(sent) == MessageKind::nack) on_told(peer, sent);
     if (kind_of(sent) == MessageKind::board_heartbeat) {
       newest_heartbeat_t_ = static_cast<std::uint32_t>(sent.time_ms());
     }
   }
   for (int i = 0; i < static_cast<int>(hosts_.size()); ++i) {
-    const std::uint32_t at_host = hosts_[static_cast<std::size_t>(i)]->peer;
-    const bool hears_all = !hosts_[static_cast<std::size_t>(i)]->watcher;
-    if (peer == everyone ? hears_all : peer == at_host) transfer(false, i, at_host, bytes);
+    const Host& host = *hosts_[static_cast<std::size_t>(i)];
+    for (std::size_t at = 0; at < host.places.size(); ++at) {
+      if (port_of(host.places[at].wire) != port) continue;
+      if (peer == everyone ? !host.watcher : peer == host.places[at].peer) {
+        transfer(false, i, static_cast<int>(at), bytes);
+      }
+    }
   }
 }
 
 void World::on_state(std::uint32_t, firmware::BoardState state, SafeReason reason) {
   note(fmt::format("board {} {}", firmware::to_text(state), r4::to_text(reason)));
-  if (state == firmware::BoardState::safe && reason == SafeReason::link) ++report_.link_losses;
+  if (state == firmware::BoardState::safe && reason == SafeReason::link) {
+    ++report_.link_losses;
+    if (serves_since(now_us_ - std::min(now_us_, settled_us))) {
+      violate("wires: the link was lost beside a good wire");
+    }
+  }
   was_lost_ = state == firmware::BoardState::safe && reason == SafeReason::link;
 }
 
@@ -175,9 +199,7 @@ void World::on_outputs(std::uint32_t, const firmware::Outputs& outputs) {
 void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& command) {
   note(fmt::format("board executes {} kind {} value {}", pnum, static_cast<int>(command.kind),
                    command.value));
-  // What a host has sent just now may come by another place: then that is a wire, and it is executed once.
-  const bool relayed = attacking_ && attack_kind_ == Attack::Kind::replay;
-  if (attacking_ && !relayed && command.kind != CommandKind::stop) violate("forged: executed");
+  if (attacking_ && command.kind != CommandKind::stop) return violate("forged: executed");
   if (command.kind == CommandKind::stop) {
     ++report_.stops;
     on_stop(pnum);
@@ -221,7 +243,7 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
       violate(fmt::format("order: command {} executed after {}", id, newest_executed_));
     }
   }
-  if (!relayed && stop_from_ == delivering_ && newer(stop_pnum_, pnum)) {
+  if (stop_from_ == delivering_ && newer(stop_pnum_, pnum)) {
     violate(fmt::format("order: command {} is older than the stop before it", id));
   }
   const std::uint64_t limit_us = 2U * board_->settings().timeout_ms * 1000U + 250'000 + slack_us;
@@ -240,8 +262,7 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
       break;
     }
   }
-  const bool of_a_wire = board_->wires().has(Source{0, delivering_peer_});
-  if (!relayed && (!of_a_wire || delivering_.host != sent.host)) {
+  if (!board_->wires().has(delivering_at_) || delivering_.host != sent.host) {
     violate(fmt::format("intact: command {} is of a host that does not control", id));
   }
   newest_executed_ = std::max(newest_executed_, id);

@@ -10,60 +10,75 @@
 
 namespace r4::simulation {
 
-void World::transfer(bool to_board, int host, std::uint32_t peer, std::string_view bytes) {
+int World::take_slot() {
+  if (free_packets_.empty()) {
+    packets_.emplace_back();
+    return static_cast<int>(packets_.size()) - 1;
+  }
+  const int slot = free_packets_.back();
+  free_packets_.pop_back();
+  return slot;
+}
+
+// What it is, of one that a host sends.
+void World::describe(Packet& packet) {
+  Datagram datagram;
+  if (!read_datagram(Text(packet.bytes), datagram)) return;
+  packet.heartbeat = kind_of(datagram) == MessageKind::host_heartbeat;
+  packet.stop = asks_to_stop(datagram);
+  packet.pnum = datagram.pnum();
+  packet.command_count = datagram.command_count();
+  Command command;
+  if (packet.command_count >= 1 && parse_command(datagram.command(), command) == Refusal::none &&
+      command.kind == CommandKind::stepper) {
+    packet.command = command.value;
+  }
+}
+
+void World::transfer(bool to_board, int host, int place, std::string_view bytes) {
+  const Host::Place at_host =
+      hosts_[static_cast<std::size_t>(host)]->places[static_cast<std::size_t>(place)];
+  const std::uint32_t incarnation = hosts_[static_cast<std::size_t>(host)]->incarnation;
+  if (recording_ && at_host.wire == schedule_.replaying_wire) {
+    recorded_.push_back({now_us_, to_board, std::string(bytes)});
+  }
   if (to_board) {
-    attacker_.on_sent(host, bytes);
+    attacker_.on_sent({host, incarnation, now_us_}, bytes);
   } else {
     attacker_.on_board(bytes);
   }
   mix(bytes.data(), bytes.size());
-  if (keep_trace_) show(fmt::format("{} host {} {}", to_board ? "->" : "<-", host, bytes));
-  const ChannelFaults& faults = to_board ? schedule_.to_board : schedule_.to_host;
-  Datagram datagram;
-  bool heartbeat = false;
-  std::uint32_t pnum = 0;
-  int command = -1;
-  if (to_board && read_datagram(Text(bytes), datagram)) {
-    heartbeat = kind_of(datagram) == MessageKind::host_heartbeat;
-    pnum = datagram.pnum();
-    if (heartbeat) hosts_[static_cast<std::size_t>(host)]->heartbeat_pnum = pnum;
-    if (asks_to_stop(datagram)) hosts_[static_cast<std::size_t>(host)]->stop_pnum = pnum;
-    Command parsed;
-    if (datagram.command_count() >= 1 &&
-        parse_command(datagram.command(), parsed) == Refusal::none &&
-        parsed.kind == CommandKind::stepper) {
-      command = parsed.value;
-      Sent& sent = commands_[static_cast<std::size_t>(command)];
-      sent.transmitted_us = now_us_;
-      if (sent.group && datagram.command_count() == 1 && !std::exchange(sent.apart, true)) {
-        ++report_.groups_apart;
-      }
+  if (keep_trace_) {
+    const std::string over = several() ? fmt::format(" over {}", at_host.wire) : "";
+    show(fmt::format("{} host {}{} {}", to_board ? "->" : "<-", host, over, bytes));
+  }
+  const ChannelFaults& faults = schedule_.faults(at_host.wire, to_board);
+  Packet sent;
+  sent.to_board = to_board;
+  sent.host = host;
+  sent.place = place;
+  sent.port = port_of(at_host.wire);
+  sent.peer = at_host.peer;
+  sent.incarnation = incarnation;
+  sent.sent_us = now_us_;
+  sent.bytes = bytes;
+  if (to_board) describe(sent);
+  if (sent.heartbeat) hosts_[static_cast<std::size_t>(host)]->heartbeat_pnum = sent.pnum;
+  if (sent.command >= 0) {
+    Sent& command = commands_[static_cast<std::size_t>(sent.command)];
+    command.transmitted_us = now_us_;
+    if (command.group && sent.command_count == 1 && !std::exchange(command.apart, true)) {
+      ++report_.groups_apart;
     }
   }
-  const std::uint64_t cut_until = to_board ? cut_to_board_until_us_ : cut_to_host_until_us_;
-  if (now_us_ < cut_until) return;
+  const Wire& wire = wires_[at_host.wire];
+  if (now_us_ < (to_board ? wire.cut_to_board_until_us : wire.cut_to_host_until_us)) return;
   const int copies = 1 + (random_.chance(faults.duplicate) ? 1 : 0);
   for (int i = 0; i < copies; ++i) {
     if (random_.chance(faults.loss)) continue;
-    int slot;
-    if (free_packets_.empty()) {
-      slot = static_cast<int>(packets_.size());
-      packets_.emplace_back();
-    } else {
-      slot = free_packets_.back();
-      free_packets_.pop_back();
-    }
+    const int slot = take_slot();
     Packet& packet = packets_[static_cast<std::size_t>(slot)];
-    packet.to_board = to_board;
-    packet.host = host;
-    packet.peer = peer;
-    packet.incarnation = hosts_[static_cast<std::size_t>(host)]->incarnation;
-    packet.heartbeat = heartbeat;
-    packet.pnum = pnum;
-    packet.command = command;
-    packet.sent_us = now_us_;
-    packet.intact = true;
-    packet.bytes.assign(bytes);
+    packet = sent;
     if (random_.chance(faults.corrupt)) {
       packet.intact = false;
       switch (random_.below(4)) {
@@ -91,7 +106,7 @@ void World::transfer(bool to_board, int host, std::uint32_t peer, std::string_vi
     }
     std::uint64_t delay = faults.delay_us + random_.below(faults.jitter_us + 1);
     if (random_.chance(faults.straggle)) delay += random_.below(faults.straggle_us + 1);
-    at(now_us_ + delay, Event::Kind::packet, slot);
+    at(std::max(now_us_, wire.stalled_until_us) + delay, Event::Kind::packet, slot);
   }
 }
 
@@ -116,24 +131,38 @@ void World::hand_over(int slot) {
   if (packet.to_board) {
     if (keep_trace_) show(fmt::format("board receives {}", packet.bytes));
     const std::uint32_t peer = packet.peer;
+    const Source source{packet.port, peer};
     const std::uint32_t fed_before = board_->link().fed_ms();
+    const bool fed_owner = board_->link().has_owner();
     delivering_ = {packet.host, packet.incarnation};
-    delivering_peer_ = peer;
+    delivering_at_ = source;
     on_lease(peer, packet.bytes);
-    board_->receive(0, peer, Text(packet.bytes), board_ms());
+    board_->receive(packet.port, peer, Text(packet.bytes), board_ms());
     if (packet.command >= 0) check_whole(packet.command);
-    attacker_.on_received(packet.host, packet.bytes);
+    attacker_.on_received({packet.host, packet.incarnation, packet.sent_us}, packet.bytes);
     const BoardLink& link = board_->link();
     if (asks_to_watch(packet.bytes) && link.fed_ms() != fed_before) violate("watch: a W feeds");
-    if (packet.intact && packet.heartbeat && link.owner().peer == peer &&
+    if (packet.recorded && link.fed_ms() != fed_before) {
+      // Only a board that has no host believes who has heard nothing of it yet, and executes nothing then.
+      if (fed_owner && !fed_.empty() && fed_.back().from.host >= 0)
+        violate("joined: a recorded one feeds");
+      fed_.push_back({{-1, 0}, 0, now_us_});
+    }
+    if (packet.intact && packet.heartbeat && board_->wires().has(source) &&
         link.fed_ms() != fed_before) {
       fed_.push_back({delivering_, packet.pnum, packet.arrived_us});
       report_.waited_to_feed += packet.arrived_us != now_us_;
     }
   } else {
     Host& host = *hosts_[static_cast<std::size_t>(packet.host)];
-    if (host.alive && host.peer == packet.peer) {
-      host.session->receive(0, packet.bytes, host.time());
+    const Host::Place& place = host.places[static_cast<std::size_t>(packet.place)];
+    const bool plugged = now_us_ >= wires_[place.wire].unplugged_until_us;
+    if (host.alive && plugged && place.peer == packet.peer) {
+      if (several() && packet.host == 0 && packet.intact && !packet.recorded &&
+          packet.sent_us >= boot_us_) {
+        on_told_state(place.wire, packet.bytes);
+      }
+      host.session->receive(static_cast<std::size_t>(packet.place), packet.bytes, host.time());
       poll_host(packet.host);
     }
   }

@@ -8,6 +8,13 @@
 
 namespace r4::simulation {
 
+namespace {
+
+// So long what was signed may come by several wires.
+constexpr std::uint64_t relayed_us = (Authentication::age_limit_ms + 2) * 1000;
+
+}  // namespace
+
 void World::happen(const Happening& happening, bool over) {
   const int index = static_cast<int>(&happening - schedule_.happenings.data());
   note(fmt::format("{} {} {}", to_text(happening.kind), over ? "over" : "begins", happening.host));
@@ -18,14 +25,17 @@ void World::happen(const Happening& happening, bool over) {
       watches ? watcher(happening.host) : *hosts_[static_cast<std::size_t>(happening.host)];
   switch (happening.kind) {
     case Happening::Kind::cut:
-      cut_to_board_until_us_ = cut_to_host_until_us_ = end_us;
-      return;
     case Happening::Kind::cut_to_board:
-      cut_to_board_until_us_ = end_us;
-      return;
     case Happening::Kind::cut_to_host:
-      cut_to_host_until_us_ = end_us;
+    case Happening::Kind::stall:
+    case Happening::Kind::port_down:
+      for (int w = 0; w < schedule_.wires(); ++w) {
+        if ((happening.wires >> w & 1U) != 0) disturb(w, happening.kind, end_us);
+      }
       return;
+    case Happening::Kind::unplug:
+      unplug(happening, over);
+      break;
     case Happening::Kind::host_restart:
       if (over) {
         if (!host.alive) start_host(happening.host);
@@ -41,13 +51,6 @@ void World::happen(const Happening& happening, bool over) {
       break;
     case Happening::Kind::board_restart:
       boot_board();
-      return;
-    case Happening::Kind::port_down:
-      if (standing_) {
-        port_lost_meanwhile_ = true;
-      } else {
-        board_->port_down(0, board_ms());
-      }
       return;
     case Happening::Kind::stop:
       if (!host.alive) return;
@@ -67,8 +70,12 @@ void World::happen(const Happening& happening, bool over) {
       break;
     case Happening::Kind::address:
       if (over && random_.chance(0.5)) return;
-      std::swap(host.peer, host.other_peer);
-      if (host.peer == 0) host.peer = next_peer_++;
+      for (Host::Place& place : host.places) {
+        if ((happening.wires >> place.wire & 1U) == 0) continue;
+        disturb(place.wire, happening.kind, now_us_);
+        std::swap(place.peer, place.other_peer);
+        if (place.peer == 0) whose_[place.peer = next_peer_++] = host.index;
+      }
       break;
     case Happening::Kind::leave:
       if (over) {
@@ -127,33 +134,35 @@ void World::attack() {
   if (attack.bytes.empty() || standing_) return;
   ++report_.attacks;
   note(fmt::format("attacker at {}: {} {}", attack.host, to_text(attack.kind), attack.bytes));
+  constexpr std::uint32_t own_address = 0xFFFF;
+  const std::uint8_t port = port_of(schedule_.attacked_wire);
+  std::uint32_t address = own_address;
+  if (attack.host >= 0) {
+    const Host::Place* const place =
+        hosts_[static_cast<std::size_t>(attack.host)]->on(schedule_.attacked_wire);
+    if (place != nullptr) address = place->peer;
+  }
   const BoardLink& link = board_->link();
   const BoardLinkState state = link.state();
-  const std::uint32_t fed_ms = link.fed_ms();
-  const std::uint32_t rejected = report_.rejected;
   board_->poll(board_ms());  // so that silence is not taken for the attacker's doing
   const bool lost = link.state() != state;
+  if (attack.kind == Attack::Kind::replay && now_us_ - attack.like.at_us <= relayed_us) {
+    return relay(attack, port, address);
+  }
+  const std::uint32_t fed_ms = link.fed_ms();
   const Source owner = link.owner();
+  const std::uint32_t rejected = report_.rejected;
   attacking_ = true;
-  attack_kind_ = attack.kind;
   delivering_ = {attack.host, 0};  // no process has that incarnation
-  constexpr std::uint32_t own_address = 0xFFFF;
-  const std::uint32_t address =
-      attack.host < 0 ? own_address : hosts_[static_cast<std::size_t>(attack.host)]->peer;
-  if (attack.kind == Attack::Kind::replay)
-    heard_us_[address] = now_us_;  // it may be the host's word
-  board_->receive(0, address, Text(attack.bytes), board_ms());
+  delivering_at_ = Source{port, address};
+  board_->receive(port, address, Text(attack.bytes), board_ms());
   attacking_ = false;
   Datagram datagram;
-  // A copy of what was signed just now may be let through: that it changes nothing is what counts.
-  const bool needs_signature =
-      attack.kind != Attack::Kind::stop && attack.kind != Attack::Kind::replay;
-  if (needs_signature && read_datagram(Text(attack.bytes), datagram) &&
+  if (attack.kind != Attack::Kind::stop && read_datagram(Text(attack.bytes), datagram) &&
       report_.rejected == rejected) {
     violate(fmt::format("forged: a {} was taken for signed", to_text(attack.kind)));
   }
-  const bool fed = link.fed_ms() != fed_ms && attack.kind != Attack::Kind::replay;
-  if (fed || link.owner() != owner || (!lost && link.state() != state)) {
+  if (link.fed_ms() != fed_ms || link.owner() != owner || (!lost && link.state() != state)) {
     violate(fmt::format("forged: a {} changed the link", to_text(attack.kind)));
   }
 }

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <string_view>
+#include <vector>
 
 #include "tests/support/signing.hpp"
 #include "world.hpp"
@@ -35,23 +36,37 @@ struct World::Host final : Session::Handler {
       options.key = key_of_host(index);
       options.clock_start = std::chrono::hours{24} - Time{clock_offset_us};
     }
-    session = std::make_unique<Session>(*this, options, first,
-                                        watcher ? BoardRole::watch : BoardRole::control);
+    session = std::make_unique<Session>(
+        *this, options, first, watcher ? BoardRole::watch : BoardRole::control, places.size());
+    for (std::size_t i = 0; world.several() && i < places.size(); ++i) {
+      const Wire& wire = world.wires_[places[i].wire];
+      session->on_transport(i, world.now_us_ >= wire.unplugged_until_us, time());
+    }
     tickets.clear();
   }
   void die() {
+    count_copies();
     alive = false;
     died_us = world.now_us_;
     session.reset();
   }
+  void count_copies() {
+    for (std::size_t i = 0; places.size() > 1 && i < places.size(); ++i) {
+      world.report_.copies += session->wire(i, time()).copies;
+    }
+  }
   Time time() const { return Time{static_cast<std::int64_t>(world.now_us_ + clock_offset_us)}; }
 
-  SendResult transmit(std::size_t, std::string_view bytes, Priority priority) override {
+  SendResult transmit(std::size_t wire, std::string_view bytes, Priority priority) override {
+    Datagram datagram;
+    if (priority == Priority::stop && read_datagram(Text(bytes), datagram))
+      stop_pnum = datagram.pnum();
     // Who shares a place with the host in control sends nothing but a stop (docs/can.md).
     if (stopper && world.schedule_.shared_place && priority != Priority::stop) {
       return SendResult::busy;
     }
-    world.transfer(true, index, peer, bytes);
+    if (world.now_us_ < world.wires_[places[wire].wire].unplugged_until_us) return SendResult::down;
+    world.transfer(true, index, static_cast<int>(wire), bytes);
     return SendResult::sent;
   }
   void on_state(const ReceivedState& state, const Datagram&) override {
@@ -90,9 +105,20 @@ struct World::Host final : Session::Handler {
   bool frozen = false;
   bool stopper = false;
   bool watcher = false;
-  bool leaving = false;    // ends at its next turn: its stop is confirmed, or its farewell over
-  std::uint32_t peer = 0;  // its address
-  std::uint32_t other_peer = 0;  // the one before or next; 0: none yet
+  bool leaving = false;  // ends at its next turn: its stop is confirmed, or its farewell over
+  struct Place {
+    int wire = 0;
+    std::uint32_t peer = 0;        // its address there
+    std::uint32_t other_peer = 0;  // the one before or next; 0: none yet
+  };
+  std::vector<Place> places;  // the wires of its session
+  // None: where it is not.
+  const Place* on(int wire) const {
+    for (const Place& each : places) {
+      if (each.wire == wire) return &each;
+    }
+    return nullptr;
+  }
   std::uint64_t died_us = 0;
   std::uint64_t clock_offset_us = 0;
   std::uint64_t next_poll_us = 0;

@@ -39,6 +39,7 @@ void World::Host::on_result(Ticket ticket, const CommandResult& result) {
   Sent& sent = world.commands_[static_cast<std::size_t>(id)];
   world.note(fmt::format("host {} command {} outcome {} {}", index, id,
                          static_cast<int>(result.outcome), static_cast<int>(result.code)));
+  world.report_.timed_on_good += index == 0 && world.serves_since(sent.asked_us);
   switch (result.outcome) {
     case Outcome::confirmed:
       ++world.report_.confirmed;
@@ -56,6 +57,9 @@ void World::Host::on_result(Ticket ticket, const CommandResult& result) {
       break;
     case Outcome::timed_out:
       ++world.report_.timed_out;
+      if (index == 0 && world.serves_since(sent.asked_us) && world.is_time_enough()) {
+        world.violate(fmt::format("wires: command {} timed out beside a good wire", id));
+      }
       break;
     case Outcome::none:
     case Outcome::cancelled:

@@ -30,9 +30,9 @@ void World::add_watchers() {
   for (int i = 0; i < schedule_.watchers; ++i) {
     hosts_.push_back(std::make_unique<Host>(*this, schedule_.hosts + 1 + i));
     hosts_.back()->watcher = true;
-    hosts_.back()->peer = random_.chance(0.1) ? hosts_.front()->peer : next_peer_++;
+    place(*hosts_.back());
   }
-  if (schedule_.forge_interval_us != 0) at(0, Event::Kind::forge, 0);
+  if (schedule_.forge_interval_us != 0) at(start_us_, Event::Kind::forge, 0);
 }
 
 void World::watch(Host& watcher, bool over) {
@@ -51,7 +51,10 @@ void World::forge_lease() {
   if (standing_) return;
   const std::uint32_t own_address = 0xFFFF;
   std::uint32_t victim = random_.chance(0.3) ? own_address : bystander;
-  if (random_.chance(0.5)) victim = hosts_[random_.below(hosts_.size())]->peer;
+  if (random_.chance(0.5)) {
+    const Host::Place* const place = hosts_[random_.below(hosts_.size())]->on(0);
+    if (place != nullptr) victim = place->peer;
+  }
   std::uint32_t echo = 0;
   auto pnum = static_cast<std::uint32_t>(random_.next());
   switch (random_.below(6)) {
@@ -67,7 +70,7 @@ void World::forge_lease() {
       echo = newest_token_ + (random_.chance(0.5) ? 1U : 0U);
       break;
     case 4:  // what would keep the link of the host in control
-      victim = hosts_.front()->peer;
+      victim = hosts_.front()->on(0)->peer;
       echo = newest_heartbeat_t_;
       pnum = hosts_.front()->heartbeat_pnum + 1;
       break;
@@ -119,21 +122,23 @@ void World::on_lease(std::uint32_t peer, std::string_view bytes) {
   lease.renewed_us = now_us_;
 }
 
-void World::check_stream(std::uint32_t peer, const Datagram& datagram) {
+void World::check_stream(std::uint8_t port, std::uint32_t peer, const Datagram& datagram) {
   const BoardLink& link = board_->link();
   State state;
   read_state(datagram, state);
   if (!link.has_owner() && state.safe == SafeReason::none) {
     violate("watch: a state tells nothing of being safe, and there is no host");
   }
-  if (link.has_owner() && link.owner().peer == peer) {
-    const bool twice = owner_streamed_us_ == now_us_ && schedule_.standstills.empty();
+  if (link.has_owner() && board_->wires().has(Source{port, peer})) {
+    std::uint64_t& streamed_us = owner_streamed_us_[peer];
+    const bool twice = streamed_us == now_us_ && schedule_.standstills.empty();
     if (twice) violate("watch: the host in control is sent a state twice");
-    owner_streamed_us_ = now_us_;
+    streamed_us = now_us_;
     return;
   }
   // A place that brought a heartbeat of the host's that was signed just now: it is taken for another wire.
   if (link.has_owner() && board_->wires().has(Source{0, peer})) return;
+  if (link.has_owner() && peer == everyone) return;  // another port
   if (streamed_us_ != now_us_) streamed_.clear();
   streamed_us_ = now_us_;
   streamed_.insert(peer);

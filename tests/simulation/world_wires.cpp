@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Several wires: where the hosts are on them, what happens to them, what comes over them that no host has sent now,
+// and the promises about them.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "tests/support/datagrams.hpp"
+#include "world_host.hpp"
+
+namespace r4::simulation {
+
+namespace {
+
+constexpr std::uint32_t most_delay_us = 100'000;
+constexpr std::uint64_t used_again_us = 2'500'000;
+constexpr std::uint64_t hour_us = 3'600'000'000;
+constexpr std::uint64_t recorded_us = 1'000'000;
+constexpr std::uint32_t stranger_address = 0xFFFD;
+
+bool is_fine(const ChannelFaults& faults) {
+  return faults.loss == 0 && faults.corrupt == 0 && faults.straggle == 0 &&
+         faults.delay_us + faults.jitter_us <= most_delay_us;
+}
+
+}  // namespace
+
+// The first host is on all wires, others on some.
+void World::place(Host& host) {
+  const bool bus_stopper = host.stopper && schedule_.shared_place;
+  for (int w = 0; w < schedule_.wires(); ++w) {
+    if (several() && host.index != 0 && (bus_stopper ? w != 0 : wires_random_.chance(0.4)))
+      continue;
+    Host::Place place;
+    place.wire = w;
+    const bool shared = w == 0 && (bus_stopper || (host.watcher && random_.chance(0.1)));
+    place.peer = shared ? hosts_.front()->places.front().peer : next_peer_++;
+    whose_.emplace(place.peer, host.index);
+    host.places.push_back(place);
+  }
+  if (!host.places.empty()) return;
+  Host::Place place;
+  place.wire = schedule_.wires() - 1;
+  place.peer = next_peer_++;
+  whose_.emplace(place.peer, host.index);
+  host.places.push_back(place);
+}
+
+// --- what happens to a wire
+
+void World::disturb(int index, Happening::Kind kind, std::uint64_t end_us) {
+  Wire& wire = wires_[index];
+  std::uint64_t until_us = end_us;
+  switch (kind) {
+    case Happening::Kind::cut:
+    case Happening::Kind::unplug:
+      wire.cut_to_board_until_us = wire.cut_to_host_until_us = end_us;
+      break;
+    case Happening::Kind::cut_to_board:
+      wire.cut_to_board_until_us = end_us;
+      break;
+    case Happening::Kind::cut_to_host:
+      wire.cut_to_host_until_us = end_us;
+      break;
+    case Happening::Kind::stall:
+      wire.stalled_until_us = end_us;
+      until_us += most_delay_us;
+      break;
+    default:
+      until_us = now_us_ + most_delay_us;
+      break;
+  }
+  wire.disturbed_until_us = std::max(wire.disturbed_until_us, until_us);
+  const bool served = std::exchange(wire.serves, false);
+  wire.fine = false;
+  if (served && serves_since(now_us_ - std::min(now_us_, settled_us))) ++report_.failovers;
+  if (kind != Happening::Kind::port_down) return;
+  for (int w = 0; w < schedule_.wires(); ++w) {
+    if (w != index && port_of(w) == port_of(index)) disturb(w, Happening::Kind::address, now_us_);
+  }
+  lose_port(port_of(index));
+}
+
+void World::unplug(const Happening& happening, bool over) {
+  int index = 0;
+  while (index + 1 < schedule_.wires() && (happening.wires >> index & 1U) == 0) ++index;
+  Wire& wire = wires_[index];
+  if (!over) {
+    const std::uint64_t end_us = now_us_ + happening.length_us;
+    wire.unplugged_until_us = std::max(wire.unplugged_until_us, end_us);
+    disturb(index, happening.kind, wire.unplugged_until_us);
+    if (!schedule_.one_port) lose_port(port_of(index));
+  } else if (now_us_ < wire.unplugged_until_us) {
+    return;
+  }
+  for (const auto& host : hosts_) {
+    const Host::Place* const place = host->on(index);
+    if (!host->alive || place == nullptr) continue;
+    const auto at = static_cast<std::size_t>(place - host->places.data());
+    host->session->on_transport(at, over, host->time());
+    poll_host(host->index);
+  }
+}
+
+// --- what nobody has sent now
+
+void World::record() {
+  hosts_.push_back(std::make_unique<Host>(*this, 0));
+  place(*hosts_.back());
+  recording_ = true;
+  start_host(0);
+  at(random_.below(100'000), Event::Kind::command, 0);
+  run_until(recorded_us);
+  recording_ = false;
+  hosts_.front()->die();
+  events_ = {};
+  packets_.clear();
+  free_packets_.clear();
+  now_us_ += hour_us;
+  start_us_ = now_us_;
+  if (schedule_.reboots_after_capture) {
+    boot_board();
+  } else {
+    ++board_generation_;
+    poll_board();
+  }
+  for (int times = 0; times < 2; ++times) {
+    const std::uint64_t from_us = start_us_ + wires_random_.below(schedule_.duration_us);
+    for (std::size_t i = 0; i < recorded_.size(); ++i) {
+      at(from_us + recorded_[i].at_us, Event::Kind::replay, static_cast<int>(i));
+    }
+  }
+}
+
+void World::replay(int index) {
+  const Recorded& recorded = recorded_[static_cast<std::size_t>(index)];
+  const Host& host = *hosts_.front();
+  const Host::Place& place = *host.on(schedule_.replaying_wire);
+  ++report_.replayed;
+  const int slot = take_slot();
+  Packet& packet = packets_[static_cast<std::size_t>(slot)];
+  packet = Packet();
+  packet.to_board = recorded.to_board;
+  packet.place = static_cast<int>(&place - host.places.data());
+  packet.port = port_of(place.wire);
+  packet.peer = place.peer;
+  packet.recorded = true;
+  packet.bytes = recorded.bytes;
+  note(fmt::format("replay to {}", recorded.to_board ? "board" : "host"));
+  deliver(slot);
+}
+
+// What an attacker repeats at once is as if the host's own came by another wire.
+void World::relay(const Attack& attack, std::uint8_t port, std::uint32_t peer) {
+  ++report_.relayed;
+  relayed_from_.insert(peer);
+  const int slot = take_slot();
+  Packet& packet = packets_[static_cast<std::size_t>(slot)];
+  packet = Packet();
+  packet.to_board = true;
+  packet.host = attack.like.host;
+  packet.incarnation = attack.like.incarnation;
+  packet.port = port;
+  packet.peer = peer;
+  packet.sent_us = attack.like.at_us;
+  packet.bytes = attack.bytes;
+  describe(packet);
+  deliver(slot);
+}
+
+// It has a number that the host may use next, but no T that the board has told.
+void World::stranger() {
+  at(now_us_ + random_.between(1, 2ULL * schedule_.stranger_interval_us), Event::Kind::stranger, 0);
+  if (standing_) return;
+  board_->poll(board_ms());
+  const BoardLink& link = board_->link();
+  if (!link.has_owner()) return;
+  ++report_.strangers;
+  const std::uint32_t pnum =
+      hosts_.front()->heartbeat_pnum + static_cast<std::uint32_t>(wires_random_.below(40));
+  const std::uint32_t t_ms =
+      board_ms() + static_cast<std::uint32_t>(wires_random_.between(60'000, 1'000'000'000));
+  const std::string bytes = test::with_crc(fmt::format("H:ROS2-R4;PNum:{};T:{};", pnum, t_ms));
+  note("stranger " + bytes);
+  const std::uint32_t fed_ms = link.fed_ms();
+  const Source source{port_of(schedule_.attacked_wire), stranger_address};
+  delivering_ = {-1, 0};
+  delivering_at_ = source;
+  board_->receive(source.port, source.peer, Text(bytes), board_ms());
+  if (link.fed_ms() != fed_ms || board_->wires().has(source)) violate("joined: a stranger");
+}
+
+// --- the promises
+
+void World::on_wire(std::uint32_t, Source wire, bool joined) {
+  note(fmt::format("wire {} {}/{}", joined ? "joins" : "leaves", wire.port, wire.peer));
+  if (!joined) {
+    ++report_.wire_losses;
+    // What it brought has fed, though it is the session's no longer.
+    std::uint64_t& heard_us = heard_us_[board_->wires()[0].peer];
+    heard_us = std::max(heard_us, heard_us_[wire.peer]);
+    return;
+  }
+  ++report_.joins;
+  const std::uint32_t owner = board_->link().owner().peer;
+  if (relayed_from_.count(wire.peer) != 0 || relayed_from_.count(owner) != 0) return;
+  const auto its = whose_.find(wire.peer);
+  const auto owners = whose_.find(owner);
+  if (its == whose_.end() || owners == whose_.end() || its->second != owners->second) {
+    violate(fmt::format("joined: place {} is not of the session's host", wire.peer));
+  }
+}
+
+bool World::meets_limits(int index) const {
+  return is_fine(schedule_.faults(index, true)) && is_fine(schedule_.faults(index, false)) &&
+         now_us_ >= wires_[index].disturbed_until_us && index != schedule_.replaying_wire;
+}
+
+bool World::serves_since(std::uint64_t at_us) const {
+  return std::any_of(std::begin(wires_), std::end(wires_), [at_us](const Wire& wire) {
+    return wire.serves && wire.serves_since_us <= at_us;
+  });
+}
+
+// For a command: there, the state that shows it or the answer to a copy, and back.
+bool World::is_time_enough() const {
+  return schedule_.command_timeout_us >=
+         2 * most_delay_us + 150'000 + schedule_.settings.state_period_ms() * 1000U;
+}
+
+void World::check_wires() {
+  const Host& host = *hosts_.front();
+  const bool in_control = !standing_ && host.alive && !host.frozen && !host.leaving &&
+                          host.farewell_ticket == 0 && controls({0, host.incarnation});
+  if (serves_since(now_us_)) report_.served_us += now_us_ - looked_us_;
+  looked_us_ = now_us_;
+  // Another one that both ends have used so long that this one has had its time to join.
+  const bool alone = !serves_since(now_us_ - std::min(now_us_, used_again_us));
+  const bool crowded = schedule_.stranger_interval_us != 0 || schedule_.attack_interval_us != 0;
+  for (int w = 0; w < schedule_.wires(); ++w) {
+    Wire& wire = wires_[w];
+    if (!in_control || !meets_limits(w)) {
+      wire.fine = wire.serves = false;
+      continue;
+    }
+    if (!wire.fine) wire.fine_since_us = now_us_;
+    wire.fine = true;
+    const auto at = static_cast<std::size_t>(w);
+    const bool serves = board_->wires().has({port_of(w), host.places[at].peer}) &&
+                        host.session->wire_state(at) == WireState::carrying;
+    const bool settled = wire.serves && now_us_ - wire.serves_since_us >= settled_us;
+    if (settled && !serves) violate(fmt::format("wires: wire {} is good and given up", w));
+    if (serves && !wire.serves) wire.serves_since_us = now_us_;
+    wire.serves = serves;
+    if (settled && serves) check_age(w);
+    if (!serves && !alone && !crowded && now_us_ - wire.fine_since_us >= used_again_us) {
+      violate(fmt::format("wires: wire {} is good and not used", w));
+    }
+  }
+}
+
+void World::on_told_state(int index, std::string_view bytes) {
+  Datagram datagram;
+  if (!read_datagram(Text(bytes), datagram) || kind_of(datagram) != MessageKind::state) return;
+  Wire& wire = wires_[index];
+  const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
+  if (!wire.brought_state || newer(t_ms, wire.newest_t)) wire.newest_t = t_ms;
+  wire.brought_state = true;
+}
+
+// Of the newest state that the host has.
+void World::check_age(int index) {
+  const Wire& wire = wires_[index];
+  const ReceivedState& state = hosts_.front()->session->state();
+  if (!state.any()) return violate("wires: no state beside a good wire");
+  if (wire.brought_state && newer(wire.newest_t, state.t_ms)) {
+    return violate(fmt::format("wires: the newest state is {} ms older than what wire {} brought",
+                               wire.newest_t - state.t_ms, index));
+  }
+  const ChannelFaults& faults = schedule_.faults(index, false);
+  const std::uint32_t limit_us = 2 * schedule_.settings.state_period_ms() * 1000U +
+                                 faults.delay_us + faults.jitter_us + schedule_.board_lateness_us +
+                                 5'000;
+  const std::uint32_t age_ms = board_ms() - state.t_ms;
+  if (age_ms > limit_us / 1000) {
+    violate(fmt::format("wires: the newest state is {} ms old beside good wire {}", age_ms, index));
+  }
+}
+
+}  // namespace r4::simulation
