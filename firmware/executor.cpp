@@ -76,6 +76,10 @@ Refusal carry_out(const Command& command, Setpoints& setpoints) {
     case CommandKind::leave:
     case CommandKind::identify:
     case CommandKind::watch:
+    case CommandKind::i2c_read:
+    case CommandKind::i2c_write:
+    case CommandKind::i2c_scan:
+    case CommandKind::i2c_poll:
       break;
   }
   return Refusal::none;

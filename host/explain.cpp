@@ -205,6 +205,9 @@ Words refusal_words(std::string_view command, Refusal code, const LinkStatus& li
       words.fix = sets_the_site(command) ? "send it over USB: serial:auto"
                                          : key_words(KeyTrouble::needed).fix;
       break;
+    case Refusal::full:
+      words.fix = "send it again when the transfer that is under way has ended";
+      break;
     case Refusal::none:
     case Refusal::duplicate:
       break;

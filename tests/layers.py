@@ -19,8 +19,8 @@ FRAMING = PROTOCOL | {'transports/framing', 'transports/framing/can'}
 CARRIERS = {'transports/can', 'transports/impaired', 'transports/serial', 'transports/share', 'transports/udp',
             'transports/udp/search'}
 TRANSPORTS = FRAMING | CARRIERS | {'transports'}
-FIRMWARE = FRAMING | {'firmware', 'firmware/application', 'firmware/drivers'}
-MODELS = {'firmware/ports/sim/chips', 'firmware/ports/sim/robot'}
+FIRMWARE = FRAMING | {'firmware', 'firmware/application', 'firmware/devices', 'firmware/drivers'}
+MODELS = {'firmware/ports/sim/chips', 'firmware/ports/sim/devices', 'firmware/ports/sim/robot'}
 HOST = TRANSPORTS | {'host', 'host/commands', 'host/control', 'host/measurement', 'host/recording', 'host/replay',
                      'host/session'}
 SIMULATED = HOST | FIRMWARE | MODELS | {'firmware/ports/sim'}
@@ -44,11 +44,13 @@ ALLOWED = {
     'transports/udp/search': FRAMING | {'transports'},
     'transports/udp': FRAMING | {'transports', 'transports/udp/search'},
     'firmware/drivers': PROTOCOL,
+    'firmware/devices': PROTOCOL,
     'firmware': FRAMING | {'firmware/drivers'},
-    'firmware/application': FRAMING | {'firmware'},
+    'firmware/application': FRAMING | {'firmware', 'firmware/devices'},
     'firmware/ports': FIRMWARE,
     'firmware/ports/sim/chips': PUBLIC | {'firmware/drivers'},
-    'firmware/ports/sim/robot': FIRMWARE | {'firmware/ports/sim/chips'},
+    'firmware/ports/sim/devices': PUBLIC | {'firmware/devices', 'firmware/ports/sim/chips'},
+    'firmware/ports/sim/robot': FIRMWARE | {'firmware/ports/sim/chips', 'firmware/ports/sim/devices'},
     'firmware/ports/sim': FIRMWARE | MODELS | TRANSPORTS,
     'firmware/ports/m7/chip': FIRMWARE,
     'firmware/ports/m7/links': FIRMWARE | {'firmware/ports', 'firmware/ports/m7/chip'},
@@ -56,7 +58,9 @@ ALLOWED = {
                                               'firmware/ports/sim'},
     'firmware/ports/giga/chip': FIRMWARE,
     'firmware/ports/giga/links': FIRMWARE | {'firmware/ports', 'firmware/ports/giga/chip'},
-    'firmware/ports/giga': FIRMWARE | {'firmware/ports/giga/chip', 'firmware/ports/giga/links'},
+    'firmware/ports/giga/devices': FIRMWARE | {'firmware/ports/giga/chip'},
+    'firmware/ports/giga': FIRMWARE | {'firmware/ports/giga/chip', 'firmware/ports/giga/devices',
+                                       'firmware/ports/giga/links'},
     'host/bridge': HOST,
     'host/commands': TRANSPORTS,
     'host/control': PUBLIC,
@@ -93,7 +97,7 @@ EXCEPTIONS = {
 }
 # What a room may not include although it is in a room that it may.
 FORBIDDEN = {room: {'transports/registry.hpp'} for room in CARRIERS}
-PORTABLE = (FIRMWARE - PUBLIC) | {'firmware/ports/sim/chips'}
+PORTABLE = (FIRMWARE - PUBLIC) | {'firmware/ports/sim/chips', 'firmware/ports/sim/devices'}
 # Those public headers that the board has, too.
 PORTABLE_PUBLIC = {f'include/r4link/{name}.hpp' for name in (
     'command', 'config', 'datagram', 'key', 'simulated_pins', 'state', 'text', 'vocabulary')}

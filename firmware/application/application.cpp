@@ -30,7 +30,8 @@ Application::Application(Hal& hal, const Config& config, Observer* observer)
       identity_(config.identity),
       link_(timing_of(config.settings)),
       authentication_(config.chance),
-      guard_(hal) {
+      guard_(hal),
+      i2c_(config.i2c) {
   setpoints_.settings = config.settings;
   authentication_.use(config.settings.site.keys);
   guard_.add_duty(loop_limit_ms);  // loop_duty
@@ -55,6 +56,7 @@ void Application::start(std::uint32_t now_ms) {
   safety_.count_from(now_ms);  // the clock begins at random
   turned_ms_ = now_ms;
   tell_ports();
+  begin_devices(now_ms);
   if (observer_ != nullptr) {
     observer_->on_state(now_ms, BoardState::connecting, SafeReason::none);
     observer_->on_outputs(now_ms, outputs_);
@@ -233,6 +235,7 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
       // Nothing that another host, or this one before its restart, commanded may come back.
       setpoints_.outputs = Outputs();
       setpoints_.fields = FieldSet::paper_default();
+      begin_devices(now_ms);
       update_outputs(now_ms);
       safety_.leave(SafeReason::link);
       if (heartbeat.has_pnum) wires_.count(from, heartbeat.pnum);
@@ -289,6 +292,7 @@ std::uint32_t Application::poll(std::uint32_t now_ms) {
   update_outputs(now_ms);
   report_state(now_ms);
   watchers_.poll(now_ms);
+  poll_devices(now_ms);
   if (!link_.has_owner() && !watchers_.any()) schedule_.stop();
   send_states(now_ms);
   if (link_.heartbeat_due(now_ms)) send_heartbeats(now_ms);

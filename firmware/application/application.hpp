@@ -23,6 +23,7 @@
 #include "../../protocol/link/session_wires.hpp"
 #include "../../protocol/link/watchers.hpp"
 #include "../../protocol/messages/message.hpp"
+#include "../devices/user_i2c.hpp"
 #include "../executor.hpp"
 #include "../guard.hpp"
 #include "../hal.hpp"
@@ -42,6 +43,8 @@ class Application {
     // Authentication::chance_size random bytes, others at each boot. Without them a board with a
     // key obeys nobody but who is at a cable of its own.
     const std::uint8_t* chance = nullptr;
+    // The user's bus, which must outlive the application; none: X is unknown.
+    UserI2c* i2c = nullptr;
   };
   static constexpr int max_ports = 4;
   static constexpr std::uint8_t no_port = max_ports;
@@ -72,6 +75,10 @@ class Application {
   // 10).
   std::uint32_t poll(std::uint32_t now_ms);
 
+  // A turn of the user's bus alone; poll() has it, too. At least once a millisecond, so that a transfer can
+  // be begun in each.
+  void poll_devices(std::uint32_t now_ms);
+
   // For the timer interrupt. Its first duty is the loop: poll() checks in.
   Guard& guard() { return guard_; }
   static constexpr Guard::Duty loop_duty = 0;
@@ -98,6 +105,8 @@ class Application {
   static constexpr int proximity_hysteresis_cm = 5;
   // … for this long: two turns of each sensor (drivers/ultrasonic.hpp), for one may miss an echo.
   static constexpr std::uint32_t proximity_clear_ms = 500;
+  // The answer to a single transfer on the user's bus is in the states of so long, chosen or not.
+  static constexpr std::uint32_t answer_shown_ms = 1000;
 
  private:
   struct PortSlot {
@@ -135,6 +144,13 @@ class Application {
   void take_effect(std::uint32_t pnum, const Command& command, std::uint32_t now_ms);
   void bring_about(std::uint32_t now_ms);
   void emergency_stop(Source from, const Datagram& datagram, Verdict verdict, std::uint32_t now_ms);
+
+  // application_devices.cpp
+  Refusal carry_out_device(std::uint32_t pnum, const Command& command, std::uint32_t now_ms);
+  void begin_devices(std::uint32_t now_ms);
+  void follow_poll_setting(Text key, std::uint32_t now_ms);
+  void add_device_answer(FieldSet& fields, std::uint32_t t_ms) const;
+  void fill_devices(State& state) const;
 
   // application_safety.cpp
   void look_at_time(std::uint32_t now_ms);
@@ -205,6 +221,9 @@ class Application {
   // and whether another has brought it before.
   Source speaker_;
   bool known_ = false;
+  UserI2c* i2c_;
+  bool has_answer_ = false;  // of the user's bus, which is told for a while
+  std::uint32_t answered_ms_ = 0;
   std::uint32_t rx_ok_ = 0;
   std::uint32_t rx_bad_ = 0;
   std::uint32_t rx_refused_ = 0;

@@ -2,6 +2,7 @@
 // What a command datagram comes to: whether it is executed, and what that changes.
 #include "../../protocol/messages/command_field.hpp"
 #include "../../protocol/messages/command_group.hpp"
+#include "../../protocol/messages/device_command.hpp"
 #include "application.hpp"
 
 namespace r4 {
@@ -78,6 +79,8 @@ void Application::on_command(Source from, const Datagram& datagram, Verdict verd
       outcome = Refusal::stale;
   } else if (!may_set(from.port, command)) {
     outcome = Refusal::auth;
+  } else if (is_device_command(command.kind)) {
+    outcome = carry_out_device(datagram.pnum(), command, now_ms);
   } else {
     outcome = carry_out(command, setpoints_);
   }
@@ -176,6 +179,7 @@ void Application::take_effect(std::uint32_t pnum, const Command& command, std::u
       enter(SafeReason::link, now_ms);
       break;
     case CommandKind::setting:
+      follow_poll_setting(command.text, now_ms);
       if (command.text == key_setting) authentication_.use(setpoints_.settings.site.keys);
       link_.set_timing(timing_of(setpoints_.settings));
       expect_host();

@@ -75,6 +75,7 @@ void Application::identify(Source to, const Datagram& question, std::uint32_t no
   write_identity(writer, identity);
   writer.more("+").more(leave_capability).more("+").more(group_capability);
   if (authentication_.has_chance()) writer.more("+").more(watch_capability);
+  if (i2c_ != nullptr) writer.more("+").more(i2c_capability);
   write_identity_fields(writer, identity);
   answer(to, writer, now_ms);
 }
@@ -168,12 +169,14 @@ void Application::send_states(std::uint32_t now_ms) {
   if (!schedule_.take(now_ms, t_ms)) return;
   State state;
   fill(state);
+  FieldSet chosen = setpoints_.fields;
+  add_device_answer(chosen, t_ms);
   if (link_.has_owner()) {
     for (std::uint8_t i = 0; i < port_count_; ++i) {
       Source to;
       to.port = i;
       to.peer = audience(i);
-      send_state(to, ports_[i].next_pnum, setpoints_.fields, state, t_ms);
+      send_state(to, ports_[i].next_pnum, chosen, state, t_ms);
     }
   } else if (state.safe == SafeReason::none) {
     state.safe = SafeReason::link;
@@ -181,7 +184,7 @@ void Application::send_states(std::uint32_t now_ms) {
   for (Watcher& watcher : watchers_) {
     if (watcher.period_ms == 0 || !watcher.take(t_ms)) continue;
     if (link_.has_owner() && reaches(watcher.at)) continue;
-    const FieldSet& fields = watcher.chooses ? watcher.fields : setpoints_.fields;
+    const FieldSet& fields = watcher.chooses ? watcher.fields : chosen;
     send_state(watcher.at, number_for(watcher.at), fields, state, t_ms);
   }
 }
@@ -246,6 +249,7 @@ void Application::fill(State& state) const {
   state.rx_refused = rx_refused_;
   state.late = schedule_.late();
   state.fault = inputs_.fault;
+  fill_devices(state);
 }
 
 }  // namespace firmware

@@ -12,7 +12,7 @@ namespace r4 {
 
 namespace {
 
-constexpr std::array<CommandHelp, 14> table{{
+constexpr std::array<CommandHelp, 15> table{{
     {'O', "O:pwm,dir,ch", "OSMC motor driver", "pwm 0-4095, dir 0 or 1, ch 1-4"},
     {'D', "D:pwm,dir,ch", "DHB12 motor driver", "pwm 0-4095, dir 0 or 1, ch 1-4"},
     {'S', "S:us,ch", "servo pulse width", "us 0 (off) to 2500, ch 1-16"},
@@ -26,6 +26,11 @@ constexpr std::array<CommandHelp, 14> table{{
     {'F', "F:name,name…", "which state fields are sent", "DEFAULT, ALL or names such as ENC1"},
     {'C', "C:key,value", "settings",
      "rate 1-1000 Hz, heartbeat 50-1000 ms, timeout 100-10000 ms, recovery last|rearm, pack 0|1 …"},
+    {'X', "X:READ|WRITE|POLL|OFF|SCAN,…", "user I2C bus: see docs/devices.md",
+     "READ,address,register,count WRITE,address,bytes[,count] POLL,address,register,count,ms,slot "
+     "OFF,slot SCAN; address 8-119 or 0x08-0x77, bytes as x3B00, x is none, count 1-32, 5-60000 "
+     "ms, "
+     "slot 1-8"},
     {'Q', "Q:ID", "asks who the board is", "ID"},
     {'H', "H:ROS2-R4", "host heartbeat", "ROS2-R4"},
     {0, "", "", ""},
@@ -36,12 +41,13 @@ struct SettingHelp {
   std::string_view values;
 };
 
-constexpr std::array<SettingHelp, 14> settings_table{{
+constexpr std::array<SettingHelp, 15> settings_table{{
     {"rate", "1-1000 states a second"},
     {"heartbeat", "50-1000 ms, below the timeout"},
     {"timeout", "100-10000 ms, above the heartbeat"},
     {"recovery", "last or rearm"},
     {"pack", "0 or 1"},
+    {"i2c1", "address:register:count:period, such as 0x68:x3B:14:10, or off; up to i2c8"},
     {"network", "1-32 bytes, or off"},
     {"password", "8-63 bytes, or off"},
     {"host", "an IPv4 address, or off"},
@@ -72,8 +78,10 @@ struct SettingText {
 
 std::string setting_fix(const SettingText& setting) {
   const bool analog = setting.is_known() && setting.name.starts_with("AIN");
+  const bool slot = poll_slot_of(Text(setting.name)) != 0;
   for (const SettingHelp& each : settings_table) {
-    if (each.name == setting.name || (analog && each.name.starts_with("AIN"))) {
+    if (each.name == setting.name || (analog && each.name.starts_with("AIN")) ||
+        (slot && each.name.starts_with("i2c"))) {
       return "write " + std::string(setting.name) + ",value with " + std::string(each.values);
     }
   }
@@ -148,6 +156,8 @@ std::string_view meaning_of(Refusal refusal) {
       return "another host controls the board";
     case Refusal::auth:
       return "not signed with the board's key, or only to be set over USB";
+    case Refusal::full:
+      return "another transfer is under way";
   }
   return "unknown code";
 }
@@ -166,6 +176,23 @@ Problem bad_command(std::string_view text, Refusal refusal) {
     for (const CommandHelp& each : table) {
       if (each.letter != 0) problem.fix += " " + std::string(each.form);
     }
+  }
+  return problem;
+}
+
+Problem failed_transfer(std::string_view command, I2cOutcome outcome) {
+  Problem problem{ErrorKind::refused, std::string(command), to_text(outcome), ""};
+  switch (outcome) {
+    case I2cOutcome::no_acknowledge:
+      problem.fix = "X:SCAN shows which addresses answer; look at supply, wires and pull-ups";
+      break;
+    case I2cOutcome::bus_stuck:
+      problem.fix =
+          "a device holds SDA or SCL of the user's bus: look at its supply, or take it off";
+      break;
+    default:
+      problem.fix = "send it again when the board is ACTIVE";
+      break;
   }
   return problem;
 }

@@ -54,6 +54,9 @@ Problem bad_command(std::string_view text, Refusal refusal);
 // Throws Error{usage} for a command outside its ranges, and for one whose texts do not go into a
 // datagram. What it lets pass can be sent.
 void require_valid(const Command& command);
+
+// Why a transfer on the user's bus has failed, which the board did execute.
+Problem failed_transfer(std::string_view command, I2cOutcome outcome);
 // Throws Error{usage} for a group of no commands. There are none with wrong ones.
 void require_any(const Setpoints& group);
 

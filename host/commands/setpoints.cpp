@@ -13,8 +13,10 @@ namespace {
 // Why it may not come behind that many others.
 Problem bad_group_member(const Command& command, std::size_t others) {
   Problem problem{ErrorKind::usage, shown(command), "", ""};
-  if (!drives_output(command.kind)) {
-    problem.reason = "drives no output, so it cannot be part of a group";
+  if (!joins_groups(command.kind)) {
+    problem.reason =
+        std::string(drives_output(command.kind) ? "is a transfer of its own" : "drives no output") +
+        ", so it cannot be part of a group";
     problem.fix = "send it by itself; a group is made of O D S R P B Z";
   } else if (others == max_group) {
     problem.reason = fmt::format("is one more than the {} that a group may have", max_group);

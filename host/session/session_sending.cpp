@@ -238,6 +238,7 @@ void Session::finish(Pending& pending, Outcome outcome, Refusal code, Time now) 
   const Ticket ticket = pending.ticket;
   CommandResult result{outcome, code, now - pending.started,
                        outcome == Outcome::not_armed ? arming_.cause() : DisarmCause::none};
+  result.pnum = pending.pnum;
   if (outcome != Outcome::confirmed) {
     result.at = pending.step != 0 ? pending.step : pending.failed;
     if (pending.step != 0) result.executed = static_cast<std::uint8_t>(pending.step - 1);

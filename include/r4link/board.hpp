@@ -62,7 +62,7 @@ struct BoardCallbacks {
 struct StatesOptions {
   // None is lost: where no more can wait, take() throws behind the last one that could. Otherwise the oldest gives way.
   bool lossless = false;
-  // So many wait, of some 400 bytes each. 0: the newest alone or, of those of which none is lost, 65536: eleven minutes
+  // So many wait, of some 900 bytes each. 0: the newest alone or, of those of which none is lost, 65536: eleven minutes
   // at 100 Hz.
   std::size_t most = 0;
 };
@@ -231,6 +231,33 @@ class R4LINK_API Board {
     Board& board_;
     int channel_;
   };
+
+  // The devices on the user's I2C bus (docs/devices.md): of 7-bit addresses, at most 32 bytes each way. read(),
+  // write() and scan() return when the device has answered, and throw Error{refused} where none does.
+  class I2c {
+   public:
+    using Bytes = std::vector<std::uint8_t>;
+    // Of a register, of one or two bytes; {}: none is named.
+    Bytes read(int address, const Bytes& register_bytes, int count,
+               Duration timeout = default_timeout) const;
+    // May move something, so that it takes arm(). Then reads `count` bytes.
+    Bytes write(int address, const Bytes& bytes, int count = 0,
+                Duration timeout = default_timeout) const;
+    // The addresses that answer, at most 32.
+    Bytes scan(Duration timeout = Duration{2000}) const;
+    // From now on, and until our session ends, the board reads every 5 to 60000 ms by itself, into slot 1-8:
+    // State::i2c and fields("DEFAULT,I2C1").
+    void poll(int slot, int address, const Bytes& register_bytes, int count, Duration period,
+              Duration timeout = default_timeout) const;
+    void poll_off(int slot, Duration timeout = default_timeout) const;
+
+   private:
+    friend class Board;
+    explicit I2c(Board& board) : board_(board) {}
+    Bytes answer(const Command& command, Duration timeout) const;
+    Board& board_;
+  };
+  I2c i2c() { return I2c(*this); }
 
   // Channels count from 1, as on the board. A channel that does not exist throws at set().
   DriveChannel osmc(int channel) { return {*this, CommandKind::osmc, channel}; }

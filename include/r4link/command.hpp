@@ -29,6 +29,10 @@ enum class CommandKind : std::uint8_t {
   setting,    // C:key,value
   identify,   // Q:ID
   watch,      // W:rate[,name,name…]
+  i2c_read,   // X:READ,address,register,count
+  i2c_write,  // X:WRITE,address,bytes[,count]
+  i2c_scan,   // X:SCAN
+  i2c_poll,   // X:POLL,address,register,count,period,slot and X:OFF,slot
 };
 
 // One command. Which members count depends on `kind`; the factories set them. `text` and `text2`
@@ -36,13 +40,17 @@ enum class CommandKind : std::uint8_t {
 struct R4LINK_API Command {
   Command() {}  // NOLINT(modernize-use-equals-default): else GCC calls memset for it
   CommandKind kind = CommandKind::heartbeat;
-  std::uint8_t channel = 0;  // 1 … the kind's channel count
-  std::int32_t value = 0;  // pwm, us, cm, BLDC speed, stepper target, Hz; clear: the cause it names
+  std::uint8_t channel = 0;     // 1 … the kind's channel count; i2c_poll: the slot
+  std::uint16_t period_ms = 0;  // i2c_poll
+  // pwm, us, cm, BLDC speed, stepper target, Hz; clear: the cause it names; i2c: the device's address
+  std::int32_t value = 0;
   std::int32_t speed = stepper_speed_default;  // stepper, steps per second
   Direction direction = Direction::reverse;    // osmc, dhb12, bldc
   bool on = false;                             // relay; bldc: brake
-  Text text;                                   // fields, watch: the list; setting: the key
-  Text text2;                                  // setting: the value
+  std::uint8_t count = 0;                      // i2c: how many bytes to read; i2c_poll: 0 is off
+  // fields, watch: the list; setting: the key; i2c: the register or what is written, as "x3B"
+  Text text;
+  Text text2;  // setting: the value
 
   static Command heartbeat();
   static Command osmc(std::int32_t pwm, Direction direction, int channel);
@@ -67,10 +75,21 @@ struct R4LINK_API Command {
   // For two seconds the board streams to whoever sends it, without control; 0: no more. `list`: the fields;
   // empty: those that the host in control has chosen.
   static Command watch(std::int32_t rate_hz, Text list = Text());
+  // On the user's I2C bus (docs/devices.md). Addresses have 7 bits; bytes are written as x and two hexadecimal
+  // digits each: "x75", and "x" for none. The answer comes as I2CX in the state.
+  static Command i2c_read(int address, Text register_bytes, int count);
+  static Command i2c_write(int address, Text bytes, int count = 0);  // then reads so many
+  static Command i2c_scan();
+  // The board reads by itself, every `period_ms`; the state tells it as I2C1 … I2C8.
+  static Command i2c_poll(int slot, int address, Text register_bytes, int count, int period_ms);
+  static Command i2c_poll_off(int slot);
 };
 
-// Does it drive an output? Those are refused in the safe state: O D S R P B Z.
+// May it move something? Those are refused in the safe state: O D S R P B Z, and X:WRITE, for what is
+// written to a device of the user's may be an actuator's.
 R4LINK_API bool drives_output(CommandKind kind);
+// May it be part of a group? O D S R P B Z.
+R4LINK_API bool joins_groups(CommandKind kind);
 
 // The most commands of one datagram. Several are a group: output commands, no two of them for the same
 // channel, that are executed together, or none of them (docs/protocol.md; setpoints.hpp).

@@ -113,6 +113,9 @@ struct CommandResult {
   // sent one after the other, from 1; 0: none in particular. Of those before it, how many were executed.
   std::uint8_t at = 0;
   std::uint8_t executed = 0;
+  // Of the datagram that carried it: what comes later, I2CX of the state, names the command by it. 0: it was
+  // not sent.
+  std::uint32_t pnum = 0;
 };
 
 // Of one that is sent once and not waited for. True where it was sent:

@@ -92,7 +92,18 @@ enum class StateField : std::uint8_t {
   enc2idx,
   enc3idx,
   enc4idx,
-  fault,  // chip,trouble: ChipFault; 0,0: none
+  // the user's I2C bus (docs/devices.md): t,errors,bytes of each repeated reading
+  i2c1,
+  i2c2,
+  i2c3,
+  i2c4,
+  i2c5,
+  i2c6,
+  i2c7,
+  i2c8,
+  i2cx,    // PNum,outcome,bytes of the newest single transfer
+  i2cbus,  // outcome,errors,recoveries
+  fault,   // chip,trouble: ChipFault; 0,0: none
   count
 };
 constexpr int state_field_count = static_cast<int>(StateField::count);
@@ -147,7 +158,8 @@ class R4LINK_API FieldSet {
   friend bool operator!=(const FieldSet& a, const FieldSet& b) { return !(a == b); }
 
   static FieldSet paper_default();  // AIN24 … SERVO1POS
-  static FieldSet all();            // but FAULT, which is sent where there is one
+  // But FAULT, which is sent where there is one, and what the user connects, I2C1 to I2CBUS.
+  static FieldSet all();
 
  private:
   static constexpr int word_bits = 32;
@@ -191,6 +203,9 @@ struct State {
   std::uint32_t rx_refused = 0;
   std::uint32_t late = 0;
   ChipFault fault;
+  I2cReading i2c[i2c_slots];
+  I2cAnswer i2c_answer;
+  I2cBusReport i2c_bus;
 
   // The same by the names of channels, as on the board: from 1. A channel that is not there reads 0.
   double volts(Analog input) const {

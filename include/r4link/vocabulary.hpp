@@ -98,6 +98,58 @@ struct ChipFault {
 // other addresses.
 R4LINK_API const char* chip_name(std::uint8_t address);
 
+// --- devices on the I2C bus of the user's (docs/devices.md)
+
+constexpr int i2c_slots = 8;       // readings that the board repeats by itself
+constexpr int i2c_max_bytes = 32;  // each way, of one transfer
+// Those below and above are reserved (UM10204, 3.1.12).
+constexpr std::uint8_t i2c_first_address = 8;
+constexpr std::uint8_t i2c_last_address = 0x77;
+constexpr int i2c_max_register_bytes = 2;
+constexpr std::uint16_t i2c_min_period_ms = 5;
+constexpr std::uint16_t i2c_max_period_ms = 60000;
+
+// Bytes as a state carries them: at most `most`. Those behind `size` have no value.
+template <int most>
+struct DeviceBytes {
+  DeviceBytes() {}  // NOLINT(modernize-use-equals-default): the bytes need no value, and cost none
+  std::uint8_t size = 0;
+  std::uint8_t bytes[most];
+  const std::uint8_t* begin() const { return bytes; }
+  const std::uint8_t* end() const { return bytes + size; }
+};
+
+// What one of the board's repeated readings (X:POLL) has found.
+struct I2cReading {
+  std::uint32_t t_ms = 0;    // the board's clock when the bytes were read
+  std::uint32_t errors = 0;  // readings that failed since it was set up
+  DeviceBytes<i2c_max_bytes> data;
+};
+
+// What became of a transfer. The number is what the fields I2CX and I2CBUS carry.
+enum class I2cOutcome : std::uint8_t {
+  done = 0,
+  no_acknowledge = 1,  // nobody answers to the address, or the device refused a byte
+  bus_stuck = 2,       // a device holds a line of the bus
+  cancelled = 3,       // the board went safe before it was begun, or another session began
+};
+// "done", "no acknowledge", "bus stuck", "cancelled"; "unknown" for other numbers.
+R4LINK_API const char* to_text(I2cOutcome outcome);
+
+// How the newest single transfer (X:READ, X:WRITE, X:SCAN) ended.
+struct I2cAnswer {
+  std::uint32_t pnum = 0;  // of its command; 0: there was none yet
+  I2cOutcome outcome = I2cOutcome::done;
+  DeviceBytes<i2c_max_bytes> data;  // what was read; of a scan, the addresses that answer
+};
+
+// How the bus does.
+struct I2cBusReport {
+  I2cOutcome newest = I2cOutcome::done;  // of all transfers
+  std::uint32_t errors = 0;              // transfers that failed since the board began
+  std::uint32_t recoveries = 0;          // how often it was clocked free
+};
+
 // --- refusals
 
 // Why a board refuses a command: the code of `N:<PNum>,<code>` (docs/protocol.md).
@@ -112,6 +164,7 @@ enum class Refusal : std::uint8_t {
   safe,       // outputs are in the safe state
   busy,       // another host controls the board
   auth,       // not authenticated
+  full,       // what it needs is in use: ask again when that has ended
 };
 
 // "UNKNOWN", "FORMAT" …; "NONE" for none.

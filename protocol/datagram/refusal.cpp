@@ -5,10 +5,10 @@ namespace r4 {
 namespace {
 
 // In the order of the enumeration.
-constexpr Text names[] = {"NONE",  "UNKNOWN",   "FORMAT", "RANGE", "CHANNEL",
-                          "STALE", "DUPLICATE", "SAFE",   "BUSY",  "AUTH"};
+constexpr Text names[] = {"NONE",      "UNKNOWN", "FORMAT", "RANGE", "CHANNEL", "STALE",
+                          "DUPLICATE", "SAFE",    "BUSY",   "AUTH",  "FULL"};
 constexpr std::size_t name_count = sizeof names / sizeof names[0];
-static_assert(name_count == static_cast<std::size_t>(Refusal::auth) + 1, "a name for every code");
+static_assert(name_count == static_cast<std::size_t>(Refusal::full) + 1, "a name for every code");
 
 }  // namespace
 

@@ -3,6 +3,7 @@
 
 #include "../datagram/numbers.hpp"
 #include "command_field.hpp"
+#include "device_command.hpp"
 
 namespace r4 {
 namespace {
@@ -50,6 +51,10 @@ Limits limits_of(CommandKind kind) {
     case CommandKind::setting:
     case CommandKind::identify:
     case CommandKind::watch:
+    case CommandKind::i2c_read:
+    case CommandKind::i2c_write:
+    case CommandKind::i2c_scan:
+    case CommandKind::i2c_poll:
       break;
   }
   return {0, 0, 0};
@@ -182,6 +187,7 @@ bool drives_output(CommandKind kind) {
     case CommandKind::stepper:
     case CommandKind::zero:
     case CommandKind::bldc:
+    case CommandKind::i2c_write:
       return true;
     case CommandKind::heartbeat:
     case CommandKind::stop:
@@ -192,9 +198,16 @@ bool drives_output(CommandKind kind) {
     case CommandKind::setting:
     case CommandKind::identify:
     case CommandKind::watch:
+    case CommandKind::i2c_read:
+    case CommandKind::i2c_scan:
+    case CommandKind::i2c_poll:
       break;
   }
   return false;
+}
+
+bool joins_groups(CommandKind kind) {
+  return drives_output(kind) && kind != CommandKind::i2c_write;
 }
 
 bool asks_to_stop(const Datagram& datagram) {
@@ -257,6 +270,8 @@ Refusal parse_command(const Field& field, Command& out) {
     case 'W':
       command = read_watch(v, field.values());
       break;
+    case 'X':
+      return parse_device_command(field, out);
     case 'F':
       command = Command::fields(field.values());
       break;
@@ -286,7 +301,9 @@ Refusal check_command(const Command& command) {
     return rate ? Refusal::none : Refusal::range;
   }
   const Limits limits = limits_of(command.kind);
-  if (limits.channels == 0) return Refusal::none;
+  if (limits.channels == 0) {
+    return is_device_command(command.kind) ? check_device_command(command) : Refusal::none;
+  }
   if (command.channel < 1 || command.channel > limits.channels) return Refusal::channel;
   if (command.value < limits.min || command.value > limits.max) return Refusal::range;
   if (command.direction > Direction::forward) return Refusal::range;
@@ -353,6 +370,12 @@ void write_command(DatagramWriter& writer, const Command& command) {
     case CommandKind::watch:
       writer.field("W").value(command.value);
       if (!command.text.empty()) writer.values(command.text);
+      break;
+    case CommandKind::i2c_read:
+    case CommandKind::i2c_write:
+    case CommandKind::i2c_scan:
+    case CommandKind::i2c_poll:
+      write_device_command(writer, command);
       break;
   }
 }

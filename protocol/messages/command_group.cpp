@@ -31,6 +31,10 @@ int GroupRules::row_of(CommandKind kind) {
     case CommandKind::setting:
     case CommandKind::identify:
     case CommandKind::watch:
+    case CommandKind::i2c_read:
+    case CommandKind::i2c_write:
+    case CommandKind::i2c_scan:
+    case CommandKind::i2c_poll:
       break;
   }
   return -1;

@@ -11,11 +11,28 @@ Command of_kind(CommandKind kind) {
   return command;
 }
 
+// 0, which is no channel of any kind and no period, for what does not fit.
+template <class Number>
+Number number_of(int value) {
+  return value > 0 && value <= static_cast<Number>(-1) ? static_cast<Number>(value) : Number{0};
+}
+
 Command of_channel(CommandKind kind, std::int32_t value, int channel) {
   Command command = of_kind(kind);
   command.value = value;
-  // 0 is no channel of any kind.
-  command.channel = channel > 0 && channel <= 0xFF ? static_cast<std::uint8_t>(channel) : 0;
+  command.channel = number_of<std::uint8_t>(channel);
+  return command;
+}
+
+// More than there may be of anything that is counted.
+constexpr std::uint8_t out_of_range = 0xFF;
+
+Command of_device(CommandKind kind, int address, Text bytes, int count) {
+  Command command = of_kind(kind);
+  command.value = address;
+  command.text = bytes;
+  command.count =
+      count >= 0 && count < out_of_range ? static_cast<std::uint8_t>(count) : out_of_range;
   return command;
 }
 
@@ -77,6 +94,26 @@ Command Command::watch(std::int32_t rate_hz, Text list) {
   Command command = of_kind(CommandKind::watch);
   command.value = rate_hz;
   command.text = list;
+  return command;
+}
+Command Command::i2c_read(int address, Text register_bytes, int count) {
+  return of_device(CommandKind::i2c_read, address, register_bytes, count);
+}
+Command Command::i2c_write(int address, Text bytes, int count) {
+  return of_device(CommandKind::i2c_write, address, bytes, count);
+}
+Command Command::i2c_scan() { return of_kind(CommandKind::i2c_scan); }
+Command Command::i2c_poll(int slot, int address, Text register_bytes, int count, int period_ms) {
+  Command command = of_device(CommandKind::i2c_poll, address, register_bytes, count);
+  command.channel = number_of<std::uint8_t>(slot);
+  // 0 bytes would be its end.
+  if (command.count == 0) command.count = out_of_range;
+  command.period_ms = number_of<std::uint16_t>(period_ms);
+  return command;
+}
+Command Command::i2c_poll_off(int slot) {
+  Command command = of_kind(CommandKind::i2c_poll);
+  command.channel = number_of<std::uint8_t>(slot);
   return command;
 }
 Command Command::identify() { return of_kind(CommandKind::identify); }

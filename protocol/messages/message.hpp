@@ -75,6 +75,8 @@ struct Identity {
 // What the firmware can do besides, whatever the board: it obeys E:LEAVE, and serves who watches by W.
 constexpr Text leave_capability("leave");
 constexpr Text watch_capability("watch");
+// It has an I2C bus for the user: X.
+constexpr Text i2c_capability("i2c");
 // Is it one of those words?
 bool has_capability(Text capabilities, Text word);
 bool read_identity(const Datagram& datagram, Identity& out);

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "../datagram/numbers.hpp"
+#include "../datagram/same_elements.hpp"
 
 namespace r4 {
 namespace {
@@ -90,19 +91,27 @@ class Lines {
 
 }  // namespace
 
+int poll_slot_of(Text key) {
+  const Text prefix("i2c");
+  if (key.size() != prefix.size() + 1 || key.substr(0, prefix.size()) != prefix) return 0;
+  const int slot = key[prefix.size()] - '0';
+  return slot >= 1 && slot <= i2c_slots ? slot : 0;
+}
+
 Refusal set(Settings& settings, Text key, Text value) {
   for (const NumberSetting& setting : number_settings) {
     if (setting.key == key) return set_number(settings, setting, value);
   }
   if (key == Text("recovery")) return set_recovery(settings, value);
   if (key == Text("pack")) return set_pack(settings, value);
+  if (const int slot = poll_slot_of(key)) return parse_poll(value, settings.polls[slot - 1]);
   return set(settings.site, key, value);
 }
 
 bool operator==(const Settings& a, const Settings& b) {
   return a.state_rate_hz == b.state_rate_hz && a.heartbeat_ms == b.heartbeat_ms &&
          a.timeout_ms == b.timeout_ms && a.recovery == b.recovery && a.pack == b.pack &&
-         a.site == b.site;
+         same_elements(a.polls, b.polls) && a.site == b.site;
 }
 
 bool write_settings(const Settings& settings, char* out, std::size_t capacity, Text& text) {
@@ -114,6 +123,12 @@ bool write_settings(const Settings& settings, char* out, std::size_t capacity, T
   }
   lines.add("recovery", settings.recovery == Recovery::last ? Text("last") : Text("rearm"));
   lines.add("pack", settings.pack ? Text("1") : Text("0"));
+  char key_text[] = "i2c1";
+  char poll[max_poll_text];
+  for (int i = 0; i < i2c_slots; ++i) {
+    key_text[3] = static_cast<char>('1' + i);
+    if (settings.polls[i].on()) lines.add(Text(key_text, 4), write_poll(settings.polls[i], poll));
+  }
   char buffer[max_site_value];
   Text key;
   Text value;

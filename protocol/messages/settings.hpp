@@ -16,6 +16,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "device_command.hpp"
 #include "r4link/text.hpp"
 #include "r4link/vocabulary.hpp"
 #include "site_settings.hpp"
@@ -30,6 +31,7 @@ struct Settings {
   std::uint16_t timeout_ms = 1000;
   Recovery recovery = Recovery::last;
   bool pack = true;
+  I2cPoll polls[i2c_slots];  // that are there when a session begins
   SiteSettings site;
 
   std::uint32_t state_period_ms() const { return 1000U / state_rate_hz; }
@@ -43,7 +45,10 @@ Refusal set(Settings& settings, Text key, Text value);
 
 // All settings as lines "key,value", each ended by a line feed, so that they can be kept. False:
 // more than `capacity` bytes.
-constexpr std::size_t max_settings_text = 960;
+constexpr std::size_t max_settings_text = 1200;
+// The slot of a setting "i2c1" to "i2c8", from 1; 0: it is another one.
+int poll_slot_of(Text key);
+
 bool write_settings(const Settings& settings, char* out, std::size_t capacity, Text& text);
 // Takes such lines, in any order. What is not known or not allowed is passed over: the text may be
 // of an older or newer firmware.

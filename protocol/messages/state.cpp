@@ -3,6 +3,7 @@
 
 #include "../datagram/numbers.hpp"
 #include "../datagram/word_index.hpp"
+#include "device_fields.hpp"
 #include "state_fields.hpp"
 
 namespace r4 {
@@ -21,6 +22,10 @@ enum class Form : std::uint8_t {
   u32,     // uint32
   reason,  // SafeReason
   fault,   // ChipFault: chip,trouble
+  // of devices on the user's bus: device_fields.hpp
+  reading,  // I2cReading
+  answer,   // I2cAnswer
+  bus,      // I2cBusReport
 };
 
 struct Entry {
@@ -98,6 +103,16 @@ constexpr Entry table[] = {
     R4_ENTRY(enc2idx, i32, "ENC2IDX", encoder_index_counts[1]),
     R4_ENTRY(enc3idx, i32, "ENC3IDX", encoder_index_counts[2]),
     R4_ENTRY(enc4idx, i32, "ENC4IDX", encoder_index_counts[3]),
+    R4_ENTRY(i2c1, reading, "I2C1", i2c[0]),
+    R4_ENTRY(i2c2, reading, "I2C2", i2c[1]),
+    R4_ENTRY(i2c3, reading, "I2C3", i2c[2]),
+    R4_ENTRY(i2c4, reading, "I2C4", i2c[3]),
+    R4_ENTRY(i2c5, reading, "I2C5", i2c[4]),
+    R4_ENTRY(i2c6, reading, "I2C6", i2c[5]),
+    R4_ENTRY(i2c7, reading, "I2C7", i2c[6]),
+    R4_ENTRY(i2c8, reading, "I2C8", i2c[7]),
+    R4_ENTRY(i2cx, answer, "I2CX", i2c_answer),
+    R4_ENTRY(i2cbus, bus, "I2CBUS", i2c_bus),
     R4_ENTRY(fault, fault, "FAULT", fault),
 };
 #undef R4_ENTRY
@@ -187,6 +202,12 @@ bool parse_entry(Text text, const Entry& entry, State& state) {
       return parse_safe_reason(text, member<SafeReason>(state, entry));
     case Form::fault:
       return parse_fault(text, member<ChipFault>(state, entry));
+    case Form::reading:
+      return parse_device(text, member<I2cReading>(state, entry));
+    case Form::answer:
+      return parse_device(text, member<I2cAnswer>(state, entry));
+    case Form::bus:
+      return parse_device(text, member<I2cBusReport>(state, entry));
   }
   return false;
 }
@@ -202,8 +223,7 @@ FieldSet FieldSet::paper_default() {
 
 FieldSet FieldSet::all() {
   FieldSet set;
-  for (int i = 0; i < state_field_count; ++i) set.add(static_cast<StateField>(i));
-  set.remove(StateField::fault);
+  for (int i = 0; i < static_cast<int>(StateField::i2c1); ++i) set.add(static_cast<StateField>(i));
   return set;
 }
 
@@ -257,6 +277,15 @@ void write_field(DatagramWriter& writer, StateField field, const State& state) {
       writer.value(std::uint32_t{fault.address}).value(static_cast<std::uint32_t>(fault.trouble));
       break;
     }
+    case Form::reading:
+      write_device(writer, member<I2cReading>(state, entry));
+      break;
+    case Form::answer:
+      write_device(writer, member<I2cAnswer>(state, entry));
+      break;
+    case Form::bus:
+      write_device(writer, member<I2cBusReport>(state, entry));
+      break;
   }
 }
 

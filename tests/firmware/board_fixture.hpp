@@ -120,7 +120,8 @@ struct Heard {
 
 class TestBoard {
  public:
-  explicit TestBoard(Settings settings = {}, int port_count = 1, std::uint32_t start_ms = 500'000)
+  explicit TestBoard(Settings settings = {}, int port_count = 1, std::uint32_t start_ms = 500'000,
+                     firmware::UserI2c* i2c = nullptr)
       : now_ms(start_ms) {
     firmware::Application::Config config;
     config.identity.firmware = "1.2.3";
@@ -129,6 +130,7 @@ class TestBoard {
     config.settings = settings;
     const std::uint8_t chance[Authentication::chance_size] = {1, 2, 3};
     config.chance = chance;
+    config.i2c = i2c;
     application = std::make_unique<firmware::Application>(hal, config, &log);
     for (int i = 0; i < port_count; ++i) {
       ports[i].now_ms = &now_ms;

@@ -53,6 +53,41 @@ bool within_ranges(const Outputs& outputs) {
 constexpr int ports = 2;
 constexpr std::uint32_t peers = 4;
 
+// A user's bus on which something answers at every even address; it can be made to hold its lines.
+class UserBus final : public firmware::UserI2cPort {
+ public:
+  void begin(const firmware::UserTransfer& transfer) override {
+    require(transfer.address >= i2c_first_address && transfer.address <= i2c_last_address);
+    require(transfer.out_size <= i2c_max_bytes && transfer.in_size <= i2c_max_bytes);
+    require(!busy_ && !released_);
+    busy_ = true;
+    answers_ = transfer.address % 2 == 0;
+    for (std::size_t i = 0; i < transfer.out_size; ++i) sum_ += transfer.out[i];
+    for (std::size_t i = 0; i < transfer.in_size; ++i)
+      transfer.in[i] = static_cast<std::uint8_t>(i);
+  }
+  Progress progress() override {
+    if (held) return Progress::busy;
+    busy_ = false;
+    return answers_ ? Progress::done : Progress::refused;
+  }
+  void release() override {
+    busy_ = false;
+    released_ = true;
+  }
+  void drive(bool, bool) override { require(released_); }
+  bool scl_is_high() override { return !held; }
+  bool sda_is_high() override { return !held; }
+  void resume() override { released_ = false; }
+  bool held = false;
+
+ private:
+  bool busy_ = false;
+  bool released_ = false;
+  bool answers_ = false;
+  unsigned sum_ = 0;
+};
+
 // A board with what is around it, and what its hosts would know.
 class World final : public firmware::Hal, public firmware::Observer {
  public:
@@ -62,6 +97,7 @@ class World final : public firmware::Hal, public firmware::Observer {
     config.chance = chance;
     if (keyed) config.settings.site.keys[0] = key();
     config.identity = Identity{"1", "fuzz", "none"};
+    config.i2c = &i2c_;
     board_ = std::make_unique<firmware::Application>(*this, config, this);
     for (int i = 0; i < ports; ++i) {
       ports_[i].world = this;
@@ -207,6 +243,9 @@ class World final : public firmware::Hal, public firmware::Observer {
         board().fail(value % 2 == 0 ? SafeReason::fault : SafeReason::watchdog, now_ms_);
         require(outputs_ == Outputs());
         break;
+      case 'b':
+        bus_.held = value % 2 != 0;
+        break;
       case 'j':  // the board is held up: time passes, nothing is polled
         now_ms_ += static_cast<std::uint32_t>(value) * 20;
         return;
@@ -335,6 +374,8 @@ class World final : public firmware::Hal, public firmware::Observer {
   Outputs outputs_;
   Port ports_[ports];
   Host hosts_[ports][peers];
+  UserBus bus_;
+  firmware::UserI2c i2c_{bus_};
   std::unique_ptr<firmware::Application> board_;
   int sent_ = 0;
   int executed_ = 0;

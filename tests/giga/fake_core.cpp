@@ -83,6 +83,7 @@ std::uintptr_t __get_MSP() {
 
 std::uint32_t HAL_RCC_GetPCLK1Freq() { return 120000000; }
 std::uint32_t HAL_RCC_GetHCLKFreq() { return 240000000; }
+std::uint32_t HAL_RCCEx_GetD3PCLK1Freq() { return 120000000; }
 void HAL_RCCEx_GetPLL1ClockFreq(PLL1_ClocksTypeDef* clocks) {
   *clocks = {480000000, 60000000, 240000000};
 }

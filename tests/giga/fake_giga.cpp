@@ -10,6 +10,7 @@
 
 GPIO_TypeDef r4_fake_gpio[11];
 I2C_TypeDef r4_fake_i2c2;
+I2C_TypeDef r4_fake_i2c4;
 ADC_TypeDef r4_fake_adc1;
 FDCAN_GlobalTypeDef r4_fake_fdcan2;
 IWDG_TypeDef r4_fake_iwdg1;
@@ -39,16 +40,18 @@ void clear_registers() {
     }
     port.MODER.value = 0xFFFFFFFF;
   }
-  auto* const words = reinterpret_cast<Register*>(&r4_fake_i2c2);
-  for (std::size_t i = 0; i < sizeof r4_fake_i2c2 / sizeof(Register); ++i) words[i].clear();
+  for (I2C_TypeDef* const i2c : {&r4_fake_i2c2, &r4_fake_i2c4}) {
+    auto* const words = reinterpret_cast<Register*>(i2c);
+    for (std::size_t i = 0; i < sizeof *i2c / sizeof(Register); ++i) words[i].clear();
+  }
   auto* const can = reinterpret_cast<Register*>(&r4_fake_fdcan2);
   for (std::size_t i = 0; i < sizeof r4_fake_fdcan2 / sizeof(Register); ++i) can[i].clear();
   auto* const converter = reinterpret_cast<Register*>(&r4_fake_adc1);
   for (std::size_t i = 0; i < sizeof r4_fake_adc1 / sizeof(Register); ++i) converter[i].clear();
-  for (Register* each :
-       {&r4_fake_tim7.CR1, &r4_fake_tim7.DIER, &r4_fake_tim7.SR, &r4_fake_tim7.ARR,
-        &r4_fake_tim7.PSC, &r4_fake_tim7.EGR, &r4_fake_rcc.AHB4ENR, &r4_fake_rcc.APB1LENR,
-        &r4_fake_rcc.APB1HENR, &r4_fake_rcc.D2CCIP1R, &r4_fake_scb.AIRCR, &r4_fake_iwdg1.KR}) {
+  for (Register* each : {&r4_fake_tim7.CR1, &r4_fake_tim7.DIER, &r4_fake_tim7.SR, &r4_fake_tim7.ARR,
+                         &r4_fake_tim7.PSC, &r4_fake_tim7.EGR, &r4_fake_rcc.AHB4ENR,
+                         &r4_fake_rcc.APB1LENR, &r4_fake_rcc.APB1HENR, &r4_fake_rcc.APB4ENR,
+                         &r4_fake_rcc.D2CCIP1R, &r4_fake_scb.AIRCR, &r4_fake_iwdg1.KR}) {
     each->clear();
   }
 }
@@ -90,6 +93,8 @@ void Giga::connect_registers() {
       }
       const bool scl = i == 'H' - 'A' && (port.MODER.value >> 8 & 3U) == 1;  // PH4 as an output
       if (scl && (before & 1U << 4) == 0 && (port.ODR.value & 1U << 4) != 0) i2c.scl_rose();
+      const bool user_scl = i == 'B' - 'A' && (port.MODER.value >> 12 & 3U) == 1;  // PB6
+      if (user_scl && (risen & 1U << 6) != 0) user_i2c.scl_rose();
     };
     port.IDR.on_read = [this, i, &port] {
       std::uint32_t levels = 0;
@@ -103,12 +108,16 @@ void Giga::connect_registers() {
                                 : pull == 1;
         if (i == 'B' - 'A' && line == 11 && i2c.sda_low()) high = false;
         if (i == 'H' - 'A' && line == 4 && i2c.scl_low()) high = false;
+        if (i == 'H' - 'A' && line == 12 && user_i2c.sda_low()) high = false;
+        if (i == 'B' - 'A' && line == 6 && user_i2c.scl_low()) high = false;
         levels |= (high ? 1U : 0U) << line;
       }
       return levels;
     };
   }
-  i2c.connect();
+  i2c.connect(r4_fake_i2c2, {&chips.osmc, &chips.dhb12, &chips.servo, &chips.expander, &chips.dac},
+              2500);
+  user_i2c.connect(r4_fake_i2c4, {&devices.mpu6050, &devices.ina219}, 10000);
   can.connect();
   connect_converter();
   r4_fake_iwdg1.KR.on_write = [this](std::uint32_t key) {

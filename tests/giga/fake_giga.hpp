@@ -19,8 +19,11 @@
 #include <string>
 #include <vector>
 
+#include "firmware/ports/sim/devices/user_devices.hpp"
 #include "firmware/ports/sim/robot/board_chips.hpp"
 #include "transports/framing/can/can_frame.hpp"
+
+struct I2C_TypeDef;
 
 namespace r4::fake {
 
@@ -39,7 +42,9 @@ class I2cPeripheral {
   // Bytes put on the wire, addresses included: {address << 1 | read, bytes…} for each START.
   std::vector<std::vector<std::uint8_t>> log;
 
-  void connect();  // to the registers, as after a reset
+  // To the registers, as after a reset.
+  void connect(I2C_TypeDef& registers, std::vector<sim::I2cChipModel*> chips,
+               std::uint64_t clock_ns);
   bool sda_low() const { return sda_held_ > 0; }
   bool scl_low() const { return scl_held_; }
   void scl_rose() {
@@ -55,6 +60,10 @@ class I2cPeripheral {
   void refuse();
   void count_byte();
 
+  I2C_TypeDef* registers_ = nullptr;
+  std::vector<sim::I2cChipModel*> chips_;
+  std::uint64_t byte_ns = 0;  // nine clocks
+  std::uint64_t stop_ns = 0;
   Step step_ = Step::idle;
   std::uint64_t due_ns_ = 0;
   std::uint32_t cr2_ = 0;
@@ -131,6 +140,8 @@ class Giga {
   // --- the board
   sim::BoardChips chips;
   I2cPeripheral i2c;
+  sim::UserDevices devices;  // on the user's bus
+  I2cPeripheral user_i2c;
   CanPeripheral can;
   void set_pin(char port, int number, bool level);  // an input, from outside
   bool pin(char port, int number);                  // an output

@@ -6,9 +6,6 @@ namespace r4::fake {
 
 namespace {
 
-constexpr std::uint64_t byte_ns = 22500;  // nine clocks of 400 kHz
-constexpr std::uint64_t stop_ns = 2500;
-
 constexpr std::uint32_t txis = 1U << 1;
 constexpr std::uint32_t rxne = 1U << 2;
 constexpr std::uint32_t nackf = 1U << 4;
@@ -21,33 +18,38 @@ constexpr std::uint32_t cr2_autoend = 1U << 25;
 
 }  // namespace
 
-void I2cPeripheral::connect() {
+void I2cPeripheral::connect(I2C_TypeDef& registers, std::vector<sim::I2cChipModel*> chips,
+                            std::uint64_t clock_ns) {
+  registers_ = &registers;
+  chips_ = std::move(chips);
+  byte_ns = 9 * clock_ns;
+  stop_ns = clock_ns;
   step_ = Step::idle;
   flags_ = 0;
   taking_part_.clear();
-  r4_fake_i2c2.CR1.on_write = [this](std::uint32_t value) {
-    r4_fake_i2c2.CR1.value = value;
+  registers_->CR1.on_write = [this](std::uint32_t value) {
+    registers_->CR1.value = value;
     if ((value & 1U) != 0) return;
     step_ = Step::idle;
     flags_ = 0;
     taking_part_.clear();
   };
-  r4_fake_i2c2.CR2.on_write = [this](std::uint32_t value) {
-    if ((value & cr2_start) != 0 && (r4_fake_i2c2.CR1.value & 1U) != 0) start(value);
+  registers_->CR2.on_write = [this](std::uint32_t value) {
+    if ((value & cr2_start) != 0 && (registers_->CR1.value & 1U) != 0) start(value);
   };
-  r4_fake_i2c2.ISR.on_read = [this] {
+  registers_->ISR.on_read = [this] {
     progress();
     const bool held = sda_held_ > 0 || scl_held_;
     return flags_ | (step_ != Step::idle || held ? busy : 0U);
   };
-  r4_fake_i2c2.ICR.on_write = [this](std::uint32_t value) { flags_ &= ~value; };
-  r4_fake_i2c2.TXDR.on_write = [this](std::uint32_t value) {
+  registers_->ICR.on_write = [this](std::uint32_t value) { flags_ &= ~value; };
+  registers_->TXDR.on_write = [this](std::uint32_t value) {
     if (step_ != Step::want_byte) return;
     out_ = static_cast<std::uint8_t>(value);
     flags_ &= ~txis;
     after(Step::byte, byte_ns);
   };
-  r4_fake_i2c2.RXDR.on_read = [this] {
+  registers_->RXDR.on_read = [this] {
     flags_ &= ~rxne;
     if (--left_ == 0) {
       after(Step::stop, stop_ns);
@@ -105,9 +107,7 @@ void I2cPeripheral::progress() {
       log.push_back({static_cast<std::uint8_t>(address << 1 | (reading ? 1 : 0))});
       count_byte();
       taking_part_.clear();
-      sim::BoardChips& chips = giga().chips;
-      for (sim::I2cChipModel* chip : std::initializer_list<sim::I2cChipModel*>{
-               &chips.osmc, &chips.dhb12, &chips.servo, &chips.expander, &chips.dac}) {
+      for (sim::I2cChipModel* chip : chips_) {
         if (chip->start(address, reading)) taking_part_.push_back(chip);
       }
       if (taking_part_.empty()) {

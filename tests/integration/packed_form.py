@@ -13,14 +13,15 @@ NAMES = [*'AIN24 AIN12 AIN5 AINDMH DMHSTA AINSTEER DHB1A OSMC1 STEP1POS SERVO1PO
          *'R4-ROS2 ROS2-R4 On Off STOP CLEAR DEFAULT ALL ID'.split(),
          *'rate heartbeat timeout recovery pack last rearm'.split(),
          *'UNKNOWN FORMAT RANGE CHANNEL STALE DUPLICATE BUSY AUTH R4 sim udp serial pty can FAULT'.split(),
-         *(f'ENC{n}HZ' for n in range(1, 5)), *(f'ENC{n}IDX' for n in range(1, 5))]
+         *(f'ENC{n}HZ' for n in range(1, 5)), *(f'ENC{n}IDX' for n in range(1, 5)),
+         *(f'I2C{n}' for n in range(1, 9)), *'I2CX I2CBUS X FULL'.split()]
 CODES = {name: code for code, name in enumerate(NAMES)}
 # first code, last code, form
 FORMS = [(0x00, 0x03, 'hundredths'), (0x04, 0x04, 'flag'), (0x05, 0x05, 'hundredths'), (0x06, 0x07, 'drive'),
          (0x08, 0x08, 'steps'), (0x09, 0x09, 'short'), (0x0A, 0x0A, 'hundredths'), (0x0B, 0x10, 'drive'),
          (0x11, 0x13, 'steps'), (0x14, 0x22, 'short'), (0x23, 0x26, 'steps'), (0x27, 0x2A, 'count'),
          (0x2B, 0x2E, 'bldc'), (0x2F, 0x2F, 'count'), (0x30, 0x30, 'flag'), (0x31, 0x39, 'count'),
-         (0x6A, 0x71, 'steps')]
+         (0x6A, 0x71, 'steps'), (0x72, 0x7A, 'bytes')]
 GIVEN = {2: NAMES[:10], 3: NAMES[:10] + ['SAFE', 'CMD'], 4: NAMES[:0x38]}
 HEARTBEATS = {5: 'R4-ROS2', 6: 'ROS2-R4'}
 SIZES = [(0, 0), (4, 5), (4, 8), (5, 8), (6, 8), (4, 11), (8, 8), (8, 11)]
@@ -67,6 +68,10 @@ def in_form(form, text):
     if form == 'count':
         found = match(PLAIN)
         return found and count(found[0])
+    if form == 'bytes':
+        found = re.fullmatch(f'{PLAIN},{PLAIN},x((?:[0-9a-f]{{2}}){{0,64}})', text)
+        counts = found and [count(int(found.group(n))) for n in (1, 2)]
+        return ''.join(counts) + f'{len(found.group(3)) // 2:02x}{found.group(3)}' if found and all(counts) else None
     assert form == 'steps'
     found = match('-?' + PLAIN)
     if not found or text == '-0':
@@ -206,6 +211,9 @@ class Digits:
         if form == 'steps':
             number = self.number(self.number(1))
             return f'-{(number + 1) // 2}' if number % 2 else str(number // 2)
+        if form == 'bytes':
+            first, second = (str(self.number(self.number(1))) for _ in range(2))
+            return f'{first},{second},x{self.take(2 * self.number(2))}'
         number = self.number({'flag': 1, 'short': 3, 'hundredths': 3, 'drive': 4, 'bldc': 4}[form])
         if form == 'hundredths':
             return f'{number // 100}.{number % 100:02}'

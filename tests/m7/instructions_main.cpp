@@ -12,6 +12,7 @@
 #include "on_target.hpp"
 #include "protocol/datagram/crc32.hpp"
 #include "protocol/datagram/datagram_writer.hpp"
+#include "protocol/messages/device_command.hpp"
 #include "protocol/messages/state_fields.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/state.hpp"
@@ -132,11 +133,12 @@ void sign(Signer* signer, DatagramWriter& writer) {
 std::uint32_t command_instructions(firmware::Hal& hal, std::uint32_t first, std::uint64_t t,
                                    const Key* key = nullptr, std::uint32_t group = 1) {
   Sink sink;
-  firmware::Application::Config config;
+  static firmware::Application::Config config;
+  config = firmware::Application::Config();
   const std::uint8_t chance[Authentication::chance_size] = {1};
   config.chance = chance;
   if (key != nullptr) config.settings.site.keys[0] = *key;
-  // Not on the stack, which is the loop's; each time a new one.
+  // One after the other in the same place: the stack has no room for it.
   alignas(firmware::Application) static unsigned char place[sizeof(firmware::Application)];
   firmware::Application& application = *new (place) firmware::Application(hal, config);
   const std::uint8_t port = application.add_port(sink);
@@ -187,6 +189,40 @@ std::uint32_t with_drivers() {
   const std::uint32_t count = command_instructions(hardware, 1500001000, 1699276044383);
   if (count == 0 || bus.writes() - before < repetitions) exit_emulator(5);
   return count;
+}
+
+// A wire that has done what it is told when it is asked.
+class UserWire final : public firmware::UserI2cPort {
+ public:
+  void begin(const firmware::UserTransfer& transfer) override {
+    for (std::size_t i = 0; i < transfer.in_size; ++i)
+      transfer.in[i] = static_cast<std::uint8_t>(i);
+    ++transfers;
+  }
+  Progress progress() override { return Progress::done; }
+  void release() override {}
+  void drive(bool, bool) override {}
+  bool scl_is_high() override { return true; }
+  bool sda_is_high() override { return true; }
+  void resume() override {}
+  std::uint32_t transfers = 0;
+};
+
+// One of eight readings of the user's bus, begun in one turn of the loop and ended in the next.
+std::uint32_t reading_instructions() {
+  static UserWire wire;
+  static firmware::UserI2c bus(wire);
+  std::uint32_t now_ms = 1000;
+  for (int slot = 1; slot <= i2c_slots; ++slot) {
+    bus.poll_slot(slot, poll_of(Command::i2c_poll(slot, 0x68, "x3B", 14, 8)),
+                  now_ms + static_cast<std::uint32_t>(slot));
+  }
+  now_ms += 20;
+  const std::uint32_t count = instructions_of([&] {
+    bus.poll(++now_ms);
+    bus.poll(now_ms);
+  });
+  return wire.transfers >= repetitions && bus.reading(8).data.size == 14 ? count : 0;
 }
 
 }  // namespace
@@ -251,5 +287,9 @@ int main() {
       instructions_of([&] { size = pack(datagram, packed, sizeof packed); });
   if (size == 0) exit_emulator(4);
   on_target::say_number("that state, packed", packing);
+
+  const std::uint32_t reading = reading_instructions();
+  if (reading == 0) exit_emulator(8);
+  on_target::say_number("14 bytes of a user's device, one of eight", reading);
   exit_emulator(0);
 }

@@ -25,6 +25,26 @@ I2cController::Wiring bus_wiring() {
   return wiring;
 }
 
+I2cController::Wiring user_wiring() {
+  I2cController::Wiring wiring;
+  wiring.registers = I2C4;
+  wiring.scl = user_scl_pin;
+  wiring.sda = user_sda_pin;
+  wiring.scl_function = user_scl_function;
+  wiring.sda_function = user_sda_function;
+  return wiring;
+}
+
+void start_user_bus(UserI2cController& bus) {
+  constexpr std::uint32_t rcc_i2c4_on = 1U << 7;
+  {
+    const InterruptLock lock;
+    RCC->APB4ENR |= rcc_i2c4_on;
+    static_cast<void>(static_cast<std::uint32_t>(RCC->APB4ENR));
+  }
+  bus.start(HAL_RCCEx_GetD3PCLK1Freq());  // the clock of I2C4 after a reset (RCC_D3CCIPR)
+}
+
 void start_bus(I2cController& bus) {
   constexpr std::uint32_t rcc_i2c2_on = 1U << 22;
   {
@@ -69,6 +89,8 @@ Machine::Machine()
       hardware_(bus_, pins(), hardware_config()),
       outputs_off_(bus_, hardware_),
       analog_(analog_values_),
+      user_bus_(user_wiring()),
+      user_i2c_(user_bus_),
       encoder1_(encoder_a_pins[0], encoder_b_pins[0], index_pins[0]),
       encoder2_(encoder_a_pins[1], encoder_b_pins[1], index_pins[1]),
       encoder3_(encoder_a_pins[2], encoder_b_pins[2], index_pins[2]),
@@ -91,6 +113,7 @@ firmware::BoardPins Machine::pins() {
 }
 
 void Machine::start(firmware::Guard& guard) {
+  start_user_bus(user_bus_);
   guard_ = &guard;
   step_duty_ = guard.add_duty(step_limit_ms);
   for (int i = 0; i < encoder_channels; ++i) {
@@ -120,6 +143,7 @@ void Machine::poll() {
 void Machine::step_tick() {
   guard_->check_in(step_duty_);
   hardware_.step_tick();
+  user_bus_.tick();
   for (int i = 0; i < encoder_channels; ++i) {
     hardware_.encoder(i + 1).index(encoders_[i]->index.read());
   }

@@ -6,10 +6,12 @@
 #include <cstdint>
 
 #include "../../board_hardware.hpp"
+#include "../../devices/user_i2c.hpp"
 #include "../../guard.hpp"
 #include "analog_inputs.hpp"
 #include "chip/i2c_controller.hpp"
 #include "chip/timers.hpp"
+#include "devices/user_i2c_controller.hpp"
 #include "pins.hpp"
 
 namespace r4 {
@@ -26,6 +28,7 @@ class Machine final : public StepTick {
 
   firmware::BoardHardware& hardware() { return hardware_; }
   I2cController& bus() { return bus_; }
+  firmware::UserI2c& user_i2c() { return user_i2c_; }
 
   void step_tick() override;
 
@@ -74,6 +77,8 @@ class Machine final : public StepTick {
   firmware::BoardHardware hardware_;
   OutputsOff outputs_off_;
   AnalogInputs analog_;
+  UserI2cController user_bus_;
+  firmware::UserI2c user_i2c_;
   firmware::Guard* guard_ = nullptr;
   firmware::Guard::Duty step_duty_ = 0;
   // GCC 7 and 8 would copy the elements of an array that a constructor makes (GCC bug 63707), and

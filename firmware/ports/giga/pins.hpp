@@ -50,6 +50,12 @@ constexpr Pin i2c_scl_pin = {'H', 4};
 constexpr Pin i2c_sda_pin = {'B', 11};
 constexpr std::uint32_t i2c_function = 4;
 
+// The user's I2C bus, the core's Wire1: SCL1 and SDA1, I2C4. It has no pins in common with anything else here.
+constexpr Pin user_scl_pin = {'B', 6};
+constexpr Pin user_sda_pin = {'H', 12};
+constexpr std::uint32_t user_scl_function = 6;
+constexpr std::uint32_t user_sda_function = 4;
+
 // CAN: FDCAN2, alternate function 9. The Giga has no transceiver: an SN65HVD230 of the R4 board (paper,
 // section 2) is wired to these two (docs/can.md).
 constexpr Pin can_tx_pin = {'B', 13};

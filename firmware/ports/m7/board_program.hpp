@@ -26,7 +26,7 @@ class BoardProgram {
       : clock_(static_cast<std::uint32_t>(seed)),
         model_(seed),
         hardware_(model_),
-        application_(hardware_.hal(), config),
+        application_(hardware_.hal(), with_devices(config, hardware_.i2c())),
         link_(link),
         udp_(udp),
         link_number_(application_.add_port(link)),
@@ -87,6 +87,12 @@ class BoardProgram {
   firmware::Application& application() { return application_; }
 
  private:
+  static firmware::Application::Config with_devices(firmware::Application::Config config,
+                                                    firmware::UserI2c& i2c) {
+    config.i2c = &i2c;
+    return config;
+  }
+
   BoardClock clock_;
   WireTime wire_;
   sim::BoardModel model_;

@@ -77,6 +77,21 @@ class Bus final : public firmware::I2cBus {
   volatile std::uint32_t wire_ = 0;
 };
 
+// The place of the user's bus.
+class UserBus final : public firmware::UserI2cPort {
+ public:
+  void begin(const firmware::UserTransfer& transfer) override { wire_ = transfer.address; }
+  Progress progress() override { return Progress::done; }
+  void release() override { drive(true, true); }
+  void drive(bool scl, bool sda) override { wire_ = scl && sda ? 1 : 0; }
+  bool scl_is_high() override { return wire_ != 0; }
+  bool sda_is_high() override { return wire_ != 0; }
+  void resume() override {}
+
+ private:
+  volatile std::uint32_t wire_ = 1;
+};
+
 class Output final : public firmware::OutputPin {
  public:
   void write(bool high) override { level_ = high; }
@@ -141,6 +156,9 @@ int main() {
   config.identity.firmware = Text(R4LINK_VERSION);
   config.identity.board_id = Text("m7-1");
   config.identity.capabilities = Text("serial+can");
+  static UserBus user_bus;
+  static firmware::UserI2c i2c(user_bus);
+  config.i2c = &i2c;
   static firmware::Application application(hal, config);
   static_assert(firmware::Application::max_ports >= 2, "each port has a place");
   const std::uint8_t link_number = application.add_port(link);

@@ -13,6 +13,7 @@
 #include "r4link/error.hpp"
 #include "r4link/state.hpp"
 #include "r4link/vocabulary.hpp"
+#include "robot/board_model.hpp"
 
 namespace r4::sim {
 
@@ -121,20 +122,26 @@ void read_motor(const Line& line, ScriptStep& step) {
   step.value = line.words[2] == "stalled" ? 1 : 0;
 }
 
+// A ScriptStep::Supply.
+std::int32_t supply_of(const Line& line, const char* what) {
+  static constexpr std::string_view supplies[] = {"off", "on", "reset"};
+  const auto* const supply = std::find(std::begin(supplies), std::end(supplies), line.words[2]);
+  if (supply == std::end(supplies)) {
+    fail(line, line.words[2], std::string("is nothing that can happen to a ") + what,
+         "write off, on or reset");
+  }
+  return static_cast<std::int32_t>(supply - std::begin(supplies));
+}
+
 void read_chip(const Line& line, ScriptStep& step) {
   static constexpr std::string_view chips[firmware::chip_count] = {"osmc", "dhb", "expander", "dac",
                                                                    "servo"};
-  static constexpr std::string_view supplies[] = {"off", "on", "reset"};
   const auto* const chip = std::find(std::begin(chips), std::end(chips), line.words[1]);
   if (chip == std::end(chips)) {
     fail(line, line.words[1], "is no chip", "write osmc, dhb, expander, dac or servo");
   }
-  const auto* const supply = std::find(std::begin(supplies), std::end(supplies), line.words[2]);
-  if (supply == std::end(supplies)) {
-    fail(line, line.words[2], "is nothing that can happen to a chip", "write off, on or reset");
-  }
   step.channel = static_cast<int>(chip - std::begin(chips));
-  step.value = static_cast<std::int32_t>(supply - std::begin(supplies));
+  step.value = supply_of(line, "chip");
 }
 
 void read_i2c(const Line& line, ScriptStep& step) {
@@ -142,6 +149,25 @@ void read_i2c(const Line& line, ScriptStep& step) {
     fail(line, line.words[1], "is nothing a bus can be", "write held or free");
   }
   step.value = line.words[1] == "held" ? 1 : 0;
+}
+
+void read_user_bus(const Line& line, ScriptStep& step) {
+  static constexpr std::string_view faults[] = {"free", "held", "cut", "stretched"};
+  const auto* const fault = std::find(std::begin(faults), std::end(faults), line.words[1]);
+  if (fault == std::end(faults)) {
+    fail(line, line.words[1], "is nothing a bus can be", "write held, cut, stretched or free");
+  }
+  step.value = static_cast<std::int32_t>(fault - std::begin(faults));
+}
+
+void read_device(const Line& line, ScriptStep& step) {
+  static constexpr std::string_view devices[user_device_count] = {"mpu6050", "ina219"};
+  const auto* const device = std::find(std::begin(devices), std::end(devices), line.words[1]);
+  if (device == std::end(devices)) {
+    fail(line, line.words[1], "is no device on the user's bus", "write mpu6050 or ina219");
+  }
+  step.channel = static_cast<int>(device - std::begin(devices));
+  step.value = supply_of(line, "device");
 }
 
 void read_hang(const Line& line, ScriptStep& step) {
@@ -164,6 +190,8 @@ constexpr Form forms[] = {
     {"motor", 3, "motor MOTOR stalled|free", ScriptStep::Kind::motor, read_motor},
     {"chip", 3, "chip NAME off|on|reset", ScriptStep::Kind::chip, read_chip},
     {"i2c", 2, "i2c held|free", ScriptStep::Kind::i2c, read_i2c},
+    {"userbus", 2, "userbus held|cut|stretched|free", ScriptStep::Kind::user_bus, read_user_bus},
+    {"device", 3, "device NAME off|on|reset", ScriptStep::Kind::device, read_device},
     {"hang", 2, "hang SECONDS", ScriptStep::Kind::hang, read_hang},
     {"fault", 1, "fault", ScriptStep::Kind::fault, nullptr},
     {"watchdog", 1, "watchdog", ScriptStep::Kind::watchdog, nullptr},

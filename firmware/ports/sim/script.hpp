@@ -11,6 +11,10 @@
 //     2   chip dac off          that chip acknowledges nothing, until it is on; reset: it loses its
 //                               supply for a moment. osmc, dhb, servo, expander, dac
 //     2   i2c held              a chip holds the bus until it is free
+//     2   userbus held          a device of the user's holds SDA until the bus is free; cut: until it has
+//                               seen nine clocks; stretched: it holds SCL
+//     2   device ina219 off     that device of the user's answers nothing, until it is on; reset: it loses
+//                               its supply for a moment. mpu6050, ina219
 //     2   hang 0.3              the firmware's loop stands still for 0.3 s; what arrives is lost
 //     3   fault                 the board finds itself broken
 //     3   watchdog              a duty of the board missed its deadline
@@ -36,6 +40,8 @@ struct ScriptStep {
     motor,
     chip,
     i2c,
+    user_bus,
+    device,
     hang,
     fault,
     watchdog,
@@ -46,8 +52,10 @@ struct ScriptStep {
 
   Kind kind = Kind::handle;
   std::uint32_t at_ms = 0;
-  int channel = 0;  // ultrasonic, encoder, motor: 1 …; analog: an Analog; chip: a Chip
-  // 1 held (handle, i2c) or stalled; cm or off; counts; hundredths of a volt; a Supply; ms
+  int channel =
+      0;  // ultrasonic, encoder, motor: 1 …; analog: an Analog; chip: a Chip; device: a UserDevice
+  // 1 held (handle, i2c) or stalled; cm or off; counts; hundredths of a volt; a Supply; ms;
+  // user_bus: a UserBusModel::Fault
   std::int32_t value = 0;
   std::string text;  // the line without its time, "handle released"
 };

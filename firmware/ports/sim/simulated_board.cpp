@@ -94,6 +94,7 @@ void SimulatedBoard::reset_microcontroller() {
   config.settings = options_.settings;
   const auto random_bytes = chance();
   config.chance = random_bytes.data();
+  config.i2c = &hardware_->i2c();
   Observer& observer = *this;
   application_.emplace(hardware_->hal(), config, &observer);
   for (const auto& port : ports_) port->number = application_->add_port(*port);
@@ -153,6 +154,7 @@ void SimulatedBoard::advance(Milliseconds elapsed) {
 void SimulatedBoard::pass_millisecond() {
   ++passed_;
   hardware_->pass_millisecond(!hangs());
+  if (!hangs()) application_->poll_devices(board_ms(passed_));
   if (!hangs()) application_->guard().check_in(firmware::Application::loop_duty);
   if (application_->guard().tick(board_ms(passed_))) {
     watchdog_fed_ = passed_;
@@ -206,6 +208,16 @@ void SimulatedBoard::take(const ScriptStep& step) {
     case ScriptStep::Kind::i2c:
       model_.chips().bus.hold(step.value != 0 ? std::numeric_limits<int>::max() : 0);
       break;
+    case ScriptStep::Kind::user_bus:
+      model_.devices().bus.set_fault(static_cast<UserBusModel::Fault>(step.value));
+      break;
+    case ScriptStep::Kind::device: {
+      I2cChipModel& device = model_.devices()[static_cast<UserDevice>(step.channel)];
+      const auto supply = static_cast<ScriptStep::Supply>(step.value);
+      if (supply != ScriptStep::Supply::off) device.power_on();
+      model_.devices().bus.connect(device, supply != ScriptStep::Supply::off);
+      break;
+    }
     case ScriptStep::Kind::hang:
       hangs_until_ = passed_ + Milliseconds(step.value);
       break;

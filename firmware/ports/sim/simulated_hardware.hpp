@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "../../board_hardware.hpp"
+#include "../../devices/user_i2c.hpp"
 #include "robot/board_model.hpp"
 
 namespace r4 {
@@ -23,6 +24,7 @@ class SimulatedHardware final : private BoardModel::Interrupts {
   void pass_millisecond(bool loop_turns = true);
 
   firmware::BoardHardware& hal() { return hardware_; }
+  firmware::UserI2c& i2c() { return i2c_; }
 
   // For a chip's EEPROM that is written for the first time, and a handle that settles.
   static constexpr int boot_ms = 100;
@@ -38,6 +40,7 @@ class SimulatedHardware final : private BoardModel::Interrupts {
 
   BoardModel& board_;
   firmware::BoardHardware hardware_;
+  firmware::UserI2c i2c_;
   std::uint32_t now_us_ = 0;  // of the microcontroller's clock; wraps
 };
 

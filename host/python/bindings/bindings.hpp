@@ -30,14 +30,29 @@ void bind_simulation(py::module_& module);
 inline py::str to_str(Text text) { return {text.data(), text.size()}; }
 py::object to_python(Drive drive);
 py::object to_python(const Bldc& bldc);
+py::object to_python(const I2cReading& reading);
+py::object to_python(const I2cAnswer& answer);
+py::object to_python(const I2cBusReport& report);
 
 // What a field holds, and its numbers as they are on the wire: volts in hundredths.
-enum class Form : std::uint8_t { volts, flag, number, drive, bldc, safe, fault };
+enum class Form : std::uint8_t {
+  volts,
+  flag,
+  number,
+  drive,
+  bldc,
+  safe,
+  fault,
+  reading,
+  answer,
+  bus
+};
 using Numbers = std::array<std::int64_t, 3>;
 Form form_of(StateField field);
 Numbers numbers_of(const State& state, StateField field);
 
-// A field of a state, in its unit (state.hpp): float of volts, bool of the handle, Drive, Bldc, int.
+// A field of a state, in its unit (state.hpp): float of volts, bool of the handle, Drive, Bldc,
+// I2cReading, int.
 py::object value_of(const State& state, StateField field);
 // "osmc1": an attribute.
 std::string attribute_of(StateField field);

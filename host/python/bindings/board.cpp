@@ -170,6 +170,17 @@ py::tuple run_loop(PyBoard& board, const control::LoopOptions& options, const py
   return py::make_tuple(to_text(report.end), report.why, report.at_rest, report.steps);
 }
 
+// What a call that waits returns, as Python has it.
+template <class Call>
+py::bytes bytes_of(Call call) {
+  Board::I2c::Bytes bytes;
+  {
+    const py::gil_scoped_release free;
+    bytes = call();
+  }
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
 }  // namespace
 
 void bind_board(py::module_& module) {
@@ -207,6 +218,30 @@ void bind_board(py::module_& module) {
           Released())
       .def("post",
            [](PyBoard& board, const Command& command) { return to_text(board->post(command)); })
+      .def("i2c_read",
+           [](PyBoard& board, int address, const std::string& at, int count, int ms) {
+             return bytes_of([&] {
+               return board->i2c().read(address, {at.begin(), at.end()}, count, Ms(ms));
+             });
+           })
+      .def("i2c_write",
+           [](PyBoard& board, int address, const std::string& bytes, int count, int ms) {
+             return bytes_of([&] {
+               return board->i2c().write(address, {bytes.begin(), bytes.end()}, count, Ms(ms));
+             });
+           })
+      .def("i2c_scan", [](PyBoard& board,
+                          int ms) { return bytes_of([&] { return board->i2c().scan(Ms(ms)); }); })
+      .def(
+          "i2c_poll",
+          [](PyBoard& board, int slot, int address, const std::string& at, int count, int period_ms,
+             int ms) {
+            board->i2c().poll(slot, address, {at.begin(), at.end()}, count, Ms(period_ms), Ms(ms));
+          },
+          Released())
+      .def(
+          "i2c_poll_off",
+          [](PyBoard& board, int slot, int ms) { board->i2c().poll_off(slot, Ms(ms)); }, Released())
       .def(
           "apply",
           [](PyBoard& board, const Setpoints& setpoints, int ms) {

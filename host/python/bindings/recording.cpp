@@ -45,8 +45,10 @@ struct RecordedBoard {
 };
 
 std::size_t count_of(Form form) {
-  if (form == Form::bldc) return 3;
-  return form == Form::drive || form == Form::fault ? 2 : 1;
+  if (form == Form::bldc || form == Form::bus) return 3;
+  const bool two =
+      form == Form::drive || form == Form::fault || form == Form::reading || form == Form::answer;
+  return two ? 2 : 1;
 }
 
 class Columns final : public RecordingVisitor {
@@ -133,6 +135,13 @@ std::pair<std::string, const char*> column_of(StateField field, std::size_t whic
       return {name, "u1"};
     case Form::fault:
       return which == 0 ? std::pair{name + "_chip", "u1"} : std::pair{name + "_trouble", "u1"};
+    case Form::reading:  // its bytes are in the datagrams
+      return {name + (which == 0 ? "_t_ms" : "_errors"), "u4"};
+    case Form::answer:
+      return which == 0 ? std::pair{name + "_pnum", "u4"} : std::pair{name + "_outcome", "u1"};
+    case Form::bus:
+      if (which == 0) return {name + "_outcome", "u1"};
+      return {name + (which == 1 ? "_errors" : "_recoveries"), "u4"};
     case Form::number:
       break;
   }

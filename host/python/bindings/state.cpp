@@ -36,6 +36,9 @@ Form form_of(F field) {
   if (nth(field, F::bldc1, F::bldc4) >= 0) return Form::bldc;
   if (field == F::dmhsta) return Form::flag;
   if (field == F::safe) return Form::safe;
+  if (nth(field, F::i2c1, F::i2c8) >= 0) return Form::reading;
+  if (field == F::i2cx) return Form::answer;
+  if (field == F::i2cbus) return Form::bus;
   return field == F::fault ? Form::fault : Form::number;
 }
 
@@ -63,6 +66,9 @@ Numbers numbers_of(const State& state, F field) {
     return {state.encoder_index_counts[n]};
   }
   if (const int n = nth(field, F::us1, F::us4); n >= 0) return {state.ultrasonic_cm[n]};
+  if (const int n = nth(field, F::i2c1, F::i2c8); n >= 0) {
+    return {state.i2c[n].t_ms, state.i2c[n].errors};
+  }
   switch (field) {
     case F::ainsteer:
       return {state.analog_cv[static_cast<int>(Analog::ainsteer)]};
@@ -88,6 +94,11 @@ Numbers numbers_of(const State& state, F field) {
       return {state.rx_refused};
     case F::late:
       return {state.late};
+    case F::i2cx:
+      return {state.i2c_answer.pnum, static_cast<int>(state.i2c_answer.outcome)};
+    case F::i2cbus:
+      return {static_cast<int>(state.i2c_bus.newest), state.i2c_bus.errors,
+              state.i2c_bus.recoveries};
     case F::fault:
       return {state.fault.address, static_cast<int>(state.fault.trouble)};
     default:
@@ -113,6 +124,12 @@ py::object value_of(const State& state, F field) {
     case Form::fault:
       if (!state.fault.any()) return py::none();
       return py::str("{}: {}").format(chip_name(state.fault.address), to_text(state.fault.trouble));
+    case Form::reading:
+      return to_python(state.i2c[nth(field, F::i2c1, F::i2c8)]);
+    case Form::answer:
+      return to_python(state.i2c_answer);
+    case Form::bus:
+      return to_python(state.i2c_bus);
     case Form::number:
       break;
   }

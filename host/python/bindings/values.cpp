@@ -92,6 +92,26 @@ py::object to_python(const Bldc& bldc) {
   return type(bldc.speed, static_cast<int>(bldc.direction), bldc.brake);
 }
 
+template <int most>
+static py::bytes bytes_of(const DeviceBytes<most>& data) {
+  return {reinterpret_cast<const char*>(data.bytes), data.size};
+}
+static py::handle named(const char* name) {
+  return py::module_::import("r4link.values").attr(name).cast<py::object>().release();
+}
+py::object to_python(const I2cReading& reading) {
+  static const py::handle type = named("I2cReading");
+  return type(reading.t_ms, reading.errors, bytes_of(reading.data));
+}
+py::object to_python(const I2cAnswer& answer) {
+  static const py::handle type = named("I2cAnswer");
+  return type(answer.pnum, to_text(answer.outcome), bytes_of(answer.data));
+}
+py::object to_python(const I2cBusReport& report) {
+  static const py::handle type = named("I2cBusReport");
+  return type(to_text(report.newest), report.errors, report.recoveries);
+}
+
 void bind_values(py::module_& module) {
   bind_commands(module);
   Record<LinkStatus>(module, "LinkStatus")

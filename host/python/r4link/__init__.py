@@ -3,14 +3,14 @@
 from . import aio, control
 from ._core import (FIELDS, BoardHealth, CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State,
                     Statistics, Subscription, __version__)
-from .board import (BldcChannel, Board, DriveChannel, RelayChannel, ServoChannel, Setpoints, States, StepperChannel)
+from .board import (BldcChannel, Board, DriveChannel, I2c, RelayChannel, ServoChannel, Setpoints, States, StepperChannel)
 from .bridge import Bridge, BridgeCounters, BridgeEnd, BridgeStatus
 from .errors import (CancelledError, ClosedError, DataError, DeniedError, Error, NotArmedError, NotConfirmedError,
                      OpenError, RefusedError, UnsupportedError, UsageError)
 from .fleet import Fleet, FleetEvent, FleetResults
 from .recording import Log, RecordedBoard, RecordedDatagram, RecordedEvent, read
 from .simulation import LinkedUrl, Look, SimBoard, with_link
-from .values import Bldc, Direction, Drive, PostResult
+from .values import Bldc, Direction, Drive, I2cAnswer, I2cBusReport, I2cReading, PostResult
 
 FORWARD = Direction.FORWARD
 REVERSE = Direction.REVERSE
@@ -18,7 +18,7 @@ REVERSE = Direction.REVERSE
 __all__ = [
     'FIELDS', 'FORWARD', 'REVERSE', 'Bldc', 'BldcChannel', 'Board', 'BoardHealth', 'Bridge', 'BridgeCounters', 'BridgeEnd', 'BridgeStatus', 'CancelledError', 'CarrierCounters',
     'ClosedError', 'Command', 'DataError', 'DeniedError', 'Direction', 'Drive', 'DriveChannel', 'Error', 'Event',
-    'Fleet', 'FleetEvent', 'FleetResults', 'Identity', 'LinkStatus', 'LinkedUrl', 'Log', 'Look', 'NotArmedError',
+    'Fleet', 'FleetEvent', 'FleetResults', 'I2c', 'I2cAnswer', 'I2cBusReport', 'I2cReading', 'Identity', 'LinkStatus', 'LinkedUrl', 'Log', 'Look', 'NotArmedError',
     'NotConfirmedError', 'OpenError', 'PostResult', 'RecordedBoard', 'RecordedDatagram', 'RecordedEvent', 'Recording',
     'RefusedError', 'RefusedPost', 'RelayChannel', 'ServoChannel', 'Setpoints', 'SimBoard', 'State', 'States',
     'Statistics', 'StepperChannel', 'Subscription', 'UnsupportedError', 'UsageError', 'aio', 'control', 'read', 'with_link',

@@ -5,7 +5,7 @@ from datetime import datetime
 from types import TracebackType
 from typing import Any, Callable, Self, Sequence, Type, overload
 
-from .values import Bldc, Drive
+from .values import Bldc, Drive, I2cAnswer, I2cBusReport, I2cReading
 
 __version__: str
 FIELDS: tuple[str, ...]
@@ -246,6 +246,16 @@ class State:
     enc2idx: int
     enc3idx: int
     enc4idx: int
+    i2c1: I2cReading
+    i2c2: I2cReading
+    i2c3: I2cReading
+    i2c4: I2cReading
+    i2c5: I2cReading
+    i2c6: I2cReading
+    i2c7: I2cReading
+    i2c8: I2cReading
+    i2cx: I2cAnswer
+    i2cbus: I2cBusReport
 
 class Command:
     @staticmethod
@@ -386,6 +396,11 @@ class Board:
     def wait_active(self, ms: int, /) -> None: ...
     def send(self, command: str | Command, ms: int, /) -> None: ...
     def post(self, command: Command | Setpoints, /) -> str: ...
+    def i2c_read(self, address: int, at: bytes, count: int, ms: int, /) -> bytes: ...
+    def i2c_write(self, address: int, data: bytes, count: int, ms: int, /) -> bytes: ...
+    def i2c_scan(self, ms: int, /) -> bytes: ...
+    def i2c_poll(self, slot: int, address: int, at: bytes, count: int, period_ms: int, ms: int, /) -> None: ...
+    def i2c_poll_off(self, slot: int, ms: int, /) -> None: ...
     def apply(self, setpoints: Setpoints, ms: int, /) -> None: ...
     def arm(self, ms: int, /) -> None: ...
     def disarmed_by(self) -> str: ...

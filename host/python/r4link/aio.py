@@ -164,6 +164,30 @@ class BldcChannel(_Channel):
         return self._board.post(Command.bldc(self._channel, speed, direction, brake))
 
 
+class I2c:
+    """The devices on the user's I2C bus, as r4link.I2c."""
+
+    def __init__(self, board: Board) -> None:
+        self._commands = board._commands
+        self._i2c = board._board.i2c
+
+    async def read(self, address: int, register: int | bytes, count: int, timeout: float = 1.0) -> bytes:
+        return await self._commands.call(lambda: self._i2c.read(address, register, count, timeout))
+
+    async def write(self, address: int, data: bytes, count: int = 0, timeout: float = 1.0) -> bytes:
+        return await self._commands.call(lambda: self._i2c.write(address, data, count, timeout))
+
+    async def scan(self, timeout: float = 2.0) -> list[int]:
+        return await self._commands.call(lambda: self._i2c.scan(timeout))
+
+    async def poll(self, slot: int, address: int, register: int | bytes, count: int, period: float,
+                   timeout: float = 1.0) -> None:
+        await self._commands.call(lambda: self._i2c.poll(slot, address, register, count, period, timeout))
+
+    async def poll_off(self, slot: int, timeout: float = 1.0) -> None:
+        await self._commands.call(lambda: self._i2c.poll_off(slot, timeout))
+
+
 class Board:
     """r4link.Board for asyncio; takes the same options. What does not wait is no coroutine there either."""
 
@@ -210,6 +234,10 @@ class Board:
 
     async def identify(self, timeout: float = 1.0) -> Identity:
         return await self._commands.call(lambda: self._board.identify(timeout))
+
+    @property
+    def i2c(self) -> I2c:
+        return I2c(self)
 
     async def proximity(self, channel: int, threshold_cm: int, timeout: float = 1.0) -> None:
         await self.send(Command.proximity(channel, threshold_cm), timeout)

@@ -140,6 +140,38 @@ class BldcChannel(_Channel):
         return self._board.post(Command.bldc(self._channel, speed, direction, brake))
 
 
+class I2c:
+    """The devices on the user's I2C bus (docs/devices.md). read(), write() and scan() return when the device has
+    answered, and raise RefusedError where none does."""
+
+    def __init__(self, board: Board) -> None:
+        self._board = board
+
+    def read(self, address: int, register: int | bytes, count: int, timeout: float = 1.0) -> bytes:
+        """Of a register, of one byte or as bytes; b'' names none."""
+        return self._board._core.i2c_read(address, _register(register), count, _ms(timeout))
+
+    def write(self, address: int, data: bytes, count: int = 0, timeout: float = 1.0) -> bytes:
+        """May move something, so that it takes arm(). Then reads `count` bytes."""
+        return self._board._core.i2c_write(address, bytes(data), count, _ms(timeout))
+
+    def scan(self, timeout: float = 2.0) -> list[int]:
+        """The addresses that answer, at most 32."""
+        return list(self._board._core.i2c_scan(_ms(timeout)))
+
+    def poll(self, slot: int, address: int, register: int | bytes, count: int, period: float,
+             timeout: float = 1.0) -> None:
+        """The board reads it by itself from now on, into slot 1-8: state.i2c1, after fields('DEFAULT,I2C1')."""
+        self._board._core.i2c_poll(slot, address, _register(register), count, _ms(period), _ms(timeout))
+
+    def poll_off(self, slot: int, timeout: float = 1.0) -> None:
+        self._board._core.i2c_poll_off(slot, _ms(timeout))
+
+
+def _register(register: int | bytes) -> bytes:
+    return register.to_bytes(1) if isinstance(register, int) else bytes(register)
+
+
 class States:
     """The states of a board from now on: `for state in board.states(): …`, until the board is closed. Keeps it open.
     """
@@ -276,6 +308,10 @@ class Board:
 
     def bldc(self, channel: int) -> BldcChannel:
         return BldcChannel(self, channel)
+
+    @property
+    def i2c(self) -> I2c:
+        return I2c(self)
 
     def proximity(self, channel: int, threshold_cm: int, timeout: float = 1.0) -> None:
         """The board goes safe when something is nearer than that; 0: off."""

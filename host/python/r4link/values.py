@@ -27,6 +27,27 @@ class Bldc(NamedTuple):
     brake: bool
 
 
+class I2cReading(NamedTuple):
+    """What the board read by itself from a device on the user's bus; t_ms is its clock then."""
+    t_ms: int
+    errors: int
+    data: bytes
+
+
+class I2cAnswer(NamedTuple):
+    """How the newest single transfer ended: 'done', 'no acknowledge', 'bus stuck', 'cancelled'."""
+    pnum: int
+    outcome: str
+    data: bytes
+
+
+class I2cBusReport(NamedTuple):
+    """How the user's bus does: the newest outcome, transfers that failed, how often it was clocked free."""
+    outcome: str
+    errors: int
+    recoveries: int
+
+
 class PostResult(enum.Enum):
     """What became of what was posted; true where it was sent."""
     SENT = 'sent'

@@ -48,6 +48,7 @@ struct SCB_Type {
 
 extern GPIO_TypeDef r4_fake_gpio[11];
 extern I2C_TypeDef r4_fake_i2c2;
+extern I2C_TypeDef r4_fake_i2c4;
 extern ADC_TypeDef r4_fake_adc1;
 extern FDCAN_GlobalTypeDef r4_fake_fdcan2;
 extern IWDG_TypeDef r4_fake_iwdg1;
@@ -70,6 +71,7 @@ extern std::uint32_t r4_fake_message_ram[2560];
 #define GPIOJ (&r4_fake_gpio[9])
 #define GPIOK (&r4_fake_gpio[10])
 #define I2C2 (&r4_fake_i2c2)
+#define I2C4 (&r4_fake_i2c4)
 #define ADC1 (&r4_fake_adc1)
 #define FDCAN2 (&r4_fake_fdcan2)
 #define IWDG1 (&r4_fake_iwdg1)
@@ -106,6 +108,7 @@ void NVIC_SetPendingIRQ(IRQn_Type line);
 
 std::uint32_t HAL_RCC_GetPCLK1Freq();
 std::uint32_t HAL_RCC_GetHCLKFreq();
+std::uint32_t HAL_RCCEx_GetD3PCLK1Freq();
 struct PLL1_ClocksTypeDef {
   std::uint32_t PLL1_P_Frequency, PLL1_Q_Frequency, PLL1_R_Frequency;
 };

@@ -14,6 +14,7 @@ TEST(Refusal, EveryCodeHasItsNameOnTheWire) {
       {Refusal::unknown, "UNKNOWN"}, {Refusal::format, "FORMAT"}, {Refusal::range, "RANGE"},
       {Refusal::channel, "CHANNEL"}, {Refusal::stale, "STALE"},   {Refusal::duplicate, "DUPLICATE"},
       {Refusal::safe, "SAFE"},       {Refusal::busy, "BUSY"},     {Refusal::auth, "AUTH"},
+      {Refusal::full, "FULL"},
   };
   for (const auto& [code, name] : codes) {
     EXPECT_EQ(str(name_of(code)), name);

@@ -180,7 +180,7 @@ TEST(Message, AReasonThatIsNotKnownIsAFault) {
 }
 
 TEST(Message, RefusalsRoundTripWithEveryCode) {
-  for (int code = 1; code <= static_cast<int>(Refusal::auth); ++code) {
+  for (int code = 1; code <= static_cast<int>(Refusal::full); ++code) {
     char buffer[max_datagram];
     DatagramWriter writer(buffer, sizeof buffer);
     write_nack(writer, Nack{4294967295U, static_cast<Refusal>(code)});

@@ -77,6 +77,17 @@ State numbered_state() {
   state.rx_refused = 16;
   state.fault = {64, ChipTrouble::no_acknowledge};
   state.late = 17;
+  for (int i = 0; i < i2c_slots; ++i) {
+    state.i2c[i].t_ms = static_cast<std::uint32_t>(9001 + i);
+    state.i2c[i].errors = static_cast<std::uint32_t>(1 + i);
+    state.i2c[i].data.size = 1;
+    state.i2c[i].data.bytes[0] = static_cast<std::uint8_t>(0xF1 + i);
+  }
+  state.i2c_answer.pnum = 18;
+  state.i2c_answer.outcome = I2cOutcome::cancelled;
+  state.i2c_bus.newest = I2cOutcome::bus_stuck;
+  state.i2c_bus.errors = 19;
+  state.i2c_bus.recoveries = 20;
   return state;
 }
 
@@ -94,7 +105,9 @@ const char* const numbered_fields[] = {
     "BLDC3:8,1,1",     "BLDC4:9,1,1",     "RELAYS:129",      "SAFE:4",          "CMD:11",
     "RXOK:12",         "RXCRC:13",        "RXLOST:14",       "RXDUP:15",        "RXREF:16",
     "LATE:17",         "ENC1HZ:-7001",    "ENC2HZ:-7002",    "ENC3HZ:-7003",    "ENC4HZ:-7004",
-    "ENC1IDX:-8001",   "ENC2IDX:-8002",   "ENC3IDX:-8003",   "ENC4IDX:-8004",   "FAULT:64,1"};
+    "ENC1IDX:-8001",   "ENC2IDX:-8002",   "ENC3IDX:-8003",   "ENC4IDX:-8004",   "I2C1:9001,1,xf1",
+    "I2C2:9002,2,xf2", "I2C3:9003,3,xf3", "I2C4:9004,4,xf4", "I2C5:9005,5,xf5", "I2C6:9006,6,xf6",
+    "I2C7:9007,7,xf7", "I2C8:9008,8,xf8", "I2CX:18,3,x",     "I2CBUS:2,19,20",  "FAULT:64,1"};
 
 TEST(State, AReasonThatIsNotKnownIsAFault) {
   State state;
@@ -137,8 +150,8 @@ TEST(State, AllFieldsFitOneDatagramAndRoundTrip) {
   ASSERT_TRUE(read_datagram(bytes, datagram));
   State back;
   ASSERT_TRUE(read_state(datagram, back));
-  FieldSet every = FieldSet::all();
-  every.add(StateField::fault);
+  FieldSet every;
+  for (const StateField field : every_field()) every.add(field);
   EXPECT_EQ(back.present, every);
   EXPECT_EQ(back.pnum, 4294967295U);
   EXPECT_EQ(back.t_ms, 4294967295U);
@@ -282,7 +295,7 @@ TEST(State, ThePapersSetIsTheFirstTenFields) {
   const FieldSet paper = FieldSet::paper_default();
   for (const StateField field : every_field()) {
     EXPECT_EQ(paper.has(field), static_cast<int>(field) < 10);
-    EXPECT_EQ(FieldSet::all().has(field), field != StateField::fault);  // it comes by itself
+    EXPECT_EQ(FieldSet::all().has(field), field < StateField::i2c1);
   }
   FieldSet set = FieldSet::all();
   for (const StateField field : every_field()) set.remove(field);
@@ -304,8 +317,8 @@ TEST(State, ASetGivesItsFieldsInTheOrderOfTheTable) {
   EXPECT_EQ(fields, (std::vector<StateField>{StateField::ain24, StateField::cmd, StateField::late,
                                              StateField::enc4idx}));
   fields.clear();
-  FieldSet every = FieldSet::all();
-  every.add(StateField::fault);
+  FieldSet every;
+  for (const StateField field : every_field()) every.add(field);
   for (const StateField field : every) fields.push_back(field);
   EXPECT_EQ(fields, every_field());
 }

@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "../shell/farewell.hpp"
@@ -132,9 +133,13 @@ class Sender {
       : options_(options),
         orders_(orders),
         board_(io_, options.url, board_options(options, orders)),
-        hold_(io_) {}
+        hold_(io_),
+        answer_limit_(io_) {}
 
   int run() {
+    const Subscription states = board_.on_state([this](const ReceivedState&, const Datagram&) {
+      if (waiting_ && is_answered(*waiting_)) tell(*std::exchange(waiting_, std::nullopt));
+    });
     board_.open();
     send_next();
     io_.run();
@@ -166,18 +171,49 @@ class Sender {
     }
   }
 
+  // A transfer on the user's bus is begun when it is confirmed; a state tells how it ended.
+  bool is_transfer() const {
+    const CommandKind kind = orders_[next_].command.kind;
+    return orders_[next_].group.empty() &&
+           (kind == CommandKind::i2c_read || kind == CommandKind::i2c_write ||
+            kind == CommandKind::i2c_scan);
+  }
+  bool is_answered(const CommandResult& result) const {
+    return board_.state().i2c_answer.pnum == result.pnum;
+  }
+
   void on_result(const CommandResult& result) {
+    const bool waits =
+        result.outcome == Outcome::confirmed && is_transfer() && !is_answered(result);
+    if (!waits) return tell(result);
+    waiting_ = result;
+    answer_limit_.expires_after(options_.timeout);
+    answer_limit_.async_wait([this](const std::error_code& error) {
+      if (error || !waiting_) return;
+      CommandResult late = *std::exchange(waiting_, std::nullopt);
+      late.outcome = Outcome::timed_out;
+      tell(late);
+    });
+  }
+
+  void tell(const CommandResult& result) {
+    answer_limit_.cancel();
     const std::size_t size = link_timing_at(orders_, next_) ? 2 : 1;
     std::string text = shown(orders_[next_]);
     if (size == 2) text += " " + shown(orders_[next_ + 1]);
-    const bool confirmed = result.outcome == Outcome::confirmed;
-    const Problem problem = explain(text, result, board_.link());
+    const I2cAnswer& transfer = board_.state().i2c_answer;
+    const bool has_transfer = is_transfer() && is_answered(result);
+    const bool failed = has_transfer && transfer.outcome != I2cOutcome::done;
+    const bool confirmed = result.outcome == Outcome::confirmed && !failed;
+    const Problem problem =
+        failed ? failed_transfer(text, transfer.outcome) : explain(text, result, board_.link());
     if (options_.json) {
-      print_line(result_json(text, result, problem));
+      print_line(result_json(text, result, problem, confirmed));
     } else if (confirmed) {
       fmt::print("{}  confirmed in {:.1f} ms{}\n", text, milliseconds(result),
                  next_ == 0 ? ", connecting included" : "");
       if (orders_[next_].command.kind == CommandKind::identify) print_identity();
+      if (has_transfer && shows_bytes(transfer)) fmt::print("  {}\n", shown_bytes(transfer));
     } else {
       fmt::print("{}  {}\n", text, problem.reason);
     }
@@ -209,6 +245,20 @@ class Sender {
            (state.relays & 1) == 0;
   }
 
+  bool shows_bytes(const I2cAnswer& transfer) const {
+    return transfer.data.size != 0 || orders_[next_].command.kind == CommandKind::i2c_scan;
+  }
+  // A scan's are addresses.
+  std::string shown_bytes(const I2cAnswer& transfer) const {
+    if (orders_[next_].command.kind == CommandKind::i2c_scan) {
+      return transfer.data.size == 0
+                 ? "nobody answers"
+                 : fmt::format("0x{:02x}",
+                               fmt::join(transfer.data.begin(), transfer.data.end(), " 0x"));
+    }
+    return fmt::format("x{:02x}", fmt::join(transfer.data.begin(), transfer.data.end(), ""));
+  }
+
   void print_identity() const {
     const BoardIdentity& id = board_.identity();
     const std::string name = id.name.empty() ? "" : " (" + id.name + ")";
@@ -219,9 +269,8 @@ class Sender {
     return std::chrono::duration<double, std::milli>(result.elapsed).count();
   }
 
-  Json result_json(const std::string& text, const CommandResult& result,
-                   const Problem& problem) const {
-    const bool confirmed = result.outcome == Outcome::confirmed;
+  Json result_json(const std::string& text, const CommandResult& result, const Problem& problem,
+                   bool confirmed) const {
     Json object{{"type", "result"},
                 {"command", text},
                 {"confirmed", confirmed},
@@ -239,6 +288,11 @@ class Sender {
     if (confirmed && turns_a_motor(orders_[next_])) {
       object["motor_supply"] = supply_is_missing() ? "open" : "closed";
     }
+    if (is_transfer() && is_answered(result)) {
+      const DeviceBytes<i2c_max_bytes>& data = board_.state().i2c_answer.data;
+      object["transfer"] = to_text(board_.state().i2c_answer.outcome);
+      object["bytes"] = fmt::format("x{:02x}", fmt::join(data.begin(), data.end(), ""));
+    }
     if (confirmed && text == "Q:ID") {
       const BoardIdentity& id = board_.identity();
       object["board_id"] = id.board_id;
@@ -254,6 +308,8 @@ class Sender {
   asio::io_context io_{1};
   AsyncBoard board_;
   asio::steady_timer hold_;
+  asio::steady_timer answer_limit_;
+  std::optional<CommandResult> waiting_;  // for the end of a transfer
   std::size_t next_ = 0;
   std::optional<Problem> failure_;
 };
@@ -288,6 +344,8 @@ Examples:
   r4 send serial:auto E:CLEAR                 after an emergency stop
   r4 send serial:auto C:timeout,300 C:heartbeat,100     side by side: one step, in any order
   r4 send udp://127.0.0.1 Q:ID                who is it?
+  r4 send serial:auto X:SCAN                  which devices answer on the user's I2C bus?
+  r4 send serial:auto X:READ,0x68,x75,1       register 0x75 of the one at 0x68
 
 Exit codes: 0 all confirmed; 3 one was refused or not confirmed in time; 2 a command or option is
 wrong, nothing was sent; 4 the transport cannot be opened; 5 permission denied.)";

@@ -30,6 +30,11 @@ StateUnits units_of(StateField field) {
   if (field == F::rxref) return one("[commands]");
   if (field == F::late) return one("[periods]");
   if (within(F::enc1hz, F::enc4hz)) return one("[counts/s]");
+  if (within(F::i2c1, F::i2c8)) return {{"t [ms]", "errors [transfers]", bytes_unit}, 3};
+  if (field == F::i2cx) return {{"command [PNum]", "outcome [0-3]", bytes_unit}, 3};
+  if (field == F::i2cbus) {
+    return {{"outcome [0-3]", "errors [transfers]", "recoveries [times]"}, 3};
+  }
   if (field == F::fault) return {{"chip [address]", "trouble [bits]", {}}, 2};
   return one("");
 }

@@ -16,6 +16,9 @@ struct StateUnits {
   std::size_t count;
 };
 
+// Of a value that is no number: "x3b00".
+constexpr std::string_view bytes_unit = "bytes [hex]";
+
 StateUnits units_of(StateField field);
 
 }  // namespace r4::tool

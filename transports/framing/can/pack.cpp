@@ -132,6 +132,48 @@ bool put_steps(Digits& digits, Text text) {
   return put_count(digits, negative ? 2 * value - 1 : 2 * value);
 }
 
+// Takes a whole number and the comma behind it off the front.
+__attribute__((noinline)) bool take_plain(Text& text, std::uint64_t& out) {
+  std::size_t size = 0;
+  while (size < text.size() && text[size] != ',') ++size;
+  if (size == text.size() || !parse_plain(text.substr(0, size), out)) return false;
+  text = text.substr(size + 1);
+  return true;
+}
+
+unsigned hex_digit_of(char c) {
+  if (c >= '0' && c <= '9') return static_cast<unsigned>(c - '0');
+  return c >= 'a' && c <= 'f' ? static_cast<unsigned>(c - 'a') + 10 : 16;
+}
+
+// Of what is rare one copy is enough.
+__attribute__((noinline)) bool put_seldom(Digits& digits, std::uint64_t value, unsigned count) {
+  return digits.put(value, count);
+}
+
+__attribute__((noinline)) bool put_device_bytes(Digits& digits, Text text) {
+  std::uint64_t first = 0;
+  std::uint64_t second = 0;
+  if (!take_plain(text, first) || !take_plain(text, second)) return false;
+  if (text.size() % 2 == 0 || text[0] != 'x' || text.size() / 2 > most_device_bytes) return false;
+  for (std::size_t i = 1; i < text.size(); ++i) {
+    if (hex_digit_of(text[i]) > 15) return false;
+  }
+  if ((first | second) > 0xFFFFFFFFU) return false;
+  // The counts, and how many bytes follow.
+  const unsigned first_digits = digits_of(first);
+  const unsigned second_digits = digits_of(second);
+  std::uint64_t head = std::uint64_t{first_digits} << 4 * first_digits | first;
+  if (!put_seldom(digits, head, 1 + first_digits)) return false;
+  head = (std::uint64_t{second_digits} << 4 * second_digits | second) << 8 | text.size() / 2;
+  if (!put_seldom(digits, head, 3 + second_digits)) return false;
+  for (std::size_t i = 1; i < text.size(); i += 2) {
+    const unsigned byte = hex_digit_of(text[i]) << 4 | hex_digit_of(text[i + 1]);
+    if (!put_seldom(digits, byte, 2)) return false;
+  }
+  return true;
+}
+
 // In the form of the field; false if its text is not one that the form would be written as.
 bool put_in_form(Digits& digits, PackedForm form, Text text) {
   std::uint64_t value = 0;
@@ -155,6 +197,8 @@ bool put_in_form(Digits& digits, PackedForm form, Text text) {
       return parse_plain(text, value) && put_count(digits, value);
     case PackedForm::steps:
       return put_steps(digits, text);
+    case PackedForm::bytes:
+      return put_device_bytes(digits, text);
   }
   return false;
 }

@@ -70,6 +70,7 @@ constexpr unsigned digit_name = 0xE;
 constexpr unsigned longest_name = 14;
 constexpr unsigned longest_bytes = 15;
 constexpr unsigned longest_count = 14;  // digits
+constexpr unsigned most_device_bytes = 64;
 
 // Fixed forms: how many digits, and the largest value.
 constexpr unsigned flag_max = 0xE;

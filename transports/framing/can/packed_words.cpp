@@ -56,6 +56,10 @@ constexpr PackedWord words[word_count] = {
     {"ENC4HZ", Form::steps},
     {"ENC1IDX", Form::steps}, {"ENC2IDX", Form::steps}, {"ENC3IDX", Form::steps},
     {"ENC4IDX", Form::steps},
+    // 72
+    {"I2C1", Form::bytes}, {"I2C2", Form::bytes}, {"I2C3", Form::bytes}, {"I2C4", Form::bytes},
+    {"I2C5", Form::bytes}, {"I2C6", Form::bytes}, {"I2C7", Form::bytes}, {"I2C8", Form::bytes},
+    {"I2CX", Form::bytes}, {"I2CBUS"}, {"X"}, {"FULL"},
 };
 // clang-format on
 

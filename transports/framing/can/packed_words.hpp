@@ -20,6 +20,7 @@ enum class PackedForm : std::uint8_t {
   bldc,        // "a,b,c", b and c 0 or 1: 4a + 2b + c in 4, up to EFFF
   count,       // how many digits (0-14), then those
   steps,       // a count of 2v for v >= 0, of -2v - 1 below
+  bytes,       // "a,b,x3f…": two counts, how many bytes in 2, those in 2 each
 };
 
 struct PackedWord {
@@ -47,7 +48,7 @@ constexpr unsigned code_cmd = 0x31;
 constexpr unsigned state_words = 0x38;
 constexpr unsigned code_r4_ros2 = 0x4B;
 constexpr unsigned code_ros2_r4 = 0x4C;
-constexpr unsigned word_count = 0x72;
+constexpr unsigned word_count = 0x7E;
 constexpr unsigned no_word = 0xFF;
 
 extern const PackedWord words[word_count];

@@ -153,6 +153,31 @@ bool take_text(Digits& digits, Characters& out) {
   return false;
 }
 
+// A count and the digits that it announces, of which the first was taken. Of what is rare one copy is enough.
+__attribute__((noinline)) bool take_count(Digits& digits, unsigned first, Characters& out) {
+  std::uint64_t value = 0;
+  if (first > longest_count || !digits.take(first, value)) return false;
+  out.put_plain(value);
+  out.put(',');
+  return true;
+}
+
+__attribute__((noinline)) bool take_device_bytes(Digits& digits, unsigned first, Characters& out) {
+  unsigned digit = 0;
+  if (!take_count(digits, first, out)) return false;
+  if (!digits.take(digit) || !take_count(digits, digit, out)) return false;
+  out.put('x');
+  unsigned count = 0;
+  if (!digits.take(digit) || !digits.take(count)) return false;
+  count |= digit << 4;
+  if (count > most_device_bytes) return false;
+  for (count *= 2; count != 0; --count) {
+    if (!digits.take(digit)) return false;
+    out.put(static_cast<char>(digit < 10 ? '0' + digit : 'a' + digit - 10));
+  }
+  return true;
+}
+
 // A form of as many digits, of which the first is not F.
 bool take_value(Digits& digits, PackedForm form, Characters& out) {
   unsigned first = 0;
@@ -195,6 +220,8 @@ bool take_value(Digits& digits, PackedForm form, Characters& out) {
       if ((value & 1) != 0) out.put('-');
       out.put_plain((value + 1) / 2);
       return true;
+    case PackedForm::bytes:
+      return take_device_bytes(digits, first, out);
   }
   return false;
 }

@@ -73,6 +73,7 @@ BoardModel::BoardModel(std::uint64_t seed) : seed_(seed) {
 
 void BoardModel::power_on() {
   chips_.power_on();
+  devices_.power_on();
   for (Stepper& stepper : steppers_) {
     stepper.driver.power_on();
     stepper.pause_ms = stepper_pause_ms;
@@ -116,6 +117,7 @@ firmware::BoardPins BoardModel::microcontroller_pins() {
 void BoardModel::pass_millisecond(std::uint32_t now_us, Interrupts& interrupts) {
   ++time_ms_;
   chips_.bus.advance(1000);
+  devices_.bus.advance(1000);
   const bool supplied = motors_have_supply();
   if (robot_ != nullptr) {
     pass_millisecond_of(*robot_, interrupts);

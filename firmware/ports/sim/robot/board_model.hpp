@@ -23,6 +23,7 @@
 
 #include <cstdint>
 
+#include "../devices/user_devices.hpp"
 #include "board_chips.hpp"
 #include "motor_model.hpp"
 #include "pin_models.hpp"
@@ -58,6 +59,7 @@ class BoardModel {
   void pass_millisecond(std::uint32_t now_us, Interrupts& interrupts);
 
   BoardChips& chips() { return chips_; }
+  UserDevices& devices() { return devices_; }
   firmware::BoardPins microcontroller_pins();
   Pins pins() const;
   // Could pins() tell something else than when this was asked last? No, while there was nothing on the bus for a while
@@ -129,6 +131,7 @@ class BoardModel {
   RobotModel::Senses senses_;  // its
   std::uint32_t time_ms_ = 0;
   BoardChips chips_;
+  UserDevices devices_;
   Stepper steppers_[stepper_channels];
   Shaft shafts_[encoder_channels];
   std::int32_t steering_ = 0;  // from where forward ends

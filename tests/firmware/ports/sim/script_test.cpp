@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "firmware/board_hardware.hpp"
+#include "firmware/ports/sim/devices/user_devices.hpp"
 #include "r4link/error.hpp"
 #include "r4link/state.hpp"
 
@@ -25,6 +26,30 @@ std::string error_of(const std::string& text) {
     return error.what();
   }
   return "";
+}
+
+TEST(Script, ReadsWhatHappensToDevices) {
+  const Script script = Script::parse(
+      "1 userbus held\n1 userbus cut\n1 userbus stretched\n1 userbus free\n2 device mpu6050 off\n"
+      "2 device ina219 reset",
+      "bench.txt");
+  const auto& steps = script.steps();
+  ASSERT_EQ(steps.size(), 6U);
+  const UserBusModel::Fault faults[] = {UserBusModel::Fault::held, UserBusModel::Fault::cut_off,
+                                        UserBusModel::Fault::stretched, UserBusModel::Fault::none};
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(steps[i].kind, Kind::user_bus);
+    EXPECT_EQ(steps[i].value, static_cast<std::int32_t>(faults[i]));
+  }
+  EXPECT_EQ(steps[4].channel, static_cast<int>(UserDevice::mpu6050));
+  EXPECT_EQ(steps[4].value, static_cast<std::int32_t>(ScriptStep::Supply::off));
+  EXPECT_EQ(steps[5].kind, Kind::device);
+  EXPECT_EQ(steps[5].channel, static_cast<int>(UserDevice::ina219));
+  EXPECT_EQ(steps[5].value, static_cast<std::int32_t>(ScriptStep::Supply::reset));
+  EXPECT_EQ(error_of("1 userbus broken"),
+            "bench.txt:1: 'broken' is nothing a bus can be; write held, cut, stretched or free");
+  EXPECT_EQ(error_of("1 device bmp280 off"),
+            "bench.txt:1: 'bmp280' is no device on the user's bus; write mpu6050 or ina219");
 }
 
 TEST(Script, ReadsEveryKindOfStep) {
@@ -185,7 +210,7 @@ TEST(Script, ReadsTroubleWithChipsBusAndLoop) {
             "bench.txt:1: 'long' is no time; write for how long, in seconds such as 0.3");
   EXPECT_EQ(error_of("1 dance"),
             "bench.txt:1: 'dance' is nothing that can happen; use handle, us, enc, analog, motor, "
-            "chip, i2c, hang, fault, watchdog or reboot");
+            "chip, i2c, userbus, device, hang, fault, watchdog or reboot");
 }
 
 TEST(Script, AFileThatDoesNotEndIsNoScenario) {

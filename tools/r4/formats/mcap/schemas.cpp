@@ -22,7 +22,8 @@ Json field_schema(StateField field) {
     all += fmt::format("{}{}", i == 0 ? "" : ", ", units.values[i]);
   }
   Json schema = of_type("array", all.c_str());
-  schema["items"] = {{"type", "number"}};
+  const bool has_text = units.values[units.count - 1] == bytes_unit;
+  if (!has_text) schema["items"] = {{"type", "number"}};
   return schema;
 }
 

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the application has to do with the user's devices: their commands, and what the state tells of them.
+#include <cstring>
+
+#include "../../protocol/messages/device_command.hpp"
+#include "application.hpp"
+
+namespace r4 {
+namespace firmware {
+
+Refusal Application::carry_out_device(std::uint32_t pnum, const Command& command,
+                                      std::uint32_t now_ms) {
+  if (i2c_ == nullptr) return Refusal::unknown;
+  if (command.kind == CommandKind::i2c_poll) {
+    i2c_->poll_slot(command.channel, poll_of(command), now_ms);
+    return Refusal::none;
+  }
+  return i2c_->ask(pnum, command) ? Refusal::none : Refusal::full;
+}
+
+// A session begins with the readings that are kept as settings, and nothing of the one before.
+void Application::begin_devices(std::uint32_t now_ms) {
+  has_answer_ = false;
+  if (i2c_ == nullptr) return;
+  i2c_->drop_all();
+  i2c_->take_answered();
+  for (int i = 0; i < i2c_slots; ++i) i2c_->poll_slot(i + 1, setpoints_.settings.polls[i], now_ms);
+}
+
+void Application::follow_poll_setting(Text key, std::uint32_t now_ms) {
+  const int slot = poll_slot_of(key);
+  if (slot != 0 && i2c_ != nullptr) {
+    i2c_->poll_slot(slot, setpoints_.settings.polls[slot - 1], now_ms);
+  }
+}
+
+void Application::poll_devices(std::uint32_t now_ms) {
+  if (i2c_ == nullptr) return;
+  i2c_->poll(now_ms);
+  if (now_ms - answered_ms_ > 2 * answer_shown_ms) has_answer_ = false;
+  if (!i2c_->take_answered()) return;
+  has_answer_ = true;
+  answered_ms_ = now_ms;
+}
+
+// Whoever asks must not have to choose a field first.
+void Application::add_device_answer(FieldSet& fields, std::uint32_t t_ms) const {
+  if (has_answer_ && static_cast<std::int32_t>(t_ms - answered_ms_) <=
+                         static_cast<std::int32_t>(answer_shown_ms)) {
+    fields.add(StateField::i2cx);
+  }
+}
+
+void Application::fill_devices(State& state) const {
+  if (i2c_ == nullptr) return;
+  std::memcpy(state.i2c, i2c_->readings(), sizeof state.i2c);
+  state.i2c_answer = i2c_->answer();
+  state.i2c_bus = i2c_->report();
+}
+
+}  // namespace firmware
+}  // namespace r4

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The user's I2C bus: single transfers, a scan, and readings that are repeated (docs/devices.md). It is not
+// the bus of the board's chips, and nothing here waits: poll() begins what is due and looks how far it is.
+//
+//            begins a transfer              it has ended
+//     idle --------------------> transfer ----------------> idle
+//      ^                            | it was lost, or has not ended after transfer_limit_ms
+//      |  both lines are high       v
+//      +----------------------- recovering     nine clocks and a STOP, half a clock each millisecond
+//      |                            | a line is low (UM10204 section 3.1.16)
+//      |       free_after_ms        v
+//      +- - - - - - - - - - - -   held         what is asked for fails at once
+//
+// A single transfer goes before readings, a reading before the next address of a scan; readings that are due
+// take turns. One whose time has come while the one before it is still under way is left out.
+// All times are ms of the board's clock, which wraps.
+#pragma once
+
+#include <cstdint>
+
+#include "../../protocol/messages/device_command.hpp"
+#include "r4link/vocabulary.hpp"
+#include "user_i2c_port.hpp"
+
+namespace r4 {
+namespace firmware {
+
+class UserI2c {
+ public:
+  explicit UserI2c(UserI2cPort& port) : port_(port) {}
+
+  // The commands X:READ, X:WRITE and X:SCAN, which are right. False: one has not ended yet.
+  bool ask(std::uint32_t pnum, const Command& command);
+  // A slot from 1; a poll that is not on ends it. What was read there before is gone.
+  void poll_slot(int slot, const I2cPoll& poll, std::uint32_t now_ms);
+  // A write that has not begun is not made any more: the board is safe.
+  void drop_write();
+  // Nor is anything else of the session before.
+  void drop_all();
+
+  // A turn of the loop.
+  void poll(std::uint32_t now_ms);
+
+  // Of the slots, in their order.
+  const I2cReading (&readings() const)[i2c_slots] { return readings_; }
+  const I2cReading& reading(int slot) const { return readings_[slot - 1]; }
+  const I2cAnswer& answer() const { return answer_; }
+  const I2cBusReport& report() const { return report_; }
+  // Has a transfer ended since it was asked last?
+  bool take_answered() {
+    const bool answered = answered_;
+    answered_ = false;
+    return answered;
+  }
+
+  // Longer than any transfer of 32 bytes each way at 100 kHz, and than a device may stretch (SMBus).
+  static constexpr std::uint32_t transfer_limit_ms = 35;
+  static constexpr std::uint32_t free_after_ms = 100;  // a held bus is clocked again
+
+ private:
+  enum class Stage : std::uint8_t { idle, transfer, recovering, held };
+  enum class Single : std::uint8_t { none, transfer, scan };
+  struct Slot {
+    I2cPoll poll;
+    std::uint32_t due_ms = 0;
+  };
+  static constexpr std::int8_t no_slot = -1;       // a single transfer
+  static constexpr std::uint8_t half_clocks = 21;  // nine clocks, and STOP
+
+  void begin_next(std::uint32_t now_ms);
+  void begin_single(std::uint32_t now_ms);
+  bool begin_due(std::uint32_t now_ms);
+  void begin(std::int8_t slot, std::uint8_t address, const std::uint8_t* out, std::uint8_t out_size,
+             std::uint8_t in_size, std::uint32_t now_ms);
+  void end(I2cOutcome outcome);
+  void end_scan_step(I2cOutcome outcome);
+  void end_reading(int slot, I2cOutcome outcome);
+  void answer(I2cOutcome outcome);
+  void count(I2cOutcome outcome);
+  void recover(std::uint32_t now_ms);
+  void recover_step(std::uint32_t now_ms);
+  void fail_what_is_due(std::uint32_t now_ms);
+  static void next_time(Slot& slot, std::uint32_t now_ms);
+
+  UserI2cPort& port_;
+  Stage stage_ = Stage::idle;
+  std::int8_t slot_ = no_slot;   // whose transfer is under way
+  std::uint8_t first_slot_ = 0;  // that is looked at next
+  bool abandoned_ = false;       // nobody wants to know how the transfer under way ends
+  std::uint8_t half_clock_ = 0;
+  std::uint32_t since_ms_ = 0;  // in this stage; recovering: the last half clock
+  // Of the transfer under way, whatever is asked for meanwhile.
+  std::uint8_t sent_[i2c_max_bytes];
+  std::uint8_t received_[i2c_max_bytes];
+
+  Single single_ = Single::none;  // asked for, and not ended
+  bool single_begun_ = false;
+  bool writes_ = false;
+  std::uint8_t address_ = 0;
+  std::uint8_t out_size_ = 0;
+  std::uint8_t in_size_ = 0;
+  std::uint8_t out_[i2c_max_bytes];
+  std::uint32_t pnum_ = 0;
+  bool answered_ = false;
+  I2cAnswer answer_;
+  I2cBusReport report_;
+  Slot slots_[i2c_slots];
+  I2cReading readings_[i2c_slots];
+};
+
+}  // namespace firmware
+}  // namespace r4

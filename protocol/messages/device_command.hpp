@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The commands for what the user connects: X, the I2C bus (docs/protocol.md, docs/devices.md).
+//
+// Bytes are written as x and two hexadecimal digits each, "x3B00", so that nobody takes them for a
+// number; "x" is none.
+#pragma once
+
+#include <cstdint>
+
+#include "../datagram/datagram_writer.hpp"
+#include "r4link/command.hpp"
+#include "r4link/datagram.hpp"
+#include "r4link/vocabulary.hpp"
+
+namespace r4 {
+
+// A reading that the board repeats by itself.
+struct I2cPoll {
+  std::uint8_t address = 0;  // 0: none
+  std::uint8_t register_size = 0;
+  std::uint8_t register_bytes[i2c_max_register_bytes] = {};
+  std::uint8_t count = 0;
+  std::uint16_t period_ms = 0;
+  bool on() const { return address != 0; }
+};
+bool operator==(const I2cPoll& a, const I2cPoll& b);
+inline bool operator!=(const I2cPoll& a, const I2cPoll& b) { return !(a == b); }
+
+constexpr bool is_device_command(CommandKind kind) {
+  return kind >= CommandKind::i2c_read && kind <= CommandKind::i2c_poll;
+}
+
+// As parse_command(), check_command() and write_command(), for those.
+Refusal parse_device_command(const Field& field, Command& out);
+Refusal check_device_command(const Command& command);
+void write_device_command(DatagramWriter& writer, const Command& command);
+
+// What a command X:POLL or X:OFF says, which is right.
+I2cPoll poll_of(const Command& command);
+
+// The value of a setting, "104:x3B:14:10" or "off". Refusal::format or ::range; `out` is only written on
+// Refusal::none.
+Refusal parse_poll(Text value, I2cPoll& out);
+// "255:xFFFF:32:60000"
+constexpr std::size_t max_poll_text = 24;
+Text write_poll(const I2cPoll& poll, char (&buffer)[max_poll_text]);
+
+// Bytes as text. Refusal::format for what is none, ::range for more than `most`.
+Refusal parse_bytes(Text text, std::uint8_t* out, std::size_t most, std::uint8_t& size);
+void write_bytes(DatagramWriter& writer, const std::uint8_t* bytes, std::size_t size);
+
+}  // namespace r4

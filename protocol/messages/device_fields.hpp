@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The state fields of what the user connects, as values: I2C1 … I2C8, I2CX, I2CBUS (docs/protocol.md).
+#pragma once
+
+#include "../datagram/datagram_writer.hpp"
+#include "r4link/text.hpp"
+#include "r4link/vocabulary.hpp"
+
+namespace r4 {
+
+// The values of the field. Reading them fails, and may have written some, where they are not of its form.
+bool parse_device(Text values, I2cReading& out);
+bool parse_device(Text values, I2cAnswer& out);
+bool parse_device(Text values, I2cBusReport& out);
+void write_device(DatagramWriter& writer, const I2cReading& reading);
+void write_device(DatagramWriter& writer, const I2cAnswer& answer);
+void write_device(DatagramWriter& writer, const I2cBusReport& report);
+
+}  // namespace r4

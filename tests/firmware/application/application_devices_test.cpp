@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The user's bus by protocol: commands, what the state tells, the safe state, and the session's end.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "firmware/ports/sim/devices/user_devices.hpp"
+#include "tests/firmware/board_fixture.hpp"
+
+namespace r4 {
+namespace {
+
+using test::echo_pnum;
+using test::Heard;
+using test::TestBoard;
+using test::TestHost;
+
+class ApplicationDevices : public testing::Test {
+ protected:
+  ApplicationDevices() { host.connect(); }
+
+  // Milliseconds, with heartbeats.
+  void pass(std::uint32_t ms, bool echoes = true) {
+    for (; ms != 0; --ms) {
+      devices.bus.advance(1000);
+      ++board.now_ms;
+      if (echoes && board.now_ms % 100 == 0) host.echo();
+      board.application->poll(board.now_ms);
+    }
+  }
+  State newest_state() {
+    const auto heard = board.take(MessageKind::state);
+    return heard.empty() ? State() : state_of(heard.back());
+  }
+
+  sim::UserDevices devices;
+  firmware::UserI2c i2c{devices.bus};
+  TestBoard board{Settings(), 1, 500'000, &i2c};
+  TestHost host{board, echo_pnum};
+};
+
+TEST_F(ApplicationDevices, AnswersUnderTheNumberOfTheCommandForASecond) {
+  const std::uint32_t number = host.command("X:READ,0x68,x75,1");
+  pass(20);
+  State state = newest_state();
+  ASSERT_TRUE(state.present.has(StateField::i2cx)) << "nobody has to choose it";
+  EXPECT_EQ(state.i2c_answer.pnum, number);
+  EXPECT_EQ(state.i2c_answer.outcome, I2cOutcome::done);
+  ASSERT_EQ(state.i2c_answer.data.size, 1);
+  EXPECT_EQ(state.i2c_answer.data.bytes[0], 0x68);
+  pass(1020);
+  EXPECT_FALSE(newest_state().present.has(StateField::i2cx));
+  host.command("F:I2CX,I2CBUS");
+  pass(20);
+  state = newest_state();
+  EXPECT_EQ(state.i2c_answer.pnum, number) << "chosen, it stays";
+  EXPECT_TRUE(state.present.has(StateField::i2cbus));
+}
+
+TEST_F(ApplicationDevices, IsExecutedOnce) {
+  const std::uint32_t number = host.command("X:WRITE,0x68,x6b00");
+  pass(20);
+  const std::uint32_t transfers = devices.bus.transfers();
+  host.resend("X:WRITE,0x68,x6b00", number);
+  EXPECT_EQ(board.log.refused.back(), std::to_string(number) + " DUPLICATE");
+  pass(20);
+  EXPECT_EQ(devices.bus.transfers(), transfers);
+}
+
+TEST_F(ApplicationDevices, OneWhileAnotherIsUnderWayIsRefused) {
+  host.command("X:SCAN");
+  const std::uint32_t second = host.command("X:READ,0x68,x75,1");
+  EXPECT_EQ(board.log.refused.back(), std::to_string(second) + " FULL");
+}
+
+TEST_F(ApplicationDevices, SafeRefusesWritesAndNothingElse) {
+  host.command("E:STOP");
+  const std::uint32_t write = host.command("X:WRITE,0x68,x6b00");
+  EXPECT_EQ(board.log.refused.back(), std::to_string(write) + " SAFE");
+  const std::uint32_t read = host.command("X:READ,0x68,x6b,1");
+  pass(20);
+  const State state = newest_state();
+  EXPECT_EQ(state.i2c_answer.pnum, read);
+  EXPECT_EQ(state.i2c_answer.data.bytes[0], 0x40) << "asleep still";
+  host.command("X:POLL,0x68,x75,1,10,1");
+  host.command("X:SCAN");
+  EXPECT_EQ(board.log.refused.size(), 1U);
+}
+
+TEST_F(ApplicationDevices, AStopDropsAWriteThatWaits) {
+  host.command("X:POLL,0x68,x3b,14,5,1");
+  pass(1);  // on the wire
+  const std::uint32_t write = host.command("X:WRITE,0x68,x6b00");
+  host.command("E:STOP");
+  pass(20);
+  State state = newest_state();
+  EXPECT_EQ(state.i2c_answer.pnum, write);
+  EXPECT_EQ(state.i2c_answer.outcome, I2cOutcome::cancelled);
+  EXPECT_EQ(devices.mpu6050.start(0x68, true), true);
+  host.command("X:READ,0x68,x6b,1");
+  pass(20);
+  EXPECT_EQ(newest_state().i2c_answer.data.bytes[0], 0x40) << "never written";
+}
+
+TEST_F(ApplicationDevices, ReadingsEndWithTheSessionAndThoseOfSettingsStay) {
+  host.command("C:i2c2,0x40:x02:2:20");
+  host.command("X:POLL,0x68,x75,1,20,1");
+  host.command("X:OFF,2");
+  host.command("F:I2C1,I2C2");
+  pass(50);
+  State state = newest_state();
+  EXPECT_EQ(state.i2c[0].data.size, 1);
+  EXPECT_EQ(state.i2c[1].data.size, 0) << "this session has no use for it";
+
+  pass(1200, false);  // silence
+  ASSERT_EQ(board.reason(), SafeReason::link);
+  TestHost next(board, echo_pnum + 0x1000000, Source{0, 9});
+  next.connect();
+  next.command("F:I2C1,I2C2");
+  pass(50, false);
+  state = newest_state();
+  EXPECT_EQ(state.i2c[0].data.size, 0) << "nobody's reading is another's";
+  EXPECT_EQ(state.i2c[0].t_ms, 0U);
+  EXPECT_EQ(state.i2c[1].data.size, 2);
+  EXPECT_NE(state.i2c[1].t_ms, 0U);
+}
+
+TEST_F(ApplicationDevices, AReadingIsToldWithItsTimeInEveryState) {
+  host.command("F:I2C1");
+  host.command("X:POLL,0x68,x75,1,50,1");
+  board.take();
+  pass(100);
+  const auto states = board.take(MessageKind::state);
+  ASSERT_EQ(states.size(), 10U);
+  for (const Heard& heard : states) {
+    EXPECT_LE(heard.t_ms - state_of(heard).i2c[0].t_ms, 60U);
+  }
+}
+
+TEST_F(ApplicationDevices, TheChipsOfTheBoardAreNotOnThisBus) {
+  host.command("X:READ,0x41,x00,1");  // a PCA9685 of the board
+  pass(20);
+  EXPECT_EQ(newest_state().i2c_answer.outcome, I2cOutcome::no_acknowledge);
+}
+
+// Every state on its grid and the stop in the same turn, whatever the user's bus does.
+TEST_F(ApplicationDevices, ABusThatIsHeldCostsTheBoardNothing) {
+  using Fault = sim::UserBusModel::Fault;
+  for (const Fault fault : {Fault::none, Fault::held, Fault::stretched}) {
+    host.command("X:POLL,0x68,x3b,14,10,1");
+    for (int slot = 2; slot <= 8; ++slot) {
+      host.command("X:POLL,0x40,x02,2,50," + std::to_string(slot));
+    }
+    host.command("F:LATE");
+    pass(20);
+    devices.bus.set_fault(fault);
+    pass(100 - board.now_ms % 100);
+    board.take();
+    pass(1000);
+    const auto states = board.take(MessageKind::state);
+    EXPECT_EQ(states.size(), 100U);
+    for (std::size_t i = 1; i < states.size(); ++i) {
+      EXPECT_EQ(states[i].t_ms - states[i - 1].t_ms, 10U);
+    }
+    host.command("O:358,1,1");
+    EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+    host.command("E:STOP");
+    EXPECT_TRUE(board.safe());
+    host.clear();
+    host.command("O:358,1,1");
+    pass(1001, false);
+    EXPECT_TRUE(board.safe()) << "silence";
+    host.connect();
+  }
+}
+
+TEST(ApplicationWithoutDevices, KnowsNoX) {
+  TestBoard board;
+  TestHost host(board, echo_pnum);
+  host.connect();
+  const std::uint32_t number = host.command("X:SCAN");
+  EXPECT_EQ(board.log.refused.back(), std::to_string(number) + " UNKNOWN");
+}
+
+}  // namespace
+}  // namespace r4

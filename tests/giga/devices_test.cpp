@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The user's bus of the Giga: its peripheral by the registers, and the board beside it.
+#include "bench.hpp"
+#include "firmware/ports/giga/devices/user_i2c_controller.hpp"
+#include "firmware/ports/giga/pins.hpp"
+#include "protocol/messages/state_fields.hpp"
+
+namespace r4::test {
+namespace {
+
+class GigaDevices : public testing::Test {
+ protected:
+  GigaDevices() {
+    bench.boot();
+    bench.drive(host, bench.usb());
+  }
+  void command(const std::string& field) {
+    bench.usb()(host.command(field));
+    bench.run_ms(3);
+  }
+  // The states of so long, of which the newest is read.
+  std::size_t states(std::uint64_t ms) {
+    bench.usb_lines();
+    bench.run_ms(ms, host, bench.usb());
+    std::size_t count = 0;
+    for (const std::string& line : bench.usb_lines()) {
+      Datagram datagram;
+      if (!read_datagram(line, datagram) || datagram.find("I2CBUS").name().empty()) continue;
+      EXPECT_TRUE(read_state(datagram, state));
+      ++count;
+    }
+    return count;
+  }
+  void read_all() {
+    command("F:I2C1,I2C8,I2CX,I2CBUS");
+    command("X:WRITE,0x68,x6b00");
+    command("X:POLL,0x68,x3b,14,10,1");
+    for (int slot = 2; slot <= 8; ++slot) command("X:POLL,0x40,x02,2,50," + std::to_string(slot));
+  }
+
+  GigaBench bench;
+  PlainHost host;
+  State state;
+};
+
+TEST(UserI2cTiming, KeepsTheLimitsOfStandardModeForEveryClock) {
+  for (std::uint32_t mhz = 8; mhz <= 250; ++mhz) {
+    const std::uint32_t timing = giga::user_i2c_timing(mhz * 1000000);
+    const double tick_ns = 1000.0 * ((timing >> 28) + 1) / mhz;
+    const double low = tick_ns * ((timing & 0xFF) + 1);
+    const double high = tick_ns * ((timing >> 8 & 0xFF) + 1);
+    EXPECT_GE(low, 4700) << mhz;  // UM10204 table 10
+    EXPECT_GE(high, 4000) << mhz;
+    EXPECT_GE(tick_ns * ((timing >> 20 & 0xF) + 1), 250) << mhz;
+    EXPECT_LE(tick_ns * (timing >> 16 & 0xF), 3450) << mhz;
+    EXPECT_LE(low + high, 11000) << mhz << ": not needlessly slow";
+    EXPECT_EQ(timing & 0x0F000000, 0U) << "reserved";
+  }
+}
+
+// As the core's Wire1 has it (variants/GIGA: I2C_SDA1 PH_12, I2C_SCL1 PB_6_ALT0, both I2C4).
+TEST(GigaPins, TheUsersBusIsTheCoresWire1) {
+  EXPECT_TRUE(giga::user_scl_pin == (giga::Pin{'B', 6}));
+  EXPECT_TRUE(giga::user_sda_pin == (giga::Pin{'H', 12}));
+  EXPECT_EQ(giga::user_scl_function, 6U);
+  EXPECT_EQ(giga::user_sda_function, 4U);
+}
+
+TEST_F(GigaDevices, AreReadAtTheirRateBesideTheChips) {
+  read_all();
+  bench.giga.i2c.log.clear();
+  bench.giga.user_i2c.log.clear();
+  EXPECT_NEAR(static_cast<double>(states(1000)), 100, 3);
+  EXPECT_EQ(state.i2c[0].data.size, 14);
+  EXPECT_EQ(state.i2c[0].data.bytes[4], 0x40) << "1 g";
+  EXPECT_EQ(state.i2c[7].data.size, 2);
+  EXPECT_EQ(state.i2c_bus.errors, 0U);
+  EXPECT_LE(state.t_ms - state.i2c[0].t_ms, 15U);
+  const auto& log = bench.giga.user_i2c.log;
+  const auto imu = std::count_if(log.begin(), log.end(), [](const auto& each) {
+    return each == std::vector<std::uint8_t>{0x68 << 1, 0x3B};
+  });
+  const auto meters = std::count_if(log.begin(), log.end(), [](const auto& each) {
+    return each == std::vector<std::uint8_t>{0x40 << 1, 0x02};
+  });
+  EXPECT_NEAR(static_cast<double>(imu), 100, 3);
+  EXPECT_NEAR(static_cast<double>(meters), 7 * 20, 8);
+  for (const auto& transfer : bench.giga.i2c.log) EXPECT_NE(transfer[0] >> 1, 0x68);
+}
+
+TEST_F(GigaDevices, OneThatIsNotThereIsToldAndAScanFindsTheOthers) {
+  command("F:I2CX,I2CBUS");
+  command("X:READ,0x50,x00,1");
+  states(30);
+  EXPECT_EQ(state.i2c_answer.outcome, I2cOutcome::no_acknowledge);
+  command("X:SCAN");
+  states(300);
+  EXPECT_EQ(state.i2c_answer.outcome, I2cOutcome::done);
+  ASSERT_EQ(state.i2c_answer.data.size, 2);
+  EXPECT_EQ(state.i2c_answer.data.bytes[0], 0x40);
+  EXPECT_EQ(state.i2c_answer.data.bytes[1], 0x68);
+}
+
+TEST_F(GigaDevices, ADeviceThatWasCutOffIsClockedFree) {
+  read_all();
+  bench.giga.user_i2c.hold_sda(9);
+  states(200);
+  EXPECT_EQ(state.i2c_bus.recoveries, 1U);
+  EXPECT_LE(state.t_ms - state.i2c[0].t_ms, 20U) << "it is read again";
+}
+
+TEST_F(GigaDevices, ALineThatIsHeldCostsTheBoardNothing) {
+  read_all();
+  for (const bool scl : {false, true}) {
+    bench.giga.user_i2c.hold_sda(scl ? 0 : 1'000'000);
+    bench.giga.user_i2c.hold_scl(scl);
+    states(200);
+    EXPECT_NEAR(static_cast<double>(states(500)), 50, 2);
+    EXPECT_EQ(state.i2c_bus.newest, I2cOutcome::bus_stuck);
+    EXPECT_TRUE(bench.active());
+    EXPECT_EQ(bench.pins().osmc[0].pwm, 358);
+    bench.usb()(host.command("E:STOP"));
+    const std::uint64_t sent_ns = bench.giga.now_ns();
+    while (!bench.pins().is_safe() && bench.giga.now_ns() - sent_ns < 20'000'000) bench.turn();
+    EXPECT_TRUE(bench.pins().is_safe());
+    EXPECT_LE((bench.giga.now_ns() - sent_ns) / 1000, 3000U);
+    bench.run_ms(1100, host, bench.usb());
+    command("E:CLEAR");
+    command("O:358,1,1");
+    bench.run_ms(20, host, bench.usb());
+    EXPECT_EQ(bench.pins().osmc[0].pwm, 358);
+  }
+  bench.giga.user_i2c.hold_scl(false);
+  states(300);
+  EXPECT_LE(state.t_ms - state.i2c[0].t_ms, 20U);
+}
+
+}  // namespace
+}  // namespace r4::test

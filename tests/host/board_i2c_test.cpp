@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Devices on the user's bus, by r4::Board.
+#include <gtest/gtest.h>
+
+#include "r4link/board.hpp"
+#include "r4link/error.hpp"
+#include "tests/support/at_will.hpp"
+#include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/problems.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+using Bytes = Board::I2c::Bytes;
+
+TEST(BoardI2c, ReadsWritesAndScans) {
+  BoardInAThread simulated("udp");
+  Board board(simulated.url(), at_will());
+  board.wait_active();
+  EXPECT_EQ(board.i2c().scan(), (Bytes{0x40, 0x68}));
+  EXPECT_EQ(board.i2c().read(0x68, {0x75}, 1), Bytes{0x68});
+  EXPECT_EQ(board.i2c().write(0x68, {0x6B, 0x00}), Bytes{});
+  EXPECT_EQ(board.i2c().read(0x68, {0x6B}, 1), Bytes{0x00});
+  EXPECT_EQ(board.i2c().write(0x40, {0x00}, 2), (Bytes{0x39, 0x9F}));
+  const auto fails = [&](int address) {
+    try {
+      board.i2c().read(address, {0x00}, 1);
+    } catch (const Error& error) {
+      return error.kind() == ErrorKind::refused ? error.problem().reason : "usage";
+    }
+    return std::string("nothing");
+  };
+  EXPECT_EQ(fails(0x50), "no acknowledge");
+  EXPECT_EQ(fails(7), "usage");
+  EXPECT_EQ(fails(0x168), "usage");
+}
+
+TEST(BoardI2c, TheStateBringsWhatIsRepeated) {
+  BoardInAThread simulated("udp");
+  Board board(simulated.url(), at_will());
+  board.wait_active();
+  board.i2c().poll(1, 0x68, {0x75}, 1, 10ms);
+  board.fields("I2C1");
+  ReceivedState state = board.next_state();
+  for (int i = 0; i < 100 && state.i2c[0].data.size == 0; ++i) state = board.next_state();
+  ASSERT_EQ(state.i2c[0].data.size, 1);
+  EXPECT_EQ(state.i2c[0].data.bytes[0], 0x68);
+  EXPECT_LE(state.t_ms - state.i2c[0].t_ms, 40U);
+  board.i2c().poll_off(1);
+  for (int i = 0; i < 100 && state.i2c[0].data.size != 0; ++i) state = board.next_state();
+  EXPECT_EQ(state.i2c[0].data.size, 0);
+  EXPECT_THROW(board.i2c().poll(9, 0x68, {0x75}, 1, 10ms), Error);
+  EXPECT_THROW(board.i2c().poll(1, 0x68, {0x75}, 1, 4ms), Error);
+}
+
+TEST(BoardI2c, AWriteIsHeldBackUntilTheProgramIsArmed) {
+  BoardInAThread simulated("udp");
+  Board board(simulated.url());
+  board.wait_active();
+  EXPECT_THROW(board.i2c().write(0x68, {0x6B, 0x00}), Error);
+  EXPECT_EQ(board.i2c().read(0x68, {0x6B}, 1), Bytes{0x40});
+  board.arm();
+  board.i2c().write(0x68, {0x6B, 0x00});
+  EXPECT_EQ(board.i2c().read(0x68, {0x6B}, 1), Bytes{0x00});
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Devices on the user's I2C bus: r4 send and r4 monitor against the simulated board, as docs/devices.md shows them."""
+import pytest
+
+from r4_process import Board, Running, is_state, objects, run
+
+
+@pytest.fixture(name='board')
+def a_simulated_board():
+    with Board('udp://127.0.0.1:0') as board:
+        yield board
+
+
+def test_a_scan_a_register_and_a_device_that_is_not_there(board):
+    result = run('send', board.host_url, 'X:SCAN', 'X:READ,0x68,x75,1', 'X:WRITE,0x68,x6b00', 'X:READ,0x40,x00,2')
+    assert result.returncode == 0, result.stderr
+    lines = result.stdout.splitlines()
+    assert [lines[1], lines[3], lines[6]] == ['  0x40 0x68', '  x68', '  x399f']
+    missing = run('send', board.host_url, 'X:READ,0x50,x00,1')
+    assert missing.returncode == 3 and 'no acknowledge; X:SCAN shows which addresses answer' in missing.stderr
+    [answer] = objects(run('send', board.host_url, 'X:READ,0x50,x00,1', '--json').stdout)
+    assert (answer['confirmed'], answer['transfer'], answer['bytes']) == (False, 'no acknowledge', 'x')
+
+
+def test_readings_come_with_every_state_and_end_with_the_session(board):
+    commands = ['X:WRITE,0x68,x6b00', 'X:POLL,0x68,x3b,14,10,1', 'X:POLL,0x40,x02,2,50,2', 'F:I2C1,I2C2,I2CBUS']
+    with Running('send', board.host_url, *commands, '--hold', '30', '--json') as host:
+        for _ in commands:
+            assert host.next()['confirmed']
+        with Running('monitor', board.host_url, '--json') as watch:
+            states = [watch.next(is_state) for _ in range(30)]
+    newest = states[-1]['fields']
+    assert newest['I2C1'][2] == 'x000000004000f0b0000000000000'
+    assert newest['I2C2'][2] == 'x5f02' and newest['I2CBUS'] == [0, 0, 0]
+    assert all(0 <= each['t'] - each['fields']['I2C1'][0] <= 20 for each in states)
+    steps = {after['t'] - before['t'] for before, after in zip(states, states[1:])}
+    assert steps == {10}
+    after = objects(run('send', board.host_url, 'F:I2C1', '--json', '--hold', '0.1').stdout)
+    assert after[0]['confirmed']
+
+
+def test_a_bus_that_is_held_stops_nothing(tmp_path):
+    scenario = tmp_path / 'held.txt'
+    scenario.write_text('0 userbus held\n')
+    with Board('udp://127.0.0.1:0', options=('--script', str(scenario))) as board:
+        stuck = run('send', board.host_url, 'X:READ,0x68,x75,1', 'R:1,On')
+        assert stuck.returncode == 3 and 'bus stuck; a device holds SDA or SCL' in stuck.stderr
+        assert run('send', board.host_url, 'R:1,On', 'O:358,1,1').returncode == 0
+        assert run('stop', board.host_url).returncode == 0

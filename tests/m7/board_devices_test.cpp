@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The user's bus on the processor: what it reads, and that the board does not wait for it.
+#include <initializer_list>
+
+#include "board_bench.hpp"
+
+namespace {
+
+using namespace r4;
+using namespace r4::m7;
+using Fault = sim::UserBusModel::Fault;
+
+// One device at 100 Hz with 14 bytes, and seven readings at 20 Hz.
+void read_all(Bench& host) {
+  host.execute(Command::i2c_write(0x68, "x6b00"));
+  host.execute(Command::i2c_poll(1, 0x68, "x3b", 14, 10));
+  for (int slot = 2; slot <= i2c_slots; ++slot) {
+    host.execute(Command::i2c_poll(slot, 0x40, "x02", 2, 50));
+  }
+}
+
+}  // namespace
+
+TEST(Devices, AreReadAndToldWithTheirTime) {
+  Bench& host = new_board();
+  const Steps steps(step_of_board);
+  host.heartbeat();
+  host.run_ms(2);
+  Listener& listener = host.listen();
+  host.execute(Command::fields("I2C1,I2C8,I2CBUS"));
+  read_all(host);
+  host.run_alive_ms(200);
+  const State& state = listener.state();
+  EXPECT(state.i2c[0].data.size == 14 && state.i2c[0].data.bytes[4] == 0x40);
+  EXPECT(state.i2c[7].data.size == 2 && state.i2c[7].data.bytes[1] == 0x02);
+  EXPECT(state.t_ms - state.i2c[0].t_ms <= 13 && state.i2c_bus.errors == 0);
+}
+
+// The stream, a stop and silence, with a bus that is free, held, and stretched for ever.
+TEST(Devices, ABusThatIsHeldCostsTheBoardNothing) {
+  std::uint32_t longest_stop_us = 0;
+  std::uint32_t longest_silence_ms = 0;
+  for (const Fault fault : {Fault::none, Fault::held, Fault::stretched}) {
+    Bench& host = new_board();
+    const Steps steps(step_of_board);
+    host.drive_everything();
+    Listener& listener = host.listen();
+    read_all(host);
+    host.model().devices().bus.set_fault(fault);
+    host.run_alive_ms(100);
+    listener.forget();
+    host.run_alive_ms(200);
+    EXPECT(listener.states() >= 19 && listener.lost() == 0 && listener.longest_step_ms() == 10);
+    EXPECT(!host.safe());
+
+    host.run_ms(timeout_ms + 10);
+    const std::uint32_t silence_ms = host.now_ms() - host.board().application().link().fed_ms();
+    EXPECT(host.safe() && host.reason() == SafeReason::link);
+    const std::uint32_t safe_ms =
+        silence_ms - (BoardClock::ticks() - host.safe_ticks()) / BoardClock::ticks_per_us / 1000;
+    if (safe_ms > longest_silence_ms) longest_silence_ms = safe_ms;
+
+    host.heartbeat();
+    host.run_ms(20);
+    EXPECT(!host.safe());
+    host.command(Command::stop());
+    host.run_ms(5);
+    const std::uint32_t took =
+        (host.safe_ticks() - host.line_end_ticks()) / BoardClock::ticks_per_us;
+    EXPECT(host.safe() && host.reason() == SafeReason::stop);
+    if (took > longest_stop_us) longest_stop_us = took;
+  }
+  on_target::say_number("us from a stop to safe, the user's bus held", longest_stop_us);
+  on_target::say_number("ms of silence until safe, the user's bus held", longest_silence_ms);
+  EXPECT(longest_stop_us <= 2000 && longest_silence_ms <= timeout_ms + 3);
+}
