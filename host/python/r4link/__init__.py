@@ -16,11 +16,12 @@ FORWARD = Direction.FORWARD
 REVERSE = Direction.REVERSE
 
 __all__ = [
-    'FIELDS', 'FORWARD', 'REVERSE', 'Bldc', 'BldcChannel', 'Board', 'BoardHealth', 'Bridge', 'BridgeCounters', 'BridgeEnd', 'BridgeStatus', 'CancelledError', 'CarrierCounters',
-    'ClosedError', 'Command', 'DataError', 'DeniedError', 'Direction', 'Drive', 'DriveChannel', 'Error', 'Event',
-    'Fleet', 'FleetEvent', 'FleetResults', 'I2c', 'I2cAnswer', 'I2cBusReport', 'I2cReading', 'Identity', 'LinkStatus', 'LinkedUrl', 'Log', 'Look', 'NotArmedError',
-    'NotConfirmedError', 'OpenError', 'PostResult', 'RecordedBoard', 'RecordedDatagram', 'RecordedEvent', 'Recording',
-    'RefusedError', 'RefusedPost', 'RelayChannel', 'ServoChannel', 'Setpoints', 'SimBoard', 'State', 'States',
-    'Statistics', 'StepperChannel', 'Subscription', 'UnsupportedError', 'UsageError', 'aio', 'control', 'read', 'with_link',
-    '__version__',
+    'Bldc', 'BldcChannel', 'Board', 'BoardHealth', 'Bridge', 'BridgeCounters', 'BridgeEnd', 'BridgeStatus',
+    'CancelledError', 'CarrierCounters', 'ClosedError', 'Command', 'DataError', 'DeniedError', 'Direction', 'Drive',
+    'DriveChannel', 'Error', 'Event', 'FIELDS', 'FORWARD', 'Fleet', 'FleetEvent', 'FleetResults', 'I2c', 'I2cAnswer',
+    'I2cBusReport', 'I2cReading', 'Identity', 'LinkStatus', 'LinkedUrl', 'Log', 'Look', 'NotArmedError',
+    'NotConfirmedError', 'OpenError', 'PostResult', 'REVERSE', 'RecordedBoard', 'RecordedDatagram', 'RecordedEvent',
+    'Recording', 'RefusedError', 'RefusedPost', 'RelayChannel', 'ServoChannel', 'Setpoints', 'SimBoard', 'State',
+    'States', 'Statistics', 'StepperChannel', 'Subscription', 'UnsupportedError', 'UsageError', 'aio', 'control',
+    'read', 'with_link', '__version__',
 ]

@@ -4,12 +4,12 @@
 #include <map>
 #include <string>
 
-#include "../protocol/messages/message.hpp"
-#include "../protocol/messages/state_fields.hpp"
+#include "../../protocol/messages/message.hpp"
+#include "../../protocol/messages/state_fields.hpp"
 #include "r4link/datagram.hpp"
-#include "recording/recorder.hpp"
-#include "recording/recording_file.hpp"
-#include "recording/recording_reader.hpp"
+#include "recorder.hpp"
+#include "recording_file.hpp"
+#include "recording_reader.hpp"
 
 namespace r4 {
 
