@@ -6,6 +6,7 @@
 #include <chrono>
 #include <stdexcept>
 #include <string>
+#include <thread>
 
 #include "r4link/error.hpp"
 #include "r4link/simulation.hpp"
@@ -193,6 +194,44 @@ TEST_F(RunLoop, ComesToRestBeforeItPassesAnExceptionOn) {
                         }),
                std::runtime_error);
   expect_rest();
+}
+
+TEST_F(RunLoop, StopsTheHeartbeatsWhenAStepHangs) {
+  loop.watchdog = 50ms;
+  bool safe = false;
+  const LoopReport report = run_loop(board, loop, [&](const LoopStep& step) {
+    if (step.state.encoder(1) > 5 && !safe) {
+      // It waits for something that only comes when the board has gone safe.
+      for (int ms = 0; ms < 10'000 && !safe; ++ms) {
+        std::this_thread::sleep_for(1ms);
+        safe = robot.look().pins.is_safe();
+      }
+    }
+    return drive(step);
+  });
+  EXPECT_TRUE(safe) << "the motor went on, with nobody to look after it";
+  EXPECT_NE(report.end, LoopEnd::asked);
+  EXPECT_TRUE(robot.look().pins.is_safe());
+}
+
+TEST(RunLoopOnALinkThatIsCut, SaysThatTheMotorsMayGoOn) {
+  sim::SimulatedRobot robot;
+  BoardOptions options;
+  options.session.fields = "OSMC1,ENC1";
+  Board board(sim::with_link(robot.url(), "cut=1s+30s"), options);
+  board.wait_active();
+  board.arm();
+  LoopOptions loop;
+  loop.fields = "ENC1";
+  loop.late = 300ms;
+  loop.rest_timeout = 50ms;
+  loop.rest.osmc(1, 0, Direction::forward);
+  const LoopReport report = run_loop(board, loop, [](const LoopStep&) {
+    return std::optional(Setpoints{}.osmc(1, 2000, Direction::forward));
+  });
+  EXPECT_EQ(report.end, LoopEnd::late) << report.why;
+  EXPECT_FALSE(report.at_rest);
+  EXPECT_TRUE(contains(report.why, std::string(stop_last_resort))) << report.why;
 }
 
 TEST_F(RunLoop, HasToBeToldWhatRestIs) {
