@@ -10,6 +10,7 @@
 
 #include "r4link/error.hpp"
 #include "r4link/simulation.hpp"
+#include "tests/support/at_will.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::control {
@@ -212,6 +213,34 @@ TEST_F(RunLoop, StopsTheHeartbeatsWhenAStepHangs) {
   EXPECT_TRUE(safe) << "the motor went on, with nobody to look after it";
   EXPECT_NE(report.end, LoopEnd::asked);
   EXPECT_TRUE(robot.look().pins.is_safe());
+}
+
+TEST(RunLoopWithoutArming, DrivesAndComesToRest) {
+  sim::SimulatedRobot robot;
+  BoardOptions options = test::at_will();
+  options.session.fields = "OSMC1,ENC1";
+  Board board(robot.url(), options);
+  board.wait_active();
+  board.osmc(1).set(1000, Direction::forward);
+  LoopOptions loop;
+  loop.late = 500ms;
+  loop.rest.osmc(1, 0, Direction::forward);
+  int steps = 0;
+  const auto drive = [&](const LoopStep&) {
+    return ++steps < 5 ? std::optional(Setpoints{}.osmc(1, 2000, Direction::forward))
+                       : std::nullopt;
+  };
+  // It was not told so: it does not run, and yet leaves nothing driven.
+  const LoopReport untold = run_loop(board, loop, drive);
+  EXPECT_EQ(untold.end, LoopEnd::disarmed);
+  EXPECT_TRUE(contains(untold.why, "not yet; call arm() first")) << untold.why;
+  EXPECT_TRUE(untold.at_rest);
+  EXPECT_EQ(robot.look().pins.osmc[0].pwm, 0);
+  loop.arming = Arming::off;
+  const LoopReport report = run_loop(board, loop, drive);
+  EXPECT_EQ(report.end, LoopEnd::asked) << report.why;
+  EXPECT_EQ(report.steps, 4U);
+  EXPECT_EQ(robot.look().pins.osmc[0].pwm, 0);
 }
 
 TEST(RunLoopOnALinkThatIsCut, SaysThatTheMotorsMayGoOn) {
