@@ -162,7 +162,8 @@ void LoopGuard::look_at_motors(const ReceivedState& state) {
 LoopEnd LoopGuard::check(HostLinkState link, DisarmCause disarmed, Clock::time_point now) {
   if (end_ != LoopEnd::none) return end_;
   if (disarmed != DisarmCause::none) {
-    end(LoopEnd::disarmed, std::string("output commands are refused: ") + to_text(disarmed));
+    end(LoopEnd::disarmed, std::string("output commands are refused: ") + to_text(disarmed) +
+                               (disarmed == DisarmCause::not_yet ? "; call arm() first" : ""));
   } else if (link != HostLinkState::active) {
     end(LoopEnd::not_active, std::string("the link is ") + to_text(link));
   } else if (now >= deadline_) {

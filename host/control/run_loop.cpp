@@ -35,16 +35,22 @@ class StepWatchdog {
   bool on_;
 };
 
+// Why output commands are refused here.
+DisarmCause cause_of(const Board& board, const LoopOptions& options) {
+  return options.arming == Arming::off ? DisarmCause::none : board.disarmed_by();
+}
+
 // Whatever there is left to say of how the outputs were left.
 std::string come_to_rest(Board& board, const LoopOptions& options, bool& at_rest) {
   at_rest = true;
-  // They are safe already; nothing would be sent.
-  if (board.disarmed_by() != DisarmCause::none) return {};
+  const auto is_safe = [&] { return cause_of(board, options) != DisarmCause::none; };
+  // They are safe already, and nothing would be sent; but for a board that nobody need arm.
+  if (is_safe() && board.disarmed_by() != DisarmCause::not_yet) return {};
   try {
     board.apply(options.rest, options.rest_timeout);
     return {};
   } catch (const Error&) {
-    if (board.disarmed_by() != DisarmCause::none) return {};
+    if (is_safe()) return {};
   }
   try {
     board.stop(options.rest_timeout);
@@ -75,7 +81,8 @@ LoopReport run_loop(Board& board, const LoopOptions& options,
     StepWatchdog watchdog(board, options.watchdog);
     States states = board.states({.most = waiting_states});
     guard.start(Clock::now());
-    while (guard.check(board.link().state, board.disarmed_by(), Clock::now()) == LoopEnd::none) {
+    while (guard.check(board.link().state, cause_of(board, options), Clock::now()) ==
+           LoopEnd::none) {
       watchdog.feed();
       const auto left = std::chrono::ceil<Milliseconds>(guard.deadline() - Clock::now());
       const auto state = states.take(std::clamp(left, Milliseconds(0), look_interval));
@@ -83,7 +90,7 @@ LoopReport run_loop(Board& board, const LoopOptions& options,
         if (states.ended()) guard.end(LoopEnd::not_active, "the board was closed");
         continue;
       }
-      const auto dt_s = guard.on_state(*state, board.disarmed_by(), Clock::now());
+      const auto dt_s = guard.on_state(*state, cause_of(board, options), Clock::now());
       if (!dt_s) continue;
       try {
         const std::optional<Setpoints> wanted = step({*state, *dt_s});

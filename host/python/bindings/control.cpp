@@ -175,7 +175,7 @@ void bind_control(py::module_& module) {
   bind_kinematics(module);
   py::class_<LoopOptions>(module, "LoopOptions")
       .def(py::init([](const std::string& fields, int late_ms, int first_ms, const Setpoints& rest,
-                       int rest_timeout_ms, int watchdog_ms) {
+                       int rest_timeout_ms, int watchdog_ms, bool arming) {
         LoopOptions options;
         options.fields = fields;
         options.late = Ms(late_ms);
@@ -183,6 +183,7 @@ void bind_control(py::module_& module) {
         options.rest = rest;
         options.rest_timeout = Ms(rest_timeout_ms);
         options.watchdog = Ms(watchdog_ms);
+        options.arming = arming ? Arming::required : Arming::off;
         return options;
       }))
       .def("add_standstill", [](LoopOptions& self, int encoder, const std::string& drive,

@@ -207,8 +207,8 @@ class LoopReport(NamedTuple):
 
 
 def _options(fields: str, late: float, first: float, standstill: Sequence[Standstill], rest: Setpoints,
-             rest_timeout: float, watchdog: float) -> _core.LoopOptions:
-    options = _core.LoopOptions(fields, _ms(late), _ms(first), rest._core, _ms(rest_timeout), _ms(watchdog))
+             rest_timeout: float, watchdog: float, arming: bool = True) -> _core.LoopOptions:
+    options = _core.LoopOptions(fields, _ms(late), _ms(first), rest._core, _ms(rest_timeout), _ms(watchdog), arming)
     for each in standstill:
         options.add_standstill(each.encoder, each.drive, each.channel, each.pwm, each.counts, _ms(each.time))
     return options
@@ -250,11 +250,11 @@ class LoopGuard:
 
 def run_loop(board: Board, step: Callable[[State, float], Setpoints | None], *, rest: Setpoints, fields: str = '',
              late: float = 0.1, first: float = 1.0, standstill: Sequence[Standstill] = (), rest_timeout: float = 0.2,
-             watchdog: float = 0.3) -> LoopReport:
+             watchdog: float = 0.3, arming: bool = True) -> LoopReport:
     """Runs a loop on this thread until it ends: `step(state, dt)` for each new state that has all `fields`, with the
     seconds since the step before on the board's clock. What it returns is posted; None ends the loop. Then the outputs
-    are left as `rest` has them. What the step raises comes after that; so does Ctrl-C."""
-    options = _options(fields, late, first, standstill, rest, rest_timeout, watchdog)
+    are left as `rest` has them. `arming`: as of the board. What the step raises comes after that; so does Ctrl-C."""
+    options = _options(fields, late, first, standstill, rest, rest_timeout, watchdog, arming)
 
     def posted(state: State, dt: float) -> _core.Setpoints | None:
         wanted = step(state, dt)

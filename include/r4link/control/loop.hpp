@@ -64,6 +64,8 @@ struct LoopOptions {
 
   // Of run_loop() alone.
 
+  // As of the board: Arming::off where its SessionOptions::arming is.
+  Arming arming = Arming::required;
   // What the loop leaves behind: 0 of each motor that it drives. Never empty.
   Setpoints rest = {};
   // If the board does not confirm that within so much time, it is stopped (E:STOP).

@@ -6,9 +6,11 @@
 #include <chrono>
 #include <stdexcept>
 #include <string>
+#include <thread>
 
 #include "r4link/error.hpp"
 #include "r4link/simulation.hpp"
+#include "tests/support/at_will.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::control {
@@ -193,6 +195,72 @@ TEST_F(RunLoop, ComesToRestBeforeItPassesAnExceptionOn) {
                         }),
                std::runtime_error);
   expect_rest();
+}
+
+TEST_F(RunLoop, StopsTheHeartbeatsWhenAStepHangs) {
+  loop.watchdog = 50ms;
+  bool safe = false;
+  const LoopReport report = run_loop(board, loop, [&](const LoopStep& step) {
+    if (step.state.encoder(1) > 5 && !safe) {
+      // It waits for something that only comes when the board has gone safe.
+      for (int ms = 0; ms < 10'000 && !safe; ++ms) {
+        std::this_thread::sleep_for(1ms);
+        safe = robot.look().pins.is_safe();
+      }
+    }
+    return drive(step);
+  });
+  EXPECT_TRUE(safe) << "the motor went on, with nobody to look after it";
+  EXPECT_NE(report.end, LoopEnd::asked);
+  EXPECT_TRUE(robot.look().pins.is_safe());
+}
+
+TEST(RunLoopWithoutArming, DrivesAndComesToRest) {
+  sim::SimulatedRobot robot;
+  BoardOptions options = test::at_will();
+  options.session.fields = "OSMC1,ENC1";
+  Board board(robot.url(), options);
+  board.wait_active();
+  board.osmc(1).set(1000, Direction::forward);
+  LoopOptions loop;
+  loop.late = 500ms;
+  loop.rest.osmc(1, 0, Direction::forward);
+  int steps = 0;
+  const auto drive = [&](const LoopStep&) {
+    return ++steps < 5 ? std::optional(Setpoints{}.osmc(1, 2000, Direction::forward))
+                       : std::nullopt;
+  };
+  // It was not told so: it does not run, and yet leaves nothing driven.
+  const LoopReport untold = run_loop(board, loop, drive);
+  EXPECT_EQ(untold.end, LoopEnd::disarmed);
+  EXPECT_TRUE(contains(untold.why, "not yet; call arm() first")) << untold.why;
+  EXPECT_TRUE(untold.at_rest);
+  EXPECT_EQ(robot.look().pins.osmc[0].pwm, 0);
+  loop.arming = Arming::off;
+  const LoopReport report = run_loop(board, loop, drive);
+  EXPECT_EQ(report.end, LoopEnd::asked) << report.why;
+  EXPECT_EQ(report.steps, 4U);
+  EXPECT_EQ(robot.look().pins.osmc[0].pwm, 0);
+}
+
+TEST(RunLoopOnALinkThatIsCut, SaysThatTheMotorsMayGoOn) {
+  sim::SimulatedRobot robot;
+  BoardOptions options;
+  options.session.fields = "OSMC1,ENC1";
+  Board board(sim::with_link(robot.url(), "cut=1s+30s"), options);
+  board.wait_active();
+  board.arm();
+  LoopOptions loop;
+  loop.fields = "ENC1";
+  loop.late = 300ms;
+  loop.rest_timeout = 50ms;
+  loop.rest.osmc(1, 0, Direction::forward);
+  const LoopReport report = run_loop(board, loop, [](const LoopStep&) {
+    return std::optional(Setpoints{}.osmc(1, 2000, Direction::forward));
+  });
+  EXPECT_EQ(report.end, LoopEnd::late) << report.why;
+  EXPECT_FALSE(report.at_rest);
+  EXPECT_TRUE(contains(report.why, std::string(stop_last_resort))) << report.why;
 }
 
 TEST_F(RunLoop, HasToBeToldWhatRestIs) {
