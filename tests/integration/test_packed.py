@@ -27,6 +27,8 @@ def any_values(rng):
         lambda: str(rng.randrange(10 ** rng.randrange(1, 20))), lambda: str(-rng.randrange(10 ** 9)),
         lambda: f'{rng.randrange(50)}.{rng.randrange(100):02}', lambda: f'{rng.randrange(5000)},{rng.randrange(2)}',
         lambda: f'{rng.randrange(5000)},{rng.randrange(2)},{rng.randrange(2)}',
+        lambda: f'{rng.randrange(10 ** 9)},{rng.randrange(9)},x{rng.randbytes(rng.randrange(70)).hex()}',
+        lambda: f'{rng.randrange(9)},0{rng.randrange(9)},x{rng.choice(["", "0", "AB", "ab", "abg0"])}',
         lambda: ','.join(rng.choices(packed_form.NAMES, k=rng.randrange(1, 4))),
         lambda: ''.join(rng.choices('0123456789.-,', k=rng.randrange(10))),
         lambda: ''.join(rng.choices('ab1 :23.-,', k=rng.randrange(60)))])()
@@ -69,7 +71,7 @@ def test_the_document_has_the_table_of_the_second_implementation():
     with open(os.path.join(DATA, '..', '..', 'docs', 'packed.md'), encoding='utf-8') as file:
         text = file.read()
     for name in packed_form.NAMES:
-        assert re.search(rf'\b{re.escape(name)}\b', text) or re.match(r'SERVO|ENC|US|BLDC', name), name
+        assert re.search(rf'\b{re.escape(name)}\b', text) or re.match(r'SERVO|ENC|US|BLDC|I2C', name), name
 
 
 def test_r4_reads_what_the_second_implementation_packs():

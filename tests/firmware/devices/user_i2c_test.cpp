@@ -121,6 +121,15 @@ TEST_F(UserBus, ReadsEachSlotOnItsGrid) {
   EXPECT_EQ(bus.report().errors, 0U);
 }
 
+TEST_F(UserBus, ReadingsThatAskForMoreThanTheBusHasTakeTurns) {
+  for (int slot = 1; slot <= 3; ++slot) bus.poll_slot(slot, reads(0x68, 0x3B, 32, 5), now_ms + 1);
+  pass(300);
+  for (int slot = 1; slot <= 3; ++slot) {
+    EXPECT_EQ(bus.reading(slot).data.size, 32) << slot;
+    EXPECT_LE(now_ms - bus.reading(slot).t_ms, 20U) << slot;
+  }
+}
+
 TEST_F(UserBus, TheTimeOfAReadingIsWhenItBegan) {
   bus.poll_slot(3, reads(0x68, 0x75, 1, 1000), now_ms + 1);
   pass(3);

@@ -17,6 +17,7 @@
 #include "r4link/vocabulary.hpp"
 #include "tests/support/datagrams.hpp"
 #include "transports/framing/can/packed_layout.hpp"
+#include "transports/framing/can/packed_layout.hpp"
 #include "transports/framing/can/packed_words.hpp"
 
 namespace r4 {
@@ -133,6 +134,9 @@ TEST(PackedForm, EveryKindOfDatagramIsCompact) {
       {"  with the largest numbers", fields_of(ours, extreme), 36},
       {"  and ENC1, ENC2, US1", fields_of(more, state), 43},
       {"state, ALL", fields_of(FieldSet::all(), state), 138},
+      {"a reading of 14 bytes",
+       with_crc("I2C1:1677667715,0,x000000004000f0b0000000000000;PNum:8640123;T:4012345670;"), 33},
+      {"  as none of its form", with_crc("I2C1:1,01,xA0;PNum:8640123;T:4012345670;"), 20},
       {"board heartbeat", with_crc("H:R4-ROS2;PNum:8640123;T:4012345670;"), 12},
       {"board heartbeat, safe", with_crc("H:R4-ROS2;PNum:8640123;T:4012345670;SAFE:1;"), 14},
       {"board heartbeat, connecting", "H:R4-ROS2;PNum:0;T:0;^0xb10b3a06^", 5},
@@ -157,6 +161,20 @@ TEST(PackedForm, EveryKindOfDatagramIsCompact) {
                frames(each.datagram.size()), frames(bytes.size()));
     EXPECT_EQ(unpacked(bytes), each.datagram);
     EXPECT_EQ(bytes.size(), each.size) << each.what;
+  }
+}
+
+TEST(PackedForm, BytesOfDevicesAreTheSameAgain) {
+  for (std::size_t count = 0; count <= 66; ++count) {
+    std::string bytes;
+    for (std::size_t i = 0; i < count; ++i) bytes += "0f";
+    const std::string datagram =
+        with_crc("I2C8:4294967295," + std::to_string(count) + ",x" + bytes + ";PNum:1;T:2;");
+    const Bytes packed = packed_bytes(datagram);
+    EXPECT_EQ(unpacked(packed), datagram) << count;
+    if (count <= packed::most_device_bytes) {
+      EXPECT_LE(packed.size(), count + 25);
+    }
   }
 }
 
