@@ -59,6 +59,7 @@ BridgeAudience::Place& BridgeAudience::place_of(Peer peer, Time now) {
         best == nullptr || (best->used && (!place.used || place.heard < best->heard));
     if (better) best = &place;
   }
+  if (best == nullptr) best = places_.data();  // there are more places than may watch
   *best = Place();
   best->used = true;
   best->peer = peer;

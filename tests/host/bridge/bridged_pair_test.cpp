@@ -157,6 +157,16 @@ TEST_F(BridgedPairTest, AStopOfAnyonePassesBeforeEverything) {
   EXPECT_EQ(hosts->take(), Texts{"H:R4-ROS2;PNum:9;T:601;SAFE:2;STOP:70;"});
 }
 
+TEST_F(BridgedPairTest, AStopWaitsForNothingWhereStatesDoNotGetThrough) {
+  begin();
+  hosts->result = SendResult::full;
+  for (int i = 0; i < 1000; ++i) board->say(board_state);
+  hosts->say("E:STOP;PNum:70;T:0;", third);
+  ASSERT_EQ(board->sent.size(), 1U) << "it has left within the call that brought it";
+  EXPECT_EQ(board->sent.front().priority, Priority::stop);
+  EXPECT_EQ(from_board().undelivered, 1000U);
+}
+
 TEST_F(BridgedPairTest, AStopBesideOtherCommandsIsOne) {
   begin();
   hosts->say("O:1,1,1;E:STOP;PNum:70;T:0;", third);

@@ -104,7 +104,7 @@ class Report {
     }
   }
 
-  void tell_counters(BridgeSide side, const BridgeEnd& now, BridgeEnd& told) {
+  void tell_counters(BridgeSide side, const BridgeEnd& now, BridgeEnd& told) const {
     bool changed = told.name.empty();
     for (const NamedCounter& each : named_counters) {
       changed = changed || now.from.*each.value != told.from.*each.value;
