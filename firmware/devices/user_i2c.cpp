@@ -99,8 +99,7 @@ bool UserI2c::begin_due(std::uint32_t now_ms) {
     next_time(slot, now_ms);
     first_slot_ = static_cast<std::uint8_t>((at + 1) % i2c_slots);
     const I2cPoll& poll = slot.poll;
-    begin(static_cast<std::int8_t>(at), poll.address, poll.register_bytes, poll.register_size,
-          poll.count, now_ms);
+    begin(at, poll.address, poll.register_bytes, poll.register_size, poll.count, now_ms);
     return true;
   }
   return false;
@@ -112,8 +111,8 @@ void UserI2c::next_time(Slot& slot, std::uint32_t now_ms) {
   slot.due_ms += (1 + (now_ms - slot.due_ms) / period) * period;
 }
 
-void UserI2c::begin(std::int8_t slot, std::uint8_t address, const std::uint8_t* out,
-                    std::uint8_t out_size, std::uint8_t in_size, std::uint32_t now_ms) {
+void UserI2c::begin(int slot, std::uint8_t address, const std::uint8_t* out, std::uint8_t out_size,
+                    std::uint8_t in_size, std::uint32_t now_ms) {
   std::memcpy(sent_, out, out_size);
   UserTransfer transfer;
   transfer.address = address;

@@ -64,13 +64,13 @@ class UserI2c {
     I2cPoll poll;
     std::uint32_t due_ms = 0;
   };
-  static constexpr std::int8_t no_slot = -1;       // a single transfer
+  static constexpr int no_slot = -1;               // a single transfer
   static constexpr std::uint8_t half_clocks = 21;  // nine clocks, and STOP
 
   void begin_next(std::uint32_t now_ms);
   void begin_single(std::uint32_t now_ms);
   bool begin_due(std::uint32_t now_ms);
-  void begin(std::int8_t slot, std::uint8_t address, const std::uint8_t* out, std::uint8_t out_size,
+  void begin(int slot, std::uint8_t address, const std::uint8_t* out, std::uint8_t out_size,
              std::uint8_t in_size, std::uint32_t now_ms);
   void end(I2cOutcome outcome);
   void end_scan_step(I2cOutcome outcome);
@@ -84,7 +84,7 @@ class UserI2c {
 
   UserI2cPort& port_;
   Stage stage_ = Stage::idle;
-  std::int8_t slot_ = no_slot;   // whose transfer is under way
+  int slot_ = no_slot;           // whose transfer is under way
   std::uint8_t first_slot_ = 0;  // that is looked at next
   bool abandoned_ = false;       // nobody wants to know how the transfer under way ends
   std::uint8_t half_clock_ = 0;

@@ -17,7 +17,6 @@
 #include "r4link/vocabulary.hpp"
 #include "tests/support/datagrams.hpp"
 #include "transports/framing/can/packed_layout.hpp"
-#include "transports/framing/can/packed_layout.hpp"
 #include "transports/framing/can/packed_words.hpp"
 
 namespace r4 {
