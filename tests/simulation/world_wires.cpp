@@ -224,7 +224,8 @@ bool World::serves_since(std::uint64_t at_us) const {
 }
 
 // For a command: there, the state that shows it or the answer to a copy, and back.
-bool World::is_time_enough() const {
+bool World::is_time_enough(const Sent& sent) const {
+  if (!shows_commands_ || shows_commands_since_us_ > sent.asked_us) return false;
   return schedule_.command_timeout_us >=
          2 * most_delay_us + 150'000 + schedule_.settings.state_period_ms() * 1000U;
 }
@@ -265,7 +266,12 @@ void World::on_told_state(int index, std::string_view bytes) {
   if (!read_datagram(Text(bytes), datagram) || kind_of(datagram) != MessageKind::state) return;
   Wire& wire = wires_[index];
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
-  if (!wire.brought_state || newer(t_ms, wire.newest_t)) wire.newest_t = t_ms;
+  if (!wire.brought_state || newer(t_ms, wire.newest_t)) {
+    wire.newest_t = t_ms;
+    const bool shows = !datagram.find(Text("CMD")).name().empty();
+    if (shows && !shows_commands_) shows_commands_since_us_ = now_us_;
+    shows_commands_ = shows;
+  }
   wire.brought_state = true;
 }
 

@@ -369,6 +369,24 @@ TEST(SessionWires, AreSignedOnce) {
   EXPECT_TRUE(executed_once(robot));
 }
 
+TEST(SessionWires, BringWhatTheBoardSaidWhileItBootedTooLate) {
+  SessionOptions options = WiredRobot::at_will();
+  options.key = key_of(1);
+  options.clock_start = std::chrono::hours{1};
+  WiredRobot robot(Cables{{1}, {1}}, options, BoardRole::control, settings_with(key_of(1)));
+  robot.connect();
+  robot.links.clear();
+  const std::string t = std::to_string(robot.board_ms(0) - 600);
+  const std::string nonce = str(robot.board(0).authentication().nonce());
+  const std::string booting = with_crc("H:R4-ROS2;PNum:0;T:" + t + ";AN:" + nonce + ";");
+  robot.bring(0, booting);
+  robot.bring(1, booting);
+  robot.run(1500);
+  for (const LinkStatus& each : robot.links) EXPECT_TRUE(is_heard(each.state));
+  EXPECT_EQ(robot.trips, 0);
+  EXPECT_EQ(robot.drive(10).outcome, Outcome::confirmed);
+}
+
 TEST(SessionWires, AreArmedTogether) {
   WiredRobot robot(Cables{{1}, {1}}, SessionOptions{});
   robot.connect();
