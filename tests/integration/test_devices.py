@@ -18,7 +18,7 @@ def test_a_scan_a_register_and_a_device_that_is_not_there(board):
     assert [lines[1], lines[3], lines[6]] == ['  0x40 0x68', '  x68', '  x399f']
     missing = run('send', board.host_url, 'X:READ,0x50,x00,1')
     assert missing.returncode == 3 and 'no acknowledge; X:SCAN shows which addresses answer' in missing.stderr
-    [answer] = objects(run('send', board.host_url, 'X:READ,0x50,x00,1', '--json').stdout)
+    answer = objects(run('send', board.host_url, 'X:READ,0x50,x00,1', '--json').stdout)[0]
     assert (answer['confirmed'], answer['transfer'], answer['bytes']) == (False, 'no acknowledge', 'x')
 
 
