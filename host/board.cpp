@@ -27,6 +27,7 @@ Board::Board(const std::vector<CarrierMaker>& makers, BoardOptions options,
     : impl_(std::make_shared<Impl>(
           [&makers](Loop& loop) {
             std::vector<std::unique_ptr<Carrier>> carriers;
+            carriers.reserve(makers.size());
             for (const CarrierMaker& make : makers) carriers.push_back(make(loop));
             return carriers;
           },

@@ -219,7 +219,7 @@ class Session {
                       Time now);
   bool is_new_heartbeat(std::size_t wire, std::uint32_t t_ms);
   bool is_newest_state(std::size_t wire, const Datagram& datagram, Time now);
-  bool take_fields(std::size_t wire, ReceivedState& fresh, const FieldSet& before);
+  bool take_fields(std::size_t wire, const ReceivedState& fresh);
   Arrival arrival_over(std::uint32_t t_ms, SafeReason reason, Time now);
   bool is_told(const Nack& nack);
   void note_busy(std::size_t wire, Time now);

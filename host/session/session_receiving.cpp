@@ -80,8 +80,6 @@ void Session::on_heartbeat_datagram(std::size_t wire, const Datagram& datagram, 
 void Session::on_state_datagram(std::size_t wire, const Datagram& datagram, Time now) {
   if (wires_.several() && !is_newest_state(wire, datagram, now)) return;
   ReceivedState fresh = state_;
-  FieldSet before;
-  if (wires_.several()) std::swap(before, fresh.present);
   if (!read_state(datagram, fresh)) {
     ++collector_.counts.damaged;
     ReadResult result;
@@ -90,7 +88,7 @@ void Session::on_state_datagram(std::size_t wire, const Datagram& datagram, Time
                              std::string_view(datagram.bytes().data(), datagram.bytes().size()));
     return;
   }
-  if (wires_.several() && !take_fields(wire, fresh, before)) return;
+  if (wires_.several() && !take_fields(wire, fresh)) return;
   const SafeReason reason = fresh.present.has(StateField::safe) ? fresh.safe : SafeReason::none;
   const Arrival arrival =
       wires_.several() ? arrival_over(fresh.t_ms, reason, now)

@@ -136,15 +136,12 @@ bool Session::is_newest_state(std::size_t wire, const Datagram& datagram, Time n
   return false;
 }
 
-// With the fields of one datagram: does it bring any that the states of this T have not brought? Then it has all
-// that are known. `before`: those of the newest state.
-bool Session::take_fields(std::size_t wire, ReceivedState& fresh, const FieldSet& before) {
-  const FieldSet brought = fresh.present;
+// Does it bring any field that the states of this T have not brought?
+bool Session::take_fields(std::size_t wire, const ReceivedState& fresh) {
   if (!state_.any() || fresh.t_ms != state_.t_ms) newest_fields_ = FieldSet();
   const FieldSet known = newest_fields_;
-  newest_fields_.add(brought);
+  newest_fields_.add(fresh.present);
   const bool copy = newest_fields_ == known;
-  fresh.present.add(before);
   copy ? wires_.copy(wire) : wires_.taken(wire);
   return !copy;
 }

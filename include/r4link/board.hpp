@@ -109,8 +109,8 @@ class R4LINK_API Board {
   // throws if none can be opened.
   explicit Board(const std::vector<std::string>& urls, BoardOptions options = {},
                  BoardCallbacks callbacks = {});
-  explicit Board(std::initializer_list<std::string_view> urls, BoardOptions options = {},
-                 BoardCallbacks callbacks = {})
+  Board(std::initializer_list<std::string_view> urls, BoardOptions options = {},
+        BoardCallbacks callbacks = {})
       : Board(std::vector<std::string>(urls.begin(), urls.end()), std::move(options),
               std::move(callbacks)) {}
   // On transports of your own.

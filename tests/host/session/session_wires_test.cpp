@@ -306,6 +306,19 @@ TEST(SessionWires, TakeAStateInPartsFromWhicheverBringsThem) {
   EXPECT_EQ(robot.states[1].analog_cv[static_cast<int>(StateField::ain24)], 100);
 }
 
+TEST(SessionWires, TellOfAStateOnlyWhatItHasBrought) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  robot.run(3);
+  const std::uint32_t t_ms = robot.board_ms(0) + 1;
+  robot.bring(0, with_crc("SAFE:2;CMD:5;PNum:90001;T:" + std::to_string(t_ms) + ";"));
+  EXPECT_EQ(robot.session->link().reason, SafeReason::stop);
+  EXPECT_TRUE(robot.session->state().present.has(StateField::cmd));
+  robot.bring(1, with_crc("AIN24:1.00;PNum:70001;T:" + std::to_string(t_ms + 1) + ";"));
+  EXPECT_EQ(robot.session->link().reason, SafeReason::none);
+  EXPECT_FALSE(robot.session->state().present.has(StateField::cmd));
+}
+
 TEST(SessionWires, CountAsLostWhatNoneBrings) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
