@@ -15,7 +15,7 @@ import pytest
 
 from r4_process import DATA, ERROR, PATIENCE_S, R4, SANITIZED, objects, run
 
-DATA_BAD, USAGE, REFUSED, OPEN, PERMISSION = 1, 2, 3, 4, 5
+DATA_BAD, USAGE, REFUSED, OPEN, PERMISSION, UNSUPPORTED = 1, 2, 3, 4, 5, 6
 COMMANDS = ['monitor', 'send', 'stop', 'list', 'doctor', 'bus', 'bench', 'record', 'info', 'convert', 'replay', 'sim', 'key',
             'demo', 'encode', 'decode', 'completion', 'man', 'ros2', 'web']
 
@@ -308,6 +308,15 @@ def test_permission_denied_is_named_with_the_fix():
     assert result.returncode == PERMISSION, result
     assert ERROR.match(result.stderr) and device in result.stderr and 'dialout' in result.stderr
     assert objects(result.stdout)[-1]['kind'] == 'permission'
+
+
+def test_r4_alone_says_which_part_of_it_is_missing(tmp_path):
+    program = shutil.copy(R4, tmp_path / 'r4')
+    for command in ('ros2', 'metrics'):
+        result = subprocess.run([program, command, 'sim:', '--for', '1'], capture_output=True, text=True, timeout=30,
+                                check=False)
+        assert result.returncode == UNSUPPORTED and ERROR.match(result.stderr), result
+        assert f'{tmp_path}/r4-services' in result.stderr and 'libexec' in result.stderr
 
 
 @pytest.mark.parametrize('arguments', [['encode', 'Q:ID'], ['decode'], ['--help'], ['--version'],

@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <exception>
@@ -25,29 +26,30 @@
 namespace r4::tool {
 namespace {
 
-void add_subcommands(CLI::App& root, Action& chosen) {
-  add_monitor(root, chosen);
-  add_send(root, chosen);
-  add_stop(root, chosen);
-  add_list(root, chosen);
-  add_doctor(root, chosen);
-  add_bus(root, chosen);
-  add_bench(root, chosen);
-  add_record(root, chosen);
-  add_info(root, chosen);
-  add_convert(root, chosen);
-  add_plot(root, chosen);
-  add_replay(root, chosen);
-  add_metrics(root, chosen);
-  add_web(root, chosen);
-  add_ros2(root, chosen);
-  add_sim(root, chosen);
-  add_key_command(root, chosen);
-  add_demo(root, chosen);
-  add_encode(root, chosen);
-  add_decode(root, chosen);
-  add_completion(root, chosen);
-  add_man(root, chosen);
+struct Subcommand {
+  std::string_view name;
+  void (*add)(CLI::App& root, Action& chosen);
+};
+
+constexpr std::array subcommands = std::to_array<Subcommand>({
+    {"monitor", add_monitor}, {"send", add_send},       {"stop", add_stop},
+    {"list", add_list},       {"doctor", add_doctor},   {"bus", add_bus},
+    {"bench", add_bench},     {"record", add_record},   {"info", add_info},
+    {"convert", add_convert}, {"plot", add_plot},       {"replay", add_replay},
+    {"metrics", add_metrics}, {"web", add_web},         {"ros2", add_ros2},
+    {"sim", add_sim},         {"key", add_key_command}, {"demo", add_demo},
+    {"encode", add_encode},   {"decode", add_decode},   {"completion", add_completion},
+    {"man", add_man},
+});
+
+// The one that the first argument names, with its options, else all. Those of all of them take longer to declare than
+// a stop takes.
+void add_subcommands(CLI::App& root, Action& chosen, std::string_view first) {
+  const bool tells_of_all = first == "completion" || first == "man";
+  for (const Subcommand& each : subcommands) {
+    if (each.name == first && !tells_of_all) return each.add(root, chosen);
+  }
+  for (const Subcommand& each : subcommands) each.add(root, chosen);
 }
 
 // The text without the ending, if it has it.
@@ -154,7 +156,7 @@ int run(int argc, const char* const* argv) {
   root.set_help_flag("-h,--help", "Print help and exit; also after a command");
   root.footer(root_footer);
   root.require_subcommand(1);
-  add_subcommands(root, chosen);
+  add_subcommands(root, chosen, argc > 1 ? argv[1] : "");
   set_help_layout(root);
   try {
     int code = 0;

@@ -1,189 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 metrics: boards and their links for Prometheus.
-#include <fmt/format.h>
-#include <prometheus/collectable.h>
-#include <prometheus/exposer.h>
-#include <prometheus/metric_family.h>
-
-#include <array>
-#include <asio/io_context.hpp>
-#include <asio/post.hpp>
-#include <asio/signal_set.hpp>
-#include <asio/steady_timer.hpp>
-#include <chrono>
-#include <csignal>
-#include <cstdint>
-#include <cstdio>
-#include <future>
-#include <map>
+// r4 metrics: its command line.
 #include <memory>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
 
-#include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
-#include "board_metrics.hpp"
-#include "r4link/async_board.hpp"
-#include "r4link/error.hpp"
-#include "transports/can/can_interface.hpp"
-#include "transports/can/can_listener.hpp"
-#include "transports/url.hpp"
-#include "transports/url_pattern.hpp"
+#include "metrics_server.hpp"
 
 namespace r4::tool {
 namespace {
-
-using prometheus::MetricFamily;
-
-struct Options {
-  std::vector<std::string> urls;
-  std::string listen = "127.0.0.1:9618";
-  std::optional<Milliseconds> duration;
-  std::string key;
-  bool json = false;
-};
-
-// Where Prometheus finds no answer it knows that this program hangs.
-constexpr std::chrono::seconds longest_collection{2};
-
-// A CAN interface: how long it was busy, and for which boards.
-class BusMetrics {
- public:
-  BusMetrics(asio::io_context& io, const CanInterface& interface)
-      : name_(interface.name), listener_(io, interface.name, rate_of(interface)) {}
-
-  void describe(MetricFamilies& out) const {
-    std::map<std::string, std::uint64_t> busy_ns;
-    for (const auto& [id, traffic] : listener_.survey().traffic()) {
-      const CanIdMeaning meaning = classify(id);
-      const bool of_a_board = id != CanSurvey::extended_ids && meaning.kind != CanIdKind::other &&
-                              meaning.kind != CanIdKind::emergency_stop;
-      busy_ns[of_a_board ? std::to_string(meaning.node) : "other"] += traffic.busy_ns;
-    }
-    for (const auto& [node, ns] : busy_ns) {
-      out.counter(
-          "r4_can_busy_seconds_total",
-          "For how long frames to and from a node took the bus; its rate is the load, 0 to 1.",
-          {{"interface", name_}, {"node", node}}, static_cast<double>(ns) / 1e9);
-    }
-  }
-
- private:
-  // A vcan has no bit rate: it counts as the one that R4 is built for.
-  static CanBitRate rate_of(const CanInterface& interface) {
-    constexpr std::uint32_t usual = 1'000'000;
-    return {interface.bit_rate != 0 ? interface.bit_rate : usual, interface.data_bit_rate};
-  }
-
-  const std::string name_;
-  CanListener listener_;
-};
-
-// What the threads of the HTTP server ask, answered by the thread of the boards.
-class Metrics final : public prometheus::Collectable {
- public:
-  explicit Metrics(asio::io_context& io) : io_(io) {}
-
-  void add(AsyncBoard& board) { boards_.push_back(&board); }
-  void add(const BusMetrics& bus) { buses_.push_back(&bus); }
-
-  std::vector<MetricFamily> Collect() const override {
-    const auto answer = std::make_shared<std::promise<std::vector<MetricFamily>>>();
-    auto told = answer->get_future();
-    asio::post(io_, [this, answer] { answer->set_value(describe_all()); });
-    if (told.wait_for(longest_collection) != std::future_status::ready) return {};
-    return told.get();
-  }
-
- private:
-  std::vector<MetricFamily> describe_all() const {
-    MetricFamilies families;
-    for (const AsyncBoard* board : boards_) r4::tool::describe(*board, families);
-    for (const BusMetrics* bus : buses_) bus->describe(families);
-    return families.take();
-  }
-
-  asio::io_context& io_;
-  std::vector<const AsyncBoard*> boards_;
-  std::vector<const BusMetrics*> buses_;
-};
-
-std::unique_ptr<prometheus::Exposer> serve(const std::string& address) {
-  const std::size_t colon = address.rfind(':');
-  const bool valid = colon != std::string::npos && colon != 0 && colon + 1 != address.size() &&
-                     address.find(',') == std::string::npos;
-  if (!valid) {
-    throw Error(ErrorKind::usage, "--listen " + address, "is not HOST:PORT",
-                "write it as in 127.0.0.1:9618, or 0.0.0.0:9618 for other computers");
-  }
-  try {
-    return std::make_unique<prometheus::Exposer>(std::vector<std::string>{
-        "listening_ports", address, "num_threads", "2", "request_timeout_ms", "5000"});
-  } catch (const std::exception&) {  // it does not say why
-    throw Error(
-        ErrorKind::open, "--listen " + address, "cannot be listened at",
-        "see whether another program has that port, and that the address is this computer's");
-  }
-}
-
-class MetricsServer {
- public:
-  explicit MetricsServer(const Options& options)
-      : signals_(io_), end_(io_), metrics_(std::make_shared<Metrics>(io_)) {
-    BoardOptions board_options = with_key(options.key);
-    board_options.role = BoardRole::watch;
-    board_options.session.arming = Arming::off;  // it drives nothing
-    for (const std::string& pattern : options.urls) {
-      for (const PatternUrl& each : expand_urls(pattern)) {
-        boards_.push_back(std::make_unique<AsyncBoard>(io_, each.url, board_options));
-        metrics_->add(*boards_.back());
-        const Url url = Url::parse(each.url);
-        if (url.scheme() == "can") interfaces_.try_emplace(can_interface_of(url));
-      }
-    }
-  }
-
-  int run(const Options& options) {
-    for (const auto& board : boards_) board->open();
-    for (auto& [name, bus] : interfaces_) {
-      bus = std::make_unique<BusMetrics>(io_, can_interface(name));
-      metrics_->add(*bus);
-    }
-    const std::unique_ptr<prometheus::Exposer> exposer = serve(options.listen);
-    exposer->RegisterCollectable(metrics_);
-    const std::string host = options.listen.substr(0, options.listen.rfind(':'));
-    const std::string url =
-        fmt::format("http://{}:{}/metrics", host, exposer->GetListeningPorts().front());
-    if (options.json) {
-      print_line({{"type", "listening"}, {"url", url}, {"boards", boards_.size()}});
-    } else {
-      fmt::print("{} of {} boards\n", url, boards_.size());
-      std::fflush(stdout);
-    }
-    for (const int number : {SIGINT, SIGTERM, SIGHUP}) signals_.add(number);
-    signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
-    if (options.duration) {
-      end_.expires_after(*options.duration);
-      end_.async_wait([this](const std::error_code&) { io_.stop(); });
-    }
-    io_.run();
-    return 0;
-  }
-
- private:
-  asio::io_context io_{1};
-  asio::signal_set signals_;
-  asio::steady_timer end_;
-  std::vector<std::unique_ptr<AsyncBoard>> boards_;
-  std::map<std::string, std::unique_ptr<BusMetrics>> interfaces_;
-  std::shared_ptr<Metrics> metrics_;
-};
-
-int metrics(const Options& options) { return MetricsServer(options).run(options); }
 
 constexpr const char* footer =
     R"(Answers Prometheus at http://127.0.0.1:9618/metrics (docs/metrics.md): of each board whether it is heard,
@@ -202,9 +27,9 @@ denied.)";
 }  // namespace
 
 void add_metrics(CLI::App& root, Action& chosen) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<MetricsOptions>();
   CLI::App* const command = add_subcommand(root, chosen, "metrics", "Tell Prometheus of boards",
-                                           footer, options, metrics);
+                                           footer, options, serve_metrics);
   add_urls(*command, options->urls);
   add_text(*command, "--listen", options->listen, "where it answers (default 127.0.0.1:9618)",
            "HOST:PORT");

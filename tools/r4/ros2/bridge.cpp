@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bridge.hpp"
+
+#include <fmt/format.h>
+
+#include <asio/io_context.hpp>
+#include <asio/post.hpp>
+#include <asio/signal_set.hpp>
+#include <asio/steady_timer.hpp>
+#include <csignal>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "../shell/json.hpp"
+#include "../shell/key_file.hpp"
+#include "../shell/line_writer.hpp"
+#include "board_node.hpp"
+#include "graph/environment.hpp"
+#include "graph/graph.hpp"
+#include "graph/inbox.hpp"
+#include "graph/outbox.hpp"
+#include "protocol/messages/command_field.hpp"
+#include "r4link/error.hpp"
+#include "transports/url.hpp"
+#include "transports/url_pattern.hpp"
+
+namespace r4::tool::ros2 {
+namespace {
+
+// What all the topics need. On a CAN bus the paper's fields: others have to fit beside them.
+constexpr const char* component_fields =
+    "DEFAULT,AIN6,DHB1B,DHB2A,DHB2B,OSMC2,OSMC3,OSMC4,STEP2POS,STEP3POS,STEP4POS,SERVO2POS,"
+    "SERVO3POS,"
+    "SERVO4POS,SERVO5POS,SERVO6POS,SERVO7POS,SERVO8POS,SERVO9POS,SERVO10POS,SERVO11POS,SERVO12POS,"
+    "SERVO13POS,SERVO14POS,SERVO15POS,SERVO16POS,ENC1,ENC2,ENC3,ENC4,ENC1HZ,ENC2HZ,ENC3HZ,ENC4HZ,"
+    "US1,US2,US3,US4,BLDC1,BLDC2,BLDC3,BLDC4,RELAYS";
+
+NodeOptions node_options(const BridgeOptions& options) {
+  NodeOptions node;
+  node.arm = options.arm;
+  node.deadline = options.deadline;
+  if (!options.servo.empty()) node.servo = servo_calibration(options.servo);
+  if (!options.counts_per_turn.empty()) {
+    node.counts_per_turn = positive_number("--counts-per-turn", options.counts_per_turn);
+  }
+  if (!options.steps_per_turn.empty()) {
+    node.steps_per_turn = positive_number("--steps-per-turn", options.steps_per_turn);
+  }
+  if (options.drive.empty()) {
+    if (!options.separation.empty() || !options.full_speed.empty()) {
+      throw Error(ErrorKind::usage, "--wheel-separation, --full-speed", "say nothing alone",
+                  "name the two motor channels, too: --drive osmc1,osmc2");
+    }
+    return node;
+  }
+  if (options.separation.empty() || options.full_speed.empty()) {
+    throw Error(ErrorKind::usage, "--drive " + options.drive,
+                "needs to know how far apart the wheels are, and how fast they can be",
+                "add --wheel-separation METRES --full-speed METRES_A_SECOND");
+  }
+  node.drive =
+      differential_drive(options.drive, positive_number("--wheel-separation", options.separation),
+                         positive_number("--full-speed", options.full_speed));
+  return node;
+}
+
+struct NamedUrl {
+  std::string url;
+  NodeName name;
+};
+
+// One board is in the namespace itself, several are each in one below it: board1, board2 …, or the numbers of a
+// pattern.
+std::vector<NamedUrl> named_urls(const BridgeOptions& options) {
+  std::vector<PatternUrl> urls;
+  for (const std::string& pattern : options.urls) {
+    for (PatternUrl& each : expand_urls(pattern)) urls.push_back(std::move(each));
+  }
+  const bool numbered = options.urls.size() == 1;
+  const NodeName base = node_name(options.space, options.name);
+  std::vector<NamedUrl> named;
+  for (const PatternUrl& each : urls) {
+    std::string space = base.space;
+    if (urls.size() > 1) {
+      std::string number = std::to_string(named.size() + 1);
+      if (numbered && !each.number.empty()) number = each.number;
+      for (char& c : number) {
+        if (c == '-' || c == ',') c = '_';
+      }
+      space = below(base.space, "board" + number);
+    }
+    named.push_back({each.url, node_name(space, options.name)});
+  }
+  return named;
+}
+
+Json endpoints_json(const std::vector<Endpoint>& endpoints) {
+  Json all = Json::array();
+  for (const Endpoint& each : endpoints) all.push_back({{"name", each.name}, {"type", each.type}});
+  return all;
+}
+
+const char* level_text(LogLevel level) {
+  switch (level) {
+    case LogLevel::info:
+      return "info";
+    case LogLevel::warning:
+      return "warning";
+    default:
+      return "error";
+  }
+}
+
+class Bridge {
+ public:
+  explicit Bridge(const BridgeOptions& options)
+      : options_(options),
+        output_(std::size_t{1} << 20),
+        domain_(domain_of(process_environment)),
+        graph_(domain_),
+        inbox_(io_, graph_.participant(),
+               [this] {
+                 for (const auto& node : nodes_) node->flush();
+               }),
+        signals_(io_),
+        end_(io_) {
+    const NodeOptions shown = node_options(options);
+    for (const NamedUrl& each : named_urls(options)) add(each, shown);
+  }
+
+  int run() {
+    for (const auto& node : nodes_) node->open();
+    NodeListing& listing = graph_.list_nodes(process_environment("ROS_DISTRO"));
+    inbox_.watch(listing.peers(), [&listing] { listing.look(); });
+    Namesakes& namesakes = graph_.watch_names([this](const NodeName& node, const std::string& who) {
+      asio::post(io_, [this, name = node.full(), who] { warn_of(name, who); });
+    });
+    inbox_.watch(namesakes.writers(), [&namesakes] { namesakes.look(); });
+    inbox_.start();
+    introduce();
+    for (const int number : {SIGINT, SIGTERM, SIGHUP}) signals_.add(number);
+    signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
+    if (options_.duration) {
+      end_.expires_after(*options_.duration);
+      end_.async_wait([this](const std::error_code&) { io_.stop(); });
+    }
+    io_.run();
+    leave();
+    return 0;
+  }
+
+ private:
+  void add(const NamedUrl& named, NodeOptions shown) {
+    BoardOptions board_options = with_key(options_.key);
+    const bool bus = Url::parse(named.url).scheme() == "can";
+    board_options.session.fields = !options_.fields.empty() ? options_.fields
+                                   : bus                    ? "DEFAULT"
+                                                            : component_fields;
+    parse_fields(Text(board_options.session.fields), shown.fields);
+    shown.fields.add(StateField::relays);  // arming asks for it
+    nodes_.push_back(std::make_unique<BoardNode>(
+        io_, named.url, board_options, graph_, graph_.add_node(named.name), inbox_, outbox_, shown,
+        [this](LogLevel level, const std::string& node, const std::string& text) {
+          say(level, node, text);
+        }));
+  }
+
+  void warn_of(const std::string& name, const std::string& who) {
+    for (const auto& node : nodes_) {
+      if (node->name() != name) continue;
+      node->warn(fmt::format(
+          "{} has a node {}, too: what is commanded reaches the boards of both; give one of them "
+          "another --namespace, or end it (who was killed is gone after 10 s)",
+          who, name));
+    }
+  }
+
+  void introduce() {
+    std::string names;
+    Json list = Json::array();
+    for (const auto& node : nodes_) {
+      names += (names.empty() ? "" : " ") + node->name();
+      list.push_back({{"name", node->name()}, {"url", node->board().name()}});
+    }
+    if (options_.json) {
+      output_.write(line_of({{"type", "ready"},
+                             {"domain", domain_.id},
+                             {"reach", domain_.reach},
+                             {"nodes", list},
+                             {"publishers", endpoints_json(graph_.publishers())},
+                             {"subscriptions", endpoints_json(graph_.subscriptions())},
+                             {"services", endpoints_json(graph_.services())}}));
+      return;
+    }
+    output_.write(fmt::format("{} in domain {}, reach: {}\n", names, domain_.id, domain_.reach));
+    const auto list_all = [this](const char* title, const std::vector<Endpoint>& endpoints) {
+      output_.write(fmt::format("{}\n", title));
+      for (const Endpoint& each : endpoints) {
+        output_.write(fmt::format("  {}  {}\n", each.name, each.type));
+      }
+    };
+    list_all("publishes", graph_.publishers());
+    list_all("takes", graph_.subscriptions());
+    list_all("serves", graph_.services());
+  }
+
+  void say(LogLevel level, const std::string& node, const std::string& text) {
+    if (options_.json) {
+      output_.write(
+          line_of({{"type", "log"}, {"level", level_text(level)}, {"node", node}, {"text", text}}));
+    } else {
+      output_.write(fmt::format("{}: {}: {}\n", node, level_text(level), text));
+    }
+  }
+
+  // Nobody is told of us any more, no sample is taken or written; then the boards hear that they are free.
+  void leave() {
+    inbox_.stop();
+    outbox_.stop();
+    graph_.leave();
+    std::size_t left = nodes_.size();
+    io_.restart();
+    constexpr Milliseconds limit{100};
+    for (const auto& node : nodes_) {
+      node->board().async_close(limit, [this, &left](const CommandResult&) {
+        if (--left == 0) io_.stop();
+      });
+    }
+    io_.run();
+  }
+
+  const BridgeOptions& options_;
+  LineWriter output_;
+  asio::io_context io_{1};
+  const Domain domain_;
+  Graph graph_;
+  Outbox outbox_;
+  Inbox inbox_;
+  std::vector<std::unique_ptr<BoardNode>> nodes_;
+  asio::signal_set signals_;
+  asio::steady_timer end_;
+};
+
+}  // namespace
+
+int run_bridge(const BridgeOptions& options) { return Bridge(options).run(); }
+
+}  // namespace r4::tool::ros2

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What r4 ros2 does: boards as nodes of a ROS 2 graph, by Cyclone DDS. A part of r4-services.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "../shell/options.hpp"
+
+namespace r4::tool::ros2 {
+
+struct BridgeOptions {
+  std::vector<std::string> urls;
+  std::string name = "r4";
+  std::string space;
+  std::string fields;
+  bool arm = false;
+  Milliseconds deadline{1000};
+  std::string servo;
+  std::string drive;
+  std::string separation;
+  std::string full_speed;
+  std::string counts_per_turn;
+  std::string steps_per_turn;
+  std::optional<Milliseconds> duration;
+  std::string key;
+  bool json = false;
+};
+
+// Returns the exit code once it is ended by a signal or by `duration`.
+int run_bridge(const BridgeOptions& options);
+
+}  // namespace r4::tool::ros2

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The subcommands that r4 leaves to r4-services, a program of its own: they stand on libraries (Cyclone DDS, an HTTP
+// server) that take several times as long to load as all the rest, for which a stop need not wait. r4 has read the
+// command line, and becomes r4-services, which reads it again: the process stays the same one.
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "r4link/error.hpp"
+#include "ros2/bridge.hpp"
+#include "watch/metrics_server.hpp"
+
+namespace r4::tool {
+namespace {
+
+std::vector<std::string> command_line() {
+  std::ifstream file("/proc/self/cmdline", std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  std::vector<std::string> arguments;
+  for (std::size_t at = 0; at < text.size(); at += arguments.back().size() + 1) {
+    arguments.emplace_back(text.c_str() + at);
+  }
+  return arguments;
+}
+
+[[noreturn]] void become_services() {
+  std::vector<std::string> arguments = command_line();
+  std::vector<char*> pointers(arguments.size() + 1, nullptr);  // the last one ends them
+  std::transform(arguments.begin(), arguments.end(), pointers.begin(),
+                 [](std::string& each) { return each.data(); });
+  std::error_code error;
+  const auto folder = std::filesystem::read_symlink("/proc/self/exe", error).parent_path();
+  // Beside r4 in a build, and where both are installed.
+  for (const char* const place : {"r4-services", R4_SERVICES_FROM_BIN}) {
+    const std::filesystem::path program = folder / place;
+    ::execv(program.c_str(), pointers.data());
+    if (errno != ENOENT) {
+      throw Error(ErrorKind::permission, program.string(),
+                  "cannot be run: " + std::system_category().message(errno),
+                  "see its rights, or install r4 again");
+    }
+  }
+  throw Error(ErrorKind::unsupported, "r4-services",
+              "this part of r4 is neither at " + folder.string() + "/r4-services nor at " +
+                  (folder / R4_SERVICES_FROM_BIN).lexically_normal().string(),
+              "install r4 as a whole, with cmake --install or as a package");
+}
+
+}  // namespace
+
+int serve_metrics(const MetricsOptions&) { become_services(); }
+
+namespace ros2 {
+
+int run_bridge(const BridgeOptions&) { become_services(); }
+
+}  // namespace ros2
+
+}  // namespace r4::tool
