@@ -2,7 +2,7 @@
 """R4 link: the R4 robot control board over UDP, USB serial and CAN (docs/python.md)."""
 from . import aio
 from ._core import (FIELDS, BoardHealth, CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State,
-                    Statistics, Subscription, __version__)
+                    Statistics, Subscription, Wire, __version__)
 from .board import (BldcChannel, Board, DriveChannel, RelayChannel, ServoChannel, Setpoints, States, StepperChannel)
 from .errors import (CancelledError, ClosedError, DataError, DeniedError, Error, NotArmedError, NotConfirmedError,
                      OpenError, RefusedError, UnsupportedError, UsageError)
@@ -20,6 +20,6 @@ __all__ = [
     'Fleet', 'FleetEvent', 'FleetResults', 'Identity', 'LinkStatus', 'LinkedUrl', 'Log', 'Look', 'NotArmedError',
     'NotConfirmedError', 'OpenError', 'PostResult', 'RecordedBoard', 'RecordedDatagram', 'RecordedEvent', 'Recording',
     'RefusedError', 'RefusedPost', 'RelayChannel', 'ServoChannel', 'Setpoints', 'SimBoard', 'State', 'States',
-    'Statistics', 'StepperChannel', 'Subscription', 'UnsupportedError', 'UsageError', 'aio', 'read', 'with_link',
+    'Statistics', 'StepperChannel', 'Subscription', 'UnsupportedError', 'UsageError', 'Wire', 'aio', 'read', 'with_link',
     '__version__',
 ]
