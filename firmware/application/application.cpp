@@ -87,6 +87,7 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
   const bool waits =
       kind == MessageKind::host_heartbeat && waits_to_join(from, datagram, verdict, now_ms);
   const bool ours = wires_.has(from);
+  speaker_ = ours ? link_.owner() : from;
   // The wires of a session carry the same bytes, and the packet number sees to it that they take effect once.
   // From anywhere else a copy is a replay.
   if (verdict == Verdict::copy) verdict = ours ? Verdict::authentic : Verdict::replayed;
@@ -217,7 +218,7 @@ void Application::hold_wires() {
 }
 
 void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::uint32_t now_ms) {
-  const BoardLink::HostHeartbeat heartbeat = heartbeat_of(speaker(from), datagram, now_ms);
+  const BoardLink::HostHeartbeat heartbeat = heartbeat_of(speaker_, datagram, now_ms);
   const std::uint32_t timeout_ms = setpoints_.settings.timeout_ms;
   switch (link_.on_heartbeat(heartbeat, now_ms)) {
     case HeartbeatEffect::fed:

@@ -118,7 +118,6 @@ class Application {
   void on_host_heartbeat(Source from, const Datagram& datagram, std::uint32_t now_ms);
   static SessionWires::Heartbeat bytes_of(const Datagram& datagram);
   bool waits_to_join(Source from, const Datagram& datagram, Verdict verdict, std::uint32_t now_ms);
-  Source speaker(Source from) const { return wires_.has(from) ? link_.owner() : from; }
   void follow_wires(std::uint32_t now_ms);
   void hold_wires();
   bool rejected(Verdict verdict, MessageKind kind, std::uint32_t now_ms);
@@ -202,7 +201,10 @@ class Application {
   bool stop_of_a_key_ = false;
   bool stop_unread_ = false;   // the guard has heard it, and its datagram is yet to be read
   bool outputs_live_ = false;  // outputs_ follow the setpoints
-  bool known_ = false;         // what is being read is a copy of what another wire has brought
+  // Of the datagram that is being read: who sent it, as the link knows him, whichever of his wires brought it;
+  // and whether another has brought it before.
+  Source speaker_;
+  bool known_ = false;
   std::uint32_t rx_ok_ = 0;
   std::uint32_t rx_bad_ = 0;
   std::uint32_t rx_refused_ = 0;

@@ -28,9 +28,9 @@ bool Application::admit(Source from, const Datagram& datagram, Verdict verdict, 
     return false;
   }
   Refusal code = Refusal::none;
-  switch (link_.admit(speaker(from), datagram.pnum(), now_ms, code)) {
+  switch (link_.admit(speaker_, datagram.pnum(), now_ms, code)) {
     case Admission::refuse:
-      if (code == Refusal::safe) link_.refused(speaker(from), datagram.pnum(), code);
+      if (code == Refusal::safe) link_.refused(speaker_, datagram.pnum(), code);
       refuse(from, datagram, code, now_ms);
       return false;
     case Admission::drop:
@@ -74,7 +74,7 @@ void Application::on_command(Source from, const Datagram& datagram, Verdict verd
   } else if (command.kind == CommandKind::clear) {
     outcome = judge_clear(command, waited_ms(from.port, now_ms), now_ms);
   } else if (command.kind == CommandKind::leave) {
-    if (!link_.may_leave(heartbeat_of(speaker(from), datagram, now_ms), now_ms))
+    if (!link_.may_leave(heartbeat_of(speaker_, datagram, now_ms), now_ms))
       outcome = Refusal::stale;
   } else if (!may_set(from.port, command)) {
     outcome = Refusal::auth;
@@ -82,7 +82,7 @@ void Application::on_command(Source from, const Datagram& datagram, Verdict verd
     outcome = carry_out(command, setpoints_);
   }
   if (outcome != Refusal::none) {
-    link_.refused(speaker(from), datagram.pnum(), outcome);
+    link_.refused(speaker_, datagram.pnum(), outcome);
     refuse(from, datagram, outcome, now_ms);
     return;
   }
@@ -98,7 +98,7 @@ void Application::on_group(Source from, const Datagram& datagram, Verdict verdic
   const Refusal refusal = read_group(datagram, group, at);
   if (!admit(from, datagram, verdict, refusal, at, now_ms)) return;
   if (safety_.is_safe()) {
-    link_.refused(speaker(from), datagram.pnum(), Refusal::safe);
+    link_.refused(speaker_, datagram.pnum(), Refusal::safe);
     refuse(from, datagram, Refusal::safe, now_ms);
     return;
   }
@@ -208,12 +208,12 @@ void Application::emergency_stop(Source from, const Datagram& datagram, Verdict 
   const bool of_a_key =
       verdict == Verdict::authentic || verdict == Verdict::replayed || verdict == Verdict::old;
   const bool same = has_number && has_stop_number_ && number == stop_number_ &&
-                    speaker(from) == stop_from_ && (stop_of_a_key_ || !of_a_key);
+                    speaker_ == stop_from_ && (stop_of_a_key_ || !of_a_key);
   // An E:CLEAR under way knows nothing of this one.
   if (repeated && !same && !stop_unread_) safety_.again();
   stop_unread_ = false;
   if (!repeated || !same) stop_of_a_key_ = of_a_key;
-  stop_from_ = speaker(from);
+  stop_from_ = speaker_;
   has_stop_number_ = has_number;
   stop_number_ = number;
   enter(SafeReason::stop, now_ms);
@@ -222,7 +222,7 @@ void Application::emergency_stop(Source from, const Datagram& datagram, Verdict 
   if (owner && verdict == Verdict::authentic && datagram.has_pnum() &&
       link_.is_next(datagram.pnum())) {
     Refusal code = Refusal::none;
-    if (link_.admit(speaker(from), datagram.pnum(), now_ms, code) == Admission::execute) {
+    if (link_.admit(speaker_, datagram.pnum(), now_ms, code) == Admission::execute) {
       link_.executed(datagram.pnum());
     }
   }

@@ -90,7 +90,7 @@ void Application::refuse(Source to, const Datagram& datagram, Refusal code, std:
   nack.code = code;
   nack.at = at;
   // A W needs no key: what answers it must prove nothing of the command whose number it has.
-  nack.has_session = !asks_to_watch(datagram) && link_.session_of(speaker(to), nack.session);
+  nack.has_session = !asks_to_watch(datagram) && link_.session_of(speaker_, nack.session);
   nack.lease = lease;
   char buffer[short_datagram];
   DatagramWriter writer(buffer, sizeof buffer);

@@ -242,6 +242,8 @@ void Session::feed(Time now) {
 Statistics Session::statistics(Time now) const {
   Statistics report = collector_.report(now);
   report.packets = packets();
+  report.copies = wires_.counters().duplicate;
+  report.received -= report.copies;
   if (state_.sampled_error != ReceivedState::unknown) {
     report.clock_drift_ppm = clock_.drift_ppm();
     report.clock_drift_error_ppm = clock_.drift_error_ppm();

@@ -76,7 +76,8 @@ void Session::ask_wires(Time now) {
 // Is it of the session's board as it is now? A restart that it shows has been noticed then.
 bool Session::admit(std::size_t wire, const Datagram& datagram, Time now) {
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
-  const bool fits = link_.is_of_this_boot(t_ms, to_ms(now));
+  const bool fits =
+      link_.is_of_this_boot(t_ms, to_ms(now), to_ms(now), HostLink::boot_tolerance_ms);
   Wires::Take take = Wires::Take::no;
   switch (kind_of(datagram)) {
     case MessageKind::nack: {
@@ -106,8 +107,7 @@ bool Session::admit(std::size_t wire, const Datagram& datagram, Time now) {
 bool Session::admit_identity(std::size_t wire, const Datagram& datagram, const Identity& identity,
                              Time now) {
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
-  const bool fits = link_.is_of_this_boot(t_ms, to_ms(now));
-  const Wires::Answer answer = wires_.on_identity(wire, identity, t_ms, fits, now);
+  const Wires::Answer answer = wires_.on_identity(wire, identity, t_ms, link_, now);
   if (answer == Wires::Answer::nothing || answer == Wires::Answer::other) return false;
   if (answer == Wires::Answer::restarted) link_.on_clock(t_ms, true, to_ms(now));
   notice_restart();

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "../../protocol/link/host_link.hpp"
-
 namespace r4 {
 
 // --- the transports
@@ -52,7 +50,7 @@ void Wires::ask_soon(Wire& wire, Time now) {
 }
 
 Wires::Answer Wires::on_identity(std::size_t index, const Identity& identity, std::uint32_t t_ms,
-                                 bool fits, Time now) {
+                                 const HostLink& link, Time now) {
   Wire& wire = wires_[index];
   const std::optional<Time> asked = wire.question.answered(identity);
   if (!wire.up || (!asked && wire.can_ask)) return Answer::nothing;
@@ -73,14 +71,17 @@ Wires::Answer Wires::on_identity(std::size_t index, const Identity& identity, st
   if (first_answer_.count() == 0) first_answer_ = now;
   if (!asked) return Answer::known;
   wire.round_trip = now - *asked;
-  set_clock(wire, t_ms, now);
   // Of two boots the later one is that which answered what was asked after the other had answered.
   const bool later = *asked > proven_;
+  // The board has answered between the question and now, which tells boots apart that are close together.
+  const bool fits =
+      link.is_of_this_boot(t_ms, to_ms(*asked), to_ms(now), HostLink::booting_tolerance_ms);
   if (!fits && !later) {
     ask_soon(wire, now);
     return Answer::known;
   }
   if (!fits) ++boot_;
+  set_clock(wire, t_ms, now);
   wire.boot = boot_;
   proven_ = now;
   return fits ? Answer::known : Answer::restarted;

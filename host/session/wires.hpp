@@ -26,6 +26,7 @@
 #include <string>
 #include <vector>
 
+#include "../../protocol/link/host_link.hpp"
 #include "../../protocol/link/packet_tracker.hpp"
 #include "../../protocol/messages/message.hpp"
 #include "../measurement/identity_question.hpp"
@@ -37,7 +38,7 @@ namespace r4 {
 
 // A set of wires: bit i is the wire i.
 using WireSet = std::uint8_t;
-constexpr WireSet wire_bit(std::size_t wire) { return static_cast<WireSet>(1U << wire); }
+constexpr WireSet wire_bit(std::size_t index) { return static_cast<WireSet>(1U << index); }
 
 class Wires {
  public:
@@ -45,32 +46,32 @@ class Wires {
 
   bool several() const { return wires_.size() > 1; }
   std::size_t count() const { return wires_.size(); }
-  Lease& lease(std::size_t wire) { return wires_[wire].lease; }
-  const Lease& lease(std::size_t wire) const { return wires_[wire].lease; }
+  Lease& lease(std::size_t index) { return wires_[index].lease; }
+  const Lease& lease(std::size_t index) const { return wires_[index].lease; }
 
   // `can_ask`: not where who watches may say nothing, on a bus; such a wire is believed what its URL says.
-  void on_transport(std::size_t wire, bool up, bool can_ask, Time now);
+  void on_transport(std::size_t index, bool up, bool can_ask, Time now);
   bool all_down() const;
 
   // --- who is there
 
   // The wires that are to be asked now, by one question.
   WireSet to_ask(Time now) const;
-  void asked(std::size_t wire, std::uint32_t pnum, Time now);
+  void asked(std::size_t index, std::uint32_t pnum, Time now);
   enum class Answer : std::uint8_t {
     nothing,  // nobody has asked
     other,    // another board is there
     known,
     restarted,  // it has begun again
   };
-  // `fits`: that T is of the boot that the session knows.
-  Answer on_identity(std::size_t wire, const Identity& identity, std::uint32_t t_ms, bool fits,
-                     Time now);
+  // `link`: what the session knows of the board's clock.
+  Answer on_identity(std::size_t index, const Identity& identity, std::uint32_t t_ms,
+                     const HostLink& link, Time now);
 
   // Those to which the session may speak: none before it has begun.
   WireSet speaking() const { return begun_ ? known() : WireSet{0}; }
   bool begun() const { return begun_; }
-  bool is_known(std::size_t wire) const { return wires_[wire].known; }
+  bool is_known(std::size_t index) const { return wires_[index].known; }
   bool two_boards() const;
   // Lets time pass; true if the session begins.
   bool poll(Time now);
@@ -85,32 +86,34 @@ class Wires {
     yes,         // if its T is newer
   };
   // A state or a heartbeat. `fits`: its T is of the boot that the session knows.
-  Take on_datagram(std::size_t wire, std::uint32_t pnum, std::uint32_t t_ms, bool fits, Time now);
+  Take on_datagram(std::size_t index, std::uint32_t pnum, std::uint32_t t_ms, bool fits, Time now);
   // A heartbeat that says that the board is booting.
-  Take on_connecting(std::size_t wire, Time now);
+  Take on_connecting(std::size_t index, Time now);
   // N or I. `counts`: its number is among those of the states.
-  Take on_answer(std::size_t wire, std::uint32_t pnum, std::uint32_t t_ms, bool counts, Time now);
+  Take on_answer(std::size_t index, std::uint32_t pnum, std::uint32_t t_ms, bool counts, Time now);
   // What on_datagram() let through was new, or a copy.
-  void taken(std::size_t wire);
-  void copy(std::size_t wire);
+  void taken(std::size_t index);
+  void copy(std::size_t index);
   // Of one wire, where nobody asks for more.
   void heard(Time now) { wires_[0].heard = now; }
 
-  void on_busy(std::size_t wire, Time now) { wires_[wire].busy_until = now + busy_memory; }
+  void on_busy(std::size_t index, Time now) { wires_[index].busy_until = now + busy_memory; }
   // Do all that are heard say that another host has the board?
   bool all_busy(Time now) const;
 
   // --- in numbers
 
   WireSet carrying() const { return carrying_; }
-  WireState state(std::size_t wire) const;
-  bool busy(std::size_t wire, Time now) const { return now < wires_[wire].busy_until; }
-  const std::string& board_id(std::size_t wire) const { return wires_[wire].board_id; }
-  const PacketCounters& packets(std::size_t wire) const { return wires_[wire].tracker.counters(); }
-  std::uint64_t copies(std::size_t wire) const { return wires_[wire].copies; }
-  Time round_trip(std::size_t wire) const { return wires_[wire].round_trip; }
+  WireState state(std::size_t index) const;
+  bool busy(std::size_t index, Time now) const { return now < wires_[index].busy_until; }
+  const std::string& board_id(std::size_t index) const { return wires_[index].board_id; }
+  const PacketCounters& packets(std::size_t index) const {
+    return wires_[index].tracker.counters();
+  }
+  std::uint64_t copies(std::size_t index) const { return wires_[index].copies; }
+  Time round_trip(std::size_t index) const { return wires_[index].round_trip; }
   // Time{0}: never.
-  Time heard_at(std::size_t wire) const { return wires_[wire].heard; }
+  Time heard_at(std::size_t index) const { return wires_[index].heard; }
   // Of the session: lost is what no wire has brought, a duplicate what another has brought first.
   const PacketCounters& counters() const { return counters_; }
 

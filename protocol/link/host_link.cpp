@@ -88,18 +88,20 @@ Arrival HostLink::on_answer(std::uint32_t pnum, std::uint32_t t_ms, std::uint32_
 // Each boot has a clock of its own: a T that does not fit the last one is of a board that has begun
 // again, even if its first heartbeats were lost.
 void HostLink::notice_boot(std::uint32_t t_ms, std::uint32_t now_ms) {
-  const bool restarted = !is_of_this_boot(t_ms, now_ms);
+  const std::int32_t tolerance = booting_ ? booting_tolerance_ms : boot_tolerance_ms;
+  const bool restarted = !is_of_this_boot(t_ms, now_ms, now_ms, tolerance);
   if (restarted && tracker_.started()) tracker_.restart();
   booting_ = false;
   on_clock(t_ms, restarted, now_ms);
 }
 
-bool HostLink::is_of_this_boot(std::uint32_t t_ms, std::uint32_t now_ms) const {
+bool HostLink::is_of_this_boot(std::uint32_t t_ms, std::uint32_t since_ms, std::uint32_t now_ms,
+                               std::int32_t tolerance_ms) const {
   if (!board_clock_known_) return true;
-  const std::uint32_t expected = board_ms_ + (now_ms - clock_ms_);
-  const std::int32_t off = static_cast<std::int32_t>(t_ms - expected);
-  const std::int32_t tolerance = booting_ ? booting_tolerance_ms : boot_tolerance_ms;
-  return off <= tolerance && off >= -tolerance;
+  const std::uint32_t begin = board_ms_ + (since_ms - clock_ms_);
+  const std::uint32_t end = board_ms_ + (now_ms - clock_ms_);
+  return static_cast<std::int32_t>(t_ms - begin) >= -tolerance_ms &&
+         static_cast<std::int32_t>(t_ms - end) <= tolerance_ms;
 }
 
 void HostLink::on_transport(bool up) {

@@ -44,8 +44,9 @@ class HostLink {
   void on_heard(std::uint32_t now_ms) { heard_ms_ = now_ms; }
   // It says that it is booting.
   void on_booting(SafeReason reason, std::uint32_t now_ms);
-  // Is that T of the boot that is known? Of any, before the first.
-  bool is_of_this_boot(std::uint32_t t_ms, std::uint32_t now_ms) const;
+  // May it be of the boot that is known that the board showed T between `since_ms` and now? Any, before the first.
+  bool is_of_this_boot(std::uint32_t t_ms, std::uint32_t since_ms, std::uint32_t now_ms,
+                       std::int32_t tolerance_ms) const;
   // The board was found to have this T; `restarted`: it has begun again.
   void on_clock(std::uint32_t t_ms, bool restarted, std::uint32_t now_ms);
 

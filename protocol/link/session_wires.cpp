@@ -3,11 +3,11 @@
 
 namespace r4 {
 
-SessionWires::Wire* SessionWires::find(Source at) {
-  for (int i = 0; i < count_; ++i) {
-    if (wires_[i].at == at) return &wires_[i];
+int SessionWires::find(Source at) const {
+  int i = count_;
+  while (i-- > 0 && wires_[i].at != at) {
   }
-  return nullptr;
+  return i;
 }
 
 void SessionWires::begin(Source at, Heartbeat heartbeat, std::uint32_t now_ms) {
@@ -30,8 +30,8 @@ void SessionWires::resume(std::uint32_t now_ms) {
 
 void SessionWires::taken(Source at, Heartbeat heartbeat, std::uint32_t timeout_ms,
                          std::uint32_t now_ms) {
-  Wire* const wire = find(at);
-  if (wire != nullptr) wire->heard_ms = now_ms;
+  const int wire = find(at);
+  if (wire >= 0) wires_[wire].heard_ms = now_ms;
   known_[known_next_].heartbeat = heartbeat;
   known_[known_next_].at_ms = now_ms;
   known_next_ = (known_next_ + 1) % remembered;
@@ -47,8 +47,8 @@ void SessionWires::taken(Source at, Heartbeat heartbeat, std::uint32_t timeout_m
 
 void SessionWires::passed_over(Source at, Heartbeat heartbeat, std::uint32_t timeout_ms,
                                std::uint32_t now_ms) {
-  Wire* const wire = find(at);
-  if (wire != nullptr && is_known(heartbeat, timeout_ms, now_ms)) wire->heard_ms = now_ms;
+  const int wire = find(at);
+  if (wire >= 0 && is_known(heartbeat, timeout_ms, now_ms)) wires_[wire].heard_ms = now_ms;
 }
 
 bool SessionWires::is_known(Heartbeat heartbeat, std::uint32_t timeout_ms,
@@ -109,12 +109,12 @@ bool SessionWires::port_lost(std::uint8_t port) {
 
 // Two wires at least: until then what one repeats is what the count over all of them says.
 bool SessionWires::count(Source from, std::uint32_t pnum) {
-  Wire* const wire = find(from);
-  if (count_ == 1 || wire == nullptr) {
+  const int wire = find(from);
+  if (count_ == 1 || wire < 0) {
     if (numbers_.on(pnum) == Arrival::duplicate) ++repeated_;
     return false;
   }
-  const bool repeated = wire->numbers.on(pnum) == Arrival::duplicate;
+  const bool repeated = wires_[wire].numbers.on(pnum) == Arrival::duplicate;
   if (repeated) ++repeated_;
   // What a wire that lags brings so late is no sign that the host has begun again.
   const std::uint32_t newest = numbers_.newest();

@@ -78,12 +78,7 @@ class SessionWires {
   };
   bool take_change(Change& change);
 
-  bool has(Source at) const {
-    for (int i = 0; i < count_; ++i) {
-      if (wires_[i].at == at) return true;
-    }
-    return false;
-  }
+  bool has(Source at) const { return find(at) >= 0; }
   int size() const { return count_; }  // 0: before the first session
   Source operator[](int i) const { return wires_[i].at; }
   std::uint32_t joins() const { return joins_; }    // since boot, beside the first of each session
@@ -109,7 +104,7 @@ class SessionWires {
   static constexpr int ports = 4;
   static constexpr int candidates_per_port = 2;
 
-  Wire* find(Source at);
+  int find(Source at) const;  // -1: none
   bool is_known(Heartbeat heartbeat, std::uint32_t timeout_ms, std::uint32_t now_ms) const;
   void join(Source at, std::uint32_t now_ms);
   void leave(int index);

@@ -53,8 +53,9 @@ class WiredHost {
       if (static_cast<std::int32_t>(board_.now_ms - next_heartbeat_ms_) >= 0) heartbeat();
     }
   }
-  // The newest T that came by a wire which is not cut.
+  // The newest T that came by a wire which is not cut; 0 while the board says CONNECTING.
   std::uint32_t echo() {
+    if (board_.state() == firmware::BoardState::connecting) return 0;
     std::uint32_t newest = 0;
     for (const Wire& wire : wires) {
       if (!wire.cut) newest = std::max(newest, board_.newest_t(wire.at.port));

@@ -2,6 +2,8 @@
 // What the protocol costs on a Cortex-M7, in instructions. Under `-icount shift=10` an instruction
 // takes 1024 ns of the board's time, so the timer counts them; a loop of known length says how many
 // ticks that are.
+#include <new>
+
 #include "firmware/application/application.hpp"
 #include "firmware/ports/m7/chip/board_clock.hpp"
 #include "firmware/ports/m7/chip/semihosting.hpp"
@@ -134,7 +136,9 @@ std::uint32_t command_instructions(firmware::Hal& hal, std::uint32_t first, std:
   const std::uint8_t chance[Authentication::chance_size] = {1};
   config.chance = chance;
   if (key != nullptr) config.settings.site.keys[0] = *key;
-  firmware::Application application(hal, config);
+  // Not on the stack, which is the loop's; each time a new one.
+  alignas(firmware::Application) static unsigned char place[sizeof(firmware::Application)];
+  firmware::Application& application = *new (place) firmware::Application(hal, config);
   const std::uint8_t port = application.add_port(sink);
   Signer key_signer(key != nullptr ? *key : Key());
   key_signer.on_nonce(application.authentication().nonce());

@@ -130,16 +130,18 @@ void World::attack() {
   const BoardLink& link = board_->link();
   const BoardLinkState state = link.state();
   const std::uint32_t fed_ms = link.fed_ms();
-  const Source owner = link.owner();
   const std::uint32_t rejected = report_.rejected;
   board_->poll(board_ms());  // so that silence is not taken for the attacker's doing
   const bool lost = link.state() != state;
+  const Source owner = link.owner();
   attacking_ = true;
   attack_kind_ = attack.kind;
   delivering_ = {attack.host, 0};  // no process has that incarnation
   constexpr std::uint32_t own_address = 0xFFFF;
   const std::uint32_t address =
       attack.host < 0 ? own_address : hosts_[static_cast<std::size_t>(attack.host)]->peer;
+  if (attack.kind == Attack::Kind::replay)
+    heard_us_[address] = now_us_;  // it may be the host's word
   board_->receive(0, address, Text(attack.bytes), board_ms());
   attacking_ = false;
   Datagram datagram;
@@ -150,7 +152,8 @@ void World::attack() {
       report_.rejected == rejected) {
     violate(fmt::format("forged: a {} was taken for signed", to_text(attack.kind)));
   }
-  if (link.fed_ms() != fed_ms || link.owner() != owner || (!lost && link.state() != state)) {
+  const bool fed = link.fed_ms() != fed_ms && attack.kind != Attack::Kind::replay;
+  if (fed || link.owner() != owner || (!lost && link.state() != state)) {
     violate(fmt::format("forged: a {} changed the link", to_text(attack.kind)));
   }
 }

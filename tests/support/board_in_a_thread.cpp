@@ -10,9 +10,10 @@
 
 namespace r4::test {
 
-BoardInAThread::BoardInAThread(const std::string& transport, const std::string& script) {
+BoardInAThread::BoardInAThread(const std::vector<std::string>& transports,
+                               const std::string& script, const std::string& board_id) {
   sim::SimulatedBoard::Options options;
-  options.board_id = "test-board";
+  options.board_id = board_id;
   options.script = sim::Script::parse(script, "script");
   options.events.on_executed = [this](std::uint32_t, std::uint32_t, const Command& command) {
     const std::lock_guard lock(mutex_);
@@ -27,18 +28,22 @@ BoardInAThread::BoardInAThread(const std::string& transport, const std::string& 
     changed_.notify_all();
   };
   board_ = std::make_unique<sim::SimulatedBoard>(io_, std::move(options));
-  const bool udp = transport == "udp";
-  const bool pty = transport == "pty";
-  auto carrier = Registry::standard().make(io_,
-                                           udp   ? "udp://127.0.0.1:0"
-                                           : pty ? "pty:"
-                                                 : transport,
-                                           Role::board);
-  const Carrier& listening = *carrier;
-  board_->add_carrier(std::move(carrier));
+  std::vector<const Carrier*> listening;
+  for (const std::string& transport : transports) {
+    const std::string url = transport == "udp"   ? "udp://127.0.0.1:0"
+                            : transport == "pty" ? "pty:"
+                                                 : transport;
+    std::unique_ptr<Carrier> carrier = Registry::standard().make(io_, url, Role::board);
+    listening.push_back(carrier.get());
+    board_->add_carrier(std::move(carrier));
+  }
   board_->start();
-  const std::string& name = listening.name();  // "udp://127.0.0.1:40123", "pty:/dev/pts/5"
-  url_ = udp ? name + "?listen=0" : pty ? "serial://" + name.substr(name.find(':') + 1) : transport;
+  for (std::size_t i = 0; i < transports.size(); ++i) {
+    const std::string& name = listening[i]->name();  // "udp://127.0.0.1:40123", "pty:/dev/pts/5"
+    urls_.push_back(transports[i] == "udp"   ? name + "?listen=0"
+                    : transports[i] == "pty" ? "serial://" + name.substr(name.find(':') + 1)
+                                             : transports[i]);
+  }
   thread_ = std::thread([this] {
     const auto work = asio::make_work_guard(io_);
     io_.run();

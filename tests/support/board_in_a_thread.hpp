@@ -19,13 +19,19 @@ class BoardInAThread {
  public:
   // What it listens on: "udp" (a free port of this machine), "pty", or a URL of a CAN bus. `script`:
   // what happens to it (firmware/ports/sim/script.hpp).
-  explicit BoardInAThread(const std::string& transport, const std::string& script = "");
+  explicit BoardInAThread(const std::string& transport, const std::string& script = "")
+      : BoardInAThread(std::vector<std::string>{transport}, script) {}
+  // On several at once.
+  explicit BoardInAThread(const std::vector<std::string>& transports,
+                          const std::string& script = "",
+                          const std::string& board_id = "test-board");
   ~BoardInAThread();
   BoardInAThread(const BoardInAThread&) = delete;
   BoardInAThread& operator=(const BoardInAThread&) = delete;
 
   // The URL by which a host reaches it.
-  const std::string& url() const { return url_; }
+  const std::string& url() const { return urls_[0]; }
+  const std::vector<std::string>& urls() const { return urls_; }
 
   // Switches it off; the transport disappears.
   void switch_off();
@@ -40,7 +46,7 @@ class BoardInAThread {
 
  private:
   asio::io_context io_;
-  std::string url_;
+  std::vector<std::string> urls_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<std::string> executed_;

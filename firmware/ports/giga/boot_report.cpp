@@ -138,6 +138,15 @@ Text BootReport::keys(char (&out)[max_line]) const {
   return line.done();
 }
 
+// By how many wires the host is heard; nothing to say while there was never more than one.
+Text BootReport::wires(char (&out)[max_line]) const {
+  const SessionWires& wires = *sources_.wires;
+  if (wires.joins() == 0) return Text();
+  LineWriter line(out);
+  line.text("Wires: ").number(static_cast<std::uint32_t>(wires.size()));
+  return line.text("; joined ").number(wires.joins()).text(", lost ").number(wires.losses()).done();
+}
+
 Text BootReport::next(char (&out)[max_line]) {
   LineWriter line(out);
   const Settings& settings = *sources_.settings;
@@ -209,6 +218,8 @@ Text BootReport::next(char (&out)[max_line]) {
       return stacks(out);
     case 24:
       return keys(out);
+    case 25:
+      return wires(out);
     default:
       step_ = 0;
       write_last_boot(line, sources_.last_boot);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A host that the board hears by several wires: how they join and leave, and that there is one session.
 #include "tests/firmware/wired_host.hpp"
+#include "tests/support/signing.hpp"
 
 namespace r4 {
 namespace {
@@ -335,6 +336,79 @@ TEST_F(ApplicationWires, AFloodFromAnotherPortKeepsNoWireOut) {
   }
   EXPECT_EQ(wires().size(), 3) << "it joins with the first heartbeat that both have brought";
   EXPECT_EQ(wires().losses(), 0U);
+}
+
+// --- a board with a key
+
+class ApplicationWiresWithAKey : public testing::Test {
+ protected:
+  ApplicationWiresWithAKey() {
+    host.seal = [this](const std::string& fields) {
+      return test::with_signature(fields, key, nonce(), ++counter, board.now_ms);
+    };
+    board.run(10);
+    host.connect();
+  }
+  // Of the newest heartbeat that went out.
+  std::string nonce() { return test::str(board.application->authentication().nonce()); }
+  const SessionWires& wires() const { return board.application->wires(); }
+
+  const Key key = test::key_of(1);
+  std::uint64_t counter = 1000;
+  TestBoard board{test::settings_with(test::key_of(1)), 4};
+  WiredHost host{board, {{wire_a}, {wire_b, 100}}};
+};
+
+TEST_F(ApplicationWiresWithAKey, TheSameSignedBytesComeByBothAndAreExecutedOnce) {
+  host.run(1000);
+  EXPECT_EQ(board.state(), BoardState::active);
+  ASSERT_EQ(wires().size(), 2);
+  board.log.rejected.clear();
+  for (int i = 0; i < 200; ++i) {
+    host.wires[0].cut = i % 10 == 0;  // now and then one brings it alone, later
+    host.command("Z:1");
+    host.wires[0].cut = false;
+    host.run(10);
+  }
+  EXPECT_EQ(board.log.rejected, Lines());
+  EXPECT_EQ(board.hal.zeroed.size(), 180U) << "what was overtaken on its way is stale";
+  EXPECT_EQ(wires().losses(), 0U);
+}
+
+TEST_F(ApplicationWiresWithAKey, WhoRelaysAtOnceIsAWireAndNoMore) {
+  host.command("O:358,1,1");
+  const std::string command = host.last;
+  host.heartbeat();
+  const std::string fresh = host.last;
+  const Source attacker{3, 9};
+  board.receive_raw(command, attacker);
+  EXPECT_EQ(board.log.rejected.back(), "replayed");
+  board.receive_raw(fresh, attacker);
+  EXPECT_TRUE(wires().has(attacker));
+  host.command("O:7,1,1");
+  board.receive_raw(command, attacker);
+  board.receive("O:9,1,1;PNum:" + std::to_string(host.pnum) + ";T:1;", attacker);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 7);
+  EXPECT_EQ(board.log.rejected.back(), "missing");
+  host.wires[0].cut = host.wires[1].cut = true;
+  for (int i = 0; i < 11; ++i) {
+    board.receive_raw(fresh, attacker);
+    board.run(100);
+  }
+  EXPECT_EQ(board.reason(), SafeReason::link) << "it keeps nothing alive";
+}
+
+TEST_F(ApplicationWiresWithAKey, AnOldCaptureDoesNothing) {
+  host.heartbeat();
+  const std::string old = host.last;
+  host.run(260);
+  const Source attacker{3, 9};
+  board.receive_raw(old, attacker);
+  EXPECT_EQ(board.log.rejected.back(), "replayed");
+  host.run(10'000);
+  board.receive_raw(old, attacker);
+  EXPECT_EQ(board.log.rejected.back(), "replayed");
+  EXPECT_EQ(wires().size(), 2);
 }
 
 // --- the end of wires

@@ -108,6 +108,27 @@ TEST(PeerTable, NobodyMakesAWatcherOfTheHostInControl) {
   EXPECT_FALSE(peers.watches(host)) << "its address was forged";
 }
 
+TEST(PeerTable, KeepsEachPlaceOfTheHostInControlUntilAnotherIsHeld) {
+  Peers peers;
+  const std::uint32_t first = peers.heard(1);
+  const std::uint32_t second = peers.heard(2);
+  peers.also_hold(second);  // nobody is in control
+  peers.hold(first);
+  peers.also_hold(second);
+  peers.also_hold(second);
+  peers.also_hold(Peers::nobody);
+  for (int i = 0; i < 1000; ++i) peers.heard(100 + i);
+  EXPECT_EQ(peers.heard(1), first);
+  EXPECT_EQ(peers.heard(2), second);
+  peers.hold(Peers::nobody);  // it may come back
+  for (int i = 0; i < 1000; ++i) peers.heard(100 + i);
+  EXPECT_EQ(peers.heard(2), second);
+  peers.hold(first);
+  for (int i = 0; i < 1000; ++i) peers.heard(100 + i);
+  EXPECT_NE(peers.heard(2), second) << "that place is its own no more";
+  EXPECT_EQ(peers.heard(1), first);
+}
+
 TEST(PeerTable, LetsANewHostInDuringAFlood) {
   Peers peers;
   for (int i = 0; i < 5000; ++i) peers.heard(i);

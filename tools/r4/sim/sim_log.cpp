@@ -128,6 +128,9 @@ sim::SimulatedBoard::Events SimLog::events() {
   events.on_executed = [this](auto... a) { on_executed(a...); };
   events.on_refused = [this](auto... a) { on_refused(a...); };
   events.on_rejected = [this](std::uint32_t t_ms, Verdict verdict) { on_rejected(t_ms, verdict); };
+  events.on_wire = [this](std::uint32_t t_ms, const Carrier& c, bool joined) {
+    on_wire(t_ms, c, joined);
+  };
   events.on_carrier = [this](std::uint32_t t_ms, const Carrier& carrier, const CarrierEvent& e) {
     on_carrier(t_ms, carrier, e);
   };
@@ -300,6 +303,23 @@ void SimLog::on_rejected(std::uint32_t t_ms, Verdict verdict) {
   if (!output_.json()) return print(t_ms, fmt::format("dropped: signature {}", why));
   Json object = event(t_ms);
   object["rejected"] = why;
+  print(object);
+}
+
+void SimLog::on_wire(std::uint32_t t_ms, const Carrier& carrier, bool joined) {
+  const SessionWires& wires = board_->application().wires();
+  const char* const what = joined ? "joined" : "left";
+  if (!output_.json()) {
+    return print(
+        t_ms, fmt::format("{} {} the session: {} wires, {} joined, {} lost so far", carrier.name(),
+                          what, wires.size(), wires.joins(), wires.losses()));
+  }
+  Json object = event(t_ms);
+  object["wire"] = {{"url", carrier.name()},
+                    {"event", what},
+                    {"wires", wires.size()},
+                    {"joins", wires.joins()},
+                    {"losses", wires.losses()}};
   print(object);
 }
 

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4::Board and r4::AsyncBoard over several wires, in real time: a board on UDP and a pty, and on carriers in memory
+// that are cut.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <asio/io_context.hpp>
+#include <asio/steady_timer.hpp>
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "firmware/ports/sim/simulated_board.hpp"
+#include "r4link/async_board.hpp"
+#include "r4link/board.hpp"
+#include "tests/bench/allocations.hpp"
+#include "tests/support/at_will.hpp"
+#include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/problems.hpp"
+#include "transports/memory_carrier.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+template <class Done>
+bool comes_true(Done done) {
+  const auto end = std::chrono::steady_clock::now() + 5s;
+  while (!done()) {
+    if (std::chrono::steady_clock::now() > end) return false;
+    std::this_thread::yield();
+  }
+  return true;
+}
+
+TEST(BoardWires, ABoardOnUdpAndAPtyIsOneBoard) {
+  BoardInAThread simulated(std::vector<std::string>{"udp", "pty"});
+  Board board(simulated.urls(), at_will());
+  board.wait_active();
+  EXPECT_TRUE(comes_true([&] { return board.link().carrying == 3; }));
+  for (int i = 0; i < 20; ++i) board.osmc(1).set(100 + i, Direction::forward);
+  EXPECT_EQ(simulated.executed().back(), "O:119,1,1");
+  const std::vector<Wire> wires = board.wires();
+  ASSERT_EQ(wires.size(), 2U);
+  EXPECT_EQ(wires[0].board_id, "test-board");
+  EXPECT_TRUE(contains(wires[0].name, "udp://127.0.0.1:"));
+  EXPECT_TRUE(contains(wires[1].name, "serial:///dev/pts/"));
+  EXPECT_EQ(wires[1].state, WireState::carrying);
+  EXPECT_GT(wires[1].round_trip_us, 0);
+  EXPECT_TRUE(contains(board.name(), wires[0].name + " " + wires[1].name));
+  for (int i = 0; i < 30; ++i) board.next_state();
+  EXPECT_GT(board.statistics().copies, 10U);
+  board.stop();
+  EXPECT_EQ(board.link().reason, SafeReason::stop);
+}
+
+TEST(BoardWires, ThatTheyLeadToTwoBoardsIsSaidWithBothNames) {
+  BoardInAThread left(std::vector<std::string>{"udp"}, "", "left-board");
+  BoardInAThread right(std::vector<std::string>{"pty"}, "", "right-board");
+  Board board({left.url(), right.url()}, at_will());
+  const Problem problem = problem_of([&] { board.wait_active(); });
+  EXPECT_EQ(problem.kind, ErrorKind::refused);
+  EXPECT_TRUE(contains(problem.text(), "left-board"));
+  EXPECT_TRUE(contains(problem.text(), "right-board"));
+  problem_of([&] { board.send("O:1,1,1", 100ms); });
+  EXPECT_TRUE(left.executed().empty());
+  EXPECT_TRUE(right.executed().empty());
+}
+
+TEST(BoardWires, WhatCannotBeWiresIsRefused) {
+  asio::io_context io;
+  const auto refusal = [&](const std::vector<std::string>& urls) {
+    const Problem problem = problem_of([&] { AsyncBoard board(io, urls); });
+    EXPECT_EQ(problem.kind, ErrorKind::usage);
+    return problem.text();
+  };
+  EXPECT_TRUE(contains(refusal({"udp://r4.local", "udp://R4.local:2018"}), "twice"));
+  EXPECT_TRUE(contains(refusal({"can://can0", "serial:auto", "can://can0?node=1&fd=1"}), "twice"));
+  EXPECT_TRUE(
+      contains(refusal({"serial:///dev/../dev/ttyACM0", "serial:///dev/ttyACM0"}), "twice"));
+  EXPECT_TRUE(contains(refusal({"sim:", "udp://r4.local"}), "of its own"));
+  EXPECT_TRUE(contains(refusal({"serial:auto", "sim:"}), "of its own"));
+  EXPECT_TRUE(contains(refusal({"udp://r4.local", "tcp://r4.local"}), "no transport"));
+  EXPECT_TRUE(contains(refusal({}), "0 wires"));
+  EXPECT_TRUE(
+      contains(refusal({"udp://a", "udp://b", "udp://c", "udp://d", "udp://e"}), "5 wires"));
+  AsyncBoard(io, {"can://can0", "can://can1", "can://can1?node=2", "udp://10.0.0.1"});
+}
+
+TEST(BoardWires, OneThatCannotBeOpenedYetIsTriedAgain) {
+  const std::string link =
+      (std::filesystem::temp_directory_path() / ("r4-wire-" + std::to_string(getpid()))).string();
+  BoardInAThread simulated(std::vector<std::string>{"udp", "pty"});
+  EXPECT_EQ(problem_of([&] {
+              Board({"serial://" + link, "serial://" + link + "2"});
+            }).kind,
+            ErrorKind::open);
+  std::atomic<int> told{0};
+  BoardCallbacks callbacks;
+  callbacks.on_event = [&](const CarrierEvent& event) {
+    told += event.kind == CarrierEvent::Kind::down ? 1 : 0;
+  };
+  Board board({simulated.urls()[0], "serial://" + link}, at_will(), callbacks);
+  board.wait_active();
+  EXPECT_EQ(board.wires()[1].state, WireState::down);
+  EXPECT_TRUE(comes_true([&] { return told == 1; }));
+  std::filesystem::create_symlink(simulated.urls()[1].substr(9), link);
+  EXPECT_TRUE(comes_true([&] { return board.link().carrying == 3; }));
+  std::filesystem::remove(link);
+}
+
+// One end of a carrier in memory that can be cut, told or untold.
+class Cuttable final : public Carrier, private Carrier::Handler {
+ public:
+  explicit Cuttable(std::unique_ptr<Carrier> below) : below_(std::move(below)) {}
+  void open(Carrier::Handler& handler) override {
+    handler_ = &handler;
+    below_->open(*this);
+  }
+  void close() noexcept override { below_->close(); }
+  SendResult send(std::string_view bytes, Priority priority, Peer to) override {
+    if (unplugged) return SendResult::down;
+    return cut ? SendResult::sent : below_->send(bytes, priority, to);
+  }
+  bool up() const override { return !unplugged && below_->up(); }
+  std::size_t max_size() const override { return below_->max_size(); }
+  const std::string& name() const override { return below_->name(); }
+  const CarrierCounters& counters() const override { return below_->counters(); }
+  void plug(bool in) {
+    unplugged = !in;
+    on_carrier_event({in ? CarrierEvent::Kind::up : CarrierEvent::Kind::down, {}});
+  }
+
+  bool cut = false;
+  bool unplugged = false;
+
+ private:
+  void on_datagram(std::string_view bytes, Peer from) override {
+    if (!cut && !unplugged) handler_->on_datagram(bytes, from);
+  }
+  void on_carrier_event(const CarrierEvent& event) override { handler_->on_carrier_event(event); }
+  void on_drained() override { handler_->on_drained(); }
+
+  std::unique_ptr<Carrier> below_;
+  Carrier::Handler* handler_ = nullptr;
+};
+
+struct BoardWiresInMemory : testing::Test {
+  void SetUp() override {
+    sim::SimulatedBoard::Options options;
+    options.board_id = "in-memory";
+    simulated = std::make_unique<sim::SimulatedBoard>(io, std::move(options));
+    std::vector<std::unique_ptr<Carrier>> ends;
+    for (Cuttable*& wire : wires) {
+      auto [host_end, board_end] = make_memory_pair(io);
+      auto cuttable = std::make_unique<Cuttable>(std::move(host_end));
+      wire = cuttable.get();
+      ends.push_back(std::move(cuttable));
+      simulated->add_carrier(std::move(board_end));
+    }
+    simulated->start();
+    board = std::make_unique<AsyncBoard>(io, std::move(ends), at_will());
+    board->open();
+    ASSERT_TRUE(run_until([&] { return board->in_control() && board->link().carrying == 3; }));
+  }
+  template <class Done>
+  bool run_until(Done done) {
+    const auto deadline = std::chrono::steady_clock::now() + 5s;
+    while (!done()) {
+      if (std::chrono::steady_clock::now() > deadline) return false;
+      io.run_one_for(1s);
+    }
+    return true;
+  }
+  void run_for(std::chrono::milliseconds duration) {
+    asio::steady_timer timer(io, duration);
+    bool over = false;
+    timer.async_wait([&](const std::error_code&) { over = true; });
+    run_until([&] { return over; });
+  }
+
+  asio::io_context io;
+  Cuttable* wires[2] = {};
+  std::unique_ptr<sim::SimulatedBoard> simulated;
+  std::unique_ptr<AsyncBoard> board;
+};
+
+TEST_F(BoardWiresInMemory, TellWhatBeginsAndCeasesToCarry) {
+  std::vector<Wire> told;
+  const Subscription keep = board->on_wire([&](const Wire& wire) { told.push_back(wire); });
+  wires[0]->plug(false);
+  ASSERT_EQ(told.size(), 1U) << "at once";
+  EXPECT_EQ(told[0].state, WireState::down);
+  EXPECT_EQ(board->link().state, HostLinkState::active);
+  wires[0]->plug(true);
+  ASSERT_TRUE(run_until([&] { return told.size() == 2; }));
+  EXPECT_EQ(told[1].state, WireState::carrying);
+  const auto cut_at = std::chrono::steady_clock::now();
+  wires[1]->cut = true;
+  ASSERT_TRUE(run_until([&] { return told.size() == 3; }));
+  EXPECT_EQ(told[2].state, WireState::silent);
+  EXPECT_LT(std::chrono::steady_clock::now() - cut_at, 1500ms);
+  EXPECT_TRUE(board->in_control());
+}
+
+TEST_F(BoardWiresInMemory, CostNoHeapPerDatagram) {
+  run_for(300ms);
+  const std::uint64_t before = bench::allocations();
+  const std::uint64_t states = board->statistics().states;
+  run_for(500ms);
+  EXPECT_GT(board->statistics().states, states + 20);
+  EXPECT_LE(bench::allocations() - before, 10U) << "of the timer of this test";
+}
+
+TEST_F(BoardWiresInMemory, AreToldApartInARecording) {
+  const std::string path =
+      (std::filesystem::temp_directory_path() / ("r4-wires-" + std::to_string(getpid()) + ".r4"))
+          .string();
+  {
+    Recording recording(path);
+    board->record(recording);
+    run_for(200ms);
+  }
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  std::filesystem::remove(path);
+  for (const std::string wire : {" 1", " 2"}) {
+    EXPECT_TRUE(contains(text.str(), wire + "< AIN24:")) << "brought";
+    EXPECT_TRUE(contains(text.str(), wire + "> H:ROS2-R4;")) << "carried";
+  }
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,402 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One session over several wires, opposite the real board (docs/redundancy.md).
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "r4link/error.hpp"
+#include "tests/support/datagrams.hpp"
+#include "tests/support/signing.hpp"
+#include "wired_robot.hpp"
+
+namespace r4::test {
+namespace {
+
+using Cable = WiredRobot::Cable;
+using Cables = WiredRobot::Cables;
+
+std::vector<std::string> with_letter(const Cable& cable, char letter) {
+  std::vector<std::string> found;
+  for (const std::string& each : cable.sent) {
+    if (each.front() == letter) found.push_back(each);
+  }
+  return found;
+}
+bool executed_once(const WiredRobot& robot) {
+  const auto& executed = robot.executed(0);
+  return std::all_of(executed.begin(), executed.end(),
+                     [](const auto& each) { return each.second == 1; });
+}
+
+TEST(SessionWires, AskWhoIsThereBeforeAnythingElseIsSaid) {
+  WiredRobot robot(Cables{{5}, {5}});
+  robot.plug(0, true);
+  robot.plug(1, true);
+  robot.run(9);
+  for (const Cable& cable : robot.cables) {
+    ASSERT_EQ(cable.sent.size(), 1U);
+    EXPECT_EQ(cable.sent[0].substr(0, 5), "Q:ID;");
+  }
+  EXPECT_EQ(robot.session->wire_state(0), WireState::asking);
+  robot.run(500);
+  EXPECT_TRUE(robot.session->in_control(robot.now()));
+  EXPECT_EQ(robot.session->wire_state(0), WireState::carrying);
+  EXPECT_EQ(robot.session->wire_state(1), WireState::carrying);
+  EXPECT_EQ(robot.session->link().carrying, 3);
+}
+
+TEST(SessionWires, CarryTheSameBytes) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  robot.drive(100);
+  EXPECT_EQ(with_letter(robot.cables[0], 'H'), with_letter(robot.cables[1], 'H'));
+  EXPECT_EQ(with_letter(robot.cables[0], 'O'), with_letter(robot.cables[1], 'O'));
+  EXPECT_EQ(with_letter(robot.cables[0], 'O').size(), 1U);
+  EXPECT_TRUE(executed_once(robot));
+}
+
+TEST(SessionWires, BringEachStateOnce) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  robot.told_states = 0;
+  robot.run(1000);
+  EXPECT_NEAR(static_cast<double>(robot.told_states), 100, 2);
+  EXPECT_FALSE(robot.went_back);
+  EXPECT_GT(robot.session->wire(1, robot.now()).copies, 90U);
+  EXPECT_EQ(robot.session->packets().lost, 0U);
+  EXPECT_EQ(robot.session->wire(0, robot.now()).loss(), 0);
+  EXPECT_EQ(robot.session->wire(1, robot.now()).loss(), 0);
+  EXPECT_GT(robot.session->wire(1, robot.now()).round_trip_us, 0);
+}
+
+TEST(SessionWires, OneThatLagsNeverReplacesNewerState) {
+  WiredRobot robot(Cables{{1}, {200}});
+  robot.connect();
+  robot.run(1000);
+  EXPECT_EQ(robot.session->link().carrying, 3);
+  robot.told_states = 0;
+  robot.oldest_age_ms = 0;
+  robot.run(2000);
+  EXPECT_FALSE(robot.went_back);
+  EXPECT_NEAR(static_cast<double>(robot.told_states), 200, 2);
+  EXPECT_LE(robot.oldest_age_ms, 3U);
+  EXPECT_EQ(robot.restarts, 0);
+  robot.cut(0);  // the slow one goes on by itself
+  robot.run(3000);
+  EXPECT_EQ(robot.trips, 0);
+  EXPECT_FALSE(robot.went_back);
+  EXPECT_EQ(robot.drive(7).outcome, Outcome::confirmed);
+  EXPECT_TRUE(executed_once(robot));
+}
+
+// The bar of the plan: one of two cut under full load, 1000 times.
+TEST(SessionWires, OneIsCutAThousandTimesAndNothingIsMissed) {
+  WiredRobot robot(Cables{{1}, {2}});
+  robot.connect();
+  robot.run(500);
+  robot.keeps_states = false;
+  robot.oldest_age_ms = 0;
+  robot.longest_gap_ms = 0;
+  int unconfirmed = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const auto wire = static_cast<std::size_t>(i % 2);
+    i % 4 < 2 ? robot.cut(wire) : robot.plug(wire, false);
+    for (int n = 0; n < 3; ++n) {
+      unconfirmed += robot.drive(i % 4096).outcome == Outcome::confirmed ? 0 : 1;
+    }
+    robot.run(10 + static_cast<std::uint32_t>(i * 7 % 40));
+    i % 4 < 2 ? robot.cut(wire, false) : robot.plug(wire, true);
+    robot.run(150);
+    robot.results.clear();
+    robot.links.clear();
+  }
+  EXPECT_EQ(unconfirmed, 0);
+  EXPECT_TRUE(executed_once(robot));
+  EXPECT_EQ(robot.trips, 0);
+  EXPECT_LE(robot.longest_gap_ms, 20) << "two periods";
+  EXPECT_LE(robot.oldest_age_ms, 20U);
+  EXPECT_FALSE(robot.went_back);
+  EXPECT_EQ(robot.session->statistics(robot.now()).timed_out, 0U);
+}
+
+TEST(SessionWires, TellAtOnceWhatTheTransportTells) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  robot.plug(0, false);
+  EXPECT_EQ(robot.links.back().carrying, 2);
+  EXPECT_EQ(robot.session->wire_state(0), WireState::down);
+  EXPECT_FALSE(robot.links.back().transport_down);
+  EXPECT_EQ(robot.links.back().state, HostLinkState::active);
+  robot.plug(0, true);
+  robot.run(200);
+  EXPECT_EQ(robot.links.back().carrying, 3);
+  EXPECT_EQ(robot.trips, 0);
+}
+
+TEST(SessionWires, TellWithinTheTimeoutWhatNobodyTells) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  robot.cut(1);
+  robot.run(990);
+  EXPECT_EQ(robot.session->link().carrying, 3);
+  robot.run(20);
+  EXPECT_EQ(robot.session->link().carrying, 1);
+  EXPECT_EQ(robot.session->wire_state(1), WireState::silent);
+  EXPECT_EQ(robot.session->link().state, HostLinkState::active);
+}
+
+TEST(SessionWires, AreLostTogetherAndComeBackOneByOne) {
+  WiredRobot robot(Cables{{1}, {1}, {1}});
+  robot.connect();
+  for (std::size_t wire = 0; wire < 3; ++wire) robot.cut(wire);
+  robot.run(1100);
+  EXPECT_EQ(robot.session->link().state, HostLinkState::lost);
+  EXPECT_EQ(robot.session->link().carrying, 0);
+  robot.cut(2, false);
+  robot.run(1000);
+  EXPECT_EQ(robot.session->link().carrying, 4);
+  EXPECT_EQ(robot.drive(5).outcome, Outcome::confirmed);
+  for (std::size_t wire = 0; wire < 3; ++wire) robot.plug(wire, false);
+  EXPECT_TRUE(robot.session->link().transport_down);
+  EXPECT_EQ(robot.session->link().state, HostLinkState::lost);
+  robot.cut(0, false);
+  robot.plug(0, true);
+  robot.run(1000);
+  EXPECT_FALSE(robot.session->link().transport_down);
+  EXPECT_EQ(robot.drive(6).outcome, Outcome::confirmed);
+  EXPECT_TRUE(executed_once(robot));
+}
+
+TEST(SessionWires, ConfirmACommandThatOneCarriesAndAnotherAnswers) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  robot.cables[0].cut_to_host = true;
+  robot.cables[1].cut_to_board = true;
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(robot.drive(i).outcome, Outcome::confirmed);
+  EXPECT_TRUE(executed_once(robot));
+}
+
+TEST(SessionWires, TellARefusalOnce) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  robot.nacks.clear();
+  robot.drive(1);
+  EXPECT_TRUE(robot.nacks.empty()) << "that a copy was executed before is nothing to tell";
+  const Ticket ticket =
+      robot.session->send(Command::setting("timeout", "100"), WiredRobot::timeout, robot.now());
+  const CommandResult result = robot.finish(ticket);  // not above the heartbeat interval
+  EXPECT_EQ(result.outcome, Outcome::refused);
+  EXPECT_EQ(result.code, Refusal::range);
+  robot.run(50);
+  EXPECT_EQ(robot.nacks.size(), 1U);
+}
+
+TEST(SessionWires, AreRefusedWhenAllOfThemAre) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  const std::string heartbeat = with_letter(robot.cables[0], 'H').back();
+  Datagram datagram;
+  ASSERT_TRUE(read_datagram(heartbeat, datagram));
+  const auto busy = [&](int number) {
+    return with_crc("N:" + std::to_string(datagram.pnum()) + ",BUSY;PNum:" +
+                    std::to_string(number) + ";T:" + std::to_string(robot.board_ms(0)) + ";");
+  };
+  robot.bring(1, busy(1));
+  EXPECT_FALSE(robot.session->link().busy);
+  EXPECT_TRUE(robot.session->wire(1, robot.now()).busy);
+  robot.bring(0, busy(1));
+  EXPECT_TRUE(robot.session->link().busy);
+}
+
+TEST(SessionWires, ToTwoBoardsAreRefused) {
+  WiredRobot robot(Cables{{1}, {1, 1}});
+  robot.connect();
+  EXPECT_TRUE(robot.session->link().two_boards);
+  EXPECT_EQ(robot.session->wire_state(1), WireState::other_board);
+  EXPECT_EQ(robot.session->wire(0, robot.now()).board_id, "board-0");
+  EXPECT_EQ(robot.session->wire(1, robot.now()).board_id, "board-1");
+  robot.session->send(Command::osmc(1, Direction::forward, 1), WiredRobot::timeout, robot.now());
+  robot.run(1000);
+  for (const Cable& cable : robot.cables) {
+    EXPECT_EQ(with_letter(cable, 'Q').size(), cable.sent.size()) << "nothing but questions";
+  }
+  robot.plug(1, false);
+  robot.cables[1].board = 0;  // the right one after all
+  robot.run(500);
+  EXPECT_FALSE(robot.session->link().two_boards);
+  EXPECT_TRUE(robot.session->in_control(robot.now()));
+}
+
+TEST(SessionWires, GoOnWhenOneIsPluggedIntoAnotherBoard) {
+  WiredRobot robot(Cables{{1}, {1}, {1, 1}});
+  robot.plug(0, true);
+  robot.plug(1, true);
+  robot.run(500);
+  ASSERT_TRUE(robot.session->in_control(robot.now()));
+  robot.plug(2, true);
+  robot.run(500);
+  EXPECT_TRUE(robot.session->link().two_boards);
+  EXPECT_EQ(robot.drive(3).outcome, Outcome::confirmed);
+  EXPECT_TRUE(robot.executed(1).empty());
+  EXPECT_EQ(with_letter(robot.cables[2], 'Q').size(), robot.cables[2].sent.size());
+}
+
+TEST(SessionWires, BeginWithoutOneWhoseBoardDoesNotAnswer) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.cut(1);
+  robot.connect();
+  EXPECT_TRUE(robot.session->in_control(robot.now()));
+  EXPECT_EQ(robot.session->wire_state(1), WireState::asking);
+  EXPECT_EQ(with_letter(robot.cables[1], 'Q').size(), robot.cables[1].sent.size());
+  robot.cut(1, false);
+  robot.run(200);
+  EXPECT_EQ(robot.session->link().carrying, 3);
+}
+
+TEST(SessionWires, ShowOneRestartOfTheBoardAndAreBack) {
+  for (const std::uint32_t lag : {1U, 30U, 200U}) {
+    WiredRobot robot(Cables{{1}, {lag}});
+    robot.connect();
+    robot.run(1000);
+    robot.drive(1);
+    for (int boots = 1; boots <= 3; ++boots) {
+      robot.run(3000);
+      robot.reboot(0);
+      robot.run(2000);
+      EXPECT_EQ(robot.restarts, boots) << "lag " << lag;
+      EXPECT_TRUE(robot.session->in_control(robot.now())) << "lag " << lag;
+      EXPECT_EQ(robot.session->link().carrying, 3) << "lag " << lag;
+    }
+    EXPECT_EQ(robot.drive(2).outcome, Outcome::confirmed);
+  }
+}
+
+TEST(SessionWires, PassOverWhatIsAnHourOld) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  const auto old = [&](std::uint32_t back_ms) {
+    return with_crc("AIN24:1.00;SAFE:0;PNum:17;T:" + std::to_string(robot.board_ms(0) - back_ms) +
+                    ";");
+  };
+  robot.told_states = 0;
+  for (int i = 0; i < 100; ++i) {
+    robot.bring(1, old(3'600'000));
+    robot.bring(1, old(5'000));
+    robot.run(10);
+  }
+  EXPECT_EQ(robot.restarts, 0);
+  EXPECT_FALSE(robot.went_back);
+  EXPECT_NEAR(static_cast<double>(robot.told_states), 100, 2);
+  EXPECT_TRUE(robot.session->in_control(robot.now()));
+  EXPECT_EQ(robot.trips, 0);
+}
+
+TEST(SessionWires, TakeAStateInPartsFromWhicheverBringsThem) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  robot.run(3);
+  const std::string t = std::to_string(robot.board_ms(0) + 1);
+  robot.states.clear();
+  robot.bring(0, with_crc("AIN24:1.00;SAFE:0;PNum:90001;T:" + t + ";"));
+  robot.bring(1, with_crc("AIN24:1.00;SAFE:0;PNum:70001;T:" + t + ";"));
+  robot.bring(1, with_crc("AIN12:2.00;SAFE:0;PNum:70002;T:" + t + ";"));
+  robot.bring(0, with_crc("AIN12:2.00;SAFE:0;PNum:90002;T:" + t + ";"));
+  ASSERT_EQ(robot.states.size(), 2U) << "each part once";
+  EXPECT_EQ(robot.states[1].analog_cv[static_cast<int>(StateField::ain12)], 200);
+  EXPECT_EQ(robot.states[1].analog_cv[static_cast<int>(StateField::ain24)], 100);
+}
+
+TEST(SessionWires, CountAsLostWhatNoneBrings) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  robot.run(100);
+  robot.cut(0);
+  robot.run(100);
+  robot.cut(0, false);
+  robot.run(100);
+  EXPECT_NEAR(robot.session->wire(0, robot.now()).packets.lost, 10, 2);
+  EXPECT_EQ(robot.session->packets().lost, 0U);
+  robot.cut(0);
+  robot.cut(1);
+  robot.run(100);
+  robot.cut(0, false);
+  robot.cut(1, false);
+  robot.run(100);
+  EXPECT_NEAR(robot.session->packets().lost, 10, 2);
+}
+
+TEST(SessionWires, AllCarryAStopWhoeverIsThere) {
+  WiredRobot robot(Cables{{1}, {1}, {1}});
+  robot.plug(0, true);
+  robot.plug(1, true);
+  const Ticket early = robot.session->stop(WiredRobot::timeout, robot.now());
+  for (const std::size_t wire : {0U, 1U}) {
+    EXPECT_EQ(with_letter(robot.cables[wire], 'E').size(), 1U) << "also before its board is known";
+  }
+  EXPECT_EQ(robot.finish(early).outcome, Outcome::confirmed);
+  robot.run(1000);
+  robot.finish(robot.session->send(Command::clear(), WiredRobot::timeout, robot.now()));
+  robot.cut(0);
+  EXPECT_EQ(robot.finish(robot.session->stop(WiredRobot::timeout, robot.now())).outcome,
+            Outcome::confirmed);
+}
+
+TEST(SessionWires, AreLeftTogether) {
+  WiredRobot robot(Cables{{1}, {3}});
+  robot.connect();
+  robot.drive(1);
+  EXPECT_EQ(robot.finish(robot.session->leave(WiredRobot::timeout, robot.now())).outcome,
+            Outcome::confirmed);
+  EXPECT_FALSE(robot.board(0).link().has_owner());
+}
+
+TEST(SessionWires, AreSignedOnce) {
+  SessionOptions options = WiredRobot::at_will();
+  options.key = key_of(1);
+  options.clock_start = std::chrono::hours{24};
+  WiredRobot robot(Cables{{1}, {20}}, options, BoardRole::control, settings_with(key_of(1)));
+  robot.connect();
+  robot.run(1000);
+  ASSERT_TRUE(robot.session->in_control(robot.now()));
+  EXPECT_EQ(robot.drive(9).outcome, Outcome::confirmed);
+  EXPECT_EQ(with_letter(robot.cables[0], 'O'), with_letter(robot.cables[1], 'O'));
+  EXPECT_NE(with_letter(robot.cables[0], 'O')[0].find(";A:1,"), std::string::npos);
+  EXPECT_EQ(robot.session->link().carrying, 3);
+  robot.cut(0);
+  robot.run(1500);
+  EXPECT_EQ(robot.drive(10).outcome, Outcome::confirmed);
+  EXPECT_EQ(robot.trips, 0);
+  EXPECT_TRUE(executed_once(robot));
+}
+
+TEST(SessionWires, AreArmedTogether) {
+  WiredRobot robot(Cables{{1}, {1}}, SessionOptions{});
+  robot.connect();
+  EXPECT_EQ(robot.finish(robot.session->arm(WiredRobot::timeout, robot.now())).outcome,
+            Outcome::confirmed);
+  robot.cut(0);
+  robot.run(1500);
+  EXPECT_EQ(robot.session->disarmed_by(), DisarmCause::none);
+  EXPECT_EQ(robot.drive(4).outcome, Outcome::confirmed);
+}
+
+TEST(SessionWires, HaveALeaseEachForWhoWatches) {
+  WiredRobot robot(Cables{{1}, {1}}, SessionOptions{}, BoardRole::watch);
+  robot.connect();
+  robot.run(2000);
+  EXPECT_EQ(robot.session->link().carrying, 3);
+  for (const Cable& cable : robot.cables) {
+    EXPECT_GE(with_letter(cable, 'W').size(), 3U);
+    EXPECT_TRUE(with_letter(cable, 'H').empty());
+  }
+  robot.told_states = 0;
+  robot.longest_gap_ms = 0;
+  robot.cut(0);
+  robot.run(1000);
+  EXPECT_NEAR(static_cast<double>(robot.told_states), 100, 2);
+  EXPECT_LE(robot.longest_gap_ms, 20);
+  EXPECT_FALSE(robot.went_back);
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A host session over several wires opposite real boards in virtual time, in steps of a millisecond: each wire has its
+// own delay, and can be cut, told or untold, in one direction or both.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "firmware/application/application.hpp"
+#include "host/session/session.hpp"
+
+namespace r4::test {
+
+class WiredRobot final : private Session::Handler {
+ public:
+  struct Cable {
+    Cable(std::uint32_t its_lag_ms, std::size_t its_board = 0)
+        : lag_ms(its_lag_ms), board(its_board) {}
+    std::uint32_t lag_ms;
+    std::size_t board;
+    bool cut_to_board = false, cut_to_host = false;
+    std::vector<std::string> sent;  // by the host
+  };
+
+  using Cables = std::vector<Cable>;
+
+  explicit WiredRobot(Cables its_cables, SessionOptions options = at_will(),
+                      BoardRole role = BoardRole::control, Settings settings = {});
+  ~WiredRobot();
+  static SessionOptions at_will();
+
+  // The transports of all wires come up, and the link has half a second.
+  void connect();
+  void run(std::uint32_t ms);
+  // Untold: as a cable that is cut somewhere in a network.
+  void cut(std::size_t wire, bool is_cut = true);
+  // The transport tells: unplugged.
+  void plug(std::size_t wire, bool in);
+  // It begins again, with another clock.
+  void reboot(std::size_t board);
+  // Hands a datagram to the host, as if that wire had brought it.
+  void bring(std::size_t wire, std::string_view bytes);
+  // Waits for the end of what was asked for.
+  CommandResult finish(Ticket ticket, std::uint32_t most_ms = 2000);
+  CommandResult drive(int pwm) {
+    return finish(session->send(Command::osmc(pwm, Direction::forward, 1), timeout, now()));
+  }
+
+  Time now() const { return Time{now_ms_ * 1000}; }
+  std::uint32_t board_ms(std::size_t board) const;
+  firmware::Application& board(std::size_t index);
+  // How often each number was executed.
+  const std::map<std::uint32_t, int>& executed(std::size_t board) const;
+
+  static constexpr Time timeout = std::chrono::milliseconds{1000};
+  Cables cables;
+  std::unique_ptr<Session> session;
+
+  std::vector<ReceivedState> states;
+  bool keeps_states = true;
+  std::uint32_t oldest_age_ms = 0;  // of the states when they were told
+  std::int64_t longest_gap_ms = 0;  // between two states
+  std::uint64_t told_states = 0;
+  bool went_back = false;  // a state was told that is older than the one before
+  std::vector<LinkStatus> links;
+  std::vector<Nack> nacks;
+  std::map<Ticket, CommandResult> results;
+  int restarts = 0;
+  int heartbeats = 0;  // of the board, told
+  int trips = 0;       // a board was safe that had been active
+
+ private:
+  struct Board;
+  struct Packet {
+    std::int64_t at_ms;
+    std::size_t wire;
+    bool to_board;
+    std::string bytes;
+  };
+  void put(std::size_t wire, bool to_board, std::string_view bytes);
+
+  SendResult transmit(std::size_t wire, std::string_view bytes, Priority priority) override;
+  void on_state(const ReceivedState& state, const Datagram&) override;
+  void on_board_heartbeat(const Datagram&) override { ++heartbeats; }
+  void on_identity(const Identity&) override {}
+  void on_nack(const Nack& nack, const Datagram&) override { nacks.push_back(nack); }
+  void on_bad_datagram(const ReadResult&, std::string_view) override {}
+  void on_link(const LinkStatus& status) override { links.push_back(status); }
+  void on_restart() override { ++restarts; }
+  void on_result(Ticket ticket, const CommandResult& result) override {
+    results.emplace(ticket, result);
+  }
+
+  std::int64_t now_ms_ = 5'000'000;
+  std::int64_t last_state_ms_ = 0;
+  std::uint32_t last_t_ms_ = 0;
+  Settings settings_;
+  std::vector<std::unique_ptr<Board>> boards_;
+  std::vector<bool> up_;
+  std::deque<Packet> packets_;
+};
+
+}  // namespace r4::test
