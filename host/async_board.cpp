@@ -31,7 +31,7 @@ std::vector<std::unique_ptr<Carrier>> checked(std::vector<std::unique_ptr<Carrie
 }  // namespace
 
 AsyncBoard::AsyncBoard(const executor_type& executor, std::string_view url, BoardOptions options)
-    : AsyncBoard(executor, make_host_carrier(executor.context(), url, options.role), options) {}
+    : AsyncBoard(executor, std::vector<std::string>{std::string(url)}, std::move(options)) {}
 
 AsyncBoard::AsyncBoard(const executor_type& executor, const std::vector<std::string>& urls,
                        BoardOptions options)

@@ -9,6 +9,7 @@
 
 #include "../firmware/ports/sim/sim_carrier.hpp"
 #include "../transports/udp/udp_url.hpp"
+#include "../transports/url_pattern.hpp"
 #include "replay/replay_carrier.hpp"
 #include "session/session.hpp"
 
@@ -75,17 +76,21 @@ void require_wires(std::size_t count) {
 std::vector<std::unique_ptr<Carrier>> make_host_carriers(asio::io_context& io,
                                                          const std::vector<std::string>& urls,
                                                          BoardRole role) {
-  require_wires(urls.size());
+  std::vector<std::string> all;
+  for (const std::string& text : urls) {
+    for (std::string& url : split_wires(text)) all.push_back(std::move(url));
+  }
+  require_wires(all.size());
   std::vector<std::string> wires;
   std::vector<std::unique_ptr<Carrier>> carriers;
   bool has_host_port = false;
-  for (const std::string& url : urls) {
+  for (const std::string& url : all) {
     const std::string scheme = Url::parse(url).scheme();
     const bool udp = scheme == "udp";
     carriers.push_back(
         make_host_carrier(io, udp && has_host_port ? with_own_port(url) : url, role));
     has_host_port = has_host_port || udp;
-    if (urls.size() > 1 && (scheme == "sim" || scheme == "replay")) {
+    if (all.size() > 1 && (scheme == "sim" || scheme == "replay")) {
       throw Error(ErrorKind::usage, url, "it is a board of its own, not a wire to another",
                   "open it alone");
     }

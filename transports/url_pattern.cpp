@@ -24,6 +24,7 @@ namespace {
 }
 
 bool is_decimal(char c) { return c >= '0' && c <= '9'; }
+bool begins_scheme(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
 
 // The end of "0-7" at the beginning of the text; 0 if that is no range.
 std::size_t range_size(std::string_view text) {
@@ -93,9 +94,8 @@ std::vector<std::string> numbers_of(std::string_view pattern, std::string_view l
   return numbers;
 }
 
-}  // namespace
-
-std::vector<PatternUrl> expand_urls(std::string_view pattern) {
+// Of one wire.
+std::vector<PatternUrl> expand_wire(std::string_view pattern) {
   std::vector<PatternUrl> all{{"", ""}};
   std::string text = with_braces(pattern);
   std::string_view rest = text;
@@ -125,6 +125,56 @@ std::vector<PatternUrl> expand_urls(std::string_view pattern) {
     Url::parse(each.url);
   }
   return all;
+}
+
+}  // namespace
+
+std::vector<PatternUrl> expand_urls(std::string_view pattern) {
+  std::vector<PatternUrl> boards;
+  for (const std::string& wire : split_wires(pattern)) {
+    std::vector<PatternUrl> urls = expand_wire(wire);
+    if (boards.empty()) {
+      boards = std::move(urls);
+      continue;
+    }
+    if (urls.size() != boards.size()) {
+      throw Error(ErrorKind::usage, std::string(pattern),
+                  "its wires lead to " + std::to_string(boards.size()) + " and to " +
+                      std::to_string(urls.size()) + " boards",
+                  "give each wire a range of the same length, as in "
+                  "can://can0?node=0-7+can://can1?node=0-7");
+    }
+    for (std::size_t i = 0; i < boards.size(); ++i) boards[i].url += "+" + urls[i].url;
+  }
+  return boards;
+}
+
+std::vector<std::string> split_wires(std::string_view text) {
+  std::vector<std::string> urls;
+  std::size_t begin = 0;
+  for (std::size_t plus = text.find('+'); plus != std::string_view::npos;
+       plus = text.find('+', plus + 1)) {
+    std::size_t end = plus + 1;
+    while (end < text.size() && (begins_scheme(text[end]) || is_decimal(text[end]))) ++end;
+    if (end == text.size() || text[end] != ':' || !begins_scheme(text[plus + 1])) continue;
+    urls.emplace_back(text.substr(begin, plus - begin));
+    begin = plus + 1;
+  }
+  urls.emplace_back(text.substr(begin));
+  return urls;
+}
+
+bool has_wire(std::string_view text, std::string_view scheme) {
+  const std::vector<std::string> urls = split_wires(text);
+  return std::any_of(urls.begin(), urls.end(), [scheme](const std::string& url) {
+    return Url::parse(url).scheme() == scheme;
+  });
+}
+
+std::string join_wires(const std::vector<std::string>& urls) {
+  std::string text;
+  for (const std::string& url : urls) text += (text.empty() ? "" : "+") + url;
+  return text;
 }
 
 }  // namespace r4

@@ -5,6 +5,14 @@
 //
 // A range of nodes or of ports needs no braces. Of several braces the last counts fastest. A number that begins with 0
 // keeps its width: {07-12} is 07, 08 …
+//
+// And for those of several wires to one board (docs/redundancy.md):
+//
+//     serial:auto+udp://192.168.0.125          can://can0?node=0-7+can://can1?node=0-7
+//
+// A '+' joins only where the scheme of a URL and its colon follow; elsewhere it is a character as any other, and %2B is
+// one everywhere. Of patterns each part stands for as many: the first board has the first of each, and so on. A part that
+// is no pattern cannot lead to several boards.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +23,7 @@
 namespace r4 {
 
 struct PatternUrl {
-  std::string url;
+  std::string url;     // of several wires: joined
   std::string number;  // what the pattern has become, "7" or "3-7"; empty where the text is a URL
 };
 
@@ -25,5 +33,11 @@ constexpr std::size_t most_pattern_urls = 10'000;
 // What it stands for, in order; a URL stands for itself. Throws Error{usage} for braces and ranges that are none,
 // for more than most_pattern_urls, and for what is then no URL.
 std::vector<PatternUrl> expand_urls(std::string_view pattern);
+
+// The URLs of the wires that a text joins; of one URL that alone. They are not looked at.
+std::vector<std::string> split_wires(std::string_view text);
+std::string join_wires(const std::vector<std::string>& urls);
+// Has one of them that scheme?
+bool has_wire(std::string_view text, std::string_view scheme);
 
 }  // namespace r4

@@ -7,6 +7,7 @@
 #include <array>
 
 #include "../../protocol/messages/command_field.hpp"
+#include "../../transports/url_pattern.hpp"
 
 namespace r4 {
 
@@ -223,12 +224,14 @@ void require_any(const Setpoints& group) {
 }
 
 void require_cable(std::string_view url, std::string_view secret) {
-  for (const std::string_view own : {"serial:", "sim:", "memory:"}) {
-    if (url.starts_with(own)) return;
+  for (const std::string& wire : split_wires(url)) {
+    const bool own =
+        wire.starts_with("serial:") || wire.starts_with("sim:") || wire.starts_with("memory:");
+    if (own) continue;
+    throw Error(ErrorKind::usage, std::string(secret),
+                fmt::format("a board takes it over USB only, and at {} others would see it", wire),
+                "use serial:auto");
   }
-  throw Error(ErrorKind::usage, std::string(secret),
-              fmt::format("a board takes it over USB only, and at {} others would see it", url),
-              "use serial:auto");
 }
 
 void require_cable(std::string_view url, const Command& command) {

@@ -226,6 +226,7 @@ BoardHealth Fleet::Impl::health_of(std::size_t board) const {
   health.in_control = async.in_control();
   health.disarmed_by = async.disarmed_by();
   health.statistics = async.statistics();
+  if (std::vector<Wire> wires = async.wires(); wires.size() > 1) health.wires = std::move(wires);
   return health;
 }
 
@@ -365,7 +366,7 @@ Fleet::Impl::Start Fleet::Impl::start_of_stop() {
   std::random_device device;
   return
       [this, number = device() | 1U](std::size_t board, std::size_t, Duration left, BoundEnd end) {
-        const bool on_a_bus = urls[board].starts_with("can:");
+        const bool on_a_bus = has_wire(urls[board], "can");
         AsyncBoard& async = *boards[board];
         async.start_stop(left, async.make_completion(std::move(end)),
                          on_a_bus ? std::optional<std::uint32_t>(number) : std::nullopt);

@@ -54,7 +54,7 @@ class AsyncBoard {
   using Duration = std::chrono::milliseconds;
   using executor_type = asio::io_context::executor_type;
 
-  // Throws Error{usage} for a wrong URL. The io_context must outlive the board.
+  // Throws Error{usage} for a wrong URL. The io_context must outlive the board. '+' joins several wires to it.
   AsyncBoard(const executor_type& executor, std::string_view url, BoardOptions options = {});
   AsyncBoard(asio::io_context& io, std::string_view url, BoardOptions options = {})
       : AsyncBoard(io.get_executor(), url, std::move(options)) {}

@@ -104,9 +104,9 @@ class R4LINK_API Board {
   // Opens the transport and begins the link; returns without waiting for the board. Throws Error.
   explicit Board(std::string_view url, BoardOptions options = {}, BoardCallbacks callbacks = {});
   // Over several wires at once, up to four, all to the same board: {"serial:auto", "udp://192.168.0.125"}
-  // (docs/redundancy.md). Throws Error{usage} also for one that is there twice, and for sim: and replay:, which are
-  // boards of their own. A wire that cannot be opened yet is tried again every second, and on_event tells why; it
-  // throws if none can be opened.
+  // (docs/redundancy.md); in one text, wherever that is opened as a board, '+' joins them. Throws Error{usage} also
+  // for one that is there twice, and for sim: and replay:, which are boards of their own. A wire that cannot be
+  // opened yet is tried again every second, and on_event tells why; it throws if none can be opened.
   explicit Board(const std::vector<std::string>& urls, BoardOptions options = {},
                  BoardCallbacks callbacks = {});
   Board(std::initializer_list<std::string_view> urls, BoardOptions options = {},

@@ -61,6 +61,20 @@ def test_tells_of_boards_what_a_host_knows():
             metrics.until(lambda samples: sorted(each[('r4_up',)] for each in samples.values()) == [0, 1])
 
 
+def test_tells_of_each_of_several_wires(tmp_path):
+    with Board('udp://127.0.0.1:0', f'pty:{tmp_path}/board') as board:
+        with Metrics(f'{board.host_url}+serial://{tmp_path}/board') as metrics:
+            def of_the_wires(samples, name):
+                [one] = samples.values()
+                return [value for key, value in one.items() if key[0] == f'r4_wire_{name}']
+            samples = metrics.until(lambda samples: min(of_the_wires(samples, 'received_total'), default=0) > 10)
+            assert of_the_wires(samples, 'carrying') == [1, 1] and sum(of_the_wires(samples, 'copies_total')) > 0
+            for name in ('round_trip_seconds', 'age_seconds'):
+                assert len(of_the_wires(samples, name)) == 2 and min(of_the_wires(samples, name)) > 0
+            board.end()
+            metrics.until(lambda samples: sum(of_the_wires(samples, 'carrying')) < 2)
+
+
 def test_a_board_that_is_not_there_is_down():
     with Metrics('udp://127.0.0.1:9?listen=0') as metrics:
         (samples,) = metrics.read().values()

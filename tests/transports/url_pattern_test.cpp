@@ -54,6 +54,37 @@ TEST(UrlPattern, BracesHaveNumbersAndRangesAndTheLastCountsFastest) {
   EXPECT_EQ(expand_urls("udp://10.0.0.{1-250}")[6].number, "7");
 }
 
+TEST(UrlPattern, APlusJoinsWhereAUrlFollows) {
+  struct Joined {
+    const char* text;
+    std::vector<std::string> urls;
+  };
+  for (const auto& [text, urls] : std::vector<Joined>{
+           {"serial:auto", {"serial:auto"}},
+           {"serial:auto+udp://10.0.0.1", {"serial:auto", "udp://10.0.0.1"}},
+           {"can://can0?node=3&fd=1+can://can1?node=3+udp:auto",
+            {"can://can0?node=3&fd=1", "can://can1?node=3", "udp:auto"}},
+           {"serial:///dev/a+b", {"serial:///dev/a+b"}},
+           {"serial:///dev/a+b+serial:///dev/c+1:2",
+            {"serial:///dev/a+b", "serial:///dev/c+1:2"}},  // no scheme begins with a digit
+           {"serial:///dev/a%2Budp:b", {"serial:///dev/a%2Budp:b"}},
+           {"udp:?id=a+", {"udp:?id=a+"}},
+           {"udp:auto+serial:", {"udp:auto", "serial:"}},
+           {"+udp:auto", {"", "udp:auto"}},  // which Url refuses
+           {"", {""}},
+       }) {
+    EXPECT_EQ(split_wires(text), urls) << text;
+    EXPECT_EQ(join_wires(urls), text[0] == '+' ? text + 1 : text);
+  }
+}
+
+TEST(UrlPattern, WiresOfOneBoardAreJoinedAndEachBoardHasTheNextOfEach) {
+  EXPECT_EQ(urls_of("serial:auto+udp://10.0.0.1"), (Texts{"serial:auto+udp://10.0.0.1"}));
+  EXPECT_EQ(urls_of("can://can0?node=0-1+can://can1?node=2-3"),
+            (Texts{"can://can0?node=0+can://can1?node=2", "can://can0?node=1+can://can1?node=3"}));
+  EXPECT_EQ(expand_urls("can://can0?node=5-7+udp://arm-{1-3}")[2].number, "7");
+}
+
 TEST(UrlPattern, WhatIsNoneIsRefusedWithTheReason) {
   struct Refused {
     const char* pattern;
@@ -73,6 +104,8 @@ TEST(UrlPattern, WhatIsNoneIsRefusedWithTheReason) {
            Refused{"udp://10.{0-255}.{0-255}.1", "stands for more than 10000 boards"},
            Refused{"udp://arm-{0-4294967295}", "stands for more than 10000 boards"},
            Refused{"udp://127.0.0.1:65535-65536", "'65536' is not a port"},
+           Refused{"can://can0?node=0-7+serial:auto", "its wires lead to 8 and to 1 boards"},
+           Refused{"serial:auto+udp://arm-{1-3}", "its wires lead to 1 and to 3 boards"},
        }) {
     try {
       expand_urls(pattern);

@@ -275,6 +275,8 @@ void bind_board(py::module_& module) {
           "carrier_counters", [](PyBoard& board) { return board->carrier_counters(); }, Released())
       .def("name", [](PyBoard& board) { return board->name(); })
       .def(
+          "wires", [](PyBoard& board) { return board->wires(); }, Released())
+      .def(
           "record",
           [](PyBoard& board, const std::string& path, std::uint64_t rotate_bytes,
              std::int64_t rotate_after_s, std::uint64_t keep_bytes) {
@@ -314,6 +316,11 @@ void bind_board(py::module_& module) {
            [](PyBoard& board, py::object function) {
              return board.subscribe(std::move(function),
                                     [&](const Callback& each) { return board->on_event(each); });
+           })
+      .def("on_wire",
+           [](PyBoard& board, py::object function) {
+             return board.subscribe(std::move(function),
+                                    [&](const Callback& each) { return board->on_wire(each); });
            })
       .def("on_restart",
            [](PyBoard& board, py::object function) {

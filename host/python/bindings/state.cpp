@@ -208,6 +208,10 @@ Numbers numbers_from(F field, const py::handle& value) {
     case Form::number:
     case Form::fault:
       break;
+    case Form::reading:
+    case Form::answer:
+    case Form::bus:
+      return {};  // set_numbers() tells that
   }
   return {value.cast<std::int64_t>()};
 }

@@ -123,10 +123,30 @@ void bind_values(py::module_& module) {
       .has("lease", [](const LinkStatus& link) { return to_text(link.lease); })
       .has("in_control", &LinkStatus::in_control)
       .has("transport_down", &LinkStatus::transport_down)
+      .has("carrying",
+           [](const LinkStatus& link) {
+             py::list wires;
+             for (int i = 0; link.carrying >> i != 0; ++i) {
+               if ((link.carrying >> i & 1) != 0) wires.append(i);
+             }
+             return py::tuple(wires);
+           })
+      .has("two_boards", &LinkStatus::two_boards)
       .has("chip", [](const LinkStatus& link) -> py::object {
         if (!link.chip.any()) return py::none();
         return py::str("{}: {}").format(chip_name(link.chip.address), to_text(link.chip.trouble));
       });
+  Record<Wire>(module, "Wire")
+      .has("name", &Wire::name)
+      .has("state", [](const Wire& wire) { return to_text(wire.state); })
+      .has("busy", &Wire::busy)
+      .has("board_id", &Wire::board_id)
+      .has("received", [](const Wire& wire) { return wire.packets.received; })
+      .has("lost", [](const Wire& wire) { return wire.packets.lost; })
+      .has("loss", [](const Wire& wire) { return wire.loss(); })
+      .has("copies", &Wire::copies)
+      .has("round_trip_us", &Wire::round_trip_us)
+      .has("age_us", &Wire::age_us);
   Record<BoardIdentity>(module, "Identity")
       .has("firmware", &BoardIdentity::firmware)
       .has("board_id", &BoardIdentity::board_id)

@@ -2,7 +2,7 @@
 """R4 link: the R4 robot control board over UDP, USB serial and CAN (docs/python.md)."""
 from . import aio, control
 from ._core import (FIELDS, BoardHealth, CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State,
-                    Statistics, Subscription, __version__)
+                    Statistics, Subscription, Wire, __version__)
 from .board import (BldcChannel, Board, DriveChannel, I2c, RelayChannel, ServoChannel, Setpoints, States, StepperChannel)
 from .bridge import Bridge, BridgeCounters, BridgeEnd, BridgeStatus
 from .errors import (CancelledError, ClosedError, DataError, DeniedError, Error, NotArmedError, NotConfirmedError,
@@ -22,6 +22,6 @@ __all__ = [
     'I2cBusReport', 'I2cReading', 'Identity', 'LinkStatus', 'LinkedUrl', 'Log', 'Look', 'NotArmedError',
     'NotConfirmedError', 'OpenError', 'PostResult', 'REVERSE', 'RecordedBoard', 'RecordedDatagram', 'RecordedEvent',
     'Recording', 'RefusedError', 'RefusedPost', 'RelayChannel', 'ServoChannel', 'Setpoints', 'SimBoard', 'State',
-    'States', 'Statistics', 'StepperChannel', 'Subscription', 'UnsupportedError', 'UsageError', 'aio', 'control',
+    'States', 'Statistics', 'StepperChannel', 'Subscription', 'UnsupportedError', 'UsageError', 'Wire', 'aio', 'control',
     'read', 'with_link', '__version__',
 ]

@@ -35,10 +35,44 @@ class LinkStatus(_Record):
     @property
     def in_control(self) -> bool: ...
     @property
-    def transport_down(self) -> bool: ...
+    def transport_down(self) -> bool:
+        """Of several wires: all are."""
+    @property
+    def carrying(self) -> tuple[int, ...]:
+        """Of several wires those that carry, from 0."""
+    @property
+    def two_boards(self) -> bool:
+        """A wire leads to another board than the rest."""
     @property
     def chip(self) -> str | None:
         """Of a fault: the chip and its trouble."""
+
+class Wire(_Record):
+    @property
+    def name(self) -> str: ...
+    @property
+    def state(self) -> str:
+        """'down', 'asking', 'other board', 'silent', 'carrying'."""
+    @property
+    def busy(self) -> bool: ...
+    @property
+    def board_id(self) -> str:
+        """Of several wires: who answered there last."""
+    @property
+    def received(self) -> int: ...
+    @property
+    def lost(self) -> int: ...
+    @property
+    def loss(self) -> float: ...
+    @property
+    def copies(self) -> int:
+        """What another wire had brought before."""
+    @property
+    def round_trip_us(self) -> float:
+        """0: not known yet."""
+    @property
+    def age_us(self) -> float:
+        """Since the newest datagram; 0: none yet."""
 
 class Identity(_Record):
     @property
@@ -414,6 +448,7 @@ class Board:
     def statistics(self) -> Statistics: ...
     def carrier_counters(self) -> CarrierCounters: ...
     def name(self) -> str: ...
+    def wires(self) -> list[Wire]: ...
     @overload
     def record(self, path: str, rotate_bytes: int, rotate_after: int, keep_bytes: int, /) -> None: ...
     @overload
@@ -427,6 +462,7 @@ class Board:
     def on_state(self, callback: Callable[[State], object], /) -> Subscription: ...
     def on_link(self, callback: Callable[[LinkStatus], object], /) -> Subscription: ...
     def on_event(self, callback: Callable[[Event], object], /) -> Subscription: ...
+    def on_wire(self, callback: Callable[[Wire], object], /) -> Subscription: ...
     def on_restart(self, callback: Callable[[], object], /) -> Subscription: ...
     def on_arming(self, callback: Callable[[str], object], /) -> Subscription: ...
     def on_refused(self, callback: Callable[[RefusedPost], object], /) -> Subscription: ...
@@ -460,6 +496,9 @@ class BoardHealth:
     def disarmed_by(self) -> str: ...
     @property
     def statistics(self) -> Statistics: ...
+    @property
+    def wires(self) -> list[Wire]:
+        """Of several; of one alone it is empty."""
     @property
     def well(self) -> bool:
         """ACTIVE and in control: commands go out."""

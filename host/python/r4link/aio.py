@@ -19,11 +19,11 @@ import threading
 import weakref
 from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
-from typing import Any, Callable, Self, Type, TypeVar
+from typing import Any, Callable, Iterable, Self, Type, TypeVar
 
 from . import board as blocking
 from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State, Statistics,
-                    Subscription)
+                    Subscription, Wire)
 from .board import Setpoints
 from .values import Direction, PostResult
 
@@ -191,7 +191,7 @@ class I2c:
 class Board:
     """r4link.Board for asyncio; takes the same options. What does not wait is no coroutine there either."""
 
-    def __init__(self, url: str, **options: Any) -> None:
+    def __init__(self, url: str | Iterable[str], **options: Any) -> None:
         self._board = blocking.Board(url, **options)
         interrupt = self._board._core.interrupt
         self._commands = _Lane(interrupt)
@@ -303,6 +303,10 @@ class Board:
     def name(self) -> str:
         return self._board.name
 
+    @property
+    def wires(self) -> list[Wire]:
+        return self._board.wires
+
     def states(self, most: int | None = None, *, lossless: bool = False) -> States:
         """The states from now on, until the board is closed: as those of r4link.Board."""
         news = asyncio.Event()
@@ -317,6 +321,9 @@ class Board:
 
     def on_link(self, callback: Callable[[LinkStatus], object]) -> Subscription:
         return self._board.on_link(_on_loop(callback))
+
+    def on_wire(self, callback: Callable[[Wire], object]) -> Subscription:
+        return self._board.on_wire(_on_loop(callback))
 
     def on_event(self, callback: Callable[[Event], object]) -> Subscription:
         return self._board.on_event(_on_loop(callback))

@@ -26,6 +26,7 @@
 #include "transports/serial/port_list.hpp"
 #include "transports/serial/serial_carrier.hpp"
 #include "transports/url.hpp"
+#include "transports/url_pattern.hpp"
 #include "udev_rules.hpp"
 
 namespace r4::tool {
@@ -214,7 +215,11 @@ void print_summary(const Findings& findings, bool json) {
   }
 }
 
-int doctor(const Options& options) {
+// Each wire is a link of its own here.
+int doctor(const Options& given) {
+  Options options = given;
+  options.urls = split_wires(join_wires(given.urls));
+  if (given.urls.empty()) options.urls.clear();
   if (options.udev_rules) {
     print_text(udev_rules);
     return 0;

@@ -19,6 +19,7 @@
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
+#include "../shell/wires.hpp"
 #include "host/commands/command_help.hpp"
 #include "host/session/limits.hpp"
 #include "protocol/datagram/numbers.hpp"
@@ -140,9 +141,13 @@ class Sender {
     const Subscription states = board_.on_state([this](const ReceivedState&, const Datagram&) {
       if (waiting_ && is_answered(*waiting_)) tell(*std::exchange(waiting_, std::nullopt));
     });
+    const Subscription refused = board_.on_link([this](const LinkStatus& link) {
+      if (leads_to_two_boards(link)) io_.stop();
+    });
     board_.open();
     send_next();
     io_.run();
+    require_one_board(board_);
     say_farewell(io_, board_);
     if (failure_) throw Error(*failure_);
     return 0;
@@ -314,10 +319,11 @@ class Sender {
   std::optional<Problem> failure_;
 };
 
-int send(const Options& options) {
+int send(const Options& given) {
+  Options options = given;
+  take_wires(options.url, options.commands, "CMD");
   std::vector<Order> orders;
   for (const std::string& text : options.commands) {
-    if (is_url(text)) one_url({options.url, text});
     orders.push_back(order_of(text, options.url));
   }
   for (std::size_t i = 0; i < orders.size(); ++i) {
@@ -341,6 +347,7 @@ Examples:
   r4 send udp://192.168.0.125 R:1,On O:358,1,1 --hold 5      R:1,On: the motors have supply
   r4 send serial:auto R:1,On D:1000,1,1 S:1500,3 R:2,On --hold 60
   r4 send serial:auto R:1,On 'O:358,1,1;O:358,1,2' --hold 5  both wheels at once
+  r4 send serial:auto udp://192.168.0.125 S:1500,3 --hold 60  two wires: either may be pulled
   r4 send serial:auto E:CLEAR                 after an emergency stop
   r4 send serial:auto C:timeout,300 C:heartbeat,100     side by side: one step, in any order
   r4 send udp://127.0.0.1 Q:ID                who is it?

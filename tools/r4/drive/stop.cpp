@@ -20,6 +20,7 @@
 #include "r4link/link.hpp"
 #include "transports/udp/udp_url.hpp"
 #include "transports/url.hpp"
+#include "transports/url_pattern.hpp"
 
 namespace r4::tool {
 namespace {
@@ -31,14 +32,19 @@ struct Options {
   bool json = false;
 };
 
+// Beside whatever program controls the board, and on ways of its own where there are any: that may hang.
 std::unique_ptr<AsyncBoard> open(asio::io_context& io, const std::string& url) {
-  // Beside whatever program controls the board, and on a way of its own where there is one: that may hang.
-  BoardOptions watching;
-  watching.role = BoardRole::watch;
-  const bool only_way = Url::parse(url).scheme() == "serial";
-  auto board = only_way ? std::make_unique<AsyncBoard>(io, url, watching)
-                        : std::make_unique<AsyncBoard>(
-                              io, standard_registry().make(io, with_any_port(url), Role::host));
+  BoardOptions options;
+  auto wires = make_host_carriers(io, {url}, BoardRole::watch);
+  const std::vector<std::string> urls = split_wires(url);
+  for (std::size_t i = 0; i < urls.size(); ++i) {
+    if (Url::parse(urls[i]).scheme() == "serial") {
+      options.role = BoardRole::watch;
+    } else {
+      wires[i] = standard_registry().make(io, with_any_port(urls[i]), Role::host);
+    }
+  }
+  auto board = std::make_unique<AsyncBoard>(io, std::move(wires), options);
   try {
     board->open();
   } catch (const Error& error) {
@@ -57,14 +63,14 @@ void print_confirmed(const Options& options, const CommandResult& result) {
     fmt::print(
         "stopped: the board reports SAFE (stop), after {:.1f} ms\n"
         "it stays so until: r4 send {} E:CLEAR\n",
-        ms, one_url(options.urls));
+        ms, join_wires(options.urls));
     std::fflush(stdout);
   }
 }
 
 int stop(const Options& options) {
   asio::io_context io(1);
-  const std::string& url = one_url(options.urls);
+  const std::string url = join_wires(options.urls);
   const std::unique_ptr<AsyncBoard> board = open(io, url);
   std::optional<CommandResult> result;
   asio::steady_timer repeating(io);
@@ -78,6 +84,7 @@ int stop(const Options& options) {
   });
   io.run();
   const LinkStatus link = board->link();
+  const std::vector<Wire> wires = board->wires();
   board->close();
   if (!result || result->outcome != Outcome::confirmed) {
     Problem problem = explain(fmt::format("E:STOP to {}", board->name()), link);
@@ -87,19 +94,21 @@ int stop(const Options& options) {
                                       : fmt::format("{}; {}", stop_last_resort, problem.fix);
     throw Error(problem);
   }
+  // The stop went to both, and one has confirmed it.
+  if (link.two_boards) throw Error(explain(wires));
   return 0;
 }
 
 constexpr const char* footer =
     R"(Works whoever controls the board, and without waiting for a link: the stop is repeated every 20 ms
 until the board reports that it has obeyed this one, and for a moment longer. It stays stopped until
-E:CLEAR.
+E:CLEAR. By several wires to the board one that works is enough.
 
 Examples:
   r4 stop udp://192.168.0.125
-  r4 stop serial:auto
+  r4 stop serial:auto udp://192.168.0.125
 
-Exit codes: 0 the board reports that it has stopped; 3 it did not confirm: cut the power; 4, 5 the
+Exit codes: 0 the board reports that it has stopped; 3 it did not confirm: cut the power, or the URLs lead to two boards; 4, 5 the
 transport cannot be opened: cut the power.)";
 
 }  // namespace
@@ -108,7 +117,7 @@ void add_stop(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<Options>();
   CLI::App* const command = add_subcommand(
       root, chosen, "stop", "Emergency stop: all outputs off, now", footer, options, stop);
-  add_urls(*command, options->urls);
+  add_wires(*command, options->urls);
   add_seconds(*command, "--timeout", options->timeout,
               "how long to repeat it for a confirmation (default 2); it is sent in any case",
               Zero::allowed);

@@ -20,6 +20,7 @@
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
+#include "../shell/wires.hpp"
 #include "host/standard_registry.hpp"
 #include "limits.hpp"
 #include "r4link/async_board.hpp"
@@ -60,7 +61,8 @@ BoardOptions board_options(const Options& options) {
 
 // can://can0, without a node: all boards that are heard on it.
 bool is_whole_bus(const std::string& text) {
-  return Url::parse(text).scheme() == "can" && text.find('?') == std::string::npos;
+  return split_wires(text).size() == 1 && Url::parse(text).scheme() == "can" &&
+         text.find('?') == std::string::npos;
 }
 
 // Tells the nodes of the boards on a bus, when they are heard first.
@@ -131,6 +133,7 @@ class Recorders {
     }
     for (const auto& bus : buses_) bus->require_boards();
     for (const auto& board : boards_) {
+      require_one_board(*board);
       if (board->statistics().received == 0) throw Error(explain(board->name(), board->link()));
     }
     return 0;
@@ -138,9 +141,9 @@ class Recorders {
 
  private:
   void add(const std::string& url) {
-    std::unique_ptr<Carrier> carrier = make_host_carrier(io_, url, BoardRole::watch);
-    carrier->gather();
-    boards_.push_back(std::make_unique<AsyncBoard>(io_, std::move(carrier), board_options_));
+    auto carriers = make_host_carriers(io_, {url}, BoardRole::watch);
+    for (const auto& carrier : carriers) carrier->gather();
+    boards_.push_back(std::make_unique<AsyncBoard>(io_, std::move(carriers), board_options_));
   }
   void open(AsyncBoard& board) {
     board.on_event([this](const CarrierEvent&) {
@@ -174,6 +177,7 @@ A recording that is there goes on at its end. A crash costs at most the last sec
 Examples:
   r4 record udp://192.168.0.125 -o drive.r4log
   r4 record serial:auto 'can://can0?node=3' -o drive.r4log.zst --for 60
+  r4 record serial:auto+udp://192.168.0.125 -o drive.r4log    one board, by both wires
   r4 record can://can0 -o bus.r4log     every board that is heard on the bus
   r4 record 'udp://10.0.0.{1-30}?listen=0' -o lab.r4log.zst     thirty boards
   r4 record udp:auto -o /var/log/robot.r4log.zst --rotate 1h --rotate 100M --keep 2G
@@ -190,7 +194,7 @@ void add_record(CLI::App& root, Action& chosen) {
   CLI::App* const command =
       add_subcommand(root, chosen, "record", "Write down what is said, in both directions", footer,
                      options, record);
-  add_urls(*command, options->urls);
+  add_boards(*command, options->urls);
   add_text(*command, "-o,--output", options->file, "the recording", file_type, Need::required);
   add_seconds(*command, "--for", options->duration, "end after that time");
   add_repeated(*command, "--rotate", options->rotate,

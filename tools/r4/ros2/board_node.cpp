@@ -58,6 +58,11 @@ void BoardNode::connect() {
     if (event.kind == CarrierEvent::Kind::up) return;
     log(LogLevel::warning, event.problem.text());
   });
+  board_.on_wire([this](const Wire& wire) {
+    log(wire.state == WireState::carrying ? LogLevel::info : LogLevel::warning,
+        fmt::format("wire {}: {}", wire.name, to_text(wire.state)));
+    tell_health();
+  });
   board_.on_restart([this] { log(LogLevel::warning, "the board has begun again"); });
   board_.on_arming([this](DisarmCause cause) {
     if (cause == DisarmCause::none) {
@@ -127,10 +132,26 @@ Health BoardNode::health() const {
     health.level = Health::ok;
     health.message = "armed";
   }
+  // One fault more, and the board is lost.
+  const std::vector<Wire> wires = board_.wires();
+  for (const Wire& wire : wires) {
+    if (wires.size() < 2 || wire.state == WireState::carrying || health.level > Health::warning)
+      continue;
+    health.level = Health::warning;
+    health.message += fmt::format("; wire {}: {}", wire.name, to_text(wire.state));
+  }
   const auto add = [&health](const char* key, std::string value) {
     health.values.emplace_back(key, std::move(value));
   };
   add("url", board_.name());
+  for (const Wire& wire : wires) {
+    if (wires.size() < 2) break;
+    health.values.emplace_back(
+        "wire " + wire.name,
+        fmt::format("{}, loss {:.3f} %, round trip {:.2f} ms, age {:.0f} ms, copies {}",
+                    to_text(wire.state), wire.loss() * 100, wire.round_trip_us / 1e3,
+                    wire.age_us / 1e3, wire.copies));
+  }
   add("name", who.name);
   add("firmware", who.firmware);
   add("link", to_text(link.state));

@@ -24,7 +24,6 @@
 #include "graph/outbox.hpp"
 #include "protocol/messages/command_field.hpp"
 #include "r4link/error.hpp"
-#include "transports/url.hpp"
 #include "transports/url_pattern.hpp"
 
 namespace r4::tool::ros2 {
@@ -155,7 +154,7 @@ class Bridge {
  private:
   void add(const NamedUrl& named, NodeOptions shown) {
     BoardOptions board_options = with_key(options_.key);
-    const bool bus = Url::parse(named.url).scheme() == "can";
+    const bool bus = has_wire(named.url, "can");
     board_options.session.fields = !options_.fields.empty() ? options_.fields
                                    : bus                    ? "DEFAULT"
                                                             : component_fields;

@@ -67,11 +67,14 @@ CLI::Option* number(CLI::App& command, const std::string& name, Out& out, std::u
 }
 
 template <class Out>
-CLI::Option* url(CLI::App& command, Out& out) {
-  return command.add_option("URL", out, "where the board is, such as udp://192.168.0.125")
-      ->required()
-      ->type_name(url_type);
+CLI::Option* url(CLI::App& command, Out& out, const char* meaning) {
+  return command.add_option("URL", out, meaning)->required()->type_name(url_type);
 }
+
+constexpr const char* wires_meaning =
+    "where the board is, such as udp://192.168.0.125; several are wires to that one board";
+constexpr const char* boards_meaning =
+    "where boards are, such as udp://192.168.0.125; a + joins the wires to one of them";
 
 }  // namespace
 
@@ -129,9 +132,28 @@ CLI::Option* add_json(CLI::App& command, bool& out, const std::string& meaning) 
   return command.add_flag("--json", out, meaning);
 }
 
-CLI::Option* add_url(CLI::App& command, std::string& out) { return url(command, out); }
-CLI::Option* add_urls(CLI::App& command, std::vector<std::string>& out) {
-  return url(command, out);
+CLI::Option* add_wires(CLI::App& command, std::vector<std::string>& out) {
+  return url(command, out, wires_meaning);
+}
+CLI::Option* add_boards(CLI::App& command, std::vector<std::string>& out) {
+  return url(command, out, boards_meaning);
+}
+
+CLI::Option* add_url(CLI::App& command, std::string& out) {
+  return url(command, out, wires_meaning);
+}
+void take_wires(std::string& url, std::vector<std::string>& words, const std::string& what) {
+  const auto is = [](const std::string& word) { return is_url(word); };
+  const auto first = std::find_if_not(words.begin(), words.end(), is);
+  for (auto word = words.begin(); word != first; ++word) url += "+" + *word;
+  words.erase(words.begin(), first);
+  if (words.empty()) {
+    throw Error(ErrorKind::usage, what, "is missing", "name it behind " + url);
+  }
+  const auto late = std::find_if(words.begin(), words.end(), is);
+  if (late == words.end()) return;
+  throw Error(ErrorKind::usage, *late, "a URL cannot stand behind " + words.front(),
+              "write all wires to the board in front");
 }
 
 bool is_url(std::string_view text) {
@@ -139,14 +161,6 @@ bool is_url(std::string_view text) {
   return std::any_of(entries.begin(), entries.end(), [&](const Registry::Entry& entry) {
     return text.starts_with(entry.scheme + ":");
   });
-}
-
-const std::string& one_url(const std::vector<std::string>& urls) {
-  if (urls.size() > 1) {
-    throw Error(ErrorKind::usage, urls[1], "one session over several links is not supported yet",
-                "give one URL");
-  }
-  return urls.front();
 }
 
 CLI::Option* add_fields(CLI::App& command, std::string& out, const std::string& meaning) {

@@ -90,11 +90,11 @@ std::vector<Plan> plans_of(const Options& options) {
     std::vector<Plan> plans;
     plans.reserve(urls.size());
     for (PatternUrl& each : urls) {
-      plans.push_back({{std::move(each.url)}, id + "-" + each.number, plans.size()});
+      plans.push_back({split_wires(each.url), id + "-" + each.number, plans.size()});
     }
     return plans;
   }
-  return {{options.urls, options.board_id.empty() ? "sim-1" : options.board_id, 0}};
+  return {{split_wires(join_wires(options.urls)), options.board_id.empty() ? "sim-1" : options.board_id, 0}};
 }
 
 // Each board has files of the system open, and by default a program may have 1024.

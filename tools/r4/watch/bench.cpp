@@ -21,9 +21,11 @@
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
+#include "../shell/wires.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/error.hpp"
 #include "r4link/link.hpp"
+#include "transports/url_pattern.hpp"
 
 namespace r4::tool {
 namespace {
@@ -71,7 +73,7 @@ class Bench {
  public:
   explicit Bench(const Options& options)
       : options_(options),
-        board_(io_, one_url(options.urls), board_options(options.key)),
+        board_(io_, join_wires(options.urls), board_options(options.key)),
         timer_(io_),
         pause_(io_) {}
 
@@ -109,6 +111,7 @@ class Bench {
     const Clock::time_point start = Clock::now();
     run_for(connect_timeout);
     waiting.cancel();
+    require_one_board(board_);
     if (!board_.in_control()) throw Error(explain(board_.name(), board_.link()));
     connect_us_ = std::chrono::duration<double, std::micro>(Clock::now() - start).count();
   }
@@ -277,7 +280,7 @@ void add_bench(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<Options>();
   CLI::App* const command =
       add_subcommand(root, chosen, "bench", "Measure the link to a board", footer, options, bench);
-  add_urls(*command, options->urls);
+  add_wires(*command, options->urls);
   add_seconds(*command, "--duration", options->duration, "how long to measure (default 5)");
   add_key(*command, options->key);
   add_json(*command, options->json, "print JSON");

@@ -18,6 +18,31 @@ MetricLabels with(MetricLabels labels, const char* name, std::string value) {
   return labels;
 }
 
+// Of several wires to a board each one.
+void describe_wires(const AsyncBoard& board, const MetricLabels& one, MetricFamilies& out) {
+  const std::vector<Wire> wires = board.wires();
+  if (wires.size() < 2) return;
+  for (const Wire& wire : wires) {
+    const MetricLabels labels = with(one, "wire", wire.name);
+    out.gauge("r4_wire_carrying", "Of several wires to the board, does this one carry?", labels,
+              wire.state == WireState::carrying ? 1 : 0);
+    out.count("r4_wire_received_total", "Datagrams of the board by this wire.", labels,
+              wire.packets.received);
+    out.count("r4_wire_lost_total", "Those that never came by it.", labels, wire.packets.lost);
+    out.count("r4_wire_copies_total", "Those that another wire had brought before.", labels,
+              wire.copies);
+    if (wire.round_trip_us > 0) {
+      out.gauge("r4_wire_round_trip_seconds",
+                "From the newest question on this wire to its answer.", labels,
+                wire.round_trip_us / 1e6);
+    }
+    if (wire.age_us > 0) {
+      out.gauge("r4_wire_age_seconds", "Since the newest datagram by this wire.", labels,
+                wire.age_us / 1e6);
+    }
+  }
+}
+
 }  // namespace
 
 void describe(const AsyncBoard& board, MetricFamilies& out) {
@@ -52,6 +77,7 @@ void describe(const AsyncBoard& board, MetricFamilies& out) {
             carrier.rx_bytes);
   out.count("r4_transport_bytes_total", "", with(one, "direction", "sent"), carrier.tx_bytes);
   out.count("r4_transport_downs_total", "Times the transport was lost.", one, carrier.downs);
+  describe_wires(board, one, out);
   if (!up) return;
   out.gauge("r4_state_rate_hertz", "States a second, over the last.", one,
             statistics.state_rate_hz);

@@ -30,7 +30,7 @@ void add_metrics(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<MetricsOptions>();
   CLI::App* const command = add_subcommand(root, chosen, "metrics", "Tell Prometheus of boards",
                                            footer, options, serve_metrics);
-  add_urls(*command, options->urls);
+  add_boards(*command, options->urls);
   add_text(*command, "--listen", options->listen, "where it answers (default 127.0.0.1:9618)",
            "HOST:PORT");
   add_seconds(*command, "--for", options->duration, "end after that time");

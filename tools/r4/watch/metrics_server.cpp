@@ -132,8 +132,10 @@ class MetricsServer {
       for (const PatternUrl& each : expand_urls(pattern)) {
         boards_.push_back(std::make_unique<AsyncBoard>(io_, each.url, board_options));
         metrics_->add(*boards_.back());
-        const Url url = Url::parse(each.url);
-        if (url.scheme() == "can") interfaces_.try_emplace(can_interface_of(url));
+        for (const std::string& wire : split_wires(each.url)) {
+          const Url url = Url::parse(wire);
+          if (url.scheme() == "can") interfaces_.try_emplace(can_interface_of(url));
+        }
       }
     }
   }

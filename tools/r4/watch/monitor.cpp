@@ -18,6 +18,7 @@
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
+#include "../shell/wires.hpp"
 #include "monitor_boards.hpp"
 #include "monitor_bus.hpp"
 #include "monitor_view.hpp"
@@ -81,6 +82,7 @@ class Monitor {
                  skipped);
     }
     const Statistics statistics = board_.statistics();
+    require_one_board(board_);
     say_farewell(io_, board_);
     view_.reset();
     if (statistics.received == 0) throw silence(statistics);
@@ -98,8 +100,12 @@ class Monitor {
     board_.on_bad_datagram([this](const ReadResult& result, std::string_view bytes) {
       view_->on_bad_datagram(result, bytes);
     });
-    board_.on_link([this](const LinkStatus& status) { view_->on_link(status); });
+    board_.on_link([this](const LinkStatus& status) {
+      view_->on_link(status);
+      if (leads_to_two_boards(status)) io_.stop();
+    });
     board_.on_event([this](const CarrierEvent& event) { view_->on_event(event); });
+    board_.on_wire([this](const Wire& wire) { view_->on_wire(wire); });
   }
 
   void end_after(Milliseconds time) {
@@ -142,6 +148,7 @@ class Monitor {
 
 // can://can0 and nothing else: all boards.
 bool is_whole_bus(const std::string& text) {
+  if (split_wires(text).size() > 1) return false;
   const Url url = Url::parse(text);
   return url.scheme() == "can" && text.find('?') == std::string::npos;
 }
@@ -179,9 +186,13 @@ the board is ACTIVE. It goes on when the transport is lost and comes back. On a 
 no host controls streams five times a second; without a node it only listens, and shows every board that it
 hears. Of several boards, by URLs or a pattern, it is a table, or the JSON of each.
 
+Where + joins several wires to a board, it has a line for each of them, and one when a wire begins to carry or
+ceases to; in JSON of type wire, also at the end.
+
 Examples:
   r4 monitor udp://192.168.0.125
   r4 monitor serial:auto --fields DEFAULT,ENC1,US1
+  r4 monitor serial:auto+udp://192.168.0.125    one board by two wires
   r4 monitor 'udp:?id=left-arm'         the board of that name, wherever it is; r4 list shows them
   r4 monitor can://can0                 every board on the bus; can://can0?node=3 is one
   r4 monitor 'udp://10.0.0.{1-30}?listen=0'   thirty boards
@@ -196,7 +207,7 @@ void add_monitor(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<Options>();
   CLI::App* const command = add_subcommand(root, chosen, "monitor", "Show what a board says, live",
                                            footer, options, monitor);
-  add_urls(*command, options->urls);
+  add_boards(*command, options->urls);
   add_json(*command, options->json, "print JSON, one object a line");
   add_number(*command, "--count", options->count, 1, ~std::uint64_t{0},
              "end after that many states (or 5 s in which nothing at all is heard)");

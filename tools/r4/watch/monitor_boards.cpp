@@ -15,6 +15,7 @@
 
 #include "../shell/line_writer.hpp"
 #include "../shell/screen.hpp"
+#include "../shell/wires.hpp"
 #include "monitor_view.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/error.hpp"
@@ -39,6 +40,17 @@ struct ShownBoard {
   std::unique_ptr<MonitorView> view;  // of its JSON
   std::string note;                   // of its transport
 };
+
+// "; udp://10.0.0.7:2018: silent", of several those that do not carry.
+std::string lost_wires(const AsyncBoard& board) {
+  const std::vector<Wire> wires = board.wires();
+  std::string text;
+  for (const Wire& wire : wires) {
+    if (wires.size() < 2 || wire.state == WireState::carrying) continue;
+    text += fmt::format("; {}: {}", wire.name, to_text(wire.state));
+  }
+  return text;
+}
 
 class BoardsMonitor {
  public:
@@ -68,6 +80,7 @@ class BoardsMonitor {
     show();
     leave();
     for (const auto& board : boards_) {
+      require_one_board(board->board);
       if (board->board.statistics().received != 0) continue;
       Problem problem = explain(board->url, board->board.link());
       problem.thing = board->url;
@@ -87,6 +100,7 @@ class BoardsMonitor {
         view.on_bad_datagram(result, bytes);
       });
       board.on_link([&view](const LinkStatus& status) { view.on_link(status); });
+      board.on_wire([&view](const Wire& wire) { view.on_wire(wire); });
     }
     board.on_state([this, &one](const ReceivedState& state, const Datagram& datagram) {
       if (io_.stopped()) return;  // what came together with the last one
@@ -131,9 +145,10 @@ class BoardsMonitor {
       active += well ? 1 : 0;
       rate += statistics.state_rate_hz;
       rows.emplace_back(
-          well, fmt::format("{:<{}}  {:>7.1f} {:>8} {:>8}  {}{}{}", one->url, width,
+          well, fmt::format("{:<{}}  {:>7.1f} {:>8} {:>8}  {}{}{}{}", one->url, width,
                             statistics.state_rate_hz, statistics.packets.lost, statistics.damaged,
-                            link_text(link), one->note.empty() ? "" : "; ", one->note));
+                            link_text(link), one->note.empty() ? "" : "; ", one->note,
+                            lost_wires(one->board)));
     }
     if (live_) {
       std::stable_partition(rows.begin(), rows.end(), [](const auto& row) { return !row.first; });

@@ -7,9 +7,11 @@
 #include <cmath>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "../shell/json.hpp"
 #include "../shell/line_writer.hpp"
+#include "../shell/wires.hpp"
 #include "host/commands/command_help.hpp"
 #include "protocol/link/host_link.hpp"
 #include "r4link/link.hpp"
@@ -61,6 +63,7 @@ class JsonView final : public MonitorView {
                 {"gated", status.gated()}};
     if (status.key != KeyTrouble::none) fields["key"] = to_text(status.key);
     if (status.lease != LeaseTrouble::none) fields["lease"] = to_text(status.lease);
+    if (Json wires = wires_json(board_); !wires.is_null()) fields["wires"] = std::move(wires);
     lines_.write(line_of(object("link", std::move(fields))));
   }
   void on_event(const CarrierEvent& event) override {
@@ -72,7 +75,14 @@ class JsonView final : public MonitorView {
     }
     on_link(board_.link());
   }
+  void on_wire(const Wire& wire) override {
+    lines_.write(line_of(object("wire", wire_json(wire))));
+  }
   void on_end() override {
+    const std::vector<Wire> wires = board_.wires();
+    for (const Wire& wire : wires) {
+      if (wires.size() > 1) on_wire(wire);
+    }
     Json transfers = transfers_json(board_.carrier_counters());
     if (!transfers.is_null()) lines_.write(line_of(object("transfers", std::move(transfers))));
   }
@@ -131,6 +141,9 @@ class PlainView final : public MonitorView {
       lines_.write(event.problem.text() + "\n");
     }
   }
+  void on_wire(const Wire& wire) override {
+    lines_.write(fmt::format("wire {}: {}\n", wire.name, to_text(wire.state)));
+  }
   std::uint64_t skipped() const override { return lines_.lost(); }
 
  private:
@@ -165,6 +178,7 @@ std::string link_text(const LinkStatus& status) {
       break;
   }
   if (status.busy) text += ", another host controls the board";
+  if (status.two_boards) text += ", its wires lead to two boards";
   if (status.gated()) text += ", our heartbeats are stopped";
   if (status.key != KeyTrouble::none) text += ", " + explain(status.key).text();
   if (status.lease != LeaseTrouble::none) text += ", " + explain(status.lease).text();

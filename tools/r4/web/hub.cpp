@@ -11,7 +11,7 @@
 #include "host/commands/command_help.hpp"
 #include "r4link/error.hpp"
 #include "r4link/setpoints.hpp"
-#include "transports/url.hpp"
+#include "transports/url_pattern.hpp"
 
 namespace r4::tool::web {
 namespace {
@@ -34,7 +34,7 @@ std::int64_t wall_ms() {
 
 BoardOptions options_for(const std::string& url, const HubOptions& options) {
   BoardOptions board = options.board;
-  const bool bus = Url::parse(url).scheme() == "can";
+  const bool bus = has_wire(url, "can");
   board.session.fields = !options.fields.empty() ? options.fields : bus ? "DEFAULT" : "ALL";
   return board;
 }

@@ -102,7 +102,7 @@ void add_web(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<Options>();
   CLI::App* const command =
       add_subcommand(root, chosen, "web", "Boards in a browser", footer, options, serve_web);
-  add_urls(*command, options->urls);
+  add_boards(*command, options->urls);
   add_text(*command, "--listen", options->listen, "where it answers (default 127.0.0.1:8080)",
            "ADDRESS:PORT");
   add_flag(*command, "--token", options->token,

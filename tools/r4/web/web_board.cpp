@@ -138,6 +138,12 @@ void WebBoard::connect() {
     if (event.kind != CarrierEvent::Kind::up) say(Level::warning, event.problem.text());
     events_.on_change(number_);
   });
+  board_->on_wire([this](const Wire& wire) {
+    const bool carries = wire.state == WireState::carrying;
+    say(carries ? Level::info : Level::warning,
+        fmt::format("wire {}: {}", wire.name, to_text(wire.state)));
+    events_.on_change(number_);
+  });
   board_->on_restart([this] { say(Level::warning, "the board has begun again"); });
   board_->on_arming([this](DisarmCause cause) {
     if (cause == DisarmCause::none) {

@@ -1,0 +1,236 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Several wires to one board, as real ones: two UDP paths and a pty, pulled and plugged in while a host drives."""
+import contextlib
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from r4_process import (ERROR, PATIENCE_S, SANITIZED, Board, Running, is_link, is_state, lasts, monitor, objects, run,
+                        text_of)
+
+RELAY = pathlib.Path(__file__).resolve().parents[1] / 'support' / 'wire_relay.py'
+REPORTED_WITHIN_S = 10 if SANITIZED else 0.05  # where the system tells
+TIMEOUT_S = 1  # where it does not
+BACK_WITHIN_S = 10 if SANITIZED else 1
+LONGEST_GAP_S = 1 if SANITIZED else 0.1  # of the machine, which has others to serve: states come every 10 ms
+
+
+class Wire:
+    """A wire of its own to a board; `url` is its host's end."""
+
+    def __init__(self, kind, *where):
+        self.kind, self.where = kind, where
+        self.process = self.url = None
+        self.plug_in()
+
+    def plug_in(self):
+        self.process = subprocess.Popen([sys.executable, '-S', RELAY, self.kind, *self.where], stdout=subprocess.PIPE,
+                                        text=True)
+        self.url = self.process.stdout.readline().strip()
+
+    def pull(self):
+        self.process.kill()
+        self.process.wait()
+        self.process.stdout.close()
+
+    def signal(self, number):
+        self.process.send_signal(number)
+
+
+@contextlib.contextmanager
+def wired(*kinds):
+    """A board, and a wire of each kind to it."""
+    folder = pathlib.Path(os.environ.get('TMPDIR', '/tmp')) / f'r4-wires-{os.getpid()}'
+    folder.mkdir(exist_ok=True)
+    wires = []
+    try:
+        with Board('udp://127.0.0.1:0', f'pty:{folder}/board') as board:
+            port = board.url.rsplit(':', 1)[1]
+            ends = {'udp': (port,), 'pty': (f'{folder}/host', f'{folder}/board')}
+            for kind in kinds:
+                wires.append(Wire(kind, *ends[kind]))
+            yield board, wires
+    finally:
+        for wire in wires:
+            if wire.process.poll() is None:
+                wire.signal(signal.SIGCONT)
+                wire.pull()
+        for left in folder.iterdir():
+            left.unlink()
+        folder.rmdir()
+
+
+def is_wire(wire, carries=True):
+    """Of the monitor: that wire begins to carry, or ceases to."""
+    place = re.search(r'[\d.]+:\d+|/[^?]+', wire.url)[0]
+    return lambda each: (each['type'] == 'wire' and place in each['fields']['name'] and
+                         (each['fields']['state'] == 'carrying') == carries)
+
+
+def of_two(wires):
+    return '+'.join(wire.url for wire in wires)
+
+
+def carried(wires):
+    """A host that has control of a board, as a process; all wires carry."""
+    host = monitor('+'.join(wire.url for wire in wires))
+    host.next(is_link('active'))
+    for wire in wires:
+        if not any(is_wire(wire)(each) for each in host.log):
+            host.next(is_wire(wire))
+    host.next(is_state)
+    return host
+
+
+def judge(host, began, what):
+    """Nothing was missed since then."""
+    for _ in range(20):
+        host.next(is_state)
+    states = [each for each in host.log if is_state(each)]
+    came = [each['came'] for each in states if each['came'] >= began]
+    gap = max(later - earlier for earlier, later in zip(came, came[1:]))
+    print(f'{what}; longest gap between states {gap * 1e3:.0f} ms')
+    times = [each['t'] for each in states]
+    assert times == sorted(set(times)), 'a state was told twice, or after a newer one'
+    assert not [each for each in host.log if each['type'] == 'link' and each['came'] > began and
+                each['fields']['state'] != 'active']
+    assert gap <= LONGEST_GAP_S
+
+
+def test_a_cable_is_pulled_and_plugged_in_again_and_nothing_is_missed():
+    with wired('pty', 'udp') as (_, wires), carried(wires) as host:
+        began = time.monotonic()
+        cable = wires[0]
+        cable.pull()
+        lost = host.next(is_wire(cable, carries=False))['came'] - began
+        plugged = time.monotonic()
+        cable.plug_in()
+        back = host.next(is_wire(cable))['came'] - plugged
+        judge(host, began, f'told of it after {lost * 1e3:.0f} ms, used again after {back * 1e3:.0f} ms')
+    assert lost <= REPORTED_WITHIN_S and back <= BACK_WITHIN_S
+
+
+def test_a_path_that_is_held_up_and_then_brings_what_is_old_disturbs_nothing():
+    with wired('udp', 'udp') as (board, wires), carried(wires) as host:
+        began = time.monotonic()
+        wires[0].signal(signal.SIGSTOP)  # the system cannot tell
+        lost = host.next(is_wire(wires[0], carries=False))['came'] - began
+        went_on = time.monotonic()
+        wires[0].signal(signal.SIGCONT)
+        back = host.next(is_wire(wires[0]))['came'] - went_on
+        judge(host, began, f'told of it after {lost * 1e3:.0f} ms, used again after {back * 1e3:.0f} ms')
+        wires[0].pull()  # and the other one has it alone
+        host.next(is_wire(wires[0], carries=False))
+        judge(host, began, 'the other one pulled')
+        board.never('SAFE', 0.2)
+    assert lost <= TIMEOUT_S + REPORTED_WITHIN_S and back <= BACK_WITHIN_S
+
+
+def test_commands_are_executed_once_each_while_wires_come_and_go():
+    commands = [f'S:{1000 + i % 1000},{i % 16 + 1}' for i in range(400)]
+    with wired('pty', 'udp') as (board, wires):
+        with Running('send', *(wire.url for wire in wires), *commands, '--json', '--hold', '60') as host:
+            results = []
+
+            def confirmed(most):
+                while len(results) < most:
+                    results.append(host.next())
+
+            confirmed(50)
+            wires[0].pull()
+            confirmed(120)
+            wires[0].plug_in()
+            confirmed(190)
+            wires[1].signal(signal.SIGSTOP)
+            confirmed(260)
+            wires[1].signal(signal.SIGCONT)
+            confirmed(330)
+            wires[1].pull()
+            confirmed(400)
+            slowest = max(each['ms'] for each in results)
+            executed = [board.executed(command)['executed']['command'] for command in commands]
+        all_of_them = [each['executed']['command'] for each in board.rest() if 'executed' in each]
+        print(f'400 commands: the slowest took {slowest:.0f} ms')
+        assert [each['command'] for each in results] == commands and all(each['confirmed'] for each in results)
+        assert executed == commands == [each for each in all_of_them if each.startswith('S:')]
+
+
+def test_each_command_takes_the_wires_of_a_board(tmp_path):
+    with wired('udp', 'pty') as (board, wires):
+        urls = [wire.url for wire in wires]
+        joined = of_two(wires)
+        assert run('send', *urls, 'R:1,On', 'Q:ID').returncode == 0
+        measured = run('bench', *reversed(urls), '--duration', '0.5', '--json')
+        assert measured.returncode == 0, measured
+        assert objects(measured.stdout)[0]['lost'] == 0
+        told = objects(run('doctor', joined, '--for', '0.3', '--json').stdout)
+        assert {each['url'] for each in told if each['type'] == 'link'} == set(urls)
+
+        drive = tmp_path / 'drive.r4log'
+        assert run('record', joined, '-o', drive, '--for', '1').returncode == 0
+        text = text_of(drive)
+        for number in (1, 2):
+            assert re.search(rf' {number}< AIN24', text), f'no state by wire {number}'
+        seen = run('info', drive).stdout
+        assert '127.0.0.2' in seen and '/host' in seen, seen
+
+        stop = run('stop', *urls)
+        assert stop.returncode == 0 and f'r4 send {joined} E:CLEAR' in stop.stdout, stop
+        # One that works is enough.
+        wires[0].pull()
+        assert run('stop', *urls).returncode == 0
+        assert run('stop', 'serial:///dev/nothing', urls[1]).returncode == 0
+
+
+def test_wires_that_lead_to_two_boards_are_refused_with_both_names():
+    boards = [Board('udp://127.0.0.1:0', options=('--board-id', name)) for name in ('left', 'right')]
+    with boards[0] as left, boards[1] as right:
+        for command in (('send', left.host_url, right.host_url, 'R:1,On'),
+                        ('monitor', f'{left.host_url}+{right.host_url}', '--control', '--duration', '3'),
+                        ('bench', left.host_url, right.host_url)):
+            refused = run(*command)
+            assert refused.returncode == 3, refused
+            assert ERROR.search(refused.stderr) and 'left' in refused.stderr and 'right' in refused.stderr, refused
+        for board in boards:
+            board.skip_past()
+        assert run('stop', left.host_url, right.host_url).returncode == 3
+        for board in boards:  # each is stopped all the same
+            board.executed('E:STOP')
+
+
+@pytest.mark.parametrize('arguments, told', [
+    (('send', 'udp://127.0.0.1', 'udp://127.0.0.1', 'R:1,On'), 'the same wire is given twice'),
+    (('send', 'udp://127.0.0.1', 'udp:auto'), 'CMD: is missing'),
+    (('send', 'udp://127.0.0.1', 'R:1,On', 'udp:auto'), 'a URL cannot stand behind R:1,On'),
+    (('send', 'sim:', 'udp://127.0.0.1', 'R:1,On'), 'a board of its own'),
+    (('send', 'serial:auto', 'udp://127.0.0.1', 'C:key,1:' + 64 * 'a'), 'others would see it'),
+    (('stop', *(f'udp://127.0.0.{i}' for i in range(1, 6))), 'one to 4 are possible'),
+    (('monitor', 'serial:auto+upd://127.0.0.1'), "there is no transport 'upd'"),
+    (('monitor', 'can://can0?node=0-3+udp://127.0.0.1:20-21'), 'its wires lead to 4 and to 2 boards'),
+])
+def test_what_cannot_be_is_one_clear_line(arguments, told):
+    refused = run(*arguments)
+    assert refused.returncode == 2 and ERROR.search(refused.stderr) and told in refused.stderr, refused
+    assert len(refused.stderr.splitlines()) == 1, refused
+
+
+def test_a_monitor_for_people_has_a_line_for_a_wire_that_ceases_to_carry():
+    with wired('pty', 'udp') as (_, wires):
+        with Running('monitor', of_two(wires), '--control') as host:
+            came = []
+
+            def line_with(words):
+                while not any(words in line for line in came):
+                    came.append(host.lines.get(timeout=PATIENCE_S)[1])
+
+            line_with('/host: carrying')
+            line_with('udp://127.0.0.2')
+            lasts(0.2)
+            wires[0].pull()
+            line_with('/host: down')

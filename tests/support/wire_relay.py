@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A wire between a host and a board, as a process: what is done to it is done to the wire.
+
+    wire_relay.py udp PORT         from 127.0.0.2, a port of its own, to the board's on 127.0.0.1
+    wire_relay.py pty LINK DEVICE  from a pty that LINK names to the board's
+
+Killed: unplugged, as the system tells at once of a pty, and of UDP never. Stopped (SIGSTOP): a wire that brings nothing,
+and, when it goes on, what is old. Prints the URL for a host when it is there.
+"""
+import os
+import select
+import socket
+import sys
+import tty
+
+
+def udp(port):
+    hosts = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    hosts.bind(('127.0.0.2', 0))
+    board = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    board.connect(('127.0.0.1', int(port)))
+    print(f'udp://127.0.0.2:{hosts.getsockname()[1]}?listen=0', flush=True)
+    host = None
+    while True:
+        for ready in select.select([hosts, board], [], [])[0]:
+            if ready is hosts:
+                datagram, host = hosts.recvfrom(2048)
+                board.send(datagram)
+            elif host:
+                hosts.sendto(board.recv(2048), host)
+            else:
+                board.recv(2048)
+
+
+def pty(link, device):
+    host, own = os.openpty()  # `own` stays open: a host may leave and come again
+    tty.setraw(own)
+    board = os.open(device, os.O_RDWR | os.O_NOCTTY)
+    tty.setraw(board)
+    if os.path.islink(link):
+        os.unlink(link)
+    os.symlink(os.ttyname(own), link)
+    print(f'serial://{link}', flush=True)
+    while True:
+        for ready in select.select([host, board], [], [])[0]:
+            os.write(board if ready == host else host, os.read(ready, 4096))
+
+
+if __name__ == '__main__':
+    {'udp': udp, 'pty': pty}[sys.argv[1]](*sys.argv[2:])

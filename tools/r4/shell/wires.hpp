@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What commands tell of boards to which several wires lead.
+#pragma once
+
+#include <vector>
+
+#include "json.hpp"
+#include "r4link/async_board.hpp"
+#include "r4link/error.hpp"
+#include "r4link/link.hpp"
+
+namespace r4::tool {
+
+// Do the URLs that were given as wires to one board lead to two, so that nothing began?
+inline bool leads_to_two_boards(const LinkStatus& link) {
+  return link.two_boards && !is_heard(link.state);
+}
+
+// Throws Error{refused} that names both.
+inline void require_one_board(const AsyncBoard& board) {
+  if (leads_to_two_boards(board.link())) throw Error(explain(board.wires()));
+}
+
+// {"name":…,"state":"carrying","busy":…,"board_id":…,"received":…,"lost":…,"loss":…,"copies":…,"round_trip_ms":…,
+//  "age_ms":…}; the last two null where nothing is known.
+inline Json wire_json(const Wire& wire) {
+  const auto milliseconds = [](double us) { return us > 0 ? Json(us / 1e3) : Json(); };
+  return {{"name", wire.name},
+          {"state", to_text(wire.state)},
+          {"busy", wire.busy},
+          {"board_id", wire.board_id},
+          {"received", wire.packets.received},
+          {"lost", wire.packets.lost},
+          {"loss", wire.loss()},
+          {"copies", wire.copies},
+          {"round_trip_ms", milliseconds(wire.round_trip_us)},
+          {"age_ms", milliseconds(wire.age_us)}};
+}
+
+// All of them; null of one alone, of which nothing is to be told that the link does not tell.
+inline Json wires_json(const AsyncBoard& board) {
+  const std::vector<Wire> wires = board.wires();
+  if (wires.size() < 2) return nullptr;
+  Json all = Json::array();
+  for (const Wire& wire : wires) all.push_back(wire_json(wire));
+  return all;
+}
+
+}  // namespace r4::tool
