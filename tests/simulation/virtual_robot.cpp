@@ -61,7 +61,7 @@ void VirtualRobot::pass_millisecond() {
     if (packet.to_board) {
       application_->receive(0, 1, Text(packet.bytes), board_ms());
     } else if (host_lives) {
-      session_.receive(packet.bytes, now());
+      session_.receive(0, packet.bytes, now());
     }
   }
   application_->poll(board_ms());
@@ -80,7 +80,7 @@ void VirtualRobot::send(Text datagram, Priority priority, std::uint32_t) {
   put(false, {datagram.data(), datagram.size()});
 }
 
-SendResult VirtualRobot::transmit(std::string_view bytes, Priority) {
+SendResult VirtualRobot::transmit(std::size_t, std::string_view bytes, Priority) {
   put(true, bytes);
   return SendResult::sent;
 }

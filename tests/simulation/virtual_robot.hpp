@@ -63,7 +63,7 @@ class VirtualRobot final : public firmware::Port, public IncuriousHost {
   void send(Text datagram, Priority priority, std::uint32_t peer) override;
   std::size_t max_size() const override { return max_datagram; }
   // IncuriousHost
-  SendResult transmit(std::string_view bytes, Priority priority) override;
+  SendResult transmit(std::size_t, std::string_view bytes, Priority priority) override;
   void on_state(const ReceivedState& state, const Datagram& datagram) override;
 
   Random random_;
