@@ -166,8 +166,9 @@ std::vector<std::string> split_wires(std::string_view text) {
 
 bool has_wire(std::string_view text, std::string_view scheme) {
   const std::vector<std::string> urls = split_wires(text);
-  return std::any_of(urls.begin(), urls.end(),
-                     [scheme](const std::string& url) { return Url::parse(url).scheme() == scheme; });
+  return std::any_of(urls.begin(), urls.end(), [scheme](const std::string& url) {
+    return Url::parse(url).scheme() == scheme;
+  });
 }
 
 std::string join_wires(const std::vector<std::string>& urls) {

