@@ -34,20 +34,26 @@ def of_wire(bus, carries):
                          (each['fields']['state'] == 'carrying') == carries)
 
 
+def has_joined(wires):
+    """The board has so many wires to its host, with one that it did not have."""
+    return lambda each: each.get('wire', {}).get('event') == 'joined' and each['wire']['wires'] == wires
+
+
 def test_either_of_two_buses_is_switched_off_and_nothing_is_missed():
     with two_buses(), Board(*URLS) as board, monitor('+'.join(URLS)) as host:
         for bus in BUSES:
             if not any(of_wire(bus, True)(each) for each in host.log):
                 host.next(of_wire(bus, True))
-        board.state('ACTIVE')
+        board.next(has_joined(2))
         began = host.next(is_state)['came']
         for bus in BUSES:
-            down = time.monotonic()
             ip('link', 'set', bus, 'down')
+            down = time.monotonic()
             lost = host.next(of_wire(bus, False))['came'] - down
-            up = time.monotonic()
             ip('link', 'set', bus, 'up')
+            up = time.monotonic()
             back = host.next(of_wire(bus, True))['came'] - up
+            board.next(has_joined(2))
             print(f'{bus}: told of it after {lost * 1e3:.0f} ms, used again after {back * 1e3:.0f} ms')
             assert lost <= SLOWER * REPORTED_WITHIN_S and back <= SLOWER * BACK_WITHIN_S
         for _ in range(20):
@@ -64,13 +70,19 @@ def test_commands_are_executed_once_each_while_buses_come_and_go():
     commands = [f'S:{1000 + i},{i % 16 + 1}' for i in range(120)]
     with two_buses(), Board(*URLS) as board:
         with Running('send', *URLS, *commands, '--json', '--hold', '60', '--timeout', '5') as host:
-            for i, command in enumerate(commands):
-                result = host.next()
-                assert result['command'] == command and result['confirmed'], result
-                if i in (20, 60):
-                    ip('link', 'set', BUSES[i // 60], 'down')
-                if i in (40, 80):
-                    ip('link', 'set', BUSES[i // 80], 'up')
+            def confirmed(several):
+                for command in several:
+                    result = host.next()
+                    assert result['command'] == command and result['confirmed'], result
+
+            board.next(has_joined(2))
+            for i, bus in enumerate(BUSES):
+                confirmed(commands[40 * i:40 * i + 20])
+                ip('link', 'set', bus, 'down')
+                confirmed(commands[40 * i + 20:40 * i + 40])
+                ip('link', 'set', bus, 'up')
+                board.next(has_joined(2))  # before that there is only one, which must not go
+            confirmed(commands[80:])
         executed = [each['executed']['command'] for each in board.rest() if 'executed' in each]
     assert [each for each in executed if each.startswith('S:')] == commands
 

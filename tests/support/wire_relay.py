@@ -47,4 +47,7 @@ def pty(link, device):
 
 
 if __name__ == '__main__':
-    {'udp': udp, 'pty': pty}[sys.argv[1]](*sys.argv[2:])
+    try:
+        {'udp': udp, 'pty': pty}[sys.argv[1]](*sys.argv[2:])
+    except OSError as error:
+        sys.exit(f'the wire has no other end any more: {error}')

@@ -108,8 +108,8 @@ Examples:
   r4 stop udp://192.168.0.125
   r4 stop serial:auto udp://192.168.0.125
 
-Exit codes: 0 the board reports that it has stopped; 3 it did not confirm: cut the power, or the URLs lead to two boards; 4, 5 the
-transport cannot be opened: cut the power.)";
+Exit codes: 0 the board reports that it has stopped; 3 it did not confirm: cut the power, or the URLs lead
+to two boards, which both were sent it; 4, 5 the transport cannot be opened: cut the power.)";
 
 }  // namespace
 

@@ -72,7 +72,7 @@ CLI::Option* url(CLI::App& command, Out& out, const char* meaning) {
 }
 
 constexpr const char* wires_meaning =
-    "where the board is, such as udp://192.168.0.125; several are wires to that one board";
+    "where the board is, such as udp://192.168.0.125; several are wires to it";
 constexpr const char* boards_meaning =
     "where boards are, such as udp://192.168.0.125; a + joins the wires to one of them";
 
