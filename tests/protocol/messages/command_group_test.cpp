@@ -81,7 +81,7 @@ TEST(CommandGroup, AsManyFieldsAsADatagramHoldsAreTooMany) {
   while (fields.size() + 30 < max_datagram) fields += "Z:1;";
   EXPECT_EQ(judged(fields), "FORMAT 2");
   fields.clear();
-  while (fields.size() + 30 < max_datagram) fields += "X:;";
+  while (fields.size() + 30 < max_datagram) fields += "V:;";
   EXPECT_EQ(judged(fields), "UNKNOWN 1");
 }
 
