@@ -48,7 +48,8 @@ std::string lower(std::string text) {
 
 // The same for URLs of the same wire, as far as they tell.
 std::string wire_of(const std::string& text) {
-  const Url url = Url::parse(text);
+  Url url = Url::parse(text);
+  url.take("share");
   const auto value = [&url](std::string_view key, std::string_view otherwise) {
     return "|" + url.get(key).value_or(std::string(otherwise));
   };

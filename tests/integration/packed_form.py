@@ -181,13 +181,14 @@ class Digits:
             raise ValueError('no such code')
         return NAMES[code]
 
-    def name(self):
+    def field(self):
         if self.digits[:1] != 'e':
-            return self.word()
+            name = self.word()
+            return name, self.value(form_of(name))
         size = self.number(2) & 15
         if size == 15:
             raise ValueError('a name too long')
-        return self.bytes(size, r'[!-+\--9<-\]_-~]+')
+        return self.bytes(size, r'[!-+\--9<-\]_-~]+'), self.text()
 
     def text(self):
         text = ''
@@ -213,7 +214,10 @@ class Digits:
             return f'-{(number + 1) // 2}' if number % 2 else str(number // 2)
         if form == 'bytes':
             first, second = (str(self.number(self.number(1))) for _ in range(2))
-            return f'{first},{second},x{self.take(2 * self.number(2))}'
+            size = self.number(2)
+            if size > 64:
+                raise ValueError('a reading too long')
+            return f'{first},{second},x{self.take(2 * size)}'
         number = self.number({'flag': 1, 'short': 3, 'hundredths': 3, 'drive': 4, 'bldc': 4}[form])
         if form == 'hundredths':
             return f'{number // 100}.{number % 100:02}'
@@ -237,8 +241,7 @@ def unpack(packed):
     pnum, time = (digits.number(width) for width in SIZES[size])
     fields = [(name, digits.value(form_of(name))) for name in GIVEN.get(layout, [])]
     while len(digits.digits) >= 2:
-        name = digits.name()
-        fields.append((name, digits.value(form_of(name))))
+        fields.append(digits.field())
     if digits.digits not in ('', 'f') or (layout == 0 and not fields):
         raise ValueError('the end')
     numbers = [('PNum', str(pnum)), ('T', str(time))]

@@ -77,7 +77,7 @@ def test_decodes_numbers_as_numbers_and_several_values_as_an_array():
 @pytest.mark.parametrize('fields, kind', [
     ('O:358,1,1', 'command'), ('H:ROS2-R4', 'heartbeat'), ('H:R4-ROS2', 'heartbeat'),
     ('N:66,RANGE', 'nack'), ('I:R4,0.1.0,sim-1,sim', 'identity'), ('AIN24:24.28;AIN12:1', 'state'),
-    ('X:1', 'command'), ('O:358,1,1;O:358,1,2;S:1500,3', 'command')])
+    ('V:1', 'command'), ('O:358,1,1;O:358,1,2;S:1500,3', 'command')])
 def test_decode_takes_what_encode_writes_and_names_its_type(fields, kind):
     decoded = objects(run('decode', stdin=run('encode', fields).stdout).stdout)
     assert len(decoded) == 1 and decoded[0]['ok'] and decoded[0]['type'] == kind

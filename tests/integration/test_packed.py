@@ -79,7 +79,7 @@ def test_r4_reads_what_the_second_implementation_packs():
     datagrams = captured_lines() + [with_crc(any_fields(rng)) for _ in range(3000)]
     packed = [(each, packed_form.pack(each)) for each in datagrams if len(each) <= 1024]
     packed = [(each, form) for each, form in packed if form and len(form) < 500]
-    assert len(packed) > 2500
+    assert len(packed) > 2400
     assert decoded([form for _, form in packed]) == [each for each, _ in packed]
     assert all(packed_form.unpack(form) == each for each, form in packed)
 

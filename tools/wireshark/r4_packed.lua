@@ -38,6 +38,9 @@ add("text", "rate heartbeat timeout recovery pack last rearm")
 add("text", "UNKNOWN FORMAT RANGE CHANNEL STALE DUPLICATE BUSY AUTH R4 sim udp serial pty can FAULT")
 numbered("steps", "ENC%dHZ", 1, 4)
 numbered("steps", "ENC%dIDX", 1, 4)
+numbered("bytes", "I2C%d", 1, 8)
+add("bytes", "I2CX")
+add("text", "I2CBUS X FULL")
 
 local given = { [2] = 10, [3] = 10, [4] = 0x38 } -- so many names from the first that a layout gives
 local sizes = { [0] = { 0, 0 }, { 4, 5 }, { 4, 8 }, { 5, 8 }, { 6, 8 }, { 4, 11 }, { 8, 8 }, { 8, 11 } }
@@ -75,15 +78,17 @@ function Digits:word()
   return words[self:number(2)] or error("no such code", 0)
 end
 
+-- A name, and the form of its values.
 function Digits:name()
   if self.digits:sub(self.at, self.at) ~= "e" then
-    return self:word()
+    local word = self:word()
+    return word, forms[word]
   end
   local size = self:number(2) % 16
   if size == 15 then
     error("a name too long", 0)
   end
-  return self:bytes(size, allowed_names)
+  return self:bytes(size, allowed_names), "text"
 end
 
 function Digits:text()
@@ -127,6 +132,15 @@ local function decimal(hex, halved)
   return ("%.0f%09.0f"):format(high, low)
 end
 
+-- The digits of a count.
+function Digits:count()
+  local size = self:number(1)
+  if size == 15 then
+    error("a count too long", 0)
+  end
+  return self:take(size)
+end
+
 function Digits:value(form)
   if form == "text" then
     return self:text()
@@ -134,15 +148,19 @@ function Digits:value(form)
     self:take(1)
     return self:text()
   elseif form == "count" or form == "steps" then
-    local size = self:number(1)
-    if size == 15 then
-      error("a count too long", 0)
-    end
-    local number = self:take(size)
+    local number = self:count()
     if form == "count" then
       return decimal(number)
     end
     return (number:find("[13579bdf]$") and "-" or "") .. decimal(number, true)
+  end
+  if form == "bytes" then
+    local first, second = decimal(self:count()), decimal(self:count())
+    local size = self:number(2)
+    if size > 64 then
+      error("a reading too long", 0)
+    end
+    return ("%s,%s,x%s"):format(first, second, self:take(2 * size))
   end
   local number = self:number(widths[form])
   if form == "hundredths" then
@@ -189,8 +207,8 @@ local function unpack_or_fail(packed)
     field("CMD", digits:value("count"))
   end
   while #digits.digits - digits.at + 1 >= 2 do
-    local name = digits:name()
-    field(name, digits:value(forms[name] or "text"))
+    local name, form = digits:name()
+    field(name, digits:value(form))
   end
   if digits.at == #digits.digits and digits.digits:sub(-1) ~= "f" then
     error("what fills the last byte", 0)

@@ -68,7 +68,14 @@ std::string command_table() {
     if (each->letter == 'H') continue;  // those are sent by themselves
     const std::string first = fmt::format("  {:<21} {}:", each->form, each->meaning);
     const bool fits = first.size() + each->ranges.size() < widest;
-    table += fmt::format("{}{}{}\n", first, fits ? " " : "\n      ", each->ranges);
+    table += first + (fits ? " " : "\n      ");
+    std::string_view ranges = each->ranges;
+    while (6 + ranges.size() > widest) {
+      const std::size_t end = ranges.rfind(' ', widest - 6);
+      table += fmt::format("{}\n      ", ranges.substr(0, end));
+      ranges.remove_prefix(end + 1);
+    }
+    table += fmt::format("{}\n", ranges);
   }
   return table;
 }
