@@ -196,14 +196,21 @@ class World final : public firmware::Hal, public firmware::Observer {
     ++sent_;
   }
 
-  // The host in control gets states, everyone at the ports where it is not, and who has echoed what it was
-  // told, for the time of a lease.
+  // The host in control gets states, on each of its wires, everyone at the ports where it is not, and who has echoed
+  // what it was told, for the time of a lease.
   bool may_get_states(int port, std::uint32_t peer) const {
     const BoardLink& link = board_->link();
-    const Host& host = hosts_[port][peer];
-    if (host.watches && now_ms_ - host.watches_ms < Watchers::lease_ms) return true;
+    if (peer < peers) {
+      const Host& host = hosts_[port][peer];
+      if (host.watches && now_ms_ - host.watches_ms < Watchers::lease_ms) return true;
+    }
     if (!link.has_owner()) return false;
-    return peer == (link.owner().port == port ? link.owner().peer : everyone);
+    const SessionWires& wires = board_->wires();
+    if (peer != everyone) return wires.has(Source{static_cast<std::uint8_t>(port), peer});
+    for (int i = 0; i < wires.size(); ++i) {
+      if (wires[i].port == port) return false;
+    }
+    return true;
   }
   void on_lease(Source from, const Datagram& datagram) {
     Host& watcher = host(from);
@@ -287,7 +294,7 @@ class World final : public firmware::Hal, public firmware::Observer {
       if (stop_) {
         require(outputs_ == Outputs() && board().reason() == SafeReason::stop);
       } else {
-        require(signed_ && board().link().in_session(from));
+        require(signed_ && board().wires().has(from));
         require(executed_ == datagram.command_count());  // all of a group, or none
         require(executed_ <= max_group);
         require(datagram.has_pnum() && board().link().last_executed() == executed_pnum_);
