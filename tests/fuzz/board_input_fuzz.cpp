@@ -200,13 +200,12 @@ class World final : public firmware::Hal, public firmware::Observer {
   // what it was told, for the time of a lease.
   bool may_get_states(int port, std::uint32_t peer) const {
     const BoardLink& link = board_->link();
-    if (peer < peers) {
-      const Host& host = hosts_[port][peer];
-      if (host.watches && now_ms_ - host.watches_ms < Watchers::lease_ms) return true;
-    }
+    const Host& host = hosts_[port][peer];
+    if (host.watches && now_ms_ - host.watches_ms < Watchers::lease_ms) return true;
     if (!link.has_owner()) return false;
     const SessionWires& wires = board_->wires();
-    if (peer != everyone) return wires.has(Source{static_cast<std::uint8_t>(port), peer});
+    if (wires.has(Source{static_cast<std::uint8_t>(port), peer})) return true;
+    if (peer != everyone) return false;
     for (int i = 0; i < wires.size(); ++i) {
       if (wires[i].port == port) return false;
     }
