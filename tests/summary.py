@@ -5,7 +5,8 @@
 Reads BUILD/results/*.xml (ctest), BUILD/[asan|tsan/]junit/*.xml (pytest, in place of the one
 ctest entry of the file) and BUILD/results/checks.txt. Names every failed and every skipped test;
 a skipped test counts as failed. Names what was repeated since the machine stood still (main.cpp,
-integration/conftest.py). The last line is `N passed, N failed`.
+integration/conftest.py), and what failed beside other tests and was repeated alone (NAME.alone.xml, which counts
+in place of what NAME.xml has of it). The last line is `N passed, N failed`.
 """
 import pathlib
 import sys
@@ -25,8 +26,20 @@ def cases(file):
         yield case.get('name'), outcome
 
 
+def alone(report):
+    """Of a report: the outcomes of what was repeated with nothing beside it."""
+    again = report.with_suffix('.alone.xml')
+    return dict(cases(again)) if again.exists() else {}
+
+
+def reports(build):
+    return [each for each in sorted((build / 'results').glob('*.xml')) if not each.match('*.alone.xml')]
+
+
 def repeated(build):
-    for report in sorted((build / 'results').glob('*.xml')):
+    for report in reports(build):
+        for name, outcome in alone(report).items():
+            yield f'{report.stem}: {name}: failed beside others; {outcome} alone ({report.with_suffix(".log")})'
         for case in ET.parse(report).iter('testcase'):
             for line in (case.findtext('system-out') or '').splitlines():
                 if 'The machine stood still' in line:
@@ -37,10 +50,12 @@ def outcomes(build):
     for line in (build / 'results/checks.txt').read_text().splitlines():
         outcome, name = line.split(' ', 1)
         yield name, outcome
-    for report in sorted((build / 'results').glob('*.xml')):
+    for report in reports(build):
         preset = report.stem.split('.')[0]
         junit = (build if preset == 'release' else build / preset) / 'junit'
+        second = alone(report)
         for name, outcome in cases(report):
+            outcome = second.get(name, outcome)
             suite, _, stem = name.partition('.')
             file = junit / f'{stem}.xml'
             inner = list(cases(file)) if suite in ('integration', 'python') and file.exists() else []
