@@ -204,6 +204,8 @@ void Session::on_identity_datagram(std::size_t wire, const Datagram& datagram, T
   }
   handler_.on_identity(identity);
   for (Pending& pending : pending_.under_way()) {
+    // A second answer to an earlier question is none to this one.
+    if (identity.has_asked && identity.asked != pending.pnum) continue;
     if (pending.is_out() && pending.kind == CommandKind::identify) {
       finish(pending, Outcome::confirmed, Refusal::none, now);
     }

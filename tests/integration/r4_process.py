@@ -3,11 +3,14 @@
 
 Nothing here sleeps to wait: everything awaits an event until a deadline.
 """
+import contextlib
 import json
 import os
 import queue
+import random
 import re
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -52,6 +55,15 @@ def run_measured(*arguments, **options):
 def objects(text):
     """The JSON objects of an output, one a line."""
     return [json.loads(line) for line in text.splitlines()]
+
+
+def free_port():
+    """A UDP port that is free, and none of those that Linux gives to who asks for any (from 32768)."""
+    while True:
+        port = random.randrange(30_000, 32_768)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe, contextlib.suppress(OSError):
+            probe.bind(('0.0.0.0', port))
+            return port
 
 
 def lasts(seconds):

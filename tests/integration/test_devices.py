@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Devices on the user's I2C bus: r4 send and r4 monitor against the simulated board, as docs/devices.md shows them."""
+import statistics
+
 import pytest
 
 from r4_process import SANITIZED, Board, Running, is_state, objects, run
@@ -33,8 +35,9 @@ def test_readings_come_with_every_state_and_end_with_the_session(board):
     assert newest['I2C1'][2] == 'x000000004000f0b0000000000000'
     assert newest['I2C2'][2] == 'x5f02' and newest['I2CBUS'] == [0, 0, 0]
     assert SANITIZED or sorted(each['t'] - each['fields']['I2C1'][0] for each in states)[-3] <= 20
-    steps = {after['t'] - before['t'] for before, after in zip(states, states[1:])}
-    assert steps == {10}
+    steps = [after['t'] - before['t'] for before, after in zip(states, states[1:])]
+    # A board whose machine stands still leaves out states, and says so by the time.
+    assert all(step % 10 == 0 for step in steps) and statistics.median(steps) == 10, steps
     after = objects(run('send', board.host_url, 'F:I2C1', '--json', '--hold', '0.1').stdout)
     assert after[0]['confirmed']
 

@@ -13,18 +13,12 @@ import zlib
 
 import pytest
 
-from r4_process import PATIENCE_S, R4, SANITIZED, Board
+from r4_process import PATIENCE_S, R4, SANITIZED, Board, free_port
 
 
 def datagram(fields):
     text = fields.encode() + b'^'
     return text + hex(zlib.crc32(text)).encode() + b'^'
-
-
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(('127.0.0.1', 0))
-        return probe.getsockname()[1]
 
 
 def test_noise_and_a_stalled_pipe_do_not_stall_the_heartbeats():

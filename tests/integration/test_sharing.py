@@ -14,8 +14,8 @@ import time
 
 import pytest
 
-from r4_process import (ERROR, PATIENCE_S, R4, SANITIZED, Board, Running, driving, is_state, run, stop_takes_ms,
-                        wait_for, watch)
+from r4_process import (ERROR, PATIENCE_S, R4, SANITIZED, Board, Running, driving, free_port, is_state, run,
+                        stop_takes_ms, wait_for, watch)
 
 # The others take a wire over within 100 ms; as much again is for a machine that is busy.
 TAKEN_OVER_WITHIN_S = 10 if SANITIZED else 0.2
@@ -37,12 +37,6 @@ def on_a_wire(request, folder):
             # One port for all, as the port of hosts is.
             board.host_url = re.sub(r'\?listen=0$', f'?listen={free_port()}', board.host_url)
         yield board
-
-
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(('0.0.0.0', 0))
-        return probe.getsockname()[1]
 
 
 def drives(pwm):

@@ -10,7 +10,7 @@ import zlib
 
 import pytest
 
-from r4_process import (PATIENCE_S, SANITIZED, Board, driving, is_link, is_state, lasts, monitor, objects,
+from r4_process import (PATIENCE_S, SANITIZED, Board, driving, free_port, is_link, is_state, lasts, monitor, objects,
                         run)
 
 # The board's timeout, and what docs/safety.md promises on top.
@@ -260,9 +260,7 @@ def test_a_session_goes_on_when_the_board_comes_back(board):
 
 
 def test_a_monitor_may_be_started_before_the_board():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(('127.0.0.1', 0))
-        url = f'udp://127.0.0.1:{probe.getsockname()[1]}'
+    url = f'udp://127.0.0.1:{free_port()}'
     with monitor(f'{url}?listen=0', '--count', '20') as host, Board(url):
         assert host.wait() == 0
 
@@ -297,9 +295,7 @@ def test_noise_from_others_does_no_harm(board):
 
 
 def test_noise_at_the_host_is_counted_and_shown_and_the_link_goes_on(board):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(('127.0.0.1', 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     with monitor(f'{board.url}?listen={port}') as host, \
             socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as noise:
         host.next(is_link('active'))

@@ -77,9 +77,13 @@ void ScriptedLink::nack(std::uint32_t pnum, std::string_view code) {
 }
 
 void ScriptedLink::identity(std::string_view capabilities, bool names_question) {
-  const bool names = names_question && count('Q') != 0;
-  finish("I:R4,0.1.0,board-7," + std::string(capabilities) + ";" +
-         (names ? "ASKED:" + std::to_string(last('Q').pnum) + ";" : ""));
+  if (names_question && count('Q') != 0) return answer(last('Q').pnum, capabilities);
+  finish("I:R4,0.1.0,board-7," + std::string(capabilities) + ";");
+}
+
+void ScriptedLink::answer(std::uint32_t question, std::string_view capabilities) {
+  finish("I:R4,0.1.0,board-7," + std::string(capabilities) + ";ASKED:" + std::to_string(question) +
+         ";");
 }
 
 void ScriptedLink::connect() {

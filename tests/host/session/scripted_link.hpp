@@ -66,6 +66,7 @@ class ScriptedLink final : private Session::Handler {
   std::uint32_t session_pnum = 0;  // connect() begins one
   // As the answer to our newest question, or of a board that does not tell which it answers.
   void identity(std::string_view capabilities = "udp", bool names_question = true);
+  void answer(std::uint32_t question, std::string_view capabilities = "udp");
   void raw(std::string_view bytes);
   // It begins again, with another clock and new numbers; nothing is sent.
   void reboot();

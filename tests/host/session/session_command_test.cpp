@@ -260,6 +260,18 @@ TEST(SessionCommand, IdentifyIsConfirmedByTheAnswerInAnyState) {
   EXPECT_DOUBLE_EQ(link.session.statistics(link.now).round_trip_us, 2000);
 }
 
+TEST(SessionCommand, IdentifyIsNotConfirmedByASecondAnswerToAnEarlierQuestion) {
+  ScriptedLink link;
+  link.session.identify(1s, link.now);
+  const Ticket second = link.session.identify(1s, link.now);
+  const auto questions = link.all('Q');
+  link.answer(questions[0].pnum);
+  link.answer(questions[0].pnum);
+  EXPECT_FALSE(link.results.contains(second));
+  link.answer(questions[1].pnum);
+  EXPECT_EQ(result_of(link, second).outcome, Outcome::confirmed);
+}
+
 TEST(SessionCommand, CancelledIsRepeatedNoMore) {
   ScriptedLink link;
   link.connect();
