@@ -14,7 +14,8 @@ constexpr std::uint8_t pca9685_chips = 1U << static_cast<int>(Chip::osmc_pwm) |
                                        1U << static_cast<int>(Chip::dhb12_pwm) |
                                        1U << static_cast<int>(Chip::servo_pwm);
 
-// In the safe state, after the all-call: what moves most with least, first.
+// In which order the chips are made safe, after the all-call, which has switched the PWM outputs
+// off: first the brushless motors and the relays, which it does not reach.
 constexpr Chip safe_order[chip_count] = {Chip::dac, Chip::expander, Chip::osmc_pwm, Chip::dhb12_pwm,
                                          Chip::servo_pwm};
 
@@ -73,7 +74,8 @@ void BoardHardware::make_safe() {
 void BoardHardware::drive_safe() {
   waiting_ = false;
   for (Stepper& stepper : steppers_) stepper.stop();
-  // Also those that a held bus keeps from being told now: what they were to do next is void.
+  // Each driver forgets what it was to write, also where a held bus keeps its chip from being told
+  // now.
   for (ChipDriver* chip : chips_) chip->want_safe();
   // A held bus fails at a transfer. If it can be freed, who held it comes last.
   const int held_at = drive_chips_safe(nowhere);
@@ -90,7 +92,8 @@ int BoardHardware::drive_chips_safe(int held_before) {
     }
     return all_chips;
   }
-  // Its acknowledge may be that of one of three: each is told by its own address, too.
+  // If one of the three chips acknowledges the all-call, that hides two that do not: each is told
+  // by its own address, too.
   for (const Chip chip : safe_order) {
     const int i = static_cast<int>(chip);
     if (i != held_before && !drive_chip_safe(i)) return i;
@@ -203,8 +206,9 @@ void BoardHardware::set_up_again() {
   }
 }
 
-// A transfer that was cut short says nothing of its chip, nor do registers that were compared with what
-// make_safe() meanwhile has written.
+// make_safe() may interrupt a transfer, or write registers while a driver compares them with what
+// it wrote. The trouble that such a driver finds says nothing of its chip, so the chip is set up
+// anew instead of called faulty.
 void BoardHardware::set_up_what_was_cut_off() {
   for (int i = 0; i < chip_count; ++i) {
     if (chips_[i]->trouble() != ChipTrouble::none && !failed_[i]) chips_[i]->begin();
@@ -232,8 +236,9 @@ bool BoardHardware::look_for_trouble() {
   return found;
 }
 
-// The end of what uses the bus. New trouble makes everything safe. If make_safe() came between,
-// what was being written may have come after it: once more.
+// Each function that uses the bus ends by this one. New trouble makes everything safe. If
+// make_safe() has interrupted the function, what that wrote last may have undone the safe state:
+// everything is made safe once more.
 void BoardHardware::leave() {
   if (!interrupted_ && look_for_trouble()) {
     drive_safe();

@@ -15,8 +15,8 @@ void set_relay(std::uint8_t& relays, int channel, bool on) {
   relays = static_cast<std::uint8_t>(on ? relays | bit : relays & ~bit);
 }
 
-// The motor supply is about to close: a motor that was commanded while it had none, or by a command that
-// a network held back, must not start by that.
+// Called when the relay of the motors' supply is about to close: a motor whose command came while
+// there was no supply, or was held back by a network, must not start because of the relay.
 void stop_motors(Outputs& outputs) {
   for (Drive& channel : outputs.osmc) channel.pwm = 0;
   for (Drive& channel : outputs.dhb12) channel.pwm = 0;

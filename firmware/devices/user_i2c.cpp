@@ -160,7 +160,7 @@ void UserI2c::end_reading(int slot, I2cOutcome outcome) {
   std::memcpy(reading.data.bytes, received_, reading.data.size);
 }
 
-// That nobody answers to an address is what a scan wants to know.
+// A scan asks one address after the other; that nobody answers at one is no error, but its result.
 void UserI2c::end_scan_step(I2cOutcome outcome) {
   DeviceBytes<i2c_max_bytes>& found = answer_.data;
   if (outcome == I2cOutcome::bus_stuck) return answer(outcome);

@@ -42,8 +42,8 @@ inline const char* skip(std::uint8_t byte_class, const char* at, const char* end
 struct Separators {
   std::uint64_t colons;
   std::uint64_t semicolons;
-  std::uint64_t no_name;   // neither of a name nor a colon
-  std::uint64_t no_field;  // neither of values nor a semicolon
+  std::uint64_t no_name;   // bytes that stand in no name and are no colon
+  std::uint64_t no_field;  // bytes that stand in no value and are no semicolon
 };
 constexpr std::size_t separators_block = 64;
 Separators separators(Text block);

@@ -21,7 +21,7 @@ void write_base64url(const std::uint8_t (&bytes)[tag_bytes], char (&out)[tag_siz
   for (std::size_t i = tag_size - 1; i-- != 0; bits >>= 6) out[i] = digits[bits & 0x3FU];
 }
 
-// In the same time, wherever they differ.
+// Takes the same time wherever the two differ, so that the time tells a forger nothing.
 bool same(Text tag, const char (&expected)[tag_size]) {
   if (tag.size() != tag_size) return false;
   unsigned difference = 0;
@@ -183,8 +183,9 @@ void Signer::on_board_time(std::uint32_t t_ms, std::uint32_t now_ms) {
   heard_ms_ = now_ms;
 }
 
-// What the board's clock shows at least: what it has said, and the time since, as long as our clock
-// is not 3 % fast. A T of the future is refused.
+// The board's clock as we estimate it: the T that it told, and the time since by our clock. The
+// board refuses a T that is ahead of its clock, so a 32nd of that time is left out: our clock may
+// be up to 3 % faster.
 std::uint32_t Signer::board_time(std::uint32_t now_ms) const {
   const std::uint32_t passed = now_ms - heard_ms_;
   return passed == 0 ? t_ms_ : t_ms_ + (passed - passed / 32 - 1);

@@ -28,9 +28,10 @@ struct UdpUrl {
   std::uint16_t peer_port = host_port;
 };
 
-// A URL of a host, whatever its scheme: over UDP with any free port, if it names none.
+// The URL by which a host opens a board. If it is one of UDP and names no port to listen at, any
+// free one is added; others come back as they are.
 std::string with_own_port(std::string url);
-// The same, even if it names one.
+// The same, and a port that it names is replaced, too.
 std::string with_any_port(std::string url);
 
 }  // namespace r4

@@ -71,7 +71,7 @@ CanBitTiming can_bit_timing(std::uint32_t kernel_hz, std::uint32_t bit_rate) {
   CanBitTiming timing;
   const std::uint32_t quanta = kernel_hz / bit_rate;
   if (quanta * bit_rate != kernel_hz || quanta < 15 || quanta > 255) return timing;
-  timing.after_sample = (quanta * 2 + 7) / 15;  // two fifteenths, to the nearest
+  timing.after_sample = (quanta * 2 + 7) / 15;  // 2/15 of a bit, rounded
   timing.before_sample = quanta - 1 - timing.after_sample;
   timing.jump = timing.after_sample;
   timing.valid = true;
@@ -94,7 +94,7 @@ const char* to_text(CanState state) {
   return "unknown";
 }
 
-// The other clock of the controller has to follow: a few of its periods.
+// Waits until the controller has taken INIT over into its other clock, which takes a few periods of that.
 bool Fdcan::set_init(bool wanted) {
   constexpr int patience = 1000;
   const std::uint32_t others = registers_.CCCR & ~cccr_init;

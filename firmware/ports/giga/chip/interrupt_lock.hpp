@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// No interrupt comes as long as it lives. For a few instructions; may be nested.
+// An InterruptLock keeps interrupts off while it exists. It is for a few instructions; locks may
+// be nested.
 #pragma once
 
 #include "chip.hpp"
