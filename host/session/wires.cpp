@@ -234,9 +234,8 @@ bool Wires::refuses(const Wire& wire, Time now) const {
 }
 
 bool Wires::all_busy(Time now) const {
-  return std::all_of(wires_.begin(), wires_.end(), [&](const Wire& wire) {
-    return refuses(wire, now) || !is_heard(wire, now);
-  });
+  return std::all_of(wires_.begin(), wires_.end(),
+                     [&](const Wire& wire) { return refuses(wire, now) || !is_heard(wire, now); });
 }
 
 void Wires::look(Time now) {

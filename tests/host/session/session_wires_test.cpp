@@ -213,8 +213,8 @@ TEST(SessionWires, AreNotRefusedByWhatTheBoardSaidBeforeItShowedThatItIsTheirs) 
   robot.connect();
   Datagram datagram;
   ASSERT_TRUE(read_datagram(with_letter(robot.cables[0], 'H').back(), datagram));
-  const std::string busy = with_crc("N:" + std::to_string(datagram.pnum()) + ",BUSY;PNum:1;T:" +
-                                    std::to_string(robot.board_ms(0)) + ";");
+  const std::string busy = with_crc("N:" + std::to_string(datagram.pnum()) +
+                                    ",BUSY;PNum:1;T:" + std::to_string(robot.board_ms(0)) + ";");
   robot.run(50);  // states with CMD
   robot.bring(0, busy);
   robot.bring(1, busy);
@@ -227,8 +227,8 @@ TEST(SessionWires, AreBackInControlAsSoonAsAStateShowsIt) {
   robot.connect();
   Datagram datagram;
   ASSERT_TRUE(read_datagram(with_letter(robot.cables[0], 'H').back(), datagram));
-  const std::string busy = with_crc("N:" + std::to_string(datagram.pnum()) + ",BUSY;PNum:1;T:" +
-                                    std::to_string(robot.board_ms(0)) + ";");
+  const std::string busy = with_crc("N:" + std::to_string(datagram.pnum()) +
+                                    ",BUSY;PNum:1;T:" + std::to_string(robot.board_ms(0)) + ";");
   robot.bring(0, busy);
   robot.bring(1, busy);
   EXPECT_TRUE(robot.session->link().busy);
