@@ -29,9 +29,10 @@ enum class HostRole : std::uint8_t { apart, asking, refused, controlling };
 class HostRoleMachine {
  public:
   // The board has answered BUSY, or another host's program on our side of the bus has the board.
-  void on_busy(Time now) {
+  void on_busy(Time now) { on_busy_until(now + busy_memory); }
+  void on_busy_until(Time until) {
     role_ = HostRole::refused;
-    refused_until_ = now + busy_memory;
+    refused_until_ = until;
   }
   // CMD names a command of ours; the link is up. `later`: the board has said so after each BUSY.
   void on_own_command(bool later, Time now) {

@@ -44,7 +44,9 @@ SendResult Session::send_over(std::string_view bytes, Way way, Priority priority
     }
     if (result == SendResult::sent || best == SendResult::down) best = result;
   }
-  if (busy && best != SendResult::sent && wires_.all_busy(now)) role_.on_busy(now);
+  if (busy && best != SendResult::sent && wires_.all_busy(now)) {
+    role_.on_busy_until(wires_.all_busy_until(now));
+  }
   return best;
 }
 
@@ -165,9 +167,10 @@ bool Session::is_told(const Nack& nack) {
 void Session::note_busy(std::size_t wire, std::uint32_t t_ms, Time now) {
   if (wires_.several()) {
     wires_.on_busy(wire, t_ms, now);
-    if (!wires_.all_busy(now)) return;
+    if (wires_.all_busy(now)) role_.on_busy_until(wires_.all_busy_until(now));
+  } else {
+    role_.on_busy(now);
   }
-  role_.on_busy(now);
 }
 
 // A state shows that the board has executed a command of ours in the session that it has.

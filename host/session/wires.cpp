@@ -238,6 +238,14 @@ bool Wires::all_busy(Time now) const {
                      [&](const Wire& wire) { return refuses(wire, now) || !is_heard(wire, now); });
 }
 
+Time Wires::all_busy_until(Time now) const {
+  Time until = now + busy_memory;
+  for (const Wire& wire : wires_) {
+    if (is_heard(wire, now)) until = std::min(until, wire.busy_until);
+  }
+  return until;
+}
+
 void Wires::look(Time now) {
   carrying_ = 0;
   for (std::size_t i = 0; i < wires_.size(); ++i) {

@@ -103,6 +103,8 @@ class Wires {
   void on_own_state(std::uint32_t t_ms, Time now);
   // Do all that are heard say that another host has the board?
   bool all_busy(Time now) const;
+  // For so long they do, if none is answered again.
+  Time all_busy_until(Time now) const;
 
   // --- in numbers
 
