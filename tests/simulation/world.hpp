@@ -31,7 +31,8 @@
 //              meets them is used on; while there is one, there is no false trip, no command times out for
 //              which there was time on that wire alone, and the newest state is never older than the newest
 //              that it has brought, nor than two periods and its delay. Beside one, another that meets them
-//              for 2.5 s is used. The host tells no BUSY beside one that it has used for 0.4 s
+//              for 2.5 s is used. The host tells no BUSY beside one that it has used for 0.4 s without being told
+//              any there
 #pragma once
 
 #include <compare>
@@ -343,6 +344,7 @@ class World : public firmware::Hal, public firmware::Observer {
     std::uint64_t fine_since_us = 0;
     bool serves = false;  // … and both ends use it
     std::uint64_t serves_since_us = 0;
+    std::uint64_t told_busy_us = 0;  // the board last answered BUSY there
     bool brought_state = false;
     std::uint32_t newest_t = 0;  // of the states that it has brought
   };

@@ -260,8 +260,8 @@ void World::check_wires() {
     if (serves && !wire.serves) wire.serves_since_us = now_us_;
     wire.serves = serves;
     if (settled && serves) check_age(w);
-    const bool known =
-        wire.serves && now_us_ - wire.serves_since_us > busy_memory_us + most_delay_us;
+    const std::uint64_t quiet_since_us = std::max(wire.serves_since_us, wire.told_busy_us);
+    const bool known = wire.serves && now_us_ - quiet_since_us > busy_memory_us + most_delay_us;
     if (known && host.session->link().busy) violate("wires: BUSY is told beside a good wire");
     if (!serves && !alone && !crowded && now_us_ - wire.fine_since_us >= used_again_us) {
       violate(fmt::format("wires: wire {} is good and not used", w));
