@@ -8,7 +8,8 @@
 //              last BUSY         |    v                                     |
 //                                refused <----------------------------------+
 //
-//     (BUSY leads to refused from apart, too)
+//     (BUSY leads to refused from apart, too. Where the times of the board show that CMD is its later word,
+//     refused leads to controlling)
 //
 //     apart        the link is down; every state falls back to it when the link goes down, refused
 //                  once its time is over
@@ -28,13 +29,14 @@ enum class HostRole : std::uint8_t { apart, asking, refused, controlling };
 class HostRoleMachine {
  public:
   // The board has answered BUSY, or another host's program on our side of the bus has the board.
-  void on_busy(Time now) {
+  void on_busy(Time now) { on_busy_until(now + busy_memory); }
+  void on_busy_until(Time until) {
     role_ = HostRole::refused;
-    refused_until_ = now + busy_memory;
+    refused_until_ = until;
   }
-  // CMD names a command of ours; the link is up.
-  void on_own_command(Time now) {
-    if (!refused(now)) role_ = HostRole::controlling;
+  // CMD names a command of ours; the link is up. `later`: the board has said so after each BUSY.
+  void on_own_command(bool later, Time now) {
+    if (later || !refused(now)) role_ = HostRole::controlling;
   }
   // The link, as it is now.
   void on_link(bool up, Time now) {

@@ -222,7 +222,8 @@ class Session {
   bool take_fields(std::size_t wire, const ReceivedState& fresh);
   Arrival arrival_over(std::uint32_t t_ms, SafeReason reason, Time now);
   bool is_told(const Nack& nack);
-  void note_busy(std::size_t wire, Time now);
+  void note_busy(std::size_t wire, std::uint32_t t_ms, Time now);
+  void note_own_command(Time now);
   bool streams(Time now) const;
   LeaseTrouble lease_trouble(Time now) const;
   Time next_lease() const;

@@ -137,7 +137,7 @@ void Session::on_nack_datagram(std::size_t wire, const Datagram& datagram, Time 
   if (watches()) return on_lease_refused(wire, nack, datagram, now);
   selection_.on_answer();
   if (nack.code == Refusal::busy) {
-    note_busy(wire, now);
+    note_busy(wire, static_cast<std::uint32_t>(datagram.time_ms()), now);
     key_.on_host_seen(now);
   }
   on_answer(datagram, now);
@@ -254,7 +254,7 @@ void Session::confirm_from_state(Time now) {
   const bool has_cmd = state_.present.has(StateField::cmd);
   if (has_cmd) {
     selection_.on_cmd(now);
-    if (link_up() && is_ours(state_.last_command)) role_.on_own_command(now);
+    if (link_up() && is_ours(state_.last_command)) note_own_command(now);
   }
   for (Pending& pending : pending_.under_way()) {
     if (!pending.is_out() || pending.kind == CommandKind::stop ||

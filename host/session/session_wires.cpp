@@ -39,12 +39,14 @@ SendResult Session::send_over(std::string_view bytes, Way way, Priority priority
       wires_.asked(i, way.pnum, now);
     }
     if (result == SendResult::busy) {
-      wires_.on_busy(i, now);
+      wires_.on_busy(i, state_.t_ms, now);
       busy = true;
     }
     if (result == SendResult::sent || best == SendResult::down) best = result;
   }
-  if (busy && best != SendResult::sent && wires_.all_busy(now)) role_.on_busy(now);
+  if (busy && best != SendResult::sent && wires_.all_busy(now)) {
+    role_.on_busy_until(wires_.all_busy_until(now));
+  }
   return best;
 }
 
@@ -162,12 +164,23 @@ bool Session::is_told(const Nack& nack) {
   return false;
 }
 
-void Session::note_busy(std::size_t wire, Time now) {
+void Session::note_busy(std::size_t wire, std::uint32_t t_ms, Time now) {
   if (wires_.several()) {
-    wires_.on_busy(wire, now);
-    if (!wires_.all_busy(now)) return;
+    wires_.on_busy(wire, t_ms, now);
+    if (wires_.all_busy(now)) role_.on_busy_until(wires_.all_busy_until(now));
+  } else {
+    role_.on_busy(now);
   }
-  role_.on_busy(now);
+}
+
+// A state shows that the board has executed a command of ours in the session that it has.
+void Session::note_own_command(Time now) {
+  bool later = false;
+  if (wires_.several()) {
+    wires_.on_own_state(state_.t_ms, now);
+    later = !wires_.all_busy(now);
+  }
+  role_.on_own_command(later, now);
 }
 
 // --- who watches

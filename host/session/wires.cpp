@@ -216,10 +216,34 @@ bool Wires::others_carry(const Wire& wire, Time now) const {
                      [&](const Wire& each) { return &each != &wire && is_heard(each, now); });
 }
 
+void Wires::on_busy(std::size_t index, std::uint32_t t_ms, Time now) {
+  Wire& wire = wires_[index];
+  wire.busy_until = now + busy_memory;
+  wire.busy_ms = t_ms;
+}
+
+void Wires::on_own_state(std::uint32_t t_ms, Time now) {
+  own_state_at_ = now;
+  own_state_ms_ = t_ms;
+}
+
+bool Wires::refuses(const Wire& wire, Time now) const {
+  if (now >= wire.busy_until) return false;
+  const bool any = own_state_at_.count() != 0 && now - own_state_at_ < own_state_memory;
+  return !any || newer(wire.busy_ms, own_state_ms_);
+}
+
 bool Wires::all_busy(Time now) const {
-  return std::all_of(wires_.begin(), wires_.end(), [&](const Wire& wire) {
-    return now < wire.busy_until || !is_heard(wire, now);
-  });
+  return std::all_of(wires_.begin(), wires_.end(),
+                     [&](const Wire& wire) { return refuses(wire, now) || !is_heard(wire, now); });
+}
+
+Time Wires::all_busy_until(Time now) const {
+  Time until = now + busy_memory;
+  for (const Wire& wire : wires_) {
+    if (is_heard(wire, now)) until = std::min(until, wire.busy_until);
+  }
+  return until;
 }
 
 void Wires::look(Time now) {

@@ -97,9 +97,14 @@ class Wires {
   // Of one wire, where nobody asks for more.
   void heard(Time now) { wires_[0].heard = now; }
 
-  void on_busy(std::size_t index, Time now) { wires_[index].busy_until = now + busy_memory; }
+  // The board, at its time `t_ms`, has answered BUSY there: that place is not its host's.
+  void on_busy(std::size_t index, std::uint32_t t_ms, Time now);
+  // A state of its time `t_ms` shows that the board is ours: a BUSY from before that says nothing any more.
+  void on_own_state(std::uint32_t t_ms, Time now);
   // Do all that are heard say that another host has the board?
   bool all_busy(Time now) const;
+  // For so long they do, if none is answered again.
+  Time all_busy_until(Time now) const;
 
   // --- in numbers
 
@@ -134,6 +139,7 @@ class Wires {
     Time ask_at{0};
     Time asked_at{0};
     Time busy_until{0};
+    std::uint32_t busy_ms = 0;  // the board's T of the newest BUSY
     Time round_trip{0};
     std::uint64_t copies = 0;
     PacketTracker tracker;
@@ -147,6 +153,8 @@ class Wires {
   static constexpr Time patience = std::chrono::milliseconds{300};
   // As that of a role (host_role.hpp).
   static constexpr Time busy_memory = std::chrono::milliseconds{300};
+  // An older state is not compared with: the board's T wraps.
+  static constexpr Time own_state_memory = std::chrono::hours{1};
   static Time timeout_of(LinkTiming timing) { return std::chrono::milliseconds{timing.timeout_ms}; }
 
   WireSet known() const;
@@ -159,6 +167,7 @@ class Wires {
   bool admits(Wire& wire, std::uint32_t t_ms, Time now) const;
   bool all_connecting(Time now) const;
   bool others_carry(const Wire& wire, Time now) const;
+  bool refuses(const Wire& wire, Time now) const;
   void look(Time now);
 
   std::vector<Wire> wires_;
@@ -170,6 +179,8 @@ class Wires {
   std::uint32_t boot_ = 0;
   Time proven_{0};  // when the newest proof of the boot came
   WireSet carrying_ = 0;
+  Time own_state_at_{0};
+  std::uint32_t own_state_ms_ = 0;
   PacketCounters counters_;
 };
 

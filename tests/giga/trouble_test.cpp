@@ -360,6 +360,24 @@ TEST(GigaSettings, AKeySurvivesARestartAndIsAskedForOnCan) {
   bench.drive(again, bench.usb());
 }
 
+TEST(GigaReport, TellsByHowManyWiresTheHostIsHeard) {
+  GigaBench bench;
+  bench.boot();
+  const auto report = [&] {
+    bench.usb_lines();
+    bench.usb()("report");
+    bench.run_ms(400);
+    return bench.usb_lines();
+  };
+  EXPECT_FALSE(has_line(report(), "Wires: "));
+  const std::string heartbeat = with_crc("H:ROS2-R4;PNum:2147484660;T:0;");
+  bench.usb()(heartbeat);
+  bench.run_ms(20);
+  bench.can()(heartbeat);
+  bench.run_ms(20);
+  EXPECT_TRUE(has_line(report(), "Wires: 2; joined 1, lost 0"));
+}
+
 TEST(GigaSettings, TellWhichChipsAreFitted) {
   GigaBench bench;
   bench.giga.stored["r4-settings"] = "chips,17\n";  // OSMC and servos

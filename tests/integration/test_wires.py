@@ -104,7 +104,12 @@ def judge(host, began, what):
 
 
 def test_a_cable_is_pulled_and_plugged_in_again_and_nothing_is_missed():
-    with wired('pty', 'udp') as (_, wires), carried(wires) as host:
+    with wired('pty', 'udp') as (board, wires), carried(wires) as host:
+        def told(event, **counts):
+            wire = board.next(lambda each: each.get('wire', {}).get('event') == event)['wire']
+            assert {name: wire[name] for name in counts} == counts, wire
+
+        told('joined', wires=2, joins=1, losses=0)
         began = time.monotonic()
         cable = wires[0]
         cable.pull()
@@ -112,6 +117,8 @@ def test_a_cable_is_pulled_and_plugged_in_again_and_nothing_is_missed():
         plugged = time.monotonic()
         cable.plug_in()
         back = host.next(is_wire(cable))['came'] - plugged
+        told('left', wires=1, joins=1, losses=1)
+        told('joined', wires=2, joins=2, losses=1)
         judge(host, began, f'told of it after {lost * 1e3:.0f} ms, used again after {back * 1e3:.0f} ms')
     assert lost <= REPORTED_WITHIN_S and back <= BACK_WITHIN_S
 

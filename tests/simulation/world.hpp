@@ -31,7 +31,8 @@
 //              meets them is used on; while there is one, there is no false trip, no command times out for
 //              which there was time on that wire alone, and the newest state is never older than the newest
 //              that it has brought, nor than two periods and its delay. Beside one, another that meets them
-//              for 2.5 s is used. (A command counts that was asked for when the state had CMD.)
+//              for 2.5 s is used. The host tells no BUSY beside one that it has used for 0.4 s without being told
+//              any there
 #pragma once
 
 #include <compare>
@@ -251,7 +252,7 @@ class World : public firmware::Hal, public firmware::Observer {
   bool several() const { return schedule_.wires() > 1; }
   bool meets_limits(int wire) const;
   bool serves_since(std::uint64_t at_us) const;
-  bool is_time_enough(const Sent& sent) const;
+  bool should_be_confirmed(const Sent& sent) const;
   void check_wires();
   void check_age(int wire);
   void on_told_state(int wire, std::string_view bytes);
@@ -343,6 +344,7 @@ class World : public firmware::Hal, public firmware::Observer {
     std::uint64_t fine_since_us = 0;
     bool serves = false;  // … and both ends use it
     std::uint64_t serves_since_us = 0;
+    std::uint64_t told_busy_us = 0;  // the board last answered BUSY there
     bool brought_state = false;
     std::uint32_t newest_t = 0;  // of the states that it has brought
   };
@@ -350,8 +352,6 @@ class World : public firmware::Hal, public firmware::Observer {
   Random wires_random_;
   std::uint64_t start_us_ = 0;  // of the schedule: an hour after what was recorded
   std::uint64_t looked_us_ = 0;
-  bool shows_commands_ = false;  // the newest state that came to the first host has CMD
-  std::uint64_t shows_commands_since_us_ = 0;
   struct Recorded {
     std::uint64_t at_us;
     bool to_board;

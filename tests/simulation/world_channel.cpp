@@ -46,6 +46,8 @@ void World::transfer(bool to_board, int host, int place, std::string_view bytes)
     attacker_.on_sent({host, incarnation, now_us_}, bytes);
   } else {
     attacker_.on_board(bytes);
+    const bool busy = bytes.find(",BUSY;") != std::string_view::npos;
+    if (host == 0 && busy) wires_[at_host.wire].told_busy_us = now_us_;
   }
   mix(bytes.data(), bytes.size());
   if (keep_trace_) {

@@ -57,7 +57,7 @@ void World::Host::on_result(Ticket ticket, const CommandResult& result) {
       break;
     case Outcome::timed_out:
       ++world.report_.timed_out;
-      if (index == 0 && world.serves_since(sent.asked_us) && world.is_time_enough(sent)) {
+      if (index == 0 && world.should_be_confirmed(sent)) {
         world.violate(fmt::format("wires: command {} timed out beside a good wire", id));
       }
       break;

@@ -14,6 +14,7 @@ namespace r4::simulation {
 namespace {
 
 constexpr std::uint32_t most_delay_us = 100'000;
+constexpr std::uint64_t busy_memory_us = 300'000;
 constexpr std::uint64_t used_again_us = 2'500'000;
 constexpr std::uint64_t hour_us = 3'600'000'000;
 constexpr std::uint64_t recorded_us = 1'000'000;
@@ -223,11 +224,15 @@ bool World::serves_since(std::uint64_t at_us) const {
   });
 }
 
-// For a command: there, the state that shows it or the answer to a copy, and back.
-bool World::is_time_enough(const Sent& sent) const {
-  if (!shows_commands_ || shows_commands_since_us_ > sent.asked_us) return false;
-  return schedule_.command_timeout_us >=
-         2 * most_delay_us + 150'000 + schedule_.settings.state_period_ms() * 1000U;
+// A good wire served when the command was asked for, and so long before that the host knew that it has the board: no
+// BUSY from before counts any more, and its F has been confirmed. The command goes there, and the state that shows it
+// or the answer to a copy comes back.
+bool World::should_be_confirmed(const Sent& sent) const {
+  const std::uint64_t there_and_back_us =
+      2 * most_delay_us + schedule_.settings.state_period_ms() * 1000U;
+  const std::uint64_t known_us = busy_memory_us + there_and_back_us;
+  return serves_since(sent.asked_us - std::min(sent.asked_us, known_us)) &&
+         schedule_.command_timeout_us >= 150'000 + there_and_back_us;
 }
 
 void World::check_wires() {
@@ -255,6 +260,9 @@ void World::check_wires() {
     if (serves && !wire.serves) wire.serves_since_us = now_us_;
     wire.serves = serves;
     if (settled && serves) check_age(w);
+    const std::uint64_t quiet_since_us = std::max(wire.serves_since_us, wire.told_busy_us);
+    const bool known = wire.serves && now_us_ - quiet_since_us > busy_memory_us + most_delay_us;
+    if (known && host.session->link().busy) violate("wires: BUSY is told beside a good wire");
     if (!serves && !alone && !crowded && now_us_ - wire.fine_since_us >= used_again_us) {
       violate(fmt::format("wires: wire {} is good and not used", w));
     }
@@ -266,12 +274,7 @@ void World::on_told_state(int index, std::string_view bytes) {
   if (!read_datagram(Text(bytes), datagram) || kind_of(datagram) != MessageKind::state) return;
   Wire& wire = wires_[index];
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
-  if (!wire.brought_state || newer(t_ms, wire.newest_t)) {
-    wire.newest_t = t_ms;
-    const bool shows = !datagram.find(Text("CMD")).name().empty();
-    if (shows && !shows_commands_) shows_commands_since_us_ = now_us_;
-    shows_commands_ = shows;
-  }
+  if (!wire.brought_state || newer(t_ms, wire.newest_t)) wire.newest_t = t_ms;
   wire.brought_state = true;
 }
 

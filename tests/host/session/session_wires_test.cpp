@@ -208,6 +208,35 @@ TEST(SessionWires, AreRefusedWhenAllOfThemAre) {
   EXPECT_TRUE(robot.session->link().busy);
 }
 
+TEST(SessionWires, AreNotRefusedByWhatTheBoardSaidBeforeItShowedThatItIsTheirs) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  Datagram datagram;
+  ASSERT_TRUE(read_datagram(with_letter(robot.cables[0], 'H').back(), datagram));
+  const std::string busy = with_crc("N:" + std::to_string(datagram.pnum()) +
+                                    ",BUSY;PNum:1;T:" + std::to_string(robot.board_ms(0)) + ";");
+  robot.run(50);  // states with CMD
+  robot.bring(0, busy);
+  robot.bring(1, busy);
+  EXPECT_FALSE(robot.session->link().busy);
+  EXPECT_EQ(robot.drive(5).outcome, Outcome::confirmed);
+}
+
+TEST(SessionWires, AreBackInControlAsSoonAsAStateShowsIt) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  Datagram datagram;
+  ASSERT_TRUE(read_datagram(with_letter(robot.cables[0], 'H').back(), datagram));
+  const std::string busy = with_crc("N:" + std::to_string(datagram.pnum()) +
+                                    ",BUSY;PNum:1;T:" + std::to_string(robot.board_ms(0)) + ";");
+  robot.bring(0, busy);
+  robot.bring(1, busy);
+  EXPECT_TRUE(robot.session->link().busy);
+  robot.run(30);
+  EXPECT_FALSE(robot.session->link().busy);
+  EXPECT_TRUE(robot.session->in_control(robot.now()));
+}
+
 TEST(SessionWires, ToTwoBoardsAreRefused) {
   WiredRobot robot(Cables{{1}, {1, 1}});
   robot.connect();
