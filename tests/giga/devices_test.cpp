@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The user's bus of the Giga: its peripheral by the registers, and the board beside it.
+#include <cstring>
+
 #include "bench.hpp"
 #include "firmware/ports/giga/devices/user_i2c_controller.hpp"
 #include "firmware/ports/giga/devices/user_uart_controller.hpp"
@@ -26,7 +28,9 @@ class GigaDevices : public testing::Test {
     std::size_t count = 0;
     for (const std::string& line : bench.usb_lines()) {
       Datagram datagram;
-      if (!read_datagram(line, datagram) || datagram.find(told).name().empty()) continue;
+      if (!read_datagram(line, datagram) ||
+          datagram.find(Text(told, std::strlen(told))).name().empty())
+        continue;
       EXPECT_TRUE(read_state(datagram, state));
       ++count;
     }
