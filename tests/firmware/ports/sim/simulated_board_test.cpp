@@ -438,7 +438,7 @@ TEST_F(SimulatedBoardTest, AnswersWhoItIs) {
   options.firmware_version = "9.9";
   build(std::move(options));
   command("Q:ID");
-  EXPECT_EQ(listener_.heard.back().substr(0, 51),
+  EXPECT_EQ(listener_.heard.back().substr(0, 60),
             "I:R4,9.9,bench-3,sim+leave+group+watch+i2c+uart+dac;BUSY:0;A");
 }
 
