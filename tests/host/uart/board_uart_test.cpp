@@ -109,7 +109,9 @@ TEST(UartStream, OverALinkThatLosesStates) {
       if (most == 60 && i % 100 == 0) line.due = 0;
       at += data.lost;
       for (const std::uint8_t byte : data.bytes) {
-        if (told.lost == 0) ASSERT_EQ(byte, at % 251);
+        if (told.lost == 0) {
+          ASSERT_EQ(byte, at % 251);
+        }
         ++at;
       }
     }
@@ -143,7 +145,9 @@ TEST(BoardUart, ReadsWhatAReceiverSaysAndCallsBack) {
   board.next_state();
   const std::lock_guard lock(mutex);
   EXPECT_NE(told.find("$GPRMC,"), std::string::npos);
-  if (lost == 0) EXPECT_EQ(told.compare(0, 200, read, 0, 200), 0);
+  if (lost == 0) {
+    EXPECT_EQ(told.compare(0, 200, read, 0, 200), 0);
+  }
   EXPECT_THROW(board.uart(3), Error);
   EXPECT_TRUE(board.uart(2).read().bytes.empty());
 }
