@@ -74,8 +74,11 @@ void BoardHardware::make_safe() {
 void BoardHardware::drive_safe() {
   waiting_ = false;
   for (Stepper& stepper : steppers_) stepper.stop();
+<<<<<<< HEAD
   // Each driver forgets what it was to write, also where a held bus keeps its chip from being told
   // now.
+=======
+  for (AnalogOutputPin* pin : pins_.dac) pin->write(0);
   for (ChipDriver* chip : chips_) chip->want_safe();
   // A held bus fails at a transfer. If it can be freed, who held it comes last.
   const int held_at = drive_chips_safe(nowhere);
@@ -145,6 +148,7 @@ void BoardHardware::set_outputs(const Outputs& outputs) {
     const StepperTarget& target = outputs.stepper[i];
     steppers_[i].go(target.position, target.enabled ? target.speed : 0);
   }
+  for (int i = 0; i < dac_channels; ++i) pins_.dac[i]->write(outputs.dac_mv[i]);
 }
 
 // From the chip at which the budget ran out last time, so that none is left behind. Ends at a held
@@ -271,6 +275,10 @@ void BoardHardware::sample(Inputs& inputs) {
   for (int i = 0; i < ultrasonic_channels; ++i) {
     inputs.ultrasonic_cm[i] = ultrasonic_.distance_cm(i);
     inputs.ultrasonic_blind |= bit(static_cast<std::uint8_t>(i), !ultrasonic_.sees(i));
+  }
+  inputs.gpio = 0;
+  for (int i = 0; i < gpio_channels; ++i) {
+    inputs.gpio |= bit(static_cast<std::uint8_t>(i), pins_.gpio[i]->read());
   }
   inputs.fault = fault_;
 }

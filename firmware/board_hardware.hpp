@@ -7,7 +7,7 @@
 // poll(), and ready() tells when all are. What is applied before that waits until then: no motor
 // runs while the chip that brakes another is not there.
 //
-// The safe state (make_safe): steppers stand, PWM outputs off, DAC codes 0, brakes on, relays off.
+// The safe state (make_safe): steppers stand, PWM outputs off, DAC codes and outputs 0, brakes on, relays off.
 // It may be called at any time, also in an interrupt or a fault handler in the middle of a
 // transfer. It makes at most two bounded attempts (a held bus is recovered once).
 //
@@ -48,6 +48,8 @@ struct BoardPins {
   OutputPin* trigger[ultrasonic_channels];
   AnalogPin* analog[analog_channels];
   InputPin* handle;
+  AnalogOutputPin* dac[dac_channels];
+  InputPin* gpio[gpio_channels];
 };
 
 class BoardHardware final : public Hal {

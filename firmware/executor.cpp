@@ -63,6 +63,9 @@ Refusal carry_out(const Command& command, Setpoints& setpoints) {
       outputs.bldc[i].direction = command.direction;
       outputs.bldc[i].brake = command.on;
       break;
+    case CommandKind::dac:
+      outputs.dac_mv[i] = value;
+      break;
     case CommandKind::proximity:
       setpoints.proximity_cm[i] = value;
       break;
@@ -80,6 +83,7 @@ Refusal carry_out(const Command& command, Setpoints& setpoints) {
     case CommandKind::i2c_write:
     case CommandKind::i2c_scan:
     case CommandKind::i2c_poll:
+    case CommandKind::uart_write:
       break;
   }
   return Refusal::none;

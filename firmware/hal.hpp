@@ -34,6 +34,7 @@ struct Outputs {
   std::uint8_t relays = 0;                      // bit n-1: relay n is on
   Bldc bldc[bldc_channels];
   StepperTarget stepper[stepper_channels];
+  std::uint16_t dac_mv[dac_channels] = {};
 };
 bool operator==(const Outputs& a, const Outputs& b);
 inline bool operator!=(const Outputs& a, const Outputs& b) { return !(a == b); }
@@ -48,6 +49,7 @@ struct Inputs {
   std::int32_t encoder_index_counts[encoder_channels] = {};  // where the index line rose last
   std::uint16_t ultrasonic_cm[ultrasonic_channels] = {};     // 0: no echo
   std::uint8_t ultrasonic_blind = 0;  // bit n-1: sensor n does not answer, nothing is known
+  std::uint8_t gpio = 0;              // bit n-1: input n is high
   ChipFault fault;                    // the first since the last clear_fault()
 };
 

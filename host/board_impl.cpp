@@ -51,6 +51,10 @@ Board::Impl::Impl(const CarriersMaker& make, BoardOptions options, BoardCallback
   if (first.on_restart) callbacks.on_restart(std::move(first.on_restart));
   if (first.on_arming) callbacks.on_arming(std::move(first.on_arming));
   if (first.on_refused) callbacks.on_refused(std::move(first.on_refused));
+  callbacks.take_uart([this](int channel) {
+    const std::lock_guard lock(mutex);
+    return std::exchange(uarts[channel - 1].to_tell, {});
+  });
   listen();
   async.open();
   take_name();
@@ -99,6 +103,7 @@ void Board::Impl::listen() {
     }
     news.notify_all();
     tell(fresh);
+    take_uarts(fresh);
   });
   async.on_link([this](const LinkStatus& fresh) {
     {
@@ -127,6 +132,7 @@ void Board::Impl::listen() {
     {
       const std::lock_guard lock(mutex);
       state = async.state();
+      for (UartInbox& uart : uarts) uart.stream.restart();
     }
     tell(CallbackThread::Restart{});
   });

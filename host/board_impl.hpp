@@ -32,6 +32,7 @@
 #include "r4link/async_board.hpp"
 #include "r4link/board.hpp"
 #include "state_queue.hpp"
+#include "uart/uart_stream.hpp"
 
 namespace r4 {
 
@@ -129,6 +130,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   void take_name();
   void deliver(const Command& command);
   void deliver(const Setpoints& setpoints);
+  void take_uarts(const State& fresh);
   void begin(const CallPtr& call, Clock::time_point deadline);
   void finish(Call& call, const CommandResult& result);
   void shut();
@@ -162,6 +164,14 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   ReceivedState state;
   std::uint64_t states = 0;
   std::vector<std::weak_ptr<States::Queue>> queues;
+  // What has come in, for read() and for callbacks.
+  struct UartInbox {
+    UartStream stream;
+    UartData to_read;
+    UartData to_tell;
+    bool told = false;  // there is a callback, or was one
+  };
+  UartInbox uarts[uart_channels];
   LinkStatus link;
   bool in_control = false;
   DisarmCause disarmed_by = DisarmCause::not_yet;

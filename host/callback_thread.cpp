@@ -137,6 +137,11 @@ void CallbackThread::call(const Notice& notice) {
                    call_each(arming_callbacks_, cause);
                  },
                  [&](const RefusedPost& refused) { call_each(refused_callbacks_, refused); },
+                 [&](const UartNews& news) {
+                   const Board::UartData data = take_uart_(news.channel);
+                   if (data.bytes.empty() && data.lost == 0) return;
+                   call_each(uart_callbacks_[news.channel - 1], data);
+                 },
              },
              notice);
 }
@@ -183,6 +188,9 @@ Subscription CallbackThread::on_arming(Subscribers<DisarmCause>::Function callba
 }
 Subscription CallbackThread::on_refused(Subscribers<RefusedPost>::Function callback) {
   return add(refused_callbacks_, std::move(callback), [](auto&) {});
+}
+Subscription CallbackThread::on_uart(int channel, Subscribers<Board::UartData>::Function callback) {
+  return add(uart_callbacks_[channel - 1], std::move(callback), [](auto&) {});
 }
 
 }  // namespace r4

@@ -23,9 +23,11 @@
 #include <mutex>
 #include <optional>
 #include <thread>
+#include <utility>
 #include <variant>
 #include <vector>
 
+#include "r4link/board.hpp"
 #include "r4link/carrier.hpp"
 #include "session/session.hpp"
 #include "subscribers.hpp"
@@ -36,8 +38,12 @@ class CallbackThread {
  public:
   using Clock = std::chrono::steady_clock;
   struct Restart {};
+  // Bytes of a UART wait for its callbacks.
+  struct UartNews {
+    int channel;
+  };
   using Notice = std::variant<Restart, ReceivedState, LinkStatus, CarrierEvent, Wire, DisarmCause,
-                              RefusedPost>;
+                              RefusedPost, UartNews>;
   static constexpr std::size_t capacity = 64;
 
   // `on_end`: a callback has ended that ran for so long; called on this thread.
@@ -46,6 +52,8 @@ class CallbackThread {
   CallbackThread(const CallbackThread&) = delete;
   CallbackThread& operator=(const CallbackThread&) = delete;
 
+  // Takes the bytes that wait. Before start().
+  void take_uart(std::function<Board::UartData(int channel)> take) { take_uart_ = std::move(take); }
   // `owner` is kept until the thread ends.
   void start(std::shared_ptr<void> owner);
   // No callback runs any more when this returns, unless it is called in one; none is called again.
@@ -65,6 +73,7 @@ class CallbackThread {
   Subscription on_restart(Subscribers<>::Function callback);
   Subscription on_arming(Subscribers<DisarmCause>::Function callback);
   Subscription on_refused(Subscribers<RefusedPost>::Function callback);
+  Subscription on_uart(int channel, Subscribers<Board::UartData>::Function callback);
 
  private:
   // Something to be done between two notices: behind the first `behind` of all.
@@ -87,6 +96,7 @@ class CallbackThread {
   }
 
   const std::function<void(Clock::duration)> on_end_;
+  std::function<Board::UartData(int)> take_uart_;
   std::thread thread_;
   std::atomic<std::thread::id> id_{};
   std::mutex joining_;
@@ -99,6 +109,7 @@ class CallbackThread {
   Subscribers<> restart_callbacks_;
   Subscribers<DisarmCause> arming_callbacks_;
   Subscribers<RefusedPost> refused_callbacks_;
+  Subscribers<Board::UartData> uart_callbacks_[uart_channels];
   ReceivedState state_;
   LinkStatus link_;
   std::optional<CarrierEvent> event_;    // up or down

@@ -32,6 +32,10 @@ Application::Application(Hal& hal, const Config& config, Observer* observer)
       authentication_(config.chance),
       guard_(hal),
       i2c_(config.i2c) {
+  for (int i = 0; i < uart_channels; ++i) {
+    uarts_[i] = config.uarts[i];
+    if (uarts_[i] != nullptr) uarts_[i]->set_up(config.settings.uarts[i]);
+  }
   setpoints_.settings = config.settings;
   authentication_.use(config.settings.site.keys);
   guard_.add_duty(loop_limit_ms);  // loop_duty

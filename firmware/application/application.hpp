@@ -24,6 +24,7 @@
 #include "../../protocol/link/watchers.hpp"
 #include "../../protocol/messages/message.hpp"
 #include "../devices/user_i2c.hpp"
+#include "../devices/user_uart.hpp"
 #include "../executor.hpp"
 #include "../guard.hpp"
 #include "../hal.hpp"
@@ -43,8 +44,10 @@ class Application {
     // Authentication::chance_size random bytes, others at each boot. Without them a board with a
     // key obeys nobody but who is at a cable of its own.
     const std::uint8_t* chance = nullptr;
-    // The user's bus, which must outlive the application; none: X is unknown.
+    // The user's bus, which must outlive the application; none: its commands are unknown.
     UserI2c* i2c = nullptr;
+    // The user's UARTs, all or none; the same.
+    UserUart* uarts[uart_channels] = {};
   };
   static constexpr int max_ports = 4;
   static constexpr std::uint8_t no_port = max_ports;
@@ -75,8 +78,8 @@ class Application {
   // 10).
   std::uint32_t poll(std::uint32_t now_ms);
 
-  // A turn of the user's bus alone; poll() has it, too. At least once a millisecond, so that a transfer can
-  // be begun in each.
+  // A turn of the user's devices alone; poll() has it, too. At least once a millisecond, so that a transfer
+  // can be begun in each.
   void poll_devices(std::uint32_t now_ms);
 
   // For the timer interrupt. Its first duty is the loop: poll() checks in.
@@ -148,7 +151,9 @@ class Application {
   // application_devices.cpp
   Refusal carry_out_device(std::uint32_t pnum, const Command& command, std::uint32_t now_ms);
   void begin_devices(std::uint32_t now_ms);
-  void follow_poll_setting(Text key, std::uint32_t now_ms);
+  Refusal write_uart(const Command& command);
+  void follow_device_setting(Text key, std::uint32_t now_ms);
+  void drop_device_writes();
   void add_device_answer(FieldSet& fields, std::uint32_t t_ms) const;
   void fill_devices(State& state) const;
 
@@ -222,6 +227,7 @@ class Application {
   Source speaker_;
   bool known_ = false;
   UserI2c* i2c_;
+  UserUart* uarts_[uart_channels];
   bool has_answer_ = false;  // of the user's bus, which is told for a while
   std::uint32_t answered_ms_ = 0;
   std::uint32_t rx_ok_ = 0;

@@ -179,7 +179,7 @@ void Application::take_effect(std::uint32_t pnum, const Command& command, std::u
       enter(SafeReason::link, now_ms);
       break;
     case CommandKind::setting:
-      follow_poll_setting(command.text, now_ms);
+      follow_device_setting(command.text, now_ms);
       if (command.text == key_setting) authentication_.use(setpoints_.settings.site.keys);
       link_.set_timing(timing_of(setpoints_.settings));
       expect_host();

@@ -10,6 +10,8 @@ namespace firmware {
 
 Refusal Application::carry_out_device(std::uint32_t pnum, const Command& command,
                                       std::uint32_t now_ms) {
+  if (command.kind == CommandKind::dac) return carry_out(command, setpoints_);
+  if (command.kind == CommandKind::uart_write) return write_uart(command);
   if (i2c_ == nullptr) return Refusal::unknown;
   if (command.kind == CommandKind::i2c_poll) {
     i2c_->poll_slot(command.channel, poll_of(command), now_ms);
@@ -18,16 +20,44 @@ Refusal Application::carry_out_device(std::uint32_t pnum, const Command& command
   return i2c_->ask(pnum, command) ? Refusal::none : Refusal::full;
 }
 
+// One that is off is not there.
+Refusal Application::write_uart(const Command& command) {
+  UserUart* const uart = uarts_[command.channel - 1];
+  if (uart == nullptr) return Refusal::unknown;
+  if (!uart->on()) return Refusal::channel;
+  std::uint8_t bytes[uart_max_write];
+  std::uint8_t size = 0;
+  parse_bytes(command.text, bytes, sizeof bytes, size);
+  return uart->write(bytes, size) ? Refusal::none : Refusal::full;
+}
+
+// What may move something, and has not begun, is void.
+void Application::drop_device_writes() {
+  if (i2c_ != nullptr) i2c_->drop_write();
+  for (UserUart* uart : uarts_) {
+    if (uart != nullptr) uart->drop_writes();
+  }
+}
+
 // A session begins with the readings that are kept as settings, and nothing of the one before.
 void Application::begin_devices(std::uint32_t now_ms) {
   has_answer_ = false;
+  for (UserUart* uart : uarts_) {
+    if (uart == nullptr) continue;
+    uart->drop_writes();
+    uart->forget();
+  }
   if (i2c_ == nullptr) return;
   i2c_->drop_all();
   i2c_->take_answered();
   for (int i = 0; i < i2c_slots; ++i) i2c_->poll_slot(i + 1, setpoints_.settings.polls[i], now_ms);
 }
 
-void Application::follow_poll_setting(Text key, std::uint32_t now_ms) {
+void Application::follow_device_setting(Text key, std::uint32_t now_ms) {
+  const int uart = uart_of(key);
+  if (uart != 0 && uarts_[uart - 1] != nullptr) {
+    uarts_[uart - 1]->set_up(setpoints_.settings.uarts[uart - 1]);
+  }
   const int slot = poll_slot_of(key);
   if (slot != 0 && i2c_ != nullptr) {
     i2c_->poll_slot(slot, setpoints_.settings.polls[slot - 1], now_ms);
@@ -35,6 +65,9 @@ void Application::follow_poll_setting(Text key, std::uint32_t now_ms) {
 }
 
 void Application::poll_devices(std::uint32_t now_ms) {
+  for (UserUart* uart : uarts_) {
+    if (uart != nullptr) uart->poll();
+  }
   if (i2c_ == nullptr) return;
   i2c_->poll(now_ms);
   if (now_ms - answered_ms_ > 2 * answer_shown_ms) has_answer_ = false;
@@ -52,6 +85,9 @@ void Application::add_device_answer(FieldSet& fields, std::uint32_t t_ms) const 
 }
 
 void Application::fill_devices(State& state) const {
+  for (int i = 0; i < uart_channels; ++i) {
+    if (uarts_[i] != nullptr) uarts_[i]->tell(state.uart[i]);
+  }
   if (i2c_ == nullptr) return;
   std::memcpy(state.i2c, i2c_->readings(), sizeof state.i2c);
   state.i2c_answer = i2c_->answer();

@@ -23,7 +23,7 @@ void Application::look_at_time(std::uint32_t now_ms) {
 }
 
 void Application::enter(SafeReason cause, std::uint32_t now_ms) {
-  if (i2c_ != nullptr) i2c_->drop_write();
+  drop_device_writes();
   if (!safety_.enter(cause)) return;
   if (cause == SafeReason::link) {
     hold_wires();

@@ -76,6 +76,8 @@ void Application::identify(Source to, const Datagram& question, std::uint32_t no
   writer.more("+").more(leave_capability).more("+").more(group_capability);
   if (authentication_.has_chance()) writer.more("+").more(watch_capability);
   if (i2c_ != nullptr) writer.more("+").more(i2c_capability);
+  if (uarts_[0] != nullptr) writer.more("+").more(uart_capability);
+  writer.more("+").more(dac_capability);
   write_identity_fields(writer, identity);
   answer(to, writer, now_ms);
 }
@@ -167,6 +169,9 @@ SafeReport Application::shown_to_watchers() const {
 void Application::send_states(std::uint32_t now_ms) {
   std::uint32_t t_ms = 0;
   if (!schedule_.take(now_ms, t_ms)) return;
+  for (UserUart* uart : uarts_) {
+    if (uart != nullptr) uart->next_state();
+  }
   State state;
   fill(state);
   FieldSet chosen = setpoints_.fields;
@@ -233,6 +238,8 @@ void Application::fill(State& state) const {
   for (int i = 0; i < servo_channels; ++i) state.servo_us[i] = outputs_.servo_us[i];
   for (int i = 0; i < bldc_channels; ++i) state.bldc[i] = outputs_.bldc[i];
   state.relays = outputs_.relays;
+  for (int i = 0; i < dac_channels; ++i) state.dac_mv[i] = outputs_.dac_mv[i];
+  state.gpio = inputs_.gpio;
   for (int i = 0; i < stepper_channels; ++i) state.stepper_steps[i] = inputs_.stepper_steps[i];
   for (int i = 0; i < encoder_channels; ++i) {
     state.encoder_counts[i] = inputs_.encoder_counts[i];

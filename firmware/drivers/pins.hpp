@@ -33,5 +33,14 @@ class AnalogPin {
   ~AnalogPin() = default;
 };
 
+// An analog output: millivolts, 0 to dac_max_mv.
+class AnalogOutputPin {
+ public:
+  virtual void write(std::uint16_t millivolts) = 0;
+
+ protected:
+  ~AnalogOutputPin() = default;
+};
+
 }  // namespace firmware
 }  // namespace r4

@@ -37,6 +37,9 @@ bool state_shows(const State& state, const Command& command) {
       return state.present.has(field_of(StateField::bldc1, StateField::bldc2, channel)) &&
              state.bldc[i].speed == command.value && state.bldc[i].direction == command.direction &&
              state.bldc[i].brake == command.on;
+    case CommandKind::dac:
+      return state.present.has(i == 0 ? StateField::dac1 : StateField::dac2) &&
+             state.dac_mv[i] == command.value;
     default:
       return false;
   }

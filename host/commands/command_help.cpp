@@ -27,11 +27,12 @@ constexpr std::array<CommandHelp, 15> table{{
     {'F', "F:name,name…", "which state fields are sent", "DEFAULT, ALL or names such as ENC1"},
     {'C', "C:key,value", "settings",
      "rate 1-1000 Hz, heartbeat 50-1000 ms, timeout 100-10000 ms, recovery last|rearm, pack 0|1 …"},
-    {'X', "X:READ|WRITE|POLL|OFF|SCAN,…", "user I2C bus: see docs/devices.md",
+    {'X', "X:READ|WRITE|POLL|OFF|SCAN|UART|DAC,…",
+     "user I2C bus, UARTs and DAC: see docs/devices.md",
      "READ,address,register,count WRITE,address,bytes[,count] POLL,address,register,count,ms,slot "
-     "OFF,slot SCAN; address 8-119 or 0x08-0x77, bytes as x3B00, x is none, count 1-32, 5-60000 "
-     "ms, "
-     "slot 1-8"},
+     "OFF,slot SCAN UART,uart,bytes DAC,channel,mV; address 8-119 or 0x08-0x77, bytes as x3B00, x "
+     "is none, count 1-32, 5-60000 ms, slot 1-8, uart 1-2 that C:uart1,115200:8N1 has turned on, "
+     "1-48 bytes, channel 1-2, 0-3300 mV"},
     {'Q', "Q:ID", "asks who the board is", "ID"},
     {'H', "H:ROS2-R4", "host heartbeat", "ROS2-R4"},
     {0, "", "", ""},
@@ -42,13 +43,14 @@ struct SettingHelp {
   std::string_view values;
 };
 
-constexpr std::array<SettingHelp, 15> settings_table{{
+constexpr std::array<SettingHelp, 16> settings_table{{
     {"rate", "1-1000 states a second"},
     {"heartbeat", "50-1000 ms, below the timeout"},
     {"timeout", "100-10000 ms, above the heartbeat"},
     {"recovery", "last or rearm"},
     {"pack", "0 or 1"},
     {"i2c1", "address:register:count:period, such as 0x68:x3B:14:10, or off; up to i2c8"},
+    {"uart1", "baud:framing, 1200-460800 and 8N1, 8E1, 8O1 or with 2 stop bits, or off; uart2"},
     {"network", "1-32 bytes, or off"},
     {"password", "8-63 bytes, or off"},
     {"host", "an IPv4 address, or off"},
@@ -80,9 +82,10 @@ struct SettingText {
 std::string setting_fix(const SettingText& setting) {
   const bool analog = setting.is_known() && setting.name.starts_with("AIN");
   const bool slot = poll_slot_of(Text(setting.name)) != 0;
+  const bool uart = uart_of(Text(setting.name)) != 0;
   for (const SettingHelp& each : settings_table) {
     if (each.name == setting.name || (analog && each.name.starts_with("AIN")) ||
-        (slot && each.name.starts_with("i2c"))) {
+        (slot && each.name.starts_with("i2c")) || (uart && each.name.starts_with("uart"))) {
       return "write " + std::string(setting.name) + ",value with " + std::string(each.values);
     }
   }

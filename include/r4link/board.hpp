@@ -259,6 +259,34 @@ class R4LINK_API Board {
   };
   I2c i2c() { return I2c(*this); }
 
+  // A UART of the user's, 1 or 2 (docs/devices.md): setting("uart1", "115200:8N1") turns it on,
+  // fields("DEFAULT,UART1") has the board tell what comes in. That is put together here from the states: in its
+  // order, each byte once, and what is missing is counted.
+  struct UartData {
+    std::vector<std::uint8_t> bytes;
+    std::uint64_t lost = 0;  // bytes that are missing in front of these or among them
+  };
+  class Uart {
+   public:
+    // 1 to 48 bytes; confirmed when the board has taken them all. May move something, so that it takes arm().
+    void write(const std::vector<std::uint8_t>& bytes, Duration timeout = default_timeout) const;
+    // What has come since the last read(), at most 64 KB: older bytes count as lost. Waits until there is
+    // something; nothing where it does not come in time.
+    UartData read(Duration timeout = Duration{0}) const;
+    // The same for each state that brings some, on the thread of the callbacks; from now on.
+    Subscription on_bytes(std::function<void(const UartData&)> callback) const;
+
+   private:
+    friend class Board;
+    Uart(Board& board, int channel) : board_(board), channel_(channel) {}
+    Board& board_;
+    int channel_;
+  };
+  // Throws Error{usage} where there is none.
+  Uart uart(int channel);
+  // A voltage of the board's, channel 1 or 2, 0-3300 mV; 0 in the safe state.
+  void dac(int channel, int millivolts, Duration timeout = default_timeout);
+
   // Channels count from 1, as on the board. A channel that does not exist throws at set().
   DriveChannel osmc(int channel) { return {*this, CommandKind::osmc, channel}; }
   DriveChannel dhb12(int channel) { return {*this, CommandKind::dhb12, channel}; }

@@ -13,26 +13,28 @@ namespace r4 {
 constexpr Text host_heartbeat_word("ROS2-R4");
 
 enum class CommandKind : std::uint8_t {
-  heartbeat,  // H:ROS2-R4
-  osmc,       // O:pwm,dir,ch
-  dhb12,      // D:pwm,dir,ch
-  servo,      // S:us,ch
-  relay,      // R:ch,On|Off
-  stop,       // E:STOP
-  clear,      // E:CLEAR,cause
-  leave,      // E:LEAVE
-  stepper,    // P:pos[,speed],ch
-  zero,       // Z:ch
-  bldc,       // B:speed,dir,brake,ch
-  proximity,  // U:cm,ch
-  fields,     // F:name,name…
-  setting,    // C:key,value
-  identify,   // Q:ID
-  watch,      // W:rate[,name,name…]
-  i2c_read,   // X:READ,address,register,count
-  i2c_write,  // X:WRITE,address,bytes[,count]
-  i2c_scan,   // X:SCAN
-  i2c_poll,   // X:POLL,address,register,count,period,slot and X:OFF,slot
+  heartbeat,   // H:ROS2-R4
+  osmc,        // O:pwm,dir,ch
+  dhb12,       // D:pwm,dir,ch
+  servo,       // S:us,ch
+  relay,       // R:ch,On|Off
+  stop,        // E:STOP
+  clear,       // E:CLEAR,cause
+  leave,       // E:LEAVE
+  stepper,     // P:pos[,speed],ch
+  zero,        // Z:ch
+  bldc,        // B:speed,dir,brake,ch
+  proximity,   // U:cm,ch
+  fields,      // F:name,name…
+  setting,     // C:key,value
+  identify,    // Q:ID
+  watch,       // W:rate[,name,name…]
+  i2c_read,    // X:READ,address,register,count
+  i2c_write,   // X:WRITE,address,bytes[,count]
+  i2c_scan,    // X:SCAN
+  i2c_poll,    // X:POLL,address,register,count,period,slot and X:OFF,slot
+  uart_write,  // X:UART,channel,bytes
+  dac,         // X:DAC,channel,mV
 };
 
 // One command. Which members count depends on `kind`; the factories set them. `text` and `text2`
@@ -42,13 +44,13 @@ struct R4LINK_API Command {
   CommandKind kind = CommandKind::heartbeat;
   std::uint8_t channel = 0;     // 1 … the kind's channel count; i2c_poll: the slot
   std::uint16_t period_ms = 0;  // i2c_poll
-  // pwm, us, cm, BLDC speed, stepper target, Hz; clear: the cause it names; i2c: the device's address
+  // pwm, us, cm, BLDC speed, stepper target, Hz, mV; clear: the cause it names; i2c: the device's address
   std::int32_t value = 0;
   std::int32_t speed = stepper_speed_default;  // stepper, steps per second
   Direction direction = Direction::reverse;    // osmc, dhb12, bldc
   bool on = false;                             // relay; bldc: brake
   std::uint8_t count = 0;                      // i2c: how many bytes to read; i2c_poll: 0 is off
-  // fields, watch: the list; setting: the key; i2c: the register or what is written, as "x3B"
+  // fields, watch: the list; setting: the key; i2c: the register or what is written, as "x3B"; uart: bytes
   Text text;
   Text text2;  // setting: the value
 
@@ -83,10 +85,14 @@ struct R4LINK_API Command {
   // The board reads by itself, every `period_ms`; the state tells it as I2C1 … I2C8.
   static Command i2c_poll(int slot, int address, Text register_bytes, int count, int period_ms);
   static Command i2c_poll_off(int slot);
+  // On a UART of the user's: at most uart_max_write bytes.
+  static Command uart_write(int channel, Text bytes);
+  // A voltage of the microcontroller's; 0 in the safe state.
+  static Command dac(int channel, std::int32_t millivolts);
 };
 
-// May it move something? Those are refused in the safe state: O D S R P B Z, and X:WRITE, for what is
-// written to a device of the user's may be an actuator's.
+// May it move something? Those are refused in the safe state: O D S R P B Z, X:DAC, and X:WRITE and
+// X:UART, for what is written to a device of the user's may be an actuator's.
 R4LINK_API bool drives_output(CommandKind kind);
 // May it be part of a group? O D S R P B Z.
 R4LINK_API bool joins_groups(CommandKind kind);

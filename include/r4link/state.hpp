@@ -103,7 +103,14 @@ enum class StateField : std::uint8_t {
   i2c8,
   i2cx,    // PNum,outcome,bytes of the newest single transfer
   i2cbus,  // outcome,errors,recoveries
-  fault,   // chip,trouble: ChipFault; 0,0: none
+  // the user's UARTs: position,lost,bytes
+  uart1,
+  uart2,
+  // millivolts
+  dac1,
+  dac2,
+  gpio,   // bit n-1 is input n, 0-255
+  fault,  // chip,trouble: ChipFault; 0,0: none
   count
 };
 constexpr int state_field_count = static_cast<int>(StateField::count);
@@ -158,7 +165,7 @@ class R4LINK_API FieldSet {
   friend bool operator!=(const FieldSet& a, const FieldSet& b) { return !(a == b); }
 
   static FieldSet paper_default();  // AIN24 … SERVO1POS
-  // But FAULT, which is sent where there is one, and what the user connects, I2C1 to I2CBUS.
+  // But FAULT, which is sent where there is one, and what the user connects, I2C1 to GPIO.
   static FieldSet all();
 
  private:
@@ -206,6 +213,9 @@ struct State {
   I2cReading i2c[i2c_slots];
   I2cAnswer i2c_answer;
   I2cBusReport i2c_bus;
+  UartBytes uart[uart_channels];
+  std::uint16_t dac_mv[dac_channels] = {};
+  std::uint8_t gpio = 0;
 
   // The same by the names of channels, as on the board: from 1. A channel that is not there reads 0.
   double volts(Analog input) const {
@@ -215,6 +225,9 @@ struct State {
   std::int32_t encoder(int channel) const { return reading(encoder_counts, channel); }
   std::int32_t steps(int channel) const { return reading(stepper_steps, channel); }
   int distance_cm(int channel) const { return reading(ultrasonic_cm, channel); }
+  bool input(int channel) const {
+    return channel >= 1 && channel <= gpio_channels && (gpio >> (channel - 1) & 1) != 0;
+  }
   bool relay(int channel) const {
     return channel >= 1 && channel <= relay_channels && (relays >> (channel - 1) & 1) != 0;
   }

@@ -150,6 +150,27 @@ struct I2cBusReport {
   std::uint32_t recoveries = 0;          // how often it was clocked free
 };
 
+// --- the user's UARTs, DAC and spare inputs (docs/devices.md)
+
+constexpr int uart_channels = 2;
+constexpr int uart_max_write = 48;  // bytes of one command
+constexpr int uart_max_bytes = 64;  // of one state
+constexpr std::uint32_t uart_min_baud = 1200;
+constexpr std::uint32_t uart_max_baud = 460800;
+constexpr int dac_channels = 2;
+constexpr std::int32_t dac_max_mv = 3300;
+constexpr int gpio_channels = 8;  // inputs
+
+// What a state carries of what came in on a UART. A state also repeats what was new in the one before it, where
+// there is room: one that is lost alone loses nothing then.
+struct UartBytes {
+  std::uint32_t position =
+      0;  // of the first of `data`, in all that was kept since the board began; wraps
+  std::uint32_t lost =
+      0;  // came damaged, or found no room, since the board began: not in the count above
+  DeviceBytes<uart_max_bytes> data;
+};
+
 // --- refusals
 
 // Why a board refuses a command: the code of `N:<PNum>,<code>` (docs/protocol.md).

@@ -39,7 +39,7 @@ class WordIndex {
 
  private:
   // Open addressing.
-  static constexpr unsigned slot_count = 256;
+  static constexpr unsigned slot_count = count < 128 ? 256 : 512;
   static_assert(count < slot_count / 2, "less than half full");
 
   static constexpr unsigned slot_of(Text word) {

@@ -43,6 +43,8 @@ Limits limits_of(CommandKind kind) {
       return {bldc_channels, 0, pwm_max};
     case CommandKind::proximity:
       return {ultrasonic_channels, 0, proximity_max_cm};
+    case CommandKind::dac:
+      return {dac_channels, 0, dac_max_mv};
     case CommandKind::heartbeat:
     case CommandKind::stop:
     case CommandKind::clear:
@@ -55,6 +57,7 @@ Limits limits_of(CommandKind kind) {
     case CommandKind::i2c_write:
     case CommandKind::i2c_scan:
     case CommandKind::i2c_poll:
+    case CommandKind::uart_write:
       break;
   }
   return {0, 0, 0};
@@ -188,6 +191,8 @@ bool drives_output(CommandKind kind) {
     case CommandKind::zero:
     case CommandKind::bldc:
     case CommandKind::i2c_write:
+    case CommandKind::uart_write:
+    case CommandKind::dac:
       return true;
     case CommandKind::heartbeat:
     case CommandKind::stop:
@@ -206,9 +211,7 @@ bool drives_output(CommandKind kind) {
   return false;
 }
 
-bool joins_groups(CommandKind kind) {
-  return drives_output(kind) && kind != CommandKind::i2c_write;
-}
+bool joins_groups(CommandKind kind) { return drives_output(kind) && !is_device_command(kind); }
 
 bool asks_to_stop(const Datagram& datagram) {
   for (const Field& field : datagram) {
@@ -375,6 +378,8 @@ void write_command(DatagramWriter& writer, const Command& command) {
     case CommandKind::i2c_write:
     case CommandKind::i2c_scan:
     case CommandKind::i2c_poll:
+    case CommandKind::uart_write:
+    case CommandKind::dac:
       write_device_command(writer, command);
       break;
   }

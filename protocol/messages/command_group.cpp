@@ -35,6 +35,8 @@ int GroupRules::row_of(CommandKind kind) {
     case CommandKind::i2c_write:
     case CommandKind::i2c_scan:
     case CommandKind::i2c_poll:
+    case CommandKind::uart_write:
+    case CommandKind::dac:
       break;
   }
   return -1;

@@ -116,6 +116,14 @@ Command Command::i2c_poll_off(int slot) {
   command.channel = number_of<std::uint8_t>(slot);
   return command;
 }
+Command Command::uart_write(int channel, Text bytes) {
+  Command command = of_channel(CommandKind::uart_write, 0, channel);
+  command.text = bytes;
+  return command;
+}
+Command Command::dac(int channel, std::int32_t millivolts) {
+  return of_channel(CommandKind::dac, millivolts, channel);
+}
 Command Command::identify() { return of_kind(CommandKind::identify); }
 
 }  // namespace r4

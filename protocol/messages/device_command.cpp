@@ -18,10 +18,11 @@ struct Word {
 constexpr Word words[] = {
     {"READ", CommandKind::i2c_read, 4, 4}, {"WRITE", CommandKind::i2c_write, 3, 4},
     {"SCAN", CommandKind::i2c_scan, 1, 1}, {"POLL", CommandKind::i2c_poll, 6, 6},
-    {"OFF", CommandKind::i2c_poll, 2, 2},
+    {"OFF", CommandKind::i2c_poll, 2, 2},  {"UART", CommandKind::uart_write, 3, 3},
+    {"DAC", CommandKind::dac, 3, 3},
 };
 constexpr std::size_t word_count = sizeof words / sizeof words[0];
-constexpr Text off_word = words[word_count - 1].text;
+constexpr Text off_word("OFF");
 constexpr Text off_value("off");
 
 // Commands that nobody is in a hurry for: of what they have in common there is one copy.
@@ -54,7 +55,7 @@ class Numbers {
   }
   // The command, if it is right: the graver of what was noted and what the command's check has found.
   R4_ONE_COPY Refusal take(const Command& command, Command& out) const {
-    const Refusal checked = check_device_command(command);
+    const Refusal checked = check_command(command);
     const Refusal refusal =
         noted_ == Refusal::format || checked == Refusal::none ? noted_ : checked;
     if (refusal == Refusal::none) out = command;
@@ -70,7 +71,7 @@ class Numbers {
 
 // `least` to `most` bytes, as text?
 Refusal check_bytes(Text text, std::size_t least, std::size_t most) {
-  std::uint8_t bytes[i2c_max_bytes];
+  std::uint8_t bytes[uart_max_write];
   std::uint8_t size = 0;
   const Refusal refusal = parse_bytes(text, bytes, most, size);
   return refusal == Refusal::none && size < least ? Refusal::range : refusal;
@@ -115,6 +116,12 @@ Refusal parse_device_command(const Field& field, Command& out) {
       command = count == 2 ? Command::i2c_poll_off(numbers.number(values[1]))
                            : numbers.poll(values + 1, numbers.number(values[5]));
       break;
+    case CommandKind::uart_write:
+      command = Command::uart_write(numbers.number(values[1]), values[2]);
+      break;
+    case CommandKind::dac:
+      command = Command::dac(numbers.number(values[1]), numbers.number(values[2]));
+      break;
     default:
       command = Command::i2c_scan();
       break;
@@ -124,6 +131,11 @@ Refusal parse_device_command(const Field& field, Command& out) {
 
 Refusal check_device_command(const Command& command) {
   if (command.kind == CommandKind::i2c_scan) return Refusal::none;
+  if (command.kind == CommandKind::uart_write) {
+    const Refusal bytes = check_bytes(command.text, 1, uart_max_write);
+    const bool there = command.channel >= 1 && command.channel <= uart_channels;
+    return bytes != Refusal::format && !there ? Refusal::channel : bytes;
+  }
   const bool polls = command.kind == CommandKind::i2c_poll;
   const bool writes = command.kind == CommandKind::i2c_write;
   const bool off = polls && command.count == 0;
@@ -148,6 +160,11 @@ void write_device_command(DatagramWriter& writer, const Command& command) {
   const bool off = polls && command.count == 0;
   writer.field("X").value(off ? off_word : word->text);
   if (command.kind == CommandKind::i2c_scan) return;
+  if (command.kind >= CommandKind::uart_write) {
+    writer.value(std::uint32_t{command.channel});
+    command.kind == CommandKind::dac ? writer.value(command.value) : writer.value(command.text);
+    return;
+  }
   if (!off) {
     writer.value(command.value).value(command.text);
     const bool counts = command.kind != CommandKind::i2c_write || command.count != 0;
@@ -200,6 +217,39 @@ Text write_poll(const I2cPoll& poll, char (&buffer)[max_poll_text]) {
   at = write_number(at, std::uint32_t{poll.count});
   *at++ = ':';
   at = write_number(at, std::uint32_t{poll.period_ms});
+  return Text(buffer, static_cast<std::size_t>(at - buffer));
+}
+
+Refusal parse_uart_mode(Text value, UartMode& out) {
+  UartMode mode;
+  if (value != off_value) {
+    constexpr std::size_t framing = 4;  // ":8N1"
+    if (value.size() <= framing) return Refusal::format;
+    const Text form = value.substr(value.size() - framing);
+    const Text baud = value.substr(0, value.size() - framing);
+    const char stop = form[3];
+    mode.parity = form[2];
+    mode.stop_bits = static_cast<std::uint8_t>(stop - '0');
+    const bool parity = mode.parity == 'N' || mode.parity == 'E' || mode.parity == 'O';
+    if (form[0] != ':' || form[1] != '8' || !parity || (stop != '1' && stop != '2')) {
+      return Refusal::format;
+    }
+    if (!parse_number(baud, mode.baud)) {
+      return is_whole_number(baud) ? Refusal::range : Refusal::format;
+    }
+    if (mode.baud < uart_min_baud || mode.baud > uart_max_baud) return Refusal::range;
+  }
+  out = mode;
+  return Refusal::none;
+}
+
+Text write_uart_mode(const UartMode& mode, char (&buffer)[max_uart_text]) {
+  if (!mode.on()) return off_value;
+  char* at = write_number(buffer, mode.baud);
+  *at++ = ':';
+  *at++ = '8';
+  *at++ = mode.parity;
+  *at++ = static_cast<char>('0' + mode.stop_bits);
   return Text(buffer, static_cast<std::size_t>(at - buffer));
 }
 

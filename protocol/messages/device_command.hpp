@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The commands for what the user connects: X, the I2C bus (docs/protocol.md, docs/devices.md).
+// The commands for what the user connects: X, the I2C bus, UARTs and DAC (docs/protocol.md, docs/devices.md).
 //
 // Bytes are written as x and two hexadecimal digits each, "x3B00", so that nobody takes them for a
 // number; "x" is none.
@@ -26,8 +26,20 @@ struct I2cPoll {
 bool operator==(const I2cPoll& a, const I2cPoll& b);
 inline bool operator!=(const I2cPoll& a, const I2cPoll& b) { return !(a == b); }
 
+// How a UART works.
+struct UartMode {
+  std::uint32_t baud = 0;  // 0: off
+  char parity = 'N';       // N, E, O
+  std::uint8_t stop_bits = 1;
+  bool on() const { return baud != 0; }
+};
+inline bool operator==(const UartMode& a, const UartMode& b) {
+  return a.baud == b.baud && a.parity == b.parity && a.stop_bits == b.stop_bits;
+}
+inline bool operator!=(const UartMode& a, const UartMode& b) { return !(a == b); }
+
 constexpr bool is_device_command(CommandKind kind) {
-  return kind >= CommandKind::i2c_read && kind <= CommandKind::i2c_poll;
+  return kind >= CommandKind::i2c_read && kind <= CommandKind::dac;
 }
 
 // As parse_command(), check_command() and write_command(), for those.
@@ -44,6 +56,12 @@ Refusal parse_poll(Text value, I2cPoll& out);
 // "255:xFFFF:32:60000"
 constexpr std::size_t max_poll_text = 24;
 Text write_poll(const I2cPoll& poll, char (&buffer)[max_poll_text]);
+
+// The same of "115200:8N1", 8 data bits always, or "off".
+Refusal parse_uart_mode(Text value, UartMode& out);
+// "460800:8N1"
+constexpr std::size_t max_uart_text = 16;
+Text write_uart_mode(const UartMode& mode, char (&buffer)[max_uart_text]);
 
 // Bytes as text. Refusal::format for what is none, ::range for more than `most`.
 Refusal parse_bytes(Text text, std::uint8_t* out, std::size_t most, std::uint8_t& size);

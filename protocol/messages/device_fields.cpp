@@ -46,6 +46,12 @@ bool parse_device(Text values, I2cBusReport& out) {
          parse_number(parts[1], out.errors) && parse_number(parts[2], out.recoveries);
 }
 
+bool parse_device(Text values, UartBytes& out) {
+  Text parts[value_count];
+  return take_values(values, parts) && parse_number(parts[0], out.position) &&
+         parse_number(parts[1], out.lost) && parse_data(parts[2], out.data);
+}
+
 void write_device(DatagramWriter& writer, const I2cReading& reading) {
   writer.value(reading.t_ms).value(reading.errors);
   write_bytes(writer, reading.data.bytes, reading.data.size);
@@ -59,6 +65,11 @@ void write_device(DatagramWriter& writer, const I2cAnswer& answer) {
 void write_device(DatagramWriter& writer, const I2cBusReport& report) {
   writer.value(static_cast<std::uint32_t>(report.newest)).value(report.errors);
   writer.value(report.recoveries);
+}
+
+void write_device(DatagramWriter& writer, const UartBytes& received) {
+  writer.value(received.position).value(received.lost);
+  write_bytes(writer, received.data.bytes, received.data.size);
 }
 
 }  // namespace r4

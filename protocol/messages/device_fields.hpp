@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The state fields of what the user connects, as values: I2C1 … I2C8, I2CX, I2CBUS (docs/protocol.md).
+// The state fields of what the user connects, as values: I2C1 … I2C8, I2CX, I2CBUS, UART1, UART2
+// (docs/protocol.md).
 #pragma once
 
 #include "../datagram/datagram_writer.hpp"
@@ -12,8 +13,10 @@ namespace r4 {
 bool parse_device(Text values, I2cReading& out);
 bool parse_device(Text values, I2cAnswer& out);
 bool parse_device(Text values, I2cBusReport& out);
+bool parse_device(Text values, UartBytes& out);
 void write_device(DatagramWriter& writer, const I2cReading& reading);
 void write_device(DatagramWriter& writer, const I2cAnswer& answer);
 void write_device(DatagramWriter& writer, const I2cBusReport& report);
+void write_device(DatagramWriter& writer, const UartBytes& received);
 
 }  // namespace r4

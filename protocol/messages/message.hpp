@@ -77,6 +77,9 @@ constexpr Text leave_capability("leave");
 constexpr Text watch_capability("watch");
 // It has an I2C bus for the user: X.
 constexpr Text i2c_capability("i2c");
+// UARTs: X:UART. A DAC and spare inputs: X:DAC, GPIO.
+constexpr Text uart_capability("uart");
+constexpr Text dac_capability("dac");
 // Is it one of those words?
 bool has_capability(Text capabilities, Text word);
 bool read_identity(const Datagram& datagram, Identity& out);

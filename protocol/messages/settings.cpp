@@ -89,14 +89,17 @@ class Lines {
   bool ok_ = true;
 };
 
+// The digit from 1 to `most` behind a prefix; 0: it is another key.
+int number_behind(Text prefix, int most, Text key) {
+  if (key.size() != prefix.size() + 1 || key.substr(0, prefix.size()) != prefix) return 0;
+  const int number = key[prefix.size()] - '0';
+  return number >= 1 && number <= most ? number : 0;
+}
+
 }  // namespace
 
-int poll_slot_of(Text key) {
-  const Text prefix("i2c");
-  if (key.size() != prefix.size() + 1 || key.substr(0, prefix.size()) != prefix) return 0;
-  const int slot = key[prefix.size()] - '0';
-  return slot >= 1 && slot <= i2c_slots ? slot : 0;
-}
+int poll_slot_of(Text key) { return number_behind("i2c", i2c_slots, key); }
+int uart_of(Text key) { return number_behind("uart", uart_channels, key); }
 
 Refusal set(Settings& settings, Text key, Text value) {
   for (const NumberSetting& setting : number_settings) {
@@ -105,13 +108,14 @@ Refusal set(Settings& settings, Text key, Text value) {
   if (key == Text("recovery")) return set_recovery(settings, value);
   if (key == Text("pack")) return set_pack(settings, value);
   if (const int slot = poll_slot_of(key)) return parse_poll(value, settings.polls[slot - 1]);
+  if (const int uart = uart_of(key)) return parse_uart_mode(value, settings.uarts[uart - 1]);
   return set(settings.site, key, value);
 }
 
 bool operator==(const Settings& a, const Settings& b) {
   return a.state_rate_hz == b.state_rate_hz && a.heartbeat_ms == b.heartbeat_ms &&
          a.timeout_ms == b.timeout_ms && a.recovery == b.recovery && a.pack == b.pack &&
-         same_elements(a.polls, b.polls) && a.site == b.site;
+         same_elements(a.polls, b.polls) && same_elements(a.uarts, b.uarts) && a.site == b.site;
 }
 
 bool write_settings(const Settings& settings, char* out, std::size_t capacity, Text& text) {
@@ -128,6 +132,13 @@ bool write_settings(const Settings& settings, char* out, std::size_t capacity, T
   for (int i = 0; i < i2c_slots; ++i) {
     key_text[3] = static_cast<char>('1' + i);
     if (settings.polls[i].on()) lines.add(Text(key_text, 4), write_poll(settings.polls[i], poll));
+  }
+  char uart_key[] = "uart1";
+  char mode[max_uart_text];
+  for (int i = 0; i < uart_channels; ++i) {
+    uart_key[4] = static_cast<char>('1' + i);
+    if (settings.uarts[i].on())
+      lines.add(Text(uart_key, 5), write_uart_mode(settings.uarts[i], mode));
   }
   char buffer[max_site_value];
   Text key;

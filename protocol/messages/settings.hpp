@@ -32,6 +32,7 @@ struct Settings {
   Recovery recovery = Recovery::last;
   bool pack = true;
   I2cPoll polls[i2c_slots];  // that are there when a session begins
+  UartMode uarts[uart_channels];
   SiteSettings site;
 
   std::uint32_t state_period_ms() const { return 1000U / state_rate_hz; }
@@ -48,6 +49,8 @@ Refusal set(Settings& settings, Text key, Text value);
 constexpr std::size_t max_settings_text = 1200;
 // The slot of a setting "i2c1" to "i2c8", from 1; 0: it is another one.
 int poll_slot_of(Text key);
+// The same of "uart1" and "uart2".
+int uart_of(Text key);
 
 bool write_settings(const Settings& settings, char* out, std::size_t capacity, Text& text);
 // Takes such lines, in any order. What is not known or not allowed is passed over: the text may be

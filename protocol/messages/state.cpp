@@ -26,6 +26,7 @@ enum class Form : std::uint8_t {
   reading,  // I2cReading
   answer,   // I2cAnswer
   bus,      // I2cBusReport
+  uart,     // UartBytes
 };
 
 struct Entry {
@@ -113,6 +114,11 @@ constexpr Entry table[] = {
     R4_ENTRY(i2c8, reading, "I2C8", i2c[7]),
     R4_ENTRY(i2cx, answer, "I2CX", i2c_answer),
     R4_ENTRY(i2cbus, bus, "I2CBUS", i2c_bus),
+    R4_ENTRY(uart1, uart, "UART1", uart[0]),
+    R4_ENTRY(uart2, uart, "UART2", uart[1]),
+    R4_ENTRY(dac1, u16, "DAC1", dac_mv[0]),
+    R4_ENTRY(dac2, u16, "DAC2", dac_mv[1]),
+    R4_ENTRY(gpio, u8, "GPIO", gpio),
     R4_ENTRY(fault, fault, "FAULT", fault),
 };
 #undef R4_ENTRY
@@ -208,6 +214,8 @@ bool parse_entry(Text text, const Entry& entry, State& state) {
       return parse_device(text, member<I2cAnswer>(state, entry));
     case Form::bus:
       return parse_device(text, member<I2cBusReport>(state, entry));
+    case Form::uart:
+      return parse_device(text, member<UartBytes>(state, entry));
   }
   return false;
 }
@@ -285,6 +293,9 @@ void write_field(DatagramWriter& writer, StateField field, const State& state) {
       break;
     case Form::bus:
       write_device(writer, member<I2cBusReport>(state, entry));
+      break;
+    case Form::uart:
+      write_device(writer, member<UartBytes>(state, entry));
       break;
   }
 }

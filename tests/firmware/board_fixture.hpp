@@ -121,7 +121,8 @@ struct Heard {
 class TestBoard {
  public:
   explicit TestBoard(Settings settings = {}, int port_count = 1, std::uint32_t start_ms = 500'000,
-                     firmware::UserI2c* i2c = nullptr)
+                     firmware::UserI2c* i2c = nullptr,
+                     firmware::UserUart (*uarts)[uart_channels] = nullptr)
       : now_ms(start_ms) {
     firmware::Application::Config config;
     config.identity.firmware = "1.2.3";
@@ -131,6 +132,7 @@ class TestBoard {
     const std::uint8_t chance[Authentication::chance_size] = {1, 2, 3};
     config.chance = chance;
     config.i2c = i2c;
+    for (int i = 0; i < uart_channels && uarts != nullptr; ++i) config.uarts[i] = &(*uarts)[i];
     application = std::make_unique<firmware::Application>(hal, config, &log);
     for (int i = 0; i < port_count; ++i) {
       ports[i].now_ms = &now_ms;

@@ -326,5 +326,28 @@ TEST(BoardHardware, TheSafeStateForgetsWhatWasWaiting) {
   EXPECT_TRUE(bench.board.pins().is_safe());
 }
 
+TEST(BoardHardware, SetsItsVoltagesAndTakesThemAwayInTheSafeState) {
+  Bench bench;
+  bench.boot();
+  Outputs outputs;
+  outputs.dac_mv[0] = 1650;
+  outputs.dac_mv[1] = 3300;
+  bench.apply(outputs);
+  EXPECT_EQ(bench.board.analog_output[0].millivolts, 1650);
+  EXPECT_EQ(bench.board.analog_output[1].millivolts, 3300);
+  bench.hardware.make_safe();
+  EXPECT_EQ(bench.board.analog_output[0].millivolts, 0);
+  EXPECT_EQ(bench.board.analog_output[1].millivolts, 0);
+}
+
+TEST(BoardHardware, SeesItsSpareInputs) {
+  Bench bench;
+  bench.boot();
+  firmware::Inputs inputs;
+  bench.board.gpio[2].high = bench.board.gpio[7].high = true;
+  bench.hardware.sample(inputs);
+  EXPECT_EQ(inputs.gpio, 0x84);
+}
+
 }  // namespace
 }  // namespace r4::firmware

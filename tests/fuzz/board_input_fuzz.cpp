@@ -53,6 +53,31 @@ bool within_ranges(const Outputs& outputs) {
 constexpr int ports = 2;
 constexpr std::uint32_t peers = 4;
 
+// A user's UART on which more comes in than can be told.
+class UserUartLine final : public firmware::UserUartPort {
+ public:
+  void set_up(const UartMode& mode) override {
+    require(!mode.on() || (mode.baud >= uart_min_baud && mode.baud <= uart_max_baud));
+    require(mode.stop_bits == 1 || mode.stop_bits == 2);
+  }
+  std::size_t receive(std::uint8_t* out, std::size_t size) override {
+    for (std::size_t i = 0; i < size; ++i) out[i] = static_cast<std::uint8_t>(i);
+    return size;
+  }
+  std::uint32_t take_lost() override { return 1; }
+  bool send(const std::uint8_t* bytes, std::size_t size) override {
+    require(size >= 1 && size <= uart_max_write);
+    for (std::size_t i = 0; i < size; ++i) sum_ += bytes[i];
+    waits_ = !waits_;
+    return waits_;
+  }
+  void drop() override { waits_ = false; }
+
+ private:
+  bool waits_ = false;
+  unsigned sum_ = 0;
+};
+
 // A user's bus on which something answers at every even address; it can be made to hold its lines.
 class UserBus final : public firmware::UserI2cPort {
  public:
@@ -98,6 +123,7 @@ class World final : public firmware::Hal, public firmware::Observer {
     if (keyed) config.settings.site.keys[0] = key();
     config.identity = Identity{"1", "fuzz", "none"};
     config.i2c = &i2c_;
+    for (int i = 0; i < uart_channels; ++i) config.uarts[i] = &uarts_[i];
     board_ = std::make_unique<firmware::Application>(*this, config, this);
     for (int i = 0; i < ports; ++i) {
       ports_[i].world = this;
@@ -382,6 +408,9 @@ class World final : public firmware::Hal, public firmware::Observer {
   Host hosts_[ports][peers];
   UserBus bus_;
   firmware::UserI2c i2c_{bus_};
+  UserUartLine lines_[uart_channels];
+  firmware::UserUart uarts_[uart_channels] = {firmware::UserUart(lines_[0]),
+                                              firmware::UserUart(lines_[1])};
   std::unique_ptr<firmware::Application> board_;
   int sent_ = 0;
   int executed_ = 0;

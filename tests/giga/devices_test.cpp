@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The user's bus of the Giga: its peripheral by the registers, and the board beside it.
+#include <cstring>
+
 #include "bench.hpp"
 #include "firmware/ports/giga/devices/user_i2c_controller.hpp"
+#include "firmware/ports/giga/devices/user_uart_controller.hpp"
 #include "firmware/ports/giga/pins.hpp"
 #include "protocol/messages/state_fields.hpp"
 
@@ -25,7 +28,9 @@ class GigaDevices : public testing::Test {
     std::size_t count = 0;
     for (const std::string& line : bench.usb_lines()) {
       Datagram datagram;
-      if (!read_datagram(line, datagram) || datagram.find("I2CBUS").name().empty()) continue;
+      if (!read_datagram(line, datagram) ||
+          datagram.find(Text(told, std::strlen(told))).name().empty())
+        continue;
       EXPECT_TRUE(read_state(datagram, state));
       ++count;
     }
@@ -41,6 +46,7 @@ class GigaDevices : public testing::Test {
   GigaBench bench;
   PlainHost host;
   State state;
+  const char* told = "I2CBUS";  // a field of the states that count
 };
 
 TEST(UserI2cTiming, KeepsTheLimitsOfStandardModeForEveryClock) {
@@ -133,6 +139,118 @@ TEST_F(GigaDevices, ALineThatIsHeldCostsTheBoardNothing) {
   bench.giga.user_i2c.hold_scl(false);
   states(300);
   EXPECT_LE(state.t_ms - state.i2c[0].t_ms, 20U);
+}
+
+// --- UARTs, DAC and spare inputs
+
+TEST(UserUartTiming, IsWithinOnePercentAtEveryRateAndClock) {
+  for (std::uint32_t mhz = 16; mhz <= 250; ++mhz) {
+    for (const std::uint32_t baud : {1200U, 9600U, 38400U, 115200U, 230400U, 460800U}) {
+      const giga::UartTiming timing = giga::user_uart_timing(mhz * 1000000, baud);
+      EXPECT_GE(timing.divider, 16U) << "RM0399: of 16 samples a bit";
+      EXPECT_LE(timing.divider, 0xFFFFU);
+      const double real = mhz * 1e6 / (1U << timing.prescaler) / timing.divider;
+      EXPECT_NEAR(real, baud, 0.015 * baud) << mhz;
+    }
+  }
+}
+
+// As the core has them (ArduinoCore-mbed, variants/GIGA: pins_arduino.h SERIAL2_TX 18, SERIAL2_RX 19, SERIAL3_TX 16,
+// SERIAL3_RX 17; variant.cpp D18 PD_5, D19 PD_6, D16 PH_13, D17 PI_9, A12 PA_4, A13 PA_5, D6 PD_13 … D13 PH_6; by
+// the data sheet PD5 and PD6 are USART2 by function 7, PH13 and PI9 UART4 by function 8).
+TEST(GigaPins, TheUsersUartsAreTheCoresSerial2AndSerial3) {
+  EXPECT_TRUE(giga::uart_tx_pins[0] == (giga::Pin{'D', 5}));
+  EXPECT_TRUE(giga::uart_rx_pins[0] == (giga::Pin{'D', 6}));
+  EXPECT_TRUE(giga::uart_tx_pins[1] == (giga::Pin{'H', 13}));
+  EXPECT_TRUE(giga::uart_rx_pins[1] == (giga::Pin{'I', 9}));
+  EXPECT_EQ(giga::uart_functions[0], 7U);
+  EXPECT_EQ(giga::uart_functions[1], 8U);
+  EXPECT_TRUE(giga::dac_pins[0] == (giga::Pin{'A', 4}));
+  EXPECT_TRUE(giga::dac_pins[1] == (giga::Pin{'A', 5}));
+  EXPECT_TRUE(giga::gpio_pins[0] == (giga::Pin{'D', 13}));
+  EXPECT_TRUE(giga::gpio_pins[7] == (giga::Pin{'H', 6}));
+}
+
+TEST_F(GigaDevices, AUartHearsEachByteOnceAndSendsWhatItIsTold) {
+  told = "UART1";
+  command("F:UART1,UART2");
+  command("C:uart1,115200:8N1");
+  command("C:uart2,460800:8E2");
+  EXPECT_NEAR(static_cast<double>(bench.giga.uart[0].byte_ns()), 86806, 900);
+  EXPECT_NEAR(static_cast<double>(bench.giga.uart[1].byte_ns()), 26042, 300);
+  bench.giga.uart[1].say("hello");
+  std::string sentence;
+  for (int i = 0; i < 60; ++i) sentence += static_cast<char>('A' + i % 26);
+  bench.giga.uart[0].say(sentence);
+  states(30);
+  EXPECT_EQ(state.uart[0].position + state.uart[0].data.size, 60U);
+  EXPECT_EQ(state.uart[0].lost, 0U);
+  EXPECT_EQ(state.uart[1].position + state.uart[1].data.size, 5U);
+  command("X:UART,1,x48656c6c6f");
+  states(20);
+  EXPECT_EQ(bench.giga.uart[0].sent, "Hello");
+  command("C:uart1,off");
+  bench.giga.uart[0].say("nobody hears it");
+  states(30);
+  EXPECT_EQ(state.uart[0].position + state.uart[0].data.size, 60U);
+}
+
+TEST_F(GigaDevices, WhatAUartHasNotSentWhenAStopComesIsDropped) {
+  command("C:uart1,1200:8N1");
+  command("X:UART,1,x" + std::string(96, '4'));
+  bench.run_ms(30);
+  command("E:STOP");
+  const std::size_t sent = bench.giga.uart[0].sent.size();
+  bench.run_ms(1000);
+  EXPECT_LE(bench.giga.uart[0].sent.size(), sent + 17)
+      << "what is in the peripheral: 16 bytes and one";
+}
+
+TEST_F(GigaDevices, NoiseOnTheUartsCostsTheBoardNothing) {
+  told = "UART1";
+  command("F:UART1,UART2");
+  command("C:uart1,460800:8N1");
+  command("C:uart2,460800:8N1");
+  bench.giga.uart[0].noise = bench.giga.uart[1].noise = true;
+  states(200);
+  EXPECT_NEAR(static_cast<double>(states(500)), 50, 2);
+  EXPECT_GT(state.uart[0].lost, 1000U);
+  EXPECT_TRUE(bench.active());
+  EXPECT_EQ(bench.pins().osmc[0].pwm, 358);
+  bench.usb()(host.command("E:STOP"));
+  const std::uint64_t sent_ns = bench.giga.now_ns();
+  while (!bench.pins().is_safe() && bench.giga.now_ns() - sent_ns < 20'000'000) bench.turn();
+  EXPECT_LE((bench.giga.now_ns() - sent_ns) / 1000, 3000U);
+  bench.run_ms(1100, host, bench.usb());
+  command("E:CLEAR");
+  command("O:358,1,1");
+  bench.run_ms(20, host, bench.usb());
+  EXPECT_EQ(bench.pins().osmc[0].pwm, 358);
+  bench.run_ms(1010);
+  EXPECT_TRUE(bench.pins().is_safe()) << "silence";
+}
+
+TEST_F(GigaDevices, AVoltageIsSetAndIsZeroInTheSafeState) {
+  command("X:DAC,1,1650");
+  command("X:DAC,2,3300");
+  EXPECT_EQ(DAC1->DHR12R1.value, 2048U);
+  EXPECT_EQ(DAC1->DHR12R2.value, 4095U);
+  EXPECT_EQ(DAC1->CR.value, 0x10001U);
+  EXPECT_EQ(DAC1->MCR.value, 0x20002U);
+  command("E:STOP");
+  EXPECT_EQ(DAC1->DHR12R1.value, 0U);
+  EXPECT_EQ(DAC1->DHR12R2.value, 0U);
+}
+
+TEST_F(GigaDevices, SpareInputsArePulledUp) {
+  told = "GPIO";
+  command("F:GPIO");
+  states(30);
+  EXPECT_EQ(state.gpio, 0xFF);
+  bench.giga.set_pin('B', 8, false);
+  bench.giga.set_pin('H', 6, false);
+  states(30);
+  EXPECT_EQ(state.gpio, 0x7B);
 }
 
 }  // namespace

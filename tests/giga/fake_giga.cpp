@@ -11,6 +11,9 @@
 GPIO_TypeDef r4_fake_gpio[11];
 I2C_TypeDef r4_fake_i2c2;
 I2C_TypeDef r4_fake_i2c4;
+USART_TypeDef r4_fake_usart2;
+USART_TypeDef r4_fake_uart4;
+DAC_TypeDef r4_fake_dac1;
 ADC_TypeDef r4_fake_adc1;
 FDCAN_GlobalTypeDef r4_fake_fdcan2;
 IWDG_TypeDef r4_fake_iwdg1;
@@ -44,6 +47,12 @@ void clear_registers() {
     auto* const words = reinterpret_cast<Register*>(i2c);
     for (std::size_t i = 0; i < sizeof *i2c / sizeof(Register); ++i) words[i].clear();
   }
+  for (USART_TypeDef* const uart : {&r4_fake_usart2, &r4_fake_uart4}) {
+    auto* const words = reinterpret_cast<Register*>(uart);
+    for (std::size_t i = 0; i < sizeof *uart / sizeof(Register); ++i) words[i].clear();
+  }
+  auto* const dac = reinterpret_cast<Register*>(&r4_fake_dac1);
+  for (std::size_t i = 0; i < sizeof r4_fake_dac1 / sizeof(Register); ++i) dac[i].clear();
   auto* const can = reinterpret_cast<Register*>(&r4_fake_fdcan2);
   for (std::size_t i = 0; i < sizeof r4_fake_fdcan2 / sizeof(Register); ++i) can[i].clear();
   auto* const converter = reinterpret_cast<Register*>(&r4_fake_adc1);
@@ -118,6 +127,8 @@ void Giga::connect_registers() {
   i2c.connect(r4_fake_i2c2, {&chips.osmc, &chips.dhb12, &chips.servo, &chips.expander, &chips.dac},
               2500);
   user_i2c.connect(r4_fake_i2c4, {&devices.mpu6050, &devices.ina219}, 10000);
+  uart[0].connect(r4_fake_usart2);
+  uart[1].connect(r4_fake_uart4);
   can.connect();
   connect_converter();
   r4_fake_iwdg1.KR.on_write = [this](std::uint32_t key) {

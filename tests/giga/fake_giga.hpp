@@ -24,6 +24,7 @@
 #include "transports/framing/can/can_frame.hpp"
 
 struct I2C_TypeDef;
+struct USART_TypeDef;
 
 namespace r4::fake {
 
@@ -76,6 +77,35 @@ class I2cPeripheral {
   bool scl_held_ = false;
   int hold_after_ = -1;
   int hold_clocks_ = 0;
+};
+
+// A USART between the firmware and a wire, by RM0399: FIFOs of 16 bytes, and a byte's time on the wire.
+class UartPeripheral {
+ public:
+  void connect(USART_TypeDef& registers);
+  // Somebody says that, from now on, as fast as the board listens.
+  void say(const std::string& bytes);
+  // Bytes without end, one in four damaged.
+  bool noise = false;
+  std::string sent;
+  std::uint64_t byte_ns() const;
+
+ private:
+  struct Byte {
+    char value;
+    bool damaged;
+  };
+  void pass();
+  bool on() const;
+
+  USART_TypeDef* registers_ = nullptr;
+  std::deque<char> to_say_;
+  std::deque<Byte> received_;
+  std::deque<char> to_send_;
+  std::uint64_t in_ns_ = 0;
+  std::uint64_t out_ns_ = 0;
+  std::uint32_t chance_ = 1;
+  bool overrun_ = false;
 };
 
 // The FDCAN controller and the bus behind it, by RM0399: 100 us a frame.
@@ -142,6 +172,7 @@ class Giga {
   I2cPeripheral i2c;
   sim::UserDevices devices;  // on the user's bus
   I2cPeripheral user_i2c;
+  UartPeripheral uart[uart_channels];
   CanPeripheral can;
   void set_pin(char port, int number, bool level);  // an input, from outside
   bool pin(char port, int number);                  // an output

@@ -20,12 +20,13 @@ THROUGH_INTERFACES = [
     ('Guard', 'BoardHardware', 'make_safe'),
     (r'switch_off_and_reset', 'BoardHardware', 'make_safe'),
     ('Machine|step|StepTick', 'Machine', 'step_tick'),
-    ('BoardHardware', 'Pca9685|Mcp23017|Mcp4728|I2cController|GpioInput|GpioOutput|AnalogValue',
+    ('BoardHardware', 'Pca9685|Mcp23017|Mcp4728|I2cController|GpioInput|GpioOutput|AnalogValue|DacOutput',
      'make_safe|want_safe|write|write_read|recover|read'),
     (r'ChipDriver\d+(?:begin|poll|write_changes|verify)', 'Pca9685|Mcp23017|Mcp4728',
      'want_safe|on_begin|set_up|on_write_changes|on_verify'),
     (r'ChipDriver\d+(?:send|fetch)|Pca9685|Mcp23017|Mcp4728', 'I2cController', 'write|write_read'),
     ('I2cController', 'BoardClock', 'now_us'),
+    ('UserUart', 'UserUartController', 'set_up|receive|take_lost|send|drop'),
     ('Stepper|UltrasonicSensors', 'GpioOutput', 'write'),
 ]
 TURNS = {'_ZN2r412write_numberEPcy': 3}

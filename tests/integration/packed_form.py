@@ -14,14 +14,15 @@ NAMES = [*'AIN24 AIN12 AIN5 AINDMH DMHSTA AINSTEER DHB1A OSMC1 STEP1POS SERVO1PO
          *'rate heartbeat timeout recovery pack last rearm'.split(),
          *'UNKNOWN FORMAT RANGE CHANNEL STALE DUPLICATE BUSY AUTH R4 sim udp serial pty can FAULT'.split(),
          *(f'ENC{n}HZ' for n in range(1, 5)), *(f'ENC{n}IDX' for n in range(1, 5)),
-         *(f'I2C{n}' for n in range(1, 9)), *'I2CX I2CBUS X FULL'.split()]
+         *(f'I2C{n}' for n in range(1, 9)), *'I2CX I2CBUS X FULL UART1 UART2 DAC1 DAC2 GPIO'.split()]
 CODES = {name: code for code, name in enumerate(NAMES)}
 # first code, last code, form
 FORMS = [(0x00, 0x03, 'hundredths'), (0x04, 0x04, 'flag'), (0x05, 0x05, 'hundredths'), (0x06, 0x07, 'drive'),
          (0x08, 0x08, 'steps'), (0x09, 0x09, 'short'), (0x0A, 0x0A, 'hundredths'), (0x0B, 0x10, 'drive'),
          (0x11, 0x13, 'steps'), (0x14, 0x22, 'short'), (0x23, 0x26, 'steps'), (0x27, 0x2A, 'count'),
          (0x2B, 0x2E, 'bldc'), (0x2F, 0x2F, 'count'), (0x30, 0x30, 'flag'), (0x31, 0x39, 'count'),
-         (0x6A, 0x71, 'steps'), (0x72, 0x7A, 'bytes')]
+         (0x6A, 0x71, 'steps'), (0x72, 0x7A, 'bytes'), (0x7E, 0x7F, 'bytes'),
+         (0x80, 0x82, 'count')]
 GIVEN = {2: NAMES[:10], 3: NAMES[:10] + ['SAFE', 'CMD'], 4: NAMES[:0x38]}
 HEARTBEATS = {5: 'R4-ROS2', 6: 'ROS2-R4'}
 SIZES = [(0, 0), (4, 5), (4, 8), (5, 8), (6, 8), (4, 11), (8, 8), (8, 11)]

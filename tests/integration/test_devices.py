@@ -42,6 +42,29 @@ def test_readings_come_with_every_state_and_end_with_the_session(board):
     assert after[0]['confirmed']
 
 
+def test_a_receiver_on_a_uart_a_voltage_and_inputs(board):
+    commands = ['C:uart1,115200:8N1', 'F:UART1,DAC1,GPIO', 'X:DAC,1,1650', 'X:UART,1,x2450']
+    with Running('send', board.host_url, *commands, '--hold', '30', '--json') as host:
+        for _ in commands:
+            assert host.next()['confirmed']
+        with Running('monitor', board.host_url, '--json') as watch:
+            states = [watch.next(is_state) for _ in range(40)]
+    assert states[-1]['fields']['DAC1'] == 1650 and states[-1]['fields']['GPIO'] == 255
+    text, position = b'', None
+    for each in states:
+        begin, lost, data = each['fields']['UART1']
+        assert lost == 0
+        data = bytes.fromhex(data[1:])
+        position = begin if position is None else position
+        assert SANITIZED or begin <= position
+        text += data[position - begin:]
+        position = begin + len(data)
+    assert SANITIZED or b'$GPRMC,' in text
+    off = run('send', board.host_url, 'X:UART,2,x24')
+    assert off.returncode == 3 and 'CHANNEL' in off.stderr or 'channel' in off.stderr, off.stderr
+    assert 'uart1,115200:8N1' in run('send', board.host_url, 'X:UART,1').stderr
+
+
 def test_a_bus_that_is_held_stops_nothing(tmp_path):
     scenario = tmp_path / 'held.txt'
     scenario.write_text('0 userbus held\n')

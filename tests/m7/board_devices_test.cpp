@@ -19,6 +19,42 @@ void read_all(Bench& host) {
   }
 }
 
+struct Longest {
+  std::uint32_t stop_us = 0;
+  std::uint32_t silence_ms = 0;
+};
+
+// The stream, silence and a stop of a board whose devices are as `trouble` leaves them.
+template <class Trouble>
+void expect_unhindered(Trouble trouble, Longest& longest) {
+  Bench& host = new_board();
+  const Steps steps(step_of_board);
+  host.drive_everything();
+  Listener& listener = host.listen();
+  trouble(host);
+  host.run_alive_ms(100);
+  listener.forget();
+  host.run_alive_ms(200);
+  EXPECT(listener.states() >= 19 && listener.lost() == 0 && listener.longest_step_ms() == 10);
+  EXPECT(!host.safe());
+
+  host.run_ms(timeout_ms + 10);
+  const std::uint32_t silence_ms = host.now_ms() - host.board().application().link().fed_ms();
+  EXPECT(host.safe() && host.reason() == SafeReason::link);
+  const std::uint32_t safe_ms =
+      silence_ms - (BoardClock::ticks() - host.safe_ticks()) / BoardClock::ticks_per_us / 1000;
+  if (safe_ms > longest.silence_ms) longest.silence_ms = safe_ms;
+
+  host.heartbeat();
+  host.run_ms(20);
+  EXPECT(!host.safe());
+  host.command(Command::stop());
+  host.run_ms(5);
+  const std::uint32_t took = (host.safe_ticks() - host.line_end_ticks()) / BoardClock::ticks_per_us;
+  EXPECT(host.safe() && host.reason() == SafeReason::stop);
+  if (took > longest.stop_us) longest.stop_us = took;
+}
+
 }  // namespace
 
 TEST(Devices, AreReadAndToldWithTheirTime) {
@@ -38,39 +74,52 @@ TEST(Devices, AreReadAndToldWithTheirTime) {
 
 // The stream, a stop and silence, with a bus that is free, held, and stretched for ever.
 TEST(Devices, ABusThatIsHeldCostsTheBoardNothing) {
-  std::uint32_t longest_stop_us = 0;
-  std::uint32_t longest_silence_ms = 0;
+  Longest longest;
   for (const Fault fault : {Fault::none, Fault::held, Fault::stretched}) {
-    Bench& host = new_board();
-    const Steps steps(step_of_board);
-    host.drive_everything();
-    Listener& listener = host.listen();
-    read_all(host);
-    host.model().devices().bus.set_fault(fault);
-    host.run_alive_ms(100);
-    listener.forget();
-    host.run_alive_ms(200);
-    EXPECT(listener.states() >= 19 && listener.lost() == 0 && listener.longest_step_ms() == 10);
-    EXPECT(!host.safe());
-
-    host.run_ms(timeout_ms + 10);
-    const std::uint32_t silence_ms = host.now_ms() - host.board().application().link().fed_ms();
-    EXPECT(host.safe() && host.reason() == SafeReason::link);
-    const std::uint32_t safe_ms =
-        silence_ms - (BoardClock::ticks() - host.safe_ticks()) / BoardClock::ticks_per_us / 1000;
-    if (safe_ms > longest_silence_ms) longest_silence_ms = safe_ms;
-
-    host.heartbeat();
-    host.run_ms(20);
-    EXPECT(!host.safe());
-    host.command(Command::stop());
-    host.run_ms(5);
-    const std::uint32_t took =
-        (host.safe_ticks() - host.line_end_ticks()) / BoardClock::ticks_per_us;
-    EXPECT(host.safe() && host.reason() == SafeReason::stop);
-    if (took > longest_stop_us) longest_stop_us = took;
+    expect_unhindered(
+        [fault](Bench& host) {
+          read_all(host);
+          host.model().devices().bus.set_fault(fault);
+        },
+        longest);
   }
-  on_target::say_number("us from a stop to safe, the user's bus held", longest_stop_us);
-  on_target::say_number("ms of silence until safe, the user's bus held", longest_silence_ms);
-  EXPECT(longest_stop_us <= 2000 && longest_silence_ms <= timeout_ms + 3);
+  on_target::say_number("us from a stop to safe, the user's bus held", longest.stop_us);
+  on_target::say_number("ms of silence until safe, the user's bus held", longest.silence_ms);
+  EXPECT(longest.stop_us <= 2000 && longest.silence_ms <= timeout_ms + 3);
+}
+
+TEST(Devices, NoiseOnTheUartsAtFullRateCostsTheBoardNothing) {
+  Longest longest;
+  expect_unhindered(
+      [](Bench& host) {
+        host.execute(Command::fields("UART1,UART2"));
+        host.execute(Command::setting("uart1", "460800:8N1"));
+        host.execute(Command::setting("uart2", "460800:8N1"));
+        for (sim::UserUartModel& uart : host.model().devices().uarts) {
+          uart.connect(sim::UartPeer::noise);
+        }
+      },
+      longest);
+  EXPECT(bench->model().devices().uarts[1].said() > 10000);
+  on_target::say_number("us from a stop to safe, noise on the UARTs", longest.stop_us);
+  on_target::say_number("ms of silence until safe, noise on the UARTs", longest.silence_ms);
+  EXPECT(longest.stop_us <= 2000 && longest.silence_ms <= timeout_ms + 3);
+}
+
+TEST(Devices, AReceiverIsHeardAndAVoltageIsZeroBehindAStop) {
+  Bench& host = new_board();
+  const Steps steps(step_of_board);
+  host.heartbeat();
+  host.run_ms(2);
+  Listener& listener = host.listen();
+  host.execute(Command::fields("UART1,DAC1,GPIO"));
+  host.execute(Command::setting("uart1", "115200:8N1"));
+  host.execute(Command::dac(1, 1650));
+  host.run_alive_ms(300);
+  const State& state = listener.state();
+  EXPECT(state.uart[0].position > 300 && state.uart[0].lost == 0);
+  EXPECT(state.dac_mv[0] == 1650 && host.model().dac_mv(1) == 1650 && state.gpio == 0xFF);
+  host.command(Command::stop());
+  host.run_ms(3);
+  EXPECT(host.model().dac_mv(1) == 0);
 }

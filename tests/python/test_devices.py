@@ -52,3 +52,31 @@ def test_for_asyncio(sim):
                 pass
             await board.i2c.poll_off(2)
     asyncio.run(main())
+
+
+def test_a_uart_brings_each_byte_once(board):
+    board.setting('uart1', '115200:8N1')
+    board.fields('DEFAULT,UART1,DAC1,GPIO')
+    text = b''
+    while len(text) < 800:
+        text += board.uart[1].read(timeout=5).data
+    assert b'$GPRMC,' in text and b'$GPGGA,' in text
+    assert board.next_state().uart1.position > 0
+    with pytest.raises(r4link.NotArmedError):
+        board.uart[1].write(b'$')
+    with pytest.raises(r4link.UsageError, match='uart'):
+        board.uart[3].read()
+
+
+def test_a_voltage_is_an_output_and_spare_inputs_are_bits(board, sim, wait):
+    board.fields('DEFAULT,DAC1,GPIO')
+    with pytest.raises(r4link.NotArmedError):
+        board.dac(1, 1650)
+    board.arm()
+    board.dac(1, 1650)
+    board.setting('uart2', '9600:8N1')
+    board.uart[2].write(b'ab')
+    sim.happen('gpio 3 low')
+    wait(lambda: board.state.dac1 == 1650 and board.state.gpio == 0xFB)
+    board.stop()
+    wait(lambda: board.state.dac1 == 0)

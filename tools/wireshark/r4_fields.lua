@@ -19,6 +19,11 @@ local forms = {
   datagrams = { { "", "uint32", "datagrams" } },
   commands = { { "", "uint32", "commands" } },
   periods = { { "", "uint32", "periods" } },
+  reading = { { "t", "uint32", "ms" }, { "errors", "uint32", "transfers" }, { "bytes", "string", "hex" } },
+  answer = { { "command", "uint32", "PNum" }, { "outcome", "uint8", "0-3" }, { "bytes", "string", "hex" } },
+  bus = { { "outcome", "uint8", "0-3" }, { "errors", "uint32", "transfers" }, { "recoveries", "uint32", "times" } },
+  received = { { "position", "uint32", "bytes" }, { "lost", "uint32", "bytes" }, { "bytes", "string", "hex" } },
+  voltage = { { "", "uint16", "mV" } },
   fault = { { "chip", "uint8", "address" }, { "trouble", "uint8", "bits" } },
 }
 
@@ -55,6 +60,12 @@ add("commands", "RXREF")
 add("periods", "LATE")
 numbered("speed", "ENC%dHZ", 1, 4)
 numbered("counts", "ENC%dIDX", 1, 4)
+numbered("reading", "I2C%d", 1, 8)
+add("answer", "I2CX")
+add("bus", "I2CBUS")
+numbered("received", "UART%d", 1, 2)
+numbered("voltage", "DAC%d", 1, 2)
+add("relays", "GPIO")
 add("fault", "FAULT")
 
 -- A command's values in their order. `last` takes all that are left, one by one; `maybe` may be left out.
@@ -71,6 +82,7 @@ local commands = {
   E = { title = "emergency", { "word", "string" }, { "cause", "uint32", last = true } },
   F = { title = "state fields wanted", { "name", "string", last = true } },
   C = { title = "setting", { "key", "string" }, { "value", "string", last = true } },
+  X = { title = "the user's devices", { "word", "string" }, { "value", "string", last = true } },
   Q = { title = "question", { "word", "string" } },
   W = { title = "watch", { "rate", "uint16" }, { "name", "string", last = true } },
   H = { title = "heartbeat", { "word", "string" } },

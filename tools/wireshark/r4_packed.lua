@@ -41,6 +41,8 @@ numbered("steps", "ENC%dIDX", 1, 4)
 numbered("bytes", "I2C%d", 1, 8)
 add("bytes", "I2CX")
 add("text", "I2CBUS X FULL")
+numbered("bytes", "UART%d", 1, 2)
+add("count", "DAC1 DAC2 GPIO")
 
 local given = { [2] = 10, [3] = 10, [4] = 0x38 } -- so many names from the first that a layout gives
 local sizes = { [0] = { 0, 0 }, { 4, 5 }, { 4, 8 }, { 5, 8 }, { 6, 8 }, { 4, 11 }, { 8, 8 }, { 8, 11 } }

@@ -27,13 +27,13 @@ Text board_id() {
   return Text(text, sizeof text);
 }
 
-firmware::Application::Config config_of(const Settings& settings, firmware::UserI2c& i2c) {
+firmware::Application::Config config_of(const Settings& settings, Machine& machine) {
   firmware::Application::Config config;
   config.identity.firmware = Text(R4LINK_VERSION);
   config.identity.board_id = board_id();
   config.identity.capabilities = Text("udp+serial+can");
   config.settings = settings;
-  config.i2c = &i2c;
+  machine.add_devices(config);
   static std::uint8_t chance[Authentication::chance_size];
   if (true_random(chance, sizeof chance)) config.chance = chance;
   return config;
@@ -110,7 +110,7 @@ BoardProgram::BoardProgram(Machine& machine, SettingsStore& store, const Setting
       // NOLINTNEXTLINE(performance-no-int-to-ptr): where the message RAM is
       fdcan_(*FDCAN2, reinterpret_cast<volatile std::uint32_t*>(SRAMCAN_BASE)),
       can_(fdcan_, settings.site.can_node, &BoardClock::now_us),
-      application_(machine.hardware(), config_of(settings, machine.user_i2c())),
+      application_(machine.hardware(), config_of(settings, machine)),
       report_(report_sources(last_boot)),
       used_(settings),
       kept_(settings),

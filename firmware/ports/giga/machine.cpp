@@ -45,6 +45,31 @@ void start_user_bus(UserI2cController& bus) {
   bus.start(HAL_RCCEx_GetD3PCLK1Freq());  // the clock of I2C4 after a reset (RCC_D3CCIPR)
 }
 
+UserUartController::Wiring uart_wiring(int channel) {
+  UserUartController::Wiring wiring;
+  wiring.registers = channel == 1 ? USART2 : UART4;
+  wiring.tx = uart_tx_pins[channel - 1];
+  wiring.rx = uart_rx_pins[channel - 1];
+  wiring.function = uart_functions[channel - 1];
+  return wiring;
+}
+
+void start_uarts(UserUartController& first, UserUartController& second) {
+  constexpr std::uint32_t rcc_usart2_and_uart4_on = 1U << 17 | 1U << 19;
+  {
+    const InterruptLock lock;
+    RCC->APB1LENR |= rcc_usart2_and_uart4_on;
+    static_cast<void>(static_cast<std::uint32_t>(RCC->APB1LENR));
+  }
+  // The clock of both after a reset (RCC_D2CCIP2R).
+  first.start(HAL_RCC_GetPCLK1Freq());
+  second.start(HAL_RCC_GetPCLK1Freq());
+}
+
+GpioInput spare_input(int channel) {
+  return GpioInput(line_of(gpio_pins[channel - 1]), LinePull::up);
+}
+
 void start_bus(I2cController& bus) {
   constexpr std::uint32_t rcc_i2c2_on = 1U << 22;
   {
@@ -86,11 +111,17 @@ Machine::Machine()
       trigger_{GpioOutput(line_of(trigger_pins[0])), GpioOutput(line_of(trigger_pins[1])),
                GpioOutput(line_of(trigger_pins[2])), GpioOutput(line_of(trigger_pins[3]))},
       handle_(line_of(handle_pin), LinePull::down),
+      gpio_{spare_input(1), spare_input(2), spare_input(3), spare_input(4),
+            spare_input(5), spare_input(6), spare_input(7), spare_input(8)},
+      dac_{DacOutput(1), DacOutput(2)},
       hardware_(bus_, pins(), hardware_config()),
       outputs_off_(bus_, hardware_),
       analog_(analog_values_),
       user_bus_(user_wiring()),
       user_i2c_(user_bus_),
+      uart1_(uart_wiring(1)),
+      uart2_(uart_wiring(2)),
+      uarts_{firmware::UserUart(uart1_), firmware::UserUart(uart2_)},
       encoder1_(encoder_a_pins[0], encoder_b_pins[0], index_pins[0]),
       encoder2_(encoder_a_pins[1], encoder_b_pins[1], index_pins[1]),
       encoder3_(encoder_a_pins[2], encoder_b_pins[2], index_pins[2]),
@@ -109,11 +140,19 @@ firmware::BoardPins Machine::pins() {
   for (int i = 0; i < ultrasonic_channels; ++i) pins.trigger[i] = &trigger_[i];
   for (int i = 0; i < analog_channels; ++i) pins.analog[i] = &analog_values_[i];
   pins.handle = &handle_;
+  for (int i = 0; i < dac_channels; ++i) pins.dac[i] = &dac_[i];
+  for (int i = 0; i < gpio_channels; ++i) pins.gpio[i] = &gpio_[i];
   return pins;
+}
+
+void Machine::add_devices(firmware::Application::Config& config) {
+  config.i2c = &user_i2c_;
+  for (int i = 0; i < uart_channels; ++i) config.uarts[i] = &uarts_[i];
 }
 
 void Machine::start(firmware::Guard& guard) {
   start_user_bus(user_bus_);
+  start_uarts(uart1_, uart2_);
   guard_ = &guard;
   step_duty_ = guard.add_duty(step_limit_ms);
   for (int i = 0; i < encoder_channels; ++i) {
@@ -144,6 +183,8 @@ void Machine::step_tick() {
   guard_->check_in(step_duty_);
   hardware_.step_tick();
   user_bus_.tick();
+  uart1_.tick();
+  uart2_.tick();
   for (int i = 0; i < encoder_channels; ++i) {
     hardware_.encoder(i + 1).index(encoders_[i]->index.read());
   }

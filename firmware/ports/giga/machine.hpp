@@ -5,13 +5,15 @@
 
 #include <cstdint>
 
+#include "../../application/application.hpp"
 #include "../../board_hardware.hpp"
-#include "../../devices/user_i2c.hpp"
 #include "../../guard.hpp"
 #include "analog_inputs.hpp"
 #include "chip/i2c_controller.hpp"
 #include "chip/timers.hpp"
+#include "devices/dac_output.hpp"
 #include "devices/user_i2c_controller.hpp"
+#include "devices/user_uart_controller.hpp"
 #include "pins.hpp"
 
 namespace r4 {
@@ -28,7 +30,8 @@ class Machine final : public StepTick {
 
   firmware::BoardHardware& hardware() { return hardware_; }
   I2cController& bus() { return bus_; }
-  firmware::UserI2c& user_i2c() { return user_i2c_; }
+  // What the application has to know of the user's devices.
+  void add_devices(firmware::Application::Config& config);
 
   void step_tick() override;
 
@@ -58,7 +61,10 @@ class Machine final : public StepTick {
 
   // Steps of the construction.
   struct PortsOn {
-    PortsOn() { start_ports(); }
+    PortsOn() {
+      start_ports();
+      start_dac();
+    }
   };
   struct OutputsOff {
     OutputsOff(I2cController& bus, firmware::BoardHardware& hardware);
@@ -73,12 +79,16 @@ class Machine final : public StepTick {
   GpioOutput direction_[stepper_channels];
   GpioOutput trigger_[ultrasonic_channels];
   GpioInput handle_;
+  GpioInput gpio_[gpio_channels];
+  DacOutput dac_[dac_channels];
   AnalogValue analog_values_[analog_channels];
   firmware::BoardHardware hardware_;
   OutputsOff outputs_off_;
   AnalogInputs analog_;
   UserI2cController user_bus_;
   firmware::UserI2c user_i2c_;
+  UserUartController uart1_, uart2_;
+  firmware::UserUart uarts_[uart_channels];
   firmware::Guard* guard_ = nullptr;
   firmware::Guard::Duty step_duty_ = 0;
   // GCC 7 and 8 would copy the elements of an array that a constructor makes (GCC bug 63707), and

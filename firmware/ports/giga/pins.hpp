@@ -56,6 +56,18 @@ constexpr Pin user_sda_pin = {'H', 12};
 constexpr std::uint32_t user_scl_function = 6;
 constexpr std::uint32_t user_sda_function = 4;
 
+// The user's UARTs, the core's Serial2 and Serial3: TX and RX of USART2 and UART4.
+constexpr Pin uart_tx_pins[uart_channels] = {{'D', 5}, {'H', 13}};  // D18 D16
+constexpr Pin uart_rx_pins[uart_channels] = {{'D', 6}, {'I', 9}};   // D19 D17
+constexpr std::uint32_t uart_functions[uart_channels] = {7, 8};
+
+// The user's voltages: DAC1.
+constexpr Pin dac_pins[dac_channels] = {{'A', 4}, {'A', 5}};  // A12 A13
+
+// Spare inputs, pulled up.
+constexpr Pin gpio_pins[gpio_channels] = {{'D', 13}, {'B', 4},  {'B', 8},  {'B', 9},
+                                          {'K', 1},  {'J', 10}, {'J', 11}, {'H', 6}};  // D6-D13
+
 // CAN: FDCAN2, alternate function 9. The Giga has no transceiver: an SN65HVD230 of the R4 board (paper,
 // section 2) is wired to these two (docs/can.md).
 constexpr Pin can_tx_pin = {'B', 13};

@@ -26,7 +26,7 @@ class BoardProgram {
       : clock_(static_cast<std::uint32_t>(seed)),
         model_(seed),
         hardware_(model_),
-        application_(hardware_.hal(), with_devices(config, hardware_.i2c())),
+        application_(hardware_.hal(), with_devices(config, hardware_)),
         link_(link),
         udp_(udp),
         link_number_(application_.add_port(link)),
@@ -88,8 +88,8 @@ class BoardProgram {
 
  private:
   static firmware::Application::Config with_devices(firmware::Application::Config config,
-                                                    firmware::UserI2c& i2c) {
-    config.i2c = &i2c;
+                                                    sim::SimulatedHardware& hardware) {
+    hardware.add_devices(config);
     return config;
   }
 

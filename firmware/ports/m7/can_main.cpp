@@ -92,6 +92,25 @@ class UserBus final : public firmware::UserI2cPort {
   volatile std::uint32_t wire_ = 1;
 };
 
+// The places of the UARTs.
+class UserUartPlace final : public firmware::UserUartPort {
+ public:
+  void set_up(const UartMode& mode) override { wire_ = mode.baud; }
+  std::size_t receive(std::uint8_t* out, std::size_t) override {
+    *out = static_cast<std::uint8_t>(wire_);
+    return wire_ & 1;
+  }
+  std::uint32_t take_lost() override { return wire_; }
+  bool send(const std::uint8_t* bytes, std::size_t) override {
+    wire_ = *bytes;
+    return true;
+  }
+  void drop() override { wire_ = 0; }
+
+ private:
+  volatile std::uint32_t wire_ = 0;
+};
+
 class Output final : public firmware::OutputPin {
  public:
   void write(bool high) override { level_ = high; }
@@ -105,6 +124,13 @@ class Input final : public firmware::InputPin {
 
  private:
   volatile bool level_ = true;
+};
+class AnalogOutput final : public firmware::AnalogOutputPin {
+ public:
+  void write(std::uint16_t millivolts) override { millivolts_ = millivolts; }
+
+ private:
+  volatile std::uint16_t millivolts_ = 0;
 };
 class Converter final : public firmware::AnalogPin {
  public:
@@ -120,6 +146,7 @@ struct Hardware {
   Output pin;
   Input handle;
   Converter converter;
+  AnalogOutput analog_output;
   firmware::BoardHardware channels{bus, pins(), {}};
 
   firmware::BoardPins pins() {
@@ -129,6 +156,8 @@ struct Hardware {
     for (auto& each : pins.trigger) each = &pin;
     for (auto& each : pins.analog) each = &converter;
     pins.handle = &handle;
+    for (auto& each : pins.dac) each = &analog_output;
+    for (auto& each : pins.gpio) each = &handle;
     return pins;
   }
 };
@@ -159,6 +188,10 @@ int main() {
   static UserBus user_bus;
   static firmware::UserI2c i2c(user_bus);
   config.i2c = &i2c;
+  static UserUartPlace uart_places[uart_channels];
+  static firmware::UserUart uarts[uart_channels] = {firmware::UserUart(uart_places[0]),
+                                                    firmware::UserUart(uart_places[1])};
+  for (int i = 0; i < uart_channels; ++i) config.uarts[i] = &uarts[i];
   static firmware::Application application(hal, config);
   static_assert(firmware::Application::max_ports >= 2, "each port has a place");
   const std::uint8_t link_number = application.add_port(link);

@@ -170,6 +170,25 @@ void read_device(const Line& line, ScriptStep& step) {
   step.value = supply_of(line, "device");
 }
 
+void read_uart(const Line& line, ScriptStep& step) {
+  static constexpr std::string_view peers[uart_peer_count] = {"off", "loop", "gnss", "lidar",
+                                                              "noise"};
+  step.channel = channel_of(line, uart_channels, "UART of the user's");
+  const auto* const peer = std::find(std::begin(peers), std::end(peers), line.words[2]);
+  if (peer == std::end(peers)) {
+    fail(line, line.words[2], "is nobody at a UART", "write gnss, lidar, loop, noise or off");
+  }
+  step.value = static_cast<std::int32_t>(peer - std::begin(peers));
+}
+
+void read_gpio(const Line& line, ScriptStep& step) {
+  step.channel = channel_of(line, gpio_channels, "spare input");
+  if (line.words[2] != "low" && line.words[2] != "high") {
+    fail(line, line.words[2], "is nothing an input can be", "write low or high");
+  }
+  step.value = line.words[2] == "high" ? 1 : 0;
+}
+
 void read_hang(const Line& line, ScriptStep& step) {
   step.value = static_cast<std::int32_t>(
       milliseconds_of(line, line.words[1], "write for how long, in seconds such as 0.3"));
@@ -192,6 +211,8 @@ constexpr Form forms[] = {
     {"i2c", 2, "i2c held|free", ScriptStep::Kind::i2c, read_i2c},
     {"userbus", 2, "userbus held|cut|stretched|free", ScriptStep::Kind::user_bus, read_user_bus},
     {"device", 3, "device NAME off|on|reset", ScriptStep::Kind::device, read_device},
+    {"uart", 3, "uart UART gnss|lidar|loop|noise|off", ScriptStep::Kind::uart, read_uart},
+    {"gpio", 3, "gpio INPUT low|high", ScriptStep::Kind::gpio, read_gpio},
     {"hang", 2, "hang SECONDS", ScriptStep::Kind::hang, read_hang},
     {"fault", 1, "fault", ScriptStep::Kind::fault, nullptr},
     {"watchdog", 1, "watchdog", ScriptStep::Kind::watchdog, nullptr},

@@ -15,6 +15,9 @@
 //                               seen nine clocks; stretched: it holds SCL
 //     2   device ina219 off     that device of the user's answers nothing, until it is on; reset: it loses
 //                               its supply for a moment. mpu6050, ina219
+//     2   uart 1 noise          who is at the other end of that UART of the user's: gnss, lidar, loop (TX joined
+//                               to RX), noise, off
+//     2   gpio 3 low            that spare input is pulled down, until it is high
 //     2   hang 0.3              the firmware's loop stands still for 0.3 s; what arrives is lost
 //     3   fault                 the board finds itself broken
 //     3   watchdog              a duty of the board missed its deadline
@@ -42,6 +45,8 @@ struct ScriptStep {
     i2c,
     user_bus,
     device,
+    uart,
+    gpio,
     hang,
     fault,
     watchdog,
@@ -52,10 +57,10 @@ struct ScriptStep {
 
   Kind kind = Kind::handle;
   std::uint32_t at_ms = 0;
-  int channel =
-      0;  // ultrasonic, encoder, motor: 1 …; analog: an Analog; chip: a Chip; device: a UserDevice
-  // 1 held (handle, i2c) or stalled; cm or off; counts; hundredths of a volt; a Supply; ms;
-  // user_bus: a UserBusModel::Fault
+  // ultrasonic, encoder, motor, uart, gpio: 1 …; analog: an Analog; chip: a Chip; device: a UserDevice
+  int channel = 0;
+  // 1 held (handle, i2c), stalled or high; cm or off; counts; hundredths of a volt; a Supply; ms;
+  // user_bus: a UserBusModel::Fault; uart: a UartPeer
   std::int32_t value = 0;
   std::string text;  // the line without its time, "handle released"
 };

@@ -94,7 +94,7 @@ void SimulatedBoard::reset_microcontroller() {
   config.settings = options_.settings;
   const auto random_bytes = chance();
   config.chance = random_bytes.data();
-  config.i2c = &hardware_->i2c();
+  hardware_->add_devices(config);
   Observer& observer = *this;
   application_.emplace(hardware_->hal(), config, &observer);
   for (const auto& port : ports_) port->number = application_->add_port(*port);
@@ -218,6 +218,12 @@ void SimulatedBoard::take(const ScriptStep& step) {
       model_.devices().bus.connect(device, supply != ScriptStep::Supply::off);
       break;
     }
+    case ScriptStep::Kind::uart:
+      model_.devices().uarts[step.channel - 1].connect(static_cast<UartPeer>(step.value));
+      break;
+    case ScriptStep::Kind::gpio:
+      model_.set_gpio(step.channel, step.value != 0);
+      break;
     case ScriptStep::Kind::hang:
       hangs_until_ = passed_ + Milliseconds(step.value);
       break;

@@ -19,13 +19,15 @@ constexpr int ticks_per_ms = 40;
 SimulatedHardware::SimulatedHardware(BoardModel& board)
     : board_(board),
       hardware_(board.chips().bus, board.microcontroller_pins(), config()),
-      i2c_(board.devices().bus) {
+      i2c_(board.devices().bus),
+      uarts_{firmware::UserUart(board.devices().uarts[0]),
+             firmware::UserUart(board.devices().uarts[1])} {
   static_assert(firmware::BoardHardware::Config().step_tick_hz == 1000 * ticks_per_ms, "");
 }
 
 void SimulatedHardware::power_up() {
   hardware_.power_up(now_us_);
-  board_.devices().bus.reset();
+  board_.devices().reset();
   board_.tell_levels(*this);
   for (int i = 0; i < boot_ms; ++i) pass_millisecond();
 }

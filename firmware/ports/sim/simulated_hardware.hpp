@@ -5,8 +5,8 @@
 
 #include <cstdint>
 
+#include "../../application/application.hpp"
 #include "../../board_hardware.hpp"
-#include "../../devices/user_i2c.hpp"
 #include "robot/board_model.hpp"
 
 namespace r4 {
@@ -25,6 +25,11 @@ class SimulatedHardware final : private BoardModel::Interrupts {
 
   firmware::BoardHardware& hal() { return hardware_; }
   firmware::UserI2c& i2c() { return i2c_; }
+  // What the application has to know of the user's devices.
+  void add_devices(firmware::Application::Config& config) {
+    config.i2c = &i2c_;
+    for (int i = 0; i < uart_channels; ++i) config.uarts[i] = &uarts_[i];
+  }
 
   // For a chip's EEPROM that is written for the first time, and a handle that settles.
   static constexpr int boot_ms = 100;
@@ -41,6 +46,7 @@ class SimulatedHardware final : private BoardModel::Interrupts {
   BoardModel& board_;
   firmware::BoardHardware hardware_;
   firmware::UserI2c i2c_;
+  firmware::UserUart uarts_[uart_channels];
   std::uint32_t now_us_ = 0;  // of the microcontroller's clock; wraps
 };
 

@@ -33,6 +33,7 @@ py::object to_python(const Bldc& bldc);
 py::object to_python(const I2cReading& reading);
 py::object to_python(const I2cAnswer& answer);
 py::object to_python(const I2cBusReport& report);
+py::object to_python(const UartBytes& received);
 
 // What a field holds, and its numbers as they are on the wire: volts in hundredths.
 enum class Form : std::uint8_t {
@@ -45,7 +46,8 @@ enum class Form : std::uint8_t {
   fault,
   reading,
   answer,
-  bus
+  bus,
+  uart
 };
 using Numbers = std::array<std::int64_t, 3>;
 Form form_of(StateField field);

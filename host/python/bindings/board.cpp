@@ -170,6 +170,13 @@ py::tuple run_loop(PyBoard& board, const control::LoopOptions& options, const py
   return py::make_tuple(to_text(report.end), report.why, report.at_rest, report.steps);
 }
 
+py::object uart_data(const Board::UartData& data) {
+  static const py::handle type =
+      py::module_::import("r4link.values").attr("UartData").cast<py::object>().release();
+  return type(py::bytes(reinterpret_cast<const char*>(data.bytes.data()), data.bytes.size()),
+              data.lost);
+}
+
 // What a call that waits returns, as Python has it.
 template <class Call>
 py::bytes bytes_of(Call call) {
@@ -242,6 +249,21 @@ void bind_board(py::module_& module) {
       .def(
           "i2c_poll_off",
           [](PyBoard& board, int slot, int ms) { board->i2c().poll_off(slot, Ms(ms)); }, Released())
+      .def(
+          "uart_write",
+          [](PyBoard& board, int channel, const std::string& bytes, int ms) {
+            board->uart(channel).write({bytes.begin(), bytes.end()}, Ms(ms));
+          },
+          Released())
+      .def("uart_read",
+           [](PyBoard& board, int channel, int ms) {
+             Board::UartData data;
+             {
+               const py::gil_scoped_release free;
+               data = board->uart(channel).read(Ms(ms));
+             }
+             return uart_data(data);
+           })
       .def(
           "apply",
           [](PyBoard& board, const Setpoints& setpoints, int ms) {

@@ -142,6 +142,8 @@ std::pair<std::string, const char*> column_of(StateField field, std::size_t whic
     case Form::bus:
       if (which == 0) return {name + "_outcome", "u1"};
       return {name + (which == 1 ? "_errors" : "_recoveries"), "u4"};
+    case Form::uart:
+      return {name + (which == 0 ? "_position" : "_lost"), "u4"};
     case Form::number:
       break;
   }

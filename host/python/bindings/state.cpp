@@ -39,6 +39,7 @@ Form form_of(F field) {
   if (nth(field, F::i2c1, F::i2c8) >= 0) return Form::reading;
   if (field == F::i2cx) return Form::answer;
   if (field == F::i2cbus) return Form::bus;
+  if (nth(field, F::uart1, F::uart2) >= 0) return Form::uart;
   return field == F::fault ? Form::fault : Form::number;
 }
 
@@ -69,7 +70,13 @@ Numbers numbers_of(const State& state, F field) {
   if (const int n = nth(field, F::i2c1, F::i2c8); n >= 0) {
     return {state.i2c[n].t_ms, state.i2c[n].errors};
   }
+  if (const int n = nth(field, F::uart1, F::uart2); n >= 0) {
+    return {state.uart[n].position, state.uart[n].lost};
+  }
+  if (const int n = nth(field, F::dac1, F::dac2); n >= 0) return {state.dac_mv[n]};
   switch (field) {
+    case F::gpio:
+      return {state.gpio};
     case F::ainsteer:
       return {state.analog_cv[static_cast<int>(Analog::ainsteer)]};
     case F::ain6:
@@ -130,6 +137,8 @@ py::object value_of(const State& state, F field) {
       return to_python(state.i2c_answer);
     case Form::bus:
       return to_python(state.i2c_bus);
+    case Form::uart:
+      return to_python(state.uart[nth(field, F::uart1, F::uart2)]);
     case Form::number:
       break;
   }
@@ -211,6 +220,7 @@ Numbers numbers_from(F field, const py::handle& value) {
     case Form::reading:
     case Form::answer:
     case Form::bus:
+    case Form::uart:
       return {};  // set_numbers() tells that
   }
   return {value.cast<std::int64_t>()};

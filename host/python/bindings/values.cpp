@@ -112,6 +112,11 @@ py::object to_python(const I2cBusReport& report) {
   return type(to_text(report.newest), report.errors, report.recoveries);
 }
 
+py::object to_python(const UartBytes& received) {
+  static const py::handle type = named("UartBytes");
+  return type(received.position, received.lost, bytes_of(received.data));
+}
+
 void bind_values(py::module_& module) {
   bind_commands(module);
   Record<LinkStatus>(module, "LinkStatus")

@@ -3,14 +3,14 @@
 from . import aio, control
 from ._core import (FIELDS, BoardHealth, CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State,
                     Statistics, Subscription, Wire, __version__)
-from .board import (BldcChannel, Board, DriveChannel, I2c, RelayChannel, ServoChannel, Setpoints, States, StepperChannel)
+from .board import (BldcChannel, Board, DriveChannel, I2c, RelayChannel, ServoChannel, Setpoints, States, StepperChannel, Uart)
 from .bridge import Bridge, BridgeCounters, BridgeEnd, BridgeStatus
 from .errors import (CancelledError, ClosedError, DataError, DeniedError, Error, NotArmedError, NotConfirmedError,
                      OpenError, RefusedError, UnsupportedError, UsageError)
 from .fleet import Fleet, FleetEvent, FleetResults
 from .recording import Log, RecordedBoard, RecordedDatagram, RecordedEvent, read
 from .simulation import LinkedUrl, Look, SimBoard, with_link
-from .values import Bldc, Direction, Drive, I2cAnswer, I2cBusReport, I2cReading, PostResult
+from .values import Bldc, Direction, Drive, I2cAnswer, I2cBusReport, I2cReading, PostResult, UartBytes, UartData
 
 FORWARD = Direction.FORWARD
 REVERSE = Direction.REVERSE
@@ -22,6 +22,6 @@ __all__ = [
     'I2cBusReport', 'I2cReading', 'Identity', 'LinkStatus', 'LinkedUrl', 'Log', 'Look', 'NotArmedError',
     'NotConfirmedError', 'OpenError', 'PostResult', 'REVERSE', 'RecordedBoard', 'RecordedDatagram', 'RecordedEvent',
     'Recording', 'RefusedError', 'RefusedPost', 'RelayChannel', 'ServoChannel', 'Setpoints', 'SimBoard', 'State',
-    'States', 'Statistics', 'StepperChannel', 'Subscription', 'UnsupportedError', 'UsageError', 'Wire', 'aio', 'control',
+    'States', 'Statistics', 'StepperChannel', 'Subscription', 'Uart', 'UartBytes', 'UartData', 'UnsupportedError', 'UsageError', 'Wire', 'aio', 'control',
     'read', 'with_link', '__version__',
 ]

@@ -5,7 +5,7 @@ from datetime import datetime
 from types import TracebackType
 from typing import Any, Callable, Self, Sequence, Type, overload
 
-from .values import Bldc, Drive, I2cAnswer, I2cBusReport, I2cReading
+from .values import Bldc, Drive, I2cAnswer, I2cBusReport, I2cReading, UartBytes, UartData
 
 __version__: str
 FIELDS: tuple[str, ...]
@@ -290,6 +290,11 @@ class State:
     i2c8: I2cReading
     i2cx: I2cAnswer
     i2cbus: I2cBusReport
+    uart1: UartBytes
+    uart2: UartBytes
+    dac1: int
+    dac2: int
+    gpio: int
 
 class Command:
     @staticmethod
@@ -435,6 +440,8 @@ class Board:
     def i2c_scan(self, ms: int, /) -> bytes: ...
     def i2c_poll(self, slot: int, address: int, at: bytes, count: int, period_ms: int, ms: int, /) -> None: ...
     def i2c_poll_off(self, slot: int, ms: int, /) -> None: ...
+    def uart_write(self, channel: int, data: bytes, ms: int, /) -> None: ...
+    def uart_read(self, channel: int, ms: int, /) -> UartData: ...
     def apply(self, setpoints: Setpoints, ms: int, /) -> None: ...
     def arm(self, ms: int, /) -> None: ...
     def disarmed_by(self) -> str: ...

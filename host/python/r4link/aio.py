@@ -25,7 +25,7 @@ from . import board as blocking
 from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State, Statistics,
                     Subscription, Wire)
 from .board import Setpoints
-from .values import Direction, PostResult
+from .values import Direction, PostResult, UartData
 
 T = TypeVar('T')
 
@@ -188,6 +188,28 @@ class I2c:
         await self._commands.call(lambda: self._i2c.poll_off(slot, timeout))
 
 
+class Uart:
+    """A UART of the user's, as r4link.Uart."""
+
+    def __init__(self, board: Board, channel: int) -> None:
+        self._commands = board._commands
+        self._uart = board._board.uart[channel]
+
+    async def write(self, data: bytes, timeout: float = 1.0) -> None:
+        await self._commands.call(lambda: self._uart.write(data, timeout))
+
+    async def read(self, timeout: float = 0.0) -> UartData:
+        return await self._commands.call(lambda: self._uart.read(timeout))
+
+
+class _Uarts:
+    def __init__(self, board: Board) -> None:
+        self._board = board
+
+    def __getitem__(self, channel: int) -> Uart:
+        return Uart(self._board, channel)
+
+
 class Board:
     """r4link.Board for asyncio; takes the same options. What does not wait is no coroutine there either."""
 
@@ -238,6 +260,14 @@ class Board:
     @property
     def i2c(self) -> I2c:
         return I2c(self)
+
+    @property
+    def uart(self) -> _Uarts:
+        """uart[1] and uart[2]."""
+        return _Uarts(self)
+
+    async def dac(self, channel: int, millivolts: int, timeout: float = 1.0) -> None:
+        await self.send(f'X:DAC,{channel},{millivolts}', timeout)
 
     async def proximity(self, channel: int, threshold_cm: int, timeout: float = 1.0) -> None:
         await self.send(Command.proximity(channel, threshold_cm), timeout)

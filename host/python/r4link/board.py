@@ -17,7 +17,7 @@ from . import _core
 from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State, Statistics,
                     Subscription, Wire)
 from .errors import UsageError
-from .values import Direction, PostResult
+from .values import Direction, PostResult, UartData
 
 F = TypeVar('F', bound=Callable[..., Any])
 _MOST_S = 24 * 3600.0
@@ -166,6 +166,31 @@ class I2c:
 
     def poll_off(self, slot: int, timeout: float = 1.0) -> None:
         self._board._core.i2c_poll_off(slot, _ms(timeout))
+
+
+class Uart:
+    """A UART of the user's, 1 or 2 (docs/devices.md): setting('uart1', '115200:8N1') turns it on,
+    fields('DEFAULT,UART1') has the board tell what comes in."""
+
+    def __init__(self, board: Board, channel: int) -> None:
+        self._board, self._channel = board, channel
+
+    def write(self, data: bytes, timeout: float = 1.0) -> None:
+        """1 to 48 bytes; returns when the board has taken them all. May move something, so that it takes arm()."""
+        self._board._core.uart_write(self._channel, bytes(data), _ms(timeout))
+
+    def read(self, timeout: float = 0.0) -> UartData:
+        """What has come since the last read(), at most 64 KB: older bytes count as lost. Waits until there is
+        something; nothing where it does not come in time."""
+        return self._board._core.uart_read(self._channel, _ms(timeout))
+
+
+class _Uarts:
+    def __init__(self, board: Board) -> None:
+        self._board = board
+
+    def __getitem__(self, channel: int) -> Uart:
+        return Uart(self._board, channel)
 
 
 def _register(register: int | bytes) -> bytes:
@@ -318,6 +343,15 @@ class Board:
     @property
     def i2c(self) -> I2c:
         return I2c(self)
+
+    @property
+    def uart(self) -> _Uarts:
+        """uart[1] and uart[2]."""
+        return _Uarts(self)
+
+    def dac(self, channel: int, millivolts: int, timeout: float = 1.0) -> None:
+        """A voltage of the board's, channel 1 or 2, 0-3300 mV; 0 in the safe state."""
+        self.send(f'X:DAC,{channel},{millivolts}', timeout)
 
     def proximity(self, channel: int, threshold_cm: int, timeout: float = 1.0) -> None:
         """The board goes safe when something is nearer than that; 0: off."""

@@ -48,6 +48,20 @@ class I2cBusReport(NamedTuple):
     recoveries: int
 
 
+class UartBytes(NamedTuple):
+    """What a state says of a UART: where its bytes begin in all that was kept, how many the board has lost, and the
+    bytes, of which some were in the state before."""
+    position: int
+    lost: int
+    data: bytes
+
+
+class UartData(NamedTuple):
+    """What has come in on a UART: each byte once, in order; `lost`: how many are missing before or among them."""
+    data: bytes
+    lost: int
+
+
 class PostResult(enum.Enum):
     """What became of what was posted; true where it was sent."""
     SENT = 'sent'

@@ -284,7 +284,7 @@ TEST_F(ApplicationCommand, AnswersWhereTheQuestionCameFrom) {
 }
 
 TEST_F(ApplicationCommand, AnswersTheQuestionWhoItIsInAnyState) {
-  const std::string answer = "I:R4,1.2.3,R4-7,udp+serial+leave+group+watch;";
+  const std::string answer = "I:R4,1.2.3,R4-7,udp+serial+leave+group+watch+dac;";
   TestBoard fresh;
   fresh.take();
   fresh.receive("Q:ID;PNum:6;T:1;", Source{0, 9});

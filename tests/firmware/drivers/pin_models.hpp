@@ -31,6 +31,11 @@ struct AnalogPinModel final : firmware::AnalogPin {
   std::uint16_t counts = 0;
 };
 
+struct AnalogOutputPinModel final : firmware::AnalogOutputPin {
+  void write(std::uint16_t wanted) override { millivolts = wanted; }
+  std::uint16_t millivolts = 0;
+};
+
 // The board's chips and pins. Their provisioned EEPROM makes the set-up short.
 struct BoardParts : sim::BoardChips {
   BoardParts() {
@@ -46,6 +51,8 @@ struct BoardParts : sim::BoardChips {
     }
     for (std::size_t i = 0; i < analog.size(); ++i) all.analog[i] = &analog[i];
     all.handle = &handle;
+    for (std::size_t i = 0; i < analog_output.size(); ++i) all.dac[i] = &analog_output[i];
+    for (std::size_t i = 0; i < gpio.size(); ++i) all.gpio[i] = &gpio[i];
     return all;
   }
   std::array<OutputPinModel, 4> step;
@@ -53,6 +60,8 @@ struct BoardParts : sim::BoardChips {
   std::array<OutputPinModel, 4> trigger;
   std::array<AnalogPinModel, analog_channels> analog;
   InputPinModel handle;
+  std::array<AnalogOutputPinModel, dac_channels> analog_output;
+  std::array<InputPinModel, gpio_channels> gpio;
 };
 
 // What the chips' pins do now, in the application's terms; steppers are not looked at.

@@ -18,6 +18,13 @@ struct GPIO_TypeDef {
 struct I2C_TypeDef {
   R4Register CR1, CR2, OAR1, OAR2, TIMINGR, TIMEOUTR, ISR, ICR, PECR, RXDR, TXDR;
 };
+struct USART_TypeDef {
+  R4Register CR1, CR2, CR3, BRR, GTPR, RTOR, RQR, ISR, ICR, RDR, TDR, PRESC;
+};
+struct DAC_TypeDef {
+  R4Register CR, SWTRIGR, DHR12R1, DHR12L1, DHR8R1, DHR12R2, DHR12L2, DHR8R2, DHR12RD, DHR12LD,
+      DHR8RD, DOR1, DOR2, SR, CCR, MCR;
+};
 struct ADC_TypeDef {
   R4Register ISR, IER, CR, CFGR, CFGR2, SMPR1, SMPR2, PCSEL, LTR1, HTR1, SQR1, SQR2, SQR3, SQR4, DR;
 };
@@ -49,6 +56,9 @@ struct SCB_Type {
 extern GPIO_TypeDef r4_fake_gpio[11];
 extern I2C_TypeDef r4_fake_i2c2;
 extern I2C_TypeDef r4_fake_i2c4;
+extern USART_TypeDef r4_fake_usart2;
+extern USART_TypeDef r4_fake_uart4;
+extern DAC_TypeDef r4_fake_dac1;
 extern ADC_TypeDef r4_fake_adc1;
 extern FDCAN_GlobalTypeDef r4_fake_fdcan2;
 extern IWDG_TypeDef r4_fake_iwdg1;
@@ -72,6 +82,9 @@ extern std::uint32_t r4_fake_message_ram[2560];
 #define GPIOK (&r4_fake_gpio[10])
 #define I2C2 (&r4_fake_i2c2)
 #define I2C4 (&r4_fake_i2c4)
+#define USART2 (&r4_fake_usart2)
+#define UART4 (&r4_fake_uart4)
+#define DAC1 (&r4_fake_dac1)
 #define ADC1 (&r4_fake_adc1)
 #define FDCAN2 (&r4_fake_fdcan2)
 #define IWDG1 (&r4_fake_iwdg1)

@@ -127,5 +127,24 @@ TEST(DeviceCommand, AReadingIsKeptAsASetting) {
   EXPECT_FALSE(settings == back);
 }
 
+TEST(UartMode, IsReadAsItIsWritten) {
+  for (const char* text : {"off", "1200:8N1", "115200:8E1", "460800:8O2"}) {
+    UartMode mode;
+    EXPECT_EQ(parse_uart_mode(Text(text, std::strlen(text)), mode), Refusal::none) << text;
+    char buffer[max_uart_text];
+    const Text written = write_uart_mode(mode, buffer);
+    EXPECT_EQ(std::string(written.data(), written.size()), text);
+  }
+  for (const char* text :
+       {"", ":8N1", "115200", "115200:8X1", "115200:9N1", "115200:8N0", "-1:8N1x"}) {
+    UartMode mode;
+    EXPECT_EQ(parse_uart_mode(Text(text, std::strlen(text)), mode), Refusal::format) << text;
+  }
+  for (const char* text : {"0:8N1", "460801:8N1", "99999999999:8N1"}) {
+    UartMode mode;
+    EXPECT_EQ(parse_uart_mode(Text(text, std::strlen(text)), mode), Refusal::range) << text;
+  }
+}
+
 }  // namespace
 }  // namespace r4

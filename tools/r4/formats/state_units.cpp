@@ -35,6 +35,9 @@ StateUnits units_of(StateField field) {
   if (field == F::i2cbus) {
     return {{"outcome [0-3]", "errors [transfers]", "recoveries [times]"}, 3};
   }
+  if (within(F::uart1, F::uart2)) return {{"position [bytes]", "lost [bytes]", bytes_unit}, 3};
+  if (within(F::dac1, F::dac2)) return one("[mV]");
+  if (field == F::gpio) return one("[bits]");
   if (field == F::fault) return {{"chip [address]", "trouble [bits]", {}}, 2};
   return one("");
 }

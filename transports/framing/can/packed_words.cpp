@@ -60,6 +60,9 @@ constexpr PackedWord words[word_count] = {
     {"I2C1", Form::bytes}, {"I2C2", Form::bytes}, {"I2C3", Form::bytes}, {"I2C4", Form::bytes},
     {"I2C5", Form::bytes}, {"I2C6", Form::bytes}, {"I2C7", Form::bytes}, {"I2C8", Form::bytes},
     {"I2CX", Form::bytes}, {"I2CBUS"}, {"X"}, {"FULL"},
+    // 7E
+    {"UART1", Form::bytes}, {"UART2", Form::bytes}, {"DAC1", Form::count}, {"DAC2", Form::count},
+    {"GPIO", Form::count},
 };
 // clang-format on
 

@@ -48,7 +48,7 @@ constexpr unsigned code_cmd = 0x31;
 constexpr unsigned state_words = 0x38;
 constexpr unsigned code_r4_ros2 = 0x4B;
 constexpr unsigned code_ros2_r4 = 0x4C;
-constexpr unsigned word_count = 0x7E;
+constexpr unsigned word_count = 0x83;
 constexpr unsigned no_word = 0xFF;
 
 extern const PackedWord words[word_count];

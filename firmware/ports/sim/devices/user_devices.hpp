@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is connected to the user's bus of the simulated board.
+// What is connected to the user's bus and UARTs of the simulated board.
 #pragma once
 
 #include <cstdint>
@@ -7,6 +7,7 @@
 #include "ina219_model.hpp"
 #include "mpu6050_model.hpp"
 #include "user_bus_model.hpp"
+#include "user_uart_model.hpp"
 
 namespace r4 {
 namespace sim {
@@ -17,6 +18,8 @@ constexpr int user_device_count = static_cast<int>(UserDevice::count);
 struct UserDevices {
   UserDevices() {
     for (int i = 0; i < user_device_count; ++i) bus.attach((*this)[static_cast<UserDevice>(i)]);
+    uarts[0].connect(UartPeer::gnss);
+    uarts[1].connect(UartPeer::lidar);
   }
   UserDevices(const UserDevices&) = delete;
   UserDevices& operator=(const UserDevices&) = delete;
@@ -29,7 +32,18 @@ struct UserDevices {
     for (int i = 0; i < user_device_count; ++i) (*this)[static_cast<UserDevice>(i)].power_on();
   }
 
+  // The microcontroller begins again.
+  void reset() {
+    bus.reset();
+    for (UserUartModel& uart : uarts) uart.reset();
+  }
+  void pass_millisecond() {
+    bus.advance(1000);
+    for (UserUartModel& uart : uarts) uart.pass_millisecond();
+  }
+
   UserBusModel bus;
+  UserUartModel uarts[uart_channels];
   Mpu6050Model mpu6050;
   Ina219Model ina219;
 };

@@ -68,6 +68,7 @@ BoardModel::BoardModel(std::uint64_t seed) : seed_(seed) {
     converters_[i].model = this;
     converters_[i].input = i;
   }
+  for (InputPinModel& pin : gpio_) pin.set(true);  // pulled up
   hold_handle(true);
 }
 
@@ -111,13 +112,15 @@ firmware::BoardPins BoardModel::microcontroller_pins() {
   for (int i = 0; i < ultrasonic_channels; ++i) pins.trigger[i] = &sensors_[i].trigger();
   for (int i = 0; i < analog_channels; ++i) pins.analog[i] = &converters_[i];
   pins.handle = &handle_;
+  for (int i = 0; i < dac_channels; ++i) pins.dac[i] = &dac_[i];
+  for (int i = 0; i < gpio_channels; ++i) pins.gpio[i] = &gpio_[i];
   return pins;
 }
 
 void BoardModel::pass_millisecond(std::uint32_t now_us, Interrupts& interrupts) {
   ++time_ms_;
   chips_.bus.advance(1000);
-  devices_.bus.advance(1000);
+  devices_.pass_millisecond();
   const bool supplied = motors_have_supply();
   if (robot_ != nullptr) {
     pass_millisecond_of(*robot_, interrupts);

@@ -80,6 +80,9 @@ class BoardModel {
   // The surroundings. Channels count from 1. Of a RobotModel motors and encoders are its own affair.
   void hold_handle(bool held);
   bool handle_held() const { return handle_held_; }
+  // A spare input is pulled down, or let go.
+  void set_gpio(int channel, bool high) { gpio_[channel - 1].set(high); }
+  std::uint16_t dac_mv(int channel) const { return dac_[channel - 1].millivolts(); }
   // Something is `cm` (0: nothing) before the sensor.
   void set_ultrasonic(int channel, std::uint16_t cm) { sensors_[channel - 1].set_distance(cm); }
   void connect_ultrasonic(int channel, bool connected) { sensors_[channel - 1].connect(connected); }
@@ -138,6 +141,8 @@ class BoardModel {
   UltrasonicModel sensors_[ultrasonic_channels];
   bool handle_held_ = true;
   InputPinModel handle_;
+  AnalogOutputPinModel dac_[dac_channels];
+  InputPinModel gpio_[gpio_channels];
   Converter converters_[analog_channels];
   std::int32_t pinned_cv_[analog_channels] = {};
   std::uint32_t bus_transfers_ = 0;  // when pins_may_differ() was asked

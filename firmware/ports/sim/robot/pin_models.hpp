@@ -32,6 +32,15 @@ class InputPinModel final : public firmware::InputPin {
   bool high_ = false;
 };
 
+class AnalogOutputPinModel final : public firmware::AnalogOutputPin {
+ public:
+  void write(std::uint16_t millivolts) override { millivolts_ = millivolts; }
+  std::uint16_t millivolts() const { return millivolts_; }
+
+ private:
+  std::uint16_t millivolts_ = 0;
+};
+
 // A stepper motor and its driver with step and direction inputs: a step at each rising edge, which
 // the motor takes if it has supply.
 class StepperDriverModel {

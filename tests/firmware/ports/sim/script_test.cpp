@@ -210,7 +210,7 @@ TEST(Script, ReadsTroubleWithChipsBusAndLoop) {
             "bench.txt:1: 'long' is no time; write for how long, in seconds such as 0.3");
   EXPECT_EQ(error_of("1 dance"),
             "bench.txt:1: 'dance' is nothing that can happen; use handle, us, enc, analog, motor, "
-            "chip, i2c, userbus, device, hang, fault, watchdog or reboot");
+            "chip, i2c, userbus, device, uart, gpio, hang, fault, watchdog or reboot");
 }
 
 TEST(Script, AFileThatDoesNotEndIsNoScenario) {

@@ -54,9 +54,10 @@ std::string url_error(const std::string& url) {
 }
 
 TEST(SimCarrier, HasABoardAtTheOtherEnd) {
-  EXPECT_EQ(identity_of("sim:"), "I:R4," R4LINK_VERSION ",sim-1,sim+leave+group+watch+i2c");
+  EXPECT_EQ(identity_of("sim:"),
+            "I:R4," R4LINK_VERSION ",sim-1,sim+leave+group+watch+i2c+uart+dac");
   EXPECT_EQ(identity_of("sim:?node=31&seed=4"),
-            "I:R4," R4LINK_VERSION ",sim-31,sim+leave+group+watch+i2c");
+            "I:R4," R4LINK_VERSION ",sim-31,sim+leave+group+watch+i2c+uart+dac");
 }
 
 TEST(SimCarrier, SaysWhatIsWrongWithItsUrl) {

@@ -438,8 +438,8 @@ TEST_F(SimulatedBoardTest, AnswersWhoItIs) {
   options.firmware_version = "9.9";
   build(std::move(options));
   command("Q:ID");
-  EXPECT_EQ(listener_.heard.back().substr(0, 51),
-            "I:R4,9.9,bench-3,sim+leave+group+watch+i2c;BUSY:0;A");
+  EXPECT_EQ(listener_.heard.back().substr(0, 60),
+            "I:R4,9.9,bench-3,sim+leave+group+watch+i2c+uart+dac;BUSY:0;A");
 }
 
 TEST_F(SimulatedBoardTest, RefusesAFifthCarrier) {

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A USART of the user's by its registers (RM0399, chapter USART), with its FIFOs of 16 bytes.
+//
+// It has no interrupt of its own, so that no noise on its wire can make a storm of them: the step timer's, each
+// 25 us, moves up to two bytes in and one out, as many as 460800 baud bring. While the UART is off, what runs
+// there looks at no register.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "../../../devices/user_uart_port.hpp"
+#include "../../byte_ring.hpp"
+#include "../chip/gpio.hpp"
+
+namespace r4 {
+namespace giga {
+
+// Prescaler (PRESC) and divider (BRR) for a kernel clock of 16 to 250 MHz.
+struct UartTiming {
+  std::uint32_t prescaler;
+  std::uint32_t divider;
+};
+UartTiming user_uart_timing(std::uint32_t kernel_hz, std::uint32_t baud);
+
+class UserUartController final : public firmware::UserUartPort {
+ public:
+  struct Wiring {
+    USART_TypeDef* registers;
+    Pin tx;
+    Pin rx;
+    std::uint32_t function;
+  };
+  explicit UserUartController(const Wiring& wiring)
+      : registers_(*wiring.registers),
+        tx_(line_of(wiring.tx)),
+        rx_(line_of(wiring.rx)),
+        function_(wiring.function) {}
+
+  // `kernel_hz`: the peripheral's clock, which must be on.
+  void start(std::uint32_t kernel_hz);
+  // In the interrupt of the step timer.
+  void tick() {
+    if (runs_) move();
+  }
+
+  void set_up(const UartMode& mode) override;
+  std::size_t receive(std::uint8_t* out, std::size_t size) override;
+  std::uint32_t take_lost() override;
+  bool send(const std::uint8_t* bytes, std::size_t size) override;
+  void drop() override;
+
+ private:
+  void begin();
+  void move();
+
+  USART_TypeDef& registers_;
+  const Line tx_;
+  const Line rx_;
+  const std::uint32_t function_;
+  std::uint32_t kernel_hz_ = 0;  // 0: not started
+  UartMode mode_;
+  volatile bool runs_ = false;
+  volatile std::uint32_t lost_ = 0;
+  std::uint32_t told_lost_ = 0;
+  firmware::ByteRing<256> received_;
+  firmware::ByteRing<send_capacity> waiting_;
+};
+
+}  // namespace giga
+}  // namespace r4

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The user's UARTs: bytes out by command, bytes in from the states.
+#include <fmt/format.h>
+
+#include <string>
+#include <utility>
+
+#include "../board_impl.hpp"
+#include "../session/limits.hpp"
+#include "r4link/board.hpp"
+
+namespace r4 {
+
+Board::Uart Board::uart(int channel) {
+  if (channel < 1 || channel > uart_channels) {
+    throw Error(ErrorKind::usage, fmt::format("uart({})", channel), "there is no such UART",
+                fmt::format("there are 1 to {}", uart_channels));
+  }
+  return {*this, channel};
+}
+
+void Board::Uart::write(const std::vector<std::uint8_t>& bytes, Duration timeout) const {
+  const std::string text = fmt::format("x{:02x}", fmt::join(bytes, ""));
+  board_.send(Command::uart_write(channel_, text), timeout);
+}
+
+Board::UartData Board::Uart::read(Duration timeout) const {
+  require_wait(fmt::format("uart({}).read()", channel_), timeout);
+  const auto impl = board_.impl_;
+  UartData& waiting = impl->uarts[channel_ - 1].to_read;
+  UartData taken;
+  impl->wait_for_news(timeout, [&] {
+    if (waiting.bytes.empty() && waiting.lost == 0) return false;
+    taken = std::exchange(waiting, {});
+    return true;
+  });
+  return taken;
+}
+
+Subscription Board::Uart::on_bytes(std::function<void(const UartData&)> callback) const {
+  const auto impl = board_.impl_;
+  {
+    const std::lock_guard lock(impl->mutex);
+    impl->uarts[channel_ - 1].told = true;
+  }
+  return impl->callbacks.on_uart(channel_, std::move(callback));
+}
+
+void Board::dac(int channel, int millivolts, Duration timeout) {
+  send(Command::dac(channel, millivolts), timeout);
+}
+
+// On the loop.
+void Board::Impl::take_uarts(const State& fresh) {
+  for (int i = 0; i < uart_channels; ++i) {
+    if (!fresh.present.has(i == 0 ? StateField::uart1 : StateField::uart2)) continue;
+    bool any = false;
+    bool told = false;
+    {
+      const std::lock_guard lock(mutex);
+      UartInbox& inbox = uarts[i];
+      told = inbox.told;
+      any = told ? inbox.stream.take(fresh.uart[i], inbox.to_read, inbox.to_tell)
+                 : inbox.stream.take(fresh.uart[i], inbox.to_read);
+    }
+    if (!any) continue;
+    news.notify_all();
+    if (told) tell(CallbackThread::UartNews{i + 1});
+  }
+}
+
+}  // namespace r4
