@@ -39,6 +39,7 @@
 
 #include "carrier.hpp"
 #include "config.hpp"
+#include "devices/device.hpp"
 #include "link.hpp"
 #include "options.hpp"
 #include "recording.hpp"
@@ -255,9 +256,15 @@ class R4LINK_API Board {
     friend class Board;
     explicit I2c(Board& board) : board_(board) {}
     Bytes answer(const Command& command, Duration timeout) const;
+    I2cAnswer ask(const Command& command, Duration timeout) const;
     Board& board_;
   };
   I2c i2c() { return I2c(*this); }
+  // Sets a described device up (devices/device.hpp, docs/described-devices.md): is it the one? Then what is to be
+  // written, which takes arm(), and the board's readings, until our session ends; fields() is asked for their fields
+  // beside those that were chosen. Throws Error{refused} if it does not answer, or is another device; what was
+  // begun stays so. After on_restart() and a lost link it is to be set up again. `timeout`: for each step.
+  void attach(const Device& device, Duration timeout = default_timeout);
 
   // Channels count from 1, as on the board. A channel that does not exist throws at set().
   DriveChannel osmc(int channel) { return {*this, CommandKind::osmc, channel}; }

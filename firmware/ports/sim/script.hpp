@@ -53,7 +53,7 @@ struct ScriptStep {
   Kind kind = Kind::handle;
   std::uint32_t at_ms = 0;
   int channel =
-      0;  // ultrasonic, encoder, motor: 1 …; analog: an Analog; chip: a Chip; device: a UserDevice
+      0;  // ultrasonic, encoder, motor: 1 …; analog: an Analog; chip: a Chip; device: a UserDevice, then those of OptionalDevices
   // 1 held (handle, i2c) or stalled; cm or off; counts; hundredths of a volt; a Supply; ms;
   // user_bus: a UserBusModel::Fault
   std::int32_t value = 0;
