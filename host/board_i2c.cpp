@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <string>
 
+#include "../protocol/messages/command_field.hpp"
 #include "board_impl.hpp"
 #include "commands/command_help.hpp"
 #include "devices/device_steps.hpp"
-#include "protocol/messages/command_field.hpp"
 #include "r4link/board.hpp"
 #include "session/limits.hpp"
 

@@ -9,7 +9,7 @@
 #include <numbers>
 #include <utility>
 
-#include "protocol/datagram/numbers.hpp"
+#include "../../protocol/datagram/numbers.hpp"
 #include "r4link/error.hpp"
 #include "r4link/vocabulary.hpp"
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "protocol/datagram/numbers.hpp"
+#include "../../protocol/datagram/numbers.hpp"
 #include "r4link/error.hpp"
 #include "r4link/vocabulary.hpp"
 

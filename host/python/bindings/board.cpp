@@ -243,6 +243,10 @@ void bind_board(py::module_& module) {
           "i2c_poll_off",
           [](PyBoard& board, int slot, int ms) { board->i2c().poll_off(slot, Ms(ms)); }, Released())
       .def(
+          "attach",
+          [](PyBoard& board, const Device& device, int ms) { board->attach(device, Ms(ms)); },
+          Released())
+      .def(
           "apply",
           [](PyBoard& board, const Setpoints& setpoints, int ms) {
             board->apply(setpoints, Ms(ms));
