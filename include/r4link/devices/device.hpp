@@ -50,7 +50,8 @@ class R4LINK_API Device {
   std::string text() const;    // "bno055@0x28"
   std::string fields() const;  // "I2C1,I2C2", for F: and Board::fields()
 
-  // The value's place is that in description().values.
+  // That brings a value; the value's place is that in description().values.
+  StateField field(std::size_t value) const;
   DeviceReading reading(const State& state, std::size_t value) const;
   // Throws Error{usage} if it has no value of that name.
   DeviceReading reading(const State& state, std::string_view value) const;

@@ -38,6 +38,8 @@ namespace {
 constexpr Milliseconds tick{100};
 // With --count alone: how long a board may stay silent from the start.
 constexpr Milliseconds patience{5000};
+// With --device: for how long another host must control the board until it is left to that one.
+constexpr Milliseconds busy_patience{1500};
 
 struct Options {
   std::vector<std::string> urls;
@@ -122,13 +124,17 @@ class Monitor {
     board_.on_link([this](const LinkStatus& status) {
       view_->on_link(status);
       if (leads_to_two_boards(status)) io_.stop();
-      if (status.busy && setup_) {
-        gives_way_ = true;
-        io_.stop();
-      }
     });
     board_.on_event([this](const CarrierEvent& event) { view_->on_event(event); });
     board_.on_wire([this](const Wire& wire) { view_->on_wire(wire); });
+  }
+
+  // A host that was killed keeps its board until the board's timeout.
+  void look_who_controls() {
+    busy_ticks_ = setup_ && board_.link().busy ? busy_ticks_ + 1 : 0;
+    if (busy_ticks_ * tick < busy_patience) return;
+    gives_way_ = true;
+    io_.stop();
   }
 
   // Each reading once, and again when the board has begun anew.
@@ -164,6 +170,7 @@ class Monitor {
     tick_.async_wait([this](const std::error_code& error) {
       if (error) return;
       view_->on_tick();
+      look_who_controls();
       next_tick();
     });
   }
@@ -189,6 +196,7 @@ class Monitor {
   std::uint64_t states_ = 0;
   std::optional<DeviceSetup> setup_;
   std::array<std::optional<std::uint32_t>, i2c_slots> told_ms_;
+  int busy_ticks_ = 0;
   bool gives_way_ = false;
 };
 
