@@ -130,11 +130,10 @@ void DeviceTopics::publish_range(const Topic& topic, const State& state, TimeMes
   constexpr std::uint8_t infrared = 1;
   const DeviceValue& distance = topic.device.description().values[topic.value];
   const std::string frame = frame_prefix_ + topic.name;
-  RangeMessage message{};
+  RangeMessage message{};  // a field of view of 0: it is not described
   message.header.stamp = time;
   message.header.frame_id = borrowed(frame);
   message.radiation_type = infrared;
-  message.field_of_view = 0.44F;  // the VL53L0X's 25 degrees
   message.min_range = static_cast<float>(distance.minimum);
   message.max_range = static_cast<float>(distance.maximum);
   // No measurement is nothing within reach: REP 117.
