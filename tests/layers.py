@@ -90,7 +90,7 @@ ALLOWED = {
     'tools/r4/ros2': SHELL | {'tools/r4/devices', 'tools/r4/ros2/graph'},
     'tools/r4/sim': SHELL,
     'tools/r4/web/server': SHELL,
-    'tools/r4/web': SHELL | FORMATS | {'tools/r4/watch', 'tools/r4/web/server'},
+    'tools/r4/web': SHELL | FORMATS | {'tools/r4/devices', 'tools/r4/watch', 'tools/r4/web/server'},
     'tools/r4': SHELL | {'tools/r4/ros2', 'tools/r4/watch'},
 }
 # What a file may include although its room may not.

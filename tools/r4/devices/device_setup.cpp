@@ -28,10 +28,11 @@ DeviceSetup::DeviceSetup(asio::io_context& io, AsyncBoard& board,
   look_later(look_interval);
 }
 
-void DeviceSetup::look_later(AsyncBoard::Duration time) {
+void DeviceSetup::after(AsyncBoard::Duration time, void (DeviceSetup::*what)()) {
   timer_.expires_after(time);
-  timer_.async_wait([this](const std::error_code& error) {
-    if (!error) look();
+  timer_.async_wait([here = std::weak_ptr(here_), what](const std::error_code& error) {
+    const auto still = here.lock();
+    if (!error && still) ((*still)->*what)();
   });
 }
 
@@ -63,7 +64,9 @@ void DeviceSetup::do_next() {
   }
   const std::uint64_t attempt = ++attempt_;
   board_.async_send(parts_[next_].step.command(), step_timeout,
-                    [this, attempt](const CommandResult& result) { on_result(result, attempt); });
+                    [here = std::weak_ptr(here_), attempt](const CommandResult& result) {
+                      if (const auto still = here.lock()) (*still)->on_result(result, attempt);
+                    });
 }
 
 void DeviceSetup::on_result(const CommandResult& result, std::uint64_t attempt) {
@@ -75,11 +78,7 @@ void DeviceSetup::on_result(const CommandResult& result, std::uint64_t attempt) 
     fail(problem);
   } else if (part.step.is_answered()) {
     awaited_pnum_ = result.pnum;
-    timer_.expires_after(step_timeout);  // the field I2CX is sent for a second
-    timer_.async_wait([this, device = part.device](const std::error_code& error) {
-      if (error) return;
-      fail({ErrorKind::refused, device->text(), "the end of a transfer was not heard", ""});
-    });
+    after(step_timeout, &DeviceSetup::on_silence);  // the field I2CX is sent for a second
     on_state(board_.state());
   } else {
     step_done();
@@ -98,13 +97,15 @@ void DeviceSetup::on_state(const State& state) {
   step_done();
 }
 
+void DeviceSetup::on_silence() {
+  fail({ErrorKind::refused, parts_[next_].device->text(), "the end of a transfer was not heard",
+        ""});
+}
+
 void DeviceSetup::step_done() {
   const std::chrono::milliseconds wait = parts_[next_].step.wait;
   ++next_;
-  timer_.expires_after(wait);
-  timer_.async_wait([this](const std::error_code& error) {
-    if (!error) do_next();
-  });
+  after(wait, &DeviceSetup::do_next);
 }
 
 void DeviceSetup::fail(const Problem& problem) {

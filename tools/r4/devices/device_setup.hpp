@@ -20,7 +20,7 @@ namespace r4::tool {
 
 class DeviceSetup {
  public:
-  // `told`: what stands in the way. The board and the devices outlive it; from here on, what the board's loop does.
+  // `told`: what stands in the way. The board and the devices outlive it, and it lives on their loop.
   DeviceSetup(asio::io_context& io, AsyncBoard& board, const std::vector<Device>& devices,
               std::function<void(const Problem&)> told);
 
@@ -29,12 +29,15 @@ class DeviceSetup {
     const Device* device = nullptr;
     DeviceStep step;
   };
-  void look_later(AsyncBoard::Duration time);
+  // As timer_ has expired, unless it is gone by then.
+  void after(AsyncBoard::Duration time, void (DeviceSetup::*what)());
+  void look_later(AsyncBoard::Duration time) { after(time, &DeviceSetup::look); }
   void look();
   void begin_again();
   void do_next();
   void on_result(const CommandResult& result, std::uint64_t attempt);
   void on_state(const State& state);
+  void on_silence();
   void step_done();
   void fail(const Problem& problem);
 
@@ -48,6 +51,7 @@ class DeviceSetup {
   std::uint32_t awaited_pnum_ = 0;  // whose answer is to come; 0: none
   std::string last_told_;
   std::vector<ScopedSubscription> subscriptions_;
+  const std::shared_ptr<DeviceSetup*> here_ = std::make_shared<DeviceSetup*>(this);
 };
 
 }  // namespace r4::tool
