@@ -25,7 +25,7 @@ const char* to_text(DeviceRole role) {
 }
 
 std::optional<double> DeviceValue::decode(const std::uint8_t* bytes, std::size_t count) const {
-  if (static_cast<std::size_t>(at + size) > count) return std::nullopt;
+  if (static_cast<std::size_t>(at) + static_cast<std::size_t>(size) > count) return std::nullopt;
   std::uint32_t raw = 0;
   for (int i = 0; i < size; ++i) raw = raw << 8 | bytes[big_endian ? at + i : at + size - 1 - i];
   // To the top, and down again, with the sign or zeros behind it.

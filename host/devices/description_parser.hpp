@@ -33,7 +33,7 @@ class DescriptionParser {
 
   void take_line(std::string_view line);
   void take_name(const Words& words);
-  void take_title(std::string_view line);
+  void take_title(std::string_view title);
   void take_role(const Words& words);
   void take_addresses(const Words& words);
   void take_check(const Words& words);

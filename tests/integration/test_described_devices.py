@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Described devices: r4 devices, monitor and convert with --device, as docs/described-devices.md shows them."""
 import csv
+import time
 
 import pytest
 
-from r4_process import Board, Running, objects, run
+from r4_process import PATIENCE_S, Board, Running, objects, run
+from web_client import Page, Web
 
 MINE = """device mine
 title A divider behind an INA219
@@ -73,3 +75,14 @@ def test_a_recording_becomes_columns_with_units(board, tmp_path):
     assert {row['bno055@0x28 heading [deg]'] for row in rows} == {'270'}
     assert {row['bno055@0x28 accel_z [m/s2]'] for row in rows} == {'9.81'}
     assert run('convert', str(log), '-o', str(tmp_path / 'drive.mcap'), '--device', 'bno055').returncode == 2
+
+
+def test_a_page_shows_them_and_who_controls_sets_them_up(board):
+    with Web(board.host_url, options=('--device', 'bno055')) as web, Page(web) as page:
+        place = page.hello['fields'].index('bno055@0x28.gyro_z')
+        assert page.hello['units'][place] == 'rad/s'
+        assert page.states(1)[0]['bno055@0x28.accel_z'] is None
+        page.drive()
+        deadline = time.monotonic() + PATIENCE_S
+        while page.states(1)[-1]['bno055@0x28.accel_z'] != 9.81:
+            assert time.monotonic() < deadline
