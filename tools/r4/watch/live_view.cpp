@@ -75,7 +75,7 @@ class LiveView final : public MonitorView {
     std::vector<std::string> lines = status_lines();
     add_fields(lines, std::max<std::size_t>(1, Screen::columns() / cell_width));
     for (const auto& [device, values] : readings_) {
-      lines.push_back("");
+      lines.emplace_back();
       lines.push_back(device.second);
       for (const auto& [name, text] : values) lines.push_back("  " + text);
     }
