@@ -74,11 +74,9 @@ void BoardHardware::make_safe() {
 void BoardHardware::drive_safe() {
   waiting_ = false;
   for (Stepper& stepper : steppers_) stepper.stop();
-<<<<<<< HEAD
+  for (AnalogOutputPin* pin : pins_.dac) pin->write(0);
   // Each driver forgets what it was to write, also where a held bus keeps its chip from being told
   // now.
-=======
-  for (AnalogOutputPin* pin : pins_.dac) pin->write(0);
   for (ChipDriver* chip : chips_) chip->want_safe();
   // A held bus fails at a transfer. If it can be freed, who held it comes last.
   const int held_at = drive_chips_safe(nowhere);

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The devices on the user's I2C bus: a command, and the answer that the state brings.
+// The devices on the user's I2C bus: a command, and the answer that the state brings; a described one set up.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <string>
 
+#include "../protocol/messages/command_field.hpp"
 #include "board_impl.hpp"
 #include "commands/command_help.hpp"
+#include "devices/device_steps.hpp"
 #include "r4link/board.hpp"
 #include "session/limits.hpp"
 
@@ -51,7 +53,7 @@ void Board::I2c::poll_off(int slot, Duration timeout) const {
   board_.send(Command::i2c_poll_off(slot), timeout);
 }
 
-Board::I2c::Bytes Board::I2c::answer(const Command& command, Duration timeout) const {
+I2cAnswer Board::I2c::ask(const Command& command, Duration timeout) const {
   const auto impl = board_.impl_;
   const std::string text = shown(command);
   const auto deadline = Impl::Clock::now() + Impl::bounded(timeout);
@@ -68,12 +70,41 @@ Board::I2c::Bytes Board::I2c::answer(const Command& command, Duration timeout) c
     throw Error(ErrorKind::refused, text, "was begun, and its end was not heard in time",
                 "give it more time, or look at the field I2CX");
   }
+  return found;
+}
+
+Board::I2c::Bytes Board::I2c::answer(const Command& command, Duration timeout) const {
+  const I2cAnswer found = ask(command, timeout);
   if (found.outcome != I2cOutcome::done) {
-    Problem problem = failed_transfer(text, found.outcome);
+    Problem problem = failed_transfer(shown(command), found.outcome);
     problem.outcome = Outcome::refused;
     throw Error(std::move(problem));
   }
   return {found.data.begin(), found.data.end()};
+}
+
+void Board::attach(const Device& device, Duration timeout) {
+  const auto impl = impl_;
+  for (const DeviceStep& step : steps_of(device)) {
+    if (step.is_answered()) {
+      require_answer(device, step, i2c().ask(step.command(), timeout));
+      impl->wait_for_news(step.wait, [] { return false; });
+    } else {
+      send(step.command(), timeout);
+    }
+  }
+  std::string chosen;
+  {
+    const std::lock_guard lock(impl->mutex);
+    chosen = impl->fields;
+  }
+  if (chosen.empty()) return;  // the board's own choice is left alone
+  FieldSet sent;
+  FieldSet wanted;
+  parse_fields(chosen, sent);
+  parse_fields(device.fields(), wanted);
+  wanted.add(sent);
+  if (wanted != sent) fields(chosen + "," + device.fields(), timeout);
 }
 
 }  // namespace r4

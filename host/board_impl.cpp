@@ -39,10 +39,11 @@ Board::Impl::Impl(const CarriersMaker& make, BoardOptions options, BoardCallback
       arming(options.session.arming),
       callback_limit(options.callback_limit),
       on_wait(std::move(options.on_wait)),
-      async(io, make(loop), std::move(options)),
+      async(io, make(loop), options),
       box(
           io, [this](const Command& c) { deliver(c); }, [this](const Setpoints& s) { deliver(s); }),
-      callbacks([this](Clock::duration busy) { on_callback_end(busy); }) {
+      callbacks([this](Clock::duration busy) { on_callback_end(busy); }),
+      fields(std::move(options.session.fields)) {
   require_callback_limit(callback_limit);
   if (first.on_state) callbacks.on_state(std::move(first.on_state));
   if (first.on_link) callbacks.on_link(std::move(first.on_link));
@@ -301,7 +302,10 @@ Board::Impl::CallPtr Board::Impl::execute(const std::string& text, CallPtr call,
     throw blocked_error(
         text, call->begun ? "not confirmed, it may have been executed or not" : "not sent");
   }
-  if (call->result.outcome == Outcome::confirmed) return call;
+  if (call->result.outcome == Outcome::confirmed) {
+    if (call->command.kind == CommandKind::fields && !fields.empty()) fields = call->text;
+    return call;
+  }
   if (call->result.outcome == Outcome::closed) throw closed_error(text);
   throw Error(explain(text, call->result, call->link));
 }

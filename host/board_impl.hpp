@@ -161,6 +161,7 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   std::condition_variable news;  // state, link or closed has changed
   std::string name;              // the transport's, as the loop knows it
   std::vector<std::string> wire_names;
+  std::string fields;  // that were chosen last; empty: the board's own choice is left alone
   ReceivedState state;
   std::uint64_t states = 0;
   std::vector<std::weak_ptr<States::Queue>> queues;

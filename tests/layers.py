@@ -13,7 +13,7 @@ import pathlib
 import re
 import sys
 
-PUBLIC = {'include/r4link', 'include/r4link/control'}
+PUBLIC = {'include/r4link', 'include/r4link/control', 'include/r4link/devices'}
 PROTOCOL = PUBLIC | {'protocol/datagram', 'protocol/keys', 'protocol/messages', 'protocol/link'}
 FRAMING = PROTOCOL | {'transports/framing', 'transports/framing/can'}
 CARRIERS = {'transports/can', 'transports/impaired', 'transports/serial', 'transports/share', 'transports/udp',
@@ -21,15 +21,16 @@ CARRIERS = {'transports/can', 'transports/impaired', 'transports/serial', 'trans
 TRANSPORTS = FRAMING | CARRIERS | {'transports'}
 FIRMWARE = FRAMING | {'firmware', 'firmware/application', 'firmware/devices', 'firmware/drivers'}
 MODELS = {'firmware/ports/sim/chips', 'firmware/ports/sim/devices', 'firmware/ports/sim/robot'}
-HOST = TRANSPORTS | {'host', 'host/commands', 'host/control', 'host/measurement', 'host/recording', 'host/replay',
+HOST = TRANSPORTS | {'host', 'host/commands', 'host/control', 'host/devices', 'host/measurement', 'host/recording', 'host/replay',
                      'host/session'}
 SIMULATED = HOST | FIRMWARE | MODELS | {'firmware/ports/sim'}
 SHELL = SIMULATED | {'tools/r4/shell'}
 FORMATS = {'tools/r4/formats', 'tools/r4/formats/mcap', 'tools/r4/formats/packets'}
 # room: the rooms it may include besides itself
 ALLOWED = {
-    'include/r4link': {'include/r4link/control'},
+    'include/r4link': {'include/r4link/control', 'include/r4link/devices'},
     'include/r4link/control': {'include/r4link'},
+    'include/r4link/devices': {'include/r4link'},
     'protocol/datagram': PUBLIC,
     'protocol/keys': PUBLIC | {'protocol/datagram'},
     'protocol/messages': PUBLIC | {'protocol/datagram', 'protocol/keys'},
@@ -64,6 +65,7 @@ ALLOWED = {
     'host/bridge': HOST,
     'host/commands': TRANSPORTS,
     'host/control': PUBLIC,
+    'host/devices': PROTOCOL,
     'host/fleet': HOST,
     'host/measurement': TRANSPORTS,
     'host/recording': TRANSPORTS,
@@ -81,13 +83,14 @@ ALLOWED = {
     'tools/r4/formats': SHELL | {'tools/r4/bus'},
     'tools/r4/formats/mcap': SHELL | {'tools/r4/bus', 'tools/r4/formats'},
     'tools/r4/formats/packets': SHELL | {'tools/r4/bus', 'tools/r4/formats'},
+    'tools/r4/devices': SHELL,
     'tools/r4/recording': SHELL | FORMATS,
-    'tools/r4/watch': SHELL | {'tools/r4/bus'},
+    'tools/r4/watch': SHELL | {'tools/r4/bus', 'tools/r4/devices'},
     'tools/r4/ros2/graph': SHELL,
-    'tools/r4/ros2': SHELL | {'tools/r4/ros2/graph'},
+    'tools/r4/ros2': SHELL | {'tools/r4/devices', 'tools/r4/ros2/graph'},
     'tools/r4/sim': SHELL,
     'tools/r4/web/server': SHELL,
-    'tools/r4/web': SHELL | FORMATS | {'tools/r4/watch', 'tools/r4/web/server'},
+    'tools/r4/web': SHELL | FORMATS | {'tools/r4/devices', 'tools/r4/watch', 'tools/r4/web/server'},
     'tools/r4': SHELL | {'tools/r4/ros2', 'tools/r4/watch'},
 }
 # What a file may include although its room may not.

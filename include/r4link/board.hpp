@@ -39,6 +39,7 @@
 
 #include "carrier.hpp"
 #include "config.hpp"
+#include "devices/device.hpp"
 #include "link.hpp"
 #include "options.hpp"
 #include "recording.hpp"
@@ -255,9 +256,15 @@ class R4LINK_API Board {
     friend class Board;
     explicit I2c(Board& board) : board_(board) {}
     Bytes answer(const Command& command, Duration timeout) const;
+    I2cAnswer ask(const Command& command, Duration timeout) const;
     Board& board_;
   };
   I2c i2c() { return I2c(*this); }
+  // Sets a described device up (devices/device.hpp, docs/described-devices.md): is it the one? Then what is to be
+  // written, which takes arm(), and the board's readings, until our session ends; fields() is asked for their fields
+  // beside those that were chosen. Throws Error{refused} if it does not answer, or is another device; what was
+  // begun stays so. After on_restart() and a lost link it is to be set up again. `timeout`: for each step.
+  void attach(const Device& device, Duration timeout = default_timeout);
 
   // A UART of the user's, 1 or 2 (docs/devices.md): setting("uart1", "115200:8N1") turns it on,
   // fields("DEFAULT,UART1") has the board tell what comes in. That is put together here from the states: in its

@@ -12,6 +12,8 @@
 #include "control/pid.hpp"
 #include "control/sensors.hpp"
 #include "datagram.hpp"
+#include "devices/description.hpp"
+#include "devices/device.hpp"
 #include "error.hpp"
 #include "fleet.hpp"
 #include "key.hpp"

@@ -17,7 +17,7 @@ from r4_process import DATA, ERROR, PATIENCE_S, R4, SANITIZED, objects, run
 
 DATA_BAD, USAGE, REFUSED, OPEN, PERMISSION, UNSUPPORTED = 1, 2, 3, 4, 5, 6
 COMMANDS = ['monitor', 'send', 'stop', 'list', 'doctor', 'bus', 'bench', 'record', 'info', 'convert', 'replay', 'sim', 'key',
-            'demo', 'encode', 'decode', 'completion', 'man', 'ros2', 'web']
+            'demo', 'encode', 'decode', 'completion', 'man', 'ros2', 'web', 'devices']
 
 
 def captured_lines():

@@ -10,6 +10,8 @@
 
 #include "../../../protocol/datagram/numbers.hpp"
 #include "../../board_hardware.hpp"
+#include "devices/optional_devices.hpp"
+#include "devices/user_devices.hpp"
 #include "r4link/error.hpp"
 #include "r4link/state.hpp"
 #include "r4link/vocabulary.hpp"
@@ -161,10 +163,12 @@ void read_user_bus(const Line& line, ScriptStep& step) {
 }
 
 void read_device(const Line& line, ScriptStep& step) {
-  static constexpr std::string_view devices[user_device_count] = {"mpu6050", "ina219"};
+  static constexpr std::string_view devices[user_device_count + optional_device_count] = {
+      "mpu6050", "ina219", "icm20948", "bno055", "vl53l0x", "as5600"};
   const auto* const device = std::find(std::begin(devices), std::end(devices), line.words[1]);
   if (device == std::end(devices)) {
-    fail(line, line.words[1], "is no device on the user's bus", "write mpu6050 or ina219");
+    fail(line, line.words[1], "is no device on the user's bus",
+         "write mpu6050, ina219, icm20948, bno055, vl53l0x or as5600");
   }
   step.channel = static_cast<int>(device - std::begin(devices));
   step.value = supply_of(line, "device");

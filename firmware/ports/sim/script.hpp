@@ -57,7 +57,8 @@ struct ScriptStep {
 
   Kind kind = Kind::handle;
   std::uint32_t at_ms = 0;
-  // ultrasonic, encoder, motor, uart, gpio: 1 …; analog: an Analog; chip: a Chip; device: a UserDevice
+  // ultrasonic, encoder, motor, uart, gpio: 1 …; analog: an Analog; chip: a Chip; device: a UserDevice,
+  // then those of OptionalDevices
   int channel = 0;
   // 1 held (handle, i2c), stalled or high; cm or off; counts; hundredths of a volt; a Supply; ms;
   // user_bus: a UserBusModel::Fault; uart: a UartPeer

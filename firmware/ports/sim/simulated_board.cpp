@@ -212,7 +212,9 @@ void SimulatedBoard::take(const ScriptStep& step) {
       model_.devices().bus.set_fault(static_cast<UserBusModel::Fault>(step.value));
       break;
     case ScriptStep::Kind::device: {
-      I2cChipModel& device = model_.devices()[static_cast<UserDevice>(step.channel)];
+      I2cChipModel& device = step.channel < user_device_count
+                                 ? model_.devices()[static_cast<UserDevice>(step.channel)]
+                                 : optional_devices_[step.channel - user_device_count];
       const auto supply = static_cast<ScriptStep::Supply>(step.value);
       if (supply != ScriptStep::Supply::off) device.power_on();
       model_.devices().bus.connect(device, supply != ScriptStep::Supply::off);
@@ -235,6 +237,7 @@ void SimulatedBoard::take(const ScriptStep& step) {
       break;
     case ScriptStep::Kind::reboot:
       model_.power_on();
+      optional_devices_.power_on();
       reset_microcontroller();
       boot();
       break;

@@ -25,6 +25,7 @@
 
 #include "../../application/application.hpp"
 #include "carrier_port.hpp"
+#include "devices/optional_devices.hpp"
 #include "r4link/config.hpp"
 #include "robot/board_model.hpp"
 #include "script.hpp"
@@ -125,6 +126,7 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   Options options_;
   std::uint64_t seed_;
   BoardModel model_;
+  OptionalDevices optional_devices_{model_.devices().bus};
   std::optional<SimulatedHardware> hardware_;  // of this boot
   std::vector<std::unique_ptr<CarrierPort>> ports_;
   std::optional<firmware::Application> application_;

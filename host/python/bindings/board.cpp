@@ -265,6 +265,10 @@ void bind_board(py::module_& module) {
              return uart_data(data);
            })
       .def(
+          "attach",
+          [](PyBoard& board, const Device& device, int ms) { board->attach(device, Ms(ms)); },
+          Released())
+      .def(
           "apply",
           [](PyBoard& board, const Setpoints& setpoints, int ms) {
             board->apply(setpoints, Ms(ms));

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """R4 link: the R4 robot control board over UDP, USB serial and CAN (docs/python.md)."""
-from . import aio, control
+from . import aio, control, devices
 from ._core import (FIELDS, BoardHealth, CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State,
                     Statistics, Subscription, Wire, __version__)
 from .board import (BldcChannel, Board, DriveChannel, I2c, RelayChannel, ServoChannel, Setpoints, States, StepperChannel, Uart)
 from .bridge import Bridge, BridgeCounters, BridgeEnd, BridgeStatus
+from .devices import Device, DeviceReading
 from .errors import (CancelledError, ClosedError, DataError, DeniedError, Error, NotArmedError, NotConfirmedError,
                      OpenError, RefusedError, UnsupportedError, UsageError)
 from .fleet import Fleet, FleetEvent, FleetResults
@@ -17,11 +18,12 @@ REVERSE = Direction.REVERSE
 
 __all__ = [
     'Bldc', 'BldcChannel', 'Board', 'BoardHealth', 'Bridge', 'BridgeCounters', 'BridgeEnd', 'BridgeStatus',
-    'CancelledError', 'CarrierCounters', 'ClosedError', 'Command', 'DataError', 'DeniedError', 'Direction', 'Drive',
+    'CancelledError', 'CarrierCounters', 'ClosedError', 'Command', 'DataError', 'DeniedError', 'Device', 'DeviceReading', 'Direction', 'Drive',
     'DriveChannel', 'Error', 'Event', 'FIELDS', 'FORWARD', 'Fleet', 'FleetEvent', 'FleetResults', 'I2c', 'I2cAnswer',
     'I2cBusReport', 'I2cReading', 'Identity', 'LinkStatus', 'LinkedUrl', 'Log', 'Look', 'NotArmedError',
     'NotConfirmedError', 'OpenError', 'PostResult', 'REVERSE', 'RecordedBoard', 'RecordedDatagram', 'RecordedEvent',
     'Recording', 'RefusedError', 'RefusedPost', 'RelayChannel', 'ServoChannel', 'Setpoints', 'SimBoard', 'State',
-    'States', 'Statistics', 'StepperChannel', 'Subscription', 'Uart', 'UartBytes', 'UartData', 'UnsupportedError', 'UsageError', 'Wire', 'aio', 'control',
+    'States', 'Statistics', 'StepperChannel', 'Subscription', 'Uart', 'UartBytes', 'UartData', 'UnsupportedError',
+    'UsageError', 'Wire', 'aio', 'control', 'devices',
     'read', 'with_link', '__version__',
 ]

@@ -25,6 +25,7 @@ from . import board as blocking
 from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State, Statistics,
                     Subscription, Wire)
 from .board import Setpoints
+from .devices import Device
 from .values import Direction, PostResult, UartData
 
 T = TypeVar('T')
@@ -268,6 +269,10 @@ class Board:
 
     async def dac(self, channel: int, millivolts: int, timeout: float = 1.0) -> None:
         await self.send(f'X:DAC,{channel},{millivolts}', timeout)
+
+    async def attach(self, device: Device, timeout: float = 1.0) -> None:
+        """As r4link.Board.attach()."""
+        await self._commands.call(lambda: self._board.attach(device, timeout))
 
     async def proximity(self, channel: int, threshold_cm: int, timeout: float = 1.0) -> None:
         await self.send(Command.proximity(channel, threshold_cm), timeout)

@@ -16,6 +16,7 @@ from typing import Any, Callable, Iterable, Iterator, Self, Type, TypeVar
 from . import _core
 from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State, Statistics,
                     Subscription, Wire)
+from .devices import Device
 from .errors import UsageError
 from .values import Direction, PostResult, UartData
 
@@ -352,6 +353,12 @@ class Board:
     def dac(self, channel: int, millivolts: int, timeout: float = 1.0) -> None:
         """A voltage of the board's, channel 1 or 2, 0-3300 mV; 0 in the safe state."""
         self.send(f'X:DAC,{channel},{millivolts}', timeout)
+
+    def attach(self, device: Device, timeout: float = 1.0) -> None:
+        """Sets a described device up (r4link.devices): is it the one? Then what is to be written, which takes arm(), and
+        the board's readings, until our session ends. Raises RefusedError if it does not answer, or is another device. To
+        be done again after on_restart() and a lost link. `timeout`: for each step."""
+        self._core.attach(device._core, _ms(timeout))
 
     def proximity(self, channel: int, threshold_cm: int, timeout: float = 1.0) -> None:
         """The board goes safe when something is nearer than that; 0: off."""

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "host/recording/record_line.hpp"
@@ -31,10 +32,10 @@ struct Converted {
 
 // What `r4 convert` makes of the bytes of a file, by the endings of both; fed in pieces of that size.
 inline Converted converted(std::string_view bytes, const std::string& from, const std::string& to,
-                           std::size_t piece = 1000) {
+                           std::size_t piece = 1000, std::vector<Device> devices = {}) {
   StringOutput output;
   Converted result;
-  const std::unique_ptr<tool::Sink> sink = tool::make_sink("test" + to, output);
+  const std::unique_ptr<tool::Sink> sink = tool::make_sink("test" + to, output, std::move(devices));
   const auto read = [&](RecordingReader::Handler& handler) {
     const std::unique_ptr<tool::Source> source = tool::make_source("test" + from, handler);
     for (std::string_view rest = bytes; !rest.empty();

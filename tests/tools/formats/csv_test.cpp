@@ -69,6 +69,27 @@ TEST(Csv, HasNoRowForAStateWhoseValuesAreNone) {
   EXPECT_EQ(csv.left_out, "1 that are no state");
 }
 
+TEST(Csv, HasWhatDescribedDevicesMeasured) {
+  const std::string recording = one_state("I2C3:1000,0,x07d0;I2C4:1002,0,x5d98;PNum:1;T:1010;") +
+                                one_state("I2C3:0,0,x;PNum:2;T:1020;");
+  const Converted csv =
+      converted(recording, ".r4log", ".csv", 1000, {Device::from("ina219@0x40:3")});
+  const auto lines = lines_of(csv.bytes);
+  ASSERT_EQ(lines.size(), 3);
+  EXPECT_TRUE(
+      lines[0].ends_with(",ina219@0x40 voltage [V],ina219@0x40 current [A],ina219@0x40 overflow"))
+      << lines[0];
+  EXPECT_TRUE(lines[1].ends_with(",x5d98,11.98,0.2,0")) << lines[1];
+  EXPECT_TRUE(lines[2].ends_with(",,,")) << lines[2] << ": nothing was read yet";
+  const Converted json =
+      converted(recording, ".r4log", ".jsonl", 1000, {Device::from("ina219@0x40:3")});
+  EXPECT_NE(json.bytes.find(R"("devices":{"ina219@0x40":{"voltage":11.98,"current":0.2)"),
+            std::string::npos)
+      << json.bytes;
+  EXPECT_THROW(converted(recording, ".r4log", ".mcap", 1000, {Device::from("ina219@0x40:3")}),
+               Error);
+}
+
 TEST(Csv, HasAUnitForEachValueOfEveryField) {
   for (int i = 0; i < state_field_count; ++i) {
     const auto field = static_cast<StateField>(i);

@@ -54,6 +54,12 @@ void CsvSink::write_header() {
       fmt::format_to(std::back_inserter(row_), ",{} {}", view(name_of(field)), units.values[i]);
     }
   }
+  for (const Device& device : devices_) {
+    for (const DeviceValue& value : device.description().values) {
+      fmt::format_to(std::back_inserter(row_), ",{} {}", device.text(), value.name);
+      if (!value.unit.empty()) fmt::format_to(std::back_inserter(row_), " [{}]", value.unit);
+    }
+  }
   row_ += '\n';
   output_.write(row_);
 }
@@ -84,6 +90,14 @@ void CsvSink::on_record(const Record& record) {
       row_ += values[static_cast<std::size_t>(field)];
     } else {
       row_.append(units_of(field).count - 1, ',');
+    }
+  }
+  for (const Device& device : devices_) {
+    for (std::size_t i = 0; i < device.description().values.size(); ++i) {
+      row_ += ',';
+      if (!state_.present.has(device.field(i))) continue;
+      const auto number = device.reading(state_, i).number;
+      if (number) fmt::format_to(out, "{}", *number);
     }
   }
   row_ += '\n';

@@ -7,9 +7,12 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "conversion.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/devices/device.hpp"
 #include "r4link/state.hpp"
 #include "wire_names.hpp"
 
@@ -17,7 +20,9 @@ namespace r4::tool {
 
 class CsvSink final : public Sink {
  public:
-  explicit CsvSink(Output& output) : output_(output) {}
+  // Of `devices`, what they have measured has columns, too.
+  explicit CsvSink(Output& output, std::vector<Device> devices = {})
+      : output_(output), devices_(std::move(devices)) {}
   // The columns are those of the fields that were there; of all fields if nothing was surveyed.
   bool wants_survey() const override { return true; }
   void survey(const RecordedWire& wire) override { names_.on_wire(wire); }
@@ -33,6 +38,7 @@ class CsvSink final : public Sink {
   void write_header();
 
   Output& output_;
+  const std::vector<Device> devices_;
   WireNames names_;
   Datagram datagram_;
   State state_;

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "json_lines.hpp"
 
+#include "protocol/messages/message.hpp"
+#include "protocol/messages/state_fields.hpp"
+
 namespace r4::tool {
 
 void add_record_json(Json& object, const Record& record) {
@@ -19,7 +22,25 @@ void JsonLinesSink::on_record(const Record& record) {
   Json object{{"time", static_cast<double>(record.time.count()) / 1e6}, {"wire", record.wire}};
   if (record.wire != no_wire) object["board"] = names_.of(record.wire);
   add_record_json(object, record);
+  add_devices(object, record);
   output_.write(line_of(object));
+}
+
+// "devices":{"bno055@0x28":{"accel_x":0.02,…}}, where the record is a state that brings them.
+void JsonLinesSink::add_devices(Json& object, const Record& record) {
+  if (devices_.empty() || record.kind != RecordKind::from_board ||
+      !read_datagram(Text(record.bytes), datagram_) || kind_of(datagram_) != MessageKind::state ||
+      !read_state(datagram_, state_)) {
+    return;
+  }
+  for (const Device& device : devices_) {
+    const std::vector<DeviceValue>& values = device.description().values;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (!state_.present.has(device.field(i))) continue;
+      const auto number = device.reading(state_, i).number;
+      object["devices"][device.text()][values[i].name] = number ? Json(*number) : Json();
+    }
+  }
 }
 
 }  // namespace r4::tool

@@ -5,10 +5,14 @@
 //     {"time":1795468293.404765,"wire":1,"board":"left-arm","type":"event","event":"up udp://192.168.0.125"}
 #pragma once
 
-#include <string>
+#include <utility>
+#include <vector>
 
 #include "../shell/json.hpp"
 #include "conversion.hpp"
+#include "r4link/datagram.hpp"
+#include "r4link/devices/device.hpp"
+#include "r4link/state.hpp"
 #include "wire_names.hpp"
 
 namespace r4::tool {
@@ -19,7 +23,9 @@ void add_record_json(Json& object, const Record& record);
 
 class JsonLinesSink final : public Sink {
  public:
-  explicit JsonLinesSink(Output& output) : output_(output) {}
+  // Of `devices`, what they have measured is told, too.
+  explicit JsonLinesSink(Output& output, std::vector<Device> devices = {})
+      : output_(output), devices_(std::move(devices)) {}
   bool wants_survey() const override { return true; }
   void survey(const RecordedWire& wire) override { names_.on_wire(wire); }
   void survey(const Record&) override {}
@@ -29,7 +35,12 @@ class JsonLinesSink final : public Sink {
   void finish() override {}
 
  private:
+  void add_devices(Json& object, const Record& record);
+
   Output& output_;
+  const std::vector<Device> devices_;
+  Datagram datagram_;
+  State state_;
   WireNames names_;
 };
 

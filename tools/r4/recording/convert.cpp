@@ -9,12 +9,15 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "../formats/output_file.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
 #include "formats.hpp"
 #include "host/recording/recording_file.hpp"
+#include "r4link/devices/device.hpp"
 #include "r4link/error.hpp"
 
 namespace r4::tool {
@@ -25,6 +28,7 @@ struct Options {
   std::string output;
   bool force = false;
   std::uint64_t port = board_port;
+  std::vector<std::string> devices;
 };
 
 // So many places of damage are told; of more than that, how many.
@@ -93,8 +97,9 @@ bool can_be_read_twice(const std::string& path) {
 }
 
 int convert(const Options& options) {
+  std::vector<Device> devices = Device::from(options.devices);
   OutputFile output(options.output, options.force);
-  const std::unique_ptr<Sink> sink = make_sink(options.output, output);
+  const std::unique_ptr<Sink> sink = make_sink(options.output, output, std::move(devices));
   Progress progress(options.input);
   if (sink->wants_survey() && can_be_read_twice(options.input)) {
     progress.begin("looking");
@@ -138,6 +143,7 @@ file is told with its place, and the rest is converted. A file that is there is 
 
 Examples:
   r4 convert drive.r4log -o drive.csv
+  r4 convert drive.r4log -o drive.csv --device bno055@0x28:1    and what a sensor measured
   r4 convert drive.r4log.zst -o drive.r4log
   r4 convert drive.r4log -o drive.pcapng && wireshark drive.pcapng
   tcpdump -w arm.pcap udp port 2018; r4 convert arm.pcap -o arm.csv
@@ -158,6 +164,8 @@ void add_convert(CLI::App& root, Action& chosen) {
            Need::required);
   add_number(*command, "--port", options->port, 1, 65535,
              "the boards' UDP port in a capture (default: 2018)");
+  add_repeated(*command, "--device", options->devices,
+               "to .csv and .jsonl: what a described device measured (r4 devices)", "NAME@ADDRESS");
   add_flag(*command, "--force", options->force, "replace a file that is there");
 }
 

@@ -2,6 +2,7 @@
 #include "formats.hpp"
 
 #include <string_view>
+#include <utility>
 
 #include "../formats/candump_log.hpp"
 #include "../formats/csv.hpp"
@@ -33,15 +34,20 @@ std::unique_ptr<Source> make_source(const std::string& path, RecordingReader::Ha
   return std::make_unique<NativeSource>(handler, called(path));
 }
 
-std::unique_ptr<Sink> make_sink(const std::string& path, Output& output) {
+std::unique_ptr<Sink> make_sink(const std::string& path, Output& output,
+                                std::vector<Device> devices) {
   const std::string_view name = path;
+  if (name.ends_with(".csv")) return std::make_unique<CsvSink>(output, std::move(devices));
+  if (name.ends_with(".jsonl")) return std::make_unique<JsonLinesSink>(output, std::move(devices));
+  if (!devices.empty()) {
+    throw Error(ErrorKind::usage, "--device", "this format holds the bytes as the board sent them",
+                "convert to .csv or .jsonl");
+  }
   if (name.ends_with(".r4log")) return std::make_unique<NativeSink>(output, false);
   if (name.ends_with(".r4log.zst")) return std::make_unique<NativeSink>(output, true);
   if (name.ends_with(".log")) return std::make_unique<CandumpSink>(output);
   if (name.ends_with(".pcapng")) return std::make_unique<PcapngSink>(output);
   if (name.ends_with(".mcap")) return std::make_unique<McapSink>(output);
-  if (name.ends_with(".csv")) return std::make_unique<CsvSink>(output);
-  if (name.ends_with(".jsonl")) return std::make_unique<JsonLinesSink>(output);
   throw Error(ErrorKind::usage, path, "no format has that ending",
               "end it in .r4log, .r4log.zst, .csv, .jsonl, .log, .pcapng or .mcap");
 }

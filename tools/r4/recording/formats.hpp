@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "../formats/conversion.hpp"
 #include "../formats/packets/packets.hpp"
+#include "r4link/devices/device.hpp"
 
 namespace r4::tool {
 
@@ -24,6 +26,8 @@ std::unique_ptr<Source> make_source(const std::string& path, RecordingReader::Ha
                                     const SourceOptions& options = {});
 
 // Writes the file of that name. Throws Error{usage} where its ending is none that is written.
-std::unique_ptr<Sink> make_sink(const std::string& path, Output& output);
+// Of `devices` .csv and .jsonl tell what they have measured; Error{usage} for them with another.
+std::unique_ptr<Sink> make_sink(const std::string& path, Output& output,
+                                std::vector<Device> devices = {});
 
 }  // namespace r4::tool

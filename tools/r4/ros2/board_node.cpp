@@ -25,10 +25,14 @@ BoardNode::BoardNode(asio::io_context& io, const std::string& url,
       logged_(std::move(logged)),
       board_(io, url, board_options),
       topics_(std::make_shared<BoardTopics>(graph, node, options)),
+      device_topics_(std::make_shared<DeviceTopics>(graph, node, options.devices)),
       commands_(board_, graph, node, inbox, outbox, options,
                 [this](LogLevel level, const std::string& text) { log(level, text); }),
       tick_(io) {
   connect();
+  if (options_.devices.empty()) return;
+  setup_.emplace(io, board_, options_.devices,
+                 [this](const Problem& problem) { log(LogLevel::warning, problem.text()); });
 }
 
 void BoardNode::open() {
@@ -39,11 +43,12 @@ void BoardNode::open() {
 
 void BoardNode::connect() {
   board_.on_state([this](const ReceivedState& state, const Datagram& datagram) {
-    outbox_.push([topics = topics_, state = static_cast<const State&>(state),
-                  sampled = state.sampled_at_wall_time(),
+    outbox_.push([topics = topics_, devices = device_topics_,
+                  state = static_cast<const State&>(state), sampled = state.sampled_at_wall_time(),
                   line = std::string(datagram.bytes().data(), datagram.bytes().size())] {
       topics->on_datagram(line);
       topics->on_state(state, sampled);
+      devices->on_state(state, sampled);
     });
   });
   board_.on_board_heartbeat([this](const Datagram& datagram) {

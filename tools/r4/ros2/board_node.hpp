@@ -9,16 +9,19 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
 #include "board_commands.hpp"
 #include "board_topics.hpp"
+#include "device_topics.hpp"
 #include "graph/graph.hpp"
 #include "graph/inbox.hpp"
 #include "graph/outbox.hpp"
 #include "node_options.hpp"
 #include "r4link/async_board.hpp"
+#include "tools/r4/devices/device_setup.hpp"
 
 namespace r4::tool::ros2 {
 
@@ -58,6 +61,8 @@ class BoardNode {
   const Logged logged_;
   AsyncBoard board_;
   const std::shared_ptr<BoardTopics> topics_;
+  const std::shared_ptr<DeviceTopics> device_topics_;
+  std::optional<DeviceSetup> setup_;
   BoardCommands commands_;
   asio::steady_timer tick_;
   Clock::time_point next_second_{};

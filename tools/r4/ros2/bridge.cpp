@@ -158,6 +158,8 @@ class Bridge {
     board_options.session.fields = !options_.fields.empty() ? options_.fields
                                    : bus                    ? "DEFAULT"
                                                             : component_fields;
+    shown.devices = Device::from(options_.devices);
+    for (const Device& each : shown.devices) board_options.session.fields += "," + each.fields();
     parse_fields(Text(board_options.session.fields), shown.fields);
     shown.fields.add(StateField::relays);  // arming asks for it
     nodes_.push_back(std::make_unique<BoardNode>(

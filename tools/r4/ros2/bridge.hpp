@@ -15,6 +15,7 @@ struct BridgeOptions {
   std::string name = "r4";
   std::string space;
   std::string fields;
+  std::vector<std::string> devices;
   bool arm = false;
   Milliseconds deadline{1000};
   std::string servo;

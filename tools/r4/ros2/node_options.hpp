@@ -4,7 +4,9 @@
 
 #include <chrono>
 #include <optional>
+#include <vector>
 
+#include "r4link/devices/device.hpp"
 #include "r4link/state.hpp"
 #include "setpoint_units.hpp"
 
@@ -17,6 +19,7 @@ struct NodeOptions {
   std::optional<double> steps_per_turn;      // of the steppers'
   std::optional<DifferentialDrive> drive;    // none: there is no cmd_vel
   std::chrono::milliseconds deadline{1000};  // of a publisher that drives
+  std::vector<Device> devices;               // on the user's I2C bus
   bool arm = false;                          // as soon as the board is there, once
 };
 

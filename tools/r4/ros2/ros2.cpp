@@ -59,6 +59,9 @@ void add_ros2(CLI::App& root, Action& chosen) {
   add_text(*command, "--steps-per-turn", options->steps_per_turn,
            "of the steppers, for joint_states", "STEPS");
   add_fields(*command, options->fields, "state fields to ask for: what topics there are");
+  add_repeated(*command, "--device", options->devices,
+               "a described one on the user's I2C bus, such as bno055@0x28: a topic of its own",
+               "NAME@ADDRESS");
   add_seconds(*command, "--for", options->duration, "end after that time");
   add_key(*command, options->key);
   add_json(*command, options->json, "print JSON, one object a line");

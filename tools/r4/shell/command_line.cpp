@@ -43,7 +43,7 @@ constexpr std::array subcommands = std::to_array<Subcommand>({
     {"sim", add_sim},         {"key", add_key_command},
     {"demo", add_demo},       {"encode", add_encode},
     {"decode", add_decode},   {"completion", add_completion},
-    {"man", add_man},
+    {"man", add_man},         {"devices", add_devices},
 });
 
 // The one that the first argument names, with its options, else all. Those of all of them take longer to declare than

@@ -19,6 +19,7 @@ void add_monitor(CLI::App& root, Action& chosen);
 void add_send(CLI::App& root, Action& chosen);
 void add_stop(CLI::App& root, Action& chosen);
 void add_list(CLI::App& root, Action& chosen);
+void add_devices(CLI::App& root, Action& chosen);
 void add_encode(CLI::App& root, Action& chosen);
 void add_decode(CLI::App& root, Action& chosen);
 void add_doctor(CLI::App& root, Action& chosen);

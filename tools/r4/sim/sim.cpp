@@ -43,6 +43,7 @@ struct Options {
   std::optional<std::uint64_t> seed;
   std::string board_id;
   std::vector<std::string> settings;
+  std::vector<std::string> devices;
   std::optional<Impairment> link;
 };
 
@@ -54,6 +55,16 @@ void check_id(const std::string& id) {
   if (valid && !id.empty() && id.size() <= longest_id) return;
   throw Error(ErrorKind::usage, "--board-id " + id, "cannot be sent",
               fmt::format("use 1 to {} printable ASCII characters without , ; and ^", longest_id));
+}
+
+// What connects a device to the user's bus.
+sim::ScriptStep connection_of(const std::string& name) {
+  try {
+    return sim::Script::parse_now("device " + name + " on", "--device").value();
+  } catch (const Error& error) {
+    const Problem& problem = error.problem();
+    throw Error(ErrorKind::usage, "--device " + name, problem.reason, problem.fix);
+  }
 }
 
 Settings read_settings(const std::vector<std::string>& texts) {
@@ -201,6 +212,8 @@ int simulate(const Options& options) {
   asio::signal_set signals(io, SIGINT, SIGTERM);
   signals.async_wait([&io](const std::error_code&, int) { io.stop(); });
 
+  std::vector<sim::ScriptStep> connections;
+  for (const std::string& name : options.devices) connections.push_back(connection_of(name));
   const std::vector<Plan> plans = plans_of(options);
   allow_files_for(plans.size());
   {
@@ -213,6 +226,9 @@ int simulate(const Options& options) {
     std::vector<std::string> listening;
     for (const auto& board : boards) board->start(listening);
     output.listening(listening);
+    for (const auto& board : boards) {
+      for (const sim::ScriptStep& step : connections) board->happen(step);
+    }
 
     asio::steady_timer end(io);
     if (options.duration) {
@@ -273,6 +289,7 @@ Examples:
   r4 sim udp://127.0.0.1:0                     at any free port, which it prints
   r4 sim --link loss=5%,delay=20ms±10          over a bad WiFi
   r4 sim --stdin                               and type: us 1 15
+  r4 sim --device bno055                       with a BNO055 on the user's I2C bus
   r4 sim udp://0.0.0.0:2018 pty:/tmp/r4        two transports at once; open the second with
                                                r4 monitor serial:///tmp/r4
   r4 sim 'udp://127.0.0.1:2018?peer=127.0.0.1:2390'   streams to that port, as the paper's board
@@ -305,6 +322,9 @@ void add_sim(CLI::App& root, Action& chosen) {
   add_repeated(*command, "--set", options->settings,
                "a setting as C:KEY,VALUE makes it, such as rate,50 (can be given again)",
                "KEY,VALUE");
+  add_repeated(*command, "--device", options->devices,
+               "icm20948, bno055, vl53l0x or as5600, on the user's I2C bus (can be given again)",
+               "NAME");
   add_text(
       *command, "--link",
       [options](const std::string& text) { options->link = Impairment::parse(text); },

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <deque>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -45,6 +46,13 @@ class LiveView final : public MonitorView {
     t_ms_ = datagram.time_ms();
   }
   void on_heartbeat(const Datagram&) override { ++heartbeats_; }
+  void on_reading(const DeviceNews& news) override {
+    for (const DeviceNews::Value& value : news.values) {
+      readings_[{news.device.first_slot(), news.device.text()}][value.meaning->name] =
+          value_text(value);
+    }
+  }
+  void on_device_trouble(const Problem& problem) override { note(problem.text()); }
   void on_nack(const Nack& nack, const Datagram&) override {
     if (nack.code == Refusal::busy) return;  // the first line says so
     note(fmt::format("refused PNum {}: {}", nack.pnum, meaning_of(nack.code)));
@@ -66,6 +74,11 @@ class LiveView final : public MonitorView {
     if (!Screen::has_room()) return;  // Ctrl-S
     std::vector<std::string> lines = status_lines();
     add_fields(lines, std::max<std::size_t>(1, Screen::columns() / cell_width));
+    for (const auto& [device, values] : readings_) {
+      lines.emplace_back();
+      lines.push_back(device.second);
+      for (const auto& [name, text] : values) lines.push_back("  " + text);
+    }
     lines.emplace_back();
     for (const std::string& each : notes_) lines.push_back(each);
     screen_.draw(std::move(lines));
@@ -137,6 +150,8 @@ class LiveView final : public MonitorView {
   const AsyncBoard& board_;
   const Clock::time_point start_ = Clock::now();
   std::vector<std::pair<std::string, std::string>> fields_;
+  // By its slot and what it is called, its values by their names.
+  std::map<std::pair<int, std::string>, std::map<std::string, std::string>> readings_;
   std::deque<std::string> notes_;
   ChipFault fault_;
   std::uint32_t pnum_ = 0;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <array>
 #include <asio/io_context.hpp>
 #include <asio/signal_set.hpp>
 #include <asio/steady_timer.hpp>
@@ -14,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "../devices/device_setup.hpp"
 #include "../shell/farewell.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
@@ -23,6 +25,7 @@
 #include "monitor_bus.hpp"
 #include "monitor_view.hpp"
 #include "r4link/async_board.hpp"
+#include "r4link/devices/device.hpp"
 #include "r4link/error.hpp"
 #include "r4link/link.hpp"
 #include "transports/can/can_interface.hpp"
@@ -35,6 +38,8 @@ namespace {
 constexpr Milliseconds tick{100};
 // With --count alone: how long a board may stay silent from the start.
 constexpr Milliseconds patience{5000};
+// With --device: for how long another host must control the board until it is left to that one.
+constexpr Milliseconds busy_patience{1500};
 
 struct Options {
   std::vector<std::string> urls;
@@ -43,14 +48,16 @@ struct Options {
   std::uint64_t count = 0;  // 0: no end
   std::optional<Milliseconds> duration;
   std::string fields;
+  std::vector<std::string> devices;
   std::string key;
 };
 
-BoardOptions board_options(const Options& options) {
+BoardOptions board_options(const Options& options, const std::vector<Device>& devices = {}) {
   BoardOptions board_options = with_key(options.key);
   board_options.role = options.control ? BoardRole::control : BoardRole::watch;
   board_options.session.arming = Arming::off;  // it drives nothing
   if (!options.fields.empty()) board_options.session.fields = options.fields;
+  for (const Device& device : devices) board_options.session.fields += "," + device.fields();
   return board_options;
 }
 
@@ -59,7 +66,8 @@ class Monitor {
   Monitor(const Options& options, std::string url)
       : options_(options),
         url_(std::move(url)),
-        board_(io_, url_, board_options(options)),
+        devices_(Device::from(options.devices)),
+        board_(io_, url_, board_options(options, devices_)),
         view_(options.json                   ? make_json_view(board_)
               : ::isatty(STDOUT_FILENO) != 0 ? make_live_view(board_)
                                              : make_plain_view()),
@@ -67,9 +75,21 @@ class Monitor {
         tick_(io_),
         end_(io_) {}
 
+  // Another host controls the board, so that devices cannot be set up here.
+  bool gives_way() const { return gives_way_; }
+
   int run() {
     connect();
-    board_.open();
+    if (options_.control && !devices_.empty()) {
+      setup_.emplace(io_, board_, devices_,
+                     [this](const Problem& problem) { view_->on_device_trouble(problem); });
+    }
+    try {
+      board_.open();
+    } catch (const Error& error) {
+      gives_way_ = error.problem().reason.starts_with("controlled by ");
+      throw;
+    }
     signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
     end_after(options_.duration ? *options_.duration : patience);
     next_tick();
@@ -93,6 +113,7 @@ class Monitor {
   void connect() {
     board_.on_state([this](const ReceivedState& state, const Datagram& datagram) {
       view_->on_state(state, datagram);
+      tell_readings(state);
       if (++states_ == options_.count) io_.stop();
     });
     board_.on_board_heartbeat([this](const Datagram& d) { view_->on_heartbeat(d); });
@@ -106,6 +127,33 @@ class Monitor {
     });
     board_.on_event([this](const CarrierEvent& event) { view_->on_event(event); });
     board_.on_wire([this](const Wire& wire) { view_->on_wire(wire); });
+  }
+
+  // A host that was killed keeps its board until the board's timeout.
+  void look_who_controls() {
+    busy_ticks_ = setup_ && board_.link().busy ? busy_ticks_ + 1 : 0;
+    if (busy_ticks_ * tick < busy_patience) return;
+    gives_way_ = true;
+    io_.stop();
+  }
+
+  // Each reading once, and again when the board has begun anew.
+  void tell_readings(const ReceivedState& state) {
+    for (const Device& device : devices_) {
+      const std::vector<DeviceValue>& values = device.description().values;
+      for (std::size_t poll = 0; poll < device.description().polls.size(); ++poll) {
+        const std::size_t slot = static_cast<std::size_t>(device.first_slot() - 1) + poll;
+        const I2cReading& read = state.i2c[slot];
+        if (read.data.size == 0 || told_ms_[slot] == read.t_ms) continue;
+        told_ms_[slot] = read.t_ms;
+        DeviceNews news{device, state.pnum, read.t_ms, {}};
+        for (std::size_t i = 0; i < values.size(); ++i) {
+          if (values[i].poll != poll) continue;
+          news.values.push_back({&values[i], device.reading(state, i).number});
+        }
+        view_->on_reading(news);
+      }
+    }
   }
 
   void end_after(Milliseconds time) {
@@ -122,6 +170,7 @@ class Monitor {
     tick_.async_wait([this](const std::error_code& error) {
       if (error) return;
       view_->on_tick();
+      look_who_controls();
       next_tick();
     });
   }
@@ -137,6 +186,7 @@ class Monitor {
 
   const Options& options_;
   const std::string url_;
+  const std::vector<Device> devices_;
   asio::io_context io_{1};
   AsyncBoard board_;
   std::unique_ptr<MonitorView> view_;
@@ -144,7 +194,26 @@ class Monitor {
   asio::steady_timer tick_;
   asio::steady_timer end_;
   std::uint64_t states_ = 0;
+  std::optional<DeviceSetup> setup_;
+  std::array<std::optional<std::uint32_t>, i2c_slots> told_ms_;
+  int busy_ticks_ = 0;
+  bool gives_way_ = false;
 };
+
+// Devices are set up by who controls the board: by us, where nobody does. Else what that program has set up is shown.
+int monitor_devices(Options options, const std::string& url) {
+  options.control = true;
+  std::optional<Monitor> monitor(std::in_place, options, url);
+  try {
+    const int code = monitor->run();
+    if (!monitor->gives_way()) return code;
+  } catch (const Error&) {
+    if (!monitor->gives_way()) throw;
+  }
+  monitor.reset();
+  options.control = false;
+  return Monitor(options, url).run();
+}
 
 // can://can0 and nothing else: all boards.
 bool is_whole_bus(const std::string& text) {
@@ -161,17 +230,22 @@ int monitor(const Options& options) {
   if (urls.size() == 1 && is_whole_bus(urls.front())) {
     const Url url = Url::parse(urls.front());
     const std::string& interface = can_interface_of(url);
-    if (!options.fields.empty()) {
-      throw Error(ErrorKind::usage, "--fields", "only one board can be asked for its fields",
+    if (!options.fields.empty() || !options.devices.empty()) {
+      throw Error(ErrorKind::usage, options.fields.empty() ? "--device" : "--fields",
+                  "only one board can be asked for its fields",
                   "name the board: " + url.text() + "?node=1");
     }
     monitor_bus({interface, options.json, options.count, options.duration});
     return 0;
   }
   if (urls.size() > 1) {
+    if (!options.devices.empty()) {
+      throw Error(ErrorKind::usage, "--device", "is for one board", "name one");
+    }
     monitor_boards({urls, board_options(options), options.json, options.count, options.duration});
     return 0;
   }
+  if (!options.devices.empty()) return monitor_devices(options, urls.front());
   return Monitor(options, urls.front()).run();
 }
 
@@ -189,11 +263,18 @@ hears. Of several boards, by URLs or a pattern, it is a table, or the JSON of ea
 Where + joins several wires to a board, it has a line for each of them, and one when a wire begins to carry or
 ceases to; in JSON of type wire, also at the end.
 
+With --device it shows what a sensor on the user's I2C bus measures, with units; in JSON a line of type
+reading, whose t is when the board read it. r4 devices lists what is described; NAME may be the path of a
+file of your own, and :SLOT behind the address is the first slot that it takes. Where no host controls the
+board, it takes control and sets the device up, which may write to it; where one does, it shows the slots
+as that host has set them up.
+
 Examples:
   r4 monitor udp://192.168.0.125
   r4 monitor serial:auto --fields DEFAULT,ENC1,US1
   r4 monitor serial:auto+udp://192.168.0.125    one board by two wires
   r4 monitor 'udp:?id=left-arm'         the board of that name, wherever it is; r4 list shows them
+  r4 monitor serial:auto --device bno055@0x28 --device ina219@0x40
   r4 monitor can://can0                 every board on the bus; can://can0?node=3 is one
   r4 monitor 'udp://10.0.0.{1-30}?listen=0'   thirty boards
   r4 monitor udp://127.0.0.1 --json --count 100 | jq .fields.AIN24
@@ -213,6 +294,9 @@ void add_monitor(CLI::App& root, Action& chosen) {
              "end after that many states (or 5 s in which nothing at all is heard)");
   add_seconds(*command, "--duration", options->duration, "end after that time");
   add_fields(*command, options->fields);
+  add_repeated(*command, "--device", options->devices,
+               "a described one on the user's I2C bus, such as bno055@0x28: shows what it measures",
+               "NAME@ADDRESS");
   add_flag(*command, "--control", options->control,
            "take control: send heartbeats, so that the board is ACTIVE");
   add_key(*command, options->key);

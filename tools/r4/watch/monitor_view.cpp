@@ -49,6 +49,23 @@ class JsonView final : public MonitorView {
     lines_.write(line_of(json));
   }
   void on_heartbeat(const Datagram& datagram) override { print("heartbeat", datagram); }
+  void on_reading(const DeviceNews& news) override {
+    Json fields = Json::object();
+    for (const DeviceNews::Value& value : news.values) {
+      fields[value.meaning->name] = value.number ? Json(*value.number) : Json();
+    }
+    Json json = object("reading", std::move(fields));
+    json["pnum"] = news.pnum;
+    json["t"] = news.t_ms;
+    json["device"] = news.device.text();
+    lines_.write(line_of(json));
+  }
+  void on_device_trouble(const Problem& problem) override {
+    lines_.write(line_of(object("error", {{"error", "device"},
+                                          {"thing", problem.thing},
+                                          {"reason", problem.reason},
+                                          {"fix", problem.fix}})));
+  }
   void on_nack(const Nack&, const Datagram& datagram) override { print("nack", datagram); }
   void on_bad_datagram(const ReadResult& result, std::string_view bytes) override {
     Json fields = bad_datagram_json(result);
@@ -124,6 +141,12 @@ class PlainView final : public MonitorView {
     lines_.write(line);
   }
   void on_heartbeat(const Datagram&) override {}
+  void on_reading(const DeviceNews& news) override {
+    std::string line = fmt::format("{} T {:>10} ", news.device.text(), news.t_ms);
+    for (const DeviceNews::Value& value : news.values) line += " " + value_text(value);
+    lines_.write(line + "\n");
+  }
+  void on_device_trouble(const Problem& problem) override { lines_.write(problem.text() + "\n"); }
   void on_nack(const Nack& nack, const Datagram&) override {
     lines_.write(fmt::format("refused PNum {}: {}\n", nack.pnum, meaning_of(nack.code)));
   }
@@ -160,6 +183,12 @@ std::unique_ptr<MonitorView> make_json_view(const AsyncBoard& board, LineWriter&
 }
 
 std::unique_ptr<MonitorView> make_plain_view() { return std::make_unique<PlainView>(); }
+
+std::string value_text(const DeviceNews::Value& value) {
+  const std::string number = value.number ? fmt::format("{:.5g}", *value.number) : "-";
+  const std::string& unit = value.meaning->unit;
+  return fmt::format("{} {}{}{}", value.meaning->name, number, unit.empty() ? "" : " ", unit);
+}
 
 std::string link_text(const LinkStatus& status) {
   std::string text;

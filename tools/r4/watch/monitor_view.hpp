@@ -2,15 +2,32 @@
 // How `r4 monitor` shows what it hears: JSON, plain lines, or a status that is redrawn.
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <string_view>
+#include <vector>
 
 #include "r4link/async_board.hpp"
 #include "r4link/carrier.hpp"
+#include "r4link/devices/device.hpp"
+#include "r4link/error.hpp"
 
 namespace r4::tool {
 
 class LineWriter;
+
+// The values of a device that came with one of its readings.
+struct DeviceNews {
+  const Device& device;
+  std::uint32_t pnum = 0;  // of the state
+  std::uint32_t t_ms = 0;  // when the board read them
+  struct Value {
+    const DeviceValue* meaning = nullptr;
+    std::optional<double> number;
+  };
+  std::vector<Value> values;
+};
 
 class MonitorView {
  public:
@@ -21,6 +38,10 @@ class MonitorView {
 
   virtual void on_state(const ReceivedState& state, const Datagram& datagram) = 0;
   virtual void on_heartbeat(const Datagram& datagram) = 0;
+  // What a described device has measured newly, of one of its polls.
+  virtual void on_reading(const DeviceNews& news) = 0;
+  // What stands in the way of setting one up.
+  virtual void on_device_trouble(const Problem& problem) = 0;
   virtual void on_end() {}
   virtual void on_nack(const Nack& nack, const Datagram& datagram) = 0;
   virtual void on_bad_datagram(const ReadResult& result, std::string_view bytes) = 0;
@@ -45,5 +66,7 @@ std::unique_ptr<MonitorView> make_live_view(const AsyncBoard& board);
 
 // "ACTIVE", "SAFE (stop)", "busy: another host controls the board": for people.
 std::string link_text(const LinkStatus& status);
+// "accel_x 0.02 m/s2"; "-" for what is no measurement.
+std::string value_text(const DeviceNews::Value& value);
 
 }  // namespace r4::tool

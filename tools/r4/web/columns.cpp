@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <charconv>
 #include <string_view>
+#include <utility>
 
 #include "../formats/state_units.hpp"
+#include "protocol/messages/state_fields.hpp"
 #include "r4link/vocabulary.hpp"
 
 namespace r4::tool::web {
@@ -34,7 +36,7 @@ StateField split(StateField first, StateField second, int index) {
 
 }  // namespace
 
-Columns::Columns() {
+Columns::Columns(std::vector<Device> devices) : devices_(std::move(devices)) {
   for (int i = 0; i < state_field_count; ++i) {
     const auto field = static_cast<StateField>(i);
     const StateUnits units = units_of(field);
@@ -52,6 +54,13 @@ Columns::Columns() {
                               : all.substr(bracket + 1, all.size() - bracket - 2));
     }
   }
+  first_of_devices_ = names_.size();
+  for (const Device& device : devices_) {
+    for (const DeviceValue& value : device.description().values) {
+      names_.push_back(device.text() + "." + value.name);
+      units_.push_back(value.unit);
+    }
+  }
 }
 
 void Columns::fill(const Datagram& state, std::vector<double>& row) const {
@@ -65,6 +74,15 @@ void Columns::fill(const Datagram& state, std::vector<double>& row) const {
       const std::size_t comma = std::min(rest.find(','), rest.size());
       std::from_chars(rest.data(), rest.data() + comma, row[column]);
       rest.remove_prefix(std::min(comma + 1, rest.size()));
+    }
+  }
+  State values;
+  if (devices_.empty() || !read_state(state, values)) return;
+  std::size_t column = first_of_devices_;
+  for (const Device& device : devices_) {
+    for (std::size_t i = 0; i < device.description().values.size(); ++i, ++column) {
+      if (!values.present.has(device.field(i))) continue;
+      if (const auto number = device.reading(values, i).number) row[column] = *number;
     }
   }
 }

@@ -36,6 +36,7 @@ BoardOptions options_for(const std::string& url, const HubOptions& options) {
   BoardOptions board = options.board;
   const bool bus = has_wire(url, "can");
   board.session.fields = !options.fields.empty() ? options.fields : bus ? "DEFAULT" : "ALL";
+  for (const Device& each : options.devices) board.session.fields += "," + each.fields();
   return board;
 }
 
@@ -58,6 +59,8 @@ void require_allowed(const Command& command) {
 
 Hub::Hub(asio::io_context& io, const std::vector<std::string>& urls, const HubOptions& options)
     : io_(io),
+      devices_(options.devices),
+      columns_(devices_),
       changed_(urls.size()),
       tick_(io),
       deadline_(io),
@@ -73,7 +76,7 @@ Hub::Hub(asio::io_context& io, const std::vector<std::string>& urls, const HubOp
       server_(options.server, *this) {
   for (const std::string& url : urls) {
     boards_.push_back(std::make_unique<WebBoard>(io, boards_.size(), url, options_for(url, options),
-                                                 static_cast<WebBoard::Events&>(*this)));
+                                                 devices_, static_cast<WebBoard::Events&>(*this)));
     all_.push_back(boards_.back().get());
     rows_.emplace_back(columns_);
   }

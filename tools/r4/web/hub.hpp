@@ -27,7 +27,8 @@ struct HubOptions {
   ServerOptions server;
   std::string record_folder;
   BoardOptions board;
-  std::string fields;  // empty: all; on a CAN bus the paper's
+  std::string fields;           // empty: all; on a CAN bus the paper's
+  std::vector<Device> devices;  // on the user's I2C bus of each board
 };
 
 class Hub final : ServerEvents, WebBoard::Events {
@@ -82,6 +83,7 @@ class Hub final : ServerEvents, WebBoard::Events {
 
   asio::io_context& io_;
   const Clock::time_point began_ = Clock::now();
+  const std::vector<Device> devices_;
   const Columns columns_;
   std::vector<std::unique_ptr<WebBoard>> boards_;
   std::vector<WebBoard*> all_;

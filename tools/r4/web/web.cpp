@@ -31,6 +31,7 @@ struct Options {
   std::string record_folder = ".";
   std::string page;
   std::string fields;
+  std::vector<std::string> devices;
   std::optional<Milliseconds> duration;
   std::string key;
   bool json = false;
@@ -50,6 +51,7 @@ int serve_web(const Options& options) {
   hub_options.record_folder = options.record_folder;
   hub_options.board = with_key(options.key);
   hub_options.fields = options.fields;
+  hub_options.devices = Device::from(options.devices);
 
   asio::io_context io{1};
   web::Hub hub(io, urls, hub_options);
@@ -86,6 +88,9 @@ safe at once. Anybody who sees the page may stop them.
 It answers at this computer alone, to all its users; with --token to who has the address that it prints.
 --listen 0.0.0.0:8080 answers other computers, and to them always so. Nothing is encrypted: over a network
 that is not yours, use ssh -L (docs/web.md).
+With --device it shows what a sensor on the user's I2C bus measures (r4 devices); who takes control sets
+it up, once the board is armed.
+
 Programs get the same by ws://ADDRESS/ with the Foxglove protocol, read-only, and Prometheus at /metrics.
 
 Examples:
@@ -115,6 +120,9 @@ void add_web(CLI::App& root, Action& chosen) {
            "FOLDER");
   add_fields(*command, options->fields,
              "state fields to ask for (default ALL, on a CAN bus DEFAULT)");
+  add_repeated(*command, "--device", options->devices,
+               "a described one on the user's I2C bus, such as bno055@0x28: what it measures",
+               "NAME@ADDRESS");
   add_seconds(*command, "--for", options->duration, "end after that time");
   add_key(*command, options->key);
   add_json(*command, options->json, "print the address as JSON");

@@ -22,11 +22,12 @@ constexpr auto stop_time = 2s;
 }  // namespace
 
 WebBoard::WebBoard(asio::io_context& io, std::size_t number, std::string url, BoardOptions options,
-                   Events& events)
+                   const std::vector<Device>& devices, Events& events)
     : io_(io),
       number_(number),
       url_(std::move(url)),
       options_(std::move(options)),
+      devices_(devices),
       events_(events),
       retry_(io) {
   make(BoardRole::watch);
@@ -39,6 +40,10 @@ void WebBoard::make(BoardRole role) {
   options.session.arming = controlling_ ? Arming::required : Arming::off;
   board_ = std::make_unique<AsyncBoard>(io_, url_, options);
   connect();
+  if (controlling_ && !devices_.empty()) {
+    setup_.emplace(io_, *board_, devices_,
+                   [this](const Problem& problem) { say(Level::warning, problem.text()); });
+  }
   if (recording_ != nullptr) board_->record(*recording_);
 }
 
@@ -54,6 +59,7 @@ void WebBoard::take_control() {
     board_->feed();
     board_->open();
   } catch (const Error&) {
+    setup_.reset();
     board_.reset();
     watch();
     throw;
@@ -76,6 +82,7 @@ void WebBoard::close(Done done) {
 
 void WebBoard::leave(Done done) {
   leaving_ = true;
+  setup_.reset();
   board_->async_close(farewell_time, [this, done = std::move(done)](const CommandResult&) {
     asio::post(io_, [this, done] {  // not from within the board's own call
       board_.reset();

@@ -11,9 +11,11 @@
 #include <asio/steady_timer.hpp>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "../devices/device_setup.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/recording.hpp"
 
@@ -37,8 +39,9 @@ class WebBoard {
   using Done = std::function<void()>;
   using OnResult = std::function<void(const CommandResult&)>;
 
+  // While it is controlled, it sets `devices` up, which outlive it.
   WebBoard(asio::io_context& io, std::size_t number, std::string url, BoardOptions options,
-           Events& events);
+           const std::vector<Device>& devices, Events& events);
 
   // To watch. Throws Error.
   void open();
@@ -72,9 +75,11 @@ class WebBoard {
   const std::size_t number_;
   const std::string url_;
   const BoardOptions options_;
+  const std::vector<Device>& devices_;
   Events& events_;
   asio::steady_timer retry_;
   std::unique_ptr<AsyncBoard> board_;
+  std::optional<DeviceSetup> setup_;  // of that one
   Recording* recording_ = nullptr;
   BoardIdentity identity_;
   std::string trouble_;

@@ -49,7 +49,8 @@ TEST(Script, ReadsWhatHappensToDevices) {
   EXPECT_EQ(error_of("1 userbus broken"),
             "bench.txt:1: 'broken' is nothing a bus can be; write held, cut, stretched or free");
   EXPECT_EQ(error_of("1 device bmp280 off"),
-            "bench.txt:1: 'bmp280' is no device on the user's bus; write mpu6050 or ina219");
+            "bench.txt:1: 'bmp280' is no device on the user's bus; write mpu6050, "
+            "ina219, icm20948, bno055, vl53l0x or as5600");
 }
 
 TEST(Script, ReadsEveryKindOfStep) {

@@ -58,6 +58,9 @@ R4_MESSAGE_TYPE(BatteryMessage, "sensor_msgs/msg/BatteryState",
 R4_MESSAGE_TYPE(JointStateMessage, "sensor_msgs/msg/JointState",
                 "RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e",
                 &sensor_msgs_msg_dds__JointState__desc)
+R4_MESSAGE_TYPE(ImuMessage, "sensor_msgs/msg/Imu",
+                "RIHS01_7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b",
+                &sensor_msgs_msg_dds__Imu__desc)
 R4_MESSAGE_TYPE(RangeMessage, "sensor_msgs/msg/Range",
                 "RIHS01_b42b62562e93cbfe9d42b82fe5994dfa3d63d7d5c90a317981703f7388adff3a",
                 &sensor_msgs_msg_dds__Range__desc)

@@ -18,6 +18,7 @@ using UInt32Message = std_msgs_msg_dds__UInt32_;
 using TwistMessage = geometry_msgs_msg_dds__Twist_;
 using BatteryMessage = sensor_msgs_msg_dds__BatteryState_;
 using JointStateMessage = sensor_msgs_msg_dds__JointState_;
+using ImuMessage = sensor_msgs_msg_dds__Imu_;
 using RangeMessage = sensor_msgs_msg_dds__Range_;
 using DiagnosticsMessage = diagnostic_msgs_msg_dds__DiagnosticArray_;
 using LogMessage = rcl_interfaces_msg_dds__Log_;
@@ -53,6 +54,8 @@ template <>
 const MessageType& message_type<BatteryMessage>();
 template <>
 const MessageType& message_type<JointStateMessage>();
+template <>
+const MessageType& message_type<ImuMessage>();
 template <>
 const MessageType& message_type<RangeMessage>();
 template <>

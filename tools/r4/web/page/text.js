@@ -15,7 +15,8 @@ export function put(node, text) { if (node.textContent !== text) node.textConten
 
 export function value_text(value, unit) {
   if (Number.isNaN(value)) return '–';
-  return unit === 'V' ? value.toFixed(2) : String(value);
+  if (unit === 'V') return value.toFixed(2);
+  return String(Number.isInteger(value) ? value : Number(value.toPrecision(5)));
 }
 
 const two = (number) => String(number).padStart(2, '0');

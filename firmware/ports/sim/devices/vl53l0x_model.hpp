@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A VL53L0X by its registers (ST DS11555 rev. 4, 3.2, and their names in ST's API, STSW-IMG005): a distance by the time
+// that light takes, each 33 ms once SYSRANGE_START has begun it.
+#pragma once
+
+#include <cstdint>
+
+#include "register_device.hpp"
+
+namespace r4 {
+namespace sim {
+
+class Vl53l0xModel final : public RegisterDevice {
+ public:
+  static constexpr std::uint8_t address = 0x29;
+  static constexpr std::int32_t no_target = 8190;  // what it says in mm when it sees nothing
+
+  Vl53l0xModel() : RegisterDevice(address) { power_on(); }
+  void power_on() override;
+  // How far what it sees is, millimetres; no_target.
+  void see(std::int32_t mm) { mm_ = mm; }
+
+ private:
+  static constexpr int result_size = 12;
+  std::uint8_t read_register(std::uint8_t at) override;
+  void write_register(std::uint8_t at, std::uint8_t byte) override;
+  void latch() override;
+  void put(int at, std::int32_t value);
+
+  std::uint8_t start_ = 0;  // SYSRANGE_START
+  std::uint8_t i2c_mode_ = 0;
+  std::uint8_t result_[result_size];  // from RESULT_RANGE_STATUS on
+  std::uint64_t ranged_ns_ = 0;       // when it began, or the range before
+  std::int32_t mm_ = 500;
+};
+
+}  // namespace sim
+}  // namespace r4

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "r4link/devices/device.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "r4link/error.hpp"
+#include "r4link/vocabulary.hpp"
+
+namespace r4 {
+
+Device::Device(DeviceDescription description, int address, int first_slot)
+    : description_(std::move(description)), address_(address), first_slot_(first_slot) {
+  const std::vector<int>& possible = description_.addresses;
+  if (std::find(possible.begin(), possible.end(), address) == possible.end()) {
+    throw Error(ErrorKind::usage, text(), "it cannot have that address",
+                fmt::format("by its description it is 0x{:02x}", fmt::join(possible, ", 0x")));
+  }
+  if (first_slot < 1 || last_slot() > i2c_slots) {
+    throw Error(ErrorKind::usage, text(),
+                fmt::format("it takes {} slots from slot {} on, and the board has {}",
+                            description_.polls.size(), first_slot, i2c_slots),
+                "begin at a lower slot, or read fewer devices");
+  }
+}
+
+std::string Device::text() const { return fmt::format("{}@0x{:02x}", description_.name, address_); }
+
+std::string Device::fields() const {
+  std::string names;
+  for (int slot = first_slot_; slot <= last_slot(); ++slot) {
+    names += fmt::format("{}I2C{}", names.empty() ? "" : ",", slot);
+  }
+  return names;
+}
+
+StateField Device::field(std::size_t value) const {
+  const int slot = first_slot_ + static_cast<int>(description_.values[value].poll);
+  return static_cast<StateField>(static_cast<int>(StateField::i2c1) + slot - 1);
+}
+
+DeviceReading Device::reading(const State& state, std::size_t value) const {
+  const DeviceValue& each = description_.values[value];
+  const I2cReading& read = state.i2c[static_cast<std::size_t>(first_slot_ - 1) + each.poll];
+  // Another length is somebody else's reading in that slot.
+  const bool whole = read.data.size == description_.polls[each.poll].count;
+  return {whole ? each.decode(read.data.bytes, read.data.size) : std::nullopt, read.t_ms,
+          read.errors};
+}
+
+DeviceReading Device::reading(const State& state, std::string_view value) const {
+  const auto found = description_.find(value);
+  if (found) return reading(state, *found);
+  std::string names;
+  for (const DeviceValue& each : description_.values)
+    names += (names.empty() ? "" : ", ") + each.name;
+  throw Error(ErrorKind::usage, text(), fmt::format("it has no value {}", value),
+              "it has " + names);
+}
+
+std::vector<DeviceReading> Device::readings(const State& state) const {
+  std::vector<DeviceReading> all;
+  all.reserve(description_.values.size());
+  for (std::size_t i = 0; i < description_.values.size(); ++i) all.push_back(reading(state, i));
+  return all;
+}
+
+}  // namespace r4

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Described devices: r4 devices, monitor and convert with --device, as docs/described-devices.md shows them."""
+import csv
+import time
+
+import pytest
+
+from r4_process import PATIENCE_S, Board, Running, objects, run
+from web_client import Page, Web
+
+MINE = """device mine
+title A divider behind an INA219
+address 0x40
+poll bus x02 2 20
+value volts bus 0 u16be bits 3..15 scale 0.004 unit V
+"""
+
+
+@pytest.fixture(name='board')
+def a_simulated_board():
+    with Board('udp://127.0.0.1:0', options=('--device', 'bno055', '--device', 'as5600')) as board:
+        yield board
+
+
+def is_reading(device, value):
+    def looks_right(line):
+        return line['type'] == 'reading' and line['device'] == device and line['fields'].get(value) is not None
+    return looks_right
+
+
+def test_those_that_are_shipped_are_listed():
+    listed = run('devices').stdout.splitlines()
+    assert [line.split()[0] for line in listed] == ['as5600', 'bno055', 'icm20948', 'ina219', 'mpu6050', 'vl53l0x']
+    assert objects(run('devices', 'ina219', '--json').stdout)[0]['values']['current'] == 'A'
+    assert 'gyro_z           rad/s    every 20 ms' in run('devices', 'bno055').stdout
+
+
+def test_a_description_that_is_wrong_is_told_with_its_line(tmp_path):
+    path = tmp_path / 'mine.device'
+    path.write_text(MINE.replace('bus 0', 'bus 1'))
+    result = run('devices', str(path))
+    assert result.returncode == 1
+    assert f'{path}, line 5: it ends behind the 2 bytes of its poll' in result.stderr
+    for command in (('devices', 'bno056'), ('monitor', 'udp://127.0.0.1', '--device', 'bno056'),
+                    ('monitor', 'udp://127.0.0.1', '--device', 'bno055@0x30'),
+                    ('monitor', 'udp://127.0.0.{1-2}', '--device', 'bno055'),
+                    ('convert', 'x.r4log', '-o', 'x.csv', '--device', 'bno055@0x28:8'),
+                    ('sim', '--device', 'bmp280')):
+        assert run(*command).returncode == 2, command
+
+
+def test_monitor_sets_devices_up_and_shows_what_they_measure(board, tmp_path):
+    path = tmp_path / 'mine.device'
+    path.write_text(MINE)
+    devices = ['--device', 'bno055@0x28', '--device', 'as5600', '--device', f'{path}@0x40:7']
+    with Running('monitor', board.host_url, *devices, '--json') as monitor:
+        assert monitor.next(is_reading('bno055@0x28', 'accel_z'))['fields']['accel_z'] == pytest.approx(9.81)
+        assert monitor.next(is_reading('as5600@0x36', 'angle'))['fields']['angle'] == pytest.approx(1.5708, abs=1e-4)
+        assert monitor.next(is_reading('mine@0x40', 'volts'))['fields']['volts'] == pytest.approx(12.16)
+        # A second one has no control, and shows what the first has set up.
+        with Running('monitor', board.host_url, *devices, '--json') as beside:
+            assert beside.next(is_reading('bno055@0x28', 'heading'))['fields']['heading'] == 270
+    wrong = run('monitor', board.host_url, '--device', 'icm20948@0x68', '--duration', '2')
+    assert 'icm20948@0x68: it is another device: its register x00 has x00, not xea' in wrong.stdout
+
+
+def test_a_recording_becomes_columns_with_units(board, tmp_path):
+    log, table = tmp_path / 'drive.r4log', tmp_path / 'drive.csv'
+    with Running('monitor', board.host_url, '--device', 'bno055', '--json') as monitor:
+        monitor.next(is_reading('bno055@0x28', 'accel_z'))
+        assert run('record', board.host_url, '-o', str(log), '--for', '0.5').returncode == 0
+    assert run('convert', str(log), '-o', str(table), '--device', 'bno055@0x28:1').returncode == 0
+    with open(table, encoding='ascii') as file:
+        rows = list(csv.DictReader(file))
+    assert {row['bno055@0x28 heading [deg]'] for row in rows} == {'270'}
+    assert {row['bno055@0x28 accel_z [m/s2]'] for row in rows} == {'9.81'}
+    assert run('convert', str(log), '-o', str(tmp_path / 'drive.mcap'), '--device', 'bno055').returncode == 2
+
+
+def test_a_page_shows_them_and_who_controls_sets_them_up(board):
+    with Web(board.host_url, options=('--device', 'bno055')) as web, Page(web) as page:
+        place = page.hello['fields'].index('bno055@0x28.gyro_z')
+        assert page.hello['units'][place] == 'rad/s'
+        assert page.states(1)[0]['bno055@0x28.accel_z'] is None
+        page.drive()
+        deadline = time.monotonic() + PATIENCE_S
+        while page.states(1)[-1]['bno055@0x28.accel_z'] != 9.81:
+            assert time.monotonic() < deadline

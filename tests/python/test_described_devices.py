@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Described devices (docs/described-devices.md)."""
+import asyncio
+import math
+
+import pytest
+
+import r4link
+from r4link import aio, devices
+
+MINE = """device mine
+address 0x40
+poll bus x02 2 20
+value volts bus 0 u16be bits 3..15 scale 0.004 unit V
+"""
+
+
+def test_one_that_is_shipped_is_set_up_and_decoded(sim, board, wait):
+    sim.happen('device bno055 on')
+    imu = r4link.Device('bno055@0x28')
+    assert (str(imu), imu.role, imu.fields, imu.units['gyro_z']) == ('bno055@0x28', 'imu', 'I2C1,I2C2', 'rad/s')
+    with pytest.raises(r4link.NotArmedError):
+        board.attach(imu)
+    board.arm()
+    board.attach(imu)
+    wait(lambda: imu.reading(board.state, 'accel_z').number == 9.81)
+    state = board.next_state()
+    readings = imu.readings(state)
+    assert math.isclose(readings['quat_z'].number, math.sqrt(0.5), abs_tol=1e-4)
+    assert readings['accel_z'].errors == 0 and 0 <= state.t_ms - readings['accel_z'].t_ms <= 1000
+    with pytest.raises(r4link.UsageError, match='it has no value yaw'):
+        imu.reading(state, 'yaw')
+
+
+def test_one_of_my_own_is_read_without_arming(board, wait, tmp_path):
+    path = tmp_path / 'mine.device'
+    path.write_text(MINE)
+    for device in (r4link.Device(f'{path}@0x40:3'), r4link.Device.parse(MINE, first_slot=4)):
+        board.attach(device)
+        wait(lambda device=device: device.reading(board.state, 'volts').number == pytest.approx(12.16))
+
+
+def test_what_is_wrong_is_named(board, tmp_path):
+    with pytest.raises(r4link.DataError, match='line 4: it ends behind the 2 bytes of its poll'):
+        r4link.Device.parse(MINE.replace('bus 0', 'bus 1'))
+    with pytest.raises(r4link.UsageError, match='no such device is described here'):
+        r4link.Device('bno056')
+    with pytest.raises(r4link.OpenError):
+        r4link.Device(str(tmp_path / 'none.device'))
+    with pytest.raises(r4link.RefusedError, match='it is another device'):
+        board.attach(r4link.Device('icm20948@0x68'))
+    assert devices.shipped() == ['as5600', 'bno055', 'icm20948', 'ina219', 'mpu6050', 'vl53l0x']
+
+
+def test_with_asyncio(sim):
+    async def main():
+        power = r4link.Device('ina219')
+        async with aio.Board(sim.url) as board:
+            await board.wait_active()
+            await board.attach(power)
+            while power.reading(await board.next_state(), 'current').number is None:
+                pass
+            assert power.reading(board.state, 'current').number == pytest.approx(1.25)
+    asyncio.run(main())

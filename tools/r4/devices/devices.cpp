@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 devices: the descriptions that are shipped, and whether one of the user's is right.
+#include <fmt/format.h>
+
+#include <memory>
+#include <string>
+
+#include "../shell/json.hpp"
+#include "../shell/options.hpp"
+#include "../shell/subcommands.hpp"
+#include "r4link/devices/description.hpp"
+#include "r4link/error.hpp"
+
+namespace r4::tool {
+namespace {
+
+struct Options {
+  std::string device;
+  bool json = false;
+};
+
+std::string addresses_of(const DeviceDescription& device) {
+  const std::vector<int>& all = device.addresses;
+  if (all.size() > 2 && all.back() - all.front() == static_cast<int>(all.size()) - 1) {
+    return fmt::format("0x{:02x}-0x{:02x}", all.front(), all.back());
+  }
+  return fmt::format("0x{:02x}", fmt::join(all, ", 0x"));
+}
+
+Json json_of(const DeviceDescription& device) {
+  Json values = Json::object();
+  for (const DeviceValue& value : device.values) values[value.name] = value.unit;
+  return {{"name", device.name},          {"title", device.title},
+          {"role", to_text(device.role)}, {"addresses", device.addresses},
+          {"slots", device.polls.size()}, {"values", std::move(values)}};
+}
+
+void print_values(const DeviceDescription& device) {
+  fmt::print("{}: {}\n", device.name, device.title);
+  fmt::print("  role {}, at {}, {} of 8 slots\n", to_text(device.role), addresses_of(device),
+             device.polls.size());
+  for (const DeviceValue& value : device.values) {
+    const DevicePoll& poll = device.polls[value.poll];
+    fmt::print("  {:<16} {:<8} every {} ms\n", value.name, value.unit.empty() ? "-" : value.unit,
+               poll.period.count());
+  }
+}
+
+int devices(const Options& options) {
+  if (!options.device.empty()) {
+    const DeviceDescription device = DeviceDescription::load(options.device);
+    options.json ? print_line(json_of(device)) : print_values(device);
+    return 0;
+  }
+  for (const std::string& name : DeviceDescription::shipped()) {
+    const DeviceDescription device = DeviceDescription::load(name);
+    if (options.json) {
+      print_line(json_of(device));
+    } else {
+      fmt::print("{:<10} {:<6} {:<11} {}\n", name, to_text(device.role), addresses_of(device),
+                 device.title);
+    }
+  }
+  return 0;
+}
+
+constexpr const char* footer =
+    R"(Without a name it lists the descriptions that are shipped; with one, or with the path of a file of your
+own, what that says: role, addresses, and its values with their units. A file that is wrong is told with
+its line. --device of r4 monitor and r4 convert takes such a name or path, with an address.
+
+Examples:
+  r4 devices
+  r4 devices bno055
+  r4 devices ./mine.device             is it right?
+
+Exit codes: 0 done; 1 the description is wrong; 2 no such device; 4, 5 the file cannot be read.)";
+
+}  // namespace
+
+void add_devices(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* const command = add_subcommand(
+      root, chosen, "devices", "Tell which sensors are described", footer, options, devices);
+  add_text(*command, "NAME", options->device, "one of them, or a file", file_type);
+  add_json(*command, options->json, "print JSON, one object a line");
+}
+
+}  // namespace r4::tool

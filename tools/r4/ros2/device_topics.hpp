@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What described devices measure, on topics of their own: imu, battery, range or joint_states below the device's name,
+// by its role, each reading once, with the time at which the board read it. Used by the outbox's thread alone, but for
+// its making.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "graph/graph.hpp"
+#include "graph/message_types.hpp"
+#include "r4link/devices/device.hpp"
+
+namespace r4::tool::ros2 {
+
+class DeviceTopics {
+ public:
+  using WallTime = std::chrono::system_clock::time_point;
+
+  DeviceTopics(Graph& graph, std::size_t node, const std::vector<Device>& devices);
+  void on_state(const State& state, WallTime sampled);
+
+ private:
+  struct Topic {
+    Device device;
+    std::string
+        name;  // the device's, with its address where there are several; of the frame and the joint, too
+    dds_entity_t writer = 0;
+    std::size_t value = 0;              // that is there in each message
+    std::optional<std::uint32_t> t_ms;  // of the last
+  };
+  void publish(const Topic& topic, const State& state, TimeMessage time) const;
+  void publish_imu(const Topic& topic, const State& state, TimeMessage time) const;
+  void publish_battery(const Topic& topic, const State& state, TimeMessage time) const;
+  void publish_range(const Topic& topic, const State& state, TimeMessage time) const;
+  void publish_joint(const Topic& topic, const State& state, TimeMessage time) const;
+
+  std::string frame_prefix_;
+  std::vector<Topic> topics_;
+};
+
+}  // namespace r4::tool::ros2
