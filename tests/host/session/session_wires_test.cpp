@@ -419,8 +419,8 @@ TEST(SessionWires, BringWhatTheBoardSaidWhileItBootedTooLate) {
   robot.connect();
   robot.links.clear();
   const std::string t = std::to_string(robot.board_ms(0) - 600);
-  const std::string nonce = str(robot.board(0).authentication().nonce());
-  const std::string booting = with_crc("H:R4-ROS2;PNum:0;T:" + t + ";AN:" + nonce + ";");
+  const std::string board_nonce = str(robot.board(0).authentication().nonce());
+  const std::string booting = with_crc("H:R4-ROS2;PNum:0;T:" + t + ";AN:" + board_nonce + ";");
   robot.bring(0, booting);
   robot.bring(1, booting);
   robot.run(1500);
