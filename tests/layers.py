@@ -22,7 +22,7 @@ TRANSPORTS = FRAMING | CARRIERS | {'transports'}
 FIRMWARE = FRAMING | {'firmware', 'firmware/application', 'firmware/devices', 'firmware/drivers'}
 MODELS = {'firmware/ports/sim/chips', 'firmware/ports/sim/devices', 'firmware/ports/sim/robot'}
 HOST = TRANSPORTS | {'host', 'host/commands', 'host/control', 'host/devices', 'host/measurement', 'host/recording', 'host/replay',
-                     'host/session'}
+                     'host/session', 'host/uart'}
 SIMULATED = HOST | FIRMWARE | MODELS | {'firmware/ports/sim'}
 SHELL = SIMULATED | {'tools/r4/shell'}
 FORMATS = {'tools/r4/formats', 'tools/r4/formats/mcap', 'tools/r4/formats/packets'}
@@ -50,7 +50,7 @@ ALLOWED = {
     'firmware/application': FRAMING | {'firmware', 'firmware/devices'},
     'firmware/ports': FIRMWARE,
     'firmware/ports/sim/chips': PUBLIC | {'firmware/drivers'},
-    'firmware/ports/sim/devices': PUBLIC | {'firmware/devices', 'firmware/ports/sim/chips'},
+    'firmware/ports/sim/devices': PUBLIC | {'firmware/devices', 'firmware/ports', 'firmware/ports/sim/chips'},
     'firmware/ports/sim/robot': FIRMWARE | {'firmware/ports/sim/chips', 'firmware/ports/sim/devices'},
     'firmware/ports/sim': FIRMWARE | MODELS | TRANSPORTS,
     'firmware/ports/m7/chip': FIRMWARE,
@@ -59,7 +59,7 @@ ALLOWED = {
                                               'firmware/ports/sim'},
     'firmware/ports/giga/chip': FIRMWARE,
     'firmware/ports/giga/links': FIRMWARE | {'firmware/ports', 'firmware/ports/giga/chip'},
-    'firmware/ports/giga/devices': FIRMWARE | {'firmware/ports/giga/chip'},
+    'firmware/ports/giga/devices': FIRMWARE | {'firmware/ports', 'firmware/ports/giga/chip'},
     'firmware/ports/giga': FIRMWARE | {'firmware/ports/giga/chip', 'firmware/ports/giga/devices',
                                        'firmware/ports/giga/links'},
     'host/bridge': HOST,
@@ -71,6 +71,7 @@ ALLOWED = {
     'host/recording': TRANSPORTS,
     'host/replay': TRANSPORTS | {'host/recording'},
     'host/session': TRANSPORTS | {'host/commands', 'host/measurement'},
+    'host/uart': HOST,
     'host/python/bindings': PUBLIC,
     'host': HOST,
     'tools/r4/shell': SIMULATED,
