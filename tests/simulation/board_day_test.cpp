@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <string>
 
+#include "environment.hpp"
 #include "firmware/application/application.hpp"
 #include "firmware/ports/sim/simulated_hardware.hpp"
 #include "protocol/messages/message.hpp"
@@ -22,11 +23,6 @@ namespace {
 
 using firmware::BoardState;
 using firmware::Chip;
-
-std::uint64_t from_environment(const char* name, std::uint64_t otherwise) {
-  const char* value = std::getenv(name);
-  return value == nullptr ? otherwise : std::strtoull(value, nullptr, 10);
-}
 
 // What can go wrong, and what the board calls it.
 enum class Incident {

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "environment.hpp"
 #include "firmware/application/application.hpp"
 #include "host/session/session.hpp"
 #include "incurious_host.hpp"
@@ -306,11 +307,6 @@ void Crowd::check() {
   if (outputs_.stepper[0].position != 0 && outputs_.stepper[0].position != -host.address) {
     violate(fmt::format("the outputs are of {}", outputs_.stepper[0].position));
   }
-}
-
-std::uint64_t from_environment(const char* name, std::uint64_t fallback) {
-  const char* value = std::getenv(name);
-  return value == nullptr ? fallback : std::strtoull(value, nullptr, 10);
 }
 
 TEST(CrowdSimulation, StrangersTakeNobodysControlAndKeepNobodyFromIt) {

@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "environment.hpp"
 #include "firmware/application/application.hpp"
 #include "host/session/session.hpp"
 #include "incurious_host.hpp"
@@ -218,8 +219,7 @@ double fleet_hours() {
 }
 
 TEST(FleetDays, NothingGrowsAndNothingTripsButForAFault) {
-  const char* const seed = std::getenv("R4_SEED");
-  Random random(seed == nullptr ? 1 : std::strtoull(seed, nullptr, 10));
+  Random random(from_environment("R4_SEED", 1));
   const auto seconds = static_cast<std::uint64_t>(fleet_hours() * 3600);
   std::vector<std::unique_ptr<FleetLink>> fleet;
   for (std::size_t i = 0; i < fleet_size; ++i) {

@@ -11,15 +11,11 @@
 #include <thread>
 #include <vector>
 
+#include "environment.hpp"
 #include "world.hpp"
 
 namespace r4::simulation {
 namespace {
-
-std::uint64_t from_environment(const char* name, std::uint64_t fallback) {
-  const char* value = std::getenv(name);
-  return value == nullptr ? fallback : std::strtoull(value, nullptr, 10);
-}
 
 std::string tail_of(const Report& report, std::size_t lines) {
   std::string text;

@@ -21,8 +21,7 @@ namespace r4::tool {
 namespace {
 
 constexpr double full = 1.0;
-constexpr double nearly_full = 0.8;  // room for retransmissions, and for what was forgotten
-constexpr std::uint64_t usual_bit_rate = 1000000;
+constexpr double nearly_full_bus = 0.8;  // room for retransmissions, and for what was forgotten
 constexpr std::uint64_t usual_data_rate = 5000000;
 
 struct Options {
@@ -91,8 +90,8 @@ void print_table(const BusPlan& plan, const Options& options, const BusLoad& loa
   fmt::print("{:<16}{:>10}{:>8}{:>10}{:>11}\n", "", "/s", "of one", "/s", "/s");
   for (const BusTraffic& row : load.traffic) print_row(row);
   print_row(load.total);
-  const std::uint32_t boards = most_boards(plan, nearly_full);
-  const std::uint32_t rate = highest_rate(plan, nearly_full);
+  const std::uint32_t boards = most_boards(plan, nearly_full_bus);
+  const std::uint32_t rate = highest_rate(plan, nearly_full_bus);
   fmt::print("\nWith 20 % to spare this bus carries {} at {} Hz{}.\n",
              boards == 0 ? "no board" : counted(boards, "board"), plan.states_hz,
              rate == 0 ? "" : fmt::format(", or {} at {} Hz", counted(plan.boards, "board"), rate));
@@ -113,8 +112,8 @@ void print_json(const BusPlan& plan, const BusLoad& load) {
   bus["packed"] = plan.packed;
   bus["bitrate"] = plan.bit_rate.nominal;
   bus["dbitrate"] = plan.bit_rate.data;
-  bus["most_boards"] = most_boards(plan, nearly_full);
-  bus["highest_rate"] = highest_rate(plan, nearly_full);
+  bus["most_boards"] = most_boards(plan, nearly_full_bus);
+  bus["highest_rate"] = highest_rate(plan, nearly_full_bus);
   bus["fits"] = load.total.load <= full;
   print_line(bus);
 }
@@ -133,7 +132,7 @@ int live(const Options& options) {
   bus.duration = options.duration;
   if (options.bit_rate) bus.bit_rate = static_cast<std::uint32_t>(*options.bit_rate);
   if (options.data_bit_rate) bus.data_bit_rate = static_cast<std::uint32_t>(*options.data_bit_rate);
-  show_live_bus(bus, nearly_full);
+  show_live_bus(bus, nearly_full_bus);
   return 0;
 }
 
@@ -153,7 +152,7 @@ int bus(const Options& options) {
   if (load.total.load > full) {
     throw Error(ErrorKind::data, "the bus", "would need " + taken, remedy(plan));
   }
-  if (load.total.load > nearly_full) {
+  if (load.total.load > nearly_full_bus) {
     std::fflush(stdout);
     fmt::print(stderr, "r4: warning: the bus: nearly full, {} is taken; {}\n", taken, remedy(plan));
   }

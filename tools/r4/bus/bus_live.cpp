@@ -28,7 +28,6 @@ using Clock = std::chrono::steady_clock;
 
 constexpr Milliseconds usual_duration{5000};
 constexpr Milliseconds interval{1000};
-constexpr std::uint32_t usual_bit_rate = 1000000;
 
 std::string meaning_of_id(std::uint32_t id) {
   if (id == CanSurvey::extended_ids) return "ids of 29 bits";

@@ -10,6 +10,8 @@
 
 namespace r4::tool {
 
+constexpr std::uint32_t usual_bit_rate = 1000000;  // bit/s
+
 struct LiveBusOptions {
   std::string url;  // can://INTERFACE
   bool json = false;

@@ -19,14 +19,14 @@
 namespace r4::tool {
 namespace {
 
-struct Options {
+struct KeyOptions {
   std::string action;
   std::string file;
   std::string url;
   std::optional<std::uint64_t> id;
 };
 
-int make(const Options& options) {
+int make(const KeyOptions& options) {
   if (!options.url.empty()) {
     throw Error(ErrorKind::usage, options.url, "a new key needs no board", "r4 key new FILE");
   }
@@ -40,7 +40,7 @@ int make(const Options& options) {
   return 0;
 }
 
-int give(const Options& options) {
+int give(const KeyOptions& options) {
   if (options.url.empty()) {
     throw Error(ErrorKind::usage, "URL", "is missing", "r4 key give FILE serial:auto");
   }
@@ -62,7 +62,7 @@ int give(const Options& options) {
   return 0;
 }
 
-int keys(const Options& options) {
+int keys(const KeyOptions& options) {
   if (options.file.empty() || is_url(options.file)) {
     throw Error(ErrorKind::usage, fmt::format("'{}'", options.file), "is no file",
                 options.action == "new" ? "r4 key new FILE" : "r4 key give FILE serial:auto");
@@ -70,7 +70,7 @@ int keys(const Options& options) {
   return options.action == "new" ? make(options) : give(options);
 }
 
-constexpr const char* footer =
+constexpr const char* key_footer =
     R"(A board with a key obeys only hosts that have it, too: with --key FILE, or R4_KEY=FILE in the
 environment, r4 signs its heartbeats and commands. An emergency stop needs no key. Whoever is at
 the board's USB cable needs none either, and can set one.
@@ -89,9 +89,9 @@ take it; 4, 5 the file or the transport cannot be opened.)";
 }  // namespace
 
 void add_key_command(CLI::App& root, Action& chosen) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<KeyOptions>();
   CLI::App* const command = add_subcommand(
-      root, chosen, "key", "Make a key, and give it to a board", footer, options, keys);
+      root, chosen, "key", "Make a key, and give it to a board", key_footer, options, keys);
   add_text(
       *command, "ACTION",
       [options](const std::string& action) {

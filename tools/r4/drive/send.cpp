@@ -31,7 +31,7 @@
 namespace r4::tool {
 namespace {
 
-struct Options {
+struct SendOptions {
   std::string url;
   std::vector<std::string> commands;
   Milliseconds timeout{3000};
@@ -114,7 +114,7 @@ std::optional<LinkTiming> link_timing_at(const std::vector<Order>& orders, std::
 // What a person types is deliberate: it is sent without being armed. Where a motor is to turn, the
 // board is to tell whether relay 1 is closed. Our heartbeats come so often that the shortest timeout
 // among the commands can live on them.
-BoardOptions board_options(const Options& options, const std::vector<Order>& orders) {
+BoardOptions board_options(const SendOptions& options, const std::vector<Order>& orders) {
   BoardOptions board_options = with_key(options.key);
   board_options.session.arming = Arming::off;
   const bool turns =
@@ -130,7 +130,7 @@ BoardOptions board_options(const Options& options, const std::vector<Order>& ord
 
 class Sender {
  public:
-  Sender(const Options& options, const std::vector<Order>& orders)
+  Sender(const SendOptions& options, const std::vector<Order>& orders)
       : options_(options),
         orders_(orders),
         board_(io_, options.url, board_options(options, orders)),
@@ -308,7 +308,7 @@ class Sender {
     return object;
   }
 
-  const Options& options_;
+  const SendOptions& options_;
   const std::vector<Order>& orders_;
   asio::io_context io_{1};
   AsyncBoard board_;
@@ -319,8 +319,8 @@ class Sender {
   std::optional<Problem> failure_;
 };
 
-int send(const Options& given) {
-  Options options = given;
+int send(const SendOptions& given) {
+  SendOptions options = given;
   take_wires(options.url, options.commands, "CMD");
   std::vector<Order> orders;
   for (const std::string& text : options.commands) {
@@ -335,7 +335,7 @@ int send(const Options& given) {
   return Sender(options, orders).run();
 }
 
-constexpr const char* footer =
+constexpr const char* send_footer =
     R"(Each command is sent when the board's own state has confirmed the one before it; the first that is not
 confirmed ends the run. All are checked before the first is sent. Several in one argument, separated by
 semicolons, are a group: up to 16 of O D S R P B Z that the board executes together, or none of them.
@@ -360,10 +360,10 @@ wrong, nothing was sent; 4 the transport cannot be opened; 5 permission denied.)
 }  // namespace
 
 void add_send(CLI::App& root, Action& chosen) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<SendOptions>();
   CLI::App* const command =
       add_subcommand(root, chosen, "send", "Send commands and wait until the board confirms them",
-                     "Commands:\n" + command_table() + "\n" + footer, options, send);
+                     "Commands:\n" + command_table() + "\n" + send_footer, options, send);
   add_url(*command, options->url);
   add_texts(*command, "CMD", options->commands,
             "commands, such as O:358,1,1; 'O:358,1,1;O:358,1,2' is a group", "", Need::required);

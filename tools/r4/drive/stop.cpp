@@ -25,7 +25,7 @@
 namespace r4::tool {
 namespace {
 
-struct Options {
+struct StopOptions {
   std::vector<std::string> urls;
   Milliseconds timeout{2000};
   std::string key;  // not needed, and so not read: nothing may keep a stop back
@@ -55,7 +55,7 @@ std::unique_ptr<AsyncBoard> open(asio::io_context& io, const std::string& url) {
   return board;
 }
 
-void print_confirmed(const Options& options, const CommandResult& result) {
+void print_confirmed(const StopOptions& options, const CommandResult& result) {
   const double ms = std::chrono::duration<double, std::milli>(result.elapsed).count();
   if (options.json) {
     print_line({{"type", "result"}, {"command", "E:STOP"}, {"confirmed", true}, {"ms", ms}});
@@ -68,7 +68,7 @@ void print_confirmed(const Options& options, const CommandResult& result) {
   }
 }
 
-int stop(const Options& options) {
+int stop(const StopOptions& options) {
   asio::io_context io(1);
   const std::string url = join_wires(options.urls);
   const std::unique_ptr<AsyncBoard> board = open(io, url);
@@ -99,7 +99,7 @@ int stop(const Options& options) {
   return 0;
 }
 
-constexpr const char* footer =
+constexpr const char* stop_footer =
     R"(Works whoever controls the board, and without waiting for a link: the stop is repeated every 20 ms
 until the board reports that it has obeyed this one, and for a moment longer. It stays stopped until
 E:CLEAR. By several wires to the board one that works is enough.
@@ -114,9 +114,9 @@ to two boards, which both were sent it; 4, 5 the transport cannot be opened: cut
 }  // namespace
 
 void add_stop(CLI::App& root, Action& chosen) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<StopOptions>();
   CLI::App* const command = add_subcommand(
-      root, chosen, "stop", "Emergency stop: all outputs off, now", footer, options, stop);
+      root, chosen, "stop", "Emergency stop: all outputs off, now", stop_footer, options, stop);
   add_wires(*command, options->urls);
   add_seconds(*command, "--timeout", options->timeout,
               "how long to repeat it for a confirmation (default 2); it is sent in any case",

@@ -30,8 +30,6 @@ constexpr milliseconds listening{700};
 // Hosts ask each second who their board is.
 constexpr milliseconds longest{1300};
 constexpr milliseconds look_again{20};
-constexpr milliseconds between_questions{150};
-constexpr int most_questions = 3;
 
 std::string url_of(const ListedBus& bus, std::uint8_t node) {
   return fmt::format("can://{}?node={}", bus.interface.name, node);

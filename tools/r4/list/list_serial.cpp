@@ -26,8 +26,6 @@ using std::chrono::milliseconds;
 
 // Who has the port open asks each second.
 constexpr milliseconds patience{1300};
-constexpr milliseconds between_questions{150};
-constexpr int most_questions = 3;
 
 // One port, while it is asked.
 class PortQuestion final : private Carrier::Handler {

@@ -2,6 +2,7 @@
 // What r4 list has heard of a board: who it is, and who has it.
 #pragma once
 
+#include <chrono>
 #include <optional>
 #include <string>
 
@@ -9,6 +10,10 @@
 #include "transports/identity_answer.hpp"
 
 namespace r4::tool {
+
+// How a board that can be heard is asked who it is.
+constexpr std::chrono::milliseconds between_questions{150};
+constexpr int most_questions = 3;
 
 struct ListedBoard {
   std::optional<IdentityAnswer> identity;

@@ -23,16 +23,13 @@
 namespace r4::tool {
 namespace {
 
-struct Options {
+struct ConvertOptions {
   std::string input;
   std::string output;
   bool force = false;
   std::uint64_t port = board_port;
   std::vector<std::string> devices;
 };
-
-// So many places of damage are told; of more than that, how many.
-constexpr std::uint64_t most_damage = 20;
 
 // How far it is, on a terminal.
 class Progress {
@@ -80,7 +77,8 @@ class Progress {
   std::chrono::steady_clock::time_point drawn_at_ = std::chrono::steady_clock::now();
 };
 
-void read_all(const Options& options, RecordingReader::Handler& handler, Progress& progress) {
+void read_all(const ConvertOptions& options, RecordingReader::Handler& handler,
+              Progress& progress) {
   const std::unique_ptr<Source> source =
       make_source(options.input, handler, {static_cast<std::uint16_t>(options.port)});
   RecordingInput input(options.input);
@@ -96,7 +94,7 @@ bool can_be_read_twice(const std::string& path) {
   return path != "-" && ::stat(path.c_str(), &status) == 0 && S_ISREG(status.st_mode);
 }
 
-int convert(const Options& options) {
+int convert(const ConvertOptions& options) {
   std::vector<Device> devices = Device::from(options.devices);
   OutputFile output(options.output, options.force);
   const std::unique_ptr<Sink> sink = make_sink(options.output, output, std::move(devices));
@@ -126,7 +124,7 @@ int convert(const Options& options) {
   return conversion.damage() == 0 ? 0 : static_cast<int>(ErrorKind::data);
 }
 
-constexpr const char* footer =
+constexpr const char* convert_footer =
     R"(The endings of the two names tell the formats (docs/recordings.md):
   .r4log .r4log.zst   the native one; also of the standard input, -
   .log                the frames of a CAN bus as candump -L writes them
@@ -155,9 +153,10 @@ file cannot be read or written.)";
 }  // namespace
 
 void add_convert(CLI::App& root, Action& chosen) {
-  const auto options = std::make_shared<Options>();
-  CLI::App* const command = add_subcommand(
-      root, chosen, "convert", "Write a recording in another format", footer, options, convert);
+  const auto options = std::make_shared<ConvertOptions>();
+  CLI::App* const command =
+      add_subcommand(root, chosen, "convert", "Write a recording in another format", convert_footer,
+                     options, convert);
   add_text(*command, "FILE", options->input, "a recording; - is the standard input", file_type,
            Need::required);
   add_text(*command, "-o,--output", options->output, "the file that is made", file_type,

@@ -2,6 +2,7 @@
 // The formats of recordings that r4 reads and writes, by the endings of their files.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -12,6 +13,9 @@
 #include "r4link/devices/device.hpp"
 
 namespace r4::tool {
+
+// So many places of damage are told; of more than that, how many.
+constexpr std::size_t most_damage = 20;
 
 // What people call the file of that name: "-" is the standard input.
 std::string called(const std::string& path);

@@ -16,12 +16,12 @@
 namespace r4::tool {
 namespace {
 
-struct Options {
+struct InfoOptions {
   std::vector<std::string> files;
   bool json = false;
 };
 
-int info(const Options& options) {
+int info(const InfoOptions& options) {
   bool any_damage = false;
   for (const std::string& file : options.files) {
     RecordingSummary summary;
@@ -36,7 +36,7 @@ int info(const Options& options) {
   return any_damage ? static_cast<int>(ErrorKind::data) : 0;
 }
 
-constexpr const char* footer =
+constexpr const char* info_footer =
     R"(Of each recording: from when to when; of each wire the rate of its states, what was damaged and lost,
 the safe states and for how long, and gaps: times longer than a second in which the board said
 nothing. Everything that can be read is read; where a line is damaged, its number and place are told,
@@ -53,9 +53,9 @@ read.)";
 }  // namespace
 
 void add_info(CLI::App& root, Action& chosen) {
-  const auto options = std::make_shared<Options>();
-  CLI::App* const command =
-      add_subcommand(root, chosen, "info", "Tell what is in a recording", footer, options, info);
+  const auto options = std::make_shared<InfoOptions>();
+  CLI::App* const command = add_subcommand(root, chosen, "info", "Tell what is in a recording",
+                                           info_footer, options, info);
   add_texts(*command, "FILE", options->files, "recordings; - is the standard input", file_type,
             Need::required);
   add_json(*command, options->json, "print JSON, one object for each file");

@@ -37,7 +37,7 @@
 namespace r4::tool {
 namespace {
 
-struct Options {
+struct PlotOptions {
   std::string file;
   std::vector<std::string> fields;
   std::string output;
@@ -302,7 +302,7 @@ FileDescriptor draw(const FileDescriptor& plan) {
   return picture;
 }
 
-int plot(const Options& options) {
+int plot(const PlotOptions& options) {
   const std::string format = format_of(options.output);
   std::vector<Wanted> wanted;
   for (const std::string& text : options.fields) wanted.push_back(to_wanted(text));
@@ -335,7 +335,7 @@ int plot(const Options& options) {
   return curves.damaged() ? static_cast<int>(ErrorKind::data) : 0;
 }
 
-constexpr const char* footer =
+constexpr const char* plot_footer =
     R"(A field of docs/protocol.md, in small letters if you like; of one board only, where the recording has
 several: left-arm:AIN24, by its name, its URL or the number of its wire. A drive is drawn with its
 direction, backwards below zero. What has the same unit shares an axis. Safe states are shaded by their
@@ -351,9 +351,9 @@ Exit codes: 0 drawn; 1 drawn, but some could not be read, or it is no recording,
 }  // namespace
 
 void add_plot(CLI::App& root, Action& chosen) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<PlotOptions>();
   CLI::App* const command =
-      add_subcommand(root, chosen, "plot", "Draw what a recording has", footer, options, plot);
+      add_subcommand(root, chosen, "plot", "Draw what a recording has", plot_footer, options, plot);
   add_text(*command, "FILE", options->file, "a recording; - is the standard input", file_type,
            Need::required);
   add_texts(*command, "FIELD", options->fields, "what is drawn, such as AIN24", "FIELD",

@@ -34,7 +34,7 @@
 namespace r4::tool {
 namespace {
 
-struct Options {
+struct RecordOptions {
   std::vector<std::string> urls;
   std::string file;
   std::vector<std::string> rotate;
@@ -44,14 +44,14 @@ struct Options {
   std::string key;
 };
 
-RecordingOptions limits_of(const Options& options) {
+RecordingOptions limits_of(const RecordOptions& options) {
   RecordingOptions limits;
   for (const std::string& each : options.rotate) take_rotation(each, limits);
   if (!options.keep.empty()) limits.keep_bytes = read_size("--keep", options.keep);
   return limits;
 }
 
-BoardOptions board_options(const Options& options) {
+BoardOptions board_options(const RecordOptions& options) {
   BoardOptions board_options = with_key(options.key);
   board_options.role = BoardRole::watch;
   board_options.session.arming = Arming::off;  // it drives nothing
@@ -94,7 +94,7 @@ class BusListener {
 
 class Recorders {
  public:
-  explicit Recorders(const Options& options)
+  explicit Recorders(const RecordOptions& options)
       : board_options_(board_options(options)), signals_(io_), end_(io_) {
     std::vector<std::string> buses;
     for (const std::string& pattern : options.urls) {
@@ -111,7 +111,7 @@ class Recorders {
     }
   }
 
-  int run(const Options& options) {
+  int run(const RecordOptions& options) {
     for (const auto& board : boards_) open(*board);
     for (const int number : {SIGINT, SIGTERM, SIGHUP}) signals_.add(number);
     signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
@@ -162,9 +162,9 @@ class Recorders {
   asio::steady_timer end_;
 };
 
-int record(const Options& options) { return Recorders(options).run(options); }
+int record(const RecordOptions& options) { return Recorders(options).run(options); }
 
-constexpr const char* footer =
+constexpr const char* record_footer =
     R"(Every datagram of every board, in both directions, with the host's time and the wire that it came
 by; damaged ones, too; and what happened to the links. It watches, as r4 monitor does: it takes no
 control, and a program that drives a board is not disturbed. It goes on when a transport is lost and
@@ -190,10 +190,10 @@ cannot be opened, or the disk is full; 5 permission denied.)";
 }  // namespace
 
 void add_record(CLI::App& root, Action& chosen) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RecordOptions>();
   CLI::App* const command =
-      add_subcommand(root, chosen, "record", "Write down what is said, in both directions", footer,
-                     options, record);
+      add_subcommand(root, chosen, "record", "Write down what is said, in both directions",
+                     record_footer, options, record);
   add_boards(*command, options->urls);
   add_text(*command, "-o,--output", options->file, "the recording", file_type, Need::required);
   add_seconds(*command, "--for", options->duration, "end after that time");

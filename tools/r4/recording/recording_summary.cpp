@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <string_view>
 
+#include "formats.hpp"
 #include "protocol/datagram/numbers.hpp"
 #include "protocol/messages/message.hpp"
 #include "r4link/state.hpp"
@@ -13,8 +14,6 @@
 namespace r4::tool {
 namespace {
 
-// So many places of damage are told; of more than that, how many.
-constexpr std::size_t most_damage = 20;
 // Of a file so damaged that it seems to have more wires, they are counted as one.
 constexpr std::size_t most_wires = 1000;
 

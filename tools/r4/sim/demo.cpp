@@ -26,7 +26,7 @@
 namespace r4::tool {
 namespace {
 
-struct Options {
+struct DemoOptions {
   bool json = false;
 };
 
@@ -213,7 +213,7 @@ void print_table(const std::vector<StoryResult>& results, const std::optional<Pr
       "  its own log");
 }
 
-int demo(const Options& options) {
+int demo(const DemoOptions& options) {
   if (!options.json) fmt::print("{}", introduction);
   bool good = decode_capture(options.json);
   std::vector<StoryResult> results;
@@ -246,7 +246,7 @@ int demo(const Options& options) {
   return good ? 0 : static_cast<int>(ErrorKind::refused);
 }
 
-constexpr const char* footer =
+constexpr const char* demo_footer =
     R"(Starts simulated boards by itself: in this process, and others as processes of their own, reached over
 UDP and over a pseudo-terminal. Nothing is needed but this program. Where a virtual CAN interface
 (vcan0) is up, a third is reached over that, as node 31; its emergency stop is heard by every simulated
@@ -257,10 +257,10 @@ Exit codes: 0 every step was true; 3 at least one was not.)";
 }  // namespace
 
 void add_demo(CLI::App& root, Action& chosen) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<DemoOptions>();
   CLI::App* const command =
       add_subcommand(root, chosen, "demo", "Show what R4 is, over every transport, in ten seconds",
-                     footer, options, demo);
+                     demo_footer, options, demo);
   add_json(*command, options->json, "print only the results, one object a transport");
 }
 

@@ -29,7 +29,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-struct Options {
+struct ReplayOptions {
   std::string file;
   std::string url = "udp://127.0.0.1:2018";
   std::uint64_t wire = 1;
@@ -48,7 +48,7 @@ constexpr std::size_t most_peers = 8;
 // Says what the board said, to whoever has said something. Nothing that it hears does anything.
 class Replay : private Carrier::Handler {
  public:
-  explicit Replay(const Options& options)
+  explicit Replay(const ReplayOptions& options)
       : options_(options),
         records_(options.file, options.file, static_cast<std::uint16_t>(options.wire),
                  options.start),
@@ -161,7 +161,7 @@ class Replay : private Carrier::Handler {
     fmt::print(stderr, "r4: {}\n", words);
   }
 
-  const Options& options_;
+  const ReplayOptions& options_;
   asio::io_context io_{1};
   ReplayRecords records_;
   const std::unique_ptr<Carrier> carrier_;
@@ -174,7 +174,7 @@ class Replay : private Carrier::Handler {
   bool damaged_ = false;
 };
 
-int replay(const Options& options) { return Replay(options).run(); }
+int replay(const ReplayOptions& options) { return Replay(options).run(); }
 
 double read_speed(const std::string& text) {
   std::int32_t hundredths = 0;
@@ -183,7 +183,7 @@ double read_speed(const std::string& text) {
               "write one such as 0.5 or 10");
 }
 
-constexpr const char* footer =
+constexpr const char* replay_footer =
     R"(What a board of a recording said is said again, at its pace, on a transport where hosts find it: they
 see the states, heartbeats and answers of then, damaged ones too. A replayed board obeys nothing and
 answers nothing: a command is never confirmed, a stop stops nothing. Over UDP it speaks to whoever has
@@ -207,9 +207,9 @@ Exit codes: 0 the recording has ended, or Ctrl-C; 1 some of it could not be read
 }  // namespace
 
 void add_replay(CLI::App& root, Action& chosen) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ReplayOptions>();
   CLI::App* const command = add_subcommand(root, chosen, "replay", "Play a recording as a board",
-                                           footer, options, replay);
+                                           replay_footer, options, replay);
   add_text(*command, "FILE", options->file, "a recording", file_type, Need::required);
   add_text(*command, "URL", options->url, "where it listens (default udp://127.0.0.1:2018)",
            url_type);

@@ -32,7 +32,7 @@
 namespace r4::tool {
 namespace {
 
-struct Options {
+struct SimOptions {
   std::vector<std::string> urls;
   bool json = false;
   bool quiet = false;
@@ -89,7 +89,7 @@ struct Plan {
   std::uint64_t number = 0;  // of the boards, from 0
 };
 
-std::vector<Plan> plans_of(const Options& options) {
+std::vector<Plan> plans_of(const SimOptions& options) {
   const std::string id = options.board_id.empty() ? "sim" : options.board_id;
   for (const std::string& text : options.urls) {
     std::vector<PatternUrl> urls = expand_urls(text);
@@ -124,7 +124,7 @@ void allow_files_for(std::size_t boards) {
 // A board with its log, at its transports.
 class ServedBoard {
  public:
-  ServedBoard(asio::io_context& io, SimOutput& output, const Options& options, const Plan& plan,
+  ServedBoard(asio::io_context& io, SimOutput& output, const SimOptions& options, const Plan& plan,
               bool named)
       : log_(output, options.quiet, named ? plan.id : ""), board_(io, options_of(options, plan)) {
     for (const std::string& url : plan.urls) {
@@ -162,7 +162,7 @@ class ServedBoard {
     return made;
   }
 
-  sim::SimulatedBoard::Options options_of(const Options& options, const Plan& plan) {
+  sim::SimulatedBoard::Options options_of(const SimOptions& options, const Plan& plan) {
     sim::SimulatedBoard::Options board_options;
     if (options.seed) board_options.seed = *options.seed + plan.number;
     if (!options.script.empty()) board_options.script = sim::Script::load(options.script);
@@ -204,7 +204,7 @@ class SensorClock {
   const std::vector<std::unique_ptr<ServedBoard>>& boards_;
 };
 
-int simulate(const Options& options) {
+int simulate(const SimOptions& options) {
   if (options.sensors && (!options.json || options.quiet)) {
     throw Error(ErrorKind::usage, "--sensors", "is for JSON", "add --json, and leave out --quiet");
   }
@@ -260,7 +260,7 @@ int simulate(const Options& options) {
   return 0;
 }
 
-constexpr const char* footer =
+constexpr const char* sim_footer =
     R"(The board streams its state and obeys commands as the real one does, with the inputs of the bench in
 the paper's capture. It prints where it listens and what it does; with --json one object a line:
   {"type":"listening","url":…,"host_url":…}
@@ -302,10 +302,10 @@ device cannot be opened.)";
 }  // namespace
 
 void add_sim(CLI::App& root, Action& chosen) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<SimOptions>();
   options->urls = {"udp://127.0.0.1:2018"};
   CLI::App* const command =
-      add_subcommand(root, chosen, "sim", "Run a simulated board", footer, options, simulate);
+      add_subcommand(root, chosen, "sim", "Run a simulated board", sim_footer, options, simulate);
   add_texts(*command, "URL", options->urls,
             "where it listens, up to four (default udp://127.0.0.1:2018)", url_type);
   add_json(*command, options->json, "print events as JSON, one object a line");

@@ -39,7 +39,7 @@ constexpr Milliseconds answer_timeout{1000};
 constexpr std::size_t burst = 100;
 constexpr Milliseconds pause{10};
 
-struct Options {
+struct BenchOptions {
   std::vector<std::string> urls;
   Milliseconds duration{5000};
   std::string key;
@@ -62,7 +62,7 @@ class Durations {
   std::vector<double> values_;
 };
 
-BoardOptions board_options(const std::string& key) {
+BoardOptions bench_board(const std::string& key) {
   BoardOptions options = with_key(key);
   options.session.arming = Arming::off;                 // it drives nothing
   options.session.identify_interval = Milliseconds(0);  // the questions are ours
@@ -71,9 +71,9 @@ BoardOptions board_options(const std::string& key) {
 
 class Bench {
  public:
-  explicit Bench(const Options& options)
+  explicit Bench(const BenchOptions& options)
       : options_(options),
-        board_(io_, join_wires(options.urls), board_options(options.key)),
+        board_(io_, join_wires(options.urls), bench_board(options.key)),
         timer_(io_),
         pause_(io_) {}
 
@@ -243,7 +243,7 @@ class Bench {
                transfers.bad_form);
   }
 
-  const Options& options_;
+  const BenchOptions& options_;
   asio::io_context io_{1};
   AsyncBoard board_;
   asio::steady_timer timer_;
@@ -261,9 +261,9 @@ class Bench {
   std::uint64_t unconfirmed_ = 0;
 };
 
-int bench(const Options& options) { return Bench(options).run(); }
+int bench(const BenchOptions& options) { return Bench(options).run(); }
 
-constexpr const char* footer =
+constexpr const char* bench_footer =
     R"(Round trips are questions (Q:ID) answered by the board, one at a time. A command is confirmed by the
 board's state, so at 100 Hz that takes up to 10 ms; the command is one that changes nothing.
 
@@ -277,9 +277,9 @@ opened.)";
 }  // namespace
 
 void add_bench(CLI::App& root, Action& chosen) {
-  const auto options = std::make_shared<Options>();
-  CLI::App* const command =
-      add_subcommand(root, chosen, "bench", "Measure the link to a board", footer, options, bench);
+  const auto options = std::make_shared<BenchOptions>();
+  CLI::App* const command = add_subcommand(root, chosen, "bench", "Measure the link to a board",
+                                           bench_footer, options, bench);
   add_wires(*command, options->urls);
   add_seconds(*command, "--duration", options->duration, "how long to measure (default 5)");
   add_key(*command, options->key);

@@ -24,7 +24,7 @@
 namespace r4::tool {
 namespace {
 
-struct Options {
+struct DecodeOptions {
   std::string file = "-";
   bool candump = false;
 };
@@ -145,7 +145,7 @@ int decode_lines(Input& input, Reader& reader) {
   return reader.any_bad() ? static_cast<int>(ErrorKind::data) : 0;
 }
 
-int decode(const Options& options) {
+int decode(const DecodeOptions& options) {
   Input input(options.file);
   if (options.candump) {
     BusLog log(print);
@@ -155,7 +155,7 @@ int decode(const Options& options) {
   return decode_lines(input, datagrams);
 }
 
-constexpr const char* footer = R"(One JSON object for each line of input that is not empty:
+constexpr const char* decode_footer = R"(One JSON object for each line of input that is not empty:
   line, ok      the line's number from 1; is it a valid datagram
   type          state, heartbeat, command, nack or identity
   pnum, t       packet number and time, null where it has none
@@ -193,9 +193,10 @@ a line is damaged; 4, 5 the file cannot be read.)";
 }  // namespace
 
 void add_decode(CLI::App& root, Action& chosen) {
-  const auto options = std::make_shared<Options>();
-  CLI::App* const command = add_subcommand(
-      root, chosen, "decode", "Check datagrams and show them as JSON", footer, options, decode);
+  const auto options = std::make_shared<DecodeOptions>();
+  CLI::App* const command =
+      add_subcommand(root, chosen, "decode", "Check datagrams and show them as JSON", decode_footer,
+                     options, decode);
   add_text(*command, "FILE", options->file, "datagrams, one a line (default: standard input)",
            file_type);
   add_flag(*command, "--candump", options->candump, "the file is what candump printed");

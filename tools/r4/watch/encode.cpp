@@ -21,7 +21,7 @@
 namespace r4::tool {
 namespace {
 
-struct Options {
+struct EncodeOptions {
   std::string fields;
   std::uint64_t pnum = 0;
   std::optional<std::uint64_t> time;
@@ -105,7 +105,7 @@ std::uint64_t epoch_ms() {
   return static_cast<std::uint64_t>(std::chrono::duration_cast<Milliseconds>(now).count());
 }
 
-int encode(const Options& options) {
+int encode(const EncodeOptions& options) {
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   write_fields(writer, options.fields);
@@ -127,7 +127,7 @@ int encode(const Options& options) {
   return 0;
 }
 
-constexpr const char* footer = R"(Examples:
+constexpr const char* encode_footer = R"(Examples:
   r4 encode O:358,1,1 --pnum 66 --time 1699276044383
                               O:358,1,1;PNum:66;T:1699276044383;^0x7fefae81^
   r4 encode 'O:358,1,1;O:358,1,2'
@@ -148,10 +148,10 @@ Exit codes: 0 done; 2 the fields or an option are wrong.)";
 }  // namespace
 
 void add_encode(CLI::App& root, Action& chosen) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<EncodeOptions>();
   CLI::App* const command =
       add_subcommand(root, chosen, "encode", "Write a datagram: fields, PNum, T and checksum",
-                     footer, options, encode);
+                     encode_footer, options, encode);
   add_text(*command, "CMD", options->fields,
            "the fields, such as O:358,1,1 or 'AIN24:24.28;AIN12:1'", "", Need::required);
   add_number(*command, "--pnum", options->pnum, 0, 0xFFFFFFFFU, "packet number (default 0)");

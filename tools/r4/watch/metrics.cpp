@@ -10,7 +10,7 @@
 namespace r4::tool {
 namespace {
 
-constexpr const char* footer =
+constexpr const char* metrics_footer =
     R"(Answers Prometheus at http://127.0.0.1:9618/metrics (docs/metrics.md): of each board whether it is heard,
 why its outputs are off, rate, loss, round trip, age and jitter of its states, analog inputs; of each CAN
 interface how busy it is, and for which boards. It watches, as r4 monitor does, and takes no control.
@@ -29,7 +29,7 @@ denied.)";
 void add_metrics(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<MetricsOptions>();
   CLI::App* const command = add_subcommand(root, chosen, "metrics", "Tell Prometheus of boards",
-                                           footer, options, serve_metrics);
+                                           metrics_footer, options, serve_metrics);
   add_boards(*command, options->urls);
   add_text(*command, "--listen", options->listen, "where it answers (default 127.0.0.1:9618)",
            "HOST:PORT");

@@ -41,7 +41,7 @@ constexpr Milliseconds patience{5000};
 // With --device: for how long another host must control the board until it is left to that one.
 constexpr Milliseconds busy_patience{1500};
 
-struct Options {
+struct MonitorOptions {
   std::vector<std::string> urls;
   bool json = false;
   bool control = false;
@@ -52,7 +52,7 @@ struct Options {
   std::string key;
 };
 
-BoardOptions board_options(const Options& options, const std::vector<Device>& devices = {}) {
+BoardOptions board_options(const MonitorOptions& options, const std::vector<Device>& devices = {}) {
   BoardOptions board_options = with_key(options.key);
   board_options.role = options.control ? BoardRole::control : BoardRole::watch;
   board_options.session.arming = Arming::off;  // it drives nothing
@@ -63,7 +63,7 @@ BoardOptions board_options(const Options& options, const std::vector<Device>& de
 
 class Monitor {
  public:
-  Monitor(const Options& options, std::string url)
+  Monitor(const MonitorOptions& options, std::string url)
       : options_(options),
         url_(std::move(url)),
         devices_(Device::from(options.devices)),
@@ -184,7 +184,7 @@ class Monitor {
     return Error(explain(url_, board_.link()));
   }
 
-  const Options& options_;
+  const MonitorOptions& options_;
   const std::string url_;
   const std::vector<Device> devices_;
   asio::io_context io_{1};
@@ -201,7 +201,7 @@ class Monitor {
 };
 
 // Devices are set up by who controls the board: by us, where nobody does. Else what that program has set up is shown.
-int monitor_devices(Options options, const std::string& url) {
+int monitor_devices(MonitorOptions options, const std::string& url) {
   options.control = true;
   std::optional<Monitor> monitor(std::in_place, options, url);
   try {
@@ -222,7 +222,7 @@ bool is_whole_bus(const std::string& text) {
   return url.scheme() == "can" && text.find('?') == std::string::npos;
 }
 
-int monitor(const Options& options) {
+int monitor(const MonitorOptions& options) {
   std::vector<std::string> urls;
   for (const std::string& pattern : options.urls) {
     for (PatternUrl& each : expand_urls(pattern)) urls.push_back(std::move(each.url));
@@ -249,7 +249,7 @@ int monitor(const Options& options) {
   return Monitor(options, urls.front()).run();
 }
 
-constexpr const char* footer =
+constexpr const char* monitor_footer =
     R"(On a terminal: a status, redrawn in place. Into a pipe: one line a state. With --json: one object a
 line, with type (state, heartbeat, link, nack, error), transport, pnum, t and fields (numbers as
 numbers, several values as an array); of one board on a CAN bus, at the end, one of type transfers.
@@ -285,9 +285,9 @@ cannot be opened; 5 permission denied.)";
 }  // namespace
 
 void add_monitor(CLI::App& root, Action& chosen) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<MonitorOptions>();
   CLI::App* const command = add_subcommand(root, chosen, "monitor", "Show what a board says, live",
-                                           footer, options, monitor);
+                                           monitor_footer, options, monitor);
   add_boards(*command, options->urls);
   add_json(*command, options->json, "print JSON, one object a line");
   add_number(*command, "--count", options->count, 1, ~std::uint64_t{0},

@@ -24,10 +24,10 @@
 namespace r4::tool {
 namespace {
 
-constexpr std::size_t unread = std::size_t{1} << 18;  // bytes that wait for a reader
+constexpr std::size_t unread_of_boards = std::size_t{1} << 18;  // bytes that wait for a reader
 constexpr Milliseconds interval{1000};
 // With --count alone: how long all may stay silent from the start.
-constexpr Milliseconds patience{5000};
+constexpr Milliseconds boards_patience{5000};
 constexpr Milliseconds farewell{100};
 
 // A board with what is shown of it.
@@ -71,7 +71,7 @@ class BoardsMonitor {
       board->board.open();
     }
     signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
-    end_.expires_after(options_.duration.value_or(patience));
+    end_.expires_after(options_.duration.value_or(boards_patience));
     end_.async_wait([this](const std::error_code& error) {
       if (!error && (options_.duration || (options_.count != 0 && states_ == 0))) io_.stop();
     });
@@ -182,7 +182,7 @@ class BoardsMonitor {
   asio::steady_timer tick_;
   asio::steady_timer end_;
   const bool live_;
-  LineWriter lines_{unread};
+  LineWriter lines_{unread_of_boards};
   Screen screen_;
   std::vector<std::unique_ptr<ShownBoard>> boards_;
   std::uint64_t states_ = 0;

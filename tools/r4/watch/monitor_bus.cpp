@@ -24,11 +24,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t unread = 65536;  // bytes that wait for a reader
-constexpr Milliseconds tick{100};
+constexpr std::size_t unread_of_bus = 65536;  // bytes that wait for a reader
+constexpr Milliseconds bus_tick{100};
 constexpr Milliseconds plain_interval{1000};
 // Boards without a host say so twice a second.
-constexpr Milliseconds patience{5000};
+constexpr Milliseconds bus_patience{5000};
 // The load of the bus is not asked here: `r4 bus` is for that.
 constexpr CanBitRate any_rate{1000000, 0};
 
@@ -48,7 +48,7 @@ class BusMonitor {
     listener_.survey().on_stop([this] { on_stop(); });
     listener_.on_event([this](const CarrierEvent& event) { on_event(event); });
     signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
-    end_.expires_after(options_.duration.value_or(patience));
+    end_.expires_after(options_.duration.value_or(bus_patience));
     end_.async_wait([this](const std::error_code& error) {
       if (!error && (options_.duration || (options_.count != 0 && !any_heard()))) io_.stop();
     });
@@ -108,7 +108,7 @@ class BusMonitor {
   }
 
   void next_tick() {
-    tick_.expires_after(live_ ? tick : plain_interval);
+    tick_.expires_after(live_ ? bus_tick : plain_interval);
     tick_.async_wait([this](const std::error_code& error) {
       if (error) return;
       show();
@@ -165,7 +165,7 @@ class BusMonitor {
   asio::steady_timer tick_;
   asio::steady_timer end_;
   const bool live_;
-  LineWriter lines_{unread};
+  LineWriter lines_{unread_of_bus};
   Screen screen_;
   std::vector<std::string> rows_;
   std::string note_;

@@ -22,7 +22,7 @@ namespace {
 std::string_view view(Text text) { return {text.data(), text.size()}; }
 
 // Bytes that wait for a reader: half a second of states.
-constexpr std::size_t unread = 32768;
+constexpr std::size_t unread_of_view = 32768;
 constexpr std::size_t most_shown = 600;  // of a damaged datagram
 
 std::string shown(std::string_view bytes) {
@@ -34,7 +34,7 @@ class JsonView final : public MonitorView {
   // No `shared`: lines of its own.
   JsonView(const AsyncBoard& board, LineWriter* shared)
       : board_(board),
-        own_(shared == nullptr ? std::make_unique<LineWriter>(unread) : nullptr),
+        own_(shared == nullptr ? std::make_unique<LineWriter>(unread_of_view) : nullptr),
         lines_(shared == nullptr ? *own_ : *shared) {}
 
   void on_state(const ReceivedState& state, const Datagram& datagram) override {
@@ -170,7 +170,7 @@ class PlainView final : public MonitorView {
   std::uint64_t skipped() const override { return lines_.lost(); }
 
  private:
-  LineWriter lines_{unread};
+  LineWriter lines_{unread_of_view};
 };
 
 }  // namespace

@@ -20,8 +20,6 @@ constexpr std::uint16_t ether_ipv4 = 0x0800;
 constexpr std::uint16_t ether_ipv6 = 0x86DD;
 constexpr std::uint16_t ether_can = 0x000C;  // as Linux has it in "cooked" captures
 constexpr std::uint16_t ether_can_fd = 0x000D;
-constexpr std::uint8_t udp_protocol = 17;
-constexpr std::size_t udp_header = 8;
 // More boards than that are on no network.
 constexpr std::size_t most_wires = 1000;
 

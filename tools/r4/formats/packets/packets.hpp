@@ -2,6 +2,7 @@
 // Numbers of pcapng and of what packets are in (draft-ietf-opsawg-pcapng; www.tcpdump.org/linktypes.html).
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 namespace r4::tool {
@@ -22,6 +23,10 @@ constexpr std::uint16_t pcapng_if_tsoffset = 14;
 
 // The longest block, and packet, that is read.
 constexpr std::uint32_t max_block = 1 << 20;
+
+// Of IP: the number of UDP, and the bytes of its header.
+constexpr std::uint8_t udp_protocol = 17;
+constexpr std::size_t udp_header = 8;
 
 // Link types.
 constexpr std::uint16_t link_null = 0;

@@ -25,8 +25,6 @@ constexpr std::uint32_t made_up_board = 0xC6120000;  // 198.18.0.0
 constexpr std::uint32_t made_up_host = 0xC6130001;   // 198.19.0.1
 constexpr std::uint16_t host_port = 2390;
 constexpr std::size_t ip_header = 20;
-constexpr std::size_t udp_header = 8;
-constexpr std::uint8_t udp_protocol = 17;
 
 // What tells Wireshark how to show a packet of LINKTYPE_WIRESHARK_UPPER_PDU: tag, size, dissector; the end.
 constexpr std::string_view shown_as_syslog{

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How much is simulated, and which of it: numbers from the environment.
+#pragma once
+
+#include <cstdint>
+#include <cstdlib>
+
+namespace r4::simulation {
+
+inline std::uint64_t from_environment(const char* name, std::uint64_t otherwise) {
+  const char* const value = std::getenv(name);
+  return value == nullptr ? otherwise : std::strtoull(value, nullptr, 10);
+}
+
+}  // namespace r4::simulation
