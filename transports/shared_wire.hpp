@@ -19,6 +19,8 @@ struct SharedWire {
   // The same for all who mean it, and for nobody else. Empty: it is not shared.
   std::string name;
   ShareGroup group{};
+  // The name is a place, as the number of a pty: when the device goes, another may be next there.
+  bool is_place = false;
 };
 // Throws Error where it is not to be found.
 using FindWire = std::function<SharedWire()>;

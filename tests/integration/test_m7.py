@@ -3,6 +3,7 @@
 import collections
 import importlib.machinery
 import importlib.util
+import itertools
 import json
 import os
 import re
@@ -29,11 +30,16 @@ def either_url(urls, request):
     return getattr(urls, request.param)
 
 
+marks = itertools.cycle(['ENC1', 'ENC2'])
+
+
 def states_of(url, count):
-    """That many states in a row, behind the choice of fields."""
-    with monitor(url, '--fields', 'LATE') as host:
+    """That many states in a row, behind the choice of fields, which is another each time: what the host before has
+    chosen is sent until then."""
+    mark = next(marks)
+    with monitor(url, '--fields', f'LATE,{mark}') as host:
         host.next(is_link('active'))
-        host.next(lambda each: is_state(each) and 'LATE' in each['fields'])
+        host.next(lambda each: is_state(each) and mark in each['fields'])
         return [host.next(is_state) for _ in range(count)]
 
 

@@ -227,7 +227,7 @@ SharedWire serial_wire(const Url& url) {
       return {"serial/sn=" + port.serial_number};
     }
   }
-  return {"serial/" + path};
+  return {"serial/" + path, {}, true};
 }
 
 }  // namespace r4

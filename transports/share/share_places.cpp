@@ -9,10 +9,31 @@
 
 namespace r4 {
 
+void SharePlaces::begin() { begin(find_()); }
+
 void SharePlaces::begin(SharedWire wire) {
   wire_ = std::move(wire);
   stranger_.reset();
   forget();
+}
+
+void SharePlaces::follow() {
+  SharedWire wire = find_();
+  if (wire.name != wire_.name) begin(std::move(wire));
+}
+
+void SharePlaces::rename() {
+  SharedWire wire;
+  try {
+    wire = find_();
+  } catch (const Error&) {  // nobody looks for it by any name
+  }
+  if (wire.name == wire_.name) return;
+  begin(std::move(wire));
+  for (int place = 0; place < share_places && !wire_.name.empty(); ++place) {
+    if (holder_.rename(at_place(wire_, place))) return;
+  }
+  holder_.rename({});
 }
 
 void SharePlaces::forget() {

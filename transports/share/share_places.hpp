@@ -8,6 +8,7 @@
 #pragma once
 
 #include <optional>
+#include <utility>
 
 #include "../shared_wire.hpp"
 #include "r4link/error.hpp"
@@ -19,9 +20,17 @@ namespace r4 {
 
 class SharePlaces {
  public:
-  SharePlaces(WireHolder& holder, WireSharer& sharer) : holder_(holder), sharer_(sharer) {}
+  SharePlaces(FindWire find, WireHolder& holder, WireSharer& sharer)
+      : find_(std::move(find)), holder_(holder), sharer_(sharer) {}
 
-  void begin(SharedWire wire);
+  // Throws Error if the wire is not to be found.
+  void begin();
+  // Begins anew if the wire is called otherwise now. Throws Error as begin() does.
+  void follow();
+  // What we hold is called otherwise now, or nothing while it is not to be found: by that name it is found by who comes.
+  // A device that goes leaves its place to the next, for the number of a pty is another's at once; when it comes again,
+  // it may be in another.
+  void rename();
   // All are of use again.
   void forget();
 
@@ -31,6 +40,8 @@ class SharePlaces {
   void ask_for_wire(const std::string& thing);
   // Takes the first that is of use, or none if none is: then nobody shares what we open. False if another has it.
   bool hold();
+
+  const SharedWire& wire() const { return wire_; }
 
   // A place that is of use has a holder.
   bool somebody_has_come() const;
@@ -50,6 +61,9 @@ class SharePlaces {
   bool is_passed_over(int place) const { return (passed_over_ >> place & 1U) != 0; }
   void pass_over(int place, Problem why);
 
+  void begin(SharedWire wire);
+
+  const FindWire find_;
   WireHolder& holder_;
   WireSharer& sharer_;
   SharedWire wire_;

@@ -46,12 +46,11 @@ class SharedCarrier final : public Carrier,
   SharedCarrier(asio::io_context& io, std::unique_ptr<Carrier> own, FindWire find, BoardRole role)
       : io_(io),
         own_(std::move(own)),
-        find_(std::move(find)),
         role_(role),
         name_(own_->name()),
         holder_(io, *this, program_invocation_short_name),
         sharer_(io, *this),
-        places_(holder_, sharer_),
+        places_(std::move(find), holder_, sharer_),
         timer_(io) {}
   ~SharedCarrier() override { close(); }
 
@@ -108,7 +107,6 @@ class SharedCarrier final : public Carrier,
 
   asio::io_context& io_;
   const std::unique_ptr<Carrier> own_;
-  const FindWire find_;
   const BoardRole role_;
   std::string name_;
   WireHolder holder_;
@@ -135,7 +133,7 @@ void SharedCarrier::open(Carrier::Handler& handler) {
   state_ = State::attaching;
   since_ = Clock::now();
   try {
-    places_.begin(find_());
+    places_.begin();
     take_part();
   } catch (...) {
     close();
@@ -258,6 +256,7 @@ void SharedCarrier::attach_later(milliseconds delay) {
 
 void SharedCarrier::look() {
   try {
+    places_.follow();
     if (try_to_take_part()) return;
   } catch (const Error& error) {
     places_.forget();
@@ -314,6 +313,9 @@ void SharedCarrier::on_carrier_event(const CarrierEvent& event) {
   // A board that is found elsewhere is another name.
   const bool renamed = name_ != own_->name();
   name_ = own_->name();
+  const bool goes = event.kind == CarrierEvent::Kind::down && places_.wire().is_place;
+  const bool comes = event.kind == CarrierEvent::Kind::up && trouble_;
+  if (state_ == State::holding && (goes || comes)) places_.rename();
   tell(event);
   if (!up_) return;
   if (auto stranger = places_.take_stranger()) tell({CarrierEvent::Kind::warning, *stranger});

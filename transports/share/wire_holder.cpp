@@ -13,7 +13,6 @@
 #include <utility>
 
 #include "../../protocol/messages/command_field.hpp"
-#include "../file_descriptor.hpp"
 #include "../send_queue.hpp"
 #include "../writable_wait.hpp"
 #include "r4link/datagram.hpp"
@@ -200,17 +199,33 @@ bool WireHolder::hold(const SharedWire& wire) {
   FileDescriptor descriptor = hold_wire(wire);
   if (!descriptor) return false;
   release();
-  wire_ = wire;
-  listener_.assign(descriptor.release());
-  listen();
+  listen_at(std::move(descriptor), wire);
   return true;
 }
 
-void WireHolder::release() noexcept {
+bool WireHolder::rename(const SharedWire& wire) {
+  FileDescriptor descriptor;
+  if (!wire.name.empty() && !(descriptor = hold_wire(wire))) return false;
+  stop_listening();
+  if (descriptor) listen_at(std::move(descriptor), wire);
+  return true;
+}
+
+void WireHolder::listen_at(FileDescriptor descriptor, const SharedWire& wire) {
+  wire_ = wire;
+  listener_.assign(descriptor.release());
+  listen();
+}
+
+void WireHolder::stop_listening() noexcept {
   wire_ = {};
   accepting_.cancel();
   asio::error_code ignored;
   listener_.close(ignored);
+}
+
+void WireHolder::release() noexcept {
+  stop_listening();
   for (const auto& sharer : sharers_) sharer->end();
   sharers_.clear();
   removing_.cancel();
@@ -310,9 +325,7 @@ void WireHolder::welcome(Sharer& sharer) {
 }
 
 void WireHolder::give_away(Sharer& to) {
-  accepting_.cancel();
-  asio::error_code ignored;
-  listener_.close(ignored);  // the name is free
+  stop_listening();  // the name is free
   to.bid_farewell(Kind::yours, {});
   for (const auto& sharer : sharers_) sharer->bid_farewell(Kind::moved, {});
   // This is called by `to`, which must not go before it returns.

@@ -19,6 +19,7 @@
 #include <string_view>
 #include <vector>
 
+#include "../file_descriptor.hpp"
 #include "../operation_slot.hpp"
 #include "../shared_wire.hpp"
 #include "r4link/carrier.hpp"
@@ -61,11 +62,13 @@ class WireHolder {
 
   // Holds the wire of that name, instead of another. False if another program does.
   bool hold(const SharedWire& wire);
+  // It is the same wire, by another name, or by none: who comes from now on finds it by that, and those that share it
+  // stay. False, and nothing is changed, if another program has that name.
+  bool rename(const SharedWire& wire);
   // Lets it go.
   void release() noexcept;
 
   bool holds() const { return !wire_.name.empty(); }
-  const std::string& wire() const { return wire_.name; }
   // Those that hear what is told.
   std::size_t sharers() const;
   // To all who share it. `state`: only the newest waits for who is slow.
@@ -74,6 +77,8 @@ class WireHolder {
  private:
   class Sharer;
 
+  void listen_at(FileDescriptor descriptor, const SharedWire& wire);
+  void stop_listening() noexcept;
   void listen();
   void accept();
   void on_message(Sharer& from, const ShareMessage& message);
