@@ -149,7 +149,8 @@ def test_a_recording_of_a_serial_link_shows_when_its_commands_were_confirmed(tmp
             host.end()
         recorder.end()
     assert run('convert', str(log), '-o', str(packets)).returncode == 0
-    commands = fields(packets, 'r4.o.pwm', 'r4.response_in', only='r4.o.pwm > 0', options=['-2'])
+    sent = fields(packets, 'r4.o.pwm', 'r4.response_in', only='r4.o.pwm > 0', options=['-2'])
+    commands = [each for each in sent if each[1]]  # of the first the answer may be in the gap when the wire is handed over
     assert commands and commands[0][0] == '358'
     confirmed = dict(fields(packets, 'frame.number', 'r4.response_by', only='r4.response_time', options=['-2']))
     assert confirmed[commands[0][1]].startswith('CMD')
