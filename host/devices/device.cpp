@@ -18,7 +18,7 @@ Device::Device(DeviceDescription description, int address, int first_slot)
     throw Error(ErrorKind::usage, text(), "it cannot have that address",
                 fmt::format("by its description it is 0x{:02x}", fmt::join(possible, ", 0x")));
   }
-  if (first_slot < 1 || last_slot() > i2c_slots) {
+  if (first_slot < 1 || first_slot > i2c_slots || last_slot() > i2c_slots) {
     throw Error(ErrorKind::usage, text(),
                 fmt::format("it takes {} slots from slot {} on, and the board has {}",
                             description_.polls.size(), first_slot, i2c_slots),

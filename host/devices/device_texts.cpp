@@ -67,6 +67,10 @@ std::vector<Device> Device::from(const std::vector<std::string>& texts) {
     next = newest.last_slot() + 1;
     for (std::size_t i = 0; i + 1 < devices.size(); ++i) {
       const Device& other = devices[i];
+      if (newest.address() == other.address()) {
+        throw Error(ErrorKind::usage, newest.text(), other.text() + " has that address, too",
+                    "give one of them another: NAME@ADDRESS; a bus has one device at an address");
+      }
       if (newest.first_slot() > other.last_slot() || newest.last_slot() < other.first_slot()) {
         continue;
       }

@@ -50,6 +50,21 @@ def test_each_role_has_its_message():
             peer.end()
 
 
+@pytest.mark.parametrize(('reach', 'told'), [('5 6', -math.inf), ('0.03 2', math.inf), ('0.03 5', 3.04)])
+def test_a_range_tells_too_near_from_nothing_within_reach(reach, told, tmp_path):
+    mine, domain = tmp_path / 'mine.device', own_domain()
+    mine.write_text('device mine\nrole range\naddress 0x40\npoll bus x02 2 20\n'
+                    f'value distance bus 0 u16be bits 3..15 scale 0.001 unit m range {reach}\n')
+    with Board('udp://127.0.0.1:0') as board, Peer(domain) as peer:
+        with Ros2(domain, board.host_url, '--device', str(mine)) as ros2:
+            peer.read('rt/mine/range', RANGE)
+            cdr = Cdr(peer.sample('rt/mine/range'))
+            assert cdr.header()[1] == 'mine' and cdr.take('B') == 1
+            assert [cdr.take('f') for _ in range(4)][3] == pytest.approx(told)
+            assert ros2.end() == 0, ros2.errors
+            peer.end()
+
+
 def test_nothing_is_written_before_the_board_is_armed():
     domain = own_domain()
     with Board('udp://127.0.0.1:0', options=('--device', 'bno055')) as board:

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <string>
 #include <string_view>
 
@@ -230,6 +231,9 @@ TEST(Device, IsNamedWithItsAddressAndSlot) {
   EXPECT_EQ(usage_of({"bno055@0x28:"}), "bno055@0x28:: its address or slot is no number");
   EXPECT_EQ(usage_of({"mpu6050@0x68:2", "bno055@0x28:1"}),
             "bno055@0x28: mpu6050@0x68 has slot 2, too");
+  EXPECT_EQ(usage_of({"mpu6050@0x68", "icm20948@0x68"}),
+            "icm20948@0x68: mpu6050@0x68 has that address, too");
+  EXPECT_THROW(Device::from("ina219", std::numeric_limits<int>::max()), Error);
 }
 
 TEST(Device, DecodesTheSlotsOfAState) {

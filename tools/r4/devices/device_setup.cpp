@@ -99,7 +99,7 @@ void DeviceSetup::on_state(const State& state) {
 
 void DeviceSetup::on_silence() {
   fail({ErrorKind::refused, parts_[next_].device->text(), "the end of a transfer was not heard",
-        ""});
+        "give it more time, or look at the field I2CX"});
 }
 
 void DeviceSetup::step_done() {

@@ -2,6 +2,7 @@
 // r4 devices: the descriptions that are shipped, and whether one of the user's is right.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 #include <string>
 
@@ -21,7 +22,9 @@ struct Options {
 
 std::string addresses_of(const DeviceDescription& device) {
   const std::vector<int>& all = device.addresses;
-  if (all.size() > 2 && all.back() - all.front() == static_cast<int>(all.size()) - 1) {
+  const auto gap =
+      std::adjacent_find(all.begin(), all.end(), [](int one, int next) { return next != one + 1; });
+  if (all.size() > 2 && gap == all.end()) {
     return fmt::format("0x{:02x}-0x{:02x}", all.front(), all.back());
   }
   return fmt::format("0x{:02x}", fmt::join(all, ", 0x"));

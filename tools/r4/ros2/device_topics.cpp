@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <string_view>
 #include <utility>
 
@@ -14,6 +15,19 @@ namespace {
 // NaN for what is no measurement.
 double number_of(const Device& device, const State& state, std::string_view value) {
   return device.reading(state, value).number.value_or(std::numeric_limits<double>::quiet_NaN());
+}
+
+// As it was read, also where it is beyond what the device can measure. Nothing before the first reading, and of another
+// length, which is somebody else's in that slot.
+std::optional<double> any_number_of(const Device& device, const State& state, std::size_t value) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  DeviceValue any = device.description().values[value];
+  any.minimum = -infinity;
+  any.maximum = infinity;
+  const std::size_t slot = static_cast<std::size_t>(device.first_slot() - 1) + any.poll;
+  const auto& bytes = state.i2c[slot].data;
+  if (bytes.size != device.description().polls[any.poll].count) return std::nullopt;
+  return any.decode(bytes.bytes, bytes.size);
 }
 
 TimeMessage device_stamp(DeviceTopics::WallTime time) {
@@ -64,8 +78,10 @@ void DeviceTopics::on_state(const State& state, WallTime sampled) {
   for (Topic& topic : topics_) {
     if (!state.present.has(topic.device.field(topic.value))) continue;
     const DeviceReading reading = topic.device.reading(state, topic.value);
-    // A range that is none is told, too: nothing within reach.
-    const bool told = reading.number || topic.device.description().role == DeviceRole::range;
+    // A range that is none is told, too: nothing within reach, or something too near.
+    const bool told = topic.device.description().role == DeviceRole::range
+                          ? any_number_of(topic.device, state, topic.value).has_value()
+                          : reading.number.has_value();
     if (!told || reading.t_ms == 0 || topic.t_ms == reading.t_ms) continue;
     topic.t_ms = reading.t_ms;
     const auto age =
@@ -99,6 +115,9 @@ void DeviceTopics::publish_imu(const Topic& topic, const State& state, TimeMessa
   message.angular_velocity = {get("gyro_x"), get("gyro_y"), get("gyro_z")};
   if (topic.device.description().find("quat_w")) {
     message.orientation = {get("quat_x"), get("quat_y"), get("quat_z"), get("quat_w")};
+    // A BNO055 that is being configured says 0 for all (BST-BNO055-DS000, 3.3.1); no orientation has that length.
+    const auto& [x, y, z, w] = message.orientation;
+    if (x * x + y * y + z * z + w * w < 0.5) return;
   } else {
     message.orientation.w = 1;
     message.orientation_covariance[0] = -1;  // it has none
@@ -136,9 +155,12 @@ void DeviceTopics::publish_range(const Topic& topic, const State& state, TimeMes
   message.radiation_type = infrared;
   message.min_range = static_cast<float>(distance.minimum);
   message.max_range = static_cast<float>(distance.maximum);
-  // No measurement is nothing within reach: REP 117.
-  message.range = static_cast<float>(topic.device.reading(state, topic.value)
-                                         .number.value_or(std::numeric_limits<double>::infinity()));
+  // REP 117: what is too near is -Inf, nothing within reach +Inf.
+  constexpr float infinity = std::numeric_limits<float>::infinity();
+  const double measured = any_number_of(topic.device, state, topic.value).value();
+  message.range = measured < distance.minimum   ? -infinity
+                  : measured > distance.maximum ? infinity
+                                                : static_cast<float>(measured);
   (void)dds_write(topic.writer, &message);
 }
 
