@@ -283,6 +283,7 @@ void AsyncBoard::Impl::tell_wires(const LinkStatus& status) {
 }
 
 void AsyncBoard::record(Recording& recording) { impl_->record(recording.recorder_); }
+void AsyncBoard::describe(const Device& device) { impl_->describe(device); }
 
 Subscription AsyncBoard::on_state(
     std::function<void(const ReceivedState&, const Datagram&)> callback) {

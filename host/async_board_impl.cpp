@@ -226,6 +226,17 @@ void AsyncBoard::Impl::record(const std::shared_ptr<Recorder>& recorder) {
   }
   wires[0]->tap.on_link(session.link());
   name_in_recording();
+  for (const Device& device : devices) describe_in_recording(device);
+}
+
+void AsyncBoard::Impl::describe(const Device& device) {
+  std::erase_if(devices, [&](const Device& each) { return each.place() == device.place(); });
+  devices.push_back(device);
+  describe_in_recording(device);
+}
+
+void AsyncBoard::Impl::describe_in_recording(const Device& device) {
+  for (const auto& wire : wires) wire->tap.on_device(device);
 }
 
 void AsyncBoard::Impl::name_in_recording() {

@@ -141,6 +141,8 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
 
   void record(const std::shared_ptr<Recorder>& recorder);
   void name_in_recording();
+  void describe(const Device& device);
+  void describe_in_recording(const Device& device);
   void tell_that_a_recording_ended();
 
   // --- time
@@ -182,6 +184,7 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
 
   asio::io_context& io;
   std::vector<std::unique_ptr<BoardWire>> wires;
+  std::vector<Device> devices;       // that recordings tell of
   const std::uint32_t heartbeat_ms;  // between ours
   Session session;
   BoardIdentity identity;

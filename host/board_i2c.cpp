@@ -93,6 +93,7 @@ void Board::attach(const Device& device, Duration timeout) {
       send(step.command(), timeout);
     }
   }
+  impl->run_on_loop("attach()", [&] { impl->async.describe(device); });
   std::string chosen;
   {
     const std::lock_guard lock(impl->mutex);

@@ -46,7 +46,9 @@ std::optional<std::size_t> DeviceDescription::find(std::string_view value) const
 }
 
 DeviceDescription DeviceDescription::parse(std::string_view text, const std::string& source) {
-  return DescriptionParser(source).parse(text);
+  DeviceDescription description = DescriptionParser(source).parse(text);
+  description.text = text;
+  return description;
 }
 
 }  // namespace r4

@@ -28,6 +28,8 @@ Device::Device(DeviceDescription description, int address, int first_slot)
 
 std::string Device::text() const { return fmt::format("{}@0x{:02x}", description_.name, address_); }
 
+std::string Device::place() const { return fmt::format("{}:{}", text(), first_slot_); }
+
 std::string Device::fields() const {
   std::string names;
   for (int slot = first_slot_; slot <= last_slot(); ++slot) {

@@ -58,6 +58,13 @@ Device Device::from(std::string_view text, int first_slot) {
   return {std::move(description), place.address.value_or(usual), place.slot.value_or(first_slot)};
 }
 
+Device Device::parse(std::string_view place, std::string_view description) {
+  const DevicePlace where = read_place(place);
+  DeviceDescription read = DeviceDescription::parse(description, std::string(place));
+  const int usual = read.addresses.front();
+  return {std::move(read), where.address.value_or(usual), where.slot.value_or(1)};
+}
+
 std::vector<Device> Device::from(const std::vector<std::string>& texts) {
   std::vector<Device> devices;
   int next = 1;

@@ -33,4 +33,11 @@ struct RecordedWire {
   std::string name;  // the board's, or its id; empty while it has not told
 };
 
+// A described device of the board at a wire, and the text of its description (docs/described-devices.md).
+struct RecordedDevice {
+  std::uint16_t wire = 1;
+  std::string place;  // "bno055@0x28:1"
+  std::string description;
+};
+
 }  // namespace r4

@@ -20,6 +20,7 @@ constexpr std::chrono::seconds second{1};
 constexpr std::size_t decimals = 6;
 constexpr std::string_view header_words = "# r4log ";
 constexpr std::string_view wire_words = "# wire ";
+constexpr std::string_view device_words = "# device ";
 constexpr std::string_view hex_digits = "0123456789abcdef";
 
 constexpr Time end_of_time =
@@ -118,15 +119,17 @@ bool take_number(std::string_view& text, char end, std::uint32_t limit, std::uin
 
 constexpr std::uint32_t max_wire = std::numeric_limits<std::uint16_t>::max();
 
-bool read_wire(std::string_view text, RecordLine& out) {
+// "1 WORD" or "1 WORD OTHER".
+bool read_of_wire(std::string_view text, std::uint16_t& wire, std::string& word,
+                  std::string& other) {
   std::uint32_t number = 0;
   if (!take_number(text, ' ', max_wire, number) || number == no_wire) return false;
-  out.wire.number = static_cast<std::uint16_t>(number);
-  out.wire.url.clear();
-  out.wire.name.clear();
+  wire = static_cast<std::uint16_t>(number);
+  word.clear();
+  other.clear();
   const std::size_t blank = text.find(' ');
-  if (!append_unescaped(out.wire.url, text.substr(0, blank))) return false;
-  return blank == std::string_view::npos || append_unescaped(out.wire.name, text.substr(blank + 1));
+  if (!append_unescaped(word, text.substr(0, blank))) return false;
+  return blank == std::string_view::npos || append_unescaped(other, text.substr(blank + 1));
 }
 
 LineKind damaged(RecordLine& out, const char* why) {
@@ -143,7 +146,17 @@ LineKind read_comment(std::string_view line, RecordLine& out) {
   }
   if (line.starts_with(wire_words)) {
     line.remove_prefix(wire_words.size());
-    return read_wire(line, out) ? LineKind::wire : damaged(out, "no wire is written so");
+    return read_of_wire(line, out.wire.number, out.wire.url, out.wire.name)
+               ? LineKind::wire
+               : damaged(out, "no wire is written so");
+  }
+  if (line.starts_with(device_words)) {
+    line.remove_prefix(device_words.size());
+    if (line.empty() || line[0] < '0' || line[0] > '9') return LineKind::comment;  // a person's
+    RecordedDevice& device = out.device;
+    return read_of_wire(line, device.wire, device.place, device.description)
+               ? LineKind::device
+               : damaged(out, "no device is written so");
   }
   return LineKind::comment;
 }
@@ -218,6 +231,16 @@ void write_wire(std::string& out, const RecordedWire& wire) {
     out += ' ';
     append_word(out, wire.name);
   }
+  out += '\n';
+}
+
+void write_device(std::string& out, const RecordedDevice& device) {
+  out += device_words;
+  append_number(out, device.wire);
+  out += ' ';
+  append_word(out, device.place);
+  out += ' ';
+  append_escaped(out, std::string_view(device.description).substr(0, max_record_bytes));
   out += '\n';
 }
 

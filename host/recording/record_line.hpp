@@ -3,6 +3,7 @@
 //
 //     # r4log 1 by r4 0.1.0
 //     # wire 1 serial:///dev/ttyACM0 left-arm
+//     # device 1 bno055@0x28:1 name bno055\x0atitle…
 //     # from 2026-11-23T21:11:33.404765Z
 //     1795468293.404765 1< AIN24:24.28;PNum:7434;T:79090;^0xf07cfd9a^
 //
@@ -31,6 +32,8 @@ void write_record_header(std::string& out);
 // For people: when the first record is from.
 void write_beginning(std::string& out, Time time);
 void write_wire(std::string& out, const RecordedWire& wire);
+// At most max_record_bytes of description.
+void write_device(std::string& out, const RecordedDevice& device);
 // Bytes beyond max_record_bytes are left out. A time outside of the years 1970 to 9999 is written as the next
 // that is inside.
 void write_record(std::string& out, const Record& record);
@@ -42,6 +45,7 @@ enum class LineKind : std::uint8_t {
   record,
   header,
   wire,
+  device,
   comment,  // another line that begins with #; of a later version, or a person's
 };
 
@@ -51,6 +55,7 @@ struct RecordLine {
   const char* problem = "";
   Record record;  // its bytes are in `text`
   RecordedWire wire;
+  RecordedDevice device;
   std::uint32_t version = 0;
   std::string text;
 };

@@ -82,6 +82,12 @@ void Recorder::name_wire(std::uint16_t wire, std::string name) {
   undeclared_.push_back(wire);
 }
 
+void Recorder::add_device(RecordedDevice device) {
+  const std::lock_guard lock(mutex_);
+  if (closing_) return;
+  undeclared_devices_.push_back(std::move(device));
+}
+
 void Recorder::record(std::uint16_t wire, RecordKind kind, std::string_view bytes, Time at) {
   if (ended()) return;
   bytes = bytes.substr(0, max_record_bytes);
@@ -130,6 +136,7 @@ void Recorder::run() {
   try {
     for (bool last = false; !last;) {
       std::vector<RecordedWire> fresh;
+      std::vector<RecordedDevice> devices;
       {
         std::unique_lock lock(mutex_);
         wanted_.wait_for(lock, interval,
@@ -138,8 +145,10 @@ void Recorder::run() {
         batch_.swap(waiting_);
         for (const std::uint16_t number : undeclared_) fresh.push_back(wires_[number - 1U]);
         undeclared_.clear();
+        devices.swap(undeclared_devices_);
       }
       for (const RecordedWire& wire : fresh) writer_.declare(wire);
+      for (const RecordedDevice& device : devices) writer_.declare(device);
       written_until_ = last ? now() : now() - settled;
       write();
       tell_of_what_was_dropped();

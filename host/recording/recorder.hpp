@@ -38,6 +38,8 @@ class Recorder {
   std::uint16_t add_wire(std::string url);
   // What the board there calls itself.
   void name_wire(std::uint16_t wire, std::string name);
+  // What the bytes of one of its devices mean.
+  void add_device(RecordedDevice device);
   // Copies it. Allocates nothing; beyond max_record_bytes it is cut. `at`: when it was, by the steady clock; records
   // are written in the order of their times if none is told of more than `settled` later.
   void record(std::uint16_t wire, RecordKind kind, std::string_view bytes, Time at);
@@ -98,6 +100,7 @@ class Recorder {
   std::vector<char> waiting_;
   std::vector<RecordedWire> wires_;
   std::vector<std::uint16_t> undeclared_;
+  std::vector<RecordedDevice> undeclared_devices_;
   std::uint64_t records_ = 0;
   std::uint64_t dropped_ = 0;
   bool closing_ = false;

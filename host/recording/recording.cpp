@@ -7,6 +7,7 @@
 #include "../../protocol/messages/message.hpp"
 #include "../../protocol/messages/state_fields.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/error.hpp"
 #include "recorder.hpp"
 #include "recording_file.hpp"
 #include "recording_reader.hpp"
@@ -46,6 +47,13 @@ class Tour final : public RecordingReader::Handler {
     }
     State& state = states_[record.wire];
     if (read_state(datagram, state)) visitor_.on_state(record.wire, record.time, state);
+  }
+  void on_device(const RecordedDevice& device) override {
+    try {
+      visitor_.on_device(device.wire, Device::parse(device.place, device.description));
+    } catch (const Error& error) {
+      visitor_.on_damage(error.what());
+    }
   }
   void on_damage(const RecordingDamage& damage) override {
     visitor_.on_damage("line " + std::to_string(damage.line) + ", byte " +

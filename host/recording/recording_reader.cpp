@@ -99,6 +99,9 @@ void RecordingReader::on_line(std::string_view line) {
       return handler_.on_comment(line);
     case LineKind::wire:
       return handler_.on_wire(read_.wire);
+    case LineKind::device:
+      handler_.on_device(read_.device);
+      return handler_.on_comment(line);
     case LineKind::comment:
       return handler_.on_comment(line);
   }

@@ -36,9 +36,11 @@ class RecordingReader {
     // may be others than before.
     virtual void on_wire(const RecordedWire& wire) = 0;
     virtual void on_damage(const RecordingDamage& damage) = 0;
+    // What is at that place of that wire from now on, until a header.
+    virtual void on_device(const RecordedDevice& device) { static_cast<void>(device); }
     // A recording begins here, or goes on: one file may hold several.
     virtual void on_header() {}
-    // Another line that begins with #, and behind on_header() the header's own.
+    // Another line that begins with #; behind on_header() and on_device() those lines, too.
     virtual void on_comment(std::string_view line) { static_cast<void>(line); }
 
    protected:

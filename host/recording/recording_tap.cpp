@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "record_line.hpp"
+
 namespace r4 {
 
 void RecordingTap::attach(std::shared_ptr<Recorder> recorder, const std::string& url) {
@@ -51,6 +53,18 @@ void RecordingTap::on_packets(const PacketCounters& packets) {
 
 void RecordingTap::on_name(std::string_view name) {
   if (recorder_) recorder_->name_wire(wire_, std::string(name));
+}
+
+void RecordingTap::on_device(const Device& device) {
+  if (!recorder_) return;
+  const std::string& description = device.description().text;
+  if (description.size() > max_record_bytes) {
+    return record(
+        RecordKind::event,
+        fmt::format("warning {}: its description has {} bytes and is left out; {} are room",
+                    device.place(), description.size(), max_record_bytes));
+  }
+  recorder_->add_device({wire_, device.place(), description});
 }
 
 }  // namespace r4

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "r4link/carrier.hpp"
+#include "r4link/devices/device.hpp"
 #include "r4link/link.hpp"
 #include "recorder.hpp"
 
@@ -33,6 +34,7 @@ class RecordingTap {
   void on_link(const LinkStatus& link);
   void on_packets(const PacketCounters& packets);
   void on_name(std::string_view name);
+  void on_device(const Device& device);
 
  private:
   void record(RecordKind kind, std::string_view bytes) {

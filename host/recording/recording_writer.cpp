@@ -32,6 +32,7 @@ void RecordingWriter::begin_file() {
   if (file_->torn()) text_ += '\n';
   write_record_header(text_);
   for (const RecordedWire& wire : wires_) write_wire(text_, wire);
+  for (const RecordedDevice& device : devices_) write_device(text_, device);
 }
 
 void RecordingWriter::declare(const RecordedWire& wire) {
@@ -44,6 +45,14 @@ void RecordingWriter::declare(const RecordedWire& wire) {
     *known = wire;
   }
   write_wire(text_, wire);
+}
+
+void RecordingWriter::declare(const RecordedDevice& device) {
+  std::erase_if(devices_, [&](const RecordedDevice& each) {
+    return each.wire == device.wire && each.place == device.place;
+  });
+  devices_.push_back(device);
+  write_device(text_, device);
 }
 
 bool RecordingWriter::is_due(Time time) const {

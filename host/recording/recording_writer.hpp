@@ -23,6 +23,8 @@ class RecordingWriter {
 
   // A wire, before its first record, or with more that is known of it. Throws as append() does.
   void declare(const RecordedWire& wire);
+  // A device: in this file, and in those that follow; instead of another at that place of that wire.
+  void declare(const RecordedDevice& device);
   // Each may write, and throws Error when that cannot be done.
   void append(const Record& record);
   // What was appended is on the disk when this returns. Throws Error.
@@ -42,6 +44,7 @@ class RecordingWriter {
   std::optional<RecordingFile> file_;
   std::optional<ZstdWriter> zstd_;
   std::vector<RecordedWire> wires_;
+  std::vector<RecordedDevice> devices_;
   std::string text_;           // not written yet
   std::string compressed_;     // used again and again
   std::size_t frame_ = 0;      // text in the frame so far

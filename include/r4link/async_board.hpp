@@ -42,6 +42,7 @@
 
 #include "carrier.hpp"
 #include "datagram.hpp"
+#include "devices/device.hpp"
 #include "options.hpp"
 #include "recording.hpp"
 #include "setpoints.hpp"
@@ -244,6 +245,8 @@ class AsyncBoard {
   // Every datagram from now on, in both directions, goes into that recording too, until it is closed or gone, or
   // another one is named. Where it ends by itself on_event() tells, and the link goes on.
   void record(Recording& recording);
+  // What the bytes of a device of this board mean, for recordings from now on: r4 convert tells its values.
+  void describe(const Device& device);
 
   // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. Throws
   // Error{usage} for less than nothing and more than an hour. feed()

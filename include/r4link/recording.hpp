@@ -23,6 +23,7 @@
 #include <string_view>
 
 #include "config.hpp"
+#include "devices/device.hpp"
 #include "error.hpp"
 #include "link.hpp"
 
@@ -49,6 +50,10 @@ class RecordingVisitor {
   virtual void on_wire(int wire, const std::string& url, const std::string& name) {
     static_cast<void>(wire), static_cast<void>(url), static_cast<void>(name);
   }
+  // A described device of that wire's board, from now on: device.readings(state) is what it has measured.
+  virtual void on_device(int wire, const Device& device) {
+    static_cast<void>(wire), static_cast<void>(device);
+  }
   // A state, whose fields are merged over those before.
   virtual void on_state(int wire, Time at, const State& state) {
     static_cast<void>(wire), static_cast<void>(at), static_cast<void>(state);
@@ -62,7 +67,7 @@ class RecordingVisitor {
   virtual void on_event(int wire, Time at, std::string_view words) {
     static_cast<void>(wire), static_cast<void>(at), static_cast<void>(words);
   }
-  // A place that cannot be read, in words; what is behind it is read again.
+  // A place that cannot be read, or a description, in words; what is behind it is read again.
   virtual void on_damage(const std::string& words) { static_cast<void>(words); }
 };
 

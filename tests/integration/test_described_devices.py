@@ -74,7 +74,24 @@ def test_a_recording_becomes_columns_with_units(board, tmp_path):
         rows = list(csv.DictReader(file))
     assert {row['bno055@0x28 heading [deg]'] for row in rows} == {'270'}
     assert {row['bno055@0x28 accel_z [m/s2]'] for row in rows} == {'9.81'}
-    assert run('convert', str(log), '-o', str(tmp_path / 'drive.mcap'), '--device', 'bno055').returncode == 2
+    assert run('convert', str(log), '-o', str(tmp_path / 'drive.pcapng'), '--device', 'bno055').returncode == 2
+
+
+def test_a_recording_tells_what_the_bytes_of_its_devices_mean(board, tmp_path):
+    """Also of a description of one's own, which is not there any more."""
+    mine, log, table = tmp_path / 'mine.device', tmp_path / 'drive.r4log', tmp_path / 'drive.csv'
+    mine.write_text(MINE)
+    devices = ['--device', 'bno055@0x28:1', '--device', f'{mine}@0x40:7']
+    with Running('monitor', board.host_url, *devices, '--json') as monitor:
+        monitor.next(is_reading('mine@0x40', 'volts'))
+        assert run('record', board.host_url, '-o', str(log), '--for', '0.5', *devices).returncode == 0
+    mine.unlink()
+    assert objects(run('info', str(log), '--json').stdout)[0]['wires'][0]['devices'] == ['bno055@0x28:1', 'mine@0x40:7']
+    assert run('convert', str(log), '-o', str(table)).returncode == 0
+    with open(table, encoding='ascii') as file:
+        rows = list(csv.DictReader(file))
+    assert {row['bno055@0x28 accel_z [m/s2]'] for row in rows} == {'9.81'}
+    assert all(float(row['mine@0x40 volts [V]']) == pytest.approx(12.16) for row in rows)
 
 
 def test_a_page_shows_them_and_who_controls_sets_them_up(board):

@@ -3,6 +3,7 @@
 import asyncio
 import math
 
+import numpy as np
 import pytest
 
 import r4link
@@ -30,6 +31,22 @@ def test_one_that_is_shipped_is_set_up_and_decoded(sim, board, wait):
     assert readings['accel_z'].errors == 0 and 0 <= state.t_ms - readings['accel_z'].t_ms <= 1000
     with pytest.raises(r4link.UsageError, match='it has no value yaw'):
         imu.reading(state, 'yaw')
+
+
+def test_a_recording_has_columns_for_what_they_measured(sim, board, wait, tmp_path):
+    for device in ('bno055 on', 'ina219 on'):
+        sim.happen(f'device {device}')
+    board.arm()
+    board.record(tmp_path / 'drive.r4log')
+    imu, power = r4link.Device('bno055@0x28:1'), r4link.Device('ina219@0x40:5')
+    board.attach(imu)
+    wait(lambda: imu.reading(board.state, 'accel_z').number == 9.81)
+    board.attach(power)  # later, so that rows before have none
+    wait(lambda: power.reading(board.state, 'current').number is not None)
+    board.close()
+    states = r4link.read(tmp_path / 'drive.r4log').boards[0].states
+    assert states['bno055_accel_z'][-1] == 9.81
+    assert np.isnan(states['ina219_current'][0]) and states['ina219_current'][-1] == pytest.approx(1.25)
 
 
 def test_one_of_my_own_is_read_without_arming(board, wait, tmp_path):

@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -32,6 +33,16 @@ struct Column {
   std::vector<std::int32_t> numbers;
 };
 
+constexpr double not_measured = std::numeric_limits<double>::quiet_NaN();
+
+// A value of a described device, in all states.
+struct Measured {
+  Device device;
+  std::size_t value;
+  std::string value_name, name;  // "gyro_z", and of the column
+  std::vector<double> numbers;
+};
+
 // What a recording has of one board.
 struct RecordedBoard {
   std::string url, name;
@@ -39,6 +50,7 @@ struct RecordedBoard {
   std::vector<std::uint32_t> t_ms, pnum;
   FieldSet fields;
   std::vector<Column> columns;
+  std::vector<Measured> measured;
   std::uint64_t damaged = 0;
   std::vector<std::pair<std::int64_t, std::string>> events;
   std::vector<std::tuple<std::int64_t, bool, std::string>> datagrams;
@@ -49,6 +61,18 @@ std::size_t count_of(Form form) {
   const bool two =
       form == Form::drive || form == Form::fault || form == Form::reading || form == Form::answer;
   return two ? 2 : 1;
+}
+
+// "bno055_gyro_z"; of a second one of that kind "bno055_29_gyro_z", with its address.
+std::string column_of(const Device& device, const DeviceValue& value,
+                      const std::vector<Measured>& others) {
+  const std::string& kind = device.description().name;
+  const bool another = std::any_of(others.begin(), others.end(), [&](const Measured& each) {
+    return each.device.description().name == kind && each.device.address() != device.address();
+  });
+  const std::string text = device.text();  // "bno055@0x29"
+  const std::string address = another ? text.substr(text.find("@0x") + 3) + "_" : "";
+  return kind + "_" + address + value.name;
 }
 
 class Columns final : public RecordingVisitor {
@@ -62,6 +86,24 @@ class Columns final : public RecordingVisitor {
     if (known == boards_.end()) boards_.emplace_back().url = url;
     if (!name.empty()) boards_[index].name = name;
     index_of_[wire] = index;
+  }
+  void on_device(int wire, const Device& device) override {
+    RecordedBoard& board = of(wire);
+    const std::vector<DeviceValue>& values = device.description().values;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const auto known =
+          std::find_if(board.measured.begin(), board.measured.end(), [&](const Measured& each) {
+            return each.device.text() == device.text() && each.value_name == values[i].name;
+          });
+      if (known != board.measured.end()) {  // in other slots, perhaps
+        known->device = device;
+        known->value = i;
+      } else {
+        board.measured.push_back({device, i, values[i].name,
+                                  column_of(device, values[i], board.measured),
+                                  std::vector<double>(board.pnum.size(), not_measured)});
+      }
+    }
   }
   void on_state(int wire, Time at, const State& state) override {
     RecordedBoard& board = of(wire);
@@ -78,6 +120,9 @@ class Columns final : public RecordingVisitor {
     for (Column& column : board.columns) {
       const std::int64_t number = numbers_of(state, column.field)[column.which];
       column.numbers.push_back(static_cast<std::int32_t>(number));
+    }
+    for (Measured& each : board.measured) {
+      each.numbers.push_back(each.device.reading(state, each.value).number.value_or(not_measured));
     }
   }
   void on_datagram(int wire, Time at, bool from_board, std::string_view bytes) override {
@@ -160,6 +205,9 @@ py::tuple Columns::take() {
     for (Column& column : board.columns) {
       const auto [name, type] = column_of(column.field, column.which);
       columns.append(py::make_tuple(name, type, to_array(std::move(column.numbers))));
+    }
+    for (Measured& each : board.measured) {
+      columns.append(py::make_tuple(each.name, "f8", to_array(std::move(each.numbers))));
     }
     py::list datagrams;
     for (const auto& [at, from_board, bytes] : board.datagrams) {

@@ -29,7 +29,8 @@ class RecordedBoard(NamedTuple):
     `states` is a structured array, a row a state: `time` (UTC, the host's), `t_ms` (the board's), `pnum`, and a
     column for each number of each field that occurs: volts, `osmc1_pwm` (0-4095), `osmc1_dir` (1: forward),
     `safe` (0: none, as SAFE). A field that a state does not carry keeps its value; before the first one that
-    does it is 0.
+    does it is 0. Of a described device that the recording tells of each value has one, `bno055_gyro_z` in its unit,
+    nan where it is no measurement; of a second one of that kind, with its address, `bno055_29_gyro_z`.
     """
     url: str
     name: str  # its own or its id; '' where it has not told
@@ -81,7 +82,10 @@ def read(path: str | os.PathLike[str], datagrams: bool = False) -> Log:
         states['time'], states['t_ms'], states['pnum'] = times(at), t_ms, pnum
         while columns:
             column, kind, numbers = columns.pop()
-            states[column] = numbers / 100 if kind == 'f8' else numbers.view('u4') if kind == 'u4' else numbers
+            if numbers.dtype.kind == 'f':
+                states[column] = numbers
+            else:
+                states[column] = numbers / 100 if kind == 'f8' else numbers.view('u4') if kind == 'u4' else numbers
         boards.append(RecordedBoard(
             url, name, states, events_of(told), damaged,
             [RecordedDatagram(np.datetime64(each, 'us'), direction, data) for each, direction, data in sent]))

@@ -82,6 +82,7 @@ struct R4LINK_API DeviceDescription {
   std::vector<DeviceWrite> writes;
   std::vector<DevicePoll> polls;  // 1 to 8
   std::vector<DeviceValue> values;
+  std::string text;  // that all this was read from
 
   static constexpr std::size_t max_text = 65536;  // bytes of a description
   static constexpr std::size_t max_lines = 256;   // checks, writes and values, each

@@ -39,6 +39,9 @@ class R4LINK_API Device {
   // "NAME[@ADDRESS[:SLOT]]", where NAME is what DeviceDescription::load() takes: "bno055", "bno055@0x28:3",
   // "./mine.device@64". Without an address its usual one; without a slot `first_slot`.
   static Device from(std::string_view text, int first_slot = 1);
+  // Of the text of a description instead of its name, as a recording has it: "bno055@0x28:1". Throws Error as
+  // DeviceDescription::parse() and the others do.
+  static Device parse(std::string_view place, std::string_view description);
   // Several, each behind the other in the slots; those with a slot of their own there. Throws Error{usage} if two
   // have one in common.
   static std::vector<Device> from(const std::vector<std::string>& texts);
@@ -48,6 +51,7 @@ class R4LINK_API Device {
   int first_slot() const { return first_slot_; }
   int last_slot() const { return first_slot_ + static_cast<int>(description_.polls.size()) - 1; }
   std::string text() const;    // "bno055@0x28"
+  std::string place() const;   // "bno055@0x28:1"
   std::string fields() const;  // "I2C1,I2C2", for F: and Board::fields()
 
   // That brings a value; the value's place is that in description().values.

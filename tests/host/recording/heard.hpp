@@ -25,6 +25,7 @@ struct Heard final : RecordingReader::Handler {
     if (record.kind == RecordKind::event) events.emplace_back(record.bytes);
   }
   void on_wire(const RecordedWire& wire) override { wires.push_back(wire); }
+  void on_device(const RecordedDevice& device) override { devices.push_back(device); }
   void on_damage(const RecordingDamage& each) override {
     damage.push_back({each.kind, each.line, each.offset});
   }
@@ -35,6 +36,7 @@ struct Heard final : RecordingReader::Handler {
   int headers = 0;
   std::vector<std::string> events;
   std::vector<RecordedWire> wires;
+  std::vector<RecordedDevice> devices;
   std::vector<Damage> damage;
 };
 

@@ -133,6 +133,34 @@ TEST(RecordLine, OfAWireHasItsUrlAndTheBoardsName) {
   }
 }
 
+TEST(RecordLine, OfADeviceHasItsPlaceAndTheTextOfItsDescription) {
+  std::string text;
+  write_device(text, {3, "my one@0x28:1", "device mine\naddress 0x40\n# \\\xff\n"});
+  EXPECT_EQ(text,
+            "# device 3 my\\x20one@0x28:1 device mine\\x0aaddress 0x40\\x0a# \\x5c\\xff\\x0a\n");
+  text.pop_back();
+  RecordLine read;
+  ASSERT_TRUE(read_record_line(text, read)) << text;
+  EXPECT_EQ(read.kind, LineKind::device);
+  EXPECT_EQ(read.device.wire, 3);
+  EXPECT_EQ(read.device.place, "my one@0x28:1");
+  EXPECT_EQ(read.device.description, "device mine\naddress 0x40\n# \\\xff\n");
+  // The longest is a line that is read.
+  text.clear();
+  write_device(text, {65535, "mine@0x28:1", std::string(5000, '\n')});
+  EXPECT_LE(text.size(), max_record_line);
+  text.pop_back();
+  ASSERT_TRUE(read_record_line(text, read));
+  EXPECT_EQ(read.device.description, std::string(max_record_bytes, '\n'));
+
+  ASSERT_TRUE(read_record_line("# device was changed at noon", read));
+  EXPECT_EQ(read.kind, LineKind::comment) << "a person's";
+  for (const char* const line :
+       {"# device 0 bno055@0x28:1 device x", "# device 70000 x", "# device 1 x \\x2"}) {
+    EXPECT_FALSE(read_record_line(line, read)) << line;
+  }
+}
+
 TEST(RecordLine, OfALaterVersionSaysWhichItIs) {
   RecordLine read;
   ASSERT_TRUE(read_record_line("# r4log 2 by r4 9.0.0", read));

@@ -63,7 +63,7 @@ TEST_F(RecordingWriterTest, WhatWasFlushedIsInTheFile) {
   for (const char* const name : {"a.r4log", "a.r4log.zst"}) {
     all.clear();
     RecordingWriter writer(path(name), {});
-    writer.declare({1, "udp://robot", ""});
+    writer.declare(RecordedWire{1, "udp://robot", ""});
     for (int i = 0; i < 10; ++i) {
       append(writer);
       writer.flush();
@@ -129,7 +129,7 @@ TEST_F(RecordingWriterTest, BeginsANewFileAfterASize) {
     RecordingOptions options;
     options.rotate_bytes = 20'000;
     RecordingWriter writer(path("drive") + ending, options);
-    writer.declare({1, "udp://robot", "left"});
+    writer.declare(RecordedWire{1, "udp://robot", "left"});
     for (int i = 0; i < 3000; ++i) {
       append(writer);
       if (i % 50 == 0) writer.flush();
@@ -157,6 +157,27 @@ TEST_F(RecordingWriterTest, BeginsANewFileAfterATime) {
   writer.close();
   ASSERT_EQ(names().size(), 5);
   for (const std::string& name : names()) EXPECT_EQ(heard_in(content(name)).count, 200) << name;
+}
+
+TEST_F(RecordingWriterTest, TellsOfItsDevicesInEachFile) {
+  RecordingOptions options;
+  options.rotate_after = 2s;
+  RecordingWriter writer(path("drive.r4log"), options);
+  writer.declare(RecordedWire{1, "udp://robot", ""});
+  writer.declare(RecordedDevice{1, "bno055@0x28:1", "older"});
+  for (int i = 0; i < 100; ++i) append(writer);
+  writer.declare(RecordedDevice{1, "bno055@0x28:1", "newer"});
+  writer.declare(RecordedDevice{1, "as5600@0x36:3", "another"});
+  for (int i = 0; i < 400; ++i) append(writer);
+  writer.close();
+  ASSERT_EQ(names().size(), 3);
+  for (const std::string& name : names()) {
+    const bool first = name == names().front();
+    const std::vector<RecordedDevice> devices = heard_in(content(name)).devices;
+    ASSERT_EQ(devices.size(), first ? 3 : 2) << name;
+    EXPECT_EQ(devices[0].description, first ? "older" : "newer");
+    EXPECT_EQ(devices.back().place, "as5600@0x36:3");
+  }
 }
 
 TEST_F(RecordingWriterTest, KeepsWhatItMayAndNoMore) {

@@ -86,8 +86,63 @@ TEST(Csv, HasWhatDescribedDevicesMeasured) {
   EXPECT_NE(json.bytes.find(R"("devices":{"ina219@0x40":{"voltage":11.98,"current":0.2)"),
             std::string::npos)
       << json.bytes;
-  EXPECT_THROW(converted(recording, ".r4log", ".mcap", 1000, {Device::from("ina219@0x40:3")}),
+  EXPECT_THROW(converted(recording, ".r4log", ".pcapng", 1000, {Device::from("ina219@0x40:3")}),
                Error);
+}
+
+// Of wire 1 and 2 at different slots.
+std::string recording_of_two_with_devices() {
+  std::string all = "# r4log 1 by r4 0.1.0\n# wire 1 udp://a\n# wire 2 udp://b\n";
+  write_device(all, {1, "ina219@0x40:3", std::string(DeviceDescription::text_of("ina219"))});
+  write_device(all, {2, "ina219@0x40:1", std::string(DeviceDescription::text_of("ina219"))});
+  write_device(all, {2, "odd@0x40:5", "no description"});
+  const auto state = [&all](std::uint16_t wire, const std::string& fields) {
+    write_record(all, {Time{1795468293000000 + wire}, wire, RecordKind::from_board,
+                       with_crc(fields + "PNum:1;T:1010;")});
+  };
+  state(1, "I2C3:1000,0,x07d0;I2C4:1002,0,x5d98;");
+  state(2, "I2C1:1000,0,x07d0;I2C2:1002,0,x5da0;");
+  state(2, "I2C3:1000,0,x07d0;I2C4:1002,0,x5d98;");
+  return all;
+}
+
+TEST(Csv, HasTheDevicesThatTheRecordingTellsOfEachOfItsWire) {
+  const std::string recording = recording_of_two_with_devices();
+  const Converted csv = converted(recording, ".r4log", ".csv");
+  const auto lines = lines_of(csv.bytes);
+  ASSERT_EQ(lines.size(), 4);
+  EXPECT_TRUE(lines[0].ends_with(
+      " bytes [hex],ina219@0x40 voltage [V],ina219@0x40 current [A],ina219@0x40 overflow"))
+      << lines[0];
+  EXPECT_TRUE(lines[1].ends_with(",11.98,0.2,0")) << lines[1];
+  EXPECT_TRUE(lines[2].ends_with(",11.984,0.2,0")) << lines[2];
+  EXPECT_TRUE(lines[3].ends_with(",,,")) << lines[3] << ": those slots are the other board's";
+  EXPECT_TRUE(csv.left_out.find("odd@0x40:5, line 1") != std::string::npos) << csv.left_out;
+  // Named ones count instead, of every wire.
+  const Converted named =
+      converted(recording, ".r4log", ".csv", 1000, {Device::from("ina219@0x40:3")});
+  EXPECT_TRUE(lines_of(named.bytes)[2].ends_with(",,,"));
+  EXPECT_TRUE(lines_of(named.bytes)[3].ends_with(",11.98,0.2,0"));
+}
+
+TEST(Csv, DevicesOfOneRecordingAreNotThoseOfTheNextInTheFile) {
+  const std::string two = recording_of_two_with_devices() +
+                          "# r4log 1 by r4 0.1.0\n# wire 1 udp://c\n" +
+                          one_state("I2C3:1000,0,x07d0;I2C4:1002,0,x5d98;PNum:1;T:1010;");
+  const auto lines = lines_of(converted(two, ".r4log", ".csv").bytes);
+  EXPECT_TRUE(lines[1].ends_with(",11.98,0.2,0"));
+  EXPECT_TRUE(lines.back().ends_with(",,,")) << lines.back();
+}
+
+TEST(Csv, OtherFormatsHaveTheDevicesOfARecordingToo) {
+  const std::string recording = recording_of_two_with_devices();
+  const char* const measured = R"("devices":{"ina219@0x40":{"voltage":11.984,"current":0.2)";
+  EXPECT_NE(converted(recording, ".r4log", ".jsonl").bytes.find(measured), std::string::npos);
+  for (const char* const by : {".pcapng", ".mcap", ".r4log.zst"}) {
+    EXPECT_EQ(and_back(recording, by), recording) << by;
+    const std::string there = converted(recording, ".r4log", by).bytes;
+    EXPECT_NE(converted(there, by, ".jsonl").bytes.find(measured), std::string::npos) << by;
+  }
 }
 
 TEST(Csv, HasAUnitForEachValueOfEveryField) {

@@ -20,6 +20,7 @@ DeviceSetup::DeviceSetup(asio::io_context& io, AsyncBoard& board,
                          std::function<void(const Problem&)> told)
     : board_(board), told_(std::move(told)), timer_(io) {
   for (const Device& device : devices) {
+    board.describe(device);
     for (DeviceStep& step : steps_of(device)) parts_.push_back({&device, std::move(step)});
   }
   subscriptions_.emplace_back(

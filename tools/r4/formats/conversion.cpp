@@ -20,6 +20,9 @@ const char* tell_line(std::string_view line, RecordLine& read, RecordingReader::
       if (read.version != record_version) return "of a later version: read it with a newer r4";
       handler.on_header();
       break;
+    case LineKind::device:
+      handler.on_device(read.device);
+      break;
     case LineKind::comment:
       break;
   }

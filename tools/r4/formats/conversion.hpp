@@ -48,11 +48,15 @@ class Sink {
   // Does it want to be told of all wires and records by survey() first? Where a file can be read once only, it is not.
   virtual bool wants_survey() const { return false; }
   virtual void survey(const RecordedWire& wire) { static_cast<void>(wire); }
+  virtual void survey(const RecordedDevice& device) { static_cast<void>(device); }
   virtual void survey(const Record& record) { static_cast<void>(record); }
   // A line that begins with #; such lines have no time of their own, so it is that of the record before, and of the
   // first one for those at the beginning.
   virtual void on_comment(std::string_view line, Time time) = 0;
   virtual void on_wire(const RecordedWire& wire, Time time) = 0;
+  // Comes before its line does by on_comment(); that of a header, too.
+  virtual void on_device(const RecordedDevice& device) { static_cast<void>(device); }
+  virtual void on_header() {}
   virtual void on_record(const Record& record) = 0;
   // All was told.
   virtual void finish() = 0;
@@ -66,6 +70,7 @@ class Survey final : public RecordingReader::Handler {
   explicit Survey(Sink& sink) : sink_(sink) {}
   void on_record(const Record& record) override { sink_.survey(record); }
   void on_wire(const RecordedWire& wire) override { sink_.survey(wire); }
+  void on_device(const RecordedDevice& device) override { sink_.survey(device); }
   void on_damage(const RecordingDamage&) override {}
 
  private:
@@ -82,6 +87,8 @@ class Conversion final : public RecordingReader::Handler {
   void on_record(const Record& record) override;
   void on_wire(const RecordedWire& wire) override;
   void on_comment(std::string_view line) override;
+  void on_header() override { sink_.on_header(); }
+  void on_device(const RecordedDevice& device) override { sink_.on_device(device); }
   void on_damage(const RecordingDamage& damage) override;
   // The source has ended.
   void finish();

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <string_view>
+#include <utility>
 
 #include "protocol/messages/message.hpp"
 #include "protocol/messages/state_fields.hpp"
@@ -31,6 +32,27 @@ void append_quoted(std::string& out, std::string_view text) {
 
 }  // namespace
 
+CsvSink::CsvSink(Output& output, std::vector<Device> devices)
+    : output_(output), devices_(std::move(devices)) {}
+
+void CsvSink::survey(const RecordedDevice& device) {
+  surveyed_.on_device(device);
+  add_columns(surveyed_);
+}
+
+void CsvSink::add_columns(const RecordedDevices& devices) {
+  for (const auto& [wire, device] : devices.all()) {
+    for (const DeviceValue& value : device.description().values) {
+      const bool known = std::any_of(device_columns_.begin(), device_columns_.end(),
+                                     [&](const DeviceColumn& each) {
+                                       return each.device == device.text() &&
+                                              each.value == value.name && each.unit == value.unit;
+                                     });
+      if (!known) device_columns_.push_back({device.text(), value.name, value.unit});
+    }
+  }
+}
+
 bool CsvSink::read(const Record& record) {
   return record.kind == RecordKind::from_board && read_datagram(Text(record.bytes), datagram_) &&
          kind_of(datagram_) == MessageKind::state && read_state(datagram_, state_) &&
@@ -54,11 +76,10 @@ void CsvSink::write_header() {
       fmt::format_to(std::back_inserter(row_), ",{} {}", view(name_of(field)), units.values[i]);
     }
   }
-  for (const Device& device : devices_) {
-    for (const DeviceValue& value : device.description().values) {
-      fmt::format_to(std::back_inserter(row_), ",{} {}", device.text(), value.name);
-      if (!value.unit.empty()) fmt::format_to(std::back_inserter(row_), " [{}]", value.unit);
-    }
+  add_columns(devices_);
+  for (const DeviceColumn& column : device_columns_) {
+    fmt::format_to(std::back_inserter(row_), ",{} {}", column.device, column.value);
+    if (!column.unit.empty()) fmt::format_to(std::back_inserter(row_), " [{}]", column.unit);
   }
   row_ += '\n';
   output_.write(row_);
@@ -92,16 +113,26 @@ void CsvSink::on_record(const Record& record) {
       row_.append(units_of(field).count - 1, ',');
     }
   }
-  for (const Device& device : devices_) {
-    for (std::size_t i = 0; i < device.description().values.size(); ++i) {
-      row_ += ',';
-      if (!state_.present.has(device.field(i))) continue;
-      const auto number = device.reading(state_, i).number;
-      if (number) fmt::format_to(out, "{}", *number);
-    }
+  for (const DeviceColumn& column : device_columns_) {
+    row_ += ',';
+    append_measured(column, record.wire);
   }
   row_ += '\n';
   output_.write(row_);
+}
+
+void CsvSink::append_measured(const DeviceColumn& column, std::uint16_t wire) {
+  for (const RecordedDevices::Known& known : devices_.all()) {
+    const Device& device = known.device;
+    if (!known.is_of(wire) || device.text() != column.device) continue;
+    const auto value = device.description().find(column.value);
+    if (!value || device.description().values[*value].unit != column.unit) continue;
+    if (!state_.present.has(device.field(*value))) continue;
+    if (const auto number = device.reading(state_, *value).number) {
+      fmt::format_to(std::back_inserter(row_), "{}", *number);
+    }
+    return;
+  }
 }
 
 void CsvSink::finish() {
@@ -109,7 +140,9 @@ void CsvSink::finish() {
 }
 
 std::string CsvSink::left_out() const {
-  return others_ == 0 ? std::string() : fmt::format("{} that are no state", others_);
+  std::string text = others_ == 0 ? std::string() : fmt::format("{} that are no state", others_);
+  if (!devices_.problems().empty()) text += (text.empty() ? "" : ", ") + devices_.problems();
+  return text;
 }
 
 }  // namespace r4::tool

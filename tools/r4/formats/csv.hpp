@@ -7,28 +7,30 @@
 
 #include <cstdint>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "conversion.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/devices/device.hpp"
 #include "r4link/state.hpp"
+#include "recorded_devices.hpp"
 #include "wire_names.hpp"
 
 namespace r4::tool {
 
 class CsvSink final : public Sink {
  public:
-  // Of `devices`, what they have measured has columns, too.
-  explicit CsvSink(Output& output, std::vector<Device> devices = {})
-      : output_(output), devices_(std::move(devices)) {}
+  // What devices have measured has columns, too: those named, or else those of the recording.
+  explicit CsvSink(Output& output, std::vector<Device> devices = {});
   // The columns are those of the fields that were there; of all fields if nothing was surveyed.
   bool wants_survey() const override { return true; }
   void survey(const RecordedWire& wire) override { names_.on_wire(wire); }
+  void survey(const RecordedDevice& device) override;
   void survey(const Record& record) override;
   void on_comment(std::string_view, Time) override {}
   void on_wire(const RecordedWire& wire, Time) override { names_.on_wire(wire); }
+  void on_device(const RecordedDevice& device) override { devices_.on_device(device); }
+  void on_header() override { devices_.on_header(); }
   void on_record(const Record& record) override;
   void finish() override;
   std::string left_out() const override;
@@ -36,9 +38,19 @@ class CsvSink final : public Sink {
  private:
   bool read(const Record& record);
   void write_header();
+  // A value of a device, whichever wire's.
+  struct DeviceColumn {
+    std::string device;  // "bno055@0x28"
+    std::string value;
+    std::string unit;
+  };
+  void add_columns(const RecordedDevices& devices);
+  void append_measured(const DeviceColumn& column, std::uint16_t wire);
 
   Output& output_;
-  const std::vector<Device> devices_;
+  RecordedDevices devices_;
+  RecordedDevices surveyed_{{}};
+  std::vector<DeviceColumn> device_columns_;
   WireNames names_;
   Datagram datagram_;
   State state_;

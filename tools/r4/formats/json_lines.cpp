@@ -22,18 +22,19 @@ void JsonLinesSink::on_record(const Record& record) {
   Json object{{"time", static_cast<double>(record.time.count()) / 1e6}, {"wire", record.wire}};
   if (record.wire != no_wire) object["board"] = names_.of(record.wire);
   add_record_json(object, record);
-  add_devices(object, record);
+  measured_.add_to(object, record, devices_);
   output_.write(line_of(object));
 }
 
-// "devices":{"bno055@0x28":{"accel_x":0.02,…}}, where the record is a state that brings them.
-void JsonLinesSink::add_devices(Json& object, const Record& record) {
-  if (devices_.empty() || record.kind != RecordKind::from_board ||
+void MeasuredJson::add_to(Json& object, const Record& record, const RecordedDevices& devices) {
+  if (devices.all().empty() || record.kind != RecordKind::from_board ||
       !read_datagram(Text(record.bytes), datagram_) || kind_of(datagram_) != MessageKind::state ||
       !read_state(datagram_, state_)) {
     return;
   }
-  for (const Device& device : devices_) {
+  for (const RecordedDevices::Known& known : devices.all()) {
+    if (!known.is_of(record.wire)) continue;
+    const Device& device = known.device;
     const std::vector<DeviceValue>& values = device.description().values;
     for (std::size_t i = 0; i < values.size(); ++i) {
       if (!state_.present.has(device.field(i))) continue;

@@ -5,6 +5,7 @@
 //     {"time":1795468293.404765,"wire":1,"board":"left-arm","type":"event","event":"up udp://192.168.0.125"}
 #pragma once
 
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "r4link/datagram.hpp"
 #include "r4link/devices/device.hpp"
 #include "r4link/state.hpp"
+#include "recorded_devices.hpp"
 #include "wire_names.hpp"
 
 namespace r4::tool {
@@ -21,9 +23,20 @@ namespace r4::tool {
 // an event's `type` and `event`. Bytes that are no printable ASCII are \xNN in `text` and `event`.
 void add_record_json(Json& object, const Record& record);
 
+// Adds what devices have measured in a record that is a state:
+// "devices":{"bno055@0x28":{"accel_x":0.02,…}}; null is no measurement.
+class MeasuredJson {
+ public:
+  void add_to(Json& object, const Record& record, const RecordedDevices& devices);
+
+ private:
+  Datagram datagram_;  // used again and again
+  State state_;
+};
+
 class JsonLinesSink final : public Sink {
  public:
-  // Of `devices`, what they have measured is told, too.
+  // What devices have measured is told, too: those named, or else those of the recording.
   explicit JsonLinesSink(Output& output, std::vector<Device> devices = {})
       : output_(output), devices_(std::move(devices)) {}
   bool wants_survey() const override { return true; }
@@ -31,16 +44,16 @@ class JsonLinesSink final : public Sink {
   void survey(const Record&) override {}
   void on_comment(std::string_view, Time) override {}
   void on_wire(const RecordedWire& wire, Time) override { names_.on_wire(wire); }
+  void on_device(const RecordedDevice& device) override { devices_.on_device(device); }
+  void on_header() override { devices_.on_header(); }
   void on_record(const Record& record) override;
   void finish() override {}
+  std::string left_out() const override { return devices_.problems(); }
 
  private:
-  void add_devices(Json& object, const Record& record);
-
   Output& output_;
-  const std::vector<Device> devices_;
-  Datagram datagram_;
-  State state_;
+  RecordedDevices devices_;
+  MeasuredJson measured_;
   WireNames names_;
 };
 

@@ -39,15 +39,15 @@ std::unique_ptr<Sink> make_sink(const std::string& path, Output& output,
   const std::string_view name = path;
   if (name.ends_with(".csv")) return std::make_unique<CsvSink>(output, std::move(devices));
   if (name.ends_with(".jsonl")) return std::make_unique<JsonLinesSink>(output, std::move(devices));
+  if (name.ends_with(".mcap")) return std::make_unique<McapSink>(output, std::move(devices));
   if (!devices.empty()) {
     throw Error(ErrorKind::usage, "--device", "this format holds the bytes as the board sent them",
-                "convert to .csv or .jsonl");
+                "convert to .csv, .jsonl or .mcap");
   }
   if (name.ends_with(".r4log")) return std::make_unique<NativeSink>(output, false);
   if (name.ends_with(".r4log.zst")) return std::make_unique<NativeSink>(output, true);
   if (name.ends_with(".log")) return std::make_unique<CandumpSink>(output);
   if (name.ends_with(".pcapng")) return std::make_unique<PcapngSink>(output);
-  if (name.ends_with(".mcap")) return std::make_unique<McapSink>(output);
   throw Error(ErrorKind::usage, path, "no format has that ending",
               "end it in .r4log, .r4log.zst, .csv, .jsonl, .log, .pcapng or .mcap");
 }

@@ -30,7 +30,8 @@ std::unique_ptr<Source> make_source(const std::string& path, RecordingReader::Ha
                                     const SourceOptions& options = {});
 
 // Writes the file of that name. Throws Error{usage} where its ending is none that is written.
-// Of `devices` .csv and .jsonl tell what they have measured; Error{usage} for them with another.
+// Of `devices` .csv, .jsonl and .mcap tell what they have measured, instead of those of the recording; Error{usage} for
+// them with another.
 std::unique_ptr<Sink> make_sink(const std::string& path, Output& output,
                                 std::vector<Device> devices = {});
 

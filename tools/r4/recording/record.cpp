@@ -42,6 +42,7 @@ struct RecordOptions {
   std::optional<Milliseconds> duration;
   std::string fields;
   std::string key;
+  std::vector<std::string> devices;
 };
 
 RecordingOptions limits_of(const RecordOptions& options) {
@@ -51,11 +52,12 @@ RecordingOptions limits_of(const RecordOptions& options) {
   return limits;
 }
 
-BoardOptions board_options(const RecordOptions& options) {
+BoardOptions board_options(const RecordOptions& options, const std::vector<Device>& devices) {
   BoardOptions board_options = with_key(options.key);
   board_options.role = BoardRole::watch;
   board_options.session.arming = Arming::off;  // it drives nothing
   if (!options.fields.empty()) board_options.session.fields = options.fields;
+  for (const Device& device : devices) board_options.session.fields += "," + device.fields();
   return board_options;
 }
 
@@ -95,7 +97,10 @@ class BusListener {
 class Recorders {
  public:
   explicit Recorders(const RecordOptions& options)
-      : board_options_(board_options(options)), signals_(io_), end_(io_) {
+      : devices_(Device::from(options.devices)),
+        board_options_(board_options(options, devices_)),
+        signals_(io_),
+        end_(io_) {
     std::vector<std::string> buses;
     for (const std::string& pattern : options.urls) {
       for (const PatternUrl& each : expand_urls(pattern)) {
@@ -149,10 +154,12 @@ class Recorders {
     board.on_event([this](const CarrierEvent&) {
       if (recording_->problem()) io_.stop();
     });
+    for (const Device& device : devices_) board.describe(device);
     board.record(*recording_);
     board.open();
   }
 
+  const std::vector<Device> devices_;
   const BoardOptions board_options_;
   asio::io_context io_{1};
   std::optional<Recording> recording_;
@@ -178,6 +185,7 @@ Examples:
   r4 record udp://192.168.0.125 -o drive.r4log
   r4 record serial:auto 'can://can0?node=3' -o drive.r4log.zst --for 60
   r4 record serial:auto+udp://192.168.0.125 -o drive.r4log    one board, by both wires
+  r4 record serial:auto -o drive.r4log --device bno055@0x28:1    which another program has set up
   r4 record can://can0 -o bus.r4log     every board that is heard on the bus
   r4 record 'udp://10.0.0.{1-30}?listen=0' -o lab.r4log.zst     thirty boards
   r4 record udp:auto -o /var/log/robot.r4log.zst --rotate 1h --rotate 100M --keep 2G
@@ -203,6 +211,9 @@ void add_record(CLI::App& root, Action& chosen) {
   add_text(*command, "--keep", options->keep, "remove the oldest files beyond that size (2G)",
            "SIZE");
   add_fields(*command, options->fields);
+  add_repeated(*command, "--device", options->devices,
+               "also the bytes of a described device, and what they mean (r4 devices)",
+               "NAME@ADDRESS");
   add_key(*command, options->key);
 }
 

@@ -16,6 +16,8 @@ namespace {
 
 // Of a file so damaged that it seems to have more wires, they are counted as one.
 constexpr std::size_t most_wires = 1000;
+// More than a board has slots are in no recording but one of many parts.
+constexpr std::size_t most_devices = 64;
 
 double seconds_of(Time time) { return std::chrono::duration<double>(time).count(); }
 
@@ -57,6 +59,13 @@ void RecordingSummary::on_wire(const RecordedWire& wire) {
   const auto index = static_cast<std::size_t>(known - wires_.begin());
   numbers_[wire.number] = known == wires_.end() ? add(wire.number) : index;
   of(wire.number).wire = wire;
+}
+
+void RecordingSummary::on_device(const RecordedDevice& device) {
+  std::vector<std::string>& known = of(device.wire).devices;
+  if (known.size() == most_devices || std::count(known.begin(), known.end(), device.place) != 0)
+    return;
+  known.push_back(device.place);
 }
 
 WireSummary& RecordingSummary::of(std::uint16_t number) {
@@ -176,6 +185,7 @@ std::string RecordingSummary::text(const std::string& name) const {
                  each.oversize == 0 ? "" : fmt::format(", {} too long", each.oversize)));
     line("",
          fmt::format("{} to it: {} heartbeats, {} stops", each.sent, each.heartbeats, each.stops));
+    if (!each.devices.empty()) line("", fmt::format("devices {}", fmt::join(each.devices, ", ")));
     std::string safe;
     for (std::size_t i = 1; i < each.safe_times.size(); ++i) {
       if (each.safe_times[i] == 0) continue;
@@ -220,6 +230,7 @@ Json RecordingSummary::json(const std::string& name) const {
     object["wires"].push_back({{"wire", each.wire.number},
                                {"url", each.wire.url},
                                {"name", each.wire.name},
+                               {"devices", each.devices},
                                {"received", each.received},
                                {"states", each.states},
                                {"states_hz", rate_of(each)},

@@ -19,6 +19,7 @@ constexpr Time shortest_gap{std::chrono::seconds{1}};
 
 struct WireSummary {
   RecordedWire wire;
+  std::vector<std::string> devices;  // "bno055@0x28:1"
   // From the board.
   std::uint64_t received = 0;  // valid ones
   std::uint64_t states = 0;
@@ -45,6 +46,7 @@ class RecordingSummary final : public RecordingReader::Handler {
  public:
   void on_header() override;
   void on_wire(const RecordedWire& wire) override;
+  void on_device(const RecordedDevice& device) override;
   void on_record(const Record& record) override;
   void on_damage(const RecordingDamage& damage) override;
 

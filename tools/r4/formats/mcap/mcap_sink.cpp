@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "../json_lines.hpp"
 #include "protocol/datagram/crc32.hpp"
 #include "r4link/config.hpp"
 #include "r4link/error.hpp"
@@ -102,6 +101,7 @@ void McapSink::on_record(const Record& record) {
   Json object = Json::object();
   add_record_json(
       object, {record.time, record.wire, record.kind, record.bytes.substr(0, max_record_bytes)});
+  measured_.add_to(object, record, devices_);
   write_message(channel_of(record.wire), record.time, object.dump());
 }
 

@@ -7,8 +7,12 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "../conversion.hpp"
+#include "../json_lines.hpp"
+#include "../recorded_devices.hpp"
 #include "../wire_names.hpp"
 #include "host/recording/zstd_stream.hpp"
 #include "mcap.hpp"
@@ -17,15 +21,20 @@ namespace r4::tool {
 
 class McapSink final : public Sink {
  public:
-  explicit McapSink(Output& output) : output_(output) {}
+  // What devices have measured is told, too: those named, or else those of the recording.
+  explicit McapSink(Output& output, std::vector<Device> devices = {})
+      : output_(output), devices_(std::move(devices)) {}
   bool wants_survey() const override { return true; }
   void survey(const RecordedWire& wire) override { names_.on_wire(wire); }
   void survey(const Record&) override {}
   void on_comment(std::string_view line, Time time) override;
   void on_wire(const RecordedWire& wire, Time time) override;
+  void on_device(const RecordedDevice& device) override { devices_.on_device(device); }
+  void on_header() override { devices_.on_header(); }
   // Throws Error{data} for a time beyond the year 2554, which MCAP cannot write.
   void on_record(const Record& record) override;
   void finish() override;
+  std::string left_out() const override { return devices_.problems(); }
 
  private:
   static constexpr std::size_t chunk_size = 1 << 20;
@@ -50,6 +59,8 @@ class McapSink final : public Sink {
   Channel& add_channel(std::uint16_t wire, const std::string& topic, std::uint16_t schema);
 
   Output& output_;
+  RecordedDevices devices_;
+  MeasuredJson measured_;
   WireNames names_;
   ZstdWriter zstd_;
   bool begun_ = false;

@@ -46,6 +46,9 @@ std::string record_schema_text() {
   }
   Json all = of_type("object", "of the datagram, but PNum and T");
   all["properties"] = fields;
+  Json measured = of_type("object", "what described devices measured, by device and value");
+  measured["additionalProperties"] = {{"type", "object"},
+                                      {"additionalProperties", {{"type", {"number", "null"}}}}};
   return text_of(record_schema,
                  {{"from", of_type("string", "board or host")},
                   {"ok", of_type("boolean", "is it a valid datagram")},
@@ -53,6 +56,7 @@ std::string record_schema_text() {
                   {"pnum", of_type("integer", "packet number")},
                   {"t", of_type("integer", "the board's clock [ms]")},
                   {"fields", all},
+                  {"devices", measured},
                   {"error", of_type("string", "of a damaged datagram: length, syntax or crc")},
                   {"position", of_type("integer", "the byte where it went wrong")},
                   {"text", of_type("string", "the datagram as it was")},

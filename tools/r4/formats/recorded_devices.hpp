@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Whose bytes are whose in a recording: the devices that it describes, of each wire, or instead of them those that the
+// user has named, of every wire.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "host/recording/record.hpp"
+#include "r4link/devices/device.hpp"
+
+namespace r4::tool {
+
+class RecordedDevices {
+ public:
+  explicit RecordedDevices(std::vector<Device> named);
+
+  // The recording tells of one, instead of what has had its slots.
+  void on_device(const RecordedDevice& told);
+  // Another recording begins, whose wires may be others.
+  void on_header();
+
+  struct Known {
+    std::uint16_t wire;  // no_wire: each
+    Device device;
+    bool is_of(std::uint16_t number) const { return wire == no_wire || wire == number; }
+  };
+  const std::vector<Known>& all() const { return all_; }
+  // Why some are none, for people; empty: all are understood.
+  const std::string& problems() const { return problems_; }
+
+ private:
+  const bool named_;
+  std::vector<Known> all_;
+  std::string problems_;
+};
+
+}  // namespace r4::tool
