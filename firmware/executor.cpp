@@ -16,12 +16,14 @@ void set_relay(std::uint8_t& relays, int channel, bool on) {
 }
 
 // Called when the relay of the motors' supply is about to close: a motor whose command came while
-// there was no supply, or was held back by a network, must not start because of the relay.
+// there was no supply, or was held back by a network, must not start because of the relay. A voltage
+// may be the throttle of one.
 void stop_motors(Outputs& outputs) {
   for (Drive& channel : outputs.osmc) channel.pwm = 0;
   for (Drive& channel : outputs.dhb12) channel.pwm = 0;
   for (Bldc& channel : outputs.bldc) channel.speed = 0;
   for (StepperTarget& channel : outputs.stepper) channel = StepperTarget();
+  for (std::uint16_t& millivolts : outputs.dac_mv) millivolts = 0;
 }
 
 }  // namespace

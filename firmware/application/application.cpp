@@ -252,6 +252,7 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
       tell_ports();
       for (int i = 0; i < wires_.size(); ++i) watchers_.end_of(wires_[i]);
       if (setpoints_.settings.recovery == Recovery::rearm) setpoints_.outputs = Outputs();
+      forget_uarts();
       safety_.leave(SafeReason::link);
       schedule_.start(now_ms, setpoints_.settings.state_period_ms());
       break;

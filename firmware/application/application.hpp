@@ -150,6 +150,7 @@ class Application {
 
   // application_devices.cpp
   Refusal carry_out_device(std::uint32_t pnum, const Command& command, std::uint32_t now_ms);
+  void forget_uarts();
   void begin_devices(std::uint32_t now_ms);
   Refusal write_uart(const Command& command);
   void follow_device_setting(Text key, std::uint32_t now_ms);

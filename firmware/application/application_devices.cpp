@@ -39,17 +39,22 @@ void Application::drop_device_writes() {
   }
 }
 
+// What came while nobody heard it is old.
+void Application::forget_uarts() {
+  for (UserUart* uart : uarts_) {
+    if (uart != nullptr) uart->forget();
+  }
+}
+
 // A session begins with the readings that are kept as settings, and nothing of the one before.
 void Application::begin_devices(std::uint32_t now_ms) {
   has_answer_ = false;
   for (UserUart* uart : uarts_) {
-    if (uart == nullptr) continue;
-    uart->drop_writes();
-    uart->forget();
+    if (uart != nullptr) uart->drop_writes();
   }
+  forget_uarts();
   if (i2c_ == nullptr) return;
   i2c_->drop_all();
-  i2c_->take_answered();
   for (int i = 0; i < i2c_slots; ++i) i2c_->poll_slot(i + 1, setpoints_.settings.polls[i], now_ms);
 }
 

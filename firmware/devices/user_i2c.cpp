@@ -22,7 +22,7 @@ bool UserI2c::ask(std::uint32_t pnum, const Command& command) {
   pnum_ = pnum;
   address_ = i2c_first_address;
   out_size_ = in_size_ = 0;
-  answer_.data.size = 0;
+  found_.size = 0;
   if (single_ == Single::transfer) {
     address_ = static_cast<std::uint8_t>(command.value);
     parse_bytes(command.text, out_, sizeof out_, out_size_);
@@ -45,9 +45,11 @@ void UserI2c::drop_write() {
 }
 
 void UserI2c::drop_all() {
-  if (single_ == Single::none) return;
-  if (single_begun_ && slot_ == no_slot && stage_ == Stage::transfer) abandoned_ = true;
-  answer(I2cOutcome::cancelled);
+  const bool under_way = single_ != Single::none && single_begun_ && slot_ == no_slot;
+  if (under_way && stage_ == Stage::transfer) abandoned_ = true;
+  single_ = Single::none;
+  answer_ = I2cAnswer();
+  answered_ = false;
 }
 
 void UserI2c::poll(std::uint32_t now_ms) {
@@ -162,11 +164,14 @@ void UserI2c::end_reading(int slot, I2cOutcome outcome) {
 
 // A scan asks one address after the other; that nobody answers at one is no error, but its result.
 void UserI2c::end_scan_step(I2cOutcome outcome) {
-  DeviceBytes<i2c_max_bytes>& found = answer_.data;
   if (outcome == I2cOutcome::bus_stuck) return answer(outcome);
-  if (outcome == I2cOutcome::done) found.bytes[found.size++] = address_;
-  if (address_ == i2c_last_address || found.size == i2c_max_bytes) return answer(I2cOutcome::done);
-  ++address_;
+  if (outcome == I2cOutcome::done) found_.bytes[found_.size++] = address_;
+  if (address_ != i2c_last_address && found_.size != i2c_max_bytes) {
+    ++address_;
+    return;
+  }
+  answer_.data = found_;
+  answer(I2cOutcome::done);
 }
 
 void UserI2c::answer(I2cOutcome outcome) {
@@ -194,6 +199,9 @@ void UserI2c::recover(std::uint32_t now_ms) {
 
 void UserI2c::recover_step(std::uint32_t now_ms) {
   since_ms_ = now_ms;
+  // Nobody holds SDA: no more clocks, which a device that was being written to would take for bits of a byte.
+  const bool may_stop = half_clock_ % 2 == 0 && half_clock_ < half_clocks - 3;
+  if (may_stop && port_.sda_is_high()) half_clock_ = half_clocks - 3;
   if (half_clock_ < half_clocks - 3) {
     port_.drive(half_clock_ % 2 != 0, true);
   } else if (half_clock_ < half_clocks) {

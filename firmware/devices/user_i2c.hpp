@@ -6,7 +6,8 @@
 //     idle --------------------> transfer ----------------> idle
 //      ^                            | it was lost, or has not ended after transfer_limit_ms
 //      |  both lines are high       v
-//      +----------------------- recovering     nine clocks and a STOP, half a clock each millisecond
+//      +----------------------- recovering     up to nine clocks while SDA is low, and a STOP, half a clock
+//                                   |            each millisecond
 //      |                            | a line is low (UM10204 section 3.1.16)
 //      |       free_after_ms        v
 //      +- - - - - - - - - - - -   held         what is asked for fails at once
@@ -35,7 +36,7 @@ class UserI2c {
   void poll_slot(int slot, const I2cPoll& poll, std::uint32_t now_ms);
   // A write that has not begun is not made any more: the board is safe.
   void drop_write();
-  // Nor is anything else of the session before.
+  // A session begins: nothing of the one before is made any more, or told.
   void drop_all();
 
   // A turn of the loop.
@@ -103,6 +104,7 @@ class UserI2c {
   std::uint32_t pnum_ = 0;
   bool answered_ = false;
   I2cAnswer answer_;
+  DeviceBytes<i2c_max_bytes> found_;  // by a scan, so far
   I2cBusReport report_;
   Slot slots_[i2c_slots];
   I2cReading readings_[i2c_slots];

@@ -32,7 +32,7 @@ class UserUart {
   bool write(const std::uint8_t* bytes, std::size_t size) { return port_.send(bytes, size); }
   // The board is safe: what waits to be sent is not sent any more.
   void drop_writes() { port_.drop(); }
-  // A session begins: what came before is nobody's.
+  // A session begins, or resumes: what came before is nobody's, or old.
   void forget();
 
   // A turn of the loop: at most bytes_a_turn are taken.

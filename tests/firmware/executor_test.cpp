@@ -63,6 +63,7 @@ TEST(Executor, ClosingTheMotorSupplyMovesNothing) {
   carry_out(Command::dhb12(500, Direction::forward, 2), setpoints);
   carry_out(Command::bldc(500, Direction::forward, false, 3), setpoints);
   carry_out(Command::stepper(500, 20, 1), setpoints);
+  carry_out(Command::dac(3000, 1), setpoints);
   carry_out(Command::servo(1500, 1), setpoints);
   carry_out(Command::relay(2, true), setpoints);
   carry_out(Command::relay(1, true), setpoints);
@@ -72,6 +73,7 @@ TEST(Executor, ClosingTheMotorSupplyMovesNothing) {
   EXPECT_EQ(outputs.bldc[2].speed, 0);
   EXPECT_FALSE(outputs.bldc[2].brake) << "a brake is left as it is";
   EXPECT_FALSE(outputs.stepper[0].enabled);
+  EXPECT_EQ(outputs.dac_mv[0], 0) << "the throttle of a motor of its own, perhaps";
   EXPECT_EQ(outputs.servo_us[0], 1500) << "servos are not on that supply";
   EXPECT_EQ(outputs.relays, 0b11);
 

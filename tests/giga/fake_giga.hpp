@@ -40,6 +40,8 @@ class I2cPeripheral {
     hold_after_ = bytes;
     hold_clocks_ = clocks;
   }
+  // The chips do not acknowledge the byte behind so many more data bytes.
+  void refuse_after(int bytes) { refuse_after_ = bytes; }
   // Bytes put on the wire, addresses included: {address << 1 | read, bytes…} for each START.
   std::vector<std::vector<std::uint8_t>> log;
 
@@ -59,6 +61,7 @@ class I2cPeripheral {
   void after(Step step, std::uint64_t ns);
   void end_of_bytes();
   void refuse();
+  void shift();
   void count_byte();
 
   I2C_TypeDef* registers_ = nullptr;
@@ -70,11 +73,13 @@ class I2cPeripheral {
   std::uint32_t cr2_ = 0;
   std::uint32_t left_ = 0;
   std::uint32_t flags_ = 0;
+  std::optional<std::uint8_t> txdr_;  // behind the byte that is on the wire
   std::uint8_t out_ = 0;
   std::uint8_t in_ = 0;
   std::vector<sim::I2cChipModel*> taking_part_;
   int sda_held_ = 0;
   bool scl_held_ = false;
+  int refuse_after_ = -1;
   int hold_after_ = -1;
   int hold_clocks_ = 0;
 };
@@ -87,6 +92,8 @@ class UartPeripheral {
   void say(const std::string& bytes);
   // Bytes without end, one in four damaged.
   bool noise = false;
+  std::uint32_t said = 0;  // so far, to the board: undamaged, and damaged
+  std::uint32_t damaged = 0;
   std::string sent;
   std::uint64_t byte_ns() const;
 

@@ -32,6 +32,7 @@ void I2cPeripheral::connect(I2C_TypeDef& registers, std::vector<sim::I2cChipMode
     if ((value & 1U) != 0) return;
     step_ = Step::idle;
     flags_ = 0;
+    txdr_.reset();
     taking_part_.clear();
   };
   registers_->CR2.on_write = [this](std::uint32_t value) {
@@ -44,10 +45,10 @@ void I2cPeripheral::connect(I2C_TypeDef& registers, std::vector<sim::I2cChipMode
   };
   registers_->ICR.on_write = [this](std::uint32_t value) { flags_ &= ~value; };
   registers_->TXDR.on_write = [this](std::uint32_t value) {
-    if (step_ != Step::want_byte) return;
-    out_ = static_cast<std::uint8_t>(value);
+    if ((flags_ & txis) == 0) return;
+    txdr_ = static_cast<std::uint8_t>(value);
     flags_ &= ~txis;
-    after(Step::byte, byte_ns);
+    if (step_ == Step::want_byte) shift();
   };
   registers_->RXDR.on_read = [this] {
     flags_ &= ~rxne;
@@ -83,7 +84,17 @@ void I2cPeripheral::count_byte() {
   hold_after_ = -1;
 }
 
+// What waits in TXDR goes to the wire, and there is room for the next one (RM0399, chapter I2C, "Master transmitter"):
+// a byte that is refused leaves that one where it is, until the peripheral is off.
+void I2cPeripheral::shift() {
+  out_ = *txdr_;
+  txdr_.reset();
+  if (left_ > 1) flags_ |= txis;
+  after(Step::byte, byte_ns);
+}
+
 void I2cPeripheral::refuse() {
+  flags_ &= ~txis;
   flags_ |= nackf;
   after(Step::stop, stop_ns);
 }
@@ -116,6 +127,8 @@ void I2cPeripheral::progress() {
         end_of_bytes();
       } else if (reading) {
         after(Step::read, byte_ns);
+      } else if (txdr_) {
+        shift();
       } else {
         step_ = Step::want_byte;
         flags_ |= txis;
@@ -127,14 +140,16 @@ void I2cPeripheral::progress() {
       count_byte();
       bool acknowledged = false;
       for (sim::I2cChipModel* chip : taking_part_) acknowledged |= chip->write(out_);
+      if (refuse_after_ >= 0 && refuse_after_-- == 0) acknowledged = false;
       --left_;
       if (!acknowledged) {
         refuse();
       } else if (left_ == 0) {
         end_of_bytes();
+      } else if (txdr_) {
+        shift();
       } else {
         step_ = Step::want_byte;
-        flags_ |= txis;
       }
       return;
     }

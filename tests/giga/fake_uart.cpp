@@ -43,6 +43,13 @@ void UartPeripheral::connect(USART_TypeDef& registers) {
   };
   registers.ICR.on_write = [this](std::uint32_t value) {
     if ((value & 1U << 3) != 0) overrun_ = false;
+    // Of the byte that would be read next.
+    if ((value & 7U) != 0 && !received_.empty()) received_.front().damaged = false;
+  };
+  registers.RQR.on_write = [this](std::uint32_t value) {
+    pass();
+    // The first one is on the wire.
+    if ((value & 1U << 4) != 0 && to_send_.size() > 1) to_send_.resize(1);
   };
   registers.RDR.on_read = [this] {
     if (received_.empty()) return 0U;
@@ -72,6 +79,8 @@ void UartPeripheral::pass() {
                           ? Byte{static_cast<char>(chance_ >> 24), (chance_ >> 22 & 3U) == 0}
                           : Byte{to_say_.front(), false};
     if (!to_say_.empty()) to_say_.pop_front();
+    said += byte.damaged ? 0 : 1;
+    damaged += byte.damaged ? 1 : 0;
     if (received_.size() == fifo) {
       overrun_ = true;
     } else {

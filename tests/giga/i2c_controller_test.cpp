@@ -93,6 +93,25 @@ TEST(I2cController, RefusesWhatItCannotSendAtOnce) {
   EXPECT_TRUE(bus.chip.i2c.log.empty());
 }
 
+TEST(I2cController, TheByteBehindOneThatWasRefusedIsNotSentLater) {
+  for (int after = 0; after < 4; ++after) {
+    Bus bus;
+    bus.chip.i2c.refuse_after(after);
+    EXPECT_EQ(bus.write(0x40, {0x06, 1, 2, 3}), I2cResult::no_acknowledge) << after;
+    bus.chip.i2c.log.clear();
+    EXPECT_EQ(bus.write(0x70, {0xFD, 0x10}), I2cResult::ok) << after;
+    EXPECT_EQ(bus.chip.i2c.log, (std::vector<Bytes>{{0xE0, 0xFD, 0x10}})) << after;
+  }
+}
+
+TEST(I2cController, ARecoveryGivesAChipThatHoldsNothingNoBits) {
+  Bus bus;
+  const int before = bus.chip.rises(giga::i2c_scl_pin.port, giga::i2c_scl_pin.number);
+  EXPECT_TRUE(bus.bus.recover());
+  EXPECT_LE(bus.chip.rises(giga::i2c_scl_pin.port, giga::i2c_scl_pin.number) - before, 2)
+      << "the release, and STOP";
+}
+
 TEST(I2cController, WaitsForAHeldLineNoLongerThanItPromises) {
   Bus bus;
   bus.chip.i2c.hold_sda(9);

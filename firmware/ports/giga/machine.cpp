@@ -129,7 +129,11 @@ Machine::Machine()
       echo1_(echo_pins[0]),
       echo2_(echo_pins[1]),
       echo3_(echo_pins[2]),
-      echo4_(echo_pins[3]) {}
+      echo4_(echo_pins[3]) {
+  // Before the application, which begins with the readings that are kept as settings.
+  start_user_bus(user_bus_);
+  start_uarts(uart1_, uart2_);
+}
 
 firmware::BoardPins Machine::pins() {
   firmware::BoardPins pins{};
@@ -151,8 +155,6 @@ void Machine::add_devices(firmware::Application::Config& config) {
 }
 
 void Machine::start(firmware::Guard& guard) {
-  start_user_bus(user_bus_);
-  start_uarts(uart1_, uart2_);
   guard_ = &guard;
   step_duty_ = guard.add_duty(step_limit_ms);
   for (int i = 0; i < encoder_channels; ++i) {
@@ -183,8 +185,9 @@ void Machine::step_tick() {
   guard_->check_in(step_duty_);
   hardware_.step_tick();
   user_bus_.tick();
-  uart1_.tick();
-  uart2_.tick();
+  const bool sends = !guard_->tripped();
+  uart1_.tick(sends);
+  uart2_.tick(sends);
   for (int i = 0; i < encoder_channels; ++i) {
     hardware_.encoder(i + 1).index(encoders_[i]->index.read());
   }

@@ -63,7 +63,7 @@ class Machine final : public StepTick {
   struct PortsOn {
     PortsOn() {
       start_ports();
-      start_dac();
+      start_dac(dac_pins);
     }
   };
   struct OutputsOff {

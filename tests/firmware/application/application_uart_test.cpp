@@ -79,6 +79,22 @@ TEST_F(ApplicationUarts, EachByteIsToldOnceOrRepeatedAtItsPosition) {
   EXPECT_GT(next, 5000U);
 }
 
+TEST_F(ApplicationUarts, WhatCameWhileTheLinkWasLostIsNotToldAsNew) {
+  host.command("C:uart1,115200:8N1");
+  host.command("F:UART1");
+  pass(500);
+  const std::uint32_t before = newest_state().uart[0].position;
+  pass(5000, false);
+  board.take();
+  host.echo();
+  pass(100);
+  const auto heard = board.take(MessageKind::state);
+  ASSERT_FALSE(heard.empty());
+  const UartBytes first = state_of(heard.front()).uart[0];
+  EXPECT_GT(first.position, before + 448) << "a gap, as long as what nobody heard";
+  EXPECT_LT(first.data.size, 40) << "what came since";
+}
+
 TEST_F(ApplicationUarts, AWriteIsAnOutput) {
   devices.uarts[0].connect(UartPeer::loop);
   EXPECT_EQ(refused("X:UART,1,x41"), "CHANNEL") << "it is off";

@@ -117,7 +117,7 @@ I2cResult I2cController::send(const Transfer& transfer, std::uint8_t address,
     if ((status & isr_refused) != 0) {  // the peripheral sends STOP by itself
       if ((status & isr_stopped) != 0) return I2cResult::no_acknowledge;
     } else if ((status & end) != 0) {
-      return I2cResult::ok;
+      return sent == size ? I2cResult::ok : I2cResult::timeout;
     } else if ((status & isr_want_byte) != 0 && sent < size) {
       if (!put(transfer, bytes[sent])) return I2cResult::timeout;
       ++sent;
@@ -149,11 +149,12 @@ I2cResult I2cController::finish(const Transfer& transfer, I2cResult result) {
   under_way_ = false;
   if (transfer.recovery != recoveries_) return I2cResult::timeout;
   registers_.ICR = icr_all;
-  if (result == I2cResult::timeout) restart();
+  if (result != I2cResult::ok) restart();
   return result;
 }
 
-// Off and on: the lines are released and the state of the transfer is gone (software reset).
+// Off and on: the lines are released and the state of the transfer is gone (software reset). So is the byte that
+// waited in TXDR behind one that was refused, which the next transfer would send first.
 void I2cController::restart() {
   registers_.CR1 = 0;
   for (int i = 0; i < 3; ++i) {  // PE must be low for three clocks of the peripherals' bus
@@ -199,7 +200,8 @@ bool I2cController::release_scl() {
   return true;
 }
 
-// By the pins' own levels: the peripheral would not drive lines that it takes for busy.
+// By the pins' own levels: the peripheral would not drive lines that it takes for busy. SCL is clocked only as long as
+// somebody holds SDA (UM10204 3.1.16): a chip that was being written to would take a clock for a bit of a byte.
 bool I2cController::recover() {
   recoveries_ = recoveries_ + 1;
   registers_.CR1 = 0;
@@ -208,20 +210,20 @@ bool I2cController::recover() {
   set_mode(scl_, LineMode::output);
   set_mode(sda_, LineMode::output);
   bool released = release_scl();
-  for (int i = 0; released && i < recovery_clocks; ++i) {
+  bool stopped = false;
+  for (int clocks = 0; released && !stopped && clocks <= recovery_clocks; ++clocks) {
+    const bool held = !read(sda_);
     giga::write(scl_, false);
+    // STOP: SDA rises while SCL is high.
+    if (!held) giga::write(sda_, false);
     pause_us(half_clock_us);
     released = release_scl();
-  }
-  if (released) {  // STOP: SDA rises while SCL is high
-    giga::write(scl_, false);
-    giga::write(sda_, false);
-    pause_us(half_clock_us);
-    released = release_scl();
+    if (held) continue;
     giga::write(sda_, true);
     pause_us(half_clock_us);
+    stopped = read(sda_);  // a chip that was being read may have put a bit there
   }
-  const bool free = released && read(scl_) && read(sda_);
+  const bool free = stopped && released && read(scl_);
   set_mode(scl_, LineMode::alternate);
   set_mode(sda_, LineMode::alternate);
   registers_.CR1 = cr1_on;

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A channel of DAC1 by its registers (RM0399, chapter DAC), without its buffer, which does not reach 0 V. Its pin
-// is analog since the reset.
+// A channel of DAC1 by its registers (RM0399, chapter DAC), without its buffer, which does not reach 0 V.
 #pragma once
 
 #include <cstdint>
 
 #include "../../../drivers/pins.hpp"
 #include "../chip/chip.hpp"
+#include "../chip/gpio.hpp"
 #include "../chip/interrupt_lock.hpp"
 
 namespace r4 {
 namespace giga {
 
-// The clock of DAC1, and both channels at 0 V.
-inline void start_dac() {
+// The clock of DAC1, and both channels at 0 V, then at their pins.
+inline void start_dac(const Pin (&pins)[2]) {
   constexpr std::uint32_t rcc_dac_on = 1U << 29;
   constexpr std::uint32_t no_buffer = 2U | 2U << 16;  // of channels 1 and 2, to the pin
   constexpr std::uint32_t on = 1U | 1U << 16;
@@ -27,6 +27,10 @@ inline void start_dac() {
   DAC1->DHR12R1 = 0;
   DAC1->DHR12R2 = 0;
   DAC1->CR = on;
+  for (const Pin pin : pins) {
+    make_input(line_of(pin), LinePull::none);
+    set_mode(line_of(pin), LineMode::analog);
+  }
 }
 
 class DacOutput final : public firmware::AnalogOutputPin {

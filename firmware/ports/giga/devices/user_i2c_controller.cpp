@@ -84,7 +84,7 @@ void UserI2cController::send_step(std::uint32_t status) {
   if ((status & isr_want_byte) != 0 && done_ < transfer_.out_size) {
     registers_.TXDR = transfer_.out[done_++];
   } else if ((status & isr_stopped) != 0) {
-    end(Progress::done);
+    end(done_ == transfer_.out_size ? Progress::done : Progress::lost);
   } else if ((status & isr_complete) != 0) {
     request(Stage::receiving, transfer_.in_size, cr2_read | cr2_then_stop);
   }
@@ -100,6 +100,13 @@ void UserI2cController::receive_step(std::uint32_t status) {
 
 void UserI2cController::end(Progress result) {
   registers_.ICR = icr_all;
+  if (result != Progress::done) {
+    // Off and on: so a byte that waited in TXDR behind one that was refused is not the first of the next transfer. It
+    // must be off for three clocks of the peripherals' bus.
+    registers_.CR1 = 0;
+    for (int i = 0; i < 3; ++i) static_cast<void>(static_cast<std::uint32_t>(registers_.CR1));
+    registers_.CR1 = cr1_on;
+  }
   result_ = result;
   stage_ = Stage::idle;
 }

@@ -18,7 +18,8 @@ constexpr std::uint32_t damaged = 7;  // parity, framing, noise: of the byte in 
 constexpr std::uint32_t overrun = 1U << 3;
 constexpr std::uint32_t has_byte = 1U << 5;
 constexpr std::uint32_t has_room = 1U << 7;
-constexpr int bytes_in = 2;  // of one tick
+constexpr std::uint32_t rqr_empty_fifo = 1U << 4;  // TXFRQ: of what is to be sent
+constexpr int bytes_in = 2;                        // of one tick
 
 }  // namespace
 
@@ -69,17 +70,21 @@ void UserUartController::begin() {
   runs_ = true;
 }
 
-void UserUartController::move() {
+void UserUartController::move(bool sends) {
   std::uint32_t status = registers_.ISR;
   for (int i = 0; i < bytes_in && (status & has_byte) != 0; ++i) {
+    // Before the byte is read, for then the flags are those of the next one.
+    if ((status & damaged) != 0) registers_.ICR = damaged;
     const char byte = static_cast<char>(registers_.RDR & 0xFFU);
     if ((status & damaged) != 0 || !received_.put(byte)) lost_ = lost_ + 1;
     status = (status & overrun) | registers_.ISR;
   }
-  if ((status & overrun) != 0) lost_ = lost_ + 1;  // one at least
-  if ((status & (overrun | damaged)) != 0) registers_.ICR = overrun | damaged;
+  if ((status & overrun) != 0) {
+    lost_ = lost_ + 1;  // one at least
+    registers_.ICR = overrun;
+  }
   char next = 0;
-  if ((status & has_room) != 0 && waiting_.take(next)) {
+  if (sends && (status & has_room) != 0 && waiting_.take(next)) {
     registers_.TDR = static_cast<unsigned char>(next);
   }
 }
@@ -102,6 +107,7 @@ bool UserUartController::send(const std::uint8_t* bytes, std::size_t size) {
 void UserUartController::drop() {
   const InterruptLock lock;
   waiting_.cut(0);
+  if (runs_) registers_.RQR = rqr_empty_fifo;
 }
 
 }  // namespace giga

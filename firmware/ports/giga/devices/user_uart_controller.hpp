@@ -39,9 +39,9 @@ class UserUartController final : public firmware::UserUartPort {
 
   // `kernel_hz`: the peripheral's clock, which must be on.
   void start(std::uint32_t kernel_hz);
-  // In the interrupt of the step timer.
-  void tick() {
-    if (runs_) move();
+  // In the interrupt of the step timer. Nothing is sent while the board is safe and its loop has not seen to it yet.
+  void tick(bool sends) {
+    if (runs_) move(sends);
   }
 
   void set_up(const UartMode& mode) override;
@@ -52,7 +52,7 @@ class UserUartController final : public firmware::UserUartPort {
 
  private:
   void begin();
-  void move();
+  void move(bool sends);
 
   USART_TypeDef& registers_;
   const Line tx_;
