@@ -56,7 +56,8 @@ Wires::Answer Wires::on_identity(std::size_t index, const Identity& identity, st
   if (!wire.up || (!asked && wire.can_ask)) return Answer::nothing;
   const std::string_view id(identity.board_id.data(), identity.board_id.size());
   if (wire.board_id != id) wire.board_id = id;
-  if (!has_id_) {
+  // The first board that answers, until the session begins: while no other wire leads to it, it may have been a mistake.
+  if (!has_id_ || (!begun_ && (known() & ~wire_bit(index)) == 0)) {
     has_id_ = true;
     id_ = id;
   }

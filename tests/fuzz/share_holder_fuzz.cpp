@@ -47,7 +47,7 @@ class Holder final : private WireHolder::Owner {
     FileDescriptor& one = others_.empty() ? none : others_[input.byte() % others_.size()];
     switch (action % 8) {
       case 0:
-        if (others_.size() < most_connections) others_.push_back(reach_holder(wire));
+        if (others_.size() < most_connections) others_.push_back(reach_holder(wire).connection);
         break;
       case 1:
         say(one, Kind::hello, hello_text(BoardRole::watch, "other"));
@@ -111,7 +111,7 @@ class Holder final : private WireHolder::Owner {
   void on_given_away() override { require(given_away_ && !holder_.holds()); }
 
   static FileDescriptor come(Kind kind, std::string_view text) {
-    FileDescriptor connection = reach_holder(wire);
+    FileDescriptor connection = reach_holder(wire).connection;
     require(static_cast<bool>(connection));
     say(connection, kind, text);
     return connection;

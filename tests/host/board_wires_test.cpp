@@ -115,6 +115,25 @@ TEST(BoardWires, OneThatCannotBeOpenedYetIsTriedAgain) {
   std::filesystem::remove(link);
 }
 
+// As where a second device is plugged in that "serial:auto" cannot tell from the board: a fault in what is asked for.
+TEST(BoardWires, OneThatTurnsOutToBeNoSuchDeviceLeavesTheOthersAlone) {
+  const std::string link =
+      (std::filesystem::temp_directory_path() / ("r4-odd-" + std::to_string(getpid()))).string();
+  BoardInAThread simulated(std::vector<std::string>{"udp", "pty"});
+  std::atomic<bool> told{false};
+  BoardCallbacks callbacks;
+  callbacks.on_event = [&](const CarrierEvent& event) {
+    if (event.problem.kind == ErrorKind::usage) told = true;
+  };
+  Board board({simulated.urls()[0], "serial://" + link + "?baud=1234567"}, at_will(), callbacks);
+  board.wait_active();
+  std::filesystem::create_symlink(simulated.urls()[1].substr(9), link);
+  EXPECT_TRUE(comes_true([&] { return told.load(); }));
+  std::filesystem::remove(link);
+  board.osmc(1).set(100, Direction::forward);
+  EXPECT_EQ(board.link().carrying, 1);
+}
+
 // One end of a carrier in memory that can be cut, told or untold.
 class Cuttable final : public Carrier, private Carrier::Handler {
  public:

@@ -106,4 +106,10 @@ std::string problem_text(const Problem& problem) {
          part(problem.reason) + '\0' + part(problem.fix);
 }
 
+Priority priority_of(std::string_view datagram) {
+  const bool other = datagram.size() > 1 && datagram[1] == ':' &&
+                     (datagram[0] == 'H' || datagram[0] == 'N' || datagram[0] == 'I');
+  return other ? Priority::normal : Priority::state;
+}
+
 }  // namespace r4

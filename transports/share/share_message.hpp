@@ -22,6 +22,7 @@
 #include <string>
 #include <string_view>
 
+#include "r4link/carrier.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/error.hpp"
 #include "r4link/options.hpp"
@@ -63,5 +64,8 @@ std::optional<ShareMessage> read_share_message(std::string_view packet);
 std::string hello_text(BoardRole role, std::string_view name);
 std::string welcome_text(std::string_view name);
 std::string problem_text(const Problem& problem);
+
+// Of a datagram of the board: of states the newest matters most; heartbeats and answers are short and few.
+Priority priority_of(std::string_view datagram);
 
 }  // namespace r4

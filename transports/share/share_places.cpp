@@ -46,6 +46,10 @@ WireSharer::Joined SharePlaces::join(int place, BoardRole role, const std::strin
   if (wire_.name.empty() || is_passed_over(place)) return WireSharer::Joined::none;
   const SharedWire there = at_place(wire_, place);
   const auto joined = sharer_.join(there, role, program_invocation_short_name);
+  if (joined == WireSharer::Joined::hanging) {
+    one_hangs_ = true;
+    pass_over(place, WireSharer::silence_of_another(thing));
+  }
   if (joined == WireSharer::Joined::stranger) {
     stranger_ = sharer_.stranger(thing, there);
     passed_over_ |= 1U << place;
@@ -64,11 +68,11 @@ bool SharePlaces::join(const std::string& thing) {
 }
 
 // Those that hang come first: who watches has the wire until then.
-void SharePlaces::ask_for_wire(const std::string& thing) {
+void SharePlaces::ask_for_wire(const std::string& thing, std::chrono::milliseconds within) {
   for (int place = 0; place < share_places; ++place) {
     if (join(place, BoardRole::control, thing) != WireSharer::Joined::holder) continue;
     joined_ = place;
-    const std::optional<ShareMessage> answer = sharer_.wait_for_answer();
+    const std::optional<ShareMessage> answer = sharer_.wait_for_answer(within);
     if (!answer) {
       pass_over_hanging(thing);
     } else if (!answer->same_version) {
@@ -95,7 +99,7 @@ bool SharePlaces::hold() {
 bool SharePlaces::somebody_has_come() const {
   if (wire_.name.empty()) return false;
   for (int place = 0; place < share_places; ++place) {
-    if (!is_passed_over(place) && reach_holder(at_place(wire_, place))) return true;
+    if (!is_passed_over(place) && reach_holder(at_place(wire_, place)).connection) return true;
   }
   return false;
 }

@@ -7,6 +7,7 @@
 //     holder   hangs      B          -         B has come when A was gone: the first that is of use
 #pragma once
 
+#include <chrono>
 #include <optional>
 #include <utility>
 
@@ -36,8 +37,9 @@ class SharePlaces {
 
   // Joins the holder who came last, to watch. False if none is of use.
   bool join(const std::string& thing);
-  // Asks each holder to let go of the wire. Throws Error{refused} if one controls the board.
-  void ask_for_wire(const std::string& thing);
+  // Asks each holder to let go of the wire, and waits so long for its answer. Throws Error{refused} if one controls the
+  // board.
+  void ask_for_wire(const std::string& thing, std::chrono::milliseconds within);
   // Takes the first that is of use, or none if none is: then nobody shares what we open. False if another has it.
   bool hold();
 

@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <cstring>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace r4 {
@@ -74,14 +75,15 @@ FileDescriptor hold_wire(const SharedWire& wire) {
   return descriptor;
 }
 
-FileDescriptor reach_holder(const SharedWire& wire) {
+ReachedHolder reach_holder(const SharedWire& wire) {
   FileDescriptor descriptor = local_socket();
   const Address address = address_of(wire);
-  if (!descriptor || ::connect(descriptor.get(), reinterpret_cast<const sockaddr*>(&address.bytes),
-                               address.size) != 0) {
-    return {};
+  if (!descriptor) return {};
+  if (::connect(descriptor.get(), reinterpret_cast<const sockaddr*>(&address.bytes),
+                address.size) == 0) {
+    return {std::move(descriptor), false};
   }
-  return descriptor;
+  return {FileDescriptor(), would_block(errno)};
 }
 
 FileDescriptor accept_sharer(int holder, const SharedWire& wire) {

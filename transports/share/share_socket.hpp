@@ -33,10 +33,14 @@ SharedWire at_place(const SharedWire& wire, int place);
 FileDescriptor hold_wire(const SharedWire& wire);
 
 // A connection to its holder, or to a stranger who has taken that name: is_one_of_us() tells. None, if there is
-// none.
-FileDescriptor reach_holder(const SharedWire& wire);
+// none, and if so many wait for it already that it cannot be running.
+struct ReachedHolder {
+  FileDescriptor connection;
+  bool hangs = false;
+};
+ReachedHolder reach_holder(const SharedWire& wire);
 
-// The next one who has come to a holder, or none: strangers are turned away.
+// The next one who has come to a holder, or none, with errno: strangers are turned away.
 FileDescriptor accept_sharer(int holder, const SharedWire& wire);
 
 // Of a call on such a socket that does not wait.

@@ -22,6 +22,8 @@ using Kind = ShareMessage::Kind;
 using std::chrono::milliseconds;
 
 constexpr milliseconds answer_within{200};
+// Where a link may be under way by other wires, which must not wait.
+constexpr milliseconds answer_again_within{20};
 // A holder that says nothing for so long is asked whether it is alive, and has so long again to answer.
 constexpr milliseconds ask_after{400};
 constexpr milliseconds look_again{5};
@@ -30,13 +32,6 @@ constexpr milliseconds look_again_slowly{100};
 constexpr milliseconds take_over_within{100};
 // To others the wire is left for so long, when a program that controls is about to take it.
 constexpr milliseconds courtesy{20};
-
-// Of states the newest matters most; heartbeats and answers are short and few.
-Priority priority_of(std::string_view bytes) {
-  const bool other = bytes.size() > 1 && bytes[1] == ':' &&
-                     (bytes[0] == 'H' || bytes[0] == 'N' || bytes[0] == 'I');
-  return other ? Priority::normal : Priority::state;
-}
 
 class SharedCarrier final : public Carrier,
                             private Carrier::Handler,
@@ -117,6 +112,7 @@ class SharedCarrier final : public Carrier,
   State state_ = State::closed;
   bool up_ = false;
   bool moved_ = false;
+  bool tried_ = false;  // before: now a link may be under way
   // Of the holder whose wire we share.
   bool welcome_ = false;
   bool heard_ = false;  // since it was looked after
@@ -136,9 +132,11 @@ void SharedCarrier::open(Carrier::Handler& handler) {
     places_.begin();
     take_part();
   } catch (...) {
+    tried_ = true;
     close();
     throw;
   }
+  tried_ = true;
 }
 
 void SharedCarrier::close() noexcept {
@@ -158,14 +156,16 @@ void SharedCarrier::take_part() {
   const Clock::time_point deadline = Clock::now() + take_over_within + share_places * answer_within;
   do {
     if (try_to_take_part()) return;
-  } while (Clock::now() < deadline);
+  } while (!tried_ && Clock::now() < deadline);
   throw Error(ErrorKind::open, name_, "other programs take it, one after the other",
               "end those that control the board");
 }
 
 bool SharedCarrier::try_to_take_part() {
   if (role_ == BoardRole::watch && try_to_share()) return true;
-  if (role_ == BoardRole::control) places_.ask_for_wire(name_);
+  if (role_ == BoardRole::control) {
+    places_.ask_for_wire(name_, tried_ ? answer_again_within : answer_within);
+  }
   try {
     return try_to_hold();
   } catch (const Error& error) {

@@ -191,7 +191,12 @@ std::size_t WireHolder::count(Which which) const {
 }
 
 WireHolder::WireHolder(asio::io_context& io, Owner& owner, std::string program)
-    : io_(io), owner_(owner), program_(std::move(program)), listener_(io), cut_off_timer_(io) {}
+    : io_(io),
+      owner_(owner),
+      program_(std::move(program)),
+      listener_(io),
+      accept_timer_(io),
+      cut_off_timer_(io) {}
 
 WireHolder::~WireHolder() { release(); }
 
@@ -256,6 +261,11 @@ void WireHolder::accept() {
     if (count([](const Sharer& each) { return each.waits(); }) > most_waiting)
       longest_waiting()->cut_off();
     cut_off_in_time();
+  } else if (!would_block(errno)) {
+    // Who waits is still there, and would be told of at once.
+    accept_timer_.expires_after(accept_again);
+    accept_timer_.async_wait(accepting_.handler([this] { accept(); }));
+    return;
   }
   if (listener_.is_open()) listen();
 }

@@ -35,6 +35,8 @@ class WireHolder {
   static constexpr std::size_t most_waiting = 8;  // silent, or turned away
   static constexpr std::chrono::milliseconds patience{1000};
   static constexpr int most_messages = 100;  // in a second, of one
+  static constexpr std::chrono::milliseconds accept_again{
+      100};  // where the system has no descriptor left
 
   // Called on the loop's thread.
   class Owner {
@@ -98,6 +100,7 @@ class WireHolder {
   SharedWire wire_;
   LoopDescriptor listener_;
   OperationSlot accepting_;
+  LoopTimer accept_timer_;
   OperationSlot removing_;
   OperationSlot giving_away_;
   LoopTimer cut_off_timer_;

@@ -16,13 +16,14 @@ namespace r4 {
 namespace {
 
 constexpr int most_at_once = 64;
-constexpr int answer_within_ms = 200;
 
 }  // namespace
 
 WireSharer::Joined WireSharer::join(const SharedWire& wire, BoardRole role,
                                     std::string_view program) {
-  FileDescriptor connection = reach_holder(wire);
+  ReachedHolder reached = reach_holder(wire);
+  if (reached.hangs) return Joined::hanging;
+  FileDescriptor connection = std::move(reached.connection);
   if (!connection) return Joined::none;
   const ShareCredentials there = credentials_of(connection.get());
   if (!is_one_of_us(connection.get(), wire)) {
@@ -38,11 +39,11 @@ WireSharer::Joined WireSharer::join(const SharedWire& wire, BoardRole role,
   return Joined::holder;
 }
 
-std::optional<ShareMessage> WireSharer::wait_for_answer() {
+std::optional<ShareMessage> WireSharer::wait_for_answer(std::chrono::milliseconds within) {
   pollfd waiting{connection_.native_handle(), POLLIN, 0};
   int ready = 0;
   do {
-    ready = ::poll(&waiting, 1, answer_within_ms);
+    ready = ::poll(&waiting, 1, static_cast<int>(within.count()));
   } while (ready < 0 && errno == EINTR);
   if (ready <= 0) return std::nullopt;
   const ssize_t size = receive_packet(connection_.native_handle(), packet_.data(), packet_.size());
@@ -69,6 +70,11 @@ Problem WireSharer::silence(const std::string& thing) const {
   return {ErrorKind::open, thing,
           fmt::format("the program that holds it (pid {}) does not answer", holder_.pid),
           fmt::format("let it go on, if it was stopped (kill -CONT {0}), or end it", holder_.pid)};
+}
+
+Problem WireSharer::silence_of_another(const std::string& thing) {
+  return {ErrorKind::open, thing, "the program that holds it does not answer, and many wait for it",
+          "let it go on, if it was stopped (fg, or kill -CONT), or end it"};
 }
 
 Problem WireSharer::other_version(const std::string& thing) const {

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <asio/io_context.hpp>
+#include <chrono>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -35,18 +36,20 @@ class WireSharer {
   WireSharer(const WireSharer&) = delete;
   WireSharer& operator=(const WireSharer&) = delete;
 
-  enum class Joined { none, holder, stranger };
-  // Goes to the holder of that wire and says hello. A stranger is told nothing. Leaves another one only for this.
+  enum class Joined { none, holder, stranger, hanging };
+  // Goes to the holder of that wire and says hello. A stranger is told nothing, and one that hangs cannot be when many
+  // wait for it. Leaves another one only for this.
   Joined join(const SharedWire& wire, BoardRole role, std::string_view program);
-  // Waits for its first answer; blocks, for 200 ms at most. `moved` where it has ended. None if none comes. `text` is
+  // Waits for its first answer; blocks, for so long at most. `moved` where it has ended. None if none comes. `text` is
   // valid until the next message.
-  std::optional<ShareMessage> wait_for_answer();
+  std::optional<ShareMessage> wait_for_answer(std::chrono::milliseconds within);
   // The process that holds the wire.
   pid_t holder_pid() const { return holder_.pid; }
   // "r4 (pid 123)": the holder.
   std::string holder(std::string_view program) const;
   // It does not answer, or not as we do, or ends what we begin, or is a stranger: what to say of it.
   Problem silence(const std::string& thing) const;
+  static Problem silence_of_another(const std::string& thing);  // whose process we do not know
   Problem other_version(const std::string& thing) const;
   Problem turned_away(const std::string& thing) const;
   Problem stranger(const std::string& thing, const SharedWire& wire) const;  // the last one

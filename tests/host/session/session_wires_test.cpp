@@ -256,6 +256,19 @@ TEST(SessionWires, ToTwoBoardsAreRefused) {
   EXPECT_TRUE(robot.session->in_control(robot.now()));
 }
 
+TEST(SessionWires, TakeTheBoardToWhichAllOfThemLeadWhicheverAnsweredFirst) {
+  WiredRobot robot(Cables{{1}, {1, 1}});
+  robot.connect();
+  ASSERT_EQ(robot.session->wire_state(1), WireState::other_board);
+  robot.plug(0, false);
+  robot.cables[0].board = 1;  // that was the wrong one
+  robot.plug(0, true);
+  robot.run(1000);
+  EXPECT_FALSE(robot.session->link().two_boards);
+  EXPECT_TRUE(robot.session->in_control(robot.now()));
+  EXPECT_EQ(robot.session->wire(0, robot.now()).board_id, "board-1");
+}
+
 TEST(SessionWires, GoOnWhenOneIsPluggedIntoAnotherBoard) {
   WiredRobot robot(Cables{{1}, {1}, {1, 1}});
   robot.plug(0, true);

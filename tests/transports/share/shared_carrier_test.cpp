@@ -30,7 +30,7 @@ TEST_F(SharedCarrier, WhoComesFirstHasTheWire) {
   EXPECT_TRUE(run_until(io, [&] { return only->has("answer"); }));
   only->carrier->close();
   EXPECT_EQ(device.open, nullptr);
-  EXPECT_FALSE(reach_holder({wire}));
+  EXPECT_FALSE(reach_holder({wire}).connection);
 }
 
 TEST_F(SharedCarrier, ThoseThatWatchHearBothDirections) {
@@ -58,7 +58,7 @@ TEST_F(SharedCarrier, ThoseThatWatchHearBothDirections) {
 // Whoever drives is kept waiting by nobody that watches.
 TEST_F(SharedCarrier, WhoHoldsTheWireHasWhatComesAndSendsWhatGoesBeforeOthersAreTold) {
   const auto driver = opened(BoardRole::control);
-  const FileDescriptor watcher = reach_holder({wire});
+  const FileDescriptor watcher = reach_holder({wire}).connection;
   send_message(watcher.get(), ShareMessage::Kind::hello, hello_text(BoardRole::watch, "watcher"));
   std::array<char, ShareMessage::max_size> packet;
   const auto hear = [&] { return receive_packet(watcher.get(), packet.data(), packet.size()) > 0; };
@@ -379,15 +379,32 @@ TEST_F(SharedCarrier, HoldersThatHangHaveFourPlacesWhichAreUsedAgain) {
   };
   for (int place = 0; place < share_places; ++place) {
     hanging.push_back(hangs_in(loops[static_cast<std::size_t>(place)]));
-    EXPECT_TRUE(reach_holder(at_place({wire}, place))) << place;
+    EXPECT_TRUE(reach_holder(at_place({wire}, place)).connection) << place;
   }
   hanging[0]->carrier->close();
   hanging.push_back(hangs_in(loops.back()));
-  EXPECT_TRUE(reach_holder({wire}));
+  EXPECT_TRUE(reach_holder({wire}).connection);
   const auto alone = opened(BoardRole::watch);
   EXPECT_FALSE(alone->carrier->is_shared());
   EXPECT_EQ(device.opened, share_places + 2);
-  EXPECT_FALSE(reach_holder(at_place({wire}, share_places)));
+  EXPECT_FALSE(reach_holder(at_place({wire}, share_places)).connection);
+}
+
+// Those that came while it hung, and have gone, still wait in its queue.
+TEST_F(SharedCarrier, AHolderWhoseQueueIsFullIsPassedOver) {
+  device.exclusive = false;
+  asio::io_context loop;
+  auto hanging = program(BoardRole::watch, loop);
+  hanging->carrier->open(hanging->heard);
+  ASSERT_TRUE(run_until(loop, [&] { return hanging->carrier->up(); }));
+  int came = 0;
+  while (reach_holder({wire}).connection && came < 1000) ++came;
+  EXPECT_TRUE(reach_holder({wire}).hangs);
+  for (const BoardRole role : {BoardRole::watch, BoardRole::control}) {
+    const auto late = opened(role);
+    EXPECT_TRUE(in_time([&] { return late->carrier->up(); }));
+    late->carrier->close();
+  }
 }
 
 TEST_F(SharedCarrier, LooksAgainSlowlyWhereTheHolderEndsWhatItBegins) {
@@ -419,7 +436,7 @@ TEST_F(SharedCarrier, MayBeClosedByWhoHearsAStopOfAnother) {
 
 TEST_F(SharedCarrier, IsNotForOtherUsers) {
   const auto holder = opened(BoardRole::control);
-  const int result = run_unprivileged([&] { return reach_holder({wire}) ? 1 : 0; });
+  const int result = run_unprivileged([&] { return reach_holder({wire}).connection ? 1 : 0; });
   EXPECT_EQ(result, 0);
 }
 
@@ -429,7 +446,7 @@ TEST_F(SharedCarrier, IsForTheMembersOfTheGroupThatTheHolderNames) {
   const auto stop_it = [&](const ShareGroup& of) {
     return run_unprivileged([&] {
       const SharedWire shared{wire, of};
-      const FileDescriptor connection = reach_holder(shared);
+      const FileDescriptor connection = reach_holder(shared).connection;
       if (!connection || !is_one_of_us(connection.get(), shared)) return 1;
       return send_message(connection.get(), ShareMessage::Kind::stop, stop);
     });

@@ -26,7 +26,7 @@ class HeldWire : public SharedWireTest {
  protected:
   // A connection of no carrier: what a forger has.
   FileDescriptor raw() {
-    FileDescriptor connection = reach_holder({wire});
+    FileDescriptor connection = reach_holder({wire}).connection;
     EXPECT_TRUE(connection);
     return connection;
   }

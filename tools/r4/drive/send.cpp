@@ -148,6 +148,7 @@ class Sender {
     send_next();
     io_.run();
     require_one_board(board_);
+    tell_wires_down(board_.wires(), options_.json);
     say_farewell(io_, board_);
     if (failure_) throw Error(*failure_);
     return 0;

@@ -86,6 +86,7 @@ int stop(const StopOptions& options) {
   const LinkStatus link = board->link();
   const std::vector<Wire> wires = board->wires();
   board->close();
+  tell_wires_down(wires, options.json);
   if (!result || result->outcome != Outcome::confirmed) {
     Problem problem = explain(fmt::format("E:STOP to {}", board->name()), link);
     problem.reason = fmt::format("the board did not confirm the stop within {} ms: {}",

@@ -2,6 +2,9 @@
 // What commands tell of boards to which several wires lead.
 #pragma once
 
+#include <fmt/core.h>
+
+#include <cstdio>
 #include <vector>
 
 #include "json.hpp"
@@ -44,6 +47,20 @@ inline Json wires_json(const AsyncBoard& board) {
   Json all = Json::array();
   for (const Wire& wire : wires) all.push_back(wire_json(wire));
   return all;
+}
+
+// Of several: those that are not there, of which a command that was carried by another one would say nothing.
+inline void tell_wires_down(const std::vector<Wire>& wires, bool json) {
+  for (const Wire& wire : wires) {
+    if (wires.size() < 2 || wire.state != WireState::down) continue;
+    if (json) {
+      Json line = wire_json(wire);
+      line["type"] = "wire";
+      print_line(line);
+    } else {
+      fmt::print(stderr, "r4: {} is down, so that nothing went by it\n", wire.name);
+    }
+  }
 }
 
 }  // namespace r4::tool

@@ -117,7 +117,12 @@ class Monitor {
       if (++states_ == options_.count) io_.stop();
     });
     board_.on_board_heartbeat([this](const Datagram& d) { view_->on_heartbeat(d); });
-    board_.on_nack([this](const Nack& nack, const Datagram& d) { view_->on_nack(nack, d); });
+    board_.on_nack([this](const Nack& nack, const Datagram& d) {
+      // A wire that is about to join is answered so, while another one carries.
+      const LinkStatus link = board_.link();
+      if (nack.code == Refusal::busy && link.carrying != 0 && !link.busy) return;
+      view_->on_nack(nack, d);
+    });
     board_.on_bad_datagram([this](const ReadResult& result, std::string_view bytes) {
       view_->on_bad_datagram(result, bytes);
     });
