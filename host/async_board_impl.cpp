@@ -165,14 +165,15 @@ void AsyncBoard::Impl::open() {
   if (!all) open_again();
 }
 
-// One of several that cannot be opened yet is tried again. `problem`: the first of all.
+// One of several that cannot be opened yet is tried again. `problem`: the first of all. Once the board is open nothing
+// that is wrong with one wire, a device of another kind in its place for example, touches the others.
 bool AsyncBoard::Impl::open_wire(BoardWire& wire, std::optional<Problem>& problem) {
   try {
     wire.carrier->open(wire);
     wire.opened = true;
     return true;
   } catch (const Error& error) {
-    if (!several() || error.kind() == ErrorKind::usage) {
+    if (phase == Phase::made && (!several() || error.kind() == ErrorKind::usage)) {
       for (const auto& each : wires) each->carrier->close();
       throw;
     }

@@ -22,6 +22,7 @@ constexpr std::size_t longest_name = 32;
 constexpr std::size_t longest_unit = 16;
 constexpr std::size_t most_addresses = 16;
 constexpr int longest_wait_ms = 5000;
+constexpr double largest_factor = 1e30;  // and the inverse of the smallest: within those of a float
 
 std::string_view trimmed(std::string_view line) {
   constexpr std::string_view blanks = " \t\r";
@@ -108,6 +109,7 @@ void DescriptionParser::take_name(const Words& words) {
 }
 
 void DescriptionParser::take_title(std::string_view title) {
+  if (!result_.title.empty()) fail("it has a title already", "one does");
   if (title.empty() || !is_printable(title)) {
     fail("the title is empty, or no plain text", "write what the device is: title TEXT");
   }
@@ -116,6 +118,7 @@ void DescriptionParser::take_title(std::string_view title) {
 
 void DescriptionParser::take_role(const Words& words) {
   require_words(words, 2, 2, "role imu");
+  if (result_.role != DeviceRole::none) fail("it has a role already", "one does");
   for (const DeviceRole role :
        {DeviceRole::imu, DeviceRole::power, DeviceRole::range, DeviceRole::angle}) {
     if (words[1] == to_text(role)) {
@@ -179,7 +182,7 @@ void DescriptionParser::take_poll(const Words& words) {
 }
 
 void DescriptionParser::take_value(const Words& words) {
-  require_words(words, 5, 18, "value NAME POLL BYTE TYPE, and what follows");
+  require_words(words, 5, 20, "value NAME POLL BYTE TYPE, and what follows");
   require_room(result_.values.size(), DeviceDescription::max_lines, "values");
   DeviceValue value;
   value.name = name_of(words[1]);
@@ -208,7 +211,7 @@ void DescriptionParser::take_options(const Words& words, std::size_t first, Devi
     const std::string_view what = words[i];
     if (std::count(seen.begin(), seen.end(), what) != 0) fail("a word is there twice", "once does");
     seen.push_back(what);
-    const std::size_t needs = what == "range" ? 2 : 1;
+    const std::size_t needs = what == "range" || what == "only" ? 2 : 1;
     if (i + needs >= words.size()) fail("something is missing at its end", "say how much it is");
     const std::string_view word = words[i + 1];
     if (what == "bits") {
@@ -232,8 +235,13 @@ void DescriptionParser::take_options(const Words& words, std::size_t first, Devi
       value.minimum = factor(word, "the range");
       value.maximum = factor(words[i + 2], "the range");
       if (value.minimum >= value.maximum) fail("the range is empty", "write range MIN MAX");
+    } else if (what == "only") {
+      const auto other = result_.find(word);
+      if (!other) fail("no value above has that name", "name one, or put this one below it");
+      value.only = {*other, factor(words[i + 2], "what that value is to be")};
     } else {
-      fail("a word of the value is not known", "they are bits, scale, offset, unit and range");
+      fail("a word of the value is not known",
+           "they are bits, scale, offset, unit, range and only");
     }
     i += 1 + needs;
   }
@@ -305,8 +313,11 @@ int DescriptionParser::number(std::string_view word, int least, int most, const 
   std::uint32_t value = 0;
   const bool read = word.starts_with("0x") ? parse_hex(Text(word.substr(2)), value)
                                            : parse_number(Text(word), value);
-  if (!read || value < static_cast<std::uint32_t>(least) ||
-      value > static_cast<std::uint32_t>(most)) {
+  if (!read) {
+    fail(fmt::format("{} is no number", what),
+         fmt::format("write {} to {}, or in hexadecimal 0x{:x}", least, most, most));
+  }
+  if (value < static_cast<std::uint32_t>(least) || value > static_cast<std::uint32_t>(most)) {
     fail(fmt::format("{} is out of range", what), fmt::format("it is {} to {}", least, most));
   }
   return static_cast<int>(value);
@@ -324,9 +335,14 @@ double DescriptionParser::factor(std::string_view word, const char* what) {
     const bool is_pi = each == "pi";
     if (is_pi) value = std::numbers::pi;
     const bool right = is_pi || (read.ec == std::errc() && read.ptr == each.data() + each.size());
-    result = joined == '*' ? result * value : result / value;
-    if (!right || !std::isfinite(result)) {
+    if (!right || !std::isfinite(value) || (joined == '/' && value == 0)) {
       fail(fmt::format("{} is no number", what), "write it as 0.01, 9.80665/16384 or pi/180");
+    }
+    result = joined == '*' ? result * value : result / value;
+    const double size = std::abs(result);
+    if (size > largest_factor || (size < 1 / largest_factor && result != 0)) {
+      fail(fmt::format("{} is out of range", what),
+           "it is up to 1e30, and no nearer to 0 than 1e-30");
     }
     more = end < word.size();
     if (more) joined = word[end];

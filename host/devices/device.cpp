@@ -43,13 +43,19 @@ StateField Device::field(std::size_t value) const {
   return static_cast<StateField>(static_cast<int>(StateField::i2c1) + slot - 1);
 }
 
+bool Device::counts(const State& state, std::size_t value) const {
+  const auto& only = description_.values[value].only;
+  return !only || reading(state, only->value).number == only->number;
+}
+
 DeviceReading Device::reading(const State& state, std::size_t value) const {
   const DeviceValue& each = description_.values[value];
   const I2cReading& read = state.i2c[static_cast<std::size_t>(first_slot_ - 1) + each.poll];
   // Another length is somebody else's reading in that slot.
   const bool whole = read.data.size == description_.polls[each.poll].count;
-  return {whole ? each.decode(read.data.bytes, read.data.size) : std::nullopt, read.t_ms,
-          read.errors};
+  return {
+      whole && counts(state, value) ? each.decode(read.data.bytes, read.data.size) : std::nullopt,
+      read.t_ms, read.errors};
 }
 
 DeviceReading Device::reading(const State& state, std::string_view value) const {

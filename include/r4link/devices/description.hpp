@@ -68,8 +68,15 @@ struct R4LINK_API DeviceValue {
   // What is beyond these is no measurement: a sensor says so that it has none.
   double minimum = -std::numeric_limits<double>::infinity();
   double maximum = std::numeric_limits<double>::infinity();
+  // It is none either where another value of the device, above it, is not this number.
+  struct Only {
+    std::size_t value = 0;  // in DeviceDescription::values
+    double number = 0;
+  };
+  std::optional<Only> only;
 
-  // Of the bytes of its poll. Nothing if there are too few, or if it is no measurement.
+  // Of the bytes of its poll. Nothing if there are too few, or if it is beyond its range; `only` is not looked at, see
+  // Device::reading().
   std::optional<double> decode(const std::uint8_t* bytes, std::size_t count) const;
 };
 

@@ -56,6 +56,8 @@ class R4LINK_API Device {
 
   // That brings a value; the value's place is that in description().values.
   StateField field(std::size_t value) const;
+  // Does the device itself say that the value is a measurement (DeviceValue::only)?
+  bool counts(const State& state, std::size_t value) const;
   DeviceReading reading(const State& state, std::size_t value) const;
   // Throws Error{usage} if it has no value of that name.
   DeviceReading reading(const State& state, std::string_view value) const;

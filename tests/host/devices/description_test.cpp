@@ -67,6 +67,35 @@ TEST(DeviceDescription, DecodesEachKindOfNumber) {
   EXPECT_FALSE(decode(2, {0, 0, 0, 0, 0}).has_value()) << "its byte is missing";
 }
 
+TEST(Device, AValueThatTheDeviceDoesNotCountIsNoMeasurement) {
+  const Device lidar(DeviceDescription::load("vl53l0x"), 0x29);
+  State state;
+  I2cReading& read = state.i2c[0];
+  read.data.size = 12;
+  read.data.bytes[10] = 0x01;  // 300 mm
+  read.data.bytes[11] = 0x2C;
+  const std::size_t distance = lidar.description().find("distance").value();
+  read.data.bytes[0] = 11 << 3;  // the range is valid
+  EXPECT_TRUE(lidar.counts(state, distance));
+  EXPECT_DOUBLE_EQ(lidar.reading(state, distance).number.value(), 0.3);
+  read.data.bytes[0] = 2 << 3;
+  EXPECT_FALSE(lidar.counts(state, distance));
+  EXPECT_FALSE(lidar.reading(state, distance).number);
+  EXPECT_EQ(lidar.reading(state, "status").number, 2);
+}
+
+TEST(Device, WithoutItsMagnetAnEncoderHasNoAngle) {
+  const Device encoder(DeviceDescription::load("as5600"), 0x36);
+  State state;
+  state.i2c[0].data.size = 2;
+  EXPECT_FALSE(encoder.reading(state, "angle").number) << "its status was not read yet";
+  state.i2c[1].data.size = 1;
+  state.i2c[1].data.bytes[0] = 0x20;
+  EXPECT_EQ(encoder.reading(state, "angle").number, 0);
+  state.i2c[1].data.bytes[0] = 0x10;
+  EXPECT_FALSE(encoder.reading(state, "angle").number);
+}
+
 TEST(DeviceDescription, TakesNumbersOfEveryWidthAndOrder) {
   struct Case {
     const char* type;
@@ -116,7 +145,10 @@ TEST(DeviceDescription, SaysWhatIsWrongAndInWhichLine) {
            Case{"device a\naddress 7\n", "mine.device, line 2: an address is out of range"},
            Case{"device a\naddress 0x78\n", "mine.device, line 2: an address is out of range"},
            Case{"device a\naddress 9 9\n", "mine.device, line 2: an address is there twice"},
+           Case{"device a\naddress x28\n", "mine.device, line 2: an address is no number"},
            Case{"device a\nrole car\n", "mine.device, line 2: there is no such role"},
+           Case{"device a\nrole imu\nrole imu\n", "mine.device, line 3: it has a role already"},
+           Case{"device a\ntitle b\ntitle c\n", "mine.device, line 3: it has a title already"},
            Case{head + "check x000000 x00\n", "mine.device, line 4: a register has 3 bytes"},
            Case{head + "check x00 x\n", "mine.device, line 4: what is expected has 0 bytes"},
            Case{head + "check x00 x0\n",
@@ -144,10 +176,20 @@ TEST(DeviceDescription, SaysWhatIsWrongAndInWhichLine) {
            Case{head + "value v p 0 u8 bits 5..3\n",
                 "mine.device, line 4: the highest bit is out of range"},
            Case{head + "value v p 0 u8 bits 5\n",
-                "mine.device, line 4: the highest bit is out of range"},
+                "mine.device, line 4: the highest bit is no number"},
            Case{head + "value v p 0 u8 scale 0\n", "mine.device, line 4: the scale is 0"},
            Case{head + "value v p 0 u8 scale 1/0\n", "mine.device, line 4: the scale is no number"},
            Case{head + "value v p 0 u8 scale nan\n", "mine.device, line 4: the scale is no number"},
+           Case{head + "value v p 0 u8 offset 1/inf\n",
+                "mine.device, line 4: the offset is no number"},
+           Case{head + "value v p 0 u8 scale 1e-31\n",
+                "mine.device, line 4: the scale is out of range"},
+           Case{head + "value v p 0 u8 range 0 1e300\n",
+                "mine.device, line 4: the range is out of range"},
+           Case{head + "value v p 0 u8 only w 1\nvalue w p 0 u8\n",
+                "mine.device, line 4: no value above has that name"},
+           Case{head + "value w p 0 u8\nvalue v p 0 u8 only w\n",
+                "mine.device, line 5: something is missing at its end"},
            Case{head + "value v p 0 u8 scale\n",
                 "mine.device, line 4: something is missing at its end"},
            Case{head + "value v p 0 u8 unit a,b\n", "mine.device, line 4: that is no unit"},

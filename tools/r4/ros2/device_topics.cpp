@@ -155,12 +155,16 @@ void DeviceTopics::publish_range(const Topic& topic, const State& state, TimeMes
   message.radiation_type = infrared;
   message.min_range = static_cast<float>(distance.minimum);
   message.max_range = static_cast<float>(distance.maximum);
-  // REP 117: what is too near is -Inf, nothing within reach +Inf.
+  // REP 117: what is too near is -Inf, nothing within reach +Inf, what the device itself does not count NaN.
   constexpr float infinity = std::numeric_limits<float>::infinity();
   const double measured = any_number_of(topic.device, state, topic.value).value();
-  message.range = measured < distance.minimum   ? -infinity
-                  : measured > distance.maximum ? infinity
-                                                : static_cast<float>(measured);
+  if (measured > distance.maximum) {
+    message.range = infinity;
+  } else if (!topic.device.counts(state, topic.value)) {
+    message.range = std::numeric_limits<float>::quiet_NaN();
+  } else {
+    message.range = measured < distance.minimum ? -infinity : static_cast<float>(measured);
+  }
   (void)dds_write(topic.writer, &message);
 }
 

@@ -62,7 +62,8 @@ std::uint8_t As5600Model::read_register(std::uint8_t at) {
     case as_angle + 1:
       return byte_of(output(), at - as_angle);
     case as_agc:
-      return magnet_ == Magnet::too_strong ? 0 : magnet_ == Magnet::right ? 0x80 : 0xFF;
+      // At 3.3 V it ends at 128.
+      return magnet_ == Magnet::too_strong ? 0 : magnet_ == Magnet::right ? 0x40 : 0x80;
     case as_magnitude:
     case as_magnitude + 1:
       return byte_of(there ? as_field : 0, at - as_magnitude);

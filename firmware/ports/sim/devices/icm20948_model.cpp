@@ -9,6 +9,7 @@ namespace {
 // Bank 0
 constexpr int icm_who_am_i = 0x00;
 constexpr int icm_user_ctrl = 0x03;
+constexpr int icm_lp_config = 0x05;
 constexpr int icm_pwr_mgmt_1 = 0x06;
 constexpr int icm_pwr_mgmt_2 = 0x07;
 constexpr int icm_int_pin_cfg = 0x0F;
@@ -28,8 +29,8 @@ constexpr std::uint8_t icm_reset = 0x80;
 
 bool icm_is_writable(int bank, int at) {
   if (bank == 2) return at <= icm_last_of_bank_2;
-  return bank == 0 && (at == icm_user_ctrl || at == icm_pwr_mgmt_1 || at == icm_pwr_mgmt_2 ||
-                       (at >= icm_int_pin_cfg && at <= icm_int_enable_3));
+  return bank == 0 && (at == icm_user_ctrl || at == icm_lp_config || at == icm_pwr_mgmt_1 ||
+                       at == icm_pwr_mgmt_2 || (at >= icm_int_pin_cfg && at <= icm_int_enable_3));
 }
 
 }  // namespace
@@ -40,6 +41,7 @@ void Icm20948Model::power_on() {
   }
   bank_ = 0;
   registers_[0][icm_who_am_i] = 0xEA;
+  registers_[0][icm_lp_config] = 0x40;
   registers_[0][icm_pwr_mgmt_1] = icm_asleep | 1;
   registers_[2][icm_gyro_config_1] = 1;
   registers_[2][icm_accel_config] = 1;

@@ -56,7 +56,11 @@ std::uint8_t Ina219Model::read() {
 std::uint16_t Ina219Model::value_of(std::uint8_t at) const {
   constexpr std::int32_t shunt_lsb_uv = 10;
   constexpr std::int32_t bus_lsb_mv = 4;
-  const std::int32_t shunt_value = shunt_uv_ / shunt_lsb_uv;
+  constexpr std::int32_t shunt_end = 32000;  // 320 mV, of the power-on configuration
+  const std::int32_t shunt_read = shunt_uv_ / shunt_lsb_uv;
+  const std::int32_t shunt_value = shunt_read > shunt_end    ? shunt_end
+                                   : shunt_read < -shunt_end ? -shunt_end
+                                                             : shunt_read;
   const std::int32_t bus_value = bus_mv_ / bus_lsb_mv;
   const std::int32_t current_value = shunt_value * calibration_ / 4096;
   switch (at) {

@@ -20,7 +20,7 @@ constexpr int vl_signal_rate = 6;   // 128ths of a million counts a second
 constexpr int vl_ambient_rate = 8;  // the same
 constexpr int vl_range_mm = 10;
 constexpr int vl_range_valid = 11;
-constexpr int vl_phase_fail = 4;
+constexpr int vl_no_target = 4;
 
 }  // namespace
 
@@ -40,7 +40,7 @@ void Vl53l0xModel::latch() {
   ranged_ns_ += (now_ns() - ranged_ns_) / vl_range_ns * vl_range_ns;
   if (start_ == vl_single) start_ = 0;  // it clears itself
   const bool seen = mm_ < no_target;
-  result_[0] = static_cast<std::uint8_t>((seen ? vl_range_valid : vl_phase_fail) << 3);
+  result_[0] = static_cast<std::uint8_t>((seen ? vl_range_valid : vl_no_target) << 3);
   put(vl_spads, 20 * 256);
   put(vl_signal_rate, seen ? 10 * 128 : 0);
   put(vl_ambient_rate, 64);

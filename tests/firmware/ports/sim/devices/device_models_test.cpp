@@ -64,6 +64,8 @@ TEST_F(UserDeviceModels, Ina219ConvertsByItsCalibration) {
   EXPECT_EQ(read(0x40, {0x03}, 2), (Bytes{0x17, 0x66}));
   write(0x40, {0x00, 0x80, 0x00});
   EXPECT_EQ(read(0x40, {0x05}, 2), (Bytes{0x00, 0x00}));
+  devices.ina219.measure(11980, -500000);
+  EXPECT_EQ(read(0x40, {0x01}, 2), (Bytes{0x83, 0x00})) << "it ends at 320 mV";
 }
 
 TEST_F(UserDeviceModels, ATransferTakesItsTimeOnTheWire) {
