@@ -285,6 +285,24 @@ void AsyncBoard::Impl::tell_wires(const LinkStatus& status) {
 void AsyncBoard::record(Recording& recording) { impl_->record(recording.recorder_); }
 void AsyncBoard::describe(const Device& device) { impl_->describe(device); }
 
+void AsyncBoard::Impl::describe(const Device& device) {
+  const auto known = std::find_if(devices.begin(), devices.end(), [&](const Device& each) {
+    return each.place() == device.place();
+  });
+  if (known == devices.end()) {
+    devices.push_back(device);
+  } else if (known->description().text != device.description().text) {
+    *known = device;
+  } else {
+    return;
+  }
+  describe_in_recording(device);
+}
+
+void AsyncBoard::Impl::describe_in_recording(const Device& device) {
+  for (const auto& wire : wires) wire->tap.on_device(device);
+}
+
 Subscription AsyncBoard::on_state(
     std::function<void(const ReceivedState&, const Datagram&)> callback) {
   return impl_->state_callbacks.add(std::move(callback));

@@ -91,18 +91,29 @@ void AsyncBoard::Impl::settle() {
   if (has_link()) arm();
 }
 
+bool AsyncBoard::Impl::has_come(const Waiter& waiter) const {
+  const LinkStatus& link = session.link();
+  switch (waiter.what) {
+    case Waiter::For::active:
+      return session.board_role() == BoardRole::watch
+                 ? is_heard(link.state)
+                 : link.state == HostLinkState::active && link.in_control;
+    case Waiter::For::answer:
+      return session.state().i2c_answer.pnum == waiter.pnum;
+    case Waiter::For::time:
+      return now >= waiter.deadline;
+  }
+  return false;
+}
+
 // Ends the waits that are over; false if none is.
 bool AsyncBoard::Impl::end_waits() {
-  const LinkStatus& link = session.link();
-  const bool active = session.board_role() == BoardRole::watch
-                          ? is_heard(link.state)
-                          : link.state == HostLinkState::active && link.in_control;
   bool any = false;
   for (std::size_t i = 0; i < waiters.size();) {
     Waiter& waiter = waiters[i];
-    const Outcome outcome = !is_open() ? Outcome::closed
-                            : active   ? Outcome::confirmed
-                                       : Outcome::timed_out;
+    const Outcome outcome = !is_open()         ? Outcome::closed
+                            : has_come(waiter) ? Outcome::confirmed
+                                               : Outcome::timed_out;
     if (outcome == Outcome::timed_out && now < waiter.deadline) {
       ++i;
       continue;
@@ -120,7 +131,8 @@ void AsyncBoard::Impl::wait_active(Duration timeout, CompletionPtr completion) {
   enter(Completion::How::post, [&] {
     const Ticket id = next_waiter++;
     completion->listen(Cancel(weak_from_this(), id));
-    waiters.push_back({id, now, now + time_of(timeout), std::move(completion)});
+    waiters.push_back(
+        {Waiter::For::active, id, 0, now, now + time_of(timeout), std::move(completion)});
   });
 }
 
@@ -228,16 +240,6 @@ void AsyncBoard::Impl::record(const std::shared_ptr<Recorder>& recorder) {
   wires[0]->tap.on_link(session.link());
   name_in_recording();
   for (const Device& device : devices) describe_in_recording(device);
-}
-
-void AsyncBoard::Impl::describe(const Device& device) {
-  std::erase_if(devices, [&](const Device& each) { return each.place() == device.place(); });
-  devices.push_back(device);
-  describe_in_recording(device);
-}
-
-void AsyncBoard::Impl::describe_in_recording(const Device& device) {
-  for (const auto& wire : wires) wire->tap.on_device(device);
 }
 
 void AsyncBoard::Impl::name_in_recording() {

@@ -36,9 +36,17 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
     Ticket id = 0;
     CompletionPtr completion;
   };
-  // Who waits until the board is active; its id is no ticket of the session's.
+  // Who waits for something, and until when; its id is no ticket of the session's, but where it is a step behind
+  // one that was a command.
   struct Waiter {
+    enum class For : std::uint8_t {
+      active,  // the board
+      answer,  // the end of the transfer of that number, as the state tells it
+      time,    // the deadline itself
+    };
+    For what = For::active;
     Ticket id = 0;
+    std::uint32_t pnum = 0;
     Time started{0};
     Time deadline{0};
     CompletionPtr completion;
@@ -131,6 +139,7 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
     });
   }
   void wait_active(Duration timeout, CompletionPtr completion);
+  bool has_come(const Waiter& waiter) const;
   void cancel(Ticket id);
   void open();
   bool open_wire(BoardWire& wire, std::optional<Problem>& problem);

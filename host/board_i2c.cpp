@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <string>
 
-#include "../protocol/messages/command_field.hpp"
 #include "board_impl.hpp"
 #include "commands/command_help.hpp"
 #include "devices/device_steps.hpp"
@@ -84,28 +83,18 @@ Board::I2c::Bytes Board::I2c::answer(const Command& command, Duration timeout) c
 }
 
 void Board::attach(const Device& device, Duration timeout) {
+  const std::string text = device.text();
+  require_timeout(text, timeout);
   const auto impl = impl_;
-  for (const DeviceStep& step : steps_of(device)) {
-    if (step.is_answered()) {
-      require_answer(device, step, i2c().ask(step.command(), timeout));
-      impl->wait_for_news(step.wait, [] { return false; });
-    } else {
-      send(step.command(), timeout);
-    }
-  }
-  impl->run_on_loop("attach()", [&] { impl->async.describe(device); });
-  std::string chosen;
-  {
-    const std::lock_guard lock(impl->mutex);
-    chosen = impl->fields;
-  }
-  if (chosen.empty()) return;  // the board's own choice is left alone
-  FieldSet sent;
-  FieldSet wanted;
-  parse_fields(chosen, sent);
-  parse_fields(device.fields(), wanted);
-  wanted.add(sent);
-  if (wanted != sent) fields(chosen + "," + device.fields(), timeout);
+  require_control(impl->role, text);
+  const Duration each = Impl::bounded(timeout);
+  const auto call = std::make_shared<Impl::Call>(Command());
+  call->start = [&async = impl->async, device, each](Duration, auto end) {
+    async.async_attach(device, each, std::move(end));
+  };
+  impl->run(text, call, longest(device, each));
+  if (call->result.outcome == Outcome::confirmed) return;
+  throw Error(explain(device, call->result, call->link));
 }
 
 }  // namespace r4

@@ -42,8 +42,7 @@ Board::Impl::Impl(const CarriersMaker& make, BoardOptions options, BoardCallback
       async(io, make(loop), options),
       box(
           io, [this](const Command& c) { deliver(c); }, [this](const Setpoints& s) { deliver(s); }),
-      callbacks([this](Clock::duration busy) { on_callback_end(busy); }),
-      fields(std::move(options.session.fields)) {
+      callbacks([this](Clock::duration busy) { on_callback_end(busy); }) {
   require_callback_limit(callback_limit);
   if (first.on_state) callbacks.on_state(std::move(first.on_state));
   if (first.on_link) callbacks.on_link(std::move(first.on_link));
@@ -278,7 +277,13 @@ Board::Impl::CallPtr Board::Impl::execute(const Command& command, Duration timeo
 }
 
 Board::Impl::CallPtr Board::Impl::execute(const std::string& text, CallPtr call, Duration timeout) {
-  const auto deadline = call->called + bounded(timeout);
+  run(text, call, bounded(timeout));
+  if (call->result.outcome == Outcome::confirmed) return call;
+  throw Error(explain(text, call->result, call->link));
+}
+
+void Board::Impl::run(const std::string& text, const CallPtr& call, Duration timeout) {
+  const auto deadline = call->called + timeout;
   std::unique_lock lock(mutex);
   if (closed) throw closed_error(text);
   asio::post(io, [this, call, deadline] { begin(call, deadline); });
@@ -302,12 +307,7 @@ Board::Impl::CallPtr Board::Impl::execute(const std::string& text, CallPtr call,
     throw blocked_error(
         text, call->begun ? "not confirmed, it may have been executed or not" : "not sent");
   }
-  if (call->result.outcome == Outcome::confirmed) {
-    if (call->command.kind == CommandKind::fields && !fields.empty()) fields = call->text;
-    return call;
-  }
   if (call->result.outcome == Outcome::closed) throw closed_error(text);
-  throw Error(explain(text, call->result, call->link));
 }
 
 void Board::Impl::abandon(const CallPtr& call) {

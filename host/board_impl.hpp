@@ -74,6 +74,8 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   // Has the loop carry out a command. Throws if it is not confirmed.
   CallPtr execute(const Command& command, Duration timeout);
   CallPtr execute(const std::string& text, CallPtr call, Duration timeout);
+  // The same, and leaves what became of it to the caller; throws if that is not known, or the board is closed.
+  void run(const std::string& text, const CallPtr& call, Duration timeout);
   PostResult post(const Command& command);
   PostResult post(const Setpoints& setpoints);
   bool is_held_back();
@@ -161,7 +163,6 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   std::condition_variable news;  // state, link or closed has changed
   std::string name;              // the transport's, as the loop knows it
   std::vector<std::string> wire_names;
-  std::string fields;  // that were chosen last; empty: the board's own choice is left alone
   ReceivedState state;
   std::uint64_t states = 0;
   std::vector<std::weak_ptr<States::Queue>> queues;

@@ -65,7 +65,7 @@ ALLOWED = {
     'host/bridge': HOST,
     'host/commands': TRANSPORTS,
     'host/control': PUBLIC,
-    'host/devices': PROTOCOL,
+    'host/devices': HOST,
     'host/fleet': HOST,
     'host/measurement': TRANSPORTS,
     'host/recording': TRANSPORTS,

@@ -17,7 +17,7 @@ Problem bad_group_member(const Command& command, std::size_t others) {
     problem.reason =
         std::string(drives_output(command.kind) ? "is a transfer of its own" : "drives no output") +
         ", so it cannot be part of a group";
-    problem.fix = "send it by itself; a group is made of O D S R P B Z";
+    problem.fix = "send it by itself; a group is made of O D S R P B Z and X:DAC";
   } else if (others == max_group) {
     problem.reason = fmt::format("is one more than the {} that a group may have", max_group);
     problem.fix = "send a second group";
@@ -46,6 +46,9 @@ Setpoints& Setpoints::stepper(int channel, std::int32_t position, int speed) {
 Setpoints& Setpoints::zero(int channel) { return add(Command::zero(channel)); }
 Setpoints& Setpoints::bldc(int channel, int speed, Direction direction, bool brake) {
   return add(Command::bldc(speed, direction, brake, channel));
+}
+Setpoints& Setpoints::dac(int channel, int millivolts) {
+  return add(Command::dac(channel, millivolts));
 }
 
 Setpoints& Setpoints::add(const Command& command) {

@@ -6,7 +6,8 @@
 #include <algorithm>
 #include <string>
 
-#include "r4link/error.hpp"
+#include "../../protocol/messages/command_field.hpp"
+#include "../commands/command_help.hpp"
 
 namespace r4 {
 
@@ -57,25 +58,60 @@ std::vector<DeviceStep> steps_of(const Device& device) {
   return steps;
 }
 
-void require_answer(const Device& device, const DeviceStep& step, const I2cAnswer& answer) {
+std::chrono::milliseconds longest(const Device& device, std::chrono::milliseconds timeout) {
+  std::chrono::milliseconds sum = timeout;  // that of the fields
+  for (const DeviceStep& step : steps_of(device)) sum += timeout + step.wait;
+  return sum;
+}
+
+std::optional<Problem> trouble_with(const Device& device, const DeviceStep& step,
+                                    const I2cAnswer& answer) {
+  Problem problem{ErrorKind::refused, device.text(), "", "", Outcome::refused};
   if (answer.outcome == I2cOutcome::cancelled) {
-    throw Error(ErrorKind::refused, device.text(),
-                "its set-up was broken off: the board went safe, or another session began",
-                "set it up again");
+    problem.reason = "its set-up was broken off: the board went safe, or another session began";
+    problem.fix = "set it up again";
+  } else if (answer.outcome != I2cOutcome::done) {
+    problem.reason = fmt::format("it does not answer: {}", to_text(answer.outcome));
+    problem.fix = "X:SCAN shows which addresses answer; look at supply, wires and pull-ups";
+  } else if (!step.expected.empty() && !std::equal(answer.data.begin(), answer.data.end(),
+                                                   step.expected.begin(), step.expected.end())) {
+    problem.reason = fmt::format("it is another device: its register {} has {}, not {}", step.bytes,
+                                 hex_of(answer.data), hex_of(step.expected));
+    problem.fix = "look what is at that address, or describe it: r4 devices";
+  } else {
+    return std::nullopt;
   }
-  if (answer.outcome != I2cOutcome::done) {
-    throw Error(ErrorKind::refused, device.text(),
-                fmt::format("it does not answer: {}", to_text(answer.outcome)),
-                "X:SCAN shows which addresses answer; look at supply, wires and pull-ups");
+  return problem;
+}
+
+std::string fields_with(const std::string& chosen, const Device& device) {
+  if (chosen.empty()) return "";
+  FieldSet sent;
+  FieldSet wanted;
+  parse_fields(chosen, sent);
+  parse_fields(device.fields(), wanted);
+  std::string all = chosen;
+  for (const StateField field : wanted) {
+    if (sent.has(field)) continue;
+    const Text name = name_of(field);
+    all.append(",").append(name.data(), name.size());
   }
-  if (step.expected.empty() || std::equal(answer.data.begin(), answer.data.end(),
-                                          step.expected.begin(), step.expected.end())) {
-    return;
+  return all == chosen ? "" : all;
+}
+
+Problem explain(const Device& device, const CommandResult& result, const LinkStatus& link) {
+  const std::vector<DeviceStep> steps = steps_of(device);
+  std::string command = "F:" + device.fields();  // behind them
+  if (result.step >= 1 && result.step <= steps.size()) {
+    const DeviceStep& step = steps[result.step - 1U];
+    if (result.transfer.pnum != 0) {
+      if (auto problem = trouble_with(device, step, result.transfer)) return *problem;
+    }
+    command = shown(step.command());
   }
-  throw Error(ErrorKind::refused, device.text(),
-              fmt::format("it is another device: its register {} has {}, not {}", step.bytes,
-                          hex_of(answer.data), hex_of(step.expected)),
-              "look what is at that address, or describe it: r4 devices");
+  Problem problem = explain(command, result, link);
+  problem.thing = device.text() + ": " + problem.thing;
+  return problem;
 }
 
 }  // namespace r4

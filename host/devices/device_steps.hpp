@@ -5,11 +5,13 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "r4link/command.hpp"
 #include "r4link/devices/device.hpp"
+#include "r4link/error.hpp"
 #include "r4link/vocabulary.hpp"
 
 namespace r4 {
@@ -30,7 +32,15 @@ struct DeviceStep {
 
 std::vector<DeviceStep> steps_of(const Device& device);
 
-// Throws Error{refused} if the device does not answer, or is another one.
-void require_answer(const Device& device, const DeviceStep& step, const I2cAnswer& answer);
+// How long they take at most, where each has `timeout`.
+std::chrono::milliseconds longest(const Device& device, std::chrono::milliseconds timeout);
+
+// What is wrong with the device, if it does not answer, or is another one.
+std::optional<Problem> trouble_with(const Device& device, const DeviceStep& step,
+                                    const I2cAnswer& answer);
+
+// The fields that are sent (as in F), with those of the device; empty if they are among them, or the board's own choice
+// is left alone (`chosen` is empty).
+std::string fields_with(const std::string& chosen, const Device& device);
 
 }  // namespace r4

@@ -169,6 +169,8 @@ class Session {
   // first that is told.
   bool knows_cause() const { return cause_ != Command::unnamed_cause; }
   const ReceivedState& state() const { return state_; }
+  // The fields that are asked for, as in F; empty: the board's own choice is left alone.
+  const std::string& fields() const { return selection_.fields(); }
   Statistics statistics(Time now) const;
   // Of the board's datagrams.
   const PacketCounters& packets() const {

@@ -194,6 +194,22 @@ class AsyncBoard {
         },
         token, board_timeout, heartbeat, timeout);
   }
+  // void(CommandResult). Sets a described device up (devices/device.hpp, docs/described-devices.md): is it the one?
+  // Then what is to be written, which takes async_arm(), and the board's readings, until our session ends; their
+  // fields are asked for beside those that were chosen. `timeout`: for each step. Confirmed: device.reading(state())
+  // has its values from now on. Else explain(device, result, link()) tells why, Outcome::refused also where it does
+  // not answer or is another device; what was begun stays so. After on_restart() and a lost link it is to be set up
+  // again. Recordings tell of it as by describe().
+  template <class Token>
+  auto async_attach(const Device& device, Duration timeout, Token&& token) {
+    require_timeout("async_attach()", timeout);
+    require_control("async_attach()");
+    return asio::async_initiate<Token, void(CommandResult)>(
+        [this](auto handler, const Device& d, Duration t) {
+          start_attach(d, t, make_completion(std::move(handler)));
+        },
+        token, device, timeout);
+  }
   // Throws Error{usage} for what async_link_timing() cannot set.
   void require_link_timing(Duration board_timeout, Duration heartbeat) const;
 
@@ -313,10 +329,11 @@ class AsyncBoard {
   void start_wait_active(Duration timeout, CompletionPtr completion);
   void start_link_timing(Duration board_timeout, Duration heartbeat, Duration timeout,
                          CompletionPtr completion);
-
+  void start_attach(const Device& device, Duration timeout, CompletionPtr completion);
   void start_close(Duration timeout, CompletionPtr completion);
 
   class TimingSteps;
+  class AttachSteps;
   class Farewell;
   std::shared_ptr<Impl> impl_;
 };

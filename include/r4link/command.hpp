@@ -94,7 +94,7 @@ struct R4LINK_API Command {
 // May it move something? Those are refused in the safe state: O D S R P B Z, X:DAC, and X:WRITE and
 // X:UART, for what is written to a device of the user's may be an actuator's.
 R4LINK_API bool drives_output(CommandKind kind);
-// May it be part of a group? O D S R P B Z.
+// May it be part of a group? O D S R P B Z, X:DAC.
 R4LINK_API bool joins_groups(CommandKind kind);
 
 // The most commands of one datagram. Several are a group: output commands, no two of them for the same

@@ -116,6 +116,10 @@ struct CommandResult {
   // Of the datagram that carried it: what comes later, I2CX of the state, names the command by it. 0: it was
   // not sent.
   std::uint32_t pnum = 0;
+  // Of a device that was to be set up and was not (Device): which of its steps failed, from 1, and of one that is a
+  // transfer how that ended, if it did.
+  std::uint16_t step = 0;
+  I2cAnswer transfer{};
 };
 
 // Of one that is sent once and not waited for. True where it was sent:

@@ -29,7 +29,9 @@ class R4LINK_API Setpoints {
   Setpoints& stepper(int channel, std::int32_t position, int speed = stepper_speed_default);
   Setpoints& zero(int channel);
   Setpoints& bldc(int channel, int speed, Direction direction, bool brake = false);
-  // Any output command (O D S R P B Z).
+  // A voltage, 0-3300 mV.
+  Setpoints& dac(int channel, int millivolts);
+  // Any output command (O D S R P B Z, X:DAC).
   Setpoints& add(const Command& command);
 
   std::size_t size() const { return size_; }

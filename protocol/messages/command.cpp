@@ -211,7 +211,9 @@ bool drives_output(CommandKind kind) {
   return false;
 }
 
-bool joins_groups(CommandKind kind) { return drives_output(kind) && !is_device_command(kind); }
+bool joins_groups(CommandKind kind) {
+  return drives_output(kind) && (!is_device_command(kind) || kind == CommandKind::dac);
+}
 
 bool asks_to_stop(const Datagram& datagram) {
   for (const Field& field : datagram) {

@@ -22,6 +22,8 @@ int GroupRules::row_of(CommandKind kind) {
       return 5;
     case CommandKind::bldc:
       return 6;
+    case CommandKind::dac:
+      return 7;
     case CommandKind::heartbeat:
     case CommandKind::stop:
     case CommandKind::clear:
@@ -36,7 +38,6 @@ int GroupRules::row_of(CommandKind kind) {
     case CommandKind::i2c_scan:
     case CommandKind::i2c_poll:
     case CommandKind::uart_write:
-    case CommandKind::dac:
       break;
   }
   return -1;

@@ -23,7 +23,7 @@ class GroupRules {
   Refusal add(const Command& command);
 
  private:
-  static constexpr int kinds = 7;  // that drive outputs
+  static constexpr int kinds = 8;  // that drive outputs
   static int row_of(CommandKind kind);
 
   int count_ = 0;

@@ -110,12 +110,13 @@ TEST(BoardGroup, FourWheelsOfOneChipChangeAtOnceAndOfTwoWithinAMillisecond) {
 TEST(BoardGroup, IsConfirmedAsOneAndRefusedAsOne) {
   BoardInAThread simulated("udp");
   Board board(simulated.url(), at_will());
-  board.fields("DEFAULT,OSMC2,SERVO3POS");
-  board.apply(Setpoints{}.osmc(1, 358, forward).osmc(2, 359, forward).servo(3, 1500));
+  board.fields("DEFAULT,OSMC2,SERVO3POS,DAC2");
+  board.apply(Setpoints{}.osmc(1, 358, forward).osmc(2, 359, forward).servo(3, 1500).dac(2, 1650));
   const State state = board.next_state();
   EXPECT_EQ(state.osmc[0], (Drive{358, forward}));
   EXPECT_EQ(state.osmc[1], (Drive{359, forward}));
   EXPECT_EQ(state.servo_us[2], 1500);
+  EXPECT_EQ(state.dac_mv[1], 1650);
   board.send("O:1,1,1;O:2,1,2");
   EXPECT_EQ(board.next_state().osmc[1].pwm, 2);
   board.stop();

@@ -43,13 +43,14 @@ def test_readings_come_with_every_state_and_end_with_the_session(board):
 
 
 def test_a_receiver_on_a_uart_a_voltage_and_inputs(board):
-    commands = ['C:uart1,115200:8N1', 'F:UART1,DAC1,GPIO', 'X:DAC,1,1650', 'X:UART,1,x2450']
+    commands = ['C:uart1,115200:8N1', 'F:UART1,DAC1,DAC2,GPIO', 'X:DAC,1,5', 'X:DAC,1,1650;S:1500,3;X:DAC,2,3300',
+                'X:UART,1,x2450']
     with Running('send', board.host_url, *commands, '--hold', '30', '--json') as host:
         for _ in commands:
             assert host.next()['confirmed']
         with Running('monitor', board.host_url, '--json') as watch:
             states = [watch.next(is_state) for _ in range(40)]
-    assert states[-1]['fields']['DAC1'] == 1650 and states[-1]['fields']['GPIO'] == 255
+    assert [states[-1]['fields'][name] for name in ('DAC1', 'DAC2', 'GPIO')] == [1650, 3300, 255]
     text, position = b'', None
     for each in states:
         begin, lost, data = each['fields']['UART1']

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Devices on the user's I2C bus (docs/devices.md)."""
 import asyncio
+import functools
+import itertools
+import operator
 
 import pytest
 
@@ -66,6 +69,108 @@ def test_a_uart_brings_each_byte_once(board):
         board.uart[1].write(b'$')
     with pytest.raises(r4link.UsageError, match='uart'):
         board.uart[3].read()
+
+
+def test_a_uart_tells_each_byte_once_to_a_callback(board, wait):
+    board.setting('uart1', '115200:8N1')
+    told = []
+    subscription = board.uart[1].on_bytes(told.append)
+    board.fields('DEFAULT,UART1')
+    wait(lambda: sum(len(each.data) for each in told) > 400)
+    subscription.cancel()
+    count = len(told)
+    assert all(isinstance(each, r4link.UartData) and isinstance(each.data, bytes) for each in told)
+    assert sum(each.lost for each in told) == 0
+    text = b''.join(each.data for each in told)
+    sentences = text[text.index(b'$'):text.rindex(b'\r\n')].split(b'\r\n')
+    assert all(is_whole(each) for each in sentences), sentences
+    for received in board.uart[1]:
+        assert received.data
+        break
+    assert len(told) == count
+    with pytest.raises(r4link.UsageError, match='uart'):
+        board.uart[3].on_bytes(told.append)
+
+
+def is_whole(sentence):
+    """By the checksum of NMEA 0183."""
+    text, _, given = sentence[1:].partition(b'*')
+    return sentence[:1] == b'$' and int(given, 16) == functools.reduce(operator.xor, text)
+
+
+def test_a_uart_tells_what_came_damaged(sim, board):
+    board.setting('uart1', '115200:8N1')
+    sim.happen('uart 1 noise')
+    board.fields('DEFAULT,UART1')
+    seen = 0
+    for data, lost in board.uart[1]:
+        seen += len(data)
+        if lost:
+            break
+    assert seen > 0
+
+
+def test_a_uart_tells_of_a_gap_where_states_are_lost(sim):
+    with r4link.Board(r4link.with_link(sim.url, 'loss=50%,seed=7')) as board:
+        board.wait_active(10)
+        board.setting('uart2', '115200:8N1', timeout=10)
+        board.fields('DEFAULT,UART2', timeout=10)
+        assert any(lost for _, lost in itertools.islice(board.uart[2], 500))
+
+
+def test_the_bytes_of_a_uart_end_with_the_board(board):
+    board.setting('uart2', '115200:8N1')
+    board.fields('DEFAULT,UART2')
+    for data, _ in board.uart[2]:
+        assert data
+        board.close()
+    assert list(board.uart[2]) == []
+
+
+def test_a_uart_for_asyncio(sim):
+    async def main():
+        async with aio.Board(sim.url) as board:
+            await board.wait_active()
+            loops = set()
+            board.uart[1].on_bytes(lambda received: loops.add((asyncio.get_running_loop(), type(received.data))))
+            await board.setting('uart1', '115200:8N1')
+            await board.fields('DEFAULT,UART1')
+            text = b''
+            async for data, lost in board.uart[1]:
+                assert lost == 0
+                text += data
+                if len(text) > 300:
+                    break
+            assert b'$GPRMC,' in text and loops == {(asyncio.get_running_loop(), bytes)}
+            rest = asyncio.create_task(count(board.uart[1]))
+            await board.next_state()
+            await board.close()
+            assert await asyncio.wait_for(rest, 5) >= 0
+    asyncio.run(main())
+
+
+async def count(received):
+    return len([each async for each in received])
+
+
+def test_voltages_are_part_of_a_group(sim, board, wait):
+    group = r4link.Setpoints().osmc(1, 100).dac(1, 1650).dac(2, 3300)
+    with pytest.raises(r4link.NotArmedError):
+        board.apply(group)
+    board.fields('DEFAULT,DAC1,DAC2')
+    board.arm()
+    board.apply(group)
+    wait(lambda: (board.state.osmc1.pwm, board.state.dac1, board.state.dac2) == (100, 1650, 3300))
+    assert board.post(r4link.Command.dac(1, 5))
+    wait(lambda: board.state.dac1 == 5)
+    with pytest.raises(r4link.UsageError, match='range'):
+        r4link.Setpoints().dac(1, 3301)
+    with pytest.raises(r4link.UsageError, match='same channel'):
+        r4link.Setpoints().dac(1, 1).dac(1, 2)
+    board.stop()
+    with pytest.raises(r4link.RefusedError):
+        board.apply(group)
+    wait(lambda: (board.state.osmc1.pwm, board.state.dac1, board.state.dac2) == (0, 0, 0))
 
 
 def test_a_voltage_is_an_output_and_spare_inputs_are_bits(board, sim, wait):

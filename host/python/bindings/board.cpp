@@ -264,6 +264,15 @@ void bind_board(py::module_& module) {
              }
              return uart_data(data);
            })
+      .def("uart_on_bytes",
+           [](PyBoard& board, int channel, py::object function) {
+             return board.subscribe(std::move(function), [&](const Callback& each) {
+               return board->uart(channel).on_bytes([each](const Board::UartData& data) {
+                 const py::gil_scoped_acquire gil;
+                 each(uart_data(data));
+               });
+             });
+           })
       .def(
           "attach",
           [](PyBoard& board, const Device& device, int ms) { board->attach(device, Ms(ms)); },

@@ -70,6 +70,7 @@ void bind_commands(py::module_& module) {
                   [](int channel, int speed, int direction, bool brake) {
                     return Command::bldc(speed, direction_of(direction), brake, channel);
                   })
+      .def_static("dac", &Command::dac)
       .def_static("proximity", [](int channel, int cm) { return Command::proximity(cm, channel); })
       .def_static("stop", &Command::stop)
       .def_static("clear", [] { return Command::clear(); });

@@ -26,6 +26,7 @@ from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recor
                     Subscription, Wire)
 from .board import Setpoints
 from .devices import Device
+from .errors import ClosedError
 from .values import Direction, PostResult, UartData
 
 T = TypeVar('T')
@@ -189,10 +190,37 @@ class I2c:
         await self._commands.call(lambda: self._i2c.poll_off(slot, timeout))
 
 
+class UartStream:
+    """What comes in on a UART: `async for data, lost in board.uart[1]: …`, until the board is closed. What waits is in
+    the link; the callback of this one only tells that there is something."""
+
+    def __init__(self, uart: blocking.Uart, news: asyncio.Event, subscription: Subscription) -> None:
+        self._uart = uart
+        self._news = news
+        self._end = weakref.finalize(self, subscription.cancel)
+
+    def __aiter__(self) -> Self:
+        return self
+
+    async def __anext__(self) -> UartData:
+        await asyncio.sleep(0)  # the loop has others to look after
+        while True:
+            self._news.clear()
+            try:
+                received = self._uart.read()
+            except ClosedError:
+                self._end()
+                raise StopAsyncIteration from None
+            if received.data or received.lost:
+                return received
+            await self._news.wait()
+
+
 class Uart:
-    """A UART of the user's, as r4link.Uart."""
+    """A UART of the user's, as r4link.Uart: `async for data, lost in board.uart[1]: …`."""
 
     def __init__(self, board: Board, channel: int) -> None:
+        self._board = board
         self._commands = board._commands
         self._uart = board._board.uart[channel]
 
@@ -200,7 +228,16 @@ class Uart:
         await self._commands.call(lambda: self._uart.write(data, timeout))
 
     async def read(self, timeout: float = 0.0) -> UartData:
-        return await self._commands.call(lambda: self._uart.read(timeout))
+        return await self._board._waits.call(lambda: self._uart.read(timeout))
+
+    def __aiter__(self) -> UartStream:
+        news = asyncio.Event()
+        self._board._news.add(news)
+        return UartStream(self._uart, news, self.on_bytes(lambda _: news.set()))
+
+    def on_bytes(self, callback: Callable[[UartData], object]) -> Subscription:
+        """As r4link.Uart.on_bytes(), on the loop of the task that adds it."""
+        return self._uart.on_bytes(_on_loop(callback))
 
 
 class _Uarts:
@@ -220,10 +257,10 @@ class Board:
         self._commands = _Lane(interrupt)
         self._waits = _Lane(interrupt)
         self._stops = _Lane(interrupt)
-        self._news: weakref.WeakSet[asyncio.Event] = weakref.WeakSet()  # of loops over states
+        self._news: weakref.WeakSet[asyncio.Event] = weakref.WeakSet()  # of loops over states and bytes
 
     async def close(self) -> None:
-        """Says farewell; calls that wait raise ClosedError, loops over states end."""
+        """Says farewell; calls that wait raise ClosedError, loops over states and bytes end."""
         await asyncio.get_running_loop().run_in_executor(None, self._board.close)
         for lane in (self._commands, self._waits, self._stops):
             lane.end()
@@ -268,7 +305,7 @@ class Board:
         return _Uarts(self)
 
     async def dac(self, channel: int, millivolts: int, timeout: float = 1.0) -> None:
-        await self.send(f'X:DAC,{channel},{millivolts}', timeout)
+        await self.send(Command.dac(channel, millivolts), timeout)
 
     async def attach(self, device: Device, timeout: float = 1.0) -> None:
         """As r4link.Board.attach()."""

@@ -17,7 +17,7 @@ from . import _core
 from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State, Statistics,
                     Subscription, Wire)
 from .devices import Device
-from .errors import UsageError
+from .errors import ClosedError, UsageError
 from .values import Direction, PostResult, UartData
 
 F = TypeVar('F', bound=Callable[..., Any])
@@ -73,6 +73,9 @@ class Setpoints:
 
     def bldc(self, channel: int, speed: int, direction: int = Direction.FORWARD, brake: bool = False) -> Setpoints:
         return self.add(Command.bldc(channel, speed, direction, brake))
+
+    def dac(self, channel: int, millivolts: int) -> Setpoints:
+        return self.add(Command.dac(channel, millivolts))
 
     def __len__(self) -> int:
         return len(self._core)
@@ -171,7 +174,11 @@ class I2c:
 
 class Uart:
     """A UART of the user's, 1 or 2 (docs/devices.md): setting('uart1', '115200:8N1') turns it on,
-    fields('DEFAULT,UART1') has the board tell what comes in."""
+    fields('DEFAULT,UART1') has the board tell what comes in.
+
+        for data, lost in board.uart[1]:    # what read() would return, as it comes, until the board is closed
+            parser.feed(data)
+    """
 
     def __init__(self, board: Board, channel: int) -> None:
         self._board, self._channel = board, channel
@@ -184,6 +191,20 @@ class Uart:
         """What has come since the last read(), at most 64 KB: older bytes count as lost. Waits until there is
         something; nothing where it does not come in time."""
         return self._board._core.uart_read(self._channel, _ms(timeout))
+
+    def __iter__(self) -> Iterator[UartData]:
+        while True:
+            try:
+                received = self.read(1.0)
+            except ClosedError:
+                return
+            if received.data or received.lost:
+                yield received
+
+    def on_bytes(self, callback: Callable[[UartData], object]) -> Subscription:
+        """Called for each state that brings some, beside read(): each byte once, in order, and how many are missing.
+        From now on, on the thread of the callbacks."""
+        return self._board._core.uart_on_bytes(self._channel, callback)
 
 
 class _Uarts:
@@ -351,8 +372,9 @@ class Board:
         return _Uarts(self)
 
     def dac(self, channel: int, millivolts: int, timeout: float = 1.0) -> None:
-        """A voltage of the board's, channel 1 or 2, 0-3300 mV; 0 in the safe state."""
-        self.send(f'X:DAC,{channel},{millivolts}', timeout)
+        """A voltage of the board's, channel 1 or 2, 0-3300 mV; 0 in the safe state. An output: it takes arm(), and may
+        be one of Setpoints, or posted: post(Command.dac(1, 1650))."""
+        self.send(Command.dac(channel, millivolts), timeout)
 
     def attach(self, device: Device, timeout: float = 1.0) -> None:
         """Sets a described device up (r4link.devices): is it the one? Then what is to be written, which takes arm(), and

@@ -19,6 +19,8 @@
 #include <vector>
 
 #include "../config.hpp"
+#include "../error.hpp"
+#include "../link.hpp"
 #include "../state.hpp"
 #include "description.hpp"
 
@@ -69,5 +71,10 @@ class R4LINK_API Device {
   int address_;
   int first_slot_;
 };
+
+// Why a device was not set up (AsyncBoard::async_attach()), and what to do. `link` is the link at that time. Of kind
+// refused.
+R4LINK_API Problem explain(const Device& device, const CommandResult& result,
+                           const LinkStatus& link);
 
 }  // namespace r4

@@ -27,8 +27,8 @@ struct ApplicationGroup : test::BoardInControl {
 
 TEST_F(ApplicationGroup, ReachesTheHardwareInOneGo) {
   const int applied = board.hal.applied;
-  const std::uint32_t number =
-      host.command("O:358,1,1;O:358,1,2;O:358,0,3;D:7,1,4;S:1500,16;R:8,On;P:-100,2;B:9,1,0,3;Z:4");
+  const std::uint32_t number = host.command(
+      "O:358,1,1;O:358,1,2;O:358,0,3;D:7,1,4;S:1500,16;R:8,On;P:-100,2;B:9,1,0,3;Z:4;X:DAC,2,1650");
   EXPECT_EQ(board.hal.applied, applied + 1);
   EXPECT_EQ(refusals(), Lines());
   firmware::Outputs expected;
@@ -40,22 +40,32 @@ TEST_F(ApplicationGroup, ReachesTheHardwareInOneGo) {
   expected.stepper[1].position = -100;
   expected.stepper[1].enabled = true;
   expected.bldc[2] = {9, Direction::forward, false};
+  expected.dac_mv[1] = 1650;
   EXPECT_EQ(board.outputs(), expected);
   EXPECT_EQ(board.hal.zeroed, std::vector<int>{4});
-  EXPECT_EQ(board.log.executed, std::vector<std::uint32_t>(9, number));
+  EXPECT_EQ(board.log.executed, std::vector<std::uint32_t>(10, number));
   EXPECT_EQ(board.application->link().last_executed(), number);
 }
 
 TEST_F(ApplicationGroup, OfWhichOneCommandIsWrongChangesNothing) {
   const int applied = board.hal.applied;
   const std::pair<const char*, const char*> cases[] = {
-      {"O:1,1,1;O:4096,1,2", "RANGE AT:2"}, {"O:1,1,1;S:1,17", "CHANNEL AT:2"},
-      {"O:1,1;O:1,1,2", "FORMAT AT:1"},     {"O:1,1,1;O:2,1,1", "FORMAT AT:2"},
-      {"O:1,1,1;C:rate,50", "FORMAT AT:2"}, {"O:1,1,1;U:10,1", "FORMAT AT:2"},
-      {"O:1,1,1;F:ALL", "FORMAT AT:2"},     {"Q:ID;O:1,1,1", "FORMAT AT:1"},
-      {"H:ROS2-R4;O:1,1,1", "FORMAT AT:1"}, {"O:1,1,1;E:CLEAR,0", "FORMAT AT:2"},
-      {"O:1,1,1;X:1", "UNKNOWN AT:2"},      {"N:1,SAFE;O:1,1,1", "UNKNOWN AT:1"},
-      {"Z:1;Z:1", "FORMAT AT:2"},           {"C:rate,50;C:rate,60", "FORMAT AT:1"},
+      {"O:1,1,1;O:4096,1,2", "RANGE AT:2"},
+      {"O:1,1,1;S:1,17", "CHANNEL AT:2"},
+      {"O:1,1;O:1,1,2", "FORMAT AT:1"},
+      {"O:1,1,1;O:2,1,1", "FORMAT AT:2"},
+      {"O:1,1,1;C:rate,50", "FORMAT AT:2"},
+      {"O:1,1,1;U:10,1", "FORMAT AT:2"},
+      {"O:1,1,1;F:ALL", "FORMAT AT:2"},
+      {"Q:ID;O:1,1,1", "FORMAT AT:1"},
+      {"H:ROS2-R4;O:1,1,1", "FORMAT AT:1"},
+      {"O:1,1,1;E:CLEAR,0", "FORMAT AT:2"},
+      {"O:1,1,1;X:1", "UNKNOWN AT:2"},
+      {"N:1,SAFE;O:1,1,1", "UNKNOWN AT:1"},
+      {"O:1,1,1;X:DAC,1,3301", "RANGE AT:2"},
+      {"X:DAC,1,5;X:UART,1,x41", "FORMAT AT:2"},
+      {"Z:1;Z:1", "FORMAT AT:2"},
+      {"C:rate,50;C:rate,60", "FORMAT AT:1"},
   };
   for (const auto& [fields, answer] : cases) {
     host.command(fields);

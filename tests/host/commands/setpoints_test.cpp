@@ -21,11 +21,13 @@ TEST(Setpoints, AreTheCommandsInTheirOrder) {
                             .stepper(3, 5)
                             .zero(4)
                             .bldc(2, 9, Direction::forward, true)
+                            .dac(1, 1650)
                             .add(Command::osmc(0, Direction::forward, 2));
   EXPECT_EQ(text_of(all),
-            "O:358,1,1;D:7,0,2;S:1500,3;R:1,On;P:-100,500,4;P:5,1000,3;Z:4;B:9,1,1,2;O:0,1,2");
+            "O:358,1,1;D:7,0,2;S:1500,3;R:1,On;P:-100,500,4;P:5,1000,3;Z:4;B:9,1,1,2;X:DAC,1,1650;"
+            "O:0,1,2");
   EXPECT_EQ(text_of(parse_group_text(text_of(all) + ";")), text_of(all));
-  EXPECT_EQ(all.size(), 9U);
+  EXPECT_EQ(all.size(), 10U);
   EXPECT_TRUE(Setpoints{}.empty());
 }
 
@@ -35,6 +37,9 @@ TEST(Setpoints, CanBeSentAsTheyAre) {
   EXPECT_TRUE(
       contains(problem_of([&] { setpoints.osmc(5, 1, Direction::forward); }).reason, "channel"));
   EXPECT_TRUE(contains(problem_of([&] { setpoints.servo(1, 2501); }).reason, "range"));
+  EXPECT_TRUE(contains(problem_of([&] { setpoints.dac(1, 3301); }).reason, "range"));
+  EXPECT_TRUE(contains(problem_of([&] { setpoints.add(Command::uart_write(1, "x41")); }).reason,
+                       "a transfer of its own"));
   const Problem twice = problem_of([&] { setpoints.osmc(1, 5, Direction::forward); });
   EXPECT_EQ(twice.kind, ErrorKind::usage);
   EXPECT_EQ(twice.thing, "O:5,1,1");

@@ -70,7 +70,7 @@ TEST_F(DescribedDevice, ABno055SaysWhereItIsTurned) {
   EXPECT_NEAR(imu.reading(state, "quat_z").number.value(), std::numbers::sqrt2 / 2, 1e-4);
   EXPECT_EQ(imu.reading(state, "mag_x").number, 22.0);
   EXPECT_EQ(imu.reading(state, "temperature").number, 25.0);
-  EXPECT_LE(state.t_ms - imu.reading(state, "accel_z").t_ms, 1000U);
+  EXPECT_LE(static_cast<std::int32_t>(state.t_ms - imu.reading(state, "accel_z").t_ms), 1000);
 }
 
 TEST_F(DescribedDevice, AnIna219MeasuresAndNothingIsWrittenToIt) {

@@ -42,7 +42,8 @@ std::string commands(int count) {
 TEST(CommandGroup, OutputsOfDifferentChannelsGoTogether) {
   for (const char* fields :
        {"O:358,1,1;O:358,1,2;", "O:1,1,4;D:1,0,4;S:1500,4;R:4,On;P:-5,4;B:1,1,0,4;Z:4;PNum:5;T:1;",
-        "PNum:5;O:1,1,1;T:1;AIN24:1;O:1,1,2;A:1,2,3,4;", "Z:1;P:100,1;"}) {
+        "X:DAC,1,1650;X:DAC,2,0;O:1,1,1;", "PNum:5;O:1,1,1;T:1;AIN24:1;O:1,1,2;A:1,2,3,4;",
+        "Z:1;P:100,1;"}) {
     EXPECT_EQ(judged(fields), "ok") << fields;
   }
   EXPECT_EQ(judged(commands(16)), "ok");
@@ -62,6 +63,13 @@ TEST(CommandGroup, TheFirstThatCannotBeExecutedIsNamed) {
       {"R:1,On;R:1,Off;", "FORMAT 2"},
       {"P:1,1;P:1,500,1;", "FORMAT 2"},
       {"O:1,1,1;O:1,1,2;PNum:5;T:1;O:1,1,1;O:1,1,2;", "FORMAT 3"},
+      {"X:DAC,1,1;X:DAC,1,2;", "FORMAT 2"},
+      {"O:1,1,1;X:DAC,2,3301;", "RANGE 2"},
+      {"O:1,1,1;X:DAC,3,1;", "CHANNEL 2"},
+      // Transfers of their own.
+      {"O:1,1,1;X:UART,1,x41;", "FORMAT 2"},
+      {"X:WRITE,104,x6b00;O:1,1,1;", "FORMAT 1"},
+      {"O:1,1,1;X:READ,104,x75,1;", "FORMAT 2"},
       // No outputs.
       {"O:1,1,1;C:rate,50;", "FORMAT 2"},
       {"U:10,1;O:1,1,1;", "FORMAT 1"},

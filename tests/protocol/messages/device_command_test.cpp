@@ -89,9 +89,13 @@ TEST(DeviceCommand, WhatIsWrongHasItsCode) {
   for (const auto& [text, code] : wrong) EXPECT_EQ(device_again(text), code) << text;
 }
 
-TEST(DeviceCommand, OnlyAWriteMayMoveSomething) {
-  EXPECT_TRUE(drives_output(CommandKind::i2c_write));
-  EXPECT_FALSE(joins_groups(CommandKind::i2c_write));
+TEST(DeviceCommand, OnlyAWriteAndAVoltageMayMoveSomethingAndTheVoltageJoinsGroups) {
+  for (const CommandKind kind : {CommandKind::i2c_write, CommandKind::uart_write}) {
+    EXPECT_TRUE(drives_output(kind));
+    EXPECT_FALSE(joins_groups(kind));
+  }
+  EXPECT_TRUE(drives_output(CommandKind::dac));
+  EXPECT_TRUE(joins_groups(CommandKind::dac));
   for (const CommandKind kind :
        {CommandKind::i2c_read, CommandKind::i2c_scan, CommandKind::i2c_poll}) {
     EXPECT_FALSE(drives_output(kind));

@@ -1,123 +1,104 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "device_setup.hpp"
 
+#include <algorithm>
+#include <asio/bind_cancellation_slot.hpp>
 #include <chrono>
 #include <utility>
-
-#include "host/commands/command_help.hpp"
 
 namespace r4::tool {
 namespace {
 
 constexpr AsyncBoard::Duration step_timeout{1000};
 constexpr AsyncBoard::Duration look_interval{50};
-constexpr AsyncBoard::Duration retry_interval{2000};
+constexpr std::chrono::milliseconds retry_interval{2000};
 
 }  // namespace
 
 DeviceSetup::DeviceSetup(asio::io_context& io, AsyncBoard& board,
                          const std::vector<Device>& devices,
                          std::function<void(const Problem&)> told)
-    : board_(board), told_(std::move(told)), timer_(io) {
-  for (const Device& device : devices) {
-    board.describe(device);
-    for (DeviceStep& step : steps_of(device)) parts_.push_back({&device, std::move(step)});
-  }
-  subscriptions_.emplace_back(
-      board.on_state([this](const ReceivedState& state, const Datagram&) { on_state(state); }));
-  subscriptions_.emplace_back(board.on_restart([this] { begin_again(); }));
-  look_later(look_interval);
+    : board_(board),
+      devices_(devices),
+      told_(std::move(told)),
+      timer_(io),
+      progress_(devices.size()) {
+  for (const Device& device : devices) board.describe(device);
+  restarts_ = board.on_restart([this] { begin_again(); });
+  look_later();
 }
 
-void DeviceSetup::after(AsyncBoard::Duration time, void (DeviceSetup::*what)()) {
-  timer_.expires_after(time);
-  timer_.async_wait([here = std::weak_ptr(here_), what](const std::error_code& error) {
+void DeviceSetup::look_later() {
+  timer_.expires_after(look_interval);
+  timer_.async_wait([here = std::weak_ptr(here_)](const std::error_code& error) {
     const auto still = here.lock();
-    if (!error && still) ((*still)->*what)();
+    if (!error && still) (*still)->look();
   });
 }
 
-// Is it time to begin, or to begin again?
+// Is there one to be set up?
 void DeviceSetup::look() {
   if (!board_.in_control()) {
-    running_ = false;
-  } else if (!running_) {
-    running_ = true;
-    next_ = 0;
-    do_next();
+    for (Progress& each : progress_) each.done = false;
+  } else if (begin_next(0)) {
     return;
   }
-  look_later(look_interval);
+  look_later();
 }
 
 void DeviceSetup::begin_again() {
-  running_ = false;
-  ++attempt_;
-  awaited_pnum_ = 0;
-  look_later(look_interval);
+  give_up();
+  for (Progress& each : progress_) each = Progress();
+  look_later();
 }
 
-void DeviceSetup::do_next() {
-  if (next_ == parts_.size()) {
-    last_told_.clear();
-    look_later(look_interval);
-    return;
-  }
-  const std::uint64_t attempt = ++attempt_;
-  board_.async_send(parts_[next_].step.command(), step_timeout,
-                    [here = std::weak_ptr(here_), attempt](const CommandResult& result) {
-                      if (const auto still = here.lock()) (*still)->on_result(result, attempt);
-                    });
+void DeviceSetup::give_up() {
+  if (const auto attempt = std::move(attempt_)) attempt->emit(asio::cancellation_type::terminal);
 }
 
-void DeviceSetup::on_result(const CommandResult& result, std::uint64_t attempt) {
-  if (attempt != attempt_ || result.outcome == Outcome::closed) return;
-  const Part& part = parts_[next_];
-  if (result.outcome != Outcome::confirmed) {
-    Problem problem = explain(shown(part.step.command()), result, board_.link());
-    problem.thing = part.device->text() + ": " + problem.thing;
-    fail(problem);
-  } else if (part.step.is_answered()) {
-    awaited_pnum_ = result.pnum;
-    after(step_timeout, &DeviceSetup::on_silence);  // the field I2CX is sent for a second
-    on_state(board_.state());
+// The first from that one on whose turn it is. False: there is none.
+bool DeviceSetup::begin_next(std::size_t from) {
+  const Clock::time_point now = Clock::now();
+  const auto is_due = [now](const Progress& each) { return !each.done && now >= each.again; };
+  const auto first = progress_.begin() + static_cast<std::ptrdiff_t>(from);
+  next_ =
+      static_cast<std::size_t>(std::find_if(first, progress_.end(), is_due) - progress_.begin());
+  if (next_ == devices_.size()) return false;
+  attempt_ = std::make_shared<asio::cancellation_signal>();
+  board_.async_attach(devices_[next_], step_timeout,
+                      asio::bind_cancellation_slot(
+                          attempt_->slot(), [here = std::weak_ptr(here_),
+                                             attempt = attempt_](const CommandResult& result) {
+                            const auto still = here.lock();
+                            if (still && (*still)->attempt_ == attempt) (*still)->on_result(result);
+                          }));
+  return true;
+}
+
+void DeviceSetup::on_result(const CommandResult& result) {
+  if (result.outcome == Outcome::closed) return;
+  Progress& progress = progress_[next_];
+  progress.done = result.outcome == Outcome::confirmed;
+  if (progress.done) {
+    progress.told.clear();
   } else {
-    step_done();
+    progress.again = Clock::now() + retry_interval;
+    tell(result);
   }
+  if (!begin_next(next_ + 1)) look_later();
 }
 
-void DeviceSetup::on_state(const State& state) {
-  if (awaited_pnum_ == 0 || state.i2c_answer.pnum != awaited_pnum_) return;
-  awaited_pnum_ = 0;
-  const Part& part = parts_[next_];
-  try {
-    require_answer(*part.device, part.step, state.i2c_answer);
-  } catch (const Error& error) {
-    return fail(error.problem());
-  }
-  step_done();
-}
-
-void DeviceSetup::on_silence() {
-  fail({ErrorKind::refused, parts_[next_].device->text(), "the end of a transfer was not heard",
-        "give it more time, or look at the field I2CX"});
-}
-
-void DeviceSetup::step_done() {
-  const std::chrono::milliseconds wait = parts_[next_].step.wait;
-  ++next_;
-  after(wait, &DeviceSetup::do_next);
-}
-
-void DeviceSetup::fail(const Problem& problem) {
-  awaited_pnum_ = 0;
-  ++attempt_;
-  running_ = false;
-  if (problem.text() != last_told_) {
-    last_told_ = problem.text();
-    told_(problem);
-  }
-  look_later(retry_interval);
+void DeviceSetup::tell(const CommandResult& result) {
+  const Device& device = devices_[next_];
+  const Problem problem =
+      result.outcome == Outcome::not_armed
+          ? Problem{ErrorKind::refused, device.text(), "it is set up once the board is armed",
+                    "arm it: what sets a device up may move something, for all the board knows"}
+          : explain(device, result, board_.link());
+  std::string text = problem.text();
+  if (progress_[next_].told == text) return;
+  progress_[next_].told = std::move(text);
+  told_(problem);
 }
 
 }  // namespace r4::tool

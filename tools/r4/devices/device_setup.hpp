@@ -3,15 +3,16 @@
 // has begun anew or the link was lost. What fails is told once, and tried again every two seconds.
 #pragma once
 
+#include <asio/cancellation_signal.hpp>
 #include <asio/io_context.hpp>
 #include <asio/steady_timer.hpp>
+#include <chrono>
 #include <cstddef>
 #include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "host/devices/device_steps.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/devices/device.hpp"
 #include "r4link/error.hpp"
@@ -23,34 +24,34 @@ class DeviceSetup {
   // `told`: what stands in the way. The board and the devices outlive it, and it lives on their loop.
   DeviceSetup(asio::io_context& io, AsyncBoard& board, const std::vector<Device>& devices,
               std::function<void(const Problem&)> told);
+  ~DeviceSetup() { give_up(); }
+  DeviceSetup(const DeviceSetup&) = delete;
+  DeviceSetup& operator=(const DeviceSetup&) = delete;
 
  private:
-  struct Part {
-    const Device* device = nullptr;
-    DeviceStep step;
+  using Clock = std::chrono::steady_clock;
+  // Of each device, whatever becomes of the others.
+  struct Progress {
+    bool done = false;
+    Clock::time_point again{};  // it has failed, and is not tried before
+    std::string told;           // why
   };
-  // As timer_ has expired, unless it is gone by then.
-  void after(AsyncBoard::Duration time, void (DeviceSetup::*what)());
-  void look_later(AsyncBoard::Duration time) { after(time, &DeviceSetup::look); }
+  void look_later();
   void look();
   void begin_again();
-  void do_next();
-  void on_result(const CommandResult& result, std::uint64_t attempt);
-  void on_state(const State& state);
-  void on_silence();
-  void step_done();
-  void fail(const Problem& problem);
+  void give_up();
+  bool begin_next(std::size_t from);
+  void on_result(const CommandResult& result);
+  void tell(const CommandResult& result);
 
   AsyncBoard& board_;
+  const std::vector<Device>& devices_;
   std::function<void(const Problem&)> told_;
-  std::vector<Part> parts_;
   asio::steady_timer timer_;
-  bool running_ = false;
-  std::size_t next_ = 0;            // of the parts
-  std::uint64_t attempt_ = 0;       // results of earlier ones do not count
-  std::uint32_t awaited_pnum_ = 0;  // whose answer is to come; 0: none
-  std::string last_told_;
-  std::vector<ScopedSubscription> subscriptions_;
+  std::vector<Progress> progress_;
+  std::size_t next_ = 0;  // that is set up now
+  ScopedSubscription restarts_;
+  std::shared_ptr<asio::cancellation_signal> attempt_;  // results of earlier ones do not count
   const std::shared_ptr<DeviceSetup*> here_ = std::make_shared<DeviceSetup*>(this);
 };
 

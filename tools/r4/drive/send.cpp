@@ -339,7 +339,8 @@ int send(const SendOptions& given) {
 constexpr const char* send_footer =
     R"(Each command is sent when the board's own state has confirmed the one before it; the first that is not
 confirmed ends the run. All are checked before the first is sent. Several in one argument, separated by
-semicolons, are a group: up to 16 of O D S R P B Z that the board executes together, or none of them.
+semicolons, are a group: up to 16 of O D S R P B Z and X:DAC that the board executes together, or none of
+them.
 
 The board goes safe, its outputs off, as soon as this program ends: --hold keeps them on. No motor turns while
 relay 1, the motor supply, is open: it is at first and after each safe state, and R:1,On closes it.

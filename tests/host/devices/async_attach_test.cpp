@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Described devices on the bus of a simulated board, set up by r4::AsyncBoard.
+#include <gtest/gtest.h>
+
+#include <asio/bind_cancellation_slot.hpp>
+#include <asio/cancellation_signal.hpp>
+#include <asio/co_spawn.hpp>
+#include <asio/detached.hpp>
+#include <asio/use_awaitable.hpp>
+#include <optional>
+
+#include "host/devices/device_steps.hpp"
+#include "r4link/async_board.hpp"
+#include "r4link/devices/device.hpp"
+#include "tests/support/at_will.hpp"
+#include "tests/support/problems.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+// On a loop of its own, with a board that has an MPU-6050 at 0x68 and an INA219 at 0x40.
+class AsyncAttach : public testing::Test {
+ protected:
+  explicit AsyncAttach(const BoardOptions& options = at_will()) : board_(io_, "sim:", options) {
+    board_.open();
+  }
+
+  // Runs the loop until `done()`; fails the test if that is not within 10 s.
+  template <class Done>
+  void run_until(Done done) {
+    const auto deadline = std::chrono::steady_clock::now() + 10s;
+    io_.restart();
+    while (!done()) {
+      if (std::chrono::steady_clock::now() > deadline) {
+        ADD_FAILURE() << "it has not come";
+        return;
+      }
+      io_.run_one_for(10s);
+    }
+  }
+  CommandResult attach(const Device& device) {
+    std::optional<CommandResult> result;
+    board_.async_attach(device, 5s, [&](const CommandResult& r) { result = r; });
+    EXPECT_FALSE(result) << "never inside the call";
+    run_until([&] { return result.has_value(); });
+    return result.value_or(CommandResult{});
+  }
+  std::uint64_t commands() const { return board_.statistics().commands; }
+
+  asio::io_context io_;
+  AsyncBoard board_;
+};
+
+TEST_F(AsyncAttach, HasTheBoardReadItAndSendItsFieldsBesideThoseThatWereChosen) {
+  const Device imu = Device::from("mpu6050@0x68:3");
+  const CommandResult result = attach(imu);
+  EXPECT_EQ(result.outcome, Outcome::confirmed);
+  EXPECT_EQ(result.step, 0);
+  run_until([&] { return imu.reading(board_.state(), "accel_z").number.has_value(); });
+  EXPECT_NEAR(imu.reading(board_.state(), "accel_z").number.value(), 9.80665, 1e-9);
+  EXPECT_TRUE(board_.state().present.has(StateField::ain24)) << "the fields of before";
+  const std::uint64_t before = commands();
+  EXPECT_EQ(attach(Device::from("ina219@0x40:3")).outcome, Outcome::confirmed);
+  EXPECT_EQ(commands() - before, 4U) << "is it there, two readings, and the field of slot 4";
+  EXPECT_EQ(attach(Device::from("ina219@0x40:3")).outcome, Outcome::confirmed);
+  EXPECT_EQ(commands() - before, 7U) << "its fields are sent already";
+}
+
+TEST(DeviceSteps, LeaveTheBoardsChoiceOfFieldsAlone) {
+  const Device power = Device::from("ina219@0x40:3");
+  EXPECT_EQ(fields_with("", power), "");
+  EXPECT_EQ(fields_with("DEFAULT,I2C3", power), "DEFAULT,I2C3,I2C4");
+  EXPECT_EQ(fields_with("I2C4,I2C3,AIN24", power), "");
+}
+
+TEST_F(AsyncAttach, TellsThatItIsAnotherDeviceAndWritesNothingToIt) {
+  const Device wrong = Device::from("icm20948@0x68");
+  const CommandResult result = attach(wrong);
+  EXPECT_EQ(result.outcome, Outcome::refused);
+  EXPECT_EQ(result.step, 1);
+  EXPECT_EQ(commands(), 1U);
+  const Problem problem = explain(wrong, result, board_.link());
+  EXPECT_EQ(problem.kind, ErrorKind::refused);
+  EXPECT_EQ(problem.outcome, Outcome::refused);
+  EXPECT_EQ(problem.thing, "icm20948@0x68");
+  EXPECT_EQ(problem.reason, "it is another device: its register x00 has x00, not xea");
+  EXPECT_FALSE(problem.fix.empty());
+}
+
+TEST_F(AsyncAttach, TellsThatNobodyAnswers) {
+  const Device missing = Device::from("ina219@0x41");
+  const CommandResult result = attach(missing);
+  EXPECT_EQ(result.outcome, Outcome::refused);
+  EXPECT_EQ(result.transfer.outcome, I2cOutcome::no_acknowledge);
+  EXPECT_EQ(explain(missing, result, board_.link()).reason, "it does not answer: no acknowledge");
+}
+
+// Its set-up waits for 5 s behind what is written.
+Device slow() {
+  return Device::parse("slow@0x68",
+                       "device slow\ntitle a test\naddress 0x68\ncheck x75 x68\n"
+                       "write x6b00 wait 5000\npoll all x3b 2 10\nvalue a all 0 i16be\n");
+}
+
+TEST_F(AsyncAttach, IsGivenUpByItsCancellationSlotWhileItWaitsForTheDevice) {
+  std::optional<CommandResult> result;
+  asio::cancellation_signal signal;
+  std::optional<std::uint32_t> first;  // the check's
+  const ScopedSubscription states =
+      board_.on_state([&](const ReceivedState& state, const Datagram&) {
+        const std::uint32_t answered = state.i2c_answer.pnum;
+        if (answered == 0) return;
+        if (!first) first = answered;
+        if (answered != *first) signal.emit(asio::cancellation_type::terminal);
+      });
+  board_.async_attach(slow(), 5s,
+                      asio::bind_cancellation_slot(signal.slot(), [&](auto r) { result = r; }));
+  run_until([&] { return result.has_value(); });
+  EXPECT_EQ(result->outcome, Outcome::cancelled);
+  EXPECT_EQ(result->step, 2);
+  EXPECT_EQ(commands(), 2U);
+}
+
+TEST_F(AsyncAttach, EndsWithTheBoard) {
+  std::optional<CommandResult> result;
+  board_.async_attach(slow(), 5s, [&](const CommandResult& r) { result = r; });
+  run_until([&] { return board_.state().i2c_answer.pnum != 0; });
+  board_.close();
+  run_until([&] { return result.has_value(); });
+  EXPECT_EQ(result->outcome, Outcome::closed);
+}
+
+TEST_F(AsyncAttach, IsAwaited) {
+  std::optional<Outcome> outcome;
+  asio::co_spawn(
+      io_,
+      [&]() -> asio::awaitable<void> {
+        const auto result =
+            co_await board_.async_attach(Device::from("ina219"), 5s, asio::use_awaitable);
+        outcome = result.outcome;
+      },
+      asio::detached);
+  run_until([&] { return outcome.has_value(); });
+  EXPECT_EQ(*outcome, Outcome::confirmed);
+}
+
+TEST_F(AsyncAttach, WhatCannotBeIsSaidAtOnce) {
+  const auto ignored = [](const CommandResult&) { ADD_FAILURE() << "it was begun"; };
+  EXPECT_EQ(problem_of([&] { board_.async_attach(slow(), 0s, ignored); }).kind, ErrorKind::usage);
+  BoardOptions options;
+  options.role = BoardRole::watch;
+  AsyncBoard watcher(io_, "sim:", options);
+  EXPECT_EQ(problem_of([&] { watcher.async_attach(slow(), 1s, ignored); }).kind, ErrorKind::usage);
+}
+
+TEST_F(AsyncAttach, ASilentBoardIsNamedWithTheDevice) {
+  AsyncBoard board(io_, "udp://127.0.0.1:9?listen=0", at_will());
+  board.open();
+  std::optional<CommandResult> result;
+  const Device device = Device::from("ina219");
+  board.async_attach(device, 50ms, [&](const CommandResult& r) { result = r; });
+  run_until([&] { return result.has_value(); });
+  EXPECT_EQ(result->outcome, Outcome::timed_out);
+  const Problem problem = explain(device, *result, board.link());
+  EXPECT_EQ(problem.thing, "ina219@0x40: X:READ,64,x01,2");
+  EXPECT_TRUE(contains(problem.reason, "nothing was heard from the board yet"));
+}
+
+struct AsyncAttachUnarmed : AsyncAttach {
+  AsyncAttachUnarmed() : AsyncAttach(BoardOptions{}) {}
+};
+
+TEST_F(AsyncAttachUnarmed, WhatIsToBeWrittenTakesArm) {
+  const Device imu = Device::from("mpu6050");
+  const CommandResult result = attach(imu);
+  EXPECT_EQ(result.outcome, Outcome::not_armed);
+  EXPECT_EQ(result.step, 2);
+  EXPECT_TRUE(explain(imu, result, board_.link()).thing.starts_with("mpu6050@0x68: X:WRITE,104,"));
+  EXPECT_EQ(attach(Device::from("ina219")).outcome, Outcome::confirmed) << "nothing is written";
+  std::optional<CommandResult> armed;
+  board_.async_arm(5s, [&](const CommandResult& r) { armed = r; });
+  run_until([&] { return armed.has_value(); });
+  EXPECT_EQ(attach(imu).outcome, Outcome::confirmed);
+}
+
+}  // namespace
+}  // namespace r4::test
