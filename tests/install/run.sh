@@ -71,6 +71,12 @@ if ! echo | ../openpodcar/build/openpodcar 1,0 >"$work/out" 2>&1 || ! grep -q '^
   echo "install: openpodcar does not arrive: $(cat "$work/out")"
   exit 1
 fi
+status=0
+../openpodcar/build/openpodcar_ros2 fax:1 >"$work/out" 2>&1 || status=$?
+if [[ $status != 2 ]]; then
+  echo "install: 'openpodcar_ros2 fax:1' ended with $status: $(cat "$work/out")"
+  exit 1
+fi
 
 cp -r "$source_tree/tests/install/own_asio" "$work"
 cmake -S ../own_asio -B ../own_asio/build -DCMAKE_CXX_COMPILER="$cxx" -DCMAKE_PREFIX_PATH="$prefix" >"$work/cmake.log"

@@ -16,6 +16,9 @@ constexpr double search_ahead_m = 1.5;  // so that the eight's crossing is no sh
 constexpr double near_m = 0.05;         // the end
 constexpr double braking_m_s2 = 0.4;
 constexpr double slowest_m_s = 0.15;
+constexpr double turning_m =
+    2.5;  // the radius; wider than the narrowest, so that there is something to correct with
+constexpr double turning_step_rad = 0.05;
 
 }  // namespace
 
@@ -43,6 +46,33 @@ Course Course::figure_of_eight(double reach_m) {
     const double scale = reach_m / (1 + std::sin(angle) * std::sin(angle));
     waypoints.push_back({scale * std::cos(angle), scale * std::cos(angle) * std::sin(angle)});
   }
+  return Course(std::move(waypoints));
+}
+
+Course Course::towards(const Waypoint& goal, const r4::control::Pose& from) {
+  const double along_x = std::cos(from.yaw_rad);
+  const double along_y = std::sin(from.yaw_rad);
+  const double dx = goal.x_m - from.x_m;
+  const double dy = goal.y_m - from.y_m;
+  const double ahead_m = along_x * dx + along_y * dy;
+  const double left_m = along_x * dy - along_y * dx;
+  // It turns to the side of the goal. What lies within that circle is reached by the one on the other side.
+  double side = left_m < 0 ? -1 : 1;
+  if (std::hypot(ahead_m, side * left_m - turning_m) < turning_m) side = -side;
+  // The tangent from the circle to the goal, seen from the circle's middle.
+  const double beyond_m = side * left_m - turning_m;
+  const double distance_m = std::max(turning_m, std::hypot(ahead_m, beyond_m));
+  double turn = std::atan2(beyond_m, ahead_m) + std::asin(turning_m / distance_m);
+  if (turn < -turning_step_rad) turn += 2 * std::numbers::pi;
+
+  std::vector<Waypoint> waypoints = {{from.x_m, from.y_m}};
+  for (double angle = turning_step_rad; angle < turn; angle += turning_step_rad) {
+    const double ahead = turning_m * std::sin(angle);
+    const double left = side * turning_m * (1 - std::cos(angle));
+    waypoints.push_back(
+        {from.x_m + along_x * ahead - along_y * left, from.y_m + along_y * ahead + along_x * left});
+  }
+  waypoints.push_back(goal);
   return Course(std::move(waypoints));
 }
 

@@ -19,6 +19,9 @@ class Course {
   // Bernoulli's lemniscate through the origin, `reach` to each side: it bends evenly more towards its ends, where the
   // radius is a third of that.
   static Course figure_of_eight(double reach_m);
+  // From there to a goal anywhere: along a circle until it looks at the goal, and straight on. Throws if that is where
+  // it stands.
+  static Course towards(const Waypoint& goal, const r4::control::Pose& from);
 
   // How to move from there; nothing once the end is reached.
   r4::control::Twist wish(const r4::control::Pose& pose, double cruise_m_s);

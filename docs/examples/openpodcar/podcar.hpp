@@ -46,6 +46,7 @@ class Podcar {
   const r4::control::Odometry& odometry() const { return odometry_; }
   double speed_m_s() const { return wheel_.speed_m_s(); }
   double steering_rad() const { return steering_rad_; }
+  double turn_rad_s() const { return car_.twist({speed_m_s(), steering_rad_}).turn_rad_s; }
 
  private:
   r4::control::Ackermann car_{podcar_geometry};

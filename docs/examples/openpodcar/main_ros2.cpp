@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Drives an OpenPodcar as ROS 2 asks, while somebody holds the dead-man's handle: by a joystick, by cmd_vel, or to the
+// goals of RViz (pilot.hpp says who of them drives). ROS itself need not be installed.
+//
+//     openpodcar_ros2 [URL]        without a URL a simulated board with a model of the vehicle behind it
+//
+// The joystick's start arms; whatever ends the drive, it is pressed once more. Ctrl-C ends. Exit code: 0 ended, 2 usage,
+// 3 refused, 4 no such transport or graph, 5 permission, 6 not supported.
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <optional>
+#include <r4link/board.hpp>
+#include <r4link/control/loop.hpp>
+#include <r4link/error.hpp>
+#include <r4link/simulation.hpp>
+#include <string>
+
+#include "model.hpp"
+#include "pilot.hpp"
+#include "podcar.hpp"
+#include "topics.hpp"
+
+using namespace std::chrono_literals;
+
+namespace {
+
+volatile std::sig_atomic_t ended = 0;
+
+// False if it was ended before.
+bool wait_for_start(r4::Board& board, Podcar& podcar, Pilot& pilot, Topics& topics) {
+  r4::States states = board.states();
+  while (ended == 0 && pilot.mode() == Pilot::Mode::off) {
+    const auto state = states.take(20ms);
+    if (state && podcar.sense(*state)) topics.publish(podcar, *state);
+    topics.take(pilot, podcar.pose());
+  }
+  return ended == 0;
+}
+
+// Until something ends it. Why, pilot.why() says.
+void drive(r4::Board& board, Podcar& podcar, Pilot& pilot, Topics& topics) {
+  board.proximity(1, podcar_clearance_cm);
+  board.arm();
+  topics.take(pilot, podcar.pose());  // stop may have been pressed meanwhile
+  pilot.begin(Pilot::Time::clock::now());
+  std::puts("armed");
+  const auto report = r4::control::run_loop(
+      board, podcar_loop(), [&](const r4::control::LoopStep& step) -> std::optional<r4::Setpoints> {
+        const bool steering_is_known = podcar.sense(step.state);
+        if (!steering_is_known) pilot.end("AINSTEER tells of an angle that there is not");
+        if (ended != 0) pilot.end("it was ended");
+        topics.publish(podcar, step.state);
+        topics.take(pilot, podcar.pose());
+        const auto wish = pilot.wish(podcar.pose(), Pilot::Time::clock::now());
+        if (wish) return podcar.drive(*wish, step.dt_s);
+        board.stop_async();  // the motors' supply is off at once, and the parking brake springs on
+        return std::nullopt;
+      });
+  board.stop_async();
+  pilot.end(report.why);
+}
+
+void run(r4::Board& board) {
+  Topics topics;
+  Podcar podcar;
+  Pilot pilot;
+  board.wait_active();
+  std::puts("hold the handle, and press the joystick's start");
+  while (wait_for_start(board, podcar, pilot, topics)) {
+    try {
+      drive(board, podcar, pilot, topics);
+    } catch (const r4::Error& error) {  // the board is not there, or refuses
+      board.stop_async();
+      pilot.end(error.what());
+    }
+    const r4::control::Pose& pose = podcar.pose();
+    std::printf("stopped at %.2f, %.2f: %s\n", pose.x_m, pose.y_m, pilot.why().c_str());
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, [](int) { ended = 1; });
+  try {
+    if (argc > 2) {
+      throw r4::Error(r4::ErrorKind::usage, argv[2], "it takes one URL", "give no more");
+    }
+    r4::BoardOptions options;
+    options.session.fields = podcar_fields;
+    PodcarModel model;
+    r4::sim::SimulatedRobot robot(model);
+    r4::Board board(argc == 2 ? argv[1] : robot.url(), options);
+    run(board);
+    return 0;
+  } catch (const r4::Error& error) {  // the thing, the reason and the fix
+    std::fprintf(stderr, "openpodcar_ros2: %s\n", error.what());
+    return static_cast<int>(error.kind());
+  }
+}
