@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What test_can_faults.py runs where SocketCAN is: a board and hosts on a bus with bit time and errors.
+"""What test_can.py runs where SocketCAN is: a board and hosts on a bus with bit time and errors.
 
 slcan0, the board's controller, and slcan1, the host's, are nodes of slcan_bus: error frames, error
 counters, bus-off and the states that the kernel tells of are those of ISO 11898-1.

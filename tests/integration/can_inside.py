@@ -385,6 +385,7 @@ def test_eight_boards_on_one_bus_each_with_its_host():
             in_control(host)
         for host in hosts:
             host.skip_past()
+        for host in hosts:  # all of them, in the same second
             states = [host.next(is_state) for _ in range(20)]
             assert all((later['t'] - earlier['t']) % 50 == 0 for earlier, later in zip(states, states[1:]))
         hosts[5].signal(signal.SIGKILL)

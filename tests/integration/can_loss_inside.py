@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What test_can_loss.py runs where SocketCAN is: frames lost, late and corrupt, ends that vanish.
+"""What test_can.py runs where SocketCAN is: frames lost, late and corrupt, ends that vanish.
 
 netem loses and delays on the pair vxcan0, vxcan1; cangw corrupts what it carries from vcan0 to vcan1.
 """
@@ -40,10 +40,10 @@ def netem(*how, ends=('vxcan0', 'vxcan1')):
             subprocess.run(['tc', 'qdisc', 'del', 'dev', interface, 'root'], check=True)
 
 
-# Of 2000 states of five frames, those that arrive differ by 1 % from 0.99^frames in one run of twenty, for
-# the kernel's dice; from what the part of the frames allows that it really lost, in less than one of ten
-# thousand: their standard deviation is 0.13 %.
-STATES, NODES, RATE = 2000, 4, 100
+# Of 1000 states of five frames, those that arrive differ by 1 % from 0.99^frames in one run of six, for the
+# kernel's dice; from what the part of the frames allows that it really lost, in less than one of ten thousand: their
+# standard deviation is 0.2 %, and that of the part of the frames 0.14 %.
+STATES, NODES, RATE = 1000, 4, 100
 
 
 def frames_of(first):
@@ -86,7 +86,7 @@ def test_of_telemetry_arrives_what_its_frames_allow(tmp_path):
     with_this_loss = sum((1 - loss) ** count for count in sent) / len(sent)
     print(f'{len(sent)} states of {sum(sent) / len(sent):.2f} frames: {100 * share:.2f} % arrived; of 0.99^frames '
           f'{100 * expected:.2f} %, of the {100 * loss:.2f} % lost {100 * with_this_loss:.2f} %')
-    assert 0.005 < loss < 0.015 and abs(share / with_this_loss - 1) < 0.01
+    assert 0.003 < loss < 0.017 and abs(share / with_this_loss - 1) < 0.01
 
 
 def executed(log):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What test_with_can.py runs where the kernel has CAN: tools/with-can runs a command on that kernel."""
+"""What test_can.py runs where the kernel has CAN: tools/with-can runs a command on that kernel."""
 import os
 import pathlib
 import pty
@@ -9,6 +9,9 @@ import subprocess
 import tempfile
 
 import pytest
+
+if os.geteuid() != 0:
+    pytest.skip('it takes root to make interfaces and to become somebody else', allow_module_level=True)
 
 TOOLS = pathlib.Path(__file__).resolve().parents[2] / 'tools'
 WITH_CAN = TOOLS / 'with-can'

@@ -30,7 +30,8 @@ def test_the_state_brings_what_the_board_reads_by_itself(board, wait):
     board.fields('DEFAULT,I2C1,I2CBUS')
     wait(lambda: board.state.i2c1.data == b'\x68')
     state = board.next_state()
-    assert state.i2c1.errors == 0 and 0 <= state.t_ms - state.i2c1.t_ms <= 40
+    # A board that comes late reads behind the T of its state.
+    assert state.i2c1.errors == 0 and abs(state.t_ms - state.i2c1.t_ms) <= 40
     assert state.i2cbus == ('done', 0, 0)
     board.i2c.poll_off(1)
     wait(lambda: board.state.i2c1.data == b'')
