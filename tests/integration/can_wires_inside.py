@@ -1,42 +1,58 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What test_can_wires.py runs where SocketCAN is: a board on two buses, of which either is switched off."""
+"""What test_can_wires.py runs where SocketCAN is: a board on two buses, of which either is switched off or breaks, and
+on one beside a cable."""
 import contextlib
+import fcntl
+import signal
+import socket
+import struct
 import subprocess
 import time
 
 from r4_process import Board, Running, is_state, monitor, run
+from slcan_bus import SlcanBus
+from wired_host import BACK_WITHIN_S, REPORTED_WITHIN_S, TIMEOUT_S, WiredHost, Wire, has_joined, has_left
 
 BUSES = ('vcan8', 'vcan9')
 URLS = [f'can://{bus}?node=3' for bus in BUSES]
-REPORTED_WITHIN_S, BACK_WITHIN_S = 0.05, 1
-# The guest emulates its processor.
-SLOWER = 4
+
+
+SIOCGIFFLAGS, SIOCSIFFLAGS, IFF_UP = 0x8913, 0x8914, 1
 
 
 def ip(*arguments):
     subprocess.run(['ip', *arguments], check=True)
 
 
+def switch(interface, up):
+    """At once: the guest takes a quarter of a second to start a program."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
+        request = bytearray(struct.pack('16s24x', interface.encode()))
+        fcntl.ioctl(any_socket, SIOCGIFFLAGS, request)
+        flags, = struct.unpack_from('=H', request, 16)
+        struct.pack_into('=H', request, 16, flags | IFF_UP if up else flags & ~IFF_UP)
+        fcntl.ioctl(any_socket, SIOCSIFFLAGS, request)
+
+
+@contextlib.contextmanager
+def one_bus(bus):
+    ip('link', 'add', bus, 'type', 'vcan')
+    ip('link', 'set', bus, 'up')
+    try:
+        yield bus
+    finally:
+        ip('link', 'delete', bus)
+
+
 @contextlib.contextmanager
 def two_buses():
-    for bus in BUSES:
-        ip('link', 'add', bus, 'type', 'vcan')
-        ip('link', 'set', bus, 'up')
-    try:
+    with one_bus(BUSES[0]), one_bus(BUSES[1]):
         yield
-    finally:
-        for bus in BUSES:
-            ip('link', 'delete', bus)
 
 
 def of_wire(bus, carries):
     return lambda each: (each['type'] == 'wire' and bus in each['fields']['name'] and
                          (each['fields']['state'] == 'carrying') == carries)
-
-
-def has_joined(wires):
-    """The board has so many wires to its host, with one that it did not have."""
-    return lambda each: each.get('wire', {}).get('event') == 'joined' and each['wire']['wires'] == wires
 
 
 def test_either_of_two_buses_is_switched_off_and_nothing_is_missed():
@@ -47,15 +63,15 @@ def test_either_of_two_buses_is_switched_off_and_nothing_is_missed():
         board.next(has_joined(2))
         began = host.next(is_state)['came']
         for bus in BUSES:
-            ip('link', 'set', bus, 'down')
             down = time.monotonic()
+            switch(bus, up=False)
             lost = host.next(of_wire(bus, False))['came'] - down
-            ip('link', 'set', bus, 'up')
             up = time.monotonic()
+            switch(bus, up=True)
             back = host.next(of_wire(bus, True))['came'] - up
             board.next(has_joined(2))
             print(f'{bus}: told of it after {lost * 1e3:.0f} ms, used again after {back * 1e3:.0f} ms')
-            assert lost <= SLOWER * REPORTED_WITHIN_S and back <= SLOWER * BACK_WITHIN_S
+            assert lost <= REPORTED_WITHIN_S and back <= BACK_WITHIN_S
         for _ in range(20):
             host.next(is_state)
         states = [each for each in host.log if is_state(each) and each['came'] >= began]
@@ -93,3 +109,60 @@ def test_a_stop_by_either_bus_is_enough():
         ip('link', 'set', BUSES[0], 'down')
         assert run('stop', *URLS, timeout=60).returncode == 0
         board.state('SAFE', 'stop')
+
+
+def test_a_cable_beside_a_bus(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('wires')
+    with one_bus('vcan8') as bus, Board(f'pty:{folder}/board', f'can://{bus}?node=3') as board:
+        cable = Wire('pty', f'{folder}/host', f'{folder}/board')
+        try:
+            with WiredHost([cable.url, f'can://{bus}?node=3'], ['/host', bus]) as host:
+                board.next(has_joined(2))
+                for place, away, back in (('/host', cable.pull, cable.plug_in),
+                                          (bus, lambda: switch(bus, up=False), lambda: switch(bus, up=True))):
+                    assert host.loses(place, away) <= REPORTED_WITHIN_S
+                    board.next(has_left(1))
+                    assert host.has_again(place, back) <= BACK_WITHIN_S
+                    board.next(has_joined(2))
+                # What was held up brings old states when it goes on.
+                assert host.loses('/host', lambda: cable.signal(signal.SIGSTOP)) <= TIMEOUT_S + REPORTED_WITHIN_S
+                board.next(has_left(1))
+                assert host.has_again('/host', lambda: cable.signal(signal.SIGCONT)) <= BACK_WITHIN_S
+                board.next(has_joined(2))
+                host.ends(board)
+        finally:
+            cable.pull()
+
+
+def test_two_buses_of_which_one_is_switched_off_and_the_other_breaks():
+    """can0 and can1 are on a bus of their own, the ends of the other have error counters and bus-off."""
+    boards, hosts = (('can0', 'slcan0'), ('can1', 'slcan1'))
+    with contextlib.ExitStack() as after, SlcanBus(2, 500000) as bus, \
+            Board(*(f'can://{each}?node=3' for each in boards)) as board, \
+            WiredHost([f'can://{each}?node=3' for each in hosts], [f'//{each}?' for each in hosts]) as host:
+        after.callback(switch, 'can1', up=True)
+        board.next(has_joined(2))
+
+        def spoil(node):
+            bus.order('spoil', node)
+            bus.state(node, 'bus-off')
+
+        def heal(node):
+            bus.order('heal', node)
+            switch(f'slcan{node}', up=False)  # for which the kernel takes more than a second now and then
+            return lambda: switch(f'slcan{node}', up=True)
+
+        assert host.loses('//slcan1', lambda: spoil(1)) <= REPORTED_WITHIN_S
+        board.next(has_left(1))
+        assert host.has_again('//slcan1', heal(1)) <= BACK_WITHIN_S
+        board.next(has_joined(2))
+        # The host cannot see it: the board's end of the bus is off.
+        assert host.loses('//slcan1', lambda: spoil(0)) <= TIMEOUT_S + REPORTED_WITHIN_S
+        board.next(has_left(1))
+        assert host.has_again('//slcan1', heal(0)) <= BACK_WITHIN_S
+        board.next(has_joined(2))
+        assert host.loses('//can1', lambda: switch('can1', up=False)) <= REPORTED_WITHIN_S
+        board.next(has_left(1))
+        assert host.has_again('//can1', lambda: switch('can1', up=True)) <= BACK_WITHIN_S
+        board.next(has_joined(2))
+        host.ends(board)

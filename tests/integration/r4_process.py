@@ -103,10 +103,10 @@ def stop_takes_ms(url):
 
 
 class Running:
-    """r4 as it runs. Each line of its stdout is kept with the time at which it came."""
+    """r4 as it runs, or another program. Each line of its stdout is kept with the time at which it came."""
 
-    def __init__(self, *arguments, **options):
-        self.process = subprocess.Popen([R4, *arguments], stdout=subprocess.PIPE,
+    def __init__(self, *arguments, program=R4, **options):
+        self.process = subprocess.Popen([program, *arguments], stdout=subprocess.PIPE,
                                         stderr=subprocess.PIPE, text=True, **options)
         self.lines = queue.Queue()
         self.log = []  # what was taken off the queue
@@ -169,6 +169,10 @@ class Running:
     def rest(self):
         """Ends it; all that it has printed."""
         assert self.end() == 0, self.errors
+        return self.left()
+
+    def left(self):
+        """It has ended; all that it has printed."""
         while True:
             came, line = self.lines.get()
             if line is None:

@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The serial transport on a USB serial port with its real driver, in the guest of tools/with-can.
 
-The board at the far end of the cable is simulated, outside. Inside runs usb_serial_inside.py.
+The board at the far end of the cable is simulated, outside. Inside runs usb_serial_inside.py, whose input and output
+are another wire to that board.
 """
+import json
+import os
 import pathlib
 import subprocess
+import threading
+import tty
 
 from r4_process import Board
 
@@ -12,12 +17,31 @@ HERE = pathlib.Path(__file__).resolve().parent
 WITH_CAN = HERE.parents[1] / 'tools' / 'with-can'
 
 
-def test_listed_streamed_unplugged_under_way_and_found_again_by_its_serial_number(tmp_path):
-    path = tmp_path / 'board'
-    with Board(f'pty:{path}'):
-        inside = subprocess.run(
-            [WITH_CAN, '--usb-serial', path, '--time', '60', '/usr/bin/python3',
-             HERE / 'usb_serial_inside.py'], stdin=subprocess.DEVNULL, capture_output=True,
-            text=True, timeout=300, check=False)
-    print(inside.stdout)
-    assert inside.returncode == 0, inside.stderr
+def carry(source, destination):
+    """All bytes, in a thread of its own, until either end is gone."""
+    def run():
+        try:
+            while received := os.read(source, 4096):
+                os.write(destination, received)
+        except OSError:
+            pass
+    threading.Thread(target=run, daemon=True).start()
+
+
+def test_listed_streamed_unplugged_under_way_and_found_again_and_one_of_two_wires(tmp_path):
+    cable, other, told, commands = (tmp_path / name for name in ('board', 'other', 'told', 'commands'))
+    with Board(f'pty:{cable}', f'pty:{other}') as board, open(told, 'wb') as errors:
+        end = os.open(other, os.O_RDWR | os.O_NOCTTY)
+        tty.setraw(end)
+        with subprocess.Popen([WITH_CAN, '--usb-serial', cable, '--time', '120', '/usr/bin/python3',
+                               HERE / 'usb_serial_inside.py', commands], stdin=subprocess.PIPE,
+                              stdout=subprocess.PIPE, stderr=errors) as inside:
+            carry(end, inside.stdin.fileno())
+            carry(inside.stdout.fileno(), end)
+            status = inside.wait(timeout=300)
+        print(told.read_text())
+        assert status == 0
+        log = board.rest()
+        os.close(end)
+    executed = [each['executed']['command'] for each in log if 'executed' in each]
+    assert [each for each in executed if each.startswith('S:')] == json.loads(commands.read_text())

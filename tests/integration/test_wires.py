@@ -5,42 +5,14 @@ import os
 import pathlib
 import re
 import signal
-import subprocess
-import sys
 import time
 
 import pytest
 
-from r4_process import (ERROR, PATIENCE_S, SANITIZED, Board, Running, is_link, is_state, lasts, monitor, objects, run,
+from r4_process import (ERROR, PATIENCE_S, Board, Running, free_port, is_link, is_state, lasts, monitor, objects, run,
                         text_of)
-
-RELAY = pathlib.Path(__file__).resolve().parents[1] / 'support' / 'wire_relay.py'
-REPORTED_WITHIN_S = 10 if SANITIZED else 0.05  # where the system tells
-TIMEOUT_S = 1  # where it does not
-BACK_WITHIN_S = 10 if SANITIZED else 1
-LONGEST_GAP_S = 1 if SANITIZED else 0.1  # of the machine, which has others to serve: states come every 10 ms
-
-
-class Wire:
-    """A wire of its own to a board; `url` is its host's end."""
-
-    def __init__(self, kind, *where):
-        self.kind, self.where = kind, where
-        self.process = self.url = None
-        self.plug_in()
-
-    def plug_in(self):
-        self.process = subprocess.Popen([sys.executable, '-S', RELAY, self.kind, *self.where], stdout=subprocess.PIPE,
-                                        text=True)
-        self.url = self.process.stdout.readline().strip()
-
-    def pull(self):
-        self.process.kill()
-        self.process.wait()
-        self.process.stdout.close()
-
-    def signal(self, number):
-        self.process.send_signal(number)
+from wired_host import (BACK_WITHIN_S, LONGEST_GAP_S, REPORTED_WITHIN_S, TIMEOUT_S, WiredHost, Wire, has_joined,
+                        has_left)
 
 
 @contextlib.contextmanager
@@ -170,6 +142,31 @@ def test_commands_are_executed_once_each_while_wires_come_and_go():
         print(f'400 commands: the slowest took {slowest:.0f} ms')
         assert [each['command'] for each in results] == commands and all(each['confirmed'] for each in results)
         assert [each for each in executed if each.startswith('S:')] == commands
+
+
+@pytest.mark.parametrize('signals', [(signal.SIGSTOP, signal.SIGCONT), (signal.SIGKILL, None)])
+def test_a_bridge_that_is_one_of_two_wires_stands_still_or_dies(tmp_path, signals):
+    tty = tmp_path / 'board'
+    with Board('udp://127.0.0.1:0', f'pty:{tty}') as board, contextlib.ExitStack() as bridges:
+        port = free_port()
+
+        def bridge():
+            return bridges.enter_context(Running('bridge', f'udp://127.0.0.2:{port}', f'serial://{tty}', '--json'))
+
+        def again():
+            if signals[1]:
+                running.signal(signals[1])
+            else:
+                bridge()
+
+        running = bridge()
+        with WiredHost([board.host_url, f'udp://127.0.0.2:{port}?listen=0'], ['127.0.0.1', '127.0.0.2']) as host:
+            board.next(has_joined(2))
+            assert host.loses('127.0.0.2', lambda: running.signal(signals[0])) <= TIMEOUT_S + REPORTED_WITHIN_S
+            board.next(has_left(1))
+            assert host.has_again('127.0.0.2', again) <= BACK_WITHIN_S
+            board.next(has_joined(2))
+            host.ends(board)
 
 
 def test_each_command_takes_the_wires_of_a_board(tmp_path):

@@ -1,16 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What test_usb_serial.py runs inside the guest; fails by an exception.
 
-The USB serial port is real to everything here: the kernel's driver, sysfs, libserialport.
+The USB serial port is real to everything here: the kernel's driver, sysfs, libserialport. Our input and output are
+another wire to the same board; what there is to tell goes to the errors.
 """
+import json
 import os
+import pathlib
+import pty
 import queue
+import signal
 import socket
 import subprocess
+import sys
 import threading
 import time
+import tty
 
-from r4_process import driving, is_link, is_state, monitor, objects, run, stop_takes_ms, watch
+from r4_process import Running, driving, free_port, is_link, is_state, monitor, objects, run, stop_takes_ms, watch
+from test_usb_serial import carry
+from wired_host import BACK_WITHIN_S as USED_AGAIN_WITHIN_S, REPORTED_WITHIN_S, TIMEOUT_S, WiredHost
 
 NETLINK_KOBJECT_UEVENT = 15
 PORT = '/dev/ttyUSB0'
@@ -32,6 +41,16 @@ def kernel_reports():
                 reports.put((now, event.split(b'@')[0].decode()))
     threading.Thread(target=read, daemon=True).start()
     return reports
+
+
+def other_wire():
+    """A terminal that leads to the board by our input and output, which are used for nothing else from now on."""
+    near, far = pty.openpty()
+    tty.setraw(far)
+    carry(0, near)
+    carry(near, os.dup(1))
+    os.dup2(2, 1)
+    return os.ttyname(far)
 
 
 def is_down(each):
@@ -116,8 +135,50 @@ def shared_by_programs():
         assert run('send', by_path, 'E:CLEAR').returncode == 0
 
 
+def one_of_two_wires(terminal, commands):
+    """The other is UDP, by a gateway; `commands`: the file for those that the board must have executed."""
+    reports = kernel_reports()
+    port = free_port()
+
+    def gateway():
+        return Running('bridge', f'udp://127.0.0.2:{port}', f'serial://{terminal}', '--json')
+
+    def by_usb(order, action):
+        def act():
+            subprocess.run(['r4-usb', order], check=True)
+            at, what = reports.get(timeout=5)
+            assert what == action
+            return at
+        return act
+
+    with gateway() as first, WiredHost([f'serial://{PORT}', f'udp://127.0.0.2:{port}?listen=0'],
+                                       [PORT, '127.0.0.2']) as host:
+        def both():
+            host.goes_on(50)  # until the board, too, has joined them
+
+        both()
+        for _ in range(2):
+            assert host.loses(PORT, by_usb('unplug', 'remove')) <= REPORTED_WITHIN_S
+            host.goes_on()
+            assert host.has_again(PORT, by_usb('plug', 'add')) <= USED_AGAIN_WITHIN_S
+            both()
+        assert host.loses('127.0.0.2', lambda: first.signal(signal.SIGSTOP)) <= TIMEOUT_S + REPORTED_WITHIN_S
+        assert host.has_again('127.0.0.2', lambda: first.signal(signal.SIGCONT)) <= USED_AGAIN_WITHIN_S
+        both()
+        assert host.loses('127.0.0.2', lambda: first.signal(signal.SIGKILL)) <= TIMEOUT_S + REPORTED_WITHIN_S
+        host.goes_on()
+        with gateway() as second:
+            since = time.monotonic()
+            assert host.has_again('127.0.0.2', lambda: since) <= USED_AGAIN_WITHIN_S
+            both()
+            commands.write_text(json.dumps(host.commands_at_its_end()))
+            assert second.process.poll() is None
+
+
+TERMINAL = other_wire()
 listed_with_who_controls_it()
 streams_at_the_boards_rate()
 shared_by_programs()
 unplugged_and_plugged_in_again('serial:?sn=R4-0001', times=3)
 unplugged_and_plugged_in_again(f'serial://{PORT}', times=1)
+one_of_two_wires(TERMINAL, pathlib.Path(sys.argv[1]))

@@ -184,8 +184,9 @@ TEST(LinkSimulation, KeepsEveryPromiseOverSeveralWires) {
 
 // What was mended stays so.
 TEST(LinkSimulation, KeepsEveryPromiseOfSeedsThatBrokeOneOnce) {
-  // A BUSY from before a wire had joined counted beside those of the others, and held the commands back (18012);
-  // the last BUSY of one that lags made the others wait for longer than what they had been told (415).
+  // The last BUSY of one that lags made the others wait for longer than what they had been told (415); a BUSY from
+  // before a wire had joined counted beside those of the others, and held the commands back (18012, which the mend
+  // of 415 mends as well).
   for (const std::uint64_t seed : {415U, 18012U}) {
     EXPECT_EQ(World(seed, false, World::Beside::wires).run().violation, "") << "seed " << seed;
   }

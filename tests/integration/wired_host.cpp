@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A host with several wires to its board that is at work, as a process: it commands all the time, each when the one
+// before it has ended, and tells of every state and of what becomes of its wires. For wired_host.py.
+//
+//     wired_host URL...                     ends when its input does
+//
+//     {"type":"state","at":12.345678,"t":…}                       as it was received, by the monotonic clock
+//     {"type":"command","command":"S:1000,1","confirmed":true}
+//     {"type":"wire","at":…,"name":…,"carries":true}
+//     {"type":"link","at":…,"active":true}
+#include <poll.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "r4link/board.hpp"
+
+namespace {
+
+using Json = nlohmann::json;
+using Clock = std::chrono::steady_clock;
+using namespace std::chrono_literals;
+
+double seconds(Clock::time_point at) {
+  return std::chrono::duration<double>(at.time_since_epoch()).count();
+}
+
+void print(const Json& object) {
+  static std::mutex mutex;
+  const std::string line = object.dump() + "\n";
+  const std::lock_guard lock(mutex);
+  std::fputs(line.c_str(), stdout);
+  std::fflush(stdout);
+}
+
+// Until the other end of our input is closed.
+bool wanted() {
+  pollfd input{0, POLLIN, 0};
+  return ::poll(&input, 1, 0) == 0;
+}
+
+void work(const std::vector<std::string>& urls) {
+  r4::BoardOptions options;
+  options.session.arming = r4::Arming::off;
+  r4::BoardCallbacks callbacks;
+  callbacks.on_wire = [](const r4::Wire& wire) {
+    const bool carries = wire.state == r4::WireState::carrying;
+    print({{"type", "wire"},
+           {"at", seconds(Clock::now())},
+           {"name", wire.name},
+           {"carries", carries}});
+  };
+  callbacks.on_link = [](const r4::LinkStatus& link) {
+    const bool active = link.state == r4::HostLinkState::active;
+    print({{"type", "link"}, {"at", seconds(Clock::now())}, {"active", active}});
+  };
+  r4::Board board(urls, options, callbacks);
+  board.wait_active(30s);
+  r4::States states = board.states({.lossless = true});
+  std::thread telling([&] {
+    while (!states.ended()) {
+      const auto state = states.take(1s);
+      if (state) print({{"type", "state"}, {"at", seconds(state->received)}, {"t", state->t_ms}});
+    }
+  });
+  for (int i = 0; wanted(); ++i) {
+    const std::string command =
+        "S:" + std::to_string(1000 + i % 1000) + "," + std::to_string(i % 16 + 1);
+    Json result{{"type", "command"}, {"command", command}, {"confirmed", true}};
+    try {
+      board.send(command, 5s);
+    } catch (const r4::Error& error) {
+      result["confirmed"] = false;
+      result["error"] = error.what();
+    }
+    print(result);
+  }
+  board.close();
+  telling.join();
+}
+
+}  // namespace
+
+int main(int count, char** arguments) {
+  try {
+    work({arguments + 1, arguments + count});
+  } catch (const r4::Error& error) {
+    std::fprintf(stderr, "wired_host: %s\n", error.what());
+    return 1;
+  }
+}

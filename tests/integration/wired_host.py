@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One session over several wires that drives all the time (wired_host.cpp): what it misses while they come and go."""
+import os
+import pathlib
+import subprocess
+import sys
+import time
+
+from r4_process import R4, SANITIZED, Running
+
+PROGRAM = pathlib.Path(R4).parent / 'tests' / 'wired_host'
+RELAY = pathlib.Path(__file__).resolve().parents[1] / 'support' / 'wire_relay.py'
+# Others want the machine, too; and the guest of tools/with-can emulates its processor.
+GUEST = 'R4_CAN_GUEST' in os.environ
+REPORTED_WITHIN_S = 10 if SANITIZED else 0.5 if GUEST else 0.05  # where the system tells
+TIMEOUT_S = 1  # where it does not
+BACK_WITHIN_S = 10 if SANITIZED else 4 if GUEST else 1
+LONGEST_GAP_S = 1 if SANITIZED else 0.5 if GUEST else 0.1  # states come every 10 ms
+
+
+class Wire:
+    """A wire of its own to a board; `url` is its host's end."""
+
+    def __init__(self, kind, *where):
+        self.kind, self.where = kind, where
+        self.process = self.url = None
+        self.plug_in()
+
+    def plug_in(self):
+        self.process = subprocess.Popen([sys.executable, '-S', RELAY, self.kind, *self.where], stdout=subprocess.PIPE,
+                                        text=True)
+        self.url = self.process.stdout.readline().strip()
+
+    def pull(self):
+        self.process.kill()
+        self.process.wait()
+        self.process.stdout.close()
+
+    def signal(self, number):
+        self.process.send_signal(number)
+
+
+class WiredHost(Running):
+    """`places`: what the name of each wire has, in the order of the URLs."""
+
+    def __init__(self, urls, places):
+        super().__init__(*urls, program=PROGRAM, stdin=subprocess.PIPE)
+        for place in places:
+            if not any(is_wire(place)(each) for each in self.log):
+                self.next(is_wire(place))
+        self.next(is_command)
+        self.began = time.monotonic()
+        self.told = []
+        self.ended = None
+
+    def loses(self, place, take_away):
+        """Seconds until that is told: from the time that it returns, or from before it began."""
+        return self._tells(place, False, take_away)
+
+    def has_again(self, place, give_back):
+        return self._tells(place, True, give_back)
+
+    def _tells(self, place, carries, action):
+        began = time.monotonic()
+        at = action() or began
+        took = self.next(is_wire(place, carries))['at'] - at
+        self.told.append(f'{place} {"used again" if carries else "told of"} after {took * 1e3:.0f} ms')
+        return took
+
+    def goes_on(self, commands=10):
+        for _ in range(commands):
+            self.next(is_command)
+
+    def ends(self, board):
+        """Nothing was missed: no state, no command; none was executed twice, and the board never went safe."""
+        commands = self.commands_at_its_end()
+        log = board.rest()
+        executed = [each['executed']['command'] for each in log if 'executed' in each]
+        assert [each for each in executed if each.startswith('S:')] == commands
+        assert not [each for each in log if each.get('state') == 'SAFE' and self.began < each['came'] < self.ended]
+
+    def commands_at_its_end(self):
+        """The same as far as the host can tell; which commands the board has executed is still to be seen."""
+        self.goes_on()
+        self.ended = time.monotonic()
+        self.process.stdin.close()
+        assert self.wait() == 0, self.errors
+        log = self.left()
+        states = [each for each in log if each['type'] == 'state']
+        came = [each['at'] for each in states if self.began <= each['at'] <= self.ended]
+        gap = max(later - earlier for earlier, later in zip(came, came[1:]))
+        commands = [each for each in log if each['type'] == 'command']
+        rate = (len(came) - 1) / (came[-1] - came[0])
+        print(f'{"; ".join(self.told)}; {len(commands)} commands, {rate:.0f} states a second, '
+              f'the longest gap between them {gap * 1e3:.0f} ms')
+        times = [each['t'] for each in states]
+        assert times == sorted(set(times)), 'a state was told twice, or after a newer one'
+        assert not [each for each in log if each['type'] == 'link' and self.began < each['at'] < self.ended and
+                    not each['active']]
+        assert all(each['confirmed'] for each in commands), [each for each in commands if not each['confirmed']]
+        assert gap <= LONGEST_GAP_S
+        return [each['command'] for each in commands]
+
+
+def is_command(each):
+    return each['type'] == 'command'
+
+
+def is_wire(place, carries=True):
+    return lambda each: each['type'] == 'wire' and place in each['name'] and each['carries'] == carries
+
+
+def has_joined(wires, event='joined'):
+    """Of a board: it has so many wires to its host, with one that it did not have."""
+    return lambda each: each.get('wire', {}).get('event') == event and each['wire']['wires'] == wires
+
+
+def has_left(wires):
+    """It has so many, without one that it had."""
+    return has_joined(wires, 'left')
