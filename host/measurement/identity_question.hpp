@@ -42,9 +42,12 @@ class IdentityQuestion {
   // One goes out, whoever asked.
   void asked(std::uint32_t pnum, Time now) {
     newest_ = now;
+    // What is sent again may be answered as it was sent first.
+    const auto same = [pnum](const Asked& each) { return each.open && each.pnum == pnum; };
+    if (std::any_of(open_.begin(), open_.end(), same)) return;
     open_[count_++ % open_.size()] = {pnum, now, true};
   }
-  // The board has answered: when it was asked; none if it was not.
+  // The board has answered: when it was asked, first; none if it was not.
   std::optional<Time> answered(const Identity& identity) {
     for (std::size_t i = 1; i <= open_.size(); ++i) {  // from the newest
       Asked& asked = open_[(count_ - i) % open_.size()];

@@ -11,11 +11,18 @@
 
 #include "host/recording/zstd_stream.hpp"
 #include "input.hpp"
+#include "r4link/devices/description.hpp"
 #include "r4link/error.hpp"
 #include "tools/r4/recording/formats.hpp"
 #include "tools/r4/recording/recording_summary.hpp"
 
 namespace r4 {
+
+// A recording has the texts of its devices; nothing here names a file.
+DeviceDescription DeviceDescription::load(const std::string& name) {
+  throw Error(ErrorKind::open, name, "there are no files here", "");
+}
+
 namespace {
 
 struct Made final : tool::Output {

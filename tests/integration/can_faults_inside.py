@@ -223,7 +223,9 @@ def test_damaged_frames_cost_time_and_no_datagram(bus, board, percent):
     print(f'{failed} of {frames} frames damaged, {transfers}')
     assert frames >= 1000 and failed >= percent  # it is a matter of chance: ten times as many are likely
     assert transfers['packed'] >= 200
-    lost = ('wrong_sequence', 'interrupted', 'overflow', 'malformed', 'bad_form', 'dropped_frames')
+    # Neither timed_out nor interrupted: where an end stands still for more than the 20 ms of N_Bs, and the guest's do,
+    # the other gives its transfer up and begins the next, with noise or without.
+    lost = ('wrong_sequence', 'overflow', 'malformed', 'bad_form', 'dropped_frames')
     assert not any(transfers[each] for each in lost), transfers
 
 

@@ -52,12 +52,13 @@ def test_a_receiver_on_a_uart_a_voltage_and_inputs(board):
             states = [watch.next(is_state) for _ in range(40)]
     assert [states[-1]['fields'][name] for name in ('DAC1', 'DAC2', 'GPIO')] == [1650, 3300, 255]
     text, position = b'', None
-    for each in states:
+    for earlier, each in zip([states[0], *states], states):
         begin, lost, data = each['fields']['UART1']
         assert lost == 0
         data = bytes.fromhex(data[1:])
         position = begin if position is None else position
-        assert SANITIZED or begin <= position
+        missed = each['pnum'] - earlier['pnum'] > 1  # by the monitor, whose machine stood still
+        assert SANITIZED or missed or begin <= position
         text += data[position - begin:]
         position = begin + len(data)
     assert SANITIZED or b'$GPRMC,' in text

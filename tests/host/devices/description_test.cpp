@@ -88,6 +88,7 @@ TEST(Device, WithoutItsMagnetAnEncoderHasNoAngle) {
   const Device encoder(DeviceDescription::load("as5600"), 0x36);
   State state;
   state.i2c[0].data.size = 2;
+  state.i2c[0].data.bytes[0] = state.i2c[0].data.bytes[1] = 0;
   EXPECT_FALSE(encoder.reading(state, "angle").number) << "its status was not read yet";
   state.i2c[1].data.size = 1;
   state.i2c[1].data.bytes[0] = 0x20;

@@ -10,22 +10,24 @@ namespace r4::test {
 
 struct WiredRobot::Board final : firmware::Hal, firmware::Observer {
   struct End final : firmware::Port {
-    End(WiredRobot& r, std::size_t w) : robot(r), wire(w) {}
+    End(WiredRobot& r, std::size_t b, std::size_t w) : robot(r), board(b), wire(w) {}
     void send(Text bytes, Priority, Peer) override {
-      robot.put(wire, false, {bytes.data(), bytes.size()});
+      if (robot.cables[wire].board == board) robot.put(wire, false, {bytes.data(), bytes.size()});
     }
     std::size_t max_size() const override { return max_datagram; }
     bool reaches(Peer) const override { return true; }
     bool may_configure() const override { return true; }
 
     WiredRobot& robot;
+    const std::size_t board;
     const std::size_t wire;
     std::uint8_t number = 0;
   };
 
+  // A cable may be plugged into another board: each has a port for each.
   Board(WiredRobot& r, std::size_t i) : robot(r), name("board-" + std::to_string(i)) {
     for (std::size_t wire = 0; wire < robot.cables.size(); ++wire) {
-      if (robot.cables[wire].board == i) ends.push_back(std::make_unique<End>(robot, wire));
+      ends.push_back(std::make_unique<End>(robot, i, wire));
     }
   }
   void boot(std::uint32_t t_ms) {

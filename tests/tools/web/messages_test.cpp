@@ -51,7 +51,7 @@ TEST(WebRows, HaveAColumnForEachValueOfADescribedDevice) {
   EXPECT_EQ(row_of(columns, rows.at(0)).at("ina219@0x40.voltage"), 11.98);
   EXPECT_EQ(row_of(columns, rows.at(0)).at("ina219@0x40.current"), 0.2);
   EXPECT_TRUE(row_of(columns, rows.at(1)).at("ina219@0x40.current").is_null());
-  EXPECT_EQ(columns.units().at(columns.size() - 2), "A");
+  EXPECT_EQ(columns.units().back(), "A");
 }
 
 TEST(WebRows, ShowTheNumbersOfTheDatagramAndNullForTheRest) {

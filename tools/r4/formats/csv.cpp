@@ -41,7 +41,8 @@ void CsvSink::survey(const RecordedDevice& device) {
 }
 
 void CsvSink::add_columns(const RecordedDevices& devices) {
-  for (const auto& [wire, device] : devices.all()) {
+  for (const RecordedDevices::Known& recorded : devices.all()) {
+    const Device& device = recorded.device;
     for (const DeviceValue& value : device.description().values) {
       const bool known = std::any_of(device_columns_.begin(), device_columns_.end(),
                                      [&](const DeviceColumn& each) {

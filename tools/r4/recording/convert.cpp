@@ -163,11 +163,9 @@ void add_convert(CLI::App& root, Action& chosen) {
            Need::required);
   add_number(*command, "--port", options->port, 1, 65535,
              "the boards' UDP port in a capture (default: 2018)");
-  add_repeated(
-      *command, "--device", options->devices,
-      "to .csv, .jsonl and .mcap: what a described device measured (r4 devices), instead of those "
-      "that the recording tells of",
-      "NAME@ADDRESS");
+  add_repeated(*command, "--device", options->devices,
+               "what it measured, to .csv, .jsonl and .mcap, for the recording's own (r4 devices)",
+               "NAME@ADDRESS");
   add_flag(*command, "--force", options->force, "replace a file that is there");
 }
 

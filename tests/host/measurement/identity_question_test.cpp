@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "host/measurement/identity_question.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cstdint>
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+Identity answer_to(std::uint32_t pnum) {
+  Identity identity;
+  identity.has_asked = true;
+  identity.asked = pnum;
+  return identity;
+}
+
+TEST(IdentityQuestion, IsAnsweredByWhoNamesIt) {
+  IdentityQuestion question(Time{0});
+  question.asked(7, 100ms);
+  question.asked(8, 200ms);
+  EXPECT_FALSE(question.answered(answer_to(9)));
+  EXPECT_EQ(question.answered(answer_to(7)), 100ms);
+  EXPECT_FALSE(question.answered(answer_to(7))) << "a second answer";
+  EXPECT_EQ(question.answered(answer_to(8)), 200ms);
+}
+
+TEST(IdentityQuestion, ThatIsSentAgainWasAskedWhenItWasSentFirst) {
+  IdentityQuestion question(Time{0});
+  question.asked(7, 100ms);
+  question.asked(7, 200ms);
+  EXPECT_EQ(question.answered(answer_to(7)), 100ms) << "it may have been on its way for so long";
+  EXPECT_FALSE(question.answered(answer_to(7)));
+}
+
+TEST(IdentityQuestion, IsForgottenBehindEightNewerOnes) {
+  IdentityQuestion question(Time{0});
+  for (std::uint32_t pnum = 0; pnum <= 8; ++pnum) question.asked(pnum, 100ms);
+  EXPECT_FALSE(question.answered(answer_to(0)));
+  EXPECT_EQ(question.answered(answer_to(1)), 100ms);
+}
+
+TEST(IdentityQuestion, IsTheNewestWhereTheAnswerNamesNone) {
+  IdentityQuestion question(Time{0});
+  question.asked(7, 100ms);
+  question.asked(8, 200ms);
+  EXPECT_EQ(question.answered(Identity{}), 200ms);
+  EXPECT_FALSE(question.answered(Identity{}));
+}
+
+}  // namespace
+}  // namespace r4::test
