@@ -14,6 +14,7 @@
 #include "../shell/json.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
+#include "../shell/wires.hpp"
 #include "host/standard_registry.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/error.hpp"
