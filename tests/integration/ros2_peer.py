@@ -132,6 +132,38 @@ class Peer:
         self.process.stdout.close()
 
 
+def join(ros2, peer, topic, of):
+    """A publisher of the peer, known at both ends: what is written now is read."""
+    peer.writer(f'rt/{topic}', of)
+    ros2.logged(f'{topic}: 1 publishers')
+
+
+def again(write, wait):
+    """Writes as who drives does, again and again, until what `wait` waits for is there: on a machine that has no time
+    a sample may come later than a command may live. When it was written last, and what was waited for."""
+    deadline = time.monotonic() + PATIENCE_S
+    while True:
+        write()
+        written = time.monotonic()
+        try:
+            return written, wait(0.25)
+        except AssertionError:
+            if time.monotonic() > deadline:
+                raise
+
+
+def drive(board, peer, topic, payload, is_it):
+    """Writes it until the board has such outputs: when it was written last, and those."""
+    written, came = again(lambda: peer.write(topic, payload), lambda timeout: board.outputs(is_it, timeout))
+    return written, came['outputs']
+
+
+def pwm(outputs, channel):
+    """The signed pwm of an OSMC channel."""
+    value, direction = outputs['osmc'][channel - 1]
+    return value if direction else -value
+
+
 class Payload(bytes):
     """A sample's bytes behind the encapsulation, with the time at which they came."""
 

@@ -85,6 +85,41 @@ TEST(Ros2Drivers, LeaveAloneWhatRestsAndTheMotorsSupply) {
   EXPECT_EQ(driven.to_stop(), Texts{});
 }
 
+TEST(Ros2Drivers, ACommandThatStopsIsRepeatedUntilTheBoardHasConfirmedIt) {
+  Driven driven;
+  driven.sent(Command::osmc(358, Direction::forward, 1));
+  driven.sent(Command::osmc(0, Direction::forward, 1));
+  const Drivers::Stop stop = driven.drivers.to_stop(driven.state, driven.now);
+  ASSERT_EQ(stop.commands.size(), 1U) << "it may have been lost on its way";
+  EXPECT_EQ(text_of(stop.commands[0]), "O:0,1,1");
+  EXPECT_FALSE(stop.missed) << "nobody has gone";
+  driven.sent(Command::osmc(0, Direction::forward, 1));  // as who drives by 0 repeats it
+  driven.drivers.stopped(stop);
+  EXPECT_EQ(driven.to_stop(), Texts{});
+  EXPECT_FALSE(driven.drivers.any());
+}
+
+TEST(Ros2Drivers, SayWhetherSomebodyIsMissed) {
+  Driven driven;
+  driven.sent(Command::osmc(358, Direction::forward, 1));
+  driven.now += 2s;
+  EXPECT_TRUE(driven.drivers.to_stop(driven.state, driven.now).missed);
+}
+
+TEST(Ros2Drivers, AVoltageGoesToZeroBehindTheOthersWhichABoardWithoutOneWouldRefuse) {
+  Driven driven;
+  driven.sent(Command::dac(2, 3300));
+  driven.sent(Command::osmc(358, Direction::forward, 1));
+  driven.now += 2s;
+  const Drivers::Stop others = driven.drivers.to_stop(driven.state, driven.now);
+  ASSERT_EQ(others.commands.size(), 1U);
+  EXPECT_EQ(text_of(others.commands[0]), "O:0,1,1");
+  driven.drivers.stopped(others);
+  EXPECT_EQ(driven.to_stop(), Texts{"X:DAC,2,0"});
+  driven.drivers.forget(Command::dac(2, 3300));
+  EXPECT_FALSE(driven.drivers.any()) << "the board has none";
+}
+
 TEST(Ros2Drivers, AnotherCommandEndsTheStopping) {
   Driven driven;
   driven.sent(Command::osmc(358, Direction::forward, 1), 7);

@@ -50,6 +50,7 @@ BoardCommands::BoardCommands(AsyncBoard& board, Graph& graph, std::size_t node, 
     warn(refused.code == Refusal::none
              ? fmt::format("{}: not sent: {}", what, to_text(refused.why))
              : fmt::format("{}: refused by the board: {}", what, meaning_of(refused.code)));
+    if (refused.code == Refusal::unknown) drivers_.forget(refused.command);
   });
 }
 
@@ -89,7 +90,12 @@ void BoardCommands::subscribe_arm(Graph& graph, std::size_t node, Inbox& inbox) 
             } else {
               pressed_.erase(origin.publisher);
             }
-            if (edge && !is_stale(origin)) arm([](bool, const std::string&) {});
+            if (!edge || is_stale(origin)) return;
+            if (is_overtaken(origin)) {
+              warn("arm: a stop came after it; arm again when the danger is over");
+            } else {
+              arm([](bool, const std::string&) {});
+            }
           },
       .left = on_publishers("arm",
                             [this](const std::vector<std::uint64_t>& there) {
@@ -132,12 +138,17 @@ void BoardCommands::on_text(const std::string& text, const void* source, const O
     return;
   }
   for (const Command& command : commands) {
-    if (drives_output(command.kind)) {
+    if (joins_groups(command.kind)) {
       want(command, source, origin);
     } else if (command.kind == CommandKind::clear) {
-      clear([](bool, const std::string&) {});
+      if (is_overtaken(origin)) {
+        warn("E:CLEAR: a stop came after it; send it again when the danger is over");
+      } else {
+        clear([](bool, const std::string&) {});
+      }
     } else if (others_ < most_others) {
       ++others_;
+      post_wanted();  // a transfer goes alone, behind what came before it
       if (const PostResult result = board_.post(command); !result) tell(shown(command), result);
     }
   }
@@ -258,7 +269,22 @@ bool BoardCommands::is_stale(const Origin& origin) {
   return true;
 }
 
+std::string BoardCommands::objection_to(const Command& command) const {
+  if (command.kind != CommandKind::stepper ||
+      options_.fields.has(position_of(static_cast<int>(command.channel)))) {
+    return {};
+  }
+  return fmt::format(
+      "{}: the board is not asked where that stepper is, so that nobody could stop it; add "
+      "STEP{}POS to --fields",
+      shown(command), command.channel);
+}
+
 void BoardCommands::want(const Command& command, const void* source, const Origin& origin) {
+  if (const std::string objection = objection_to(command); !objection.empty()) {
+    warn(objection);
+    return;
+  }
   std::erase_if(wanted_,
                 [&command](const Setpoint& each) { return is_same_output(each.command, command); });
   wanted_.push_back({command, source, origin.publisher});
@@ -312,7 +338,9 @@ void BoardCommands::on_tick() {
   if (stop.commands.empty()) return;
   Setpoints group;
   for (const Command& command : stop.commands) group.add(command);
-  warn(fmt::format("{}: whoever drove it has gone or is silent", text_of(group)));
+  if (stop.missed) {
+    warn(fmt::format("{}: whoever drove it has gone or is silent", text_of(group)));
+  }
   resting_ = true;
   board_.async_apply(group, oldest, [this, stop](const CommandResult& result) {
     resting_ = false;

@@ -79,6 +79,9 @@ class BoardCommands {
 
   void warn(const std::string& text) const { say_(LogLevel::warning, text); }
   bool is_stale(const Origin& origin);
+  bool is_overtaken(const Origin& origin) const { return origin.written <= stopped_; }
+  // Why the board is not to be told that, in words; empty: nothing is in the way.
+  std::string objection_to(const Command& command) const;
   void on_text(const std::string& text, const void* source, const Origin& origin);
   void want(const Command& command, const void* source, const Origin& origin);
   void post_wanted();
@@ -99,6 +102,7 @@ class BoardCommands {
   bool resting_ = false;    // what nobody drives is on its way to rest
   bool arming_ = false;
   std::vector<Done> stops_;          // who waits for the stop that is under way
+  Clock::time_point stopped_{};      // the newest stop: what was written before does not undo it
   std::set<std::uint64_t> pressed_;  // publishers of `arm` whose newest message is true
   std::uint64_t stale_ = 0;
   std::vector<std::unique_ptr<int>> sources_;  // what tells the topics apart

@@ -17,6 +17,7 @@ using namespace std::chrono_literals;
 
 constexpr auto patience = 3000ms;
 constexpr auto stop_patience = 5000ms;
+constexpr const char* overtaken = ": a stop came after it; ask again when the danger is over";
 
 std::function<void(const CommandResult&)> in_words(const AsyncBoard& board, std::string what,
                                                    BoardCommands::Done done) {
@@ -99,7 +100,13 @@ void BoardCommands::serve_all(Graph& graph, std::size_t node, Inbox& inbox) {
   const auto serve_trigger = [&](const char* name, void (BoardCommands::*act)(Done)) {
     serve<TriggerRequest, TriggerResponse>(
         room, name, "std_srvs/srv/Trigger",
-        [this, act](const auto&, const Origin&, const Done& done) { (this->*act)(done); }, {});
+        [this, name, act](const auto&, const Origin& origin, const Done& done) {
+          if (act != &BoardCommands::stop && is_overtaken(origin)) {
+            return done(false, std::string(name) + overtaken);
+          }
+          (this->*act)(done);
+        },
+        {});
   };
   serve_trigger("~/stop", &BoardCommands::stop);
   serve_trigger("~/clear", &BoardCommands::clear);
@@ -114,6 +121,7 @@ void BoardCommands::serve_all(Graph& graph, std::size_t node, Inbox& inbox) {
 
 void BoardCommands::stop(Done done) {
   constexpr std::size_t most_waiting = 16;
+  stopped_ = Clock::now();
   wanted_.clear();
   drivers_.forget();
   const bool under_way = !stops_.empty();
@@ -167,8 +175,10 @@ void BoardCommands::send(const std::optional<std::string>& text, const void* sou
     // It is repeated until it is too old to be executed.
     const auto age = std::chrono::ceil<std::chrono::milliseconds>(Clock::now() - origin.written);
     const auto left = std::max<AsyncBoard::Duration>(oldest - age, 1ms);
-    if (commands.size() == 1 && !drives_output(commands[0].kind)) {
-      if (commands[0].kind == CommandKind::clear) {
+    if (commands.size() == 1 && !joins_groups(commands[0].kind)) {
+      if (commands[0].kind == CommandKind::clear && is_overtaken(origin)) {
+        done(false, *text + overtaken);
+      } else if (commands[0].kind == CommandKind::clear) {
         clear(done);
       } else {
         board_.async_send(commands[0], left, in_words(board_, *text, done));
@@ -176,7 +186,12 @@ void BoardCommands::send(const std::optional<std::string>& text, const void* sou
       return;
     }
     Setpoints setpoints;
-    for (const Command& command : commands) setpoints.add(command);
+    for (const Command& command : commands) {
+      if (const std::string objection = objection_to(command); !objection.empty()) {
+        return done(false, objection);
+      }
+      setpoints.add(command);
+    }
     board_.async_apply(setpoints, left, in_words(board_, *text, done));
     if (board_.disarmed_by() != DisarmCause::none) return;
     for (const Command& command : commands) {

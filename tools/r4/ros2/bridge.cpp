@@ -217,11 +217,9 @@ class Bridge {
     }
   }
 
-  // Nobody is told of us any more, no sample is taken or written; then the boards hear that they are free.
+  // No sample is taken any more, and the boards hear that they are free; then ROS, which may take its time.
   void leave() {
     inbox_.stop();
-    outbox_.stop();
-    graph_.leave();
     std::size_t left = nodes_.size();
     io_.restart();
     constexpr Milliseconds limit{100};
@@ -231,6 +229,8 @@ class Bridge {
       });
     }
     io_.run();
+    outbox_.stop();
+    graph_.leave();
   }
 
   const BridgeOptions& options_;

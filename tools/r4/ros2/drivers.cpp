@@ -10,12 +10,13 @@ struct Kind {
   CommandKind kind;
   int channels;
 };
-constexpr std::array<Kind, 6> kinds{{{CommandKind::osmc, osmc_channels},
+constexpr std::array<Kind, 7> kinds{{{CommandKind::osmc, osmc_channels},
                                      {CommandKind::dhb12, dhb12_channels},
                                      {CommandKind::servo, servo_channels},
                                      {CommandKind::relay, relay_channels},
                                      {CommandKind::stepper, stepper_channels},
-                                     {CommandKind::bldc, bldc_channels}}};
+                                     {CommandKind::bldc, bldc_channels},
+                                     {CommandKind::dac, dac_channels}}};
 constexpr int supply_relay = 1;
 
 // Does the output rest after it?
@@ -32,13 +33,13 @@ bool rests(const Command& command) {
   }
 }
 
-bool has_position(const State& state, int channel) {
+}  // namespace
+
+StateField position_of(int stepper) {
   constexpr std::array<StateField, stepper_channels> fields{
       StateField::step1pos, StateField::step2pos, StateField::step3pos, StateField::step4pos};
-  return state.present.has(fields[static_cast<std::size_t>(channel - 1)]);
+  return fields[static_cast<std::size_t>(stepper - 1)];
 }
-
-}  // namespace
 
 std::optional<std::size_t> Drivers::index_of(const Command& command) {
   std::size_t first = 0;
@@ -71,8 +72,10 @@ std::optional<Command> Drivers::stop_of(std::size_t index, const State& state) {
       case CommandKind::relay:
         return Command::relay(channel, false);
       case CommandKind::stepper:
-        if (!has_position(state, channel)) return std::nullopt;
+        if (!state.present.has(position_of(channel))) return std::nullopt;
         return Command::stepper(state.steps(channel), stepper_speed_default, channel);
+      case CommandKind::dac:
+        return Command::dac(channel, 0);
       default:
         return Command::bldc(0, Direction::forward, true, channel);
     }
@@ -82,10 +85,12 @@ std::optional<Command> Drivers::stop_of(std::size_t index, const State& state) {
 
 void Drivers::on_sent(const Command& command, const void* source, std::uint64_t publisher,
                       Time now) {
-  if (const auto index = index_of(command)) {
-    outputs_[*index] = {rests(command) ? Stage::free : Stage::driven, source, publisher, now,
-                        ++sent_};
-  }
+  const auto index = index_of(command);
+  if (!index) return;
+  Output& output = outputs_[*index];
+  const bool rest = rests(command);
+  if (rest && output.stage != Stage::driven) return;  // it rests, or is on its way there
+  output = {rest ? Stage::stopping : Stage::driven, source, publisher, now, ++sent_, rest};
 }
 
 void Drivers::on_publishers(const void* source, const std::vector<std::uint64_t>& there) {
@@ -99,14 +104,23 @@ void Drivers::on_publishers(const void* source, const std::vector<std::uint64_t>
 
 void Drivers::forget() { outputs_.fill({}); }
 
+void Drivers::forget(const Command& command) {
+  if (const auto index = index_of(command)) outputs_[*index] = {};
+}
+
 Drivers::Stop Drivers::to_stop(const State& state, Time now) {
-  Stop stop{{}, sent_};
+  Stop stop{{}, sent_, false};
   for (std::size_t i = 0; i < outputs; ++i) {
     Output& output = outputs_[i];
     const bool silent = deadline_.count() != 0 && now - output.last >= deadline_;
     if (output.stage == Stage::driven && silent) output.stage = Stage::stopping;
     if (output.stage != Stage::stopping || stop.commands.size() == max_group) continue;
-    if (const auto command = stop_of(i, state)) stop.commands.push_back(*command);
+    const bool voltage = i >= outputs - dac_channels;  // the last of them
+    if (voltage && !stop.commands.empty() && stop.commands[0].kind != CommandKind::dac) continue;
+    const auto command = stop_of(i, state);
+    if (!command) continue;
+    stop.commands.push_back(*command);
+    stop.missed = stop.missed || !output.asked;
   }
   return stop;
 }

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Which publisher drives which output, and which of them have gone.
 //
-//     free --a command that drives--> driven --its publisher has gone, or is silent for the deadline--> stopping
-//      ^                               |  ^                                                              |
-//      +-- a command that stops -------+  +---------------- a command of somebody -----------------------+
-//      +---------------------------------- stopped, the board has confirmed it ---------------------------+
+//     free --a command that drives--> driven --a command that stops, its publisher has gone, or--> stopping
+//      ^                                 ^     is silent for the deadline                            |
+//      |                                 +---------------- a command that drives --------------------+
+//      +---------------------------------- stopped, the board has confirmed it -----------------------+
 //
-// What is stopped goes where the board's safe state puts it: motors to 0, brushless drivers to 0 with their brakes
-// on, servos without pulses, relays open, steppers standing where they are. Relay 1 is no output here: it is the
-// motors' supply, and arming's. No clock: the time is passed in.
+// A command that stops goes out once like the others, and might be lost: so it, too, is repeated until the board has
+// confirmed it. What is stopped goes where the board's safe state puts it: motors to 0, brushless drivers to 0 with
+// their brakes on, servos without pulses, relays open, steppers standing where they are, voltages to 0. Relay 1 is no
+// output here: it is the motors' supply, and arming's. No clock: the time is passed in.
 #pragma once
 
 #include <array>
@@ -22,6 +23,9 @@
 #include "r4link/state.hpp"
 
 namespace r4::tool::ros2 {
+
+// The field that has the position of stepper 1 to 4: without it none can be stopped.
+StateField position_of(int stepper);
 
 class Drivers {
  public:
@@ -37,12 +41,15 @@ class Drivers {
   void on_publishers(const void* source, const std::vector<std::uint64_t>& there);
   // Somebody else has made the outputs safe.
   void forget();
+  // The board does not know such a command: there is no such output.
+  void forget(const Command& command);
 
-  // Commands for what is to be stopped now, for each output until stopped() or a command for it. At most
-  // max_group. A stepper waits for a `state` with its position.
+  // Commands for what is to be stopped now, for each output until stopped() or a command that drives it. At most
+  // max_group. A stepper waits for a `state` with its position; voltages, which not every board has, for the others.
   struct Stop {
     std::vector<Command> commands;
     std::uint64_t sent = 0;  // commands before it
+    bool missed = false;     // who drove one of them has gone or is silent
   };
   Stop to_stop(const State& state, Time now);
   // The board has confirmed it. What was driven again since is not stopped by that.
@@ -57,9 +64,11 @@ class Drivers {
     std::uint64_t publisher = 0;
     Time last{};
     std::uint64_t sent = 0;  // which command it was
+    bool asked = false;      // to stop
   };
   static constexpr std::size_t outputs = osmc_channels + dhb12_channels + servo_channels +
-                                         relay_channels + stepper_channels + bldc_channels;
+                                         relay_channels + stepper_channels + bldc_channels +
+                                         dac_channels;
   static std::optional<std::size_t> index_of(const Command& command);
   static std::optional<Command> stop_of(std::size_t index, const State& state);
 

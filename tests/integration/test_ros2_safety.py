@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""r4 ros2, where what ROS says is lost, overtaken, or of a kind that nobody could take back."""
+import contextlib
+
+import pytest
+
+from r4_process import Board
+from ros2_peer import BOOL, FLOAT32, INT32, STRING, Peer, Ros2, again, drive, float32, join, own_domain, pwm, text
+
+ON, OFF = b'\x01', b'\x00'
+
+
+@contextlib.contextmanager
+def armed(*arguments, options=()):
+    """A board, its node, armed, and a peer."""
+    domain = own_domain()
+    with Board('udp://127.0.0.1:0', options=options) as board, Peer(domain) as peer:
+        with Ros2(domain, board.host_url, '--arm', *arguments) as ros2:
+            ros2.armed()
+            yield board, ros2, peer
+            assert ros2.end() == 0, ros2.errors
+            peer.end()
+
+
+def test_a_setpoint_that_rests_gets_there_though_it_is_said_once_and_lost():
+    # Without a deadline nothing but its repetition could end the drive. Of these ten a third would be lost.
+    with armed('--deadline', '0', options=('--link', 'loss=30%,seed=7')) as (board, ros2, peer):
+        join(ros2, peer, 'osmc1/command', FLOAT32)
+        for _ in range(10):
+            drive(board, peer, 'rt/osmc1/command', float32(0.5), lambda each: pwm(each, 1) == 2048)
+            peer.write('rt/osmc1/command', float32(0))
+            board.outputs(lambda each: pwm(each, 1) == 0)
+
+
+def test_a_transfer_beside_an_output_ends_nothing():
+    with armed() as (board, ros2, peer):
+        join(ros2, peer, 'R4_Command', STRING)
+        for first in ('X:UART,1,x41', 'X:WRITE,0x68,x6b00'):
+            drive(board, peer, 'rt/R4_Command', text(f'{first};O:358,1,1'), lambda each: pwm(each, 1) == 358)
+            drive(board, peer, 'rt/R4_Command', text('O:0,1,1'), lambda each: pwm(each, 1) == 0)
+
+
+@pytest.mark.parametrize('_', range(3))  # whether both are taken in one turn is a matter of chance
+def test_an_arm_that_was_written_before_a_stop_does_not_undo_it(_):
+    with armed() as (board, ros2, peer):
+        join(ros2, peer, 'arm', BOOL)
+        join(ros2, peer, 'stop', BOOL)
+        join(ros2, peer, 'osmc1/command', FLOAT32)
+        peer.write('rt/arm', OFF)
+        peer.write('rt/arm', ON)
+        peer.write('rt/stop', ON)  # in the same turn it is taken first
+        ros2.logged('E:STOP: confirmed')
+        again(lambda: peer.write('rt/osmc1/command', float32(0.5)),
+              lambda timeout: ros2.logged('not armed (stop)', timeout=timeout))
+        board.state('SAFE', 'stop')
+        peer.write('rt/arm', OFF)
+        peer.write('rt/arm', ON)
+        ros2.armed()
+
+
+def test_a_stepper_whose_place_is_not_told_is_not_driven():
+    with armed('--fields', 'DEFAULT') as (_, ros2, peer):
+        join(ros2, peer, 'stepper2/command', INT32)
+        again(lambda: peer.write('rt/stepper2/command', (1000).to_bytes(4, 'little')),
+              lambda timeout: ros2.logged('nobody could stop it; add STEP2POS to --fields', timeout=timeout))
+
+
+def test_a_voltage_is_off_when_its_publisher_is_gone():
+    with armed('--fields', 'DEFAULT,DAC1') as (_, ros2, peer):
+        peer.read('rt/R4', STRING)
+        join(ros2, peer, 'R4_Command', STRING)
+        again(lambda: peer.write('rt/R4_Command', text('X:DAC,1,3300')),
+              lambda timeout: peer.sample('rt/R4', lambda payload: b'DAC1:3300;' in payload, timeout))
+        peer.say('remove', 'rt/R4_Command')
+        peer.sample('rt/R4', lambda payload: b'DAC1:0;' in payload)
