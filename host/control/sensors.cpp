@@ -39,9 +39,10 @@ double Wheel::advance(const State& state) {
     const Sample& before = samples_[newest_];
     const auto counts = static_cast<std::int32_t>(static_cast<std::uint32_t>(now.counts) -
                                                   static_cast<std::uint32_t>(before.counts));
-    const double dt_s = (now.t_ms - before.t_ms) / 1000.0;
+    const auto elapsed_ms =
+        static_cast<std::int32_t>(now.t_ms - before.t_ms);  // < 0: it began again
     rolled_m = counts * metres_a_count_;
-    if (std::abs(rolled_m) > max_speed_m_s_ * dt_s) {
+    if (elapsed_ms < 0 || std::abs(rolled_m) > max_speed_m_s_ * elapsed_ms / 1000.0) {
       reset();
       rolled_m = 0;
     }

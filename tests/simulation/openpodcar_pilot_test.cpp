@@ -119,6 +119,7 @@ class PilotRun {
         // One after the other: what overtakes a command on its way takes its turn.
         if (++arming_ms_ == 200) session.arm(patience, robot.now());
         if (session.disarmed_by() == DisarmCause::none) {
+          podcar.begin_drive();
           pilot.begin(robot.clock());
           guard_.start(robot.clock());
           phase_ = Phase::driving;
@@ -145,6 +146,7 @@ class PilotRun {
     const auto dt_s = guard_.on_state(state, robot.session().disarmed_by(), robot.clock());
     if (!dt_s) return;
     if (!podcar.sense(state)) pilot.end("the steering sensor");
+    if (!podcar.obeys()) pilot.end("it does not obey");
     const auto wish = pilot.wish(podcar.pose(), robot.clock());
     if (!wish) return guard_.end(LoopEnd::asked, pilot.why());
     const Setpoints out = podcar.drive(*wish, *dt_s);
@@ -365,6 +367,51 @@ TEST(OpenPodcarPilot, ArmsOnceByAStartThatIsHeldDown) {
   run.press_start();  // was down, and is
   run.press_start();
   EXPECT_TRUE(run.moves_within(2000));
+}
+
+TEST(OpenPodcarPilot, EndsAndDoesNotBeginWhereThereAreTwoJoysticks) {
+  PilotRun run;
+  run.press_start();
+  ASSERT_TRUE(run.driving());
+  const std::array<float, 6> axes{};
+  const std::array<std::int32_t, 8> buttons{};
+  run.pilot.on_joy(axes, buttons, run.robot.clock(), 7);
+  run.pass(100);
+  EXPECT_FALSE(run.driving());
+  EXPECT_EQ(run.pilot.why(), "there are two joysticks");
+  run.start = true;  // held on the one, while the other says that it is up
+  for (int ms = 0; ms < 1000; ms += 10) {
+    run.pilot.on_joy(axes, buttons, run.robot.clock(), 7);
+    run.pass(10);
+    ASSERT_EQ(run.pilot.mode(), Mode::off);
+  }
+  run.start = false;
+  run.pass(400);
+  run.press_start();
+  EXPECT_TRUE(run.driving()) << "the other one is gone";
+}
+
+TEST(OpenPodcarPilot, BeginsADriveWithNothingOfTheOneBefore) {
+  Podcar podcar;
+  podcar.begin_drive();
+  for (int i = 0; i < 200; ++i) podcar.drive({1, 0}, 0.01);  // its encoder's cable is off
+  ASSERT_EQ(podcar.drive({1, 0}, 0.01)[0].value, pwm_max);
+  podcar.begin_drive();
+  EXPECT_EQ(podcar.drive({0.1, 0}, 0)[0].value, 0);
+  EXPECT_LE(podcar.drive({0.1, 0}, 0.01)[0].value, static_cast<int>(2 * 0.01 * pwm_max) + 1);
+}
+
+TEST(OpenPodcarPilot, EndsWhenTheSteeringDoesNotFollow) {
+  Podcar podcar;
+  podcar.begin_drive();
+  for (int ms = 0; ms < 490; ms += 10) podcar.drive({1, 0.4}, 0.01);
+  EXPECT_TRUE(podcar.obeys());
+  for (int ms = 0; ms < 30; ms += 10) podcar.drive({1, 0.4}, 0.01);
+  EXPECT_FALSE(podcar.obeys());
+  podcar.begin_drive();
+  EXPECT_TRUE(podcar.obeys());
+  for (int ms = 0; ms < 5000; ms += 10) podcar.drive({0, 0}, 0.01);
+  EXPECT_TRUE(podcar.obeys()) << "it is not told to steer while it stands";
 }
 
 TEST(OpenPodcarPilot, KeepsOnlyAStopOfWhatCameWhileItWasArmed) {

@@ -64,6 +64,12 @@ int drive(r4::Board& board, Course& course, const r4::control::Pose& start) {
                           "the steering sensor tells of an angle that there is not",
                           "look at its cable, and at podcar_steering");
         }
+        if (!podcar.obeys()) {
+          throw r4::Error(r4::ErrorKind::refused, "the vehicle",
+                          "steering or speed is not as it was told",
+                          "look at DHB1A, AINSTEER and encoder 1: does forward steer to the left "
+                          "and count upwards?");
+        }
         time_s += step.dt_s;
         if (time_s >= told_s) {
           say(time_s, podcar, course);

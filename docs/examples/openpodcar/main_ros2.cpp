@@ -42,16 +42,19 @@ bool wait_for_start(r4::Board& board, Podcar& podcar, Pilot& pilot, Topics& topi
 void drive(r4::Board& board, Podcar& podcar, Pilot& pilot, Topics& topics) {
   board.proximity(1, podcar_clearance_cm);
   board.arm();
-  topics.take(pilot, podcar.pose());  // stop may have been pressed meanwhile
-  pilot.begin(Pilot::Time::clock::now());
+  podcar.begin_drive();
+  bool begun = false;
   std::puts("armed");
   const auto report = r4::control::run_loop(
       board, podcar_loop(), [&](const r4::control::LoopStep& step) -> std::optional<r4::Setpoints> {
+        topics.take(pilot, podcar.pose());
+        if (!begun) pilot.begin(Pilot::Time::clock::now());  // what waited until now is too old
+        begun = true;
         const bool steering_is_known = podcar.sense(step.state);
         if (!steering_is_known) pilot.end("AINSTEER tells of an angle that there is not");
+        if (!podcar.obeys()) pilot.end("steering or speed is not as it was told");
         if (ended != 0) pilot.end("it was ended");
         topics.publish(podcar, step.state);
-        topics.take(pilot, podcar.pose());
         const auto wish = pilot.wish(podcar.pose(), Pilot::Time::clock::now());
         if (wish) return podcar.drive(*wish, step.dt_s);
         board.stop_async();  // the motors' supply is off at once, and the parking brake springs on

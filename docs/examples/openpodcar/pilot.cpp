@@ -7,7 +7,8 @@
 
 using r4::control::Twist;
 
-void Pilot::on_joy(std::span<const float> axes, std::span<const std::int32_t> buttons, Time now) {
+void Pilot::on_joy(std::span<const float> axes, std::span<const std::int32_t> buttons, Time now,
+                   std::uint64_t from) {
   const auto is_down = [&](std::size_t button) {
     return button < buttons.size() && buttons[button] != 0;
   };
@@ -17,6 +18,11 @@ void Pilot::on_joy(std::span<const float> axes, std::span<const std::int32_t> bu
                      std::abs(axes[map_.speed_axis]) <= 1 &&
                      std::abs(axes[map_.steering_axis]) <= 1;  // false for what is no number
   if (!whole) return;
+  if (from != from_) {
+    if (now - heard_ <= joy_timeout) end("there are two joysticks");
+    from_ = from;
+    start_was_up_ = false;
+  }
 
   // A press is what was seen to come: not a button that is down when the joystick begins to be heard.
   const bool started = is_down(map_.start) && start_was_up_ && now - heard_ <= joy_timeout;
@@ -59,6 +65,9 @@ void Pilot::begin(Time now) {
 
 std::optional<Twist> Pilot::wish(const r4::control::Pose& pose, Time now) {
   if (now - heard_ > joy_timeout) end("the joystick is silent");
+  if (course_ && course_->deviation_m(pose.x_m, pose.y_m) > most_beside_m) {
+    end("it is off its way to the goal");
+  }
   if (mode_ == Mode::off) return std::nullopt;
   if (mode_ == Mode::manual) return held_ ? limited(stick_) : Twist{};
   if (commanded(now)) return limited(*command_);

@@ -50,12 +50,16 @@ class Pilot {
   static constexpr double backwards_m_s = 0.5;  // at most: no sensor looks there
   static constexpr double farthest_goal_m = 100;
   static constexpr double nearest_goal_m = 0.3;
+  static constexpr double most_beside_m = 1.5;  // of the way to a goal
 
   explicit Pilot(const JoyMap& map = {}) : map_(map) {}
 
   // What comes from outside, and when. Numbers that are none, and a joystick without these axes and buttons, count as
   // if they had not come; but for its stop button.
-  void on_joy(std::span<const float> axes, std::span<const std::int32_t> buttons, Time now);
+  // `from` tells publishers apart: two joysticks at a time end the drive, for a start that is held on the one looks
+  // like one that is pressed again and again, and the other would be heard when the one that drives is not.
+  void on_joy(std::span<const float> axes, std::span<const std::int32_t> buttons, Time now,
+              std::uint64_t from = 0);
   void on_cmd_vel(const r4::control::Twist& twist, Time now);
   // Why the goal is not taken; empty if it is.
   std::string on_goal(const Waypoint& goal, const r4::control::Pose& from, Time now);
@@ -80,7 +84,8 @@ class Pilot {
   Mode mode_ = Mode::off;
   std::string why_;
 
-  Time heard_;  // when the joystick was
+  Time heard_;              // when the joystick was
+  std::uint64_t from_ = 0;  // which one that was
   bool start_was_up_ = false;
   bool held_ = false;
   r4::control::Twist stick_;

@@ -8,6 +8,10 @@ namespace {
 
 constexpr double steering_tolerance_rad = 0.004;  // nearer than this the actuator rests
 constexpr double standing_m_s = 0.02;
+constexpr double driven_rad = 0.05;  // farther than this the actuator is driven with all it has
+constexpr double moved_rad = 0.02;
+constexpr double most_stuck_s = 0.5;
+constexpr double runaway = 1.5;  // times the greatest speed
 
 int pwm_of(double duty) { return static_cast<int>(std::lround(std::abs(duty) * r4::pwm_max)); }
 r4::Direction direction_of(double duty) {
@@ -24,6 +28,17 @@ r4::control::LoopOptions podcar_loop() {
   options.standstill = {{.encoder = 1, .channel = 1, .pwm = 1500, .counts = 5, .time = 1000ms}};
   options.rest.osmc(1, 0, r4::Direction::forward).dhb12(1, 0, r4::Direction::forward);
   return options;
+}
+
+void Podcar::begin_drive() {
+  speed_.reset();
+  steering_.reset();
+  stuck_s_ = 0;
+}
+
+bool Podcar::obeys() const {
+  return stuck_s_ < most_stuck_s &&
+         std::abs(wheel_.speed_m_s()) < runaway * podcar_geometry.max_speed_m_s;
 }
 
 bool Podcar::sense(const r4::State& state) {
@@ -47,7 +62,15 @@ r4::Setpoints Podcar::drive(const r4::control::Twist& wish, double dt_s) {
   // Standing, it keeps the wheels as they are.
   const double turn =
       command.speed_m_s == 0 ? 0 : steering_.step(command.steering_rad, steering_rad_, dt_s);
-  const bool steered = std::abs(command.steering_rad - steering_rad_) < steering_tolerance_rad;
+  const double off_rad = std::abs(command.steering_rad - steering_rad_);
+  const bool steered = off_rad < steering_tolerance_rad;
+  const bool is_driven = command.speed_m_s != 0 && off_rad > driven_rad;
+  if (is_driven && std::abs(steering_rad_ - stuck_at_rad_) < moved_rad) {
+    stuck_s_ += dt_s;
+  } else {
+    stuck_at_rad_ = steering_rad_;
+    stuck_s_ = 0;
+  }
   return r4::Setpoints{}
       .osmc(1, pwm_of(drive), direction_of(drive))
       .dhb12(1, steered ? 0 : pwm_of(turn), direction_of(turn));

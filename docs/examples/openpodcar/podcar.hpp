@@ -37,10 +37,15 @@ class Podcar {
  public:
   // It is there, before the first state.
   void begin_at(const r4::control::Pose& pose) { odometry_.reset(pose); }
+  // The board is armed: nothing is left of the drive before.
+  void begin_drive();
   // A state has come. False if the steering sensor cannot be believed: do not drive then.
   bool sense(const r4::State& state);
   // What to post for this motion. After sense().
   r4::Setpoints drive(const r4::control::Twist& wish, double dt_s);
+  // Does it do what drive() told it? False if the steering does not follow for half a second, or if the vehicle is much
+  // faster than it may be, as one whose encoder counts the wrong way: do not drive then.
+  bool obeys() const;
 
   const r4::control::Pose& pose() const { return odometry_.pose(); }
   const r4::control::Odometry& odometry() const { return odometry_; }
@@ -58,4 +63,7 @@ class Podcar {
   // The actuator is an integrator, so proportional is enough.
   r4::control::Pid steering_{{.kp = 30, .rate = 20}};
   double steering_rad_ = 0;
+  double stuck_at_rad_ = 0,
+         stuck_s_ =
+             0;  // where the steering is held to be, though it is told to move, and since when
 };

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -89,13 +90,15 @@ Qos qos_of(const Topic& topic, dds_reliability_kind_t reliability, int depth) {
   return qos;
 }
 
+// use(message, publisher)
 template <class Message, class Use>
 void take_each(dds_entity_t reader, const Use& use) {
   void* samples[most_joys] = {};
   dds_sample_info_t infos[most_joys];
   const int count = dds_take(reader, samples, infos, most_joys, most_joys);
   for (int i = 0; i < count; ++i) {
-    if (infos[i].valid_data) use(*static_cast<const Message*>(samples[i]));
+    if (!infos[i].valid_data) continue;
+    use(*static_cast<const Message*>(samples[i]), infos[i].publication_handle);
   }
   if (count > 0) dds_return_loan(reader, samples, count);
 }
@@ -134,16 +137,17 @@ Topics::~Topics() {
 
 void Topics::take(Pilot& pilot, const r4::control::Pose& pose) {
   const Time now = std::chrono::steady_clock::now();
-  take_each<sensor_msgs_msg_dds__Joy_>(joy_, [&](const sensor_msgs_msg_dds__Joy_& joy) {
-    pilot.on_joy({joy.axes._buffer, joy.axes._length}, {joy.buttons._buffer, joy.buttons._length},
-                 now);
-  });
+  take_each<sensor_msgs_msg_dds__Joy_>(
+      joy_, [&](const sensor_msgs_msg_dds__Joy_& joy, std::uint64_t publisher) {
+        pilot.on_joy({joy.axes._buffer, joy.axes._length},
+                     {joy.buttons._buffer, joy.buttons._length}, now, publisher);
+      });
   take_each<geometry_msgs_msg_dds__Twist_>(
-      cmd_vel_, [&](const geometry_msgs_msg_dds__Twist_& twist) {
+      cmd_vel_, [&](const geometry_msgs_msg_dds__Twist_& twist, std::uint64_t) {
         pilot.on_cmd_vel({twist.linear.x, twist.angular.z}, now);
       });
   take_each<geometry_msgs_msg_dds__PoseStamped_>(
-      goal_pose_, [&](const geometry_msgs_msg_dds__PoseStamped_& goal) {
+      goal_pose_, [&](const geometry_msgs_msg_dds__PoseStamped_& goal, std::uint64_t) {
         const Waypoint place{goal.pose.position.x, goal.pose.position.y};
         const std::string refused = std::strcmp(goal.header.frame_id, "odom") == 0
                                         ? pilot.on_goal(place, pose, now)

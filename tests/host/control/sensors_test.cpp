@@ -44,6 +44,14 @@ TEST(Wheel, DoesNotMindThatCountsAndTimeWrap) {
   EXPECT_NEAR(wheel.speed_m_s(), 1.0, 1e-9);
 }
 
+TEST(Wheel, TakesABoardThatBeganAgainForOne) {
+  Wheel wheel(metre_wheel);
+  wheel.advance(seen(600'000, 90'000));
+  EXPECT_EQ(wheel.advance(seen(3'000, 0)), 0);
+  EXPECT_EQ(wheel.speed_m_s(), 0);
+  EXPECT_NEAR(wheel.advance(seen(3'010, 10)), 0.010, 1e-12);
+}
+
 TEST(Wheel, TakesAJumpForAnEncoderThatWasSet) {
   Wheel wheel(metre_wheel);
   wheel.advance(seen(0, 100'000));
