@@ -286,16 +286,12 @@ void AsyncBoard::record(Recording& recording) { impl_->record(recording.recorder
 void AsyncBoard::describe(const Device& device) { impl_->describe(device); }
 
 void AsyncBoard::Impl::describe(const Device& device) {
-  const auto known = std::find_if(devices.begin(), devices.end(), [&](const Device& each) {
-    return each.place() == device.place();
-  });
-  if (known == devices.end()) {
-    devices.push_back(device);
-  } else if (known->description().text != device.description().text) {
-    *known = device;
-  } else {
-    return;
-  }
+  const auto is_same = [&](const Device& each) {
+    return each.place() == device.place() && each.description().text == device.description().text;
+  };
+  if (std::any_of(devices.begin(), devices.end(), is_same)) return;
+  std::erase_if(devices, [&](const Device& each) { return device.takes_place_of(each); });
+  devices.push_back(device);
   describe_in_recording(device);
 }
 

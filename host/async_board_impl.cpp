@@ -392,6 +392,7 @@ void AsyncBoard::Impl::on_link(const LinkStatus& status) {
 }
 
 void AsyncBoard::Impl::on_restart() {
+  ++boots;
   backlog_size = 0;  // of the boot before
   if (is_open()) call(restart_callbacks);
 }

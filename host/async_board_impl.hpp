@@ -194,6 +194,7 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
   asio::io_context& io;
   std::vector<std::unique_ptr<BoardWire>> wires;
   std::vector<Device> devices;       // that recordings tell of
+  std::uint32_t boots = 0;           // of the board, while we have known it
   const std::uint32_t heartbeat_ms;  // between ours
   Session session;
   BoardIdentity identity;

@@ -51,6 +51,11 @@ class AsyncBoard::AttachSteps final : public Completion {
   void complete(const CommandResult& result, How how) override {
     Ptr self(this);
     if (result.outcome != Outcome::confirmed) return end(std::move(self), result, how);
+    if (impl_.boots != boots_) {  // it has forgotten the steps that were done
+      CommandResult cut = result;
+      cut.outcome = Outcome::cancelled;
+      return end(std::move(self), cut, how);
+    }
     switch (stage_) {
       case Stage::command:
         if (has_step() && step().is_answered()) {
@@ -97,6 +102,7 @@ class AsyncBoard::AttachSteps final : public Completion {
   void end(Ptr self, const CommandResult& result, How how) {
     CommandResult whole = result;
     whole.elapsed = Impl::steady_now() - started_;
+    if (stage_ == Stage::answer && whole.outcome == Outcome::timed_out) whole.executed = 1;
     if (whole.outcome != Outcome::confirmed) whole.step = static_cast<std::uint16_t>(done_ + 1);
     const CompletionPtr::pointer users = completion_.release();
     self.reset();
@@ -108,6 +114,7 @@ class AsyncBoard::AttachSteps final : public Completion {
   const std::vector<DeviceStep> steps_;
   const Time timeout_;  // of each
   const Time started_;
+  const std::uint32_t boots_ = impl_.boots;
   Time deadline_{0};  // of the step that is being done
   std::size_t done_ = 0;
   Stage stage_ = Stage::command;

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "r4link/error.hpp"
@@ -26,6 +27,11 @@ Device::Device(DeviceDescription description, int address, int first_slot)
   }
 }
 
+bool Device::takes_place_of(const Device& other) const {
+  return other.address_ == address_ ||
+         (other.first_slot_ <= last_slot() && other.last_slot() >= first_slot_);
+}
+
 std::string Device::text() const { return fmt::format("{}@0x{:02x}", description_.name, address_); }
 
 std::string Device::place() const { return fmt::format("{}:{}", text(), first_slot_); }
@@ -43,9 +49,13 @@ StateField Device::field(std::size_t value) const {
   return static_cast<StateField>(static_cast<int>(StateField::i2c1) + slot - 1);
 }
 
+// A scaled value is as near to what the description says as its scale can be rounded to.
 bool Device::counts(const State& state, std::size_t value) const {
   const auto& only = description_.values[value].only;
-  return !only || reading(state, only->value).number == only->number;
+  if (!only) return true;
+  const auto is = reading(state, only->value).number;
+  const double step = std::abs(description_.values[only->value].scale);
+  return is && std::abs(*is - only->number) <= step / 1e6;
 }
 
 DeviceReading Device::reading(const State& state, std::size_t value) const {

@@ -107,6 +107,12 @@ Problem explain(const Device& device, const CommandResult& result, const LinkSta
     if (result.transfer.pnum != 0) {
       if (auto problem = trouble_with(device, step, result.transfer)) return *problem;
     }
+    if (result.outcome == Outcome::timed_out && result.executed != 0) {
+      return {ErrorKind::refused, device.text(),
+              "the end of its transfer was not heard: " + shown(step.command()),
+              "give each step more time, or look at the field I2CX of the state",
+              Outcome::timed_out};
+    }
     command = shown(step.command());
   }
   Problem problem = explain(command, result, link);

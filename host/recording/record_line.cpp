@@ -154,7 +154,9 @@ LineKind read_comment(std::string_view line, RecordLine& out) {
     line.remove_prefix(device_words.size());
     if (line.empty() || line[0] < '0' || line[0] > '9') return LineKind::comment;  // a person's
     RecordedDevice& device = out.device;
-    return read_of_wire(line, device.wire, device.place, device.description)
+    // It is shown as it is.
+    return read_of_wire(line, device.wire, device.place, device.description) &&
+                   std::all_of(device.place.begin(), device.place.end(), is_plain)
                ? LineKind::device
                : damaged(out, "no device is written so");
   }

@@ -30,7 +30,10 @@ class Tour final : public RecordingReader::Handler {
  public:
   explicit Tour(RecordingVisitor& visitor) : visitor_(visitor) {}
 
-  void on_header() override { states_.clear(); }
+  void on_header() override {
+    states_.clear();
+    visitor_.on_beginning();
+  }
   void on_wire(const RecordedWire& wire) override {
     visitor_.on_wire(wire.number, wire.url, wire.name);
   }

@@ -46,6 +46,8 @@ struct RecordingOptions {
 class RecordingVisitor {
  public:
   virtual ~RecordingVisitor() = default;
+  // A recording begins, or another one in the same file: its wires and devices may be others.
+  virtual void on_beginning() {}
   // How a board is reached, before the first record of that wire, and again when its name is known: its own or its id.
   virtual void on_wire(int wire, const std::string& url, const std::string& name) {
     static_cast<void>(wire), static_cast<void>(url), static_cast<void>(name);

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """r4link.read: recordings as arrays."""
 import os
+import pathlib
 import threading
 import zlib
 
@@ -9,6 +10,7 @@ import pytest
 
 import r4link
 
+DESCRIPTIONS = pathlib.Path(__file__).parents[2] / 'host' / 'devices'
 HEADER = '# r4log 1 by r4 0.1.0\n# wire 1 udp://192.168.0.125 left-arm\n'
 
 
@@ -62,6 +64,44 @@ def test_fields_that_come_later_two_boards_and_damage(tmp_path):
     assert left.damaged == 1 and len(log.damage) == 1 and log.damage[0].startswith('line 7, byte ')
     with pytest.raises(KeyError, match='left-arm'):
         log['right-arm']  # pylint: disable=pointless-statement
+
+
+def device(place, text, wire=1):
+    escaped = text.replace('\\', '\\x5c').replace('\n', '\\x0a')
+    return f'# device {wire} {place} {escaped}\n'
+
+
+def test_a_device_that_another_has_replaced_measures_nothing_any_more(tmp_path):
+    path = tmp_path / 'replaced.r4log'
+    angle, power = ((DESCRIPTIONS / f'{name}.device').read_text() for name in ('as5600', 'ina219'))
+    both = 'I2C1:5,0,x0400;I2C2:5,0,x20;'
+    path.write_text(HEADER + device('as5600@0x36:1', angle) + line(0.1, both + 'PNum:1;T:10;')
+                    + device('ina219@0x40:1', power) + line(0.2, 'I2C1:15,0,x07d0;I2C2:15,0,x5d98;PNum:2;T:20;')
+                    + HEADER + line(0.3, both + 'PNum:1;T:10;'))
+    [board] = r4link.read(path).boards
+    assert board.states['as5600_angle'][0] == pytest.approx(np.pi / 2)
+    assert np.isnan(board.states['as5600_angle'][1:]).all()
+    assert board.states['ina219_current'][1] == pytest.approx(0.2)
+    assert np.isnan(board.states['ina219_current'][[0, 2]]).all(), 'the last is of another recording'
+
+
+def test_values_may_be_called_as_other_columns_are(tmp_path):
+    path = tmp_path / 'names.r4log'
+    mine = 'device t\ntitle t\naddress 0x40\npoll all x00 1 100\nvalue ms all 0 u8\n'
+    path.write_text(HEADER + device('t@0x40:1', mine) + line(0.1, 'I2C1:5,0,x07;PNum:1;T:10;'))
+    [board] = r4link.read(path).boards
+    assert board.states['t_ms'].tolist() == [10] and board.states['t_ms_'].tolist() == [7]
+
+
+def test_more_values_than_devices_can_have_are_told(tmp_path):
+    path = tmp_path / 'many.r4log'
+    values = ''.join(f'value v{i} all 0 u8\n' for i in range(250))
+    path.write_text(HEADER + ''.join(
+        device('t%d@0x40:1' % n, f'device t{n}\ntitle t\naddress 0x40\npoll all x00 1 100\n{values}')
+        for n in range(6)) + line(0.1, 'I2C1:5,0,x07;PNum:1;T:10;'))
+    log = r4link.read(path)
+    assert len(log.boards[0].states.dtype.names) < 1010
+    assert any('more values than' in each for each in log.damage), log.damage
 
 
 @pytest.mark.parametrize('written, states, damaged', [

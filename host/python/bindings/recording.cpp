@@ -37,11 +37,15 @@ constexpr double not_measured = std::numeric_limits<double>::quiet_NaN();
 
 // A value of a described device, in all states.
 struct Measured {
-  Device device;
+  std::shared_ptr<const Device> device;
   std::size_t value;
   std::string value_name, name;  // "gyro_z", and of the column
   std::vector<double> numbers;
+  bool here = true;  // no other has taken its place
 };
+
+// Of one board, whose bus has 112 addresses.
+constexpr std::size_t most_measured = 1000;
 
 // What a recording has of one board.
 struct RecordedBoard {
@@ -68,7 +72,7 @@ std::string column_of(const Device& device, const DeviceValue& value,
                       const std::vector<Measured>& others) {
   const std::string& kind = device.description().name;
   const bool another = std::any_of(others.begin(), others.end(), [&](const Measured& each) {
-    return each.device.description().name == kind && each.device.address() != device.address();
+    return each.device->description().name == kind && each.device->address() != device.address();
   });
   const std::string text = device.text();  // "bno055@0x29"
   const std::string address = another ? text.substr(text.find("@0x") + 3) + "_" : "";
@@ -87,21 +91,33 @@ class Columns final : public RecordingVisitor {
     if (!name.empty()) boards_[index].name = name;
     index_of_[wire] = index;
   }
-  void on_device(int wire, const Device& device) override {
+  void on_beginning() override {
+    for (RecordedBoard& board : boards_) {
+      for (Measured& each : board.measured) each.here = false;
+    }
+  }
+  void on_device(int wire, const Device& told) override {
     RecordedBoard& board = of(wire);
-    const std::vector<DeviceValue>& values = device.description().values;
+    for (Measured& each : board.measured)
+      each.here = each.here && !told.takes_place_of(*each.device);
+    const auto device = std::make_shared<const Device>(told);
+    const std::string text = device->text();
+    const std::vector<DeviceValue>& values = device->description().values;
     for (std::size_t i = 0; i < values.size(); ++i) {
       const auto known =
           std::find_if(board.measured.begin(), board.measured.end(), [&](const Measured& each) {
-            return each.device.text() == device.text() && each.value_name == values[i].name;
+            return each.value_name == values[i].name && each.device->text() == text;
           });
       if (known != board.measured.end()) {  // in other slots, perhaps
         known->device = device;
         known->value = i;
-      } else {
+        known->here = true;
+      } else if (board.measured.size() < most_measured) {
         board.measured.push_back({device, i, values[i].name,
-                                  column_of(device, values[i], board.measured),
+                                  column_of(*device, values[i], board.measured),
                                   std::vector<double>(board.pnum.size(), not_measured)});
+      } else {
+        return on_damage(text + ": more values than the devices of one board have");
       }
     }
   }
@@ -122,7 +138,11 @@ class Columns final : public RecordingVisitor {
       column.numbers.push_back(static_cast<std::int32_t>(number));
     }
     for (Measured& each : board.measured) {
-      each.numbers.push_back(each.device.reading(state, each.value).number.value_or(not_measured));
+      double number = not_measured;
+      if (each.here) {
+        number = each.device->reading(state, each.value).number.value_or(not_measured);
+      }
+      each.numbers.push_back(number);
     }
   }
   void on_datagram(int wire, Time at, bool from_board, std::string_view bytes) override {

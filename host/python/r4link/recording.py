@@ -78,6 +78,12 @@ def read(path: str | os.PathLike[str], datagrams: bool = False) -> Log:
     while found:
         url, name, damaged, at, t_ms, pnum, columns, told, sent = found.pop(0)
         kinds: list[Any] = [('time', 'datetime64[us]'), ('t_ms', 'u4'), ('pnum', 'u4')]
+        taken = {name for name, _ in kinds}
+        for i, (column, kind, numbers) in enumerate(columns):
+            while column in taken:  # what a device calls its values is up to its description
+                column += '_'
+            taken.add(column)
+            columns[i] = (column, kind, numbers)
         states = np.zeros(len(pnum), np.dtype(kinds + [(column, kind) for column, kind, _ in columns]))
         states['time'], states['t_ms'], states['pnum'] = times(at), t_ms, pnum
         while columns:

@@ -52,6 +52,8 @@ class R4LINK_API Device {
   int address() const { return address_; }
   int first_slot() const { return first_slot_; }
   int last_slot() const { return first_slot_ + static_cast<int>(description_.polls.size()) - 1; }
+  // Is the other, on the same bus, no more once this one is set up? It has its address, or one of its slots.
+  bool takes_place_of(const Device& other) const;
   std::string text() const;    // "bno055@0x28"
   std::string place() const;   // "bno055@0x28:1"
   std::string fields() const;  // "I2C1,I2C2", for F: and Board::fields()

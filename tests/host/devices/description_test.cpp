@@ -84,6 +84,27 @@ TEST(Device, AValueThatTheDeviceDoesNotCountIsNoMeasurement) {
   EXPECT_EQ(lidar.reading(state, "status").number, 2);
 }
 
+TEST(Device, CountsByAScaledValueAsItIsWritten) {
+  const Device device(DeviceDescription::parse("device t\ntitle t\naddress 0x40\npoll s x00 2 100\n"
+                                               "value mode s 0 u8 scale 0.1\n"
+                                               "value x s 1 u8 only mode 0.3\n"),
+                      0x40);
+  State state;
+  state.i2c[0].data.size = 2;
+  state.i2c[0].data.bytes[0] = 3;
+  state.i2c[0].data.bytes[1] = 9;
+  EXPECT_EQ(device.reading(state, "x").number, 9) << "3 times 0.1 is not quite 0.3";
+  state.i2c[0].data.bytes[0] = 4;
+  EXPECT_FALSE(device.reading(state, "x").number);
+}
+
+TEST(Device, TakesThePlaceOfWhatHasItsAddressOrASlotOfIt) {
+  const Device ina = Device::from("ina219@0x40:1");  // slots 1 and 2
+  EXPECT_TRUE(ina.takes_place_of(Device::from("ina219@0x40:5")));
+  EXPECT_TRUE(ina.takes_place_of(Device::from("ina219@0x41:2")));
+  EXPECT_FALSE(ina.takes_place_of(Device::from("ina219@0x41:3")));
+}
+
 TEST(Device, WithoutItsMagnetAnEncoderHasNoAngle) {
   const Device encoder(DeviceDescription::load("as5600"), 0x36);
   State state;

@@ -156,7 +156,8 @@ TEST(RecordLine, OfADeviceHasItsPlaceAndTheTextOfItsDescription) {
   ASSERT_TRUE(read_record_line("# device was changed at noon", read));
   EXPECT_EQ(read.kind, LineKind::comment) << "a person's";
   for (const char* const line :
-       {"# device 0 bno055@0x28:1 device x", "# device 70000 x", "# device 1 x \\x2"}) {
+       {"# device 0 bno055@0x28:1 device x", "# device 1 a\\x1b[2J@0x28:1 device x",
+        "# device 70000 x", "# device 1 x \\x2"}) {
     EXPECT_FALSE(read_record_line(line, read)) << line;
   }
 }

@@ -131,6 +131,46 @@ TEST(Csv, DevicesOfOneRecordingAreNotThoseOfTheNextInTheFile) {
   EXPECT_TRUE(lines.back().ends_with(",x5d98,,")) << lines.back();
 }
 
+TEST(Csv, HasNoColumnOfTheRecordingsDevicesWhereOthersAreNamed) {
+  const auto lines = lines_of(converted(recording_of_two_with_devices(), ".r4log", ".csv", 1000,
+                                        {Device::from("as5600@0x36:3")})
+                                  .bytes);
+  EXPECT_EQ(lines[0].find("ina219"), std::string::npos) << lines[0];
+  EXPECT_NE(lines[0].find("as5600@0x36 angle [rad]"), std::string::npos) << lines[0];
+}
+
+TEST(Csv, WhatADeviceCountsIsSaidByItsOwnWire) {
+  std::string all = "# r4log 1 by r4 0.1.0\n# wire 1 udp://a\n# wire 2 udp://b\n";
+  for (const std::uint16_t wire : {std::uint16_t{1}, std::uint16_t{2}}) {
+    write_device(all, {wire, "as5600@0x36:1", std::string(DeviceDescription::text_of("as5600"))});
+  }
+  const auto state = [&all](std::uint16_t wire, const std::string& fields) {
+    write_record(all, {Time{1795468293000000 + wire}, wire, RecordKind::from_board,
+                       with_crc(fields + "PNum:1;T:1010;")});
+  };
+  state(1, "I2C2:1000,0,x20;");    // its magnet is there
+  state(2, "I2C1:1000,0,x0400;");  // what it says of its magnet was not read yet
+  const auto lines = lines_of(converted(all, ".r4log", ".csv").bytes);
+  ASSERT_EQ(lines.size(), 3U);
+  EXPECT_NE(lines[2].find("x0400,"), std::string::npos) << lines[2];
+  EXPECT_EQ(lines[2].find("1.57"), std::string::npos) << lines[2];
+  EXPECT_EQ(converted(all, ".r4log", ".jsonl").bytes.find("1.57"), std::string::npos);
+}
+
+TEST(Csv, SaysWhatIsToldTooLateForAColumnOfIt) {
+  StringOutput output;
+  const auto sink = tool::make_sink("test.csv", output, {});
+  tool::Conversion conversion(*sink, [](const RecordingDamage&) {});
+  std::string all = one_state("I2C3:1000,0,x07d0;I2C4:1002,0,x5d98;PNum:1;T:1010;");
+  write_device(all, {1, "ina219@0x40:3", std::string(DeviceDescription::text_of("ina219"))});
+  const auto source = tool::make_source("test.r4log", conversion);  // not surveyed, as of a pipe
+  source->feed(all);
+  source->finish();
+  conversion.finish();
+  EXPECT_NE(sink->left_out().find("what ina219@0x40 measured"), std::string::npos)
+      << sink->left_out();
+}
+
 TEST(Csv, OtherFormatsHaveTheDevicesOfARecordingToo) {
   const std::string recording = recording_of_two_with_devices();
   const char* const measured = R"("devices":{"ina219@0x40":{"voltage":11.984,"current":0.2)";

@@ -30,38 +30,53 @@ void append_quoted(std::string& out, std::string_view text) {
   out += '"';
 }
 
+// Of devices; what a table can have is less.
+constexpr std::size_t most_columns = 4096;
+
 }  // namespace
 
 CsvSink::CsvSink(Output& output, std::vector<Device> devices)
-    : output_(output), devices_(std::move(devices)) {}
+    : output_(output), devices_(devices), surveyed_(std::move(devices)) {}
 
 void CsvSink::survey(const RecordedDevice& device) {
-  surveyed_.on_device(device);
-  add_columns(surveyed_);
+  if (const Device* const taken = surveyed_.on_device(device)) add_columns(*taken);
 }
 
-void CsvSink::add_columns(const RecordedDevices& devices) {
-  for (const RecordedDevices::Known& recorded : devices.all()) {
-    const Device& device = recorded.device;
-    for (const DeviceValue& value : device.description().values) {
-      const bool known = std::any_of(device_columns_.begin(), device_columns_.end(),
-                                     [&](const DeviceColumn& each) {
-                                       return each.device == device.text() &&
-                                              each.value == value.name && each.unit == value.unit;
-                                     });
-      if (!known) device_columns_.push_back({device.text(), value.name, value.unit});
-    }
+void CsvSink::add_columns(const Device& device) {
+  const std::string text = device.text();
+  for (const DeviceValue& value : device.description().values) {
+    const bool known =
+        std::any_of(device_columns_.begin(), device_columns_.end(), [&](const DeviceColumn& each) {
+          return each.device == text && each.value == value.name && each.unit == value.unit;
+        });
+    if (known) continue;
+    if (device_columns_.size() == most_columns) return;
+    device_columns_.push_back({text, value.name, value.unit});
   }
+}
+
+void CsvSink::on_device(const RecordedDevice& device) {
+  const Device* const taken = devices_.on_device(device);
+  if (taken == nullptr || !begun_) return;
+  const std::string text = taken->text();
+  const bool known = std::any_of(device_columns_.begin(), device_columns_.end(),
+                                 [&](const DeviceColumn& each) { return each.device == text; });
+  if (!known && late_.empty()) late_ = text;
+}
+
+void CsvSink::on_header() {
+  devices_.on_header();
+  states_.clear();
 }
 
 bool CsvSink::read(const Record& record) {
   return record.kind == RecordKind::from_board && read_datagram(Text(record.bytes), datagram_) &&
-         kind_of(datagram_) == MessageKind::state && read_state(datagram_, state_) &&
-         !state_.present.empty();
+         kind_of(datagram_) == MessageKind::state && read_state(datagram_, states_[record.wire]) &&
+         !states_[record.wire].present.empty();
 }
 
 void CsvSink::survey(const Record& record) {
-  if (read(record)) columns_.add(state_.present);
+  if (read(record)) columns_.add(states_[record.wire].present);
 }
 
 void CsvSink::write_header() {
@@ -77,7 +92,7 @@ void CsvSink::write_header() {
       fmt::format_to(std::back_inserter(row_), ",{} {}", view(name_of(field)), units.values[i]);
     }
   }
-  add_columns(devices_);
+  for (const RecordedDevices::Known& known : devices_.all()) add_columns(known.device);
   for (const DeviceColumn& column : device_columns_) {
     fmt::format_to(std::back_inserter(row_), ",{} {}", column.device, column.value);
     if (!column.unit.empty()) fmt::format_to(std::back_inserter(row_), " [{}]", column.unit);
@@ -92,6 +107,7 @@ void CsvSink::on_record(const Record& record) {
     ++others_;
     return;
   }
+  const State& state = states_[record.wire];
   // A field's values as they came: read_state() has found that they are numbers, and how many.
   std::array<std::string_view, state_field_count + 1> values;
   for (const Field& field : datagram_) {
@@ -108,7 +124,7 @@ void CsvSink::on_record(const Record& record) {
   if (datagram_.has_time()) fmt::format_to(out, "{}", datagram_.time_ms());
   for (const StateField field : columns_) {
     row_ += ',';
-    if (state_.present.has(field)) {
+    if (state.present.has(field)) {
       row_ += values[static_cast<std::size_t>(field)];
     } else {
       row_.append(units_of(field).count - 1, ',');
@@ -128,8 +144,9 @@ void CsvSink::append_measured(const DeviceColumn& column, std::uint16_t wire) {
     if (!known.is_of(wire) || device.text() != column.device) continue;
     const auto value = device.description().find(column.value);
     if (!value || device.description().values[*value].unit != column.unit) continue;
-    if (!state_.present.has(device.field(*value))) continue;
-    if (const auto number = device.reading(state_, *value).number) {
+    const State& state = states_[wire];
+    if (!state.present.has(device.field(*value))) continue;
+    if (const auto number = device.reading(state, *value).number) {
       fmt::format_to(std::back_inserter(row_), "{}", *number);
     }
     return;
@@ -143,6 +160,11 @@ void CsvSink::finish() {
 std::string CsvSink::left_out() const {
   std::string text = others_ == 0 ? std::string() : fmt::format("{} that are no state", others_);
   if (!devices_.problems().empty()) text += (text.empty() ? "" : ", ") + devices_.problems();
+  if (!late_.empty()) {
+    text += fmt::format(
+        "{}what {} measured, which a pipe tells behind the first record (convert the file itself)",
+        text.empty() ? "" : ", ", late_);
+  }
   return text;
 }
 

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -29,8 +30,8 @@ class CsvSink final : public Sink {
   void survey(const Record& record) override;
   void on_comment(std::string_view, Time) override {}
   void on_wire(const RecordedWire& wire, Time) override { names_.on_wire(wire); }
-  void on_device(const RecordedDevice& device) override { devices_.on_device(device); }
-  void on_header() override { devices_.on_header(); }
+  void on_device(const RecordedDevice& device) override;
+  void on_header() override;
   void on_record(const Record& record) override;
   void finish() override;
   std::string left_out() const override;
@@ -44,20 +45,21 @@ class CsvSink final : public Sink {
     std::string value;
     std::string unit;
   };
-  void add_columns(const RecordedDevices& devices);
+  void add_columns(const Device& device);
   void append_measured(const DeviceColumn& column, std::uint16_t wire);
 
   Output& output_;
   RecordedDevices devices_;
-  RecordedDevices surveyed_{{}};
+  RecordedDevices surveyed_;
   std::vector<DeviceColumn> device_columns_;
   WireNames names_;
   Datagram datagram_;
-  State state_;
+  std::map<std::uint16_t, State> states_;  // of each wire: what is merged is one board's
   FieldSet columns_;
   bool begun_ = false;
   std::string row_;
   std::uint64_t others_ = 0;  // records that are no state
+  std::string late_;          // a device that is told when the columns are written
 };
 
 }  // namespace r4::tool

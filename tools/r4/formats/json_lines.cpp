@@ -28,17 +28,18 @@ void JsonLinesSink::on_record(const Record& record) {
 
 void MeasuredJson::add_to(Json& object, const Record& record, const RecordedDevices& devices) {
   if (devices.all().empty() || record.kind != RecordKind::from_board ||
-      !read_datagram(Text(record.bytes), datagram_) || kind_of(datagram_) != MessageKind::state ||
-      !read_state(datagram_, state_)) {
+      !read_datagram(Text(record.bytes), datagram_) || kind_of(datagram_) != MessageKind::state) {
     return;
   }
+  State& state = states_[record.wire];
+  if (!read_state(datagram_, state)) return;
   for (const RecordedDevices::Known& known : devices.all()) {
     if (!known.is_of(record.wire)) continue;
     const Device& device = known.device;
     const std::vector<DeviceValue>& values = device.description().values;
     for (std::size_t i = 0; i < values.size(); ++i) {
-      if (!state_.present.has(device.field(i))) continue;
-      const auto number = device.reading(state_, i).number;
+      if (!state.present.has(device.field(i))) continue;
+      const auto number = device.reading(state, i).number;
       object["devices"][device.text()][values[i].name] = number ? Json(*number) : Json();
     }
   }

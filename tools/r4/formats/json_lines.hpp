@@ -5,6 +5,8 @@
 //     {"time":1795468293.404765,"wire":1,"board":"left-arm","type":"event","event":"up udp://192.168.0.125"}
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -28,10 +30,12 @@ void add_record_json(Json& object, const Record& record);
 class MeasuredJson {
  public:
   void add_to(Json& object, const Record& record, const RecordedDevices& devices);
+  // Another recording begins, whose wires may be others.
+  void on_header() { states_.clear(); }
 
  private:
-  Datagram datagram_;  // used again and again
-  State state_;
+  Datagram datagram_;                      // used again and again
+  std::map<std::uint16_t, State> states_;  // of each wire: what is merged is one board's
 };
 
 class JsonLinesSink final : public Sink {
@@ -45,7 +49,10 @@ class JsonLinesSink final : public Sink {
   void on_comment(std::string_view, Time) override {}
   void on_wire(const RecordedWire& wire, Time) override { names_.on_wire(wire); }
   void on_device(const RecordedDevice& device) override { devices_.on_device(device); }
-  void on_header() override { devices_.on_header(); }
+  void on_header() override {
+    devices_.on_header();
+    measured_.on_header();
+  }
   void on_record(const Record& record) override;
   void finish() override {}
   std::string left_out() const override { return devices_.problems(); }

@@ -1,29 +1,44 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "recorded_devices.hpp"
 
+#include <cstddef>
 #include <utility>
 
 #include "r4link/error.hpp"
 
 namespace r4::tool {
+namespace {
+
+// What a recording of a thousand boards tells, and of whatever else it is made up.
+constexpr std::size_t most_devices = 8000;
+constexpr std::size_t most_problems = 1000;  // bytes
+
+}  // namespace
 
 RecordedDevices::RecordedDevices(std::vector<Device> named) : named_(!named.empty()) {
   for (Device& each : named) all_.push_back({no_wire, std::move(each)});
 }
 
-void RecordedDevices::on_device(const RecordedDevice& told) {
-  if (named_) return;
+const Device* RecordedDevices::on_device(const RecordedDevice& told) {
+  if (named_) return nullptr;
   try {
     Device device = Device::parse(told.place, told.description);
     std::erase_if(all_, [&](const Known& each) {
-      return each.wire == told.wire && each.device.first_slot() <= device.last_slot() &&
-             each.device.last_slot() >= device.first_slot();
+      return each.wire == told.wire && device.takes_place_of(each.device);
     });
-    all_.push_back({told.wire, std::move(device)});
+    if (all_.size() < most_devices) {
+      return &all_.emplace_back(Known{told.wire, std::move(device)}).device;
+    }
+    add_problem(told.place + ": one device too many");
   } catch (const Error& error) {
-    if (problems_.find(error.what()) != std::string::npos) return;
-    problems_ += (problems_.empty() ? "" : ", ") + std::string(error.what());
+    add_problem(error.what());
   }
+  return nullptr;
+}
+
+void RecordedDevices::add_problem(const std::string& text) {
+  if (problems_.size() > most_problems || problems_.find(text) != std::string::npos) return;
+  problems_ += (problems_.empty() ? "" : ", ") + text;
 }
 
 void RecordedDevices::on_header() {

@@ -17,8 +17,8 @@ class RecordedDevices {
  public:
   explicit RecordedDevices(std::vector<Device> named);
 
-  // The recording tells of one, instead of what has had its slots.
-  void on_device(const RecordedDevice& told);
+  // The recording tells of one, instead of what has had its address or slots. Nothing if it is not taken.
+  const Device* on_device(const RecordedDevice& told);
   // Another recording begins, whose wires may be others.
   void on_header();
 
@@ -32,6 +32,8 @@ class RecordedDevices {
   const std::string& problems() const { return problems_; }
 
  private:
+  void add_problem(const std::string& text);
+
   const bool named_;
   std::vector<Known> all_;
   std::string problems_;

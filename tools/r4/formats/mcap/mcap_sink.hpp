@@ -30,7 +30,10 @@ class McapSink final : public Sink {
   void on_comment(std::string_view line, Time time) override;
   void on_wire(const RecordedWire& wire, Time time) override;
   void on_device(const RecordedDevice& device) override { devices_.on_device(device); }
-  void on_header() override { devices_.on_header(); }
+  void on_header() override {
+    devices_.on_header();
+    measured_.on_header();
+  }
   // Throws Error{data} for a time beyond the year 2554, which MCAP cannot write.
   void on_record(const Record& record) override;
   void finish() override;
