@@ -31,6 +31,11 @@ bool same(Text tag, const char (&expected)[tag_size]) {
   return difference == 0;
 }
 
+// 0: none.
+int id_of(Text digit) {
+  return digit.size() == 1 && digit[0] >= '1' && digit[0] <= '0' + max_key_id ? digit[0] - '0' : 0;
+}
+
 Field last_field(const Datagram& datagram) {
   Field last;
   for (const Field& field : datagram) last = field;
@@ -97,9 +102,8 @@ void Authentication::use(const Key (&keys)[max_keys]) {
 
 void Authentication::renew() {
   has_nonce_ = required_ && has_chance_;
-  for (Entry& entry : entries_) {
-    for (std::uint64_t& counter : entry.counters) counter = 0;
-  }
+  for (Entry& entry : entries_) entry.highest = entry.forgotten = 0;
+  for (std::uint8_t& id : used_with_) id = 0;
   if (!has_nonce_) return;
   std::uint8_t digest[nonce_size / 2];
   draw(Text(), digest);
@@ -123,10 +127,10 @@ void Authentication::draw(Text purpose, std::uint8_t (&digest)[nonce_size / 2]) 
   hash.finish(digest);
 }
 
-Authentication::Entry* Authentication::find(Text id) {
-  if (id.size() != 1 || id[0] < '1' || id[0] > '0' + max_key_id) return nullptr;
+// nullptr: there is no key of that id.
+Authentication::Entry* Authentication::find(int id) {
   for (Entry& entry : entries_) {
-    if (entry.id == id[0] - '0') return &entry;
+    if (id != 0 && entry.id == id) return &entry;
   }
   return nullptr;
 }
@@ -140,7 +144,7 @@ Verdict Authentication::verify(const Datagram& datagram, std::uint32_t now_ms) {
       !parse_number(values[1], counter) || !parse_number(values[2], board_t)) {
     return Verdict::missing;
   }
-  Entry* const entry = find(values[0]);
+  Entry* const entry = find(id_of(values[0]));
   if (entry == nullptr) return Verdict::unknown_key;
   const char* const begin = datagram.bytes().begin();
   const Text before(begin, static_cast<std::size_t>(values[2].end() - begin));
@@ -148,14 +152,29 @@ Verdict Authentication::verify(const Datagram& datagram, std::uint32_t now_ms) {
   write_tag(entry->key, nonce(), before, expected);
   if (!same(values[3], expected)) return Verdict::wrong_tag;
   const bool fresh = now_ms - board_t <= age_limit_ms;
-  std::uint64_t* lowest = entry->counters;
-  for (std::uint64_t& used : entry->counters) {
-    if (used == counter) return fresh && counter != 0 ? Verdict::copy : Verdict::replayed;
-    if (used < *lowest) lowest = &used;
-  }
-  if (counter < *lowest) return Verdict::replayed;
-  *lowest = counter;
+  if (counter <= entry->forgotten) return Verdict::replayed;
+  if (is_used(*entry, counter)) return fresh ? Verdict::copy : Verdict::replayed;
+  spend(*entry, counter);
   return fresh ? Verdict::authentic : Verdict::old;
+}
+
+bool Authentication::is_used(const Entry& entry, std::uint64_t counter) const {
+  if (counter > entry.highest) return false;
+  for (int i = 0; i < counters_remembered; ++i) {
+    if (counters_[i] == counter && used_with_[i] == entry.id) return true;
+  }
+  return false;
+}
+
+void Authentication::spend(Entry& entry, std::uint64_t counter) {
+  Entry* const forgets = find(used_with_[next_]);
+  if (forgets != nullptr && counters_[next_] > forgets->forgotten) {
+    forgets->forgotten = counters_[next_];
+  }
+  counters_[next_] = counter;
+  used_with_[next_] = entry.id;
+  next_ = (next_ + 1) % counters_remembered;
+  if (counter > entry.highest) entry.highest = counter;
 }
 
 bool Authentication::rejected(Verdict verdict, bool is_command, std::uint32_t now_ms) {

@@ -41,7 +41,7 @@ enum class Verdict : std::uint8_t {
   missing,      // its last field is no A of the form above
   unknown_key,  // no key of that id
   wrong_tag,    // changed, of another key, or for another nonce
-  replayed,     // the counter was used, or is below all that are remembered
+  replayed,     // the counter was used, or one that was forgotten may have been it
   old,          // its board T is more than 250 ms ago, or yet to come
   copy,  // byte for byte one of the last that were signed, and not old: by another wire, perhaps
 };
@@ -55,9 +55,9 @@ class Authentication {
   static constexpr std::size_t chance_size = 32;
   static constexpr std::uint32_t age_limit_ms = 250;
   static constexpr std::uint32_t answer_spacing_ms = 100;
-  // So many counters of a key are remembered, the highest: a wire that lags by age_limit_ms beside another
-  // brings copies of as many datagrams. What is below them counts as used.
-  static constexpr int counters_remembered = 32;
+  // So many counters are remembered, the newest of all keys together: a wire that lags by age_limit_ms beside
+  // another brings copies of as many datagrams, 448 a second. What is below a forgotten one counts as used.
+  static constexpr int counters_remembered = 112;
 
   // `chance`: random bytes, others at each boot, from which the nonces are made. nullptr: the board
   // has none; then it tells no nonce, and nothing is ever authentic.
@@ -93,13 +93,20 @@ class Authentication {
  private:
   struct Entry {
     Blake2sKey key;
-    std::uint64_t counters[counters_remembered] = {};  // in no order; 0: none yet
+    std::uint64_t highest = 0;    // counter that was used
+    std::uint64_t forgotten = 0;  // the highest of those that are not remembered any more
     std::uint8_t id = 0;
   };
-  Entry* find(Text id);
+  Entry* find(int id);
+  bool is_used(const Entry& entry, std::uint64_t counter) const;
+  void spend(Entry& entry, std::uint64_t counter);
   void draw(Text purpose, std::uint8_t (&digest)[nonce_size / 2]);
 
   Entry entries_[max_keys];
+  // In the order in which they were used, from next_ on.
+  std::uint64_t counters_[counters_remembered] = {};
+  std::uint8_t used_with_[counters_remembered] = {};  // the key's id; 0: none yet
+  int next_ = 0;
   bool required_ = false;
   Blake2sKey chance_;
   bool has_chance_;

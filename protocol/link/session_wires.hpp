@@ -28,8 +28,9 @@ class SessionWires {
   static constexpr int most = 4;
   // So many heartbeats of the session's host are remembered.
   static constexpr int remembered = 8;
-  // By so many numbers a heartbeat may be ahead of the session's newest.
-  static constexpr std::uint32_t most_ahead = 64;
+  // By so many numbers a heartbeat may be ahead of the session's newest: commands, too, have numbers, and a wire
+  // may lag by nearly the timeout.
+  static constexpr std::uint32_t most_ahead = BoardLink::resume_window;
 
   // What tells one heartbeat from every other.
   struct Heartbeat {

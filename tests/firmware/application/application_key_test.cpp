@@ -341,7 +341,7 @@ TEST_F(ApplicationKey, TakesAnotherNonceForEachCauseToBeSafe) {
 }
 
 TEST_F(ApplicationKey, AHostThatBeginsAgainWithALowCounterIsTakenAfterTheOutage) {
-  for (int i = 0; i < Authentication::counters_remembered; ++i) host.heartbeat();
+  for (int i = 0; i <= Authentication::counters_remembered; ++i) host.heartbeat();
   KeyHost again(board);
   again.pnum = echo_pnum + 1'000'000;
   again.counter = 0;

@@ -111,7 +111,7 @@ TEST_F(ApplicationWires, AStrangerStaysBusyAndNeverJoins) {
   const std::uint32_t t = board.newest_t(0);
   const std::uint32_t pnum = host.echo();
   board.receive(heartbeat(echo_pnum + 500'000, t), wire_b);  // numbers of its own
-  board.receive(heartbeat(pnum + 65, t), wire_b);            // too far ahead
+  board.receive(heartbeat(pnum + 4097, t), wire_b);          // too far ahead
   board.receive(heartbeat(pnum, t + 1), wire_b);             // other bytes
   board.receive(heartbeat(pnum - 20, t), wire_b);
   board.receive("O:358,1,1;PNum:" + std::to_string(host.pnum) + ";T:1;", wire_b);
@@ -306,6 +306,37 @@ TEST_F(ApplicationWires, TheCutOfEitherIsNotNoticed) {
   }
 }
 
+// 400 commands a second over a wire that lags, then also over a fast one, then over that one only. Commands have
+// numbers, too: the fast wire is far ahead.
+void expect_a_fast_wire_takes_over(TestBoard& board, WiredHost& host, std::uint32_t lag_ms) {
+  host.wires[0].cut = true;
+  host.wires[1].lag_ms = lag_ms;
+  host.connect();
+  host.run(1000);
+  ASSERT_EQ(board.state(), BoardState::active);
+  board.log.states.clear();
+  Numbers sent;
+  for (int ms = 0; ms < 6000; ms += 10) {
+    if (ms == 1000) host.wires[0].cut = false;
+    if (ms == 3000) host.wires[1].cut = true;
+    if (ms == 2000) board.log.executed.clear();
+    for (int channel = 1; channel <= 4; ++channel) {
+      const std::string end = ",1," + std::to_string(channel);
+      const std::uint32_t number = host.command("O:" + std::to_string(ms / 2) + end);
+      if (ms >= 2000) sent.push_back(number);
+    }
+    host.run(10);
+  }
+  EXPECT_EQ(board.log.states, Lines()) << "no trip";
+  EXPECT_EQ(board.log.executed, sent) << "each at once, and once";
+  EXPECT_EQ(board.application->wires()[0], wire_a);
+}
+
+TEST_F(ApplicationWires, AFastWireTakesOverFromOneThatLagsAtAnyRateOfCommands) {
+  WiredHost host(board, {{wire_a}, {wire_b}});
+  expect_a_fast_wire_takes_over(board, host, 500);
+}
+
 // --- who floods
 
 TEST_F(ApplicationWires, AFloodFromAnotherPortKeepsNoWireOut) {
@@ -409,6 +440,10 @@ TEST_F(ApplicationWiresWithAKey, AnOldCaptureDoesNothing) {
   board.receive_raw(old, attacker);
   EXPECT_EQ(board.log.rejected.back(), "replayed");
   EXPECT_EQ(wires().size(), 2);
+}
+
+TEST_F(ApplicationWiresWithAKey, AFastWireTakesOverFromOneThatLagsAtAnyRateOfCommands) {
+  expect_a_fast_wire_takes_over(board, host, 200);
 }
 
 // --- the end of wires

@@ -99,18 +99,36 @@ TEST_F(TestAuthentication, TakesEachCounterOnceAndTellsACopyOfTheLastOnes) {
   EXPECT_EQ(verdict(sign(0xFFFFFFFFFFFFFFFF)), Verdict::copy);
 }
 
-TEST_F(TestAuthentication, WhatIsBelowTheCountersThatAreRememberedWasUsed) {
+TEST_F(TestAuthentication, WhatIsBelowACounterThatWasForgottenWasUsed) {
   constexpr std::uint64_t remembered = Authentication::counters_remembered;
   for (std::uint64_t counter = 100; counter < 100 + remembered; ++counter) {
     EXPECT_EQ(verdict(sign(counter)), Verdict::authentic);
   }
   EXPECT_EQ(verdict(sign(100)), Verdict::copy);
-  EXPECT_EQ(verdict(sign(99)), Verdict::replayed) << "it may be one that was forgotten";
   EXPECT_EQ(verdict(sign(1000)), Verdict::authentic);
-  EXPECT_EQ(verdict(sign(100)), Verdict::replayed) << "the lowest was forgotten for it";
+  EXPECT_EQ(verdict(sign(100)), Verdict::replayed) << "the oldest was forgotten for it";
+  EXPECT_EQ(verdict(sign(99)), Verdict::replayed) << "it may be one that was forgotten";
   EXPECT_EQ(verdict(sign(101)), Verdict::copy);
-  EXPECT_EQ(verdict(sign(500)), Verdict::authentic);
+  EXPECT_EQ(verdict(sign(500)), Verdict::authentic) << "it was overtaken";
   EXPECT_EQ(verdict(sign(101)), Verdict::replayed);
+}
+
+// Each key's counters are its own, and one that is used much makes the board forget what the other has used, not
+// take it again.
+TEST_F(TestAuthentication, ForgetsTheOldestOfAllKeysTogether) {
+  const auto sign_other = [this](std::uint64_t counter) {
+    return sign(counter, now, key_of(5, 100));
+  };
+  EXPECT_EQ(verdict(sign_other(7)), Verdict::authentic);
+  EXPECT_EQ(verdict(sign_other(9)), Verdict::authentic);
+  for (std::uint64_t i = 0; i < Authentication::counters_remembered; ++i) {
+    EXPECT_EQ(verdict(sign_other(9)), Verdict::copy);
+    EXPECT_EQ(verdict(sign(1000 + i)), Verdict::authentic);
+  }
+  EXPECT_EQ(verdict(sign_other(9)), Verdict::replayed);
+  EXPECT_EQ(verdict(sign_other(8)), Verdict::replayed);
+  EXPECT_EQ(verdict(sign(1)), Verdict::authentic) << "nothing of its own key was forgotten";
+  EXPECT_EQ(verdict(sign_other(10)), Verdict::authentic);
 }
 
 TEST_F(TestAuthentication, TakesNothingOlderThan250MsNorOfTheFuture) {
