@@ -56,7 +56,7 @@ std::string wire_of(const std::string& text) {
   if (url.scheme() == "udp") {
     const UdpUrl udp(url, Role::host);
     return "udp|" + lower(udp.host) + "|" + udp.called + "|" + std::to_string(udp.port) + "|" +
-           std::to_string(udp.listen);
+           std::to_string(udp.listen) + "|" + udp.local.to_string();
   }
   if (url.scheme() == "can") return "can|" + url.host() + value("node", "1");
   std::error_code failed;  // then it stays as it is

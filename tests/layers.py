@@ -17,7 +17,7 @@ PUBLIC = {'include/r4link', 'include/r4link/control', 'include/r4link/devices'}
 PROTOCOL = PUBLIC | {'protocol/datagram', 'protocol/keys', 'protocol/messages', 'protocol/link'}
 FRAMING = PROTOCOL | {'transports/framing', 'transports/framing/can'}
 CARRIERS = {'transports/can', 'transports/impaired', 'transports/serial', 'transports/share', 'transports/udp',
-            'transports/udp/search'}
+            'transports/udp/network', 'transports/udp/search'}
 TRANSPORTS = FRAMING | CARRIERS | {'transports'}
 FIRMWARE = FRAMING | {'firmware', 'firmware/application', 'firmware/devices', 'firmware/drivers'}
 MODELS = {'firmware/ports/sim/chips', 'firmware/ports/sim/devices', 'firmware/ports/sim/robot'}
@@ -43,7 +43,8 @@ ALLOWED = {
     'transports/serial': FRAMING | {'transports'},
     'transports/share': FRAMING | {'transports'},
     'transports/udp/search': FRAMING | {'transports'},
-    'transports/udp': FRAMING | {'transports', 'transports/udp/search'},
+    'transports/udp/network': {'transports'},
+    'transports/udp': FRAMING | {'transports', 'transports/udp/network', 'transports/udp/search'},
     'firmware/drivers': PROTOCOL,
     'firmware/devices': PROTOCOL,
     'firmware': FRAMING | {'firmware/drivers'},

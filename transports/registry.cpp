@@ -16,7 +16,7 @@ namespace r4 {
 
 Registry Registry::standard() {
   Registry registry;
-  registry.add({"udp", "udp://HOST[:2018][?listen=2390], udp:auto, udp:?id=NAME",
+  registry.add({"udp", "udp://HOST[:2018][?listen=2390&local=ADDRESS], udp:auto, udp:?id=NAME",
                 "WiFi or Ethernet; for a board: udp://BIND[:2018][?peer=HOST[:2390]]",
                 make_udp_carrier, udp_wire, udp_has_own_port});
   registry.add({"serial", "serial:///dev/ttyACM0[?baud=1000000], serial:auto, serial:?sn=SERIAL",

@@ -23,7 +23,7 @@ class Registry {
  public:
   struct Entry {
     std::string scheme;
-    std::string usage;    // "udp://HOST[:2018][?listen=2390]"
+    std::string usage;    // "udp://HOST[:2018][?listen=2390&local=ADDRESS]"
     std::string meaning;  // one line for --help
     CarrierFactory make;
     // What the wire is called that programs of this machine share (shared_wire.hpp). None: they

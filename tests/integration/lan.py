@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Computers on a network of their own: a network namespace each, with a TAP interface on one hub.
+"""Computers on a network of their own: a network namespace each, with TAP interfaces on one hub.
 
 Nothing of it reaches the networks of this machine. It takes root, or a kernel that gives users namespaces
 of their own, and /dev/net/tun.
@@ -8,47 +8,63 @@ import contextlib
 import ctypes
 import fcntl
 import os
+import pathlib
 import select
 import socket
 import struct
 import subprocess
 import sys
 import threading
+import time
 
 LIBC = ctypes.CDLL(None, use_errno=True)
-TUNSETIFF, IFF_TAP, IFF_NO_PI = 0x400454ca, 0x0002, 0x1000
+TUNSETIFF, TUNSETCARRIER, IFF_TAP, IFF_NO_PI = 0x400454ca, 0x400454e2, 0x0002, 0x1000
+RTMGRP_LINK = 1
 INTERFACE = 'r4lan'
+PATIENCE_S = 10
 FRAME = 2048
 
 
-def _be_a_computer(address, handed_over):
-    """In the namespace: makes the interface, gives it away, and stays until standard input ends."""
-    tap = os.open('/dev/net/tun', os.O_RDWR | os.O_CLOEXEC)
-    fcntl.ioctl(tap, TUNSETIFF, struct.pack('16sH22x', INTERFACE.encode(), IFF_TAP | IFF_NO_PI))
-    for order in ('link set lo up', f'addr add {address}/24 dev {INTERFACE}', f'link set {INTERFACE} up'):
-        subprocess.run(['ip', *order.split()], check=True)
+def interface(number):
+    return f'{INTERFACE}{number or ""}'
+
+
+def _be_a_computer(handed_over, *addresses):
+    """In the namespace: makes the interfaces, gives them away, and stays until standard input ends."""
+    taps = []
+    subprocess.run(['ip', 'link', 'set', 'lo', 'up'], check=True)
+    # Each interface answers for its own address only, also where several are on one network.
+    for name, value in ('arp_ignore', '1'), ('arp_announce', '2'):
+        pathlib.Path(f'/proc/sys/net/ipv4/conf/all/{name}').write_text(value)
+    for number, address in enumerate(addresses):
+        taps.append(os.open('/dev/net/tun', os.O_RDWR | os.O_CLOEXEC))
+        fcntl.ioctl(taps[-1], TUNSETIFF, struct.pack('16sH22x', interface(number).encode(), IFF_TAP | IFF_NO_PI))
+        for order in f'addr add {address}/24 dev {interface(number)}', f'link set {interface(number)} up':
+            subprocess.run(['ip', *order.split()], check=True)
+    reports = socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, socket.NETLINK_ROUTE)
+    reports.bind((0, RTMGRP_LINK))
     with socket.socket(fileno=handed_over) as to_lan:
-        socket.send_fds(to_lan, [b'.'], [tap])
+        socket.send_fds(to_lan, [b'.'], [*taps, reports.fileno()])
     sys.stdin.read()
 
 
 class Computer:
     """One of them. `inside` is for what starts a process: run(…, **computer.inside)."""
 
-    def __init__(self, address):
+    def __init__(self, *addresses):
         ours, theirs = socket.socketpair()
         privileges = [] if os.geteuid() == 0 else ['--user', '--map-root-user']
         self._process = subprocess.Popen(
-            ['unshare', *privileges, '--net', sys.executable, __file__, address, str(theirs.fileno())],
+            ['unshare', *privileges, '--net', sys.executable, __file__, str(theirs.fileno()), *addresses],
             stdin=subprocess.PIPE, stderr=subprocess.PIPE, pass_fds=[theirs.fileno()])
         theirs.close()
         with ours:
-            _, descriptors, _, _ = socket.recv_fds(ours, 1, 1)
-        if not descriptors:
+            _, self.taps, _, _ = socket.recv_fds(ours, 1, len(addresses) + 1)
+        if not self.taps:
             raise AssertionError('a network of our own cannot be made: ' +
                                  self._process.communicate()[1].decode())
-        self.tap = descriptors[0]
-        self.address = address
+        self._reports = socket.socket(fileno=self.taps.pop())
+        self.addresses = list(addresses)
         names = (['user'] if privileges else []) + ['net']
         self._spaces = [os.open(f'/proc/{self._process.pid}/ns/{name}', os.O_RDONLY | os.O_CLOEXEC)
                         for name in names]
@@ -61,15 +77,36 @@ class Computer:
 
     def move(self, address):
         """It has another address, as after a new lease of DHCP."""
-        for order in (f'addr del {self.address}/24 dev {INTERFACE}', f'addr add {address}/24 dev {INTERFACE}'):
+        for order in (f'addr del {self.addresses[0]}/24 dev {INTERFACE}', f'addr add {address}/24 dev {INTERFACE}'):
             subprocess.run(['ip', *order.split()], check=True, **self.inside)
-        self.address = address
+        self.addresses[0] = address
+
+    def switch(self, number, state):
+        """That interface is made 'up' or 'down'; when the kernel told of it."""
+        return self._reported(number, lambda: subprocess.run(['ip', 'link', 'set', interface(number), state], check=True,
+                                                             **self.inside))
+
+    def plug(self, number, there):
+        """Its cable is pulled, or plugged in; when the kernel told of it, which it does once a second at most."""
+        return self._reported(number, lambda: fcntl.ioctl(self.taps[number], TUNSETCARRIER, struct.pack('i', there)))
+
+    def _reported(self, number, change):
+        self._reports.setblocking(False)
+        with contextlib.suppress(BlockingIOError):
+            while self._reports.recv(65536):
+                pass
+        change()
+        self._reports.settimeout(PATIENCE_S)
+        while f'\0{interface(number)}\0'.encode() not in self._reports.recv(65536):
+            pass
+        return time.monotonic()
 
     def close(self):
         self._process.stdin.close()
         self._process.wait()
         self._process.stderr.close()
-        for descriptor in (self.tap, *self._spaces):
+        self._reports.close()
+        for descriptor in (*self.taps, *self._spaces):
             os.close(descriptor)
 
 
@@ -82,15 +119,15 @@ class Lan:
         self._thread = threading.Thread(target=self._carry)
         self._thread.start()
 
-    def computer(self, address):
-        computer = Computer(address)
+    def computer(self, *addresses):
+        computer = Computer(*addresses)
         self._computers = [*self._computers, computer]
         os.write(self._wake, b'+')
         return computer
 
     def _carry(self):
         while True:
-            taps = [each.tap for each in self._computers]
+            taps = [tap for each in self._computers for tap in each.taps]
             ready, _, _ = select.select([self._waking, *taps], [], [])
             if self._waking in ready and os.read(self._waking, 1) != b'+':
                 return
@@ -99,7 +136,8 @@ class Lan:
                     frame = os.read(tap, FRAME)
                     for other in taps:
                         if other != tap:
-                            os.write(other, frame)
+                            with contextlib.suppress(OSError):  # it is down
+                                os.write(other, frame)
 
     def __enter__(self):
         return self
@@ -114,4 +152,4 @@ class Lan:
 
 
 if __name__ == '__main__':
-    _be_a_computer(sys.argv[1], int(sys.argv[2]))
+    _be_a_computer(int(sys.argv[1]), *sys.argv[2:])

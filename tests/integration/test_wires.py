@@ -9,6 +9,7 @@ import time
 
 import pytest
 
+from lan import Lan
 from r4_process import (ERROR, PATIENCE_S, Board, Running, free_port, is_link, is_state, lasts, monitor, objects, run,
                         text_of)
 from wired_host import (BACK_WITHIN_S, LONGEST_GAP_S, REPORTED_WITHIN_S, TIMEOUT_S, WiredHost, Wire, has_joined,
@@ -166,6 +167,24 @@ def test_a_bridge_that_is_one_of_two_wires_stands_still_or_dies(tmp_path, signal
             board.next(has_left(1))
             assert host.has_again('127.0.0.2', again) <= BACK_WITHIN_S
             board.next(has_joined(2))
+            host.ends(board)
+
+
+def test_a_board_of_one_address_has_a_wire_by_each_interface_of_this_computer():
+    with Lan() as lan:
+        robot, desk = lan.computer('10.77.0.1'), lan.computer('10.77.0.2', '10.77.0.3')
+        by_switch, by_cable = desk.addresses
+        with Board('udp://10.77.0.1', **robot.inside) as board, WiredHost(
+                [f'udp://10.77.0.1?local={address}' for address in desk.addresses], desk.addresses,
+                **desk.inside) as host:
+            board.next(has_joined(2))
+            for place, gone, there in (
+                    (by_cable, lambda: desk.plug(1, False), lambda: desk.plug(1, True)),
+                    (by_switch, lambda: desk.switch(0, 'down'), lambda: desk.switch(0, 'up'))):
+                assert host.loses(place, gone) <= REPORTED_WITHIN_S
+                host.goes_on()
+                assert host.has_again(place, there) <= BACK_WITHIN_S
+                host.goes_on(50)  # until the board, too, has joined them
             host.ends(board)
 
 

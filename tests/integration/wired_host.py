@@ -43,8 +43,8 @@ class Wire:
 class WiredHost(Running):
     """`places`: what the name of each wire has, in the order of the URLs."""
 
-    def __init__(self, urls, places):
-        super().__init__(*urls, program=PROGRAM, stdin=subprocess.PIPE)
+    def __init__(self, urls, places, **process):
+        super().__init__(*urls, program=PROGRAM, stdin=subprocess.PIPE, **process)
         for place in places:
             if not any(is_wire(place)(each) for each in self.log):
                 self.next(is_wire(place))

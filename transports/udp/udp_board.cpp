@@ -100,6 +100,6 @@ UdpEnd::Outcome UdpBoard::transmit(std::string_view bytes, Peer to) {
   return outcome;
 }
 
-int UdpBoard::probe() { return probe_route(audience_); }
+int UdpBoard::probe(const std::vector<OwnAddress>& own) { return probe_route(audience_, {}, own); }
 
 }  // namespace r4

@@ -24,7 +24,7 @@ class UdpBoard final : public UdpEnd {
  private:
   void received(std::string_view bytes) override;
   Outcome transmit(std::string_view bytes, Peer to) override;
-  int probe() override;
+  int probe(const std::vector<OwnAddress>& own) override;
   void close_socket() noexcept override;
 
   void find_peer(const Endpoint& local);

@@ -43,8 +43,9 @@ SharedWire udp_wire(const Url& text) {
   const UdpUrl url(text, Role::host);
   if (url.listen == 0) return {};
   // Who watches has that port, too, if the URL names it, else one of its own.
-  return {fmt::format("udp/{}{}/{}/{}", url.search ? "?" : "",
-                      url.search ? url.called : spelling_of(url.host), url.port, url.listen)};
+  const std::string from = url.local.is_unspecified() ? "" : "/" + url.local.to_string();
+  return {fmt::format("udp/{}{}/{}/{}{}", url.search ? "?" : "",
+                      url.search ? url.called : spelling_of(url.host), url.port, url.listen, from)};
 }
 
 }  // namespace r4

@@ -4,7 +4,9 @@
 //     host    udp://HOST[:2018][?listen=2390]        sends to HOST:2018 from port 2390 and hears
 //                                                    HOST there, from any of its ports; listen=0
 //                                                    takes any free port. Boards of one program
-//                                                    share the port (udp_host_socket.hpp)
+//                                                    share the port (udp_host_socket.hpp).
+//                                                    local=ADDRESS sends from that address of this
+//                                                    computer, by its interface
 //             udp:auto[?port=2018&listen=…]      the one board that is on the networks of this
 //                                                computer (board_search.hpp)
 //             udp:?id=NAME[&port=…&listen=…]     the board of that name, or of that board id

@@ -87,7 +87,7 @@ void UdpEnd::begin(Handler& handler) {
 
 void UdpEnd::close() noexcept {
   handler_ = nullptr;
-  up_ = reported_up_ = false;
+  up_ = reported_up_ = cut_ = false;
   down_reason_.clear();
   refused_error_ = reported_refusal_ = 0;
   reporting_.cancel();
@@ -159,7 +159,7 @@ UdpEnd::Outcome UdpEnd::transmit_to(std::string_view bytes, const Endpoint& to, 
     ++counters_.tx_datagrams;
     counters_.tx_bytes += bytes.size();
     refused_error_ = 0;
-    if (!up_) {
+    if (!up_ && !cut_) {
       set_up(true);
       report_later();
     }
@@ -175,10 +175,7 @@ UdpEnd::Outcome UdpEnd::transmit_to(std::string_view bytes, const Endpoint& to, 
     refused_error_ = error;
     report_later();
   } else if (standing && up_) {
-    down_error_ = error;
-    set_up(false);
-    probe_later();
-    report_later();
+    lose_network(error);
   }
   return Outcome::failed;
 }
@@ -187,6 +184,23 @@ void UdpEnd::set_up(bool up) {
   up_ = up;
   ++(up ? counters_.ups : counters_.downs);
   probe_.cancel();
+}
+
+void UdpEnd::lose_network(int error) {
+  down_error_ = error;
+  set_up(false);
+  probe_later();
+  report_later();
+}
+
+void UdpEnd::judge_route(int error) {
+  cut_ = is_network_loss(error);
+  if (cut_ && up_) {
+    lose_network(error);
+  } else if (error == 0 && !up_ && socket_.is_open()) {
+    set_up(true);
+    report_later();
+  }
 }
 
 void UdpEnd::warn(const std::string& reason, const std::string& fix) {
@@ -229,12 +243,8 @@ void UdpEnd::report() {
 void UdpEnd::probe_later() {
   probe_timer_.expires_after(probe_interval);
   probe_timer_.async_wait(probe_.handler([this] {
-    if (probe() == 0) {
-      set_up(true);
-      report();
-    } else {
-      probe_later();
-    }
+    judge_route(probe(own_addresses()));
+    if (!up_) probe_later();
   }));
 }
 

@@ -13,6 +13,7 @@
 #include "../operation_slot.hpp"
 #include "../send_queue.hpp"
 #include "../writable_wait.hpp"
+#include "network/udp_route.hpp"
 #include "r4link/carrier.hpp"
 #include "r4link/datagram.hpp"
 #include "udp_host_socket.hpp"
@@ -40,8 +41,8 @@ class UdpEnd : public Carrier {
   // A packet from sender_.
   virtual void received(std::string_view bytes) = 0;
   virtual Outcome transmit(std::string_view bytes, Peer to) = 0;
-  // Is the network there again? 0, or errno.
-  virtual int probe() = 0;
+  // Is the network there? 0, or errno.
+  virtual int probe(const std::vector<OwnAddress>& own) = 0;
   virtual void close_socket() noexcept = 0;
   // The socket is bound: begins to receive.
   virtual void listen() { begin_to_receive(); }
@@ -59,6 +60,8 @@ class UdpEnd : public Carrier {
   // `standing`: to where what is for everyone goes. It tells whether the network is there.
   Outcome transmit_to(std::string_view bytes, const Endpoint& to, bool standing);
   void set_up(bool up);
+  // What the system says of the way, 0 or errno: is it up?
+  void judge_route(int error);
   void report();
   void warn(const std::string& reason, const std::string& fix);
   // It is tried again and again, and told once.
@@ -82,12 +85,14 @@ class UdpEnd : public Carrier {
   // Is there more at once?
   bool begin_to_receive();
   void send_waiting();
+  void lose_network(int error);
   void report_later();
   void probe_later();
 
   LoopTimer probe_timer_;
   OperationSlot probe_;
   bool up_ = false;
+  bool cut_ = false;  // its interface does not work, though the system may take what is sent
   bool reported_up_ = false;
   int down_error_ = 0;
   int refused_error_ = 0;  // why the system refused the last packet; 0 once one has passed

@@ -21,7 +21,8 @@ UdpHost::UdpHost(asio::io_context& io, const Url& url, HostLookup lookup, BoardS
       lookup_(std::move(lookup)),
       search_(std::move(search)),
       watch_(io, lookup_),
-      crowd_(UdpCrowd::of(io)) {
+      crowd_(UdpCrowd::of(io)),
+      network_(NetworkWatch::of(io)) {
   search_.port = url_.port;
 }
 
@@ -32,6 +33,7 @@ void UdpHost::open(Handler& handler) {
   named_ = url_.search || !is_address(url_.host);
   if (named_ && io_.get_executor().running_in_this_thread()) {
     handler_ = &handler;
+    network_.enter(*this);
     return watch();  // its address is asked for
   }
   if (url_.search) {
@@ -42,7 +44,9 @@ void UdpHost::open(Handler& handler) {
     bind(Endpoint(lookup_.find(url_.host, url_.text), url_.port));
   }
   begin(handler);
-  if (handler_ != nullptr) watch();
+  if (handler_ == nullptr) return;
+  network_.enter(*this);
+  watch();
 }
 
 void UdpHost::gather() {
@@ -86,6 +90,7 @@ void UdpHost::close_socket() noexcept {
 
 void UdpHost::close() noexcept {
   watch_.stop();
+  network_.leave(*this);
   UdpEnd::close();
 }
 
@@ -103,13 +108,24 @@ void UdpHost::enter_crowd() {
 // The socket of a host whose board is there.
 void UdpHost::bind(const Endpoint& board) {
   board_ = board;
-  if (const int error = probe_route(board); error != 0) {
+  Endpoint local(board.protocol(), url_.listen);
+  if (!url_.local.is_unspecified()) {
+    if (url_.local.is_v6() != board.address().is_v6()) {
+      throw Error(ErrorKind::usage, url_.text,
+                  fmt::format("{} and the board's address, {}, are of two kinds",
+                              url_.local.to_string(), board.address().to_string()),
+                  "give an address of the board's kind, IPv4 or IPv6");
+    }
+    local.address(url_.local);
+  }
+  const std::vector<OwnAddress> own = own_addresses();
+  if (const int error = probe_route(board, url_.local, own); error != 0) {
     throw Error(ErrorKind::open, url_.text, std::strerror(error), network_fix);
   }
-  const Endpoint local(board.protocol(), url_.listen);
   if (!gathering_) enter_crowd();
   open_socket(local, true);
-  const asio::error_code error = host_socket_.bind(local.port(), board);
+  send_by_interface_of(url_.local, socket_.native_handle(), board, own);
+  const asio::error_code error = host_socket_.bind(local, board);
   if (error == asio::error::already_open) {
     close_socket();
     throw Error(ErrorKind::open, url_.text, "this program has that board open already",
@@ -122,6 +138,9 @@ void UdpHost::bind(const Endpoint& board) {
   const std::string host = url_.search ? board.address().to_string() : url_.host;
   name_ = fmt::format("udp://{}:{}", bracketed(host), url_.port);
   if (local_port != UdpUrl::host_port) name_ += fmt::format("?listen={}", local_port);
+  if (url_.local.is_unspecified()) return;
+  const char* const joins = local_port != UdpUrl::host_port ? "&" : "?";
+  name_ += fmt::format("{}local={}", joins, url_.local.to_string());
 }
 
 void UdpHost::watch() {
@@ -129,7 +148,7 @@ void UdpHost::watch() {
     watch_.start(question(), socket_.is_open(), [this](const FoundHost& answer) { found(answer); });
   } else if (host_socket_.connected()) {
     // The address of this computer may be another now.
-    watch_.start([this] { host_socket_.reconnect(); });
+    watch_.start([this] { judge_route(probe(own_addresses())); });
   }
 }
 
@@ -153,7 +172,7 @@ void UdpHost::found(const FoundHost& answer) {
   const auto& addresses = answer.addresses;
   const bool is_open = socket_.is_open();
   if (is_open) {
-    host_socket_.reconnect();  // or it is this computer that has moved
+    judge_route(probe(own_addresses()));  // or it is this computer that has moved
     const bool same =
         std::find(addresses.begin(), addresses.end(), board_.address()) != addresses.end();
     if (same || addresses.empty()) return;
@@ -205,8 +224,15 @@ UdpEnd::Outcome UdpHost::transmit(std::string_view bytes, Peer to) {
   return Outcome::failed;
 }
 
-int UdpHost::probe() {
-  return host_socket_.connected() ? host_socket_.reconnect() : probe_route(board_);
+int UdpHost::probe(const std::vector<OwnAddress>& own) {
+  if (const int error = probe_route(board_, url_.local, own); error != 0) return error;
+  // The interface may be another of the same address.
+  send_by_interface_of(url_.local, socket_.native_handle(), board_, own);
+  return host_socket_.reconnect();
+}
+
+void UdpHost::on_network_change(const std::vector<OwnAddress>& own) {
+  if (socket_.is_open()) judge_route(probe(own));
 }
 
 }  // namespace r4

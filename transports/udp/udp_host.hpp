@@ -7,6 +7,7 @@
 #include <chrono>
 #include <optional>
 
+#include "network/network_watch.hpp"
 #include "search/board_search.hpp"
 #include "search/host_lookup.hpp"
 #include "udp_crowd.hpp"
@@ -15,7 +16,7 @@
 
 namespace r4 {
 
-class UdpHost final : public UdpEnd, private UdpCrowd::Member {
+class UdpHost final : public UdpEnd, private UdpCrowd::Member, private NetworkWatch::Member {
  public:
   UdpHost(asio::io_context& io, const Url& url, HostLookup lookup, BoardSearch search);
   ~UdpHost() override { close(); }
@@ -33,7 +34,8 @@ class UdpHost final : public UdpEnd, private UdpCrowd::Member {
   void on_packet(std::string_view bytes, const Endpoint& from) override;
   void on_all_read() override { handler_->on_drained(); }
   Outcome transmit(std::string_view bytes, Peer to) override;
-  int probe() override;
+  int probe(const std::vector<OwnAddress>& own) override;
+  void on_network_change(const std::vector<OwnAddress>& own) override;
   void close_socket() noexcept override;
 
   void bind(const Endpoint& board);
@@ -51,6 +53,7 @@ class UdpHost final : public UdpEnd, private UdpCrowd::Member {
   UdpHostSocket host_socket_{socket_};
   std::optional<UdpGathering> gathering_;  // of what comes; else it is read at once
   UdpCrowd& crowd_;
+  NetworkWatch& network_;
   bool entered_ = false;  // the crowd, which counts it
   bool one_of_many_ = false;
   bool named_ = false;  // the URL has a name or leaves it to a search: where the board is, is asked

@@ -2,7 +2,6 @@
 #include "udp_host_socket.hpp"
 
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -30,19 +29,11 @@ void set_reuse(int descriptor, bool on) {
 
 }  // namespace
 
-int probe_route(const UdpHostSocket::Endpoint& to) {
-  const int probe = ::socket(to.protocol().family(), SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (probe < 0) return errno;
-  const int error = ::connect(probe, to.data(), static_cast<socklen_t>(to.size())) == 0 ? 0 : errno;
-  ::close(probe);
-  return error;
-}
-
-asio::error_code UdpHostSocket::bind(std::uint16_t port, const Endpoint& board) {
+asio::error_code UdpHostSocket::bind(const Endpoint& local, const Endpoint& board) {
   Bound& all = bound();
   const std::lock_guard lock(all.mutex);
   asio::error_code error;
-  local_ = Endpoint(board.protocol(), port);
+  local_ = local;
   board_ = board;
   connected_ = neighbours_ = false;
   std::vector<UdpHostSocket*> others;
@@ -89,8 +80,6 @@ void UdpHostSocket::close() noexcept {
 
 int UdpHostSocket::reconnect() {
   if (!connected_) return 0;
-  // A socket that is not connected takes what is the other boards'.
-  if (const int error = probe_route(board_); error != 0) return error;
   sockaddr none{};
   none.sa_family = AF_UNSPEC;
   const bool done =

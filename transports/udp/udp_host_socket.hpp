@@ -29,15 +29,15 @@ class UdpHostSocket {
   UdpHostSocket& operator=(const UdpHostSocket&) = delete;
   ~UdpHostSocket() { close(); }
 
-  // Binds the socket, which is open, to `port` (0: any free one), to hear `board`. Fails with
+  // Binds the socket, which is open, to `local` (port 0: any free one), to hear `board`. Fails with
   // asio::error::already_open if this program hears that board there already.
-  asio::error_code bind(std::uint16_t port, const Endpoint& board);
+  asio::error_code bind(const Endpoint& local, const Endpoint& board);
   // Closes the socket. Can be called twice.
   void close() noexcept;
 
   // Connected: the kernel has chosen the address that it sends from, which may be gone.
   bool connected() const { return connected_; }
-  // Has it chosen again, if it has. 0, or errno. Without a way to the board it stays as it is.
+  // Has it chosen again, if it has. 0, or errno.
   int reconnect();
 
   // Does the board send from there?
@@ -55,8 +55,5 @@ class UdpHostSocket {
   // Another board of this program is, or was, at this one's address: they differ by their port.
   std::atomic<bool> neighbours_{false};
 };
-
-// 0 if the system knows a way to that address, else errno. Sends nothing.
-int probe_route(const UdpHostSocket::Endpoint& to);
 
 }  // namespace r4

@@ -18,6 +18,14 @@ std::string host_of(const Url& url, Role role) {
   return url.host().empty() && listens ? "127.0.0.1" : url.host();
 }
 
+asio::ip::address local_address(const std::string& text, const std::string& url) {
+  asio::error_code error;
+  const asio::ip::address address = asio::ip::make_address(text, error);
+  if (!error && !address.is_unspecified() && !address.is_multicast()) return address;
+  throw Error(ErrorKind::usage, url, "'local=" + text + "' is no address of this computer",
+              "write one that `ip -brief address` shows, as in local=192.168.0.7");
+}
+
 std::uint16_t port_of(const Url& url, Role role) {
   if (!is_search(url, role)) return url.port().value_or(UdpUrl::board_port);
   return static_cast<std::uint16_t>(url.get_number("port", 1, 65535, UdpUrl::board_port));
@@ -48,7 +56,8 @@ UdpUrl::UdpUrl(const Url& url, Role role)
                     : "write it as in udp://192.168.1.77:2018");
   }
   if (role == Role::host) {
-    url.allow_only("listen");
+    url.allow_only("listen local");
+    if (const auto text_of_it = url.get("local")) local = local_address(*text_of_it, text);
     if (port == 0) {
       throw Error(ErrorKind::usage, text, "port 0 is no board's", "the board's is 2018");
     }

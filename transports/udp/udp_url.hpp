@@ -2,6 +2,7 @@
 // The URL of a UDP carrier, taken apart (udp_carrier.hpp).
 #pragma once
 
+#include <asio/ip/address.hpp>
 #include <cstdint>
 #include <string>
 
@@ -23,7 +24,9 @@ struct UdpUrl {
   std::string host;      // the board's; at a board: where it listens
   std::uint16_t port;    // of the board
   std::uint16_t listen;  // of the host
-  std::string peer;      // HOST or HOST:PORT; empty: none
+  asio::ip::address
+      local;         // of this computer, by whose interface the host sends; unspecified: by any
+  std::string peer;  // HOST or HOST:PORT; empty: none
   std::string peer_host;
   std::uint16_t peer_port = host_port;
 };

@@ -699,7 +699,13 @@ int lose_and_regain_the_network() {
   if (at_host.last(Kind::up)->when - back > std::chrono::seconds(1)) return 21;
   host->send("3", Priority::normal);
   if (!run_until(io, [&] { return at_board.has("3"); })) return 22;
-  return host->counters().downs == 1 && host->counters().ups == 2 ? 0 : 23;
+  if (host->counters().downs != 1 || host->counters().ups != 2) return 23;
+
+  if (!set_loopback(false)) return 24;  // and nothing is sent
+  const auto lost_again = Clock::now();
+  if (!run_until(io, [&] { return at_host.count(Kind::down) == 2; })) return 25;
+  if (at_host.last(Kind::down)->when - lost_again > std::chrono::milliseconds(50)) return 26;
+  return set_loopback(true) && run_until(io, [&] { return at_host.count(Kind::up) == 3; }) ? 0 : 27;
 }
 
 TEST(UdpNetwork, IsReportedWhenLostAndComesBackByItself) {

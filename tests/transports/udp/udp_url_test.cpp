@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "r4link/error.hpp"
+
 namespace r4::test {
 namespace {
 
@@ -19,6 +21,20 @@ TEST(UdpUrl, OfAHostOnAnyPortForgetsTheOneItNames) {
   EXPECT_EQ(with_any_port("udp:?listen=2391&id=listen=1"), "udp:?listen=0&id=listen=1");
   EXPECT_EQ(with_any_port("udp:?id=left-arm&listen=0"), "udp:?id=left-arm&listen=0");
   EXPECT_EQ(with_any_port("serial:auto?listen=1"), "serial:auto?listen=1");
+}
+
+TEST(UdpUrl, OfAHostMayNameAnAddressOfThisComputer) {
+  const auto local = [](const char* url) {
+    return UdpUrl(Url::parse(url), Role::host).local.to_string();
+  };
+  EXPECT_EQ(local("udp://robot?local=10.0.0.7"), "10.0.0.7");
+  EXPECT_EQ(local("udp://robot?listen=0&local=fd00::7"), "fd00::7");
+  EXPECT_EQ(local("udp://robot"), "0.0.0.0");
+  for (const char* url :
+       {"udp://robot?local=", "udp://robot?local=eth0", "udp://robot?local=0.0.0.0",
+        "udp://robot?local=239.1.1.1", "udp:auto?local=10.0.0.7"}) {
+    EXPECT_THROW(local(url), Error) << url;
+  }
 }
 
 }  // namespace

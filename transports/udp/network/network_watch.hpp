@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Tells the hosts of a loop that an interface of this computer, its carrier or an address of it has changed: a cable
+// that is pulled is known at once, though nothing is sent. One of each loop. Where the system does not tell
+// (rtnetlink(7) is not to be had), nobody is called, and what is sent shows it later.
+#pragma once
+
+#include <asio/execution_context.hpp>
+#include <asio/io_context.hpp>
+#include <vector>
+
+#include "../../file_descriptor.hpp"
+#include "../../operation_slot.hpp"
+#include "udp_route.hpp"
+
+namespace r4 {
+
+class NetworkWatch final : public asio::execution_context::service {
+ public:
+  using key_type = NetworkWatch;
+  static asio::execution_context::id id;
+
+  class Member {
+   public:
+    virtual void on_network_change(const std::vector<OwnAddress>& own) = 0;
+
+   protected:
+    ~Member() = default;
+  };
+
+  explicit NetworkWatch(asio::execution_context& context);
+
+  static NetworkWatch& of(asio::io_context& io) { return asio::use_service<NetworkWatch>(io); }
+
+  void enter(Member& member);
+  // No call of that member follows. Can be called twice.
+  void leave(Member& member);
+
+ private:
+  void shutdown() noexcept override;
+  void open();
+  void wait();
+  void tell();
+
+  FileDescriptor changes_;  // a socket of rtnetlink
+  LoopDescriptor waits_;
+  OperationSlot waiting_;
+  std::vector<Member*> members_;  // nullptr: has left while all are told
+};
+
+}  // namespace r4
