@@ -61,9 +61,14 @@ class Keyboard:
 
 class Gamepad:
     """The left stick drives while the right shoulder button is held; the right stick and the triggers' cross move the
-    arm; the lower button (A) stops, Start ends."""
+    arm; the lower button (A) stops, Start ends.
+
+    Where the kernel had no room for what the pad said, it tells of it by SYN_DROPPED, and what comes until the next
+    SYN_REPORT is not whole (Documentation/input/event-codes.rst). Whether the button is still held nobody knows then:
+    it counts once it is pressed anew, and the axes once they move."""
     EVENT = struct.Struct('llHHi')  # input_event of the kernel
-    EV_KEY, EV_ABS = 1, 3
+    EV_SYN, EV_KEY, EV_ABS = 0, 1, 3
+    SYN_REPORT, SYN_DROPPED = 0, 3
     ABS_X, ABS_Y, ABS_RX, ABS_RY, ABS_HAT0Y = 0, 1, 3, 4, 17
     SHOULDER, LOWER, START = 0x137, 0x130, 0x13B
 
@@ -72,6 +77,7 @@ class Gamepad:
         self._arm = [float(each) for each in ARM_REST]
         self._axes: dict[int, float] = {}
         self._held = False
+        self._dropped = False  # until the next SYN_REPORT
         self._last = time.monotonic()
         self._file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         self._ranges = {axis: self._range(axis) for axis in (self.ABS_X, self.ABS_Y, self.ABS_RX, self.ABS_RY,
@@ -89,12 +95,18 @@ class Gamepad:
         return low, max(high, low + 1)
 
     def _take(self, kind: int, code: int, value: int) -> None:
-        if kind == self.EV_ABS and code in self._ranges:
+        if kind == self.EV_SYN and code == self.SYN_DROPPED:
+            self._dropped, self._held = True, False
+            self._axes.clear()
+        elif self._dropped:
+            self._dropped = not (kind == self.EV_SYN and code == self.SYN_REPORT)
+        elif kind == self.EV_ABS and code in self._ranges:
             low, high = self._ranges[code]
             share = max(-1.0, min(1.0, 2 * (value - low) / (high - low) - 1))
             self._axes[code] = share if abs(share) > 0.1 else 0.0  # a stick never rests at 0 quite
         elif kind == self.EV_KEY:
-            self._held = value != 0 if code == self.SHOULDER else self._held
+            if code == self.SHOULDER and value != 2:  # 2 repeats
+                self._held = value == 1
             self.stop = self.stop or (code == self.LOWER and value == 1)
             self.ended = self.ended or (code == self.START and value == 1)
 

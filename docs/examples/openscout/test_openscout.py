@@ -68,15 +68,19 @@ def test_it_passes_its_waypoints():
     assert math.dist((model.x, model.y), waypoints[-1]) <= 0.10
 
 
-def test_the_gamepad_drives_while_its_shoulder_is_held(tmp_path):
+@pytest.fixture(name='plugged')
+def make_plugged(tmp_path):
+    """A gamepad, what makes it say something, and what unplugs it."""
     events = tmp_path / 'event0'
     os.mkfifo(events)
     pad = Gamepad(str(events))
     writer = os.open(events, os.O_WRONLY)
+    yield (pad, lambda *event: os.write(writer, struct.pack('llHHi', 0, 0, *event)), lambda: os.close(writer))
+    pad.close()
 
-    def happens(kind, code, value):
-        os.write(writer, struct.pack('llHHi', 0, 0, kind, code, value))
 
+def test_the_gamepad_drives_while_its_shoulder_is_held(plugged):
+    pad, happens, unplug = plugged
     happens(3, Gamepad.ABS_Y, -32768)
     assert pad.wish().twist == (0, 0)
     happens(1, Gamepad.SHOULDER, 1)
@@ -90,9 +94,30 @@ def test_the_gamepad_drives_while_its_shoulder_is_held(tmp_path):
     happens(1, Gamepad.LOWER, 1)
     assert pad.wish() and pad.stop and not pad.ended
     happens(1, Gamepad.SHOULDER, 1)
-    os.close(writer)  # unplugged
+    unplug()
     assert pad.wish().twist == (0, 0) and pad.ended
-    pad.close()
+
+
+def test_the_gamepad_stands_where_the_kernel_dropped_what_it_said(plugged):
+    pad, happens, unplug = plugged
+    happens(3, Gamepad.ABS_Y, -32768)
+    happens(1, Gamepad.SHOULDER, 1)
+    happens(0, 0, 0)
+    assert pad.wish().twist.forward > 0
+    happens(0, 3, 0)  # SYN_DROPPED: that the button was let go is lost
+    assert pad.wish().twist == (0, 0)
+    happens(1, Gamepad.SHOULDER, 1)  # is not whole
+    happens(3, Gamepad.ABS_Y, -32768)
+    assert pad.wish().twist == (0, 0)
+    happens(0, 0, 0)
+    happens(3, Gamepad.ABS_Y, -32768)
+    happens(1, Gamepad.SHOULDER, 2)
+    happens(0, 0, 0)
+    assert pad.wish().twist == (0, 0)
+    happens(1, Gamepad.SHOULDER, 0)
+    happens(1, Gamepad.SHOULDER, 1)
+    assert pad.wish().twist.forward > 0
+    unplug()
 
 
 def until(done):
