@@ -86,7 +86,7 @@ class PilotRun {
   VirtualRobot robot;
 
  private:
-  enum class Phase { waiting, arming, driving };
+  enum class Phase { waiting, arming, guarding, driving };
   static constexpr std::chrono::seconds patience{1};
 
   void publish() {
@@ -111,21 +111,25 @@ class PilotRun {
     switch (phase_) {
       case Phase::waiting:
         if (pilot.mode() == Mode::off) return;
-        session.send(Command::proximity(podcar_clearance_cm, 1), patience, robot.now());
+        session.arm(patience, robot.now());
         phase_ = Phase::arming;
-        arming_ms_ = 0;
+        phase_ms_ = ms_;
         return;
       case Phase::arming:
-        // One after the other: what overtakes a command on its way takes its turn.
-        if (++arming_ms_ == 200) session.arm(patience, robot.now());
         if (session.disarmed_by() == DisarmCause::none) {
-          podcar.begin_drive();
-          pilot.begin(robot.clock());
-          guard_.start(robot.clock());
-          phase_ = Phase::driving;
-        } else if (arming_ms_ > 1200) {
+          session.send(Command::proximity(podcar_clearance_cm, 1), patience, robot.now());
+          phase_ = Phase::guarding;
+          phase_ms_ = ms_;
+        } else if (ms_ - phase_ms_ > 1000) {
           end("refused");
         }
+        return;
+      case Phase::guarding:
+        if (ms_ - phase_ms_ < 200) return;
+        podcar.begin_drive();
+        pilot.begin(robot.clock());
+        guard_.start(robot.clock());
+        phase_ = Phase::driving;
         return;
       case Phase::driving:
         guard_.check(session.link().state, session.disarmed_by(), robot.clock());
@@ -156,7 +160,7 @@ class PilotRun {
 
   control::LoopGuard guard_;
   Phase phase_ = Phase::waiting;
-  int arming_ms_ = 0;
+  int phase_ms_ = 0;  // when that began
   int ms_ = 0;
 };
 

@@ -6,6 +6,9 @@
 //
 // Enter begins, Ctrl-C ends. Exit code: 0 arrived, 2 usage, 3 it stopped on its way or was refused, 4 no such transport,
 // 5 permission, 6 not supported.
+#include <termios.h>
+#include <unistd.h>
+
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -19,14 +22,13 @@
 #include <vector>
 
 #include "course.hpp"
+#include "drive.hpp"
 #include "model.hpp"
 #include "podcar.hpp"
 
 using namespace std::chrono_literals;
 
 namespace {
-
-constexpr double cruise_m_s = 1.0;
 
 volatile std::sig_atomic_t ended = 0;
 
@@ -45,40 +47,33 @@ void say(double time_s, const Podcar& podcar, const Course& course) {
               course.deviation_m(pose.x_m, pose.y_m));
 }
 
-int drive(r4::Board& board, Course& course, const r4::control::Pose& start) {
-  board.wait_active();
-  board.proximity(1, podcar_clearance_cm);
+// False if it is not to begin.
+bool wait_for_enter(const Course& course) {
+  tcflush(STDIN_FILENO, TCIFLUSH);  // what was typed before is no answer
   std::printf("hold the handle, and press Enter to drive %.1f m\n", course.length_m());
   int key = std::getchar();
   while (key != '\n' && key != EOF) key = std::getchar();
-  if (key == EOF || ended != 0) return 0;
-  board.arm();
+  return key != EOF && ended == 0;
+}
+
+int drive(r4::Board& board, Course& course, const r4::control::Pose& start) {
+  board.wait_active();
+  guard_podcar(board);  // so that it is not armed where something is in the way already
+  if (!wait_for_enter(course)) return 0;
+  arm_podcar(board);
 
   Podcar podcar;
   podcar.begin_at(start);
   double time_s = 0, told_s = 0;
   const auto report = r4::control::run_loop(
       board, podcar_loop(), [&](const r4::control::LoopStep& step) -> std::optional<r4::Setpoints> {
-        if (!podcar.sense(step.state)) {
-          throw r4::Error(r4::ErrorKind::refused, "AINSTEER",
-                          "the steering sensor tells of an angle that there is not",
-                          "look at its cable, and at podcar_steering");
-        }
-        if (!podcar.obeys()) {
-          throw r4::Error(r4::ErrorKind::refused, "the vehicle",
-                          "steering or speed is not as it was told",
-                          "look at DHB1A, AINSTEER and encoder 1: does forward steer to the left "
-                          "and count upwards?");
-        }
+        const auto wish = follow(podcar, course, step.state, step.dt_s);
         time_s += step.dt_s;
         if (time_s >= told_s) {
           say(time_s, podcar, course);
           told_s += 1;
         }
-        const auto wish = course.wish(podcar.pose(), cruise_m_s);
-        const bool stands = podcar.speed_m_s() < 0.02;
-        if (ended != 0 || (course.finished() && stands)) return std::nullopt;
-        return podcar.drive(wish, step.dt_s);
+        return ended != 0 ? std::nullopt : wish;
       });
   say(time_s, podcar, course);
   const bool arrived = report.end == r4::control::LoopEnd::asked && course.finished();

@@ -16,6 +16,7 @@
 #include <r4link/simulation.hpp>
 #include <string>
 
+#include "drive.hpp"
 #include "model.hpp"
 #include "pilot.hpp"
 #include "podcar.hpp"
@@ -40,8 +41,7 @@ bool wait_for_start(r4::Board& board, Podcar& podcar, Pilot& pilot, Topics& topi
 
 // Until something ends it. Why, pilot.why() says.
 void drive(r4::Board& board, Podcar& podcar, Pilot& pilot, Topics& topics) {
-  board.proximity(1, podcar_clearance_cm);
-  board.arm();
+  arm_podcar(board);
   podcar.begin_drive();
   bool begun = false;
   std::puts("armed");
@@ -69,6 +69,7 @@ void run(r4::Board& board) {
   Podcar podcar;
   Pilot pilot;
   board.wait_active();
+  guard_podcar(board);  // so that it is not armed where something is in the way already
   std::puts("hold the handle, and press the joystick's start");
   while (wait_for_start(board, podcar, pilot, topics)) {
     try {
