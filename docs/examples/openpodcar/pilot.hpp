@@ -14,8 +14,8 @@
 //     automatic   cmd_vel, as long as it comes; else the goal; else it stands
 //     manual      the joystick while hold is held; else it stands. What a person has taken over is given back by start
 //
-// end() is called by the stop button, by a joystick that is silent, for then nobody can stop it from afar, and by the
-// program when its loop ends. It forgets goal and commands.
+// end() is called by the stop button, by a joystick that is silent, for then nobody can stop it from afar, by Topics
+// where a stop may be lost, and by the program when its loop ends. It forgets goal and commands.
 #pragma once
 
 #include <chrono>

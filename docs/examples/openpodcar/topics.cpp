@@ -20,7 +20,9 @@ namespace {
 
 using Time = Pilot::Time;
 
-constexpr int most_joys = 64;  // three seconds of them: no press is lost while the board is armed
+// So many wait while the board is armed: three seconds of them where no stick moves, else less, for joy_node tells of
+// each move. Of more the newest are kept.
+constexpr int most_joys = 64;
 constexpr const char* this_computer =
     R"(<Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces>)"
     "<AllowMulticast>spdp</AllowMulticast>";
@@ -90,9 +92,9 @@ Qos qos_of(const Topic& topic, dds_reliability_kind_t reliability, int depth) {
   return qos;
 }
 
-// use(message, publisher)
+// use(message, publisher). How many they were.
 template <class Message, class Use>
-void take_each(dds_entity_t reader, const Use& use) {
+int take_each(dds_entity_t reader, const Use& use) {
   void* samples[most_joys] = {};
   dds_sample_info_t infos[most_joys];
   const int count = dds_take(reader, samples, infos, most_joys, most_joys);
@@ -101,6 +103,7 @@ void take_each(dds_entity_t reader, const Use& use) {
     use(*static_cast<const Message*>(samples[i]), infos[i].publication_handle);
   }
   if (count > 0) dds_return_loan(reader, samples, count);
+  return count;
 }
 
 }  // namespace
@@ -137,11 +140,12 @@ Topics::~Topics() {
 
 void Topics::take(Pilot& pilot, const r4::control::Pose& pose) {
   const Time now = std::chrono::steady_clock::now();
-  take_each<sensor_msgs_msg_dds__Joy_>(
+  const int joys = take_each<sensor_msgs_msg_dds__Joy_>(
       joy_, [&](const sensor_msgs_msg_dds__Joy_& joy, std::uint64_t publisher) {
         pilot.on_joy({joy.axes._buffer, joy.axes._length},
                      {joy.buttons._buffer, joy.buttons._length}, now, publisher);
       });
+  if (joys == most_joys) pilot.end("so much of /joy has waited that a stop may be lost");
   take_each<geometry_msgs_msg_dds__Twist_>(
       cmd_vel_, [&](const geometry_msgs_msg_dds__Twist_& twist, std::uint64_t) {
         pilot.on_cmd_vel({twist.linear.x, twist.angular.z}, now);
