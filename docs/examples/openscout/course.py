@@ -38,6 +38,10 @@ class Course:
         (x, y), (on_x, on_y) = self._places[:2]
         return math.atan2(on_y - y, on_x - x)
 
+    @property
+    def end(self) -> Waypoint:
+        return self._places[-1]
+
     def deviation(self, x: float, y: float) -> float:
         """How far that place is beside the course, near to where it is followed."""
         return min(math.dist((x, y), each) for each in self._places[max(0, self._at - 50):self._at + 50])

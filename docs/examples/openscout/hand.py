@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Somebody drives: by the keyboard, or by a gamepad as the kernel has it (evdev, /dev/input/event*)."""
+import contextlib
 import fcntl
 import os
 import select
@@ -23,6 +24,8 @@ class Hand(Protocol):
     ended: bool  # it wants no more, or is gone
     stop: bool  # an emergency stop was asked for
 
+    def begin(self) -> None: ...  # it is armed: of what came until now only a stop counts
+
     def wish(self) -> Wish: ...
 
 
@@ -43,7 +46,12 @@ class Keyboard:
 
     def close(self) -> None:
         if self._before:
-            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
+            with contextlib.suppress(termios.error):  # the terminal is gone
+                termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
+
+    def begin(self) -> None:
+        self.wish()
+        self._until = 0.0
 
     def wish(self) -> Wish:
         while not self.ended and select.select([sys.stdin], [], [], 0)[0]:
@@ -85,6 +93,10 @@ class Gamepad:
 
     def close(self) -> None:
         os.close(self._file)
+
+    def begin(self) -> None:
+        self.wish()
+        self._held = False
 
     def _range(self, axis: int) -> tuple[int, int]:
         try:

@@ -16,8 +16,9 @@ METRES_A_COUNT = 2 * math.pi * scout.WHEEL_RADIUS / scout.COUNTS_A_TURN
 
 
 class ScoutModel:
-    def __init__(self) -> None:
-        self.x = self.y = self.yaw = 0.0
+    def __init__(self, yaw: float = 0) -> None:
+        self.x = self.y = 0.0
+        self.yaw = yaw
         self.travelled = 0.0
         self.speeds = [0.0] * 4
         self._rolled = [0.0] * 4
@@ -53,9 +54,9 @@ class ScoutModel:
 class Behind:
     """`with Behind(sim) as model:` the board's robot is that model."""
 
-    def __init__(self, sim: r4link.SimBoard) -> None:
+    def __init__(self, sim: r4link.SimBoard, yaw: float = 0) -> None:
         self._sim = sim
-        self._model = ScoutModel()
+        self._model = ScoutModel(yaw)
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
 

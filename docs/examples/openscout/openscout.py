@@ -65,8 +65,11 @@ def run(options: argparse.Namespace, course: Course | None, ends: contextlib.Exi
         hand = Gamepad(options.gamepad) if options.gamepad else Keyboard()
         ends.callback(hand.close)
     board.wait_active()
-    board.proximity(1, CLEARANCE_CM)
     board.arm()
+    # Behind arm(): a board that begins again forgets it, and is not armed any more either.
+    board.proximity(1, CLEARANCE_CM)
+    if hand:
+        hand.begin()
     print('armed: it drives', flush=True)
     # The eight begins straight ahead, whatever way that is.
     start = control.Pose(0, 0, course.heading) if course and not options.course else None

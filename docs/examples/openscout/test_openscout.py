@@ -1,20 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How well it keeps to a course, in no time, on the model alone; what its hand says; and how far it rolls when something
-happens, as a process against a simulated board with the model behind it."""
+"""How well it keeps to a course, in no time, on the model alone; and, as a process against a simulated board with the
+model behind it, the same courses, the keys, and how far it rolls when something happens."""
+import contextlib
 import math
 import os
 import pathlib
-import struct
+import pty
+import re
+import socket
 import subprocess
 import sys
+import threading
 import time
+from typing import NamedTuple
 
 import pytest
 
 import r4link
 import scout
 from course import Course, figure_of_eight
-from hand import Gamepad
 from model import Behind, ScoutModel
 from openscout import CRUISE
 from r4link import control
@@ -22,6 +26,7 @@ from r4link.testing import make_state
 
 PATIENCE_S = 20
 TIMEOUT_S = 1.0  # of the board
+WAYPOINTS = [(0, 0), (1.5, 0), (2.2, 0.7), (2.2, 2)]
 PROGRAM = pathlib.Path(__file__).with_name('openscout.py')
 
 
@@ -61,100 +66,148 @@ def test_it_drives_a_figure_of_eight():
 
 
 def test_it_passes_its_waypoints():
-    waypoints = [(0, 0), (1.5, 0), (2.2, 0.7), (2.2, 2)]
-    worst, model = follow(Course(waypoints, CRUISE), control.Pose(0, 0, 0))
+    worst, model = follow(Course(WAYPOINTS, CRUISE), control.Pose(0, 0, 0))
     print(f'{worst:.3f} m beside them at most')
     assert worst <= 0.20
-    assert math.dist((model.x, model.y), waypoints[-1]) <= 0.10
+    assert math.dist((model.x, model.y), WAYPOINTS[-1]) <= 0.10
 
 
-@pytest.fixture(name='plugged')
-def make_plugged(tmp_path):
-    """A gamepad, what makes it say something, and what unplugs it."""
-    events = tmp_path / 'event0'
-    os.mkfifo(events)
-    pad = Gamepad(str(events))
-    writer = os.open(events, os.O_WRONLY)
-    yield (pad, lambda *event: os.write(writer, struct.pack('llHHi', 0, 0, *event)), lambda: os.close(writer))
-    pad.close()
-
-
-def test_the_gamepad_drives_while_its_shoulder_is_held(plugged):
-    pad, happens, unplug = plugged
-    happens(3, Gamepad.ABS_Y, -32768)
-    assert pad.wish().twist == (0, 0)
-    happens(1, Gamepad.SHOULDER, 1)
-    assert pad.wish().twist.forward == pytest.approx(0.5)
-    happens(3, Gamepad.ABS_RY, 32767)
-    pad.wish()
-    time.sleep(0.02)
-    assert pad.wish().arm[1] > 1500
-    happens(1, Gamepad.SHOULDER, 0)
-    assert pad.wish().twist == (0, 0)
-    happens(1, Gamepad.LOWER, 1)
-    assert pad.wish() and pad.stop and not pad.ended
-    happens(1, Gamepad.SHOULDER, 1)
-    unplug()
-    assert pad.wish().twist == (0, 0) and pad.ended
-
-
-def test_the_gamepad_stands_where_the_kernel_dropped_what_it_said(plugged):
-    pad, happens, unplug = plugged
-    happens(3, Gamepad.ABS_Y, -32768)
-    happens(1, Gamepad.SHOULDER, 1)
-    happens(0, 0, 0)
-    assert pad.wish().twist.forward > 0
-    happens(0, 3, 0)  # SYN_DROPPED: that the button was let go is lost
-    assert pad.wish().twist == (0, 0)
-    happens(1, Gamepad.SHOULDER, 1)  # is not whole
-    happens(3, Gamepad.ABS_Y, -32768)
-    assert pad.wish().twist == (0, 0)
-    happens(0, 0, 0)
-    happens(3, Gamepad.ABS_Y, -32768)
-    happens(1, Gamepad.SHOULDER, 2)
-    happens(0, 0, 0)
-    assert pad.wish().twist == (0, 0)
-    happens(1, Gamepad.SHOULDER, 0)
-    happens(1, Gamepad.SHOULDER, 1)
-    assert pad.wish().twist.forward > 0
-    unplug()
-
-
-def until(done):
-    deadline = time.monotonic() + PATIENCE_S
+def until(done, patience_s=PATIENCE_S):
+    deadline = time.monotonic() + patience_s
     while not done():
         assert time.monotonic() < deadline, 'it did not come'
         time.sleep(0.005)
 
 
-def let_go(sim, _):
-    sim.handle(False)
+class Wire:
+    """The way to a board on UDP, that can be cut."""
+
+    def __init__(self, url):
+        host, port = re.match(r'udp://([^:]+):(\d+)', url).groups()
+        self.cut = False
+        self._near, self._far = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
+        self._near.bind(('127.0.0.1', 0))
+        self._far.connect((host, int(port)))
+        self.url = f'udp://127.0.0.1:{self._near.getsockname()[1]}?listen=0'
+        self._threads = [threading.Thread(target=each, daemon=True) for each in (self._there, self._back)]
+
+    def _there(self):
+        while (took := self._near.recvfrom(4096))[0]:
+            self._host = took[1]
+            if not self.cut:
+                self._far.send(took[0])
+
+    def _back(self):
+        while data := self._far.recv(4096):
+            if not self.cut:
+                self._near.sendto(data, self._host)
+
+    def __enter__(self):
+        for each in self._threads:
+            each.start()
+        return self
+
+    def __exit__(self, *_):
+        for each in (self._near, self._far):
+            with contextlib.suppress(OSError):
+                each.shutdown(socket.SHUT_RDWR)  # ends what waits for it
+        for each in self._threads:
+            each.join()
+        self._near.close()
+        self._far.close()
 
 
-def obstacle(sim, _):
-    sim.obstacle(1, 30)
+def drive(arguments, course):
+    """The program along that course: what it said, its exit code, how far beside the course, and from its end."""
+    worst = 0.0
+    with r4link.SimBoard('udp://127.0.0.1:0') as sim, Behind(sim, course.heading) as model:
+        with subprocess.Popen([sys.executable, PROGRAM, sim.url, *arguments], stdout=subprocess.PIPE, text=True) as program:
+            def has_ended():
+                nonlocal worst
+                course.twist(control.Pose(model.x, model.y, model.yaw))  # tells the course how far it is
+                worst = max(worst, course.deviation(model.x, model.y))
+                return program.poll() is not None
+            until(has_ended, 3 * PATIENCE_S)
+            return program.stdout.read(), program.returncode, worst, math.dist((model.x, model.y), course.end)
 
 
-def killed(_, program):
-    program.kill()
+@pytest.mark.parametrize('arguments, places', [(('--eight', '1.5'), figure_of_eight(1.5)),
+                                               (('--course', '1.5,0', '2.2,0.7', '2.2,2'), WAYPOINTS)],
+                         ids=['eight', 'course'])
+def test_it_keeps_to_its_course_behind_the_simulated_board(arguments, places):
+    for _ in range(3):
+        told, code, worst, left = drive(arguments, Course(places, CRUISE))
+        if 'newest state' not in told:  # as where this machine stood still
+            break
+    assert code == 0, told
+    print(f'{worst:.3f} m beside it at most, {left:.3f} m from its end')
+    assert 0 < worst <= 0.15
+    assert left <= 0.15
 
 
-@pytest.mark.parametrize('happens, notice_s', [(let_go, 0.0), (obstacle, 0.5), (killed, TIMEOUT_S)],
-                         ids=['handle let go', 'obstacle', 'killed'])
-def test_it_stands_within_its_braking_distance_and_one_timeout(happens, notice_s):
-    with r4link.SimBoard('udp://127.0.0.1:0') as sim, Behind(sim) as model:
-        with subprocess.Popen([sys.executable, PROGRAM, sim.url, '--course', '50,0'], stdout=subprocess.PIPE,
+class Scene(NamedTuple):
+    sim: r4link.SimBoard
+    wire: Wire
+    program: subprocess.Popen
+
+
+def let_go(scene):
+    scene.sim.handle(False)
+
+
+def obstacle(scene):
+    scene.sim.obstacle(1, 30)
+
+
+def killed(scene):
+    scene.program.kill()
+
+
+def cut(scene):
+    scene.wire.cut = True
+
+
+@pytest.mark.parametrize('happens, notice_s, told', [(let_go, 0.0, 'handle'), (obstacle, 0.5, 'proximity'),
+                                                     (killed, TIMEOUT_S, ''), (cut, TIMEOUT_S, 'newest state')],
+                         ids=['handle let go', 'obstacle', 'killed', 'link lost'])
+def test_it_stands_within_its_braking_distance_and_one_timeout(happens, notice_s, told):
+    with r4link.SimBoard('udp://127.0.0.1:0') as sim, Behind(sim) as model, Wire(sim.url) as wire:
+        with subprocess.Popen([sys.executable, PROGRAM, wire.url, '--course', '50,0'], stdout=subprocess.PIPE,
                               text=True) as program:
             until(lambda: model.speed > 0.9 * CRUISE)
             speed, begun = model.speed, model.travelled
-            happens(sim, program)
+            happens(Scene(sim, wire, program))
             until(lambda: model.speed < 0.001 and sim.look().is_safe)
             rolled = model.travelled - begun
             if happens is not killed:
                 assert program.wait(PATIENCE_S) == 3
-                told = program.stdout.read()
-                assert ('handle' if happens is let_go else 'proximity') in told, told
+                why = program.stdout.read()
+                assert told in why, why
     # This machine may be busy: a quarter of a second until the model hears of the pins.
     allowed = ScoutModel.braking_distance(1.1 * speed) + 1.1 * speed * (notice_s + 0.25)
     print(f'{rolled:.3f} m, of {allowed:.3f} m')
     assert rolled <= allowed
+
+
+def test_its_keys_move_the_wheels_and_the_arm_of_the_board():
+    keys, terminal = pty.openpty()
+    with r4link.SimBoard('udp://127.0.0.1:0') as sim, Behind(sim) as model:
+        with subprocess.Popen([sys.executable, PROGRAM, sim.url], stdin=terminal, stdout=subprocess.PIPE,
+                              text=True) as program:
+            os.close(terminal)
+            assert program.stdout.readline() == 'armed: it drives\n'
+            until(lambda: is_near(sim.look().servo_us[:3], (1500, 1500, 1500)))
+            os.write(keys, b'uuu' + b'k' * 5 + b'oo')
+            until(lambda: is_near(sim.look().servo_us[:3], (1560, 1400, 1540)))
+            assert model.travelled == 0
+            os.write(keys, b'w')
+            until(lambda: model.travelled > 0.05)
+            os.write(keys, b'q')
+            assert program.wait(PATIENCE_S) == 0
+            until(lambda: sim.look().is_safe)
+    os.close(keys)
+
+
+def is_near(pulses, wanted):
+    """A chip counts in 4.88 microseconds."""
+    return all(abs(pulse - each) < 5 for pulse, each in zip(pulses, wanted))
