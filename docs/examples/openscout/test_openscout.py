@@ -79,6 +79,15 @@ def until(done, patience_s=PATIENCE_S):
         time.sleep(0.005)
 
 
+@contextlib.contextmanager
+def running(*arguments, **options):
+    with subprocess.Popen([sys.executable, PROGRAM, *arguments], stdout=subprocess.PIPE, text=True, **options) as program:
+        try:
+            yield program
+        finally:
+            program.kill()
+
+
 class Wire:
     """The way to a board on UDP, that can be cut."""
 
@@ -121,7 +130,7 @@ def drive(arguments, course):
     """The program along that course: what it said, its exit code, how far beside the course, and from its end."""
     worst = 0.0
     with r4link.SimBoard('udp://127.0.0.1:0') as sim, Behind(sim, course.heading) as model:
-        with subprocess.Popen([sys.executable, PROGRAM, sim.url, *arguments], stdout=subprocess.PIPE, text=True) as program:
+        with running(sim.url, *arguments) as program:
             def has_ended():
                 nonlocal worst
                 course.twist(control.Pose(model.x, model.y, model.yaw))  # tells the course how far it is
@@ -172,8 +181,7 @@ def cut(scene):
                          ids=['handle let go', 'obstacle', 'killed', 'link lost'])
 def test_it_stands_within_its_braking_distance_and_one_timeout(happens, notice_s, told):
     with r4link.SimBoard('udp://127.0.0.1:0') as sim, Behind(sim) as model, Wire(sim.url) as wire:
-        with subprocess.Popen([sys.executable, PROGRAM, wire.url, '--course', '50,0'], stdout=subprocess.PIPE,
-                              text=True) as program:
+        with running(wire.url, '--course', '50,0') as program:
             until(lambda: model.speed > 0.9 * CRUISE)
             speed, begun = model.speed, model.travelled
             happens(Scene(sim, wire, program))
@@ -192,8 +200,7 @@ def test_it_stands_within_its_braking_distance_and_one_timeout(happens, notice_s
 def test_its_keys_move_the_wheels_and_the_arm_of_the_board():
     keys, terminal = pty.openpty()
     with r4link.SimBoard('udp://127.0.0.1:0') as sim, Behind(sim) as model:
-        with subprocess.Popen([sys.executable, PROGRAM, sim.url], stdin=terminal, stdout=subprocess.PIPE,
-                              text=True) as program:
+        with running(sim.url, stdin=terminal) as program:
             os.close(terminal)
             assert program.stdout.readline() == 'armed: it drives\n'
             until(lambda: is_near(sim.look().servo_us[:3], (1500, 1500, 1500)))
