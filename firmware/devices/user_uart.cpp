@@ -21,7 +21,9 @@ void UserUart::poll() {
       lost_ += static_cast<std::uint32_t>(size - i);
       break;
     }
-    bytes_[kept_++ % capacity] = taken[i];
+    bytes_[end_] = taken[i];
+    end_ = (end_ + 1) % capacity;
+    ++kept_;
   }
   lost_ += port_.take_lost();
 }
@@ -41,7 +43,12 @@ void UserUart::tell(UartBytes& out) const {
   out.lost = lost_;
   out.data.size = static_cast<std::uint8_t>(told_ - first_);
   for (std::uint32_t i = 0; i < out.data.size; ++i)
-    out.data.bytes[i] = bytes_[(first_ + i) % capacity];
+    out.data.bytes[i] = bytes_[place_of(first_ + i)];
+}
+
+std::size_t UserUart::place_of(std::uint32_t position) const {
+  const std::uint32_t back = kept_ - position;
+  return back <= end_ ? end_ - back : end_ + capacity - back;
 }
 
 }  // namespace firmware

@@ -41,21 +41,24 @@ class UserUart {
   void next_state();
   void tell(UartBytes& out) const;
 
-  // Waits for states: a second of NMEA in bursts at 100 states a second and 115200 baud. What comes
-  // when so much waits is lost, and counted.
-  static constexpr std::uint32_t capacity = 512;
+  // Waits for states: of a burst at 115200 baud, of which 100 states a second carry more than half as it comes, 600
+  // bytes. What comes when so much waits is lost, and counted.
+  static constexpr std::uint32_t capacity = 344;
   static constexpr std::uint32_t backlog = capacity - uart_max_bytes;
   static constexpr std::size_t bytes_a_turn = 64;
 
  private:
   UserUartPort& port_;
   UartMode mode_;
+  std::size_t place_of(std::uint32_t position) const;
+
   // Positions in what was kept. All wrap.
   std::uint32_t kept_ = 0;   // the next one
   std::uint32_t told_ = 0;   // behind the newest state's
   std::uint32_t first_ = 0;  // of the newest state's
   std::uint32_t new_ = 0;    // … that was new in it
   std::uint32_t lost_ = 0;
+  std::uint32_t end_ = 0;  // where in bytes_ the next one goes
   std::uint8_t bytes_[capacity];
 };
 
