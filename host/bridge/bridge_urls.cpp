@@ -74,6 +74,14 @@ void require_board(const Url& board) {
   }
 }
 
+void require_one_wire(std::string_view side) {
+  if (split_wires(side).size() == 1) return;
+  throw Error(ErrorKind::usage, std::string(side),
+              "a side of a bridge is one wire, and these are several",
+              "begin a bridge for each wire of the board; its host joins them, as in "
+              "udp://ROBOT:2018+udp://ROBOT:2019");
+}
+
 void require_once(std::set<std::string>& seen, const std::string& url) {
   if (seen.insert(url).second) return;
   throw Error(ErrorKind::usage, url, "it is in the bridge twice", "name it once");
@@ -82,6 +90,8 @@ void require_once(std::set<std::string>& seen, const std::string& url) {
 }  // namespace
 
 std::vector<BridgedUrls> pair_urls(std::string_view hosts, std::string_view board) {
+  require_one_wire(hosts);
+  require_one_wire(board);
   std::vector<PatternUrl> a = expand_urls(hosts);
   std::vector<PatternUrl> b = expand_urls(board);
   if (a.size() != b.size()) {

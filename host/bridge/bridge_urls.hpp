@@ -13,8 +13,8 @@ struct BridgedUrls {
   std::string board;
 };
 
-// Throws Error{usage} for patterns of different lengths, for a side that would be joined to itself, and for what
-// cannot be a side.
+// Throws Error{usage} for patterns of different lengths, for a side of several wires, for a side that would be
+// joined to itself, and for what cannot be a side.
 std::vector<BridgedUrls> pair_urls(std::string_view hosts, std::string_view board);
 
 }  // namespace r4

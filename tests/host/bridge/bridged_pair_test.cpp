@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "scripted_bridge.hpp"
+#include "tests/bench/allocations.hpp"
 
 namespace r4::test {
 namespace {
@@ -324,6 +325,49 @@ TEST_F(BridgedPairTest, FourMayWatch) {
   hosts->take();
   board->say(board_state);
   EXPECT_EQ(hosts->take().size(), 5U) << "strangers take no watcher's place";
+}
+
+// --- for weeks
+
+TEST_F(BridgedPairTest, ItTakesNoMemoryForADatagramHoweverManyHostsThereAre) {
+  begin();
+  hosts->keeps = board->keeps = false;
+  const std::string damaged = "O:358,1,1;PNum:2;T:0;^0x0^";
+  std::vector<std::string> of_hosts, of_board;
+  for (const char* const fields :
+       {heartbeat, "O:1,1,1;PNum:2;T:0;", "Q:ID;PNum:500;T:0;", "W:50;PNum:900;T:0;",
+        "E:STOP;PNum:70;T:0;", "E:LEAVE;PNum:9;T:100;", board_state}) {
+    of_hosts.push_back(with_crc(fields));
+  }
+  for (const char* const fields :
+       {board_state, "H:R4-ROS2;PNum:8;T:101;SAFE:2;STOP:70;", "N:900,STALE;LEASE:77;PNum:1;T:100;",
+        "I:R4,1,id,udp;ASKED:500;PNum:9;T:101;", heartbeat}) {
+    of_board.push_back(with_crc(fields));
+  }
+  of_hosts.push_back(damaged);
+  of_board.push_back(damaged);
+
+  constexpr std::uint64_t rounds = 100'000;
+  std::uint64_t stops = 0;
+  const std::uint64_t before = bench::allocations_of_this_thread();
+  for (std::uint64_t round = 0; round < rounds; ++round) {
+    const Peer stranger = static_cast<Peer>(10 + round);
+    const Peer peer = round % 2 == 0 ? first : stranger;
+    const std::size_t what = round / 2 % of_hosts.size();
+    if (what == 4) ++stops;
+    hosts->say_bytes(of_hosts[what], peer);
+    board->say_bytes(of_board[round % of_board.size()]);
+    if (round % 10 == 0) {
+      now += WaitingTime::tick_interval;
+      pair->tick();
+    }
+  }
+  EXPECT_EQ(bench::allocations_of_this_thread() - before, 0U);
+  const BridgeCounters told = from_hosts();
+  EXPECT_EQ(told.stops, stops);
+  EXPECT_GT(told.passed, rounds / 10);
+  EXPECT_GT(told.kept_out, rounds / 10);
+  EXPECT_GT(from_board().passed, rounds / 2);
 }
 
 }  // namespace

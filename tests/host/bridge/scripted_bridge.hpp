@@ -32,7 +32,7 @@ class ScriptedCarrier final : public Carrier {
   }
   void close() noexcept override { handler_ = nullptr; }
   SendResult send(std::string_view bytes, Priority priority, Peer to) override {
-    if (result == SendResult::sent) sent.push_back({std::string(bytes), priority, to});
+    if (result == SendResult::sent && keeps) sent.push_back({std::string(bytes), priority, to});
     return result;
   }
   void hold(Peer peer) override { held = peer; }
@@ -63,6 +63,7 @@ class ScriptedCarrier final : public Carrier {
   std::optional<Problem> absence;  // why it cannot be opened
   SendResult result = SendResult::sent;
   CarrierCounters counted;
+  bool keeps = true;  // what was sent, which takes memory
   std::vector<Sent> sent;
   Peer held = everyone;
 
