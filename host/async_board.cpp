@@ -77,6 +77,7 @@ void AsyncBoard::require_wait(std::string_view what, Duration timeout) {
 
 void AsyncBoard::start_send(const Command& command, Duration timeout, CompletionPtr completion) {
   Impl& impl = *impl_;
+  impl.give_up_slot(command);
   impl.begin(std::move(completion),
              [&] { return impl.session.send(command, Impl::time_of(timeout), impl.now); });
 }
@@ -213,6 +214,7 @@ void AsyncBoard::require_sendable(const Setpoints& setpoints) const {
 PostResult AsyncBoard::post(const Command& command) {
   require_sendable(command);
   Impl& impl = *impl_;
+  impl.give_up_slot(command);
   PostResult result = PostResult::no_link;
   impl.enter(Completion::How::post, [&] {
     if (impl.is_open()) result = impl.session.post(command, impl.now);

@@ -152,6 +152,10 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
   void name_in_recording();
   void describe(const Device& device);
   void describe_in_recording(const Device& device);
+  // Throws Error{usage} if another device has one of its slots.
+  void require_slots(const Device& device) const;
+  // X:OFF gives up the device that has that slot.
+  void give_up_slot(const Command& command);
   void tell_that_a_recording_ended();
 
   // --- time
@@ -193,7 +197,8 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
 
   asio::io_context& io;
   std::vector<std::unique_ptr<BoardWire>> wires;
-  std::vector<Device> devices;       // that recordings tell of
+  std::vector<Device> devices;  // that recordings tell of
+  std::vector<const Device*> attaching;
   std::uint32_t boots = 0;           // of the board, while we have known it
   const std::uint32_t heartbeat_ms;  // between ours
   Session session;

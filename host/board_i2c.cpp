@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <memory>
+#include <optional>
 #include <string>
 
 #include "board_impl.hpp"
@@ -89,10 +91,17 @@ void Board::attach(const Device& device, Duration timeout) {
   require_control(impl->role, text);
   const Duration each = Impl::bounded(timeout);
   const auto call = std::make_shared<Impl::Call>(Command());
-  call->start = [&async = impl->async, device, each](Duration, auto end) {
-    async.async_attach(device, each, std::move(end));
+  const auto obstacle = std::make_shared<std::optional<Problem>>();
+  call->start = [&async = impl->async, device, each, obstacle](Duration, auto end) {
+    try {
+      async.async_attach(device, each, std::move(end));
+    } catch (const Error& error) {  // before it has taken `end`
+      *obstacle = error.problem();
+      end(CommandResult());
+    }
   };
   impl->run(text, call, longest(device, each));
+  if (*obstacle) throw Error(**obstacle);
   if (call->result.outcome == Outcome::confirmed) return;
   throw Error(explain(device, call->result, call->link));
 }

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // AsyncBoard::async_attach(): what sets a device up, one step behind the other.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <memory>
 #include <string>
@@ -26,7 +28,12 @@ class AsyncBoard::AttachSteps final : public Completion {
         steps_(steps_of(device_)),
         timeout_(timeout),
         started_(Impl::steady_now()),
-        completion_(std::move(completion)) {}
+        completion_(std::move(completion)) {
+    impl_.attaching.push_back(&device_);
+  }
+  ~AttachSteps() { std::erase(impl_.attaching, &device_); }
+  AttachSteps(const AttachSteps&) = delete;
+  AttachSteps& operator=(const AttachSteps&) = delete;
 
   // The command of the step that is to be done now.
   static void begin(Ptr self) {
@@ -123,9 +130,60 @@ class AsyncBoard::AttachSteps final : public Completion {
   CompletionPtr completion_;
 };
 
+void AsyncBoard::require_slots(const Device& device) const { impl_->require_slots(device); }
+
 void AsyncBoard::start_attach(const Device& device, Duration timeout, CompletionPtr completion) {
   AttachSteps::begin(AttachSteps::Ptr(
       new AttachSteps(*impl_, device, Impl::time_of(timeout), std::move(completion))));
+}
+
+// --- the slots
+
+namespace {
+
+bool shares_slot(const Device& a, const Device& b) {
+  return a.first_slot() <= b.last_slot() && b.first_slot() <= a.last_slot();
+}
+
+bool is_same_device(const Device& a, const Device& b) {
+  return a.address() == b.address() && a.description().name == b.description().name;
+}
+
+}  // namespace
+
+void AsyncBoard::Impl::require_slots(const Device& device) const {
+  std::vector<const Device*> others = attaching;
+  for (const Device& each : devices) others.push_back(&each);
+  std::erase_if(others, [&](const Device* each) { return is_same_device(*each, device); });
+  const auto holder = [&](const Device& wanted) -> const Device* {
+    const auto found = std::find_if(others.begin(), others.end(),
+                                    [&](const Device* each) { return shares_slot(*each, wanted); });
+    return found == others.end() ? nullptr : *found;
+  };
+  const Device* const other = holder(device);
+  if (other == nullptr) return;
+
+  std::string fix;
+  const int slots = device.last_slot() - device.first_slot() + 1;
+  for (int slot = 1; fix.empty() && slot + slots - 1 <= i2c_slots; ++slot) {
+    const Device moved(device.description(), device.address(), slot);
+    if (holder(moved) == nullptr) fix = "name a free one, " + moved.place() + ", or ";
+  }
+  fix += "give the other up first:";
+  for (int slot = other->first_slot(); slot <= other->last_slot(); ++slot) {
+    fix += fmt::format(" X:OFF,{}", slot);
+  }
+  throw Error(ErrorKind::usage, device.place(),
+              fmt::format("{} has slot {}", other->text(),
+                          std::max(device.first_slot(), other->first_slot())),
+              fix);
+}
+
+void AsyncBoard::Impl::give_up_slot(const Command& command) {
+  if (command.kind != CommandKind::i2c_poll || command.count != 0) return;
+  std::erase_if(devices, [&](const Device& each) {
+    return each.first_slot() <= command.channel && command.channel <= each.last_slot();
+  });
 }
 
 }  // namespace r4

@@ -199,11 +199,13 @@ class AsyncBoard {
   // fields are asked for beside those that were chosen. `timeout`: for each step. Confirmed: device.reading(state())
   // has its values from now on. Else explain(device, result, link()) tells why, Outcome::refused also where it does
   // not answer or is another device; what was begun stays so. After on_restart() and a lost link it is to be set up
-  // again. Recordings tell of it as by describe().
+  // again. Recordings tell of it as by describe(). Throws Error{usage} if another device, of another address or name,
+  // has one of its slots: its readings would become this one's. X:OFF of that slot gives the other up.
   template <class Token>
   auto async_attach(const Device& device, Duration timeout, Token&& token) {
     require_timeout("async_attach()", timeout);
     require_control("async_attach()");
+    require_slots(device);
     return asio::async_initiate<Token, void(CommandResult)>(
         [this](auto handler, const Device& d, Duration t) {
           start_attach(d, t, make_completion(std::move(handler)));
@@ -329,6 +331,7 @@ class AsyncBoard {
   void start_wait_active(Duration timeout, CompletionPtr completion);
   void start_link_timing(Duration board_timeout, Duration heartbeat, Duration timeout,
                          CompletionPtr completion);
+  void require_slots(const Device& device) const;
   void start_attach(const Device& device, Duration timeout, CompletionPtr completion);
   void start_close(Duration timeout, CompletionPtr completion);
 

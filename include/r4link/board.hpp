@@ -263,7 +263,9 @@ class R4LINK_API Board {
   // Sets a described device up (devices/device.hpp, docs/described-devices.md): is it the one? Then what is to be
   // written, which takes arm(), and the board's readings, until our session ends; fields() is asked for their fields
   // beside those that were chosen. Throws Error{refused} if it does not answer, or is another device; what was
-  // begun stays so. After on_restart() and a lost link it is to be set up again. `timeout`: for each step.
+  // begun stays so. After on_restart() and a lost link it is to be set up again. `timeout`: for each step. Throws
+  // Error{usage} if another device, of another address or name, has one of its slots: its readings would become this
+  // one's. i2c().poll_off() of that slot gives the other up.
   void attach(const Device& device, Duration timeout = default_timeout);
 
   // A UART of the user's, 1 or 2 (docs/devices.md): setting("uart1", "115200:8N1") turns it on,

@@ -57,6 +57,19 @@ def test_one_of_my_own_is_read_without_arming(board, wait, tmp_path):
         wait(lambda device=device: device.reading(board.state, 'volts').number == pytest.approx(12.16))
 
 
+def test_another_gets_a_slot_only_once_its_holder_is_given_up(sim, board, wait):
+    sim.happen('device as5600 on')
+    power, angle = r4link.Device('ina219@0x40'), r4link.Device('as5600')
+    board.attach(power)
+    with pytest.raises(r4link.UsageError, match=r'as5600@0x36:1: ina219@0x40 has slot 1; name a free one, as5600@0x36:3'):
+        board.attach(angle)
+    board.attach(power)
+    for slot in (1, 2):
+        board.i2c.poll_off(slot)
+    board.attach(angle)
+    wait(lambda: angle.reading(board.state, 'angle').number is not None)
+
+
 def test_what_is_wrong_is_named(board, tmp_path):
     with pytest.raises(r4link.DataError, match='line 4: it ends behind the 2 bytes of its poll'):
         r4link.Device.parse(MINE.replace('bus 0', 'bus 1'))
@@ -75,6 +88,8 @@ def test_with_asyncio(sim):
         async with aio.Board(sim.url) as board:
             await board.wait_active()
             await board.attach(power)
+            with pytest.raises(r4link.UsageError, match='ina219@0x40 has slot 1'):
+                await board.attach(r4link.Device('ina219@0x41'))
             while power.reading(await board.next_state(), 'current').number is None:
                 pass
             assert power.reading(board.state, 'current').number == pytest.approx(1.25)

@@ -379,7 +379,8 @@ class Board:
     def attach(self, device: Device, timeout: float = 1.0) -> None:
         """Sets a described device up (r4link.devices): is it the one? Then what is to be written, which takes arm(), and
         the board's readings, until our session ends. Raises RefusedError if it does not answer, or is another device. To
-        be done again after on_restart() and a lost link. `timeout`: for each step."""
+        be done again after on_restart() and a lost link. `timeout`: for each step. Raises UsageError if another device,
+        of another address or name, has one of its slots: i2c.poll_off() of that slot gives the other up."""
         self._core.attach(device._core, _ms(timeout))
 
     def proximity(self, channel: int, threshold_cm: int, timeout: float = 1.0) -> None:

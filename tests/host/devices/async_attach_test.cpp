@@ -20,6 +20,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
+// Its set-up waits for 5 s behind what is written.
+Device slow() {
+  return Device::parse("slow@0x68",
+                       "device slow\ntitle a test\naddress 0x68\ncheck x75 x68\n"
+                       "write x6b00 wait 5000\npoll all x3b 2 10\nvalue a all 0 i16be\n");
+}
+
 // On a loop of its own, with a board that has an MPU-6050 at 0x68 and an INA219 at 0x40.
 class AsyncAttach : public testing::Test {
  protected:
@@ -62,10 +69,44 @@ TEST_F(AsyncAttach, HasTheBoardReadItAndSendItsFieldsBesideThoseThatWereChosen) 
   EXPECT_NEAR(imu.reading(board_.state(), "accel_z").number.value(), 9.80665, 1e-9);
   EXPECT_TRUE(board_.state().present.has(StateField::ain24)) << "the fields of before";
   const std::uint64_t before = commands();
-  EXPECT_EQ(attach(Device::from("ina219@0x40:3")).outcome, Outcome::confirmed);
-  EXPECT_EQ(commands() - before, 4U) << "is it there, two readings, and the field of slot 4";
-  EXPECT_EQ(attach(Device::from("ina219@0x40:3")).outcome, Outcome::confirmed);
+  EXPECT_EQ(attach(Device::from("ina219@0x40:4")).outcome, Outcome::confirmed);
+  EXPECT_EQ(commands() - before, 4U) << "is it there, two readings, and their fields";
+  EXPECT_EQ(attach(Device::from("ina219@0x40:4")).outcome, Outcome::confirmed);
   EXPECT_EQ(commands() - before, 7U) << "its fields are sent already";
+}
+
+TEST_F(AsyncAttach, AnotherDeviceGetsNoSlotUntilItsHolderIsGivenUp) {
+  const auto problem_with = [&](const char* device) {
+    return problem_of([&] {
+      board_.async_attach(Device::from(device), 5s,
+                          [](const CommandResult&) { ADD_FAILURE() << "it was begun"; });
+    });
+  };
+  EXPECT_EQ(attach(Device::from("ina219@0x40")).outcome, Outcome::confirmed);
+  const std::uint64_t before = commands();
+  const Problem problem = problem_with("ina219@0x41");
+  EXPECT_EQ(problem.kind, ErrorKind::usage);
+  EXPECT_EQ(problem.text(),
+            "ina219@0x41:1: ina219@0x40 has slot 1; name a free one, ina219@0x41:3, or give the "
+            "other up first: X:OFF,1 X:OFF,2");
+  EXPECT_EQ(problem_with("mpu6050@0x68:2").reason, "ina219@0x40 has slot 2");
+  EXPECT_EQ(commands(), before) << "nothing was sent";
+
+  EXPECT_EQ(attach(Device::from("ina219@0x40")).outcome, Outcome::confirmed) << "the same again";
+  EXPECT_EQ(attach(Device::from("ina219@0x40:7")).outcome, Outcome::confirmed) << "it moves";
+  EXPECT_EQ(attach(Device::from("mpu6050@0x68:2")).outcome, Outcome::confirmed) << "it is free";
+  std::optional<CommandResult> off;
+  board_.async_send(Command::i2c_poll_off(2), 5s, [&](const CommandResult& r) { off = r; });
+  run_until([&] { return off.has_value(); });
+  EXPECT_EQ(attach(Device::from("ina219@0x40:1")).outcome, Outcome::confirmed);
+}
+
+TEST_F(AsyncAttach, OneThatIsBeingSetUpHasItsSlotsAlready) {
+  board_.async_attach(slow(), 5s, [](const CommandResult&) {});
+  EXPECT_EQ(problem_of([&] {
+              board_.async_attach(Device::from("ina219"), 5s, [](const CommandResult&) {});
+            }).reason,
+            "slow@0x68 has slot 1");
 }
 
 TEST(DeviceSteps, LeaveTheBoardsChoiceOfFieldsAlone) {
@@ -95,13 +136,6 @@ TEST_F(AsyncAttach, TellsThatNobodyAnswers) {
   EXPECT_EQ(result.outcome, Outcome::refused);
   EXPECT_EQ(result.transfer.outcome, I2cOutcome::no_acknowledge);
   EXPECT_EQ(explain(missing, result, board_.link()).reason, "it does not answer: no acknowledge");
-}
-
-// Its set-up waits for 5 s behind what is written.
-Device slow() {
-  return Device::parse("slow@0x68",
-                       "device slow\ntitle a test\naddress 0x68\ncheck x75 x68\n"
-                       "write x6b00 wait 5000\npoll all x3b 2 10\nvalue a all 0 i16be\n");
 }
 
 TEST_F(AsyncAttach, IsGivenUpByItsCancellationSlotWhileItWaitsForTheDevice) {
@@ -178,7 +212,8 @@ TEST_F(AsyncAttachUnarmed, WhatIsToBeWrittenTakesArm) {
   EXPECT_EQ(result.outcome, Outcome::not_armed);
   EXPECT_EQ(result.step, 2);
   EXPECT_TRUE(explain(imu, result, board_.link()).thing.starts_with("mpu6050@0x68: X:WRITE,104,"));
-  EXPECT_EQ(attach(Device::from("ina219")).outcome, Outcome::confirmed) << "nothing is written";
+  EXPECT_EQ(attach(Device::from("ina219@0x40:3")).outcome, Outcome::confirmed)
+      << "nothing is written";
   std::optional<CommandResult> armed;
   board_.async_arm(5s, [&](const CommandResult& r) { armed = r; });
   run_until([&] { return armed.has_value(); });

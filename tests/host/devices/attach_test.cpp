@@ -10,6 +10,7 @@
 #include "r4link/error.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/problems.hpp"
 
 namespace r4::test {
 namespace {
@@ -106,6 +107,21 @@ TEST_F(DescribedDevice, SeveralAreReadSideBySide) {
   EXPECT_NEAR(wait_for(devices[0], "accel_z"), 9.81, 1e-9);
 }
 
+TEST_F(DescribedDevice, AnotherOneGetsItsSlotOnlyOnceItIsGivenUp) {
+  board_.attach(Device::from("ina219@0x40"));
+  const Problem problem = problem_of([&] { board_.attach(Device::from("bno055@0x28")); });
+  EXPECT_EQ(problem.kind, ErrorKind::usage);
+  EXPECT_EQ(problem.thing + ": " + problem.reason, "bno055@0x28:1: ina219@0x40 has slot 1");
+  for (const std::string& command : simulated_.executed()) {
+    EXPECT_FALSE(command.starts_with("X:WRITE")) << command;
+  }
+  board_.i2c().poll_off(1);
+  board_.i2c().poll_off(2);
+  const Device imu = Device::from("bno055@0x28");
+  board_.attach(imu);
+  EXPECT_EQ(wait_for(imu, "calibrated"), 3.0);
+}
+
 std::string reason_of(Board& board, const Device& device) {
   try {
     board.attach(device);
@@ -149,7 +165,7 @@ TEST(DescribedDevices, WhatIsToBeWrittenTakesArm) {
   } catch (const Error& error) {
     EXPECT_EQ(error.outcome(), Outcome::not_armed);
   }
-  EXPECT_NO_THROW(board.attach(Device::from("ina219"))) << "nothing is written to this one";
+  EXPECT_NO_THROW(board.attach(Device::from("ina219@0x40:3"))) << "nothing is written to this one";
   board.arm();
   EXPECT_NO_THROW(board.attach(Device::from("mpu6050")));
 }
