@@ -159,17 +159,23 @@ if [[ $status != 2 ]] || ! grep -q 'udp://HOST' "$work/err"; then
   exit 1
 fi
 
-# Every installed header, alone.
+# Every installed header, of all folders, alone.
 read -ra flags <<<"$(pkg-config --cflags r4link-asio)"
 headers=0
-for header in "$prefix"/include/r4link/*.hpp "$prefix"/include/r4link/control/*.hpp; do
+mapfile -t installed < <(find "$prefix/include/r4link" -name '*.hpp' | sort)
+for header in "${installed[@]}"; do
   echo "#include <${header#"$prefix"/include/}>" >alone.cpp
   "$cxx" -std=c++20 -Wall -Wextra -Wpedantic -Wconversion -Werror -fsyntax-only "${flags[@]}" alone.cpp || {
-    echo "install: $(basename "$header") does not compile alone"
+    echo "install: ${header#"$prefix"/include/} does not compile alone"
     exit 1
   }
   headers=$((headers + 1))
 done
+public=$(find "$source_tree/include/r4link" -name '*.hpp' | wc -l)
+if [[ $headers != "$public" ]]; then
+  echo "install: of $public public headers $headers are installed"
+  exit 1
+fi
 if grep -rl asio "$prefix"/include/r4link | grep -v '/async_board.hpp$' |
   xargs -r grep -n '#include.*asio'; then
   echo 'install: a header of the blocking API includes Asio'
