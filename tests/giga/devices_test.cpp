@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The user's bus of the Giga: its peripheral by the registers, and the board beside it.
 #include <cstring>
+#include <iterator>
 
 #include "bench.hpp"
 #include "firmware/ports/giga/devices/user_i2c_controller.hpp"
@@ -64,7 +65,7 @@ TEST(UserI2cTiming, KeepsTheLimitsOfStandardModeForEveryClock) {
   }
 }
 
-// As the core's Wire1 has it (variants/GIGA: I2C_SDA1 PH_12, I2C_SCL1 PB_6_ALT0, both I2C4).
+// Read from variants/GIGA of ArduinoCore-mbed, commit 2080938: I2C_SDA1 PH_12, I2C_SCL1 PB_6_ALT0, both I2C4.
 TEST(GigaPins, TheUsersBusIsTheCoresWire1) {
   EXPECT_TRUE(giga::user_scl_pin == (giga::Pin{'B', 6}));
   EXPECT_TRUE(giga::user_sda_pin == (giga::Pin{'H', 12}));
@@ -181,9 +182,8 @@ TEST(UserUartTiming, IsWithinOnePercentAtEveryRateAndClock) {
   }
 }
 
-// As the core has them (ArduinoCore-mbed, variants/GIGA: pins_arduino.h SERIAL2_TX 18, SERIAL2_RX 19, SERIAL3_TX 16,
-// SERIAL3_RX 17; variant.cpp D18 PD_5, D19 PD_6, D16 PH_13, D17 PI_9, A12 PA_4, A13 PA_5, D6 PD_13 … D13 PH_6; by
-// the data sheet PD5 and PD6 are USART2 by function 7, PH13 and PI9 UART4 by function 8).
+// Of the same commit: pins_arduino.h SERIAL2_TX 18, SERIAL2_RX 19, SERIAL3_TX 16, SERIAL3_RX 17; variant.cpp D18 PD_5,
+// D19 PD_6, D16 PH_13, D17 PI_9. By the data sheet PD5 and PD6 are USART2 by function 7, PH13 and PI9 UART4 by function 8.
 TEST(GigaPins, TheUsersUartsAreTheCoresSerial2AndSerial3) {
   EXPECT_TRUE(giga::uart_tx_pins[0] == (giga::Pin{'D', 5}));
   EXPECT_TRUE(giga::uart_rx_pins[0] == (giga::Pin{'D', 6}));
@@ -191,10 +191,21 @@ TEST(GigaPins, TheUsersUartsAreTheCoresSerial2AndSerial3) {
   EXPECT_TRUE(giga::uart_rx_pins[1] == (giga::Pin{'I', 9}));
   EXPECT_EQ(giga::uart_functions[0], 7U);
   EXPECT_EQ(giga::uart_functions[1], 8U);
+}
+
+// The same: A12 PA_4 (DAC1_OUT1), A13 PA_5 (DAC1_OUT2).
+TEST(GigaPins, TheUsersVoltagesAreA12AndA13) {
   EXPECT_TRUE(giga::dac_pins[0] == (giga::Pin{'A', 4}));
   EXPECT_TRUE(giga::dac_pins[1] == (giga::Pin{'A', 5}));
-  EXPECT_TRUE(giga::gpio_pins[0] == (giga::Pin{'D', 13}));
-  EXPECT_TRUE(giga::gpio_pins[7] == (giga::Pin{'H', 6}));
+}
+
+TEST(GigaPins, TheSpareInputsAreD6ToD13) {
+  const giga::Pin pins_of_variant[] = {{'D', 13}, {'B', 4},  {'B', 8},  {'B', 9},
+                                       {'K', 1},  {'J', 10}, {'J', 11}, {'H', 6}};
+  ASSERT_EQ(std::size(giga::gpio_pins), std::size(pins_of_variant));
+  for (std::size_t i = 0; i < std::size(pins_of_variant); ++i) {
+    EXPECT_TRUE(giga::gpio_pins[i] == pins_of_variant[i]) << "D" << 6 + i;
+  }
 }
 
 TEST_F(GigaDevices, AUartHearsEachByteOnceAndSendsWhatItIsTold) {
