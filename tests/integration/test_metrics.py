@@ -45,7 +45,8 @@ def test_tells_of_boards_what_a_host_knows():
     with Board('udp://127.0.0.1:0') as left, Board('udp://127.0.0.1:0') as right:
         with Metrics(left.host_url, right.host_url) as metrics, driving(left.host_url, 'O:358,1,1'):
             def both_are_heard(samples):
-                return len(samples) == 2 and all(each.get(('r4_state_rate_hertz',), 0) > 90 for each in samples.values())
+                return len(samples) == 2 and all(each.get(('r4_state_rate_hertz',), 0) > 90 and
+                                                 ('r4_clock_error_seconds',) in each for each in samples.values())
             samples = metrics.until(both_are_heard)
             driven, idle = (samples[url] for url in sorted(samples, key=lambda url: samples[url][('r4_safe', 'link')]))
             assert driven[('r4_safe', 'none')] == 1 and driven[('r4_safe', 'link')] == 0
@@ -54,11 +55,23 @@ def test_tells_of_boards_what_a_host_knows():
                 assert each[('r4_up',)] == 1
                 assert 23 < each[('r4_analog_volts', 'AIN24')] < 26
                 assert each[('r4_states_total',)] > 0 and each[('r4_damaged_total',)] == 0
+                assert each[('r4_lost_total',)] == 0
+                assert 0 <= each[('r4_state_age_seconds',)] < 1
                 assert 0 < each[('r4_round_trip_seconds',)] < 0.1
                 assert 0 <= each[('r4_clock_error_seconds',)] < 0.1
                 assert any(key[0] == 'r4_info' and 'sim-1' in key for key in each)
             right.end()
-            metrics.until(lambda samples: sorted(each[('r4_up',)] for each in samples.values()) == [0, 1])
+            samples = metrics.until(lambda samples: sorted(each[('r4_up',)] for each in samples.values()) == [0, 1])
+            [silent] = [each for each in samples.values() if each[('r4_up',)] == 0]
+            assert ('r4_state_age_seconds',) not in silent and silent[('r4_states_total',)] > 0
+
+
+def test_what_was_lost_on_the_way_is_counted():
+    with Board('udp://127.0.0.1:0', options=('--link', 'loss=20%')) as board, Metrics(board.host_url) as metrics:
+        def some_are_lost(samples):
+            return any(each.get(('r4_lost_total',), 0) > 0 and each.get(('r4_states_total',), 0) > 0
+                       for each in samples.values())
+        metrics.until(some_are_lost)
 
 
 def test_tells_of_each_of_several_wires(tmp_path):
