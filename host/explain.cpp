@@ -344,9 +344,11 @@ Problem explain(const std::vector<Wire>& wires) {
   std::string names;
   std::string boards;
   for (const Wire& wire : wires) {
-    if (wire.board_id.empty()) continue;
+    const bool unnamed = wire.board_id.empty();  // on a bus nobody asks who watches
+    if (unnamed && wire.state != WireState::other_board) continue;
     names += (names.empty() ? "" : ", ") + wire.name;
-    boards += (boards.empty() ? "" : ", ") + wire.name + " to " + wire.board_id;
+    boards += (boards.empty() ? "" : ", ") + wire.name + " to " +
+              (unnamed ? "one with another clock" : wire.board_id);
   }
   return {ErrorKind::refused, std::move(names), "they lead to two boards: " + boards,
           "give the URLs of one board, or open each board by itself"};

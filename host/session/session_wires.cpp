@@ -85,7 +85,7 @@ bool Session::admit(std::size_t wire, const Datagram& datagram, Time now) {
     case MessageKind::nack: {
       Nack nack;
       const bool counts = read_nack(datagram, nack) && nack.code != Refusal::busy;
-      take = wires_.on_answer(wire, datagram.pnum(), t_ms, counts, now);
+      take = wires_.on_answer(wire, datagram.pnum(), t_ms, fits, counts, now);
       break;
     }
     case MessageKind::board_heartbeat:
@@ -111,12 +111,14 @@ bool Session::admit(std::size_t wire, const Datagram& datagram, Time now) {
 bool Session::admit_identity(std::size_t wire, const Datagram& datagram, const Identity& identity,
                              Time now) {
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
+  const bool fits =
+      link_.is_of_this_boot(t_ms, to_ms(now), to_ms(now), HostLink::boot_tolerance_ms);
   const Wires::Answer answer = wires_.on_identity(wire, identity, t_ms, link_, now);
   if (answer == Wires::Answer::nothing || answer == Wires::Answer::other) return false;
   if (answer == Wires::Answer::restarted) link_.on_clock(t_ms, true, to_ms(now));
   notice_restart();
   const bool counts = !(identity.has_busy && identity.busy);
-  wires_.on_answer(wire, datagram.pnum(), t_ms, counts, now);
+  wires_.on_answer(wire, datagram.pnum(), t_ms, fits, counts, now);
   return true;
 }
 

@@ -16,6 +16,7 @@ void Wires::on_transport(std::size_t index, bool up, bool can_ask, Time now) {
   wire.heard = wire.busy_until = Time{0};
   wire.ask_at = can_ask ? now : Time::max();
   if (wire.known && first_answer_.count() == 0) first_answer_ = now;
+  anew_ = anew_ || all_down();
   // It may bring other numbers from now on.
   if (up && wire.tracker.started()) wire.tracker.restart();
   look(now);
@@ -85,6 +86,7 @@ Wires::Answer Wires::on_identity(std::size_t index, const Identity& identity, st
   set_clock(wire, t_ms, now);
   wire.boot = boot_;
   proven_ = now;
+  compare_those_that_listen(t_ms, now);
   return fits ? Answer::known : Answer::restarted;
 }
 
@@ -103,8 +105,10 @@ WireSet Wires::known() const {
 bool Wires::poll(Time now) {
   look(now);
   if (begun_ || known() == 0 || two_boards()) return false;
-  const bool asking = std::any_of(wires_.begin(), wires_.end(),
-                                  [](const Wire& wire) { return wire.up && !wire.known; });
+  const bool asking = std::any_of(wires_.begin(), wires_.end(), [](const Wire& wire) {
+    const bool compared = wire.can_ask || wire.has_clock;
+    return wire.up && !(wire.known && compared);
+  });
   if (asking && now < first_answer_ + patience) return false;
   begun_ = true;
   return true;
@@ -138,6 +142,32 @@ void Wires::set_clock(Wire& wire, std::uint32_t t_ms, Time now) {
   wire.clock_ms = to_ms(now);
 }
 
+// Is what a wire brings that cannot be asked of the session's board, by its T? Before the session begins the other
+// wires know its clock alone.
+bool Wires::agrees(const Wire& wire, std::uint32_t t_ms, bool fits, Time now) const {
+  if (begun_) return fits;
+  return std::all_of(wires_.begin(), wires_.end(), [&](const Wire& each) {
+    return &each == &wire || !each.known || !each.has_clock || in_clock(each, t_ms, now);
+  });
+}
+
+// The board has said its T on a wire that was asked: those that cannot be asked, and had another, are of another
+// board, or have yet to bring what is of this boot.
+void Wires::compare_those_that_listen(std::uint32_t t_ms, Time now) {
+  anew_ = false;
+  for (Wire& each : wires_) {
+    if (each.can_ask || !each.has_clock || in_clock(each, t_ms, now)) continue;
+    each.has_clock = false;
+    if (!begun_) turn_away(each, now);
+  }
+}
+
+void Wires::turn_away(Wire& wire, Time now) {
+  wire.other = true;
+  wire.known = false;
+  look(now);
+}
+
 // Is it of the board as the session knows it? If not, the wire is asked.
 bool Wires::admits(Wire& wire, std::uint32_t t_ms, Time now) const {
   if (!wire.known) return false;
@@ -151,15 +181,21 @@ Wires::Take Wires::on_datagram(std::size_t index, std::uint32_t pnum, std::uint3
   Wire& wire = wires_[index];
   Take take = Take::yes;
   if (!admits(wire, t_ms, now)) {
-    // One that cannot be asked is believed, unless another one knows better.
-    if (wire.can_ask || !wire.known || (!fits && others_carry(wire, now))) return Take::no;
-    if (!fits) {
+    if (wire.can_ask || !wire.up) return Take::no;
+    if (!agrees(wire, t_ms, fits, now)) {
+      // A restart, if it has carried and no other one knows better.
+      const bool carried = wire.has_clock && wire.boot == boot_;
+      if (!carried && !anew_) turn_away(wire, now);
+      if ((!carried && !anew_) || others_carry(wire, now)) return Take::no;
       ++boot_;
       proven_ = now;
       take = Take::restarted;
     }
+    wire.other = false;
+    wire.known = true;
     wire.boot = boot_;
   }
+  anew_ = false;
   wire.connecting = false;
   set_clock(wire, t_ms, now);
   wire.heard = now;
@@ -182,10 +218,18 @@ Wires::Take Wires::on_connecting(std::size_t index, Time now) {
   return all_connecting(now) ? Take::connecting : Take::no;
 }
 
-Wires::Take Wires::on_answer(std::size_t index, std::uint32_t pnum, std::uint32_t t_ms, bool counts,
-                             Time now) {
+Wires::Take Wires::on_answer(std::size_t index, std::uint32_t pnum, std::uint32_t t_ms, bool fits,
+                             bool counts, Time now) {
   Wire& wire = wires_[index];
-  if (!admits(wire, t_ms, now)) return Take::no;
+  if (!admits(wire, t_ms, now)) {
+    // On a bus the states come only once a lease was answered.
+    const bool first = !wire.can_ask && wire.known && !wire.has_clock;
+    if (!first) return Take::no;
+    if (!agrees(wire, t_ms, fits, now)) {
+      if (!anew_) turn_away(wire, now);
+      return Take::no;
+    }
+  }
   wire.heard = now;
   look(now);
   if (counts && wire.tracker.started()) wire.tracker.on(pnum);

@@ -49,7 +49,8 @@ class Wires {
   Lease& lease(std::size_t index) { return wires_[index].lease; }
   const Lease& lease(std::size_t index) const { return wires_[index].lease; }
 
-  // `can_ask`: not where who watches may say nothing, on a bus; such a wire is believed what its URL says.
+  // `can_ask`: not where who watches may say nothing, on a bus. Such a wire is believed what its URL says while it is the
+  // only one; beside others the T that it brings must fit the board's clock, which begins at random.
   void on_transport(std::size_t index, bool up, bool can_ask, Time now);
   bool all_down() const;
 
@@ -90,7 +91,8 @@ class Wires {
   // A heartbeat that says that the board is booting.
   Take on_connecting(std::size_t index, Time now);
   // N or I. `counts`: its number is among those of the states.
-  Take on_answer(std::size_t index, std::uint32_t pnum, std::uint32_t t_ms, bool counts, Time now);
+  Take on_answer(std::size_t index, std::uint32_t pnum, std::uint32_t t_ms, bool fits, bool counts,
+                 Time now);
   // What on_datagram() let through was new, or a copy.
   void taken(std::size_t index);
   void copy(std::size_t index);
@@ -165,6 +167,9 @@ class Wires {
   static void set_clock(Wire& wire, std::uint32_t t_ms, Time now);
   static void ask_soon(Wire& wire, Time now);
   bool admits(Wire& wire, std::uint32_t t_ms, Time now) const;
+  bool agrees(const Wire& wire, std::uint32_t t_ms, bool fits, Time now) const;
+  void compare_those_that_listen(std::uint32_t t_ms, Time now);
+  void turn_away(Wire& wire, Time now);
   bool all_connecting(Time now) const;
   bool others_carry(const Wire& wire, Time now) const;
   bool refuses(const Wire& wire, Time now) const;
@@ -175,6 +180,7 @@ class Wires {
   bool has_id_ = false;
   std::string id_;  // of the session's board
   bool begun_ = false;
+  bool anew_ = true;  // nothing has come since all wires were down
   Time first_answer_{0};
   std::uint32_t boot_ = 0;
   Time proven_{0};  // when the newest proof of the boot came

@@ -105,7 +105,7 @@ void WiredRobot::cut(std::size_t wire, bool is_cut) {
 void WiredRobot::plug(std::size_t wire, bool in) {
   up_[wire] = in;
   if (!in) std::erase_if(packets_, [wire](const Packet& each) { return each.wire == wire; });
-  session->on_transport(wire, in, now());
+  session->on_transport(wire, in, now(), !cables[wire].listens);
   session->poll(now());
   Board& at = *boards_[cables[wire].board];
   for (const auto& end : at.ends) {
@@ -160,6 +160,7 @@ void WiredRobot::put(std::size_t wire, bool to_board, std::string_view bytes) {
 
 SendResult WiredRobot::transmit(std::size_t wire, std::string_view bytes, Priority) {
   if (!up_[wire]) return SendResult::down;
+  if (cables[wire].listens && !bytes.starts_with("W:")) return SendResult::down;
   if (keeps_states) cables[wire].sent.emplace_back(bytes);
   put(wire, true, bytes);
   return SendResult::sent;

@@ -24,6 +24,7 @@ class WiredRobot final : private Session::Handler {
         : lag_ms(its_lag_ms), board(its_board) {}
     std::uint32_t lag_ms;
     std::size_t board;
+    bool listens = false;  // a bus, for who watches: nobody is asked there who is there
     bool cut_to_board = false, cut_to_host = false;
     std::vector<std::string> sent;  // by the host
   };

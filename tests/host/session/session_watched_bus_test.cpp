@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Who watches a board over a bus beside another wire: on a bus nobody may be asked who is there.
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <string>
+
+#include "tests/support/datagrams.hpp"
+#include "wired_robot.hpp"
+
+namespace r4::test {
+namespace {
+
+using Cables = WiredRobot::Cables;
+
+// Two wires, of which the second, or both, are buses.
+class WatchedBus : public testing::Test {
+ protected:
+  explicit WatchedBus(std::size_t board_of_bus = 0, bool first_is_asked = true) {
+    Cables cables{{1}, {1, board_of_bus}};
+    cables[0].listens = !first_is_asked;
+    cables[1].listens = true;
+    robot_.emplace(cables, SessionOptions{}, BoardRole::watch);
+  }
+  WiredRobot& robot() { return *robot_; }
+  WireState state(std::size_t wire) { return robot().session->wire_state(wire); }
+
+ private:
+  std::optional<WiredRobot> robot_;
+};
+
+TEST_F(WatchedBus, CarriesBesideAWireThatWasAsked) {
+  robot().connect();
+  robot().run(2000);
+  EXPECT_EQ(robot().session->link().carrying, 3);
+  EXPECT_FALSE(robot().session->link().two_boards);
+  robot().cut(0);
+  robot().told_states = 0;
+  robot().run(1500);
+  EXPECT_EQ(state(0), WireState::silent);
+  EXPECT_NEAR(static_cast<double>(robot().told_states), 150, 3);
+  EXPECT_EQ(robot().restarts, 0);
+}
+
+TEST_F(WatchedBus, IsBelievedAgainAfterARestartOfTheBoard) {
+  robot().connect();
+  robot().run(2000);
+  for (const bool alone : {false, true}) {
+    robot().cut(0, alone);
+    robot().run(12'000);  // or its clock would be near that of before
+    const int restarts = robot().restarts;
+    robot().reboot(0);
+    robot().run(3000);
+    EXPECT_EQ(robot().restarts, restarts + 1);
+    EXPECT_EQ(state(1), WireState::carrying) << alone;
+    EXPECT_FALSE(robot().session->link().two_boards);
+  }
+}
+
+struct WatchedBusOfAnother : WatchedBus {
+  WatchedBusOfAnother() : WatchedBus(1) {}
+};
+
+TEST_F(WatchedBusOfAnother, IsNeverUsed) {
+  robot().connect();
+  robot().run(3000);
+  EXPECT_TRUE(robot().session->link().two_boards);
+  EXPECT_EQ(state(1), WireState::other_board);
+  robot().cut(0);
+  robot().told_states = 0;
+  robot().run(3000);
+  EXPECT_EQ(robot().told_states, 0U) << "nor when the right one is silent";
+  EXPECT_EQ(robot().restarts, 0);
+}
+
+TEST_F(WatchedBusOfAnother, EndsTheSessionBeforeItBeginsIfItBringsAnythingByThen) {
+  for (const std::size_t wire : {0U, 1U}) robot().plug(wire, true);
+  robot().bring(1, with_crc("AIN24:24;PNum:5;T:" + std::to_string(robot().board_ms(1)) + ";"));
+  robot().run(1000);
+  EXPECT_TRUE(robot().session->link().two_boards);
+  EXPECT_EQ(robot().session->link().state, HostLinkState::connecting);
+  EXPECT_EQ(robot().told_states, 0U);
+}
+
+struct TwoWatchedBuses : WatchedBus {
+  TwoWatchedBuses() : WatchedBus(0, false) {}
+};
+
+TEST_F(TwoWatchedBuses, CarryBothAndAreBelievedAfterAPowerCycleOfTheirAdapters) {
+  robot().connect();
+  robot().run(2000);
+  EXPECT_EQ(robot().session->link().carrying, 3);
+  for (const std::size_t wire : {0U, 1U}) robot().plug(wire, false);
+  robot().reboot(0);
+  robot().connect();
+  robot().run(2000);
+  EXPECT_EQ(robot().session->link().carrying, 3);
+  EXPECT_FALSE(robot().session->link().two_boards);
+}
+
+struct TwoWatchedBusesOfTwoBoards : WatchedBus {
+  TwoWatchedBusesOfTwoBoards() : WatchedBus(1, false) {}
+};
+
+TEST_F(TwoWatchedBusesOfTwoBoards, AreNotBothUsed) {
+  robot().connect();
+  robot().run(2000);
+  EXPECT_TRUE(robot().session->link().two_boards);
+  EXPECT_NE(state(0) == WireState::other_board, state(1) == WireState::other_board);
+}
+
+}  // namespace
+}  // namespace r4::test
