@@ -73,3 +73,16 @@ def test_a_voltage_is_off_when_its_publisher_is_gone():
               lambda timeout: peer.sample('rt/R4', lambda payload: b'DAC1:3300;' in payload, timeout))
         peer.say('remove', 'rt/R4_Command')
         peer.sample('rt/R4', lambda payload: b'DAC1:0;' in payload)
+
+
+def test_a_stepper_is_stopped_though_its_state_comes_in_two_datagrams():
+    with armed('--fields', 'ALL,I2C1,I2C2,I2C3,I2C4,UART1,UART2,I2CX,I2CBUS') as (board, ros2, peer):
+        peer.read('rt/R4', STRING)
+        join(ros2, peer, 'R4_Command', STRING)
+        polls = text(';'.join(f'X:POLL,0x68,x3B,32,10,{slot}' for slot in range(1, 5)))
+        again(lambda: peer.write('rt/R4_Command', polls),
+              lambda timeout: peer.sample('rt/R4', lambda line: b'I2C4:' in line and b'STEP2POS:' not in line, timeout))
+        join(ros2, peer, 'stepper2/command', INT32)
+        drive(board, peer, 'rt/stepper2/command', (100_000).to_bytes(4, 'little'), lambda each: each['stepper'][1][1])
+        peer.say('remove', 'rt/stepper2/command')
+        board.outputs(lambda each: not each['stepper'][1][1])

@@ -15,16 +15,21 @@ struct Driven {
 
   Drivers drivers;
   Drivers::Time now{1h};
-  State state;
   int topic = 0;
   int other_topic = 0;
 
   void sent(const Command& command, std::uint64_t publisher = 7) {
     drivers.on_sent(command, &topic, publisher, now);
   }
+  void told(int stepper, std::int32_t steps) {
+    State state;
+    state.present.add(position_of(stepper));
+    state.stepper_steps[stepper - 1] = steps;
+    drivers.on_state(state, now);
+  }
   std::vector<std::string> to_stop() {
     std::vector<std::string> texts;
-    for (const Command& each : drivers.to_stop(state, now).commands) texts.push_back(text_of(each));
+    for (const Command& each : drivers.to_stop(now).commands) texts.push_back(text_of(each));
     return texts;
   }
 };
@@ -38,7 +43,7 @@ TEST(Ros2Drivers, StopWhatASilentPublisherDrove) {
   driven.now += 1ms;
   EXPECT_EQ(driven.to_stop(), Texts{"O:0,1,2"});
   EXPECT_EQ(driven.to_stop(), Texts{"O:0,1,2"}) << "until the board has confirmed it";
-  driven.drivers.stopped(driven.drivers.to_stop(driven.state, driven.now));
+  driven.drivers.stopped(driven.drivers.to_stop(driven.now));
   EXPECT_EQ(driven.to_stop(), Texts{});
   EXPECT_FALSE(driven.drivers.any());
 }
@@ -68,9 +73,47 @@ TEST(Ros2Drivers, AStepperIsStoppedWhereItIsOnceThatIsKnown) {
   driven.sent(Command::stepper(100000, 1000, 2));
   driven.now += 2s;
   EXPECT_EQ(driven.to_stop(), Texts{});
-  driven.state.present.add(StateField::step2pos);
-  driven.state.stepper_steps[1] = 1234;
+  driven.told(2, 1234);
   EXPECT_EQ(driven.to_stop(), Texts{"P:1234,1000,2"});
+}
+
+TEST(Ros2Drivers, AStepperIsStoppedThoughTheNewestDatagramIsAnotherPartOfTheState) {
+  Driven driven;
+  driven.sent(Command::stepper(100000, 1000, 2));
+  driven.told(2, 1234);
+  State rest;
+  rest.present.add(StateField::relays);
+  driven.drivers.on_state(rest, driven.now);
+  driven.drivers.on_publishers(&driven.topic, {});
+  EXPECT_EQ(driven.to_stop(), Texts{"P:1234,1000,2"});
+}
+
+TEST(Ros2Drivers, NoStepperGoesBackToWhereItWasLongAgo) {
+  Driven driven;
+  driven.sent(Command::stepper(100000, 1000, 2));
+  driven.told(2, 1234);
+  driven.drivers.on_publishers(&driven.topic, {});
+  driven.now += 251ms;
+  EXPECT_EQ(driven.to_stop(), Texts{});
+  driven.told(3, 5);
+  EXPECT_EQ(driven.to_stop(), Texts{}) << "that of another one";
+  driven.told(2, 1500);
+  EXPECT_EQ(driven.to_stop(), Texts{"P:1500,1000,2"});
+}
+
+TEST(Ros2Drivers, APositionOfBeforeItWasSetToZeroIsNone) {
+  Driven driven;
+  driven.sent(Command::stepper(100000, 1000, 2));
+  driven.told(2, 50000);
+  driven.sent(Command::zero(2));
+  driven.drivers.on_publishers(&driven.topic, {});
+  EXPECT_EQ(driven.to_stop(), Texts{});
+  driven.now += 20ms;
+  driven.told(2, 50020);  // on its way when the board was told
+  EXPECT_EQ(driven.to_stop(), Texts{});
+  driven.now += 80ms;
+  driven.told(2, 3);
+  EXPECT_EQ(driven.to_stop(), Texts{"P:3,1000,2"});
 }
 
 TEST(Ros2Drivers, LeaveAloneWhatRestsAndTheMotorsSupply) {
@@ -89,7 +132,7 @@ TEST(Ros2Drivers, ACommandThatStopsIsRepeatedUntilTheBoardHasConfirmedIt) {
   Driven driven;
   driven.sent(Command::osmc(358, Direction::forward, 1));
   driven.sent(Command::osmc(0, Direction::forward, 1));
-  const Drivers::Stop stop = driven.drivers.to_stop(driven.state, driven.now);
+  const Drivers::Stop stop = driven.drivers.to_stop(driven.now);
   ASSERT_EQ(stop.commands.size(), 1U) << "it may have been lost on its way";
   EXPECT_EQ(text_of(stop.commands[0]), "O:0,1,1");
   EXPECT_FALSE(stop.missed) << "nobody has gone";
@@ -103,7 +146,7 @@ TEST(Ros2Drivers, SayWhetherSomebodyIsMissed) {
   Driven driven;
   driven.sent(Command::osmc(358, Direction::forward, 1));
   driven.now += 2s;
-  EXPECT_TRUE(driven.drivers.to_stop(driven.state, driven.now).missed);
+  EXPECT_TRUE(driven.drivers.to_stop(driven.now).missed);
 }
 
 TEST(Ros2Drivers, AVoltageGoesToZeroBehindTheOthersWhichABoardWithoutOneWouldRefuse) {
@@ -111,7 +154,7 @@ TEST(Ros2Drivers, AVoltageGoesToZeroBehindTheOthersWhichABoardWithoutOneWouldRef
   driven.sent(Command::dac(2, 3300));
   driven.sent(Command::osmc(358, Direction::forward, 1));
   driven.now += 2s;
-  const Drivers::Stop others = driven.drivers.to_stop(driven.state, driven.now);
+  const Drivers::Stop others = driven.drivers.to_stop(driven.now);
   ASSERT_EQ(others.commands.size(), 1U);
   EXPECT_EQ(text_of(others.commands[0]), "O:0,1,1");
   driven.drivers.stopped(others);
@@ -124,7 +167,7 @@ TEST(Ros2Drivers, AnotherCommandEndsTheStopping) {
   Driven driven;
   driven.sent(Command::osmc(358, Direction::forward, 1), 7);
   driven.now += 2s;
-  const Drivers::Stop stop = driven.drivers.to_stop(driven.state, driven.now);
+  const Drivers::Stop stop = driven.drivers.to_stop(driven.now);
   driven.sent(Command::osmc(100, Direction::forward, 1), 8);
   EXPECT_EQ(driven.to_stop(), Texts{});
   driven.drivers.on_publishers(&driven.topic, {});
@@ -148,7 +191,7 @@ TEST(Ros2Drivers, AGroupAtATime) {
   for (int n = 1; n <= servo_channels; ++n) driven.sent(Command::servo(1500, n));
   for (int n = 1; n <= osmc_channels; ++n) driven.sent(Command::osmc(1, Direction::forward, n));
   driven.now += 2s;
-  const auto first = driven.drivers.to_stop(driven.state, driven.now);
+  const auto first = driven.drivers.to_stop(driven.now);
   EXPECT_EQ(first.commands.size(), static_cast<std::size_t>(max_group));
   driven.drivers.stopped(first);
   EXPECT_EQ(driven.to_stop().size(), 4U);

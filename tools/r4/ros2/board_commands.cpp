@@ -40,6 +40,9 @@ BoardCommands::BoardCommands(AsyncBoard& board, Graph& graph, std::size_t node, 
   subscribe_outputs(graph, node, inbox);
   if (options_.drive) subscribe_drive(graph, node, inbox);
   serve_all(graph, node, inbox);
+  board_.on_state([this](const ReceivedState& state, const Datagram&) {
+    drivers_.on_state(state, state.sampled);
+  });
   board_.on_arming([this](DisarmCause cause) {
     if (cause == DisarmCause::none) return;
     wanted_.clear();
@@ -334,7 +337,7 @@ void BoardCommands::tell(const std::string& what, PostResult result) {
 
 void BoardCommands::on_tick() {
   if (resting_ || !drivers_.any()) return;
-  const Drivers::Stop stop = drivers_.to_stop(board_.state(), Clock::now());
+  const Drivers::Stop stop = drivers_.to_stop(Clock::now());
   if (stop.commands.empty()) return;
   Setpoints group;
   for (const Command& command : stop.commands) group.add(command);

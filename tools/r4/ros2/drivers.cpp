@@ -53,7 +53,7 @@ std::optional<std::size_t> Drivers::index_of(const Command& command) {
   return std::nullopt;
 }
 
-std::optional<Command> Drivers::stop_of(std::size_t index, const State& state) {
+std::optional<Command> Drivers::stop_of(std::size_t index, Time now) const {
   std::size_t first = 0;
   for (const Kind& each : kinds) {
     const auto channels = static_cast<std::size_t>(each.channels);
@@ -71,9 +71,11 @@ std::optional<Command> Drivers::stop_of(std::size_t index, const State& state) {
         return Command::servo(0, channel);
       case CommandKind::relay:
         return Command::relay(channel, false);
-      case CommandKind::stepper:
-        if (!state.present.has(position_of(channel))) return std::nullopt;
-        return Command::stepper(state.steps(channel), stepper_speed_default, channel);
+      case CommandKind::stepper: {
+        const Position& position = positions_[index - first];
+        if (!position.sampled || now - *position.sampled > oldest_position) return std::nullopt;
+        return Command::stepper(position.steps, stepper_speed_default, channel);
+      }
       case CommandKind::dac:
         return Command::dac(channel, 0);
       default:
@@ -85,12 +87,24 @@ std::optional<Command> Drivers::stop_of(std::size_t index, const State& state) {
 
 void Drivers::on_sent(const Command& command, const void* source, std::uint64_t publisher,
                       Time now) {
+  if (command.kind == CommandKind::zero) {
+    positions_[command.channel - 1U] = {0, std::nullopt, now + longest_way};
+  }
   const auto index = index_of(command);
   if (!index) return;
   Output& output = outputs_[*index];
   const bool rest = rests(command);
   if (rest && output.stage != Stage::driven) return;  // it rests, or is on its way there
   output = {rest ? Stage::stopping : Stage::driven, source, publisher, now, ++sent_, rest};
+}
+
+void Drivers::on_state(const State& state, Time sampled) {
+  for (int n = 1; n <= stepper_channels; ++n) {
+    Position& position = positions_[static_cast<std::size_t>(n - 1)];
+    if (!state.present.has(position_of(n)) || sampled < position.counts_from) continue;
+    position.steps = state.steps(n);
+    position.sampled = sampled;
+  }
 }
 
 void Drivers::on_publishers(const void* source, const std::vector<std::uint64_t>& there) {
@@ -108,7 +122,7 @@ void Drivers::forget(const Command& command) {
   if (const auto index = index_of(command)) outputs_[*index] = {};
 }
 
-Drivers::Stop Drivers::to_stop(const State& state, Time now) {
+Drivers::Stop Drivers::to_stop(Time now) {
   Stop stop{{}, sent_, false};
   for (std::size_t i = 0; i < outputs; ++i) {
     Output& output = outputs_[i];
@@ -117,7 +131,7 @@ Drivers::Stop Drivers::to_stop(const State& state, Time now) {
     if (output.stage != Stage::stopping || stop.commands.size() == max_group) continue;
     const bool voltage = i >= outputs - dac_channels;  // the last of them
     if (voltage && !stop.commands.empty() && stop.commands[0].kind != CommandKind::dac) continue;
-    const auto command = stop_of(i, state);
+    const auto command = stop_of(i, now);
     if (!command) continue;
     stop.commands.push_back(*command);
     stop.missed = stop.missed || !output.asked;

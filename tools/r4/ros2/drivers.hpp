@@ -9,7 +9,8 @@
 // A command that stops goes out once like the others, and might be lost: so it, too, is repeated until the board has
 // confirmed it. What is stopped goes where the board's safe state puts it: motors to 0, brushless drivers to 0 with
 // their brakes on, servos without pulses, relays open, steppers standing where they are, voltages to 0. Relay 1 is no
-// output here: it is the motors' supply, and arming's. No clock: the time is passed in.
+// output here: it is the motors' supply, and arming's. Where a stepper is, is known for a while, for a state may come in
+// several datagrams, of which one has it. No clock: the time is passed in.
 #pragma once
 
 #include <array>
@@ -37,6 +38,8 @@ class Drivers {
 
   // `source`: the topic; `publisher`: of that topic.
   void on_sent(const Command& command, const void* source, std::uint64_t publisher, Time now);
+  // A datagram of the board, sampled then: where its steppers are.
+  void on_state(const State& state, Time sampled);
   // Those of a topic that are left.
   void on_publishers(const void* source, const std::vector<std::uint64_t>& there);
   // Somebody else has made the outputs safe.
@@ -45,13 +48,13 @@ class Drivers {
   void forget(const Command& command);
 
   // Commands for what is to be stopped now, for each output until stopped() or a command that drives it. At most
-  // max_group. A stepper waits for a `state` with its position; voltages, which not every board has, for the others.
+  // max_group. A stepper waits for its position; voltages, which not every board has, for the others.
   struct Stop {
     std::vector<Command> commands;
     std::uint64_t sent = 0;  // commands before it
     bool missed = false;     // who drove one of them has gone or is silent
   };
-  Stop to_stop(const State& state, Time now);
+  Stop to_stop(Time now);
   // The board has confirmed it. What was driven again since is not stopped by that.
   void stopped(const Stop& stop);
   bool any() const;
@@ -66,15 +69,25 @@ class Drivers {
     std::uint64_t sent = 0;  // which command it was
     bool asked = false;      // to stop
   };
+  struct Position {
+    std::int32_t steps = 0;
+    std::optional<Time> sampled;
+    Time counts_from{};  // what was sampled before is counted from another zero
+  };
+  // A stepper that was sent to an older position would move, not stop.
+  static constexpr Duration oldest_position{250};
+  // Of Z to the board: a state of meanwhile may still be of before.
+  static constexpr Duration longest_way{100};
   static constexpr std::size_t outputs = osmc_channels + dhb12_channels + servo_channels +
                                          relay_channels + stepper_channels + bldc_channels +
                                          dac_channels;
   static std::optional<std::size_t> index_of(const Command& command);
-  static std::optional<Command> stop_of(std::size_t index, const State& state);
+  std::optional<Command> stop_of(std::size_t index, Time now) const;
 
   const Duration deadline_;
   std::uint64_t sent_ = 0;
   std::array<Output, outputs> outputs_{};
+  std::array<Position, stepper_channels> positions_{};
 };
 
 }  // namespace r4::tool::ros2
