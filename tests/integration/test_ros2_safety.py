@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """r4 ros2, where what ROS says is lost, overtaken, or of a kind that nobody could take back."""
 import contextlib
+import signal
 
 import pytest
 
@@ -58,11 +59,46 @@ def test_an_arm_that_was_written_before_a_stop_does_not_undo_it(_):
         ros2.armed()
 
 
+def test_an_arm_of_an_outage_does_not_arm_when_the_link_is_back():
+    with armed() as (board, ros2, peer):
+        join(ros2, peer, 'arm', BOOL)
+        join(ros2, peer, 'R4_Command', STRING)
+
+        def arm():
+            peer.write('rt/arm', OFF)
+            peer.write('rt/arm', ON)
+        peer.write('rt/R4_Command', text('E:STOP'))
+        ros2.logged('E:STOP: confirmed')
+        board.signal(signal.SIGSTOP)
+        again(arm, lambda timeout: ros2.logged('silent', timeout=timeout))
+        ros2.logged('arm: ')
+        arm()
+        again(lambda: peer.write('rt/R4_Command', text('E:CLEAR')),
+              lambda timeout: ros2.logged('E:CLEAR: ', timeout=timeout))
+        board.signal(signal.SIGCONT)
+        ros2.logged('the board takes commands')
+        again(lambda: peer.write('rt/R4_Command', text('O:358,1,1')),
+              lambda timeout: ros2.logged('not armed (stop)', timeout=timeout))
+        arm()
+        ros2.armed()
+
+
 def test_a_stepper_whose_place_is_not_told_is_not_driven():
     with armed('--fields', 'DEFAULT') as (_, ros2, peer):
         join(ros2, peer, 'stepper2/command', INT32)
         again(lambda: peer.write('rt/stepper2/command', (1000).to_bytes(4, 'little')),
               lambda timeout: ros2.logged('nobody could stop it; add STEP2POS to --fields', timeout=timeout))
+
+
+def test_nobody_has_the_board_tell_no_more_where_a_driven_stepper_is():
+    with armed('--fields', 'DEFAULT,STEP2POS') as (board, ros2, peer):
+        join(ros2, peer, 'stepper2/command', INT32)
+        join(ros2, peer, 'R4_Command', STRING)
+        drive(board, peer, 'rt/stepper2/command', (100_000).to_bytes(4, 'little'), lambda each: each['stepper'][1][1])
+        again(lambda: peer.write('rt/R4_Command', text('F:AIN24')),
+              lambda timeout: ros2.logged('fields are not chosen from a topic', timeout=timeout))
+        peer.say('remove', 'rt/stepper2/command')
+        board.outputs(lambda each: not each['stepper'][1][1])
 
 
 def test_a_voltage_is_off_when_its_publisher_is_gone():

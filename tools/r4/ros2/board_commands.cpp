@@ -48,6 +48,9 @@ BoardCommands::BoardCommands(AsyncBoard& board, Graph& graph, std::size_t node, 
     wanted_.clear();
     drivers_.forget();
   });
+  board_.on_link([this](const LinkStatus& link) {
+    if (arming_ && !link.in_control) give_up_arming_.emit(asio::cancellation_type::terminal);
+  });
   board_.on_refused([this](const RefusedPost& refused) {
     const std::string what = shown(refused.command);
     warn(refused.code == Refusal::none
@@ -147,7 +150,7 @@ void BoardCommands::on_text(const std::string& text, const void* source, const O
       if (is_overtaken(origin)) {
         warn("E:CLEAR: a stop came after it; send it again when the danger is over");
       } else {
-        clear([](bool, const std::string&) {});
+        clear(origin, [](bool, const std::string&) {});
       }
     } else if (others_ < most_others) {
       ++others_;

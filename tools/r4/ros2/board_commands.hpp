@@ -3,9 +3,11 @@
 //
 // All of it runs on the loop of the boards. What drives an output is gathered until the inbox is drained, the
 // newest of a channel, and leaves in as few datagrams as there can be. A sample older than 250 ms is dropped, as is
-// what comes while there is no link: nothing is kept for later. A stop is never too old.
+// what comes while there is no link: nothing is kept for later, and an arm() that is under way ends when the link
+// does. A stop is never too old.
 #pragma once
 
+#include <asio/cancellation_signal.hpp>
 #include <asio/io_context.hpp>
 #include <chrono>
 #include <cstdint>
@@ -87,8 +89,12 @@ class BoardCommands {
   void post_wanted();
   void post(std::size_t first, std::size_t count);
   void tell(const std::string& what, PostResult result);
+  // Is there no link for it? Then that is said: nothing is kept for later.
+  bool is_without_link(const std::string& what, const Done& done) const;
+  // How long it may still be on its way.
+  static AsyncBoard::Duration left_of(const Origin& origin);
   void stop(Done done);
-  void clear(Done done);
+  void clear(const Origin& origin, Done done);
   void send(const std::optional<std::string>& text, const void* source, const Origin& origin,
             const Done& done);
 
@@ -101,6 +107,7 @@ class BoardCommands {
   std::size_t others_ = 0;  // commands since the last flush() that drive nothing
   bool resting_ = false;    // what nobody drives is on its way to rest
   bool arming_ = false;
+  asio::cancellation_signal give_up_arming_;
   std::vector<Done> stops_;          // who waits for the stop that is under way
   Clock::time_point stopped_{};      // the newest stop: what was written before does not undo it
   std::set<std::uint64_t> pressed_;  // publishers of `arm` whose newest message is true

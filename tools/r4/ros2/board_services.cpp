@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <asio/bind_cancellation_slot.hpp>
 #include <utility>
 
 #include "board_commands.hpp"
@@ -15,7 +16,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto patience = 3000ms;
+constexpr auto arm_patience = 3000ms;  // for its steps
 constexpr auto stop_patience = 5000ms;
 constexpr const char* overtaken = ": a stop came after it; ask again when the danger is over";
 
@@ -24,6 +25,8 @@ std::function<void(const CommandResult&)> in_words(const AsyncBoard& board, std:
   return [&board, what = std::move(what), done = std::move(done)](const CommandResult& result) {
     if (result.outcome == Outcome::confirmed) {
       done(true, fmt::format("{}: confirmed by the board", what));
+    } else if (result.outcome == Outcome::cancelled && !board.in_control()) {
+      done(false, explain(what, board.link()).text());
     } else {
       done(false, explain(what, result, board.link()).text());
     }
@@ -97,20 +100,16 @@ void BoardCommands::serve(const Room& room, std::string name, const char* type, 
 
 void BoardCommands::serve_all(Graph& graph, std::size_t node, Inbox& inbox) {
   const Room room{graph, node, inbox};
-  const auto serve_trigger = [&](const char* name, void (BoardCommands::*act)(Done)) {
-    serve<TriggerRequest, TriggerResponse>(
-        room, name, "std_srvs/srv/Trigger",
-        [this, name, act](const auto&, const Origin& origin, const Done& done) {
-          if (act != &BoardCommands::stop && is_overtaken(origin)) {
-            return done(false, std::string(name) + overtaken);
-          }
-          (this->*act)(done);
-        },
-        {});
+  const auto serve_trigger = [&](const char* name, Act act) {
+    serve<TriggerRequest, TriggerResponse>(room, name, "std_srvs/srv/Trigger", std::move(act), {});
   };
-  serve_trigger("~/stop", &BoardCommands::stop);
-  serve_trigger("~/clear", &BoardCommands::clear);
-  serve_trigger("~/arm", &BoardCommands::arm);
+  serve_trigger("~/stop", [this](const auto&, const Origin&, const Done& done) { stop(done); });
+  serve_trigger("~/clear", [this](const auto&, const Origin& origin, const Done& done) {
+    is_overtaken(origin) ? done(false, std::string("~/clear") + overtaken) : clear(origin, done);
+  });
+  serve_trigger("~/arm", [this](const auto&, const Origin& origin, const Done& done) {
+    is_overtaken(origin) ? done(false, std::string("~/arm") + overtaken) : arm(done);
+  });
   const void* const source = sources_.emplace_back(std::make_unique<int>()).get();
   serve<AddDiagnosticsRequest, AddDiagnosticsResponse>(
       room, "~/send", "diagnostic_msgs/srv/AddDiagnostics",
@@ -134,23 +133,42 @@ void BoardCommands::stop(Done done) {
                     }));
 }
 
-void BoardCommands::clear(Done done) {
-  board_.async_send(Command::clear(), patience, in_words(board_, "E:CLEAR", std::move(done)));
+bool BoardCommands::is_without_link(const std::string& what, const Done& done) const {
+  const LinkStatus& link = board_.link();
+  if (link.in_control) return false;
+  const std::string text = explain(what, link).text();
+  warn(text);
+  done(false, text);
+  return true;
+}
+
+AsyncBoard::Duration BoardCommands::left_of(const Origin& origin) {
+  const auto age = std::chrono::ceil<std::chrono::milliseconds>(Clock::now() - origin.written);
+  return std::max<AsyncBoard::Duration>(oldest - age, 1ms);
+}
+
+void BoardCommands::clear(const Origin& origin, Done done) {
+  if (is_without_link("E:CLEAR", done)) return;
+  board_.async_send(Command::clear(), left_of(origin),
+                    in_words(board_, "E:CLEAR", std::move(done)));
 }
 
 void BoardCommands::arm(Done done) {
+  if (is_without_link("arm", done)) return;
   if (arming_) {
     done(false, "arm: it is being armed already");
     return;
   }
   arming_ = true;
-  board_.async_arm(
-      patience,
-      in_words(board_, "arm", [this, done = std::move(done)](bool armed, const std::string& text) {
-        arming_ = false;
-        if (!armed) warn(text);
-        done(armed, text);
-      }));
+  board_.async_arm(arm_patience,
+                   asio::bind_cancellation_slot(give_up_arming_.slot(),
+                                                in_words(board_, "arm",
+                                                         [this, done = std::move(done)](
+                                                             bool armed, const std::string& text) {
+                                                           arming_ = false;
+                                                           if (!armed) warn(text);
+                                                           done(armed, text);
+                                                         })));
 }
 
 void BoardCommands::send(const std::optional<std::string>& text, const void* source,
@@ -173,13 +191,12 @@ void BoardCommands::send(const std::optional<std::string>& text, const void* sou
   try {
     const std::vector<Command> commands = commands_of(*text);
     // It is repeated until it is too old to be executed.
-    const auto age = std::chrono::ceil<std::chrono::milliseconds>(Clock::now() - origin.written);
-    const auto left = std::max<AsyncBoard::Duration>(oldest - age, 1ms);
+    const auto left = left_of(origin);
     if (commands.size() == 1 && !joins_groups(commands[0].kind)) {
       if (commands[0].kind == CommandKind::clear && is_overtaken(origin)) {
         done(false, *text + overtaken);
       } else if (commands[0].kind == CommandKind::clear) {
-        clear(done);
+        clear(origin, done);
       } else {
         board_.async_send(commands[0], left, in_words(board_, *text, done));
       }

@@ -32,6 +32,9 @@ void require_allowed(std::string_view text, const Command& command) {
     case CommandKind::setting:
       throw Error(ErrorKind::usage, shown(text), "settings are not taken from a topic",
                   "r4 send URL " + shown(text) + " sets it");
+    case CommandKind::fields:  // a stepper whose position is not told cannot be stopped
+      throw Error(ErrorKind::usage, shown(text), "fields are not chosen from a topic",
+                  "name them by --fields");
     case CommandKind::heartbeat:
     case CommandKind::leave:
     case CommandKind::watch:

@@ -20,7 +20,7 @@ std::optional<std::string> text_of(const dds_sequence_octet& string);
 bool asks_to_stop(std::string_view text);
 
 // Its commands, all of them right; their texts are views of `text`. Throws Error{usage} naming the first that is wrong
-// or that cannot come from a topic: settings, heartbeats and farewells.
+// or that cannot come from a topic: settings, choices of fields, heartbeats and farewells.
 std::vector<Command> commands_of(std::string_view text);
 
 }  // namespace r4::tool::ros2
