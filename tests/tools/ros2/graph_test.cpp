@@ -2,6 +2,7 @@
 // What of the graph needs no DDS: names, environment, releases, delays, the outbox.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <future>
 #include <map>
 
@@ -127,6 +128,25 @@ TEST(Ros2Outbox, LosesTheOldestAndWaitsForNobody) {
   go_on.set_value();
   end.get_future().wait();
   EXPECT_EQ(done, "bc");
+}
+
+TEST(Ros2Outbox, TriesAgainForAWhileWhileTheOthersGoOn) {
+  Outbox outbox;
+  std::promise<int> given_up;
+  std::atomic<int> tries{0};
+  std::atomic<int> jobs{0};
+  outbox.push_attempt([&](bool last) {
+    ++tries;
+    outbox.push([&] { ++jobs; });
+    if (last) given_up.set_value(jobs);
+    return last;
+  });
+  EXPECT_GE(given_up.get_future().get(), 1) << "between two tries";
+  outbox.push_attempt([&](bool) { return ++tries > 0; });
+  std::promise<void> end;
+  outbox.push([&] { end.set_value(); });
+  end.get_future().wait();
+  EXPECT_EQ(tries, jobs + 1) << "who has succeeded is not tried again";
 }
 
 }  // namespace

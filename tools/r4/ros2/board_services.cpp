@@ -44,21 +44,20 @@ Request request_of(const AddDiagnosticsRequest& request) {
   return {request.client, request.number, text_of(request.load_namespace)};
 }
 
+// The reader of a client that has just come may not be known yet. False: it is not, and nothing was written.
 template <class Response>
-void answer(dds_entity_t replies, const Request& request, bool done, const std::string& text) {
+bool answer(dds_entity_t replies, const Request& request, bool done, const std::string& text,
+            bool last) {
+  dds_publication_matched_status_t matched{};
+  (void)dds_get_publication_matched_status(replies, &matched);
+  if (matched.current_count == 0 && !last) return false;
   Response response{};
   response.client = request.client;
   response.number = request.number;
   response.success = done;
   response.message = borrowed(text);
-  // The reader of a client that has just come may not be known yet.
-  dds_publication_matched_status_t matched{};
-  for (int i = 0; i < 20; ++i) {
-    (void)dds_get_publication_matched_status(replies, &matched);
-    if (matched.current_count != 0) break;
-    dds_sleepfor(DDS_MSECS(5));
-  }
   (void)dds_write(replies, &response);
+  return true;
 }
 
 }  // namespace
@@ -82,8 +81,8 @@ void BoardCommands::serve(const Room& room, std::string name, const char* type, 
           [this, name, urgent, act = std::move(act), replies = service.replies](
               const Request& request, const Origin& origin) {
             const Done done = [this, replies, request](bool confirmed, const std::string& text) {
-              outbox_.push([replies, request, confirmed, text] {
-                answer<Response>(replies, request, confirmed, text);
+              outbox_.push_attempt([replies, request, confirmed, text](bool last) {
+                return answer<Response>(replies, request, confirmed, text, last);
               });
             };
             if (!urgent(request) && is_stale(origin)) {
