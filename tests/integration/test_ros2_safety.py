@@ -2,10 +2,11 @@
 """r4 ros2, where what ROS says is lost, overtaken, or of a kind that nobody could take back."""
 import contextlib
 import signal
+import struct
 
 import pytest
 
-from r4_process import Board
+from r4_process import SANITIZED, Board
 from ros2_peer import BOOL, FLOAT32, INT32, STRING, Peer, Ros2, again, drive, float32, join, own_domain, pwm, text
 
 ON, OFF = b'\x01', b'\x00'
@@ -99,6 +100,36 @@ def test_nobody_has_the_board_tell_no_more_where_a_driven_stepper_is():
               lambda timeout: ros2.logged('fields are not chosen from a topic', timeout=timeout))
         peer.say('remove', 'rt/stepper2/command')
         board.outputs(lambda each: not each['stepper'][1][1])
+
+
+def test_beside_a_command_that_is_objected_to_none_is_executed():
+    with armed('--fields', 'DEFAULT') as (board, ros2, peer):
+        join(ros2, peer, 'R4_Command', STRING)
+        again(lambda: peer.write('rt/R4_Command', text('O:358,1,1;P:1,1000,2')),
+              lambda timeout: ros2.logged('nobody could stop it', timeout=timeout))
+        drive(board, peer, 'rt/R4_Command', text('O:77,1,2'), lambda each: pwm(each, 2) == 77)
+        assert not any(pwm(each['outputs'], 1) for each in board.log if 'outputs' in each)
+
+
+def test_what_is_too_much_at_once_is_not_left_out_without_a_word():
+    with armed() as (_, ros2, peer):
+        join(ros2, peer, 'R4_Command', STRING)
+        again(lambda: peer.write('rt/R4_Command', text('Q:ID;' * 4 + 'X:SCAN')),
+              lambda timeout: ros2.logged('more than 4 at once that drive no output (X:SCAN)', timeout=timeout))
+
+
+def test_a_client_that_reads_no_answers_starves_no_topic():
+    with armed() as (board, ros2, peer):
+        peer.read('rt/R4', STRING)
+        peer.writer('rq/r4/sendRequest', 'diagnostic_msgs::srv::dds_::AddDiagnostics_Request_')
+        ros2.logged('~/send: 1 publishers')
+        request = struct.pack('<Qq', 1, 1) + text('C:timeout,1000')  # answered at once
+        peer.sample('rt/R4')
+        came = [peer.sample('rt/R4').came]
+        for _ in range(20):
+            peer.write('rq/r4/sendRequest', request)
+            came += [peer.sample('rt/R4').came for _ in range(5)]
+        assert SANITIZED or sorted(b - a for a, b in zip(came, came[1:]))[-10] < 0.05
 
 
 def test_a_voltage_is_off_when_its_publisher_is_gone():

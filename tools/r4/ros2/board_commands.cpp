@@ -144,6 +144,12 @@ void BoardCommands::on_text(const std::string& text, const void* source, const O
     return;
   }
   for (const Command& command : commands) {
+    if (const std::string objection = objection_to(command); !objection.empty()) {
+      warn(objection);
+      return;
+    }
+  }
+  for (const Command& command : commands) {
     if (joins_groups(command.kind)) {
       want(command, source, origin);
     } else if (command.kind == CommandKind::clear) {
@@ -156,6 +162,9 @@ void BoardCommands::on_text(const std::string& text, const void* source, const O
       ++others_;
       post_wanted();  // a transfer goes alone, behind what came before it
       if (const PostResult result = board_.post(command); !result) tell(shown(command), result);
+    } else {
+      warn(fmt::format("a command was dropped: more than {} at once that drive no output ({})",
+                       most_others, shown(command)));
     }
   }
 }
