@@ -26,6 +26,7 @@ TEST(Ros2Environment, StaysOnThisComputerUnlessItIsTold) {
   const Domain usual = with_variables({});
   EXPECT_EQ(usual.id, 0U);
   EXPECT_EQ(usual.reach, "this computer");
+  EXPECT_TRUE(usual.one_computer);
   EXPECT_NE(usual.configuration.find("name=\"lo\""), std::string::npos);
   EXPECT_EQ(
       with_variables({{"ROS_LOCALHOST_ONLY", "1"}, {"ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET"}})
@@ -36,6 +37,7 @@ TEST(Ros2Environment, StaysOnThisComputerUnlessItIsTold) {
   for (const auto& each : {with_variables({{"ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET"}}),
                            with_variables({{"ROS_LOCALHOST_ONLY", "0"}})}) {
     EXPECT_EQ(each.reach, "the network");
+    EXPECT_FALSE(each.one_computer);
     EXPECT_EQ(each.configuration.find("name=\"lo\""), std::string::npos);
   }
   EXPECT_EQ(with_variables({{"ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF"}}).reach, "nobody");
@@ -44,6 +46,7 @@ TEST(Ros2Environment, StaysOnThisComputerUnlessItIsTold) {
 TEST(Ros2Environment, TakesPeersADomainAndCyclonesOwnConfiguration) {
   const Domain peers = with_variables({{"ROS_STATIC_PEERS", "10.0.0.7;robot.local;"}});
   EXPECT_EQ(peers.reach, "this computer and 10.0.0.7, robot.local");
+  EXPECT_FALSE(peers.one_computer);
   EXPECT_NE(peers.configuration.find("Address=\"127.0.0.1\"/><Peer Address=\"10.0.0.7\"/><Peer "
                                      "Address=\"robot.local\"/>"),
             std::string::npos);
@@ -85,7 +88,7 @@ TEST(Ros2Releases, ChangedTheirIdsWithIron) {
 }
 
 TEST(Ros2Transit, IsJudgedByTheFastestWhateverTheClocksSay) {
-  Transit transit;
+  Transit transit(Transit::Clocks::two);
   constexpr auto skew = 1h;
   const auto delay = [&](auto written, auto under_way) {
     return transit.delay(written, written + skew + under_way);
@@ -97,8 +100,17 @@ TEST(Ros2Transit, IsJudgedByTheFastestWhateverTheClocksSay) {
   EXPECT_LT(delay(50s, 5ms), 10ms);
 }
 
+TEST(Ros2Transit, IsKnownOfTheFirstSampleWhereThereIsOneClock) {
+  Transit transit(Transit::Clocks::one);
+  for (int i = 0; i < 200; ++i) {
+    const auto now = 100s + i * 100ms;
+    EXPECT_EQ(transit.delay(now - 300ms, now), 300ms) << i;
+  }
+  EXPECT_EQ(transit.delay(500s, 90s), 0s) << "it was set back meanwhile";
+}
+
 TEST(Ros2Transit, BelievesInAClockThatIsSetAfterTenSeconds) {
-  Transit transit;
+  Transit transit(Transit::Clocks::two);
   EXPECT_EQ(transit.delay(100s, 100s), 0s);
   for (int i = 1; i < 100; ++i) {
     const auto now = 100s + i * 100ms;

@@ -121,6 +121,7 @@ class Bridge {
         domain_(domain_of(process_environment)),
         graph_(domain_),
         inbox_(io_, graph_.participant(),
+               domain_.one_computer ? Transit::Clocks::one : Transit::Clocks::two,
                [this] {
                  for (const auto& node : nodes_) node->flush();
                }),

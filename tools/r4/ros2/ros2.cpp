@@ -45,7 +45,8 @@ void add_ros2(CLI::App& root, Action& chosen) {
   add_text(*command, "--namespace", options->space, "its namespace (default /)", "NAME");
   add_flag(*command, "--arm", options->arm, "arm as soon as the board is there, once");
   add_seconds(*command, "--deadline", options->deadline,
-              "of a publisher that drives (default 1); 0: none", Zero::allowed);
+              "of a publisher that drives (default 1, as the board's timeout); 0: none",
+              Zero::allowed);
   add_text(*command, "--drive", options->drive, "the two motor channels of cmd_vel, left and right",
            "LEFT,RIGHT");
   add_text(*command, "--wheel-separation", options->separation, "metres between the two wheels",

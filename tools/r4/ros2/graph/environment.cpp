@@ -110,6 +110,7 @@ Domain domain_of(const Environment& environment) {
     case Range::localhost:
       if (peers.empty()) {
         domain.reach = "this computer";
+        domain.one_computer = true;
         domain.configuration = configuration(
             R"(<Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces><AllowMulticast>spdp</AllowMulticast>)",
             {"127.0.0.1"});

@@ -20,6 +20,7 @@ struct Domain {
   std::string
       configuration;  // Cyclone's, as XML; empty: what it finds in CYCLONEDDS_URI, or its own
   std::string reach;  // in words, "this computer"
+  bool one_computer = false;  // nobody else's can be in it
 };
 
 // The value of a variable; empty where it is not set.

@@ -13,9 +13,11 @@ constexpr std::size_t most_publishers = 256;  // of one topic, that are told apa
 
 }  // namespace
 
-Inbox::Inbox(asio::io_context& io, dds_entity_t participant, std::function<void()> on_drained)
+Inbox::Inbox(asio::io_context& io, dds_entity_t participant, Transit::Clocks clocks,
+             std::function<void()> on_drained)
     : io_(io),
       participant_(participant),
+      clocks_(clocks),
       on_drained_(std::move(on_drained)),
       waitset_(dds_create_waitset(participant), "the reading thread"),
       end_(dds_create_guardcondition(participant), "the reading thread"),
@@ -68,7 +70,7 @@ void Inbox::run() {
 Origin Inbox::origin_of(Source& source, const dds_sample_info_t& info) const {
   const auto now = std::chrono::nanoseconds(dds_time());
   if (source.transits.size() > most_publishers) source.transits.clear();
-  Transit& transit = source.transits[info.publication_handle];
+  Transit& transit = source.transits.try_emplace(info.publication_handle, clocks_).first->second;
   const auto delay = transit.delay(std::chrono::nanoseconds(info.source_timestamp), now);
   return {info.publication_handle,
           Clock::now() - std::chrono::duration_cast<Clock::duration>(delay)};

@@ -39,8 +39,9 @@ struct Origin {
 
 class Inbox {
  public:
-  // `on_drained`: called on the loop when it has taken what there was.
-  Inbox(asio::io_context& io, dds_entity_t participant, std::function<void()> on_drained);
+  // `clocks`: ours and that of who writes. `on_drained`: called on the loop when it has taken what there was.
+  Inbox(asio::io_context& io, dds_entity_t participant, Transit::Clocks clocks,
+        std::function<void()> on_drained);
   ~Inbox() { stop(); }
   Inbox(const Inbox&) = delete;
   Inbox& operator=(const Inbox&) = delete;
@@ -107,6 +108,7 @@ class Inbox {
 
   asio::io_context& io_;
   const dds_entity_t participant_;
+  const Transit::Clocks clocks_;
   const std::function<void()> on_drained_;
   Entity waitset_;
   Entity end_;
