@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Somebody else in a ROS 2 graph: ros2_peer (ros2_peer.cpp) on Fast DDS, and CDR by hand."""
+import contextlib
 import itertools
 import json
 import os
@@ -9,7 +10,7 @@ import subprocess
 import threading
 import time
 
-from r4_process import PATIENCE_S, R4, Running
+from r4_process import PATIENCE_S, R4, Board, Running
 
 PROGRAM = os.path.join(os.path.dirname(R4), 'tests', 'ros2_peer')
 # Of ROS; each graph has its own, for who was killed stays in the old one for a while.
@@ -20,6 +21,7 @@ ENVIRONMENT = {name: value for name, value in os.environ.items()
 STRING, BOOL, FLOAT32, INT32, UINT32, TWIST = (f'{package}::msg::dds_::{name}_' for package, name in (
     ('std_msgs', 'String'), ('std_msgs', 'Bool'), ('std_msgs', 'Float32'), ('std_msgs', 'Int32'), ('std_msgs', 'UInt32'),
     ('geometry_msgs', 'Twist')))
+DIAGNOSTICS = 'diagnostic_msgs::msg::dds_::DiagnosticArray_'
 NODES = 'rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_'
 NODES_HASH = 'typehash=RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e;'
 HEAD = bytes((0, 1, 0, 0))  # little-endian XCDR1
@@ -35,6 +37,7 @@ class Ros2(Running):
 
     def __init__(self, domain, *arguments):
         super().__init__('ros2', '--json', *arguments, env=domain)
+        self.domain = domain
         self.ready = self.next(lambda each: each['type'] == 'ready')
 
     def armed(self):
@@ -132,6 +135,18 @@ class Peer:
         self.process.stdout.close()
 
 
+@contextlib.contextmanager
+def armed(*arguments, options=()):
+    """A board, its node, armed, and a peer."""
+    domain = own_domain()
+    with Board('udp://127.0.0.1:0', options=options) as board, Peer(domain) as peer:
+        with Ros2(domain, board.host_url, '--arm', *arguments) as ros2:
+            ros2.armed()
+            yield board, ros2, peer
+            assert ros2.end() == 0, ros2.errors
+            peer.end()
+
+
 def join(ros2, peer, topic, of):
     """A publisher of the peer, known at both ends: what is written now is read."""
     peer.writer(f'rt/{topic}', of)
@@ -216,6 +231,15 @@ def float32(value):
 
 def twist(linear, angular):
     return struct.pack('<6d', linear, 0, 0, 0, 0, angular)
+
+
+def health_of(payload):
+    """(level, name, message, hardware id, values) of the one that is told of in /diagnostics."""
+    cdr = Cdr(payload)
+    cdr.header()
+    assert cdr.take('I') == 1
+    level, name, message, hardware = cdr.take('B'), cdr.text(), cdr.text(), cdr.text()
+    return level, name, message, hardware, dict((cdr.text(), cdr.text()) for _ in range(cdr.take('I')))
 
 
 def nodes_of(payload, gid_size):

@@ -13,13 +13,12 @@ import types
 import pytest
 
 from r4_process import ERROR, PATIENCE_S, SANITIZED, Board, lasts, run
-from ros2_peer import (BOOL, FLOAT32, INT32, NODES, NODES_HASH, STRING, TWIST, UINT32, Cdr, Peer, Ros2, again, drive,
-                       float32, join, nodes_of, own_domain, pwm, text, texts, twist)
+from ros2_peer import (BOOL, DIAGNOSTICS, FLOAT32, INT32, NODES, NODES_HASH, STRING, TWIST, UINT32, Cdr, Peer, Ros2,
+                       again, drive, float32, health_of, join, nodes_of, own_domain, pwm, text, texts, twist)
 
 USAGE = 2
 ON, OFF = b'\x01', b'\x00'
 LOG = 'rcl_interfaces::msg::dds_::Log_'
-DIAGNOSTICS = 'diagnostic_msgs::msg::dds_::DiagnosticArray_'
 REQUEST, RESPONSE = 'std_srvs::srv::dds_::Trigger_Request_', 'std_srvs::srv::dds_::Trigger_Response_'
 SEND, SENT = (f'diagnostic_msgs::srv::dds_::AddDiagnostics_{half}_' for half in ('Request', 'Response'))
 
@@ -142,11 +141,7 @@ def test_sensors(graph):
 def test_diagnostics(graph):
     _, _, peer = graph
     peer.read('rt/diagnostics', DIAGNOSTICS)
-    cdr = Cdr(peer.sample('rt/diagnostics'))
-    cdr.header()
-    assert cdr.take('I') == 1
-    level, name, message, hardware = cdr.take('B'), cdr.text(), cdr.text(), cdr.text()
-    values = dict((cdr.text(), cdr.text()) for _ in range(cdr.take('I')))
+    level, name, message, hardware, values = health_of(peer.sample('rt/diagnostics'))
     assert (level, name, message, hardware) == (0, '/r4: board', 'armed', 'sim-1')
     assert values['link'] == 'active' and float(values['state rate (Hz)']) > 0 and values['firmware']
 

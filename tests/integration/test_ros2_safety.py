@@ -1,27 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """r4 ros2, where what ROS says is lost, overtaken, or of a kind that nobody could take back."""
-import contextlib
 import signal
 import struct
 
 import pytest
 
-from r4_process import SANITIZED, Board
-from ros2_peer import BOOL, FLOAT32, INT32, STRING, Peer, Ros2, again, drive, float32, join, own_domain, pwm, text
+from r4_process import SANITIZED
+from ros2_peer import BOOL, FLOAT32, INT32, STRING, again, armed, drive, float32, join, pwm, text
 
 ON, OFF = b'\x01', b'\x00'
-
-
-@contextlib.contextmanager
-def armed(*arguments, options=()):
-    """A board, its node, armed, and a peer."""
-    domain = own_domain()
-    with Board('udp://127.0.0.1:0', options=options) as board, Peer(domain) as peer:
-        with Ros2(domain, board.host_url, '--arm', *arguments) as ros2:
-            ros2.armed()
-            yield board, ros2, peer
-            assert ros2.end() == 0, ros2.errors
-            peer.end()
 
 
 def test_a_setpoint_that_rests_gets_there_though_it_is_said_once_and_lost():
