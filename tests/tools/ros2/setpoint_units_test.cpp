@@ -69,21 +69,24 @@ TEST(Ros2Units, ATwistDrivesTwoWheelsAndKeepsTheirRatio) {
   }
 }
 
-dds_sequence_octet bytes_of(std::string& text) {
-  dds_sequence_octet bytes{};
-  bytes._length = static_cast<std::uint32_t>(text.size());
-  bytes._buffer = reinterpret_cast<std::uint8_t*>(text.data());
-  return bytes;
+TEST(Ros2CommandText, AStringEndsWithTheOnlyNulInIt) {
+  EXPECT_EQ(text_of(std::string_view("O:1,1,1\0", 8)), "O:1,1,1");
+  EXPECT_EQ(text_of(std::string_view("\0", 1)), "");
+  for (const std::string& bad : {std::string(), std::string("O:1,1,1"),
+                                 std::string("E:STOP\0x\0", 9), std::string(2000, 'x') + '\0'}) {
+    EXPECT_FALSE(text_of(std::string_view(bad))) << bad;
+  }
 }
 
-TEST(Ros2CommandText, AStringEndsWithTheOnlyNulInIt) {
-  std::string good("O:1,1,1\0", 8);
-  EXPECT_EQ(text_of(bytes_of(good)), "O:1,1,1");
-  std::string empty("\0", 1);
-  EXPECT_EQ(text_of(bytes_of(empty)), "");
-  for (std::string bad : {std::string(), std::string("O:1,1,1"), std::string("E:STOP\0x\0", 9),
-                          std::string(2000, 'x') + '\0'}) {
-    EXPECT_FALSE(text_of(bytes_of(bad))) << bad;
+TEST(Ros2CommandText, OfWhatIsNoTextNothingIsRepeated) {
+  for (const char* wrong : {"O:\xff", "O:1,1,1;\xc3", "\x01"}) {
+    try {
+      (void)commands_of(wrong);
+      ADD_FAILURE() << wrong;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.problem().text(),
+                "a command: has characters that no command has; write it in ASCII");
+    }
   }
 }
 
@@ -94,10 +97,10 @@ TEST(Ros2CommandText, SeveralCommandsStandBesideEachOther) {
   EXPECT_EQ(text_of(commands[1]), "S:1500,2");
   EXPECT_TRUE(commands_of(" ; ").empty());
   for (const char* wrong :
-       {"O:358,1,1;X", "C:timeout,9000", "H:ROS2-R4", "E:LEAVE", "W:100", "O:358,1,9"}) {
+       {"O:358,1,1;X", "C:timeout,9000", "H:ROS2-R4", "E:LEAVE", "W:100", "F:AIN24", "O:358,1,9"}) {
     EXPECT_THROW(commands_of(wrong), Error) << wrong;
   }
-  EXPECT_TRUE(asks_to_stop("nonsense; E:STOP ;O:1,1,1"));
+  EXPECT_TRUE(asks_to_stop("nonsense\xff; E:STOP ;O:1,1,1"));
   EXPECT_FALSE(asks_to_stop("E:STOPPED;E:CLEAR"));
 }
 

@@ -119,7 +119,7 @@ void BoardCommands::subscribe_text(Graph& graph, std::size_t node, Inbox& inbox)
   inbox.add<StringMessage, std::string>({
       .reader = graph.subscribe<StringMessage>(node, "R4_Command", qos),
       .room = most_texts,
-      .read = [](const StringMessage& message) { return text_of(message.data); },
+      .read = [](const StringMessage& message) { return text_of(bytes_of(message.data)); },
       .urgent = [](const std::string& text) { return asks_to_stop(text); },
       .take = [this, source](const std::string& text,
                              const Origin& origin) { on_text(text, source, origin); },

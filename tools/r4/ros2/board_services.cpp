@@ -41,7 +41,7 @@ struct Request {
 };
 Request request_of(const TriggerRequest& request) { return {request.client, request.number, {}}; }
 Request request_of(const AddDiagnosticsRequest& request) {
-  return {request.client, request.number, text_of(request.load_namespace)};
+  return {request.client, request.number, text_of(bytes_of(request.load_namespace))};
 }
 
 // The reader of a client that has just come may not be known yet. False: it is not, and nothing was written.
@@ -104,10 +104,12 @@ void BoardCommands::serve_all(Graph& graph, std::size_t node, Inbox& inbox) {
   };
   serve_trigger("~/stop", [this](const auto&, const Origin&, const Done& done) { stop(done); });
   serve_trigger("~/clear", [this](const auto&, const Origin& origin, const Done& done) {
-    is_overtaken(origin) ? done(false, std::string("~/clear") + overtaken) : clear(origin, done);
+    if (is_overtaken(origin)) return done(false, std::string("~/clear") + overtaken);
+    clear(origin, done);
   });
   serve_trigger("~/arm", [this](const auto&, const Origin& origin, const Done& done) {
-    is_overtaken(origin) ? done(false, std::string("~/arm") + overtaken) : arm(done);
+    if (is_overtaken(origin)) return done(false, std::string("~/arm") + overtaken);
+    arm(done);
   });
   const void* const source = sources_.emplace_back(std::make_unique<int>()).get();
   serve<AddDiagnosticsRequest, AddDiagnosticsResponse>(
@@ -181,14 +183,14 @@ void BoardCommands::send(const std::optional<std::string>& text, const void* sou
     stop(done);
     return;
   }
-  const LinkStatus& link = board_.link();
-  if (!link.in_control) {  // nothing is kept for later
-    done(false, explain(*text, link).text());
-    return;
-  }
-  post_wanted();  // what came before goes before
   try {
     const std::vector<Command> commands = commands_of(*text);
+    const LinkStatus& link = board_.link();
+    if (!link.in_control) {  // nothing is kept for later
+      done(false, explain(*text, link).text());
+      return;
+    }
+    post_wanted();  // what came before goes before
     // It is repeated until it is too old to be executed.
     const auto left = left_of(origin);
     if (commands.size() == 1 && !joins_groups(commands[0].kind)) {

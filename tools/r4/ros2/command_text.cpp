@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "command_text.hpp"
 
-#include <cstring>
+#include <algorithm>
 
 #include "host/commands/command_help.hpp"
 #include "r4link/datagram.hpp"
@@ -11,6 +11,8 @@ namespace r4::tool::ros2 {
 namespace {
 
 constexpr std::string_view blank = " \t\r\n";
+
+bool is_ascii(char c) { return (c >= ' ' && c <= '~') || blank.find(c) != std::string_view::npos; }
 
 // Calls part(text) for each that is not empty.
 template <class Part>
@@ -46,14 +48,11 @@ void require_allowed(std::string_view text, const Command& command) {
 
 }  // namespace
 
-std::optional<std::string> text_of(const dds_sequence_octet& string) {
-  const std::uint32_t length = string._length;
-  if (length == 0 || length > max_datagram || string._buffer[length - 1] != 0) {
-    return std::nullopt;
-  }
-  const auto* const bytes = reinterpret_cast<const char*>(string._buffer);
-  if (std::memchr(bytes, 0, length - 1) != nullptr) return std::nullopt;
-  return std::string(bytes, length - 1);
+std::optional<std::string> text_of(std::string_view bytes) {
+  if (bytes.empty() || bytes.size() > max_datagram) return std::nullopt;
+  if (bytes.find('\0') != bytes.size() - 1) return std::nullopt;
+  bytes.remove_suffix(1);
+  return std::string(bytes);
 }
 
 bool asks_to_stop(std::string_view text) {
@@ -63,6 +62,10 @@ bool asks_to_stop(std::string_view text) {
 }
 
 std::vector<Command> commands_of(std::string_view text) {
+  if (!std::all_of(text.begin(), text.end(), is_ascii)) {  // nobody who reads /rosout would read on
+    throw Error(ErrorKind::usage, "a command", "has characters that no command has",
+                "write it in ASCII");
+  }
   std::vector<Command> commands;
   each_part(text, [&commands](std::string_view part) {
     const Command command = parse_command_text(part);

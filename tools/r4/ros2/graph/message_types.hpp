@@ -6,6 +6,7 @@
 #include <ros2_messages.h>
 
 #include <string>
+#include <string_view>
 
 namespace r4::tool::ros2 {
 
@@ -77,6 +78,11 @@ const MessageType& message_type<NodesBeforeIronMessage>();
 
 // A text as the messages want it, whose strings are not const: for as long as `string` lives.
 inline char* borrowed(const std::string& string) { return const_cast<char*>(string.c_str()); }
+
+// The bytes of a string of a sample, as the IDL has it.
+inline std::string_view bytes_of(const dds_sequence_octet& string) {
+  return {reinterpret_cast<const char*>(string._buffer), string._length};
+}
 
 // What a reader or writer of that type carries as its user data.
 std::string user_data_of(const MessageType& type);

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Whatever a message of ROS holds, a string of R4_Command and ~/send or the numbers of the other topics: it is refused
+// with a reason, or it is commands that the board takes, and none of those that cannot come from a topic.
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "host/commands/command_help.hpp"
+#include "input.hpp"
+#include "r4link/error.hpp"
+#include "tools/r4/ros2/command_text.hpp"
+#include "tools/r4/ros2/setpoint_units.hpp"
+
+namespace r4::tool::ros2 {
+namespace {
+
+bool is_ascii(char c) { return static_cast<unsigned char>(c) < 0x80; }
+
+void is_sendable(const Command& command) {
+  require(check_command(command) == Refusal::none);
+  for (const CommandKind kind : {CommandKind::heartbeat, CommandKind::leave, CommandKind::watch,
+                                 CommandKind::setting, CommandKind::fields}) {
+    require(command.kind != kind);
+  }
+  const std::string text = r4::text_of(command);
+  require(r4::text_of(parse_command_text(text)) == text);
+}
+
+void read_string(std::string_view bytes) {
+  const std::optional<std::string> text = text_of(bytes);
+  if (!text) return;
+  require(text->size() + 1 == bytes.size());
+  const bool stops = asks_to_stop(*text);
+  try {
+    bool stop = false;
+    for (const Command& command : commands_of(*text)) {
+      is_sendable(command);
+      stop = stop || command.kind == CommandKind::stop;
+    }
+    require(stop == stops);
+  } catch (const Error& error) {
+    const Problem& problem = error.problem();
+    require(problem.kind == ErrorKind::usage && !problem.reason.empty() && !problem.fix.empty());
+    require(std::all_of(problem.thing.begin(), problem.thing.end(), is_ascii));  // on /rosout
+  }
+}
+
+void read_numbers(double first, double second) {
+  const auto duty = from_duty(first);
+  require(duty.has_value() == (first >= -1 && first <= 1));
+  if (duty) require(duty->pwm >= 0 && duty->pwm <= 4095);
+  const MotorChannel left{CommandKind::osmc, 1, false}, right{CommandKind::dhb12, 4, true};
+  if (const auto command = left.command(first)) is_sendable(*command);
+  ServoCalibration servo;
+  for (const bool microseconds : {false, true}) {
+    servo.microseconds = microseconds;
+    if (const auto pulse = to_pulse(servo, first)) is_sendable(Command::servo(*pulse, 16));
+  }
+  const auto wheels = DifferentialDrive{left, right, 0.4, 1.5}.setpoints(first, second);
+  if (std::isnan(first) || std::isnan(second)) require(!wheels);
+  for (std::size_t i = 0; wheels && i < wheels->size(); ++i) is_sendable((*wheels)[i]);
+}
+
+}  // namespace
+}  // namespace r4::tool::ros2
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  namespace ros2 = r4::tool::ros2;
+  double numbers[2];
+  if (size < sizeof numbers) return 0;
+  std::memcpy(numbers, data, sizeof numbers);
+  ros2::read_numbers(numbers[0], numbers[1]);
+  float floats[2];
+  std::memcpy(floats, data, sizeof floats);
+  ros2::read_numbers(floats[0], floats[1]);
+  ros2::read_string({reinterpret_cast<const char*>(data) + sizeof numbers, size - sizeof numbers});
+  return 0;
+}
