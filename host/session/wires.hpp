@@ -12,8 +12,8 @@
 //     down leads out of each of them to `down`; an answer of another board from each to `other`
 //
 // Until its board has said who it is, a wire is sent nothing but the question and stops, and what it brings is
-// passed over. The board that answers first is the session's, unless all other wires lead elsewhere. The session begins when all wires that are up have
-// answered, or 300 ms after the first.
+// passed over. The board that answers first is the session's, unless all other wires lead elsewhere. The session begins
+// when all wires that are up have answered, or 300 ms after the first.
 //
 // Each wire has the board's packet numbers of its own; so what is newest is told by T (host_link.hpp). A wire also
 // has its view of the board's clock, by the answers to its own questions alone: a T that does not fit it, of a board

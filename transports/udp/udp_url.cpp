@@ -20,7 +20,7 @@ std::string host_of(const Url& url, Role role) {
 
 asio::ip::address local_address(const std::string& text, const std::string& url) {
   asio::error_code error;
-  const asio::ip::address address = asio::ip::make_address(text, error);
+  asio::ip::address address = asio::ip::make_address(text, error);
   if (!error && !address.is_unspecified() && !address.is_multicast()) return address;
   throw Error(ErrorKind::usage, url, "'local=" + text + "' is no address of this computer",
               "write one that `ip -brief address` shows, as in local=192.168.0.7");

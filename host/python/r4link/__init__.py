@@ -3,8 +3,9 @@
 from . import aio, control, devices
 from ._core import (FIELDS, BoardHealth, CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State,
                     Statistics, Subscription, Wire, __version__)
-from .board import (BldcChannel, Board, DriveChannel, I2c, RelayChannel, ServoChannel, Setpoints, States, StepperChannel, Uart)
+from .board import Board, States
 from .bridge import Bridge, BridgeCounters, BridgeEnd, BridgeStatus
+from .channels import (BldcChannel, DriveChannel, I2c, RelayChannel, ServoChannel, Setpoints, StepperChannel, Uart)
 from .devices import Device, DeviceReading
 from .errors import (CancelledError, ClosedError, DataError, DeniedError, Error, NotArmedError, NotConfirmedError,
                      OpenError, RefusedError, UnsupportedError, UsageError)

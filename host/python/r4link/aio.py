@@ -21,10 +21,10 @@ from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
 from typing import Any, Callable, Iterable, Self, Type, TypeVar
 
-from . import board as blocking
+from . import board as blocking, channels
 from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State, Statistics,
                     Subscription, Wire)
-from .board import Setpoints
+from .channels import Setpoints
 from .devices import Device
 from .errors import ClosedError
 from .values import Direction, PostResult, UartData
@@ -194,7 +194,7 @@ class UartStream:
     """What comes in on a UART: `async for data, lost in board.uart[1]: …`, until the board is closed. What waits is in
     the link; the callback of this one only tells that there is something."""
 
-    def __init__(self, uart: blocking.Uart, news: asyncio.Event, subscription: Subscription) -> None:
+    def __init__(self, uart: channels.Uart, news: asyncio.Event, subscription: Subscription) -> None:
         self._uart = uart
         self._news = news
         self._end = weakref.finalize(self, subscription.cancel)

@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import NamedTuple, Self, Type
 
 from . import _core
-from .board import _ms
+from .channels import _ms
 
 _open: weakref.WeakSet[Bridge] = weakref.WeakSet()
 

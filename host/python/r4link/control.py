@@ -11,7 +11,8 @@ from typing import Callable, Literal, NamedTuple, Sequence
 
 from . import _core
 from ._core import State
-from .board import Board, Setpoints, _ms
+from .board import Board
+from .channels import Setpoints, _ms
 
 LoopEnd = Literal['none', 'asked', 'late', 'not active', 'disarmed', 'standstill']
 

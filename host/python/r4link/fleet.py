@@ -21,7 +21,7 @@ from typing import Iterable, Iterator, Mapping, NamedTuple, Self, Sequence, Type
 
 from . import _core
 from ._core import BoardHealth, Command, Event, FleetResult, LinkStatus, Recording, RefusedPost, State
-from .board import Setpoints, _ms
+from .channels import Setpoints, _ms
 from .errors import Error, RefusedError, UsageError, error_of
 from .values import PostResult
 

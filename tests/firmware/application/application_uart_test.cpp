@@ -91,7 +91,8 @@ TEST_F(ApplicationUarts, WhatCameWhileTheLinkWasLostIsNotToldAsNew) {
   const auto heard = board.take(MessageKind::state);
   ASSERT_FALSE(heard.empty());
   const UartBytes first = state_of(heard.front()).uart[0];
-  EXPECT_GT(first.position, before + firmware::UserUart::backlog) << "a gap, as long as what nobody heard";
+  EXPECT_GT(first.position, before + firmware::UserUart::backlog)
+      << "a gap, as long as what nobody heard";
   EXPECT_LT(first.data.size, 40) << "what came since";
 }
 

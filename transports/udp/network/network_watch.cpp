@@ -57,8 +57,10 @@ void NetworkWatch::tell() {
   while (::recv(changes_.get(), report.data(), report.size(), MSG_TRUNC) > 0) {
   }
   const std::vector<OwnAddress> own = own_addresses();
-  for (std::size_t i = 0; i < members_.size(); ++i) {
-    if (members_[i] != nullptr) members_[i]->on_network_change(own);
+  std::size_t next = 0;  // they may enter and leave meanwhile
+  while (next < members_.size()) {
+    Member* const member = members_[next++];
+    if (member != nullptr) member->on_network_change(own);
   }
   members_.erase(std::remove(members_.begin(), members_.end(), nullptr), members_.end());
   if (!members_.empty()) wait();
