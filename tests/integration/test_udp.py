@@ -395,3 +395,12 @@ def test_an_older_client_without_heartbeats_gets_nothing_done(board):
         while not answer.startswith(b'N:'):
             answer = client.recv(2000)
     assert answer.startswith(b'N:1,SAFE;')
+
+
+def test_a_process_has_a_thousand_boards():
+    with Board('udp://127.0.0.1:21000-21999', listens=1000) as boards:
+        for port in 21000, 21500, 21999:
+            sent = run('send', f'udp://127.0.0.1:{port}?listen=0', 'O:358,1,1')
+            assert sent.returncode == 0, sent
+            boards.next(lambda each, port=port: each.get('board') == f'sim-{port}' and
+                        each.get('executed', {}).get('command') == 'O:358,1,1')
