@@ -76,8 +76,9 @@ Wires::Answer Wires::on_identity(std::size_t index, const Identity& identity, st
   // Of two boots the later one is that which answered what was asked after the other had answered.
   const bool later = *asked > proven_;
   // The board has answered between the question and now, which tells boots apart that are close together.
-  const bool fits =
-      link.is_of_this_boot(t_ms, to_ms(*asked), to_ms(now), HostLink::booting_tolerance_ms);
+  const bool fits = link.knows_clock() ? link.is_of_this_boot(t_ms, to_ms(*asked), to_ms(now),
+                                                              HostLink::booting_tolerance_ms)
+                                       : fits_others(wire, t_ms, now);
   if (!fits && !later) {
     ask_soon(wire, now);
     return Answer::known;
@@ -136,6 +137,14 @@ bool Wires::in_clock(const Wire& wire, std::uint32_t t_ms, Time now) {
   return off <= most && off >= -most;
 }
 
+// Before the link knows the board's clock, only the other wires do: of them one may have answered before a restart.
+bool Wires::fits_others(const Wire& wire, std::uint32_t t_ms, Time now) const {
+  return std::all_of(wires_.begin(), wires_.end(), [&](const Wire& each) {
+    const bool knows = &each != &wire && each.known && each.has_clock && each.boot == boot_;
+    return !knows || in_clock(each, t_ms, now);
+  });
+}
+
 void Wires::set_clock(Wire& wire, std::uint32_t t_ms, Time now) {
   wire.has_clock = true;
   wire.board_ms = t_ms;
@@ -145,10 +154,7 @@ void Wires::set_clock(Wire& wire, std::uint32_t t_ms, Time now) {
 // Is what a wire brings that cannot be asked of the session's board, by its T? Before the session begins the other
 // wires know its clock alone.
 bool Wires::agrees(const Wire& wire, std::uint32_t t_ms, bool fits, Time now) const {
-  if (begun_) return fits;
-  return std::all_of(wires_.begin(), wires_.end(), [&](const Wire& each) {
-    return &each == &wire || !each.known || !each.has_clock || in_clock(each, t_ms, now);
-  });
+  return begun_ ? fits : fits_others(wire, t_ms, now);
 }
 
 // The board has said its T on a wire that was asked: those that cannot be asked, and had another, are of another

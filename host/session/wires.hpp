@@ -164,6 +164,7 @@ class Wires {
     return wire.known && wire.heard.count() != 0 && now - wire.heard < timeout_;
   }
   static bool in_clock(const Wire& wire, std::uint32_t t_ms, Time now);
+  bool fits_others(const Wire& wire, std::uint32_t t_ms, Time now) const;
   static void set_clock(Wire& wire, std::uint32_t t_ms, Time now);
   static void ask_soon(Wire& wire, Time now);
   bool admits(Wire& wire, std::uint32_t t_ms, Time now) const;

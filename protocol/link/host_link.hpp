@@ -44,6 +44,8 @@ class HostLink {
   void on_heard(std::uint32_t now_ms) { heard_ms_ = now_ms; }
   // It says that it is booting.
   void on_booting(SafeReason reason, std::uint32_t now_ms);
+  // Has the board's T been heard?
+  bool knows_clock() const { return board_clock_known_; }
   // May it be of the boot that is known that the board showed T between `since_ms` and now? Any, before the first.
   bool is_of_this_boot(std::uint32_t t_ms, std::uint32_t since_ms, std::uint32_t now_ms,
                        std::int32_t tolerance_ms) const;

@@ -39,6 +39,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <queue>
 #include <set>
 #include <string>
@@ -259,6 +260,7 @@ class World : public firmware::Hal, public firmware::Observer {
   void disturb(int wire, Happening::Kind kind, std::uint64_t until_us);
   void unplug(const Happening& happening, bool over);
   void record();
+  bool recorded_right_ahead_of(std::uint32_t first) const;
   void replay(int index);
   void relay(const Attack& attack, std::uint8_t port, std::uint32_t peer);
   void stranger();
@@ -352,6 +354,7 @@ class World : public firmware::Hal, public firmware::Observer {
   Random wires_random_;
   std::uint64_t start_us_ = 0;  // of the schedule: an hour after what was recorded
   std::uint64_t looked_us_ = 0;
+  std::optional<std::uint32_t> recorded_first_;  // number of the host that was recorded
   struct Recorded {
     std::uint64_t at_us;
     bool to_board;
