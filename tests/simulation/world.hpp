@@ -39,7 +39,6 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <optional>
 #include <queue>
 #include <set>
 #include <string>
@@ -260,7 +259,7 @@ class World : public firmware::Hal, public firmware::Observer {
   void disturb(int wire, Happening::Kind kind, std::uint64_t until_us);
   void unplug(const Happening& happening, bool over);
   void record();
-  bool recorded_right_ahead_of(std::uint32_t first) const;
+  std::uint32_t first_number();
   void replay(int index);
   void relay(const Attack& attack, std::uint8_t port, std::uint32_t peer);
   void stranger();
@@ -350,11 +349,11 @@ class World : public firmware::Hal, public firmware::Observer {
     bool brought_state = false;
     std::uint32_t newest_t = 0;  // of the states that it has brought
   };
+  std::vector<std::uint32_t> first_numbers_;  // of all hosts so far
   Wire wires_[most_wires];
   Random wires_random_;
   std::uint64_t start_us_ = 0;  // of the schedule: an hour after what was recorded
   std::uint64_t looked_us_ = 0;
-  std::optional<std::uint32_t> recorded_first_;  // number of the host that was recorded
   struct Recorded {
     std::uint64_t at_us;
     bool to_board;

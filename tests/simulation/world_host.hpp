@@ -27,9 +27,7 @@ struct World::Host final : Session::Handler {
     leaving = false;
     stops.clear();
     clear_ticket = farewell_ticket = 0;
-    do {
-      first = echo_host_first_pnum + static_cast<std::uint32_t>(world.random_.below(1U << 30));
-    } while (world.recorded_right_ahead_of(first));
+    const std::uint32_t first = world.first_number();
     SessionOptions options;
     options.arming = Arming::off;  // so that more is sent that must not be executed
     if (watcher) options.watch_rate_hz = static_cast<int>(world.random_.between(1, 100));
@@ -102,7 +100,6 @@ struct World::Host final : Session::Handler {
   World& world;
   int index;
   std::uint32_t incarnation = 0;
-  std::uint32_t first = 0;  // of its numbers
   bool alive = false;
   bool frozen = false;
   bool stopper = false;

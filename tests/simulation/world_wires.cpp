@@ -114,7 +114,6 @@ void World::record() {
   at(random_.below(100'000), Event::Kind::command, 0);
   run_until(recorded_us);
   recording_ = false;
-  recorded_first_ = hosts_.front()->first;
   hosts_.front()->die();
   events_ = {};
   packets_.clear();
@@ -133,13 +132,6 @@ void World::record() {
       at(from_us + recorded_[i].at_us, Event::Kind::replay, static_cast<int>(i));
     }
   }
-}
-
-// The numbers of a host begin at random. By chance, 6 of 100,000 times, those that were recorded go on behind its own,
-// and without a key they count (docs/safety.md, Limits). That is no mistake to look for.
-bool World::recorded_right_ahead_of(std::uint32_t first) const {
-  constexpr std::uint32_t window = 1U << 16, most_sent = 1U << 12;
-  return recorded_first_ && *recorded_first_ + most_sent - first <= window + 2 * most_sent;
 }
 
 void World::replay(int index) {
