@@ -398,8 +398,9 @@ def test_an_older_client_without_heartbeats_gets_nothing_done(board):
 
 
 def test_a_process_has_a_thousand_boards():
-    with Board('udp://127.0.0.1:21000-21999', listens=1000) as boards:
-        for port in 21000, 21500, 21999:
+    last = 21049 if SANITIZED else 21999  # of more it has no time for each
+    with Board(f'udp://127.0.0.1:21000-{last}', listens=last - 20999) as boards:
+        for port in 21000, 21025, last:
             sent = run('send', f'udp://127.0.0.1:{port}?listen=0', 'O:358,1,1')
             assert sent.returncode == 0, sent
             boards.next(lambda each, port=port: each.get('board') == f'sim-{port}' and
