@@ -90,9 +90,10 @@ bool Session::admit(std::size_t wire, const Datagram& datagram, Time now) {
     }
     case MessageKind::board_heartbeat:
       if (is_connecting_heartbeat(datagram)) {
-        // A board with a key tells T then, too: one that was overtaken says nothing of now.
-        if (t_ms != 0 && fits && link_.echo() != 0 && !newer(t_ms, link_.echo())) break;
         take = wires_.on_connecting(wire, now);
+        // One that comes late is no sign that the board has begun again: who had a heartbeat of it learns that by the
+        // answer of its clock, for which the wire is asked now.
+        if (link_.echo() != 0) take = Wires::Take::no;
         break;
       }
       [[fallthrough]];

@@ -203,7 +203,6 @@ Wires::Take Wires::on_datagram(std::size_t index, std::uint32_t pnum, std::uint3
   }
   anew_ = false;
   wire.connecting = false;
-  admitted_ = now;
   set_clock(wire, t_ms, now);
   wire.heard = now;
   look(now);
@@ -217,7 +216,6 @@ Wires::Take Wires::on_connecting(std::size_t index, Time now) {
   if (!wire.known) return Take::no;
   wire.heard = now;
   look(now);
-  wire.connecting_at = now;
   if (!wire.connecting) {
     wire.connecting = true;
     if (wire.tracker.started()) wire.tracker.restart();
@@ -259,10 +257,9 @@ void Wires::copy(std::size_t index) {
   wire.others -= std::min(wire.others, wire.gap + 1);
 }
 
-// Since any brought what says otherwise: one that came late is no sign that the board has begun again.
 bool Wires::all_connecting(Time now) const {
   return std::all_of(wires_.begin(), wires_.end(), [&](const Wire& wire) {
-    return (wire.connecting && wire.connecting_at >= admitted_) || !is_heard(wire, now);
+    return wire.connecting || !is_heard(wire, now);
   });
 }
 

@@ -131,7 +131,6 @@ class Wires {
     bool known = false;       // its board is the session's
     bool other = false;       // it is not
     bool connecting = false;  // said so last
-    Time connecting_at{0};
     bool has_clock = false;
     std::uint32_t boot = 0;
     std::uint32_t board_ms = 0;  // the board's T at clock_ms
@@ -185,8 +184,7 @@ class Wires {
   bool anew_ = true;  // nothing has come since all wires were down
   Time first_answer_{0};
   std::uint32_t boot_ = 0;
-  Time proven_{0};    // when the newest proof of the boot came
-  Time admitted_{0};  // when the newest came of a board that is not booting
+  Time proven_{0};  // when the newest proof of the boot came
   WireSet carrying_ = 0;
   Time own_state_at_{0};
   std::uint32_t own_state_ms_ = 0;

@@ -42,6 +42,7 @@
 #include <queue>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "attacker.hpp"
@@ -314,7 +315,9 @@ class World : public firmware::Hal, public firmware::Observer {
   std::set<std::uint32_t>
       streamed_;  // where states went at streamed_us_, besides to the host in control
   std::uint64_t streamed_us_ = 0;
-  std::map<std::uint32_t, std::uint64_t> owner_streamed_us_;
+  // When a place of the host in control was sent a state last, and in which session: of the heartbeat that began it.
+  using Streamed = std::pair<std::uint64_t, std::uint32_t>;
+  std::map<std::uint32_t, Streamed> owner_streamed_;
   std::uint32_t newest_heartbeat_t_ = 0;
 
   std::vector<std::unique_ptr<Host>> hosts_;

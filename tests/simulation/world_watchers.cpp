@@ -130,10 +130,13 @@ void World::check_stream(std::uint8_t port, std::uint32_t peer, const Datagram& 
     violate("watch: a state tells nothing of being safe, and there is no host");
   }
   if (link.has_owner() && board_->wires().has(Source{port, peer})) {
-    std::uint64_t& streamed_us = owner_streamed_us_[peer];
-    const bool twice = streamed_us == now_us_ && schedule_.standstills.empty();
+    // A session that begins in the very instant of a state is sent one of its own.
+    Streamed now{now_us_, 0};
+    link.session_of(link.owner(), now.second);
+    Streamed& before = owner_streamed_[peer];
+    const bool twice = before == now && schedule_.standstills.empty();
     if (twice) violate("watch: the host in control is sent a state twice");
-    streamed_us = now_us_;
+    before = now;
     return;
   }
   // A place that brought a heartbeat of the host's that was signed just now: it is taken for another wire.

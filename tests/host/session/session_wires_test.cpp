@@ -442,6 +442,42 @@ TEST(SessionWires, BringWhatTheBoardSaidWhileItBootedTooLate) {
   EXPECT_EQ(robot.drive(10).outcome, Outcome::confirmed);
 }
 
+// Whether the other wire is heard or not.
+TEST(SessionWires, AreNotEndedByALateWordThatTheBoardIsBooting) {
+  for (const bool alone : {false, true}) {
+    WiredRobot robot(Cables{{1}, {1}});
+    robot.connect();
+    if (alone) robot.plug(1, false);
+    robot.run(500);
+    robot.links.clear();
+    for (int i = 0; i < 20; ++i) {
+      robot.bring(0, with_crc("H:R4-ROS2;PNum:0;T:0;"));
+      robot.run(5);
+    }
+    robot.run(1500);
+    for (const LinkStatus& each : robot.links) EXPECT_TRUE(is_heard(each.state));
+    EXPECT_EQ(robot.restarts, 0);
+    EXPECT_EQ(robot.trips, 0);
+    EXPECT_EQ(robot.drive(10).outcome, Outcome::confirmed);
+  }
+}
+
+TEST(SessionWires, BeginAnewWhenTheAnswerToAWordOfBootingSaysSo) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  robot.run(500);
+  for (Cable& cable : robot.cables) cable.sent.clear();
+  robot.bring(0, with_crc("H:R4-ROS2;PNum:0;T:0;"));
+  robot.run(110);
+  EXPECT_EQ(with_letter(robot.cables[0], 'Q').size(), with_letter(robot.cables[1], 'Q').size() + 1)
+      << "that wire is asked besides";
+  EXPECT_EQ(robot.restarts, 0);
+  robot.reboot(0);
+  robot.run(1500);
+  EXPECT_EQ(robot.restarts, 1);
+  EXPECT_TRUE(robot.session->in_control(robot.now()));
+}
+
 TEST(SessionWires, AreArmedTogether) {
   WiredRobot robot(Cables{{1}, {1}}, SessionOptions{});
   robot.connect();
