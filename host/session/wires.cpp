@@ -258,9 +258,8 @@ void Wires::copy(std::size_t index) {
 }
 
 bool Wires::all_connecting(Time now) const {
-  return std::all_of(wires_.begin(), wires_.end(), [&](const Wire& wire) {
-    return wire.connecting || !is_heard(wire, now);
-  });
+  return std::all_of(wires_.begin(), wires_.end(),
+                     [&](const Wire& wire) { return wire.connecting || !is_heard(wire, now); });
 }
 
 bool Wires::others_carry(const Wire& wire, Time now) const {

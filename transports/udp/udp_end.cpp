@@ -182,6 +182,7 @@ UdpEnd::Outcome UdpEnd::transmit_to(std::string_view bytes, const Endpoint& to, 
 
 void UdpEnd::set_up(bool up) {
   up_ = up;
+  cut_ = cut_ && !up;
   ++(up ? counters_.ups : counters_.downs);
   probe_.cancel();
 }
@@ -194,7 +195,8 @@ void UdpEnd::lose_network(int error) {
 }
 
 void UdpEnd::judge_route(int error) {
-  cut_ = is_network_loss(error);
+  if (error != 0 && !is_network_loss(error)) return;  // it was not found out
+  cut_ = error != 0;
   if (cut_ && up_) {
     lose_network(error);
   } else if (error == 0 && !up_ && socket_.is_open()) {
@@ -233,10 +235,18 @@ void UdpEnd::report() {
   if (up_) {
     handler_->on_carrier_event({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
   } else {
-    handler_->on_carrier_event(
-        {CarrierEvent::Kind::down,
-         Problem{ErrorKind::open, name_, std::strerror(down_error_), network_fix}});
+    handler_->on_carrier_event({CarrierEvent::Kind::down, no_route(name_, down_error_)});
   }
+}
+
+Problem UdpEnd::no_route(const std::string& subject, int error) const {
+  if (error == EADDRNOTAVAIL && !url_.local.is_unspecified()) {
+    return {ErrorKind::open, subject,
+            fmt::format("{} is no address of this computer at the moment", url_.local.to_string()),
+            "connect its interface, or name an address that `ip address` shows"};
+  }
+  return {ErrorKind::open, subject, std::strerror(error),
+          "check the WiFi or cable and the address"};
 }
 
 // The interface may come back while nobody sends.

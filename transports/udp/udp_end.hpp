@@ -60,14 +60,15 @@ class UdpEnd : public Carrier {
   // `standing`: to where what is for everyone goes. It tells whether the network is there.
   Outcome transmit_to(std::string_view bytes, const Endpoint& to, bool standing);
   void set_up(bool up);
-  // What the system says of the way, 0 or errno: is it up?
+  // What the system says of the way, 0 or errno: is it up? Any other error says nothing of it.
   void judge_route(int error);
   void report();
   void warn(const std::string& reason, const std::string& fix);
   // It is tried again and again, and told once.
   void tell_why_down(const Problem& problem);
 
-  static constexpr char network_fix[] = "check the WiFi or cable and the address";
+  // Why there is no way, by what the system says: errno.
+  Problem no_route(const std::string& subject, int error) const;
 
   asio::io_context& io_;
   const UdpUrl url_;

@@ -120,7 +120,7 @@ void UdpHost::bind(const Endpoint& board) {
   }
   const std::vector<OwnAddress> own = own_addresses();
   if (const int error = probe_route(board, url_.local, own); error != 0) {
-    throw Error(ErrorKind::open, url_.text, std::strerror(error), network_fix);
+    throw Error(no_route(url_.text, error));
   }
   if (!gathering_) enter_crowd();
   open_socket(local, true);
@@ -172,10 +172,10 @@ void UdpHost::found(const FoundHost& answer) {
   const auto& addresses = answer.addresses;
   const bool is_open = socket_.is_open();
   if (is_open) {
-    judge_route(probe(own_addresses()));  // or it is this computer that has moved
     const bool same =
         std::find(addresses.begin(), addresses.end(), board_.address()) != addresses.end();
-    if (same || addresses.empty()) return;
+    // Or it is this computer that has moved.
+    if (same || addresses.empty()) return judge_route(probe(own_addresses()));
   }
   const std::string before = is_open ? board_.address().to_string() : "";
   try {
