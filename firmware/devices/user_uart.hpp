@@ -41,8 +41,8 @@ class UserUart {
   void next_state();
   void tell(UartBytes& out) const;
 
-  // Waits for states: of a burst at 115200 baud, of which 100 states a second carry more than half as it comes, 600
-  // bytes. What comes when so much waits is lost, and counted.
+  // Waits for states: a burst of 530 bytes at 115200 baud, of which 100 states a second carry half as it comes. What
+  // comes when so much waits is lost, and counted.
   static constexpr std::uint32_t capacity = 344;
   static constexpr std::uint32_t backlog = capacity - uart_max_bytes;
   static constexpr std::size_t bytes_a_turn = 64;

@@ -101,6 +101,25 @@ TEST_F(UserUartTest, CountsWhatFindsNoRoomOrCameDamaged) {
       << "its position is that of what was kept";
 }
 
+// As it comes at 115200 baud, 8N1: 11.52 bytes a millisecond, and a state every ten.
+TEST_F(UserUartTest, TellsABurstOf530BytesWhole) {
+  std::string sent;
+  for (int i = 0; i < 530; ++i) sent += static_cast<char>('a' + i % 26);
+  std::string heard;
+  for (std::size_t ms = 1; ms <= 200; ++ms) {
+    const std::size_t before = std::min(sent.size(), (ms - 1) * 1152 / 100);
+    const std::size_t now = std::min(sent.size(), ms * 1152 / 100);
+    if (now > before) arrive(sent.substr(before, now - before));
+    if (ms % 10 != 0) continue;
+    uart.next_state();
+    UartBytes bytes;
+    uart.tell(bytes);
+    ASSERT_EQ(bytes.lost, 0U);
+    heard.append(bytes.data.begin() + (heard.size() - bytes.position), bytes.data.end());
+  }
+  EXPECT_EQ(heard, sent);
+}
+
 TEST_F(UserUartTest, KeepsTheOrderHoweverOftenItsRingIsPassed) {
   std::string sent;
   std::string heard;
