@@ -91,9 +91,9 @@ bool Session::admit(std::size_t wire, const Datagram& datagram, Time now) {
     case MessageKind::board_heartbeat:
       if (is_connecting_heartbeat(datagram)) {
         take = wires_.on_connecting(wire, now);
-        // One that comes late is no sign that the board has begun again: who had a heartbeat of it learns that by the
+        // One that comes late is no sign that the board has begun again: who has its heartbeats learns that by the
         // answer of its clock, for which the wire is asked now.
-        if (link_.echo() != 0) take = Wires::Take::no;
+        if (link_.echo() != 0 && is_heard(link_.state())) take = Wires::Take::no;
         break;
       }
       [[fallthrough]];

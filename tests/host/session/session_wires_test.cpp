@@ -478,6 +478,18 @@ TEST(SessionWires, BeginAnewWhenTheAnswerToAWordOfBootingSaysSo) {
   EXPECT_TRUE(robot.session->in_control(robot.now()));
 }
 
+TEST(SessionWires, BeginAnewWhereNothingElseComes) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  for (const std::size_t wire : {0U, 1U}) robot.cut(wire);
+  for (int i = 0; i < 15; ++i) {  // no answer of another clock: it began again with nearly the same one
+    robot.bring(1, with_crc("H:R4-ROS2;PNum:0;T:0;"));
+    robot.run(100);
+  }
+  EXPECT_EQ(robot.session->link().state, HostLinkState::connecting);
+  EXPECT_NE(with_letter(robot.cables[1], 'H').back().find(";T:0;"), std::string::npos);
+}
+
 TEST(SessionWires, AreArmedTogether) {
   WiredRobot robot(Cables{{1}, {1}}, SessionOptions{});
   robot.connect();
