@@ -482,8 +482,8 @@ TEST(SessionWires, BeginAnewWhereNothingElseComes) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   for (const std::size_t wire : {0U, 1U}) robot.cut(wire);
-  for (int i = 0; i < 15;
-       ++i) {  // no answer of another clock: it began again with nearly the same one
+  // No answer tells of another clock: it began again with nearly the same one.
+  for (int i = 0; i < 15; ++i) {
     robot.bring(1, with_crc("H:R4-ROS2;PNum:0;T:0;"));
     robot.run(100);
   }
