@@ -16,8 +16,8 @@ import pytest
 from r4_process import DATA, ERROR, PATIENCE_S, R4, SANITIZED, objects, run
 
 DATA_BAD, USAGE, REFUSED, OPEN, PERMISSION, UNSUPPORTED = 1, 2, 3, 4, 5, 6
-COMMANDS = ['monitor', 'send', 'stop', 'list', 'doctor', 'bus', 'bench', 'record', 'info', 'convert', 'replay', 'sim', 'key',
-            'demo', 'encode', 'decode', 'completion', 'man', 'ros2', 'web', 'devices']
+COMMANDS = ['monitor', 'send', 'stop', 'list', 'doctor', 'bridge', 'bus', 'bench', 'record', 'info', 'convert', 'plot',
+            'replay', 'metrics', 'web', 'ros2', 'sim', 'key', 'demo', 'encode', 'decode', 'completion', 'man', 'devices']
 
 
 def captured_lines():
@@ -383,8 +383,8 @@ def test_version():
 def test_help_names_every_command_url_and_exit_code():
     result = run('--help')
     assert result.returncode == 0 and result.stderr == ''
-    for command in COMMANDS:
-        assert re.search(rf'^  {command} +\S', result.stdout, re.MULTILINE), command
+    commands = result.stdout.split('\nCommands:\n')[1].split('\n\n')[0]
+    assert re.findall(r'^  (\S+) +\S', commands, re.MULTILINE) == COMMANDS
     for word in ('udp://', 'serial:', 'pty:', 'sim:', 'Exit codes', 'r4 demo'):
         assert word in result.stdout
 

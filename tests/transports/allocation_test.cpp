@@ -41,7 +41,7 @@ std::uint64_t allocations_over(const std::string& board_url, const std::string& 
   Player at_board, at_host;
   const auto board = Registry::standard().make(io, board_url, Role::board);
   board->open(at_board);
-  const std::string place = board->name().substr(4);
+  const std::string place = board->name().substr(board->name().find(':') + 1);
   const auto host = Registry::standard().make(
       io, host_scheme + place + (host_scheme == "udp:" ? "?listen=0" : ""), Role::host);
   host->open(at_host);

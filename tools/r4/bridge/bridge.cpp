@@ -169,16 +169,17 @@ int bridge(const Options& options) {
 }
 
 constexpr const char* footer =
-    R"(The first URL is where hosts are heard, as r4 sim takes it; the second is the board's, as r4 send takes it. So
-any old tool that speaks UDP drives a board on USB or CAN (docs/bridge.md). Datagrams pass as they are, and nothing is
-said for a host that is dead: a board behind a bridge goes safe as any other.
+    R"(The first URL is where hosts are heard, as r4 sim takes it; the second is the board's, as r4 send takes
+it. So any old tool that speaks UDP drives a board on USB or CAN (docs/bridge.md). Datagrams pass as they are,
+and nothing is said for a host that is dead: a board behind a bridge goes safe as any other.
 
 Of several hosts one at a time is let through: the first that sends heartbeats, until it has been silent for
---timeout. The others may watch, and stop the board: E:STOP of anyone goes first. What has waited for longer than
-0.1 s is dropped. A board that is not there, or goes, is waited for.
+--timeout. The others may watch, and stop the board: E:STOP of anyone goes first. What has waited for longer
+than 0.1 s is dropped. A board that is not there, or goes, is waited for.
 
-On standard error it tells which transports come and go, and every ten seconds, if that has changed, and at the end
-what came from each side and was passed or dropped, and why; with --json on standard output, one object a line:
+On standard error it tells which transports come and go, and every ten seconds, if that has changed, and at
+the end what came from each side and was passed or dropped, and why; with --json on standard output, one
+object a line:
   {"type":"bridge","hosts":…,"board":…}                             of each board, at the beginning
   {"type":"transport","event":"up|down|warning","side":"hosts|board","thing":…,"reason":…,"fix":…}
   {"type":"counters","side":…,"transport":…,"up":…,"passed":…,"stops":…,"damaged":…,"misdirected":…,
@@ -206,7 +207,7 @@ void add_bridge(CLI::App& root, Action& chosen) {
   add_seconds(*command, "--every", options->every, "tell what passed so often (default 10)");
   add_seconds(
       *command, "--timeout", options->timeout,
-      "after so long without its heartbeat a host makes room for another: the board's (default 1)");
+      "after so long without a heartbeat a host makes room for another (default 1)");
   add_seconds(*command, "--duration", options->duration, "end after that time");
 }
 

@@ -20,7 +20,7 @@ using mcap::Op;
 
 constexpr std::uint16_t record_schema_id = 1;
 constexpr std::uint16_t line_schema_id = 2;
-constexpr std::string_view compression = "zstd";
+constexpr std::string_view chunk_compression = "zstd";
 // More wires than that are in no recording.
 constexpr std::size_t most_channels = 1000;
 
@@ -142,7 +142,7 @@ void McapSink::write_chunk() {
   append_number(record_, chunk_has_messages_ ? chunk_last_ns_ : 0);
   append_number(record_, std::uint64_t{chunk_.size()});
   append_number(record_, crc32(Text(chunk_)));
-  append_string(record_, compression);
+  append_string(record_, chunk_compression);
   append_number(record_, std::uint64_t{compressed_.size()});
   record_ += compressed_;
   text_.clear();
@@ -171,7 +171,7 @@ void McapSink::write_chunk() {
   append_number(record_, ends - begins);
   append_string(record_, indexes);
   append_number(record_, offset_ - ends);
-  append_string(record_, compression);
+  append_string(record_, chunk_compression);
   append_number(record_, std::uint64_t{compressed_.size()});
   append_number(record_, std::uint64_t{chunk_.size()});
   append_record(chunk_indexes_, Op::chunk_index, record_);
