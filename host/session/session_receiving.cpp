@@ -73,7 +73,7 @@ void Session::on_heartbeat_datagram(std::size_t wire, const Datagram& datagram, 
   if (!current) return;
   refresh_status(now);
   confirm_stop(report, now);
-  confirm_leave(report, now);
+  confirm_leave(report, connecting ? 0 : t_ms, now);
   on_causes(report.cause, now);
 }
 
@@ -291,8 +291,10 @@ void Session::confirm_stop(const SafeReport& report, Time now) {
 
 // A board whose host has left is safe for that reason, unless there is a graver one: then its answer to
 // a repetition tells.
-void Session::confirm_leave(const SafeReport& report, Time now) {
+// Over several wires one of before may come behind it, and of the same millisecond as a state that told otherwise.
+void Session::confirm_leave(const SafeReport& report, std::uint32_t t_ms, Time now) {
   if (report.reason != SafeReason::link) return;
+  if (wires_.several() && t_ms != 0 && state_.any() && !newer(t_ms, left_ms_)) return;
   for (Pending& pending : pending_.under_way()) {
     if (pending.kind == CommandKind::leave) finish(pending, Outcome::confirmed, Refusal::none, now);
   }

@@ -261,6 +261,7 @@ class World : public firmware::Hal, public firmware::Observer {
   void unplug(const Happening& happening, bool over);
   void record();
   std::uint32_t first_number();
+  std::uint32_t first_time();
   void replay(int index);
   void relay(const Attack& attack, std::uint8_t port, std::uint32_t peer);
   void stranger();
@@ -279,6 +280,7 @@ class World : public firmware::Hal, public firmware::Observer {
 
   std::unique_ptr<firmware::Application> board_;
   std::uint32_t boot_offset_ms_ = 0;
+  std::vector<std::uint32_t> first_times_;  // of the boots so far
   std::uint64_t boot_us_ = 0;
   std::uint32_t board_generation_ = 0;
   bool handle_held_ = true;

@@ -81,7 +81,10 @@ struct World::Host final : Session::Handler {
         static_cast<std::int64_t>(world.when_board_shows(state.t_ms) + clock_offset_us)};
     const Time off = std::chrono::round<Time>(state.sampled.time_since_epoch()) - truth;
     ++world.report_.sampled;
-    world.report_.sampled_wrongly += std::chrono::abs(off) > state.sampled_error;
+    if (std::chrono::abs(off) <= state.sampled_error) return;
+    ++world.report_.sampled_wrongly;
+    world.note(fmt::format("host {} sample of T {} is timed {} us off, with an error of {} us",
+                           index, state.t_ms, off.count(), state.sampled_error.count()));
   }
   void on_board_heartbeat(const Datagram&) override {}
   void on_identity(const Identity&) override {}

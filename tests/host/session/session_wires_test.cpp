@@ -405,6 +405,22 @@ TEST(SessionWires, AreLeftTogether) {
   EXPECT_FALSE(robot.board(0).link().has_owner());
 }
 
+TEST(SessionWires, AreNotLeftByWhatTheBoardSaidBefore) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  for (const std::size_t wire : {0U, 1U}) robot.cut(wire);
+  const Ticket ticket = robot.session->leave(WiredRobot::timeout, robot.now());
+  const std::uint32_t newest_ms = robot.session->state().t_ms;
+  const auto safe = [](std::uint32_t t_ms) {
+    return with_crc("H:R4-ROS2;PNum:9;T:" + std::to_string(t_ms) + ";SAFE:1;");
+  };
+  robot.bring(0, safe(newest_ms));  // of the millisecond of a state: which was first?
+  EXPECT_EQ(robot.results.count(ticket), 0U);
+  robot.bring(0, safe(newest_ms + 1));
+  ASSERT_EQ(robot.results.count(ticket), 1U);
+  EXPECT_EQ(robot.results.at(ticket).outcome, Outcome::confirmed);
+}
+
 TEST(SessionWires, AreSignedOnce) {
   SessionOptions options = WiredRobot::at_will();
   options.key = key_of(1);
