@@ -13,7 +13,7 @@
 // Boards count from 0, in the order of the URLs; a pattern stands for its boards in order (docs/fleet.md), and '+' joins
 // several wires to a board: "can://can0?node=0-7+can://can1?node=0-7". Their links live on one thread and one loop; those
 // on a CAN bus share one socket. Each is a link of its own: a board that is silent disturbs no other one, and every
-// state has its time on this computer's clock (State::sampled).
+// state has its time on this computer's clock (ReceivedState::sampled).
 //
 // Thread-safe, and nothing here blocks the links. As with a Board, each board goes safe by itself when this object
 // is gone or its process hangs, what has not been sent by its timeout never is, and only a stop goes out in any
