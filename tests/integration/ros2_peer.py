@@ -43,6 +43,12 @@ class Ros2(Running):
     def armed(self):
         return self.next(lambda each: each['type'] == 'log' and each['text'] == 'armed')
 
+    def logged_both(self, *texts):
+        """In either order."""
+        missing = set(texts)
+        while missing:
+            missing.discard(self.next(lambda each: each['type'] == 'log')['text'])
+
     def logged(self, words, **options):
         return self.next(lambda each: each['type'] == 'log' and words in each['text'], **options)
 

@@ -21,8 +21,7 @@ def test_what_it_drove_is_safe_when_it_is_killed_and_it_begins_again():
             assert SANITIZED or off['came'] - killed < 1.1  # the board's timeout
         board.state('SAFE', 'link')
         with Ros2(domain, board.host_url, '--arm') as ros2:
-            ros2.armed()
-            ros2.logged('osmc1/command: 1 publishers')
+            ros2.logged_both('armed', 'osmc1/command: 1 publishers')
             drive(board, peer, 'rt/osmc1/command', float32(0.25), lambda each: pwm(each, 1) == 1024)
             assert ros2.end() == 0, ros2.errors
         peer.end()
