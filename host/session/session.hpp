@@ -288,7 +288,7 @@ class Session {
   std::uint32_t restarts_ = 0;       // of the board, those that were told
   std::optional<bool> knows_leave_;  // does the board?
   bool leaving_ = false;
-  std::uint32_t left_ms_ = 0;  // the T of its newest state by then
+  std::optional<std::uint32_t> left_ms_;  // of several wires: the T of the newest state by then
   bool transport_down_ = false;
   bool group_waits_ = false;  // for the answer to Q:ID
   StatisticsCollector collector_;

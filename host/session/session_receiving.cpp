@@ -290,11 +290,11 @@ void Session::confirm_stop(const SafeReport& report, Time now) {
 }
 
 // A board whose host has left is safe for that reason, unless there is a graver one: then its answer to
-// a repetition tells.
-// Over several wires one of before may come behind it, and of the same millisecond as a state that told otherwise.
+// a repetition tells. Over several wires one of before may come behind the farewell, and be of the same millisecond as
+// a state that told otherwise. `t_ms`: its T, 0 of a board that is booting.
 void Session::confirm_leave(const SafeReport& report, std::uint32_t t_ms, Time now) {
   if (report.reason != SafeReason::link) return;
-  if (wires_.several() && t_ms != 0 && state_.any() && !newer(t_ms, left_ms_)) return;
+  if (left_ms_ && t_ms != 0 && !newer(t_ms, *left_ms_)) return;
   for (Pending& pending : pending_.under_way()) {
     if (pending.kind == CommandKind::leave) finish(pending, Outcome::confirmed, Refusal::none, now);
   }

@@ -421,6 +421,28 @@ TEST(SessionWires, AreNotLeftByWhatTheBoardSaidBefore) {
   EXPECT_EQ(robot.results.at(ticket).outcome, Outcome::confirmed);
 }
 
+TEST(SessionWires, AreLeftBeforeAStateHasCome) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.reboot(0, 0xC0000000U);  // whatever T: this one is not newer than 0
+  robot.plug(0, true);
+  robot.plug(1, true);
+  robot.run(2);  // each wire's board has said who it is
+  for (const std::size_t wire : {0U, 1U}) robot.cut(wire);
+  const auto at = [&](std::uint32_t later_ms) {
+    return ";PNum:9;T:" + std::to_string(robot.board_ms(0) + later_ms) + ";";
+  };
+  robot.bring(0, with_crc("H:R4-ROS2" + at(0)));
+  robot.run(5);
+  ASSERT_EQ(robot.told_states, 0U);
+  const Ticket ticket = robot.session->leave(WiredRobot::timeout, robot.now());
+  ASSERT_NE(ticket, 0U);
+  robot.bring(1, with_crc("AIN24:1.00;SAFE:0" + at(1)));
+  EXPECT_EQ(robot.results.count(ticket), 0U);
+  robot.bring(1, with_crc("H:R4-ROS2" + at(2) + "SAFE:1;"));
+  ASSERT_EQ(robot.results.count(ticket), 1U);
+  EXPECT_EQ(robot.results.at(ticket).outcome, Outcome::confirmed);
+}
+
 TEST(SessionWires, AreSignedOnce) {
   SessionOptions options = WiredRobot::at_will();
   options.key = key_of(1);

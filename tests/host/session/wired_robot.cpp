@@ -113,7 +113,7 @@ void WiredRobot::plug(std::size_t wire, bool in) {
   }
 }
 
-void WiredRobot::reboot(std::size_t board) { boards_[board]->boot(50); }
+void WiredRobot::reboot(std::size_t board, std::uint32_t t_ms) { boards_[board]->boot(t_ms); }
 
 void WiredRobot::bring(std::size_t wire, std::string_view bytes) {
   session->receive(wire, bytes, now());

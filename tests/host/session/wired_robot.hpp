@@ -44,7 +44,7 @@ class WiredRobot final : private Session::Handler {
   // The transport tells: unplugged.
   void plug(std::size_t wire, bool in);
   // It begins again, with another clock.
-  void reboot(std::size_t board);
+  void reboot(std::size_t board, std::uint32_t t_ms = 50);
   // Hands a datagram to the host, as if that wire had brought it.
   void bring(std::size_t wire, std::string_view bytes);
   // Waits for the end of what was asked for.

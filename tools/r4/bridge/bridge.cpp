@@ -206,7 +206,7 @@ void add_bridge(CLI::App& root, Action& chosen) {
   add_json(*command, options->json, "print what happens as JSON, one object a line");
   add_seconds(*command, "--every", options->every, "tell what passed so often (default 10)");
   add_seconds(*command, "--timeout", options->timeout,
-              "after so long without a heartbeat a host makes room for another (default 1)");
+              "a host makes room for another after so long: the board's timeout (default 1)");
   add_seconds(*command, "--duration", options->duration, "end after that time");
 }
 
