@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A file descriptor with an owner.
+// A file descriptor with an owner; and what to do where there is none left.
 #pragma once
 
+#include <sys/resource.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <optional>
+#include <string>
 #include <utility>
+
+#include "r4link/error.hpp"
 
 namespace r4 {
 
@@ -30,5 +36,19 @@ class FileDescriptor {
  private:
   int number_ = -1;
 };
+
+// Why `thing` cannot be opened, if that `error` (errno) is that the program, or the system, has no file left for it.
+inline std::optional<Problem> out_of_files(const std::string& thing, int error) {
+  if (error == ENFILE) {
+    return Problem{ErrorKind::open, thing, "this computer has no file left", "end some programs"};
+  }
+  if (error != EMFILE) return std::nullopt;
+  rlimit limit{};
+  ::getrlimit(RLIMIT_NOFILE, &limit);
+  return Problem{
+      ErrorKind::open, thing,
+      "this program may have " + std::to_string(limit.rlim_cur) + " files open, and has them",
+      "open fewer boards, or allow it more before it begins: ulimit -n 4096"};
+}
 
 }  // namespace r4

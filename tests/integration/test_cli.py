@@ -25,6 +25,18 @@ def captured_lines():
         return [line.rstrip('\n').split('\t')[1] for line in file]
 
 
+# Of a fleet, one board after the other.
+@pytest.mark.parametrize('command', [
+    ['monitor', 'udp://127.1.0.{1-100}'], ['monitor', 'udp://127.1.0.{1-100}?listen=0'],
+    ['record', 'udp://127.1.0.{1-100}', '-o', 'fleet.r4log'], ['metrics', 'udp://127.1.0.{1-100}?listen=0'],
+    ['sim', 'udp://127.1.0.{1-100}:20180']])
+def test_a_program_that_may_open_no_more_files_says_so(command, tmp_path):
+    result = subprocess.run(['sh', '-c', 'ulimit -n 40; exec "$0" "$@"', R4, *command], capture_output=True, text=True,
+                            timeout=PATIENCE_S, cwd=tmp_path, check=False)
+    assert result.returncode == OPEN, result.stderr
+    assert 'this program may have 40 files open, and has them' in result.stderr and 'ulimit -n' in result.stderr
+
+
 # --- encode and decode
 
 def test_encodes_the_papers_command():

@@ -21,6 +21,8 @@
 #include <string_view>
 #include <utility>
 
+#include "../file_descriptor.hpp"
+
 namespace r4 {
 
 namespace {
@@ -112,6 +114,7 @@ std::vector<CanInterface> list_can_interfaces() {
 
 Problem can_problem(const std::string& interface, int error) {
   const std::string thing = "can://" + interface;
+  if (auto problem = out_of_files(thing, error)) return std::move(*problem);
   switch (error) {
     case EAFNOSUPPORT:
     case EPROTONOSUPPORT:

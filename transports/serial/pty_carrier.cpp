@@ -105,6 +105,7 @@ void PtyCarrier::open(Handler& handler) {
   if (!made) {
     const int error = errno;
     master_.reset();
+    if (const auto problem = out_of_files(url_.text(), error)) throw Error(*problem);
     throw Error(ErrorKind::open, url_.text(),
                 std::string("no pseudo-terminal is to be had: ") + std::strerror(error),
                 "see that /dev/ptmx and /dev/pts are there");

@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "../file_descriptor.hpp"
 #include "port_list.hpp"
 #include "r4link/error.hpp"
 
@@ -30,6 +31,7 @@ std::string ports_in_words() {
 }
 
 [[noreturn]] void fail(const std::string& path, int error) {
+  if (const auto problem = out_of_files(path, error)) throw Error(*problem);
   switch (error) {
     case ENOENT:
     case ENODEV:

@@ -85,6 +85,7 @@ void UdpHost::close_socket() noexcept {
   if (gathering_) gathering_->stop();
   crowd_.stop(*this);
   if (std::exchange(entered_, false)) crowd_.leave();
+  one_of_many_ = false;
   host_socket_.close();
 }
 
