@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace r4 {
 
@@ -43,12 +44,11 @@ bool BoardClock::place(Limits& limits, std::uint32_t t_ms, Time host, Time margi
   fresh.at = since_first(t_ms);
   fresh.second = static_cast<std::int64_t>(std::floor(fresh.at / 1e6));
   fresh.offset = static_cast<double>((host - first_ + margin).count()) - fresh.at;
-  if (is_old(fresh)) return false;  // no datagram is under way for so long
+  if (is_old(fresh.second)) return false;  // no datagram is under way for so long
   const bool is_upper = &limits == &upper_;
   if (is_upper ? fresh.offset < lowest(fresh.at) : fresh.offset > highest(fresh.at)) return false;
   if (fresh.second > newest_second_) next_second(fresh.second);
-  const auto slot = static_cast<std::size_t>((fresh.second % seconds + seconds) % seconds);
-  Limit& kept = limits[slot];
+  Limit& kept = limits[slot_of(fresh.second)];
   const double later = fresh.at - kept.at;
   const double moved = kept.offset + later * (is_upper == (later > 0) ? fastest_ : slowest_);
   const bool tighter = is_upper ? fresh.offset < moved : fresh.offset > moved;
@@ -64,28 +64,49 @@ bool BoardClock::place(Limits& limits, std::uint32_t t_ms, Time host, Time margi
 
 // What has been learned in the last one tells more of the drift, and the oldest is forgotten.
 void BoardClock::next_second(std::int64_t second) {
-  newest_second_ = second;
-  narrow_drift();
+  narrow_drift(std::exchange(newest_second_, second));
   const double at = static_cast<double>(second) * 1e6;
   high_ = {at, highest_of_all(at)};
   low_ = {at, lowest_of_all(at)};
 }
 
 // A line through the gap between an upper and a lower limit cannot be steeper than from the one to the other.
-void BoardClock::narrow_drift() {
+void BoardClock::Slopes::narrow(const Limit& upper, const Limit& lower) {
+  if (lower.at == upper.at) return;
+  const double slope = (lower.offset - upper.offset) / (lower.at - upper.at);
+  if (lower.at > upper.at) {
+    slowest = std::max(slowest, slope);
+  } else {
+    fastest = std::min(fastest, slope);
+  }
+}
+
+// The limits of that second beside those before it, and its own.
+void BoardClock::take_slopes(std::int64_t second) {
+  const Limit& upper = upper_[slot_of(second)];
+  const Limit& lower = lower_[slot_of(second)];
+  for (std::int64_t before = second - seconds + 1; before <= second; ++before) {
+    const std::size_t slot = slot_of(before);
+    if (slopes_[slot].second != before) slopes_[slot] = {before};
+    if (upper_[slot].second == before && lower.second == second) {
+      slopes_[slot].narrow(upper_[slot], lower);
+    }
+    if (lower_[slot].second == before && upper.second == second) {
+      slopes_[slot].narrow(upper, lower_[slot]);
+    }
+  }
+}
+
+// That second is over. An answer from its end may still come.
+void BoardClock::narrow_drift(std::int64_t second) {
+  take_slopes(second - 1);
+  take_slopes(second);
   slowest_ = -most_drift;
   fastest_ = most_drift;
-  for (const Limit& upper : upper_) {
-    if (upper.second == none || is_old(upper)) continue;
-    for (const Limit& lower : lower_) {
-      if (lower.second == none || is_old(lower) || lower.at == upper.at) continue;
-      const double slope = (lower.offset - upper.offset) / (lower.at - upper.at);
-      if (lower.at > upper.at) {
-        slowest_ = std::max(slowest_, slope);
-      } else {
-        fastest_ = std::min(fastest_, slope);
-      }
-    }
+  for (const Slopes& each : slopes_) {
+    if (each.second == none || is_old(each.second)) continue;
+    slowest_ = std::max(slowest_, each.slowest);
+    fastest_ = std::min(fastest_, each.fastest);
   }
   if (slowest_ > fastest_) slowest_ = fastest_ = (slowest_ + fastest_) / 2;  // of rounding
 }
@@ -101,7 +122,7 @@ double BoardClock::lowest(double at) const {
 double BoardClock::highest_of_all(double at) const {
   double offset = infinite;
   for (const Limit& each : upper_) {
-    if (each.second == none || is_old(each)) continue;
+    if (each.second == none || is_old(each.second)) continue;
     const double later = at - each.at;
     offset = std::min(offset, each.offset + later * (later > 0 ? fastest_ : slowest_));
   }
@@ -111,7 +132,7 @@ double BoardClock::highest_of_all(double at) const {
 double BoardClock::lowest_of_all(double at) const {
   double offset = -infinite;
   for (const Limit& each : lower_) {
-    if (each.second == none || is_old(each)) continue;
+    if (each.second == none || is_old(each.second)) continue;
     const double later = at - each.at;
     offset = std::max(offset, each.offset + later * (later > 0 ? slowest_ : fastest_));
   }

@@ -60,6 +60,15 @@ class BoardClock {
   static constexpr int seconds = 64;
   using Limits = std::array<Limit, seconds>;
 
+  // Of the lines that pass between the limits of a second and those of later ones, or of itself.
+  struct Slopes {
+    std::int64_t second = none;
+    double slowest = -most_drift;
+    double fastest = most_drift;
+
+    void narrow(const Limit& upper, const Limit& lower);
+  };
+
   // The tightest limit as it is now: at later times it is that much looser.
   struct Front {
     double at = 0;
@@ -69,9 +78,13 @@ class BoardClock {
   void limit(Limits& limits, std::uint32_t t_ms, Time host, Time margin);
   bool place(Limits& limits, std::uint32_t t_ms, Time host, Time margin);
   void next_second(std::int64_t second);
-  void narrow_drift();
+  void take_slopes(std::int64_t second);
+  void narrow_drift(std::int64_t second);
   double since_first(std::uint32_t t_ms) const;
-  bool is_old(const Limit& limit) const { return limit.second + seconds <= newest_second_; }
+  static std::size_t slot_of(std::int64_t second) {
+    return static_cast<std::size_t>((second % seconds + seconds) % seconds);
+  }
+  bool is_old(std::int64_t second) const { return second + seconds <= newest_second_; }
   // The limits of the offset at that time of the board.
   double highest(double at) const;
   double lowest(double at) const;
@@ -84,6 +97,7 @@ class BoardClock {
   std::int64_t newest_second_ = 0;
   Time first_{0};
   Limits upper_, lower_;
+  std::array<Slopes, seconds> slopes_;
   Front high_{0, std::numeric_limits<double>::infinity()};
   Front low_{0, -std::numeric_limits<double>::infinity()};
   // What the offset may change by in one unit of time.

@@ -12,8 +12,10 @@
 #include <cstdint>
 #include <cstdlib>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "environment.hpp"
@@ -36,6 +38,46 @@ constexpr std::uint64_t comes_back_within_us = 15 * second_us;  // through all t
 constexpr std::uint64_t connecting_us = 2 * second_us;
 constexpr double lost = 0.1, twice = 0.01, damaged = 0.001;
 
+struct Packet {
+  std::uint64_t came_us = 0;  // to who gets it at `at_us`: what waits stays in order
+  std::uint64_t at_us = 0;
+  bool to_board = false;
+  bool intact = true;
+  std::size_t size = 0;
+  std::array<char, 512> bytes;
+};
+
+// What is under way, and what waits for a host that does nothing for half a minute.
+class Wire {
+  auto later() const {
+    return [this](std::uint8_t a, std::uint8_t b) {
+      return std::tie(packets_[a].at_us, packets_[a].came_us) >
+             std::tie(packets_[b].at_us, packets_[b].came_us);
+    };
+  }
+
+ public:
+  Wire() { std::iota(order_.begin(), order_.end(), std::uint8_t{0}); }
+
+  std::uint64_t next_us() const { return count_ == 0 ? UINT64_MAX : packets_[order_[0]].at_us; }
+  Packet take() {
+    std::pop_heap(order_.begin(), order_.begin() + count_, later());
+    return packets_[order_[static_cast<std::size_t>(--count_)]];
+  }
+  // False: it holds no more.
+  bool put(const Packet& packet) {
+    if (count_ == static_cast<std::ptrdiff_t>(packets_.size())) return false;
+    packets_[order_[static_cast<std::size_t>(count_++)]] = packet;
+    std::push_heap(order_.begin(), order_.begin() + count_, later());
+    return true;
+  }
+
+ private:
+  std::array<Packet, 128> packets_;
+  std::array<std::uint8_t, 128> order_;  // those of the packets first, a heap; then the free ones
+  std::ptrdiff_t count_ = 0;
+};
+
 // One board and its host.
 class FleetLink final : firmware::Hal, firmware::Port, IncuriousHost {
  public:
@@ -49,15 +91,13 @@ class FleetLink final : firmware::Hal, firmware::Port, IncuriousHost {
 
   void run_until(std::uint64_t end_us) {
     for (;;) {
-      Packet* const packet =
-          &*std::min_element(packets_.begin(), packets_.end(),
-                             [](const Packet& a, const Packet& b) { return a.at_us < b.at_us; });
+      const std::uint64_t packet_us = wire_.next_us();
       const std::uint64_t host_us = std::max(host_due_us_, held_until_us_);
-      const std::uint64_t next_us = std::min({packet->at_us, board_due_us_, host_us});
+      const std::uint64_t next_us = std::min({packet_us, board_due_us_, host_us});
       if (next_us > end_us) break;
       now_us_ = std::max(now_us_, next_us);
-      if (packet->at_us == next_us) {
-        deliver(*packet);
+      if (packet_us == next_us) {
+        deliver(wire_.take());
       } else if (board_due_us_ == next_us) {
         poll_board();
       } else {
@@ -94,14 +134,6 @@ class FleetLink final : firmware::Hal, firmware::Port, IncuriousHost {
                 overflows = 0;
 
  private:
-  struct Packet {
-    std::uint64_t at_us = UINT64_MAX;  // it is free
-    bool to_board = false;
-    bool intact = true;
-    std::size_t size = 0;
-    std::array<char, 512> bytes;
-  };
-
   std::uint64_t fault_ends_us() const {
     return std::max({cut_until_us_, held_until_us_, restarted_us_});
   }
@@ -150,27 +182,23 @@ class FleetLink final : firmware::Hal, firmware::Port, IncuriousHost {
     if (now_us_ < cut_until_us_) return;
     for (int copies = random_.chance(twice) ? 2 : 1; copies > 0; --copies) {
       if (random_.chance(lost)) continue;
-      const auto room = std::find_if(packets_.begin(), packets_.end(),
-                                     [](const Packet& each) { return each.at_us == UINT64_MAX; });
-      if (room == packets_.end() || bytes.size() > room->bytes.size()) {
-        ++overflows;
-        return;
-      }
       // Up to 20 ms: some overtake others.
-      room->at_us = now_us_ + 500 + random_.below(20'000);
-      room->to_board = to_board;
-      room->size = bytes.size();
-      std::copy(bytes.begin(), bytes.end(), room->bytes.begin());
-      room->intact = !random_.chance(damaged);
-      if (!room->intact) room->bytes[random_.below(bytes.size())] ^= 1;
+      Packet packet;
+      packet.at_us = packet.came_us = now_us_ + 500 + random_.below(20'000);
+      packet.to_board = to_board;
+      packet.size = std::min(bytes.size(), packet.bytes.size());
+      std::copy_n(bytes.begin(), packet.size, packet.bytes.begin());
+      packet.intact = !random_.chance(damaged);
+      if (!packet.intact) packet.bytes[random_.below(packet.size)] ^= 1;
+      if (packet.size < bytes.size() || !wire_.put(packet)) ++overflows;
     }
   }
-  void deliver(Packet& packet) {
+  void deliver(Packet packet) {
     if (!packet.to_board && now_us_ < held_until_us_) {
       packet.at_us = held_until_us_;
+      if (!wire_.put(packet)) ++overflows;
       return;
     }
-    packet.at_us = UINT64_MAX;
     const std::string_view bytes(packet.bytes.data(), packet.size);
     if (packet.to_board) {
       if (packet.intact && bytes.starts_with("H:")) heartbeat_us_ = now_us_;
@@ -208,7 +236,7 @@ class FleetLink final : firmware::Hal, firmware::Port, IncuriousHost {
   std::uint64_t cut_until_us_ = 0, held_until_us_ = 0, restarted_us_ = 0;
   std::uint32_t boot_ms_ = 0;
   bool was_active_ = false;
-  std::array<Packet, 48> packets_;
+  Wire wire_;
   std::optional<firmware::Application> application_;
   std::optional<Session> session_;
 };
