@@ -37,10 +37,11 @@ Error closed_error(std::string_view what) {
 }
 
 // `instead`: what that means for what was asked.
-Error blocked_error(std::string_view what, std::string_view instead) {
+Error blocked_error(std::string_view what, std::string_view instead,
+                    std::string_view fix = "see that this computer has time for it") {
   return Error(Problem{ErrorKind::refused, std::string(what),
                        std::string(instead) + ": the fleet's thread does not answer",
-                       "see that this computer has time for it", Outcome::blocked});
+                       std::string(fix), Outcome::blocked});
 }
 
 std::vector<std::string> urls_of(const std::vector<std::string>& patterns) {
@@ -162,6 +163,7 @@ void Fleet::Impl::tell(FleetEvent event) {
   news.notify_all();
 }
 
+// A stop is sent however late it is, and repeated.
 void Fleet::Impl::begin(const CallPtr& call, Clock::time_point deadline) {
   auto left = std::chrono::ceil<Duration>(deadline - Clock::now());
   {
@@ -169,7 +171,7 @@ void Fleet::Impl::begin(const CallPtr& call, Clock::time_point deadline) {
     if (!call->stop && (call->abandoned || left <= Duration{0})) return;
     call->begun = true;
   }
-  left = std::max(left, Duration{1});
+  if (left <= Duration{0}) left = call->stop ? default_timeout : Duration{1};
   for (std::size_t at = 0; at < call->boards.size(); ++at) {
     BoundEnd end(call->cancelled[at].slot(), End{this, call, at});
     try {
@@ -278,10 +280,11 @@ FleetResults Fleet::Impl::execute(std::string text, const Boards& which, Duratio
   }
   if (!done) {
     call->abandoned = true;
-    throw blocked_error(call->text, call->stop ? "not confirmed; it goes out when it can"
-                                    : call->begun
-                                        ? "not confirmed, it may have been executed or not"
-                                        : "not sent");
+    if (call->stop) {
+      throw blocked_error(call->text, "not confirmed; it goes out when it can", stop_last_resort);
+    }
+    throw blocked_error(call->text, call->begun ? "not confirmed, it may have been executed or not"
+                                                : "not sent");
   }
   return FleetResults(call->results);
 }
@@ -374,15 +377,19 @@ Fleet::Impl::Start Fleet::Impl::start_of_stop() {
 }
 
 FleetResults Fleet::Impl::stop(const Boards& which, Duration timeout) {
-  return execute("E:STOP", which, std::max(timeout, Duration{1}), start_of_stop(), true);
+  const Start start = start_of_stop();
+  FleetResults results = execute("E:STOP", which, std::max(timeout, Duration{1}), start, true);
+  // Whoever does not wait for it does not mean that it may be lost.
+  if (timeout < default_timeout && !results.all_confirmed()) stop_async(results.failed(), start);
+  return results;
 }
 
-void Fleet::Impl::stop_async() {
-  const CallPtr call = call_of("E:STOP", all_boards, start_of_stop());
+void Fleet::Impl::stop_async(const Boards& which, Start start) {
+  const CallPtr call = call_of("E:STOP", which, std::move(start));
   call->stop = true;
   const std::lock_guard lock(mutex);
   if (closed) return;
-  asio::post(io, [this, call, end = Clock::now() + default_timeout] { begin(call, end); });
+  asio::post(io, [this, call] { begin(call, Clock::now() + default_timeout); });
 }
 
 }  // namespace r4

@@ -81,7 +81,8 @@ struct Fleet::Impl {
   std::optional<FleetEvent> next_event(Duration timeout);
   BoardHealth health_of(std::size_t board) const;  // on the loop
   FleetResults stop(const Boards& which, Duration timeout);
-  void stop_async();
+  void stop_async() { stop_async(all_boards, start_of_stop()); }
+  void stop_async(const Boards& which, Start start);
   void require_board(std::size_t board) const;
 
   // --- on the loop

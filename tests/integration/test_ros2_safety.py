@@ -5,10 +5,15 @@ import struct
 
 import pytest
 
-from r4_process import SANITIZED
-from ros2_peer import BOOL, FLOAT32, INT32, STRING, again, armed, drive, float32, join, pwm, text
+from r4_process import SANITIZED, Board
+from ros2_peer import (BOOL, FLOAT32, INT32, STRING, Peer, Ros2, again, armed, drive, float32, join, own_domain, pwm,
+                       text)
 
 ON, OFF = b'\x01', b'\x00'
+
+
+def newest_outputs(board):
+    return [each for each in board.log if 'outputs' in each][-1]['outputs']
 
 
 def test_a_setpoint_that_rests_gets_there_though_it_is_said_once_and_lost():
@@ -69,6 +74,43 @@ def test_an_arm_of_an_outage_does_not_arm_when_the_link_is_back():
               lambda timeout: ros2.logged('not armed (stop)', timeout=timeout))
         arm()
         ros2.armed()
+
+
+def test_a_stop_of_an_outage_is_obeyed_when_the_link_is_back():
+    with armed() as (board, ros2, peer):
+        join(ros2, peer, 'osmc1/command', FLOAT32)
+        join(ros2, peer, 'stop', BOOL)
+        drive(board, peer, 'rt/osmc1/command', float32(0.5), lambda each: pwm(each, 1) == 2048)
+        board.signal(signal.SIGSTOP)
+        ros2.logged('silent')
+        peer.write('rt/stop', ON)
+        ros2.logged('CUT THE POWER')  # nobody waits for it any longer
+        board.signal(signal.SIGCONT)
+        board.state('SAFE', 'stop')
+        assert pwm(newest_outputs(board), 1) == 0
+
+
+def test_what_is_armed_as_soon_as_it_is_there_was_not_stopped_before():
+    domain = own_domain()
+    with Board('udp://127.0.0.1:0') as board:
+        url, host_url = board.url, board.host_url
+    with Peer(domain) as peer, Ros2(domain, host_url, '--arm') as ros2:
+        join(ros2, peer, 'stop', BOOL)
+        peer.write('rt/stop', ON)
+        ros2.logged('CUT THE POWER')
+        with Board(url) as board:
+            ros2.logged('--arm: a stop came first; arm when the danger is over')
+            board.state('SAFE', 'stop')
+
+
+def test_when_the_motors_supply_is_switched_off_nothing_else_stays_on():
+    with armed() as (board, ros2, peer):
+        join(ros2, peer, 'relay3/command', BOOL)
+        join(ros2, peer, 'R4_Command', STRING)
+        drive(board, peer, 'rt/relay3/command', ON, lambda each: each['relays'] & 4)
+        drive(board, peer, 'rt/R4_Command', text('R:1,Off'), lambda each: not each['relays'] & 1)
+        board.state('SAFE', 'stop')
+        assert newest_outputs(board)['relays'] == 0
 
 
 def test_a_stepper_whose_place_is_not_told_is_not_driven():

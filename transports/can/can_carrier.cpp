@@ -235,13 +235,22 @@ SendResult CanCarrier::send_lease(std::string_view bytes) {
   return SendResult::sent;
 }
 
-// What another host sends to our board: commands; its flow control is the same as ours.
+// Our board, and what another host sends to it: commands; its flow control is the same as ours. Frames of other boards
+// come, too, where their hosts have this bus.
 void CanCarrier::listen_for_others(const CanFrame& frame) {
-  if (role_ != Role::host) return;
+  const CanIdMeaning meaning = classify(frame);
+  if (role_ != Role::host || meaning.node != number_) return;
   const Clock::time_point now = Clock::now();
-  if (classify(frame).kind != CanIdKind::command) {
-    board_heard_ = now;
-    return;
+  switch (meaning.kind) {
+    case CanIdKind::went_safe:
+    case CanIdKind::reply:
+    case CanIdKind::telemetry:
+      board_heard_ = now;
+      return;
+    case CanIdKind::command:
+      break;
+    default:
+      return;
   }
   if (isotp_frame::is_flow_control(frame)) return;
   host_heard_ = now;

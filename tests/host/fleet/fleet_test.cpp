@@ -144,6 +144,14 @@ TEST(Fleet, ABoardThatFallsSilentIsToldOfAndDisturbsNoOther) {
   EXPECT_EQ(fleet[1].state().osmc[0].pwm, 5);
 }
 
+TEST(Fleet, AStopThatNobodyWaitsForIsRepeatedToo) {
+  const std::string url = BoardInAThread("udp").url();  // where there is none any more
+  Fleet fleet({url}, at_will());
+  EXPECT_EQ(fleet.stop(0ms).failed(), Boards{0});
+  BoardInAThread late(url.substr(0, url.find('?')));
+  EXPECT_TRUE(late.wait_for(firmware::BoardState::safe, SafeReason::stop));
+}
+
 TEST(Fleet, WhatItsProgramDoesNotTakeOfEventsIsCounted) {
   Fleet fleet({"sim:?node=0-31"});
   ASSERT_EQ(fleet.wait_active(), Boards{});

@@ -45,6 +45,8 @@ BoardCommands::BoardCommands(AsyncBoard& board, Graph& graph, std::size_t node, 
   });
   board_.on_arming([this](DisarmCause cause) {
     if (cause == DisarmCause::none) return;
+    // Without the motors' supply the board is not safe yet, and takes nothing but a stop from us now.
+    if (cause == DisarmCause::supply && drivers_.any()) stop([](bool, const std::string&) {});
     wanted_.clear();
     drivers_.forget();
   });
@@ -274,6 +276,7 @@ void BoardCommands::subscribe_drive(Graph& graph, std::size_t node, Inbox& inbox
 BoardCommands::Left BoardCommands::on_publishers(const std::string& topic, Left left) {
   return [this, topic, left = std::move(left)](const std::vector<std::uint64_t>& there) {
     say_(LogLevel::info, fmt::format("{}: {} publishers", topic, there.size()));
+    post_wanted();  // what they said last goes out before they are missed
     if (left) left(there);
   };
 }

@@ -43,6 +43,8 @@ class BoardCommands {
   void on_tick();
   using Done = std::function<void(bool done, const std::string& text)>;
   void arm(Done done);
+  // Where it is to be armed as soon as it is there: unless it was stopped before.
+  void arm_at_first();
 
   std::uint64_t stale() const { return stale_; }
 
@@ -94,6 +96,7 @@ class BoardCommands {
   // How long it may still be on its way.
   static AsyncBoard::Duration left_of(const Origin& origin);
   void stop(Done done);
+  void repeat_stop();
   void clear(const Origin& origin, Done done);
   void send(const std::optional<std::string>& text, const void* source, const Origin& origin,
             const Done& done);
@@ -109,6 +112,7 @@ class BoardCommands {
   bool arming_ = false;
   asio::cancellation_signal give_up_arming_;
   std::vector<Done> stops_;          // who waits for the stop that is under way
+  bool stopping_ = false;            // one is
   Clock::time_point stopped_{};      // the newest stop: what was written before does not undo it
   std::set<std::uint64_t> pressed_;  // publishers of `arm` whose newest message is true
   std::uint64_t stale_ = 0;

@@ -92,7 +92,7 @@ void BoardNode::on_link(const LinkStatus& link) {
   tell_health();
   if (options_.arm && link.in_control && !armed_once_) {
     armed_once_ = true;
-    commands_.arm([](bool, const std::string&) {});
+    commands_.arm_at_first();
   }
 }
 

@@ -124,14 +124,26 @@ void BoardCommands::stop(Done done) {
   stopped_ = Clock::now();
   wanted_.clear();
   drivers_.forget();
-  const bool under_way = !stops_.empty();
   if (stops_.size() < most_waiting) stops_.push_back(std::move(done));
-  if (under_way) return;  // it is repeated until the board confirms it
-  board_.async_stop(stop_patience,
-                    in_words(board_, "E:STOP", [this](bool stopped, const std::string& text) {
-                      warn(stopped ? text : fmt::format("{}; {}", text, stop_last_resort));
-                      for (const Done& each : std::exchange(stops_, {})) each(stopped, text);
-                    }));
+  if (!stopping_) repeat_stop();
+}
+
+// Until the board confirms it: after an outage it would do again what it did before.
+void BoardCommands::repeat_stop() {
+  stopping_ = true;
+  board_.async_stop(stop_patience, [this](const CommandResult& result) {
+    stopping_ = false;
+    in_words(board_, "E:STOP", [this](bool stopped, const std::string& text) {
+      warn(stopped ? text : fmt::format("{}; {}", text, stop_last_resort));
+      for (const Done& each : std::exchange(stops_, {})) each(stopped, text);
+    })(result);
+    if (result.outcome == Outcome::timed_out) repeat_stop();
+  });
+}
+
+void BoardCommands::arm_at_first() {
+  if (stopped_ == Clock::time_point{}) return arm([](bool, const std::string&) {});
+  warn("--arm: a stop came first; arm when the danger is over");
 }
 
 bool BoardCommands::is_without_link(const std::string& what, const Done& done) const {

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "r4link/fleet.hpp"
@@ -41,6 +43,33 @@ TEST(CanFleet, IsStoppedByOneFrameAndEachBoardConfirmsIt) {
   }
   fleet.clear(std::chrono::seconds{5}).require();
   fleet.send("O:1,1,1", std::chrono::seconds{5}).require();
+}
+
+// It keeps the one; the others are free.
+TEST(CanFleet, AHostOfAnotherComputerThatDrivesOneBoardConcernsNoOther) {
+  std::vector<std::unique_ptr<BoardInAThread>> boards;
+  for (int node = 24; node < 28; ++node) {
+    boards.push_back(std::make_unique<BoardInAThread>("can://vcan0?node=" + std::to_string(node)));
+  }
+  std::atomic<bool> drives{true};
+  std::thread other([&] {
+    RawCan raw(went_safe_id(27));
+    CanFrame heartbeat{};  // of one frame; its text is nothing
+    heartbeat.id = command_id(27);
+    heartbeat.size = 3;
+    heartbeat.data[0] = 2;
+    CanFrame ignored;
+    while (drives) {
+      raw.send(heartbeat);
+      raw.receive(ignored, clock_us() + 20000);
+    }
+  });
+  {
+    Fleet fleet({"can://vcan0?node=24-27"}, at_will());
+    EXPECT_EQ(fleet.wait_active(std::chrono::seconds{5}), Fleet::Boards{3});
+  }
+  drives = false;
+  other.join();
 }
 
 }  // namespace

@@ -146,7 +146,9 @@ void Inbox::drain() {
     }
   }
   if (all.empty()) return;
-  next_ = std::max(next_, Clock::now() - turns_saved * turn) + turn;
+  // What is urgent does not wait for its turn, and makes nothing else wait longer than for one.
+  const Clock::time_point now = Clock::now();
+  next_ = std::min(std::max(next_, now - turns_saved * turn), now) + turn;
   std::sort(all.begin(), all.end(), [](const Waiting& a, const Waiting& b) {
     const bool a_first = a.kind == Kind::urgent;
     const bool b_first = b.kind == Kind::urgent;
