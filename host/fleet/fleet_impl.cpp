@@ -283,8 +283,8 @@ FleetResults Fleet::Impl::execute(std::string text, const Boards& which, Duratio
     if (call->stop) {
       throw blocked_error(call->text, "not confirmed; it goes out when it can", stop_last_resort);
     }
-    throw blocked_error(call->text, call->begun ? "not confirmed, it may have been executed or not"
-                                                : "not sent");
+    throw blocked_error(
+        call->text, call->begun ? "not confirmed, it may have been executed or not" : "not sent");
   }
   return FleetResults(call->results);
 }

@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <utility>
 
+#include "../file_descriptor.hpp"
 #include "share_message.hpp"
 #include "share_socket.hpp"
 
@@ -85,11 +86,15 @@ void SharePlaces::ask_for_wire(const std::string& thing, std::chrono::millisecon
   sharer_.leave();
 }
 
-bool SharePlaces::hold() {
+bool SharePlaces::hold(const std::string& thing) {
   if (wire_.name.empty()) return true;
   for (int place = 0; place < share_places; ++place) {
     if (is_passed_over(place)) continue;
-    if (!holder_.hold(at_place(wire_, place))) return false;
+    errno = 0;
+    if (!holder_.hold(at_place(wire_, place))) {
+      if (const auto problem = out_of_files(thing, errno)) throw Error(*problem);
+      return false;
+    }
     stranger_.reset();
     return true;
   }

@@ -41,7 +41,8 @@ class SharePlaces {
   // board.
   void ask_for_wire(const std::string& thing, std::chrono::milliseconds within);
   // Takes the first that is of use, or none if none is: then nobody shares what we open. False if another has it.
-  bool hold();
+  // Throws Error{open} if this program may open no more files.
+  bool hold(const std::string& thing);
 
   const SharedWire& wire() const { return wire_; }
 

@@ -7,7 +7,6 @@
 #include <optional>
 #include <utility>
 
-#include "../file_descriptor.hpp"
 #include "../operation_slot.hpp"
 #include "r4link/datagram.hpp"
 #include "share_message.hpp"
@@ -233,11 +232,7 @@ void SharedCarrier::leave_other_version() {
 
 // Where a holder hangs that only watches, it is taken from that one. Throws Error if it cannot be opened.
 bool SharedCarrier::try_to_hold() {
-  errno = 0;
-  if (!places_.hold()) {
-    if (const auto problem = out_of_files(name_, errno)) throw Error(*problem);
-    return false;
-  }
+  if (!places_.hold(name_)) return false;
   const State before = std::exchange(state_, State::holding);
   try {
     own_->claim({role_ == BoardRole::watch && holder_.holds(), places_.one_hangs()});
