@@ -13,7 +13,7 @@ import zlib
 import pytest
 
 import packed_form
-from r4_process import DATA, SANITIZED, Board, Running, driving, run, wait_for
+from r4_process import DATA, Board, Running, driving, run, wait_for
 
 DISSECTOR = pathlib.Path(__file__).resolve().parents[2] / 'tools/wireshark'
 BOARD, HOST = (192, 168, 0, 125), (192, 168, 0, 10)
@@ -299,15 +299,18 @@ def test_it_is_installed_by_copying_it(installed, tmp_path):
     assert len(lines) == sum('OSMC1:358' in line for _, line in paper())
 
 
-def test_a_long_capture_takes_about_100_us_a_packet(tmp_path):
-    texts = []
-    for index in range(10000):
-        command = 2147483648 + index // 10
-        texts.append(('host', datagram(f'O:{index % 4096},1,1;PNum:{command};T:5;')) if index % 10 == 0 else
-                     ('board', datagram(paper()[0][1].split('PNum')[0] + f'SAFE:0;CMD:{command};PNum:{index};T:1;')))
-    path = write_pcap(tmp_path / 'long.pcap', RAW_IP, [(index / 100, udp(*each)) for index, each in enumerate(texts)])
-    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-    assert len(fields(path, 'r4.response_time', only='r4.response_time')) == 1000
-    took = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
-    print(f'{took * 10:.1f} s for 100,000 packets')
-    assert took < 2 or SANITIZED, 'twice what it is to take, for a busy machine'
+def test_a_long_capture_takes_no_longer_a_packet_than_a_short_one(tmp_path):
+    def seconds_for(count):
+        texts = []
+        for index in range(count):
+            command = 2147483648 + index // 10
+            texts.append(('host', datagram(f'O:{index % 4096},1,1;PNum:{command};T:5;')) if index % 10 == 0 else
+                         ('board', datagram(paper()[0][1].split('PNum')[0] + f'SAFE:0;CMD:{command};PNum:{index};T:1;')))
+        path = write_pcap(tmp_path / 'long.pcap', RAW_IP,
+                          [(index / 100, udp(*each)) for index, each in enumerate(texts)])
+        before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+        assert len(fields(path, 'r4.response_time', only='r4.response_time')) == count // 10
+        return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+    few, many = seconds_for(2500), seconds_for(10000)
+    print(f'{few:.2f} s for 2,500 packets, {many:.2f} s for 10,000')
+    assert many < 6 * few
