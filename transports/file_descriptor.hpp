@@ -48,7 +48,8 @@ inline std::optional<Problem> out_of_files(const std::string& thing, int error) 
   return Problem{
       ErrorKind::open, thing,
       "this program may have " + std::to_string(limit.rlim_cur) + " files open, and has them",
-      "open fewer boards, or allow it more before it begins: ulimit -n 4096"};
+      "open fewer boards, or allow it more before it begins: ulimit -n " +
+          std::to_string(4 * limit.rlim_cur)};
 }
 
 }  // namespace r4

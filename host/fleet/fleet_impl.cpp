@@ -379,8 +379,8 @@ Fleet::Impl::Start Fleet::Impl::start_of_stop() {
 FleetResults Fleet::Impl::stop(const Boards& which, Duration timeout) {
   const Start start = start_of_stop();
   FleetResults results = execute("E:STOP", which, std::max(timeout, Duration{1}), start, true);
-  // Whoever does not wait for it does not mean that it may be lost.
-  if (timeout < default_timeout && !results.all_confirmed()) stop_async(results.failed(), start);
+  // Whoever does not wait for it any longer does not mean that it may be lost.
+  if (!results.all_confirmed()) stop_async(results.failed(), start);
   return results;
 }
 

@@ -157,7 +157,8 @@ class R4LINK_API Fleet {
 
   // E:STOP to all in one pass, before this waits for anything: by one frame on each CAN bus, which stops all its
   // boards, ours or not; repeated until each has confirmed it. Does not throw where boards do not confirm: their
-  // results say to cut the power. With a shorter timeout than the default it is repeated behind the call for as long.
+  // results say to cut the power, and it is repeated to them for default_timeout behind the call. On a CAN bus that
+  // stops all its boards again.
   FleetResults stop(Duration timeout = default_timeout);
   void stop_async();  // does not wait; repeated for default_timeout
 
