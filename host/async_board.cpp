@@ -9,7 +9,6 @@
 #include "board_loop.hpp"
 #include "commands/command_help.hpp"
 #include "commands/link_timing.hpp"
-#include "measurement/carrier_sum.hpp"
 #include "session/limits.hpp"
 #include "standard_registry.hpp"
 
@@ -265,7 +264,7 @@ const std::string& AsyncBoard::Impl::name() {
 const CarrierCounters& AsyncBoard::Impl::counters() {
   if (!several()) return carrier(0).counters();
   counted = CarrierCounters();
-  for (const auto& wire : wires) add(counted, wire->carrier->counters());
+  for (const auto& wire : wires) counted += wire->carrier->counters();
   return counted;
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <set>
 #include <utility>
 
 #include "../protocol/datagram/numbers.hpp"
@@ -145,6 +146,20 @@ std::vector<PatternUrl> expand_urls(std::string_view pattern) {
                   "can://can0?node=0-7+can://can1?node=0-7");
     }
     for (std::size_t i = 0; i < boards.size(); ++i) boards[i].url += "+" + urls[i].url;
+  }
+  return boards;
+}
+
+std::vector<PatternUrl> expand_urls(const std::vector<std::string>& patterns) {
+  std::vector<PatternUrl> boards;
+  std::set<std::string> seen;
+  for (const std::string& pattern : patterns) {
+    for (PatternUrl& each : expand_urls(pattern)) {
+      if (!seen.insert(each.url).second) {
+        throw Error(ErrorKind::usage, each.url, "it is named twice", "name a board once");
+      }
+      boards.push_back(std::move(each));
+    }
   }
   return boards;
 }

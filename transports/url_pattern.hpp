@@ -33,6 +33,8 @@ constexpr std::size_t most_pattern_urls = 10'000;
 // What it stands for, in order; a URL stands for itself. Throws Error{usage} for braces and ranges that are none,
 // for more than most_pattern_urls, and for what is then no URL.
 std::vector<PatternUrl> expand_urls(std::string_view pattern);
+// Of several texts, each of other boards: throws Error{usage} for a URL that is there twice, too.
+std::vector<PatternUrl> expand_urls(const std::vector<std::string>& patterns);
 
 // The URLs of the wires that a text joins; of one URL that alone. They are not looked at.
 std::vector<std::string> split_wires(std::string_view text);

@@ -4,7 +4,6 @@
 #include <asio/post.hpp>
 #include <exception>
 #include <random>
-#include <set>
 #include <utility>
 
 #include "../../transports/url_pattern.hpp"
@@ -46,15 +45,7 @@ Error blocked_error(std::string_view what, std::string_view instead,
 
 std::vector<std::string> urls_of(const std::vector<std::string>& patterns) {
   std::vector<std::string> urls;
-  std::set<std::string> seen;
-  for (const std::string& pattern : patterns) {
-    for (PatternUrl& each : expand_urls(pattern)) {
-      if (!seen.insert(each.url).second) {
-        throw Error(ErrorKind::usage, each.url, "it is in the fleet twice", "name a board once");
-      }
-      urls.push_back(std::move(each.url));
-    }
-  }
+  for (PatternUrl& each : expand_urls(patterns)) urls.push_back(std::move(each.url));
   if (urls.empty()) {
     throw Error(ErrorKind::usage, "a fleet", "it has no boards", "name at least one URL");
   }

@@ -39,7 +39,6 @@ Session::Session(Handler& handler, SessionOptions options, std::uint32_t first_p
     : handler_(handler),
       options_(checked(std::move(options))),
       board_role_(role),
-      first_pnum_(first_pnum),
       link_(options_.timing, first_pnum),
       key_(options_.key, options_.clock_start),
       selection_(options_.fields),
@@ -242,6 +241,7 @@ void Session::feed(Time now) {
 Statistics Session::statistics(Time now) const {
   Statistics report = collector_.report(now);
   report.packets = packets();
+  report.packets.restarts = link_.restarts();  // not those of the numbers, which a transport that comes up begins anew
   report.copies = wires_.counters().duplicate;
   report.received -= report.copies;
   if (state_.sampled_error != ReceivedState::unknown) {

@@ -237,7 +237,6 @@ class Session {
   void on_nack_datagram(std::size_t wire, const Datagram& datagram, Time now);
   void on_answer(const Datagram& datagram, Time now);
   bool notice_restart();
-  bool is_ours(std::uint32_t pnum) const;
   bool is_proof(const Nack& nack) const;
   bool is_cable_only(std::uint32_t pnum);
   void confirm_from_state(Time now);
@@ -273,7 +272,6 @@ class Session {
   Handler& handler_;
   SessionOptions options_;
   const BoardRole board_role_;
-  std::uint32_t first_pnum_;
   HostLink link_;
   HostKey key_;
   HostRoleMachine role_;

@@ -128,7 +128,7 @@ void Session::on_nack_datagram(std::size_t wire, const Datagram& datagram, Time 
   Nack nack;
   if (!read_nack(datagram, nack)) return;
   if (wires_.several() && !admit(wire, datagram, now)) return;
-  if (!is_ours(nack.pnum)) {
+  if (!link_.is_taken(nack.pnum)) {
     // On a CAN bus, on a wire that is shared and in a recording the answers to other hosts are heard, too. One to
     // the host in control has a number among those of the states; one to who has no lease yet has not.
     if (watches() && nack.has_session) on_answer(datagram, now);
@@ -184,7 +184,7 @@ bool Session::is_proof(const Nack& nack) const {
   // Over another wire than those of the board's session, which may take its copy.
   const bool of_one_copy = nack.code == Refusal::busy || nack.code == Refusal::auth;
   if (of_one_copy && wires_.several()) return false;
-  return nack.has_session && is_ours(nack.session) && newer(nack.pnum, nack.session) &&
+  return nack.has_session && link_.is_taken(nack.session) && newer(nack.pnum, nack.session) &&
          link_.last_pnum() - nack.pnum < BoardLink::memory;
 }
 
@@ -220,11 +220,6 @@ bool Session::is_cable_only(std::uint32_t pnum) {
   return false;
 }
 
-// Have we sent a datagram with that number?
-bool Session::is_ours(std::uint32_t pnum) const {
-  return pnum - first_pnum_ <= link_.last_pnum() - first_pnum_;
-}
-
 // An answer counts in the board's packet numbers, but not in those that a host without control
 // sees.
 void Session::on_answer(const Datagram& datagram, Time now) {
@@ -254,7 +249,7 @@ void Session::confirm_from_state(Time now) {
   const bool has_cmd = state_.present.has(StateField::cmd);
   if (has_cmd) {
     selection_.on_cmd(now);
-    if (link_up() && is_ours(state_.last_command)) note_own_command(now);
+    if (link_up() && link_.is_taken(state_.last_command)) note_own_command(now);
   }
   for (Pending& pending : pending_.under_way()) {
     if (!pending.is_out() || pending.kind == CommandKind::stop ||

@@ -65,6 +65,37 @@ struct CarrierCounters {
   std::optional<TransferCounters> transfers;  // none: a datagram is one packet or line
 };
 
+inline TransferCounters& operator+=(TransferCounters& sum, const TransferCounters& more) {
+  sum.wrong_sequence += more.wrong_sequence;
+  sum.timed_out += more.timed_out;
+  sum.overflow += more.overflow;
+  sum.interrupted += more.interrupted;
+  sum.cancelled += more.cancelled;
+  sum.unexpected += more.unexpected;
+  sum.malformed += more.malformed;
+  sum.packed += more.packed;
+  sum.bad_form += more.bad_form;
+  return sum;
+}
+
+inline CarrierCounters& operator+=(CarrierCounters& sum, const CarrierCounters& more) {
+  sum.rx_datagrams += more.rx_datagrams;
+  sum.rx_bytes += more.rx_bytes;
+  sum.rx_oversize += more.rx_oversize;
+  sum.rx_foreign += more.rx_foreign;
+  sum.rx_overflows += more.rx_overflows;
+  sum.tx_datagrams += more.tx_datagrams;
+  sum.tx_bytes += more.tx_bytes;
+  sum.tx_dropped += more.tx_dropped;
+  sum.tx_errors += more.tx_errors;
+  sum.downs += more.downs;
+  sum.ups += more.ups;
+  if (!more.transfers) return sum;
+  if (!sum.transfers) sum.transfers.emplace();
+  *sum.transfers += *more.transfers;
+  return sum;
+}
+
 struct CarrierEvent {
   enum class Kind : std::uint8_t { up, down, warning };
   Kind kind = Kind::warning;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "host_link.hpp"
 
+#include "board_link.hpp"
+
 namespace r4 {
 
 const char* to_text(HostLinkState state) {
@@ -61,7 +63,6 @@ bool HostLink::on_newest(std::uint32_t t_ms, bool heartbeat, SafeReason reason,
   }
   if (any_newest_ && newer(newest_ms_, t_ms)) return false;
   any_newest_ = true;
-  booting_ = false;
   newest_ms_ = t_ms;
   on_clock(t_ms, false, now_ms);
   reason_ = reason;
@@ -72,9 +73,10 @@ bool HostLink::on_newest(std::uint32_t t_ms, bool heartbeat, SafeReason reason,
 void HostLink::on_clock(std::uint32_t t_ms, bool restarted, std::uint32_t now_ms) {
   if (restarted) {
     ++restarts_;
-    booting_ = false;
+    if (!booting_) renumber();
     forget_boot();
   }
+  booting_ = false;
   board_clock_known_ = true;
   board_ms_ = t_ms;
   clock_ms_ = heard_ms_ = now_ms;
@@ -91,8 +93,15 @@ void HostLink::notice_boot(std::uint32_t t_ms, std::uint32_t now_ms) {
   const std::int32_t tolerance = booting_ ? booting_tolerance_ms : boot_tolerance_ms;
   const bool restarted = !is_of_this_boot(t_ms, now_ms, now_ms, tolerance);
   if (restarted && tracker_.started()) tracker_.restart();
-  booting_ = false;
   on_clock(t_ms, restarted, now_ms);
+}
+
+// Nothing but its clock tells that the board has begun again. It may be ours that stood still, in a computer that
+// slept, and the board's outputs are what they were: by numbers too far off to go on with, the board takes us for
+// another host, and its session begins with all outputs off.
+void HostLink::renumber() {
+  constexpr std::uint32_t step = 16 * BoardLink::command_window;
+  first_pnum_ = next_pnum_ = (next_pnum_ + step) | echo_host_first_pnum;
 }
 
 bool HostLink::is_of_this_boot(std::uint32_t t_ms, std::uint32_t since_ms, std::uint32_t now_ms,

@@ -22,7 +22,8 @@ namespace r4 {
 class HostLink {
  public:
   // `first_pnum` must be echo_host_first_pnum (board_link.hpp) plus 30 random bits.
-  HostLink(LinkTiming timing, std::uint32_t first_pnum) : timing_(timing), next_pnum_(first_pnum) {}
+  HostLink(LinkTiming timing, std::uint32_t first_pnum)
+      : timing_(timing), first_pnum_(first_pnum), next_pnum_(first_pnum) {}
 
   // A valid datagram of the board. Returns what its number says; a late, old or duplicate one does
   // not change the state. `heartbeat`: it is a board heartbeat, answered at once by
@@ -49,7 +50,8 @@ class HostLink {
   // May it be of the boot that is known that the board showed T between `since_ms` and now? Any, before the first.
   bool is_of_this_boot(std::uint32_t t_ms, std::uint32_t since_ms, std::uint32_t now_ms,
                        std::int32_t tolerance_ms) const;
-  // The board was found to have this T; `restarted`: it has begun again.
+  // The board was found to have this T; `restarted`: it has begun again. If it has not said so itself, the numbers of
+  // the host are others from now on.
   void on_clock(std::uint32_t t_ms, bool restarted, std::uint32_t now_ms);
 
   // The transport has gone (`lost` at once) or come (a heartbeat is due at once).
@@ -86,6 +88,8 @@ class HostLink {
   std::uint32_t take_pnum() { return next_pnum_++; }
   // The number that was taken last.
   std::uint32_t last_pnum() const { return next_pnum_ - 1; }
+  // Was it taken, for the board as it is now?
+  bool is_taken(std::uint32_t pnum) const { return pnum - first_pnum_ < next_pnum_ - first_pnum_; }
 
   // Milliseconds until poll() or heartbeat_due() may have something to say; 0 is now.
   std::uint32_t due_in(std::uint32_t now_ms) const;
@@ -109,8 +113,10 @@ class HostLink {
  private:
   void notice_boot(std::uint32_t t_ms, std::uint32_t now_ms);
   void forget_boot();
+  void renumber();
 
   LinkTiming timing_;
+  std::uint32_t first_pnum_;
   std::uint32_t next_pnum_;
   HostLinkState state_ = HostLinkState::connecting;
   SafeReason reason_ = SafeReason::none;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command line: encode and decode, bad input with exit code and message, help, completion."""
+"""The command line: bad input with its exit code and message, and what surrounds a program."""
 import json
 import os
 import pty
@@ -13,16 +13,9 @@ import time
 
 import pytest
 
-from r4_process import DATA, ERROR, PATIENCE_S, R4, SANITIZED, objects, run
+from r4_process import ERROR, PATIENCE_S, R4, objects, run
 
 DATA_BAD, USAGE, REFUSED, OPEN, PERMISSION, UNSUPPORTED = 1, 2, 3, 4, 5, 6
-COMMANDS = ['monitor', 'send', 'stop', 'list', 'doctor', 'bridge', 'bus', 'bench', 'record', 'info', 'convert', 'plot',
-            'replay', 'metrics', 'web', 'ros2', 'sim', 'key', 'demo', 'encode', 'decode', 'completion', 'man', 'devices']
-
-
-def captured_lines():
-    with open(os.path.join(DATA, 'paper_capture.tsv'), encoding='ascii') as file:
-        return [line.rstrip('\n').split('\t')[1] for line in file]
 
 
 # Of a fleet, one board after the other.
@@ -36,115 +29,6 @@ def test_a_program_that_may_open_no_more_files_says_so(command, tmp_path):
     assert result.returncode == OPEN, result.stderr
     assert 'this program may have 40 files open, and has them' in result.stderr and 'ulimit -n 160' in result.stderr
 
-
-# --- encode and decode
-
-def test_encodes_the_papers_command():
-    result = run('encode', 'O:358,1,1', '--pnum', '66', '--time', '1699276044383')
-    assert (result.returncode, result.stdout) == (0, 'O:358,1,1;PNum:66;T:1699276044383;^0x7fefae81^\n')
-
-
-def test_writes_a_checksum_without_leading_zeros():
-    result = run('encode', 'O:1,0,1', '--pnum', '67', '--time', '1699276044483')
-    assert result.stdout == 'O:1,0,1;PNum:67;T:1699276044483;^0xa13d0ac^\n'
-
-
-def test_encodes_every_captured_datagram_byte_for_byte():
-    form = re.compile(r'^(.*);PNum:(\d+);T:(\d+);\^')
-    lines = [line for line in captured_lines() if form.match(line)]
-    damaged = 0
-    for line in lines:
-        fields, pnum, t = form.match(line).groups()
-        written = run('encode', fields, '--pnum', pnum, '--time', t).stdout.rstrip('\n')
-        damaged += written != line
-    assert (len(lines), damaged) == (69, 2)
-
-
-def test_decodes_all_captured_datagrams_and_finds_the_two_damaged_ones():
-    lines = captured_lines()
-    result = run('decode', stdin='\n'.join(lines) + '\n')
-    decoded = objects(result.stdout)
-    assert result.returncode == DATA_BAD
-    assert len(decoded) == 71
-    assert [each['line'] for each in decoded] == list(range(1, 72))
-    assert [each['text'] for each in decoded] == lines
-    bad = [each for each in decoded if not each['ok']]
-    assert len(bad) == 2 and all(each['error'] == 'crc' for each in bad)
-    assert [re.search(r'PNum:(\d+)', each['text']).group(1) for each in bad] == ['7460', '7491']
-    assert (bad[0]['expected'], bad[0]['found']) == ('0xc9640169', '0x306eb6ac')
-    assert bad[0]['text'][bad[0]['position']:] == '306eb6ac^'
-
-
-def test_decodes_numbers_as_numbers_and_several_values_as_an_array():
-    first = objects(run('decode', stdin=captured_lines()[0]).stdout)[0]
-    text = first.pop('text')
-    assert text.startswith('AIN24:24.28;')
-    assert first == {
-        'line': 1, 'ok': True, 'type': 'state', 'pnum': 7434, 't': 79090,
-        'fields': {'AIN24': 24.28, 'AIN12': 12.12, 'AIN5': 5.12, 'AINDMH': 12.11, 'DMHSTA': 1,
-                   'AINSTEER': 1.03, 'DHB1A': [4095, 1], 'OSMC1': [400, 1], 'STEP1POS': -100,
-                   'SERVO1POS': 2000}}
-
-
-@pytest.mark.parametrize('fields, kind', [
-    ('O:358,1,1', 'command'), ('H:ROS2-R4', 'heartbeat'), ('H:R4-ROS2', 'heartbeat'),
-    ('N:66,RANGE', 'nack'), ('I:R4,0.1.0,sim-1,sim', 'identity'), ('AIN24:24.28;AIN12:1', 'state'),
-    ('V:1', 'command'), ('O:358,1,1;O:358,1,2;S:1500,3', 'command')])
-def test_decode_takes_what_encode_writes_and_names_its_type(fields, kind):
-    decoded = objects(run('decode', stdin=run('encode', fields).stdout).stdout)
-    assert len(decoded) == 1 and decoded[0]['ok'] and decoded[0]['type'] == kind
-    assert decoded[0]['pnum'] == 0 and decoded[0]['t'] > 1_600_000_000_000
-
-
-def test_decodes_the_commands_of_a_group_in_their_order():
-    datagram = run('encode', 'O:1,1,1;S:1500,3;O:2,1,2;O:3,1,3').stdout
-    assert objects(run('decode', stdin=datagram).stdout)[0]['fields'] == {
-        'O': [[1, 1, 1], [2, 1, 2], [3, 1, 3]], 'S': [1500, 3]}
-
-
-def test_decodes_a_heartbeat_without_a_packet_number():
-    decoded = objects(run('decode', stdin='H:ROS2-R4;T:79201;^0xf390d9ad^').stdout)
-    assert decoded[0]['pnum'] is None and decoded[0]['t'] == 79201
-
-
-def test_decode_counts_lines_whatever_ends_them():
-    good = run('encode', 'Q:ID', '--time', '1').stdout.strip()
-    result = run('decode', stdin=f'{good}\r\n{good}\n\n{good}\r{good}')
-    assert result.returncode == 0
-    assert [each['line'] for each in objects(result.stdout)] == [1, 2, 4, 5]
-
-
-def test_decode_goes_on_after_binary_junk():
-    good = run('encode', 'Q:ID', '--time', '1').stdout.encode()
-    junk = bytes(range(256)) * 20
-    result = subprocess.run([R4, 'decode'], input=junk + b'\n' + good, capture_output=True, check=False)
-    decoded = objects(result.stdout.decode('ascii'))
-    assert result.returncode == DATA_BAD
-    assert decoded[-1]['ok'] and decoded[-1]['fields'] == {'Q': 'ID'}
-    assert not any(each['ok'] for each in decoded[:-1])
-
-
-def test_decode_of_10_mb_without_a_terminator_needs_little_memory():
-    with subprocess.Popen([R4, 'decode'], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
-        process.stdin.write(b'x' * 10_000_000)
-        process.stdin.flush()
-        with open(f'/proc/{process.pid}/status', encoding='ascii') as status:
-            # Without the program and its libraries, which are files.
-            own_kib = int(re.search(r'RssAnon:\s*(\d+)', status.read()).group(1))
-        output, _ = process.communicate()
-    assert process.returncode == DATA_BAD
-    assert objects(output.decode()) == [
-        {'line': 1, 'ok': False, 'error': 'length', 'position': 1024, 'size': 10_000_000}]
-    print(f'its own memory {own_kib} KiB')
-    assert SANITIZED or own_kib < 4_000
-
-
-def test_decode_of_nothing_is_no_error():
-    result = run('decode')
-    assert (result.returncode, result.stdout) == (0, '')
-
-
-# --- bad input: exit code, and a message with the fix
 
 NO_BOARD = 'udp://127.0.0.1:9?listen=0'
 
@@ -246,11 +130,6 @@ def test_bad_input_has_its_exit_code_and_a_message_with_the_fix(arguments, code,
     assert result.returncode == code, result
     assert re.search(message, result.stderr), result.stderr
     assert ERROR.fullmatch(result.stderr.strip()), result.stderr
-
-
-def test_encode_force_writes_what_no_board_takes():
-    result = run('encode', 'O:5000,1,9', '--force', '--time', '1')
-    assert result.returncode == 0 and result.stdout.startswith('O:5000,1,9;')
 
 
 def test_a_wrong_command_keeps_all_from_being_sent():
@@ -383,122 +262,3 @@ def test_with_json_an_error_is_an_object_too():
     assert error['type'] == 'error' and error['kind'] == 'open'
     assert all(error[key] for key in ('thing', 'reason', 'fix'))
     assert f"r4: {error['thing']}: {error['reason']}; {error['fix']}\n" == result.stderr
-
-
-# --- help, list, completion
-
-def test_version():
-    result = run('--version')
-    assert result.returncode == 0 and re.fullmatch(r'r4 \d+\.\d+\.\d+\n', result.stdout)
-
-
-def test_help_names_every_command_url_and_exit_code():
-    result = run('--help')
-    assert result.returncode == 0 and result.stderr == ''
-    commands = result.stdout.split('\nCommands:\n')[1].split('\n\n')[0]
-    assert re.findall(r'^  (\S+) +\S', commands, re.MULTILINE) == COMMANDS
-    for word in ('udp://', 'serial:', 'pty:', 'sim:', 'Exit codes', 'r4 demo'):
-        assert word in result.stdout
-
-
-@pytest.mark.parametrize('command', COMMANDS)
-def test_help_of_every_command_teaches(command):
-    result = run(command, '--help')
-    assert result.returncode == 0
-    assert 'Usage: r4 ' + command in result.stdout and 'Exit codes' in result.stdout
-    assert max(len(line) for line in result.stdout.splitlines()) <= 110
-
-
-def test_list_names_ports_and_urls():
-    assert run('list').returncode == 0
-    listed = objects(run('list', '--json').stdout)
-    assert {'udp', 'serial', 'pty', 'sim'} <= {each.get('scheme') for each in listed}
-
-
-def complete(*words):
-    """What bash offers for the last word."""
-    script = '''
-        source "$1"; shift
-        COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1))
-        _r4; printf '%s\\n' "${COMPREPLY[@]}"'''
-    with tempfile.NamedTemporaryFile('w') as file:
-        file.write(run('completion', 'bash').stdout)
-        file.flush()
-        result = subprocess.run(['bash', '-c', script, 'bash', file.name, *words],
-                                capture_output=True, text=True, check=True)
-    assert result.stderr == ''
-    return result.stdout.split()
-
-
-def test_bash_completes_commands_options_urls_and_files():
-    assert complete('r4', 'mo') == ['monitor']
-    assert set(COMMANDS) <= set(complete('r4', ''))
-    assert complete('r4', 'monitor', '--js') == ['--json']
-    assert {'--count', '--duration', '--fields', '--help'} <= set(complete('r4', 'monitor', '--'))
-    assert complete('r4', 'sim', 'ud') == ['udp://']
-    assert complete('r4', 'monitor', '--count', '') == []
-    assert complete('r4', 'completion', '') == ['bash', 'zsh', 'fish']
-    assert complete('r4', 'decode', DATA + '/paper_c') == [DATA + '/paper_capture.tsv']
-    assert complete('r4', 'key', 'giv') == ['give']
-    assert complete('r4', 'send', '--key', DATA + '/paper_c') == [DATA + '/paper_capture.tsv']
-    assert complete('r4', 'sim', '--script', DATA + '/paper_c') == [DATA + '/paper_capture.tsv']
-
-
-def test_fish_completes_commands_options_urls_and_files(tmp_path):
-    script = tmp_path / 'r4.fish'
-    script.write_text(run('completion', 'fish').stdout)
-
-    def offered(*lines):
-        """The words that fish offers at the end of each line."""
-        asked = ''.join(f"complete -C '{line}'; echo; " for line in lines)
-        result = subprocess.run(['fish', '--no-config', '-c', f'source {script}; {asked}'], capture_output=True, text=True,
-                                check=True, env={**os.environ, 'HOME': str(tmp_path)})
-        assert result.stderr == ''
-        return [[word.split('\t')[0] for word in each.split('\n') if word]
-                for each in result.stdout.split('\n\n')[:len(lines)]]
-
-    commands, option, values, url, choices, path = offered(
-        'r4 ', 'r4 monitor --co', 'r4 monitor --count ', 'r4 --json monitor ud', 'r4 completion ',
-        f'r4 send --key {DATA}/paper_c')
-    assert set(COMMANDS) <= set(commands) and 'udp://' not in commands
-    assert option == ['--control', '--count']
-    assert not {'monitor', '--json'} & set(values)
-    assert url == ['udp://']
-    assert sorted(choices) == ['bash', 'fish', 'zsh']
-    assert path == [DATA + '/paper_capture.tsv']
-
-
-@pytest.mark.parametrize('shell', ['bash', 'zsh', 'fish'])
-def test_completion_scripts_are_valid_in_their_shell(shell):
-    script = run('completion', shell).stdout
-    assert all(command in script for command in COMMANDS)
-    result = subprocess.run([shell, '-n', '/dev/stdin'], input=script, capture_output=True, text=True,
-                            check=False)
-    assert (result.returncode, result.stderr) == (0, '')
-
-
-def test_manual_pages_say_what_the_help_says_and_checkers_find_nothing(tmp_path):
-    assert run('man', '--into', str(tmp_path)).returncode == 0
-    pages = sorted(tmp_path.iterdir())
-    assert {page.name for page in pages} >= {'r4.1', *(f'r4-{command}.1' for command in COMMANDS)}
-    lint = subprocess.run(['mandoc', '-T', 'lint', *pages], capture_output=True, text=True, check=False)
-    assert (lint.returncode, lint.stdout, lint.stderr) == (0, '', '')
-
-    def words_of(text):
-        return set(re.findall(r'[\w./=]{4,}', text.lower()))
-
-    for page in pages:
-        command = page.stem.removeprefix('r4').removeprefix('-')
-        shown = subprocess.run(['mandoc', '-T', 'utf8', '-O', 'width=500', page], capture_output=True, text=True,
-                               check=True).stdout
-        shown = re.sub('.\b', '', shown)  # what is bold or underlined is printed twice
-        told = run(*command.split(), '--help').stdout
-        assert words_of(told) - words_of(shown) <= {'usage', 'codes', 'excludes'}, command
-    assert run('man').stdout == (tmp_path / 'r4.1').read_text()
-    assert run('man', 'send').stdout == (tmp_path / 'r4-send.1').read_text()
-
-
-def test_every_json_line_of_decode_is_ascii():
-    result = subprocess.run([R4, 'decode'], input='gr\u00fc\u00dfe;\n'.encode(), capture_output=True,
-                            check=False)
-    assert json.loads(result.stdout.decode('ascii'))['text'] == 'gr\\xc3\\xbc\\xc3\\x9fe;'

@@ -45,17 +45,17 @@ def test_tells_of_boards_what_a_host_knows():
     with Board('udp://127.0.0.1:0') as left, Board('udp://127.0.0.1:0') as right:
         with Metrics(left.host_url, right.host_url) as metrics, driving(left.host_url, 'O:358,1,1'):
             def both_are_heard(samples):
-                return len(samples) == 2 and all(each.get(('r4_state_rate_hertz',), 0) > 90 and
+                return samples.keys() == {left.host_url, right.host_url} and all(each.get(('r4_state_rate_hertz',), 0) > 90 and
                                                  ('r4_clock_error_seconds',) in each for each in samples.values())
             samples = metrics.until(both_are_heard)
-            driven, idle = (samples[url] for url in sorted(samples, key=lambda url: samples[url][('r4_safe', 'link')]))
+            driven, idle = samples[left.host_url], samples[right.host_url]
             assert driven[('r4_safe', 'none')] == 1 and driven[('r4_safe', 'link')] == 0
             assert idle[('r4_safe', 'none')] == 0 and idle[('r4_safe', 'link')] == 1
             for each in (driven, idle):
                 assert each[('r4_up',)] == 1
                 assert 23 < each[('r4_analog_volts', 'AIN24')] < 26
                 assert each[('r4_states_total',)] > 0 and each[('r4_damaged_total',)] == 0
-                assert each[('r4_lost_total',)] == 0
+                assert each[('r4_lost_total',)] == each[('r4_restarts_total',)] == 0
                 assert 0 <= each[('r4_state_age_seconds',)] < 1
                 assert 0 < each[('r4_round_trip_seconds',)] < 0.1
                 assert 0 <= each[('r4_clock_error_seconds',)] < 0.1
@@ -86,6 +86,7 @@ def test_tells_of_each_of_several_wires(tmp_path):
                 assert len(of_the_wires(samples, name)) == 2 and min(of_the_wires(samples, name)) > 0
             board.end()
             metrics.until(lambda samples: sum(of_the_wires(samples, 'carrying')) < 2)
+            assert any(key[1:] == (board.host_url,) for key in samples[f'{board.host_url}+serial://{tmp_path}/board'])
 
 
 def test_a_board_that_is_not_there_is_down():
@@ -100,6 +101,8 @@ def test_wrong_uses_are_refused(tmp_path):
     for listen, code in (('nowhere', USAGE), ('127.0.0.1:', USAGE), ('192.0.2.1:9618', OPEN)):
         result = run('metrics', 'udp://127.0.0.1?listen=0', '--listen', listen, cwd=tmp_path)
         assert result.returncode == code and ERROR.search(result.stderr), result
+    result = run('metrics', 'udp://127.0.0.1:20000-20003?listen=0', 'udp://127.0.0.1:20002?listen=0')
+    assert result.returncode == USAGE and 'named twice' in result.stderr, result
     with Metrics('sim:') as metrics:
         taken = metrics.url.split('/')[2]
         result = run('metrics', 'sim:', '--listen', taken)

@@ -326,8 +326,9 @@ def test_its_node_is_listed_for_every_release(user_data, gid_size):
         assert not nodes
         raw = bytes.fromhex(peer.endpoint('writer', 'rt/robot/R4')['gid'])
         assert raw.ljust(gid_size, b'\0') in writers
-        assert (len(readers), len(writers)) == tuple(len(ros2.ready[kind]) + 4  # of the services
-                                                    for kind in ('subscriptions', 'publishers'))
+        services = 4
+        assert len(readers) == len(ros2.ready['subscriptions']) + services + 1  # `stop` has two
+        assert len(writers) == len(ros2.ready['publishers']) + services
         left = ros2.signal(signal.SIGINT)
         gone = peer.sample('ros_discovery_info', lambda data: data[:16] == listed[:16])
         assert nodes_of(gone, gid_size) == {}

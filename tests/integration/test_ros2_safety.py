@@ -90,6 +90,30 @@ def test_a_stop_of_an_outage_is_obeyed_when_the_link_is_back():
         assert pwm(newest_outputs(board), 1) == 0
 
 
+def test_a_stop_is_heard_of_who_does_not_publish_reliably_and_who_is_not_heard_is_told():
+    with armed() as (board, ros2, peer):
+        peer.writer('rt/stop', BOOL, reliability='best_effort')
+        ros2.logged('stop: 1 publishers')
+        again(lambda: peer.write('rt/stop', ON), lambda timeout: ros2.logged('E:STOP: confirmed', timeout=timeout))
+        board.state('SAFE', 'stop')
+        peer.writer('rt/osmc1/command', FLOAT32, reliability='best_effort', matched=False)
+        ros2.logged('osmc1/command: a publisher offers less')
+
+
+def test_a_zero_of_an_outage_ends_the_drive_when_the_link_is_back():
+    with armed('--deadline', '0') as (board, ros2, peer):
+        join(ros2, peer, 'osmc1/command', FLOAT32)
+        drive(board, peer, 'rt/osmc1/command', float32(0.5), lambda each: pwm(each, 1) == 2048)
+        board.signal(signal.SIGSTOP)
+        ros2.logged('silent')
+        again(lambda: peer.write('rt/osmc1/command', float32(0)),
+              lambda timeout: ros2.logged('a command was dropped', timeout=timeout))
+        board.signal(signal.SIGCONT)
+        board.outputs(lambda each: pwm(each, 1) == 0)  # for want of a host
+        board.outputs(lambda each: pwm(each, 1) == 2048)  # it resumes
+        board.outputs(lambda each: pwm(each, 1) == 0)
+
+
 def test_what_is_armed_as_soon_as_it_is_there_was_not_stopped_before():
     domain = own_domain()
     with Board('udp://127.0.0.1:0') as board:

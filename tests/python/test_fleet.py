@@ -67,6 +67,10 @@ def test_has_one_recording(fleet, tmp_path):
 def test_wrong_options_are_refused_as_a_boards_are(monkeypatch, tmp_path):
     with pytest.raises(r4link.UsageError, match='there is no such role'):
         r4link.Fleet('sim:', role='drive')
+    with pytest.raises(r4link.UsageError, match='for a Board alone'):
+        r4link.Fleet(r4link.with_link('sim:', 'loss=5%'))
+    with pytest.raises(r4link.UsageError, match='stop_retry'):
+        r4link.Fleet('sim:', stop_retry=0)
     monkeypatch.setenv('HOME', str(tmp_path))
     with pytest.raises(r4link.Error, match=str(tmp_path / 'none')):
         r4link.Fleet('sim:', key='~/none')

@@ -63,7 +63,8 @@ class SharedCarrier final : public Carrier,
   std::size_t max_size() const override { return own_->max_size(); }
   const std::string& name() const override { return name_; }
   const CarrierCounters& counters() const override {
-    return state_ == State::sharing ? shared_counters_ : own_->counters();
+    counted_ = own_->counters();
+    return counted_ += shared_counters_;
   }
 
  private:
@@ -120,7 +121,8 @@ class SharedCarrier final : public Carrier,
   std::optional<Problem> trouble_;  // why it is down, or the warning that stands
   Clock::time_point since_;         // we have no part in the wire
   Carrier::Handler* handler_ = nullptr;
-  CarrierCounters shared_counters_;
+  CarrierCounters shared_counters_;  // of what others carried for us
+  mutable CarrierCounters counted_;  // of it and our own
 };
 
 void SharedCarrier::open(Carrier::Handler& handler) {
@@ -393,10 +395,12 @@ void SharedCarrier::on_message(const ShareMessage& message) {
       handler_->on_oversize(message.text);
       break;
     case Kind::up:
+      if (!up_) ++shared_counters_.ups;
       name_ = std::string(message.text);
       tell({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
       break;
     case Kind::down:
+      if (up_) ++shared_counters_.downs;
       tell({CarrierEvent::Kind::down, message.problem});
       break;
     case Kind::warning:

@@ -9,6 +9,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "r4link/board.hpp"
@@ -27,6 +28,12 @@ void bind_fleet(py::module_& module);
 void bind_bridge(py::module_& module);
 void bind_recording(py::module_& module);
 void bind_simulation(py::module_& module);
+
+// Of a board and of a fleet.
+BoardOptions options_of(bool watch, bool arming, const std::string& fields,
+                        const std::optional<std::string>& key, int watch_rate_hz, int heartbeat_ms,
+                        int timeout_ms, int command_retry_ms, int stop_retry_ms, int stop_linger_ms,
+                        int identify_interval_ms, int callback_limit_ms);
 
 inline py::str to_str(Text text) { return {text.data(), text.size()}; }
 py::object to_python(Drive drive);

@@ -133,27 +133,6 @@ void collect_garbage(PyHeapTypeObject* heap) {
   };
 }
 
-BoardOptions options_of(bool watch, bool arming, const std::string& fields,
-                        const std::optional<std::string>& key, int watch_rate_hz, int heartbeat_ms,
-                        int timeout_ms, int command_retry_ms, int stop_retry_ms, int stop_linger_ms,
-                        int identify_interval_ms, int callback_limit_ms) {
-  BoardOptions options;
-  options.role = watch ? BoardRole::watch : BoardRole::control;
-  options.callback_limit = Ms(callback_limit_ms);
-  SessionOptions& session = options.session;
-  session.arming = arming ? Arming::required : Arming::off;
-  session.fields = fields;
-  if (key) session.key = load_key(*key);
-  session.watch_rate_hz = watch_rate_hz;
-  session.timing = {static_cast<std::uint32_t>(heartbeat_ms),
-                    static_cast<std::uint32_t>(timeout_ms)};
-  session.command_retry = Ms(command_retry_ms);
-  session.stop_retry = Ms(stop_retry_ms);
-  session.stop_linger = Ms(stop_linger_ms);
-  session.identify_interval = Ms(identify_interval_ms);
-  return options;
-}
-
 // The step is called with the GIL, what is between steps goes without.
 py::tuple run_loop(PyBoard& board, const control::LoopOptions& options, const py::function& step) {
   control::LoopReport report;
@@ -189,6 +168,27 @@ py::bytes bytes_of(Call call) {
 }
 
 }  // namespace
+
+BoardOptions options_of(bool watch, bool arming, const std::string& fields,
+                        const std::optional<std::string>& key, int watch_rate_hz, int heartbeat_ms,
+                        int timeout_ms, int command_retry_ms, int stop_retry_ms, int stop_linger_ms,
+                        int identify_interval_ms, int callback_limit_ms) {
+  BoardOptions options;
+  options.role = watch ? BoardRole::watch : BoardRole::control;
+  options.callback_limit = Ms(callback_limit_ms);
+  SessionOptions& session = options.session;
+  session.arming = arming ? Arming::required : Arming::off;
+  session.fields = fields;
+  if (key) session.key = load_key(*key);
+  session.watch_rate_hz = watch_rate_hz;
+  session.timing = {static_cast<std::uint32_t>(heartbeat_ms),
+                    static_cast<std::uint32_t>(timeout_ms)};
+  session.command_retry = Ms(command_retry_ms);
+  session.stop_retry = Ms(stop_retry_ms);
+  session.stop_linger = Ms(stop_linger_ms);
+  session.identify_interval = Ms(identify_interval_ms);
+  return options;
+}
 
 void bind_board(py::module_& module) {
   py::class_<Subscription>(module, "Subscription").def("cancel", &Subscription::cancel, Released());

@@ -151,20 +151,18 @@ void bind_fleet(py::module_& module) {
   py::class_<PyFleet>(module, "Fleet")
       .def(py::init([](const std::vector<std::string>& urls, bool watch, bool arming,
                        const std::string& fields, const std::optional<std::string>& key,
-                       int watch_rate_hz, int heartbeat, int timeout) {
-             BoardOptions options;
-             options.role = watch ? BoardRole::watch : BoardRole::control;
-             SessionOptions& session = options.session;
-             session.arming = arming ? Arming::required : Arming::off;
-             session.fields = fields;
-             if (key) session.key = load_key(*key);
-             session.watch_rate_hz = watch_rate_hz;
-             session.timing = {static_cast<std::uint32_t>(heartbeat),
-                               static_cast<std::uint32_t>(timeout)};
-             return std::make_unique<PyFleet>(urls, std::move(options));
+                       int watch_rate_hz, int heartbeat, int timeout, int command_retry,
+                       int stop_retry, int stop_linger, int identify_interval) {
+             constexpr int no_callbacks = 0;
+             return std::make_unique<PyFleet>(
+                 urls, options_of(watch, arming, fields, key, watch_rate_hz, heartbeat, timeout,
+                                  command_retry, stop_retry, stop_linger, identify_interval,
+                                  no_callbacks));
            }),
            py::arg("urls"), py::kw_only(), py::arg("watch"), py::arg("arming"), py::arg("fields"),
-           py::arg("key"), py::arg("watch_rate_hz"), py::arg("heartbeat"), py::arg("timeout"))
+           py::arg("key"), py::arg("watch_rate_hz"), py::arg("heartbeat"), py::arg("timeout"),
+           py::arg("command_retry"), py::arg("stop_retry"), py::arg("stop_linger"),
+           py::arg("identify_interval"))
       .def("close", &PyFleet::close, Released())
       .def("__len__", [](PyFleet& fleet) { return fleet->size(); })
       .def("url", [](PyFleet& fleet, std::size_t board) { return fleet->url(board); })

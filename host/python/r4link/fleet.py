@@ -82,17 +82,25 @@ class FleetResults(Sequence[FleetResult]):
 
 class Fleet:
     def __init__(self, *urls: str, role: str = 'control', arming: bool = True, key: str | os.PathLike[str] | None = None,
-                 fields: str = 'DEFAULT', watch_rate_hz: int = 100, heartbeat: float = 0.1,
-                 timeout: float = 1.0) -> None:
+                 fields: str = 'DEFAULT', watch_rate_hz: int = 100, heartbeat: float = 0.1, timeout: float = 1.0,
+                 command_retry: float = 0.05, stop_retry: float = 0.02, stop_linger: float = 0.2,
+                 identify_interval: float = 1.0) -> None:
         """Opens all transports and begins the links; returns without waiting for the boards.
 
-        Each of `urls` is a URL or a pattern of many: 'can://can0?node=0-7'. The options are those of Board.
+        Each of `urls` is a URL or a pattern of many: 'can://can0?node=0-7'. The options are those of Board. Raises
+        UsageError, OpenError or DeniedError where one of them cannot be opened.
         """
         if role not in ('control', 'watch'):
             raise UsageError(f'role {role!r}', 'there is no such role', "give 'control' or 'watch'")
+        for url in urls:
+            if getattr(url, 'link', ''):
+                raise UsageError(url, 'with_link() is for a Board alone, not for one of a Fleet',
+                                 'open it by a Board, or let the simulated board have the bad link (r4 sim --link)')
         self._core = _core.Fleet(list(urls), watch=role == 'watch', arming=arming, fields=fields,
                                  key=None if key is None else os.path.expanduser(os.fspath(key)),
-                                 watch_rate_hz=watch_rate_hz, heartbeat=_ms(heartbeat), timeout=_ms(timeout))
+                                 watch_rate_hz=watch_rate_hz, heartbeat=_ms(heartbeat), timeout=_ms(timeout),
+                                 command_retry=_ms(command_retry), stop_retry=_ms(stop_retry),
+                                 stop_linger=_ms(stop_linger), identify_interval=_ms(identify_interval))
         _open.add(self)
 
     def close(self) -> None:

@@ -198,7 +198,7 @@ TEST(Fleet, RefusesWhatIsNoFleet) {
   };
   EXPECT_EQ(problem({}).kind, ErrorKind::usage);
   EXPECT_EQ(problem({"sim:?node=0-3", "sim:?node=2"}).text(),
-            "sim:?node=2: it is in the fleet twice; name a board once");
+            "sim:?node=2: it is named twice; name a board once");
   EXPECT_EQ(problem({"udp://10.0.0.{1-"}).kind, ErrorKind::usage);
   EXPECT_EQ(problem({"sim:", "serial:///dev/no-such-port"}).kind, ErrorKind::open);
   Fleet fleet({"sim:?node=0-1"});

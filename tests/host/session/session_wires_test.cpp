@@ -15,13 +15,6 @@ namespace {
 using Cable = WiredRobot::Cable;
 using Cables = WiredRobot::Cables;
 
-std::vector<std::string> with_letter(const Cable& cable, char letter) {
-  std::vector<std::string> found;
-  for (const std::string& each : cable.sent) {
-    if (each.front() == letter) found.push_back(each);
-  }
-  return found;
-}
 bool executed_once(const WiredRobot& robot) {
   const auto& executed = robot.executed(0);
   return std::all_of(executed.begin(), executed.end(),
@@ -49,9 +42,9 @@ TEST(SessionWires, CarryTheSameBytes) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   robot.drive(100);
-  EXPECT_EQ(with_letter(robot.cables[0], 'H'), with_letter(robot.cables[1], 'H'));
-  EXPECT_EQ(with_letter(robot.cables[0], 'O'), with_letter(robot.cables[1], 'O'));
-  EXPECT_EQ(with_letter(robot.cables[0], 'O').size(), 1U);
+  EXPECT_EQ(robot.cables[0].all('H'), robot.cables[1].all('H'));
+  EXPECT_EQ(robot.cables[0].all('O'), robot.cables[1].all('O'));
+  EXPECT_EQ(robot.cables[0].all('O').size(), 1U);
   EXPECT_TRUE(executed_once(robot));
 }
 
@@ -194,7 +187,7 @@ TEST(SessionWires, TellARefusalOnce) {
 TEST(SessionWires, AreRefusedWhenAllOfThemAre) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
-  const std::string heartbeat = with_letter(robot.cables[0], 'H').back();
+  const std::string heartbeat = robot.cables[0].all('H').back();
   Datagram datagram;
   ASSERT_TRUE(read_datagram(heartbeat, datagram));
   const auto busy = [&](int number) {
@@ -212,7 +205,7 @@ TEST(SessionWires, AreNotRefusedByWhatTheBoardSaidBeforeItShowedThatItIsTheirs) 
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   Datagram datagram;
-  ASSERT_TRUE(read_datagram(with_letter(robot.cables[0], 'H').back(), datagram));
+  ASSERT_TRUE(read_datagram(robot.cables[0].all('H').back(), datagram));
   const std::string busy = with_crc("N:" + std::to_string(datagram.pnum()) +
                                     ",BUSY;PNum:1;T:" + std::to_string(robot.board_ms(0)) + ";");
   robot.run(50);  // states with CMD
@@ -226,7 +219,7 @@ TEST(SessionWires, AreBackInControlAsSoonAsAStateShowsIt) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   Datagram datagram;
-  ASSERT_TRUE(read_datagram(with_letter(robot.cables[0], 'H').back(), datagram));
+  ASSERT_TRUE(read_datagram(robot.cables[0].all('H').back(), datagram));
   const std::string busy = with_crc("N:" + std::to_string(datagram.pnum()) +
                                     ",BUSY;PNum:1;T:" + std::to_string(robot.board_ms(0)) + ";");
   robot.bring(0, busy);
@@ -247,7 +240,7 @@ TEST(SessionWires, ToTwoBoardsAreRefused) {
   robot.session->send(Command::osmc(1, Direction::forward, 1), WiredRobot::timeout, robot.now());
   robot.run(1000);
   for (const Cable& cable : robot.cables) {
-    EXPECT_EQ(with_letter(cable, 'Q').size(), cable.sent.size()) << "nothing but questions";
+    EXPECT_EQ(cable.all('Q').size(), cable.sent.size()) << "nothing but questions";
   }
   robot.plug(1, false);
   robot.cables[1].board = 0;  // the right one after all
@@ -280,7 +273,7 @@ TEST(SessionWires, GoOnWhenOneIsPluggedIntoAnotherBoard) {
   EXPECT_TRUE(robot.session->link().two_boards);
   EXPECT_EQ(robot.drive(3).outcome, Outcome::confirmed);
   EXPECT_TRUE(robot.executed(1).empty());
-  EXPECT_EQ(with_letter(robot.cables[2], 'Q').size(), robot.cables[2].sent.size());
+  EXPECT_EQ(robot.cables[2].all('Q').size(), robot.cables[2].sent.size());
 }
 
 TEST(SessionWires, BeginWithoutOneWhoseBoardDoesNotAnswer) {
@@ -289,48 +282,10 @@ TEST(SessionWires, BeginWithoutOneWhoseBoardDoesNotAnswer) {
   robot.connect();
   EXPECT_TRUE(robot.session->in_control(robot.now()));
   EXPECT_EQ(robot.session->wire_state(1), WireState::asking);
-  EXPECT_EQ(with_letter(robot.cables[1], 'Q').size(), robot.cables[1].sent.size());
+  EXPECT_EQ(robot.cables[1].all('Q').size(), robot.cables[1].sent.size());
   robot.cut(1, false);
   robot.run(200);
   EXPECT_EQ(robot.session->link().carrying, 3);
-}
-
-TEST(SessionWires, ShowOneRestartOfTheBoardAndAreBack) {
-  for (const std::uint32_t lag : {1U, 30U, 200U}) {
-    WiredRobot robot(Cables{{1}, {lag}});
-    robot.connect();
-    robot.run(1000);
-    robot.drive(1);
-    for (int boots = 1; boots <= 3; ++boots) {
-      robot.run(3000);
-      robot.reboot(0);
-      robot.run(2000);
-      EXPECT_EQ(robot.restarts, boots) << "lag " << lag;
-      EXPECT_TRUE(robot.session->in_control(robot.now())) << "lag " << lag;
-      EXPECT_EQ(robot.session->link().carrying, 3) << "lag " << lag;
-    }
-    EXPECT_EQ(robot.drive(2).outcome, Outcome::confirmed);
-  }
-}
-
-TEST(SessionWires, PassOverWhatIsAnHourOld) {
-  WiredRobot robot(Cables{{1}, {1}});
-  robot.connect();
-  const auto old = [&](std::uint32_t back_ms) {
-    return with_crc("AIN24:1.00;SAFE:0;PNum:17;T:" + std::to_string(robot.board_ms(0) - back_ms) +
-                    ";");
-  };
-  robot.told_states = 0;
-  for (int i = 0; i < 100; ++i) {
-    robot.bring(1, old(3'600'000));
-    robot.bring(1, old(5'000));
-    robot.run(10);
-  }
-  EXPECT_EQ(robot.restarts, 0);
-  EXPECT_FALSE(robot.went_back);
-  EXPECT_NEAR(static_cast<double>(robot.told_states), 100, 2);
-  EXPECT_TRUE(robot.session->in_control(robot.now()));
-  EXPECT_EQ(robot.trips, 0);
 }
 
 TEST(SessionWires, TakeAStateInPartsFromWhicheverBringsThem) {
@@ -386,7 +341,7 @@ TEST(SessionWires, AllCarryAStopWhoeverIsThere) {
   robot.plug(1, true);
   const Ticket early = robot.session->stop(WiredRobot::timeout, robot.now());
   for (const std::size_t wire : {0U, 1U}) {
-    EXPECT_EQ(with_letter(robot.cables[wire], 'E').size(), 1U) << "also before its board is known";
+    EXPECT_EQ(robot.cables[wire].all('E').size(), 1U) << "also before its board is known";
   }
   EXPECT_EQ(robot.finish(early).outcome, Outcome::confirmed);
   robot.run(1000);
@@ -452,81 +407,14 @@ TEST(SessionWires, AreSignedOnce) {
   robot.run(1000);
   ASSERT_TRUE(robot.session->in_control(robot.now()));
   EXPECT_EQ(robot.drive(9).outcome, Outcome::confirmed);
-  EXPECT_EQ(with_letter(robot.cables[0], 'O'), with_letter(robot.cables[1], 'O'));
-  EXPECT_NE(with_letter(robot.cables[0], 'O')[0].find(";A:1,"), std::string::npos);
+  EXPECT_EQ(robot.cables[0].all('O'), robot.cables[1].all('O'));
+  EXPECT_NE(robot.cables[0].all('O')[0].find(";A:1,"), std::string::npos);
   EXPECT_EQ(robot.session->link().carrying, 3);
   robot.cut(0);
   robot.run(1500);
   EXPECT_EQ(robot.drive(10).outcome, Outcome::confirmed);
   EXPECT_EQ(robot.trips, 0);
   EXPECT_TRUE(executed_once(robot));
-}
-
-TEST(SessionWires, BringWhatTheBoardSaidWhileItBootedTooLate) {
-  SessionOptions options = WiredRobot::at_will();
-  options.key = key_of(1);
-  options.clock_start = std::chrono::hours{1};
-  WiredRobot robot(Cables{{1}, {1}}, options, BoardRole::control, settings_with(key_of(1)));
-  robot.connect();
-  robot.links.clear();
-  const std::string t = std::to_string(robot.board_ms(0) - 600);
-  const std::string board_nonce = str(robot.board(0).authentication().nonce());
-  const std::string booting = with_crc("H:R4-ROS2;PNum:0;T:" + t + ";AN:" + board_nonce + ";");
-  robot.bring(0, booting);
-  robot.bring(1, booting);
-  robot.run(1500);
-  for (const LinkStatus& each : robot.links) EXPECT_TRUE(is_heard(each.state));
-  EXPECT_EQ(robot.trips, 0);
-  EXPECT_EQ(robot.drive(10).outcome, Outcome::confirmed);
-}
-
-// Whether the other wire is heard or not.
-TEST(SessionWires, AreNotEndedByALateWordThatTheBoardIsBooting) {
-  for (const bool alone : {false, true}) {
-    WiredRobot robot(Cables{{1}, {1}});
-    robot.connect();
-    if (alone) robot.plug(1, false);
-    robot.run(500);
-    robot.links.clear();
-    for (int i = 0; i < 20; ++i) {
-      robot.bring(0, with_crc("H:R4-ROS2;PNum:0;T:0;"));
-      robot.run(5);
-    }
-    robot.run(1500);
-    for (const LinkStatus& each : robot.links) EXPECT_TRUE(is_heard(each.state));
-    EXPECT_EQ(robot.restarts, 0);
-    EXPECT_EQ(robot.trips, 0);
-    EXPECT_EQ(robot.drive(10).outcome, Outcome::confirmed);
-  }
-}
-
-TEST(SessionWires, BeginAnewWhenTheAnswerToAWordOfBootingSaysSo) {
-  WiredRobot robot(Cables{{1}, {1}});
-  robot.connect();
-  robot.run(500);
-  for (Cable& cable : robot.cables) cable.sent.clear();
-  robot.bring(0, with_crc("H:R4-ROS2;PNum:0;T:0;"));
-  robot.run(110);
-  EXPECT_EQ(with_letter(robot.cables[0], 'Q').size(), with_letter(robot.cables[1], 'Q').size() + 1)
-      << "that wire is asked besides";
-  EXPECT_EQ(robot.restarts, 0);
-  robot.reboot(0);
-  robot.run(1500);
-  EXPECT_EQ(robot.restarts, 1);
-  EXPECT_TRUE(robot.session->in_control(robot.now()));
-}
-
-TEST(SessionWires, BeginAnewWhereNothingElseComes) {
-  WiredRobot robot(Cables{{1}, {1}});
-  robot.connect();
-  for (const std::size_t wire : {0U, 1U}) robot.cut(wire);
-  // No answer tells of another clock: it began again with nearly the same one.
-  for (int i = 0; i < 15; ++i) {
-    robot.bring(1, with_crc("H:R4-ROS2;PNum:0;T:0;"));
-    robot.run(100);
-  }
-  EXPECT_EQ(robot.session->link().state, HostLinkState::connecting);
-  EXPECT_NE(with_letter(robot.cables[1], 'H').back().find(";T:0;"), std::string::npos);
 }
 
 TEST(SessionWires, AreArmedTogether) {
@@ -546,8 +434,8 @@ TEST(SessionWires, HaveALeaseEachForWhoWatches) {
   robot.run(2000);
   EXPECT_EQ(robot.session->link().carrying, 3);
   for (const Cable& cable : robot.cables) {
-    EXPECT_GE(with_letter(cable, 'W').size(), 3U);
-    EXPECT_TRUE(with_letter(cable, 'H').empty());
+    EXPECT_GE(cable.all('W').size(), 3U);
+    EXPECT_TRUE(cable.all('H').empty());
   }
   robot.told_states = 0;
   robot.longest_gap_ms = 0;

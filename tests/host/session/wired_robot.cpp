@@ -2,6 +2,7 @@
 #include "wired_robot.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "protocol/link/board_link.hpp"
@@ -68,6 +69,13 @@ struct WiredRobot::Board final : firmware::Hal, firmware::Observer {
   std::map<std::uint32_t, int> executed;
 };
 
+std::vector<std::string> WiredRobot::Cable::all(char letter) const {
+  std::vector<std::string> found;
+  std::copy_if(sent.begin(), sent.end(), std::back_inserter(found),
+               [letter](const std::string& each) { return each.front() == letter; });
+  return found;
+}
+
 SessionOptions WiredRobot::at_will() {
   SessionOptions options;
   options.arming = Arming::off;
@@ -129,27 +137,34 @@ CommandResult WiredRobot::finish(Ticket ticket, std::uint32_t most_ms) {
 }
 
 void WiredRobot::run(std::uint32_t ms) {
-  for (; ms != 0; --ms) {
-    ++now_ms_;
-    for (std::size_t n = packets_.size(); n != 0; --n) {
-      Packet packet = std::move(packets_.front());
-      packets_.pop_front();
-      if (packet.at_ms > now_ms_) {
-        packets_.push_back(std::move(packet));
-      } else if (packet.to_board) {
-        Board& at = *boards_[cables[packet.wire].board];
-        for (const auto& end : at.ends) {
-          if (end->wire != packet.wire) continue;
-          at.application->receive(end->number, 1, Text(packet.bytes.data(), packet.bytes.size()),
-                                  at.now());
-        }
-      } else {
-        session->receive(packet.wire, packet.bytes, now());
+  for (; ms != 0; --ms) pass(false);
+}
+
+void WiredRobot::sleep(std::uint32_t ms) {
+  for (; ms != 0; --ms) pass(true);
+}
+
+void WiredRobot::pass(bool asleep) {
+  ++now_ms_;
+  if (asleep) ++slept_ms_;
+  for (std::size_t n = packets_.size(); n != 0; --n) {
+    Packet packet = std::move(packets_.front());
+    packets_.pop_front();
+    if (packet.at_ms > now_ms_) {
+      packets_.push_back(std::move(packet));
+    } else if (packet.to_board) {
+      Board& at = *boards_[cables[packet.wire].board];
+      for (const auto& end : at.ends) {
+        if (end->wire != packet.wire) continue;
+        at.application->receive(end->number, 1, Text(packet.bytes.data(), packet.bytes.size()),
+                                at.now());
       }
+    } else if (!asleep) {
+      session->receive(packet.wire, packet.bytes, now());
     }
-    for (const auto& each : boards_) each->application->poll(each->now());
-    session->poll(now());
   }
+  for (const auto& each : boards_) each->application->poll(each->now());
+  if (!asleep) session->poll(now());
 }
 
 void WiredRobot::put(std::size_t wire, bool to_board, std::string_view bytes) {

@@ -26,7 +26,8 @@ class WiredRobot final : private Session::Handler {
     std::size_t board;
     bool listens = false;  // a bus, for who watches: nobody is asked there who is there
     bool cut_to_board = false, cut_to_host = false;
-    std::vector<std::string> sent;  // by the host
+    std::vector<std::string> sent;                    // by the host
+    std::vector<std::string> all(char letter) const;  // of those, that begin with it
   };
 
   using Cables = std::vector<Cable>;
@@ -39,6 +40,8 @@ class WiredRobot final : private Session::Handler {
   // The transports of all wires come up, and the link has half a second.
   void connect();
   void run(std::uint32_t ms);
+  // The host's computer sleeps: its clock stands still, and what comes meanwhile is lost.
+  void sleep(std::uint32_t ms);
   // Untold: as a cable that is cut somewhere in a network.
   void cut(std::size_t wire, bool is_cut = true);
   // The transport tells: unplugged.
@@ -53,7 +56,7 @@ class WiredRobot final : private Session::Handler {
     return finish(session->send(Command::osmc(pwm, Direction::forward, 1), timeout, now()));
   }
 
-  Time now() const { return Time{now_ms_ * 1000}; }
+  Time now() const { return Time{(now_ms_ - slept_ms_) * 1000}; }
   std::uint32_t board_ms(std::size_t board) const;
   firmware::Application& board(std::size_t index);
   // How often each number was executed.
@@ -98,7 +101,10 @@ class WiredRobot final : private Session::Handler {
     results.emplace(ticket, result);
   }
 
+  void pass(bool asleep);
+
   std::int64_t now_ms_ = 5'000'000;
+  std::int64_t slept_ms_ = 0;
   std::int64_t last_state_ms_ = 0;
   std::uint32_t last_t_ms_ = 0;
   Settings settings_;

@@ -190,6 +190,27 @@ TEST_F(HostLinkTest, CountsEachRestartOfTheBoardOnce) {
   EXPECT_EQ(link.restarts(), 2U) << "also when its first heartbeats were lost";
 }
 
+TEST_F(HostLinkTest, TakesOtherNumbersWhereOnlyTheClockTellsOfARestart) {
+  heartbeat();
+  const std::uint32_t before = link.take_pnum();
+  now += 500;
+  board_offset += 60'000;  // or ours stood still
+  state();
+  ASSERT_EQ(link.restarts(), 1U);
+  EXPECT_FALSE(link.is_taken(before));
+  const std::uint32_t behind = link.take_pnum();
+  EXPECT_GT(behind - before, BoardLink::command_window) << "the board must not go on with them";
+  EXPECT_GT(before - behind, BoardLink::command_window);
+  EXPECT_GE(behind, echo_host_first_pnum);
+  EXPECT_TRUE(link.is_taken(behind));
+  now += 500;
+  board_offset += 60'000;
+  booting();
+  heartbeat();
+  ASSERT_EQ(link.restarts(), 2U);
+  EXPECT_EQ(link.take_pnum(), behind + 1) << "it knows that it has begun again, and no number";
+}
+
 TEST_F(HostLinkTest, ABootHeartbeatThatTheNetworkHeldBackIsNoRestart) {
   booting();
   heartbeat();

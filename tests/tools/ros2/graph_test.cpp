@@ -100,6 +100,24 @@ TEST(Ros2Transit, IsJudgedByTheFastestWhateverTheClocksSay) {
   EXPECT_LT(delay(50s, 5ms), 10ms);
 }
 
+TEST(Ros2Transit, IsNoFreerOfWhoWasSilentForLong) {
+  Transit transit(Transit::Clocks::two);
+  EXPECT_EQ(transit.delay(100s, 100s), 0s);
+  EXPECT_GT(transit.delay(100s + 24h, 103s + 24h), 2400ms) << "the network held it back";
+  EXPECT_LT(transit.delay(104s + 24h, 104s + 24h + 2ms), 5ms);
+}
+
+TEST(Ros2Transit, BelievesOneWhoSpeaksSeldomToo) {
+  Transit transit(Transit::Clocks::two);
+  EXPECT_EQ(transit.delay(100s, 100s), 0s);
+  int old = 0;
+  for (int i = 1; i <= 20; ++i) {
+    const auto now = 100s + i * 5s;
+    if (transit.delay(now - 3s, now) > 250ms) ++old;
+  }
+  EXPECT_EQ(old, 9) << "its clock was set";
+}
+
 TEST(Ros2Transit, IsKnownOfTheFirstSampleWhereThereIsOneClock) {
   Transit transit(Transit::Clocks::one);
   for (int i = 0; i < 200; ++i) {

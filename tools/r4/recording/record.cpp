@@ -102,10 +102,8 @@ class Recorders {
         signals_(io_),
         end_(io_) {
     std::vector<std::string> buses;
-    for (const std::string& pattern : options.urls) {
-      for (const PatternUrl& each : expand_urls(pattern)) {
-        is_whole_bus(each.url) ? buses.push_back(each.url) : add(each.url);
-      }
+    for (const PatternUrl& each : expand_urls(options.urls)) {
+      is_whole_bus(each.url) ? buses.push_back(each.url) : add(each.url);
     }
     recording_.emplace(options.file, limits_of(options));
     for (const std::string& bus : buses) {

@@ -67,68 +67,84 @@ BoardCommands::BoardCommands(AsyncBoard& board, Graph& graph, std::size_t node, 
 
 // --- topics
 
+template <class Message, class Value>
+void BoardCommands::add(Inbox& inbox, const std::string& topic,
+                        Inbox::Subscription<Message, Value> subscription) {
+  subscription.left = on_publishers(topic, std::move(subscription.left));
+  subscription.mismatched = [this, topic] {
+    warn(
+        fmt::format("{}: a publisher offers less than this subscription needs, and is not heard; "
+                    "have it publish reliably (QoS reliability: reliable)",
+                    topic));
+  };
+  inbox.add(std::move(subscription));
+}
+
+// Of who publishes reliably twice: a stop is a stop. Who does not, a micro-ROS button for one, is heard, too.
 void BoardCommands::subscribe_stop(Graph& graph, std::size_t node, Inbox& inbox) {
-  inbox.add<BoolMessage, bool>({
-      .reader = graph.subscribe<BoolMessage>(node, "stop"),
-      .room = 1,
-      .read = [](const BoolMessage& message) { return std::optional(message.data != 0); },
-      .urgent = [](bool pressed) { return pressed; },
-      .take =
-          [this](bool pressed, const Origin&) {
-            if (pressed) stop([](bool, const std::string&) {});
-          },
-      .left = on_publishers("stop"),
-  });
+  const auto subscribe = [&](bool reliable) {
+    Qos qos;
+    qos.reliable = reliable;
+    Inbox::Subscription<BoolMessage, bool> stops{
+        .reader = graph.subscribe<BoolMessage>(node, "stop", qos),
+        .room = 1,
+        .read = [](const BoolMessage& message) { return std::optional(message.data != 0); },
+        .urgent = [](bool pressed) { return pressed; },
+        .take =
+            [this](bool pressed, const Origin&) {
+              if (pressed) stop([](bool, const std::string&) {});
+            },
+        .left = {},
+        .mismatched = {},
+    };
+    reliable ? inbox.add(std::move(stops)) : add(inbox, "stop", std::move(stops));
+  };
+  subscribe(true);
+  subscribe(false);
 }
 
 void BoardCommands::subscribe_arm(Graph& graph, std::size_t node, Inbox& inbox) {
   Qos qos;
   qos.depth = 10;
-  inbox.add<BoolMessage, bool>({
-      .reader = graph.subscribe<BoolMessage>(node, "arm", qos),
-      .room = 8,
-      .read = [](const BoolMessage& message) { return std::optional(message.data == 1); },
-      .urgent = {},
-      .take =
-          [this](bool pressed, const Origin& origin) {
-            // Who repeats itself does not arm again what has been stopped since: the edge counts.
-            const bool edge = pressed && !pressed_.contains(origin.publisher);
-            if (pressed) {
-              pressed_.insert(origin.publisher);
-            } else {
-              pressed_.erase(origin.publisher);
-            }
-            if (!edge || is_stale(origin)) return;
-            if (is_overtaken(origin)) {
-              warn("arm: a stop came after it; arm again when the danger is over");
-            } else {
-              arm([](bool, const std::string&) {});
-            }
-          },
-      .left = on_publishers("arm",
-                            [this](const std::vector<std::uint64_t>& there) {
-                              std::erase_if(pressed_, [&there](std::uint64_t each) {
-                                return std::find(there.begin(), there.end(), each) == there.end();
-                              });
-                            }),
-  });
+  add<BoolMessage, bool>(
+      inbox, "arm",
+      {
+          .reader = graph.subscribe<BoolMessage>(node, "arm", qos),
+          .room = 8,
+          .read = [](const BoolMessage& message) { return std::optional(message.data == 1); },
+          .urgent = {},
+          .take =
+              [this](bool pressed, const Origin& origin) {
+                // Who repeats itself does not arm again what has been stopped since: the edge counts.
+                const bool edge = pressed_.on(origin.writer, pressed);
+                if (!edge || is_stale("arm", origin)) return;
+                if (is_overtaken(origin)) {
+                  warn("arm: a stop came after it; arm again when the danger is over");
+                } else {
+                  arm([](bool, const std::string&) {});
+                }
+              },
+          .left = {},
+          .mismatched = {},
+      });
 }
 
 void BoardCommands::subscribe_text(Graph& graph, std::size_t node, Inbox& inbox) {
   Qos qos;
   qos.depth = static_cast<int>(most_texts);  // each may be for another channel
   const void* const source = sources_.emplace_back(std::make_unique<int>()).get();
-  inbox.add<StringMessage, std::string>({
-      .reader = graph.subscribe<StringMessage>(node, "R4_Command", qos),
-      .room = most_texts,
-      .read = [](const StringMessage& message) { return text_of(bytes_of(message.data)); },
-      .urgent = [](const std::string& text) { return asks_to_stop(text); },
-      .take = [this, source](const std::string& text,
-                             const Origin& origin) { on_text(text, source, origin); },
-      .left = on_publishers(
-          "R4_Command",
-          [this, source](const auto& there) { drivers_.on_publishers(source, there); }),
-  });
+  add<StringMessage, std::string>(
+      inbox, "R4_Command",
+      {
+          .reader = graph.subscribe<StringMessage>(node, "R4_Command", qos),
+          .room = most_texts,
+          .read = [](const StringMessage& message) { return text_of(bytes_of(message.data)); },
+          .urgent = [](const std::string& text) { return asks_to_stop(text); },
+          .take = [this, source](const std::string& text,
+                                 const Origin& origin) { on_text(text, source, origin); },
+          .left = [this, source](const auto& there) { drivers_.on_publishers(source, there); },
+          .mismatched = {},
+      });
 }
 
 void BoardCommands::on_text(const std::string& text, const void* source, const Origin& origin) {
@@ -136,7 +152,7 @@ void BoardCommands::on_text(const std::string& text, const void* source, const O
     stop([](bool, const std::string&) {});
     return;
   }
-  if (is_stale(origin)) return;
+  if (is_stale("R4_Command", origin)) return;
   std::vector<Command> commands;
   try {
     commands = commands_of(text);
@@ -177,25 +193,29 @@ void BoardCommands::subscribe_output(Graph& graph, std::size_t node, Inbox& inbo
   Qos qos;
   qos.depth = 1;
   const void* const source = sources_.emplace_back(std::make_unique<int>()).get();
-  inbox.add<Message, double>({
-      .reader = graph.subscribe<Message>(node, topic, qos),
-      .room = 1,
-      .read =
-          [](const Message& message) { return std::optional(static_cast<double>(message.data)); },
-      .urgent = {},
-      .take =
-          [this, source, topic, to_command](double value, const Origin& origin) {
-            if (is_stale(origin)) return;
-            const std::optional<Command> command = to_command(value);
-            if (command) {
-              want(*command, source, origin);
-            } else {
-              warn(fmt::format("{}: {} is out of range; it changes nothing", topic, value));
-            }
-          },
-      .left = on_publishers(
-          topic, [this, source](const auto& there) { drivers_.on_publishers(source, there); }),
-  });
+  add<Message, double>(
+      inbox, topic,
+      {
+          .reader = graph.subscribe<Message>(node, topic, qos),
+          .room = 1,
+          .read =
+              [](const Message& message) {
+                return std::optional(static_cast<double>(message.data));
+              },
+          .urgent = {},
+          .take =
+              [this, source, topic, to_command](double value, const Origin& origin) {
+                if (is_stale(topic, origin)) return;
+                const std::optional<Command> command = to_command(value);
+                if (command) {
+                  want(*command, source, origin);
+                } else {
+                  warn(fmt::format("{}: {} is out of range; it changes nothing", topic, value));
+                }
+              },
+          .left = [this, source](const auto& there) { drivers_.on_publishers(source, there); },
+          .mismatched = {},
+      });
 }
 
 void BoardCommands::subscribe_outputs(Graph& graph, std::size_t node, Inbox& inbox) {
@@ -244,29 +264,31 @@ void BoardCommands::subscribe_drive(Graph& graph, std::size_t node, Inbox& inbox
   Qos qos;
   qos.depth = 1;
   const void* const source = sources_.emplace_back(std::make_unique<int>()).get();
-  inbox.add<TwistMessage, Speed>({
-      .reader = graph.subscribe<TwistMessage>(node, "cmd_vel", qos),
-      .room = 1,
-      .read =
-          [](const TwistMessage& message) {
-            return std::optional(Speed{message.linear.x, message.angular.z});
-          },
-      .urgent = {},
-      .take =
-          [this, source](const Speed& speed, const Origin& origin) {
-            if (is_stale(origin)) return;
-            const auto setpoints = options_.drive->setpoints(speed.linear, speed.angular);
-            if (!setpoints) {
-              warn("cmd_vel: a speed is no number; it changes nothing");
-              return;
-            }
-            for (std::size_t i = 0; i < setpoints->size(); ++i) {
-              want((*setpoints)[i], source, origin);
-            }
-          },
-      .left = on_publishers(
-          "cmd_vel", [this, source](const auto& there) { drivers_.on_publishers(source, there); }),
-  });
+  add<TwistMessage, Speed>(
+      inbox, "cmd_vel",
+      {
+          .reader = graph.subscribe<TwistMessage>(node, "cmd_vel", qos),
+          .room = 1,
+          .read =
+              [](const TwistMessage& message) {
+                return std::optional(Speed{message.linear.x, message.angular.z});
+              },
+          .urgent = {},
+          .take =
+              [this, source](const Speed& speed, const Origin& origin) {
+                if (is_stale("cmd_vel", origin)) return;
+                const auto setpoints = options_.drive->setpoints(speed.linear, speed.angular);
+                if (!setpoints) {
+                  warn("cmd_vel: a speed is no number; it changes nothing");
+                  return;
+                }
+                for (std::size_t i = 0; i < setpoints->size(); ++i) {
+                  want((*setpoints)[i], source, origin);
+                }
+              },
+          .left = [this, source](const auto& there) { drivers_.on_publishers(source, there); },
+          .mismatched = {},
+      });
 }
 
 // NOLINTEND(clang-analyzer-cplusplus.NewDeleteLeaks)
@@ -281,9 +303,13 @@ BoardCommands::Left BoardCommands::on_publishers(const std::string& topic, Left 
   };
 }
 
-bool BoardCommands::is_stale(const Origin& origin) {
+bool BoardCommands::is_stale(const std::string& what, const Origin& origin) {
   if (Clock::now() - origin.written <= oldest) return false;
   ++stale_;
+  warn(
+      fmt::format("{}: dropped: it was more than {} ms on its way; see what the network or this "
+                  "computer is busy with, and that the clocks of both computers go alike",
+                  what, oldest.count()));
   return true;
 }
 
@@ -331,13 +357,13 @@ void BoardCommands::post(std::size_t first, std::size_t count) {
     what = text_of(group);
     result = board_.post(group);
   }
-  if (!result) {
-    tell(what, result);
-    return;
-  }
+  if (!result) tell(what, result);
   const Clock::time_point now = Clock::now();
   for (std::size_t i = first; i < first + count; ++i) {
-    drivers_.on_sent(wanted_[i].command, wanted_[i].source, wanted_[i].publisher, now);
+    const Setpoint& each = wanted_[i];
+    // What is to rest is repeated until it does, also if it could not be sent.
+    if (!result && !Drivers::rests(each.command)) continue;
+    drivers_.on_sent(each.command, each.source, each.publisher, now);
   }
 }
 

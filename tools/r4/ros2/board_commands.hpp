@@ -14,7 +14,6 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -25,6 +24,7 @@
 #include "graph/outbox.hpp"
 #include "log_level.hpp"
 #include "node_options.hpp"
+#include "pressed.hpp"
 #include "r4link/async_board.hpp"
 
 namespace r4::tool::ros2 {
@@ -67,6 +67,10 @@ class BoardCommands {
   void subscribe_arm(Graph& graph, std::size_t node, Inbox& inbox);
 
   using Left = std::function<void(const std::vector<std::uint64_t>&)>;
+  // Tells of who comes, goes, or cannot be heard, too.
+  template <class Message, class Value>
+  void add(Inbox& inbox, const std::string& topic,
+           Inbox::Subscription<Message, Value> subscription);
   // What a service does for a request with that text.
   using Act =
       std::function<void(const std::optional<std::string>& text, const Origin&, const Done&)>;
@@ -78,11 +82,10 @@ class BoardCommands {
   void serve_all(Graph& graph, std::size_t node, Inbox& inbox);
   template <class RequestMessage, class Response>
   void serve(const Room& room, std::string name, const char* type, Act act, Left left);
-  // Tells of it, too.
-  Left on_publishers(const std::string& topic, Left left = {});
+  Left on_publishers(const std::string& topic, Left left);
 
   void warn(const std::string& text) const { say_(LogLevel::warning, text); }
-  bool is_stale(const Origin& origin);
+  bool is_stale(const std::string& what, const Origin& origin);
   bool is_overtaken(const Origin& origin) const { return origin.written <= stopped_; }
   // Why the board is not to be told that, in words; empty: nothing is in the way.
   std::string objection_to(const Command& command) const;
@@ -111,10 +114,10 @@ class BoardCommands {
   bool resting_ = false;    // what nobody drives is on its way to rest
   bool arming_ = false;
   asio::cancellation_signal give_up_arming_;
-  std::vector<Done> stops_;          // who waits for the stop that is under way
-  bool stopping_ = false;            // one is
-  Clock::time_point stopped_{};      // the newest stop: what was written before does not undo it
-  std::set<std::uint64_t> pressed_;  // publishers of `arm` whose newest message is true
+  std::vector<Done> stops_;      // who waits for the stop that is under way
+  bool stopping_ = false;        // one is
+  Clock::time_point stopped_{};  // the newest stop: what was written before does not undo it
+  Pressed pressed_;              // on `arm`
   std::uint64_t stale_ = 0;
   std::vector<std::unique_ptr<int>> sources_;  // what tells the topics apart
 };

@@ -72,27 +72,31 @@ void BoardCommands::serve(const Room& room, std::string name, const char* type, 
   const auto urgent = [stops](const Request& request) {
     return stops || (request.text && asks_to_stop(*request.text));
   };
-  room.inbox.add<RequestMessage, Request>({
-      .reader = service.requests,
-      .room = 4,
-      .read = [](const RequestMessage& request) { return std::optional(request_of(request)); },
-      .urgent = urgent,
-      .take =
-          [this, name, urgent, act = std::move(act), replies = service.replies](
-              const Request& request, const Origin& origin) {
-            const Done done = [this, replies, request](bool confirmed, const std::string& text) {
-              outbox_.push_attempt([replies, request, confirmed, text](bool last) {
-                return answer<Response>(replies, request, confirmed, text, last);
-              });
-            };
-            if (!urgent(request) && is_stale(origin)) {
-              done(false, fmt::format("{}: the request came too late: dropped", name));
-            } else {
-              act(request.text, origin, done);
-            }
-          },
-      .left = on_publishers(name, std::move(left)),
-  });
+  add<RequestMessage, Request>(
+      room.inbox, name,
+      {
+          .reader = service.requests,
+          .room = 4,
+          .read = [](const RequestMessage& request) { return std::optional(request_of(request)); },
+          .urgent = urgent,
+          .take =
+              [this, name, urgent, act = std::move(act), replies = service.replies](
+                  const Request& request, const Origin& origin) {
+                const Done done = [this, replies, request](bool confirmed,
+                                                           const std::string& text) {
+                  outbox_.push_attempt([replies, request, confirmed, text](bool last) {
+                    return answer<Response>(replies, request, confirmed, text, last);
+                  });
+                };
+                if (!urgent(request) && is_stale(name, origin)) {
+                  done(false, fmt::format("{}: the request came too late: dropped", name));
+                } else {
+                  act(request.text, origin, done);
+                }
+              },
+          .left = std::move(left),
+          .mismatched = {},
+      });
 }
 
 // NOLINTEND(clang-analyzer-cplusplus.NewDeleteLeaks)

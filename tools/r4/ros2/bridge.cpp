@@ -74,10 +74,7 @@ struct NamedUrl {
 // One board is in the namespace itself, several are each in one below it: board1, board2 …, or the numbers of a
 // pattern.
 std::vector<NamedUrl> named_urls(const BridgeOptions& options) {
-  std::vector<PatternUrl> urls;
-  for (const std::string& pattern : options.urls) {
-    for (PatternUrl& each : expand_urls(pattern)) urls.push_back(std::move(each));
-  }
+  const std::vector<PatternUrl> urls = expand_urls(options.urls);
   const bool numbered = options.urls.size() == 1;
   const NodeName base = node_name(options.space, options.name);
   std::vector<NamedUrl> named;

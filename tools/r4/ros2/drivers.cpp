@@ -19,8 +19,9 @@ constexpr std::array<Kind, 7> kinds{{{CommandKind::osmc, osmc_channels},
                                      {CommandKind::dac, dac_channels}}};
 constexpr int supply_relay = 1;
 
-// Does the output rest after it?
-bool rests(const Command& command) {
+}  // namespace
+
+bool Drivers::rests(const Command& command) {
   switch (command.kind) {
     case CommandKind::stepper:
       return false;
@@ -32,8 +33,6 @@ bool rests(const Command& command) {
       return command.value == 0;
   }
 }
-
-}  // namespace
 
 StateField position_of(int stepper) {
   constexpr std::array<StateField, stepper_channels> fields{

@@ -36,6 +36,8 @@ class Drivers {
   // A deadline of 0: only who has gone is missed.
   explicit Drivers(Duration deadline) : deadline_(deadline) {}
 
+  // Does an output rest after it?
+  static bool rests(const Command& command);
   // `source`: the topic; `publisher`: of that topic.
   void on_sent(const Command& command, const void* source, std::uint64_t publisher, Time now);
   // A datagram of the board, sampled then: where its steppers are.

@@ -9,6 +9,7 @@
 
 #include "protocol/messages/state_fields.hpp"
 #include "r4link/link.hpp"
+#include "transports/url_pattern.hpp"
 
 namespace r4::tool {
 namespace {
@@ -18,17 +19,27 @@ MetricLabels with(MetricLabels labels, const char* name, std::string value) {
   return labels;
 }
 
+// What counts may not go down, as what is lost does when it comes late.
+std::uint64_t lost_in_turn(const PacketCounters& packets) {
+  return std::uint64_t{packets.lost} + packets.late;
+}
+
 // Of several wires to a board each one.
-void describe_wires(const AsyncBoard& board, const MetricLabels& one, MetricFamilies& out) {
-  const std::vector<Wire> wires = board.wires();
+void describe_wires(const MetricBoard& each, const MetricLabels& one, MetricFamilies& out) {
+  const std::vector<std::string> urls = split_wires(each.url);
+  const std::vector<Wire> wires = each.board->wires();
   if (wires.size() < 2) return;
-  for (const Wire& wire : wires) {
-    const MetricLabels labels = with(one, "wire", wire.name);
+  for (std::size_t i = 0; i < wires.size(); ++i) {
+    const Wire& wire = wires[i];
+    const MetricLabels labels = with(one, "wire", urls[i]);
     out.gauge("r4_wire_carrying", "Of several wires to the board, does this one carry?", labels,
               wire.state == WireState::carrying ? 1 : 0);
     out.count("r4_wire_received_total", "Datagrams of the board by this wire.", labels,
               wire.packets.received);
-    out.count("r4_wire_lost_total", "Those that never came by it.", labels, wire.packets.lost);
+    out.count("r4_wire_lost_total", "Those that it did not bring in their turn.", labels,
+              lost_in_turn(wire.packets));
+    out.count("r4_wire_late_total", "Those of them that it brought later.", labels,
+              wire.packets.late);
     out.count("r4_wire_copies_total", "Those that another wire had brought before.", labels,
               wire.copies);
     if (wire.round_trip_us > 0) {
@@ -45,14 +56,15 @@ void describe_wires(const AsyncBoard& board, const MetricLabels& one, MetricFami
 
 }  // namespace
 
-void describe(const AsyncBoard& board, MetricFamilies& out) {
+void describe(const MetricBoard& each, MetricFamilies& out) {
+  const AsyncBoard& board = *each.board;
   const BoardIdentity& who = board.identity();
   const LinkStatus& link = board.link();
   const Statistics statistics = board.statistics();
   const ReceivedState& state = board.state();
   const CarrierCounters& carrier = board.carrier_counters();
   const bool up = link.state == HostLinkState::active || link.state == HostLinkState::safe;
-  const MetricLabels one{{"url", board.name()}};
+  const MetricLabels one{{"url", each.url}};
 
   out.gauge("r4_up", "The board is heard.", one, up ? 1 : 0);
   if (!who.board_id.empty()) {
@@ -68,16 +80,16 @@ void describe(const AsyncBoard& board, MetricFamilies& out) {
   out.count("r4_received_total", "Datagrams of the board.", one, statistics.received);
   out.count("r4_states_total", "Those of them that are states.", one, statistics.states);
   out.count("r4_damaged_total", "What came and was no datagram.", one, statistics.damaged);
-  out.count("r4_lost_total", "Datagrams of the board that never came.", one,
-            statistics.packets.lost);
+  out.count("r4_lost_total", "Datagrams of the board that did not come in their turn.", one,
+            lost_in_turn(statistics.packets));
   out.count("r4_duplicates_total", "Datagrams that came again.", one, statistics.packets.duplicate);
-  out.count("r4_late_total", "Datagrams that others overtook.", one, statistics.packets.late);
+  out.count("r4_late_total", "Those of them that came later.", one, statistics.packets.late);
   out.count("r4_restarts_total", "Times the board began again.", one, statistics.packets.restarts);
   out.count("r4_transport_bytes_total", "Bytes of datagrams.", with(one, "direction", "received"),
             carrier.rx_bytes);
   out.count("r4_transport_bytes_total", "", with(one, "direction", "sent"), carrier.tx_bytes);
   out.count("r4_transport_downs_total", "Times the transport was lost.", one, carrier.downs);
-  describe_wires(board, one, out);
+  describe_wires(each, one, out);
   if (!up) return;
   out.gauge("r4_state_rate_hertz", "States a second, over the last.", one,
             statistics.state_rate_hz);
@@ -107,9 +119,9 @@ void describe(const AsyncBoard& board, MetricFamilies& out) {
   }
 }
 
-std::string metrics_text(const std::vector<const AsyncBoard*>& boards) {
+std::string metrics_text(const std::vector<MetricBoard>& boards) {
   MetricFamilies families;
-  for (const AsyncBoard* board : boards) describe(*board, families);
+  for (const MetricBoard& each : boards) describe(each, families);
   return prometheus::TextSerializer().Serialize(families.take());
 }
 

@@ -53,10 +53,16 @@ class MetricFamilies {
   std::vector<prometheus::MetricFamily> families_;
 };
 
+// A board under the URL that the user gave: the same whenever the program is started.
+struct MetricBoard {
+  std::string url;
+  const AsyncBoard* board;
+};
+
 // What is told of one board.
-void describe(const AsyncBoard& board, MetricFamilies& out);
+void describe(const MetricBoard& each, MetricFamilies& out);
 
 // The same of several in the text format of Prometheus.
-std::string metrics_text(const std::vector<const AsyncBoard*>& boards);
+std::string metrics_text(const std::vector<MetricBoard>& boards);
 
 }  // namespace r4::tool

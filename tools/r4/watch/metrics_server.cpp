@@ -38,7 +38,7 @@ namespace {
 
 using prometheus::MetricFamily;
 
-// Where Prometheus finds no answer it knows that this program hangs.
+// Then the answer tells of no board, which is what `absent(r4_up)` looks for.
 constexpr std::chrono::seconds longest_collection{2};
 
 // A CAN interface: how long it was busy, and for which boards.
@@ -79,7 +79,7 @@ class Metrics final : public prometheus::Collectable {
  public:
   explicit Metrics(asio::io_context& io) : io_(io) {}
 
-  void add(AsyncBoard& board) { boards_.push_back(&board); }
+  void add(MetricBoard board) { boards_.push_back(std::move(board)); }
   void add(const BusMetrics& bus) { buses_.push_back(&bus); }
 
   std::vector<MetricFamily> Collect() const override {
@@ -93,13 +93,13 @@ class Metrics final : public prometheus::Collectable {
  private:
   std::vector<MetricFamily> describe_all() const {
     MetricFamilies families;
-    for (const AsyncBoard* board : boards_) r4::tool::describe(*board, families);
+    for (const MetricBoard& board : boards_) r4::tool::describe(board, families);
     for (const BusMetrics* bus : buses_) bus->describe(families);
     return families.take();
   }
 
   asio::io_context& io_;
-  std::vector<const AsyncBoard*> boards_;
+  std::vector<MetricBoard> boards_;
   std::vector<const BusMetrics*> buses_;
 };
 
@@ -128,14 +128,12 @@ class MetricsServer {
     BoardOptions board_options = with_key(options.key);
     board_options.role = BoardRole::watch;
     board_options.session.arming = Arming::off;  // it drives nothing
-    for (const std::string& pattern : options.urls) {
-      for (const PatternUrl& each : expand_urls(pattern)) {
-        boards_.push_back(std::make_unique<AsyncBoard>(io_, each.url, board_options));
-        metrics_->add(*boards_.back());
-        for (const std::string& wire : split_wires(each.url)) {
-          const Url url = Url::parse(wire);
-          if (url.scheme() == "can") interfaces_.try_emplace(can_interface_of(url));
-        }
+    for (const PatternUrl& each : expand_urls(options.urls)) {
+      boards_.push_back(std::make_unique<AsyncBoard>(io_, each.url, board_options));
+      metrics_->add({each.url, boards_.back().get()});
+      for (const std::string& wire : split_wires(each.url)) {
+        const Url url = Url::parse(wire);
+        if (url.scheme() == "can") interfaces_.try_emplace(can_interface_of(url));
       }
     }
   }

@@ -229,9 +229,7 @@ bool is_whole_bus(const std::string& text) {
 
 int monitor(const MonitorOptions& options) {
   std::vector<std::string> urls;
-  for (const std::string& pattern : options.urls) {
-    for (PatternUrl& each : expand_urls(pattern)) urls.push_back(std::move(each.url));
-  }
+  for (PatternUrl& each : expand_urls(options.urls)) urls.push_back(std::move(each.url));
   if (urls.size() == 1 && is_whole_bus(urls.front())) {
     const Url url = Url::parse(urls.front());
     const std::string& interface = can_interface_of(url);

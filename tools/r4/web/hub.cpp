@@ -143,9 +143,9 @@ void Hub::on_metrics(std::uint32_t request) {
   asio::post(io_, [this, request] {
     if (now() - metrics_made_ > metrics_age) {
       metrics_made_ = now();
-      std::vector<const AsyncBoard*> boards;
+      std::vector<MetricBoard> boards;
       for (const auto& each : boards_) {
-        if (each->board() != nullptr) boards.push_back(each->board());
+        if (each->board() != nullptr) boards.push_back({each->url(), each->board()});
       }
       metrics_ = metrics_text(boards);
     }

@@ -39,9 +39,7 @@ struct Options {
 
 int serve_web(const Options& options) {
   std::vector<std::string> urls;
-  for (const std::string& pattern : options.urls) {
-    for (PatternUrl& each : expand_urls(pattern)) urls.push_back(std::move(each.url));
-  }
+  for (PatternUrl& each : expand_urls(options.urls)) urls.push_back(std::move(each.url));
   web::HubOptions hub_options;
   hub_options.server.address = web::listen_address(options.listen);
   hub_options.server.origins = options.origins;

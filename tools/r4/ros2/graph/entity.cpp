@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <cstring>
+
 #include "r4link/error.hpp"
 
 namespace r4::tool::ros2 {
@@ -20,11 +22,25 @@ void Entity::reset() {
   if (entity_ > 0) (void)dds_delete(std::exchange(entity_, 0));
 }
 
+EntityId id_from(const dds_guid_t& guid) {
+  EntityId id{};
+  std::memcpy(id.data(), guid.v, id.size());
+  return id;
+}
+
+EntityId id_of(dds_entity_t entity) {
+  dds_guid_t guid{};
+  (void)dds_get_guid(entity, &guid);
+  return id_from(guid);
+}
+
 QosPtr make_qos(const Qos& qos) {
   QosPtr made(dds_create_qos());
   constexpr dds_data_representation_id_t xcdr1 = DDS_DATA_REPRESENTATION_XCDR1;
   dds_qset_data_representation(made.get(), 1, &xcdr1);
-  dds_qset_reliability(made.get(), DDS_RELIABILITY_RELIABLE, DDS_MSECS(100));
+  dds_qset_reliability(made.get(),
+                       qos.reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT,
+                       DDS_MSECS(100));
   dds_qset_history(made.get(), DDS_HISTORY_KEEP_LAST, qos.depth);
   if (qos.transient_local) {
     dds_qset_durability(made.get(), DDS_DURABILITY_TRANSIENT_LOCAL);

@@ -5,6 +5,8 @@
 
 #include <dds/dds.h>
 
+#include <array>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <utility>
@@ -36,8 +38,14 @@ class Entity {
   dds_entity_t entity_ = 0;
 };
 
+// What DDS tells a participant, a reader or a writer by, wherever it is.
+using EntityId = std::array<std::uint8_t, 16>;
+EntityId id_from(const dds_guid_t& guid);
+EntityId id_of(dds_entity_t entity);
+
 struct Qos {
-  int depth = 10;                // samples that are kept
+  int depth = 10;        // samples that are kept
+  bool reliable = true;  // as ROS is by default; a reader that is not takes from every writer
   bool transient_local = false;  // who comes later is told those, too
   dds_duration_t lifespan = DDS_INFINITY;
   std::string user_data;
@@ -48,7 +56,7 @@ struct DeleteQos {
 };
 using QosPtr = std::unique_ptr<dds_qos_t, DeleteQos>;
 
-// Reliable, as ROS does by default; a write waits for a slow reader for 100 ms at most.
+// A write waits for a slow reader for 100 ms at most.
 QosPtr make_qos(const Qos& qos);
 
 // A sample or value of Cyclone's that has to be given back.

@@ -98,7 +98,9 @@ dds_entity_t Graph::make_writer(std::size_t node, std::string_view topic, const 
 dds_entity_t Graph::make_reader(std::size_t node, std::string_view topic, const MessageType& type,
                                 const Qos& qos) {
   const std::string name = full_name(nodes_[node].name, topic);
-  subscriptions_.push_back({name, type.name});
+  if (subscriptions_.empty() || subscriptions_.back().name != name) {
+    subscriptions_.push_back({name, type.name});
+  }
   return add_reader(node, dds_topic(name), type, qos);
 }
 

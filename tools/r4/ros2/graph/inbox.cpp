@@ -11,6 +11,14 @@ constexpr std::chrono::milliseconds turn{10};
 constexpr int turns_saved = 3;                // by who was quiet
 constexpr std::size_t most_publishers = 256;  // of one topic, that are told apart
 
+EntityId writer_of(dds_entity_t reader, dds_instance_handle_t publication) {
+  dds_builtintopic_endpoint_t* const data = dds_get_matched_publication_data(reader, publication);
+  if (data == nullptr) return {};
+  const EntityId id = id_from(data->key);
+  dds_builtintopic_free_endpoint(data);
+  return id;
+}
+
 }  // namespace
 
 Inbox::Inbox(asio::io_context& io, dds_entity_t participant, Transit::Clocks clocks,
@@ -67,12 +75,17 @@ void Inbox::run() {
   }
 }
 
-Origin Inbox::origin_of(Source& source, const dds_sample_info_t& info) const {
+Origin Inbox::origin_of(dds_entity_t reader, Source& source, const dds_sample_info_t& info) const {
   const auto now = std::chrono::nanoseconds(dds_time());
-  if (source.transits.size() > most_publishers) source.transits.clear();
-  Transit& transit = source.transits.try_emplace(info.publication_handle, clocks_).first->second;
-  const auto delay = transit.delay(std::chrono::nanoseconds(info.source_timestamp), now);
-  return {info.publication_handle,
+  if (source.publishers.size() > most_publishers) source.publishers.clear();
+  auto known = source.publishers.find(info.publication_handle);
+  if (known == source.publishers.end()) {
+    const Source::Publisher publisher{writer_of(reader, info.publication_handle), Transit(clocks_)};
+    known = source.publishers.emplace(info.publication_handle, publisher).first;
+  }
+  const auto delay =
+      known->second.transit.delay(std::chrono::nanoseconds(info.source_timestamp), now);
+  return {info.publication_handle, known->second.writer,
           Clock::now() - std::chrono::duration_cast<Clock::duration>(delay)};
 }
 
@@ -85,10 +98,16 @@ void Inbox::look_at_publishers(dds_entity_t reader, Source& source,
   const dds_return_t count = dds_get_matched_publications(reader, there.data(), there.size());
   there.resize(
       std::clamp<std::size_t>(count < 0 ? 0 : static_cast<std::size_t>(count), 0, most_publishers));
-  std::erase_if(source.transits, [&there](const auto& each) {
+  std::erase_if(source.publishers, [&there](const auto& each) {
     return std::find(there.begin(), there.end(), each.first) == there.end();
   });
   if (left) put(source, Kind::publishers, [left, there = std::move(there)] { left(there); });
+}
+
+void Inbox::look_at_mismatches(dds_entity_t reader, const std::function<void()>& mismatched) {
+  dds_requested_incompatible_qos_status_t status{};
+  if (dds_get_requested_incompatible_qos_status(reader, &status) < 0) return;
+  if (mismatched && status.total_count_change > 0) asio::post(io_, mismatched);
 }
 
 void Inbox::put(Source& source, Kind kind, std::function<void()> deliver) {

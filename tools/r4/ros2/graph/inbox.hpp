@@ -33,7 +33,8 @@ namespace r4::tool::ros2 {
 
 // Who wrote a sample, and when.
 struct Origin {
-  std::uint64_t publisher = 0;                    // never the same for two
+  std::uint64_t publisher = 0;  // never the same for two
+  EntityId writer{};            // the same when it is back; 0: unknown, it has gone
   std::chrono::steady_clock::time_point written;  // by our clock, as far as it is known (Transit)
 };
 
@@ -58,6 +59,8 @@ class Inbox {
     std::function<void(const Value&, const Origin&)> take;
     // On the loop, when a publisher has gone: those that are left.
     std::function<void(const std::vector<std::uint64_t>&)> left;
+    // On the loop: somebody offers less than the reader asks for, so that nothing of his is read.
+    std::function<void()> mismatched;
   };
   // Before start().
   template <class Message, class Value>
@@ -89,14 +92,19 @@ class Inbox {
     Entity condition;
     std::deque<Waiting> waiting;
     std::size_t room = 1;
-    std::map<std::uint64_t, Transit> transits;
+    struct Publisher {
+      EntityId writer;
+      Transit transit;
+    };
+    std::map<std::uint64_t, Publisher> publishers;
   };
 
   template <class Message, class Value>
   void receive(const Subscription<Message, Value>& subscription, Source& source);
-  Origin origin_of(Source& source, const dds_sample_info_t& info) const;
+  Origin origin_of(dds_entity_t reader, Source& source, const dds_sample_info_t& info) const;
   void look_at_publishers(dds_entity_t reader, Source& source,
                           const std::function<void(const std::vector<std::uint64_t>&)>& left);
+  void look_at_mismatches(dds_entity_t reader, const std::function<void()>& mismatched);
   void put(Source& source, Kind kind, std::function<void()> deliver);
   // To the newest source.
   void attach(dds_entity_t entity);
@@ -135,11 +143,13 @@ void Inbox::add(Subscription<Message, Value> subscription) {
   source.room = subscription.room;
   source.condition =
       Entity(dds_create_readcondition(subscription.reader, DDS_ANY_STATE), "a subscription");
-  (void)dds_set_status_mask(subscription.reader, DDS_SUBSCRIPTION_MATCHED_STATUS);
+  (void)dds_set_status_mask(
+      subscription.reader, DDS_SUBSCRIPTION_MATCHED_STATUS | DDS_REQUESTED_INCOMPATIBLE_QOS_STATUS);
   const auto entity = subscription.reader;
   source.look = [this, &source, subscription = std::move(subscription)] {
     receive(subscription, source);
     look_at_publishers(subscription.reader, source, subscription.left);
+    look_at_mismatches(subscription.reader, subscription.mismatched);
   };
   attach(source.condition.get());
   attach(entity);
@@ -154,7 +164,7 @@ void Inbox::receive(const Subscription<Message, Value>& subscription, Source& so
   if (count <= 0) return;
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     if (!infos[i].valid_data) continue;
-    const Origin origin = origin_of(source, infos[i]);
+    const Origin origin = origin_of(subscription.reader, source, infos[i]);
     std::optional<Value> value = subscription.read(*static_cast<const Message*>(samples[i]));
     if (!value) {
       ++malformed_;

@@ -4,17 +4,12 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <cstring>
 #include <utility>
 
 namespace r4::tool::ros2 {
 namespace {
 
 constexpr std::size_t most_samples = 64;  // at once
-
-bool is_same(const dds_guid_t& guid, const EntityId& id) {
-  return std::memcmp(guid.v, id.data(), id.size()) == 0;
-}
 
 // What Cyclone tells of the process of a participant; others do not.
 std::string property(const dds_qos_t* qos, const char* name) {
@@ -39,6 +34,7 @@ Namesakes::Namesakes(dds_entity_t participant, const std::vector<Node>& nodes, T
 }
 
 void Namesakes::look() {
+  look_at_participants();  // each comes before its writers
   std::array<void*, most_samples> samples{};
   std::array<dds_sample_info_t, most_samples> infos{};
   for (;;) {
@@ -48,32 +44,38 @@ void Namesakes::look() {
     for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
       const auto& writer = *static_cast<const dds_builtintopic_endpoint_t*>(samples[i]);
       if (infos[i].instance_state != DDS_IST_ALIVE || !infos[i].valid_data ||
-          writer.topic_name == nullptr || is_same(writer.participant_key, own_)) {
+          writer.topic_name == nullptr || id_from(writer.participant_key) == own_) {
         continue;
       }
       const auto node = nodes_.find(writer.topic_name);
-      if (node != nodes_.end()) tell_(node->second, who_is(writer.participant_key));
+      if (node == nodes_.end()) continue;
+      const auto who = participants_there_.find(id_from(writer.participant_key));
+      tell_(node->second, who == participants_there_.end() ? "somebody" : who->second);
     }
     (void)dds_return_loan(writers_.get(), samples.data(), count);
   }
 }
 
-std::string Namesakes::who_is(const dds_guid_t& participant) const {
+void Namesakes::look_at_participants() {
   std::array<void*, most_samples> samples{};
   std::array<dds_sample_info_t, most_samples> infos{};
-  const dds_return_t count =
-      dds_read(participants_.get(), samples.data(), infos.data(), most_samples, most_samples);
-  std::string who = "somebody";
-  for (std::size_t i = 0; count > 0 && i < static_cast<std::size_t>(count); ++i) {
-    const auto& each = *static_cast<const dds_builtintopic_participant_t*>(samples[i]);
-    if (std::memcmp(each.key.v, participant.v, sizeof participant.v) != 0) continue;
-    const std::string process = property(each.qos, "__Pid");
-    if (!process.empty()) {
-      who = fmt::format("process {} on {}", process, property(each.qos, "__Hostname"));
+  for (;;) {
+    const dds_return_t count =
+        dds_take(participants_.get(), samples.data(), infos.data(), most_samples, most_samples);
+    if (count <= 0) return;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+      const auto& each = *static_cast<const dds_builtintopic_participant_t*>(samples[i]);
+      if (infos[i].instance_state != DDS_IST_ALIVE || !infos[i].valid_data) {
+        participants_there_.erase(id_from(each.key));
+        continue;
+      }
+      const std::string process = property(each.qos, "__Pid");
+      if (process.empty()) continue;
+      participants_there_[id_from(each.key)] =
+          fmt::format("process {} on {}", process, property(each.qos, "__Hostname"));
     }
+    (void)dds_return_loan(participants_.get(), samples.data(), count);
   }
-  if (count > 0) (void)dds_return_loan(participants_.get(), samples.data(), count);
-  return who;
 }
 
 }  // namespace r4::tool::ros2

@@ -25,11 +25,12 @@ class Namesakes {
   void look();
 
  private:
-  std::string who_is(const dds_guid_t& participant) const;
+  void look_at_participants();
 
   const EntityId own_;
   std::map<std::string, NodeName> nodes_;  // by the topic on which they would answer
   const Tell tell_;
+  std::map<EntityId, std::string> participants_there_;  // who they are, of those that say so
   Entity participants_;
   Entity writers_;
 };

@@ -14,12 +14,6 @@ namespace {
 
 constexpr const char* listing_topic = "ros_discovery_info";
 
-EntityId id_from(const dds_guid_t& guid) {
-  EntityId id{};
-  std::memcpy(id.data(), guid.v, id.size());
-  return id;
-}
-
 template <class Gid>
 Gid gid_from(const EntityId& id) {
   Gid gid{};  // the rest of a longer one is zero
@@ -56,12 +50,6 @@ void write(dds_entity_t writer, const EntityId& participant, const std::vector<N
 }
 
 }  // namespace
-
-EntityId id_of(dds_entity_t entity) {
-  dds_guid_t guid{};
-  (void)dds_get_guid(entity, &guid);
-  return id_from(guid);
-}
 
 std::optional<Release> release_of(const std::string& distro) {
   if (distro.empty()) return std::nullopt;

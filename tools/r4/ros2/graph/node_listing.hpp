@@ -7,7 +7,6 @@
 // it is. Of two releases in one graph the first counts; ROS itself does not mix them either.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -18,9 +17,6 @@
 #include "names.hpp"
 
 namespace r4::tool::ros2 {
-
-using EntityId = std::array<std::uint8_t, 16>;
-EntityId id_of(dds_entity_t entity);
 
 struct Node {
   NodeName name;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // How long a sample was under way, as far as that can be known. In a graph of one computer the clock tells: there is
 // one. The clocks of two computers differ, so what counts is by how much it was slower than the fastest of its
-// publisher. They may drift apart by 0.1 %. One that was set makes all samples look slow: where they come for ten
-// seconds without a break and none is fast, that is believed. The first sample of a publisher has nothing to be
+// publisher. They may drift apart by 0.02 %, but never by more than half a second between two samples: of who is silent
+// for long, one that a network held back would pass for fresh. A clock that was set makes all samples look slow: where
+// none is fast, of ten or more that take ten seconds, that is believed. The first sample of a publisher has nothing to be
 // compared with.
 #pragma once
 
@@ -27,15 +28,16 @@ class Transit {
     const Duration elapsed = std::max(received - last_, Duration(0));
     last_ = received;
     if (!least_) least_ = difference;
-    least_ = std::min(*least_ + elapsed / drift, difference);
+    const Duration drifted = std::min<Duration>(elapsed / drift, most_drifted);
+    least_ = std::min(*least_ + drifted, difference);
     const Duration delay = difference - *least_;
     if (delay <= slow) {
       slow_.reset();
       return delay;
     }
-    if (!slow_ || elapsed > longest_break) slow_ = Slow{received, difference};
+    if (!slow_) slow_ = Slow{received, difference, 0};
     slow_->least = std::min(slow_->least, difference);
-    if (received - slow_->since < patience) return delay;
+    if (++slow_->samples < enough || received - slow_->since < patience) return delay;
     least_ = slow_->least;
     slow_.reset();
     return difference - *least_;
@@ -45,15 +47,17 @@ class Transit {
   struct Slow {
     Duration since;
     Duration least;
+    int samples;
   };
-  static constexpr int drift = 1000;
+  static constexpr int drift = 5000;
+  static constexpr std::chrono::milliseconds most_drifted{500};
   static constexpr std::chrono::milliseconds slow{200};
-  static constexpr std::chrono::seconds longest_break{1};
   static constexpr std::chrono::seconds patience{10};
+  static constexpr int enough = 10;
   const Clocks clocks_;
   Duration last_{0};
   std::optional<Duration> least_;
-  std::optional<Slow> slow_;  // samples that come without a break, all of them slow
+  std::optional<Slow> slow_;  // samples of which none was fast
 };
 
 }  // namespace r4::tool::ros2

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A host whose computer slept, opposite the real board: its clock stood still, and it takes the board for one that has
+// begun again.
+#include <gtest/gtest.h>
+
+#include "wired_robot.hpp"
+
+namespace r4::test {
+namespace {
+
+using Cable = WiredRobot::Cable;
+using Cables = WiredRobot::Cables;
+
+class SleepingHost : public ::testing::TestWithParam<Cables> {
+ protected:
+  static bool drives(WiredRobot& robot) { return robot.board(0).outputs().osmc[0].pwm != 0; }
+
+  WiredRobot robot{GetParam()};
+};
+
+// The board's setting `recovery` is `last`: it drives on where a session goes on.
+TEST_P(SleepingHost, FindsTheMotorsOffAndLeavesThemOff) {
+  robot.connect();
+  ASSERT_EQ(robot.drive(100).outcome, Outcome::confirmed);
+  robot.sleep(60'000);
+  ASSERT_FALSE(drives(robot));
+  for (int ms = 0; ms < 5000; ++ms) {
+    robot.run(1);
+    ASSERT_FALSE(drives(robot)) << ms << " ms behind its waking";
+  }
+  EXPECT_EQ(robot.restarts, 1);
+  EXPECT_TRUE(robot.session->in_control(robot.now()));
+}
+
+TEST_P(SleepingHost, IsObeyedAgain) {
+  robot.connect();
+  ASSERT_EQ(robot.drive(100).outcome, Outcome::confirmed);
+  robot.sleep(60'000);
+  robot.run(2000);
+  EXPECT_EQ(robot.drive(50).outcome, Outcome::confirmed);
+  EXPECT_TRUE(drives(robot));
+}
+
+// A nap that the clocks of two boots do not tell from what a network does is an outage.
+TEST_P(SleepingHost, GoesOnBehindAShortNapAsBehindAnOutage) {
+  robot.connect();
+  ASSERT_EQ(robot.drive(100).outcome, Outcome::confirmed);
+  robot.sleep(3000);
+  ASSERT_FALSE(drives(robot));
+  robot.run(2000);
+  EXPECT_EQ(robot.restarts, 0);
+  EXPECT_TRUE(drives(robot));
+}
+
+INSTANTIATE_TEST_SUITE_P(Wires, SleepingHost,
+                         ::testing::Values(Cables{{1}}, Cables{{40}}, Cables{{1}, {5}}));
+
+}  // namespace
+}  // namespace r4::test

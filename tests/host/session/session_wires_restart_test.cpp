@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One session over several wires, opposite a board that begins again, and what looks like it (docs/redundancy.md).
+#include <gtest/gtest.h>
+
+#include "tests/support/datagrams.hpp"
+#include "tests/support/signing.hpp"
+#include "wired_robot.hpp"
+
+namespace r4::test {
+namespace {
+
+using Cable = WiredRobot::Cable;
+using Cables = WiredRobot::Cables;
+
+TEST(SessionWires, ShowOneRestartOfTheBoardAndAreBack) {
+  for (const std::uint32_t lag : {1U, 30U, 200U}) {
+    WiredRobot robot(Cables{{1}, {lag}});
+    robot.connect();
+    robot.run(1000);
+    robot.drive(1);
+    for (int boots = 1; boots <= 3; ++boots) {
+      robot.run(3000);
+      robot.reboot(0);
+      robot.run(2000);
+      EXPECT_EQ(robot.restarts, boots) << "lag " << lag;
+      EXPECT_TRUE(robot.session->in_control(robot.now())) << "lag " << lag;
+      EXPECT_EQ(robot.session->link().carrying, 3) << "lag " << lag;
+    }
+    EXPECT_EQ(robot.drive(2).outcome, Outcome::confirmed);
+  }
+}
+
+TEST(SessionWires, PassOverWhatIsAnHourOld) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  const auto old = [&](std::uint32_t back_ms) {
+    return with_crc("AIN24:1.00;SAFE:0;PNum:17;T:" + std::to_string(robot.board_ms(0) - back_ms) +
+                    ";");
+  };
+  robot.told_states = 0;
+  for (int i = 0; i < 100; ++i) {
+    robot.bring(1, old(3'600'000));
+    robot.bring(1, old(5'000));
+    robot.run(10);
+  }
+  EXPECT_EQ(robot.restarts, 0);
+  EXPECT_FALSE(robot.went_back);
+  EXPECT_NEAR(static_cast<double>(robot.told_states), 100, 2);
+  EXPECT_TRUE(robot.session->in_control(robot.now()));
+  EXPECT_EQ(robot.trips, 0);
+}
+
+TEST(SessionWires, BringWhatTheBoardSaidWhileItBootedTooLate) {
+  SessionOptions options = WiredRobot::at_will();
+  options.key = key_of(1);
+  options.clock_start = std::chrono::hours{1};
+  WiredRobot robot(Cables{{1}, {1}}, options, BoardRole::control, settings_with(key_of(1)));
+  robot.connect();
+  robot.links.clear();
+  const std::string t = std::to_string(robot.board_ms(0) - 600);
+  const std::string board_nonce = str(robot.board(0).authentication().nonce());
+  const std::string booting = with_crc("H:R4-ROS2;PNum:0;T:" + t + ";AN:" + board_nonce + ";");
+  robot.bring(0, booting);
+  robot.bring(1, booting);
+  robot.run(1500);
+  for (const LinkStatus& each : robot.links) EXPECT_TRUE(is_heard(each.state));
+  EXPECT_EQ(robot.trips, 0);
+  EXPECT_EQ(robot.drive(10).outcome, Outcome::confirmed);
+}
+
+// Whether the other wire is heard or not.
+TEST(SessionWires, AreNotEndedByALateWordThatTheBoardIsBooting) {
+  for (const bool alone : {false, true}) {
+    WiredRobot robot(Cables{{1}, {1}});
+    robot.connect();
+    if (alone) robot.plug(1, false);
+    robot.run(500);
+    robot.links.clear();
+    for (int i = 0; i < 20; ++i) {
+      robot.bring(0, with_crc("H:R4-ROS2;PNum:0;T:0;"));
+      robot.run(5);
+    }
+    robot.run(1500);
+    for (const LinkStatus& each : robot.links) EXPECT_TRUE(is_heard(each.state));
+    EXPECT_EQ(robot.restarts, 0);
+    EXPECT_EQ(robot.trips, 0);
+    EXPECT_EQ(robot.drive(10).outcome, Outcome::confirmed);
+  }
+}
+
+TEST(SessionWires, BeginAnewWhenTheAnswerToAWordOfBootingSaysSo) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  robot.run(500);
+  for (Cable& cable : robot.cables) cable.sent.clear();
+  robot.bring(0, with_crc("H:R4-ROS2;PNum:0;T:0;"));
+  robot.run(110);
+  EXPECT_EQ(robot.cables[0].all('Q').size(), robot.cables[1].all('Q').size() + 1)
+      << "that wire is asked besides";
+  EXPECT_EQ(robot.restarts, 0);
+  robot.reboot(0);
+  robot.run(1500);
+  EXPECT_EQ(robot.restarts, 1);
+  EXPECT_TRUE(robot.session->in_control(robot.now()));
+}
+
+TEST(SessionWires, BeginAnewWhereNothingElseComes) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  for (const std::size_t wire : {0U, 1U}) robot.cut(wire);
+  // No answer tells of another clock: it began again with nearly the same one.
+  for (int i = 0; i < 15; ++i) {
+    robot.bring(1, with_crc("H:R4-ROS2;PNum:0;T:0;"));
+    robot.run(100);
+  }
+  EXPECT_EQ(robot.session->link().state, HostLinkState::connecting);
+  EXPECT_NE(robot.cables[1].all('H').back().find(";T:0;"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace r4::test

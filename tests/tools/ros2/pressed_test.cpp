@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/r4/ros2/pressed.hpp"
+
+#include <gtest/gtest.h>
+
+namespace r4::tool::ros2 {
+namespace {
+
+EntityId number(int n) {
+  return {static_cast<std::uint8_t>(n), static_cast<std::uint8_t>(n >> 8), 1};
+}
+
+TEST(Ros2Pressed, CountsOnceUntilItIsLetGo) {
+  Pressed pressed;
+  EXPECT_FALSE(pressed.on(number(1), false));
+  EXPECT_TRUE(pressed.on(number(1), true));
+  EXPECT_FALSE(pressed.on(number(1), true)) << "it repeats itself";
+  EXPECT_TRUE(pressed.on(number(2), true)) << "somebody else";
+  EXPECT_FALSE(pressed.on(number(1), false));
+  EXPECT_TRUE(pressed.on(number(1), true));
+}
+
+TEST(Ros2Pressed, ForgetsWhomItHasNotHeardForLongest) {
+  Pressed pressed;
+  for (int n = 0; n < static_cast<int>(Pressed::most); ++n)
+    EXPECT_TRUE(pressed.on(number(n), true));
+  EXPECT_FALSE(pressed.on(number(0), true)) << "the newest now";
+  EXPECT_TRUE(pressed.on(number(1000), true));
+  EXPECT_FALSE(pressed.on(number(0), true));
+  EXPECT_TRUE(pressed.on(number(1), true)) << "forgotten";
+}
+
+}  // namespace
+}  // namespace r4::tool::ros2
