@@ -195,6 +195,7 @@ TEST_F(SharedCarrier, AnotherTakesTheWireOverFromOneThatEnds) {
   }
   EXPECT_EQ(device.opened, 5);
   EXPECT_EQ(programs.front()->heard.count(Kind::down), 0U);
+  EXPECT_GE(programs.front()->carrier->counters().rx_datagrams, 3U) << "heard of four others";
 }
 
 TEST_F(SharedCarrier, TroubleOfTheWireIsToldToAll) {
@@ -210,6 +211,9 @@ TEST_F(SharedCarrier, TroubleOfTheWireIsToldToAll) {
   ASSERT_TRUE(run_until(io, [&] { return late->heard.count(Kind::down) == 1; }));
   device.report({CarrierEvent::Kind::up, Problem{ErrorKind::open, "device:", "", ""}});
   ASSERT_TRUE(run_until(io, [&] { return late->carrier->up() && early->carrier->up(); }));
+  EXPECT_EQ(early->carrier->counters().downs, 1U);
+  EXPECT_EQ(early->carrier->counters().ups, 2U);
+  EXPECT_EQ(late->carrier->counters().downs, 0U) << "it was down when it came";
 }
 
 TEST_F(SharedCarrier, AHolderThatDoesNotAnswerIsNamed) {
