@@ -255,6 +255,7 @@ class Session {
   void on_post_refused(const Nack& nack);
   void confirm_stop(const SafeReport& report, Time now);
   void confirm_leave(const SafeReport& report, std::uint32_t t_ms, Time now);
+  bool is_behind_leave(std::uint32_t t_ms) const;
   void on_causes(std::int32_t newest, Time now);
   bool name_cause(Pending& pending) const;
   void repeat_stop(Time now);
@@ -286,6 +287,7 @@ class Session {
   std::uint32_t restarts_ = 0;       // of the board, those that were told
   std::optional<bool> knows_leave_;  // does the board?
   bool leaving_ = false;
+  Time left_at_{0};
   std::optional<std::uint32_t> left_ms_;  // of several wires: the T of the newest state by then
   bool transport_down_ = false;
   bool group_waits_ = false;  // for the answer to Q:ID

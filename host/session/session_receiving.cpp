@@ -284,15 +284,23 @@ void Session::confirm_stop(const SafeReport& report, Time now) {
   }
 }
 
-// A board whose host has left is safe for that reason, unless there is a graver one: then its answer to
-// a repetition tells. Over several wires one of before may come behind the farewell, and be of the same millisecond as
-// a state that told otherwise. `t_ms`: its T, 0 of a board that is booting.
+// A board whose host has left is safe for that reason, unless there is a graver one, or its heartbeat may be of before
+// the farewell: then its answer to a repetition tells. `t_ms`: its T, 0 of a board that is booting.
 void Session::confirm_leave(const SafeReport& report, std::uint32_t t_ms, Time now) {
-  if (report.reason != SafeReason::link) return;
-  if (left_ms_ && t_ms != 0 && !newer(t_ms, *left_ms_)) return;
+  if (report.reason != SafeReason::link || (t_ms != 0 && !is_behind_leave(t_ms))) return;
   for (Pending& pending : pending_.under_way()) {
     if (pending.kind == CommandKind::leave) finish(pending, Outcome::confirmed, Refusal::none, now);
   }
+}
+
+// Was a heartbeat with that T sent behind the farewell? Over several wires it may be of the same millisecond as a state
+// that told otherwise. Where the clocks tell little, for the network is slow, only what they tell for certain counts.
+bool Session::is_behind_leave(std::uint32_t t_ms) const {
+  constexpr Time fast{5000};
+  if (left_ms_ && !newer(t_ms, *left_ms_)) return false;
+  const BoardClock::Instant sent = clock_.at(t_ms);
+  if (!sent.error) return true;
+  return *sent.error < fast ? sent.at + *sent.error >= left_at_ : sent.at - *sent.error > left_at_;
 }
 
 // The number of the newest cause that only E:CLEAR ends. A newer one than that which an E:CLEAR or an

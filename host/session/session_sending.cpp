@@ -263,6 +263,7 @@ Ticket Session::leave(Time timeout, Time now) {
     transmit_now(Command::watch(0), wires_.lease(i).echo(), Priority::normal, now, wire_bit(i));
   }
   leaving_ = true;  // a heartbeat behind the farewell would take the board again
+  left_at_ = now;
   if (wires_.several() && state_.any()) left_ms_ = state_.t_ms;
   // The answer that tells it may have been lost. A board that confirms commands refuses what it does not know.
   const bool understands = knows_leave_.value_or(state_.present.has(StateField::cmd));

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "shared_carrier.hpp"
 
-#include <asio/post.hpp>
 #include <cerrno>
 #include <chrono>
 #include <optional>
@@ -388,8 +387,7 @@ void SharedCarrier::on_message(const ShareMessage& message) {
       handler_->on_datagram(message.text, everyone);
       break;
     case Kind::sent:
-      handler_->on_overheard(message.text);
-      break;
+      return handler_->on_overheard(message.text);
     case Kind::oversize:
       ++shared_counters_.rx_oversize;
       handler_->on_oversize(message.text);
@@ -401,11 +399,9 @@ void SharedCarrier::on_message(const ShareMessage& message) {
       break;
     case Kind::down:
       if (up_) ++shared_counters_.downs;
-      tell({CarrierEvent::Kind::down, message.problem});
-      break;
+      return tell({CarrierEvent::Kind::down, message.problem});
     case Kind::warning:
-      tell({CarrierEvent::Kind::warning, message.problem});
-      break;
+      return tell({CarrierEvent::Kind::warning, message.problem});
     case Kind::moved:
       moved_ = true;
       break;

@@ -8,6 +8,7 @@
 #include "r4link/error.hpp"
 #include "scripted_link.hpp"
 #include "tests/support/datagrams.hpp"
+#include "wired_robot.hpp"
 
 namespace r4::test {
 namespace {
@@ -94,6 +95,20 @@ TEST(SessionFarewell, IsConfirmedByTheAnswerToARepetitionToo) {
   EXPECT_EQ(link.results.count(ticket), 0U);
   link.nack(link.last('E').pnum, "DUPLICATE");
   EXPECT_EQ(link.results.at(ticket).outcome, Outcome::confirmed);
+}
+
+// Of a board that had lost its host and had it again.
+TEST(SessionFarewell, IsNotConfirmedByAHeartbeatThatMayBeOfBefore) {
+  WiredRobot robot(WiredRobot::Cables{{40}});
+  robot.connect();
+  robot.run(1500);
+  const std::string before = std::to_string(robot.board_ms(0) - 20);
+  const Ticket ticket = robot.session->leave(WiredRobot::timeout, robot.now());
+  robot.bring(0, with_crc("H:R4-ROS2;PNum:400;T:" + before + ";SAFE:1;"));
+  EXPECT_EQ(robot.session->link().state, HostLinkState::safe) << "it counts, but not for that";
+  EXPECT_EQ(robot.results.count(ticket), 0U);
+  EXPECT_EQ(robot.finish(ticket).outcome, Outcome::confirmed);
+  EXPECT_FALSE(robot.board(0).link().has_owner());
 }
 
 TEST(SessionFarewell, TellsThatItWasRefusedOrNotAnswered) {

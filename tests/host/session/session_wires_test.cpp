@@ -371,7 +371,7 @@ TEST(SessionWires, AreNotLeftByWhatTheBoardSaidBefore) {
   };
   robot.bring(0, safe(newest_ms));  // of the millisecond of a state: which was first?
   EXPECT_EQ(robot.results.count(ticket), 0U);
-  robot.bring(0, safe(newest_ms + 1));
+  robot.bring(0, safe(robot.board_ms(0) + 2));
   ASSERT_EQ(robot.results.count(ticket), 1U);
   EXPECT_EQ(robot.results.at(ticket).outcome, Outcome::confirmed);
 }

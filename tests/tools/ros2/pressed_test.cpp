@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "tools/r4/ros2/pressed.hpp"
+#include "tools/r4/ros2/graph/pressed.hpp"
 
 #include <gtest/gtest.h>
 

@@ -22,9 +22,9 @@
 #include "graph/graph.hpp"
 #include "graph/inbox.hpp"
 #include "graph/outbox.hpp"
+#include "graph/pressed.hpp"
 #include "log_level.hpp"
 #include "node_options.hpp"
-#include "pressed.hpp"
 #include "r4link/async_board.hpp"
 
 namespace r4::tool::ros2 {

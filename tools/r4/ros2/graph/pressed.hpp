@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "graph/entity.hpp"
+#include "entity.hpp"
 
 namespace r4::tool::ros2 {
 
