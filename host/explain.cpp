@@ -265,7 +265,8 @@ Words outcome_words(std::string_view command, const CommandResult& result, const
     }
     case Outcome::cancelled:
       words.reason =
-          "cancelled: an emergency stop came, the board has a newer reason to be safe, or the "
+          "cancelled: an emergency stop came, the board has a newer reason to be safe or another "
+          "clock, or the "
           "program gave it up";
       words.fix = "see why the board is safe before it is cleared";
       break;

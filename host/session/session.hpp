@@ -236,7 +236,8 @@ class Session {
   void on_identity_datagram(std::size_t wire, const Datagram& datagram, Time now);
   void on_nack_datagram(std::size_t wire, const Datagram& datagram, Time now);
   void on_answer(const Datagram& datagram, Time now);
-  bool notice_restart();
+  bool notice_restart(Time now);
+  void give_up_commands(Time now);
   bool is_proof(const Nack& nack) const;
   bool is_cable_only(std::uint32_t pnum);
   void confirm_from_state(Time now);
@@ -284,8 +285,9 @@ class Session {
   StopRepetition repetition_;
   LinkStatus status_;
   ReceivedState state_;
-  std::uint32_t restarts_ = 0;       // of the board, those that were told
-  std::optional<bool> knows_leave_;  // does the board?
+  std::uint32_t restarts_ = 0;                     // of the board, those that were told
+  std::uint32_t first_pnum_ = link_.first_pnum();  // of the numbers since the last of them
+  std::optional<bool> knows_leave_;                // does the board?
   bool leaving_ = false;
   Time left_at_{0};
   std::optional<std::uint32_t> left_ms_;  // of several wires: the T of the newest state by then

@@ -59,7 +59,7 @@ void Session::on_heartbeat_datagram(std::size_t wire, const Datagram& datagram, 
     current = is_current(
         link_.on_datagram(datagram.pnum(), connecting ? 0 : t_ms, true, report.reason, to_ms(now)));
   }
-  notice_restart();
+  notice_restart(now);
   if (current) {
     if (!connecting) clock_.heard(t_ms, now);
     state_.safe = report.reason;
@@ -93,7 +93,7 @@ void Session::on_state_datagram(std::size_t wire, const Datagram& datagram, Time
   const Arrival arrival =
       wires_.several() ? arrival_over(fresh.t_ms, reason, now)
                        : link_.on_datagram(fresh.pnum, fresh.t_ms, false, reason, to_ms(now));
-  if (notice_restart()) {  // nothing of the boot before
+  if (notice_restart(now)) {  // nothing of the boot before
     fresh = state_;
     read_state(datagram, fresh);
   }
@@ -226,11 +226,11 @@ void Session::on_answer(const Datagram& datagram, Time now) {
   if (wires_.several()) return link_.on_heard(to_ms(now));
   if (role_.refused(now)) return;
   link_.on_answer(datagram.pnum(), static_cast<std::uint32_t>(datagram.time_ms()), to_ms(now));
-  notice_restart();
+  notice_restart(now);
 }
 
 // A board that begins again knows nothing of what it had before. True if it has just been found to.
-bool Session::notice_restart() {
+bool Session::notice_restart(Time now) {
   if (restarts_ == link_.restarts()) return false;
   restarts_ = link_.restarts();
   knows_leave_.reset();
@@ -239,8 +239,18 @@ bool Session::notice_restart() {
   questions_of_clock_ = 0;
   groups_.on_restart();
   disarm(DisarmCause::restart);
+  if (first_pnum_ != link_.first_pnum()) give_up_commands(now);
+  first_pnum_ = link_.first_pnum();
   handler_.on_restart();
   return true;
+}
+
+// Our clock may have stood still, and their deadlines with it: nobody wants now what was asked for then.
+void Session::give_up_commands(Time now) {
+  end_arming(Outcome::cancelled, Refusal::none, now);
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.kind != CommandKind::stop) finish(pending, Outcome::cancelled, Refusal::none, now);
+  }
 }
 
 // --- what the board's state proves
@@ -297,10 +307,12 @@ void Session::confirm_leave(const SafeReport& report, std::uint32_t t_ms, Time n
 // that told otherwise. Where the clocks tell little, for the network is slow, only what they tell for certain counts.
 bool Session::is_behind_leave(std::uint32_t t_ms) const {
   constexpr Time fast{5000};
+  constexpr Time tick{1000};  // so long a T is shown
   if (left_ms_ && !newer(t_ms, *left_ms_)) return false;
-  const BoardClock::Instant sent = clock_.at(t_ms);
-  if (!sent.error) return true;
-  return *sent.error < fast ? sent.at + *sent.error >= left_at_ : sent.at - *sent.error > left_at_;
+  const BoardClock::Instant shown = clock_.at(t_ms);
+  if (!shown.error) return true;
+  return *shown.error < fast ? shown.at + tick + *shown.error >= left_at_
+                             : shown.at - *shown.error > left_at_;
 }
 
 // The number of the newest cause that only E:CLEAR ends. A newer one than that which an E:CLEAR or an

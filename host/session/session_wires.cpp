@@ -103,7 +103,7 @@ bool Session::admit(std::size_t wire, const Datagram& datagram, Time now) {
   }
   if (take == Wires::Take::restarted) {
     link_.on_clock(t_ms, true, to_ms(now));
-    notice_restart();
+    notice_restart(now);
   }
   return take != Wires::Take::no && wires_.begun();
 }
@@ -117,7 +117,7 @@ bool Session::admit_identity(std::size_t wire, const Datagram& datagram, const I
   const Wires::Answer answer = wires_.on_identity(wire, identity, t_ms, link_, now);
   if (answer == Wires::Answer::nothing || answer == Wires::Answer::other) return false;
   if (answer == Wires::Answer::restarted) link_.on_clock(t_ms, true, to_ms(now));
-  notice_restart();
+  notice_restart(now);
   const bool counts = !(identity.has_busy && identity.busy);
   wires_.on_answer(wire, datagram.pnum(), t_ms, fits, counts, now);
   return true;

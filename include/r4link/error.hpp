@@ -28,7 +28,7 @@ enum class Outcome : std::uint8_t {
   confirmed,  // the board's own state says so
   refused,    // the board refused it, and did not execute it: the Refusal
   timed_out,  // no confirmation until the deadline; it may or may not have been executed
-  cancelled,  // given up: a stop, or a newer cause to be safe, came first, or the program did
+  cancelled,  // given up: a stop, a newer cause to be safe or another clock of the board came first, or the program did
   closed,     // given up: the board was closed
   blocked,    // the board's thread does not answer: not sent, or not confirmed
   full,       // not taken: 64 commands are under way already

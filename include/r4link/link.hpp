@@ -207,8 +207,8 @@ struct Statistics {
   std::uint64_t damaged = 0;  // bad checksum, syntax or length
   std::uint64_t copies =
       0;  // of several wires: what another wire had brought before; not among `received`
-  // lost, duplicate, late, restarts. Of several wires: lost is what none of them brought, a duplicate what another
-  // had brought before.
+  // lost, duplicate, late. Of several wires: lost is what none of them brought, a duplicate what another had brought
+  // before. `restarts` are those of the board, as its clock tells them: a computer that slept counts one, too.
   PacketCounters packets;
   double state_rate_hz = 0;  // over the last second
   // Time, microseconds; 0 where nothing was measured yet
@@ -240,7 +240,7 @@ struct Wire {
   WireState state = WireState::down;
   bool busy = false;         // the board there answers that another host controls it
   std::string board_id;      // of several wires: who answered there last
-  PacketCounters packets;    // of the board's datagrams on this wire
+  PacketCounters packets;    // of the board's datagrams on this wire; `restarts`: of their numbers
   std::uint64_t copies = 0;  // of them, what another wire had brought before
   double round_trip_us = 0;  // question to answer, the newest; 0: none yet
   double age_us = 0;         // since the newest datagram; 0: none yet

@@ -88,6 +88,8 @@ class HostLink {
   std::uint32_t take_pnum() { return next_pnum_++; }
   // The number that was taken last.
   std::uint32_t last_pnum() const { return next_pnum_ - 1; }
+  // Others begin where on_clock() says so.
+  std::uint32_t first_pnum() const { return first_pnum_; }
   // Was it taken, for the board as it is now?
   bool is_taken(std::uint32_t pnum) const { return pnum - first_pnum_ < next_pnum_ - first_pnum_; }
 

@@ -97,7 +97,7 @@ def test_a_stop_is_heard_of_who_does_not_publish_reliably_and_who_is_not_heard_i
         again(lambda: peer.write('rt/stop', ON), lambda timeout: ros2.logged('E:STOP: confirmed', timeout=timeout))
         board.state('SAFE', 'stop')
         peer.writer('rt/osmc1/command', FLOAT32, reliability='best_effort', matched=False)
-        ros2.logged('osmc1/command: a publisher offers less')
+        ros2.logged('osmc1/command: a publisher does not offer what this subscription needs, reliability')
 
 
 def test_a_zero_of_an_outage_ends_the_drive_when_the_link_is_back():

@@ -317,6 +317,7 @@ class World : public firmware::Hal, public firmware::Observer {
   std::set<std::uint32_t>
       streamed_;  // where states went at streamed_us_, besides to the host in control
   std::uint64_t streamed_us_ = 0;
+  std::uint64_t went_on_us_ = 0;  // behind a standstill of the board
   // When a place of the host in control was sent a state last, and in which session: of the heartbeat that began it.
   using Streamed = std::pair<std::uint64_t, std::uint32_t>;
   std::map<std::uint32_t, Streamed> owner_streamed_;

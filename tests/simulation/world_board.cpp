@@ -87,6 +87,7 @@ void World::stand_still(const Standstill& standstill) {
 void World::go_on() {
   note("board goes on");
   standing_ = false;
+  went_on_us_ = now_us_;
   ++board_generation_;
   const std::vector<int> waiting = std::exchange(waiting_, {});
   if (loop_random_.chance(0.5)) board_->poll(board_ms());

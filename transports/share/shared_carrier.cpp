@@ -326,11 +326,13 @@ void SharedCarrier::on_carrier_event(const CarrierEvent& event) {
 // To those who share the wire and to our program, unless it knows that already. `up` is told anew when
 // the datagrams come from elsewhere.
 void SharedCarrier::tell(const CarrierEvent& event) {
+  const bool up = event.kind == CarrierEvent::Kind::up;
   const bool down = event.kind == CarrierEvent::Kind::down;
   const bool known = down && !up_ && trouble_ && trouble_->reason == event.problem.reason;
-  if (event.kind != CarrierEvent::Kind::warning) up_ = event.kind == CarrierEvent::Kind::up;
-  trouble_.reset();
-  if (event.kind != CarrierEvent::Kind::up) trouble_ = event.problem;
+  const bool turns = (up || down) && up != up_;
+  if (turns && state_ != State::holding) ++(up ? shared_counters_.ups : shared_counters_.downs);
+  if (turns) up_ = up;
+  trouble_ = up ? std::nullopt : std::optional(event.problem);
   if (state_ == State::holding && holder_.sharers() != 0) {
     std::string text;
     const Kind kind = standing(text);
@@ -393,12 +395,10 @@ void SharedCarrier::on_message(const ShareMessage& message) {
       handler_->on_oversize(message.text);
       break;
     case Kind::up:
-      if (!up_) ++shared_counters_.ups;
       name_ = std::string(message.text);
       tell({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
       break;
     case Kind::down:
-      if (up_) ++shared_counters_.downs;
       return tell({CarrierEvent::Kind::down, message.problem});
     case Kind::warning:
       return tell({CarrierEvent::Kind::warning, message.problem});

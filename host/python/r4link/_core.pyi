@@ -94,7 +94,7 @@ class Statistics(_Record):
     def damaged(self) -> int: ...
     @property
     def packets_received(self) -> int:
-        """Of those with a packet number, duplicates too; lost, duplicate, late, old and restarts are of these."""
+        """Of those with a packet number, duplicates too; lost, duplicate, late and old are of these."""
     @property
     def lost(self) -> int: ...
     @property

@@ -41,6 +41,38 @@ TEST_P(SleepingHost, IsObeyedAgain) {
   EXPECT_TRUE(drives(robot));
 }
 
+// Its deadlines stood still with its clock: what was asked for before it slept is wanted no more.
+TEST_P(SleepingHost, GivesUpWhatHadNotBeenSent) {
+  robot.connect();
+  for (std::size_t wire = 0; wire < robot.cables.size(); ++wire) robot.cut(wire);
+  robot.run(1500);
+  const auto command = Command::osmc(100, Direction::forward, 1);
+  const Ticket ticket = robot.session->send(command, std::chrono::seconds{30}, robot.now());
+  robot.sleep(60'000);
+  for (std::size_t wire = 0; wire < robot.cables.size(); ++wire) robot.cut(wire, false);
+  robot.run(5000);
+  EXPECT_TRUE(robot.session->in_control(robot.now()));
+  EXPECT_EQ(robot.finish(ticket).outcome, Outcome::cancelled);
+  EXPECT_FALSE(drives(robot));
+}
+
+TEST_P(SleepingHost, IsNotArmedByWhatItAskedForBefore) {
+  WiredRobot armed(GetParam(), SessionOptions());
+  armed.connect();
+  for (std::size_t wire = 0; wire < armed.cables.size(); ++wire) armed.cut(wire);
+  armed.run(1500);
+  const Ticket arm = armed.session->arm(std::chrono::seconds{30}, armed.now());
+  const auto command = Command::osmc(100, Direction::forward, 1);
+  const Ticket drive = armed.session->send(command, std::chrono::seconds{30}, armed.now());
+  armed.sleep(60'000);
+  for (std::size_t wire = 0; wire < armed.cables.size(); ++wire) armed.cut(wire, false);
+  armed.run(5000);
+  EXPECT_EQ(armed.finish(arm).outcome, Outcome::cancelled);
+  EXPECT_EQ(armed.finish(drive).outcome, Outcome::cancelled);
+  EXPECT_FALSE(drives(armed));
+  EXPECT_EQ(armed.session->disarmed_by(), DisarmCause::restart);
+}
+
 // A nap that the clocks of two boots do not tell from what a network does is an outage.
 TEST_P(SleepingHost, GoesOnBehindAShortNapAsBehindAnOutage) {
   robot.connect();

@@ -97,6 +97,19 @@ TEST(SessionFarewell, IsConfirmedByTheAnswerToARepetitionToo) {
   EXPECT_EQ(link.results.at(ticket).outcome, Outcome::confirmed);
 }
 
+// T is a whole millisecond, and a farewell is said somewhere in it.
+TEST(SessionFarewell, IsConfirmedByAHeartbeatOfTheSameMillisecond) {
+  for (const int us : {0, 200, 400, 600, 800, 999}) {
+    ScriptedLink link;
+    link.connect();
+    link.identity("leave");
+    link.pass(std::chrono::microseconds(5000 + us));
+    const Ticket ticket = link.session.leave(100ms, link.now);
+    link.heartbeat(SafeReason::link);
+    EXPECT_EQ(link.results.count(ticket), 1U) << us;
+  }
+}
+
 // Of a board that had lost its host and had it again.
 TEST(SessionFarewell, IsNotConfirmedByAHeartbeatThatMayBeOfBefore) {
   WiredRobot robot(WiredRobot::Cables{{40}});

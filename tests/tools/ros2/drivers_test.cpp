@@ -197,5 +197,10 @@ TEST(Ros2Drivers, AGroupAtATime) {
   EXPECT_EQ(driven.to_stop().size(), 4U);
 }
 
+TEST(Ros2Drivers, ToSetAStepperToZeroIsNoRest) {
+  EXPECT_TRUE(Drivers::rests(Command::osmc(0, Direction::forward, 1)));
+  EXPECT_FALSE(Drivers::rests(Command::zero(1)));
+}
+
 }  // namespace
 }  // namespace r4::tool::ros2

@@ -118,6 +118,15 @@ TEST(Ros2Transit, BelievesOneWhoSpeaksSeldomToo) {
   EXPECT_EQ(old, 9) << "its clock was set";
 }
 
+TEST(Ros2Transit, ABacklogOfALongSilenceIsNoClockThatWasSet) {
+  Transit transit(Transit::Clocks::two);
+  EXPECT_EQ(transit.delay(100s, 100s), 0s);
+  EXPECT_GT(transit.delay(101s, 105s), 3s);
+  for (int i = 0; i < 30; ++i) {
+    EXPECT_GT(transit.delay(4000s + i * 10ms, 4004s + i * 1ms), 3s) << i;
+  }
+}
+
 TEST(Ros2Transit, IsKnownOfTheFirstSampleWhereThereIsOneClock) {
   Transit transit(Transit::Clocks::one);
   for (int i = 0; i < 200; ++i) {

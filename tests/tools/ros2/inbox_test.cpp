@@ -34,7 +34,7 @@ class InboxTest : public ::testing::Test {
         .urgent = [](bool pressed) { return pressed; },
         .take = [this](bool, const Origin&) { taken.emplace_back("stop"); },
         .left = {},
-        .mismatched = [this] { taken.emplace_back("mismatch"); },
+        .mismatched = [this](const char* policy) { taken.push_back(std::string("no ") + policy); },
     });
     inbox.add<Float32Message, float>({
         .reader = duty_reader = graph.subscribe<Float32Message>(node, "duty"),
@@ -123,7 +123,7 @@ TEST_F(InboxTest, TellsWhoWroteASample) {
 
 TEST_F(InboxTest, TellsOfAPublisherThatCannotBeHeard) {
   const Entity writer = writer_of<BoolMessage>("rt/stop", false);
-  EXPECT_TRUE(until([&] { return has("mismatch"); }));
+  EXPECT_TRUE(until([&] { return has("no reliability"); }));
 }
 
 // However many stops there were, what comes behind them waits for one turn, and not for one for each of them.

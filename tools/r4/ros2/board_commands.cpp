@@ -71,11 +71,11 @@ template <class Message, class Value>
 void BoardCommands::add(Inbox& inbox, const std::string& topic,
                         Inbox::Subscription<Message, Value> subscription) {
   subscription.left = on_publishers(topic, std::move(subscription.left));
-  subscription.mismatched = [this, topic] {
+  subscription.mismatched = [this, topic](const char* policy) {
     warn(
-        fmt::format("{}: a publisher offers less than this subscription needs, and is not heard; "
-                    "have it publish reliably (QoS reliability: reliable)",
-                    topic));
+        fmt::format("{}: a publisher does not offer what this subscription needs, {}, and is not "
+                    "heard; have it do so, as ROS does by default",
+                    topic, policy));
   };
   inbox.add(std::move(subscription));
 }
@@ -116,6 +116,12 @@ void BoardCommands::subscribe_arm(Graph& graph, std::size_t node, Inbox& inbox) 
           .take =
               [this](bool pressed, const Origin& origin) {
                 // Who repeats itself does not arm again what has been stopped since: the edge counts.
+                if (origin.writer == EntityId{}) {
+                  warn(
+                      "arm: dropped: its publisher had gone before it was known; say it for "
+                      "longer");
+                  return;
+                }
                 const bool edge = pressed_.on(origin.writer, pressed);
                 if (!edge || is_stale("arm", origin)) return;
                 if (is_overtaken(origin)) {

@@ -24,6 +24,7 @@ constexpr int supply_relay = 1;
 bool Drivers::rests(const Command& command) {
   switch (command.kind) {
     case CommandKind::stepper:
+    case CommandKind::zero:
       return false;
     case CommandKind::relay:
       return !command.on;

@@ -75,17 +75,19 @@ void Inbox::run() {
   }
 }
 
+Inbox::Source::Publisher& Inbox::publisher_of(dds_entity_t reader, Source& source,
+                                              dds_instance_handle_t publication) const {
+  const auto known = source.publishers.find(publication);
+  if (known != source.publishers.end()) return known->second;
+  const Source::Publisher publisher{writer_of(reader, publication), Transit(clocks_)};
+  return source.publishers.emplace(publication, publisher).first->second;
+}
+
 Origin Inbox::origin_of(dds_entity_t reader, Source& source, const dds_sample_info_t& info) const {
   const auto now = std::chrono::nanoseconds(dds_time());
-  if (source.publishers.size() > most_publishers) source.publishers.clear();
-  auto known = source.publishers.find(info.publication_handle);
-  if (known == source.publishers.end()) {
-    const Source::Publisher publisher{writer_of(reader, info.publication_handle), Transit(clocks_)};
-    known = source.publishers.emplace(info.publication_handle, publisher).first;
-  }
-  const auto delay =
-      known->second.transit.delay(std::chrono::nanoseconds(info.source_timestamp), now);
-  return {info.publication_handle, known->second.writer,
+  Source::Publisher& publisher = publisher_of(reader, source, info.publication_handle);
+  const auto delay = publisher.transit.delay(std::chrono::nanoseconds(info.source_timestamp), now);
+  return {info.publication_handle, publisher.writer,
           Clock::now() - std::chrono::duration_cast<Clock::duration>(delay)};
 }
 
@@ -98,16 +100,25 @@ void Inbox::look_at_publishers(dds_entity_t reader, Source& source,
   const dds_return_t count = dds_get_matched_publications(reader, there.data(), there.size());
   there.resize(
       std::clamp<std::size_t>(count < 0 ? 0 : static_cast<std::size_t>(count), 0, most_publishers));
-  std::erase_if(source.publishers, [&there](const auto& each) {
-    return std::find(there.begin(), there.end(), each.first) == there.end();
-  });
+  // Who has gone may have left a sample that is yet to be read.
+  for (const dds_instance_handle_t each : there) publisher_of(reader, source, each);
+  if (source.publishers.size() > most_publishers) {
+    std::erase_if(source.publishers, [&there](const auto& each) {
+      return std::find(there.begin(), there.end(), each.first) == there.end();
+    });
+  }
   if (left) put(source, Kind::publishers, [left, there = std::move(there)] { left(there); });
 }
 
-void Inbox::look_at_mismatches(dds_entity_t reader, const std::function<void()>& mismatched) {
+void Inbox::look_at_mismatches(dds_entity_t reader,
+                               const std::function<void(const char* policy)>& mismatched) {
   dds_requested_incompatible_qos_status_t status{};
   if (dds_get_requested_incompatible_qos_status(reader, &status) < 0) return;
-  if (mismatched && status.total_count_change > 0) asio::post(io_, mismatched);
+  if (!mismatched || status.total_count_change == 0) return;
+  const char* policy = "another quality of service";
+  if (status.last_policy_id == DDS_RELIABILITY_QOS_POLICY_ID) policy = "reliability";
+  if (status.last_policy_id == DDS_DATA_REPRESENTATION_QOS_POLICY_ID) policy = "XCDR1";
+  asio::post(io_, [mismatched, policy] { mismatched(policy); });
 }
 
 void Inbox::put(Source& source, Kind kind, std::function<void()> deliver) {

@@ -59,8 +59,8 @@ class Inbox {
     std::function<void(const Value&, const Origin&)> take;
     // On the loop, when a publisher has gone: those that are left.
     std::function<void(const std::vector<std::uint64_t>&)> left;
-    // On the loop: somebody offers less than the reader asks for, so that nothing of his is read.
-    std::function<void()> mismatched;
+    // On the loop: somebody offers less than the reader asks for, in what, so that nothing of his is read.
+    std::function<void(const char* policy)> mismatched;
   };
   // Before start().
   template <class Message, class Value>
@@ -101,10 +101,13 @@ class Inbox {
 
   template <class Message, class Value>
   void receive(const Subscription<Message, Value>& subscription, Source& source);
+  Source::Publisher& publisher_of(dds_entity_t reader, Source& source,
+                                  dds_instance_handle_t publication) const;
   Origin origin_of(dds_entity_t reader, Source& source, const dds_sample_info_t& info) const;
   void look_at_publishers(dds_entity_t reader, Source& source,
                           const std::function<void(const std::vector<std::uint64_t>&)>& left);
-  void look_at_mismatches(dds_entity_t reader, const std::function<void()>& mismatched);
+  void look_at_mismatches(dds_entity_t reader,
+                          const std::function<void(const char* policy)>& mismatched);
   void put(Source& source, Kind kind, std::function<void()> deliver);
   // To the newest source.
   void attach(dds_entity_t entity);

@@ -3,7 +3,7 @@
 // one. The clocks of two computers differ, so what counts is by how much it was slower than the fastest of its
 // publisher. They may drift apart by 0.02 %, but never by more than half a second between two samples: of who is silent
 // for long, one that a network held back would pass for fresh. A clock that was set makes all samples look slow: where
-// none is fast, of ten or more that take ten seconds, that is believed. The first sample of a publisher has nothing to be
+// none is fast of those that come in ten seconds or more, and ten of them are a second apart, that is believed. The first sample of a publisher has nothing to be
 // compared with.
 #pragma once
 
@@ -35,9 +35,13 @@ class Transit {
       slow_.reset();
       return delay;
     }
-    if (!slow_) slow_ = Slow{received, difference, 0};
+    if (!slow_) slow_ = Slow{received, received - apart, difference, 0};
     slow_->least = std::min(slow_->least, difference);
-    if (++slow_->samples < enough || received - slow_->since < patience) return delay;
+    if (received - slow_->counted >= apart) {
+      slow_->counted = received;
+      ++slow_->samples;
+    }
+    if (slow_->samples < enough || received - slow_->since < patience) return delay;
     least_ = slow_->least;
     slow_.reset();
     return difference - *least_;
@@ -46,13 +50,15 @@ class Transit {
  private:
   struct Slow {
     Duration since;
+    Duration counted;  // the newest of them that was
     Duration least;
-    int samples;
+    int samples;  // a second apart: what a network held back comes at once
   };
   static constexpr int drift = 5000;
   static constexpr std::chrono::milliseconds most_drifted{500};
   static constexpr std::chrono::milliseconds slow{200};
   static constexpr std::chrono::seconds patience{10};
+  static constexpr std::chrono::seconds apart{1};
   static constexpr int enough = 10;
   const Clocks clocks_;
   Duration last_{0};
