@@ -265,10 +265,9 @@ Words outcome_words(std::string_view command, const CommandResult& result, const
     }
     case Outcome::cancelled:
       words.reason =
-          "cancelled: an emergency stop came, the board has a newer reason to be safe or another "
-          "clock, or the "
-          "program gave it up";
-      words.fix = "see why the board is safe before it is cleared";
+          "cancelled: a stop came, the board has a newer reason to be safe or another clock, "
+          "or the program gave it up";
+      words.fix = "see why, before the board is cleared or asked again";
       break;
     case Outcome::closed:
       words.reason = "given up: the board was closed";

@@ -238,9 +238,10 @@ bool Session::notice_restart(Time now) {
   clock_.restart();
   questions_of_clock_ = 0;
   groups_.on_restart();
-  disarm(DisarmCause::restart);
-  if (first_pnum_ != link_.first_pnum()) give_up_commands(now);
-  first_pnum_ = link_.first_pnum();
+  const bool renumbered = std::exchange(first_pnum_, link_.first_pnum()) != link_.first_pnum();
+  arming_.disarm(DisarmCause::restart);
+  if (renumbered) give_up_commands(now);
+  tell_arming();  // what somebody asks for when he hears of it is wanted
   handler_.on_restart();
   return true;
 }
@@ -249,7 +250,8 @@ bool Session::notice_restart(Time now) {
 void Session::give_up_commands(Time now) {
   end_arming(Outcome::cancelled, Refusal::none, now);
   for (Pending& pending : pending_.under_way()) {
-    if (pending.kind != CommandKind::stop) finish(pending, Outcome::cancelled, Refusal::none, now);
+    if (pending.kind == CommandKind::stop || pending.kind == CommandKind::identify) continue;
+    finish(pending, Outcome::cancelled, Refusal::none, now);
   }
 }
 

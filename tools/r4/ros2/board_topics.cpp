@@ -112,6 +112,14 @@ BoardTopics::BoardTopics(Graph& graph, std::size_t node, const NodeOptions& opti
   if (options.counts_per_turn || options.steps_per_turn) {
     joints_ = graph.publish<JointStateMessage>(node, "joint_states");
   }
+  for (int n = 1; n <= encoder_channels; ++n) {
+    for (const StateField first : {StateField::enc1, StateField::enc1hz}) {
+      if (options.counts_per_turn && fields.has(nth(first, n))) joint_fields_.add(nth(first, n));
+    }
+  }
+  for (int n = 1; n <= stepper_channels; ++n) {
+    if (options.steps_per_turn && fields.has(stepper_field(n))) joint_fields_.add(stepper_field(n));
+  }
 }
 
 void BoardTopics::write_text(dds_entity_t writer, std::string_view text) {
@@ -180,7 +188,7 @@ void BoardTopics::on_state(const State& state, WallTime sampled) {
   if (has.has(StateField::dmhsta)) publish<BoolMessage>(handle_, state.handle_held, now);
   publish_battery(state, sampled, now);
   publish_ranges(state, sampled, now);
-  publish_joints(state, sampled);
+  gather_joints(state, sampled);
 }
 
 void BoardTopics::publish_battery(const State& state, WallTime sampled, Clock::time_point now) {
@@ -221,25 +229,41 @@ void BoardTopics::publish_ranges(const State& state, WallTime sampled, Clock::ti
   }
 }
 
-void BoardTopics::publish_joints(const State& state, WallTime sampled) const {
+void BoardTopics::gather_joints(const State& state, WallTime sampled) {
   if (joints_ == 0) return;
+  if (gathered_ && gathered_->state.t_ms != state.t_ms) publish_joints();  // a part was lost
+  if (!gathered_) gathered_ = Joints{{}, {}, sampled};
+  gathered_->state = state;  // the values of its other parts are still there
+  bool all = true;
+  for (int i = 0; i < state_field_count; ++i) {
+    const auto field = static_cast<StateField>(i);
+    if (!joint_fields_.has(field)) continue;
+    if (state.present.has(field)) gathered_->present.add(field);
+    all = all && gathered_->present.has(field);
+  }
+  if (all) publish_joints();
+}
+
+void BoardTopics::publish_joints() {
+  const Joints joints = std::move(*gathered_);
+  gathered_.reset();
   std::vector<std::string> names;
   std::vector<double> positions;
   std::vector<double> velocities;
   constexpr double turn = 2 * std::numbers::pi;
-  for (int n = 1; n <= encoder_channels && options_.counts_per_turn; ++n) {
-    if (!state.present.has(nth(StateField::enc1, n))) continue;
+  for (int n = 1; n <= encoder_channels; ++n) {
+    if (!joints.present.has(nth(StateField::enc1, n))) continue;
     const double scale = turn / *options_.counts_per_turn;
     names.push_back(fmt::format("encoder{}", n));
-    positions.push_back(state.encoder(n) * scale);
-    velocities.push_back(state.present.has(nth(StateField::enc1hz, n))
-                             ? state.encoder_hz[n - 1] * scale
+    positions.push_back(joints.state.encoder(n) * scale);
+    velocities.push_back(joints.present.has(nth(StateField::enc1hz, n))
+                             ? joints.state.encoder_hz[n - 1] * scale
                              : std::numeric_limits<double>::quiet_NaN());
   }
-  for (int n = 1; n <= stepper_channels && options_.steps_per_turn; ++n) {
-    if (!state.present.has(stepper_field(n))) continue;
+  for (int n = 1; n <= stepper_channels; ++n) {
+    if (!joints.present.has(stepper_field(n))) continue;
     names.push_back(fmt::format("stepper{}", n));
-    positions.push_back(state.steps(n) * turn / *options_.steps_per_turn);
+    positions.push_back(joints.state.steps(n) * turn / *options_.steps_per_turn);
     velocities.push_back(std::numeric_limits<double>::quiet_NaN());
   }
   if (names.empty()) return;
@@ -248,7 +272,7 @@ void BoardTopics::publish_joints(const State& state, WallTime sampled) const {
   texts.reserve(names.size());
   for (const std::string& name : names) texts.push_back(borrowed(name));
   JointStateMessage message{};
-  message.header.stamp = stamp(sampled);
+  message.header.stamp = stamp(joints.sampled);
   message.header.frame_id = borrowed(none);
   point(message.name, texts);
   point(message.position, positions);

@@ -2,7 +2,7 @@
 // What a board says, on the topics of its node: the paper's three strings (section 8.8), one topic a component in
 // the units of ROS, joints, battery, ranges and diagnostics. Used by the outbox's thread alone, but for its making.
 //
-// The paper's strings and the joints are published with every datagram; a component when it has changed, and once
+// The paper's strings are published with every datagram, the joints with every state; a component when it has changed, and once
 // a second, so that who comes later is told. What is not heard of any more is not repeated.
 #pragma once
 
@@ -64,7 +64,8 @@ class BoardTopics {
   static void publish(Changing<Value>& topic, Value value, Clock::time_point now);
   void publish_battery(const State& state, WallTime sampled, Clock::time_point now);
   void publish_ranges(const State& state, WallTime sampled, Clock::time_point now);
-  void publish_joints(const State& state, WallTime sampled) const;
+  void gather_joints(const State& state, WallTime sampled);
+  void publish_joints();
   static void write_text(dds_entity_t writer, std::string_view text);
 
   const NodeOptions options_;
@@ -78,6 +79,14 @@ class BoardTopics {
   dds_entity_t diagnostics_ = 0;
   dds_entity_t rosout_ = 0;
   dds_entity_t joints_ = 0;
+  FieldSet joint_fields_;  // of the state, that joint_states is made of
+  // A state may come in several datagrams of one T, and is one sample.
+  struct Joints {
+    State state;
+    FieldSet present;  // of joint_fields_
+    WallTime sampled;
+  };
+  std::optional<Joints> gathered_;
   std::array<Changing<float>, osmc_channels> osmc_;
   std::array<Changing<float>, dhb12_channels> dhb12_;
   std::array<Changing<float>, bldc_channels> bldc_;

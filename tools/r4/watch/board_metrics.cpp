@@ -83,7 +83,7 @@ void describe(const MetricBoard& each, MetricFamilies& out) {
   out.count("r4_lost_total", "Datagrams of the board that did not come in their turn.", one,
             lost_in_turn(statistics.packets));
   out.count("r4_duplicates_total", "Datagrams that came again.", one, statistics.packets.duplicate);
-  out.count("r4_late_total", "Those of them that came later.", one, statistics.packets.late);
+  out.count("r4_late_total", "Lost datagrams that came later.", one, statistics.packets.late);
   out.count("r4_restarts_total", "Times the board began again.", one, statistics.packets.restarts);
   out.count("r4_transport_bytes_total", "Bytes of datagrams.", with(one, "direction", "received"),
             carrier.rx_bytes);

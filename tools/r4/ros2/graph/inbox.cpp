@@ -78,7 +78,11 @@ void Inbox::run() {
 Inbox::Source::Publisher& Inbox::publisher_of(dds_entity_t reader, Source& source,
                                               dds_instance_handle_t publication) const {
   const auto known = source.publishers.find(publication);
-  if (known != source.publishers.end()) return known->second;
+  if (known != source.publishers.end()) {
+    Source::Publisher& publisher = known->second;
+    if (publisher.writer == EntityId{}) publisher.writer = writer_of(reader, publication);
+    return publisher;
+  }
   const Source::Publisher publisher{writer_of(reader, publication), Transit(clocks_)};
   return source.publishers.emplace(publication, publisher).first->second;
 }
