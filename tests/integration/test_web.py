@@ -293,7 +293,7 @@ def test_64_browsers_are_served():
 
 
 def test_a_slow_browser_loses_old_states_and_costs_no_memory():
-    with Web(*['sim:'] * 8) as web, WebSocket(web.port, buffer=4096) as slow, Page(web) as page:
+    with Web('sim:?node=0-7') as web, WebSocket(web.port, buffer=4096) as slow, Page(web) as page:
         page.states(50)
         before = web.resident_kib()
         states = page.states(150)

@@ -58,7 +58,7 @@ class JointStates : public ::testing::Test {
   std::size_t node = graph.add_node(node_name("", "r4"));
   BoardTopics topics{graph, node, options_of()};
   Entity topic{dds_create_topic(graph.participant(), message_type<JointStateMessage>().descriptor,
-                                "rt/joint_states", nullptr, nullptr),
+                                "rt/joint_states", make_qos({}).get(), nullptr),
                "joint_states"};
   Entity reader{dds_create_reader(graph.participant(), topic.get(), make_qos({}).get(), nullptr),
                 "joint_states"};
