@@ -245,7 +245,7 @@ void BoardTopics::gather_joints(const State& state, WallTime sampled) {
 }
 
 void BoardTopics::publish_joints() {
-  const Joints joints = std::move(*gathered_);
+  const Joints joints = *gathered_;
   gathered_.reset();
   std::vector<std::string> names;
   std::vector<double> positions;
