@@ -241,8 +241,8 @@ void Session::feed(Time now) {
 Statistics Session::statistics(Time now) const {
   Statistics report = collector_.report(now);
   report.packets = packets();
-  report.packets.restarts =
-      link_.restarts();  // not those of the numbers, which a transport that comes up begins anew
+  // Not those of the numbers, which a transport that comes up begins anew.
+  report.packets.restarts = link_.restarts();
   report.copies = wires_.counters().duplicate;
   report.received -= report.copies;
   if (state_.sampled_error != ReceivedState::unknown) {

@@ -56,6 +56,48 @@ TEST_P(SleepingHost, GivesUpWhatHadNotBeenSent) {
   EXPECT_FALSE(drives(robot));
 }
 
+// It was on its way when the lid was closed, and may come late or never.
+TEST_P(SleepingHost, RepeatsNothingThatItHadSent) {
+  for (const std::uint32_t later_ms : {0U, 10U, 60U}) {
+    WiredRobot sender(GetParam());
+    sender.connect();
+    for (std::size_t wire = 0; wire < sender.cables.size(); ++wire) sender.cut(wire);
+    const auto command = Command::osmc(100, Direction::forward, 1);
+    const Ticket ticket = sender.session->send(command, std::chrono::seconds{30}, sender.now());
+    sender.run(later_ms);
+    sender.sleep(60'000);
+    for (std::size_t wire = 0; wire < sender.cables.size(); ++wire) sender.cut(wire, false);
+    for (int ms = 0; ms < 5000; ++ms) {
+      sender.run(1);
+      ASSERT_FALSE(drives(sender)) << ms << " ms behind its waking";
+    }
+    EXPECT_EQ(sender.finish(ticket).outcome, Outcome::cancelled);
+  }
+}
+
+TEST_P(SleepingHost, StopsTheBoardAllTheSame) {
+  robot.connect();
+  ASSERT_EQ(robot.drive(100).outcome, Outcome::confirmed);
+  for (std::size_t wire = 0; wire < robot.cables.size(); ++wire) robot.cut(wire);
+  const Ticket stop = robot.session->stop(std::chrono::seconds{30}, robot.now());
+  robot.sleep(60'000);
+  for (std::size_t wire = 0; wire < robot.cables.size(); ++wire) robot.cut(wire, false);
+  EXPECT_EQ(robot.finish(stop, 5000).outcome, Outcome::confirmed);
+  EXPECT_EQ(robot.board(0).reason(), SafeReason::stop);
+}
+
+TEST_P(SleepingHost, HasItsStatesAgainIfItOnlyWatches) {
+  WiredRobot watcher(GetParam(), WiredRobot::at_will(), BoardRole::watch);
+  watcher.connect();
+  watcher.run(1000);
+  ASSERT_GT(watcher.told_states, 50U);
+  watcher.sleep(60'000);
+  watcher.run(3000);
+  watcher.told_states = 0;
+  watcher.run(1000);
+  EXPECT_GT(watcher.told_states, 50U);
+}
+
 TEST_P(SleepingHost, IsNotArmedByWhatItAskedForBefore) {
   WiredRobot armed(GetParam(), SessionOptions());
   armed.connect();

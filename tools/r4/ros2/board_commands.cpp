@@ -115,13 +115,11 @@ void BoardCommands::subscribe_arm(Graph& graph, std::size_t node, Inbox& inbox) 
           .urgent = {},
           .take =
               [this](bool pressed, const Origin& origin) {
-                // Who repeats itself does not arm again what has been stopped since: the edge counts.
-                if (origin.writer == EntityId{}) {
-                  warn(
-                      "arm: dropped: its publisher had gone before it was known; say it for "
-                      "longer");
-                  return;
+                if (origin.writer == EntityId{}) {  // it may have been pressed all along
+                  if (!pressed) return;
+                  return warn("arm: dropped: its publisher has gone; let it stay for a second");
                 }
+                // Who repeats itself does not arm again what has been stopped since: the edge counts.
                 const bool edge = pressed_.on(origin.writer, pressed);
                 if (!edge || is_stale("arm", origin)) return;
                 if (is_overtaken(origin)) {

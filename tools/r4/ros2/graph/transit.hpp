@@ -3,8 +3,8 @@
 // one. The clocks of two computers differ, so what counts is by how much it was slower than the fastest of its
 // publisher. They may drift apart by 0.02 %, but never by more than half a second between two samples: of who is silent
 // for long, one that a network held back would pass for fresh. A clock that was set makes all samples look slow: where
-// none is fast of those that come in ten seconds or more, and ten of them are a second apart, that is believed. The first sample of a publisher has nothing to be
-// compared with.
+// none is fast of those that come in ten seconds or more, and ten of them are a second apart, that is believed. The
+// first sample of a publisher has nothing to be compared with.
 #pragma once
 
 #include <algorithm>
