@@ -57,7 +57,7 @@ cmake --build ../teleop/build >>"$work/cmake.log" || {
 R4=$build_tree/r4 /usr/bin/python3 "$source_tree/tests/install/teleop.py" ../teleop/build/teleop
 
 # r4 finds the part of it that is a program of its own.
-"$prefix/bin/r4" metrics sim: --listen 127.0.0.1:0 --for 0.1 >"$work/out" 2>&1 || {
+"$prefix/bin/r4" metrics sim: --listen 127.0.0.1:0 --duration 0.1 >"$work/out" 2>&1 || {
   cat "$work/out"
   echo 'install: r4 metrics fails'
   exit 1

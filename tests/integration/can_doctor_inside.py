@@ -16,7 +16,7 @@ def ip(*arguments):
 
 def doctor(*arguments, listen='0.01'):
     """The exit code, and the findings by their checks."""
-    result = run('doctor', *arguments, '--for', listen, '--json', timeout=60)
+    result = run('doctor', *arguments, '--duration', listen, '--json', timeout=60)
     return result.returncode, {each['check']: each for each in objects(result.stdout) if each['type'] == 'finding'}
 
 
@@ -63,7 +63,7 @@ def test_a_virtual_bus_is_brought_up_and_its_board_heard():
     ip('set', 'vcan0', 'down')
     code, found = doctor('can://vcan0?node=1')
     assert code == OPEN and found['can.down']['automatic']
-    run('doctor', 'can://vcan0?node=1', '--fix', '--for', '0.01', timeout=60)
+    run('doctor', 'can://vcan0?node=1', '--fix', '--duration', '0.01', timeout=60)
     with Board('can://vcan0?node=1'):
         _, found = doctor('can://vcan0?node=1', listen='1.5')
     assert 'link.silent' not in found and 'link.open' not in found, found

@@ -447,7 +447,7 @@ def test_a_bus_is_shown_with_all_of_its_boards(tmp_path):
         assert 'ACTIVE' in table and 'CONNECTING' in table
 
         recording = tmp_path / 'bus.r4log'
-        assert run('record', 'can://vcan0', '-o', str(recording), '--for', '1.5', timeout=60).returncode == 0
+        assert run('record', 'can://vcan0', '-o', str(recording), '--duration', '1.5', timeout=60).returncode == 0
         [told] = objects(run('info', '--json', str(recording)).stdout)
         assert sorted(each['url'] for each in told['wires']) == [f'can://vcan0?node={node}' for node in (2, 3, 4)]
 
@@ -466,7 +466,7 @@ def test_a_bus_is_shown_with_all_of_its_boards(tmp_path):
         host.next(is_state)
     silent = run('monitor', 'can://vcan0', '--duration', '1', timeout=60)
     assert silent.returncode == 3 and ERROR.search(silent.stderr), silent
-    silent = run('record', 'can://vcan0', '-o', str(tmp_path / 'silence'), '--for', '1', timeout=60)
+    silent = run('record', 'can://vcan0', '-o', str(tmp_path / 'silence'), '--duration', '1', timeout=60)
     assert silent.returncode == 3 and 'no board was heard' in silent.stderr, silent
 
 

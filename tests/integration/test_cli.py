@@ -6,6 +6,7 @@ import pty
 import pwd
 import re
 import shutil
+import signal
 import socket
 import subprocess
 import tempfile
@@ -13,7 +14,8 @@ import time
 
 import pytest
 
-from r4_process import ERROR, PATIENCE_S, R4, objects, run
+from r4_process import ERROR, PATIENCE_S, R4, Running, objects, run
+from ros2_peer import own_domain
 
 DATA_BAD, USAGE, REFUSED, OPEN, PERMISSION, UNSUPPORTED = 1, 2, 3, 4, 5, 6
 
@@ -123,7 +125,7 @@ NO_BOARD = 'udp://127.0.0.1:9?listen=0'
     (['sim', 'udp://127.0.0.1:0', 'pty:', 'pty:', 'pty:', 'pty:'], USAGE, 'at most 4'),
     (['completion', 'csh'], USAGE, 'bash, zsh or fish'),
     (['man', 'sned'], USAGE, 'there is no such command'),
-    (['man', '--into', '/nowhere/at/all'], OPEN, 'folder'),
+    (['man', '--output', '/nowhere/at/all'], OPEN, 'folder'),
 ])
 def test_bad_input_has_its_exit_code_and_a_message_with_the_fix(arguments, code, message):
     result = run(*arguments)
@@ -211,7 +213,7 @@ def test_permission_denied_is_named_with_the_fix():
 def test_r4_alone_says_which_part_of_it_is_missing(tmp_path):
     program = shutil.copy(R4, tmp_path / 'r4')
     for command in ('ros2', 'metrics'):
-        result = subprocess.run([program, command, 'sim:', '--for', '1'], capture_output=True, text=True, timeout=30,
+        result = subprocess.run([program, command, 'sim:', '--duration', '1'], capture_output=True, text=True, timeout=30,
                                 check=False)
         assert result.returncode == UNSUPPORTED and ERROR.match(result.stderr), result
         assert f'{tmp_path}/r4-services' in result.stderr and 'libexec' in result.stderr
@@ -254,6 +256,39 @@ def test_nothing_that_is_opened_takes_the_place_of_a_closed_output():
         streams = [os.readlink(f'/proc/{process.pid}/fd/{fd}') for fd in range(3)]
         process.kill()
     assert streams == ['/dev/null'] * 3
+
+
+def signals_of(pid, kind):
+    """The signals that a process catches (SigCgt) or ignores (SigIgn)."""
+    with open(f'/proc/{pid}/status', encoding='ascii') as status:
+        mask = next(int(line.split()[1], 16) for line in status if line.startswith(kind))
+    return {number for number in signal.Signals if mask >> (number - 1) & 1}
+
+
+@pytest.mark.parametrize('command', [
+    ['sim', 'udp://127.0.0.1:0'], ['monitor', NO_BOARD], ['monitor', NO_BOARD, 'udp://127.0.0.1:10?listen=0'],
+    ['record', NO_BOARD, '-o', 'drive.r4log'], ['bridge', 'udp://127.0.0.1:0', NO_BOARD],
+    ['metrics', NO_BOARD, '--listen', '127.0.0.1:0'], ['web', NO_BOARD, '--listen', '127.0.0.1:0'], ['ros2', NO_BOARD],
+    ['replay', 'drive.r4log', 'udp://127.0.0.1:0', '--step']], ids=' '.join)
+def test_a_signal_that_was_ignored_at_the_start_stays_ignored(command, tmp_path):
+    if command[0] == 'replay':
+        assert run('record', 'sim:', '-o', 'drive.r4log', '--duration', '0.2', cwd=tmp_path).returncode == 0
+    ignored = {signal.SIGHUP, signal.SIGINT}
+
+    def as_nohup_and_the_background_of_a_script():
+        for number in ignored:
+            signal.signal(number, signal.SIG_IGN)
+
+    with Running(*command, cwd=tmp_path, env=own_domain(), stdin=subprocess.PIPE,
+                 preexec_fn=as_nohup_and_the_background_of_a_script) as program:
+        deadline = time.monotonic() + PATIENCE_S
+        while signal.SIGTERM not in signals_of(program.process.pid, 'SigCgt:'):
+            assert program.process.poll() is None and time.monotonic() < deadline
+            time.sleep(0.01)
+        assert ignored <= signals_of(program.process.pid, 'SigIgn:')
+        program.signal(signal.SIGTERM)
+        assert program.wait() in (0, REFUSED), program.errors  # REFUSED: no board was heard
+        program.process.stdin.close()
 
 
 def test_with_json_an_error_is_an_object_too():

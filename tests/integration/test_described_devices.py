@@ -68,7 +68,7 @@ def test_a_recording_becomes_columns_with_units(board, tmp_path):
     log, table = tmp_path / 'drive.r4log', tmp_path / 'drive.csv'
     with Running('monitor', board.host_url, '--device', 'bno055', '--json') as monitor:
         monitor.next(is_reading('bno055@0x28', 'accel_z'))
-        assert run('record', board.host_url, '-o', str(log), '--for', '0.5').returncode == 0
+        assert run('record', board.host_url, '-o', str(log), '--duration', '0.5').returncode == 0
     assert run('convert', str(log), '-o', str(table), '--device', 'bno055@0x28:1').returncode == 0
     with open(table, encoding='ascii') as file:
         rows = list(csv.DictReader(file))
@@ -84,7 +84,7 @@ def test_a_recording_tells_what_the_bytes_of_its_devices_mean(board, tmp_path):
     devices = ['--device', 'bno055@0x28:1', '--device', f'{mine}@0x40:7']
     with Running('monitor', board.host_url, *devices, '--json') as monitor:
         monitor.next(is_reading('mine@0x40', 'volts'))
-        assert run('record', board.host_url, '-o', str(log), '--for', '0.5', *devices).returncode == 0
+        assert run('record', board.host_url, '-o', str(log), '--duration', '0.5', *devices).returncode == 0
     mine.unlink()
     assert objects(run('info', str(log), '--json').stdout)[0]['wires'][0]['devices'] == ['bno055@0x28:1', 'mine@0x40:7']
     assert run('convert', str(log), '-o', str(table)).returncode == 0

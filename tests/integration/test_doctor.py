@@ -30,11 +30,11 @@ def test_a_serial_link_that_is_well_and_who_else_has_its_port(tmp_path):
         with subprocess.Popen([sys.executable, '-S', '-c', HOLDER, port], stdin=subprocess.PIPE,
                               stdout=subprocess.PIPE) as other:
             assert other.stdout.readline() == b'open\n'
-            code, found = doctor(board.host_url, '--for', '0.5')
+            code, found = doctor(board.host_url, '--duration', '0.5')
             assert f'pid {other.pid}' in found['serial.holder']['reason']
             assert found['serial.holder']['fix'] == f'kill {other.pid}' and code != 0
             other.stdin.close()
-        _, found = doctor(board.host_url, '--for', '1')
+        _, found = doctor(board.host_url, '--duration', '1')
     assert found['serial.permission']['severity'] == 'ok' and 'serial.holder' not in found
     assert not {'link.silent', 'link.open', 'link.damaged'} & set(found), found
 
@@ -67,16 +67,16 @@ def test_a_link_that_loses_and_damages():
         board.settimeout(PATIENCE_S)
         speaker = threading.Thread(target=speak, args=(board,))
         speaker.start()
-        code, found = doctor(f'udp://127.0.0.1:{board.getsockname()[1]}?listen=0', '--for', '1.5')
+        code, found = doctor(f'udp://127.0.0.1:{board.getsockname()[1]}?listen=0', '--duration', '1.5')
         speaker.join()
     assert code == REFUSED and found['link.loss']['severity'] == 'error', found
     assert found['link.damaged']['severity'] == 'warning'
 
 
 def test_a_board_that_says_nothing_and_a_port_that_is_not_there(tmp_path):
-    code, found = doctor('udp://127.0.0.1:9?listen=0', '--for', '0.1')
+    code, found = doctor('udp://127.0.0.1:9?listen=0', '--duration', '0.1')
     assert code == REFUSED and found['link.silent']['severity'] == 'error'
-    code, found = doctor(f'serial://{tmp_path}/none', '--for', '0.1')
+    code, found = doctor(f'serial://{tmp_path}/none', '--duration', '0.1')
     assert code == OPEN and found['serial.permission']['reason'] == 'there is no such port'
 
 

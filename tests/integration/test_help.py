@@ -35,6 +35,15 @@ def test_help_of_every_command_teaches(command):
     assert max(len(line) for line in result.stdout.splitlines()) <= 110
 
 
+def test_an_option_of_one_meaning_has_one_name_in_all_commands():
+    names = {}
+    for command in COMMANDS:
+        for name, meaning in re.findall(r'^  (-\S+)[^\n]*?  +(\S[^\n]*)$', run(command, '--help').stdout, re.MULTILINE):
+            names.setdefault(meaning, set()).add(name)
+    assert [each for each in names.values() if len(each) > 1] == []
+    assert names['end after that time'] == {'--duration'}
+
+
 def test_list_names_ports_and_urls():
     assert run('list').returncode == 0
     listed = objects(run('list', '--json').stdout)
@@ -104,7 +113,7 @@ def test_completion_scripts_are_valid_in_their_shell(shell):
 
 
 def test_manual_pages_say_what_the_help_says_and_checkers_find_nothing(tmp_path):
-    assert run('man', '--into', str(tmp_path)).returncode == 0
+    assert run('man', '--output', str(tmp_path)).returncode == 0
     pages = sorted(tmp_path.iterdir())
     assert {page.name for page in pages} >= {'r4.1', *(f'r4-{command}.1' for command in COMMANDS)}
     lint = subprocess.run(['mandoc', '-T', 'lint', *pages], capture_output=True, text=True, check=False)

@@ -92,7 +92,7 @@ def test_a_recording_is_a_transport(board, tmp_path):
 def a_recording(board, tmp_path):
     path = tmp_path / 'drive.r4log'
     with driving(board.host_url, 'O:358,1,1'):
-        assert run('record', board.host_url, '-o', str(path), '--for', '0.5').returncode == 0
+        assert run('record', board.host_url, '-o', str(path), '--duration', '0.5').returncode == 0
     return path
 
 
@@ -142,7 +142,7 @@ def test_a_replay_goes_step_by_step_from_anywhere_and_tells_damage(recorded):
 def test_records_several_boards_into_one_file(tmp_path):
     path = tmp_path / 'two.r4log'
     with Board('udp://127.0.0.1:0') as left, Board(f'pty:{tmp_path}/r4') as right:
-        ended = run('record', left.host_url, right.host_url, '-o', str(path), '--for', '1')
+        ended = run('record', left.host_url, right.host_url, '-o', str(path), '--duration', '1')
         assert ended.returncode == 0, ended.stderr
         assert re.search(r'two.r4log: \d+ datagrams and events in 1\.\d s', ended.stdout)
     (told,), code = info(path)
@@ -156,7 +156,7 @@ def test_records_many_boards_by_one_pattern(tmp_path, name, most_bytes):
     first = 28600
     ports = f'udp://127.0.0.1:{first}-{first + 9}'
     with Board(ports, listens=10):
-        ended = run('record', f'{ports}?listen=0', '-o', str(path), '--for', '1')
+        ended = run('record', f'{ports}?listen=0', '-o', str(path), '--duration', '1')
         assert ended.returncode == 0, ended.stderr
     (told,), code = info(path)
     assert code == 0 and [wire['name'] for wire in told['wires']] == [f'sim-{first + i}' for i in range(10)]
@@ -207,13 +207,13 @@ def test_who_is_killed_under_load_has_lost_a_second_at_most(tmp_path, name):
 def test_a_full_disk_ends_the_recording_with_a_reason(board, tmp_path):
     path = tmp_path / 'drive.r4log'
     limit = (20_000, 20_000)
-    full = run('record', board.host_url, '-o', str(path), '--for', '20', timeout=15,
+    full = run('record', board.host_url, '-o', str(path), '--duration', '20', timeout=15,
                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limit))
     assert full.returncode == OPEN, full
     assert ERROR.search(full.stderr) and 'the recording has ended: File too large' in full.stderr
     (told,), code = info(path)
     assert code == 0 and told['records'] >= 10 and not told['damage']
-    tiny = run('record', board.host_url, '-o', str(tmp_path / 'tiny'), '--for', '20',
+    tiny = run('record', board.host_url, '-o', str(tmp_path / 'tiny'), '--duration', '20',
                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10)))
     assert tiny.returncode == OPEN, 'not ended by SIGXFSZ'
 
@@ -253,7 +253,7 @@ def test_files_that_follow_one_another_are_whole_in_themselves(board, tmp_path):
 
 
 def test_a_board_that_says_nothing_is_named(tmp_path):
-    silent = run('record', 'udp://127.0.0.1:9?listen=0', '-o', str(tmp_path / 'x.r4log'), '--for', '0.3')
+    silent = run('record', 'udp://127.0.0.1:9?listen=0', '-o', str(tmp_path / 'x.r4log'), '--duration', '0.3')
     assert silent.returncode == REFUSED and ERROR.search(silent.stderr), silent
 
 
@@ -293,7 +293,7 @@ def test_info_says_what_is_no_recording(tmp_path, make, code, message):
     (['sim:', '-o', 'x', '--rotate', '5'], 'is neither a size nor a time'),
     (['sim:', '-o', 'x', '--keep', '1K'], 'is too little'),
     (['sim:', '-o', 'x', '--keep', '2M', '--rotate', '1M'], 'the files are too large for it'),
-    (['sim:', '-o', 'x', '--for', '0'], 'is too short for anything'),
+    (['sim:', '-o', 'x', '--duration', '0'], 'is too short for anything'),
 ])
 def test_wrong_uses_are_refused_before_anything_is_opened(tmp_path, arguments, message):
     result = run('record', *arguments, cwd=tmp_path)
@@ -304,5 +304,5 @@ def test_wrong_uses_are_refused_before_anything_is_opened(tmp_path, arguments, m
 def test_nothing_else_is_written_over(tmp_path):
     (tmp_path / 'notes').write_text('something else')
     for path, code in ((tmp_path / 'notes', DATA_BAD), (tmp_path, OPEN), ('/dev/null', OPEN)):
-        assert run('record', 'sim:', '-o', str(path), '--for', '1').returncode == code
+        assert run('record', 'sim:', '-o', str(path), '--duration', '1').returncode == code
     assert (tmp_path / 'notes').read_text() == 'something else'

@@ -398,7 +398,7 @@ def test_two_of_one_name_are_told_of_each_other():
 
 def test_it_says_what_it_is():
     domain = own_domain()
-    result = run('ros2', 'sim:', '--namespace', 'robot', '--for', '0.2', env=domain)
+    result = run('ros2', 'sim:', '--namespace', 'robot', '--duration', '0.2', env=domain)
     lines = result.stdout.splitlines()
     assert result.returncode == 0 and lines[0] == f'/robot/r4 in domain {domain["ROS_DOMAIN_ID"]}, reach: this computer'
     for line in ('  /robot/R4  std_msgs/msg/String', '  /robot/osmc1/command  std_msgs/msg/Float32',
@@ -416,7 +416,7 @@ def test_the_launch_example_starts_it(monkeypatch):
     monkeypatch.setitem(sys.modules, 'launch.actions', actions)
     [(command, options)] = example('robot.launch.py')['generate_launch_description']()
     assert command[:3] == ['r4', 'ros2', 'serial:auto'] and '--arm' not in command and options['respawn']
-    result = run('ros2', 'sim:', *command[3:], '--for', '0.1', env=own_domain())
+    result = run('ros2', 'sim:', *command[3:], '--duration', '0.1', env=own_domain())
     assert result.returncode == 0 and '  /robot/cmd_vel  geometry_msgs/msg/Twist' in result.stdout.splitlines()
 
 

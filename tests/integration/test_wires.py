@@ -196,11 +196,11 @@ def test_each_command_takes_the_wires_of_a_board(tmp_path):
         measured = run('bench', *reversed(urls), '--duration', '0.5', '--json')
         assert measured.returncode == 0, measured
         assert objects(measured.stdout)[0]['lost'] == 0
-        told = objects(run('doctor', joined, '--for', '0.3', '--json').stdout)
+        told = objects(run('doctor', joined, '--duration', '0.3', '--json').stdout)
         assert {each['url'] for each in told if each['type'] == 'link'} == set(urls)
 
         drive = tmp_path / 'drive.r4log'
-        assert run('record', joined, '-o', drive, '--for', '1').returncode == 0
+        assert run('record', joined, '-o', drive, '--duration', '1').returncode == 0
         text = text_of(drive)
         for number in (1, 2):
             assert re.search(rf' {number}< AIN24', text), f'no state by wire {number}'

@@ -89,7 +89,11 @@ int main(int argc, char** argv) {
   action.sa_handler = [](int) {
     ended = 1;
   };  // without SA_RESTART: it ends the wait for Enter, too
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    struct sigaction before {};
+    sigaction(signal, nullptr, &before);
+    if (before.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);  // nohup ignores SIGHUP
+  }
   try {
     std::string url;
     std::vector<Waypoint> waypoints = {{0, 0}};

@@ -87,7 +87,10 @@ void run(r4::Board& board) {
 
 int main(int argc, char** argv) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, [](int) { ended = 1; });
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    // nohup ignores SIGHUP, and it stays so.
+    if (std::signal(signal, [](int) { ended = 1; }) == SIG_IGN) std::signal(signal, SIG_IGN);
+  }
   try {
     if (argc > 2) {
       throw r4::Error(r4::ErrorKind::usage, argv[2], "it takes one URL", "give no more");

@@ -15,8 +15,8 @@
 #include <cstdio>
 #include <cstdlib>
 #include <r4link/board.hpp>
-#include <r4link/link.hpp>
 #include <r4link/error.hpp>
+#include <r4link/link.hpp>
 
 #include "keyboard.hpp"
 
@@ -145,7 +145,10 @@ void teleoperate(r4::Board& board, Keyboard& keyboard) {
 
 int main(int argc, char** argv) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, [](int) { ended = 1; });
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    // nohup ignores SIGHUP, and it stays so.
+    if (std::signal(signal, [](int) { ended = 1; }) == SIG_IGN) std::signal(signal, SIG_IGN);
+  }
   try {
     Keyboard keyboard;
     r4::Board board(argc > 1 ? argv[1] : "sim:");

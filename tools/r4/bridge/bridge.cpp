@@ -4,9 +4,7 @@
 
 #include <array>
 #include <asio/io_context.hpp>
-#include <asio/signal_set.hpp>
 #include <asio/steady_timer.hpp>
-#include <csignal>
 #include <cstdio>
 #include <memory>
 #include <mutex>
@@ -18,6 +16,7 @@
 
 #include "../shell/json.hpp"
 #include "../shell/options.hpp"
+#include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
 #include "r4link/fleet.hpp"
 
@@ -137,21 +136,15 @@ class Report {
 
 int bridge(const Options& options) {
   asio::io_context io(1);
-  asio::signal_set signals(io, SIGINT, SIGTERM, SIGHUP);
-  signals.async_wait([&io](const std::error_code&, int) { io.stop(); });
-
   Report report(options.json);
   BridgeOptions bridge_options;
   bridge_options.timeout = options.timeout;
   bridge_options.on_event = [&report](const BridgeEvent& event) { report.event(event); };
   Bridge bridge(options.hosts, options.board, std::move(bridge_options));
+  RunEnd run_end(io);
+  run_end.watch(options.duration);
   report.joined(bridge.status());
 
-  asio::steady_timer end(io);
-  if (options.duration) {
-    end.expires_after(*options.duration);
-    end.async_wait([&io](const std::error_code&) { io.stop(); });
-  }
   asio::steady_timer timer(io);
   const std::function<void()> tell_later = [&] {
     timer.expires_after(options.every);
@@ -207,7 +200,7 @@ void add_bridge(CLI::App& root, Action& chosen) {
   add_seconds(*command, "--every", options->every, "tell what passed so often (default 10)");
   add_seconds(*command, "--timeout", options->timeout,
               "a host makes room for another after so long: the board's timeout (default 1)");
-  add_seconds(*command, "--duration", options->duration, "end after that time");
+  add_duration(*command, options->duration);
 }
 
 }  // namespace r4::tool

@@ -205,7 +205,7 @@ void add_bus(CLI::App& root, Action& chosen) {
              "bit/s of the data phase, with --fd (default 5000000)");
   add_flag(*command, "--plain", options->plain, "plain text (pack=0) instead of the packed form");
   exclude(*command, "URL", {"--boards", "--rate", "--fields", "--commands", "--fd", "--plain"});
-  add_seconds(*command, "--duration", options->duration, "how long to listen to a real bus");
+  add_duration(*command, options->duration, "how long to listen to a real bus");
   add_json(*command, options->json, "print JSON, one object a line");
 }
 

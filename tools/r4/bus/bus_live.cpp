@@ -5,10 +5,8 @@
 #include <unistd.h>
 
 #include <asio/io_context.hpp>
-#include <asio/signal_set.hpp>
 #include <asio/steady_timer.hpp>
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <map>
 #include <string>
@@ -16,6 +14,7 @@
 #include <vector>
 
 #include "../shell/json.hpp"
+#include "../shell/run_end.hpp"
 #include "../shell/screen.hpp"
 #include "transports/can/can_interface.hpp"
 #include "transports/can/can_listener.hpp"
@@ -71,7 +70,7 @@ class LiveBus {
         rate_{rate_of("--bitrate", options.bit_rate, interface_.bit_rate, usual_bit_rate),
               rate_of("--dbitrate", options.data_bit_rate, interface_.data_bit_rate, 0)},
         listener_(io_, interface_.name, checked(rate_)),
-        signals_(io_, SIGINT, SIGTERM),
+        run_end_(io_),
         timer_(io_),
         live_(!options.json && !options.duration && ::isatty(STDOUT_FILENO) != 0) {}
 
@@ -84,7 +83,7 @@ class LiveBus {
         problem_.clear();
       }
     });
-    signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
+    run_end_.watch();
     wait();
     io_.run();
     if (live_) return;
@@ -244,7 +243,7 @@ class LiveBus {
   const CanBitRate rate_;
   asio::io_context io_{1};
   CanListener listener_;
-  asio::signal_set signals_;
+  RunEnd run_end_;
   asio::steady_timer timer_;
   const bool live_;
   Screen screen_;

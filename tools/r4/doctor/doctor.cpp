@@ -247,7 +247,7 @@ before, and looks again. It kills no program, sets no bit rate and takes no inte
 Examples:
   r4 doctor
   r4 doctor serial:auto can://can0?node=1
-  r4 doctor udp://192.168.0.125 --for 30
+  r4 doctor udp://192.168.0.125 --duration 30
   r4 doctor --fix
   r4 doctor --udev-rules | sudo tee /etc/udev/rules.d/70-r4.rules
 
@@ -262,7 +262,7 @@ void add_doctor(CLI::App& root, Action& chosen) {
       root, chosen, "doctor", "Tell what is wrong with this machine and a link, and how to mend it",
       footer, options, doctor);
   add_texts(*command, "URL", options->urls, "where boards are, such as serial:auto", url_type);
-  add_seconds(*command, "--for", options->duration, "how long to listen to each link (default 5)");
+  add_duration(*command, options->duration, "how long to listen to each link (default 5)");
   add_flag(*command, "--fix", options->fix, "run what needs no choice, and look again");
   add_flag(*command, "--udev-rules", options->udev_rules,
            "print the rules for udev and do nothing else");

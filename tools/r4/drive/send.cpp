@@ -13,11 +13,11 @@
 #include <utility>
 #include <vector>
 
-#include "../shell/farewell.hpp"
 #include "../shell/help.hpp"
 #include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
+#include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
 #include "../shell/wires.hpp"
 #include "host/commands/command_help.hpp"

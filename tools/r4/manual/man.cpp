@@ -63,7 +63,7 @@ without this.
 
 Examples:
   r4 man send | man -l -
-  r4 man --into ~/.local/share/man/man1       all of them: r4.1, r4-send.1 …
+  r4 man -o ~/.local/share/man/man1           all of them: r4.1, r4-send.1 …
 
 Exit codes: 0 done; 2 no such command; 4, 5 a page cannot be written.)";
 
@@ -75,9 +75,9 @@ void add_man(CLI::App& root, Action& chosen) {
   CLI::App* const command = add_subcommand(
       root, chosen, "man", "Print the manual page of a command", man_footer, options, print_pages);
   add_text(*command, "COMMAND", options->command, "such as send (default: r4 itself)", "COMMAND");
-  add_text(*command, "--into", options->folder, "write the pages of all commands into this folder",
-           "FOLDER");
-  exclude(*command, "--into", {"COMMAND"});
+  add_text(*command, "-o,--output", options->folder,
+           "write the pages of all commands into this folder", "FOLDER");
+  exclude(*command, "--output", {"COMMAND"});
 }
 
 }  // namespace r4::tool

@@ -5,10 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <asio/io_context.hpp>
-#include <asio/signal_set.hpp>
-#include <asio/steady_timer.hpp>
 #include <chrono>
-#include <csignal>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -19,6 +16,7 @@
 
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
+#include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
 #include "../shell/wires.hpp"
 #include "host/standard_registry.hpp"
@@ -99,8 +97,7 @@ class Recorders {
   explicit Recorders(const RecordOptions& options)
       : devices_(Device::from(options.devices)),
         board_options_(board_options(options, devices_)),
-        signals_(io_),
-        end_(io_) {
+        run_end_(io_) {
     std::vector<std::string> buses;
     for (const PatternUrl& each : expand_urls(options.urls)) {
       is_whole_bus(each.url) ? buses.push_back(each.url) : add(each.url);
@@ -116,12 +113,7 @@ class Recorders {
 
   int run(const RecordOptions& options) {
     for (const auto& board : boards_) open(*board);
-    for (const int number : {SIGINT, SIGTERM, SIGHUP}) signals_.add(number);
-    signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
-    if (options.duration) {
-      end_.expires_after(*options.duration);
-      end_.async_wait([this](const std::error_code&) { io_.stop(); });
-    }
+    run_end_.watch(options.duration);
     const auto began = std::chrono::steady_clock::now();
     io_.run();
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
@@ -163,8 +155,7 @@ class Recorders {
   std::optional<Recording> recording_;
   std::vector<std::unique_ptr<AsyncBoard>> boards_;
   std::vector<std::unique_ptr<BusListener>> buses_;
-  asio::signal_set signals_;
-  asio::steady_timer end_;
+  RunEnd run_end_;
 };
 
 int record(const RecordOptions& options) { return Recorders(options).run(options); }
@@ -181,7 +172,7 @@ A recording that is there goes on at its end. A crash costs at most the last sec
 
 Examples:
   r4 record udp://192.168.0.125 -o drive.r4log
-  r4 record serial:auto 'can://can0?node=3' -o drive.r4log.zst --for 60
+  r4 record serial:auto 'can://can0?node=3' -o drive.r4log.zst --duration 60
   r4 record serial:auto+udp://192.168.0.125 -o drive.r4log    one board, by both wires
   r4 record serial:auto -o drive.r4log --device bno055@0x28:1    which another program has set up
   r4 record can://can0 -o bus.r4log     every board that is heard on the bus
@@ -190,7 +181,7 @@ Examples:
   grep ' 1> ' drive.r4log               what was sent to the first board
   r4 info drive.r4log                   what is in it
 
-Exit codes: 0 ended by --for or Ctrl-C; 3 a board was not heard; 2 usage; 4 the file or the transport
+Exit codes: 0 ended by --duration or Ctrl-C; 3 a board was not heard; 2 usage; 4 the file or the transport
 cannot be opened, or the disk is full; 5 permission denied.)";
 
 }  // namespace
@@ -202,7 +193,7 @@ void add_record(CLI::App& root, Action& chosen) {
                      record_footer, options, record);
   add_boards(*command, options->urls);
   add_text(*command, "-o,--output", options->file, "the recording", file_type, Need::required);
-  add_seconds(*command, "--for", options->duration, "end after that time");
+  add_duration(*command, options->duration);
   add_repeated(*command, "--rotate", options->rotate,
                "begin a new file after a size (100M) or a time (10min); give it twice for both",
                "LIMIT");

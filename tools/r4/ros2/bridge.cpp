@@ -5,9 +5,7 @@
 
 #include <asio/io_context.hpp>
 #include <asio/post.hpp>
-#include <asio/signal_set.hpp>
 #include <asio/steady_timer.hpp>
-#include <csignal>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -17,6 +15,7 @@
 #include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/line_writer.hpp"
+#include "../shell/run_end.hpp"
 #include "board_node.hpp"
 #include "graph/environment.hpp"
 #include "graph/graph.hpp"
@@ -122,8 +121,7 @@ class Bridge {
                [this] {
                  for (const auto& node : nodes_) node->flush();
                }),
-        signals_(io_),
-        end_(io_) {
+        run_end_(io_) {
     const NodeOptions shown = node_options(options);
     for (const NamedUrl& each : named_urls(options)) add(each, shown);
   }
@@ -137,13 +135,8 @@ class Bridge {
     });
     inbox_.watch(namesakes.writers(), [&namesakes] { namesakes.look(); });
     inbox_.start();
+    run_end_.watch(options_.duration);
     introduce();
-    for (const int number : {SIGINT, SIGTERM, SIGHUP}) signals_.add(number);
-    signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
-    if (options_.duration) {
-      end_.expires_after(*options_.duration);
-      end_.async_wait([this](const std::error_code&) { io_.stop(); });
-    }
     io_.run();
     leave();
     return 0;
@@ -239,8 +232,7 @@ class Bridge {
   Outbox outbox_;
   Inbox inbox_;
   std::vector<std::unique_ptr<BoardNode>> nodes_;
-  asio::signal_set signals_;
-  asio::steady_timer end_;
+  RunEnd run_end_;
 };
 
 }  // namespace

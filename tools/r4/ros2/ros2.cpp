@@ -32,8 +32,8 @@ Examples:
   r4 ros2 udp://192.168.0.125 --drive osmc1,-osmc2 --wheel-separation 0.4 --full-speed 1.5
   r4 ros2 'can://can0?node=0-3' --namespace robot       /robot/board0/R4 …
 
-Exit codes: 0 ended by --for or Ctrl-C; 2 usage; 4 a transport or the graph cannot be opened; 5 permission
-denied.)";
+Exit codes: 0 ended by --duration or Ctrl-C; 2 usage; 4 a transport or the graph cannot be opened; 5
+permission denied.)";
 
 }  // namespace
 
@@ -64,7 +64,7 @@ void add_ros2(CLI::App& root, Action& chosen) {
   add_repeated(*command, "--device", options->devices,
                "a described one on the user's I2C bus, such as bno055@0x28: a topic of its own",
                "NAME@ADDRESS");
-  add_seconds(*command, "--for", options->duration, "end after that time");
+  add_duration(*command, options->duration);
   add_key(*command, options->key);
   add_json(*command, options->json, "print JSON, one object a line");
 }

@@ -86,6 +86,12 @@ CLI::Option* add_seconds(CLI::App& command, const std::string& name,
                          std::optional<Milliseconds>& out, const std::string& meaning) {
   return seconds(command, name, out, meaning, Zero::refused);
 }
+void add_duration(CLI::App& command, std::optional<Milliseconds>& out, const std::string& meaning) {
+  seconds(command, "--duration", out, meaning, Zero::refused);
+}
+void add_duration(CLI::App& command, Milliseconds& out, const std::string& meaning) {
+  seconds(command, "--duration", out, meaning, Zero::refused);
+}
 
 void add_text(CLI::App& command, const std::string& name, std::string& out,
               const std::string& meaning, const char* type, Need need) {

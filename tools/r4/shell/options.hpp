@@ -26,6 +26,10 @@ CLI::Option* add_seconds(CLI::App& command, const std::string& name, Millisecond
                          const std::string& meaning, Zero zero = Zero::refused);
 CLI::Option* add_seconds(CLI::App& command, const std::string& name,
                          std::optional<Milliseconds>& out, const std::string& meaning);
+// --duration, the same in every command that runs until it is ended.
+void add_duration(CLI::App& command, std::optional<Milliseconds>& out,
+                  const std::string& meaning = "end after that time");
+void add_duration(CLI::App& command, Milliseconds& out, const std::string& meaning);
 
 // One text, or a list of them; `type` is what the help and the completion call it.
 enum class Need { optional, required };

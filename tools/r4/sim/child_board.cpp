@@ -24,11 +24,20 @@ pid_t spawn(const std::string& url, int output) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
+  // It ends by this signal even if r4 was started with the signal ignored.
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  sigset_t ends;
+  ::sigemptyset(&ends);
+  ::sigaddset(&ends, SIGTERM);
+  posix_spawnattr_setsigdefault(&attributes, &ends);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
   const char* const arguments[] = {"r4",         "sim",          url.c_str(), "--json",
                                    "--duration", longest_life_s, nullptr};
   pid_t pid = 0;
-  const int error = ::posix_spawn(&pid, "/proc/self/exe", &actions, nullptr,
+  const int error = ::posix_spawn(&pid, "/proc/self/exe", &actions, &attributes,
                                   const_cast<char* const*>(arguments), environ);
+  posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   if (error != 0) {
     throw Error(ErrorKind::open, "r4 sim " + url,

@@ -4,10 +4,8 @@
 
 #include <algorithm>
 #include <asio/io_context.hpp>
-#include <asio/signal_set.hpp>
 #include <asio/steady_timer.hpp>
 #include <chrono>
-#include <csignal>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -16,6 +14,7 @@
 #include <utility>
 
 #include "../shell/options.hpp"
+#include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
 #include "host/replay/replay_records.hpp"
 #include "host/standard_registry.hpp"
@@ -35,6 +34,7 @@ struct ReplayOptions {
   std::uint64_t wire = 1;
   double speed = 1;
   ReplayStart start;
+  std::optional<Milliseconds> duration;
   bool step = false;
   bool json = false;
 };
@@ -54,12 +54,12 @@ class Replay : private Carrier::Handler {
                  options.start),
         carrier_(standard_registry().make(io_, options.url, Role::board)),
         timer_(io_),
-        signals_(io_, SIGINT, SIGTERM),
+        run_end_(io_),
         first_(records_.next()->time) {}
   ~Replay() { carrier_->close(); }
 
   int run() {
-    signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
+    run_end_.watch(options_.duration);
     carrier_->open(*this);
     {
       SimOutput output(options_.json);
@@ -166,7 +166,7 @@ class Replay : private Carrier::Handler {
   ReplayRecords records_;
   const std::unique_ptr<Carrier> carrier_;
   asio::steady_timer timer_;
-  asio::signal_set signals_;
+  RunEnd run_end_;
   const Time first_;
   Clock::time_point began_;
   std::map<Peer, Clock::time_point> audience_;
@@ -201,8 +201,8 @@ Examples:
   r4 replay robots.r4log 'can://vcan0?node=3' --wire 2
   r4 replay drive.r4log --step                  press Return
 
-Exit codes: 0 the recording has ended, or Ctrl-C; 1 some of it could not be read, or it is no recording;
-2 usage; 4, 5 the file or the transport cannot be opened.)";
+Exit codes: 0 the recording has ended, or --duration or Ctrl-C; 1 some of it could not be read, or it is no
+recording; 2 usage; 4, 5 the file or the transport cannot be opened.)";
 
 }  // namespace
 
@@ -223,6 +223,7 @@ void add_replay(CLI::App& root, Action& chosen) {
       *command, "--from",
       [options](const std::string& text) { options->start = ReplayStart::of("--from", text); },
       "seconds that are passed over, or a time in UTC", "TIME", Need::optional);
+  add_duration(*command, options->duration);
   add_flag(*command, "--step", options->step, "a datagram for each line on standard input");
   add_json(*command, options->json, "print where it listens as JSON");
 }

@@ -6,9 +6,7 @@
 
 #include <algorithm>
 #include <asio/io_context.hpp>
-#include <asio/signal_set.hpp>
 #include <asio/steady_timer.hpp>
-#include <csignal>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,6 +14,7 @@
 #include <vector>
 
 #include "../shell/options.hpp"
+#include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
 #include "firmware/ports/sim/simulated_board.hpp"
 #include "host/commands/command_help.hpp"
@@ -209,8 +208,6 @@ int simulate(const SimOptions& options) {
     throw Error(ErrorKind::usage, "--sensors", "is for JSON", "add --json, and leave out --quiet");
   }
   asio::io_context io(1);
-  asio::signal_set signals(io, SIGINT, SIGTERM);
-  signals.async_wait([&io](const std::error_code&, int) { io.stop(); });
 
   std::vector<sim::ScriptStep> connections;
   for (const std::string& name : options.devices) connections.push_back(connection_of(name));
@@ -225,16 +222,13 @@ int simulate(const SimOptions& options) {
     }
     std::vector<std::string> listening;
     for (const auto& board : boards) board->start(listening);
+    RunEnd run_end(io);
+    run_end.watch(options.duration);
     output.listening(listening);
     for (const auto& board : boards) {
       for (const sim::ScriptStep& step : connections) board->happen(step);
     }
 
-    asio::steady_timer end(io);
-    if (options.duration) {
-      end.expires_after(*options.duration);
-      end.async_wait([&io](const std::error_code&) { io.stop(); });
-    }
     std::optional<SensorClock> sensors;
     if (options.sensors) sensors.emplace(io, *options.sensors, boards);
     std::optional<InputLines> input;
@@ -310,7 +304,7 @@ void add_sim(CLI::App& root, Action& chosen) {
             "where it listens, up to four (default udp://127.0.0.1:2018)", url_type);
   add_json(*command, options->json, "print events as JSON, one object a line");
   add_flag(*command, "--quiet", options->quiet, "print only where it listens");
-  add_seconds(*command, "--duration", options->duration, "end after that time");
+  add_duration(*command, options->duration);
   add_seconds(*command, "--sensors", options->sensors,
               "with --json: what the sensors sense, as often as that");
   add_text(*command, "--script", options->script, "a scenario: what happens around the board",

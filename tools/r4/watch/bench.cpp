@@ -16,10 +16,10 @@
 #include <utility>
 #include <vector>
 
-#include "../shell/farewell.hpp"
 #include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
+#include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
 #include "../shell/wires.hpp"
 #include "r4link/async_board.hpp"
@@ -281,7 +281,7 @@ void add_bench(CLI::App& root, Action& chosen) {
   CLI::App* const command = add_subcommand(root, chosen, "bench", "Measure the link to a board",
                                            bench_footer, options, bench);
   add_wires(*command, options->urls);
-  add_seconds(*command, "--duration", options->duration, "how long to measure (default 5)");
+  add_duration(*command, options->duration, "how long to measure (default 5)");
   add_key(*command, options->key);
   add_json(*command, options->json, "print JSON");
 }

@@ -21,7 +21,7 @@ Examples:
   r4 metrics 'udp://10.0.0.{1-30}?listen=0' 'can://can0?node=0-7'
   curl -s http://127.0.0.1:9618/metrics | grep r4_safe
 
-Exit codes: 0 ended by --for or Ctrl-C; 2 usage; 4 a transport or the port cannot be opened; 5 permission
+Exit codes: 0 ended by --duration or Ctrl-C; 2 usage; 4 a transport or the port cannot be opened; 5 permission
 denied.)";
 
 }  // namespace
@@ -33,7 +33,7 @@ void add_metrics(CLI::App& root, Action& chosen) {
   add_boards(*command, options->urls);
   add_text(*command, "--listen", options->listen, "where it answers (default 127.0.0.1:9618)",
            "HOST:PORT");
-  add_seconds(*command, "--for", options->duration, "end after that time");
+  add_duration(*command, options->duration);
   add_key(*command, options->key);
   add_json(*command, options->json, "print where it listens as JSON");
 }

@@ -9,10 +9,8 @@
 #include <array>
 #include <asio/io_context.hpp>
 #include <asio/post.hpp>
-#include <asio/signal_set.hpp>
 #include <asio/steady_timer.hpp>
 #include <chrono>
-#include <csignal>
 #include <cstdint>
 #include <cstdio>
 #include <future>
@@ -25,6 +23,7 @@
 
 #include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
+#include "../shell/run_end.hpp"
 #include "board_metrics.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/error.hpp"
@@ -124,7 +123,7 @@ std::unique_ptr<prometheus::Exposer> serve(const std::string& address) {
 class MetricsServer {
  public:
   explicit MetricsServer(const MetricsOptions& options)
-      : signals_(io_), end_(io_), metrics_(std::make_shared<Metrics>(io_)) {
+      : run_end_(io_), metrics_(std::make_shared<Metrics>(io_)) {
     BoardOptions board_options = with_key(options.key);
     board_options.role = BoardRole::watch;
     board_options.session.arming = Arming::off;  // it drives nothing
@@ -146,6 +145,7 @@ class MetricsServer {
     }
     const std::unique_ptr<prometheus::Exposer> exposer = serve(options.listen);
     exposer->RegisterCollectable(metrics_);
+    run_end_.watch(options.duration);
     const std::string host = options.listen.substr(0, options.listen.rfind(':'));
     const std::string url =
         fmt::format("http://{}:{}/metrics", host, exposer->GetListeningPorts().front());
@@ -155,20 +155,13 @@ class MetricsServer {
       fmt::print("{} of {} boards\n", url, boards_.size());
       std::fflush(stdout);
     }
-    for (const int number : {SIGINT, SIGTERM, SIGHUP}) signals_.add(number);
-    signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
-    if (options.duration) {
-      end_.expires_after(*options.duration);
-      end_.async_wait([this](const std::error_code&) { io_.stop(); });
-    }
     io_.run();
     return 0;
   }
 
  private:
   asio::io_context io_{1};
-  asio::signal_set signals_;
-  asio::steady_timer end_;
+  RunEnd run_end_;
   std::vector<std::unique_ptr<AsyncBoard>> boards_;
   std::map<std::string, std::unique_ptr<BusMetrics>> interfaces_;
   std::shared_ptr<Metrics> metrics_;

@@ -5,7 +5,6 @@
 
 #include <array>
 #include <asio/io_context.hpp>
-#include <asio/signal_set.hpp>
 #include <asio/steady_timer.hpp>
 #include <chrono>
 #include <csignal>
@@ -16,9 +15,9 @@
 #include <vector>
 
 #include "../devices/device_setup.hpp"
-#include "../shell/farewell.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
+#include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
 #include "../shell/wires.hpp"
 #include "monitor_boards.hpp"
@@ -71,7 +70,7 @@ class Monitor {
         view_(options.json                   ? make_json_view(board_)
               : ::isatty(STDOUT_FILENO) != 0 ? make_live_view(board_)
                                              : make_plain_view()),
-        signals_(io_, SIGINT, SIGTERM),
+        run_end_(io_),
         tick_(io_),
         end_(io_) {}
 
@@ -90,7 +89,7 @@ class Monitor {
       gives_way_ = error.problem().reason.starts_with("controlled by ");
       throw;
     }
-    signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
+    run_end_.watch();
     end_after(options_.duration ? *options_.duration : patience);
     next_tick();
     io_.run();
@@ -195,7 +194,7 @@ class Monitor {
   asio::io_context io_{1};
   AsyncBoard board_;
   std::unique_ptr<MonitorView> view_;
-  asio::signal_set signals_;
+  RunEnd run_end_;
   asio::steady_timer tick_;
   asio::steady_timer end_;
   std::uint64_t states_ = 0;
@@ -295,7 +294,7 @@ void add_monitor(CLI::App& root, Action& chosen) {
   add_json(*command, options->json, "print JSON, one object a line");
   add_number(*command, "--count", options->count, 1, ~std::uint64_t{0},
              "end after that many states (or 5 s in which nothing at all is heard)");
-  add_seconds(*command, "--duration", options->duration, "end after that time");
+  add_duration(*command, options->duration);
   add_fields(*command, options->fields);
   add_repeated(*command, "--device", options->devices,
                "a described one on the user's I2C bus, such as bno055@0x28: shows what it measures",

@@ -6,14 +6,13 @@
 
 #include <algorithm>
 #include <asio/io_context.hpp>
-#include <asio/signal_set.hpp>
 #include <asio/steady_timer.hpp>
 #include <chrono>
-#include <csignal>
 #include <memory>
 #include <utility>
 
 #include "../shell/line_writer.hpp"
+#include "../shell/run_end.hpp"
 #include "../shell/screen.hpp"
 #include "../shell/wires.hpp"
 #include "monitor_view.hpp"
@@ -56,7 +55,7 @@ class BoardsMonitor {
  public:
   explicit BoardsMonitor(const BoardsMonitorOptions& options)
       : options_(options),
-        signals_(io_, SIGINT, SIGTERM),
+        run_end_(io_),
         tick_(io_),
         end_(io_),
         live_(!options.json && ::isatty(STDOUT_FILENO) != 0) {
@@ -70,7 +69,7 @@ class BoardsMonitor {
       listen(*board);
       board->board.open();
     }
-    signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
+    run_end_.watch();
     end_.expires_after(options_.duration.value_or(boards_patience));
     end_.async_wait([this](const std::error_code& error) {
       if (!error && (options_.duration || (options_.count != 0 && states_ == 0))) io_.stop();
@@ -178,7 +177,7 @@ class BoardsMonitor {
 
   const BoardsMonitorOptions& options_;
   asio::io_context io_{1};
-  asio::signal_set signals_;
+  RunEnd run_end_;
   asio::steady_timer tick_;
   asio::steady_timer end_;
   const bool live_;

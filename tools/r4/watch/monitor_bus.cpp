@@ -6,15 +6,14 @@
 
 #include <array>
 #include <asio/io_context.hpp>
-#include <asio/signal_set.hpp>
 #include <asio/steady_timer.hpp>
 #include <chrono>
-#include <csignal>
 #include <string>
 #include <vector>
 
 #include "../shell/json.hpp"
 #include "../shell/line_writer.hpp"
+#include "../shell/run_end.hpp"
 #include "../shell/screen.hpp"
 #include "protocol/messages/message.hpp"
 #include "transports/can/can_listener.hpp"
@@ -37,7 +36,7 @@ class BusMonitor {
   explicit BusMonitor(const BusMonitorOptions& options)
       : options_(options),
         listener_(io_, options.interface, any_rate),
-        signals_(io_, SIGINT, SIGTERM),
+        run_end_(io_),
         tick_(io_),
         end_(io_),
         live_(!options.json && ::isatty(STDOUT_FILENO) != 0) {}
@@ -47,7 +46,7 @@ class BusMonitor {
         [this](std::uint8_t node, const Datagram& datagram) { on_datagram(node, datagram); });
     listener_.survey().on_stop([this] { on_stop(); });
     listener_.on_event([this](const CarrierEvent& event) { on_event(event); });
-    signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
+    run_end_.watch();
     end_.expires_after(options_.duration.value_or(bus_patience));
     end_.async_wait([this](const std::error_code& error) {
       if (!error && (options_.duration || (options_.count != 0 && !any_heard()))) io_.stop();
@@ -161,7 +160,7 @@ class BusMonitor {
   const BusMonitorOptions& options_;
   asio::io_context io_{1};
   CanListener listener_;
-  asio::signal_set signals_;
+  RunEnd run_end_;
   asio::steady_timer tick_;
   asio::steady_timer end_;
   const bool live_;

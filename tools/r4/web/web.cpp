@@ -3,9 +3,6 @@
 #include <fmt/format.h>
 
 #include <asio/io_context.hpp>
-#include <asio/signal_set.hpp>
-#include <asio/steady_timer.hpp>
-#include <csignal>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -15,6 +12,7 @@
 #include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
+#include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
 #include "hub.hpp"
 #include "server/access.hpp"
@@ -54,6 +52,8 @@ int serve_web(const Options& options) {
   asio::io_context io{1};
   web::Hub hub(io, urls, hub_options);
   hub.open();
+  RunEnd run_end(io);
+  run_end.watch(options.duration);
   std::string url = fmt::format("http://{}/", hub.address().text());
   if (secret) url += "#token=" + hub_options.server.token;
   if (options.json) {
@@ -61,14 +61,6 @@ int serve_web(const Options& options) {
   } else {
     fmt::print("{}\n", url);
     std::fflush(stdout);
-  }
-  asio::signal_set signals(io);
-  for (const int number : {SIGINT, SIGTERM, SIGHUP}) signals.add(number);
-  signals.async_wait([&io](const std::error_code&, int) { io.stop(); });
-  asio::steady_timer end(io);
-  if (options.duration) {
-    end.expires_after(*options.duration);
-    end.async_wait([&io](const std::error_code&) { io.stop(); });
   }
   io.run();
   io.restart();
@@ -96,7 +88,7 @@ Examples:
   r4 web 'can://can0?node=0-7' --record-to /var/log/robot
   r4 web serial:auto --listen 0.0.0.0:8080
 
-Exit codes: 0 ended by --for or Ctrl-C; 2 usage; 4 a transport or the port cannot be opened; 5 permission
+Exit codes: 0 ended by --duration or Ctrl-C; 2 usage; 4 a transport or the port cannot be opened; 5 permission
 denied.)";
 
 }  // namespace
@@ -121,7 +113,7 @@ void add_web(CLI::App& root, Action& chosen) {
   add_repeated(*command, "--device", options->devices,
                "a described one on the user's I2C bus, such as bno055@0x28: what it measures",
                "NAME@ADDRESS");
-  add_seconds(*command, "--for", options->duration, "end after that time");
+  add_duration(*command, options->duration);
   add_key(*command, options->key);
   add_json(*command, options->json, "print the address as JSON");
 }

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How a command ends that runs until it is ended.
+#pragma once
+
+#include <asio/io_context.hpp>
+#include <asio/signal_set.hpp>
+#include <asio/steady_timer.hpp>
+#include <chrono>
+#include <csignal>
+#include <optional>
+#include <system_error>
+
+#include "r4link/async_board.hpp"
+
+namespace r4::tool {
+
+// SIGINT, SIGTERM and SIGHUP stop `io`, so that the command ends in good order. A signal that was
+// ignored when the program started stays ignored: nohup and the & of a shell script ask for that.
+class RunEnd {
+ public:
+  explicit RunEnd(asio::io_context& io) : io_(io), signals_(io), timer_(io) {}
+
+  // Before this call a signal ends the program at once. `duration`: the longest run, if it has a limit.
+  void watch(const std::optional<std::chrono::milliseconds>& duration = std::nullopt) {
+    for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
+      if (!is_ignored(number)) signals_.add(number);
+    }
+    signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
+    if (!duration) return;
+    timer_.expires_after(*duration);
+    timer_.async_wait([this](const std::error_code&) { io_.stop(); });
+  }
+
+ private:
+  static bool is_ignored(int number) {
+    struct sigaction action {};
+    return ::sigaction(number, nullptr, &action) == 0 && action.sa_handler == SIG_IGN;
+  }
+
+  asio::io_context& io_;
+  asio::signal_set signals_;
+  asio::steady_timer timer_;
+};
+
+// The end of a command that had a board: runs `io`, which was stopped, until the board has said that it is
+// free, or does not answer, and closes it. So the next command need not wait for the board's timeout.
+inline void say_farewell(asio::io_context& io, AsyncBoard& board) {
+  constexpr std::chrono::milliseconds limit{100};
+  board.async_close(limit, [&io](const CommandResult&) { io.stop(); });
+  io.restart();
+  io.run();
+}
+
+}  // namespace r4::tool
