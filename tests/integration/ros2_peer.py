@@ -18,9 +18,10 @@ DOMAINS = itertools.count(os.getpid() * 8)
 ENVIRONMENT = {name: value for name, value in os.environ.items()
                if not name.startswith('ROS_') and name != 'CYCLONEDDS_URI'}
 # What ROS 2 calls its messages in DDS, and what releases since Iron compare (measured).
-STRING, BOOL, FLOAT32, INT32, UINT32, TWIST = (f'{package}::msg::dds_::{name}_' for package, name in (
+STRING, BOOL, FLOAT32, INT32, UINT32, TWIST, TWIST_STAMPED, EMPTY = (f'{package}::msg::dds_::{name}_' for package, name in (
     ('std_msgs', 'String'), ('std_msgs', 'Bool'), ('std_msgs', 'Float32'), ('std_msgs', 'Int32'), ('std_msgs', 'UInt32'),
-    ('geometry_msgs', 'Twist')))
+    ('geometry_msgs', 'Twist'), ('geometry_msgs', 'TwistStamped'), ('std_msgs', 'Empty')))
+LOG = 'rcl_interfaces::msg::dds_::Log_'
 DIAGNOSTICS = 'diagnostic_msgs::msg::dds_::DiagnosticArray_'
 NODES = 'rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_'
 NODES_HASH = 'typehash=RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e;'
@@ -237,6 +238,11 @@ def float32(value):
 
 def twist(linear, angular):
     return struct.pack('<6d', linear, 0, 0, 0, 0, angular)
+
+
+def stamped(stamp, payload):
+    """A message that begins with a header: of that stamp, in seconds, and without a frame."""
+    return struct.pack('<iIIB3x', int(stamp), int(stamp % 1 * 1e9), 1, 0) + payload
 
 
 def health_of(payload):

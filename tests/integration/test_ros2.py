@@ -3,22 +3,23 @@
 import math
 import os
 import pathlib
+import resource
 import runpy
 import signal
 import struct
+import subprocess
 import sys
 import time
 import types
 
 import pytest
 
-from r4_process import ERROR, PATIENCE_S, SANITIZED, Board, lasts, run
-from ros2_peer import (BOOL, DIAGNOSTICS, FLOAT32, INT32, NODES, NODES_HASH, STRING, TWIST, UINT32, Cdr, Peer, Ros2,
+from r4_process import ERROR, PATIENCE_S, R4, SANITIZED, Board, lasts, run
+from ros2_peer import (BOOL, DIAGNOSTICS, FLOAT32, INT32, LOG, NODES, NODES_HASH, STRING, TWIST, UINT32, Cdr, Peer, Ros2,
                        again, drive, float32, health_of, join, nodes_of, own_domain, pwm, text, texts, twist)
 
 USAGE = 2
 ON, OFF = b'\x01', b'\x00'
-LOG = 'rcl_interfaces::msg::dds_::Log_'
 REQUEST, RESPONSE = 'std_srvs::srv::dds_::Trigger_Request_', 'std_srvs::srv::dds_::Trigger_Response_'
 SEND, SENT = (f'diagnostic_msgs::srv::dds_::AddDiagnostics_{half}_' for half in ('Request', 'Response'))
 
@@ -443,6 +444,21 @@ def test_the_example_of_a_robot_keeps_the_speeds_of_its_wheels():
     assert drive(5, 0.5, 0.0) == pytest.approx([10, -10], rel=0.05)  # and it comes back from there
     base.command(1, 0, now)
     assert base.update((math.nan, 0), now) == [0, 0]
+
+
+def test_it_says_so_where_other_open_files_leave_no_room_for_the_graph():
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    files = []
+    try:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (min(2048, hard), hard))
+        files = [os.open(os.devnull, os.O_RDONLY) for _ in range(1024)]
+        result = subprocess.run([R4, 'ros2', 'sim:', '--for', '0.1'], pass_fds=files, env=own_domain(), check=False,
+                                capture_output=True, text=True, timeout=PATIENCE_S)
+    finally:
+        for each in files:
+            os.close(each)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    assert result.returncode == 4 and ERROR.search(result.stderr) and 'open files' in result.stderr, result
 
 
 def test_wrong_uses_are_refused():

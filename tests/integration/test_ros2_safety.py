@@ -2,12 +2,13 @@
 """r4 ros2, where what ROS says is lost, overtaken, or of a kind that nobody could take back."""
 import signal
 import struct
+import time
 
 import pytest
 
 from r4_process import SANITIZED, Board
-from ros2_peer import (BOOL, FLOAT32, INT32, STRING, Peer, Ros2, again, armed, drive, float32, join, own_domain, pwm,
-                       text)
+from ros2_peer import (BOOL, DIAGNOSTICS, EMPTY, FLOAT32, INT32, LOG, STRING, TWIST, TWIST_STAMPED, Peer, Ros2, again,
+                       armed, drive, float32, health_of, join, own_domain, pwm, stamped, text, twist)
 
 ON, OFF = b'\x01', b'\x00'
 
@@ -98,6 +99,56 @@ def test_a_stop_is_heard_of_who_does_not_publish_reliably_and_who_is_not_heard_i
         board.state('SAFE', 'stop')
         peer.writer('rt/osmc1/command', FLOAT32, reliability='best_effort', matched=False)
         ros2.logged('osmc1/command: a publisher does not offer what this subscription needs, reliability')
+        peer.read('rt/R4', STRING, durability='transient_local')
+        ros2.logged('R4: a subscriber asks for more than this publisher offers, in durability')
+
+
+def test_a_publisher_of_another_type_is_told_until_it_has_gone():
+    with armed() as (_, ros2, peer):
+        peer.read('rt/diagnostics', DIAGNOSTICS)
+        peer.read('rt/rosout', LOG)
+        peer.sample('rt/diagnostics', lambda payload: health_of(payload)[0] == 0)
+        for topic, of, words in (
+                ('osmc1/command', 'std_msgs::msg::dds_::Float64_', b'std_msgs/msg/Float64, and is not heard'),
+                ('arm', STRING, b'std_msgs/msg/String, and is not heard'),
+                ('cmd_vel', TWIST, b'--drive'), ('relay1/command', BOOL, b'supply')):
+            peer.writer(f'rt/{topic}', of, matched=False)
+            told = ros2.logged(words.decode())
+            assert told['level'] == 'warning' and told['text'].startswith(f'{topic}: ')
+            peer.sample('rt/rosout', lambda payload, words=words: words in payload)
+
+            def is_told(payload, words=words):
+                level, _, message, _, values = health_of(payload)
+                return level == 1 and words.decode() in message and words.decode() in values['mismatch 1']
+            peer.sample('rt/diagnostics', is_told)
+            peer.say('remove', f'rt/{topic}')
+            peer.sample('rt/diagnostics', lambda payload: health_of(payload)[0] == 0)
+
+
+def test_each_sample_of_another_type_on_stop_is_a_stop():
+    with armed() as (board, ros2, peer):
+        join(ros2, peer, 'osmc1/command', FLOAT32)
+        drive(board, peer, 'rt/osmc1/command', float32(0.5), lambda each: pwm(each, 1) == 2048)
+        peer.writer('rt/stop', EMPTY, reliability='best_effort')
+        assert 'std_msgs/msg/Empty' in ros2.logged('each of its samples is a stop')['text']
+        again(lambda: peer.write('rt/stop', OFF), lambda timeout: ros2.logged('E:STOP: confirmed', timeout=timeout))
+        board.state('SAFE', 'stop')
+        assert pwm(newest_outputs(board), 1) == 0
+
+
+def test_a_stamped_cmd_vel_drives_unless_its_stamp_is_older_than_the_deadline():
+    with armed('--drive', 'osmc1,osmc2', '--wheel-separation', '0.5', '--full-speed', '2') as (board, ros2, peer):
+        peer.writer('rt/cmd_vel', TWIST_STAMPED)
+        ros2.logged('geometry_msgs/msg/TwistStamped of')
+        again(lambda: peer.write('rt/cmd_vel', stamped(time.time() - 5, twist(2, 0))),
+              lambda timeout: ros2.logged('the stamp of its header is more than 1000 ms old', timeout=timeout))
+        for stamp, speed in ((time.time() + 60, 0.5), (0, 1.0)):
+            _, outputs = drive(board, peer, 'rt/cmd_vel', stamped(stamp, twist(speed, 0)),
+                               lambda each, speed=speed: pwm(each, 1) == round(speed / 2 * 4095))
+            assert pwm(outputs, 2) == pwm(outputs, 1)
+        peer.say('remove', 'rt/cmd_vel')
+        board.outputs(lambda each: pwm(each, 1) == 0)
+        assert not any(pwm(each['outputs'], 1) == 4095 for each in board.log if 'outputs' in each)
 
 
 def test_a_zero_of_an_outage_ends_the_drive_when_the_link_is_back():

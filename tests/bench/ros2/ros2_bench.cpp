@@ -125,7 +125,7 @@ void publish(std::size_t samples) {
     // As BoardNode does.
     outbox.push([topics, state, line = stamped(), sampled = std::chrono::system_clock::now()] {
       topics->on_datagram(line);
-      topics->on_state(state, sampled);
+      topics->on_state(state, sampled, 0);
     });
     std::this_thread::sleep_until(next += period);
     std::string text = stamped();

@@ -7,6 +7,8 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
+#include <numbers>
 
 namespace r4::tool::ros2 {
 namespace {
@@ -27,10 +29,11 @@ class JointStates : public ::testing::Test {
     state.t_ms = t_ms;
     state.present = FieldSet();
     for (const StateField field : fields) state.present.add(field);
-    topics.on_state(state, BoardTopics::WallTime(std::chrono::milliseconds(t_ms)));
+    topics.on_state(state, BoardTopics::WallTime(std::chrono::milliseconds(t_ms)), boot);
   }
   struct Told {
     std::vector<std::string> names;
+    std::vector<double> positions;
     std::vector<double> velocities;
     std::uint32_t stamp_ns = 0;
   };
@@ -44,6 +47,8 @@ class JointStates : public ::testing::Test {
       Told& each = all.emplace_back();
       for (std::uint32_t n = 0; n < message.name._length; ++n)
         each.names.emplace_back(message.name._buffer[n]);
+      each.positions.assign(message.position._buffer,
+                            message.position._buffer + message.position._length);
       each.velocities.assign(message.velocity._buffer,
                              message.velocity._buffer + message.velocity._length);
       each.stamp_ns = message.header.stamp.nanosec;
@@ -63,6 +68,7 @@ class JointStates : public ::testing::Test {
   Entity reader{dds_create_reader(graph.participant(), topic.get(), make_qos({}).get(), nullptr),
                 "joint_states"};
   State state;
+  std::uint32_t boot = 0;
 };
 
 // 508 bytes, over the Giga's WiFi.
@@ -92,6 +98,22 @@ TEST_F(JointStates, OfAStateOfWhichAPartWasLostAreWhatCame) {
   all = told();
   ASSERT_EQ(all.size(), 1U);
   EXPECT_FALSE(std::isnan(all[0].velocities[0]));
+}
+
+TEST_F(JointStates, GoOnWhereTheyWereWhenCountsWrapAndTheBoardRestarts) {
+  constexpr double turn = 2 * std::numbers::pi / 4096;
+  constexpr std::int32_t last = std::numeric_limits<std::int32_t>::max();
+  const auto position = [this](std::uint32_t t_ms, std::int32_t counts) {
+    state.encoder_counts[0] = counts;
+    part(t_ms, {StateField::enc1, StateField::enc2, StateField::enc1hz, StateField::enc2hz});
+    const auto all = told();
+    return all.size() == 1 ? all[0].positions[0] : std::nan("");
+  };
+  EXPECT_NEAR(position(1000, last - 9), (last - 9.0) * turn, 1e-3);
+  EXPECT_NEAR(position(1010, -last), (last + 2.0) * turn, 1e-3) << "12 counts more, with a wrap";
+  boot = 1;
+  EXPECT_NEAR(position(500, 3), (last + 2.0) * turn, 1e-3) << "it counts from 0 again";
+  EXPECT_NEAR(position(510, -7), (last - 8.0) * turn, 1e-3);
 }
 
 }  // namespace

@@ -34,7 +34,6 @@ class InboxTest : public ::testing::Test {
         .urgent = [](bool pressed) { return pressed; },
         .take = [this](bool, const Origin&) { taken.emplace_back("stop"); },
         .left = {},
-        .mismatched = [this](const char* policy) { taken.push_back(std::string("no ") + policy); },
     });
     inbox.add<Float32Message, float>({
         .reader = duty_reader = graph.subscribe<Float32Message>(node, "duty"),
@@ -48,19 +47,16 @@ class InboxTest : public ::testing::Test {
             },
         .left =
             [this](const auto& there) { taken.push_back("left " + std::to_string(there.size())); },
-        .mismatched = {},
     });
     inbox.start();
   }
 
   template <class Message>
-  Entity writer_of(const char* topic, bool reliable = true) {
+  Entity writer_of(const char* topic) {
     const Entity made_topic(
         dds_create_topic(other.get(), message_type<Message>().descriptor, topic, nullptr, nullptr),
         topic);
-    Qos qos;
-    qos.reliable = reliable;
-    return {dds_create_writer(other.get(), made_topic.get(), make_qos(qos).get(), nullptr), topic};
+    return {dds_create_writer(other.get(), made_topic.get(), make_qos({}).get(), nullptr), topic};
   }
   void write_duty(const Entity& writer, float duty) {
     const Float32Message message{duty};
@@ -95,7 +91,7 @@ class InboxTest : public ::testing::Test {
   dds_entity_t duty_reader = 0;
   std::vector<std::string> taken;
   std::vector<EntityId> writers;
-  Inbox inbox{io, graph.participant(), Transit::Clocks::one, [this] { taken.emplace_back("-"); }};
+  Inbox inbox{io, Transit::Clocks::one, [this] { taken.emplace_back("-"); }};
 };
 
 TEST_F(InboxTest, HandsOverTheLastSampleOfAPublisherBeforeItsLeaving) {
@@ -119,11 +115,6 @@ TEST_F(InboxTest, TellsWhoWroteASample) {
   write_duty(writer, 1);
   ASSERT_TRUE(until([&] { return !writers.empty(); }));
   EXPECT_EQ(writers[0], id_of(writer.get()));
-}
-
-TEST_F(InboxTest, TellsOfAPublisherThatCannotBeHeard) {
-  const Entity writer = writer_of<BoolMessage>("rt/stop", false);
-  EXPECT_TRUE(until([&] { return has("no reliability"); }));
 }
 
 // However many stops there were, what comes behind them waits for one turn, and not for one for each of them.

@@ -104,5 +104,24 @@ TEST(Ros2CommandText, SeveralCommandsStandBesideEachOther) {
   EXPECT_FALSE(asks_to_stop("E:STOPPED;E:CLEAR"));
 }
 
+TEST(StampOfACommand, IsOldBehindTheDeadlineAndSaysNothingIfItIsZero) {
+  using namespace std::chrono_literals;
+  const WallTime now(1000s);
+  EXPECT_FALSE(is_outdated(stamp_time(999, 500'000'000), now, 500ms));
+  EXPECT_TRUE(is_outdated(stamp_time(999, 499'999'999), now, 500ms));
+  EXPECT_FALSE(is_outdated(stamp_time(1001, 0), now, 500ms)) << "a clock that is ahead";
+  EXPECT_FALSE(is_outdated(stamp_time(0, 0), now, 500ms));
+  EXPECT_FALSE(is_outdated(stamp_time(1, 0), now, 0ms)) << "no deadline";
+}
+
+TEST(PositionOfACounter, BeginsWithTheCountAndFollowsItBothWays) {
+  Position position;
+  EXPECT_EQ(position.advance(-5, 7), -5);
+  EXPECT_EQ(position.advance(10, 7), 10);
+  EXPECT_EQ(position.advance(-20, 7), -20);
+  EXPECT_EQ(position.advance(3, 8), -20) << "the board has restarted";
+  EXPECT_EQ(position.advance(2, 8), -21);
+}
+
 }  // namespace
 }  // namespace r4::tool::ros2

@@ -23,7 +23,6 @@
 #include "graph/inbox.hpp"
 #include "graph/outbox.hpp"
 #include "graph/pressed.hpp"
-#include "log_level.hpp"
 #include "node_options.hpp"
 #include "r4link/async_board.hpp"
 
@@ -62,12 +61,21 @@ class BoardCommands {
   template <class Message, class ToCommand>
   void subscribe_output(Graph& graph, std::size_t node, Inbox& inbox, const std::string& topic,
                         ToCommand to_command);
+  struct Speed {
+    double linear;
+    double angular;
+    std::optional<WallTime> stamp;
+  };
+  template <class Message, class Read>
+  void subscribe_speed(Graph& graph, std::size_t node, Inbox& inbox, const void* source, Read read);
   void subscribe_drive(Graph& graph, std::size_t node, Inbox& inbox);
+  void on_speed(const Speed& speed, const void* source, const Origin& origin);
+  static void decline(Graph& graph, std::size_t node, const char* topic, const char* why);
   void subscribe_stop(Graph& graph, std::size_t node, Inbox& inbox);
   void subscribe_arm(Graph& graph, std::size_t node, Inbox& inbox);
 
   using Left = std::function<void(const std::vector<std::uint64_t>&)>;
-  // Tells of who comes, goes, or cannot be heard, too.
+  // Logs how many publishers there are, too.
   template <class Message, class Value>
   void add(Inbox& inbox, const std::string& topic,
            Inbox::Subscription<Message, Value> subscription);
@@ -121,5 +129,12 @@ class BoardCommands {
   std::uint64_t stale_ = 0;
   std::vector<std::unique_ptr<int>> sources_;  // what tells the topics apart
 };
+
+template <class Message, class Value>
+void BoardCommands::add(Inbox& inbox, const std::string& topic,
+                        Inbox::Subscription<Message, Value> subscription) {
+  subscription.left = on_publishers(topic, std::move(subscription.left));
+  inbox.add(std::move(subscription));
+}
 
 }  // namespace r4::tool::ros2

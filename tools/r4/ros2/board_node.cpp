@@ -45,9 +45,10 @@ void BoardNode::connect() {
   board_.on_state([this](const ReceivedState& state, const Datagram& datagram) {
     outbox_.push([topics = topics_, devices = device_topics_,
                   state = static_cast<const State&>(state), sampled = state.sampled_at_wall_time(),
+                  boot = boots_,
                   line = std::string(datagram.bytes().data(), datagram.bytes().size())] {
       topics->on_datagram(line);
-      topics->on_state(state, sampled);
+      topics->on_state(state, sampled, boot);
       devices->on_state(state, sampled);
     });
   });
@@ -68,7 +69,10 @@ void BoardNode::connect() {
         fmt::format("wire {}: {}", wire.name, to_text(wire.state)));
     tell_health();
   });
-  board_.on_restart([this] { log(LogLevel::warning, "the board has begun again"); });
+  board_.on_restart([this] {
+    ++boots_;
+    log(LogLevel::warning, "the board has begun again");
+  });
   board_.on_arming([this](DisarmCause cause) {
     if (cause == DisarmCause::none) {
       log(LogLevel::info, "armed");
@@ -94,6 +98,17 @@ void BoardNode::on_link(const LinkStatus& link) {
     armed_once_ = true;
     commands_.arm_at_first();
   }
+}
+
+void BoardNode::on_mismatch(const EntityId& who, const std::optional<Mismatch>& mismatch) {
+  mismatches_.erase(who);
+  if (mismatch && mismatch->weight == Mismatch::Weight::note) {
+    log(LogLevel::info, mismatch->text);
+  } else if (mismatch) {
+    mismatches_[who] = *mismatch;
+    warn(mismatch->text);
+  }
+  tell_health();
 }
 
 void BoardNode::tick() {
@@ -145,6 +160,13 @@ Health BoardNode::health() const {
     health.level = Health::warning;
     health.message += fmt::format("; wire {}: {}", wire.name, to_text(wire.state));
   }
+  const auto lost = std::find_if(mismatches_.begin(), mismatches_.end(), [](const auto& each) {
+    return each.second.weight == Mismatch::Weight::lost;
+  });
+  if (lost != mismatches_.end() && health.level <= Health::warning) {
+    health.level = Health::warning;
+    health.message += "; " + lost->second.text;
+  }
   const auto add = [&health](const char* key, std::string value) {
     health.values.emplace_back(key, std::move(value));
   };
@@ -176,6 +198,12 @@ Health BoardNode::health() const {
   add("commands too old", fmt::format("{}", commands_.stale()));
   add("samples malformed", fmt::format("{}", inbox_.malformed()));
   add("samples dropped", fmt::format("{}", inbox_.dropped()));
+  constexpr std::size_t most_mismatches = 8;  // that are told; a graph may have any number
+  add("mismatches", fmt::format("{}", mismatches_.size()));
+  for (std::size_t i = 0; const auto& each : mismatches_) {
+    if (++i > most_mismatches) break;
+    health.values.emplace_back(fmt::format("mismatch {}", i), each.second.text);
+  }
   return health;
 }
 

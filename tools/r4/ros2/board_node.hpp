@@ -40,6 +40,8 @@ class BoardNode {
   // The inbox is drained.
   void flush() { commands_.flush(); }
   void warn(const std::string& text) { log(LogLevel::warning, text); }
+  // A reader or writer of another participant does not match ours; without a `mismatch` it does, or has gone.
+  void on_mismatch(const EntityId& who, const std::optional<Mismatch>& mismatch);
   AsyncBoard& board() { return board_; }
   const std::string& name() const { return name_; }
 
@@ -66,6 +68,8 @@ class BoardNode {
   BoardCommands commands_;
   asio::steady_timer tick_;
   Clock::time_point next_second_{};
+  std::map<EntityId, Mismatch> mismatches_;
+  std::uint32_t boots_ = 0;
   bool armed_once_ = false;
   bool heard_ = false;
   bool in_control_ = false;

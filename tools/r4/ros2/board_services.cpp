@@ -95,7 +95,6 @@ void BoardCommands::serve(const Room& room, std::string name, const char* type, 
                 }
               },
           .left = std::move(left),
-          .mismatched = {},
       });
 }
 

@@ -147,7 +147,7 @@ void BoardTopics::on_heartbeat() {
 
 void BoardTopics::on_active(bool active) const { write_text(active_, active ? "True" : "False"); }
 
-void BoardTopics::on_state(const State& state, WallTime sampled) {
+void BoardTopics::on_state(const State& state, WallTime sampled, std::uint32_t boot) {
   const Clock::time_point now = Clock::now();
   const FieldSet& has = state.present;
   for (int n = 1; n <= osmc_channels; ++n) {
@@ -188,7 +188,7 @@ void BoardTopics::on_state(const State& state, WallTime sampled) {
   if (has.has(StateField::dmhsta)) publish<BoolMessage>(handle_, state.handle_held, now);
   publish_battery(state, sampled, now);
   publish_ranges(state, sampled, now);
-  gather_joints(state, sampled);
+  gather_joints(state, sampled, boot);
 }
 
 void BoardTopics::publish_battery(const State& state, WallTime sampled, Clock::time_point now) {
@@ -229,10 +229,10 @@ void BoardTopics::publish_ranges(const State& state, WallTime sampled, Clock::ti
   }
 }
 
-void BoardTopics::gather_joints(const State& state, WallTime sampled) {
+void BoardTopics::gather_joints(const State& state, WallTime sampled, std::uint32_t boot) {
   if (joints_ == 0) return;
   if (gathered_ && gathered_->state.t_ms != state.t_ms) publish_joints();  // a part was lost
-  if (!gathered_) gathered_ = Joints{{}, {}, sampled};
+  if (!gathered_) gathered_ = Joints{{}, {}, sampled, boot};
   gathered_->state = state;  // the values of its other parts are still there
   bool all = true;
   for (int i = 0; i < state_field_count; ++i) {
@@ -255,7 +255,9 @@ void BoardTopics::publish_joints() {
     if (!joints.present.has(nth(StateField::enc1, n))) continue;
     const double scale = turn / *options_.counts_per_turn;
     names.push_back(fmt::format("encoder{}", n));
-    positions.push_back(joints.state.encoder(n) * scale);
+    Position& position = encoder_positions_[static_cast<std::size_t>(n - 1)];
+    const auto counts = position.advance(joints.state.encoder(n), joints.boot);
+    positions.push_back(static_cast<double>(counts) * scale);
     velocities.push_back(joints.present.has(nth(StateField::enc1hz, n))
                              ? joints.state.encoder_hz[n - 1] * scale
                              : std::numeric_limits<double>::quiet_NaN());
@@ -263,7 +265,9 @@ void BoardTopics::publish_joints() {
   for (int n = 1; n <= stepper_channels; ++n) {
     if (!joints.present.has(stepper_field(n))) continue;
     names.push_back(fmt::format("stepper{}", n));
-    positions.push_back(joints.state.steps(n) * turn / *options_.steps_per_turn);
+    Position& position = stepper_positions_[static_cast<std::size_t>(n - 1)];
+    const auto steps = position.advance(joints.state.steps(n), joints.boot);
+    positions.push_back(static_cast<double>(steps) * turn / *options_.steps_per_turn);
     velocities.push_back(std::numeric_limits<double>::quiet_NaN());
   }
   if (names.empty()) return;

@@ -16,7 +16,6 @@
 
 #include "graph/graph.hpp"
 #include "graph/message_types.hpp"
-#include "log_level.hpp"
 #include "node_options.hpp"
 #include "r4link/link.hpp"
 
@@ -41,7 +40,8 @@ class BoardTopics {
   void on_datagram(const std::string& line) const;
   void on_heartbeat();
   void on_active(bool active) const;
-  void on_state(const State& state, WallTime sampled);
+  // `boot`: how often the board has restarted.
+  void on_state(const State& state, WallTime sampled, std::uint32_t boot);
   void on_health(const Health& health, WallTime now) const;
   void log(LogLevel level, const std::string& text, WallTime now) const;
 
@@ -64,7 +64,7 @@ class BoardTopics {
   static void publish(Changing<Value>& topic, Value value, Clock::time_point now);
   void publish_battery(const State& state, WallTime sampled, Clock::time_point now);
   void publish_ranges(const State& state, WallTime sampled, Clock::time_point now);
-  void gather_joints(const State& state, WallTime sampled);
+  void gather_joints(const State& state, WallTime sampled, std::uint32_t boot);
   void publish_joints();
   static void write_text(dds_entity_t writer, std::string_view text);
 
@@ -85,8 +85,11 @@ class BoardTopics {
     State state;
     FieldSet present;  // of joint_fields_
     WallTime sampled;
+    std::uint32_t boot = 0;
   };
   std::optional<Joints> gathered_;
+  std::array<Position, encoder_channels> encoder_positions_;
+  std::array<Position, stepper_channels> stepper_positions_;
   std::array<Changing<float>, osmc_channels> osmc_;
   std::array<Changing<float>, dhb12_channels> dhb12_;
   std::array<Changing<float>, bldc_channels> bldc_;

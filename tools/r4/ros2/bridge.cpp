@@ -17,6 +17,9 @@
 #include "../shell/line_writer.hpp"
 #include "../shell/run_end.hpp"
 #include "board_node.hpp"
+#include "discovery/discovery.hpp"
+#include "discovery/mismatches.hpp"
+#include "discovery/namesakes.hpp"
 #include "graph/environment.hpp"
 #include "graph/graph.hpp"
 #include "graph/inbox.hpp"
@@ -109,34 +112,33 @@ const char* level_text(LogLevel level) {
   }
 }
 
+constexpr std::size_t jobs_a_board = 256;  // that may wait to be published
+
 class Bridge {
  public:
   explicit Bridge(const BridgeOptions& options)
       : options_(options),
         output_(std::size_t{1} << 20),
         domain_(domain_of(process_environment)),
+        urls_(named_urls(options)),
         graph_(domain_),
-        inbox_(io_, graph_.participant(),
-               domain_.one_computer ? Transit::Clocks::one : Transit::Clocks::two,
+        outbox_(jobs_a_board * urls_.size()),
+        inbox_(io_, domain_.one_computer ? Transit::Clocks::one : Transit::Clocks::two,
                [this] {
                  for (const auto& node : nodes_) node->flush();
                }),
         run_end_(io_) {
-    const NodeOptions shown = node_options(options);
-    for (const NamedUrl& each : named_urls(options)) add(each, shown);
+    NodeOptions shown = node_options(options);
+    shown.one_clock = domain_.one_computer;
+    for (const NamedUrl& each : urls_) add(each, shown);
   }
 
   int run() {
     for (const auto& node : nodes_) node->open();
-    NodeListing& listing = graph_.list_nodes(process_environment("ROS_DISTRO"));
-    inbox_.watch(listing.peers(), [&listing] { listing.look(); });
-    Namesakes& namesakes = graph_.watch_names([this](const NodeName& node, const std::string& who) {
-      asio::post(io_, [this, name = node.full(), who] { warn_of(name, who); });
-    });
-    inbox_.watch(namesakes.writers(), [&namesakes] { namesakes.look(); });
+    introduce();
+    discover();
     inbox_.start();
     run_end_.watch(options_.duration);
-    introduce();
     io_.run();
     leave();
     return 0;
@@ -160,14 +162,31 @@ class Bridge {
         }));
   }
 
-  void warn_of(const std::string& name, const std::string& who) {
-    for (const auto& node : nodes_) {
-      if (node->name() != name) continue;
-      node->warn(fmt::format(
-          "{} has a node {}, too: what is commanded reaches the boards of both; give one of them "
-          "another --namespace, or end it (who was killed is gone after 10 s)",
-          who, name));
+  // What others have in the graph is looked at on the thread that reads.
+  void discover() {
+    graph_.list_nodes(process_environment("ROS_DISTRO"));
+    namesakes_.emplace(graph_.nodes());
+    mismatches_.emplace(graph_, [this](std::size_t node, const EntityId& who,
+                                       const std::optional<Mismatch>& mismatch) {
+      asio::post(io_, [this, node, who, mismatch] { nodes_[node]->on_mismatch(who, mismatch); });
+    });
+    discovery_.emplace(graph_.participants(), [this](const Announced& announced) {
+      graph_.on_announced(announced);
+      mismatches_->on_announced(announced);
+      const auto node = namesakes_->node_of(announced);
+      if (!node) return;
+      asio::post(io_, [this, node = *node, who = announced.owner] { warn_of(node, who); });
+    });
+    for (const dds_entity_t each : discovery_->entities()) {
+      inbox_.watch(each, [this] { discovery_->look(); });
     }
+  }
+
+  void warn_of(std::size_t node, const std::string& who) {
+    nodes_[node]->warn(fmt::format(
+        "{} has a node {}, too: what is commanded reaches the boards of both; give one of them "
+        "another --namespace, or end it (who was killed is gone after 10 s)",
+        who, nodes_[node]->name()));
   }
 
   void introduce() {
@@ -228,7 +247,11 @@ class Bridge {
   LineWriter output_;
   asio::io_context io_{1};
   const Domain domain_;
+  const std::vector<NamedUrl> urls_;
   Graph graph_;
+  std::optional<Namesakes> namesakes_;
+  std::optional<Mismatches> mismatches_;
+  std::optional<Discovery> discovery_;
   Outbox outbox_;
   Inbox inbox_;
   std::vector<std::unique_ptr<BoardNode>> nodes_;

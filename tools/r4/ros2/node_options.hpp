@@ -3,6 +3,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -11,6 +12,9 @@
 #include "setpoint_units.hpp"
 
 namespace r4::tool::ros2 {
+
+// As rcl_interfaces/Log has them.
+enum class LogLevel : std::uint8_t { info = 20, warning = 30, error = 40 };
 
 struct NodeOptions {
   FieldSet fields;  // those that the board is asked for
@@ -21,6 +25,7 @@ struct NodeOptions {
   std::chrono::milliseconds deadline{1000};  // of a publisher that drives
   std::vector<Device> devices;               // on the user's I2C bus
   bool arm = false;                          // as soon as the board is there, once
+  bool one_clock = false;  // all publishers are on this computer, so their stamps are of its clock
 };
 
 }  // namespace r4::tool::ros2

@@ -136,6 +136,29 @@ DifferentialDrive differential_drive(std::string_view channels, double separatio
   return {*left, *right, separation_m, full_speed_mps};
 }
 
+std::int64_t Position::advance(std::int32_t count, std::uint32_t boot) {
+  if (!count_) {
+    position_ = count;
+  } else if (boot == boot_) {
+    position_ += static_cast<std::int32_t>(static_cast<std::uint32_t>(count) -
+                                           static_cast<std::uint32_t>(*count_));
+  }
+  count_ = count;
+  boot_ = boot;
+  return position_;
+}
+
+std::optional<WallTime> stamp_time(std::int32_t seconds, std::uint32_t nanoseconds) {
+  if (seconds == 0 && nanoseconds == 0) return std::nullopt;
+  const auto since = std::chrono::seconds(seconds) + std::chrono::nanoseconds(nanoseconds);
+  return WallTime(std::chrono::duration_cast<WallTime::duration>(since));
+}
+
+bool is_outdated(const std::optional<WallTime>& stamp, WallTime now,
+                 std::chrono::milliseconds deadline) {
+  return stamp && deadline.count() != 0 && now - *stamp > deadline;
+}
+
 double positive_number(std::string_view name, std::string_view text) {
   double number = 0;
   if (read(text, number) && std::isfinite(number) && number > 0) return number;

@@ -4,6 +4,8 @@
 // ratio.
 #pragma once
 
+#include <chrono>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -55,6 +57,26 @@ struct DifferentialDrive {
 // "osmc1,-osmc2" and the two lengths. Throws Error{usage}.
 DifferentialDrive differential_drive(std::string_view channels, double separation_m,
                                      double full_speed_mps);
+
+// A counter of the board as a position without jumps. The counter has 32 bits and wraps, and begins at 0 when the board
+// restarts: the position goes on from where it was. What was counted before the first state after a restart is lost.
+class Position {
+ public:
+  // `boot` differs from that of the state before if the board has restarted in between.
+  std::int64_t advance(std::int32_t count, std::uint32_t boot);
+
+ private:
+  std::int64_t position_ = 0;
+  std::optional<std::int32_t> count_;
+  std::uint32_t boot_ = 0;
+};
+
+using WallTime = std::chrono::system_clock::time_point;
+// The stamp of a header; none for 0, which says nothing.
+std::optional<WallTime> stamp_time(std::int32_t seconds, std::uint32_t nanoseconds);
+// True if a command with that stamp is older than `deadline`; 0: there is none. Both clocks are the same.
+bool is_outdated(const std::optional<WallTime>& stamp, WallTime now,
+                 std::chrono::milliseconds deadline);
 
 // A number greater than 0, as `name` takes it. Throws Error{usage}.
 double positive_number(std::string_view name, std::string_view text);

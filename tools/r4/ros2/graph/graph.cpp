@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "graph.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/select.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -16,8 +19,28 @@ namespace {
 // So long others take to hear that the nodes are gone, before the participant is.
 constexpr std::chrono::milliseconds farewell{100};
 
+// Cyclone DDS waits by select(), which ends the process at a descriptor of FD_SETSIZE or more.
+void require_low_descriptors(const std::string& what) {
+  constexpr int needed = 32;  // more than a domain takes
+  std::vector<int> low;
+  int newest = 0;
+  while (static_cast<int>(low.size()) < needed && newest >= 0 && newest < FD_SETSIZE) {
+    newest = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+    if (newest >= 0) low.push_back(newest);
+  }
+  for (const int each : low) ::close(each);
+  if (newest >= 0 && newest < FD_SETSIZE) return;
+  throw Error(ErrorKind::open, what,
+              fmt::format("too many files are open in this process; Cyclone DDS needs {} free "
+                          "descriptors below {}",
+                          needed, FD_SETSIZE),
+              "start r4 ros2 from a program that does not pass on its open files, and raise "
+              "`ulimit -n` if it is lower");
+}
+
 Entity join(const Domain& domain) {
   const std::string what = fmt::format("ROS domain {}", domain.id);
+  require_low_descriptors(what);
   if (domain.configuration.empty()) return {};
   return {dds_create_domain(domain.id, domain.configuration.c_str()), what};
 }
@@ -42,57 +65,62 @@ std::string service_id(dds_entity_t participant, std::size_t number) {
 
 }  // namespace
 
-Graph::Graph(const Domain& domain) : domain_(join(domain)), participant_(participant_of(domain)) {}
+Graph::Graph(const Domain& domain) : domain_settings_(domain), domain_(join(domain)) {
+  add_participant();
+}
 
 Graph::~Graph() {
   leave();
   std::this_thread::sleep_until(*left_ + farewell);
 }
 
+void Graph::add_participant() { members_.push_back({participant_of(domain_settings_), {}}); }
+
+std::vector<dds_entity_t> Graph::participants() const {
+  std::vector<dds_entity_t> all;
+  for (const Member& each : members_) all.push_back(each.participant.get());
+  return all;
+}
+
 std::size_t Graph::add_node(const NodeName& name) {
+  if (nodes_.size() == members_.size() * nodes_a_participant) add_participant();
   nodes_.push_back({name, {}, {}});
   return nodes_.size() - 1;
 }
 
-dds_entity_t Graph::topic(const std::string& name, const MessageType& type) {
+dds_entity_t Graph::topic(std::size_t node, const std::string& name, const MessageType& type) {
   const QosPtr qos = make_qos({});
-  topics_.emplace_back(
-      dds_create_topic(participant_.get(), type.descriptor, name.c_str(), qos.get(), nullptr),
-      name);
-  return topics_.back().get();
+  return topics_
+      .emplace_back(dds_create_topic(members_[node / nodes_a_participant].participant.get(),
+                                     type.descriptor, name.c_str(), qos.get(), nullptr),
+                    name)
+      .get();
 }
 
-dds_entity_t Graph::add_writer(std::size_t node, const std::string& name, const MessageType& type,
-                               Qos qos) {
+dds_entity_t Graph::add(EndpointKind kind, const Place& place, const MessageType& type, Qos qos) {
   qos.user_data += user_data_of(type);
-  const dds_entity_t writer =
+  const QosPtr made = make_qos(qos);
+  Member& member = members_[place.node / nodes_a_participant];
+  const auto create = kind == EndpointKind::reader ? dds_create_reader : dds_create_writer;
+  const dds_entity_t endpoint =
       endpoints_
-          .emplace_back(dds_create_writer(participant_.get(), topic(name, type),
-                                          make_qos(qos).get(), nullptr),
-                        name)
+          .emplace_back(create(member.participant.get(), topic(place.node, place.topic, type),
+                               made.get(), nullptr),
+                        place.topic)
           .get();
-  nodes_[node].writers.push_back(id_of(writer));
-  return writer;
-}
-
-dds_entity_t Graph::add_reader(std::size_t node, const std::string& name, const MessageType& type,
-                               Qos qos) {
-  qos.user_data += user_data_of(type);
-  const dds_entity_t reader =
-      endpoints_
-          .emplace_back(dds_create_reader(participant_.get(), topic(name, type),
-                                          make_qos(qos).get(), nullptr),
-                        name)
-          .get();
-  nodes_[node].readers.push_back(id_of(reader));
-  return reader;
+  Node& node = nodes_[place.node];
+  (kind == EndpointKind::reader ? node.readers : node.writers).push_back(id_of(endpoint));
+  own_[place.topic].endpoints.push_back({kind, place.node, place.name, type.descriptor->m_typename,
+                                         policies_of(kind, made.get()), !member.listing});
+  if (member.listing) member.listing->change(place.node % nodes_a_participant, node);
+  return endpoint;
 }
 
 dds_entity_t Graph::make_writer(std::size_t node, std::string_view topic, const MessageType& type,
                                 const Qos& qos) {
   const std::string name = full_name(nodes_[node].name, topic);
   publishers_.push_back({name, type.name});
-  return add_writer(node, dds_topic(name), type, qos);
+  return add(EndpointKind::writer, {node, std::string(topic), dds_topic(name)}, type, qos);
 }
 
 dds_entity_t Graph::make_reader(std::size_t node, std::string_view topic, const MessageType& type,
@@ -101,32 +129,67 @@ dds_entity_t Graph::make_reader(std::size_t node, std::string_view topic, const 
   if (subscriptions_.empty() || subscriptions_.back().name != name) {
     subscriptions_.push_back({name, type.name});
   }
-  return add_reader(node, dds_topic(name), type, qos);
+  return add(EndpointKind::reader, {node, std::string(topic), dds_topic(name)}, type, qos);
+}
+
+dds_entity_t Graph::subscribe_first_byte(std::size_t node, std::string_view topic,
+                                         const Announced& of, const Qos& qos) {
+  return make_reader(node, topic, copied_types_.emplace_back(of).message, qos);
+}
+
+Graph::CopiedType::CopiedType(const Announced& of)
+    : type(of.type),
+      name(ros_type(of.type)),
+      hash(type_hash_of(of.user_data)),
+      descriptor(renamed(std_msgs_msg_dds__Bool__desc, type.c_str())),
+      message{name.c_str(), hash.c_str(), &descriptor} {}
+
+void Graph::on_other_type(std::size_t node, std::string_view topic, OtherType act) {
+  OwnTopic& own = own_[dds_topic(full_name(nodes_[node].name, topic))];
+  own.node = node;
+  own.name = topic;
+  own.other_type = std::move(act);
+}
+
+const Graph::OwnTopic* Graph::own_topic(const std::string& topic) const {
+  const auto own = own_.find(topic);
+  return own == own_.end() ? nullptr : &own->second;
 }
 
 Graph::Service Graph::make_service(std::size_t node, std::string_view name, const char* type,
                                    const MessageType& request, const MessageType& response) {
   const std::string full = full_name(nodes_[node].name, name);
   Qos qos;
-  qos.user_data = service_id(participant_.get(), services_.size() + 1);
+  qos.user_data =
+      service_id(members_[node / nodes_a_participant].participant.get(), services_.size() + 1);
   services_.push_back({full, type});
   Service service;
-  service.replies = add_writer(node, dds_reply(full), response, qos);
-  service.requests = add_reader(node, dds_request(full), request, qos);
+  service.replies =
+      add(EndpointKind::writer, {node, std::string(name), dds_reply(full)}, response, qos);
+  service.requests =
+      add(EndpointKind::reader, {node, std::string(name), dds_request(full)}, request, qos);
   return service;
 }
 
-NodeListing& Graph::list_nodes(const std::string& distro) {
-  return listing_.emplace(participant_.get(), nodes_, distro);
+void Graph::list_nodes(const std::string& distro) {
+  for (std::size_t i = 0; i < members_.size(); ++i) {
+    const auto first = nodes_.begin() + static_cast<std::ptrdiff_t>(i * nodes_a_participant);
+    const auto left = static_cast<std::size_t>(nodes_.end() - first);
+    const auto last = first + static_cast<std::ptrdiff_t>(std::min(left, nodes_a_participant));
+    members_[i].listing.emplace(members_[i].participant.get(), std::vector<Node>(first, last),
+                                distro);
+  }
 }
 
-Namesakes& Graph::watch_names(Namesakes::Tell tell) {
-  return namesakes_.emplace(participant_.get(), nodes_, std::move(tell));
+void Graph::on_announced(const Announced& announced) {
+  for (Member& each : members_) each.listing->on_announced(announced);
 }
 
 void Graph::leave() {
   if (left_) return;
-  if (listing_) listing_->leave();
+  for (Member& each : members_) {
+    if (each.listing) each.listing->leave();
+  }
   endpoints_.clear();
   left_ = std::chrono::steady_clock::now();
 }

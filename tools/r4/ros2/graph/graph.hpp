@@ -1,23 +1,25 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A participant of the ROS 2 graph: its nodes with their topics and services.
+// Our part of the ROS 2 graph: nodes with their topics and services.
 //
-// All is made before list_nodes(). leave() takes the nodes out of everybody's list at once, and the end of the
-// object waits until that has been told; who is killed stays in those lists for 10 s.
+// Cyclone DDS counts what a participant has made with 14 bits, so 64 nodes share a participant. Nodes are made before
+// list_nodes(). A reader may be made later, on the thread that reads. leave() takes the nodes out of all lists at once,
+// and the destructor waits until that has been sent. A killed process stays in those lists for 10 s.
 #pragma once
 
 #include <chrono>
 #include <cstddef>
-#include <memory>
+#include <list>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "announced.hpp"
 #include "entity.hpp"
 #include "environment.hpp"
 #include "message_types.hpp"
 #include "names.hpp"
-#include "namesakes.hpp"
 #include "node_listing.hpp"
 
 namespace r4::tool::ros2 {
@@ -28,8 +30,20 @@ struct Endpoint {
   const char* type;  // "std_msgs/msg/String"
 };
 
+// A reader or writer of ours, and of which node.
+struct OwnEndpoint {
+  EndpointKind kind = EndpointKind::writer;
+  std::size_t node = 0;
+  std::string name;  // of its topic or service, as the node names it: "osmc1/state", "~/stop"
+  std::string type;  // as DDS names it
+  Policies policies;
+  bool is_declared = true;  // false: made for a writer of another type
+};
+
 class Graph {
  public:
+  static constexpr std::size_t nodes_a_participant = 64;
+
   // Throws Error{open} if the domain cannot be joined.
   explicit Graph(const Domain& domain);
   ~Graph();
@@ -59,10 +73,30 @@ class Graph {
     return make_service(node, name, type, message_type<Request>(), message_type<Response>());
   }
 
-  dds_entity_t participant() const { return participant_.get(); }
-  NodeListing& list_nodes(const std::string& distro);
-  Namesakes& watch_names(Namesakes::Tell tell);
+  // What a sample of another type has in common with all types: its first byte.
+  dds_entity_t subscribe_first_byte(std::size_t node, std::string_view topic, const Announced& of,
+                                    const Qos& qos);
+  // A topic that the node reads, or might read: what is to be done for writers of another type.
+  void on_other_type(std::size_t node, std::string_view topic, OtherType act);
+
+  // The first of them.
+  dds_entity_t participant() const { return members_.front().participant.get(); }
+  std::vector<dds_entity_t> participants() const;
+  // From now on our nodes are listed, in the form that others read.
+  void list_nodes(const std::string& distro);
+  // On the thread that reads.
+  void on_announced(const Announced& announced);
   void leave();
+
+  const std::vector<Node>& nodes() const { return nodes_; }
+  struct OwnTopic {
+    std::vector<OwnEndpoint> endpoints;
+    std::size_t node = 0;  // of other_type
+    std::string name;
+    OtherType other_type;
+  };
+  // By its name in DDS. nullptr: none of our nodes has to do with it.
+  const OwnTopic* own_topic(const std::string& topic) const;
 
   const std::vector<Endpoint>& publishers() const { return publishers_; }
   const std::vector<Endpoint>& subscriptions() const { return subscriptions_; }
@@ -75,19 +109,36 @@ class Graph {
                            const Qos& qos);
   Service make_service(std::size_t node, std::string_view name, const char* type,
                        const MessageType& request, const MessageType& response);
-  dds_entity_t topic(const std::string& name, const MessageType& type);
-  dds_entity_t add_writer(std::size_t node, const std::string& name, const MessageType& type,
-                          Qos qos);
-  dds_entity_t add_reader(std::size_t node, const std::string& name, const MessageType& type,
-                          Qos qos);
+  dds_entity_t topic(std::size_t node, const std::string& name, const MessageType& type);
+  struct Place {
+    std::size_t node;
+    std::string name;   // as the node names it
+    std::string topic;  // as DDS names it
+  };
+  dds_entity_t add(EndpointKind kind, const Place& place, const MessageType& type, Qos qos);
+  void add_participant();
 
+  struct Member {
+    Entity participant;
+    std::optional<NodeListing> listing;
+  };
+  struct CopiedType {
+    explicit CopiedType(const Announced& of);
+    const std::string type;
+    const std::string name;
+    const std::string hash;
+    const dds_topic_descriptor_t descriptor;
+    const MessageType message;
+  };
+
+  const Domain domain_settings_;
   Entity domain_;
-  Entity participant_;
+  std::vector<Member> members_;
   std::vector<Node> nodes_;
   std::vector<Entity> topics_;
   std::vector<Entity> endpoints_;
-  std::optional<NodeListing> listing_;
-  std::optional<Namesakes> namesakes_;
+  std::map<std::string, OwnTopic> own_;
+  std::list<CopiedType> copied_types_;
   std::vector<Endpoint> publishers_;
   std::vector<Endpoint> subscriptions_;
   std::vector<Endpoint> services_;

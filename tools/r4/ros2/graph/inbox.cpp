@@ -21,21 +21,23 @@ EntityId writer_of(dds_entity_t reader, dds_instance_handle_t publication) {
 
 }  // namespace
 
-Inbox::Inbox(asio::io_context& io, dds_entity_t participant, Transit::Clocks clocks,
-             std::function<void()> on_drained)
+Inbox::Inbox(asio::io_context& io, Transit::Clocks clocks, std::function<void()> on_drained)
     : io_(io),
-      participant_(participant),
       clocks_(clocks),
       on_drained_(std::move(on_drained)),
-      waitset_(dds_create_waitset(participant), "the reading thread"),
-      end_(dds_create_guardcondition(participant), "the reading thread"),
+      waitset_(dds_create_waitset(DDS_CYCLONEDDS_HANDLE), "the reading thread"),
+      end_(dds_create_guardcondition(DDS_CYCLONEDDS_HANDLE), "the reading thread"),
       timer_(io) {
   (void)dds_waitset_attach(waitset_.get(), end_.get(), 0);
 }
 
+Inbox::Source& Inbox::add_source() {
+  const std::lock_guard lock(mutex_);
+  return *sources_.emplace_back(std::make_unique<Source>());
+}
+
 void Inbox::watch(dds_entity_t entity, std::function<void()> look) {
-  sources_.push_back(std::make_unique<Source>());
-  Source& source = *sources_.back();
+  Source& source = add_source();
   source.look = std::move(look);
   source.condition = Entity(dds_create_readcondition(entity, DDS_ANY_STATE), "a subscription");
   attach(source.condition.get());
@@ -112,17 +114,6 @@ void Inbox::look_at_publishers(dds_entity_t reader, Source& source,
     });
   }
   if (left) put(source, Kind::publishers, [left, there = std::move(there)] { left(there); });
-}
-
-void Inbox::look_at_mismatches(dds_entity_t reader,
-                               const std::function<void(const char* policy)>& mismatched) {
-  dds_requested_incompatible_qos_status_t status{};
-  if (dds_get_requested_incompatible_qos_status(reader, &status) < 0) return;
-  if (!mismatched || status.total_count_change == 0) return;
-  const char* policy = "another quality of service";
-  if (status.last_policy_id == DDS_RELIABILITY_QOS_POLICY_ID) policy = "reliability";
-  if (status.last_policy_id == DDS_DATA_REPRESENTATION_QOS_POLICY_ID) policy = "XCDR1";
-  asio::post(io_, [mismatched, policy] { mismatched(policy); });
 }
 
 void Inbox::put(Source& source, Kind kind, std::function<void()> deliver) {

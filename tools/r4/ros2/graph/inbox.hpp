@@ -40,9 +40,9 @@ struct Origin {
 
 class Inbox {
  public:
-  // `clocks`: ours and that of who writes. `on_drained`: called on the loop when it has taken what there was.
-  Inbox(asio::io_context& io, dds_entity_t participant, Transit::Clocks clocks,
-        std::function<void()> on_drained);
+  // `clocks`: ours and that of who writes. `on_drained`: called on the loop when it has taken what there was. There is a
+  // participant already.
+  Inbox(asio::io_context& io, Transit::Clocks clocks, std::function<void()> on_drained);
   ~Inbox() { stop(); }
   Inbox(const Inbox&) = delete;
   Inbox& operator=(const Inbox&) = delete;
@@ -59,10 +59,8 @@ class Inbox {
     std::function<void(const Value&, const Origin&)> take;
     // On the loop, when a publisher has gone: those that are left.
     std::function<void(const std::vector<std::uint64_t>&)> left;
-    // On the loop: somebody offers less than the reader asks for, in what, so that nothing of his is read.
-    std::function<void(const char* policy)> mismatched;
   };
-  // Before start().
+  // Before start(), or on the reading thread.
   template <class Message, class Value>
   void add(Subscription<Message, Value> subscription);
   // `look` is called on the reading thread while `entity` has something to be read.
@@ -106,9 +104,8 @@ class Inbox {
   Origin origin_of(dds_entity_t reader, Source& source, const dds_sample_info_t& info) const;
   void look_at_publishers(dds_entity_t reader, Source& source,
                           const std::function<void(const std::vector<std::uint64_t>&)>& left);
-  void look_at_mismatches(dds_entity_t reader,
-                          const std::function<void(const char* policy)>& mismatched);
   void put(Source& source, Kind kind, std::function<void()> deliver);
+  Source& add_source();
   // To the newest source.
   void attach(dds_entity_t entity);
   void run();
@@ -118,12 +115,11 @@ class Inbox {
   static constexpr std::size_t most_at_once = 16;
 
   asio::io_context& io_;
-  const dds_entity_t participant_;
   const Transit::Clocks clocks_;
   const std::function<void()> on_drained_;
   Entity waitset_;
   Entity end_;
-  std::vector<std::unique_ptr<Source>> sources_;
+  std::vector<std::unique_ptr<Source>> sources_;  // the reading thread adds to it under the mutex
   std::thread thread_;
   std::atomic<std::uint64_t> malformed_{0};
   std::atomic<std::uint64_t> dropped_{0};
@@ -141,18 +137,15 @@ class Inbox {
 
 template <class Message, class Value>
 void Inbox::add(Subscription<Message, Value> subscription) {
-  sources_.push_back(std::make_unique<Source>());
-  Source& source = *sources_.back();
+  Source& source = add_source();
   source.room = subscription.room;
   source.condition =
       Entity(dds_create_readcondition(subscription.reader, DDS_ANY_STATE), "a subscription");
-  (void)dds_set_status_mask(
-      subscription.reader, DDS_SUBSCRIPTION_MATCHED_STATUS | DDS_REQUESTED_INCOMPATIBLE_QOS_STATUS);
+  (void)dds_set_status_mask(subscription.reader, DDS_SUBSCRIPTION_MATCHED_STATUS);
   const auto entity = subscription.reader;
   source.look = [this, &source, subscription = std::move(subscription)] {
     receive(subscription, source);
     look_at_publishers(subscription.reader, source, subscription.left);
-    look_at_mismatches(subscription.reader, subscription.mismatched);
   };
   attach(source.condition.get());
   attach(entity);

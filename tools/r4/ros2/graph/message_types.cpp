@@ -7,24 +7,31 @@ namespace r4::tool::ros2 {
 namespace {
 
 // The same messages under the name that they have in every release.
-const dds_topic_descriptor_t nodes_before_iron = {
-    rmw_dds_common_before_iron_msg_dds__ParticipantEntitiesInfo__desc.m_size,
-    rmw_dds_common_before_iron_msg_dds__ParticipantEntitiesInfo__desc.m_align,
-    rmw_dds_common_before_iron_msg_dds__ParticipantEntitiesInfo__desc.m_flagset,
-    rmw_dds_common_before_iron_msg_dds__ParticipantEntitiesInfo__desc.m_nkeys,
-    rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc.m_typename,
-    rmw_dds_common_before_iron_msg_dds__ParticipantEntitiesInfo__desc.m_keys,
-    rmw_dds_common_before_iron_msg_dds__ParticipantEntitiesInfo__desc.m_nops,
-    rmw_dds_common_before_iron_msg_dds__ParticipantEntitiesInfo__desc.m_ops,
-    rmw_dds_common_before_iron_msg_dds__ParticipantEntitiesInfo__desc.m_meta,
-    {nullptr, 0},
-    {nullptr, 0},
-    rmw_dds_common_before_iron_msg_dds__ParticipantEntitiesInfo__desc.restrict_data_representation};
+const dds_topic_descriptor_t nodes_before_iron =
+    renamed(rmw_dds_common_before_iron_msg_dds__ParticipantEntitiesInfo__desc,
+            rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc.m_typename);
 
 }  // namespace
 
 std::string user_data_of(const MessageType& type) {
   return *type.hash == '\0' ? std::string() : fmt::format("typehash={};", type.hash);
+}
+
+std::string type_hash_of(std::string_view user_data) {
+  constexpr std::string_view key = "typehash=";
+  constexpr std::size_t size = 7 + 64;  // "RIHS01_" and the digits of SHA-256
+  const std::size_t at = user_data.find(key);
+  if (at == std::string_view::npos) return {};
+  const std::string_view hash = user_data.substr(at + key.size(), size);
+  const bool is_hash = hash.size() == size && hash.starts_with("RIHS01_") &&
+                       hash.find_first_not_of("0123456789abcdef", 7) == std::string_view::npos;
+  return is_hash ? std::string(hash) : std::string();
+}
+
+dds_topic_descriptor_t renamed(const dds_topic_descriptor_t& type, const char* name) noexcept {
+  return {type.m_size, type.m_align, type.m_flagset, type.m_nkeys,
+          name,        type.m_keys,  type.m_nops,    type.m_ops,
+          type.m_meta, {nullptr, 0}, {nullptr, 0},   type.restrict_data_representation};
 }
 
 #define R4_MESSAGE_TYPE(Message, name, hash, descriptor)   \
@@ -52,6 +59,9 @@ R4_MESSAGE_TYPE(UInt32Message, "std_msgs/msg/UInt32",
 R4_MESSAGE_TYPE(TwistMessage, "geometry_msgs/msg/Twist",
                 "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
                 &geometry_msgs_msg_dds__Twist__desc)
+R4_MESSAGE_TYPE(TwistStampedMessage, "geometry_msgs/msg/TwistStamped",
+                "RIHS01_5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64",
+                &geometry_msgs_msg_dds__TwistStamped__desc)
 R4_MESSAGE_TYPE(BatteryMessage, "sensor_msgs/msg/BatteryState",
                 "RIHS01_4bee5dfce981c98faa6828b868307a0a73f992ed0789f374ee96c8f840e69741",
                 &sensor_msgs_msg_dds__BatteryState__desc)

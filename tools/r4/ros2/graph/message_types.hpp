@@ -17,6 +17,7 @@ using Float32Message = std_msgs_msg_dds__Float32_;
 using Int32Message = std_msgs_msg_dds__Int32_;
 using UInt32Message = std_msgs_msg_dds__UInt32_;
 using TwistMessage = geometry_msgs_msg_dds__Twist_;
+using TwistStampedMessage = geometry_msgs_msg_dds__TwistStamped_;
 using BatteryMessage = sensor_msgs_msg_dds__BatteryState_;
 using JointStateMessage = sensor_msgs_msg_dds__JointState_;
 using ImuMessage = sensor_msgs_msg_dds__Imu_;
@@ -52,6 +53,8 @@ const MessageType& message_type<UInt32Message>();
 template <>
 const MessageType& message_type<TwistMessage>();
 template <>
+const MessageType& message_type<TwistStampedMessage>();
+template <>
 const MessageType& message_type<BatteryMessage>();
 template <>
 const MessageType& message_type<JointStateMessage>();
@@ -86,5 +89,9 @@ inline std::string_view bytes_of(const dds_sequence_octet& string) {
 
 // What a reader or writer of that type carries as its user data.
 std::string user_data_of(const MessageType& type);
+// The type hash in the user data of another participant; empty if there is none.
+std::string type_hash_of(std::string_view user_data);
+// The same type under another name, which has to live as long.
+dds_topic_descriptor_t renamed(const dds_topic_descriptor_t& type, const char* name) noexcept;
 
 }  // namespace r4::tool::ros2

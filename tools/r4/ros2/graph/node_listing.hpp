@@ -7,12 +7,14 @@
 // it is. Of two releases in one graph the first counts; ROS itself does not mix them either.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "announced.hpp"
 #include "entity.hpp"
 #include "names.hpp"
 
@@ -32,9 +34,10 @@ class NodeListing {
  public:
   NodeListing(dds_entity_t participant, std::vector<Node> nodes, const std::string& distro);
 
-  // Tells of writers that come and go, to be waited for; look() then.
-  dds_entity_t peers() const { return peers_.get(); }
-  void look();
+  // An endpoint of another participant has come or gone.
+  void on_announced(const Announced& announced);
+  // Node `index` has other readers or writers.
+  void change(std::size_t index, const Node& node);
 
   // There are no nodes any more.
   void leave();
@@ -49,7 +52,6 @@ class NodeListing {
   std::vector<Node> nodes_;
   const std::optional<Release> fixed_;
   std::map<EntityId, Release> others_;  // who else lists its nodes
-  Entity peers_;
   std::optional<Release> spoken_;
   Entity topic_;
   Entity writer_;

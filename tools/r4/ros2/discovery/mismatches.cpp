@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "mismatches.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+
+namespace r4::tool::ros2 {
+namespace {
+
+using Weight = Mismatch::Weight;
+
+// Our endpoints at the other end.
+std::vector<const OwnEndpoint*> counterparts(const Graph::OwnTopic& own, const Announced& other) {
+  std::vector<const OwnEndpoint*> found;
+  for (const OwnEndpoint& each : own.endpoints) {
+    if (each.kind != other.kind) found.push_back(&each);
+  }
+  return found;
+}
+
+std::optional<Mismatch> wrong_type(const OwnEndpoint& ours, const Announced& other) {
+  const std::string expected = ros_type(ours.type);
+  if (other.kind == EndpointKind::writer) {
+    return Mismatch{
+        Weight::lost,
+        fmt::format("{}: a publisher ({}) has the type {}, and is not heard; publish {}", ours.name,
+                    other.owner, ros_type(other.type), expected)};
+  }
+  return Mismatch{
+      Weight::warning,
+      fmt::format("{}: a subscriber ({}) has the type {}, and receives nothing; subscribe to {}",
+                  ours.name, other.owner, ros_type(other.type), expected)};
+}
+
+std::optional<Mismatch> wrong_policy(const OwnEndpoint& ours, const Announced& other,
+                                     const char* policy) {
+  if (other.kind == EndpointKind::writer) {
+    return Mismatch{
+        Weight::lost,
+        fmt::format("{}: a publisher does not offer what this subscription needs, {}, and is not "
+                    "heard ({}); have it do so, as ROS does by default",
+                    ours.name, policy, other.owner)};
+  }
+  return Mismatch{
+      Weight::warning,
+      fmt::format("{}: a subscriber asks for more than this publisher offers, in {}, and receives "
+                  "nothing ({}); subscribe as ROS does by default",
+                  ours.name, policy, other.owner)};
+}
+
+// True if it writes requests as rmw_fastrtps does, without saying in them whose they are (docs/ros2.md, Services).
+bool cannot_be_answered(const OwnEndpoint& ours, const Announced& other) {
+  return other.kind == EndpointKind::writer && ours.name.starts_with("~/") &&
+         other.user_data.find("clientid=") == std::string::npos;
+}
+
+std::optional<Mismatch> no_answer(const OwnEndpoint& ours, const Announced& other) {
+  return Mismatch{
+      Weight::lost,
+      fmt::format("{}: a client ({}) does not use rmw_cyclonedds_cpp, and gets no answer; nothing "
+                  "is executed for it: set RMW_IMPLEMENTATION=rmw_cyclonedds_cpp for it, or use "
+                  "the topics arm, stop and R4_Command",
+                  ours.name, other.owner)};
+}
+
+}  // namespace
+
+std::optional<Mismatch> mismatch_of(const Graph::OwnTopic& own, const Announced& other) {
+  const auto is_declared = [&other](const OwnEndpoint* each) {
+    return each->is_declared && each->type == other.type;
+  };
+  const auto declared = counterparts(own, other);
+  std::optional<Mismatch> of_type;
+  if (other.kind == EndpointKind::writer && own.other_type &&
+      std::none_of(declared.begin(), declared.end(), is_declared)) {
+    of_type = own.other_type(other);
+  }
+  const auto ours = counterparts(own, other);  // it may have made one
+  std::optional<Mismatch> of_policy;
+  for (const OwnEndpoint* const each : ours) {
+    if (each->type != other.type) continue;
+    const bool reads = each->kind == EndpointKind::reader;
+    const char* const policy = reads ? unmatched_policy(other.policies, each->policies)
+                                     : unmatched_policy(each->policies, other.policies);
+    if (policy == nullptr) {
+      return cannot_be_answered(*each, other) ? no_answer(*each, other) : of_type;
+    }
+    if (!of_policy) of_policy = wrong_policy(*each, other, policy);
+  }
+  if (of_policy) return of_policy;
+  if (of_type || ours.empty()) return of_type;
+  return wrong_type(*ours.front(), other);
+}
+
+void Mismatches::on_announced(const Announced& announced) {
+  std::optional<Mismatch> mismatch;
+  const Graph::OwnTopic* const own = announced.gone ? nullptr : graph_.own_topic(announced.topic);
+  if (own != nullptr) mismatch = mismatch_of(*own, announced);
+  const auto told = told_.find(announced.id);
+  if (mismatch) {
+    const std::size_t node = own->endpoints.empty() ? own->node : own->endpoints.front().node;
+    told_[announced.id] = node;
+    tell_(node, announced.id, mismatch);
+  } else if (told != told_.end()) {
+    tell_(told->second, announced.id, std::nullopt);
+    told_.erase(told);
+  }
+}
+
+}  // namespace r4::tool::ros2
