@@ -375,6 +375,9 @@ def test_several_boards_have_namespaces_and_a_lost_one_is_told():
                 peer.read(f'rt/{topic}/R4_Active', STRING)
                 peer.sample(f'rt/{topic}/R4_Active', lambda payload: texts(payload) == 'True')
             peer.read('rt/rosout', LOG, 'reliable', 'transient_local')
+            peer.writer('rt/stop', BOOL, matched=False)
+            told = ros2.logged('/stop: a publisher (')
+            assert 'is not heard here; publish /board1/stop, and so on for each board' in told['text']
             right.signal(signal.SIGKILL)
             peer.sample('rt/board2/R4_Active', lambda payload: texts(payload) == 'False')
             peer.sample('rt/rosout', lambda payload: b'board2.r4\0' in payload and b'\0' in payload)

@@ -227,5 +227,23 @@ TEST(OpenPodcar, DoesNotDriveByASteeringSensorThatIsOff) {
   EXPECT_NE(run.guard.why().find("AINSTEER"), std::string::npos) << run.guard.why();
 }
 
+// Its clock shows no restart: it ran for longer than before, until the host heard it again.
+TEST(OpenPodcar, StaysWhereItIsWhenTheBoardRestarts) {
+  Podcar podcar;
+  State state;
+  state.analog_cv[static_cast<int>(Analog::ainsteer)] = 250;
+  const auto sense = [&](std::uint32_t t_ms, std::int32_t counts) {
+    state.t_ms = t_ms;
+    state.encoder_counts[podcar_wheel.encoder - 1] = counts;
+    EXPECT_TRUE(podcar.sense(state));
+  };
+  sense(60'000, 50'000);
+  podcar.on_restart();
+  sense(120'000, 0);
+  EXPECT_EQ(podcar.pose().x_m, 0);
+  sense(120'010, 20);
+  EXPECT_GT(podcar.pose().x_m, 0) << "and it counts on from there";
+}
+
 }  // namespace
 }  // namespace r4::simulation

@@ -8,6 +8,7 @@
 // 3 refused, 4 no such transport or graph, 5 permission, 6 not supported.
 #include <chrono>
 #include <csignal>
+#include <cstdint>
 #include <cstdio>
 #include <optional>
 #include <r4link/board.hpp>
@@ -15,6 +16,7 @@
 #include <r4link/error.hpp>
 #include <r4link/simulation.hpp>
 #include <string>
+#include <utility>
 
 #include "drive.hpp"
 #include "model.hpp"
@@ -28,11 +30,15 @@ namespace {
 
 volatile std::sig_atomic_t ended = 0;
 
-// False if it was ended before.
-bool wait_for_start(r4::Board& board, Podcar& podcar, Pilot& pilot, Topics& topics) {
+// False if it was ended before. run_loop() ends when the board restarts, so the first state after a restart comes here.
+// `restarts`: those of the board that are known.
+bool wait_for_start(r4::Board& board, Podcar& podcar, Pilot& pilot, Topics& topics,
+                    std::uint32_t& restarts) {
   r4::States states = board.states();
   while (ended == 0 && pilot.mode() == Pilot::Mode::off) {
     const auto state = states.take(20ms);
+    const std::uint32_t counted = board.statistics().packets.restarts;
+    if (std::exchange(restarts, counted) != counted) podcar.on_restart();
     if (state && podcar.sense(*state)) topics.publish(podcar, *state);
     topics.take(pilot, podcar.pose());
   }
@@ -71,7 +77,8 @@ void run(r4::Board& board) {
   board.wait_active();
   guard_podcar(board);  // so that it is not armed where something is in the way already
   std::puts("hold the handle, and press the joystick's start");
-  while (wait_for_start(board, podcar, pilot, topics)) {
+  std::uint32_t restarts = 0;
+  while (wait_for_start(board, podcar, pilot, topics, restarts)) {
     try {
       drive(board, podcar, pilot, topics);
     } catch (const r4::Error& error) {  // the board is not there, or refuses

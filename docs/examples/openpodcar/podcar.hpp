@@ -39,6 +39,8 @@ class Podcar {
   void begin_at(const r4::control::Pose& pose) { odometry_.reset(pose); }
   // The board is armed: nothing is left of the drive before.
   void begin_drive();
+  // The board has restarted: its counter begins at 0, which is no movement.
+  void on_restart() { wheel_.reset(); }
   // A state has come. False if the steering sensor cannot be believed: do not drive then.
   bool sense(const r4::State& state);
   // What to post for this motion. After sense().

@@ -131,6 +131,7 @@ class Bridge {
     NodeOptions shown = node_options(options);
     shown.one_clock = domain_.one_computer;
     for (const NamedUrl& each : urls_) add(each, shown);
+    if (urls_.front().name.space != "/") decline_root();
   }
 
   int run() {
@@ -160,6 +161,19 @@ class Bridge {
         [this](LogLevel level, const std::string& node, const std::string& text) {
           say(level, node, text);
         }));
+  }
+
+  // Publishers often forget the namespace.
+  void decline_root() {
+    for (const std::string topic : {"stop", "arm", "R4_Command", "cmd_vel"}) {
+      const std::string ours = full_name(urls_.front().name, topic);
+      const char* const more = urls_.size() > 1 ? ", and so on for each board" : "";
+      graph_.on_other_type(0, "/" + topic, [topic, ours, more](const Announced& writer) {
+        return Mismatch{Mismatch::Weight::warning,
+                        fmt::format("/{}: a publisher ({}) is not heard here; publish {}{}", topic,
+                                    writer.owner, ours, more)};
+      });
+    }
   }
 
   // What others have in the graph is looked at on the thread that reads.
