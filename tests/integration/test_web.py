@@ -245,6 +245,19 @@ def test_a_recording_belongs_to_whoever_controls_and_to_whoever_began_it(tmp_pat
         assert [str(each) for each in tmp_path.iterdir()] == [path]
 
 
+def test_a_recording_whose_file_was_removed_goes_on_and_the_page_is_told(tmp_path):
+    with one_board('--record-to', str(tmp_path)) as (_, web), Page(web) as page:
+        assert page.control()['you']
+        page.say(type='record', on=True)
+        path = page.next('recording', lambda each: each['path'])['path']
+        os.unlink(path)
+        assert page.next('recording', lambda each: 'was removed' in each['why'])['path'] == path
+        page.say(type='record', on=False)
+        page.next('recording', lambda each: each['path'] is None)
+        assert web.end() == 0
+        assert 'states' in run('info', path).stdout
+
+
 def test_a_refused_wish_for_control_is_told_to_nobody_else():
     with one_board() as (_, web), Page(web) as page:
         assert page.control()['you']
