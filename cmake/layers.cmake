@@ -14,6 +14,13 @@ function(r4_warnings target)
                          $<$<BOOL:${R4_WERROR}>:-Werror>)
 endfunction()
 
+# install(), unless another project has taken the tree in: it installs what it wants.
+function(r4_install)
+  if(R4_INSTALL)
+    install(${ARGV})
+  endif()
+endfunction()
+
 # Host code: C++20, the tree's root on the include path ("protocol/datagram/crc32.hpp").
 function(r4_host_code target)
   r4_warnings(${target})

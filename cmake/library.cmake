@@ -46,21 +46,21 @@ add_library(r4link::r4link ALIAS r4link)
 add_library(r4link::shared ALIAS r4link_shared)
 add_library(r4link::asio ALIAS r4link_asio)
 
-install(TARGETS r4link r4link_shared r4link_asio EXPORT r4link-targets
-        LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-install(DIRECTORY include/r4link DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+r4_install(TARGETS r4link r4link_shared r4link_asio EXPORT r4link-targets
+           LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+r4_install(DIRECTORY include/r4link DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/r4link)
-install(EXPORT r4link-targets NAMESPACE r4link:: DESTINATION ${package})
+r4_install(EXPORT r4link-targets NAMESPACE r4link:: DESTINATION ${package})
 configure_package_config_file(cmake/r4link-config.cmake.in r4link-config.cmake
                               INSTALL_DESTINATION ${package})
 write_basic_package_version_file(r4link-config-version.cmake COMPATIBILITY SameMinorVersion)
-install(FILES ${PROJECT_BINARY_DIR}/r4link-config.cmake
-              ${PROJECT_BINARY_DIR}/r4link-config-version.cmake DESTINATION ${package})
+r4_install(FILES ${PROJECT_BINARY_DIR}/r4link-config.cmake
+                 ${PROJECT_BINARY_DIR}/r4link-config-version.cmake DESTINATION ${package})
 
 list(TRANSFORM R4_ASIO_DEFINITIONS PREPEND "-D" OUTPUT_VARIABLE asio_flags)
 list(JOIN asio_flags " " asio_flags)
 file(RELATIVE_PATH prefix_from_pc /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
 foreach(name r4link r4link-asio)
   configure_file(cmake/${name}.pc.in ${name}.pc @ONLY)
-  install(FILES ${PROJECT_BINARY_DIR}/${name}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+  r4_install(FILES ${PROJECT_BINARY_DIR}/${name}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 endforeach()

@@ -249,11 +249,11 @@ void AsyncBoard::Impl::name_in_recording() {
 }
 
 // The link goes on without it.
-void AsyncBoard::Impl::tell_that_a_recording_ended() {
+void AsyncBoard::Impl::tell_of_recordings() {
   std::optional<Problem> problem;
   for (const auto& wire : wires) {
-    std::optional<Problem> end = wire->tap.take_end();
-    if (end && !problem) problem = std::move(end);
+    std::optional<Problem> news = wire->tap.take_news();
+    if (news && !problem) problem = std::move(news);
   }
   if (problem) call(event_callbacks, CarrierEvent{CarrierEvent::Kind::warning, *problem});
 }
@@ -278,7 +278,7 @@ void AsyncBoard::Impl::on_timer() {
   armed = false;
   enter(Completion::How::dispatch, [this] {
     due = session.poll(now);
-    tell_that_a_recording_ended();
+    tell_of_recordings();
   });
   // Twice without a word that the transport is drained: it may be one that never tells.
   undrained = backlog_size == 0 ? 0 : undrained + 1;

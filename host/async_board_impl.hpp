@@ -156,7 +156,7 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
   void require_slots(const Device& device) const;
   // X:OFF gives up the device that has that slot.
   void give_up_slot(const Command& command);
-  void tell_that_a_recording_ended();
+  void tell_of_recordings();
 
   // --- time
 

@@ -87,14 +87,14 @@ ALLOWED = {
     'tools/r4/formats/packets': SHELL | {'tools/r4/bus', 'tools/r4/formats'},
     'tools/r4/devices': SHELL,
     'tools/r4/recording': SHELL | FORMATS,
-    'tools/r4/watch': SHELL | {'tools/r4/bus', 'tools/r4/devices'},
+    'tools/r4/watch': SHELL | {'tools/r4/bus', 'tools/r4/devices', 'tools/r4/web/server'},
     'tools/r4/ros2/graph': SHELL,
     'tools/r4/ros2/discovery': SHELL | {'tools/r4/ros2/graph'},
     'tools/r4/ros2': SHELL | {'tools/r4/devices', 'tools/r4/ros2/graph', 'tools/r4/ros2/discovery'},
     'tools/r4/sim': SHELL,
     'tools/r4/web/server': SHELL,
     'tools/r4/web': SHELL | FORMATS | {'tools/r4/devices', 'tools/r4/watch', 'tools/r4/web/server'},
-    'tools/r4': SHELL | {'tools/r4/ros2', 'tools/r4/watch'},
+    'tools/r4': SHELL | {'tools/r4/ros2'},
 }
 # What a file may include although its room may not.
 EXCEPTIONS = {

@@ -120,6 +120,12 @@ std::optional<Problem> Recorder::problem() const {
   const std::lock_guard lock(mutex_);
   return problem_;
 }
+std::optional<Problem> Recorder::news(unsigned& known) const {
+  if (news_count() == known) return std::nullopt;
+  const std::lock_guard lock(mutex_);
+  known = news_count_;
+  return news_;
+}
 std::uint64_t Recorder::records() const {
   const std::lock_guard lock(mutex_);
   return records_;
@@ -154,17 +160,24 @@ void Recorder::run() {
       tell_of_what_was_dropped();
       tell_of_the_clock();
       writer_.flush();
+      tell_of_the_file();
     }
     write_event("end");
     writer_.close();
+    tell_of_the_file();
   } catch (const Error& error) {
-    const std::lock_guard lock(mutex_);
-    problem_ = error.problem();
+    tell_of_trouble(error.problem(), true);
   } catch (const std::exception& error) {
-    const std::lock_guard lock(mutex_);
-    problem_ = Problem{ErrorKind::open, writer_.path(), error.what(), "record again"};
+    tell_of_trouble({ErrorKind::open, writer_.path(), error.what(), "record again"}, true);
   }
   ended_ = true;
+}
+
+void Recorder::tell_of_trouble(const Problem& trouble, bool is_problem) {
+  const std::lock_guard lock(mutex_);
+  if (is_problem) problem_ = trouble;
+  news_ = trouble;
+  ++news_count_;
 }
 
 // Writes what is of times up to written_until_; the rest waits for what may be told of earlier times.
@@ -204,6 +217,14 @@ void Recorder::tell_of_what_was_dropped() {
   if (all == dropped_told_) return;
   write_event(fmt::format("dropped {}", all - dropped_told_));
   dropped_told_ = all;
+}
+
+// A file that was only moved is no problem: nothing of it is lost.
+void Recorder::tell_of_the_file() {
+  const std::optional<Problem> trouble = writer_.take_trouble();
+  if (!trouble) return;
+  write_event("warning " + trouble->text());
+  tell_of_trouble(*trouble, trouble->kind == ErrorKind::data);
 }
 
 void Recorder::tell_of_the_clock() {

@@ -51,8 +51,11 @@ class Recorder {
   void close();
 
   // It records nothing any more. No lock: for every datagram.
-  bool ended() const { return ended_.load(std::memory_order_relaxed); }
+  bool ended() const { return ended_.load(std::memory_order_acquire); }
   std::optional<Problem> problem() const;
+  // What has happened to it: it was begun anew, or has ended by itself. `known`: how much of that is known already.
+  std::optional<Problem> news(unsigned& known) const;
+  unsigned news_count() const { return news_count_.load(std::memory_order_acquire); }
   std::uint64_t records() const;
   std::uint64_t dropped() const;
 
@@ -82,6 +85,8 @@ class Recorder {
   void write_event(const std::string& text);
   void tell_of_the_clock();
   void tell_of_what_was_dropped();
+  void tell_of_the_file();
+  void tell_of_trouble(const Problem& trouble, bool is_problem);
 
   // Of the writer's thread.
   RecordingWriter writer_;
@@ -95,6 +100,7 @@ class Recorder {
   const Time began_steady_ = steady_now();
 
   std::atomic<bool> ended_{false};
+  std::atomic<unsigned> news_count_{0};
   mutable std::mutex mutex_;  // of what follows
   std::condition_variable wanted_;
   std::vector<char> waiting_;
@@ -105,6 +111,7 @@ class Recorder {
   std::uint64_t dropped_ = 0;
   bool closing_ = false;
   std::optional<Problem> problem_;
+  std::optional<Problem> news_;  // the newest
 
   std::mutex joining_;
   std::thread thread_;

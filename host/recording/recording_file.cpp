@@ -90,6 +90,17 @@ void RecordingFile::append(std::string_view bytes) {
   size_ += all;
 }
 
+RecordingFile::Fate RecordingFile::fate() const {
+  struct stat mine {};
+  struct stat there {};
+  if (::fstat(file_.get(), &mine) != 0) return Fate::here;  // append() reports what is wrong
+  if (mine.st_nlink == 0) return Fate::removed;
+  if (static_cast<std::uint64_t>(mine.st_size) < size_) return Fate::truncated;
+  const bool same = ::stat(path_.c_str(), &there) == 0 && there.st_dev == mine.st_dev &&
+                    there.st_ino == mine.st_ino;
+  return same ? Fate::here : Fate::moved;
+}
+
 RecordingInput::RecordingInput(const std::string& path)
     : name_(path == "-" ? "standard input" : path),
       file_(path == "-" ? ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3)

@@ -14,6 +14,9 @@ namespace r4 {
 // A file that a recording goes into.
 class RecordingFile {
  public:
+  // What others have done to the file since it was opened.
+  enum class Fate : std::uint8_t { here, moved, removed, truncated };
+
   // Opens it, or makes it; a recording that is there goes on at its end. Nobody else records into it meanwhile.
   // Throws Error for what cannot be written, and for a file that holds something else.
   explicit RecordingFile(std::string path);
@@ -21,7 +24,9 @@ class RecordingFile {
   // Writes all of it and hands it to the disk. Throws Error; then the file is as it was before.
   void append(std::string_view bytes);
 
-  const std::string& path() const { return path_; }
+  // moved: another file, or none, has its path.
+  Fate fate() const;
+
   std::uint64_t size() const { return size_; }
   // Its last line has no end.
   bool torn() const { return torn_; }

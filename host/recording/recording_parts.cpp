@@ -51,9 +51,10 @@ void require_limits(const RecordingOptions& options) {
 
 }  // namespace
 
-RecordingParts::RecordingParts(std::string path, RecordingOptions options)
-    : stem_(path.substr(0, ending_of(path))),
-      ending_(path.substr(stem_.size())),
+// The path is made absolute: it leads to the same file if the program changes its working directory.
+RecordingParts::RecordingParts(const std::string& path, RecordingOptions options)
+    : stem_(std::filesystem::absolute(path.substr(0, ending_of(path)))),
+      ending_(path.substr(ending_of(path))),
       options_(options),
       most_bytes_(options.rotate_bytes != 0 ? options.rotate_bytes
                                             : options.keep_bytes / least_parts) {

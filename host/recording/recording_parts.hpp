@@ -13,7 +13,7 @@ namespace r4 {
 class RecordingParts {
  public:
   // Throws Error{usage} for limits that cannot be kept.
-  RecordingParts(std::string path, RecordingOptions options);
+  RecordingParts(const std::string& path, RecordingOptions options);
 
   // The path of the next file: `path` itself, where there are no limits.
   std::string next();

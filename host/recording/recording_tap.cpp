@@ -13,13 +13,17 @@ namespace r4 {
 void RecordingTap::attach(std::shared_ptr<Recorder> recorder, const std::string& url) {
   recorder_ = std::move(recorder);
   wire_ = recorder_->add_wire(url);
+  known_news_ = recorder_->news_count();
   state_ = HostLinkState::connecting;
   reason_ = SafeReason::none;
 }
 
-std::optional<Problem> RecordingTap::take_end() {
-  if (!recorder_ || !recorder_->ended()) return std::nullopt;
-  return std::exchange(recorder_, nullptr)->problem();
+std::optional<Problem> RecordingTap::take_news() {
+  if (!recorder_) return std::nullopt;
+  const bool ended = recorder_->ended();  // nothing is told after it
+  std::optional<Problem> news = recorder_->news(known_news_);
+  if (ended) recorder_.reset();
+  return news;
 }
 
 // An event, and no datagram: what was thrown away could be one as far as it is kept.

@@ -20,8 +20,8 @@ class RecordingTap {
   void attach(std::shared_ptr<Recorder> recorder, const std::string& url);
   void detach() { recorder_.reset(); }
   bool attached() const { return recorder_ != nullptr; }
-  // Why the recording has ended; told once, and nothing if it was closed. Then it is let go.
-  std::optional<Problem> take_end();
+  // Why the recording has ended, or was begun anew; each is told once. A recording that has ended is let go.
+  std::optional<Problem> take_news();
 
   // `at`: when it came, by the steady clock.
   void on_received(std::string_view bytes, Time at) {
@@ -42,6 +42,7 @@ class RecordingTap {
   }
 
   std::shared_ptr<Recorder> recorder_;
+  unsigned known_news_ = 0;
   std::uint16_t wire_ = no_wire;
   HostLinkState state_ = HostLinkState::connecting;
   SafeReason reason_ = SafeReason::none;

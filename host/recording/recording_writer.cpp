@@ -2,6 +2,7 @@
 #include "recording_writer.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "record_line.hpp"
 
@@ -23,9 +24,10 @@ RecordingWriter::RecordingWriter(const std::string& path, const RecordingOptions
 
 void RecordingWriter::begin_file() {
   parts_.make_room();
-  file_.emplace(parts_.next());
+  path_ = parts_.next();
+  file_.emplace(path_);
   zstd_.reset();
-  if (file_->path().ends_with(".zst")) zstd_.emplace();
+  if (path_.ends_with(".zst")) zstd_.emplace();
   frame_ = 0;
   begun_.reset();
   // Whoever wrote the last line was ended in the midst of it; it stays a line of its own.
@@ -75,9 +77,34 @@ void RecordingWriter::append(const Record& record) {
   if (text_.size() >= most_text) write_out(false);
 }
 
-void RecordingWriter::flush() { write_out(false); }
+void RecordingWriter::flush() {
+  look_after_file();
+  write_out(false);
+}
 
-void RecordingWriter::close() { write_out(true); }
+void RecordingWriter::close() {
+  look_after_file();
+  write_out(true);
+}
+
+// Who moves it (logrotate) has all of it; what was removed or truncated is lost.
+void RecordingWriter::look_after_file() {
+  using Fate = RecordingFile::Fate;
+  const Fate fate = file_->fate();
+  if (fate == Fate::here) return;
+  const bool moved = fate == Fate::moved;
+  if (moved) write_out(true);
+  trouble_ = {moved ? ErrorKind::open : ErrorKind::data, path_,
+              std::string(moved                   ? "was moved"
+                          : fate == Fate::removed ? "was removed"
+                                                  : "was truncated") +
+                  " while it was recorded, and is begun anew" +
+                  (moved ? "" : "; what was recorded before is lost"),
+              "let r4 record begin new files and remove old ones: --rotate, --keep"};
+  const std::string waiting = std::exchange(text_, {});
+  begin_file();
+  text_ += waiting;
+}
 
 void RecordingWriter::write_out(bool end_frame) {
   if (!zstd_) {

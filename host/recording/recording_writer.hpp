@@ -6,8 +6,10 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "r4link/error.hpp"
 #include "r4link/recording.hpp"
 #include "record.hpp"
 #include "recording_file.hpp"
@@ -27,21 +29,27 @@ class RecordingWriter {
   void declare(const RecordedDevice& device);
   // Each may write, and throws Error when that cannot be done.
   void append(const Record& record);
-  // What was appended is on the disk when this returns. Throws Error.
+  // What was appended is on the disk when this returns. Throws Error. If others have moved, removed or truncated the
+  // file, it is begun anew first.
   void flush();
   // The same, and ends what is compressed.
   void close();
 
-  const std::string& path() const { return file_->path(); }
+  const std::string& path() const { return path_; }
+  // That the file was begun anew since the last call, and why. Kind `data`: what was in it is lost.
+  std::optional<Problem> take_trouble() { return std::exchange(trouble_, std::nullopt); }
 
  private:
   bool is_due(Time time) const;
   void begin_file();
+  void look_after_file();
   void write_out(bool end_frame);
 
   const RecordingOptions options_;
   RecordingParts parts_;
+  std::string path_;
   std::optional<RecordingFile> file_;
+  std::optional<Problem> trouble_;
   std::optional<ZstdWriter> zstd_;
   std::vector<RecordedWire> wires_;
   std::vector<RecordedDevice> devices_;

@@ -11,8 +11,9 @@
 // What is recorded: datagrams in both directions, damaged ones too, with the host's time; that the transport went
 // or came, how the link is, what was lost. A thread writes it, four times a second and to the disk, so that a
 // crash costs at most the last second. The link waits for no disk: 4 MiB wait for a slow one, and of what is
-// beyond that the recording tells how much it is. When the disk is full the recording ends, on_event() of the board tells so
-// (Error::kind() open), and the link goes on.
+// beyond that the recording tells how much it is. When the disk is full the recording ends, on_event() of the board
+// reports it (kind open), and the link goes on. If another program moves, removes or truncates the file, it is begun anew
+// under its name, and on_event() reports that.
 #pragma once
 
 #include <chrono>
@@ -91,7 +92,8 @@ class R4LINK_API Recording {
   // thread; idempotent.
   void close();
 
-  // Why it has ended before it was closed; nothing if it has not.
+  // Why it has ended before it was closed. Kind `data`: it goes on, but the file was removed or truncated, and what was in
+  // it is lost. Nothing if neither has happened.
   std::optional<Problem> problem() const;
   // Datagrams and events so far, and those that the disk was too slow for.
   std::uint64_t records() const;

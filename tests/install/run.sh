@@ -57,9 +57,9 @@ cmake --build ../teleop/build >>"$work/cmake.log" || {
 R4=$build_tree/r4 /usr/bin/python3 "$source_tree/tests/install/teleop.py" ../teleop/build/teleop
 
 # r4 finds the part of it that is a program of its own.
-"$prefix/bin/r4" metrics sim: --listen 127.0.0.1:0 --duration 0.1 >"$work/out" 2>&1 || {
+ROS_LOCALHOST_ONLY=1 "$prefix/bin/r4" ros2 sim: --duration 0.1 >"$work/out" 2>&1 || {
   cat "$work/out"
-  echo 'install: r4 metrics fails'
+  echo 'install: r4 ros2 fails'
   exit 1
 }
 cmake -S ../openpodcar -B ../openpodcar/build -DCMAKE_CXX_COMPILER="$cxx" -DCMAKE_PREFIX_PATH="$prefix" >"$work/cmake.log"
@@ -91,6 +91,23 @@ for program in beside shared_with; do
   fi
 done
 echo 'install: an Asio of its own disturbs nobody'
+
+# A project that takes the tree in gets the library alone: no library of the tools is needed, and nothing is installed.
+without=(CLI11=ON nlohmann_json=ON prometheus-cpp=ON CycloneDDS=ON GTest=ON rapidcheck=ON)
+cmake -G Ninja -S "$source_tree/tests/install/subproject" -B "$work/subproject" -DR4LINK_SOURCE="$source_tree" \
+  -DCMAKE_CXX_COMPILER="$cxx" "${without[@]/#/-DCMAKE_DISABLE_FIND_PACKAGE_}" >"$work/cmake.log" 2>&1 ||
+  {
+    cat "$work/cmake.log"
+    echo 'install: a project that takes the tree in needs more than the library does'
+    exit 1
+  }
+cmake --install "$work/subproject" --prefix "$work/installed" >"$work/out"
+installed=$(cd "$work/installed" && find . -type f)
+if [[ $installed != ./share/robot/main.cpp ]]; then
+  echo "install: a project that takes the tree in installs $installed"
+  exit 1
+fi
+echo 'install: another project can take the tree in'
 
 PKG_CONFIG_PATH=$(dirname "$(find "$prefix" -name r4link.pc)")
 LD_LIBRARY_PATH=$(dirname "$(find "$prefix" -name libr4link.so)")

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """r4 metrics as a program, read by Prometheus' own parser."""
+import contextlib
+import http.client
+import socket
 import time
 import urllib.error
 import urllib.request
@@ -23,8 +26,6 @@ class Metrics(Running):
             text = answer.read().decode()
         samples = {}
         for family in text_string_to_metric_families(text):
-            if family.name.startswith('exposer_'):  # of the server itself
-                continue
             assert family.documentation and family.type in ('gauge', 'counter'), family
             for sample in family.samples:
                 labels = dict(sample.labels)
@@ -95,6 +96,30 @@ def test_a_board_that_is_not_there_is_down():
         assert samples[('r4_up',)] == 0 and ('r4_safe', 'none') not in samples
         with pytest.raises(urllib.error.HTTPError):
             urllib.request.urlopen(metrics.url.replace('/metrics', '/other'), timeout=PATIENCE_S)
+
+
+def test_only_those_who_name_this_computer_are_answered():
+    with Metrics('sim:', '--host', 'robot.example') as metrics:
+        port = int(metrics.url.split(':')[2].split('/')[0])
+
+        def status(method, host):
+            connection = http.client.HTTPConnection('127.0.0.1', port, timeout=PATIENCE_S)
+            connection.request(method, '/metrics', headers={'Host': host})
+            answer = connection.getresponse()
+            assert bool(answer.read()) == (method == 'GET'), method
+            return answer.status
+        for host in (f'127.0.0.1:{port}', 'localhost', 'robot.example:9618'):
+            assert status('GET', host) == status('HEAD', host) == 200, host
+        for host in ('evil.example', '', '192.0.2.1'):
+            assert status('GET', host) == 403, host
+
+
+def test_connections_that_say_nothing_hold_nobody_up():
+    with Metrics('udp://127.0.0.1:9?listen=0') as metrics, contextlib.ExitStack() as stack:
+        where = metrics.url.split('/')[2].split(':')
+        for _ in range(20):
+            stack.enter_context(socket.create_connection((where[0], int(where[1])), PATIENCE_S))
+        assert metrics.read()
 
 
 def test_wrong_uses_are_refused(tmp_path):

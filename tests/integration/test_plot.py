@@ -42,6 +42,26 @@ def curve(picture, name):
     return [re.findall(r'(-?[0-9.]+) (-?[0-9.]+)', part) for part in parts]
 
 
+def test_nothing_in_the_working_directory_is_executed_or_read(native, tmp_path):
+    for module in ('json', 'random', 'string', 'token', 'numpy', 'matplotlib', 'sitecustomize'):
+        (tmp_path / f'{module}.py').write_text(f"open({str(tmp_path / 'executed')!r}, 'a').write('{module}')")
+    (tmp_path / 'matplotlibrc').write_text('svg.fonttype: nonsense')
+    (tmp_path / 'python3').write_text(f'#!/bin/sh\ntouch {tmp_path}/executed\n')
+    (tmp_path / 'python3').chmod(0o755)
+    for extra in ({}, {'PYTHONPATH': ''}, {'PYTHONPATH': '.'}, {'PATH': ':' + os.environ['PATH']}):
+        result = run('plot', native.name, 'AIN24', '-o', 'drive.svg', '--force', cwd=tmp_path, env={**os.environ, **extra})
+        assert (result.returncode, result.stderr) == (0, ''), extra
+        assert (tmp_path / 'drive.svg').stat().st_size > 1000
+        assert not (tmp_path / 'executed').exists(), extra
+
+
+def test_a_dollar_in_a_name_is_drawn_as_it_is(native, tmp_path):
+    named = native.rename(tmp_path / '$x^$.r4log')
+    assert run('plot', str(named), 'AIN24', '-o', str(tmp_path / 'drive.svg')).returncode == 0
+    texts = [text.text for text in ElementTree.parse(tmp_path / 'drive.svg').getroot().iter(f'{SVG}text')]
+    assert any('$x^$.r4log' in text for text in texts), texts
+
+
 def test_draws_curves_safe_states_and_gaps(native, tmp_path):
     result = run('plot', str(native), 'ain24', 'left-arm:OSMC1', '-o', str(tmp_path / 'drive.svg'))
     assert result.returncode == 0 and not result.stderr, result

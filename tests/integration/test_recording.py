@@ -2,6 +2,7 @@
 """Recordings: r4 record beside a program that drives, killed, on a full disk; r4 info of what came of it."""
 import contextlib
 import datetime
+import pathlib
 import re
 import resource
 import signal
@@ -216,6 +217,28 @@ def test_a_full_disk_ends_the_recording_with_a_reason(board, tmp_path):
     tiny = run('record', board.host_url, '-o', str(tmp_path / 'tiny'), '--duration', '20',
                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10)))
     assert tiny.returncode == OPEN, 'not ended by SIGXFSZ'
+
+
+def test_a_file_that_others_take_away_is_begun_anew_and_the_exit_code_tells_a_loss(board, tmp_path):
+    path, moved = tmp_path / 'drive.r4log', tmp_path / 'drive.r4log.1'
+    with record(board.host_url, '-o', path) as recorder:
+        wait_for(path, ' 1< AIN24')
+        path.rename(moved)  # as logrotate does
+        wait_for(path, ' 1< AIN24')
+        assert recorder.end() == 0, recorder.errors
+    for each in (path, moved):
+        (told,), code = info(each)
+        assert code == 0 and told['wires'][0]['name'] == 'sim-1' and not told['damage'], told
+    for name, lose in (('removed', pathlib.Path.unlink), ('truncated', lambda each: each.write_text(''))):
+        path = tmp_path / f'{name}.r4log'
+        with record(board.host_url, '-o', path) as recorder:
+            wait_for(path, ' 1< AIN24')
+            lose(path)
+            wait_for(path, ' 0! warning ')
+            assert recorder.end() == DATA_BAD
+        assert ERROR.search(recorder.errors) and 'what was recorded before is lost' in recorder.errors
+        (told,), code = info(path)
+        assert code == 0 and told['ended'] and not told['damage'], told
 
 
 def test_a_disk_without_space_ends_the_recording_with_a_reason(board, tmp_path):

@@ -212,16 +212,92 @@ def test_a_program_that_drives_keeps_its_board():
 
 def test_a_page_records(tmp_path):
     with one_board('--record-to', str(tmp_path)) as (_, web), Page(web) as page:
+        assert page.control()['you']
         page.say(type='record', on=True)
-        path = page.next('recording', lambda each: each['path'])['path']
+        path = page.next('recording', lambda each: each['path'] and each['you'])['path']
         page.states(50)
         page.say(type='record', on=False)
         page.next('recording', lambda each: each['path'] is None and not each['why'])
         assert web.end() == 0
         assert 'states' in run('info', path).stdout
     with one_board('--record-to', str(tmp_path / 'nowhere')) as (_, web), Page(web) as page:
+        assert page.control()['you']
         page.say(type='record', on=True)
         assert 'nowhere' in page.next('recording', lambda each: each['why'])['why']
+
+
+def test_a_recording_belongs_to_whoever_controls_and_to_whoever_began_it(tmp_path):
+    with one_board('--record-to', str(tmp_path)) as (_, web), Page(web) as first, Page(web) as second:
+        second.say(type='record', on=True)
+        refused = second.next('recording', lambda each: each['why'])
+        assert 'no control' in refused['why'] and refused['path'] is None and not refused['you']
+        assert first.control()['you']
+        first.say(type='record', on=True)
+        path = second.next('recording', lambda each: each['path'])['path']
+        second.say(type='record', on=False)
+        refused = second.next('recording', lambda each: each['why'])
+        assert refused['path'] == path and not refused['you']
+        first.say(type='control', want=False)
+        first.next('control', lambda each: not each['you'])
+        assert first.next('recording')['path'] == path
+        first.say(type='record', on=False)
+        second.next('recording', lambda each: each['path'] is None)
+        assert [str(each) for each in tmp_path.iterdir()] == [path]
+
+
+def test_a_recording_whose_file_was_removed_goes_on_and_the_page_is_told(tmp_path):
+    with one_board('--record-to', str(tmp_path)) as (_, web), Page(web) as page:
+        assert page.control()['you']
+        page.say(type='record', on=True)
+        path = page.next('recording', lambda each: each['path'])['path']
+        os.unlink(path)
+        assert page.next('recording', lambda each: 'was removed' in each['why'])['path'] == path
+        page.say(type='record', on=False)
+        page.next('recording', lambda each: each['path'] is None)
+        assert web.end() == 0
+        assert 'states' in run('info', path).stdout
+
+
+def test_a_refused_wish_for_control_is_told_to_nobody_else():
+    with one_board() as (_, web), Page(web) as page:
+        assert page.control()['you']
+        with Page(web) as other:
+            for _ in range(20):
+                other.say(type='control', want=True)
+            for _ in range(20):
+                assert 'another browser' in other.next('control', lambda each: each['why'])['why']
+        page.say(type='control', want=False)
+        assert page.next('control')['why'] == 'it was given back'
+
+
+def test_a_folder_of_files_takes_the_place_of_the_page(tmp_path):
+    (tmp_path / 'page/sub').mkdir(parents=True)
+    (tmp_path / 'page/index.html').write_text('changed')
+    (tmp_path / 'page.key').write_text('secret')
+    with one_board('--page', str(tmp_path / 'page')) as (_, web):
+        assert web.get('/')[1].endswith(b'changed') and web.get('/main.js')[0] == 200
+        for path, status in (('/sub', 404), ('.key', 400), ('/..', 404), ('/../page.key', 404)):
+            code, answer = web.get(path)
+            assert code == status and b'secret' not in answer, path
+        assert web.get('/')[0] == 200
+    nowhere = run('web', 'sim:', '--listen', '127.0.0.1:0', '--page', str(tmp_path / 'page.key'))
+    assert nowhere.returncode == OPEN and ERROR.search(nowhere.stderr) and 'is not a folder' in nowhere.stderr
+
+
+def test_a_proxy_in_front_is_named():
+    with one_board('--host', 'robot.example') as (_, web):
+        token = web.url.partition('#token=')[2]
+        assert len(token) == 32, 'a name is for other computers'
+        protocols = ('r4.web.v1', f'r4.token.{token}')
+        for host in ('robot.example', f'127.0.0.1:{web.port}'):
+            with WebSocket(web.port, protocols=protocols, Host=host, Origin='https://robot.example') as page:
+                assert page.protocol == 'r4.web.v1'
+        for headers in ({'Host': 'evil.example'}, {'Origin': 'https://evil.example'}):
+            with pytest.raises(Refused) as refused:
+                WebSocket(web.port, protocols=protocols, **headers)
+            assert refused.value.status == 403, headers
+    wrong = run('web', 'sim:', '--host', 'https://robot.example')
+    assert wrong.returncode == USAGE and ERROR.search(wrong.stderr)
 
 
 def test_wrong_hosts_and_origins_are_turned_away():
@@ -368,6 +444,9 @@ def test_foxglove_reads_records_links_and_events():
 
 def test_who_speaks_foxglove_may_only_read():
     with one_board() as (_, web):
+        for names in (('foxglove.sdk.v1',), ('foxglove.sdk.v1', 'foxglove.websocket.v1')):
+            with WebSocket(web.port, '/', names) as client:
+                assert client.protocol in names and json.loads(client.receive()[1])['op'] == 'serverInfo'
         with WebSocket(web.port, '/', ['foxglove.websocket.v1']) as client:
             assert json.loads(client.receive()[1])['capabilities'] == []
             channels = json.loads(client.receive()[1])['channels']

@@ -237,6 +237,9 @@ def test_a_second_browser_watches_and_may_stop(browser):
 def test_the_button_records_and_tells_where(browser, tmp_path):
     with Board('udp://127.0.0.1:0') as board, Web(board.host_url, options=('--record-to', str(tmp_path))) as web, \
             browser.open(web.url) as page:
+        page.until('!document.querySelector("#control").disabled')
+        assert page.evaluate('document.querySelector("#record").disabled'), 'it belongs to control'
+        page.click('#control')
         page.until('!document.querySelector("#record").disabled')
         page.click('#record')
         page.until_text('#recording', f'recording {tmp_path}/')

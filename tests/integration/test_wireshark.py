@@ -96,6 +96,14 @@ def test_the_papers_capture_is_shown_field_by_field(tmp_path):
     assert [row[9] for row in shown if row[9]] == [row[0] for row in shown if row[2] == 'command'], 'all are confirmed'
 
 
+def test_a_dissector_that_is_found_twice_is_loaded_once(tmp_path):
+    plugins = tmp_path / '.local/lib/wireshark/plugins'
+    shutil.copytree(DISSECTOR, plugins)
+    path = paper_capture(tmp_path / 'paper.pcap')
+    lines = tshark('-r', path, env={**os.environ, 'HOME': str(tmp_path)})
+    assert sum(' R4 ' in line for line in lines) == len(paper())
+
+
 def test_a_wrong_checksum_is_told_with_the_right_one_and_leaves_a_gap(tmp_path):
     path = paper_capture(tmp_path / 'paper.pcap')
     right = {line.split('PNum:')[1].split(';')[0]: zlib.crc32(line[:line.index('^') + 1].encode())

@@ -19,6 +19,19 @@ def line(at, fields, wire=1, direction='<'):
     return f'{1795468293 + at:.6f} {wire}{direction} {body}0x{zlib.crc32(body.encode()):x}^\n'
 
 
+def test_a_file_that_was_removed_is_begun_anew_and_the_recording_tells(sim, tmp_path, wait):
+    path = tmp_path / 'drive.r4log'
+    with r4link.Recording(path) as recording, r4link.Board(sim.url, arming=False) as board:
+        board.record(recording)
+        board.wait_active()
+        assert recording.problem is None
+        path.unlink()
+        wait(lambda: recording.problem)
+        board.next_state()
+    assert 'was removed' in recording.problem
+    assert len(r4link.read(path).boards[0].states) > 0
+
+
 def test_what_was_recorded_is_there(sim, tmp_path):
     path = tmp_path / 'drive.r4log.zst'
     with r4link.Board(sim.url, arming=False, fields='DEFAULT,ENC1,BLDC1,US1') as board:

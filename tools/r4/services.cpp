@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The subcommands that r4 leaves to r4-services, a program of its own: they stand on libraries (Cyclone DDS, an HTTP
-// server) that take several times as long to load as all the rest, for which a stop need not wait. r4 has read the
-// command line, and becomes r4-services, which reads it again: the process stays the same one.
+// r4 leaves the subcommand ros2 to r4-services, a program of its own: Cyclone DDS takes several times as long to load as
+// all the rest, and a stop must not wait for it. r4 has read the command line, and becomes r4-services, which reads it
+// again: the process stays the same one.
 #include <unistd.h>
 
 #include <algorithm>
@@ -15,7 +15,6 @@
 
 #include "r4link/error.hpp"
 #include "ros2/bridge.hpp"
-#include "watch/metrics_server.hpp"
 
 namespace r4::tool {
 namespace {
@@ -54,8 +53,6 @@ std::vector<std::string> command_line() {
 }
 
 }  // namespace
-
-int serve_metrics(const MetricsOptions&) { become_services(); }
 
 namespace ros2 {
 

@@ -341,7 +341,7 @@ class Recording:
                  trace: TracebackType | None) -> None: ...
     @property
     def problem(self) -> str | None:
-        """Why it has ended before it was closed."""
+        """Why it has ended before it was closed; or that its file was removed or truncated meanwhile, and begun anew."""
     @property
     def records(self) -> int: ...
     @property

@@ -123,6 +123,35 @@ TEST_F(RecordingOfABoard, ThatTheDiskEndsIsToldAndTheLinkGoesOn) {
   EXPECT_TRUE(has(heard("next.r4log"), " 1< AIN24:"));
 }
 
+TEST_F(RecordingOfABoard, WhoseFileWasRemovedIsBegunAnewAndTheBoardIsTold) {
+  std::mutex mutex;
+  std::condition_variable told;
+  std::vector<Problem> problems;
+  Board board("sim:", at_will());
+  const ScopedSubscription events = board.on_event([&](const CarrierEvent& event) {
+    const std::lock_guard lock(mutex);
+    if (event.kind == CarrierEvent::Kind::warning) problems.push_back(event.problem);
+    told.notify_all();
+  });
+  board.wait_active();
+  Recording recording(path());
+  board.record(recording);
+  fs::remove(path());
+  {
+    std::unique_lock lock(mutex);
+    ASSERT_TRUE(told.wait_for(lock, 10s, [&] { return !problems.empty(); }));
+  }
+  board.next_state();
+  recording.close();
+  ASSERT_EQ(problems.size(), 1U);
+  EXPECT_EQ(problems[0].kind, ErrorKind::data);
+  EXPECT_TRUE(contains(problems[0].reason, "was removed"));
+  ASSERT_TRUE(recording.problem());
+  EXPECT_EQ(recording.problem()->text(), problems[0].text());
+  EXPECT_TRUE(has(heard(), " 0! warning .*was removed") && has(heard(), " 1< AIN24:"));
+  EXPECT_TRUE(has(heard(), " 0! end"));
+}
+
 TEST_F(RecordingOfABoard, ThatCannotBeOpenedIsAnErrorAtTheCall) {
   Board board("sim:", at_will());
   EXPECT_EQ(problem_of([&] { board.record(path("no/where")); }).kind, ErrorKind::open);

@@ -124,6 +124,85 @@ TEST_F(RecordingWriterTest, WritesOverNothingElse) {
   EXPECT_EQ(problem_of([&] { RecordingWriter(path("no/where.r4log"), {}); }).kind, ErrorKind::open);
 }
 
+TEST_F(RecordingWriterTest, AFileThatWasMovedIsLeftWholeAndBegunAnew) {
+  for (const std::string ending : {".r4log", ".r4log.zst"}) {
+    all.clear();
+    RecordingWriter writer(path("a" + ending), {});
+    writer.declare(RecordedWire{1, "udp://robot", "left"});
+    for (int i = 0; i < 10; ++i) append(writer);
+    writer.flush();
+    fs::rename(path("a" + ending), path("moved" + ending));
+    append(writer);
+    writer.flush();
+    const std::optional<Problem> trouble = writer.take_trouble();
+    ASSERT_TRUE(trouble);
+    EXPECT_EQ(trouble->kind, ErrorKind::open) << "nothing is lost";
+    EXPECT_EQ(trouble->thing, path("a" + ending));
+    EXPECT_TRUE(contains(trouble->reason, "was moved"));
+    EXPECT_FALSE(writer.take_trouble()) << "it is told once";
+    append(writer);
+    writer.close();
+    const Heard moved = heard_in(content("moved" + ending));
+    const Heard anew = heard_in(content("a" + ending));
+    EXPECT_EQ(moved.records + anew.records, all);
+    EXPECT_TRUE(moved.damage.empty() && anew.damage.empty());
+    EXPECT_EQ(anew.wires.back().name, "left") << "each is whole in itself";
+  }
+}
+
+TEST_F(RecordingWriterTest, AFileThatWasRemovedOrTruncatedIsBegunAnewAndTheLossIsTold) {
+  for (const std::string ending : {".r4log", ".r4log.zst"}) {
+    for (const bool removed : {true, false}) {
+      RecordingWriter writer(path("a" + ending), {});
+      writer.declare(RecordedWire{1, "udp://robot", "left"});
+      for (int i = 0; i < 10; ++i) append(writer);
+      writer.flush();
+      removed ? static_cast<void>(fs::remove(path("a" + ending)))
+              : fs::resize_file(path("a" + ending), 0);
+      all.clear();
+      append(writer);
+      writer.flush();
+      const std::optional<Problem> trouble = writer.take_trouble();
+      ASSERT_TRUE(trouble);
+      EXPECT_EQ(trouble->kind, ErrorKind::data);
+      EXPECT_TRUE(contains(trouble->reason, removed ? "was removed" : "was truncated"));
+      append(writer);
+      writer.close();
+      const Heard anew = heard_in(content("a" + ending));
+      EXPECT_EQ(anew.records, all);
+      EXPECT_TRUE(anew.damage.empty());
+      EXPECT_EQ(anew.wires.back().name, "left");
+      fs::remove(path("a" + ending));
+    }
+  }
+}
+
+TEST_F(RecordingWriterTest, AFileThatCannotBeBegunAnewEndsTheRecording) {
+  RecordingWriter writer(path("a.r4log"), {});
+  append(writer);
+  writer.flush();
+  fs::remove_all(folder);
+  append(writer);
+  const Problem problem = problem_of([&] { writer.flush(); });
+  EXPECT_EQ(problem.kind, ErrorKind::open);
+  EXPECT_EQ(problem.thing, path("a.r4log"));
+}
+
+TEST_F(RecordingWriterTest, StaysInItsFolderWhenTheProgramChangesItsWorkingDirectory) {
+  const fs::path before = fs::current_path();
+  fs::current_path(folder);
+  RecordingOptions options;
+  options.rotate_after = 2s;
+  {
+    RecordingWriter writer("drive.r4log", options);
+    fs::current_path(before);
+    for (int i = 0; i < 300; ++i) append(writer);
+    writer.close();
+    EXPECT_FALSE(writer.take_trouble());
+  }
+  EXPECT_EQ(names(), (std::vector<std::string>{"drive-00001.r4log", "drive-00002.r4log"}));
+}
+
 TEST_F(RecordingWriterTest, BeginsANewFileAfterASize) {
   for (const char* const ending : {".r4log", ".r4log.zst"}) {
     RecordingOptions options;

@@ -137,6 +137,43 @@ TEST(DoctorSerial, ModemManagerIsTroubleWhileNoRuleKeepsItOff) {
   EXPECT_EQ(modems().severity, Severity::ok);
 }
 
+TEST(DoctorSerial, ARuleOfBrlttyThatTakesTheAdapterIsFound) {
+  const MadeUpMachine made_up;
+  const auto brltty = [&](const std::vector<std::string>& ports) {
+    return found_by(check_brltty(made_up.machine, ports), "serial.brltty");
+  };
+  const std::string gone = "/dev/ttyUSB7";
+  EXPECT_EQ(brltty({gone}).severity, Severity::ok) << "it is not installed";
+  const std::string rules = "/usr/lib/udev/rules.d/85-brltty.rules";
+  made_up.file(rules,
+               "# ENV{PRODUCT}==\"403/6001/*\", GOTO=\"brltty_usb_run\"\n"
+               "ENV{PRODUCT}==\"10c4/ea60/*\", ATTRS{manufacturer}==\"Silicon Labs\", "
+               "GOTO=\"brltty_usb_run\"\n");
+  EXPECT_EQ(brltty({gone}).severity, Severity::ok) << "it takes braille displays alone";
+  made_up.file(rules,
+               "ENV{PRODUCT}==\"1a86/7523/*\", ENV{BRLTTY_BRAILLE_DRIVER}=\"bm\"\n"
+               "ENV{PRODUCT}==\"403/6001/*\", ENV{BRLTTY_BRAILLE_DRIVER}=\"at\"\n");
+  EXPECT_EQ(brltty({}).severity, Severity::note);
+  EXPECT_EQ(brltty({"/dev/ttyACM0"}).severity, Severity::note);
+  EXPECT_EQ(brltty({gone}).severity, Severity::warning);
+  EXPECT_EQ(brltty({gone}).mending, Mending::by_hand) << "somebody may need it to read";
+  EXPECT_NE(brltty({gone}).reason.find("CH340, FT232"), std::string::npos);
+  EXPECT_EQ(brltty({gone}).fix,
+            "sudo sh -c 'ln -s /dev/null /etc/udev/rules.d/85-brltty.rules && udevadm control "
+            "--reload'");
+  const std::string usb = "/sys/class/tty/ttyUSB0/device";
+  for (const auto& [vendor, product, severity] :
+       {std::tuple{"0403", "6001", Severity::warning}, {"0403", "6015", Severity::note}}) {
+    made_up.file("/dev/ttyUSB0");
+    made_up.file(usb + "/uevent");
+    made_up.file("/sys/class/tty/ttyUSB0/idVendor", vendor);
+    made_up.file("/sys/class/tty/ttyUSB0/idProduct", product);
+    EXPECT_EQ(brltty({"/dev/ttyUSB0"}).severity, severity) << product;
+  }
+  made_up.file("/etc/udev/rules.d/85-brltty.rules");
+  EXPECT_EQ(brltty({gone}).severity, Severity::ok) << "it is masked";
+}
+
 TEST(DoctorFinding, TheExitCodeIsThatOfTheFirstErrorAndOneForWarnings) {
   Finding warning;
   warning.severity = Severity::warning;

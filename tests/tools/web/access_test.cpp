@@ -8,7 +8,7 @@
 namespace r4::tool::web {
 namespace {
 
-const Access local("127.0.0.1", "", {"https://app.example"});
+const Access local("127.0.0.1", {}, "", {"https://app.example"});
 
 TEST(WebAccess, ReadsWhereToListen) {
   EXPECT_EQ(listen_address("127.0.0.1:8080").host, "127.0.0.1");
@@ -40,11 +40,11 @@ TEST(WebAccess, TurnsAwayNamesThatCouldHaveBeenMadeToPointHere) {
         "localhost:8080:9", "[::1", "[::1]x", "localhost:", "user@localhost"}) {
     EXPECT_EQ(local.check(host, ""), Verdict::wrong_host) << host;
   }
-  const Access everywhere("0.0.0.0", "secret", {});
+  const Access everywhere("0.0.0.0", {}, "secret", {});
   EXPECT_EQ(everywhere.check("10.1.2.3:8080", ""), Verdict::allowed);
   EXPECT_EQ(everywhere.check("[fe80::1]:8080", ""), Verdict::allowed);
   EXPECT_EQ(everywhere.check("robot.example:8080", ""), Verdict::wrong_host);
-  EXPECT_EQ(Access("robot.example", "secret", {}).check("Robot.example:8080", ""),
+  EXPECT_EQ(Access("robot.example", {}, "secret", {}).check("Robot.example:8080", ""),
             Verdict::allowed);
 }
 
@@ -55,6 +55,33 @@ TEST(WebAccess, TurnsAwayPagesOfOtherSites) {
         "http://evil.example", "http://localhost:8080.evil.example", "https://app.example"}) {
     EXPECT_EQ(local.check("localhost:8080", origin), Verdict::wrong_origin) << origin;
   }
+}
+
+TEST(WebAccess, ReadsTheNameByWhichItIsAsked) {
+  EXPECT_EQ(host_name("Robot.example"), "robot.example");
+  EXPECT_EQ(host_name("robot.example:8443"), "robot.example:8443");
+  for (const char* wrong : {"", "https://robot.example", "robot.example/", "robot.example:https",
+                            "user@robot.example", "robot example"}) {
+    EXPECT_THROW(host_name(wrong), Error) << wrong;
+  }
+}
+
+// A proxy in front passes the name on that the browser asked for, or asks by the address that it was given.
+TEST(WebAccess, ServesThePagesOfTheNamesThatItWasGiven) {
+  const Access access("127.0.0.1", {"robot.example", "lab.example:8443"}, "secret", {});
+  for (const char* host :
+       {"robot.example", "Robot.Example:8080", "lab.example", "127.0.0.1:8080"}) {
+    EXPECT_EQ(access.check(host, ""), Verdict::allowed) << host;
+    for (const char* origin : {"https://robot.example", "http://robot.example",
+                               "https://Lab.example:8443", "http://lab.example:8443"}) {
+      EXPECT_EQ(access.check(host, origin), Verdict::allowed) << host << " " << origin;
+    }
+    for (const char* origin : {"https://lab.example", "https://robot.example:8443",
+                               "https://robot.example.evil", "null", "ftp://robot.example"}) {
+      EXPECT_EQ(access.check(host, origin), Verdict::wrong_origin) << host << " " << origin;
+    }
+  }
+  EXPECT_EQ(access.check("evil.example", "https://robot.example"), Verdict::wrong_host);
 }
 
 TEST(WebAccess, AForeignPageMayReadIfItWasNamed) {
@@ -68,7 +95,7 @@ TEST(WebAccess, TakesTheTokenInAnyOfThreePlacesAndNothingLikeIt) {
   const std::string token = random_token();
   EXPECT_EQ(token.size(), 32U);
   EXPECT_NE(token, random_token());
-  const Access access("0.0.0.0", token, {});
+  const Access access("0.0.0.0", {}, token, {});
   EXPECT_EQ(access.check_token("Bearer " + token, "/", {}), Verdict::allowed);
   EXPECT_EQ(access.check_token("", "/live?token=" + token, {}), Verdict::allowed);
   EXPECT_EQ(access.check_token("", "/", {"r4.web.v1", "r4.token." + token}), Verdict::allowed);

@@ -79,12 +79,14 @@ Findings check_ports(const Machine& machine, std::vector<std::string> ports) {
   std::sort(ports.begin(), ports.end());
   ports.erase(std::unique(ports.begin(), ports.end()), ports.end());
   Findings findings;
+  std::vector<std::string> devices;
   for (const std::string& path : ports) {
-    const std::string device = device_of(path);
+    const std::string device = devices.emplace_back(device_of(path));
     append(findings, check_port_permission(machine, device));
     append(findings, check_port_holders(machine, device, sharing(device)));
     append(findings, check_latency_timer(machine, device));
   }
+  append(findings, check_brltty(machine, devices));
   return findings;
 }
 

@@ -7,8 +7,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <optional>
+#include <set>
 #include <sstream>
 
 namespace r4::tool {
@@ -64,14 +66,48 @@ bool may_open(const struct stat& file, const User& user) {
   return (bits & read_write) == read_write;
 }
 
-std::optional<std::string> installed_rules(const Machine& machine) {
-  // The first that has the file counts (man udev).
-  for (const char* folder :
-       {"/etc/udev/rules.d/", "/run/udev/rules.d/", "/usr/local/lib/udev/rules.d/",
-        "/usr/lib/udev/rules.d/", "/lib/udev/rules.d/"}) {
-    if (auto text = machine.read(std::string(folder) + rules_file)) return text;
+// The first that has a file counts (man udev).
+constexpr std::array<const char*, 5> rules_folders{"/etc/udev/rules.d/", "/run/udev/rules.d/",
+                                                   "/usr/local/lib/udev/rules.d/",
+                                                   "/usr/lib/udev/rules.d/", "/lib/udev/rules.d/"};
+
+std::optional<std::string> installed_rules(const Machine& machine, const std::string& name) {
+  for (const char* folder : rules_folders) {
+    if (auto text = machine.read(folder + name)) return text;
   }
   return std::nullopt;
+}
+
+// A chip of USB serial adapters, by the id that rules of udev have: "1a86/7523".
+struct Adapter {
+  const char* id;
+  const char* chip;
+};
+constexpr std::array<Adapter, 4> adapters{
+    {{"1a86/7523", "CH340"}, {"10c4/ea60", "CP210x"}, {"403/6001", "FT232"}, {"403/6015", "FT-X"}}};
+
+// True if the rules take every adapter of that id: no further condition, such as a manufacturer, is in the line.
+bool take(const std::string& rules, const Adapter& adapter) {
+  std::istringstream lines(rules);
+  for (std::string line; std::getline(lines, line);) {
+    const bool names_it =
+        line.find(fmt::format("ENV{{PRODUCT}}==\"{}/", adapter.id)) != std::string::npos;
+    const bool is_rule = line.find_first_not_of(" \t") != line.find('#');
+    if (names_it && is_rule && line.find("ATTR") == std::string::npos) return true;
+  }
+  return false;
+}
+
+// "1a86/7523"; empty where it is no device of USB. A tty is below the interface, or, of usb-serial, one further.
+std::string usb_id_of(const Machine& machine, const std::string& port) {
+  for (const char* up : {"/../", "/../../"}) {
+    const std::string folder = "/sys/class/tty/" + port + "/device" + up;
+    std::string vendor = machine.read(folder + "idVendor").value_or("");
+    if (vendor.empty()) continue;
+    vendor.erase(0, vendor.find_first_not_of('0'));
+    return vendor + "/" + machine.read(folder + "idProduct").value_or("");
+  }
+  return {};
 }
 
 std::vector<std::string> processes(const Machine& machine) {
@@ -97,17 +133,11 @@ std::string_view without_end(std::string_view text) {
 std::vector<std::string> likely_ports(const Machine& machine) {
   std::vector<std::string> ports;
   for (const std::string& name : machine.list("/sys/class/tty")) {
-    const std::string device = "/sys/class/tty/" + name + "/device";
-    // A tty of USB is below the interface, or, of usb-serial, one further.
-    std::string vendor;
-    std::string product;
-    for (const char* up : {"/../", "/../../"}) {
-      if (!vendor.empty()) break;
-      vendor = machine.read(device + up + "idVendor").value_or("");
-      product = machine.read(device + up + "idProduct").value_or("");
+    const std::string id = usb_id_of(machine, name);
+    const bool board = id == "2341/0266" || id == "2341/0366";
+    if (board || machine.exists("/sys/class/tty/" + name + "/device/latency_timer")) {
+      ports.push_back("/dev/" + name);
     }
-    const bool board = vendor == "2341" && (product == "0266" || product == "0366");
-    if (board || machine.exists(device + "/latency_timer")) ports.push_back("/dev/" + name);
   }
   return ports;
 }
@@ -192,7 +222,7 @@ Findings check_latency_timer(const Machine& machine, const std::string& path) {
 
 Findings check_udev_rules(const Machine& machine, std::string_view rules) {
   Finding finding{Severity::ok, "serial.udev", rules_file, "installed", "", {}, ErrorKind::data};
-  const std::optional<std::string> installed = installed_rules(machine);
+  const std::optional<std::string> installed = installed_rules(machine, rules_file);
   if (installed && without_end(*installed) == without_end(rules)) return {finding};
   const bool modems = is_running(machine, "ModemManager");
   const bool keeps_off = installed && installed->find("ID_MM_DEVICE_IGNORE") != std::string::npos;
@@ -213,6 +243,42 @@ Findings check_udev_rules(const Machine& machine, std::string_view rules) {
     finding.thing = "ModemManager";
     finding.reason = "runs, and sends modem commands to each serial port that comes";
     findings.push_back(finding);
+  }
+  return findings;
+}
+
+Findings check_brltty(const Machine& machine, const std::vector<std::string>& ports) {
+  std::set<std::string> names;
+  for (const char* folder : rules_folders) {
+    for (const std::string& name : machine.list(folder)) {
+      if (name.find("brltty") != std::string::npos) names.insert(name);
+    }
+  }
+  Findings findings;
+  for (const std::string& name : names) {
+    const std::string rules = installed_rules(machine, name).value_or("");
+    std::string chips;
+    bool concerned = false;
+    for (const Adapter& adapter : adapters) {
+      if (!take(rules, adapter)) continue;
+      chips += (chips.empty() ? "" : ", ") + std::string(adapter.chip);
+      concerned =
+          concerned || std::any_of(ports.begin(), ports.end(), [&](const std::string& port) {
+            const bool gone = !machine.exists(port);
+            return gone ? name_of_port(port).starts_with("ttyUSB")
+                        : usb_id_of(machine, name_of_port(port)) == adapter.id;
+          });
+    }
+    if (chips.empty()) continue;
+    findings.push_back(
+        {concerned ? Severity::warning : Severity::note, "serial.brltty", name,
+         fmt::format("brltty takes adapters with a {} for braille displays: their port vanishes "
+                     "a second after it was plugged in",
+                     chips),
+         machine.as_root(fmt::format("ln -s /dev/null /etc/udev/rules.d/{} && udevadm control "
+                                     "--reload",
+                                     name)),
+         Mending::by_hand, ErrorKind::open});
   }
   return findings;
 }

@@ -22,5 +22,7 @@ Findings check_port_holders(const Machine& machine, const std::string& path, pid
 Findings check_latency_timer(const Machine& machine, const std::string& path);
 // Whether the rules of udev are there, and are `rules`; and whether ModemManager, if it runs, keeps off by them.
 Findings check_udev_rules(const Machine& machine, std::string_view rules);
+// Whether a rule of brltty, which is for braille displays, takes the USB serial adapters that `ports` are or may be.
+Findings check_brltty(const Machine& machine, const std::vector<std::string>& ports);
 
 }  // namespace r4::tool

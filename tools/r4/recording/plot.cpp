@@ -255,7 +255,7 @@ FileDescriptor make_plan(const Curves& curves, const std::vector<Wanted>& wanted
     }
   }
   FileDescriptor input = make_memory("plan");
-  const std::string line = plan.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+  const std::string line = line_of(plan);
   write_all(input, line.data(), line.size());
   for (const Curve* curve : drawn) {
     for (const std::vector<double>* numbers : {&curve->times, &curve->values}) {
@@ -265,12 +265,14 @@ FileDescriptor make_plan(const Curves& curves, const std::vector<Wanted>& wanted
   return input;
 }
 
-// Runs plot.py; its exit code, or nothing if there is no such Python.
+// Runs plot.py; its exit code, or nothing if there is no such Python. It runs in the root directory: Python imports what
+// is in the working directory, matplotlib reads its settings there, and files that were downloaded may lie there.
 std::optional<int> run_python(const char* python, const FileDescriptor& plan,
                               const FileDescriptor& picture) {
   ::lseek(plan.get(), 0, SEEK_SET);
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addchdir_np(&actions, "/");
   posix_spawn_file_actions_adddup2(&actions, plan.get(), STDIN_FILENO);
   posix_spawn_file_actions_adddup2(&actions, picture.get(), STDOUT_FILENO);
   const char* const arguments[] = {python, "-c", plot_script, nullptr};

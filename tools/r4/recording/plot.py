@@ -34,6 +34,8 @@ def main():
     data = sys.stdin.buffer
     plan = json.loads(data.readline())
     matplotlib.rcParams.update({'svg.fonttype': 'none', 'svg.hashsalt': 'r4', 'agg.path.chunksize': 20000})
+    if 'text.parse_math' in matplotlib.rcParams:  # a dollar in a name is a dollar
+        matplotlib.rcParams['text.parse_math'] = False
     units = list(dict.fromkeys(curve['unit'] for curve in plan['curves']))
     figure, axes = pyplot.subplots(len(units), sharex=True, squeeze=False, layout='constrained',
                                    figsize=(10, 1.2 + 2.4 * len(units)))

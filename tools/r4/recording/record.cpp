@@ -119,7 +119,8 @@ class Recorders {
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
     for (const auto& board : boards_) board->close();
     recording_->close();
-    if (const std::optional<Problem> problem = recording_->problem()) throw Error(*problem);
+    if (has_ended()) throw Error(*recording_->problem());
+    tell_loss();
     fmt::print("{}: {} datagrams and events in {:.1f} s\n", options.file, recording_->records(),
                took.count());
     if (recording_->dropped() != 0) {
@@ -131,10 +132,20 @@ class Recorders {
       require_one_board(*board);
       if (board->statistics().received == 0) throw Error(explain(board->name(), board->link()));
     }
-    return 0;
+    return lost_ ? static_cast<int>(ErrorKind::data) : 0;
   }
 
  private:
+  // A recording that was removed or truncated goes on; one that cannot be written has ended.
+  bool has_ended() const {
+    const std::optional<Problem> problem = recording_->problem();
+    return problem && problem->kind != ErrorKind::data;
+  }
+  void tell_loss() {
+    const std::optional<Problem> problem = recording_->problem();
+    if (!problem || std::exchange(lost_, true)) return;
+    fmt::print(stderr, "r4: {}\n", problem->text());
+  }
   void add(const std::string& url) {
     auto carriers = make_host_carriers(io_, {url}, BoardRole::watch);
     for (const auto& carrier : carriers) carrier->gather();
@@ -142,7 +153,8 @@ class Recorders {
   }
   void open(AsyncBoard& board) {
     board.on_event([this](const CarrierEvent&) {
-      if (recording_->problem()) io_.stop();
+      if (has_ended()) return io_.stop();
+      tell_loss();
     });
     for (const Device& device : devices_) board.describe(device);
     board.record(*recording_);
@@ -156,6 +168,7 @@ class Recorders {
   std::vector<std::unique_ptr<AsyncBoard>> boards_;
   std::vector<std::unique_ptr<BusListener>> buses_;
   RunEnd run_end_;
+  bool lost_ = false;  // what was recorded is, and that is told
 };
 
 int record(const RecordOptions& options) { return Recorders(options).run(options); }
@@ -164,7 +177,7 @@ constexpr const char* record_footer =
     R"(Every datagram of every board, in both directions, with the host's time and the wire that it came
 by; damaged ones, too; and what happened to the links. It watches, as r4 monitor does: it takes no
 control, and a program that drives a board is not disturbed. It goes on when a transport is lost and
-comes back.
+comes back. If another program moves, removes or truncates the file, it is begun anew, and told of.
 
 The file is text, one line a datagram (docs/recordings.md); one whose name ends in .zst is compressed.
 A recording that is there goes on at its end. A crash costs at most the last second. With --rotate or
@@ -181,8 +194,8 @@ Examples:
   grep ' 1> ' drive.r4log               what was sent to the first board
   r4 info drive.r4log                   what is in it
 
-Exit codes: 0 ended by --duration or Ctrl-C; 3 a board was not heard; 2 usage; 4 the file or the transport
-cannot be opened, or the disk is full; 5 permission denied.)";
+Exit codes: 0 ended by --duration or Ctrl-C; 1 the file was removed or truncated meanwhile; 3 a board was
+not heard; 2 usage; 4 the file or the transport cannot be opened, or the disk is full; 5 permission denied.)";
 
 }  // namespace
 

@@ -176,9 +176,11 @@ std::string escaped(std::string_view bytes) {
   return text;
 }
 
-std::string line_of(const Json& object) {
-  return object.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+std::string text_of(const Json& value) {
+  return value.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
+
+std::string line_of(const Json& object) { return text_of(object) + "\n"; }
 
 void print_text(std::string_view text) {
   std::fwrite(text.data(), 1, text.size(), stdout);

@@ -52,7 +52,9 @@ Json counters_json(const CarrierCounters& counters);
 // Any bytes as printable ASCII: what is not, and the backslash, as \xNN.
 std::string escaped(std::string_view bytes);
 
-// One object as a line of text. Bytes that are no UTF-8, as a command line may hold, are replaced.
+// The text of a value, and one object as a line of text. Bytes that are no UTF-8, as a command line or a board's name may
+// hold, are replaced.
+std::string text_of(const Json& value);
 std::string line_of(const Json& object);
 
 // Text, or an object on a line of its own, to stdout and handed to the system at once.

@@ -119,10 +119,8 @@ void describe(const MetricBoard& each, MetricFamilies& out) {
   }
 }
 
-std::string metrics_text(const std::vector<MetricBoard>& boards) {
-  MetricFamilies families;
-  for (const MetricBoard& each : boards) describe(each, families);
-  return prometheus::TextSerializer().Serialize(families.take());
+std::string MetricFamilies::text() const {
+  return prometheus::TextSerializer().Serialize(families_);
 }
 
 }  // namespace r4::tool

@@ -34,7 +34,8 @@ class MetricFamilies {
     metric.counter.value = value;
     add(name, help, prometheus::MetricType::Counter, std::move(metric));
   }
-  std::vector<prometheus::MetricFamily> take() { return std::move(families_); }
+  // In the text format of Prometheus.
+  std::string text() const;
 
  private:
   void add(const char* name, const char* help, prometheus::MetricType type,
@@ -61,8 +62,5 @@ struct MetricBoard {
 
 // What is told of one board.
 void describe(const MetricBoard& each, MetricFamilies& out);
-
-// The same of several in the text format of Prometheus.
-std::string metrics_text(const std::vector<MetricBoard>& boards);
 
 }  // namespace r4::tool

@@ -1,28 +1,158 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 metrics: its command line.
-#include <memory>
+// r4 metrics: boards and their links for Prometheus.
+#include <fmt/format.h>
 
+#include <asio/io_context.hpp>
+#include <asio/post.hpp>
+#include <cstdint>
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
+#include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
-#include "metrics_server.hpp"
+#include "../web/server/server.hpp"
+#include "board_metrics.hpp"
+#include "r4link/async_board.hpp"
+#include "transports/can/can_interface.hpp"
+#include "transports/can/can_listener.hpp"
+#include "transports/url.hpp"
+#include "transports/url_pattern.hpp"
 
 namespace r4::tool {
 namespace {
+
+struct MetricsOptions {
+  std::vector<std::string> urls;
+  std::string listen = "127.0.0.1:9618";
+  std::vector<std::string> hosts;
+  std::optional<Milliseconds> duration;
+  std::string key;
+  bool json = false;
+};
+
+web::ServerOptions server_options(const MetricsOptions& options) {
+  web::ServerOptions server;
+  server.address = web::listen_address(options.listen);
+  server.offer = web::Offer::metrics;
+  for (const std::string& each : options.hosts) server.hosts.push_back(web::host_name(each));
+  return server;
+}
+
+// A CAN interface: how long it was busy, and for which boards.
+class BusMetrics {
+ public:
+  BusMetrics(asio::io_context& io, const CanInterface& interface)
+      : name_(interface.name), listener_(io, interface.name, rate_of(interface)) {}
+
+  void describe(MetricFamilies& out) const {
+    std::map<std::string, std::uint64_t> busy_ns;
+    for (const auto& [id, traffic] : listener_.survey().traffic()) {
+      const CanIdMeaning meaning = classify(id);
+      const bool of_a_board = id != CanSurvey::extended_ids && meaning.kind != CanIdKind::other &&
+                              meaning.kind != CanIdKind::emergency_stop;
+      busy_ns[of_a_board ? std::to_string(meaning.node) : "other"] += traffic.busy_ns;
+    }
+    for (const auto& [node, ns] : busy_ns) {
+      out.counter(
+          "r4_can_busy_seconds_total",
+          "For how long frames to and from a node took the bus; its rate is the load, 0 to 1.",
+          {{"interface", name_}, {"node", node}}, static_cast<double>(ns) / 1e9);
+    }
+  }
+
+ private:
+  // A vcan has no bit rate: it counts as the one that R4 is built for.
+  static CanBitRate rate_of(const CanInterface& interface) {
+    constexpr std::uint32_t usual = 1'000'000;
+    return {interface.bit_rate != 0 ? interface.bit_rate : usual, interface.data_bit_rate};
+  }
+
+  const std::string name_;
+  CanListener listener_;
+};
+
+class MetricsCommand final : web::ServerEvents {
+ public:
+  explicit MetricsCommand(const MetricsOptions& options)
+      : run_end_(io_), server_(server_options(options), *this) {
+    BoardOptions board_options = with_key(options.key);
+    board_options.role = BoardRole::watch;
+    board_options.session.arming = Arming::off;  // it drives nothing
+    for (const PatternUrl& each : expand_urls(options.urls)) {
+      boards_.push_back(std::make_unique<AsyncBoard>(io_, each.url, board_options));
+      described_.push_back({each.url, boards_.back().get()});
+      for (const std::string& wire : split_wires(each.url)) {
+        const Url url = Url::parse(wire);
+        if (url.scheme() == "can") interfaces_.try_emplace(can_interface_of(url));
+      }
+    }
+  }
+
+  int run(const MetricsOptions& options) {
+    for (const auto& board : boards_) board->open();
+    for (auto& [name, bus] : interfaces_) {
+      bus = std::make_unique<BusMetrics>(io_, can_interface(name));
+    }
+    server_.start();
+    run_end_.watch(options.duration);
+    const std::string url = fmt::format("http://{}/metrics", server_.address().text());
+    if (options.json) {
+      print_line({{"type", "listening"}, {"url", url}, {"boards", boards_.size()}});
+    } else {
+      fmt::print("{} of {} boards\n", url, boards_.size());
+      std::fflush(stdout);
+    }
+    io_.run();
+    return 0;
+  }
+
+ private:
+  // On the server's thread. There are no other clients than those that ask for the metrics.
+  void on_open(web::ClientId, web::Protocol) override {}
+  void on_message(web::ClientId, web::Protocol, std::string) override {}
+  void on_closed(web::ClientId, web::Protocol) override {}
+  void on_metrics() override {
+    asio::post(io_, [this] {
+      MetricFamilies families;
+      for (const MetricBoard& board : described_) describe(board, families);
+      for (const auto& [name, bus] : interfaces_) bus->describe(families);
+      server_.set_metrics(families.text());
+    });
+  }
+
+  asio::io_context io_{1};
+  RunEnd run_end_;
+  std::vector<std::unique_ptr<AsyncBoard>> boards_;
+  std::vector<MetricBoard> described_;
+  std::map<std::string, std::unique_ptr<BusMetrics>> interfaces_;
+  web::Server server_;
+};
+
+int serve_metrics(const MetricsOptions& options) { return MetricsCommand(options).run(options); }
 
 constexpr const char* metrics_footer =
     R"(Answers Prometheus at http://127.0.0.1:9618/metrics (docs/metrics.md): of each board whether it is heard,
 why its outputs are off, rate, loss, round trip, age and jitter of its states, analog inputs; of each CAN
 interface how busy it is, and for which boards. It watches, as r4 monitor does, and takes no control.
---listen 0.0.0.0:9618 answers other computers, too: anybody there may read, and nobody may do more.
+--listen 0.0.0.0:9618 answers other computers, too: anybody there may read, and nobody may do more. It is
+asked by its address; --host adds a name of this computer, or that of a proxy in front.
 
 Examples:
   r4 metrics udp://192.168.0.125
   r4 metrics 'udp://10.0.0.{1-30}?listen=0' 'can://can0?node=0-7'
+  r4 metrics serial:auto --listen 0.0.0.0:9618 --host robot.example
   curl -s http://127.0.0.1:9618/metrics | grep r4_safe
 
-Exit codes: 0 ended by --duration or Ctrl-C; 2 usage; 4 a transport or the port cannot be opened; 5 permission
-denied.)";
+Exit codes: 0 ended by --duration or Ctrl-C; 2 usage; 4 a transport or the port cannot be opened; 5
+permission denied.)";
 
 }  // namespace
 
@@ -32,7 +162,10 @@ void add_metrics(CLI::App& root, Action& chosen) {
                                            metrics_footer, options, serve_metrics);
   add_boards(*command, options->urls);
   add_text(*command, "--listen", options->listen, "where it answers (default 127.0.0.1:9618)",
-           "HOST:PORT");
+           "ADDRESS:PORT");
+  add_repeated(*command, "--host", options->hosts,
+               "a name by which it is asked, too: of this computer, or of a proxy in front",
+               "NAME");
   add_duration(*command, options->duration);
   add_key(*command, options->key);
   add_json(*command, options->json, "print where it listens as JSON");

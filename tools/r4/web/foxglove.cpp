@@ -65,7 +65,7 @@ std::string Foxglove::advertisement(std::size_t first, std::size_t end) const {
          {"schema", schema_of(topic)},
          {"schemaEncoding", "jsonschema"}});
   }
-  return Json{{"op", "advertise"}, {"channels", std::move(all)}}.dump();
+  return text_of({{"op", "advertise"}, {"channels", std::move(all)}});
 }
 
 void Foxglove::tell(ClientId client, std::string json) {
@@ -74,11 +74,10 @@ void Foxglove::tell(ClientId client, std::string json) {
 
 void Foxglove::on_open(ClientId client) {
   clients_[client];
-  tell(client, Json{{"op", "serverInfo"},
-                    {"name", "r4 web"},
-                    {"capabilities", Json::array()},
-                    {"sessionId", session_}}
-                   .dump());
+  tell(client, text_of({{"op", "serverInfo"},
+                        {"name", "r4 web"},
+                        {"capabilities", Json::array()},
+                        {"sessionId", session_}}));
   tell(client, advertisement(0, channels_.size()));
 }
 
@@ -109,7 +108,7 @@ bool Foxglove::on_message(ClientId client, const std::string& text) {
     }
     return true;
   }
-  tell(client, Json{{"op", "status"}, {"level", 1}, {"message", "r4 web is read only"}}.dump());
+  tell(client, text_of({{"op", "status"}, {"level", 1}, {"message", "r4 web is read only"}}));
   return true;
 }
 
@@ -122,7 +121,7 @@ void Foxglove::subscribe(ClientId client, Subscriptions& mine, SubscriptionId id
   if (mine.contains(id)) why = "that subscription is there already";
   if (mine.size() == channels_.size()) why = "too many subscriptions";
   if (why != nullptr) {
-    tell(client, Json{{"op", "status"}, {"level", 2}, {"message", why}}.dump());
+    tell(client, text_of({{"op", "status"}, {"level", 2}, {"message", why}}));
     return;
   }
   mine.emplace(id, &*found);
@@ -159,7 +158,7 @@ void Foxglove::name(std::size_t board, const std::string& name) {
     channels_[i].id = next_id_++;
     channels_[i].topic = topic + forms[i % topics].suffix;
   }
-  const std::string unadvertise = Json{{"op", "unadvertise"}, {"channelIds", gone}}.dump();
+  const std::string unadvertise = text_of({{"op", "unadvertise"}, {"channelIds", gone}});
   const std::string advertise = advertisement(first, first + topics);
   for (const auto& each : clients_) {
     tell(each.first, unadvertise);

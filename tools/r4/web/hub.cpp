@@ -24,8 +24,6 @@ constexpr auto command_time = 1s;
 constexpr auto arm_time = 2s;
 // A page that echoes what it has heard needs to hear something.
 constexpr auto longest_silence = 100ms;
-// Several who ask within that get the same answer.
-constexpr auto metrics_age = 200ms;
 
 std::int64_t wall_ms() {
   return std::chrono::duration_cast<std::chrono::milliseconds>(WallClock::now().time_since_epoch())
@@ -139,17 +137,13 @@ void Hub::on_closed(ClientId client, Protocol protocol) {
   asio::post(io_, [this, client] { leave(client); });
 }
 
-void Hub::on_metrics(std::uint32_t request) {
-  asio::post(io_, [this, request] {
-    if (now() - metrics_made_ > metrics_age) {
-      metrics_made_ = now();
-      std::vector<MetricBoard> boards;
-      for (const auto& each : boards_) {
-        if (each->board() != nullptr) boards.push_back({each->url(), each->board()});
-      }
-      metrics_ = metrics_text(boards);
+void Hub::on_metrics() {
+  asio::post(io_, [this] {
+    MetricFamilies families;
+    for (const auto& each : boards_) {
+      if (each->board() != nullptr) describe({each->url(), each->board()}, families);
     }
-    server_.answer_metrics(request, metrics_);
+    server_.set_metrics(families.text());
   });
 }
 
@@ -169,7 +163,7 @@ void Hub::on_datagram(std::size_t board, const Datagram& datagram) {
         Json object = Json::object();
         add_record_json(
             object, {time, static_cast<std::uint16_t>(board + 1), RecordKind::from_board, bytes});
-        foxglove_.publish(board, Foxglove::Topic::record, time.count(), object.dump());
+        foxglove_.publish(board, Foxglove::Topic::record, time.count(), text_of(object));
       });
 }
 
@@ -192,8 +186,8 @@ void Hub::greet(ClientId client) {
   pages_.insert(client);
   tell(client, hello_text(columns_, all_, client, wall_ms()));
   for (std::size_t i = 0; i < boards_.size(); ++i) tell(client, board_text(i, *boards_[i]));
-  tell_control("");
-  tell_recording();
+  tell_control(client, "");
+  tell_recording(client, recording_.told().why);
 }
 
 void Hub::leave(ClientId client) {
@@ -215,7 +209,7 @@ void Hub::obey(ClientId client, const PageRequest& request) {
       }
       return;
     case PageRequest::Kind::record:
-      return request.on ? recording_.begin() : recording_.end();
+      return record(client, request.on);
     case PageRequest::Kind::command:
     case PageRequest::Kind::arm:
     case PageRequest::Kind::clear:
@@ -232,8 +226,8 @@ void Hub::want_control(ClientId client, bool wanted) {
   }
   if (control_.is_held_by(client)) return;
   if (!control_.take(client, now())) {
-    return tell_control(control_.leaving() ? "the boards are being left; ask again"
-                                           : "another browser has control");
+    return tell_control(client, control_.leaving() ? "the boards are being left; ask again"
+                                                   : "another browser has control");
   }
   for (const auto& board : boards_) {
     try {
@@ -270,13 +264,24 @@ void Hub::end_control(const std::string& why) {
 }
 
 void Hub::tell_control(const std::string& why) {
-  for (const ClientId client : pages_) {
-    Json object{{"type", "control"}, {"holder", nullptr}};
-    if (control_.holder()) object["holder"] = *control_.holder();
-    object["you"] = control_.is_held_by(client);
-    object["why"] = why;
-    tell(client, object.dump());
+  for (const ClientId client : pages_) tell_control(client, why);
+}
+
+void Hub::tell_control(ClientId client, const std::string& why) {
+  Json object{{"type", "control"}, {"holder", nullptr}};
+  if (control_.holder()) object["holder"] = *control_.holder();
+  object["you"] = control_.is_held_by(client);
+  object["why"] = why;
+  tell(client, text_of(object));
+}
+
+// Whoever has control may record, and end any recording. Whoever has begun one may end it, too.
+void Hub::record(ClientId client, bool on) {
+  if (!control_.is_held_by(client) && (on || !recording_.is_of(client))) {
+    return tell_recording(client, "this browser has no control; take it first");
   }
+  if (on) return recording_.begin(client);
+  recording_.end();
 }
 
 // --- commands
@@ -359,12 +364,17 @@ void Hub::tell_all(std::string text, Outgoing::Kind kind) {
 }
 
 void Hub::tell_recording() {
+  for (const ClientId client : pages_) tell_recording(client, recording_.told().why);
+}
+
+void Hub::tell_recording(ClientId client, const std::string& why) {
   const WebRecording::Told& told = recording_.told();
   Json object{{"type", "recording"}, {"path", nullptr}};
   if (!told.path.empty()) object["path"] = told.path;
   object["bytes"] = told.bytes;
-  object["why"] = told.why;
-  tell_all(object.dump(-1, ' ', false, Json::error_handler_t::replace));
+  object["you"] = recording_.is_of(client);
+  object["why"] = why;
+  tell(client, text_of(object));
 }
 
 void Hub::tick() {

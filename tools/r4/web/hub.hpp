@@ -50,7 +50,7 @@ class Hub final : ServerEvents, WebBoard::Events {
   void on_open(ClientId client, Protocol protocol) override;
   void on_message(ClientId client, Protocol protocol, std::string text) override;
   void on_closed(ClientId client, Protocol protocol) override;
-  void on_metrics(std::uint32_t request) override;
+  void on_metrics() override;
 
   // On the loop.
   void on_state(std::size_t board, const ReceivedState& state, const Datagram& datagram) override;
@@ -65,6 +65,8 @@ class Hub final : ServerEvents, WebBoard::Events {
   void end_control(const std::string& why);
   void watch_holder();
   void tell_control(const std::string& why);
+  void tell_control(ClientId client, const std::string& why);
+  void record(ClientId client, bool on);
   void command(ClientId client, const PageRequest& request);
   void send(ClientId client, const PageRequest& request, AsyncBoard& board,
             const std::string& text);
@@ -76,6 +78,7 @@ class Hub final : ServerEvents, WebBoard::Events {
   void tell(ClientId client, std::string text);
   void tell_all(std::string text, Outgoing::Kind kind = Outgoing::Kind::other);
   void tell_recording();
+  void tell_recording(ClientId client, const std::string& why);
   void tick();
   void tell_states();
   void tell_board(std::size_t board);
@@ -95,8 +98,6 @@ class Hub final : ServerEvents, WebBoard::Events {
   asio::steady_timer deadline_;
   Control::Time told_states_{0};
   Control::Time next_second_{0};
-  std::string metrics_;
-  Control::Time metrics_made_{-1000};
   bool closing_ = false;
   WebRecording recording_;
   Foxglove foxglove_;

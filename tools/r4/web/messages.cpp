@@ -13,11 +13,6 @@
 namespace r4::tool::web {
 namespace {
 
-// Text that is no UTF-8 cannot come from here, but a board's name is the board's.
-std::string dump(const Json& object) {
-  return object.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
 const char* level_text(WebBoard::Level level) {
   switch (level) {
     case WebBoard::Level::info:
@@ -69,14 +64,14 @@ std::string hello_text(const Columns& columns, const std::vector<WebBoard*>& boa
   for (std::size_t i = 0; i < boards.size(); ++i) {
     list.push_back({{"board", i}, {"url", boards[i]->url()}, {"name", boards[i]->identity().name}});
   }
-  return dump({{"type", "hello"},
-               {"version", R4LINK_VERSION},
-               {"boards", std::move(list)},
-               {"fields", columns.names()},
-               {"units", columns.units()},
-               {"channels", channels_json()},
-               {"you", you},
-               {"clock_ms", clock_ms}});
+  return text_of({{"type", "hello"},
+                  {"version", R4LINK_VERSION},
+                  {"boards", std::move(list)},
+                  {"fields", columns.names()},
+                  {"units", columns.units()},
+                  {"channels", channels_json()},
+                  {"you", you},
+                  {"clock_ms", clock_ms}});
 }
 
 std::string board_text(std::size_t number, WebBoard& slot) {
@@ -89,7 +84,7 @@ std::string board_text(std::size_t number, WebBoard& slot) {
   const AsyncBoard* const board = slot.board();
   if (board == nullptr) {
     object.update({{"link", "down"}, {"why", slot.trouble()}, {"armed", false}, {"safe", ""}});
-    return dump(object);
+    return text_of(object);
   }
   const LinkStatus& link = board->link();
   const Statistics statistics = board->statistics();
@@ -107,30 +102,30 @@ std::string board_text(std::size_t number, WebBoard& slot) {
   object["round_trip_ms"] = statistics.round_trip_us / 1e3;
   object["age_ms"] = statistics.state_age_us / 1e3;
   if (Json wires = wires_json(*board); !wires.is_null()) object["wires"] = std::move(wires);
-  return dump(object);
+  return text_of(object);
 }
 
 std::string event_text(std::size_t board, WebBoard::Level level, const std::string& text,
                        std::int64_t time_ms) {
-  return dump({{"type", "event"},
-               {"time_ms", time_ms},
-               {"board", board},
-               {"level", level_text(level)},
-               {"text", text}});
+  return text_of({{"type", "event"},
+                  {"time_ms", time_ms},
+                  {"board", board},
+                  {"level", level_text(level)},
+                  {"text", text}});
 }
 
 std::string result_text(std::uint64_t request, std::size_t board, bool ok, double ms,
                         const std::string& text) {
-  return dump({{"type", "result"},
-               {"request", request},
-               {"board", board},
-               {"ok", ok},
-               {"ms", ms},
-               {"text", text}});
+  return text_of({{"type", "result"},
+                  {"request", request},
+                  {"board", board},
+                  {"ok", ok},
+                  {"ms", ms},
+                  {"text", text}});
 }
 
 std::string error_text(const std::string& text) {
-  return dump({{"type", "error"}, {"text", text}});
+  return text_of({{"type", "error"}, {"text", text}});
 }
 
 }  // namespace r4::tool::web

@@ -25,6 +25,7 @@ struct Options {
   std::vector<std::string> urls;
   std::string listen = "127.0.0.1:8080";
   bool token = false;
+  std::vector<std::string> hosts;
   std::vector<std::string> origins;
   std::string record_folder = ".";
   std::string page;
@@ -40,9 +41,14 @@ int serve_web(const Options& options) {
   for (PatternUrl& each : expand_urls(options.urls)) urls.push_back(std::move(each.url));
   web::HubOptions hub_options;
   hub_options.server.address = web::listen_address(options.listen);
+  for (const std::string& each : options.hosts) {
+    hub_options.server.hosts.push_back(web::host_name(each));
+  }
   hub_options.server.origins = options.origins;
   hub_options.server.page_folder = options.page;
-  const bool secret = options.token || !web::is_loopback(hub_options.server.address.host);
+  // A name is for other computers, though a proxy in front asks from this one.
+  const bool secret =
+      options.token || !options.hosts.empty() || !web::is_loopback(hub_options.server.address.host);
   if (secret) hub_options.server.token = web::random_token();
   hub_options.record_folder = options.record_folder;
   hub_options.board = with_key(options.key);
@@ -77,7 +83,7 @@ safe at once. Anybody who sees the page may stop them.
 
 It answers at this computer alone, to all its users; with --token to who has the address that it prints.
 --listen 0.0.0.0:8080 answers other computers, and to them always so. Nothing is encrypted: over a network
-that is not yours, use ssh -L (docs/web.md).
+that is not yours, use ssh -L, or a proxy in front, whose name --host tells (docs/web.md).
 With --device it shows what a sensor on the user's I2C bus measures (r4 devices); who takes control sets
 it up, once the board is armed.
 
@@ -87,6 +93,7 @@ Examples:
   r4 web udp://192.168.0.125
   r4 web 'can://can0?node=0-7' --record-to /var/log/robot
   r4 web serial:auto --listen 0.0.0.0:8080
+  r4 web serial:auto --host robot.example       behind a proxy with TLS
 
 Exit codes: 0 ended by --duration or Ctrl-C; 2 usage; 4 a transport or the port cannot be opened; 5 permission
 denied.)";
@@ -102,6 +109,9 @@ void add_web(CLI::App& root, Action& chosen) {
            "ADDRESS:PORT");
   add_flag(*command, "--token", options->token,
            "only who has the address that is printed; always so for other computers");
+  add_repeated(*command, "--host", options->hosts,
+               "a name by which it is asked, too: of this computer, or of a proxy in front",
+               "NAME");
   add_repeated(*command, "--origin", options->origins,
                "of a foreign page that may read by the Foxglove protocol", "URL");
   add_text(*command, "--record-to", options->record_folder,

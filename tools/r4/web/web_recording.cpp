@@ -22,9 +22,11 @@ WebRecording::WebRecording(asio::io_context& io, std::string folder,
 
 WebRecording::~WebRecording() { disk_.join(); }
 
-void WebRecording::begin() {
-  if (opening_ || recording_) return;
-  opening_ = true;
+void WebRecording::begin(Client client) {
+  if (stage_ != Stage::off) return;
+  stage_ = Stage::opening;
+  client_ = client;
+  ends_at_once_ = false;
   std::tm now{};
   const std::time_t seconds = std::time(nullptr);
   ::localtime_r(&seconds, &now);
@@ -40,23 +42,27 @@ void WebRecording::begin() {
 }
 
 void WebRecording::opened(std::shared_ptr<Recording> recording, std::string path) {
-  opening_ = false;
+  stage_ = Stage::on;
   recording_ = std::move(recording);
   told_ = {std::move(path), 0, ""};
   use_(recording_.get());
   tell_(told_);
+  if (ends_at_once_) end();
 }
 
 void WebRecording::failed(const std::string& why) {
-  opening_ = false;
+  stage_ = Stage::off;
   told_ = {"", 0, why};
   tell_(told_);
 }
 
-void WebRecording::end() { close(""); }
+void WebRecording::end() {
+  ends_at_once_ = stage_ == Stage::opening;
+  if (stage_ == Stage::on) close("");
+}
 
 void WebRecording::close(const std::string& why) {
-  if (!recording_) return;
+  stage_ = Stage::off;
   use_(nullptr);
   asio::post(disk_, [recording = std::move(recording_)] { recording->close(); });
   recording_.reset();
@@ -66,7 +72,10 @@ void WebRecording::close(const std::string& why) {
 
 void WebRecording::look() {
   if (!recording_) return;
-  if (const std::optional<Problem> problem = recording_->problem()) return close(problem->text());
+  if (const std::optional<Problem> problem = recording_->problem()) {
+    if (problem->kind != ErrorKind::data) return close(problem->text());
+    told_.why = problem->text();  // it was removed or truncated, and goes on
+  }
   asio::post(disk_, [this, path = told_.path] {
     std::error_code none;
     const std::uintmax_t size = std::filesystem::file_size(path, none);

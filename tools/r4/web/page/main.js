@@ -59,7 +59,7 @@ link.addEventListener('hello', ({detail}) => {
   }
   document.documentElement.classList.remove('stale');
   put(at('server'), `Connected to r4 web ${hello.version}`);
-  at('record').disabled = at('control').disabled = false;
+  at('control').disabled = false;
   show_alarm();
 });
 
@@ -70,8 +70,9 @@ link.addEventListener('lost-server', ({detail}) => {
     'A board that this page drove makes itself safe. Trying again …';
   put(at('server'), 'Not connected');
   document.documentElement.classList.add('stale');
-  at('record').disabled = at('control').disabled = true;
+  at('control').disabled = true;
   show_control({holder: null, you: false, why: ''});
+  show_recording({path: null, you: false, why: ''});
   boards?.forget();
   if (boards) show_alarm(); else { at('alarm').hidden = false; put(at('alarm'), server_lost); }
   if (detail.was_up) add_event('error', 'the connection to r4 web is lost');
@@ -117,6 +118,7 @@ function show_control(control) {
   document.documentElement.classList.toggle('controls', control.you);
   boards?.allow(control.you);
   outputs?.allow(control.you);
+  allow_recording();
 }
 link.addEventListener('control', ({detail}) => show_control(detail));
 link.addEventListener('released', ({detail}) => {
@@ -144,12 +146,20 @@ listen_for_stop(stop, () => link.controls);
 
 // --- recording
 
-link.addEventListener('recording', ({detail}) => {
-  const on = detail.path !== null;
+let recording_is_ours = false;
+// Recordings belong to whoever has control; whoever has begun one may end it, too.
+function allow_recording() { at('record').disabled = !link.controls && !recording_is_ours; }
+
+function show_recording(recording) {
+  const on = recording.path !== null;
+  recording_is_ours = on && recording.you;
   at('record').setAttribute('aria-pressed', String(on));
   put(at('record'), on ? 'Stop recording' : 'Record');
-  put(at('recording'), on ? `recording ${detail.path}, ${(detail.bytes / 1e6).toFixed(1)} MB` : detail.why);
-});
+  const size = on ? `recording ${recording.path}, ${(recording.bytes / 1e6).toFixed(1)} MB` : '';
+  put(at('recording'), [size, recording.why].filter(Boolean).join('; '));
+  allow_recording();
+}
+link.addEventListener('recording', ({detail}) => show_recording(detail));
 at('record').onclick = () => link.tell({type: 'record', on: at('record').getAttribute('aria-pressed') !== 'true'});
 
 // --- how fast this page is

@@ -73,6 +73,15 @@ ListenAddress listen_address(const std::string& text) {
   return address;
 }
 
+std::string host_name(const std::string& text) {
+  const std::string name = name_in(text);
+  if (name.empty() || name.find_first_of("/@? ") != std::string::npos) {
+    throw Error(ErrorKind::usage, "--host " + text, "is not a name",
+                "write it as in robot.example, or robot.example:8443");
+  }
+  return lower(text);
+}
+
 bool is_loopback(std::string_view host) {
   in_addr four{};
   return host == "localhost" || host == "::1" ||
@@ -105,11 +114,11 @@ const char* to_text(Verdict verdict) {
     case Verdict::allowed:
       return "allowed";
     case Verdict::wrong_host:
-      return "r4 web does not listen by that name; use the address that it printed";
+      return "this server does not know that name; use the address that it printed, or --host";
     case Verdict::wrong_origin:
-      return "a page of another site asks; open the page of r4 web itself";
+      return "a page of another site asks; open the page of this server itself";
     default:
-      return "the token is missing or wrong; use the address that r4 web printed, as it is";
+      return "the token is missing or wrong; use the address that was printed, as it is";
   }
 }
 
@@ -118,13 +127,24 @@ bool Access::is_ours(std::string_view host) const {
   const std::string name = name_in(host);
   if (name.empty()) return false;
   if (is_loopback(name) || name == lower(host_)) return true;
-  return (host_ == "0.0.0.0" || host_ == "::") && is_ip(name);
+  if ((host_ == "0.0.0.0" || host_ == "::") && is_ip(name)) return true;
+  return std::any_of(hosts_.begin(), hosts_.end(),
+                     [&name](const std::string& each) { return name == name_in(each); });
+}
+
+// A proxy in front may ask by another name, and its pages may come encrypted.
+bool Access::is_our_page(std::string_view origin) const {
+  return std::any_of(hosts_.begin(), hosts_.end(), [&origin](const std::string& each) {
+    return origin == "http://" + each || origin == "https://" + each;
+  });
 }
 
 Verdict Access::check(std::string_view host, std::string_view origin) const {
   if (!is_ours(host)) return Verdict::wrong_host;
   if (origin.empty()) return Verdict::allowed;
-  return lower(origin) == "http://" + lower(host) ? Verdict::allowed : Verdict::wrong_origin;
+  const std::string page = lower(origin);
+  return page == "http://" + lower(host) || is_our_page(page) ? Verdict::allowed
+                                                              : Verdict::wrong_origin;
 }
 
 Verdict Access::check_reader(std::string_view host, std::string_view origin) const {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Who may come to r4 web. A browser tells which name its user typed (Host) and which page asks (Origin); that keeps
-// away pages of other sites, also those whose name was made to point here (DNS rebinding). Beyond this computer a
-// token is needed as well.
+// Who may ask the HTTP server. A browser tells which name its user typed (Host) and which page asks (Origin); that keeps
+// away pages of other sites, also those whose name was made to point here (DNS rebinding). Where there is a token, it is
+// needed as well.
 #pragma once
 
 #include <cstdint>
@@ -19,6 +19,9 @@ struct ListenAddress {
 };
 ListenAddress listen_address(const std::string& text);
 
+// NAME or NAME:PORT as --host has it. Throws Error{usage}.
+std::string host_name(const std::string& text);
+
 // 127.0.0.1, ::1, localhost: nobody on another computer gets there.
 bool is_loopback(std::string_view host);
 
@@ -33,9 +36,15 @@ const char* to_text(Verdict verdict);
 
 class Access {
  public:
-  // An empty token: none is needed. `origins`: pages of others that may read by the Foxglove protocol.
-  Access(std::string host, std::string token, std::vector<std::string> origins)
-      : host_(std::move(host)), token_(std::move(token)), origins_(std::move(origins)) {}
+  // `hosts`: NAME or NAME:PORT by which the server is asked besides the address that it listens at, `host`: names of
+  // this computer, and that of a proxy in front. An empty token: none is needed. `origins`: pages of others that may
+  // read by the Foxglove protocol.
+  Access(std::string host, std::vector<std::string> hosts, std::string token,
+         std::vector<std::string> origins)
+      : host_(std::move(host)),
+        hosts_(std::move(hosts)),
+        token_(std::move(token)),
+        origins_(std::move(origins)) {}
 
   // Of any request. An empty origin: there is none, for no browser sends a foreign page's request without it.
   Verdict check(std::string_view host, std::string_view origin) const;
@@ -49,7 +58,10 @@ class Access {
  private:
   bool is_ours(std::string_view host) const;
 
+  bool is_our_page(std::string_view origin) const;
+
   const std::string host_;
+  const std::vector<std::string> hosts_;
   const std::string token_;
   const std::vector<std::string> origins_;
 };

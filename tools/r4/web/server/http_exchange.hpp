@@ -3,7 +3,6 @@
 #pragma once
 
 #include <algorithm>
-#include <fstream>
 #include <iterator>
 #include <optional>
 #include <utility>
@@ -48,7 +47,10 @@ class Server::Impl::Exchange : public std::enable_shared_from_this<Exchange> {
         [self = shared_from_this()](error_code error, std::size_t) { self->on_read(error); });
   }
 
+  void wait_for_metrics() { waits_for_metrics_ = true; }
+  bool waits_for_metrics() const { return waits_for_metrics_; }
   void answer_metrics(std::string text) {
+    waits_for_metrics_ = false;
     Response response = make(http::status::ok, "text/plain; version=0.0.4; charset=utf-8");
     response.set(http::field::cache_control, "no-store");
     response.body() = std::move(text);
@@ -85,7 +87,7 @@ class Server::Impl::Exchange : public std::enable_shared_from_this<Exchange> {
         std::distance(origins.first, origins.second) > 1) {
       return refuse(http::status::bad_request, "there must be one Host");
     }
-    if (websocket::is_upgrade(request)) return upgrade();
+    if (websocket::is_upgrade(request) && server_.offer != Offer::metrics) return upgrade();
     const std::string_view host = view(request[http::field::host]);
     const std::string_view origin = view(request[http::field::origin]);
     if (const Verdict verdict = server_.access.check(host, origin); verdict != Verdict::allowed) {
@@ -96,12 +98,14 @@ class Server::Impl::Exchange : public std::enable_shared_from_this<Exchange> {
     }
     const std::string_view target = view(request.target());
     const std::string_view path = target.substr(0, target.find('?'));
+    if (!path.starts_with('/')) {
+      return refuse(http::status::bad_request, "a path begins with a slash");
+    }
     if (path != "/metrics") return serve(path == "/" ? "/index.html" : path);
     const Verdict verdict =
         server_.access.check_token(view(request[http::field::authorization]), target, {});
     if (verdict != Verdict::allowed) return refuse(http::status::unauthorized, to_text(verdict));
-    stream_.expires_after(answer_time);
-    server_.events.on_metrics(number_);
+    server_.ask_metrics(*this);
   }
 
   void upgrade() {
@@ -113,8 +117,9 @@ class Server::Impl::Exchange : public std::enable_shared_from_this<Exchange> {
     const std::string_view target = view(request.target());
     const std::string_view path = target.substr(0, target.find('?'));
     const bool page = path == "/live" && asks_for(page_protocol);
-    const bool foxglove = !page && asks_for(foxglove_protocol);
-    if (!page && !foxglove) {
+    const auto foxglove =
+        std::find_if(foxglove_protocols.begin(), foxglove_protocols.end(), asks_for);
+    if (!page && foxglove == foxglove_protocols.end()) {
       return refuse(http::status::bad_request,
                     "the subprotocol r4.web.v1 is at /live, foxglove.websocket.v1 anywhere");
     }
@@ -133,25 +138,20 @@ class Server::Impl::Exchange : public std::enable_shared_from_this<Exchange> {
     stream_.expires_never();
     const ClientId id = server_.next_number++;
     const auto client = std::make_shared<Client>(server_, std::move(stream_), id,
-                                                 page ? Protocol::page : Protocol::foxglove);
+                                                 page ? Protocol::page : Protocol::foxglove,
+                                                 page ? page_protocol : *foxglove);
     server_.clients.emplace(id, client);
     client->accept(request);
     server_.exchanges.erase(number_);
   }
 
   void serve(std::string_view path) {
-    PageFile changed;
+    std::optional<PageFile> changed;
+    if (!server_.folder.empty()) changed = page_file_in(server_.folder, path);
     const auto found = server_.files.find(path);
-    const PageFile* file = found == server_.files.end() ? nullptr : &found->second;
-    if (!server_.folder.empty() && path.find('/', 1) == std::string_view::npos &&
-        !path.starts_with("/.")) {
-      std::ifstream in(server_.folder + std::string(path), std::ios::binary);
-      if (in) {
-        const std::string content{std::istreambuf_iterator<char>(in), {}};
-        changed = page_file(path, content);
-        file = &changed;
-      }
-    }
+    const PageFile* const file = changed                        ? &*changed
+                                 : found != server_.files.end() ? &found->second
+                                                                : nullptr;
     if (file == nullptr) return refuse(http::status::not_found, "there is nothing here");
     const Request& request = parser_->get();
     const bool same = view(request[http::field::if_none_match]) == file->etag;
@@ -180,7 +180,7 @@ class Server::Impl::Exchange : public std::enable_shared_from_this<Exchange> {
     Response response = make(status, "text/plain; charset=utf-8");
     response.keep_alive(false);
     if (status == http::status::method_not_allowed) response.set(http::field::allow, "GET, HEAD");
-    response.body() = std::string("r4 web: ") + why + "\n";
+    response.body() = std::string("r4: ") + why + "\n";
     answer(std::move(response));
   }
 
@@ -201,6 +201,7 @@ class Server::Impl::Exchange : public std::enable_shared_from_this<Exchange> {
 
   Impl& server_;
   const std::uint32_t number_;
+  bool waits_for_metrics_ = false;
   beast::tcp_stream stream_;
   beast::flat_buffer buffer_{most_header_bytes};
   std::optional<http::request_parser<http::empty_body>> parser_;

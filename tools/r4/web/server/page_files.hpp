@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,5 +28,8 @@ struct PageFile {
 using PageFiles = std::map<std::string, PageFile, std::less<>>;
 PageFiles page_files();
 PageFile page_file(std::string_view name, std::string_view content);
+// The regular file of that folder at such a path. None for all else: the folder itself, what is hidden in it, below or
+// beside it, and what is larger than a page's file could be.
+std::optional<PageFile> page_file_in(const std::string& folder, std::string_view path);
 
 }  // namespace r4::tool::web

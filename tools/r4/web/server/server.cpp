@@ -3,6 +3,7 @@
 
 #include <boost/asio/dispatch.hpp>
 #include <boost/asio/post.hpp>
+#include <filesystem>
 #include <utility>
 
 #include "http_exchange.hpp"
@@ -71,8 +72,28 @@ void Server::Impl::accept() {
   });
 }
 
+void Server::Impl::ask_metrics(Exchange& exchange) {
+  if (metrics_made + metrics_age > Clock::now() && !metrics.empty()) {
+    return exchange.answer_metrics(metrics);
+  }
+  exchange.wait_for_metrics();
+  if (std::exchange(metrics_asked, true)) return;
+  events.on_metrics();
+}
+
+void Server::Impl::answer_metrics() {
+  const auto all = exchanges;  // one may end meanwhile
+  for (const auto& [number, exchange] : all) {
+    if (exchange->waits_for_metrics()) exchange->answer_metrics(metrics);
+  }
+}
+
 Server::Server(const ServerOptions& options, ServerEvents& events)
     : impl_(std::make_unique<Impl>(options, events)) {
+  if (!options.page_folder.empty() && !std::filesystem::is_directory(options.page_folder)) {
+    throw Error(ErrorKind::open, "--page " + options.page_folder, "is not a folder",
+                "name the folder of the page's files, such as tools/r4/web/page");
+  }
   impl_->listen();
 }
 
@@ -124,10 +145,12 @@ void Server::drop(ClientId client, std::string why) {
   });
 }
 
-void Server::answer_metrics(std::uint32_t request, std::string text) {
-  net::post(impl_->io, [this, request, text = std::move(text)]() mutable {
-    const auto found = impl_->exchanges.find(request);
-    if (found != impl_->exchanges.end()) found->second->answer_metrics(std::move(text));
+void Server::set_metrics(std::string text) {
+  net::post(impl_->io, [this, text = std::move(text)]() mutable {
+    impl_->metrics = std::move(text);
+    impl_->metrics_made = Clock::now();
+    impl_->metrics_asked = false;
+    impl_->answer_metrics();
   });
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The HTTP and WebSocket server of r4 web, on a thread of its own. It knows nothing of boards. Whatever clients do,
-// however many they are, costs a bounded amount of memory and never waits for anything of the caller's.
+// The HTTP and WebSocket server of r4 web and r4 metrics, on a thread of its own. It knows nothing of boards. Whatever
+// clients do, however many they are, costs a bounded amount of memory and never waits for anything of the caller's.
 //
 // Each client's next message is read when the caller has dealt with the one before: so no more than one of each waits.
 #pragma once
@@ -20,9 +20,12 @@ namespace r4::tool::web {
 
 using ClientId = std::uint32_t;
 enum class Protocol : std::uint8_t { page, foxglove };
+enum class Offer : std::uint8_t { page_and_metrics, metrics };
 
 struct ServerOptions {
   ListenAddress address;
+  Offer offer = Offer::page_and_metrics;
+  std::vector<std::string> hosts;    // NAME or NAME:PORT by which it is asked besides the address
   std::string token;                 // empty: none is needed
   std::vector<std::string> origins;  // of foreign pages that may read by the Foxglove protocol
   std::string page_folder;           // the page's files; empty: those in the program
@@ -35,8 +38,8 @@ class ServerEvents {
   // A text message. The next one of that client comes after Server::read_on().
   virtual void on_message(ClientId client, Protocol protocol, std::string text) = 0;
   virtual void on_closed(ClientId client, Protocol protocol) = 0;
-  // Somebody asks for /metrics: Server::answer_metrics() with that number.
-  virtual void on_metrics(std::uint32_t request) = 0;
+  // A request for /metrics waits: Server::set_metrics(). Not called again before that, nor within `metrics_age` after it.
+  virtual void on_metrics() = 0;
 
  protected:
   ~ServerEvents() = default;
@@ -52,6 +55,9 @@ class Server {
   // A client that sends more messages is let go: at once, and then a second.
   static constexpr double message_burst = 400;
   static constexpr double messages_a_second = 200;
+
+  // All who ask for /metrics within that time get the same answer.
+  static constexpr std::chrono::milliseconds metrics_age{200};
 
   // Listens. Throws Error. Clients are served from start() on.
   Server(const ServerOptions& options, ServerEvents& events);
@@ -69,7 +75,7 @@ class Server {
   void read_on(ClientId client);
   // Tells it why, and closes its connection.
   void drop(ClientId client, std::string why);
-  void answer_metrics(std::uint32_t request, std::string text);
+  void set_metrics(std::string text);
   void run(std::function<void()> task);
 
  private:

@@ -3,6 +3,7 @@
 // boards' is that of Asio alone, and no source can include both: they meet in closures that each hands to the other.
 #pragma once
 
+#include <array>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core.hpp>
@@ -32,7 +33,9 @@ using namespace std::chrono_literals;
 
 constexpr auto header_time = 5s;
 constexpr std::string_view page_protocol = "r4.web.v1";
-constexpr std::string_view foxglove_protocol = "foxglove.websocket.v1";
+// Two names of one protocol: that of the older servers, and that of Foxglove's own SDK.
+constexpr std::array<std::string_view, 2> foxglove_protocols{"foxglove.websocket.v1",
+                                                             "foxglove.sdk.v1"};
 using Request = http::request<http::empty_body>;
 
 struct Server::Impl {
@@ -41,15 +44,19 @@ struct Server::Impl {
 
   Impl(const ServerOptions& options, ServerEvents& server_events)
       : events(server_events),
-        access(options.address.host, options.token, options.origins),
+        offer(options.offer),
+        access(options.address.host, options.hosts, options.token, options.origins),
         folder(options.page_folder),
-        files(page_files()),
+        files(offer == Offer::metrics ? PageFiles() : page_files()),
         listen_address(options.address) {}
 
   void listen();
   void accept();
+  void ask_metrics(Exchange& exchange);
+  void answer_metrics();
 
   ServerEvents& events;
+  const Offer offer;
   const Access access;
   const std::string folder;
   const PageFiles files;
@@ -60,6 +67,9 @@ struct Server::Impl {
   std::map<ClientId, std::shared_ptr<Client>> clients;
   std::map<std::uint32_t, std::shared_ptr<Exchange>> exchanges;  // the oldest first
   std::uint32_t next_number = 1;
+  std::string metrics;
+  Clock::time_point metrics_made{};
+  bool metrics_asked = false;
   std::thread thread;
 };
 

@@ -38,8 +38,10 @@ class Allowance {
 
 class Server::Impl::Client : public std::enable_shared_from_this<Client> {
  public:
-  Client(Impl& server, beast::tcp_stream&& stream, ClientId id, Protocol spoken)
-      : protocol(spoken), server_(server), id_(id), stream_(std::move(stream)) {
+  // `name`: the subprotocol by which the client asked for the protocol.
+  Client(Impl& server, beast::tcp_stream&& stream, ClientId id, Protocol spoken,
+         std::string_view name)
+      : protocol(spoken), server_(server), id_(id), name_(name), stream_(std::move(stream)) {
     stream_.set_option({header_time, idle_time, true});
     stream_.read_message_max(most_message_bytes);
     stream_.auto_fragment(false);
@@ -51,11 +53,9 @@ class Server::Impl::Client : public std::enable_shared_from_this<Client> {
   void accept(const Request& request) {
     stream_.set_option(
         websocket::stream_base::decorator([this](websocket::response_type& response) {
-          const bool page = protocol == Protocol::page;
-          const std::string_view name = page ? page_protocol : foxglove_protocol;
           response.set(http::field::server, "r4");
           response.set(http::field::sec_websocket_protocol,
-                       beast::string_view(name.data(), name.size()));
+                       beast::string_view(name_.data(), name_.size()));
         }));
     stream_.async_accept(request, [self = shared_from_this()](error_code error) {
       if (error) return self->end();
@@ -141,6 +141,7 @@ class Server::Impl::Client : public std::enable_shared_from_this<Client> {
 
   Impl& server_;
   const ClientId id_;
+  const std::string_view name_;
   websocket::stream<beast::tcp_stream> stream_;
   beast::flat_buffer buffer_{most_message_bytes + 1024};
   ClientQueue queue_;
