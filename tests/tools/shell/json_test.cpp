@@ -46,7 +46,18 @@ TEST(Json, EscapesBytesSoThatTheyCanBeTakenBack) {
 }
 
 TEST(Json, ReplacesWhatIsNoUtf8) {
-  EXPECT_EQ(line_of({{"thing", "\xff"}}), "{\"thing\":\"\xEF\xBF\xBD\"}\n");
+  EXPECT_EQ(line_of({{"thing", "\xff"}}), "{\"thing\":\"\\ufffd\"}\n");
+}
+
+TEST(Json, IsALineOfAscii) {
+  EXPECT_EQ(line_of({{"thing", "\x1b\u009b\x7f\u202eö"}}),
+            "{\"thing\":\"\\u001b\\u009b\\u007f\\u202e\\u00f6\"}\n");
+}
+
+TEST(Json, PrintsTextForPeopleLineByLine) {
+  EXPECT_EQ(printable_lines("a\nb\x1b[2J\n\nc"), "a\nb\\x1b[2J\n\nc");
+  EXPECT_EQ(printable_lines("a\n"), "a\n");
+  EXPECT_EQ(printable_lines(""), "");
 }
 
 TEST(Json, TellsOfTransfersWhereThereAreSome) {

@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
@@ -128,8 +129,8 @@ class Recorders {
     for (const auto& board : boards_) board->close();
     recording_->close();
     if (const std::optional<Problem> problem = recording_->problem()) throw Error(*problem);
-    fmt::print("{}: {} datagrams and events in {:.1f} s\n", options.file, recording_->records(),
-               took.count());
+    print_text(fmt::format("{}: {} datagrams and events in {:.1f} s\n", printable(options.file),
+                           recording_->records(), took.count()));
     if (recording_->dropped() != 0) {
       fmt::print(stderr, "r4: {} more were left out: the disk is too slow\n",
                  recording_->dropped());
