@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "../../protocol/datagram/numbers.hpp"
+#include "../../protocol/messages/site_settings.hpp"
 #include "r4link/config.hpp"
 
 namespace r4 {
@@ -146,9 +147,12 @@ LineKind read_comment(std::string_view line, RecordLine& out) {
   }
   if (line.starts_with(wire_words)) {
     line.remove_prefix(wire_words.size());
-    return read_of_wire(line, out.wire.number, out.wire.url, out.wire.name)
-               ? LineKind::wire
-               : damaged(out, "no wire is written so");
+    if (!read_of_wire(line, out.wire.number, out.wire.url, out.wire.name)) {
+      return damaged(out, "no wire is written so");
+    }
+    // Elsewhere it becomes a cell, a topic or a label: what no board is called is no name.
+    if (!is_board_id(Text(out.wire.name))) out.wire.name.clear();
+    return LineKind::wire;
   }
   if (line.starts_with(device_words)) {
     line.remove_prefix(device_words.size());

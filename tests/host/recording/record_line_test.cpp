@@ -118,18 +118,31 @@ TEST(RecordLine, TellsWhatIsNoLineOfARecording) {
 }
 
 TEST(RecordLine, OfAWireHasItsUrlAndTheBoardsName) {
-  for (const std::string& name :
-       {std::string(), std::string("left-arm"), std::string("a b\n\xff")}) {
+  for (const std::string& name : {std::string(), std::string("left-arm"), std::string("0042AF")}) {
     std::string text;
-    write_wire(text, {7, "udp:?id=a b", name});
+    write_wire(text, {7, "udp:?id=a b\n\xff", name});
     text.pop_back();
     EXPECT_EQ(text.find('\n'), std::string::npos);
     RecordLine read;
     ASSERT_TRUE(read_record_line(text, read)) << text;
     EXPECT_EQ(read.kind, LineKind::wire);
     EXPECT_EQ(read.wire.number, 7);
-    EXPECT_EQ(read.wire.url, "udp:?id=a b");
+    EXPECT_EQ(read.wire.url, "udp:?id=a b\n\xff");
     EXPECT_EQ(read.wire.name, name);
+  }
+}
+
+TEST(RecordLine, OfAWireHasNoNameThatNoBoardMayHave) {
+  for (const std::string& name :
+       {std::string("=1+cmd|calc!A0"), std::string("arm\x1b]0;owned\x07"), std::string("a b"),
+        std::string("a/b"), std::string("\xff"), std::string(65, 'n')}) {
+    std::string text;
+    write_wire(text, {7, "udp://robot", name});
+    text.pop_back();
+    RecordLine read;
+    ASSERT_TRUE(read_record_line(text, read)) << text;
+    EXPECT_EQ(read.wire.url, "udp://robot");
+    EXPECT_EQ(read.wire.name, "") << text;
   }
 }
 

@@ -43,7 +43,7 @@ std::string generated_recording(unsigned seed, int records) {
     }
     if (what == 6) native += "# a comment \xff \\x20\n";
     if (what == 7)
-      write_wire(native, {wire, "udp://10.0.0.1:2018", "arm " + std::to_string(i % 100)});
+      write_wire(native, {wire, "udp://10.0.0.1:2018", "arm-" + std::to_string(i % 100)});
     if (what == 8) native += "# r4log 1 by r4 9.9.9\n";
     const RecordKind kind = what == 9   ? RecordKind::event
                             : what < 20 ? RecordKind::to_board
