@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "../../protocol/datagram/numbers.hpp"
-#include "../../protocol/messages/site_settings.hpp"
 #include "r4link/config.hpp"
 
 namespace r4 {
@@ -218,6 +217,22 @@ bool append_unescaped(std::string& out, std::string_view text) {
     i += 3;
   }
   return true;
+}
+
+Record without_secrets(Record record, RecordRoom& room) {
+  record.bytes = record.bytes.substr(0, max_record_bytes);
+  // Of events only this one has bytes of a wire.
+  constexpr std::string_view oversize = "oversize ";
+  std::size_t before = 0;
+  if (record.kind == RecordKind::event) {
+    if (!record.bytes.starts_with(oversize)) return record;
+    before = oversize.size();
+    std::copy(oversize.begin(), oversize.end(), room.begin());
+  }
+  const Text bytes(record.bytes.substr(before));
+  const Text masked = without_secrets(bytes, room.data() + before);
+  if (masked.data() != bytes.data()) record.bytes = {room.data(), before + masked.size()};
+  return record;
 }
 
 void write_record_header(std::string& out) {

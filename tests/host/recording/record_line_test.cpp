@@ -7,6 +7,8 @@
 
 #include <string>
 
+#include "tests/support/datagrams.hpp"
+
 namespace r4 {
 namespace {
 
@@ -143,6 +145,30 @@ TEST(RecordLine, OfAWireHasNoNameThatNoBoardMayHave) {
     ASSERT_TRUE(read_record_line(text, read)) << text;
     EXPECT_EQ(read.wire.url, "udp://robot");
     EXPECT_EQ(read.wire.name, "") << text;
+  }
+}
+
+TEST(RecordLine, IsMadeOfARecordWithoutItsSecrets) {
+  const std::string setting = test::with_crc("C:password,letmein!;PNum:1;T:2;");
+  const std::string masked = test::with_crc("C:password,...;PNum:1;T:2;");
+  const struct {
+    RecordKind kind;
+    std::string bytes, kept;
+  } cases[] = {
+      {RecordKind::to_board, setting, masked},
+      {RecordKind::from_board, setting, masked},  // an echo
+      {RecordKind::event, "oversize noiseC:password,letmein!", "oversize noiseC:password,..."},
+      {RecordKind::event, "up serial:///dev/pci-0000:0C:00.0,1",
+       "up serial:///dev/pci-0000:0C:00.0,1"},
+      {RecordKind::from_board, std::string(5000, 'x'), std::string(max_record_bytes, 'x')},
+  };
+  for (const auto& c : cases) {
+    RecordRoom room;
+    const Record kept = without_secrets(Record{sample, 3, c.kind, c.bytes}, room);
+    EXPECT_EQ(kept.bytes, c.kept);
+    EXPECT_EQ(kept.time, sample);
+    EXPECT_EQ(kept.wire, 3);
+    EXPECT_EQ(kept.kind, c.kind);
   }
 }
 

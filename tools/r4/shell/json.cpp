@@ -11,6 +11,7 @@
 
 #include "host/recording/record_line.hpp"
 #include "protocol/messages/message.hpp"
+#include "protocol/messages/settings.hpp"
 #include "transports/framing/can/packed_form.hpp"
 
 namespace r4::tool {
@@ -109,6 +110,9 @@ bool add_datagram_json(Json& object, const std::uint8_t* bytes, std::size_t size
   const ReadResult result = read_datagram(text, datagram);
   object["ok"] = static_cast<bool>(result);
   if (packed) object["packed"] = size;
+  std::vector<char> room(text.size() + masking_room);
+  const Text masked = without_secrets(text, room.data());
+  if (result && masked.data() != text.data()) (void)read_datagram(masked, datagram);
   if (result) {
     object["type"] = to_text(kind_of(datagram));
     object["pnum"] = datagram.has_pnum() ? Json(datagram.pnum()) : Json();
@@ -117,7 +121,7 @@ bool add_datagram_json(Json& object, const std::uint8_t* bytes, std::size_t size
   } else {
     object.update(bad_datagram_json(result));
   }
-  object["text"] = escaped(view(text));
+  object["text"] = escaped(view(masked));
   return static_cast<bool>(result);
 }
 
