@@ -2,7 +2,10 @@
 #include "async_board_impl.hpp"
 
 #include <algorithm>
+#include <array>
 #include <string>
+
+#include "../protocol/messages/settings.hpp"
 
 namespace r4 {
 
@@ -330,7 +333,9 @@ void AsyncBoard::Impl::on_carrier_event(BoardWire& wire, const CarrierEvent& eve
 void AsyncBoard::Impl::on_overheard(BoardWire& wire, std::string_view bytes) {
   enter(Completion::How::dispatch, [&] {
     wire.tap.on_sent(bytes);
-    call(overheard_callbacks, bytes);
+    std::array<char, max_datagram + masking_room> room;
+    const Text shown = without_secrets(Text(bytes.substr(0, max_datagram)), room.data());
+    call(overheard_callbacks, std::string_view(shown.data(), shown.size()));
   });
 }
 

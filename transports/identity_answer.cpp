@@ -11,7 +11,7 @@
 namespace r4 {
 namespace {
 
-constexpr std::size_t longest_id = 64;
+constexpr std::size_t longest_text = 64;
 
 }  // namespace
 
@@ -27,9 +27,8 @@ std::optional<IdentityAnswer> read_identity_answer(Text bytes) {
   Datagram datagram;
   Identity identity;
   if (!read_datagram(bytes, datagram) || kind_of(datagram) != MessageKind::identity ||
-      !read_identity(datagram, identity) || identity.board_id.empty() ||
-      identity.board_id.size() > longest_id || identity.firmware.size() > longest_id ||
-      identity.capabilities.size() > longest_id) {
+      !read_identity(datagram, identity) || identity.firmware.size() > longest_text ||
+      identity.capabilities.size() > longest_text) {
     return std::nullopt;
   }
   const auto str = [](Text text) { return std::string(text.data(), text.size()); };

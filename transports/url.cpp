@@ -67,10 +67,7 @@ std::string parse_host(std::string_view url, std::string_view host, bool bracket
 }  // namespace
 
 Url Url::parse(std::string_view text) {
-  const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; };
-  if (std::any_of(text.begin(), text.end(), is_control)) {
-    refuse("the URL", "it has control characters in it");
-  }
+  if (printable(text) != text) refuse(text, "it has control characters in it");
   const std::size_t colon = text.find(':');
   std::string_view scheme = text.substr(0, colon);
   const auto in_scheme = [](char c) { return is_letter(c) || is_digit(c); };

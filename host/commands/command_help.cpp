@@ -122,18 +122,10 @@ std::string text_of(const Setpoints& group) {
 }
 
 std::string shown(std::string_view text) {
-  if (!SettingText::is_one(text)) return std::string(text);
-  const SettingText setting(text);
-  const bool is_public = setting.is_known() && !is_secret_setting(Text(setting.name));
-  if (setting.value.empty() || is_public) return std::string(text);
-  // Of a key, which one it is, and that it is taken away.
-  std::uint8_t id = 0;
-  Text digits;
-  const bool has_id = Text(setting.name) == key_setting &&
-                      split_key(Text(setting.value), id, digits) == Refusal::none;
-  if (has_id && digits == Text("off")) return std::string(text);
-  return std::string(text.substr(0, text.size() - setting.value.size())) +
-         (has_id ? std::to_string(id) + ":..." : "...");
+  const Text secret = secret_in(text);
+  if (secret.empty()) return printable(text);
+  const auto before = static_cast<std::size_t>(secret.begin() - text.data());
+  return printable(text.substr(0, before)) + "...";
 }
 
 std::string shown(const Command& command) { return shown(text_of(command)); }

@@ -31,8 +31,8 @@ std::string text_of(const Command& command);
 // "O:358,1,1;O:358,1,2"
 std::string text_of(const Setpoints& group);
 
-// The same for people and logs to see, without what is secret: "C:password,...", "C:key,1:...". The
-// value of a setting that we do not know may be meant for one that is.
+// The same for people and logs to see: printable(), and without the secret that secret_in() finds:
+// "C:password,...", "C:key,1:...".
 std::string shown(const Command& command);
 std::string shown(std::string_view text);
 

@@ -146,9 +146,12 @@ LineKind read_comment(std::string_view line, RecordLine& out) {
   }
   if (line.starts_with(wire_words)) {
     line.remove_prefix(wire_words.size());
-    return read_of_wire(line, out.wire.number, out.wire.url, out.wire.name)
-               ? LineKind::wire
-               : damaged(out, "no wire is written so");
+    if (!read_of_wire(line, out.wire.number, out.wire.url, out.wire.name)) {
+      return damaged(out, "no wire is written so");
+    }
+    // Elsewhere it becomes a cell, a topic or a label: what no board is called is no name.
+    if (!is_board_id(Text(out.wire.name))) out.wire.name.clear();
+    return LineKind::wire;
   }
   if (line.starts_with(device_words)) {
     line.remove_prefix(device_words.size());
@@ -214,6 +217,22 @@ bool append_unescaped(std::string& out, std::string_view text) {
     i += 3;
   }
   return true;
+}
+
+Record without_secrets(Record record, RecordRoom& room) {
+  record.bytes = record.bytes.substr(0, max_record_bytes);
+  // Of events only this one has bytes of a wire.
+  constexpr std::string_view oversize = "oversize ";
+  std::size_t before = 0;
+  if (record.kind == RecordKind::event) {
+    if (!record.bytes.starts_with(oversize)) return record;
+    before = oversize.size();
+    std::copy(oversize.begin(), oversize.end(), room.begin());
+  }
+  const Text bytes(record.bytes.substr(before));
+  const Text masked = without_secrets(bytes, room.data() + before);
+  if (masked.data() != bytes.data()) record.bytes = {room.data(), before + masked.size()};
+  return record;
 }
 
 void write_record_header(std::string& out) {

@@ -10,12 +10,14 @@
 // Any bytes come back as they were: what is not printable ASCII, and a backslash, stands as \xNN.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
 
+#include "../../protocol/messages/settings.hpp"
 #include "record.hpp"
 
 namespace r4 {
@@ -25,6 +27,11 @@ constexpr std::uint32_t record_version = 1;
 constexpr std::size_t max_record_bytes = 4096;
 // The longest line there is, without its end: all of it escaped, and its time and wire before it.
 constexpr std::size_t max_record_line = 4 * max_record_bytes + 64;
+
+// A record as it may be kept: its datagram, or what begins one in an event `oversize`, is
+// without_secrets(). It has at most max_record_bytes, which may be in `room`.
+using RecordRoom = std::array<char, max_record_bytes + masking_room>;
+Record without_secrets(Record record, RecordRoom& room);
 
 // --- writing; each appends one line with its end
 

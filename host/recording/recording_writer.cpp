@@ -73,7 +73,7 @@ void RecordingWriter::append(const Record& record) {
     begun_ = record.time;
     write_beginning(text_, record.time);
   }
-  write_record(text_, record);
+  write_record(text_, without_secrets(record, room_));
   if (text_.size() >= most_text) write_out(false);
 }
 

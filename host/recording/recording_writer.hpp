@@ -12,6 +12,7 @@
 #include "r4link/error.hpp"
 #include "r4link/recording.hpp"
 #include "record.hpp"
+#include "record_line.hpp"
 #include "recording_file.hpp"
 #include "recording_parts.hpp"
 #include "zstd_stream.hpp"
@@ -27,7 +28,7 @@ class RecordingWriter {
   void declare(const RecordedWire& wire);
   // A device: in this file, and in those that follow; instead of another at that place of that wire.
   void declare(const RecordedDevice& device);
-  // Each may write, and throws Error when that cannot be done.
+  // Without the secrets in it. Each may write, and throws Error when that cannot be done.
   void append(const Record& record);
   // What was appended is on the disk when this returns. Throws Error. If others have moved, removed or truncated the
   // file, it is begun anew first.
@@ -53,6 +54,7 @@ class RecordingWriter {
   std::optional<ZstdWriter> zstd_;
   std::vector<RecordedWire> wires_;
   std::vector<RecordedDevice> devices_;
+  RecordRoom room_;            // used again and again
   std::string text_;           // not written yet
   std::string compressed_;     // used again and again
   std::size_t frame_ = 0;      // text in the frame so far

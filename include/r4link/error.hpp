@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "config.hpp"
@@ -39,6 +40,13 @@ enum class Outcome : std::uint8_t {
 // "confirmed", "refused", "timed out" …
 R4LINK_API const char* to_text(Outcome outcome);
 
+// Text of others (a name, a host name, a line of a file) as one line that a terminal or a log may
+// show. What would move the cursor, colour, hide or reorder text is written as \xNN, a byte each:
+// control characters, also line feed and tab; what is not UTF-8; characters without a width, or with
+// a direction of their own. Everything else stays, so that printable() of such a line changes
+// nothing.
+R4LINK_API std::string printable(std::string_view text);
+
 // A problem in words: "/dev/ttyACM0: permission denied; add yourself to the group dialout: …".
 struct Problem {
   ErrorKind kind = ErrorKind::open;
@@ -50,7 +58,8 @@ struct Problem {
   Refusal refusal = Refusal::none;  // for Outcome::refused
   std::uint8_t at = 0;              // which command of a group, from 1; 0: none in particular
 
-  std::string text() const { return thing + ": " + reason + (fix.empty() ? "" : "; " + fix); }
+  // "thing: reason; fix", printable: one line, whatever the parts hold.
+  R4LINK_API std::string text() const;
 };
 
 class R4LINK_API Error : public std::runtime_error {

@@ -128,7 +128,10 @@ void write_nack(DatagramWriter& writer, const Nack& nack) {
 
 bool read_identity(const Datagram& datagram, Identity& out) {
   Text values[4];
-  if (datagram.find("I").split(values, 4) != 4 || values[0] != board_word) return false;
+  if (datagram.find("I").split(values, 4) != 4 || values[0] != board_word ||
+      !is_board_id(values[2])) {
+    return false;
+  }
   out.firmware = values[1];
   out.board_id = values[2];
   out.capabilities = values[3];

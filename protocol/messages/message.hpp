@@ -64,7 +64,7 @@ void write_nack(DatagramWriter& writer, const Nack& nack);
 // them passes over them, and not every board tells them.
 struct Identity {
   Text firmware;       // "0.1.0"
-  Text board_id;       // serial number, unique
+  Text board_id;       // serial number, unique; is_board_id()
   Text capabilities;   // words joined by '+': "udp+serial+leave"
   Text name = Text();  // that its owner gave it (`C:name`); empty: none
   bool has_busy = false;

@@ -213,10 +213,14 @@ bool operator==(const SiteSettings& a, const SiteSettings& b) {
 }
 
 bool is_board_name(Text text) {
+  return is_board_id(text) && text.size() <= board_name_max && text != off_word;
+}
+
+bool is_board_id(Text text) {
   for (const char c : text) {
     if (!is_in_board_name(c)) return false;
   }
-  return !text.empty() && text.size() <= board_name_max && text != off_word;
+  return !text.empty() && text.size() <= board_id_max;
 }
 
 bool is_site_setting(Text key) { return index_of(key) >= 0; }

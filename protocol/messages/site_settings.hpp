@@ -57,11 +57,14 @@ bool operator==(const SiteSettings& a, const SiteSettings& b);
 
 constexpr Text key_setting("key");
 
-// May a board be called so?
+// True if the owner of a board may call it so: 1 to 31 letters, digits, _ and -.
 bool is_board_name(Text text);
+// The same of the id that it has of itself: 1 to 64 of them.
+constexpr std::size_t board_id_max = 64;
+bool is_board_id(Text text);
 
 bool is_site_setting(Text key);
-// Is it one whose value is for nobody to see: `password`, `key`?
+// True for `password` and `key`, whose values are for the board alone.
 bool is_secret_setting(Text key);
 // As set() of settings.hpp.
 Refusal set(SiteSettings& settings, Text key, Text value);

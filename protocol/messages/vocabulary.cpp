@@ -23,4 +23,18 @@ const char* to_text(SafeReason reason) {
   return "unknown";
 }
 
+const char* to_text(I2cOutcome outcome) {
+  switch (outcome) {
+    case I2cOutcome::done:
+      return "done";
+    case I2cOutcome::no_acknowledge:
+      return "no acknowledge";
+    case I2cOutcome::bus_stuck:
+      return "bus stuck";
+    case I2cOutcome::cancelled:
+      return "cancelled";
+  }
+  return "unknown";
+}
+
 }  // namespace r4

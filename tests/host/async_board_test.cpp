@@ -21,6 +21,7 @@
 #include "host/standard_registry.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/datagrams.hpp"
 #include "transports/memory_carrier.hpp"
 #include "transports/registry.hpp"
 
@@ -63,6 +64,38 @@ TEST_F(AsyncBoardTest, SendsItsFirstHeartbeatWhenItOpens) {
   ASSERT_TRUE(run_until(io, [&] { return !listener.heard.empty(); }));
   EXPECT_EQ(listener.heard[0].substr(0, 9), "H:ROS2-R4");
   board_end->close();
+}
+
+// A wire on which another host is heard.
+class Overhearing final : public Carrier {
+ public:
+  void open(Handler& handler) override { handler_ = &handler; }
+  void close() noexcept override { handler_ = nullptr; }
+  SendResult send(std::string_view, Priority, Peer) override { return SendResult::sent; }
+  bool up() const override { return handler_ != nullptr; }
+  std::size_t max_size() const override { return max_datagram; }
+  const std::string& name() const override { return name_; }
+  const CarrierCounters& counters() const override { return counters_; }
+  void overhear(std::string_view bytes) { handler_->on_overheard(bytes); }
+
+ private:
+  Handler* handler_ = nullptr;
+  const std::string name_ = "memory:";
+  CarrierCounters counters_;
+};
+
+TEST_F(AsyncBoardTest, TellsNoSecretOfAnotherHost) {
+  auto wire = std::make_unique<Overhearing>();
+  Overhearing& other = *wire;
+  AsyncBoard watching(io, std::move(wire), at_will());
+  std::vector<std::string> heard;
+  const auto subscription =
+      watching.on_overheard([&](std::string_view bytes) { heard.emplace_back(bytes); });
+  watching.open();
+  other.overhear(with_crc("C:key,1:5a5a;PNum:1;T:2;"));
+  other.overhear(with_crc("O:358,1,1;PNum:2;T:3;"));
+  EXPECT_EQ(heard, (std::vector<std::string>{with_crc("C:key,1:...;PNum:1;T:2;"),
+                                             with_crc("O:358,1,1;PNum:2;T:3;")}));
 }
 
 // Hands over what another carrier receives, and never tells that it is drained.

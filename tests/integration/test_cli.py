@@ -118,7 +118,7 @@ NO_BOARD = 'udp://127.0.0.1:9?listen=0'
     (['sim', '--link', 'cut=1s'], USAGE, '^r4: cut=1s: does not say for how long'),
     (['sim', '--link', 'speed=1'], USAGE, '^r4: speed=1: says nothing of a link'),
     (['sim', '--link', ''], USAGE, '--link|says nothing of a link'),
-    (['sim', '--board-id', 'a,b'], USAGE, 'cannot be sent'),
+    (['sim', '--board-id', '=1+1'], USAGE, 'is not a valid board id'),
     (['sim', '--board-id', 'x' * 65], USAGE, 'use 1 to 64'),
     (['monitor', 'udp://255.255.255.255'], USAGE, 'the address of many'),
     (['monitor', 'udp://224.0.0.1'], USAGE, 'the address of many'),

@@ -298,6 +298,21 @@ def test_info_reads_a_pipe():
     assert result.stdout.startswith('standard input\n')
 
 
+def test_what_others_wrote_moves_no_terminal(tmp_path):
+    path = tmp_path / 'others.r4log'
+    path.write_text('# r4log 1 by r4 0.1.0\n# wire 1 udp://x\\x1b]0;owned\\x07\\x0afake arm\\x1b]0;owned\\x07\n'
+                    '1795468293.000000 1< garbage\\x1b]0;owned\\x07\n'
+                    '1795468293.000001 1! down \\x1b]0;owned\\x07\n')
+    for arguments in (('info', path), ('info', '--json', path), ('replay', path, 'udp://127.0.0.1:0', '--step'),
+                      ('convert', path, '-o', tmp_path / 'o.csv'), ('monitor', f'replay:{path}', '--duration', '1')):
+        told = run(*map(str, arguments), stdin='\n\n')
+        shown = told.stdout + told.stderr
+        assert shown.replace('\n', '').isprintable(), (arguments, shown)
+        assert '\nfake' not in shown
+    assert r'garbage\x1b]0;owned\x07' in run('replay', str(path), 'udp://127.0.0.1:0', '--step', stdin='\n\n').stdout
+    assert (tmp_path / 'o.csv').read_text().replace('\n', '').isprintable()
+
+
 @pytest.mark.parametrize('make, code, message', [
     (lambda path: path.write_bytes(b'\0' * 100_000), DATA_BAD, 'no recording'),
     (lambda path: path.write_bytes(b''), DATA_BAD, 'no recording'),

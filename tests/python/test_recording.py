@@ -79,6 +79,24 @@ def test_fields_that_come_later_two_boards_and_damage(tmp_path):
         log['right-arm']  # pylint: disable=pointless-statement
 
 
+def test_an_error_shows_bytes_of_a_file_that_are_no_text(tmp_path):
+    path = tmp_path / 'later.r4log'
+    path.write_bytes(b'# r4log 9 by r4 \xff\x1b]0;owned\x07 \xe2\x80\xae\n')
+    with pytest.raises(r4link.DataError) as error:
+        r4link.read(path)
+    assert str(error.value).isprintable() and error.value.reason.isprintable()
+    assert r'by r4 \xff\x1b]0;owned\x07 \xe2\x80\xae' in str(error.value)
+
+
+def test_texts_of_a_recording_are_shown_whatever_bytes_they_are(tmp_path):
+    path = tmp_path / 'others.r4log'
+    path.write_text('# r4log 1 by r4 0.1.0\n# wire 1 udp://\\xff\\x1b]0;owned arm\\xff\n'
+                    '1795468293.000000 1! down \\xff\\x1b]0;owned\n')
+    [board] = r4link.read(path).boards
+    assert (board.url, board.name) == (r'udp://\xff\x1b]0;owned', '')
+    assert [each.words for each in board.events] == [r'down \xff\x1b]0;owned']
+
+
 def device(place, text, wire=1):
     escaped = text.replace('\\', '\\x5c').replace('\n', '\\x0a')
     return f'# device {wire} {place} {escaped}\n'

@@ -92,6 +92,8 @@ const std::vector<Refused> refused = {
     {"pty:/tmp/%00", "'%00' is not a percent-encoded"},
     {"pty:/tmp?x=%g0", "'%g0' is not a percent-encoded"},
     {"pty:/tmp\nx", "control characters"},
+    {"pty:/tmp/\u202Ex", "control characters"},
+    {"pty:/tmp/\xff", "control characters"},
     {std::string("pty:/tmp\0x", 10), "control characters"},
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "port_list.hpp"
 
+#include <fmt/core.h>
 #include <libserialport.h>
 
 #include <algorithm>
@@ -36,7 +37,15 @@ std::vector<SerialPort> list_serial_ports() {
 
 std::string url_of(const SerialPort& port) {
   if (port.serial_number.empty()) return "serial://" + port.path;
-  return "serial:?sn=" + port.serial_number;
+  // Any text may be a serial number: what a URL, a shell or a terminal would take for its own is
+  // percent-encoded.
+  std::string url = "serial:?sn=";
+  for (const char c : port.serial_number) {
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                       c == '_' || c == '-' || c == '.' || c == ':';
+    url += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  }
+  return url;
 }
 
 }  // namespace r4

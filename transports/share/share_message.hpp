@@ -11,7 +11,8 @@
 //     down      d KIND THING 0 REASON 0 FIX     it is down
 //     warning   ! KIND THING 0 REASON 0 FIX
 //     received  r DATAGRAM                      from the board
-//     sent      s DATAGRAM                      to the board, by the holder or for another
+//     sent      s DATAGRAM                      to the board, by the holder or for another, and
+//                                               without secrets
 //     oversize  o BEGINNING                     from the board: too long for a datagram
 //     stop      S DATAGRAM                      to the holder: an E:STOP for the board
 //     alive     a                               to the holder, who says it back: it does not hang

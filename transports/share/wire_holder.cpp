@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "../../protocol/messages/command_field.hpp"
+#include "../../protocol/messages/settings.hpp"
 #include "../send_queue.hpp"
 #include "../writable_wait.hpp"
 #include "r4link/datagram.hpp"
@@ -243,6 +244,12 @@ std::size_t WireHolder::sharers() const {
 }
 
 void WireHolder::tell(Kind kind, std::string_view text, Priority priority) {
+  if (sharers_.empty()) return;
+  std::array<char, max_datagram + masking_room> room;
+  if (kind == Kind::sent || kind == Kind::received || kind == Kind::oversize) {
+    const Text masked = without_secrets(Text(text.substr(0, max_datagram)), room.data());
+    text = {masked.data(), std::min(masked.size(), max_datagram)};
+  }
   for (const auto& sharer : sharers_) {
     if (sharer->is(Sharer::Standing::welcome)) sharer->tell(kind, text, priority);
   }

@@ -73,7 +73,7 @@ class WireHolder {
   bool holds() const { return !wire_.name.empty(); }
   // Those that hear what is told.
   std::size_t sharers() const;
-  // To all who share it. `state`: only the newest waits for who is slow.
+  // To all who share it, without the secrets in it. `state`: only the newest waits for who is slow.
   void tell(ShareMessage::Kind kind, std::string_view text, Priority priority = Priority::normal);
 
  private:

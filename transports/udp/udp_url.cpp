@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "udp_url.hpp"
 
+#include "../../protocol/messages/site_settings.hpp"
 #include "r4link/error.hpp"
 
 namespace r4 {
 namespace {
-
-constexpr std::size_t longest_id = 64;
 
 bool is_search(const Url& url, Role role) {
   return role == Role::host && url.host().empty() && (url.path() == "auto" || url.get("id"));
@@ -43,7 +42,7 @@ UdpUrl::UdpUrl(const Url& url, Role role)
   if (search) {
     const bool by_id = url.get("id").has_value();
     url.allow_only(by_id ? "id port listen" : "port listen");
-    if (by_id && (!url.path().empty() || called.empty() || called.size() > longest_id)) {
+    if (by_id && (!url.path().empty() || !is_board_id(Text(called)))) {
       throw Error(ErrorKind::usage, text, "it does not name one board",
                   "write udp:auto, or udp:?id=NAME with a name or id that r4 list shows");
     }

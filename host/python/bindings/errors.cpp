@@ -11,9 +11,9 @@ void raise(const Error& error) {
   const Problem& problem = error.problem();
   const py::object made =
       py::module_::import("r4link.errors")
-          .attr("error_of")(static_cast<int>(problem.kind), problem.thing, problem.reason,
-                            problem.fix, to_text(problem.outcome), to_str(name_of(problem.refusal)),
-                            problem.at);
+          .attr("error_of")(static_cast<int>(problem.kind), printable(problem.thing),
+                            printable(problem.reason), printable(problem.fix),
+                            to_text(problem.outcome), to_str(name_of(problem.refusal)), problem.at);
   PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(made.ptr())), made.ptr());
 }
 

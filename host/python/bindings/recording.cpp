@@ -83,7 +83,9 @@ class Columns final : public RecordingVisitor {
  public:
   explicit Columns(bool datagrams) : with_datagrams_(datagrams) {}
 
-  void on_wire(int wire, const std::string& url, const std::string& name) override {
+  // Texts of the file are printable(): any bytes may be there, and a str of Python has none.
+  void on_wire(int wire, const std::string& told, const std::string& name) override {
+    const std::string url = printable(told);
     const auto known = std::find_if(boards_.begin(), boards_.end(),
                                     [&url](const RecordedBoard& each) { return each.url == url; });
     const auto index = static_cast<std::size_t>(known - boards_.begin());
@@ -152,9 +154,9 @@ class Columns final : public RecordingVisitor {
     if (with_datagrams_) board.datagrams.emplace_back(at.count(), from_board, bytes);
   }
   void on_event(int wire, Time at, std::string_view words) override {
-    (wire == 0 ? events_ : of(wire).events).emplace_back(at.count(), words);
+    (wire == 0 ? events_ : of(wire).events).emplace_back(at.count(), printable(words));
   }
-  void on_damage(const std::string& words) override { damage_.push_back(words); }
+  void on_damage(const std::string& words) override { damage_.push_back(printable(words)); }
 
   py::tuple take();
 

@@ -200,9 +200,9 @@ void bind_values(py::module_& module) {
       .has("ups", &CarrierCounters::ups);
   Record<CarrierEvent>(module, "Event")
       .has("kind", [](const CarrierEvent& event) { return to_text(event.kind); })
-      .has("thing", [](const CarrierEvent& event) { return event.problem.thing; })
-      .has("reason", [](const CarrierEvent& event) { return event.problem.reason; })
-      .has("fix", [](const CarrierEvent& event) { return event.problem.fix; });
+      .has("thing", [](const CarrierEvent& event) { return printable(event.problem.thing); })
+      .has("reason", [](const CarrierEvent& event) { return printable(event.problem.reason); })
+      .has("fix", [](const CarrierEvent& event) { return printable(event.problem.fix); });
   Record<RefusedPost>(module, "RefusedPost")
       .has("refusal", [](const RefusedPost& post) { return to_str(name_of(post.code)); })
       .has("why", [](const RefusedPost& post) { return to_text(post.why); })

@@ -7,6 +7,8 @@
 
 #include <string>
 
+#include "tests/support/datagrams.hpp"
+
 namespace r4 {
 namespace {
 
@@ -118,18 +120,55 @@ TEST(RecordLine, TellsWhatIsNoLineOfARecording) {
 }
 
 TEST(RecordLine, OfAWireHasItsUrlAndTheBoardsName) {
-  for (const std::string& name :
-       {std::string(), std::string("left-arm"), std::string("a b\n\xff")}) {
+  for (const std::string& name : {std::string(), std::string("left-arm"), std::string("0042AF")}) {
     std::string text;
-    write_wire(text, {7, "udp:?id=a b", name});
+    write_wire(text, {7, "udp:?id=a b\n\xff", name});
     text.pop_back();
     EXPECT_EQ(text.find('\n'), std::string::npos);
     RecordLine read;
     ASSERT_TRUE(read_record_line(text, read)) << text;
     EXPECT_EQ(read.kind, LineKind::wire);
     EXPECT_EQ(read.wire.number, 7);
-    EXPECT_EQ(read.wire.url, "udp:?id=a b");
+    EXPECT_EQ(read.wire.url, "udp:?id=a b\n\xff");
     EXPECT_EQ(read.wire.name, name);
+  }
+}
+
+TEST(RecordLine, OfAWireHasNoNameThatNoBoardMayHave) {
+  for (const std::string& name :
+       {std::string("=1+cmd|calc!A0"), std::string("arm\x1b]0;owned\x07"), std::string("a b"),
+        std::string("a/b"), std::string("\xff"), std::string(65, 'n')}) {
+    std::string text;
+    write_wire(text, {7, "udp://robot", name});
+    text.pop_back();
+    RecordLine read;
+    ASSERT_TRUE(read_record_line(text, read)) << text;
+    EXPECT_EQ(read.wire.url, "udp://robot");
+    EXPECT_EQ(read.wire.name, "") << text;
+  }
+}
+
+TEST(RecordLine, IsMadeOfARecordWithoutItsSecrets) {
+  const std::string setting = test::with_crc("C:password,letmein!;PNum:1;T:2;");
+  const std::string masked = test::with_crc("C:password,...;PNum:1;T:2;");
+  const struct {
+    RecordKind kind;
+    std::string bytes, kept;
+  } cases[] = {
+      {RecordKind::to_board, setting, masked},
+      {RecordKind::from_board, setting, masked},  // an echo
+      {RecordKind::event, "oversize noiseC:password,letmein!", "oversize noiseC:password,..."},
+      {RecordKind::event, "up serial:///dev/pci-0000:0C:00.0,1",
+       "up serial:///dev/pci-0000:0C:00.0,1"},
+      {RecordKind::from_board, std::string(5000, 'x'), std::string(max_record_bytes, 'x')},
+  };
+  for (const auto& c : cases) {
+    RecordRoom room;
+    const Record kept = without_secrets(Record{sample, 3, c.kind, c.bytes}, room);
+    EXPECT_EQ(kept.bytes, c.kept);
+    EXPECT_EQ(kept.time, sample);
+    EXPECT_EQ(kept.wire, 3);
+    EXPECT_EQ(kept.kind, c.kind);
   }
 }
 

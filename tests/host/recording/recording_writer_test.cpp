@@ -13,6 +13,7 @@
 #include <string>
 
 #include "heard.hpp"
+#include "tests/support/datagrams.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::test {
@@ -58,6 +59,19 @@ struct RecordingWriterTest : testing::Test {
   int number = 0;
   std::string all;  // the lines of what was appended
 };
+
+TEST_F(RecordingWriterTest, WritesNoSecretOfAnyHost) {
+  for (const char* name : {"a.r4log", "a.r4log.zst"}) {
+    {
+      RecordingWriter writer(path(name), {});
+      writer.append({Time{1795468293000000}, 1, RecordKind::to_board,
+                     with_crc("C:password,letmein!;PNum:1;T:2;")});
+      writer.close();
+    }
+    const std::string records = heard_in(content(name)).records;
+    EXPECT_TRUE(records.ends_with("> " + with_crc("C:password,...;PNum:1;T:2;") + "\n")) << records;
+  }
+}
 
 TEST_F(RecordingWriterTest, WhatWasFlushedIsInTheFile) {
   for (const char* const name : {"a.r4log", "a.r4log.zst"}) {

@@ -5,6 +5,7 @@
 
 #include <string>
 
+#include "protocol/messages/site_settings.hpp"
 #include "tests/support/datagrams.hpp"
 
 namespace r4 {
@@ -268,12 +269,21 @@ TEST(Message, AnIdentityWhoseOtherFieldsCannotBeReadIsOneWithoutThem) {
 }
 
 TEST(Message, OtherIdentitiesAreNotTaken) {
-  for (const char* fields : {"A:1;", "I:;", "I:R4;", "I:R4,a,b;", "I:R5,a,b,c;", "I:R4,a,b,c,d;"}) {
+  const std::string longest(board_id_max, 'n');
+  for (const std::string& fields :
+       {std::string("A:1;"), std::string("I:;"), std::string("I:R4;"), std::string("I:R4,a,b;"),
+        std::string("I:R5,a,b,c;"), std::string("I:R4,a,b,c,d;"), std::string("I:R4,a,,c;"),
+        std::string("I:R4,a,=1+cmd|calc!A0,c;"), std::string("I:R4,a,<b>,c;"),
+        std::string("I:R4,a,b b,c;"), "I:R4,a," + longest + "n,c;"}) {
     Identity identity;
     identity.firmware = "kept";
     EXPECT_FALSE(read_identity(Read(fields).datagram, identity)) << fields;
     EXPECT_EQ(str(identity.firmware), "kept") << fields;
   }
+  const Read read("I:R4,a," + longest + ",c;");
+  Identity identity;
+  EXPECT_TRUE(read_identity(read.datagram, identity));
+  EXPECT_EQ(str(identity.board_id), longest);
 }
 
 }  // namespace

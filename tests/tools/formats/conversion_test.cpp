@@ -17,6 +17,28 @@ TEST(Conversion, GivesANativeRecordingAsItWas) {
   }
 }
 
+// Of whichever program the recording is, also where it has no line that would say so.
+TEST(Conversion, CopiesNoSecretIntoAnotherFile) {
+  std::string native;
+  write_record_header(native);
+  write_wire(native, {1, "can://can0?node=1", "arm"});
+  for (const char* setting : {"C:password,letmein!;", "C:key,1:letmein!;", "C:pasword,letmein!;"}) {
+    write_record(native, {Time{1795468293000001}, 1, RecordKind::to_board,
+                          with_crc(std::string(setting) + "PNum:1;T:2;")});
+  }
+  for (const char* ending : {".r4log", ".r4log.zst", ".jsonl", ".mcap", ".pcapng", ".log"}) {
+    const Converted there = converted(native, ".r4log", ending);
+    EXPECT_EQ(there.bytes.find("letmein!"), std::string::npos) << ending;
+    if (std::string(ending) == ".jsonl") {
+      EXPECT_TRUE(contains(there.bytes, R"("fields":{"C":["password","..."]})")) << there.bytes;
+      continue;
+    }
+    const std::string back = converted(there.bytes, ending, ".r4log").bytes;
+    EXPECT_TRUE(contains(back, "> " + with_crc("C:password,...;PNum:1;T:2;"))) << ending << back;
+    EXPECT_TRUE(contains(back, "> " + with_crc("C:key,1:...;PNum:1;T:2;"))) << ending << back;
+  }
+}
+
 TEST(Conversion, TellsThePlaceOfDamageAndConvertsTheRest) {
   const std::string native = recorded_capture();
   const std::size_t second = native.find('\n', native.find("AIN24")) + 1;

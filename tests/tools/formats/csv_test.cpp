@@ -24,7 +24,7 @@ std::string one_state(const std::string& fields) {
   write_record_header(native);
   write_wire(native, {1, "udp://robot", ""});
   write_record(native, {Time{1795468293000001}, 1, RecordKind::from_board, with_crc(fields)});
-  write_wire(native, {1, "udp://robot", "left, \"old\" arm"});
+  write_wire(native, {1, "udp://robot", "left-arm"});
   return native;
 }
 
@@ -58,8 +58,36 @@ TEST(Csv, HasTheFieldsThatAreThereAndLeavesAPlaceWhereOneIsMissing) {
   EXPECT_EQ(lines[0],
             "time [s],wire,board,PNum,T [ms],ENC1 [counts],US2 [cm],BLDC1 speed [0-4095],"
             "BLDC1 direction [0/1],BLDC1 brake [0/1]");
-  EXPECT_EQ(lines[1], "1795468293.000001,1,\"left, \"\"old\"\" arm\",1,2,-5,,1,0,1");
-  EXPECT_EQ(lines[2], "1795468293.000002,1,\"left, \"\"old\"\" arm\",2,3,,30,,,");
+  EXPECT_EQ(lines[1], "1795468293.000001,1,left-arm,1,2,-5,,1,0,1");
+  EXPECT_EQ(lines[2], "1795468293.000002,1,left-arm,2,3,,30,,,");
+}
+
+TEST(Csv, HasNoCellThatASpreadsheetTakesForAFormula) {
+  const struct {
+    std::string url, cell;
+  } cases[] = {
+      {"=1+cmd|calc!A0", "'=1+cmd|calc!A0"},
+      {"@SUM(1+1)", "'@SUM(1+1)"},
+      {"+1", "'+1"},
+      {"-1", "'-1"},
+      {"\t=1", "\\x09=1"},
+      {"\r=1", "\\x0d=1"},
+      {" =1", " '=1"},
+      {"x;=1", "x;'=1"},
+      {"x,=1", "\"x,'=1\""},
+      {"\"=1", "\"\"\"'=1\""},
+      {"udp://robot?listen=-1", "udp://robot?listen=-1"},
+  };
+  for (const auto& c : cases) {
+    std::string native;
+    write_record_header(native);
+    write_wire(native, {1, c.url, ""});
+    write_record(native, {Time{1795468293000001}, 1, RecordKind::from_board,
+                          with_crc("STEP1POS:-100;PNum:1;T:2;")});
+    const auto lines = lines_of(converted(native, ".r4log", ".csv").bytes);
+    ASSERT_EQ(lines.size(), 2);
+    EXPECT_EQ(lines[1], "1795468293.000001,1," + c.cell + ",1,2,-100");
+  }
 }
 
 TEST(Csv, HasNoRowForAStateWhoseValuesAreNone) {

@@ -46,7 +46,36 @@ TEST(Json, EscapesBytesSoThatTheyCanBeTakenBack) {
 }
 
 TEST(Json, ReplacesWhatIsNoUtf8) {
-  EXPECT_EQ(line_of({{"thing", "\xff"}}), "{\"thing\":\"\xEF\xBF\xBD\"}\n");
+  EXPECT_EQ(line_of({{"thing", "\xff"}}), "{\"thing\":\"\\ufffd\"}\n");
+}
+
+TEST(Json, IsALineOfAscii) {
+  EXPECT_EQ(line_of({{"thing", "\x1b\u009b\x7f\u202eö"}}),
+            "{\"thing\":\"\\u001b\\u009b\\u007f\\u202e\\u00f6\"}\n");
+}
+
+TEST(Json, OfADatagramHasNoSecret) {
+  const auto json_of = [](const std::string& bytes) {
+    Json object;
+    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): characters as bytes
+    add_datagram_json(object, reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
+    return object.dump();
+  };
+  const std::string good = test::with_crc("C:password,letmein!;PNum:1;T:2;");
+  const std::string masked = test::with_crc("C:password,...;PNum:1;T:2;");
+  EXPECT_EQ(json_of(good),
+            R"({"ok":true,"type":"command","pnum":1,"t":2,"fields":{"C":["password",)"
+            R"("..."]},"text":")" +
+                masked + "\"}");
+  const std::string damaged = good.substr(0, good.size() - 1);
+  EXPECT_EQ(json_of(damaged), R"({"ok":false,"error":"syntax","position":)" +
+                                  std::to_string(damaged.size()) + R"(,"text":"C:password,..."})");
+}
+
+TEST(Json, PrintsTextForPeopleLineByLine) {
+  EXPECT_EQ(printable_lines("a\nb\x1b[2J\n\nc"), "a\nb\\x1b[2J\n\nc");
+  EXPECT_EQ(printable_lines("a\n"), "a\n");
+  EXPECT_EQ(printable_lines(""), "");
 }
 
 TEST(Json, TellsOfTransfersWhereThereAreSome) {

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "transports/url.hpp"
+
 namespace r4 {
 namespace {
 
@@ -24,6 +26,9 @@ TEST(PortList, GivesTheUrlThatFindsAPortAgain) {
   EXPECT_EQ(url_of(port), "serial:///dev/ttyS0");
   port.serial_number = "0042";
   EXPECT_EQ(url_of(port), "serial:?sn=0042");
+  port.serial_number = "00:4 2&\x1b[2J;$(x)\xff";
+  EXPECT_EQ(url_of(port), "serial:?sn=00:4%202%26%1B%5B2J%3B%24%28x%29%FF");
+  EXPECT_EQ(Url::parse(url_of(port)).get("sn"), port.serial_number);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <array>
 
 #include "shared_wire.hpp"
+#include "tests/support/datagrams.hpp"
 #include "transports/share/share_message.hpp"
 #include "transports/share/share_socket.hpp"
 
@@ -51,6 +52,20 @@ TEST_F(SharedCarrier, ThoseThatWatchHearBothDirections) {
     EXPECT_GT(each->heard.drained, 0);
   }
   EXPECT_TRUE(driver->heard.overheard.empty());
+}
+
+TEST_F(SharedCarrier, ThoseThatWatchHearNoSecret) {
+  const auto driver = opened(BoardRole::control);
+  const auto watcher = opened(BoardRole::watch);
+  const std::string setting = with_crc("C:password,letmein!;PNum:1;T:2;");
+  const std::string masked = with_crc("C:password,...;PNum:1;T:2;");
+  driver->carrier->send(setting, Priority::normal);
+  device.overhear(setting);
+  device.deliver(setting);  // an echo of the line
+  ASSERT_TRUE(run_until(io, [&] { return watcher->has(masked); }));
+  EXPECT_EQ(watcher->heard.overheard, (std::vector<std::string>{masked, masked}));
+  ASSERT_EQ(watcher->heard.datagrams.size(), 1U);
+  EXPECT_EQ(device.all_sent(), std::vector<std::string>{setting}) << "to the board as it is";
 }
 
 // Whoever drives is kept waiting by nobody that watches.

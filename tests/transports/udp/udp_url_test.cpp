@@ -23,6 +23,14 @@ TEST(UdpUrl, OfAHostOnAnyPortForgetsTheOneItNames) {
   EXPECT_EQ(with_any_port("serial:auto?listen=1"), "serial:auto?listen=1");
 }
 
+TEST(UdpUrl, NamesABoardOnlyAsOneMayBeCalled) {
+  EXPECT_EQ(UdpUrl(Url::parse("udp:?id=left-arm"), Role::host).called, "left-arm");
+  for (const std::string& id : {std::string(), std::string("a%20b"), std::string("%3D1"),
+                                std::string("%1B[2J"), std::string(65, 'n')}) {
+    EXPECT_THROW(UdpUrl(Url::parse("udp:?id=" + id), Role::host), Error) << id;
+  }
+}
+
 TEST(UdpUrl, OfAHostMayNameAnAddressOfThisComputer) {
   const auto local = [](const char* url) {
     return UdpUrl(Url::parse(url), Role::host).local.to_string();

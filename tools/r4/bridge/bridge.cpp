@@ -97,9 +97,9 @@ class Report {
       line["side"] = to_text(event.side);
       print_line(line);
     } else if (event.event.kind == CarrierEvent::Kind::up) {
-      fmt::print(stderr, "{}: up\n", problem.thing);
+      print_trouble(problem.thing + ": up");
     } else {
-      fmt::print(stderr, "{} ({})\n", problem.text(), kind);
+      print_trouble(fmt::format("{} ({})", problem.text(), kind));
     }
   }
 
@@ -124,7 +124,7 @@ class Report {
       if (name == "kept_out") name = "kept out";
       text += fmt::format("{}{} {}", text.empty() ? "" : ", ", now.from.*each.value, name);
     }
-    fmt::print(stderr, "from {}: {}\n", now.name, text);
+    print_trouble(fmt::format("from {}: {}", now.name, text));
   }
 
   const bool json_;

@@ -39,13 +39,13 @@ Json json_of(const DeviceDescription& device) {
 }
 
 void print_values(const DeviceDescription& device) {
-  fmt::print("{}: {}\n", device.name, device.title);
-  fmt::print("  role {}, at {}, {} of 8 slots\n", to_text(device.role), addresses_of(device),
-             device.polls.size());
+  print_text(fmt::format("{}: {}\n", device.name, device.title));
+  print_text(fmt::format("  role {}, at {}, {} of 8 slots\n", to_text(device.role),
+                         addresses_of(device), device.polls.size()));
   for (const DeviceValue& value : device.values) {
     const DevicePoll& poll = device.polls[value.poll];
-    fmt::print("  {:<16} {:<8} every {} ms\n", value.name, value.unit.empty() ? "-" : value.unit,
-               poll.period.count());
+    print_text(fmt::format("  {:<16} {:<8} every {} ms\n", value.name,
+                           value.unit.empty() ? "-" : value.unit, poll.period.count()));
   }
 }
 

@@ -135,8 +135,9 @@ void print(const Findings& findings, bool json) {
                   {"automatic", each.mending == Mending::automatic}});
       continue;
     }
-    print_text(fmt::format("{:<8} {}: {}\n", to_text(each.severity), each.thing, each.reason));
-    if (!each.fix.empty()) print_text(fmt::format("           {}\n", each.fix));
+    print_text(fmt::format("{:<8} {}: {}\n", to_text(each.severity), printable(each.thing),
+                           printable(each.reason)));
+    if (!each.fix.empty()) print_text(fmt::format("           {}\n", printable(each.fix)));
   }
 }
 
@@ -148,7 +149,10 @@ int mend(const Findings& findings, bool json) {
     const bool known = std::find(done.begin(), done.end(), each.fix) != done.end();
     if (each.mending != Mending::automatic || each.severity == Severity::ok || known) continue;
     done.push_back(each.fix);
-    if (!json) print_text(fmt::format("{}: {}\n$ {}\n", each.thing, each.reason, each.fix));
+    if (!json) {
+      print_text(fmt::format("{}: {}\n$ {}\n", printable(each.thing), printable(each.reason),
+                             printable(each.fix)));
+    }
     // What it says is for people: with --json it must not get between the objects.
     const std::string command = json ? "{ " + each.fix + "; } >&2" : each.fix;
     const bool worked = std::system(command.c_str()) == 0;

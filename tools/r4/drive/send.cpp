@@ -221,7 +221,7 @@ class Sender {
       if (orders_[next_].command.kind == CommandKind::identify) print_identity();
       if (has_transfer && shows_bytes(transfer)) fmt::print("  {}\n", shown_bytes(transfer));
     } else {
-      fmt::print("{}  {}\n", text, problem.reason);
+      print_text(fmt::format("{}  {}\n", text, problem.reason));
     }
     if (!confirmed) {
       for (std::size_t i = next_ + size; i < orders_.size() && !options_.json; ++i) {
@@ -268,7 +268,8 @@ class Sender {
   void print_identity() const {
     const BoardIdentity& id = board_.identity();
     const std::string name = id.name.empty() ? "" : " (" + id.name + ")";
-    fmt::print("  board {}{}, firmware {}, {}\n", id.board_id, name, id.firmware, id.capabilities);
+    print_text(fmt::format("  board {}{}, firmware {}, {}\n", id.board_id, name, id.firmware,
+                           id.capabilities));
   }
 
   static double milliseconds(const CommandResult& result) {

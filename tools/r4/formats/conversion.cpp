@@ -34,7 +34,7 @@ void Conversion::on_record(const Record& record) {
   if (!begun_) begin(record.time);
   time_ = record.time;
   ++records_;
-  sink_.on_record(record);
+  sink_.on_record(without_secrets(record, room_));
 }
 
 void Conversion::on_wire(const RecordedWire& wire) {

@@ -84,6 +84,7 @@ class Conversion final : public RecordingReader::Handler {
 
   Conversion(Sink& sink, TellDamage tell) : sink_(sink), tell_(std::move(tell)) {}
 
+  // Whatever the source is, no secret gets into another file.
   void on_record(const Record& record) override;
   void on_wire(const RecordedWire& wire) override;
   void on_comment(std::string_view line) override;
@@ -110,6 +111,7 @@ class Conversion final : public RecordingReader::Handler {
   Sink& sink_;
   const TellDamage tell_;
   std::vector<Waiting> waiting_;  // until begun_
+  RecordRoom room_;
   bool begun_ = false;
   Time time_{0};  // of the newest record
   std::uint64_t records_ = 0;

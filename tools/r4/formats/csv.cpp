@@ -17,8 +17,20 @@ namespace {
 
 std::string_view view(Text text) { return {text.data(), text.size()}; }
 
-void append_quoted(std::string& out, std::string_view text) {
-  if (text.find_first_of(",\"\r\n") == std::string_view::npos) {
+// A text of others as a cell (RFC 4180), in which a spreadsheet finds no formula: an apostrophe
+// stands before each character that begins one, at the start and after what may separate cells
+// elsewhere.
+void append_cell(std::string& out, std::string_view others) {
+  static constexpr std::string_view formula = "=+-@";
+  static constexpr std::string_view separators = " ,;|\"'";
+  std::string text;
+  bool begins = true;
+  for (const char c : printable(others)) {
+    if (begins && formula.find(c) != std::string_view::npos) text += '\'';
+    begins = separators.find(c) != std::string_view::npos;
+    text += c;
+  }
+  if (text.find_first_of(",\"") == std::string::npos) {
     out += text;
     return;
   }
@@ -94,8 +106,9 @@ void CsvSink::write_header() {
   }
   for (const RecordedDevices::Known& known : devices_.all()) add_columns(known.device);
   for (const DeviceColumn& column : device_columns_) {
-    fmt::format_to(std::back_inserter(row_), ",{} {}", column.device, column.value);
-    if (!column.unit.empty()) fmt::format_to(std::back_inserter(row_), " [{}]", column.unit);
+    row_ += ',';
+    append_cell(row_, fmt::format("{} {}{}", column.device, column.value,
+                                  column.unit.empty() ? "" : " [" + column.unit + "]"));
   }
   row_ += '\n';
   output_.write(row_);
@@ -117,7 +130,7 @@ void CsvSink::on_record(const Record& record) {
   const auto out = std::back_inserter(row_);
   const auto us = record.time.count();
   fmt::format_to(out, "{}.{:06},{},", us / 1'000'000, us % 1'000'000, record.wire);
-  append_quoted(row_, names_.of(record.wire));
+  append_cell(row_, names_.of(record.wire));
   row_ += ',';
   if (datagram_.has_pnum()) fmt::format_to(out, "{}", datagram_.pnum());
   row_ += ',';

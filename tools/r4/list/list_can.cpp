@@ -169,14 +169,15 @@ void print_text(const std::vector<ListedBus>& buses) {
     const std::string rate = interface.bit_rate == 0
                                  ? (interface.has_controller ? "no bit rate" : "virtual")
                                  : fmt::format("{} kbit/s", interface.bit_rate / 1000.0);
-    fmt::print("  {:<14} {:<5}{:<14} {:<14}{}{}\n", interface.name, interface.up ? "up" : "down",
-               interface.state, rate, interface.fd ? "CAN FD  " : "",
+    fmt::print("  {:<14} {:<5}{:<14} {:<14}{}{}\n", printable(interface.name),
+               interface.up ? "up" : "down", interface.state, rate, interface.fd ? "CAN FD  " : "",
                bus.boards.empty() && bus.trouble.empty() ? "no board heard" : "");
     for (const auto& [node, board] : bus.boards) {
-      fmt::print("    R4 board: {}  {}\n", url_of(bus, node), text_of(board));
+      fmt::print("    R4 board: {}  {}\n", printable(url_of(bus, node)), text_of(board));
     }
     if (!bus.trouble.empty()) {
-      fmt::print("    {}{}{}\n", bus.trouble, bus.fix.empty() ? "" : "; ", bus.fix);
+      fmt::print("    {}{}{}\n", printable(bus.trouble), bus.fix.empty() ? "" : "; ",
+                 printable(bus.fix));
     }
   }
 }

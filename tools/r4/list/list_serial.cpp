@@ -140,16 +140,18 @@ void print_text(const std::vector<ListedPort>& ports) {
   fmt::print("Serial ports:\n");
   if (ports.empty()) fmt::print("  none\n");
   for (const auto& [port, asked, board, trouble] : ports) {
-    fmt::print("  {:<14} {:<10} {:<24} {}\n", port.path, usb_id(port), port.serial_number,
-               port.description);
+    fmt::print("  {:<14} {:<10} {:<24} {}\n", printable(port.path), usb_id(port),
+               printable(port.serial_number), printable(port.description));
     if (!asked) continue;
     // What has not the board's USB id is one if it says so, or if a program of ours has it.
     if (port.is_r4 || board.identity || board.pid != 0) {
-      fmt::print("    R4 board: {}  {}\n", url_of(port), text_of(board));
+      fmt::print("    R4 board: {}  {}\n", printable(url_of(port)), text_of(board));
     } else {
-      fmt::print("    no R4 board has answered: {}\n", url_of(port));
+      fmt::print("    no R4 board has answered: {}\n", printable(url_of(port)));
     }
-    if (trouble) fmt::print("    {}; {}\n", trouble->reason, trouble->fix);
+    if (trouble) {
+      fmt::print("    {}; {}\n", printable(trouble->reason), printable(trouble->fix));
+    }
   }
 }
 

@@ -37,13 +37,15 @@ void print_text(const BoardSearch::Result& found, std::uint16_t port) {
   if (found.networks.empty()) fmt::print("  none\n");
   for (const Network& network : found.networks) {
     const std::vector<FoundBoard> boards = boards_on(network, found);
-    fmt::print("  {:<14} {:<19}{}\n", network.interface, network.from.to_string(),
+    fmt::print("  {:<14} {:<19}{}\n", printable(network.interface), network.from.to_string(),
                boards.empty() && network.trouble.empty() ? "no board answered" : "");
     for (const FoundBoard& board : boards) {
       fmt::print("    R4 board: {}  at {}, {}\n", url_of(board, found.boards, port),
                  board.address.to_string(), text_of(heard(board)));
     }
-    if (!network.trouble.empty()) fmt::print("    {}; {}\n", network.trouble, network_fix);
+    if (!network.trouble.empty()) {
+      fmt::print("    {}; {}\n", printable(network.trouble), network_fix);
+    }
   }
   if (found.more) fmt::print("  more than {} answered\n", BoardSearch::most_boards);
 }

@@ -34,7 +34,7 @@ std::string text_of(const ListedBoard& board) {
   const std::optional<bool> busy = board.busy();
   if (busy && !board.controls) text += *busy ? ", controlled by a host" : ", free";
   if (board.pid != 0) text += ", " + holder_of(board);
-  return text;
+  return printable(text);
 }
 
 void describe(const ListedBoard& board, Json& object) {

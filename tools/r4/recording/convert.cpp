@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "../formats/output_file.hpp"
+#include "../shell/json.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
 #include "formats.hpp"
@@ -110,8 +111,8 @@ int convert(const ConvertOptions& options) {
     if (++told > most_damage) return;
     progress.clear();
     const std::string line = damage.line == 0 ? "" : fmt::format("line {}, ", damage.line);
-    fmt::print(stderr, "r4: {}: {}byte {}: {}; it is left out\n", called(options.input), line,
-               damage.offset, damage.reason);
+    print_trouble(fmt::format("r4: {}: {}byte {}: {}; it is left out", called(options.input), line,
+                              damage.offset, damage.reason));
   });
   read_all(options, conversion, progress);
   conversion.finish();
@@ -119,8 +120,8 @@ int convert(const ConvertOptions& options) {
   progress.clear();
   if (told > most_damage) fmt::print(stderr, "r4: and {} more\n", told - most_damage);
   const std::string left_out = sink->left_out();
-  fmt::print("{}: {} records{}\n", options.output, conversion.records(),
-             left_out.empty() ? "" : "; left out are " + left_out);
+  print_text(fmt::format("{}: {} records{}\n", printable(options.output), conversion.records(),
+                         left_out.empty() ? "" : "; left out are " + printable(left_out)));
   return conversion.damage() == 0 ? 0 : static_cast<int>(ErrorKind::data);
 }
 

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4 info: what is in a recording, and what of it cannot be read.
-#include <fmt/format.h>
-
 #include <memory>
 #include <string>
 #include <vector>
@@ -29,7 +27,7 @@ int info(const InfoOptions& options) {
     if (options.json) {
       print_line(summary.json(file));
     } else {
-      fmt::print("{}", summary.text(called(file)));
+      print_text(summary.text(called(file)));
     }
     any_damage = any_damage || summary.damaged();
   }

@@ -332,7 +332,7 @@ int plot(const PlotOptions& options) {
   }
   output.finish();
   if (curves.damaged()) {
-    fmt::print(stderr, "r4: {}: some of it could not be read; see r4 info\n", options.file);
+    print_trouble(fmt::format("r4: {}: some of it could not be read; see r4 info", options.file));
   }
   return curves.damaged() ? static_cast<int>(ErrorKind::data) : 0;
 }

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
 #include "../shell/run_end.hpp"
@@ -121,8 +122,8 @@ class Recorders {
     recording_->close();
     if (has_ended()) throw Error(*recording_->problem());
     tell_loss();
-    fmt::print("{}: {} datagrams and events in {:.1f} s\n", options.file, recording_->records(),
-               took.count());
+    print_text(fmt::format("{}: {} datagrams and events in {:.1f} s\n", printable(options.file),
+                           recording_->records(), took.count()));
     if (recording_->dropped() != 0) {
       fmt::print(stderr, "r4: {} more were left out: the disk is too slow\n",
                  recording_->dropped());

@@ -166,9 +166,9 @@ void RecordingSummary::on_damage(const RecordingDamage& damage) {
 }
 
 std::string RecordingSummary::text(const std::string& name) const {
-  std::string out = name + "\n";
+  std::string out = printable(name) + "\n";
   const auto line = [&out](const char* what, const std::string& words) {
-    out += fmt::format("  {:<10} {}\n", what, words);
+    out += fmt::format("  {:<10} {}\n", what, printable(words));
   };
   if (any_) {
     line("from", record_time_text(first_));

@@ -207,7 +207,8 @@ Health BoardNode::health() const {
   return health;
 }
 
-void BoardNode::log(LogLevel level, const std::string& text) {
+void BoardNode::log(LogLevel level, const std::string& told) {
+  const std::string text = printable(told);  // names of other nodes and computers may be in it
   // The same trouble again and again is told once a second.
   constexpr std::size_t most_kept = 64;
   const Clock::time_point now = Clock::now();

@@ -108,24 +108,9 @@ Problem usage_problem(const CLI::App& root, const CLI::ParseError& error) {
   return problem;
 }
 
-// One line, whatever the command line held.
-std::string one_line(const std::string& text) {
-  std::string line;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (byte < 0x20 || byte == 0x7F) {
-      line += fmt::format("\\x{:02x}", byte);
-    } else {
-      line += c;
-    }
-  }
-  return line;
-}
-
 int report(Problem problem, bool json) {
   if (problem.thing.empty()) problem.thing = "''";
-  std::fflush(stdout);
-  fmt::print(stderr, "r4: {}\n", one_line(problem.text()));
+  print_trouble("r4: " + problem.text());
   if (json) print_line(problem_json(problem));
   return static_cast<int>(problem.kind);
 }

@@ -9,7 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "host/recording/record_line.hpp"
 #include "protocol/messages/message.hpp"
+#include "protocol/messages/settings.hpp"
 #include "transports/framing/can/packed_form.hpp"
 
 namespace r4::tool {
@@ -108,6 +110,9 @@ bool add_datagram_json(Json& object, const std::uint8_t* bytes, std::size_t size
   const ReadResult result = read_datagram(text, datagram);
   object["ok"] = static_cast<bool>(result);
   if (packed) object["packed"] = size;
+  std::vector<char> room(text.size() + masking_room);
+  const Text masked = without_secrets(text, room.data());
+  if (result && masked.data() != text.data()) (void)read_datagram(masked, datagram);
   if (result) {
     object["type"] = to_text(kind_of(datagram));
     object["pnum"] = datagram.has_pnum() ? Json(datagram.pnum()) : Json();
@@ -116,7 +121,7 @@ bool add_datagram_json(Json& object, const std::uint8_t* bytes, std::size_t size
   } else {
     object.update(bad_datagram_json(result));
   }
-  object["text"] = escaped(view(text));
+  object["text"] = escaped(view(masked));
   return static_cast<bool>(result);
 }
 
@@ -165,28 +170,40 @@ Json problem_json(const Problem& problem) {
 
 std::string escaped(std::string_view bytes) {
   std::string text;
-  text.reserve(bytes.size());
-  for (const char c : bytes) {
-    if (c >= 0x20 && c <= 0x7E && c != '\\') {
-      text += c;
-    } else {
-      text += fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
-    }
-  }
+  append_escaped(text, bytes);
   return text;
 }
 
 std::string text_of(const Json& value) {
-  return value.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return value.dump(-1, ' ', true, Json::error_handler_t::replace);
 }
 
 std::string line_of(const Json& object) { return text_of(object) + "\n"; }
 
-void print_text(std::string_view text) {
+std::string printable_lines(std::string_view text) {
+  std::string out;
+  for (std::size_t end = 0; end != std::string_view::npos;) {
+    end = text.find('\n');
+    out += printable(text.substr(0, end));
+    if (end == std::string_view::npos) break;
+    out += '\n';
+    text.remove_prefix(end + 1);
+  }
+  return out;
+}
+
+void print_raw(std::string_view text) {
   std::fwrite(text.data(), 1, text.size(), stdout);
   std::fflush(stdout);
 }
 
-void print_line(const Json& object) { print_text(line_of(object)); }
+void print_text(std::string_view text) { print_raw(printable_lines(text)); }
+
+void print_line(const Json& object) { print_raw(line_of(object)); }
+
+void print_trouble(std::string_view text) {
+  std::fflush(stdout);
+  fmt::print(stderr, "{}\n", printable(text));
+}
 
 }  // namespace r4::tool

@@ -52,13 +52,20 @@ Json counters_json(const CarrierCounters& counters);
 // Any bytes as printable ASCII: what is not, and the backslash, as \xNN.
 std::string escaped(std::string_view bytes);
 
-// The text of a value, and one object as a line of text. Bytes that are no UTF-8, as a command line or a board's name may
-// hold, are replaced.
+// The text of a value, and one object as a line of ASCII. Bytes that are not UTF-8, as a command line
+// or a board's name may hold, are replaced.
 std::string text_of(const Json& value);
 std::string line_of(const Json& object);
 
-// Text, or an object on a line of its own, to stdout and handed to the system at once.
+// Each line of it printable(): what a text for people goes through that may hold names of others.
+std::string printable_lines(std::string_view text);
+// Text for people, by printable_lines(), or an object on a line of its own, to stdout and handed to
+// the system at once.
 void print_text(std::string_view text);
 void print_line(const Json& object);
+// Text as it is: of ours alone, with what moves the cursor.
+void print_raw(std::string_view text);
+// A line for people on stderr, printable().
+void print_trouble(std::string_view text);
 
 }  // namespace r4::tool

@@ -12,6 +12,8 @@
 #include <cstring>
 #include <utility>
 
+#include "json.hpp"
+
 namespace r4::tool {
 namespace {
 
@@ -72,7 +74,7 @@ void LineWriter::run() {
       if (waiting_.empty()) return;
       text.swap(waiting_);
     }
-    if (!write_out(text)) return;
+    if (!write_out(printable_lines(text))) return;
   }
 }
 

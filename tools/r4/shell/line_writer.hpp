@@ -28,7 +28,7 @@ class LineWriter {
   LineWriter(const LineWriter&) = delete;
   LineWriter& operator=(const LineWriter&) = delete;
 
-  // `line` with its end. Never waits.
+  // `line` with its end, which is written as printable_lines(). Never waits.
   void write(std::string_view line);
 
   // When no writer is left: throws Error if one could not write. Standard output is one for all.

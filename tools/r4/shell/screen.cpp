@@ -29,7 +29,7 @@ bool Screen::has_room() {
 }
 
 Screen::~Screen() {
-  if (begun_) print_text("\x1b[?25h");
+  if (begun_) print_raw("\x1b[?25h");
 }
 
 std::size_t Screen::columns() { return terminal_size().ws_col; }
@@ -41,12 +41,13 @@ void Screen::draw(std::vector<std::string> lines) {
   begun_ = true;
   if (drawn_ > 0) frame += fmt::format("\x1b[{}A", drawn_);
   for (std::string& line : lines) {
+    line = printable(line);
     if (line.size() > size.ws_col) line.resize(size.ws_col);
     frame += "\r" + line + "\x1b[K\n";
   }
   frame += "\x1b[J";
   drawn_ = lines.size();
-  print_text(frame);
+  print_raw(frame);
 }
 
 }  // namespace r4::tool

@@ -4,7 +4,6 @@
 
 #include <fmt/core.h>
 
-#include <cstdio>
 #include <vector>
 
 #include "json.hpp"
@@ -58,7 +57,7 @@ inline void tell_wires_down(const std::vector<Wire>& wires, bool json) {
       line["type"] = "wire";
       print_line(line);
     } else {
-      fmt::print(stderr, "r4: {} is down, so that nothing went by it\n", wire.name);
+      print_trouble(fmt::format("r4: {} is down, so that nothing went by it", wire.name));
     }
   }
 }

@@ -13,6 +13,7 @@
 #include <string>
 #include <utility>
 
+#include "../shell/json.hpp"
 #include "../shell/options.hpp"
 #include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
@@ -74,7 +75,9 @@ class Replay : private Carrier::Handler {
     }
     began_ = Clock::now();
     io_.run();
-    if (!options_.json) fmt::print("{}: {} datagrams\n", options_.file, sent_);
+    if (!options_.json) {
+      print_text(fmt::format("{}: {} datagrams\n", printable(options_.file), sent_));
+    }
     return damaged_ ? static_cast<int>(ErrorKind::data) : 0;
   }
 
@@ -87,8 +90,7 @@ class Replay : private Carrier::Handler {
   }
   void on_carrier_event(const CarrierEvent& event) override {
     // That nobody listens yet is no trouble.
-    if (event.kind == CarrierEvent::Kind::warning)
-      fmt::print(stderr, "r4: {}\n", event.problem.text());
+    if (event.kind == CarrierEvent::Kind::warning) print_trouble("r4: " + event.problem.text());
   }
 
   // --- playing
@@ -125,8 +127,7 @@ class Replay : private Carrier::Handler {
       play(item);
       if (item.kind != RecordKind::from_board) continue;
       const std::chrono::duration<double> at = item.time - first_;
-      fmt::print("{:.6f} {}\n", at.count(), item.bytes);
-      std::fflush(stdout);
+      print_text(fmt::format("{:.6f} {}\n", at.count(), escaped(item.bytes)));
       return;
     }
     io_.stop();
@@ -158,7 +159,7 @@ class Replay : private Carrier::Handler {
 
   void tell_damage(const std::string& words) {
     damaged_ = true;
-    fmt::print(stderr, "r4: {}\n", words);
+    print_trouble("r4: " + words);
   }
 
   const ReplayOptions& options_;

@@ -46,14 +46,10 @@ struct SimOptions {
   std::optional<Impairment> link;
 };
 
-constexpr std::size_t longest_id = 64;
-
 void check_id(const std::string& id) {
-  Field field;
-  const bool valid = read_field(Text("I:" + id), field) && field.count() == 1;
-  if (valid && !id.empty() && id.size() <= longest_id) return;
-  throw Error(ErrorKind::usage, "--board-id " + id, "cannot be sent",
-              fmt::format("use 1 to {} printable ASCII characters without , ; and ^", longest_id));
+  if (is_board_id(Text(id))) return;
+  throw Error(ErrorKind::usage, "--board-id " + id, "is not a valid board id",
+              fmt::format("use 1 to {} letters, digits, _ and -", board_id_max));
 }
 
 // What connects a device to the user's bus.

@@ -208,7 +208,7 @@ class Bench {
   }
 
   void print_table() {
-    fmt::print("{}\n", board_.name());
+    print_text(board_.name() + "\n");
     fmt::print("  in control after      {:>9.1f} ms\n", connect_us_ / 1000);
     fmt::print("  states                {:>9.1f} Hz    {} received, {} lost, {} damaged\n",
                state_hz_, states_, lost_, damaged_);

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <string>
@@ -14,6 +15,7 @@
 #include "../shell/wires.hpp"
 #include "host/commands/command_help.hpp"
 #include "protocol/link/host_link.hpp"
+#include "protocol/messages/settings.hpp"
 #include "r4link/link.hpp"
 
 namespace r4::tool {
@@ -26,7 +28,9 @@ constexpr std::size_t unread_of_view = 32768;
 constexpr std::size_t most_shown = 600;  // of a damaged datagram
 
 std::string shown(std::string_view bytes) {
-  return escaped(bytes.substr(0, most_shown)) + (bytes.size() > most_shown ? "..." : "");
+  std::array<char, most_shown + masking_room> room;
+  const Text masked = without_secrets(Text(bytes.substr(0, most_shown)), room.data());
+  return escaped(view(masked)) + (bytes.size() > most_shown ? "..." : "");
 }
 
 class JsonView final : public MonitorView {

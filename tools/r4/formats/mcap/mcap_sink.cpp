@@ -102,7 +102,8 @@ void McapSink::on_record(const Record& record) {
   add_record_json(
       object, {record.time, record.wire, record.kind, record.bytes.substr(0, max_record_bytes)});
   measured_.add_to(object, record, devices_);
-  write_message(channel_of(record.wire), record.time, object.dump());
+  write_message(channel_of(record.wire), record.time,
+                object.dump(-1, ' ', true, Json::error_handler_t::replace));
 }
 
 void McapSink::write_line(std::string_view line, Time time) {
