@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <string>
 
+#include "r4link/error.hpp"
+
 namespace r4::tool::ros2 {
 namespace {
 
@@ -75,7 +77,12 @@ std::optional<Mismatch> mismatch_of(const Graph::OwnTopic& own, const Announced&
   std::optional<Mismatch> of_type;
   if (other.kind == EndpointKind::writer && own.other_type &&
       std::none_of(declared.begin(), declared.end(), is_declared)) {
-    of_type = own.other_type(other);
+    try {
+      of_type = own.other_type(other);
+    } catch (const Error& error) {  // Cyclone DDS cannot make a reader for that type
+      of_type = Mismatch{Weight::lost, fmt::format("{}: a publisher ({}) is not heard: {}",
+                                                   own.name, other.owner, error.problem().text())};
+    }
   }
   const auto ours = counterparts(own, other);  // it may have made one
   std::optional<Mismatch> of_policy;
