@@ -7,6 +7,8 @@
 
 #include <string>
 
+#include "r4link/error.hpp"
+
 namespace r4::tool::ros2 {
 namespace {
 
@@ -100,6 +102,17 @@ TEST(GraphMismatch, NamesAServiceClientThatCannotBeAnswered) {
   EXPECT_NE(words_of(mismatch_of(own, client)).find("rmw_cyclonedds_cpp"), std::string::npos);
   client.user_data = "clientid=1.2;";
   EXPECT_FALSE(mismatch_of(own, client));
+}
+
+TEST(GraphMismatch, IsToldWhereNoReaderCanBeMadeForAnotherType) {
+  auto own = own_of(EndpointKind::reader, "stop", twist);
+  own.name = "stop";
+  own.other_type = [](const Announced&) -> std::optional<Mismatch> {
+    throw Error(ErrorKind::open, "rt/stop", "cannot be made", "look");
+  };
+  const auto other = other_of(EndpointKind::writer, "another");
+  EXPECT_EQ(words_of(mismatch_of(own, other)),
+            "stop: a publisher (process 7 on robot) is not heard: rt/stop: cannot be made; look");
 }
 
 Domain own_test_domain() {

@@ -61,7 +61,7 @@ void BoardCommands::subscribe_stop(Graph& graph, std::size_t node, Inbox& inbox)
             Mismatch::Weight::warning,
             fmt::format("stop: a publisher ({}) has the type {}: each of its samples is a stop; "
                         "publish std_msgs/msg/Bool",
-                        writer.owner, ros_type(writer.type))};
+                        writer.owner_text(), ros_type(writer.type))};
       });
 }
 
@@ -251,16 +251,18 @@ void BoardCommands::subscribe_drive(Graph& graph, std::size_t node, Inbox& inbox
                        stamp_time(message.header.stamp.sec, message.header.stamp.nanosec)};
         });
   };
-  graph.on_other_type(node, "cmd_vel",
-                      [subscribe_stamped,
-                       taken = false](const Announced& writer) mutable -> std::optional<Mismatch> {
-                        const MessageType& stamped = message_type<TwistStampedMessage>();
-                        if (writer.type != stamped.descriptor->m_typename) return std::nullopt;
-                        if (!std::exchange(taken, true)) subscribe_stamped();
-                        return Mismatch{Mismatch::Weight::note,
-                                        fmt::format("cmd_vel: {} of {} is obeyed, too",
-                                                    stamped.name, writer.owner)};
-                      });
+  graph.on_other_type(
+      node, "cmd_vel",
+      [subscribe_stamped,
+       taken = false](const Announced& writer) mutable -> std::optional<Mismatch> {
+        const MessageType& stamped = message_type<TwistStampedMessage>();
+        if (writer.type != stamped.descriptor->m_typename) return std::nullopt;
+        if (!std::exchange(taken, true)) subscribe_stamped();
+        return Mismatch{
+            Mismatch::Weight::note,
+            fmt::format("cmd_vel: a publisher ({}) has the type {}, which is obeyed, too",
+                        writer.owner_text(), stamped.name)};
+      });
 }
 
 void BoardCommands::on_speed(const Speed& speed, const void* source, const Origin& origin) {
@@ -281,8 +283,8 @@ void BoardCommands::on_speed(const Speed& speed, const void* source, const Origi
 // What ROS users publish, and what would drive nothing without a word.
 void BoardCommands::decline(Graph& graph, std::size_t node, const char* topic, const char* why) {
   graph.on_other_type(node, topic, [topic, why](const Announced& writer) {
-    return Mismatch{Mismatch::Weight::lost,
-                    fmt::format("{}: a publisher ({}) is not heard: {}", topic, writer.owner, why)};
+    return Mismatch{Mismatch::Weight::lost, fmt::format("{}: a publisher ({}) is not heard: {}",
+                                                        topic, writer.owner_text(), why)};
   });
 }
 

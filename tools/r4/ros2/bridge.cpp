@@ -171,7 +171,7 @@ class Bridge {
       graph_.on_other_type(0, "/" + topic, [topic, ours, more](const Announced& writer) {
         return Mismatch{Mismatch::Weight::warning,
                         fmt::format("/{}: a publisher ({}) is not heard here; publish {}{}", topic,
-                                    writer.owner, ours, more)};
+                                    writer.owner_text(), ours, more)};
       });
     }
   }
@@ -189,7 +189,10 @@ class Bridge {
       mismatches_->on_announced(announced);
       const auto node = namesakes_->node_of(announced);
       if (!node) return;
-      asio::post(io_, [this, node = *node, who = announced.owner] { warn_of(node, who); });
+      asio::post(io_, [this, node = *node,
+                       who = announced.owner.empty() ? "another participant" : announced.owner] {
+        warn_of(node, who);
+      });
     });
     for (const dds_entity_t each : discovery_->entities()) {
       inbox_.watch(each, [this] { discovery_->look(); });

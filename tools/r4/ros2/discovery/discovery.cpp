@@ -87,7 +87,7 @@ void Discovery::look_at(EndpointKind kind, dds_entity_t entity) {
           announced.user_data = user_data_of(each.qos);
           announced.policies = policies_of(kind, each.qos);
           const auto owner = owners_.find(participant);
-          announced.owner = owner == owners_.end() ? "unknown process" : owner->second;
+          if (owner != owners_.end()) announced.owner = owner->second;
         }
         tell_(announced);
       });

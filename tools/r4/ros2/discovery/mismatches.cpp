@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <string>
 
+#include "r4link/error.hpp"
+
 namespace r4::tool::ros2 {
 namespace {
 
@@ -26,12 +28,12 @@ std::optional<Mismatch> wrong_type(const OwnEndpoint& ours, const Announced& oth
     return Mismatch{
         Weight::lost,
         fmt::format("{}: a publisher ({}) has the type {}, and is not heard; publish {}", ours.name,
-                    other.owner, ros_type(other.type), expected)};
+                    other.owner_text(), ros_type(other.type), expected)};
   }
   return Mismatch{
       Weight::warning,
       fmt::format("{}: a subscriber ({}) has the type {}, and receives nothing; subscribe to {}",
-                  ours.name, other.owner, ros_type(other.type), expected)};
+                  ours.name, other.owner_text(), ros_type(other.type), expected)};
 }
 
 std::optional<Mismatch> wrong_policy(const OwnEndpoint& ours, const Announced& other,
@@ -41,13 +43,13 @@ std::optional<Mismatch> wrong_policy(const OwnEndpoint& ours, const Announced& o
         Weight::lost,
         fmt::format("{}: a publisher does not offer what this subscription needs, {}, and is not "
                     "heard ({}); have it do so, as ROS does by default",
-                    ours.name, policy, other.owner)};
+                    ours.name, policy, other.owner_text())};
   }
   return Mismatch{
       Weight::warning,
       fmt::format("{}: a subscriber asks for more than this publisher offers, in {}, and receives "
                   "nothing ({}); subscribe as ROS does by default",
-                  ours.name, policy, other.owner)};
+                  ours.name, policy, other.owner_text())};
 }
 
 // True if it writes requests as rmw_fastrtps does, without saying in them whose they are (docs/ros2.md, Services).
@@ -62,7 +64,7 @@ std::optional<Mismatch> no_answer(const OwnEndpoint& ours, const Announced& othe
       fmt::format("{}: a client ({}) does not use rmw_cyclonedds_cpp, and gets no answer; nothing "
                   "is executed for it: set RMW_IMPLEMENTATION=rmw_cyclonedds_cpp for it, or use "
                   "the topics arm, stop and R4_Command",
-                  ours.name, other.owner)};
+                  ours.name, other.owner_text())};
 }
 
 }  // namespace
@@ -75,7 +77,13 @@ std::optional<Mismatch> mismatch_of(const Graph::OwnTopic& own, const Announced&
   std::optional<Mismatch> of_type;
   if (other.kind == EndpointKind::writer && own.other_type &&
       std::none_of(declared.begin(), declared.end(), is_declared)) {
-    of_type = own.other_type(other);
+    try {
+      of_type = own.other_type(other);
+    } catch (const Error& error) {  // Cyclone DDS cannot make a reader for that type
+      of_type =
+          Mismatch{Weight::lost, fmt::format("{}: a publisher ({}) is not heard: {}", own.name,
+                                             other.owner_text(), error.problem().text())};
+    }
   }
   const auto ours = counterparts(own, other);  // it may have made one
   std::optional<Mismatch> of_policy;

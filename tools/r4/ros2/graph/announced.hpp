@@ -36,8 +36,10 @@ struct Announced {
   std::string topic;  // as DDS names it: "rt/R4"
   std::string type;   // as DDS names it: "std_msgs::msg::dds_::String_"
   std::string user_data;
-  std::string owner;  // printable: "process 1234 on robot", or "unknown process"
+  std::string owner;  // printable: "process 1234 on robot"; empty if its middleware does not say
   Policies policies;
+  // Its owner, or how to find it.
+  std::string owner_text() const { return owner.empty() ? "see ros2 topic info -v" : owner; }
 };
 
 // What is wrong between a reader or writer of another participant and ours.
