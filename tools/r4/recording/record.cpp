@@ -145,7 +145,7 @@ class Recorders {
   void tell_loss() {
     const std::optional<Problem> problem = recording_->problem();
     if (!problem || std::exchange(lost_, true)) return;
-    fmt::print(stderr, "r4: {}\n", problem->text());
+    print_trouble("r4: " + problem->text());
   }
   void add(const std::string& url) {
     auto carriers = make_host_carriers(io_, {url}, BoardRole::watch);
