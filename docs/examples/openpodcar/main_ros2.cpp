@@ -30,8 +30,8 @@ namespace {
 
 volatile std::sig_atomic_t ended = 0;
 
-// False if it was ended before. run_loop() ends when the board restarts, so the first state after a restart comes here.
-// `restarts`: those of the board that are known.
+// False if it was ended before. run_loop() ends when the board restarts, so the first state after a
+// restart comes here. `restarts`: those of the board that are known.
 bool wait_for_start(r4::Board& board, Podcar& podcar, Pilot& pilot, Topics& topics,
                     std::uint32_t& restarts) {
   r4::States states = board.states();

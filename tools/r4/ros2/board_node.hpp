@@ -40,7 +40,8 @@ class BoardNode {
   // The inbox is drained.
   void flush() { commands_.flush(); }
   void warn(const std::string& text) { log(LogLevel::warning, text); }
-  // A reader or writer of another participant does not match ours; without a `mismatch` it does, or has gone.
+  // A reader or writer of another participant does not match ours; without a `mismatch` it does, or
+  // has gone.
   void on_mismatch(const EntityId& who, const std::optional<Mismatch>& mismatch);
   AsyncBoard& board() { return board_; }
   const std::string& name() const { return name_; }

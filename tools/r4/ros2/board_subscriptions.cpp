@@ -22,8 +22,8 @@ constexpr std::size_t most_other_types = 8;  // on `stop`, beside Bool
 // NOLINTBEGIN(clang-analyzer-cplusplus.NewDeleteLeaks): it loses sight of a std::function that is moved from a
 // designated initializer.
 
-// Subscribe twice, reliable and best effort. A duplicate stop is harmless, and no publisher is missed: neither a button of
-// micro-ROS nor one of another type.
+// Subscribe twice, reliable and best effort. A duplicate stop is harmless, and no publisher is
+// missed: neither a button of micro-ROS nor one of another type.
 void BoardCommands::subscribe_stop(Graph& graph, std::size_t node, Inbox& inbox) {
   const auto subscribe = [this, &graph, node, &inbox](const Announced* other) {
     for (const bool reliable : {true, false}) {
@@ -81,7 +81,8 @@ void BoardCommands::subscribe_arm(Graph& graph, std::size_t node, Inbox& inbox) 
                   if (!pressed) return;
                   return warn("arm: dropped: its publisher has gone; let it stay for a second");
                 }
-                // Who repeats itself does not arm again what has been stopped since: the edge counts.
+                // Who repeats itself does not arm again what has been stopped since: the edge
+                // counts.
                 const bool edge = pressed_.on(origin.writer, pressed);
                 if (!edge || is_stale("arm", origin)) return;
                 if (is_overtaken(origin)) {
@@ -243,7 +244,8 @@ void BoardCommands::subscribe_drive(Graph& graph, std::size_t node, Inbox& inbox
   subscribe_speed<TwistMessage>(graph, node, inbox, source, [](const TwistMessage& twist) {
     return Speed{twist.linear.x, twist.angular.z, {}};
   });
-  // `ros2 topic echo` does not show a topic of two types, so the second is there when somebody publishes it.
+  // `ros2 topic echo` does not show a topic of two types, so the second is there when somebody
+  // publishes it.
   const auto subscribe_stamped = [this, &graph, node, &inbox, stamped_source] {
     subscribe_speed<TwistStampedMessage>(
         graph, node, inbox, stamped_source, [](const TwistStampedMessage& message) {

@@ -58,8 +58,9 @@ struct DifferentialDrive {
 DifferentialDrive differential_drive(std::string_view channels, double separation_m,
                                      double full_speed_mps);
 
-// A counter of the board as a position without jumps. The counter has 32 bits and wraps, and begins at 0 when the board
-// restarts: the position goes on from where it was. What was counted before the first state after a restart is lost.
+// A counter of the board as a position without jumps. The counter has 32 bits and wraps, and begins
+// at 0 when the board restarts: the position goes on from where it was. What was counted before the
+// first state after a restart is lost.
 class Position {
  public:
   // `boot` differs from that of the state before if the board has restarted in between.
@@ -74,7 +75,8 @@ class Position {
 using WallTime = std::chrono::system_clock::time_point;
 // The stamp of a header; none for 0, which says nothing.
 std::optional<WallTime> stamp_time(std::int32_t seconds, std::uint32_t nanoseconds);
-// True if a command with that stamp is older than `deadline`; 0: there is none. Both clocks are the same.
+// True if a command with that stamp is older than `deadline`; 0: there is none. Both clocks are the
+// same.
 bool is_outdated(const std::optional<WallTime>& stamp, WallTime now,
                  std::chrono::milliseconds deadline);
 

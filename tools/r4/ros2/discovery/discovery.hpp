@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The readers and writers that other participants of the graph announce, as they come, change and go.
+// The readers and writers that other participants of the graph announce, as they come, change and
+// go.
 #pragma once
 
 #include <array>

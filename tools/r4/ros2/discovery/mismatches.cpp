@@ -52,7 +52,8 @@ std::optional<Mismatch> wrong_policy(const OwnEndpoint& ours, const Announced& o
                   ours.name, policy, other.owner_text())};
 }
 
-// True if it writes requests as rmw_fastrtps does, without saying in them whose they are (docs/ros2.md, Services).
+// True if it writes requests as rmw_fastrtps does, without saying in them whose they are
+// (docs/ros2.md, Services).
 bool cannot_be_answered(const OwnEndpoint& ours, const Announced& other) {
   return other.kind == EndpointKind::writer && ours.name.starts_with("~/") &&
          other.user_data.find("clientid=") == std::string::npos;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Finds readers and writers of other participants that belong to our topics and do not match: of another type, of
-// another quality of service, or service clients that cannot be answered. DDS ignores these silently.
+// Finds readers and writers of other participants that belong to our topics and do not match: of
+// another type, of another quality of service, or service clients that cannot be answered. DDS
+// ignores these silently.
 #pragma once
 
 #include <functional>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Finds nodes of the same names as ours: a second `r4 ros2`, for one. Each of our nodes has the service ~/stop. Another
-// participant that answers it has a node of that name, too.
+// Finds nodes of the same names as ours: a second `r4 ros2`, for one. Each of our nodes has the
+// service ~/stop. Another participant that answers it has a node of that name, too.
 #pragma once
 
 #include <map>

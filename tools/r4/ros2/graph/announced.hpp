@@ -26,7 +26,8 @@ struct Policies {
   bool xcdr1 = true;  // a writer writes it, a reader can read it
 };
 Policies policies_of(EndpointKind kind, const dds_qos_t* qos);
-// The first policy of which a writer offers less than a reader requests, in words; nullptr if they match.
+// The first policy of which a writer offers less than a reader requests, in words; nullptr if they
+// match.
 const char* unmatched_policy(const Policies& offered, const Policies& requested);
 
 struct Announced {
@@ -52,8 +53,8 @@ struct Mismatch {
   Weight weight = Weight::warning;
   std::string text;  // begins with the topic, as the node names it
 };
-// What becomes of a writer whose type our readers of its topic do not have. It may make a reader for it. Returns nothing
-// if the type is simply wrong.
+// What becomes of a writer whose type our readers of its topic do not have. It may make a reader
+// for it. Returns nothing if the type is simply wrong.
 using OtherType = std::function<std::optional<Mismatch>(const Announced& writer)>;
 
 // "std_msgs/msg/String" for "std_msgs::msg::dds_::String_". Any name becomes printable.

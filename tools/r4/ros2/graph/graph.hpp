@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Our part of the ROS 2 graph: nodes with their topics and services.
 //
-// Cyclone DDS counts what a participant has made with 14 bits, so 64 nodes share a participant. Nodes are made before
-// list_nodes(). A reader may be made later, on the thread that reads. leave() takes the nodes out of all lists at once,
-// and the destructor waits until that has been sent. A killed process stays in those lists for 10 s.
+// Cyclone DDS counts what a participant has made with 14 bits, so 64 nodes share a participant.
+// Nodes are made before list_nodes(). A reader may be made later, on the thread that reads. leave()
+// takes the nodes out of all lists at once, and the destructor waits until that has been sent. A
+// killed process stays in those lists for 10 s.
 #pragma once
 
 #include <chrono>

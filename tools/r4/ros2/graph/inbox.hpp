@@ -40,8 +40,8 @@ struct Origin {
 
 class Inbox {
  public:
-  // `clocks`: ours and that of who writes. `on_drained`: called on the loop when it has taken what there was. There is a
-  // participant already.
+  // `clocks`: ours and that of who writes. `on_drained`: called on the loop when it has taken what
+  // there was. There is a participant already.
   Inbox(asio::io_context& io, Transit::Clocks clocks, std::function<void()> on_drained);
   ~Inbox() { stop(); }
   Inbox(const Inbox&) = delete;
