@@ -33,7 +33,8 @@ def broken(times, values, longest):
 def main():
     data = sys.stdin.buffer
     plan = json.loads(data.readline())
-    matplotlib.rcParams.update({'svg.fonttype': 'none', 'svg.hashsalt': 'r4', 'agg.path.chunksize': 20000})
+    matplotlib.rcParams.update({'svg.fonttype': 'none', 'svg.hashsalt': 'r4', 'agg.path.chunksize': 20000,
+                                'text.parse_math': False})  # a name is no formula
     units = list(dict.fromkeys(curve['unit'] for curve in plan['curves']))
     figure, axes = pyplot.subplots(len(units), sharex=True, squeeze=False, layout='constrained',
                                    figsize=(10, 1.2 + 2.4 * len(units)))
