@@ -78,6 +78,15 @@ def test_draws_curves_safe_states_and_gaps(native, tmp_path):
     assert heights[4] < heights[0] < heights[6], 'forward is above zero, backward below it'
 
 
+def test_shows_names_of_others_as_they_are(native, tmp_path):
+    wires = native.read_text().replace('192.168.0.125 left-arm', r'$\x5cfoo$\x1b[2J&<b>').replace(' right-arm', '')
+    (tmp_path / 'others.r4log').write_text(wires)
+    result = run('plot', str(tmp_path / 'others.r4log'), 'AIN24', '-o', str(tmp_path / 'others.svg'))
+    assert result.returncode == 0 and not result.stderr, result
+    texts = [text.text for text in ElementTree.parse(tmp_path / 'others.svg').getroot().iter(f'{SVG}text')]
+    assert r'udp://$\foo$\x1b[2J&<b> AIN24' in texts, texts
+
+
 def test_draws_bitmaps_and_pages(native, tmp_path):
     for name, begin in (('a.png', b'\x89PNG'), ('a.pdf', b'%PDF')):
         assert run('plot', str(native), 'AIN24', '-o', str(tmp_path / name)).returncode == 0

@@ -139,8 +139,9 @@ void bind_fleet(py::module_& module) {
       .def_property_readonly("confirmed", &FleetResult::confirmed)
       .def_property_readonly("problem", [](const FleetResult& result) {
         const Problem& problem = result.problem;
-        return std::make_tuple(static_cast<int>(problem.kind), problem.thing, problem.reason,
-                               problem.fix, std::string(to_text(problem.outcome)),
+        return std::make_tuple(static_cast<int>(problem.kind), printable(problem.thing),
+                               printable(problem.reason), printable(problem.fix),
+                               std::string(to_text(problem.outcome)),
                                to_str(name_of(problem.refusal)), static_cast<int>(problem.at));
       });
 

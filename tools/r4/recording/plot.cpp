@@ -135,7 +135,8 @@ class Curves final : public RecordingReader::Handler {
 
   static std::string name_of(const PlottedWire& wire) {
     if (!wire.wire.name.empty()) return wire.wire.name;
-    return wire.wire.url.empty() ? fmt::format("wire {}", wire.wire.number) : wire.wire.url;
+    if (wire.wire.url.empty()) return fmt::format("wire {}", wire.wire.number);
+    return printable(wire.wire.url);
   }
   static bool is_called(const PlottedWire& wire, const std::string& name) {
     return name.empty() || name == wire.wire.name || name == wire.wire.url ||
@@ -221,7 +222,7 @@ void write_all(const FileDescriptor& memory, const void* bytes, std::size_t size
 // What Python is told (plot.py); the spans are those of the boards that have curves.
 FileDescriptor make_plan(const Curves& curves, const std::vector<Wanted>& wanted,
                          const std::string& title, const std::string& format) {
-  Json plan{{"title", title},
+  Json plan{{"title", printable(title)},
             {"format", format},
             {"seconds", curves.seconds_of(curves.last())},
             {"step", std::chrono::duration<double>(shortest_gap).count()},
