@@ -3,14 +3,21 @@
 #include "host/recording/recording_writer.hpp"
 
 #include <gtest/gtest.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 
+#include <cerrno>
 #include <csignal>
+#include <cstddef>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <thread>
 
 #include "heard.hpp"
 #include "tests/support/problems.hpp"
@@ -122,6 +129,33 @@ TEST_F(RecordingWriterTest, WritesOverNothingElse) {
   ASSERT_EQ(::mkfifo(path("fifo").c_str(), 0600), 0);
   EXPECT_EQ(problem_of([&] { RecordingWriter(path("fifo"), {}); }).reason, "is no file");
   EXPECT_EQ(problem_of([&] { RecordingWriter(path("no/where.r4log"), {}); }).kind, ErrorKind::open);
+}
+
+// From now on flock() fails with that error in this thread.
+void let_flock_fail(int error) {
+  sock_filter program[] = {
+      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_flock, 0, 1),
+      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | static_cast<std::uint32_t>(error)),
+      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW),
+  };
+  const sock_fprog filter{static_cast<unsigned short>(std::size(program)), program};
+  ASSERT_EQ(::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0), 0);
+  ASSERT_EQ(::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &filter), 0);
+}
+
+TEST_F(RecordingWriterTest, RecordsOnAFileSystemThatHasNoLocks) {
+  for (const int error : {ENOLCK, ENOSYS, EOPNOTSUPP, EINVAL}) {
+    std::thread([&] {
+      let_flock_fail(error);
+      EXPECT_NO_THROW(RecordingWriter(path(std::to_string(error)), {})) << error;
+    }).join();
+  }
+  std::thread([&] {
+    let_flock_fail(EWOULDBLOCK);
+    EXPECT_EQ(problem_of([&] { RecordingWriter(path("taken"), {}); }).reason,
+              "another program records into it");
+  }).join();
 }
 
 TEST_F(RecordingWriterTest, BeginsANewFileAfterASize) {
