@@ -9,7 +9,6 @@
 #include "r4link/datagram.hpp"
 #include "r4link/error.hpp"
 #include "recorder.hpp"
-#include "recording_file.hpp"
 #include "recording_reader.hpp"
 
 namespace r4 {
@@ -71,13 +70,8 @@ class Tour final : public RecordingReader::Handler {
 }  // namespace
 
 void read_recording(const std::string& path, RecordingVisitor& visitor) {
-  RecordingInput input(path);
   Tour tour(visitor);
-  RecordingReader reader(tour, input.name());
-  for (std::string_view bytes = input.read(); !bytes.empty(); bytes = input.read()) {
-    reader.feed(bytes);
-  }
-  reader.finish();
+  read_recording(path, tour);
 }
 
 }  // namespace r4

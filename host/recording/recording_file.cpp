@@ -38,6 +38,14 @@ Error cannot_be_read(const std::string& path, int error) {
           denied ? "allow reading it: chmod +r" : "name a recording, or - for standard input"};
 }
 
+// False if another program has the file. A file system that has no locks, such as some of networks, grants any.
+bool lock_alone(int file) {
+  while (::flock(file, LOCK_EX | LOCK_NB) != 0) {
+    if (errno != EINTR) return errno != EWOULDBLOCK;
+  }
+  return true;
+}
+
 }  // namespace
 
 RecordingFile::RecordingFile(std::string path) : path_(std::move(path)) {
@@ -49,7 +57,7 @@ RecordingFile::RecordingFile(std::string path) : path_(std::move(path)) {
   }
   file_.reset(::open(path_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOCTTY, 0666));
   if (!file_ || ::fstat(file_.get(), &status) != 0) throw cannot_be_written(path_, errno);
-  if (::flock(file_.get(), LOCK_EX | LOCK_NB) != 0) {
+  if (!lock_alone(file_.get())) {
     throw Error(ErrorKind::open, path_, "another program records into it", "name another file");
   }
   size_ = static_cast<std::uint64_t>(status.st_size);

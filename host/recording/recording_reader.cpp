@@ -11,23 +11,107 @@ namespace {
 
 constexpr std::size_t magic_size = 4;  // of zstd
 
+// Appends the front of `bytes` to what is known of a beginning, until that is `wanted` bytes long. True if it is.
+bool complete(std::string& beginning, std::string_view& bytes, std::size_t wanted) {
+  const std::size_t taken = std::min(bytes.size(), wanted - beginning.size());
+  beginning += bytes.substr(0, taken);
+  bytes.remove_prefix(taken);
+  return beginning.size() == wanted;
+}
+
 }  // namespace
 
+// --- lines
+
+const char* RecordingLines::on_line(std::string_view line, std::uint32_t stream) {
+  // What is not printable is written as \xNN, so this is a part of the line's end.
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  if (line.empty()) return nullptr;
+  if (!read_record_line(line, read_)) {
+    on_damage();
+    return read_.problem;
+  }
+  const bool header = read_.kind == LineKind::header;
+  if (header ? after_header_ : stream_.value_or(stream) != stream) fail_as_mixed();
+  after_header_ = header;
+  stream_ = stream;
+  switch (read_.kind) {
+    case LineKind::damaged:
+      break;
+    case LineKind::record:
+      recognised_ = true;
+      tell(read_.record);
+      return nullptr;
+    case LineKind::header:
+      if (read_.version != record_version) {
+        throw Error(ErrorKind::data, name_,
+                    std::string("a recording of a later version: ").append(line.substr(0, 60)),
+                    "read it with a newer r4");
+      }
+      recognised_ = true;
+      ended_ = false;
+      wires_.clear();
+      handler_.on_header();
+      break;
+    case LineKind::wire: {
+      Wire& wire = wires_[read_.wire.number];
+      if (!wire.url.empty() && wire.url != read_.wire.url) fail_as_mixed();
+      wire = {read_.wire.url, std::nullopt};
+      handler_.on_wire(read_.wire);
+      return nullptr;
+    }
+    case LineKind::device:
+      handler_.on_device(read_.device);
+      break;
+    case LineKind::comment:
+      break;
+  }
+  handler_.on_comment(line);
+  return nullptr;
+}
+
+void RecordingLines::on_record(const Record& record, std::uint32_t stream, std::string_view url) {
+  Wire& wire = wires_[record.wire];
+  if (wire.stream.value_or(stream) != stream) fail_as_mixed();
+  if (!wire.url.empty() && !url.empty() && wire.url != url) fail_as_mixed();
+  wire.stream = stream;
+  tell(record);
+}
+
+void RecordingLines::on_damage() {
+  after_header_ = ended_ = false;
+  stream_.reset();
+  wires_.clear();
+}
+
+void RecordingLines::tell(const Record& record) {
+  if (ended_) fail_as_mixed();
+  after_header_ = false;
+  ended_ = record.wire == no_wire && record.kind == RecordKind::event && record.bytes == "end";
+  handler_.on_record(record);
+}
+
+void RecordingLines::fail_as_mixed() const {
+  throw Error(ErrorKind::data, name_,
+              "several recordings are mixed in it, so whose datagrams these are is unknown",
+              "read each recording alone, or join them one after the other: cat A.r4log B.r4log");
+}
+
+// --- a file
+
 RecordingReader::RecordingReader(Handler& handler, std::string name)
-    : handler_(handler), name_(std::move(name)) {
-  part_.reserve(max_record_line);
+    : lines_(handler, name), handler_(handler), name_(std::move(name)) {
+  part_.reserve(max_record_line + 1);
 }
 
 void RecordingReader::feed(std::string_view bytes) {
-  if (begun_) return zstd_ ? on_compressed(bytes) : on_text(bytes);
-  const std::size_t taken = std::min(bytes.size(), magic_size - beginning_.size());
-  beginning_ += bytes.substr(0, taken);
-  bytes.remove_prefix(taken);
-  if (beginning_.size() < magic_size) return;
-  begun_ = true;
-  if (is_zstd(beginning_)) zstd_ = std::make_unique<ZstdReader>();
-  feed(beginning_);
-  feed(bytes);
+  if (!begun_) {
+    if (!complete(beginning_, bytes, magic_size)) return;
+    begun_ = true;
+    if (is_zstd(beginning_)) zstd_ = std::make_unique<ZstdReader>();
+    feed(beginning_);
+  }
+  zstd_ ? on_compressed(bytes) : on_text(bytes);
 }
 
 void RecordingReader::on_compressed(std::string_view bytes) {
@@ -37,41 +121,62 @@ void RecordingReader::on_compressed(std::string_view bytes) {
     if (step == ZstdReader::Step::damaged) {
       // What comes next is not the rest of the line that was begun.
       if (part_size_ != 0) end_line({});
-      handler_.on_damage({RecordingDamage::Kind::zstd, line_, taken_, "damaged compression"});
+      if (zstd_->window_too_large() && !lines_.recognised()) {
+        throw Error(ErrorKind::data, name_, ZstdReader::window_problem,
+                    "unpack it first: zstd -d --long=31 FILE.zst");
+      }
+      lines_.on_damage();
+      handler_.on_damage({RecordingDamage::Kind::zstd, line_, taken_, zstd_->problem()});
     }
     taken_ += before - bytes.size();
     if (step == ZstdReader::Step::more) break;
     if (step == ZstdReader::Step::text) on_text(zstd_->text());
   }
-  if (!recognised_ && taken_ > patience) fail_as_none();
+  if (!lines_.recognised() && taken_ > patience) fail_as_none();
 }
 
+// The text from its beginning, which may be something else.
 void RecordingReader::on_text(std::string_view text) {
+  if (!text_begun_) {
+    if (!complete(text_beginning_, text, form_bytes)) return;
+    text_begun_ = true;
+    if (form_of(text_beginning_) != FileForm::text) fail_as_none();
+    std::string_view beginning = text_beginning_;
+    if (beginning.starts_with(utf8_mark)) {
+      beginning.remove_prefix(utf8_mark.size());
+      offset_ = utf8_mark.size();
+    }
+    on_lines(beginning);
+  }
+  on_lines(text);
+}
+
+void RecordingReader::on_lines(std::string_view text) {
   while (!text.empty()) {
     const std::size_t end = text.find('\n');
     const std::string_view piece = text.substr(0, end);
     if (end == std::string_view::npos) {
       part_size_ += piece.size();
-      part_ += piece.substr(0, max_record_line - std::min(part_.size(), max_record_line));
+      part_ += piece.substr(0, max_record_line + 1 - std::min(part_.size(), max_record_line + 1));
       text = {};
     } else {
       end_line(piece);
       text.remove_prefix(end + 1);
     }
-    if (!recognised_ && offset_ + part_size_ > patience) fail_as_none();
+    if (!lines_.recognised() && offset_ + part_size_ > patience) fail_as_none();
   }
 }
 
 // Ends the line whose last bytes these are.
 void RecordingReader::end_line(std::string_view rest) {
   const std::uint64_t size = part_size_ + rest.size();
-  if (size > max_record_line) {
+  const bool cr = rest.empty() ? part_.ends_with('\r') : rest.ends_with('\r');
+  if (size > max_record_line + (cr ? 1 : 0)) {
     damage(RecordingDamage::Kind::line, "longer than any line of a recording");
-  } else if (part_size_ == 0) {
-    on_line(rest);
   } else {
-    part_ += rest;
-    on_line(part_);
+    if (part_size_ != 0) part_ += rest;
+    const char* const problem = lines_.on_line(part_size_ == 0 ? rest : part_);
+    if (problem != nullptr) damage(RecordingDamage::Kind::line, problem);
   }
   part_.clear();
   part_size_ = 0;
@@ -79,53 +184,31 @@ void RecordingReader::end_line(std::string_view rest) {
   ++line_;
 }
 
-void RecordingReader::on_line(std::string_view line) {
-  if (line.empty()) return;
-  read_record_line(line, read_);
-  switch (read_.kind) {
-    case LineKind::damaged:
-      return damage(RecordingDamage::Kind::line, read_.problem);
-    case LineKind::record:
-      recognised_ = true;
-      return handler_.on_record(read_.record);
-    case LineKind::header:
-      if (read_.version != record_version) {
-        throw Error(ErrorKind::data, name_,
-                    std::string("a recording of a later version: ").append(line.substr(0, 60)),
-                    "read it with a newer r4");
-      }
-      recognised_ = true;
-      handler_.on_header();
-      return handler_.on_comment(line);
-    case LineKind::wire:
-      return handler_.on_wire(read_.wire);
-    case LineKind::device:
-      handler_.on_device(read_.device);
-      return handler_.on_comment(line);
-    case LineKind::comment:
-      return handler_.on_comment(line);
-  }
-}
-
 void RecordingReader::finish() {
   if (!begun_) {
     begun_ = true;
     on_text(beginning_);
   }
+  if (!text_begun_) {
+    text_begun_ = true;
+    on_lines(text_beginning_);
+  }
+  const bool recognised = lines_.recognised();
   if (part_size_ != 0) {
     damage(RecordingDamage::Kind::torn, "the last line is not whole");
-  } else if (recognised_ && zstd_ && !zstd_->between_frames()) {
+  } else if (recognised && zstd_ && !zstd_->between_frames()) {
     damage(RecordingDamage::Kind::torn, "the recording was not ended");
   }
-  if (!recognised_) fail_as_none();
+  if (!recognised) fail_as_none();
 }
 
 void RecordingReader::damage(RecordingDamage::Kind kind, std::string_view reason) {
+  lines_.on_damage();
   handler_.on_damage({kind, line_, offset_, reason});
 }
 
 void RecordingReader::fail_as_none() const {
-  throw Error(ErrorKind::data, name_, "no recording", "r4 record URL -o FILE makes one");
+  throw not_a_recording(name_, form_of(text_beginning_));
 }
 
 }  // namespace r4

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "zstd_stream.hpp"
 
+#include <zstd_errors.h>
+
 #include <algorithm>
 #include <new>
 
@@ -9,8 +11,12 @@ namespace {
 
 // The first bytes of a frame (RFC 8878, 3.1.1).
 constexpr std::string_view magic = "\x28\xb5\x2f\xfd";
-// What a frame may ask of a reader: 8 MiB, as the RFC recommends.
-constexpr int window_log = 23;
+// The last three bytes of the magic number of a skippable frame, whose first byte is 0x50 to 0x5F (RFC 8878, 3.1.2).
+// pzstd and seekable archives begin with one.
+constexpr std::string_view skippable = "\x2a\x4d\x18";
+// The largest window that is read: 128 MiB, as `zstd -d` reads without an option. zstd --long and --ultra ask for it.
+// Memory is taken only for what the frame holds.
+constexpr int window_log = 27;
 constexpr int level = 3;
 // The frames that are written here; a longer window gains nothing.
 constexpr int frame_window_log = 20;
@@ -67,6 +73,7 @@ ZstdReader::Step ZstdReader::step(std::string_view& bytes) {
   ZSTD_outBuffer output{output_.data(), output_.size(), 0};
   const std::size_t left = ZSTD_decompressStream(context_.get(), &output, &input);
   if (ZSTD_isError(left) != 0) {
+    window_too_large_ = ZSTD_getErrorCode(left) == ZSTD_error_frameParameter_windowTooLarge;
     search(bytes, from_found);
     return Step::damaged;
   }
@@ -115,6 +122,14 @@ bool ZstdReader::find_frame(std::string_view& bytes) {
   return false;
 }
 
-bool is_zstd(std::string_view beginning) { return beginning.starts_with(magic); }
+const char* ZstdReader::problem() const {
+  return window_too_large_ ? window_problem : "damaged compression";
+}
+
+bool is_zstd(std::string_view beginning) {
+  const bool skipped = beginning.size() >= 4 && beginning.substr(1).starts_with(skippable) &&
+                       (static_cast<unsigned char>(beginning[0]) & 0xF0) == 0x50;
+  return skipped || beginning.starts_with(magic);
+}
 
 }  // namespace r4

@@ -28,6 +28,9 @@ class ZstdWriter {
 // Frames one after the other. Behind damage it goes on with the next frame that there is.
 class ZstdReader {
  public:
+  static constexpr const char* window_problem =
+      "a zstd frame that needs a window of more than 128 MiB";
+
   ZstdReader();
   enum class Step : unsigned char {
     more,     // all of the input is taken
@@ -37,6 +40,10 @@ class ZstdReader {
   // Takes from the front of `bytes`.
   Step step(std::string_view& bytes);
   std::string_view text() const { return {output_.data(), size_}; }
+  // Why step() returned damaged.
+  const char* problem() const;
+  // True if that was a frame which needs more memory than is read: it is whole, and zstd --long=31 unpacks it.
+  bool window_too_large() const { return window_too_large_; }
   // Between two frames: nothing of the last one is missing.
   bool between_frames() const { return !in_frame_; }
 
@@ -51,13 +58,14 @@ class ZstdReader {
   std::string output_;
   std::size_t size_ = 0;
   bool in_frame_ = false;
+  bool window_too_large_ = false;
   bool searching_ = false;
   std::string tail_;   // while it searches: the beginning of a frame, perhaps
   std::string last_;   // the last bytes that were taken
   std::string found_;  // the beginning of the frame that was found
 };
 
-// Does a file that begins so hold frames of zstd?
+// True if a file that begins so holds frames of zstd; four bytes tell.
 bool is_zstd(std::string_view beginning);
 
 }  // namespace r4

@@ -133,7 +133,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   r4::is_json_lines(lines.file, lines.records);
   const r4::Made frames = converted(whole, "x.log");
   if (!frames.file.empty()) {
-    r4::require(converted(frames.file, "x.log", r4::native, frames.file.size()).told.empty());
+    const r4::Made back = converted(frames.file, "x.log", r4::native, frames.file.size());
+    r4::require(back.told.empty() || back.told.find("count from 1970") != std::string::npos);
   }
   r4::is_told_of(whole, lines.records);
   return 0;

@@ -18,9 +18,9 @@ DOMAINS = itertools.count(os.getpid() * 8)
 ENVIRONMENT = {name: value for name, value in os.environ.items()
                if not name.startswith('ROS_') and name != 'CYCLONEDDS_URI'}
 # What ROS 2 calls its messages in DDS, and what releases since Iron compare (measured).
-STRING, BOOL, FLOAT32, INT32, UINT32, TWIST, TWIST_STAMPED, EMPTY = (f'{package}::msg::dds_::{name}_' for package, name in (
+STRING, BOOL, FLOAT32, INT32, UINT32, TWIST, TWIST_STAMPED = (f'{package}::msg::dds_::{name}_' for package, name in (
     ('std_msgs', 'String'), ('std_msgs', 'Bool'), ('std_msgs', 'Float32'), ('std_msgs', 'Int32'), ('std_msgs', 'UInt32'),
-    ('geometry_msgs', 'Twist'), ('geometry_msgs', 'TwistStamped'), ('std_msgs', 'Empty')))
+    ('geometry_msgs', 'Twist'), ('geometry_msgs', 'TwistStamped')))
 LOG = 'rcl_interfaces::msg::dds_::Log_'
 DIAGNOSTICS = 'diagnostic_msgs::msg::dds_::DiagnosticArray_'
 NODES = 'rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_'

@@ -110,7 +110,7 @@ def in_several_chunks(native):
     """The capture's lines again and again, and a second board."""
     lines = native.read_text().splitlines(True)
     native.write_text(''.join(lines[:2]) + '# wire 2 can://can0?node=2\n' +
-                      ''.join(lines[2:] + [line.replace(' 1', ' 2', 1) for line in lines[4:-1]]) * 40)
+                      ''.join(lines[2:-1] + [line.replace(' 1', ' 2', 1) for line in lines[4:-1]]) * 40 + lines[-1])
     return native
 
 
@@ -121,7 +121,7 @@ def test_mcaps_own_reader_has_every_message_by_every_index(two_boards, tmp_path)
     told = json.loads(read.stdout)
     assert told['topics'] == {
         '/r4log': ['r4.Line', {'wire': '0'}],
-        '/left-arm': ['r4.Record', {'wire': '1', 'url': 'udp://192.168.0.125'}],
+        '/left-arm': ['r4.Record', {'wire': '1', 'url': 'udp://192.168.0.125', 'name': 'left-arm'}],
         '/board2': ['r4.Record', {'wire': '2', 'url': 'can://can0?node=2'}]}
     convert(two_boards, tmp_path / 'drive.jsonl')
     expected = {1: [], 2: []}
@@ -177,6 +177,20 @@ def test_of_a_pipe_whose_writer_is_gone_all_that_is_whole_is_read(native, tmp_pa
         told, _ = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == DATA_BAD and 'the last line is not whole' in told, told
     assert command == 'info' or target.read_text().startswith(''.join(lines[:-2]))
+
+
+def test_what_mergecap_has_mixed_is_refused_and_what_it_appends_is_read(tmp_path):
+    for name, url in (('a', 'udp://192.168.0.125'), ('b', 'udp://192.168.0.126')):
+        convert(capture(tmp_path / f'{name}.r4log', url), tmp_path / f'{name}.pcapng')
+    both = [tmp_path / 'a.pcapng', tmp_path / 'b.pcapng']
+    for mode in ('none', 'all'):
+        subprocess.run(['mergecap', '-I', mode, '-w', tmp_path / 'mixed.pcapng', *both], check=True)
+        said = convert(tmp_path / 'mixed.pcapng', tmp_path / 'mixed.csv', code=DATA_BAD).stderr
+        assert 'several recordings are mixed' in said
+    subprocess.run(['mergecap', '-a', '-I', 'none', '-w', tmp_path / 'after.pcapng', *both], check=True)
+    convert(tmp_path / 'after.pcapng', tmp_path / 'after.r4log')
+    assert (tmp_path / 'after.r4log').read_text() == ''.join(
+        (tmp_path / f'{name}.r4log').read_text() for name in 'ab')
 
 
 def test_a_pipe_is_read_and_nothing_is_replaced_unasked(native, tmp_path):
@@ -237,14 +251,14 @@ def claims(ending):
     endless = subprocess.run(['zstd', '-cq'], input=line + b'x' * 100_000_000, capture_output=True, check=True).stdout
     frame = b'\x28\xb5\x2f\xfd'
     return {
-        '.mcap': [(mcap + b'\x06' + struct.pack('<Q', much), 'a record that is longer than any'),
+        '.mcap': [(mcap + b'\x06' + struct.pack('<Q', much), 'a record of more than 256 MiB'),
                   (mcap + b'\x06' + struct.pack('<Q', len(chunk)) + chunk, 'a chunk that is not whole')],
         '.pcapng': [(section + struct.pack('<II', 6, most) + bytes(100), 'no block of pcapng')],
         '.pcap': [(struct.pack('<IIQIIIIII', 0xA1B2C3D4, 0x40002, 0, most, 228, 1, 0, most, most) + bytes(100),
                    'no packet is that long')],
         # Of that size; with a window of that size; with a line of 100 MB in it.
-        '.r4log.zst': [(begins + frame + b'\xe0' + struct.pack('<Q', much) + bytes(100), 'damaged compression'),
-                       (begins + frame + b'\0\xa8' + bytes(100), 'damaged compression'),
+        '.r4log.zst': [(begins + frame + b'\xe0' + struct.pack('<Q', much) + bytes(100), 'a zstd frame that needs a window'),
+                       (begins + frame + b'\0\xa8' + bytes(100), 'a zstd frame that needs a window'),
                        (endless, 'the last line is not whole')],
     }[ending]
 

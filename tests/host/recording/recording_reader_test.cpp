@@ -3,8 +3,12 @@
 #include "host/recording/recording_reader.hpp"
 
 #include <gtest/gtest.h>
+#include <zstd.h>
 
+#include <algorithm>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "heard.hpp"
 #include "host/recording/zstd_stream.hpp"
@@ -151,6 +155,128 @@ TEST(RecordingReader, RefusesAFrameThatWantsMuchMemory) {
   const Heard heard = heard_in(file);
   EXPECT_EQ(heard.records, lines(0, 3));
   EXPECT_FALSE(heard.damage.empty());
+}
+
+TEST(RecordingReader, ReadsLinesThatEndInCrLfBehindAMarkOfUtf8) {
+  const std::string text = head() + lines(0, 20);
+  std::string edited = "\xEF\xBB\xBF";
+  for (const char c : text) edited += c == '\n' ? std::string("\r\n") : std::string(1, c);
+  for (const std::string& file : {edited, compressed(edited)}) {
+    for (const std::size_t piece : {1, 2, 7, 100'000}) {
+      const Heard heard = heard_in(file, piece);
+      EXPECT_EQ(heard.records, lines(0, 20)) << piece;
+      EXPECT_TRUE(heard.damage.empty()) << piece;
+    }
+  }
+}
+
+TEST(RecordingReader, SaysWhatAFileOfAnotherFormIsAndWhatReadsIt) {
+  struct Other {
+    std::string beginning, reason, fix;
+  };
+  for (const Other& other : {Other{"\x0A\x0D\x0D\x0A", "capture of packets", "r4 convert"},
+                             Other{"\xD4\xC3\xB2\xA1", "capture of packets", "r4 convert"},
+                             Other{"\x89MCAP0\r\n", "MCAP file", "r4 convert"},
+                             Other{"\x1F\x8B\x08", "compressed by gzip", "gzip -dk"},
+                             Other{"\xFD\x37zXZ", "compressed by xz", "xz -dk"},
+                             Other{"\xFF\xFE#", "UTF-16", "iconv -f UTF-16"},
+                             Other{std::string("#\0 \0", 4), "UTF-16", "iconv -f UTF-16"}}) {
+    const std::string file = other.beginning + std::string(1000, 'x');
+    for (const std::string& bytes : {file, compressed(file)}) {
+      const Problem problem = problem_of([&] { heard_in(bytes, 3); });
+      EXPECT_EQ(problem.kind, ErrorKind::data);
+      EXPECT_TRUE(contains(problem.reason, other.reason)) << problem.reason;
+      EXPECT_TRUE(contains(problem.fix, other.fix)) << problem.fix;
+    }
+  }
+}
+
+TEST(RecordingReader, ReadsTheArchivesOfZstdsOwnPrograms) {
+  const std::string text = head() + lines(0, 50);
+  // What --long=27 and --ultra -22 ask for, and what pzstd writes in front of each frame.
+  std::string archive(ZSTD_compressBound(text.size()), '\0');
+  const std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> context(ZSTD_createCCtx(),
+                                                                     &ZSTD_freeCCtx);
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_windowLog, 27);
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_contentSizeFlag, 0);
+  ZSTD_inBuffer input{text.data(), text.size(), 0};
+  ZSTD_outBuffer output{archive.data(), archive.size(), 0};
+  ASSERT_EQ(ZSTD_compressStream2(context.get(), &output, &input, ZSTD_e_continue), 0);
+  ASSERT_EQ(ZSTD_compressStream2(context.get(), &output, &input, ZSTD_e_end), 0);
+  archive.resize(output.pos);
+  const std::string skippable("\x50\x2A\x4D\x18\x04\0\0\0abcd", 12);
+  for (const std::string& file :
+       {archive, skippable + archive,
+        skippable + compressed(head() + lines(0, 25)) + skippable + compressed(lines(25, 25))}) {
+    const Heard heard = heard_in(file, 5);
+    EXPECT_EQ(heard.records, lines(0, 50));
+    EXPECT_TRUE(heard.damage.empty());
+  }
+}
+
+TEST(RecordingReader, SaysThatAWindowIsTooLargeAndWhatUnpacksIt) {
+  const std::string file = std::string("\x28\xb5\x2f\xfd\x00\xa8", 6) + std::string(100, '\0');
+  const Problem problem = problem_of([&] { heard_in(file); });
+  EXPECT_EQ(problem.kind, ErrorKind::data);
+  EXPECT_TRUE(contains(problem.reason, "window of more than 128 MiB"));
+  EXPECT_TRUE(contains(problem.fix, "zstd -d --long=31"));
+}
+
+// As `sort -m` makes it of two recordings.
+std::string merged_by_sort(const std::string& a, const std::string& b) {
+  std::vector<std::string> all;
+  for (const std::string& file : {a, b}) {
+    for (std::size_t at = 0, end = 0; at < file.size(); at = end + 1) {
+      end = file.find('\n', at);
+      all.push_back(file.substr(at, end - at + 1));
+    }
+  }
+  std::stable_sort(all.begin(), all.end());
+  std::string file;
+  for (const std::string& line : all) file += line;
+  return file;
+}
+
+TEST(RecordingReader, RefusesRecordingsThatAreMixed) {
+  const std::string end = "1795468299.000000 0! end\n";
+  std::string other;
+  write_record_header(other);
+  write_wire(other, {1, "udp://another-robot", "right"});
+  const std::string left = head() + lines(0, 5) + end;
+  const std::string right = other + lines(3, 5) + end;
+  const std::string no_header = right.substr(right.find("# wire"));
+  for (const std::string& file : {
+           merged_by_sort(left, right),
+           merged_by_sort(left, left),
+           head() + lines(0, 2) + no_header,                  // the wire is another
+           head() + other + lines(0, 9) + end + lines(9, 1),  // behind the end
+           head() + other + lines(0, 9) + end + end,
+       }) {
+    const Problem problem = problem_of([&] { heard_in(file); });
+    EXPECT_EQ(problem.kind, ErrorKind::data);
+    EXPECT_TRUE(contains(problem.reason, "several recordings are mixed")) << problem.reason;
+  }
+}
+
+TEST(RecordingReader, ReadsRecordingsOneAfterTheOtherThoughTheHeaderBetweenThemIsDamaged) {
+  std::string other;
+  write_record_header(other);
+  write_wire(other, {1, "udp://another-robot", "right"});
+  other[0] = '$';
+  const std::string end = "1795468299.000000 0! end\n";
+  const Heard heard = heard_in(head() + lines(0, 2) + end + other + lines(2, 2) + end);
+  EXPECT_EQ(heard.records, lines(0, 2) + end + lines(2, 2) + end);
+  EXPECT_EQ(heard.damage.size(), 1);
+}
+
+TEST(RecordingReader, ReadsRecordingsWithOtherWiresOneAfterTheOther) {
+  std::string other;
+  write_record_header(other);
+  write_wire(other, {1, "udp://another-robot", "right"});
+  const std::string end = "1795468299.000000 0! end\n";
+  const Heard heard = heard_in(head() + lines(0, 2) + end + other + lines(2, 2) + head() + end);
+  EXPECT_EQ(heard.records, lines(0, 2) + end + lines(2, 2) + end);
+  EXPECT_EQ(heard.headers, 3);
 }
 
 }  // namespace

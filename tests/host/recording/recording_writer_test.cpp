@@ -3,14 +3,21 @@
 #include "host/recording/recording_writer.hpp"
 
 #include <gtest/gtest.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 
+#include <cerrno>
 #include <csignal>
+#include <cstddef>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <thread>
 
 #include "heard.hpp"
 #include "tests/support/datagrams.hpp"
@@ -215,6 +222,33 @@ TEST_F(RecordingWriterTest, StaysInItsFolderWhenTheProgramChangesItsWorkingDirec
     EXPECT_FALSE(writer.take_trouble());
   }
   EXPECT_EQ(names(), (std::vector<std::string>{"drive-00001.r4log", "drive-00002.r4log"}));
+}
+
+// From now on flock() fails with that error in this thread.
+void let_flock_fail(int error) {
+  sock_filter program[] = {
+      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_flock, 0, 1),
+      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | static_cast<std::uint32_t>(error)),
+      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW),
+  };
+  const sock_fprog filter{static_cast<unsigned short>(std::size(program)), program};
+  ASSERT_EQ(::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0), 0);
+  ASSERT_EQ(::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &filter), 0);
+}
+
+TEST_F(RecordingWriterTest, RecordsOnAFileSystemThatHasNoLocks) {
+  for (const int error : {ENOLCK, ENOSYS, EOPNOTSUPP, EINVAL}) {
+    std::thread([&] {
+      let_flock_fail(error);
+      EXPECT_NO_THROW(RecordingWriter(path(std::to_string(error)), {})) << error;
+    }).join();
+  }
+  std::thread([&] {
+    let_flock_fail(EWOULDBLOCK);
+    EXPECT_EQ(problem_of([&] { RecordingWriter(path("taken"), {}); }).reason,
+              "another program records into it");
+  }).join();
 }
 
 TEST_F(RecordingWriterTest, BeginsANewFileAfterASize) {

@@ -72,6 +72,36 @@ TEST(Candump, TellsFramesThatAreNoneOfOurs) {
             CandumpError::detail);
 }
 
+TEST(Candump, ReadsTheLinesOfNewerCandumpForFramesThatAreNoneOfOurs) {
+  for (const char* const text :
+       {"(1.0) can0 244#R8", "(1.0) can0 244#R8_B", "(1.0) can0 123#81:00:12345678#112233",
+        "(1.0) can0 12123#81:00:12345678#", "  can0  123  [0003]  11 22 33"}) {
+    CandumpLine line;
+    ASSERT_EQ(read_candump_line(text, line), CandumpError::none) << text;
+    EXPECT_TRUE(line.frame.remote) << text;
+    EXPECT_EQ(line.frame.size, 0) << text;
+  }
+  CandumpLine line;
+  ASSERT_EQ(read_candump_line(" can0  244   {B}  01 02 03 04 05 06 07 08", line),
+            CandumpError::none);
+  EXPECT_EQ(bytes_of(line.frame), (std::vector<int>{1, 2, 3, 4, 5, 6, 7, 8}));
+  for (const char* const text :
+       {"(1.0) can0 123#81:00:1234567#112233", "(1.0) can0 123#81:00:12345678",
+        "(1.0) can0 244#R8_B more", " can0  244   {8}  01 02 03 04 05 06 07 08"}) {
+    EXPECT_NE(read_candump_line(text, line), CandumpError::none) << text;
+  }
+}
+
+TEST(Candump, TakesTheNamesThatPythonCanGivesToItsChannels) {
+  for (const char* const name : {"PCAN_USBBUS1", "239.74.163.2", "/dev/ttyACM0",
+                                 "ff15:7079:7468:6f6e:6465:6d6f:6d63:6173"}) {
+    CandumpLine line;
+    const std::string text = std::string("(1436509052.249713) ") + name + " 244#00";
+    ASSERT_EQ(read_candump_line(text, line), CandumpError::none) << name;
+    EXPECT_EQ(line.interface, name);
+  }
+}
+
 TEST(Candump, ReadsTimesToTheMicrosecond) {
   CandumpLine line;
   read_candump_line("(1436509052.249713) vcan0 244#", line);
@@ -112,7 +142,7 @@ TEST(Candump, SaysWhatIsWrongWithALine) {
            {"(1.1234567890) vcan0 244#", E::time},
            {"(99999999999999999999.5) vcan0 244#", E::time},
            {"(2015-02-30 08:57:32.249713) vcan0 244#", E::time},
-           {"(1.0) an-interface-too-long 244#", E::interface},
+           {"(1.0) " + std::string(65, 'x') + " 244#", E::interface},
            {"(1.0) vc\xffn0 244#", E::interface},
            {"(1.0) vcan0 24#", E::id},
            {"(1.0) vcan0 800#", E::id},

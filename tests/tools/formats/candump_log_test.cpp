@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // CAN frames to records, and records to the frames that carry them.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "converted.hpp"
@@ -71,6 +72,64 @@ TEST(CandumpLog, TellsThePlaceOfWhatCannotBeRead) {
   EXPECT_EQ(
       datagram_lines(result.bytes),
       datagram_lines(recorded_capture()).substr(datagram_lines(recorded_capture()).find('\n') + 1));
+}
+
+// The log with its times, in microseconds, as `time_of(time, time before)` counts them.
+template <class TimeOf>
+std::string counted(const std::string& log, TimeOf time_of) {
+  std::string out;
+  std::uint64_t first = 0, before = 0;
+  for (std::size_t at = 0, end = 0; at < log.size(); at = end + 1) {
+    end = log.find('\n', at);
+    const std::uint64_t us = std::stoull(log.substr(at + 1)) * 1'000'000 +
+                             std::stoull(log.substr(log.find('.', at) + 1));
+    if (first == 0) first = before = us;
+    const std::uint64_t now = time_of(us - first, us - before);
+    before = us;
+    out += fmt::format("({:03}.{:06}{}", now / 1'000'000, now % 1'000'000,
+                       log.substr(log.find(')', at), end - log.find(')', at) + 1));
+  }
+  return out;
+}
+
+TEST(CandumpLog, RefusesTimesThatDoNotCountFrom1970) {
+  const std::string log = converted(recorded_capture("can://can0"), ".r4log", ".log").bytes;
+  const std::string from_zero = counted(log, [](auto since, auto) { return since; });
+  const std::string differences = counted(log, [](auto, auto gap) { return gap; });
+  const std::string zeros = counted(log, [](auto, auto) { return 0; });
+  tool::SourceOptions at;
+  at.start = Time{1795468293414765};
+  for (const std::string& text : {from_zero, differences, zeros}) {
+    const Problem problem = problem_of([&] { converted(text, ".log", ".r4log"); });
+    EXPECT_EQ(problem.kind, ErrorKind::data);
+    EXPECT_TRUE(contains(problem.reason, "do not count from 1970"));
+    EXPECT_TRUE(contains(problem.fix, "--start"));
+  }
+  const auto dated = [&](const std::string& text) {
+    return converted(text, ".log", ".r4log", 100, {}, at).bytes;
+  };
+  EXPECT_EQ(datagram_lines(dated(from_zero)), datagram_lines(recorded_capture()));
+  EXPECT_TRUE(contains(problem_of([&] { dated(differences); }).reason, "go back"));
+  EXPECT_TRUE(contains(problem_of([&] { dated(zeros); }).reason, "are the same"));
+}
+
+TEST(CandumpLog, RefusesALogWithoutADatagramOfABoard) {
+  const std::string foreign = "(1436509052.249713) can0 7DF#0201050000000000\n";
+  const Problem problem = problem_of([&] { converted(foreign, ".log", ".r4log"); });
+  EXPECT_EQ(problem.kind, ErrorKind::data);
+  EXPECT_TRUE(contains(problem.reason, "no whole datagram of a board"));
+}
+
+TEST(CandumpLog, KeepsTheChannelsOfPythonCanThereAndBack) {
+  const std::string log = converted(recorded_capture("can://can0?node=3"), ".r4log", ".log").bytes;
+  for (const std::string channel : {"/dev/ttyACM0", "239.74.163.2", "ff15:7079::6173", "a%20b"}) {
+    std::string text = log;
+    for (std::size_t at = text.find("can0"); at != std::string::npos; at = text.find("can0", at)) {
+      text.replace(at, 4, channel);
+    }
+    const std::string native = converted(text, ".log", ".r4log").bytes;
+    EXPECT_EQ(converted(native, ".r4log", ".log").bytes, text) << channel;
+  }
 }
 
 TEST(CandumpLog, RefusesWhatIsNoneAndWhatItCannotHold) {

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "converted.hpp"
+#include "host/recording/zstd_stream.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::test {
@@ -84,6 +85,45 @@ TEST(Conversion, RefusesEndingsThatAreNoFormat) {
     EXPECT_TRUE(
         contains(problem_of([&] { tool::make_source(name, nobody); }).reason, "only written"));
   }
+}
+
+TEST(Conversion, ReadsAFileByWhatIsInItWhateverItsNameAndCompression) {
+  const std::string native = recorded_capture("can://can0?node=3");
+  for (const char* const form : {".r4log", ".log", ".pcapng", ".mcap"}) {
+    const std::string file = converted(native, ".r4log", form).bytes;
+    const std::string expected = converted(file, form, ".r4log").bytes;
+    std::string archive;
+    ZstdWriter().write(file, true, archive);
+    for (const std::string& bytes : {file, archive}) {
+      for (const char* const name : {".txt", ".pcapng0", ".MCAP", ".log", ".r4log", ".zst"}) {
+        for (const std::size_t piece : {3, 100'000}) {
+          const Converted read = converted(bytes, name, ".r4log", piece);
+          EXPECT_EQ(read.bytes, expected) << form << " as " << name;
+          EXPECT_TRUE(read.damage.empty());
+        }
+      }
+    }
+  }
+}
+
+TEST(Conversion, SaysWhatAFileIsThatNoFormatReads) {
+  for (const char* const name : {".r4log", ".log", ".pcapng", ".gz"}) {
+    const std::string file = "\x1F\x8B\x08" + std::string(100, 'x');
+    const Problem problem = problem_of([&] { converted(file, name, ".r4log"); });
+    EXPECT_TRUE(contains(problem.reason, "compressed by gzip")) << problem.reason;
+  }
+}
+
+TEST(Conversion, TellsOfDamagedCompressionWhateverIsCompressed) {
+  const std::string packets = converted(generated_recording(7, 3000), ".r4log", ".pcapng").bytes;
+  std::string archive;
+  ZstdWriter writer;
+  writer.write(packets.substr(0, packets.size() / 2), true, archive);
+  archive.back() ^= 0x55;  // of the checksum
+  writer.write(packets.substr(packets.size() / 2), true, archive);
+  const Converted read = converted(archive, ".pcapng.zst", ".r4log");
+  ASSERT_FALSE(read.damage.empty());
+  EXPECT_EQ(read.damage[0].reason, "damaged compression");
 }
 
 }  // namespace

@@ -24,10 +24,13 @@ std::string recorded_capture(const std::string& url) {
 
 std::string generated_recording(unsigned seed, int records) {
   std::mt19937 random(seed);
+  const auto url_of = [](std::uint16_t wire) {
+    return wire == 2 ? "serial:///dev/tty ACM0" : "udp://10.0.0.1:2018";
+  };
   const auto below = [&random](unsigned n) { return static_cast<unsigned>(random() % n); };
   std::string native = "# r4log 1 by r4 0.0.7\n# an older one\n";
   for (std::uint16_t wire = 1; wire <= 3; ++wire) {
-    write_wire(native, {wire, wire == 2 ? "serial:///dev/tty ACM0" : "udp://10.0.0.1:2018", ""});
+    write_wire(native, {wire, url_of(wire), ""});
   }
   Time time{1795468293404765};
   for (int i = 0; i < records; ++i) {
@@ -44,8 +47,7 @@ std::string generated_recording(unsigned seed, int records) {
       std::replace(bytes.begin(), bytes.end(), 'C', 'c');  // no setting, which might be a secret
     }
     if (what == 6) native += "# a comment \xff \\x20\n";
-    if (what == 7)
-      write_wire(native, {wire, "udp://10.0.0.1:2018", "arm-" + std::to_string(i % 100)});
+    if (what == 7) write_wire(native, {wire, url_of(wire), "arm-" + std::to_string(i % 100)});
     if (what == 8) native += "# r4log 1 by r4 9.9.9\n";
     const RecordKind kind = what == 9   ? RecordKind::event
                             : what < 20 ? RecordKind::to_board

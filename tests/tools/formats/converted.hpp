@@ -32,12 +32,13 @@ struct Converted {
 
 // What `r4 convert` makes of the bytes of a file, by the endings of both; fed in pieces of that size.
 inline Converted converted(std::string_view bytes, const std::string& from, const std::string& to,
-                           std::size_t piece = 1000, std::vector<Device> devices = {}) {
+                           std::size_t piece = 1000, std::vector<Device> devices = {},
+                           const tool::SourceOptions& options = {}) {
   StringOutput output;
   Converted result;
   const std::unique_ptr<tool::Sink> sink = tool::make_sink("test" + to, output, std::move(devices));
   const auto read = [&](RecordingReader::Handler& handler) {
-    const std::unique_ptr<tool::Source> source = tool::make_source("test" + from, handler);
+    const std::unique_ptr<tool::Source> source = tool::make_source("test" + from, handler, options);
     for (std::string_view rest = bytes; !rest.empty();
          rest.remove_prefix(std::min(piece, rest.size()))) {
       source->feed(rest.substr(0, piece));

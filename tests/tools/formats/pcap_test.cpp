@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // pcapng of a recording and back, and captures of other programs.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "converted.hpp"
@@ -13,6 +14,18 @@ namespace {
 using tool::append_number;
 using tool::ByteOrder;
 
+// A packet of a pcap.
+std::string in_pcap(ByteOrder order, const std::string& packet, std::uint32_t us = 404765,
+                    std::uint32_t cut_from = 0) {
+  std::string file;
+  append_number(file, std::uint32_t{1795468293}, order);
+  append_number(file, us, order);
+  append_number(file, static_cast<std::uint32_t>(packet.size()), order);
+  append_number(file, static_cast<std::uint32_t>(std::max<std::size_t>(cut_from, packet.size())),
+                order);
+  return file + packet;
+}
+
 // A pcap in that order of bytes, of one packet of that link type.
 std::string pcap(ByteOrder order, std::uint32_t link, const std::string& packet,
                  std::uint32_t magic = 0xA1B2C3D4, std::uint32_t cut_from = 0) {
@@ -23,12 +36,7 @@ std::string pcap(ByteOrder order, std::uint32_t link, const std::string& packet,
   append_number(file, std::uint64_t{0}, order);
   append_number(file, std::uint32_t{262144}, order);
   append_number(file, link, order);
-  append_number(file, std::uint32_t{1795468293}, order);
-  append_number(file, std::uint32_t{404765}, order);
-  append_number(file, static_cast<std::uint32_t>(packet.size()), order);
-  append_number(file, static_cast<std::uint32_t>(std::max<std::size_t>(cut_from, packet.size())),
-                order);
-  return file + packet;
+  return file + in_pcap(order, packet, 404765, cut_from);
 }
 
 std::string udp(std::uint16_t from, std::uint16_t to, const std::string& payload) {
@@ -97,11 +105,15 @@ TEST(Pcap, ReadsUdpOfEitherOrderFromEveryKindOfLink) {
   const std::string state = captured_state();
   const std::string packet = ipv4(udp(2018, 2390, state + "\r\n"));
   const std::string ethernet = std::string(12, 'm') + std::string("\x08\0", 2) + packet;
-  const std::string tagged = std::string(12, 'm') + std::string("\x81\0\0\x05\x08\0", 6) + packet;
+  const std::string tag("\x81\0\0\x05", 4);
+  const std::string tagged = std::string(12, 'm') + tag + std::string("\x08\0", 2) + packet;
+  const std::string thrice =
+      std::string(12, 'm') + tag + tag + tag + std::string("\x08\0", 2) + packet;
   const std::string sll = std::string(14, 's') + std::string("\x08\0", 2) + packet;
   const std::string sll2 = std::string("\x08\0", 2) + std::string(18, 's') + packet;
   const std::vector<std::pair<std::uint32_t, std::string>> links{
-      {1, ethernet}, {1, tagged}, {0, std::string(4, 'n') + packet}, {101, packet}, {228, packet},
+      {1, ethernet}, {1, tagged},  {1, thrice},   {0, std::string(4, 'n') + packet},
+      {12, packet},  {14, packet}, {101, packet}, {228, packet},
       {113, sll},    {276, sll2}};
   for (const auto& [link, bytes] : links) {
     for (const ByteOrder order : {ByteOrder::little, ByteOrder::big}) {
@@ -118,7 +130,183 @@ TEST(Pcap, ReadsBothDirectionsAndPassesOverOthers) {
   };
   EXPECT_TRUE(contains(one(2390, 2018), "# wire 1 udp://10.0.0.9\n"));
   EXPECT_TRUE(contains(one(2390, 2018), "1795468293.000404 1> x\n"));  // in nanoseconds
-  EXPECT_FALSE(one(53, 4000).find("# wire") != std::string::npos);
+}
+
+TEST(Pcap, RefusesACaptureWithoutADatagramOfABoardAndSaysWhatIsThere) {
+  const auto problem = [](const std::string& file) {
+    const Problem found = problem_of([&] { converted(file, ".pcap", ".r4log"); });
+    EXPECT_EQ(found.kind, ErrorKind::data);
+    EXPECT_TRUE(contains(found.reason, "no datagram of a board is in it")) << found.reason;
+    return found.reason + "; " + found.fix;
+  };
+  const std::string state = captured_state();
+  const std::string elsewhere = problem(pcap(ByteOrder::little, 228, ipv4(udp(3018, 2390, state))));
+  EXPECT_TRUE(contains(elsewhere, "port 2018, but of: 3018, 2390")) << elsewhere;
+  EXPECT_TRUE(contains(elsewhere, "--port"));
+  const std::string unread = problem(pcap(ByteOrder::little, 127, std::string(100, 'r')));
+  EXPECT_TRUE(contains(unread, "link types that are not read: 127 (802.11")) << unread;
+  const std::string empty = pcap(ByteOrder::little, 228, "").substr(0, 24);
+  EXPECT_TRUE(contains(problem(empty), "0 packets"));
+}
+
+// A frame of SocketCAN whose id has that order.
+std::string can_frame(std::uint32_t id, const std::string& data, ByteOrder order) {
+  std::string packet;
+  append_number(packet, id, order);
+  append_number(packet, static_cast<std::uint8_t>(data.size()));
+  return packet + std::string(3, '\0') + data;
+}
+
+std::string cooked(std::uint32_t interface, const std::string& frame) {
+  std::string packet("\0\x0C\0\0", 4);
+  append_number(packet, interface, ByteOrder::big);
+  return packet + std::string(12, '\0') + frame;
+}
+
+TEST(Pcap, ReadsCanFramesOfCookedCapturesWhateverTheOrderOfTheirIds) {
+  const std::string data(
+      "\x03"
+      "abc",
+      4);
+  for (const ByteOrder order : {ByteOrder::little, ByteOrder::big}) {
+    for (const std::uint32_t node : {0U, 3U, 31U}) {
+      const std::string frame = can_frame(0x180 + node, data, order);
+      const std::string sll = std::string(14, '\0') + std::string("\0\x0C", 2) + frame;
+      EXPECT_TRUE(contains(native_of(pcap(ByteOrder::little, 113, sll)), " 1> abc\n")) << node;
+      const std::string native = native_of(pcap(ByteOrder::little, 276, cooked(4, frame)));
+      EXPECT_TRUE(contains(native, fmt::format("# wire 1 can://if4?node={}\n", node))) << native;
+      EXPECT_TRUE(contains(native, " 1> abc\n")) << node;
+    }
+    // The number of a stop fits in either order: the frame before tells.
+    const std::string stop = can_frame(0x80400083, "", order);
+    const std::string native =
+        native_of(pcap(ByteOrder::little, 276, cooked(4, can_frame(0x183, data, order))) +
+                  in_pcap(ByteOrder::little, cooked(4, stop)));
+    EXPECT_TRUE(contains(native, " 0! stop if4\n")) << native;
+  }
+}
+
+TEST(Pcap, KeepsTheInterfacesOfACookedCaptureApart) {
+  const auto half = [](std::uint32_t interface, const std::string& data) {
+    return cooked(interface, can_frame(0x403, data, ByteOrder::little));
+  };
+  // Two datagrams of eight bytes at the same time, one on each bus.
+  std::string file = pcap(ByteOrder::little, 276,
+                          half(4, std::string("\x10\x08"
+                                              "ABCDEF")));
+  for (const std::string& packet : {half(5, std::string("\x10\x08"
+                                                        "abcdef")),
+                                    half(4, std::string("\x21"
+                                                        "GH")),
+                                    half(5, std::string("\x21"
+                                                        "gh"))}) {
+    file += in_pcap(ByteOrder::little, packet);
+  }
+  const std::string native = native_of(file);
+  EXPECT_TRUE(contains(native, "# wire 1 can://if4?node=3\n")) << native;
+  EXPECT_TRUE(contains(native, " 1< ABCDEFGH\n"));
+  EXPECT_TRUE(contains(native, "# wire 2 can://if5?node=3\n"));
+  EXPECT_TRUE(contains(native, " 2< abcdefgh\n"));
+}
+
+TEST(Pcap, TellsAPacketOnceThatPassedTwoInterfaces) {
+  const auto count_of = [](const std::string& second, std::uint32_t us) {
+    const std::string first = ipv4(udp(2018, 2390, "PNum:1;"));
+    const std::string native =
+        native_of(pcap(ByteOrder::little, 228, first) + in_pcap(ByteOrder::little, second, us));
+    return native.find("1< ") == native.rfind("1< ") ? 1 : 2;
+  };
+  std::string same = ipv4(udp(2018, 2390, "PNum:1;"));
+  EXPECT_EQ(count_of(same, 404800), 1);
+  same[8] = '\x3F';  // forwarded: its time to live is less
+  EXPECT_EQ(count_of(same, 404800), 1);
+  EXPECT_EQ(count_of(same, 504800), 2);  // the same text again
+  EXPECT_EQ(count_of(ipv4(udp(2018, 2390, "PNum:2;")), 404800), 2);
+  same[5] = '\x07';  // the id of IP
+  EXPECT_EQ(count_of(same, 404800), 2);
+}
+
+// A block of pcapng.
+std::string block(std::uint32_t type, std::string body) {
+  body.append((4 - body.size() % 4) % 4, '\0');
+  std::string bytes;
+  append_number(bytes, type);
+  append_number(bytes, static_cast<std::uint32_t>(body.size() + 12));
+  bytes += body;
+  append_number(bytes, static_cast<std::uint32_t>(body.size() + 12));
+  return bytes;
+}
+
+TEST(Pcapng, ReadsTheObsoleteBlockOfAPacket) {
+  std::string section, interface, packet;
+  append_number(section, std::uint32_t{0x1A2B3C4D});
+  append_number(section, std::uint32_t{1});
+  append_number(section, ~std::uint64_t{0});
+  append_number(interface, std::uint64_t{228});
+  const std::string bytes = ipv4(udp(2018, 2390, "PNum:1;"));
+  append_number(packet, std::uint16_t{0});
+  append_number(packet, std::uint16_t{9});  // packets that were lost
+  append_number(packet, static_cast<std::uint32_t>(1795468293404765 >> 32));
+  append_number(packet, static_cast<std::uint32_t>(1795468293404765));
+  append_number(packet, static_cast<std::uint32_t>(bytes.size()));
+  append_number(packet, static_cast<std::uint32_t>(bytes.size()));
+  const std::string file =
+      block(0x0A0D0D0A, section) + block(1, interface) + block(2, packet + bytes);
+  EXPECT_TRUE(contains(native_of(file), "1795468293.404765 1< PNum:1;\n"));
+}
+
+// The blocks of a pcapng.
+std::vector<std::string> blocks_of(const std::string& file) {
+  std::vector<std::string> blocks;
+  for (std::size_t at = 0; at < file.size(); at += blocks.back().size()) {
+    blocks.push_back(file.substr(at, tool::read_number<std::uint32_t>(file.substr(at + 4, 4))));
+  }
+  return blocks;
+}
+
+// The packets of the two in turn, as mergecap puts those of the same times; with interfaces of their own, or with those
+// of the first for both.
+std::string merged_by_mergecap(const std::string& a, const std::string& b, bool own) {
+  std::string head = blocks_of(a)[0], packets;
+  std::vector<std::string> left, right;
+  std::uint32_t interfaces = 0;
+  for (const std::string& each : blocks_of(a)) {
+    const auto type = tool::read_number<std::uint32_t>(each);
+    if (type == 1) head += each, ++interfaces;
+    if (type == 6) left.push_back(each);
+  }
+  for (const std::string& each : blocks_of(b)) {
+    const auto type = tool::read_number<std::uint32_t>(each);
+    if (type == 1 && own) head += each;
+    if (type != 6) continue;
+    std::string moved = each, number;
+    append_number(number,
+                  tool::read_number<std::uint32_t>(each.substr(8)) + (own ? interfaces : 0));
+    right.push_back(moved.replace(8, 4, number));
+  }
+  for (std::size_t i = 0; i < std::max(left.size(), right.size()); ++i) {
+    if (i < left.size()) packets += left[i];
+    if (i < right.size()) packets += right[i];
+  }
+  return head + packets;
+}
+
+TEST(Pcapng, RefusesRecordingsThatMergecapHasMixed) {
+  const auto packets = [](const std::string& url) {
+    return converted(recorded_capture(url), ".r4log", ".pcapng").bytes;
+  };
+  for (const char* const other : {"udp://192.168.0.126", "udp://192.168.0.125"}) {
+    for (const bool own : {false, true}) {
+      const std::string file =
+          merged_by_mergecap(packets("udp://192.168.0.125"), packets(other), own);
+      const Problem problem = problem_of([&] { converted(file, ".pcapng", ".r4log"); });
+      EXPECT_EQ(problem.kind, ErrorKind::data) << other;
+      EXPECT_TRUE(contains(problem.reason, "several recordings are mixed")) << problem.reason;
+    }
+  }
+  // One after the other they are read, in a section each.
+  EXPECT_EQ(native_of(packets("udp://a") + packets("udp://b")),
+            recorded_capture("udp://a") + recorded_capture("udp://b"));
 }
 
 TEST(Pcap, ReadsFramesOfSocketCan) {

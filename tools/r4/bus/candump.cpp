@@ -12,7 +12,8 @@ namespace {
 
 constexpr std::uint32_t error_flag = 0x20000000;  // of ids of 8 digits: an error frame
 constexpr std::uint32_t max_extended_id = 0x1FFFFFFF;
-constexpr std::size_t max_interface_name = 15;
+// Linux has at most 15, python-can names a channel also by an address, a path or a number of a device.
+constexpr std::size_t max_interface_name = 64;
 constexpr std::uint64_t max_seconds = 1'000'000'000'000;
 
 // In the order of the enumeration.
@@ -22,7 +23,7 @@ constexpr std::array texts{
     "candump has lost frames here",
     "not a line of candump",
     "the time is none",
-    "no name of an interface",
+    "not a name of an interface",
     "no id of a frame",
     "no frame has that many bytes",
     "the line is cut off",
@@ -93,6 +94,8 @@ bool read_time(std::string_view text, CandumpLine& out) {
 
 bool read_id(std::string_view text, CandumpLine& out) {
   std::uint32_t id = 0;
+  // Of CAN XL a priority, alone or behind two digits of a virtual network.
+  if (out.xl) return (text.size() == 3 || text.size() == 5) && parse_hex(Text(text), id);
   if ((text.size() != 3 && text.size() != 8) || !parse_hex(Text(text), id)) return false;
   out.frame.extended = text.size() == 8;
   if (!out.frame.extended) {
@@ -111,10 +114,22 @@ bool read_byte(std::string_view text, std::uint8_t& out) {
   return true;
 }
 
-// What follows the first # of the log's format: "2A366C2B", "#12A36", "R", "R4".
+// What follows the first # of a frame of CAN XL: flags, type and address, then its bytes: "81:00:12345678#112233".
+bool is_xl_frame(std::string_view data) {
+  constexpr std::string_view form = "hh:hh:hhhhhhhh#";
+  if (data.size() < form.size()) return false;
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    const bool digit = data[i] >= '0' && data[i] <= 'F' && (data[i] <= '9' || data[i] >= 'A');
+    if (i >= form.size() || form[i] == 'h' ? !digit : data[i] != form[i]) return false;
+  }
+  return true;
+}
+
+// What follows the first # of the log's format: "2A366C2B", "#12A36", "R", "R4", "R8_B".
 CandumpError read_log_frame(std::string_view data, CanFrame& frame) {
   if (data.starts_with('R')) {
     frame.remote = true;
+    data = data.substr(0, data.find('_'));  // a length code of more than 8
     return data.size() <= 2 ? CandumpError::none : CandumpError::rest;
   }
   if (data.starts_with('#')) {
@@ -135,8 +150,14 @@ CandumpError read_log_frame(std::string_view data, CanFrame& frame) {
   return has_valid_size(frame) ? CandumpError::none : CandumpError::size;
 }
 
-// The bytes of the format on screen, behind "[4]" or, for CAN FD, "[04]".
+// The bytes of the format on screen, behind "[4]" or, for CAN FD, "[04]"; behind "{B}", a length code of more than 8,
+// there are 8.
 CandumpError read_screen_frame(std::string_view size, std::string_view& line, CanFrame& frame) {
+  if (size.size() == 3 && size.front() == '{' && size.back() == '}') {
+    if (size[1] < '9' || size[1] > 'F' || (size[1] > '9' && size[1] < 'A'))
+      return CandumpError::size;
+    size = "[8]";
+  }
   if (size.size() < 3 || size.size() > 4 || size.front() != '[') return CandumpError::no_frame;
   std::uint32_t count = 0;
   if (size.back() != ']' || !read_digits(size.substr(1, size.size() - 2), count)) {
@@ -168,6 +189,11 @@ bool one_of(std::string_view word, std::string_view a, std::string_view b) {
 
 }  // namespace
 
+bool is_interface_name(std::string_view name) {
+  return !name.empty() && name.size() <= max_interface_name &&
+         std::all_of(name.begin(), name.end(), [](char c) { return c > ' ' && c <= '~'; });
+}
+
 const char* to_text(CandumpError error) {
   const auto index = static_cast<std::size_t>(error);
   return index < texts.size() ? texts[index] : "unknown";
@@ -187,16 +213,15 @@ CandumpError read_candump_line(std::string_view line, CandumpLine& out) {
   out.interface = take_word(line);
   std::string_view word = take_word(line);
   if (word.empty()) return out.time.empty() ? CandumpError::no_frame : CandumpError::cut;
-  const bool name = out.interface.size() <= max_interface_name &&
-                    out.interface.find_first_not_of(
-                        "0123456789abcdefghijklmnopqrstuvwxyz"
-                        "ABCDEFGHIJKLMNOPQRSTUVWXYZ_.-") == std::string_view::npos;
+  const bool name = is_interface_name(out.interface);
 
   const std::size_t mark = word.find('#');
   if (mark != std::string_view::npos) {
     if (!name) return CandumpError::interface;
+    out.xl = out.frame.remote = is_xl_frame(word.substr(mark + 1));
     if (!read_id(word.substr(0, mark), out)) return CandumpError::id;
-    const CandumpError error = read_log_frame(word.substr(mark + 1), out.frame);
+    const CandumpError error =
+        out.xl ? CandumpError::none : read_log_frame(word.substr(mark + 1), out.frame);
     if (error != CandumpError::none) return error;
     word = take_word(line);  // -x: T of the own machine, R of others
     if (!word.empty() && !one_of(word, "T", "R")) return CandumpError::rest;
@@ -211,9 +236,11 @@ CandumpError read_candump_line(std::string_view line, CandumpLine& out) {
   }
   const std::string_view size = take_word(line);
   if (size.empty() && !out.time.empty()) return CandumpError::cut;
-  if (!size.starts_with('[')) return CandumpError::no_frame;
+  if (!size.starts_with('[') && !size.starts_with('{')) return CandumpError::no_frame;
   if (!name) return CandumpError::interface;
+  out.xl = out.frame.remote = size.size() == 6;  // "[0008]"
   if (!read_id(word, out)) return CandumpError::id;
+  if (out.xl) return CandumpError::none;
   const CandumpError error = read_screen_frame(size, line, out.frame);
   if (error != CandumpError::none) return error;
   line.remove_prefix(std::min(line.find_first_not_of(' '), line.size()));

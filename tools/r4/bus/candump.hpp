@@ -5,8 +5,9 @@
 //                                                                #R for a remote request
 //     candump        (1436509052.249713)  vcan0  244   [4]  2A 36 6C 2B
 //
-// with the extras of its options -a, -x and -t; on screen the time may be missing, be counted from
-// the start or be a date. Any bytes may come in; nothing is kept.
+// with the extras of its options -a, -x, -8 and -t; on screen the time may be missing, be counted from
+// the start or be a date. Frames of CAN XL are recognised. Interfaces may have the names that python-can gives to
+// its channels. Any bytes may come in; nothing is kept.
 #pragma once
 
 #include <cstdint>
@@ -24,6 +25,7 @@ struct CandumpLine {
   std::string_view interface;
   CanFrame frame{};
   bool error_frame = false;  // a report of the controller's, no frame of the bus
+  bool xl = false;           // a frame of CAN XL, which is not one of ours; `frame` is remote
 };
 
 enum class CandumpError : std::uint8_t {
@@ -32,13 +34,16 @@ enum class CandumpError : std::uint8_t {
   dropped,    // no frame: candump -d tells that it was too slow
   no_frame,   // not of either format
   time,       // what is in the parentheses is no time
-  interface,  // no name of an interface
+  interface,  // not a name of an interface
   id,         // neither 3 nor 8 hexadecimal digits, or beyond what an id can be
   size,       // no frame has that many bytes
   cut,        // fewer bytes than the line says, or half of one
   bytes,      // a byte that is not two hexadecimal digits
   rest,       // something behind the frame
 };
+
+// True if candump or python-can may have written that name: 1 to 64 printable ASCII characters without blanks.
+bool is_interface_name(std::string_view name);
 
 // In words: "a byte that is not two hexadecimal digits".
 const char* to_text(CandumpError error);

@@ -3,8 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <iterator>
 
+#include "../bus/candump.hpp"
+#include "protocol/datagram/numbers.hpp"
 #include "r4link/vocabulary.hpp"
 #include "transports/framing/can/packed_form.hpp"
 
@@ -15,7 +19,43 @@ Time time_of(const BusTransfers::Place& place) {
   return Time{static_cast<std::int64_t>(place.time_us.value_or(0))};
 }
 
+bool is_plain(char c) {
+  return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '.' ||
+         c == '-' || c == '_';
+}
+
 }  // namespace
+
+std::string bus_url(std::string_view interface, std::uint8_t node) {
+  if (std::all_of(interface.begin(), interface.end(), is_plain)) {
+    return fmt::format("can://{}?node={}", interface, node);
+  }
+  std::string host;
+  for (const char c : interface) {
+    if (is_plain(c) || c == ':') {
+      host += c;
+    } else {
+      fmt::format_to(std::back_inserter(host), "%{:02X}", static_cast<unsigned char>(c));
+    }
+  }
+  return fmt::format("can://[{}]?node={}", host, node);
+}
+
+std::string bus_interface(const std::string& host) {
+  std::string name;
+  for (std::size_t i = 0; i < host.size(); ++i) {
+    std::uint32_t code = 0;
+    if (host[i] != '%') {
+      name += host[i];
+    } else if (parse_hex(Text(std::string_view(host).substr(i + 1, 2)), code)) {
+      name += static_cast<char>(code);
+      i += 2;
+    } else {
+      return host;
+    }
+  }
+  return is_interface_name(name) ? name : host;
+}
 
 void BusRecords::on_frame(std::string_view interface, const CanFrame& frame,
                           const BusTransfers::Place& place) {
@@ -47,8 +87,8 @@ void BusRecords::on_datagram(const BusTransfers::Lane& lane) {
   }
   const std::uint16_t wire = wire_of(lane.interface, lane.meaning.node);
   const bool from_host = lane.meaning.kind == CanIdKind::command;
-  handler_.on_record({time_of(lane.last), wire,
-                      from_host ? RecordKind::to_board : RecordKind::from_board, datagram});
+  tell({time_of(lane.last), wire, from_host ? RecordKind::to_board : RecordKind::from_board,
+        datagram});
 }
 
 void BusRecords::on_failure(const BusTransfers::Lane& lane, const BusTransfers::Place& place,
@@ -61,19 +101,18 @@ void BusRecords::on_failure(const BusTransfers::Lane& lane, const BusTransfers::
 void BusRecords::on_raw_frame(const std::string& interface, const CanIdMeaning& meaning,
                               const CanFrame& frame, const BusTransfers::Place& place) {
   if (meaning.kind == CanIdKind::emergency_stop) {
-    handler_.on_record({time_of(place), no_wire, RecordKind::event, "stop " + interface});
-    return;
+    return tell({time_of(place), no_wire, RecordKind::event, "stop " + interface});
   }
   if (meaning.kind == CanIdKind::watch) return;  // no news of the board
   const std::uint8_t number = frame.size == 0 ? 0 : frame.data[0];
   const SafeReason reason = number == 0 ? SafeReason::fault : to_safe_reason(number);
   const std::string words = fmt::format("link safe {}", to_text(reason));
-  handler_.on_record({time_of(place), wire_of(interface, meaning.node), RecordKind::event, words});
+  tell({time_of(place), wire_of(interface, meaning.node), RecordKind::event, words});
 }
 
 std::uint16_t BusRecords::wire_of(const std::string& interface, std::uint8_t node) {
   const auto [known, added] = wires_.try_emplace({interface, node}, no_wire);
-  if (added) known->second = add_wire(fmt::format("can://{}?node={}", interface, node));
+  if (added) known->second = add_wire(bus_url(interface, node));
   return known->second;
 }
 
@@ -82,7 +121,13 @@ std::uint16_t BusRecords::add_wire(const std::string& url) {
   return last_wire_;
 }
 
+void BusRecords::tell(const Record& record) {
+  told_ = true;
+  handler_.on_record(record);
+}
+
 void BusRecords::damage(const BusTransfers::Place& place, const std::string& reason) {
+  told_ = true;
   handler_.on_damage({RecordingDamage::Kind::line, place.line, place.offset, reason});
 }
 

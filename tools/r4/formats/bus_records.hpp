@@ -16,6 +16,12 @@
 
 namespace r4::tool {
 
+// The URL of that board. A name that a URL cannot hold, such as python-can's /dev/ttyACM0 or ff15::1, stands in brackets:
+// can://[%2Fdev%2FttyACM0]?node=3.
+std::string bus_url(std::string_view interface, std::uint8_t node);
+// The interface in the host of such a URL.
+std::string bus_interface(const std::string& host);
+
 class BusRecords final : BusTransfers::Handler {
  public:
   explicit BusRecords(RecordingReader::Handler& handler) : handler_(handler) {}
@@ -25,6 +31,8 @@ class BusRecords final : BusTransfers::Handler {
                 const BusTransfers::Place& place);
   // No more frames come.
   void finish();
+  // True if a record or damage was told.
+  bool told() const { return told_; }
   // The number of a wire that is told of now; those of other sources of the same recording count on.
   std::uint16_t add_wire(const std::string& url);
 
@@ -35,12 +43,14 @@ class BusRecords final : BusTransfers::Handler {
   void on_raw_frame(const std::string& interface, const CanIdMeaning& meaning,
                     const CanFrame& frame, const BusTransfers::Place& place) override;
   std::uint16_t wire_of(const std::string& interface, std::uint8_t node);
+  void tell(const Record& record);
   void damage(const BusTransfers::Place& place, const std::string& reason);
 
   RecordingReader::Handler& handler_;
   BusTransfers transfers_{*this};
   std::map<std::pair<std::string, std::uint8_t>, std::uint16_t> wires_;
   std::uint16_t last_wire_ = 0;
+  bool told_ = false;
 };
 
 }  // namespace r4::tool

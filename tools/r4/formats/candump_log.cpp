@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "../bus/candump.hpp"
 #include "r4link/error.hpp"
 #include "transports/framing/can/can_node.hpp"
@@ -13,8 +15,17 @@ namespace {
 
 // How much without a frame makes it no log.
 constexpr std::uint64_t patience = 65536;
+// Times before September 2001 count from something else than 1970: SocketCAN is younger.
+constexpr std::uint64_t earliest_us = 1'000'000'000'000'000;
+// Frames of several interfaces may be so much out of order.
+constexpr std::uint64_t disorder_us = 1000;
 
 }  // namespace
+
+bool CandumpSource::recognises(std::string_view line) {
+  CandumpLine read;
+  return read_candump_line(line, read) == CandumpError::none;
+}
 
 void CandumpSource::feed(std::string_view bytes) {
   lines_.push(
@@ -32,6 +43,14 @@ void CandumpSource::finish() {
                 });
   if (!recognised_) fail_as_none();
   records_.finish();
+  if (start_ && frames_ > 1 && latest_us_ == first_us_) {
+    fail("all of its times are the same (candump -H without hardware time stamps)",
+         "record it again with candump -L");
+  }
+  if (!records_.told() && !undated_) {
+    fail("no whole datagram of a board is in it",
+         "record on the bus of the board for a second or longer: candump -L can0");
+  }
 }
 
 void CandumpSource::on_line(std::uint64_t number, std::string_view text) {
@@ -40,26 +59,54 @@ void CandumpSource::on_line(std::uint64_t number, std::string_view text) {
   if (error == CandumpError::detail) return;
   if (error != CandumpError::none) return damage(number, to_text(error));
   if (!line.time_us || line.date) {
+    undated_ = true;
     return damage(number, "it has no time since 1970: candump -L writes one");
   }
+  if (!start_ && *line.time_us < earliest_us) {
+    if (recognised_) return damage(number, "its time does not count from 1970");
+    fail("its times do not count from 1970 (candump -tz, -td or -H)",
+         "of -tz, say when the first frame was: r4 convert --start 2026-11-23T21:20:00 (UTC); "
+         "else record it again with candump -L");
+  }
+  const std::uint64_t time_us = dated(*line.time_us);
   recognised_ = true;
+  ++frames_;
   if (line.error_frame) return;  // of the controller, not of the bus
-  records_.on_frame(line.interface, line.frame, {number, lines_.begin(), line.time_us, {}});
+  records_.on_frame(line.interface, line.frame, {number, lines_.begin(), time_us, {}});
+}
+
+// The time since 1970.
+std::uint64_t CandumpSource::dated(std::uint64_t time_us) {
+  if (frames_ == 0) first_us_ = latest_us_ = time_us;
+  const bool goes_back = time_us + disorder_us < latest_us_;
+  latest_us_ = std::max(latest_us_, time_us);
+  if (!start_) return time_us;
+  if (goes_back) {
+    fail("its times go back, so they do not count from the first frame (candump -td)",
+         "record it again with candump -L");
+  }
+  return static_cast<std::uint64_t>(start_->count()) + (std::max(time_us, first_us_) - first_us_);
 }
 
 void CandumpSource::damage(std::uint64_t number, const char* reason) {
   handler_.on_damage({RecordingDamage::Kind::line, number, lines_.begin(), reason});
 }
 
+void CandumpSource::fail(const char* reason, const char* fix) const {
+  throw Error(ErrorKind::data, name_, reason, fix);
+}
+
 void CandumpSource::fail_as_none() const {
-  throw Error(ErrorKind::data, name_, "no log of CAN frames", "candump -L can0 > FILE makes one");
+  fail("no log of CAN frames", "candump -L can0 > FILE makes one");
 }
 
 std::optional<CandumpSink::Place> CandumpSink::place_of(const RecordedWire& wire) {
   try {
     const Url url = Url::parse(wire.url);
     if (url.scheme() != "can" || url.host().empty()) return std::nullopt;
-    return Place{url.host(), static_cast<std::uint8_t>(url.get_number("node", 0, 31, 1)),
+    const std::string interface = bus_interface(url.host());
+    if (!is_interface_name(interface)) return std::nullopt;
+    return Place{interface, static_cast<std::uint8_t>(url.get_number("node", 0, 31, 1)),
                  url.get_number("fd", 0, 1, 0) == 1, url.get_number("pack", 0, 1, 1) == 1};
   } catch (const Error&) {
     return std::nullopt;

@@ -3,6 +3,8 @@
 //
 //     (1436509052.249713) vcan0 244#2A366C2B
 //
+// Times count from 1970. Those of candump -tz count from the first frame, which the user may date.
+//
 // A recording has datagrams, not frames. The sink makes the frames of them that boards and hosts send, flow control
 // included, all at the record's time: by the CanNode of both ends.
 #pragma once
@@ -20,21 +22,32 @@ namespace r4::tool {
 
 class CandumpSource final : public Source {
  public:
-  CandumpSource(RecordingReader::Handler& handler, std::string name)
-      : handler_(handler), records_(handler), name_(std::move(name)) {}
+  // `start`: when the first frame was, where times do not count from 1970.
+  CandumpSource(RecordingReader::Handler& handler, std::string name,
+                std::optional<Time> start = std::nullopt)
+      : handler_(handler), records_(handler), name_(std::move(name)), start_(start) {}
+  // True if a log of frames may have that line.
+  static bool recognises(std::string_view line);
   void feed(std::string_view bytes) override;
   void finish() override;
 
  private:
   void on_line(std::uint64_t number, std::string_view text);
+  std::uint64_t dated(std::uint64_t time_us);
   void damage(std::uint64_t number, const char* reason);
+  [[noreturn]] void fail(const char* reason, const char* fix) const;
   [[noreturn]] void fail_as_none() const;
 
   RecordingReader::Handler& handler_;
   BusRecords records_;
   const std::string name_;
+  const std::optional<Time> start_;
   NumberedLines lines_;
   bool recognised_ = false;
+  bool undated_ = false;  // a frame without a time was told
+  std::uint64_t frames_ = 0;
+  std::uint64_t first_us_ = 0;  // as the log counts
+  std::uint64_t latest_us_ = 0;
 };
 
 class CandumpSink final : public Sink {

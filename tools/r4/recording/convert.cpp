@@ -17,9 +17,10 @@
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
 #include "formats.hpp"
-#include "host/recording/recording_file.hpp"
+#include "host/recording/record_line.hpp"
 #include "r4link/devices/device.hpp"
 #include "r4link/error.hpp"
+#include "read_file.hpp"
 
 namespace r4::tool {
 namespace {
@@ -29,6 +30,7 @@ struct ConvertOptions {
   std::string output;
   bool force = false;
   std::uint64_t port = board_port;
+  std::string start;
   std::vector<std::string> devices;
 };
 
@@ -78,16 +80,16 @@ class Progress {
   std::chrono::steady_clock::time_point drawn_at_ = std::chrono::steady_clock::now();
 };
 
-void read_all(const ConvertOptions& options, RecordingReader::Handler& handler,
-              Progress& progress) {
-  const std::unique_ptr<Source> source =
-      make_source(options.input, handler, {static_cast<std::uint16_t>(options.port)});
-  RecordingInput input(options.input);
-  for (std::string_view piece = input.read(); !piece.empty(); piece = input.read()) {
-    source->feed(piece);
-    progress.advance(piece.size());
+SourceOptions source_options(const ConvertOptions& options) {
+  SourceOptions result;
+  result.port = static_cast<std::uint16_t>(options.port);
+  if (options.start.empty()) return result;
+  result.start = read_record_time(options.start);
+  if (!result.start) {
+    throw Error(ErrorKind::usage, "--start " + options.start, "is not a time in UTC",
+                "write it as in --start 2026-11-23T21:20:00");
   }
-  source->finish();
+  return result;
 }
 
 bool can_be_read_twice(const std::string& path) {
@@ -97,13 +99,15 @@ bool can_be_read_twice(const std::string& path) {
 
 int convert(const ConvertOptions& options) {
   std::vector<Device> devices = Device::from(options.devices);
+  const SourceOptions source = source_options(options);
   OutputFile output(options.output, options.force);
   const std::unique_ptr<Sink> sink = make_sink(options.output, output, std::move(devices));
   Progress progress(options.input);
+  const auto advance = [&progress](std::size_t bytes) { progress.advance(bytes); };
   if (sink->wants_survey() && can_be_read_twice(options.input)) {
     progress.begin("looking");
     Survey survey(*sink);
-    read_all(options, survey, progress);
+    read_file(options.input, survey, source, advance);
   }
   progress.begin("converting");
   std::uint64_t told = 0;
@@ -114,7 +118,7 @@ int convert(const ConvertOptions& options) {
     print_trouble(fmt::format("r4: {}: {}byte {}: {}; it is left out", called(options.input), line,
                               damage.offset, damage.reason));
   });
-  read_all(options, conversion, progress);
+  read_file(options.input, conversion, source, advance);
   conversion.finish();
   output.finish();
   progress.clear();
@@ -126,13 +130,15 @@ int convert(const ConvertOptions& options) {
 }
 
 constexpr const char* convert_footer =
-    R"(The endings of the two names tell the formats (docs/recordings.md):
-  .r4log .r4log.zst   the native one; also of the standard input, -
-  .log                the frames of a CAN bus as candump -L writes them
+    R"(FILE may be of any format that is read, compressed by zstd or not: what is in it tells which. The
+ending of the output's name tells what is written (docs/recordings.md):
+  .r4log .r4log.zst   the native one
+  .log                the frames of a CAN bus as candump -L writes them; of candump -tz, --start tells
+                      when the first frame was
   .pcapng             packets that Wireshark opens, with all of the recording in them; read are
-                      also captures, .pcap too, of UDP to and from --port, and of SocketCAN
+                      also captures, of pcap too: UDP to and from --port, and SocketCAN
   .mcap               a topic a board for Foxglove and PlotJuggler, with all of the recording
-                      in it; read is what r4 has made
+                      in it; read is what r4 has made, also when other tools have copied it
   .csv                the states, a row each, a column a value with its unit in the header
   .jsonl              every record, a JSON object a line, as r4 decode shows it
 
@@ -147,6 +153,7 @@ Examples:
   r4 convert drive.r4log -o drive.pcapng && wireshark drive.pcapng
   tcpdump -w arm.pcap udp port 2018; r4 convert arm.pcap -o arm.csv
   zstdcat robot-*.r4log.zst | r4 convert - -o robot.jsonl
+  r4 convert bus.log -o bus.r4log --start 2026-11-23T21:20:00    of candump -tz
 
 Exit codes: 0 all of it was converted; 1 some could not be read, or it is no recording; 2 usage; 4, 5 a
 file cannot be read or written.)";
@@ -164,6 +171,9 @@ void add_convert(CLI::App& root, Action& chosen) {
            Need::required);
   add_number(*command, "--port", options->port, 1, 65535,
              "the boards' UDP port in a capture (default: 2018)");
+  add_text(*command, "--start", options->start,
+           "when the first frame was, in UTC, of a log whose times count from it (candump -tz)",
+           "TIME");
   add_repeated(*command, "--device", options->devices,
                "what it measured, to .csv, .jsonl and .mcap, for the recording's own (r4 devices)",
                "NAME@ADDRESS");

@@ -8,10 +8,9 @@
 #include "../formats/csv.hpp"
 #include "../formats/json_lines.hpp"
 #include "../formats/mcap/mcap_sink.hpp"
-#include "../formats/mcap/mcap_source.hpp"
 #include "../formats/native.hpp"
-#include "../formats/packets/pcap_source.hpp"
 #include "../formats/packets/pcapng_sink.hpp"
+#include "detected_source.hpp"
 #include "r4link/error.hpp"
 
 namespace r4::tool {
@@ -26,12 +25,7 @@ std::unique_ptr<Source> make_source(const std::string& path, RecordingReader::Ha
                   "convert the recording that it was made of");
     }
   }
-  if (path.ends_with(".log")) return std::make_unique<CandumpSource>(handler, path);
-  if (path.ends_with(".mcap")) return std::make_unique<McapSource>(handler, path);
-  if (path.ends_with(".pcapng") || path.ends_with(".pcap")) {
-    return std::make_unique<PcapSource>(handler, path, options.port);
-  }
-  return std::make_unique<NativeSource>(handler, called(path));
+  return std::make_unique<DetectedSource>(handler, called(path), options);
 }
 
 std::unique_ptr<Sink> make_sink(const std::string& path, Output& output,

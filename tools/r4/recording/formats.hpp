@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The formats of recordings that r4 reads and writes, by the endings of their files.
+// The formats of recordings that r4 reads, by what is in a file, and writes, by the ending of its name.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,10 +23,11 @@ std::string called(const std::string& path);
 
 struct SourceOptions {
   std::uint16_t port = board_port;  // of boards in a capture of UDP
+  std::optional<Time> start;        // of a log of candump whose times count from its first frame
 };
 
-// Reads the file of that name; "-", and what has none of the endings of other formats, is a native recording.
-// Throws Error{usage} for a format that is only written.
+// Reads the file of that name, "-" being the standard input, whatever its format. Throws Error{usage} for a format that
+// is only written.
 std::unique_ptr<Source> make_source(const std::string& path, RecordingReader::Handler& handler,
                                     const SourceOptions& options = {});
 

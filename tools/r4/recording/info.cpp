@@ -9,6 +9,7 @@
 #include "../shell/subcommands.hpp"
 #include "formats.hpp"
 #include "r4link/error.hpp"
+#include "read_file.hpp"
 #include "recording_summary.hpp"
 
 namespace r4::tool {
@@ -23,7 +24,7 @@ int info(const InfoOptions& options) {
   bool any_damage = false;
   for (const std::string& file : options.files) {
     RecordingSummary summary;
-    read_recording(file, summary);
+    read_file(file, summary);
     if (options.json) {
       print_line(summary.json(file));
     } else {
@@ -37,8 +38,9 @@ int info(const InfoOptions& options) {
 constexpr const char* info_footer =
     R"(Of each recording: from when to when; of each wire the rate of its states, what was damaged and lost,
 the safe states and for how long, and gaps: times longer than a second in which the board said
-nothing. Everything that can be read is read; where a line is damaged, its number and place are told,
-and the exit code is 1. The last line is torn where a recording was killed in the midst of it.
+nothing. A file of another format that r4 convert reads is shown as the recording that it makes.
+Everything that can be read is read; where a line is damaged, its number and place are told, and the
+exit code is 1. The last line is torn where a recording was killed in the midst of it.
 
 Examples:
   r4 info drive.r4log

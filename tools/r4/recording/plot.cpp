@@ -31,6 +31,7 @@
 #include "protocol/messages/message.hpp"
 #include "protocol/messages/state_fields.hpp"
 #include "r4link/error.hpp"
+#include "read_file.hpp"
 #include "recording_summary.hpp"
 #include "transports/file_descriptor.hpp"
 
@@ -311,7 +312,7 @@ int plot(const PlotOptions& options) {
   for (const std::string& text : options.fields) wanted.push_back(to_wanted(text));
   OutputFile output(options.output, options.force);
   Curves curves(wanted);
-  read_recording(options.file, curves);
+  read_file(options.file, curves);
   curves.finish();
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     const bool found = std::any_of(curves.wires().begin(), curves.wires().end(), [&](auto& each) {

@@ -205,7 +205,8 @@ std::string RecordingSummary::text(const std::string& name) const {
   const std::uint64_t cut = unended_ + (ended_ ? 0 : 1);
   if (cut != 0) line("cut", "it was not ended: the recording program runs, or was killed");
   for (const Damage& each : damage_) {
-    line("damage", fmt::format("line {}, byte {}: {}", each.line, each.offset, each.reason));
+    const std::string place = each.line == 0 ? "" : fmt::format("line {}, ", each.line);
+    line("damage", fmt::format("{}byte {}: {}", place, each.offset, each.reason));
   }
   if (damage_count_ > damage_.size()) {
     line("", fmt::format("and {} more", damage_count_ - damage_.size()));

@@ -2,7 +2,6 @@
 // The topics that a board takes commands from.
 #include <fmt/format.h>
 
-#include <set>
 #include <utility>
 
 #include "board_commands.hpp"
@@ -13,56 +12,33 @@
 namespace r4::tool::ros2 {
 namespace {
 
-constexpr std::size_t most_texts = 16;       // of R4_Command, that wait
-constexpr std::size_t most_others = 4;       // in one turn
-constexpr std::size_t most_other_types = 8;  // on `stop`, beside Bool
+constexpr std::size_t most_texts = 16;  // of R4_Command, that wait
+constexpr std::size_t most_others = 4;  // in one turn
 
 }  // namespace
 
 // NOLINTBEGIN(clang-analyzer-cplusplus.NewDeleteLeaks): it loses sight of a std::function that is moved from a
 // designated initializer.
 
-// Subscribe twice, reliable and best effort. A duplicate stop is harmless, and no publisher is
-// missed: neither a button of micro-ROS nor one of another type.
+// Subscribe twice, reliable and best effort: a duplicate stop is harmless, and a button of micro-ROS
+// is not missed.
 void BoardCommands::subscribe_stop(Graph& graph, std::size_t node, Inbox& inbox) {
-  const auto subscribe = [this, &graph, node, &inbox](const Announced* other) {
-    for (const bool reliable : {true, false}) {
-      Qos qos;
-      qos.reliable = reliable;
-      Inbox::Subscription<BoolMessage, bool> stops{
-          .reader = other == nullptr ? graph.subscribe<BoolMessage>(node, "stop", qos)
-                                     : graph.subscribe_first_byte(node, "stop", *other, qos),
-          .room = 1,
-          .read =
-              [any = other != nullptr](const BoolMessage& message) {
-                return std::optional(any || message.data != 0);
-              },
-          .urgent = [](bool pressed) { return pressed; },
-          .take =
-              [this](bool pressed, const Origin&) {
-                if (pressed) stop([](bool, const std::string&) {});
-              },
-          .left = {},
-      };
-      reliable ? inbox.add(std::move(stops)) : add(inbox, "stop", std::move(stops));
-    }
-  };
-  subscribe(nullptr);
-  graph.on_other_type(
-      node, "stop",
-      [subscribe, taken = std::set<std::string>()](
-          const Announced& writer) mutable -> std::optional<Mismatch> {
-        if (!taken.contains(writer.type)) {
-          if (taken.size() == most_other_types) return std::nullopt;
-          taken.insert(writer.type);
-          subscribe(&writer);
-        }
-        return Mismatch{
-            Mismatch::Weight::warning,
-            fmt::format("stop: a publisher ({}) has the type {}: each of its samples is a stop; "
-                        "publish std_msgs/msg/Bool",
-                        writer.owner_text(), ros_type(writer.type))};
-      });
+  for (const bool reliable : {true, false}) {
+    Qos qos;
+    qos.reliable = reliable;
+    Inbox::Subscription<BoolMessage, bool> stops{
+        .reader = graph.subscribe<BoolMessage>(node, "stop", qos),
+        .room = 1,
+        .read = [](const BoolMessage& message) { return std::optional(message.data != 0); },
+        .urgent = [](bool pressed) { return pressed; },
+        .take =
+            [this](bool pressed, const Origin&) {
+              if (pressed) stop([](bool, const std::string&) {});
+            },
+        .left = {},
+    };
+    reliable ? inbox.add(std::move(stops)) : add(inbox, "stop", std::move(stops));
+  }
 }
 
 void BoardCommands::subscribe_arm(Graph& graph, std::size_t node, Inbox& inbox) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The lines of an input, with their numbers from 1, whatever ends them: CR, LF or both. Memory is
-// one line of max_datagram characters: a longer one is measured, not kept.
+// The lines of an input, with their numbers from 1, whatever ends them: CR, LF or both. UTF-8's mark in front of the
+// first line is left out. Memory is one line of max_datagram characters: a longer one is measured, not kept.
 #pragma once
 
 #include <algorithm>
@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <string_view>
 
+#include "host/recording/file_form.hpp"
 #include "transports/framing/line_framing.hpp"
 
 namespace r4::tool {
@@ -23,8 +24,11 @@ class NumberedLines {
       const bool ends = end != bytes.size();
       const std::size_t taken = end + (ends ? 1 : 0);
       size_ += end;
-      framing_.push(bytes.data(), taken,
-                    [&](Text text) { line(number_, std::string_view(text.data(), text.size())); });
+      framing_.push(bytes.data(), taken, [&](Text framed) {
+        std::string_view text(framed.data(), framed.size());
+        if (number_ == 1 && text.starts_with(utf8_mark)) text.remove_prefix(utf8_mark.size());
+        if (!text.empty()) line(number_, text);
+      });
       if (!ends) {
         after_cr_ = false;
         return;

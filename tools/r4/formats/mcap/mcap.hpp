@@ -35,12 +35,15 @@ constexpr std::size_t record_head = 9;
 // In front of a message's data.
 constexpr std::size_t message_head = 22;
 
-// The file's profile: who reads it can count on what is said above.
+// The file's profile.
 constexpr std::string_view profile = "r4log";
 constexpr std::string_view record_schema = "r4.Record";
 constexpr std::string_view line_schema = "r4.Line";
 // The key of a channel's metadata that has the number of its wire; 0: it is that of lines.
 constexpr std::string_view wire_key = "wire";
+// And how its board is reached and is called, escaped as in the native format.
+constexpr std::string_view url_key = "url";
+constexpr std::string_view name_key = "name";
 
 inline void append_string(std::string& out, std::string_view text) {
   append_number(out, static_cast<std::uint32_t>(text.size()));

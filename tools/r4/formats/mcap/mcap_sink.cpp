@@ -87,7 +87,16 @@ void McapSink::on_wire(const RecordedWire& wire, Time time) {
   line.pop_back();
   write_line(line, time);
   names_.on_wire(wire);
+  urls_[wire.number] = wire.url;
   current_.erase(wire.number);
+}
+
+// The wires of the recording that begins may be others.
+void McapSink::on_header() {
+  devices_.on_header();
+  measured_.on_header();
+  urls_.clear();
+  current_.clear();
 }
 
 void McapSink::on_record(const Record& record) {
@@ -247,7 +256,7 @@ std::string McapSink::topic_of(std::uint16_t wire) {
   if (name.empty()) return fmt::format("/board{}", wire);
   std::string topic = "/" + plain(name);
   const bool taken = std::any_of(channels_.begin(), channels_.end(), [&](const auto& each) {
-    return each.first.second == topic && each.first.first != wire;
+    return each.first.topic == topic && each.first.wire != wire;
   });
   return taken ? fmt::format("{}_{}", topic, wire) : topic;
 }
@@ -256,7 +265,7 @@ McapSink::Channel& McapSink::channel_of(std::uint16_t wire) {
   Channel*& current = current_[wire];
   if (current != nullptr) return *current;
   const std::string topic = topic_of(wire);
-  const auto known = channels_.find({wire, topic});
+  const auto known = channels_.find({wire, topic, urls_[wire]});
   current = known != channels_.end() ? &known->second : &add_channel(wire, topic, record_schema_id);
   return *current;
 }
@@ -267,11 +276,16 @@ McapSink::Channel& McapSink::add_channel(std::uint16_t wire, const std::string& 
     throw Error(ErrorKind::data, topic, "the recording has more than 1000 boards",
                 "is it damaged? r4 info FILE tells; convert it to .jsonl");
   }
-  Channel& channel = channels_[{wire, topic}];
+  const std::string& url = urls_[wire];
+  Channel& channel = channels_[{wire, topic, url}];
   channel.id = static_cast<std::uint16_t>(channels_.size());
   std::string metadata;
   append_pair(metadata, mcap::wire_key, std::to_string(wire));
-  if (wire != no_wire) append_pair(metadata, "url", plain(names_.url_of(wire)));
+  if (wire != no_wire) {
+    append_pair(metadata, mcap::url_key, plain(url));
+    const std::string& name = names_.name_of(wire);
+    if (!name.empty()) append_pair(metadata, mcap::name_key, plain(name));
+  }
   std::string content;
   append_number(content, channel.id);
   append_number(content, schema_id);

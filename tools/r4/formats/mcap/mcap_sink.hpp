@@ -4,6 +4,7 @@
 // for each MiB of JSON.
 #pragma once
 
+#include <compare>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -30,10 +31,7 @@ class McapSink final : public Sink {
   void on_comment(std::string_view line, Time time) override;
   void on_wire(const RecordedWire& wire, Time time) override;
   void on_device(const RecordedDevice& device) override { devices_.on_device(device); }
-  void on_header() override {
-    devices_.on_header();
-    measured_.on_header();
-  }
+  void on_header() override;
   // Throws Error{data} for a time beyond the year 2554, which MCAP cannot write.
   void on_record(const Record& record) override;
   void finish() override;
@@ -48,7 +46,12 @@ class McapSink final : public Sink {
         record;         // is in every chunk that has messages of it, so that each can be read alone
     std::string index;  // of the chunk that is being made
   };
-  using ChannelKey = std::pair<std::uint16_t, std::string>;  // wire and topic
+  struct ChannelKey {
+    std::uint16_t wire;
+    std::string topic, url;
+    bool operator==(const ChannelKey&) const = default;
+    auto operator<=>(const ChannelKey&) const = default;
+  };
 
   void begin();
   void write(std::string_view bytes);
@@ -69,6 +72,7 @@ class McapSink final : public Sink {
   bool begun_ = false;
   std::map<ChannelKey, Channel> channels_;
   std::map<std::uint16_t, Channel*> current_;  // by wire
+  std::map<std::uint16_t, std::string> urls_;  // by wire, of this recording
   Channel* lines_ = nullptr;
 
   std::uint64_t offset_ = 0;                // in the file

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "mcap_source.hpp"
 
+#include <lz4frame.h>
+
 #include <algorithm>
+#include <memory>
+#include <new>
 
 #include "host/recording/zstd_stream.hpp"
 #include "protocol/datagram/crc32.hpp"
@@ -14,11 +18,33 @@ namespace {
 using mcap::Fields;
 using mcap::Op;
 
-// The longest record, and chunk when it is unpacked: ours have a MiB.
-constexpr std::uint64_t max_record = 16 << 20;
+// The longest record, and chunk when it is unpacked: ours have a MiB, other tools are told any size by their users.
+constexpr std::uint64_t max_record = 256 << 20;
 // Where the name of its compression is in a chunk's record; so a chunk is found behind damage.
 constexpr std::size_t compression_at = mcap::record_head + 28;
-constexpr std::string_view compression_mark{"\x04\0\0\0zstd", 8};
+constexpr std::string_view zstd_mark{"\x04\0\0\0zstd", 8};
+constexpr std::string_view lz4_mark{"\x03\0\0\0lz4", 7};
+
+// Into `out`; false if the bytes are not frames of LZ4 that give `size` bytes.
+bool unpack_lz4(std::string_view bytes, std::uint64_t size, std::string& out) {
+  LZ4F_dctx* context = nullptr;
+  if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION)) != 0) {
+    throw std::bad_alloc();
+  }
+  const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> owner(
+      context, &LZ4F_freeDecompressionContext);
+  std::string piece(1 << 16, '\0');
+  std::size_t wanted = 0, written = 0, taken = 0;
+  do {
+    written = piece.size();
+    taken = bytes.size();
+    wanted = LZ4F_decompress(context, piece.data(), &written, bytes.data(), &taken, nullptr);
+    if (LZ4F_isError(wanted) != 0 || out.size() + written > size) return false;
+    out.append(piece, 0, written);
+    bytes.remove_prefix(taken);
+  } while (wanted == 0 ? !bytes.empty() : taken != 0 || written != 0);
+  return wanted == 0 && bytes.empty() && out.size() == size;
+}
 
 }  // namespace
 
@@ -30,6 +56,13 @@ void McapSource::feed(std::string_view bytes) {
 void McapSource::finish() {
   if (part_ == Part::magic || part_ == Part::header) fail_as_none();
   if (part_ != Part::end) damage("the file ends here; it is not whole");
+  const bool any_of_ours = std::any_of(channels_.begin(), channels_.end(), [](const auto& each) {
+    return each.second.wire.has_value();
+  });
+  if (!ours_ && !any_of_ours) {
+    throw Error(ErrorKind::data, name_, "an MCAP file that is no recording of r4",
+                "convert what r4 record or r4 convert has made");
+  }
 }
 
 void McapSource::take() {
@@ -61,7 +94,9 @@ std::size_t McapSource::take_next(std::string_view bytes) {
   const bool known = (code >= 0x01 && code <= 0x0F) || code >= 0x80;
   if (!known || size > max_record) {
     if (part_ == Part::header) fail_as_none();
-    damage(known ? "a record that is longer than any" : "no record of MCAP");
+    damage(known ? "a record of more than 256 MiB; make chunks smaller: mcap compress "
+                   "--chunk-size 4194304 FILE.mcap -o NEW.mcap"
+                 : "no record of MCAP");
     searching_ = true;
     return 1;
   }
@@ -69,7 +104,8 @@ std::size_t McapSource::take_next(std::string_view bytes) {
   const std::string_view content = bytes.substr(mcap::record_head, size);
   if (part_ == Part::header) {
     if (op != Op::header) fail_as_none();
-    on_header(content);
+    // Another profile is not the end: other tools write their own when they copy a file.
+    ours_ = Fields(content).string() == mcap::profile;
     part_ = Part::data;
   } else if (op == Op::footer) {
     part_ = Part::end;
@@ -83,11 +119,11 @@ std::size_t McapSource::take_next(std::string_view bytes) {
   return mcap::record_head + size;
 }
 
-// To the next chunk.
+// To the next chunk that is compressed.
 std::size_t McapSource::search(std::string_view bytes) {
-  const std::size_t mark = bytes.find(compression_mark);
+  const std::size_t mark = std::min(bytes.find(zstd_mark), bytes.find(lz4_mark));
   if (mark == std::string_view::npos) {
-    const std::size_t kept = compression_at + compression_mark.size();
+    const std::size_t kept = compression_at + zstd_mark.size();
     return bytes.size() > kept ? bytes.size() - kept : 0;
   }
   if (mark >= compression_at && static_cast<Op>(bytes[mark - compression_at]) == Op::chunk &&
@@ -96,12 +132,6 @@ std::size_t McapSource::search(std::string_view bytes) {
     return mark - compression_at != 0 ? mark - compression_at : take_next(bytes);
   }
   return mark >= compression_at ? mark - compression_at + 1 : mark + 1;
-}
-
-void McapSource::on_header(std::string_view content) {
-  if (Fields(content).string() == mcap::profile) return;
-  throw Error(ErrorKind::data, name_, "an MCAP file that is no recording of r4",
-              "convert what r4 record or r4 convert has made");
 }
 
 void McapSource::on_data_record(Op op, std::string_view content) {
@@ -115,19 +145,27 @@ void McapSource::on_channel(std::string_view content) {
   const auto id = fields.number<std::uint16_t>();
   static_cast<void>(fields.number<std::uint16_t>());  // its schema
   static_cast<void>(fields.string());                 // the topic
-  static_cast<void>(fields.string());                 // the encoding
+  const std::string_view encoding = fields.string();
   Fields metadata(fields.string());
-  std::uint32_t wire = 0;
-  bool told = false;
+  Channel channel;
   while (!metadata.rest().empty()) {
     const std::string_view key = metadata.string();
     const std::string_view value = metadata.string();
-    if (key == mcap::wire_key) told = parse_number(Text(value), wire) && wire <= 65535;
+    std::uint32_t wire = 0;
+    if (key == mcap::wire_key && parse_number(Text(value), wire) && wire <= 65535) {
+      channel.wire = static_cast<std::uint16_t>(wire);
+    }
+    std::string* const text = key == mcap::url_key    ? &channel.url
+                              : key == mcap::name_key ? &channel.name
+                                                      : nullptr;
+    if (text != nullptr && !append_unescaped(*text, value)) text->clear();
   }
-  if (!told || !fields.good()) {
-    return damage("a channel that is no board's");
-  }
-  channels_[id] = static_cast<std::uint16_t>(wire);
+  if (!fields.good() || !metadata.good()) return damage("a channel that is not whole");
+  if (encoding != "json") channel.wire.reset();
+  // Each chunk repeats the channels of its messages.
+  Channel& known = channels_[id];
+  channel.told = known.told && known.wire == channel.wire;
+  known = std::move(channel);
 }
 
 void McapSource::on_chunk(std::string_view content) {
@@ -158,6 +196,7 @@ bool McapSource::unpack(std::string_view compression, std::string_view bytes, st
     chunk_ = bytes;
     return chunk_.size() == size;
   }
+  if (compression == "lz4") return unpack_lz4(bytes, size, chunk_);
   if (compression != "zstd") return false;
   ZstdReader reader;
   for (;;) {
@@ -177,6 +216,7 @@ void McapSource::on_message(std::string_view content) {
   const auto time_ns = fields.number<std::uint64_t>();
   static_cast<void>(fields.number<std::uint64_t>());
   if (!fields.good() || channel == channels_.end()) return damage("a message of no channel");
+  if (!channel->second.wire) return;  // of another program, in the same file
   const Json object = Json::parse(fields.rest(), nullptr, false);
   const auto text_of = [&object](const char* key) {
     const auto found = object.find(key);
@@ -185,7 +225,7 @@ void McapSource::on_message(std::string_view content) {
   };
   if (!object.is_object()) return damage("a message that is no JSON object");
   bytes_.clear();
-  const std::uint16_t wire = channel->second;
+  const std::uint16_t wire = *channel->second.wire;
   const std::string* const event = text_of("event");
   const std::string* const from = text_of("from");
   const std::string* const text = wire == no_wire    ? text_of("line")
@@ -194,22 +234,28 @@ void McapSource::on_message(std::string_view content) {
   const bool good =
       text != nullptr && append_unescaped(bytes_, *text) && bytes_.size() <= max_record_line;
   if (!good) return damage("a message that is no record");
-  if (wire == no_wire) return on_line(bytes_);
+  if (wire == no_wire) {
+    const char* const problem = lines_.on_line(bytes_, channel->first);
+    if (problem != nullptr) damage(problem);
+    return;
+  }
   if (event == nullptr && from == nullptr) return damage("a message that is no record");
   const RecordKind kind = event != nullptr   ? RecordKind::event
                           : *from == "board" ? RecordKind::from_board
                                              : RecordKind::to_board;
-  handler_.on_record({Time{static_cast<std::int64_t>(time_ns / 1000)}, wire, kind,
-                      std::string_view(bytes_).substr(0, max_record_bytes)});
-}
-
-void McapSource::on_line(std::string_view line) {
-  const char* const problem = tell_line(line, line_, handler_);
-  if (problem != nullptr) damage(problem);
+  // A filter may have left out the topic of the lines, which declare the wires.
+  if (!channel->second.told && !lines_.recognised() && !channel->second.url.empty()) {
+    handler_.on_wire({wire, channel->second.url, channel->second.name});
+  }
+  channel->second.told = true;
+  lines_.on_record({Time{static_cast<std::int64_t>(time_ns / 1000)}, wire, kind,
+                    std::string_view(bytes_).substr(0, max_record_bytes)},
+                   channel->first, channel->second.url);
 }
 
 void McapSource::damage(std::string_view reason) {
   any_damage_ = true;
+  lines_.on_damage();
   handler_.on_damage({RecordingDamage::Kind::line, 0, offset_, reason});
 }
 

@@ -6,12 +6,15 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
+#include <functional>
+#include <utility>
+#include <vector>
 
-#include "../byte_order.hpp"
-#include "../conversion.hpp"
 #include "packets.hpp"
 #include "pcapng_sink.hpp"
 #include "protocol/datagram/numbers.hpp"
+#include "r4link/error.hpp"
 
 namespace r4::tool {
 namespace {
@@ -43,6 +46,45 @@ std::string address_text(int family, std::string_view bytes) {
   return family == AF_INET6 ? fmt::format("[{}]", text.data()) : text.data();
 }
 
+bool is_vlan_tag(std::uint16_t type) { return type == 0x8100 || type == 0x88A8 || type == 0x9100; }
+
+// True if a frame may have that id: 11 bits unless it is extended, few classes of errors.
+bool can_be_id(std::uint32_t id) {
+  constexpr std::uint32_t flags = can_extended | can_remote | can_error;
+  if ((id & can_error) != 0) return (id & ~flags) < 0x400;
+  return (id & can_extended) != 0 || (id & ~flags) <= max_can_id;
+}
+
+std::string link_name(std::uint16_t link) {
+  switch (link) {
+    case 105:
+      return "105 (802.11)";
+    case 119:
+    case 127:
+    case 192:
+      return fmt::format("{} (802.11 in monitor mode)", link);
+    case 258:
+      return "258 (pktap)";
+    default:
+      return std::to_string(link);
+  }
+}
+
+// The most frequent of them, at most five: "3018, 2390 and 4 more".
+template <class Name>
+std::string listed(const std::map<std::uint16_t, std::uint64_t>& counts, Name name) {
+  constexpr std::size_t most = 5;
+  std::vector<std::pair<std::uint64_t, std::uint16_t>> order;
+  order.reserve(counts.size());
+  for (const auto& [number, count] : counts) order.emplace_back(count, number);
+  std::sort(order.begin(), order.end(), std::greater<>());
+  std::string text;
+  for (std::size_t i = 0; i < std::min(most, order.size()); ++i) {
+    text += (i == 0 ? "" : ", ") + name(order[i].second);
+  }
+  return order.size() <= most ? text : fmt::format("{} and {} more", text, order.size() - most);
+}
+
 std::string_view without_end(std::string_view datagram) {
   while (datagram.ends_with('\r') || datagram.ends_with('\n')) datagram.remove_suffix(1);
   return datagram;
@@ -52,48 +94,91 @@ std::string_view without_end(std::string_view datagram) {
 
 void PacketRecords::on_packet(const PacketInterface& interface, const Packet& packet) {
   const std::string_view bytes = packet.bytes;
-  if (interface.description == lines_interface) return on_line(packet);
-  if (interface.description.starts_with(wire_interface)) {
-    return on_own(std::string_view(interface.description).substr(wire_interface.size()), packet);
-  }
+  ++packets_;
+  if (interface.description == lines_interface) return on_line(interface, packet);
+  if (interface.description.starts_with(wire_interface)) return on_own(interface, packet);
   switch (interface.link_type) {
     case link_ethernet: {
       std::size_t at = 12;
-      // Tags of a VLAN, at most two.
-      for (int tags = 0; tags < 2 && bytes.size() >= at + 2; ++tags, at += 4) {
-        if (word(bytes, at) != 0x8100 && word(bytes, at) != 0x88A8) break;
-      }
+      while (bytes.size() >= at + 2 && is_vlan_tag(word(bytes, at))) at += 4;
       if (bytes.size() < at + 2) return;
-      return on_protocol(word(bytes, at), bytes.substr(at + 2), interface.name, packet);
+      const std::uint16_t protocol = word(bytes, at);
+      if (protocol == ether_ipv4 || protocol == ether_ipv6) on_ip(bytes.substr(at + 2), packet);
+      return;
     }
     case link_null:
     case link_loop:
       return on_ip(bytes.substr(std::min<std::size_t>(4, bytes.size())), packet);
     case link_raw:
+    case link_raw_bsd:
+    case link_raw_openbsd:
     case link_ipv4:
     case link_ipv6:
       return on_ip(bytes, packet);
     case link_linux_sll:
       if (bytes.size() < 16) return;
-      return on_protocol(word(bytes, 14), bytes.substr(16), interface.name, packet);
+      return on_cooked(word(bytes, 14), bytes.substr(16), interface.name, packet);
     case link_linux_sll2:
       if (bytes.size() < 20) return;
-      return on_protocol(word(bytes, 0), bytes.substr(20), interface.name, packet);
+      return on_cooked(
+          word(bytes, 0), bytes.substr(20),
+          fmt::format("if{}", read_number<std::uint32_t>(bytes.substr(4), ByteOrder::big)), packet);
     case link_socketcan:
-      return on_can(interface.name, bytes, packet);
+      if (bytes.size() < can_header) return damage(packet, "a frame without a header");
+      return on_can(interface.name, read_number<std::uint32_t>(bytes, ByteOrder::big), bytes,
+                    packet);
     default:
+      ++unread_links_[interface.link_type];
       return;
   }
 }
 
-void PacketRecords::on_protocol(std::uint16_t protocol, std::string_view bytes,
-                                std::string_view interface, const Packet& packet) {
+void PacketRecords::finish(bool any_damage) {
+  bus_.finish();
+  if (told_ || bus_.told() || any_damage) return;
+  std::string reason = "no datagram of a board is in it: ";
+  if (!unread_links_.empty()) {
+    reason += "packets of link types that are not read: " + listed(unread_links_, link_name);
+  } else if (!ports_.empty()) {
+    reason += fmt::format("nothing is of UDP port {}, but of: {}", port_,
+                          listed(ports_, [](std::uint16_t port) { return std::to_string(port); }));
+  } else {
+    reason += fmt::format("{} packets, none of UDP or of a board's frames on a CAN bus", packets_);
+  }
+  const char* const fix =
+      !ports_.empty() ? "name the boards' port: r4 convert --port PORT"
+      : !unread_links_.empty()
+          ? "capture on the interface by which this computer talks to the board: tcpdump -i wlan0 "
+            "-w FILE udp port 2018"
+          : "capture while the board is heard: tcpdump -i any -w FILE udp port 2018";
+  throw Error(ErrorKind::data, name_, reason, fix);
+}
+
+void PacketRecords::on_cooked(std::uint16_t protocol, std::string_view bytes,
+                              std::string_view interface, const Packet& packet) {
   if (protocol == ether_ipv4 || protocol == ether_ipv6) return on_ip(bytes, packet);
-  if (protocol == ether_can || protocol == ether_can_fd) return on_can(interface, bytes, packet);
+  if (protocol != ether_can && protocol != ether_can_fd) return;
+  if (bytes.size() < can_header) return damage(packet, "a frame without a header");
+  on_can(interface, cooked_id(bytes), bytes, packet);
+}
+
+// In cooked captures libpcap up to 1.10.4 leaves a frame's id in the order of the capturing computer; later ones have
+// the order of the network. Often only one of them gives an id that can be; else it is the order of the frame before.
+// At first it is that which gives an id of 11 bits, as all but stops with a number have.
+std::uint32_t PacketRecords::cooked_id(std::string_view bytes) {
+  const auto big = read_number<std::uint32_t>(bytes, ByteOrder::big);
+  const auto little = read_number<std::uint32_t>(bytes, ByteOrder::little);
+  if (can_be_id(big) != can_be_id(little)) {
+    cooked_order_ = can_be_id(big) ? ByteOrder::big : ByteOrder::little;
+  } else if (!cooked_order_) {
+    const bool only_little = (big & can_extended) != 0 && (little & can_extended) == 0;
+    cooked_order_ = only_little ? ByteOrder::little : ByteOrder::big;
+  }
+  return cooked_order_ == ByteOrder::big ? big : little;
 }
 
 // A line of the native format, as PcapngSink writes it: behind the tags, of which a zero is the last.
-void PacketRecords::on_line(const Packet& packet) {
+void PacketRecords::on_line(const PacketInterface& interface, const Packet& packet) {
   std::string_view bytes = packet.bytes;
   while (bytes.size() >= 4) {
     const std::uint16_t tag = word(bytes, 0);
@@ -101,12 +186,14 @@ void PacketRecords::on_line(const Packet& packet) {
     if (tag == 0) break;
   }
   if (packet.cut) return damage(packet, "the packet is cut");
-  const char* const problem = tell_line(bytes, line_, handler_);
+  told_ = true;
+  const char* const problem = lines_.on_line(bytes, interface.number);
   if (problem != nullptr) damage(packet, problem);
 }
 
 // A datagram of that wire, as PcapngSink writes it.
-void PacketRecords::on_own(std::string_view wire, const Packet& packet) {
+void PacketRecords::on_own(const PacketInterface& interface, const Packet& packet) {
+  const auto wire = std::string_view(interface.description).substr(wire_interface.size());
   Udp udp;
   std::uint32_t number = 0;
   if (!parse_number(Text(wire), number) || number > 65535 || !read_ip(packet.bytes, udp)) {
@@ -114,8 +201,10 @@ void PacketRecords::on_own(std::string_view wire, const Packet& packet) {
   }
   if (packet.cut || udp.cut) return damage(packet, "the packet is cut");
   const bool to_board = udp.from == made_up_host_text;
-  handler_.on_record({packet.time, static_cast<std::uint16_t>(number),
-                      to_board ? RecordKind::to_board : RecordKind::from_board, udp.payload});
+  told_ = true;
+  lines_.on_record({packet.time, static_cast<std::uint16_t>(number),
+                    to_board ? RecordKind::to_board : RecordKind::from_board, udp.payload},
+                   interface.number, interface.name);
 }
 
 // IPv4 or IPv6 with UDP in it, whole or the first of its fragments.
@@ -127,6 +216,7 @@ bool PacketRecords::read_ip(std::string_view bytes, Udp& out) {
     if (header < 20 || bytes.size() < header + udp_header) return false;
     const bool fragment = (word(bytes, 6) & 0x1FFF) != 0;
     if (byte(bytes, 9) != udp_protocol || fragment) return false;
+    out.id = word(bytes, 4);
     out.from = address_text(AF_INET, bytes.substr(12, 4));
     out.to = address_text(AF_INET, bytes.substr(16, 4));
     bytes.remove_prefix(header);
@@ -151,18 +241,40 @@ void PacketRecords::on_ip(std::string_view bytes, const Packet& packet) {
   Udp udp;
   if (!read_ip(bytes, udp)) return;
   const bool from_board = udp.from_port == port_;
-  if (!from_board && udp.to_port != port_) return;
+  if (!from_board && udp.to_port != port_) {
+    ++ports_[udp.from_port];
+    ++ports_[udp.to_port];
+    return;
+  }
   if (udp.cut) return damage(packet, "the packet is cut: capture it whole, tcpdump -s 0");
+  if (is_repeated(udp, packet.time)) return;
   const std::uint16_t wire = wire_of(from_board ? udp.from : udp.to);
   if (wire == no_wire) return damage(packet, "more than 1000 boards");
+  told_ = true;
   handler_.on_record({packet.time, wire, from_board ? RecordKind::from_board : RecordKind::to_board,
                       without_end(udp.payload)});
 }
 
-void PacketRecords::on_can(std::string_view interface, std::string_view bytes,
+// True if the same packet was told before. Two that are not the same differ in the id of IP, or in the number and time
+// in the datagram; a host that sends the same text again takes its time.
+bool PacketRecords::is_repeated(const Udp& udp, Time time) {
+  constexpr Time of_an_id{500'000};
+  constexpr Time without{5'000};
+  const std::string all = fmt::format("{} {} {} {} {} {}", udp.from, udp.from_port, udp.to,
+                                      udp.to_port, udp.id, udp.payload);
+  const std::size_t hash = std::hash<std::string>()(all);
+  const Time most = udp.id != 0 ? of_an_id : without;
+  const bool known = std::any_of(seen_.begin(), seen_.end(), [&](const Seen& each) {
+    return each.hash == hash && std::chrono::abs(time - each.time) <= most;
+  });
+  if (known) return true;
+  seen_[next_seen_] = {hash, time};
+  next_seen_ = (next_seen_ + 1) % seen_.size();
+  return false;
+}
+
+void PacketRecords::on_can(std::string_view interface, std::uint32_t id, std::string_view bytes,
                            const Packet& packet) {
-  if (bytes.size() < can_header) return damage(packet, "a frame without a header");
-  const auto id = read_number<std::uint32_t>(bytes, ByteOrder::big);
   if ((id & can_error) != 0) return;
   const std::size_t size = byte(bytes, 4);
   CanFrame frame{};
@@ -192,6 +304,8 @@ std::uint16_t PacketRecords::wire_of(const std::string& address) {
 }
 
 void PacketRecords::damage(const Packet& packet, std::string_view reason) {
+  told_ = true;
+  lines_.on_damage();
   handler_.on_damage({RecordingDamage::Kind::line, 0, packet.offset, reason});
 }
 

@@ -12,7 +12,8 @@ constexpr std::uint32_t pcap_us = 0xA1B2C3D4;
 constexpr std::uint32_t pcap_ns = 0xA1B23C4D;
 constexpr std::size_t pcap_header = 24;
 constexpr std::size_t pcap_packet_header = 16;
-constexpr std::size_t block_ends = 12;  // type and size, and the size again
+constexpr std::size_t block_ends = 12;   // type and size, and the size again
+constexpr std::size_t packet_head = 20;  // of a packet's block
 constexpr std::size_t most_interfaces = 70'000;
 
 // Those blocks that begin anew behind a damaged one.
@@ -34,7 +35,7 @@ void PcapSource::finish() {
     throw Error(ErrorKind::data, name_, "no capture of packets",
                 "tcpdump -w FILE udp port 2018 makes one");
   }
-  records_.finish();
+  records_.finish(any_damage_);
 }
 
 void PcapSource::take(bool at_end) {
@@ -156,6 +157,8 @@ void PcapSource::on_block(std::uint32_t type, std::string_view body) {
     on_interface(body);
   } else if (type == pcapng_packet) {
     on_pcapng_packet(body);
+  } else if (type == pcapng_old_packet) {
+    on_old_packet(body);
   } else if (type == pcapng_simple_packet) {
     damage("a packet without a time");
   }
@@ -164,6 +167,7 @@ void PcapSource::on_block(std::uint32_t type, std::string_view body) {
 void PcapSource::on_interface(std::string_view body) {
   if (interfaces_.size() == most_interfaces) return damage("more interfaces than are read");
   Interface& interface = interfaces_.emplace_back();
+  interface.number = interface_count_++;
   if (body.size() < 8) return damage("an interface that is not whole");
   interface.link_type = number<std::uint16_t>(body, 0);
   body.remove_prefix(8);
@@ -172,8 +176,8 @@ void PcapSource::on_interface(std::string_view body) {
     const auto size = number<std::uint16_t>(body, 2);
     if (code == 0 || size > body.size() - 4) break;
     const std::string_view value = body.substr(4, size);
-    // Names of our own are longer than those of devices, and shorter than that.
-    if (code == pcapng_if_name) interface.name = value.substr(0, 64);
+    if (code == pcapng_if_name && size <= max_interface_text) interface.name = value;
+    // Our own are shorter than that.
     if (code == pcapng_if_description) interface.description = value.substr(0, 64);
     if (code == pcapng_if_tsoffset && size == 8)
       interface.offset_s = number<std::int64_t>(value, 0);
@@ -192,15 +196,24 @@ void PcapSource::on_interface(std::string_view body) {
 }
 
 void PcapSource::on_pcapng_packet(std::string_view body) {
-  if (body.size() < 20) return damage("a packet that is not whole");
-  const auto index = number<std::uint32_t>(body, 0);
+  if (body.size() < packet_head) return damage("a packet that is not whole");
+  on_packet_of(number<std::uint32_t>(body, 0), body);
+}
+
+// Its interface has 16 bits; a count of lost packets follows.
+void PcapSource::on_old_packet(std::string_view body) {
+  if (body.size() < packet_head) return damage("a packet that is not whole");
+  on_packet_of(number<std::uint16_t>(body, 0), body);
+}
+
+void PcapSource::on_packet_of(std::uint32_t index, std::string_view body) {
   if (index >= interfaces_.size()) return damage("a packet of an interface that is not there");
   const std::uint64_t ticks =
       std::uint64_t{number<std::uint32_t>(body, 4)} << 32 | number<std::uint32_t>(body, 8);
   const auto size = number<std::uint32_t>(body, 12);
-  if (size > body.size() - 20) return damage("a packet that is not whole");
+  if (size > body.size() - packet_head) return damage("a packet that is not whole");
   records_.on_packet(interfaces_[index],
-                     {time_of(interfaces_[index], ticks), offset_, body.substr(20, size),
+                     {time_of(interfaces_[index], ticks), offset_, body.substr(packet_head, size),
                       number<std::uint32_t>(body, 16) > size});
 }
 
@@ -218,6 +231,8 @@ Time PcapSource::time_of(const Interface& interface, std::uint64_t ticks) {
 }
 
 void PcapSource::damage(std::string_view reason) {
+  any_damage_ = true;
+  records_.on_damage();
   handler_.on_damage({RecordingDamage::Kind::line, 0, offset_, reason});
 }
 

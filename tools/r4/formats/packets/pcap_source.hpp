@@ -20,7 +20,7 @@ class PcapSource final : public Source {
  public:
   // `port`: of the boards.
   PcapSource(RecordingReader::Handler& handler, std::string name, std::uint16_t port = board_port)
-      : handler_(handler), records_(handler, port), name_(std::move(name)) {}
+      : handler_(handler), records_(handler, name, port), name_(std::move(name)) {}
   void feed(std::string_view bytes) override;
   void finish() override;
 
@@ -44,6 +44,8 @@ class PcapSource final : public Source {
   void on_block(std::uint32_t type, std::string_view body);
   void on_interface(std::string_view body);
   void on_pcapng_packet(std::string_view body);
+  void on_old_packet(std::string_view body);
+  void on_packet_of(std::uint32_t index, std::string_view body);
   void damage(std::string_view reason);
   template <class Number>
   Number number(std::string_view bytes, std::size_t at) const {
@@ -56,10 +58,12 @@ class PcapSource final : public Source {
   const std::string name_;
   Form form_ = Form::unknown;
   ByteOrder order_ = ByteOrder::little;
-  std::string waiting_;       // what is not taken yet
-  std::uint64_t offset_ = 0;  // where that begins in the file
-  bool searching_ = false;    // for the next block behind a damaged one
-  std::vector<Interface> interfaces_;
+  std::string waiting_;                // what is not taken yet
+  std::uint64_t offset_ = 0;           // where that begins in the file
+  bool searching_ = false;             // for the next block behind a damaged one
+  std::vector<Interface> interfaces_;  // of this section
+  std::uint32_t interface_count_ = 0;  // of all sections
+  bool any_damage_ = false;
 };
 
 }  // namespace r4::tool

@@ -132,18 +132,6 @@ dds_entity_t Graph::make_reader(std::size_t node, std::string_view topic, const 
   return add(EndpointKind::reader, {node, std::string(topic), dds_topic(name)}, type, qos);
 }
 
-dds_entity_t Graph::subscribe_first_byte(std::size_t node, std::string_view topic,
-                                         const Announced& of, const Qos& qos) {
-  return make_reader(node, topic, copied_types_.emplace_back(of).message, qos);
-}
-
-Graph::CopiedType::CopiedType(const Announced& of)
-    : type(of.type),
-      name(ros_type(of.type)),
-      hash(type_hash_of(of.user_data)),
-      descriptor(renamed(std_msgs_msg_dds__Bool__desc, type.c_str())),
-      message{name.c_str(), hash.c_str(), &descriptor} {}
-
 void Graph::on_other_type(std::size_t node, std::string_view topic, OtherType act) {
   OwnTopic& own = own_[dds_topic(full_name(nodes_[node].name, topic))];
   own.node = node;

@@ -9,7 +9,6 @@
 
 #include <chrono>
 #include <cstddef>
-#include <list>
 #include <map>
 #include <optional>
 #include <string>
@@ -74,9 +73,6 @@ class Graph {
     return make_service(node, name, type, message_type<Request>(), message_type<Response>());
   }
 
-  // What a sample of another type has in common with all types: its first byte.
-  dds_entity_t subscribe_first_byte(std::size_t node, std::string_view topic, const Announced& of,
-                                    const Qos& qos);
   // A topic that the node reads, or might read: what is to be done for writers of another type.
   void on_other_type(std::size_t node, std::string_view topic, OtherType act);
 
@@ -123,14 +119,6 @@ class Graph {
     Entity participant;
     std::optional<NodeListing> listing;
   };
-  struct CopiedType {
-    explicit CopiedType(const Announced& of);
-    const std::string type;
-    const std::string name;
-    const std::string hash;
-    const dds_topic_descriptor_t descriptor;
-    const MessageType message;
-  };
 
   const Domain domain_settings_;
   Entity domain_;
@@ -139,7 +127,6 @@ class Graph {
   std::vector<Entity> topics_;
   std::vector<Entity> endpoints_;
   std::map<std::string, OwnTopic> own_;
-  std::list<CopiedType> copied_types_;
   std::vector<Endpoint> publishers_;
   std::vector<Endpoint> subscriptions_;
   std::vector<Endpoint> services_;

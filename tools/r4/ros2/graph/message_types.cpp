@@ -6,6 +6,12 @@
 namespace r4::tool::ros2 {
 namespace {
 
+dds_topic_descriptor_t renamed(const dds_topic_descriptor_t& type, const char* name) noexcept {
+  return {type.m_size, type.m_align, type.m_flagset, type.m_nkeys,
+          name,        type.m_keys,  type.m_nops,    type.m_ops,
+          type.m_meta, {nullptr, 0}, {nullptr, 0},   type.restrict_data_representation};
+}
+
 // The same messages under the name that they have in every release.
 const dds_topic_descriptor_t nodes_before_iron =
     renamed(rmw_dds_common_before_iron_msg_dds__ParticipantEntitiesInfo__desc,
@@ -15,23 +21,6 @@ const dds_topic_descriptor_t nodes_before_iron =
 
 std::string user_data_of(const MessageType& type) {
   return *type.hash == '\0' ? std::string() : fmt::format("typehash={};", type.hash);
-}
-
-std::string type_hash_of(std::string_view user_data) {
-  constexpr std::string_view key = "typehash=";
-  constexpr std::size_t size = 7 + 64;  // "RIHS01_" and the digits of SHA-256
-  const std::size_t at = user_data.find(key);
-  if (at == std::string_view::npos) return {};
-  const std::string_view hash = user_data.substr(at + key.size(), size);
-  const bool is_hash = hash.size() == size && hash.starts_with("RIHS01_") &&
-                       hash.find_first_not_of("0123456789abcdef", 7) == std::string_view::npos;
-  return is_hash ? std::string(hash) : std::string();
-}
-
-dds_topic_descriptor_t renamed(const dds_topic_descriptor_t& type, const char* name) noexcept {
-  return {type.m_size, type.m_align, type.m_flagset, type.m_nkeys,
-          name,        type.m_keys,  type.m_nops,    type.m_ops,
-          type.m_meta, {nullptr, 0}, {nullptr, 0},   type.restrict_data_representation};
 }
 
 #define R4_MESSAGE_TYPE(Message, name, hash, descriptor)   \

@@ -89,9 +89,5 @@ inline std::string_view bytes_of(const dds_sequence_octet& string) {
 
 // What a reader or writer of that type carries as its user data.
 std::string user_data_of(const MessageType& type);
-// The type hash in the user data of another participant; empty if there is none.
-std::string type_hash_of(std::string_view user_data);
-// The same type under another name, which has to live as long.
-dds_topic_descriptor_t renamed(const dds_topic_descriptor_t& type, const char* name) noexcept;
 
 }  // namespace r4::tool::ros2

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a file holds, by its first bytes and not by its name.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "r4link/error.hpp"
+
+namespace r4 {
+
+enum class FileForm : std::uint8_t {
+  text,  // and whatever else begins as no other form does
+  zstd,  // also with skippable frames at the front
+  pcap,
+  pcapng,
+  mcap,
+  gzip,
+  xz,
+  bzip2,
+  lz4,
+  zip,
+  utf16,
+};
+
+// So many bytes tell every form.
+constexpr std::size_t form_bytes = 8;
+
+FileForm form_of(std::string_view beginning);
+
+// The mark that some editors write in front of UTF-8.
+constexpr std::string_view utf8_mark = "\xEF\xBB\xBF";
+
+// Why a file of that form is not a recording, and what makes one of it.
+Error not_a_recording(const std::string& name, FileForm form);
+
+}  // namespace r4
