@@ -455,7 +455,7 @@ def test_it_says_so_where_other_open_files_leave_no_room_for_the_graph():
     try:
         resource.setrlimit(resource.RLIMIT_NOFILE, (min(2048, hard), hard))
         files = [os.open(os.devnull, os.O_RDONLY) for _ in range(1024)]
-        result = subprocess.run([R4, 'ros2', 'sim:', '--for', '0.1'], pass_fds=files, env=own_domain(), check=False,
+        result = subprocess.run([R4, 'ros2', 'sim:', '--duration', '0.1'], pass_fds=files, env=own_domain(), check=False,
                                 capture_output=True, text=True, timeout=PATIENCE_S)
     finally:
         for each in files:
