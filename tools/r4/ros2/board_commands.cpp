@@ -41,7 +41,7 @@ BoardCommands::BoardCommands(AsyncBoard& board, Graph& graph, std::size_t node, 
   if (options_.drive) subscribe_drive(graph, node, inbox);
   serve_all(graph, node, inbox);
   board_.on_state([this](const ReceivedState& state, const Datagram&) {
-    drivers_.on_state(state, state.sampled);
+    drivers_.on_state(state, BootClock::now() - (Clock::now() - state.sampled));
   });
   board_.on_arming([this](DisarmCause cause) {
     if (cause == DisarmCause::none) return;
@@ -362,7 +362,7 @@ void BoardCommands::post(std::size_t first, std::size_t count) {
     result = board_.post(group);
   }
   if (!result) tell(what, result);
-  const Clock::time_point now = Clock::now();
+  const Drivers::Time now = BootClock::now();
   for (std::size_t i = first; i < first + count; ++i) {
     const Setpoint& each = wanted_[i];
     // What is to rest is repeated until it does, also if it could not be sent.
@@ -373,8 +373,9 @@ void BoardCommands::post(std::size_t first, std::size_t count) {
 
 void BoardCommands::tell(const std::string& what, PostResult result) {
   if (result == PostResult::not_armed) {
-    const Problem problem = explain("command", board_.disarmed_by());
-    warn(fmt::format("not armed ({}): {}", to_text(board_.disarmed_by()), problem.fix));
+    const DisarmCause cause = board_.disarmed_by();
+    const Problem problem = for_a_node(explain("command", cause), cause);
+    warn(fmt::format("not armed ({}): {}", to_text(cause), problem.fix));
   } else {
     warn(fmt::format("a command was dropped: {} ({})", to_text(result), what));
   }
@@ -382,7 +383,7 @@ void BoardCommands::tell(const std::string& what, PostResult result) {
 
 void BoardCommands::on_tick() {
   if (resting_ || !drivers_.any()) return;
-  const Drivers::Stop stop = drivers_.to_stop(Clock::now());
+  const Drivers::Stop stop = drivers_.to_stop(BootClock::now());
   if (stop.commands.empty()) return;
   Setpoints group;
   for (const Command& command : stop.commands) group.add(command);
