@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "guard.hpp"
 
+#include "../protocol/datagram/wrapping.hpp"
+
 namespace r4 {
 namespace firmware {
 
@@ -42,9 +44,13 @@ bool Guard::tick(std::uint32_t now_ms) {
     debt_ = 0;
     trip(SafeReason::watchdog);
   }
-  if (stop_.exchange(false, std::memory_order_acquire)) trip(SafeReason::stop);
+  const std::uint32_t stops = stops_heard();
+  if (stops != stops_obeyed_) {
+    stops_obeyed_ = stops;
+    trip(SafeReason::stop);
+  }
   if (armed_.load(std::memory_order_acquire) &&
-      static_cast<std::int32_t>(now_ms - deadline_ms_.load(std::memory_order_relaxed)) >= 0) {
+      reached(now_ms, deadline_ms_.load(std::memory_order_relaxed))) {
     disarm();
     trip(SafeReason::link);
   }

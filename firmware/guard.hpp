@@ -49,7 +49,9 @@ class Guard {
 
   // E:STOP has come in, in an interrupt or a thread that need not wait for the loop
   // (stop_detector.hpp): outputs safe at the next tick(), which may be called for it at once.
-  void stop() { stop_.store(true, std::memory_order_release); }
+  void stop() { stops_heard_.fetch_add(1, std::memory_order_release); }
+  // How often that was since boot; it wraps. The application has to find as many datagrams.
+  std::uint32_t stops_heard() const { return stops_heard_.load(std::memory_order_acquire); }
 
   // A millisecond has passed. True: every duty has checked in since it was last true, so the
   // hardware watchdog may be fed.
@@ -84,12 +86,13 @@ class Guard {
   std::uint8_t duty_count_ = 0;
   bool unwatched_ = false;  // a duty was refused
   std::atomic<bool> armed_{false};
-  std::atomic<bool> stop_{false};
+  std::atomic<std::uint32_t> stops_heard_{0};
   std::atomic<std::uint32_t> deadline_ms_{0};
   std::atomic<SafeReason> tripped_{SafeReason::none};
   std::atomic<std::uint32_t> missed_{0};
   // Of tick() alone.
   bool started_ = false;
+  std::uint32_t stops_obeyed_ = 0;
   std::uint32_t debt_ = 0;
 };
 

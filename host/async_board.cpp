@@ -296,6 +296,25 @@ void AsyncBoard::Impl::describe(const Device& device) {
   describe_in_recording(device);
 }
 
+// What is known already comes first.
+void AsyncBoard::Impl::record(const std::shared_ptr<Recorder>& recorder) {
+  for (const auto& wire : wires) {
+    const Carrier& transport = *wire->carrier;
+    wire->tap.attach(recorder, transport.name());
+    if (!transport.up()) continue;
+    wire->tap.on_carrier_event({CarrierEvent::Kind::up, {{}, transport.name(), {}, {}}});
+  }
+  wires[0]->tap.on_link(session.link());
+  name_in_recording();
+  for (const Device& device : devices) describe_in_recording(device);
+}
+
+void AsyncBoard::Impl::name_in_recording() {
+  const std::string& board = identity.name.empty() ? identity.board_id : identity.name;
+  if (board.empty()) return;
+  for (const auto& wire : wires) wire->tap.on_name(board);
+}
+
 void AsyncBoard::Impl::describe_in_recording(const Device& device) {
   for (const auto& wire : wires) wire->tap.on_device(device);
 }

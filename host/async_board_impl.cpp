@@ -32,6 +32,7 @@ AsyncBoard::Impl::Impl(asio::io_context& context, std::vector<std::unique_ptr<Ca
                        BoardOptions options)
     : io(context),
       heartbeat_ms(options.session.timing.heartbeat_ms),
+      board_timeout(std::chrono::milliseconds(options.session.timing.timeout_ms)),
       session(*this, with_clock(std::move(options.session), steady_now()),
               Session::random_first_pnum(), options.role, transports.size()),
       timer(context),
@@ -61,6 +62,16 @@ void AsyncBoard::Impl::end_entry(Time late) {
     tell_that_it_was_held_up(late);
   }
   settle();
+}
+
+// What has waited in sockets and buffers since before is passed over.
+void AsyncBoard::Impl::on_sleep() {
+  waking = 2;
+  backlog_size = 0;
+  session.on_sleep(now);
+  for (Waiter& waiter : waiters) give_up(waiter);
+  waiters.clear();
+  poll_wanted = true;
 }
 
 void AsyncBoard::Impl::tell_that_it_was_held_up(Time late) {
@@ -128,6 +139,11 @@ bool AsyncBoard::Impl::end_waits() {
   return any;
 }
 
+void AsyncBoard::Impl::give_up(Waiter& waiter) {
+  ended.push_back(
+      {{Outcome::cancelled, Refusal::none, now - waiter.started}, std::move(waiter.completion)});
+}
+
 // --- what the user starts
 
 void AsyncBoard::Impl::wait_active(Duration timeout, CompletionPtr completion) {
@@ -144,8 +160,7 @@ void AsyncBoard::Impl::cancel(Ticket id) {
     const auto waiter =
         std::find_if(waiters.begin(), waiters.end(), [id](const Waiter& w) { return w.id == id; });
     if (waiter != waiters.end()) {
-      ended.push_back({{Outcome::cancelled, Refusal::none, now - waiter->started},
-                       std::move(waiter->completion)});
+      give_up(*waiter);
       waiters.erase(waiter);
       return;
     }
@@ -175,6 +190,7 @@ void AsyncBoard::Impl::open() {
   }
   if (!any) throw Error(*problem);
   phase = Phase::open;
+  sleep_watch = SleepWatch();
   due = steady_now();
   enter(Completion::How::post, [this] { due = session.poll(now); });
   if (!all) open_again();
@@ -232,25 +248,6 @@ void AsyncBoard::Impl::close() {
   enter(Completion::How::post, [this] { session.end_all(now); });
 }
 
-// What is known already comes first.
-void AsyncBoard::Impl::record(const std::shared_ptr<Recorder>& recorder) {
-  for (const auto& wire : wires) {
-    const Carrier& transport = *wire->carrier;
-    wire->tap.attach(recorder, transport.name());
-    if (!transport.up()) continue;
-    wire->tap.on_carrier_event({CarrierEvent::Kind::up, {{}, transport.name(), {}, {}}});
-  }
-  wires[0]->tap.on_link(session.link());
-  name_in_recording();
-  for (const Device& device : devices) describe_in_recording(device);
-}
-
-void AsyncBoard::Impl::name_in_recording() {
-  const std::string& board = identity.name.empty() ? identity.board_id : identity.name;
-  if (board.empty()) return;
-  for (const auto& wire : wires) wire->tap.on_name(board);
-}
-
 // The link goes on without it.
 void AsyncBoard::Impl::tell_of_recordings() {
   std::optional<Problem> problem;
@@ -279,6 +276,7 @@ void AsyncBoard::Impl::arm() {
 void AsyncBoard::Impl::on_timer() {
   if (!has_link()) return;
   armed = false;
+  if (waking != 0) --waking;
   enter(Completion::How::dispatch, [this] {
     due = session.poll(now);
     tell_of_recordings();
@@ -295,6 +293,7 @@ void AsyncBoard::Impl::on_datagram(BoardWire& wire, std::string_view bytes) {
     const auto arrival = wire.carrier->arrival();
     const Time at = arrival ? std::chrono::duration_cast<Time>(arrival->time_since_epoch()) : now;
     wire.tap.on_received(bytes, at);
+    if (waking != 0) return;
     session.receive(wire.index, bytes, std::clamp(at, before, now));  // its time never goes back
     wires[0]->tap.on_packets(session.packets());
     poll_wanted = true;
@@ -303,6 +302,7 @@ void AsyncBoard::Impl::on_datagram(BoardWire& wire, std::string_view bytes) {
 
 void AsyncBoard::Impl::on_drained() {
   in_backlog = false;
+  waking = 0;
   undrained = 0;
   tell_backlog();
 }

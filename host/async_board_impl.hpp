@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "board_wire.hpp"
+#include "measurement/boot_clock.hpp"
 #include "r4link/async_board.hpp"
 #include "session/session.hpp"
 #include "subscribers.hpp"
@@ -100,6 +101,7 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
     const Time late = begin_entry(way);
     {
       const Inside inside(depth);
+      if (depth == 1 && has_link() && sleep_watch.slept(now, board_timeout)) on_sleep();
       if (fed.load(std::memory_order_relaxed) != 0) {
         session.feed(Time{fed.exchange(0, std::memory_order_relaxed)});
       }
@@ -116,9 +118,11 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
   };
   Time begin_entry(Completion::How way);
   void end_entry(Time late);
+  void on_sleep();
   void tell_that_it_was_held_up(Time late);
   void settle();
   bool end_waits();
+  void give_up(Waiter& waiter);
 
   // --- what the user starts
 
@@ -201,6 +205,7 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
   std::vector<const Device*> attaching;
   std::uint32_t boots = 0;           // of the board, while we have known it
   const std::uint32_t heartbeat_ms;  // between ours
+  const Time board_timeout;          // so long a board waits for its host
   Session session;
   BoardIdentity identity;
 
@@ -216,6 +221,8 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
   Subscribers<DisarmCause> arming_callbacks;
   Subscribers<RefusedPost> refused_callbacks;
 
+  SleepWatch sleep_watch;
+  int waking = 0;  // times that the timer may ring until what came before a sleep has been read
   bool in_backlog = false;
   std::array<char, max_datagram> backlog;  // the newest state of it
   std::size_t backlog_size = 0;

@@ -28,6 +28,7 @@
 
 #include "board_loop.hpp"
 #include "callback_thread.hpp"
+#include "measurement/boot_clock.hpp"
 #include "post_box.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/board.hpp"
@@ -82,14 +83,16 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   // Does `action` on the loop and waits until it is done; nothing if the board is closed. Throws if
   // the loop does not begin in time; then it never will.
   void run_on_loop(std::string_view what, std::function<void()> action);
-  // Waits until `arrived` (asked under the lock) is true. False if it was not in time.
+  // Waits until `arrived` (asked under the lock) is true. False if it was not in time. A sleep of this computer is part
+  // of the time, though the deadline stands still meanwhile.
   template <class Predicate>
   bool wait_for_news(Duration timeout, Predicate arrived) {
+    const SleepWatch slept;
     std::unique_lock lock(mutex);
     const bool woken = wait_until(lock, news, Clock::now() + bounded(timeout),
                                   [&] { return closed || arrived(); });
     if (closed) throw closed_error(name);
-    return woken;
+    return woken && slept.time() <= bounded(timeout);
   }
   // Waits for what `done` is asked under the lock; false at the deadline. Throws what on_wait() throws, without
   // the lock.

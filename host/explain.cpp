@@ -78,6 +78,9 @@ Words lease_words(LeaseTrouble trouble) {
           "bring it up to date, or take control: r4 monitor --control, BoardRole::control"};
 }
 
+constexpr const char* clear_on_purpose =
+    "clear it on purpose: r4 send URL E:CLEAR, or board.clear(), ";
+
 // Why outputs are not driven, and what to do before arm() is called.
 Words disarm_words(DisarmCause cause) {
   switch (cause) {
@@ -99,6 +102,15 @@ Words disarm_words(DisarmCause cause) {
       return {"the board has begun again", "set its thresholds (U) again, "};
     case DisarmCause::supply:
       return {"relay 1, the motor supply, was opened", ""};
+    case DisarmCause::sleep:
+      return {"this computer slept", ""};
+    case DisarmCause::earlier_stop:
+      return {"stopped before this program began", clear_on_purpose};
+    case DisarmCause::earlier_watchdog:
+      return {"a duty of the board's firmware missed its deadline before this program began",
+              clear_on_purpose};
+    case DisarmCause::earlier_fault:
+      return {"the board found a fault in itself before this program began", clear_on_purpose};
     case DisarmCause::none:
       break;
   }

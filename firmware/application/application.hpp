@@ -160,6 +160,8 @@ class Application {
 
   // application_safety.cpp
   void look_at_time(std::uint32_t now_ms);
+  void look_at_stops(std::uint32_t now_ms);
+  void stop_without_number(std::uint32_t now_ms);
   void enter(SafeReason cause, std::uint32_t now_ms);
   void check_interlocks(std::uint32_t now_ms);
   void clear();
@@ -221,7 +223,10 @@ class Application {
   bool has_stop_number_ = false;
   std::uint32_t stop_number_ = 0;
   bool stop_of_a_key_ = false;
-  bool stop_unread_ = false;   // the guard has heard it, and its datagram is yet to be read
+  // Stops that the guard has heard, and those of them whose datagrams are still to be read; when it heard the newest.
+  std::uint32_t stops_heard_ = 0;
+  std::uint32_t unread_stops_ = 0;
+  std::uint32_t unread_ms_ = 0;
   bool outputs_live_ = false;  // outputs_ follow the setpoints
   // Of the datagram that is being read: who sent it, as the link knows him, whichever of his wires brought it;
   // and whether another has brought it before.

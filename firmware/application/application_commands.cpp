@@ -214,8 +214,8 @@ void Application::emergency_stop(Source from, const Datagram& datagram, Verdict 
   const bool same = has_number && has_stop_number_ && number == stop_number_ &&
                     speaker_ == stop_from_ && (stop_of_a_key_ || !of_a_key);
   // An E:CLEAR under way knows nothing of this one.
-  if (repeated && !same && !stop_unread_) safety_.again();
-  stop_unread_ = false;
+  if (repeated && !same) safety_.again();
+  if (unread_stops_ != 0) --unread_stops_;
   if (!repeated || !same) stop_of_a_key_ = of_a_key;
   stop_from_ = speaker_;
   has_stop_number_ = has_number;

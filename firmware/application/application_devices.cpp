@@ -83,8 +83,7 @@ void Application::poll_devices(std::uint32_t now_ms) {
 
 // Whoever asks must not have to choose a field first.
 void Application::add_device_answer(FieldSet& fields, std::uint32_t t_ms) const {
-  if (has_answer_ && static_cast<std::int32_t>(t_ms - answered_ms_) <=
-                         static_cast<std::int32_t>(answer_shown_ms)) {
+  if (has_answer_ && reached(answered_ms_ + answer_shown_ms, t_ms)) {
     fields.add(StateField::i2cx);
   }
 }

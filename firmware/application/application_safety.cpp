@@ -12,14 +12,31 @@ void Application::look_at_time(std::uint32_t now_ms) {
   if (guard_.tripped()) {
     const SafeReason cause = guard_.take();
     if (cause == SafeReason::watchdog) fail(cause, now_ms);
-    if (cause == SafeReason::stop && !safety_.has(cause)) {
-      fail(cause, now_ms);
-      has_stop_number_ = false;
-      stop_unread_ = true;
-    }
+    if (cause == SafeReason::stop && !safety_.has(cause)) stop_without_number(now_ms);
     if (cause == SafeReason::link) lost = lost || link_.port_lost(link_.owner().port, now_ms);
   }
+  look_at_stops(now_ms);
   if (lost) enter(SafeReason::link, now_ms);
+}
+
+// A stop that an interrupt has heard applies at once. Its datagram tells whether it is a repetition. Where the
+// datagram does not come, because a port had no room for it, the stop is a new cause.
+void Application::look_at_stops(std::uint32_t now_ms) {
+  const std::uint32_t heard = guard_.stops_heard();
+  if (heard != stops_heard_) {
+    unread_stops_ += heard - stops_heard_;
+    stops_heard_ = heard;
+    unread_ms_ = now_ms;
+    if (!safety_.has(SafeReason::stop)) stop_without_number(now_ms);
+  } else if (unread_stops_ != 0 && now_ms - unread_ms_ >= catch_up_ms) {
+    unread_stops_ = 0;
+    fail(SafeReason::stop, now_ms);
+  }
+}
+
+void Application::stop_without_number(std::uint32_t now_ms) {
+  fail(SafeReason::stop, now_ms);
+  has_stop_number_ = false;
 }
 
 void Application::enter(SafeReason cause, std::uint32_t now_ms) {
@@ -44,6 +61,7 @@ void Application::enter(SafeReason cause, std::uint32_t now_ms) {
 // what was sent before it is held back for no longer.
 Refusal Application::judge_clear(const Command& command, std::uint32_t waited_ms,
                                  std::uint32_t now_ms) const {
+  if (unread_stops_ != 0) return Refusal::stale;  // its sender cannot know their numbers
   if (command.value != Command::unnamed_cause) {
     const bool named = command.value == safety_.newest() || !safety_.latched();
     return named ? Refusal::none : Refusal::stale;

@@ -4,6 +4,8 @@
 
 #include <cstdint>
 
+#include "../../protocol/datagram/wrapping.hpp"
+
 namespace r4 {
 namespace firmware {
 
@@ -24,9 +26,8 @@ class StateSchedule {
   // Takes a due state: true, with its time on the grid in `t_ms`. Whole periods that have passed
   // unserved are left out and counted.
   bool take(std::uint32_t now_ms, std::uint32_t& t_ms) {
-    const std::uint32_t behind = now_ms - next_ms_;
-    if (!running_ || static_cast<std::int32_t>(behind) < 0) return false;
-    const std::uint32_t missed = behind / period_ms_;
+    if (!running_ || !reached(now_ms, next_ms_)) return false;
+    const std::uint32_t missed = (now_ms - next_ms_) / period_ms_;
     late_ += missed;
     t_ms = next_ms_ + missed * period_ms_;
     next_ms_ = t_ms + period_ms_;
@@ -35,8 +36,7 @@ class StateSchedule {
 
   // Milliseconds until the next one; only while running.
   std::uint32_t due_in(std::uint32_t now_ms) const {
-    const std::int32_t left = static_cast<std::int32_t>(next_ms_ - now_ms);
-    return left > 0 ? static_cast<std::uint32_t>(left) : 0;
+    return reached(now_ms, next_ms_) ? 0 : next_ms_ - now_ms;
   }
 
   std::uint32_t late() const { return late_; }  // states left out since boot

@@ -3,16 +3,10 @@
 
 #include <cstring>
 
+#include "../../protocol/datagram/wrapping.hpp"
+
 namespace r4 {
 namespace firmware {
-
-namespace {
-
-bool is_past(std::uint32_t now_ms, std::uint32_t due_ms) {
-  return static_cast<std::int32_t>(now_ms - due_ms) >= 0;
-}
-
-}  // namespace
 
 bool UserI2c::ask(std::uint32_t pnum, const Command& command) {
   if (single_ != Single::none) return false;
@@ -97,7 +91,7 @@ bool UserI2c::begin_due(std::uint32_t now_ms) {
   for (int i = 0; i < i2c_slots; ++i) {
     const int at = (first_slot_ + i) % i2c_slots;
     Slot& slot = slots_[at];
-    if (!slot.poll.on() || !is_past(now_ms, slot.due_ms)) continue;
+    if (!slot.poll.on() || !reached(now_ms, slot.due_ms)) continue;
     next_time(slot, now_ms);
     first_slot_ = static_cast<std::uint8_t>((at + 1) % i2c_slots);
     const I2cPoll& poll = slot.poll;
@@ -225,7 +219,7 @@ void UserI2c::fail_what_is_due(std::uint32_t now_ms) {
   }
   for (int i = 0; i < i2c_slots; ++i) {
     Slot& slot = slots_[i];
-    if (!slot.poll.on() || !is_past(now_ms, slot.due_ms)) continue;
+    if (!slot.poll.on() || !reached(now_ms, slot.due_ms)) continue;
     next_time(slot, now_ms);
     ++readings_[i].errors;
     count(I2cOutcome::bus_stuck);

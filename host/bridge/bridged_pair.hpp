@@ -22,6 +22,7 @@
 #include <string_view>
 
 #include "../../protocol/datagram/datagram_writer.hpp"
+#include "../measurement/boot_clock.hpp"
 #include "bridge_audience.hpp"
 #include "bridge_control.hpp"
 #include "r4link/carrier.hpp"
@@ -45,7 +46,8 @@ class BridgedPair {
     // May the side of hosts be away at the beginning, too? A device may; a port to listen at is an error.
     Absence hosts_absence = Absence::refused;
     std::chrono::milliseconds timeout{1000};  // the board's
-    std::function<Time()> now = [] { return std::chrono::steady_clock::now(); };
+    // Goes on while this computer sleeps, so that what has waited since before is old.
+    std::function<Time()> now = [] { return Time(BootClock::now().time_since_epoch()); };
     std::function<void(BridgeSide, const CarrierEvent&)> on_event;
   };
 

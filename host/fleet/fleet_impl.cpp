@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "../../transports/url_pattern.hpp"
+#include "../measurement/boot_clock.hpp"
 
 namespace r4 {
 
@@ -331,10 +332,12 @@ Fleet::Boards Fleet::Impl::wait_active(const Boards& which, Duration timeout) {
     }
     return closed || missing.empty();
   };
+  const SleepWatch slept;
   std::unique_lock lock(mutex);
   wait_until(lock, news, Clock::now() + bounded(timeout), all_active);
   if (closed) throw closed_error("wait_active()");
-  return missing;
+  // The deadline stands still while this computer sleeps.
+  return slept.time() > bounded(timeout) ? which : missing;
 }
 
 std::optional<FleetEvent> Fleet::Impl::next_event(Duration timeout) {

@@ -25,6 +25,14 @@ const char* to_text(DisarmCause cause) {
       return "restart";
     case DisarmCause::supply:
       return "supply";
+    case DisarmCause::sleep:
+      return "sleep";
+    case DisarmCause::earlier_stop:
+      return "earlier stop";
+    case DisarmCause::earlier_watchdog:
+      return "earlier watchdog";
+    case DisarmCause::earlier_fault:
+      return "earlier fault";
   }
   return "unknown";
 }
@@ -48,6 +56,17 @@ DisarmCause cause_of(SafeReason reason) {
   return DisarmCause::none;
 }
 
+DisarmCause earlier_cause_of(SafeReason reason) {
+  switch (reason) {
+    case SafeReason::stop:
+      return DisarmCause::earlier_stop;
+    case SafeReason::watchdog:
+      return DisarmCause::earlier_watchdog;
+    default:
+      return DisarmCause::earlier_fault;
+  }
+}
+
 // The first cause is told until the next arm(): what follows from it is no news.
 void ArmingMachine::disarm(DisarmCause cause) {
   if (armed() || cause_ == DisarmCause::not_yet) cause_ = cause;
@@ -56,6 +75,32 @@ void ArmingMachine::disarm(DisarmCause cause) {
 void ArmingMachine::on_reason(SafeReason reason) {
   const DisarmCause cause = cause_of(reason);
   if (cause != DisarmCause::none && armed()) cause_ = cause;
+}
+
+// The board tells the gravest of its reasons: those that are graver are not there. Of one that only E:CLEAR ends it
+// cannot be told whether it hides others.
+void ArmingMachine::on_heard(SafeReason reason) {
+  switch (reason) {
+    case SafeReason::stop:
+      break;
+    case SafeReason::fault:
+      earlier_ = static_cast<std::uint8_t>(earlier_ & ~bit(SafeReason::stop));
+      break;
+    case SafeReason::watchdog:
+      earlier_ = static_cast<std::uint8_t>(earlier_ & bit(SafeReason::watchdog));
+      break;
+    case SafeReason::none:
+    case SafeReason::link:
+    case SafeReason::handle:
+    case SafeReason::proximity:
+      earlier_ = 0;
+      break;
+  }
+}
+
+void ArmingMachine::on_sleep() {
+  disarm(DisarmCause::sleep);
+  earlier_ = 0xFF;
 }
 
 void ArmingMachine::on_supply(bool closed) {
@@ -79,9 +124,9 @@ ArmingMachine::Step ArmingMachine::next(SafeReason reason) {
     case SafeReason::stop:
     case SafeReason::watchdog:
     case SafeReason::fault: {
-      const auto bit = static_cast<std::uint8_t>(1U << static_cast<unsigned>(reason));
-      const bool may_clear = (cleared_ & bit) == 0 && (first || reason != SafeReason::stop);
-      cleared_ = static_cast<std::uint8_t>(cleared_ | bit);
+      if ((earlier_ & bit(reason)) != 0) return fail(earlier_cause_of(reason));
+      const bool may_clear = (cleared_ & bit(reason)) == 0 && (first || reason != SafeReason::stop);
+      cleared_ = static_cast<std::uint8_t>(cleared_ | bit(reason));
       if (may_clear) return Step::clear;
       break;
     }
@@ -90,7 +135,11 @@ ArmingMachine::Step ArmingMachine::next(SafeReason reason) {
     case SafeReason::proximity:
       break;
   }
-  cause_ = cause_of(reason);
+  return fail(cause_of(reason));
+}
+
+ArmingMachine::Step ArmingMachine::fail(DisarmCause cause) {
+  cause_ = cause;
   attempt_ = Attempt::none;
   return Step::fail;
 }

@@ -20,6 +20,10 @@
 //
 // arm() clears what it finds when it begins, and what that was hiding, each cause once: a stop that is
 // pressed meanwhile stays, and ends it. A released handle and an obstacle cannot be cleared, and end it.
+//
+// arm() never clears a stop, a watchdog or a fault that may be older than the session: a program that a supervisor
+// restarts would drive off again by itself. A cause may be older until the board, under our control, was heard
+// without it.
 #pragma once
 
 #include <cstdint>
@@ -30,6 +34,8 @@ namespace r4 {
 
 // The cause that a reason of the board is; none for `none` and `link`.
 DisarmCause cause_of(SafeReason reason);
+// The same of a stop, a watchdog or a fault that may be older than the session.
+DisarmCause earlier_cause_of(SafeReason reason);
 
 class ArmingMachine {
  public:
@@ -49,6 +55,10 @@ class ArmingMachine {
   void disarm(DisarmCause cause);
   // The board's reason to be safe, as heard last.
   void on_reason(SafeReason reason);
+  // The board, under our control, tells that reason.
+  void on_heard(SafeReason reason);
+  // This computer slept: a session begins, which has seen nothing yet.
+  void on_sleep();
   // The link is not up.
   void on_outage() { outage_ = true; }
   // A state of a board that has no reason to be safe tells how relay 1 is.
@@ -69,10 +79,16 @@ class ArmingMachine {
   // `begun`: the board's reason has not been looked at yet.
   enum class Attempt : std::uint8_t { none, begun, clearing, closing };
 
+  static std::uint8_t bit(SafeReason reason) {
+    return static_cast<std::uint8_t>(1U << static_cast<unsigned>(reason));
+  }
+  Step fail(DisarmCause cause);
+
   DisarmCause cause_ = DisarmCause::not_yet;
   bool outage_ = false;  // since relay 1 was last known to be closed
   Attempt attempt_ = Attempt::none;
-  std::uint8_t cleared_ = 0;  // bit n: this arm() has cleared reason n
+  std::uint8_t cleared_ = 0;     // bit n: this arm() has cleared reason n
+  std::uint8_t earlier_ = 0xFF;  // bit n: reason n may be older than the session
 };
 
 }  // namespace r4

@@ -80,6 +80,7 @@ Command Session::with_needed_fields(const Command& command) {
 
 Time Session::poll(Time now) {
   link_.poll(to_ms(now));
+  notice_restart(now);
   if (wires_.several()) ask_wires(now);
   refresh_status(now);
   if (!leaving_ && begun()) watches() ? send_lease(now) : send_heartbeat(now);
@@ -200,7 +201,7 @@ bool Session::in_control(Time now) const {
 
 void Session::refresh_status(Time now) {
   role_.on_link(link_up(), now);
-  look_at_arming();
+  look_at_arming(now);
   const LinkStatus fresh{
       .state = link_.state(),
       .reason = link_.reason(),

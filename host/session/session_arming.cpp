@@ -36,9 +36,11 @@ void Session::tell_arming() {
   handler_.on_arming(told_cause_);
 }
 
-// What the board's newest datagram says of it, and what the link does.
-void Session::look_at_arming() {
+// What the board's newest datagram says of it, and what the link does. What the board said before it obeyed us may have
+// been on its way since before the session.
+void Session::look_at_arming(Time now) {
   if (!link_up()) arming_.on_outage();
+  if (in_control(now)) arming_.on_heard(link_.reason());
   if (link_.state() == HostLinkState::safe) arming_.on_reason(link_.reason());
   tell_arming();
 }
@@ -58,9 +60,9 @@ void Session::advance_arming(Time now) {
   bool must_wait = !in_control(now);
   for (const Pending& pending : pending_.under_way()) {
     wanted = wanted || pending.role == Pending::Role::arm;
-    // For a step of its own, and for a stop that came before it.
-    must_wait =
-        must_wait || pending.role == Pending::Role::arm_step || pending.kind == CommandKind::stop;
+    // For a step of its own, and for a stop or an E:CLEAR that was asked for.
+    must_wait = must_wait || pending.role == Pending::Role::arm_step ||
+                pending.kind == CommandKind::stop || pending.kind == CommandKind::clear;
   }
   if (!wanted) {
     if (arming_.under_way()) give_up_arming();

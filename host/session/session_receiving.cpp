@@ -184,8 +184,11 @@ bool Session::is_proof(const Nack& nack) const {
   // Over another wire than those of the board's session, which may take its copy.
   const bool of_one_copy = nack.code == Refusal::busy || nack.code == Refusal::auth;
   if (of_one_copy && wires_.several()) return false;
-  return nack.has_session && link_.is_taken(nack.session) && newer(nack.pnum, nack.session) &&
-         link_.last_pnum() - nack.pnum < BoardLink::memory;
+  // By how many numbers ago each was taken, since a session may be older than half of all numbers.
+  const std::uint32_t since_command = link_.last_pnum() - nack.pnum;
+  const std::uint32_t since_session = link_.last_pnum() - nack.session;
+  return nack.has_session && link_.is_taken(nack.session) && since_session > since_command &&
+         since_command < BoardLink::memory;
 }
 
 void Session::on_identity_datagram(std::size_t wire, const Datagram& datagram, Time now) {
@@ -244,6 +247,15 @@ bool Session::notice_restart(Time now) {
   tell_arming();  // what somebody asks for when he hears of it is wanted
   handler_.on_restart();
   return true;
+}
+
+void Session::on_sleep(Time now) {
+  repetition_.cancel();
+  arming_.on_sleep();
+  link_.begin_anew();
+  wires_.on_sleep(now);
+  notice_restart(now);
+  refresh_status(now);
 }
 
 // Our clock may have stood still, and their deadlines with it: nobody wants now what was asked for then.

@@ -26,6 +26,19 @@ bool Wires::all_down() const {
   return std::none_of(wires_.begin(), wires_.end(), [](const Wire& wire) { return wire.up; });
 }
 
+void Wires::on_sleep(Time now) {
+  for (Wire& wire : wires_) {
+    wire.has_clock = wire.connecting = false;
+    wire.heard = wire.busy_until = Time{0};
+    wire.question = IdentityQuestion{Time{0}};
+    if (wire.up && wire.can_ask) wire.ask_at = now;
+    if (wire.tracker.started()) wire.tracker.restart();
+    wire.lease.renew(now);
+  }
+  anew_ = true;
+  look(now);
+}
+
 // --- who is there
 
 WireSet Wires::to_ask(Time now) const {

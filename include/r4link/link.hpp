@@ -95,11 +95,18 @@ enum class DisarmCause : std::uint8_t {
   watchdog,   // a duty of the board missed its deadline
   fault,      // the board found a fault in itself
   link,       // the link was lost, and the board did not bring its outputs back
-  restart,    // the board has begun again
+  restart,    // the board restarted
   supply,     // relay 1, the motor supply, was opened
+  sleep,      // this computer slept for longer than the board waits for its host
+  // arm() has found one of these that may have come before the program began, and does not clear it: clear() does
+  earlier_stop,
+  earlier_watchdog,
+  earlier_fault,
 };
-// "stop", "not yet" …
+// "stop", "not yet", "earlier stop" …
 R4LINK_API const char* to_text(DisarmCause cause);
+// True of a cause that may have come before the program began.
+constexpr bool is_earlier(DisarmCause cause) { return cause >= DisarmCause::earlier_stop; }
 
 // --- what became of a command
 
@@ -208,7 +215,7 @@ struct Statistics {
   std::uint64_t copies =
       0;  // of several wires: what another wire had brought before; not among `received`
   // lost, duplicate, late. Of several wires: lost is what none of them brought, a duplicate what another had brought
-  // before. `restarts` are those of the board, as its clock tells them: a computer that slept counts one, too.
+  // before. `restarts` are those of the board, as its clock tells them: a sleep of this computer that is longer than the board's timeout counts as one.
   PacketCounters packets;
   double state_rate_hz = 0;  // over the last second
   // Time, microseconds; 0 where nothing was measured yet

@@ -3,14 +3,6 @@
 
 namespace r4 {
 
-namespace {
-
-constexpr bool at_or_after(std::uint32_t a, std::uint32_t b) {
-  return static_cast<std::int32_t>(a - b) >= 0;
-}
-
-}  // namespace
-
 // A T that the board gave one of its recent heartbeats?
 bool BoardLink::sent_at(std::uint32_t t_ms) const {
   for (int i = 0; i < sent_used_; ++i) {
@@ -32,13 +24,11 @@ BoardLink::Freshness BoardLink::judge(const HostHeartbeat& heartbeat, bool echo_
   if (ours && clock_ == Clock::own) return Freshness::no_echo;
   if (is_echo(heartbeat)) {
     const std::uint32_t t = static_cast<std::uint32_t>(heartbeat.t);
-    const bool recent = at_or_after(now_ms, t) && now_ms - t <= timing_.timeout_ms;
+    const bool recent = now_ms - t <= timing_.timeout_ms;
     // What was sent before the link was lost says nothing of the host's being alive now. Of the same
     // millisecond, it may have been: where the host has left, that begins nothing.
-    const std::uint32_t age_ms = now_ms - t;  // by age: it may be weeks
-    const std::uint32_t lost_for_ms = now_ms - lost_ms_;
-    const bool this_episode = state_ != BoardLinkState::lost || age_ms < lost_for_ms ||
-                              (age_ms == lost_for_ms && !begun_again_);
+    const bool this_episode =
+        state_ != BoardLinkState::lost || newer(t, lost_ms_) || (t == lost_ms_ && !begun_again_);
     return recent && this_episode ? Freshness::fresh : Freshness::stale;
   }
   const bool should_echo = echo_host || (ours && clock_ == Clock::echo && has_owner());
@@ -276,6 +266,10 @@ void BoardLink::lose(std::uint32_t now_ms) {
 }
 
 bool BoardLink::poll(std::uint32_t now_ms) {
+  // A session may last for months, and so may the time without one.
+  keep_near(began_ms_, now_ms);
+  keep_near(lost_ms_, now_ms);
+  keep_near(newest_echo_ms_, now_ms);
   if (state_ != BoardLinkState::active || now_ms - fed_ms_ < timing_.timeout_ms) return false;
   lose(now_ms);
   return true;
@@ -289,7 +283,7 @@ bool BoardLink::port_lost(std::uint8_t port, std::uint32_t now_ms) {
 
 bool BoardLink::may_leave(const HostHeartbeat& farewell, std::uint32_t now_ms) const {
   return judge(farewell, echo_host_, now_ms) == Freshness::fresh &&
-         at_or_after(static_cast<std::uint32_t>(farewell.t), began_ms_);
+         reached(static_cast<std::uint32_t>(farewell.t), began_ms_);
 }
 
 void BoardLink::leave(std::uint32_t now_ms) {

@@ -96,9 +96,19 @@ void HostLink::notice_boot(std::uint32_t t_ms, std::uint32_t now_ms) {
   on_clock(t_ms, restarted, now_ms);
 }
 
-// Nothing but its clock tells that the board has begun again. It may be ours that stood still, in a computer that
-// slept, and the board's outputs are what they were: by numbers too far off to go on with, the board takes us for
-// another host, and its session begins with all outputs off.
+void HostLink::begin_anew() {
+  ++restarts_;
+  if (tracker_.started()) tracker_.restart();
+  renumber();
+  forget_boot();
+  board_clock_known_ = booting_ = false;
+  answer_now_ = true;
+  if (state_ != HostLinkState::connecting) state_ = HostLinkState::lost;
+}
+
+// The board may hold our session still, and its setpoints. It takes a host with numbers that are too far off for
+// another one, and its session begins with all outputs off. So it has to be where our clock stood still, and also where
+// nothing but the board's clock tells of a restart: in a virtual machine that was paused, no clock of ours tells it.
 void HostLink::renumber() {
   constexpr std::uint32_t step = 16 * BoardLink::command_window;
   first_pnum_ = next_pnum_ = (next_pnum_ + step) | echo_host_first_pnum;
@@ -123,6 +133,7 @@ void HostLink::on_transport(bool up) {
 
 bool HostLink::poll(std::uint32_t now_ms) {
   hung_ = watchdog_expired(now_ms);
+  if (board_clock_known_ && now_ms - heard_ms_ > long_ago) begin_anew();
   if (state_ != HostLinkState::active && state_ != HostLinkState::safe) return false;
   if (now_ms - heard_ms_ < timing_.timeout_ms) return false;
   state_ = HostLinkState::lost;

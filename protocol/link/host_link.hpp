@@ -54,6 +54,10 @@ class HostLink {
   // the host are others from now on.
   void on_clock(std::uint32_t t_ms, bool restarted, std::uint32_t now_ms);
 
+  // Nothing that is known of the board counts any more, because this computer slept: the board is taken for one that
+  // has begun again, and the numbers of the host are others from now on.
+  void begin_anew();
+
   // The transport has gone (`lost` at once) or come (a heartbeat is due at once).
   void on_transport(bool up);
   // What comes from now on may have other packet numbers.
@@ -61,7 +65,8 @@ class HostLink {
     if (tracker_.started()) tracker_.restart();
   }
 
-  // Lets time pass: silence of the board. True if the state changed.
+  // Lets time pass: silence of the board. True if the state changed. After 12 days of silence begin_anew() applies,
+  // because the times of the two cannot be compared any more (datagram/wrapping.hpp).
   bool poll(std::uint32_t now_ms);
 
   // Should a heartbeat be sent now? False while they are gated.
@@ -88,7 +93,7 @@ class HostLink {
   std::uint32_t take_pnum() { return next_pnum_++; }
   // The number that was taken last.
   std::uint32_t last_pnum() const { return next_pnum_ - 1; }
-  // Others begin where on_clock() says so.
+  // Others begin where on_clock() and begin_anew() say so.
   std::uint32_t first_pnum() const { return first_pnum_; }
   // Was it taken, for the board as it is now?
   bool is_taken(std::uint32_t pnum) const { return pnum - first_pnum_ < next_pnum_ - first_pnum_; }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Tells lost, duplicate, reordered and restarted packet numbers apart (paper section 4.1: PNum).
 //
-// Packet numbers are unsigned 32 bit and wrap; "newer" is by serial-number arithmetic (RFC 1982).
+// Packet numbers are unsigned 32 bit and wrap (datagram/wrapping.hpp).
 // The last 64 numbers are remembered, so a late packet is told from a repeated one and takes its
 // loss back. A number that is further behind is old news, until two old ones in a row rise: then
 // the sender has restarted (the rule of RFC 3550 A.1).
@@ -9,14 +9,10 @@
 
 #include <cstdint>
 
+#include "../datagram/wrapping.hpp"
 #include "r4link/vocabulary.hpp"
 
 namespace r4 {
-
-// Is `a` newer than `b`? Half the number space is ahead of any number, half behind.
-constexpr bool newer(std::uint32_t a, std::uint32_t b) {
-  return static_cast<std::int32_t>(a - b) > 0;
-}
 
 enum class Arrival : std::uint8_t {
   first,      // nothing to compare with

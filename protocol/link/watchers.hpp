@@ -31,8 +31,8 @@ struct Watcher {
 
   // Takes the state of that time, if one is due.
   bool take(std::uint32_t t_ms) {
+    if (!reached(t_ms, next_ms)) return false;
     const std::uint32_t behind = t_ms - next_ms;
-    if (static_cast<std::int32_t>(behind) < 0) return false;
     next_ms += behind < period_ms ? period_ms : behind + period_ms;  // none are made up for
     return true;
   }

@@ -201,7 +201,7 @@ TEST_F(GuardedBoard, AStopThatAnInterruptHasHeardIsDoneBeforeTheLoopReadsIt) {
   EXPECT_EQ(board.outputs().osmc[0].pwm, 400);
 }
 
-TEST_F(GuardedBoard, AStopThatAnInterruptHasHeardIsOneCauseWithItsDatagramAndSoAreItsRepetitions) {
+TEST_F(GuardedBoard, RepetitionsOfAStopThatAnInterruptHasHeardAreNoNewCause) {
   const auto heard = [&](std::uint32_t number) {
     guard().stop();
     guard().tick(board.now_ms);
@@ -226,6 +226,56 @@ TEST_F(GuardedBoard, AStopThatAnInterruptHasHeardIsOneCauseWithItsDatagramAndSoA
   board.run(1);
   EXPECT_EQ(board.reason(), SafeReason::stop);
   EXPECT_FALSE(application.safe_report().has_stop);
+}
+
+// An interrupt hears stops whose datagrams are lost then: a port had no room for them.
+class StopWithoutDatagram : public GuardedBoard {
+ protected:
+  void hear() {
+    guard().stop();
+    guard().tick(board.now_ms);
+    board.run(1);
+  }
+  std::int32_t cause() const { return board.application->safe_report().cause; }
+  // An E:CLEAR that names that cause.
+  bool clears(std::int32_t named) {
+    host.echo();
+    host.command("E:CLEAR," + std::to_string(named));
+    return board.reason() != SafeReason::stop;
+  }
+  static constexpr std::uint32_t lost_ms = firmware::Application::catch_up_ms;
+};
+
+TEST_F(StopWithoutDatagram, IsNoStopOfSomebodyElseThatComesLater) {
+  hear();
+  const std::int32_t heard = cause();
+  host.resend("E:STOP", host.pnum++);
+  EXPECT_NE(cause(), heard);
+  EXPECT_FALSE(clears(heard)) << "it was asked for before the second stop";
+  EXPECT_TRUE(clears(cause()));
+}
+
+TEST_F(StopWithoutDatagram, IsANewCauseOnABoardThatIsStoppedAlready) {
+  host.resend("E:STOP", host.pnum++);
+  const std::int32_t first = cause();
+  hear();
+  EXPECT_FALSE(clears(first)) << "it is not known yet whether the stop is a repetition";
+  board.run(lost_ms);
+  EXPECT_NE(cause(), first);
+  EXPECT_FALSE(clears(first));
+  EXPECT_TRUE(clears(cause()));
+}
+
+TEST_F(StopWithoutDatagram, IsANewCauseAlsoIfARepetitionOfTheFirstStopIsRead) {
+  const std::uint32_t number = host.pnum++;
+  host.resend("E:STOP", number);
+  const std::int32_t first = cause();
+  hear();
+  hear();
+  host.resend("E:STOP", number);
+  EXPECT_EQ(cause(), first);
+  board.run(lost_ms);
+  EXPECT_NE(cause(), first);
 }
 
 TEST_F(GuardedBoard, WhatTheGuardTookOffStaysOffUntilTheApplicationKnows) {

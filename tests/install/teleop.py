@@ -116,6 +116,10 @@ def main(program):
         assert teleop.process.wait(PATIENCE_S) == 0
         teleop = Teleop(program, board.host_url)  # begins while that stop is latched
         teleop.says(r'^not armed')
+        teleop.press('e')
+        teleop.says(r'not armed: stopped before this program began')
+        teleop.press('c')
+        board.next(lambda each: each.get('reason') == 'none')
         arm_and_drive(teleop, board)
         teleop.press('q')
         assert teleop.process.wait(PATIENCE_S) == 0

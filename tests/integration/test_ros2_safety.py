@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from r4_process import SANITIZED, Board
+from r4_process import SANITIZED, Board, run
 from ros2_peer import (BOOL, DIAGNOSTICS, FLOAT32, INT32, LOG, STRING, TWIST, TWIST_STAMPED, Peer, Ros2, again,
                        armed, drive, float32, health_of, join, own_domain, pwm, stamped, text, twist)
 
@@ -166,6 +166,23 @@ def test_what_is_armed_as_soon_as_it_is_there_was_not_stopped_before():
         with Board(url) as board:
             ros2.logged('--arm: a stop came first; arm when the danger is over')
             board.state('SAFE', 'stop')
+
+
+def test_a_node_that_a_supervisor_restarts_does_not_clear_a_stop_that_came_before():
+    domain = own_domain()
+    with Board('udp://127.0.0.1:0') as board, Peer(domain) as peer:
+        assert run('stop', board.host_url).returncode == 0
+        board.state('SAFE', 'stop')
+        with Ros2(domain, board.host_url, '--arm') as ros2:
+            told = ros2.logged('not armed: stopped before this program began')['text']
+            assert told.endswith('clear it on purpose: call ~/clear, then ~/arm'), told
+            assert not any(each.get('supply') for each in board.log)
+            join(ros2, peer, 'R4_Command', STRING)
+            join(ros2, peer, 'arm', BOOL)
+            peer.write('rt/R4_Command', text('E:CLEAR'))
+            board.state('ACTIVE')
+            peer.write('rt/arm', ON)
+            ros2.armed()
 
 
 def test_when_the_motors_supply_is_switched_off_nothing_else_stays_on():

@@ -4,6 +4,7 @@
 //     teleop [URL]       sim: without a URL; udp://192.168.0.125, serial:auto …
 //
 //     e       arm: the motors get their supply; nothing moves yet
+//     c       clear a stop that came before this program began; nothing moves
 //     w s     forward, backward      a d     turn left, right        as long as the key is held
 //     space   emergency stop         q       stop and end            any other key: stand still
 //
@@ -87,16 +88,20 @@ void say_why(r4::Board& board, r4::PostResult result) {
   if (result == r4::PostResult::sent) {
     std::printf("armed: w a s d drive, space stops\n");
   } else if (result == r4::PostResult::not_armed) {
-    std::printf("not armed (%s): press e\n", r4::to_text(board.disarmed_by()));
+    const r4::DisarmCause cause = board.disarmed_by();
+    const char* const keys = r4::is_earlier(cause) ? "c, then e" : "e";
+    std::printf("not armed (%s): press %s\n", r4::to_text(cause), keys);
   } else {
     std::printf("not sent: %s\n", r4::to_text(result));
   }
 }
 
-void arm(r4::Board& board) {
+// `act` may fail: the handle is released, something is in the way …
+template <class Act>
+void attempt(Act act) {
   try {
-    board.arm(patience);
-  } catch (const r4::Error& error) {  // the handle is released, something is in the way …
+    act();
+  } catch (const r4::Error& error) {
     std::printf("%s\n", error.what());
   }
 }
@@ -111,7 +116,7 @@ void teleoperate(r4::Board& board, Keyboard& keyboard) {
   board.on_refused([](const r4::RefusedPost& refused) {
     std::printf("refused by the board or on the way: OSMC %d\n", refused.command.channel);
   });
-  board.next_state(3s);  // it is there; a stop that is latched is cleared by e
+  board.next_state(3s);  // it is there, though a stop may be latched
   // After a lost link nothing comes back by itself: who holds the keys may not see the robot.
   board.setting("recovery", "rearm");
   board.watchdog(watchdog);
@@ -126,7 +131,8 @@ void teleoperate(r4::Board& board, Keyboard& keyboard) {
     board.feed();
     if (key == 'q') break;
     if (key == ' ') stop(board);
-    if (key == 'e') arm(board);
+    if (key == 'c') attempt([&] { board.clear(patience); });
+    if (key == 'e') attempt([&] { board.arm(patience); });
     if (key) hand.press(*key, Clock::now());
 
     const r4::PostResult result = post(board, hand.setpoint(Clock::now()));

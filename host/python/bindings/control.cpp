@@ -38,7 +38,7 @@ Clock::time_point at(double seconds) {
 }
 
 DisarmCause disarm_cause(const std::string& text) {
-  for (int i = 0; i <= static_cast<int>(DisarmCause::supply); ++i) {
+  for (int i = 0; i <= static_cast<int>(DisarmCause::earlier_fault); ++i) {
     if (text == to_text(static_cast<DisarmCause>(i))) return static_cast<DisarmCause>(i);
   }
   throw Error(ErrorKind::usage, "disarmed_by '" + text + "'", "there is no such cause",

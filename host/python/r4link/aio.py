@@ -290,6 +290,7 @@ class Board:
         await self._commands.call(lambda: self._board.arm(timeout))
 
     async def clear(self, timeout: float = 1.0) -> None:
+        """Takes away the stop, the watchdog or the fault that the board reports; moves nothing."""
         await self.send(Command.clear(), timeout)
 
     async def identify(self, timeout: float = 1.0) -> Identity:

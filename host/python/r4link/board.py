@@ -137,12 +137,16 @@ class Board:
         self._core.apply(setpoints._core, _ms(timeout))
 
     def arm(self, timeout: float = 1.0) -> None:
-        """Before the first output command, and again after whatever made the outputs safe but a lost link."""
+        """Before the first output command, and again after whatever made the outputs safe but a lost link.
+
+        Clears a stop, a watchdog or a fault that came while this program controlled the board, and closes relay 1. One
+        that may have come before the program began is not cleared: NotArmedError says so, and clear() clears it.
+        """
         self._core.arm(_ms(timeout))
 
     @property
     def disarmed_by(self) -> str:
-        """Why output commands are refused; 'none' when armed."""
+        """Why output commands are refused, such as 'not yet', 'stop' or 'earlier stop'; 'none' when armed."""
         return self._core.disarmed_by()
 
     def stop(self, timeout: float = 1.0) -> None:
@@ -154,7 +158,7 @@ class Board:
         self._core.stop_async()
 
     def clear(self, timeout: float = 1.0) -> None:
-        """Clears a stop."""
+        """Takes away the stop, the watchdog or the fault that the board reports; moves nothing."""
         self.send(Command.clear(), timeout)
 
     def osmc(self, channel: int) -> DriveChannel:

@@ -192,6 +192,116 @@ TEST_F(SessionArming, DoesNotClearTheSameCauseTwice) {
   EXPECT_EQ(link.count('E'), 1U);
 }
 
+// --- what may have come before the session
+
+struct EarlierCause : testing::Test {
+  // A program begins, and its board, which obeys it, is safe for that reason.
+  void begin(SafeReason reason) {
+    link.heartbeat();  // held back by the network since before the cause: it proves nothing
+    link.heartbeat(reason);
+    link.pass(10ms);
+    says(reason);
+    ASSERT_TRUE(link.session.in_control(link.now));
+    link.sent.clear();
+  }
+  void says(SafeReason reason) {
+    if (link.count('F') != 0) cmd = link.last('F').pnum;
+    link.state("RELAYS:0;SAFE:" + std::to_string(static_cast<int>(reason)) +
+               ";CMD:" + std::to_string(cmd) + ";");
+  }
+  CommandResult arm() {
+    const Ticket ticket = link.session.arm(1s, link.now);
+    link.pass(1ms);
+    return link.results[ticket];
+  }
+
+  ScriptedLink link{arming_required()};
+  std::uint32_t cmd = 0;
+};
+
+TEST_F(EarlierCause, IsNotClearedByArming) {
+  begin(SafeReason::stop);
+  const CommandResult result = arm();
+  EXPECT_EQ(result.outcome, Outcome::not_armed);
+  EXPECT_EQ(result.disarmed, DisarmCause::earlier_stop);
+  const Problem problem = explain("arm()", result, link.session.link());
+  EXPECT_EQ(problem.reason, "not armed: stopped before this program began");
+  EXPECT_EQ(problem.fix,
+            "clear it on purpose: r4 send URL E:CLEAR, or board.clear(), then call arm()");
+  EXPECT_EQ(link.session.disarmed_by(), DisarmCause::earlier_stop);
+  link.pass(2s);
+  EXPECT_EQ(link.count('E') + link.count('R'), 0U);
+}
+
+TEST_F(EarlierCause, IsAlsoAFault) {
+  begin(SafeReason::fault);
+  EXPECT_EQ(arm().disarmed, DisarmCause::earlier_fault);
+  EXPECT_EQ(link.count('E') + link.count('R'), 0U);
+}
+
+TEST_F(EarlierCause, IsAlsoAWatchdog) {
+  begin(SafeReason::watchdog);
+  EXPECT_EQ(arm().disarmed, DisarmCause::earlier_watchdog);
+  EXPECT_EQ(link.count('E') + link.count('R'), 0U);
+}
+
+TEST_F(EarlierCause, IsClearedOnPurposeAndTheProgramIsArmedThen) {
+  begin(SafeReason::stop);
+  link.session.send(Command::clear(), 1s, link.now);
+  link.pass(1ms);
+  ASSERT_EQ(link.count('E'), 1U);
+  cmd = link.last('E').pnum;
+  says(SafeReason::none);
+  arm();
+  EXPECT_EQ(link.count('R'), 1U);
+}
+
+TEST_F(EarlierCause, IsWaitedForWhereItIsBeingCleared) {
+  begin(SafeReason::stop);
+  link.session.send(Command::clear(), 1s, link.now);
+  const Ticket ticket = link.session.arm(1s, link.now);
+  link.pass(1ms);
+  EXPECT_EQ(link.results.count(ticket), 0U) << "it has not failed";
+  cmd = link.last('E').pnum;
+  says(SafeReason::none);
+  EXPECT_EQ(link.count('R'), 1U);
+}
+
+TEST_F(EarlierCause, StaysOneThoughTheStopIsPressedAgain) {
+  begin(SafeReason::stop);
+  link.stopped(1, 7);
+  link.stopped(2, 8);
+  EXPECT_EQ(arm().disarmed, DisarmCause::earlier_stop);
+}
+
+TEST_F(EarlierCause, MayBeHiddenByALaterStop) {
+  begin(SafeReason::fault);
+  says(SafeReason::stop);  // pressed meanwhile
+  const Ticket ticket = link.session.arm(1s, link.now);
+  link.pass(1ms);
+  ASSERT_EQ(link.count('E'), 1U) << "that stop came while the program was there";
+  cmd = link.last('E').pnum;
+  says(SafeReason::fault);
+  EXPECT_EQ(link.results[ticket].disarmed, DisarmCause::earlier_fault);
+  EXPECT_EQ(link.count('E'), 1U);
+}
+
+TEST_F(EarlierCause, IsNoneThatComesWhileTheHandleIsReleased) {
+  begin(SafeReason::handle);
+  says(SafeReason::stop);
+  arm();
+  EXPECT_EQ(link.count('E'), 1U);
+}
+
+TEST_F(EarlierCause, IsAnyOneAfterASleep) {
+  begin(SafeReason::none);
+  link.session.on_sleep(link.now);
+  link.heartbeat(SafeReason::stop);
+  link.pass(300ms);  // until it asks for its fields again
+  says(SafeReason::stop);
+  EXPECT_EQ(arm().disarmed, DisarmCause::earlier_stop);
+}
+
 TEST_F(SessionArming, FailsAtOnceForWhatCannotBeCleared) {
   for (const SafeReason reason : {SafeReason::handle, SafeReason::proximity}) {
     link.heartbeat(reason);

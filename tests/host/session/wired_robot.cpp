@@ -141,6 +141,11 @@ void WiredRobot::run(std::uint32_t ms) {
 }
 
 void WiredRobot::sleep(std::uint32_t ms) {
+  pause(ms);
+  session->on_sleep(now());
+}
+
+void WiredRobot::pause(std::uint32_t ms) {
   for (; ms != 0; --ms) pass(true);
 }
 

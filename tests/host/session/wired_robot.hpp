@@ -40,8 +40,11 @@ class WiredRobot final : private Session::Handler {
   // The transports of all wires come up, and the link has half a second.
   void connect();
   void run(std::uint32_t ms);
-  // The host's computer sleeps: its clock stands still, and what comes meanwhile is lost.
+  // The host's computer sleeps: its clock stands still, and what comes meanwhile is lost. When it wakes, its other clock
+  // tells.
   void sleep(std::uint32_t ms);
+  // The same of a virtual machine that is paused: no clock tells.
+  void pause(std::uint32_t ms);
   // Untold: as a cable that is cut somewhere in a network.
   void cut(std::size_t wire, bool is_cut = true);
   // The transport tells: unplugged.

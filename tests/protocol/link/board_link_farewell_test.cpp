@@ -90,6 +90,24 @@ TEST_F(BoardLinkFarewell, TooOldAnEchoProvesNothing) {
   EXPECT_FALSE(may_leave(old));
 }
 
+TEST_F(BoardLinkFarewell, IsObeyedInASessionOfAnyAge) {
+  constexpr std::uint32_t day_ms = 24U * 3600 * 1000;
+  constexpr std::uint32_t step_ms = 900;  // below the timeout
+  connect();
+  std::uint32_t pnum = echo_pnum + 1;
+  for (int day = 1; day <= 60; ++day) {  // more than a turn of the clock
+    for (std::uint32_t ms = 0; ms < day_ms; ms += step_ms) {
+      now += step_ms;
+      link.poll(now);
+      link.heartbeat_sent(now);
+      ASSERT_EQ(link.on_heartbeat(numbered(++pnum, now, here), now), HeartbeatEffect::fed);
+      if (ms % (24U * step_ms) == 0) {
+        ASSERT_TRUE(link.may_leave(numbered(pnum + 1, now, here), now)) << "day " << day;
+      }
+    }
+  }
+}
+
 TEST_F(BoardLinkFarewell, OfAClockOfItsOwnProvesNothing) {
   send_due();
   ASSERT_EQ(heartbeat(5, 42), HeartbeatEffect::new_session);

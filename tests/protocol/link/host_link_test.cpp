@@ -211,6 +211,38 @@ TEST_F(HostLinkTest, TakesOtherNumbersWhereOnlyTheClockTellsOfARestart) {
   EXPECT_EQ(link.take_pnum(), behind + 1) << "it knows that it has begun again, and no number";
 }
 
+TEST_F(HostLinkTest, KnowsNothingOfItsBoardAfterASleepOfItsComputer) {
+  heartbeat();
+  send_due();
+  const std::uint32_t before = link.take_pnum();
+  ASSERT_TRUE(link.echoed());
+  link.begin_anew();
+  EXPECT_EQ(link.restarts(), 1U);
+  EXPECT_EQ(link.state(), HostLinkState::lost);
+  EXPECT_FALSE(link.echoed());
+  EXPECT_EQ(link.echo(), 0U);
+  EXPECT_FALSE(link.is_taken(before));
+  EXPECT_GT(link.take_pnum() - before, BoardLink::command_window);
+  EXPECT_TRUE(link.heartbeat_due(now));
+  board_offset += 60'000;  // while it slept
+  board_pnum = 7;
+  EXPECT_EQ(heartbeat(), Arrival::first);
+  EXPECT_EQ(link.restarts(), 1U) << "the board's clock is new to it, and no second restart";
+}
+
+TEST_F(HostLinkTest, HearsABoardAgainAfterAMonthOfSilence) {
+  const auto newest = [this] { return link.on_newest(board_t(), true, SafeReason::none, now); };
+  ASSERT_TRUE(newest());
+  ASSERT_EQ(link.echo(), board_t());
+  for (int day = 0; day < 30; ++day) {  // more than half a turn of the clock
+    now += 24U * 3600 * 1000;
+    link.poll(now);
+  }
+  EXPECT_EQ(link.restarts(), 1U);
+  EXPECT_TRUE(newest());
+  EXPECT_EQ(link.echo(), board_t());
+}
+
 TEST_F(HostLinkTest, ABootHeartbeatThatTheNetworkHeldBackIsNoRestart) {
   booting();
   heartbeat();

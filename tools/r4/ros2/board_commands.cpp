@@ -46,7 +46,7 @@ BoardCommands::BoardCommands(AsyncBoard& board, Graph& graph, std::size_t node, 
           "relay 1 is the motors' supply; it closes when the board is armed");
   serve_all(graph, node, inbox);
   board_.on_state([this](const ReceivedState& state, const Datagram&) {
-    drivers_.on_state(state, state.sampled);
+    drivers_.on_state(state, BootClock::now() - (Clock::now() - state.sampled));
   });
   board_.on_arming([this](DisarmCause cause) {
     if (cause == DisarmCause::none) return;
@@ -132,7 +132,7 @@ void BoardCommands::post(std::size_t first, std::size_t count) {
     result = board_.post(group);
   }
   if (!result) tell(what, result);
-  const Clock::time_point now = Clock::now();
+  const Drivers::Time now = BootClock::now();
   for (std::size_t i = first; i < first + count; ++i) {
     const Setpoint& each = wanted_[i];
     // What is to rest is repeated until it does, also if it could not be sent.
@@ -143,8 +143,9 @@ void BoardCommands::post(std::size_t first, std::size_t count) {
 
 void BoardCommands::tell(const std::string& what, PostResult result) {
   if (result == PostResult::not_armed) {
-    const Problem problem = explain("command", board_.disarmed_by());
-    warn(fmt::format("not armed ({}): {}", to_text(board_.disarmed_by()), problem.fix));
+    const DisarmCause cause = board_.disarmed_by();
+    const Problem problem = for_a_node(explain("command", cause), cause);
+    warn(fmt::format("not armed ({}): {}", to_text(cause), problem.fix));
   } else {
     warn(fmt::format("a command was dropped: {} ({})", to_text(result), what));
   }
@@ -152,7 +153,7 @@ void BoardCommands::tell(const std::string& what, PostResult result) {
 
 void BoardCommands::on_tick() {
   if (resting_ || !drivers_.any()) return;
-  const Drivers::Stop stop = drivers_.to_stop(Clock::now());
+  const Drivers::Stop stop = drivers_.to_stop(BootClock::now());
   if (stop.commands.empty()) return;
   Setpoints group;
   for (const Command& command : stop.commands) group.add(command);

@@ -28,7 +28,7 @@ std::function<void(const CommandResult&)> in_words(const AsyncBoard& board, std:
     } else if (result.outcome == Outcome::cancelled && !board.in_control()) {
       done(false, explain(what, board.link()).text());
     } else {
-      done(false, explain(what, result, board.link()).text());
+      done(false, for_a_node(explain(what, result, board.link()), result.disarmed).text());
     }
   };
 }
@@ -228,7 +228,7 @@ void BoardCommands::send(const std::optional<std::string>& text, const void* sou
     board_.async_apply(setpoints, left, in_words(board_, *text, done));
     if (board_.disarmed_by() != DisarmCause::none) return;
     for (const Command& command : commands) {
-      drivers_.on_sent(command, source, origin.publisher, Clock::now());
+      drivers_.on_sent(command, source, origin.publisher, BootClock::now());
     }
   } catch (const Error& error) {
     done(false, error.problem().text());

@@ -75,4 +75,9 @@ std::vector<Command> commands_of(std::string_view text) {
   return commands;
 }
 
+Problem for_a_node(Problem problem, DisarmCause cause) {
+  if (is_earlier(cause)) problem.fix = "clear it on purpose: call ~/clear, then ~/arm";
+  return problem;
+}
+
 }  // namespace r4::tool::ros2

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "r4link/command.hpp"
+#include "r4link/link.hpp"
 
 namespace r4::tool::ros2 {
 
@@ -22,5 +23,9 @@ bool asks_to_stop(std::string_view text);
 // or that cannot come from a topic: settings, choices of fields, heartbeats and farewells. A text that is not ASCII is
 // not repeated there.
 std::vector<Command> commands_of(std::string_view text);
+
+// `problem` is the library's, which names its own call and r4 send. The board refuses those while this bridge controls
+// it, so a cause that came before this program is cleared by a service.
+Problem for_a_node(Problem problem, DisarmCause cause);
 
 }  // namespace r4::tool::ros2

@@ -10,7 +10,7 @@
 // confirmed it. What is stopped goes where the board's safe state puts it: motors to 0, brushless drivers to 0 with
 // their brakes on, servos without pulses, relays open, steppers standing where they are, voltages to 0. Relay 1 is no
 // output here: it is the motors' supply, and arming's. Where a stepper is, is known for a while, for a state may come in
-// several datagrams, of which one has it. No clock: the time is passed in.
+// several datagrams, of which one has it. No clock: the time is passed in. It goes on while this computer sleeps.
 #pragma once
 
 #include <array>
@@ -20,6 +20,7 @@
 #include <optional>
 #include <vector>
 
+#include "host/measurement/boot_clock.hpp"
 #include "r4link/command.hpp"
 #include "r4link/state.hpp"
 
@@ -30,7 +31,7 @@ StateField position_of(int stepper);
 
 class Drivers {
  public:
-  using Time = std::chrono::steady_clock::time_point;
+  using Time = BootClock::time_point;
   using Duration = std::chrono::milliseconds;
 
   // A deadline of 0: only who has gone is missed.

@@ -16,10 +16,11 @@ R4_Active and R4_Command (std_msgs/String), a topic for each component, diagnost
 ~/clear, ~/arm and ~/send (for clients with rmw_cyclonedds). docs/ros2.md has each topic with its units, and
 how to drive a robot by cmd_vel.
 
-Nothing drives before it is armed: by --arm, once, when the board is there; by true on the topic arm; by the
-service ~/arm. After a stop or a fault that has to be done again. What a publisher drives is switched off when
-it is gone, or silent for --deadline. Of several boards each has a namespace: board1, board2 …, or a pattern's
-numbers.
+Nothing drives before it is armed: by --arm, once, when the board is there; by true on the topic
+arm; by the service ~/arm. After a stop or a fault that has to be done again. A stop or a fault that
+came before this program began is cleared by ~/clear first, or by E:CLEAR on R4_Command. What a
+publisher drives is switched off when it is gone, or silent for --deadline. Of several boards each
+has a namespace: board1, board2 …, or a pattern's numbers.
 
 The graph is that of ROS_DOMAIN_ID, on this computer alone unless ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET,
 ROS_STATIC_PEERS or CYCLONEDDS_URI say otherwise.

@@ -102,7 +102,7 @@ void Hub::close(std::function<void()> done) {
 }
 
 Control::Time Hub::now() const {
-  return std::chrono::duration_cast<Control::Time>(Clock::now() - began_);
+  return std::chrono::duration_cast<Control::Time>(BootClock::now() - began_);
 }
 
 // --- on the server's thread
@@ -197,6 +197,7 @@ void Hub::leave(ClientId client) {
 
 void Hub::obey(ClientId client, const PageRequest& request) {
   if (closing_) return;
+  look_at_holder();
   switch (request.kind) {
     case PageRequest::Kind::stop:
       return stop(client, request);
@@ -242,13 +243,19 @@ void Hub::want_control(ClientId client, bool wanted) {
 }
 
 void Hub::watch_holder() {
-  deadline_.expires_at(began_ + *control_.deadline());
+  deadline_.expires_after(*control_.deadline() - now());
   deadline_.async_wait([this](const std::error_code& error) {
-    if (error || !control_.holder()) return;
-    if (!control_.expired(now())) return watch_holder();
-    control_.release(*control_.holder());
-    end_control(fmt::format("nothing was heard of the browser for {} ms", Control::limit.count()));
+    if (error) return;
+    look_at_holder();
+    if (control_.holder()) watch_holder();
   });
+}
+
+// The timer stands still while this computer sleeps: a browser that is heard first when it wakes may have lost control.
+void Hub::look_at_holder() {
+  if (!control_.expired(now())) return;
+  control_.release(*control_.holder());
+  end_control(fmt::format("nothing was heard of the browser for {} ms", Control::limit.count()));
 }
 
 // Nobody has it: the boards hear a farewell, and are safe.
@@ -298,7 +305,8 @@ WebBoard::OnResult Hub::answering(ClientId client, const PageRequest& request, s
     const double ms = std::chrono::duration<double, std::milli>(result.elapsed).count();
     LinkStatus link;
     if (boards_[board]->board() != nullptr) link = boards_[board]->board()->link();
-    const Problem problem = explain(what, result, link);
+    Problem problem = explain(what, result, link);
+    if (is_earlier(result.disarmed)) problem.fix = "press Clear when the danger is over, then Arm";
     answer(client, request, board, ok, ms,
            ok                    ? "confirmed"
            : problem.fix.empty() ? problem.reason

@@ -15,6 +15,7 @@
 #include "columns.hpp"
 #include "control.hpp"
 #include "foxglove.hpp"
+#include "host/measurement/boot_clock.hpp"
 #include "messages.hpp"
 #include "page_request.hpp"
 #include "server/server.hpp"
@@ -44,8 +45,6 @@ class Hub final : ServerEvents, WebBoard::Events {
   void close(std::function<void()> done);
 
  private:
-  using Clock = std::chrono::steady_clock;
-
   // On the server's thread.
   void on_open(ClientId client, Protocol protocol) override;
   void on_message(ClientId client, Protocol protocol, std::string text) override;
@@ -64,6 +63,7 @@ class Hub final : ServerEvents, WebBoard::Events {
   void want_control(ClientId client, bool wanted);
   void end_control(const std::string& why);
   void watch_holder();
+  void look_at_holder();
   void tell_control(const std::string& why);
   void tell_control(ClientId client, const std::string& why);
   void record(ClientId client, bool on);
@@ -85,7 +85,7 @@ class Hub final : ServerEvents, WebBoard::Events {
   Control::Time now() const;
 
   asio::io_context& io_;
-  const Clock::time_point began_ = Clock::now();
+  const BootClock::time_point began_ = BootClock::now();
   const std::vector<Device> devices_;
   const Columns columns_;
   std::vector<std::unique_ptr<WebBoard>> boards_;

@@ -24,6 +24,7 @@
 
 #include <cstdint>
 
+#include "../../../protocol/datagram/wrapping.hpp"
 #include "can_frame.hpp"
 #include "r4link/text.hpp"
 
@@ -62,11 +63,6 @@ struct IsotpDeadline {
   bool armed;
   std::uint32_t at_us;
 };
-
-// Has the time come? Right over a wrap, for times less than 2^31 us apart.
-constexpr bool reached(std::uint32_t now_us, std::uint32_t at_us) {
-  return static_cast<std::int32_t>(now_us - at_us) >= 0;
-}
 
 // The gap between two consecutive frames that a byte STmin asks for (9.6.5.4): 0–127 ms, or
 // 100–900 us for 0xF1–0xF9. Reserved values are the longest gap, 127 ms (9.6.5.5).

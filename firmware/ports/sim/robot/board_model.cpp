@@ -267,7 +267,7 @@ bool BoardModel::pins_may_differ() {
       disturb_pins();
     }
   }
-  return static_cast<std::int32_t>(time_ms_ - settled_ms_) <= 0;
+  return time_ms_ - disturbed_ms_ <= settling_ms;
 }
 
 Pins BoardModel::pins() const {

@@ -66,7 +66,7 @@ class BoardModel {
   // and all steppers stand: then it is not worth its time, in a process of many boards.
   bool pins_may_differ();
   // Something else has happened to the chips.
-  void disturb_pins() { settled_ms_ = time_ms_ + settling_ms; }
+  void disturb_pins() { disturbed_ms_ = time_ms_; }
   bool motors_have_supply() const { return handle_held_ && chips_.relay_closed(supply_relay); }
   // How far the shaft of an encoder has turned since power came, in the encoder's counts.
   std::int32_t shaft_count(int channel) const { return shafts_[channel - 1].count; }
@@ -146,7 +146,7 @@ class BoardModel {
   Converter converters_[analog_channels];
   std::int32_t pinned_cv_[analog_channels] = {};
   std::uint32_t bus_transfers_ = 0;  // when pins_may_differ() was asked
-  std::uint32_t settled_ms_ = 0;     // since there was one
+  std::uint32_t disturbed_ms_ = 0;   // since something happened that may change them
   std::uint8_t pinned_ = 0;          // bit n: analog input n stays at pinned_cv_[n]
 };
 

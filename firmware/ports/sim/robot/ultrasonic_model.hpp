@@ -5,6 +5,7 @@
 
 #include <cstdint>
 
+#include "../../../../protocol/datagram/wrapping.hpp"
 #include "pin_models.hpp"
 
 namespace r4 {
@@ -34,12 +35,12 @@ class UltrasonicModel {
       phase_ = Phase::burst;
       next_us_ = now_us + burst_us;
     }
-    if (phase_ == Phase::burst && reached(now_us)) {
+    if (phase_ == Phase::burst && reached(now_us, next_us_)) {
       on_edge(true, next_us_);
       phase_ = Phase::echo;
       next_us_ += cm_ == 0 ? nothing_us : cm_ * us_per_cm;
     }
-    if (phase_ == Phase::echo && reached(now_us)) {
+    if (phase_ == Phase::echo && reached(now_us, next_us_)) {
       on_edge(false, next_us_);
       phase_ = Phase::quiet;
     }
@@ -47,10 +48,6 @@ class UltrasonicModel {
 
  private:
   enum class Phase : std::uint8_t { quiet, burst, echo };
-
-  bool reached(std::uint32_t now_us) const {
-    return static_cast<std::int32_t>(now_us - next_us_) >= 0;
-  }
 
   OutputPinModel trigger_;
   std::uint16_t cm_ = 0;

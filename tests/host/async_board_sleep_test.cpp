@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A program whose computer sleeps. The boot clock of this test program is its own: it can be set forward.
+#include <gtest/gtest.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <asio/io_context.hpp>
+#include <atomic>
+#include <ctime>
+#include <optional>
+
+#include "host/measurement/boot_clock.hpp"
+#include "r4link/async_board.hpp"
+#include "r4link/board.hpp"
+#include "r4link/error.hpp"
+#include "tests/support/board_in_a_thread.hpp"
+
+namespace {
+
+std::atomic<int> slept_seconds{0};
+
+}  // namespace
+
+// In place of the C library's.
+extern "C" int clock_gettime(clockid_t clock, timespec* time) noexcept {
+  const auto result = static_cast<int>(syscall(SYS_clock_gettime, clock, time));
+  if (clock == CLOCK_BOOTTIME) time->tv_sec += slept_seconds;
+  return result;
+}
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+Time steady_time() {
+  return std::chrono::duration_cast<Time>(std::chrono::steady_clock::now().time_since_epoch());
+}
+
+void run_io_until(asio::io_context& io, const std::function<bool()>& done) {
+  const auto deadline = std::chrono::steady_clock::now() + 10s;
+  while (!done() && std::chrono::steady_clock::now() < deadline) io.run_one_for(10ms);
+  ASSERT_TRUE(done());
+}
+
+TEST(SleepWatchTest, TellsASleepThatIsLongerThanTheLimitOnce) {
+  SleepWatch watch;
+  EXPECT_FALSE(watch.slept(steady_time(), 1s));
+  slept_seconds += 2;
+  EXPECT_TRUE(watch.slept(steady_time(), 1s));
+  EXPECT_FALSE(watch.slept(steady_time(), 1s));
+  slept_seconds += 1;
+  EXPECT_FALSE(watch.slept(steady_time(), 2s));
+}
+
+TEST(SleepWatchTest, DoesNotTakeAThreadThatGetsNoProcessorForASleep) {
+  SleepWatch watch;
+  const Time before = steady_time() - 5s;  // the steady clock was read long before the boot clock
+  EXPECT_FALSE(watch.slept(before, 1s));
+  slept_seconds += 2;
+  EXPECT_TRUE(watch.slept(steady_time(), 1s));
+}
+
+TEST(AsyncBoardSleep, DisarmsAndSwitchesTheMotorsOff) {
+  BoardInAThread simulated("udp");
+  asio::io_context io;
+  AsyncBoard board(io, simulated.url());
+  int restarts = 0;
+  board.on_restart([&] { ++restarts; });
+  board.open();
+  bool armed = false;
+  board.async_arm(
+      10s, [&](const CommandResult& result) { armed = result.outcome == Outcome::confirmed; });
+  run_io_until(io, [&] { return armed; });
+  ASSERT_TRUE(board.post(Command::osmc(500, Direction::forward, 1)));
+  run_io_until(io, [&] { return board.state().osmc[0].pwm == 500; });
+
+  slept_seconds += 3;
+  run_io_until(io, [&] { return board.disarmed_by() != DisarmCause::none; });
+  EXPECT_EQ(board.disarmed_by(), DisarmCause::sleep);
+  EXPECT_EQ(board.post(Command::osmc(500, Direction::forward, 1)), PostResult::no_link);
+  EXPECT_EQ(restarts, 1);
+  run_io_until(io, [&] { return board.in_control() && board.state().any(); });
+  EXPECT_EQ(board.state().osmc[0].pwm, 0) << "another session has begun";
+  EXPECT_EQ(board.post(Command::osmc(500, Direction::forward, 1)), PostResult::not_armed);
+  EXPECT_EQ(restarts, 1);
+}
+
+TEST(AsyncBoardSleep, CancelsWhatWaited) {
+  asio::io_context io;
+  AsyncBoard board(io, "udp://127.0.0.1:1?listen=0");  // nobody is there
+  board.open();
+  std::vector<Outcome> ends;
+  const auto note = [&](const CommandResult& result) { ends.push_back(result.outcome); };
+  board.async_wait_active(30s, note);
+  board.async_arm(30s, note);
+  board.async_send(Command::osmc(500, Direction::forward, 1), 30s, note);
+  io.run_for(20ms);
+  ASSERT_TRUE(ends.empty());
+  slept_seconds += 3;
+  run_io_until(io, [&] { return ends.size() == 3; });
+  EXPECT_EQ(ends, std::vector<Outcome>(3, Outcome::cancelled));
+}
+
+}  // namespace
+}  // namespace r4::test
