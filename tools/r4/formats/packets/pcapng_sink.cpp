@@ -165,7 +165,8 @@ PcapngSink::Wire& PcapngSink::wire_of(std::uint16_t number) {
     }
   } catch (const Error&) {  // no URL, or none that we know: the address is made up
   }
-  add_interface(link_ipv4, wire.url.substr(0, 1000), fmt::format("{}{}", wire_interface, number));
+  add_interface(link_ipv4, printable(wire.url.substr(0, 1000)),
+                fmt::format("{}{}", wire_interface, number));
   return wire;
 }
 
