@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What is secret in a setting, and datagrams without it.
 #include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
 
 #include <string>
+#include <vector>
 
 #include "protocol/messages/settings.hpp"
 #include "r4link/datagram.hpp"
@@ -69,6 +71,19 @@ TEST(Secrets, OfADamagedDatagramTakeTheRestWithThem) {
   EXPECT_EQ(masked("1;^0x12^C:key,1:" + secret_digits), "1;^0x12^C:key,1:...");
   EXPECT_EQ(masked("noiseC:password,letmein!"), "noiseC:password,...");
   EXPECT_EQ(masked(masked(damaged)), masked(damaged));
+}
+
+RC_GTEST_PROP(Secrets, AreGoneTheFirstTime, (bool is_valid)) {
+  const auto pieces = *rc::gen::container<std::vector<std::string>>(
+      rc::gen::element<std::string>("C:", "key", "password", ",", "1:", ";", "^", "0x1", "letmein!",
+                                    "rate,50", "...", "off", "x"));
+  std::string bytes;
+  for (const std::string& each : pieces) bytes += each;
+  if (is_valid) bytes = with_crc(bytes);
+  const std::string once = masked(bytes);
+  RC_ASSERT(masked(once) == once);
+  RC_ASSERT(once.size() <= bytes.size() + masking_room);
+  RC_ASSERT((";" + once).find(";C:password,letmein!") == std::string::npos);
 }
 
 TEST(Secrets, NeverMakeADatagramLongerThanTheRoomForIt) {

@@ -43,6 +43,7 @@ void Screen::draw(std::vector<std::string> lines) {
   for (std::string& line : lines) {
     line = printable(line);
     if (line.size() > size.ws_col) line.resize(size.ws_col);
+    while (printable(line) != line) line.pop_back();  // the beginning of a character
     frame += "\r" + line + "\x1b[K\n";
   }
   frame += "\x1b[J";

@@ -89,7 +89,7 @@ class LiveView final : public MonitorView {
 
   void note(std::string text) {
     const auto seconds = std::chrono::duration<double>(Clock::now() - start_).count();
-    notes_.push_back(fmt::format("{:8.1f} s  {}", seconds, escaped(text)));
+    notes_.push_back(fmt::format("{:8.1f} s  {}", seconds, printable(text)));
     if (notes_.size() > most_notes) notes_.pop_front();
   }
 

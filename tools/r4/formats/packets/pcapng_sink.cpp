@@ -165,7 +165,8 @@ PcapngSink::Wire& PcapngSink::wire_of(std::uint16_t number) {
     }
   } catch (const Error&) {  // no URL, or none that we know: the address is made up
   }
-  add_interface(link_ipv4, wire.url.size() <= max_interface_text ? wire.url : std::string(),
+  add_interface(link_ipv4,
+                wire.url.size() <= max_interface_text ? printable(wire.url) : std::string(),
                 fmt::format("{}{}", wire_interface, number));
   return wire;
 }
