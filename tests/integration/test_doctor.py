@@ -80,6 +80,16 @@ def test_a_board_that_says_nothing_and_a_port_that_is_not_there(tmp_path):
     assert code == OPEN and found['serial.permission']['reason'] == 'there is no such port'
 
 
+def test_no_program_of_the_working_directory_is_run(tmp_path):
+    for name in ('iw', 'nft', 'iptables', 'sh'):
+        (tmp_path / name).write_text(f'#!/bin/sh\n: > {tmp_path}/executed\n')
+        (tmp_path / name).chmod(0o755)
+    listened = run('doctor', 'udp://127.0.0.1:9?listen=0', '--duration', '0.1', cwd=tmp_path,
+                   env={**os.environ, 'PATH': ':' + os.environ['PATH']})
+    assert listened.returncode == REFUSED, listened
+    assert not (tmp_path / 'executed').exists()
+
+
 def test_it_brings_its_rules_for_udev():
     assert run('doctor', '--udev-rules').stdout == RULES.read_text(encoding='ascii')
     if subprocess.run(['which', 'udevadm'], capture_output=True, check=False).returncode == 0:

@@ -73,6 +73,8 @@ def test_the_page_comes_with_what_keeps_foreign_scripts_out():
         etag = next(line for line in head.decode().splitlines() if line.startswith('ETag')).split(': ')[1]
         assert web.get('/', f'If-None-Match: {etag}\r\n')[0] == 304
         assert web.get('/../web.cpp')[0] == web.get('/nothing')[0] == 404
+        only_head = web.request(b'HEAD / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n')
+        assert only_head == head + b'\r\n\r\n'
         assert b'r4_up' in web.get('/metrics')[1]
 
 

@@ -155,7 +155,7 @@ int mend(const Findings& findings, bool json) {
     }
     // What it says is for people: with --json it must not get between the objects.
     const std::string command = json ? "{ " + each.fix + "; } >&2" : each.fix;
-    const bool worked = std::system(command.c_str()) == 0;
+    const bool worked = std::system(from_root(command).c_str()) == 0;
     if (json) {
       print_line(
           {{"type", "mended"}, {"check", each.check}, {"command", each.fix}, {"done", worked}});

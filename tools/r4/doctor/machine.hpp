@@ -21,6 +21,10 @@ struct User {
 };
 User this_user();
 
+// The command for a shell, with / as its working directory: a PATH with "." or an empty entry then leads to no file that
+// happens to lie where r4 was started.
+std::string from_root(const std::string& command);
+
 struct Machine {
   std::string root;  // before every path; empty: this machine
   User user;
