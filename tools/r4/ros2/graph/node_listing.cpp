@@ -68,26 +68,25 @@ NodeListing::NodeListing(dds_entity_t participant, std::vector<Node> nodes,
   if (fixed_) speak_to(*fixed_);
 }
 
+// Of many, some: what is left is the next look's. Stops are read on the same thread.
 void NodeListing::look() {
   constexpr std::size_t most = 64;
   std::array<void*, most> samples{};
   std::array<dds_sample_info_t, most> infos{};
-  for (;;) {
-    const dds_return_t count = dds_take(peers_.get(), samples.data(), infos.data(), most, most);
-    if (count <= 0) break;
-    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
-      const auto& writer = *static_cast<const dds_builtintopic_endpoint_t*>(samples[i]);
-      if (infos[i].instance_state != DDS_IST_ALIVE) {
-        others_.erase(id_from(writer.key));
-      } else if (infos[i].valid_data && writer.topic_name != nullptr &&
-                 std::string_view(writer.topic_name) == listing_topic &&
-                 id_from(writer.participant_key) != id_) {
-        const bool hashed = user_data_of(writer.qos).find("typehash=") != std::string::npos;
-        others_[id_from(writer.key)] = hashed ? Release::since_iron : Release::before_iron;
-      }
+  const dds_return_t count = dds_take(peers_.get(), samples.data(), infos.data(), most, most);
+  if (count <= 0) return;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+    const auto& writer = *static_cast<const dds_builtintopic_endpoint_t*>(samples[i]);
+    if (infos[i].instance_state != DDS_IST_ALIVE) {
+      others_.erase(id_from(writer.key));
+    } else if (infos[i].valid_data && writer.topic_name != nullptr &&
+               std::string_view(writer.topic_name) == listing_topic &&
+               id_from(writer.participant_key) != id_) {
+      const bool hashed = user_data_of(writer.qos).find("typehash=") != std::string::npos;
+      others_[id_from(writer.key)] = hashed ? Release::since_iron : Release::before_iron;
     }
-    (void)dds_return_loan(peers_.get(), samples.data(), count);
   }
+  (void)dds_return_loan(peers_.get(), samples.data(), count);
   if (const auto release = wanted(); release && release != spoken_) speak_to(*release);
 }
 
