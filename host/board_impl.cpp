@@ -65,6 +65,7 @@ Board::Impl::Impl(const CarriersMaker& make, BoardOptions options, BoardCallback
 std::shared_ptr<Board::Impl> Board::Impl::started(const CarriersMaker& make, BoardOptions options,
                                                   BoardCallbacks first) {
   return with_system_errors("a board", [&] {
+    require_watches();
     auto impl = std::make_shared<Impl>(make, std::move(options), std::move(first));
     impl->start();
     return impl;

@@ -2,6 +2,8 @@
 // A file descriptor with an owner; and what to do where the system has none left, or no memory or thread.
 #pragma once
 
+#include <sys/epoll.h>
+#include <sys/eventfd.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -73,6 +75,21 @@ inline Problem problem_of(const std::string& thing, const std::system_error& err
   }
   return {ErrorKind::open, thing, "the system refuses it: " + error.code().message(),
           "end some programs, and try again"};
+}
+
+// Throws std::system_error if an event loop that is made now could not be woken. Asio does not look whether the system
+// lets a loop wait for what wakes it and for its timers: such a loop would sleep for ever.
+inline void require_watches() {
+  const FileDescriptor epoll(::epoll_create1(EPOLL_CLOEXEC));
+  const FileDescriptor events[] = {FileDescriptor(::eventfd(0, EFD_CLOEXEC)),
+                                   FileDescriptor(::eventfd(0, EFD_CLOEXEC))};
+  for (const FileDescriptor& each : events) {
+    epoll_event wanted{};
+    wanted.events = EPOLLIN;
+    if (!epoll || !each || ::epoll_ctl(epoll.get(), EPOLL_CTL_ADD, each.get(), &wanted) != 0) {
+      throw std::system_error(errno, std::generic_category());
+    }
+  }
 }
 
 // The result of `action`; what the system refuses it is an Error about `thing`.

@@ -61,8 +61,10 @@ void FleetResults::require() const {
 // --- the fleet
 
 Fleet::Fleet(const std::vector<std::string>& patterns, BoardOptions options)
-    : impl_(with_system_errors(
-          "a fleet", [&] { return std::make_unique<Impl>(patterns, std::move(options)); })) {}
+    : impl_(with_system_errors("a fleet", [&] {
+        require_watches();
+        return std::make_unique<Impl>(patterns, std::move(options));
+      })) {}
 Fleet::~Fleet() = default;
 void Fleet::close() { impl_->close(); }
 

@@ -54,7 +54,11 @@ TEST(BoardResources, WithoutAWatchLeftIsAnError) {
     return error.find("wait for as many files and sockets as they may") != std::string::npos;
   };
   EXPECT_PRED1(is_told, error_where(no_watches, [] { const Board board(a_board); }));
+  EXPECT_PRED1(is_told, error_where(no_watches, [] { const Board board("sim:"); }));
   EXPECT_PRED1(is_told, error_where(no_watches, [] { const Fleet fleet({a_board}); }));
+  EXPECT_PRED1(is_told, error_where(no_watches, [] {
+                 const Bridge bridge("udp://127.0.0.1:0", "udp://127.0.0.1:9");
+               }));
   EXPECT_PRED1(is_told, error_where(no_watches, [] {
                  asio::io_context io;
                  AsyncBoard(io.get_executor(), a_board).open();
