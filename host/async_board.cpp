@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "../transports/file_descriptor.hpp"
 #include "async_board_impl.hpp"
 #include "board_loop.hpp"
 #include "commands/command_help.hpp"
@@ -42,8 +43,10 @@ AsyncBoard::AsyncBoard(const executor_type& executor, std::unique_ptr<Carrier> c
 
 AsyncBoard::AsyncBoard(const executor_type& executor,
                        std::vector<std::unique_ptr<Carrier>> carriers, BoardOptions options)
-    : impl_(std::make_shared<Impl>(executor.context(), checked(std::move(carriers)),
-                                   std::move(options))) {}
+    : impl_(with_system_errors("a board", [&] {
+        return std::make_shared<Impl>(executor.context(), checked(std::move(carriers)),
+                                      std::move(options));
+      })) {}
 
 AsyncBoard::~AsyncBoard() {
   impl_->close();

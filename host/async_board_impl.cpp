@@ -6,6 +6,7 @@
 #include <string>
 
 #include "../protocol/messages/settings.hpp"
+#include "../transports/file_descriptor.hpp"
 
 namespace r4 {
 
@@ -200,7 +201,7 @@ void AsyncBoard::Impl::open() {
 // that is wrong with one wire, a device of another kind in its place for example, touches the others.
 bool AsyncBoard::Impl::open_wire(BoardWire& wire, std::optional<Problem>& problem) {
   try {
-    wire.carrier->open(wire);
+    with_system_errors(wire.carrier->name(), [&] { wire.carrier->open(wire); });
     wire.opened = true;
     return true;
   } catch (const Error& error) {

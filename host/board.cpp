@@ -13,27 +13,23 @@ namespace r4 {
 Board::Board(std::string_view url, BoardOptions options, BoardCallbacks callbacks)
     : Board(std::vector<std::string>{std::string(url)}, std::move(options), std::move(callbacks)) {}
 Board::Board(const std::vector<std::string>& urls, BoardOptions options, BoardCallbacks callbacks)
-    : impl_(std::make_shared<Impl>(
+    : impl_(Impl::started(
           [&urls, role = options.role](Loop& loop) {
             return make_host_carriers(context_of(loop), urls, role);
           },
-          std::move(options), std::move(callbacks))) {
-  impl_->start();
-}
+          std::move(options), std::move(callbacks))) {}
 Board::Board(const CarrierMaker& make, BoardOptions options, BoardCallbacks callbacks)
     : Board(std::vector<CarrierMaker>{make}, std::move(options), std::move(callbacks)) {}
 Board::Board(const std::vector<CarrierMaker>& makers, BoardOptions options,
              BoardCallbacks callbacks)
-    : impl_(std::make_shared<Impl>(
+    : impl_(Impl::started(
           [&makers](Loop& loop) {
             std::vector<std::unique_ptr<Carrier>> carriers;
             carriers.reserve(makers.size());
             for (const CarrierMaker& make : makers) carriers.push_back(make(loop));
             return carriers;
           },
-          std::move(options), std::move(callbacks))) {
-  impl_->start();
-}
+          std::move(options), std::move(callbacks))) {}
 Board::~Board() { impl_->close(); }
 
 void Board::close() { impl_->close(); }

@@ -5,6 +5,7 @@
 #include <asio/post.hpp>
 #include <utility>
 
+#include "../transports/file_descriptor.hpp"
 #include "commands/command_help.hpp"
 #include "session/limits.hpp"
 
@@ -59,6 +60,16 @@ Board::Impl::Impl(const CarriersMaker& make, BoardOptions options, BoardCallback
   async.open();
   take_name();
   if (callback_limit != Duration{0}) look_at_callbacks();
+}
+
+std::shared_ptr<Board::Impl> Board::Impl::started(const CarriersMaker& make, BoardOptions options,
+                                                  BoardCallbacks first) {
+  return with_system_errors("a board", [&] {
+    require_watches();
+    auto impl = std::make_shared<Impl>(make, std::move(options), std::move(first));
+    impl->start();
+    return impl;
+  });
 }
 
 void Board::Impl::start() {

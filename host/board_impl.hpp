@@ -65,6 +65,9 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
 
   using CarriersMaker = std::function<std::vector<std::unique_ptr<Carrier>>(Loop& loop)>;
   Impl(const CarriersMaker& make, BoardOptions options, BoardCallbacks first);
+  // One whose threads run. Throws Error, also where the system has no thread or descriptor left.
+  static std::shared_ptr<Impl> started(const CarriersMaker& make, BoardOptions options,
+                                       BoardCallbacks first);
   void start();
   // Idempotent, from any thread.
   void close();

@@ -2,6 +2,8 @@
 // Callbacks, several of a kind, each with a handle by which it is ended.
 #pragma once
 
+#include <unistd.h>
+
 #include <atomic>
 #include <functional>
 #include <memory>
@@ -18,6 +20,8 @@ class Subscriber {
  public:
   virtual ~Subscriber() = default;
   void end() {
+    // In a fork nothing calls it, and a thread that was calling it then holds the lock for ever.
+    if (::getpid() != process_) return;
     ended_ = true;
     std::shared_ptr<void> gone;            // destroyed without the lock
     const std::lock_guard lock(running_);  // waits for a call in another thread
@@ -60,6 +64,7 @@ class Subscriber {
     const bool outermost_;
   };
 
+  const pid_t process_ = ::getpid();
   std::recursive_mutex running_;
   std::atomic<bool> ended_{false};
   bool called_ = false;

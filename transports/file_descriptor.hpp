@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A file descriptor with an owner; and what to do where there is none left.
+// A file descriptor with an owner; and what to do where the system has none left, or no memory or thread.
 #pragma once
 
+#include <sys/epoll.h>
+#include <sys/eventfd.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "r4link/error.hpp"
@@ -37,10 +40,21 @@ class FileDescriptor {
   int number_ = -1;
 };
 
-// Why `thing` cannot be opened, if that `error` (errno) is that the program, or the system, has no file left for it.
-inline std::optional<Problem> out_of_files(const std::string& thing, int error) {
+// Why `thing` cannot be opened, if `error` (errno) says that the program, the user or the computer has used up what it
+// needs: files, memory, or what epoll may wait for.
+inline std::optional<Problem> out_of_resources(const std::string& thing, int error) {
   if (error == ENFILE) {
     return Problem{ErrorKind::open, thing, "this computer has no file left", "end some programs"};
+  }
+  if (error == ENOMEM || error == ENOBUFS) {
+    return Problem{ErrorKind::open, thing, "this computer has no memory left for it",
+                   "end some programs"};
+  }
+  if (error == ENOSPC) {  // of epoll_ctl(2)
+    return Problem{ErrorKind::open, thing,
+                   "the programs of this user wait for as many files and sockets as they may",
+                   "end some programs, or allow more: sysctl fs.epoll.max_user_watches shows how "
+                   "many"};
   }
   if (error != EMFILE) return std::nullopt;
   rlimit limit{};
@@ -50,6 +64,42 @@ inline std::optional<Problem> out_of_files(const std::string& thing, int error) 
       "this program may have " + std::to_string(limit.rlim_cur) + " files open, and has them",
       "open fewer boards, or allow it more before it begins: ulimit -n " +
           std::to_string(4 * limit.rlim_cur)};
+}
+
+// What Asio and the standard library throw where the system refuses something: a thread, a descriptor, a watch.
+inline Problem problem_of(const std::string& thing, const std::system_error& error) {
+  if (auto problem = out_of_resources(thing, error.code().value())) return *std::move(problem);
+  if (error.code().value() == EAGAIN) {
+    return {ErrorKind::open, thing, "this user may have no more threads",
+            "end some programs, or allow more: ulimit -u shows how many"};
+  }
+  return {ErrorKind::open, thing, "the system refuses it: " + error.code().message(),
+          "end some programs, and try again"};
+}
+
+// Throws std::system_error if an event loop that is made now could not be woken. Asio does not look whether the system
+// lets a loop wait for what wakes it and for its timers: such a loop would sleep for ever.
+inline void require_watches() {
+  const FileDescriptor epoll(::epoll_create1(EPOLL_CLOEXEC));
+  const FileDescriptor events[] = {FileDescriptor(::eventfd(0, EFD_CLOEXEC)),
+                                   FileDescriptor(::eventfd(0, EFD_CLOEXEC))};
+  for (const FileDescriptor& each : events) {
+    epoll_event wanted{};
+    wanted.events = EPOLLIN;
+    if (!epoll || !each || ::epoll_ctl(epoll.get(), EPOLL_CTL_ADD, each.get(), &wanted) != 0) {
+      throw std::system_error(errno, std::generic_category());
+    }
+  }
+}
+
+// The result of `action`; what the system refuses it is an Error about `thing`.
+template <class Action>
+auto with_system_errors(const std::string& thing, Action action) {
+  try {
+    return action();
+  } catch (const std::system_error& error) {
+    throw Error(problem_of(thing, error));
+  }
 }
 
 }  // namespace r4

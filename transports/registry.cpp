@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "can/can_carrier.hpp"
+#include "file_descriptor.hpp"
 #include "serial/pty_carrier.hpp"
 #include "serial/serial_carrier.hpp"
 #include "share/share_group.hpp"
@@ -45,7 +46,7 @@ std::unique_ptr<Carrier> Registry::make(asio::io_context& io, std::string_view u
   Url parsed = Url::parse(url);
   const Entry& entry = entry_of(parsed);
   if (role == Role::host && entry.wire) parsed.take("share");
-  return entry.make(io, parsed, role);
+  return with_system_errors(parsed.text(), [&] { return entry.make(io, parsed, role); });
 }
 
 std::unique_ptr<Carrier> Registry::make_shared(asio::io_context& io, std::string_view url,

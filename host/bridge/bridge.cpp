@@ -8,6 +8,7 @@
 #include <thread>
 #include <utility>
 
+#include "../../transports/file_descriptor.hpp"
 #include "../../transports/operation_slot.hpp"
 #include "../../transports/url.hpp"
 #include "../standard_registry.hpp"
@@ -125,7 +126,10 @@ struct Bridge::Impl {
 };
 
 Bridge::Bridge(std::string_view hosts, std::string_view board, BridgeOptions options)
-    : impl_(std::make_unique<Impl>(hosts, board, std::move(options))) {}
+    : impl_(with_system_errors("a bridge", [&] {
+        require_watches();
+        return std::make_unique<Impl>(hosts, board, std::move(options));
+      })) {}
 Bridge::~Bridge() = default;
 
 void Bridge::close() { impl_->close(); }

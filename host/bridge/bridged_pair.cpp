@@ -6,6 +6,7 @@
 
 #include "../../protocol/messages/command_field.hpp"
 #include "../../protocol/messages/message.hpp"
+#include "../../transports/file_descriptor.hpp"
 
 namespace r4 {
 namespace {
@@ -61,7 +62,7 @@ void BridgedPair::try_to_open(Side& side, Absence absence, Time now) {
   side.waiting.begin(now);
   try {
     side.opened = true;  // it may be up before it returns
-    side.carrier->open(side);
+    with_system_errors(side.carrier->name(), [&] { side.carrier->open(side); });
   } catch (const Error& error) {
     side.opened = false;
     if (absence == Absence::refused || !is_absence(error.kind())) throw;

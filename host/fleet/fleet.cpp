@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "../../transports/file_descriptor.hpp"
 #include "../commands/command_help.hpp"
 #include "../session/limits.hpp"
 #include "fleet_impl.hpp"
@@ -60,7 +61,10 @@ void FleetResults::require() const {
 // --- the fleet
 
 Fleet::Fleet(const std::vector<std::string>& patterns, BoardOptions options)
-    : impl_(std::make_unique<Impl>(patterns, std::move(options))) {}
+    : impl_(with_system_errors("a fleet", [&] {
+        require_watches();
+        return std::make_unique<Impl>(patterns, std::move(options));
+      })) {}
 Fleet::~Fleet() = default;
 void Fleet::close() { impl_->close(); }
 

@@ -50,10 +50,10 @@ def _built():
         if not given:
             configure(folder)
         _run('cmake', '--build', str(folder), '--target', 'r4_python')
-        package = folder / 'python/r4link'
-        for path in sorted(package.iterdir()):
+        package = folder / 'python'
+        for path in sorted([*package.glob('r4link/*'), package / 'r4link_pytest.py']):
             if path.is_file():
-                yield f'r4link/{path.name}', path.read_bytes()
+                yield str(path.relative_to(package)), path.read_bytes()
 
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
@@ -75,6 +75,11 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
         for name, content in files:
             archive.writestr(name, content)
     return wheel
+
+
+def build_editable(wheel_directory, config_settings=None, metadata_directory=None):
+    sys.exit('r4link: it cannot be installed with -e, because a part of it is compiled\n  fix: pip install . ; or, to work '
+             'on it, cmake --build build --target r4_python, and PYTHONPATH=build/python')
 
 
 def build_sdist(sdist_directory, config_settings=None):

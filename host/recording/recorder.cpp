@@ -10,6 +10,7 @@
 #include <exception>
 #include <utility>
 
+#include "../../transports/file_descriptor.hpp"
 #include "record_line.hpp"
 
 namespace r4 {
@@ -51,7 +52,7 @@ Recorder::Recorder(const std::string& path, const RecordingOptions& options)
   waiting_.reserve(capacity);
   const NoSignals inherited;
   writer_.flush();
-  thread_ = std::thread([this] { run(); });
+  with_system_errors(path, [&] { thread_ = std::thread([this] { run(); }); });
 }
 
 Recorder::~Recorder() { close(); }

@@ -242,6 +242,32 @@ def as_another_user(folder):
     return run_as_nobody
 
 
+HAMMER = """
+import socket, sys
+while True:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as other:
+        other.connect(chr(0) + sys.argv[1])
+"""
+
+
+def test_programs_of_another_user_that_connect_again_and_again_hold_up_neither_the_host_nor_a_stop(folder):
+    if os.geteuid() != 0:
+        pytest.skip('only root may run programs as another user')
+    with Board(f'pty:{folder}/tty') as board, driving(board.host_url, 'O:358,1,1') as host, contextlib.ExitStack() as others:
+        name = f'r4link/{os.geteuid()}/serial/{os.path.realpath(folder + "/tty")}'
+        for _ in range(20):
+            other = subprocess.Popen(['/usr/bin/python3', '-S', '-c', HAMMER, name], user='nobody', group='nogroup',
+                                     extra_groups=[], cwd='/')
+            others.callback(other.wait)
+            others.callback(other.kill)
+        board.never('SAFE', 2)
+        assert host.process.poll() is None and all(each['type'] != 'error' for each in host.log)
+        # By the host's socket, where it waits in the queue with all of them.
+        stopped = run('stop', board.host_url, '--json')
+        assert stopped.returncode == 0, stopped
+        board.state('SAFE', 'stop')
+
+
 def test_another_user_shares_a_wire_where_both_say_so(board, nobody):
     shared = board.host_url + ('&' if '?' in board.host_url else '?') + 'share=nogroup'
     with driving(shared, 'O:358,1,1') as host:

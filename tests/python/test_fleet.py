@@ -69,6 +69,9 @@ def test_wrong_options_are_refused_as_a_boards_are(monkeypatch, tmp_path):
         r4link.Fleet('sim:', role='drive')
     with pytest.raises(r4link.UsageError, match='for a Board alone'):
         r4link.Fleet(r4link.with_link('sim:', 'loss=5%'))
+    for wrong in (['sim:', 'sim:?node=2'],), (None,), (b'sim:',):
+        with pytest.raises(r4link.UsageError, match=r'write r4link.Fleet\(\*urls\)'):
+            r4link.Fleet(*wrong)
     with pytest.raises(r4link.UsageError, match='stop_retry'):
         r4link.Fleet('sim:', stop_retry=0)
     monkeypatch.setenv('HOME', str(tmp_path))

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import threading
 import time
+import traceback
 import weakref
 
 import pytest
@@ -85,6 +86,86 @@ def test_a_board_of_the_parent_is_none_of_a_fork(board):
         os._exit(code)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
     board.osmc(1).set(5)
+
+
+def in_a_fork(action):
+    """The exit code of a child that does that; a child that hangs is ended."""
+    child = os.fork()
+    if child == 0:
+        signal.alarm(20)
+        code = 1
+        try:
+            action()
+            code = 0
+        except BaseException:  # pylint: disable=broad-except
+            traceback.print_exc()
+        os._exit(code)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+def test_in_a_fork_each_call_is_refused_or_does_nothing_and_none_hangs(tmp_path):
+    in_callback, go_on = threading.Event(), threading.Event()
+
+    def hold(_):
+        in_callback.set()
+        go_on.wait(20)
+
+    sim = r4link.SimBoard()
+    with r4link.SimBoard('udp://127.0.0.1:0') as other, r4link.Recording(tmp_path / 'x.r4log') as recording, \
+            r4link.Board(sim.url, callback_limit=0) as board, r4link.Fleet(other.url) as fleet, \
+            r4link.Bridge('udp://127.0.0.1:0', 'udp://127.0.0.1:9?listen=0') as bridge:
+        board.record(recording)
+        board.wait_active()
+        states = board.states()
+        subscription = board.on_state(hold)
+        assert in_callback.wait(10)
+        refused = [lambda: board.state, lambda: board.identify(), board.stop, board.stop_async, lambda: board.wires,
+                   lambda: board.post(r4link.Setpoints().osmc(1, 5)), lambda: board.on_link(print), lambda: next(states),
+                   states.take, lambda: states.ended, lambda: board.watchdog(1), lambda: fleet.stop(),
+                   fleet.health, lambda: fleet.post({0: r4link.Setpoints().osmc(1, 5)}), fleet.next_event,
+                   bridge.status, lambda: recording.records, lambda: recording.problem,
+                   sim.look, lambda: sim.happen('handle released'), other.look,
+                   lambda: other.happen('handle released')]
+
+        def use_all_of_it():
+            for number, call in enumerate(refused):
+                try:
+                    call()
+                    assert False, number
+                except r4link.ClosedError as error:
+                    assert 'fork' in error.reason
+            subscription.cancel()
+            for each in (board, fleet, bridge, recording, sim, other):
+                each.close()
+
+        assert in_a_fork(use_all_of_it) == 0
+        go_on.set()
+        subscription.cancel()
+        board.identify()
+        fleet.wait_active()
+        assert other.look().open, 'the child has ended it'
+
+
+def test_a_fork_may_end_while_a_callback_runs_in_its_parent():
+    program = """
+import os, signal, sys, threading, weakref, r4link
+board = r4link.Board('sim:', callback_limit=0)
+runs, may_end = threading.Event(), threading.Event()
+subscription = board.on_state(lambda state: (runs.set(), may_end.wait(20)))
+weakref.finalize(board, subscription.cancel)
+runs.wait(10)
+child = os.fork()
+if child:
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    may_end.set()
+    sys.exit(code)
+signal.alarm(15)
+"""
+    with run(program) as process:
+        try:
+            assert process.communicate(timeout=20) == ('', '') and process.returncode == 0
+        finally:
+            process.kill()
 
 
 def test_a_board_in_a_circle_is_collected(sim):

@@ -87,3 +87,16 @@ def test_installs_into_a_venv_and_builds_a_wheel_and_a_source_distribution(tmp_p
         env={**OFFLINE, 'PYTHONPATH': 'host/python'})
     assert f'r4link-{r4link.__version__}/host/python/bindings/board.cpp' in names
     assert not any('__pycache__' in each or each.endswith('.so') for each in names)
+
+
+def test_a_folder_of_sources_says_what_is_missing():
+    ended = subprocess.run([sys.executable, '-B', '-c', 'import r4link'], cwd=ROOT / 'host/python', env=OFFLINE,
+                           capture_output=True, text=True, check=False)
+    assert 'ImportError: r4link: ' in ended.stderr and 'without the compiled module; build it' in ended.stderr, ended.stderr
+
+
+def test_an_editable_installation_says_what_to_do_instead(tmp_path):
+    ended = subprocess.run([sys.executable, '-c', 'import build_backend; build_backend.build_editable("x")'], cwd=tmp_path,
+                           env={**OFFLINE, 'PYTHONPATH': str(ROOT / 'host/python')}, capture_output=True, text=True,
+                           check=False)
+    assert ended.returncode != 0 and 'fix: pip install .' in ended.stderr, ended.stderr

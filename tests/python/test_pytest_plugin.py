@@ -10,6 +10,8 @@ import tomllib
 
 import pytest
 
+from r4link import UsageError, pytest_plugin
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 EXAMPLE = ROOT / 'docs/examples/robot_tests'
 
@@ -95,3 +97,37 @@ def test_without_the_command_it_is_told_how_to_get_it(tmp_path):
     env = {'R4': '', 'PATH': str(tmp_path)}
     ended = run_pytest('test_it.py', '--r4-transport', 'udp', cwd=tmp_path, **env)
     assert 'the command r4: it is not on PATH; set R4=FILE' in ended.stdout, ended.stdout
+
+
+def test_the_workers_of_xdist_have_nodes_of_their_own_on_a_bus(monkeypatch):
+    node = pytest_plugin._node
+    assert [node(number) for number in range(3)] == [1, 2, 3]
+    monkeypatch.setenv('PYTEST_XDIST_WORKER_COUNT', '4')
+    nodes = set()
+    for worker in range(4):
+        monkeypatch.setenv('PYTEST_XDIST_WORKER', f'gw{worker}')
+        nodes |= {node(number) for number in range(7)}
+    assert len(nodes) == 4 * 7 and nodes <= set(range(1, 32))
+    with pytest.raises(UsageError, match='use fewer workers'):
+        node(8)
+
+
+@pytest.mark.parametrize('broken', [False, True])
+def test_a_package_that_cannot_be_loaded_fails_only_the_tests_that_use_it(broken, tmp_path):
+    """As pytest loads it where it is installed: by its entry point."""
+    site = tmp_path / 'site'
+    shutil.copytree(pathlib.Path(pytest_plugin.__file__).parent, site / 'r4link')
+    shutil.copy(ROOT / 'host/python/r4link_pytest.py', site)
+    information = site / 'r4link-1.dist-info'
+    information.mkdir()
+    (information / 'METADATA').write_text('Metadata-Version: 2.1\nName: r4link\nVersion: 1\n')
+    project = tomllib.loads((ROOT / 'pyproject.toml').read_text())['project']
+    (information / 'entry_points.txt').write_text(f'[pytest11]\nr4link = {project["entry-points"]["pytest11"]["r4link"]}\n')
+    if broken:
+        (site / 'r4link/_core.so').write_bytes(b'no library')
+    (tmp_path / 'test_any.py').write_text('def test_any(): pass\n')
+    (tmp_path / 'test_robot.py').write_text('def test_robot(r4_robot): pass\n')
+    ended = subprocess.run([sys.executable, '-B', '-W', 'error', '-m', 'pytest', '-q', '-p', 'no:cacheprovider'], cwd=tmp_path,
+                           env={**os.environ, 'PYTHONPATH': str(site)}, capture_output=True, text=True, check=False)
+    assert ('1 passed, 1 error' if broken else '2 passed') in ended.stdout, ended.stdout + ended.stderr
+    assert ('warning: r4link: its pytest plugin cannot be loaded: ImportError' in ended.stdout) == broken, ended.stdout

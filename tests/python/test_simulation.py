@@ -2,6 +2,8 @@
 """r4link.SimBoard: what happens around a simulated board, in this process and in one of its own."""
 import pathlib
 import re
+import subprocess
+import sys
 
 import pytest
 
@@ -132,3 +134,20 @@ def test_what_cannot_be_is_told(tmp_path):
     sim.close()
     with pytest.raises(r4link.DataError, match='ended'):
         sim.happen('reboot')
+
+
+def test_one_that_was_closed_leaves_nothing_open():
+    program = """
+import gc, os, r4link
+files = len(os.listdir('/proc/self/fd'))
+for url in 'udp://127.0.0.1:0', 'tcp://x':
+    try:
+        r4link.SimBoard(url).close()
+    except r4link.Error:
+        pass
+gc.collect()
+assert len(os.listdir('/proc/self/fd')) == files
+"""
+    ended = subprocess.run([sys.executable, '-W', 'error', '-X', 'dev', '-c', program], capture_output=True, text=True,
+                           check=False)
+    assert ended.returncode == 0 and 'ResourceWarning' not in ended.stderr, ended.stderr

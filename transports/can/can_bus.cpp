@@ -12,6 +12,7 @@
 #include <map>
 #include <utility>
 
+#include "../file_descriptor.hpp"
 #include "../framing/can/can_ids.hpp"
 #include "can_interface.hpp"
 
@@ -74,7 +75,7 @@ CanBus::CanBus(asio::io_context& io, std::string interface, bool fd)
       look_timer_(io),
       polling_(most_polling) {
   socket_.open(interface_, fd_);
-  readable_.assign(socket_.number());
+  watch_socket();
   listen();
 }
 
@@ -135,6 +136,11 @@ bool CanBus::set_filters() {
 }
 
 // --- receiving
+
+// Throws Error if the system does not let the loop wait for the socket.
+void CanBus::watch_socket() {
+  with_system_errors("can://" + interface_, [&] { readable_.assign(socket_.number()); });
+}
 
 void CanBus::listen() {
   readable_.async_wait(asio::posix::descriptor_base::wait_read, reading_.handler([this] {
@@ -293,12 +299,12 @@ void CanBus::look() {
   try {
     socket_.open(interface_, fd_);
     if (!set_filters()) throw Error(filter_problem(interface_, errno));
+    watch_socket();
   } catch (const Error& error) {
     socket_.close();
     look_later();
     return be_down(error.problem());
   }
-  readable_.assign(socket_.number());
   listen();
   look_at_controller();
 }

@@ -120,6 +120,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
     bool all;
   };
 
+  void watch_socket();
   void listen();
   void receive();
   bool someone_awaits_a_frame() const;

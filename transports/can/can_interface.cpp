@@ -114,7 +114,7 @@ std::vector<CanInterface> list_can_interfaces() {
 
 Problem can_problem(const std::string& interface, int error) {
   const std::string thing = "can://" + interface;
-  if (auto problem = out_of_files(thing, error)) return std::move(*problem);
+  if (auto problem = out_of_resources(thing, error)) return std::move(*problem);
   switch (error) {
     case EAFNOSUPPORT:
     case EPROTONOSUPPORT:

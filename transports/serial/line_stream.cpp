@@ -28,10 +28,10 @@ LineStream::LineStream(asio::io_context& io, Owner& owner, CarrierCounters& coun
       writable_(io),
       queue_(normal_entries, state_entries, counters.tx_dropped) {}
 
-void LineStream::start(FileDescriptor descriptor, bool asks) {
+void LineStream::start(FileDescriptor descriptor, const std::string& thing, bool asks) {
   stop();
   asks_ = asks;
-  stream_.assign(descriptor.get());
+  with_system_errors(thing, [&] { stream_.assign(descriptor.get()); });
   (void)descriptor.release();
   framing_.reset();
   line_size_ = line_written_ = 0;

@@ -10,6 +10,7 @@
 #include <asio/error_code.hpp>
 #include <asio/io_context.hpp>
 #include <cstddef>
+#include <string>
 #include <string_view>
 
 #include "../file_descriptor.hpp"
@@ -46,8 +47,9 @@ class LineStream {
   LineStream(asio::io_context& io, Owner& owner, CarrierCounters& counters);
   ~LineStream() { stop(); }
 
-  // Begins to receive. The descriptor must not block. `asks`: the owner, before each reading.
-  void start(FileDescriptor descriptor, bool asks = false);
+  // Begins to receive. The descriptor must not block. `asks`: the owner, before each reading. Throws Error about `thing`
+  // if the system does not let the loop wait for it.
+  void start(FileDescriptor descriptor, const std::string& thing, bool asks = false);
   // Closes it and drops what waits.
   void stop() noexcept;
 

@@ -71,6 +71,7 @@ class PtyCarrier final : public Carrier, private LineStream::Owner {
   std::string name_;
   std::string device_;  // "/dev/pts/5"
   bool linked_ = false;
+  std::string obstacle_;  // why a host that is there cannot be heard
   LoopTimer timer_;
   OperationSlot looking_;
   FileDescriptor master_;
@@ -105,7 +106,9 @@ void PtyCarrier::open(Handler& handler) {
   if (!made) {
     const int error = errno;
     master_.reset();
-    if (const auto problem = out_of_files(url_.text(), error)) throw Error(*problem);
+    // ENOSPC: there are as many pseudo-terminals as there may be (kernel.pty.max).
+    const auto problem = out_of_resources(url_.text(), error == ENOSPC ? 0 : error);
+    if (problem) throw Error(*problem);
     throw Error(ErrorKind::open, url_.text(),
                 std::string("no pseudo-terminal is to be had: ") + std::strerror(error),
                 "see that /dev/ptmx and /dev/pts are there");
@@ -187,7 +190,16 @@ void PtyCarrier::look() {
   // A line may have been under way when the last host went.
   if (const FileDescriptor other = open_other_end()) ::tcflush(other.get(), TCIFLUSH);
   unread_.clear();
-  stream_.start(std::move(stream));
+  try {
+    stream_.start(std::move(stream), name_);
+  } catch (const Error& error) {
+    look_later();
+    if (std::exchange(obstacle_, error.what()) != error.what()) {
+      handler_->on_carrier_event({CarrierEvent::Kind::warning, error.problem()});
+    }
+    return;
+  }
+  obstacle_.clear();
   up_ = true;
   ++counters_.ups;
   handler_->on_carrier_event({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});

@@ -164,7 +164,7 @@ std::string SerialCarrier::find_again() const {
 }
 
 void SerialCarrier::open_device(const std::string& path) {
-  stream_.start(open_serial_device(io_, path, baud_, claim_, lock_), claim_.yields);
+  stream_.start(open_serial_device(io_, path, baud_, claim_, lock_), path, claim_.yields);
   name_ = "serial://" + path;
   if (baud_ != default_baud) name_ += fmt::format("?baud={}", baud_);
   const std::string real_path = resolve_links(path);

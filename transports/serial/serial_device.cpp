@@ -31,7 +31,7 @@ std::string ports_in_words() {
 }
 
 [[noreturn]] void fail(const std::string& path, int error) {
-  if (const auto problem = out_of_files(path, error)) throw Error(*problem);
+  if (const auto problem = out_of_resources(path, error)) throw Error(*problem);
   switch (error) {
     case ENOENT:
     case ENODEV:

@@ -43,10 +43,12 @@ void SharePlaces::forget() {
   no_help_.reset();
 }
 
-WireSharer::Joined SharePlaces::join(int place, BoardRole role, const std::string& thing) {
+WireSharer::Joined SharePlaces::join(int place, BoardRole role, const std::string& thing,
+                                     std::chrono::milliseconds within) {
   if (wire_.name.empty() || is_passed_over(place)) return WireSharer::Joined::none;
   const SharedWire there = at_place(wire_, place);
-  const auto joined = sharer_.join(there, role, program_invocation_short_name);
+  const auto joined = with_system_errors(
+      thing, [&] { return sharer_.join(there, role, program_invocation_short_name, within); });
   if (joined == WireSharer::Joined::hanging) {
     one_hangs_ = true;
     pass_over(place, WireSharer::silence_of_another(thing));
@@ -58,11 +60,11 @@ WireSharer::Joined SharePlaces::join(int place, BoardRole role, const std::strin
   return joined;
 }
 
-bool SharePlaces::join(const std::string& thing) {
+bool SharePlaces::join(const std::string& thing, std::chrono::milliseconds within) {
   int place = share_places;
   do {
     if (place-- == 0) return false;
-  } while (join(place, BoardRole::watch, thing) != WireSharer::Joined::holder);
+  } while (join(place, BoardRole::watch, thing, within) != WireSharer::Joined::holder);
   joined_ = place;
   stranger_.reset();
   return true;
@@ -71,7 +73,7 @@ bool SharePlaces::join(const std::string& thing) {
 // Those that hang come first: who watches has the wire until then.
 void SharePlaces::ask_for_wire(const std::string& thing, std::chrono::milliseconds within) {
   for (int place = 0; place < share_places; ++place) {
-    if (join(place, BoardRole::control, thing) != WireSharer::Joined::holder) continue;
+    if (join(place, BoardRole::control, thing, within) != WireSharer::Joined::holder) continue;
     joined_ = place;
     const std::optional<ShareMessage> answer = sharer_.wait_for_answer(within);
     if (!answer) {
@@ -92,7 +94,7 @@ bool SharePlaces::hold(const std::string& thing) {
     if (is_passed_over(place)) continue;
     errno = 0;
     if (!holder_.hold(at_place(wire_, place))) {
-      if (const auto problem = out_of_files(thing, errno)) throw Error(*problem);
+      if (const auto problem = out_of_resources(thing, errno)) throw Error(*problem);
       return false;
     }
     stranger_.reset();

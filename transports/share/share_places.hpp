@@ -35,13 +35,14 @@ class SharePlaces {
   // All are of use again.
   void forget();
 
-  // Joins the holder who came last, to watch. False if none is of use.
-  bool join(const std::string& thing);
-  // Asks each holder to let go of the wire, and waits so long for its answer. Throws Error{refused} if one controls the
+  // Joins the holder who came last, to watch. False if none is of use. Where many programs wait for a holder, this
+  // waits for `within` at most.
+  bool join(const std::string& thing, std::chrono::milliseconds within);
+  // Asks each holder to let go of the wire, and waits for `within` to reach it and again for its answer. Throws Error{refused} if one controls the
   // board.
   void ask_for_wire(const std::string& thing, std::chrono::milliseconds within);
   // Takes the first that is of use, or none if none is: then nobody shares what we open. False if another has it.
-  // Throws Error{open} if this program may open no more files.
+  // Throws Error{open} if the system has no file, memory or watch left for it.
   bool hold(const std::string& thing);
 
   const SharedWire& wire() const { return wire_; }
@@ -60,7 +61,8 @@ class SharePlaces {
   std::optional<Problem> take_stranger();
 
  private:
-  WireSharer::Joined join(int place, BoardRole role, const std::string& thing);
+  WireSharer::Joined join(int place, BoardRole role, const std::string& thing,
+                          std::chrono::milliseconds within);
   bool is_passed_over(int place) const { return (passed_over_ >> place & 1U) != 0; }
   void pass_over(int place, Problem why);
 

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "share_socket.hpp"
 
+#include <fcntl.h>
 #include <fmt/core.h>
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <sys/uio.h>
 #include <sys/un.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
-#include <climits>
 #include <cstddef>
 #include <cstring>
 #include <string>
@@ -19,7 +20,7 @@
 namespace r4 {
 namespace {
 
-// Who comes while the holder hangs waits, too, until it has gone again.
+// A program that comes while the holder hangs waits, too, until that program has gone again.
 constexpr int most_waiting = 128;
 // About eighty states: who sleeps and wakes up hears nothing much older than a second.
 constexpr int buffer_bytes = 32 * 1024;
@@ -75,27 +76,36 @@ FileDescriptor hold_wire(const SharedWire& wire) {
   return descriptor;
 }
 
-ReachedHolder reach_holder(const SharedWire& wire) {
+ReachedHolder reach_holder(const SharedWire& wire, std::chrono::milliseconds within) {
   FileDescriptor descriptor = local_socket();
   const Address address = address_of(wire);
   if (!descriptor) return {};
-  if (::connect(descriptor.get(), reinterpret_cast<const sockaddr*>(&address.bytes),
-                address.size) == 0) {
-    return {std::move(descriptor), false};
+  const auto connect = [&] {
+    return ::connect(descriptor.get(), reinterpret_cast<const sockaddr*>(&address.bytes),
+                     address.size) == 0;
+  };
+  bool connected = connect();
+  if (!connected && would_block(errno) && within.count() > 0) {
+    // The kernel queues those that wait for a place. One that tried again and again would be overtaken.
+    const int flags = ::fcntl(descriptor.get(), F_GETFL);
+    const timeval most{0, static_cast<suseconds_t>(std::chrono::microseconds(within).count())};
+    ::setsockopt(descriptor.get(), SOL_SOCKET, SO_SNDTIMEO, &most, sizeof most);
+    ::fcntl(descriptor.get(), F_SETFL, flags & ~O_NONBLOCK);
+    connected = connect();
+    const int error = errno;
+    ::fcntl(descriptor.get(), F_SETFL, flags);
+    errno = error;
   }
+  if (connected) return {std::move(descriptor), false};
   return {FileDescriptor(), would_block(errno)};
 }
 
-FileDescriptor accept_sharer(int holder, const SharedWire& wire) {
-  while (true) {
-    FileDescriptor descriptor(::accept4(holder, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
-    if (!descriptor && (errno == EINTR || errno == ECONNABORTED)) continue;
-    if (!descriptor) return {};
-    if (!is_one_of_us(descriptor.get(), wire) && credentials_of(descriptor.get()).uid != 0)
-      continue;
+FileDescriptor accept_sharer(int holder) {
+  FileDescriptor descriptor(::accept4(holder, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+  if (descriptor) {
     ::setsockopt(descriptor.get(), SOL_SOCKET, SO_SNDBUF, &buffer_bytes, sizeof buffer_bytes);
-    return descriptor;
   }
+  return descriptor;
 }
 
 ShareCredentials credentials_of(int connection) {
@@ -112,11 +122,17 @@ bool is_one_of_us(int connection, const SharedWire& wire) {
   if (peer.uid == ::geteuid()) return true;
   if (wire.group.name.empty()) return false;
   if (peer.uid == 0 || peer.gid == wire.group.id) return true;
-  std::vector<gid_t> groups(NGROUPS_MAX);
-  auto size = static_cast<socklen_t>(groups.size() * sizeof(gid_t));
+  // Asked for nothing, the kernel says how much there is.
+  socklen_t size = 0;
+  if (::getsockopt(connection, SOL_SOCKET, SO_PEERGROUPS, nullptr, &size) == 0) return false;
+  std::vector<gid_t> groups(size / sizeof(gid_t));
   if (::getsockopt(connection, SOL_SOCKET, SO_PEERGROUPS, groups.data(), &size) != 0) return false;
   groups.resize(size / sizeof(gid_t));
   return std::find(groups.begin(), groups.end(), wire.group.id) != groups.end();
+}
+
+bool may_come(int connection, const SharedWire& wire) {
+  return is_one_of_us(connection, wire) || credentials_of(connection).uid == 0;
 }
 
 int send_message(int connection, ShareMessage::Kind kind, std::string_view text) {

@@ -10,6 +10,7 @@
 #include <sys/types.h>
 
 #include <cerrno>
+#include <chrono>
 #include <string_view>
 
 #include "../file_descriptor.hpp"
@@ -33,22 +34,25 @@ SharedWire at_place(const SharedWire& wire, int place);
 FileDescriptor hold_wire(const SharedWire& wire);
 
 // A connection to its holder, or to a stranger who has taken that name: is_one_of_us() tells. None, if there is
-// none, and if so many wait for it already that it cannot be running.
+// none. If many programs wait for the holder already, this waits for a free place, for `within` at most: a holder
+// under attack lets them in a few at a time, and one that hangs never does.
 struct ReachedHolder {
   FileDescriptor connection;
   bool hangs = false;
 };
-ReachedHolder reach_holder(const SharedWire& wire);
+ReachedHolder reach_holder(const SharedWire& wire, std::chrono::milliseconds within = {});
 
-// The next one who has come to a holder, or none, with errno: strangers are turned away.
-FileDescriptor accept_sharer(int holder, const SharedWire& wire);
+// The connection of the next program that waits at a holder, whoever it is; none, with errno.
+FileDescriptor accept_sharer(int holder);
 
 // Of a call on such a socket that does not wait.
 inline bool would_block(int error) { return error == EAGAIN || error == EWOULDBLOCK; }
 
 ShareCredentials credentials_of(int connection);
-// The other end is of the same user or, if the wire is shared with a group, of one of its members or root.
+// True if the other end is of the same user or, if the wire is shared with a group, of one of its members or root.
 bool is_one_of_us(int connection, const SharedWire& wire);
+// True if a holder lets the other end say why it has come: one of us, or root.
+bool may_come(int connection, const SharedWire& wire);
 
 // None of these blocks. send_message(): 0, or errno. receive_packet(): the packet's size, which may be more
 // than `size` and was cut then; 0 at the end of the connection; -1 with errno.

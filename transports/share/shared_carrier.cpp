@@ -29,8 +29,7 @@ constexpr milliseconds look_again{5};
 constexpr milliseconds look_again_slowly{100};
 // So long the wire may be nobody's before that is told.
 constexpr milliseconds take_over_within{100};
-// To others the wire is left for so long, when a program that controls is about to take it.
-constexpr milliseconds courtesy{20};
+constexpr milliseconds courtesy{20};  // left to a program that is about to take the wire to control
 
 class SharedCarrier final : public Carrier,
                             private Carrier::Handler,
@@ -97,6 +96,7 @@ class SharedCarrier final : public Carrier,
   void attach_later(milliseconds delay);
   void look();
   void look_later();
+  milliseconds may_wait() const { return tried_ ? answer_again_within : answer_within; }
   bool late() const { return Clock::now() - since_ >= take_over_within; }
   void tell(const CarrierEvent& event);
 
@@ -165,7 +165,7 @@ void SharedCarrier::take_part() {
 bool SharedCarrier::try_to_take_part() {
   if (role_ == BoardRole::watch && try_to_share()) return true;
   if (role_ == BoardRole::control) {
-    places_.ask_for_wire(name_, tried_ ? answer_again_within : answer_within);
+    places_.ask_for_wire(name_, may_wait());
   }
   try {
     return try_to_hold();
@@ -179,7 +179,7 @@ bool SharedCarrier::try_to_take_part() {
 
 // True if we share it now, or may do so soon.
 bool SharedCarrier::try_to_share() {
-  if (!places_.join(name_)) return false;
+  if (!places_.join(name_, may_wait())) return false;
   state_ = State::sharing;
   welcome_ = heard_ = false;
   asked_ = true;  // by the hello

@@ -42,9 +42,9 @@ class WireHolder::Sharer : public std::enable_shared_from_this<Sharer> {
  public:
   enum class Standing { silent, turned_away, welcome };
 
-  Sharer(WireHolder& holder, asio::io_context& io, FileDescriptor connection)
+  Sharer(WireHolder& holder, asio::io_context& io, LoopDescriptor connection)
       : holder_(holder),
-        connection_(io, connection.release()),
+        connection_(std::move(connection)),
         writable_(io),
         queue_(normal_entries, state_entries, dropped_) {}
 
@@ -202,24 +202,39 @@ WireHolder::WireHolder(asio::io_context& io, Owner& owner, std::string program)
 WireHolder::~WireHolder() { release(); }
 
 bool WireHolder::hold(const SharedWire& wire) {
-  FileDescriptor descriptor = hold_wire(wire);
-  if (!descriptor) return false;
+  LoopDescriptor listener = on_loop(hold_wire(wire));
+  if (!listener.is_open()) return false;
   release();
-  listen_at(std::move(descriptor), wire);
+  listen_at(std::move(listener), wire);
   return true;
 }
 
 bool WireHolder::rename(const SharedWire& wire) {
-  FileDescriptor descriptor;
-  if (!wire.name.empty() && !(descriptor = hold_wire(wire))) return false;
+  if (wire.name.empty()) {
+    stop_listening();
+    return true;
+  }
+  LoopDescriptor listener = on_loop(hold_wire(wire));
+  if (!listener.is_open()) return false;
   stop_listening();
-  if (descriptor) listen_at(std::move(descriptor), wire);
+  listen_at(std::move(listener), wire);
   return true;
 }
 
-void WireHolder::listen_at(FileDescriptor descriptor, const SharedWire& wire) {
+// Closed, with errno, if the loop cannot wait for it: an error here must not end the program, which may be driving.
+LoopDescriptor WireHolder::on_loop(FileDescriptor descriptor) {
+  LoopDescriptor waited_for(io_);
+  if (!descriptor) return waited_for;
+  asio::error_code error;
+  waited_for.assign(descriptor.get(), error);
+  if (!error) static_cast<void>(descriptor.release());
+  errno = error.value();
+  return waited_for;
+}
+
+void WireHolder::listen_at(LoopDescriptor listener, const SharedWire& wire) {
   wire_ = wire;
-  listener_.assign(descriptor.release());
+  listener_ = std::move(listener);
   listen();
 }
 
@@ -261,20 +276,34 @@ void WireHolder::listen() {
 }
 
 void WireHolder::accept() {
-  if (FileDescriptor connection = accept_sharer(listener_.native_handle(), wire_)) {
-    const auto sharer = std::make_shared<Sharer>(*this, io_, std::move(connection));
-    sharers_.push_back(sharer);
-    sharer->receive();  // what it comes for is there already, mostly
-    if (count([](const Sharer& each) { return each.waits(); }) > most_waiting)
-      longest_waiting()->cut_off();
-    cut_off_in_time();
-  } else if (!would_block(errno)) {
-    // Who waits is still there, and would be told of at once.
-    accept_timer_.expires_after(accept_again);
-    accept_timer_.async_wait(accepting_.handler([this] { accept(); }));
-    return;
+  const Clock::time_point now = Clock::now();
+  if (now - window_began_ >= arrival_window) {
+    window_began_ = now;
+    arrivals_ = 0;
   }
+  if (arrivals_ == most_arrivals) return accept_at(window_began_ + arrival_window);
+  ++arrivals_;
+  FileDescriptor connection = accept_sharer(listener_.native_handle());
+  // Without a descriptor the program goes on waiting, and the loop would be woken for it at once.
+  if (!connection && !would_block(errno)) return accept_at(now + accept_again);
+  if (connection && may_come(connection.get(), wire_)) take_in(std::move(connection));
   if (listener_.is_open()) listen();
+}
+
+void WireHolder::accept_at(Clock::time_point time) {
+  accept_timer_.expires_at(time);
+  accept_timer_.async_wait(accepting_.handler([this] { accept(); }));
+}
+
+void WireHolder::take_in(FileDescriptor connection) {
+  LoopDescriptor waited_for = on_loop(std::move(connection));
+  if (!waited_for.is_open()) return;  // it is let go, and may come again
+  const auto sharer = std::make_shared<Sharer>(*this, io_, std::move(waited_for));
+  sharers_.push_back(sharer);
+  sharer->receive();  // what it comes for is there already, mostly
+  if (count([](const Sharer& each) { return each.waits(); }) > most_waiting)
+    longest_waiting()->cut_off();
+  cut_off_in_time();
 }
 
 // Null: nobody waits.

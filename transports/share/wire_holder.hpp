@@ -37,6 +37,10 @@ class WireHolder {
   static constexpr int most_messages = 100;  // in a second, of one
   static constexpr std::chrono::milliseconds accept_again{
       100};  // where the system has no descriptor left
+  // Connections are taken one a turn of the loop, and at most so many in so long. So no number of programs that connect
+  // again and again, of whichever user, takes more than a few percent of the loop's time.
+  static constexpr int most_arrivals = 16;
+  static constexpr std::chrono::milliseconds arrival_window{5};
 
   // Called on the loop's thread.
   class Owner {
@@ -79,10 +83,13 @@ class WireHolder {
  private:
   class Sharer;
 
-  void listen_at(FileDescriptor descriptor, const SharedWire& wire);
+  LoopDescriptor on_loop(FileDescriptor descriptor);
+  void listen_at(LoopDescriptor listener, const SharedWire& wire);
   void stop_listening() noexcept;
   void listen();
   void accept();
+  void accept_at(std::chrono::steady_clock::time_point time);
+  void take_in(FileDescriptor connection);
   void on_message(Sharer& from, const ShareMessage& message);
   void on_hello(Sharer& from, const ShareMessage& hello);
   void on_stop(Sharer& from, std::string_view datagram);
@@ -101,6 +108,8 @@ class WireHolder {
   LoopDescriptor listener_;
   OperationSlot accepting_;
   LoopTimer accept_timer_;
+  std::chrono::steady_clock::time_point window_began_;
+  int arrivals_ = 0;  // in this window
   OperationSlot removing_;
   OperationSlot giving_away_;
   LoopTimer cut_off_timer_;

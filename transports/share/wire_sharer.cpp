@@ -20,8 +20,8 @@ constexpr int most_at_once = 64;
 }  // namespace
 
 WireSharer::Joined WireSharer::join(const SharedWire& wire, BoardRole role,
-                                    std::string_view program) {
-  ReachedHolder reached = reach_holder(wire);
+                                    std::string_view program, std::chrono::milliseconds within) {
+  ReachedHolder reached = reach_holder(wire, within);
   if (reached.hangs) return Joined::hanging;
   FileDescriptor connection = std::move(reached.connection);
   if (!connection) return Joined::none;
@@ -35,7 +35,8 @@ WireSharer::Joined WireSharer::join(const SharedWire& wire, BoardRole role,
   }
   leave();
   holder_ = there;
-  connection_.assign(connection.release());
+  connection_.assign(connection.get());
+  static_cast<void>(connection.release());
   return Joined::holder;
 }
 

@@ -38,8 +38,10 @@ class WireSharer {
 
   enum class Joined { none, holder, stranger, hanging };
   // Goes to the holder of that wire and says hello. A stranger is told nothing, and one that hangs cannot be when many
-  // wait for it. Leaves another one only for this.
-  Joined join(const SharedWire& wire, BoardRole role, std::string_view program);
+  // wait for it: then this waits, too, for `within` at most. Leaves another one only for this. Throws std::system_error
+  // if the system does not let the loop wait for it.
+  Joined join(const SharedWire& wire, BoardRole role, std::string_view program,
+              std::chrono::milliseconds within = {});
   // Waits for its first answer; blocks, for so long at most. `moved` where it has ended. None if none comes. `text` is
   // valid until the next message.
   std::optional<ShareMessage> wait_for_answer(std::chrono::milliseconds within);

@@ -89,13 +89,17 @@ void UdpCrowd::wait() {
   if (busy_) {
     // The loop's reactor would wake up for what comes meanwhile.
     if (idle_.is_open()) idle_.release();
+  } else if (!idle_.is_open()) {
+    asio::error_code
+        ignored;  // where the system lets the loop wait for nothing more, it looks again and again
+    idle_.assign(ready_.get(), ignored);
+  }
+  if (idle_.is_open()) {
+    idle_.async_wait(asio::posix::descriptor_base::wait_read, waiting_.handler([this] { turn(); }));
+  } else {
     timer_.expires_after(pause);
     timer_.async_wait(waiting_.handler([this] { turn(); }));
-    return;
   }
-  asio::error_code error;
-  if (!idle_.is_open()) idle_.assign(ready_.get(), error);
-  idle_.async_wait(asio::posix::descriptor_base::wait_read, waiting_.handler([this] { turn(); }));
 }
 
 void UdpCrowd::turn() {

@@ -64,7 +64,7 @@ void UdpEnd::open_socket(const Endpoint& local, bool v6_only) {
 
 void UdpEnd::refuse(const asio::error_code& error, const Endpoint& local, const std::string& fix) {
   close_socket();
-  if (const auto problem = out_of_files(url_.text, error.value())) throw Error(*problem);
+  if (const auto problem = out_of_resources(url_.text, error.value())) throw Error(*problem);
   const std::string port = fmt::format("UDP port {}", local.port());
   if (error == asio::error::address_in_use) {
     throw Error(ErrorKind::open, url_.text,
@@ -247,7 +247,7 @@ Problem UdpEnd::no_route(const std::string& subject, int error) const {
             fmt::format("{} is no address of this computer at the moment", url_.local.to_string()),
             "connect its interface, or name an address that `ip address` shows"};
   }
-  if (auto problem = out_of_files(subject, error)) return std::move(*problem);
+  if (auto problem = out_of_resources(subject, error)) return std::move(*problem);
   return {ErrorKind::open, subject, std::strerror(error),
           "check the WiFi or cable and the address"};
 }

@@ -52,11 +52,11 @@ class BoardProgram {
       application_.receive(link_number_, everyone, datagram, clock_.now_ms());
       hal().calibrate(application_.settings().site.full_scale_cv);  // it may have been C:AIN24,…
     });
-    application_.drained(link_number_);
+    if (!link_.has_received()) application_.drained(link_number_);
     udp_.receive([this](std::uint32_t peer, Text datagram) {
       application_.receive(udp_number_, peer, datagram, clock_.now_ms());
     });
-    application_.drained(udp_number_);
+    if (!udp_.has_received()) application_.drained(udp_number_);
     const std::uint32_t now_ms = clock_.now_ms();
     application_.poll(now_ms);
     link_.poll(now_ms);

@@ -2,7 +2,6 @@
 #include "r4link/board.hpp"
 
 #include <pybind11/stl.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -15,6 +14,7 @@
 
 #include "bindings.hpp"
 #include "callback.hpp"
+#include "process.hpp"
 #include "r4link/control/loop.hpp"
 #include "r4link/simulation.hpp"
 
@@ -23,47 +23,31 @@ namespace {
 
 using Ms = std::chrono::milliseconds;
 using Released = py::call_guard<py::gil_scoped_release>;
+using PyStates = OfThisProcess<States>;
 
-// A board of this process. One that was inherited by a fork is none: its threads are not here, and the wire is
-// the parent's.
 class PyBoard {
  public:
   // `link`: what is wrong with it (sim::with_link()); "": nothing.
   PyBoard(const std::string& url, const std::string& link, BoardOptions options) {
     options.on_wait = [this] { on_wait(); };
     const py::gil_scoped_release free;
-    board_ = link.empty() ? std::make_unique<Board>(url, std::move(options))
-                          : std::make_unique<Board>(sim::with_link(url, link), std::move(options));
-  }
-  ~PyBoard() {
-    if (::getpid() != process_) {
-      static_cast<void>(board_.release());
-      return;
-    }
-    const py::gil_scoped_release free;
-    board_.reset();
+    board_.emplace("the board", link.empty() ? std::make_unique<Board>(url, std::move(options))
+                                             : std::make_unique<Board>(sim::with_link(url, link),
+                                                                       std::move(options)));
   }
   PyBoard(const PyBoard&) = delete;
   PyBoard& operator=(const PyBoard&) = delete;
+  ~PyBoard() = default;
 
-  Board* operator->() {
-    require_own();
-    return board_.get();
-  }
-  void require_own() const {
-    if (::getpid() == process_) return;
-    throw Error(Problem{ErrorKind::refused, "the board",
-                        "it was opened by the process " + std::to_string(process_) +
-                            ", of which this one is a fork",
-                        "open it here, after the fork", Outcome::closed});
-  }
+  Board* operator->() { return &board_->get(); }
 
   // The GIL is not held.
   void close() {
-    if (::getpid() != process_) return;
-    board_->close();
-    const py::gil_scoped_acquire gil;
-    clear();  // they may refer to this board
+    board_->if_here([this](Board& board) {
+      board.close();
+      const py::gil_scoped_acquire gil;
+      clear();  // they may refer to this board
+    });
   }
 
   // What a call that waits asks on its thread: was it interrupted, by a signal or by another thread?
@@ -101,10 +85,9 @@ class PyBoard {
   }
 
  private:
-  const pid_t process_ = ::getpid();
-  std::unique_ptr<Board> board_;
   std::vector<std::weak_ptr<Callback::Held>> callbacks_;  // with the GIL
   std::atomic<unsigned long> interrupted_{0};             // a thread
+  std::optional<OfThisProcess<Board>> board_;             // it goes first: its threads use the rest
 };
 
 // None while the constructor has not made one.
@@ -192,9 +175,9 @@ BoardOptions options_of(bool watch, bool arming, const std::string& fields,
 
 void bind_board(py::module_& module) {
   py::class_<Subscription>(module, "Subscription").def("cancel", &Subscription::cancel, Released());
-  py::class_<States>(module, "States")
-      .def_property_readonly("ended", &States::ended)
-      .def_property_readonly("missed", &States::missed);
+  py::class_<PyStates>(module, "States")
+      .def_property_readonly("ended", [](const PyStates& states) { return states->ended(); })
+      .def_property_readonly("missed", [](const PyStates& states) { return states->missed(); });
 
   py::class_<PyBoard>(module, "Board", py::custom_type_setup(collect_garbage))
       .def(py::init([](const std::string& url, const std::string& link, bool watch, bool arming,
@@ -319,7 +302,7 @@ void bind_board(py::module_& module) {
           },
           Released())
       .def(
-          "record", [](PyBoard& board, Recording& recording) { board->record(recording); },
+          "record", [](PyBoard& board, PyRecording& recording) { board->record(*recording); },
           py::keep_alive<1, 2>(), Released())
       .def(
           "watchdog", [](PyBoard& board, int ms) { board->watchdog(Ms(ms)); }, Released())
@@ -328,14 +311,11 @@ void bind_board(py::module_& module) {
       // Its on_wait() is that of the board, and asked in take() alone.
       .def("states",
            [](PyBoard& board, bool lossless, std::size_t most) {
-             return board->states({lossless, most});
+             return PyStates("the states",
+                             std::make_unique<States>(board->states({lossless, most})));
            })
       .def(
-          "take",
-          [](PyBoard& board, States& states, int ms) {
-            board.require_own();
-            return states.take(Ms(ms));
-          },
+          "take", [](PyBoard&, PyStates& states, int ms) { return states->take(Ms(ms)); },
           Released())
       .def("on_state",
            [](PyBoard& board, py::object function) {

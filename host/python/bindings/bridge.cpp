@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <pybind11/stl.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <memory>
@@ -9,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "bindings.hpp"
+#include "process.hpp"
 #include "r4link/fleet.hpp"
 
 namespace r4::python {
@@ -27,56 +26,33 @@ End end_of(const BridgeEnd& end) {
            from.undelivered, from.outdated}};
 }
 
-// A bridge of this process. One that was inherited by a fork has no thread, and is left alone.
-class PyBridge {
- public:
-  PyBridge(const std::string& hosts, const std::string& board, int timeout_ms) {
-    BridgeOptions options;
-    options.timeout = std::chrono::milliseconds(timeout_ms);
-    const py::gil_scoped_release free;
-    bridge_ = std::make_unique<Bridge>(hosts, board, std::move(options));
-  }
-  ~PyBridge() {
-    if (::getpid() != process_) {
-      static_cast<void>(bridge_.release());
-      return;
-    }
-    const py::gil_scoped_release free;
-    bridge_.reset();
-  }
-  PyBridge(const PyBridge&) = delete;
-  PyBridge& operator=(const PyBridge&) = delete;
+using PyBridge = OfThisProcess<Bridge>;
 
-  void close() {
-    if (::getpid() == process_) bridge_->close();
-  }
-  std::vector<std::pair<End, End>> status() const {
-    if (::getpid() != process_) {
-      throw Error(Problem{ErrorKind::refused, "the bridge",
-                          "it was opened by the process " + std::to_string(process_) +
-                              ", of which this one is a fork",
-                          "open it here, after the fork", Outcome::closed});
-    }
-    std::vector<std::pair<End, End>> all;
-    for (const BridgeStatus& each : bridge_->status()) {
-      all.emplace_back(end_of(each.hosts), end_of(each.board));
-    }
-    return all;
-  }
+PyBridge opened_bridge(const std::string& hosts, const std::string& board, int timeout_ms) {
+  BridgeOptions options;
+  options.timeout = std::chrono::milliseconds(timeout_ms);
+  const py::gil_scoped_release free;
+  return {"the bridge", std::make_unique<Bridge>(hosts, board, std::move(options))};
+}
 
- private:
-  const pid_t process_ = ::getpid();
-  std::unique_ptr<Bridge> bridge_;
-};
+std::vector<std::pair<End, End>> status_of(const PyBridge& bridge) {
+  std::vector<std::pair<End, End>> all;
+  for (const BridgeStatus& each : bridge->status()) {
+    all.emplace_back(end_of(each.hosts), end_of(each.board));
+  }
+  return all;
+}
 
 }  // namespace
 
 void bind_bridge(py::module_& module) {
   py::class_<PyBridge>(module, "Bridge")
-      .def(py::init<const std::string&, const std::string&, int>(), py::arg("hosts"),
-           py::arg("board"), py::kw_only(), py::arg("timeout"))
-      .def("close", &PyBridge::close, Released())
-      .def("status", &PyBridge::status, Released());
+      .def(py::init(&opened_bridge), py::arg("hosts"), py::arg("board"), py::kw_only(),
+           py::arg("timeout"))
+      .def(
+          "close", [](PyBridge& bridge) { bridge.if_here([](Bridge& here) { here.close(); }); },
+          Released())
+      .def("status", &status_of, Released());
 }
 
 }  // namespace r4::python

@@ -2,7 +2,6 @@
 #include "r4link/fleet.hpp"
 
 #include <pybind11/stl.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <memory>
@@ -12,7 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "bindings.hpp"
+#include "pickle.hpp"
+#include "process.hpp"
 
 namespace r4::python {
 namespace {
@@ -21,43 +21,16 @@ using Ms = std::chrono::milliseconds;
 using Released = py::call_guard<py::gil_scoped_release>;
 using Boards = Fleet::Boards;
 
-// A fleet of this process. One that was inherited by a fork is none.
-class PyFleet {
- public:
-  PyFleet(const std::vector<std::string>& urls, BoardOptions options) {
-    options.on_wait = [] {
-      const py::gil_scoped_acquire gil;
-      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-    };
-    const py::gil_scoped_release free;
-    fleet_ = std::make_unique<Fleet>(urls, std::move(options));
-  }
-  ~PyFleet() {
-    if (::getpid() != process_) {
-      static_cast<void>(fleet_.release());
-      return;
-    }
-    const py::gil_scoped_release free;
-    fleet_.reset();
-  }
-  PyFleet(const PyFleet&) = delete;
-  PyFleet& operator=(const PyFleet&) = delete;
+using PyFleet = OfThisProcess<Fleet>;
 
-  Fleet* operator->() {
-    if (::getpid() == process_) return fleet_.get();
-    throw Error(Problem{ErrorKind::refused, "the fleet",
-                        "it was opened by the process " + std::to_string(process_) +
-                            ", of which this one is a fork",
-                        "open it here, after the fork", Outcome::closed});
-  }
-  void close() {
-    if (::getpid() == process_) fleet_->close();
-  }
-
- private:
-  const pid_t process_ = ::getpid();
-  std::unique_ptr<Fleet> fleet_;
-};
+PyFleet opened(const std::vector<std::string>& urls, BoardOptions options) {
+  options.on_wait = [] {
+    const py::gil_scoped_acquire gil;
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  };
+  const py::gil_scoped_release free;
+  return {"the fleet", std::make_unique<Fleet>(urls, std::move(options))};
+}
 
 Boards boards_of(PyFleet& fleet, const std::optional<Boards>& boards) {
   if (boards) return *boards;
@@ -116,6 +89,7 @@ const char* kind_of(FleetEvent::Kind kind) {
 
 void bind_fleet(py::module_& module) {
   py::class_<BoardHealth>(module, "BoardHealth")
+      .def(pickled<BoardHealth>("BoardHealth"))
       .def_readonly("board", &BoardHealth::board)
       .def_readonly("url", &BoardHealth::url)
       .def_readonly("identity", &BoardHealth::identity)
@@ -129,6 +103,7 @@ void bind_fleet(py::module_& module) {
 
   // The Error of a board that did not confirm is made in r4link/fleet.py.
   py::class_<FleetResult>(module, "FleetResult")
+      .def(pickled<FleetResult>("FleetResult"))
       .def_readonly("board", &FleetResult::board)
       .def_property_readonly(
           "outcome", [](const FleetResult& result) { return to_text(result.result.outcome); })
@@ -155,16 +130,17 @@ void bind_fleet(py::module_& module) {
                        int watch_rate_hz, int heartbeat, int timeout, int command_retry,
                        int stop_retry, int stop_linger, int identify_interval) {
              constexpr int no_callbacks = 0;
-             return std::make_unique<PyFleet>(
-                 urls, options_of(watch, arming, fields, key, watch_rate_hz, heartbeat, timeout,
-                                  command_retry, stop_retry, stop_linger, identify_interval,
-                                  no_callbacks));
+             return opened(urls, options_of(watch, arming, fields, key, watch_rate_hz, heartbeat,
+                                            timeout, command_retry, stop_retry, stop_linger,
+                                            identify_interval, no_callbacks));
            }),
            py::arg("urls"), py::kw_only(), py::arg("watch"), py::arg("arming"), py::arg("fields"),
            py::arg("key"), py::arg("watch_rate_hz"), py::arg("heartbeat"), py::arg("timeout"),
            py::arg("command_retry"), py::arg("stop_retry"), py::arg("stop_linger"),
            py::arg("identify_interval"))
-      .def("close", &PyFleet::close, Released())
+      .def(
+          "close", [](PyFleet& fleet) { fleet.if_here([](Fleet& here) { here.close(); }); },
+          Released())
       .def("__len__", [](PyFleet& fleet) { return fleet->size(); })
       .def("url", [](PyFleet& fleet, std::size_t board) { return fleet->url(board); })
       .def(
@@ -222,7 +198,7 @@ void bind_fleet(py::module_& module) {
              return py::make_tuple(kind_of(event->kind), event->board, subject_of(*event));
            })
       .def(
-          "record", [](PyFleet& fleet, Recording& recording) { fleet->record(recording); },
+          "record", [](PyFleet& fleet, PyRecording& recording) { fleet->record(*recording); },
           py::keep_alive<1, 2>(), Released())
       .def(
           "watchdog", [](PyFleet& fleet, int ms) { fleet->watchdog(Ms(ms)); }, Released())

@@ -20,7 +20,7 @@
 #include <utility>
 #include <vector>
 
-#include "bindings.hpp"
+#include "process.hpp"
 #include "r4link/datagram.hpp"
 
 namespace r4::python {
@@ -246,30 +246,36 @@ py::tuple Columns::take() {
 }  // namespace
 
 void bind_recording(py::module_& module) {
-  py::class_<Recording>(module, "Recording")
+  const auto close = [](PyRecording& recording) {
+    recording.if_here([](Recording& here) { here.close(); });
+  };
+  py::class_<PyRecording>(module, "Recording")
       .def(py::init([](const std::filesystem::path& path, std::uint64_t rotate_bytes,
                        std::int64_t rotate_after_s, std::uint64_t keep_bytes) {
-             return std::make_unique<Recording>(
-                 path.string(),
-                 RecordingOptions{rotate_bytes, std::chrono::seconds(rotate_after_s), keep_bytes});
+             const RecordingOptions options{rotate_bytes, std::chrono::seconds(rotate_after_s),
+                                            keep_bytes};
+             return PyRecording("the recording",
+                                std::make_unique<Recording>(path.string(), options));
            }),
            py::arg("path"), py::kw_only(), py::arg("rotate_bytes") = 0, py::arg("rotate_after") = 0,
            py::arg("keep_bytes") = 0, py::call_guard<py::gil_scoped_release>())
       .def("__enter__", [](py::object recording) { return recording; })
       .def("__exit__",
-           [](Recording& recording, const py::args&) {
+           [close](PyRecording& recording, const py::args&) {
              const py::gil_scoped_release free;
-             recording.close();
+             close(recording);
            })
-      .def("close", &Recording::close, py::call_guard<py::gil_scoped_release>())
+      .def("close", close, py::call_guard<py::gil_scoped_release>())
       .def_property_readonly("problem",
-                             [](const Recording& recording) -> std::optional<std::string> {
-                               const auto problem = recording.problem();
+                             [](const PyRecording& recording) -> std::optional<std::string> {
+                               const auto problem = recording->problem();
                                if (!problem) return std::nullopt;
                                return problem->text();
                              })
-      .def_property_readonly("records", &Recording::records)
-      .def_property_readonly("dropped", &Recording::dropped);
+      .def_property_readonly("records",
+                             [](const PyRecording& recording) { return recording->records(); })
+      .def_property_readonly("dropped",
+                             [](const PyRecording& recording) { return recording->dropped(); });
   module.def("read", [](const std::string& path, bool datagrams) {
     Columns columns(datagrams);
     {

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "r4link/simulation.hpp"
 
+#include <memory>
 #include <string>
 
-#include "bindings.hpp"
+#include "process.hpp"
 
 namespace r4::python {
 namespace {
 
 using Robot = sim::SimulatedRobot;
+using PyRobot = OfThisProcess<Robot>;
 
 template <class Value, std::size_t count, class Make>
 py::tuple tuple_of(const Value (&values)[count], Make make) {
@@ -17,10 +19,10 @@ py::tuple tuple_of(const Value (&values)[count], Make make) {
   return result;
 }
 
-py::dict look(const Robot& robot) {
+py::dict look(const PyRobot& robot) {
   const Robot::Look look = [&] {
     const py::gil_scoped_release free;
-    return robot.look();
+    return robot->look();
   }();
   const auto number = [](auto value) { return py::int_(value); };
   py::dict all;
@@ -46,10 +48,12 @@ py::dict look(const Robot& robot) {
 }  // namespace
 
 void bind_simulation(py::module_& module) {
-  py::class_<Robot>(module, "SimulatedRobot")
-      .def(py::init<>())
-      .def_property_readonly("url", &Robot::url)
-      .def("happen", &Robot::happen, py::call_guard<py::gil_scoped_release>())
+  py::class_<PyRobot>(module, "SimulatedRobot")
+      .def(py::init([] { return PyRobot("the simulated board", std::make_unique<Robot>()); }))
+      .def_property_readonly("url", [](const PyRobot& robot) { return robot->url(); })
+      .def(
+          "happen", [](const PyRobot& robot, const std::string& words) { robot->happen(words); },
+          py::call_guard<py::gil_scoped_release>())
       .def("look", &look);
   // Throws where with_link() would.
   module.def("check_link", [](const std::string& url, const std::string& link) {

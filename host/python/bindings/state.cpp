@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "bindings.hpp"
+#include "pickle.hpp"
 
 namespace r4::python {
 namespace {
@@ -261,7 +261,8 @@ void bind_state(py::module_& module) {
         name.c_str(), [field](const ReceivedState& self) { return value_of(self, field); });
   }
   module.attr("FIELDS") = py::tuple(names);
-  state.def_readonly("pnum", &ReceivedState::pnum)
+  state.def(pickled<ReceivedState>("State"))
+      .def_readonly("pnum", &ReceivedState::pnum)
       .def_readonly("t_ms", &ReceivedState::t_ms)
       .def_property_readonly("present",
                              [](const ReceivedState& self) {

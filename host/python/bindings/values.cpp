@@ -2,7 +2,7 @@
 // Commands, setpoints and the small values of link and statistics.
 #include <pybind11/stl.h>
 
-#include "bindings.hpp"
+#include "pickle.hpp"
 
 namespace r4::python {
 namespace {
@@ -12,6 +12,7 @@ template <class Value>
 class Record {
  public:
   Record(py::module_& module, const char* name) : class_(module, name) {
+    class_.def(pickled<Value>(name));
     class_.def("as_dict", [members = members_](const py::object& self) {
       py::dict dict;
       for (const py::handle member : members) dict[member] = self.attr(member);
@@ -73,9 +74,11 @@ void bind_commands(py::module_& module) {
       .def_static("dac", &Command::dac)
       .def_static("proximity", [](int channel, int cm) { return Command::proximity(cm, channel); })
       .def_static("stop", &Command::stop)
-      .def_static("clear", [] { return Command::clear(); });
+      .def_static("clear", [] { return Command::clear(); })
+      .def(pickled<Command>("Command"));
   py::class_<Setpoints>(module, "Setpoints")
       .def(py::init<>())
+      .def(pickled<Setpoints>("Setpoints"))
       .def("add", &Setpoints::add, py::return_value_policy::reference_internal)
       .def("__len__", &Setpoints::size);
 }

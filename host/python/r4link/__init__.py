@@ -1,6 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """R4 link: the R4 robot control board over UDP, USB serial and CAN (docs/python.md)."""
-from . import aio, control, devices
+import importlib.util as _importlib
+
+if _importlib.find_spec('r4link._core') is None:
+    raise ImportError(f'r4link: {__path__[0]} has the sources alone, without the compiled module; build it (cmake --build '
+                      'build --target r4_python) and put build/python first on PYTHONPATH, or: pip install .')
+
+from . import aio, control, devices  # pylint: disable=wrong-import-position
 from ._core import (FIELDS, BoardHealth, CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State,
                     Statistics, Subscription, Wire, __version__)
 from .board import Board, States

@@ -37,11 +37,15 @@ class _Lane:
 
     def __init__(self, interrupt: Callable[[int], None]) -> None:
         self._thread = ThreadPoolExecutor(1, 'r4link')
+        self._process = os.getpid()
         self._interrupt = interrupt
         self._lock = threading.Lock()
         self._running: object = None
 
     async def call(self, function: Callable[[], T]) -> T:
+        if os.getpid() != self._process:  # in a fork its thread is missing
+            raise ClosedError('the board', f'it was opened by the process {self._process}, of which this one is a fork',
+                              'open it here, after the fork')
         token = object()
         thread = 0
 
@@ -66,7 +70,8 @@ class _Lane:
             raise
 
     def end(self) -> None:
-        self._thread.shutdown(wait=False)
+        if os.getpid() == self._process:
+            self._thread.shutdown(wait=False)
 
 
 class States:

@@ -8,7 +8,7 @@
 """
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from . import _core
 from ._core import State
@@ -30,13 +30,18 @@ class Device:
 
     def __init__(self, text: str, first_slot: int = 1) -> None:
         self._core = _core.load_device(text, first_slot)
+        self._made: tuple[Any, ...] = (Device, (text, first_slot))
 
     @classmethod
     def parse(cls, description: str, address: int | None = None, first_slot: int = 1) -> Device:
         """From the text of a description. Raises DataError."""
         device = cls.__new__(cls)
         device._core = _core.parse_device(description, address, first_slot)
+        device._made = (Device.parse, (description, address, first_slot))
         return device
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return self._made
 
     def __str__(self) -> str:
         return str(self._core)

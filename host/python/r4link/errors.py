@@ -13,6 +13,7 @@
       DeniedError          the system denies it (an OSError, too)
       UnsupportedError     kernel support or an interface is missing
 """
+from typing import Any
 
 
 class Error(Exception):
@@ -35,6 +36,16 @@ class Error(Exception):
 
     def __str__(self) -> str:
         return str(self.args[0])
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For copy and pickle: multiprocessing brings it from one process to another."""
+        return _again, (type(self), self.args[0]), self.__dict__
+
+
+def _again(kind: type[Error], text: str) -> Error:
+    error = kind.__new__(kind)
+    Exception.__init__(error, text)
+    return error
 
 
 class DataError(Error):

@@ -13,12 +13,14 @@ pty, can (a bus in the kernel, --r4-interface).
 from __future__ import annotations
 
 import contextlib
+import os
 import pathlib
 import random
 from typing import Any, Iterator
 
 import pytest
 
+from .errors import UsageError
 from .testing import TRANSPORTS, Robot, SimProcess, TestBoard, make_robot
 
 
@@ -34,17 +36,29 @@ def pytest_configure(config: pytest.Config) -> None:
                                        'r4link.Board')
 
 
+def _node(number: int) -> int:
+    """Of the board of that number, from 0: the workers of pytest-xdist share the bus, and none has the node of another."""
+    workers = int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', '1'))
+    worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw'))
+    node = 1 + worker + number * workers
+    if node > 31:
+        raise UsageError(f'board {number + 1} of a test of {workers} pytest workers', 'a CAN bus has the nodes 1 to 31',
+                         'use fewer workers (-n), or fewer boards')
+    return node
+
+
 def _marked(request: pytest.FixtureRequest) -> dict[str, Any]:
     mark = request.node.get_closest_marker('r4')
     return dict(mark.kwargs) if mark else {}
 
 
 @contextlib.contextmanager
-def _robot(request: pytest.FixtureRequest, folder: pathlib.Path, node: int, link: str = '') -> Iterator[Robot]:
+def _robot(request: pytest.FixtureRequest, folder: pathlib.Path, number: int, link: str = '') -> Iterator[Robot]:
     config = request.config
     transport = _marked(request).get('transport', config.getoption('--r4-transport'))
     if link and transport == 'sim':
         transport = 'udp'
+    node = _node(number) if transport == 'can' else 1 + number
     robot = make_robot(transport, folder, interface=config.getoption('--r4-interface'), node=node, link=link)
     try:
         yield robot
@@ -65,7 +79,7 @@ def _board(request: pytest.FixtureRequest, robot: Robot) -> Iterator[TestBoard]:
 @pytest.fixture
 def r4_robot(request: pytest.FixtureRequest, tmp_path: pathlib.Path) -> Iterator[Robot]:
     """A simulated robot: `url` to be opened by the program under test, happen(), look()."""
-    with _robot(request, tmp_path, 1) as robot:
+    with _robot(request, tmp_path, 0) as robot:
         yield robot
 
 
@@ -81,7 +95,7 @@ def r4_link(request: pytest.FixtureRequest, tmp_path: pathlib.Path) -> Iterator[
     """A board behind a bad link: as the mark says, or one that loses and delays a little, with a seed of its own."""
     link = _marked(request).get('link') or f'loss=2%,delay=5ms±5,seed={random.randrange(1 << 32)}'
     request.node.add_report_section('setup', 'r4_link', f"@pytest.mark.r4(link='{link}')")
-    with _robot(request, tmp_path, 1, link) as robot, _board(request, robot) as board:
+    with _robot(request, tmp_path, 0, link) as robot, _board(request, robot) as board:
         yield board
 
 
@@ -89,5 +103,5 @@ def r4_link(request: pytest.FixtureRequest, tmp_path: pathlib.Path) -> Iterator[
 def r4_bus(request: pytest.FixtureRequest, tmp_path: pathlib.Path) -> Iterator[list[TestBoard]]:
     """Several boards under control of the test: two, or as the mark says."""
     with contextlib.ExitStack() as stack:
-        yield [stack.enter_context(_board(request, stack.enter_context(_robot(request, tmp_path, node))))
-               for node in range(1, 1 + _marked(request).get('boards', 2))]
+        yield [stack.enter_context(_board(request, stack.enter_context(_robot(request, tmp_path, number))))
+               for number in range(_marked(request).get('boards', 2))]

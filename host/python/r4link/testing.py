@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections
+import contextlib
 import json
 import math
 import os
@@ -17,7 +18,7 @@ from typing import Any, Protocol, Self, Type
 from . import _core
 from ._core import FIELDS, State
 from .board import Board
-from .errors import DataError, Error, OpenError, UsageError
+from .errors import ClosedError, DataError, Error, OpenError, UsageError
 from .simulation import Look, SimBoard
 from .values import Bldc, Drive
 
@@ -56,6 +57,12 @@ class SimProcess:
             [command, 'sim', url, '--json', '--stdin', '--sensors', '0.01', *options], stdin=subprocess.PIPE,
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=1)
         assert self._process.stdin and self._process.stdout and self._process.stderr
+        self._parent = os.getpid()
+        self._lock = threading.Lock()
+        self._outputs: dict[str, Any] = {}
+        self._sensors: dict[str, Any] = {}
+        self.errors: collections.deque[str] = collections.deque(maxlen=100)
+        self._reader = threading.Thread(target=self._read, daemon=True)
         first = self._process.stdout.readline()
         told: dict[str, Any] = json.loads(first) if first else {}
         if told.get('type') != 'listening':
@@ -64,11 +71,6 @@ class SimProcess:
         self._url: str = told['host_url']
         if self._url.startswith('udp:'):
             self._url += '?listen=0'  # the paper's port of hosts is one, and several tests may run at a time
-        self._lock = threading.Lock()
-        self._outputs: dict[str, Any] = {}
-        self._sensors: dict[str, Any] = {}
-        self.errors: collections.deque[str] = collections.deque(maxlen=100)
-        self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
     @property
@@ -78,13 +80,15 @@ class SimProcess:
     def happen(self, words: str) -> None:
         """A line of a scenario (docs/simulation.md), without its time. Raises DataError where it has ended."""
         assert self._process.stdin
+        self._require_own()
         try:
             self._process.stdin.write(words + '\n')
-        except OSError as error:
+        except (OSError, ValueError) as error:  # ValueError: after close()
             raise DataError('r4 sim', 'it has ended', f'exit code {self._process.poll()}') from error
 
     def look(self) -> Look:
         """What its pins did last, and what its sensors sensed 10 ms ago or later."""
+        self._require_own()
         deadline = time.monotonic() + 5
         while not self._outputs or not self._sensors:  # the first line of each
             if time.monotonic() > deadline:
@@ -103,9 +107,17 @@ class SimProcess:
                     volts=tuple(senses['analog'].values()))
 
     def close(self) -> None:
-        """Ends it. Idempotent."""
+        """Ends it. Idempotent. In a fork it is the parent's, and goes on."""
+        if os.getpid() != self._parent:
+            return
         self._process.kill()
         self._process.wait()
+        if self._reader.is_alive():
+            self._reader.join()
+        for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
+            with contextlib.suppress(OSError):  # what waits for a process that has ended goes nowhere
+                if pipe:
+                    pipe.close()
 
     def __enter__(self) -> Self:
         return self
@@ -113,6 +125,11 @@ class SimProcess:
     def __exit__(self, kind: Type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
         self.close()
+
+    def _require_own(self) -> None:
+        if os.getpid() != self._parent:
+            raise ClosedError('r4 sim', f'it was started by the process {self._parent}, of which this one is a fork',
+                              'start one here, after the fork')
 
     def _read(self) -> None:
         assert self._process.stdout

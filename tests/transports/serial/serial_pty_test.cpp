@@ -16,6 +16,7 @@
 #include <fstream>
 
 #include "../recorder.hpp"
+#include "tests/support/refused_calls.hpp"
 #include "transports/file_descriptor.hpp"
 #include "transports/serial/pty_carrier.hpp"
 #include "transports/serial/serial_carrier.hpp"
@@ -561,6 +562,25 @@ TEST_F(SerialPtyTest, LeaksNoDescriptorsOver100Reopenings) {
     ASSERT_TRUE(wait_for(at_board, std::to_string(i)));
   }
   EXPECT_LE(open_descriptors(), before);
+}
+
+// The program may be driving: it goes on, and tries again.
+TEST_F(SerialPtyTest, WhatTheLoopMayNotWaitForIsAnErrorOfTheHostAndAWarningOfTheBoard) {
+  in_a_thread_of_its_own([&] {
+    open_board();
+    refuse(no_watches);
+    const std::string reason =
+        "the programs of this user wait for as many files and sockets as they may";
+    const auto error = host_error(url_for_host(*board));
+    ASSERT_TRUE(error);
+    EXPECT_EQ(error->problem().reason, reason);
+    const FileDescriptor terminal = open_raw(board->name().substr(4));
+    ASSERT_TRUE(run_until(io, [&] { return at_board.count(Kind::warning) != 0; }));
+    EXPECT_EQ(at_board.last(Kind::warning)->problem.reason, reason);
+    run_for(io, milliseconds(100));
+    EXPECT_EQ(at_board.count(Kind::warning), 1U);
+    EXPECT_FALSE(board->up());
+  });
 }
 
 }  // namespace

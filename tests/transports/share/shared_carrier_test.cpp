@@ -248,7 +248,7 @@ TEST_F(SharedCarrier, LooksAgainSlowlyWhereTheHolderEndsWhatItBegins) {
   int came = 0;
   const auto until = Clock::now() + 800ms;
   while (Clock::now() < until) {
-    while (accept_sharer(unkind.get(), {wire})) ++came;
+    while (accept_sharer(unkind.get())) ++came;
     run_for(io, 1ms);
   }
   EXPECT_GE(came, 5);

@@ -4,15 +4,24 @@
 
 #include <fmt/core.h>
 #include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <asio/post.hpp>
 #include <cerrno>
+#include <cstddef>
+#include <future>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "shared_wire.hpp"
+#include "tests/support/refused_calls.hpp"
 #include "transports/share/share_message.hpp"
 #include "transports/share/share_socket.hpp"
 
@@ -68,6 +77,24 @@ class HeldWire : public SharedWireTest {
     EXPECT_EQ(message->problem.thing, "device:");
     EXPECT_FALSE(message->problem.fix.empty());
     return message->problem.reason;
+  }
+
+  // A connection of another user's program, which only root can be, too.
+  FileDescriptor stranger() {
+    const std::string name = "r4link/0/" + wire;
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    name.copy(address.sun_path + 1, name.size());
+    const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
+    EXPECT_EQ(::seteuid(65534), 0);
+    FileDescriptor connection(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
+    EXPECT_EQ(::connect(connection.get(), reinterpret_cast<const sockaddr*>(&address), size), 0);
+    EXPECT_EQ(::seteuid(0), 0);
+    return connection;
+  }
+  static bool is_ended(const FileDescriptor& connection) {
+    pollfd state{connection.get(), 0, 0};
+    return ::poll(&state, 1, 0) == 1;
   }
 
   const std::string stop = datagram_of("E", "STOP");
@@ -264,6 +291,68 @@ TEST_F(HeldWire, AStopWithoutAHelloIsObeyedAlsoOfOneThatMustGo) {
   ASSERT_TRUE(run_until(io, [&] { return !device.all_sent().empty(); }));
   run_for(io, 20ms);
   EXPECT_EQ(device.all_sent(), std::vector<std::string>{stop});
+}
+
+TEST_F(HeldWire, StrangersAreTurnedAwayOneATurnOfTheLoopAndFewAtATime) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can be a stranger, too";
+  const auto holder = opened(BoardRole::control);
+  std::vector<FileDescriptor> strangers;
+  while (strangers.size() < 100) strangers.push_back(stranger());
+  const auto turned_away = [&] {
+    return std::count_if(strangers.begin(), strangers.end(), is_ended);
+  };
+  const auto began = Clock::now();
+  while (turned_away() == 0 && Clock::now() - began < patience) {
+    io.restart();
+    io.run_one_for(1ms);
+  }
+  EXPECT_EQ(turned_away(), 1) << "the loop does other things in between";
+  ASSERT_TRUE(run_until(io, [&] { return turned_away() == 100; }));
+  // Sixteen in each window; the first window may be over in no time.
+  EXPECT_GE(Clock::now() - began, 5 * WireHolder::arrival_window);
+}
+
+TEST_F(HeldWire, AProgramThatFindsManyWaitingWaitsForItsTurn) {
+  const auto holder = opened(BoardRole::control);
+  std::vector<FileDescriptor> waiting;
+  while (FileDescriptor one = reach_holder({wire}).connection) waiting.push_back(std::move(one));
+  EXPECT_GE(waiting.size(), 100U);
+  OtherThread elsewhere;
+  const auto watcher = program(BoardRole::watch, elsewhere.loop);
+  std::promise<void> opened;
+  auto is_open = opened.get_future();
+  asio::post(elsewhere.loop, [&] {
+    watcher->carrier->open(watcher->heard);
+    opened.set_value();
+  });
+  EXPECT_TRUE(in_time([&] { return is_open.wait_for(0s) == std::future_status::ready; }));
+  bool is_shared = false;
+  elsewhere.run([&] {
+    is_shared = watcher->carrier->is_shared();
+    watcher->carrier->close();
+  });
+  EXPECT_TRUE(is_shared);
+}
+
+// What the system refuses ends nothing: the program may be driving.
+TEST_F(HeldWire, AProgramForWhichTheLoopCannotWaitIsLetGoAndTheHolderGoesOn) {
+  in_a_thread_of_its_own([&] {
+    const auto holder = opened(BoardRole::control);
+    const auto watcher = opened(BoardRole::watch);
+    refuse(no_watches);
+    const FileDescriptor late = raw();
+    EXPECT_TRUE(in_time([&] { return is_ended(late); }));
+    device.deliver("state");
+    EXPECT_TRUE(run_until(io, [&] { return watcher->has("state"); }));
+    EXPECT_TRUE(holder->has("state"));
+    const auto told = program(BoardRole::watch, io);
+    try {
+      told->carrier->open(told->heard);
+      ADD_FAILURE() << "it cannot wait for the holder";
+    } catch (const Error& error) {
+      EXPECT_NE(error.problem().reason.find("wait for as many files"), std::string::npos);
+    }
+  });
 }
 
 }  // namespace

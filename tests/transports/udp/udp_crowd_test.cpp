@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "../recorder.hpp"
+#include "tests/support/refused_calls.hpp"
 
 namespace r4::test {
 namespace {
@@ -134,6 +135,21 @@ TEST_F(UdpCrowdTest, WhereMuchComesItIsReadTogetherAndNothingIsLost) {
   run_for(io, std::chrono::milliseconds(30));  // it is quiet again
   boards[last]->say("one more");
   ASSERT_TRUE(run_until(io, [&] { return at_host[last].has("one more"); }));
+}
+
+TEST_F(UdpCrowdTest, ALoopThatMayWaitForNothingMoreLooksAgainAndAgain) {
+  in_a_thread_of_its_own([&] {
+    refuse(no_watches);  // from now on: it waits already
+    const std::size_t last = boards_here - 1;
+    const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(60);
+    while (std::chrono::steady_clock::now() < end) {
+      for (int n = 0; n < 40; ++n) boards[last]->say("state");
+      run_for(io, std::chrono::milliseconds(1));
+    }
+    run_for(io, std::chrono::milliseconds(30));  // it is quiet again
+    boards[last]->say("one more");
+    EXPECT_TRUE(run_until(io, [&] { return at_host[last].has("one more"); }));
+  });
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include <iostream>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "help.hpp"
@@ -22,6 +23,7 @@
 #include "r4link/config.hpp"
 #include "r4link/error.hpp"
 #include "subcommands.hpp"
+#include "transports/file_descriptor.hpp"
 
 namespace r4::tool {
 namespace {
@@ -161,6 +163,8 @@ int run(int argc, const char* const* argv) {
     return report(usage_problem(root, error), json);
   } catch (const Error& error) {
     return report(error.problem(), json);
+  } catch (const std::system_error& error) {
+    return report(problem_of("this program", error), json);
   } catch (const std::exception& error) {
     return report({ErrorKind::data, "internal error", error.what(), "please report it"}, json);
   }

@@ -13,6 +13,7 @@
 #include <string_view>
 
 #include "r4link/error.hpp"
+#include "transports/file_descriptor.hpp"
 
 namespace r4::tool {
 namespace {
@@ -55,7 +56,7 @@ ChildBoard::ChildBoard(asio::io_context& io, const std::string& url, OnEvent on_
   if (::pipe2(ends, O_CLOEXEC) != 0) {
     throw Error(ErrorKind::open, "a pipe", std::strerror(errno), "close some programs");
   }
-  output_.assign(ends[0]);
+  with_system_errors("a pipe", [&] { output_.assign(ends[0]); });
   try {
     pid_ = spawn(url, ends[1]);
   } catch (...) {

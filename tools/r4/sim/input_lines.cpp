@@ -10,6 +10,8 @@
 #include <istream>
 #include <utility>
 
+#include "transports/file_descriptor.hpp"
+
 namespace r4::tool {
 namespace {
 
@@ -32,7 +34,7 @@ InputLines::InputLines(asio::io_context& io, std::function<void(const std::strin
     throw Error(ErrorKind::open, "standard input", std::strerror(errno),
                 "give it a terminal, a pipe or a file to read");
   }
-  input_.assign(input);
+  with_system_errors("standard input", [&] { input_.assign(input); });
   read_line();
 }
 

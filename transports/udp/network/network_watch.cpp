@@ -9,6 +9,11 @@
 #include <array>
 
 namespace r4 {
+namespace {
+
+constexpr int most_in_a_turn = 64;
+
+}  // namespace
 
 asio::execution_context::id NetworkWatch::id;
 
@@ -51,10 +56,12 @@ void NetworkWatch::wait() {
   waits_.async_wait(asio::posix::descriptor_base::wait_read, waiting_.handler([this] { tell(); }));
 }
 
-// What has changed is looked up anew: reports may have been lost, and many may have come for one cause.
+// What has changed is looked up anew: reports may have been lost, and many may have come for one cause. Those that come
+// faster than they are read are the next turn's.
 void NetworkWatch::tell() {
   std::array<char, 4096> report;
-  while (::recv(changes_.get(), report.data(), report.size(), MSG_TRUNC) > 0) {
+  for (int i = 0; i < most_in_a_turn; ++i) {
+    if (::recv(changes_.get(), report.data(), report.size(), MSG_TRUNC) <= 0) break;
   }
   const std::vector<OwnAddress> own = own_addresses();
   std::size_t next = 0;  // they may enter and leave meanwhile

@@ -7,6 +7,7 @@
 #include <asio/ip/udp.hpp>
 #include <asio/post.hpp>
 #include <condition_variable>
+#include <exception>
 #include <mutex>
 #include <optional>
 #include <system_error>
@@ -21,8 +22,16 @@ namespace {
 // Calls `done(answer)` in a thread of its own. It may outlive everything that it was not given.
 template <class Question, class Done>
 void ask_in_a_thread(Question question, Done done) {
+  // Out of that thread an exception would end the program, which may be driving.
+  const auto ask = [question] {
+    try {
+      return question();
+    } catch (const std::exception& error) {
+      return FoundHost{{}, error.what()};
+    }
+  };
   try {
-    std::thread([question, done] { done(question()); }).detach();
+    std::thread([ask, done] { done(ask()); }).detach();
   } catch (const std::system_error& error) {
     done(FoundHost{{}, error.what()});
   }

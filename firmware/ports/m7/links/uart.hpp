@@ -35,11 +35,14 @@ class Uart final : public firmware::Port {
     return stop;
   }
 
-  // Calls `on_datagram(Text)` for each line that has arrived.
+  // Calls `on_datagram(Text)` for each line that has arrived, of as many bytes as have room: the interrupt brings more
+  // meanwhile, and a flood must not keep the loop from its other work.
   template <class OnDatagram>
   void receive(OnDatagram&& on_datagram) {
     char chunk[64];
-    while (const std::uint32_t size = received_.take(chunk, sizeof chunk)) {
+    for (std::uint32_t taken = 0; taken < receive_capacity; taken += sizeof chunk) {
+      const std::uint32_t size = received_.take(chunk, sizeof chunk);
+      if (size == 0) return;
       framing_.push(chunk, size, on_datagram);
     }
   }

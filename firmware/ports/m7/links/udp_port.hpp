@@ -43,10 +43,11 @@ class UdpPort final : public firmware::Port {
     return stop;
   }
 
-  // Calls `on_datagram(peer, Text)` for each that has arrived.
+  // Calls `on_datagram(peer, Text)` for those that have arrived, at most frames_max: the interrupt brings more meanwhile,
+  // and a flood must not keep the loop from its other work.
   template <class OnDatagram>
   void receive(OnDatagram&& on_datagram) {
-    while (has_received()) {
+    for (std::uint32_t i = 0; i < frames_max && has_received(); ++i) {
       const Frame& frame = received_[taken_ % frames_max];
       std::uint32_t reply[UdpFrames::min_frame / 4];
       const UdpFrames::Arrival arrival =

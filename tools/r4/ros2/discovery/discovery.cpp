@@ -11,13 +11,17 @@
 namespace r4::tool::ros2 {
 namespace {
 
-// Takes all samples of a built-in topic: take(sample, whether its subject is there).
+constexpr std::size_t most = 64;  // samples at once
+// Looks at participants before each look at readers and writers, because the names of participants are
+// reported with these. More samples wait for the next look: stops are read on the same thread.
+constexpr int most_rounds = 16;
+
+// Takes samples of a built-in topic: take(sample, whether its subject is there).
 template <class Sample, class Take>
-void take_all(dds_entity_t reader, Take take) {
-  constexpr std::size_t most = 64;  // at once
+void take_some(dds_entity_t reader, int rounds, Take take) {
   std::array<void*, most> samples{};
   std::array<dds_sample_info_t, most> infos{};
-  for (;;) {
+  for (int round = 0; round < rounds; ++round) {
     const dds_return_t count = dds_take(reader, samples.data(), infos.data(), most, most);
     if (count <= 0) return;
     for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
@@ -58,8 +62,9 @@ void Discovery::look() {
 }
 
 void Discovery::look_at_participants() {
-  take_all<dds_builtintopic_participant_t>(
-      participants_.get(), [this](const dds_builtintopic_participant_t& each, bool there) {
+  take_some<dds_builtintopic_participant_t>(
+      participants_.get(), most_rounds,
+      [this](const dds_builtintopic_participant_t& each, bool there) {
         if (!there) {
           owners_.erase(id_from(each.key));
           return;
@@ -72,8 +77,8 @@ void Discovery::look_at_participants() {
 }
 
 void Discovery::look_at(EndpointKind kind, dds_entity_t entity) {
-  take_all<dds_builtintopic_endpoint_t>(
-      entity, [this, kind](const dds_builtintopic_endpoint_t& each, bool there) {
+  take_some<dds_builtintopic_endpoint_t>(
+      entity, 1, [this, kind](const dds_builtintopic_endpoint_t& each, bool there) {
         Announced announced;
         announced.kind = kind;
         announced.id = id_from(each.key);

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Values that can be pickled and copied. What is pickled is read by the same version of R4 link only: by the other
+// processes of a program, not by next year's.
+#pragma once
+
+#include <cstddef>
+#include <cstring>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "bindings.hpp"
+#include "r4link/fleet.hpp"
+
+namespace r4::python {
+
+// Goes through the members of a value, to write their bytes or to read them.
+class Pickle {
+ public:
+  Pickle() = default;
+  explicit Pickle(std::string_view bytes) : reads_(true), bytes_(bytes) {}
+
+  template <class... Members>
+  void operator()(Members&... members) {
+    (one(members), ...);
+  }
+  const std::string& bytes() const { return bytes_; }
+  // Everything was read.
+  bool whole() const { return whole_ && at_ == bytes_.size(); }
+
+ private:
+  void raw(void* member, std::size_t size) {
+    if (!reads_) {
+      bytes_.append(static_cast<const char*>(member), size);
+    } else if (bytes_.size() - at_ < size) {
+      whole_ = false;
+    } else {
+      std::memcpy(member, bytes_.data() + at_, size);
+      at_ += size;
+    }
+  }
+  std::size_t count(std::size_t size) {
+    raw(&size, sizeof size);
+    return !reads_ || (whole_ && size <= bytes_.size()) ? size : 0;
+  }
+
+  template <class Member>
+  void one(Member& member) {
+    if constexpr (std::is_trivially_copyable_v<Member>) {
+      raw(static_cast<void*>(&member), sizeof member);
+    } else {
+      members_of(*this, member);
+    }
+  }
+  void one(std::string& text) {
+    text.resize(count(text.size()));
+    raw(text.data(), text.size());
+  }
+  template <class Member>
+  void one(std::vector<Member>& all) {
+    all.resize(count(all.size()));
+    for (Member& each : all) one(each);
+  }
+  // Its texts belong to the program that it was made in.
+  void one(Command& command) {
+    command.text = command.text2 = Text();
+    raw(static_cast<void*>(&command), sizeof command);
+    command.text = command.text2 = Text();
+  }
+
+  bool reads_ = false;
+  bool whole_ = true;
+  std::string bytes_;
+  std::size_t at_ = 0;
+};
+
+inline void members_of(Pickle& pickle, Problem& it) {
+  pickle(it.kind, it.thing, it.reason, it.fix, it.outcome, it.refusal, it.at);
+}
+inline void members_of(Pickle& pickle, CarrierEvent& it) { pickle(it.kind, it.problem); }
+inline void members_of(Pickle& pickle, BoardIdentity& it) {
+  pickle(it.firmware, it.board_id, it.capabilities, it.name);
+}
+inline void members_of(Pickle& pickle, Wire& it) {
+  pickle(it.name, it.state, it.busy, it.board_id, it.packets, it.copies, it.round_trip_us,
+         it.age_us);
+}
+inline void members_of(Pickle& pickle, BoardHealth& it) {
+  pickle(it.board, it.url, it.identity, it.link, it.in_control, it.disarmed_by, it.statistics,
+         it.wires);
+}
+inline void members_of(Pickle& pickle, FleetResult& it) { pickle(it.board, it.result, it.problem); }
+
+// For copy and pickle; a value of another version is refused with an Error.
+template <class Value>
+auto pickled(const char* name) {
+  return py::pickle(
+      [](const Value& value) {
+        Value copy = value;
+        Pickle pickle;
+        pickle(copy);
+        return py::make_tuple(R4LINK_VERSION, sizeof(Value), py::bytes(pickle.bytes()));
+      },
+      [name](const py::tuple& told) {
+        const bool same = told.size() == 3 && told[0].cast<std::string>() == R4LINK_VERSION &&
+                          told[1].cast<std::size_t>() == sizeof(Value);
+        Pickle pickle(same ? told[2].cast<std::string>() : std::string());
+        Value value{};
+        pickle(value);
+        if (same && pickle.whole()) return value;
+        throw Error(ErrorKind::data, name, "it was pickled by another version of R4 link",
+                    "use the same version in all processes");
+      });
+}
+
+}  // namespace r4::python

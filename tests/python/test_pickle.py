@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Errors and values can be copied, and sent to another process."""
+import concurrent.futures
+import copy
+import inspect
+import multiprocessing
+import pickle
+
+import pytest
+
+import r4link
+from r4link import _core
+from r4link.errors import error_of
+
+ERRORS = [each for each in vars(r4link).values() if inspect.isclass(each) and issubclass(each, r4link.Error)]
+
+
+def copies(value):
+    return [pickle.loads(pickle.dumps(value, protocol)) for protocol in range(2, pickle.HIGHEST_PROTOCOL + 1)] + [
+        copy.copy(value), copy.deepcopy(value)]
+
+
+@pytest.mark.parametrize('kind', ERRORS, ids=lambda kind: kind.__name__)
+def test_a_copy_of_an_error_tells_the_same(kind):
+    error = kind('O:1,1,1', 'refused', 'arm it', outcome='refused', refusal='SAFE', at=2)
+    error.add_note('on the left arm')
+    for each in copies(error):
+        assert type(each) is kind and str(each) == str(error) and vars(each) == vars(error)
+
+
+class OwnError(r4link.RefusedError):
+    """An error of a program's own."""
+
+    def __init__(self, arm):
+        super().__init__(arm, 'it does not move')
+        self.arm = arm
+
+
+def test_a_copy_of_an_error_of_ones_own_tells_the_same():
+    for each in copies(OwnError('left')):
+        assert type(each) is OwnError and each.arm == 'left' and str(each) == 'left: it does not move'
+
+
+def open_it(url):
+    r4link.Board(url)
+
+
+@pytest.fixture(name='pool', params=['Pool', 'ProcessPoolExecutor'])
+def pool_of_either_kind(request):
+    spawn = multiprocessing.get_context('spawn')
+    if request.param == 'Pool':
+        with spawn.Pool(1) as pool:
+            yield pool.map
+    else:
+        with concurrent.futures.ProcessPoolExecutor(1, mp_context=spawn) as pool:
+            yield lambda job, inputs: list(pool.map(job, inputs))
+
+
+def test_an_error_comes_from_another_process(pool):
+    with pytest.raises(r4link.UsageError) as raised:
+        pool(open_it, ['no URL'])
+    assert raised.value.thing and raised.value.fix
+
+
+def state_of_a_board(fields):
+    with r4link.Board('sim:') as board:
+        board.wait_active()
+        board.fields(fields)
+        while not hasattr(state := board.next_state(), 'enc1') or 'enc1' not in state.present:
+            pass
+        return state
+
+
+def test_a_state_comes_from_another_process(pool):
+    state, = pool(state_of_a_board, ['DEFAULT,ENC1,I2C1,UART1'])
+    assert state.ain24 > 20 and state.enc1 == 0 and state.received is not None
+
+
+def told(value):
+    """All that a value tells."""
+    if hasattr(value, 'as_dict'):
+        return value.as_dict()
+    names = [name for name in dir(value) if not name.startswith('_')]
+    return {name: told(each) if type(each).__module__ == 'r4link._core' else repr(each)
+            for name in names if not callable(each := getattr(value, name))}
+
+
+def test_copies_of_values_tell_the_same(sim, board):
+    board.arm()
+    with r4link.Fleet('sim:') as fleet:
+        fleet.wait_active()
+        values = [board.state, board.next_state(), board.link, board.statistics, board.carrier_counters, board.identify(),
+                  *board.wires, r4link.Command.osmc(1, 5, 1), *fleet.health(), *fleet.stop(), sim.look(),
+                  r4link.Device('bno055@0x29')]
+        events = []
+        board.on_event(events.append)
+        board.stop()
+        values += events
+    for value in values:
+        for each in copies(value):
+            assert type(each) is type(value) and told(each) == told(value), value
+
+
+def test_a_copy_of_setpoints_does_the_same(board, sim, wait):
+    board.arm()
+    for number, each in enumerate(copies(r4link.Setpoints().osmc(1, 5).servo(3, 1500)), 1):
+        assert len(each) == 2
+        each.osmc(2, number)
+        board.apply(each)
+    wait(lambda: sim.look().osmc[1].pwm == number)
+    for each in copies(r4link.Command.osmc(2, 9, 1)):
+        board.send(each)
+    wait(lambda: sim.look().osmc[1].pwm == 9)
+
+
+def test_a_value_of_another_version_is_refused():
+    state = r4link.testing.make_state(1) if hasattr(r4link, 'testing') else _core.make_state(1, 0.0, {})
+    version, size, data = state.__getstate__()
+    for other in (('0.0.0', size, data), (version, size + 1, data), (version, size, data[:-1]), (version, size, data + b'x')):
+        with pytest.raises(r4link.DataError, match='another version'):
+            _core.State.__new__(_core.State).__setstate__(other)
+
+
+def test_an_error_of_the_library_keeps_its_outcome():
+    error = error_of(3, 'O:1,1,1', 'timed out', '', 'timed out', 'NONE', 0)
+    assert all(type(each) is r4link.NotConfirmedError and each.outcome == 'timed out' for each in copies(error))
