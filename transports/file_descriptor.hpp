@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A file descriptor with an owner; and what to do where there is none left.
+// A file descriptor with an owner; what to do where there is none left; and sockets of Asio's that a program which this
+// one starts does not inherit: it would keep the port for as long as it runs.
 #pragma once
 
+#include <fcntl.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -51,5 +54,22 @@ inline std::optional<Problem> out_of_files(const std::string& thing, int error) 
       "open fewer boards, or allow it more before it begins: ulimit -n " +
           std::to_string(4 * limit.rlim_cur)};
 }
+
+// As socket.open(protocol, error), also of an acceptor.
+template <class Socket, class ErrorCode>
+void open_close_on_exec(Socket& socket, const typename Socket::protocol_type& protocol,
+                        ErrorCode& error) {
+  const int descriptor =
+      ::socket(protocol.family(), protocol.type() | SOCK_CLOEXEC, protocol.protocol());
+  if (descriptor < 0) {
+    error.assign(errno, error.category());
+    return;
+  }
+  socket.assign(protocol, descriptor, error);
+  if (error) ::close(descriptor);
+}
+
+// For one that Asio has opened itself.
+inline void close_on_exec(int descriptor) { ::fcntl(descriptor, F_SETFD, FD_CLOEXEC); }
 
 }  // namespace r4
