@@ -11,6 +11,7 @@
 
 #include "bindings.hpp"
 #include "r4link/fleet.hpp"
+#include "r4link/options.hpp"
 
 namespace r4::python {
 namespace {
@@ -23,17 +24,20 @@ End end_of(const BridgeEnd& end) {
   const BridgeCounters& from = end.from;
   return {end.name,
           end.up,
-          {from.passed, from.stops, from.damaged, from.misdirected, from.kept_out, from.late,
-           from.undelivered, from.outdated}};
+          {from.passed, from.stops, from.damaged, from.misdirected, from.kept_out, from.refused,
+           from.late, from.undelivered, from.outdated}};
 }
 
 // A bridge of this process. One that was inherited by a fork has no thread, and is left alone.
 class PyBridge {
  public:
-  PyBridge(const std::string& hosts, const std::string& board, int timeout_ms) {
+  PyBridge(const std::string& hosts, const std::string& board, int timeout_ms,
+           const std::vector<std::string>& keys, bool open) {
     BridgeOptions options;
     options.timeout = std::chrono::milliseconds(timeout_ms);
+    options.open = open;
     const py::gil_scoped_release free;
+    for (const std::string& path : keys) options.keys.push_back(load_key(path));
     bridge_ = std::make_unique<Bridge>(hosts, board, std::move(options));
   }
   ~PyBridge() {
@@ -73,8 +77,10 @@ class PyBridge {
 
 void bind_bridge(py::module_& module) {
   py::class_<PyBridge>(module, "Bridge")
-      .def(py::init<const std::string&, const std::string&, int>(), py::arg("hosts"),
-           py::arg("board"), py::kw_only(), py::arg("timeout"))
+      .def(py::init<const std::string&, const std::string&, int, const std::vector<std::string>&,
+                    bool>(),
+           py::arg("hosts"), py::arg("board"), py::kw_only(), py::arg("timeout"), py::arg("keys"),
+           py::arg("open"))
       .def("close", &PyBridge::close, Released())
       .def("status", &PyBridge::status, Released());
 }

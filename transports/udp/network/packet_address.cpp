@@ -45,10 +45,12 @@ void put(msghdr& message, int level, int type, const Info& info) {
   std::memcpy(CMSG_DATA(item), &info, sizeof info);
 }
 
-int send_message(int socket, const msghdr& message) {
+// `call()` sends. 0, or errno.
+template <class Call>
+int result_of(Call call) {
   ssize_t sent = 0;
   do {
-    sent = ::sendmsg(socket, &message, MSG_DONTWAIT | MSG_NOSIGNAL);
+    sent = call();
   } while (sent < 0 && errno == EINTR);
   return sent >= 0 ? 0 : errno;
 }
@@ -88,14 +90,20 @@ std::optional<std::size_t> receive_packet(int socket, char* out, std::size_t roo
 }
 
 int send_packet(int socket, std::string_view bytes, const Endpoint& to, const address& from) {
+  constexpr int flags = MSG_DONTWAIT | MSG_NOSIGNAL;
+  const auto send_by_any = [&] {
+    return ::sendto(socket, bytes.data(), bytes.size(), flags, to.data(),
+                    static_cast<socklen_t>(to.size()));
+  };
+  if (from.is_unspecified()) return result_of(send_by_any);
   alignas(cmsghdr) char control[control_size] = {};
-  iovec part{const_cast<char*>(bytes.data()), bytes.size()};  // NOLINT: it is only read
+  // The kernel only reads them.
+  iovec part{const_cast<char*>(bytes.data()), bytes.size()};  // NOLINT
   msghdr message{};
-  message.msg_name = const_cast<void*>(static_cast<const void*>(to.data()));  // NOLINT: likewise
+  message.msg_name = const_cast<void*>(static_cast<const void*>(to.data()));  // NOLINT
   message.msg_namelen = static_cast<socklen_t>(to.size());
   message.msg_iov = &part;
   message.msg_iovlen = 1;
-  if (from.is_unspecified()) return send_message(socket, message);
   message.msg_control = control;
   if (from.is_v4()) {
     in_pktinfo info{};
@@ -107,11 +115,9 @@ int send_packet(int socket, std::string_view bytes, const Endpoint& to, const ad
     std::memcpy(&info.ipi6_addr, address_bytes.data(), address_bytes.size());
     put(message, IPPROTO_IPV6, IPV6_PKTINFO, info);
   }
-  const int error = send_message(socket, message);
-  if (error != EINVAL && error != EADDRNOTAVAIL) return error;
-  message.msg_control = nullptr;  // this computer has that address no longer
-  message.msg_controllen = 0;
-  return send_message(socket, message);
+  const int error = result_of([&] { return ::sendmsg(socket, &message, flags); });
+  // This computer may have that address no longer.
+  return error == EINVAL || error == EADDRNOTAVAIL ? result_of(send_by_any) : error;
 }
 
 }  // namespace r4
