@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A file descriptor with an owner; and what to do where the system has none left, or no memory or thread.
+// A file descriptor with an owner; what to do where the system has none left, or no memory or thread;
+// and sockets of Asio's that a program which this one starts does not inherit: it would keep the port
+// for as long as it runs.
 #pragma once
 
+#include <fcntl.h>
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -101,5 +105,22 @@ auto with_system_errors(const std::string& thing, Action action) {
     throw Error(problem_of(thing, error));
   }
 }
+
+// As socket.open(protocol, error), also of an acceptor.
+template <class Socket, class ErrorCode>
+void open_close_on_exec(Socket& socket, const typename Socket::protocol_type& protocol,
+                        ErrorCode& error) {
+  const int descriptor =
+      ::socket(protocol.family(), protocol.type() | SOCK_CLOEXEC, protocol.protocol());
+  if (descriptor < 0) {
+    error.assign(errno, error.category());
+    return;
+  }
+  socket.assign(protocol, descriptor, error);
+  if (error) ::close(descriptor);
+}
+
+// For one that Asio has opened itself.
+inline void close_on_exec(int descriptor) { ::fcntl(descriptor, F_SETFD, FD_CLOEXEC); }
 
 }  // namespace r4

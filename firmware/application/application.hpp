@@ -19,6 +19,7 @@
 #include <cstdint>
 
 #include "../../protocol/keys/authentication.hpp"
+#include "../../protocol/link/answer_budget.hpp"
 #include "../../protocol/link/board_link.hpp"
 #include "../../protocol/link/session_wires.hpp"
 #include "../../protocol/link/watchers.hpp"
@@ -203,6 +204,7 @@ class Application {
   SessionWires wires_;
   Watchers watchers_;
   Authentication authentication_;
+  AnswerBudget questions_, stops_;  // answers to hosts that do not control the board
   Guard guard_;
   Safety safety_;
   StateSchedule schedule_;

@@ -63,13 +63,15 @@ void Application::answer(Source to, DatagramWriter& writer, std::uint32_t now_ms
 }
 
 void Application::identify(Source to, const Datagram& question, std::uint32_t now_ms) {
+  const bool ours = link_.has_owner() && wires_.has(to);
+  if (!ours && !questions_.take(now_ms)) return;
   char buffer[max_datagram];
   DatagramWriter writer(buffer, sizeof buffer);
   Identity identity = identity_;
   const char* const name = settings().site.name;
   identity.name = Text(name, std::strlen(name));
   identity.has_busy = true;
-  identity.busy = link_.has_owner() && !wires_.has(to);
+  identity.busy = link_.has_owner() && !ours;
   identity.has_asked = question.has_pnum();
   identity.asked = question.pnum();
   write_identity(writer, identity);

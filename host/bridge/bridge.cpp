@@ -5,6 +5,7 @@
 #include <future>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -25,6 +26,9 @@ BridgedPair::Absence absence_of(const std::string& url) {
                                                : BridgedPair::Absence::refused;
 }
 
+// True if a board obeys whatever comes by that transport, without a signature.
+bool is_cable(const std::string& board) { return Url::parse(board).scheme() == "serial"; }
+
 }  // namespace
 
 struct Bridge::Impl {
@@ -34,8 +38,22 @@ struct Bridge::Impl {
       throw Error(ErrorKind::usage, "a bridge's timeout", "it must be more than 0",
                   "give the board's, which is 1000 ms where nobody has set another");
     }
+    if (options.keys.size() > max_keys) {
+      throw Error(ErrorKind::usage, "a bridge's keys",
+                  "there are " + std::to_string(options.keys.size()) +
+                      ", and a board has at most " + std::to_string(max_keys),
+                  "give those of the board");
+    }
+    if (options.open && !options.keys.empty()) {
+      throw Error(ErrorKind::usage, "a bridge that is open to everyone", "it has a key, too",
+                  "choose one: the key (--key, or R4_KEY), or --open");
+    }
     for (const BridgedUrls& urls : pair_urls(hosts, board)) {
+      const bool cable = is_cable(urls.board);
+      if (cable && options.keys.empty()) permit(urls, options.open);
       BridgedPair::Setup setup;
+      setup.keys = options.keys;
+      setup.trusted = cable && !options.open;
       setup.hosts = standard_registry().make(io, urls.hosts, Role::board);
       setup.board = make_host_carrier(io, urls.board, BoardRole::control);
       setup.hosts_absence = absence_of(urls.hosts);
@@ -49,6 +67,21 @@ struct Bridge::Impl {
   }
 
   ~Impl() { close(); }
+
+  // A bridge without a key, to a board that obeys its cable.
+  void permit(const BridgedUrls& urls, bool open) {
+    const std::string danger = "everyone who reaches it may drive the board at " + urls.board +
+                               ", which asks for no key at its cable";
+    if (!open && !is_of_this_computer(urls.hosts)) {
+      throw Error(ErrorKind::usage, urls.hosts, danger,
+                  "give the bridge the board's key (--key FILE), or listen at udp://127.0.0.1; "
+                  "--open allows it to everyone");
+    }
+    if (!open || !on_event) return;
+    const Problem warning{ErrorKind::usage, urls.hosts, "it is open: " + danger,
+                          "give the bridge the board's key instead: --key FILE"};
+    on_event({pairs.size(), BridgeSide::hosts, {CarrierEvent::Kind::warning, warning}});
+  }
 
   // On the loop, where no name that is looked up holds the others up.
   void open() {

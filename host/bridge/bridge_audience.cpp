@@ -17,23 +17,20 @@ BridgeAudience::Effect BridgeAudience::on_lease(Peer from, bool ends, std::uint6
   return Effect::watching;
 }
 
-void BridgeAudience::tell(Peer to, std::uint32_t token, Time now) {
+std::uint32_t BridgeAudience::new_token(Peer to, Time now) {
+  std::uint32_t token = 0;
+  while (token == 0) token = random_();
   Place& place = place_of(to, now);
   place.token = token;
   place.told = now;
-}
-
-std::uint32_t BridgeAudience::new_token() {
-  std::uint32_t token = 0;
-  while (token == 0) token = random_();
   return token;
 }
 
-void BridgeAudience::on_question(Peer from, std::uint32_t pnum, Time now) {
+void BridgeAudience::on_question(Peer from, std::optional<std::uint32_t> pnum, Time now) {
   questions_[next_question_++ % questions_.size()] = {from, pnum, now};
 }
 
-std::optional<Peer> BridgeAudience::asker_of(std::uint32_t pnum, Time now) const {
+std::optional<Peer> BridgeAudience::asker_of(std::optional<std::uint32_t> pnum, Time now) const {
   std::optional<Peer> asker;
   Time newest;
   for (const Question& each : questions_) {

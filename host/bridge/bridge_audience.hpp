@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Who hears a board through a bridge besides the host that has the place: who watches (docs/protocol.md, 4.8), and for
-// a second who has stopped it, or asked it something.
+// a second who has stopped it, asked it something, or needs its nonce to sign what it sends.
 //
 //     W:rate --> is told a LEASE --W:rate that echoes it--> hears everything for two seconds, again by the next W
 //
 // As at the board, nothing is streamed before the echo of a random number that was told to that very place: so nobody has
-// a bridge flood a third by forging where a W comes from.
+// a bridge flood a third by forging where a W comes from. For the same reason the answers to those that have echoed
+// nothing are few.
 #pragma once
 
 #include <array>
@@ -30,32 +31,37 @@ class BridgeAudience {
   enum class Effect : std::uint8_t { watching, unproven, full };
   // `W` of a host, with its T; `rate` 0 ends its lease.
   Effect on_lease(Peer from, bool ends, std::uint64_t echo, Time now);
-  // That host is told this LEASE: by the board, or a new one by us.
-  void tell(Peer to, std::uint32_t token, Time now);
-  std::uint32_t new_token();
+  // A new LEASE, which that host is told.
+  std::uint32_t new_token(Peer to, Time now);
 
-  // That host has stopped the board: it wants to hear how the board takes it.
-  void on_stop(Peer from, Time now) { place_of(from, now).asked_until = now + curiosity; }
+  // That host is to hear the board's heartbeats for a while: it has stopped the board, or it needs the nonce.
+  void listen(Peer from, Time now) { place_of(from, now).listens_until = now + curiosity; }
 
-  // It has asked something by a datagram of that number.
-  void on_question(Peer from, std::uint32_t pnum, Time now);
-  // Whose question is this an answer to?
-  std::optional<Peer> asker_of(std::uint32_t pnum, Time now) const;
+  // It has asked something by a datagram of that number; none: of no number.
+  void on_question(Peer from, std::optional<std::uint32_t> pnum, Time now);
+  // The host that has asked that last.
+  std::optional<Peer> asker_of(std::optional<std::uint32_t> pnum, Time now) const;
 
-  // Calls `call(peer)` for each that hears states, or heartbeats.
+  // Calls `call(peer)` for each that hears states.
   template <class Call>
   void for_each_watcher(Time now, Call call) const {
     for (const Place& place : places_) {
       if (place.used && now < place.watches_until) call(place.peer);
     }
   }
+  // Calls `call(peer)` for each that hears heartbeats and is no watcher.
   template <class Call>
   void for_each_listener(Time now, Call call) const {
     for (const Place& place : places_) {
-      if (place.used && (now < place.watches_until || now < place.asked_until)) call(place.peer);
+      if (place.used && now >= place.watches_until && now < place.listens_until) call(place.peer);
     }
   }
-  // Is there nobody? Then nobody need be looked for.
+  bool has_watchers(Time now) const {
+    bool any = false;
+    if (any_) for_each_watcher(now, [&any](Peer) { any = true; });
+    return any;
+  }
+  // True if nobody need be looked for.
   bool empty() const { return !any_; }
 
  private:
@@ -66,11 +72,11 @@ class BridgeAudience {
     std::uint32_t token = 0;  // 0: none
     Time told;
     Time watches_until;
-    Time asked_until;
+    Time listens_until;
   };
   struct Question {
     Peer from = everyone;
-    std::uint32_t pnum = 0;
+    std::optional<std::uint32_t> pnum;
     Time at;
   };
 

@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "../../transports/file_descriptor.hpp"
 #include "../../transports/serial/serial_device.hpp"
 #include "../../transports/udp/udp_url.hpp"
 #include "../../transports/url.hpp"
@@ -25,7 +26,7 @@ bool is_ours(const std::string& host) {
   asio::io_context io;
   asio::ip::udp::socket socket(io);
   const asio::ip::udp::endpoint any_port(address, 0);
-  socket.open(any_port.protocol(), error);
+  open_close_on_exec(socket, any_port.protocol(), error);
   if (!error) socket.bind(any_port, error);
   return !error;
 }
@@ -88,6 +89,14 @@ void require_once(std::set<std::string>& seen, const std::string& url) {
 }
 
 }  // namespace
+
+bool is_of_this_computer(const std::string& hosts) {
+  const Url url = Url::parse(hosts);
+  if (url.scheme() != "udp") return url.scheme() == "pty" || url.scheme() == "serial";
+  const std::string host = UdpUrl(url, Role::board).host;
+  asio::error_code error;
+  return host == "localhost" || (asio::ip::make_address(host, error).is_loopback() && !error);
+}
 
 std::vector<BridgedUrls> pair_urls(std::string_view hosts, std::string_view board) {
   require_one_wire(hosts);

@@ -6,6 +6,7 @@
 
 #include "../../protocol/messages/command_field.hpp"
 #include "../../protocol/messages/message.hpp"
+#include "../../protocol/messages/site_settings.hpp"
 #include "../../transports/file_descriptor.hpp"
 
 namespace r4 {
@@ -28,6 +29,16 @@ bool is_single(const Datagram& datagram, Text name) {
   return datagram.command_count() == 1 && datagram.command().name() == name;
 }
 
+// True if one of its commands is a setting that a board takes only from its own cable.
+bool has_site_setting(const Datagram& datagram) {
+  for (const Field& field : datagram) {
+    if (field.name() != "C") continue;
+    Text key;
+    if (field.split(&key, 1) != 0 && is_site_setting(key)) return true;
+  }
+  return false;
+}
+
 bool is_absence(ErrorKind kind) {
   return kind == ErrorKind::open || kind == ErrorKind::unsupported || kind == ErrorKind::refused;
 }
@@ -40,7 +51,8 @@ BridgedPair::BridgedPair(Setup setup)
       on_event_(std::move(setup.on_event)),
       hosts_(*this, BridgeSide::hosts, std::move(setup.hosts)),
       board_(*this, BridgeSide::board, std::move(setup.board)),
-      control_(setup.timeout) {}
+      control_(setup.timeout),
+      guard_(setup.keys, setup.trusted) {}
 
 // --- the two sides
 
@@ -87,10 +99,14 @@ void BridgedPair::tick() {
       }
     }
   }
+  watch_board(now);
 }
 
 void BridgedPair::Side::on_carrier_event(const CarrierEvent& event) {
   if (event.kind == CarrierEvent::Kind::up) obstacle.clear();
+  if (event.kind == CarrierEvent::Kind::down && which == BridgeSide::board) {
+    pair.guard_.on_board_gone();
+  }
   if (pair.on_event_) pair.on_event_(which, event);
 }
 
@@ -132,7 +148,7 @@ bool BridgedPair::is_old(Side& side, Time now) {
 void BridgedPair::on_host_datagram(const Datagram& datagram, Peer from, Time now) {
   const MessageKind kind = kind_of(datagram);
   if (kind == MessageKind::command && is_stop(datagram)) {
-    if (!control_.has_place(from)) audience_.on_stop(from, now);
+    if (!control_.has_place(from)) audience_.listen(from, now);
     return pass_on(datagram, Priority::stop);
   }
   if (is_old(hosts_, now)) return;
@@ -141,48 +157,98 @@ void BridgedPair::on_host_datagram(const Datagram& datagram, Peer from, Time now
     ++hosts_.counters.misdirected;
     return;
   }
+  if (!is_allowed(datagram, kind, from, now)) return;
   const std::optional<Peer> before = control_.host();
   if (!control_.on_heartbeat(from, now)) {
     ++hosts_.counters.kept_out;
     return answer(datagram, Refusal::busy, 0, from, now);  // as the board does
   }
-  if (before != control_.host()) hosts_.carrier->hold(from);
+  if (before != control_.host()) {
+    hosts_.carrier->hold(from);
+    if (watch_.asked()) {  // what the board streams from now on is for this host
+      std::array<char, max_datagram> buffer;
+      DatagramWriter writer(buffer.data(), buffer.size());
+      send(board_, view(watch_.write_end(writer)), Priority::normal, everyone);
+    }
+  }
   pass_on(datagram);
 }
 
 void BridgedPair::on_command(const Datagram& datagram, Peer from, Time now) {
   if (is_single(datagram, Text("W"))) return on_lease(datagram, from, now);
-  const bool has_place = control_.has_place(from);
-  if (is_single(datagram, Text("Q"))) {
-    if (!has_place && datagram.has_pnum()) audience_.on_question(from, datagram.pnum(), now);
-    return pass_on(datagram);
+  const Field& command = datagram.command();
+  if (is_single(datagram, Text("Q")) && command.values() == "ID") {
+    return on_question(datagram, from, now);
   }
-  if (!has_place) {
+  if (!is_allowed(datagram, MessageKind::command, from, now)) return;
+  if (!control_.has_place(from)) {
     ++hosts_.counters.kept_out;
     // Where nobody keeps it out, its heartbeat comes.
     if (control_.keeps_out(from, now)) answer(datagram, Refusal::busy, 0, from, now);
     return;
   }
-  const Field& command = datagram.command();
+  if (datagram.has_pnum()) control_.on_number(datagram.pnum());
   if (is_single(datagram, Text("E")) && command.values() == "LEAVE") control_.on_farewell();
   pass_on(datagram);
 }
 
-// The board takes it for one of the host that has the place, and answers nothing while that is there.
+// True if that heartbeat or command may pass, as far as it does not depend on who has the place.
+bool BridgedPair::is_allowed(const Datagram& datagram, MessageKind kind, Peer from, Time now) {
+  Verdict verdict = guard_.judge(datagram, now);
+  if (verdict == Verdict::copy) {
+    verdict = control_.has_place(from) ? Verdict::authentic : Verdict::replayed;
+  }
+  const bool is_command = kind == MessageKind::command;
+  if (verdict != Verdict::authentic) {
+    ++hosts_.counters.refused;
+    if (!guard_.may_answer(verdict, is_command, now)) return false;
+    if (is_command) {
+      answer(datagram, Refusal::auth, 0, from, now);
+    } else {
+      audience_.listen(from, now);  // a heartbeat of the board tells the nonce
+    }
+    return false;
+  }
+  if (!is_command || !has_site_setting(datagram)) return true;
+  ++hosts_.counters.refused;
+  answer(datagram, Refusal::auth, 0, from, now);
+  return false;
+}
+
+void BridgedPair::on_question(const Datagram& datagram, Peer from, Time now) {
+  std::optional<std::uint32_t> pnum;
+  if (datagram.has_pnum()) pnum = datagram.pnum();
+  if (control_.has_place(from)) {
+    if (pnum) control_.on_number(*pnum);
+  } else if (!questions_.take(ms_of(now))) {
+    ++hosts_.counters.kept_out;
+    return;
+  }
+  audience_.on_question(from, pnum, now);
+  pass_on(datagram);
+}
+
+// The board takes it for one of the host that has the place. So it is answered here.
 void BridgedPair::on_lease(const Datagram& datagram, Peer from, Time now) {
   if (control_.has_place(from)) return pass_on(datagram);
-  const bool ends = datagram.command().values() == "0";
-  const auto effect = audience_.on_lease(from, ends, datagram.time_ms(), now);
-  if (effect == BridgeAudience::Effect::full) return answer(datagram, Refusal::busy, 0, from, now);
-  if (!control_.keeps_out(from, now)) {
-    if (datagram.has_pnum()) audience_.on_question(from, datagram.pnum(), now);
-    return pass_on(datagram);
+  Command command;
+  FieldSet fields;
+  Refusal refusal = parse_command(datagram.command(), command);
+  if (refusal == Refusal::none && !command.text.empty()) {
+    refusal = parse_fields(command.text, fields);
   }
-  ++hosts_.counters.kept_out;
-  if (effect == BridgeAudience::Effect::watching) return;
-  const std::uint32_t token = audience_.new_token();
-  audience_.tell(from, token, now);
-  answer(datagram, Refusal::stale, token, from, now);
+  if (refusal != Refusal::none) return answer(datagram, refusal, 0, from, now);
+  const bool ends = command.value == 0;
+  switch (audience_.on_lease(from, ends, datagram.time_ms(), now)) {
+    case BridgeAudience::Effect::full:
+      return answer(datagram, Refusal::busy, 0, from, now);
+    case BridgeAudience::Effect::watching:
+      if (!ends) watch_.wish(datagram.command().values());
+      return;
+    case BridgeAudience::Effect::unproven:
+      if (ends || !leases_.take(ms_of(now))) return;
+      return answer(datagram, Refusal::stale, audience_.new_token(from, now), from, now);
+  }
 }
 
 void BridgedPair::on_board_datagram(const Datagram& datagram, Time now) {
@@ -192,26 +258,21 @@ void BridgedPair::on_board_datagram(const Datagram& datagram, Time now) {
     ++board_.counters.misdirected;
     return;
   }
+  guard_.on_board_datagram(datagram, kind, now);
+  report_trouble();
   if (datagram.has_pnum() && datagram.has_time()) {
     board_known_ = true;
     board_pnum_ = datagram.pnum();
     board_t_ = datagram.time_ms();
     board_heard_ = now;
   }
-  std::optional<Peer> asker;
   switch (kind) {
-    case MessageKind::nack: {
-      Nack nack;
-      if (read_nack(datagram, nack)) asker = audience_.asker_of(nack.pnum, now);
-      if (asker && nack.lease != 0) audience_.tell(*asker, nack.lease, now);
-      break;
-    }
+    case MessageKind::nack:
     case MessageKind::identity: {
-      Identity identity;
-      if (read_identity(datagram, identity) && identity.has_asked) {
-        asker = audience_.asker_of(identity.asked, now);
-      }
-      break;
+      Nack nack;
+      if (read_nack(datagram, nack) && watch_.on_refusal(nack, now)) return;
+      const std::optional<Peer> asker = asker_of(datagram, kind, now);
+      return deliver(board_, hosts_, datagram, Priority::normal, asker.value_or(everyone));
     }
     case MessageKind::board_heartbeat:
       if (is_connecting_heartbeat(datagram) || heartbeat_reason(datagram) == SafeReason::link) {
@@ -219,18 +280,83 @@ void BridgedPair::on_board_datagram(const Datagram& datagram, Time now) {
       }
       break;
     default:
-      control_.on_state(now);
+      watch_.on_state(now);
+      // Of a board that has no host, it comes by our own lease.
+      if (control_.streams() || heartbeat_reason(datagram) != SafeReason::link) {
+        control_.on_state(now);
+      }
       break;
   }
-  const Priority priority = kind == MessageKind::state ? Priority::state : Priority::normal;
-  if (asker) return deliver(board_, hosts_, datagram, priority, *asker);
-  deliver(board_, hosts_, datagram, priority);
-  if (audience_.empty() || kind == MessageKind::nack || kind == MessageKind::identity) return;
+  const bool is_state = kind == MessageKind::state;
+  const Priority priority = is_state ? Priority::state : Priority::normal;
+  // A state that no host has asked for is for those that watch, and for nobody else.
+  const bool of_a_host = !is_state || control_.is_taken(now);
+  if (of_a_host) deliver(board_, hosts_, datagram, priority);
+  if (!audience_.empty()) copy_to_audience(datagram, priority, of_a_host, now);
+}
+
+// Those to whom what is for everyone comes get no copy of it.
+void BridgedPair::copy_to_audience(const Datagram& datagram, Priority priority, bool of_a_host,
+                                   Time now) {
   const auto copy = [&](Peer peer) {
-    if (!hosts_.carrier->reaches(peer)) send(hosts_, view(datagram.bytes()), priority, peer);
+    if (of_a_host && hosts_.carrier->reaches(peer)) return;
+    send(hosts_, view(datagram.bytes()), priority, peer);
   };
-  if (kind == MessageKind::state) return audience_.for_each_watcher(now, copy);
-  audience_.for_each_listener(now, copy);
+  audience_.for_each_watcher(now, copy);
+  if (priority == Priority::state) return;
+  audience_.for_each_listener(now, [&](Peer peer) {
+    if (copies_.take(ms_of(now))) copy(peer);
+  });
+}
+
+// The host that the board answers; none: the one that has the place.
+std::optional<Peer> BridgedPair::asker_of(const Datagram& answer, MessageKind kind,
+                                          Time now) const {
+  std::optional<std::uint32_t> pnum;
+  Nack nack;
+  Identity identity;
+  if (kind == MessageKind::nack) {
+    if (!read_nack(answer, nack)) return std::nullopt;
+    pnum = nack.pnum;
+  } else {
+    if (!read_identity(answer, identity)) return std::nullopt;
+    if (identity.has_asked) pnum = identity.asked;
+  }
+  if (pnum && control_.has_sent(*pnum)) return std::nullopt;
+  const std::optional<Peer> asker = audience_.asker_of(pnum, now);
+  return asker && control_.has_place(*asker) ? std::nullopt : asker;
+}
+
+void BridgedPair::watch_board(Time now) {
+  if (!board_.opened || control_.is_taken(now)) return;
+  if (!audience_.has_watchers(now)) watch_.wish_nothing();
+  if (!watch_.due(now)) return;
+  std::array<char, max_datagram> buffer;
+  DatagramWriter writer(buffer.data(), buffer.size());
+  send(board_, view(watch_.write(writer, now)), Priority::normal, everyone);
+}
+
+void BridgedPair::report_trouble() {
+  const BridgeGuard::Trouble trouble = guard_.trouble();
+  if (std::exchange(told_trouble_, trouble) == trouble || !on_event_) return;
+  Problem problem{ErrorKind::refused, board_.carrier->name(), "", ""};
+  switch (trouble) {
+    case BridgeGuard::Trouble::none:
+      return;
+    case BridgeGuard::Trouble::board_has_no_key:
+      problem.reason = "the board has no key, and this bridge passes only what is signed for it";
+      problem.fix =
+          "give the board the key while no bridge has its cable (r4 key give FILE URL), or begin "
+          "the bridge without --key";
+      break;
+    case BridgeGuard::Trouble::key_needed:
+      problem.reason =
+          "the board has a key, and this bridge, which has none, cannot tell what is signed with "
+          "it: nothing but stops and questions passes";
+      problem.fix = "give the bridge the key, too: r4 bridge … --key FILE";
+      break;
+  }
+  on_event_(BridgeSide::board, {CarrierEvent::Kind::warning, problem});
 }
 
 // In the board's place, as if it had said so together with what it said last.

@@ -2,15 +2,20 @@
 // Two carriers of one loop joined: on one hosts are heard, at the other is their board.
 //
 //     hosts --> E:STOP                          first of all, of anyone, however old
-//               heartbeats, commands            of the host that has the place (bridge_control.hpp)
-//               Q, W                            of anyone
+//               heartbeats, commands            of the host that has the place (bridge_control.hpp), if its datagrams
+//                                               prove what they must (bridge_guard.hpp)
+//               Q:ID                            of anyone
 //     board --> states, heartbeats              to the host that has the place, and who watches (bridge_audience.hpp)
 //               N, I                            to who has asked, by the number that they name
 //
 // The bytes stay as they are. What may have waited for longer than `oldest` before it was read is dropped, but a stop:
 // so nothing that a bridge held back is executed, or keeps a board alive. What waits to be sent is bounded likewise,
-// by the carriers' queues. No heartbeat is made here. Two answers are: BUSY for who is kept out, and a LEASE for who
-// watches while the board, which takes all hosts for one, tells none.
+// by the carriers' queues. Settings that a board takes only from its own cable (site_settings.hpp) never pass: a bridge
+// would turn everyone who reaches it into that cable, and would carry keys and passwords over a network.
+//
+// No heartbeat is made here. Answers are: BUSY for who is kept out, AUTH for what must not pass, and a LEASE for who
+// watches, since the board takes all hosts of a bridge for one. While no host has the place, the bridge itself watches
+// the board (bridge_watch.hpp).
 #pragma once
 
 #include <array>
@@ -18,13 +23,18 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "../../protocol/datagram/datagram_writer.hpp"
+#include "../../protocol/link/answer_budget.hpp"
 #include "../measurement/boot_clock.hpp"
 #include "bridge_audience.hpp"
 #include "bridge_control.hpp"
+#include "bridge_guard.hpp"
+#include "bridge_watch.hpp"
 #include "r4link/carrier.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/fleet.hpp"
@@ -46,6 +56,8 @@ class BridgedPair {
     // May the side of hosts be away at the beginning, too? A device may; a port to listen at is an error.
     Absence hosts_absence = Absence::refused;
     std::chrono::milliseconds timeout{1000};  // the board's
+    std::vector<Key> keys;                    // the board's
+    bool trusted = false;                     // as BridgeGuard takes it
     // Goes on while this computer sleeps, so that what has waited since before is old.
     std::function<Time()> now = [] { return Time(BootClock::now().time_since_epoch()); };
     std::function<void(BridgeSide, const CarrierEvent&)> on_event;
@@ -86,7 +98,13 @@ class BridgedPair {
   void on_host_datagram(const Datagram& datagram, Peer from, Time now);
   void on_board_datagram(const Datagram& datagram, Time now);
   void on_command(const Datagram& datagram, Peer from, Time now);
+  void on_question(const Datagram& datagram, Peer from, Time now);
   void on_lease(const Datagram& datagram, Peer from, Time now);
+  bool is_allowed(const Datagram& datagram, MessageKind kind, Peer from, Time now);
+  std::optional<Peer> asker_of(const Datagram& answer, MessageKind kind, Time now) const;
+  void copy_to_audience(const Datagram& datagram, Priority priority, bool of_a_host, Time now);
+  void watch_board(Time now);
+  void report_trouble();
   void answer(const Datagram& asked, Refusal code, std::uint32_t lease, Peer to, Time now);
   void deliver(Side& from, Side& to, const Datagram& datagram, Priority priority,
                Peer peer = everyone);
@@ -103,7 +121,11 @@ class BridgedPair {
   Side hosts_;
   Side board_;
   BridgeControl control_;
+  BridgeGuard guard_;
   BridgeAudience audience_;
+  BridgeWatch watch_;
+  AnswerBudget questions_, leases_, copies_;  // of hosts that have proved nothing
+  BridgeGuard::Trouble told_trouble_ = BridgeGuard::Trouble::none;
   // The board's newest number and clock, for answers in its place.
   bool board_known_ = false;
   std::uint32_t board_pnum_ = 0;

@@ -8,8 +8,18 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
 
 namespace r4 {
+
+// For the machines of protocol/, whose milliseconds wrap.
+inline std::uint32_t ms_of(std::chrono::steady_clock::duration time) {
+  return static_cast<std::uint32_t>(
+      std::chrono::duration_cast<std::chrono::milliseconds>(time).count());
+}
+inline std::uint32_t ms_of(std::chrono::steady_clock::time_point time) {
+  return ms_of(time.time_since_epoch());
+}
 
 class WaitingTime {
  public:

@@ -36,6 +36,7 @@
 
 #include "carrier.hpp"
 #include "config.hpp"
+#include "key.hpp"
 #include "link.hpp"
 #include "options.hpp"
 #include "recording.hpp"
@@ -224,8 +225,10 @@ struct BridgeCounters {
   std::uint64_t damaged = 0;  // a wrong checksum, too long, or no datagram at all
   std::uint64_t misdirected =
       0;  // what only a board says from the hosts' side, or the other way round
-  std::uint64_t kept_out = 0;  // heartbeats, commands and leases while another host has the place
-  std::uint64_t late = 0;      // may have waited for more than 100 ms: the bridge was held up
+  std::uint64_t kept_out = 0;  // heartbeats and commands while another host has the place
+  std::uint64_t refused =
+      0;  // not signed though it must be, or a setting that only a cable may change
+  std::uint64_t late = 0;         // may have waited for more than 100 ms: the bridge was held up
   std::uint64_t undelivered = 0;  // the other side is away, takes no more, or nobody is known there
   // Of what passed: a newer state took its place in front of the other side, or it waited there for 100 ms.
   std::uint64_t outdated = 0;
@@ -251,6 +254,13 @@ struct BridgeEvent {
 };
 
 struct BridgeOptions {
+  // The board's keys, at most four (load_key()). With one the bridge passes only heartbeats and commands that are
+  // signed with it, as a board does that is reached by radio; stops and questions pass without.
+  std::vector<Key> keys;
+  // A board obeys its own cable without a signature. Unless this is set, a bridge to a cable therefore passes nothing
+  // unsigned to a board that has a key, and is refused on a network without `keys`. Set it, and everyone who reaches
+  // the hosts' side may drive the board.
+  bool open = false;
   // After so long without a heartbeat of the host that has the place another one gets it: no shorter than the
   // board's timeout.
   std::chrono::milliseconds timeout{1000};
@@ -264,7 +274,8 @@ struct BridgeOptions {
 //     r4::Bridge bus("udp://0.0.0.0:2100-2107", "can://can0?node=0-7");
 //
 // It makes no heartbeat: a board whose host has died goes safe. Of several hosts one at a time is let through, and
-// E:STOP of any. A device that is not there, or goes, is waited for. Thread-safe.
+// E:STOP of any. A device that is not there, or goes, is waited for. What only a cable may set (C:key, C:network …)
+// never passes. Thread-safe.
 class R4LINK_API Bridge {
  public:
   // `hosts`: where hosts are heard, as r4 sim takes it; `board`: as a host takes it. Patterns of as many boards

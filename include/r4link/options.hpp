@@ -64,7 +64,7 @@ struct BoardOptions {
 //     r4::Board board("udp://192.168.0.125", options);
 //
 // Throws Error: open if it cannot be read, permission if others than its owner may read or write
-// it, data if it holds no key.
+// it, data if it holds no key. A file of root's may also be read by its group, as a service's is.
 R4LINK_API Key load_key(const std::string& path);
 
 }  // namespace r4

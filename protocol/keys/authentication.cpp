@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "authentication.hpp"
 
+#include <cstring>
+
 #include "../datagram/numbers.hpp"
 
 namespace r4 {
@@ -102,12 +104,23 @@ void Authentication::use(const Key (&keys)[max_keys]) {
 
 void Authentication::renew() {
   has_nonce_ = required_ && has_chance_;
-  for (Entry& entry : entries_) entry.highest = entry.forgotten = 0;
-  for (std::uint8_t& id : used_with_) id = 0;
+  forget_counters();
   if (!has_nonce_) return;
   std::uint8_t digest[nonce_size / 2];
   draw(Text(), digest);
   write_hex(nonce_, digest, sizeof digest);
+}
+
+void Authentication::follow(Text nonce) {
+  if (nonce == this->nonce()) return;
+  has_nonce_ = nonce.size() == nonce_size;
+  forget_counters();
+  if (has_nonce_) std::memcpy(nonce_, nonce.data(), nonce_size);
+}
+
+void Authentication::forget_counters() {
+  for (Entry& entry : entries_) entry.highest = entry.forgotten = 0;
+  for (std::uint8_t& id : used_with_) id = 0;
 }
 
 std::uint32_t Authentication::random() {

@@ -72,6 +72,9 @@ class Authentication {
   Text nonce() const { return Text(nonce_, has_nonce_ ? nonce_size : 0); }
   // Another nonce: what was signed before is of no use then. Counters begin anew.
   void renew();
+  // Checks in the place of a board that tells this nonce, as a bridge does. Empty: the board tells none, and nothing is
+  // authentic. Counters begin anew with another nonce.
+  void follow(Text nonce);
 
   // Is there chance to make random numbers of?
   bool has_chance() const { return has_chance_; }
@@ -98,6 +101,7 @@ class Authentication {
     std::uint8_t id = 0;
   };
   Entry* find(int id);
+  void forget_counters();
   bool is_used(const Entry& entry, std::uint64_t counter) const;
   void spend(Entry& entry, std::uint64_t counter);
   void draw(Text purpose, std::uint8_t (&digest)[nonce_size / 2]);

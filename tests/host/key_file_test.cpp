@@ -31,13 +31,22 @@ TEST_F(KeyFile, HoldsAKeyForItsOwnerAlone) {
 }
 
 TEST_F(KeyFile, IsRefusedWhereOthersMayReadOrWriteIt) {
-  for (const mode_t mode : {0640, 0604, 0620, 0602}) {
+  for (const mode_t mode : {0644, 0604, 0620, 0602}) {
     write(text, mode);
     const Problem problem = problem_of([&] { load_key(path); });
     EXPECT_EQ(problem.kind, ErrorKind::permission) << mode;
     EXPECT_EQ(problem.thing, path);
     EXPECT_TRUE(contains(problem.fix, "chmod 600"));
   }
+}
+
+TEST_F(KeyFile, MayBeReadByItsGroupIfItIsRoots) {
+  write(text, 0640);
+  if (::geteuid() == 0) {
+    EXPECT_EQ(load_key(path).id, 3);
+    ASSERT_EQ(::chown(path.c_str(), 1, 1), 0);
+  }
+  EXPECT_EQ(problem_of([&] { load_key(path); }).kind, ErrorKind::permission);
 }
 
 TEST_F(KeyFile, IsNamedWhereItHoldsNoKey) {

@@ -56,6 +56,7 @@ def test_the_papers_udp_client_drives_a_board_on_a_serial_port(board):
     with listening, sending, Bridge(f'udp://127.0.0.1:0?peer={peer}', f'serial://{board.tty}') as bridge:
         port = int(bridge.url.split('?')[0].rsplit(':', 1)[1])
         client = PaperClient(lambda data: sending.sendto(data, ('127.0.0.1', port)))
+        bridge.counters('board', lambda each: each['passed'] or each['undelivered'])  # the board has told that it has no key
         end = time.monotonic() + LASTS_S
         while time.monotonic() < end:
             try:
@@ -72,7 +73,7 @@ def test_the_papers_udp_client_drives_a_board_on_a_serial_port(board):
     # A machine that stands still for a moment makes some late; none vanishes.
     assert hosts['passed'] + hosts['late'] + hosts['undelivered'] == client.pnum_sent or SANITIZED
     assert hosts['passed'] > 0.95 * client.pnum_sent
-    assert hosts['damaged'] == hosts['misdirected'] == hosts['kept_out'] == 0
+    assert hosts['damaged'] == hosts['misdirected'] == hosts['kept_out'] == hosts['refused'] == 0
 
 
 def test_one_drives_through_two_bridges_while_another_watches_and_a_third_stops(bridge, board):
@@ -145,12 +146,43 @@ def test_by_default_it_listens_to_this_computer_alone(board):
         assert bridge.url.startswith('udp://127.0.0.1:')
 
 
+def test_a_cable_is_not_opened_to_a_network_by_mistake(board):
+    refused = run('bridge', 'udp://0.0.0.0:0', f'serial://{board.tty}')
+    assert refused.returncode == 2 and ERROR.match(refused.stderr) and '--open' in refused.stderr
+    with Bridge('udp://0.0.0.0:0', f'serial://{board.tty}', '--open') as bridge:
+        warning = bridge.next(lambda each: each['type'] == 'transport' and each['event'] == 'warning')
+        assert warning['side'] == 'hosts' and 'it is open' in warning['reason']
+
+
+def test_a_board_with_a_key_at_a_cable_obeys_only_who_has_it(tty, tmp_path):
+    key = tmp_path / 'key'
+    assert run('key', 'new', str(key)).returncode == 0
+    with Board(f'pty:{tty}', options=('--set', f'key,{key.read_text().strip()}')):
+        with Bridge('udp://127.0.0.1:0', f'serial://{tty}') as bridge:
+            assert run('send', bridge.host_url, 'R:1,On', '--key', str(key), '--timeout', '1').returncode == 3
+        with Bridge('udp://127.0.0.1:0', f'serial://{tty}', '--key', str(key)) as bridge:
+            assert run('send', bridge.host_url, 'R:1,On', '--timeout', '1').returncode == 3
+            signed = run('send', bridge.host_url, 'R:1,On', 'O:358,1,1', '--key', str(key))
+            assert signed.returncode == 0, signed.stderr
+            assert run('stop', bridge.host_url).returncode == 0
+
+
+def test_no_key_goes_through_a_bridge(tty, tmp_path):
+    key = tmp_path / 'key'
+    assert run('key', 'new', str(key)).returncode == 0
+    with Board('udp://127.0.0.1:0') as board:
+        with Bridge(f'pty:{tty}', board.host_url) as bridge:
+            given = run('key', 'give', str(key), f'serial://{tty}')
+            assert given.returncode == 3 and ERROR.match(given.stderr), given.stderr
+            assert bridge.counters('hosts', lambda each: each['refused'] > 0)
+
+
 @pytest.mark.parametrize('hosts, to, code', [
     ('udp://127.0.0.1:2018', 'udp://127.0.0.1', 2),
     ('udp://127.0.0.1:2100-2107', 'can://can0?node=0-6', 2),
     ('udp://127.0.0.1:0', 'pty:', 2),
     ('sim:', 'serial:auto', 2),
-    ('udp://192.0.2.1:2018', 'serial:auto', 4),
+    ('udp://192.0.2.1:2018', 'udp://127.0.0.1:2019', 4),
     ('udp://127.0.0.1:0', 'nothing', 2),
 ])
 def test_what_cannot_be_joined_is_one_clear_line(hosts, to, code):

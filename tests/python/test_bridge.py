@@ -27,9 +27,25 @@ def test_a_host_drives_the_board_behind_a_bridge():
 def test_what_cannot_be_joined_is_an_error():
     with pytest.raises(r4link.UsageError, match='both sides of the bridge are the same'):
         r4link.Bridge('can://can0', 'can://can0?node=1')
+    with pytest.raises(r4link.UsageError, match='everyone who reaches it'):
+        r4link.Bridge('udp://0.0.0.0:0', 'serial:///dev/r4-is-not-there')
+    r4link.Bridge('udp://0.0.0.0:0', 'serial:///dev/r4-is-not-there', open=True).close()
     with r4link.Bridge('udp://127.0.0.1:0', 'sim:') as bridge:
         with pytest.raises(r4link.OpenError, match='in use'):
             r4link.Bridge(bridge.status()[0].hosts.name, 'sim:')
+
+
+def test_with_a_key_it_passes_only_what_is_signed(tmp_path):
+    files = [tmp_path / 'a', tmp_path / 'b']
+    for number, file in enumerate(files, 1):
+        file.write_text(f'{number}:' + f'{number}' * 64)
+        file.chmod(0o600)
+    for key in (files[0], str(files[0]), files):
+        r4link.Bridge('udp://0.0.0.0:0', 'serial:///dev/r4-is-not-there', key=key).close()
+    with r4link.Bridge('udp://127.0.0.1:0', 'sim:', key=files[0]) as bridge:
+        with pytest.raises(r4link.Error), r4link.Board(bridge.status()[0].hosts.name + '?listen=0') as board:
+            board.wait_active(timeout=0.5)
+        assert bridge.status()[0].hosts.counters.refused > 0
 
 
 def test_a_fork_has_no_part_in_it():

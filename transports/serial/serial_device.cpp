@@ -109,6 +109,7 @@ FileDescriptor open_pty(asio::io_context& io, const std::string& path, unsigned 
   Port port(io);
   port.open(path, error);
   if (error) fail(path, error.value());
+  close_on_exec(port.native_handle());
   port.set_option(Port::character_size(8), error);
   if (!error) port.set_option(Port::parity(Port::parity::none), error);
   if (!error) port.set_option(Port::stop_bits(Port::stop_bits::one), error);

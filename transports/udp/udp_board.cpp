@@ -5,8 +5,13 @@
 
 #include <utility>
 
+#include "network/packet_address.hpp"
+
 namespace r4 {
 namespace {
+
+// Others of the loop wait.
+constexpr int most_packets = 32;
 
 asio::ip::address mapped_to_v6(const asio::ip::address& address) {
   return asio::ip::make_address_v6(asio::ip::v4_mapped, address.to_v4());
@@ -25,17 +30,21 @@ void UdpBoard::open(Handler& handler) {
   asio::error_code error;
   socket_.bind(local, error);
   if (error) refuse(error, local, "end that program, or listen on another port");
+  at_all_addresses_ =
+      local.address().is_unspecified() && note_addresses(socket_.native_handle(), local.protocol());
+  sent_to_ = asio::ip::address();
   name_ = fmt::format("udp://{}:{}", bracketed(url_.host), socket_.local_endpoint().port());
   if (!url_.peer.empty()) name_ += "?peer=" + url_.peer;
   begin(handler);
 }
 
 void UdpBoard::find_peer(const Endpoint& local) {
-  audience_ = Endpoint(lookup_.find(url_.peer_host, url_.text), url_.peer_port);
+  audience_ = {Endpoint(lookup_.find(url_.peer_host, url_.text), url_.peer_port), {}};
+  Endpoint& host = audience_.host;
   const bool v6_socket = local.protocol() == asio::ip::udp::v6();
-  if (v6_socket && audience_.protocol() == asio::ip::udp::v4()) {
-    audience_.address(mapped_to_v6(audience_.address()));
-  } else if (!v6_socket && audience_.protocol() == asio::ip::udp::v6()) {
+  if (v6_socket && host.protocol() == asio::ip::udp::v4()) {
+    host.address(mapped_to_v6(host.address()));
+  } else if (!v6_socket && host.protocol() == asio::ip::udp::v6()) {
     throw Error(ErrorKind::usage, url_.text, "an IPv4 socket cannot send to an IPv6 peer",
                 "listen on [::]");
   }
@@ -52,12 +61,30 @@ void UdpBoard::close_socket() noexcept {
   socket_.close(ignored);
 }
 
+void UdpBoard::listen() {
+  if (!at_all_addresses_) return UdpEnd::listen();
+  socket_.async_wait(UdpSocket::wait_read, reception_.handler([this] { take_what_is_there(); }));
+}
+
+void UdpBoard::take_what_is_there() {
+  for (int i = 0; i < most_packets && handler_ != nullptr; ++i) {
+    const auto size = receive_packet(socket_.native_handle(), received_.data(), received_.size(),
+                                     sender_, sent_to_);
+    if (!size) {
+      handler_->on_drained();
+      break;
+    }
+    received({received_.data(), *size});
+  }
+  if (handler_ != nullptr) listen();
+}
+
 void UdpBoard::received(std::string_view bytes) {
   if (bytes.size() > max_datagram) {
     ++counters_.rx_oversize;
     return;
   }
-  const Peer peer = peers_.heard(sender_, bytes);
+  const Peer peer = peers_.heard({sender_, sent_to_}, bytes);
   follow_audience();
   hand_over(bytes, peer);
 }
@@ -68,12 +95,12 @@ void UdpBoard::hold(Peer peer) {
 }
 
 bool UdpBoard::reaches(Peer peer) const {
-  const Endpoint* const at = peers_.find(peer);
+  const Place* const at = peers_.find(peer);
   return peer == everyone || (at != nullptr && audience_known_ && *at == audience_);
 }
 
 void UdpBoard::follow_audience() {
-  const Endpoint* const audience = peers_.find(peers_.audience());
+  const Place* const audience = peers_.find(peers_.audience());
   if (audience == nullptr || !url_.peer_host.empty()) return;
   audience_ = *audience;
   audience_known_ = true;
@@ -81,25 +108,28 @@ void UdpBoard::follow_audience() {
 
 UdpEnd::Outcome UdpBoard::transmit(std::string_view bytes, Peer to) {
   if (to == everyone) {
-    if (audience_known_) return transmit_to(bytes, audience_, true);
+    if (audience_known_) return transmit_to(bytes, audience_.host, true, audience_.at);
     ++counters_.tx_dropped;
     return Outcome::failed;
   }
-  const Endpoint* const asker = peers_.find(to);
+  const Place* const asker = peers_.find(to);
   if (asker == nullptr) {
     ++counters_.tx_dropped;
     return Outcome::failed;
   }
-  const Outcome outcome = transmit_to(bytes, *asker, false);
+  const Outcome outcome = transmit_to(bytes, asker->host, false, asker->at);
   if (outcome == Outcome::busy) return outcome;
-  const bool same_machine =
-      !url_.peer_host.empty() && asker->address() == audience_.address() && !peers_.watches(to);
-  if (same_machine && asker->port() != audience_.port()) {
-    return transmit_to(bytes, audience_, true);
+  const bool same_machine = !url_.peer_host.empty() &&
+                            asker->host.address() == audience_.host.address() &&
+                            !peers_.watches(to);
+  if (same_machine && asker->host.port() != audience_.host.port()) {
+    return transmit_to(bytes, audience_.host, true, asker->at);
   }
   return outcome;
 }
 
-int UdpBoard::probe(const std::vector<OwnAddress>& own) { return probe_route(audience_, {}, own); }
+int UdpBoard::probe(const std::vector<OwnAddress>& own) {
+  return probe_route(audience_.host, {}, own);
+}
 
 }  // namespace r4

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's end of UDP: hosts come and go, and one of them is in control.
+// The board's end of UDP: hosts come and go, and one of them is in control. At 0.0.0.0 or [::] each host is answered
+// from the address that it has asked.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -22,6 +23,18 @@ class UdpBoard final : public UdpEnd {
   bool reaches(Peer peer) const override;
 
  private:
+  // A host, and the address of this computer that it sends to: its answers leave from there. Unspecified where the
+  // socket has one address only.
+  struct Place {
+    Endpoint host;
+    asio::ip::address at;
+    friend bool operator==(const Place& a, const Place& b) {
+      return a.host == b.host && a.at == b.at;
+    }
+  };
+
+  void listen() override;
+  void take_what_is_there();
   void received(std::string_view bytes) override;
   Outcome transmit(std::string_view bytes, Peer to) override;
   int probe(const std::vector<OwnAddress>& own) override;
@@ -33,9 +46,11 @@ class UdpBoard final : public UdpEnd {
   static constexpr int peer_places = 16;
 
   const HostLookup lookup_;
-  PeerTable<Endpoint, peer_places> peers_;
+  PeerTable<Place, peer_places> peers_;
+  bool at_all_addresses_ = false;
+  asio::ip::address sent_to_;  // of the packet that is being read
   bool audience_known_ = false;
-  Endpoint audience_;  // where what is for everyone goes
+  Place audience_;  // where what is for everyone goes
 };
 
 }  // namespace r4

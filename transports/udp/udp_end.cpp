@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "../file_descriptor.hpp"
+#include "network/packet_address.hpp"
 #include "udp_port_user.hpp"
 
 namespace r4 {
@@ -25,16 +26,6 @@ constexpr std::chrono::milliseconds probe_interval{200};
 bool is_network_loss(int error) {
   return error == ENETUNREACH || error == ENETDOWN || error == EHOSTUNREACH ||
          error == EADDRNOTAVAIL || error == ENODEV;
-}
-
-// 0 if the system has taken it, else errno.
-int send_packet(int socket, std::string_view bytes, const asio::ip::udp::endpoint& to) {
-  ssize_t sent = 0;
-  do {
-    sent = ::sendto(socket, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL, to.data(),
-                    static_cast<socklen_t>(to.size()));
-  } while (sent < 0 && errno == EINTR);
-  return sent >= 0 ? 0 : errno;
 }
 
 }  // namespace
@@ -54,7 +45,7 @@ UdpEnd::UdpEnd(asio::io_context& io, UdpUrl url)
 
 void UdpEnd::open_socket(const Endpoint& local, bool v6_only) {
   asio::error_code error;
-  socket_.open(local.protocol(), error);
+  open_close_on_exec(socket_, local.protocol(), error);
   if (!error && local.protocol() == asio::ip::udp::v6()) {
     socket_.set_option(asio::ip::v6_only(v6_only), error);
   }
@@ -153,10 +144,11 @@ void UdpEnd::send_waiting() {
   writable_.stop();
 }
 
-UdpEnd::Outcome UdpEnd::transmit_to(std::string_view bytes, const Endpoint& to, bool standing) {
-  int error = send_packet(socket_.native_handle(), bytes, to);
+UdpEnd::Outcome UdpEnd::transmit_to(std::string_view bytes, const Endpoint& to, bool standing,
+                                    const asio::ip::address& from) {
+  int error = send_packet(socket_.native_handle(), bytes, to, from);
   // That is about an earlier packet, no program listens there yet; this one was not sent for it.
-  if (error == ECONNREFUSED) error = send_packet(socket_.native_handle(), bytes, to);
+  if (error == ECONNREFUSED) error = send_packet(socket_.native_handle(), bytes, to, from);
   if (error == 0 || error == ECONNREFUSED) {
     ++counters_.tx_datagrams;
     counters_.tx_bytes += bytes.size();

@@ -10,6 +10,7 @@
 
 #include "process.hpp"
 #include "r4link/fleet.hpp"
+#include "r4link/options.hpp"
 
 namespace r4::python {
 namespace {
@@ -22,16 +23,19 @@ End end_of(const BridgeEnd& end) {
   const BridgeCounters& from = end.from;
   return {end.name,
           end.up,
-          {from.passed, from.stops, from.damaged, from.misdirected, from.kept_out, from.late,
-           from.undelivered, from.outdated}};
+          {from.passed, from.stops, from.damaged, from.misdirected, from.kept_out, from.refused,
+           from.late, from.undelivered, from.outdated}};
 }
 
 using PyBridge = OfThisProcess<Bridge>;
 
-PyBridge opened_bridge(const std::string& hosts, const std::string& board, int timeout_ms) {
+PyBridge opened_bridge(const std::string& hosts, const std::string& board, int timeout_ms,
+                       const std::vector<std::string>& keys, bool open) {
   BridgeOptions options;
   options.timeout = std::chrono::milliseconds(timeout_ms);
+  options.open = open;
   const py::gil_scoped_release free;
+  for (const std::string& path : keys) options.keys.push_back(load_key(path));
   return {"the bridge", std::make_unique<Bridge>(hosts, board, std::move(options))};
 }
 
@@ -48,7 +52,7 @@ std::vector<std::pair<End, End>> status_of(const PyBridge& bridge) {
 void bind_bridge(py::module_& module) {
   py::class_<PyBridge>(module, "Bridge")
       .def(py::init(&opened_bridge), py::arg("hosts"), py::arg("board"), py::kw_only(),
-           py::arg("timeout"))
+           py::arg("timeout"), py::arg("keys"), py::arg("open"))
       .def(
           "close", [](PyBridge& bridge) { bridge.if_here([](Bridge& here) { here.close(); }); },
           Released())

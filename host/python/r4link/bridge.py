@@ -10,7 +10,9 @@ It runs on a thread of its own, which never takes the GIL.
 from __future__ import annotations
 
 import atexit
+import os
 import weakref
+from collections.abc import Sequence
 from types import TracebackType
 from typing import NamedTuple, Self, Type
 
@@ -33,7 +35,8 @@ class BridgeCounters(NamedTuple):
     # Dropped:
     damaged: int  # a wrong checksum, too long, or no datagram at all
     misdirected: int  # what only a board says from the hosts' side, or the other way round
-    kept_out: int  # heartbeats, commands and leases while another host has the place
+    kept_out: int  # heartbeats and commands while another host has the place
+    refused: int  # not signed though it must be, or a setting that only a cable may change
     late: int  # may have waited for more than 100 ms: the bridge was held up
     undelivered: int  # the other side is away, takes no more, or nobody is known there
     # Of what passed: a newer state took its place in front of the other side, or it waited there for 100 ms.
@@ -53,11 +56,15 @@ class BridgeStatus(NamedTuple):
 
 
 class Bridge:
-    def __init__(self, hosts: str, board: str, *, timeout: float = 1.0) -> None:
+    def __init__(self, hosts: str, board: str, *, timeout: float = 1.0,
+                 key: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (), open: bool = False) -> None:
         """`hosts`: where hosts are heard, 'udp://0.0.0.0:2018'; `board`: as Board takes it. Patterns of as many boards
         are joined in order. After `timeout` without a heartbeat of the host that is let through, another is: no shorter
-        than the board's timeout."""
-        self._core = _core.Bridge(hosts, board, timeout=_ms(timeout))
+        than the board's timeout. With `key`, the path of a key file of the board's or several (`~` is yours), only what
+        is signed with one passes. To a board at a serial port a network needs that, unless `open` lets everyone drive."""
+        files = [key] if isinstance(key, (str, os.PathLike)) else key
+        self._core = _core.Bridge(hosts, board, timeout=_ms(timeout), open=open,
+                                  keys=[os.path.expanduser(os.fspath(each)) for each in files])
         _open.add(self)
 
     def close(self) -> None:

@@ -117,12 +117,43 @@ TEST(Bridge, RefusesWhatCannotBeJoined) {
                 "they stand for 1 and 2 transports"},
            Case{"udp://127.0.0.{1,1}:0", "can://can0?node=0-1", ErrorKind::usage,
                 "it is in the bridge twice"},
+           Case{"udp://0.0.0.0:0", "serial:auto", ErrorKind::usage,
+                "everyone who reaches it may drive the board at serial:auto, which asks for no key "
+                "at its cable"},
+           Case{"udp://[::]:0", "serial:///dev/r4", ErrorKind::usage,
+                "everyone who reaches it may drive the board at serial:///dev/r4, which asks for "
+                "no key at its cable"},
+           Case{"can://can0?node=3", "serial:auto", ErrorKind::usage,
+                "everyone who reaches it may drive the board at serial:auto, which asks for no key "
+                "at its cable"},
        }) {
     const Problem problem = problem_of([&] { Bridge(each.hosts, each.board); });
     EXPECT_EQ(problem.kind, each.kind) << each.hosts << ' ' << each.board;
     EXPECT_EQ(problem.reason, each.reason) << each.hosts << ' ' << each.board;
     EXPECT_FALSE(problem.fix.empty()) << each.hosts << ' ' << each.board;
   }
+}
+
+TEST(Bridge, ListensToANetworkForABoardAtACableWithItsKeyOrOnPurpose) {
+  const std::string away = "serial:///dev/r4-is-not-there";
+  BridgeOptions keyed;
+  keyed.keys.resize(1);
+  keyed.keys[0].id = 1;
+  EXPECT_NO_THROW(Bridge("udp://0.0.0.0:0", away, keyed));
+  EXPECT_NO_THROW(Bridge("udp://127.0.0.1:0", away));
+
+  std::string warned;
+  BridgeOptions open;
+  open.open = true;
+  open.on_event = [&warned](const BridgeEvent& event) {
+    if (event.event.kind == CarrierEvent::Kind::warning) warned = event.event.problem.text();
+  };
+  EXPECT_NO_THROW(Bridge("udp://0.0.0.0:0", away, open));
+  EXPECT_NE(warned.find("it is open: everyone who reaches it may drive the board"),
+            std::string::npos)
+      << warned;
+  open.keys = keyed.keys;
+  EXPECT_EQ(problem_of([&] { Bridge("udp://0.0.0.0:0", away, open); }).kind, ErrorKind::usage);
 }
 
 TEST(Bridge, SaysWhoHasThePort) {

@@ -29,7 +29,7 @@ class BridgedPairTest : public testing::Test, protected ScriptedBridge {
     hosts->say(heartbeat, first);
     board->say(board_state);
     hosts->take();
-    board->take();
+    passed();
   }
 };
 
@@ -47,6 +47,22 @@ TEST_F(BridgedPairTest, BytesPassAsTheyAre) {
   }
 }
 
+TEST_F(BridgedPairTest, ASettingThatOnlyACableMayChangeNeverPasses) {
+  begin();
+  passed();
+  for (const char* const command :
+       {"C:key,1:off", "C:network,evil", "C:password,evilevil", "C:host,10.0.0.1", "C:port,2019",
+        "C:node,3", "C:chips,31", "C:name,left", "C:AIN24,50", "C:key", "O:1,1,1;C:key,1:off"}) {
+    hosts->take();
+    hosts->say(std::string(command) + ";PNum:2;T:0;", first);
+    EXPECT_EQ(passed(), Texts{}) << command;
+    EXPECT_EQ(hosts->take(), Texts{"N:2,AUTH;PNum:7;T:100;@1"}) << command;
+  }
+  EXPECT_EQ(from_hosts().refused, 11U);
+  hosts->say("C:rate,50;PNum:3;T:0;", first);
+  EXPECT_EQ(passed(), Texts{"C:rate,50;PNum:3;T:0;"});
+}
+
 TEST_F(BridgedPairTest, WhatIsDamagedIsDroppedAndCounted) {
   begin();
   std::string damaged = with_crc("O:358,1,1;PNum:2;T:0;");
@@ -56,7 +72,7 @@ TEST_F(BridgedPairTest, WhatIsDamagedIsDroppedAndCounted) {
   damaged = with_crc(board_state);
   damaged[7] = '9';
   board->say_bytes(damaged);
-  EXPECT_EQ(board->take(), Texts{});
+  EXPECT_EQ(passed(), Texts{});
   EXPECT_EQ(hosts->take(), Texts{});
   EXPECT_EQ(from_hosts().damaged, 2U);
   EXPECT_EQ(from_board().damaged, 1U);
@@ -69,16 +85,16 @@ TEST_F(BridgedPairTest, NothingOfTheWrongEndPasses) {
   hosts->say(board_state, second);
   board->say(heartbeat);
   board->say("O:358,1,1;PNum:2;T:0;");
-  EXPECT_EQ(board->take(), Texts{});
+  EXPECT_EQ(passed(), Texts{});
   EXPECT_EQ(hosts->take(), Texts{});
   EXPECT_EQ(from_hosts().misdirected, 3U);
   EXPECT_EQ(from_board().misdirected, 2U);
 }
 
-TEST_F(BridgedPairTest, ItSaysNothingOfItsOwn) {
+TEST_F(BridgedPairTest, ItMakesNoHeartbeatAndNoCommand) {
   begin();
   pass(10s);
-  EXPECT_EQ(board->take(), Texts{});
+  EXPECT_EQ(passed(), Texts{});
   EXPECT_EQ(hosts->take(), Texts{});
 }
 
@@ -89,11 +105,11 @@ TEST_F(BridgedPairTest, TheFirstHostIsLetThroughAlone) {
   EXPECT_EQ(hosts->held, first);
   hosts->say("H:ROS2-R4;PNum:50;T:0;", second);
   hosts->say("O:1,1,1;PNum:51;T:0;", second);
-  EXPECT_EQ(board->take(), Texts{});
+  EXPECT_EQ(passed(), Texts{});
   EXPECT_EQ(hosts->take(), (Texts{"N:50,BUSY;PNum:7;T:100;@2", "N:51,BUSY;PNum:7;T:100;@2"}));
   EXPECT_EQ(from_hosts().kept_out, 2U);
   hosts->say("O:1,1,1;PNum:2;T:0;", first);
-  EXPECT_EQ(board->take(), Texts{"O:1,1,1;PNum:2;T:0;"});
+  EXPECT_EQ(passed(), Texts{"O:1,1,1;PNum:2;T:0;"});
 }
 
 TEST_F(BridgedPairTest, AnotherHostGetsThePlaceAfterTheTimeoutAndNotBefore) {
@@ -101,20 +117,20 @@ TEST_F(BridgedPairTest, AnotherHostGetsThePlaceAfterTheTimeoutAndNotBefore) {
   pass(975ms);
   board->say(board_state);
   hosts->say("H:ROS2-R4;PNum:50;T:0;", second);
-  EXPECT_EQ(board->take(), Texts{});
+  EXPECT_EQ(passed(), Texts{});
   pass(25ms);
   hosts->say("H:ROS2-R4;PNum:51;T:0;", second);
-  EXPECT_EQ(board->take(), Texts{"H:ROS2-R4;PNum:51;T:0;"});
+  EXPECT_EQ(passed(), Texts{"H:ROS2-R4;PNum:51;T:0;"});
   EXPECT_EQ(hosts->held, second);
   hosts->say("O:1,1,1;PNum:2;T:0;", first);
-  EXPECT_EQ(board->take(), Texts{}) << "it has lost its place";
+  EXPECT_EQ(passed(), Texts{}) << "it has lost its place";
 }
 
 TEST_F(BridgedPairTest, ACommandWithoutAHeartbeatBeforeItDoesNotPass) {
   board->say(board_state);
   hosts->take();
   hosts->say("O:1,1,1;PNum:2;T:0;", first);
-  EXPECT_EQ(board->take(), Texts{});
+  EXPECT_EQ(passed(), Texts{});
   EXPECT_EQ(hosts->take(), Texts{}) << "its heartbeat may come: it is not kept out";
   EXPECT_EQ(from_hosts().kept_out, 1U);
 }
@@ -123,10 +139,10 @@ TEST_F(BridgedPairTest, AFarewellMakesRoomWhenTheBoardHasConfirmedIt) {
   begin();
   hosts->say("E:LEAVE;PNum:9;T:100;", first);
   hosts->say("H:ROS2-R4;PNum:50;T:0;", second);
-  EXPECT_EQ(board->take(), Texts{"E:LEAVE;PNum:9;T:100;"});
+  EXPECT_EQ(passed(), Texts{"E:LEAVE;PNum:9;T:100;"});
   board->say("H:R4-ROS2;PNum:8;T:101;SAFE:1;");
   hosts->say("H:ROS2-R4;PNum:51;T:0;", second);
-  EXPECT_EQ(board->take(), Texts{"H:ROS2-R4;PNum:51;T:0;"});
+  EXPECT_EQ(passed(), Texts{"H:ROS2-R4;PNum:51;T:0;"});
 }
 
 TEST_F(BridgedPairTest, AHostThatTheBoardDoesNotTakeKeepsNobodyOutForLong) {
@@ -135,9 +151,30 @@ TEST_F(BridgedPairTest, AHostThatTheBoardDoesNotTakeKeepsNobodyOutForLong) {
     pass(100ms);
     hosts->say(heartbeat, first);
   }
-  board->take();
+  passed();
   hosts->say("H:ROS2-R4;PNum:50;T:0;", second);
-  EXPECT_EQ(board->take(), Texts{"H:ROS2-R4;PNum:50;T:0;"});
+  EXPECT_EQ(passed(), Texts{"H:ROS2-R4;PNum:50;T:0;"});
+}
+
+TEST_F(BridgedPairTest, TwoHostsInTurnThatTheBoardDoesNotTakeCannotKeepOutTheOneThatItTakes) {
+  board->say("H:R4-ROS2;PNum:3;T:90;SAFE:1;AN:0123456789abcdef;");
+  int turns = 0;
+  bool taken = false;
+  for (; turns < 50 && !taken; ++turns) {
+    pass(100ms);
+    board->take();
+    hosts->say("H:ROS2-R4;PNum:50;T:0;", second);
+    hosts->say("H:ROS2-R4;PNum:60;T:0;", third);
+    hosts->say("H:ROS2-R4;PNum:1;T:0;", first);
+    for (const std::string& each : passed()) taken = taken || each.find(";PNum:1;") != each.npos;
+    board->say("AIN24:24.28;SAFE:1;PNum:7;T:100;");
+  }
+  EXPECT_TRUE(taken);
+  EXPECT_LE(turns, 25) << "one second each for the two";
+  board->say(board_state);
+  pass(100ms);
+  hosts->say("H:ROS2-R4;PNum:51;T:0;", second);
+  EXPECT_EQ(passed(), Texts{}) << "the board streams to the first host, which has the place";
 }
 
 // --- the emergency stop
@@ -196,12 +233,12 @@ TEST_F(BridgedPairTest, WhatCameWhileTheBridgeWasStoppedIsDroppedButAStop) {
   hosts->say("E:STOP;PNum:4;T:0;", first);
   hosts->drained();
   board->say(board_state);
-  EXPECT_EQ(board->take(), Texts{"E:STOP;PNum:4;T:0;"});
+  EXPECT_EQ(passed(), Texts{"E:STOP;PNum:4;T:0;"});
   EXPECT_EQ(hosts->take(), Texts{}) << "nor is an old state";
   EXPECT_EQ(from_hosts().late, 2U);
   EXPECT_EQ(from_board().late, 1U);
   hosts->say("O:1,1,1;PNum:5;T:0;", first);
-  EXPECT_EQ(board->take(), Texts{"O:1,1,1;PNum:5;T:0;"}) << "that was read behind all that waited";
+  EXPECT_EQ(passed(), Texts{"O:1,1,1;PNum:5;T:0;"}) << "that was read behind all that waited";
 }
 
 TEST_F(BridgedPairTest, WhereNothingWaitedTheFirstDatagramAfterAStandstillPasses) {
@@ -209,14 +246,14 @@ TEST_F(BridgedPairTest, WhereNothingWaitedTheFirstDatagramAfterAStandstillPasses
   sleep(500ms);
   pass(50ms);
   hosts->say("O:1,1,1;PNum:5;T:0;", first);
-  EXPECT_EQ(board->take(), Texts{"O:1,1,1;PNum:5;T:0;"});
+  EXPECT_EQ(passed(), Texts{"O:1,1,1;PNum:5;T:0;"});
 }
 
 TEST_F(BridgedPairTest, AnIdleBridgeIsNoLateOne) {
   begin();
   pass(1h);
   hosts->say(heartbeat, first);
-  EXPECT_EQ(board->take(), Texts{heartbeat});
+  EXPECT_EQ(passed(), Texts{heartbeat});
 }
 
 // --- the other side
@@ -233,7 +270,7 @@ TEST_F(BridgedPairTest, ABoardThatIsAwayIsWaitedFor) {
   other.pass(500ms);
   EXPECT_EQ(other.events.back(), "board up");
   other.hosts->say(heartbeat, first);
-  EXPECT_EQ(other.board->take(), Texts{heartbeat});
+  EXPECT_EQ(other.passed(), Texts{heartbeat});
 }
 
 TEST_F(BridgedPairTest, WhatNoWaitingMendsIsAnError) {
@@ -262,7 +299,7 @@ TEST_F(BridgedPairTest, AnAnswerGoesToWhoHasAsked) {
   hosts->say("Q:ID;PNum:500;T:0;", second);
   hosts->say("Q:ID;PNum:600;T:0;", third);
   hosts->say("Q:ID;PNum:3;T:0;", first);
-  EXPECT_EQ(board->take().size(), 3U);
+  EXPECT_EQ(passed().size(), 3U);
   board->say("I:R4,1,id,udp;ASKED:600;PNum:8;T:101;");
   board->say("I:R4,1,id,udp;ASKED:500;PNum:9;T:101;");
   board->say("I:R4,1,id,udp;ASKED:3;PNum:10;T:101;");
@@ -271,6 +308,59 @@ TEST_F(BridgedPairTest, AnAnswerGoesToWhoHasAsked) {
       hosts->take(),
       (Texts{"I:R4,1,id,udp;ASKED:600;PNum:8;T:101;@3", "I:R4,1,id,udp;ASKED:500;PNum:9;T:101;@2",
              "I:R4,1,id,udp;ASKED:3;PNum:10;T:101;", "N:2,RANGE;PNum:11;T:101;"}));
+}
+
+TEST_F(BridgedPairTest, AnAnswerToAHostsCommandGoesToThatHostThoughAnotherAsksWithItsNumber) {
+  begin();
+  hosts->say("Q:ID;PNum:2;T:0;", second);
+  hosts->say("O:1,1,1;PNum:2;T:0;", first);
+  hosts->say("Q:ID;PNum:2;T:0;", third);
+  board->say("N:2,RANGE;PNum:8;T:101;");
+  EXPECT_EQ(hosts->take(), Texts{"N:2,RANGE;PNum:8;T:101;"});
+}
+
+TEST_F(BridgedPairTest, ANumberlessQuestionIsAnsweredToTheHostThatAsked) {
+  begin();
+  hosts->say("Q:ID;", second);
+  board->say("I:R4,1,id,udp;PNum:8;T:101;");
+  EXPECT_EQ(hosts->take(), Texts{"I:R4,1,id,udp;PNum:8;T:101;@2"});
+}
+
+TEST_F(BridgedPairTest, AnotherHostCannotHaveACommandRefusedByAskingBadly) {
+  begin();
+  passed();
+  hosts->say("Q:NO;PNum:2;T:0;", second);
+  EXPECT_EQ(passed(), Texts{}) << "the board would answer N:2,UNKNOWN";
+}
+
+TEST_F(BridgedPairTest, WhatHostsThatHaveProvedNothingAreSentIsLimited) {
+  begin();
+  hosts->take();
+  passed();
+  std::size_t questions = 0, leases = 0, copies = 0;
+  for (int i = 0; i < 1000; ++i) {
+    if (i % 25 == 0) {
+      pass(25ms);
+      hosts->say(heartbeat, first);
+      board->say(board_state);
+    }
+    hosts->take();
+    passed();
+    hosts->say("Q:ID;PNum:" + std::to_string(1000 + i) + ";T:0;", second);
+    questions += passed().size();
+    hosts->say("W:50;PNum:900;T:0;", second);
+    leases += hosts->take().size();
+    hosts->say("E:STOP;PNum:70;T:0;", third);
+    EXPECT_EQ(passed().size(), 1U) << "a stop always passes";
+    board->say("H:R4-ROS2;PNum:8;T:101;SAFE:2;STOP:70;");
+    copies += hosts->take().size() - 1;
+  }
+  for (const std::size_t count : {questions, leases, copies}) {
+    EXPECT_GE(count, 16U + 40U);
+    EXPECT_LE(count, 16U + 60U);
+  }
+  hosts->say("Q:ID;PNum:3;T:0;", first);
+  EXPECT_EQ(passed(), Texts{"Q:ID;PNum:3;T:0;"});
 }
 
 // --- who watches
@@ -291,21 +381,64 @@ TEST_F(BridgedPairTest, WhoWatchesBesideAHostHearsAllAfterAnEchoAndForTwoSeconds
   board->say(board_state);
   EXPECT_EQ(hosts->take(), (Texts{board_state, std::string(board_state) + "@2"}))
       << "the echo of another proves nothing";
-  EXPECT_EQ(board->take(), Texts{}) << "the board would take it for the first host's";
+  EXPECT_EQ(passed(), Texts{}) << "the board would take it for the first host's";
   pass(2s);
+  hosts->say(heartbeat, first);
   board->say(board_state);
   EXPECT_EQ(hosts->take(), Texts{board_state});
 }
 
-TEST_F(BridgedPairTest, WithoutAHostTheBoardGivesTheLease) {
-  hosts->say("W:50;PNum:900;T:0;", second);
-  EXPECT_EQ(board->take(), Texts{"W:50;PNum:900;T:0;"});
-  board->say("N:900,STALE;LEASE:77;PNum:1;T:100;");
-  EXPECT_EQ(hosts->take(), Texts{"N:900,STALE;LEASE:77;PNum:1;T:100;@2"});
-  hosts->say("W:50;PNum:901;T:77;", second);
-  EXPECT_EQ(board->take(), Texts{"W:50;PNum:901;T:77;"});
-  board->say(board_state);
-  EXPECT_EQ(hosts->take(), (Texts{board_state, std::string(board_state) + "@2"}));
+// The number of the newest W that the bridge has sent since this was asked last, and its text before that.
+struct OwnLease {
+  std::string text;
+  std::string pnum;
+};
+OwnLease own_lease(ScriptedCarrier& board) {
+  OwnLease newest;
+  for (const std::string& each : board.take()) {
+    const std::size_t at = each.find(";PNum:");
+    if (!each.starts_with("W:")) continue;
+    newest = {each.substr(0, at), each.substr(at + 6, each.find(';', at + 1) - at - 6)};
+  }
+  return newest;
+}
+
+TEST_F(BridgedPairTest, WhileNoHostHasThePlaceTheBridgeItselfWatchesTheBoard) {
+  board->say("H:R4-ROS2;PNum:3;T:90;SAFE:1;");
+  pass(25ms);
+  const OwnLease first_one = own_lease(*board);
+  EXPECT_EQ(first_one.text, "W:10");
+  hosts->take();
+  board->say("N:" + first_one.pnum + ",STALE;LEASE:77;PNum:4;T:100;");
+  EXPECT_EQ(hosts->take(), Texts{}) << "that is for the bridge";
+  pass(25ms);
+  const Texts echoed = board->take();
+  ASSERT_EQ(echoed.size(), 1U);
+  EXPECT_TRUE(echoed[0].ends_with(";T:77;")) << echoed[0];
+  board->say("AIN24:24.28;SAFE:1;PNum:7;T:100;");
+  EXPECT_EQ(hosts->take(), Texts{}) << "nobody has asked for it";
+  hosts->say(heartbeat, first);
+  const Texts begun = board->take();
+  ASSERT_EQ(begun.size(), 2U);
+  EXPECT_TRUE(begun[0].starts_with("W:0;")) << begun[0];
+  EXPECT_EQ(begun[1], heartbeat);
+}
+
+TEST_F(BridgedPairTest, WithoutAHostThoseThatWatchHearWhatTheNewestOfThemAskedFor) {
+  board->say("H:R4-ROS2;PNum:3;T:90;SAFE:1;");
+  hosts->take();
+  hosts->say("W:50,AIN24,SAFE;PNum:900;T:0;", second);
+  const std::string told = hosts->take().at(0);
+  const std::size_t at = told.find("LEASE:") + 6;
+  EXPECT_EQ(passed(), Texts{}) << "the board would take it for the bridge's";
+  hosts->say("W:50,AIN24,SAFE;PNum:901;T:" + told.substr(at, told.find(';', at) - at) + ";",
+             second);
+  pass(25ms);
+  EXPECT_EQ(own_lease(*board).text, "W:50,AIN24,SAFE");
+  board->say("AIN24:24.28;SAFE:1;PNum:7;T:100;");
+  EXPECT_EQ(hosts->take(), Texts{"AIN24:24.28;SAFE:1;PNum:7;T:100;@2"});
+  hosts->say("W:50,NOTHING;PNum:902;T:0;", third);
+  EXPECT_EQ(hosts->take(), Texts{"N:902,UNKNOWN;PNum:7;T:100;@3"});
 }
 
 TEST_F(BridgedPairTest, FourMayWatch) {

@@ -76,8 +76,11 @@ class ScriptedBridge {
  public:
   using Texts = std::vector<std::string>;
 
-  ScriptedBridge() {
+  // `trusted`: as BridgeGuard takes it.
+  explicit ScriptedBridge(std::vector<Key> keys = {}, bool trusted = false) {
     BridgedPair::Setup setup;
+    setup.keys = std::move(keys);
+    setup.trusted = trusted;
     auto a = std::make_unique<ScriptedCarrier>("udp:");
     auto b = std::make_unique<ScriptedCarrier>("can:");
     hosts = a.get();
@@ -101,6 +104,12 @@ class ScriptedBridge {
   }
   // Time passes in which the process is stopped.
   void sleep(std::chrono::milliseconds time) { now += time; }
+  // What has passed to the board since this was asked last: without what the bridge itself asks the board for.
+  Texts passed() {
+    Texts texts = board->take();
+    std::erase_if(texts, [](const std::string& text) { return text.starts_with("W:"); });
+    return texts;
+  }
   BridgeCounters from_hosts() const { return pair->status().hosts.from; }
   BridgeCounters from_board() const { return pair->status().board.from; }
 

@@ -98,6 +98,53 @@ TEST_F(UdpCarrierTest, CarriesOverIpv6) {
   ASSERT_TRUE(wait_for(at_host, "answer"));
 }
 
+// A socket that hears one address only, as a host hears its board.
+std::string answer_from(asio::io_context& io, const char* asked, const std::string& port,
+                        Carrier& board, const Recorder& at_board) {
+  udp::socket socket(io, udp::endpoint(udp::v4(), 0));
+  socket.non_blocking(true);
+  socket.connect(
+      udp::endpoint(asio::ip::make_address(asked), static_cast<unsigned short>(std::stoi(port))));
+  socket.send(asio::buffer(valid(asked)));
+  if (!run_until(io, [&] { return at_board.has(valid(asked)); })) return "nothing was heard";
+  board.send("for one", Priority::normal, at_board.datagrams.back().from);
+  board.hold(at_board.datagrams.back().from);
+  board.send("for all", Priority::state);
+  std::string all;
+  for (int i = 0; i < 2; ++i) {
+    std::array<char, 64> buffer{};
+    std::size_t size = 0;
+    asio::error_code error;
+    const bool came = run_until(io, [&] {
+      size = socket.receive(asio::buffer(buffer), 0, error);
+      return !error;
+    });
+    all += came ? std::string(buffer.data(), size) + ";" : "nothing;";
+  }
+  return all;
+}
+
+TEST_F(UdpCarrierTest, AnswersFromTheAddressThatWasAsked) {
+  for (const char* const url : {"udp://0.0.0.0:0", "udp://[::]:0"}) {
+    board = open_carrier(io, url, Role::board, at_board);
+    for (const char* const asked : {"127.0.0.1", "127.0.0.2", "127.0.0.3"}) {
+      EXPECT_EQ(answer_from(io, asked, port_of(*board), *board, at_board), "for one;for all;")
+          << url << ' ' << asked;
+    }
+    at_board.datagrams.clear();
+  }
+}
+
+TEST_F(UdpCarrierTest, AtAllAddressesCarriesOverIpv6) {
+  board = open_carrier(io, "udp://[::]:0", Role::board, at_board);
+  host = open_carrier(io, "udp://[::1]:" + port_of(*board) + "?listen=0", Role::host, at_host);
+  host->send(valid("question"), Priority::normal);
+  ASSERT_TRUE(wait_for(at_board, valid("question")));
+  board->send("answer", Priority::normal, at_board.datagrams.back().from);
+  ASSERT_TRUE(wait_for(at_host, "answer"));
+  EXPECT_GE(at_board.drained, 1);
+}
+
 TEST_F(UdpCarrierTest, ServesIpv4HostsOnAnIpv6Socket) {
   Socket peer(io, "127.0.0.1");
   board = open_carrier(io, "udp://[::]:0?peer=127.0.0.1:" + peer.port(), Role::board, at_board);

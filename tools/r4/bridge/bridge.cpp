@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "../shell/json.hpp"
+#include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
 #include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
@@ -30,18 +31,21 @@ struct Options {
   Milliseconds every{10'000};
   Milliseconds timeout{1000};
   std::optional<Milliseconds> duration;
+  std::vector<std::string> keys;  // their files
+  bool open = false;
 };
 
 struct NamedCounter {
   const char* name;
   std::uint64_t BridgeCounters::*value;
 };
-constexpr std::array<NamedCounter, 8> named_counters{{
+constexpr std::array<NamedCounter, 9> named_counters{{
     {"passed", &BridgeCounters::passed},
     {"stops", &BridgeCounters::stops},
     {"damaged", &BridgeCounters::damaged},
     {"misdirected", &BridgeCounters::misdirected},
     {"kept_out", &BridgeCounters::kept_out},
+    {"refused", &BridgeCounters::refused},
     {"late", &BridgeCounters::late},
     {"undelivered", &BridgeCounters::undelivered},
     {"outdated", &BridgeCounters::outdated},
@@ -139,6 +143,8 @@ int bridge(const Options& options) {
   Report report(options.json);
   BridgeOptions bridge_options;
   bridge_options.timeout = options.timeout;
+  for (const std::string& path : options.keys) bridge_options.keys.push_back(load_key(path));
+  bridge_options.open = options.open;
   bridge_options.on_event = [&report](const BridgeEvent& event) { report.event(event); };
   Bridge bridge(options.hosts, options.board, std::move(bridge_options));
   RunEnd run_end(io);
@@ -170,17 +176,23 @@ Of several hosts one at a time is let through: the first that sends heartbeats, 
 --timeout. The others may watch, and stop the board: E:STOP of anyone goes first. What has waited for longer
 than 0.1 s is dropped. A board that is not there, or goes, is waited for.
 
+A board obeys its own cable without a key. A bridge to a serial port therefore passes to a board that has a
+key only what is signed with it, and needs the key for that: --key FILE. Without a key it listens to this
+computer alone; --open lets everyone who reaches it drive the board. What only a cable may set (C:key,
+C:network, C:password and the like) never passes.
+
 On standard error it tells which transports come and go, and every ten seconds, if that has changed, and at
 the end what came from each side and was passed or dropped, and why; with --json on standard output, one
 object a line:
   {"type":"bridge","hosts":…,"board":…}                             of each board, at the beginning
   {"type":"transport","event":"up|down|warning","side":"hosts|board","thing":…,"reason":…,"fix":…}
   {"type":"counters","side":…,"transport":…,"up":…,"passed":…,"stops":…,"damaged":…,"misdirected":…,
-   "kept_out":…,"late":…,"undelivered":…,"outdated":…}
+   "kept_out":…,"refused":…,"late":…,"undelivered":…,"outdated":…}
 
 Examples:
   r4 bridge udp:// serial:auto                        for programs of this computer
   r4 bridge udp://0.0.0.0:2018 'can://can0?node=3'    for the network: anybody there may drive the board
+  r4 bridge udp://0.0.0.0:2018 serial:auto --key /etc/r4link/key    for hosts that have the key
   r4 bridge udp://0.0.0.0:2100-2107 'can://can0?node=0-7'
   r4 bridge pty:/tmp/r4 udp://192.168.0.125           a serial port for a board on WiFi
 
@@ -201,6 +213,9 @@ void add_bridge(CLI::App& root, Action& chosen) {
   add_seconds(*command, "--timeout", options->timeout,
               "a host makes room for another after so long: the board's timeout (default 1)");
   add_duration(*command, options->duration);
+  add_keys(*command, options->keys);
+  add_flag(*command, "--open", options->open,
+           "let everyone who reaches HOSTS drive a board at a serial port, without its key");
 }
 
 }  // namespace r4::tool

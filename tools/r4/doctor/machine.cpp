@@ -22,7 +22,7 @@ constexpr std::size_t most_bytes = 1 << 20;
 std::string output_of(const std::string& command) {
   const auto close = [](FILE* file) { ::pclose(file); };
   const std::unique_ptr<FILE, decltype(close)> pipe(
-      ::popen((from_root(command) + " 2>/dev/null </dev/null").c_str(), "r"), close);
+      ::popen((from_root(command) + " 2>/dev/null </dev/null").c_str(), "re"), close);
   std::string text;
   std::array<char, 4096> buffer{};
   while (pipe && text.size() < most_bytes) {

@@ -9,6 +9,8 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <functional>
+#include <utility>
 
 #include "options.hpp"
 #include "r4link/error.hpp"
@@ -22,6 +24,23 @@ Error system_error(const std::string& path, int error, const std::string& fix) {
   const ErrorKind kind =
       error == EACCES || error == EPERM ? ErrorKind::permission : ErrorKind::open;
   return {kind, path, std::strerror(error), fix};
+}
+
+CLI::Option* add_key_option(CLI::App& command, const std::string& help,
+                            std::function<void(const std::string&)> take) {
+  return command
+      .add_option_function<std::string>(
+          "--key",
+          [take = std::move(take)](const std::string& text) {
+            if (text.empty()) {
+              throw Error(ErrorKind::usage, "--key", "names no file",
+                          "write --key FILE, or leave it out");
+            }
+            take(text);
+          },
+          help + ", in a file made by r4 key new (default: $R4_KEY)")
+      ->envname("R4_KEY")
+      ->type_name(file_type);
 }
 
 }  // namespace
@@ -49,19 +68,15 @@ void make_key_file(const std::string& path, std::uint8_t id) {
 }
 
 CLI::Option* add_key(CLI::App& command, std::string& path) {
-  return command
-      .add_option_function<std::string>(
-          "--key",
-          [&path](const std::string& text) {
-            if (text.empty()) {
-              throw Error(ErrorKind::usage, "--key", "names no file",
-                          "write --key FILE, or leave it out");
-            }
-            path = text;
-          },
-          "the board's key, in a file made by r4 key new (default: $R4_KEY)")
-      ->envname("R4_KEY")
-      ->type_name(file_type);
+  return add_key_option(command, "the board's key",
+                        [&path](const std::string& text) { path = text; });
+}
+
+CLI::Option* add_keys(CLI::App& command, std::vector<std::string>& paths) {
+  return add_key_option(command, "a key of the board's; may be given several times",
+                        [&paths](const std::string& text) { paths.push_back(text); })
+      ->trigger_on_parse()
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
 }
 
 BoardOptions with_key(const std::string& path, BoardOptions options) {

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "cli_fwd.hpp"
 #include "r4link/options.hpp"
@@ -16,6 +17,8 @@ void make_key_file(const std::string& path, std::uint8_t id);
 
 // --key FILE, or R4_KEY in the environment, for a command that opens a board.
 CLI::Option* add_key(CLI::App& command, std::string& path);
+// The same, of which a command takes several.
+CLI::Option* add_keys(CLI::App& command, std::vector<std::string>& paths);
 
 // The options of a session with the key of that file; without one if `path` is empty.
 BoardOptions with_key(const std::string& path, BoardOptions options = {});

@@ -9,6 +9,7 @@
 #include "http_exchange.hpp"
 #include "r4link/error.hpp"
 #include "server_impl.hpp"
+#include "transports/file_descriptor.hpp"
 #include "websocket_client.hpp"
 
 namespace r4::tool::web {
@@ -30,7 +31,7 @@ void Server::Impl::listen() {
                 "ip address shows which there are");
   }
   const tcp::endpoint endpoint = found.begin()->endpoint();
-  acceptor.open(endpoint.protocol(), error);
+  open_close_on_exec(acceptor, endpoint.protocol(), error);
   if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
   if (!error) acceptor.bind(endpoint, error);
   if (!error) acceptor.listen(net::socket_base::max_listen_connections, error);
@@ -59,6 +60,7 @@ void Server::Impl::accept() {
       });
       return;
     }
+    close_on_exec(socket.native_handle());
     error_code ignored;
     socket.set_option(tcp::no_delay(true), ignored);
     socket.set_option(net::socket_base::send_buffer_size(send_buffer), ignored);

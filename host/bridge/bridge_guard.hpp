@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Which host datagrams a bridge may pass to its board, as far as that depends on keys.
+//
+// A board obeys its own cable without a signature, and a bridge must not lend that trust to its hosts:
+//
+//     keys of the bridge   board                               heartbeats and commands pass
+//     given                any                                 if they are signed for this board, once, within 250 ms
+//     none                 not at a cable, or opened to all    always; the board itself checks signatures
+//     none                 at a cable, has no key              always
+//     none                 at a cable, has a key               never: the bridge cannot check signatures
+//     none                 at a cable, not heard yet           never
+//
+// The rule is that of the board (protocol/keys/authentication.hpp), with the nonce and the clock that the board tells.
+// E:STOP, Q:ID and W need no signature, neither here nor at the board.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <vector>
+
+#include "../../protocol/keys/authentication.hpp"
+#include "../../protocol/messages/message.hpp"
+
+namespace r4 {
+
+class BridgeGuard {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+
+  // Why nothing passes that needs a signature.
+  enum class Trouble : std::uint8_t {
+    none,
+    board_has_no_key,  // and the bridge has one
+    key_needed,        // the board has a key, and the bridge has none
+  };
+
+  // `keys`: those of the board that its hosts sign with; at most max_keys. `trusted`: the board obeys whatever comes by
+  // this transport (its cable), and the bridge is not open to everyone.
+  BridgeGuard(const std::vector<Key>& keys, bool trusted);
+
+  void on_board_datagram(const Datagram& datagram, MessageKind kind, Time now);
+  // The board's transport is down. Another board may be there when it comes back.
+  void on_board_gone() { heard_ = false; }
+
+  // Judges a heartbeat or a command. `copy` is for the caller to judge: it is good from the host that has the place.
+  Verdict judge(const Datagram& datagram, Time now);
+  // That verdict was not good. True if it may be answered.
+  bool may_answer(Verdict verdict, bool is_command, Time now);
+
+  Trouble trouble() const;
+
+ private:
+  std::uint32_t board_ms(Time now) const;
+
+  Authentication authentication_;
+  const bool trusted_;
+  bool heard_ = false;  // a heartbeat of the board
+  bool asks_ = false;   // for signatures, by its newest heartbeat
+  bool has_clock_ = false;
+  std::uint32_t t_ms_ = 0;  // the board's clock at told_
+  Time told_;
+};
+
+}  // namespace r4

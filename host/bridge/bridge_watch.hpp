@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A bridge watches its board while no host has the place (docs/protocol.md, 4.8): the states that come by it are for
+// the watchers at the hosts' side, and for those that share the board's transport with the bridge.
+//
+// It asks for what the newest watcher at the hosts' side has asked for; where there is none, for a few states a second,
+// which are no load for a bus of many boards.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <random>
+#include <string>
+#include <string_view>
+
+#include "../../protocol/datagram/datagram_writer.hpp"
+#include "../session/lease.hpp"
+#include "r4link/datagram.hpp"
+
+namespace r4 {
+
+class BridgeWatch {
+ public:
+  using SteadyTime = std::chrono::steady_clock::time_point;
+  static constexpr std::string_view idle_wish = "10";
+
+  BridgeWatch() { wish_.reserve(max_datagram); }
+
+  // The values of a watcher's W: the rate, and perhaps fields.
+  void wish(Text values) { wish_.assign(values.data(), values.size()); }
+  void wish_nothing() { wish_.clear(); }
+
+  bool due(SteadyTime now) const { return lease_.due(time(now)); }
+  // The W that is due.
+  Text write(DatagramWriter& writer, SteadyTime now) {
+    lease_.sent(time(now));
+    asked_ = true;
+    return write_lease(writer, wish_.empty() ? idle_wish : std::string_view(wish_));
+  }
+  // True if there may be a lease to end, by write_end().
+  bool asked() const { return asked_; }
+  Text write_end(DatagramWriter& writer) {
+    asked_ = false;
+    return write_lease(writer, "0");
+  }
+
+  // True if that answers a W of ours.
+  bool on_refusal(const Nack& nack, SteadyTime now) {
+    if (next_pnum_ - 1 - nack.pnum >= remembered) return false;
+    if (nack.lease == 0) wish_nothing();  // the board does not take it
+    lease_.on_refusal(nack, time(now));
+    return true;
+  }
+  void on_state(SteadyTime now) { lease_.on_state(time(now)); }
+
+ private:
+  static constexpr std::uint32_t remembered = 16;
+
+  static Time time(SteadyTime now) {
+    return std::chrono::duration_cast<Time>(now.time_since_epoch());
+  }
+  Text write_lease(DatagramWriter& writer, std::string_view values) {
+    writer.field("W");
+    for (std::size_t end = values.find(','); end != std::string_view::npos;
+         end = values.find(',')) {
+      writer.value(Text(values.substr(0, end)));
+      values.remove_prefix(end + 1);
+    }
+    writer.value(Text(values));
+    return writer.finish(next_pnum_++, lease_.echo());
+  }
+
+  Lease lease_;
+  std::string wish_;
+  std::uint32_t next_pnum_ = std::random_device()();
+  bool asked_ = false;
+};
+
+}  // namespace r4
