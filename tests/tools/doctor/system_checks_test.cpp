@@ -38,6 +38,8 @@ TEST(DoctorSystem, AFirewallThatDropsAndNamesNoPortOfOursIsAWarning) {
   made_up.file("/proc/sys/net/netfilter/nf_log_all_netns", "0\n");
   EXPECT_EQ(firewall().severity, Severity::note) << "only root can tell";
   made_up.machine.user.id = 0;
+  EXPECT_EQ(firewall().severity, Severity::note) << "neither program is there to tell";
+  made_up.says["nft --version"] = "nftables v1.0.6\n";
   EXPECT_EQ(firewall().severity, Severity::ok);
   const std::string chain =
       "table inet filter {\n chain input {\n  type filter hook input priority filter; policy ";
