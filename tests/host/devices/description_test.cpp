@@ -147,8 +147,9 @@ TEST(Device, AChipThatIsSoldInItsPlaceIsNamedWithWhatToDo) {
             "it is an MPU-6500, which has another scale of its temperature: its register x75 has "
             "x70, not x68");
   EXPECT_NE(clone.find("let the copy check x75 x70"), std::string::npos) << clone;
-  for (const std::uint8_t identity : {0x71, 0x72, 0x98}) {
-    const std::string other = what_is_there(Device::from("mpu6050@0x68"), {identity});
+  for (const int identity : {0x71, 0x72, 0x98}) {
+    const std::string other =
+        what_is_there(Device::from("mpu6050@0x68"), {static_cast<std::uint8_t>(identity)});
     EXPECT_NE(other.find("let the copy check"), std::string::npos) << other;
   }
   EXPECT_EQ(what_is_there(Device::from("mpu6050@0x68"), {0x00}).substr(0, 20),

@@ -35,6 +35,22 @@ TEST(DoctorLink, IsOkWithStatesAndAnAnswerInTime) {
             "ms\n");
 }
 
+TEST(DoctorLink, JudgesLossDamageAndJitter) {
+  const auto judged = [](std::uint64_t lost, std::uint64_t damaged, double jitter_us) {
+    LinkSample sample = well();
+    sample.received -= lost;
+    sample.lost = lost;
+    sample.damaged = damaged;
+    sample.jitter_us = jitter_us;
+    return judge_link("udp://r4", sample).front();
+  };
+  EXPECT_EQ(judged(1, 0, 300).severity, Severity::ok);
+  EXPECT_EQ(judged(10, 0, 300).severity, Severity::warning);
+  EXPECT_EQ(judged(100, 0, 300).severity, Severity::error);
+  EXPECT_EQ(judged(0, 2, 300).check, "link.damaged");
+  EXPECT_EQ(judged(0, 0, 20000).check, "link.jitter");
+}
+
 TEST(DoctorLink, IsAnErrorWithoutAnyStateWhateverElseCame) {
   LinkSample sample = well();
   sample.states = 0;
