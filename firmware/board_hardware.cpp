@@ -10,6 +10,7 @@ constexpr std::uint8_t bit(std::uint8_t number, bool on) {
   return static_cast<std::uint8_t>(on ? 1U << number : 0U);
 }
 
+constexpr Chip pwm_chips[] = {Chip::osmc_pwm, Chip::dhb12_pwm, Chip::servo_pwm};
 constexpr std::uint8_t pca9685_chips = 1U << static_cast<int>(Chip::osmc_pwm) |
                                        1U << static_cast<int>(Chip::dhb12_pwm) |
                                        1U << static_cast<int>(Chip::servo_pwm);
@@ -52,6 +53,11 @@ BoardHardware::BoardHardware(I2cBus& bus, const BoardPins& pins, const Config& c
 void BoardHardware::power_up(std::uint32_t now_us) {
   now_us_ = now_us;
   verified_us_ = now_us;
+  if ((config_.chips_fitted & pca9685_chips) != 0) {
+    busy_ = true;
+    (void)Pca9685::reset_all(bus_);  // the set-up looks at the modes
+    busy_ = false;
+  }
   make_safe();
   for (int i = 0; i < chip_count; ++i) {
     if (fitted(i) && !failed_[i]) chips_[i]->begin();
@@ -73,6 +79,7 @@ void BoardHardware::make_safe() {
 
 void BoardHardware::drive_safe() {
   waiting_ = false;
+  modes_to_check_ = sizeof pwm_chips / sizeof *pwm_chips;
   for (Stepper& stepper : steppers_) stepper.stop();
   for (AnalogOutputPin* pin : pins_.dac) pin->write(0);
   // Each driver forgets what it was to write, also where a held bus keeps its chip from being told
@@ -182,7 +189,13 @@ void BoardHardware::poll(std::uint32_t now_us) {
 
   set_up_again();
   BusBudget budget(bus_bytes_per_poll);
-  if (now_us - verified_us_ >= verify_us) {
+  if (modes_to_check_ != 0) {
+    // make_safe() may set it between the two.
+    const int at = modes_to_check_ - 1;
+    modes_to_check_ = static_cast<std::uint8_t>(at);
+    const int chip = static_cast<int>(pwm_chips[at]);
+    if (fitted(chip)) chips_[chip]->verify(budget);
+  } else if (now_us - verified_us_ >= verify_us) {
     verified_us_ = now_us;
     if (fitted(verified_chip_)) chips_[verified_chip_]->verify(budget);
     verified_chip_ = (verified_chip_ + 1) % chip_count;
@@ -204,7 +217,19 @@ void BoardHardware::set_up_again() {
     failed_us_[i] = now_us_;
     free = tried ? free : bus_.recover();
     tried = true;
-    if (free) chips_[i]->begin();
+    if (!free) continue;
+    reset_lost_modes();
+    chips_[i]->begin();
+  }
+}
+
+// A chip whose modes are not as written may drive although it was told to be off: it is reset, and
+// the chips that were reset with it are set up anew.
+void BoardHardware::reset_lost_modes() {
+  const bool lost = osmc_.lost_mode() || dhb12_.lost_mode() || servo_.lost_mode();
+  if (!lost || Pca9685::reset_all(bus_) != I2cResult::ok) return;
+  for (int i = 0; i < chip_count; ++i) {
+    if (fitted(i) && i != static_cast<int>(Chip::expander)) chips_[i]->begin();
   }
 }
 
@@ -243,6 +268,7 @@ bool BoardHardware::look_for_trouble() {
 // everything is made safe once more.
 void BoardHardware::leave() {
   if (!interrupted_ && look_for_trouble()) {
+    reset_lost_modes();
     drive_safe();
     if (!interrupted_) look_for_trouble();
   }

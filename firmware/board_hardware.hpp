@@ -2,10 +2,11 @@
 // The R4 board's hardware made of the chip drivers: outputs go to chips and pins by the table of
 // board_channels.hpp, inputs come from pins, converters and interrupts.
 //
-// Order at power-up: power_up() first, before anything else. Its first transfer turns every PWM
-// output off, its last leaves every output in its safe value; only then the chips are set up, in
-// poll(), and ready() tells when all are. What is applied before that waits until then: no motor
-// runs while the chip that brakes another is not there.
+// Order at power-up: power_up() first, before anything else. Its first transfer resets the PWM
+// chips, which turns every PWM output off whatever their modes were, its last leaves every output
+// in its safe value; only then the chips are set up, in poll(), and ready() tells when all are.
+// What is applied before that waits until then: no motor runs while the chip that brakes another is
+// not there.
 //
 // The safe state (make_safe): steppers stand, PWM outputs off, DAC codes and outputs 0, brakes on, relays off.
 // It may be called at any time, also in an interrupt or a fault handler in the middle of a
@@ -13,8 +14,12 @@
 //
 // A chip in trouble: the fault is latched with chip and reason, all outputs are made safe, and
 // apply() has no effect until clear_fault(). Meanwhile the chip is set up anew, outputs off first,
-// every retry_us, after a recovery of the bus. Chips are looked at one after the other, so a chip
-// that was reset is noticed within chip_count x verify_us plus one poll.
+// every retry_us, after a recovery of the bus. A PCA9685 whose modes a disturbance has changed is
+// reset first, and with it all chips that hear the general call: until then its outputs may be on.
+//
+// Chips are looked at one after the other, so a chip that was reset is noticed within
+// chip_count x verify_us plus one poll. In the polls that follow a safe state the modes of the
+// PCA9685 are looked at first.
 //
 // The bus carries at most bus_bytes_per_poll bytes in each poll() and each apply(); what does not
 // fit follows in the next polls. Nothing waits.
@@ -111,6 +116,7 @@ class BoardHardware final : public Hal {
   void set_outputs(const Outputs& outputs);
   void for_each_chip(BusBudget& budget, bool set_up);
   void set_up_again();
+  void reset_lost_modes();
   void set_up_what_was_cut_off();
   bool look_for_trouble();
   void leave();
@@ -133,8 +139,9 @@ class BoardHardware final : public Hal {
   ChipFault fault_;
   bool failed_[chip_count] = {};
   std::uint32_t failed_us_[chip_count] = {};
-  int first_chip_ = 0;     // of the next poll
-  int verified_chip_ = 0;  // the next
+  int first_chip_ = 0;                        // of the next poll
+  int verified_chip_ = 0;                     // the next
+  volatile std::uint8_t modes_to_check_ = 0;  // of PWM chips, since the last safe state
   std::uint32_t verified_us_ = 0;
   std::uint32_t now_us_ = 0;  // of the last poll
   std::uint32_t held_since_us_ = 0;

@@ -357,6 +357,16 @@ SendResult AsyncBoard::Impl::transmit(std::size_t wire, std::string_view datagra
   return result;
 }
 
+// One wire that is well is enough.
+WireTrouble AsyncBoard::Impl::trouble() const {
+  WireTrouble common = WireTrouble::none;
+  for (const auto& wire : wires) {
+    common = wire->carrier->trouble();
+    if (common == WireTrouble::none) break;
+  }
+  return common;
+}
+
 void AsyncBoard::Impl::on_state(const ReceivedState& state, const Datagram& datagram) {
   if (!is_open()) return;
   if (in_backlog) {

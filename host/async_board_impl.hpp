@@ -178,6 +178,7 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
   // --- Session::Handler
 
   SendResult transmit(std::size_t wire, std::string_view datagram, Priority priority) override;
+  WireTrouble trouble() const override;
   void on_state(const ReceivedState& state, const Datagram& datagram) override;
   void on_board_heartbeat(const Datagram& datagram) override;
   void on_identity(const Identity& fresh) override;

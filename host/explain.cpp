@@ -135,6 +135,13 @@ Words link_words(const LinkStatus& link) {
     return {"a callback does not return, so our heartbeats and commands have stopped",
             "do its work in another thread; BoardOptions::callback_limit is the time that it has"};
   }
+  if (link.trouble == WireTrouble::foreign_frames) {
+    return {
+        "frames that make no R4 datagram come on the board's command id (0x180 + node): another "
+        "protocol, such as CANopen, uses it",
+        "r4 bus can://INTERFACE names the ids that are in use; give the board a node of which no "
+        "id is in use, or the other device another id"};
+  }
   if (link.busy) {
     return {"another host controls the board",
             "stop that host; control is free when its heartbeats have stayed away for the board's "
@@ -144,6 +151,15 @@ Words link_words(const LinkStatus& link) {
     return key_words(link.key);
   }
   if (link.lease != LeaseTrouble::none) return lease_words(link.lease);
+  const bool hears_us = link.state == HostLinkState::active ||
+                        (link.state == HostLinkState::safe && link.reason != SafeReason::link);
+  if (link.trouble == WireTrouble::late_frames && is_heard(link.state)) {
+    return {fmt::format("{}flow control of the board does not come within 20 ms: the bus, or a "
+                        "tunnel or adapter on it, holds frames back or loses them",
+                        hears_us ? "" : "the board does not hear our heartbeats: "),
+            "ISO-TP needs each frame within 10 ms: use the bus without what is slow; `r4 bench` "
+            "measures the round trip"};
+  }
   switch (link.state) {
     case HostLinkState::connecting:
       return {"nothing was heard from the board yet",
@@ -163,7 +179,7 @@ Words link_words(const LinkStatus& link) {
 
 bool link_is_well(const LinkStatus& link) {
   return link.state == HostLinkState::active && !link.busy && !link.gated() &&
-         link.key == KeyTrouble::none;
+         link.key == KeyTrouble::none && link.trouble == WireTrouble::none;
 }
 
 // Is it a setting that a board takes over its own cable only?
@@ -231,6 +247,7 @@ Words refusal_words(std::string_view command, Refusal code, const LinkStatus& li
 Words unconfirmed_stop_words(const CommandResult& result, LinkStatus link) {
   link.gate = Gate::open;
   link.busy = false;
+  link.trouble = WireTrouble::none;
   link.key = KeyTrouble::none;
   Words why = link_words(link);
   if (link.state == HostLinkState::active && !link.transport_down) {
@@ -321,6 +338,18 @@ std::string group_words(std::string_view group, const CommandResult& result) {
 Problem explain(KeyTrouble trouble) {
   Words words = key_words(trouble);
   return {ErrorKind::refused, "key", std::move(words.reason), std::move(words.fix)};
+}
+
+const char* to_text(WireTrouble trouble) {
+  switch (trouble) {
+    case WireTrouble::none:
+      break;
+    case WireTrouble::foreign_frames:
+      return "foreign frames";
+    case WireTrouble::late_frames:
+      return "late frames";
+  }
+  return "none";
 }
 
 const char* to_text(LeaseTrouble trouble) {

@@ -79,7 +79,7 @@ ALLOWED = {
     'tools/r4/manual': SHELL,
     'tools/r4/drive': SHELL,
     'tools/r4/list': SHELL,
-    'tools/r4/doctor': SHELL | {'tools/r4/list'},
+    'tools/r4/doctor': SHELL | {'tools/r4/bus', 'tools/r4/list'},
     'tools/r4/bridge': SHELL,
     'tools/r4/bus': SHELL,
     'tools/r4/formats': SHELL | {'tools/r4/bus'},

@@ -15,6 +15,7 @@ constexpr std::uint8_t all_led_off_h = 0xFD;
 constexpr std::uint8_t pre_scale = 0xFE;
 
 constexpr std::uint8_t mode1_restart = 0x80;
+constexpr std::uint8_t mode1_external_clock = 0x40;
 constexpr std::uint8_t mode1_auto_increment = 0x20;
 constexpr std::uint8_t mode1_sleep = 0x10;
 constexpr std::uint8_t mode1_all_call = 0x01;
@@ -56,6 +57,12 @@ I2cResult Pca9685::all_off(I2cBus& bus) {
   return bus.write(all_call_address, bytes, sizeof bytes);
 }
 
+I2cResult Pca9685::reset_all(I2cBus& bus) {
+  constexpr std::uint8_t general_call = 0;
+  constexpr std::uint8_t reset = 0x06;
+  return bus.write(general_call, &reset, 1);
+}
+
 I2cResult Pca9685::make_safe() {
   want_safe();
   const std::uint8_t bytes[] = {all_led_off_h, full};
@@ -66,7 +73,10 @@ I2cResult Pca9685::make_safe() {
   return result;
 }
 
-void Pca9685::on_begin() { step_ = Step::off; }
+void Pca9685::on_begin() {
+  step_ = Step::off;
+  lost_mode_ = false;
+}
 
 bool Pca9685::set_up(std::uint32_t now_us, BusBudget& budget) {
   switch (step_) {
@@ -194,6 +204,7 @@ bool Pca9685::check_mode(BusBudget& budget) {
   std::uint8_t mode[2] = {};
   if (!fetch(mode1, mode, sizeof mode, budget)) return false;
   if (mode[0] == mode1_running && mode[1] == mode2_totem_pole) return true;
+  lost_mode_ = (mode[0] & mode1_external_clock) != 0 || mode[1] != mode2_totem_pole;
   fail((mode[0] & mode1_sleep) != 0 ? ChipTrouble::was_reset : ChipTrouble::wrong_register);
   return false;
 }

@@ -20,7 +20,10 @@
 // short, only between groups of channels: a motor's duty and direction never part.
 //
 // The chip has no timeout of its own: it keeps driving when the microcontroller dies. Safe state of
-// all three in three bytes: all_off().
+// all three in three bytes: all_off(). A disturbance can set bits that make this useless: INVRT
+// turns "off" into "on", and with EXTCLK the outputs wait for a clock that is not there. EXTCLK can
+// be cleared by a reset only. So the modes are read back after a safe state, and where they are not
+// as written, lost_mode() asks for reset_all().
 #pragma once
 
 #include <cstdint>
@@ -58,6 +61,11 @@ class Pca9685 final : public ChipDriver {
   // Every output of every PCA9685 on the bus off, by the all-call address: 70 <- FD 10. Its
   // acknowledge says that at least one of them heard it.
   static I2cResult all_off(I2cBus& bus);
+  // The software reset (7.6): 00 <- 06. Resets every chip on the bus that knows the general call,
+  // the MCP4728 too: all need their set-up. Every output of every PCA9685 is off then.
+  static I2cResult reset_all(I2cBus& bus);
+  // True if the modes were found with bits that change what "off" means. Ends with begin().
+  bool lost_mode() const { return lost_mode_; }
 
  private:
   static constexpr int registers = 4 * channels;
@@ -77,6 +85,7 @@ class Pca9685 final : public ChipDriver {
   Step step_ = Step::off;
   std::uint32_t awake_us_ = 0;
   std::uint8_t verified_channel_ = 0;
+  bool lost_mode_ = false;
   static constexpr std::uint16_t all_channels = 0xFFFF;
   std::uint16_t changed_ = all_channels;  // bit: duty_ may ask for another value than is written
   std::uint16_t duty_[channels] = {};

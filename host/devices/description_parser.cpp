@@ -94,12 +94,14 @@ void DescriptionParser::take_line(std::string_view line) {
   if (what == "role") return take_role(words);
   if (what == "address") return take_addresses(words);
   if (what == "check") return take_check(words);
+  if (what == "lookalike") return take_lookalike(words, line);
   if (what == "write") return take_write(words);
   if (what == "poll") return take_poll(words);
   if (what == "value") return take_value(words);
+  if (what == "ready") return take_ready(words);
   fail(fmt::format("\"{}\" is none of its words",
                    is_printable(what) ? what.substr(0, longest_name) : "this"),
-       "they are device, title, role, address, check, write, poll and value");
+       "they are device, title, role, address, check, lookalike, write, poll, value and ready");
 }
 
 void DescriptionParser::take_name(const Words& words) {
@@ -146,6 +148,21 @@ void DescriptionParser::take_check(const Words& words) {
   require_room(result_.checks.size(), DeviceDescription::max_lines, "checks");
   result_.checks.push_back({bytes(words[1], 0, i2c_max_register_bytes, "a register"),
                             bytes(words[2], 1, i2c_max_bytes, "what is expected")});
+}
+
+void DescriptionParser::take_lookalike(const Words& words, std::string_view line) {
+  constexpr std::size_t longest_title = 120;
+  require_words(words, 4, longest_line, "lookalike REGISTER BYTES TITLE");
+  require_room(result_.lookalikes.size(), DeviceDescription::max_lines, "lookalikes");
+  DeviceLookalike other{bytes(words[1], 0, i2c_max_register_bytes, "a register"),
+                        bytes(words[2], 1, i2c_max_bytes, "what is found"),
+                        {}};
+  other.title = line.substr(static_cast<std::size_t>(words[3].data() - line.data()));
+  if (other.title.size() > longest_title || !is_printable(other.title)) {
+    fail("its title is too long, or not plain text",
+         fmt::format("write what it is with at most {} plain characters", longest_title));
+  }
+  result_.lookalikes.push_back(std::move(other));
 }
 
 void DescriptionParser::take_write(const Words& words) {
@@ -203,6 +220,16 @@ void DescriptionParser::take_value(const Words& words) {
   }
   take_options(words, 5, value);
   result_.values.push_back(std::move(value));
+}
+
+void DescriptionParser::take_ready(const Words& words) {
+  require_words(words, 2, 3, "ready VALUE, or ready VALUE NUMBER");
+  require_room(result_.ready.size(), DeviceDescription::max_lines, "lines that begin with ready");
+  const auto value = result_.find(words[1]);
+  if (!value) fail("no value above has that name", "name one, or put this line below it");
+  DeviceReady ready{*value, std::nullopt};
+  if (words.size() == 3) ready.number = factor(words[2], "what that value is while it is set up");
+  result_.ready.push_back(ready);
 }
 
 void DescriptionParser::take_options(const Words& words, std::size_t first, DeviceValue& value) {

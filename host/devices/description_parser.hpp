@@ -6,9 +6,12 @@
 //     role imu|power|range|angle
 //     address A [A…]
 //     check REGISTER BYTES
+//     lookalike REGISTER BYTES TITLE
 //     write BYTES [wait MS]
 //     poll NAME REGISTER COUNT PERIOD
 //     value NAME POLL BYTE TYPE [bits LOW..HIGH] [scale S] [offset O] [unit U] [range MIN MAX]
+//           [only VALUE NUMBER]
+//     ready VALUE [NUMBER]
 //
 // '#' begins a comment. Bytes are x and two hexadecimal digits each; S and O are numbers and pi, joined by * and /.
 #pragma once
@@ -37,9 +40,11 @@ class DescriptionParser {
   void take_role(const Words& words);
   void take_addresses(const Words& words);
   void take_check(const Words& words);
+  void take_lookalike(const Words& words, std::string_view line);
   void take_write(const Words& words);
   void take_poll(const Words& words);
   void take_value(const Words& words);
+  void take_ready(const Words& words);
   void take_options(const Words& words, std::size_t first, DeviceValue& value);
   void require_whole();
   void require_role();

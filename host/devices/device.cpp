@@ -12,6 +12,23 @@
 
 namespace r4 {
 
+namespace {
+
+// Of the slot that brings the value.
+const I2cReading& read_for(const Device& device, const State& state, std::size_t value) {
+  const std::size_t poll = device.description().values[value].poll;
+  return state.i2c[static_cast<std::size_t>(device.first_slot() - 1) + poll];
+}
+
+// A scaled value is as near to what the description says as its scale can be rounded to.
+bool is_number(const Device& device, const State& state, std::size_t value, double number) {
+  const auto is = device.reading(state, value).number;
+  const double step = std::abs(device.description().values[value].scale);
+  return is && std::abs(*is - number) <= step / 1e6;
+}
+
+}  // namespace
+
 Device::Device(DeviceDescription description, int address, int first_slot)
     : description_(std::move(description)), address_(address), first_slot_(first_slot) {
   const std::vector<int>& possible = description_.addresses;
@@ -49,18 +66,30 @@ StateField Device::field(std::size_t value) const {
   return static_cast<StateField>(static_cast<int>(StateField::i2c1) + slot - 1);
 }
 
-// A scaled value is as near to what the description says as its scale can be rounded to.
+std::optional<bool> Device::is_set_up(const State& state) const {
+  std::optional<bool> result;
+  for (const DeviceReady& each : description_.ready) {
+    if (read_for(*this, state, each.value).data.size == 0) return std::nullopt;
+    const bool holds = each.number ? is_number(*this, state, each.value, *each.number)
+                                   : reading(state, each.value).number.has_value();
+    if (!holds) return false;
+    result = true;
+  }
+  return result;
+}
+
 bool Device::counts(const State& state, std::size_t value) const {
+  const std::vector<DeviceReady>& ready = description_.ready;
+  const bool tells_it = std::any_of(
+      ready.begin(), ready.end(), [value](const DeviceReady& each) { return each.value == value; });
+  if (!ready.empty() && !tells_it && !is_set_up(state).value_or(false)) return false;
   const auto& only = description_.values[value].only;
-  if (!only) return true;
-  const auto is = reading(state, only->value).number;
-  const double step = std::abs(description_.values[only->value].scale);
-  return is && std::abs(*is - only->number) <= step / 1e6;
+  return !only || is_number(*this, state, only->value, only->number);
 }
 
 DeviceReading Device::reading(const State& state, std::size_t value) const {
   const DeviceValue& each = description_.values[value];
-  const I2cReading& read = state.i2c[static_cast<std::size_t>(first_slot_ - 1) + each.poll];
+  const I2cReading& read = read_for(*this, state, value);
   // Another length is somebody else's reading in that slot.
   const bool whole = read.data.size == description_.polls[each.poll].count;
   return {

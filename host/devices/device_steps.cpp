@@ -78,6 +78,17 @@ std::optional<Problem> trouble_with(const Device& device, const DeviceStep& step
     problem.reason = fmt::format("it is another device: its register {} has {}, not {}", step.bytes,
                                  hex_of(answer.data), hex_of(step.expected));
     problem.fix = "look what is at that address, or describe it: r4 devices";
+    for (const DeviceLookalike& each : device.description().lookalikes) {
+      if (hex_of(each.register_bytes) != step.bytes || hex_of(each.found) != hex_of(answer.data)) {
+        continue;
+      }
+      problem.reason = fmt::format("it is {}: its register {} has {}, not {}", each.title,
+                                   step.bytes, hex_of(answer.data), hex_of(step.expected));
+      problem.fix = fmt::format(
+          "describe it: copy share/r4link/devices/{0}.device, let the copy check {1} {2}, compare "
+          "the rest with the data sheet, and name the copy: ./{0}.device",
+          device.description().name, step.bytes, hex_of(answer.data));
+    }
   } else {
     return std::nullopt;
   }

@@ -206,6 +206,7 @@ void Session::refresh_status(Time now) {
       .state = link_.state(),
       .reason = link_.reason(),
       .busy = role_.refused(now),
+      .trouble = handler_.trouble(),
       .gate = watches()                            ? Gate::open
               : link_.watchdog_expired(to_ms(now)) ? Gate::watchdog
               : link_.gated(to_ms(now))            ? Gate::callback

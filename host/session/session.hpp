@@ -79,6 +79,8 @@ class Session {
   class Handler {
    public:
     virtual SendResult transmit(std::size_t wire, std::string_view datagram, Priority priority) = 0;
+    // Of the wires: what all of them have.
+    virtual WireTrouble trouble() const { return WireTrouble::none; }
     virtual void on_state(const ReceivedState& state, const Datagram& datagram) = 0;
     virtual void on_board_heartbeat(const Datagram& datagram) = 0;
     virtual void on_identity(const Identity& identity) = 0;

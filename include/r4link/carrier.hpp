@@ -33,6 +33,16 @@ enum class SendResult : std::uint8_t {
   busy,  // not sent, for another host commands the board from the same place (CAN)
 };
 
+// Why datagrams do not pass although the transport is up (CAN).
+enum class WireTrouble : std::uint8_t {
+  none,
+  // frames that make no R4 datagram come on the board's command id: another protocol uses it
+  foreign_frames,
+  late_frames,  // flow control does not come in time: frames are held back, or lost
+};
+// "none", "foreign frames", "late frames".
+R4LINK_API const char* to_text(WireTrouble trouble);
+
 // Where a datagram travels in several frames (CAN): what became of the transfers, of both directions.
 struct TransferCounters {
   // Ended a transfer, whose datagram is lost.
@@ -197,6 +207,8 @@ class R4LINK_API Carrier {
   }
 
   virtual bool up() const = 0;
+  // At a host: as it is now.
+  virtual WireTrouble trouble() const { return WireTrouble::none; }
   // The longest datagram it carries, in bytes.
   virtual std::size_t max_size() const = 0;
   // For people: the URL, with what `auto` found.

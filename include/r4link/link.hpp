@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "carrier.hpp"
 #include "command.hpp"
 #include "config.hpp"
 #include "error.hpp"
@@ -62,8 +63,9 @@ R4LINK_API const char* to_text(WireState state);
 
 struct LinkStatus {
   HostLinkState state = HostLinkState::connecting;
-  SafeReason reason = SafeReason::none;  // why the board is safe
-  bool busy = false;                     // another host controls the board
+  SafeReason reason = SafeReason::none;     // why the board is safe
+  bool busy = false;                        // another host controls the board
+  WireTrouble trouble = WireTrouble::none;  // foreign_frames: what keeps us busy is no R4 host
   Gate gate = Gate::open;
   KeyTrouble key = KeyTrouble::none;
   LeaseTrouble lease = LeaseTrouble::none;

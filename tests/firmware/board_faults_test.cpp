@@ -219,6 +219,85 @@ TEST(BoardHardware, AChipThatIsResetAtAnyByteNeverLeavesAnythingRunningUnnoticed
   }
 }
 
+// What a disturbance does to the modes of a PWM chip: INVRT, EXTCLK, both.
+constexpr std::uint8_t inverted_outputs = 0x10;
+constexpr std::uint8_t external_clock = 0x40;
+struct Disturbance {
+  std::uint8_t mode1;
+  std::uint8_t mode2;
+};
+constexpr Disturbance disturbances[] = {
+    {0, inverted_outputs}, {external_clock, 0}, {external_clock, inverted_outputs}};
+
+void disturb_chip(Bench& bench, int chip, const Disturbance& by) {
+  sim::Pca9685Model* const chips[] = {&bench.board.osmc, &bench.board.dhb12, &bench.board.servo};
+  chips[chip]->disturb_mode1(by.mode1);
+  chips[chip]->disturb_mode2(by.mode2);
+}
+
+TEST(BoardFaults, AChipWhoseModesWereDisturbedIsResetAndTold) {
+  for (const Disturbance& by : disturbances) {
+    for (int chip = 0; chip < 3; ++chip) {
+      Bench bench;
+      bench.boot();
+      bench.apply(full());
+      disturb_chip(bench, chip, by);
+      bench.run(chip_count * 20 + 2);
+      EXPECT_TRUE(bench.board.pins().is_safe()) << chip;
+      EXPECT_EQ(bench.hardware.fault().trouble, ChipTrouble::wrong_register) << chip;
+      EXPECT_EQ(bench.hardware.fault().address, 0x40 + chip);
+      bench.run(200);
+      EXPECT_TRUE(bench.board.pins().is_safe()) << chip;
+      EXPECT_TRUE(bench.hardware.clear_fault()) << chip;
+      bench.apply(full());
+      EXPECT_EQ(test::outputs_of(bench.board), test::as_pins(full())) << chip;
+    }
+  }
+}
+
+TEST(BoardFaults, ASafeStateLooksWhetherOffMeansOff) {
+  for (const Disturbance& by : disturbances) {
+    for (int chip = 0; chip < 3; ++chip) {
+      Bench bench;
+      bench.boot();
+      bench.apply(full());
+      disturb_chip(bench, chip, by);
+      bench.hardware.make_safe();
+      bench.run(4);
+      EXPECT_TRUE(bench.board.pins().is_safe()) << chip;
+    }
+  }
+}
+
+TEST(BoardFaults, APowerUpResetsChipsWhoseModesWereDisturbedBefore) {
+  for (const Disturbance& by : disturbances) {
+    Bench bench;
+    bench.boot();
+    bench.apply(full());
+    for (int chip = 0; chip < 3; ++chip) disturb_chip(bench, chip, by);
+    BoardHardware next(bench.board.bus, bench.board.microcontroller_pins(), {});
+    next.power_up(bench.now());
+    for (int ms = 0; ms < 20; ++ms) {
+      EXPECT_TRUE(bench.board.pins().is_safe());
+      bench.board.bus.advance(1000);
+      next.poll(bench.now());
+    }
+    EXPECT_TRUE(next.ready());
+    EXPECT_FALSE(next.fault().any());
+  }
+}
+
+TEST(BoardFaults, AChipThatDoesNotHearItsResetIsResetAgain) {
+  Bench bench;
+  bench.boot();
+  bench.apply(full());
+  disturb_chip(bench, 0, disturbances[2]);
+  bench.board.bus.refuse(0x00, 0, 1);
+  bench.run(250);
+  EXPECT_TRUE(bench.board.pins().is_safe());
+  EXPECT_TRUE(bench.hardware.clear_fault());
+}
+
 TEST(BoardHardware, AHeldBusIsFreedAndEverythingIsSafeAtOnce) {
   for (std::size_t after = 1; after < 60; ++after) {
     Bench bench;

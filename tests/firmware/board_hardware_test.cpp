@@ -41,9 +41,10 @@ rc::Gen<Outputs> any_outputs() {
 TEST(BoardHardware, OutputsAreOffBeforeAnythingElseAtPowerUp) {
   Bench bench;
   bench.hardware.power_up(bench.now());
-  EXPECT_EQ(test::lines(bench.log),
-            (Lines{"70 <- FD 10", "61 <- 40 00 00 42 00 00 44 00 00 46 00 00", "20 <- 14 AA 00",
-                   "20 <- 00 00 00", "40 <- FD 10", "41 <- FD 10", "42 <- FD 10"}));
+  EXPECT_EQ(
+      test::lines(bench.log),
+      (Lines{"00 <- 06", "70 <- FD 10", "61 <- 40 00 00 42 00 00 44 00 00 46 00 00",
+             "20 <- 14 AA 00", "20 <- 00 00 00", "40 <- FD 10", "41 <- FD 10", "42 <- FD 10"}));
   EXPECT_TRUE(bench.board.pins().is_safe());
   for (int i = 0; i < 20; ++i) {
     bench.run(1);

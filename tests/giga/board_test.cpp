@@ -14,7 +14,8 @@ TEST(GigaPowerUp, SwitchesEveryOutputOffBeforeAnythingElse) {
   const auto& log = bench.giga.i2c.log;
   bench.boot();
   ASSERT_GE(log.size(), 6U);
-  EXPECT_EQ(log[0], (std::vector<std::uint8_t>{0x70 << 1, 0xFD, 0x10})) << "all PWM off, first";
+  EXPECT_EQ(log[0], (std::vector<std::uint8_t>{0, 0x06})) << "the reset of all PWM chips, first";
+  EXPECT_EQ(log[1], (std::vector<std::uint8_t>{0x70 << 1, 0xFD, 0x10})) << "then all off";
   const auto first_set_up = std::find_if(log.begin(), log.end(), [](const auto& transfer) {
     return transfer.size() > 1 && (transfer[0] >> 1 == 0x40) && transfer[1] == 0xFE;
   });

@@ -7,7 +7,7 @@ import pytest
 
 from r4_process import Board, objects, run
 
-WARNINGS, OPEN, UNSUPPORTED = 1, 4, 6
+WARNINGS, REFUSED, OPEN, UNSUPPORTED = 1, 3, 4, 6
 
 
 def ip(*arguments):
@@ -66,5 +66,31 @@ def test_a_virtual_bus_is_brought_up_and_its_board_heard():
     run('doctor', 'can://vcan0?node=1', '--fix', '--duration', '0.01', timeout=60)
     with Board('can://vcan0?node=1'):
         _, found = doctor('can://vcan0?node=1', listen='1.5')
-    assert 'link.silent' not in found and 'link.open' not in found, found
+    assert found['link']['severity'] == 'ok' and 'it answers in' in found['link']['reason'], found
     assert found['can.load']['severity'] == 'ok' and found['can.interface']['reason'] == 'up, virtual'
+
+
+def test_frames_of_another_protocol_on_an_id_of_the_board_are_told():
+    with Board('can://vcan0?node=5'):
+        with subprocess.Popen(['cangen', 'vcan0', '-I', '185', '-L', '8', '-D', 'i', '-g', '10']) as other:
+            sent = run('send', 'can://vcan0?node=5', 'R:1,On')
+            code, found = doctor('can://vcan0?node=5', listen='3')
+            other.terminate()
+    words = 'make no R4 datagram'
+    assert sent.returncode == REFUSED and words in sent.stderr and 'another host' not in sent.stderr, sent
+    assert code == REFUSED and words in found['link.answer']['reason'], found
+    assert 'CANopen TPDO1 of node 5' in found['can.foreign']['reason'], found
+
+
+def test_a_bus_that_holds_frames_back_is_told():
+    with Board('can://vxcan1?node=1'):
+        for name in ('vxcan0', 'vxcan1'):
+            subprocess.run(f'tc qdisc replace dev {name} root netem delay 30ms limit 2000', shell=True, check=True)
+        try:
+            sent = run('send', 'can://vxcan0?node=1', 'R:1,On')
+            code, found = doctor('can://vxcan0?node=1', listen='4')
+        finally:
+            for name in ('vxcan0', 'vxcan1'):
+                subprocess.run(f'tc qdisc del dev {name} root', shell=True, check=True)
+    assert sent.returncode == 0 or 'does not come within 20 ms' in sent.stderr, sent
+    assert code == REFUSED and 'does not come within 20 ms' in found['link.answer']['reason'], found

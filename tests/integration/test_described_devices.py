@@ -64,6 +64,23 @@ def test_monitor_sets_devices_up_and_shows_what_they_measure(board, tmp_path):
     assert 'icm20948@0x68: it is another device: its register x00 has x00, not xea' in wrong.stdout
 
 
+def test_a_device_that_is_reset_is_told_measures_nothing_and_is_set_up_again(tmp_path):
+    scenario = tmp_path / 'reset.txt'
+    scenario.write_text('2.5 device mpu6050 reset\n')
+    with Board('udp://127.0.0.1:0', options=('--script', str(scenario))) as board:
+        with Running('monitor', board.host_url, '--device', 'mpu6050', '--json') as monitor:
+            monitor.next(is_reading('mpu6050@0x68', 'accel_z'))
+            monitor.next(lambda each: is_reading('mpu6050@0x68', 'power_mode')(each)
+                         and each['fields']['power_mode'] == 0x40)
+            meanwhile = []
+            again = monitor.next(lambda each: meanwhile.append(each) or is_reading('mpu6050@0x68', 'accel_z')(each))
+            assert again['fields']['accel_z'] == pytest.approx(9.80665)
+            measured = [each['fields'] for each in meanwhile[:-1] if each['type'] == 'reading']
+            assert any('accel_z' in each for each in measured)
+            [told] = [each['fields'] for each in meanwhile if each['type'] == 'error']
+            assert told['thing'] == 'mpu6050@0x68' and told['reason'].startswith('it is not set up, as after a reset')
+
+
 def test_a_recording_becomes_columns_with_units(board, tmp_path):
     log, table = tmp_path / 'drive.r4log', tmp_path / 'drive.csv'
     with Running('monitor', board.host_url, '--device', 'bno055', '--json') as monitor:

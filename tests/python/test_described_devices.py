@@ -33,6 +33,19 @@ def test_one_that_is_shipped_is_set_up_and_decoded(sim, board, wait):
         imu.reading(state, 'yaw')
 
 
+def test_one_that_was_reset_measures_nothing_until_it_is_attached_again(sim, board, wait):
+    imu = r4link.Device('mpu6050')
+    board.arm()
+    assert imu.is_set_up(board.next_state()) is None
+    board.attach(imu)
+    wait(lambda: imu.reading(board.state, 'accel_z').number is not None)
+    sim.happen('device mpu6050 reset')
+    wait(lambda: imu.is_set_up(board.state) is False)
+    assert imu.reading(board.state, 'accel_z').number is None
+    board.attach(imu)
+    wait(lambda: imu.is_set_up(board.state) and imu.reading(board.state, 'accel_z').number is not None)
+
+
 def test_a_recording_has_columns_for_what_they_measured(sim, board, wait, tmp_path):
     for device in ('bno055 on', 'ina219 on'):
         sim.happen(f'device {device}')

@@ -18,6 +18,7 @@
 #include "../send_queue.hpp"
 #include "can_bus.hpp"
 #include "can_interface.hpp"
+#include "can_trouble.hpp"
 #include "can_turn.hpp"
 #include "overheard_commands.hpp"
 #include "r4link/command.hpp"
@@ -28,9 +29,6 @@ namespace {
 constexpr std::size_t normal_entries = 32;
 constexpr std::size_t state_entries = 1;  // newest wins
 constexpr std::uint32_t look_again_us = 20000;
-// Of a board six heartbeats, of its host three: who was not heard for so long is not there.
-constexpr std::chrono::milliseconds board_silence{3000};
-constexpr std::chrono::milliseconds host_silence{300};
 
 class CanCarrier final : public Carrier, private CanBus::Member {
  public:
@@ -42,6 +40,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   SendResult send(std::string_view bytes, Priority priority, Peer) override;
   void use_packed_form(bool wanted) override { node_.use_packed_form(wanted); }
   bool up() const override { return handler_ != nullptr && bus_->up(); }
+  WireTrouble trouble() const override;
   std::size_t max_size() const override { return max_datagram; }
   bool is_shared() const override { return true; }
   const std::string& name() const override { return name_; }
@@ -75,6 +74,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   bool begin(std::string_view bytes, std::uint32_t now_us);
   bool begin_waiting(std::uint32_t now_us);
   void listen_for_others(const CanFrame& frame);
+  void count_late_transfers();
   void arm();
   void on_deadline();
 
@@ -92,9 +92,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   std::array<Lane, 2> lanes_;
   std::shared_ptr<CanBus> bus_;
   std::optional<std::uint32_t> announced_stop_;  // its number
-  // When they were heard last, by a host's end.
-  Clock::time_point board_heard_;
-  Clock::time_point host_heard_;
+  CanTrouble trouble_;                           // of a host
   Handler* handler_ = nullptr;
   LoopTimer timer_;
   OperationSlot timing_;
@@ -227,9 +225,7 @@ bool CanCarrier::begin(std::string_view bytes, std::uint32_t now_us) {
 SendResult CanCarrier::send_lease(std::string_view bytes) {
   const Clock::time_point now = Clock::now();
   if (ends_lease(bytes)) return SendResult::down;  // others may watch, too: it runs out
-  if (now - board_heard_ > board_silence || now - host_heard_ < host_silence) {
-    return SendResult::down;
-  }
+  if (!trouble_.hears_board(now) || trouble_.hears_host(now)) return SendResult::down;
   node_.ask_for_states();
   bus_->send();
   return SendResult::sent;
@@ -245,7 +241,7 @@ void CanCarrier::listen_for_others(const CanFrame& frame) {
     case CanIdKind::went_safe:
     case CanIdKind::reply:
     case CanIdKind::telemetry:
-      board_heard_ = now;
+      trouble_.on_board(now);
       return;
     case CanIdKind::command:
       break;
@@ -253,10 +249,21 @@ void CanCarrier::listen_for_others(const CanFrame& frame) {
       return;
   }
   if (isotp_frame::is_flow_control(frame)) return;
-  host_heard_ = now;
+  trouble_.on_host_frame(now);
   if (!turn_.on_other(now)) return;
   node_.stop_commanding();
   lane(CanLane::dialogue).queue.clear();
+}
+
+// Both directions of the dialogue take flow control.
+void CanCarrier::count_late_transfers() {
+  const std::uint64_t count = std::uint64_t{node_.sent(CanLane::dialogue).flow_control_timeout} +
+                              node_.received(CanLane::dialogue).consecutive_timeout;
+  if (count != trouble_.late()) trouble_.on_late(count, Clock::now());
+}
+
+WireTrouble CanCarrier::trouble() const {
+  return role_ == Role::host && up() ? trouble_.now(Clock::now()) : WireTrouble::none;
 }
 
 // Begins the next datagram of each lane that has become idle. True if there was one.
@@ -280,10 +287,16 @@ void CanCarrier::on_frame(const CanFrame& frame, std::uint32_t at_us) {
   listen_for_others(frame);
   if (role_ == Role::host && classify(frame).kind == CanIdKind::command) {
     const std::string_view command = others_.on_frame(frame, at_us);
-    if (!command.empty()) handler_->on_overheard(command);
+    if (command.empty()) return;
+    Datagram whole;
+    if (read_datagram(Text(command.data(), command.size()), whole)) {
+      trouble_.on_host_datagram(Clock::now());
+    }
+    handler_->on_overheard(command);
     return;
   }
   const Text datagram = node_.on_frame(frame, at_us);
+  count_late_transfers();
   if (datagram.empty()) return;
   ++counters_.rx_datagrams;
   counters_.rx_bytes += datagram.size();
@@ -322,6 +335,7 @@ void CanCarrier::on_deadline() {
   const auto answerable = [this](const CanFrame& frame) { return node_.may_be_answered(frame); };
   if (bus->holds(answerable)) node_.wait_anew(now_us);
   node_.poll(now_us);
+  count_late_transfers();
   bus->send();  // also what others owe by now
 }
 

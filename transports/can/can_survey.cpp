@@ -7,6 +7,7 @@
 #include "../framing/can/can_node.hpp"
 #include "../framing/can/isotp_receiver.hpp"
 #include "../framing/can/packed_form.hpp"
+#include "overheard_commands.hpp"
 
 namespace r4 {
 
@@ -14,10 +15,12 @@ namespace r4 {
 struct CanSurvey::Lanes {
   explicit Lanes(std::uint8_t node)
       : telemetry(listening_to(CanIdKind::telemetry, node), telemetry_bytes.data(), max_datagram),
-        replies(listening_to(CanIdKind::reply, node), reply_bytes.data(), max_datagram) {}
+        replies(listening_to(CanIdKind::reply, node), reply_bytes.data(), max_datagram),
+        commands(node) {}
 
   std::array<std::uint8_t, max_datagram> telemetry_bytes, reply_bytes;
   IsotpReceiver telemetry, replies;
+  OverheardCommands commands;
   PacketTracker packets;
 };
 
@@ -52,10 +55,41 @@ void CanSurvey::on_frame(const CanFrame& frame, std::uint32_t at_us) {
       if (stop_callback_) stop_callback_();
       return;
     case CanIdKind::command:
+      return receive_command(meaning.node, frame, at_us);
     case CanIdKind::watch:
     case CanIdKind::other:
       return;
   }
+}
+
+bool CanSurvey::is_r4(std::uint32_t id) const {
+  const CanIdMeaning meaning = classify(id);
+  switch (meaning.kind) {
+    case CanIdKind::emergency_stop:
+      return true;
+    case CanIdKind::command:
+      return board(meaning.node).commands != 0;
+    case CanIdKind::went_safe:
+    case CanIdKind::reply:
+    case CanIdKind::telemetry:
+    case CanIdKind::watch:
+      return board(meaning.node).sends_datagrams();
+    case CanIdKind::other:
+      break;
+  }
+  return false;
+}
+
+CanSurvey::Lanes& CanSurvey::lanes(std::uint8_t node) {
+  std::unique_ptr<Lanes>& lanes = lanes_[node];
+  if (!lanes) lanes = std::make_unique<Lanes>(node);
+  return *lanes;
+}
+
+void CanSurvey::receive_command(std::uint8_t node, const CanFrame& frame, std::uint32_t at_us) {
+  const std::string_view bytes = lanes(node).commands.on_frame(frame, at_us);
+  Datagram datagram;
+  if (read_datagram(Text(bytes.data(), bytes.size()), datagram)) ++boards_[node].commands;
 }
 
 void CanSurvey::count(const CanFrame& frame) {
@@ -70,9 +104,8 @@ void CanSurvey::count(const CanFrame& frame) {
 
 void CanSurvey::receive(std::uint8_t node, const CanFrame& frame, CanIdKind kind,
                         std::uint32_t at_us) {
-  std::unique_ptr<Lanes>& lanes = lanes_[node];
-  if (!lanes) lanes = std::make_unique<Lanes>(node);
-  IsotpReceiver& receiver = kind == CanIdKind::reply ? lanes->replies : lanes->telemetry;
+  Lanes& own = lanes(node);
+  IsotpReceiver& receiver = kind == CanIdKind::reply ? own.replies : own.telemetry;
   const std::uint64_t before = errors(receiver.counters());
   const bool complete = receiver.on_frame(frame, at_us).datagram;
   boards_[node].damaged += errors(receiver.counters()) - before;

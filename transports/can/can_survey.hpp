@@ -25,11 +25,12 @@
 
 namespace r4 {
 
-// What was heard of a board, since it was heard first.
+// What was heard of a node, since it was heard first.
 struct HeardBoard {
   std::uint64_t states = 0;
   std::uint64_t heartbeats = 0;
   std::uint64_t answers = 0;             // N and I
+  std::uint64_t commands = 0;            // of its hosts, heartbeats too; the rest is the board's
   std::uint64_t damaged = 0;             // transfers that failed, and datagrams that are none
   std::uint32_t lost = 0;                // numbers that never came
   std::uint64_t t_ms = 0;                // T of the newest datagram, by the board's clock
@@ -38,6 +39,7 @@ struct HeardBoard {
   SafeReason reason = SafeReason::none;  // of the newest heartbeat or went-safe frame
   bool connected = false;                // it has a host: it sends states, or numbered heartbeats
 
+  bool sends_datagrams() const { return states + heartbeats + answers != 0; }
   bool heard() const { return states + heartbeats + answers + damaged != 0; }
 };
 
@@ -65,6 +67,9 @@ class CanSurvey {
 
   void on_frame(const CanFrame& frame, std::uint32_t at_us);
 
+  // True if the id is one of R4's, and frames with it make R4's datagrams. False: another protocol
+  // uses it.
+  bool is_r4(std::uint32_t id) const;
   const HeardBoard& board(std::uint8_t node) const { return boards_[node % can_nodes]; }
   const std::map<std::uint32_t, CanTraffic>& traffic() const { return traffic_; }
   std::uint64_t busy_ns() const { return busy_ns_; }
@@ -74,6 +79,8 @@ class CanSurvey {
 
   void count(const CanFrame& frame);
   void receive(std::uint8_t node, const CanFrame& frame, CanIdKind kind, std::uint32_t at_us);
+  void receive_command(std::uint8_t node, const CanFrame& frame, std::uint32_t at_us);
+  Lanes& lanes(std::uint8_t node);
   void take(std::uint8_t node, Text bytes, std::uint32_t at_us);
 
   const CanBitRate rate_;

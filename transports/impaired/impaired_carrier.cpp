@@ -53,6 +53,7 @@ class Impaired final : public ImpairedCarrier, private Carrier::Handler {
   bool is_shared() const override { return below_->is_shared(); }
   void use_packed_form(bool wanted) override { below_->use_packed_form(wanted); }
   bool up() const override { return below_->up(); }
+  WireTrouble trouble() const override { return below_->trouble(); }
   std::size_t max_size() const override { return below_->max_size(); }
   const std::string& name() const override { return below_->name(); }
   const CarrierCounters& counters() const override { return below_->counters(); }

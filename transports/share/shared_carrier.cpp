@@ -56,6 +56,7 @@ class SharedCarrier final : public Carrier,
     return state_ == State::holding ? own_->arrival() : std::nullopt;
   }
   bool up() const override { return up_; }
+  WireTrouble trouble() const override { return own_->trouble(); }
   // What is sent on a wire that another program holds the board would take for the holder's.
   bool is_shared() const override { return state_ == State::sharing || own_->is_shared(); }
   std::size_t max_size() const override { return own_->max_size(); }
@@ -68,7 +69,6 @@ class SharedCarrier final : public Carrier,
  private:
   enum class State { closed, attaching, holding, sharing };
 
-  // The carrier of our own.
   void on_datagram(std::string_view bytes, Peer from) override;
   void on_carrier_event(const CarrierEvent& event) override;
   void on_drained() override { handler_->on_drained(); }

@@ -48,6 +48,8 @@ void bind_devices(py::module_& module) {
                                }
                                return units;
                              })
+      .def("is_set_up",
+           [](const Device& self, const ReceivedState& state) { return self.is_set_up(state); })
       .def("reading",
            [](const Device& self, const ReceivedState& state, const std::string& value) {
              return reading_of(self.reading(state, value));

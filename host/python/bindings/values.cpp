@@ -127,6 +127,7 @@ void bind_values(py::module_& module) {
       .has("state", [](const LinkStatus& link) { return to_text(link.state); })
       .has("reason", [](const LinkStatus& link) { return to_text(link.reason); })
       .has("busy", &LinkStatus::busy)
+      .has("trouble", [](const LinkStatus& link) { return to_text(link.trouble); })
       .has("gated", [](const LinkStatus& link) { return link.gated(); })
       .has("key", [](const LinkStatus& link) { return to_text(link.key); })
       .has("lease", [](const LinkStatus& link) { return to_text(link.lease); })

@@ -24,6 +24,10 @@ class LinkStatus(_Record):
     def busy(self) -> bool:
         """Another host controls the board."""
     @property
+    def trouble(self) -> str:
+        """Of a CAN bus: 'none', 'foreign frames' (another protocol uses the board's command id, busy or not), 'late frames'
+        (flow control does not come in time)."""
+    @property
     def gated(self) -> bool:
         """Our heartbeats and commands do not go out: the watchdog was not fed, or a callback does not return."""
     @property
@@ -360,6 +364,7 @@ class Device:
     def fields(self) -> str: ...
     @property
     def units(self) -> dict[str, str]: ...
+    def is_set_up(self, state: State, /) -> bool | None: ...
     def reading(self, state: State, value: str, /) -> tuple[float | None, int, int]: ...
     def readings(self, state: State, /) -> dict[str, tuple[float | None, int, int]]: ...
 

@@ -73,6 +73,11 @@ class Device:
         """Of its values, by their names; '' is none."""
         return self._core.units
 
+    def is_set_up(self, state: State) -> bool | None:
+        """Whether it is still as it was set up. False: it was reset, and its values are no measurements; attach it again.
+        None: it was not read yet, or cannot tell."""
+        return self._core.is_set_up(state)
+
     def reading(self, state: State, value: str) -> DeviceReading:
         """Raises UsageError if it has no such value."""
         return DeviceReading(*self._core.reading(state, value))

@@ -38,6 +38,14 @@ struct DeviceCheck {
   std::vector<std::uint8_t> expected;        // 1 to 32
 };
 
+// Another device that people take for this one: what its register has instead of what a DeviceCheck
+// expects.
+struct DeviceLookalike {
+  std::vector<std::uint8_t> register_bytes;  // 0 to 2
+  std::vector<std::uint8_t> found;           // 1 to 32
+  std::string title;                         // what it is, for people
+};
+
 struct DeviceWrite {
   std::vector<std::uint8_t> bytes;    // 1 to 32: the register, and what it is to hold
   std::chrono::milliseconds wait{0};  // afterwards, up to 5 s
@@ -80,19 +88,28 @@ struct R4LINK_API DeviceValue {
   std::optional<double> decode(const std::uint8_t* bytes, std::size_t count) const;
 };
 
+// How the device tells that it is still as it was set up: `value` is a measurement and, where
+// `number` is there, is that number. A device that was reset fails this.
+struct DeviceReady {
+  std::size_t value = 0;  // in DeviceDescription::values
+  std::optional<double> number;
+};
+
 struct R4LINK_API DeviceDescription {
   std::string name;
   std::string title;
   DeviceRole role = DeviceRole::none;
   std::vector<int> addresses;  // that it can have; the first is the usual one
   std::vector<DeviceCheck> checks;
+  std::vector<DeviceLookalike> lookalikes;
   std::vector<DeviceWrite> writes;
   std::vector<DevicePoll> polls;  // 1 to 8
   std::vector<DeviceValue> values;
-  std::string text;  // that all this was read from
+  std::vector<DeviceReady> ready;  // all of them hold while it is set up; empty: it does not tell
+  std::string text;                // that all this was read from
 
   static constexpr std::size_t max_text = 65536;  // bytes of a description
-  static constexpr std::size_t max_lines = 256;   // checks, writes and values, each
+  static constexpr std::size_t max_lines = 256;   // lines of each kind
 
   // The place of a value; nothing if there is none of that name.
   std::optional<std::size_t> find(std::string_view value) const;

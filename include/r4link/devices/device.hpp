@@ -60,7 +60,12 @@ class R4LINK_API Device {
 
   // That brings a value; the value's place is that in description().values.
   StateField field(std::size_t value) const;
-  // Does the device itself say that the value is a measurement (DeviceValue::only)?
+  // Whether the device is still as it was set up (DeviceDescription::ready). False: it was reset,
+  // or was never set up. Its values are no measurements then; attach it again. Nothing: it was not
+  // read yet, or cannot tell.
+  std::optional<bool> is_set_up(const State& state) const;
+  // True if the value is a measurement as far as the device itself tells: it is set up, and
+  // DeviceValue::only holds.
   bool counts(const State& state, std::size_t value) const;
   DeviceReading reading(const State& state, std::size_t value) const;
   // Throws Error{usage} if it has no value of that name.

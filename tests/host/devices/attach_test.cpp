@@ -99,6 +99,33 @@ TEST_F(DescribedDevice, AnAs5600SaysItsAngle) {
   EXPECT_EQ(wait_for(angle, "magnet"), 1.0);
 }
 
+TEST_F(DescribedDevice, ThatWasResetMeasuresNothingUntilItIsSetUpAgain) {
+  for (const auto& [name, value] :
+       {std::pair("mpu6050", "accel_z"), std::pair("icm20948@0x69", "accel_z"),
+        std::pair("bno055", "accel_z"), std::pair("vl53l0x", "signal")}) {
+    const Device device = Device::from(name);
+    board_.attach(device);
+    const double measured = wait_for(device, value);
+    simulated_.run([&](sim::SimulatedBoard& board) {
+      board.happen(
+          sim::Script::parse_now("device " + device.description().name + " reset", "test").value());
+    });
+    ReceivedState state;
+    do {
+      state = board_.next_state();
+    } while (device.is_set_up(state) != false);
+    for (int i = 0; i < 30; ++i) {
+      EXPECT_FALSE(device.reading(state, value).number) << name;
+      state = board_.next_state();
+    }
+    board_.attach(device);
+    EXPECT_EQ(wait_for(device, value), measured) << name;
+    for (int slot = device.first_slot(); slot <= device.last_slot(); ++slot) {
+      board_.i2c().poll_off(slot);
+    }
+  }
+}
+
 TEST_F(DescribedDevice, SeveralAreReadSideBySide) {
   const auto devices = Device::from({"bno055", "ina219", "as5600@0x36:7"});
   for (const Device& each : devices) board_.attach(each);

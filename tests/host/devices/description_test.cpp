@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -82,6 +83,77 @@ TEST(Device, AValueThatTheDeviceDoesNotCountIsNoMeasurement) {
   EXPECT_FALSE(lidar.counts(state, distance));
   EXPECT_FALSE(lidar.reading(state, distance).number);
   EXPECT_EQ(lidar.reading(state, "status").number, 2);
+}
+
+constexpr std::string_view gauge =
+    "device gauge\naddress 0x48\n"
+    "check x00 x01\n"
+    "lookalike x00 x02 a gauge of another maker, 5 V\n"
+    "write x0901\n"
+    "poll all x00 1 20\npoll modes x09 2 20\n"
+    "value height all 0 u8\n"
+    "value mode modes 0 u8\n"
+    "value status modes 1 u8 range 1 9\n"
+    "ready mode 1\n"
+    "ready status\n";
+
+TEST(Device, OfOneThatIsNotSetUpNothingIsAMeasurement) {
+  const Device device(DeviceDescription::parse(gauge), 0x48);
+  State state;
+  state.i2c[0].data.size = 1;
+  state.i2c[0].data.bytes[0] = 0;
+  EXPECT_FALSE(device.is_set_up(state).has_value()) << "its modes were not read yet";
+  EXPECT_FALSE(device.reading(state, "height").number);
+  I2cReading& modes = state.i2c[1];
+  modes.data.size = 2;
+  const auto set_up_with = [&](std::uint8_t mode, std::uint8_t status) {
+    modes.data.bytes[0] = mode;
+    modes.data.bytes[1] = status;
+    return device.is_set_up(state).value();
+  };
+  EXPECT_FALSE(set_up_with(0, 5));
+  EXPECT_FALSE(device.reading(state, "height").number);
+  EXPECT_EQ(device.reading(state, "mode").number, 0) << "what tells it is still told";
+  EXPECT_FALSE(set_up_with(1, 0));
+  EXPECT_FALSE(device.reading(state, "height").number);
+  EXPECT_TRUE(set_up_with(1, 5));
+  EXPECT_EQ(device.reading(state, "height").number, 0);
+}
+
+TEST(Device, EachThatIsShippedTellsWhetherItMeasures) {
+  for (const std::string& name : DeviceDescription::shipped()) {
+    const DeviceDescription device = DeviceDescription::load(name);
+    const bool tells = std::any_of(device.values.begin(), device.values.end(),
+                                   [](const DeviceValue& each) { return each.only.has_value(); });
+    EXPECT_TRUE(!device.ready.empty() || (device.writes.empty() && tells)) << name;
+  }
+}
+
+std::string what_is_there(const Device& device, std::vector<std::uint8_t> identity) {
+  CommandResult result;
+  result.outcome = Outcome::refused;
+  result.step = 1;
+  result.transfer.pnum = 1;
+  result.transfer.outcome = I2cOutcome::done;
+  result.transfer.data.size = static_cast<std::uint8_t>(identity.size());
+  std::copy(identity.begin(), identity.end(), result.transfer.data.bytes);
+  const Problem problem = explain(device, result, LinkStatus());
+  return problem.reason + "; " + problem.fix;
+}
+
+TEST(Device, AChipThatIsSoldInItsPlaceIsNamedWithWhatToDo) {
+  const std::string clone = what_is_there(Device::from("mpu6050@0x68"), {0x70});
+  EXPECT_EQ(clone.substr(0, clone.find(';')),
+            "it is an MPU-6500, which has another scale of its temperature: its register x75 has "
+            "x70, not x68");
+  EXPECT_NE(clone.find("let the copy check x75 x70"), std::string::npos) << clone;
+  for (const int identity : {0x71, 0x72, 0x98}) {
+    const std::string other =
+        what_is_there(Device::from("mpu6050@0x68"), {static_cast<std::uint8_t>(identity)});
+    EXPECT_NE(other.find("let the copy check"), std::string::npos) << other;
+  }
+  EXPECT_EQ(what_is_there(Device::from("mpu6050@0x68"), {0x00}).substr(0, 20),
+            "it is another device");
 }
 
 TEST(Device, CountsByAScaledValueAsItIsWritten) {
@@ -220,6 +292,13 @@ TEST(DeviceDescription, SaysWhatIsWrongAndInWhichLine) {
                 "mine.device, line 4: a word is there twice"},
            Case{head + "value v p 0 u8 gain 3\n",
                 "mine.device, line 4: a word of the value is not known"},
+           Case{head + "ready v 1\n", "mine.device, line 4: no value above has that name"},
+           Case{head + "value v p 0 u8\nready v 1 2\n", "mine.device, line 5: it has 4 words"},
+           Case{head + "value v p 0 u8\nready v x01\n",
+                "mine.device, line 5: what that value is while it is set up is no number"},
+           Case{head + "lookalike x00 x01\n", "mine.device, line 4: it has 3 words"},
+           Case{head + "lookalike x00 x01 a\x1b" + "b\n",
+                "mine.device, line 4: its title is too long, or not plain text"},
            Case{head + "value v p 0 u8\nvalue v p 1 u8\n",
                 "mine.device, line 5: there is a value of that name"},
            Case{many, "mine.device, line 260: it has more than 256 values"},

@@ -75,6 +75,22 @@ TEST(DoctorCan, BusOffAndErrorsAreTold) {
   EXPECT_NE(only_finding(interface).reason.find("tx 248"), std::string::npos);
 }
 
+TEST(DoctorCan, FramesOfAnotherProtocolOnAnIdOfTheBoardAreNamed) {
+  CanSurvey survey({1000000, 0});
+  CanFrame frame{};
+  frame.size = 8;
+  for (const std::uint32_t id : {0x185U, 0x186U, 0x705U}) {
+    frame.id = id;
+    survey.on_frame(frame, 0);
+  }
+  const Findings findings = check_foreign_frames(survey, "can0", 5);
+  ASSERT_EQ(findings.size(), 1U) << "the other ids are none of board 5";
+  EXPECT_EQ(findings[0].severity, Severity::warning);
+  EXPECT_EQ(findings[0].reason,
+            "1 frames with id 185, which is one of board 5, make no R4 datagram: CANopen TPDO1 of "
+            "node 5, or ODrive axis 12");
+}
+
 TEST(DoctorCan, AFullBusIsAWarning) {
   EXPECT_EQ(check_can_load("can0", 0.79).front().severity, Severity::ok);
   EXPECT_EQ(check_can_load("can0", 0.81).front().severity, Severity::warning);

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include "made_up_machine.hpp"
-#include "tools/r4/doctor/link_check.hpp"
 
 namespace r4::tool {
 namespace {
@@ -38,6 +37,8 @@ TEST(DoctorSystem, AFirewallThatDropsAndNamesNoPortOfOursIsAWarning) {
   made_up.file("/proc/sys/net/netfilter/nf_log_all_netns", "0\n");
   EXPECT_EQ(firewall().severity, Severity::note) << "only root can tell";
   made_up.machine.user.id = 0;
+  EXPECT_EQ(firewall().severity, Severity::note) << "neither program is there to tell";
+  made_up.says["nft --version"] = "nftables v1.0.6\n";
   EXPECT_EQ(firewall().severity, Severity::ok);
   const std::string chain =
       "table inet filter {\n chain input {\n  type filter hook input priority filter; policy ";
@@ -75,16 +76,6 @@ TEST(DoctorSystem, AClockThatNobodyKeepsIsNotedAndOneThatIsSetMeanwhileAWarning)
   EXPECT_EQ(check_clock(false).front().severity, Severity::note);
   EXPECT_TRUE(check_clock_steps(0.001).empty());
   EXPECT_EQ(check_clock_steps(-3600).front().severity, Severity::warning);
-}
-
-TEST(DoctorLink, JudgesLossDamageAndJitter) {
-  const auto judged = [](LinkSample sample) { return judge_link("udp://r4", sample); };
-  EXPECT_EQ(judged({5, 500, 490, 0, 0, 300}).front().severity, Severity::ok);
-  EXPECT_EQ(judged({5, 1000, 990, 1, 0, 300}).front().severity, Severity::ok);
-  EXPECT_EQ(judged({5, 490, 480, 10, 0, 300}).front().severity, Severity::warning);
-  EXPECT_EQ(judged({5, 400, 390, 100, 0, 300}).front().severity, Severity::error);
-  EXPECT_EQ(judged({5, 500, 490, 0, 2, 300}).front().check, "link.damaged");
-  EXPECT_EQ(judged({5, 500, 490, 0, 0, 20000}).front().check, "link.jitter");
 }
 
 }  // namespace

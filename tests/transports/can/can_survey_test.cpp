@@ -54,6 +54,25 @@ struct Bus {
   std::uint32_t now_us = 0xFFFF0000;  // wraps under way
 };
 
+TEST(CanSurvey, TellsIdsOfR4FromThoseThatAnotherProtocolUses) {
+  Bus bus;
+  CanFrame frame{};
+  frame.size = 8;
+  for (const std::uint32_t id : {command_id(3), reply_id(4), telemetry_id(4), watch_id(4)}) {
+    frame.id = id;
+    for (std::uint8_t first = 0; first < 0x40; ++first) {
+      frame.data[0] = first;
+      bus.survey.on_frame(frame, bus.now_us += 1000);
+    }
+    EXPECT_FALSE(bus.survey.is_r4(id)) << id;
+  }
+  bus.state(1);
+  EXPECT_TRUE(bus.survey.is_r4(telemetry_id(3)));
+  EXPECT_FALSE(bus.survey.is_r4(command_id(3))) << "no host has said anything";
+  EXPECT_FALSE(bus.survey.is_r4(0x123));
+  EXPECT_TRUE(bus.survey.is_r4(emergency_stop_id));
+}
+
 TEST(CanSurvey, HearsEveryDatagramOfABoard) {
   Bus bus;
   for (std::uint32_t pnum = 10; pnum < 30; ++pnum) bus.state(pnum);

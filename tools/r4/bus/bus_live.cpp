@@ -16,6 +16,7 @@
 #include "../shell/json.hpp"
 #include "../shell/run_end.hpp"
 #include "../shell/screen.hpp"
+#include "foreign_ids.hpp"
 #include "transports/can/can_interface.hpp"
 #include "transports/can/can_listener.hpp"
 #include "transports/url.hpp"
@@ -28,9 +29,13 @@ using Clock = std::chrono::steady_clock;
 constexpr Milliseconds usual_duration{5000};
 constexpr Milliseconds interval{1000};
 
-std::string meaning_of_id(std::uint32_t id) {
+std::string meaning_of_id(const CanSurvey& survey, std::uint32_t id) {
   if (id == CanSurvey::extended_ids) return "ids of 29 bits";
   const CanIdMeaning meaning = classify(id);
+  if (!survey.is_r4(id)) {
+    const bool is_ours = meaning.kind != CanIdKind::other;
+    return (is_ours ? "no R4 datagram: " : "not R4: ") + foreign_names(id);
+  }
   switch (meaning.kind) {
     case CanIdKind::emergency_stop:
       return "emergency stop";
@@ -47,7 +52,7 @@ std::string meaning_of_id(std::uint32_t id) {
     case CanIdKind::other:
       break;
   }
-  return "not R4's";
+  return "";
 }
 
 // What passed since the last look.
@@ -180,7 +185,7 @@ class LiveBus {
     };
     for (const auto& [id, part] : window.traffic) {
       const std::string number = id > max_can_id ? "" : fmt::format("{:03X}  ", id);
-      add(number + meaning_of_id(id), part);
+      add(number + meaning_of_id(listener_.survey(), id), part);
     }
     add("total", window.total);
     return rows;
@@ -196,7 +201,7 @@ class LiveBus {
     for (const auto& [id, part] : window.traffic) {
       Json row = object("traffic", part);
       row["id"] = id > max_can_id ? Json() : Json(id);
-      row["name"] = meaning_of_id(id);
+      row["name"] = meaning_of_id(listener_.survey(), id);
       print_line(row);
     }
     Json bus = object("bus", window.total);

@@ -12,6 +12,8 @@ namespace {
 constexpr AsyncBoard::Duration step_timeout{1000};
 constexpr AsyncBoard::Duration look_interval{50};
 constexpr std::chrono::milliseconds retry_interval{2000};
+constexpr std::chrono::milliseconds settle_time{
+    500};  // after which a device that was set up measures
 
 }  // namespace
 
@@ -36,14 +38,36 @@ void DeviceSetup::look_later() {
   });
 }
 
-// Is there one to be set up?
+// Begins to set up the devices that are due.
 void DeviceSetup::look() {
+  look_for_resets();
   if (!board_.in_control()) {
     for (Progress& each : progress_) each.done = false;
   } else if (begin_next(0)) {
     return;
   }
   look_later();
+}
+
+void DeviceSetup::look_for_resets() {
+  const bool in_control = board_.in_control();
+  for (std::size_t i = 0; i < devices_.size(); ++i) {
+    Progress& progress = progress_[i];
+    if (in_control && (!progress.done || Clock::now() < progress.settled)) continue;
+    const std::optional<bool> is_set_up = devices_[i].is_set_up(board_.state());
+    if (is_set_up == true) progress.reset = false;
+    if (is_set_up != false) continue;
+    if (!progress.reset) {
+      told_({ErrorKind::refused, devices_[i].text(),
+             "it is not set up, as after a reset: its values are no measurements",
+             in_control
+                 ? "it is set up again; look at its supply and wires if that repeats"
+                 : "the program that controls the board sets it up: give it this device, too",
+             Outcome::refused});
+    }
+    progress.reset = !in_control;  // set up again, it may be reset again
+    progress.done = false;
+  }
 }
 
 void DeviceSetup::begin_again() {
@@ -80,6 +104,7 @@ void DeviceSetup::on_result(const CommandResult& result) {
   Progress& progress = progress_[next_];
   progress.done = result.outcome == Outcome::confirmed;
   if (progress.done) {
+    progress.settled = Clock::now() + settle_time;
     progress.told.clear();
   } else {
     progress.again = Clock::now() + retry_interval;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Sets described devices up for as long as a command runs: as soon as the board takes our commands, and again when it
-// has begun anew or the link was lost. What fails is told once, and tried again every two seconds.
+// has begun anew, when the link was lost, or when a device was reset. What fails is told once, and
+// tried again every two seconds. A command that only watches tells which device was reset, and sets
+// none up.
 #pragma once
 
 #include <asio/cancellation_signal.hpp>
@@ -33,11 +35,14 @@ class DeviceSetup {
   // Of each device, whatever becomes of the others.
   struct Progress {
     bool done = false;
-    Clock::time_point again{};  // it has failed, and is not tried before
-    std::string told;           // why
+    Clock::time_point again{};    // it has failed, and is not tried before
+    std::string told;             // why
+    Clock::time_point settled{};  // it was set up, and has measured by then
+    bool reset = false;           // it was told that the device is not set up any more
   };
   void look_later();
   void look();
+  void look_for_resets();
   void begin_again();
   void give_up();
   bool begin_next(std::size_t from);

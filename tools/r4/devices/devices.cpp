@@ -33,9 +33,14 @@ std::string addresses_of(const DeviceDescription& device) {
 Json json_of(const DeviceDescription& device) {
   Json values = Json::object();
   for (const DeviceValue& value : device.values) values[value.name] = value.unit;
+  Json ready = Json::object();
+  for (const DeviceReady& each : device.ready) {
+    ready[device.values[each.value].name] = each.number ? Json(*each.number) : Json();
+  }
   return {{"name", device.name},          {"title", device.title},
           {"role", to_text(device.role)}, {"addresses", device.addresses},
-          {"slots", device.polls.size()}, {"values", std::move(values)}};
+          {"slots", device.polls.size()}, {"values", std::move(values)},
+          {"ready", std::move(ready)}};
 }
 
 void print_values(const DeviceDescription& device) {
@@ -46,6 +51,16 @@ void print_values(const DeviceDescription& device) {
     const DevicePoll& poll = device.polls[value.poll];
     print_text(fmt::format("  {:<16} {:<8} every {} ms\n", value.name,
                            value.unit.empty() ? "-" : value.unit, poll.period.count()));
+  }
+  for (const DeviceReady& each : device.ready) {
+    const std::string& name = device.values[each.value].name;
+    fmt::print("  it is set up while {} is {}\n", name,
+               each.number ? fmt::format("{}", *each.number) : "a measurement");
+  }
+  if (device.ready.empty() && !device.writes.empty()) {
+    fmt::print(
+        "  after a reset its values are not told from measurements: add a line: ready VALUE "
+        "NUMBER\n");
   }
 }
 

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "../bus/foreign_ids.hpp"
+
 namespace r4::tool {
 namespace {
 
@@ -124,6 +126,25 @@ Findings check_can_interface(const Machine& machine, const CanInterface& interfa
     finding.reason = interface.has_controller ? fmt::format("up, {}, {} kbit/s", interface.state,
                                                             interface.bit_rate / 1000.0)
                                               : "up, virtual";
+    findings.push_back(finding);
+  }
+  return findings;
+}
+
+Findings check_foreign_frames(const CanSurvey& survey, const std::string& interface,
+                              std::uint8_t node) {
+  Findings findings;
+  for (const auto& [id, traffic] : survey.traffic()) {
+    const CanIdMeaning meaning = classify(id);
+    const bool is_ours = meaning.kind != CanIdKind::other &&
+                         meaning.kind != CanIdKind::emergency_stop && meaning.node == node;
+    if (!is_ours || survey.is_r4(id)) continue;
+    Finding finding{Severity::warning, "can.foreign",  interface, "", "",
+                    Mending::by_hand,  ErrorKind::data};
+    finding.reason =
+        fmt::format("{} frames with id {:03X}, which is one of board {}, make no R4 datagram: {}",
+                    traffic.frames, id, node, foreign_names(id));
+    finding.fix = fmt::format("r4 bus can://{}", interface);
     findings.push_back(finding);
   }
   return findings;

@@ -8,6 +8,7 @@
 #include "finding.hpp"
 #include "machine.hpp"
 #include "transports/can/can_interface.hpp"
+#include "transports/can/can_survey.hpp"
 
 namespace r4::tool {
 
@@ -15,6 +16,9 @@ namespace r4::tool {
 Findings check_can_kernel(const Machine& machine);
 // One interface, as the system tells of it; also one that is not there.
 Findings check_can_interface(const Machine& machine, const CanInterface& interface);
+// Whether frames that are not R4's come on an id of that board.
+Findings check_foreign_frames(const CanSurvey& survey, const std::string& interface,
+                              std::uint8_t node);
 // How full the bus is, 0 to 1 of what its bit rate carries.
 Findings check_can_load(const std::string& interface, double load);
 

@@ -197,7 +197,9 @@ Findings check_links(const Options& options) {
                   {"states", sample.states},
                   {"lost", sample.lost},
                   {"damaged", sample.damaged},
-                  {"jitter_us", sample.jitter_us}});
+                  {"jitter_us", sample.jitter_us},
+                  {"answer_us", sample.answer_us},
+                  {"trouble", to_text(sample.trouble)}});
     }
     append(findings, std::move(link.findings));
   }

@@ -7,8 +7,10 @@
 #include <memory>
 #include <utility>
 
+#include "../bus/foreign_ids.hpp"
 #include "../shell/options.hpp"
 #include "can_checks.hpp"
+#include "can_question.hpp"
 #include "r4link/async_board.hpp"
 #include "transports/can/can_interface.hpp"
 #include "transports/can/can_listener.hpp"
@@ -23,7 +25,11 @@ constexpr double some_loss = 0.005;
 // A state of 100 Hz, and a half.
 constexpr double much_jitter_us = 15000;
 // Where nobody tells the rate, as of a virtual bus.
-constexpr std::uint32_t usual_bit_rate = 1'000'000;
+constexpr std::uint32_t doctor_bit_rate = 1'000'000;
+// A board does not execute what is older.
+constexpr double slow_answer_us = 250'000;
+// A board that was asked all that time had time to answer.
+constexpr double asked_for_s = 1;
 
 Finding found(const std::string& url, Severity severity, const char* check, std::string reason,
               std::string fix, ErrorKind kind = ErrorKind::data) {
@@ -49,7 +55,8 @@ class Listening {
       });
       board_->open();
       const Url parsed = Url::parse(url);
-      if (parsed.scheme() == "can") listen_to_bus(io, can_interface_of(parsed));
+      is_recording_ = parsed.scheme() == "replay";
+      if (parsed.scheme() == "can") listen_to_bus(io, parsed);
     } catch (const Error& error) {
       if (error.kind() == ErrorKind::usage) throw;
       findings_.push_back(trouble(url, error.problem()));
@@ -66,7 +73,11 @@ class Listening {
                      statistics.states - begun_.states,
                      statistics.packets.lost - begun_.packets.lost,
                      statistics.damaged - begun_.damaged,
-                     statistics.jitter_us};
+                     statistics.jitter_us,
+                     answered(statistics, seconds),
+                     question_ ? question_->answer_us() : statistics.round_trip_min_us,
+                     question_ ? question_->trouble() : board_->link().trouble,
+                     explain(board_->name(), link())};
     if (statistics.received == 0 && statistics.damaged == 0) {
       const Problem problem = explain(board_->name(), board_->link());
       result.findings.push_back(found(url_, Severity::error, "link.silent", problem.reason,
@@ -78,25 +89,53 @@ class Listening {
       const double load = static_cast<double>(bus_->survey().busy_ns()) / 1e9 / seconds;
       for (Finding& each : check_can_load(interface_, load))
         result.findings.push_back(std::move(each));
+      // Frames that come too late make no datagram, whosever they are.
+      if (result.sample.trouble != WireTrouble::late_frames) {
+        for (Finding& each : check_foreign_frames(bus_->survey(), interface_, node_))
+          result.findings.push_back(std::move(each));
+      }
     }
     return result;
   }
 
  private:
-  void listen_to_bus(asio::io_context& io, const std::string& name) {
+  // As the question on the bus sees it, too, where this program only watches.
+  LinkStatus link() const {
+    LinkStatus link = board_->link();
+    if (question_) link.trouble = question_->trouble();
+    return link;
+  }
+  Answered answered(const Statistics& statistics, double seconds) const {
+    const bool by_anyone =
+        !board_->identity().board_id.empty() || (bus_ && bus_->survey().board(node_).answers != 0);
+    if (statistics.round_trip_us > 0 || by_anyone) return Answered::yes;
+    const bool asked = question_ ? question_->asked_since_s() >= asked_for_s
+                                 : !is_recording_ && seconds >= asked_for_s;
+    return asked || link().trouble != WireTrouble::none ? Answered::no : Answered::not_asked;
+  }
+  void listen_to_bus(asio::io_context& io, const Url& url) {
+    const std::string& name = can_interface_of(url);
     interface_ = name;
+    node_ = static_cast<std::uint8_t>(url.get_number("node", 0, can_nodes - 1, 1));
     const CanInterface interface = can_interface(name);
-    const std::uint32_t rate = interface.bit_rate != 0 ? interface.bit_rate : usual_bit_rate;
+    const std::uint32_t rate = interface.bit_rate != 0 ? interface.bit_rate : doctor_bit_rate;
     bus_ = std::make_unique<CanListener>(io, name, CanBitRate{rate, interface.data_bit_rate});
+    question_ = std::make_unique<CanQuestion>(io, url);
+    bus_->survey().on_datagram([this](std::uint8_t node, const Datagram& datagram) {
+      if (node == node_) question_->hear(datagram.bytes());
+    });
   }
 
   const std::string url_;
   std::string interface_;
+  std::uint8_t node_ = 0;
+  bool is_recording_ = false;
   Findings findings_;
   std::unique_ptr<AsyncBoard> board_;
   // Before the first state a stream is joined somewhere in its numbers, which is no loss.
   Subscription first_state_;
   Statistics begun_;
+  std::unique_ptr<CanQuestion> question_;
   std::unique_ptr<CanListener> bus_;
 };
 
@@ -128,12 +167,41 @@ Findings judge_link(const std::string& url, const LinkSample& sample) {
         fmt::format("states come {:.1f} ms early or late on average", sample.jitter_us / 1000),
         fmt::format("r4 bench {}", url)));
   }
-  if (findings.empty()) {
+  if (sample.states == 0) {
     findings.push_back(
-        found(url, Severity::ok, "link",
-              fmt::format("{} states in {:.1f} s, {} lost, none damaged, jitter {:.1f} ms",
-                          sample.states, sample.seconds, sample.lost, sample.jitter_us / 1000),
-              ""));
+        found(url, Severity::error, "link.states",
+              fmt::format("{} datagrams came in {:.1f} s, and none is a state: {}", sample.received,
+                          sample.seconds, sample.link.reason),
+              sample.link.fix.empty() ? fmt::format("r4 monitor {} --json", url) : sample.link.fix,
+              ErrorKind::refused));
+  }
+  if (sample.answered == Answered::no) {
+    const bool known = sample.trouble != WireTrouble::none;
+    findings.push_back(
+        found(url, Severity::error, "link.answer",
+              known ? sample.link.reason
+                    : "the board does not answer a question: it does not hear this computer",
+              known ? sample.link.fix
+                    : "look at the way to the board (its RX wire, firewall): r4 bench " + url,
+              ErrorKind::refused));
+  } else if (sample.answer_us > slow_answer_us) {
+    findings.push_back(found(url, Severity::warning, "link.answer",
+                             fmt::format("the board answers after {:.0f} ms, and refuses commands "
+                                         "that are older than 250 ms",
+                                         sample.answer_us / 1000),
+                             fmt::format("r4 bench {}", url)));
+  }
+  if (findings.empty()) {
+    const bool answered = sample.answered == Answered::yes;
+    std::string answer =
+        answered ? "it answers" : "it was not asked whether it hears this computer";
+    if (sample.answer_us > 0) answer += fmt::format(" in {:.1f} ms", sample.answer_us / 1000);
+    findings.push_back(found(
+        url, answered ? Severity::ok : Severity::note, "link",
+        fmt::format("{} states in {:.1f} s, {} lost, none damaged, jitter "
+                    "{:.1f} ms; {}",
+                    sample.states, sample.seconds, sample.lost, sample.jitter_us / 1000, answer),
+        ""));
   }
   return findings;
 }

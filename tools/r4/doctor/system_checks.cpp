@@ -91,6 +91,9 @@ void check_firewall(const Machine& machine, Findings& findings) {
         found(Severity::warning, "network.firewall", "iptables",
               "drops what comes from boards: no rule names UDP port 2018 or 2390",
               fmt::format("iptables -I INPUT -p udp --sport {} -j ACCEPT", board_port)));
+  } else if (iptables.empty() && machine.run("nft --version").empty()) {
+    findings.push_back(found(Severity::note, "network.firewall", "firewall",
+                             "neither nft nor iptables tells its rules", "apt install nftables"));
   } else {
     findings.push_back(found(Severity::ok, "network.firewall", "firewall", "lets boards in"));
   }
@@ -150,7 +153,8 @@ Findings check_processors(const Machine& machine) {
               machine.as_root(
                   "echo performance | tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor")));
   }
-  const double load = std::strtod(machine.read("/proc/loadavg").value_or("0").c_str(), nullptr);
+  const std::optional<std::string> loads = machine.read("/proc/loadavg");
+  const double load = std::strtod(loads.value_or("0").c_str(), nullptr);
   if (processors > 0 && load > 1.5 * static_cast<double>(processors)) {
     findings.push_back(
         found(Severity::warning, "processor.load", "processors",
@@ -158,7 +162,7 @@ Findings check_processors(const Machine& machine) {
                           load, processors),
               "top"));
   }
-  if (findings.empty() && processors > 0) {
+  if (findings.empty() && processors > 0 && loads) {
     findings.push_back(found(Severity::ok, "processor", "processors",
                              fmt::format("{}, load {:.1f}", processors, load)));
   }

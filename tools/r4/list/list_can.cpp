@@ -62,16 +62,15 @@ class NodeQuestion final : private Carrier::Handler {
   bool answered() const { return board_.identity && (board_.pid == 0 || board_.controls); }
 
  private:
-  // As soon as nobody else was heard for as long as a host listens that comes.
+  // As soon as nobody else was heard for as long as a host listens that comes. Whether that is a
+  // host is seen by what its frames make.
   void ask() {
     if (board_.identity) return;
     const SendResult result = carrier_->send(identity_question(), Priority::normal);
-    if (result == SendResult::busy) {
-      board_.other_host = true;
-      carrier_.reset();
-    }
+    board_.foreign_frames = carrier_->trouble() == WireTrouble::foreign_frames;
+    board_.other_host = result == SendResult::busy && !board_.foreign_frames;
     if (result == SendResult::sent) ++asked_;
-    if (board_.identity || board_.other_host || asked_ == most_questions) return;
+    if (board_.identity || asked_ == most_questions) return;
     timer_.expires_after(result == SendResult::sent ? between_questions : look_again);
     timer_.async_wait([this](const std::error_code& error) {
       if (!error) ask();

@@ -33,6 +33,7 @@ std::string text_of(const ListedBoard& board) {
   }
   const std::optional<bool> busy = board.busy();
   if (busy && !board.controls) text += *busy ? ", controlled by a host" : ", free";
+  if (board.foreign_frames) text += ", frames that are not R4's come on its command id";
   if (board.pid != 0) text += ", " + holder_of(board);
   return printable(text);
 }
@@ -45,6 +46,7 @@ void describe(const ListedBoard& board, Json& object) {
                    {"capabilities", board.identity->capabilities}});
   }
   if (const std::optional<bool> busy = board.busy()) object["busy"] = *busy;
+  if (board.foreign_frames) object["foreign_frames"] = true;
   if (board.pid == 0) return;
   object["held_by"] = {
       {"program", board.program}, {"pid", board.pid}, {"controls", board.controls}};

@@ -23,6 +23,8 @@ struct ListedBoard {
   bool controls = false;
   // A host that is not that program was heard on the bus.
   bool other_host = false;
+  // Frames of another protocol come on its command id, so that it was not asked.
+  bool foreign_frames = false;
 
   // Does a host control it? None: it is not known.
   std::optional<bool> busy() const;

@@ -79,8 +79,10 @@ void DeviceTopics::on_state(const State& state, WallTime sampled) {
     if (!state.present.has(topic.device.field(topic.value))) continue;
     const DeviceReading reading = topic.device.reading(state, topic.value);
     // A range that is none is told, too: nothing within reach, or something too near.
+    // Of a device that is not set up nothing is a measurement.
     const bool told = topic.device.description().role == DeviceRole::range
-                          ? any_number_of(topic.device, state, topic.value).has_value()
+                          ? topic.device.is_set_up(state).value_or(true) &&
+                                any_number_of(topic.device, state, topic.value).has_value()
                           : reading.number.has_value();
     if (!told || reading.t_ms == 0 || topic.t_ms == reading.t_ms) continue;
     topic.t_ms = reading.t_ms;

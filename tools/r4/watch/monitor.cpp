@@ -79,7 +79,7 @@ class Monitor {
 
   int run() {
     connect();
-    if (options_.control && !devices_.empty()) {
+    if (!devices_.empty()) {
       setup_.emplace(io_, board_, devices_,
                      [this](const Problem& problem) { view_->on_device_trouble(problem); });
     }
@@ -135,7 +135,8 @@ class Monitor {
 
   // A host that was killed keeps its board until the board's timeout.
   void look_who_controls() {
-    busy_ticks_ = setup_ && board_.link().busy ? busy_ticks_ + 1 : 0;
+    const bool waits = options_.control && !devices_.empty() && board_.link().busy;
+    busy_ticks_ = waits ? busy_ticks_ + 1 : 0;
     if (busy_ticks_ * tick < busy_patience) return;
     gives_way_ = true;
     io_.stop();

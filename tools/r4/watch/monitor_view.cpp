@@ -82,6 +82,7 @@ class JsonView final : public MonitorView {
                 {"reason", to_text(status.reason)},
                 {"busy", status.busy},
                 {"gated", status.gated()}};
+    if (status.trouble != WireTrouble::none) fields["trouble"] = to_text(status.trouble);
     if (status.key != KeyTrouble::none) fields["key"] = to_text(status.key);
     if (status.lease != LeaseTrouble::none) fields["lease"] = to_text(status.lease);
     if (Json wires = wires_json(board_); !wires.is_null()) fields["wires"] = std::move(wires);
@@ -210,7 +211,11 @@ std::string link_text(const LinkStatus& status) {
       text = "LOST: the board is silent";
       break;
   }
-  if (status.busy) text += ", another host controls the board";
+  if (status.trouble != WireTrouble::none) {
+    text += fmt::format(", {} on the bus", to_text(status.trouble));
+  } else if (status.busy) {
+    text += ", another host controls the board";
+  }
   if (status.two_boards) text += ", its wires lead to two boards";
   if (status.gated()) text += ", our heartbeats are stopped";
   if (status.key != KeyTrouble::none) text += ", " + explain(status.key).text();

@@ -164,7 +164,10 @@ void Pca9685Model::write_mode1(std::uint8_t value) {
   }
 }
 
+bool Pca9685Model::clock_stands() const { return (registers_[mode1] & external_clock) != 0; }
+
 void Pca9685Model::show() {
+  if (clock_stands()) return;
   std::copy_n(registers_ + led_first, std::end(active_) - std::begin(active_), active_);
 }
 
@@ -176,9 +179,9 @@ bool Pca9685Model::running() const {
 int Pca9685Model::duty(int channel) const {
   const std::uint8_t* led = &active_[4 * channel];
   int duty = 0;
-  if (!running() || (led[3] & full) != 0) {
+  if ((!running() && !clock_stands()) || (led[3] & full) != 0) {
     duty = 0;
-  } else if ((led[1] & full) != 0) {
+  } else if ((led[1] & full) != 0 || clock_stands()) {
     duty = 4096;
   } else {
     const int on = led[0] | (led[1] & 0x0F) << 8;

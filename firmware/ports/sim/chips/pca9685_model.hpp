@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The PCA9685 by its data sheet (Rev. 4), register for register. Not modelled: the OE pin (held
-// low), the external clock, the phase of the pulses, test mode.
+// low), the phase of the pulses, test mode. The external clock stands, as on the board: with EXTCLK
+// the outputs stay as they are, pulses high, which is the worst that the data sheet allows.
 #pragma once
 
 #include <cstdint>
@@ -24,6 +25,10 @@ class Pca9685Model final : public I2cChipModel {
   double frequency_hz() const { return 25e6 / (4096.0 * (reg(0xFE) + 1)); }
   std::uint8_t reg(std::uint8_t number) const { return registers_[number]; }
 
+  // A disturbance changes a mode register: MODE1 or MODE2, whatever may be written there.
+  void disturb_mode1(std::uint8_t bits) { registers_[0x00] ^= bits; }
+  void disturb_mode2(std::uint8_t bits) { registers_[0x01] ^= bits; }
+
   void power_on() override;
   bool start(std::uint8_t address, bool read) override;
   bool write(std::uint8_t byte) override;
@@ -38,6 +43,7 @@ class Pca9685Model final : public I2cChipModel {
   void next_register();
   void show();
   bool running() const;
+  bool clock_stands() const;
 
   std::uint8_t address_;
   std::uint8_t registers_[256] = {};

@@ -174,6 +174,31 @@ TEST(Pca9685Model, SoftwareResetIsOneByteByTheGeneralCall) {
   EXPECT_EQ(bench.chip.reg(0xFE), 0x1E);
 }
 
+TEST(Pca9685Model, InvertedOutputsAreOnWhenTheyAreTurnedOff) {
+  Pca9685ModelBench bench;
+  bench.wake();
+  bench.chip.disturb_mode2(0x10);
+  bench.write({0xFD, 0x10}, 0x70);
+  EXPECT_TRUE(bench.chip.high(0));
+  bench.write({0x01, 0x04});
+  EXPECT_EQ(bench.chip.duty(0), 0);
+}
+
+TEST(Pca9685Model, WithoutItsClockItKeepsItsOutputsUntilItIsReset) {
+  Pca9685ModelBench bench;
+  bench.wake();
+  bench.write({0x06, 0x00, 0x00, 0x34, 0x02});
+  bench.chip.disturb_mode1(0x40);
+  bench.write({0xFD, 0x10}, 0x70);
+  EXPECT_TRUE(bench.chip.high(0)) << "a pulse that may have stopped while it was high";
+  EXPECT_EQ(bench.chip.duty(1), 0);
+  bench.write({0x00, 0x31});
+  EXPECT_EQ(bench.read(0x00, 1), Bytes{0x71}) << "EXTCLK cannot be cleared by writing";
+  bench.write({0x06}, 0);
+  EXPECT_EQ(bench.read(0x00, 1), Bytes{0x11});
+  EXPECT_EQ(bench.chip.duty(0), 0);
+}
+
 TEST(Pca9685Model, AllLedRegistersWriteAllAndReadZero) {
   Pca9685ModelBench bench;
   bench.wake();

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "transports/can/can_trouble.hpp"
+
+#include <gtest/gtest.h>
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+const CanTrouble::Time trouble_start{std::chrono::hours{1}};
+
+TEST(CanTrouble, TakesFramesThatMakeNoDatagramForThoseOfAnotherProtocol) {
+  CanTrouble trouble;
+  for (auto after = 0ms; after < 300ms; after += 10ms) {
+    trouble.on_host_frame(trouble_start + after);
+    EXPECT_EQ(trouble.now(trouble_start + after), WireTrouble::none) << after.count();
+    EXPECT_TRUE(trouble.hears_host(trouble_start + after)) << "it may be one";
+  }
+  trouble.on_host_frame(trouble_start + 300ms);
+  EXPECT_EQ(trouble.now(trouble_start + 300ms), WireTrouble::foreign_frames);
+  EXPECT_FALSE(trouble.hears_host(trouble_start + 300ms));
+  EXPECT_EQ(trouble.now(trouble_start + 1300ms), WireTrouble::none) << "they have ended";
+}
+
+TEST(CanTrouble, TakesAHostForNoOtherProtocol) {
+  CanTrouble trouble;
+  for (auto after = 0ms; after < 5s; after += 100ms) {
+    trouble.on_host_frame(trouble_start + after);
+    trouble.on_host_datagram(trouble_start + after + 1ms);
+    EXPECT_EQ(trouble.now(trouble_start + after + 99ms), WireTrouble::none);
+    EXPECT_TRUE(trouble.hears_host(trouble_start + after + 99ms));
+  }
+  EXPECT_FALSE(trouble.hears_host(trouble_start + 6s));
+}
+
+TEST(CanTrouble, TellsOfFramesThatComeTooLateWhileTheBoardIsHeard) {
+  CanTrouble trouble;
+  trouble.on_late(2, trouble_start);
+  trouble.on_board(trouble_start);
+  EXPECT_EQ(trouble.now(trouble_start), WireTrouble::none) << "two may be chance";
+  trouble.on_late(3, trouble_start + 1900ms);
+  EXPECT_EQ(trouble.now(trouble_start + 1950ms), WireTrouble::late_frames);
+  EXPECT_EQ(trouble.now(trouble_start + 2100ms), WireTrouble::none) << "they were long ago";
+  trouble.on_late(10, trouble_start + 4s);
+  EXPECT_EQ(trouble.now(trouble_start + 4s), WireTrouble::none) << "the board has gone";
+}
+
+}  // namespace
+}  // namespace r4::test

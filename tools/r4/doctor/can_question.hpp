@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Asks one board on a CAN bus who it is, as a host that comes to the bus does: only while no other
+// host is heard. What it answers everyone on the bus hears.
+#pragma once
+
+#include <asio/io_context.hpp>
+#include <asio/steady_timer.hpp>
+#include <chrono>
+#include <memory>
+#include <optional>
+
+#include "r4link/carrier.hpp"
+#include "r4link/text.hpp"
+#include "transports/url.hpp"
+
+namespace r4::tool {
+
+class CanQuestion final : private Carrier::Handler {
+ public:
+  // Asks until the board has answered. Throws Error if the bus cannot be opened.
+  CanQuestion(asio::io_context& io, const Url& url);
+  ~CanQuestion() { carrier_->close(); }
+  CanQuestion(const CanQuestion&) = delete;
+  CanQuestion& operator=(const CanQuestion&) = delete;
+
+  // A datagram of the board.
+  void hear(Text datagram);
+  // Question to answer; 0: there was none.
+  double answer_us() const { return answer_us_; }
+  // How long ago the first question went out; 0: none did.
+  double asked_since_s() const;
+  // What stands in the way, at its worst.
+  WireTrouble trouble() const { return trouble_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  void ask();
+  void on_datagram(std::string_view, Peer) override {}
+  void on_carrier_event(const CarrierEvent&) override {}
+
+  std::unique_ptr<Carrier> carrier_;
+  asio::steady_timer timer_;
+  std::optional<Clock::time_point> first_asked_;
+  std::optional<Clock::time_point> asked_;  // the newest question that is not answered
+  double answer_us_ = 0;
+  WireTrouble trouble_ = WireTrouble::none;
+};
+
+}  // namespace r4::tool

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a host hears on a CAN bus beside its own transfers: its board, other hosts, and why
+// datagrams do not pass although the bus is up. Without I/O.
+//
+//     foreign frames   frames come on the board's command id, and for host_completes they have made
+//                      no datagram of a host, which sends ten heartbeats a second: another protocol
+//                      uses the id
+//     late frames      late_transfers transfers within late_within were not answered in time (N_Bs,
+//                      N_Cr), while the board is heard: frames are held back, or lost
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+
+#include "r4link/carrier.hpp"
+
+namespace r4 {
+
+class CanTrouble {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+  using Duration = std::chrono::milliseconds;
+  static constexpr Duration board_silence{3000};  // six heartbeats of a board
+  static constexpr Duration host_silence{300};    // three of a host
+  static constexpr Duration host_completes{300};
+  static constexpr Duration frames_over{1000};  // after that, frames begin anew
+  static constexpr std::size_t late_transfers = 3;
+  static constexpr Duration late_within{2000};
+
+  void on_board(Time now) { board_heard_ = now; }
+  // A frame on the board's command id that is not ours.
+  void on_host_frame(Time now) {
+    if (now - host_heard_ > frames_over) frames_since_ = now;
+    host_heard_ = now;
+  }
+  // Such frames have made a datagram.
+  void on_host_datagram(Time now) { host_completed_ = now; }
+  // How many transfers were not answered in time, since the beginning.
+  void on_late(std::uint64_t count, Time now) {
+    for (; late_count_ < count; ++late_count_) late_[late_count_ % late_.size()] = now;
+  }
+
+  std::uint64_t late() const { return late_count_; }
+
+  bool hears_board(Time now) const { return now - board_heard_ <= board_silence; }
+  bool hears_host(Time now) const {
+    return now - host_heard_ < host_silence && !hears_foreign_frames(now);
+  }
+  WireTrouble now(Time now) const {
+    if (hears_foreign_frames(now)) return WireTrouble::foreign_frames;
+    const Time oldest = late_[late_count_ % late_.size()];
+    const bool late = late_count_ >= late_.size() && now - oldest < late_within;
+    return late && hears_board(now) ? WireTrouble::late_frames : WireTrouble::none;
+  }
+
+ private:
+  bool hears_foreign_frames(Time now) const {
+    return now - host_heard_ < frames_over &&
+           now - std::max(frames_since_, host_completed_) >= host_completes;
+  }
+
+  // When they were heard last; long ago.
+  Time board_heard_;
+  Time host_heard_;
+  Time host_completed_;
+  Time frames_since_;  // without a pause
+  std::uint64_t late_count_ = 0;
+  std::array<Time, late_transfers> late_;  // the newest, in a ring
+};
+
+}  // namespace r4
