@@ -75,8 +75,8 @@ TEST(Secrets, OfADamagedDatagramTakeTheRestWithThem) {
 
 RC_GTEST_PROP(Secrets, AreGoneTheFirstTime, (bool is_valid)) {
   const auto pieces = *rc::gen::container<std::vector<std::string>>(
-      rc::gen::element<std::string>("C:", "key", "password", ",", "1:", ";", "^", "0x1", "letmein!",
-                                    "rate,50", "...", "off", "x"));
+      rc::gen::element<std::string>("C:", "key", "password", ",", "1:", ";", "^", "0x1",
+                                    "C:password,letmein!", "rate,50", "...", "off", "x"));
   std::string bytes;
   for (const std::string& each : pieces) bytes += each;
   if (is_valid) bytes = with_crc(bytes);
