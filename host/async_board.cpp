@@ -318,6 +318,16 @@ void AsyncBoard::Impl::name_in_recording() {
   for (const auto& wire : wires) wire->tap.on_name(board);
 }
 
+// The link goes on without it.
+void AsyncBoard::Impl::tell_of_recordings() {
+  std::optional<Problem> problem;
+  for (const auto& wire : wires) {
+    std::optional<Problem> news = wire->tap.take_news();
+    if (news && !problem) problem = std::move(news);
+  }
+  if (problem) call(event_callbacks, CarrierEvent{CarrierEvent::Kind::warning, *problem});
+}
+
 void AsyncBoard::Impl::describe_in_recording(const Device& device) {
   for (const auto& wire : wires) wire->tap.on_device(device);
 }

@@ -249,16 +249,6 @@ void AsyncBoard::Impl::close() {
   enter(Completion::How::post, [this] { session.end_all(now); });
 }
 
-// The link goes on without it.
-void AsyncBoard::Impl::tell_of_recordings() {
-  std::optional<Problem> problem;
-  for (const auto& wire : wires) {
-    std::optional<Problem> news = wire->tap.take_news();
-    if (news && !problem) problem = std::move(news);
-  }
-  if (problem) call(event_callbacks, CarrierEvent{CarrierEvent::Kind::warning, *problem});
-}
-
 // --- time
 
 // The timer is only set when it must ring earlier than it will; ringing early costs one poll.

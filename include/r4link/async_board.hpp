@@ -249,9 +249,8 @@ class AsyncBoard {
   Subscription on_board_heartbeat(std::function<void(const Datagram&)> callback);
   Subscription on_nack(std::function<void(const Nack&, const Datagram&)> callback);
   Subscription on_bad_datagram(std::function<void(const ReadResult&, std::string_view)> callback);
-  // What other programs send to the board on a wire that is shared with them (docs/sharing.md):
-  // heartbeats and commands of the one that controls, stops of others. Dots stand for a key or a
-  // password.
+  // What other programs send to the board on a shared wire (docs/sharing.md): heartbeats and commands
+  // of the controlling host, stops of any. Dots stand for a key or a password.
   Subscription on_overheard(std::function<void(std::string_view)> callback);
   Subscription on_link(std::function<void(const LinkStatus&)> callback);
   // One of several wires has begun to carry, or ceased to. A transport that tells that it is gone is told of at

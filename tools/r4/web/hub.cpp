@@ -17,7 +17,6 @@ namespace r4::tool::web {
 namespace {
 
 using namespace std::chrono_literals;
-using WallClock = std::chrono::system_clock;
 
 constexpr auto tick_time = 25ms;
 constexpr auto command_time = 1s;
@@ -25,10 +24,11 @@ constexpr auto arm_time = 2s;
 // A page that echoes what it has heard needs to hear something.
 constexpr auto longest_silence = 100ms;
 
-std::int64_t wall_ms() {
-  return std::chrono::duration_cast<std::chrono::milliseconds>(WallClock::now().time_since_epoch())
-      .count();
+template <class Unit>
+Unit wall_time() {
+  return std::chrono::duration_cast<Unit>(std::chrono::system_clock::now().time_since_epoch());
 }
+std::int64_t wall_ms() { return wall_time<std::chrono::milliseconds>().count(); }
 
 BoardOptions options_for(const std::string& url, const HubOptions& options) {
   BoardOptions board = options.board;
@@ -156,8 +156,7 @@ void Hub::on_state(std::size_t board, const ReceivedState&, const Datagram& data
 
 void Hub::on_datagram(std::size_t board, const Datagram& datagram) {
   if (!foxglove_.wanted(board, Foxglove::Topic::record)) return;
-  const auto time =
-      std::chrono::duration_cast<std::chrono::microseconds>(WallClock::now().time_since_epoch());
+  const auto time = wall_time<std::chrono::microseconds>();
   server_.run(
       [this, board, time, bytes = std::string(datagram.bytes().data(), datagram.bytes().size())] {
         Json object = Json::object();
@@ -308,9 +307,7 @@ WebBoard::OnResult Hub::answering(ClientId client, const PageRequest& request, s
     Problem problem = explain(what, result, link);
     if (is_earlier(result.disarmed)) problem.fix = "press Clear when the danger is over, then Arm";
     answer(client, request, board, ok, ms,
-           ok                    ? "confirmed"
-           : problem.fix.empty() ? problem.reason
-                                 : problem.reason + "; " + problem.fix);
+           ok ? "confirmed" : problem.reason + (problem.fix.empty() ? "" : "; " + problem.fix));
   };
 }
 
@@ -377,12 +374,11 @@ void Hub::tell_recording() {
 
 void Hub::tell_recording(ClientId client, const std::string& why) {
   const WebRecording::Told& told = recording_.told();
-  Json object{{"type", "recording"}, {"path", nullptr}};
-  if (!told.path.empty()) object["path"] = told.path;
-  object["bytes"] = told.bytes;
-  object["you"] = recording_.is_of(client);
-  object["why"] = why;
-  tell(client, text_of(object));
+  tell(client, text_of({{"type", "recording"},
+                        {"path", told.path.empty() ? Json() : Json(told.path)},
+                        {"bytes", told.bytes},
+                        {"you", recording_.is_of(client)},
+                        {"why", why}}));
 }
 
 void Hub::tick() {
