@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A file descriptor with an owner; what to do where there is none left; and sockets of Asio's that a program which this
-// one starts does not inherit: it would keep the port for as long as it runs.
+// A file descriptor with an owner; what to do where there is none left; and sockets of Asio's that
+// a program which this one starts does not inherit: it would keep the port for as long as it runs.
 #pragma once
 
 #include <fcntl.h>
