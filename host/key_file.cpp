@@ -51,7 +51,8 @@ Key load_key(const std::string& path) {
   if (S_ISDIR(status.st_mode)) {
     throw Error(ErrorKind::open, path, "is a directory", "name the file that holds the key");
   }
-  // A file of root's may be for a group that root has chosen, such as that of a service. So are systemd's credentials.
+  // A file of root's may be for a group that root has chosen, such as that of a service. So are
+  // systemd's credentials.
   const mode_t allowed = status.st_uid == 0 ? S_IRWXU | S_IRGRP : S_IRWXU;
   if ((status.st_mode & (S_IRWXU | S_IRWXG | S_IRWXO) & ~allowed) != 0) {
     throw Error(ErrorKind::permission, path, "others can read or write this key",

@@ -231,8 +231,8 @@ void Application::emergency_stop(Source from, const Datagram& datagram, Verdict 
     }
   }
   if (observer_ != nullptr) observer_->on_executed(now_ms, datagram.pnum(), Command::stop());
-  // Everyone hears of it once. The sender hears it each time, as often as it takes; one that has proved nothing, as
-  // long as there are not too many of them.
+  // Everyone hears of it once. The sender hears it each time, as often as it takes; one that has
+  // proved nothing, as long as there are not too many of them.
   if (!repeated) send_heartbeats(now_ms);
   if (owner ? repeated : stops_.take(now_ms)) answer_heartbeat(from, now_ms);
 }

@@ -5,8 +5,8 @@
 //     W:rate --> is told a LEASE --W:rate that echoes it--> hears everything for two seconds, again by the next W
 //
 // As at the board, nothing is streamed before the echo of a random number that was told to that very place: so nobody has
-// a bridge flood a third by forging where a W comes from. For the same reason the answers to those that have echoed
-// nothing are few.
+// a bridge flood a third by forging where a W comes from. For the same reason the answers to those
+// that have echoed nothing are few.
 #pragma once
 
 #include <array>
@@ -34,7 +34,8 @@ class BridgeAudience {
   // A new LEASE, which that host is told.
   std::uint32_t new_token(Peer to, Time now);
 
-  // That host is to hear the board's heartbeats for a while: it has stopped the board, or it needs the nonce.
+  // That host is to hear the board's heartbeats for a while: it has stopped the board, or it needs
+  // the nonce.
   void listen(Peer from, Time now) { place_of(from, now).listens_until = now + curiosity; }
 
   // It has asked something by a datagram of that number; none: of no number.

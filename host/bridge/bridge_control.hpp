@@ -8,13 +8,15 @@
 //     nobody ---------------> that host has the place ------------------------------------> that other host has it
 //
 // The place is free again when its host has been silent for the board's timeout, when the board has confirmed
-// its farewell, and when the board does not take that host: it has not streamed for `unanswered`, or, to a host that it
-// has never streamed to, for `untaken` (a board takes a host at once, or never: the host has no key). Other hosts'
-// heartbeats and commands do not pass meanwhile. The board begins a new session with the next host, outputs off, because
-// its packet numbers do not go on.
+// its farewell, and when the board does not take that host: it has not streamed for `unanswered`,
+// or, to a host that it has never streamed to, for `untaken` (a board takes a host at once, or
+// never: the host has no key). Other hosts' heartbeats and commands do not pass meanwhile. The
+// board begins a new session with the next host, outputs off, because its packet numbers do not go
+// on.
 //
-// A host that the board did not take steps back: it gets the free place only if no other host has asked for it for
-// `courtesy`. So up to `remembered` hosts without a key, in turn, cannot keep out the one that has it.
+// A host that the board did not take steps back: it gets the free place only if no other host has
+// asked for it for `courtesy`. So up to `remembered` hosts without a key, in turn, cannot keep out
+// the one that has it.
 #pragma once
 
 #include <array>

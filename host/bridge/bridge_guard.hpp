@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Which host datagrams a bridge may pass to its board, as far as that depends on keys.
 //
-// A board obeys its own cable without a signature, and a bridge must not lend that trust to its hosts:
+// A board obeys its own cable without a signature, and a bridge must not lend that trust to its
+// hosts:
 //
-//     keys of the bridge   board                               heartbeats and commands pass
-//     given                any                                 if they are signed for this board, once, within 250 ms
-//     none                 not at a cable, or opened to all    always; the board itself checks signatures
-//     none                 at a cable, has no key              always
-//     none                 at a cable, has a key               never: the bridge cannot check signatures
-//     none                 at a cable, not heard yet           never
+//     keys    board                        heartbeats and commands pass
+//     given   any                          if they are signed for this board, once, within 250 ms
+//     none    at no cable, or open to all  always; the board itself checks signatures
+//     none    at a cable, has no key       always
+//     none    at a cable, has a key        never: the bridge cannot check signatures
+//     none    at a cable, not heard yet    never
 //
-// The rule is that of the board (protocol/keys/authentication.hpp), with the nonce and the clock that the board tells.
-// E:STOP, Q:ID and W need no signature, neither here nor at the board.
+// The rule is that of the board (protocol/keys/authentication.hpp), with the nonce and the clock
+// that the board tells. E:STOP, Q:ID and W need no signature, neither here nor at the board.
 #pragma once
 
 #include <chrono>
@@ -34,15 +35,16 @@ class BridgeGuard {
     key_needed,        // the board has a key, and the bridge has none
   };
 
-  // `keys`: those of the board that its hosts sign with; at most max_keys. `trusted`: the board obeys whatever comes by
-  // this transport (its cable), and the bridge is not open to everyone.
+  // `keys`: those of the board that its hosts sign with; at most max_keys. `trusted`: the board
+  // obeys whatever comes by this transport (its cable), and the bridge is not open to everyone.
   BridgeGuard(const std::vector<Key>& keys, bool trusted);
 
   void on_board_datagram(const Datagram& datagram, MessageKind kind, Time now);
   // The board's transport is down. Another board may be there when it comes back.
   void on_board_gone() { heard_ = false; }
 
-  // Judges a heartbeat or a command. `copy` is for the caller to judge: it is good from the host that has the place.
+  // Judges a heartbeat or a command. `copy` is for the caller to judge: it is good from the host
+  // that has the place.
   Verdict judge(const Datagram& datagram, Time now);
   // That verdict was not good. True if it may be answered.
   bool may_answer(Verdict verdict, bool is_command, Time now);

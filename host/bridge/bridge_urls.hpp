@@ -17,7 +17,8 @@ struct BridgedUrls {
 // joined to itself, and for what cannot be a side.
 std::vector<BridgedUrls> pair_urls(std::string_view hosts, std::string_view board);
 
-// True if only programs of this computer, or what is plugged into it, reach a side where hosts are heard.
+// True if only programs of this computer, or what is plugged into it, reach a side where hosts are
+// heard.
 bool is_of_this_computer(const std::string& hosts);
 
 }  // namespace r4

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A bridge watches its board while no host has the place (docs/protocol.md, 4.8): the states that come by it are for
-// the watchers at the hosts' side, and for those that share the board's transport with the bridge.
+// A bridge watches its board while no host has the place (docs/protocol.md, 4.8): the states that
+// come by it are for the watchers at the hosts' side, and for those that share the board's
+// transport with the bridge.
 //
-// It asks for what the newest watcher at the hosts' side has asked for; where there is none, for a few states a second,
-// which are no load for a bus of many boards.
+// It asks for what the newest watcher at the hosts' side has asked for; where there is none, for a
+// few states a second, which are no load for a bus of many boards.
 #pragma once
 
 #include <chrono>

@@ -2,20 +2,21 @@
 // Two carriers of one loop joined: on one hosts are heard, at the other is their board.
 //
 //     hosts --> E:STOP                          first of all, of anyone, however old
-//               heartbeats, commands            of the host that has the place (bridge_control.hpp), if its datagrams
-//                                               prove what they must (bridge_guard.hpp)
+//               heartbeats, commands            of the host that has the place, if they prove what
+//                                               they must (bridge_control.hpp, bridge_guard.hpp)
 //               Q:ID                            of anyone
 //     board --> states, heartbeats              to the host that has the place, and who watches (bridge_audience.hpp)
 //               N, I                            to who has asked, by the number that they name
 //
 // The bytes stay as they are. What may have waited for longer than `oldest` before it was read is dropped, but a stop:
 // so nothing that a bridge held back is executed, or keeps a board alive. What waits to be sent is bounded likewise,
-// by the carriers' queues. Settings that a board takes only from its own cable (site_settings.hpp) never pass: a bridge
-// would turn everyone who reaches it into that cable, and would carry keys and passwords over a network.
+// by the carriers' queues. Settings that a board takes only from its own cable (site_settings.hpp)
+// never pass: a bridge would turn everyone who reaches it into that cable, and would carry keys and
+// passwords over a network.
 //
-// No heartbeat is made here. Answers are: BUSY for who is kept out, AUTH for what must not pass, and a LEASE for who
-// watches, since the board takes all hosts of a bridge for one. While no host has the place, the bridge itself watches
-// the board (bridge_watch.hpp).
+// No heartbeat is made here. Answers are: BUSY for who is kept out, AUTH for what must not pass,
+// and a LEASE for who watches, since the board takes all hosts of a bridge for one. While no host
+// has the place, the bridge itself watches the board (bridge_watch.hpp).
 #pragma once
 
 #include <array>

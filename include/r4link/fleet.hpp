@@ -254,12 +254,13 @@ struct BridgeEvent {
 };
 
 struct BridgeOptions {
-  // The board's keys, at most four (load_key()). With one the bridge passes only heartbeats and commands that are
-  // signed with it, as a board does that is reached by radio; stops and questions pass without.
+  // The board's keys, at most four (load_key()). With one the bridge passes only heartbeats and
+  // commands that are signed with it, as a board does that is reached by radio; stops and questions
+  // pass without.
   std::vector<Key> keys;
-  // A board obeys its own cable without a signature. Unless this is set, a bridge to a cable therefore passes nothing
-  // unsigned to a board that has a key, and is refused on a network without `keys`. Set it, and everyone who reaches
-  // the hosts' side may drive the board.
+  // A board obeys its own cable without a signature. Unless this is set, a bridge to a cable
+  // therefore passes nothing unsigned to a board that has a key, and is refused on a network
+  // without `keys`. Set it, and everyone who reaches the hosts' side may drive the board.
   bool open = false;
   // After so long without a heartbeat of the host that has the place another one gets it: no shorter than the
   // board's timeout.
@@ -274,8 +275,8 @@ struct BridgeOptions {
 //     r4::Bridge bus("udp://0.0.0.0:2100-2107", "can://can0?node=0-7");
 //
 // It makes no heartbeat: a board whose host has died goes safe. Of several hosts one at a time is let through, and
-// E:STOP of any. A device that is not there, or goes, is waited for. What only a cable may set (C:key, C:network …)
-// never passes. Thread-safe.
+// E:STOP of any. A device that is not there, or goes, is waited for. What only a cable may set
+// (C:key, C:network …) never passes. Thread-safe.
 class R4LINK_API Bridge {
  public:
   // `hosts`: where hosts are heard, as r4 sim takes it; `board`: as a host takes it. Patterns of as many boards

@@ -72,8 +72,8 @@ class Authentication {
   Text nonce() const { return Text(nonce_, has_nonce_ ? nonce_size : 0); }
   // Another nonce: what was signed before is of no use then. Counters begin anew.
   void renew();
-  // Checks in the place of a board that tells this nonce, as a bridge does. Empty: the board tells none, and nothing is
-  // authentic. Counters begin anew with another nonce.
+  // Checks in the place of a board that tells this nonce, as a bridge does. Empty: the board tells
+  // none, and nothing is authentic. Counters begin anew with another nonce.
   void follow(Text nonce);
 
   // Is there chance to make random numbers of?

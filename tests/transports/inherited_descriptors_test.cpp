@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A program that this one starts inherits no descriptor of a transport: it would keep a port for as long as it runs.
+// A program that this one starts inherits no descriptor of a transport: it would keep a port for as
+// long as it runs.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <unistd.h>

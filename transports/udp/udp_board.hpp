@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's end of UDP: hosts come and go, and one of them is in control. At 0.0.0.0 or [::] each host is answered
-// from the address that it has asked.
+// The board's end of UDP: hosts come and go, and one of them is in control. At 0.0.0.0 or [::] each
+// host is answered from the address that it has asked.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -23,8 +23,8 @@ class UdpBoard final : public UdpEnd {
   bool reaches(Peer peer) const override;
 
  private:
-  // A host, and the address of this computer that it sends to: its answers leave from there. Unspecified where the
-  // socket has one address only.
+  // A host, and the address of this computer that it sends to: its answers leave from there.
+  // Unspecified where the socket has one address only.
   struct Place {
     Endpoint host;
     asio::ip::address at;

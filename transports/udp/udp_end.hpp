@@ -57,8 +57,8 @@ class UdpEnd : public Carrier {
   // The socket is bound: receives, and is up.
   void begin(Handler& handler);
   void hand_over(std::string_view bytes, Peer from);
-  // `standing`: to where what is for everyone goes. It tells whether the network is there. `from`: an address of this
-  // computer; unspecified: any.
+  // `standing`: to where what is for everyone goes. It tells whether the network is there. `from`:
+  // an address of this computer; unspecified: any.
   Outcome transmit_to(std::string_view bytes, const Endpoint& to, bool standing,
                       const asio::ip::address& from = {});
   void set_up(bool up);

@@ -388,7 +388,8 @@ TEST_F(BridgedPairTest, WhoWatchesBesideAHostHearsAllAfterAnEchoAndForTwoSeconds
   EXPECT_EQ(hosts->take(), Texts{board_state});
 }
 
-// The number of the newest W that the bridge has sent since this was asked last, and its text before that.
+// The number of the newest W that the bridge has sent since this was asked last, and its text
+// before that.
 struct OwnLease {
   std::string text;
   std::string pnum;

@@ -104,7 +104,8 @@ class ScriptedBridge {
   }
   // Time passes in which the process is stopped.
   void sleep(std::chrono::milliseconds time) { now += time; }
-  // What has passed to the board since this was asked last: without what the bridge itself asks the board for.
+  // What has passed to the board since this was asked last: without what the bridge itself asks the
+  // board for.
   Texts passed() {
     Texts texts = board->take();
     std::erase_if(texts, [](const std::string& text) { return text.starts_with("W:"); });

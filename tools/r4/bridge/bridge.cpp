@@ -176,10 +176,10 @@ Of several hosts one at a time is let through: the first that sends heartbeats, 
 --timeout. The others may watch, and stop the board: E:STOP of anyone goes first. What has waited for longer
 than 0.1 s is dropped. A board that is not there, or goes, is waited for.
 
-A board obeys its own cable without a key. A bridge to a serial port therefore passes to a board that has a
-key only what is signed with it, and needs the key for that: --key FILE. Without a key it listens to this
-computer alone; --open lets everyone who reaches it drive the board. What only a cable may set (C:key,
-C:network, C:password and the like) never passes.
+A board obeys its own cable without a key. To a board at a serial port that has a key, a bridge
+therefore passes only what is signed with it, and needs the key for that: --key FILE. Without a key
+it listens to this computer alone; --open lets everyone who reaches it drive the board. What only a
+cable may set (C:key, C:network, C:password and the like) never passes.
 
 On standard error it tells which transports come and go, and every ten seconds, if that has changed, and at
 the end what came from each side and was passed or dropped, and why; with --json on standard output, one

@@ -38,7 +38,7 @@ CLI::Option* add_key_option(CLI::App& command, const std::string& help,
             }
             take(text);
           },
-          help + ", in a file made by r4 key new (default: $R4_KEY)")
+          help)
       ->envname("R4_KEY")
       ->type_name(file_type);
 }
@@ -68,12 +68,13 @@ void make_key_file(const std::string& path, std::uint8_t id) {
 }
 
 CLI::Option* add_key(CLI::App& command, std::string& path) {
-  return add_key_option(command, "the board's key",
+  return add_key_option(command, "the board's key, in a file made by r4 key new (default: $R4_KEY)",
                         [&path](const std::string& text) { path = text; });
 }
 
 CLI::Option* add_keys(CLI::App& command, std::vector<std::string>& paths) {
-  return add_key_option(command, "a key of the board's; may be given several times",
+  return add_key_option(command,
+                        "a key file of the board's (default: $R4_KEY); may be given several times",
                         [&paths](const std::string& text) { paths.push_back(text); })
       ->trigger_on_parse()
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
