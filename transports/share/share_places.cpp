@@ -44,11 +44,12 @@ void SharePlaces::forget() {
 }
 
 WireSharer::Joined SharePlaces::join(int place, BoardRole role, const std::string& thing,
-                                     std::chrono::milliseconds within) {
+                                     const Patience& patience) {
   if (wire_.name.empty() || is_passed_over(place)) return WireSharer::Joined::none;
   const SharedWire there = at_place(wire_, place);
-  const auto joined = with_system_errors(
-      thing, [&] { return sharer_.join(there, role, program_invocation_short_name, within); });
+  const auto joined = with_system_errors(thing, [&] {
+    return sharer_.join(there, role, program_invocation_short_name, patience.queue);
+  });
   if (joined == WireSharer::Joined::hanging) {
     one_hangs_ = true;
     pass_over(place, WireSharer::silence_of_another(thing));
@@ -60,22 +61,22 @@ WireSharer::Joined SharePlaces::join(int place, BoardRole role, const std::strin
   return joined;
 }
 
-bool SharePlaces::join(const std::string& thing, std::chrono::milliseconds within) {
+bool SharePlaces::join(const std::string& thing, const Patience& patience) {
   int place = share_places;
   do {
     if (place-- == 0) return false;
-  } while (join(place, BoardRole::watch, thing, within) != WireSharer::Joined::holder);
+  } while (join(place, BoardRole::watch, thing, patience) != WireSharer::Joined::holder);
   joined_ = place;
   stranger_.reset();
   return true;
 }
 
 // Those that hang come first: who watches has the wire until then.
-void SharePlaces::ask_for_wire(const std::string& thing, std::chrono::milliseconds within) {
+void SharePlaces::ask_for_wire(const std::string& thing, const Patience& patience) {
   for (int place = 0; place < share_places; ++place) {
-    if (join(place, BoardRole::control, thing, within) != WireSharer::Joined::holder) continue;
+    if (join(place, BoardRole::control, thing, patience) != WireSharer::Joined::holder) continue;
     joined_ = place;
-    const std::optional<ShareMessage> answer = sharer_.wait_for_answer(within);
+    const std::optional<ShareMessage> answer = sharer_.wait_for_answer(patience.answer);
     if (!answer) {
       pass_over_hanging(thing);
     } else if (!answer->same_version) {

@@ -21,6 +21,12 @@ namespace r4 {
 
 class SharePlaces {
  public:
+  // How long a call may block.
+  struct Patience {
+    std::chrono::milliseconds queue;   // where many programs wait for a holder
+    std::chrono::milliseconds answer;  // of a holder that is asked
+  };
+
   SharePlaces(FindWire find, WireHolder& holder, WireSharer& sharer)
       : find_(std::move(find)), holder_(holder), sharer_(sharer) {}
 
@@ -35,12 +41,10 @@ class SharePlaces {
   // All are of use again.
   void forget();
 
-  // Joins the holder who came last, to watch. False if none is of use. Where many programs wait for a holder, this
-  // waits for `within` at most.
-  bool join(const std::string& thing, std::chrono::milliseconds within);
-  // Asks each holder to let go of the wire, and waits for `within` to reach it and again for its answer. Throws Error{refused} if one controls the
-  // board.
-  void ask_for_wire(const std::string& thing, std::chrono::milliseconds within);
+  // Joins the holder who came last, to watch. False if none is of use.
+  bool join(const std::string& thing, const Patience& patience);
+  // Asks each holder to let go of the wire, and waits for its answer. Throws Error{refused} if one controls the board.
+  void ask_for_wire(const std::string& thing, const Patience& patience);
   // Takes the first that is of use, or none if none is: then nobody shares what we open. False if another has it.
   // Throws Error{open} if the system has no file, memory or watch left for it.
   bool hold(const std::string& thing);
@@ -62,7 +66,7 @@ class SharePlaces {
 
  private:
   WireSharer::Joined join(int place, BoardRole role, const std::string& thing,
-                          std::chrono::milliseconds within);
+                          const Patience& patience);
   bool is_passed_over(int place) const { return (passed_over_ >> place & 1U) != 0; }
   void pass_over(int place, Problem why);
 

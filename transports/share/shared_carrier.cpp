@@ -21,12 +21,12 @@ using Kind = ShareMessage::Kind;
 using std::chrono::milliseconds;
 
 constexpr milliseconds answer_within{200};
+constexpr SharePlaces::Patience at_first{milliseconds(500), answer_within};
 // Where a link may be under way by other wires, which must not wait.
-constexpr milliseconds answer_again_within{20};
+constexpr SharePlaces::Patience again{milliseconds(0), milliseconds(20)};
 // A holder that says nothing for so long is asked whether it is alive, and has so long again to answer.
 constexpr milliseconds ask_after{400};
-constexpr milliseconds look_again{5};
-constexpr milliseconds look_again_slowly{100};
+constexpr milliseconds look_again{5}, look_again_slowly{100};
 // So long the wire may be nobody's before that is told.
 constexpr milliseconds take_over_within{100};
 constexpr milliseconds courtesy{20};  // left to a program that is about to take the wire to control
@@ -96,7 +96,7 @@ class SharedCarrier final : public Carrier,
   void attach_later(milliseconds delay);
   void look();
   void look_later();
-  milliseconds may_wait() const { return tried_ ? answer_again_within : answer_within; }
+  const SharePlaces::Patience& patience() const { return tried_ ? again : at_first; }
   bool late() const { return Clock::now() - since_ >= take_over_within; }
   void tell(const CarrierEvent& event);
 
@@ -165,7 +165,7 @@ void SharedCarrier::take_part() {
 bool SharedCarrier::try_to_take_part() {
   if (role_ == BoardRole::watch && try_to_share()) return true;
   if (role_ == BoardRole::control) {
-    places_.ask_for_wire(name_, may_wait());
+    places_.ask_for_wire(name_, patience());
   }
   try {
     return try_to_hold();
@@ -179,7 +179,7 @@ bool SharedCarrier::try_to_take_part() {
 
 // True if we share it now, or may do so soon.
 bool SharedCarrier::try_to_share() {
-  if (!places_.join(name_, may_wait())) return false;
+  if (!places_.join(name_, patience())) return false;
   state_ = State::sharing;
   welcome_ = heard_ = false;
   asked_ = true;  // by the hello
