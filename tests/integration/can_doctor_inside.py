@@ -84,6 +84,7 @@ def test_frames_of_another_protocol_on_an_id_of_the_board_are_told():
 
 def test_a_bus_that_holds_frames_back_is_told():
     with Board('can://vxcan1?node=1'):
+        assert run('send', 'can://vxcan0?node=1', 'R:1,On').returncode == 0
         for name in ('vxcan0', 'vxcan1'):
             subprocess.run(f'tc qdisc replace dev {name} root netem delay 30ms limit 2000', shell=True, check=True)
         try:

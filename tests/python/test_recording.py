@@ -107,7 +107,7 @@ def test_a_device_that_another_has_replaced_measures_nothing_any_more(tmp_path):
     angle, power = ((DESCRIPTIONS / f'{name}.device').read_text() for name in ('as5600', 'ina219'))
     both = 'I2C1:5,0,x0400;I2C2:5,0,x20;'
     path.write_text(HEADER + device('as5600@0x36:1', angle) + line(0.1, both + 'PNum:1;T:10;')
-                    + device('ina219@0x40:1', power) + line(0.2, 'I2C1:15,0,x07d0;I2C2:15,0,x5d9a;PNum:2;T:20;')
+                    + device('ina219@0x40:1', power) + line(0.2, 'I2C1:15,0,x07d0;I2C2:15,0,x5d98;PNum:2;T:20;')
                     + HEADER + line(0.3, both + 'PNum:1;T:10;'))
     [board] = r4link.read(path).boards
     assert board.states['as5600_angle'][0] == pytest.approx(np.pi / 2)

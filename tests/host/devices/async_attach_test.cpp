@@ -69,9 +69,9 @@ TEST_F(AsyncAttach, HasTheBoardReadItAndSendItsFieldsBesideThoseThatWereChosen) 
   EXPECT_NEAR(imu.reading(board_.state(), "accel_z").number.value(), 9.80665, 1e-9);
   EXPECT_TRUE(board_.state().present.has(StateField::ain24)) << "the fields of before";
   const std::uint64_t before = commands();
-  EXPECT_EQ(attach(Device::from("ina219@0x40:4")).outcome, Outcome::confirmed);
+  EXPECT_EQ(attach(Device::from("ina219@0x40:5")).outcome, Outcome::confirmed);
   EXPECT_EQ(commands() - before, 4U) << "is it there, two readings, and their fields";
-  EXPECT_EQ(attach(Device::from("ina219@0x40:4")).outcome, Outcome::confirmed);
+  EXPECT_EQ(attach(Device::from("ina219@0x40:5")).outcome, Outcome::confirmed);
   EXPECT_EQ(commands() - before, 7U) << "its fields are sent already";
 }
 

@@ -98,14 +98,14 @@ TEST(Csv, HasNoRowForAStateWhoseValuesAreNone) {
 }
 
 TEST(Csv, HasWhatDescribedDevicesMeasured) {
-  const std::string recording = one_state("I2C3:1000,0,x07d0;I2C4:1002,0,x5d9a;PNum:1;T:1010;") +
+  const std::string recording = one_state("I2C3:1000,0,x07d0;I2C4:1002,0,x5d98;PNum:1;T:1010;") +
                                 one_state("I2C3:0,0,x;PNum:2;T:1020;");
   const Converted csv =
       converted(recording, ".r4log", ".csv", 1000, {Device::from("ina219@0x40:3")});
   const auto lines = lines_of(csv.bytes);
   ASSERT_EQ(lines.size(), 3);
   EXPECT_TRUE(lines[0].ends_with(",ina219@0x40 voltage [V],ina219@0x40 current [A]")) << lines[0];
-  EXPECT_TRUE(lines[1].ends_with(",x5d9a,11.98,0.2")) << lines[1];
+  EXPECT_TRUE(lines[1].ends_with(",x5d98,11.98,0.2")) << lines[1];
   EXPECT_TRUE(lines[2].ends_with(",,")) << lines[2] << ": nothing was read yet";
   const Converted json =
       converted(recording, ".r4log", ".jsonl", 1000, {Device::from("ina219@0x40:3")});
@@ -126,9 +126,9 @@ std::string recording_of_two_with_devices() {
     write_record(all, {Time{1795468293000000 + wire}, wire, RecordKind::from_board,
                        with_crc(fields + "PNum:1;T:1010;")});
   };
-  state(1, "I2C3:1000,0,x07d0;I2C4:1002,0,x5d9a;");
+  state(1, "I2C3:1000,0,x07d0;I2C4:1002,0,x5d98;");
   state(2, "I2C1:1000,0,x07d0;I2C2:1002,0,x5da0;");
-  state(2, "I2C3:1000,0,x07d0;I2C4:1002,0,x5d9a;");
+  state(2, "I2C3:1000,0,x07d0;I2C4:1002,0,x5d98;");
   return all;
 }
 
@@ -141,7 +141,7 @@ TEST(Csv, HasTheDevicesThatTheRecordingTellsOfEachOfItsWire) {
       << lines[0];
   EXPECT_TRUE(lines[1].ends_with(",11.98,0.2")) << lines[1];
   EXPECT_TRUE(lines[2].ends_with(",11.984,0.2")) << lines[2];
-  EXPECT_TRUE(lines[3].ends_with(",x5d9a,,")) << lines[3] << ": those slots are the other board's";
+  EXPECT_TRUE(lines[3].ends_with(",x5d98,,")) << lines[3] << ": those slots are the other board's";
   EXPECT_TRUE(csv.left_out.find("odd@0x40:5, line 1") != std::string::npos) << csv.left_out;
   // Named ones count instead, of every wire.
   const Converted named =
@@ -153,10 +153,10 @@ TEST(Csv, HasTheDevicesThatTheRecordingTellsOfEachOfItsWire) {
 TEST(Csv, DevicesOfOneRecordingAreNotThoseOfTheNextInTheFile) {
   const std::string two = recording_of_two_with_devices() +
                           "# r4log 1 by r4 0.1.0\n# wire 1 udp://c\n" +
-                          one_state("I2C3:1000,0,x07d0;I2C4:1002,0,x5d9a;PNum:1;T:1010;");
+                          one_state("I2C3:1000,0,x07d0;I2C4:1002,0,x5d98;PNum:1;T:1010;");
   const auto lines = lines_of(converted(two, ".r4log", ".csv").bytes);
   EXPECT_TRUE(lines[1].ends_with(",11.98,0.2"));
-  EXPECT_TRUE(lines.back().ends_with(",x5d9a,,")) << lines.back();
+  EXPECT_TRUE(lines.back().ends_with(",x5d98,,")) << lines.back();
 }
 
 TEST(Csv, HasNoColumnOfTheRecordingsDevicesWhereOthersAreNamed) {
@@ -189,7 +189,7 @@ TEST(Csv, SaysWhatIsToldTooLateForAColumnOfIt) {
   StringOutput output;
   const auto sink = tool::make_sink("test.csv", output, {});
   tool::Conversion conversion(*sink, [](const RecordingDamage&) {});
-  std::string all = one_state("I2C3:1000,0,x07d0;I2C4:1002,0,x5d9a;PNum:1;T:1010;");
+  std::string all = one_state("I2C3:1000,0,x07d0;I2C4:1002,0,x5d98;PNum:1;T:1010;");
   write_device(all, {1, "ina219@0x40:3", std::string(DeviceDescription::text_of("ina219"))});
   const auto source = tool::make_source("test.r4log", conversion);  // not surveyed, as of a pipe
   source->feed(all);

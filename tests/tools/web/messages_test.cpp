@@ -46,7 +46,7 @@ TEST(WebRows, HaveAColumnForEachValueOfEveryField) {
 
 TEST(WebRows, HaveAColumnForEachValueOfADescribedDevice) {
   const Columns columns({Device::from("ina219@0x40:3")});
-  const Json rows = rows_after(columns, {"I2C3:1000,0,x07d0;I2C4:1002,0,x5d9a;PNum:1;T:10;",
+  const Json rows = rows_after(columns, {"I2C3:1000,0,x07d0;I2C4:1002,0,x5d98;PNum:1;T:10;",
                                          "I2C3:0,0,x;I2C4:0,0,x;PNum:2;T:20;"});
   EXPECT_EQ(row_of(columns, rows.at(0)).at("ina219@0x40.voltage"), 11.98);
   EXPECT_EQ(row_of(columns, rows.at(0)).at("ina219@0x40.current"), 0.2);
