@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host whose computer slept, opposite the real board: its clock stood still, and it begins another session.
+// A host whose computer slept, opposite the real board: its clock stood still, and it begins
+// another session.
 #include <gtest/gtest.h>
 
 #include "wired_robot.hpp"
@@ -17,7 +18,8 @@ class SleepingHost : public ::testing::TestWithParam<Cables> {
   void cut_all(WiredRobot& of, bool is_cut = true) {
     for (std::size_t wire = 0; wire < of.cables.size(); ++wire) of.cut(wire, is_cut);
   }
-  // Longer than the board waits for its host, and shorter or longer than the tolerance of a board's clock.
+  // Longer than the board waits for its host, and shorter or longer than the tolerance of a board's
+  // clock.
   static constexpr std::uint32_t naps_ms[] = {1500, 9000, 60'000};
 
   WiredRobot robot{GetParam()};
