@@ -259,6 +259,7 @@ class Session {
   void refuse_held_back(Time now);
   void on_post_refused(const Nack& nack);
   void confirm_stop(const SafeReport& report, Time now);
+  bool may_say_farewell() const;
   void confirm_leave(const SafeReport& report, std::uint32_t t_ms, Time now);
   bool is_behind_leave(std::uint32_t t_ms) const;
   void on_causes(std::int32_t newest, Time now);

@@ -90,6 +90,22 @@ TEST_P(SleepingHost, IsNotArmedByWhatItAskedForThoughTheBoardWasNeverHeard) {
   EXPECT_EQ(armed.finish(drive).outcome, Outcome::cancelled);
 }
 
+TEST_P(SleepingHost, SwitchesTheMotorsOffAtOnceWhereTheBoardWaitsForLonger) {
+  Settings settings;
+  settings.timeout_ms = 10'000;
+  WiredRobot patient(GetParam(), WiredRobot::at_will(), BoardRole::control, settings);
+  patient.connect();
+  ASSERT_EQ(patient.drive(100).outcome, Outcome::confirmed);
+  patient.sleep(3000);
+  ASSERT_TRUE(drives(patient)) << "the board has not missed its host yet";
+  patient.run(100);
+  for (int ms = 0; ms < 3000; ++ms) {
+    ASSERT_FALSE(drives(patient)) << ms << " ms later";
+    patient.run(1);
+  }
+  EXPECT_TRUE(patient.session->in_control(patient.now()));
+}
+
 TEST_P(SleepingHost, IsObeyedAgain) {
   robot.connect();
   ASSERT_EQ(robot.drive(100).outcome, Outcome::confirmed);
