@@ -144,11 +144,10 @@ class AsyncBoard {
         [this](auto handler, Duration t) { start_stop(t, make_completion(std::move(handler))); },
         token, timeout);
   }
-  // void(CommandResult). Clears what made the outputs safe, where it can be cleared (a stop, a
-  // watchdog or a fault that came while this program controlled the board), and closes relay 1, the
-  // motor supply. Confirmed by the board's state: output commands go out from then on. Not armed:
-  // what stands against it cannot be cleared, or may have come before the program began, which
-  // async_clear() clears.
+  // void(CommandResult). Clears a stop, a watchdog or a fault that came while this program controlled
+  // the board, and closes relay 1, the motor supply. Confirmed by the board's state: output commands
+  // go out from then on. Not armed: what stands against it cannot be cleared, or may have come before
+  // the program began, which async_clear() clears.
   template <class Token>
   auto async_arm(Duration timeout, Token&& token) {
     require_timeout("async_arm()", timeout);
@@ -157,8 +156,7 @@ class AsyncBoard {
         [this](auto handler, Duration t) { start_arm(t, make_completion(std::move(handler))); },
         token, timeout);
   }
-  // void(CommandResult). Takes away the stop, the watchdog or the fault that the board reports;
-  // moves nothing.
+  // void(CommandResult). Takes away the stop, watchdog or fault that the board reports.
   template <class Token>
   auto async_clear(Duration timeout, Token&& token) {
     return async_send(Command::clear(), timeout, std::forward<Token>(token));
