@@ -86,8 +86,8 @@ struct Board::Impl : std::enable_shared_from_this<Board::Impl> {
   // Does `action` on the loop and waits until it is done; nothing if the board is closed. Throws if
   // the loop does not begin in time; then it never will.
   void run_on_loop(std::string_view what, std::function<void()> action);
-  // Waits until `arrived` (asked under the lock) is true. False if it was not in time. A sleep of this computer is part
-  // of the time, though the deadline stands still meanwhile.
+  // Waits until `arrived` (asked under the lock) is true. False if it was not in time. A sleep of
+  // this computer is part of the time, though the deadline stands still meanwhile.
   template <class Predicate>
   bool wait_for_news(Duration timeout, Predicate arrived) {
     const SleepWatch slept;

@@ -225,7 +225,8 @@ class Application {
   bool has_stop_number_ = false;
   std::uint32_t stop_number_ = 0;
   bool stop_of_a_key_ = false;
-  // Stops that the guard has heard, and those of them whose datagrams are still to be read; when it heard the newest.
+  // Stops that the guard has heard, and those of them whose datagrams are still to be read; when it
+  // heard the newest.
   std::uint32_t stops_heard_ = 0;
   std::uint32_t unread_stops_ = 0;
   std::uint32_t unread_ms_ = 0;

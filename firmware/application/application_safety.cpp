@@ -19,8 +19,9 @@ void Application::look_at_time(std::uint32_t now_ms) {
   if (lost) enter(SafeReason::link, now_ms);
 }
 
-// A stop that an interrupt has heard applies at once. Its datagram tells whether it is a repetition. Where the
-// datagram does not come, because a port had no room for it, the stop is a new cause.
+// A stop that an interrupt has heard applies at once. Its datagram tells whether it is a
+// repetition. Where the datagram does not come, because a port had no room for it, the stop is a
+// new cause.
 void Application::look_at_stops(std::uint32_t now_ms) {
   const std::uint32_t heard = guard_.stops_heard();
   if (heard != stops_heard_) {

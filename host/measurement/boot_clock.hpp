@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Time that goes on while this computer sleeps, and a watch that notices that it slept.
 //
-// The steady clock (CLOCK_MONOTONIC) stands still in a suspended computer, and every timer and deadline with it. The
-// boot clock (CLOCK_BOOTTIME) goes on. What has to end in a human's time is measured by it.
+// The steady clock (CLOCK_MONOTONIC) stands still in a suspended computer, and every timer and
+// deadline with it. The boot clock (CLOCK_BOOTTIME) goes on. What has to end in a human's time is
+// measured by it.
 #pragma once
 
 #include <algorithm>
@@ -27,8 +28,9 @@ struct BootClock {
   }
 };
 
-// How long this computer has slept since it was switched on: by so much the boot clock is ahead of the steady one. The
-// two are read one after the other, and a thread may lose its processor in between.
+// How long this computer has slept since it was switched on: by so much the boot clock is ahead of
+// the steady one. The two are read one after the other, and a thread may lose its processor in
+// between.
 inline Time slept_at_most(Time steady) {
   return std::chrono::duration_cast<Time>(BootClock::now().time_since_epoch()) - steady;
 }
@@ -41,8 +43,8 @@ inline Time slept_at_least() {
 // Neither a thread that gets no processor nor a process that is stopped is mistaken for a sleep.
 class SleepWatch {
  public:
-  // `steady` is the steady clock now. True if the computer slept for longer than `limit` since this was made, or since
-  // it was last true.
+  // `steady` is the steady clock now. True if the computer slept for longer than `limit` since this
+  // was made, or since it was last true.
   bool slept(Time steady, Time limit) {
     const Time most = slept_at_most(steady);
     if (most - before_ <= limit) {

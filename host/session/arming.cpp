@@ -77,8 +77,8 @@ void ArmingMachine::on_reason(SafeReason reason) {
   if (cause != DisarmCause::none && armed()) cause_ = cause;
 }
 
-// The board tells the gravest of its reasons: those that are graver are not there. Of one that only E:CLEAR ends it
-// cannot be told whether it hides others.
+// The board tells the gravest of its reasons: those that are graver are not there. Of one that only
+// E:CLEAR ends it cannot be told whether it hides others.
 void ArmingMachine::on_heard(SafeReason reason) {
   switch (reason) {
     case SafeReason::stop:

@@ -21,9 +21,9 @@
 // arm() clears what it finds when it begins, and what that was hiding, each cause once: a stop that is
 // pressed meanwhile stays, and ends it. A released handle and an obstacle cannot be cleared, and end it.
 //
-// arm() never clears a stop, a watchdog or a fault that may be older than the session: a program that a supervisor
-// restarts would drive off again by itself. A cause may be older until the board, under our control, was heard
-// without it.
+// arm() never clears a stop, a watchdog or a fault that may be older than the session: a program
+// that a supervisor restarts would drive off again by itself. A cause may be older until the board,
+// under our control, was heard without it.
 #pragma once
 
 #include <cstdint>

@@ -116,8 +116,9 @@ class Session {
   // The transport of a wire has gone or come; poll() is needed now. One of several is gone until it has come.
   // `can_ask`: false where who watches may send no question (a bus).
   void on_transport(std::size_t wire, bool up, Time now, bool can_ask = true);
-  // This computer slept for longer than the board waits for its host, while `now` stood still. Another session begins:
-  // it is disarmed, and every command under way but a stop is cancelled. on_restart() is called. poll() is needed now.
+  // This computer slept for longer than the board waits for its host, while `now` stood still.
+  // Another session begins: it is disarmed, and every command under way but a stop is cancelled.
+  // on_restart() is called. poll() is needed now.
   void on_sleep(Time now);
 
   // Sends a command and finds out what became of it, by on_result() at the latest at `timeout` from
@@ -260,6 +261,7 @@ class Session {
   void refuse_held_back(Time now);
   void on_post_refused(const Nack& nack);
   void confirm_stop(const SafeReport& report, Time now);
+  bool may_say_farewell() const;
   void confirm_leave(const SafeReport& report, std::uint32_t t_ms, Time now);
   bool is_behind_leave(std::uint32_t t_ms) const;
   void on_causes(std::int32_t newest, Time now);

@@ -36,8 +36,8 @@ void Session::tell_arming() {
   handler_.on_arming(told_cause_);
 }
 
-// What the board's newest datagram says of it, and what the link does. What the board said before it obeyed us may have
-// been on its way since before the session.
+// What the board's newest datagram says of it, and what the link does. What the board said before
+// it obeyed us may have been on its way since before the session.
 void Session::look_at_arming(Time now) {
   if (!link_up()) arming_.on_outage();
   if (in_control(now)) arming_.on_heard(link_.reason());

@@ -249,7 +249,11 @@ bool Session::notice_restart(Time now) {
   return true;
 }
 
+// A board whose timeout was raised may be driving still: the session that it has ends at once.
 void Session::on_sleep(Time now) {
+  if (may_say_farewell()) {
+    transmit_now(Command::leave(), link_.echo(), Priority::normal, now);
+  }
   repetition_.cancel();
   arming_.on_sleep();
   link_.begin_anew();

@@ -255,6 +255,12 @@ void Session::cancel(Ticket ticket, Time now) {
   }
 }
 
+// The answer that tells whether the board knows farewells may have been lost. A board that confirms
+// commands refuses what it does not know.
+bool Session::may_say_farewell() const {
+  return link_up() && !watches() && knows_leave_.value_or(state_.present.has(StateField::cmd));
+}
+
 Ticket Session::leave(Time timeout, Time now) {
   for (Pending& pending : pending_.under_way()) {
     if (pending.kind != CommandKind::stop) finish(pending, Outcome::closed, Refusal::none, now);
@@ -265,9 +271,7 @@ Ticket Session::leave(Time timeout, Time now) {
   leaving_ = true;  // a heartbeat behind the farewell would take the board again
   left_at_ = now;
   if (wires_.several() && state_.any()) left_ms_ = state_.t_ms;
-  // The answer that tells it may have been lost. A board that confirms commands refuses what it does not know.
-  const bool understands = knows_leave_.value_or(state_.present.has(StateField::cmd));
-  if (!understands || !link_up()) return 0;
+  if (!may_say_farewell()) return 0;
   Pending* pending = allocate(Command::leave(), timeout, now);
   if (pending == nullptr) return 0;
   ++collector_.counts.commands;

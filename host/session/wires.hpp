@@ -53,7 +53,8 @@ class Wires {
   // only one; beside others the T that it brings must fit the board's clock, which begins at random.
   void on_transport(std::size_t index, bool up, bool can_ask, Time now);
   bool all_down() const;
-  // This computer slept: who the board is counts on, but each wire has to say again what the board's clock is.
+  // This computer slept: who the board is counts on, but each wire has to say again what the
+  // board's clock is.
   void on_sleep(Time now);
 
   // --- who is there

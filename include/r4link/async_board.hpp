@@ -144,9 +144,9 @@ class AsyncBoard {
         [this](auto handler, Duration t) { start_stop(t, make_completion(std::move(handler))); },
         token, timeout);
   }
-  // void(CommandResult). Clears what made the outputs safe, where it can be cleared (a stop, a watchdog or a fault that
-  // came while this program controlled the board), and closes relay 1, the motor supply. Confirmed by the board's state:
-  // output commands go out from then on. Not armed: what stands against it cannot be cleared, or may have come before
+  // void(CommandResult). Clears a stop, a watchdog or a fault that came while this program controlled
+  // the board, and closes relay 1, the motor supply. Confirmed by the board's state: output commands
+  // go out from then on. Not armed: what stands against it cannot be cleared, or may have come before
   // the program began, which async_clear() clears.
   template <class Token>
   auto async_arm(Duration timeout, Token&& token) {
@@ -156,7 +156,7 @@ class AsyncBoard {
         [this](auto handler, Duration t) { start_arm(t, make_completion(std::move(handler))); },
         token, timeout);
   }
-  // void(CommandResult). Takes away the stop, the watchdog or the fault that the board reports; moves nothing.
+  // void(CommandResult). Takes away the stop, watchdog or fault that the board reports.
   template <class Token>
   auto async_clear(Duration timeout, Token&& token) {
     return async_send(Command::clear(), timeout, std::forward<Token>(token));
@@ -258,8 +258,8 @@ class AsyncBoard {
   Subscription on_wire(std::function<void(const Wire&)> callback);
   // The transport, and a warning where the event loop was held up for so long that heartbeats were late.
   Subscription on_event(std::function<void(const CarrierEvent&)> callback);
-  // The board has begun again, or this computer slept for longer than the board waits for its host: what it was told is
-  // gone, thresholds of U too. Comes before its new state.
+  // The board has begun again, or this computer slept for longer than the board waits for its host:
+  // what it was told is gone, thresholds of U too. Comes before its new state.
   Subscription on_restart(std::function<void()> callback);
   // The session is armed (none), or not any more.
   Subscription on_arming(std::function<void(DisarmCause)> callback);

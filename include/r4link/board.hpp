@@ -155,12 +155,12 @@ class R4LINK_API Board {
 
   // Before the first output command (O D S R P B Z), and again after whatever made the outputs safe but
   // a lost link: until then they are refused here, so that a program that goes on commanding drives off
-  // only when it means to. Clears what can be cleared (a stop, a watchdog or a fault that came while this
-  // program controlled the board), then closes relay 1, the motor supply. Throws Error{refused} if the
-  // handle is released or something is in the way, when a stop comes meanwhile, and for a stop, a watchdog
-  // or a fault that may have come before this program began: clear() clears that, on purpose, so that a
-  // program which is restarted does not drive off again. BoardOptions: options.session.arming = Arming::off
-  // does without.
+  // only when it means to. Clears what can be cleared (a stop, a watchdog or a fault that came
+  // while this program controlled the board), then closes relay 1, the motor supply. Throws
+  // Error{refused} if the handle is released or something is in the way, when a stop comes
+  // meanwhile, and for a stop, a watchdog or a fault that may have come before this program began:
+  // clear() clears that, on purpose, so that a program which is restarted does not drive off again.
+  // BoardOptions: options.session.arming = Arming::off does without.
   void arm(Duration timeout = default_timeout);
   // Why output commands are refused; none when armed.
   DisarmCause disarmed_by() const;
@@ -342,8 +342,8 @@ class R4LINK_API Board {
   Subscription on_event(std::function<void(const CarrierEvent&)> callback);
   // One of several wires has begun to carry, or ceased to.
   Subscription on_wire(std::function<void(const Wire&)> callback);
-  // The board has begun again, or this computer slept for longer than the board waits for its host: what it
-  // was told is gone, thresholds of U too. Comes before its new state.
+  // The board has begun again, or this computer slept for longer than the board waits for its host:
+  // what it was told is gone, thresholds of U too. Comes before its new state.
   Subscription on_restart(std::function<void()> callback);
   // Armed (none), or not any more, and why.
   Subscription on_arming(std::function<void(DisarmCause)> callback);

@@ -100,7 +100,8 @@ enum class DisarmCause : std::uint8_t {
   restart,    // the board restarted
   supply,     // relay 1, the motor supply, was opened
   sleep,      // this computer slept for longer than the board waits for its host
-  // arm() has found one of these that may have come before the program began, and does not clear it: clear() does
+  // arm() has found one of these that may have come before the program began, and does not clear
+  // it: clear() does
   earlier_stop,
   earlier_watchdog,
   earlier_fault,
@@ -217,7 +218,8 @@ struct Statistics {
   std::uint64_t copies =
       0;  // of several wires: what another wire had brought before; not among `received`
   // lost, duplicate, late. Of several wires: lost is what none of them brought, a duplicate what another had brought
-  // before. `restarts` are those of the board, as its clock tells them: a sleep of this computer that is longer than the board's timeout counts as one.
+  // before. `restarts` are those of the board, as its clock tells them: a sleep of this computer
+  // that is longer than the board's timeout counts as one.
   PacketCounters packets;
   double state_rate_hz = 0;  // over the last second
   // Time, microseconds; 0 where nothing was measured yet

@@ -266,10 +266,6 @@ void BoardLink::lose(std::uint32_t now_ms) {
 }
 
 bool BoardLink::poll(std::uint32_t now_ms) {
-  // A session may last for months, and so may the time without one.
-  keep_near(began_ms_, now_ms);
-  keep_near(lost_ms_, now_ms);
-  keep_near(newest_echo_ms_, now_ms);
   if (state_ != BoardLinkState::active || now_ms - fed_ms_ < timing_.timeout_ms) return false;
   lose(now_ms);
   return true;
@@ -306,6 +302,10 @@ void BoardLink::heartbeat_sent(std::uint32_t t_ms) {
   any_sent_ = true;
   send_now_ = false;
   last_sent_ms_ = t_ms;
+  // A session may last for months, and so may the time without one.
+  keep_near(began_ms_, t_ms);
+  keep_near(lost_ms_, t_ms);
+  keep_near(newest_echo_ms_, t_ms);
   remember_sent(t_ms);
 }
 

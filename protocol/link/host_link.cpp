@@ -106,9 +106,10 @@ void HostLink::begin_anew() {
   if (state_ != HostLinkState::connecting) state_ = HostLinkState::lost;
 }
 
-// The board may hold our session still, and its setpoints. It takes a host with numbers that are too far off for
-// another one, and its session begins with all outputs off. So it has to be where our clock stood still, and also where
-// nothing but the board's clock tells of a restart: in a virtual machine that was paused, no clock of ours tells it.
+// The board may hold our session still, and its setpoints. It takes a host with numbers that are
+// too far off for another one, and its session begins with all outputs off. So it has to be where
+// our clock stood still, and also where nothing but the board's clock tells of a restart: in a
+// virtual machine that was paused, no clock of ours tells it.
 void HostLink::renumber() {
   constexpr std::uint32_t step = 16 * BoardLink::command_window;
   first_pnum_ = next_pnum_ = (next_pnum_ + step) | echo_host_first_pnum;

@@ -54,8 +54,8 @@ class HostLink {
   // the host are others from now on.
   void on_clock(std::uint32_t t_ms, bool restarted, std::uint32_t now_ms);
 
-  // Nothing that is known of the board counts any more, because this computer slept: the board is taken for one that
-  // has begun again, and the numbers of the host are others from now on.
+  // Nothing that is known of the board counts any more, because this computer slept: the board is
+  // taken for one that has begun again, and the numbers of the host are others from now on.
   void begin_anew();
 
   // The transport has gone (`lost` at once) or come (a heartbeat is due at once).
@@ -65,8 +65,9 @@ class HostLink {
     if (tracker_.started()) tracker_.restart();
   }
 
-  // Lets time pass: silence of the board. True if the state changed. After 12 days of silence begin_anew() applies,
-  // because the times of the two cannot be compared any more (datagram/wrapping.hpp).
+  // Lets time pass: silence of the board. True if the state changed. After 12 days of silence
+  // begin_anew() applies, because the times of the two cannot be compared any more
+  // (datagram/wrapping.hpp).
   bool poll(std::uint32_t now_ms);
 
   // Should a heartbeat be sent now? False while they are gated.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A program whose computer sleeps. The boot clock of this test program is its own: it can be set forward.
+// A program whose computer sleeps. The boot clock of this test program is its own: it can be set
+// forward.
 #include <gtest/gtest.h>
 #include <sys/syscall.h>
 #include <unistd.h>

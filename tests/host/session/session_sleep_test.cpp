@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host whose computer slept, opposite the real board: its clock stood still, and it begins another session.
+// A host whose computer slept, opposite the real board: its clock stood still, and it begins
+// another session.
 #include <gtest/gtest.h>
 
 #include "wired_robot.hpp"
@@ -17,7 +18,8 @@ class SleepingHost : public ::testing::TestWithParam<Cables> {
   void cut_all(WiredRobot& of, bool is_cut = true) {
     for (std::size_t wire = 0; wire < of.cables.size(); ++wire) of.cut(wire, is_cut);
   }
-  // Longer than the board waits for its host, and shorter or longer than the tolerance of a board's clock.
+  // Longer than the board waits for its host, and shorter or longer than the tolerance of a board's
+  // clock.
   static constexpr std::uint32_t naps_ms[] = {1500, 9000, 60'000};
 
   WiredRobot robot{GetParam()};
@@ -86,6 +88,22 @@ TEST_P(SleepingHost, IsNotArmedByWhatItAskedForThoughTheBoardWasNeverHeard) {
   }
   EXPECT_EQ(armed.finish(arm).outcome, Outcome::cancelled);
   EXPECT_EQ(armed.finish(drive).outcome, Outcome::cancelled);
+}
+
+TEST_P(SleepingHost, SwitchesTheMotorsOffAtOnceWhereTheBoardWaitsForLonger) {
+  Settings settings;
+  settings.timeout_ms = 10'000;
+  WiredRobot patient(GetParam(), WiredRobot::at_will(), BoardRole::control, settings);
+  patient.connect();
+  ASSERT_EQ(patient.drive(100).outcome, Outcome::confirmed);
+  patient.sleep(3000);
+  ASSERT_TRUE(drives(patient)) << "the board has not missed its host yet";
+  patient.run(100);
+  for (int ms = 0; ms < 3000; ++ms) {
+    ASSERT_FALSE(drives(patient)) << ms << " ms later";
+    patient.run(1);
+  }
+  EXPECT_TRUE(patient.session->in_control(patient.now()));
 }
 
 TEST_P(SleepingHost, IsObeyedAgain) {

@@ -40,8 +40,8 @@ class WiredRobot final : private Session::Handler {
   // The transports of all wires come up, and the link has half a second.
   void connect();
   void run(std::uint32_t ms);
-  // The host's computer sleeps: its clock stands still, and what comes meanwhile is lost. When it wakes, its other clock
-  // tells.
+  // The host's computer sleeps: its clock stands still, and what comes meanwhile is lost. When it
+  // wakes, its other clock tells.
   void sleep(std::uint32_t ms);
   // The same of a virtual machine that is paused: no clock tells.
   void pause(std::uint32_t ms);

@@ -92,7 +92,8 @@ TEST_F(BoardLinkFarewell, TooOldAnEchoProvesNothing) {
 
 TEST_F(BoardLinkFarewell, IsObeyedInASessionOfAnyAge) {
   constexpr std::uint32_t day_ms = 24U * 3600 * 1000;
-  constexpr std::uint32_t step_ms = 900;  // below the timeout
+  constexpr std::uint32_t step_ms = 9000;
+  link.set_timing({500, step_ms + 1000});
   connect();
   std::uint32_t pnum = echo_pnum + 1;
   for (int day = 1; day <= 60; ++day) {  // more than a turn of the clock

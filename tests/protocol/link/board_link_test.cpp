@@ -75,7 +75,6 @@ TEST_F(BoardLinkTest, AHostIsServedAfterWeeksOfSilence) {
   ASSERT_TRUE(link.poll(now));
   for (int day = 0; day < 30; ++day) {  // more than half a turn of the clock
     now += 24U * 3600 * 1000;
-    link.poll(now);
     send_due();
   }
   now += 5;

@@ -24,8 +24,8 @@ bool asks_to_stop(std::string_view text);
 // not repeated there.
 std::vector<Command> commands_of(std::string_view text);
 
-// `problem` is the library's, which names its own call and r4 send. The board refuses those while this bridge controls
-// it, so a cause that came before this program is cleared by a service.
+// `problem` is the library's, which names its own call and r4 send. The board refuses those while
+// this bridge controls it, so a cause that came before this program is cleared by a service.
 Problem for_a_node(Problem problem, DisarmCause cause);
 
 }  // namespace r4::tool::ros2

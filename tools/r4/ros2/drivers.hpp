@@ -10,7 +10,8 @@
 // confirmed it. What is stopped goes where the board's safe state puts it: motors to 0, brushless drivers to 0 with
 // their brakes on, servos without pulses, relays open, steppers standing where they are, voltages to 0. Relay 1 is no
 // output here: it is the motors' supply, and arming's. Where a stepper is, is known for a while, for a state may come in
-// several datagrams, of which one has it. No clock: the time is passed in. It goes on while this computer sleeps.
+// several datagrams, of which one has it. No clock: the time is passed in. It goes on while this
+// computer sleeps.
 #pragma once
 
 #include <array>

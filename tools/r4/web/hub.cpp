@@ -250,7 +250,8 @@ void Hub::watch_holder() {
   });
 }
 
-// The timer stands still while this computer sleeps: a browser that is heard first when it wakes may have lost control.
+// The timer stands still while this computer sleeps: a browser that is heard first when it wakes
+// may have lost control.
 void Hub::look_at_holder() {
   if (!control_.expired(now())) return;
   control_.release(*control_.holder());
