@@ -25,14 +25,17 @@ bool complete(std::string& beginning, std::string_view& bytes, std::size_t wante
 
 const char* RecordingLines::on_line(std::string_view line, std::uint32_t stream) {
   // What is not printable is written as \xNN, so this is a part of the line's end.
-  if (line.ends_with('\r')) line.remove_suffix(1);
+  while (line.ends_with('\r')) line.remove_suffix(1);
   if (line.empty()) return nullptr;
-  if (!read_record_line(line, read_)) {
+  // Another format may carry any bytes as a line.
+  const bool one = !line.starts_with('#') || line.find('\n') == std::string_view::npos;
+  if (!one || !read_record_line(line, read_)) {
     on_damage();
-    return read_.problem;
+    return one ? read_.problem : "it has the end of a line in it";
   }
+  if (line == damage_line) damage_ = Damage::told;
   const bool header = read_.kind == LineKind::header;
-  if (header ? after_header_ : stream_.value_or(stream) != stream) fail_as_mixed();
+  if (header ? after_header_ : stream_.value_or(stream) != stream) on_sign_of_mixture();
   after_header_ = header;
   stream_ = stream;
   switch (read_.kind) {
@@ -50,12 +53,13 @@ const char* RecordingLines::on_line(std::string_view line, std::uint32_t stream)
       }
       recognised_ = true;
       ended_ = false;
+      damage_ = Damage::none;
       wires_.clear();
       handler_.on_header();
       break;
     case LineKind::wire: {
       Wire& wire = wires_[read_.wire.number];
-      if (!wire.url.empty() && wire.url != read_.wire.url) fail_as_mixed();
+      if (!wire.url.empty() && wire.url != read_.wire.url) on_sign_of_mixture();
       wire = {read_.wire.url, std::nullopt};
       handler_.on_wire(read_.wire);
       return nullptr;
@@ -72,29 +76,27 @@ const char* RecordingLines::on_line(std::string_view line, std::uint32_t stream)
 
 void RecordingLines::on_record(const Record& record, std::uint32_t stream, std::string_view url) {
   Wire& wire = wires_[record.wire];
-  if (wire.stream.value_or(stream) != stream) fail_as_mixed();
-  if (!wire.url.empty() && !url.empty() && wire.url != url) fail_as_mixed();
+  if (wire.stream.value_or(stream) != stream) on_sign_of_mixture();
+  if (!wire.url.empty() && !url.empty() && wire.url != url) on_sign_of_mixture();
   wire.stream = stream;
   tell(record);
 }
 
-void RecordingLines::on_damage() {
-  after_header_ = ended_ = false;
-  stream_.reset();
-  wires_.clear();
-}
-
 void RecordingLines::tell(const Record& record) {
-  if (ended_) fail_as_mixed();
+  if (ended_) on_sign_of_mixture();
   after_header_ = false;
   ended_ = record.wire == no_wire && record.kind == RecordKind::event && record.bytes == "end";
   handler_.on_record(record);
 }
 
-void RecordingLines::fail_as_mixed() const {
-  throw Error(ErrorKind::data, name_,
-              "several recordings are mixed in it, so whose datagrams these are is unknown",
-              "read each recording alone, or join them one after the other: cat A.r4log B.r4log");
+void RecordingLines::on_sign_of_mixture() {
+  if (damage_ == Damage::none) {
+    throw Error(ErrorKind::data, name_,
+                "several recordings are mixed in it, so whose datagrams these are is unknown",
+                "read each recording alone, or join them one after the other: cat A.r4log B.r4log");
+  }
+  if (damage_ == Damage::here) handler_.on_comment(damage_line);
+  damage_ = Damage::told;
 }
 
 // --- a file

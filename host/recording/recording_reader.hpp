@@ -58,8 +58,12 @@ class RecordingHandler {
 // - a wire whose URL changes without a header,
 // - lines, or datagrams of one wire, that come from another stream (an interface of a capture, a channel of MCAP)
 //   where no header or wire begins.
+// Where something could not be read before, the missing part may explain such a sign. Then the file is read on, and the
+// line damage_line is told, so that a copy of what was read can be read, too.
 class RecordingLines {
  public:
+  static constexpr std::string_view damage_line = "# damage: a part before this could not be read";
+
   // `name`: what errors are about.
   RecordingLines(RecordingHandler& handler, std::string name)
       : handler_(handler), name_(std::move(name)) {}
@@ -71,8 +75,12 @@ class RecordingLines {
   // is reached; empty if it does not say. Throws Error{data} for recordings that are mixed.
   void on_record(const Record& record, std::uint32_t stream, std::string_view url);
 
-  // Something could not be read here, perhaps the line that explains what comes next.
-  void on_damage();
+  // Recordings seem to be mixed here. Throws Error{data}, unless damage may explain it.
+  void on_sign_of_mixture();
+  // Something could not be read here.
+  void on_damage() {
+    if (damage_ == Damage::none) damage_ = Damage::here;
+  }
 
   // True if a line was a record or a header.
   bool recognised() const { return recognised_; }
@@ -82,15 +90,16 @@ class RecordingLines {
     std::string url;
     std::optional<std::uint32_t> stream;
   };
+  enum class Damage : std::uint8_t { none, here, told };  // since the newest header
   void tell(const Record& record);
-  [[noreturn]] void fail_as_mixed() const;
 
   RecordingHandler& handler_;
   const std::string name_;
   RecordLine read_;
   bool recognised_ = false;
-  bool after_header_ = false;            // nothing but the header's own line has come
-  bool ended_ = false;                   // of the newest recording
+  bool after_header_ = false;  // nothing but the header's own line has come
+  bool ended_ = false;         // of the newest recording
+  Damage damage_ = Damage::none;
   std::optional<std::uint32_t> stream_;  // of the lines, since the newest header
   std::map<std::uint16_t, Wire> wires_;
 };

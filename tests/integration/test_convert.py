@@ -179,6 +179,15 @@ def test_of_a_pipe_whose_writer_is_gone_all_that_is_whole_is_read(native, tmp_pa
     assert command == 'info' or target.read_text().startswith(''.join(lines[:-2]))
 
 
+@pytest.mark.parametrize('ending', ['.pcapng', '.mcap', '.log'])
+def test_info_shows_a_file_of_another_format_whatever_its_name(tmp_path, ending):
+    capture(tmp_path / 'drive.r4log', 'can://can0?node=3')
+    convert(tmp_path / 'drive.r4log', tmp_path / f'drive{ending}')
+    (tmp_path / f'drive{ending}').rename(tmp_path / 'drive.txt')
+    told = objects(run('info', str(tmp_path / 'drive.txt'), '--json').stdout)[0]
+    assert [(wire['url'], wire['states']) for wire in told['wires']] == [('can://can0?node=3', 60)]
+
+
 def test_what_mergecap_has_mixed_is_refused_and_what_it_appends_is_read(tmp_path):
     for name, url in (('a', 'udp://192.168.0.125'), ('b', 'udp://192.168.0.126')):
         convert(capture(tmp_path / f'{name}.r4log', url), tmp_path / f'{name}.pcapng')

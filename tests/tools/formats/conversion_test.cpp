@@ -54,6 +54,19 @@ TEST(Conversion, TellsThePlaceOfDamageAndConvertsTheRest) {
   EXPECT_EQ(result.damage[1].reason, "the last line is not whole");
 }
 
+TEST(Conversion, MakesAFileThatCanBeReadOfRecordingsWhoseHeaderIsDamaged) {
+  std::string second = recorded_capture("udp://another");
+  second[0] = '$';
+  for (const char* const form : {".r4log", ".pcapng", ".mcap"}) {
+    const Converted first = converted(recorded_capture() + second, ".r4log", form);
+    EXPECT_EQ(first.damage.size(), 1);
+    const Converted again = converted(first.bytes, form, ".r4log");
+    EXPECT_TRUE(again.damage.empty());
+    EXPECT_TRUE(contains(again.bytes, "# damage: a part before this could not be read\n"));
+    EXPECT_EQ(converted(again.bytes, ".r4log", ".r4log").bytes, again.bytes);
+  }
+}
+
 TEST(Conversion, GivesWhatHasNoHeaderOneAndAnEnd) {
   StringOutput output;
   const auto sink = tool::make_sink("x.r4log", output);

@@ -304,6 +304,21 @@ TEST(Pcapng, RefusesRecordingsThatMergecapHasMixed) {
       EXPECT_TRUE(contains(problem.reason, "several recordings are mixed")) << problem.reason;
     }
   }
+  // A capture has numbers of its own for its wires.
+  const std::string recording = packets("udp://192.168.0.125");
+  std::string interface, packet;
+  append_number(interface, std::uint64_t{228});
+  const std::string bytes = ipv4(udp(2018, 2390, "PNum:1;"));
+  append_number(packet, std::uint32_t{0});
+  append_number(packet, std::uint64_t{0});
+  append_number(packet, static_cast<std::uint32_t>(bytes.size()));
+  append_number(packet, static_cast<std::uint32_t>(bytes.size()));
+  const std::string capture =
+      blocks_of(recording)[0] + block(1, interface) + block(6, packet + bytes);
+  for (const std::string& file : {recording + capture, capture + recording}) {
+    EXPECT_TRUE(contains(problem_of([&] { converted(file, ".pcapng", ".r4log"); }).reason,
+                         "several recordings are mixed"));
+  }
   // One after the other they are read, in a section each.
   EXPECT_EQ(native_of(packets("udp://a") + packets("udp://b")),
             recorded_capture("udp://a") + recorded_capture("udp://b"));

@@ -41,13 +41,14 @@ void NativeSink::on_record(const Record& record) {
   if (ours_ && !told_when_) write_beginning(text_, record.time);
   told_when_ = true;
   time_ = record.time;
+  ended_ = record.wire == no_wire && record.kind == RecordKind::event && record.bytes == "end";
   write_record(text_, record);
   write_out(false);
 }
 
 void NativeSink::finish() {
   begin();
-  if (ours_) write_record(text_, {time_, no_wire, RecordKind::event, "end"});
+  if (ours_ && !ended_) write_record(text_, {time_, no_wire, RecordKind::event, "end"});
   write_out(true);
 }
 

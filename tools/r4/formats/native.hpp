@@ -39,6 +39,7 @@ class NativeSink final : public Sink {
   bool begun_ = false;
   bool ours_ = false;       // the header
   bool told_when_ = false;  // it begins
+  bool ended_ = false;      // the newest record says so
   Time time_{0};            // of the newest record
   std::string text_, compressed_;
 };

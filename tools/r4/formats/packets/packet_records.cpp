@@ -133,6 +133,14 @@ void PacketRecords::on_packet(const PacketInterface& interface, const Packet& pa
   }
 }
 
+// The file is a recording, or a capture. A mixture of the two has the numbers of wires twice.
+void PacketRecords::be(Kind kind) {
+  told_ = true;
+  const bool other = kind_ != Kind::none ? kind_ != kind : kind == Kind::recorded && bus_.told();
+  if (other) lines_.on_sign_of_mixture();
+  kind_ = kind;
+}
+
 void PacketRecords::finish(bool any_damage) {
   bus_.finish();
   if (told_ || bus_.told() || any_damage) return;
@@ -186,7 +194,7 @@ void PacketRecords::on_line(const PacketInterface& interface, const Packet& pack
     if (tag == 0) break;
   }
   if (packet.cut) return damage(packet, "the packet is cut");
-  told_ = true;
+  be(Kind::recorded);
   const char* const problem = lines_.on_line(bytes, interface.number);
   if (problem != nullptr) damage(packet, problem);
 }
@@ -201,7 +209,7 @@ void PacketRecords::on_own(const PacketInterface& interface, const Packet& packe
   }
   if (packet.cut || udp.cut) return damage(packet, "the packet is cut");
   const bool to_board = udp.from == made_up_host_text;
-  told_ = true;
+  be(Kind::recorded);
   lines_.on_record({packet.time, static_cast<std::uint16_t>(number),
                     to_board ? RecordKind::to_board : RecordKind::from_board, udp.payload},
                    interface.number, interface.name);
@@ -248,9 +256,9 @@ void PacketRecords::on_ip(std::string_view bytes, const Packet& packet) {
   }
   if (udp.cut) return damage(packet, "the packet is cut: capture it whole, tcpdump -s 0");
   if (is_repeated(udp, packet.time)) return;
+  be(Kind::captured);
   const std::uint16_t wire = wire_of(from_board ? udp.from : udp.to);
   if (wire == no_wire) return damage(packet, "more than 1000 boards");
-  told_ = true;
   handler_.on_record({packet.time, wire, from_board ? RecordKind::from_board : RecordKind::to_board,
                       without_end(udp.payload)});
 }
@@ -288,6 +296,7 @@ void PacketRecords::on_can(std::string_view interface, std::uint32_t id, std::st
   frame.size = static_cast<std::uint8_t>(size);
   if (!has_valid_size(frame)) return damage(packet, "no frame has that many bytes");
   if (!frame.remote) std::copy_n(bytes.data() + can_header, size, frame.data);
+  if (kind_ == Kind::recorded) be(Kind::captured);
   bus_.on_frame(interface.empty() ? "can0" : interface, frame,
                 {0, packet.offset, static_cast<std::uint64_t>(packet.time.count()), {}});
 }

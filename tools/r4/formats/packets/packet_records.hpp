@@ -62,6 +62,8 @@ class PacketRecords {
     bool cut = false;
   };
   static bool read_ip(std::string_view bytes, Udp& out);
+  enum class Kind : std::uint8_t { none, recorded, captured };
+  void be(Kind kind);
   void on_line(const PacketInterface& interface, const Packet& packet);
   void on_own(const PacketInterface& interface, const Packet& packet);
   void on_ip(std::string_view bytes, const Packet& packet);
@@ -91,6 +93,7 @@ class PacketRecords {
   std::size_t next_seen_ = 0;
   // What there is, for the error when nothing is found.
   bool told_ = false;
+  Kind kind_ = Kind::none;
   std::uint64_t packets_ = 0;
   std::map<std::uint16_t, std::uint64_t> unread_links_, ports_;  // and how many packets each has
 };
