@@ -19,8 +19,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto tick_time = 25ms;
-constexpr auto command_time = 1s;
-constexpr auto arm_time = 2s;
+constexpr auto command_time = 1s, arm_time = 2s;
 // A page that echoes what it has heard needs to hear something.
 constexpr auto longest_silence = 100ms;
 
