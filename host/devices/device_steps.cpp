@@ -23,6 +23,7 @@ std::string hex_of(const Bytes& bytes) {
 Command DeviceStep::command() const {
   if (kind == CommandKind::i2c_write) return Command::i2c_write(address, bytes);
   if (kind == CommandKind::i2c_read) return Command::i2c_read(address, bytes, count);
+  if (count == 0) return Command::i2c_poll_off(slot);
   return Command::i2c_poll(slot, address, bytes, count, static_cast<int>(poll_period.count()));
 }
 
@@ -47,6 +48,12 @@ std::vector<DeviceStep> steps_of(const Device& device) {
   }
   for (const DeviceWrite& write : description.writes) {
     add(CommandKind::i2c_write, write.bytes).wait = write.wait;
+    if (&write != &description.writes.front()) continue;
+    // What is read while it is being set up is no measurement: the slots stay empty meanwhile. They
+    // are emptied once the first write has shown that it may be set up.
+    for (int slot = device.first_slot(); slot <= device.last_slot(); ++slot) {
+      add(CommandKind::i2c_poll, {}).slot = slot;
+    }
   }
   int slot = device.first_slot();
   for (const DevicePoll& poll : description.polls) {

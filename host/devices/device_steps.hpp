@@ -21,10 +21,10 @@ struct DeviceStep {
   int address = 0;
   std::string bytes;  // the register, or what is written: "x3b00"
   int count = 0;
-  std::vector<std::uint8_t> expected;                                 // i2c_read; empty: anything
-  std::chrono::milliseconds wait{0};                                  // i2c_write, afterwards
-  int slot = 0;                                                       // i2c_poll
-  std::chrono::milliseconds poll_period{0};                           // i2c_poll
+  std::vector<std::uint8_t> expected;        // i2c_read; empty: anything
+  std::chrono::milliseconds wait{0};         // i2c_write, afterwards
+  int slot = 0;                              // i2c_poll, whose count 0 empties it
+  std::chrono::milliseconds poll_period{0};  // i2c_poll
   bool is_answered() const { return kind != CommandKind::i2c_poll; }  // by I2CX
   // Views `bytes`.
   Command command() const;
