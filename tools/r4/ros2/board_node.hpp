@@ -54,7 +54,7 @@ class BoardNode {
   void tick();
   void tell_health();
   Health health() const;
-  void log(LogLevel level, const std::string& text);
+  void log(LogLevel level, const std::string& told);
   void say(LogLevel level, const std::string& text);
 
   const NodeOptions options_;

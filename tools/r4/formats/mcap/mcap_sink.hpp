@@ -50,7 +50,7 @@ class McapSink final : public Sink {
     std::uint16_t wire;
     std::string topic, url;
     bool operator==(const ChannelKey&) const = default;
-    auto operator<=>(const ChannelKey&) const = default;
+    auto operator<=>(const ChannelKey&) const = default;  // NOLINT(modernize-use-nullptr)
   };
 
   void begin();

@@ -29,6 +29,6 @@ class Mismatches {
 };
 
 // What is wrong with an endpoint for a topic of ours. May call the topic's `other_type`.
-std::optional<Mismatch> mismatch_of(const Graph::OwnTopic& own, const Announced& announced);
+std::optional<Mismatch> mismatch_of(const Graph::OwnTopic& own, const Announced& other);
 
 }  // namespace r4::tool::ros2
