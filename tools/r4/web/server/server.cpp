@@ -83,7 +83,7 @@ void Server::Impl::ask_metrics(Exchange& exchange) {
   events.on_metrics();
 }
 
-void Server::Impl::answer_metrics() {
+void Server::Impl::answer_metrics() const {
   const auto all = exchanges;  // one may end meanwhile
   for (const auto& [number, exchange] : all) {
     if (exchange->waits_for_metrics()) exchange->answer_metrics(metrics);

@@ -53,7 +53,7 @@ struct Server::Impl {
   void listen();
   void accept();
   void ask_metrics(Exchange& exchange);
-  void answer_metrics();
+  void answer_metrics() const;
 
   ServerEvents& events;
   const Offer offer;
