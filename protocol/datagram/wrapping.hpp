@@ -24,8 +24,9 @@ constexpr std::uint32_t long_ago = std::uint32_t{1} << 30;
 
 // Moves a past time along, so that comparisons with it stay right. To be called more often than
 // every 12 days.
+// A time that is still to come stays as it is.
 inline void keep_near(std::uint32_t& past, std::uint32_t now) {
-  if (now - past > long_ago) past = now - long_ago;
+  if (newer(now - long_ago, past)) past = now - long_ago;
 }
 
 }  // namespace r4
