@@ -151,7 +151,8 @@ TEST(Board, SilenceIsNoticedInTheTimerInterruptWhileTheLoopIsElsewhere) {
   const std::uint32_t silence_ms = host.now_ms() - fed_ms;
   on_target::say_number("ms of silence until safe, with a timeout of 200", silence_ms);
   EXPECT(host.safe() && silence_ms >= timeout_ms && silence_ms <= timeout_ms + 3);
-  host.run_ms(20);  // the first turn after the standstill takes 8 ms; then the line is known to be empty
+  // The first turn after the standstill takes 8 ms. Then the line is known to be empty.
+  host.run_ms(20);
   EXPECT(host.board().application().reason() == SafeReason::link);
   // The host comes back, and so does what it had set.
   host.heartbeat();
