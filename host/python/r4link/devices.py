@@ -74,7 +74,7 @@ class Device:
         return self._core.units
 
     def is_set_up(self, state: State) -> bool | None:
-        """Whether it is still as it was set up. False: it was reset, and its values are no measurements; attach it again.
+        """Whether it is still as it was set up. False: it was reset, and its values are not measurements; attach it again.
         None: it was not read yet, or cannot tell."""
         return self._core.is_set_up(state)
 

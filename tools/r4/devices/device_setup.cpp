@@ -59,7 +59,7 @@ void DeviceSetup::look_for_resets() {
     if (is_set_up != false) continue;
     if (!progress.reset) {
       told_({ErrorKind::refused, devices_[i].text(),
-             "it is not set up, as after a reset: its values are no measurements",
+             "it is not set up, as after a reset: its values are not measurements",
              in_control
                  ? "it is set up again; look at its supply and wires if that repeats"
                  : "the program that controls the board sets it up: give it this device, too",

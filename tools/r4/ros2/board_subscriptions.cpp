@@ -254,7 +254,7 @@ void BoardCommands::on_speed(const Speed& speed, const void* source, const Origi
                     options_.deadline.count()));
   }
   const auto setpoints = options_.drive->setpoints(speed.linear, speed.angular);
-  if (!setpoints) return warn("cmd_vel: a speed is no number; it changes nothing");
+  if (!setpoints) return warn("cmd_vel: a speed is not a number; it changes nothing");
   for (std::size_t i = 0; i < setpoints->size(); ++i) want((*setpoints)[i], source, origin);
 }
 
