@@ -10,8 +10,7 @@ set(R4_ASIO_DEFINITIONS ASIO_STANDALONE ASIO_SEPARATE_COMPILATION ASIO_NO_DEPREC
 
 # Our warnings, for our own targets only. Asio, CLI11 and the like are system headers.
 function(r4_warnings target)
-  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow
-                         $<$<BOOL:${R4_WERROR}>:-Werror>)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow)
 endfunction()
 
 # install(), unless another project has taken the tree in: it installs what it wants.
