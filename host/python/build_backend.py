@@ -14,8 +14,12 @@ import sys
 import sysconfig
 import tarfile
 import tempfile
-import tomllib
 import zipfile
+
+try:
+    import tomllib
+except ModuleNotFoundError:  # Python 3.10
+    import tomli as tomllib
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / 'pyproject.toml').read_text())['project']
@@ -39,7 +43,7 @@ def _run(*command):
 def configure(folder):
     """A build of the package alone."""
     _run('cmake', '-S', str(ROOT), '-B', str(folder), '-G', 'Ninja', '-DCMAKE_BUILD_TYPE=Release', '-DR4_TESTS=OFF',
-         '-DR4_WERROR=OFF', '-DR4_PYTHON=ON')
+         '-DR4_PYTHON=ON')
 
 
 def _built():
