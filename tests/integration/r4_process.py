@@ -18,6 +18,7 @@ import time
 
 R4 = os.environ['R4']
 DATA = os.environ.get('R4_TEST_DATA', os.path.join(os.path.dirname(__file__), '..', 'data'))
+METRICS = os.environ.get('R4_METRICS') != 'OFF'  # as CMake's option
 # Sanitizers make everything slower and bigger; promises about time and memory are for release builds.
 SANITIZED = 'R4_SANITIZER' in os.environ
 # So does the guest of tools/with-can, which emulates its processor.
