@@ -260,18 +260,6 @@ def is_state(each):
     return each['type'] == 'state'
 
 
-def cost_of_watching(board, host, seconds):
-    """States a second that the host has, and the shares of a processor of both."""
-    host.next(is_state)
-    before = [each.cpu_seconds() for each in (board, host)]
-    until = time.monotonic() + seconds
-    states = 0
-    while time.monotonic() < until:
-        host.next(is_state)
-        states += 1
-    return states / seconds, [(each.cpu_seconds() - cpu) / seconds for each, cpu in zip((board, host), before)]
-
-
 def is_link(state, reason='none', busy=False):
     return lambda each: (each['type'] == 'link' and each['fields']['state'] == state and
                          each['fields']['reason'] == reason and each['fields']['busy'] == busy)
