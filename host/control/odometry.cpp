@@ -65,7 +65,7 @@ void Odometry::advance(double length_m, double turn_rad) {
 std::array<double, 36> Odometry::ros_covariance(double unknown) const {
   constexpr std::size_t axes[] = {0, 1, 5};
   std::array<double, 36> all{};
-  for (const std::size_t axis : {2, 3, 4}) all[axis * 7] = unknown;
+  for (const std::size_t axis : {2U, 3U, 4U}) all[axis * 7] = unknown;
   for (std::size_t row = 0; row < 3; ++row) {
     for (std::size_t column = 0; column < 3; ++column) {
       all[axes[row] * 6 + axes[column]] = covariance_[row * 3 + column];

@@ -15,8 +15,12 @@ import sysconfig
 import tarfile
 import tempfile
 import time
-import tomllib
 import zipfile
+
+try:
+    import tomllib
+except ModuleNotFoundError:  # Python 3.10
+    import tomli as tomllib
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / 'pyproject.toml').read_text())['project']
@@ -43,7 +47,7 @@ def configure(folder):
     folder = pathlib.Path(folder).resolve()
     flags = f'{os.environ.get("CXXFLAGS", "")} -ffile-prefix-map={ROOT}/= -ffile-prefix-map={folder}/='
     _run('cmake', '-S', str(ROOT), '-B', str(folder), '-G', 'Ninja', '-DCMAKE_BUILD_TYPE=Release', '-DR4_TOOLS=OFF',
-         '-DR4_TESTS=OFF', '-DR4_WERROR=OFF', '-DR4_PYTHON=ON', f'-DCMAKE_CXX_FLAGS={flags}')
+         '-DR4_TESTS=OFF', '-DR4_PYTHON=ON', f'-DCMAKE_CXX_FLAGS={flags}')
 
 
 def _built():

@@ -89,8 +89,8 @@ void RecordingFile::append(std::string_view bytes) {
       bytes.remove_prefix(static_cast<std::size_t>(n));
     } else if (errno != EINTR) {
       const int error = errno;
-      // Half a line is of no use.
-      static_cast<void>(::ftruncate(file_.get(), static_cast<off_t>(size_)));
+      // Half a line is of no use. If it cannot be removed, a reader skips it.
+      [[maybe_unused]] const int removed = ::ftruncate(file_.get(), static_cast<off_t>(size_));
       throw cannot_be_written(path_, error);
     }
   }

@@ -21,7 +21,7 @@ struct ReplayStart {
   static ReplayStart of(const std::string& thing, const std::string& text);
 };
 
-class ReplayRecords : private RecordingReader::Handler {
+class ReplayRecords final : private RecordingReader::Handler {
  public:
   struct Item {
     Time time;  // as recorded

@@ -2,7 +2,7 @@
 // What other programs do to one that holds a wire: any number of them come, say anything in any order, read
 // or do not, and go. The input is a list of actions. Whatever they do, nothing but a stop gets to the board, one
 // that watches hears all, and a stop of one that comes last is obeyed.
-#include <fmt/core.h>
+#include <fmt/format.h>
 #include <sys/socket.h>
 #include <unistd.h>
 

@@ -2,7 +2,7 @@
 // r4::Board opposite simulated boards in real time: in process, over UDP and over a pty.
 #include "r4link/board.hpp"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 

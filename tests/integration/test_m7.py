@@ -180,7 +180,9 @@ def tool_as_a_module(tmp_path):
     tool = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
     loader.exec_module(tool)
     tool.ROOT, tool.TABLE = tmp_path, tmp_path / 'table.json'
-    tool.TABLE.write_text(json.dumps({'plain': {'instructions': 1000}, 'barred': {'instructions': 2000, 'bar': 2050}}))
+    tool.TABLE.write_text(json.dumps({'plain': {'instructions': {'12': 1000}},
+                                      'barred': {'instructions': {'12': 2000}, 'bar': 2050}}))
+    tool.compiler = lambda: '12'
     return tool
 
 
@@ -200,11 +202,24 @@ def test_what_costs_more_than_the_table_says_fails_and_so_does_what_it_has_not(t
     assert tool.TABLE.read_text() == before
 
 
+def test_of_a_compiler_that_is_not_in_the_table_only_the_bars_hold(tool, capsys):
+    tool.compiler = lambda: '13'
+    tool.measured = lambda: {'plain': 3000, 'barred': 2049}
+    assert tool.instructions(update=False)
+    tool.measured = lambda: {'plain': 3000, 'barred': 2051}
+    assert not tool.instructions(update=False)
+    assert 'above its bar of 2050' in capsys.readouterr().out
+    tool.measured = lambda: {'plain': 3000, 'barred': 2049}
+    assert tool.instructions(update=True)
+    assert json.loads(tool.TABLE.read_text())['plain'] == {'instructions': {'12': 1000, '13': 3000}}
+
+
 def test_an_update_takes_what_there_is_but_nothing_above_a_bar(tool):
     tool.measured = lambda: {'plain': 3000, 'barred': 2049, 'new': 7}
     assert tool.instructions(update=True)
     assert json.loads(tool.TABLE.read_text()) == {
-        'plain': {'instructions': 3000}, 'barred': {'instructions': 2049, 'bar': 2050}, 'new': {'instructions': 7}}
+        'plain': {'instructions': {'12': 3000}}, 'barred': {'instructions': {'12': 2049}, 'bar': 2050},
+        'new': {'instructions': {'12': 7}}}
     tool.measured = lambda: {'plain': 3000, 'barred': 2051, 'new': 7}
     assert not tool.instructions(update=True)
 

@@ -336,9 +336,9 @@ def drive_in_a_child(told):
 
 
 def test_no_reference_is_lost_or_left():
-    """On the interpreter that counts them, python3.11-dbg, with the module built for it."""
+    """On the interpreter that counts them, such as python3.11-dbg, with the module built for it."""
     build = pathlib.Path(os.environ['R4_BUILD'])
-    ended = subprocess.run(['/usr/bin/python3.11-dbg', pathlib.Path(__file__).with_name('reference_counts.py')],
+    ended = subprocess.run([f'/usr/bin/python3.{sys.version_info.minor}-dbg', pathlib.Path(__file__).with_name('reference_counts.py')],
                            capture_output=True, text=True, timeout=120, check=False,
                            env={**os.environ, 'PYTHONPATH': str(build / 'python-debug')})
     assert ended.returncode == 0 and ended.stderr == '', ended.stdout + ended.stderr

@@ -6,11 +6,15 @@ import re
 import shutil
 import subprocess
 import sys
-import tomllib
 
 import pytest
 
 from r4link import UsageError, pytest_plugin
+
+try:
+    import tomllib
+except ModuleNotFoundError:  # Python 3.10
+    import tomli as tomllib
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 EXAMPLE = ROOT / 'docs/examples/robot_tests'

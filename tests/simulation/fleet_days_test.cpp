@@ -183,7 +183,7 @@ class FleetLink final : firmware::Hal, firmware::Port, IncuriousHost {
     for (int copies = random_.chance(twice) ? 2 : 1; copies > 0; --copies) {
       if (random_.chance(lost)) continue;
       // Up to 20 ms: some overtake others.
-      Packet packet;
+      Packet packet{};
       packet.at_us = packet.came_us = now_us_ + 500 + random_.below(20'000);
       packet.to_board = to_board;
       packet.size = std::min(bytes.size(), packet.bytes.size());

@@ -14,6 +14,7 @@ import os
 import pathlib
 import platform
 import shutil
+import struct
 import subprocess
 import sys
 import tarfile
@@ -29,7 +30,9 @@ CAN_MODULES = ('can-raw', 'can-bcm', 'can-isotp', 'can-gw', 'can-dev', 'vcan', '
                'sch_netem', 'sch_tbf', 'kvaser_pci')
 USB_MODULES = ('xhci-pci', 'ftdi_sio')
 XZ_MAGIC = b'\xfd7zXZ\x00'
-GIVEN_IS = 'set R4_CAN_KERNEL to the path of a Debian linux-image-6.1.*-amd64 package, or leave it out'
+ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
+DEBIANS = 'take a linux-image-*-amd64 package of Debian 12 or 13'
+GIVEN_IS = 'set R4_CAN_KERNEL to the path of a Debian linux-image-*-amd64 package, or leave it out'
 
 
 class Kernel:
@@ -85,13 +88,13 @@ def prepare(cache, ready):
     package = fetched(cache)
     print(f'with-can: unpacking {package.name}', file=sys.stderr)
     try:
-        image, modules = unpacked(package)
+        image, modules, built_in = unpacked(package)
     except (tarfile.TarError, EOFError, ValueError) as error:
         own = package.parent == cache
         raise Trouble(str(package), f'it cannot be unpacked: {error}',
                       f'rm {package}, then run this again' if own else GIVEN_IS) from error
     (making / 'vmlinux').write_bytes(elf_inside(package, image))
-    (making / 'initrd').write_bytes(initial_ram_disk(modules))
+    (making / 'initrd').write_bytes(initial_ram_disk(modules, built_in))
     making.chmod(0o755)
     making.rename(ready)
     if package.parent == cache:
@@ -130,9 +133,10 @@ def fetched(cache):
 
 
 def unpacked(package):
-    """The compressed kernel, and the modules by name."""
+    """The compressed kernel, the modules by name, and the names of those that are a part of the kernel."""
     image = None
     modules = {}
+    built_in = set()
     wanted = ('/kernel/net/9p/', '/kernel/fs/', '/kernel/net/can/', '/kernel/drivers/net/can/',
               '/kernel/drivers/virtio/', '/kernel/drivers/char/', '/kernel/drivers/usb/',
               '/kernel/net/sched/', '/kernel/lib/')
@@ -142,38 +146,57 @@ def unpacked(package):
         for each in files:
             if each.isfile() and each.name.startswith('./boot/vmlinuz-'):
                 image = files.extractfile(each).read()
-            elif each.isfile() and each.name.endswith('.ko') and \
+            elif each.isfile() and each.name.endswith('/modules.builtin'):
+                built_in = {name_of(line.decode()) for line in files.extractfile(each).read().split()}
+            elif each.isfile() and each.name.endswith(('.ko', '.ko.xz')) and \
                     any(folder in each.name for folder in wanted):
-                modules[os.path.basename(each.name)[:-3].replace('-', '_')] = \
-                    files.extractfile(each).read()
+                content = files.extractfile(each).read()
+                modules[name_of(each.name)] = lzma.decompress(content) if content.startswith(XZ_MAGIC) else content
         unpacking.stdout.read()
     if image is None:
         raise ValueError('it has no boot/vmlinuz-*')
-    return image, modules
+    return image, modules, built_in
+
+
+def name_of(path):
+    """A module's name: dri-ver.ko.xz is dri_ver."""
+    return os.path.basename(path).split('.', 1)[0].replace('-', '_')
 
 
 def elf_inside(package, image):
-    """The kernel proper: bzImage carries it as an xz stream."""
-    at = image.find(XZ_MAGIC)
-    try:
-        elf = lzma.LZMADecompressor().decompress(image[at:]) if at >= 0 else b''
-    except lzma.LZMAError:
-        elf = b''
+    """The kernel proper: bzImage carries it compressed by xz (Debian 12) or zstd (Debian 13)."""
+    # Documentation/arch/x86/boot.rst: setup_sects, payload_offset, payload_length
+    payload = b''
+    if len(image) > 0x250:
+        start, length = struct.unpack_from('<II', image, 0x248)
+        start += (image[0x1f1] + 1) * 512
+        payload = image[start:start + length]
+    elf = b''
+    if payload.startswith(XZ_MAGIC):
+        try:
+            elf = lzma.LZMADecompressor().decompress(payload)
+        except lzma.LZMAError:
+            pass
+    elif payload.startswith(ZSTD_MAGIC):
+        if shutil.which('zstd') is None:
+            raise Trouble('zstd', 'it is not installed', 'tools/setup --can')
+        # The last four bytes are the kernel's own: its size.
+        elf = subprocess.run(['zstd', '-dcq'], input=payload[:-4], capture_output=True, check=False).stdout
     if not elf.startswith(b'\x7fELF'):
-        raise Trouble(str(package), 'its kernel is not compressed by xz',
-                      'take a linux-image-6.1.* package of Debian 12')
+        raise Trouble(str(package), 'its kernel is not compressed by xz or zstd', DEBIANS)
     return elf
 
 
-def in_loading_order(modules, names):
-    """Those modules, each after what it depends on."""
+def in_loading_order(modules, built_in, names):
+    """Those modules that are not a part of the kernel, each after what it depends on."""
     order = []
 
     def add(name):
-        name = name.replace('-', '_')
+        name = name_of(name)
+        if name in built_in:
+            return
         if name not in modules:
-            raise Trouble(f'module {name}', 'the kernel package does not have it',
-                          'take a linux-image-6.1.* package of Debian 12')
+            raise Trouble(f'module {name}', 'the kernel package does not have it', DEBIANS)
         at = modules[name].find(b'\0depends=')
         depends = modules[name][at + 9:modules[name].index(b'\0', at + 9)].decode()
         for each in filter(None, depends.split(',')):
@@ -186,16 +209,16 @@ def in_loading_order(modules, names):
     return order
 
 
-def initial_ram_disk(modules):
+def initial_ram_disk(modules, built_in):
     try:
         busybox = pathlib.Path(BUSYBOX).read_bytes()
     except OSError as error:
         raise Trouble(BUSYBOX, error.strerror, 'tools/setup --can') from error
     if b'/lib64/ld-linux' in busybox[:4096]:
         raise Trouble(BUSYBOX, 'it is not linked statically', 'sudo apt-get install busybox-static')
-    base = in_loading_order(modules, BASE_MODULES)
-    can = [name for name in in_loading_order(modules, CAN_MODULES) if name not in base]
-    usb = in_loading_order(modules, USB_MODULES)
+    base, can, usb = (in_loading_order(modules, built_in, names)
+                      for names in (BASE_MODULES, CAN_MODULES, USB_MODULES))
+    can = [name for name in can if name not in base]
     disk = Cpio()
     for folder in ('bin', 'modules'):
         disk.add(folder, 0o040755)

@@ -45,7 +45,9 @@ void describe_controller(rtnl_link* link, CanInterface& result) {
   }
   can_bittiming timing{};
   if (rtnl_link_can_get_bittiming(link, &timing) >= 0) result.bit_rate = timing.bitrate;
+#if LIBNL_VER_NUM >= LIBNL_VER(3, 6)
   if (rtnl_link_can_get_data_bittiming(link, &timing) >= 0) result.data_bit_rate = timing.bitrate;
+#endif
   std::uint32_t restart_ms = 0;
   if (rtnl_link_can_get_restart_ms(link, &restart_ms) >= 0) result.restart_ms = restart_ms;
   can_berr_counter errors{};

@@ -14,7 +14,7 @@
 
 namespace r4 {
 
-class CanListener : private CanBus::Member {
+class CanListener final : private CanBus::Member {
  public:
   // `rate` is for the survey's sums. Throws Error, as a carrier does that is opened.
   CanListener(asio::io_context& io, const std::string& interface, CanBitRate rate);

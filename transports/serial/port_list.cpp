@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "port_list.hpp"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 #include <libserialport.h>
 
 #include <algorithm>

@@ -2,7 +2,7 @@
 #include "serial_device.hpp"
 
 #include <fcntl.h>
-#include <fmt/core.h>
+#include <fmt/format.h>
 #include <libserialport.h>
 #include <linux/serial.h>
 #include <sys/ioctl.h>

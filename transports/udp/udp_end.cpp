@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "udp_end.hpp"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 #include <sys/socket.h>
 
 #include <asio/ip/v6_only.hpp>

@@ -3,7 +3,9 @@
 import os
 from datetime import datetime
 from types import TracebackType
-from typing import Any, Callable, Self, Sequence, Type, overload
+from typing import Any, Callable, Sequence, Type, overload
+
+from typing_extensions import Self
 
 from .values import Bldc, Drive, I2cAnswer, I2cBusReport, I2cReading, UartBytes, UartData
 

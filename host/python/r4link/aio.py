@@ -19,7 +19,7 @@ import threading
 import weakref
 from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
-from typing import Any, Callable, Iterable, Self, Type, TypeVar
+from typing import TYPE_CHECKING, Any, Callable, Iterable, Type, TypeVar
 
 from . import board as blocking, channels
 from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State, Statistics,
@@ -28,6 +28,9 @@ from .channels import Setpoints
 from .devices import Device
 from .errors import ClosedError
 from .values import Direction, PostResult, UartData
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # since Python 3.11 in typing
 
 T = TypeVar('T')
 

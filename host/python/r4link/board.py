@@ -10,7 +10,7 @@ import atexit
 import os
 import weakref
 from types import TracebackType
-from typing import Any, Callable, Iterable, Iterator, Self, Type, TypeVar
+from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, Type, TypeVar
 
 from . import _core
 from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State, Statistics,
@@ -20,6 +20,9 @@ from .channels import (BldcChannel, DriveChannel, I2c, RelayChannel, ServoChanne
 from .devices import Device
 from .errors import UsageError
 from .values import PostResult
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # since Python 3.11 in typing
 
 F = TypeVar('F', bound=Callable[..., Any])
 _open: weakref.WeakSet[_core.Board] = weakref.WeakSet()

@@ -14,10 +14,13 @@ import os
 import weakref
 from collections.abc import Sequence
 from types import TracebackType
-from typing import NamedTuple, Self, Type
+from typing import TYPE_CHECKING, NamedTuple, Type
 
 from . import _core
 from .channels import _ms
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # since Python 3.11 in typing
 
 _open: weakref.WeakSet[Bridge] = weakref.WeakSet()
 

@@ -203,4 +203,4 @@ class _Uarts:
 
 
 def _register(register: int | bytes) -> bytes:
-    return register.to_bytes(1) if isinstance(register, int) else bytes(register)
+    return register.to_bytes(1, 'big') if isinstance(register, int) else bytes(register)

@@ -17,13 +17,16 @@ import atexit
 import os
 import weakref
 from types import TracebackType
-from typing import Iterable, Iterator, Mapping, NamedTuple, Self, Sequence, Type
+from typing import TYPE_CHECKING, Iterable, Iterator, Mapping, NamedTuple, Sequence, Type
 
 from . import _core
 from ._core import BoardHealth, Command, Event, FleetResult, LinkStatus, Recording, RefusedPost, State
 from .channels import Setpoints, _ms
 from .errors import Error, RefusedError, UsageError, error_of
 from .values import PostResult
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # since Python 3.11 in typing
 
 _open: weakref.WeakSet[Fleet] = weakref.WeakSet()
 

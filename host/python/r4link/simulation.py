@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from types import TracebackType
-from typing import TYPE_CHECKING, Literal, Mapping, NamedTuple, Self, Type
+from typing import TYPE_CHECKING, Literal, Mapping, NamedTuple, Type
 
 from . import _core
 from .errors import DataError, UsageError
 from .values import Bldc, Drive
 
 if TYPE_CHECKING:
+    from typing_extensions import Self  # since Python 3.11 in typing
+
     from .testing import SimProcess
 
 

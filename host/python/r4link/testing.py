@@ -13,7 +13,7 @@ import subprocess
 import threading
 import time
 from types import TracebackType
-from typing import Any, Protocol, Self, Type
+from typing import TYPE_CHECKING, Any, Protocol, Type
 
 from . import _core
 from ._core import FIELDS, State
@@ -21,6 +21,9 @@ from .board import Board
 from .errors import ClosedError, DataError, Error, OpenError, UsageError
 from .simulation import Look, SimBoard
 from .values import Bldc, Drive
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # since Python 3.11 in typing
 
 TRANSPORTS = ('sim', 'udp', 'pty', 'can')
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // serial and pty joined by a real pseudo-terminal, and each against a terminal in the test's hands.
 #include <fcntl.h>
-#include <fmt/core.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <stdlib.h>

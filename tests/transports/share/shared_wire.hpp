@@ -2,7 +2,7 @@
 // What the tests of a shared wire have in common: a device, and programs that share it.
 #pragma once
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 

@@ -2,7 +2,7 @@
 // What a program that holds a wire lets others do, and what becomes of those who do anything else.
 #include "transports/share/wire_holder.hpp"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/socket.h>

@@ -2,7 +2,7 @@
 // What commands tell of boards to which several wires lead.
 #pragma once
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <vector>
 

@@ -110,9 +110,8 @@ class Round {
         next_question = now + search_.between;
       }
       const auto until = asked < search_.questions ? std::min(end, next_question) : end;
-      const auto wait = std::chrono::ceil<std::chrono::milliseconds>(until - now);
-      if (::poll(polled_.data(), polled_.size(),
-                 static_cast<int>(std::max<long>(0, wait.count()))) <= 0) {
+      const auto wait = std::chrono::ceil<std::chrono::milliseconds>(until - now).count();
+      if (::poll(polled_.data(), polled_.size(), wait > 0 ? static_cast<int>(wait) : 0) <= 0) {
         continue;
       }
       for (std::size_t i = 0; i < polled_.size(); ++i) {

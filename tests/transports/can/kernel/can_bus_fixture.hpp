@@ -84,7 +84,9 @@ class CanBusTest : public testing::Test {
   std::shared_ptr<CanBus> bus = CanBus::of(io, near_end, false);
 
  private:
-  static void remove() { (void)std::system("ip link del vxcan7 2>/dev/null"); }
+  static void remove() {
+    [[maybe_unused]] const int ended = std::system("ip link del vxcan7 2>/dev/null");
+  }
 };
 
 // Writes down what it is told.

@@ -62,7 +62,7 @@ class SlowBus {
                               std::to_string(rate) + "bit")
                                  .c_str()));
   }
-  ~SlowBus() { (void)std::system("tc qdisc del dev vxcan7 root"); }
+  ~SlowBus() { [[maybe_unused]] const int ended = std::system("tc qdisc del dev vxcan7 root"); }
   SlowBus(const SlowBus&) = delete;
   SlowBus& operator=(const SlowBus&) = delete;
 };

@@ -70,8 +70,8 @@ class Fields {
   std::string_view string() { return take(number<std::uint32_t>()); }
   std::string_view take(std::uint64_t size) {
     if (rest_.size() < size) return fail(), std::string_view();
-    const std::string_view bytes = rest_.substr(0, size);
-    rest_.remove_prefix(size);
+    const std::string_view bytes = rest_.substr(0, static_cast<std::size_t>(size));
+    rest_.remove_prefix(bytes.size());
     return bytes;
   }
   std::string_view rest() const { return rest_; }

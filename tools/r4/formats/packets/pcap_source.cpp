@@ -220,10 +220,13 @@ void PcapSource::on_packet_of(std::uint32_t index, std::string_view body) {
 // A time that no recording can have is the next that it can.
 Time PcapSource::time_of(const Interface& interface, std::uint64_t ticks) {
   constexpr std::int64_t last_s = 253'402'300'799;  // of the year 9999
+  constexpr std::uint64_t second_us = 1'000'000;
   const std::uint64_t whole = ticks / interface.ticks;
-  const std::uint64_t part = ticks % interface.ticks;
-  const auto us =
-      static_cast<std::int64_t>(static_cast<unsigned __int128>(part) * 1'000'000 / interface.ticks);
+  // Coarser ticks where the product would overflow: 2^-44 s at the most.
+  const std::uint64_t scale = interface.ticks / (UINT64_MAX / second_us) + 1;
+  const std::uint64_t part_us =
+      ticks % interface.ticks / scale * second_us / (interface.ticks / scale);
+  const auto us = static_cast<std::int64_t>(std::min(part_us, second_us - 1));
   const std::int64_t offset_s = std::clamp(interface.offset_s, -last_s, last_s);
   const auto seconds =
       static_cast<std::int64_t>(std::min<std::uint64_t>(whole, std::uint64_t{2} * last_s));
