@@ -4,6 +4,7 @@ import ast
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -88,6 +89,17 @@ def test_installs_into_a_venv_and_builds_a_wheel_and_a_source_distribution(tmp_p
         env={**OFFLINE, 'PYTHONPATH': 'host/python'})
     assert f'r4link-{r4link.__version__}/host/python/bindings/board.cpp' in names
     assert not any('__pycache__' in each or each.endswith('.so') for each in names)
+
+
+def test_a_wheel_has_the_same_bytes_twice_and_carries_its_libraries(tmp_path):
+    for folder in (tmp_path / 'one', tmp_path / 'two'):
+        made = run(ROOT / 'tools/wheel', '--built', os.environ['R4_BUILD'], '--into', folder)
+        assert '-manylinux_2_' in made and not list(folder.glob('*-linux_*')), made
+    first, second = sorted(tmp_path.glob('*/*.whl'))
+    assert first.name == second.name and first.read_bytes() == second.read_bytes()
+    shutil.copy(ROOT / 'tests/install/wheel_inside.sh', tmp_path / 'one')
+    told = run(tmp_path / 'one/wheel_inside.sh', sys.executable, env=OFFLINE)
+    assert 'drives a board; 6 libraries are its own' in told, told
 
 
 def test_a_folder_of_sources_says_what_is_missing():
