@@ -10,7 +10,9 @@ set(R4_ASIO_DEFINITIONS ASIO_STANDALONE ASIO_SEPARATE_COMPILATION ASIO_NO_DEPREC
 
 # Our warnings, for our own targets only. Asio, CLI11 and the like are system headers.
 function(r4_warnings target)
-  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow)
+  # clang's -Wconversion includes -Wsign-conversion.
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow
+                         $<$<CXX_COMPILER_ID:Clang>:-Wno-sign-conversion>)
 endfunction()
 
 # Finds the package that an option of ours needs. `needs_it` and `debian` are for people.

@@ -37,8 +37,7 @@ class SharedCarrier final : public Carrier,
                             private WireSharer::Owner {
  public:
   SharedCarrier(asio::io_context& io, std::unique_ptr<Carrier> own, FindWire find, BoardRole role)
-      : io_(io),
-        own_(std::move(own)),
+      : own_(std::move(own)),
         role_(role),
         name_(own_->name()),
         holder_(io, *this, program_invocation_short_name),
@@ -100,7 +99,6 @@ class SharedCarrier final : public Carrier,
   bool late() const { return Clock::now() - since_ >= take_over_within; }
   void tell(const CarrierEvent& event);
 
-  asio::io_context& io_;
   const std::unique_ptr<Carrier> own_;
   const BoardRole role_;
   std::string name_;
