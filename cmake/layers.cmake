@@ -10,9 +10,18 @@ set(R4_ASIO_DEFINITIONS ASIO_STANDALONE ASIO_SEPARATE_COMPILATION ASIO_NO_DEPREC
 
 # Our warnings, for our own targets only. Asio, CLI11 and the like are system headers.
 function(r4_warnings target)
-  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow
-                         $<$<BOOL:${R4_WERROR}>:-Werror>)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow)
 endfunction()
+
+# Finds the package that an option of ours needs. `needs_it` and `debian` are for people.
+macro(r4_find_optional option package needs_it debian)
+  find_package(${package} CONFIG QUIET)
+  if(NOT ${package}_FOUND)
+    message(FATAL_ERROR "${package} was not found, and ${needs_it} needs it.\n"
+            "  fix: install it (Debian and Ubuntu: apt-get install ${debian}), "
+            "or build without ${needs_it}: cmake -D${option}=OFF")
+  endif()
+endmacro()
 
 # install(), unless another project has taken the tree in: it installs what it wants.
 function(r4_install)

@@ -14,19 +14,29 @@ import tempfile
 
 import yaml
 
-TOOL = re.compile(r'(?<![\w/.])((?:tools|\.ci)/[\w-]+)((?: --[\w-]+)*)(?![\w/])')
+TOOL = re.compile(r'(?<![\w/.])((?:tools|\.ci)/[\w-]+)(?![\w/])([^`|;&\n]*)')
+RUNNERS = {'tools/on', 'tools/with-can'}  # they run a command, which has options of its own
 FIELDS = {'dropdown', 'textarea', 'input', 'checkboxes', 'markdown'}
 
 
 def workflow_faults(content):
-    if not {'push', 'pull_request'} <= set(content.get(True) or content.get('on') or ()):
-        yield 'it does not run for pushes and pull requests'
+    events = content.get(True) or content.get('on') or {}
+    for_tags = isinstance(events, dict) and (events.get('push') or {}).get('tags')
+    if not for_tags and not {'push', 'pull_request'} <= set(events):
+        yield 'it runs neither for tags nor for pushes and pull requests'
     for name, job in content['jobs'].items():
         if not job.get('timeout-minutes'):
             yield f'job {name} may run for ever'
         for step in job['steps']:
             if ('run' in step) == ('uses' in step):
                 yield f'job {name}: a step either runs or uses something'
+        used = set(re.findall(r'matrix\.([\w-]+)', str(job)))
+        rows = job.get('strategy', {}).get('matrix', {})
+        for row in rows.get('include', [rows]):
+            if not used <= set(row):
+                yield f'job {name}: a row of its matrix lacks {", ".join(sorted(used - set(row)))}'
+        if job.get('needs') and job['needs'] not in content['jobs']:
+            yield f'job {name} needs {job["needs"]}, which is not there'
 
 
 def action_faults(content):
@@ -70,14 +80,18 @@ def yaml_faults(root):
 
 
 def tool_faults(root):
-    for page in ('README.md', 'CONTRIBUTING.md', 'docs/packages.md', '.github/workflows/ci.yml'):
+    pages = ('README.md', 'CONTRIBUTING.md', 'docs/contributing.md', 'docs/packages.md', '.github/workflows/ci.yml',
+             '.github/workflows/release.yml')
+    for page in pages:
         for tool, options in TOOL.findall((root / page).read_text()):
             program = root / tool
+            if tool in RUNNERS:
+                options = re.match(r'(?: --[\w-]+)*', options)[0]
             if not program.exists():
                 yield f'{page}: there is no {tool}'
             elif program.is_file():
                 text = program.read_text()
-                for option in options.split():
+                for option in re.findall(r'(?<= )--[\w-]+', options):
                     if option not in text:
                         yield f'{page}: {tool} has no option {option}'
 

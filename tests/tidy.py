@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""clang-tidy over the product's sources: tests/tidy.py BUILD [JOBS]
+"""clang-tidy over the product's sources: tests/tidy.py BUILD [JOBS] [--all]
 
+Without --all: those in folders where something differs from origin/main or, on main itself, from 20 commits ago.
 BUILD is configured with -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON -DR4_UNITY=ON. What is one source for the compiler
 (cmake/layers.cmake) is one for clang-tidy, which then reads its headers once instead of a dozen times. Its files are
 written one behind the other, not included: the analyzer follows only what is in the file that it is given.
@@ -78,6 +79,18 @@ def sources_of(build):
     return sources
 
 
+def changed_folders():
+    """The folders of the tree in which something changed, or None if that is not known."""
+    def git(*arguments):
+        result = subprocess.run(["git", "-C", str(ROOT), *arguments], capture_output=True, text=True)
+        return result.stdout.strip() if result.returncode == 0 else None
+    head, base = git("rev-parse", "HEAD"), git("merge-base", "HEAD", "origin/main")
+    if base in (None, head):
+        base = git("rev-parse", "HEAD~20")
+    names = base and git("diff", "--name-only", base)
+    return None if names is None else {(ROOT / name).parent for name in names.splitlines()}
+
+
 def included_twice(file):
     """A check of clang-tidy that has no meaning where files follow each other."""
     lines = collections.Counter(line for line in file.read_text().splitlines() if line.startswith("#include"))
@@ -98,9 +111,14 @@ def check(build, path, source):
 
 
 def main():
-    build = pathlib.Path(sys.argv[1]).resolve()
-    jobs = int(sys.argv[2]) if len(sys.argv) > 2 else 1
+    arguments = [each for each in sys.argv[1:] if each != "--all"]
+    build = pathlib.Path(arguments[0]).resolve()
+    jobs = int(arguments[1]) if len(arguments) > 1 else 1
     sources = sources_of(build)
+    changed = None if "--all" in sys.argv else changed_folders()
+    if changed is not None:
+        sources = {path: source for path, source in sources.items()
+                   if any(file.parent in changed for file in source.files)}
     # What takes longest, first.
     order = sorted(sources, key=lambda path: -sum(file.stat().st_size for file in sources[path].files))
     found = 0

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Builds the Python package (PEP 517) with nothing but cmake and Python itself, so also without a network.
 
-The module links libraries of the system (tools/setup --python): the wheel is for this one. R4_BUILD=FOLDER takes the
-package that is in that build folder, and builds it there if it is not.
+The module links libraries of the system (tools/setup --python), so this wheel is for the same system; tools/wheel makes
+one that carries its libraries. R4_BUILD=FOLDER takes the package from that build folder, and builds it there if needed.
 """
 import base64
 import hashlib
@@ -14,6 +14,7 @@ import sys
 import sysconfig
 import tarfile
 import tempfile
+import time
 import zipfile
 
 try:
@@ -25,6 +26,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / 'pyproject.toml').read_text())['project']
 VERSION = re.search(r'R4LINK_VERSION "([^"]+)"', (ROOT / 'include/r4link/config.hpp').read_text())[1]
 NAME = f'{PROJECT["name"]}-{VERSION}'
+INFO = f'{NAME}.dist-info'
 METADATA = f"""Metadata-Version: 2.1
 Name: {PROJECT['name']}
 Version: {VERSION}
@@ -41,9 +43,11 @@ def _run(*command):
 
 
 def configure(folder):
-    """A build of the package alone."""
-    _run('cmake', '-S', str(ROOT), '-B', str(folder), '-G', 'Ninja', '-DCMAKE_BUILD_TYPE=Release', '-DR4_TESTS=OFF',
-         '-DR4_PYTHON=ON')
+    """A build of the package alone. No folder's name is left in it."""
+    folder = pathlib.Path(folder).resolve()
+    flags = f'{os.environ.get("CXXFLAGS", "")} -ffile-prefix-map={ROOT}/= -ffile-prefix-map={folder}/='
+    _run('cmake', '-S', str(ROOT), '-B', str(folder), '-G', 'Ninja', '-DCMAKE_BUILD_TYPE=Release', '-DR4_TOOLS=OFF',
+         '-DR4_TESTS=OFF', '-DR4_PYTHON=ON', f'-DCMAKE_CXX_FLAGS={flags}')
 
 
 def _built():
@@ -62,25 +66,38 @@ def _built():
                 yield str(path.relative_to(package)), path.read_bytes()
 
 
-def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
-    python = f'cp{sys.version_info.major}{sys.version_info.minor}'
-    tag = f'{python}-{python}-{sysconfig.get_platform().replace("-", "_").replace(".", "_")}'
-    info = f'{NAME}.dist-info'
+def contents():
+    """What is in a wheel, but for its tag: {name: content}."""
     entries = ''.join(f'[{group}]\n' + ''.join(f'{name} = {where}\n' for name, where in each.items())
                       for group, each in PROJECT['entry-points'].items())
-    files = [*_built(), (f'{info}/entry_points.txt', entries.encode()), (f'{info}/METADATA', METADATA.encode()),
-             (f'{info}/LICENSE', (ROOT / 'LICENSE').read_bytes()),
-             (f'{info}/WHEEL', f'Wheel-Version: 1.0\nGenerator: r4link\nRoot-Is-Purelib: false\nTag: {tag}\n'.encode())]
+    return {**dict(_built()), f'{INFO}/entry_points.txt': entries.encode(), f'{INFO}/METADATA': METADATA.encode(),
+            f'{INFO}/LICENSE': (ROOT / 'LICENSE').read_bytes()}
+
+
+def write_wheel(folder, files, platform):
+    """The same files give the same bytes, if SOURCE_DATE_EPOCH is the same; without it they are of 1980."""
+    python = f'cp{sys.version_info.major}{sys.version_info.minor}'
+    tag = f'{python}-{python}-{platform}'
+    about = f'Wheel-Version: 1.0\nGenerator: r4link\nRoot-Is-Purelib: false\nTag: {tag}\n'
+    files = {**files, f'{INFO}/WHEEL': about.encode()}
     record = ''
-    for name, content in files:
+    for name, content in sorted(files.items()):
         digest = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b'=').decode()
         record += f'{name},sha256={digest},{len(content)}\n'
-    files.append((f'{info}/RECORD', f'{record}{info}/RECORD,,\n'.encode()))
+    files[f'{INFO}/RECORD'] = f'{record}{INFO}/RECORD,,\n'.encode()
+    epoch = max(int(os.environ.get('SOURCE_DATE_EPOCH', 0)), 315532800)  # a zip begins in 1980
     wheel = f'{NAME}-{tag}.whl'
-    with zipfile.ZipFile(pathlib.Path(wheel_directory) / wheel, 'w', zipfile.ZIP_DEFLATED) as archive:
-        for name, content in files:
-            archive.writestr(name, content)
+    with zipfile.ZipFile(pathlib.Path(folder) / wheel, 'w', zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+        for name, content in sorted(files.items()):
+            entry = zipfile.ZipInfo(name, time.gmtime(epoch)[:6])
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = (0o100755 if '.so' in name else 0o100644) << 16
+            archive.writestr(entry, content)
     return wheel
+
+
+def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
+    return write_wheel(wheel_directory, contents(), sysconfig.get_platform().replace('-', '_').replace('.', '_'))
 
 
 def build_editable(wheel_directory, config_settings=None, metadata_directory=None):

@@ -1,6 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Installs the packages that lie beside it, uses each, and purges them. packages.sh runs it in a copy of the system.
+# Installs the packages that lie beside it, uses each, and purges them. packages.sh runs it in a copy of the system,
+# clean.sh with --apt in a minimal one, which gets what the packages depend on and what the steps use.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
@@ -16,7 +17,14 @@ step() {
   printf '%5ds  packages: %s\n' "$SECONDS" "$name"
 }
 
-step 'install' dpkg --force-unsafe-io --install ./*.deb
+if [[ "${1-}" == --apt ]]; then
+  export DEBIAN_FRONTEND=noninteractive
+  apt=(apt-get -q -y --no-install-recommends -o DPkg::Options::=--force-unsafe-io)
+  step 'install' "${apt[@]}" install ./*.deb
+  step 'what the steps use' "${apt[@]}" install bash-completion cmake fish g++ libasio-dev man-db systemd tshark udev zsh
+else
+  step 'install' dpkg --force-unsafe-io --install ./*.deb
+fi
 
 step 'man r4-send' bash -c "MANPAGER=cat man r4-send | grep -q 'until the board confirms'"
 completes() {
@@ -33,10 +41,16 @@ units_are_safe() {
   done
 }
 step 'r4-record@.service and r4-bridge@.service are whole, and expose little' units_are_safe
+udev_rules_are_valid() {
+  local rules=/usr/lib/udev/rules.d/70-r4.rules
+  grep -q 'MODE="0660"' "$rules"
+  # Of systemd 254 and newer.
+  ! udevadm verify --help >/dev/null || udevadm verify "$rules"
+}
+step 'udev rules' udev_rules_are_valid
 wireshark_knows_it() {
   # Wireshark 4.4 loads no Lua for root, and lists more columns.
-  ! compgen -G '/usr/lib/*/wireshark/plugins/r4.lua' >/dev/null ||
-    setpriv --reuid=65534 --regid=65534 --clear-groups tshark -G protocols 2>/dev/null | grep -P '\tr4(\t|$)'
+  setpriv --reuid=65534 --regid=65534 --clear-groups tshark -G protocols | grep -P '\tr4(\t|$)'
 }
 step 'Wireshark' wireshark_knows_it
 

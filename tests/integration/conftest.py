@@ -3,8 +3,15 @@
 
 Bounds of real time are what r4 promises, so they are tested; a virtual machine that is paused breaks
 them all. A thread that only looks at the clock tells; a failure without a standstill counts at once.
+Each repeat is a line of build/results/repeats.txt, and they are counted at the end of a run.
 """
+import ctypes
+import fcntl
+import os
+import pathlib
 import signal
+import socket
+import struct
 import threading
 import time
 
@@ -15,10 +22,28 @@ from _pytest.runner import runtestprotocol
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+CLONE_NEWNET, SIOCSIFFLAGS, IFF_UP = 0x40000000, 0x8914, 0x1
+
+
+def leave_the_network_of_others():
+    """Files of tests that run at a time do not meet at UDP ports: each has a network of its own, which is a loopback.
+
+    It takes root; without it they share the network of this machine. In the guest of tools/with-can are the interfaces.
+    """
+    if 'R4_CAN_GUEST' in os.environ or ctypes.CDLL(None).unshare(CLONE_NEWNET) != 0:
+        return
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
+        fcntl.ioctl(any_socket, SIOCSIFFLAGS, struct.pack('16sH22x', b'lo', IFF_UP))
+
+
+leave_the_network_of_others()
+
 LOOK_S = 0.025  # seldom enough for the emulated machine of tools/with-can
 STANDSTILL_S = 0.02 + LOOK_S  # as exact as the promises are
 MOST_RUNS = 3
 LONGEST_S = 80  # what takes longer runs in the guest, and has this rule there
+REPEATS = pathlib.Path(__file__).resolve().parents[2] / 'build/results/repeats.txt'
+repeated = []
 
 
 class Watch:
@@ -45,6 +70,18 @@ class Watch:
             before = now
 
 
+def note_repeat(line):
+    repeated.append(line)
+    REPEATS.parent.mkdir(parents=True, exist_ok=True)
+    with open(REPEATS, 'a', encoding='utf-8') as file:
+        file.write(line + '\n')
+
+
+def pytest_terminal_summary(terminalreporter):
+    if repeated:
+        terminalreporter.write_line(f'{len(repeated)} repeated because the machine stood still: {", ".join(repeated)}')
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_protocol(item, nextitem):
     item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
@@ -56,6 +93,7 @@ def pytest_runtest_protocol(item, nextitem):
         took = time.monotonic() - began
         if not failed or watch.longest < STANDSTILL_S or run == MOST_RUNS or took > LONGEST_S:
             break
+        note_repeat(f'{item.nodeid}: {watch.longest * 1000:.0f} ms')
         item.config.pluginmanager.get_plugin('terminalreporter').write(
             f'\n{item.nodeid}: The machine stood still for {watch.longest * 1000:.0f} ms: run again. It said\n'
             f'{failed[0].longreprtext}\n')

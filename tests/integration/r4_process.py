@@ -18,6 +18,7 @@ import time
 
 R4 = os.environ['R4']
 DATA = os.environ.get('R4_TEST_DATA', os.path.join(os.path.dirname(__file__), '..', 'data'))
+METRICS = os.environ.get('R4_METRICS') != 'OFF'  # as CMake's option
 # Sanitizers make everything slower and bigger; promises about time and memory are for release builds.
 SANITIZED = 'R4_SANITIZER' in os.environ
 # So does the guest of tools/with-can, which emulates its processor.
@@ -257,18 +258,6 @@ def watch(url, *options, **process):
 
 def is_state(each):
     return each['type'] == 'state'
-
-
-def cost_of_watching(board, host, seconds):
-    """States a second that the host has, and the shares of a processor of both."""
-    host.next(is_state)
-    before = [each.cpu_seconds() for each in (board, host)]
-    until = time.monotonic() + seconds
-    states = 0
-    while time.monotonic() < until:
-        host.next(is_state)
-        states += 1
-    return states / seconds, [(each.cpu_seconds() - cpu) / seconds for each, cpu in zip((board, host), before)]
 
 
 def is_link(state, reason='none', busy=False):

@@ -13,8 +13,14 @@
 // have it tells of itself: {"type":"endpoint","kind":"writer","topic":…,"of":…,"user_data":…,"gid":…}, and when it
 // goes, "gone":true; of participants {"type":"participant","user_data":…,"gone":…}. Its domain is ROS_DOMAIN_ID's,
 // on 127.0.0.1 alone.
+#if __has_include(<fastdds/utils/IPLocator.hpp>)
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.hpp>
+#include <fastdds/utils/IPLocator.hpp>
+#define FAST_DDS_3
+#else
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastrtps/utils/IPLocator.h>
+#endif
 
 #include <algorithm>
 #include <atomic>
@@ -44,7 +50,13 @@
 namespace {
 
 using namespace eprosima::fastdds::dds;  // NOLINT(google-build-using-namespace)
+#ifdef FAST_DDS_3
+namespace rtps = eprosima::fastdds::rtps;
+const ReturnCode_t ok = RETCODE_OK;
+#else
 namespace rtps = eprosima::fastrtps::rtps;
+const ReturnCode_t ok = ReturnCode_t::RETCODE_OK;
+#endif
 using Bytes = std::vector<std::uint8_t>;
 
 std::mutex output;
@@ -81,21 +93,43 @@ std::string in_quotes(const std::string& text) {
 // A type whose samples are bytes, the four of the encapsulation included.
 class RawType final : public TopicDataType {
  public:
+#ifdef FAST_DDS_3
+  explicit RawType(const std::string& name) {
+    set_name(name);
+    max_serialized_type_size = 1024;
+  }
+  bool serialize(const void* data, rtps::SerializedPayload_t& payload,
+                 DataRepresentationId_t /*form*/) override {
+    return write(*static_cast<const Bytes*>(data), payload);
+  }
+  bool deserialize(rtps::SerializedPayload_t& payload, void* data) override {
+    return read(payload, *static_cast<Bytes*>(data));
+  }
+  std::uint32_t calculate_serialized_size(const void* data,
+                                          DataRepresentationId_t /*form*/) override {
+    return static_cast<std::uint32_t>(static_cast<const Bytes*>(data)->size());
+  }
+  void* create_data() override { return new Bytes(); }
+  void delete_data(void* data) override { delete static_cast<Bytes*>(data); }
+  bool compute_key(rtps::SerializedPayload_t& /*payload*/, rtps::InstanceHandle_t& /*handle*/,
+                   bool /*md5*/) override {
+    return false;
+  }
+  bool compute_key(const void* /*data*/, rtps::InstanceHandle_t& /*handle*/,
+                   bool /*md5*/) override {
+    return false;
+  }
+#else
   explicit RawType(const std::string& name) {
     setName(name.c_str());
     m_typeSize = 1024;
     m_isGetKeyDefined = false;
   }
   bool serialize(void* data, rtps::SerializedPayload_t* payload) override {
-    const Bytes& bytes = *static_cast<Bytes*>(data);
-    if (bytes.size() > payload->max_size) return false;
-    std::memcpy(payload->data, bytes.data(), bytes.size());
-    payload->length = static_cast<std::uint32_t>(bytes.size());
-    return true;
+    return write(*static_cast<const Bytes*>(data), *payload);
   }
   bool deserialize(rtps::SerializedPayload_t* payload, void* data) override {
-    static_cast<Bytes*>(data)->assign(payload->data, payload->data + payload->length);
-    return true;
+    return read(*payload, *static_cast<Bytes*>(data));
   }
   std::function<std::uint32_t()> getSerializedSizeProvider(void* data) override {
     return [data] { return static_cast<std::uint32_t>(static_cast<Bytes*>(data)->size()); };
@@ -104,6 +138,19 @@ class RawType final : public TopicDataType {
   void deleteData(void* data) override { delete static_cast<Bytes*>(data); }
   bool getKey(void* /*data*/, rtps::InstanceHandle_t* /*handle*/, bool /*md5*/) override {
     return false;
+  }
+#endif
+
+ private:
+  static bool write(const Bytes& bytes, rtps::SerializedPayload_t& payload) {
+    if (bytes.size() > payload.max_size) return false;
+    std::memcpy(payload.data, bytes.data(), bytes.size());
+    payload.length = static_cast<std::uint32_t>(bytes.size());
+    return true;
+  }
+  static bool read(const rtps::SerializedPayload_t& payload, Bytes& bytes) {
+    bytes.assign(payload.data, payload.data + payload.length);
+    return true;
   }
 };
 
@@ -118,30 +165,63 @@ std::string text_of(const Octets& octets) {
 
 class Graph final : public DomainParticipantListener {
  public:
+#ifdef FAST_DDS_3
+  void on_data_writer_discovery(DomainParticipant* /*participant*/,
+                                rtps::WriterDiscoveryStatus status,
+                                const PublicationBuiltinTopicData& info,
+                                bool& /*ignored*/) override {
+    tell("writer", info.topic_name.to_string(), info.type_name.to_string(), info.user_data,
+         info.guid, status != rtps::WriterDiscoveryStatus::REMOVED_WRITER);
+  }
+  void on_data_reader_discovery(DomainParticipant* /*participant*/,
+                                rtps::ReaderDiscoveryStatus status,
+                                const SubscriptionBuiltinTopicData& info,
+                                bool& /*ignored*/) override {
+    tell("reader", info.topic_name.to_string(), info.type_name.to_string(), info.user_data,
+         info.guid, status != rtps::ReaderDiscoveryStatus::REMOVED_READER);
+  }
+  void on_participant_discovery(DomainParticipant* /*participant*/,
+                                rtps::ParticipantDiscoveryStatus status,
+                                const ParticipantBuiltinTopicData& info,
+                                bool& /*ignored*/) override {
+    using Status = rtps::ParticipantDiscoveryStatus;
+    tell_participant(info.user_data, status == Status::DISCOVERED_PARTICIPANT ||
+                                         status == Status::CHANGED_QOS_PARTICIPANT);
+  }
+#else
   void on_publisher_discovery(DomainParticipant* /*participant*/,
                               rtps::WriterDiscoveryInfo&& info) override {
-    tell("writer", info.info, info.status != rtps::WriterDiscoveryInfo::REMOVED_WRITER);
+    tell("writer", info.info.topicName().to_string(), info.info.typeName().to_string(),
+         info.info.m_qos.m_userData, info.info.guid(),
+         info.status != rtps::WriterDiscoveryInfo::REMOVED_WRITER);
   }
   void on_subscriber_discovery(DomainParticipant* /*participant*/,
                                rtps::ReaderDiscoveryInfo&& info) override {
-    tell("reader", info.info, info.status != rtps::ReaderDiscoveryInfo::REMOVED_READER);
+    tell("reader", info.info.topicName().to_string(), info.info.typeName().to_string(),
+         info.info.m_qos.m_userData, info.info.guid(),
+         info.status != rtps::ReaderDiscoveryInfo::REMOVED_READER);
   }
   void on_participant_discovery(DomainParticipant* /*participant*/,
                                 rtps::ParticipantDiscoveryInfo&& info) override {
-    const bool there = info.status == rtps::ParticipantDiscoveryInfo::DISCOVERED_PARTICIPANT ||
-                       info.status == rtps::ParticipantDiscoveryInfo::CHANGED_QOS_PARTICIPANT;
-    print(R"({"type":"participant","user_data":)" + in_quotes(text_of(info.info.m_userData)) +
-          R"(,"gone":)" + (there ? "false" : "true") + "}");
+    using Info = rtps::ParticipantDiscoveryInfo;
+    tell_participant(info.info.m_userData, info.status == Info::DISCOVERED_PARTICIPANT ||
+                                               info.status == Info::CHANGED_QOS_PARTICIPANT);
   }
+#endif
 
  private:
-  template <class Info>
-  static void tell(const char* kind, const Info& info, bool there) {
+  template <class Octets>
+  static void tell_participant(const Octets& user_data, bool there) {
+    print(R"({"type":"participant","user_data":)" + in_quotes(text_of(user_data)) + R"(,"gone":)" +
+          (there ? "false" : "true") + "}");
+  }
+  template <class Octets>
+  static void tell(const char* kind, const std::string& topic, const std::string& type,
+                   const Octets& user_data, const rtps::GUID_t& guid, bool there) {
     print(std::string(R"({"type":"endpoint","kind":")") + kind + R"(","topic":)" +
-          in_quotes(info.topicName().to_string()) + R"(,"of":)" +
-          in_quotes(info.typeName().to_string()) + R"(,"user_data":)" +
-          in_quotes(text_of(info.m_qos.m_userData)) + R"(,"gid":)" +
-          in_quotes(gid_of(info.guid())) + R"(,"gone":)" + (there ? "false" : "true") + "}");
+          in_quotes(topic) + R"(,"of":)" + in_quotes(type) + R"(,"user_data":)" +
+          in_quotes(text_of(user_data)) + R"(,"gid":)" + in_quotes(gid_of(guid)) + R"(,"gone":)" +
+          (there ? "false" : "true") + "}");
   }
 };
 
@@ -150,7 +230,7 @@ class Samples final : public DataReaderListener {
   void on_data_available(DataReader* reader) override {
     Bytes bytes;
     SampleInfo info;
-    while (reader->take_next_sample(&bytes, &info) == ReturnCode_t::RETCODE_OK) {
+    while (reader->take_next_sample(&bytes, &info) == ok) {
       if (!info.valid_data) continue;
       print(R"({"type":"sample","topic":)" + in_quotes(reader->get_topicdescription()->get_name()) +
             R"(,"bytes":)" + in_quotes(hex(bytes.data(), bytes.size())) + "}");
@@ -163,7 +243,7 @@ class Count final : public DataReaderListener {
   void on_data_available(DataReader* reader) override {
     Bytes bytes;
     SampleInfo info;
-    while (reader->take_next_sample(&bytes, &info) == ReturnCode_t::RETCODE_OK) ++samples;
+    while (reader->take_next_sample(&bytes, &info) == ok) ++samples;
   }
   std::atomic<int> samples{0};
 };

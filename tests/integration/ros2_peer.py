@@ -56,6 +56,9 @@ class Ros2(Running):
 
 class Peer:
     def __init__(self, domain):
+        assert os.path.exists(PROGRAM), (
+            f'{PROGRAM} is not built, for which Fast DDS is needed\n  fix: install it (Debian 12 and Ubuntu: libfastrtps-dev; '
+            'Debian 13: libfastdds-dev), then configure and build again')
         self.process = subprocess.Popen([PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
                                         env=domain)
         self.lines = queue.Queue()

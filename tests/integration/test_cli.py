@@ -237,9 +237,9 @@ def test_a_board_does_not_wait_for_whoever_reads_its_log():
         url = json.loads(board.stdout.readline())['host_url'] + '?listen=0'
         result = run('send', url, *[f'O:{pwm},1,1' for pwm in range(1, 301)], timeout=60)
         assert result.returncode == 0, result
-        monitor = run('monitor', url, '--json', '--duration', '3', timeout=60)
+        monitor = run('monitor', url, '--json', '--count', '60', timeout=60)
         states = [each for each in objects(monitor.stdout) if each['type'] == 'state']
-        assert len(states) > 50
+        assert len(states) == 60
         board.terminate()
         written = board.stdout.read()
     events = objects(written)  # whole lines, nothing torn

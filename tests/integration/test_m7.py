@@ -1,18 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The board's firmware on an emulated Cortex-M7 (tools/m7) and r4 as the host, by UART and by UDP."""
 import collections
-import importlib.machinery
-import importlib.util
 import itertools
-import json
 import os
-import re
 import signal
 import socket
 
 import pytest
 
-from m7_board import M7, M7Board, Relay, Watcher, m7
+from m7_board import M7Board, Relay, Watcher, m7
 from r4_process import PATIENCE_S, SANITIZED, driving, is_link, is_state, monitor, objects, run
 
 SAFE_WITHIN_MS = 1020
@@ -153,94 +149,6 @@ def test_a_serial_host_that_does_not_read_holds_nothing_up(urls):
         assert run('send', urls.serial, 'E:CLEAR').returncode == 0
     finally:
         os.close(unread)
-
-
-def test_the_tests_that_run_on_the_m7_pass():
-    result = m7('--test')
-    print(result.stdout)
-    assert result.returncode == 0, result
-    names = re.findall(r'^passed (\S+)$', result.stdout, re.MULTILINE)
-    assert 'FAILED' not in result.stdout and len(names) >= 20
-    assert 'BoardState.StreamsAt1000HzOverUdpWithNothingLostOrLeftOut' in names
-    assert 'Fault.AStackOverflowSwitchesOffAndIsNoted' in names
-    assert int(re.search(r'stack of the tests: (\d+)', result.stdout)[1]) < 6144
-
-
-def test_what_the_protocol_costs_is_what_the_table_says():
-    result = m7('--instructions')
-    print(result.stdout)
-    assert result.returncode == 0, result
-    assert m7('--instructions').stdout == result.stdout  # to the last instruction
-
-
-@pytest.fixture(name='tool')
-def tool_as_a_module(tmp_path):
-    """tools/m7 with a table of its own: 1000 instructions, and 2000 with a bar of 2050."""
-    loader = importlib.machinery.SourceFileLoader('m7_tool', M7)
-    tool = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
-    loader.exec_module(tool)
-    tool.ROOT, tool.TABLE = tmp_path, tmp_path / 'table.json'
-    tool.TABLE.write_text(json.dumps({'plain': {'instructions': {'12': 1000}},
-                                      'barred': {'instructions': {'12': 2000}, 'bar': 2050}}))
-    tool.compiler = lambda: '12'
-    return tool
-
-
-@pytest.mark.parametrize('counts, good, word', [
-    ({'plain': 1000, 'barred': 2000}, True, 'ok'),
-    ({'plain': 1049, 'barred': 1}, True, 'ok'),
-    ({'plain': 1051, 'barred': 2000}, False, 'worse: the table has 1000'),
-    ({'plain': 1000, 'barred': 2051}, False, 'above its bar of 2050'),
-    ({'plain': 1000, 'barred': 2000, 'new': 1}, False, 'not in the table'),
-    ({'plain': 1000}, False, 'no longer measured'),
-])
-def test_what_costs_more_than_the_table_says_fails_and_so_does_what_it_has_not(tool, capsys, counts, good, word):
-    before = tool.TABLE.read_text()
-    tool.measured = lambda: counts
-    assert tool.instructions(update=False) == good
-    assert word in capsys.readouterr().out
-    assert tool.TABLE.read_text() == before
-
-
-def test_of_a_compiler_that_is_not_in_the_table_only_the_bars_hold(tool, capsys):
-    tool.compiler = lambda: '13'
-    tool.measured = lambda: {'plain': 3000, 'barred': 2049}
-    assert tool.instructions(update=False)
-    tool.measured = lambda: {'plain': 3000, 'barred': 2051}
-    assert not tool.instructions(update=False)
-    assert 'above its bar of 2050' in capsys.readouterr().out
-    tool.measured = lambda: {'plain': 3000, 'barred': 2049}
-    assert tool.instructions(update=True)
-    assert json.loads(tool.TABLE.read_text())['plain'] == {'instructions': {'12': 1000, '13': 3000}}
-
-
-def test_an_update_takes_what_there_is_but_nothing_above_a_bar(tool):
-    tool.measured = lambda: {'plain': 3000, 'barred': 2049, 'new': 7}
-    assert tool.instructions(update=True)
-    assert json.loads(tool.TABLE.read_text()) == {
-        'plain': {'instructions': {'12': 3000}}, 'barred': {'instructions': {'12': 2049}, 'bar': 2050},
-        'new': {'instructions': {'12': 7}}}
-    tool.measured = lambda: {'plain': 3000, 'barred': 2051, 'new': 7}
-    assert not tool.instructions(update=True)
-
-
-def test_flash_ram_and_stacks_are_within_their_bars():
-    result = m7('--size')
-    print(result.stdout)
-    assert result.returncode == 0, result
-    assert len(re.findall(r'^portable code, .* ok$', result.stdout, re.MULTILINE)) == 2  # flash and RAM; stacks
-
-
-@pytest.mark.parametrize('arguments, code, words', [
-    (['--udp', '0'], 2, ['--udp 0', 'no port']),
-    (['--nothing'], 2, ['--nothing']),
-    (['--update'], 2, ['--instructions']),
-])
-def test_wrong_options_are_told_with_the_fix(arguments, code, words):
-    result = m7(*arguments)
-    assert result.returncode == code
-    assert re.match(r'tools/m7: m7: .+\n  fix: .+\n$', result.stderr), result.stderr
-    assert all(word in result.stderr for word in words)
 
 
 def test_a_port_that_is_in_use_is_told():

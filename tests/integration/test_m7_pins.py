@@ -7,12 +7,12 @@ import signal
 import pytest
 
 from m7_board import LineWatcher, M7Board, Watcher
-from r4_process import SANITIZED, Running, is_link, is_state, monitor, objects, run
+from r4_process import SANITIZED, Running, is_link, is_state, monitor, run
 
 TIMEOUT_MS = 1000
 SAFE_WITHIN_MS = 20
 STOP_WITHIN_US = 2000
-STREAM_S = 60
+STREAM_S = 20
 
 
 def channels(steps):
@@ -40,7 +40,7 @@ def running_board():
 
 
 @pytest.fixture(scope='module', name='streamed', autouse=True)
-def states_of_a_minute():
+def states_of_twenty_seconds():
     """From another board, while the tests go on: a function that waits for them."""
     with M7Board() as board, monitor(board.serial, '--fields', 'LATE', '--duration', str(STREAM_S + 5)) as host:
         host.next(is_link('active'))
@@ -119,7 +119,7 @@ def test_every_output_is_safe_in_time_when_the_host_is_killed(board, link):
 def test_every_output_is_safe_soon_after_the_last_byte_of_a_stop(board, link):
     url, _ = link
     took_us = []
-    for _ in range(4):
+    for _ in range(3):
         with drive(url, *everything_on()):
             on = board.pins(is_everything_on)
             assert run('stop', board.udp).returncode == 0
@@ -133,7 +133,7 @@ def test_every_output_is_safe_soon_after_the_last_byte_of_a_stop(board, link):
     assert took_us[len(took_us) // 2] <= STOP_WITHIN_US or SANITIZED
 
 
-def test_streams_at_100_hz_for_a_minute_with_nothing_lost_and_every_period_exact(streamed):
+def test_streams_at_100_hz_for_twenty_seconds_with_nothing_lost_and_every_period_exact(streamed):
     states = streamed()
     steps = collections.Counter()
     left_out = 0

@@ -5,12 +5,12 @@ import socket
 import time
 
 from paper_client import PaperClient
-from r4_process import SANITIZED, Board
+from r4_process import PATIENCE_S, Board
 
-LASTS_S = 10
+STATES, HEARTBEATS = 300, 5  # of three seconds
 
 
-def test_the_papers_python_client_drives_the_board_for_ten_seconds_without_a_safe_state():
+def test_the_papers_python_client_drives_the_board_without_a_safe_state():
     server_socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     client_socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     server_socket.bind(('127.0.0.1', 0))
@@ -20,8 +20,9 @@ def test_the_papers_python_client_drives_the_board_for_ten_seconds_without_a_saf
         # The board's port stands in front of its options.
         address = ('127.0.0.1', int(board.url.split('?')[0].rsplit(':', 1)[1]))
         client = PaperClient(lambda data: client_socket.sendto(data, address))
-        end = time.monotonic() + LASTS_S
-        while time.monotonic() < end:
+        deadline = time.monotonic() + 2 * PATIENCE_S
+        while len(client.states) < STATES or client.heartbeats < HEARTBEATS:
+            assert time.monotonic() < deadline, (len(client.states), client.heartbeats)
             try:
                 data = server_socket.recv(256)
             except OSError as error:
@@ -37,8 +38,6 @@ def test_the_papers_python_client_drives_the_board_for_ten_seconds_without_a_saf
     print(f'{len(client.states)} states, {client.heartbeats} heartbeats, {client.pnum_sent} datagrams sent')
     assert not went_safe, went_safe[:3]
     assert active and any('outputs' in each for each in active)
-    assert client.heartbeats >= 2 * LASTS_S - 2
-    assert len(client.states) >= 90 * LASTS_S or SANITIZED
     for state in client.states[-100:]:
         assert ';DHB1A:1000,1;' in state and ';SERVO1POS:300;' in state
         assert len(state) <= 256 - len('0x12345678^'), 'the client reads 256 bytes'

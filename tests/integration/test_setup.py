@@ -11,6 +11,7 @@ TOOLS = pathlib.Path(__file__).resolve().parents[2] / 'tools'
 PRODUCT = {'g++', 'cmake', 'ninja-build', 'pkg-config', 'libasio-dev', 'libboost-dev', 'libserialport-dev',
            'libnl-route-3-dev', 'libfmt-dev', 'libdeflate-dev', 'libzstd-dev', 'liblz4-dev', 'libcli11-dev',
            'nlohmann-json3-dev', 'prometheus-cpp-dev', 'cyclonedds-dev', 'cyclonedds-tools'}
+PARTS = {'prometheus-cpp-dev', 'cyclonedds-dev', 'cyclonedds-tools'}
 UNIT_TESTS = {'libgtest-dev', 'librapidcheck-dev', 'libbenchmark-dev', 'python3', 'python3-pytest', 'libpython3-dev',
               'pybind11-dev'}
 
@@ -18,14 +19,12 @@ UNIT_TESTS = {'libgtest-dev', 'librapidcheck-dev', 'libbenchmark-dev', 'python3'
 class Release:
     """A system with some packages installed, some in its archive, in a folder that comes first on the PATH."""
 
-    def __init__(self, folder, archive, installed=(), asio='1.22.1'):
+    def __init__(self, folder, archive, installed=(), version='9.0'):
         self._log = folder / 'installed'
         self._path = folder
-        self._program('dpkg-query', f'''case "$*" in
-          *Version*) {f"echo 1:{asio}" if "libasio-dev" in installed else "exit 1"} ;;
-          *) printf '%s\\n' {' '.join(f"'installed amd64 {each}'" for each in installed) or "''"} ;;
-        esac''')
-        known = '\n'.join(f'{each}:\n  Installed: (none)\n  Candidate: 1:9.0\n' for each in archive)
+        there = '\n'.join(f'installed amd64 {each} 1:9.0' for each in installed)
+        self._program('dpkg-query', f"cat <<'END'\n{there}\nEND")
+        known = '\n'.join(f'{each}:\n  Installed: (none)\n  Candidate: 1:{version}\n' for each in archive)
         self._program('apt-cache', f"cat <<'END'\n{known}\nEND")
         self._program('apt-get', f'case "$*" in *install*) echo "$*" >>"{self._log}" ;; esac')
         self._program('sudo', 'exec "$@"')
@@ -75,10 +74,16 @@ def test_a_peer_of_a_test_that_the_release_has_not_is_skipped_and_named(tmp_path
 
 
 def test_what_the_product_needs_is_named_by_library_and_version_where_there_is_no_package(tmp_path):
-    ended, installed = Release(tmp_path, PRODUCT - {'cyclonedds-dev'}).set_up()
+    ended, installed = Release(tmp_path, PRODUCT - {'libfmt-dev'}).set_up()
     assert (ended.returncode, installed) == (1, set())
-    assert re.match(r'tools/setup: this release has no package cyclonedds-dev\n  fix: install .*fmt 8\.1', ended.stderr,
+    assert re.match(r'tools/setup: this release has no package libfmt-dev, or too old a one\n  fix: install .*fmt 8\.1', ended.stderr,
                     re.DOTALL)
+
+
+def test_a_part_of_the_product_is_skipped_where_its_library_is_too_old(tmp_path):
+    ended, installed = Release(tmp_path, {'cyclonedds-dev', 'cyclonedds-tools'}, PRODUCT - PARTS, '0.8.2').set_up()
+    assert (ended.returncode, installed) == (0, set())
+    assert re.search(r'skipped.*prometheus-cpp-dev cyclonedds-dev cyclonedds-tools', ended.stderr)
 
 
 def test_for_another_architecture_the_compiler_is_a_cross_compiler_and_libraries_are_its_own(tmp_path):

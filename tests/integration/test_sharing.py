@@ -70,7 +70,7 @@ def test_a_third_is_refused_with_the_name_and_pid_of_who_controls(board):
             refused = run(*command)
             assert refused.returncode == 3, refused
             assert f'controlled by r4 (pid {host.process.pid})' in refused.stderr + refused.stdout
-        board.never('SAFE', 1)
+        board.never('SAFE', 0.3)
 
 
 def test_a_stop_from_the_second_terminal(board):

@@ -319,13 +319,13 @@ def test_a_flood_of_valid_datagrams_takes_nothing_from_the_host_in_control(board
 
 
 def test_measures_a_link(board):
-    result = run('bench', board.host_url, '--duration', '5', '--json', timeout=PATIENCE_S + 10)
+    result = run('bench', board.host_url, '--duration', '2', '--json', timeout=PATIENCE_S)
     assert result.returncode == 0, result
     measured = objects(result.stdout)[0]
     print(result.stdout)
     assert SANITIZED or measured['state_hz'] == pytest.approx(100, abs=3)
-    assert measured['round_trip_us']['count'] > 100 and measured['unanswered'] == 0
-    assert measured['confirmation_us']['count'] > 5 and measured['unconfirmed'] == 0
+    assert measured['round_trip_us']['count'] > 20 and measured['unanswered'] == 0
+    assert measured['confirmation_us']['count'] > 1 and measured['unconfirmed'] == 0
     assert measured['lost'] == 0 and measured['damaged'] == 0
     assert run('bench', board.host_url, '--duration', '0.3').returncode == 0
 

@@ -13,7 +13,7 @@ import time
 
 import pytest
 
-from r4_process import ERROR, PATIENCE_S, PROMPT, Board, driving, lasts, run
+from r4_process import ERROR, METRICS, PATIENCE_S, PROMPT, Board, driving, lasts, run
 from web_client import BINARY, CLOSE, Page, Refused, Web, WebSocket
 
 USAGE, OPEN = 2, 4
@@ -75,7 +75,8 @@ def test_the_page_comes_with_what_keeps_foreign_scripts_out():
         assert web.get('/../web.cpp')[0] == web.get('/nothing')[0] == 404
         only_head = web.request(b'HEAD / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n')
         assert only_head == head + b'\r\n\r\n'
-        assert b'r4_up' in web.get('/metrics')[1]
+        status, text = web.get('/metrics')
+        assert b'r4_up' in text if METRICS else status == 501
 
 
 def test_one_browser_controls_and_the_others_watch():
@@ -332,7 +333,7 @@ def test_other_computers_need_the_token():
             assert page.protocol == 'r4.web.v1'
         assert web.get('/')[0] == 200
         assert web.get('/metrics')[0] == web.get('/metrics', 'Authorization: Bearer 0\r\n')[0] == 401
-        assert web.get('/metrics', f'Authorization: Bearer {token}\r\n')[0] == 200
+        assert web.get('/metrics', f'Authorization: Bearer {token}\r\n')[0] == (200 if METRICS else 501)
         with WebSocket(web.port, f'/?token={token}', ['foxglove.websocket.v1'], Host='10.1.2.3:80') as foxglove:
             assert foxglove.receive()[0] == 1
 
@@ -402,13 +403,13 @@ def test_hostile_clients_disturb_nobody():
         page.drive()
         board.outputs(motor_is_driven)
         before = web.resident_kib()
-        # A program of its own: here it would keep the page from saying that it is alive.
-        attack = [sys.executable, TESTS / 'integration/hostile_clients.py', str(web.port), seed, str(HOSTILE_S)]
+        # A program of its own, which waits for the others: it must not keep the page from saying that it is alive.
+        attack = ['nice', '-n', '19', sys.executable, TESTS / 'integration/hostile_clients.py', str(web.port), seed, str(HOSTILE_S)]
         with subprocess.Popen(attack, stdout=subprocess.PIPE, text=True) as attackers:
             board.never('SAFE', HOSTILE_S)
             done = int(attackers.communicate()[0])
         print(f'{done} hostile connections in {HOSTILE_S:.0f} s')
-        assert done > 50 * HOSTILE_S or not PROMPT
+        assert done > 20 * HOSTILE_S or not PROMPT
         result = page.ask(type='command', board=0, command='O:100,1,1')
         assert result['ok'], result
         assert web.resident_kib() - before < 16384 or not PROMPT, (before, web.resident_kib())

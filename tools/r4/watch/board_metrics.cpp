@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "board_metrics.hpp"
 
-#include <prometheus/text_serializer.h>
-
 #include <array>
 #include <chrono>
 #include <utility>
@@ -15,7 +13,7 @@ namespace r4::tool {
 namespace {
 
 MetricLabels with(MetricLabels labels, const char* name, std::string value) {
-  labels.push_back({name, std::move(value)});
+  labels.emplace_back(name, std::move(value));
   return labels;
 }
 
@@ -117,10 +115,6 @@ void describe(const MetricBoard& each, MetricFamilies& out) {
     out.gauge("r4_analog_volts", "An analog input.",
               with(one, "input", std::string(name.data(), name.size())), state.volts(input));
   }
-}
-
-std::string MetricFamilies::text() const {
-  return prometheus::TextSerializer().Serialize(families_);
 }
 
 }  // namespace r4::tool

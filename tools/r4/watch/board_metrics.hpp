@@ -2,8 +2,7 @@
 // What Prometheus is told of boards, by r4 metrics and r4 web.
 #pragma once
 
-#include <prometheus/metric_family.h>
-
+#include <cstdint>
 #include <map>
 #include <string>
 #include <utility>
@@ -13,7 +12,25 @@
 
 namespace r4::tool {
 
-using MetricLabels = std::vector<prometheus::ClientMetric::Label>;
+using MetricLabels = std::vector<std::pair<std::string, std::string>>;
+
+// True if this build can write metrics: CMake's option R4_METRICS.
+bool has_metrics();
+// Throws Error if it cannot.
+void require_metrics();
+
+enum class MetricKind : std::uint8_t { gauge, counter };
+
+struct MetricFamily {
+  struct Metric {
+    MetricLabels labels;
+    double value;
+  };
+  std::string name;
+  std::string help;
+  MetricKind kind;
+  std::vector<Metric> metrics;
+};
 
 // The families of one answer, by name.
 class MetricFamilies {
@@ -23,35 +40,23 @@ class MetricFamilies {
     counter(name, help, std::move(labels), static_cast<double>(value));
   }
   void gauge(const char* name, const char* help, MetricLabels labels, double value) {
-    prometheus::ClientMetric metric;
-    metric.label = std::move(labels);
-    metric.gauge.value = value;
-    add(name, help, prometheus::MetricType::Gauge, std::move(metric));
+    add(name, help, MetricKind::gauge, {std::move(labels), value});
   }
   void counter(const char* name, const char* help, MetricLabels labels, double value) {
-    prometheus::ClientMetric metric;
-    metric.label = std::move(labels);
-    metric.counter.value = value;
-    add(name, help, prometheus::MetricType::Counter, std::move(metric));
+    add(name, help, MetricKind::counter, {std::move(labels), value});
   }
-  // In the text format of Prometheus.
+  // In the text format of Prometheus. Throws Error as require_metrics() does.
   std::string text() const;
 
  private:
-  void add(const char* name, const char* help, prometheus::MetricType type,
-           prometheus::ClientMetric metric) {
+  void add(const char* name, const char* help, MetricKind kind, MetricFamily::Metric metric) {
     const auto [known, fresh] = index_.try_emplace(name, families_.size());
-    if (fresh) {
-      families_.emplace_back();
-      families_.back().name = name;
-      families_.back().help = help;
-      families_.back().type = type;
-    }
-    families_[known->second].metric.push_back(std::move(metric));
+    if (fresh) families_.push_back({name, help, kind, {}});
+    families_[known->second].metrics.push_back(std::move(metric));
   }
 
   std::map<std::string, std::size_t> index_;
-  std::vector<prometheus::MetricFamily> families_;
+  std::vector<MetricFamily> families_;
 };
 
 // A board under the URL that the user gave: the same whenever the program is started.

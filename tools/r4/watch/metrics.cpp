@@ -136,7 +136,10 @@ class MetricsCommand final : web::ServerEvents {
   web::Server server_;
 };
 
-int serve_metrics(const MetricsOptions& options) { return MetricsCommand(options).run(options); }
+int serve_metrics(const MetricsOptions& options) {
+  require_metrics();
+  return MetricsCommand(options).run(options);
+}
 
 constexpr const char* metrics_footer =
     R"(Answers Prometheus at http://127.0.0.1:9618/metrics (docs/metrics.md): of each board whether it is heard,

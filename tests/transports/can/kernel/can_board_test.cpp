@@ -23,7 +23,6 @@ class CanBoard : public testing::TestWithParam<Form> {};
 INSTANTIATE_TEST_SUITE_P(Forms, CanBoard,
                          testing::Values(Form{"plain", "can://vcan0?node=9", "&pack=0", false},
                                          Form{"packed", "can://vcan0?node=9", "", true},
-                                         Form{"fd", "can://vcan0?node=9&fd=1", "&pack=0", false},
                                          Form{"fd_packed", "can://vcan0?node=9&fd=1", "", true}),
                          [](const auto& form) { return std::string(form.param.name); });
 

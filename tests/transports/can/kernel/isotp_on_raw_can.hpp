@@ -21,6 +21,13 @@ constexpr std::uint32_t flow_control_id = 0x200;
 constexpr std::uint32_t patience_us = 2000000;
 constexpr std::uint32_t start_limit_us = 10000000;  // of a transfer; a program may send it
 
+// The lengths to try: each one in which single frames end or sequence numbers begin again, then every 17th, so that last
+// frames of all sizes come up. Isotp.EveryLengthInEveryFrameLengthArrives tries all lengths, without a bus.
+constexpr std::uint32_t longest_datagram = 1024;
+constexpr std::uint32_t next_length(std::uint32_t size) {
+  return size < 136 || size >= longest_datagram ? size + 1 : std::min(size + 17, longest_datagram);
+}
+
 // How both ends make their frames.
 struct Form {
   const char* name;

@@ -105,6 +105,10 @@ class Server::Impl::Exchange : public std::enable_shared_from_this<Exchange> {
     const Verdict verdict =
         server_.access.check_token(view(request[http::field::authorization]), target, {});
     if (verdict != Verdict::allowed) return refuse(http::status::unauthorized, to_text(verdict));
+    if (server_.offer == Offer::page) {
+      return refuse(http::status::not_implemented,
+                    "this build of r4 does not have metrics (R4_METRICS=OFF)");
+    }
     server_.ask_metrics(*this);
   }
 

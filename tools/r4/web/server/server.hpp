@@ -20,7 +20,7 @@ namespace r4::tool::web {
 
 using ClientId = std::uint32_t;
 enum class Protocol : std::uint8_t { page, foxglove };
-enum class Offer : std::uint8_t { page_and_metrics, metrics };
+enum class Offer : std::uint8_t { page_and_metrics, metrics, page };
 
 struct ServerOptions {
   ListenAddress address;

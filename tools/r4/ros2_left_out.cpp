@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// In the place of services.cpp: of a build with -DR4_ROS2=OFF.
+#include "r4link/error.hpp"
+#include "ros2/bridge.hpp"
+
+namespace r4::tool::ros2 {
+
+int run_bridge(const BridgeOptions&) {
+  throw Error(
+      ErrorKind::unsupported, "r4 ros2", "this build of r4 does not have it (R4_ROS2=OFF)",
+      "install Cyclone DDS (Debian and Ubuntu: cyclonedds-dev cyclonedds-tools), and build r4 "
+      "with cmake -DR4_ROS2=ON");
+}
+
+}  // namespace r4::tool::ros2
