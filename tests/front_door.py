@@ -32,9 +32,9 @@ def workflow_faults(content):
                 yield f'job {name}: a step either runs or uses something'
         used = set(re.findall(r'matrix\.([\w-]+)', str(job)))
         rows = job.get('strategy', {}).get('matrix', {})
-        for row in rows.get('include', [rows]):
-            if not used <= set(row):
-                yield f'job {name}: a row of its matrix lacks {", ".join(sorted(used - set(row)))}'
+        known = set(rows).union(*rows.get('include', ()))  # a row may lack what is empty then
+        if not used <= known:
+            yield f'job {name}: its matrix has no {", ".join(sorted(used - known))}'
         if job.get('needs') and job['needs'] not in content['jobs']:
             yield f'job {name} needs {job["needs"]}, which is not there'
 

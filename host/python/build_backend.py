@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Builds the Python package (PEP 517) with nothing but cmake and Python itself, so also without a network.
 
-The module links libraries of the system (tools/setup), so this wheel is for the same system; tools/wheel makes one that
-carries its libraries. R4_BUILD=FOLDER takes the package from that build folder.
+The module links libraries of the system (tools/setup --python), so this wheel is for the same system; tools/wheel makes
+one that carries its libraries. R4_BUILD=FOLDER takes the package from that build folder, and builds it there if needed.
 """
 import base64
 import hashlib
@@ -39,7 +39,7 @@ Requires-Python: {PROJECT['requires-python']}
 def _run(*command):
     ended = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
     if ended.returncode != 0:
-        sys.exit(f'{ended.stdout}\n{" ".join(command)} failed\n  fix: tools/setup installs what the build needs')
+        sys.exit(f'{ended.stdout}\n{" ".join(command)} failed\n  fix: tools/setup --python installs what the build needs')
 
 
 def configure(folder):
@@ -57,6 +57,8 @@ def _built():
         folder = pathlib.Path(given or temporary)
         if not given:
             configure(folder)
+        elif 'R4_PYTHON:BOOL=ON' not in (folder / 'CMakeCache.txt').read_text():  # what tools/build leaves out
+            _run('cmake', '-DR4_PYTHON=ON', str(folder))
         _run('cmake', '--build', str(folder), '--target', 'r4_python')
         package = folder / 'python'
         for path in sorted([*package.glob('r4link/*'), package / 'r4link_pytest.py']):

@@ -41,7 +41,7 @@ class RecordedBoard(NamedTuple):
 
     def to_pandas(self) -> Any:
         """The states as a pandas.DataFrame, by time."""
-        import pandas  # type: ignore[import]
+        import pandas  # type: ignore
         frame = pandas.DataFrame(self.states)
         frame['time'] = frame['time'].dt.tz_localize('UTC')
         return frame.set_index('time')

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""tools/setup on releases that are made up of programs in place of apt's, and what tools/on says when it cannot."""
+import os
+import pathlib
+import re
+import subprocess
+
+import pytest
+
+TOOLS = pathlib.Path(__file__).resolve().parents[2] / 'tools'
+PRODUCT = {'g++', 'cmake', 'ninja-build', 'pkg-config', 'libasio-dev', 'libboost-dev', 'libserialport-dev',
+           'libnl-route-3-dev', 'libfmt-dev', 'libdeflate-dev', 'libzstd-dev', 'liblz4-dev', 'libcli11-dev',
+           'nlohmann-json3-dev', 'prometheus-cpp-dev', 'cyclonedds-dev', 'cyclonedds-tools'}
+PARTS = {'prometheus-cpp-dev', 'cyclonedds-dev', 'cyclonedds-tools'}
+UNIT_TESTS = {'libgtest-dev', 'librapidcheck-dev', 'libbenchmark-dev', 'python3', 'python3-pytest', 'libpython3-dev',
+              'pybind11-dev'}
+
+
+class Release:
+    """A system with some packages installed, some in its archive, in a folder that comes first on the PATH."""
+
+    def __init__(self, folder, archive, installed=(), version='9.0'):
+        self._log = folder / 'installed'
+        self._path = folder
+        there = '\n'.join(f'installed amd64 {each} 1:9.0' for each in installed)
+        self._program('dpkg-query', f"cat <<'END'\n{there}\nEND")
+        known = '\n'.join(f'{each}:\n  Installed: (none)\n  Candidate: 1:{version}\n' for each in archive)
+        self._program('apt-cache', f"cat <<'END'\n{known}\nEND")
+        self._program('apt-get', f'case "$*" in *install*) echo "$*" >>"{self._log}" ;; esac')
+        self._program('sudo', 'exec "$@"')
+        self._program('dpkg', '''case "$1" in
+          --print-architecture) echo amd64 ;;
+          --print-foreign-architectures) echo arm64 ;;
+          *) exec /usr/bin/dpkg "$@" ;;
+        esac''')
+
+    def _program(self, name, script):
+        path = self._path / name
+        path.write_text(f'#!/bin/bash\n{script}\n')
+        path.chmod(0o755)
+
+    def set_up(self, *options, **variables):
+        """(The run, the packages that it would have installed)"""
+        ended = subprocess.run([TOOLS / 'setup', *options], capture_output=True, text=True, check=False,
+                               env={**os.environ, 'PATH': f'{self._path}:/usr/bin:/bin', **variables})
+        said = self._log.read_text() if self._log.exists() else ''
+        return ended, set(said.partition('--no-install-recommends ')[2].split())
+
+
+def test_a_build_installs_only_what_the_product_needs(tmp_path):
+    ended, installed = Release(tmp_path, PRODUCT | UNIT_TESTS | {'libfastdds-dev'}).set_up()
+    assert ended.returncode == 0, ended.stderr
+    assert installed == PRODUCT
+
+
+def test_nothing_is_installed_where_all_is_there(tmp_path):
+    ended, installed = Release(tmp_path, (), PRODUCT).set_up()
+    assert (ended.returncode, installed) == (0, set())
+    assert f'all {len(PRODUCT)} packages are there' in ended.stdout
+
+
+@pytest.mark.parametrize('name', ['libfastdds-dev', 'libfastrtps-dev'])
+def test_a_package_is_taken_by_the_name_that_the_release_has(tmp_path, name):
+    ended, installed = Release(tmp_path, UNIT_TESTS | {name}, PRODUCT).set_up('--test')
+    assert ended.returncode == 0, ended.stderr
+    assert installed == UNIT_TESTS | {name}
+
+
+def test_a_peer_of_a_test_that_the_release_has_not_is_skipped_and_named(tmp_path):
+    ended, installed = Release(tmp_path, UNIT_TESTS, PRODUCT).set_up('--test')
+    assert ended.returncode == 0, ended.stderr
+    assert installed == UNIT_TESTS
+    assert re.search(r'skipped.*libfastdds-dev', ended.stderr)
+
+
+def test_what_the_product_needs_is_named_by_library_and_version_where_there_is_no_package(tmp_path):
+    ended, installed = Release(tmp_path, PRODUCT - {'libfmt-dev'}).set_up()
+    assert (ended.returncode, installed) == (1, set())
+    assert re.match(r'tools/setup: this release has no package libfmt-dev, or too old a one\n  fix: install .*fmt 8\.1', ended.stderr,
+                    re.DOTALL)
+
+
+def test_a_part_of_the_product_is_skipped_where_its_library_is_too_old(tmp_path):
+    ended, installed = Release(tmp_path, {'cyclonedds-dev', 'cyclonedds-tools'}, PRODUCT - PARTS, '0.8.2').set_up()
+    assert (ended.returncode, installed) == (0, set())
+    assert re.search(r'skipped.*prometheus-cpp-dev cyclonedds-dev cyclonedds-tools', ended.stderr)
+
+
+def test_for_another_architecture_the_compiler_is_a_cross_compiler_and_libraries_are_its_own(tmp_path):
+    libraries = {each for each in PRODUCT if each.endswith('-dev')} - {'libasio-dev'}
+    archive = PRODUCT | {f'{each}:arm64' for each in libraries} | {'g++-aarch64-linux-gnu'}
+    ended, installed = Release(tmp_path, archive).set_up(R4_ARCH='arm64')
+    assert ended.returncode == 0, ended.stderr
+    assert installed == (PRODUCT - libraries - {'g++'}) | {f'{each}:arm64' for each in libraries} | {'g++-aarch64-linux-gnu'}
+
+
+@pytest.mark.parametrize('arguments, words', [
+    (['debian11', 'true'], ['debian11 is not a release', 'debian12']),
+    (['debian12/mips', 'true'], ['mips is not an architecture', 'arm64']),
+    (['debian12'], ['no command', 'tools/demo']),
+    (['debian12', '--see', '/nowhere', 'true'], ['/nowhere is not a folder']),
+    (['debian12', '--dirty', 'true'], ['--dirty is not an option', '--help']),
+    (['--all', 'debian11'], ['debian11 is neither', 'debian12']),
+])
+def test_on_says_what_is_wrong_with_its_options(arguments, words):
+    ended = subprocess.run([TOOLS / 'on', *arguments], capture_output=True, text=True, check=False)
+    assert ended.returncode == 2
+    assert re.match(r'tools/on: .+\n  fix: .+\n$', ended.stderr), ended.stderr
+    assert all(word in ended.stderr for word in words), ended.stderr
+
+
+def test_on_names_the_package_of_a_program_that_is_missing(tmp_path):
+    for program in ('bash', 'dirname', 'dpkg', 'uname'):
+        (tmp_path / program).symlink_to(f'/usr/bin/{program}')
+    ended = subprocess.run([TOOLS / 'on', 'debian12', 'true'], capture_output=True, text=True, check=False,
+                           env={'PATH': str(tmp_path), 'HOME': str(tmp_path)})
+    assert (ended.returncode, ended.stderr) == (
+        6, 'tools/on: mmdebstrap is not installed\n  fix: apt-get install mmdebstrap\n')
