@@ -21,7 +21,7 @@ if [[ "${1-}" == --apt ]]; then
   export DEBIAN_FRONTEND=noninteractive
   apt=(apt-get -q -y --no-install-recommends -o DPkg::Options::=--force-unsafe-io)
   step 'install' "${apt[@]}" install ./*.deb
-  step 'what the steps use' "${apt[@]}" install bash-completion cmake fish g++ libasio-dev man-db systemd tshark udev zsh
+  step 'what the steps use' "${apt[@]}" install bash-completion cmake fish g++ libasio-dev make man-db systemd tshark udev zsh
 else
   step 'install' dpkg --force-unsafe-io --install ./*.deb
 fi
