@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What test_can_wires.py runs where SocketCAN is: r4 bridge between UDP and a bus."""
+"""What test_can.py runs where SocketCAN is: r4 bridge between UDP and a bus."""
 from can_inside import EMERGENCY, Dump, ip
 from r4_process import PATIENCE_S, Board, Running, driving, run
 

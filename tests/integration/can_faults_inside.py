@@ -13,7 +13,7 @@ import time
 
 import pytest
 
-from can_inside import SAFE_WITHIN_MS, Dump, in_control
+from can_inside import SAFE_WITHIN_MS, SLOWLY, Dump, in_control
 from r4_process import PATIENCE_S, Board, Running, is_link, is_state, lasts, monitor, objects, run
 from slcan_bus import SlcanBus
 
@@ -25,6 +25,7 @@ OF_HOST = (STOP, COMMAND, FLOOD)
 # interface is back and sends ten heartbeats a second; the rest is the emulated machine's.
 BACK_WITHIN_S = 2
 DRIVING, OFF = [358, 1], [0, 0]
+LOAD_WITHIN = 0.1  # the bus is watched a little longer than r4 bus listens
 
 
 @pytest.fixture(name='bus')
@@ -36,7 +37,7 @@ def running_bus():
 @pytest.fixture(name='board')
 def running_board(bus):
     assert bus.interfaces == ['slcan0', 'slcan1']
-    with Board(BOARD) as board:
+    with Board(BOARD, options=SLOWLY) as board:
         yield board
 
 
@@ -77,33 +78,20 @@ def streams_again(host, since):
     print(f'streams again after {(state["came"] - since) * 1000:.0f} ms')
 
 
-def test_a_board_streams_and_obeys_on_a_bus_with_bit_time(bus, board):
+def test_a_board_obeys_on_a_bus_with_bit_time_and_the_load_that_is_shown_is_the_time_that_the_bus_was_taken(bus, board):
     result = run('send', HOST, 'O:358,1,1', 'S:1500,16', 'Q:ID', timeout=60)
     assert result.returncode == 0, result
     with monitor(HOST) as host:
         in_control(host)
         before = bus.status()
-        states = [host.next(is_state) for _ in range(200)]
-        after = bus.status()
-    took_ms = states[-1]['t'] - states[0]['t']
-    load = (after['busy_us'] - before['busy_us']) / (after['t_us'] - before['t_us'])
-    print(f'{1000 * 199 / took_ms:.1f} states/s, load {100 * load:.1f} %, '
-          f'{after["frames"] - before["frames"]} frames')
-    assert took_ms < 1.5 * 1990  # a slow emulated machine shows the newest of several
-    assert after['failed'] == 0
-
-
-def test_the_load_that_is_shown_is_the_time_that_the_bus_was_taken(bus, board):
-    with monitor(HOST) as host:
-        in_control(host)
-        before = bus.status()
-        *_, shown = objects(run('bus', 'can://slcan1', '--json', '--duration', '4', timeout=60).stdout)
+        *_, shown = objects(run('bus', 'can://slcan1', '--json', '--duration', '3', timeout=60).stdout)
         after = bus.status()
     busy_us, t_us, frames = (after[each] - before[each] for each in ('busy_us', 't_us', 'frames'))
     print(f'load {100 * shown["load"]:.2f} %, by the bus {100 * busy_us / t_us:.2f} %; '
           f'a frame {1e6 * shown["load"] / shown["frames"]:.2f} us, by the bus {busy_us / frames:.2f} us')
     assert shown['bitrate'] == BITRATE  # as the controller has it: nobody said
-    assert abs(shown['load'] / (busy_us / t_us) - 1) < 0.05
+    assert after['failed'] == 0
+    assert abs(shown['load'] / (busy_us / t_us) - 1) < LOAD_WITHIN
     assert abs(1e6 * shown['load'] / shown['frames'] / (busy_us / frames) - 1) < 0.01
 
 
@@ -205,24 +193,24 @@ def test_a_host_alone_is_told_that_nobody_acknowledges(bus, board):
         assert bus.status()['nodes'][1]['state'] != 'b'
 
 
-@pytest.mark.parametrize('percent', [1, 5])
-def test_damaged_frames_cost_time_and_no_datagram(bus, board, percent):
-    with monitor(HOST, '--duration', '30') as host:
-        in_control(host)
-        before = bus.status()
-        bus.order('noise', percent / 100)
-        for _ in range(200):
-            host.next(is_state)
-        status = bus.status()
-        bus.order('noise', 0)
-        log = host.rest()
-    result = run('send', HOST, *(f'S:{1000 + i},{1 + i % 16}' for i in range(5)), timeout=60)
+def test_damaged_frames_cost_time_and_no_datagram(bus):
+    with Board(BOARD):
+        with monitor(HOST, '--duration', '30') as host:
+            in_control(host)
+            before = bus.status()
+            bus.order('noise', 0.05)
+            for _ in range(100):
+                host.next(is_state)
+            status = bus.status()
+            bus.order('noise', 0)
+            log = host.rest()
+        result = run('send', HOST, *(f'S:{1000 + i},{1 + i % 16}' for i in range(5)), timeout=60)
     assert result.returncode == 0, result
     failed, frames = (status[each] - before[each] for each in ('failed', 'frames'))
     transfers = next(each['fields'] for each in log if each['type'] == 'transfers')
     print(f'{failed} of {frames} frames damaged, {transfers}')
-    assert frames >= 1000 and failed >= percent  # it is a matter of chance: ten times as many are likely
-    assert transfers['packed'] >= 200
+    assert frames >= 500 and failed >= 5  # it is a matter of chance: five times as many are likely
+    assert transfers['packed'] >= 100
     # Neither timed_out nor interrupted: where an end stands still for more than the 20 ms of N_Bs, and the guest's do,
     # the other gives its transfer up and begins the next, with noise or without.
     lost = ('wrong_sequence', 'overflow', 'malformed', 'bad_form', 'dropped_frames')

@@ -13,7 +13,7 @@ import urllib.request
 
 import pytest
 
-from r4_process import (DATA, ERROR, METRICS, PATIENCE_S, R4, Board, Running, driving, is_link, is_state, lasts, monitor,
+from r4_process import (DATA, ERROR, METRICS, PATIENCE_S, Board, Running, driving, is_link, is_state, lasts, monitor,
                         objects, run, stop_takes_ms, watch)
 
 # The board's timeout, what docs/safety.md promises on top, and what an emulated machine may take.
@@ -27,24 +27,43 @@ def ip(*arguments):
     subprocess.run(['ip', *arguments], check=True)
 
 
-@pytest.fixture(name='board', params=['vcan', 'controllers'])
-def on_a_bus(request):
-    """A board, on a bus in the kernel in plain text, and packed on one of two controllers with their driver."""
-    if request.param == 'vcan':
-        board = Board(BUS)
-        board.bus, board.packs = 'vcan0', False
-        board.host_url = IN_PLAIN_TEXT
-    else:  # each frame costs the emulated machine some 100 us: fewer frames
-        board = Board('can://can0?node=3')
-        board.bus, board.packs = 'can1', True
-        board.host_url = 'can://can1?node=3'
-    with board:
+# Every frame costs the emulated machine some 100 us, and a state in plain text has 25. A rate that leaves it time is
+# enough where the rate is not what is tested: 100 Hz is tests/simulation/can_capacity_test.cpp's, in virtual time.
+PERIOD_MS = 50
+SLOWLY = ('--set', f'rate,{1000 // PERIOD_MS}')
+
+
+def on_vcan():
+    """A board on a bus in the kernel, whose hosts speak plain text."""
+    board = Board(BUS, options=SLOWLY)
+    board.bus, board.packs = 'vcan0', False
+    board.host_url = IN_PLAIN_TEXT
+    return board
+
+
+def on_controllers():
+    """A board at one of two controllers with their driver, whose hosts are at the other and speak the packed form."""
+    board = Board('can://can0?node=3', options=SLOWLY)
+    board.bus, board.packs = 'can1', True
+    board.host_url = 'can://can1?node=3'
+    return board
+
+
+@pytest.fixture(name='either_board', params=[on_vcan, on_controllers])
+def on_each_bus(request):
+    with request.param() as board:
+        yield board
+
+
+@pytest.fixture(name='board')
+def beyond_a_controller():
+    with on_controllers() as board:
         yield board
 
 
 @pytest.fixture(name='vcan_board')
-def on_vcan():
-    with Board(BUS) as board:
+def beside_its_hosts():
+    with Board(BUS, options=SLOWLY) as board:
         yield board
 
 
@@ -98,33 +117,30 @@ class Dump:
         self.process.wait()
 
 
-def elsewhere(board):
-    """Where a program of another computer would be, and why it is refused."""
-    return [('can://can0?node=3', 'another host')] if board.bus == 'can1' else []
-
-
 def in_control(host):
     host.next(is_link('active'))
     return host.next(lambda each: is_state(each) and 'CMD' in each['fields'])
 
 
-def test_streams_its_state_on_the_grid(board):
-    with monitor(board.host_url) as host:
+def test_streams_its_state_on_the_grid(either_board):
+    with monitor(either_board.host_url) as host:
         in_control(host)
-        states = [host.next(is_state) for _ in range(200)]
+        states = [host.next(is_state) for _ in range(20)]
         assert host.end() == 0
     times = [each['t'] for each in states]
-    assert all((later - earlier) % 10 == 0 for earlier, later in zip(times, times[1:]))
-    assert len(states) > 0.9 * (times[-1] - times[0]) / 10
-    assert states[0]['transport'] == board.host_url
+    assert times == sorted(set(times)) and {time % PERIOD_MS for time in times} == {times[0] % PERIOD_MS}
+    assert states[0]['transport'] == either_board.host_url
 
 
-def test_commands_are_confirmed_by_the_boards_state(board):
-    result = run('send', board.host_url, 'O:358,1,1', 'S:1500,16', 'Q:ID', timeout=60)
+def test_commands_are_confirmed_by_the_boards_state_and_a_refusal_comes_back(either_board):
+    result = run('send', either_board.host_url, 'O:358,1,1', 'S:1500,16', 'Q:ID', timeout=60)
     assert result.returncode == 0, result
     assert 'board sim-1' in result.stdout
-    board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
-    board.outputs(lambda outputs: outputs['servo'][15] == 1498)
+    either_board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
+    either_board.outputs(lambda outputs: outputs['servo'][15] == 1498)
+    result = run('send', either_board.host_url, 'E:STOP', 'O:1,1,1', timeout=60)
+    assert result.returncode == 3 and 'SAFE' in result.stderr, result
+    assert ERROR.search(result.stderr), result.stderr
 
 
 def test_the_next_host_need_not_wait_for_the_timeout(board):
@@ -137,22 +153,7 @@ def test_the_next_host_need_not_wait_for_the_timeout(board):
         board.state('SAFE', 'link')
 
 
-def test_a_refusal_comes_back(board):
-    result = run('send', board.host_url, 'E:STOP', 'O:1,1,1', timeout=60)
-    assert result.returncode == 3 and 'SAFE' in result.stderr, result
-    assert ERROR.search(result.stderr), result.stderr
-
-
-def test_a_killed_host_leaves_the_board_safe_in_time(board):
-    with monitor(board.host_url) as host:
-        in_control(host)
-        host.signal(signal.SIGKILL)
-        safe = board.state('SAFE', 'link')
-    print(f'silence to safe {safe["silence"]} ms')
-    assert 1000 <= safe['silence'] <= SAFE_WITHIN_MS
-
-
-def test_a_host_that_was_held_up_goes_on_by_itself(board):
+def test_a_host_that_was_held_up_goes_on_by_itself_and_a_killed_one_leaves_the_board_safe_in_time(board):
     with monitor(board.host_url) as host:
         in_control(host)
         host.signal(signal.SIGSTOP)
@@ -161,6 +162,10 @@ def test_a_host_that_was_held_up_goes_on_by_itself(board):
         board.state('ACTIVE')
         host.skip_past()
         host.next(is_state)
+        host.signal(signal.SIGKILL)
+        safe = board.state('SAFE', 'link')
+    print(f'silence to safe {safe["silence"]} ms')
+    assert 1000 <= safe['silence'] <= SAFE_WITHIN_MS
 
 
 def test_a_stop_is_one_frame_of_top_priority_and_is_told_in_one(board):
@@ -185,11 +190,11 @@ def test_another_host_is_refused_while_the_first_is_there(board):
     with monitor(board.host_url) as first:
         in_control(first)
         # From this computer, and from another on the same bus.
-        here = f'controlled by r4 (pid {first.process.pid})'
-        for url, why in [(board.host_url, here), *elsewhere(board)]:
-            result = run('send', url, '--timeout', '2', 'O:358,1,1', timeout=60)
-            assert result.returncode == 3 and why in result.stderr, result
-            result = run('bench', url, '--duration', '1', timeout=60)
+        for command, where, why in (
+                (('send', '--timeout', '2', 'O:358,1,1'), 'can1', f'controlled by r4 (pid {first.process.pid})'),
+                (('send', '--timeout', '2', 'O:358,1,1'), 'can0', 'another host'),
+                (('bench', '--duration', '0.5'), 'can0', 'another host')):
+            result = run(command[0], f'can://{where}?node=3', *command[1:], timeout=60)
             assert result.returncode == 3 and why in result.stderr, result
         first.skip_past()
         first.next(is_state)
@@ -203,16 +208,15 @@ def test_another_host_is_refused_while_the_first_is_there(board):
     assert result.returncode == 0, f'control is free again: {result}'
 
 
-@pytest.mark.parametrize('url, host_url', [(BUS, BUS), ('can://can0?node=3', 'can://can1?node=3')])
-def test_a_restarted_board_is_taken_up_again(url, host_url):
+def test_a_restarted_board_is_taken_up_again():
     with contextlib.ExitStack() as stack:
-        first = stack.enter_context(Board(url))
-        host = stack.enter_context(monitor(host_url))
+        first = stack.enter_context(on_controllers())
+        host = stack.enter_context(monitor(first.host_url))
         in_control(host)
         first.signal(signal.SIGKILL)
         first.wait()
         host.next(lambda each: each['type'] == 'link' and each['fields']['state'] != 'active', timeout=20)
-        stack.enter_context(Board(url))
+        stack.enter_context(on_controllers())
         host.next(is_link('active'), timeout=20)
 
 
@@ -222,14 +226,14 @@ def test_packed_and_fd_take_fewer_frames(vcan_board):
             in_control(host)
             host.next(is_state)
             dump.frames.clear()
-            for _ in range(100):
+            for _ in range(20):
                 host.next(is_state)
-            return len([data for frame, data in dump.frames if frame == TELEMETRY]) / 100
+            return len([data for frame, data in dump.frames if frame == TELEMETRY]) / 20
 
     plain = frames_a_state(IN_PLAIN_TEXT)
     packed = frames_a_state(BUS)
-    measured = objects(run('bench', vcan_board.host_url, '--duration', '2', '--json', timeout=60).stdout)[0]
-    assert measured['transfers']['packed'] > 50 and measured['transfers']['bad_form'] == 0
+    measured = objects(run('bench', vcan_board.host_url, '--duration', '1', '--json', timeout=60).stdout)[0]
+    assert measured['transfers']['packed'] > 5 and measured['transfers']['bad_form'] == 0
     print(f'{plain:.1f} frames a state plain, {packed:.1f} packed')
     assert 3 * packed < plain  # 24 and 5, some of them of heartbeats
     assert run('send', BUS, 'C:pack,0', timeout=60).returncode == 0
@@ -237,13 +241,13 @@ def test_packed_and_fd_take_fewer_frames(vcan_board):
 
 
 def test_can_fd_carries_a_plain_state_in_three_frames_and_a_packed_one_in_one():
-    with Board('can://vcan0?node=3&fd=1') as board, Dump('vcan0') as dump:
+    with Board('can://vcan0?node=3&fd=1', options=SLOWLY) as board, Dump('vcan0') as dump:
         with monitor(board.host_url + '&pack=0') as host:
             in_control(host)
-            for _ in range(50):
+            for _ in range(20):
                 host.next(is_state)
         states = [data for frame, data in dump.frames if frame == TELEMETRY and len(data) > 100]
-        assert len(states) > 100
+        assert len(states) > 40
         dump.frames.clear()
         result = run('send', board.host_url, 'O:358,1,1', timeout=60)
         assert result.returncode == 0, result
@@ -282,11 +286,10 @@ def test_first_steps_in_either_order(vcan_board):
 
     with watch(BUS) as early:
         nobody_drives(early)
-        for pwm in (100, 200):
-            sent = run('send', BUS, 'R:1,On', f'O:{pwm},1,1', timeout=60)
-            assert sent.returncode == 0, sent
-            early.next(drives(pwm))
-            nobody_drives(early)
+        sent = run('send', BUS, 'R:1,On', 'O:100,1,1', timeout=60)
+        assert sent.returncode == 0, sent
+        early.next(drives(100))
+        nobody_drives(early)
         with driving(BUS, 'O:358,1,1') as host, watch(BUS) as late:
             for each in (early, late):
                 each.next(drives(358))
@@ -301,13 +304,13 @@ def test_first_steps_in_either_order(vcan_board):
 # As of two computers, where the bus has two ends: they share no wire.
 @pytest.mark.parametrize('url, host_url', [(BUS, BUS), ('can://can0?node=3', 'can://can1?node=3')])
 def test_who_watches_sends_a_frame_of_its_own_and_only_while_nobody_drives(url, host_url):
-    with Board(url), watch(url) as watcher, Dump(url.split('/')[2].split('?')[0]) as dump:
+    with Board(url, options=SLOWLY), watch(url) as watcher, Dump(url.split('/')[2].split('?')[0]) as dump:
         watcher.next(is_state)
         assert {(frame, data) for frame, data in dump.frames if frame in (COMMAND, WATCH)} <= {(WATCH, '')}
         with driving(host_url, 'O:358,1,1'):
             watcher.next(drives(358))
             dump.frames.clear()
-            dump.more(500)
+            dump.more(100)
             assert any(frame == COMMAND for frame, _ in dump.frames)
             assert not any(frame == WATCH for frame, _ in dump.frames)
         watcher.skip_past()
@@ -318,7 +321,7 @@ def test_who_watches_sends_a_frame_of_its_own_and_only_while_nobody_drives(url, 
 def test_what_a_host_of_another_computer_says_is_recorded(tmp_path):
     path = tmp_path / 'drive.r4log'
     said = [re.compile(rf'^[0-9.]+ 1> {what};PNum:\d+;T:\d+;\^0x', re.MULTILINE) for what in ('H:ROS2-R4', 'Q:ID')]
-    with Board('can://can0?node=3'), monitor('can://can0?node=3'), \
+    with Board('can://can0?node=3', options=SLOWLY), monitor('can://can0?node=3'), \
             Running('record', 'can://can1?node=3', '-o', str(path)) as recorder:
         deadline = time.monotonic() + PATIENCE_S
         while not (path.exists() and all(each.search(path.read_text()) for each in said)):
@@ -340,7 +343,7 @@ def test_bus_off_is_safe_at_once_and_a_restart_brings_it_back(vcan_board):
         assert safe['silence'] < 500, 'it waited for the timeout'
         host.next(lambda each: each['type'] == 'link' and not each['fields']['up'])
         subprocess.run(['cansend', 'vcan0', f'{COMMAND:x}#00'], check=True)  # of this machine
-        vcan_board.never('ACTIVE', 1.5)
+        vcan_board.never('ACTIVE', 1)
         error_frame(0x100)  # CAN_ERR_RESTARTED
         back_at = time.monotonic()
         vcan_board.state('ACTIVE')
@@ -375,50 +378,6 @@ def test_garbage_on_every_id_of_ours_harms_nobody(board):
     assert executed and all(command.startswith('F:') for command in executed), executed
 
 
-def test_eight_boards_on_one_bus_each_with_its_host():
-    # At a rate that the emulated machine bears with nine processes, and with patience for frames that
-    # its controllers lose: the backbone at 100 Hz is tests/simulation's, in virtual time.
-    slowly = ('--set', 'rate,20', '--set', 'timeout,3000')
-    with contextlib.ExitStack() as stack:
-        boards = stack.enter_context(Board('can://can0?node=0-7', options=slowly, listens=8))
-        hosts = [stack.enter_context(monitor(f'can://can1?node={node}')) for node in range(8)]
-        for host in hosts:
-            in_control(host)
-        for host in hosts:
-            host.skip_past()
-        for host in hosts:  # all of them, in the same second
-            states = [host.next(is_state) for _ in range(20)]
-            assert all((later['t'] - earlier['t']) % 50 == 0 for earlier, later in zip(states, states[1:]))
-        hosts[5].signal(signal.SIGKILL)
-        safe = boards.next(lambda each: each.get('state') == 'SAFE')
-        assert safe['board'] == 'sim-5' and safe['reason'] == 'link', safe
-        assert 3000 <= safe['silence'] <= 2000 + SAFE_WITHIN_MS
-        for node in (4, 6):
-            hosts[node].skip_past()
-            assert hosts[node].next(is_state)['fields']['SAFE'] == 0
-        assert run('stop', 'can://can1?node=1', timeout=60).returncode == 0
-        stopped = set()
-        while len(stopped) < 8:  # one frame stops all of them
-            stopped.add(boards.state('SAFE', 'stop')['board'])
-
-
-def test_none_of_eight_boards_at_50_hz_is_safe_by_mistake():
-    often = ('--set', 'rate,50')
-    with contextlib.ExitStack() as stack:
-        boards = stack.enter_context(Board('can://vcan0?node=0-7', options=often, listens=8))
-        for node in range(8):
-            stack.enter_context(beside(R4, 'monitor', '--control', f'can://vcan0?node={node}',
-                                       stdout=subprocess.DEVNULL))
-        for _ in range(8):
-            boards.state('ACTIVE')
-        *rows, total = objects(run('bus', 'can://vcan0', '--json', '--duration', '3', timeout=60).stdout)
-        log = boards.rest()
-    rates = [row['frames'] / 5 for row in rows if row['id'] and 0x400 <= row['id'] < 0x408]
-    print(f'{min(rates):.0f} to {max(rates):.0f} states a second, load {100 * total["load"]:.0f} %')
-    assert len(rates) == 8 and min(rates) > 10  # what a slow emulated machine cannot send is replaced
-    assert not any(each.get('state') == 'SAFE' for each in log)
-
-
 def listed_interfaces(is_told):
     """r4 list, again until `is_told` of each board at vcan0: it waits 1.3 s at most, and this machine may be slower."""
     deadline = time.monotonic() + PATIENCE_S
@@ -429,7 +388,7 @@ def listed_interfaces(is_told):
 
 
 def test_a_bus_is_shown_with_all_of_its_boards(tmp_path):
-    with Board('can://vcan0?node=2-4', listens=3), monitor(IN_PLAIN_TEXT) as host:  # to have some load
+    with Board('can://vcan0?node=2-4', listens=3), monitor(IN_PLAIN_TEXT) as host:  # at full rate, to have some load
         in_control(host)
         listed = listed_interfaces(is_told=lambda board: 'board_id' in board)
         boards = listed['vcan0']['boards']
@@ -443,17 +402,17 @@ def test_a_bus_is_shown_with_all_of_its_boards(tmp_path):
         heard = objects(run('monitor', 'can://vcan0', '--json', '--duration', '1.5', timeout=60).stdout)
         assert {each['node'] for each in heard if each['type'] == 'heartbeat'} == {2, 3, 4}
         assert {each['node'] for each in heard if each['type'] == 'state'} == {3}
-        table = run('monitor', 'can://vcan0', '--count', '100', timeout=60).stdout
+        table = run('monitor', 'can://vcan0', '--count', '50', timeout=60).stdout
         assert 'ACTIVE' in table and 'CONNECTING' in table
 
         recording = tmp_path / 'bus.r4log'
-        assert run('record', 'can://vcan0', '-o', str(recording), '--duration', '1.5', timeout=60).returncode == 0
+        assert run('record', 'can://vcan0', '-o', str(recording), '--duration', '2.5', timeout=60).returncode == 0
         [told] = objects(run('info', '--json', str(recording)).stdout)
         assert sorted(each['url'] for each in told['wires']) == [f'can://vcan0?node={node}' for node in (2, 3, 4)]
 
         *rows, total = objects(run('bus', 'can://vcan0', '--json', '--duration', '1', timeout=60).stdout)
         load = {row['id']: row['load'] for row in rows}
-        assert load[TELEMETRY] > 0.1 > load[TELEMETRY - 1] > 0
+        assert load[TELEMETRY] > 3 * load[TELEMETRY - 1] > 0
         assert abs(sum(load.values()) - total['load']) < 1e-9 and total['nearly_full'] is False
         nearly_full = str(round(total['bits'] / 0.9))
         for rate, words in ((nearly_full, 'nearly full'), ('125000', 'more than a bus of 125 kbit/s carries')):
@@ -464,9 +423,9 @@ def test_a_bus_is_shown_with_all_of_its_boards(tmp_path):
             assert warned.returncode == 0 and words in warned.stderr, warned
         host.skip_past()
         host.next(is_state)
-    silent = run('monitor', 'can://vcan0', '--duration', '1', timeout=60)
+    silent = run('monitor', 'can://vcan0', '--duration', '0.3', timeout=60)
     assert silent.returncode == 3 and ERROR.search(silent.stderr), silent
-    silent = run('record', 'can://vcan0', '-o', str(tmp_path / 'silence'), '--duration', '1', timeout=60)
+    silent = run('record', 'can://vcan0', '-o', str(tmp_path / 'silence'), '--duration', '0.3', timeout=60)
     assert silent.returncode == 3 and 'no board was heard' in silent.stderr, silent
 
 
@@ -509,9 +468,9 @@ def test_prometheus_is_told_how_busy_a_bus_is_and_for_whom():
 
 def test_r4_bus_tells_that_it_needs_the_data_bit_rate():
     with beside('cangen', 'vcan0', '-b', '-g', '20'):
-        warned = run('bus', 'can://vcan0', '--duration', '1', timeout=60)
+        warned = run('bus', 'can://vcan0', '--duration', '0.5', timeout=60)
         assert warned.returncode == 0 and '--dbitrate' in warned.stderr, warned
-        told = run('bus', 'can://vcan0', '--duration', '1', '--dbitrate', '5000000', timeout=60)
+        told = run('bus', 'can://vcan0', '--duration', '0.5', '--dbitrate', '5000000', timeout=60)
         assert told.returncode == 0 and told.stderr == '', told
 
 

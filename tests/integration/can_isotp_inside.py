@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What test_can_wires.py runs where SocketCAN is: our ISO-TP engine against the kernel's and can-utils', by can_test.
+"""What test_can.py runs where SocketCAN is: our ISO-TP engine against the kernel's and can-utils', by can_test.
 
 A run in which a test was not executed fails; under a sanitizer, one of those that TESTS names.
 """

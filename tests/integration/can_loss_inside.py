@@ -16,7 +16,7 @@ import zlib
 
 import pytest
 
-from can_inside import EMERGENCY, Dump, beside, in_control, ip
+from can_inside import EMERGENCY, SLOWLY, Dump, beside, in_control, ip
 from r4_process import R4, Board, Running, is_link, is_state, lasts, monitor, objects, run
 
 BOARD, HOST = 'can://vxcan0?node=2', 'can://vxcan1?node=2'
@@ -40,10 +40,10 @@ def netem(*how, ends=('vxcan0', 'vxcan1')):
             subprocess.run(['tc', 'qdisc', 'del', 'dev', interface, 'root'], check=True)
 
 
-# Of 1000 states of five frames, those that arrive differ by 1 % from 0.99^frames in one run of six, for the
-# kernel's dice; from what the part of the frames allows that it really lost, in less than one of ten thousand: their
-# standard deviation is 0.2 %, and that of the part of the frames 0.14 %.
-STATES, NODES, RATE = 1000, 4, 100
+# Of 400 states of five frames, the share that arrives has a standard deviation of 0.35 % around what the share of lost
+# frames allows, and the share of lost frames one of 0.2 %. A datagram that is lost for each one that lost a frame would
+# be 5 %.
+STATES, NODES, RATE = 400, 2, 100
 
 
 def frames_of(first):
@@ -86,7 +86,7 @@ def test_of_telemetry_arrives_what_its_frames_allow(tmp_path):
     with_this_loss = sum((1 - loss) ** count for count in sent) / len(sent)
     print(f'{len(sent)} states of {sum(sent) / len(sent):.2f} frames: {100 * share:.2f} % arrived; of 0.99^frames '
           f'{100 * expected:.2f} %, of the {100 * loss:.2f} % lost {100 * with_this_loss:.2f} %')
-    assert 0.003 < loss < 0.017 and abs(share / with_this_loss - 1) < 0.01
+    assert 0.001 < loss < 0.02 and abs(share / with_this_loss - 1) < 0.02
 
 
 def executed(log):
@@ -113,10 +113,10 @@ def agrees_with_the_board(told, commands, log):
             assert outcome.startswith(('refused', 'not sent')) and times[command] == 0, (command, outcome)
 
 
-@pytest.mark.parametrize('loss, count', [('1%', 40), ('5%', 20)])
+@pytest.mark.parametrize('loss, count', [('1%', 20), ('5%', 20)])
 def test_a_confirmed_command_was_executed_exactly_once(loss, count):
     commands = [f'S:{1000 + i},{1 + i % 16}' for i in range(count)]
-    with netem('loss', loss, 'delay', '2ms'), Board(BOARD) as board, \
+    with netem('loss', loss, 'delay', '2ms'), Board(BOARD, options=SLOWLY) as board, \
             Dump(f'vxcan1,{COMMAND_OF_2}:7FF') as dump:
         result = run('send', HOST, '--json', '--timeout', '10', *commands, timeout=200)
         log = board.rest()
@@ -134,7 +134,7 @@ def test_a_confirmed_command_was_executed_exactly_once(loss, count):
 
 def test_a_command_that_is_not_confirmed_is_reported_and_those_behind_it_are_not_sent():
     commands = [f'S:{1000 + i},{1 + i % 16}' for i in range(300)]
-    with Board(BOARD) as board, \
+    with Board(BOARD, options=SLOWLY) as board, \
             Running('send', HOST, '--json', '--timeout', '3', *commands) as sender:
         board.executed(commands[3])
         with netem('loss', '100%'):
@@ -154,7 +154,7 @@ NUMBERED_STOPS = f'{EMERGENCY << 18:08x}:{0x7FF << 18:08x}'
 
 
 def test_a_stop_whose_first_frames_are_lost_is_repeated_until_the_board_confirms_it():
-    with Board(BOARD) as board, monitor(HOST) as host, \
+    with Board(BOARD, options=SLOWLY) as board, monitor(HOST) as host, \
             Dump(f'vxcan1,{NUMBERED_STOPS}') as sent, Dump(f'vxcan0,{NUMBERED_STOPS}') as arrived:
         in_control(host)
         with netem('loss', '100%', ends=['vxcan1']):
@@ -193,16 +193,16 @@ class Gateway:
 def test_nothing_corrupt_is_ever_applied(form):
     host_url = f'can://vcan1?node={NODE}' + ('&pack=0' if form == 'plain' else '')
     commands = [f'S:{1000 + i},{1 + i % 16}' for i in range(400)]
-    with Gateway() as gateway, Board(f'can://vcan0?node={NODE}') as board:
+    with Gateway() as gateway, Board(f'can://vcan0?node={NODE}', options=SLOWLY) as board:
         with Running('send', host_url, '--timeout', '20', '--json', *commands) as sender, Dump('vcan1') as dump:
             board.executed(commands[0], timeout=20)
             for byte in range(8):
                 mask = bytearray(8)
                 mask[byte] = 0x01 if byte % 2 == 0 else 0x20
                 gateway.carry('-m', f'XOR:D:0.0.{mask.hex().upper()}')
-                dump.more(100)
+                dump.more(40)
                 gateway.carry()
-                dump.more(50)
+                dump.more(20)
             sender.signal(signal.SIGKILL)
         log = board.rest()
     ours = executed(log)
@@ -211,7 +211,7 @@ def test_nothing_corrupt_is_ever_applied(form):
     others = {each['command'] for each in ours} - set(servos)
     print(f'{len(servos)} commands executed through 8 kinds of corruption, none of them a corrupt one')
     assert servos == commands[:len(servos)]
-    assert all(each.startswith(('F:', 'Q:')) for each in others), others
+    assert all(each.startswith(('F:', 'Q:', 'E:LEAVE')) for each in others), others
     widths = {us for each in log if 'outputs' in each for us in each['outputs']['servo']}
     assert widths <= {0, *range(997, 1403)}  # the chip counts in 4.88 us
 
@@ -249,7 +249,7 @@ class RawHost:
 
 @pytest.mark.parametrize('break_off', ['falls silent', 'interface down', 'begins anew'])
 def test_the_datagram_after_a_broken_one_is_taken(break_off):
-    with Board(f'can://vcan0?node={NODE}') as board, contextlib.closing(RawHost()) as host:
+    with Board(f'can://vcan0?node={NODE}', options=SLOWLY) as board, contextlib.closing(RawHost()) as host:
         host.send(host.heartbeat(), frames=3)
         if break_off == 'falls silent':
             lasts(0.2)  # N_Cr is 100 ms
@@ -272,10 +272,10 @@ def test_an_end_that_is_killed_within_a_transfer_is_followed_by_the_next_one():
     plain = url + '&pack=0'
     options = ('--set', 'rate,500')  # of 26 frames each: there is always one on its way
     with monitor_of_several(url, plain) as host:
-        for _ in range(3):
+        for _ in range(2):
             with Board(url, options=options) as board:
                 host.next(is_link('active'), timeout=20)
-                for _ in range(20):
+                for _ in range(3):
                     host.next(is_state)
                 board.signal(signal.SIGKILL)
                 board.wait()
@@ -295,7 +295,7 @@ def test_an_end_that_is_killed_within_a_transfer_is_followed_by_the_next_one():
 
 @contextlib.contextmanager
 def monitor_of_several(url, host_url):
-    with Board(url) as board, monitor(host_url) as host:
+    with Board(url, options=SLOWLY) as board, monitor(host_url) as host:
         in_control(host)
         board.signal(signal.SIGKILL)
         board.wait()

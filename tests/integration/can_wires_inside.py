@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What test_can_wires.py runs where SocketCAN is: a board on two buses, of which either is switched off or breaks, and
+"""What test_can.py runs where SocketCAN is: a board on two buses, of which either is switched off or breaks, and
 on one beside a cable."""
 import contextlib
 import fcntl

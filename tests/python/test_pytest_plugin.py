@@ -51,7 +51,7 @@ def run_step(step, folder):
     assert 'skipped' not in ended.stdout and ('deselected' in ended.stdout) != everything
 
 
-# The last one is test_pytest_plugin_can.py's.
+# The last one is pytest_plugin_can_inside.py's.
 @pytest.mark.parametrize('step', steps()[:-1])
 def test_the_example_passes_in_this_process_and_over_udp(step, tmp_path):
     run_step(step, tmp_path)

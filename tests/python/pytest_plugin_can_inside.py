@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pytest plugin on a CAN bus, by the example of docs/testing.md: in the guest where this kernel has none."""
+"""What integration/test_can.py runs where SocketCAN is: the pytest plugin, by the example of docs/testing.md."""
 from test_pytest_plugin import run_step, steps
 
 
