@@ -156,23 +156,6 @@ struct GuardedBoard : testing::Test {
   TestHost host{board, echo_pnum, Source{0, 4}};
 };
 
-TEST_F(GuardedBoard, AHungLoopEndsInTheSafeStateWithoutTheLoop) {
-  guard().tick(board.now_ms);
-  hang(101);
-  EXPECT_TRUE(board.safe());
-  EXPECT_TRUE(board.log.states.empty());  // the application has not heard of it
-  board.run(1);
-  EXPECT_EQ(board.log.states, std::vector<std::string>{"SAFE watchdog"});
-  host.stay(300);
-  EXPECT_TRUE(board.safe());
-  host.command("O:400,1,1");
-  EXPECT_TRUE(board.safe());
-  host.echo();
-  host.clear();
-  host.command("O:400,1,1");
-  EXPECT_EQ(board.outputs().osmc[0].pwm, 400);
-}
-
 TEST_F(GuardedBoard, SilenceIsSeenWhileTheLoopHangsEvenIfAHeartbeatWaits) {
   const std::uint32_t fed_ms = board.application->link().fed_ms();
   board.now_ms = fed_ms + 990;  // ten milliseconds are left, and the loop hangs for eleven

@@ -57,6 +57,15 @@ class GigaBench {
     system = std::make_unique<giga::System>();
     system->boot();
   }
+  // In a network that it knows. True if it has joined it.
+  bool boot_in_network() {
+    giga.stored["r4-settings"] = "network,lab\npassword,correct%20horse\n";
+    boot();
+    return run_until([this] {
+      const std::lock_guard<std::mutex> lock(giga.mutex);
+      return giga.udp_port != 0;
+    });
+  }
   // The chip starts again, as after a reset or with new power for the microcontroller alone.
   void restart() {
     giga.reset_by([this] { giga.reset(); });
@@ -118,6 +127,14 @@ class GigaBench {
       giga.usb_host.erase(0, end + 2);
     }
     return lines;
+  }
+
+  // The lines of the answer to "report".
+  std::vector<std::string> report() {
+    usb_lines();
+    usb()("report");
+    run_ms(500);
+    return usb_lines();
   }
 
   const firmware::Application& application() { return system->board().application(); }

@@ -342,12 +342,7 @@ TEST(GigaWiFi, IsJoinedAgainWhenItIsLostAndAWrongPasswordIsTriedAgain) {
 
 TEST(GigaWiFi, LosingItMakesTheOutputsOfItsHostSafeAtOnce) {
   GigaBench bench;
-  bench.giga.stored["r4-settings"] = "network,lab\npassword,correct%20horse\n";
-  bench.boot();
-  ASSERT_TRUE(bench.run_until([&] {
-    const std::lock_guard<std::mutex> lock(bench.giga.mutex);
-    return bench.giga.udp_port != 0;
-  }));
+  ASSERT_TRUE(bench.boot_in_network());
   PlainHost host;
   std::uint64_t next_ms = 0;
   ASSERT_TRUE(bench.run_until([&] {
@@ -393,53 +388,25 @@ TEST(GigaWiFi, AnotherCalibrationDoesNotDropIt) {
   EXPECT_EQ(joins(), 1);
 }
 
-TEST(GigaStop, IsObeyedOverEachTransport) {
-  for (const char* transport : {"usb", "can", "emergency frame", "numbered frame", "udp"}) {
-    GigaBench bench;
-    bench.giga.stored["r4-settings"] = "network,lab\npassword,correct%20horse\n";
-    bench.boot();
-    PlainHost host;
-    const std::string name = transport;
-    if (name == "udp") {
-      ASSERT_TRUE(bench.run_until([&] {
-        const std::lock_guard<std::mutex> lock(bench.giga.mutex);
-        return bench.giga.udp_port != 0;
-      }));
-    }
-    bench.drive(host, bench.usb());
-    const std::string stop = with_crc("E:STOP;");
-    if (name == "usb") bench.usb()(stop);
-    if (name == "can") bench.can()(stop);
-    if (name == "udp") bench.udp()(stop);
-    if (name == "emergency frame" || name == "numbered frame") {
-      CanFrame frame{};
-      frame.extended = name == "numbered frame";
-      frame.id = frame.extended ? numbered_stop_id(200000) : emergency_stop_id;
-      ASSERT_TRUE(bench.giga.can.deliver(frame));
-    }
-    if (name == "udp") {
-      bench.run_until([&] { return bench.reason() == SafeReason::stop; });
-    } else {
-      bench.run_ms(3);
-    }
-    EXPECT_EQ(bench.reason(), SafeReason::stop) << name;
-    EXPECT_TRUE(bench.pins().is_safe()) << name;
-  }
+TEST(GigaStop, ByANumberedFrameIsObeyed) {
+  GigaBench bench;
+  bench.boot();
+  PlainHost host;
+  bench.drive(host, bench.usb());
+  CanFrame frame{};
+  frame.extended = true;
+  frame.id = numbered_stop_id(200000);
+  ASSERT_TRUE(bench.giga.can.deliver(frame));
+  bench.run_ms(3);
+  EXPECT_EQ(bench.reason(), SafeReason::stop);
+  EXPECT_TRUE(bench.pins().is_safe());
 }
 
 TEST(GigaReport, IsThePapersFigure3) {
   GigaBench bench;
-  bench.giga.stored["r4-settings"] = "network,lab\npassword,correct%20horse\n";
-  bench.boot();
-  ASSERT_TRUE(bench.run_until([&] {
-    const std::lock_guard<std::mutex> lock(bench.giga.mutex);
-    return bench.giga.udp_port != 0;
-  }));
+  ASSERT_TRUE(bench.boot_in_network());
   bench.run_ms(20);
-  bench.usb_lines();
-  bench.usb()("report");
-  bench.run_ms(500);
-  std::vector<std::string> lines = bench.usb_lines();
+  std::vector<std::string> lines = bench.report();
   lines.erase(std::remove_if(lines.begin(), lines.end(),
                              [](const std::string& line) { return line.rfind("H:", 0) == 0; }),
               lines.end());

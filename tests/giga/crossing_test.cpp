@@ -106,33 +106,6 @@ TEST(HandOver, GivesTheNewestOnceAndNeverAMixture) {
 // A valid datagram.
 const std::string hello = with_crc("H:ROS2-R4;");
 
-TEST(UdpPeers, SendWhatIsForEveryoneToTheHostHeardLast) {
-  giga::UdpPeers peers;
-  giga::UdpAddress to[2];
-  const std::uint32_t first = peers.heard({1, 1}, Text(hello));
-  peers.heard({2, 9}, Text(hello));
-  peers.heard({3, 9}, Text("x"));  // no datagram
-  EXPECT_EQ(peers.find(first, to), 1);
-  EXPECT_EQ(to[0].ip, 1U);
-  EXPECT_EQ(peers.find(everyone, to), 1);
-  EXPECT_EQ(to[0].ip, 2U);
-}
-
-TEST(UdpPeers, KeepTheHostInControlInAFloodFromChangingAddresses) {
-  giga::UdpPeers peers;
-  const std::uint32_t owner = peers.heard({1, 1}, Text(hello));
-  peers.hold(owner);
-  for (std::uint32_t i = 0; i < 5000; ++i) peers.heard({100 + i, 2}, Text(hello));
-  giga::UdpAddress to[2];
-  ASSERT_EQ(peers.find(everyone, to), 1);
-  EXPECT_EQ(to[0].ip, 1U) << "what is for everyone is not led away";
-  EXPECT_EQ(peers.heard({1, 1}, Text(hello)), owner);
-  peers.hold(everyone);  // it has gone
-  peers.heard({7, 2}, Text(hello));
-  ASSERT_EQ(peers.find(everyone, to), 1);
-  EXPECT_EQ(to[0].ip, 7U);
-}
-
 TEST(UdpLink, TellsTheNetworkThreadWhoIsInControl) {
   giga::UdpLink link;
   giga::UdpPort port(link, &clock_ms);

@@ -34,9 +34,7 @@ TEST_P(GigaStacks, OneThatIsFullSwitchesEverythingOffWithinAMillisecondAndStaysA
   bench.usb()(again.command("O:358,1,1"));
   bench.run_ms(20);
   EXPECT_TRUE(bench.pins().is_safe()) << "until E:CLEAR";
-  bench.usb()("report");
-  bench.run_ms(400);
-  EXPECT_TRUE(has_line(bench.usb_lines(), "Last boot ended by: a full stack of the interrupts"));
+  EXPECT_TRUE(has_line(bench.report(), "Last boot ended by: a full stack of the interrupts"));
 }
 
 TEST_P(GigaStacks, OneThatIsFullEndsAHungBoardToo) {
@@ -58,10 +56,8 @@ TEST(GigaStacksReport, TellsTheMostThatTheyHaveHeld) {
   bench.boot();
   r4_giga_own_stack[924] = 0;  // a hundred words
   __StackLimit[56] = 0;        // 200
-  bench.usb()("report");
-  bench.run_ms(400);
   EXPECT_TRUE(
-      has_line(bench.usb_lines(), "Interrupt stacks: the core's 800 of 1024, ours 400 of 4096"));
+      has_line(bench.report(), "Interrupt stacks: the core's 800 of 1024, ours 400 of 4096"));
 }
 
 }  // namespace

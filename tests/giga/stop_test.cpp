@@ -154,12 +154,7 @@ TEST(GigaStop, OverUsbPassesADeadLoopWithAFullRing) {
 
 TEST(GigaStop, OverUdpIsObeyedWhenTheThreadHasItWhileTheLoopHangs) {
   GigaBench bench;
-  bench.giga.stored["r4-settings"] = "network,lab\npassword,correct%20horse\n";
-  bench.boot();
-  ASSERT_TRUE(bench.run_until([&] {
-    const std::lock_guard<std::mutex> lock(bench.giga.mutex);
-    return bench.giga.udp_port != 0;
-  }));
+  ASSERT_TRUE(bench.boot_in_network());
   PlainHost host;
   bench.drive(host, bench.usb());
   bench.udp()(with_crc("E:STOP;"));

@@ -22,8 +22,8 @@ using namespace std::chrono_literals;
 const Command run_motor = Command::osmc(358, Direction::forward, 1);
 
 // A board that nobody answers, on a loop of its own.
-struct AsyncBoardCancellation : testing::Test {
-  AsyncBoardCancellation() { board.open(); }
+struct AsyncBoardUnanswered {
+  AsyncBoardUnanswered() { board.open(); }
 
   // How what `start` begins ends when its handler's slot is told to cancel it.
   template <class Start>
@@ -46,30 +46,20 @@ struct AsyncBoardCancellation : testing::Test {
   asio::io_context io;
   AsyncBoard board{io.get_executor(), "udp://127.0.0.1:9?listen=0", at_will()};
 };
+struct AsyncBoardCancellation : testing::Test, AsyncBoardUnanswered {};
 
-TEST_F(AsyncBoardCancellation, GivesACommandUp) {
-  const auto result = cancelled([&](auto token) { board.async_send(run_motor, 1h, token); });
-  ASSERT_TRUE(result);
-  EXPECT_EQ(result->outcome, Outcome::cancelled);
-}
-
-TEST_F(AsyncBoardCancellation, GivesAnArmUp) {
-  const auto result = cancelled([&](auto token) { board.async_arm(1h, token); });
-  ASSERT_TRUE(result);
-  EXPECT_EQ(result->outcome, Outcome::cancelled);
-}
-
-TEST_F(AsyncBoardCancellation, GivesBothSettingsOfTheLinkTimingUp) {
-  const auto result =
-      cancelled([&](auto token) { board.async_link_timing(800ms, 100ms, 1h, token); });
-  ASSERT_TRUE(result);
-  EXPECT_EQ(result->outcome, Outcome::cancelled);
-}
-
-TEST_F(AsyncBoardCancellation, EndsTheWaitForAnActiveBoard) {
-  const auto result = cancelled([&](auto token) { board.async_wait_active(1h, token); });
-  ASSERT_TRUE(result);
-  EXPECT_EQ(result->outcome, Outcome::cancelled);
+TEST(AsyncBoardCancellations, EndACommandAnArmASettingAndAWait) {
+  const auto expect_cancelled = [](auto start) {
+    AsyncBoardUnanswered each;
+    const auto result = each.cancelled([&](auto token) { start(each.board, token); });
+    ASSERT_TRUE(result);
+    EXPECT_EQ(result->outcome, Outcome::cancelled);
+  };
+  expect_cancelled([](AsyncBoard& board, auto token) { board.async_send(run_motor, 1h, token); });
+  expect_cancelled([](AsyncBoard& board, auto token) { board.async_arm(1h, token); });
+  expect_cancelled(
+      [](AsyncBoard& board, auto token) { board.async_link_timing(800ms, 100ms, 1h, token); });
+  expect_cancelled([](AsyncBoard& board, auto token) { board.async_wait_active(1h, token); });
 }
 
 TEST_F(AsyncBoardCancellation, EndsTheWaitForAStopThatGoesOn) {

@@ -205,17 +205,6 @@ TEST_F(AsyncBoardTest, TellsEverySubscriberLastWhatIsSo) {
   EXPECT_EQ(told.back(), DisarmCause::stop) << "the first one stopped the board meanwhile";
 }
 
-TEST_F(AsyncBoardTest, ConfirmsThroughACallback) {
-  std::optional<CommandResult> result;
-  board.open();
-  board.async_send(start_motor, 1s, [&](const CommandResult& r) { result = r; });
-  EXPECT_FALSE(result) << "never inside the call that starts it";
-  ASSERT_TRUE(run_until(io, [&] { return result.has_value(); }));
-  EXPECT_EQ(result->outcome, Outcome::confirmed);
-  EXPECT_EQ(board.state().osmc[0], (Drive{358, Direction::forward}));
-  EXPECT_TRUE(board.in_control());
-}
-
 TEST_F(AsyncBoardTest, ConfirmsThroughAFuture) {
   board.open();
   std::thread loop([&] {
@@ -258,22 +247,6 @@ TEST_F(AsyncBoardTest, ConfirmsThroughACoroutine) {
   EXPECT_EQ(outcomes,
             (std::vector<Outcome>{Outcome::confirmed, Outcome::confirmed, Outcome::confirmed,
                                   Outcome::confirmed, Outcome::confirmed, Outcome::refused}));
-}
-
-TEST_F(AsyncBoardTest, ThrowsIntoACoroutineWhatIsOutsideItsRange) {
-  bool caught = false;
-  auto program = [&]() -> asio::awaitable<void> {
-    board.open();
-    try {
-      co_await board.async_send(Command::servo(9999, 1), 1s, asio::use_awaitable);
-    } catch (const Error& error) {
-      caught = error.kind() == ErrorKind::usage;
-    }
-    board.close();
-  };
-  asio::co_spawn(io, program(), asio::detached);
-  io.run();
-  EXPECT_TRUE(caught);
 }
 
 TEST_F(AsyncBoardTest, RunsAHandlerOnItsExecutor) {
@@ -323,18 +296,6 @@ TEST_F(AsyncBoardTest, HandlersMaySendAgain) {
   ASSERT_TRUE(run_until(io, [&] { return confirmed == 1000; }));
 }
 
-TEST_F(AsyncBoardTest, CallbacksMaySend) {
-  std::optional<Outcome> outcome;
-  board.on_state([&, sent = false](const State&, const Datagram&) mutable {
-    if (sent) return;
-    sent = true;
-    board.async_send(start_motor, 1s, [&](const CommandResult& r) { outcome = r.outcome; });
-  });
-  board.open();
-  ASSERT_TRUE(run_until(io, [&] { return outcome.has_value(); }));
-  EXPECT_EQ(*outcome, Outcome::confirmed);
-}
-
 TEST_F(AsyncBoardTest, IsNotInTheWayWithSixtyFiveCommands) {
   std::vector<Outcome> outcomes;
   const auto note = [&](const CommandResult& result) { outcomes.push_back(result.outcome); };
@@ -367,21 +328,6 @@ TEST_F(AsyncBoardTest, CloseCancelsAndNoCallbackFollows) {
                                       Outcome::closed};
   EXPECT_EQ(outcomes, expected) << "the stop cancelled the first";
   EXPECT_THROW(board.open(), Error) << "once only";
-}
-
-TEST_F(AsyncBoardTest, MayBeClosedInACallback) {
-  int calls = 0;
-  std::optional<Outcome> outcome;
-  board.on_state([&](const State&, const Datagram&) {
-    ++calls;
-    board.close();
-  });
-  board.open();
-  board.async_send(Command::fields("ENC1"), 10s,
-                   [&](const CommandResult& r) { outcome = r.outcome; });
-  io.run();
-  EXPECT_EQ(calls, 1);
-  EXPECT_TRUE(outcome);
 }
 
 // Everywhere where the user's code runs, the board may be destroyed.
@@ -502,24 +448,6 @@ TEST_F(AsyncBoardTest, GatesItsHeartbeatsAndFeedsFromAnyThread) {
   EXPECT_TRUE(run_until(io, [&] { return !board.link().gated() && board.in_control(); }));
   stop = true;
   feeder.join();
-}
-
-TEST(AsyncBoardTransport, IsLostAndBackWithItsPty) {
-  asio::io_context io;
-  auto simulated = std::make_unique<BoardInAThread>("pty");
-  BoardOptions options = at_will();
-  options.session.timing.timeout_ms = 60'000;  // silence alone would not tell in time
-  AsyncBoard board(io, simulated->url(), options);
-  std::vector<CarrierEvent::Kind> events;
-  board.on_event([&](const CarrierEvent& event) { events.push_back(event.kind); });
-  board.open();
-  ASSERT_TRUE(run_until(io, [&] { return board.in_control(); }));
-  simulated->switch_off();
-  simulated.reset();
-  ASSERT_TRUE(run_until(io, [&] { return board.link().state == HostLinkState::lost; }))
-      << "at once, not after the timeout";
-  ASSERT_FALSE(events.empty());
-  EXPECT_EQ(events.back(), CarrierEvent::Kind::down);
 }
 
 }  // namespace

@@ -130,30 +130,6 @@ TEST(BoardGroup, IsConfirmedAsOneAndRefusedAsOne) {
   EXPECT_EQ(problem_of([&] { board.apply(Setpoints{}.servo(1, 1), 0ms); }).kind, ErrorKind::usage);
 }
 
-TEST(BoardGroup, IsPostedAndToldOfWhenItIsRefused) {
-  BoardInAThread simulated("udp");
-  Board board(simulated.url(), at_will());
-  std::promise<RefusedPost> told;
-  board.on_refused([&](const RefusedPost& refused) { told.set_value(refused); });
-  EXPECT_EQ(board.post(Setpoints{}.servo(1, 1)), PostResult::no_link);
-  board.wait_active();
-  board.fields("DEFAULT,OSMC2");
-  const Setpoints wheels = Setpoints{}.osmc(1, 358, forward).osmc(2, 359, forward);
-  board.identify();  // it is known now whether the board executes groups
-  ASSERT_TRUE(board.post(wheels));
-  while (board.next_state().osmc[1].pwm != 359) {
-  }
-  EXPECT_EQ(board.state().osmc[0].pwm, 358);
-  board.stop();
-  ASSERT_TRUE(board.post(wheels));
-  auto refused = told.get_future();
-  ASSERT_EQ(refused.wait_for(5s), std::future_status::ready);
-  const RefusedPost post = refused.get();
-  EXPECT_EQ(post.code, Refusal::safe);
-  EXPECT_EQ(post.group, 2);
-  EXPECT_EQ(post.at, 0);
-}
-
 TEST(BoardGroup, IsPostedWithoutAllocatingAnything) {
   Board board("sim:", at_will());
   board.wait_active();
@@ -166,18 +142,6 @@ TEST(BoardGroup, IsPostedWithoutAllocatingAnything) {
   }
   EXPECT_EQ(bench::allocations_of_this_thread() - before, 0U);
   EXPECT_EQ(sent, 20);
-}
-
-TEST(BoardGroup, IsHeldBackLikeAnyOutputUntilArmed) {
-  Board board("sim:");
-  board.wait_active();
-  const Setpoints wheels = Setpoints{}.osmc(1, 358, forward).osmc(2, 358, forward);
-  EXPECT_EQ(board.post(wheels), PostResult::not_armed);
-  const Problem problem = problem_of([&] { board.apply(wheels); });
-  EXPECT_EQ(problem.outcome, Outcome::not_armed);
-  EXPECT_TRUE(contains(problem.reason, "not armed"));
-  board.arm();
-  board.apply(wheels);
 }
 
 // A host and a board on one loop.

@@ -55,16 +55,5 @@ TEST(BoardI2c, TheStateBringsWhatIsRepeated) {
   EXPECT_THROW(board.i2c().poll(1, 0x68, {0x75}, 1, 4ms), Error);
 }
 
-TEST(BoardI2c, AWriteIsHeldBackUntilTheProgramIsArmed) {
-  BoardInAThread simulated("udp");
-  Board board(simulated.url());
-  board.wait_active();
-  EXPECT_THROW(board.i2c().write(0x68, {0x6B, 0x00}), Error);
-  EXPECT_EQ(board.i2c().read(0x68, {0x6B}, 1), Bytes{0x40});
-  board.arm();
-  board.i2c().write(0x68, {0x6B, 0x00});
-  EXPECT_EQ(board.i2c().read(0x68, {0x6B}, 1), Bytes{0x00});
-}
-
 }  // namespace
 }  // namespace r4::test

@@ -29,12 +29,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
+// Looks at each state of the board, for 5 s.
 template <class Done>
-bool comes_true(Done done) {
+bool comes_true(Board& board, Done done) {
   const auto end = std::chrono::steady_clock::now() + 5s;
   while (!done()) {
     if (std::chrono::steady_clock::now() > end) return false;
-    std::this_thread::yield();
+    board.next_state(5s);
   }
   return true;
 }
@@ -43,7 +44,7 @@ TEST(BoardWires, ABoardOnUdpAndAPtyIsOneBoard) {
   BoardInAThread simulated(std::vector<std::string>{"udp", "pty"});
   Board board(simulated.urls(), at_will());
   board.wait_active();
-  EXPECT_TRUE(comes_true([&] { return board.link().carrying == 3; }));
+  EXPECT_TRUE(comes_true(board, [&] { return board.link().carrying == 3; }));
   for (int i = 0; i < 20; ++i) board.osmc(1).set(100 + i, Direction::forward);
   EXPECT_EQ(simulated.executed().back(), "O:119,1,1");
   const std::vector<Wire> wires = board.wires();
@@ -109,9 +110,9 @@ TEST(BoardWires, OneThatCannotBeOpenedYetIsTriedAgain) {
   Board board({simulated.urls()[0], "serial://" + link}, at_will(), callbacks);
   board.wait_active();
   EXPECT_EQ(board.wires()[1].state, WireState::down);
-  EXPECT_TRUE(comes_true([&] { return told == 1; }));
+  EXPECT_TRUE(comes_true(board, [&] { return told == 1; }));
   std::filesystem::create_symlink(simulated.urls()[1].substr(9), link);
-  EXPECT_TRUE(comes_true([&] { return board.link().carrying == 3; }));
+  EXPECT_TRUE(comes_true(board, [&] { return board.link().carrying == 3; }));
   std::filesystem::remove(link);
 }
 
@@ -128,7 +129,7 @@ TEST(BoardWires, OneThatTurnsOutToBeNoSuchDeviceLeavesTheOthersAlone) {
   Board board({simulated.urls()[0], "serial://" + link + "?baud=1234567"}, at_will(), callbacks);
   board.wait_active();
   std::filesystem::create_symlink(simulated.urls()[1].substr(9), link);
-  EXPECT_TRUE(comes_true([&] { return told.load(); }));
+  EXPECT_TRUE(comes_true(board, [&] { return told.load(); }));
   std::filesystem::remove(link);
   board.osmc(1).set(100, Direction::forward);
   EXPECT_EQ(board.link().carrying, 1);

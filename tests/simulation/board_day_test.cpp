@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A day of one board in virtual time: the application and the chip drivers on the model of the board,
-// every millisecond of it, with a host that drives it and an incident every few minutes. The clocks in
-// milliseconds and in microseconds wrap under way. R4_DAY_HOURS makes the day shorter or longer,
-// R4_SEED makes it another.
+// A working day of one board in virtual time: the application and the chip drivers on the model of the
+// board, every millisecond of it, with a host that drives it and an incident every few minutes. Both the
+// clock in milliseconds and the clock in microseconds wrap during the day. R4_DAY_HOURS sets its length
+// (8 by default), and R4_SEED its incidents.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -305,9 +305,9 @@ class Day final : private firmware::Port {
 };
 
 TEST(BoardDay, EveryIncidentEndsSafeAndTheBoardDrivesAgain) {
-  const std::uint64_t hours = from_environment("R4_DAY_HOURS", 24);
+  const std::uint64_t hours = from_environment("R4_DAY_HOURS", 8);
   const std::uint64_t seed = from_environment("R4_SEED", 1);
-  Day day(seed, 0U - 12U * 3600U * 1000U);  // wraps at noon
+  Day day(seed, 0U - static_cast<std::uint32_t>(hours * 3600U * 1000U / 2));  // wraps at noon
   day.connect();
   int next = 0;
   while (day.passed_ms() < hours * 3600 * 1000) {

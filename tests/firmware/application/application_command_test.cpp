@@ -65,81 +65,11 @@ TEST_F(ApplicationCommand, RefusesWhatIsNoCommandOfTheBoard) {
   EXPECT_EQ(board.application->settings().state_rate_hz, before.state_rate_hz);
 }
 
-TEST_F(ApplicationCommand, DropsWhatIsDamaged) {
-  const std::string good = test::with_crc("O:358,1,1;PNum:" + std::to_string(host.pnum) + ";T:1;");
-  for (std::size_t i = 0; i < good.size(); ++i) {
-    for (int bit = 0; bit < 8; ++bit) {
-      std::string bad = good;
-      bad[i] = static_cast<char>(bad[i] ^ (1 << bit));
-      // Capital digits in the checksum are the same checksum.
-      if (i + 10 > good.size() && std::isalpha(good[i]) && bit == 5) continue;
-      board.receive_raw(bad, host.at);
-      ASSERT_TRUE(board.safe()) << bad;
-    }
-    board.receive_raw(good.substr(0, i), host.at);
-    ASSERT_TRUE(board.safe()) << good.substr(0, i);
-  }
-  EXPECT_EQ(answers(), Lines());  // nothing of it is believed, its number neither
-  board.receive_raw(good, host.at);
-  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
-}
-
 TEST_F(ApplicationCommand, ExecutesANumberOnce) {
   const std::uint32_t number = host.command("P:100,1");
   for (int i = 0; i < 3; ++i) host.resend("P:100,1", number);
   EXPECT_EQ(board.log.executed, std::vector<std::uint32_t>{number});
   EXPECT_EQ(answers(), (Lines{"DUPLICATE", "DUPLICATE", "DUPLICATE"}));
-}
-
-TEST_F(ApplicationCommand, KnowsTheLast64NumbersThatItExecuted) {
-  const std::uint32_t first = host.command("S:1,1");
-  for (int i = 0; i < 63; ++i) host.command("S:2,2");
-  host.resend("S:1,1", first);
-  EXPECT_EQ(answers(), Lines{"DUPLICATE"});
-  host.command("S:2,2");
-  host.resend("S:1,1", first);
-  EXPECT_EQ(answers(), Lines{"STALE"});
-}
-
-TEST_F(ApplicationCommand, RefusesWhatANewerOneOvertook) {
-  const std::uint32_t late = host.pnum++;
-  host.command("O:2,1,1");
-  host.resend("O:1,1,1", late);
-  EXPECT_EQ(board.outputs().osmc[0].pwm, 2);
-  EXPECT_EQ(answers(), Lines{"STALE"});
-}
-
-TEST_F(ApplicationCommand, RefusesWhatAHeartbeatOvertookMoreThan250MsAgo) {
-  const std::uint32_t in_time = host.pnum++;
-  const std::uint32_t late = host.pnum++;
-  host.echo();
-  board.run(250);
-  host.resend("O:1,1,1", in_time);
-  EXPECT_EQ(board.outputs().osmc[0].pwm, 1);
-  board.run(1);
-  host.resend("O:2,1,1", late);
-  EXPECT_EQ(board.outputs().osmc[0].pwm, 1);
-  EXPECT_EQ(answers(), Lines{"STALE"});
-}
-
-TEST_F(ApplicationCommand, OvertakenIsOvertakenAtAnyRateOfHeartbeats) {
-  const std::uint32_t late = host.pnum++;
-  for (int ms = 0; ms < 300; ++ms) {  // a heartbeat each millisecond
-    host.echo();
-    board.run(1);
-  }
-  host.resend("O:2,1,1", late);
-  EXPECT_TRUE(board.safe());
-  EXPECT_EQ(answers(), Lines{"STALE"});
-}
-
-TEST_F(ApplicationCommand, RefusesWhatIsFarAhead) {
-  host.resend("O:1,1,1", host.pnum + 65536);  // the newest spent number is one back
-  EXPECT_EQ(answers(), Lines{"STALE"});
-  host.command("S:1,1");
-  host.resend("O:1,1,1", host.pnum - 1 + 65536);
-  EXPECT_EQ(answers(), Lines());
-  EXPECT_EQ(board.outputs().osmc[0].pwm, 1);
 }
 
 TEST_F(ApplicationCommand, NothingSentBeforeTheSessionWasArmedIsExecuted) {
@@ -168,42 +98,6 @@ TEST_F(ApplicationCommand, AnEchoOfAnotherBootDoesNotArm) {
   EXPECT_TRUE(fresh.safe());
 }
 
-TEST_F(ApplicationCommand, NothingSentBeforeAnOutageIsExecutedAfterIt) {
-  const std::uint32_t held_back = host.pnum++;
-  board.run(1500);
-  const std::uint32_t in_between = host.command("O:1,1,1");
-  EXPECT_EQ(answers(), Lines{"SAFE"});
-  host.echo();
-  ASSERT_EQ(board.state(), BoardState::active);
-  host.resend("O:1,1,1", held_back);
-  host.resend("O:1,1,1", in_between);
-  EXPECT_TRUE(board.safe());
-  EXPECT_EQ(answers(), (Lines{"STALE", "SAFE"}));
-}
-
-TEST_F(ApplicationCommand, TellsOfAnExecutedNumberEvenAfterAnOutage) {
-  const std::uint32_t number = host.command("O:1,1,1");
-  board.run(1500);
-  host.resend("O:1,1,1", number);
-  EXPECT_EQ(answers(), Lines{"DUPLICATE"});
-  host.echo();
-  host.resend("O:1,1,1", number);
-  EXPECT_EQ(answers(), Lines{"DUPLICATE"});
-}
-
-TEST_F(ApplicationCommand, ARefusedCommandStaysRefused) {
-  board.hal.inputs.handle_held = false;
-  board.run(10);
-  const std::uint32_t refused = host.command("O:1,1,1");
-  EXPECT_EQ(answers(), Lines{"SAFE"});
-  board.hal.inputs.handle_held = true;
-  board.run(10);
-  ASSERT_EQ(board.state(), BoardState::active);
-  host.resend("O:1,1,1", refused);  // a copy that the network made
-  EXPECT_TRUE(board.safe());
-  EXPECT_EQ(answers(), Lines{"SAFE"}) << "why it was refused";
-}
-
 TEST_F(ApplicationCommand, ACommandRefusedInAnOutageStaysRefused) {
   board.run(1500);
   const std::uint32_t overtaken = host.pnum++;  // a heartbeat that comes after the command
@@ -230,28 +124,6 @@ TEST_F(ApplicationCommand, NeedsANumberForAllButStopHeartbeatAndQuestion) {
   EXPECT_EQ(board.take(MessageKind::identity).size(), 1U);
   board.receive("E:STOP;", Source{0, 9});
   EXPECT_EQ(board.reason(), SafeReason::stop);
-}
-
-TEST_F(ApplicationCommand, SurvivesTheWrapOfTheHostsNumbers) {
-  TestBoard fresh;
-  TestHost again(fresh, 0xffffffffU - 100);
-  again.connect();
-  for (int i = 0; i < 200; ++i) {
-    again.command("S:" + std::to_string(i + 1) + ",1");
-    ASSERT_EQ(fresh.outputs().servo_us[0], i + 1);
-    if (i % 10 == 0) again.echo();
-    fresh.run(20);
-  }
-  EXPECT_LT(again.pnum, 1000U);
-  EXPECT_EQ(fresh.log.states.size(), 2U);  // one session, never lost
-  // It goes on far behind the wrap, also after an outage.
-  again.pnum = 4'000;
-  again.echo();
-  again.pnum = 8'000;
-  again.echo();
-  fresh.run(1500);
-  again.echo();
-  EXPECT_EQ(fresh.outputs().servo_us[0], 200);
 }
 
 TEST_F(ApplicationCommand, ReportsTheNewestExecutedNumber) {
@@ -420,15 +292,6 @@ TEST(ApplicationNumberless, MayBeginAgainAfterAnOutageWithNothingOfTheOldLeft) {
   EXPECT_EQ(board.log.refused, Lines{"0 DUPLICATE"});
   board.receive("S:1700,1;PNum:1;T:1;");
   EXPECT_EQ(board.log.refused.back(), "1 STALE");
-}
-
-TEST(ApplicationNumberless, MayNotBeginAgainWithoutAnOutage) {
-  TestBoard board;
-  board.receive("H:ROS2-R4;T:1;");
-  board.receive("O:358,1,1;PNum:6600;T:1;");
-  board.receive("O:1,1,1;PNum:0;T:1;");
-  EXPECT_EQ(board.log.refused, Lines{"0 STALE"});
-  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
 }
 
 }  // namespace

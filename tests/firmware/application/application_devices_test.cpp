@@ -143,37 +143,6 @@ TEST_F(ApplicationDevices, TheChipsOfTheBoardAreNotOnThisBus) {
   EXPECT_EQ(newest_state().i2c_answer.outcome, I2cOutcome::no_acknowledge);
 }
 
-// Every state on its grid and the stop in the same turn, whatever the user's bus does.
-TEST_F(ApplicationDevices, ABusThatIsHeldCostsTheBoardNothing) {
-  using Fault = sim::UserBusModel::Fault;
-  for (const Fault fault : {Fault::none, Fault::held, Fault::stretched}) {
-    host.command("X:POLL,0x68,x3b,14,10,1");
-    for (int slot = 2; slot <= 8; ++slot) {
-      host.command("X:POLL,0x40,x02,2,50," + std::to_string(slot));
-    }
-    host.command("F:LATE");
-    pass(20);
-    devices.bus.set_fault(fault);
-    pass(100 - board.now_ms % 100);
-    board.take();
-    pass(1000);
-    const auto states = board.take(MessageKind::state);
-    EXPECT_EQ(states.size(), 100U);
-    for (std::size_t i = 1; i < states.size(); ++i) {
-      EXPECT_EQ(states[i].t_ms - states[i - 1].t_ms, 10U);
-    }
-    host.command("O:358,1,1");
-    EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
-    host.command("E:STOP");
-    EXPECT_TRUE(board.safe());
-    host.clear();
-    host.command("O:358,1,1");
-    pass(1001, false);
-    EXPECT_TRUE(board.safe()) << "silence";
-    host.connect();
-  }
-}
-
 TEST(ApplicationWithoutDevices, KnowsNoX) {
   TestBoard board;
   TestHost host(board, echo_pnum);

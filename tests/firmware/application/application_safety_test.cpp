@@ -516,40 +516,6 @@ TEST_F(ApplicationSafety, AThresholdIsSetAtOnceAndTurnedOffAtOnce) {
 
 // --- several at once
 
-TEST_F(ApplicationSafety, OutputsAreSafeWhileAnyCauseIsThere) {
-  host.command("U:30,1");
-  distance(20);
-  handle(false);
-  host.command("E:STOP");
-  clear();
-  EXPECT_EQ(board.reason(), SafeReason::handle);
-  handle(true);
-  EXPECT_EQ(board.reason(), SafeReason::proximity);
-  host.command("O:1,1,1");
-  EXPECT_TRUE(board.safe());
-  distance(40);
-  host.stay(500);
-  EXPECT_EQ(board.reason(), SafeReason::none);
-  host.command("O:1,1,1");
-  EXPECT_FALSE(board.safe());
-}
-
-TEST_F(ApplicationSafety, TheGravestCauseIsReported) {
-  host.command("U:30,1");
-  board.run(1500);
-  EXPECT_EQ(board.reason(), SafeReason::link);
-  distance(20);
-  EXPECT_EQ(board.reason(), SafeReason::proximity);
-  handle(false);
-  EXPECT_EQ(board.reason(), SafeReason::handle);
-  board.application->fail(SafeReason::watchdog, board.now_ms);
-  EXPECT_EQ(board.reason(), SafeReason::watchdog);
-  board.application->fail(SafeReason::fault, board.now_ms);
-  EXPECT_EQ(board.reason(), SafeReason::fault);
-  board.receive("E:STOP;", Source{0, 9});
-  EXPECT_EQ(board.reason(), SafeReason::stop);
-}
-
 TEST_F(ApplicationSafety, TheReasonIsInEveryHeartbeatAndState) {
   host.command("F:AIN24");
   handle(false);

@@ -162,31 +162,6 @@ TEST_F(ApplicationUarts, SaysSoInItsCapabilities) {
   EXPECT_TRUE(found);
 }
 
-// Every state on its grid and the stop in the same turn, whatever comes in.
-TEST_F(ApplicationUarts, NoiseAtFullRateCostsTheBoardNothing) {
-  host.command("F:LATE,UART1,UART2");
-  host.command("C:uart1,460800:8N1");
-  host.command("C:uart2,460800:8N1");
-  for (sim::UserUartModel& uart : devices.uarts) uart.connect(UartPeer::noise);
-  pass(100 - board.now_ms % 100);
-  board.take();
-  pass(1000);
-  const auto states = board.take(MessageKind::state);
-  EXPECT_EQ(states.size(), 100U);
-  for (std::size_t i = 1; i < states.size(); ++i) {
-    EXPECT_EQ(states[i].t_ms - states[i - 1].t_ms, 10U);
-  }
-  EXPECT_GT(state_of(states.back()).uart[0].lost, 1000U);
-  host.command("O:358,1,1");
-  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
-  host.command("E:STOP");
-  EXPECT_TRUE(board.safe());
-  host.clear();
-  host.command("O:358,1,1");
-  pass(1001, false);
-  EXPECT_TRUE(board.safe()) << "silence";
-}
-
 TEST(ApplicationWithoutUarts, KnowsNoUart) {
   TestBoard board;
   TestHost host(board, echo_pnum);

@@ -147,17 +147,6 @@ TEST_F(ApplicationWatched, AWatcherChoosesItsFields) {
   EXPECT_EQ(states.back().bytes.rfind("ENC1:0;US1:0;PNum:", 0), 0U) << states.back().bytes;
 }
 
-TEST_F(ApplicationWatched, RenewsByTheSameToken) {
-  watcher.watch("10");
-  for (int i = 0; i < 8; ++i) {
-    host.stay(1000);
-    watcher.ask("10", watcher.token);
-  }
-  EXPECT_TRUE(watcher.take(MessageKind::nack).empty());
-  host.stay(500);
-  EXPECT_EQ(watcher.take(MessageKind::state).size(), 5U);
-}
-
 TEST_F(ApplicationWatched, AWatcherCommandsNothingButStops) {
   watcher.watch("10");
   host.command("O:358,1,1");
@@ -173,22 +162,6 @@ TEST_F(ApplicationWatched, AWatcherCommandsNothingButStops) {
   board.receive("E:STOP;PNum:73;T:1;", watcher.at);
   EXPECT_EQ(board.outputs().osmc[0].pwm, 0);
   EXPECT_EQ(board.application->reason(), SafeReason::stop);
-}
-
-TEST_F(ApplicationWatched, AForgedLeaseIsAnsweredAndStreamsNothing) {
-  TestWatcher other{board, Source{0, 10}};
-  other.watch("1000");
-  host.stay(100);
-  other.take();
-  watcher.ask("1000", 0);
-  EXPECT_EQ(watcher.take(MessageKind::nack).size(), 1U);
-  watcher.ask("1000", board.now_ms);  // the board tells its time to anyone who asks
-  watcher.ask("1000", board.newest_t());
-  watcher.ask("1000", other.token);
-  watcher.ask("0", board.newest_t());
-  host.stay(1000);
-  EXPECT_TRUE(watcher.take(MessageKind::state).empty());
-  EXPECT_TRUE(watcher.take(MessageKind::board_heartbeat).empty());
 }
 
 // Somebody may forge that it came from the host, with the number of a command that was executed.

@@ -123,21 +123,6 @@ TEST_F(ApplicationWires, AStrangerStaysBusyAndNeverJoins) {
   EXPECT_TRUE(board.safe());
 }
 
-TEST_F(ApplicationWires, AHeartbeatFromBeforeTheTimeoutIsNoProof) {
-  TestHost host(board, echo_pnum, wire_a);
-  host.connect();
-  board.run(500);
-  const std::uint32_t t = board.newest_t(0);
-  const std::uint32_t old = host.echo();
-  board.run(500);
-  host.echo();
-  board.run(500);
-  forget();
-  board.receive(heartbeat(old, t), wire_b);
-  EXPECT_EQ(answers(1), Lines{"BUSY"});
-  EXPECT_EQ(wires().size(), 1);
-}
-
 TEST_F(ApplicationWires, NoMoreThanFour) {
   WiredHost host(board, {{wire_a}, {wire_b}, {wire_c}, {Source{0, 5}}});
   host.connect();
@@ -157,24 +142,6 @@ TEST_F(ApplicationWires, APaperHostHasOne) {
   board.receive(heartbeat(pnum, t), wire_b);
   EXPECT_EQ(answers(1), Lines{"BUSY"});
   EXPECT_EQ(wires().size(), 1);
-}
-
-TEST_F(ApplicationWires, AHostThatBeginsAgainWaitsForTheTimeoutByAllItsWires) {
-  WiredHost host(board, {{wire_a}, {wire_b}});
-  host.connect();
-  host.command("O:358,1,1");
-  WiredHost again(board, {{wire_a}, {wire_b}}, echo_pnum + 9'000'000);
-  forget();
-  again.run(500);
-  const Lines told = answers(0);
-  EXPECT_NE(std::find(told.begin(), told.end(), "BUSY"), told.end());
-  EXPECT_EQ(board.outputs().osmc[0].pwm, 358) << "the one before is not lost yet";
-  again.run(1000);
-  EXPECT_EQ(board.state(), BoardState::active);
-  EXPECT_TRUE(board.safe()) << "nothing of it comes back";
-  EXPECT_EQ(wires().size(), 2);
-  again.command("O:7,1,1");
-  EXPECT_EQ(board.outputs().osmc[0].pwm, 7);
 }
 
 TEST_F(ApplicationWires, TheIdentityTellsAWireOfTheSessionThatItIsNotBusy) {
@@ -241,71 +208,6 @@ TEST_F(ApplicationWires, ACopyOfARefusedCommandIsToldTheSame) {
   EXPECT_TRUE(board.safe());
 }
 
-TEST_F(ApplicationWires, AWireThatLagsDelaysRepeatsAndReordersNothing) {
-  WiredHost host(board, {{wire_a}, {wire_b, 200}});
-  host.connect();
-  host.run(1000);
-  ASSERT_EQ(wires().size(), 2);
-  forget();
-  Numbers sent;
-  for (int i = 0; i < 1000; ++i) {  // 10 s at 100 Hz
-    sent.push_back(host.command("O:" + std::to_string(i) + ",1,1"));
-    EXPECT_EQ(board.outputs().osmc[0].pwm, i);
-    host.run(10);
-    EXPECT_EQ(board.outputs().osmc[0].pwm, i) << "an old one has no effect";
-  }
-  EXPECT_EQ(board.log.executed, sent);
-  EXPECT_EQ(board.log.refused, Lines());
-  EXPECT_EQ(board.log.wires, Lines()) << "nobody leaves";
-  const State state = newest_state(host);
-  EXPECT_EQ(state.rx_lost, 0U);
-  EXPECT_EQ(state.rx_duplicate, 0U);
-  EXPECT_EQ(state.rx_refused, 0U);
-}
-
-TEST_F(ApplicationWires, ALateCopyIsNoRestartOfTheHostsNumbers) {
-  WiredHost host(board, {{wire_a}, {wire_b, 200}});
-  host.connect();
-  host.run(1000);
-  for (int i = 0; i < 2000; ++i) {  // at 1000 Hz the wire lags by 200 numbers
-    host.command("Z:1");
-    host.run(1);
-  }
-  EXPECT_EQ(board.hal.zeroed.size(), 2000U);
-  const State state = newest_state(host);
-  EXPECT_EQ(state.rx_lost, 0U);
-  EXPECT_EQ(state.rx_duplicate, 0U);
-}
-
-TEST_F(ApplicationWires, TheCutOfEitherIsNotNoticed) {
-  for (const int cut : {0, 1}) {
-    TestBoard fresh({}, 4);
-    WiredHost host(fresh, {{wire_a}, {wire_b}});
-    host.connect();
-    fresh.log.states.clear();
-    fresh.take(1 - cut);
-    Numbers sent;
-    for (int i = 0; i < 500; ++i) {
-      if (i == 100) host.wires[static_cast<std::size_t>(cut)].cut = true;
-      if (i == 350) host.wires[static_cast<std::size_t>(cut)].cut = false;
-      sent.push_back(host.command("O:" + std::to_string(i) + ",1,1"));
-      EXPECT_EQ(fresh.outputs().osmc[0].pwm, i);
-      host.run(10);
-    }
-    EXPECT_EQ(fresh.log.executed, sent);
-    EXPECT_EQ(fresh.log.states, Lines()) << "no trip";
-    const std::string at = cut == 0 ? "0/4" : "1/0";
-    const Lines changes(fresh.log.wires.begin() + 1, fresh.log.wires.end());
-    EXPECT_EQ(changes, (Lines{"left " + at, "joined " + at}));
-    EXPECT_EQ(fresh.application->wires().losses(), 1U);
-    std::uint32_t before = 0;
-    for (const Heard& heard : fresh.take(MessageKind::state, 1 - cut)) {
-      EXPECT_TRUE(before == 0 || heard.t_ms - before == 10U) << "a gap at " << heard.t_ms;
-      before = heard.t_ms;
-    }
-  }
-}
-
 // 400 commands a second over a wire that lags, then also over a fast one, then over that one only. Commands have
 // numbers, too: the fast wire is far ahead.
 void expect_a_fast_wire_takes_over(TestBoard& board, WiredHost& host, std::uint32_t lag_ms) {
@@ -335,38 +237,6 @@ void expect_a_fast_wire_takes_over(TestBoard& board, WiredHost& host, std::uint3
 TEST_F(ApplicationWires, AFastWireTakesOverFromOneThatLagsAtAnyRateOfCommands) {
   WiredHost host(board, {{wire_a}, {wire_b}});
   expect_a_fast_wire_takes_over(board, host, 500);
-}
-
-// --- who floods
-
-TEST_F(ApplicationWires, AFloodFromAnotherPortKeepsNoWireOut) {
-  WiredHost host(board, {{wire_a}, {wire_b}});
-  host.connect();
-  host.wires.push_back({wire_c});
-  host.wires[2].cut = true;
-  std::uint32_t peer = 100;
-  const auto flood = [&] {
-    for (int i = 0; i < 20; ++i) {
-      const Source from{3, ++peer};
-      const std::uint32_t t = board.newest_t(0);
-      board.receive(heartbeat(echo_pnum + 700'000 + peer, t), from);
-      board.receive(heartbeat(host.pnum + static_cast<std::uint32_t>(i) % 64, t + 1), from);
-    }
-  };
-  for (int i = 0; i < 1000; ++i) {
-    flood();
-    host.run(1);
-  }
-  EXPECT_EQ(wires().size(), 2);
-  EXPECT_EQ(board.state(), BoardState::active);
-  host.wires[2].cut = false;
-  host.wires[0].lag_ms = host.wires[1].lag_ms = 30;  // the new one is ahead
-  for (int i = 0; i < 150; ++i) {
-    flood();
-    host.run(1);
-  }
-  EXPECT_EQ(wires().size(), 3) << "it joins with the first heartbeat that both have brought";
-  EXPECT_EQ(wires().losses(), 0U);
 }
 
 // --- a board with a key
@@ -427,19 +297,6 @@ TEST_F(ApplicationWiresWithAKey, WhoRelaysAtOnceIsAWireAndNoMore) {
     board.run(100);
   }
   EXPECT_EQ(board.reason(), SafeReason::link) << "it keeps nothing alive";
-}
-
-TEST_F(ApplicationWiresWithAKey, AnOldCaptureDoesNothing) {
-  host.heartbeat();
-  const std::string old = host.last;
-  host.run(260);
-  const Source attacker{3, 9};
-  board.receive_raw(old, attacker);
-  EXPECT_EQ(board.log.rejected.back(), "replayed");
-  host.run(10'000);
-  board.receive_raw(old, attacker);
-  EXPECT_EQ(board.log.rejected.back(), "replayed");
-  EXPECT_EQ(wires().size(), 2);
 }
 
 TEST_F(ApplicationWiresWithAKey, AFastWireTakesOverFromOneThatLagsAtAnyRateOfCommands) {
@@ -523,18 +380,6 @@ TEST_F(ApplicationWires, TheSameStopByAllWiresIsOneCause) {
 }
 
 // --- what is sent
-
-TEST_F(ApplicationWires, EachGetsStateAndHeartbeatsWithNumbersThatGoOn) {
-  WiredHost host(board, {{wire_a}, {wire_b}});
-  host.connect();
-  forget();
-  host.run(1000);
-  for (const int port : {0, 1}) {
-    const std::vector<Heard> heard = board.take(port);
-    EXPECT_GE(heard.size(), 102U) << "100 states, two heartbeats";
-    for (std::size_t i = 1; i < heard.size(); ++i) EXPECT_EQ(heard[i].pnum, heard[i - 1].pnum + 1);
-  }
-}
 
 TEST_F(ApplicationWires, TwoPlacesOnOnePortGetTheSame) {
   const Source other{0, 5};

@@ -34,39 +34,6 @@ TEST(Bridge, AHostDrivesTheBoardBehindIt) {
   EXPECT_EQ(status.hosts.from.damaged + status.board.from.damaged, 0U);
 }
 
-TEST(Bridge, ASecondHostIsToldThatTheBoardIsBusyAndMayStopIt) {
-  Bridge bridge("udp://127.0.0.1:0", "sim:");
-  Board board(host_url(bridge));
-  board.wait_active();
-  Board other(host_url(bridge));
-  EXPECT_EQ(problem_of([&] { other.wait_active(500ms); }).kind, ErrorKind::refused);
-  EXPECT_TRUE(other.link().busy);
-  other.stop();  // throws unless the board confirms it
-  EXPECT_GE(bridge.status().at(0).hosts.from.kept_out, 1U);
-}
-
-TEST(Bridge, WhoWatchesHearsTheBoardThatAnotherDrives) {
-  Bridge bridge("udp://127.0.0.1:0", "sim:");
-  Board board(host_url(bridge));
-  board.wait_active();
-  BoardOptions options;
-  options.role = BoardRole::watch;
-  Board watcher(host_url(bridge), options);
-  watcher.wait_active();
-  EXPECT_EQ(watcher.link().state, HostLinkState::active);
-}
-
-TEST(Bridge, TheNextHostNeedNotWaitForTheTimeoutAfterAFarewell) {
-  BridgeOptions options;
-  options.timeout = 1min;
-  Bridge bridge("udp://127.0.0.1:0", "sim:", options);
-  for (int i = 0; i < 3; ++i) {
-    Board board(host_url(bridge));
-    board.wait_active();
-    board.identify();
-  }
-}
-
 TEST(Bridge, JoinsAWholeFleetInOrder) {
   Bridge bridge("udp://127.0.0.{1-3}:0", "sim:?node=7-9");
   ASSERT_EQ(bridge.size(), 3U);

@@ -168,25 +168,6 @@ TEST_F(RunLoop, RunsByTheStatesUntilTheStepEndsItAndLeavesTheMotorsAtRest) {
   EXPECT_EQ(board.disarmed_by(), DisarmCause::none) << "another may begin";
 }
 
-TEST_F(RunLoop, EndsWhenTheHandleIsReleased) {
-  const LoopReport report = run_loop(board, loop, [&](const LoopStep& step) {
-    if (step.state.encoder(1) > 5) robot.happen("handle released");
-    return drive(step);
-  });
-  EXPECT_TRUE(report.end == LoopEnd::disarmed || report.end == LoopEnd::not_active);
-  EXPECT_TRUE(report.at_rest && contains(report.why, "handle")) << report.why;
-  EXPECT_TRUE(robot.look().pins.is_safe());
-}
-
-TEST_F(RunLoop, EndsWhenNoStateHasWhatItNeeds) {
-  loop.fields = "ENC1,US1";
-  loop.first = 100ms;
-  const LoopReport report = run_loop(board, loop, drive);
-  EXPECT_EQ(report.end, LoopEnd::late);
-  EXPECT_EQ(report.steps, 0U);
-  EXPECT_TRUE(contains(report.why, "ENC1,US1")) << report.why;
-}
-
 TEST_F(RunLoop, ComesToRestBeforeItPassesAnExceptionOn) {
   EXPECT_THROW(run_loop(board, loop,
                         [&](const LoopStep& step) -> std::optional<Setpoints> {

@@ -68,26 +68,6 @@ TEST_F(RecordingOfABoard, HasBothDirectionsAndWhatHappened) {
   }
 }
 
-TEST_F(RecordingOfABoard, OfSeveralIsOneFileWithAWireEach) {
-  Recording recording(path("two.r4log.zst"));
-  {
-    Board left("sim:?node=1", at_will());
-    Board right("sim:?node=2", at_will());
-    left.record(recording);
-    right.record(recording);
-    left.wait_active();
-    right.wait_active();
-    left.next_state();
-    right.next_state();
-  }
-  recording.close();
-  EXPECT_FALSE(recording.problem());
-  const Heard all = heard("two.r4log.zst");
-  EXPECT_TRUE(all.damage.empty());
-  EXPECT_EQ(static_cast<std::uint64_t>(all.count), recording.records() + 1) << "and its end";
-  EXPECT_TRUE(has(all, " 1< AIN24:") && has(all, " 2< AIN24:"));
-}
-
 TEST_F(RecordingOfABoard, ThatTheDiskEndsIsToldAndTheLinkGoesOn) {
   std::mutex mutex;
   std::condition_variable told;
@@ -121,35 +101,6 @@ TEST_F(RecordingOfABoard, ThatTheDiskEndsIsToldAndTheLinkGoesOn) {
   board.next_state();
   board.close();
   EXPECT_TRUE(has(heard("next.r4log"), " 1< AIN24:"));
-}
-
-TEST_F(RecordingOfABoard, WhoseFileWasRemovedIsBegunAnewAndTheBoardIsTold) {
-  std::mutex mutex;
-  std::condition_variable told;
-  std::vector<Problem> problems;
-  Board board("sim:", at_will());
-  const ScopedSubscription events = board.on_event([&](const CarrierEvent& event) {
-    const std::lock_guard lock(mutex);
-    if (event.kind == CarrierEvent::Kind::warning) problems.push_back(event.problem);
-    told.notify_all();
-  });
-  board.wait_active();
-  Recording recording(path());
-  board.record(recording);
-  fs::remove(path());
-  {
-    std::unique_lock lock(mutex);
-    ASSERT_TRUE(told.wait_for(lock, 10s, [&] { return !problems.empty(); }));
-  }
-  board.next_state();
-  recording.close();
-  ASSERT_EQ(problems.size(), 1U);
-  EXPECT_EQ(problems[0].kind, ErrorKind::data);
-  EXPECT_TRUE(contains(problems[0].reason, "was removed"));
-  ASSERT_TRUE(recording.problem());
-  EXPECT_EQ(recording.problem()->text(), problems[0].text());
-  EXPECT_TRUE(has(heard(), " 0! warning .*was removed") && has(heard(), " 1< AIN24:"));
-  EXPECT_TRUE(has(heard(), " 0! end"));
 }
 
 TEST_F(RecordingOfABoard, ThatCannotBeOpenedIsAnErrorAtTheCall) {

@@ -39,6 +39,7 @@ TEST_P(SleepingHost, FindsTheMotorsOffAndLeavesThemOff) {
     }
     EXPECT_EQ(sleeper.restarts, 1);
     EXPECT_TRUE(sleeper.session->in_control(sleeper.now()));
+    EXPECT_EQ(sleeper.drive(50).outcome, Outcome::confirmed) << "it is obeyed again";
   }
 }
 
@@ -54,40 +55,32 @@ TEST_P(SleepingHost, FindsTheMotorsOffAlsoAfterAPauseOfItsVirtualMachine) {
   EXPECT_TRUE(robot.session->in_control(robot.now()));
 }
 
-TEST_P(SleepingHost, IsNotArmedByWhatItAskedForThoughTheBoardRestartedMeanwhile) {
-  WiredRobot armed(GetParam(), SessionOptions());
-  armed.connect();
-  cut_all(armed);
-  armed.run(1500);
-  const Ticket arm = armed.session->arm(std::chrono::seconds{30}, armed.now());
-  const auto command = Command::osmc(100, Direction::forward, 1);
-  const Ticket drive = armed.session->send(command, std::chrono::seconds{30}, armed.now());
-  armed.reboot(0);
-  armed.sleep(9000);
-  cut_all(armed, false);
-  for (int ms = 0; ms < 5000; ++ms) {
-    armed.run(1);
-    ASSERT_FALSE(drives(armed)) << ms << " ms after its waking";
+// The commands were asked for before the sleep and were not sent: before the board was heard, while the link was
+// lost, or before the board restarted.
+TEST_P(SleepingHost, CancelsACommandAndAnArmThatItAskedForBefore) {
+  enum class Link { never_heard, lost, restarted };
+  for (const Link link : {Link::never_heard, Link::lost, Link::restarted}) {
+    WiredRobot armed(GetParam(), SessionOptions());
+    if (link == Link::never_heard) cut_all(armed);
+    armed.connect();
+    if (link != Link::never_heard) cut_all(armed);
+    armed.run(1500);
+    const Ticket arm = armed.session->arm(std::chrono::seconds{30}, armed.now());
+    const auto command = Command::osmc(100, Direction::forward, 1);
+    const Ticket drive = armed.session->send(command, std::chrono::seconds{30}, armed.now());
+    if (link == Link::restarted) armed.reboot(0);
+    armed.sleep(9000);
+    cut_all(armed, false);
+    for (int ms = 0; ms < 5000; ++ms) {
+      armed.run(1);
+      ASSERT_FALSE(drives(armed)) << ms << " ms after its waking";
+    }
+    EXPECT_EQ(armed.finish(arm).outcome, Outcome::cancelled);
+    EXPECT_EQ(armed.finish(drive).outcome, Outcome::cancelled);
+    if (link == Link::lost) {
+      EXPECT_EQ(armed.session->disarmed_by(), DisarmCause::sleep);
+    }
   }
-  EXPECT_EQ(armed.finish(arm).outcome, Outcome::cancelled);
-  EXPECT_EQ(armed.finish(drive).outcome, Outcome::cancelled);
-}
-
-TEST_P(SleepingHost, IsNotArmedByWhatItAskedForThoughTheBoardWasNeverHeard) {
-  WiredRobot armed(GetParam(), SessionOptions());
-  cut_all(armed);
-  armed.connect();
-  const Ticket arm = armed.session->arm(std::chrono::seconds{30}, armed.now());
-  const auto command = Command::osmc(100, Direction::forward, 1);
-  const Ticket drive = armed.session->send(command, std::chrono::seconds{30}, armed.now());
-  armed.sleep(9000);
-  cut_all(armed, false);
-  for (int ms = 0; ms < 5000; ++ms) {
-    armed.run(1);
-    ASSERT_FALSE(drives(armed)) << ms << " ms after its waking";
-  }
-  EXPECT_EQ(armed.finish(arm).outcome, Outcome::cancelled);
-  EXPECT_EQ(armed.finish(drive).outcome, Outcome::cancelled);
 }
 
 TEST_P(SleepingHost, SwitchesTheMotorsOffAtOnceWhereTheBoardWaitsForLonger) {
@@ -104,30 +97,6 @@ TEST_P(SleepingHost, SwitchesTheMotorsOffAtOnceWhereTheBoardWaitsForLonger) {
     patient.run(1);
   }
   EXPECT_TRUE(patient.session->in_control(patient.now()));
-}
-
-TEST_P(SleepingHost, IsObeyedAgain) {
-  robot.connect();
-  ASSERT_EQ(robot.drive(100).outcome, Outcome::confirmed);
-  robot.sleep(60'000);
-  robot.run(2000);
-  EXPECT_EQ(robot.drive(50).outcome, Outcome::confirmed);
-  EXPECT_TRUE(drives(robot));
-}
-
-// Its deadlines stood still with its clock: what was asked for before it slept is wanted no more.
-TEST_P(SleepingHost, GivesUpWhatHadNotBeenSent) {
-  robot.connect();
-  cut_all(robot);
-  robot.run(1500);
-  const auto command = Command::osmc(100, Direction::forward, 1);
-  const Ticket ticket = robot.session->send(command, std::chrono::seconds{30}, robot.now());
-  robot.sleep(60'000);
-  cut_all(robot, false);
-  robot.run(5000);
-  EXPECT_TRUE(robot.session->in_control(robot.now()));
-  EXPECT_EQ(robot.finish(ticket).outcome, Outcome::cancelled);
-  EXPECT_FALSE(drives(robot));
 }
 
 // It was on its way when the lid was closed, and may come late or never.
@@ -170,23 +139,6 @@ TEST_P(SleepingHost, HasItsStatesAgainIfItOnlyWatches) {
   watcher.told_states = 0;
   watcher.run(1000);
   EXPECT_GT(watcher.told_states, 50U);
-}
-
-TEST_P(SleepingHost, IsNotArmedByWhatItAskedForBefore) {
-  WiredRobot armed(GetParam(), SessionOptions());
-  armed.connect();
-  cut_all(armed);
-  armed.run(1500);
-  const Ticket arm = armed.session->arm(std::chrono::seconds{30}, armed.now());
-  const auto command = Command::osmc(100, Direction::forward, 1);
-  const Ticket drive = armed.session->send(command, std::chrono::seconds{30}, armed.now());
-  armed.sleep(60'000);
-  cut_all(armed, false);
-  armed.run(5000);
-  EXPECT_EQ(armed.finish(arm).outcome, Outcome::cancelled);
-  EXPECT_EQ(armed.finish(drive).outcome, Outcome::cancelled);
-  EXPECT_FALSE(drives(armed));
-  EXPECT_EQ(armed.session->disarmed_by(), DisarmCause::sleep);
 }
 
 INSTANTIATE_TEST_SUITE_P(Wires, SleepingHost,

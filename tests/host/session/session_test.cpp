@@ -30,17 +30,6 @@ TEST(Session, SendsAHeartbeatAtOnceAndThenTenASecond) {
   }
 }
 
-TEST(Session, AnswersABoardHeartbeatAtOnceWithItsTime) {
-  ScriptedLink link;
-  link.pass(30ms);
-  link.heartbeat();
-  EXPECT_EQ(link.last('H').at, link.now);
-  EXPECT_EQ(link.last('H').t, link.board_ms());
-  const std::uint32_t echoed = link.board_ms();
-  link.pass(100ms);
-  EXPECT_EQ(link.last('H').t, echoed) << "until the board's next one";
-}
-
 TEST(Session, IsConnectingWhileTheBoardBoots) {
   ScriptedLink link;
   link.boot_heartbeat();
@@ -219,17 +208,6 @@ TEST(Session, IsLostWhenTheBoardFallsSilentAndComesBackByItself) {
   EXPECT_EQ(link.session.link().state, HostLinkState::active);
 }
 
-TEST(Session, IsLostAtOnceWithItsTransport) {
-  ScriptedLink link;
-  link.connect();
-  link.session.on_transport(0, false, link.now);
-  EXPECT_EQ(link.session.link().state, HostLinkState::lost);
-  link.pass(30ms);
-  link.session.on_transport(0, true, link.now);
-  link.session.poll(link.now);
-  EXPECT_EQ(link.last('H').at, link.now) << "a heartbeat at once when it comes back";
-}
-
 TEST(Session, AsksForItsFieldsWhenTheLinkComesUpAndAgainWhenTheyAreMissing) {
   ScriptedLink link;
   link.heartbeat();
@@ -360,38 +338,6 @@ TEST(Session, PassesOverDatagramsThatAreNotOfABoard) {
   EXPECT_EQ(link.sent.size(), before);
   EXPECT_EQ(link.session.link().state, HostLinkState::connecting);
   EXPECT_EQ(link.session.statistics(link.now).received, 0U);
-}
-
-TEST(Session, StopsItsHeartbeatsWhenTheApplicationHangsAndGoesOnWhenItFeeds) {
-  ScriptedLink link;
-  link.connect();
-  link.session.watchdog(500ms, link.now);
-  for (int i = 0; i < 20; ++i) {
-    link.pass(100ms);
-    link.session.feed(link.now);
-    link.heartbeat();
-  }
-  EXPECT_FALSE(link.session.link().gated());
-  const Time fed = link.now;
-  for (int i = 0; i < 20; ++i) {
-    link.pass(100ms);
-    link.heartbeat();
-  }
-  EXPECT_TRUE(link.session.link().gated());
-  EXPECT_LE(link.last('H').at - fed, 501ms);
-  EXPECT_GE(link.last('H').at - fed, 400ms);
-
-  link.session.feed(link.now);
-  link.pass(100ms);
-  EXPECT_FALSE(link.session.link().gated());
-  EXPECT_GE(link.last('H').at, link.now - 100ms);
-
-  link.pass(600ms);
-  EXPECT_TRUE(link.session.link().gated());
-  link.session.watchdog(0ms, link.now);
-  link.pass(3s);
-  EXPECT_FALSE(link.session.link().gated());
-  EXPECT_GE(link.last('H').at, link.now - 100ms);
 }
 
 TEST(Session, IsBusyWhileTheBoardSaysThatAnotherHostControlsIt) {

@@ -21,6 +21,14 @@ bool executed_once(const WiredRobot& robot) {
                      [](const auto& each) { return each.second == 1; });
 }
 
+// The answer of the board of another host to the newest heartbeat.
+std::string busy_for(const WiredRobot& robot) {
+  Datagram datagram;
+  EXPECT_TRUE(read_datagram(robot.cables[0].all('H').back(), datagram));
+  return with_crc("N:" + std::to_string(datagram.pnum()) +
+                  ",BUSY;PNum:1;T:" + std::to_string(robot.board_ms(0)) + ";");
+}
+
 TEST(SessionWires, AskWhoIsThereBeforeAnythingElseIsSaid) {
   WiredRobot robot(Cables{{5}, {5}});
   robot.plug(0, true);
@@ -187,27 +195,17 @@ TEST(SessionWires, TellARefusalOnce) {
 TEST(SessionWires, AreRefusedWhenAllOfThemAre) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
-  const std::string heartbeat = robot.cables[0].all('H').back();
-  Datagram datagram;
-  ASSERT_TRUE(read_datagram(heartbeat, datagram));
-  const auto busy = [&](int number) {
-    return with_crc("N:" + std::to_string(datagram.pnum()) + ",BUSY;PNum:" +
-                    std::to_string(number) + ";T:" + std::to_string(robot.board_ms(0)) + ";");
-  };
-  robot.bring(1, busy(1));
+  robot.bring(1, busy_for(robot));
   EXPECT_FALSE(robot.session->link().busy);
   EXPECT_TRUE(robot.session->wire(1, robot.now()).busy);
-  robot.bring(0, busy(1));
+  robot.bring(0, busy_for(robot));
   EXPECT_TRUE(robot.session->link().busy);
 }
 
 TEST(SessionWires, AreNotRefusedByWhatTheBoardSaidBeforeItShowedThatItIsTheirs) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
-  Datagram datagram;
-  ASSERT_TRUE(read_datagram(robot.cables[0].all('H').back(), datagram));
-  const std::string busy = with_crc("N:" + std::to_string(datagram.pnum()) +
-                                    ",BUSY;PNum:1;T:" + std::to_string(robot.board_ms(0)) + ";");
+  const std::string busy = busy_for(robot);
   robot.run(50);  // states with CMD
   robot.bring(0, busy);
   robot.bring(1, busy);
@@ -218,10 +216,7 @@ TEST(SessionWires, AreNotRefusedByWhatTheBoardSaidBeforeItShowedThatItIsTheirs) 
 TEST(SessionWires, AreBackInControlAsSoonAsAStateShowsIt) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
-  Datagram datagram;
-  ASSERT_TRUE(read_datagram(robot.cables[0].all('H').back(), datagram));
-  const std::string busy = with_crc("N:" + std::to_string(datagram.pnum()) +
-                                    ",BUSY;PNum:1;T:" + std::to_string(robot.board_ms(0)) + ";");
+  const std::string busy = busy_for(robot);
   robot.bring(0, busy);
   robot.bring(1, busy);
   EXPECT_TRUE(robot.session->link().busy);

@@ -11,26 +11,6 @@ struct BoardLinkFarewell : BoardLinkTest {
   }
 };
 
-TEST_F(BoardLinkFarewell, FreesTheBoardAtOnce) {
-  connect();
-  run(300);
-  ASSERT_TRUE(may_leave(sent.back()));
-  link.leave(now);
-  EXPECT_EQ(link.state(), BoardLinkState::lost);
-  EXPECT_FALSE(link.has_owner());
-  EXPECT_TRUE(link.heartbeat_due(now)) << "which tells it";
-  run(1);
-  EXPECT_EQ(heartbeat(echo_pnum + 5000, sent.back(), there), HeartbeatEffect::new_session);
-}
-
-TEST_F(BoardLinkFarewell, EndsTheSessionEvenIfTheSameNumbersGoOn) {
-  connect();
-  run(300);
-  link.leave(now);
-  run(10);
-  EXPECT_EQ(heartbeat(echo_pnum + 2, sent.back()), HeartbeatEffect::new_session) << "not resumed";
-}
-
 TEST_F(BoardLinkFarewell, AHeartbeatThatItOvertookBeginsNothing) {
   connect();
   run(300);
@@ -107,12 +87,6 @@ TEST_F(BoardLinkFarewell, IsObeyedInASessionOfAnyAge) {
       }
     }
   }
-}
-
-TEST_F(BoardLinkFarewell, OfAClockOfItsOwnProvesNothing) {
-  send_due();
-  ASSERT_EQ(heartbeat(5, 42), HeartbeatEffect::new_session);
-  EXPECT_FALSE(may_leave(43));
 }
 
 }  // namespace

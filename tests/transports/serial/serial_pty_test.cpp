@@ -547,13 +547,13 @@ TEST_F(SerialPtyTest, CallsNoHandlerAfterClose) {
   EXPECT_TRUE(wait_for(at_host, "4"));
 }
 
-TEST_F(SerialPtyTest, LeaksNoDescriptorsOver100Reopenings) {
+TEST_F(SerialPtyTest, LeaksNoDescriptorsOver30Reopenings) {
   const std::string link = folder / "board";
   open_board("pty:" + link);
   open_host("serial://" + link);
   ASSERT_TRUE(run_until(io, [&] { return board->up(); }));
   const std::size_t before = open_descriptors();
-  for (int i = 0; i < 100; ++i) {
+  for (int i = 0; i < 30; ++i) {
     host->close();
     board->open(at_board);
     host->open(at_host);

@@ -275,39 +275,6 @@ TEST_F(SimulatedBoardTest, EveryOutputRegisterIsSafeInTimeWhenTheHostFallsSilent
   }
 }
 
-TEST_F(SimulatedBoardTest, AnAnalogInputIsCalibratedAtOnceAndNoOther) {
-  SimulatedBoard::Options options;
-  options.settings.site.full_scale_cv[static_cast<int>(Analog::ain12)] = 4000;
-  build(std::move(options), "pty:cable");
-  for (int i = 0; i < analog_channels; ++i) {
-    board_->model().pin_analog(static_cast<Analog>(i), 2000);
-  }
-  connect();
-  command("F:ALL");
-  run(20);
-  EXPECT_EQ(states().back().analog_cv[0], 2000);
-  EXPECT_EQ(states().back().analog_cv[1], 1600) << "as set from the start";
-  command("C:AIN24,55.00");
-  run(20);
-  EXPECT_EQ(states().back().analog_cv[0], 2200);
-  EXPECT_EQ(states().back().analog_cv[1], 1600);
-  for (int i = 2; i < analog_channels; ++i) EXPECT_EQ(states().back().analog_cv[i], 2000) << i;
-}
-
-TEST_F(SimulatedBoardTest, AChipThatIsNotFittedIsNotMissed) {
-  SimulatedBoard::Options options;
-  options.settings.site.chips = 17;  // OSMC and servos
-  options.script = Script::parse("0 chip dhb off\n0 chip expander off\n0 chip dac off\n", "test");
-  build(std::move(options));
-  connect();
-  command("O:358,1,1");
-  command("S:1500,2");
-  run_alive(1000);
-  EXPECT_EQ(board_->application().reason(), SafeReason::none);
-  EXPECT_EQ(board_->model().pins().osmc[0].pwm, 358);
-  EXPECT_NEAR(board_->model().pins().servo_us[1], 1500, 3);
-}
-
 TEST_F(SimulatedBoardTest, TellsOfWhatItRefuses) {
   build();
   connect();
@@ -523,25 +490,6 @@ TEST_F(TroubledBoardTest, AChipThatStopsAnsweringIsAFaultUntilItIsBackAndCleared
   expect_drives_after_clear();
 }
 
-TEST_F(TroubledBoardTest, EveryChipIsMissed) {
-  for (const char* chip : {"osmc", "dhb", "servo", "expander", "dac"}) {
-    events_.clear();
-    drive(std::string("0.3 chip ") + chip + " off\n");
-    run_alive(600);
-    EXPECT_EQ(board_->application().reason(), SafeReason::fault) << chip;
-    EXPECT_EQ(events_.front(), "no acknowledge") << chip;
-  }
-}
-
-TEST_F(TroubledBoardTest, AChipThatLostItsSupplyIsSetUpAnewWithEverythingOff) {
-  drive("0.3 chip osmc reset\n");
-  run_alive(500);
-  EXPECT_EQ(events_, (Lines{"outputs 0", "was reset", "SAFE fault"}));
-  run_alive(500);
-  EXPECT_TRUE(board_->model().pins().is_safe());
-  expect_drives_after_clear();
-}
-
 TEST_F(TroubledBoardTest, AHeldBusIsAFaultAndTheLoopGoesOn) {
   drive("0.3 i2c held\n1 i2c free\n");
   listener_.heard.clear();
@@ -584,31 +532,6 @@ TEST_F(TroubledBoardTest, ALoopThatDoesNotComeBackIsReset) {
   command("O:400,1,1");
   EXPECT_EQ(events_, Lines{"refused SAFE"});
   expect_drives_after_clear();
-}
-
-TEST_F(TroubledBoardTest, SilenceIsJudgedWhileTheLoopHangs) {
-  // The host's last word came at 0; the loop hangs over the end of the timeout.
-  drive("0.95 hang 0.09\n");
-  run(999);
-  EXPECT_EQ(board_->model().pins().osmc[0].pwm, 358);
-  run(1);
-  EXPECT_TRUE(board_->model().pins().is_safe());
-  EXPECT_EQ(events_, Lines{"outputs 0"});
-  run(50);
-  EXPECT_EQ(events_.back(), "SAFE link");
-}
-
-TEST_F(TroubledBoardTest, AThresholdNeedsASensorThatAnswers) {
-  drive("0.4 us 2 off\n1 us 2 0\n");
-  run_alive(300);
-  command("U:50,2");
-  EXPECT_EQ(board_->application().reason(), SafeReason::none);
-  events_.clear();
-  run_alive(500);
-  EXPECT_EQ(events_, (Lines{"outputs 0", "SAFE proximity"}));
-  run_alive(1100);
-  EXPECT_EQ(events_.back(), "ACTIVE none");
-  EXPECT_EQ(board_->model().pins().osmc[0].pwm, 0);
 }
 
 }  // namespace

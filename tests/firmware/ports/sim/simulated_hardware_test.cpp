@@ -167,26 +167,6 @@ TEST(SimulatedHardware, AStepperMovesAtItsSpeedAndStopsAtItsTarget) {
   EXPECT_EQ(bench.board.pins().stepper[0].stepping, 0);
 }
 
-TEST(SimulatedHardware, ASlowStepperLosesNoPartOfAStep) {
-  HardwareBench bench;
-  bench.hardware.hal().apply(stepper_to(1000, 7, 3));
-  bench.run(10'010);
-  EXPECT_EQ(bench.sample().stepper_steps[2], 70);
-  EXPECT_EQ(bench.board.pins().stepper[2].position, 70);
-}
-
-TEST(SimulatedHardware, ASafeStepperStaysWhereItIs) {
-  HardwareBench bench;
-  bench.hardware.hal().apply(stepper_to(100, 1000));
-  bench.run(50);
-  const std::int32_t there = bench.board.pins().stepper[0].position;
-  bench.hardware.hal().make_safe();
-  bench.run(5000);
-  EXPECT_TRUE(bench.board.pins().is_safe());
-  EXPECT_EQ(bench.board.pins().stepper[0].position, there);
-  EXPECT_EQ(bench.sample().stepper_steps[0], there);
-}
-
 // --- motors
 
 TEST(SimulatedHardware, WithoutSupplyNoMotorTurnsWhateverItsDriverIsTold) {
@@ -299,20 +279,6 @@ TEST(SimulatedHardware, AShaftIsTurnedByHandToAnyCount) {
   EXPECT_EQ(bench.sample().encoder_index_counts[1], 2000);
   EXPECT_EQ(bench.sample().encoder_counts[2], -13000);
   EXPECT_EQ(bench.sample().encoder_index_counts[2], -13000);
-}
-
-TEST(SimulatedHardware, ZeroCountsFromHereAndHoldsTheStepper) {
-  HardwareBench bench;
-  bench.hardware.hal().apply(stepper_to(100, 1000, 2));
-  bench.board.turn_encoder(2, 1234);
-  bench.board.turn_encoder(1, 99);
-  bench.run(50);
-  bench.hardware.hal().zero(2);
-  EXPECT_EQ(bench.sample().stepper_steps[1], 0);
-  EXPECT_EQ(bench.sample().encoder_counts[1], 0);
-  EXPECT_EQ(bench.sample().encoder_counts[0], 99);
-  bench.run(5000);
-  EXPECT_EQ(bench.sample().stepper_steps[1], 0);
 }
 
 // --- ultrasonic sensors

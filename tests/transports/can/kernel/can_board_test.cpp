@@ -13,17 +13,18 @@
 namespace r4::test {
 namespace {
 
-struct Form {
+struct BoardForm {
   const char* name;
   const char* url;
   const char* pack;  // of the host's URL
   bool packed;       // what the host hears
 };
-class CanBoard : public testing::TestWithParam<Form> {};
+class CanBoard : public testing::TestWithParam<BoardForm> {};
 INSTANTIATE_TEST_SUITE_P(Forms, CanBoard,
-                         testing::Values(Form{"plain", "can://vcan0?node=9", "&pack=0", false},
-                                         Form{"packed", "can://vcan0?node=9", "", true},
-                                         Form{"fd_packed", "can://vcan0?node=9&fd=1", "", true}),
+                         testing::Values(BoardForm{"plain", "can://vcan0?node=9", "&pack=0", false},
+                                         BoardForm{"packed", "can://vcan0?node=9", "", true},
+                                         BoardForm{"fd_packed", "can://vcan0?node=9&fd=1", "",
+                                                   true}),
                          [](const auto& form) { return std::string(form.param.name); });
 
 TEST_P(CanBoard, EveryChannelReachesItsPinAndComesBack) {

@@ -27,7 +27,7 @@ namespace r4::test {
 inline constexpr char near_end[] = "vxcan7";
 inline constexpr char far_end[] = "vxcan8";
 inline constexpr std::uint8_t node = 3;
-inline constexpr std::uint32_t heard_id = 0x183;
+inline constexpr std::uint32_t heard_frame_id = 0x183;
 inline constexpr std::uint32_t other_id = 0x555;
 inline constexpr std::chrono::milliseconds soon{200};
 
@@ -57,7 +57,7 @@ class CanBusTest : public testing::Test {
 
   static CanFrame data(std::uint8_t byte) {
     CanFrame frame{};
-    frame.id = heard_id;
+    frame.id = heard_frame_id;
     frame.size = 1;
     frame.data[0] = byte;
     return frame;
@@ -92,7 +92,7 @@ class CanBusTest : public testing::Test {
 // Writes down what it is told.
 class Witness final : public CanBus::Member {
  public:
-  explicit Witness(std::shared_ptr<CanBus> bus, std::uint32_t id = heard_id)
+  explicit Witness(std::shared_ptr<CanBus> bus, std::uint32_t id = heard_frame_id)
       : bus_(std::move(bus)) {
     bus_->join(*this, {id});
   }

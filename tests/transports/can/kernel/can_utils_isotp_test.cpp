@@ -1,16 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// can-utils' isotpsend and isotprecv against our ISO-TP engine. For tools/with-can.
+// can-utils' isotpsend and isotprecv against our ISO-TP engine. For tools/with-can. Both use the kernel's ISO-TP
+// sockets: kernel_isotp_test.cpp has every length.
 #include <gtest/gtest.h>
-#include <signal.h>
-#include <spawn.h>
 #include <stdio.h>
-#include <sys/mman.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <cerrno>
-#include <cstdlib>
-#include <deque>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -37,12 +31,6 @@ class Program {
   std::string output() {
     std::string text;
     for (int byte; (byte = fgetc(output_)) != EOF;) text += static_cast<char>(byte);
-    return text;
-  }
-  // The next line that it prints.
-  std::string line() {
-    std::string text;
-    for (int byte; (byte = fgetc(output_)) != EOF && byte != '\n';) text += static_cast<char>(byte);
     return text;
   }
   // Waits for its end; its status.
@@ -107,98 +95,6 @@ TEST_P(CanUtils, IsotpsendSendsTheEngineWhatItReads) {
     EXPECT_EQ(hex_of({receiver.text().data(), receiver.text().size()}), hex_of(datagram));
     EXPECT_EQ(program.end(), 0);
   }
-}
-
-// Without padding, in many lengths.
-class CanUtilsLengths : public testing::TestWithParam<Form> {};
-INSTANTIATE_TEST_SUITE_P(, CanUtilsLengths, testing::Values(forms[0], forms[2]),
-                         [](const auto& form) { return form.param.name; });
-
-TEST_P(CanUtilsLengths, OfTheEngineIsPrintedByOneIsotprecv) {
-  RawCan bus(flow_control_id);
-  // Line by line, whatever its output is; its first line is how to end it.
-  Program program("echo $$; exec timeout 60 stdbuf -oL isotprecv -l -s 200 -d 180 -P l" +
-                  link_options(GetParam()));
-  const pid_t process = std::atoi(program.line().c_str());
-  ASSERT_GT(process, 0);
-  IsotpSenderOptions impatient = sender_of(GetParam());
-  impatient.n_bs_us = 100000;
-  const std::string first = content_of(longest_datagram);
-  IsotpSender finding(impatient);
-  const std::uint32_t until_us = clock_us() + 5000000;
-  while (drive(bus, finding, first).error == IsotpError::flow_control_timeout &&
-         !reached(clock_us(), until_us)) {
-    // it has not bound its socket yet
-  }
-  EXPECT_EQ(program.line(), hex_of(first));
-  IsotpSender sender(sender_of(GetParam()));
-  std::uint32_t datagrams = 0;
-  for (std::uint32_t size = 1; size <= longest_datagram && !HasFailure();
-       size = next_length(size), ++datagrams) {
-    const std::string datagram = content_of(size);
-    EXPECT_EQ(drive(bus, sender, datagram).error, IsotpError::none) << size;
-    EXPECT_EQ(program.line(), hex_of(datagram)) << size;
-  }
-  EXPECT_EQ(sender.counters().datagrams, datagrams);
-  ::kill(process, SIGTERM);
-}
-
-// Each length takes a process of its own, and the emulated machine some 80 ms for it.
-constexpr std::uint32_t next_costly_length(std::uint32_t size) {
-  return size < 24 ? size + 1 : size + 51;
-}
-
-// isotpsend without a shell around it. Its exit status.
-class Isotpsend {
- public:
-  Isotpsend(const Form& form, const std::string& datagram) {
-    const std::string text = hex_of(datagram);
-    const int input = memfd_create("input", MFD_CLOEXEC);
-    if (write(input, text.data(), text.size()) != static_cast<ssize_t>(text.size()) ||
-        lseek(input, 0, SEEK_SET) != 0) {
-      throw std::system_error(errno, std::generic_category(), "memfd");
-    }
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
-    const char* const words[] = {"isotpsend",   "-b",   "-s", "180",
-                                 "-d",          "200",  "-L", form.tx_dl > 8 ? "72:64:0" : "16:8:0",
-                                 can_interface, nullptr};
-    const int error = posix_spawnp(&process_, words[0], &actions, nullptr,
-                                   const_cast<char* const*>(words), environ);
-    posix_spawn_file_actions_destroy(&actions);
-    close(input);
-    if (error != 0) throw std::system_error(error, std::generic_category(), words[0]);
-  }
-  ~Isotpsend() { end(); }
-  Isotpsend(const Isotpsend&) = delete;
-  Isotpsend& operator=(const Isotpsend&) = delete;
-
-  int end() {
-    int status = -1;
-    if (process_ > 0) waitpid(std::exchange(process_, -1), &status, 0);
-    return status;
-  }
-
- private:
-  pid_t process_ = -1;
-};
-
-TEST_P(CanUtilsLengths, OfIsotpsendIsTakenByTheEngine) {
-  RawCan bus(data_id);
-  std::string buffer(longest_datagram, '\0');
-  IsotpReceiver receiver(receiver_of(GetParam()), buffer.data(), longest_datagram);
-  // The kernel takes its time to close a socket: meanwhile the next one sends.
-  std::deque<Isotpsend> ending;
-  for (std::uint32_t size = 1; size <= longest_datagram && !HasFailure();
-       size = next_costly_length(size)) {
-    const std::string datagram = content_of(size);
-    ending.emplace_back(GetParam(), datagram);
-    EXPECT_EQ(drive(bus, receiver).error, IsotpError::none) << size;
-    EXPECT_TRUE(receiver.text() == Text(datagram.data(), datagram.size())) << size;
-    for (; ending.size() > 3; ending.pop_front()) EXPECT_EQ(ending.front().end(), 0) << size;
-  }
-  for (Isotpsend& program : ending) EXPECT_EQ(program.end(), 0);
 }
 
 }  // namespace
