@@ -67,7 +67,7 @@ TEST(DatagramRing, CarriesBetweenThreadsWithoutLosingAnyByte) {
       if (ring.put(note, Text(text))) {
         ++i;
       } else {
-        std::this_thread::yield();  // one processor must do
+        std::this_thread::yield();  // one processor must suffice
       }
     }
   });
