@@ -67,8 +67,8 @@ void add(Report& sum, const Report& report) {
   sum.worst_silence_us = std::max(sum.worst_silence_us, report.worst_silence_us);
 }
 
-// How many schedules to run: R4_SCHEDULES or the default, divided by `part`. With 200 or more, every
-// event that is under test occurs.
+// How many schedules to run: R4_SCHEDULES or the default, divided by `part`. With 200 or more,
+// every event that is under test occurs.
 std::uint64_t schedules_for(std::uint64_t part) {
   return std::max<std::uint64_t>(from_environment("R4_SCHEDULES", 30'000) / part, 200);
 }
