@@ -57,7 +57,7 @@ class GigaBench {
     system = std::make_unique<giga::System>();
     system->boot();
   }
-  // In a network that it knows. True if it has joined it.
+  // Boots with a network in its settings. True if the board has joined it.
   bool boot_in_network() {
     giga.stored["r4-settings"] = "network,lab\npassword,correct%20horse\n";
     boot();

@@ -29,7 +29,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Looks at each state of the board, for 5 s.
+// True if `done` becomes true within 5 s. It is checked after each state of the board.
 template <class Done>
 bool comes_true(Board& board, Done done) {
   const auto end = std::chrono::steady_clock::now() + 5s;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A working day of one board in virtual time: the application and the chip drivers on the model of the
-// board, every millisecond of it, with a host that drives it and an incident every few minutes. Both the
-// clock in milliseconds and the clock in microseconds wrap during the day. R4_DAY_HOURS sets its length
-// (8 by default), and R4_SEED its incidents.
+// A working day of one board in virtual time: the application and the chip drivers on the model of
+// the board, every millisecond of it, with a host that drives it and an incident every few minutes.
+// Both the clock in milliseconds and the clock in microseconds wrap during the day. R4_DAY_HOURS
+// sets its length (8 by default), and R4_SEED its incidents.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The promises of docs/safety.md under random faults. R4_SCHEDULES sets how many schedules are run (30,000
-// by default). A fifth as many are run with standstills, and a tenth with several paths. R4_SEED replays one
-// schedule and prints its trace.
+// The promises of docs/safety.md under random faults. R4_SCHEDULES sets how many schedules are run
+// (30,000 by default). A fifth as many are run with standstills, and a tenth with several paths.
+// R4_SEED replays one schedule and prints its trace.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -67,7 +67,8 @@ void add(Report& sum, const Report& report) {
   sum.worst_silence_us = std::max(sum.worst_silence_us, report.worst_silence_us);
 }
 
-// One of `part` of the schedules that were asked for, but enough to reach what they are to test.
+// How many schedules to run: R4_SCHEDULES or the default, divided by `part`. With 200 or more,
+// every event that is under test occurs.
 std::uint64_t schedules_for(std::uint64_t part) {
   return std::max<std::uint64_t>(from_environment("R4_SCHEDULES", 30'000) / part, 200);
 }
@@ -166,7 +167,7 @@ TEST(LinkSimulation, KeepsEveryPromiseOfABoardThatStandsStillNowAndThen) {
 
 TEST(LinkSimulation, KeepsEveryPromiseOverSeveralWires) {
   if (std::getenv("R4_SEED") != nullptr) return replay(World::Beside::wires);
-  const std::uint64_t schedules = schedules_for(10);  // each takes four times as long
+  const std::uint64_t schedules = schedules_for(10);  // a schedule takes four times as long
   const Report sum = run_all(schedules, World::Beside::wires);
   fmt::print(
       "several wires: {} joined, {} lost while the session went on, {} failovers; {} copies at "

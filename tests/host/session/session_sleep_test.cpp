@@ -55,8 +55,8 @@ TEST_P(SleepingHost, FindsTheMotorsOffAlsoAfterAPauseOfItsVirtualMachine) {
   EXPECT_TRUE(robot.session->in_control(robot.now()));
 }
 
-// The commands were asked for before the sleep and were not sent: before the board was heard, while the link was
-// lost, or before the board restarted.
+// The commands were asked for before the sleep and were not sent: before the board was heard, while
+// the link was lost, or before the board restarted.
 TEST_P(SleepingHost, CancelsACommandAndAnArmThatItAskedForBefore) {
   enum class Link { never_heard, lost, restarted };
   for (const Link link : {Link::never_heard, Link::lost, Link::restarted}) {

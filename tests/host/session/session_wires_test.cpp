@@ -21,7 +21,7 @@ bool executed_once(const WiredRobot& robot) {
                      [](const auto& each) { return each.second == 1; });
 }
 
-// The answer of the board of another host to the newest heartbeat.
+// The board's answer to the newest heartbeat if another host is in control.
 std::string busy_for(const WiredRobot& robot) {
   Datagram datagram;
   EXPECT_TRUE(read_datagram(robot.cables[0].all('H').back(), datagram));

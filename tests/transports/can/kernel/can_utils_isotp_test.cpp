@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// can-utils' isotpsend and isotprecv against our ISO-TP engine. For tools/with-can. Both use the kernel's ISO-TP
-// sockets: kernel_isotp_test.cpp has every length.
+// can-utils' isotpsend and isotprecv against our ISO-TP engine. For tools/with-can. Both use the
+// kernel's ISO-TP sockets: kernel_isotp_test.cpp has every length.
 #include <gtest/gtest.h>
 #include <stdio.h>
 

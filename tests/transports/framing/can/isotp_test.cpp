@@ -77,16 +77,16 @@ std::vector<CanFrame> frames_of(const Options& options, const std::string& datag
 }
 
 // What comes of the frames, one every `step_us`.
-struct Outcome {
+struct Received {
   Datagrams datagrams;
   IsotpReceiverCounters counters;
 };
 
-Outcome receive(const Options& options, const std::vector<CanFrame>& frames,
-                std::uint32_t step_us = 100) {
+Received receive(const Options& options, const std::vector<CanFrame>& frames,
+                 std::uint32_t step_us = 100) {
   std::string buffer(1024, '\0');
   IsotpReceiver receiver(options.receiver, buffer.data(), 1024);
-  Outcome outcome;
+  Received outcome;
   std::uint32_t now = 0xFFFFFF00;
   for (const CanFrame& frame : frames) {
     if (receiver.on_frame(frame, now).datagram) {
@@ -186,7 +186,7 @@ TEST(Isotp, EveryLengthInEveryFrameLengthArrives) {
       options.sender.channel.padding = padding;
       for (std::size_t size = 1; size <= 1024; ++size) {
         const std::string datagram = random_bytes(size, static_cast<std::uint32_t>(size));
-        const Outcome outcome = receive(options, frames_of(options, datagram));
+        const Received outcome = receive(options, frames_of(options, datagram));
         ASSERT_EQ(outcome.datagrams, Datagrams{datagram}) << size << " in frames of " << +tx_dl;
       }
     }
@@ -253,7 +253,7 @@ RC_GTEST_PROP(Isotp, DamageToTheOrderOfFramesGivesTheBytesOrNothing, ()) {
         std::swap(*place, frames[std::min(at + 1 + random() % 2, frames.size() - 1)]);
     }
   }
-  const Outcome outcome = receive(options, frames);
+  const Received outcome = receive(options, frames);
   for (const std::string& delivered : outcome.datagrams) RC_ASSERT(delivered == datagram);
   const IsotpReceiverCounters& c = outcome.counters;
   const std::uint32_t errors = c.wrong_sequence_number + c.interrupted + c.consecutive_timeout +
@@ -309,7 +309,7 @@ TEST(Isotp, WithoutFlowControlLossOverABorderCanJoinTwoDatagrams) {
     const auto from = frames.begin() + static_cast<std::ptrdiff_t>(c.kept);
     frames.erase(from, from + static_cast<std::ptrdiff_t>(c.lost));
 
-    const Outcome joined = receive(burst(), frames);
+    const Received joined = receive(burst(), frames);
     const std::size_t of_first = 6 + 7 * (c.kept - 1);
     EXPECT_EQ(joined.datagrams, Datagrams{first.substr(0, of_first) + second.substr(of_first)})
         << "what the CRC of the datagram is for";
