@@ -30,6 +30,7 @@ TEST_P(CanBoard, EveryChannelReachesItsPinAndComesBack) {
   BoardInAThread simulated(GetParam().url);
   Board board(simulated.url() + GetParam().pack, at_will());
   board.wait_active();
+  board.setting("rate", "50");  // 25 frames a state in plain text are much for an emulated machine
   expect_every_channel(controlled(simulated, board));
   EXPECT_EQ(board.carrier_counters().transfers->packed != 0, GetParam().packed);
 }
