@@ -200,9 +200,9 @@ def test_nothing_corrupt_is_ever_applied(form):
                 mask = bytearray(8)
                 mask[byte] = 0x01 if byte % 2 == 0 else 0x20
                 gateway.carry('-m', f'XOR:D:0.0.{mask.hex().upper()}')
-                dump.more(40)
+                dump.more(25)
                 gateway.carry()
-                dump.more(20)
+                dump.more(15)
             sender.signal(signal.SIGKILL)
         log = board.rest()
     ours = executed(log)

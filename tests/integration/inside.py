@@ -20,16 +20,16 @@ WITH_CAN = [TOOL] if 'R4_CAN_GUEST' in os.environ else ['nice', '-n', '10', TOOL
 # The guest needs less than three minutes. A busy machine may be several times as slow.
 LONGEST_S = 900
 PACKAGE = pathlib.Path(R4).resolve().parent / 'python'
-PYTEST = ['/usr/bin/python3', '-m', 'pytest', '-q', '-p', 'no:cacheprovider']
+PYTEST = ['/usr/bin/python3', '-X', f'pycache_prefix={HERE.parents[1] / "build/pycache"}', '-m', 'pytest', '-q',
+          '-p', 'no:cacheprovider']
 # Looking for plugins reads the metadata of every installed package, which takes the guest seconds.
-PLAIN = {**os.environ, 'PYTEST_DISABLE_PLUGIN_AUTOLOAD': '1', 'PYTHONPATH': str(PACKAGE),
-         'PYTHONPYCACHEPREFIX': str(HERE.parents[1] / 'build/pycache')}
-PLAIN.pop('PYTHONDONTWRITEBYTECODE', None)
+PLAIN = {**os.environ, 'PYTEST_DISABLE_PLUGIN_AUTOLOAD': '1', 'PYTHONPATH': str(PACKAGE), 'PYTHONDONTWRITEBYTECODE': '1'}
 
 
 def compile_here(files):
     """Python compiles the files on this machine: the guest would need ten times as long."""
-    subprocess.run([*PYTEST, *files, '--collect-only'], env=PLAIN, stdin=subprocess.DEVNULL, capture_output=True,
+    environment = {name: value for name, value in PLAIN.items() if name != 'PYTHONDONTWRITEBYTECODE'}
+    subprocess.run([*PYTEST, *files, '--collect-only'], env=environment, stdin=subprocess.DEVNULL, capture_output=True,
                    timeout=120, check=False)
 
 
