@@ -40,7 +40,7 @@ class CanTrouble {
   void on_host_datagram(Time now) { host_completed_ = now; }
   // How many transfers were not answered in time, since the beginning.
   void on_late(std::uint64_t count, Time now) {
-    for (; late_count_ < count; ++late_count_) late_[late_count_ % late_.size()] = now;
+    for (; late_count_ < count; ++late_count_) late_[place(late_count_)] = now;
   }
 
   std::uint64_t late() const { return late_count_; }
@@ -51,12 +51,15 @@ class CanTrouble {
   }
   WireTrouble now(Time now) const {
     if (hears_foreign_frames(now)) return WireTrouble::foreign_frames;
-    const Time oldest = late_[late_count_ % late_.size()];
+    const Time oldest = late_[place(late_count_)];
     const bool late = late_count_ >= late_.size() && now - oldest < late_within;
     return late && hears_board(now) ? WireTrouble::late_frames : WireTrouble::none;
   }
 
  private:
+  static std::size_t place(std::uint64_t count) {
+    return static_cast<std::size_t>(count % late_transfers);
+  }
   bool hears_foreign_frames(Time now) const {
     return now - host_heard_ < frames_over &&
            now - std::max(frames_since_, host_completed_) >= host_completes;

@@ -115,7 +115,7 @@ void ImpairedDirection::put(Time now, Item item) {
     return;
   }
   if (corrupted && !item.bytes.empty()) {
-    char& byte = item.bytes[where / 8 % item.bytes.size()];
+    char& byte = item.bytes[static_cast<std::size_t>(where / 8 % item.bytes.size())];
     byte = static_cast<char>(static_cast<unsigned char>(byte) ^ (1U << where % 8));
     ++counters_.corrupted;
   }

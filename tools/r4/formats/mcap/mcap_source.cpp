@@ -101,7 +101,7 @@ std::size_t McapSource::take_next(std::string_view bytes) {
     return 1;
   }
   if (bytes.size() - mcap::record_head < size) return 0;
-  const std::string_view content = bytes.substr(mcap::record_head, size);
+  const std::string_view content = bytes.substr(mcap::record_head, static_cast<std::size_t>(size));
   if (part_ == Part::header) {
     if (op != Op::header) fail_as_none();
     // Another profile is not the end: other tools write their own when they copy a file.
@@ -116,7 +116,7 @@ std::size_t McapSource::take_next(std::string_view bytes) {
   } else if (part_ == Part::data) {
     on_data_record(op, content);
   }
-  return mcap::record_head + size;
+  return mcap::record_head + content.size();
 }
 
 // To the next chunk that is compressed.
