@@ -128,7 +128,7 @@ void DeviceTopics::publish_imu(const Topic& topic, const State& state, TimeMessa
 }
 
 void DeviceTopics::publish_battery(const Topic& topic, const State& state, TimeMessage time) const {
-  constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
+  constexpr float not_measured = std::numeric_limits<float>::quiet_NaN();
   std::string none;
   const std::string frame = frame_prefix_ + topic.name;
   BatteryMessage message{};
@@ -139,7 +139,7 @@ void DeviceTopics::publish_battery(const Topic& topic, const State& state, TimeM
   message.current = -static_cast<float>(number_of(topic.device, state, "current"));
   for (float* value : {&message.temperature, &message.charge, &message.capacity,
                        &message.design_capacity, &message.percentage}) {
-    *value = unknown;
+    *value = not_measured;
   }
   message.present = true;
   message.location = borrowed(none);
