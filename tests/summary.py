@@ -56,9 +56,8 @@ def outcomes(build):
         second = alone(report)
         for name, outcome in cases(report):
             outcome = second.get(name, outcome)
-            suite, _, stem = name.partition('.')
-            file = junit / f'{stem}.xml'
-            inner = list(cases(file)) if suite in ('integration', 'python') and file.exists() else []
+            file = junit / f'{name}.xml'
+            inner = list(cases(file)) if file.exists() else []
             if outcome == 'failed' and all(each == 'passed' for _, each in inner):
                 inner = []  # the process failed, whatever its tests say
             for each, its_outcome in [(f'{name}.{case}', o) for case, o in inner] or [(name, outcome)]:

@@ -5,38 +5,21 @@ Bounds of real time are what r4 promises, so they are tested; a virtual machine 
 them all. A thread that only looks at the clock tells; a failure without a standstill counts at once.
 Each repeat is a line of build/results/repeats.txt, and they are counted at the end of a run.
 """
-import ctypes
-import fcntl
-import os
 import pathlib
 import signal
-import socket
-import struct
 import threading
 import time
 
 import pytest
 from _pytest.runner import runtestprotocol
 
+import own_network
+
 # What the tests run is interrupted; under nohup, or in the background of a shell, it would ignore that.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-CLONE_NEWNET, SIOCSIFFLAGS, IFF_UP = 0x40000000, 0x8914, 0x1
-
-
-def leave_the_network_of_others():
-    """Files of tests that run at a time do not meet at UDP ports: each has a network of its own, which is a loopback.
-
-    It takes root; without it they share the network of this machine. In the guest of tools/with-can are the interfaces.
-    """
-    if 'R4_CAN_GUEST' in os.environ or ctypes.CDLL(None).unshare(CLONE_NEWNET) != 0:
-        return
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
-        fcntl.ioctl(any_socket, SIOCSIFFLAGS, struct.pack('16sH22x', b'lo', IFF_UP))
-
-
-leave_the_network_of_others()
+own_network.enter()
 
 LOOK_S = 0.025  # seldom enough for the emulated machine of tools/with-can
 STANDSTILL_S = 0.02 + LOOK_S  # as exact as the promises are

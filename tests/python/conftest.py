@@ -1,9 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+import pathlib
+import sys
 import time
 
 import pytest
 
 import r4link
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / 'integration'))
+import own_network  # noqa: E402
+
+own_network.enter()
 
 PATIENCE_S = 10
 
