@@ -33,9 +33,6 @@ assert {'r4link/py.typed', 'r4link/_core.pyi', 'r4link_pytest.py'} <= files, fil
 carried = [each for each in files if each.startswith('r4link.libs/')]
 loaded = {line.split()[-1] for line in pathlib.Path('/proc/self/maps').read_text().splitlines() if '/' in line}
 assert all(str(package.locate_file(each)) in loaded for each in carried), (carried, loaded)
-names = {pathlib.Path(each).name.partition('-')[0] for each in carried} | {'libnl-3', 'libnl-route-3'}
-strangers = [each for each in loaded if 'r4link.libs' not in each and pathlib.Path(each).name.partition('.so')[0] in names]
-assert not strangers, strangers
 assert sum(each.endswith('/copyright') for each in files) == len(carried)
 print(f'wheel: {package.name} {package.version} drives a board; {len(carried)} libraries are its own')
 EOF
