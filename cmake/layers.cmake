@@ -11,8 +11,11 @@ set(R4_ASIO_DEFINITIONS ASIO_STANDALONE ASIO_SEPARATE_COMPILATION ASIO_NO_DEPREC
 # Our warnings, for our own targets only. Asio, CLI11 and the like are system headers.
 function(r4_warnings target)
   # clang has -Wsign-conversion in -Wconversion, and calls libstdc++'s own stable_sort() deprecated.
-  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow
-                         $<$<CXX_COMPILER_ID:Clang>:-Wno-sign-conversion$<SEMICOLON>-Wno-deprecated-declarations>)
+  set(warnings -Wall -Wextra -Wconversion -Wshadow)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+    list(APPEND warnings -Wno-sign-conversion -Wno-deprecated-declarations)
+  endif()
+  target_compile_options(${target} PRIVATE "$<$<COMPILE_LANGUAGE:CXX>:${warnings}>")
 endfunction()
 
 # Finds the package that an option of ours needs. `needs_it` and `debian` are for people.

@@ -156,7 +156,7 @@ void Giga::connect_converter() {
   constexpr std::uint32_t ready = 1U << 0;
   constexpr std::uint32_t converted = 1U << 2;
   ADC_TypeDef& adc = r4_fake_adc1;
-  adc.CR.on_write = [this, &adc](std::uint32_t value) {
+  adc.CR.on_write = [this](std::uint32_t value) {
     static const std::map<std::uint32_t, int> pins = {{4, 0x24}, {5, 0x11},  {8, 0x25},
                                                       {9, 0x10}, {12, 0x22}, {13, 0x23}};
     if (converter_hangs) return;
@@ -169,8 +169,8 @@ void Giga::connect_converter() {
     adc.DR.value = selected ? analog[pins.at(input)] : 0;
     adc.ISR.value |= converted;
   };
-  adc.ISR.on_write = [&adc](std::uint32_t value) { adc.ISR.value &= ~value; };
-  adc.DR.on_read = [&adc] {
+  adc.ISR.on_write = [](std::uint32_t value) { adc.ISR.value &= ~value; };
+  adc.DR.on_read = [] {
     adc.ISR.value &= ~converted;
     return adc.DR.value;
   };

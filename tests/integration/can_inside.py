@@ -414,13 +414,14 @@ def test_a_bus_is_shown_with_all_of_its_boards(tmp_path):
         load = {row['id']: row['load'] for row in rows}
         assert load[TELEMETRY] > 3 * load[TELEMETRY - 1] > 0
         assert abs(sum(load.values()) - total['load']) < 1e-9 and total['nearly_full'] is False
-        nearly_full = str(round(total['bits'] / 0.9))
-        for rate, words in ((nearly_full, 'nearly full'), ('125000', 'more than a bus of 125 kbit/s carries')):
-            for _ in range(5):  # half a second in which nothing stands still
-                warned = run('bus', 'can://vcan0', '--duration', '0.5', '--bitrate', rate, timeout=60)
-                if words in warned.stderr:
+        # An emulated machine that stands still sends less, and more afterwards.
+        for rate, words in ((total['bits'] / 0.9, 'nearly full|more than a bus of'),
+                            (total['bits'] / 10, 'more than a bus of [0-9.]+ kbit/s carries')):
+            for _ in range(5):
+                warned = run('bus', 'can://vcan0', '--duration', '0.5', '--bitrate', str(round(rate)), timeout=60)
+                if re.search(words, warned.stderr):
                     break
-            assert warned.returncode == 0 and words in warned.stderr, warned
+            assert warned.returncode == 0 and re.search(words, warned.stderr), warned
         host.skip_past()
         host.next(is_state)
     silent = run('monitor', 'can://vcan0', '--duration', '0.3', timeout=60)

@@ -13,9 +13,7 @@ from r4_process import R4
 
 HERE = pathlib.Path(__file__).resolve().parent
 TOOL = HERE.parents[1] / 'tools' / 'with-can'
-# The guest has two processors, and beside it runs the board that is emulated in real time (m7_board.py): it waits.
-WITH_CAN = [TOOL] if 'R4_CAN_GUEST' in os.environ else ['nice', '-n', '10', TOOL, '--guest']
-
+WITH_CAN = [TOOL] if 'R4_CAN_GUEST' in os.environ else [TOOL, '--guest']
 
 # The guest needs less than three minutes. A busy machine may be several times as slow.
 LONGEST_S = 900

@@ -235,7 +235,7 @@ def test_a_heartbeat_that_waited_while_the_board_stood_still_counts_from_before(
         safe = board.state('SAFE', 'link')
     after_ms = (safe['came'] - delivered) * 1000
     print(f'SAFE {after_ms:.0f} ms after the heartbeat was delivered')
-    assert 900 < after_ms  # it did feed
+    assert 700 < after_ms  # it did feed: without it, 500
     assert after_ms <= SAFE_WITHIN_MS or SANITIZED
 
 

@@ -21,7 +21,7 @@ class MadeUpMachine {
     std::string name = (std::filesystem::temp_directory_path() / "r4-doctor-XXXXXX").string();
     machine.root = ::mkdtemp(name.data());
     machine.user = {"mara", 4242, {4242}};
-    machine.run = [this](const std::string& command) { return says[command]; };
+    machine.run = [this](const std::string& line) { return says[line]; };
   }
   ~MadeUpMachine() { std::filesystem::remove_all(machine.root); }
   MadeUpMachine(const MadeUpMachine&) = delete;

@@ -108,7 +108,7 @@ class Device::Wire final : public Carrier {
 inline void Device::deliver(const std::string& datagram) {
   const std::lock_guard lock(mutex);
   ASSERT_NE(open, nullptr) << "nobody has it open";
-  asio::post(open->io_, [this, wire = open, datagram] {
+  asio::post(open->io_, [wire = open, datagram] {
     if (wire->handler_ == nullptr) return;
     if (datagram.size() > max_datagram) {
       wire->handler_->on_oversize(std::string_view(datagram).substr(0, max_datagram));
