@@ -23,7 +23,8 @@ constexpr double second_ns = 1e9;
 
 using Datagrams = std::vector<std::string>;
 
-// Writes what boards and hosts say: of a machine that drives, or the longest that there is.
+// Writes what boards and hosts say: of a machine that drives, or the longest that there is. Random numbers are drawn in
+// statements of their own: compilers differ in which argument they evaluate first.
 class Speaker {
  public:
   explicit Speaker(bool longest) : longest_(longest) {}
@@ -49,13 +50,15 @@ class Speaker {
     return parts;
   }
   Datagrams board_heartbeat() {
-    return {text(write_board_heartbeat(buffer_.data(), buffer_.size(), board_pnum(), any(),
+    const std::uint32_t t_ms = any();
+    return {text(write_board_heartbeat(buffer_.data(), buffer_.size(), board_pnum(), t_ms,
                                        longest_ ? SafeReason::link : SafeReason::none))};
   }
   Datagrams host_heartbeat() {
     DatagramWriter writer(buffer_.data(), buffer_.size());
     writer.field("H").values("ROS2-R4");
-    return {text(writer.finish(host_pnum(), any()))};
+    const std::uint32_t t_ms = any();
+    return {text(writer.finish(host_pnum(), t_ms))};
   }
   // Motors and servos in turn; the longest command is the stepper's.
   Datagrams command() {
@@ -69,7 +72,8 @@ class Speaker {
       writer.field("O").value(between(0, pwm_max)).value(between(0, 1));
       writer.value(between(1, osmc_channels));
     }
-    return {text(writer.finish(host_pnum(), any()))};
+    const std::uint32_t t_ms = any();
+    return {text(writer.finish(host_pnum(), t_ms))};
   }
 
  private:
