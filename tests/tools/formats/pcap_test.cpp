@@ -237,7 +237,8 @@ std::string block(std::uint32_t type, std::string body) {
   return bytes;
 }
 
-TEST(Pcapng, ReadsTheObsoleteBlockOfAPacket) {
+// One packet in an obsolete block. `options`: of its interface.
+std::string pcapng_at(std::uint64_t ticks, const std::string& options) {
   std::string section, interface, packet;
   append_number(section, std::uint32_t{0x1A2B3C4D});
   append_number(section, std::uint32_t{1});
@@ -246,13 +247,35 @@ TEST(Pcapng, ReadsTheObsoleteBlockOfAPacket) {
   const std::string bytes = ipv4(udp(2018, 2390, "PNum:1;"));
   append_number(packet, std::uint16_t{0});
   append_number(packet, std::uint16_t{9});  // packets that were lost
-  append_number(packet, static_cast<std::uint32_t>(1795468293404765 >> 32));
-  append_number(packet, static_cast<std::uint32_t>(1795468293404765));
+  append_number(packet, static_cast<std::uint32_t>(ticks >> 32));
+  append_number(packet, static_cast<std::uint32_t>(ticks));
   append_number(packet, static_cast<std::uint32_t>(bytes.size()));
   append_number(packet, static_cast<std::uint32_t>(bytes.size()));
-  const std::string file =
-      block(0x0A0D0D0A, section) + block(1, interface) + block(2, packet + bytes);
-  EXPECT_TRUE(contains(native_of(file), "1795468293.404765 1< PNum:1;\n"));
+  return block(0x0A0D0D0A, section) + block(1, interface + options) + block(2, packet + bytes);
+}
+
+TEST(Pcapng, ReadsTheObsoleteBlockOfAPacket) {
+  EXPECT_TRUE(
+      contains(native_of(pcapng_at(1795468293404765, "")), "1795468293.404765 1< PNum:1;\n"));
+}
+
+TEST(Pcapng, ReadsTimesOfEveryResolutionExactly) {
+  const auto native_at = [](std::uint8_t resolution, std::uint64_t ticks) {
+    std::string option;
+    append_number(option, std::uint16_t{9});  // if_tsresol
+    append_number(option, std::uint16_t{1});
+    append_number(option, std::uint32_t{resolution});
+    return native_of(pcapng_at(ticks, option));
+  };
+  constexpr std::uint64_t one = 1;
+  EXPECT_TRUE(contains(native_at(0, 1795468293), "1795468293.000000 1<"));
+  EXPECT_TRUE(contains(native_at(9, 1795468293404765999), "1795468293.404765 1<"));
+  EXPECT_TRUE(contains(native_at(0x80 | 20, (one << 50) + (one << 18)), "1073741824.250000 1<"));
+  // With the finest ticks, 64 bits reach a few seconds past 1970.
+  EXPECT_TRUE(contains(native_at(18, 1'500'000'000'000'000'000), "1.500000 1<"));
+  EXPECT_TRUE(contains(native_at(18, 1'000'001'000'000'000'000), "1.000001 1<"));
+  EXPECT_TRUE(contains(native_at(0x80 | 62, 7 * (one << 60)), "1.750000 1<"));
+  EXPECT_TRUE(contains(native_at(0x80 | 62, ~std::uint64_t{0}), "3.999999 1<"));
 }
 
 // The blocks of a pcapng.

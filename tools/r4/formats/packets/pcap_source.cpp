@@ -222,11 +222,16 @@ Time PcapSource::time_of(const Interface& interface, std::uint64_t ticks) {
   constexpr std::int64_t last_s = 253'402'300'799;  // of the year 9999
   constexpr std::uint64_t second_us = 1'000'000;
   const std::uint64_t whole = ticks / interface.ticks;
-  // Coarser ticks where the product would overflow: 2^-44 s at the most.
-  const std::uint64_t scale = interface.ticks / (UINT64_MAX / second_us) + 1;
-  const std::uint64_t part_us =
-      ticks % interface.ticks / scale * second_us / (interface.ticks / scale);
-  const auto us = static_cast<std::int64_t>(std::min(part_us, second_us - 1));
+  const std::uint64_t part = ticks % interface.ticks;
+  std::uint64_t part_us = 0;
+  if (interface.ticks % second_us == 0) {
+    part_us = part / (interface.ticks / second_us);
+  } else {  // fewer ticks than microseconds, or a power of 2: halved until the product fits
+    int shift = 0;
+    while (interface.ticks >> shift > UINT64_MAX / second_us) ++shift;
+    part_us = (part >> shift) * second_us / (interface.ticks >> shift);
+  }
+  const auto us = static_cast<std::int64_t>(part_us);
   const std::int64_t offset_s = std::clamp(interface.offset_s, -last_s, last_s);
   const auto seconds =
       static_cast<std::int64_t>(std::min<std::uint64_t>(whole, std::uint64_t{2} * last_s));
