@@ -22,8 +22,8 @@ class Port {
   // Where nothing reaches everyone at once (UDP), what is sent to everyone goes to it. `everyone`: nobody on
   // this port is in control any more.
   virtual void hold(Peer peer) { static_cast<void>(peer); }
-  // … and is there a second time, or a third: it is heard from several places (session_wires.hpp). They are held
-  // beside the first until another is held.
+  // The session has several paths on this port (session_paths.hpp): this peer is held besides those before, until
+  // hold() is called.
   virtual void also_hold(Peer peer) { static_cast<void>(peer); }
   // Does that peer get what is sent to everyone?
   virtual bool reaches(Peer peer) const { return peer == everyone; }

@@ -35,7 +35,7 @@ AsyncBoard::Impl::Impl(asio::io_context& context, std::vector<std::unique_ptr<Ca
       heartbeat_ms(options.session.timing.heartbeat_ms),
       board_timeout(std::chrono::milliseconds(options.session.timing.timeout_ms)),
       session(*this, with_clock(std::move(options.session), steady_now()),
-              Session::random_first_pnum(), options.role, transports.size()),
+              options.role, transports.size()),
       timer(context),
       reopening(context) {
   for (std::unique_ptr<Carrier>& each : transports) {

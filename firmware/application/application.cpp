@@ -89,21 +89,16 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
   from.port = port;
   from.peer = peer;
   const MessageKind kind = kind_of(datagram);
-  Verdict verdict = judge(port, kind, datagram, now_ms);
-  const bool waits =
-      kind == MessageKind::host_heartbeat && waits_to_join(from, datagram, verdict, now_ms);
-  const bool ours = wires_.has(from);
-  speaker_ = ours ? link_.owner() : from;
-  // The wires of a session carry the same bytes, and the packet number sees to it that they take effect once.
-  // From anywhere else a copy is a replay.
-  if (verdict == Verdict::copy) verdict = ours ? Verdict::authentic : Verdict::replayed;
+  const Verdict verdict = judge(port, kind, datagram, now_ms);
   const bool authentic = verdict == Verdict::authentic;
-  // A watcher at the place of the host in control, as on a bus, has numbers of its own.
-  const bool counts = authentic && ours && datagram.has_pnum() && !asks_to_watch(datagram);
-  known_ = counts && wires_.count(from, datagram.pnum());
+  speaker_.from = from;
+  speaker_.sid = datagram.session_id();
+  // A watcher on a bus may be where the paper host in control is, and has numbers of its own.
+  const bool counts =
+      authentic && link_.is_session_of(speaker_) && datagram.has_pnum() && !asks_to_watch(datagram);
+  known_ = counts && paths_.count(from, datagram.pnum());
   switch (kind) {
     case MessageKind::host_heartbeat:
-      if (waits) break;
       if (authentic) {
         on_host_heartbeat(from, datagram, now_ms);
       } else if (rejected(verdict, kind, now_ms)) {
@@ -162,78 +157,48 @@ bool Application::rejected(Verdict verdict, MessageKind kind, std::uint32_t now_
   return authentication_.rejected(verdict, kind == MessageKind::command, now_ms);
 }
 
-BoardLink::HostHeartbeat Application::heartbeat_of(Source from, const Datagram& datagram,
-                                                   std::uint32_t now_ms) const {
-  BoardLink::HostHeartbeat heartbeat;
-  heartbeat.from = from;
-  heartbeat.has_pnum = datagram.has_pnum();
-  heartbeat.pnum = datagram.pnum();
-  heartbeat.has_time = datagram.has_time();
-  heartbeat.t = datagram.time_ms();
-  heartbeat.waited_ms = waited_ms(from.port, now_ms);
-  return heartbeat;
-}
-
-SessionWires::Heartbeat Application::bytes_of(const Datagram& datagram) {
-  SessionWires::Heartbeat bytes;
-  bytes.pnum = datagram.pnum();
-  bytes.checksum = datagram.checksum();
-  return bytes;
-}
-
-// Of a heartbeat from a place that is none of the session's: becomes it one of them? True: that will show.
-bool Application::waits_to_join(Source from, const Datagram& datagram, Verdict verdict,
-                                std::uint32_t now_ms) {
-  if (verdict != Verdict::authentic && verdict != Verdict::copy) return false;
-  if (!link_.has_echo_host() || wires_.has(from) || !datagram.has_pnum()) return false;
-  const SessionWires::Stranger stranger = wires_.on_stranger(
-      from, bytes_of(datagram), link_.newest_heartbeat(), setpoints_.settings.timeout_ms, now_ms);
-  follow_wires(now_ms);
-  return stranger == SessionWires::Stranger::waits;
-}
-
-// A wire has come or gone: who is told, and where the host is.
-void Application::follow_wires(std::uint32_t now_ms) {
-  SessionWires::Change change;
-  bool any = false;
-  while (wires_.take_change(change)) {
-    any = true;
-    if (change.joined) watchers_.end_of(change.at);
-    if (change.joined) link_.send_soon();  // it is to hear from us
-    if (observer_ != nullptr) observer_->on_wire(now_ms, change.at, change.joined);
-  }
-  if (!any) return;
-  if (!wires_.has(link_.owner())) {
-    if (stop_from_ == link_.owner()) stop_from_ = wires_[0];
-    link_.move_owner(wires_[0]);
-  }
-  hold_wires();
-}
-
-// The places of the session's host are its own, whatever others send.
-void Application::hold_wires() {
+// The session's paths keep their peers, whatever other peers send.
+void Application::hold_paths() {
   for (std::uint8_t i = 0; i < port_count_; ++i) {
     bool held = false;
-    for (int wire = 0; link_.has_owner() && wire < wires_.size(); ++wire) {
-      if (wires_[wire].port != i) continue;
-      held ? ports_[i].port->also_hold(wires_[wire].peer) : ports_[i].port->hold(wires_[wire].peer);
+    for (int path = 0; link_.has_owner() && path < paths_.size(); ++path) {
+      if (paths_[path].port != i) continue;
+      held ? ports_[i].port->also_hold(paths_[path].peer) : ports_[i].port->hold(paths_[path].peer);
       held = true;
     }
     if (!held) ports_[i].port->hold(everyone);
   }
 }
 
+// A heartbeat of the session came from there, which may be a path from now on.
+void Application::on_path_heard(Source from, std::uint32_t now_ms) {
+  if (!paths_.on_heartbeat(from, now_ms)) return;
+  watchers_.end_of(from);
+  link_.send_soon();  // it is to hear from us
+  hold_paths();
+  if (observer_ != nullptr) observer_->on_path(now_ms, from, true);
+}
+
+void Application::on_path_left(Source path, std::uint32_t now_ms) {
+  hold_paths();
+  if (observer_ != nullptr) observer_->on_path(now_ms, path, false);
+}
+
 void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::uint32_t now_ms) {
-  const BoardLink::HostHeartbeat heartbeat = heartbeat_of(speaker_, datagram, now_ms);
-  const std::uint32_t timeout_ms = setpoints_.settings.timeout_ms;
+  BoardLink::HostHeartbeat heartbeat;
+  heartbeat.host = speaker_;
+  heartbeat.has_pnum = datagram.has_pnum();
+  heartbeat.pnum = datagram.pnum();
+  heartbeat.t = datagram.time_ms();
+  heartbeat.waited_ms = waited_ms(from.port, now_ms);
   switch (link_.on_heartbeat(heartbeat, now_ms)) {
     case HeartbeatEffect::fed:
-      wires_.taken(from, bytes_of(datagram), timeout_ms, now_ms);
+    case HeartbeatEffect::repeated:
+      on_path_heard(from, now_ms);
       break;
     case HeartbeatEffect::new_session:
-      link_.move_owner(from);
-      wires_.begin(from, bytes_of(datagram), now_ms);
-      hold_wires();
+      paths_.begin(from, now_ms);
+      hold_paths();
       tell_ports();
       watchers_.end_of(from);
       // Nothing that another host, or this one before its restart, commanded may come back.
@@ -242,38 +207,39 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
       begin_devices(now_ms);
       update_outputs(now_ms);
       safety_.leave(SafeReason::link);
-      if (heartbeat.has_pnum) wires_.count(from, heartbeat.pnum);
+      if (heartbeat.has_pnum) paths_.count(from, heartbeat.pnum);
       schedule_.start(now_ms, setpoints_.settings.state_period_ms());
       break;
     case HeartbeatEffect::resumed:
-      wires_.resume(now_ms);
-      wires_.taken(from, bytes_of(datagram), timeout_ms, now_ms);
-      hold_wires();
+      paths_.resume(from, now_ms);
+      hold_paths();
       tell_ports();
-      for (int i = 0; i < wires_.size(); ++i) watchers_.end_of(wires_[i]);
+      watchers_.end_of(from);
       if (setpoints_.settings.recovery == Recovery::rearm) setpoints_.outputs = Outputs();
       forget_uarts();
       safety_.leave(SafeReason::link);
       schedule_.start(now_ms, setpoints_.settings.state_period_ms());
       break;
+    case HeartbeatEffect::hello:
+      if (link_.wants_answer(heartbeat, now_ms)) offer_heartbeat(from, now_ms);
+      break;
     case HeartbeatEffect::stale:
-      wires_.passed_over(from, bytes_of(datagram), timeout_ms, now_ms);
-      if (link_.wants_answer(heartbeat, now_ms)) {
-        answer_heartbeat(from, now_ms);
-      }
+      if (link_.wants_answer(heartbeat, now_ms)) answer_heartbeat(from, now_ms);
       break;
     case HeartbeatEffect::busy:
       refuse(from, datagram, Refusal::busy, now_ms);
       break;
   }
-  follow_wires(now_ms);
   expect_host();
   poll(now_ms);
 }
 
 void Application::port_down(std::uint8_t port, std::uint32_t now_ms) {
-  if (link_.has_owner() && wires_.port_lost(port)) return follow_wires(now_ms);
-  if (link_.port_lost(port, now_ms)) enter(SafeReason::link, now_ms);
+  Source left;
+  while (link_.has_owner() && paths_.take_port(port, left)) {
+    if (paths_.size() == 0 && link_.lose(now_ms)) enter(SafeReason::link, now_ms);
+    on_path_left(left, now_ms);
+  }
 }
 
 void Application::fail(SafeReason cause, std::uint32_t now_ms) {
@@ -289,9 +255,9 @@ std::uint32_t Application::poll(std::uint32_t now_ms) {
   guard_.check_in(loop_duty);
   turn(now_ms);
   look_at_time(now_ms);
-  if (link_.has_owner()) {
-    wires_.poll(setpoints_.settings.timeout_ms, now_ms);
-    follow_wires(now_ms);
+  Source left;
+  while (link_.has_owner() && paths_.take_silent(setpoints_.settings.timeout_ms, now_ms, left)) {
+    on_path_left(left, now_ms);
   }
   check_interlocks(now_ms);
   update_outputs(now_ms);

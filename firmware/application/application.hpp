@@ -10,7 +10,7 @@
 //     ACTIVE       a host is alive and nothing is wrong: outputs follow the setpoints
 //     SAFE         a cause of safety.hpp is there: outputs safe; with cause `link` heartbeats only
 //
-// The host may be heard by several wires (session_wires.hpp): state and heartbeats go to each of them. Packet
+// A session has one to four paths (session_paths.hpp): state and heartbeats go to each of them. Packet
 // numbers count per port; answers to hosts that do not control the board count apart, so the
 // controlling host sees no gaps. All times are ms of the board's clock, which wraps.
 #pragma once
@@ -21,7 +21,7 @@
 #include "../../protocol/keys/authentication.hpp"
 #include "../../protocol/link/answer_budget.hpp"
 #include "../../protocol/link/board_link.hpp"
-#include "../../protocol/link/session_wires.hpp"
+#include "../../protocol/link/session_paths.hpp"
 #include "../../protocol/link/watchers.hpp"
 #include "../../protocol/messages/message.hpp"
 #include "../devices/user_i2c.hpp"
@@ -93,7 +93,7 @@ class Application {
   const Outputs& outputs() const { return outputs_; }  // as the hardware has them
   const Settings& settings() const { return setpoints_.settings; }
   const BoardLink& link() const { return link_; }
-  const SessionWires& wires() const { return wires_; }
+  const SessionPaths& paths() const { return paths_; }
   const Authentication& authentication() const { return authentication_; }
 
   // poll() is wanted at least this often, for the interlocks.
@@ -126,13 +126,10 @@ class Application {
   std::uint32_t waited_ms(std::uint8_t port, std::uint32_t now_ms) const;
   Verdict judge(std::uint8_t port, MessageKind kind, const Datagram& datagram,
                 std::uint32_t now_ms);
-  BoardLink::HostHeartbeat heartbeat_of(Source from, const Datagram& datagram,
-                                        std::uint32_t now_ms) const;
   void on_host_heartbeat(Source from, const Datagram& datagram, std::uint32_t now_ms);
-  static SessionWires::Heartbeat bytes_of(const Datagram& datagram);
-  bool waits_to_join(Source from, const Datagram& datagram, Verdict verdict, std::uint32_t now_ms);
-  void follow_wires(std::uint32_t now_ms);
-  void hold_wires();
+  void on_path_heard(Source from, std::uint32_t now_ms);
+  void on_path_left(Source path, std::uint32_t now_ms);
+  void hold_paths();
   bool rejected(Verdict verdict, MessageKind kind, std::uint32_t now_ms);
   void tell_ports();
 
@@ -177,6 +174,7 @@ class Application {
   static std::uint32_t heartbeat_time(std::uint32_t now_ms);
   void send_heartbeats(std::uint32_t now_ms);
   void answer_heartbeat(Source to, std::uint32_t now_ms);
+  void offer_heartbeat(Source to, std::uint32_t now_ms);
   void send_heartbeat(Source to, std::uint32_t& pnum, std::uint32_t now_ms);
   void write_heartbeat(Source to, std::uint32_t& pnum, const SafeReport& safe,
                        std::uint32_t now_ms);
@@ -201,7 +199,7 @@ class Application {
   Observer* observer_;
   Identity identity_;
   BoardLink link_;
-  SessionWires wires_;
+  SessionPaths paths_;
   Watchers watchers_;
   Authentication authentication_;
   AnswerBudget questions_, stops_;  // answers to hosts that do not control the board
@@ -221,7 +219,7 @@ class Application {
   std::uint32_t obstacle_ms_ = 0;  // when there was one last
   std::uint32_t caused_ms_ = 0;    // when a cause other than link came last
   // The newest stop, as long as it lasts: who asked for it, and its number if it had one.
-  Source stop_from_;
+  HostId stop_from_;
   bool has_stop_number_ = false;
   std::uint32_t stop_number_ = 0;
   bool stop_of_a_key_ = false;
@@ -231,9 +229,8 @@ class Application {
   std::uint32_t unread_stops_ = 0;
   std::uint32_t unread_ms_ = 0;
   bool outputs_live_ = false;  // outputs_ follow the setpoints
-  // Of the datagram that is being read: who sent it, as the link knows him, whichever of his wires brought it;
-  // and whether another has brought it before.
-  Source speaker_;
+  // Of the datagram that is being read: its host, and whether another path has brought it before.
+  HostId speaker_;
   bool known_ = false;
   UserI2c* i2c_;
   UserUart* uarts_[uart_channels];

@@ -28,19 +28,11 @@ bool Application::admit(Source from, const Datagram& datagram, Verdict verdict, 
     refuse(from, datagram, refusal, now_ms, at);
     return false;
   }
-  Refusal code = Refusal::none;
-  switch (link_.admit(speaker_, datagram.pnum(), now_ms, code)) {
-    case Admission::refuse:
-      if (code == Refusal::safe) link_.refused(speaker_, datagram.pnum(), code);
-      refuse(from, datagram, code, now_ms);
-      return false;
-    case Admission::drop:
-      ++rx_refused_;
-      return false;
-    case Admission::execute:
-      break;
-  }
-  return true;
+  const Refusal code = link_.admit(speaker_, datagram.pnum(), now_ms);
+  if (code == Refusal::none) return true;
+  if (code == Refusal::safe) link_.refused(speaker_, datagram.pnum(), code);
+  refuse(from, datagram, code, now_ms);
+  return false;
 }
 
 void Application::on_command(Source from, const Datagram& datagram, Verdict verdict,
@@ -67,16 +59,13 @@ void Application::on_command(Source from, const Datagram& datagram, Verdict verd
     return;
   }
   if (!admit(from, datagram, verdict, refusal, 0, now_ms)) return;
-  const bool held = drives_output(command.kind) && safety_.is_safe();
-  if (!held && link_.begins_anew(datagram.pnum())) setpoints_.outputs = Outputs();
   Refusal outcome = Refusal::none;
-  if (held) {
+  if (drives_output(command.kind) && safety_.is_safe()) {
     outcome = Refusal::safe;
   } else if (command.kind == CommandKind::clear) {
     outcome = judge_clear(command, waited_ms(from.port, now_ms), now_ms);
   } else if (command.kind == CommandKind::leave) {
-    if (!link_.may_leave(heartbeat_of(speaker_, datagram, now_ms), now_ms))
-      outcome = Refusal::stale;
+    if (speaker_.sid == no_session) outcome = Refusal::unknown;  // a paper host knows no sessions
   } else if (!may_set(from.port, command)) {
     outcome = Refusal::auth;
   } else if (is_device_command(command.kind)) {
@@ -105,7 +94,6 @@ void Application::on_group(Source from, const Datagram& datagram, Verdict verdic
     refuse(from, datagram, Refusal::safe, now_ms);
     return;
   }
-  if (link_.begins_anew(datagram.pnum())) setpoints_.outputs = Outputs();
   link_.executed(datagram.pnum());
   for (const Command& command : group) {
     carry_out(command, setpoints_);  // it was checked: none of them can fail
@@ -126,7 +114,7 @@ void Application::on_watch(Source from, const Datagram& datagram, const Command&
     const Refusal refusal = parse_fields(command.text, fields);
     if (refusal != Refusal::none) return refuse(from, datagram, refusal, now_ms);
   }
-  if (link_.has_owner() && wires_.has(from)) return;  // all goes there
+  if (link_.has_owner() && paths_.has(from)) return;  // all goes there
   const std::uint32_t rate_hz = static_cast<std::uint32_t>(command.value);
   switch (watchers_.on_lease(from, rate_hz, datagram.time_ms(), proven, now_ms)) {
     case Watchers::Effect::watching: {
@@ -222,13 +210,11 @@ void Application::emergency_stop(Source from, const Datagram& datagram, Verdict 
   stop_number_ = number;
   enter(SafeReason::stop, now_ms);
   caused_ms_ = now_ms;
-  const bool owner = link_.has_owner() && wires_.has(from);
+  const bool owner = link_.has_owner() && link_.is_session_of(speaker_);
   if (owner && verdict == Verdict::authentic && datagram.has_pnum() &&
-      link_.is_next(datagram.pnum())) {
-    Refusal code = Refusal::none;
-    if (link_.admit(speaker_, datagram.pnum(), now_ms, code) == Admission::execute) {
-      link_.executed(datagram.pnum());
-    }
+      link_.is_next(datagram.pnum()) &&
+      link_.admit(speaker_, datagram.pnum(), now_ms) == Refusal::none) {
+    link_.executed(datagram.pnum());
   }
   if (observer_ != nullptr) observer_->on_executed(now_ms, datagram.pnum(), Command::stop());
   // Everyone hears of it once. The sender hears it each time, as often as it takes; one that has

@@ -13,7 +13,7 @@ void Application::look_at_time(std::uint32_t now_ms) {
     const SafeReason cause = guard_.take();
     if (cause == SafeReason::watchdog) fail(cause, now_ms);
     if (cause == SafeReason::stop && !safety_.has(cause)) stop_without_number(now_ms);
-    if (cause == SafeReason::link) lost = lost || link_.port_lost(link_.owner().port, now_ms);
+    if (cause == SafeReason::link) lost = link_.lose(now_ms) || lost;
   }
   look_at_stops(now_ms);
   if (lost) enter(SafeReason::link, now_ms);
@@ -44,7 +44,7 @@ void Application::enter(SafeReason cause, std::uint32_t now_ms) {
   drop_device_writes();
   if (!safety_.enter(cause)) return;
   if (cause == SafeReason::link) {
-    hold_wires();
+    hold_paths();
     tell_ports();
   } else {
     setpoints_.outputs = Outputs();

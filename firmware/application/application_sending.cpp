@@ -21,8 +21,8 @@ constexpr std::size_t safe_fields_size = 22;
 
 // The controlling host where it is, else whoever the port streams to.
 std::uint32_t Application::audience(std::uint8_t port) const {
-  for (int i = 0; link_.has_owner() && i < wires_.size(); ++i) {
-    if (wires_[i].port == port) return wires_[i].peer;
+  for (int i = 0; link_.has_owner() && i < paths_.size(); ++i) {
+    if (paths_[i].port == port) return paths_[i].peer;
   }
   return everyone;
 }
@@ -30,11 +30,11 @@ std::uint32_t Application::audience(std::uint8_t port) const {
 // The controlling host's places on one port share its numbers: each gets all that has one.
 void Application::transmit(Source to, Text datagram, Priority priority) {
   Port& port = *ports_[to.port].port;
-  if (!link_.has_owner() || wires_.size() == 1 || !wires_.has(to)) {
+  if (!link_.has_owner() || paths_.size() == 1 || !paths_.has(to)) {
     return port.send(datagram, priority, to.peer);
   }
-  for (int i = 0; i < wires_.size(); ++i) {
-    if (wires_[i].port == to.port) port.send(datagram, priority, wires_[i].peer);
+  for (int i = 0; i < paths_.size(); ++i) {
+    if (paths_[i].port == to.port) port.send(datagram, priority, paths_[i].peer);
   }
 }
 
@@ -43,7 +43,7 @@ void Application::transmit(Source to, Text datagram, Priority priority) {
 std::uint32_t& Application::number_for(Source to) {
   Watcher* const watcher = watchers_.find(to);
   if (watcher != nullptr && !hears_all(to)) return watcher->pnum;
-  const bool aside = link_.has_owner() && !wires_.has(to);
+  const bool aside = link_.has_owner() && !paths_.has(to);
   return aside ? ports_[to.port].aside_pnum : ports_[to.port].next_pnum;
 }
 
@@ -63,7 +63,7 @@ void Application::answer(Source to, DatagramWriter& writer, std::uint32_t now_ms
 }
 
 void Application::identify(Source to, const Datagram& question, std::uint32_t now_ms) {
-  const bool ours = link_.has_owner() && wires_.has(to);
+  const bool ours = link_.has_owner() && link_.is_session_of(speaker_);
   if (!ours && !questions_.take(now_ms)) return;
   char buffer[max_datagram];
   DatagramWriter writer(buffer, sizeof buffer);
@@ -74,6 +74,7 @@ void Application::identify(Source to, const Datagram& question, std::uint32_t no
   identity.busy = link_.has_owner() && !ours;
   identity.has_asked = question.has_pnum();
   identity.asked = question.pnum();
+  identity.sid = question.session_id();
   write_identity(writer, identity);
   writer.more("+").more(leave_capability).more("+").more(group_capability);
   if (authentication_.has_chance()) writer.more("+").more(watch_capability);
@@ -92,10 +93,11 @@ void Application::refuse(Source to, const Datagram& datagram, Refusal code, std:
   if (observer_ != nullptr && !known_) observer_->on_refused(now_ms, datagram.pnum(), code);
   Nack nack;
   nack.pnum = datagram.pnum();
+  nack.sid = datagram.session_id();
   nack.code = code;
   nack.at = at;
   // A W needs no key: what answers it must prove nothing of the command whose number it has.
-  nack.has_session = !asks_to_watch(datagram) && link_.session_of(speaker_, nack.session);
+  nack.has_session = !asks_to_watch(datagram) && link_.first_heartbeat(speaker_, nack.session);
   nack.lease = lease;
   char buffer[short_datagram];
   DatagramWriter writer(buffer, sizeof buffer);
@@ -133,11 +135,18 @@ void Application::send_heartbeats(std::uint32_t now_ms) {
 }
 
 void Application::answer_heartbeat(Source to, std::uint32_t now_ms) {
+  const bool tells_time = link_.state() != BoardLinkState::connecting;
   send_heartbeat(to, number_for(to), now_ms);
-  link_.heartbeat_answered(heartbeat_time(now_ms));
+  link_.heartbeat_answered(tells_time ? heartbeat_time(now_ms) : 0, now_ms);
 }
 
-// In CONNECTING it says so, and packet numbers begin anew behind it.
+// In CONNECTING a host that has nothing to echo yet is sent, alone, a heartbeat that it can echo.
+void Application::offer_heartbeat(Source to, std::uint32_t now_ms) {
+  write_heartbeat(to, ports_[to.port].next_pnum, safe_report(), now_ms);
+  link_.heartbeat_answered(heartbeat_time(now_ms), now_ms);
+}
+
+// In CONNECTING it says so, and packet numbers begin anew after it.
 void Application::send_heartbeat(Source to, std::uint32_t& pnum, std::uint32_t now_ms) {
   if (link_.state() != BoardLinkState::connecting) {
     return write_heartbeat(to, pnum, safe_report(), now_ms);
@@ -253,8 +262,8 @@ void Application::fill(State& state) const {
   state.last_command = link_.last_executed();
   state.rx_ok = rx_ok_;
   state.rx_crc = rx_bad_;
-  state.rx_lost = wires_.lost();
-  state.rx_duplicate = wires_.repeated();
+  state.rx_lost = paths_.lost();
+  state.rx_duplicate = paths_.repeated();
   state.rx_refused = rx_refused_;
   state.late = schedule_.late();
   state.fault = inputs_.fault;

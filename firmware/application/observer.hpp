@@ -26,10 +26,10 @@ class Observer {
   virtual void on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code) = 0;
   // A heartbeat or command was dropped because its signature is not right, or not there.
   virtual void on_rejected(std::uint32_t t_ms, Verdict verdict) = 0;
-  // The session's host is heard by another wire as well; or no longer by that one, but by others.
-  virtual void on_wire(std::uint32_t t_ms, Source wire, bool joined) {
+  // The session has another path, or has lost this one.
+  virtual void on_path(std::uint32_t t_ms, Source path, bool joined) {
     static_cast<void>(t_ms);
-    static_cast<void>(wire);
+    static_cast<void>(path);
     static_cast<void>(joined);
   }
 

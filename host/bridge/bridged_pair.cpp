@@ -51,7 +51,7 @@ BridgedPair::BridgedPair(Setup setup)
       on_event_(std::move(setup.on_event)),
       hosts_(*this, BridgeSide::hosts, std::move(setup.hosts)),
       board_(*this, BridgeSide::board, std::move(setup.board)),
-      control_(setup.timeout),
+      known_(setup.timeout),
       guard_(setup.keys, setup.trusted) {}
 
 // --- the two sides
@@ -148,7 +148,7 @@ bool BridgedPair::is_old(Side& side, Time now) {
 void BridgedPair::on_host_datagram(const Datagram& datagram, Peer from, Time now) {
   const MessageKind kind = kind_of(datagram);
   if (kind == MessageKind::command && is_stop(datagram)) {
-    if (!control_.has_place(from)) audience_.listen(from, now);
+    audience_.listen(from, now);
     return pass_on(datagram, Priority::stop);
   }
   if (is_old(hosts_, now)) return;
@@ -158,20 +158,31 @@ void BridgedPair::on_host_datagram(const Datagram& datagram, Peer from, Time now
     return;
   }
   if (!is_allowed(datagram, kind, from, now)) return;
-  const std::optional<Peer> before = control_.host();
-  if (!control_.on_heartbeat(from, now)) {
-    ++hosts_.counters.kept_out;
-    return answer(datagram, Refusal::busy, 0, from, now);  // as the board does
+  switch (known_.on_heartbeat(from, datagram.session_id(), now)) {
+    case BridgeHosts::Heartbeat::kept_out:
+      ++hosts_.counters.kept_out;
+      return answer(datagram, Refusal::busy, 0, from, now);  // as the board does
+    case BridgeHosts::Heartbeat::added:
+      hold_hosts(now);
+      break;
+    case BridgeHosts::Heartbeat::known:
+      break;
   }
-  if (before != control_.host()) {
-    hosts_.carrier->hold(from);
-    if (watch_.asked()) {  // what the board streams from now on is for this host
-      std::array<char, max_datagram> buffer;
-      DatagramWriter writer(buffer.data(), buffer.size());
-      send(board_, view(watch_.write_end(writer)), Priority::normal, everyone);
-    }
+  if (watch_.asked() && known_.serves_any(now)) {  // the board's states are for that host now
+    std::array<char, max_datagram> buffer;
+    DatagramWriter writer(buffer.data(), buffer.size());
+    send(board_, view(watch_.write_end(writer)), Priority::normal, everyone);
   }
   pass_on(datagram);
+}
+
+// The peers of the hosts that are served keep their numbers, whatever others send.
+void BridgedPair::hold_hosts(Time now) {
+  bool any = false;
+  known_.for_each_served(now, [&](Peer peer) {
+    any ? hosts_.carrier->also_hold(peer) : hosts_.carrier->hold(peer);
+    any = true;
+  });
 }
 
 void BridgedPair::on_command(const Datagram& datagram, Peer from, Time now) {
@@ -181,23 +192,16 @@ void BridgedPair::on_command(const Datagram& datagram, Peer from, Time now) {
     return on_question(datagram, from, now);
   }
   if (!is_allowed(datagram, MessageKind::command, from, now)) return;
-  if (!control_.has_place(from)) {
+  if (!known_.knows(from, datagram.session_id(), now)) {  // its heartbeat comes first
     ++hosts_.counters.kept_out;
-    // Where nobody keeps it out, its heartbeat comes.
-    if (control_.keeps_out(from, now)) answer(datagram, Refusal::busy, 0, from, now);
-    return;
+    return answer(datagram, Refusal::busy, 0, from, now);
   }
-  if (datagram.has_pnum()) control_.on_number(datagram.pnum());
-  if (is_single(datagram, Text("E")) && command.values() == "LEAVE") control_.on_farewell();
   pass_on(datagram);
 }
 
-// True if that heartbeat or command may pass, as far as it does not depend on who has the place.
+// True if that heartbeat or command may pass, as far as keys decide.
 bool BridgedPair::is_allowed(const Datagram& datagram, MessageKind kind, Peer from, Time now) {
-  Verdict verdict = guard_.judge(datagram, now);
-  if (verdict == Verdict::copy) {
-    verdict = control_.has_place(from) ? Verdict::authentic : Verdict::replayed;
-  }
+  const Verdict verdict = guard_.judge(datagram, now);
   const bool is_command = kind == MessageKind::command;
   if (verdict != Verdict::authentic) {
     ++hosts_.counters.refused;
@@ -216,21 +220,20 @@ bool BridgedPair::is_allowed(const Datagram& datagram, MessageKind kind, Peer fr
 }
 
 void BridgedPair::on_question(const Datagram& datagram, Peer from, Time now) {
-  std::optional<std::uint32_t> pnum;
-  if (datagram.has_pnum()) pnum = datagram.pnum();
-  if (control_.has_place(from)) {
-    if (pnum) control_.on_number(*pnum);
-  } else if (!questions_.take(ms_of(now))) {
+  const SessionId sid = datagram.session_id();
+  const bool known = sid != no_session && known_.knows(from, sid, now);
+  if (!known && !questions_.take(ms_of(now))) {
     ++hosts_.counters.kept_out;
     return;
   }
-  audience_.on_question(from, pnum, now);
+  std::optional<std::uint32_t> pnum;
+  if (datagram.has_pnum()) pnum = datagram.pnum();
+  if (!known) audience_.on_question(from, pnum, now);
   pass_on(datagram);
 }
 
-// The board takes it for one of the host that has the place. So it is answered here.
+// The board has one lease for all that comes from the bridge. So each watcher has its lease here.
 void BridgedPair::on_lease(const Datagram& datagram, Peer from, Time now) {
-  if (control_.has_place(from)) return pass_on(datagram);
   Command command;
   FieldSet fields;
   Refusal refusal = parse_command(datagram.command(), command);
@@ -268,67 +271,60 @@ void BridgedPair::on_board_datagram(const Datagram& datagram, Time now) {
   }
   switch (kind) {
     case MessageKind::nack:
-    case MessageKind::identity: {
-      Nack nack;
-      if (read_nack(datagram, nack) && watch_.on_refusal(nack, now)) return;
-      const std::optional<Peer> asker = asker_of(datagram, kind, now);
-      return deliver(board_, hosts_, datagram, Priority::normal, asker.value_or(everyone));
-    }
+    case MessageKind::identity:
+      return on_answer(datagram, kind, now);
     case MessageKind::board_heartbeat:
-      if (is_connecting_heartbeat(datagram) || heartbeat_reason(datagram) == SafeReason::link) {
-        control_.on_no_host();
-      }
-      break;
+      return deliver_to_hosts(datagram, false, now);
     default:
       watch_.on_state(now);
-      // Of a board that has no host, it comes by our own lease.
-      if (control_.streams() || heartbeat_reason(datagram) != SafeReason::link) {
-        control_.on_state(now);
-      }
-      break;
+      return deliver_to_hosts(datagram, true, now);
   }
-  const bool is_state = kind == MessageKind::state;
-  const Priority priority = is_state ? Priority::state : Priority::normal;
-  // A state that no host has asked for is for those that watch, and for nobody else.
-  const bool of_a_host = !is_state || control_.is_taken(now);
-  if (of_a_host) deliver(board_, hosts_, datagram, priority);
-  if (!audience_.empty()) copy_to_audience(datagram, priority, of_a_host, now);
 }
 
-// Those to whom what is for everyone comes get no copy of it.
-void BridgedPair::copy_to_audience(const Datagram& datagram, Priority priority, bool of_a_host,
-                                   Time now) {
+// A heartbeat goes to everyone whom the carrier reaches at once, and to each host and listener. A state goes to the hosts
+// that are served, and to watchers.
+void BridgedPair::deliver_to_hosts(const Datagram& datagram, bool is_state, Time now) {
+  const Priority priority = is_state ? Priority::state : Priority::normal;
+  const bool to_everyone = !is_state || known_.serves_any(now);
+  if (to_everyone) deliver(board_, hosts_, datagram, priority);
   const auto copy = [&](Peer peer) {
-    if (of_a_host && hosts_.carrier->reaches(peer)) return;
+    if (to_everyone && hosts_.carrier->reaches(peer)) return;
     send(hosts_, view(datagram.bytes()), priority, peer);
   };
-  audience_.for_each_watcher(now, copy);
-  if (priority == Priority::state) return;
+  is_state ? known_.for_each_served(now, copy) : known_.for_each(now, copy);
+  if (audience_.empty()) return;
+  audience_.for_each_watcher(now, [&](Peer peer) {
+    if (!known_.serves(peer, now)) copy(peer);
+  });
+  if (is_state) return;
   audience_.for_each_listener(now, [&](Peer peer) {
-    if (copies_.take(ms_of(now))) copy(peer);
+    if (!known_.serves(peer, now) && copies_.take(ms_of(now))) copy(peer);
   });
 }
 
-// The host that the board answers; none: the one that has the place.
-std::optional<Peer> BridgedPair::asker_of(const Datagram& answer, MessageKind kind,
-                                          Time now) const {
-  std::optional<std::uint32_t> pnum;
+// To each path of the session that it names. Without a session it answers a watcher's question, or a paper host.
+void BridgedPair::on_answer(const Datagram& answer, MessageKind kind, Time now) {
   Nack nack;
   Identity identity;
+  std::optional<std::uint32_t> pnum;
   if (kind == MessageKind::nack) {
-    if (!read_nack(answer, nack)) return std::nullopt;
+    if (!read_nack(answer, nack) || watch_.on_refusal(nack, now)) return;
     pnum = nack.pnum;
-  } else {
-    if (!read_identity(answer, identity)) return std::nullopt;
-    if (identity.has_asked) pnum = identity.asked;
+    if (nack.code == Refusal::busy && known_.on_busy(nack.sid, now)) hold_hosts(now);
+  } else if (!read_identity(answer, identity)) {
+    return;
+  } else if (identity.has_asked) {
+    pnum = identity.asked;
   }
-  if (pnum && control_.has_sent(*pnum)) return std::nullopt;
-  const std::optional<Peer> asker = audience_.asker_of(pnum, now);
-  return asker && control_.has_place(*asker) ? std::nullopt : asker;
+  const SessionId sid = answer.session_id();
+  const auto pass = [&](Peer peer) { deliver(board_, hosts_, answer, Priority::normal, peer); };
+  const std::optional<Peer> asker =
+      sid == no_session ? audience_.asker_of(pnum, now) : std::nullopt;
+  asker ? pass(*asker) : known_.for_each_of(sid, now, pass);
 }
 
 void BridgedPair::watch_board(Time now) {
-  if (!board_.opened || control_.is_taken(now)) return;
+  if (!board_.opened || known_.serves_any(now)) return;
   if (!audience_.has_watchers(now)) watch_.wish_nothing();
   if (!watch_.due(now)) return;
   std::array<char, max_datagram> buffer;

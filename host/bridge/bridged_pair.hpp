@@ -2,11 +2,13 @@
 // Two carriers of one loop joined: on one hosts are heard, at the other is their board.
 //
 //     hosts --> E:STOP                          first of all, of anyone, however old
-//               heartbeats, commands            of the host that has the place, if they prove what
-//                                               they must (bridge_control.hpp, bridge_guard.hpp)
+//               heartbeats, commands            if they prove what they must (bridge_guard.hpp)
 //               Q:ID                            of anyone
-//     board --> states, heartbeats              to the host that has the place, and who watches (bridge_audience.hpp)
-//               N, I                            to who has asked, by the number that they name
+//     board --> heartbeats                      to every host (bridge_hosts.hpp)
+//               states                          to the hosts that the board does not refuse, and to
+//                                               watchers (bridge_audience.hpp)
+//               N, I                            to the session that they name; without a session, by the
+//                                               number of the question
 //
 // The bytes stay as they are. What may have waited for longer than `oldest` before it was read is dropped, but a stop:
 // so nothing that a bridge held back is executed, or keeps a board alive. What waits to be sent is bounded likewise,
@@ -14,9 +16,9 @@
 // never pass: a bridge would turn everyone who reaches it into that cable, and would carry keys and
 // passwords over a network.
 //
-// No heartbeat is made here. Answers are: BUSY for who is kept out, AUTH for what must not pass,
-// and a LEASE for who watches, since the board takes all hosts of a bridge for one. While no host
-// has the place, the bridge itself watches the board (bridge_watch.hpp).
+// No heartbeat is made here. Answers are: BUSY for a host that is kept out, AUTH for what must not pass, and a
+// LEASE for a watcher, since all of a bridge's watchers are at one place for the board. While no host is
+// served, the bridge itself watches the board (bridge_watch.hpp).
 #pragma once
 
 #include <array>
@@ -33,8 +35,8 @@
 #include "../../protocol/link/answer_budget.hpp"
 #include "../measurement/boot_clock.hpp"
 #include "bridge_audience.hpp"
-#include "bridge_control.hpp"
 #include "bridge_guard.hpp"
+#include "bridge_hosts.hpp"
 #include "bridge_watch.hpp"
 #include "r4link/carrier.hpp"
 #include "r4link/datagram.hpp"
@@ -102,8 +104,9 @@ class BridgedPair {
   void on_question(const Datagram& datagram, Peer from, Time now);
   void on_lease(const Datagram& datagram, Peer from, Time now);
   bool is_allowed(const Datagram& datagram, MessageKind kind, Peer from, Time now);
-  std::optional<Peer> asker_of(const Datagram& answer, MessageKind kind, Time now) const;
-  void copy_to_audience(const Datagram& datagram, Priority priority, bool of_a_host, Time now);
+  void on_answer(const Datagram& answer, MessageKind kind, Time now);
+  void deliver_to_hosts(const Datagram& datagram, bool is_state, Time now);
+  void hold_hosts(Time now);
   void watch_board(Time now);
   void report_trouble();
   void answer(const Datagram& asked, Refusal code, std::uint32_t lease, Peer to, Time now);
@@ -121,7 +124,7 @@ class BridgedPair {
   const std::function<void(BridgeSide, const CarrierEvent&)> on_event_;
   Side hosts_;
   Side board_;
-  BridgeControl control_;
+  BridgeHosts known_;
   BridgeGuard guard_;
   BridgeAudience audience_;
   BridgeWatch watch_;

@@ -12,9 +12,9 @@
 
 namespace r4 {
 
-std::uint32_t Session::random_first_pnum() {
+std::uint64_t Session::random_bits() {
   std::random_device random;
-  return echo_host_first_pnum + (random() & 0x3fffffffU);
+  return std::uint64_t{random()} << 32 | random();
 }
 
 namespace {
@@ -34,18 +34,20 @@ SessionOptions checked(SessionOptions options) {
 
 }  // namespace
 
-Session::Session(Handler& handler, SessionOptions options, std::uint32_t first_pnum, BoardRole role,
-                 std::size_t wires)
+Session::Session(Handler& handler, SessionOptions options, BoardRole role, std::size_t wires,
+                 std::function<std::uint64_t()> random)
     : handler_(handler),
       options_(checked(std::move(options))),
       board_role_(role),
-      link_(options_.timing, first_pnum),
+      random_(std::move(random)),
+      link_(options_.timing, static_cast<std::uint32_t>(random_())),
       key_(options_.key, options_.clock_start),
       selection_(options_.fields),
       question_(options_.identify_interval),
       wires_(wires, options_.timing),
       pending_(max_pending, max_stops) {
   link_.hold(watches());
+  begin_session();
   if (!options_.fields.empty()) {
     const std::string fields = options_.fields;
     if (FieldSet set; parse_fields(fields, set) != Refusal::none) {
@@ -53,6 +55,10 @@ Session::Session(Handler& handler, SessionOptions options, std::uint32_t first_p
     }
     require_valid(with_needed_fields(Command::fields(fields)));
   }
+}
+
+void Session::begin_session() {
+  while (link_.wants_session()) link_.begin_session(random_());
 }
 
 // Sees to it that the state has the fields we need, whoever chose others, and that we are in

@@ -42,6 +42,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -100,10 +101,10 @@ class Session {
     ~Handler() = default;
   };
 
-  // `first_pnum`: echo_host_first_pnum plus 30 random bits (random_first_pnum()).
+  // `random` gives 64 random bits at each call.
   // Throws Error{usage} if options.fields are no state fields.
-  Session(Handler& handler, SessionOptions options, std::uint32_t first_pnum,
-          BoardRole role = BoardRole::control, std::size_t wires = 1);
+  Session(Handler& handler, SessionOptions options, BoardRole role = BoardRole::control,
+          std::size_t wires = 1, std::function<std::uint64_t()> random = random_bits);
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
@@ -189,7 +190,7 @@ class Session {
 
   static constexpr std::size_t max_pending = 64;
   static constexpr std::size_t max_stops = 16;
-  static std::uint32_t random_first_pnum();
+  static std::uint64_t random_bits();
 
  private:
   using Pending = PendingCommand;
@@ -218,8 +219,10 @@ class Session {
   static constexpr WireSet all_wires = 0xFF;
   SendResult close_and_transmit(DatagramWriter& writer, Way way, Priority priority, Time now);
   // session_wires.cpp
-  SendResult send_over(std::string_view bytes, Way way, Priority priority, Time now);
+  SendResult send_over(DatagramWriter& writer, Way way, Priority priority, Time now);
+  SendResult transmit_over(std::size_t wire, DatagramWriter& writer, Priority priority, Time now);
   bool may_speak(std::size_t wire) const;
+  SessionId session_id() const { return watches() ? no_session : link_.session(); }
   bool begun() const { return !wires_.several() || wires_.begun(); }
   void ask_wires(Time now);
   bool admit(std::size_t wire, const Datagram& datagram, Time now);
@@ -243,6 +246,7 @@ class Session {
   void on_nack_datagram(std::size_t wire, const Datagram& datagram, Time now);
   void on_answer(const Datagram& datagram, Time now);
   bool notice_restart(Time now);
+  void begin_session();
   void give_up_commands(Time now);
   bool is_proof(const Nack& nack) const;
   bool is_cable_only(std::uint32_t pnum);
@@ -281,6 +285,7 @@ class Session {
   Handler& handler_;
   SessionOptions options_;
   const BoardRole board_role_;
+  std::function<std::uint64_t()> random_;
   HostLink link_;
   HostKey key_;
   HostRoleMachine role_;
@@ -292,9 +297,8 @@ class Session {
   StopRepetition repetition_;
   LinkStatus status_;
   ReceivedState state_;
-  std::uint32_t restarts_ = 0;                     // of the board, those that were told
-  std::uint32_t first_pnum_ = link_.first_pnum();  // of the numbers since the last of them
-  std::optional<bool> knows_leave_;                // does the board?
+  std::uint32_t restarts_ = 0;       // of the board, those that were told
+  std::optional<bool> knows_leave_;  // does the board?
   bool leaving_ = false;
   Time left_at_{0};
   std::optional<std::uint32_t> left_ms_;  // of several wires: the T of the newest state by then

@@ -128,7 +128,7 @@ void Session::on_nack_datagram(std::size_t wire, const Datagram& datagram, Time 
   Nack nack;
   if (!read_nack(datagram, nack)) return;
   if (wires_.several() && !admit(wire, datagram, now)) return;
-  if (!link_.is_taken(nack.pnum)) {
+  if (nack.sid != session_id() || !link_.is_taken(nack.pnum)) {
     // On a CAN bus, on a wire that is shared and in a recording the answers to other hosts are heard, too. One to
     // the host in control has a number among those of the states; one to who has no lease yet has not.
     if (watches() && nack.has_session) on_answer(datagram, now);
@@ -241,9 +241,11 @@ bool Session::notice_restart(Time now) {
   clock_.restart();
   questions_of_clock_ = 0;
   groups_.on_restart();
-  const bool renumbered = std::exchange(first_pnum_, link_.first_pnum()) != link_.first_pnum();
   arming_.disarm(DisarmCause::restart);
-  if (renumbered) give_up_commands(now);
+  if (link_.wants_session()) {
+    begin_session();
+    give_up_commands(now);
+  }
   tell_arming();  // what somebody asks for when he hears of it is wanted
   handler_.on_restart();
   return true;

@@ -23,7 +23,7 @@ SendResult Session::transmit_now(const Command& command, std::uint32_t t_ms, Pri
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   write_command(writer, command);
-  writer.stamp(link_.take_pnum(), t_ms);
+  writer.session(session_id()).stamp(link_.take_pnum(), t_ms);
   return close_and_transmit(writer, {command.kind, link_.last_pnum(), wires}, priority, now);
 }
 
@@ -31,12 +31,21 @@ SendResult Session::transmit_now(const Command& command, std::uint32_t t_ms, Pri
 SendResult Session::close_and_transmit(DatagramWriter& writer, Way way, Priority priority,
                                        Time now) {
   if (key_.refuses_board() && way.kind != CommandKind::stop) return SendResult::down;
-  if (!watches()) key_.sign(writer, now);  // nobody's counter goes on by it
+  if (wires_.several()) return send_over(writer, way, priority, now);
+  const SendResult result = transmit_over(0, writer, priority, now);
+  if (result == SendResult::busy) role_.on_busy(now);
+  return result;
+}
+
+// Each path has a signature of its own, which proves that path (docs/protocol.md, "Paths").
+SendResult Session::transmit_over(std::size_t wire, DatagramWriter& writer, Priority priority,
+                                  Time now) {
+  const std::size_t size = writer.size();
+  if (!watches()) key_.sign(writer, now);  // a watcher's datagrams need no signature
   const Text bytes = writer.finish();
   if (bytes.empty()) return SendResult::down;
-  if (wires_.several()) return send_over({bytes.data(), bytes.size()}, way, priority, now);
-  const SendResult result = handler_.transmit(0, {bytes.data(), bytes.size()}, priority);
-  if (result == SendResult::busy) role_.on_busy(now);
+  const SendResult result = handler_.transmit(wire, {bytes.data(), bytes.size()}, priority);
+  writer.truncate(size);
   return result;
 }
 
@@ -157,9 +166,8 @@ void Session::transmit(Pending& pending, Time now) {
     pending.pnum = pending.stop_number ? *pending.stop_number : link_.take_pnum();
     // The command's field is there already.
     DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.size);
-    // A farewell proves that it is of this session, as a heartbeat does.
-    const bool echoes = pending.kind == CommandKind::leave;
-    pending.size = writer.stamp(pending.pnum, echoes ? link_.echo() : to_ms(now)).size();
+    writer.session(session_id()).stamp(pending.pnum, to_ms(now));
+    pending.size = writer.size();
     pending.stage = Stage::sent;
     if (pending.kind == CommandKind::identify) question_.asked(pending.pnum, now);
   } else {

@@ -27,14 +27,14 @@ const char* to_text(WireState state) {
 // --- what goes out
 
 // A stop goes to all of them, whoever is there; anything else to those whose board is known.
-SendResult Session::send_over(std::string_view bytes, Way way, Priority priority, Time now) {
+SendResult Session::send_over(DatagramWriter& writer, Way way, Priority priority, Time now) {
   const bool stop = way.kind == CommandKind::stop;
   const WireSet to = stop ? way.wires : static_cast<WireSet>(way.wires & wires_.speaking());
   SendResult best = SendResult::down;
   bool busy = false;
   for (std::size_t i = 0; i < wires_.count(); ++i) {
     if ((to & wire_bit(i)) == 0) continue;
-    const SendResult result = handler_.transmit(i, bytes, priority);
+    const SendResult result = transmit_over(i, writer, priority, now);
     if (result == SendResult::sent && way.kind == CommandKind::identify) {
       wires_.asked(i, way.pnum, now);
     }
@@ -61,12 +61,10 @@ void Session::ask_wires(Time now) {
     std::array<char, max_datagram> buffer;
     DatagramWriter writer(buffer.data(), buffer.size());
     write_command(writer, Command::identify());
-    writer.stamp(link_.take_pnum(), to_ms(now));
-    if (!watches()) key_.sign(writer, now);
-    const Text bytes = writer.finish();
+    writer.session(session_id()).stamp(link_.take_pnum(), to_ms(now));
     for (std::size_t i = 0; i < wires_.count(); ++i) {
       if ((due & wire_bit(i)) == 0) continue;
-      handler_.transmit(i, {bytes.data(), bytes.size()}, Priority::normal);
+      transmit_over(i, writer, Priority::normal, now);
       wires_.asked(i, link_.last_pnum(), now);
     }
   }

@@ -16,6 +16,7 @@
 
 #include "config.hpp"
 #include "text.hpp"
+#include "vocabulary.hpp"
 
 namespace r4 {
 
@@ -117,6 +118,8 @@ class R4LINK_API Datagram {
   std::uint32_t pnum() const { return pnum_; }
   bool has_time() const { return has_time_; }
   std::uint64_t time_ms() const { return time_ms_; }
+  // The id of the session that it belongs to (SID); no_session if it names none.
+  SessionId session_id() const { return sid_; }
   // The fields that are commands by their name: how many there are (none or several are no command),
   // and the first.
   int command_count() const { return command_count_; }
@@ -124,7 +127,7 @@ class R4LINK_API Datagram {
 
  private:
   friend ReadResult read_datagram(Text bytes, Datagram& out);
-  // Reads PNum and T, and finds the letters, which are among the names whose ends are in
+  // Reads PNum, T and SID, and finds the letters, which are among the names whose ends are in
   // `short_names`; where a number is wrong, nullptr if none is.
   const char* read_short_names(const std::uint64_t* short_names);
   Text values_at(std::size_t word, std::uint64_t bit) const;
@@ -132,6 +135,7 @@ class R4LINK_API Datagram {
   Text bytes_;
   Text fields_;
   std::uint64_t time_ms_ = 0;
+  SessionId sid_ = no_session;
   std::uint32_t checksum_ = 0;
   std::uint32_t pnum_ = 0;
   bool has_pnum_ = false;
@@ -183,7 +187,8 @@ inline void Datagram::Iterator::load() {
 
 // Checks `bytes` (one datagram, with or without its line terminator) and makes `out` a view of it.
 // Never fails but by its result; `out` is only written on success. A PNum or T that is not a whole
-// number in range (32 bit, 64 bit), or is there twice, is `syntax`. Linear in the size.
+// number in range (32 bit, 64 bit), a SID that is not 16 hexadecimal digits, or is 0, and one of
+// them that is there twice, is `syntax`. Linear in the size.
 R4LINK_API ReadResult read_datagram(Text bytes, Datagram& out);
 
 }  // namespace r4

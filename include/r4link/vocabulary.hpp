@@ -171,6 +171,14 @@ struct UartBytes {
   DeviceBytes<uart_max_bytes> data;
 };
 
+// --- sessions
+
+// Names one session of a host (SID): 64 random bits, which only the host and its board know. It is chosen anew for
+// each session, so it is worthless once the session is over.
+using SessionId = std::uint64_t;
+constexpr SessionId no_session =
+    0;  // of watchers, of the paper's hosts, and in what is for everyone
+
 // --- refusals
 
 // Why a board refuses a command: the code of `N:<PNum>,<code>` (docs/protocol.md).
@@ -193,11 +201,12 @@ R4LINK_API Text name_of(Refusal refusal);
 // The refusal of that name; Refusal::none if there is none.
 R4LINK_API Refusal refusal_from(Text name);
 
-// A refusal as the board answers it: which command of ours, and why; of a group, which of its commands
-// (AT); and to the host of the session, the number of its first echo (SESSION), so that a host knows
-// whether the board still remembers what it executed.
+// A refusal as the board answers it: the session id and number of the command, and why; of a group, which of its
+// commands (AT); and to the host of the session, the number of the heartbeat that began it (SESSION), so that
+// the host knows whether the board still remembers what it executed.
 struct Nack {
   std::uint32_t pnum = 0;
+  SessionId sid = no_session;
   Refusal code = Refusal::none;
   std::uint8_t at = 0;  // from 1; 0: it is none of a group, or the group was refused as a whole
   bool has_session = false;

@@ -72,6 +72,11 @@ const char* take_number(Text name, Text value, bool& has, Number& number) {
   return parse_number(value, number) ? nullptr : value.begin();
 }
 
+const char* take_session_id(Text name, Text value, SessionId& sid) {
+  if (sid != no_session) return name.begin();
+  return parse_session_id(value, sid) ? nullptr : value.begin();
+}
+
 }  // namespace
 
 const char* to_text(ReadError error) {
@@ -114,6 +119,7 @@ Datagram& Datagram::operator=(const Datagram& other) {
   bytes_ = other.bytes_;
   fields_ = other.fields_;
   time_ms_ = other.time_ms_;
+  sid_ = other.sid_;
   checksum_ = other.checksum_;
   pnum_ = other.pnum_;
   has_pnum_ = other.has_pnum_;
@@ -141,6 +147,7 @@ Text Datagram::values_at(std::size_t word, std::uint64_t bit) const {
 
 const char* Datagram::read_short_names(const std::uint64_t* short_names) {
   constexpr Text pnum("PNum");
+  constexpr Text sid("SID");
   for (std::size_t word = 0; word * 64 < fields_.size(); ++word) {
     for (std::uint64_t left = short_names[word]; left != 0; left &= left - 1) {
       const std::uint64_t bit = left & (0 - left);
@@ -154,6 +161,9 @@ const char* Datagram::read_short_names(const std::uint64_t* short_names) {
           if (command_count_ == 0) command_ = Field(name, values_at(word, bit));
           ++command_count_;
         }
+      } else if (colon - 3 == fields_.begin() || colon[-4] == ';') {
+        const Text name(colon - 3, 3);
+        if (name == sid) wrong = take_session_id(name, values_at(word, bit), sid_);
       } else {  // four letters
         const Text name(colon - 4, 4);
         if (name == pnum) wrong = take_number(name, values_at(word, bit), has_pnum_, pnum_);

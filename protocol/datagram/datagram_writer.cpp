@@ -11,6 +11,7 @@ namespace {
 
 constexpr FieldName pnum_name("PNum");
 constexpr FieldName time_name("T");
+constexpr FieldName session_name("SID");
 
 }  // namespace
 
@@ -112,6 +113,13 @@ void DatagramWriter::truncate(std::size_t size) {
   ok_ = true;
   open_ = size != 0;
   has_value_ = open_;
+}
+
+DatagramWriter& DatagramWriter::session(SessionId sid) {
+  if (sid == no_session) return *this;
+  char digits[session_id_size];
+  write_session_id(digits, sid);
+  return field(session_name).value(Text(digits, sizeof digits));
 }
 
 DatagramWriter& DatagramWriter::stamp(std::uint32_t pnum, std::uint64_t t_ms) {

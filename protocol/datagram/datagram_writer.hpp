@@ -15,6 +15,7 @@
 #include <cstdint>
 
 #include "r4link/text.hpp"
+#include "r4link/vocabulary.hpp"
 
 namespace r4 {
 
@@ -78,6 +79,8 @@ class DatagramWriter {
   // `size` is what size() was before a field(), while ok() was true; it is true again.
   void truncate(std::size_t size);
 
+  // Writes SID, in front of PNum; nothing if it is no_session.
+  DatagramWriter& session(SessionId sid);
   // Writes PNum and T: the last fields, but for a signature (authentication.hpp).
   DatagramWriter& stamp(std::uint32_t pnum, std::uint64_t t_ms);
   // Closes with PNum, T and the CRC. An empty Text if anything did not fit or was not allowed, or

@@ -130,7 +130,8 @@ bool mark_fields(Text fields, std::uint64_t* ends, std::uint64_t* short_names) {
       return false;
     }
     ends[word] = name_ends | field_ends;
-    short_names[word] = name_ends & (starts << 1 | before >> 63 | starts << 4 | before >> 60);
+    short_names[word] = name_ends & (starts << 1 | before >> 63 | starts << 3 | before >> 61 |
+                                     starts << 4 | before >> 60);
   }
   return true;
 }

@@ -49,7 +49,7 @@ constexpr std::size_t separators_block = 64;
 Separators separators(Text block);
 
 // Marks in `ends` the colon behind each name and the semicolon behind each field, and in
-// `short_names` those colons that stand one or four bytes behind the beginning of a field; 64 bytes
+// `short_names` those colons that stand one, three or four bytes behind the beginning of a field; 64 bytes
 // a word. False if the fields are not of the grammar. The time does not depend on how many there
 // are.
 bool mark_fields(Text fields, std::uint64_t* ends, std::uint64_t* short_names);

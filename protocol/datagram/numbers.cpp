@@ -199,6 +199,22 @@ bool parse_hex(Text text, std::uint32_t& out) {
   return true;
 }
 
+bool parse_session_id(Text text, SessionId& out) {
+  std::uint32_t high = 0;
+  std::uint32_t low = 0;
+  if (text.size() != session_id_size || !parse_hex(text.substr(0, 8), high) ||
+      !parse_hex(text.substr(8, 8), low) || (high | low) == 0) {
+    return false;
+  }
+  out = SessionId{high} << 32 | low;
+  return true;
+}
+
+char* write_session_id(char* out, SessionId sid) {
+  for (int shift = 60; shift >= 0; shift -= 4) *out++ = "0123456789abcdef"[sid >> shift & 0xFU];
+  return out;
+}
+
 char* write_number(char* out, std::uint32_t value) {
   char* const end = out + decimal_digits(value);
   char* at = end;

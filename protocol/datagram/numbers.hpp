@@ -9,6 +9,7 @@
 #include <cstdint>
 
 #include "r4link/text.hpp"
+#include "r4link/vocabulary.hpp"
 
 namespace r4 {
 
@@ -29,6 +30,10 @@ bool parse_hex(Text text, std::uint32_t& out);
 // Bytes, two digits each: `size` of them, neither more nor fewer. `out` is written on refusal, too.
 bool parse_hex(Text text, std::uint8_t* out, std::size_t size);
 
+// A session id: 16 hexadecimal digits, not all of them 0.
+constexpr std::size_t session_id_size = 16;
+bool parse_session_id(Text text, SessionId& out);
+
 // The longest text that a writer below produces ("-2147483648", 20 digits of a 64-bit number).
 constexpr std::size_t max_number_text = 20;
 
@@ -41,5 +46,6 @@ char* write_hundredths(char* out, std::int32_t hundredths);  // always two decim
 char* write_hex(char* out, std::uint32_t value);             // lower case, no leading zeros
 // Bytes, two digits each, lower case; `out` must have room for them.
 char* write_hex(char* out, const std::uint8_t* bytes, std::size_t size);
+char* write_session_id(char* out, SessionId sid);  // session_id_size characters
 
 }  // namespace r4

@@ -60,8 +60,6 @@ const char* to_text(Verdict verdict) {
       return "replayed";
     case Verdict::old:
       return "old";
-    case Verdict::copy:
-      return "copy";
   }
   return "authentic";
 }
@@ -165,8 +163,7 @@ Verdict Authentication::verify(const Datagram& datagram, std::uint32_t now_ms) {
   write_tag(entry->key, nonce(), before, expected);
   if (!same(values[3], expected)) return Verdict::wrong_tag;
   const bool fresh = now_ms - board_t <= age_limit_ms;
-  if (counter <= entry->forgotten) return Verdict::replayed;
-  if (is_used(*entry, counter)) return fresh ? Verdict::copy : Verdict::replayed;
+  if (counter <= entry->forgotten || is_used(*entry, counter)) return Verdict::replayed;
   spend(*entry, counter);
   return fresh ? Verdict::authentic : Verdict::old;
 }

@@ -43,10 +43,9 @@ enum class Verdict : std::uint8_t {
   wrong_tag,    // changed, of another key, or for another nonce
   replayed,     // the counter was used, or one that was forgotten may have been it
   old,          // its board T is more than 250 ms ago, or yet to come
-  copy,  // byte for byte one of the last that were signed, and not old: by another wire, perhaps
 };
-constexpr int verdict_count = 6;  // without `copy`, which is not rejected as such
-// "authentic", "missing", "unknown key", "wrong tag", "replayed", "old", "copy".
+constexpr int verdict_count = 6;
+// "authentic", "missing", "unknown key", "wrong tag", "replayed", "old".
 const char* to_text(Verdict verdict);
 
 // The board's end.
@@ -55,8 +54,8 @@ class Authentication {
   static constexpr std::size_t chance_size = 32;
   static constexpr std::uint32_t age_limit_ms = 250;
   static constexpr std::uint32_t answer_spacing_ms = 100;
-  // So many counters are remembered, the newest of all keys together: a wire that lags by age_limit_ms beside
-  // another brings copies of as many datagrams, 448 a second. What is below a forgotten one counts as used.
+  // So many counters are remembered, the newest of all keys together: a path that lags by age_limit_ms behind
+  // the other paths may bring as many. What is below a forgotten one counts as used.
   static constexpr int counters_remembered = 112;
 
   // `chance`: random bytes, others at each boot, from which the nonces are made. nullptr: the board

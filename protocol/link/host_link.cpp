@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "host_link.hpp"
 
-#include "board_link.hpp"
-
 namespace r4 {
 
 const char* to_text(HostLinkState state) {
@@ -73,7 +71,7 @@ bool HostLink::on_newest(std::uint32_t t_ms, bool heartbeat, SafeReason reason,
 void HostLink::on_clock(std::uint32_t t_ms, bool restarted, std::uint32_t now_ms) {
   if (restarted) {
     ++restarts_;
-    if (!booting_) renumber();
+    if (!booting_) end_session();
     forget_boot();
   }
   booting_ = false;
@@ -99,20 +97,18 @@ void HostLink::notice_boot(std::uint32_t t_ms, std::uint32_t now_ms) {
 void HostLink::begin_anew() {
   ++restarts_;
   if (tracker_.started()) tracker_.restart();
-  renumber();
+  end_session();
   forget_boot();
   board_clock_known_ = booting_ = false;
   answer_now_ = true;
   if (state_ != HostLinkState::connecting) state_ = HostLinkState::lost;
 }
 
-// The board may hold our session still, and its setpoints. It takes a host with numbers that are
-// too far off for another one, and its session begins with all outputs off. So it has to be where
-// our clock stood still, and also where nothing but the board's clock tells of a restart: in a
-// virtual machine that was paused, no clock of ours tells it.
-void HostLink::renumber() {
-  constexpr std::uint32_t step = 16 * BoardLink::command_window;
-  first_pnum_ = next_pnum_ = (next_pnum_ + step) | echo_host_first_pnum;
+// The board may still hold our session with its setpoints, which nobody wants any more if our clock stood
+// still. In a virtual machine that was paused, no clock of ours shows that: only the board's does.
+void HostLink::end_session() {
+  session_ = no_session;
+  first_pnum_ = next_pnum_;
 }
 
 bool HostLink::is_of_this_boot(std::uint32_t t_ms, std::uint32_t since_ms, std::uint32_t now_ms,

@@ -21,9 +21,15 @@ namespace r4 {
 
 class HostLink {
  public:
-  // `first_pnum` must be echo_host_first_pnum (board_link.hpp) plus 30 random bits.
+  // `first_pnum` is random, so that the number of a command which another host's session has executed (CMD) is
+  // none of ours.
   HostLink(LinkTiming timing, std::uint32_t first_pnum)
       : timing_(timing), first_pnum_(first_pnum), next_pnum_(first_pnum) {}
+
+  // The id of the session. Nothing may be sent while wants_session(): then begin_session() is given a new random one.
+  SessionId session() const { return session_; }
+  bool wants_session() const { return session_ == no_session; }
+  void begin_session(SessionId id) { session_ = id; }
 
   // A valid datagram of the board. Returns what its number says; a late, old or duplicate one does
   // not change the state. `heartbeat`: it is a board heartbeat, answered at once by
@@ -50,12 +56,12 @@ class HostLink {
   // May it be of the boot that is known that the board showed T between `since_ms` and now? Any, before the first.
   bool is_of_this_boot(std::uint32_t t_ms, std::uint32_t since_ms, std::uint32_t now_ms,
                        std::int32_t tolerance_ms) const;
-  // The board was found to have this T; `restarted`: it has begun again. If it has not said so itself, the numbers of
-  // the host are others from now on.
+  // The board was found to have this T; `restarted`: it has restarted. If it has not said so itself, the host's own
+  // clock may have stood still: it wants a new session.
   void on_clock(std::uint32_t t_ms, bool restarted, std::uint32_t now_ms);
 
   // Nothing that is known of the board counts any more, because this computer slept: the board is
-  // taken for one that has begun again, and the numbers of the host are others from now on.
+  // taken for one that has restarted, and a new session is wanted.
   void begin_anew();
 
   // The transport has gone (`lost` at once) or come (a heartbeat is due at once).
@@ -94,9 +100,7 @@ class HostLink {
   std::uint32_t take_pnum() { return next_pnum_++; }
   // The number that was taken last.
   std::uint32_t last_pnum() const { return next_pnum_ - 1; }
-  // Others begin where on_clock() and begin_anew() say so.
-  std::uint32_t first_pnum() const { return first_pnum_; }
-  // Was it taken, for the board as it is now?
+  // True if it was taken in this session.
   bool is_taken(std::uint32_t pnum) const { return pnum - first_pnum_ < next_pnum_ - first_pnum_; }
 
   // Milliseconds until poll() or heartbeat_due() may have something to say; 0 is now.
@@ -121,9 +125,10 @@ class HostLink {
  private:
   void notice_boot(std::uint32_t t_ms, std::uint32_t now_ms);
   void forget_boot();
-  void renumber();
+  void end_session();
 
   LinkTiming timing_;
+  SessionId session_ = no_session;
   std::uint32_t first_pnum_;
   std::uint32_t next_pnum_;
   HostLinkState state_ = HostLinkState::connecting;

@@ -113,6 +113,7 @@ bool read_nack(const Datagram& datagram, Nack& out) {
   if (nack.code == Refusal::none || !parse_number(values[0], nack.pnum)) return false;
   std::uint32_t at = 0;
   if (find_number(datagram, at_name, at) && at <= 0xFF) nack.at = static_cast<std::uint8_t>(at);
+  nack.sid = datagram.session_id();
   nack.has_session = find_number(datagram, session_name, nack.session);
   if (!find_number(datagram, lease_name, nack.lease)) nack.lease = 0;
   out = nack;
@@ -124,6 +125,7 @@ void write_nack(DatagramWriter& writer, const Nack& nack) {
   if (nack.at != 0) writer.field(at_name).value(std::uint32_t{nack.at});
   if (nack.has_session) writer.field(session_name).value(nack.session);
   if (nack.lease != 0) writer.field(lease_name).value(nack.lease);
+  writer.session(nack.sid);
 }
 
 bool read_identity(const Datagram& datagram, Identity& out) {
@@ -141,6 +143,7 @@ bool read_identity(const Datagram& datagram, Identity& out) {
   out.busy = busy == Text("1");
   out.has_busy = out.busy || busy == Text("0");
   out.has_asked = parse_number(datagram.find(asked_name).values(), out.asked);
+  out.sid = datagram.session_id();
   return true;
 }
 
@@ -166,6 +169,7 @@ void write_identity_fields(DatagramWriter& writer, const Identity& identity) {
   if (!identity.name.empty()) writer.field(board_name).value(identity.name);
   if (identity.has_busy) writer.field(busy_name).value(identity.busy ? Text("1") : Text("0"));
   if (identity.has_asked) writer.field(asked_name).value(identity.asked);
+  writer.session(identity.sid);
 }
 
 }  // namespace r4

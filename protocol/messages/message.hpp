@@ -70,7 +70,8 @@ struct Identity {
   bool has_busy = false;
   bool busy = false;  // another host than the one that asked controls it
   bool has_asked = false;
-  std::uint32_t asked = 0;  // the number of the question
+  std::uint32_t asked = 0;     // the number of the question
+  SessionId sid = no_session;  // of the host that asked
 };
 // What the firmware can do besides, whatever the board: it obeys E:LEAVE, and serves who watches by W.
 constexpr Text leave_capability("leave");

@@ -125,7 +125,7 @@ BootReport::Sources BoardProgram::report_sources(const FaultNote& last_boot) {
   sources.can = &fdcan_;
   sources.store = &store_;
   sources.authentication = &application_.authentication();
-  sources.wires = &application_.wires();
+  sources.paths = &application_.paths();
   sources.guard = &application_.guard();
   sources.last_boot = last_boot;
   sources.timer_hz = timer_input_hz();

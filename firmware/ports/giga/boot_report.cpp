@@ -138,13 +138,13 @@ Text BootReport::keys(char (&out)[max_line]) const {
   return line.done();
 }
 
-// By how many wires the host is heard; nothing to say while there was never more than one.
-Text BootReport::wires(char (&out)[max_line]) const {
-  const SessionWires& wires = *sources_.wires;
-  if (wires.joins() == 0) return Text();
+// How many paths the session has; empty while there was never more than one.
+Text BootReport::paths(char (&out)[max_line]) const {
+  const SessionPaths& paths = *sources_.paths;
+  if (paths.joins() == 0) return Text();
   LineWriter line(out);
-  line.text("Wires: ").number(static_cast<std::uint32_t>(wires.size()));
-  return line.text("; joined ").number(wires.joins()).text(", lost ").number(wires.losses()).done();
+  line.text("Paths: ").number(static_cast<std::uint32_t>(paths.size()));
+  return line.text("; joined ").number(paths.joins()).text(", lost ").number(paths.losses()).done();
 }
 
 Text BootReport::next(char (&out)[max_line]) {
@@ -219,7 +219,7 @@ Text BootReport::next(char (&out)[max_line]) {
     case 24:
       return keys(out);
     case 25:
-      return wires(out);
+      return paths(out);
     default:
       step_ = 0;
       write_last_boot(line, sources_.last_boot);

@@ -9,7 +9,7 @@
 #include <cstdint>
 
 #include "../../../protocol/keys/authentication.hpp"
-#include "../../../protocol/link/session_wires.hpp"
+#include "../../../protocol/link/session_paths.hpp"
 #include "../../../protocol/messages/settings.hpp"
 #include "../../board_hardware.hpp"
 #include "../../guard.hpp"
@@ -32,7 +32,7 @@ class BootReport {
     const Fdcan* can;
     const SettingsStore* store;
     const Authentication* authentication;
-    const SessionWires* wires;
+    const SessionPaths* paths;
     const firmware::Guard* guard;
     FaultNote last_boot;
     std::uint32_t timer_hz;
@@ -58,7 +58,7 @@ class BootReport {
   Text chip(char (&out)[max_line]);
   static Text stacks(char (&out)[max_line]);
   Text keys(char (&out)[max_line]) const;
-  Text wires(char (&out)[max_line]) const;
+  Text paths(char (&out)[max_line]) const;
 
   Sources sources_;
   int step_ = 0;  // of the list in next(); 0: not running

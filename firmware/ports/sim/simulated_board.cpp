@@ -325,8 +325,8 @@ void SimulatedBoard::on_rejected(std::uint32_t t_ms, Verdict verdict) {
   if (options_.events.on_rejected) options_.events.on_rejected(t_ms, verdict);
 }
 
-void SimulatedBoard::on_wire(std::uint32_t t_ms, Source wire, bool joined) {
-  if (options_.events.on_wire) options_.events.on_wire(t_ms, ports_[wire.port]->carrier(), joined);
+void SimulatedBoard::on_path(std::uint32_t t_ms, Source path, bool joined) {
+  if (options_.events.on_path) options_.events.on_path(t_ms, ports_[path.port]->carrier(), joined);
 }
 
 }  // namespace r4::sim

@@ -47,7 +47,7 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
     std::function<void(std::uint32_t t_ms, std::uint32_t pnum, Refusal)> on_refused;
     std::function<void(std::uint32_t t_ms, Verdict)> on_rejected;
     // The session's host is heard by that transport as well, or no longer.
-    std::function<void(std::uint32_t t_ms, const Carrier&, bool joined)> on_wire;
+    std::function<void(std::uint32_t t_ms, const Carrier&, bool joined)> on_path;
     std::function<void(std::uint32_t t_ms, const Carrier&, const CarrierEvent&)> on_carrier;
   };
 
@@ -121,7 +121,7 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   void on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command) override;
   void on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code) override;
   void on_rejected(std::uint32_t t_ms, Verdict verdict) override;
-  void on_wire(std::uint32_t t_ms, Source wire, bool joined) override;
+  void on_path(std::uint32_t t_ms, Source path, bool joined) override;
 
   Options options_;
   std::uint64_t seed_;

@@ -128,8 +128,8 @@ sim::SimulatedBoard::Events SimLog::events() {
   events.on_executed = [this](auto... a) { on_executed(a...); };
   events.on_refused = [this](auto... a) { on_refused(a...); };
   events.on_rejected = [this](std::uint32_t t_ms, Verdict verdict) { on_rejected(t_ms, verdict); };
-  events.on_wire = [this](std::uint32_t t_ms, const Carrier& c, bool joined) {
-    on_wire(t_ms, c, joined);
+  events.on_path = [this](std::uint32_t t_ms, const Carrier& c, bool joined) {
+    on_path(t_ms, c, joined);
   };
   events.on_carrier = [this](std::uint32_t t_ms, const Carrier& carrier, const CarrierEvent& e) {
     on_carrier(t_ms, carrier, e);
@@ -306,20 +306,20 @@ void SimLog::on_rejected(std::uint32_t t_ms, Verdict verdict) {
   print(object);
 }
 
-void SimLog::on_wire(std::uint32_t t_ms, const Carrier& carrier, bool joined) {
-  const SessionWires& wires = board_->application().wires();
+void SimLog::on_path(std::uint32_t t_ms, const Carrier& carrier, bool joined) {
+  const SessionPaths& paths = board_->application().paths();
   const char* const what = joined ? "joined" : "left";
   if (!output_.json()) {
     return print(
-        t_ms, fmt::format("{} {} the session: {} wires, {} joined, {} lost so far", carrier.name(),
-                          what, wires.size(), wires.joins(), wires.losses()));
+        t_ms, fmt::format("{} {} the session: {} paths, {} joined, {} lost so far", carrier.name(),
+                          what, paths.size(), paths.joins(), paths.losses()));
   }
   Json object = event(t_ms);
-  object["wire"] = {{"url", carrier.name()},
+  object["path"] = {{"url", carrier.name()},
                     {"event", what},
-                    {"wires", wires.size()},
-                    {"joins", wires.joins()},
-                    {"losses", wires.losses()}};
+                    {"paths", paths.size()},
+                    {"joins", paths.joins()},
+                    {"losses", paths.losses()}};
   print(object);
 }
 

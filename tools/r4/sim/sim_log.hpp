@@ -62,7 +62,7 @@ class SimLog {
   void on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command);
   void on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code);
   void on_rejected(std::uint32_t t_ms, Verdict verdict);
-  void on_wire(std::uint32_t t_ms, const Carrier& carrier, bool joined);
+  void on_path(std::uint32_t t_ms, const Carrier& carrier, bool joined);
   void on_carrier(std::uint32_t t_ms, const Carrier& carrier, const CarrierEvent& event);
   void print(const Json& object) { output_.print(line_of(object)); }
   void print(std::uint32_t t_ms, std::string_view text);

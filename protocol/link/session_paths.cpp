@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "session_paths.hpp"
+
+namespace r4 {
+
+int SessionPaths::find(Source at) const {
+  int i = count_;
+  while (i-- > 0 && paths_[i].at != at) {
+  }
+  return i;
+}
+
+void SessionPaths::begin(Source at, std::uint32_t now_ms) {
+  numbers_.restart();
+  resume(at, now_ms);
+}
+
+void SessionPaths::resume(Source at, std::uint32_t now_ms) {
+  count_ = 1;
+  paths_[0].at = at;
+  paths_[0].heard_ms = now_ms;
+  paths_[0].numbers = PacketTracker();
+}
+
+bool SessionPaths::on_heartbeat(Source from, std::uint32_t now_ms) {
+  const int known = find(from);
+  if (known < 0 && count_ == most) return false;
+  Path& path = paths_[known < 0 ? count_ : known];
+  path.heard_ms = now_ms;
+  if (known >= 0) return false;
+  path.at = from;
+  path.numbers = PacketTracker();
+  ++count_;
+  ++joins_;
+  return true;
+}
+
+bool SessionPaths::take_silent(std::uint32_t timeout_ms, std::uint32_t now_ms, Source& left) {
+  for (int i = 0; count_ > 1 && i < count_; ++i) {
+    if (now_ms - paths_[i].heard_ms >= timeout_ms) return leave(i, left);
+  }
+  return false;
+}
+
+bool SessionPaths::take_port(std::uint8_t port, Source& left) {
+  for (int i = 0; i < count_; ++i) {
+    if (paths_[i].at.port == port) return leave(i, left);
+  }
+  return false;
+}
+
+// What a path that lags brings so late is no sign that the host has restarted.
+bool SessionPaths::count(Source from, std::uint32_t pnum) {
+  const int path = find(from);
+  const bool repeated = path >= 0 && paths_[path].numbers.on(pnum) == Arrival::duplicate;
+  if (repeated) ++repeated_;
+  const std::uint32_t newest = numbers_.newest();
+  const bool long_past =
+      numbers_.started() && !newer(pnum, newest) && newest - pnum >= PacketTracker::window;
+  const bool known = long_past || numbers_.on(pnum) == Arrival::duplicate;
+  return known && !repeated;
+}
+
+bool SessionPaths::leave(int index, Source& left) {
+  left = paths_[index].at;
+  --count_;
+  for (int i = index; i < count_; ++i) paths_[i] = paths_[i + 1];
+  ++losses_;
+  return true;
+}
+
+}  // namespace r4
