@@ -206,12 +206,12 @@ R4LINK_API Refusal refusal_from(Text name);
 // the host knows whether the board still remembers what it executed.
 struct Nack {
   std::uint32_t pnum = 0;
-  SessionId sid = no_session;
   Refusal code = Refusal::none;
   std::uint8_t at = 0;  // from 1; 0: it is none of a group, or the group was refused as a whole
   bool has_session = false;
   std::uint32_t session = 0;
   std::uint32_t lease = 0;  // what a W has to echo (LEASE); 0: none is told
+  SessionId sid = no_session;
 };
 
 // --- the link, seen from the host

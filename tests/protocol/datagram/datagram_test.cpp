@@ -214,5 +214,37 @@ TEST(Datagram, ErrorsHaveTheirWords) {
   EXPECT_STREQ(to_text(ReadError::crc), "crc");
 }
 
+TEST(Datagram, ReadsTheSessionIdWhereverItStands) {
+  for (const char* fields :
+       {"SID:0123456789abcdef;H:ROS2-R4;PNum:1;T:2;", "H:ROS2-R4;SID:0123456789abcdef;PNum:1;T:2;",
+        "H:ROS2-R4;PNum:1;T:2;SID:0123456789ABCDEF;"}) {
+    const std::string bytes = test::with_crc(fields);
+    Datagram datagram;
+    ASSERT_TRUE(read_datagram(bytes, datagram)) << fields;
+    EXPECT_EQ(datagram.session_id(), 0x0123456789abcdefU);
+    EXPECT_EQ(datagram.command().name(), "H");
+    const Datagram copied = datagram;
+    EXPECT_EQ(copied.session_id(), 0x0123456789abcdefU);
+  }
+  const std::string none = test::with_crc("CMD:5;PNum:1;T:2;");
+  Datagram datagram;
+  ASSERT_TRUE(read_datagram(none, datagram));
+  EXPECT_EQ(datagram.session_id(), no_session);
+}
+
+TEST(Datagram, RefusesASessionIdThatIsNone) {
+  for (const char* id : {"", "0", "0000000000000000", "0123456789abcde", "0123456789abcdef0",
+                         "0123456789abcdeg", "01234567,9abcdef", "0x23456789abcdef"}) {
+    const std::string bytes = test::with_crc("H:ROS2-R4;SID:" + std::string(id) + ";PNum:1;T:2;");
+    Datagram datagram;
+    const ReadResult result = read_datagram(bytes, datagram);
+    EXPECT_EQ(result.error, ReadError::syntax) << id;
+    EXPECT_EQ(result.position, 14U);
+  }
+  const std::string twice = test::with_crc("SID:0123456789abcdef;SID:0123456789abcdef;PNum:1;T:2;");
+  Datagram datagram;
+  EXPECT_EQ(read_datagram(twice, datagram).error, ReadError::syntax);
+}
+
 }  // namespace
 }  // namespace r4

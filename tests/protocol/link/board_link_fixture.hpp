@@ -13,7 +13,10 @@ namespace r4 {
 
 constexpr Source here{0, 1};
 constexpr Source there{0, 2};
-constexpr std::uint32_t echo_pnum = echo_host_first_pnum + 100;
+constexpr HostId ours{here, 0x1111};   // the host that connect() brings
+constexpr HostId other{here, 0x2222};  // another host, at the same place
+constexpr HostId paper{here, no_session};
+constexpr std::uint32_t first_number = 0x80000064U;
 
 struct BoardLinkTest : testing::Test {
   // Sends the heartbeats that are due, as the application does.
@@ -29,59 +32,62 @@ struct BoardLinkTest : testing::Test {
     link.heartbeat_sent(now);
     sent.push_back(now);
   }
+  // The board answers one peer; returns the T.
+  std::uint32_t answer() {
+    link.heartbeat_answered(now, now);
+    return now;
+  }
 
-  static BoardLink::HostHeartbeat numbered(std::uint32_t pnum, std::uint64_t t, Source from) {
+  static BoardLink::HostHeartbeat numbered(std::uint32_t pnum, std::uint64_t t, HostId host) {
     BoardLink::HostHeartbeat heartbeat;
-    heartbeat.from = from;
+    heartbeat.host = host;
     heartbeat.has_pnum = true;
     heartbeat.pnum = pnum;
-    heartbeat.has_time = true;
     heartbeat.t = t;
     return heartbeat;
   }
-  HeartbeatEffect heartbeat(std::uint32_t pnum, std::uint64_t t, Source from = here) {
-    const HeartbeatEffect effect = link.on_heartbeat(numbered(pnum, t, from), now);
+  HeartbeatEffect take(const BoardLink::HostHeartbeat& heartbeat) {
+    const HeartbeatEffect effect = link.on_heartbeat(heartbeat, now);
     send_due();
     return effect;
   }
-  // … read so late, perhaps.
+  HeartbeatEffect heartbeat(std::uint32_t pnum, std::uint64_t t, HostId host = ours) {
+    return take(numbered(pnum, t, host));
+  }
+  // The same, which may have waited for so long before it was read.
   HeartbeatEffect late(std::uint32_t waited_ms, std::uint32_t pnum, std::uint64_t t,
-                       Source from = here) {
-    BoardLink::HostHeartbeat heartbeat = numbered(pnum, t, from);
+                       HostId host = ours) {
+    BoardLink::HostHeartbeat heartbeat = numbered(pnum, t, host);
     heartbeat.waited_ms = waited_ms;
-    const HeartbeatEffect effect = link.on_heartbeat(heartbeat, now);
-    send_due();
-    return effect;
+    return take(heartbeat);
   }
-  // As in the capture: no number.
-  HeartbeatEffect numberless(std::uint64_t t, Source from = here) {
-    BoardLink::HostHeartbeat heartbeat = numbered(0, t, from);
+  // As in the paper's capture: without a number.
+  HeartbeatEffect numberless(std::uint64_t t, HostId host = paper) {
+    BoardLink::HostHeartbeat heartbeat = numbered(0, t, host);
     heartbeat.has_pnum = false;
-    const HeartbeatEffect effect = link.on_heartbeat(heartbeat, now);
-    send_due();
-    return effect;
+    return take(heartbeat);
   }
 
-  // What becomes of a command: "execute", "drop" or the refusal's name.
-  std::string command(std::uint32_t pnum, Source from = here) {
-    Refusal code = Refusal::none;
-    switch (link.admit(from, pnum, now, code)) {
-      case Admission::execute:
-        link.executed(pnum);
-        return "execute";
-      case Admission::drop:
-        return "drop";
-      case Admission::refuse:
-        break;
+  // What becomes of a command: "execute" or the refusal's name.
+  std::string command(std::uint32_t pnum, HostId host = ours) {
+    const Refusal code = link.admit(host, pnum, now);
+    if (code == Refusal::none) {
+      link.executed(pnum);
+      return "execute";
     }
     return std::string(name_of(code).data(), name_of(code).size());
   }
 
-  // An echo host in control; its heartbeats were echo_pnum and the next.
+  // A host with a session id in control. Its heartbeats were first_number, a hello, and the next.
   void connect() {
     send_due();
-    ASSERT_EQ(heartbeat(echo_pnum, 0), HeartbeatEffect::new_session);
-    ASSERT_EQ(heartbeat(echo_pnum + 1, sent.back()), HeartbeatEffect::fed);
+    ASSERT_EQ(heartbeat(first_number, 0), HeartbeatEffect::hello);
+    ASSERT_EQ(heartbeat(first_number + 1, answer()), HeartbeatEffect::new_session);
+  }
+  void begin_anew() {
+    link = BoardLink(BoardLink::Timing{});
+    sent.clear();
+    connect();
   }
 
   BoardLink link{BoardLink::Timing{}};

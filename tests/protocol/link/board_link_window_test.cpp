@@ -6,12 +6,14 @@
 namespace r4 {
 namespace {
 
+constexpr HostId host{Source{0, 1}, 77};
+constexpr std::uint32_t first_number = 1000;
+
 BoardLink::HostHeartbeat numbered(std::uint32_t pnum, std::uint32_t t) {
   BoardLink::HostHeartbeat heartbeat;
-  heartbeat.from = Source{0, 1};
+  heartbeat.host = host;
   heartbeat.has_pnum = true;
   heartbeat.pnum = pnum;
-  heartbeat.has_time = true;
   heartbeat.t = t;
   return heartbeat;
 }
@@ -26,7 +28,9 @@ std::uint32_t idle(BoardLink& link, std::uint32_t& now_ms, std::uint32_t pnum,
       link.heartbeat_sent(now_ms);
       echo = now_ms;
     }
-    link.on_heartbeat(numbered(pnum++, i == 0 ? 0 : echo), now_ms);
+    const std::uint32_t t = i == 0 ? 0 : i == 1 ? now_ms : echo;
+    if (i == 1) link.heartbeat_answered(now_ms, now_ms);  // the answer to its hello
+    link.on_heartbeat(numbered(pnum++, t), now_ms);
     link.poll(now_ms);
   }
   return pnum;
@@ -35,21 +39,16 @@ std::uint32_t idle(BoardLink& link, std::uint32_t& now_ms, std::uint32_t pnum,
 TEST(BoardLink, TakesCommandsOfAHostThatOnlySentHeartbeatsForHours) {
   BoardLink link(BoardLink::Timing{});
   std::uint32_t now_ms = 5000;
-  const std::uint32_t pnum =
-      idle(link, now_ms, echo_host_first_pnum, 3 * BoardLink::command_window);
+  const std::uint32_t pnum = idle(link, now_ms, first_number, 3 * BoardLink::command_window);
   ASSERT_EQ(link.state(), BoardLinkState::active);
-  Refusal code = Refusal::none;
-  EXPECT_EQ(link.admit(Source{0, 1}, pnum, now_ms, code), Admission::execute)
-      << "code " << static_cast<int>(code);
+  EXPECT_EQ(link.admit(host, pnum, now_ms), Refusal::none);
 }
 
 TEST(BoardLink, RefusesACommandFromBeforeHoursOfHeartbeats) {
   BoardLink link(BoardLink::Timing{});
   std::uint32_t now_ms = 5000;
-  idle(link, now_ms, echo_host_first_pnum, 3 * BoardLink::command_window);
-  Refusal code = Refusal::none;
-  EXPECT_EQ(link.admit(Source{0, 1}, echo_host_first_pnum + 10, now_ms, code), Admission::refuse);
-  EXPECT_EQ(code, Refusal::stale);
+  idle(link, now_ms, first_number, 3 * BoardLink::command_window);
+  EXPECT_EQ(link.admit(host, first_number + 10, now_ms), Refusal::stale);
 }
 
 }  // namespace
