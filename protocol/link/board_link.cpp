@@ -145,7 +145,6 @@ bool BoardLink::poll(std::uint32_t now_ms) {
 void BoardLink::leave(std::uint32_t now_ms) {
   left_[left_next_] = host_.sid;
   left_next_ = (left_next_ + 1) % left_memory;
-  has_session_ = false;
   lose(now_ms);
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "firmware/application/application.hpp"
+#include "protocol/datagram/numbers.hpp"
 #include "protocol/messages/message.hpp"
 #include "protocol/messages/state_fields.hpp"
 #include "tests/support/datagrams.hpp"
@@ -69,8 +70,8 @@ class MemoryPort final : public firmware::Port {
   bool packed = false;
   bool cable = false;
   bool bus = false;
-  std::uint32_t held = 0;                // who is in control
-  std::vector<std::uint32_t> also_held;  // … and its other places
+  std::uint32_t held = 0;                // the peer of a path of the session
+  std::vector<std::uint32_t> also_held;  // those of its other paths
   const std::uint32_t* now_ms = nullptr;
   std::size_t limit = max_datagram;
   std::vector<Sent> sent;
@@ -94,9 +95,9 @@ class EventLog final : public firmware::Observer {
   void on_rejected(std::uint32_t, Verdict verdict) override {
     rejected.emplace_back(to_text(verdict));
   }
-  void on_wire(std::uint32_t, Source wire, bool joined) override {
-    wires.push_back((joined ? "joined " : "left ") + std::to_string(wire.port) + "/" +
-                    std::to_string(wire.peer));
+  void on_path(std::uint32_t, Source path, bool joined) override {
+    paths.push_back((joined ? "joined " : "left ") + std::to_string(path.port) + "/" +
+                    std::to_string(path.peer));
   }
 
   std::vector<std::string> states;
@@ -105,7 +106,7 @@ class EventLog final : public firmware::Observer {
   std::vector<std::uint32_t> executed;
   std::vector<std::string> refused;
   std::vector<std::string> rejected;
-  std::vector<std::string> wires;  // "joined 1/4": port and peer
+  std::vector<std::string> paths;  // "joined 1/4": port and peer
 };
 
 // A datagram of the board, read.
@@ -185,13 +186,14 @@ class TestBoard {
     return heard;
   }
 
-  // The T of the newest heartbeat on a port that carried one; 0 before the first.
+  // The T that a host on that port echoes: of the newest heartbeat, 0 before the first and of one that says CONNECTING.
   std::uint32_t newest_t(int port = 0) {
     for (const MemoryPort::Sent& sent : ports[port].sent) {
       Datagram datagram;
       if (read_datagram(sent.bytes, datagram) &&
           kind_of(datagram) == MessageKind::board_heartbeat) {
-        newest_t_[port] = static_cast<std::uint32_t>(datagram.time_ms());
+        const bool echoes = !is_connecting_heartbeat(datagram);
+        newest_t_[port] = echoes ? static_cast<std::uint32_t>(datagram.time_ms()) : 0;
         newest_cause_ = heartbeat_report(datagram).cause;
       }
     }
@@ -230,14 +232,26 @@ inline State state_of(const Heard& heard) {
   return state;
 }
 
-// A host at one place, numbering its packets.
+constexpr SessionId our_session = 0x0123456789abcdef;
+constexpr SessionId another_session = 0xfedcba9876543210;
+constexpr SessionId third_session = 0xaaaabbbbccccdddd;
+
+// "SID:…;PNum:…;T:…;", without SID for no_session.
+inline std::string stamp_of(SessionId sid, std::uint32_t pnum, std::uint64_t t) {
+  char digits[session_id_size];
+  write_session_id(digits, sid);
+  const std::string id = sid == no_session ? "" : "SID:" + std::string(digits, sizeof digits) + ";";
+  return id + "PNum:" + std::to_string(pnum) + ";T:" + std::to_string(t) + ";";
+}
+
+// A host with one path, numbering its packets. A paper host has no_session.
 class TestHost {
  public:
-  TestHost(TestBoard& to, std::uint32_t first_pnum, Source place = {})
-      : board(to), at(place), pnum(first_pnum) {}
+  TestHost(TestBoard& to, SessionId session, Source place = {})
+      : board(to), at(place), sid(session) {}
 
   std::uint32_t heartbeat(std::uint64_t t) {
-    board.receive("H:ROS2-R4;PNum:" + std::to_string(pnum) + ";T:" + std::to_string(t) + ";", at);
+    board.receive("H:ROS2-R4;" + stamp_of(sid, pnum, t), at);
     return pnum++;
   }
   // A heartbeat that echoes the board's newest.
@@ -254,7 +268,7 @@ class TestHost {
   std::uint32_t clear() { return command(clear_field()); }
   std::string clear_field() { return "E:CLEAR," + std::to_string(board.newest_cause()); }
   void resend(const std::string& field, std::uint32_t number) {
-    board.receive(field + ";PNum:" + std::to_string(number) + ";T:1699276044383;", at);
+    board.receive(field + ";" + stamp_of(sid, number, 1699276044383), at);
   }
   // Takes control: T:0, then the echo of what the board sent.
   void connect() {
@@ -271,16 +285,14 @@ class TestHost {
 
   TestBoard& board;
   Source at;
-  std::uint32_t pnum;
+  SessionId sid;
+  std::uint32_t pnum = 12345;
 
  private:
   std::uint32_t heard_ = 0;
 };
 
-// Where our hosts begin to number.
-constexpr std::uint32_t echo_pnum = echo_host_first_pnum + 12345;
-
-// A board with an echo host in control.
+// A board with a host in control.
 struct BoardInControl : testing::Test {
   BoardInControl() {
     host.connect();
@@ -305,7 +317,7 @@ struct BoardInControl : testing::Test {
   }
 
   TestBoard board;
-  TestHost host{board, echo_pnum, Source{0, 4}};
+  TestHost host{board, our_session, Source{0, 4}};
 };
 
 }  // namespace r4::test

@@ -13,7 +13,8 @@ namespace r4 {
 namespace {
 
 using firmware::Guard;
-using test::echo_pnum;
+using test::another_session;
+using test::our_session;
 using test::MemoryHal;
 using test::TestBoard;
 using test::TestHost;
@@ -153,7 +154,7 @@ struct GuardedBoard : testing::Test {
   Guard& guard() { return board.application->guard(); }
 
   TestBoard board;
-  TestHost host{board, echo_pnum, Source{0, 4}};
+  TestHost host{board, our_session, Source{0, 4}};
 };
 
 TEST_F(GuardedBoard, SilenceIsSeenWhileTheLoopHangsEvenIfAHeartbeatWaits) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An echo host that is heard by several wires: each carries the same bytes, some later than others.
+// A host with several paths: each carries the same datagrams, some later than others.
 #pragma once
 
 #include <algorithm>
@@ -18,16 +18,15 @@ class WiredHost {
     bool cut = false;
   };
 
-  WiredHost(TestBoard& to, std::vector<Wire> its_wires, std::uint32_t first_pnum = echo_pnum)
-      : wires(std::move(its_wires)), pnum(first_pnum), board_(to) {}
+  WiredHost(TestBoard& to, std::vector<Wire> its_wires) : wires(std::move(its_wires)), board_(to) {}
 
-  // Sends by every wire that is not cut; returns the number.
+  // Sends on every path that is not cut; returns the number.
   std::uint32_t send(const std::string& field, std::uint64_t t) {
     const std::uint32_t number = pnum++;
-    const std::string numbered = field + ";PNum:" + std::to_string(number);
-    last = with_crc(seal(numbered + ";T:" + std::to_string(t) + ";"));
     for (const Wire& wire : wires) {
-      if (!wire.cut) under_way_.push_back({wire.at, last, board_.now_ms + wire.lag_ms});
+      if (wire.cut) continue;
+      last = with_crc(seal(field + ";" + stamp_of(our_session, number, t)));
+      under_way_.push_back({wire.at, last, board_.now_ms + wire.lag_ms});
     }
     deliver();
     return number;
@@ -53,9 +52,8 @@ class WiredHost {
       if (static_cast<std::int32_t>(board_.now_ms - next_heartbeat_ms_) >= 0) heartbeat();
     }
   }
-  // The newest T that came by a wire which is not cut; 0 while the board says CONNECTING.
+  // The newest T that came on a path which is not cut.
   std::uint32_t echo() {
-    if (board_.state() == firmware::BoardState::connecting) return 0;
     std::uint32_t newest = 0;
     for (const Wire& wire : wires) {
       if (!wire.cut) newest = std::max(newest, board_.newest_t(wire.at.port));
@@ -64,7 +62,7 @@ class WiredHost {
   }
 
   std::vector<Wire> wires;
-  std::uint32_t pnum;
+  std::uint32_t pnum = 12345;
   std::string last;  // that was sent
   // What is done to the fields before they are sent: nothing, or they are signed.
   std::function<std::string(const std::string&)> seal = [](const std::string& fields) {

@@ -10,8 +10,9 @@
 namespace r4 {
 namespace {
 
-using test::echo_pnum;
+using test::another_session;
 using test::Heard;
+using test::our_session;
 using test::TestBoard;
 using test::TestHost;
 
@@ -36,7 +37,7 @@ class ApplicationDevices : public testing::Test {
   sim::UserDevices devices;
   firmware::UserI2c i2c{devices.bus};
   TestBoard board{Settings(), 1, 500'000, &i2c};
-  TestHost host{board, echo_pnum};
+  TestHost host{board, our_session};
 };
 
 TEST_F(ApplicationDevices, AnswersUnderTheNumberOfTheCommandForASecond) {
@@ -114,7 +115,7 @@ TEST_F(ApplicationDevices, ReadingsEndWithTheSessionAndThoseOfSettingsStay) {
 
   pass(1200, false);  // silence
   ASSERT_EQ(board.reason(), SafeReason::link);
-  TestHost next(board, echo_pnum + 0x1000000, Source{0, 9});
+  TestHost next(board, another_session, Source{0, 9});
   next.connect();
   next.command("F:I2C1,I2C2");
   pass(50, false);
@@ -145,7 +146,7 @@ TEST_F(ApplicationDevices, TheChipsOfTheBoardAreNotOnThisBus) {
 
 TEST(ApplicationWithoutDevices, KnowsNoX) {
   TestBoard board;
-  TestHost host(board, echo_pnum);
+  TestHost host(board, our_session);
   host.connect();
   const std::uint32_t number = host.command("X:SCAN");
   EXPECT_EQ(board.log.refused.back(), std::to_string(number) + " UNKNOWN");

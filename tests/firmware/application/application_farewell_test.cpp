@@ -9,21 +9,15 @@ namespace r4 {
 namespace {
 
 using firmware::BoardState;
-using test::echo_pnum;
+using test::another_session;
+using test::our_session;
 using test::TestBoard;
 using test::TestHost;
 using Lines = std::vector<std::string>;
 
 struct ApplicationFarewell : test::BoardInControl {
-  // Its T echoes, as a heartbeat's.
-  void leave(TestHost& from, std::uint32_t pnum) {
-    leave(from, pnum, board.newest_t(from.at.port));
-  }
-  void leave(TestHost& from, std::uint32_t pnum, std::uint32_t t) {
-    board.receive("E:LEAVE;PNum:" + std::to_string(pnum) + ";T:" + std::to_string(t) + ";",
-                  from.at);
-  }
-  TestHost other{board, echo_pnum + 99999, Source{0, 5}};
+  static void leave(TestHost& from, std::uint32_t pnum) { from.resend("E:LEAVE", pnum); }
+  TestHost other{board, another_session, Source{0, 5}};
 };
 
 TEST_F(ApplicationFarewell, MakesTheOutputsSafeAndTheBoardFreeAtOnce) {
@@ -47,6 +41,9 @@ TEST_F(ApplicationFarewell, NothingComesBackWithTheSameHost) {
   leave(host, host.pnum++);
   board.run(1);
   host.connect();
+  EXPECT_EQ(board.reason(), SafeReason::link) << "the session is over";
+  host.sid = another_session;
+  host.connect();
   EXPECT_EQ(board.state(), BoardState::active);
   EXPECT_EQ(board.outputs().osmc[0].pwm, 0);
 }
@@ -61,26 +58,27 @@ TEST_F(ApplicationFarewell, OfAnotherHostIsRefused) {
 
 TEST_F(ApplicationFarewell, LateOrRepeatedHasNoEffectOnTheNextSession) {
   const std::uint32_t number = host.pnum++;
-  const std::uint32_t echo = board.newest_t();
-  leave(host, number, echo);
+  leave(host, number);
   forget();
-  leave(host, number, echo);
+  leave(host, number);
   EXPECT_EQ(answers(), (Lines{"DUPLICATE"})) << "its host learns that it was executed";
   board.run(1);
-  TestHost next(board, number - 50, host.at);  // its numbers are such that the old one would fit
+  TestHost next(board, another_session,
+                host.at);  // its numbers are such that the old one would fit
   next.connect();
   next.command("O:358,1,1");
   forget();
-  leave(next, number, echo);
-  EXPECT_EQ(answers(), (Lines{"STALE"}));
+  leave(host, number);
+  leave(host, next.pnum);
+  EXPECT_EQ(answers(), (Lines{"BUSY", "BUSY"}));
   EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
-  leave(next, number + 1);
+  leave(next, next.pnum);
   EXPECT_TRUE(board.safe());
 }
 
-TEST_F(ApplicationFarewell, OfAPaperHostProvesNothing) {
+TEST_F(ApplicationFarewell, OfAPaperHostIsRefused) {
   TestBoard paper_board;
-  TestHost paper(paper_board, 1);
+  TestHost paper(paper_board, no_session);
   paper.heartbeat(5);
   paper.command("O:358,1,1");
   paper.command("E:LEAVE");
@@ -105,8 +103,7 @@ struct SignedFarewell : testing::Test {
       if (!read_datagram(sent.bytes, datagram) || heartbeat_nonce(datagram).empty()) continue;
       nonce = test::str(heartbeat_nonce(datagram));
     }
-    const std::string text =
-        field + ";PNum:" + std::to_string(pnum++) + ";T:" + std::to_string(t) + ";";
+    const std::string text = field + ";" + test::stamp_of(sid, pnum++, t);
     const std::string whole =
         test::with_signature(text, test::key_of(1), nonce, ++counter, board.now_ms);
     board.receive(whole, at);
@@ -122,16 +119,15 @@ struct SignedFarewell : testing::Test {
 
   TestBoard board{test::settings_with(test::key_of(1))};
   Source at{0, 7};
-  std::uint32_t pnum = echo_pnum;
+  std::uint32_t pnum = 7;
+  SessionId sid = our_session;
   std::uint64_t counter = 1000;
   std::string nonce;
 };
 
 TEST_F(SignedFarewell, IsObeyedIfItIsSigned) {
   drive();
-  const std::string unsigned_one =
-      "E:LEAVE;PNum:" + std::to_string(pnum) + ";T:" + std::to_string(board.newest_t()) + ";";
-  board.receive(unsigned_one, at);
+  board.receive("E:LEAVE;" + test::stamp_of(sid, pnum, board.newest_t()), at);
   EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
   EXPECT_EQ(board.log.rejected, Lines{"missing"});
   say("E:LEAVE", board.newest_t());
@@ -143,6 +139,7 @@ TEST_F(SignedFarewell, ReplayedItEndsNoSession) {
   drive();
   const std::string farewell = say("E:LEAVE", board.newest_t());
   board.run(10);
+  sid = another_session;
   drive();
   const std::uint16_t pwm = board.outputs().osmc[0].pwm;
   board.receive(farewell, at);

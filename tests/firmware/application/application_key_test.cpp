@@ -9,9 +9,10 @@ namespace r4 {
 namespace {
 
 using firmware::BoardState;
-using test::echo_pnum;
+using test::another_session;
 using test::Heard;
 using test::key_of;
+using test::our_session;
 using test::settings_with;
 using test::TestBoard;
 using Lines = std::vector<std::string>;
@@ -36,7 +37,7 @@ class KeyHost {
     }
   }
   std::string fields(const std::string& field, std::uint64_t time) {
-    return field + ";PNum:" + std::to_string(pnum++) + ";T:" + std::to_string(time) + ";";
+    return field + ";" + test::stamp_of(our_session, pnum++, time);
   }
   std::string signed_fields(const std::string& text) {
     return test::with_signature(text, key_, nonce, ++counter, board.now_ms);
@@ -60,7 +61,7 @@ class KeyHost {
 
   TestBoard& board;
   Source at;
-  std::uint32_t pnum = echo_pnum;
+  std::uint32_t pnum = 12345;
   std::uint64_t counter = 1000;
   std::string nonce;
   std::uint32_t t = 0;
@@ -104,9 +105,9 @@ TEST_F(ApplicationKey, ObeysAHostThatSigns) {
 
 TEST_F(ApplicationKey, ObeysNoHostThatDoesNot) {
   board.take();
-  board.receive("H:ROS2-R4;PNum:" + std::to_string(echo_pnum) + ";T:0;");
+  board.receive("H:ROS2-R4;" + test::stamp_of(our_session, 1, 0));
   EXPECT_EQ(board.state(), BoardState::connecting);
-  board.receive("O:358,1,1;PNum:" + std::to_string(echo_pnum + 1) + ";T:0;");
+  board.receive("O:358,1,1;" + test::stamp_of(our_session, 2, 0));
   EXPECT_TRUE(board.safe());
   EXPECT_EQ(board.log.rejected, (Lines{"missing", "missing"}));
   EXPECT_EQ(board.log.executed, std::vector<std::uint32_t>());
@@ -163,7 +164,7 @@ TEST_F(ApplicationKey, AnEchoOfWhatItSaysWhileConnectingStartsNothingButAZeroDoe
     board.run(100);
   }
   EXPECT_EQ(board.log.rejected, Lines()) << "rightly signed they are";
-  host.heartbeat();
+  host.connect();
   EXPECT_EQ(board.state(), BoardState::active);
 }
 
@@ -194,9 +195,9 @@ TEST_F(ApplicationKey, AReplayMovesNothingFromAnywhere) {
   }
   EXPECT_EQ(pwm(), 0);
   EXPECT_EQ(board.log.executed.size(), 2U);
-  EXPECT_EQ(board.log.rejected, Lines(2, "replayed")) << "until they relay a heartbeat";
+  EXPECT_EQ(board.log.rejected, Lines(9, "replayed"));
   board.run(1000);
-  ASSERT_EQ(board.reason(), SafeReason::link) << "copies keep nobody alive";
+  ASSERT_EQ(board.reason(), SafeReason::link) << "replays keep nobody alive";
 }
 
 TEST_F(ApplicationKey, WhatTheNetworkHeldBackForMoreThan250MsDoesNothing) {
@@ -218,7 +219,7 @@ TEST_F(ApplicationKey, WhatTheNetworkHeldBackForMoreThan250MsDoesNothing) {
 TEST_F(ApplicationKey, ARetrySignedAnewIsExecutedOnce) {
   host.connect();
   const std::uint32_t pnum = host.pnum++;
-  const std::string text = "O:358,1,1;PNum:" + std::to_string(pnum) + ";T:5;";
+  const std::string text = "O:358,1,1;" + test::stamp_of(our_session, pnum, 5);
   board.receive(host.signed_fields(text), host.at);
   board.receive(host.signed_fields(text), host.at);
   EXPECT_EQ(board.log.executed, std::vector<std::uint32_t>{pnum});
@@ -239,7 +240,7 @@ TEST_F(ApplicationKey, AnUnsignedStopProvesNothingOfTheOwnersCommands) {
   const std::uint32_t executed = host.command("O:358,1,1");
   // With the number of a command that was kept from the board.
   const std::uint32_t held_back = host.pnum++;
-  board.receive("E:STOP;PNum:" + std::to_string(held_back) + ";T:0;", host.at);
+  board.receive("E:STOP;" + test::stamp_of(our_session, held_back, 0), host.at);
   EXPECT_EQ(board.reason(), SafeReason::stop);
   EXPECT_EQ(board.application->link().last_executed(), executed);
   host.heartbeat();  // there is another nonce
@@ -250,7 +251,7 @@ TEST_F(ApplicationKey, AnUnsignedStopProvesNothingOfTheOwnersCommands) {
 TEST_F(ApplicationKey, TheOwnersStopIsNoRepetitionOfOneThatWasForgedUnderItsNumber) {
   host.connect();
   const std::uint32_t next = host.pnum + 1;
-  board.receive("E:STOP;PNum:" + std::to_string(next) + ";T:0;", host.at);
+  board.receive("E:STOP;" + test::stamp_of(our_session, next, 0), host.at);
   host.heartbeat();
   const std::string clear = "E:CLEAR," + std::to_string(board.newest_cause());
   ASSERT_EQ(host.pnum, next);
@@ -307,7 +308,7 @@ TEST_F(ApplicationKey, TakesAnotherNonceForEachCauseToBeSafe) {
 
 TEST_F(ApplicationKey, ACableOfItsOwnNeedsNoSignatureAndCanSetKeys) {
   board.ports[1].cable = true;
-  test::TestHost cable(board, echo_pnum, {1, 0});
+  test::TestHost cable(board, our_session, {1, 0});
   cable.connect();
   cable.command("O:358,1,1");
   EXPECT_EQ(pwm(), 358);
@@ -326,7 +327,7 @@ TEST_F(ApplicationKey, AKeyIsNotSetOverANetworkNotEvenBySomebodyWhoHasOne) {
 TEST(ApplicationWithoutKey, AsksForASignatureAsSoonAsItIsGivenAKey) {
   TestBoard board({}, 2);
   board.ports[0].cable = true;
-  test::TestHost cable(board, echo_pnum);
+  test::TestHost cable(board, our_session);
   cable.connect();
   cable.command("C:key,1:" + std::string(64, 'a'));
   board.take();
@@ -337,7 +338,7 @@ TEST(ApplicationWithoutKey, AsksForASignatureAsSoonAsItIsGivenAKey) {
   EXPECT_NE(heard.back().bytes.find(";AN:"), std::string::npos);
   board.run(1000);
   ASSERT_EQ(board.reason(), SafeReason::link);
-  test::TestHost network(board, echo_pnum + 9'000'000, {1, 5});
+  test::TestHost network(board, another_session, {1, 5});
   network.connect();
   EXPECT_EQ(board.reason(), SafeReason::link);
   EXPECT_EQ(board.log.rejected.front(), "missing");
@@ -345,7 +346,7 @@ TEST(ApplicationWithoutKey, AsksForASignatureAsSoonAsItIsGivenAKey) {
 
 TEST(ApplicationWithoutKey, TakesASignedDatagramAsAnyOther) {
   TestBoard board;
-  test::TestHost host(board, echo_pnum);
+  test::TestHost host(board, our_session);
   host.connect();
   host.command("O:358,1,1;A:1,1,1,AAAAAAAAAAA");
   EXPECT_EQ(board.outputs().osmc[0].pwm, 358);

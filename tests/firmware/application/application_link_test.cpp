@@ -8,9 +8,10 @@ namespace r4 {
 namespace {
 
 using firmware::BoardState;
-using test::echo_pnum;
+using test::another_session;
 using test::Heard;
 using test::MemoryPort;
+using test::our_session;
 using test::TestBoard;
 using test::TestHost;
 using Lines = std::vector<std::string>;
@@ -29,9 +30,28 @@ TEST(ApplicationLink, SendsThePapersHeartbeatWhileConnecting) {
   EXPECT_EQ(board.hal.made_safe, 1);
 }
 
-TEST(ApplicationLink, StreamsFromTheFirstHostHeartbeatOn) {
+TEST(ApplicationLink, OffersAHostWithNothingToEchoAHeartbeatOfItsOwn) {
+  TestBoard board({}, 2);
+  TestHost host(board, our_session, Source{0, 3});
+  board.run(777);
+  board.take(0);
+  board.take(1);
+  host.heartbeat(0);
+  const std::vector<Heard> heard = board.take();
+  ASSERT_EQ(heard.size(), 1U);
+  EXPECT_EQ(heard[0].kind, MessageKind::board_heartbeat);
+  EXPECT_EQ(heard[0].peer, 3U);
+  EXPECT_EQ(heard[0].pnum, 1U);
+  EXPECT_EQ(heard[0].t_ms, board.now_ms);
+  EXPECT_EQ(board.state(), BoardState::connecting);
+  EXPECT_TRUE(board.take(1).empty());
+  host.heartbeat(board.now_ms);
+  EXPECT_EQ(board.state(), BoardState::active);
+}
+
+TEST(ApplicationLink, StreamsFromTheHeartbeatOnThatBeginsTheSession) {
   TestBoard board;
-  TestHost host(board, echo_pnum);
+  TestHost host(board, no_session);
   board.run(777);
   board.take();
   host.heartbeat(0);
@@ -58,7 +78,7 @@ TEST(ApplicationLink, HearsAPaperHostsHeartbeatWithoutNumberOrTime) {
 
 TEST(ApplicationLink, GoesSafeExactlyAtTheTimeout) {
   TestBoard board;
-  TestHost host(board, echo_pnum);
+  TestHost host(board, our_session);
   host.connect();
   host.stay(300);
   host.command("O:358,1,1");
@@ -73,7 +93,7 @@ TEST(ApplicationLink, GoesSafeExactlyAtTheTimeout) {
 
 TEST(ApplicationLink, SilenceCountsBeforeTheHeartbeatThatEndsIt) {
   TestBoard board;
-  TestHost host(board, 1);
+  TestHost host(board, no_session);
   host.heartbeat(5);
   host.command("O:358,1,1");
   board.now_ms += 999;  // the board was held up: nothing was polled
@@ -104,7 +124,7 @@ struct ApplicationStandstill : testing::Test {
   }
 
   TestBoard board;
-  TestHost host{board, 1};
+  TestHost host{board, no_session};
 };
 
 TEST_F(ApplicationStandstill, AHeartbeatThatWaitedCountsFromWhenTheLoopStoodStill) {
@@ -154,7 +174,7 @@ TEST_F(ApplicationStandstill, ALoopThatTurnsAsItShouldDoesNotStandStill) {
 
 TEST_F(ApplicationStandstill, EachPortHasABacklogOfItsOwn) {
   TestBoard two({}, 2);
-  TestHost driver(two, 1, Source{1, 4});
+  TestHost driver(two, no_session, Source{1, 4});
   driver.heartbeat(5);
   driver.command("O:358,1,1");
   two.now_ms += 300;
@@ -225,17 +245,17 @@ TEST_F(ApplicationStandstill, OneThatTheHeartbeatOvertookIsStale) {
 
 TEST(ApplicationLink, ACommandAfterTheSilenceComesTooLate) {
   TestBoard board;
-  TestHost host(board, 1);
+  TestHost host(board, no_session);
   host.heartbeat(5);
   board.now_ms += 1000;
   host.command("O:358,1,1");
   EXPECT_TRUE(board.safe());
-  EXPECT_EQ(board.log.refused, (Lines{"2 SAFE"}));
+  EXPECT_EQ(board.log.refused, (Lines{"12346 SAFE"}));
 }
 
 TEST(ApplicationLink, SendsHeartbeatsOnlyWhileTheLinkIsLost) {
   TestBoard board;
-  TestHost host(board, echo_pnum);
+  TestHost host(board, our_session);
   host.connect();
   board.run(1000);
   board.take();
@@ -252,7 +272,7 @@ TEST(ApplicationLink, SendsHeartbeatsOnlyWhileTheLinkIsLost) {
 
 TEST(ApplicationLink, KeepsTwoHeartbeatsASecondForAPaperHost) {
   TestBoard board;
-  TestHost host(board, 1);
+  TestHost host(board, no_session);
   host.heartbeat(1);
   board.take();
   for (int i = 0; i < 20; ++i) {
@@ -280,8 +300,8 @@ TEST(ApplicationLink, APortTooManyIsRefusedAndWhatItWouldBringIsPassedOver) {
 
 TEST(ApplicationLink, TellsThePortWhoIsInControlAndWhenNobodyIs) {
   TestBoard board({}, 2);
-  TestHost host(board, 66, {1, 7});
-  TestHost other(board, 900, {1, 8});
+  TestHost host(board, no_session, {1, 7});
+  TestHost other(board, no_session, {1, 8});
   host.echo();
   host.echo();
   EXPECT_EQ(board.ports[1].held, 7U);
@@ -303,7 +323,7 @@ TEST(ApplicationLink, TellsThePortWhoIsInControlAndWhenNobodyIs) {
 
 TEST(ApplicationLink, RestoresTheOutputsForTheSameHost) {
   TestBoard board;
-  TestHost host(board, echo_pnum);
+  TestHost host(board, our_session);
   host.connect();
   host.command("O:358,1,1");
   host.command("F:AIN24");
@@ -322,7 +342,7 @@ TEST(ApplicationLink, RearmKeepsTheOutputsOffUntilAFreshCommand) {
   Settings settings;
   settings.recovery = Recovery::rearm;
   TestBoard board(settings);
-  TestHost host(board, echo_pnum);
+  TestHost host(board, our_session);
   host.connect();
   host.command("O:358,1,1");
   host.command("S:1500,2");
@@ -337,11 +357,11 @@ TEST(ApplicationLink, RearmKeepsTheOutputsOffUntilAFreshCommand) {
 
 TEST(ApplicationLink, RestoresNothingForAnotherHost) {
   TestBoard board;
-  TestHost first(board, echo_pnum, Source{0, 1});
+  TestHost first(board, our_session, Source{0, 1});
   first.connect();
   first.command("O:358,1,1");
   board.run(1500);
-  TestHost second(board, echo_pnum + 100'000'000, Source{0, 2});
+  TestHost second(board, another_session, Source{0, 2});
   second.connect();
   EXPECT_EQ(board.log.states.back(), "ACTIVE none");
   EXPECT_TRUE(board.safe());
@@ -351,12 +371,12 @@ TEST(ApplicationLink, RestoresNothingForAnotherHost) {
 
 TEST(ApplicationLink, ARestartIsNoticedWithinTheTimeoutAndMakesTheOutputsSafe) {
   TestBoard board;
-  TestHost host(board, echo_pnum);
+  TestHost host(board, our_session);
   host.connect();
   host.stay(200);
   host.command("O:358,1,1");
   host.command("F:AIN24");
-  TestHost restarted(board, echo_pnum + 100'000'000);
+  TestHost restarted(board, another_session);
   restarted.heartbeat(0);
   EXPECT_EQ(board.outputs().osmc[0].pwm, 358);  // nothing is proven yet
   board.run(1010);
@@ -371,20 +391,11 @@ TEST(ApplicationLink, ARestartIsNoticedWithinTheTimeoutAndMakesTheOutputsSafe) {
 
 TEST(ApplicationLink, AnswersAHostThatHasNothingToEcho) {
   TestBoard board;
-  TestHost host(board, echo_pnum, Source{0, 1});
+  TestHost host(board, our_session, Source{0, 1});
   host.connect();
-  host.stay(200);
-  board.take();
-
-  // The owner began again: a heartbeat for it to echo.
-  TestHost restarted(board, echo_pnum + 100'000'000, Source{0, 1});
-  restarted.heartbeat(0);
-  EXPECT_EQ(board.take(MessageKind::board_heartbeat).size(), 1U);
-
-  // While the link is lost, to any host, wherever it is.
   board.run(1500);
   board.take();
-  TestHost other(board, echo_pnum + 200'000'000, Source{0, 9});
+  TestHost other(board, another_session, Source{0, 9});
   other.heartbeat(0);
   const std::vector<Heard> heard = board.take(MessageKind::board_heartbeat);
   ASSERT_EQ(heard.size(), 1U);
@@ -395,7 +406,7 @@ TEST(ApplicationLink, AnswersAHostThatHasNothingToEcho) {
 TEST(ApplicationLink, AnswersAHostThatEchoesWhatIsPast) {
   // After a reboot of the board.
   TestBoard board;
-  TestHost host(board, echo_pnum, Source{0, 3});
+  TestHost host(board, our_session, Source{0, 3});
   board.take();
   host.heartbeat(123456);
   EXPECT_EQ(board.state(), BoardState::connecting);
@@ -405,6 +416,7 @@ TEST(ApplicationLink, AnswersAHostThatEchoesWhatIsPast) {
   EXPECT_EQ(heard[0].peer, 3U);
 
   // After an outage.
+  board.run(20);
   host.connect();
   const std::uint32_t old_t = board.newest_t();
   board.run(1500);
@@ -418,8 +430,8 @@ TEST(ApplicationLink, AnswersAHostThatEchoesWhatIsPast) {
 
 TEST(ApplicationLink, TheSamePeerNumberOnAnotherPortIsAnotherHost) {
   TestBoard board(Settings(), 2);
-  TestHost owner(board, echo_pnum, Source{0, 1});
-  TestHost other(board, echo_pnum + 50, Source{1, 1});
+  TestHost owner(board, our_session, Source{0, 1});
+  TestHost other(board, another_session, Source{1, 1});
   owner.connect();
   other.command("O:358,1,1");
   EXPECT_TRUE(board.safe());
@@ -429,8 +441,8 @@ TEST(ApplicationLink, TheSamePeerNumberOnAnotherPortIsAnotherHost) {
 
 TEST(ApplicationLink, AnswersToOthersDoNotCountInTheOwnersNumbers) {
   TestBoard board;
-  TestHost owner(board, echo_pnum, Source{0, 1});
-  TestHost other(board, echo_pnum + 100'000'000, Source{0, 2});
+  TestHost owner(board, our_session, Source{0, 1});
+  TestHost other(board, another_session, Source{0, 2});
   owner.connect();
   for (int i = 0; i < 50; ++i) {
     other.command("Q:ID");
@@ -453,7 +465,7 @@ TEST(ApplicationLink, AnswersToOthersDoNotCountInTheOwnersNumbers) {
 
 TEST(ApplicationLink, StreamsOnEveryPortWithNumbersOfItsOwn) {
   TestBoard board(Settings(), 3);
-  TestHost owner(board, echo_pnum, Source{1, 6});
+  TestHost owner(board, our_session, Source{1, 6});
   owner.connect();
   owner.stay(200);
   for (int port = 0; port < 3; ++port) {
@@ -474,7 +486,7 @@ TEST(ApplicationLink, StreamsOnEveryPortWithNumbersOfItsOwn) {
 
 TEST(ApplicationLink, TheFirstNumberOfASessionIsOneOnEveryPort) {
   TestBoard board(Settings(), 2);
-  TestHost owner(board, echo_pnum);
+  TestHost owner(board, no_session);
   owner.heartbeat(0);
   EXPECT_EQ(board.take(MessageKind::state, 0)[0].pnum, 1U);
   EXPECT_EQ(board.take(MessageKind::state, 1)[0].pnum, 1U);
@@ -507,7 +519,7 @@ TEST(ApplicationLink, ServesThePapersPythonClient) {
 TEST(ApplicationLink, TheClockWrapsInTheMiddleOfASession) {
   // Heartbeats fall on every half second, and so on the wrap itself.
   TestBoard board({}, 1, 0U - 2000U);
-  TestHost host{board, echo_pnum, Source{0, 4}};
+  TestHost host{board, our_session, Source{0, 4}};
   host.connect();
   host.command("O:358,1,1");
   board.take();

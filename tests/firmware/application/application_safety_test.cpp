@@ -8,8 +8,9 @@ namespace r4 {
 namespace {
 
 using firmware::BoardState;
-using test::echo_pnum;
+using test::another_session;
 using test::Heard;
+using test::our_session;
 using test::TestBoard;
 using test::TestHost;
 using Lines = std::vector<std::string>;
@@ -48,7 +49,7 @@ struct ApplicationSafety : testing::Test {
   }
 
   TestBoard board;
-  TestHost host{board, echo_pnum, Source{0, 4}};
+  TestHost host{board, our_session, Source{0, 4}};
 };
 
 // --- stop
@@ -126,7 +127,7 @@ TEST_F(ApplicationSafety, AStopOfAnotherProgramAtTheOwnersPlaceSpendsNoneOfItsNu
 
 TEST_F(ApplicationSafety, AStopIsAnsweredToEveryoneAndToWhoAsked) {
   TestBoard two(Settings(), 2);
-  TestHost owner(two, echo_pnum, Source{0, 4});
+  TestHost owner(two, our_session, Source{0, 4});
   owner.connect();
   two.take(0);
   two.take(1);
@@ -158,7 +159,8 @@ TEST_F(ApplicationSafety, AStopIsObeyedBeforeThereIsAHost) {
   fresh.receive("E:STOP;PNum:1;T:1;", Source{0, 99});
   EXPECT_EQ(fresh.reason(), SafeReason::stop);
   EXPECT_EQ(fresh.state(), BoardState::connecting);
-  TestHost first(fresh, echo_pnum);
+  TestHost first(fresh, our_session);
+  fresh.run(20);
   first.connect();
   EXPECT_EQ(fresh.log.states.back(), "SAFE stop");
   first.command("O:1,1,1");
@@ -190,7 +192,7 @@ TEST_F(ApplicationSafety, OnlyTheOwnerClears) {
 TEST_F(ApplicationSafety, ANewHostDoesNotClearByTakingControl) {
   host.command("E:STOP");
   board.run(1500);
-  TestHost other(board, echo_pnum + 100'000'000, Source{0, 5});
+  TestHost other(board, another_session, Source{0, 5});
   other.connect();
   EXPECT_EQ(board.reason(), SafeReason::stop);
 }
@@ -262,7 +264,7 @@ TEST_F(ApplicationSafety, AStopWithoutANumberIsANewCauseEachTime) {
 
 TEST_F(ApplicationSafety, AClearThatNamesNoneMustComeLaterThanTheTimeoutAfterTheCause) {
   TestBoard fresh;
-  TestHost paper(fresh, 1);
+  TestHost paper(fresh, no_session);
   paper.heartbeat(4000);
   paper.command("E:STOP");
   for (int i = 0; i < 9; ++i) {
@@ -341,7 +343,7 @@ TEST_F(ApplicationSafety, EveryCauseIsToldOfAtOnce) {
   board.application->fail(SafeReason::fault, board.now_ms);
   board.run(0);
   EXPECT_TRUE(told(";SAFE:6;"));
-  board.receive("E:STOP;", Source{0, 4});
+  host.command("E:STOP");
   EXPECT_TRUE(told(";SAFE:2;"));
 }
 
@@ -421,7 +423,7 @@ TEST_F(ApplicationSafety, AHandleReleasedBeforeTheHostComesKeepsItSafe) {
   TestBoard fresh;
   fresh.hal.inputs.handle_held = false;
   fresh.run(20);
-  TestHost first(fresh, echo_pnum);
+  TestHost first(fresh, our_session);
   first.connect();
   first.command("O:1,1,1");
   EXPECT_TRUE(fresh.safe());

@@ -8,7 +8,8 @@ namespace r4 {
 namespace {
 
 using firmware::BoardState;
-using test::echo_pnum;
+using test::another_session;
+using test::our_session;
 using test::TestBoard;
 using test::TestHost;
 using Lines = std::vector<std::string>;
@@ -50,7 +51,7 @@ TEST_F(ApplicationSetting, ATimeoutThatIsAlreadyOverMakesTheOutputsSafeAtOnce) {
 }
 
 TEST_F(ApplicationSetting, TheHeartbeatIntervalFollowsItsSetting) {
-  TestHost paper(board, 7, Source{0, 4});
+  TestHost paper(board, no_session, Source{0, 4});
   board.run(1500);
   paper.heartbeat(5);
   board.run(1);
@@ -77,7 +78,7 @@ TEST_F(ApplicationSetting, SettingsOutlastTheSession) {
   host.command("C:rate,10");
   host.command("U:30,1");
   board.run(1500);
-  TestHost other(board, echo_pnum + 100'000'000, Source{0, 6});
+  TestHost other(board, another_session, Source{0, 6});
   other.connect();
   EXPECT_EQ(board.application->settings().state_rate_hz, 10);
   board.hal.inputs.ultrasonic_cm[0] = 20;
@@ -111,7 +112,7 @@ TEST_F(ApplicationSetting, WithoutAHostABoardSpeaksPlainText) {
 
   TestBoard alone;
   EXPECT_FALSE(alone.ports[0].packed);
-  TestHost first(alone, echo_pnum, Source{0, 4});
+  TestHost first(alone, our_session, Source{0, 4});
   first.connect();
   EXPECT_TRUE(alone.ports[0].packed) << "a new session";
   alone.application->port_down(0, alone.now_ms);

@@ -9,8 +9,9 @@
 namespace r4 {
 namespace {
 
-using test::echo_pnum;
+using test::another_session;
 using test::Heard;
+using test::our_session;
 using test::TestBoard;
 using test::TestHost;
 
@@ -19,7 +20,7 @@ TEST(ApplicationStream, SendsTheDatagramOfTheCapture) {
   const std::int32_t volts[] = {2428, 1212, 512, 1211, 103, 0};
   std::copy(std::begin(volts), std::end(volts), board.hal.inputs.analog_cv);
   board.hal.inputs.stepper_steps[0] = -100;
-  TestHost host(board, 1);
+  TestHost host(board, no_session);
   host.heartbeat(1699276044000);
   host.command("D:4095,1,1");
   host.command("O:400,1,1");
@@ -36,7 +37,7 @@ TEST(ApplicationStream, SendsTheDatagramOfTheCapture) {
 
 TEST(ApplicationStream, LeavesOutAndCountsWhatCameTooLate) {
   TestBoard board;
-  TestHost host(board, 1);
+  TestHost host(board, no_session);
   host.heartbeat(5);
   host.command("F:LATE");
   const std::uint32_t start = board.now_ms;
@@ -51,7 +52,7 @@ TEST(ApplicationStream, LeavesOutAndCountsWhatCameTooLate) {
 
 TEST(ApplicationStream, CarriesTheNewestInputs) {
   TestBoard board;
-  TestHost host(board, 1);
+  TestHost host(board, no_session);
   host.heartbeat(5);
   host.command("F:ALL");
   board.hal.inputs.analog_cv[5] = 33;
@@ -95,7 +96,7 @@ TEST(ApplicationStream, SplitsAStateThatIsTooLongForThePort) {
   for (const std::size_t limit : {std::size_t{508}, max_datagram}) {
     TestBoard board;
     board.ports[0].limit = limit;
-    TestHost host(board, echo_pnum);
+    TestHost host(board, our_session);
     host.connect();
     fill(board, host);
     host.command("F:ALL");
@@ -123,7 +124,7 @@ TEST(ApplicationStream, SplitsAStateThatIsTooLongForThePort) {
 TEST(ApplicationStream, EveryPartOfASafeStateTellsTheReason) {
   TestBoard board;
   board.ports[0].limit = 508;
-  TestHost host(board, echo_pnum);
+  TestHost host(board, our_session);
   host.connect();
   fill(board, host);
   host.command("F:ALL");
@@ -142,7 +143,7 @@ TEST(ApplicationStream, EveryPartOfASafeStateTellsTheReason) {
 TEST(ApplicationStream, EachPortGetsPartsOfItsOwnSize) {
   TestBoard board(Settings(), 2);
   board.ports[1].limit = 508;
-  TestHost host(board, echo_pnum);
+  TestHost host(board, our_session);
   host.connect();
   fill(board, host);
   host.command("F:ALL");
@@ -155,7 +156,7 @@ TEST(ApplicationStream, EachPortGetsPartsOfItsOwnSize) {
 
 TEST(ApplicationStream, SendsTheFieldsThatWereAskedFor) {
   TestBoard board;
-  TestHost host(board, echo_pnum);
+  TestHost host(board, our_session);
   host.connect();
   host.command("F:RELAYS,AIN24,SAFE");
   host.command("R:3,On");
@@ -171,7 +172,7 @@ TEST(ApplicationStream, SendsTheFieldsThatWereAskedFor) {
 
 TEST(ApplicationStream, MarksStatesAsReplaceableAndTheRestNot) {
   TestBoard board;
-  TestHost host(board, echo_pnum);
+  TestHost host(board, our_session);
   host.connect();
   host.command("X:1");
   host.command("Q:ID");
@@ -186,7 +187,7 @@ TEST(ApplicationStream, MarksStatesAsReplaceableAndTheRestNot) {
 TEST(ApplicationStream, AsksForTheNextCallNoLaterThanItsDuties) {
   TestBoard board;
   EXPECT_LE(board.application->poll(board.now_ms), 10U);
-  TestHost host(board, 1);
+  TestHost host(board, no_session);
   host.heartbeat(5);
   host.command("C:rate,1000");
   board.run(10);

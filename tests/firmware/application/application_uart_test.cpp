@@ -11,8 +11,9 @@ namespace r4 {
 namespace {
 
 using sim::UartPeer;
-using test::echo_pnum;
+using test::another_session;
 using test::Heard;
+using test::our_session;
 using test::TestBoard;
 using test::TestHost;
 
@@ -42,7 +43,7 @@ class ApplicationUarts : public testing::Test {
   firmware::UserUart uarts[uart_channels] = {firmware::UserUart(devices.uarts[0]),
                                              firmware::UserUart(devices.uarts[1])};
   TestBoard board{Settings(), 1, 500'000, nullptr, &uarts};
-  TestHost host{board, echo_pnum};
+  TestHost host{board, our_session};
 };
 
 TEST_F(ApplicationUarts, ASettingTurnsOneOnAndTheStateTellsWhatComes) {
@@ -164,7 +165,7 @@ TEST_F(ApplicationUarts, SaysSoInItsCapabilities) {
 
 TEST(ApplicationWithoutUarts, KnowsNoUart) {
   TestBoard board;
-  TestHost host(board, echo_pnum);
+  TestHost host(board, our_session);
   host.connect();
   const std::uint32_t number = host.command("X:UART,1,x41");
   EXPECT_EQ(board.log.refused.back(), std::to_string(number) + " UNKNOWN");

@@ -9,9 +9,10 @@ namespace r4 {
 namespace {
 
 using firmware::BoardState;
+using test::another_session;
 using test::BoardInControl;
-using test::echo_pnum;
 using test::Heard;
+using test::our_session;
 using test::state_of;
 using test::TestBoard;
 using test::TestHost;
@@ -99,7 +100,7 @@ TEST(ApplicationWatch, OnABusABoardStreamsToWhoAsksUntilAHostIsThere) {
   EXPECT_EQ(state_of(states.back()).safe, SafeReason::link);
   EXPECT_EQ(board.state(), BoardState::connecting) << "nobody controls it";
 
-  TestHost host(board, echo_pnum, Source{1, 0});
+  TestHost host(board, our_session, Source{1, 0});
   host.connect();
   EXPECT_EQ(board.state(), BoardState::active);
   board.take(1);
@@ -218,7 +219,7 @@ TEST_F(ApplicationWatched, AWatcherAtTheHostsPlaceCountsForNothing) {
 TEST(ApplicationWatch, OnALineEverythingHasTheNumbersOfTheLine) {
   TestBoard board({}, 2);
   TestWatcher watcher{board, Source{1, everyone}};
-  TestHost host(board, echo_pnum, Source{0, 4});
+  TestHost host(board, our_session, Source{0, 4});
   host.connect();
   host.stay(500);
   watcher.watch("50");
@@ -273,7 +274,7 @@ TEST_F(ApplicationWatched, WhoTakesControlWatchesNoMore) {
   watcher.watch("10");
   host.echo();
   board.run(1000);  // the host is lost
-  TestHost next(board, echo_pnum + 99999, watcher.at);
+  TestHost next(board, another_session, watcher.at);
   next.connect();
   board.take();
   next.stay(1000);

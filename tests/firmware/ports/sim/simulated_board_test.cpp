@@ -97,10 +97,10 @@ class SimulatedBoardTest : public testing::Test {
     deliver();
   }
   void heartbeat(std::uint32_t t) {
-    send("H:ROS2-R4;PNum:" + std::to_string(pnum_++) + ";T:" + std::to_string(t) + ";");
+    send("H:ROS2-R4;SID:0123456789abcdef;PNum:" + std::to_string(pnum_++) + ";T:" + std::to_string(t) + ";");
   }
   void command(const std::string& field) {
-    send(field + ";PNum:" + std::to_string(pnum_++) + ";T:1;");
+    send(field + ";SID:0123456789abcdef;PNum:" + std::to_string(pnum_++) + ";T:1;");
   }
   void connect() {
     heartbeat(0);
@@ -138,7 +138,7 @@ class SimulatedBoardTest : public testing::Test {
     return states;
   }
 
-  static constexpr std::uint32_t first_pnum = echo_host_first_pnum + 1000;
+  static constexpr std::uint32_t first_pnum = 1000;
   asio::io_context io_;
   std::uint32_t clock_ms_ = 0;
   std::uint32_t pnum_ = first_pnum;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host that the board hears by several wires: how they join and leave, and that there is one session.
+// A session with several paths: how they join and leave, and that they are one session.
 #include "tests/firmware/wired_host.hpp"
 #include "tests/support/signing.hpp"
 
@@ -7,8 +7,9 @@ namespace r4 {
 namespace {
 
 using firmware::BoardState;
-using test::echo_pnum;
+using test::another_session;
 using test::Heard;
+using test::our_session;
 using test::state_of;
 using test::TestBoard;
 using test::TestHost;
@@ -16,12 +17,12 @@ using test::WiredHost;
 using Lines = std::vector<std::string>;
 using Numbers = std::vector<std::uint32_t>;
 
-constexpr Source wire_a{0, 4};
-constexpr Source wire_b{1, 0};
-constexpr Source wire_c{2, 6};
+constexpr Source path_a{0, 4};
+constexpr Source path_b{1, 0};
+constexpr Source path_c{2, 6};
 
-struct ApplicationWires : testing::Test {
-  const SessionWires& wires() const { return board.application->wires(); }
+struct ApplicationPaths : testing::Test {
+  const SessionPaths& paths() const { return board.application->paths(); }
   // … with the counters of what came.
   State newest_state(WiredHost& host, int port = 0) {
     host.command("F:RXLOST,RXDUP,RXREF");
@@ -46,121 +47,123 @@ struct ApplicationWires : testing::Test {
     for (int i = 0; i < 4; ++i) board.take(i);
     board.log.refused.clear();
     board.log.executed.clear();
-    board.log.wires.clear();
+    board.log.paths.clear();
   }
-  std::string heartbeat(std::uint32_t pnum, std::uint32_t t) {
-    return "H:ROS2-R4;PNum:" + std::to_string(pnum) + ";T:" + std::to_string(t) + ";";
+  static std::string heartbeat(std::uint32_t pnum, std::uint32_t t, SessionId sid = our_session) {
+    return "H:ROS2-R4;" + test::stamp_of(sid, pnum, t);
   }
 
   TestBoard board{{}, 4};
 };
 
-// --- how a wire joins
+// --- how a path joins
 
-TEST_F(ApplicationWires, AWireJoinsWithACopyOfAHeartbeatOfTheSession) {
-  TestHost host(board, echo_pnum, wire_a);
+TEST_F(ApplicationPaths, APathJoinsWithAFreshEchoOfTheSession) {
+  TestHost host(board, our_session, path_a);
   host.connect();
   forget();
   const std::uint32_t t = board.newest_t(0);
   const std::uint32_t pnum = host.echo();
-  board.receive(heartbeat(pnum, t), wire_b);
-  EXPECT_EQ(board.log.wires, Lines{"joined 1/0"});
-  EXPECT_EQ(wires().size(), 2);
-  EXPECT_EQ(wires().joins(), 1U);
+  board.receive(heartbeat(pnum, t), path_b);
+  EXPECT_EQ(board.log.paths, Lines{"joined 1/0"});
+  EXPECT_EQ(paths().size(), 2);
+  EXPECT_EQ(paths().joins(), 1U);
   EXPECT_EQ(answers(1), Lines());
-  host.resend("O:358,1,1", host.pnum);
-  board.receive("O:5,1,2;PNum:" + std::to_string(host.pnum + 1) + ";T:1;", wire_b);
+  board.receive(heartbeat(host.pnum++, t), path_c);
+  EXPECT_EQ(board.log.paths.back(), "joined 2/6") << "a number that came on no other path";
+  host.command("O:358,1,1");
+  board.receive("O:5,1,2;" + test::stamp_of(our_session, host.pnum, 1), path_b);
   EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
-  EXPECT_EQ(board.outputs().osmc[1].pwm, 5) << "either wire brings commands";
+  EXPECT_EQ(board.outputs().osmc[1].pwm, 5) << "either path brings commands";
 }
 
-TEST_F(ApplicationWires, AWireThatIsAheadJoinsWhenTheSameComesByTheSession) {
-  TestHost host(board, echo_pnum, wire_a);
-  host.connect();
-  board.run(400);
-  forget();
-  const std::uint32_t fed_ms = board.application->link().fed_ms();
-  const std::uint32_t t = board.newest_t(0);
-  board.receive(heartbeat(host.pnum, t), wire_b);
-  board.receive(heartbeat(host.pnum + 1, t), wire_b);  // so far ahead
-  EXPECT_EQ(wires().size(), 1);
-  EXPECT_EQ(board.application->link().fed_ms(), fed_ms) << "it feeds nothing before it has joined";
-  EXPECT_EQ(answers(1), Lines()) << "nor is it told BUSY";
-  host.echo();
-  EXPECT_EQ(board.log.wires, Lines{"joined 1/0"});
-}
-
-TEST_F(ApplicationWires, WhoWaitsToJoinKeepsNobodyAlive) {
-  WiredHost host(board, {{wire_a}, {wire_b}});
+TEST_F(ApplicationPaths, ANewPathKeepsTheSessionAlive) {
+  WiredHost host(board, {{path_a}, {path_b}});
   host.wires[1].cut = true;
   host.connect();
   host.wires[0].cut = true;
   host.wires[1].cut = false;
-  const std::uint32_t fed_ms = board.application->link().fed_ms();
-  for (int i = 0; i < 1000 && board.reason() != SafeReason::link; ++i) host.run(1);
-  EXPECT_EQ(board.log.state_ms - fed_ms, 1000U);
-  host.run(200);
-  EXPECT_EQ(board.state(), BoardState::active) << "and begins a session of its own then";
-  EXPECT_EQ(wires()[0], wire_b);
+  board.log.states.clear();
+  host.run(3000);
+  EXPECT_EQ(board.log.states, Lines());
+  EXPECT_EQ(paths().size(), 1);
+  EXPECT_EQ(paths()[0], path_b);
 }
 
-TEST_F(ApplicationWires, AStrangerStaysBusyAndNeverJoins) {
-  TestHost host(board, echo_pnum, wire_a);
+TEST_F(ApplicationPaths, AStrangerStaysBusyAndNeverJoins) {
+  TestHost host(board, our_session, path_a);
   host.connect();
   forget();
   const std::uint32_t t = board.newest_t(0);
   const std::uint32_t pnum = host.echo();
-  board.receive(heartbeat(echo_pnum + 500'000, t), wire_b);  // numbers of its own
-  board.receive(heartbeat(pnum + 4097, t), wire_b);          // too far ahead
-  board.receive(heartbeat(pnum, t + 1), wire_b);             // other bytes
-  board.receive(heartbeat(pnum - 20, t), wire_b);
-  board.receive("O:358,1,1;PNum:" + std::to_string(host.pnum) + ";T:1;", wire_b);
-  EXPECT_EQ(answers(1), Lines(5, "BUSY"));
-  board.receive(heartbeat(host.pnum, t + 1), wire_b);  // the next number, but other bytes
-  EXPECT_EQ(answers(1), Lines());
+  for (const SessionId sid : {no_session, another_session}) {
+    board.receive(heartbeat(pnum, t, sid), path_b);
+    board.receive(heartbeat(pnum + 1, t, sid), path_b);
+    board.receive("O:358,1,1;" + test::stamp_of(sid, host.pnum, 1), path_b);
+    EXPECT_EQ(answers(1), Lines(3, "BUSY"));
+    board.receive(heartbeat(pnum + 1, t, sid), path_a);
+    EXPECT_EQ(answers(0), Lines(1, "BUSY")) << "from the place of the host, too";
+  }
   host.stay(2000);
-  EXPECT_EQ(wires().size(), 1);
+  EXPECT_EQ(paths().size(), 1);
   EXPECT_TRUE(board.safe());
 }
 
-TEST_F(ApplicationWires, NoMoreThanFour) {
-  WiredHost host(board, {{wire_a}, {wire_b}, {wire_c}, {Source{0, 5}}});
+TEST_F(ApplicationPaths, AnEchoThatIsNotFreshMakesNoPath) {
+  TestHost host(board, our_session, path_a);
   host.connect();
-  EXPECT_EQ(wires().size(), 4);
+  const std::uint32_t old = board.newest_t(0);
+  host.stay(1100);
   forget();
-  board.receive_raw(host.last, Source{3, 1});
-  EXPECT_EQ(answers(3), Lines{"BUSY"});
-  EXPECT_EQ(wires().size(), 4);
+  board.receive(heartbeat(host.pnum, old), path_b);
+  board.receive(heartbeat(host.pnum, 0), path_b);
+  board.receive(heartbeat(host.pnum, board.now_ms + 1), path_b);
+  EXPECT_EQ(paths().size(), 1);
 }
 
-TEST_F(ApplicationWires, APaperHostHasOne) {
-  TestHost host(board, 5, wire_a);
+TEST_F(ApplicationPaths, NoMoreThanFour) {
+  WiredHost host(board, {{path_a}, {path_b}, {path_c}, {Source{0, 5}}});
+  host.connect();
+  EXPECT_EQ(paths().size(), 4);
+  forget();
+  board.receive_raw(host.last, Source{3, 1});
+  EXPECT_EQ(paths().size(), 4);
+  EXPECT_FALSE(paths().has(Source{3, 1}));
+}
+
+TEST_F(ApplicationPaths, APaperHostHasOne) {
+  TestHost host(board, no_session, path_a);
   host.connect();
   forget();
   const std::uint32_t t = board.newest_t(0);
   const std::uint32_t pnum = host.echo();
-  board.receive(heartbeat(pnum, t), wire_b);
+  board.receive(heartbeat(pnum, t, no_session), path_b);
   EXPECT_EQ(answers(1), Lines{"BUSY"});
-  EXPECT_EQ(wires().size(), 1);
+  EXPECT_EQ(paths().size(), 1);
 }
 
-TEST_F(ApplicationWires, TheIdentityTellsAWireOfTheSessionThatItIsNotBusy) {
-  WiredHost host(board, {{wire_a}, {wire_b}});
+TEST_F(ApplicationPaths, AnAnswerNamesTheSessionOfTheAskerAloneAndTellsOthersBusy) {
+  WiredHost host(board, {{path_a}, {path_b}});
   host.connect();
   forget();
-  for (const Source from : {wire_a, wire_b, wire_c}) {
-    board.receive("Q:ID;PNum:7;T:0;", from);
-    const std::vector<Heard> told = board.take(MessageKind::identity, from.port);
-    ASSERT_EQ(told.size(), 1U);
-    const bool busy = told[0].bytes.find(";BUSY:1;") != std::string::npos;
-    EXPECT_EQ(busy, from == wire_c) << told[0].bytes;
+  for (const Source from : {path_a, path_c}) {
+    for (const SessionId sid : {our_session, another_session, no_session}) {
+      board.receive("Q:ID;" + test::stamp_of(sid, 7, 0), from);
+      const std::vector<Heard> told = board.take(MessageKind::identity, from.port);
+      ASSERT_EQ(told.size(), 1U);
+      const bool busy = told[0].bytes.find(";BUSY:1;") != std::string::npos;
+      EXPECT_EQ(busy, sid != our_session) << told[0].bytes;
+      Datagram datagram;
+      ASSERT_TRUE(read_datagram(told[0].bytes, datagram));
+      EXPECT_EQ(datagram.session_id(), sid);
+    }
   }
 }
 
 // --- commands over all of them
 
-TEST_F(ApplicationWires, ACommandIsExecutedOnceWhicheverWireBringsIt) {
-  WiredHost host(board, {{wire_a}, {wire_b}});
+TEST_F(ApplicationPaths, ACommandIsExecutedOnceWhicheverWireBringsIt) {
+  WiredHost host(board, {{path_a}, {path_b}});
   host.connect();
   forget();
   const std::uint32_t both = host.command("O:358,1,1");
@@ -176,18 +179,18 @@ TEST_F(ApplicationWires, ACommandIsExecutedOnceWhicheverWireBringsIt) {
   EXPECT_EQ(state.rx_lost, 0U);
 }
 
-TEST_F(ApplicationWires, WhatOneWireRepeatsIsCounted) {
-  WiredHost host(board, {{wire_a}, {wire_b}});
+TEST_F(ApplicationPaths, WhatOneWireRepeatsIsCounted) {
+  WiredHost host(board, {{path_a}, {path_b}});
   host.connect();
   host.command("Z:1");
-  board.receive_raw(host.last, wire_b);
+  board.receive_raw(host.last, path_b);
   const State state = newest_state(host, 1);
   EXPECT_EQ(state.rx_duplicate, 1U);
   EXPECT_EQ(state.rx_refused, 1U);
 }
 
-TEST_F(ApplicationWires, ACopyOfARefusedCommandIsToldTheSame) {
-  WiredHost host(board, {{wire_a}, {wire_b, 200}});
+TEST_F(ApplicationPaths, ACopyOfARefusedCommandIsToldTheSame) {
+  WiredHost host(board, {{path_a}, {path_b, 200}});
   host.connect();
   host.run(1000);
   forget();
@@ -231,19 +234,19 @@ void expect_a_fast_wire_takes_over(TestBoard& board, WiredHost& host, std::uint3
   }
   EXPECT_EQ(board.log.states, Lines()) << "no trip";
   EXPECT_EQ(board.log.executed, sent) << "each at once, and once";
-  EXPECT_EQ(board.application->wires()[0], wire_a);
+  EXPECT_EQ(board.application->paths()[0], path_a);
 }
 
-TEST_F(ApplicationWires, AFastWireTakesOverFromOneThatLagsAtAnyRateOfCommands) {
-  WiredHost host(board, {{wire_a}, {wire_b}});
+TEST_F(ApplicationPaths, AFastWireTakesOverFromOneThatLagsAtAnyRateOfCommands) {
+  WiredHost host(board, {{path_a}, {path_b}});
   expect_a_fast_wire_takes_over(board, host, 500);
 }
 
 // --- a board with a key
 
-class ApplicationWiresWithAKey : public testing::Test {
+class ApplicationPathsWithAKey : public testing::Test {
  protected:
-  ApplicationWiresWithAKey() {
+  ApplicationPathsWithAKey() {
     host.seal = [this](const std::string& fields) {
       return test::with_signature(fields, key, nonce(), ++counter, board.now_ms);
     };
@@ -252,18 +255,18 @@ class ApplicationWiresWithAKey : public testing::Test {
   }
   // Of the newest heartbeat that went out.
   std::string nonce() { return test::str(board.application->authentication().nonce()); }
-  const SessionWires& wires() const { return board.application->wires(); }
+  const SessionPaths& paths() const { return board.application->paths(); }
 
   const Key key = test::key_of(1);
   std::uint64_t counter = 1000;
   TestBoard board{test::settings_with(test::key_of(1)), 4};
-  WiredHost host{board, {{wire_a}, {wire_b, 100}}};
+  WiredHost host{board, {{path_a}, {path_b, 100}}};
 };
 
-TEST_F(ApplicationWiresWithAKey, TheSameSignedBytesComeByBothAndAreExecutedOnce) {
+TEST_F(ApplicationPathsWithAKey, EachPathHasASignatureOfItsOwnAndACommandIsExecutedOnce) {
   host.run(1000);
   EXPECT_EQ(board.state(), BoardState::active);
-  ASSERT_EQ(wires().size(), 2);
+  ASSERT_EQ(paths().size(), 2);
   board.log.rejected.clear();
   for (int i = 0; i < 200; ++i) {
     host.wires[0].cut = i % 10 == 0;  // now and then one brings it alone, later
@@ -273,46 +276,40 @@ TEST_F(ApplicationWiresWithAKey, TheSameSignedBytesComeByBothAndAreExecutedOnce)
   }
   EXPECT_EQ(board.log.rejected, Lines());
   EXPECT_EQ(board.hal.zeroed.size(), 180U) << "what was overtaken on its way is stale";
-  EXPECT_EQ(wires().losses(), 0U);
+  EXPECT_EQ(paths().losses(), 0U);
 }
 
-TEST_F(ApplicationWiresWithAKey, WhoRelaysAtOnceIsAWireAndNoMore) {
+TEST_F(ApplicationPathsWithAKey, ADuplicateFromAnotherPlaceIsAReplay) {
   host.command("O:358,1,1");
   const std::string command = host.last;
   host.heartbeat();
   const std::string fresh = host.last;
+  host.run(150);
+  board.log.rejected.clear();
   const Source attacker{3, 9};
   board.receive_raw(command, attacker);
-  EXPECT_EQ(board.log.rejected.back(), "replayed");
   board.receive_raw(fresh, attacker);
-  EXPECT_TRUE(wires().has(attacker));
-  host.command("O:7,1,1");
-  board.receive_raw(command, attacker);
-  board.receive("O:9,1,1;PNum:" + std::to_string(host.pnum) + ";T:1;", attacker);
-  EXPECT_EQ(board.outputs().osmc[0].pwm, 7);
-  EXPECT_EQ(board.log.rejected.back(), "missing");
-  host.wires[0].cut = host.wires[1].cut = true;
-  for (int i = 0; i < 11; ++i) {
-    board.receive_raw(fresh, attacker);
-    board.run(100);
-  }
-  EXPECT_EQ(board.reason(), SafeReason::link) << "it keeps nothing alive";
+  EXPECT_EQ(board.log.rejected, Lines(2, "replayed"));
+  EXPECT_FALSE(paths().has(attacker));
+  board.receive("O:9,1,1;" + test::stamp_of(our_session, host.pnum, 1), attacker);
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
+  EXPECT_EQ(board.log.rejected.back(), "missing") << "the session id alone is no proof";
 }
 
-TEST_F(ApplicationWiresWithAKey, AFastWireTakesOverFromOneThatLagsAtAnyRateOfCommands) {
+TEST_F(ApplicationPathsWithAKey, AFastWireTakesOverFromOneThatLagsAtAnyRateOfCommands) {
   expect_a_fast_wire_takes_over(board, host, 200);
 }
 
 // --- the end of wires
 
-TEST_F(ApplicationWires, ALostPortTakesTheLinkOnlyWithTheLastWire) {
-  WiredHost host(board, {{wire_a}, {wire_b}});
+TEST_F(ApplicationPaths, ALostPortTakesTheLinkOnlyWithTheLastWire) {
+  WiredHost host(board, {{path_a}, {path_b}});
   host.connect();
   host.command("O:358,1,1");
   board.application->port_down(0, board.now_ms);
   EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
-  EXPECT_EQ(wires().size(), 1);
-  EXPECT_EQ(board.log.wires.back(), "left 0/4");
+  EXPECT_EQ(paths().size(), 1);
+  EXPECT_EQ(board.log.paths.back(), "left 0/4");
   EXPECT_EQ(board.ports[0].held, everyone);
   board.application->port_down(2, board.now_ms);  // nobody was there
   EXPECT_EQ(board.state(), BoardState::active);
@@ -321,10 +318,10 @@ TEST_F(ApplicationWires, ALostPortTakesTheLinkOnlyWithTheLastWire) {
   EXPECT_TRUE(board.safe());
 }
 
-TEST_F(ApplicationWires, ASessionIsResumedFromAnyOfItsWires) {
+TEST_F(ApplicationPaths, ASessionIsResumedFromAnyOfItsWires) {
   for (const std::size_t first : {0U, 1U}) {
     TestBoard fresh({}, 4);
-    WiredHost host(fresh, {{wire_a}, {wire_b}});
+    WiredHost host(fresh, {{path_a}, {path_b}});
     host.connect();
     host.command("O:358,1,1");
     host.wires[0].cut = host.wires[1].cut = true;
@@ -338,17 +335,17 @@ TEST_F(ApplicationWires, ASessionIsResumedFromAnyOfItsWires) {
     EXPECT_EQ(fresh.outputs().osmc[0].pwm, 7);
     host.wires[1 - first].cut = false;
     host.run(300);
-    EXPECT_EQ(fresh.application->wires().losses(), 0U) << "it has the timeout to come back, too";
+    EXPECT_EQ(fresh.application->paths().size(), 2);
   }
 }
 
-TEST_F(ApplicationWires, TheFarewellByAllWiresIsObeyedOnce) {
-  WiredHost host(board, {{wire_a}, {wire_b, 80}});
+TEST_F(ApplicationPaths, TheFarewellByAllWiresIsObeyedOnce) {
+  WiredHost host(board, {{path_a}, {path_b, 80}});
   host.connect();
   host.command("O:358,1,1");
   host.run(85);
   forget();
-  const std::uint32_t leave = host.send("E:LEAVE", host.echo());
+  const std::uint32_t leave = host.command("E:LEAVE");
   EXPECT_EQ(board.reason(), SafeReason::link);
   EXPECT_TRUE(board.safe());
   host.wires[0].cut = host.wires[1].cut = true;  // it has ended; what is under way comes
@@ -360,8 +357,8 @@ TEST_F(ApplicationWires, TheFarewellByAllWiresIsObeyedOnce) {
 
 // --- the stop
 
-TEST_F(ApplicationWires, TheSameStopByAllWiresIsOneCause) {
-  WiredHost host(board, {{wire_a}, {wire_b, 50}, {wire_c, 90}});
+TEST_F(ApplicationPaths, TheSameStopByAllWiresIsOneCause) {
+  WiredHost host(board, {{path_a}, {path_b, 50}, {path_c, 90}});
   host.connect();
   host.command("O:358,1,1");
   host.run(150);
@@ -381,11 +378,11 @@ TEST_F(ApplicationWires, TheSameStopByAllWiresIsOneCause) {
 
 // --- what is sent
 
-TEST_F(ApplicationWires, TwoPlacesOnOnePortGetTheSame) {
+TEST_F(ApplicationPaths, TwoPlacesOnOnePortGetTheSame) {
   const Source other{0, 5};
-  WiredHost host(board, {{wire_a}, {other}});
+  WiredHost host(board, {{path_a}, {other}});
   host.connect();
-  EXPECT_EQ(board.ports[0].held, wire_a.peer);
+  EXPECT_EQ(board.ports[0].held, path_a.peer);
   EXPECT_EQ(board.ports[0].also_held, std::vector<std::uint32_t>{other.peer});
   forget();
   host.command("X:1");
@@ -397,7 +394,7 @@ TEST_F(ApplicationWires, TwoPlacesOnOnePortGetTheSame) {
   for (const Heard& heard : board.take(0)) {
     (heard.peer == other.peer ? at_other : at_a).push_back(heard.bytes);
     if (heard.peer == other.peer) continue;
-    EXPECT_EQ(heard.peer, wire_a.peer);
+    EXPECT_EQ(heard.peer, path_a.peer);
     EXPECT_TRUE(pnum == 0 || heard.pnum == pnum + 1) << heard.bytes;
     pnum = heard.pnum;
   }
@@ -408,8 +405,8 @@ TEST_F(ApplicationWires, TwoPlacesOnOnePortGetTheSame) {
   EXPECT_EQ(board.ports[0].also_held, std::vector<std::uint32_t>());
 }
 
-TEST_F(ApplicationWires, AWatcherBecomesAWireAndNeedsNoLeaseAnyMore) {
-  TestHost host(board, echo_pnum, wire_a);
+TEST_F(ApplicationPaths, AWatcherBecomesAWireAndNeedsNoLeaseAnyMore) {
+  TestHost host(board, our_session, path_a);
   host.connect();
   const Source place{2, 6};
   board.ports[2].bus = true;  // it need prove nothing
@@ -420,7 +417,7 @@ TEST_F(ApplicationWires, AWatcherBecomesAWireAndNeedsNoLeaseAnyMore) {
   const std::uint32_t t = board.newest_t(0);
   const std::uint32_t pnum = host.echo();
   board.receive(heartbeat(pnum, t), place);
-  ASSERT_EQ(wires().size(), 2);
+  ASSERT_EQ(paths().size(), 2);
   forget();
   board.run(100);
   const std::vector<Heard> states = board.take(MessageKind::state, 2);
