@@ -14,7 +14,7 @@ BridgeHosts::Heartbeat BridgeHosts::on_heartbeat(Peer from, SessionId sid, Time 
       return Heartbeat::known;
     }
     if (heard && host.sid == sid && sid == no_session) return Heartbeat::kept_out;
-    if (!heard) free = &host;
+    if (!heard && free == nullptr) free = &host;
   }
   if (free == nullptr) return Heartbeat::kept_out;
   *free = Host{true, from, sid, now, Time()};

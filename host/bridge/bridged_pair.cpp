@@ -192,11 +192,8 @@ void BridgedPair::on_command(const Datagram& datagram, Peer from, Time now) {
     return on_question(datagram, from, now);
   }
   if (!is_allowed(datagram, MessageKind::command, from, now)) return;
-  if (!known_.knows(from, datagram.session_id(), now)) {  // its heartbeat comes first
-    ++hosts_.counters.kept_out;
-    return answer(datagram, Refusal::busy, 0, from, now);
-  }
-  pass_on(datagram);
+  if (known_.knows(from, datagram.session_id(), now)) return pass_on(datagram);
+  ++hosts_.counters.kept_out;  // its heartbeat comes first, and that is answered
 }
 
 // True if that heartbeat or command may pass, as far as keys decide.

@@ -366,6 +366,7 @@ TEST(BoardCallbacks, ThatDoNotReturnEndTheHeartbeatsUntilTheyDo) {
 
 TEST(BoardCallbacks, AreToldTheNewestOfTheStatesThatCameMeanwhile) {
   Board board("sim:");
+  board.wait_active();
   std::promise<void> late;
   std::promise<std::uint32_t> next;
   board.on_state([&, calls = 0](const State& state) mutable {

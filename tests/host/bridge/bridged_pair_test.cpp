@@ -17,14 +17,17 @@ namespace {
 using namespace std::chrono_literals;
 using Texts = ScriptedBridge::Texts;
 
-constexpr char heartbeat[] = "H:ROS2-R4;PNum:1;T:0;";
+constexpr char heartbeat[] = "H:ROS2-R4;SID:00000000000000aa;PNum:1;T:0;";
+constexpr char paper_heartbeat[] = "H:ROS2-R4;PNum:1;T:0;";
+constexpr char sid_a[] = ";SID:00000000000000aa";
+constexpr char sid_b[] = ";SID:00000000000000bb";
 constexpr char board_state[] = "AIN24:24.28;PNum:7;T:100;";
 constexpr Peer first = 1, second = 2, third = 3;
 
 class BridgedPairTest : public testing::Test, protected ScriptedBridge {
  protected:
   void SetUp() override { pair->open(); }
-  // The first host has the place, and the board streams.
+  // The first host is there, and the board streams.
   void begin() {
     hosts->say(heartbeat, first);
     board->say(board_state);
@@ -35,6 +38,8 @@ class BridgedPairTest : public testing::Test, protected ScriptedBridge {
 
 TEST_F(BridgedPairTest, BytesPassAsTheyAre) {
   begin();
+  hosts->say(paper_heartbeat, first);
+  passed();
   for (const CapturedLine& line : paper_capture()) {
     Datagram datagram;
     if (!read_datagram(Text(line.bytes), datagram)) continue;
@@ -59,8 +64,8 @@ TEST_F(BridgedPairTest, ASettingThatOnlyACableMayChangeNeverPasses) {
     EXPECT_EQ(hosts->take(), Texts{"N:2,AUTH;PNum:7;T:100;@1"}) << command;
   }
   EXPECT_EQ(from_hosts().refused, 11U);
-  hosts->say("C:rate,50;PNum:3;T:0;", first);
-  EXPECT_EQ(passed(), Texts{"C:rate,50;PNum:3;T:0;"});
+  hosts->say("C:rate,50;SID:00000000000000aa;PNum:3;T:0;", first);
+  EXPECT_EQ(passed(), Texts{"C:rate,50;SID:00000000000000aa;PNum:3;T:0;"});
 }
 
 TEST_F(BridgedPairTest, WhatIsDamagedIsDroppedAndCounted) {
@@ -98,83 +103,87 @@ TEST_F(BridgedPairTest, ItMakesNoHeartbeatAndNoCommand) {
   EXPECT_EQ(hosts->take(), Texts{});
 }
 
-// --- one host at a time
+// --- hosts
 
-TEST_F(BridgedPairTest, TheFirstHostIsLetThroughAlone) {
+TEST_F(BridgedPairTest, SeveralHostsPassAndTheBoardDecides) {
   begin();
   EXPECT_EQ(hosts->held, first);
+  const std::string other = "H:ROS2-R4" + std::string(sid_b) + ";PNum:50;T:0;";
+  hosts->say(other, second);
+  EXPECT_EQ(passed(), Texts{other});
+  board->say("N:50,BUSY" + std::string(sid_b) + ";PNum:8;T:101;");
+  EXPECT_EQ(hosts->take(), Texts{"N:50,BUSY" + std::string(sid_b) + ";PNum:8;T:101;@2"});
+  const std::string command = "O:1,1,1" + std::string(sid_b) + ";PNum:51;T:0;";
+  hosts->say(command, second);
+  EXPECT_EQ(passed(), Texts{command});
+}
+
+TEST_F(BridgedPairTest, StatesAreForTheHostsThatTheBoardDoesNotRefuse) {
+  begin();
+  hosts->say("H:ROS2-R4" + std::string(sid_b) + ";PNum:50;T:0;", second);
+  board->say(board_state);
+  EXPECT_EQ(hosts->take(), (Texts{board_state, std::string(board_state) + "@2"}));
+  board->say("N:50,BUSY" + std::string(sid_b) + ";PNum:8;T:101;");
+  hosts->take();
+  board->say(board_state);
+  EXPECT_EQ(hosts->take(), Texts{board_state});
+  board->say("H:R4-ROS2;PNum:8;T:101;");
+  EXPECT_EQ(hosts->take(), (Texts{"H:R4-ROS2;PNum:8;T:101;", "H:R4-ROS2;PNum:8;T:101;@2"}))
+      << "a heartbeat is for every host: it may be echoed";
+  pass(500ms);
+  hosts->say(heartbeat, first);
+  board->say(board_state);
+  EXPECT_EQ(hosts->take().size(), 2U) << "the refusal is over";
+}
+
+TEST_F(BridgedPairTest, APathOfASessionIsAnyPeerThatNamesIt) {
+  begin();
+  hosts->say(heartbeat, second);
+  board->say("N:2,RANGE" + std::string(sid_a) + ";PNum:8;T:101;");
+  EXPECT_EQ(hosts->take().size(), 2U);
+}
+
+TEST_F(BridgedPairTest, ASecondPaperHostIsKeptOut) {
+  hosts->say(paper_heartbeat, first);
+  board->say(board_state);
+  hosts->take();
+  passed();
   hosts->say("H:ROS2-R4;PNum:50;T:0;", second);
   hosts->say("O:1,1,1;PNum:51;T:0;", second);
   EXPECT_EQ(passed(), Texts{});
-  EXPECT_EQ(hosts->take(), (Texts{"N:50,BUSY;PNum:7;T:100;@2", "N:51,BUSY;PNum:7;T:100;@2"}));
+  EXPECT_EQ(hosts->take(), Texts{"N:50,BUSY;PNum:7;T:100;@2"});
   EXPECT_EQ(from_hosts().kept_out, 2U);
   hosts->say("O:1,1,1;PNum:2;T:0;", first);
   EXPECT_EQ(passed(), Texts{"O:1,1,1;PNum:2;T:0;"});
-}
-
-TEST_F(BridgedPairTest, AnotherHostGetsThePlaceAfterTheTimeoutAndNotBefore) {
-  begin();
   pass(975ms);
-  board->say(board_state);
-  hosts->say("H:ROS2-R4;PNum:50;T:0;", second);
+  hosts->say("H:ROS2-R4;PNum:52;T:0;", second);
   EXPECT_EQ(passed(), Texts{});
   pass(25ms);
-  hosts->say("H:ROS2-R4;PNum:51;T:0;", second);
-  EXPECT_EQ(passed(), Texts{"H:ROS2-R4;PNum:51;T:0;"});
-  EXPECT_EQ(hosts->held, second);
-  hosts->say("O:1,1,1;PNum:2;T:0;", first);
-  EXPECT_EQ(passed(), Texts{}) << "it has lost its place";
+  hosts->say("H:ROS2-R4;PNum:53;T:0;", second);
+  EXPECT_EQ(passed(), Texts{"H:ROS2-R4;PNum:53;T:0;"});
 }
 
 TEST_F(BridgedPairTest, ACommandWithoutAHeartbeatBeforeItDoesNotPass) {
   board->say(board_state);
   hosts->take();
-  hosts->say("O:1,1,1;PNum:2;T:0;", first);
+  hosts->say("O:1,1,1" + std::string(sid_a) + ";PNum:2;T:0;", first);
   EXPECT_EQ(passed(), Texts{});
-  EXPECT_EQ(hosts->take(), Texts{}) << "its heartbeat may come: it is not kept out";
   EXPECT_EQ(from_hosts().kept_out, 1U);
 }
 
-TEST_F(BridgedPairTest, AFarewellMakesRoomWhenTheBoardHasConfirmedIt) {
-  begin();
-  hosts->say("E:LEAVE;PNum:9;T:100;", first);
-  hosts->say("H:ROS2-R4;PNum:50;T:0;", second);
-  EXPECT_EQ(passed(), Texts{"E:LEAVE;PNum:9;T:100;"});
-  board->say("H:R4-ROS2;PNum:8;T:101;SAFE:1;");
-  hosts->say("H:ROS2-R4;PNum:51;T:0;", second);
-  EXPECT_EQ(passed(), Texts{"H:ROS2-R4;PNum:51;T:0;"});
-}
-
-TEST_F(BridgedPairTest, AHostThatTheBoardDoesNotTakeKeepsNobodyOutForLong) {
-  begin();
-  for (int i = 0; i < 30; ++i) {
-    pass(100ms);
-    hosts->say(heartbeat, first);
-  }
-  passed();
-  hosts->say("H:ROS2-R4;PNum:50;T:0;", second);
-  EXPECT_EQ(passed(), Texts{"H:ROS2-R4;PNum:50;T:0;"});
-}
-
-TEST_F(BridgedPairTest, TwoHostsInTurnThatTheBoardDoesNotTakeCannotKeepOutTheOneThatItTakes) {
-  board->say("H:R4-ROS2;PNum:3;T:90;SAFE:1;AN:0123456789abcdef;");
-  int turns = 0;
-  bool taken = false;
-  for (; turns < 50 && !taken; ++turns) {
-    pass(100ms);
-    board->take();
-    hosts->say("H:ROS2-R4;PNum:50;T:0;", second);
-    hosts->say("H:ROS2-R4;PNum:60;T:0;", third);
-    hosts->say("H:ROS2-R4;PNum:1;T:0;", first);
-    for (const std::string& each : passed()) taken = taken || each.find(";PNum:1;") != each.npos;
-    board->say("AIN24:24.28;SAFE:1;PNum:7;T:100;");
-  }
-  EXPECT_TRUE(taken);
-  EXPECT_LE(turns, 25) << "one second each for the two";
+TEST_F(BridgedPairTest, NoMoreThanSixteenHosts) {
   board->say(board_state);
-  pass(100ms);
-  hosts->say("H:ROS2-R4;PNum:51;T:0;", second);
-  EXPECT_EQ(passed(), Texts{}) << "the board streams to the first host, which has the place";
+  for (Peer peer = 1; peer <= 17; ++peer) {
+    board->take();
+    hosts->say("H:ROS2-R4;SID:00000000000000" + std::to_string(10 + peer) + ";PNum:1;T:0;", peer);
+    EXPECT_EQ(board->take().size(), peer == 17 ? 0U : peer == 1 ? 1U : 1U) << peer;
+  }
+  pass(500ms);
+  hosts->say("H:ROS2-R4;SID:0000000000000011;PNum:2;T:0;", 1);
+  pass(500ms);
+  board->take();
+  hosts->say("H:ROS2-R4;SID:0000000000000099;PNum:1;T:0;", 17);
+  EXPECT_EQ(board->take().size(), 1U) << "one that was silent has made room";
 }
 
 // --- the emergency stop
@@ -214,7 +223,7 @@ TEST_F(BridgedPairTest, AStopBesideOtherCommandsIsOne) {
 
 TEST_F(BridgedPairTest, PrioritiesAreThoseOfTheEnds) {
   begin();
-  hosts->say("O:1,1,1;PNum:2;T:0;", first);
+  hosts->say("O:1,1,1;SID:00000000000000aa;PNum:2;T:0;", first);
   EXPECT_EQ(board->sent.front().priority, Priority::normal);
   board->say(board_state);
   board->say("H:R4-ROS2;PNum:8;T:101;");
@@ -229,7 +238,7 @@ TEST_F(BridgedPairTest, WhatCameWhileTheBridgeWasStoppedIsDroppedButAStop) {
   pass(1s);
   sleep(500ms);
   hosts->say("H:ROS2-R4;PNum:2;T:0;", first);
-  hosts->say("O:1,1,1;PNum:3;T:0;", first);
+  hosts->say("O:1,1,1;SID:00000000000000aa;PNum:3;T:0;", first);
   hosts->say("E:STOP;PNum:4;T:0;", first);
   hosts->drained();
   board->say(board_state);
@@ -237,16 +246,16 @@ TEST_F(BridgedPairTest, WhatCameWhileTheBridgeWasStoppedIsDroppedButAStop) {
   EXPECT_EQ(hosts->take(), Texts{}) << "nor is an old state";
   EXPECT_EQ(from_hosts().late, 2U);
   EXPECT_EQ(from_board().late, 1U);
-  hosts->say("O:1,1,1;PNum:5;T:0;", first);
-  EXPECT_EQ(passed(), Texts{"O:1,1,1;PNum:5;T:0;"}) << "that was read behind all that waited";
+  hosts->say(heartbeat, first);
+  EXPECT_EQ(passed(), Texts{heartbeat}) << "that was read after all that waited";
 }
 
 TEST_F(BridgedPairTest, WhereNothingWaitedTheFirstDatagramAfterAStandstillPasses) {
   begin();
   sleep(500ms);
   pass(50ms);
-  hosts->say("O:1,1,1;PNum:5;T:0;", first);
-  EXPECT_EQ(passed(), Texts{"O:1,1,1;PNum:5;T:0;"});
+  hosts->say("O:1,1,1;SID:00000000000000aa;PNum:5;T:0;", first);
+  EXPECT_EQ(passed(), Texts{"O:1,1,1;SID:00000000000000aa;PNum:5;T:0;"});
 }
 
 TEST_F(BridgedPairTest, AnIdleBridgeIsNoLateOne) {
@@ -286,7 +295,7 @@ TEST_F(BridgedPairTest, CountsWhatDidNotGetThrough) {
   begin();
   hosts->counted.tx_dropped = 5;  // states that newer ones have replaced
   board->result = SendResult::full;
-  hosts->say("O:1,1,1;PNum:2;T:0;", first);
+  hosts->say("O:1,1,1;SID:00000000000000aa;PNum:2;T:0;", first);
   EXPECT_EQ(from_hosts().undelivered, 1U);
   EXPECT_EQ(from_hosts().outdated, 0U);
   EXPECT_EQ(from_board().outdated, 5U);
@@ -298,25 +307,25 @@ TEST_F(BridgedPairTest, AnAnswerGoesToWhoHasAsked) {
   begin();
   hosts->say("Q:ID;PNum:500;T:0;", second);
   hosts->say("Q:ID;PNum:600;T:0;", third);
-  hosts->say("Q:ID;PNum:3;T:0;", first);
+  hosts->say("Q:ID;SID:00000000000000aa;PNum:3;T:0;", first);
   EXPECT_EQ(passed().size(), 3U);
   board->say("I:R4,1,id,udp;ASKED:600;PNum:8;T:101;");
   board->say("I:R4,1,id,udp;ASKED:500;PNum:9;T:101;");
-  board->say("I:R4,1,id,udp;ASKED:3;PNum:10;T:101;");
-  board->say("N:2,RANGE;PNum:11;T:101;");
-  EXPECT_EQ(
-      hosts->take(),
-      (Texts{"I:R4,1,id,udp;ASKED:600;PNum:8;T:101;@3", "I:R4,1,id,udp;ASKED:500;PNum:9;T:101;@2",
-             "I:R4,1,id,udp;ASKED:3;PNum:10;T:101;", "N:2,RANGE;PNum:11;T:101;"}));
+  board->say("I:R4,1,id,udp;ASKED:3;SID:00000000000000aa;PNum:10;T:101;");
+  board->say("N:2,RANGE;SID:00000000000000aa;PNum:11;T:101;");
+  EXPECT_EQ(hosts->take(), (Texts{"I:R4,1,id,udp;ASKED:600;PNum:8;T:101;@3",
+                                  "I:R4,1,id,udp;ASKED:500;PNum:9;T:101;@2",
+                                  "I:R4,1,id,udp;ASKED:3;SID:00000000000000aa;PNum:10;T:101;@1",
+                                  "N:2,RANGE;SID:00000000000000aa;PNum:11;T:101;@1"}));
 }
 
 TEST_F(BridgedPairTest, AnAnswerToAHostsCommandGoesToThatHostThoughAnotherAsksWithItsNumber) {
   begin();
   hosts->say("Q:ID;PNum:2;T:0;", second);
-  hosts->say("O:1,1,1;PNum:2;T:0;", first);
+  hosts->say("O:1,1,1;SID:00000000000000aa;PNum:2;T:0;", first);
   hosts->say("Q:ID;PNum:2;T:0;", third);
-  board->say("N:2,RANGE;PNum:8;T:101;");
-  EXPECT_EQ(hosts->take(), Texts{"N:2,RANGE;PNum:8;T:101;"});
+  board->say("N:2,RANGE;SID:00000000000000aa;PNum:8;T:101;");
+  EXPECT_EQ(hosts->take(), Texts{"N:2,RANGE;SID:00000000000000aa;PNum:8;T:101;@1"});
 }
 
 TEST_F(BridgedPairTest, ANumberlessQuestionIsAnsweredToTheHostThatAsked) {
@@ -359,8 +368,8 @@ TEST_F(BridgedPairTest, WhatHostsThatHaveProvedNothingAreSentIsLimited) {
     EXPECT_GE(count, 16U + 40U);
     EXPECT_LE(count, 16U + 60U);
   }
-  hosts->say("Q:ID;PNum:3;T:0;", first);
-  EXPECT_EQ(passed(), Texts{"Q:ID;PNum:3;T:0;"});
+  hosts->say("Q:ID;SID:00000000000000aa;PNum:3;T:0;", first);
+  EXPECT_EQ(passed(), Texts{"Q:ID;SID:00000000000000aa;PNum:3;T:0;"});
 }
 
 // --- who watches

@@ -3,13 +3,13 @@
 
 #include <gtest/gtest.h>
 
-#include "protocol/link/board_link.hpp"
+#include "protocol/datagram/numbers.hpp"
 #include "tests/support/datagrams.hpp"
 
 namespace r4::test {
 
 ScriptedLink::ScriptedLink(SessionOptions options, BoardRole role)
-    : session(*this, std::move(options), echo_host_first_pnum + 100, role),
+    : session(*this, std::move(options), role, 1, [n = 99ULL]() mutable { return ++n; }),
       due_(session.poll(now)) {}
 
 SessionOptions ScriptedLink::without_questions() {
@@ -73,17 +73,24 @@ void ScriptedLink::executed(std::uint32_t pnum) {
 void ScriptedLink::nack(std::uint32_t pnum, std::string_view code) {
   const std::string began =
       session_pnum == 0 ? "" : "SESSION:" + std::to_string(session_pnum) + ";";
-  finish("N:" + std::to_string(pnum) + "," + std::string(code) + ";" + began);
+  finish("N:" + std::to_string(pnum) + "," + std::string(code) + ";" + began + asker());
 }
 
 void ScriptedLink::identity(std::string_view capabilities, bool names_question) {
   if (names_question && count('Q') != 0) return answer(last('Q').pnum, capabilities);
-  finish("I:R4,0.1.0,board-7," + std::string(capabilities) + ";");
+  finish("I:R4,0.1.0,board-7," + std::string(capabilities) + ";" + asker());
 }
 
 void ScriptedLink::answer(std::uint32_t question, std::string_view capabilities) {
   finish("I:R4,0.1.0,board-7," + std::string(capabilities) + ";ASKED:" + std::to_string(question) +
-         ";");
+         ";" + asker());
+}
+
+std::string ScriptedLink::asker() const {
+  if (host_session == no_session) return "";
+  char digits[session_id_size];
+  write_session_id(digits, host_session);
+  return "SID:" + std::string(digits, sizeof digits) + ";";
 }
 
 void ScriptedLink::connect() {
@@ -117,6 +124,7 @@ SendResult ScriptedLink::transmit(std::size_t, std::string_view bytes, Priority 
   if (place_taken && priority != Priority::stop) return SendResult::busy;
   Datagram datagram;
   EXPECT_TRUE(read_datagram(bytes, datagram)) << bytes;
+  host_session = datagram.session_id();
   const Field field = *datagram.begin();
   sent.push_back({str(field.name()) + ":" + str(field.values()), datagram.pnum(),
                   datagram.time_ms(), priority, now, std::string(bytes)});

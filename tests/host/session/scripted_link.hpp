@@ -63,10 +63,12 @@ class ScriptedLink final : private Session::Handler {
   void executed(std::uint32_t pnum);  // a state with SAFE 0 and this CMD
   // To the host of the session that began with its heartbeat session_pnum, or with 0 to another.
   void nack(std::uint32_t pnum, std::string_view code);
-  std::uint32_t session_pnum = 0;  // connect() begins one
+  std::uint32_t session_pnum = 0;       // connect() begins one
+  SessionId host_session = no_session;  // of the host's newest datagram; answers name it
   // As the answer to our newest question, or of a board that does not tell which it answers.
   void identity(std::string_view capabilities = "udp", bool names_question = true);
   void answer(std::uint32_t question, std::string_view capabilities = "udp");
+  std::string asker() const;  // "SID:…;"
   void raw(std::string_view bytes);
   // It begins again, with another clock and new numbers; nothing is sent.
   void reboot();

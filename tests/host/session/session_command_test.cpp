@@ -480,10 +480,10 @@ TEST(SessionRefusal, ProvesNothingOfASessionThatBeganAfterTheCommand) {
   link.session_pnum = pnum + 1;  // a heartbeat of ours that came after an outage
   link.nack(pnum, "STALE");
   EXPECT_TRUE(under_way(link, ticket));
-  link.session_pnum = echo_host_first_pnum + 99;  // not ours
+  link.session_pnum = 99;  // not ours
   link.nack(pnum, "STALE");
   EXPECT_TRUE(under_way(link, ticket));
-  link.session_pnum = echo_host_first_pnum + 100;
+  link.session_pnum = 100;
   link.nack(pnum, "STALE");
   EXPECT_EQ(result_of(link, ticket).outcome, Outcome::refused);
 }

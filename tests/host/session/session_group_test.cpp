@@ -31,13 +31,13 @@ struct SessionGroup : testing::Test {
   }
   // The command fields of a datagram.
   static std::string fields(const ScriptedLink::Sent& sent) {
-    return sent.bytes.substr(0, sent.bytes.find("PNum:"));
+    return sent.bytes.substr(0, sent.bytes.find("SID:"));
   }
   // The board answers with the command of a group that it refuses.
   void nack_at(std::uint32_t pnum, const std::string& code, int at) {
     link.raw(with_crc("N:" + std::to_string(pnum) + "," + code + ";AT:" + std::to_string(at) +
-                      ";SESSION:" + std::to_string(link.session_pnum) +
-                      ";PNum:" + std::to_string(link.board_pnum++) +
+                      ";SESSION:" + std::to_string(link.session_pnum) + ";" + link.asker() +
+                      "PNum:" + std::to_string(link.board_pnum++) +
                       ";T:" + std::to_string(link.board_ms()) + ";"));
   }
 

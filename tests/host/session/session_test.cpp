@@ -20,7 +20,7 @@ TEST(Session, SendsAHeartbeatAtOnceAndThenTenASecond) {
   ASSERT_EQ(link.count('H'), 1U);
   EXPECT_EQ(link.sent[0].command, "H:ROS2-R4");
   EXPECT_EQ(link.sent[0].t, 0U) << "nothing heard, nothing to echo";
-  EXPECT_GE(link.sent[0].pnum, echo_host_first_pnum);
+  EXPECT_NE(link.host_session, no_session);
   link.pass(10s);
   EXPECT_EQ(link.count('H'), 101U);
   EXPECT_EQ(link.sent.size(), 101U) << "and nothing else";
@@ -56,8 +56,6 @@ TEST(SessionFarewell, EndsHeartbeatsAndIsRepeatedUntilTheBoardTellsThatItIsFree)
   link.connect();
   link.identity("udp+leave");
   const Ticket command = link.session.send(Command::servo(1500, 1), 1s, link.now);
-  link.heartbeat();
-  const std::uint32_t echo = link.board_ms();
   link.pass(5ms);
   link.sent.clear();
   const Ticket ticket = link.session.leave(100ms, link.now);
@@ -65,7 +63,6 @@ TEST(SessionFarewell, EndsHeartbeatsAndIsRepeatedUntilTheBoardTellsThatItIsFree)
   EXPECT_EQ(link.results.at(command).outcome, Outcome::closed);
   ASSERT_EQ(link.sent.size(), 1U);
   EXPECT_EQ(link.sent[0].command, "E:LEAVE");
-  EXPECT_EQ(link.sent[0].t, echo) << "it proves that it is of this session";
   link.pass(45ms);
   ASSERT_EQ(link.sent.size(), 3U) << "every 20 ms, and nothing else";
   EXPECT_EQ(link.sent[2].bytes, link.sent[0].bytes);

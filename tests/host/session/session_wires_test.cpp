@@ -26,7 +26,7 @@ std::string busy_for(const WiredRobot& robot) {
   Datagram datagram;
   EXPECT_TRUE(read_datagram(robot.cables[0].all('H').back(), datagram));
   return with_crc("N:" + std::to_string(datagram.pnum()) +
-                  ",BUSY;PNum:1;T:" + std::to_string(robot.board_ms(0)) + ";");
+                  ",BUSY;SID:0000000000000065;PNum:1;T:" + std::to_string(robot.board_ms(0)) + ";");
 }
 
 TEST(SessionWires, AskWhoIsThereBeforeAnythingElseIsSaid) {
@@ -393,7 +393,7 @@ TEST(SessionWires, AreLeftBeforeAStateHasCome) {
   EXPECT_EQ(robot.results.at(ticket).outcome, Outcome::confirmed);
 }
 
-TEST(SessionWires, AreSignedOnce) {
+TEST(SessionWires, AreSignedEachByItsOwnSignature) {
   SessionOptions options = WiredRobot::at_will();
   options.key = key_of(1);
   options.clock_start = std::chrono::hours{24};
@@ -402,8 +402,12 @@ TEST(SessionWires, AreSignedOnce) {
   robot.run(1000);
   ASSERT_TRUE(robot.session->in_control(robot.now()));
   EXPECT_EQ(robot.drive(9).outcome, Outcome::confirmed);
-  EXPECT_EQ(robot.cables[0].all('O'), robot.cables[1].all('O'));
-  EXPECT_NE(robot.cables[0].all('O')[0].find(";A:1,"), std::string::npos);
+  const std::string first = robot.cables[0].all('O')[0];
+  const std::string second = robot.cables[1].all('O')[0];
+  const std::size_t signature = first.find(";A:1,");
+  ASSERT_NE(signature, std::string::npos);
+  EXPECT_EQ(first.substr(0, signature), second.substr(0, signature));
+  EXPECT_NE(first, second);
   EXPECT_EQ(robot.session->link().carrying, 3);
   robot.cut(0);
   robot.run(1500);

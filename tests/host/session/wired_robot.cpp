@@ -5,8 +5,6 @@
 #include <iterator>
 #include <utility>
 
-#include "protocol/link/board_link.hpp"
-
 namespace r4::test {
 
 struct WiredRobot::Board final : firmware::Hal, firmware::Observer {
@@ -91,8 +89,8 @@ WiredRobot::WiredRobot(Cables its_cables, SessionOptions options, BoardRole role
     boards_[i]->boot(100'000 * static_cast<std::uint32_t>(i + 1));
   }
   Session::Handler& handler = *this;
-  session = std::make_unique<Session>(handler, std::move(options), echo_host_first_pnum + 100, role,
-                                      cables.size());
+  session = std::make_unique<Session>(handler, std::move(options), role, cables.size(),
+                                      [n = 99ULL]() mutable { return ++n; });
 }
 WiredRobot::~WiredRobot() = default;
 
