@@ -134,7 +134,7 @@ def test_what_waited_in_a_stopped_bridge_is_not_executed(bridge, board):
         lasts(0.2)
         bridge.skip_past()
         bridge.signal(signal.SIGCONT)
-        late = bridge.counters('hosts', lambda each: each['late'] == 2)
+        late = bridge.counters('hosts', lambda each: each['late'] >= 2)
         assert late['passed'] < client.pnum_sent
         client.send_msg('H:ROS2-R4')
         board.state('ACTIVE')

@@ -18,7 +18,7 @@ import threading
 import time
 import tty
 
-from r4_process import Running, driving, free_port, is_link, is_state, monitor, objects, run, stop_takes_ms, watch
+from r4_process import Running, driving, free_port, is_link, is_state, monitor, objects, run, send, stop_takes_ms, watch
 from test_usb_serial import carry
 from wired_host import WiredHost
 
@@ -128,7 +128,8 @@ def shared_by_programs():
             host.process.kill()
             early.skip_past()
             early.next(lambda each: is_state(each) and each['fields'].get('SAFE') == 2)
-        assert run('send', by_path, 'E:CLEAR').returncode == 0
+        cleared = send(by_path, '--timeout', '20', 'E:CLEAR')
+        assert cleared.returncode == 0, cleared
 
 
 def one_of_two_wires(terminal, commands):
