@@ -26,6 +26,9 @@ constexpr Description descriptions[] = {
     {"cut", "the path carries nothing for 1.3 s"},
     {"cut-to-board", "the path carries nothing toward the board for 1.3 s"},
     {"cut-to-host", "the path carries nothing toward the host for 1.3 s"},
+    {"cut-shortly", "the path carries nothing for 0.4 s"},
+    {"held", "what is sent on the path in the next 1.3 s arrives after them, at once"},
+    {"unplugged", "the path is unplugged at both ends for 1.3 s, which their systems report"},
     {"port-lost", "the board loses the transport for a moment"},
     {"restarts", "the host is killed, and restarts after 50 ms"},
     {"dies", "the host is killed, and restarts after 1.3 s"},
@@ -35,7 +38,9 @@ constexpr Description descriptions[] = {
     {"stops", "the host asks for an emergency stop"},
     {"clears", "the host clears what it knows to be wrong"},
     {"reboots", "the board restarts"},
+    {"stands-still", "the board's loop stands still for 1.2 s"},
     {"other-stops", "another program asks for an emergency stop"},
+    {"bridge-restarts", "the bridge restarts"},
     {"stranger-beats", "a stranger sends one heartbeat with the host's next number"},
     {"stranger-drives", "a stranger sends one command with the host's next number"},
     {"stranger-leaves", "a stranger says farewell with the host's next number"},
@@ -49,8 +54,8 @@ constexpr Description descriptions[] = {
      "from here on a stranger sends heartbeats and commands as if it were the host, on another "
      "path"},
     {"stranger-inherits",
-     "from here on a stranger sends heartbeats and commands from the host's address whenever the "
-     "host is dead"},
+     "from here on a stranger sends heartbeats and commands from the first host's address whenever "
+     "no host has it"},
     {"stranger-copies", "a stranger sends a copy of it from an address of its own"},
 };
 static_assert(std::size(descriptions) == static_cast<std::size_t>(Fault::Kind::count));

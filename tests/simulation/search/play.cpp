@@ -20,7 +20,7 @@ constexpr std::uint64_t prompt_us = 100'000;
 
 Schedule Play::schedule_of(const Story& story) {
   Schedule schedule;
-  schedule.duration_us = story.ends_ms * 1000ULL;
+  schedule.duration_us = (story.faults_until_ms + Story::recovery_ms) * 1000ULL;
   schedule.hosts = story.hosts;
   schedule.settings.state_rate_hz = 5;
   schedule.more_wires.resize(static_cast<std::size_t>(story.paths) - 1);
@@ -78,7 +78,14 @@ void Play::begin() {
   for (const Act& each : story_.acts) {
     after(each.at_ms * 1000ULL, [this, each] { act(each); });
   }
-  if (story_.bridge) begin_bridge();
+  first_peer_ = host(0).places.front().peer;
+  for (int i = 1; story_.one_address && i < story_.hosts; ++i) {
+    host(i).places.front().peer = first_peer_;
+  }
+  if (story_.bridge) {
+    begin_bridge();
+    tick_bridge();
+  }
   renew_lease();
 }
 
@@ -88,12 +95,21 @@ bool Play::applies(Fault fault) const {
   using Kind = Fault::Kind;
   const Step& step = steps_[static_cast<std::size_t>(fault.step)];
   if (step.at_us >= story_.faults_until_ms * 1000ULL) return false;
-  if (is_of_datagram(fault.kind)) return step.passes;
+  if (is_of_datagram(fault.kind)) {
+    // Nobody is there to get it, unless it comes late.
+    const bool same =
+        !step.to_board && !step.alive &&
+        (fault.kind == Kind::lost || fault.kind == Kind::twice || fault.kind == Kind::overtaken);
+    return step.passes && !same;
+  }
   const bool is_host = step.host < story_.hosts;
   switch (fault.kind) {
     case Kind::cut:
     case Kind::cut_to_board:
     case Kind::cut_to_host:
+    case Kind::cut_shortly:
+    case Kind::held:
+    case Kind::unplugged:
     case Kind::port_lost:
       return step.first_of_host;
     case Kind::restarts:
@@ -109,6 +125,8 @@ bool Play::applies(Fault fault) const {
       return step.first && story_.paths > 1;
     case Kind::stranger_inherits:
       return step.first && step.host == 0;
+    case Kind::bridge_restarts:
+      return step.first && story_.bridge;
     case Kind::stranger_copies:
       return story_.keys && step.to_board && is_host;
     default:
@@ -194,8 +212,11 @@ void Play::on_sent(const Packet& sent) {
     overtaken_.push_back(sent);
     return;
   }
-  deliver_in(first_us, sent);
-  if (second_us) deliver_in(*second_us, sent);
+  // What a path holds back leaves it in order.
+  const std::uint64_t held_us =
+      wire.stalled_until_us - std::min(wire.stalled_until_us, world_.now_us_);
+  deliver_in(held_us + first_us, sent);
+  if (second_us) deliver_in(held_us + *second_us, sent);
 }
 
 void Play::deliver_in(std::uint64_t us, const Packet& packet) {
@@ -253,7 +274,7 @@ void Play::after_board(const Packet& packet) {
                                         name_of(controller_)));
   }
   const std::uint64_t timeout_us = world_.board_->settings().timeout_ms * 1000ULL;
-  if (looks_for_pushed_ && feeds && executed_ &&
+  if (looks_for_pushed_ && controller_.host >= 0 && feeds && executed_ &&
       world_.now_us_ - good_us_ < timeout_us - promise_slack_us) {
     violate(fmt::format("pushed: {} takes the board from {}", name_of(from), name_of(controller_)));
   }
@@ -278,7 +299,8 @@ bool Play::on_executed(const Command& command) {
 void Play::on_link_lost() { lost_now_ = true; }
 
 void Play::check() {
-  if (std::exchange(lost_now_, false) && !may_be_lost_ && executed_ && looks_for_pushed_) {
+  if (std::exchange(lost_now_, false) && !may_be_lost_ && executed_ && looks_for_pushed_ &&
+      controller_.host >= 0) {
     const std::uint64_t timeout_us = world_.board_->settings().timeout_ms * 1000ULL;
     const std::uint64_t since_us = world_.now_us_ - good_us_;
     if (since_us < timeout_us - promise_slack_us) {
@@ -287,7 +309,7 @@ void Play::check() {
     }
   }
   may_be_lost_ = false;
-  if (!world_.live_) return;
+  if (!world_.live_ || world_.standing_) return;
   const firmware::StepperTarget& stepper = world_.outputs_.stepper[0];
   if (!stepper.enabled) return;
   Process whose{stranger_host, 0};

@@ -101,6 +101,7 @@ class Play final : World::Script {
   void renew_lease();
   void say(const std::string& fields, std::uint8_t port, std::uint32_t peer);
   void say_bytes(std::string bytes, std::uint8_t port, std::uint32_t peer);
+  bool is_taken(std::uint32_t peer);
   void say_once(Fault::Kind kind);
   void repeat(const std::string& bytes);
   std::uint32_t next_number() const;
@@ -108,6 +109,7 @@ class Play final : World::Script {
 
   // play_bridge.cpp
   void begin_bridge();
+  void set_clock_of_bridge();
   void tick_bridge();
   bool bridge_takes(const Packet& arrived);
   void carry_from_bridge(const Packet* packet);
@@ -152,6 +154,7 @@ class Play final : World::Script {
 
   Stranger stranger_;
   std::uint32_t stranger_pnum_ = 0;                     // of his own
+  std::uint32_t first_peer_ = 0;                        // the address that the first host had first
   std::uint32_t campaign_pnum_ = 0;                     // as if he were the host
   std::uint32_t next_pnum_[8] = {};                     // of each host
   static constexpr std::uint32_t bridge_peer = 0xFFFB;  // as the board knows it

@@ -10,6 +10,8 @@ namespace {
 
 constexpr std::uint64_t outage_us = 1'300'000;
 constexpr std::uint64_t sleep_us = 1'500'000;
+constexpr std::uint64_t short_us = 400'000;
+constexpr std::uint64_t standstill_us = 1'200'000;
 constexpr std::uint64_t restart_us = 50'000;
 constexpr std::uint64_t stopper_us = 400'000;
 
@@ -56,14 +58,11 @@ void Play::act(const Act& act) {
     case Act::Kind::cut:
       begin_fault(Fault::Kind::cut, 0, whose, {});
       break;
-    case Act::Kind::unplug:
-      break;
   }
 }
 
 void Play::begin_fault(Fault::Kind kind, int index, int path, const std::string& bytes) {
   const std::uint64_t until_us = world_.now_us_ + outage_us;
-  const std::uint8_t port = world_.port_of(path);
   const std::uint32_t own = Stranger::address;
   switch (kind) {
     case Fault::Kind::cut:
@@ -72,6 +71,17 @@ void Play::begin_fault(Fault::Kind kind, int index, int path, const std::string&
       return world_.disturb(path, Happening::Kind::cut_to_board, until_us);
     case Fault::Kind::cut_to_host:
       return world_.disturb(path, Happening::Kind::cut_to_host, until_us);
+    case Fault::Kind::cut_shortly:
+      return world_.disturb(path, Happening::Kind::cut, world_.now_us_ + short_us);
+    case Fault::Kind::held:
+      return world_.disturb(path, Happening::Kind::stall, until_us);
+    case Fault::Kind::unplugged: {
+      may_be_lost_ = true;
+      const Happening happening{Happening::Kind::unplug, 0, outage_us, index,
+                                static_cast<std::uint8_t>(1U << path)};
+      world_.unplug(happening, false);
+      return after(outage_us, [this, happening] { world_.unplug(happening, true); });
+    }
     case Fault::Kind::port_lost:
       may_be_lost_ = true;
       return world_.disturb(path, Happening::Kind::port_down, world_.now_us_);
@@ -100,6 +110,13 @@ void Play::begin_fault(Fault::Kind kind, int index, int path, const std::string&
       disturb_all(world_.now_us_);
       has_controller_ = executed_ = false;
       return world_.boot_board();
+    case Fault::Kind::stands_still:
+      if (world_.standing_) return;
+      disturb_all(world_.now_us_ + standstill_us);
+      world_.schedule_.standstills.push_back({world_.now_us_, standstill_us});
+      return world_.stand_still(world_.schedule_.standstills.back());
+    case Fault::Kind::bridge_restarts:
+      return begin_bridge();
     case Fault::Kind::other_stops:
       world_.call_stopper(host(story_.hosts), false);
       return after(stopper_us, [this] { world_.call_stopper(host(story_.hosts), true); });
@@ -115,7 +132,7 @@ void Play::begin_fault(Fault::Kind kind, int index, int path, const std::string&
     case Fault::Kind::stranger_elsewhere:
       return carry_on(kind, world_.port_of(0), own);
     case Fault::Kind::stranger_inherits:
-      return carry_on(kind, port, host(0).places.front().peer);
+      return carry_on(kind, world_.port_of(host(0).places.front().wire), first_peer_);
     case Fault::Kind::stranger_copies:
       return repeat(bytes);
     default:
@@ -180,7 +197,7 @@ void Play::sleep(int index) {
     ++it.incarnation;
     it.session->on_sleep(it.time());
     world_.poll_host(index);
-    for (const auto& call : calls) call();
+    for (const auto& call : calls) when_it_runs(index, call);
   });
 }
 
@@ -199,7 +216,7 @@ void Play::pause(int index) {
     it.suspended = false;
     for (const Packet& packet : waited.arrived) deliver_in(0, packet);
     world_.poll_host(index);
-    for (const auto& call : waited.calls) call();
+    for (const auto& call : waited.calls) when_it_runs(index, call);
   });
 }
 

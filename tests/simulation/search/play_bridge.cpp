@@ -9,13 +9,18 @@ namespace r4::simulation {
 
 void Play::begin_bridge() {
   bridge_ = std::make_unique<test::ScriptedBridge>();
+  set_clock_of_bridge();
   bridge_->pair->open();
-  tick_bridge();
+  carry_from_bridge(nullptr);
+}
+
+void Play::set_clock_of_bridge() {
+  bridge_->now = std::chrono::steady_clock::time_point(std::chrono::hours(1) +
+                                                       std::chrono::microseconds(world_.now_us_));
 }
 
 void Play::tick_bridge() {
-  bridge_->now = std::chrono::steady_clock::time_point(std::chrono::hours(1) +
-                                                       std::chrono::microseconds(world_.now_us_));
+  set_clock_of_bridge();
   bridge_->hosts->drained();
   bridge_->board->drained();
   bridge_->pair->tick();
@@ -26,8 +31,7 @@ void Play::tick_bridge() {
 bool Play::bridge_takes(const Packet& arrived) {
   if (arrived.peer == bridge_peer) return false;
   if (keep_trace_) world_.show("bridge receives " + arrived.bytes);
-  bridge_->now = std::chrono::steady_clock::time_point(std::chrono::hours(1) +
-                                                       std::chrono::microseconds(world_.now_us_));
+  set_clock_of_bridge();
   bridge_->hosts->say_bytes(arrived.bytes, arrived.peer);
   carry_from_bridge(&arrived);
   return true;

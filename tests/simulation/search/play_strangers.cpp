@@ -75,9 +75,19 @@ void Play::repeat(const std::string& bytes) {
   say_bytes(bytes, world_.port_of(story_.paths - 1), Stranger::address);
 }
 
+// True if a host that lives has that address.
+bool Play::is_taken(std::uint32_t peer) {
+  for (const auto& each : world_.hosts_) {
+    for (const Host::Place& place : each->places) {
+      if (each->alive && place.peer == peer) return true;
+    }
+  }
+  return false;
+}
+
 void Play::carry_on(Fault::Kind kind, std::uint8_t port, std::uint32_t peer) {
   after(campaign_us, [this, kind, port, peer] { carry_on(kind, port, peer); });
-  if (kind == Fault::Kind::stranger_inherits && host(0).alive) return;
+  if (kind == Fault::Kind::stranger_inherits && is_taken(peer)) return;
   const std::uint32_t echo = stranger_.echo();
   if (kind == Fault::Kind::stranger_is_paper) {
     const std::uint32_t clock = world_.board_ms() + 1'000'000;
@@ -96,10 +106,11 @@ void Play::carry_on(Fault::Kind kind, std::uint8_t port, std::uint32_t peer) {
   }
   const std::string& name = stranger_.name();
   const std::uint32_t next = next_number();
-  if (!newer(campaign_pnum_, next)) campaign_pnum_ = next;
+  if (campaign_pnum_ == 0 || newer(next, campaign_pnum_)) campaign_pnum_ = next;
   say(fmt::format("{}H:ROS2-R4;PNum:{};T:{};", name, next, echo), port, peer);
   say(fmt::format("{}H:ROS2-R4;PNum:{};T:{};", name, ++campaign_pnum_, echo), port, peer);
   say(fmt::format("{}P:-7777,1000,1;PNum:{};T:{};", name, ++campaign_pnum_, echo), port, peer);
+  say(fmt::format("{}H:ROS2-R4;PNum:{};T:0;", name, ++campaign_pnum_), port, peer);
 }
 
 }  // namespace r4::simulation

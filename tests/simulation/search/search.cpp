@@ -119,20 +119,22 @@ Search search(const Story& story, int most_faults) {
 std::map<std::string, FoundKind> kinds_of(const std::vector<Finding>& findings) {
   using Kinds = std::multiset<Fault::Kind>;
   std::map<std::string, FoundKind> kinds;
-  std::set<Kinds> smaller;
+  std::vector<std::pair<std::size_t, Kinds>> before;
   for (const Finding& finding : findings) {  // those of few faults come first
+    const bool strange = std::any_of(finding.faults.begin(), finding.faults.end(),
+                                     [](const Fault& fault) { return is_strangers(fault.kind); });
     Kinds all;
     std::string text = finding.violation.substr(0, finding.violation.find(':')) + ":";
     for (const Fault& fault : finding.faults) {
-      all.insert(fault.kind);
-      text += fmt::format(" {}", word_of(fault.kind));
+      if (!strange || is_strangers(fault.kind)) all.insert(fault.kind);
     }
-    const bool implied = std::any_of(smaller.begin(), smaller.end(), [&](const Kinds& part) {
-      return part.size() < all.size() &&
-             std::includes(all.begin(), all.end(), part.begin(), part.end());
+    for (const Fault::Kind kind : all) text += fmt::format(" {}", word_of(kind));
+    const bool implied = std::any_of(before.begin(), before.end(), [&](const auto& part) {
+      return part.first < finding.faults.size() &&
+             std::includes(all.begin(), all.end(), part.second.begin(), part.second.end());
     });
     if (implied) continue;
-    smaller.insert(all);
+    before.emplace_back(finding.faults.size(), all);
     FoundKind& kind = kinds[text];
     if (kind.schedules++ == 0) kind.first = finding;
   }

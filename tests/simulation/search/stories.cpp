@@ -6,144 +6,140 @@ namespace {
 
 using Kind = Act::Kind;
 
+// A host is in control after 200 ms. It sends heartbeats every 250 ms, the board every 500 ms, and states every 200 ms.
 std::vector<Story> all() {
   std::vector<Story> all;
-  Story story;
+  const auto add = [&all](const char* name, const char* text, std::uint32_t faults_until_ms,
+                          std::vector<Act> acts) -> Story& {
+    Story story;
+    story.name = name;
+    story.text = text;
+    story.acts = std::move(acts);
+    story.faults_until_ms = faults_until_ms;
+    all.push_back(std::move(story));
+    return all.back();
+  };
 
-  story = Story();
-  story.name = "drive";
-  story.text = "a host connects, drives, stops the board, clears the stop and drives on";
-  story.acts = {{0, Kind::start},   {700, Kind::command}, {1000, Kind::group},
-                {1300, Kind::stop}, {1500, Kind::clear},  {1900, Kind::command}};
-  story.faults_until_ms = 2100;
-  story.ends_ms = 5000;
-  all.push_back(story);
+  add("begin", "a host connects and drives", 350, {{0, Kind::start}, {250, Kind::command}})
+      .is_short = true;
 
-  story = Story();
-  story.name = "killed";
-  story.text = "a host drives and is killed";
-  story.acts = {{0, Kind::start}, {700, Kind::command}, {1300, Kind::kill}};
-  story.faults_until_ms = 1800;
-  story.ends_ms = 4500;
-  all.push_back(story);
+  add("end", "a host drives and says farewell", 400,
+      {{0, Kind::start}, {250, Kind::command}, {330, Kind::leave}})
+      .is_short = true;
 
-  story = Story();
-  story.name = "restart";
-  story.text = "a host drives, is killed and restarts at once, and drives";
-  story.acts = {{0, Kind::start},
-                {700, Kind::command},
-                {1100, Kind::kill},
-                {1150, Kind::start},
-                {2600, Kind::command}};
-  story.faults_until_ms = 2700;
-  story.ends_ms = 5500;
-  all.push_back(story);
+  add("drive", "a host drives, stops the board, commands in vain, clears the stop and drives on",
+      950,
+      {{0, Kind::start},
+       {250, Kind::command},
+       {350, Kind::group},
+       {550, Kind::stop},
+       {600, Kind::command},
+       {700, Kind::clear},
+       {820, Kind::command}});
 
-  story = Story();
-  story.name = "farewell";
-  story.text = "a host drives and says farewell; a second host takes control and drives";
-  story.hosts = 2;
-  story.acts = {{0, Kind::start},
-                {700, Kind::command},
-                {1000, Kind::leave},
-                {1200, Kind::start, 1},
-                {1900, Kind::command, 1}};
-  story.faults_until_ms = 2000;
-  story.ends_ms = 5000;
-  all.push_back(story);
+  add("killed", "a host drives and is killed", 1800,
+      {{0, Kind::start}, {250, Kind::command}, {550, Kind::kill}});
 
-  story = Story();
-  story.name = "waiting";
-  story.text = "a host drives while a second one waits; the first is killed, the second drives";
-  story.hosts = 2;
-  story.acts = {{0, Kind::start},
-                {500, Kind::start, 1},
-                {700, Kind::command},
-                {1000, Kind::kill},
-                {2600, Kind::command, 1}};
-  story.faults_until_ms = 2600;
-  story.ends_ms = 5500;
-  all.push_back(story);
+  add("restart", "a host drives, is killed and restarts at once, and drives", 2000,
+      {{0, Kind::start},
+       {250, Kind::command},
+       {550, Kind::kill},
+       {600, Kind::start},
+       {1900, Kind::command}});
 
-  story = Story();
-  story.name = "watched";
-  story.text = "a host drives while a program watches, and is killed";
-  story.watched = true;
-  story.acts = {{0, Kind::start}, {200, Kind::start, 2}, {700, Kind::command}, {1200, Kind::kill}};
-  story.faults_until_ms = 1700;
-  story.ends_ms = 4000;
-  all.push_back(story);
+  add("farewell", "a host drives and says farewell; a second host takes control and drives", 1000,
+      {{0, Kind::start},
+       {250, Kind::command},
+       {400, Kind::leave},
+       {500, Kind::start, 1},
+       {900, Kind::command, 1}})
+      .hosts = 2;
 
-  story = Story();
-  story.name = "two paths";
-  story.text = "a host drives over two paths, of which one carries nothing for a while";
-  story.paths = 2;
-  story.acts = {{0, Kind::start}, {900, Kind::command}, {1200, Kind::cut, 0}, {1500, Kind::group}};
-  story.faults_until_ms = 1700;
-  story.ends_ms = 5000;
-  all.push_back(story);
+  add("waiting", "a host drives while a second one waits; the first is killed, the second drives",
+      1900,
+      {{0, Kind::start},
+       {100, Kind::start, 1},
+       {250, Kind::command},
+       {400, Kind::kill},
+       {1850, Kind::command, 1}})
+      .hosts = 2;
 
-  story = Story();
-  story.name = "cable";
-  story.text =
-      "a host drives over the board's cable alone, and is killed; strangers are on its network";
-  story.paths = 2;
-  story.paths_of_first = 1;
-  story.acts = {{0, Kind::start}, {700, Kind::command}, {1200, Kind::kill}};
-  story.faults_until_ms = 1700;
-  story.ends_ms = 4000;
-  all.push_back(story);
+  add("watched", "a host drives while a program watches, and is killed", 1700,
+      {{0, Kind::start}, {10, Kind::start, 2}, {250, Kind::command}, {550, Kind::kill}})
+      .watched = true;
 
-  story = Story();
-  story.name = "reboot";
-  story.text = "a host drives, the board restarts, the host drives on";
-  story.acts = {
-      {0, Kind::start}, {700, Kind::command}, {1000, Kind::reboot}, {1700, Kind::command}};
-  story.faults_until_ms = 1900;
-  story.ends_ms = 4800;
-  all.push_back(story);
+  {
+    Story& story =
+        add("two paths", "a host drives over two paths, of which one carries nothing for a while",
+            900, {{0, Kind::start}, {400, Kind::command}, {600, Kind::cut, 0}, {750, Kind::group}});
+    story.paths = 2;
+  }
+  {
+    Story& story = add("two paths at one port",
+                       "a host drives over two paths to one port of the board, and is killed", 1700,
+                       {{0, Kind::start}, {400, Kind::command}, {650, Kind::kill}});
+    story.paths = 2;
+    story.one_port = true;
+  }
+  {
+    Story& story =
+        add("cable",
+            "a host drives over the board's cable alone, and is killed; strangers are on "
+            "the board's network",
+            1700, {{0, Kind::start}, {250, Kind::command}, {550, Kind::kill}});
+    story.paths = 2;
+    story.paths_of_first = 1;
+  }
 
-  story = Story();
-  story.name = "sleep";
-  story.text = "a host drives, its computer sleeps, it drives on";
-  story.acts = {{0, Kind::start}, {700, Kind::command}, {1000, Kind::sleep}, {3200, Kind::command}};
-  story.faults_until_ms = 3300;
-  story.ends_ms = 6000;
-  all.push_back(story);
+  add("reboot", "a host drives, the board restarts, the host drives on", 1000,
+      {{0, Kind::start}, {250, Kind::command}, {450, Kind::reboot}, {900, Kind::command}});
 
-  story = Story();
-  story.name = "key";
-  story.text = "a host with a key drives and is killed";
-  story.keys = true;
-  story.acts = {{0, Kind::start}, {700, Kind::command}, {1300, Kind::kill}};
-  story.faults_until_ms = 1800;
-  story.ends_ms = 4500;
-  all.push_back(story);
+  add("sleep", "a host drives, its computer sleeps, it drives on", 2400,
+      {{0, Kind::start}, {250, Kind::command}, {450, Kind::sleep}, {2300, Kind::command}});
 
-  story = Story();
-  story.name = "bridge";
-  story.text = "a host drives over a bridge, and is killed";
-  story.bridge = true;
-  story.acts = {{0, Kind::start}, {700, Kind::command}, {1200, Kind::kill}};
-  story.faults_until_ms = 1700;
-  story.ends_ms = 4500;
-  all.push_back(story);
+  add("key", "a host with a key drives and is killed", 1800,
+      {{0, Kind::start}, {300, Kind::command}, {550, Kind::kill}})
+      .keys = true;
 
-  story = Story();
-  story.name = "bridge for two";
-  story.text =
-      "a host drives over a bridge while a second one waits; it is killed, the second drives";
-  story.bridge = true;
-  story.hosts = 2;
-  story.acts = {{0, Kind::start},
-                {500, Kind::start, 1},
-                {700, Kind::command},
-                {1000, Kind::kill},
-                {2600, Kind::command, 1}};
-  story.faults_until_ms = 2600;
-  story.ends_ms = 6000;
-  all.push_back(story);
+  {
+    Story& story =
+        add("key and two paths", "a host with a key drives over two paths, and is killed", 1800,
+            {{0, Kind::start}, {500, Kind::command}, {750, Kind::kill}});
+    story.keys = true;
+    story.paths = 2;
+  }
 
+  add("bridge", "a host drives over a bridge, and is killed", 1800,
+      {{0, Kind::start}, {250, Kind::command}, {550, Kind::kill}})
+      .bridge = true;
+
+  {
+    Story& story = add("bridge for two",
+                       "a host drives over a bridge while a second one waits; it is killed, the "
+                       "second drives",
+                       1900,
+                       {{0, Kind::start},
+                        {100, Kind::start, 1},
+                        {250, Kind::command},
+                        {400, Kind::kill},
+                        {1850, Kind::command, 1}});
+    story.bridge = true;
+    story.hosts = 2;
+  }
+  {
+    Story& story =
+        add("one address",
+            "two hosts reach the board from one address; the first drives and is killed, "
+            "the second drives",
+            1900,
+            {{0, Kind::start},
+             {100, Kind::start, 1},
+             {250, Kind::command},
+             {400, Kind::kill},
+             {1850, Kind::command, 1}});
+    story.one_address = true;
+    story.hosts = 2;
+  }
   return all;
 }
 

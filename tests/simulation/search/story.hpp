@@ -23,7 +23,6 @@ struct Act {
     reboot,   // the board restarts
     sleep,    // the host's computer sleeps for 1.5 s
     cut,      // that path carries nothing for 1.3 s
-    unplug,   // that path is gone at both ends, which the system reports, for 1.3 s
   };
   std::uint32_t at_ms;
   Kind kind;
@@ -34,14 +33,18 @@ struct Story {
   const char* name;
   const char* text;  // what happens, in plain words
   std::vector<Act> acts;
-  std::uint32_t faults_until_ms;  // datagrams that are sent later have no faults
-  std::uint32_t ends_ms;
+  // Datagrams that are sent later have no faults. A board and hosts recover from two faults in the
+  // time that follows.
+  std::uint32_t faults_until_ms = 0;
+  static constexpr std::uint32_t recovery_ms = 3000;
   int hosts = 1;
   int paths = 1;
   bool one_port = false;      // the paths are peers at one port of the board; else each has its own
   int paths_of_first = 0xFF;  // bit n: the first host is on path n. The others are on the last path
+  bool one_address = false;   // the board hears all hosts from one peer
   bool watched = false;       // a program watches, which is the last host
   bool keys = false;          // the board has a key of each host
+  bool is_short = false;      // it has few schedules
   bool bridge = false;        // hosts and strangers reach the board through a bridge
 };
 
@@ -63,6 +66,9 @@ struct Fault {
     cut,
     cut_to_board,
     cut_to_host,
+    cut_shortly,
+    held,
+    unplugged,
     port_lost,
     // Of the host that sends it, or that it is for.
     restarts,
@@ -74,7 +80,9 @@ struct Fault {
     clears,
     // Of all.
     reboots,
+    stands_still,
     other_stops,
+    bridge_restarts,
     // Of a stranger, who knows what the board tells to all, and to those that watch.
     stranger_beats,
     stranger_drives,
