@@ -314,7 +314,7 @@ void World::on_stop(std::uint32_t pnum) {
   if (attacking_) attacker_stops_.insert(pnum);
   if (delivering_.host < 0) return;
   Host& host = *hosts_[static_cast<std::size_t>(delivering_.host)];
-  if (host.incarnation != delivering_.incarnation) return;
+  if (delivering_.incarnation < host.began_as) return;
   for (auto& [ticket, stop] : host.stops) stop.executed = stop.executed || stop.pnum == pnum;
 }
 

@@ -22,7 +22,7 @@ struct World::Host final : Session::Handler {
   Host(World& w, int i) : world(w), index(i) {}
 
   void begin() {
-    ++incarnation;
+    began_as = ++incarnation;
     alive = true;
     clock_offset_us = world.random_.below(1'000'000'000);
     leaving = false;
@@ -105,6 +105,7 @@ struct World::Host final : Session::Handler {
   World& world;
   int index;
   std::uint32_t incarnation = 0;
+  std::uint32_t began_as = 0;  // its incarnation when this process began. A sleep ends one, too
   bool alive = false;
   bool frozen = false;
   bool suspended = false;  // the process does not run

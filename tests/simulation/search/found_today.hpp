@@ -2,8 +2,8 @@
 // What is known to break a promise: in which story, by how many faults, and what (search.hpp). The
 // search has to find each of these lines. One that it does not find has to be deleted.
 //
-//     stranger-joins     a watcher guesses a heartbeat of the host, and its address becomes a path of
-//                        the session; over a bridge it resumes the session of a host that was killed
+//     stranger-joins     a watcher guesses a heartbeat of the host, and its address becomes a path
+//                        of the session. Over a bridge it resumes the session of a killed host
 //     stranger-inherits  a program that gets the address of a killed host continues its session
 //     stranger-copies    a signed heartbeat that is sent again at once makes that address a path
 #pragma once
@@ -35,6 +35,11 @@ inline const std::vector<Known> found_today = {
     {"bridge for two", 1, "resumed: stranger-inherits"},
     {"bridge for two", 1, "resumed: stranger-joins"},
     {"bridge for two", 1, "stranger: stranger-inherits"},
+    {"bridge watched", 1, "joined: stranger-inherits"},
+    {"bridge watched", 1, "restore: stranger-joins"},
+    {"bridge watched", 1, "resumed: stranger-beats"},
+    {"bridge watched", 1, "resumed: stranger-inherits"},
+    {"bridge watched", 1, "resumed: stranger-joins"},
     {"cable", 1, "joined: stranger-beats"},
     {"cable", 1, "joined: stranger-elsewhere"},
     {"cable", 1, "joined: stranger-inherits"},
@@ -83,6 +88,7 @@ inline const std::vector<Known> found_today = {
     {"watched", 1, "joined: stranger-beats"},
     {"watched", 1, "joined: stranger-inherits"},
     {"watched", 1, "joined: stranger-joins"},
+    {"watched", 1, "restore: stranger-inherits"},
     {"watched", 1, "resumed: stranger-inherits"},
 };
 

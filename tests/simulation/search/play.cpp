@@ -111,20 +111,19 @@ bool Play::applies(Fault fault) const {
     case Kind::held:
     case Kind::unplugged:
     case Kind::port_lost:
-      return step.first_of_host;
+      return step.first_of_path;
     case Kind::restarts:
     case Kind::dies:
     case Kind::sleeps:
     case Kind::pauses:
       return step.first_of_host && step.alive;
     case Kind::moves:
+      return step.first_of_path && step.alive && is_host;
     case Kind::stops:
     case Kind::clears:
       return step.first_of_host && step.alive && is_host;
     case Kind::stranger_elsewhere:
       return step.first && story_.paths > 1;
-    case Kind::stranger_inherits:
-      return step.first && step.host == 0;
     case Kind::bridge_restarts:
       return step.first && story_.bridge;
     case Kind::stranger_copies:
@@ -151,8 +150,10 @@ void Play::on_sent(const Packet& sent) {
   if (step.first) hosts_of_event_.clear();
   event_of_step_ = world_.handled_;
   const std::pair<int, int> who{sent.host, path};
-  step.first_of_host =
-      std::find(hosts_of_event_.begin(), hosts_of_event_.end(), who) == hosts_of_event_.end();
+  for (const auto& before : hosts_of_event_) {
+    step.first_of_host = step.first_of_host && before.first != who.first;
+    step.first_of_path = step.first_of_path && before != who;
+  }
   hosts_of_event_.push_back(who);
   if (keep_trace_) step.text = sent.bytes.substr(0, sent.bytes.find('^'));
   steps_.push_back(std::move(step));

@@ -37,11 +37,12 @@ struct Step {
   bool to_board = false;
   int host = 0;
   int path = 0;
-  bool passes = false;         // no cut loses it
-  bool first = false;          // the first datagram of its event of the world
-  bool first_of_host = false;  // … that has to do with its host
-  bool alive = false;          // its host is
-  std::string text;            // only with a trace
+  bool passes = false;        // no cut loses it
+  bool first = false;         // the first datagram of its event of the world
+  bool first_of_host = true;  // … that has to do with its host
+  bool first_of_path = true;  // … on its path
+  bool alive = false;         // its host is
+  std::string text;           // only with a trace
 };
 
 class Play final : World::Script {

@@ -34,9 +34,9 @@ Search search(const Story& story, int most_faults);
 // The story of a schedule: what happens in it, the faults in plain words, what breaks, and how to
 // run it again.
 std::string tell(const Story& story, const Finding& finding);
-// What is broken and by which kinds of faults, of strangers alone if they have a part in it: "joined:
-// stranger-joins"; with how many schedules that is, and the first of them. Without those to which
-// fewer faults of a part of these kinds lead already.
+// What is broken and by which kinds of faults, of strangers alone if they have a part in it:
+// "joined: stranger-joins"; with how many schedules that is, and the first of them. Without those
+// to which fewer faults of a part of these kinds lead already.
 struct FoundKind {
   std::size_t schedules = 0;
   Finding first;

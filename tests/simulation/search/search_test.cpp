@@ -3,6 +3,8 @@
 // sets how many faults at once. Without it that is 1, but 2 where R4_SCHEDULES asks for 100,000
 // schedules of the random simulator or more, or for 10,000 and the story is short. R4_STORY and
 // R4_STORY_FAULTS run one schedule again and print its trace.
+#include "search.hpp"
+
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -14,7 +16,6 @@
 
 #include "found_today.hpp"
 #include "play.hpp"
-#include "search.hpp"
 #include "tests/simulation/environment.hpp"
 
 namespace r4::simulation {

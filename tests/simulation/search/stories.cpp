@@ -6,7 +6,8 @@ namespace {
 
 using Kind = Act::Kind;
 
-// A host is in control after 200 ms. It sends heartbeats every 250 ms, the board every 500 ms, and states every 200 ms.
+// A host is in control after 200 ms. It sends heartbeats every 250 ms, the board every 500 ms, and
+// states every 200 ms.
 std::vector<Story> all() {
   std::vector<Story> all;
   const auto add = [&all](const char* name, const char* text, std::uint32_t faults_until_ms,
@@ -113,6 +114,14 @@ std::vector<Story> all() {
       {{0, Kind::start}, {250, Kind::command}, {550, Kind::kill}})
       .bridge = true;
 
+  {
+    Story& story =
+        add("bridge watched",
+            "a host drives over a bridge while a program watches over it, and is killed", 1600,
+            {{0, Kind::start}, {10, Kind::start, 2}, {250, Kind::command}, {550, Kind::kill}});
+    story.bridge = true;
+    story.watched = true;
+  }
   {
     Story& story = add("bridge for two",
                        "a host drives over a bridge while a second one waits; it is killed, the "
