@@ -116,7 +116,8 @@ bool Play::applies(Fault fault) const {
     case Kind::dies:
     case Kind::sleeps:
     case Kind::pauses:
-      return step.first_of_host && step.alive;
+      // The program that only stops the board ends soon anyway.
+      return step.first_of_host && step.alive && step.host != story_.hosts;
     case Kind::moves:
       return step.first_of_path && step.alive && is_host;
     case Kind::stops:
@@ -216,8 +217,8 @@ void Play::on_sent(const Packet& sent) {
   // What a path holds back leaves it in order.
   const std::uint64_t held_us =
       wire.stalled_until_us - std::min(wire.stalled_until_us, world_.now_us_);
-  deliver_in(held_us + first_us, sent);
-  if (second_us) deliver_in(held_us + *second_us, sent);
+  deliver_in(std::max(held_us + delay_us, first_us), sent);
+  if (second_us) deliver_in(std::max(held_us + delay_us, *second_us), sent);
 }
 
 void Play::deliver_in(std::uint64_t us, const Packet& packet) {

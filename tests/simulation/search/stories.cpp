@@ -140,7 +140,7 @@ std::vector<Story> all() {
         add("one address",
             "two hosts reach the board from one address; the first drives and is killed, "
             "the second drives",
-            1900,
+            1000,
             {{0, Kind::start},
              {100, Kind::start, 1},
              {250, Kind::command},
