@@ -15,6 +15,10 @@ function(r4_warnings target)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
     list(APPEND warnings -Wno-sign-conversion -Wno-deprecated-declarations)
   endif()
+  # On 32-bit ARM, GCC notes in every use of std::sort that its calls are not those of GCC 6.
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_SYSTEM_PROCESSOR MATCHES "^arm")
+    list(APPEND warnings -Wno-psabi)
+  endif()
   target_compile_options(${target} PRIVATE "$<$<COMPILE_LANGUAGE:CXX>:${warnings}>")
 endfunction()
 

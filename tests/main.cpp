@@ -2,7 +2,7 @@
 // main() of the test programs. Some tests set bounds to real time, as the promises that they test
 // do. A machine that stands still in the middle (a virtual one that is paused) breaks them all. A
 // thread that only looks at the clock tells: a failure during a standstill says nothing and is
-// repeated, one without counts. integration/conftest.py has the same rule.
+// repeated, one without counts. integration/repeat.py has a rule like it.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

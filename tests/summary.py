@@ -5,7 +5,7 @@
 Reads BUILD/results/*.xml (ctest), BUILD/[asan|tsan/]junit/*.xml (pytest, in place of the one
 ctest entry of the file) and BUILD/results/checks.txt. Names every failed and every skipped test;
 a skipped test counts as failed. Names what was repeated since the machine stood still (main.cpp,
-integration/conftest.py), and what failed beside other tests and was repeated alone (NAME.alone.xml, which counts
+integration/repeat.py), and what failed beside other tests and was repeated alone (NAME.alone.xml, which counts
 in place of what NAME.xml has of it). The last line is `N passed, N failed`.
 """
 import pathlib
@@ -37,6 +37,9 @@ def reports(build):
 
 
 def repeated(build):
+    repeats = build / 'results/repeats.txt'
+    if repeats.exists():
+        yield from repeats.read_text(encoding='utf-8').splitlines()
     for report in reports(build):
         for name, outcome in alone(report).items():
             yield f'{report.stem}: {name}: failed beside others; {outcome} alone ({report.with_suffix(".log")})'

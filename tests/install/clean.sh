@@ -1,6 +1,6 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# What FOLDER has for this system is installed, used and removed: the wheel, then the .debs. Usage: clean.sh FOLDER
+# What FOLDER has for this system is installed, used and removed: the wheel, the .debs, or both. Usage: clean.sh FOLDER
 # As root in a minimal system: tools/on debian13/arm64 --clean --see FOLDER tests/install/clean.sh FOLDER
 set -euo pipefail
 tree=$(realpath "$(dirname "${BASH_SOURCE[0]}")/../..")
@@ -16,18 +16,27 @@ quietly() {
   }
 }
 
+compgen -G "$folder/*.whl" >/dev/null || compgen -G "$folder/*.deb" >/dev/null || {
+  echo "clean: $folder has neither a wheel nor packages"
+  exit 1
+}
 quietly apt-get update
-quietly apt-get install -y --no-install-recommends -o DPkg::Options::=--force-unsafe-io python3-venv
-python=$(python3 -c 'import sys; print("cp%d%d" % sys.version_info[:2])')
-cp "$folder"/r4link-*-"$python"-*_"$(uname -m)".whl "$tree/tests/install/wheel_inside.sh" "$work"
-"$work/wheel_inside.sh"
-
+if compgen -G "$folder/*.whl" >/dev/null; then
+  quietly apt-get install -y --no-install-recommends -o DPkg::Options::=--force-unsafe-io python3-venv
+  python=$(python3 -c 'import sys; print("cp%d%d" % sys.version_info[:2])')
+  cp "$folder"/r4link-*-"$python"-*_"$(uname -m)".whl "$tree/tests/install/wheel_inside.sh" "$work"
+  "$work/wheel_inside.sh"
+fi
 # shellcheck source=/dev/null
 release=$(. /etc/os-release && printf '%s%s' "$ID" "$VERSION_ID")
 arch=$(dpkg --print-architecture)
-cp "$folder"/*+"$release"_"$arch".deb "$folder"/r4link-doc_*+"$release"_all.deb "$tree/tests/install/packages_inside.sh" "$work"
-cp -r "$tree/docs/examples/drive" "$work"
-"$work/packages_inside.sh" --apt
+if compgen -G "$folder/*.deb" >/dev/null; then
+  cp "$folder"/*+"$release"_"$arch".deb "$tree/tests/install/packages_inside.sh" "$work"
+  # A cross build makes no documentation, which is the same for each architecture.
+  find "$folder" -maxdepth 1 -name "r4link-doc_*+${release}_all.deb" -exec cp {} "$work" \;
+  cp -r "$tree/docs/examples/drive" "$work"
+  "$work/packages_inside.sh" --apt
+fi
 left=$(find /etc /usr /var -name '*r4link*' -o -name '70-r4.rules' -o -name 'r4-*@.service')
 if [[ -n "$left" ]]; then
   printf 'clean: purging them leaves\n%s\n' "$left"

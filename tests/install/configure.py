@@ -3,6 +3,7 @@
 """ctest `configure`: what CMake says where a library is missing or too old. Usage: configure.py TREE"""
 import json
 import pathlib
+import platform
 import re
 import subprocess
 import sys
@@ -37,6 +38,15 @@ def a_missing_library_is_named_with_its_option_and_its_packages():
         assert f'-D{option}=OFF' in said and debian in said, said
 
 
+def a_cross_build_makes_the_manual_by_the_r4_that_it_built():
+    with tempfile.TemporaryDirectory() as folder:
+        ended = subprocess.run(['cmake', '--preset', 'release', '-B', folder, '-DR4_TESTS=OFF', '-DR4_PYTHON=OFF',
+                                '-DCMAKE_SYSTEM_NAME=Linux', f'-DCMAKE_SYSTEM_PROCESSOR={platform.machine()}'],
+                               cwd=TREE, capture_output=True, text=True, check=False)
+        assert ended.returncode == 0, ended.stderr
+        assert f'{pathlib.Path(folder).resolve()}/r4 man ' in pathlib.Path(folder, 'build.ninja').read_text()
+
+
 def an_asio_that_is_too_old_is_named():
     with tempfile.TemporaryDirectory() as folder:
         header = pathlib.Path(folder, 'asio/version.hpp')
@@ -62,7 +72,7 @@ def the_oldest_cmake_is_enough():
 
 failed = 0
 for test in (a_build_needs_no_library_of_what_it_leaves_out, a_missing_library_is_named_with_its_option_and_its_packages,
-             an_asio_that_is_too_old_is_named, the_oldest_cmake_is_enough):
+             a_cross_build_makes_the_manual_by_the_r4_that_it_built, an_asio_that_is_too_old_is_named, the_oldest_cmake_is_enough):
     name = test.__name__.replace('_', ' ')
     try:
         test()

@@ -78,8 +78,11 @@ in_cpp() {
 }
 step 'a C++ program is built by CMake and by pkg-config, and drives a board' in_cpp
 
-test -s /usr/share/doc/r4link-doc/html/index.html
-test -s /usr/share/doc/r4link-doc/html/api/board_8hpp.html
+mapfile -t packages < <(for each in ./*.deb; do dpkg-deb --field "$each" Package; done)
+if [[ " ${packages[*]} " == *' r4link-doc '* ]]; then
+  test -s /usr/share/doc/r4link-doc/html/index.html
+  test -s /usr/share/doc/r4link-doc/html/api/board_8hpp.html
+fi
 
 # What it measures is only true where nobody else needs the processors (3): integration/test_demo.py asserts that.
 demo() {
@@ -88,4 +91,4 @@ demo() {
 }
 step 'r4 demo' demo
 
-step 'purge' dpkg --force-unsafe-io --purge r4link libr4link-dev libr4link0.1 python3-r4link r4link-doc
+step 'purge' dpkg --force-unsafe-io --purge "${packages[@]}"

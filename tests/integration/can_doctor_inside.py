@@ -20,6 +20,15 @@ def doctor(*arguments, listen='0.01'):
     return result.returncode, {each['check']: each for each in objects(result.stdout) if each['type'] == 'finding'}
 
 
+def doctor_that_finds(check, words, url):
+    """As doctor(), listening for longer until it has found that."""
+    for listen in (2, 4, 8, 16):
+        code, found = doctor(url, listen=str(listen))
+        if words in found.get(check, {}).get('reason', ''):
+            return code, found
+    raise AssertionError(found)
+
+
 def queue(name):
     return int(pathlib.Path(f'/sys/class/net/{name}/tx_queue_len').read_text(encoding='ascii'))
 
@@ -65,33 +74,30 @@ def test_a_virtual_bus_is_brought_up_and_its_board_heard():
     assert code == OPEN and found['can.down']['automatic']
     run('doctor', 'can://vcan0?node=1', '--fix', '--duration', '0.01', timeout=60)
     with Board('can://vcan0?node=1'):
-        _, found = doctor('can://vcan0?node=1', listen='1.5')
-    assert found['link']['severity'] == 'ok' and 'it answers in' in found['link']['reason'], found
+        _, found = doctor_that_finds('link', 'it answers in', 'can://vcan0?node=1')
+    assert found['link']['severity'] == 'ok', found
     assert found['can.load']['severity'] == 'ok' and found['can.interface']['reason'] == 'up, virtual'
 
 
 def test_frames_of_another_protocol_on_an_id_of_the_board_are_told():
+    words = 'make no R4 datagram'
     with Board('can://vcan0?node=5'):
         with subprocess.Popen(['cangen', 'vcan0', '-I', '185', '-L', '8', '-D', 'i', '-g', '10']) as other:
             sent = run('send', 'can://vcan0?node=5', 'R:1,On')
-            code, found = doctor('can://vcan0?node=5', listen='3')
+            code, found = doctor_that_finds('link.answer', words, 'can://vcan0?node=5')
             other.terminate()
-    words = 'make no R4 datagram'
     assert sent.returncode == REFUSED and words in sent.stderr and 'another host' not in sent.stderr, sent
-    assert code == REFUSED and words in found['link.answer']['reason'], found
+    assert code == REFUSED, found
     assert 'CANopen TPDO1 of node 5' in found['can.foreign']['reason'], found
 
 
 def test_a_bus_that_holds_frames_back_is_told():
     with Board('can://vxcan1?node=1'):
-        assert run('send', 'can://vxcan0?node=1', 'R:1,On').returncode == 0
         for name in ('vxcan0', 'vxcan1'):
             subprocess.run(f'tc qdisc replace dev {name} root netem delay 30ms limit 2000', shell=True, check=True)
         try:
-            sent = run('send', 'can://vxcan0?node=1', 'R:1,On')
-            code, found = doctor('can://vxcan0?node=1', listen='4')
+            code, found = doctor_that_finds('link.answer', 'does not come within 20 ms', 'can://vxcan0?node=1')
         finally:
             for name in ('vxcan0', 'vxcan1'):
                 subprocess.run(f'tc qdisc del dev {name} root', shell=True, check=True)
-    assert sent.returncode == 0 or 'does not come within 20 ms' in sent.stderr, sent
-    assert code == REFUSED and 'does not come within 20 ms' in found['link.answer']['reason'], found
+    assert code == REFUSED, found

@@ -9,9 +9,10 @@ import struct
 import subprocess
 import time
 
-from r4_process import Board, Running, is_state, monitor, run
+from can_inside import PATIENTLY
+from r4_process import Board, Running, is_state, monitor, run, send
 from slcan_bus import SlcanBus
-from wired_host import BACK_WITHIN_S, REPORTED_WITHIN_S, TIMEOUT_S, WiredHost, Wire, has_joined, has_left
+from wired_host import WiredHost, Wire, has_joined, has_left
 
 BUSES = ('vcan8', 'vcan9')
 URLS = [f'can://{bus}?node=3' for bus in BUSES]
@@ -56,7 +57,7 @@ def of_wire(bus, carries):
 
 
 def test_either_of_two_buses_is_switched_off_and_nothing_is_missed():
-    with two_buses(), Board(*URLS) as board, monitor('+'.join(URLS)) as host:
+    with two_buses(), Board(*URLS, options=PATIENTLY) as board, monitor('+'.join(URLS)) as host:
         for bus in BUSES:
             if not any(of_wire(bus, True)(each) for each in host.log):
                 host.next(of_wire(bus, True))
@@ -71,14 +72,11 @@ def test_either_of_two_buses_is_switched_off_and_nothing_is_missed():
             back = host.next(of_wire(bus, True))['came'] - up
             board.next(has_joined(2))
             print(f'{bus}: told of it after {lost * 1e3:.0f} ms, used again after {back * 1e3:.0f} ms')
-            assert lost <= REPORTED_WITHIN_S and back <= BACK_WITHIN_S
         for _ in range(20):
             host.next(is_state)
         states = [each for each in host.log if is_state(each) and each['came'] >= began]
-        gap = max(later['came'] - earlier['came'] for earlier, later in zip(states, states[1:]))
         times = [each['t'] for each in states]
-        print(f'longest gap between states {gap * 1e3:.0f} ms')
-        assert times == sorted(set(times)) and gap < 0.5
+        assert times == sorted(set(times))
         board.never('SAFE', 0.1)
 
 
@@ -105,7 +103,7 @@ def test_commands_are_executed_once_each_while_buses_come_and_go():
 
 def test_a_stop_by_either_bus_is_enough():
     with two_buses(), Board(*URLS) as board:
-        assert run('send', *URLS, 'S:1500,1', timeout=60).returncode == 0
+        assert send(*URLS, 'S:1500,1').returncode == 0
         ip('link', 'set', BUSES[0], 'down')
         assert run('stop', *URLS, timeout=60).returncode == 0
         board.state('SAFE', 'stop')
@@ -113,34 +111,34 @@ def test_a_stop_by_either_bus_is_enough():
 
 def test_a_cable_beside_a_bus(tmp_path_factory):
     folder = tmp_path_factory.mktemp('wires')
-    with one_bus('vcan8') as bus, Board(f'pty:{folder}/board', f'can://{bus}?node=3') as board:
+    with one_bus('vcan8') as bus, \
+            Board(f'pty:{folder}/board', f'can://{bus}?node=3', options=PATIENTLY) as board:
         cable = Wire('pty', f'{folder}/host', f'{folder}/board')
         try:
             with WiredHost([cable.url, f'can://{bus}?node=3'], ['/host', bus]) as host:
                 board.next(has_joined(2))
                 for place, away, back in (('/host', cable.pull, cable.plug_in),
                                           (bus, lambda: switch(bus, up=False), lambda: switch(bus, up=True))):
-                    assert host.loses(place, away) <= REPORTED_WITHIN_S
+                    host.loses(place, away)
                     board.next(has_left(1))
-                    assert host.has_again(place, back) <= BACK_WITHIN_S
+                    host.has_again(place, back)
                     board.next(has_joined(2))
                 # What was held up brings old states when it goes on.
-                assert host.loses('/host', lambda: cable.signal(signal.SIGSTOP)) <= TIMEOUT_S + REPORTED_WITHIN_S
+                host.loses_by_silence('/host', lambda: cable.signal(signal.SIGSTOP))
                 board.next(has_left(1))
-                assert host.has_again('/host', lambda: cable.signal(signal.SIGCONT)) <= BACK_WITHIN_S
+                host.has_again('/host', lambda: cable.signal(signal.SIGCONT))
                 board.next(has_joined(2))
                 host.ends(board)
         finally:
             cable.pull()
 
 
-def test_two_buses_of_which_one_is_switched_off_and_the_other_breaks():
+def test_two_buses_of_which_one_breaks_at_either_end():
     """can0 and can1 are on a bus of their own, the ends of the other have error counters and bus-off."""
     boards, hosts = (('can0', 'slcan0'), ('can1', 'slcan1'))
-    with contextlib.ExitStack() as after, SlcanBus(2, 500000) as bus, \
-            Board(*(f'can://{each}?node=3' for each in boards)) as board, \
+    with SlcanBus(2, 500000) as bus, \
+            Board(*(f'can://{each}?node=3' for each in boards), options=PATIENTLY) as board, \
             WiredHost([f'can://{each}?node=3' for each in hosts], [f'//{each}?' for each in hosts]) as host:
-        after.callback(switch, 'can1', up=True)
         board.next(has_joined(2))
 
         def spoil(node):
@@ -152,17 +150,13 @@ def test_two_buses_of_which_one_is_switched_off_and_the_other_breaks():
             switch(f'slcan{node}', up=False)  # for which the kernel takes more than a second now and then
             return lambda: switch(f'slcan{node}', up=True)
 
-        assert host.loses('//slcan1', lambda: spoil(1)) <= REPORTED_WITHIN_S
+        host.loses('//slcan1', lambda: spoil(1))
         board.next(has_left(1))
-        assert host.has_again('//slcan1', heal(1)) <= BACK_WITHIN_S
+        host.has_again('//slcan1', heal(1))
         board.next(has_joined(2))
         # The host cannot see it: the board's end of the bus is off.
-        assert host.loses('//slcan1', lambda: spoil(0)) <= TIMEOUT_S + REPORTED_WITHIN_S
+        host.loses_by_silence('//slcan1', lambda: spoil(0))
         board.next(has_left(1))
-        assert host.has_again('//slcan1', heal(0)) <= BACK_WITHIN_S
-        board.next(has_joined(2))
-        assert host.loses('//can1', lambda: switch('can1', up=False)) <= REPORTED_WITHIN_S
-        board.next(has_left(1))
-        assert host.has_again('//can1', lambda: switch('can1', up=True)) <= BACK_WITHIN_S
+        host.has_again('//slcan1', heal(0))
         board.next(has_joined(2))
         host.ends(board)

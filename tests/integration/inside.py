@@ -36,10 +36,10 @@ def run_inside(*names):
     files = [HERE / name for name in names]
     compile_here(files)
     inside = subprocess.run(
-        [*WITH_CAN, '--time', str(LONGEST_S), *PYTEST, *files, '-ra', '-s', '--durations=0'], env=PLAIN,
+        [*WITH_CAN, '--time', str(LONGEST_S), *PYTEST, *files, '-ra', '-s', '--durations=20'], env=PLAIN,
         stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=LONGEST_S + 50, check=False)
     print(inside.stdout)
     written = sum(len(re.findall(r'^def test_', file.read_text(), re.MULTILINE)) for file in files)
     passed = re.search(r'(\d+) passed', inside.stdout)
-    assert inside.returncode == 0, inside.stdout[-6000:] + inside.stderr
+    assert inside.returncode == 0, inside.stdout[-20000:] + inside.stderr
     assert passed and int(passed[1]) >= written and 'skipped' not in inside.stdout

@@ -41,8 +41,8 @@ class Ros2(Running):
         self.domain = domain
         self.ready = self.next(lambda each: each['type'] == 'ready')
 
-    def armed(self):
-        return self.next(lambda each: each['type'] == 'log' and each['text'] == 'armed')
+    def armed(self, timeout=PATIENCE_S):
+        return self.next(lambda each: each['type'] == 'log' and each['text'] == 'armed', timeout)
 
     def logged_both(self, *texts):
         """In either order."""
@@ -175,6 +175,14 @@ def again(write, wait):
         except AssertionError:
             if time.monotonic() > deadline:
                 raise
+
+
+def arm(ros2, peer):
+    """Presses the button until that arms: a sample may be lost, or come too late."""
+    def press():
+        for pressed in (b'\x00', b'\x01'):
+            peer.write('rt/arm', pressed)
+    again(press, ros2.armed)
 
 
 def drive(board, peer, topic, payload, is_it):

@@ -6,11 +6,12 @@ import time
 
 import pytest
 
+from machine import SANITIZED, within
 from paper_client import PaperClient
-from r4_process import (ERROR, SANITIZED, Board, Running, driving, is_state, lasts, monitor, run, watch)
+from r4_process import ERROR, Board, Running, driving, is_state, lasts, monitor, run, watch
 
 # The board's timeout, and what docs/safety.md promises on top; a busy machine as much again.
-SAFE_WITHIN_S = 1.02 + (1 if SANITIZED else 0.08)
+SAFE_WITHIN_S = 1.02 + 0.08
 LASTS_S = 2
 
 
@@ -112,7 +113,7 @@ def test_a_death_on_the_way_makes_the_board_safe_in_time(bridge, board, end):
         board.skip_past()
         died = (bridge if end == 'bridge' else host).signal(signal.SIGKILL)
         safe = board.state('SAFE', 'link')
-        assert safe['came'] - died <= SAFE_WITHIN_S
+        assert safe['came'] - died <= within(SAFE_WITHIN_S)
 
 
 def test_what_waited_in_a_stopped_bridge_is_not_executed(bridge, board):
@@ -133,7 +134,7 @@ def test_what_waited_in_a_stopped_bridge_is_not_executed(bridge, board):
         lasts(0.2)
         bridge.skip_past()
         bridge.signal(signal.SIGCONT)
-        late = bridge.counters('hosts', lambda each: each['late'] == 2)
+        late = bridge.counters('hosts', lambda each: each['late'] >= 2)
         assert late['passed'] < client.pnum_sent
         client.send_msg('H:ROS2-R4')
         board.state('ACTIVE')

@@ -8,7 +8,7 @@ All in one guest, because it takes ten seconds until the first test runs in it. 
 the others assert times that a slow program in a guest does not keep.
 """
 from inside import PACKAGE, run_inside
-from r4_process import SANITIZED
+from machine import SANITIZED
 
 ALWAYS = ['can_bridge_inside.py', 'can_isotp_inside.py']
 # slcan is the guest's: few kernels have it loaded.

@@ -13,7 +13,8 @@ import zlib
 import pandas
 import pytest
 
-from r4_process import DATA, ERROR, PATIENCE_S, R4, SANITIZED, objects, run, run_measured
+from machine import SANITIZED
+from r4_process import DATA, ERROR, PATIENCE_S, R4, objects, run, run_measured
 
 DATA_BAD, USAGE, OPEN = 1, 2, 4
 HERE = pathlib.Path(__file__).resolve().parent

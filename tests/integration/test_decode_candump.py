@@ -9,8 +9,9 @@ import zlib
 
 import pytest
 
+from machine import SANITIZED
 import packed_form
-from r4_process import R4, SANITIZED, objects, run
+from r4_process import R4, objects, run
 
 DATA_BAD, OPEN = 1, 4
 STATE = 'AIN24:24.28;OSMC1:400,1;PNum:7434;T:79090;'

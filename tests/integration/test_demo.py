@@ -9,7 +9,8 @@ import socket
 import subprocess
 import time
 
-from r4_process import PATIENCE_S, R4, SANITIZED, Board, is_state, monitor, objects, run
+from machine import SANITIZED, within, within_ms
+from r4_process import PATIENCE_S, R4, Board, is_state, monitor, objects, run
 
 TRANSPORTS = ['in process', 'UDP', 'serial']
 CAN_HERE = any(name.startswith('vcan') for _, name in socket.if_nameindex())
@@ -25,7 +26,7 @@ def test_the_demonstration_is_true_on_every_transport_and_short_and_so_are_its_n
         results = objects(numbers.communicate(timeout=60)[0])
     print(result.stdout[-1500:], f'took {took:.1f} s')
     assert result.returncode == 0 and result.stderr == ''
-    assert took < 16 or SANITIZED
+    assert took < within(16)
     if not CAN_HERE:
         assert re.search(r'^  CAN +not played: .+; .+(modprobe|ip link)', result.stdout, re.MULTILINE)
     for transport in TRANSPORTS:
@@ -39,7 +40,9 @@ def test_the_demonstration_is_true_on_every_transport_and_short_and_so_are_its_n
     assert [each['transport'] for each in results] == TRANSPORTS
     for each in results:
         assert each['ok'], each
-        assert SANITIZED or 980 <= each['safe_ms'] <= 1020
+        # In this process it is measured from when the host knew that it had sent its last heartbeat, at the latest.
+        assert each['safe_ms'] <= within_ms(1020)
+        assert each['safe_ms'] >= 980 or each['transport'] == 'in process'
         assert each['lost'] == 0
 
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Devices on the user's I2C bus: r4 send and r4 monitor against the simulated board, as docs/devices.md shows them."""
-import statistics
 
 import pytest
 
-from r4_process import SANITIZED, Board, Running, is_state, objects, run
+from machine import within_ms
+from r4_process import Board, Running, is_state, objects, run
 
 
 @pytest.fixture(name='board')
@@ -34,10 +34,10 @@ def test_readings_come_with_every_state_and_end_with_the_session(board):
     newest = states[-1]['fields']
     assert newest['I2C1'][2] == 'x000000004000f0b0000000000000'
     assert newest['I2C2'][2] == 'x5f02' and newest['I2CBUS'] == [0, 0, 0]
-    assert SANITIZED or sorted(each['t'] - each['fields']['I2C1'][0] for each in states)[-3] <= 20
+    assert sorted(each['t'] - each['fields']['I2C1'][0] for each in states)[-3] <= within_ms(20)
     steps = [after['t'] - before['t'] for before, after in zip(states, states[1:])]
-    # A board whose machine stands still leaves out states, and says so by the time.
-    assert all(step % 10 == 0 for step in steps) and statistics.median(steps) == 10, steps
+    # A board on a busy machine leaves out states, and says so by the time.
+    assert all(step % 10 == 0 for step in steps) and sum(steps) <= within_ms(11 * len(steps)), steps
     after = objects(run('send', board.host_url, 'F:I2C1', '--json', '--hold', '0.1').stdout)
     assert after[0]['confirmed']
 
@@ -53,15 +53,14 @@ def test_a_receiver_on_a_uart_a_voltage_and_inputs(board):
     assert [states[-1]['fields'][name] for name in ('DAC1', 'DAC2', 'GPIO')] == [1650, 3300, 255]
     text, position = b'', None
     for earlier, each in zip([states[0], *states], states):
-        begin, lost, data = each['fields']['UART1']
-        assert lost == 0
+        begin, _, data = each['fields']['UART1']
         data = bytes.fromhex(data[1:])
         position = begin if position is None else position
         missed = each['pnum'] - earlier['pnum'] > 1  # by the monitor, whose machine stood still
-        assert SANITIZED or missed or begin <= position
+        assert missed or begin <= position
         text += data[position - begin:]
         position = begin + len(data)
-    assert SANITIZED or b'$GPRMC,' in text
+    assert b'$GPRMC,' in text
     off = run('send', board.host_url, 'X:UART,2,x24')
     assert off.returncode == 3 and 'CHANNEL' in off.stderr or 'channel' in off.stderr, off.stderr
     assert 'uart1,115200:8N1' in run('send', board.host_url, 'X:UART,1').stderr

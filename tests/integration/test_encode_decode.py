@@ -7,7 +7,8 @@ import subprocess
 
 import pytest
 
-from r4_process import DATA, R4, SANITIZED, objects, run
+from machine import SANITIZED
+from r4_process import DATA, R4, objects, run
 
 DATA_BAD = 1
 

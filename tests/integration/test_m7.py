@@ -9,7 +9,8 @@ import socket
 import pytest
 
 from m7_board import M7Board, Relay, Watcher, m7
-from r4_process import PATIENCE_S, SANITIZED, driving, is_link, is_state, monitor, objects, run
+from machine import within_ms
+from r4_process import PATIENCE_S, driving, is_link, is_state, monitor, objects, run
 
 SAFE_WITHIN_MS = 1020
 
@@ -53,7 +54,7 @@ def steps_of(states, period_ms):
 
 def test_streams_at_100_hz_with_nothing_lost(url):
     steps = steps_of(states_of(url, 200), 10)
-    assert SANITIZED or steps.count(10) > 0.5 * len(steps)
+    assert sum(steps) < within_ms(2 * 10 * len(steps))
 
 
 def test_streams_at_1000_hz_over_udp_with_nothing_lost(urls):
@@ -61,7 +62,7 @@ def test_streams_at_1000_hz_over_udp_with_nothing_lost(urls):
     assert run('send', urls.udp, 'C:rate,1000').returncode == 0
     steps = steps_of(states_of(urls.udp, 2000), 1)
     assert run('send', urls.udp, 'C:rate,100').returncode == 0
-    assert SANITIZED or steps.count(1) > 0.5 * len(steps)
+    assert sum(steps) < within_ms(2 * len(steps))
 
 
 def test_every_kind_of_command_is_executed(url):
@@ -121,8 +122,8 @@ def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(u
         assert relay.went_safe.wait(PATIENCE_S)
         silence = (int(relay.safe['T']) - relay.heartbeat_t) % 2**32
     print(f'safe {silence} ms after the last heartbeat, by the board\'s clock')
-    assert silence >= 1000 or SANITIZED
-    assert silence <= SAFE_WITHIN_MS or SANITIZED
+    assert silence >= 1000
+    assert silence <= within_ms(SAFE_WITHIN_MS)
     # Another host finds the outputs off, and gets them on again.
     with monitor(urls.udp) as host:
         host.next(is_link('active'))

@@ -11,7 +11,8 @@ import subprocess
 import time
 import zlib
 
-from r4_process import PATIENCE_S, R4, SANITIZED, Board, free_port
+from machine import SANITIZED
+from r4_process import PATIENCE_S, R4, Board, free_port
 
 
 def datagram(fields):

@@ -12,7 +12,8 @@ import tty
 
 import pytest
 
-from r4_process import R4, SANITIZED, Board, driving, is_link, is_state, monitor, objects, run, watch
+from machine import SANITIZED, within, within_ms
+from r4_process import R4, Board, driving, is_link, is_state, monitor, objects, run, watch
 
 SAFE_WITHIN_MS = 1020
 
@@ -37,7 +38,7 @@ def test_streams_its_state_at_100_hz(board):
     times = [each['t'] for each in states[20:]]
     steps = [later - earlier for earlier, later in zip(times, times[1:])]
     assert all(step % 10 == 0 for step in steps)
-    assert SANITIZED or steps.count(10) > 0.9 * len(steps)
+    assert times[-1] - times[0] <= within_ms(11 * len(steps))
 
 
 def test_a_pty_without_a_path_is_named():
@@ -129,7 +130,7 @@ def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(b
         safe = board.state('SAFE', 'link')
     print(f"safe {safe['silence']} ms after the last heartbeat, "
           f"{(safe['came'] - killed) * 1000:.0f} ms after the kill")
-    assert safe['silence'] <= SAFE_WITHIN_MS or SANITIZED
+    assert safe['silence'] <= within_ms(SAFE_WITHIN_MS)
 
 
 def test_the_board_is_safe_within_its_timeout_of_a_hung_hosts_last_heartbeat(board):
@@ -137,7 +138,7 @@ def test_the_board_is_safe_within_its_timeout_of_a_hung_hosts_last_heartbeat(boa
         host.signal(signal.SIGSTOP)
         safe = board.state('SAFE', 'link')
         print(f"safe {safe['silence']} ms after the last heartbeat")
-        assert 1000 <= safe['silence'] <= SAFE_WITHIN_MS or SANITIZED
+        assert 1000 <= safe['silence'] <= within_ms(SAFE_WITHIN_MS)
         host.signal(signal.SIGCONT)
         board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
         board.state('ACTIVE')
@@ -148,10 +149,10 @@ def test_a_session_goes_on_when_the_board_is_plugged_in_again(board, path):
         host.next(is_link('active'))
         unplugged = board.signal(signal.SIGKILL)
         lost = host.next(lambda each: each['type'] == 'link' and not each['fields']['up'])
-        assert lost['came'] - unplugged < 0.05 or SANITIZED
+        assert lost['came'] - unplugged < within(0.05)
         with Board(f'pty:{path}') as again:
             back = host.next(is_link('active'))
-            assert back['came'] - again.log[-1]['came'] < 1.05 or SANITIZED
+            assert back['came'] - again.log[-1]['came'] < within(1.05)
             host.next(is_state)
             print(f"told after {(lost['came'] - unplugged) * 1000:.1f} ms, "
                   f"back after {(back['came'] - again.log[-1]['came']) * 1000:.1f} ms")
@@ -188,7 +189,7 @@ def test_a_board_recovers_from_a_host_of_another_speed(board):
         host.next(is_link('active'))
         state = host.next(lambda each: is_state(each) and 'RXCRC' in each['fields'])
         print(f"RXCRC {state['fields']['RXCRC']}")
-        assert state['fields']['RXCRC'] > 10 and state['fields']['SAFE'] == 0
+        assert state['fields']['RXCRC'] > 10 and state['fields'].get('SAFE') == 0
 
 
 def test_a_board_throws_10_mb_without_a_terminator_away(board):

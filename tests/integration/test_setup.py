@@ -3,6 +3,7 @@
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 
 import pytest
@@ -116,3 +117,44 @@ def test_on_names_the_package_of_a_program_that_is_missing(tmp_path):
                            env={'PATH': str(tmp_path), 'HOME': str(tmp_path)})
     assert (ended.returncode, ended.stderr) == (
         6, 'tools/on: mmdebstrap is not installed\n  fix: apt-get install mmdebstrap\n')
+
+
+class Table:
+    """tools/on --all with a program in place of tools/on, which writes its words down, then does what `script` says."""
+
+    def __init__(self, folder, script=''):
+        self.folder = folder
+        (folder / 'tools/on.d').mkdir(parents=True)
+        shutil.copy(TOOLS / 'on.d/table', folder / 'tools/on.d')
+        program = folder / 'tools/on'
+        program.write_text(f'#!/bin/sh\necho "$*" >>"{folder}/commands"\n{script}\n')
+        program.chmod(0o755)
+
+    def run(self, *words):
+        """(The run, the commands that it gave)"""
+        ended = subprocess.run([self.folder / 'tools/on.d/table', *words], capture_output=True, text=True, check=False,
+                               env={**os.environ, 'R4_ON_DIR': str(self.folder / 'roots')})
+        return ended, (self.folder / 'commands').read_text().splitlines()
+
+
+def test_packages_and_wheels_are_used_in_a_minimal_system_and_compiled_once(tmp_path):
+    ended, commands = Table(tmp_path).run('debian13/arm64', 'package', 'wheel')
+    assert ended.returncode == 0, ended.stderr
+    packages, wheel = (f'{tmp_path}/roots/debian13-arm64/root/r4link/build/{made}' for made in ('packages', 'wheel'))
+    assert commands == [
+        'debian13/arm64 bash -c tools/setup --package && tools/package',
+        f'debian13/arm64 --clean --see {packages} tests/install/clean.sh {packages}',
+        'debian13/arm64 bash -c tools/setup --package && tools/wheel --built build/packages/r4link/debian/build',
+        f'debian13/arm64 --clean --see {wheel} tests/install/clean.sh {wheel}']
+
+
+def test_packages_that_are_not_built_are_not_used(tmp_path):
+    ended, commands = Table(tmp_path, 'exit 1').run('debian13/amd64', 'package')
+    assert (ended.returncode, len(commands)) == (1, 1)
+    assert re.search(r'\| debian13/amd64 +\|[ |]* FAILED ', ended.stdout), ended.stdout
+
+
+def test_a_build_with_a_warning_has_failed(tmp_path):
+    ended, _ = Table(tmp_path, "echo 'a.cpp:1:2: warning: unused variable'").run('debian13/amd64', 'build')
+    assert ended.returncode == 1
+    assert re.search(r'\| debian13/amd64 +\| FAILED ', ended.stdout), ended.stdout

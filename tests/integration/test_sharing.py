@@ -14,12 +14,12 @@ import time
 
 import pytest
 
-from r4_process import (ERROR, PATIENCE_S, R4, SANITIZED, Board, Running, driving, free_port, is_state, run,
-                        stop_takes_ms, wait_for, watch)
+from machine import within
+from r4_process import (ERROR, PATIENCE_S, R4, Board, Running, driving, free_port, is_state, objects, run, stop_takes_ms,
+                        wait_for, watch)
 
 # The others take a wire over within 100 ms; as much again is for a machine that is busy.
-TAKEN_OVER_WITHIN_S = 10 if SANITIZED else 0.2
-MOST_LOST = 1000 if SANITIZED else 20
+TAKEN_OVER_WITHIN_S = 0.2
 
 
 @pytest.fixture(name='folder')
@@ -112,7 +112,7 @@ def test_of_five_that_watch_one_sleeps_one_dies_and_nobody_else_loses_anything(b
         sleeper.skip_past()
         sleeper.next(drives(358))
         killed, killed_at = host.signal(signal.SIGKILL), time.time()
-        assert board.state('SAFE', 'link')['came'] - killed < 1.1
+        assert board.state('SAFE', 'link')['came'] - killed < within(1.1)
         for path, recorder in zip(paths, recorders):
             wait_for(path, '(?s)OSMC1:358,1;.*SAFE:1;')
             assert recorder.end() == 0, recorder.errors
@@ -122,9 +122,9 @@ def test_of_five_that_watch_one_sleeps_one_dies_and_nobody_else_loses_anything(b
         # Only while the dead one's wire was nobody's something was lost.
         holes = [(a, b) for a, b in pairs if b[1] != a[1] + 1]
         assert len(holes) <= 1 and all(b[0] > killed_at for _, b in holes), holes
-        assert all(0 < b[1] - a[1] - 1 <= MOST_LOST for a, b in holes), holes
+        assert all(0 < b[1] - a[1] - 1 <= 100 * within(TAKEN_OVER_WITHIN_S) for a, b in holes), holes
         silence = max(b[0] - a[0] for a, b in pairs)
-        assert silence <= TAKEN_OVER_WITHIN_S, f'{silence} s without a datagram'
+        assert silence <= within(TAKEN_OVER_WITHIN_S), f'{silence} s without a datagram'
 
 
 def with_a_stopped_holder(url, look):
@@ -145,7 +145,7 @@ def with_a_stopped_holder(url, look):
 
 def hears_on(watcher, _, stopped):
     heard = watcher.next(lambda each: is_state(each) and each['came'] > stopped + 0.5)
-    assert heard['came'] - stopped < 2 or SANITIZED
+    assert heard['came'] - stopped < within(2)
 
 
 def test_a_stopped_holder_that_watches_is_named_where_it_has_the_only_port():
@@ -182,7 +182,10 @@ def test_a_stopped_holder_loses_the_serial_port_and_takes_no_byte_of_it_when_it_
                 holder.signal(signal.SIGSTOP)  # it shares now, and keeps nobody from anything
                 assert recorder.end() == 0, recorder.errors
             numbers = [number for _, number, _ in received(path)]
-            assert len(numbers) > 20 and numbers == list(range(numbers[0], numbers[-1] + 1))
+            assert len(numbers) > 20 and numbers == sorted(set(numbers))
+            # A board that is held up leaves whole states out.
+            [told] = objects(run('info', '--json', str(path)).stdout)
+            assert told['wires'][0]['damaged'] == 0, told
             path.unlink()
 
 

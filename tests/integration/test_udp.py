@@ -10,8 +10,8 @@ import zlib
 
 import pytest
 
-from r4_process import (PATIENCE_S, SANITIZED, Board, driving, free_port, is_link, is_state, lasts, monitor, objects,
-                        run)
+from machine import SANITIZED, within, within_ms
+from r4_process import PATIENCE_S, Board, driving, free_port, is_link, is_state, lasts, monitor, objects, run
 
 # The board's timeout, and what docs/safety.md promises on top.
 SAFE_WITHIN_MS = 1020
@@ -72,7 +72,7 @@ def stays_with_its_host_in(board, flooded):
             steps = [later['t'] - earlier['t'] for earlier, later in itertools.pairwise(
                 each for each in during if is_state(each))]
             print(f'{len(sent)} datagrams of others; {len(steps) + 1} states, at most {max(steps)} ms apart')
-            assert max(steps) < 500 or SANITIZED
+            assert max(steps) < within_ms(500)
             left = host.signal(signal.SIGKILL)
             safe = board.next(lambda each: each.get('state') in ('SAFE', 'CONNECTING'))
             assert (safe['state'], safe['reason']) == ('SAFE', 'link') and safe['came'] > left
@@ -105,7 +105,7 @@ def test_streams_its_state_at_100_hz(board):
     assert len(states) - 1 <= numbers[-1] - numbers[0] <= len(states) + 4 + 20
     # The grid of 10 ms is kept; a busy machine may leave periods out, but never shifts it.
     assert all(step % 10 == 0 for step in steps)
-    assert SANITIZED or steps.count(10) > 0.9 * len(steps)
+    assert times[-1] - times[0] <= within_ms(11 * len(steps))
     assert states[0]['fields']['AIN24'] == pytest.approx(24.3, abs=1)
     assert states[0]['fields']['OSMC1'] == [0, 0]
 
@@ -172,7 +172,7 @@ def test_a_stop_switches_every_output_off_and_nothing_comes_back(board):
         assert stopped.returncode == 0 and 'SAFE (stop)' in stopped.stdout
         board.state('SAFE', 'stop')
         host.next(is_link('safe', 'stop'))
-        state = host.next(lambda each: is_state(each) and each['fields']['SAFE'] == 2)
+        state = host.next(lambda each: is_state(each) and each['fields'].get('SAFE') == 2)
         assert state['fields']['OSMC1'] == [0, 0]
 
 
@@ -209,13 +209,14 @@ def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(b
     print(f"off {off_after} and said {safe['silence']} ms after the last heartbeat, "
           f"{(safe['came'] - killed) * 1000:.0f} ms after the kill")
     assert 1000 <= off_after
-    assert safe['silence'] <= SAFE_WITHIN_MS or SANITIZED
-    assert safe['came'] - killed <= SAFE_WITHIN_MS / 1000 + 0.05 or SANITIZED
+    assert safe['silence'] <= within_ms(SAFE_WITHIN_MS)
+    assert safe['came'] - killed <= within(SAFE_WITHIN_MS / 1000 + 0.05)
 
 
-def test_a_heartbeat_that_waited_while_the_board_stood_still_counts_from_before(board):
+def test_a_heartbeat_that_waited_while_the_board_stood_still_counts_from_before():
     # A host of the paper's: that its heartbeats arrive is all that the board can know.
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as host:
+    with Board('udp://127.0.0.1:0', options=('--set', 'timeout,2000')) as board, \
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as host:
         host.connect(('127.0.0.1', int(board.url.rsplit(':', 1)[1])))
 
         def say(number, field):
@@ -226,7 +227,7 @@ def test_a_heartbeat_that_waited_while_the_board_stood_still_counts_from_before(
         board.state('ACTIVE')
         say(2, 'O:358,1,1')
         board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
-        lasts(0.5)
+        lasts(1)
         board.signal(signal.SIGSTOP)
         say(3, 'H:ROS2-R4')
         delivered = time.monotonic()
@@ -235,8 +236,7 @@ def test_a_heartbeat_that_waited_while_the_board_stood_still_counts_from_before(
         safe = board.state('SAFE', 'link')
     after_ms = (safe['came'] - delivered) * 1000
     print(f'SAFE {after_ms:.0f} ms after the heartbeat was delivered')
-    assert 700 < after_ms  # it did feed: without it, 500
-    assert after_ms <= SAFE_WITHIN_MS or SANITIZED
+    assert 1200 < after_ms <= within_ms(2020)  # it did feed: without it, 1000
 
 
 def test_control_is_free_when_the_host_that_had_it_is_gone(board):
@@ -273,7 +273,7 @@ def test_a_stalled_reader_gets_a_young_state_first(board):
         first = host.next(is_state)
     age_ms = (first['came'] - before['came']) * 1000 - (first['t'] - before['t'])
     print(f'the first state is {age_ms:.1f} ms old, {1000 * (first["came"] - woken):.1f} ms after waking')
-    assert age_ms < 50
+    assert age_ms < within_ms(50)
 
 
 def test_noise_from_others_does_no_harm(board):
@@ -290,7 +290,7 @@ def test_noise_from_others_does_no_harm(board):
             host.next(is_state)
         noise.sendto(b'x' * 60000, address)
         host.next(lambda each: is_state(each) and each['fields'].get('RXCRC', 0) >= 100)
-        assert host.next(is_state)['fields']['SAFE'] == 0
+        assert host.next(is_state)['fields'].get('SAFE') == 0
     assert not any('executed' in each and each['executed']['command'][0] in 'OE' for each in board.log)
 
 
@@ -323,7 +323,8 @@ def test_measures_a_link(board):
     assert result.returncode == 0, result
     measured = objects(result.stdout)[0]
     print(result.stdout)
-    assert SANITIZED or measured['state_hz'] == pytest.approx(100, abs=3)
+    # What a busy machine keeps the board from is left out.
+    assert 2 * 97 / within(2) <= measured['state_hz'] <= 103
     assert measured['round_trip_us']['count'] > 20 and measured['unanswered'] == 0
     assert measured['confirmation_us']['count'] > 1 and measured['unconfirmed'] == 0
     assert measured['lost'] == 0 and measured['damaged'] == 0
@@ -401,7 +402,7 @@ def test_a_process_has_a_thousand_boards():
     last = 21049 if SANITIZED else 21999  # of more it has no time for each
     with Board(f'udp://127.0.0.1:21000-{last}', listens=last - 20999) as boards:
         for port in 21000, 21025, last:
-            sent = run('send', f'udp://127.0.0.1:{port}?listen=0', 'O:358,1,1')
+            sent = run('send', f'udp://127.0.0.1:{port}?listen=0', '--timeout', '20', 'O:358,1,1', timeout=30)
             assert sent.returncode == 0, sent
             boards.next(lambda each, port=port: each.get('board') == f'sim-{port}' and
                         each.get('executed', {}).get('command') == 'O:358,1,1')

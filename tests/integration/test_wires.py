@@ -10,8 +10,9 @@ import time
 import pytest
 
 from lan import Lan
-from r4_process import (ERROR, PATIENCE_S, Board, Running, free_port, is_link, is_state, lasts, monitor, objects, run,
-                        text_of)
+from machine import within
+from r4_process import (ERROR, PATIENCE_S, Board, Running, free_port, is_link, is_state, lasts, monitor, objects,
+                        run, text_of)
 from wired_host import (BACK_WITHIN_S, LONGEST_GAP_S, REPORTED_WITHIN_S, TIMEOUT_S, WiredHost, Wire, has_joined,
                         has_left)
 
@@ -73,7 +74,7 @@ def judge(host, began, what):
     assert times == sorted(set(times)), 'a state was told twice, or after a newer one'
     assert not [each for each in host.log if each['type'] == 'link' and each['came'] > began and
                 each['fields']['state'] != 'active']
-    assert gap <= LONGEST_GAP_S
+    assert gap <= within(LONGEST_GAP_S)
 
 
 def test_a_cable_is_pulled_and_plugged_in_again_and_nothing_is_missed():
@@ -93,7 +94,7 @@ def test_a_cable_is_pulled_and_plugged_in_again_and_nothing_is_missed():
         told('left', wires=1, joins=1, losses=1)
         told('joined', wires=2, joins=2, losses=1)
         judge(host, began, f'told of it after {lost * 1e3:.0f} ms, used again after {back * 1e3:.0f} ms')
-    assert lost <= REPORTED_WITHIN_S and back <= BACK_WITHIN_S
+    assert lost <= within(REPORTED_WITHIN_S) and back <= within(BACK_WITHIN_S)
 
 
 def test_a_path_that_is_held_up_and_then_brings_what_is_old_disturbs_nothing():
@@ -109,7 +110,7 @@ def test_a_path_that_is_held_up_and_then_brings_what_is_old_disturbs_nothing():
         host.next(is_wire(wires[0], carries=False))
         judge(host, began, 'the other one pulled')
         board.never('SAFE', 0.2)
-    assert lost <= TIMEOUT_S + REPORTED_WITHIN_S and back <= BACK_WITHIN_S
+    assert lost <= within(TIMEOUT_S + REPORTED_WITHIN_S) and back <= within(BACK_WITHIN_S)
 
 
 def test_commands_are_executed_once_each_while_wires_come_and_go():
@@ -163,9 +164,9 @@ def test_a_bridge_that_is_one_of_two_wires_stands_still_or_dies(tmp_path, signal
         running = bridge()
         with WiredHost([board.host_url, f'udp://127.0.0.2:{port}?listen=0'], ['127.0.0.1', '127.0.0.2']) as host:
             board.next(has_joined(2))
-            assert host.loses('127.0.0.2', lambda: running.signal(signals[0])) <= TIMEOUT_S + REPORTED_WITHIN_S
+            host.loses_by_silence('127.0.0.2', lambda: running.signal(signals[0]))
             board.next(has_left(1))
-            assert host.has_again('127.0.0.2', again) <= BACK_WITHIN_S
+            host.has_again('127.0.0.2', again)
             board.next(has_joined(2))
             host.ends(board)
 
@@ -181,9 +182,9 @@ def test_a_board_of_one_address_has_a_wire_by_each_interface_of_this_computer():
             for place, gone, there in (
                     (by_cable, lambda: desk.plug(1, False), lambda: desk.plug(1, True)),
                     (by_switch, lambda: desk.switch(0, 'down'), lambda: desk.switch(0, 'up'))):
-                assert host.loses(place, gone) <= REPORTED_WITHIN_S
+                host.loses(place, gone)
                 host.goes_on()
-                assert host.has_again(place, there) <= BACK_WITHIN_S
+                host.has_again(place, there)
                 host.goes_on(50)  # until the board, too, has joined them
             host.ends(board)
 

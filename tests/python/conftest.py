@@ -9,6 +9,7 @@ import r4link
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / 'integration'))
 import own_network  # noqa: E402
+from repeat import pytest_runtest_protocol  # noqa: E402, F401
 
 own_network.enter()
 

@@ -27,12 +27,12 @@ def run(*command, cwd=ROOT, env=None):
     return ended.stdout
 
 
-def test_types_are_strict(tmp_path):
-    """In one run, because most of its time goes into the types of the standard library."""
+def test_types_are_strict():
+    """In one run, because most of its time goes into the types of the standard library, which the build folder keeps."""
     package, examples = ROOT / 'host/python/r4link', ROOT / 'docs/examples'
     sources = [*package.glob('*.py'), package / '_core.pyi', *(examples / 'python').glob('*.py'),
                examples / 'openscout/openscout.py']
-    run(sys.executable, '-m', 'mypy', '--strict', '--python-version', '3.10', '--cache-dir', tmp_path, *sorted(sources),
+    run(sys.executable, '-m', 'mypy', '--strict', '--python-version', '3.10', '--cache-dir', f'{os.environ["R4_BUILD"]}/mypy', *sorted(sources),
         env={**os.environ, 'MYPYPATH': f'{ROOT / "host/python"}:{ROOT / "docs/examples/openscout"}'})
 
 
@@ -70,16 +70,15 @@ def test_what_the_documentation_shows_runs(page, tmp_path):
         run(sys.executable, '-c', 'import r4link\n' + program, cwd=tmp_path)
 
 
-def test_installs_into_a_venv_and_builds_a_wheel_and_a_source_distribution(tmp_path):
+def test_installs_into_a_venv_and_builds_a_source_distribution(tmp_path):
     run(sys.executable, '-m', 'venv', tmp_path / 'venv')
     python = tmp_path / 'venv/bin/python'
     run(python, '-m', 'pip', 'install', '--quiet', ROOT, env=OFFLINE)
     told = run(python, '-c', 'import r4link; print(r4link.__version__, r4link.__file__); '
                              'board = r4link.Board("sim:"); board.wait_active(); print(board)', cwd=tmp_path, env=OFFLINE)
     assert told.startswith(f'{r4link.__version__} {tmp_path}') and 'active' in told
-    run(sys.executable, '-m', 'build', '--outdir', tmp_path / 'dist', '--sdist', '--wheel', ROOT, env=OFFLINE)
-    source, wheel = sorted((tmp_path / 'dist').iterdir())[::-1]
-    assert wheel.name.startswith('r4link-') and wheel.suffix == '.whl', wheel
+    run(sys.executable, '-m', 'build', '--outdir', tmp_path / 'dist', '--sdist', ROOT, env=OFFLINE)
+    [source] = (tmp_path / 'dist').iterdir()
     with tarfile.open(source) as archive:
         names = archive.getnames()
         archive.extractall(tmp_path / 'source')

@@ -36,17 +36,16 @@ def written(*names):
     return sum(len(re.findall(r'^def test_', (EXAMPLE / name).read_text(), re.MULTILINE)) for name in names)
 
 
-def run_step(step, folder):
-    """As its workflow runs it. Nothing is left out."""
+def run_step(step, folder, *files):
+    """As its workflow runs it; `files`: those alone. Nothing of them is left out."""
     project = shutil.copytree(EXAMPLE, folder / 'project')
     env = {**os.environ, 'R4LINK': str(ROOT), 'PATH': f'{pathlib.Path(sys.executable).parent}:{os.environ["PATH"]}',
-           # With the rule of a machine that stood still, which is a conftest.
            'PYTHONPATH': f'{ROOT / "tests/integration"}:{os.environ["PYTHONPATH"]}',
-           'PYTEST_ADDOPTS': '-p no:cacheprovider -p r4link.pytest_plugin -p conftest'}
-    ended = subprocess.run(['bash', '-c', step], cwd=project, env=env, stdin=subprocess.DEVNULL, capture_output=True,
+           'PYTEST_ADDOPTS': '-p no:cacheprovider -p r4link.pytest_plugin -p repeat'}
+    ended = subprocess.run(['bash', '-c', f'{step} {" ".join(files)}'], cwd=project, env=env, stdin=subprocess.DEVNULL, capture_output=True,
                            text=True, timeout=200, check=False)
     everything = "-m ''" in step
-    passed = written('test_patrol.py', 'test_bus.py') if everything else written('test_patrol.py')
+    passed = written(*(files or ['test_patrol.py']))
     assert ended.returncode == 0 and f'{passed} passed' in ended.stdout, ended.stdout + ended.stderr
     assert 'skipped' not in ended.stdout and ('deselected' in ended.stdout) != everything
 

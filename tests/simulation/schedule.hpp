@@ -90,6 +90,7 @@ struct Schedule {
   // The board has a key for each host, and there is an attacker, who acts about so often; 0:
   // neither.
   std::uint32_t attack_interval_us = 0;
+  bool keys = false;  // the same without an attacker
   int watchers = 0;
   // Somebody asks for leases in the name of others about so often; 0: nobody.
   std::uint32_t forge_interval_us = 0;

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <utility>
 
+#include "script.hpp"
 #include "world_host.hpp"
 
 namespace r4::simulation {
@@ -42,6 +43,11 @@ World::World(std::uint64_t seed, Schedule schedule, bool keep_trace)
   report_.seed = seed;
 }
 
+World::World(Schedule schedule, Script& script, bool keep_trace)
+    : World(1, std::move(schedule), keep_trace) {
+  script_ = &script;
+}
+
 World::~World() = default;
 
 Report World::run() {
@@ -54,6 +60,7 @@ Report World::run() {
       hosts_.push_back(std::make_unique<Host>(*this, i));
       place(*hosts_.back());
     }
+    if (script_ != nullptr) continue;
     start_host(i);
     at(start_us_ + random_.below(300'000), Event::Kind::command, i);
   }
@@ -69,7 +76,9 @@ Report World::run() {
     at(start_us_ + schedule_.standstills[i].at_us, Event::Kind::standstill, static_cast<int>(i));
   }
   if (schedule_.stranger_interval_us != 0) at(start_us_, Event::Kind::stranger, 0);
+  if (script_ != nullptr) script_->begin();
   run_until(start_us_ + schedule_.duration_us);
+  if (script_ != nullptr && report_.violation.empty()) script_->end();
   for (const auto& host : hosts_) {
     if (host->alive) host->count_copies();
   }
@@ -83,9 +92,11 @@ void World::run_until(std::uint64_t end_us) {
     if (event.at_us > end_us) break;
     events_.pop();
     now_us_ = event.at_us;
+    ++handled_;
     handle(event);
     check_silence();
-    if (several() && !recording_) check_wires();
+    if (script_ != nullptr) script_->check();
+    if (several() && !recording_ && hosts_.front()->places.size() > 1) check_wires();
   }
 }
 
@@ -128,6 +139,9 @@ void World::handle(const Event& event) {
       break;
     case Event::Kind::replay:
       replay(event.index);
+      break;
+    case Event::Kind::script:
+      script_->on_event(event.index);
       break;
   }
 }

@@ -107,11 +107,15 @@ class World : public firmware::Hal, public firmware::Observer {
   World(std::uint64_t seed, bool keep_trace, Beside beside = Beside::nothing);
   // The same with a given scenario.
   World(std::uint64_t seed, Schedule schedule, bool keep_trace);
+  // The same, but a script decides what happens, and chance decides nothing (script.hpp).
+  class Script;
+  World(Schedule schedule, Script& script, bool keep_trace);
   ~World();
 
   Report run();
 
  private:
+  friend class Play;  // search/play.hpp
   struct Host;
   struct Event {
     std::uint64_t at_us;
@@ -129,6 +133,7 @@ class World : public firmware::Hal, public firmware::Observer {
       go_on,
       stranger,
       replay,
+      script,
     } kind;
     int index;
     std::uint32_t generation;
@@ -250,6 +255,7 @@ class World : public firmware::Hal, public firmware::Observer {
   }
   // For so long both ends have used a wire before it must not be given up.
   static constexpr std::uint64_t settled_us = 1'000'000;
+  bool has_keys() const { return schedule_.keys || schedule_.attack_interval_us != 0; }
   bool several() const { return schedule_.wires() > 1; }
   bool meets_limits(int wire) const;
   bool serves_since(std::uint64_t at_us) const;
@@ -271,6 +277,8 @@ class World : public firmware::Hal, public firmware::Observer {
   Schedule schedule_;
   Report report_;
   bool keep_trace_;
+  Script* script_ = nullptr;
+  std::uint64_t handled_ = 0;  // events so far
   bool over_ = false;
   std::uint64_t now_us_ = 0;
   std::uint64_t order_ = 0;

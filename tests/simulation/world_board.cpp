@@ -52,10 +52,10 @@ void World::boot_board() {
   config.settings = schedule_.settings;
   std::uint8_t chance[Authentication::chance_size];
   leases_.clear();
-  if (schedule_.attack_interval_us != 0) {
+  if (has_keys()) {
     for (int i = 0; i < schedule_.hosts; ++i) config.settings.site.keys[i] = key_of_host(i);
   }
-  if (schedule_.attack_interval_us != 0 || schedule_.watchers != 0) {
+  if (has_keys() || schedule_.watchers != 0) {
     for (std::uint8_t& byte : chance) byte = static_cast<std::uint8_t>(random_.next());
     config.chance = chance;
   }
@@ -129,6 +129,7 @@ void World::apply(const firmware::Outputs& outputs) {
   const auto first = std::find_if(std::begin(outputs.stepper), std::end(outputs.stepper),
                                   [](const firmware::StepperTarget& each) { return each.enabled; });
   const int id = first != std::end(outputs.stepper) ? first->position : 0;
+  if (script_ != nullptr && id == Script::strangers_target) return;
   if (id < 0 || id >= static_cast<int>(commands_.size())) return violate("intact: unknown output");
   const Sent& sent = commands_[static_cast<std::size_t>(id)];
   const Host& host = *hosts_[static_cast<std::size_t>(sent.host)];
@@ -187,6 +188,7 @@ void World::send(std::uint8_t port, Text datagram, Priority priority, std::uint3
       newest_heartbeat_t_ = static_cast<std::uint32_t>(sent.time_ms());
     }
   }
+  if (script_ != nullptr && script_->on_board_sent(port, peer, priority, bytes)) return;
   for (int i = 0; i < static_cast<int>(hosts_.size()); ++i) {
     const Host& host = *hosts_[static_cast<std::size_t>(i)];
     for (std::size_t at = 0; at < host.places.size(); ++at) {
@@ -207,6 +209,7 @@ void World::on_state(std::uint32_t, firmware::BoardState state, SafeReason reaso
     }
   }
   was_lost_ = state == firmware::BoardState::safe && reason == SafeReason::link;
+  if (script_ != nullptr && was_lost_) script_->on_link_lost();
 }
 
 void World::on_outputs(std::uint32_t, const firmware::Outputs& outputs) {
@@ -216,6 +219,7 @@ void World::on_outputs(std::uint32_t, const firmware::Outputs& outputs) {
 void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& command) {
   note(fmt::format("board executes {} kind {} value {}", pnum, static_cast<int>(command.kind),
                    command.value));
+  if (script_ != nullptr && !script_->on_executed(command)) return;
   if (attacking_ && command.kind != CommandKind::stop) return violate("forged: executed");
   if (command.kind == CommandKind::stop) {
     ++report_.stops;
@@ -310,7 +314,7 @@ void World::on_stop(std::uint32_t pnum) {
   if (attacking_) attacker_stops_.insert(pnum);
   if (delivering_.host < 0) return;
   Host& host = *hosts_[static_cast<std::size_t>(delivering_.host)];
-  if (host.incarnation != delivering_.incarnation) return;
+  if (delivering_.incarnation < host.began_as) return;
   for (auto& [ticket, stop] : host.stops) stop.executed = stop.executed || stop.pnum == pnum;
 }
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "protocol/messages/command_field.hpp"
+#include "script.hpp"
 #include "world_host.hpp"
 
 namespace r4::simulation {
@@ -43,9 +44,9 @@ void World::transfer(bool to_board, int host, int place, std::string_view bytes)
     recorded_.push_back({now_us_, to_board, std::string(bytes)});
   }
   if (to_board) {
-    attacker_.on_sent({host, incarnation, now_us_}, bytes);
+    if (has_keys()) attacker_.on_sent({host, incarnation, now_us_}, bytes);
   } else {
-    attacker_.on_board(bytes);
+    if (has_keys()) attacker_.on_board(bytes);
     const bool busy = bytes.find(",BUSY;") != std::string_view::npos;
     if (host == 0 && busy) wires_[at_host.wire].told_busy_us = now_us_;
   }
@@ -73,6 +74,7 @@ void World::transfer(bool to_board, int host, int place, std::string_view bytes)
       ++report_.groups_apart;
     }
   }
+  if (script_ != nullptr) return script_->on_sent(sent);
   const Wire& wire = wires_[at_host.wire];
   if (now_us_ < (to_board ? wire.cut_to_board_until_us : wire.cut_to_host_until_us)) return;
   const int copies = 1 + (random_.chance(faults.duplicate) ? 1 : 0);
@@ -130,7 +132,9 @@ void World::deliver(int slot) {
 void World::hand_over(int slot) {
   // Receiving may transfer, and so move packets_: take the packet out first.
   Packet packet = std::move(packets_[static_cast<std::size_t>(slot)]);
-  if (packet.to_board) {
+  if (script_ != nullptr && script_->takes(packet)) {
+    // A bridge has it, or a host that does not run keeps it.
+  } else if (packet.to_board) {
     if (keep_trace_) show(fmt::format("board receives {}", packet.bytes));
     const std::uint32_t peer = packet.peer;
     const Source source{packet.port, peer};
@@ -139,9 +143,12 @@ void World::hand_over(int slot) {
     delivering_ = {packet.host, packet.incarnation};
     delivering_at_ = source;
     on_lease(peer, packet.bytes);
+    if (script_ != nullptr) script_->before_board(packet);
     board_->receive(packet.port, peer, Text(packet.bytes), board_ms());
     if (packet.command >= 0) check_whole(packet.command);
-    attacker_.on_received({packet.host, packet.incarnation, packet.sent_us}, packet.bytes);
+    if (script_ != nullptr) script_->after_board(packet);
+    if (has_keys())
+      attacker_.on_received({packet.host, packet.incarnation, packet.sent_us}, packet.bytes);
     const BoardLink& link = board_->link();
     if (asks_to_watch(packet.bytes) && link.fed_ms() != fed_before) violate("watch: a W feeds");
     if (packet.recorded && link.fed_ms() != fed_before) {

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "script.hpp"
 #include "tests/support/signing.hpp"
 #include "world.hpp"
 
@@ -21,7 +22,7 @@ struct World::Host final : Session::Handler {
   Host(World& w, int i) : world(w), index(i) {}
 
   void begin() {
-    ++incarnation;
+    began_as = ++incarnation;
     alive = true;
     clock_offset_us = world.random_.below(1'000'000'000);
     leaving = false;
@@ -31,7 +32,8 @@ struct World::Host final : Session::Handler {
     SessionOptions options;
     options.arming = Arming::off;  // so that more is sent that must not be executed
     if (watcher) options.watch_rate_hz = static_cast<int>(world.random_.between(1, 100));
-    if (world.schedule_.attack_interval_us != 0 && !stopper && !watcher) {
+    if (world.script_ != nullptr) world.script_->set(options);
+    if (world.has_keys() && !stopper && !watcher) {
       options.key = key_of_host(index);
       options.clock_start = std::chrono::hours{24} - Time{clock_offset_us};
     }
@@ -103,8 +105,10 @@ struct World::Host final : Session::Handler {
   World& world;
   int index;
   std::uint32_t incarnation = 0;
+  std::uint32_t began_as = 0;  // its incarnation when this process began. A sleep ends one, too
   bool alive = false;
   bool frozen = false;
+  bool suspended = false;  // the process does not run
   bool stopper = false;
   bool watcher = false;
   bool leaving = false;  // ends at its next turn: its stop is confirmed, or its farewell over

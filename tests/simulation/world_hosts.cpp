@@ -95,7 +95,7 @@ void World::start_host(int index) {
 
 void World::poll_host(int index) {
   Host& host = *hosts_[static_cast<std::size_t>(index)];
-  if (!host.alive) return;
+  if (!host.alive || host.suspended) return;
   if (host.leaving) return host.die();
   if (!host.frozen) host.session->feed(host.time());
   const Time next = host.session->poll(host.time());

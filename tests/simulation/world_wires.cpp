@@ -31,11 +31,13 @@ bool is_fine(const ChannelFaults& faults) {
 void World::place(Host& host) {
   const bool bus_stopper = host.stopper && schedule_.shared_place;
   for (int w = 0; w < schedule_.wires(); ++w) {
-    if (several() && host.index != 0 && (bus_stopper ? w != 0 : wires_random_.chance(0.4)))
+    if (script_ != nullptr && !script_->has_place(host.index, w)) continue;
+    if (script_ == nullptr && several() && host.index != 0 &&
+        (bus_stopper ? w != 0 : wires_random_.chance(0.4)))
       continue;
     Host::Place place;
     place.wire = w;
-    const bool shared = w == 0 && (bus_stopper || (host.watcher && random_.chance(0.1)));
+    const bool shared = w == 0 && (bus_stopper || (host.watcher && script_ == nullptr && random_.chance(0.1)));
     place.peer = shared ? hosts_.front()->places.front().peer : next_peer_++;
     whose_.emplace(place.peer, host.index);
     host.places.push_back(place);

@@ -10,6 +10,8 @@ namespace r4::test {
 
 namespace {
 
+constexpr std::chrono::seconds channel_patience{10};  // on a machine that is busy
+
 sim::Pins pins_of(const ControlledBoard& board) {
   sim::Pins pins;
   board.at_board([&](sim::SimulatedBoard& at) { pins = at.model().pins(); });
@@ -182,10 +184,10 @@ void expect_interlocks(const ControlledBoard& board) {
 
 ControlledBoard controlled(BoardInAThread& simulated, Board& host) {
   return {
-      [&host](const std::string& command) { host.send(command); },
+      [&host](const std::string& command) { host.send(command, channel_patience); },
       [&host] {
-        host.next_state();  // it may have been under way
-        return host.next_state();
+        host.next_state(channel_patience);  // it may have been under way
+        return host.next_state(channel_patience);
       },
       [&simulated](const auto& action) { simulated.run(action); },
   };

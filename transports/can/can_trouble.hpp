@@ -2,14 +2,13 @@
 // What a host hears on a CAN bus beside its own transfers: its board, other hosts, and why
 // datagrams do not pass although the bus is up. Without I/O.
 //
-//     foreign frames   frames come on the board's command id, and for host_completes they have made
-//                      no datagram of a host, which sends ten heartbeats a second: another protocol
-//                      uses the id
+//     foreign frames   frames come on the board's command id for host_completes, and none of them
+//                      has ended a datagram of a host, which sends ten heartbeats a second: another
+//                      protocol uses the id. A host that pauses or ends sends no frames meanwhile
 //     late frames      late_transfers transfers within late_within were not answered in time (N_Bs,
 //                      N_Cr), while the board is heard: frames are held back, or lost
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstddef>
@@ -25,15 +24,15 @@ class CanTrouble {
   using Duration = std::chrono::milliseconds;
   static constexpr Duration board_silence{3000};  // six heartbeats of a board
   static constexpr Duration host_silence{300};    // three of a host
-  static constexpr Duration host_completes{300};
-  static constexpr Duration frames_over{1000};  // after that, frames begin anew
+  static constexpr Duration host_completes{500};  // five heartbeats of a host
+  static constexpr Duration frames_over{1000};    // after that, frames begin anew
   static constexpr std::size_t late_transfers = 3;
   static constexpr Duration late_within{2000};
 
   void on_board(Time now) { board_heard_ = now; }
   // A frame on the board's command id that is not ours.
   void on_host_frame(Time now) {
-    if (now - host_heard_ > frames_over) frames_since_ = now;
+    if (now - host_heard_ > frames_over || !incomplete()) frames_since_ = now;
     host_heard_ = now;
   }
   // Such frames have made a datagram.
@@ -60,16 +59,18 @@ class CanTrouble {
   static std::size_t place(std::uint64_t count) {
     return static_cast<std::size_t>(count % late_transfers);
   }
+  // Frames have come since the newest datagram.
+  bool incomplete() const { return frames_since_ > host_completed_; }
   bool hears_foreign_frames(Time now) const {
-    return now - host_heard_ < frames_over &&
-           now - std::max(frames_since_, host_completed_) >= host_completes;
+    return now - host_heard_ < frames_over && incomplete() &&
+           host_heard_ - frames_since_ >= host_completes;
   }
 
   // When they were heard last; long ago.
   Time board_heard_;
   Time host_heard_;
   Time host_completed_;
-  Time frames_since_;  // without a pause
+  Time frames_since_;  // the first that no datagram and no pause has followed
   std::uint64_t late_count_ = 0;
   std::array<Time, late_transfers> late_;  // the newest, in a ring
 };

@@ -12,6 +12,7 @@ import scout
 TIME_CONSTANT = 0.15  # s, of a wheel with its motor and its share of the mass
 FRICTION = 3.0  # m/s^2, of the gears, without a supply
 STEP = 0.001
+LONGEST = 0.02  # s at once: while a busy machine holds up the thread, the robot stands still
 METRES_A_COUNT = 2 * math.pi * scout.WHEEL_RADIUS / scout.COUNTS_A_TURN
 
 
@@ -65,6 +66,7 @@ class Behind:
         while not self._ended.wait(0.01):
             look = self._sim.look()
             now = time.monotonic()
+            then = max(then, now - LONGEST)
             whole = round((now - then) / STEP)
             then += whole * STEP
             self._model.advance(tuple(each.duty for each in look.dhb12), look.supply, whole * STEP)

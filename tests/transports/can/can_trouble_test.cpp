@@ -12,15 +12,27 @@ const CanTrouble::Time trouble_start{std::chrono::hours{1}};
 
 TEST(CanTrouble, TakesFramesThatMakeNoDatagramForThoseOfAnotherProtocol) {
   CanTrouble trouble;
-  for (auto after = 0ms; after < 300ms; after += 10ms) {
+  for (auto after = 0ms; after < 500ms; after += 10ms) {
     trouble.on_host_frame(trouble_start + after);
     EXPECT_EQ(trouble.now(trouble_start + after), WireTrouble::none) << after.count();
     EXPECT_TRUE(trouble.hears_host(trouble_start + after)) << "it may be one";
   }
-  trouble.on_host_frame(trouble_start + 300ms);
-  EXPECT_EQ(trouble.now(trouble_start + 300ms), WireTrouble::foreign_frames);
-  EXPECT_FALSE(trouble.hears_host(trouble_start + 300ms));
-  EXPECT_EQ(trouble.now(trouble_start + 1300ms), WireTrouble::none) << "they have ended";
+  trouble.on_host_frame(trouble_start + 500ms);
+  EXPECT_EQ(trouble.now(trouble_start + 500ms), WireTrouble::foreign_frames);
+  EXPECT_FALSE(trouble.hears_host(trouble_start + 500ms));
+  EXPECT_EQ(trouble.now(trouble_start + 1500ms), WireTrouble::none) << "they have ended";
+}
+
+TEST(CanTrouble, TakesAHostThatIsHeldUpOrEndsForNoOtherProtocol) {
+  CanTrouble trouble;
+  trouble.on_host_frame(trouble_start);
+  trouble.on_host_datagram(trouble_start + 1ms);
+  for (auto after = 1ms; after < 2s; after += 10ms) {
+    EXPECT_EQ(trouble.now(trouble_start + after), WireTrouble::none) << after.count();
+  }
+  trouble.on_host_frame(trouble_start + 900ms);  // the first of a heartbeat
+  EXPECT_EQ(trouble.now(trouble_start + 900ms), WireTrouble::none);
+  EXPECT_TRUE(trouble.hears_host(trouble_start + 900ms));
 }
 
 TEST(CanTrouble, TakesAHostForNoOtherProtocol) {

@@ -86,7 +86,7 @@ struct Link {
   std::unique_ptr<Carrier> host, board;
 };
 
-constexpr int most_runs = 3;
+constexpr int most_runs = 20;  // until this machine does not stand still meanwhile
 
 class CanBusLoad : public CanBusTest {};
 
@@ -115,7 +115,7 @@ TEST_F(CanBusLoad, AFirstFrameThatWaitedForTheBusHasAllOfItsTimeToBeAnswered) {
   constexpr std::size_t hosts = 16;
   const SlowBus slow(64000);
   bool in_time = false;
-  for (int run = 0; run < most_runs && !in_time; ++run) {  // a machine may stand still
+  for (int run = 0; run < most_runs && !in_time; ++run) {
     std::vector<std::unique_ptr<Link>> links;
     while (links.size() < hosts) links.push_back(std::make_unique<Link>(io, links.size()));
     run_for(soon);  // hosts listen before they speak
@@ -165,7 +165,7 @@ TEST_F(CanBusLoad, WhatNobodyAnswersTimesOutAlsoBehindAStateThatTakesTheBusLong)
 // The frame came in time, by its stamp: what this process did meanwhile does not make it late.
 TEST_F(CanBusLoad, FlowControlThatCameInTimeIsObeyedHoweverLateItIsRead) {
   bool in_time = false;
-  for (int run = 0; run < most_runs && !in_time; ++run) {  // a machine may stand still
+  for (int run = 0; run < most_runs && !in_time; ++run) {
     Link link(io, node);
     link.board->close();
     run_for(soon);

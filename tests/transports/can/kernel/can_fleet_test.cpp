@@ -18,6 +18,14 @@
 namespace r4::test {
 namespace {
 
+// A command that a busy machine held up is refused, as it should be.
+void send_to_all(Fleet& fleet, const std::string& command) {
+  for (int most = 20; most > 0; --most) {
+    if (fleet.send(command, std::chrono::seconds{5}).all_confirmed()) return;
+  }
+  ADD_FAILURE() << command;
+}
+
 TEST(CanFleet, IsStoppedByOneFrameAndEachBoardConfirmsIt) {
   std::vector<std::unique_ptr<BoardInAThread>> boards;
   for (int node = 20; node < 24; ++node) {
@@ -25,7 +33,7 @@ TEST(CanFleet, IsStoppedByOneFrameAndEachBoardConfirmsIt) {
   }
   Fleet fleet({"can://vcan0?node=20-23"}, at_will());
   ASSERT_EQ(fleet.wait_active(std::chrono::seconds{10}), Fleet::Boards{});
-  fleet.send("O:500,1,1", std::chrono::seconds{5}).require();
+  send_to_all(fleet, "O:500,1,1");
 
   RawCan bare(emergency_stop_id);
   EXPECT_TRUE(fleet.stop(std::chrono::seconds{5}).all_confirmed());
@@ -42,7 +50,7 @@ TEST(CanFleet, IsStoppedByOneFrameAndEachBoardConfirmsIt) {
     EXPECT_LE(stops.size(), 25U) << "repeated every 20 ms by all together";
   }
   fleet.clear(std::chrono::seconds{5}).require();
-  fleet.send("O:1,1,1", std::chrono::seconds{5}).require();
+  send_to_all(fleet, "O:1,1,1");
 }
 
 // It keeps the one; the others are free.

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What decides in place of chance what happens in a world: who runs, who commands, and what becomes
+// of each datagram (search/play.hpp).
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "world.hpp"
+
+namespace r4::simulation {
+
+class World::Script {
+ public:
+  // The position that a stranger's command asks of stepper 1. No command of a host asks for it.
+  static constexpr int strangers_target = -7777;
+
+  // All hosts are there, and none runs.
+  virtual void begin() = 0;
+  // The time of the schedule is over, and no promise was broken.
+  virtual void end() = 0;
+  // An event that the script asked for.
+  virtual void on_event(int index) = 0;
+  // After each event.
+  virtual void check() = 0;
+
+  virtual void set(SessionOptions& options) const = 0;
+  // True if that host is on that path.
+  virtual bool has_place(int host, int wire) const = 0;
+
+  // A host or the board has sent this datagram. The script delivers it.
+  virtual void on_sent(const Packet& sent) = 0;
+  // A datagram has arrived. True if its receiver does not get it now.
+  virtual bool takes(const Packet& arrived) = 0;
+  virtual void before_board(const Packet& packet) = 0;
+  virtual void after_board(const Packet& packet) = 0;
+  // The board sends. True if this does not go to the hosts directly.
+  virtual bool on_board_sent(std::uint8_t port, std::uint32_t peer, Priority priority,
+                             std::string_view bytes) = 0;
+  // The board has executed a command. False if it is a stranger's.
+  virtual bool on_executed(const Command& command) = 0;
+  // The board has become SAFE(link).
+  virtual void on_link_lost() = 0;
+
+ protected:
+  ~Script() = default;
+};
+
+}  // namespace r4::simulation

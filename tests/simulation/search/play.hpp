@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One run of a story with some faults in it, on the world of the link simulator.
+//
+// A step is a datagram that a host or the board sends to the other, numbered from 0 in the order in
+// which they are sent. A fault happens to a datagram or, right after it was sent and before it
+// arrives, to a path, a host or the board.
+//
+// Besides the promises of the world (world.hpp) it checks, without a look at how the link works:
+//   silence   outputs of a host are live only while intact heartbeats of that very process arrive
+//   joined    a session is kept by the heartbeats of its own host alone
+//   resumed   … and resumed by no other
+//   stranger  nothing is executed in a session but what its own host sends
+//   pushed    strangers do not take the board from a host whose heartbeats arrive in time with a
+//             fresh echo
+//   served    while it has it, strangers keep no command of it from being confirmed
+//   returns   in the end, where nothing but faults of the network and of processes happened, a host
+//             that is there is in control
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "story.hpp"
+#include "stranger.hpp"
+#include "tests/host/bridge/scripted_bridge.hpp"
+#include "tests/simulation/script.hpp"
+
+namespace r4::simulation {
+
+struct Step {
+  std::uint64_t at_us = 0;
+  bool to_board = false;
+  int host = 0;
+  int path = 0;
+  bool passes = false;        // no cut loses it
+  bool first = false;         // the first datagram of its event of the world
+  bool first_of_host = true;  // … that has to do with its host
+  bool first_of_path = true;  // … on its path
+  bool alive = false;         // its host is
+  std::string text;           // only with a trace
+};
+
+class Play final : World::Script {
+ public:
+  // `confirmed`: so many commands are confirmed without faults, if that is known.
+  // `always_pushed`: look for `pushed` also where there is no stranger.
+  Play(const Story& story, std::vector<Fault> faults, bool keep_trace,
+       std::optional<std::uint32_t> confirmed = {}, bool always_pushed = false);
+
+  Report run() { return world_.run(); }
+  const std::vector<Step>& steps() const { return steps_; }
+  // True if that fault may happen at that step. False also where it would be the very run that
+  // another one makes.
+  bool applies(Fault fault) const;
+
+ private:
+  using Process = World::Process;
+  using Packet = World::Packet;
+  using Host = World::Host;
+  static constexpr int stranger_host = -2;
+  static constexpr std::uint64_t delay_us = 500;   // of every path
+  static constexpr std::uint64_t bridge_us = 100;  // from a bridge to its board, and back
+  static constexpr std::uint64_t disturbed_us = 100'000;
+
+  static Schedule schedule_of(const Story& story);
+
+  // World::Script
+  void begin() override;
+  void end() override;
+  void on_event(int index) override;
+  void check() override;
+  void set(SessionOptions& options) const override;
+  bool has_place(int host, int wire) const override;
+  void on_sent(const Packet& sent) override;
+  bool takes(const Packet& arrived) override;
+  void before_board(const Packet& packet) override;
+  void after_board(const Packet& packet) override;
+  bool on_board_sent(std::uint8_t port, std::uint32_t peer, Priority priority,
+                     std::string_view bytes) override;
+  bool on_executed(const Command& command) override;
+  void on_link_lost() override;
+
+  void after(std::uint64_t us, std::function<void()> call);
+  Host& host(int index);
+  bool runs(int index);
+  void disturb_all(std::uint64_t until_us);
+  // play_acts.cpp
+  void act(const Act& act);
+  void begin_fault(Fault::Kind kind, int host, int path, const std::string& bytes);
+  void command(int index, bool group);
+  void kill(int index);
+  void start_after(int index, std::uint64_t us);
+  void sleep(int index);
+  void pause(int index);
+  void when_it_runs(int index, std::function<void()> call);
+  // play_strangers.cpp
+  void renew_lease();
+  void say(const std::string& fields, std::uint8_t port, std::uint32_t peer);
+  void say_bytes(std::string bytes, std::uint8_t port, std::uint32_t peer);
+  bool is_taken(std::uint32_t peer);
+  void say_once(Fault::Kind kind);
+  void repeat(const std::string& bytes);
+  std::uint32_t next_number() const;
+  void carry_on(Fault::Kind kind, std::uint8_t port, std::uint32_t peer);
+
+  // play_bridge.cpp
+  void begin_bridge();
+  void set_clock_of_bridge();
+  void tick_bridge();
+  bool bridge_takes(const Packet& arrived);
+  void carry_from_bridge(const Packet* packet);
+
+  void deliver_in(std::uint64_t us, const Packet& packet);
+  std::string name_of(Process process) const;
+  void violate(const std::string& what) { world_.violate(what); }
+
+  const Story& story_;
+  const std::vector<Fault> faults_;
+  std::size_t next_fault_ = 0;
+  bool keep_trace_;
+  const std::optional<std::uint32_t> confirmed_;
+  bool any_stranger_ = false;
+  bool only_strangers_ = true;
+  bool looks_for_pushed_;
+
+  std::vector<Step> steps_;
+  std::uint64_t event_of_step_ = ~std::uint64_t{0};
+  std::vector<std::pair<int, int>> hosts_of_event_;  // and their paths, of the steps of that event
+  std::vector<std::function<void()>> calls_;
+  std::vector<Packet> overtaken_;  // that wait for the next in their direction
+  struct Suspended {
+    bool keeps = false;  // what arrives
+    std::vector<Packet> arrived;
+    std::vector<std::function<void()>> calls;
+  };
+  std::map<int, Suspended> suspended_;
+
+  // Who is in control, as far as it shows by what the board does.
+  Process controller_{-1, 0};
+  bool has_controller_ = false;
+  bool executed_ = false;  // a command of it
+  bool stranger_controlled_ = false;
+  bool lost_now_ = false;     // in this event
+  bool may_be_lost_ = false;  // … by a farewell or with the transport
+  bool had_owner_ = false;
+  std::uint32_t fed_before_ = 0;
+  std::uint64_t good_us_ = 0;  // its newest heartbeat that has to feed
+  std::map<Process, std::uint64_t> heard_us_;
+  std::map<Process, std::uint32_t> newest_;  // heartbeat
+
+  Stranger stranger_;
+  std::uint32_t stranger_pnum_ = 0;                     // of his own
+  std::uint32_t first_peer_ = 0;                        // the address that the first host had first
+  std::uint32_t campaign_pnum_ = 0;                     // as if he were the host
+  std::uint32_t next_pnum_[8] = {};                     // of each host
+  static constexpr std::uint32_t bridge_peer = 0xFFFB;  // as the board knows it
+  std::unique_ptr<test::ScriptedBridge> bridge_;
+  World world_;
+};
+
+}  // namespace r4::simulation

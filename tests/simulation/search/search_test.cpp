@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The promises of docs/safety.md under every combination of few faults in short stories. R4_FAULTS
+// sets how many faults at once. Without it that is 1, but 2 where R4_SCHEDULES asks for 100,000
+// schedules of the random simulator or more, or for 10,000 and the story is short. R4_STORY and
+// R4_STORY_FAULTS run one schedule again and print its trace.
+#include "search.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include "found_today.hpp"
+#include "play.hpp"
+#include "tests/simulation/environment.hpp"
+
+namespace r4::simulation {
+namespace {
+
+int most_faults(const Story& story) {
+  const std::uint64_t schedules = from_environment("R4_SCHEDULES", 30'000);
+  const std::uint64_t pairs_from = story.is_short ? 10'000 : 100'000;
+  return static_cast<int>(from_environment("R4_FAULTS", schedules >= pairs_from ? 2 : 1));
+}
+
+class EveryFault : public testing::TestWithParam<Story> {};
+
+TEST_P(EveryFault, KeepsEveryPromise) {
+  const Story& story = GetParam();
+  const int most = most_faults(story);
+  const Search found = search(story, most);
+  fmt::print("{}: {} datagrams; schedules:", story.name, found.steps);
+  for (std::size_t i = 0; i < found.schedules.size(); ++i) {
+    fmt::print(" {} with {} fault{},", found.schedules[i], i, i == 1 ? "" : "s");
+  }
+  fmt::print(" {} broke a promise\n", found.findings.size());
+  std::map<std::string_view, std::size_t> known;
+  for (const Known& each : found_today) {
+    if (each.story == story.name && each.faults <= static_cast<std::size_t>(most)) {
+      known[each.what] = each.faults;
+    }
+  }
+  for (const auto& [what, kind] : kinds_of(found.findings)) {
+    const std::size_t faults = kind.first.faults.size();
+    const auto expected = known.find(what);
+    if (expected != known.end() && expected->second == faults) {
+      known.erase(expected);
+      continue;
+    }
+    ADD_FAILURE() << fmt::format("new: {{\"{}\", {}, \"{}\"}}, {} schedules. The first:\n",
+                                 story.name, faults, what, kind.schedules)
+                  << tell(story, kind.first);
+  }
+  for (const auto& [what, faults] : known) {
+    ADD_FAILURE() << fmt::format("not found any more: {{\"{}\", {}, \"{}\"}}", story.name, faults,
+                                 what);
+  }
+}
+
+std::string name_of_case(const testing::TestParamInfo<Story>& info) {
+  std::string name = info.param.name;
+  std::replace(name.begin(), name.end(), ' ', '_');
+  return name;
+}
+INSTANTIATE_TEST_SUITE_P(Stories, EveryFault, testing::ValuesIn(stories()), name_of_case);
+
+TEST(EveryFaultOfAStory, IsRunAgainByItsName) {
+  const char* const name = std::getenv("R4_STORY");
+  const char* const faults = std::getenv("R4_STORY_FAULTS");
+  bool any = false;
+  for (const Story& story : stories()) {
+    if (story.name != std::string_view(name == nullptr ? "drive" : name)) continue;
+    any = true;
+    const std::vector<Fault> list = faults_from(faults == nullptr ? "7:lost 9:overtaken" : faults);
+    Play play(story, list, true);
+    const Report report = play.run();
+    EXPECT_EQ(report.violation, "");
+    EXPECT_EQ(faults_from(to_text(list)), list);
+    EXPECT_EQ(Play(story, list, true).run().trace, report.trace);
+    if (name == nullptr) break;
+    for (const std::string& line : report.trace) fmt::print("{}\n", line);
+    fmt::print("{}", tell(story, {list, report.violation}));
+  }
+  EXPECT_TRUE(any) << name << " is not the name of a story";
+}
+
+}  // namespace
+}  // namespace r4::simulation
