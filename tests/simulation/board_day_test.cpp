@@ -299,7 +299,7 @@ class Day final : private firmware::Port {
   std::uint64_t ended_ms_ =
       0;  // the last incident; a chip that is back is reached with the next try
   Chip silent_ = Chip::count;
-  std::uint32_t pnum_ = echo_host_first_pnum + 7;
+  std::uint32_t pnum_ = 7;
   std::uint32_t heard_t_ = 0;
   State state_;
 };

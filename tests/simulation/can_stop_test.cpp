@@ -177,7 +177,7 @@ class StoppingHost {
     }
     CanNode node;
     std::deque<std::string> waiting;
-    std::uint32_t pnum = echo_pnum;
+    std::uint32_t pnum = 12345;
     std::uint64_t board_t = 0;  // of its newest heartbeat: what ours echo
     std::int32_t cause = 0;     // of that too
   };

@@ -99,8 +99,8 @@ class Crowd final : public firmware::Hal, public firmware::Port, public firmware
   std::uint32_t board_ms() const { return boot_ms_ + static_cast<std::uint32_t>(now_ms_); }
   Time time() const { return Time{static_cast<std::int64_t>(now_ms_ * 1000 + 1'000'000)}; }
   bool in_control(const Host& host) const {
-    return application_->link().has_owner() && application_->link().owner().peer == host.number &&
-           host.number != Peers::nobody;
+    return application_->link().has_owner() && host.number != Peers::nobody &&
+           application_->paths().has(Source{0, host.number});
   }
 
   Random random_;
@@ -144,8 +144,8 @@ void Crowd::start(Host& host) {
     options.key = test::key_of(static_cast<std::uint8_t>(-host.address));
     options.clock_start = std::chrono::hours{24};
   }
-  const auto first = echo_host_first_pnum + static_cast<std::uint32_t>(random_.below(1U << 30));
-  host.session = std::make_unique<Session>(host, options, first);
+  host.session = std::make_unique<Session>(host, options, BoardRole::control, 1,
+                                           [this] { return random_.next(); });
 }
 
 CrowdReport Crowd::run() {
@@ -210,13 +210,12 @@ void Crowd::crowd_sends() {
 
 // Anything but a stop, which everybody may ask for. While nobody is in control of a board without a key,
 // a heartbeat would take it: then no stranger knows what to echo. And while nobody is, they ask for it
-// twice as often as is answered, no more. Without a key, who relays what a host has just sent is taken for a
-// wire of that host's, and would be believed: there nobody does.
+// twice as often as is answered, no more. Without a key, whoever hears the host's datagrams can pass for it: there
+// nobody does.
 std::string Crowd::say_something() {
-  const std::string number =
-      std::to_string(random_.chance(0.5) ? random_.below(1U << 31)
-                                         : echo_host_first_pnum + random_.below(1U << 31));
-  const std::string end = ";PNum:" + number + ";T:1;";
+  const std::string number = std::to_string(random_.below(1ULL << 32));
+  const std::string sid = fmt::format(";SID:{:016x}", random_.next());
+  const std::string end = (random_.chance(0.5) ? "" : sid) + ";PNum:" + number + ";T:1;";
   const bool owned = application_->link().has_owner();
   const bool may_take = with_key_ || owned;
   const std::uint64_t asking = with_key_ ? 100 : 500;
@@ -250,9 +249,7 @@ std::string Crowd::say_something() {
       [[fallthrough]];
     case 8:
       if (may_take) return test::with_crc("H:ROS2-R4" + end);
-      return test::with_crc(
-          "H:ROS2-R4;PNum:" + std::to_string(echo_host_first_pnum + random_.below(1U << 31)) +
-          ";T:1;");
+      return test::with_crc("H:ROS2-R4" + sid + ";PNum:" + number + ";T:1;");
   }
 }
 

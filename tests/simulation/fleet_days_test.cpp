@@ -84,8 +84,8 @@ class FleetLink final : firmware::Hal, firmware::Port, IncuriousHost {
   explicit FleetLink(std::uint64_t seed) : random_(seed) {
     SessionOptions options;
     options.arming = Arming::off;
-    const auto first = echo_host_first_pnum + static_cast<std::uint32_t>(random_.below(1U << 30));
-    session_.emplace(static_cast<Session::Handler&>(*this), options, first);
+    session_.emplace(static_cast<Session::Handler&>(*this), options, BoardRole::control, 1U,
+                     [this] { return random_.next(); });
     boot();
   }
 

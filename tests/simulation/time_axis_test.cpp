@@ -78,8 +78,8 @@ class AxisLink final : public firmware::Hal, public firmware::Port, public Incur
     application_ = std::make_unique<firmware::Application>(*this, config);
     application_->add_port(*this);
     application_->start(clock.first_ms);
-    const auto first = echo_host_first_pnum + static_cast<std::uint32_t>(random.below(1U << 30));
-    session_ = std::make_unique<Session>(*this, SessionOptions{}, first);
+    session_ = std::make_unique<Session>(*this, SessionOptions{}, BoardRole::control, 1,
+                                         [this] { return random_.next(); });
     board_due_us = session_due_us = 1000;
   }
 

@@ -21,8 +21,8 @@ VirtualRobot::VirtualRobot(std::uint64_t seed, const Link& link, const std::stri
       boot_ms_(static_cast<std::uint32_t>(random_.next())),
       model_(seed),
       hardware_(model_),
-      session_(*this, options_of(fields),
-               echo_host_first_pnum + static_cast<std::uint32_t>(random_.below(1U << 30))) {
+      session_(*this, options_of(fields), BoardRole::control, 1,
+               [this] { return random_.next(); }) {
   model_.connect(robot);
   model_.power_on();
   hardware_.power_up();

@@ -24,8 +24,8 @@
 //              board is safe.
 //              Who watches sends no heartbeat and no command: what it feeds or drives breaks silence or
 //              intact
-//   joined     a place becomes a wire of a session only by what that session's host has sent, and nothing that
-//              was recorded an hour ago feeds
+//   joined     a peer becomes a path of a session only by what that session's host has sent to it, and nothing
+//              that was recorded an hour ago feeds
 //   wires      a wire meets the limits while it loses, damages and holds back nothing, takes at most 100 ms each
 //              way, is not disturbed, and both ends go on. One that both ends have used for a second and that
 //              meets them is used on; while there is one, there is no false trip, no command times out for
@@ -94,7 +94,6 @@ struct Report {
   std::uint32_t timed_on_good = 0;  // commands that ended while a wire met the limits all the time
   std::uint64_t copies = 0;         // that came to hosts
   std::uint32_t strangers = 0;      // heartbeats of strangers
-  std::uint32_t relayed = 0;        // datagrams that an attacker repeated at once
   std::uint32_t replayed = 0;       // datagrams of an hour ago
   std::uint64_t served_us = 0;      // for so long there was a wire that met the limits
 };
@@ -197,7 +196,7 @@ class World : public firmware::Hal, public firmware::Observer {
   void on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command) override;
   void on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code) override;
   void on_rejected(std::uint32_t t_ms, Verdict verdict) override;
-  void on_wire(std::uint32_t t_ms, Source wire, bool joined) override;
+  void on_path(std::uint32_t t_ms, Source path, bool joined) override;
 
   void run_until(std::uint64_t end_us);
   void handle(const Event& event);
@@ -266,10 +265,8 @@ class World : public firmware::Hal, public firmware::Observer {
   void disturb(int wire, Happening::Kind kind, std::uint64_t until_us);
   void unplug(const Happening& happening, bool over);
   void record();
-  std::uint32_t first_number();
   std::uint32_t first_time();
   void replay(int index);
-  void relay(const Attack& attack, std::uint8_t port, std::uint32_t peer);
   void stranger();
 
   Random random_;
@@ -326,8 +323,8 @@ class World : public firmware::Hal, public firmware::Observer {
       streamed_;  // where states went at streamed_us_, besides to the host in control
   std::uint64_t streamed_us_ = 0;
   std::uint64_t went_on_us_ = 0;  // behind a standstill of the board
-  // When a place of the host in control was sent a state last, and in which session: of the heartbeat that began it.
-  using Streamed = std::pair<std::uint64_t, std::uint32_t>;
+  // When a path of the session was sent a state last, and after how many heartbeats that fed.
+  using Streamed = std::pair<std::uint64_t, std::size_t>;
   std::map<std::uint32_t, Streamed> owner_streamed_;
   std::uint32_t newest_heartbeat_t_ = 0;
 
@@ -363,7 +360,6 @@ class World : public firmware::Hal, public firmware::Observer {
     bool brought_state = false;
     std::uint32_t newest_t = 0;  // of the states that it has brought
   };
-  std::vector<std::uint32_t> first_numbers_;  // of all hosts so far
   Wire wires_[most_wires];
   Random wires_random_;
   std::uint64_t start_us_ = 0;  // of the schedule: an hour after what was recorded
@@ -376,7 +372,6 @@ class World : public firmware::Hal, public firmware::Observer {
   bool recording_ = false;
   std::vector<Recorded> recorded_;
   std::map<std::uint32_t, int> whose_;  // a place: a host's
-  std::set<std::uint32_t> relayed_from_;
 };
 
 }  // namespace r4::simulation

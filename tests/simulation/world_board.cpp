@@ -164,9 +164,9 @@ void World::make_safe() {
 void World::check_silence() {
   if (!live_ || standing_) return;
   const std::uint64_t timeout_us = board_->settings().timeout_ms * 1000U;
-  std::uint64_t heard_us = heard_us_[board_->link().owner().peer];
-  for (int i = 0; i < board_->wires().size(); ++i) {
-    heard_us = std::max(heard_us, heard_us_[board_->wires()[i].peer]);
+  std::uint64_t heard_us = 0;
+  for (int i = 0; i < board_->paths().size(); ++i) {
+    heard_us = std::max(heard_us, heard_us_[board_->paths()[i].peer]);
   }
   const std::uint64_t silent_us = now_us_ - heard_us;
   if (silent_us > timeout_us + slack_us) {
@@ -283,7 +283,7 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
       break;
     }
   }
-  if (!board_->wires().has(delivering_at_) || delivering_.host != sent.host) {
+  if (!controls(delivering_) || delivering_.host != sent.host) {
     violate(fmt::format("intact: command {} is of a host that does not control", id));
   }
   newest_executed_ = std::max(newest_executed_, id);

@@ -139,7 +139,6 @@ void World::hand_over(int slot) {
     const std::uint32_t peer = packet.peer;
     const Source source{packet.port, peer};
     const std::uint32_t fed_before = board_->link().fed_ms();
-    const bool fed_owner = board_->link().has_owner();
     delivering_ = {packet.host, packet.incarnation};
     delivering_at_ = source;
     on_lease(peer, packet.bytes);
@@ -151,13 +150,8 @@ void World::hand_over(int slot) {
       attacker_.on_received({packet.host, packet.incarnation, packet.sent_us}, packet.bytes);
     const BoardLink& link = board_->link();
     if (asks_to_watch(packet.bytes) && link.fed_ms() != fed_before) violate("watch: a W feeds");
-    if (packet.recorded && link.fed_ms() != fed_before) {
-      // Only a board that has no host believes who has heard nothing of it yet, and executes nothing then.
-      if (fed_owner && !fed_.empty() && fed_.back().from.host >= 0)
-        violate("joined: a recorded one feeds");
-      fed_.push_back({{-1, 0}, 0, now_us_});
-    }
-    if (packet.intact && packet.heartbeat && board_->wires().has(source) &&
+    if (packet.recorded && link.fed_ms() != fed_before) violate("joined: a recorded one feeds");
+    if (packet.intact && packet.heartbeat && board_->paths().has(source) &&
         link.fed_ms() != fed_before) {
       fed_.push_back({delivering_, packet.pnum, packet.arrived_us});
       report_.waited_to_feed += packet.arrived_us != now_us_;

@@ -8,13 +8,6 @@
 
 namespace r4::simulation {
 
-namespace {
-
-// So long what was signed may come by several wires.
-constexpr std::uint64_t relayed_us = (Authentication::age_limit_ms + 2) * 1000;
-
-}  // namespace
-
 void World::happen(const Happening& happening, bool over) {
   const int index = static_cast<int>(&happening - schedule_.happenings.data());
   note(fmt::format("{} {} {}", to_text(happening.kind), over ? "over" : "begins", happening.host));
@@ -146,15 +139,13 @@ void World::attack() {
   const BoardLinkState state = link.state();
   board_->poll(board_ms());  // so that silence is not taken for the attacker's doing
   const bool lost = link.state() != state;
-  if (attack.kind == Attack::Kind::replay && now_us_ - attack.like.at_us <= relayed_us) {
-    return relay(attack, port, address);
-  }
   const std::uint32_t fed_ms = link.fed_ms();
-  const Source owner = link.owner();
+  const Source source{port, address};
+  const bool was_path = board_->paths().has(source);
   const std::uint32_t rejected = report_.rejected;
   attacking_ = true;
   delivering_ = {attack.host, 0};  // no process has that incarnation
-  delivering_at_ = Source{port, address};
+  delivering_at_ = source;
   board_->receive(port, address, Text(attack.bytes), board_ms());
   attacking_ = false;
   Datagram datagram;
@@ -162,7 +153,8 @@ void World::attack() {
       report_.rejected == rejected) {
     violate(fmt::format("forged: a {} was taken for signed", to_text(attack.kind)));
   }
-  if (link.fed_ms() != fed_ms || link.owner() != owner || (!lost && link.state() != state)) {
+  const bool joined = !was_path && board_->paths().has(source);
+  if (link.fed_ms() != fed_ms || joined || (!lost && link.state() != state)) {
     violate(fmt::format("forged: a {} changed the link", to_text(attack.kind)));
   }
 }

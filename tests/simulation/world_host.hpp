@@ -28,7 +28,6 @@ struct World::Host final : Session::Handler {
     leaving = false;
     stops.clear();
     clear_ticket = farewell_ticket = 0;
-    const std::uint32_t first = world.first_number();
     SessionOptions options;
     options.arming = Arming::off;  // so that more is sent that must not be executed
     if (watcher) options.watch_rate_hz = static_cast<int>(world.random_.between(1, 100));
@@ -37,8 +36,9 @@ struct World::Host final : Session::Handler {
       options.key = key_of_host(index);
       options.clock_start = std::chrono::hours{24} - Time{clock_offset_us};
     }
-    session = std::make_unique<Session>(
-        *this, options, first, watcher ? BoardRole::watch : BoardRole::control, places.size());
+    session =
+        std::make_unique<Session>(*this, options, watcher ? BoardRole::watch : BoardRole::control,
+                                  places.size(), [this] { return world.random_.next(); });
     for (std::size_t i = 0; world.several() && i < places.size(); ++i) {
       const Wire& wire = world.wires_[places[i].wire];
       session->on_transport(i, world.now_us_ >= wire.unplugged_until_us, time());

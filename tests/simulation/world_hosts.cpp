@@ -71,22 +71,6 @@ void World::Host::on_result(Ticket ticket, const CommandResult& result) {
   }
 }
 
-// The numbers of a host begin at random. By chance, 6 of 100,000 times, those of one before it are the next ones, and
-// what a network held back of that one, or plays again, counts (docs/safety.md, Limits): no mistake to look for.
-std::uint32_t World::first_number() {
-  constexpr std::uint32_t window = 1U << 16;
-  constexpr std::uint32_t most_sent = 1U << 12;
-  std::uint32_t first = 0;
-  const auto is_next = [&](std::uint32_t other) {
-    return other + most_sent - first <= window + 2 * most_sent;
-  };
-  do {
-    first = echo_host_first_pnum + static_cast<std::uint32_t>(random_.below(1U << 30));
-  } while (std::any_of(first_numbers_.begin(), first_numbers_.end(), is_next));
-  first_numbers_.push_back(first);
-  return first;
-}
-
 void World::start_host(int index) {
   Host& host = *hosts_[static_cast<std::size_t>(index)];
   host.begin();

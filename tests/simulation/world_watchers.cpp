@@ -129,18 +129,15 @@ void World::check_stream(std::uint8_t port, std::uint32_t peer, const Datagram& 
   if (!link.has_owner() && state.safe == SafeReason::none) {
     violate("watch: a state tells nothing of being safe, and there is no host");
   }
-  if (link.has_owner() && board_->wires().has(Source{port, peer})) {
+  if (link.has_owner() && board_->paths().has(Source{port, peer})) {
     // A session that begins in the very instant of a state is sent one of its own.
-    Streamed now{now_us_, 0};
-    link.session_of(link.owner(), now.second);
+    const Streamed now{now_us_, fed_.size()};
     Streamed& before = owner_streamed_[peer];
     const bool twice = before == now && schedule_.standstills.empty();
     if (twice) violate("watch: the host in control is sent a state twice");
     before = now;
     return;
   }
-  // A place that brought a heartbeat of the host's that was signed just now: it is taken for another wire.
-  if (link.has_owner() && board_->wires().has(Source{0, peer})) return;
   if (link.has_owner() && peer == everyone) return;  // another port
   if (streamed_us_ != now_us_) streamed_.clear();
   streamed_us_ = now_us_;

@@ -37,7 +37,8 @@ void World::place(Host& host) {
       continue;
     Host::Place place;
     place.wire = w;
-    const bool shared = w == 0 && (bus_stopper || (host.watcher && script_ == nullptr && random_.chance(0.1)));
+    const bool shared =
+        w == 0 && (bus_stopper || (host.watcher && script_ == nullptr && random_.chance(0.1)));
     place.peer = shared ? hosts_.front()->places.front().peer : next_peer_++;
     whose_.emplace(place.peer, host.index);
     host.places.push_back(place);
@@ -154,25 +155,7 @@ void World::replay(int index) {
   deliver(slot);
 }
 
-// What an attacker repeats at once is as if the host's own came by another wire.
-void World::relay(const Attack& attack, std::uint8_t port, std::uint32_t peer) {
-  ++report_.relayed;
-  relayed_from_.insert(peer);
-  const int slot = take_slot();
-  Packet& packet = packets_[static_cast<std::size_t>(slot)];
-  packet = Packet();
-  packet.to_board = true;
-  packet.host = attack.like.host;
-  packet.incarnation = attack.like.incarnation;
-  packet.port = port;
-  packet.peer = peer;
-  packet.sent_us = attack.like.at_us;
-  packet.bytes = attack.bytes;
-  describe(packet);
-  deliver(slot);
-}
-
-// It has a number that the host may use next, but no T that the board has told.
+// It knows a number that the host may use next, and the board's newest T, but not the session's id.
 void World::stranger() {
   at(now_us_ + random_.between(1, 2ULL * schedule_.stranger_interval_us), Event::Kind::stranger, 0);
   if (standing_) return;
@@ -182,37 +165,35 @@ void World::stranger() {
   ++report_.strangers;
   const std::uint32_t pnum =
       hosts_.front()->heartbeat_pnum + static_cast<std::uint32_t>(wires_random_.below(40));
-  const std::uint32_t t_ms =
-      board_ms() + static_cast<std::uint32_t>(wires_random_.between(60'000, 1'000'000'000));
-  const std::string bytes = test::with_crc(fmt::format("H:ROS2-R4;PNum:{};T:{};", pnum, t_ms));
+  const std::string sid =
+      wires_random_.chance(0.5) ? "" : fmt::format("SID:{:016x};", wires_random_.next());
+  const std::string bytes =
+      test::with_crc(fmt::format("H:ROS2-R4;{}PNum:{};T:{};", sid, pnum, newest_heartbeat_t_));
   note("stranger " + bytes);
   const std::uint32_t fed_ms = link.fed_ms();
   const Source source{port_of(schedule_.attacked_wire), stranger_address};
   delivering_ = {-1, 0};
   delivering_at_ = source;
   board_->receive(source.port, source.peer, Text(bytes), board_ms());
-  if (link.fed_ms() != fed_ms || board_->wires().has(source)) violate("joined: a stranger");
+  if (link.fed_ms() != fed_ms || board_->paths().has(source)) violate("joined: a stranger");
 }
 
 // --- the promises
 
-void World::on_wire(std::uint32_t, Source wire, bool joined) {
-  note(fmt::format("wire {} {}/{}", joined ? "joins" : "leaves", wire.port, wire.peer));
+void World::on_path(std::uint32_t, Source path, bool joined) {
+  note(fmt::format("path {} {}/{}", joined ? "joins" : "leaves", path.port, path.peer));
   if (!joined) {
     ++report_.wire_losses;
+    if (board_->paths().size() == 0) return;
     // What it brought has fed, though it is the session's no longer.
-    std::uint64_t& heard_us = heard_us_[board_->wires()[0].peer];
-    heard_us = std::max(heard_us, heard_us_[wire.peer]);
+    std::uint64_t& heard_us = heard_us_[board_->paths()[0].peer];
+    heard_us = std::max(heard_us, heard_us_[path.peer]);
     return;
   }
   ++report_.joins;
-  const std::uint32_t owner = board_->link().owner().peer;
-  if (relayed_from_.count(wire.peer) != 0 || relayed_from_.count(owner) != 0) return;
-  const auto its = whose_.find(wire.peer);
-  const auto owners = whose_.find(owner);
-  if (its == whose_.end() || owners == whose_.end() || its->second != owners->second) {
-    violate(fmt::format("joined: place {} is not of the session's host", wire.peer));
-  }
+  const auto its = whose_.find(path.peer);
+  const bool of_host = its != whose_.end() && !fed_.empty() && its->second == fed_.back().from.host;
+  if (!of_host) violate(fmt::format("joined: peer {} is not of the session's host", path.peer));
 }
 
 bool World::meets_limits(int index) const {
@@ -255,7 +236,7 @@ void World::check_wires() {
     if (!wire.fine) wire.fine_since_us = now_us_;
     wire.fine = true;
     const auto at = static_cast<std::size_t>(w);
-    const bool serves = board_->wires().has({port_of(w), host.places[at].peer}) &&
+    const bool serves = board_->paths().has({port_of(w), host.places[at].peer}) &&
                         host.session->wire_state(at) == WireState::carrying;
     const bool settled = wire.serves && now_us_ - wire.serves_since_us >= settled_us;
     if (settled && !serves) violate(fmt::format("wires: wire {} is good and given up", w));

@@ -258,7 +258,7 @@ void Play::before_board(const Packet& packet) {
   const std::uint32_t age_ms = world_.board_ms() - static_cast<std::uint32_t>(datagram.time_ms());
   const bool fresh = age_ms < world_.board_->settings().timeout_ms;
   const bool prompt = world_.now_us_ - packet.sent_us <= prompt_us;
-  if (fresh && prompt && world_.board_->wires().has({packet.port, packet.peer})) {
+  if (fresh && prompt && world_.board_->paths().has({packet.port, packet.peer})) {
     good_us_ = world_.now_us_;
   }
 }
