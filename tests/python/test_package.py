@@ -32,7 +32,8 @@ def test_types_are_strict():
     package, examples = ROOT / 'host/python/r4link', ROOT / 'docs/examples'
     sources = [*package.glob('*.py'), package / '_core.pyi', *(examples / 'python').glob('*.py'),
                examples / 'openscout/openscout.py']
-    run(sys.executable, '-m', 'mypy', '--strict', '--python-version', '3.10', '--cache-dir', f'{os.environ["R4_BUILD"]}/mypy', *sorted(sources),
+    kept = pathlib.Path(os.environ['R4_BUILD']) / 'mypy'
+    run(sys.executable, '-m', 'mypy', '--strict', '--python-version', '3.10', '--cache-dir', kept, *sorted(sources),
         env={**os.environ, 'MYPYPATH': f'{ROOT / "host/python"}:{ROOT / "docs/examples/openscout"}'})
 
 

@@ -42,8 +42,8 @@ def run_step(step, folder, *files):
     env = {**os.environ, 'R4LINK': str(ROOT), 'PATH': f'{pathlib.Path(sys.executable).parent}:{os.environ["PATH"]}',
            'PYTHONPATH': f'{ROOT / "tests/integration"}:{os.environ["PYTHONPATH"]}',
            'PYTEST_ADDOPTS': '-p no:cacheprovider -p r4link.pytest_plugin -p repeat'}
-    ended = subprocess.run(['bash', '-c', f'{step} {" ".join(files)}'], cwd=project, env=env, stdin=subprocess.DEVNULL, capture_output=True,
-                           text=True, timeout=200, check=False)
+    ended = subprocess.run(['bash', '-c', f'{step} {" ".join(files)}'], cwd=project, env=env, stdin=subprocess.DEVNULL,
+                           capture_output=True, text=True, timeout=200, check=False)
     everything = "-m ''" in step
     passed = written(*(files or ['test_patrol.py']))
     assert ended.returncode == 0 and f'{passed} passed' in ended.stdout, ended.stdout + ended.stderr
