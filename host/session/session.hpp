@@ -223,6 +223,8 @@ class Session {
   SendResult transmit_over(std::size_t wire, DatagramWriter& writer, Priority priority, Time now);
   bool may_speak(std::size_t wire) const;
   SessionId session_id() const { return watches() ? no_session : link_.session(); }
+  void stamp(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum,
+             std::uint32_t t_ms) const;
   bool begun() const { return !wires_.several() || wires_.begun(); }
   void ask_wires(Time now);
   bool admit(std::size_t wire, const Datagram& datagram, Time now);

@@ -44,7 +44,7 @@ PostResult Session::post(const Setpoints& group, Time now) {
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   for (std::size_t i = 0; i < group.size(); ++i) write_command(writer, group[i]);
-  writer.session(session_id()).stamp(link_.take_pnum(), to_ms(now));
+  stamp(writer, group[0].kind, link_.take_pnum(), to_ms(now));
   const SendResult result = close_and_transmit(
       writer, {group[0].kind, link_.last_pnum(), all_wires}, Priority::normal, now);
   if (result == SendResult::sent) posted_.add(link_.last_pnum(), group);

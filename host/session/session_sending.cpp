@@ -17,13 +17,21 @@ bool is_urgent(CommandKind kind) { return kind == CommandKind::stop || kind == C
 
 }  // namespace
 
+// A command of the session needs no T. Heartbeats and leases echo by it.
+void Session::stamp(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum,
+                    std::uint32_t t_ms) const {
+  const bool echoes = kind == CommandKind::heartbeat || kind == CommandKind::watch;
+  writer.session(session_id());
+  echoes || watches() ? writer.stamp(pnum, t_ms) : writer.packet(pnum);
+}
+
 // A datagram of which no copy is kept.
 SendResult Session::transmit_now(const Command& command, std::uint32_t t_ms, Priority priority,
                                  Time now, WireSet wires) {
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   write_command(writer, command);
-  writer.session(session_id()).stamp(link_.take_pnum(), t_ms);
+  stamp(writer, command.kind, link_.take_pnum(), t_ms);
   return close_and_transmit(writer, {command.kind, link_.last_pnum(), wires}, priority, now);
 }
 
@@ -166,7 +174,7 @@ void Session::transmit(Pending& pending, Time now) {
     pending.pnum = pending.stop_number ? *pending.stop_number : link_.take_pnum();
     // The command's field is there already.
     DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.size);
-    writer.session(session_id()).stamp(pending.pnum, to_ms(now));
+    stamp(writer, pending.kind, pending.pnum, to_ms(now));
     pending.size = writer.size();
     pending.stage = Stage::sent;
     if (pending.kind == CommandKind::identify) question_.asked(pending.pnum, now);

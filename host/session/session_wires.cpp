@@ -61,7 +61,7 @@ void Session::ask_wires(Time now) {
     std::array<char, max_datagram> buffer;
     DatagramWriter writer(buffer.data(), buffer.size());
     write_command(writer, Command::identify());
-    writer.session(session_id()).stamp(link_.take_pnum(), to_ms(now));
+    stamp(writer, CommandKind::identify, link_.take_pnum(), to_ms(now));
     for (std::size_t i = 0; i < wires_.count(); ++i) {
       if ((due & wire_bit(i)) == 0) continue;
       transmit_over(i, writer, Priority::normal, now);

@@ -123,9 +123,10 @@ DatagramWriter& DatagramWriter::session(SessionId sid) {
 }
 
 DatagramWriter& DatagramWriter::stamp(std::uint32_t pnum, std::uint64_t t_ms) {
-  field(pnum_name).value(pnum);
-  return field(time_name).value(t_ms);
+  return packet(pnum).field(time_name).value(t_ms);
 }
+
+DatagramWriter& DatagramWriter::packet(std::uint32_t pnum) { return field(pnum_name).value(pnum); }
 
 Text DatagramWriter::finish(std::uint32_t pnum, std::uint64_t t_ms) {
   stamp(pnum, t_ms);

@@ -81,7 +81,9 @@ class DatagramWriter {
 
   // Writes SID, in front of PNum; nothing if it is no_session.
   DatagramWriter& session(SessionId sid);
-  // Writes PNum and T: the last fields, but for a signature (authentication.hpp).
+  // Writes PNum: the last field of a session's command, but for a signature (authentication.hpp).
+  DatagramWriter& packet(std::uint32_t pnum);
+  // Writes PNum and T: the last fields of any other datagram, likewise.
   DatagramWriter& stamp(std::uint32_t pnum, std::uint64_t t_ms);
   // Closes with PNum, T and the CRC. An empty Text if anything did not fit or was not allowed, or
   // if the datagram is longer than max_datagram.

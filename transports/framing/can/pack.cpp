@@ -174,6 +174,24 @@ __attribute__((noinline)) bool put_device_bytes(Digits& digits, Text text) {
   return true;
 }
 
+// False if it is not exactly 16 digits as writers print them.
+bool take_session(Text text, std::uint64_t& out) {
+  if (text.size() != session_digits) return false;
+  std::uint64_t sid = 0;
+  for (const char c : text) {
+    const unsigned digit = hex_digit_of(c);
+    if (digit > 15) return false;
+    sid = sid << 4 | digit;
+  }
+  out = sid;
+  return true;
+}
+
+bool put_session(Digits& digits, std::uint64_t sid) {
+  return digits.put(sid >> 32, session_digits / 2) &&
+         digits.put(sid & 0xFFFFFFFFU, session_digits / 2);
+}
+
 // In the form of the field; false if its text is not one that the form would be written as.
 bool put_in_form(Digits& digits, PackedForm form, Text text) {
   std::uint64_t value = 0;
@@ -199,6 +217,8 @@ bool put_in_form(Digits& digits, PackedForm form, Text text) {
       return put_steps(digits, text);
     case PackedForm::bytes:
       return put_device_bytes(digits, text);
+    case PackedForm::session:
+      return take_session(text, value) && digits.put(0, 1) && put_session(digits, value);
   }
   return false;
 }
@@ -274,8 +294,9 @@ bool put_values(Digits& digits, PackedForm form, Text values) {
          (digits.put(digit_escape, 1) && put_text(digits, values));
 }
 
-// PNum and T, and how they are written.
+// SID, PNum and T, and how they are written.
 struct Numbers {
+  std::uint64_t sid = 0;
   std::uint64_t pnum = 0;
   std::uint64_t time = 0;
   unsigned size = 0;  // index of `sizes`
@@ -293,7 +314,17 @@ struct Numbers {
     }
     return false;
   }
+  // PNum alone, of a command.
+  bool take(const Field& only) {
+    size = 0;
+    return only.name() == Text("PNum") && parse_plain(only.values(), pnum) &&
+           digits_of(pnum) <= session_sizes.pnum;
+  }
 };
+
+bool is_session(const Field& field, Numbers& numbers) {
+  return field.name() == Text("SID") && take_session(field.values(), numbers.sid);
+}
 
 // The last field before `end`, which is behind its semicolon; none before `begin`.
 Field last_field(const char* begin, const char* end) {
@@ -335,8 +366,10 @@ Layout choose_layout(Fields& fields, const char*& end, Numbers& numbers) {
                            : is_heartbeat_of(first, code_ros2_r4) ? Layout::host_heartbeat
                                                                   : Layout::plain_fields;
   if (heartbeat != Layout::plain_fields && after.at() != end) {
-    const Field second = after.next();
-    if (after.at() != end && numbers.take(second, after.next())) {
+    Field second = after.next();
+    const bool fits = !has_session(heartbeat) || is_session(second, numbers);
+    if (has_session(heartbeat) && after.at() != end) second = after.next();
+    if (fits && after.at() != end && numbers.take(second, after.next())) {
       fields = after;
       return heartbeat;
     }
@@ -344,9 +377,13 @@ Layout choose_layout(Fields& fields, const char*& end, Numbers& numbers) {
   const Field time = last_field(fields.at(), end);
   if (time.name().begin() == fields.at()) return Layout::plain_fields;
   const Field pnum = last_field(fields.at(), time.name().begin());
-  if (!numbers.take(pnum, time)) return Layout::plain_fields;
+  if (numbers.take(pnum, time)) {
+    end = pnum.name().begin();
+    return layout_of(fields, end);
+  }
+  if (!is_session(pnum, numbers) || !numbers.take(time)) return Layout::plain_fields;
   end = pnum.name().begin();
-  return layout_of(fields, end);
+  return Layout::of_session;
 }
 
 // Parts the datagram before its "^0x"; false if its checksum is not as writers print it.
@@ -382,8 +419,9 @@ std::size_t write_packed(Text datagram, std::uint8_t* out, std::size_t capacity)
   unsigned head = version_bits | static_cast<unsigned>(layout) << 3;
   if (layout != Layout::plain_fields) {
     head |= numbers.size;
-    if (!digits.put(numbers.pnum, sizes[numbers.size].pnum) ||
-        !digits.put(numbers.time, sizes[numbers.size].time)) {
+    const Sizes sizes = sizes_of(layout, numbers.size);
+    if (!digits.put(numbers.pnum, sizes.pnum) || !digits.put(numbers.time, sizes.time) ||
+        (has_session(layout) && !put_session(digits, numbers.sid))) {
       return 0;
     }
   }

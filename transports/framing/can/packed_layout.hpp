@@ -19,8 +19,8 @@ enum class Layout : std::uint8_t {
   state_safe_cmd,   // those ten, SAFE, CMD, more, PNum, T
   full_state,       // all state fields, more, PNum, T
   board_heartbeat,  // H:R4-ROS2, PNum, T, more
-  host_heartbeat,   // H:ROS2-R4, PNum, T, more
-  count
+  host_heartbeat,   // H:ROS2-R4, SID, PNum, T, more
+  of_session,       // more, SID, PNum: a command
 };
 
 constexpr std::uint8_t version_bits = 0x80;  // of version 1
@@ -47,6 +47,11 @@ constexpr bool is_heartbeat(Layout layout) {
   return layout == Layout::board_heartbeat || layout == Layout::host_heartbeat;
 }
 
+// True if SID stands in front of PNum, without its name.
+constexpr bool has_session(Layout layout) {
+  return layout == Layout::host_heartbeat || layout == Layout::of_session;
+}
+
 // How many digits PNum and T have, by the head's last three bits; a writer takes the first that is
 // enough.
 struct Sizes {
@@ -54,6 +59,10 @@ struct Sizes {
   std::uint8_t time;
 };
 constexpr Sizes sizes[8] = {{0, 0}, {4, 5}, {4, 8}, {5, 8}, {6, 8}, {4, 11}, {8, 8}, {8, 11}};
+constexpr Sizes session_sizes = {8, 0};
+constexpr Sizes sizes_of(Layout layout, unsigned size) {
+  return layout == Layout::of_session ? session_sizes : sizes[size];
+}
 
 // --- digits with a meaning
 
@@ -71,6 +80,7 @@ constexpr unsigned longest_name = 14;
 constexpr unsigned longest_bytes = 15;
 constexpr unsigned longest_count = 14;  // digits
 constexpr unsigned most_device_bytes = 64;
+constexpr unsigned session_digits = 16;
 
 // Fixed forms: how many digits, and the largest value.
 constexpr unsigned flag_max = 0xE;

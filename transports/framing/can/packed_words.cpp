@@ -63,6 +63,8 @@ constexpr PackedWord words[word_count] = {
     // 7E
     {"UART1", Form::bytes}, {"UART2", Form::bytes}, {"DAC1", Form::count}, {"DAC2", Form::count},
     {"GPIO", Form::count},
+    // 83
+    {"SID", Form::session}, {"LEAVE"},
 };
 // clang-format on
 

@@ -21,6 +21,7 @@ enum class PackedForm : std::uint8_t {
   count,       // how many digits (0-14), then those
   steps,       // a count of 2v for v >= 0, of -2v - 1 below
   bytes,       // "a,b,x3f…": two counts, how many bytes in 2, those in 2 each
+  session,     // 16 lower-case hexadecimal digits: a 0, then those
 };
 
 struct PackedWord {
@@ -48,7 +49,7 @@ constexpr unsigned code_cmd = 0x31;
 constexpr unsigned state_words = 0x38;
 constexpr unsigned code_r4_ros2 = 0x4B;
 constexpr unsigned code_ros2_r4 = 0x4C;
-constexpr unsigned word_count = 0x83;
+constexpr unsigned word_count = 0x85;
 constexpr unsigned no_word = 0xFF;
 
 extern const PackedWord words[word_count];

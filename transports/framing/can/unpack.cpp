@@ -36,6 +36,11 @@ class Digits {
     return true;
   }
   void put_back() { --at_; }
+  bool skip(unsigned digits) {
+    if (left() < digits) return false;
+    at_ += digits;
+    return true;
+  }
 
  private:
   const std::uint8_t* bytes_;
@@ -178,6 +183,15 @@ __attribute__((noinline)) bool take_device_bytes(Digits& digits, unsigned first,
   return true;
 }
 
+__attribute__((noinline)) bool take_session(Digits& digits, Characters& out) {
+  for (unsigned i = 0; i < session_digits; ++i) {
+    unsigned digit = 0;
+    if (!digits.take(digit)) return false;
+    out.put(static_cast<char>(digit < 10 ? '0' + digit : 'a' + digit - 10));
+  }
+  return true;
+}
+
 // A form of as many digits, of which the first is not F.
 bool take_value(Digits& digits, PackedForm form, Characters& out) {
   unsigned first = 0;
@@ -222,6 +236,8 @@ bool take_value(Digits& digits, PackedForm form, Characters& out) {
       return true;
     case PackedForm::bytes:
       return take_device_bytes(digits, first, out);
+    case PackedForm::session:
+      return first == 0 && take_session(digits, out);
   }
   return false;
 }
@@ -266,31 +282,48 @@ bool take_fields(Digits& digits, Layout layout, Characters& out) {
   return digits.left() == 0 || (digits.take(filler) && filler == 0xF);
 }
 
-void put_numbers(std::uint64_t pnum, std::uint64_t time, Characters& out) {
+struct Numbers {
+  std::uint64_t pnum = 0;
+  std::uint64_t time = 0;
+  Digits session;  // where its digits are
+};
+
+// SID and T where the layout has them, and PNum.
+bool put_numbers(Layout layout, Numbers& numbers, Characters& out) {
+  if (has_session(layout)) {
+    out.put("SID:", 4);
+    if (!take_session(numbers.session, out)) return false;
+    out.put(';');
+  }
   out.put("PNum:", 5);
-  out.put_plain(pnum);
-  out.put(";T:", 3);
-  out.put_plain(time);
+  out.put_plain(numbers.pnum);
   out.put(';');
+  if (layout == Layout::of_session) return true;
+  out.put("T:", 2);
+  out.put_plain(numbers.time);
+  out.put(';');
+  return true;
 }
 
 bool take_datagram(Digits& digits, Layout layout, unsigned size, Characters& out) {
-  std::uint64_t pnum = 0;
-  std::uint64_t time = 0;
   if (layout == Layout::plain_fields) {
     return size == 0 && digits.left() >= 2 && take_fields(digits, layout, out);
   }
-  if (!digits.take(sizes[size].pnum, pnum) || !digits.take(sizes[size].time, time)) return false;
+  Numbers numbers{0, 0, digits};
+  if (layout == Layout::of_session && size != 0) return false;
+  const Sizes sizes = sizes_of(layout, size);
+  if (!digits.take(sizes.pnum, numbers.pnum) || !digits.take(sizes.time, numbers.time)) {
+    return false;
+  }
+  numbers.session = digits;
+  if (has_session(layout) && !digits.skip(session_digits)) return false;
   if (is_heartbeat(layout)) {
     out.put("H:", 2);
     out.put(words[layout == Layout::board_heartbeat ? code_r4_ros2 : code_ros2_r4], 0);
     out.put(';');
-    put_numbers(pnum, time, out);
-    return take_fields(digits, layout, out);
+    return put_numbers(layout, numbers, out) && take_fields(digits, layout, out);
   }
-  if (!take_fields(digits, layout, out)) return false;
-  put_numbers(pnum, time, out);
-  return true;
+  return take_fields(digits, layout, out) && put_numbers(layout, numbers, out);
 }
 
 UnpackResult failed(UnpackError error) {
@@ -304,9 +337,7 @@ UnpackResult read_packed(const std::uint8_t* bytes, std::size_t size, char* out,
   if (size == 0 || size > max_datagram) return failed(UnpackError::length);
   const unsigned head = bytes[0];
   const auto layout = static_cast<Layout>(head >> 3 & 7U);
-  if ((head & version_mask) != version_bits || layout >= Layout::count) {
-    return failed(UnpackError::version);
-  }
+  if ((head & version_mask) != version_bits) return failed(UnpackError::version);
   if (size < 1 + checksum_size) return failed(UnpackError::length);
 
   const std::uint8_t* const end = bytes + size - checksum_size;

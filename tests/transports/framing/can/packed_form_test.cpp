@@ -139,18 +139,22 @@ TEST(PackedForm, EveryKindOfDatagramIsCompact) {
       {"board heartbeat", with_crc("H:R4-ROS2;PNum:8640123;T:4012345670;"), 12},
       {"board heartbeat, safe", with_crc("H:R4-ROS2;PNum:8640123;T:4012345670;SAFE:1;"), 14},
       {"board heartbeat, connecting", "H:R4-ROS2;PNum:0;T:0;^0xb10b3a06^", 5},
-      {"host heartbeat", with_crc("H:ROS2-R4;PNum:2523456789;T:4012345670;"), 13},
+      {"host heartbeat", with_crc("H:ROS2-R4;SID:fedcba9876543210;PNum:2523456789;T:4012345670;"),
+       21},
       {"paper's host heartbeat", "H:ROS2-R4;T:79201;^0xf390d9ad^", 12},
-      {"O:358,1,1", with_crc("O:358,1,1;PNum:2523456789;T:4012345670;"), 18},
+      {"O:358,1,1", with_crc("O:358,1,1;SID:fedcba9876543210;PNum:2523456789;"), 18},
       {"paper's O:358,1,1", "O:358,1,1;PNum:66;T:1699276044383;^0x7fefae81^", 18},
       {"four wheels, a group",
-       with_crc("O:358,1,1;O:358,1,2;O:358,1,3;O:358,1,4;PNum:2523456789;T:4012345670;"), 33},
-      {"R:2,On", with_crc("R:2,On;PNum:2523456789;T:4012345670;"), 17},
-      {"E:STOP", with_crc("E:STOP;PNum:2523456789;T:4012345670;"), 16},
-      {"F:DEFAULT,SAFE,CMD", with_crc("F:DEFAULT,SAFE,CMD;PNum:2523456789;T:4012345670;"), 20},
-      {"C:pack,1", with_crc("C:pack,1;PNum:2523456789;T:4012345670;"), 17},
-      {"Q:ID", with_crc("Q:ID;PNum:2523456789;T:4012345670;"), 16},
-      {"N:2523456789,RANGE", with_crc("N:2523456789,RANGE;PNum:8640123;T:4012345670;"), 21},
+       with_crc("O:358,1,1;O:358,1,2;O:358,1,3;O:358,1,4;SID:fedcba9876543210;PNum:2523456789;"),
+       37},
+      {"R:2,On", with_crc("R:2,On;SID:fedcba9876543210;PNum:2523456789;"), 17},
+      {"E:STOP", with_crc("E:STOP;SID:fedcba9876543210;PNum:2523456789;"), 16},
+      {"F:DEFAULT,SAFE,CMD", with_crc("F:DEFAULT,SAFE,CMD;SID:fedcba9876543210;PNum:2523456789;"),
+       20},
+      {"C:pack,1", with_crc("C:pack,1;SID:fedcba9876543210;PNum:2523456789;"), 17},
+      {"Q:ID", with_crc("Q:ID;SID:fedcba9876543210;PNum:2523456789;"), 16},
+      {"N:2523456789,RANGE",
+       with_crc("N:2523456789,RANGE;SID:fedcba9876543210;PNum:8640123;T:4012345670;"), 31},
       {"I:R4,0.1.0,sim-1,sim", with_crc("I:R4,0.1.0,sim-1,sim;PNum:8640123;T:4012345670;"), 26},
   };
   fmt::print("{:<30} {:>6} {:>6} {:>7} {:>7}\n", "", "plain", "packed", "frames", "frames");
@@ -201,9 +205,9 @@ TEST(PackedForm, TheTableHasEveryNameAndWordOfTheProtocol) {
     EXPECT_TRUE(known(str(name_of(static_cast<Refusal>(code)))));
   }
   for (const std::string word :
-       {"PNum",      "T",       "A",        "AN",      "R4-ROS2", "ROS2-R4", "On",
-        "Off",       "STOP",    "CLEAR",    "DEFAULT", "ALL",     "ID",      "rate",
-        "heartbeat", "timeout", "recovery", "last",    "rearm",   "pack"}) {
+       {"PNum",      "T",       "A",        "AN",    "R4-ROS2", "ROS2-R4", "On", "SID",
+        "LEAVE",     "Off",     "STOP",     "CLEAR", "DEFAULT", "ALL",     "ID", "rate",
+        "heartbeat", "timeout", "recovery", "last",  "rearm",   "pack"}) {
     EXPECT_TRUE(known(word)) << word;
   }
 }
@@ -391,10 +395,15 @@ rc::Gen<std::string> any_datagram() {
     static const std::string all = fields_of(FieldSet::all(), busy_state());
     std::string fields = *rc::gen::elementOf(std::vector<std::string>{
         "", "", "", defaults, defaults + "SAFE:2;", defaults + "SAFE:0;CMD:77;",
-        all.substr(0, all.find("PNum")), "H:R4-ROS2;", "H:ROS2-R4;PNum:12;T:345;"});
+        all.substr(0, all.find("PNum")), "H:R4-ROS2;", "H:ROS2-R4;PNum:12;T:345;",
+        "H:ROS2-R4;SID:fedcba9876543210;PNum:12;T:345;",
+        "H:ROS2-R4;SID:FEDCBA9876543210;PNum:1;T:3;"});
     const int count = *rc::gen::inRange(0, 12);
     for (int i = 0; i < count; ++i) fields += *any_name() + ':' + *any_values() + ';';
-    if (*rc::gen::inRange(0, 3) != 0) {
+    if (*rc::gen::inRange(0, 3) == 0) {
+      fields += fmt::format("SID:{:016x};PNum:{};", *rc::gen::arbitrary<std::uint64_t>(),
+                            *rc::gen::arbitrary<std::uint32_t>());
+    } else if (*rc::gen::inRange(0, 3) != 0) {
       fields += fmt::format("PNum:{};T:{};", *rc::gen::arbitrary<std::uint32_t>(),
                             *rc::gen::arbitrary<std::uint64_t>() >> *rc::gen::inRange(0, 64));
     }
@@ -435,7 +444,8 @@ RC_GTEST_PROP(PackedForm, AnyBytesUnpackSafelyToTheGrammarOrARefusal, ()) {
   const ReadResult read_result = read_datagram(out, datagram);
   RC_ASSERT(read_result.error != ReadError::length);
   if (read_result.error == ReadError::syntax) {
-    RC_ASSERT(out.find("PNum:") != std::string::npos || out.find("T:") != std::string::npos);
+    RC_ASSERT(out.find("PNum:") != std::string::npos || out.find("T:") != std::string::npos ||
+              out.find("SID:") != std::string::npos);
   }
 }
 
@@ -452,8 +462,8 @@ TEST(PackedForm, MalformedBytesAreRefusedWithTheirReason) {
   EXPECT_EQ(error(good, test::captured_state().size()), UnpackError::none);
   EXPECT_EQ(error({'O', ':', '1', ',', '0', ',', '1'}), UnpackError::version);
   EXPECT_EQ(error({0xC0, 0, 0, 0, 0, 0}), UnpackError::version);
-  EXPECT_EQ(error({0xB8, 0, 0, 0, 0, 0}), UnpackError::version);
-  EXPECT_EQ(error({0x80, 0, 0, 0, 0}), UnpackError::syntax);              // no field
+  EXPECT_EQ(error({0xB8, 0, 0, 0, 0, 0}), UnpackError::syntax);  // of a session, and too short
+  EXPECT_EQ(error({0x80, 0, 0, 0, 0}), UnpackError::syntax);     // no field
   EXPECT_EQ(error({0x81, 0x3B, 0x1D, 0, 0, 0, 0}), UnpackError::syntax);  // a size without numbers
   EXPECT_EQ(error({0x80, 0x3B, 0x1D, 0, 0, 0, 0}), UnpackError::none);    // O:1
   EXPECT_EQ(error({0x80, 0x3B, 0x11, 0, 0, 0, 0}), UnpackError::syntax);  // a text without end
