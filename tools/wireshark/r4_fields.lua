@@ -101,6 +101,7 @@ local answers = {
   STOP = { { "", "uint32" } },
   AN = { { "", "string" } },
   SESSION = { { "", "uint32" } },
+  SID = { { "", "string" } },
   AT = { { "", "uint8" } },
   LEASE = { { "", "uint32" } },
 }

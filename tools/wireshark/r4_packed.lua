@@ -43,6 +43,8 @@ add("bytes", "I2CX")
 add("text", "I2CBUS X FULL")
 numbered("bytes", "UART%d", 1, 2)
 add("count", "DAC1 DAC2 GPIO")
+add("session", "SID")
+add("text", "LEAVE")
 
 local given = { [2] = 10, [3] = 10, [4] = 0x38 } -- so many names from the first that a layout gives
 local sizes = { [0] = { 0, 0 }, { 4, 5 }, { 4, 8 }, { 5, 8 }, { 6, 8 }, { 4, 11 }, { 8, 8 }, { 8, 11 } }
@@ -164,6 +166,12 @@ function Digits:value(form)
     end
     return ("%s,%s,x%s"):format(first, second, self:take(2 * size))
   end
+  if form == "session" then
+    if self:take(1) ~= "0" then
+      error("a session id of another form", 0)
+    end
+    return self:take(16)
+  end
   local number = self:number(widths[form])
   if form == "hundredths" then
     return ("%d.%02d"):format(math.floor(number / 100), number % 100)
@@ -181,23 +189,30 @@ local function unpack_or_fail(packed)
   end
   local head = packed:byte(1)
   local layout, size = math.floor(head / 8) % 8, head % 8
-  if math.floor(head / 64) ~= 2 or layout == 7 then
+  if math.floor(head / 64) ~= 2 then
     error("the version", 0)
-  elseif layout == 0 and size ~= 0 then
+  elseif (layout == 0 or layout == 7) and size ~= 0 then
     error("sizes without numbers", 0)
   end
   local hex = packed:sub(2, -5):gsub(".", function(each) return ("%02x"):format(each:byte()) end)
   local digits = setmetatable({ digits = hex, at = 1 }, Digits)
-  local pnum, time = digits:number(sizes[size][1]), digits:number(sizes[size][2])
+  local pnum = digits:number(layout == 7 and 8 or sizes[size][1])
+  local time = digits:number(sizes[size][2])
+  local session = layout >= 6 and digits:take(16)
   local fields = {}
   local function field(name, value)
     fields[#fields + 1] = name .. ":" .. value .. ";"
   end
   local function numbers()
+    if session then
+      field("SID", session)
+    end
     field("PNum", plain(pnum))
-    field("T", plain(time))
+    if layout ~= 7 then
+      field("T", plain(time))
+    end
   end
-  if layout >= 5 then
+  if layout == 5 or layout == 6 then
     field("H", layout == 5 and "R4-ROS2" or "ROS2-R4")
     numbers()
   end
@@ -215,7 +230,7 @@ local function unpack_or_fail(packed)
   if digits.at == #digits.digits and digits.digits:sub(-1) ~= "f" then
     error("what fills the last byte", 0)
   end
-  if layout >= 1 and layout <= 4 then
+  if layout ~= 0 and layout ~= 5 and layout ~= 6 then
     numbers()
   end
   if #fields == 0 then
