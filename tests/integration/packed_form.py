@@ -14,7 +14,7 @@ NAMES = [*'AIN24 AIN12 AIN5 AINDMH DMHSTA AINSTEER DHB1A OSMC1 STEP1POS SERVO1PO
          *'rate heartbeat timeout recovery pack last rearm'.split(),
          *'UNKNOWN FORMAT RANGE CHANNEL STALE DUPLICATE BUSY AUTH R4 sim udp serial pty can FAULT'.split(),
          *(f'ENC{n}HZ' for n in range(1, 5)), *(f'ENC{n}IDX' for n in range(1, 5)),
-         *(f'I2C{n}' for n in range(1, 9)), *'I2CX I2CBUS X FULL UART1 UART2 DAC1 DAC2 GPIO'.split()]
+         *(f'I2C{n}' for n in range(1, 9)), *'I2CX I2CBUS X FULL UART1 UART2 DAC1 DAC2 GPIO SID LEAVE'.split()]
 CODES = {name: code for code, name in enumerate(NAMES)}
 # first code, last code, form
 FORMS = [(0x00, 0x03, 'hundredths'), (0x04, 0x04, 'flag'), (0x05, 0x05, 'hundredths'), (0x06, 0x07, 'drive'),
@@ -22,10 +22,12 @@ FORMS = [(0x00, 0x03, 'hundredths'), (0x04, 0x04, 'flag'), (0x05, 0x05, 'hundred
          (0x11, 0x13, 'steps'), (0x14, 0x22, 'short'), (0x23, 0x26, 'steps'), (0x27, 0x2A, 'count'),
          (0x2B, 0x2E, 'bldc'), (0x2F, 0x2F, 'count'), (0x30, 0x30, 'flag'), (0x31, 0x39, 'count'),
          (0x6A, 0x71, 'steps'), (0x72, 0x7A, 'bytes'), (0x7E, 0x7F, 'bytes'),
-         (0x80, 0x82, 'count')]
+         (0x80, 0x82, 'count'), (0x83, 0x83, 'session')]
 GIVEN = {2: NAMES[:10], 3: NAMES[:10] + ['SAFE', 'CMD'], 4: NAMES[:0x38]}
 HEARTBEATS = {5: 'R4-ROS2', 6: 'ROS2-R4'}
 SIZES = [(0, 0), (4, 5), (4, 8), (5, 8), (6, 8), (4, 11), (8, 8), (8, 11)]
+OF_SESSION = 7
+SESSION = re.compile('[0-9a-f]{16}')
 PLAIN = r'(0|[1-9][0-9]*)'
 DATAGRAM = re.compile(r'((?:[!-+\--9<-\]_-~]+:[ -:<-\]_-~]*;)+)\^0x(0|[1-9a-f][0-9a-f]{0,7})\^')
 
@@ -73,6 +75,8 @@ def in_form(form, text):
         found = re.fullmatch(f'{PLAIN},{PLAIN},x((?:[0-9a-f]{{2}}){{0,64}})', text)
         counts = found and [count(int(found.group(n))) for n in (1, 2)]
         return ''.join(counts) + f'{len(found.group(3)) // 2:02x}{found.group(3)}' if found and all(counts) else None
+    if form == 'session':
+        return '0' + text if SESSION.fullmatch(text) else None
     assert form == 'steps'
     found = match('-?' + PLAIN)
     if not found or text == '-0':
@@ -121,15 +125,31 @@ def size_of(first, second):
 
 
 def layout_of(fields):
-    """Layout, S, PNum and T as fields, the other fields."""
+    """Layout, S, the digits of PNum, T and SID, the other fields."""
+    def is_session(field):
+        return field[0] == 'SID' and SESSION.fullmatch(field[1])
+
+    def digits(size, numbers):
+        return ''.join(f'{int(number):0{width}x}' for (_, number), width in zip(numbers, SIZES[size]) if width)
     for layout, word in HEARTBEATS.items():
-        if len(fields) >= 3 and fields[0] == ['H', word] and size_of(*fields[1:3]) is not None:
-            return layout, size_of(*fields[1:3]), fields[1:3], fields[3:]
-    if len(fields) < 2 or size_of(*fields[-2:]) is None:
-        return 0, 0, [], fields
-    names = [name for name, _ in fields[:-2]]
-    layout = next((l for l in (4, 3, 2) if names[:len(GIVEN[l])] == GIVEN[l]), 1)
-    return layout, size_of(*fields[-2:]), fields[-2:], fields[:-2]
+        at = 1 if layout == 5 else 2  # where PNum stands
+        if len(fields) < at + 2 or fields[0] != ['H', word] or (at == 2 and not is_session(fields[1])):
+            continue
+        size = size_of(*fields[at:at + 2])
+        if size is not None:
+            session = fields[1][1] if at == 2 else ''
+            return layout, size, digits(size, fields[at:at + 2]) + session, fields[at + 2:]
+    if len(fields) < 2:
+        return 0, 0, '', fields
+    size = size_of(*fields[-2:])
+    if size is not None:
+        names = [name for name, _ in fields[:-2]]
+        layout = next((l for l in (4, 3, 2) if names[:len(GIVEN[l])] == GIVEN[l]), 1)
+        return layout, size, digits(size, fields[-2:]), fields[:-2]
+    session, (name, pnum) = fields[-2:]
+    if is_session(session) and name == 'PNum' and re.fullmatch(PLAIN, pnum) and int(pnum) < 16 ** 8:
+        return OF_SESSION, 0, f'{int(pnum):08x}{session[1]}', fields[:-2]
+    return 0, 0, '', fields
 
 
 def pack(datagram):
@@ -138,10 +158,7 @@ def pack(datagram):
         return None
     fields = [field.split(':', 1) for field in found.group(1)[:-1].split(';')]
     layout, size, numbers, rest = layout_of(fields)
-    digits = f'{0x80 | layout << 3 | size:02x}'
-    for (_, number), width in zip(numbers, SIZES[size]):
-        if width:
-            digits += f'{int(number):0{width}x}'
+    digits = f'{0x80 | layout << 3 | size:02x}{numbers}'
     for index, (name, values) in enumerate(rest):
         if index >= len(GIVEN.get(layout, [])):
             if name in CODES:
@@ -219,6 +236,10 @@ class Digits:
             if size > 64:
                 raise ValueError('a reading too long')
             return f'{first},{second},x{self.take(2 * size)}'
+        if form == 'session':
+            if self.take(1) != '0':
+                raise ValueError('a session id of another form')
+            return self.take(16)
         number = self.number({'flag': 1, 'short': 3, 'hundredths': 3, 'drive': 4, 'bldc': 4}[form])
         if form == 'hundredths':
             return f'{number // 100}.{number % 100:02}'
@@ -234,18 +255,19 @@ def unpack(packed):
         raise ValueError('the length')
     head, checksum = packed[0], int.from_bytes(packed[-4:], 'big')
     layout, size = head >> 3 & 7, head & 7
-    if head >> 6 != 2 or layout == 7:
+    if head >> 6 != 2:
         raise ValueError('the version')
-    if layout == 0 and size != 0:
+    if layout in (0, OF_SESSION) and size != 0:
         raise ValueError('sizes without numbers')
     digits = Digits(packed[1:-4].hex())
-    pnum, time = (digits.number(width) for width in SIZES[size])
+    pnum, time = (digits.number(width) for width in ((8, 0) if layout == OF_SESSION else SIZES[size]))
+    session = [('SID', digits.take(16))] if layout in (6, OF_SESSION) else []
     fields = [(name, digits.value(form_of(name))) for name in GIVEN.get(layout, [])]
     while len(digits.digits) >= 2:
         fields.append(digits.field())
     if digits.digits not in ('', 'f') or (layout == 0 and not fields):
         raise ValueError('the end')
-    numbers = [('PNum', str(pnum)), ('T', str(time))]
+    numbers = [*session, ('PNum', str(pnum)), *([('T', str(time))] if layout != OF_SESSION else [])]
     if layout in HEARTBEATS:
         fields = [('H', HEARTBEATS[layout]), *numbers, *fields]
     elif layout != 0:

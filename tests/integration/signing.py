@@ -6,6 +6,7 @@ Nothing of r4 is used here.
 import base64
 import hashlib
 import re
+import secrets
 import socket
 import time
 import zlib
@@ -26,7 +27,7 @@ def tag_of(key, nonce, before):
 
 
 class SigningHost:
-    """An echo host that signs, on UDP."""
+    """A host that signs, on UDP."""
 
     def __init__(self, board_url, key_id, key):
         port = int(re.search(r':(\d+)', board_url.removeprefix('udp://')).group(1))
@@ -35,7 +36,8 @@ class SigningHost:
         self.socket.bind(('127.0.0.1', 0))
         self.key_id = key_id
         self.key = key
-        self.pnum = 2**31 + 4711
+        self.session = secrets.token_hex(8)
+        self.pnum = 4711
         self.counter = time.time_ns() // 1000
         self.nonce = None
         self.board_t = 0   # of the newest datagram
@@ -54,7 +56,7 @@ class SigningHost:
     def fields(self, command, more=''):
         self.pnum += 1
         t = self.echo if command.startswith('H:') else time.time_ns() // 1000000
-        return f'{command};{more}PNum:{self.pnum};T:{t};'
+        return f'{command};{more}SID:{self.session};PNum:{self.pnum};T:{t};'
 
     def signed(self, fields, *, board_t=None, counter=None, key_id=None, key=None):
         self.counter = max(self.counter + 1, time.time_ns() // 1000)

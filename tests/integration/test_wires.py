@@ -80,10 +80,10 @@ def judge(host, began, what):
 def test_a_cable_is_pulled_and_plugged_in_again_and_nothing_is_missed():
     with wired('pty', 'udp') as (board, wires), carried(wires) as host:
         def told(event, **counts):
-            wire = board.next(lambda each: each.get('wire', {}).get('event') == event)['wire']
+            wire = board.next(lambda each: each.get('path', {}).get('event') == event)['path']
             assert {name: wire[name] for name in counts} == counts, wire
 
-        told('joined', wires=2, joins=1, losses=0)
+        told('joined', paths=2, joins=1, losses=0)
         began = time.monotonic()
         cable = wires[0]
         cable.pull()
@@ -91,8 +91,8 @@ def test_a_cable_is_pulled_and_plugged_in_again_and_nothing_is_missed():
         plugged = time.monotonic()
         cable.plug_in()
         back = host.next(is_wire(cable))['came'] - plugged
-        told('left', wires=1, joins=1, losses=1)
-        told('joined', wires=2, joins=2, losses=1)
+        told('left', paths=1, joins=1, losses=1)
+        told('joined', paths=2, joins=2, losses=1)
         judge(host, began, f'told of it after {lost * 1e3:.0f} ms, used again after {back * 1e3:.0f} ms')
     assert lost <= within(REPORTED_WITHIN_S) and back <= within(BACK_WITHIN_S)
 
@@ -124,7 +124,7 @@ def test_commands_are_executed_once_each_while_wires_come_and_go():
                     results.append(host.next())
 
             def both():
-                board.next(lambda each: each.get('wire', {}).get('event') == 'joined' and each['wire']['wires'] == 2)
+                board.next(lambda each: each.get('path', {}).get('event') == 'joined' and each['path']['paths'] == 2)
 
             both()
             confirmed(50)
