@@ -10,7 +10,6 @@
 #include "allocations.hpp"
 #include "host/session/session.hpp"
 #include "protocol/datagram/datagram_writer.hpp"
-#include "protocol/link/board_link.hpp"
 
 namespace r4::bench {
 namespace {
@@ -21,7 +20,7 @@ class Receiver final : Session::Handler {
     SessionOptions options;
     options.arming = Arming::off;
     Session::Handler& handler = *this;
-    session_.emplace(handler, options, echo_host_first_pnum + 100, BoardRole::control, wires);
+    session_.emplace(handler, options, BoardRole::control, wires);
     for (std::size_t wire = 0; wire < wires && wires > 1; ++wire) {
       session_->on_transport(wire, true, Time{0});
       session_->poll(now(0));

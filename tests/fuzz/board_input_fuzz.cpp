@@ -5,9 +5,10 @@
 // The input is lines. A line is a control byte and a payload. Control: bits 0-1 the peer, bit 2 the
 // port, bit 3 a checksum is put behind the payload, bits 4-6 how much time passes before. A payload
 // that begins with '!' is something that happens around the board. In others, to reach what only a
-// host in session reaches: $T stands for the T of the newest heartbeat that the peer heard, $N for
-// its next packet number in the upper half, $L for its last, $P for its next in the lower half, $A
-// for a right signature of what is before it, $W for the newest LEASE that the peer was told. If the first payload is "!k", the board has a key:
+// host in session reaches: $T stands for the T of the newest heartbeat that the peer heard, $S for
+// its session id, as "SID:...;", $N for its next packet number, $L for its last, $P for its next as a
+// paper host, $A for a right signature of what is before it, $W for the newest LEASE that the peer was
+// told. If the first payload is "!k", the board has a key:
 // then nothing is executed, and no heartbeat feeds, without such a signature, but a stop.
 #include <algorithm>
 #include <cstdint>
@@ -18,6 +19,7 @@
 
 #include "firmware/application/application.hpp"
 #include "protocol/datagram/crc32.hpp"
+#include "protocol/datagram/numbers.hpp"
 #include "protocol/keys/authentication.hpp"
 #include "protocol/messages/state_fields.hpp"
 
@@ -126,6 +128,8 @@ class World final : public firmware::Hal, public firmware::Observer {
     for (int i = 0; i < uart_channels; ++i) config.uarts[i] = &uarts_[i];
     board_ = std::make_unique<firmware::Application>(*this, config, this);
     for (int i = 0; i < ports; ++i) {
+      // The same peer on another port is another path of the same session.
+      for (std::uint32_t peer = 0; peer < peers; ++peer) hosts_[i][peer].sid = peer + 1;
       ports_[i].world = this;
       ports_[i].number = i;
       ports_[i].limit = i == 0 ? max_datagram : 508;
@@ -158,8 +162,9 @@ class World final : public firmware::Hal, public firmware::Observer {
   };
   struct Host {
     std::uint32_t board_t = 0;
-    std::uint32_t high = echo_host_first_pnum + 1000;
-    std::uint32_t low = 0;
+    std::uint32_t number = 1000;  // of a host with a session id
+    std::uint32_t paper_number = 0;
+    SessionId sid = no_session;
     std::set<std::uint32_t> told;  // LEASEs
     std::uint32_t newest_told = 0;
     bool watches = false;  // it has echoed one
@@ -222,18 +227,18 @@ class World final : public firmware::Hal, public firmware::Observer {
     ++sent_;
   }
 
-  // The host in control gets states, on each of its wires, everyone at the ports where it is not, and who has echoed
+  // The host in control gets states, on each of its paths, everyone at the ports where it is not, and who has echoed
   // what it was told, for the time of a lease.
   bool may_get_states(int port, std::uint32_t peer) const {
     const BoardLink& link = board_->link();
     const Host& host = hosts_[port][peer];
     if (host.watches && now_ms_ - host.watches_ms < Watchers::lease_ms) return true;
     if (!link.has_owner()) return false;
-    const SessionWires& wires = board_->wires();
-    if (wires.has(Source{static_cast<std::uint8_t>(port), peer})) return true;
+    const SessionPaths& paths = board_->paths();
+    if (paths.has(Source{static_cast<std::uint8_t>(port), peer})) return true;
     if (peer != everyone) return false;
-    for (int i = 0; i < wires.size(); ++i) {
-      if (wires[i].port == port) return false;
+    for (int i = 0; i < paths.size(); ++i) {
+      if (paths[i].port == port) return false;
     }
     return true;
   }
@@ -319,7 +324,7 @@ class World final : public firmware::Hal, public firmware::Observer {
       if (stop_) {
         require(outputs_ == Outputs() && board().reason() == SafeReason::stop);
       } else {
-        require(signed_ && board().wires().has(from));
+        require(signed_ && board().link().is_session_of({from, datagram.session_id()}));
         require(executed_ == datagram.command_count());  // all of a group, or none
         require(executed_ <= max_group);
         require(datagram.has_pnum() && board().link().last_executed() == executed_pnum_);
@@ -352,14 +357,20 @@ class World final : public firmware::Hal, public firmware::Observer {
           bytes += std::to_string(host.board_t);
           break;
         case 'N':
-          bytes += std::to_string(host.high++);
+          bytes += std::to_string(host.number++);
           break;
         case 'L':
-          bytes += std::to_string(host.high - 1);
+          bytes += std::to_string(host.number - 1);
           break;
         case 'P':
-          bytes += std::to_string(host.low++);
+          bytes += std::to_string(host.paper_number++);
           break;
+        case 'S': {
+          char digits[session_id_size];
+          write_session_id(digits, host.sid);
+          bytes += "SID:" + std::string(digits, sizeof digits) + ";";
+          break;
+        }
         case 'W':
           bytes += std::to_string(host.newest_told);
           break;

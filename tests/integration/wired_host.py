@@ -115,7 +115,7 @@ def is_wire(place, carries=True):
 
 def has_joined(wires, event='joined'):
     """Of a board: it has so many wires to its host, with one that it did not have."""
-    return lambda each: each.get('wire', {}).get('event') == event and each['wire']['wires'] == wires
+    return lambda each: each.get('path', {}).get('event') == event and each['path']['paths'] == wires
 
 
 def has_left(wires):
