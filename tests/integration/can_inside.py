@@ -329,7 +329,7 @@ def test_who_watches_sends_a_frame_of_its_own_and_only_while_nobody_drives(url, 
 
 def test_what_a_host_of_another_computer_says_is_recorded(tmp_path):
     path = tmp_path / 'drive.r4log'
-    said = [re.compile(rf'^[0-9.]+ 1> {what};PNum:\d+;T:\d+;\^0x', re.MULTILINE) for what in ('H:ROS2-R4', 'Q:ID')]
+    said = [re.compile(rf'^[0-9.]+ 1> {what};SID:[0-9a-f]{{16}};PNum:\d+;(T:\d+;)?\^0x', re.MULTILINE) for what in ('H:ROS2-R4', 'Q:ID')]
     with Board('can://can0?node=3', options=PATIENTLY), monitor('can://can0?node=3'), \
             Running('record', 'can://can1?node=3', '-o', str(path)) as recorder:
         deadline = time.monotonic() + PATIENCE_S

@@ -23,8 +23,9 @@ STATE_PERIOD_S, HEARTBEAT_S, HOST_HEARTBEAT_S, RETRY_S = 0.05, 0.5, 0.1, 0.05
 
 # --- datagrams (protocol.md, 1)
 
-def datagram(fields, pnum, time_ms):
-    text = f'{fields};PNum:{pnum};T:{time_ms};^'
+def datagram(fields, pnum, time_ms, session=None):
+    named = f'SID:{session};' if session else ''
+    text = f'{fields};{named}PNum:{pnum};T:{time_ms};^'
     return f'{text}0x{zlib.crc32(text.encode()):x}^'
 
 
@@ -185,14 +186,15 @@ class Peer:
 # --- a host
 
 class Host(Peer):
-    """An echo host (protocol.md, 4.2) of one board."""
+    """A host (protocol.md, 4.1) of one board."""
 
     def __init__(self, interface, node, fd=False, block_size=0, stmin=0, packs=True):
         super().__init__(interface, TO_BOARD + node, REPLIES + node,
                          [REPLIES + node, TELEMETRY + node, WENT_SAFE + node], fd)
         self.receivers = {REPLIES + node: Receiver(lambda data: self.send_frame(self.own_id, data), block_size, stmin),
                           TELEMETRY + node: Receiver()}
-        self.pnum = 2 ** 31 + random.randrange(2 ** 30)
+        self.session = f'{random.randrange(1, 2 ** 64):016x}'
+        self.pnum = random.randrange(2 ** 32)
         self.board_time = 0
         self.cause = 0  # as the newest heartbeat told it
         self.beats = True
@@ -219,7 +221,7 @@ class Host(Peer):
     def send(self, fields):
         """A new datagram; its number and bytes."""
         self.pnum = (self.pnum + 1) % 2 ** 32
-        text = datagram(fields, self.pnum, self.board_time)
+        text = datagram(fields, self.pnum, self.board_time, self.session)
         self._send_text(text)
         return self.pnum, text
 

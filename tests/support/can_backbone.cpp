@@ -40,7 +40,8 @@ class Voice {
   explicit Voice(std::uint64_t seed) : random_(seed) {
     board_t_ = static_cast<std::uint32_t>(random_.next());
     board_pnum_ = static_cast<std::uint32_t>(random_.between(100000, 999999));
-    host_pnum_ = 0x80000000U | static_cast<std::uint32_t>(random_.next() & 0x3FFFFFFFU);
+    host_pnum_ = static_cast<std::uint32_t>(random_.next());
+    session_ = random_.next();
   }
 
   std::string state(FieldSet fields, std::uint64_t now_ns) {
@@ -75,9 +76,9 @@ class Voice {
   std::string host_heartbeat(std::uint64_t now_ns) {
     DatagramWriter writer(buffer_.data(), buffer_.size());
     writer.field("H").values("ROS2-R4");
-    return text(writer.finish(host_pnum_++, board_time(now_ns)));
+    return text(writer.session(session_).finish(host_pnum_++, board_time(now_ns)));
   }
-  std::string command(std::uint64_t now_ns) {
+  std::string command() {
     DatagramWriter writer(buffer_.data(), buffer_.size());
     if (random_.chance(0.5)) {
       const Drive drive = any_drive();
@@ -87,8 +88,7 @@ class Voice {
       const std::uint32_t us = static_cast<std::uint32_t>(random_.between(500, 2500));
       writer.field("S").value(us).value(channel(16));
     }
-    const std::uint64_t host_t_ms = 0x20000000U + now_ns / 1000000;
-    return text(writer.finish(host_pnum_++, host_t_ms));
+    return text(writer.session(session_).packet(host_pnum_++).finish());
   }
 
  private:
@@ -114,6 +114,7 @@ class Voice {
   std::uint32_t board_t_;
   std::uint32_t board_pnum_;
   std::uint32_t host_pnum_;
+  SessionId session_;
 };
 
 // One direction of a board's link: datagrams in, datagrams out. No more than one frame of it is in

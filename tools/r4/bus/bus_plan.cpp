@@ -58,7 +58,7 @@ class Speaker {
     DatagramWriter writer(buffer_.data(), buffer_.size());
     writer.field("H").values("ROS2-R4");
     const std::uint32_t t_ms = any();
-    return {text(writer.finish(host_pnum(), t_ms))};
+    return {text(writer.session(session_id).finish(any(), t_ms))};
   }
   // Motors and servos in turn; the longest command is the stepper's.
   Datagrams command() {
@@ -72,20 +72,20 @@ class Speaker {
       writer.field("O").value(between(0, pwm_max)).value(between(0, 1));
       writer.value(between(1, osmc_channels));
     }
-    const std::uint32_t t_ms = any();
-    return {text(writer.finish(host_pnum(), t_ms))};
+    return {text(writer.session(session_id).packet(any()).finish())};
   }
 
  private:
+  static constexpr SessionId session_id = 0x0123456789abcdef;  // each is as long
+
   static std::string text(Text bytes) { return {bytes.data(), bytes.size()}; }
 
   std::uint32_t between(std::uint32_t low, std::uint32_t high) {
     return longest_ ? high : low + static_cast<std::uint32_t>(random_() % (high - low + 1));
   }
   std::uint32_t any() { return longest_ ? widest : static_cast<std::uint32_t>(random_()); }
-  // A board that has sent for some hours; a host counts from the upper half.
+  // A board that has sent for some hours; a host's numbers begin at random.
   std::uint32_t board_pnum() { return longest_ ? widest : between(100000, 999999); }
-  std::uint32_t host_pnum() { return longest_ ? widest : 0x80000000U | (any() >> 2); }
   std::int32_t position(std::uint32_t range) {
     return longest_ ? std::numeric_limits<std::int32_t>::min()
                     : static_cast<std::int32_t>(between(0, 2 * range)) -
@@ -111,7 +111,7 @@ class Speaker {
     for (std::uint16_t& cm : state.ultrasonic_cm) cm = static_cast<std::uint16_t>(between(5, 400));
     for (Bldc& bldc : state.bldc) bldc.speed = static_cast<std::uint16_t>(between(0, pwm_max));
     state.relays = static_cast<std::uint8_t>(between(0, 255));
-    state.last_command = host_pnum();
+    state.last_command = any();
     state.rx_ok = board_pnum();
     if (!longest_) return;
     state.rx_crc = state.rx_lost = state.rx_duplicate = state.rx_refused = state.late = widest;
