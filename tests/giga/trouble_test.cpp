@@ -331,16 +331,16 @@ TEST(GigaSettings, AKeySurvivesARestartAndIsAskedForOnCan) {
   bench.drive(again, bench.usb());
 }
 
-TEST(GigaReport, TellsByHowManyWiresTheHostIsHeard) {
+TEST(GigaReport, ReportsHowManyPathsTheSessionHas) {
   GigaBench bench;
   bench.boot();
-  EXPECT_FALSE(has_line(bench.report(), "Wires: "));
+  EXPECT_FALSE(has_line(bench.report(), "Paths: "));
   const std::string heartbeat = with_crc("H:ROS2-R4;PNum:2147484660;T:0;");
   bench.usb()(heartbeat);
   bench.run_ms(20);
   bench.can()(heartbeat);
   bench.run_ms(20);
-  EXPECT_TRUE(has_line(bench.report(), "Wires: 2; joined 1, lost 0"));
+  EXPECT_TRUE(has_line(bench.report(), "Paths: 2; joined 1, lost 0"));
 }
 
 TEST(GigaSettings, TellWhichChipsAreFitted) {

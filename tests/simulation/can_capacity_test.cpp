@@ -50,7 +50,7 @@ TEST(CanCapacity, EightBoardsInPackedFormFitOneClassicBus) {
 
 // Ten times a second, all that there is wants the bus at once: more than a state's period of work.
 // The boards that lose the arbitration skip a state then.
-constexpr std::uint32_t replaced_in_step = 10;
+constexpr std::uint32_t replaced_in_step = 12;
 
 TEST(CanCapacity, EightBoardsFitWhenAllOfThemSpeakAtTheSameInstant) {
   BackboneOptions options;

@@ -191,6 +191,8 @@ void World::on_path(std::uint32_t, Source path, bool joined) {
     return;
   }
   ++report_.joins;
+  if (!fed_.empty() && fed_.back().from.host < 0)
+    return;  // a stranger's session, with what paths it likes
   const auto its = whose_.find(path.peer);
   const bool of_host = its != whose_.end() && !fed_.empty() && its->second == fed_.back().from.host;
   if (!of_host) violate(fmt::format("joined: peer {} is not of the session's host", path.peer));

@@ -320,7 +320,7 @@ class Backbone {
       commands->say({voice->host_heartbeat(now_ns), now_ns, false, true});
     });
     every(options_.commands_hz, [=](std::uint64_t now_ns) {
-      commands->say({voice->command(now_ns), now_ns, false, false});
+      commands->say({voice->command(), now_ns, false, false});
     });
   }
 

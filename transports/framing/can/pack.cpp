@@ -2,6 +2,7 @@
 // The writing half of packed_form.hpp.
 #include "../../../protocol/datagram/grammar.hpp"
 #include "../../../protocol/datagram/numbers.hpp"
+#include "packed_digits.hpp"
 #include "packed_form.hpp"
 #include "packed_layout.hpp"
 
@@ -41,51 +42,6 @@ class Fields {
   std::uint64_t ends_;
 };
 
-// --- digits out
-
-class Digits {
- public:
-  Digits(std::uint8_t* out, std::uint8_t* end) : at_(out), end_(end) {}
-
-  // The last `digits` hexadecimal digits of `value`; at most 14.
-  bool put(std::uint64_t value, unsigned digits) {
-    // In variables of its own: bytes written may alias any member.
-    const std::uint64_t pending = pending_ << 4 * digits | value;
-    unsigned count = count_ + digits;
-    std::uint8_t* at = at_;
-    if (end_ - at < static_cast<std::ptrdiff_t>((count + 1) / 2)) {
-      end_ = at;  // for good: what follows must not fit either
-      count_ = 1;
-      return false;
-    }
-    while (count >= 2) {
-      count -= 2;
-      *at++ = static_cast<std::uint8_t>(pending >> 4 * count);
-    }
-    at_ = at;
-    pending_ = pending;
-    count_ = count;
-    return true;
-  }
-  bool put_bytes(const char* begin, const char* end) {
-    for (; begin != end; ++begin) {
-      if (!put(static_cast<unsigned char>(*begin), 2)) return false;
-    }
-    return true;
-  }
-  // Fills the last byte; where the digits end.
-  std::uint8_t* finish() {
-    if (count_ != 0) put(0xF, 1);
-    return at_;
-  }
-
- private:
-  std::uint8_t* at_;
-  std::uint8_t* end_;
-  std::uint64_t pending_ = 0;  // its last `count_` digits are still to be written
-  unsigned count_ = 0;
-};
-
 unsigned digits_of(std::uint64_t value) {
   return value == 0 ? 0 : (67 - static_cast<unsigned>(__builtin_clzll(value))) / 4;
 }
@@ -105,16 +61,16 @@ bool take_bit(Text& text, std::uint64_t& value, unsigned weight) {
   return true;
 }
 
-bool put_fixed(Digits& digits, std::uint64_t value, std::uint64_t max, unsigned count) {
+bool put_fixed(DigitWriter& digits, std::uint64_t value, std::uint64_t max, unsigned count) {
   return value <= max && digits.put(value, count);
 }
 
-bool put_count(Digits& digits, std::uint64_t value) {
+bool put_count(DigitWriter& digits, std::uint64_t value) {
   const unsigned count = digits_of(value);
   return count <= longest_count && digits.put(count, 1) && digits.put(value, count);
 }
 
-bool put_hundredths(Digits& digits, Text text) {
+bool put_hundredths(DigitWriter& digits, Text text) {
   std::int32_t value = 0;
   // Exactly two decimals, no sign, no leading zero but the one before the point.
   return text.size() >= 4 && *(text.end() - 3) == '.' && (text[0] != '0' || text.size() == 4) &&
@@ -122,7 +78,7 @@ bool put_hundredths(Digits& digits, Text text) {
          put_fixed(digits, static_cast<std::uint64_t>(value), short3_max, 3);
 }
 
-bool put_steps(Digits& digits, Text text) {
+bool put_steps(DigitWriter& digits, Text text) {
   std::uint64_t value = 0;
   const bool negative = !text.empty() && text[0] == '-';
   if (!parse_plain(negative ? text.substr(1) : text, value) || (negative && value == 0) ||
@@ -147,11 +103,12 @@ unsigned hex_digit_of(char c) {
 }
 
 // Of what is rare one copy is enough.
-__attribute__((noinline)) bool put_seldom(Digits& digits, std::uint64_t value, unsigned count) {
+__attribute__((noinline)) bool put_seldom(DigitWriter& digits, std::uint64_t value,
+                                          unsigned count) {
   return digits.put(value, count);
 }
 
-__attribute__((noinline)) bool put_device_bytes(Digits& digits, Text text) {
+__attribute__((noinline)) bool put_device_bytes(DigitWriter& digits, Text text) {
   std::uint64_t first = 0;
   std::uint64_t second = 0;
   if (!take_plain(text, first) || !take_plain(text, second)) return false;
@@ -187,13 +144,13 @@ bool take_session(Text text, std::uint64_t& out) {
   return true;
 }
 
-bool put_session(Digits& digits, std::uint64_t sid) {
+bool put_session(DigitWriter& digits, std::uint64_t sid) {
   return digits.put(sid >> 32, session_digits / 2) &&
          digits.put(sid & 0xFFFFFFFFU, session_digits / 2);
 }
 
 // In the form of the field; false if its text is not one that the form would be written as.
-bool put_in_form(Digits& digits, PackedForm form, Text text) {
+bool put_in_form(DigitWriter& digits, PackedForm form, Text text) {
   std::uint64_t value = 0;
   std::uint64_t bits = 0;
   switch (form) {
@@ -246,7 +203,7 @@ const char* end_of_bytes(const char* at, const char* end) {
   return at;
 }
 
-bool put_value(Digits& digits, Text value) {
+bool put_value(DigitWriter& digits, Text value) {
   const unsigned code = value.empty() || digit_of(value[0]) < 10 ? no_word : code_of(value);
   if (code != no_word) return digits.put(digit_word << 8 | code, 3);
   for (const char *at = value.begin(), *const end = value.end(); at != end;) {
@@ -264,7 +221,7 @@ bool put_value(Digits& digits, Text value) {
   return true;
 }
 
-bool put_text(Digits& digits, Text values) {
+bool put_text(DigitWriter& digits, Text values) {
   const char* at = values.begin();
   for (const char* end = at;; at = ++end) {
     while (end != values.end() && *end != ',') ++end;
@@ -276,7 +233,7 @@ bool put_text(Digits& digits, Text values) {
 
 // --- fields
 
-bool put_name(Digits& digits, Text name, PackedForm& form) {
+bool put_name(DigitWriter& digits, Text name, PackedForm& form) {
   const unsigned code = code_of(name);
   if (code != no_word) {
     form = words[code].form;
@@ -288,7 +245,7 @@ bool put_name(Digits& digits, Text name, PackedForm& form) {
          digits.put_bytes(name.begin(), name.end());
 }
 
-bool put_values(Digits& digits, PackedForm form, Text values) {
+bool put_values(DigitWriter& digits, PackedForm form, Text values) {
   if (form == PackedForm::text) return put_text(digits, values);
   return put_in_form(digits, form, values) ||
          (digits.put(digit_escape, 1) && put_text(digits, values));
@@ -415,7 +372,7 @@ std::size_t write_packed(Text datagram, std::uint8_t* out, std::size_t capacity)
   const char* end = text.end();
   Numbers numbers;
   const Layout layout = choose_layout(fields, end, numbers);
-  Digits digits(out + 1, out + limit - checksum_size);
+  DigitWriter digits(out + 1, out + limit - checksum_size);
   unsigned head = version_bits | static_cast<unsigned>(layout) << 3;
   if (layout != Layout::plain_fields) {
     head |= numbers.size;
