@@ -26,15 +26,17 @@ std::uint32_t BridgeAudience::new_token(Peer to, Time now) {
   return token;
 }
 
-void BridgeAudience::on_question(Peer from, std::optional<std::uint32_t> pnum, Time now) {
-  questions_[next_question_++ % questions_.size()] = {from, pnum, now};
+void BridgeAudience::on_question(Peer from, std::optional<std::uint32_t> pnum, SessionId sid,
+                                 Time now) {
+  questions_[next_question_++ % questions_.size()] = {from, pnum, sid, now};
 }
 
-std::optional<Peer> BridgeAudience::asker_of(std::optional<std::uint32_t> pnum, Time now) const {
+std::optional<Peer> BridgeAudience::asker_of(std::optional<std::uint32_t> pnum, SessionId sid,
+                                             Time now) const {
   std::optional<Peer> asker;
   Time newest;
   for (const Question& each : questions_) {
-    if (each.pnum != pnum || each.at == Time() || now - each.at > curiosity) continue;
+    if (each.pnum != pnum || each.sid != sid || each.at == Time() || now - each.at > curiosity) continue;
     if (asker && each.at < newest) continue;
     asker = each.from;
     newest = each.at;

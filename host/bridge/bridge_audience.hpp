@@ -38,10 +38,10 @@ class BridgeAudience {
   // the nonce.
   void listen(Peer from, Time now) { place_of(from, now).listens_until = now + curiosity; }
 
-  // It has asked something by a datagram of that number; none: of no number.
-  void on_question(Peer from, std::optional<std::uint32_t> pnum, Time now);
-  // The host that has asked that last.
-  std::optional<Peer> asker_of(std::optional<std::uint32_t> pnum, Time now) const;
+  // It has asked something by a datagram of that number and session; none: of no number.
+  void on_question(Peer from, std::optional<std::uint32_t> pnum, SessionId sid, Time now);
+  // The host that has asked that last. An answer to a session goes to nobody who does not know its id.
+  std::optional<Peer> asker_of(std::optional<std::uint32_t> pnum, SessionId sid, Time now) const;
 
   // Calls `call(peer)` for each that hears states.
   template <class Call>
@@ -78,6 +78,7 @@ class BridgeAudience {
   struct Question {
     Peer from = everyone;
     std::optional<std::uint32_t> pnum;
+    SessionId sid = no_session;
     Time at;
   };
 

@@ -225,7 +225,7 @@ void BridgedPair::on_question(const Datagram& datagram, Peer from, Time now) {
   }
   std::optional<std::uint32_t> pnum;
   if (datagram.has_pnum()) pnum = datagram.pnum();
-  if (!known) audience_.on_question(from, pnum, now);
+  if (!known) audience_.on_question(from, pnum, sid, now);
   pass_on(datagram);
 }
 
@@ -299,7 +299,7 @@ void BridgedPair::deliver_to_hosts(const Datagram& datagram, bool is_state, Time
   });
 }
 
-// To each path of the session that it names. Without a session it answers a watcher's question, or a paper host.
+// To a peer that asked before its first heartbeat, else to each path of the session that the answer names.
 void BridgedPair::on_answer(const Datagram& answer, MessageKind kind, Time now) {
   Nack nack;
   Identity identity;
@@ -313,11 +313,11 @@ void BridgedPair::on_answer(const Datagram& answer, MessageKind kind, Time now) 
   } else if (identity.has_asked) {
     pnum = identity.asked;
   }
-  const SessionId sid = answer.session_id();
   const auto pass = [&](Peer peer) { deliver(board_, hosts_, answer, Priority::normal, peer); };
-  const std::optional<Peer> asker =
-      sid == no_session ? audience_.asker_of(pnum, now) : std::nullopt;
-  asker ? pass(*asker) : known_.for_each_of(sid, now, pass);
+  const SessionId sid = answer.session_id();
+  const std::optional<Peer> asker = audience_.asker_of(pnum, sid, now);
+  if (asker && !known_.knows(*asker, sid, now)) return pass(*asker);
+  known_.for_each_of(sid, now, pass);
 }
 
 void BridgedPair::watch_board(Time now) {

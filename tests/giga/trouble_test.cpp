@@ -335,10 +335,16 @@ TEST(GigaReport, ReportsHowManyPathsTheSessionHas) {
   GigaBench bench;
   bench.boot();
   EXPECT_FALSE(has_line(bench.report(), "Paths: "));
-  const std::string heartbeat = with_crc("H:ROS2-R4;PNum:2147484660;T:0;");
-  bench.usb()(heartbeat);
+  const std::string named = "H:ROS2-R4;SID:0123456789abcdef;";
+  bench.usb_lines();
+  bench.usb()(with_crc(named + "PNum:1;T:0;"));
   bench.run_ms(20);
-  bench.can()(heartbeat);
+  const std::string offered = bench.usb_lines().back();  // "H:R4-ROS2;PNum:1;T:…;^…^"
+  const std::size_t at = offered.find(";T:");
+  ASSERT_NE(at, std::string::npos) << offered;
+  const std::string echo = offered.substr(at + 1, offered.find(';', at + 1) - at);
+  bench.usb()(with_crc(named + "PNum:2;" + echo));
+  bench.can()(with_crc(named + "PNum:2;" + echo));
   bench.run_ms(20);
   EXPECT_TRUE(has_line(bench.report(), "Paths: 2; joined 1, lost 0"));
 }

@@ -17,6 +17,8 @@ def captured_lines():
     with open(os.path.join(DATA, 'paper_capture.tsv'), encoding='ascii') as file:
         return [line.rstrip('\n').split('\t')[1] for line in file]
 
+NAMES = [name for name in packed_form.NAMES if name != 'SID']  # r4 checks the values of that one
+
 
 def with_crc(fields):
     return f'{fields}^0x{zlib.crc32((fields + "^").encode()):x}^'
@@ -40,8 +42,12 @@ def any_fields(rng):
     fields = rng.choice(['', '', state, state + 'SAFE:0;CMD:77;', state + 'SAFE:1;', everything, 'H:R4-ROS2;',
                          'H:ROS2-R4;', 'H:R4-ROS2;PNum:7;T:8;'])
     for _ in range(rng.randrange(6)):
-        name = rng.choice([rng.choice(packed_form.NAMES), 'Other', 'a' * rng.randrange(1, 17)])
+        name = rng.choice([rng.choice(NAMES), 'Other', 'a' * rng.randrange(1, 17)])
         fields += f'{name}:{any_values(rng)};'
+    if rng.random() < 0.3:
+        fields += f'SID:{rng.randrange(1, 2 ** 64):016x};'
+        if rng.random() < 0.5:
+            return f'{fields}PNum:{rng.getrandbits(rng.randrange(33))};'
     if rng.random() < 0.7 or not fields:
         fields += f'PNum:{rng.getrandbits(rng.randrange(33))};T:{rng.getrandbits(rng.randrange(65))};'
     return fields
