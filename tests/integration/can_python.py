@@ -389,9 +389,13 @@ class Board(Peer):
         if fields.get('H') == 'ROS2-R4':
             self._on_heartbeat(int(fields['T']), int(fields['PNum']))
         elif 'Q' in fields:
-            self.answers.append('I:R4,python,second,none')
+            self.answers.append('I:R4,python,second,none' + self._asker(fields))
         elif self.armed:
             self._on_command(fields)
+
+    @staticmethod
+    def _asker(fields):
+        return f';SID:{fields["SID"]}' if 'SID' in fields else ''
 
     def _on_heartbeat(self, echo, pnum):
         if self.state == 'CONNECTING' and echo == 0:
@@ -409,15 +413,15 @@ class Board(Peer):
         if not self.obeys:
             return
         if self.newest is not None and not 0 < (pnum - self.newest) % 2 ** 32 <= 65536:
-            self._refuse(pnum, 'DUPLICATE' if pnum == self.newest else 'STALE')
+            self._refuse(fields, 'DUPLICATE' if pnum == self.newest else 'STALE')
             return
         self.newest = pnum
         letter = next(iter(fields))
         if letter in self.refuses:
-            self._refuse(pnum, 'SAFE' if self.safe else 'RANGE')
+            self._refuse(fields, 'SAFE' if self.safe else 'RANGE')
             return
         if letter == 'E' and fields[letter] != f'CLEAR,{self.cause if self.safe == 2 else 0}':
-            self._refuse(pnum, 'STALE')
+            self._refuse(fields, 'STALE')
             return
         self.executed.append(f'{letter}:{fields[letter]}')
         self.last_command = pnum
@@ -428,5 +432,5 @@ class Board(Peer):
         elif letter == 'E':
             self.safe = 0
 
-    def _refuse(self, pnum, code):
-        self.answers.append(f'N:{pnum},{code};SESSION:{self.session}')
+    def _refuse(self, fields, code):
+        self.answers.append(f'N:{fields["PNum"]},{code};SESSION:{self.session}{self._asker(fields)}')
