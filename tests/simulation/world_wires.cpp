@@ -37,7 +37,8 @@ void World::place(Host& host) {
       continue;
     Host::Place place;
     place.wire = w;
-    const bool shared = w == 0 && (bus_stopper || (host.watcher && script_ == nullptr && random_.chance(0.1)));
+    const bool shared =
+        w == 0 && (bus_stopper || (host.watcher && script_ == nullptr && random_.chance(0.1)));
     place.peer = shared ? hosts_.front()->places.front().peer : next_peer_++;
     whose_.emplace(place.peer, host.index);
     host.places.push_back(place);
