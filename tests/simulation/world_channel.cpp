@@ -162,7 +162,7 @@ void World::hand_over(int slot) {
     const bool plugged = now_us_ >= wires_[place.wire].unplugged_until_us;
     if (host.alive && plugged && place.peer == packet.peer) {
       if (several() && packet.host == 0 && packet.intact && !packet.recorded &&
-          packet.sent_us >= boot_us_) {
+          packet.sent_us > boot_us_) {
         on_told_state(place.wire, packet.bytes);
       }
       host.session->receive(static_cast<std::size_t>(packet.place), packet.bytes, host.time());
