@@ -101,8 +101,8 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
     case MessageKind::host_heartbeat:
       if (authentic) {
         on_host_heartbeat(from, datagram, now_ms);
-      } else if (rejected(verdict, kind, now_ms)) {
-        answer_heartbeat(from, now_ms);  // it tells the nonce
+      } else if (rejected(verdict, now_ms)) {
+        answer_heartbeat(from, now_ms);  // with the nonce
       }
       break;
     case MessageKind::command:
@@ -151,10 +151,10 @@ Verdict Application::judge(std::uint8_t port, MessageKind kind, const Datagram& 
   return of_host ? authentication_.verify(datagram, now_ms) : Verdict::missing;
 }
 
-// It is dropped. True if it may be answered.
-bool Application::rejected(Verdict verdict, MessageKind kind, std::uint32_t now_ms) {
+// It is dropped. True if it is answered.
+bool Application::rejected(Verdict verdict, std::uint32_t now_ms) {
   if (observer_ != nullptr) observer_->on_rejected(now_ms, verdict);
-  return authentication_.rejected(verdict, kind == MessageKind::command, now_ms);
+  return authentication_.rejected(verdict);
 }
 
 // The session's paths keep their peers, whatever other peers send.
@@ -184,6 +184,15 @@ void Application::on_path_left(Source path, std::uint32_t now_ms) {
   if (observer_ != nullptr) observer_->on_path(now_ms, path, false);
 }
 
+// A host controls the board from now on.
+void Application::on_host_found(Source at, std::uint32_t now_ms) {
+  hold_paths();
+  tell_ports();
+  watchers_.end_of(at);
+  safety_.leave(SafeReason::link);
+  schedule_.start(now_ms, setpoints_.settings.state_period_ms());
+}
+
 void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::uint32_t now_ms) {
   BoardLink::HostHeartbeat heartbeat;
   heartbeat.host = speaker_;
@@ -198,33 +207,23 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
       break;
     case HeartbeatEffect::new_session:
       paths_.begin(from, now_ms);
-      hold_paths();
-      tell_ports();
-      watchers_.end_of(from);
       // Nothing that another host, or this one before its restart, commanded may come back.
       setpoints_.outputs = Outputs();
       setpoints_.fields = FieldSet::paper_default();
       begin_devices(now_ms);
-      update_outputs(now_ms);
-      safety_.leave(SafeReason::link);
       if (heartbeat.has_pnum) paths_.count(from, heartbeat.pnum);
-      schedule_.start(now_ms, setpoints_.settings.state_period_ms());
+      on_host_found(from, now_ms);
       break;
     case HeartbeatEffect::resumed:
       paths_.resume(from, now_ms);
-      hold_paths();
-      tell_ports();
-      watchers_.end_of(from);
       if (setpoints_.settings.recovery == Recovery::rearm) setpoints_.outputs = Outputs();
       forget_uarts();
-      safety_.leave(SafeReason::link);
-      schedule_.start(now_ms, setpoints_.settings.state_period_ms());
-      break;
-    case HeartbeatEffect::hello:
-      if (link_.wants_answer(heartbeat, now_ms)) offer_heartbeat(from, now_ms);
+      on_host_found(from, now_ms);
       break;
     case HeartbeatEffect::stale:
-      if (link_.wants_answer(heartbeat, now_ms)) answer_heartbeat(from, now_ms);
+      break;
+    case HeartbeatEffect::unheard:
+      answer_heartbeat(from, now_ms);
       break;
     case HeartbeatEffect::busy:
       refuse(from, datagram, Refusal::busy, now_ms);

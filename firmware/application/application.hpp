@@ -11,8 +11,8 @@
 //     SAFE         a cause of safety.hpp is there: outputs safe; with cause `link` heartbeats only
 //
 // A session has one to four paths (session_paths.hpp): state and heartbeats go to each of them. Packet
-// numbers count per port; answers to hosts that do not control the board count apart, so the
-// controlling host sees no gaps. All times are ms of the board's clock, which wraps.
+// numbers count per port; answers to hosts that do not control the board count apart. All times are ms of
+// the board's clock, which wraps.
 #pragma once
 
 #include <cstddef>
@@ -127,10 +127,11 @@ class Application {
   Verdict judge(std::uint8_t port, MessageKind kind, const Datagram& datagram,
                 std::uint32_t now_ms);
   void on_host_heartbeat(Source from, const Datagram& datagram, std::uint32_t now_ms);
+  void on_host_found(Source at, std::uint32_t now_ms);
   void on_path_heard(Source from, std::uint32_t now_ms);
   void on_path_left(Source path, std::uint32_t now_ms);
   void hold_paths();
-  bool rejected(Verdict verdict, MessageKind kind, std::uint32_t now_ms);
+  bool rejected(Verdict verdict, std::uint32_t now_ms);
   void tell_ports();
 
   // application_commands.cpp
@@ -174,10 +175,8 @@ class Application {
   static std::uint32_t heartbeat_time(std::uint32_t now_ms);
   void send_heartbeats(std::uint32_t now_ms);
   void answer_heartbeat(Source to, std::uint32_t now_ms);
-  void offer_heartbeat(Source to, std::uint32_t now_ms);
-  void send_heartbeat(Source to, std::uint32_t& pnum, std::uint32_t now_ms);
-  void write_heartbeat(Source to, std::uint32_t& pnum, const SafeReport& safe,
-                       std::uint32_t now_ms);
+  void send_heartbeat(Source to, std::uint32_t now_ms);
+  void write_heartbeat(Source to, std::uint32_t& pnum, std::uint32_t t_ms, const SafeReport& safe);
   SafeReport shown_to_watchers() const;
   void send_states(std::uint32_t now_ms);
   void send_state(Source to, std::uint32_t& pnum, FieldSet fields, const State& state,
@@ -185,11 +184,12 @@ class Application {
   void send_part(Source to, std::uint32_t& pnum, DatagramWriter& writer, const State& state,
                  std::uint32_t t_ms);
   void fill(State& state) const;
-  void transmit(Source to, Text datagram, Priority priority);
+  void transmit(Source to, const std::uint32_t& number, Text datagram, Priority priority);
   void answer(Source to, DatagramWriter& writer, std::uint32_t now_ms);
   void identify(Source to, const Datagram& question, std::uint32_t now_ms);
   void refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms,
               std::uint8_t at = 0, std::uint32_t lease = 0);
+  bool is_of_owner() const;
   std::uint32_t& number_for(Source to);
   bool reaches(Source watcher) const;
   bool hears_all(Source watcher) const;
@@ -202,7 +202,7 @@ class Application {
   SessionPaths paths_;
   Watchers watchers_;
   Authentication authentication_;
-  AnswerBudget questions_, stops_;  // answers to hosts that do not control the board
+  AnswerBudget questions_;  // of hosts that do not control the board
   Guard guard_;
   Safety safety_;
   StateSchedule schedule_;

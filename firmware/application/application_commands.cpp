@@ -13,7 +13,7 @@ namespace firmware {
 bool Application::admit(Source from, const Datagram& datagram, Verdict verdict, Refusal refusal,
                         std::uint8_t at, std::uint32_t now_ms) {
   if (verdict != Verdict::authentic) {
-    if (rejected(verdict, MessageKind::command, now_ms)) {
+    if (rejected(verdict, now_ms)) {
       refuse(from, datagram, Refusal::auth, now_ms);
     } else {
       ++rx_refused_;
@@ -210,17 +210,16 @@ void Application::emergency_stop(Source from, const Datagram& datagram, Verdict 
   stop_number_ = number;
   enter(SafeReason::stop, now_ms);
   caused_ms_ = now_ms;
-  const bool owner = link_.has_owner() && link_.is_session_of(speaker_);
+  const bool owner = is_of_owner();
   if (owner && verdict == Verdict::authentic && datagram.has_pnum() &&
       link_.is_next(datagram.pnum()) &&
       link_.admit(speaker_, datagram.pnum(), now_ms) == Refusal::none) {
     link_.executed(datagram.pnum());
   }
   if (observer_ != nullptr) observer_->on_executed(now_ms, datagram.pnum(), Command::stop());
-  // Everyone hears of it once. The sender hears it each time, as often as it takes; one that has
-  // proved nothing, as long as there are not too many of them.
+  // Everyone hears of it once, its sender each time.
   if (!repeated) send_heartbeats(now_ms);
-  if (owner ? repeated : stops_.take(now_ms)) answer_heartbeat(from, now_ms);
+  if (repeated || !owner) answer_heartbeat(from, now_ms);
 }
 
 }  // namespace firmware

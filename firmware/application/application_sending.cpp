@@ -27,24 +27,30 @@ std::uint32_t Application::audience(std::uint8_t port) const {
   return everyone;
 }
 
-// The controlling host's places on one port share its numbers: each gets all that has one.
-void Application::transmit(Source to, Text datagram, Priority priority) {
-  Port& port = *ports_[to.port].port;
-  if (!link_.has_owner() || paths_.size() == 1 || !paths_.has(to)) {
-    return port.send(datagram, priority, to.peer);
+// The session's paths on one port share the port's numbers: each of them gets whatever has one.
+void Application::transmit(Source to, const std::uint32_t& number, Text datagram,
+                           Priority priority) {
+  PortSlot& slot = ports_[to.port];
+  const bool shared = link_.has_owner() && &number == &slot.next_pnum;
+  bool sent = false;
+  for (int i = 0; shared && i < paths_.size(); ++i) {
+    if (paths_[i].port != to.port) continue;
+    slot.port->send(datagram, priority, paths_[i].peer);
+    sent = true;
   }
-  for (int i = 0; i < paths_.size(); ++i) {
-    if (paths_[i].port == to.port) port.send(datagram, priority, paths_[i].peer);
-  }
+  if (!sent) slot.port->send(datagram, priority, to.peer);
 }
 
-// A watcher has numbers of its own, but where it hears those of everyone at its port; the answers to other
-// hosts that do not control the board count apart.
+// Is the datagram that is being read of the host in control?
+bool Application::is_of_owner() const { return link_.has_owner() && link_.is_session_of(speaker_); }
+
+// The numbers of an answer to who is speaking. A watcher has its own, but where it hears those of everyone at
+// its port. Answers to other hosts count apart, even to one at a place of the session, behind the same bridge.
 std::uint32_t& Application::number_for(Source to) {
   Watcher* const watcher = watchers_.find(to);
   if (watcher != nullptr && !hears_all(to)) return watcher->pnum;
-  const bool aside = link_.has_owner() && !paths_.has(to);
-  return aside ? ports_[to.port].aside_pnum : ports_[to.port].next_pnum;
+  const bool shared = !link_.has_owner() || (is_of_owner() && paths_.has(to));
+  return shared ? ports_[to.port].next_pnum : ports_[to.port].aside_pnum;
 }
 
 // Does what is for everyone at its port come to it, too?
@@ -58,12 +64,13 @@ bool Application::hears_all(Source watcher) const {
 }
 
 void Application::answer(Source to, DatagramWriter& writer, std::uint32_t now_ms) {
-  const Text datagram = writer.finish(number_for(to)++, now_ms);
-  if (!datagram.empty()) transmit(to, datagram, Priority::normal);
+  std::uint32_t& number = number_for(to);
+  const Text datagram = writer.finish(number++, now_ms);
+  if (!datagram.empty()) transmit(to, number, datagram, Priority::normal);
 }
 
 void Application::identify(Source to, const Datagram& question, std::uint32_t now_ms) {
-  const bool ours = link_.has_owner() && link_.is_session_of(speaker_);
+  const bool ours = is_of_owner();
   if (!ours && !questions_.take(now_ms)) return;
   char buffer[max_datagram];
   DatagramWriter writer(buffer, sizeof buffer);
@@ -124,32 +131,26 @@ void Application::send_heartbeats(std::uint32_t now_ms) {
     Source to;
     to.port = i;
     to.peer = audience(i);
-    send_heartbeat(to, ports_[i].next_pnum, now_ms);
+    send_heartbeat(to, now_ms);
   }
   for (Watcher& watcher : watchers_) {
     if (watcher.period_ms != 0 && !reaches(watcher.at)) {
-      write_heartbeat(watcher.at, watcher.pnum, shown_to_watchers(), now_ms);
+      write_heartbeat(watcher.at, watcher.pnum, heartbeat_time(now_ms), shown_to_watchers());
     }
   }
   link_.heartbeat_sent(heartbeat_time(now_ms));
 }
 
+// To who is speaking, who may have nothing to echo yet: it can echo this one, in CONNECTING, too.
 void Application::answer_heartbeat(Source to, std::uint32_t now_ms) {
-  const bool tells_time = link_.state() != BoardLinkState::connecting;
-  send_heartbeat(to, number_for(to), now_ms);
-  link_.heartbeat_answered(tells_time ? heartbeat_time(now_ms) : 0, now_ms);
-}
-
-// In CONNECTING a host that has nothing to echo yet is sent, alone, a heartbeat that it can echo.
-void Application::offer_heartbeat(Source to, std::uint32_t now_ms) {
-  write_heartbeat(to, ports_[to.port].next_pnum, safe_report(), now_ms);
-  link_.heartbeat_answered(heartbeat_time(now_ms), now_ms);
+  write_heartbeat(to, number_for(to), link_.answer_time(heartbeat_time(now_ms)), safe_report());
 }
 
 // In CONNECTING it says so, and packet numbers begin anew after it.
-void Application::send_heartbeat(Source to, std::uint32_t& pnum, std::uint32_t now_ms) {
+void Application::send_heartbeat(Source to, std::uint32_t now_ms) {
+  std::uint32_t& pnum = ports_[to.port].next_pnum;
   if (link_.state() != BoardLinkState::connecting) {
-    return write_heartbeat(to, pnum, safe_report(), now_ms);
+    return write_heartbeat(to, pnum, heartbeat_time(now_ms), safe_report());
   }
   char buffer[short_datagram];
   const Text nonce = authentication_.nonce();
@@ -157,17 +158,16 @@ void Application::send_heartbeat(Source to, std::uint32_t& pnum, std::uint32_t n
   ports_[to.port].port->send(
       write_board_heartbeat(buffer, sizeof buffer, 0, t_ms, safe_report(), nonce), Priority::normal,
       to.peer);
-  ports_[to.port].next_pnum = 1;
+  pnum = 1;
 }
 
-void Application::write_heartbeat(Source to, std::uint32_t& pnum, const SafeReport& safe,
-                                  std::uint32_t now_ms) {
+void Application::write_heartbeat(Source to, std::uint32_t& pnum, std::uint32_t t_ms,
+                                  const SafeReport& safe) {
   char buffer[short_datagram];
   const Text nonce = authentication_.nonce();
   if (pnum == 0 && !nonce.empty()) ++pnum;  // that would say CONNECTING
-  transmit(
-      to, write_board_heartbeat(buffer, sizeof buffer, pnum++, heartbeat_time(now_ms), safe, nonce),
-      Priority::normal);
+  transmit(to, pnum, write_board_heartbeat(buffer, sizeof buffer, pnum++, t_ms, safe, nonce),
+           Priority::normal);
 }
 
 // A board that has had no host yet tells watchers `link`, as one that has lost its host does.
@@ -201,7 +201,8 @@ void Application::send_states(std::uint32_t now_ms) {
     if (watcher.period_ms == 0 || !watcher.take(t_ms)) continue;
     if (link_.has_owner() && reaches(watcher.at)) continue;
     const FieldSet& fields = watcher.chooses ? watcher.fields : chosen;
-    send_state(watcher.at, number_for(watcher.at), fields, state, t_ms);
+    std::uint32_t& pnum = hears_all(watcher.at) ? ports_[watcher.at.port].next_pnum : watcher.pnum;
+    send_state(watcher.at, pnum, fields, state, t_ms);
   }
 }
 
@@ -238,7 +239,7 @@ void Application::send_part(Source to, std::uint32_t& pnum, DatagramWriter& writ
   if (state.safe != SafeReason::none && state.fault.any()) {
     write_field(writer, StateField::fault, state);
   }
-  transmit(to, writer.finish(pnum++, t_ms), Priority::state);
+  transmit(to, pnum, writer.finish(pnum++, t_ms), Priority::state);
 }
 
 void Application::fill(State& state) const {

@@ -49,9 +49,7 @@ Verdict BridgeGuard::judge(const Datagram& datagram, Time now) {
   return !trusted_ || (heard_ && !asks_) ? Verdict::authentic : Verdict::missing;
 }
 
-bool BridgeGuard::may_answer(Verdict verdict, bool is_command, Time now) {
-  return authentication_.rejected(verdict, is_command, ms_of(now));
-}
+bool BridgeGuard::may_answer(Verdict verdict) { return authentication_.rejected(verdict); }
 
 BridgeGuard::Trouble BridgeGuard::trouble() const {
   if (!heard_) return Trouble::none;

@@ -47,7 +47,7 @@ class BridgeGuard {
   // that has the place.
   Verdict judge(const Datagram& datagram, Time now);
   // That verdict was not good. True if it may be answered.
-  bool may_answer(Verdict verdict, bool is_command, Time now);
+  bool may_answer(Verdict verdict);
 
   Trouble trouble() const;
 

@@ -202,7 +202,7 @@ bool BridgedPair::is_allowed(const Datagram& datagram, MessageKind kind, Peer fr
   const bool is_command = kind == MessageKind::command;
   if (verdict != Verdict::authentic) {
     ++hosts_.counters.refused;
-    if (!guard_.may_answer(verdict, is_command, now)) return false;
+    if (!guard_.may_answer(verdict)) return false;
     if (is_command) {
       answer(datagram, Refusal::auth, 0, from, now);
     } else {

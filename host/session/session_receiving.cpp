@@ -181,9 +181,8 @@ void Session::on_lease_refused(std::size_t wire, const Nack& nack, const Datagra
 // executed: in the session in which the command was sent, and not after too many numbers. Without
 // proof the deadline ends it, as unknown.
 bool Session::is_proof(const Nack& nack) const {
-  // Over another wire than those of the board's session, which may take its copy.
-  const bool of_one_copy = nack.code == Refusal::busy || nack.code == Refusal::auth;
-  if (of_one_copy && wires_.several()) return false;
+  // Of one copy: another wire may have brought one that the board takes.
+  if (nack.code == Refusal::auth && wires_.several()) return false;
   // By how many numbers ago each was taken, since a session may be older than half of all numbers.
   const std::uint32_t since_command = link_.last_pnum() - nack.pnum;
   const std::uint32_t since_session = link_.last_pnum() - nack.session;
@@ -194,6 +193,7 @@ bool Session::is_proof(const Nack& nack) const {
 void Session::on_identity_datagram(std::size_t wire, const Datagram& datagram, Time now) {
   Identity identity;
   if (!read_identity(datagram, identity)) return;
+  if (!watches() && identity.sid != session_id()) return;  // an answer to another host
   if (wires_.several() && !admit_identity(wire, datagram, identity, now)) return;
   selection_.on_answer();
   on_answer(datagram, now);

@@ -82,7 +82,7 @@ bool Session::admit(std::size_t wire, const Datagram& datagram, Time now) {
   switch (kind_of(datagram)) {
     case MessageKind::nack: {
       Nack nack;
-      const bool counts = read_nack(datagram, nack) && nack.code != Refusal::busy;
+      const bool counts = read_nack(datagram, nack) && nack.has_session;
       take = wires_.on_answer(wire, datagram.pnum(), t_ms, fits, counts, now);
       break;
     }

@@ -176,8 +176,8 @@ struct UartBytes {
 // Names one session of a host (SID): 64 random bits, which only the host and its board know. It is chosen anew for
 // each session, so it is worthless once the session is over.
 using SessionId = std::uint64_t;
-constexpr SessionId no_session =
-    0;  // of watchers, of the paper's hosts, and in what is for everyone
+// That of watchers, of the paper's hosts, and in what is for everyone.
+constexpr SessionId no_session = 0;
 
 // --- refusals
 

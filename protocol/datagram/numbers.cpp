@@ -200,14 +200,15 @@ bool parse_hex(Text text, std::uint32_t& out) {
 }
 
 bool parse_session_id(Text text, SessionId& out) {
-  std::uint32_t high = 0;
-  std::uint32_t low = 0;
-  if (text.size() != session_id_size || !parse_hex(text.substr(0, 8), high) ||
-      !parse_hex(text.substr(8, 8), low) || (high | low) == 0) {
-    return false;
+  if (text.size() != session_id_size) return false;
+  SessionId sid = 0;
+  for (const char c : text) {
+    const unsigned digit = hex_digits.of[static_cast<unsigned char>(c)];
+    if (digit == HexDigits::none || (c >= 'A' && c <= 'F')) return false;
+    sid = sid << 4 | digit;
   }
-  out = SessionId{high} << 32 | low;
-  return true;
+  out = sid;
+  return sid != no_session;
 }
 
 char* write_session_id(char* out, SessionId sid) {

@@ -30,7 +30,7 @@ bool parse_hex(Text text, std::uint32_t& out);
 // Bytes, two digits each: `size` of them, neither more nor fewer. `out` is written on refusal, too.
 bool parse_hex(Text text, std::uint8_t* out, std::size_t size);
 
-// A session id: 16 hexadecimal digits, not all of them 0.
+// A session id: 16 lower-case hexadecimal digits, not all of them 0. `out` is written on refusal, too.
 constexpr std::size_t session_id_size = 16;
 bool parse_session_id(Text text, SessionId& out);
 

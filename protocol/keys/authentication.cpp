@@ -187,14 +187,9 @@ void Authentication::spend(Entry& entry, std::uint64_t counter) {
   if (counter > entry.highest) entry.highest = counter;
 }
 
-bool Authentication::rejected(Verdict verdict, bool is_command, std::uint32_t now_ms) {
+bool Authentication::rejected(Verdict verdict) {
   ++rejections_[static_cast<std::size_t>(verdict)];
-  if (verdict == Verdict::replayed || verdict == Verdict::old) return false;
-  Answered& answered = answered_[is_command ? 1 : 0];
-  if (answered.any && now_ms - answered.at_ms < answer_spacing_ms) return false;
-  answered.any = true;
-  answered.at_ms = now_ms;
-  return true;
+  return verdict != Verdict::replayed && verdict != Verdict::old;
 }
 
 // --- the host's end

@@ -53,9 +53,9 @@ class Authentication {
  public:
   static constexpr std::size_t chance_size = 32;
   static constexpr std::uint32_t age_limit_ms = 250;
-  static constexpr std::uint32_t answer_spacing_ms = 100;
-  // So many counters are remembered, the newest of all keys together: a path that lags by age_limit_ms behind
-  // the other paths may bring as many. What is below a forgotten one counts as used.
+  // So many counters are remembered, the newest of all keys together. Each path of a session uses its own: at r
+  // datagrams a second over p paths they are those of the last 112 / (p r) seconds, and a path may lag by that. What is
+  // below a forgotten one counts as used.
   static constexpr int counters_remembered = 112;
 
   // `chance`: random bytes, others at each boot, from which the nonces are made. nullptr: the board
@@ -83,10 +83,8 @@ class Authentication {
 
   // Is it signed? If so, its counter is used up.
   Verdict verify(const Datagram& datagram, std::uint32_t now_ms);
-  // It was not and was needed. True if that may be answered: at most every answer_spacing_ms, and
-  // not what a network has repeated or held back. Commands are answered apart from the rest: a host
-  // whose heartbeats are answered must learn what is wrong as well.
-  bool rejected(Verdict verdict, bool is_command, std::uint32_t now_ms);
+  // It was not and was needed. True if that is answered: what a network has repeated or held back is not.
+  bool rejected(Verdict verdict);
   // How many were rejected for that.
   std::uint32_t rejections(Verdict verdict) const {
     return rejections_[static_cast<std::size_t>(verdict)];
@@ -117,11 +115,6 @@ class Authentication {
   char nonce_[nonce_size] = {};
   bool has_nonce_ = false;
   std::uint32_t rejections_[verdict_count] = {};
-  struct Answered {
-    bool any = false;
-    std::uint32_t at_ms = 0;
-  };
-  Answered answered_[2];  // heartbeats, commands
 };
 
 // The host's end: signs for one board.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How many answers go to peers that have proved nothing: 50 a second in the long run, and 16 at
+// How many long answers go to peers that have proved nothing: 50 a second in the long run, and 16 at
 // once. Where a datagram says that it comes from may be forged, and nobody is to be flooded in that
-// way.
+// way. Answers of about the size of what they answer need no budget.
 //
 // All times are in ms, and wrap.
 #pragma once

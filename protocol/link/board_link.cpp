@@ -34,8 +34,7 @@ BoardLink::Freshness BoardLink::judge(const HostHeartbeat& heartbeat, std::uint3
 // True if the number of this heartbeat of the session follows its newest one. A paper host may have no numbers.
 bool BoardLink::continues(const HostHeartbeat& heartbeat) const {
   if (heartbeat.has_pnum != has_heartbeat_pnum_) return false;
-  return !heartbeat.has_pnum || (newer(heartbeat.pnum, newest_heartbeat_) &&
-                                 heartbeat.pnum - newest_heartbeat_ <= command_window);
+  return !heartbeat.has_pnum || newer(heartbeat.pnum, newest_heartbeat_);
 }
 
 bool BoardLink::has_left(HostId host) const {
@@ -59,18 +58,17 @@ HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uin
   const std::uint32_t at_ms = now_ms - waited_ms;
 
   if (state_ == BoardLinkState::active && !ours) return HeartbeatEffect::busy;
-  const bool hello = state_ == BoardLinkState::connecting && !paper && heartbeat.t == 0;
-  if (hello && heartbeat.waited_ms < timing_.timeout_ms) return HeartbeatEffect::hello;
-  if (freshness == Freshness::stale || has_left(heartbeat.host)) return HeartbeatEffect::stale;
-  const bool next = ours && continues(heartbeat);
+  if (freshness == Freshness::stale || has_left(heartbeat.host)) {
+    const bool has_fresh_t = state_ == BoardLinkState::active && heartbeat.t != 0;
+    return has_fresh_t ? HeartbeatEffect::stale : HeartbeatEffect::unheard;
+  }
   if (state_ == BoardLinkState::active) {
-    if (!next) return paper ? HeartbeatEffect::stale : HeartbeatEffect::repeated;
+    if (!continues(heartbeat)) return paper ? HeartbeatEffect::stale : HeartbeatEffect::repeated;
     feed(heartbeat, at_ms);
     return HeartbeatEffect::fed;
   }
-  // A paper host that restarted shows it by its numbers or its clock, or it cannot be told from one that restarted.
-  const bool other_clock = clock_ == Clock::echo && freshness == Freshness::no_echo;
-  if (next && heartbeat.has_pnum && !other_clock) {
+  if (ours && !paper) {
+    if (!continues(heartbeat)) return HeartbeatEffect::stale;  // a late copy
     resume(heartbeat, at_ms);
     return HeartbeatEffect::resumed;
   }
@@ -240,15 +238,12 @@ void BoardLink::heartbeat_sent(std::uint32_t t_ms) {
   if (state_ != BoardLinkState::connecting) remember_sent(t_ms);  // connecting: those carry T:0
 }
 
-bool BoardLink::wants_answer(const HostHeartbeat& heartbeat, std::uint32_t now_ms) const {
-  if (any_answered_ && now_ms - last_answered_ms_ < answer_spacing_ms) return false;
-  return state_ != BoardLinkState::active || heartbeat.t == 0;
-}
-
-void BoardLink::heartbeat_answered(std::uint32_t t_ms, std::uint32_t now_ms) {
-  any_answered_ = true;
-  last_answered_ms_ = now_ms;
-  if (t_ms != 0) remember_sent(t_ms);
+std::uint32_t BoardLink::answer_time(std::uint32_t t_ms) {
+  const std::uint32_t newest = sent_[(sent_next_ + sent_count - 1) % sent_count];
+  const bool recent = sent_used_ != 0 && t_ms - newest < answer_spacing_ms;
+  if (recent && (state_ != BoardLinkState::lost || reached(newest, lost_ms_))) return newest;
+  remember_sent(t_ms);
+  return t_ms;
 }
 
 void BoardLink::remember_sent(std::uint32_t t_ms) {

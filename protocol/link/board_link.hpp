@@ -13,7 +13,8 @@
 //                                      at most `timeout` ago, and in LOST since the link was lost
 //     a paper host (no SID)            is known by where it is. If its T was an echo once, it must go on
 //                                      echoing; else its T is a clock of its own, and its heartbeats
-//                                      count when they arrive
+//                                      count when they arrive. It never resumes: in LOST nothing shows
+//                                      that it is the same host
 //
 // All times are the board's clock in ms, which wraps; it must start at a random value at boot.
 #pragma once
@@ -51,9 +52,9 @@ enum class HeartbeatEffect : std::uint8_t {
   repeated,  // the same for the path that it came by: another path brought that heartbeat, or a newer one, first
   resumed,      // LOST -> ACTIVE, the same session goes on
   new_session,  // the sender controls the board now; nothing of an earlier host may be restored
-  hello,  // CONNECTING, and the sender has nothing to echo yet: answer it with a heartbeat that it can echo
-  stale,  // no effect: an old echo, overtaken, or read too late
-  busy,   // another host controls the board
+  stale,        // no effect: no echo or an old one, overtaken, or read too late
+  unheard,  // the same, and its host may have no fresh T: answer it with a heartbeat that it can echo
+  busy,     // another host controls the board
 };
 
 class BoardLink {
@@ -101,13 +102,11 @@ class BoardLink {
   // each send one at once.
   bool heartbeat_due(std::uint32_t now_ms) const;
   void heartbeat_sent(std::uint32_t t_ms);
-  // True if this heartbeat without effect is to be answered with one of ours: its sender may have none to echo.
-  // Seldom enough that two sides which answer each other do not fill the line.
-  bool wants_answer(const HostHeartbeat& heartbeat, std::uint32_t now_ms) const;
   // The next one is wanted at once: it brings news.
   void send_soon() { send_now_ = true; }
-  // A heartbeat with this T was sent to one peer, besides those above; 0: it told no T.
-  void heartbeat_answered(std::uint32_t t_ms, std::uint32_t now_ms);
+  // The T of a heartbeat that answers one peer. Answers within answer_spacing_ms share it, so that hosts
+  // which ask often do not push out of the memory what another host is about to echo.
+  std::uint32_t answer_time(std::uint32_t t_ms);
 
   // Milliseconds until poll() or heartbeat_due() may have something to say; 0 is now.
   std::uint32_t due_in(std::uint32_t now_ms) const;
@@ -129,7 +128,7 @@ class BoardLink {
   std::uint32_t last_executed() const { return last_executed_; }
 
   static constexpr std::uint32_t echo_retry_ms = 100;
-  static constexpr std::uint32_t answer_spacing_ms = 20;
+  static constexpr std::uint32_t answer_spacing_ms = 50;
   // A command that a heartbeat overtook this long ago is stale.
   static constexpr std::uint32_t late_limit_ms = 250;
   // How far ahead of the newest known number a command may be.
@@ -142,7 +141,7 @@ class BoardLink {
 
  private:
   enum class Clock : std::uint8_t { unknown, echo, own };  // what a paper host's T turned out to be
-  enum class Freshness : std::uint8_t { fresh, stale, no_echo };
+  enum class Freshness : std::uint8_t { fresh, stale, no_echo };  // no_echo: none is asked for
 
   Freshness judge(const HostHeartbeat& heartbeat, std::uint32_t now_ms) const;
   bool is_echo(std::uint64_t t) const;
@@ -196,8 +195,6 @@ class BoardLink {
   int sent_next_ = 0;
   bool any_sent_ = false;
   std::uint32_t last_sent_ms_ = 0;
-  bool any_answered_ = false;
-  std::uint32_t last_answered_ms_ = 0;
   std::uint32_t lost_ms_ = 0;  // when LOST was entered
   bool send_now_ = true;       // boot, ACTIVE and LOST entered
 };

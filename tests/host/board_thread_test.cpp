@@ -366,7 +366,7 @@ TEST(BoardCallbacks, ThatDoNotReturnEndTheHeartbeatsUntilTheyDo) {
 
 TEST(BoardCallbacks, AreToldTheNewestOfTheStatesThatCameMeanwhile) {
   Board board("sim:");
-  board.wait_active();
+  board.send("F:DEFAULT");  // from now on there is no other news
   std::promise<void> late;
   std::promise<std::uint32_t> next;
   board.on_state([&, calls = 0](const State& state) mutable {
@@ -374,8 +374,8 @@ TEST(BoardCallbacks, AreToldTheNewestOfTheStatesThatCameMeanwhile) {
     if (calls == 1) late.get_future().wait_for(5s);
     if (calls == 2) next.set_value(state.t_ms);
   });
-  for (int i = 0; i < 5; ++i) board.next_state();
-  const std::uint32_t newest = board.state().t_ms;
+  std::uint32_t newest = 0;
+  for (int i = 0; i < 5; ++i) newest = board.next_state().t_ms;
   // A state is told to those who wait before it is told to callbacks: with the next one, this one was.
   board.next_state();
   late.set_value();

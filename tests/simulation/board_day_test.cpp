@@ -264,6 +264,7 @@ class Day final : private firmware::Port {
     DatagramWriter writer(buffer, sizeof buffer);
     const std::size_t colon = fields.find(':');
     writer.field(Text(fields.substr(0, colon))).values(Text(fields.substr(colon + 1)));
+    writer.session(1);
     const Text bytes = writer.finish(pnum_++, t);
     application_.receive(0, 1, bytes, now_ms_);
     due_ms_ = 0;

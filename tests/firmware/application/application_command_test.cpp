@@ -172,23 +172,17 @@ TEST_F(ApplicationCommand, AnswersTheQuestionWhoItIsInAnyState) {
   EXPECT_EQ(heard[0].bytes.rfind(answer, 0), 0U);
 }
 
-TEST_F(ApplicationCommand, LimitsTheAnswersToHostsThatHaveProvedNothing) {
-  std::size_t identities = 0, heartbeats = 0;
-  board.take();
+TEST_F(ApplicationCommand, LimitsTheLongAnswersToHostsThatHaveProvedNothing) {
+  std::size_t identities = 0;
   for (int i = 0; i < 1000; ++i) {
+    board.take();
     board.receive("Q:ID;", Source{0, 1000U + static_cast<std::uint32_t>(i)});
-    board.receive("E:STOP;", Source{0, 1000U + static_cast<std::uint32_t>(i)});
-    EXPECT_EQ(board.reason(), SafeReason::stop) << "a stop is always obeyed";
-    for (const Heard& heard : board.take()) {
-      if (heard.peer < 1000) continue;
-      heard.kind == MessageKind::identity ? ++identities : ++heartbeats;
-    }
+    identities += board.take(MessageKind::identity).size();
     board.run(1);
   }
-  for (const std::size_t count : {identities, heartbeats}) {
-    EXPECT_GE(count, 16U + 45U);
-    EXPECT_LE(count, 16U + 55U);
-  }
+  EXPECT_GE(identities, 16U + 45U);
+  EXPECT_LE(identities, 16U + 55U);
+  board.take();
   board.receive("Q:ID;", host.at);
   EXPECT_EQ(board.take(MessageKind::identity).size(), 1U) << "the host in control is answered";
 }

@@ -113,44 +113,27 @@ TEST_F(ApplicationKey, ObeysNoHostThatDoesNot) {
   EXPECT_EQ(board.log.executed, std::vector<std::uint32_t>());
 }
 
-TEST_F(ApplicationKey, AnswersAnUnsignedHeartbeatWithItsNonceSeldom) {
-  const Source stranger{0, 99};
-  board.take();
-  for (int i = 0; i < 1000; ++i) {
-    board.receive("H:ROS2-R4;PNum:7;T:0;", stranger);
-    ++board.now_ms;
+// Each: a stranger who sends many takes no answer from a host that has yet to hear the nonce.
+TEST_F(ApplicationKey, AnswersAnUnsignedHeartbeatWithItsNonce) {
+  for (std::uint32_t peer = 90; peer < 99; ++peer) {
+    board.take();
+    board.receive("H:ROS2-R4;PNum:7;T:0;", {0, peer});
+    const std::vector<Heard> heard = board.take(MessageKind::board_heartbeat);
+    ASSERT_EQ(heard.size(), 1U);
+    EXPECT_EQ(heard[0].peer, peer);
+    EXPECT_NE(heard[0].bytes.find(";AN:"), std::string::npos);
   }
-  std::size_t to_stranger = 0;
-  for (const Heard& heard : board.take(MessageKind::board_heartbeat)) {
-    to_stranger += heard.peer == stranger.peer ? 1 : 0;
-  }
-  EXPECT_EQ(to_stranger, 10U);
 }
 
-TEST_F(ApplicationKey, AnswersAnUnsignedCommandWithAuthSeldom) {
+TEST_F(ApplicationKey, AnswersAnUnsignedCommandWithAuth) {
   host.connect();
-  board.take();
-  for (int i = 0; i < 300; ++i) {
-    board.receive("O:1,1,1;PNum:" + std::to_string(i) + ";T:0;", {0, 99});
-    board.receive("nonsense:1;O:x;PNum:" + std::to_string(i) + ";T:0;", {0, 99});
-    ++board.now_ms;
+  for (const char* command : {"O:1,1,1;", "nonsense:1;O:x;"}) {
+    board.take();
+    board.receive(command + std::string("PNum:7;T:0;"), {0, 99});
+    const std::vector<Heard> nacks = board.take(MessageKind::nack);
+    ASSERT_EQ(nacks.size(), 1U);
+    EXPECT_EQ(nacks[0].bytes.find("N:7,AUTH;"), 0U) << nacks[0].bytes;
   }
-  const std::vector<Heard> nacks = board.take(MessageKind::nack);
-  ASSERT_EQ(nacks.size(), 3U);
-  EXPECT_EQ(nacks[0].bytes.find("N:0,AUTH;"), 0U) << nacks[0].bytes;
-}
-
-// A host with another key sends heartbeats and commands. Were only the first of a moment answered, it
-// would be told its nonce for ever and never what is wrong.
-TEST_F(ApplicationKey, AnswersACommandWithAuthAlsoWhileItAnswersHeartbeats) {
-  KeyHost wrong(board, key_of(2), {0, 99});
-  board.take();
-  for (int i = 0; i < 3; ++i) {
-    wrong.heartbeat();
-    wrong.command("F:CMD");
-    board.run(100);
-  }
-  EXPECT_EQ(board.take(MessageKind::nack).size(), 3U);
 }
 
 // docs/protocol.md 4.2: the T of a CONNECTING heartbeat is for the signature, not to be echoed.
@@ -159,8 +142,10 @@ TEST_F(ApplicationKey, AnEchoOfWhatItSaysWhileConnectingStartsNothingButAZeroDoe
     host.listen();
     ASSERT_NE(host.t, 0U);
     ASSERT_EQ(host.echo, 0U);
+    board.run(1);
     board.receive(host.signed_fields(host.fields("H:ROS2-R4", host.t)), host.at);
     EXPECT_EQ(board.state(), BoardState::connecting);
+    board.take();
     board.run(100);
   }
   EXPECT_EQ(board.log.rejected, Lines()) << "rightly signed they are";

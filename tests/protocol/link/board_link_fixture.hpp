@@ -33,10 +33,7 @@ struct BoardLinkTest : testing::Test {
     sent.push_back(now);
   }
   // The board answers one peer; returns the T.
-  std::uint32_t answer() {
-    link.heartbeat_answered(now, now);
-    return now;
-  }
+  std::uint32_t answer() { return link.answer_time(now); }
 
   static BoardLink::HostHeartbeat numbered(std::uint32_t pnum, std::uint64_t t, HostId host) {
     BoardLink::HostHeartbeat heartbeat;
@@ -81,7 +78,7 @@ struct BoardLinkTest : testing::Test {
   // A host with a session id in control. Its heartbeats were first_number, a hello, and the next.
   void connect() {
     send_due();
-    ASSERT_EQ(heartbeat(first_number, 0), HeartbeatEffect::hello);
+    ASSERT_EQ(heartbeat(first_number, 0), HeartbeatEffect::unheard);
     ASSERT_EQ(heartbeat(first_number + 1, answer()), HeartbeatEffect::new_session);
   }
   void begin_anew() {

@@ -19,8 +19,8 @@ TEST_F(BoardLinkTest, BeginsConnecting) {
 
 TEST_F(BoardLinkTest, TheFirstHostThatEchoesIsInControl) {
   send_due();
-  EXPECT_EQ(heartbeat(first_number, 0), HeartbeatEffect::hello);
-  EXPECT_EQ(heartbeat(1, 0, other), HeartbeatEffect::hello);
+  EXPECT_EQ(heartbeat(first_number, 0), HeartbeatEffect::unheard);
+  EXPECT_EQ(heartbeat(1, 0, other), HeartbeatEffect::unheard);
   EXPECT_EQ(link.state(), BoardLinkState::connecting);
   EXPECT_EQ(heartbeat(2, answer(), other), HeartbeatEffect::new_session);
   EXPECT_EQ(heartbeat(first_number + 1, now), HeartbeatEffect::busy);
@@ -31,7 +31,7 @@ TEST_F(BoardLinkTest, TheFirstHostThatEchoesIsInControl) {
 }
 
 TEST_F(BoardLinkTest, AnEchoOfAnotherBootBeginsNothing) {
-  EXPECT_EQ(heartbeat(first_number, 123), HeartbeatEffect::stale);
+  EXPECT_EQ(heartbeat(first_number, 123), HeartbeatEffect::unheard);
   EXPECT_EQ(link.state(), BoardLinkState::connecting);
 }
 
@@ -73,7 +73,7 @@ TEST_F(BoardLinkTest, AReplacedSessionBeginsAnewOnlyWithAFreshEcho) {
   heartbeat(1, sent.back(), other);
   const std::uint32_t before = sent.back();
   run(1000);
-  EXPECT_EQ(heartbeat(first_number + 4, before), HeartbeatEffect::stale);
+  EXPECT_EQ(heartbeat(first_number + 4, before), HeartbeatEffect::unheard);
   EXPECT_EQ(heartbeat(first_number + 5, sent.back()), HeartbeatEffect::new_session);
   EXPECT_EQ(link.last_executed(), 0U);
   EXPECT_EQ(command(first_number + 3), "STALE");
@@ -85,7 +85,7 @@ TEST_F(BoardLinkTest, ASessionThatWasLeftBeginsNoMore) {
   EXPECT_EQ(link.state(), BoardLinkState::lost);
   run(10);
   const std::uint32_t echo = answer();
-  EXPECT_EQ(heartbeat(first_number + 2, echo), HeartbeatEffect::stale);
+  EXPECT_EQ(heartbeat(first_number + 2, echo), HeartbeatEffect::unheard);
   EXPECT_EQ(command(first_number + 3), "SAFE");
   EXPECT_EQ(heartbeat(1, echo, other), HeartbeatEffect::new_session);
 }
@@ -100,7 +100,7 @@ TEST_F(BoardLinkTest, RemembersTheLastSessionsThatWereLeft) {
   run(1000);
   const std::uint32_t echo = answer();
   for (SessionId sid = 1; sid <= BoardLink::left_memory; ++sid) {
-    EXPECT_EQ(heartbeat(9, echo, {here, sid}), HeartbeatEffect::stale) << sid;
+    EXPECT_EQ(heartbeat(9, echo, {here, sid}), HeartbeatEffect::unheard) << sid;
   }
 }
 
@@ -135,8 +135,20 @@ TEST_F(BoardLinkTest, TheSameHostResumesWithAnEchoFromAfterTheLoss) {
   run(100);
   ASSERT_EQ(link.state(), BoardLinkState::lost);
   EXPECT_GE(sent.back(), lost_at);
-  EXPECT_EQ(heartbeat(first_number + 2, before), HeartbeatEffect::stale);
+  EXPECT_EQ(heartbeat(first_number + 2, before), HeartbeatEffect::unheard);
   EXPECT_EQ(heartbeat(first_number + 4, sent.back()), HeartbeatEffect::resumed);
+}
+
+// The board's heartbeat of the millisecond in which the link was lost can be echoed before and after it.
+TEST_F(BoardLinkTest, ACopyOfAnOldHeartbeatDoesNotBeginTheSessionAnew) {
+  connect();
+  command(first_number + 2);
+  now += 400;
+  link.heartbeat_sent(now);
+  ASSERT_EQ(heartbeat(first_number + 3, now), HeartbeatEffect::fed);
+  ASSERT_TRUE(link.lose(now));
+  EXPECT_EQ(heartbeat(first_number + 3, now), HeartbeatEffect::stale);
+  EXPECT_EQ(command(first_number + 2), "DUPLICATE");
 }
 
 TEST_F(BoardLinkTest, AHostIsServedAfterWeeksOfSilence) {
@@ -160,7 +172,7 @@ TEST_F(BoardLinkTest, OnlyAFreshEchoFeedsAnEchoHost) {
   run(999);
   EXPECT_EQ(heartbeat(first_number + 2, echoed + 1), HeartbeatEffect::stale);  // no T of ours
   EXPECT_EQ(heartbeat(first_number + 3, now + 5), HeartbeatEffect::stale);     // of the future
-  EXPECT_EQ(heartbeat(first_number + 4, 0), HeartbeatEffect::stale);
+  EXPECT_EQ(heartbeat(first_number + 4, 0), HeartbeatEffect::unheard);
   EXPECT_EQ(heartbeat(first_number + 5, (std::uint64_t{1} << 32) + sent.back()),
             HeartbeatEffect::stale);
   EXPECT_EQ(link.state(), BoardLinkState::active);
@@ -221,16 +233,16 @@ TEST_F(BoardLinkTest, AHeartbeatThatWaitedMakesNothingOlder) {
 }
 
 TEST_F(BoardLinkTest, AHeartbeatThatMayHaveWaitedForTheTimeoutDoesNothing) {
-  EXPECT_EQ(late(1000, 1, 5, paper), HeartbeatEffect::stale);
+  EXPECT_EQ(late(1000, 1, 5, paper), HeartbeatEffect::unheard);
   EXPECT_EQ(link.state(), BoardLinkState::connecting);
   ASSERT_EQ(late(999, 1, 5, paper), HeartbeatEffect::new_session);
   EXPECT_EQ(link.deadline_ms(), now + 1);
   run(500);
   ASSERT_EQ(link.state(), BoardLinkState::lost);
-  EXPECT_EQ(late(1000, 2, 6, paper), HeartbeatEffect::stale);
-  EXPECT_EQ(late(1000, 7, 6, other), HeartbeatEffect::stale);
+  EXPECT_EQ(late(1000, 2, 6, paper), HeartbeatEffect::unheard);
+  EXPECT_EQ(late(1000, 7, 6, other), HeartbeatEffect::unheard);
   EXPECT_EQ(link.state(), BoardLinkState::lost);
-  ASSERT_EQ(late(400, 2, 6, paper), HeartbeatEffect::resumed);
+  ASSERT_EQ(late(400, 2, 6, paper), HeartbeatEffect::new_session);
   EXPECT_EQ(link.deadline_ms(), now + 600);
 }
 
@@ -256,7 +268,7 @@ TEST_F(BoardLinkTest, APaperHostWithAClockOfItsOwnFeedsByArriving) {
               HeartbeatEffect::fed);  // a clock may stand still
   }
   run(1000);
-  EXPECT_EQ(heartbeat(100, 1699276044390, paper), HeartbeatEffect::resumed);
+  EXPECT_EQ(heartbeat(100, 1699276044390, paper), HeartbeatEffect::new_session);
 }
 
 TEST_F(BoardLinkTest, AClockOfItsOwnMayHappenToShowATimeOfOurs) {
@@ -282,7 +294,7 @@ TEST_F(BoardLinkTest, APaperHostThatEchoesMustGoOnEchoing) {
   EXPECT_EQ(heartbeat(4, old_echo, paper), HeartbeatEffect::stale);
 }
 
-TEST_F(BoardLinkTest, APaperHostThatEchoesResumesWithAnEchoFromAfterTheLoss) {
+TEST_F(BoardLinkTest, APaperHostThatEchoesBeginsAnewWithAnEchoFromAfterTheLoss) {
   send_due();
   heartbeat(0, 0, paper);
   heartbeat(1, sent.back(), paper);
@@ -290,8 +302,8 @@ TEST_F(BoardLinkTest, APaperHostThatEchoesResumesWithAnEchoFromAfterTheLoss) {
   const std::uint32_t before = sent.back();
   run(1);
   ASSERT_EQ(link.state(), BoardLinkState::lost);
-  EXPECT_EQ(heartbeat(2, before, paper), HeartbeatEffect::stale);
-  EXPECT_EQ(heartbeat(3, sent.back(), paper), HeartbeatEffect::resumed);
+  EXPECT_EQ(heartbeat(2, before, paper), HeartbeatEffect::unheard);
+  EXPECT_EQ(heartbeat(3, sent.back(), paper), HeartbeatEffect::new_session);
 }
 
 TEST_F(BoardLinkTest, AHostWithAnotherClockIsAnotherHost) {
@@ -536,28 +548,41 @@ TEST_F(BoardLinkTest, AnAnswerCanBeEchoed) {
   connect();
   run(1000);
   run(33);
-  answer();
-  const std::uint32_t answered = now;
+  const std::uint32_t answered = answer();
   run(5);
   EXPECT_EQ(heartbeat(first_number + 100'000'000, answered, other), HeartbeatEffect::new_session);
 }
 
-TEST_F(BoardLinkTest, WantsToAnswerOneWhoHasNothingToEcho) {
-  // CONNECTING: whatever it echoes.
-  EXPECT_TRUE(link.wants_answer(numbered(first_number, 99, ours), now));
+TEST_F(BoardLinkTest, AHostThatMayHaveNothingToEchoIsAnswered) {
+  EXPECT_EQ(heartbeat(first_number, 99), HeartbeatEffect::unheard);
   connect();
   run(500);
-  // ACTIVE: only one that has heard nothing.
-  EXPECT_FALSE(link.wants_answer(numbered(first_number, 99, ours), now));
-  EXPECT_TRUE(link.wants_answer(numbered(first_number, 0, ours), now));
-  answer();
-  run(BoardLink::answer_spacing_ms - 1);
-  EXPECT_FALSE(link.wants_answer(numbered(first_number, 0, ours), now));
-  run(1);
-  EXPECT_TRUE(link.wants_answer(numbered(first_number, 0, ours), now));
-  // LOST: whatever it echoes.
+  // In ACTIVE the session's host hears the regular ones, but on a new path.
+  EXPECT_EQ(heartbeat(first_number + 2, 99), HeartbeatEffect::stale);
+  EXPECT_EQ(heartbeat(first_number + 2, 0), HeartbeatEffect::unheard);
   run(1000);
-  EXPECT_TRUE(link.wants_answer(numbered(first_number, 99, other), now));
+  EXPECT_EQ(heartbeat(first_number + 3, 99), HeartbeatEffect::unheard);
+  EXPECT_EQ(heartbeat(1, 99, other), HeartbeatEffect::unheard);
+}
+
+TEST_F(BoardLinkTest, HostsThatAskOftenMakeTheBoardForgetNoTimeThatAnotherEchoes) {
+  connect();
+  run(1000);
+  const std::uint32_t echo = answer();
+  for (int i = 0; i < 999; ++i) {
+    run(1);
+    const std::uint32_t t = answer();
+    EXPECT_LT(now - t, BoardLink::answer_spacing_ms);
+  }
+  EXPECT_EQ(heartbeat(first_number + 2, echo), HeartbeatEffect::resumed);
+}
+
+TEST_F(BoardLinkTest, AnAnswerAfterALossCanBeEchoedAfterIt) {
+  connect();
+  answer();
+  run(2);
+  ASSERT_TRUE(link.lose(now));
+  ASSERT_EQ(heartbeat(first_number + 2, answer()), HeartbeatEffect::resumed);
 }
 
 TEST_F(BoardLinkTest, TellsExactlyWhenItNeedsTime) {

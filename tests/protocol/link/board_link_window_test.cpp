@@ -29,7 +29,7 @@ std::uint32_t idle(BoardLink& link, std::uint32_t& now_ms, std::uint32_t pnum,
       echo = now_ms;
     }
     const std::uint32_t t = i == 0 ? 0 : i == 1 ? now_ms : echo;
-    if (i == 1) link.heartbeat_answered(now_ms, now_ms);  // the answer to its hello
+    if (i == 1) link.answer_time(now_ms);  // the answer to its first
     link.on_heartbeat(numbered(pnum++, t), now_ms);
     link.poll(now_ms);
   }

@@ -131,22 +131,9 @@ __attribute__((noinline)) bool put_device_bytes(DigitWriter& digits, Text text) 
   return true;
 }
 
-// False if it is not exactly 16 digits as writers print them.
-bool take_session(Text text, std::uint64_t& out) {
-  if (text.size() != session_digits) return false;
-  std::uint64_t sid = 0;
-  for (const char c : text) {
-    const unsigned digit = hex_digit_of(c);
-    if (digit > 15) return false;
-    sid = sid << 4 | digit;
-  }
-  out = sid;
-  return true;
-}
-
-bool put_session(DigitWriter& digits, std::uint64_t sid) {
-  return digits.put(sid >> 32, session_digits / 2) &&
-         digits.put(sid & 0xFFFFFFFFU, session_digits / 2);
+bool put_session(DigitWriter& digits, SessionId sid) {
+  return digits.put(sid >> 32, session_id_size / 2) &&
+         digits.put(sid & 0xFFFFFFFFU, session_id_size / 2);
 }
 
 // In the form of the field; false if its text is not one that the form would be written as.
@@ -175,7 +162,7 @@ bool put_in_form(DigitWriter& digits, PackedForm form, Text text) {
     case PackedForm::bytes:
       return put_device_bytes(digits, text);
     case PackedForm::session:
-      return take_session(text, value) && digits.put(0, 1) && put_session(digits, value);
+      return parse_session_id(text, value) && digits.put(0, 1) && put_session(digits, value);
   }
   return false;
 }
@@ -253,7 +240,7 @@ bool put_values(DigitWriter& digits, PackedForm form, Text values) {
 
 // SID, PNum and T, and how they are written.
 struct Numbers {
-  std::uint64_t sid = 0;
+  SessionId sid = no_session;
   std::uint64_t pnum = 0;
   std::uint64_t time = 0;
   unsigned size = 0;  // index of `sizes`
@@ -280,7 +267,7 @@ struct Numbers {
 };
 
 bool is_session(const Field& field, Numbers& numbers) {
-  return field.name() == Text("SID") && take_session(field.values(), numbers.sid);
+  return field.name() == Text("SID") && parse_session_id(field.values(), numbers.sid);
 }
 
 // The last field before `end`, which is behind its semicolon; none before `begin`.
@@ -315,7 +302,7 @@ bool is_heartbeat_of(const Field& field, unsigned code) {
   return field.name() == Text("H") && field.values() == words[code].word();
 }
 
-// Takes the fields that the layout holds for the head's numbers off `fields` and the end.
+// The datagram's layout. Narrows [fields, end) to the fields that it leaves, and reads the numbers of the others.
 Layout choose_layout(Fields& fields, const char*& end, Numbers& numbers) {
   Fields after = fields;
   const Field first = after.next();

@@ -80,7 +80,6 @@ constexpr unsigned longest_name = 14;
 constexpr unsigned longest_bytes = 15;
 constexpr unsigned longest_count = 14;  // digits
 constexpr unsigned most_device_bytes = 64;
-constexpr unsigned session_digits = 16;
 
 // Fixed forms: how many digits, and the largest value.
 constexpr unsigned flag_max = 0xE;

@@ -36,11 +36,6 @@ class Digits {
     return true;
   }
   void put_back() { --at_; }
-  bool skip(unsigned digits) {
-    if (left() < digits) return false;
-    at_ += digits;
-    return true;
-  }
 
  private:
   const std::uint8_t* bytes_;
@@ -183,13 +178,13 @@ __attribute__((noinline)) bool take_device_bytes(Digits& digits, unsigned first,
   return true;
 }
 
-__attribute__((noinline)) bool take_session(Digits& digits, Characters& out) {
-  for (unsigned i = 0; i < session_digits; ++i) {
-    unsigned digit = 0;
-    if (!digits.take(digit)) return false;
-    out.put(static_cast<char>(digit < 10 ? '0' + digit : 'a' + digit - 10));
+bool take_session(Digits& digits, SessionId& sid) {
+  std::uint64_t high = 0;
+  if (!digits.take(session_id_size / 2, high) || !digits.take(session_id_size / 2, sid)) {
+    return false;
   }
-  return true;
+  sid |= high << 32;
+  return sid != no_session;
 }
 
 // A form of as many digits, of which the first is not F.
@@ -237,7 +232,9 @@ bool take_value(Digits& digits, PackedForm form, Characters& out) {
     case PackedForm::bytes:
       return take_device_bytes(digits, first, out);
     case PackedForm::session:
-      return first == 0 && take_session(digits, out);
+      if (first != 0 || !take_session(digits, value)) return false;
+      out.put_number<SessionId>(value, write_session_id);
+      return true;
   }
   return false;
 }
@@ -285,45 +282,46 @@ bool take_fields(Digits& digits, Layout layout, Characters& out) {
 struct Numbers {
   std::uint64_t pnum = 0;
   std::uint64_t time = 0;
-  Digits session;  // where its digits are
+  SessionId sid = no_session;
 };
 
 // SID and T where the layout has them, and PNum.
-bool put_numbers(Layout layout, Numbers& numbers, Characters& out) {
+void put_numbers(Layout layout, const Numbers& numbers, Characters& out) {
   if (has_session(layout)) {
     out.put("SID:", 4);
-    if (!take_session(numbers.session, out)) return false;
+    out.put_number<SessionId>(numbers.sid, write_session_id);
     out.put(';');
   }
   out.put("PNum:", 5);
   out.put_plain(numbers.pnum);
   out.put(';');
-  if (layout == Layout::of_session) return true;
+  if (layout == Layout::of_session) return;
   out.put("T:", 2);
   out.put_plain(numbers.time);
   out.put(';');
-  return true;
 }
 
 bool take_datagram(Digits& digits, Layout layout, unsigned size, Characters& out) {
   if (layout == Layout::plain_fields) {
     return size == 0 && digits.left() >= 2 && take_fields(digits, layout, out);
   }
-  Numbers numbers{0, 0, digits};
+  Numbers numbers;
   if (layout == Layout::of_session && size != 0) return false;
   const Sizes sizes = sizes_of(layout, size);
-  if (!digits.take(sizes.pnum, numbers.pnum) || !digits.take(sizes.time, numbers.time)) {
+  if (!digits.take(sizes.pnum, numbers.pnum) || !digits.take(sizes.time, numbers.time) ||
+      (has_session(layout) && !take_session(digits, numbers.sid))) {
     return false;
   }
-  numbers.session = digits;
-  if (has_session(layout) && !digits.skip(session_digits)) return false;
   if (is_heartbeat(layout)) {
     out.put("H:", 2);
     out.put(words[layout == Layout::board_heartbeat ? code_r4_ros2 : code_ros2_r4], 0);
     out.put(';');
-    return put_numbers(layout, numbers, out) && take_fields(digits, layout, out);
+    put_numbers(layout, numbers, out);
+    return take_fields(digits, layout, out);
   }
-  return take_fields(digits, layout, out) && put_numbers(layout, numbers, out);
+  if (!take_fields(digits, layout, out)) return false;
+  put_numbers(layout, numbers, out);
+  return true;
 }
 
 UnpackResult failed(UnpackError error) {
