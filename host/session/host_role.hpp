@@ -55,7 +55,7 @@ class HostRoleMachine {
   Time refused_until() const { return refused_until_; }
 
  private:
-  // The board answers a host without control at most every 100 ms.
+  // Our heartbeats go out every 100 ms at least, and each is answered.
   static constexpr Time busy_memory = std::chrono::milliseconds{300};
   HostRole role_ = HostRole::apart;
   Time refused_until_{0};

@@ -15,7 +15,7 @@
 // (measurement/identity_question.hpp), the board's clock on ours (measurement/board_clock.hpp), the stop that
 // lasts (stop_repetition.hpp) and, where the session only watches, its lease at the board (lease.hpp).
 //
-// Over several wires (wires.hpp) every datagram goes out on each, written and signed once; what comes in is taken
+// Over several wires (wires.hpp) every datagram goes out on each, written once and signed for each; what comes in is taken
 // once, whichever wire brings it first, and newest is what has the newest T. Leases alone are each wire's own.
 //
 // A retry has the bytes and the packet number of the original (signed anew, where there is a key),

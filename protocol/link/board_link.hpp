@@ -48,8 +48,8 @@ enum class BoardLinkState : std::uint8_t { connecting, active, lost };
 
 // What a host's heartbeat did.
 enum class HeartbeatEffect : std::uint8_t {
-  fed,  // the controlling host is alive
-  repeated,  // the same for the path that it came by: another path brought that heartbeat, or a newer one, first
+  fed,          // the controlling host is alive
+  repeated,     // its path is alive; another one has brought that heartbeat before, or a newer one
   resumed,      // LOST -> ACTIVE, the same session goes on
   new_session,  // the sender controls the board now; nothing of an earlier host may be restored
   stale,        // no effect: no echo or an old one, overtaken, or read too late

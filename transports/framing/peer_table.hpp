@@ -112,7 +112,7 @@ class PeerTable {
     return *silent;
   }
 
-  static constexpr int most_held = 4;  // as many wires as a session has
+  static constexpr int most_held = 4;  // as many paths as a session has
   static_assert(places > most_held, "all but these may be taken");
   Entry entries_[places];
   std::uint64_t turn_ = 0;

@@ -164,9 +164,9 @@ TEST_F(BoardLinkTest, AHostIsServedAfterWeeksOfSilence) {
   EXPECT_TRUE(link.heartbeat_due(now + BoardLink::echo_retry_ms)) << "its echo is missed again";
 }
 
-// --- freshness of echo hosts
+// --- fresh echoes
 
-TEST_F(BoardLinkTest, OnlyAFreshEchoFeedsAnEchoHost) {
+TEST_F(BoardLinkTest, OnlyAFreshEchoFeeds) {
   connect();
   const std::uint32_t echoed = sent.back();
   run(999);
@@ -520,7 +520,7 @@ TEST_F(BoardLinkTest, SendsAtOnceOnEveryChange) {
   EXPECT_EQ(sent.back(), 701'200U);  // ACTIVE again
 }
 
-TEST_F(BoardLinkTest, AsksAnEchoHostAgainWhileItsEchoStaysAway) {
+TEST_F(BoardLinkTest, AsksAHostAgainWhileItsEchoStaysAway) {
   connect();
   sent.clear();
   const std::uint32_t start = now;

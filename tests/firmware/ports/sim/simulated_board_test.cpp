@@ -30,7 +30,7 @@ struct BoardListener final : Carrier::Handler {
   void on_carrier_event(const CarrierEvent&) override {}
 };
 
-// A board, an echo host at the other end of a memory pair, and the time.
+// A board, a host at the other end of a memory pair, and the time.
 class SimulatedBoardTest : public testing::Test {
  protected:
   // `link`: what the board's end is called. One that is called pty: is a cable of its own.
