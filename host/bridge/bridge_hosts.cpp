@@ -11,9 +11,13 @@ BridgeHosts::BridgeHosts(std::chrono::milliseconds timeout) : timeout_(timeout) 
   next_.reserve(hosts_.size());
 }
 
-bool BridgeHosts::on_heartbeat(Peer from, SessionId sid, bool judged, Time now) {
-  Host* const host = place_for(from, sid, now);
+bool BridgeHosts::on_heartbeat(Peer from, const Datagram& heartbeat, bool judged, Time now) {
+  Host* const host = place_for(from, heartbeat.session_id(), now);
   if (host == nullptr) return false;
+  if (!is_heard(*host, now)) {
+    host->first_heartbeat.reset();
+    if (heartbeat.has_pnum()) host->first_heartbeat = heartbeat.pnum();
+  }
   host->heard = now;
   if (judged && now >= host->refused_until && host->served_from == never) {
     host->served_from = now + patience;
@@ -87,6 +91,13 @@ bool BridgeHosts::trusts(Peer from, SessionId sid, Time now) const {
     const bool same = host.sid == sid && (sid != no_session || host.peer == from);
     return same && now >= host.served_from;
   });
+}
+
+std::optional<std::uint32_t> BridgeHosts::first_heartbeat(Peer from, SessionId sid) const {
+  for (const Host& host : hosts_) {
+    if (is_of(host, from, sid)) return host.first_heartbeat;
+  }
+  return std::nullopt;
 }
 
 bool BridgeHosts::serves(SessionId sid, Time now) const {

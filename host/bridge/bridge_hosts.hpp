@@ -23,8 +23,11 @@
 #include <array>
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <vector>
 
+#include "r4link/datagram.hpp"
 #include "r4link/vocabulary.hpp"
 
 namespace r4 {
@@ -43,7 +46,7 @@ class BridgeHosts {
 
   // `judged`: the board begins or feeds a session by that heartbeat, or answers it BUSY.
   // False if it must not pass: there is another paper host, or `most` other hosts are served.
-  bool on_heartbeat(Peer from, SessionId sid, bool judged, Time now);
+  bool on_heartbeat(Peer from, const Datagram& heartbeat, bool judged, Time now);
   // The board has refused that session.
   void on_busy(SessionId sid, Time now);
   // The board reports that it has no host, so it refuses nobody.
@@ -60,6 +63,8 @@ class BridgeHosts {
   // for every path of its session.
   bool trusts(Peer from, SessionId sid, Time now) const;
   bool serves(SessionId sid, Time now) const;
+  // The number of the first heartbeat of this host that passed, or passed after a silence.
+  std::optional<std::uint32_t> first_heartbeat(Peer from, SessionId sid) const;
   // Calls `call(peer)` for each path of that session if it is served.
   template <class Call>
   void for_each_path(SessionId sid, Time now, Call call) const {
@@ -74,6 +79,7 @@ class BridgeHosts {
     Peer peer = everyone;
     SessionId sid = no_session;
     Time heard;  // Time(): the place is free
+    std::optional<std::uint32_t> first_heartbeat;
     Time refused_until;
     Time served_from = never;
   };

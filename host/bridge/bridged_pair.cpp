@@ -164,7 +164,7 @@ void BridgedPair::on_host_datagram(const Datagram& datagram, Peer from, Time now
   const SessionId sid = datagram.session_id();
   const bool trusted = known_.trusts(from, sid, now);
   if (!trusted && !may_ask(now)) return;
-  if (!known_.on_heartbeat(from, sid, is_judged(datagram), now)) {
+  if (!known_.on_heartbeat(from, datagram, is_judged(datagram), now)) {
     ++hosts_.counters.kept_out;
     return answer(datagram, Refusal::busy, 0, from, now);  // as the board does
   }
@@ -185,9 +185,9 @@ void BridgedPair::on_command(const Datagram& datagram, Peer from, Time now) {
     return;
   }
   if (!trusted && !may_ask(now)) return;
-  if (has_site_setting(datagram)) {
+  if (has_site_setting(datagram)) {  // no copy of it has passed: that is proof for its host
     ++hosts_.counters.refused;
-    return answer(datagram, Refusal::auth, 0, from, now);
+    return answer(datagram, Refusal::auth, 0, from, now, known_.first_heartbeat(from, sid));
   }
   // A paper host and a program that only asks cannot be distinguished by the answer.
   pass_on(datagram, from, trusted && !(asks_who && sid == no_session), now);
@@ -373,15 +373,18 @@ void BridgedPair::report_trouble() {
   on_event_(BridgeSide::board, {CarrierEvent::Kind::warning, problem});
 }
 
-// In the board's place, as if it had said so together with what it said last.
+// In the board's place, as if it had said so together with what it said last. `session`: as a
+// refusal of the board names it.
 void BridgedPair::answer(const Datagram& asked, Refusal code, std::uint32_t lease, Peer to,
-                         Time now) {
+                         Time now, std::optional<std::uint32_t> session) {
   if (!asked.has_pnum() || !board_known_ || now - board_heard_ > clock_lifetime) return;
   Nack nack;
   nack.pnum = asked.pnum();
   nack.sid = asked.session_id();
   nack.code = code;
   nack.lease = lease;
+  nack.has_session = session.has_value();
+  nack.session = session.value_or(0);
   std::array<char, 160> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   write_nack(writer, nack);

@@ -111,7 +111,8 @@ class BridgedPair {
   void follow_hosts(Time now);
   void watch_board(Time now);
   void report_trouble();
-  void answer(const Datagram& asked, Refusal code, std::uint32_t lease, Peer to, Time now);
+  void answer(const Datagram& asked, Refusal code, std::uint32_t lease, Peer to, Time now,
+              std::optional<std::uint32_t> session = std::nullopt);
   void deliver(Side& from, Side& to, const Datagram& datagram, Priority priority,
                Peer peer = everyone);
   void pass_on(const Datagram& datagram, Peer from, bool trusted, Time now);

@@ -62,7 +62,7 @@ TEST_F(BridgedPairTest, ASettingThatOnlyACableMayChangeNeverPasses) {
     hosts->take();
     hosts->say(std::string(command) + sid_a + ";PNum:2;T:0;", first);
     EXPECT_EQ(passed(), Texts{}) << command;
-    EXPECT_EQ(hosts->take(), Texts{"N:2,AUTH" + std::string(sid_a) + ";PNum:7;T:150;@1"})
+    EXPECT_EQ(hosts->take(), Texts{"N:2,AUTH;SESSION:1" + std::string(sid_a) + ";PNum:7;T:150;@1"})
         << command;
   }
   EXPECT_EQ(from_hosts().refused, 11U);
