@@ -254,6 +254,16 @@ TEST_F(BridgeHostsTest, AnAnswerToAHostThatIsNotServedGoesToThePeerThatAskedAlon
   EXPECT_EQ(hosts->take(), Texts{"N:60,BUSY" + other_sid + ";PNum:8;T:101;@105"});
 }
 
+TEST_F(BridgeHostsTest, ARefusalForTheServedPaperHostGoesToItThoughAnotherPeerAsksWithItsNumber) {
+  paper_heartbeat(owner);
+  pass(BridgeHosts::patience);
+  hosts->say("Q:ID;PNum:51;T:0;", waiting);
+  command("", owner);
+  hosts->take();
+  board->say("N:51,RANGE;PNum:8;T:101;");
+  EXPECT_EQ(hosts->take(), Texts{"N:51,RANGE;PNum:8;T:101;@1"});
+}
+
 TEST_F(BridgeHostsTest, AForgedHeartbeatHasItsVictimSentFewDatagrams) {
   for (const int ids : {1, 15}) {
     begin();
