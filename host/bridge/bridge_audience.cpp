@@ -36,7 +36,8 @@ std::optional<Peer> BridgeAudience::asker_of(std::optional<std::uint32_t> pnum, 
   std::optional<Peer> asker;
   Time newest;
   for (const Question& each : questions_) {
-    if (each.pnum != pnum || each.sid != sid || each.at == Time() || now - each.at > curiosity) continue;
+    if (each.at == Time() || now - each.at > curiosity) continue;
+    if (each.pnum != pnum || each.sid != sid) continue;
     if (asker && each.at < newest) continue;
     asker = each.from;
     newest = each.at;

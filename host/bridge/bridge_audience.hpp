@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Who hears a board through a bridge besides the host that has the place: who watches (docs/protocol.md, 4.8), and for
-// a second who has stopped it, asked it something, or needs its nonce to sign what it sends.
+// The peers that hear a board through a bridge besides the served hosts: watchers (docs/protocol.md,
+// 4.8), and for a second each peer that stopped the board, that asks for control of it, or that
+// needs its nonce to sign what it sends.
 //
 //     W:rate --> is told a LEASE --W:rate that echoes it--> hears everything for two seconds, again by the next W
 //
-// As at the board, nothing is streamed before the echo of a random number that was told to that very place: so nobody has
-// a bridge flood a third by forging where a W comes from. For the same reason the answers to those
-// that have echoed nothing are few.
+// As at the board, nothing is streamed before the echo of a random number that was sent to that very
+// peer. So nobody can have a bridge flood a third party by forging where a W comes from. For the
+// same reason the answers to peers that have echoed nothing are few.
 #pragma once
 
 #include <array>
@@ -24,7 +25,7 @@ class BridgeAudience {
  public:
   using Time = std::chrono::steady_clock::time_point;
   static constexpr std::chrono::milliseconds lease{2000};
-  static constexpr std::chrono::milliseconds curiosity{1000};  // after a stop or a question
+  static constexpr std::chrono::milliseconds curiosity{1000};
   static constexpr std::size_t places = 16;
   static constexpr int most_watchers = 4;
 
@@ -34,13 +35,13 @@ class BridgeAudience {
   // A new LEASE, which that host is told.
   std::uint32_t new_token(Peer to, Time now);
 
-  // That host is to hear the board's heartbeats for a while: it has stopped the board, or it needs
-  // the nonce.
+  // That peer is to hear the board's heartbeats for a while.
   void listen(Peer from, Time now) { place_of(from, now).listens_until = now + curiosity; }
 
-  // It has asked something by a datagram of that number and session; none: of no number.
+  // It has sent the board a datagram of that number and session; none: of no number.
   void on_question(Peer from, std::optional<std::uint32_t> pnum, SessionId sid, Time now);
-  // The host that has asked that last. An answer to a session goes to nobody who does not know its id.
+  // The peer that sent such a datagram last. An answer to a session goes to no peer that did not
+  // name its id.
   std::optional<Peer> asker_of(std::optional<std::uint32_t> pnum, SessionId sid, Time now) const;
 
   // Calls `call(peer)` for each that hears states.
@@ -50,10 +51,13 @@ class BridgeAudience {
       if (place.used && now < place.watches_until) call(place.peer);
     }
   }
-  // Calls `call(peer)` for each that hears heartbeats and is no watcher.
+  // Calls `call(peer)` for each that hears heartbeats and is no watcher. Each time it begins with
+  // another one: where a budget does not suffice for all, each has its turn.
   template <class Call>
-  void for_each_listener(Time now, Call call) const {
-    for (const Place& place : places_) {
+  void for_each_listener(Time now, Call call) {
+    ++turn_;
+    for (std::size_t i = 0; i < places; ++i) {
+      const Place& place = places_[(turn_ + i) % places];
       if (place.used && now >= place.watches_until && now < place.listens_until) call(place.peer);
     }
   }
@@ -87,6 +91,7 @@ class BridgeAudience {
   std::array<Place, places> places_;
   std::array<Question, 64> questions_;
   std::size_t next_question_ = 0;
+  std::size_t turn_ = 0;
   bool any_ = false;
   std::random_device random_;
 };

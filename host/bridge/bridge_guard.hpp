@@ -43,8 +43,7 @@ class BridgeGuard {
   // The board's transport is down. Another board may be there when it comes back.
   void on_board_gone() { heard_ = false; }
 
-  // Judges a heartbeat or a command. `copy` is for the caller to judge: it is good from the host
-  // that has the place.
+  // Judges a heartbeat or a command.
   Verdict judge(const Datagram& datagram, Time now);
   // That verdict was not good. True if it may be answered.
   bool may_answer(Verdict verdict);

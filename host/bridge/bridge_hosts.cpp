@@ -2,49 +2,107 @@
 #include "bridge_hosts.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace r4 {
 
-BridgeHosts::Heartbeat BridgeHosts::on_heartbeat(Peer from, SessionId sid, Time now) {
-  Host* free = nullptr;
-  for (Host& host : hosts_) {
-    const bool heard = is_heard(host, now);
-    if (heard && host.sid == sid && host.peer == from) {
-      host.heard = now;
-      return Heartbeat::known;
-    }
-    if (heard && host.sid == sid && sid == no_session) return Heartbeat::kept_out;
-    if (!heard && free == nullptr) free = &host;
+BridgeHosts::BridgeHosts(std::chrono::milliseconds timeout) : timeout_(timeout) {
+  served_.reserve(hosts_.size());
+  next_.reserve(hosts_.size());
+}
+
+bool BridgeHosts::on_heartbeat(Peer from, const Datagram& heartbeat, bool judged, Time now) {
+  Host* const host = place_for(from, heartbeat.session_id(), now);
+  if (host == nullptr) return false;
+  if (!is_heard(*host, now)) {
+    host->first_heartbeat.reset();
+    if (heartbeat.has_pnum()) host->first_heartbeat = heartbeat.pnum();
   }
-  if (free == nullptr) return Heartbeat::kept_out;
-  *free = Host{true, from, sid, now, Time()};
-  return Heartbeat::added;
+  host->heard = now;
+  if (judged && now >= host->refused_until && host->served_from == never) {
+    host->served_from = now + patience;
+  }
+  return true;
+}
+
+// The place of a known host, or a new one; null if there is none.
+BridgeHosts::Host* BridgeHosts::place_for(Peer from, SessionId sid, Time now) {
+  for (Host& host : hosts_) {
+    if (is_of(host, from, sid)) return &host;
+  }
+  Host fresh;
+  Host* place = nullptr;
+  if (sid == no_session) {
+    place = hosts_.data();
+    if (place->heard != Time() && now - place->heard < timeout_ + paper_margin) return nullptr;
+  } else {
+    // Hosts that were never served give way first, then the one that was silent longest.
+    const auto rank = [now](const Host& host) {
+      return std::pair(now >= host.served_from, host.heard);
+    };
+    for (Host& host : hosts_) {
+      if (host.sid == sid) fresh = host;  // another path of the same session
+      if (&host == hosts_.data() || is_served(host, now)) continue;
+      if (place == nullptr || rank(host) < rank(*place)) place = &host;
+    }
+    if (place == nullptr) return nullptr;
+  }
+  *place = fresh;
+  place->peer = from;
+  place->sid = sid;
+  return place;
+}
+
+void BridgeHosts::on_busy(SessionId sid, Time now) {
+  for (Host& host : hosts_) {
+    if (host.sid != sid) continue;
+    host.served_from = never;
+    host.refused_until = now + timeout_;
+  }
+}
+
+void BridgeHosts::on_board_free() {
+  for (Host& host : hosts_) host.refused_until = Time();
+}
+
+bool BridgeHosts::poll(Time now) {
+  next_.clear();
+  for (const Host& host : hosts_) {
+    if (!is_served(host, now)) continue;
+    if (std::find(next_.begin(), next_.end(), host.peer) == next_.end()) next_.push_back(host.peer);
+  }
+  if (next_ == served_) return false;
+  served_.swap(next_);
+  return true;
+}
+
+bool BridgeHosts::is_served_at(Peer peer) const {
+  return std::find(served_.begin(), served_.end(), peer) != served_.end();
 }
 
 bool BridgeHosts::knows(Peer from, SessionId sid, Time now) const {
   return std::any_of(hosts_.begin(), hosts_.end(), [&](const Host& host) {
-    return is_heard(host, now) && host.sid == sid && host.peer == from;
+    return is_of(host, from, sid) && is_heard(host, now);
   });
 }
 
-bool BridgeHosts::on_busy(SessionId sid, Time now) {
-  bool served = false;
-  for (Host& host : hosts_) {
-    if (host.sid != sid || !is_heard(host, now)) continue;
-    served = served || is_served(host, now);
-    host.refused_until = now + refusal;
+bool BridgeHosts::trusts(Peer from, SessionId sid, Time now) const {
+  return std::any_of(hosts_.begin(), hosts_.end(), [&](const Host& host) {
+    const bool same = host.sid == sid && (sid != no_session || host.peer == from);
+    return same && now >= host.served_from;
+  });
+}
+
+std::optional<std::uint32_t> BridgeHosts::first_heartbeat(Peer from, SessionId sid) const {
+  for (const Host& host : hosts_) {
+    if (is_of(host, from, sid)) return host.first_heartbeat;
   }
-  return served;
+  return std::nullopt;
 }
 
-bool BridgeHosts::serves_any(Time now) const {
+bool BridgeHosts::serves(SessionId sid, Time now) const {
   return std::any_of(hosts_.begin(), hosts_.end(),
-                     [&](const Host& host) { return is_served(host, now); });
-}
-
-bool BridgeHosts::serves(Peer peer, Time now) const {
-  return std::any_of(hosts_.begin(), hosts_.end(),
-                     [&](const Host& host) { return host.peer == peer && is_served(host, now); });
+                     [&](const Host& host) { return host.sid == sid && is_served(host, now); });
 }
 
 }  // namespace r4

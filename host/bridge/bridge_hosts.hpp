@@ -1,20 +1,33 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The hosts behind a bridge, by their session ids, and which of them the board refuses.
+// The hosts behind a bridge, by their session ids, and which of them the bridge serves.
 //
-//                 its heartbeat                  the board answers BUSY
-//     unknown ---------------------> served <------------------------------> refused
-//        ^                             |          `refusal` has passed          |
-//        +------------------- silent for the timeout --------------------------+
+//                 heartbeat             no BUSY of the board for `patience` after a
+//                                       heartbeat that the board judges
+//     unknown ---------------> asking ------------------------------------------> served
+//                                | ^                                                |
+//                           BUSY | | no BUSY for the timeout, or                    | BUSY
+//                                v | the board reports that it has no host          |
+//                              refused <--------------------------------------------+
 //
-// The board decides which host controls it. A bridge passes what they all send, and the board's states to those that
-// the board does not refuse. Paper hosts have no session id, and the board cannot tell two of them apart behind one
-// bridge: only one at a time is let through.
+// The board decides which host controls it, and answers BUSY to every other one. So the host that
+// the board obeys is the one that it does not refuse. States are sent to served hosts alone, and
+// what they send passes at once. Other hosts share a budget (bridged_pair.hpp).
+//
+// A served host keeps its place for as long as it is heard. After a silence it is served again at
+// once, unless another served host needed the place.
+//
+// A paper host has no session id, so the board cannot distinguish two of them behind one bridge.
+// Only one passes at a time.
 #pragma once
 
 #include <array>
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
 
+#include "r4link/datagram.hpp"
 #include "r4link/vocabulary.hpp"
 
 namespace r4 {
@@ -22,66 +35,69 @@ namespace r4 {
 class BridgeHosts {
  public:
   using Time = std::chrono::steady_clock::time_point;
-  static constexpr std::size_t most = 16;
-  // A host in vain sends heartbeats at 10 Hz at least, and each is refused.
-  static constexpr std::chrono::milliseconds refusal{500};
+  static constexpr std::size_t most = 16;  // besides the paper host
+  // Longer than a board needs to answer.
+  static constexpr std::chrono::milliseconds patience{50};
+  // The board must have lost a silent paper host before another one passes.
+  static constexpr std::chrono::milliseconds paper_margin{500};
 
   // `timeout`: the board's.
-  explicit BridgeHosts(std::chrono::milliseconds timeout) : timeout_(timeout) {}
+  explicit BridgeHosts(std::chrono::milliseconds timeout);
 
-  enum class Heartbeat : std::uint8_t {
-    known,     // it passes
-    added,     // it passes, and its host is served from now on
-    kept_out,  // another paper host is there, or `most` hosts
-  };
-  Heartbeat on_heartbeat(Peer from, SessionId sid, Time now);
-  // True if commands of this host pass: its heartbeats do.
+  // `judged`: the board begins or feeds a session by that heartbeat, or answers it BUSY.
+  // False if it must not pass: there is another paper host, or `most` other hosts are served.
+  bool on_heartbeat(Peer from, const Datagram& heartbeat, bool judged, Time now);
+  // The board has refused that session.
+  void on_busy(SessionId sid, Time now);
+  // The board reports that it has no host, so it refuses nobody.
+  void on_board_free();
+  // Lets time pass. True if served() has changed.
+  bool poll(Time now);
+
+  // Where the served hosts are as of the last poll(), each peer once.
+  const std::vector<Peer>& served() const { return served_; }
+  bool is_served_at(Peer peer) const;
+  // True if a heartbeat of this host passed, at most a timeout ago.
   bool knows(Peer from, SessionId sid, Time now) const;
-  // The board has refused that session. True if it was served until now.
-  bool on_busy(SessionId sid, Time now);
-
-  // Calls `call(peer)` for each path of that session.
+  // True if what this host sends passes at once: it is served, or was before a silence. That holds
+  // for every path of its session.
+  bool trusts(Peer from, SessionId sid, Time now) const;
+  bool serves(SessionId sid, Time now) const;
+  // The number of the first heartbeat of this host that passed, or passed after a silence.
+  std::optional<std::uint32_t> first_heartbeat(Peer from, SessionId sid) const;
+  // Calls `call(peer)` for each path of that session if it is served.
   template <class Call>
-  void for_each_of(SessionId sid, Time now, Call call) const {
+  void for_each_path(SessionId sid, Time now, Call call) const {
     for (const Host& host : hosts_) {
-      if (is_heard(host, now) && host.sid == sid) call(host.peer);
+      if (host.sid == sid && is_served(host, now)) call(host.peer);
     }
   }
-  // Calls `call(peer)` for each host that is heard.
-  template <class Call>
-  void for_each(Time now, Call call) const {
-    for (const Host& host : hosts_) {
-      if (is_heard(host, now)) call(host.peer);
-    }
-  }
-  // Calls `call(peer)` for each that is served.
-  template <class Call>
-  void for_each_served(Time now, Call call) const {
-    for (const Host& host : hosts_) {
-      if (is_served(host, now)) call(host.peer);
-    }
-  }
-  bool serves_any(Time now) const;
-  bool serves(Peer peer, Time now) const;
 
  private:
+  static constexpr Time never = Time::max();
   struct Host {
-    bool used = false;
     Peer peer = everyone;
     SessionId sid = no_session;
-    Time heard;
+    Time heard;  // Time(): the place is free
+    std::optional<std::uint32_t> first_heartbeat;
     Time refused_until;
+    Time served_from = never;
   };
 
+  static bool is_of(const Host& host, Peer from, SessionId sid) {
+    return host.heard != Time() && host.sid == sid && host.peer == from;
+  }
   bool is_heard(const Host& host, Time now) const {
-    return host.used && now - host.heard < timeout_;
+    return host.heard != Time() && now - host.heard < timeout_;
   }
   bool is_served(const Host& host, Time now) const {
-    return is_heard(host, now) && now >= host.refused_until;
+    return is_heard(host, now) && now >= host.served_from;
   }
+  Host* place_for(Peer from, SessionId sid, Time now);
 
   const std::chrono::milliseconds timeout_;
-  std::array<Host, most> hosts_;
+  std::array<Host, most + 1> hosts_;  // the first place is for a paper host
+  std::vector<Peer> served_, next_;
 };
 
 }  // namespace r4

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A bridge watches its board while no host has the place (docs/protocol.md, 4.8): the states that
+// A bridge watches its board while it serves no host (docs/protocol.md, 4.8): the states that
 // come by it are for the watchers at the hosts' side, and for those that share the board's
 // transport with the bridge.
 //
@@ -44,9 +44,9 @@ class BridgeWatch {
     return write_lease(writer, "0");
   }
 
-  // True if that answers a W of ours.
+  // True if that answers a W of ours, which names no session.
   bool on_refusal(const Nack& nack, SteadyTime now) {
-    if (next_pnum_ - 1 - nack.pnum >= remembered) return false;
+    if (nack.sid != no_session || next_pnum_ - 1 - nack.pnum >= remembered) return false;
     if (nack.lease == 0) wish_nothing();  // the board does not take it
     lease_.on_refusal(nack, time(now));
     return true;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bridged_pair.hpp"
 
+#include <cstdlib>
 #include <optional>
 #include <utility>
 
@@ -51,6 +52,7 @@ BridgedPair::BridgedPair(Setup setup)
       on_event_(std::move(setup.on_event)),
       hosts_(*this, BridgeSide::hosts, std::move(setup.hosts)),
       board_(*this, BridgeSide::board, std::move(setup.board)),
+      timeout_(setup.timeout),
       known_(setup.timeout),
       guard_(setup.keys, setup.trusted) {}
 
@@ -99,6 +101,7 @@ void BridgedPair::tick() {
       }
     }
   }
+  follow_hosts(now);
   watch_board(now);
 }
 
@@ -149,7 +152,7 @@ void BridgedPair::on_host_datagram(const Datagram& datagram, Peer from, Time now
   const MessageKind kind = kind_of(datagram);
   if (kind == MessageKind::command && is_stop(datagram)) {
     audience_.listen(from, now);
-    return pass_on(datagram, Priority::stop);
+    return deliver(hosts_, board_, datagram, Priority::stop);
   }
   if (is_old(hosts_, now)) return;
   if (kind == MessageKind::command) return on_command(datagram, from, now);
@@ -158,75 +161,83 @@ void BridgedPair::on_host_datagram(const Datagram& datagram, Peer from, Time now
     return;
   }
   if (!is_allowed(datagram, kind, from, now)) return;
-  switch (known_.on_heartbeat(from, datagram.session_id(), now)) {
-    case BridgeHosts::Heartbeat::kept_out:
-      ++hosts_.counters.kept_out;
-      return answer(datagram, Refusal::busy, 0, from, now);  // as the board does
-    case BridgeHosts::Heartbeat::added:
-      hold_hosts(now);
-      break;
-    case BridgeHosts::Heartbeat::known:
-      break;
+  const SessionId sid = datagram.session_id();
+  const bool trusted = known_.trusts(from, sid, now);
+  if (!trusted && !may_ask(now)) return;
+  if (!known_.on_heartbeat(from, datagram, is_judged(datagram), now)) {
+    ++hosts_.counters.kept_out;
+    return answer(datagram, Refusal::busy, 0, from, now);  // as the board does
   }
-  if (watch_.asked() && known_.serves_any(now)) {  // the board's states are for that host now
-    std::array<char, max_datagram> buffer;
-    DatagramWriter writer(buffer.data(), buffer.size());
-    send(board_, view(watch_.write_end(writer)), Priority::normal, everyone);
-  }
-  pass_on(datagram);
-}
-
-// The peers of the hosts that are served keep their numbers, whatever others send.
-void BridgedPair::hold_hosts(Time now) {
-  bool any = false;
-  known_.for_each_served(now, [&](Peer peer) {
-    any ? hosts_.carrier->also_hold(peer) : hosts_.carrier->hold(peer);
-    any = true;
-  });
+  if (!trusted) audience_.listen(from, now);  // to a heartbeat of the board, which it can echo
+  pass_on(datagram, from, trusted, now);
+  follow_hosts(now);
 }
 
 void BridgedPair::on_command(const Datagram& datagram, Peer from, Time now) {
   if (is_single(datagram, Text("W"))) return on_lease(datagram, from, now);
+  const SessionId sid = datagram.session_id();
+  const bool trusted = known_.trusts(from, sid, now);
   const Field& command = datagram.command();
-  if (is_single(datagram, Text("Q")) && command.values() == "ID") {
-    return on_question(datagram, from, now);
+  const bool asks_who = is_single(datagram, Text("Q")) && command.values() == "ID";
+  if (!asks_who && !is_allowed(datagram, MessageKind::command, from, now)) return;
+  if (!asks_who && !known_.knows(from, sid, now)) {
+    ++hosts_.counters.kept_out;  // its heartbeat comes first, and that is answered
+    return;
   }
-  if (!is_allowed(datagram, MessageKind::command, from, now)) return;
-  if (known_.knows(from, datagram.session_id(), now)) return pass_on(datagram);
-  ++hosts_.counters.kept_out;  // its heartbeat comes first, and that is answered
+  if (!trusted && !may_ask(now)) return;
+  if (has_site_setting(datagram)) {  // no copy of it has passed: that is proof for its host
+    ++hosts_.counters.refused;
+    return answer(datagram, Refusal::auth, 0, from, now, known_.first_heartbeat(from, sid));
+  }
+  // A paper host and a program that only asks cannot be distinguished by the answer.
+  pass_on(datagram, from, trusted && !(asks_who && sid == no_session), now);
+}
+
+// True if one more datagram of a host that is not trusted may pass.
+bool BridgedPair::may_ask(Time now) {
+  if (asking_.take(ms_of(now))) return true;
+  ++hosts_.counters.kept_out;
+  return false;
+}
+
+// True if the board begins or feeds a session by that heartbeat, or else answers BUSY: it echoes a
+// heartbeat of the board, as a session must, or is a paper host's. The answer needs a number, so a
+// paper host without numbers cannot be refused, and is served only where no other host is.
+bool BridgedPair::is_judged(const Datagram& heartbeat) const {
+  if (heartbeat.session_id() == no_session) return heartbeat.has_pnum() || known_.served().empty();
+  const auto board_t = static_cast<std::uint32_t>(board_t_);
+  const auto ago =
+      static_cast<std::int32_t>(board_t - static_cast<std::uint32_t>(heartbeat.time_ms()));
+  return board_t != 0 && heartbeat.has_pnum() && heartbeat.time_ms() != 0 &&
+         milliseconds(std::abs(std::int64_t{ago})) <= timeout_;
+}
+
+// Whenever other hosts are served than before. Their peers keep their numbers at the carrier,
+// whatever others send.
+void BridgedPair::follow_hosts(Time now) {
+  if (!known_.poll(now)) return;
+  const std::vector<Peer>& served = known_.served();
+  hosts_.carrier->hold(served.empty() ? everyone : served.front());
+  for (const Peer peer : served) hosts_.carrier->also_hold(peer);
+  if (served.empty() || !watch_.asked()) return;
+  std::array<char, max_datagram> buffer;  // the board's states are for that host now
+  DatagramWriter writer(buffer.data(), buffer.size());
+  send(board_, view(watch_.write_end(writer)), Priority::normal, everyone);
 }
 
 // True if that heartbeat or command may pass, as far as keys decide.
 bool BridgedPair::is_allowed(const Datagram& datagram, MessageKind kind, Peer from, Time now) {
   const Verdict verdict = guard_.judge(datagram, now);
+  if (verdict == Verdict::authentic) return true;
   const bool is_command = kind == MessageKind::command;
-  if (verdict != Verdict::authentic) {
-    ++hosts_.counters.refused;
-    if (!guard_.may_answer(verdict)) return false;
-    if (is_command) {
-      answer(datagram, Refusal::auth, 0, from, now);
-    } else {
-      audience_.listen(from, now);  // a heartbeat of the board tells the nonce
-    }
-    return false;
-  }
-  if (!is_command || !has_site_setting(datagram)) return true;
   ++hosts_.counters.refused;
-  answer(datagram, Refusal::auth, 0, from, now);
-  return false;
-}
-
-void BridgedPair::on_question(const Datagram& datagram, Peer from, Time now) {
-  const SessionId sid = datagram.session_id();
-  const bool known = sid != no_session && known_.knows(from, sid, now);
-  if (!known && !questions_.take(ms_of(now))) {
-    ++hosts_.counters.kept_out;
-    return;
+  if (!guard_.may_answer(verdict)) return false;
+  if (is_command) {
+    answer(datagram, Refusal::auth, 0, from, now);
+  } else {
+    audience_.listen(from, now);  // a heartbeat of the board tells the nonce
   }
-  std::optional<std::uint32_t> pnum;
-  if (datagram.has_pnum()) pnum = datagram.pnum();
-  if (!known) audience_.on_question(from, pnum, sid, now);
-  pass_on(datagram);
+  return false;
 }
 
 // The board has one lease for all that comes from the bridge. So each watcher has its lease here.
@@ -237,11 +248,15 @@ void BridgedPair::on_lease(const Datagram& datagram, Peer from, Time now) {
   if (refusal == Refusal::none && !command.text.empty()) {
     refusal = parse_fields(command.text, fields);
   }
-  if (refusal != Refusal::none) return answer(datagram, refusal, 0, from, now);
+  if (refusal != Refusal::none) {
+    if (leases_.take(ms_of(now))) answer(datagram, refusal, 0, from, now);
+    return;
+  }
   const bool ends = command.value == 0;
   switch (audience_.on_lease(from, ends, datagram.time_ms(), now)) {
     case BridgeAudience::Effect::full:
-      return answer(datagram, Refusal::busy, 0, from, now);
+      if (leases_.take(ms_of(now))) answer(datagram, Refusal::busy, 0, from, now);
+      return;
     case BridgeAudience::Effect::watching:
       if (!ends) watch_.wish(datagram.command().values());
       return;
@@ -271,6 +286,9 @@ void BridgedPair::on_board_datagram(const Datagram& datagram, Time now) {
     case MessageKind::identity:
       return on_answer(datagram, kind, now);
     case MessageKind::board_heartbeat:
+      if (is_connecting_heartbeat(datagram) || heartbeat_reason(datagram) == SafeReason::link) {
+        known_.on_board_free();
+      }
       return deliver_to_hosts(datagram, false, now);
     default:
       watch_.on_state(now);
@@ -278,50 +296,53 @@ void BridgedPair::on_board_datagram(const Datagram& datagram, Time now) {
   }
 }
 
-// A heartbeat goes to everyone whom the carrier reaches at once, and to each host and listener. A state goes to the hosts
-// that are served, and to watchers.
+// To served hosts and watchers; a heartbeat also to listeners, and while no host is served to
+// everyone whom the carrier reaches at once.
 void BridgedPair::deliver_to_hosts(const Datagram& datagram, bool is_state, Time now) {
   const Priority priority = is_state ? Priority::state : Priority::normal;
-  const bool to_everyone = !is_state || known_.serves_any(now);
+  const std::vector<Peer>& served = known_.served();
+  const bool to_everyone = served.empty() && !is_state;
   if (to_everyone) deliver(board_, hosts_, datagram, priority);
-  const auto copy = [&](Peer peer) {
-    if (to_everyone && hosts_.carrier->reaches(peer)) return;
-    send(hosts_, view(datagram.bytes()), priority, peer);
-  };
-  is_state ? known_.for_each_served(now, copy) : known_.for_each(now, copy);
+  if (!served.empty()) deliver(board_, hosts_, datagram, priority, served.front());
+  const auto copy = [&](Peer peer) { send(hosts_, view(datagram.bytes()), priority, peer); };
+  for (std::size_t i = 1; i < served.size(); ++i) copy(served[i]);
   if (audience_.empty()) return;
+  const auto has_it = [&](Peer peer) {
+    return known_.is_served_at(peer) || (to_everyone && hosts_.carrier->reaches(peer));
+  };
   audience_.for_each_watcher(now, [&](Peer peer) {
-    if (!known_.serves(peer, now)) copy(peer);
+    if (!has_it(peer)) copy(peer);
   });
   if (is_state) return;
   audience_.for_each_listener(now, [&](Peer peer) {
-    if (!known_.serves(peer, now) && copies_.take(ms_of(now))) copy(peer);
+    if (!has_it(peer) && copies_.take(ms_of(now))) copy(peer);
   });
 }
 
-// To a peer that asked before its first heartbeat, else to each path of the session that the answer names.
+// To each path of the session that the answer names if it is served, else to the peer that asked.
 void BridgedPair::on_answer(const Datagram& answer, MessageKind kind, Time now) {
+  const SessionId sid = answer.session_id();
+  std::optional<Peer> asker;
   Nack nack;
   Identity identity;
-  std::optional<std::uint32_t> pnum;
   if (kind == MessageKind::nack) {
     if (!read_nack(answer, nack) || watch_.on_refusal(nack, now)) return;
-    pnum = nack.pnum;
-    if (nack.code == Refusal::busy && known_.on_busy(nack.sid, now)) hold_hosts(now);
-  } else if (!read_identity(answer, identity)) {
-    return;
-  } else if (identity.has_asked) {
-    pnum = identity.asked;
+    if (!known_.serves(sid, now)) asker = audience_.asker_of(nack.pnum, sid, now);
+  } else {
+    if (!read_identity(answer, identity)) return;
+    std::optional<std::uint32_t> pnum;
+    if (identity.has_asked) pnum = identity.asked;
+    asker = audience_.asker_of(pnum, sid, now);
   }
   const auto pass = [&](Peer peer) { deliver(board_, hosts_, answer, Priority::normal, peer); };
-  const SessionId sid = answer.session_id();
-  const std::optional<Peer> asker = audience_.asker_of(pnum, sid, now);
-  if (asker && !known_.knows(*asker, sid, now)) return pass(*asker);
-  known_.for_each_of(sid, now, pass);
+  asker ? pass(*asker) : known_.for_each_path(sid, now, pass);
+  if (kind != MessageKind::nack || nack.code != Refusal::busy) return;
+  known_.on_busy(sid, now);
+  follow_hosts(now);
 }
 
 void BridgedPair::watch_board(Time now) {
-  if (!board_.opened || known_.serves_any(now)) return;
+  if (!board_.opened || !known_.served().empty()) return;
   if (!audience_.has_watchers(now)) watch_.wish_nothing();
   if (!watch_.due(now)) return;
   std::array<char, max_datagram> buffer;
@@ -352,20 +373,34 @@ void BridgedPair::report_trouble() {
   on_event_(BridgeSide::board, {CarrierEvent::Kind::warning, problem});
 }
 
-// In the board's place, as if it had said so together with what it said last.
+// In the board's place, as if it had said so together with what it said last. `session`: as a
+// refusal of the board names it.
 void BridgedPair::answer(const Datagram& asked, Refusal code, std::uint32_t lease, Peer to,
-                         Time now) {
+                         Time now, std::optional<std::uint32_t> session) {
   if (!asked.has_pnum() || !board_known_ || now - board_heard_ > clock_lifetime) return;
   Nack nack;
   nack.pnum = asked.pnum();
+  nack.sid = asked.session_id();
   nack.code = code;
   nack.lease = lease;
+  nack.has_session = session.has_value();
+  nack.session = session.value_or(0);
   std::array<char, 160> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   write_nack(writer, nack);
   const auto since = std::chrono::duration_cast<milliseconds>(now - board_heard_).count();
   const Text text = writer.finish(board_pnum_, board_t_ + static_cast<std::uint64_t>(since));
   send(hosts_, view(text), Priority::normal, to);
+}
+
+// To the board. The answer to a host that is not trusted goes to where it asked from.
+void BridgedPair::pass_on(const Datagram& datagram, Peer from, bool trusted, Time now) {
+  if (!trusted) {
+    std::optional<std::uint32_t> pnum;
+    if (datagram.has_pnum()) pnum = datagram.pnum();
+    audience_.on_question(from, pnum, datagram.session_id(), now);
+  }
+  deliver(hosts_, board_, datagram, Priority::normal);
 }
 
 void BridgedPair::deliver(Side& from, Side& to, const Datagram& datagram, Priority priority,

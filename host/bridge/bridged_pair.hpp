@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Two carriers of one loop joined: on one hosts are heard, at the other is their board.
 //
-//     hosts --> E:STOP                          first of all, of anyone, however old
-//               heartbeats, commands            if they prove what they must (bridge_guard.hpp)
-//               Q:ID                            of anyone
-//     board --> heartbeats                      to every host (bridge_hosts.hpp)
-//               states                          to the hosts that the board does not refuse, and to
-//                                               watchers (bridge_audience.hpp)
-//               N, I                            to the session that they name; without a session, by the
-//                                               number of the question
+//     hosts --> E:STOP                 first of all, of anyone, however old
+//               heartbeats, commands   if they prove what they must (bridge_guard.hpp): of served
+//                                      hosts (bridge_hosts.hpp) at once, of others within a budget
+//               Q:ID                   of anyone, likewise
+//     board --> heartbeats             to served hosts and watchers (bridge_audience.hpp), and for a
+//                                      second to each other host
+//               states                 to served hosts and watchers
+//               N, I                   to the session that they name if it is served, else to the
+//                                      peer that asked
 //
 // The bytes stay as they are. What may have waited for longer than `oldest` before it was read is dropped, but a stop:
 // so nothing that a bridge held back is executed, or keeps a board alive. What waits to be sent is bounded likewise,
@@ -16,9 +17,9 @@
 // never pass: a bridge would turn everyone who reaches it into that cable, and would carry keys and
 // passwords over a network.
 //
-// No heartbeat is made here. Answers are: BUSY for a host that is kept out, AUTH for what must not pass, and a
-// LEASE for a watcher, since all of a bridge's watchers are at one place for the board. While no host is
-// served, the bridge itself watches the board (bridge_watch.hpp).
+// No heartbeat is made here. Answers are: BUSY for a host that is kept out, AUTH for what must not
+// pass, and a LEASE for a watcher, since all of a bridge's watchers are one peer to the board. While
+// no host is served, the bridge itself watches the board (bridge_watch.hpp).
 #pragma once
 
 #include <array>
@@ -101,20 +102,20 @@ class BridgedPair {
   void on_host_datagram(const Datagram& datagram, Peer from, Time now);
   void on_board_datagram(const Datagram& datagram, Time now);
   void on_command(const Datagram& datagram, Peer from, Time now);
-  void on_question(const Datagram& datagram, Peer from, Time now);
   void on_lease(const Datagram& datagram, Peer from, Time now);
   bool is_allowed(const Datagram& datagram, MessageKind kind, Peer from, Time now);
   void on_answer(const Datagram& answer, MessageKind kind, Time now);
   void deliver_to_hosts(const Datagram& datagram, bool is_state, Time now);
-  void hold_hosts(Time now);
+  bool may_ask(Time now);
+  bool is_judged(const Datagram& heartbeat) const;
+  void follow_hosts(Time now);
   void watch_board(Time now);
   void report_trouble();
-  void answer(const Datagram& asked, Refusal code, std::uint32_t lease, Peer to, Time now);
+  void answer(const Datagram& asked, Refusal code, std::uint32_t lease, Peer to, Time now,
+              std::optional<std::uint32_t> session = std::nullopt);
   void deliver(Side& from, Side& to, const Datagram& datagram, Priority priority,
                Peer peer = everyone);
-  void pass_on(const Datagram& datagram, Priority priority = Priority::normal) {
-    deliver(hosts_, board_, datagram, priority);
-  }
+  void pass_on(const Datagram& datagram, Peer from, bool trusted, Time now);
   bool send(Side& to, std::string_view bytes, Priority priority, Peer peer);
   bool is_old(Side& side, Time now);
   void try_to_open(Side& side, Absence absence, Time now);
@@ -124,11 +125,13 @@ class BridgedPair {
   const std::function<void(BridgeSide, const CarrierEvent&)> on_event_;
   Side hosts_;
   Side board_;
+  const std::chrono::milliseconds timeout_;
   BridgeHosts known_;
   BridgeGuard guard_;
   BridgeAudience audience_;
   BridgeWatch watch_;
-  AnswerBudget questions_, leases_, copies_;  // of hosts that have proved nothing
+  // For peers that have proved nothing: what they send to the board, answers to W, and heartbeats.
+  AnswerBudget asking_, leases_, copies_;
   BridgeGuard::Trouble told_trouble_ = BridgeGuard::Trouble::none;
   // The board's newest number and clock, for answers in its place.
   bool board_known_ = false;

@@ -225,7 +225,7 @@ struct BridgeCounters {
   std::uint64_t damaged = 0;  // a wrong checksum, too long, or no datagram at all
   std::uint64_t misdirected =
       0;  // what only a board says from the hosts' side, or the other way round
-  std::uint64_t kept_out = 0;  // heartbeats and commands while another host has the place
+  std::uint64_t kept_out = 0;  // of hosts that are not served: docs/bridge.md
   std::uint64_t refused =
       0;  // not signed though it must be, or a setting that only a cable may change
   std::uint64_t late = 0;         // may have waited for more than 100 ms: the bridge was held up

@@ -71,10 +71,12 @@ def test_the_papers_udp_client_drives_a_board_on_a_serial_port(board):
     assert len(client.states) >= 50 * LASTS_S or SANITIZED
     assert ';DHB1A:1000,1;' in client.states[-1] and ';SERVO1POS:300;' in client.states[-1]
     hosts = [each for each in told if each.get('side') == 'hosts' and each['type'] == 'counters'][-1]
-    # A machine that stands still for a moment makes some late; none vanishes.
-    assert hosts['passed'] + hosts['late'] + hosts['undelivered'] == client.pnum_sent or SANITIZED
+    # A machine that stands still for a moment makes some late; none vanishes. Before the client is served, 16 pass at once.
+    counted = sum(hosts[each] for each in ('passed', 'late', 'undelivered', 'kept_out'))
+    assert counted == client.pnum_sent or SANITIZED
+    assert hosts['kept_out'] <= 16 or SANITIZED
     assert hosts['passed'] > 0.95 * client.pnum_sent
-    assert hosts['damaged'] == hosts['misdirected'] == hosts['kept_out'] == hosts['refused'] == 0
+    assert hosts['damaged'] == hosts['misdirected'] == hosts['refused'] == 0
 
 
 def test_one_drives_through_two_bridges_while_another_watches_and_a_third_stops(bridge, board):

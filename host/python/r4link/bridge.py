@@ -38,7 +38,7 @@ class BridgeCounters(NamedTuple):
     # Dropped:
     damaged: int  # a wrong checksum, too long, or no datagram at all
     misdirected: int  # what only a board says from the hosts' side, or the other way round
-    kept_out: int  # heartbeats and commands while another host has the place
+    kept_out: int  # of hosts that are not served: docs/bridge.md
     refused: int  # not signed though it must be, or a setting that only a cable may change
     late: int  # may have waited for more than 100 ms: the bridge was held up
     undelivered: int  # the other side is away, takes no more, or nobody is known there

@@ -23,7 +23,7 @@ class ScriptedCarrier final : public Carrier {
     Peer to;
   };
 
-  explicit ScriptedCarrier(std::string name) : name_(std::move(name)) {}
+  explicit ScriptedCarrier(std::string name) : name_(std::move(name)) { also_held.reserve(100); }
 
   void open(Handler& handler) override {
     if (absence) throw Error(*absence);
@@ -35,7 +35,13 @@ class ScriptedCarrier final : public Carrier {
     if (result == SendResult::sent && keeps) sent.push_back({std::string(bytes), priority, to});
     return result;
   }
-  void hold(Peer peer) override { held = peer; }
+  void hold(Peer peer) override {
+    held = peer;
+    also_held.clear();
+  }
+  void also_hold(Peer peer) override {
+    if (peer != held) also_held.push_back(peer);
+  }
   bool reaches(Peer peer) const override { return peer == everyone || peer == held; }
   bool up() const override { return handler_ != nullptr; }
   std::size_t max_size() const override { return max_datagram; }
@@ -66,6 +72,7 @@ class ScriptedCarrier final : public Carrier {
   bool keeps = true;  // what was sent, which takes memory
   std::vector<Sent> sent;
   Peer held = everyone;
+  std::vector<Peer> also_held;
 
  private:
   const std::string name_;
