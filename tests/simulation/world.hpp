@@ -311,10 +311,11 @@ class World : public firmware::Hal, public firmware::Observer {
   std::map<Process, std::uint64_t> clear_asked_us_;
   std::uint32_t next_peer_ = 1;
 
-  // What a place was told to echo by this boot of the board, and the lease that it has by that.
+  // What this boot of the board sent a place to echo, each with the time when it was sent or last echoed, and
+  // the lease that the place has by that. The board may forget one of them at any time: then another renews.
   struct Lease {
-    std::map<std::uint32_t, std::uint64_t> told_us;
-    std::uint32_t token = 0;  // 0: it never had one
+    std::map<std::uint32_t, std::uint64_t> tokens_us;
+    std::uint32_t token = 0;  // the newest echoed; 0: none yet
     std::uint64_t renewed_us = 0;
   };
   std::map<std::uint32_t, Lease> leases_;
