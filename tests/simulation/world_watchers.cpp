@@ -71,8 +71,8 @@ void World::forge_lease() {
       break;
     case 4:  // what would keep the link of the host in control
       victim = hosts_.front()->on(0)->peer;
-      echo = newest_heartbeat_t_;
-      pnum = hosts_.front()->heartbeat_pnum + 1;
+      echo = stranger_.echo();
+      pnum = hosts_.front()->next_pnum;
       break;
     default:
       for (const auto& [peer, lease] : leases_) {

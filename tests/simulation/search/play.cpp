@@ -158,7 +158,6 @@ void Play::on_sent(const Packet& sent) {
   hosts_of_event_.push_back(who);
   if (keep_trace_) step.text = sent.bytes.substr(0, sent.bytes.find('^'));
   steps_.push_back(std::move(step));
-  if (sent.to_board) next_pnum_[sent.host] = sent.pnum + 1;
 
   bool first_copy = steps_.back().passes;
   std::uint64_t first_us = delay_us;
@@ -295,7 +294,7 @@ bool Play::on_executed(const Command& command) {
   }
   executed_ = true;
   if (command.kind == CommandKind::leave) may_be_lost_ = true;
-  return command.kind != CommandKind::stepper || command.value != strangers_target;
+  return command.kind != CommandKind::stepper || command.value != Stranger::target;
 }
 
 void Play::on_link_lost() { lost_now_ = true; }
@@ -315,7 +314,7 @@ void Play::check() {
   const firmware::StepperTarget& stepper = world_.outputs_.stepper[0];
   if (!stepper.enabled) return;
   Process whose{stranger_host, 0};
-  if (stepper.position != strangers_target) {
+  if (stepper.position != Stranger::target) {
     const World::Sent& sent = world_.commands_[static_cast<std::size_t>(stepper.position)];
     whose = {sent.host, sent.incarnation};
   }

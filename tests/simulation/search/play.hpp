@@ -26,9 +26,9 @@
 #include <vector>
 
 #include "story.hpp"
-#include "stranger.hpp"
 #include "tests/host/bridge/scripted_bridge.hpp"
 #include "tests/simulation/script.hpp"
+#include "tests/simulation/stranger.hpp"
 
 namespace r4::simulation {
 
@@ -62,7 +62,7 @@ class Play final : World::Script {
   using Process = World::Process;
   using Packet = World::Packet;
   using Host = World::Host;
-  static constexpr int stranger_host = -2;
+  static constexpr int stranger_host = World::stranger_host;
   static constexpr std::uint64_t delay_us = 500;   // of every path
   static constexpr std::uint64_t bridge_us = 100;  // from a bridge to its board, and back
   static constexpr std::uint64_t disturbed_us = 100'000;
@@ -157,7 +157,6 @@ class Play final : World::Script {
   std::uint32_t stranger_pnum_ = 0;                     // of his own
   std::uint32_t first_peer_ = 0;                        // the address that the first host had first
   std::uint32_t campaign_pnum_ = 0;                     // as if he were the host
-  std::uint32_t next_pnum_[8] = {};                     // of each host
   static constexpr std::uint32_t bridge_peer = 0xFFFB;  // as the board knows it
   std::unique_ptr<test::ScriptedBridge> bridge_;
   World world_;

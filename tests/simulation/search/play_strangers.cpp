@@ -57,7 +57,7 @@ void Play::say_bytes(std::string bytes, std::uint8_t port, std::uint32_t peer) {
 
 std::uint32_t Play::next_number() const {
   const int whose = has_controller_ && controller_.host >= 0 ? controller_.host : 0;
-  return stranger_.guess(next_pnum_[whose]);
+  return stranger_.guess(world_.hosts_[static_cast<std::size_t>(whose)]->next_pnum);
 }
 
 void Play::say_once(Fault::Kind kind) {
@@ -97,7 +97,7 @@ void Play::carry_on(Fault::Kind kind, std::uint8_t port, std::uint32_t peer) {
   }
   if (kind == Fault::Kind::stranger_competes) {
     // Alternately with a name of its session and without.
-    const char* const own = stranger_pnum_ % 4 < 2 ? "" : "SID:00c0ffee00c0ffee;";
+    const char* const own = stranger_pnum_ % 4 < 2 ? "" : Stranger::own_name;
     const std::uint32_t first = 0x9000'0000U;
     say(fmt::format("{}H:ROS2-R4;PNum:{};T:{};", own, first + ++stranger_pnum_, echo), port, peer);
     say(fmt::format("{}P:-7777,1000,1;PNum:{};T:{};", own, first + ++stranger_pnum_, echo), port,
