@@ -286,6 +286,7 @@ class World : public firmware::Hal, public firmware::Observer {
   std::uint32_t first_time();
   void replay(int index);
   // world_strangers.cpp
+  void on_board_heartbeat(std::string_view bytes);
   void tell_stranger(std::uint32_t peer, Priority priority, std::string_view bytes);
   void stranger();
   void on_strangers(const Command& command);
@@ -360,9 +361,10 @@ class World : public firmware::Hal, public firmware::Observer {
   std::set<std::uint32_t> attacker_stops_;  // their numbers
   Stranger stranger_;
   Random stranger_random_;
-  std::uint64_t good_us_ = 0;  // when a heartbeat that has to feed came last
-  bool had_owner_ = false;     // after the event before this one
-  bool may_be_lost_ = false;   // in this event, by a farewell or with a port of the board
+  std::uint64_t good_us_ = 0;         // when a heartbeat that has to feed came last
+  std::vector<std::uint32_t> shown_;  // the T of the newest heartbeats of the board
+  bool had_owner_ = false;            // after the event before this one
+  bool may_be_lost_ = false;          // in this event, by a farewell or with a port of the board
 
   struct BoardPort final : firmware::Port {
     BoardPort(World& w, std::uint8_t n) : world(w), number(n) {}

@@ -42,6 +42,7 @@ void World::boot_board() {
   outputs_ = firmware::Outputs();
   live_ = stopped_ = false;
   had_owner_ = false;
+  shown_.clear();
   fed_.clear();
   for (Wire& wire : wires_) wire.brought_state = wire.serves = false;
   standing_ = false;

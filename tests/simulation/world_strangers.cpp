@@ -2,6 +2,7 @@
 // The stranger of a random schedule, and the promises about what it cannot do.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "world_host.hpp"
@@ -18,9 +19,21 @@ constexpr std::uint64_t slack_of_loss_us = 20'000;
 void World::tell_stranger(std::uint32_t peer, Priority priority, std::string_view bytes) {
   if (schedule_.stranger_interval_us == 0) return;
   const bool heartbeat = bytes.substr(0, 2) == "H:";
+  if (heartbeat) on_board_heartbeat(bytes);
   if (priority == Priority::state || heartbeat || peer == Stranger::address) {
     stranger_.hears(bytes);
   }
+}
+
+// Keeps the T of the newest heartbeats of the board: an echo of an older one does not feed.
+void World::on_board_heartbeat(std::string_view bytes) {
+  constexpr std::size_t most_shown = 64;
+  Datagram datagram;
+  if (!read_datagram(Text(bytes), datagram) || datagram.time_ms() == 0) return;
+  const auto t = static_cast<std::uint32_t>(datagram.time_ms());
+  if (std::find(shown_.begin(), shown_.end(), t) != shown_.end()) return;
+  shown_.push_back(t);
+  if (shown_.size() > most_shown) shown_.erase(shown_.begin());
 }
 
 // Its datagrams arrive whole and at once, some from the address of a host.
@@ -91,17 +104,19 @@ void World::on_strangers(const Command& command) {
   if (command.kind == CommandKind::clear) stopped_ = board_->reason() == SafeReason::stop;
 }
 
-// True if this is a heartbeat of the host in control that comes in time, is the newest one, and echoes what
-// the board sent within the timeout. False with keys and with standstills: there it is not certain.
+// True if this is a heartbeat of the host in control that comes in time, is the newest one, and echoes
+// one of the last heartbeats of the board, which is younger than the timeout. False with keys and
+// with standstills: there it is not certain.
 bool World::has_to_feed(const Packet& packet) const {
   if (has_keys() || !schedule_.standstills.empty() || packet.host < 0) return false;
   if (!packet.intact || !packet.heartbeat) return false;
+  const auto t = static_cast<std::uint32_t>(packet.t);
+  if (std::find(shown_.begin(), shown_.end(), t) == shown_.end()) return false;
   // A host may have begun another session.
   if (!controls(delivering_) || packet.sid != fed_.back().id.sid || !is_in_time()) return false;
   const std::uint32_t ahead = packet.pnum - fed_.back().pnum;
-  const std::uint32_t age_ms = board_ms() - static_cast<std::uint32_t>(packet.t);
-  return ahead != 0 && ahead <= BoardLink::command_window && packet.t != 0 &&
-         age_ms < board_->settings().timeout_ms;
+  return ahead != 0 && ahead <= BoardLink::command_window &&
+         board_ms() - t < board_->settings().timeout_ms;
 }
 
 // The command of live outputs is of the process in control.
