@@ -167,9 +167,12 @@ void Schedule::add_wires(Random& random) {
   attacked_wire = static_cast<int>(random.below(count));
   if (random.chance(0.2)) replaying_wire = static_cast<int>(random.below(count));
   reboots_after_capture = random.chance(0.3);
-  if (random.chance(0.3)) {
-    stranger_interval_us = static_cast<std::uint32_t>(random.between(10'000, 200'000));
-  }
+}
+
+void Schedule::add_stranger(Random& random) {
+  static constexpr double claims[] = {0, 0, 0.05, 0.3};
+  stranger_interval_us = static_cast<std::uint32_t>(random.between(10'000, 300'000));
+  stranger_claims = random.pick(claims);
 }
 
 const char* to_text(Happening::Kind kind) {

@@ -75,8 +75,10 @@ struct Schedule {
   int replaying_wire = -1;
   bool reboots_after_capture = false;
   int attacked_wire = 0;
-  // Somebody on one wire, who knows about where the host's numbers are, sends heartbeats about so often; 0: nobody.
+  // A stranger (stranger.hpp) on the attacked wire sends about so often while a host is in control,
+  // and else at a share of these times; 0: there is none.
   std::uint32_t stranger_interval_us = 0;
+  double stranger_claims = 0;  // that share
   std::vector<Happening> happenings;
   std::vector<Standstill> standstills;  // one after the other
   std::uint32_t command_interval_us = 0;
@@ -100,6 +102,7 @@ struct Schedule {
   void add_watchers(Random& random);
   void add_drift(Random& random);
   void add_wires(Random& random);
+  void add_stranger(Random& random);
   int wires() const { return 1 + static_cast<int>(more_wires.size()); }
   const ChannelFaults& faults(int wire, bool to_board) const;
 };

@@ -12,9 +12,6 @@ namespace r4::simulation {
 
 class World::Script {
  public:
-  // The position that a stranger's command asks of stepper 1. No command of a host asks for it.
-  static constexpr int strangers_target = -7777;
-
   // All hosts are there, and none runs.
   virtual void begin() = 0;
   // The time of the schedule is over, and no promise was broken.

@@ -20,7 +20,7 @@ constexpr std::int64_t million = 1'000'000;
 }  // namespace
 
 World::World(std::uint64_t seed, bool keep_trace, Beside beside)
-    : random_(seed), loop_random_(~seed), keep_trace_(keep_trace), wires_random_(seed + 0x311e5) {
+    : World(seed, Schedule(), keep_trace) {
   schedule_ = Schedule::random(random_);
   Random watch_random(seed + 0x5eed);  // what else happens in a schedule without them is as it was
   if (watch_random.chance(0.3)) schedule_.add_watchers(watch_random);
@@ -31,7 +31,7 @@ World::World(std::uint64_t seed, bool keep_trace, Beside beside)
   }
   Random drift_random(seed + 0xd21f7);
   schedule_.add_drift(drift_random);
-  report_.seed = seed;
+  schedule_.add_stranger(stranger_random_);
 }
 
 World::World(std::uint64_t seed, Schedule schedule, bool keep_trace)
@@ -39,6 +39,7 @@ World::World(std::uint64_t seed, Schedule schedule, bool keep_trace)
       loop_random_(~seed),
       schedule_(std::move(schedule)),
       keep_trace_(keep_trace),
+      stranger_random_(seed + 0x57a96e),
       wires_random_(seed + 0x311e5) {
   report_.seed = seed;
 }
@@ -75,7 +76,7 @@ Report World::run() {
   for (std::size_t i = 0; i < schedule_.standstills.size(); ++i) {
     at(start_us_ + schedule_.standstills[i].at_us, Event::Kind::standstill, static_cast<int>(i));
   }
-  if (schedule_.stranger_interval_us != 0) at(start_us_, Event::Kind::stranger, 0);
+  if (schedule_.stranger_interval_us != 0) at(start_us_ + 1, Event::Kind::stranger, 0);
   if (script_ != nullptr) script_->begin();
   run_until(start_us_ + schedule_.duration_us);
   if (script_ != nullptr && report_.violation.empty()) script_->end();
@@ -94,6 +95,7 @@ void World::run_until(std::uint64_t end_us) {
     now_us_ = event.at_us;
     ++handled_;
     handle(event);
+    check_lost();
     check_silence();
     if (script_ != nullptr) script_->check();
     if (several() && !recording_ && hosts_.front()->places.size() > 1) check_wires();

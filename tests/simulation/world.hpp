@@ -19,6 +19,16 @@
 //   restore    outputs that come back belong to a host that was alive a timeout ago
 //   forged     of a board with a key: nothing that an attacker sends is executed, feeds or takes
 //              control, but a stop
+//   stranger   a stranger (stranger.hpp) takes, keeps and resumes no session but its own: in the session of a
+//              host nothing of the stranger is executed, makes a path or spends a number. While no host is in
+//              control, the stranger may begin a session as any host may. The session belongs to the process
+//              whose heartbeat began it, and each SID of the stranger, and each address without a SID, counts
+//              as a process of its own. A new session has executed no command, and its SESSION is the number of
+//              the heartbeat that began it; a session that has another one was resumed
+//   kept       a host keeps the board while its heartbeats arrive in time with new numbers and fresh echoes.
+//              With keys (a signature may be late) it keeps the board while its heartbeats feed. Not checked
+//              with standstills, because a heartbeat may have waited
+//   owned      outputs that are live were commanded by the process in control
 //   watch      states go to the host in control, and to four places at most that have echoed, at most a
 //              lease ago, what they were told themselves, to each once; without a host they tell that the
 //              board is safe.
@@ -49,6 +59,7 @@
 #include "firmware/application/application.hpp"
 #include "host/session/session.hpp"
 #include "schedule.hpp"
+#include "stranger.hpp"
 
 namespace r4::simulation {
 
@@ -78,8 +89,11 @@ struct Report {
   std::uint32_t attacks = 0;   // datagrams of an attacker
   std::uint32_t rejected = 0;  // for their signatures
   std::uint32_t executed_signed = 0;
-  std::uint32_t leases = 0;   // begun
-  std::uint32_t watched = 0;  // states that came to watchers
+  std::uint32_t strangers = 0;           // datagrams of a stranger
+  std::uint32_t strangers_sessions = 0;  // of its own, begun
+  std::uint32_t strangers_executed = 0;  // commands in these
+  std::uint32_t leases = 0;              // begun
+  std::uint32_t watched = 0;             // states that came to watchers
   std::uint32_t forged_leases = 0;
   std::uint32_t sampled = 0;  // states whose time on the host's clock was told with its error
   std::uint32_t sampled_wrongly = 0;  // and was farther from the truth
@@ -93,7 +107,6 @@ struct Report {
   std::uint32_t failovers = 0;      // a wire that served was disturbed, and another served on
   std::uint32_t timed_on_good = 0;  // commands that ended while a wire met the limits all the time
   std::uint64_t copies = 0;         // that came to hosts
-  std::uint32_t strangers = 0;      // heartbeats of strangers
   std::uint32_t replayed = 0;       // datagrams of an hour ago
   std::uint64_t served_us = 0;      // for so long there was a wire that met the limits
 };
@@ -152,6 +165,8 @@ class World : public firmware::Hal, public firmware::Observer {
     bool recorded = false;  // an hour ago
     bool stop = false;
     std::uint32_t pnum = 0;
+    std::uint64_t t = 0;
+    SessionId sid = no_session;
     int command = -1;  // index in commands_
     int command_count = 0;
     std::uint64_t sent_us = 0;
@@ -164,11 +179,13 @@ class World : public firmware::Hal, public firmware::Observer {
     std::uint32_t incarnation = 0;
     auto operator<=>(const Process&) const = default;
   };
+  static constexpr int stranger_host = -2;
   // A heartbeat that the board took as a sign of life.
   struct Fed {
     Process from;
     std::uint32_t pnum;
     std::uint64_t at_us;
+    HostId id;
   };
   // One command that a host asked for, named by its stepper target: that of channel 1, or, if it is a
   // group, of all.
@@ -244,6 +261,7 @@ class World : public firmware::Hal, public firmware::Observer {
   void transfer(bool to_board, int host, int place, std::string_view bytes);
   int take_slot();
   void describe(Packet& packet);
+  bool has_to_feed(const Packet& packet) const;
   void deliver(int slot);
   void hand_over(int slot);
   void release(int slot);
@@ -267,7 +285,14 @@ class World : public firmware::Hal, public firmware::Observer {
   void record();
   std::uint32_t first_time();
   void replay(int index);
+  // world_strangers.cpp
+  void on_board_heartbeat(std::string_view bytes);
+  void tell_stranger(std::uint32_t peer, Priority priority, std::string_view bytes);
   void stranger();
+  void on_strangers(const Command& command);
+  void check_owner_of_outputs();
+  bool is_in_time() const;
+  void check_lost();
 
   Random random_;
   Random loop_random_;  // of the standstills: what else happens is as without them
@@ -311,10 +336,12 @@ class World : public firmware::Hal, public firmware::Observer {
   std::map<Process, std::uint64_t> clear_asked_us_;
   std::uint32_t next_peer_ = 1;
 
-  // What a place was told to echo by this boot of the board, and the lease that it has by that.
+  // What this boot of the board sent a place to echo, each with the time when it was sent or last
+  // echoed, and the lease that the place has by that. The board may forget one at any time: then
+  // another one renews the lease.
   struct Lease {
-    std::map<std::uint32_t, std::uint64_t> told_us;
-    std::uint32_t token = 0;  // 0: it never had one
+    std::map<std::uint32_t, std::uint64_t> tokens_us;
+    std::uint32_t token = 0;  // the newest echoed; 0: none yet
     std::uint64_t renewed_us = 0;
   };
   std::map<std::uint32_t, Lease> leases_;
@@ -326,13 +353,18 @@ class World : public firmware::Hal, public firmware::Observer {
   // When a path of the session was sent a state last, and after how many heartbeats that fed.
   using Streamed = std::pair<std::uint64_t, std::size_t>;
   std::map<std::uint32_t, Streamed> owner_streamed_;
-  std::uint32_t newest_heartbeat_t_ = 0;
 
   std::vector<std::unique_ptr<Host>> hosts_;
   std::vector<Sent> commands_;
   Attacker attacker_;
   bool attacking_ = false;
   std::set<std::uint32_t> attacker_stops_;  // their numbers
+  Stranger stranger_;
+  Random stranger_random_;
+  std::uint64_t good_us_ = 0;         // when a heartbeat that has to feed came last
+  std::vector<std::uint32_t> shown_;  // the T of the newest heartbeats of the board
+  bool had_owner_ = false;            // after the event before this one
+  bool may_be_lost_ = false;          // in this event, by a farewell or with a port of the board
 
   struct BoardPort final : firmware::Port {
     BoardPort(World& w, std::uint8_t n) : world(w), number(n) {}

@@ -41,6 +41,8 @@ void World::boot_board() {
   boot_offset_ms_ = first_time();
   outputs_ = firmware::Outputs();
   live_ = stopped_ = false;
+  had_owner_ = false;
+  shown_.clear();
   fed_.clear();
   for (Wire& wire : wires_) wire.brought_state = wire.serves = false;
   standing_ = false;
@@ -106,6 +108,7 @@ void World::go_on() {
 }
 
 void World::lose_port(std::uint8_t port) {
+  may_be_lost_ = true;
   if (standing_) {
     ports_lost_meanwhile_.insert(port);
   } else {
@@ -129,7 +132,7 @@ void World::apply(const firmware::Outputs& outputs) {
   const auto first = std::find_if(std::begin(outputs.stepper), std::end(outputs.stepper),
                                   [](const firmware::StepperTarget& each) { return each.enabled; });
   const int id = first != std::end(outputs.stepper) ? first->position : 0;
-  if (script_ != nullptr && id == Script::strangers_target) return;
+  if (id == Stranger::target) return;
   if (id < 0 || id >= static_cast<int>(commands_.size())) return violate("intact: unknown output");
   const Sent& sent = commands_[static_cast<std::size_t>(id)];
   const Host& host = *hosts_[static_cast<std::size_t>(sent.host)];
@@ -163,6 +166,7 @@ void World::make_safe() {
 
 void World::check_silence() {
   if (!live_ || standing_) return;
+  check_owner_of_outputs();
   const std::uint64_t timeout_us = board_->settings().timeout_ms * 1000U;
   std::uint64_t heard_us = 0;
   for (int i = 0; i < board_->paths().size(); ++i) {
@@ -184,10 +188,8 @@ void World::send(std::uint8_t port, Text datagram, Priority priority, std::uint3
   if (schedule_.watchers != 0 && read_datagram(datagram, sent)) {
     if (priority == Priority::state) check_stream(port, peer, sent);
     if (kind_of(sent) == MessageKind::nack) on_told(peer, sent);
-    if (kind_of(sent) == MessageKind::board_heartbeat) {
-      newest_heartbeat_t_ = static_cast<std::uint32_t>(sent.time_ms());
-    }
   }
+  tell_stranger(peer, priority, bytes);
   if (script_ != nullptr && script_->on_board_sent(port, peer, priority, bytes)) return;
   for (int i = 0; i < static_cast<int>(hosts_.size()); ++i) {
     const Host& host = *hosts_[static_cast<std::size_t>(i)];
@@ -219,7 +221,9 @@ void World::on_outputs(std::uint32_t, const firmware::Outputs& outputs) {
 void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& command) {
   note(fmt::format("board executes {} kind {} value {}", pnum, static_cast<int>(command.kind),
                    command.value));
+  if (command.kind == CommandKind::leave) may_be_lost_ = true;
   if (script_ != nullptr && !script_->on_executed(command)) return;
+  if (script_ == nullptr && delivering_.host == stranger_host) return on_strangers(command);
   if (attacking_ && command.kind != CommandKind::stop) return violate("forged: executed");
   if (command.kind == CommandKind::stop) {
     ++report_.stops;

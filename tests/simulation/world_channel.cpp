@@ -28,6 +28,8 @@ void World::describe(Packet& packet) {
   packet.heartbeat = kind_of(datagram) == MessageKind::host_heartbeat;
   packet.stop = asks_to_stop(datagram);
   packet.pnum = datagram.pnum();
+  packet.t = datagram.time_ms();
+  packet.sid = datagram.session_id();
   packet.command_count = datagram.command_count();
   Command command;
   if (packet.command_count >= 1 && parse_command(datagram.command(), command) == Refusal::none &&
@@ -66,7 +68,7 @@ void World::transfer(bool to_board, int host, int place, std::string_view bytes)
   sent.sent_us = now_us_;
   sent.bytes = bytes;
   if (to_board) describe(sent);
-  if (sent.heartbeat) hosts_[static_cast<std::size_t>(host)]->heartbeat_pnum = sent.pnum;
+  if (to_board) hosts_[static_cast<std::size_t>(host)]->next_pnum = sent.pnum + 1;
   if (sent.command >= 0) {
     Sent& command = commands_[static_cast<std::size_t>(sent.command)];
     command.transmitted_us = now_us_;
@@ -139,9 +141,13 @@ void World::hand_over(int slot) {
     const std::uint32_t peer = packet.peer;
     const Source source{packet.port, peer};
     const std::uint32_t fed_before = board_->link().fed_ms();
+    const bool had_owner = board_->link().has_owner();
+    const bool lasts = had_owner && is_in_time() && schedule_.standstills.empty();
     delivering_ = {packet.host, packet.incarnation};
     delivering_at_ = source;
     on_lease(peer, packet.bytes);
+    const bool has_to_feed_now = has_to_feed(packet);
+    if (has_to_feed_now) good_us_ = now_us_;
     if (script_ != nullptr) script_->before_board(packet);
     board_->receive(packet.port, peer, Text(packet.bytes), board_ms());
     if (packet.command >= 0) check_whole(packet.command);
@@ -151,9 +157,14 @@ void World::hand_over(int slot) {
     const BoardLink& link = board_->link();
     if (asks_to_watch(packet.bytes) && link.fed_ms() != fed_before) violate("watch: a W feeds");
     if (packet.recorded && link.fed_ms() != fed_before) violate("joined: a recorded one feeds");
+    const bool begins = link.has_owner() && !had_owner;
     if (packet.intact && packet.heartbeat && board_->paths().has(source) &&
-        link.fed_ms() != fed_before) {
-      fed_.push_back({delivering_, packet.pnum, packet.arrived_us});
+        (begins || has_to_feed_now || link.fed_ms() != fed_before)) {
+      if (lasts && script_ == nullptr && fed_.back().from != delivering_) {
+        violate("joined: a process keeps the session of another");
+      }
+      good_us_ = now_us_;
+      fed_.push_back({delivering_, packet.pnum, packet.arrived_us, {source, packet.sid}});
       report_.waited_to_feed += packet.arrived_us != now_us_;
     }
   } else {

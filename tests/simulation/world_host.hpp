@@ -136,9 +136,9 @@ struct World::Host final : Session::Handler {
     bool executed = false;
   };
   std::map<Ticket, Stop> stops;
-  std::uint32_t stop_pnum = 0;       // of the newest that was sent
-  std::uint32_t heartbeat_pnum = 0;  // likewise
-  Ticket clear_ticket = 0;           // 0: none is under way
+  std::uint32_t stop_pnum = 0;  // of the newest that was sent
+  std::uint32_t next_pnum = 0;  // of the next datagram
+  Ticket clear_ticket = 0;      // 0: none is under way
   Ticket farewell_ticket = 0;
 };
 

@@ -71,8 +71,8 @@ void World::forge_lease() {
       break;
     case 4:  // what would keep the link of the host in control
       victim = hosts_.front()->on(0)->peer;
-      echo = newest_heartbeat_t_;
-      pnum = hosts_.front()->heartbeat_pnum + 1;
+      echo = stranger_.echo();
+      pnum = hosts_.front()->next_pnum;
       break;
     default:
       for (const auto& [peer, lease] : leases_) {
@@ -80,7 +80,7 @@ void World::forge_lease() {
       }
       break;
   }
-  if (leases_[victim].told_us.contains(echo)) return;  // that is what it cannot know
+  if (leases_[victim].tokens_us.contains(echo)) return;  // that is what it cannot know
   ++report_.forged_leases;
   const std::string bytes =
       test::with_crc(fmt::format("W:{};PNum:{};T:{};", random_.below(1001), pnum, echo));
@@ -99,11 +99,11 @@ bool World::asks_to_watch(std::string_view bytes) {
 void World::on_told(std::uint32_t peer, const Datagram& datagram) {
   Nack nack;
   if (!read_nack(datagram, nack) || nack.lease == 0) return;
-  leases_[peer].told_us[nack.lease] = now_us_;
+  leases_[peer].tokens_us[nack.lease] = now_us_;
   newest_token_ = nack.lease;
 }
 
-// Is it one that the board may take?
+// Notes a W that the board may take for a lease.
 void World::on_lease(std::uint32_t peer, std::string_view bytes) {
   Datagram datagram;
   if (schedule_.watchers == 0 || !read_datagram(Text(bytes), datagram)) return;
@@ -111,15 +111,13 @@ void World::on_lease(std::uint32_t peer, std::string_view bytes) {
   if (!r4::asks_to_watch(datagram) || parse_command(datagram.command(), command) != Refusal::none)
     return;
   Lease& lease = leases_[peer];
+  const auto token = lease.tokens_us.find(static_cast<std::uint32_t>(datagram.time_ms()));
   const std::uint64_t limit_us = lease_us + slack_us;
-  const auto told = lease.told_us.find(static_cast<std::uint32_t>(datagram.time_ms()));
-  if (told == lease.told_us.end()) return;
-  const bool renews = lease.token == told->first && now_us_ - lease.renewed_us <= limit_us;
-  if (!renews && now_us_ - told->second > limit_us) return;
-  if (command.value == 0) return;
-  report_.leases += !renews;
-  lease.token = told->first;
-  lease.renewed_us = now_us_;
+  const bool good = token != lease.tokens_us.end() && now_us_ - token->second <= limit_us;
+  if (!good || command.value == 0) return;
+  report_.leases += lease.token == 0 || now_us_ - lease.renewed_us > limit_us;
+  lease.token = token->first;
+  lease.renewed_us = token->second = now_us_;
 }
 
 void World::check_stream(std::uint8_t port, std::uint32_t peer, const Datagram& datagram) {

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <vector>
 
-#include "tests/support/datagrams.hpp"
 #include "world_host.hpp"
 
 namespace r4::simulation {
@@ -18,7 +17,6 @@ constexpr std::uint64_t busy_memory_us = 300'000;
 constexpr std::uint64_t used_again_us = 2'500'000;
 constexpr std::uint64_t hour_us = 3'600'000'000;
 constexpr std::uint64_t recorded_us = 1'000'000;
-constexpr std::uint32_t stranger_address = 0xFFFD;
 
 bool is_fine(const ChannelFaults& faults) {
   return faults.loss == 0 && faults.corrupt == 0 && faults.straggle == 0 &&
@@ -155,29 +153,6 @@ void World::replay(int index) {
   deliver(slot);
 }
 
-// It knows a number that the host may use next, and the board's newest T, but not the session's id.
-void World::stranger() {
-  at(now_us_ + random_.between(1, 2ULL * schedule_.stranger_interval_us), Event::Kind::stranger, 0);
-  if (standing_) return;
-  board_->poll(board_ms());
-  const BoardLink& link = board_->link();
-  if (!link.has_owner()) return;
-  ++report_.strangers;
-  const std::uint32_t pnum =
-      hosts_.front()->heartbeat_pnum + static_cast<std::uint32_t>(wires_random_.below(40));
-  const std::string sid =
-      wires_random_.chance(0.5) ? "" : fmt::format("SID:{:016x};", wires_random_.next());
-  const std::string bytes =
-      test::with_crc(fmt::format("H:ROS2-R4;{}PNum:{};T:{};", sid, pnum, newest_heartbeat_t_));
-  note("stranger " + bytes);
-  const std::uint32_t fed_ms = link.fed_ms();
-  const Source source{port_of(schedule_.attacked_wire), stranger_address};
-  delivering_ = {-1, 0};
-  delivering_at_ = source;
-  board_->receive(source.port, source.peer, Text(bytes), board_ms());
-  if (link.fed_ms() != fed_ms || board_->paths().has(source)) violate("joined: a stranger");
-}
-
 // --- the promises
 
 void World::on_path(std::uint32_t, Source path, bool joined) {
@@ -228,7 +203,7 @@ void World::check_wires() {
   looked_us_ = now_us_;
   // Another one that both ends have used so long that this one has had its time to join.
   const bool alone = !serves_since(now_us_ - std::min(now_us_, used_again_us));
-  const bool crowded = schedule_.stranger_interval_us != 0 || schedule_.attack_interval_us != 0;
+  const bool crowded = schedule_.attack_interval_us != 0;
   for (int w = 0; w < schedule_.wires(); ++w) {
     Wire& wire = wires_[w];
     if (!in_control || !meets_limits(w)) {

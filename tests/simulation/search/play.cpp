@@ -69,7 +69,7 @@ void Play::after(std::uint64_t us, std::function<void()> call) {
 }
 
 void Play::on_event(int index) {
-  // It may ask for more, which moves calls_.
+  // Take the call out first: it may add calls, which moves calls_.
   const std::function<void()> call = std::move(calls_[static_cast<std::size_t>(index)]);
   call();
 }
@@ -89,14 +89,14 @@ void Play::begin() {
   renew_lease();
 }
 
-// --- what becomes of datagrams
+// --- the faults of datagrams
 
 bool Play::applies(Fault fault) const {
   using Kind = Fault::Kind;
   const Step& step = steps_[static_cast<std::size_t>(fault.step)];
   if (step.at_us >= story_.faults_until_ms * 1000ULL) return false;
   if (is_of_datagram(fault.kind)) {
-    // Nobody is there to get it, unless it comes late.
+    // The host does not run. So these faults change nothing, but one that comes late may find it.
     const bool same =
         !step.to_board && !step.alive &&
         (fault.kind == Kind::lost || fault.kind == Kind::twice || fault.kind == Kind::overtaken);
@@ -116,7 +116,7 @@ bool Play::applies(Fault fault) const {
     case Kind::dies:
     case Kind::sleeps:
     case Kind::pauses:
-      // The program that only stops the board ends soon anyway.
+      // The program that only stops the board ends soon in any case.
       return step.first_of_host && step.alive && step.host != story_.hosts;
     case Kind::moves:
       return step.first_of_path && step.alive && is_host;
@@ -158,7 +158,6 @@ void Play::on_sent(const Packet& sent) {
   hosts_of_event_.push_back(who);
   if (keep_trace_) step.text = sent.bytes.substr(0, sent.bytes.find('^'));
   steps_.push_back(std::move(step));
-  if (sent.to_board) next_pnum_[sent.host] = sent.pnum + 1;
 
   bool first_copy = steps_.back().passes;
   std::uint64_t first_us = delay_us;
@@ -214,7 +213,7 @@ void Play::on_sent(const Packet& sent) {
     overtaken_.push_back(sent);
     return;
   }
-  // What a path holds back leaves it in order.
+  // A path keeps the order of the datagrams that it holds back.
   const std::uint64_t held_us =
       wire.stalled_until_us - std::min(wire.stalled_until_us, world_.now_us_);
   deliver_in(std::max(held_us + delay_us, first_us), sent);
@@ -295,7 +294,7 @@ bool Play::on_executed(const Command& command) {
   }
   executed_ = true;
   if (command.kind == CommandKind::leave) may_be_lost_ = true;
-  return command.kind != CommandKind::stepper || command.value != strangers_target;
+  return command.kind != CommandKind::stepper || command.value != Stranger::target;
 }
 
 void Play::on_link_lost() { lost_now_ = true; }
@@ -315,7 +314,7 @@ void Play::check() {
   const firmware::StepperTarget& stepper = world_.outputs_.stepper[0];
   if (!stepper.enabled) return;
   Process whose{stranger_host, 0};
-  if (stepper.position != strangers_target) {
+  if (stepper.position != Stranger::target) {
     const World::Sent& sent = world_.commands_[static_cast<std::size_t>(stepper.position)];
     whose = {sent.host, sent.incarnation};
   }

@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One run of a story with some faults in it, on the world of the link simulator.
+// One run of a story with faults, in the world of the link simulator.
 //
 // A step is a datagram that a host or the board sends to the other, numbered from 0 in the order in
 // which they are sent. A fault happens to a datagram or, right after it was sent and before it
 // arrives, to a path, a host or the board.
 //
-// Besides the promises of the world (world.hpp) it checks, without a look at how the link works:
-//   silence   outputs of a host are live only while intact heartbeats of that very process arrive
-//   joined    a session is kept by the heartbeats of its own host alone
-//   resumed   … and resumed by no other
-//   stranger  nothing is executed in a session but what its own host sends
+// It checks the promises of the world (world.hpp). By the board's behaviour alone it also checks:
+//   silence   outputs of a host are live only while intact heartbeats of the same process arrive
+//   joined    only the heartbeats of its own host keep a session
+//   resumed   only its own host resumes a session
+//   stranger  only commands of its own host are executed in a session
 //   pushed    strangers do not take the board from a host whose heartbeats arrive in time with a
 //             fresh echo
-//   served    while it has it, strangers keep no command of it from being confirmed
-//   returns   in the end, where nothing but faults of the network and of processes happened, a host
-//             that is there is in control
+//   served    while a host is in control, strangers do not prevent the confirmation of its commands
+//   returns   at the end of a run without strangers, a host that runs is in control
 #pragma once
 
 #include <cstdint>
@@ -26,9 +25,9 @@
 #include <vector>
 
 #include "story.hpp"
-#include "stranger.hpp"
 #include "tests/host/bridge/scripted_bridge.hpp"
 #include "tests/simulation/script.hpp"
+#include "tests/simulation/stranger.hpp"
 
 namespace r4::simulation {
 
@@ -39,30 +38,29 @@ struct Step {
   int path = 0;
   bool passes = false;        // no cut loses it
   bool first = false;         // the first datagram of its event of the world
-  bool first_of_host = true;  // … that has to do with its host
-  bool first_of_path = true;  // … on its path
-  bool alive = false;         // its host is
+  bool first_of_host = true;  // the first one of its event from or to this host
+  bool first_of_path = true;  // the first one of its event from or to this host on this path
+  bool alive = false;         // its host runs
   std::string text;           // only with a trace
 };
 
 class Play final : World::Script {
  public:
-  // `confirmed`: so many commands are confirmed without faults, if that is known.
-  // `always_pushed`: look for `pushed` also where there is no stranger.
+  // `confirmed`: the number of commands that are confirmed without faults, if that is known.
+  // `always_pushed`: check `pushed` also without strangers.
   Play(const Story& story, std::vector<Fault> faults, bool keep_trace,
        std::optional<std::uint32_t> confirmed = {}, bool always_pushed = false);
 
   Report run() { return world_.run(); }
   const std::vector<Step>& steps() const { return steps_; }
-  // True if that fault may happen at that step. False also where it would be the very run that
-  // another one makes.
+  // True if the fault may happen at its step. False if another fault makes the same run.
   bool applies(Fault fault) const;
 
  private:
   using Process = World::Process;
   using Packet = World::Packet;
   using Host = World::Host;
-  static constexpr int stranger_host = -2;
+  static constexpr int stranger_host = World::stranger_host;
   static constexpr std::uint64_t delay_us = 500;   // of every path
   static constexpr std::uint64_t bridge_us = 100;  // from a bridge to its board, and back
   static constexpr std::uint64_t disturbed_us = 100'000;
@@ -130,34 +128,33 @@ class Play final : World::Script {
 
   std::vector<Step> steps_;
   std::uint64_t event_of_step_ = ~std::uint64_t{0};
-  std::vector<std::pair<int, int>> hosts_of_event_;  // and their paths, of the steps of that event
+  std::vector<std::pair<int, int>> hosts_of_event_;  // host and path of each step of that event
   std::vector<std::function<void()>> calls_;
-  std::vector<Packet> overtaken_;  // that wait for the next in their direction
+  std::vector<Packet> overtaken_;  // each waits for the next datagram in its direction
   struct Suspended {
-    bool keeps = false;  // what arrives
+    bool keeps = false;  // true: what arrives waits, false: it is lost
     std::vector<Packet> arrived;
     std::vector<std::function<void()>> calls;
   };
   std::map<int, Suspended> suspended_;
 
-  // Who is in control, as far as it shows by what the board does.
+  // The process in control, judged by the board's behaviour.
   Process controller_{-1, 0};
   bool has_controller_ = false;
-  bool executed_ = false;  // a command of it
+  bool executed_ = false;  // the board has executed a command of the process in control
   bool stranger_controlled_ = false;
-  bool lost_now_ = false;     // in this event
-  bool may_be_lost_ = false;  // … by a farewell or with the transport
+  bool lost_now_ = false;     // the link was lost in this event
+  bool may_be_lost_ = false;  // in this event, by a farewell or with the transport
   bool had_owner_ = false;
   std::uint32_t fed_before_ = 0;
-  std::uint64_t good_us_ = 0;  // its newest heartbeat that has to feed
+  std::uint64_t good_us_ = 0;  // when the newest heartbeat came that has to feed
   std::map<Process, std::uint64_t> heard_us_;
-  std::map<Process, std::uint32_t> newest_;  // heartbeat
+  std::map<Process, std::uint32_t> newest_;  // number of a heartbeat
 
   Stranger stranger_;
-  std::uint32_t stranger_pnum_ = 0;                     // of his own
+  std::uint32_t stranger_pnum_ = 0;                     // of its own datagrams
   std::uint32_t first_peer_ = 0;                        // the address that the first host had first
-  std::uint32_t campaign_pnum_ = 0;                     // as if he were the host
-  std::uint32_t next_pnum_[8] = {};                     // of each host
+  std::uint32_t campaign_pnum_ = 0;                     // of its datagrams that pass for the host's
   static constexpr std::uint32_t bridge_peer = 0xFFFB;  // as the board knows it
   std::unique_ptr<test::ScriptedBridge> bridge_;
   World world_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What people, computers and networks do in a story, and its faults but those of datagrams.
+// The acts of a story, and all faults except those of datagrams.
 #include <utility>
 
 #include "play.hpp"
@@ -171,14 +171,14 @@ void Play::start_after(int index, std::uint64_t us) {
   });
 }
 
-// What the host's program does waits while it does not run.
+// While the host's process does not run, the call waits.
 void Play::when_it_runs(int index, std::function<void()> call) {
   if (runs(index)) return call();
   if (host(index).alive) suspended_[index].calls.push_back(std::move(call));
 }
 
-// The clocks of its programs stand still meanwhile, and nothing that is sent to it arrives. It
-// begins another session.
+// While the host's computer sleeps, the clocks of its programs stand still, and it receives
+// nothing. After the sleep the host begins another session.
 void Play::sleep(int index) {
   Host& at = host(index);
   if (!runs(index)) return;
@@ -192,7 +192,7 @@ void Play::sleep(int index) {
     suspended_.erase(index);
     it.suspended = false;
     it.clock_offset_us -= sleep_us;
-    // Nothing of what it was before goes on: for what is promised it is another process.
+    // The promises treat the host as another process, because nothing of its session goes on.
     it.died_us = slept_from;
     ++it.incarnation;
     it.session->on_sleep(it.time());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The bridge that ships, between hosts and strangers on one side and the board on the other.
+// A story with the bridge that ships: hosts and strangers on one side, the board on the other.
 #include <utility>
 
 #include "play.hpp"
@@ -37,7 +37,7 @@ bool Play::bridge_takes(const Packet& arrived) {
   return true;
 }
 
-// What it has sent, to both sides. `packet`: what it got for that.
+// Delivers what the bridge has sent to both sides. `packet`: the datagram that it received before.
 void Play::carry_from_bridge(const Packet* packet) {
   for (const auto& sent : std::exchange(bridge_->board->sent, {})) {
     Packet passed;

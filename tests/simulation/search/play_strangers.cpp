@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a stranger sends, and hears.
+// The datagrams that a stranger sends and receives.
 #include <fmt/format.h>
 
 #include "play.hpp"
@@ -14,7 +14,7 @@ constexpr std::uint64_t campaign_us = 100'000;
 
 }  // namespace
 
-// He watches, on the last path.
+// The stranger watches the board on the last path.
 void Play::renew_lease() {
   if (!any_stranger_) return;
   const std::uint8_t port = world_.port_of(story_.paths - 1);
@@ -57,7 +57,7 @@ void Play::say_bytes(std::string bytes, std::uint8_t port, std::uint32_t peer) {
 
 std::uint32_t Play::next_number() const {
   const int whose = has_controller_ && controller_.host >= 0 ? controller_.host : 0;
-  return stranger_.guess(next_pnum_[whose]);
+  return stranger_.guess(world_.hosts_[static_cast<std::size_t>(whose)]->next_pnum);
 }
 
 void Play::say_once(Fault::Kind kind) {
@@ -70,12 +70,12 @@ void Play::say_once(Fault::Kind kind) {
       port, Stranger::address);
 }
 
-// The same bytes, and what the host in the midst of a network does not know of: from elsewhere.
+// Sends a copy of a host's datagram from the stranger's address.
 void Play::repeat(const std::string& bytes) {
   say_bytes(bytes, world_.port_of(story_.paths - 1), Stranger::address);
 }
 
-// True if a host that lives has that address.
+// True if a living host has this address.
 bool Play::is_taken(std::uint32_t peer) {
   for (const auto& each : world_.hosts_) {
     for (const Host::Place& place : each->places) {
@@ -96,8 +96,8 @@ void Play::carry_on(Fault::Kind kind, std::uint8_t port, std::uint32_t peer) {
     return;
   }
   if (kind == Fault::Kind::stranger_competes) {
-    // Alternately with a name of its session and without.
-    const char* const own = stranger_pnum_ % 4 < 2 ? "" : "SID:00c0ffee00c0ffee;";
+    // Alternately with a SID of its own and as a paper host.
+    const char* const own = stranger_pnum_ % 4 < 2 ? "" : Stranger::own_name;
     const std::uint32_t first = 0x9000'0000U;
     say(fmt::format("{}H:ROS2-R4;PNum:{};T:{};", own, first + ++stranger_pnum_, echo), port, peer);
     say(fmt::format("{}P:-7777,1000,1;PNum:{};T:{};", own, first + ++stranger_pnum_, echo), port,

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "stranger.hpp"
 
+#include <fmt/format.h>
+
 #include "protocol/messages/message.hpp"
 #include "protocol/messages/state_fields.hpp"
+#include "tests/support/datagrams.hpp"
 
 namespace r4::simulation {
 namespace {
 
-// The field of that name with its value, wherever the board has put it.
+// The field with this name, its value and its end; empty if there is none.
 std::string_view field_in(std::string_view bytes, std::string_view name) {
   for (std::size_t at = bytes.find(name); at != std::string_view::npos;
        at = bytes.find(name, at + 1)) {
@@ -49,6 +52,48 @@ void Stranger::hears(std::string_view bytes) {
     default:
       break;
   }
+}
+
+std::string Stranger::say(Random& random, std::uint32_t next) {
+  std::string field = "H:ROS2-R4";
+  switch (random.below(8)) {
+    case 0:
+      field = "E:LEAVE";
+      break;
+    case 1:
+      field = fmt::format("E:CLEAR,{}", cause_);
+      break;
+    case 2:
+    case 3:
+      field = fmt::format("P:{},1000,1", target);
+      break;
+    default:
+      break;
+  }
+  std::string name;  // of a paper host
+  switch (random.below(4)) {
+    case 0:
+      name = own_name;
+      break;
+    case 1:
+      name = name_;
+      break;
+    case 2:
+      name = fmt::format("SID:{:016x};", random.next() | 1U);
+      break;
+    default:
+      break;
+  }
+  const bool guesses = random.chance(0.5);
+  const std::uint32_t pnum =
+      guesses ? guess(next) + static_cast<std::uint32_t>(random.below(40)) : ++own_pnum_;
+  const bool numbered = !name.empty() || random.chance(0.9);
+  const std::string number = numbered ? fmt::format("PNum:{};", pnum) : "";
+  std::uint64_t t = echo_;
+  if (random.chance(0.1)) t = 0;
+  if (random.chance(0.1)) t -= random.below(2000);
+  if (random.chance(0.1)) t = random.next() >> 24;  // a clock of its own
+  return test::with_crc(fmt::format("{};{}{}T:{};", field, name, number, t));
 }
 
 std::uint32_t Stranger::guess(std::uint32_t next) const {

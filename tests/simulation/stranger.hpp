@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A stranger has no key and hears no host, so it knows the id of no session. It knows what the board
+// sends to watchers and to everyone, and the answers to its own datagrams. It guesses packet numbers
+// well.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "random.hpp"
+
+namespace r4::simulation {
+
+class Stranger {
+ public:
+  static constexpr std::uint32_t address = 0xFFFD;
+  // The position that its commands ask of a stepper. No command of a host asks for it.
+  static constexpr int target = -7777;
+  // The field SID of a session of its own.
+  static constexpr const char* own_name = "SID:00c0ffee00c0ffee;";
+
+  // The board has sent this datagram to the stranger.
+  void hears(std::string_view bytes);
+
+  // A datagram of any kind but E:STOP. `next`: the number that the host in control uses next.
+  std::string say(Random& random, std::uint32_t next);
+
+  // `next`, if the stranger knows a number that is near. Else a number that the stranger makes up.
+  std::uint32_t guess(std::uint32_t next) const;
+  // The T of the newest heartbeat; 0 before the first.
+  std::uint32_t echo() const { return echo_; }
+  // The newest cause that the board has named.
+  std::int32_t cause() const { return cause_; }
+  // What the stranger has to echo for its lease.
+  std::uint32_t lease() const { return lease_; }
+  // The field SID with which the stranger may pass for the host; empty if the board has sent it none.
+  const std::string& name() const { return name_; }
+
+ private:
+  static constexpr std::uint32_t most_guesses = 4096;
+  std::uint32_t echo_ = 0;
+  std::uint32_t lease_ = 0;
+  std::uint32_t command_ = 0;  // CMD
+  std::int32_t cause_ = 0;
+  std::string name_;
+  std::uint32_t own_pnum_ = 0x9000'0000U;
+};
+
+}  // namespace r4::simulation
