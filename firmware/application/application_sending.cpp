@@ -45,11 +45,12 @@ void Application::transmit(Source to, const std::uint32_t& number, Text datagram
 bool Application::is_of_owner() const { return link_.has_owner() && link_.is_session_of(speaker_); }
 
 // The numbers of an answer to who is speaking. A watcher has its own, but where it hears those of everyone at
-// its port. Answers to other hosts count apart, even to one at a place of the session, behind the same bridge.
+// its port, or of the session. Answers to other hosts count apart, even behind the same bridge as the session.
 std::uint32_t& Application::number_for(Source to) {
   Watcher* const watcher = watchers_.find(to);
   if (watcher != nullptr && !hears_all(to)) return watcher->pnum;
-  const bool shared = !link_.has_owner() || (is_of_owner() && paths_.has(to));
+  const bool hears_session = is_of_owner() || speaker_.sid == no_session;
+  const bool shared = !link_.has_owner() || (hears_session && paths_.has(to));
   return shared ? ports_[to.port].next_pnum : ports_[to.port].aside_pnum;
 }
 

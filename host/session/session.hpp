@@ -246,6 +246,7 @@ class Session {
   void on_state_datagram(std::size_t wire, const Datagram& datagram, Time now);
   void on_identity_datagram(std::size_t wire, const Datagram& datagram, Time now);
   void on_nack_datagram(std::size_t wire, const Datagram& datagram, Time now);
+  bool counts(const Identity& identity) const;
   void on_answer(const Datagram& datagram, Time now);
   bool notice_restart(Time now);
   void begin_session();

@@ -196,7 +196,7 @@ void Session::on_identity_datagram(std::size_t wire, const Datagram& datagram, T
   if (!watches() && identity.sid != session_id()) return;  // an answer to another host
   if (wires_.several() && !admit_identity(wire, datagram, identity, now)) return;
   selection_.on_answer();
-  on_answer(datagram, now);
+  if (counts(identity)) on_answer(datagram, now);
   knows_leave_ = has_capability(identity.capabilities, leave_capability);
   groups_.on_identity(identity.capabilities);
   if (const auto asked = question_.answered(identity)) {
@@ -221,6 +221,12 @@ bool Session::is_cable_only(std::uint32_t pnum) {
     if (pending.is_out() && pending.pnum == pnum) return pending.cable_only;
   }
   return false;
+}
+
+// Is its number among those of the states? The answer to a host without control is not.
+bool Session::counts(const Identity& identity) const {
+  const bool to_watcher = watches() && identity.sid == no_session;
+  return to_watcher || !(identity.has_busy && identity.busy);
 }
 
 // An answer counts in the board's packet numbers, but not in those that a host without control

@@ -116,8 +116,7 @@ bool Session::admit_identity(std::size_t wire, const Datagram& datagram, const I
   if (answer == Wires::Answer::nothing || answer == Wires::Answer::other) return false;
   if (answer == Wires::Answer::restarted) link_.on_clock(t_ms, true, to_ms(now));
   notice_restart(now);
-  const bool counts = !(identity.has_busy && identity.busy);
-  wires_.on_answer(wire, datagram.pnum(), t_ms, fits, counts, now);
+  wires_.on_answer(wire, datagram.pnum(), t_ms, fits, counts(identity), now);
   return true;
 }
 
