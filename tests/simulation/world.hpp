@@ -352,7 +352,7 @@ class World : public firmware::Hal, public firmware::Observer {
   std::uint64_t went_on_us_ = 0;  // behind a standstill of the board
   // When a path of the session was sent a state last, and after how many heartbeats that fed.
   using Streamed = std::pair<std::uint64_t, std::size_t>;
-  std::map<std::uint32_t, Streamed> owner_streamed_;
+  std::map<std::pair<std::uint8_t, std::uint32_t>, Streamed> owner_streamed_;  // by port and peer
 
   std::vector<std::unique_ptr<Host>> hosts_;
   std::vector<Sent> commands_;

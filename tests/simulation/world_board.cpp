@@ -168,7 +168,7 @@ void World::check_silence() {
   if (!live_ || standing_) return;
   check_owner_of_outputs();
   const std::uint64_t timeout_us = board_->settings().timeout_ms * 1000U;
-  std::uint64_t heard_us = 0;
+  std::uint64_t heard_us = fed_.empty() ? 0 : fed_.back().at_us;
   for (int i = 0; i < board_->paths().size(); ++i) {
     heard_us = std::max(heard_us, heard_us_[board_->paths()[i].peer]);
   }

@@ -158,7 +158,7 @@ void World::hand_over(int slot) {
     if (asks_to_watch(packet.bytes) && link.fed_ms() != fed_before) violate("watch: a W feeds");
     if (packet.recorded && link.fed_ms() != fed_before) violate("joined: a recorded one feeds");
     const bool begins = link.has_owner() && !had_owner;
-    if (packet.intact && packet.heartbeat && board_->paths().has(source) &&
+    if (packet.intact && packet.heartbeat &&
         (begins || has_to_feed_now || link.fed_ms() != fed_before)) {
       if (lasts && script_ == nullptr && fed_.back().from != delivering_) {
         violate("joined: a process keeps the session of another");

@@ -130,7 +130,7 @@ void World::check_stream(std::uint8_t port, std::uint32_t peer, const Datagram& 
   if (link.has_owner() && board_->paths().has(Source{port, peer})) {
     // A session that begins in the very instant of a state is sent one of its own.
     const Streamed now{now_us_, fed_.size()};
-    Streamed& before = owner_streamed_[peer];
+    Streamed& before = owner_streamed_[{port, peer}];
     const bool twice = before == now && schedule_.standstills.empty();
     if (twice) violate("watch: the host in control is sent a state twice");
     before = now;

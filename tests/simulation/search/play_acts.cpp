@@ -192,10 +192,10 @@ void Play::sleep(int index) {
     suspended_.erase(index);
     it.suspended = false;
     it.clock_offset_us -= sleep_us;
+    it.session->on_sleep(it.time());
     // The promises treat the host as another process, because nothing of its session goes on.
     it.died_us = slept_from;
     ++it.incarnation;
-    it.session->on_sleep(it.time());
     world_.poll_host(index);
     for (const auto& call : calls) when_it_runs(index, call);
   });
