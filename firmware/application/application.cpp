@@ -94,8 +94,8 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
   speaker_.from = from;
   speaker_.sid = datagram.session_id();
   // A watcher on a bus may be where the paper host in control is, and has numbers of its own.
-  const bool counts =
-      authentic && link_.is_session_of(speaker_) && datagram.has_pnum() && !asks_to_watch(datagram);
+  const bool counts = authentic && link_.is_session_of(speaker_) && datagram.has_pnum() &&
+                      (speaker_.sid != no_session || !asks_to_watch(datagram));
   known_ = counts && paths_.count(from, datagram.pnum());
   switch (kind) {
     case MessageKind::host_heartbeat:

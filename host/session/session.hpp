@@ -227,6 +227,7 @@ class Session {
              std::uint32_t t_ms) const;
   bool begun() const { return !wires_.several() || wires_.begun(); }
   void ask_wires(Time now);
+  bool is_recent(std::uint32_t t_ms, Time now) const;
   bool admit(std::size_t wire, const Datagram& datagram, Time now);
   bool admit_identity(std::size_t wire, const Datagram& datagram, const Identity& identity,
                       Time now);

@@ -73,6 +73,12 @@ void Session::ask_wires(Time now) {
 
 // --- what comes
 
+// Did the board show that T less than the timeout ago, by what is known of its clock?
+bool Session::is_recent(std::uint32_t t_ms, Time now) const {
+  const auto most = static_cast<std::int32_t>(options_.timing.timeout_ms);
+  return link_.is_of_this_boot(t_ms, to_ms(now), to_ms(now), most);
+}
+
 // Is it of the session's board as it is now? A restart that it shows has been noticed then.
 bool Session::admit(std::size_t wire, const Datagram& datagram, Time now) {
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
@@ -91,7 +97,9 @@ bool Session::admit(std::size_t wire, const Datagram& datagram, Time now) {
         take = wires_.on_connecting(wire, now);
         // One that comes late is no sign that the board has begun again: who has its heartbeats learns that by the
         // answer of its clock, for which the wire is asked now.
-        if (link_.echo() != 0 && is_heard(link_.state())) take = Wires::Take::no;
+        if (link_.echo() != 0 && is_heard(link_.state()) && is_recent(link_.echo(), now)) {
+          take = Wires::Take::no;
+        }
         break;
       }
       [[fallthrough]];

@@ -201,14 +201,21 @@ bool parse_hex(Text text, std::uint32_t& out) {
 
 bool parse_session_id(Text text, SessionId& out) {
   if (text.size() != session_id_size) return false;
-  SessionId sid = 0;
-  for (const char c : text) {
-    const unsigned digit = hex_digits.of[static_cast<unsigned char>(c)];
-    if (digit == HexDigits::none || (c >= 'A' && c <= 'F')) return false;
-    sid = sid << 4 | digit;
+  std::uint32_t halves[2] = {0, 0};
+  std::uint32_t seen = 0;
+  unsigned all = 0x20;  // in '0' to '9' and 'a' to 'f', and not in 'A' to 'F'
+  const char* at = text.begin();
+  for (std::uint32_t& half : halves) {
+    for (const char* const end = at + session_id_size / 2; at != end; at += 2) {
+      const std::uint32_t high = hex_digits.of[static_cast<unsigned char>(at[0])];
+      const std::uint32_t low = hex_digits.of[static_cast<unsigned char>(at[1])];
+      seen |= high | low;
+      all &= static_cast<unsigned>(at[0]) & static_cast<unsigned>(at[1]);
+      half = half << 8 | high << 4 | low;
+    }
   }
-  out = sid;
-  return sid != no_session;
+  out = SessionId{halves[0]} << 32 | halves[1];
+  return (seen & HexDigits::none) == 0 && all != 0 && out != no_session;
 }
 
 char* write_session_id(char* out, SessionId sid) {

@@ -19,7 +19,7 @@ void SessionPaths::resume(Source at, std::uint32_t now_ms) {
   count_ = 1;
   paths_[0].at = at;
   paths_[0].heard_ms = now_ms;
-  paths_[0].numbers = PacketTracker();
+  paths_[0].seen = 0;
 }
 
 bool SessionPaths::on_heartbeat(Source from, std::uint32_t now_ms) {
@@ -29,7 +29,7 @@ bool SessionPaths::on_heartbeat(Source from, std::uint32_t now_ms) {
   path.heard_ms = now_ms;
   if (known >= 0) return false;
   path.at = from;
-  path.numbers = PacketTracker();
+  path.seen = 0;
   ++count_;
   ++joins_;
   return true;
@@ -51,13 +51,21 @@ bool SessionPaths::take_port(std::uint8_t port, Source& left) {
 
 // What a path that lags brings so late is no sign that the host has restarted.
 bool SessionPaths::count(Source from, std::uint32_t pnum) {
+  constexpr std::uint32_t window = PacketTracker::window;
+  const std::uint32_t before = numbers_.newest();
+  if (numbers_.started() && !newer(pnum, before) && before - pnum >= window) return true;
+  const bool known = numbers_.on(pnum) == Arrival::duplicate;
+  const std::uint32_t ahead = numbers_.newest() - before;
+  for (int i = 0; ahead != 0 && i < count_; ++i) {
+    paths_[i].seen = ahead < window ? paths_[i].seen << ahead : 0;
+  }
+  const std::uint32_t behind = numbers_.newest() - pnum;
   const int path = find(from);
-  const bool repeated = path >= 0 && paths_[path].numbers.on(pnum) == Arrival::duplicate;
+  if (path < 0 || behind >= window) return known;
+  const std::uint64_t bit = std::uint64_t{1} << behind;
+  const bool repeated = (paths_[path].seen & bit) != 0;
+  paths_[path].seen |= bit;
   if (repeated) ++repeated_;
-  const std::uint32_t newest = numbers_.newest();
-  const bool long_past =
-      numbers_.started() && !newer(pnum, newest) && newest - pnum >= PacketTracker::window;
-  const bool known = long_past || numbers_.on(pnum) == Arrival::duplicate;
   return known && !repeated;
 }
 

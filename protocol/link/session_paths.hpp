@@ -48,7 +48,7 @@ class SessionPaths {
   struct Path {
     Source at;
     std::uint32_t heard_ms = 0;
-    PacketTracker numbers;
+    std::uint64_t seen = 0;  // bit i: it has brought the number numbers_.newest() - i
   };
 
   int find(Source at) const;  // -1: it is no path

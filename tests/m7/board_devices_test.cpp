@@ -45,8 +45,7 @@ void expect_unhindered(Trouble trouble, Longest& longest) {
       silence_ms - (BoardClock::ticks() - host.safe_ticks()) / BoardClock::ticks_per_us / 1000;
   if (safe_ms > longest.silence_ms) longest.silence_ms = safe_ms;
 
-  host.heartbeat();
-  host.run_ms(20);
+  host.drive_everything();  // a paper host begins anew
   EXPECT(!host.safe());
   host.command(Command::stop());
   host.run_ms(5);

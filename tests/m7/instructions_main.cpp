@@ -128,9 +128,11 @@ void sign(Signer* signer, DatagramWriter& writer) {
   if (signer != nullptr) signer->sign(writer, 1700000000000000, 1000);
 }
 
+constexpr SessionId session = 0x0123456789abcdef;
+
 // One command after the other, each with its own number; what reading, checking and executing
 // costs. With a key they are signed. `group`: so many commands are one datagram.
-std::uint32_t command_instructions(firmware::Hal& hal, std::uint32_t first, std::uint64_t t,
+std::uint32_t command_instructions(firmware::Hal& hal, std::uint32_t first, SessionId sid,
                                    const Key* key = nullptr, std::uint32_t group = 1) {
   Sink sink;
   static firmware::Application::Config config;
@@ -146,21 +148,24 @@ std::uint32_t command_instructions(firmware::Hal& hal, std::uint32_t first, std:
   key_signer.on_nonce(application.authentication().nonce());
   key_signer.on_board_time(1000, 1000);
   Signer* const signer = key != nullptr ? &key_signer : nullptr;
-  static char heartbeat[max_datagram];
   static char commands[repetitions + 1][128];
   static Text texts[repetitions + 1];
   application.start(1000);
-  DatagramWriter writer(heartbeat, sizeof heartbeat);
-  writer.field("H").value("ROS2-R4");
-  writer.stamp(first - 1, t - 100);
-  sign(signer, writer);
-  application.receive(port, 1, writer.finish(), 1000);
+  for (std::uint32_t i = 0; i < 2; ++i) {  // the second echoes the answer to the first
+    DatagramWriter heartbeat(commands[0], sizeof commands[0]);
+    heartbeat.field("H").value("ROS2-R4");
+    heartbeat.session(sid);
+    heartbeat.stamp(first - 2 + i, 1000 * i);
+    sign(signer, heartbeat);
+    application.receive(port, 1, heartbeat.finish(), 1000);
+  }
   for (std::uint32_t i = 0; i <= repetitions; ++i) {
     DatagramWriter command(commands[i], sizeof commands[i]);
     for (std::uint32_t channel = 1; channel <= group; ++channel) {
       command.field("O").value(std::uint32_t{358 + i % 2}).value(std::uint32_t{1}).value(channel);
     }
-    command.stamp(first + i, t);
+    command.session(sid);
+    sid != no_session ? command.packet(first + i) : command.stamp(first + i, 79146);
     sign(signer, command);
     texts[i] = command.finish();
   }
@@ -186,7 +191,7 @@ std::uint32_t with_drivers() {
   }
   bus.set_free();
   const std::uint32_t before = bus.writes();
-  const std::uint32_t count = command_instructions(hardware, 1500001000, 1699276044383);
+  const std::uint32_t count = command_instructions(hardware, 1500001000, session);
   if (count == 0 || bus.writes() - before < repetitions) exit_emulator(5);
   return count;
 }
@@ -244,18 +249,18 @@ int main() {
                         instructions_of([&] { read_datagram(datagram, seen); }));
 
   static Hal hal;
-  const std::uint32_t command = command_instructions(hal, 1000, 79146);
-  const std::uint32_t long_command = command_instructions(hal, 1500001000, 1699276044383);
-  if (command == 0 || long_command == 0) exit_emulator(2);
+  const std::uint32_t command = command_instructions(hal, 1000, no_session);
+  const std::uint32_t of_session = command_instructions(hal, 1500001000, session);
+  if (command == 0 || of_session == 0) exit_emulator(2);
   on_target::say_number("a command read, checked and executed", command);
-  on_target::say_number("one with a PNum of 10 and a T of 13 digits", long_command);
+  on_target::say_number("one of a session with an id", of_session);
   on_target::say_number("that, written to its chip by the drivers", with_drivers());
   Key key;
   key.id = 1;
-  const std::uint32_t signed_command = command_instructions(hal, 1500001000, 1699276044383, &key);
+  const std::uint32_t signed_command = command_instructions(hal, 1500001000, session, &key);
   if (signed_command == 0) exit_emulator(6);
   on_target::say_number("that command signed, on a board with a key", signed_command);
-  const std::uint32_t group = command_instructions(hal, 1500001000, 1699276044383, nullptr, 4);
+  const std::uint32_t group = command_instructions(hal, 1500001000, no_session, nullptr, 4);
   if (group == 0) exit_emulator(7);
   on_target::say_number("a group of four commands, all executed", group);
 

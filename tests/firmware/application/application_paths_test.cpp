@@ -405,6 +405,23 @@ TEST_F(ApplicationPaths, TwoPlacesOnOnePortGetTheSame) {
   EXPECT_EQ(board.ports[0].also_held, std::vector<std::uint32_t>());
 }
 
+// An answer carries the SID of its question, which its host alone may know.
+TEST_F(ApplicationPaths, AnotherHostAtAPathGetsItsAnswersAlone) {
+  const Source other{0, 5};
+  WiredHost host(board, {{path_a}, {other}});
+  host.connect();
+  forget();
+  board.receive("Q:ID;" + test::stamp_of(another_session, 7, 0), path_a);
+  board.receive(heartbeat(8, 0, another_session), path_a);
+  int answers = 0;
+  for (const Heard& heard : board.take(0)) {
+    if (heard.bytes.find("SID:") == std::string::npos) continue;
+    ++answers;
+    EXPECT_EQ(heard.peer, path_a.peer) << heard.bytes;
+  }
+  EXPECT_EQ(answers, 2);
+}
+
 TEST_F(ApplicationPaths, AWatcherBecomesAWireAndNeedsNoLeaseAnyMore) {
   TestHost host(board, our_session, path_a);
   host.connect();

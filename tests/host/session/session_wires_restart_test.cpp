@@ -117,5 +117,23 @@ TEST(SessionWires, BeginAnewWhereNothingElseComes) {
   EXPECT_NE(robot.cables[1].all('H').back().find(";T:0;"), std::string::npos);
 }
 
+// The board answers who it is, and its clock is nearly that of the boot before.
+TEST(SessionWires, BeginAnewWhereTheBoardOnlySaysThatItBoots) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  for (const std::size_t wire : {0U, 1U}) robot.cut(wire);
+  const std::string id = robot.session->wire(1, robot.now()).board_id;
+  const std::string question = robot.cables[1].all('Q').back();
+  const std::string sid = question.substr(question.find("SID:"), 21);
+  for (int i = 0; i < 15; ++i) {
+    robot.bring(1, with_crc("H:R4-ROS2;PNum:0;T:0;"));
+    robot.bring(1, with_crc("I:R4,0," + id + ",sim;BUSY:0;" + sid + "PNum:" + std::to_string(i) +
+                            ";T:" + std::to_string(robot.board_ms(0)) + ";"));
+    robot.run(100);
+  }
+  EXPECT_EQ(robot.session->link().state, HostLinkState::connecting);
+  EXPECT_NE(robot.cables[1].all('H').back().find(";T:0;"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace r4::test
