@@ -34,8 +34,8 @@ AsyncBoard::Impl::Impl(asio::io_context& context, std::vector<std::unique_ptr<Ca
     : io(context),
       heartbeat_ms(options.session.timing.heartbeat_ms),
       board_timeout(std::chrono::milliseconds(options.session.timing.timeout_ms)),
-      session(*this, with_clock(std::move(options.session), steady_now()),
-              options.role, transports.size()),
+      session(*this, with_clock(std::move(options.session), steady_now()), options.role,
+              transports.size()),
       timer(context),
       reopening(context) {
   for (std::unique_ptr<Carrier>& each : transports) {

@@ -14,8 +14,8 @@ namespace {
 
 using firmware::Guard;
 using test::another_session;
-using test::our_session;
 using test::MemoryHal;
+using test::our_session;
 using test::TestBoard;
 using test::TestHost;
 

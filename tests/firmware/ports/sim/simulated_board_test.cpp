@@ -97,7 +97,8 @@ class SimulatedBoardTest : public testing::Test {
     deliver();
   }
   void heartbeat(std::uint32_t t) {
-    send("H:ROS2-R4;SID:0123456789abcdef;PNum:" + std::to_string(pnum_++) + ";T:" + std::to_string(t) + ";");
+    send("H:ROS2-R4;SID:0123456789abcdef;PNum:" + std::to_string(pnum_++) +
+         ";T:" + std::to_string(t) + ";");
   }
   void command(const std::string& field) {
     send(field + ";SID:0123456789abcdef;PNum:" + std::to_string(pnum_++) + ";T:1;");
