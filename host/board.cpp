@@ -72,22 +72,22 @@ void Board::apply(const Setpoints& setpoints, Duration timeout) {
   require_timeout(text, timeout);
   const auto impl = impl_;
   require_control(impl->role, text);
-  const auto call = std::make_shared<Impl::Call>(Command());
-  call->start = [&async = impl->async, setpoints](Duration left, auto end) {
-    async.async_apply(setpoints, left, std::move(end));
-  };
-  impl->execute(text, call, timeout);
+  impl->execute(
+      text,
+      [&async = impl->async, setpoints](Duration left, auto end) {
+        async.async_apply(setpoints, left, std::move(end));
+      },
+      timeout);
 }
 PostResult Board::post(const Setpoints& setpoints) { return impl_->post(setpoints); }
 void Board::arm(Duration timeout) {
   require_timeout("arm()", timeout);
   const auto impl = impl_;
   require_control(impl->role, "arm()");
-  const auto call = std::make_shared<Impl::Call>(Command());
-  call->start = [&async = impl->async](Duration left, auto end) {
-    async.async_arm(left, std::move(end));
-  };
-  impl->execute("arm()", call, timeout);
+  impl->execute(
+      "arm()",
+      [&async = impl->async](Duration left, auto end) { async.async_arm(left, std::move(end)); },
+      timeout);
 }
 DisarmCause Board::disarmed_by() const {
   const std::lock_guard lock(impl_->mutex);
@@ -152,11 +152,12 @@ void Board::link_timing(Duration board_timeout, Duration heartbeat, Duration tim
   const auto impl = impl_;
   require_control(impl->role, text);
   impl->async.require_link_timing(board_timeout, heartbeat);
-  const auto call = std::make_shared<Impl::Call>(Command());
-  call->start = [&async = impl->async, board_timeout, heartbeat](Duration left, auto end) {
-    async.async_link_timing(board_timeout, heartbeat, left, std::move(end));
-  };
-  impl->execute(text, call, timeout);
+  impl->execute(
+      text,
+      [&async = impl->async, board_timeout, heartbeat](Duration left, auto end) {
+        async.async_link_timing(board_timeout, heartbeat, left, std::move(end));
+      },
+      timeout);
 }
 
 BoardIdentity Board::identify(Duration timeout) {

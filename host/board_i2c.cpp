@@ -90,9 +90,8 @@ void Board::attach(const Device& device, Duration timeout) {
   const auto impl = impl_;
   require_control(impl->role, text);
   const Duration each = Impl::bounded(timeout);
-  const auto call = std::make_shared<Impl::Call>(Command());
   const auto obstacle = std::make_shared<std::optional<Problem>>();
-  call->start = [&async = impl->async, device, each, obstacle](Duration, auto end) {
+  const auto attach = [&async = impl->async, device, each, obstacle](Duration, auto end) {
     try {
       async.async_attach(device, each, std::move(end));
     } catch (const Error& error) {  // before it has taken `end`
@@ -100,7 +99,7 @@ void Board::attach(const Device& device, Duration timeout) {
       end(CommandResult());
     }
   };
-  impl->run(text, call, longest(device, each));
+  const auto call = impl->run(text, attach, longest(device, each));
   if (*obstacle) throw Error(**obstacle);
   if (call->result.outcome == Outcome::confirmed) return;
   throw Error(explain(device, call->result, call->link));

@@ -13,33 +13,30 @@ namespace r4 {
 
 namespace {
 
-// The session ends every command at its deadline, which is that of the call. A call that has been
-// begun and waits longer than this beyond it is held up by a transport that does not return.
-constexpr std::chrono::milliseconds grace{500};
+// With texts of its own: its caller may be gone when it is sent.
+struct KeptCommand {
+  explicit KeptCommand(const Command& kept)
+      : command(kept),
+        text(kept.text.data(), kept.text.size()),
+        text2(kept.text2.data(), kept.text2.size()) {
+    command.text = text;
+    command.text2 = text2;
+  }
+  KeptCommand(const KeptCommand&) = delete;
+  KeptCommand& operator=(const KeptCommand&) = delete;
 
-// So long does close() wait for the board to say that it is free.
-constexpr std::chrono::milliseconds farewell_limit{100};
-
-// `instead`: what that means for what was asked.
-Error blocked_error(std::string_view what, std::string_view instead) {
-  return Error(Problem{ErrorKind::refused, std::string(what),
-                       std::string(instead) + ": the board's thread does not answer",
-                       "a transport of your own must return at once", Outcome::blocked});
-}
+  Command command;
+  std::string text, text2;
+};
 
 }  // namespace
 
-Board::Impl::Call::Call(const Command& c)
-    : command(c), text(c.text.data(), c.text.size()), text2(c.text2.data(), c.text2.size()) {
-  command.text = text;
-  command.text2 = text2;
-}
-
 Board::Impl::Impl(const CarriersMaker& make, BoardOptions options, BoardCallbacks first)
-    : role(options.role),
+    : BlockingLoop({"board", "a transport of your own must return at once"}, 1,
+                   std::move(options.on_wait)),
+      role(options.role),
       arming(options.session.arming),
       callback_limit(options.callback_limit),
-      on_wait(std::move(options.on_wait)),
       async(io, make(loop), options),
       box(
           io, [this](const Command& c) { deliver(c); }, [this](const Setpoints& s) { deliver(s); }),
@@ -75,7 +72,7 @@ std::shared_ptr<Board::Impl> Board::Impl::started(const CarriersMaker& make, Boa
 void Board::Impl::start() {
   callbacks.start(shared_from_this());
   try {
-    thread = std::thread([self = shared_from_this()] { self->io.run(); });
+    BlockingLoop::start([self = shared_from_this()] { self->io.run(); });
   } catch (...) {
     callbacks.stop();
     throw;
@@ -84,20 +81,13 @@ void Board::Impl::start() {
 
 // The loop first: it waits for no callback, so that a callback may close the board.
 void Board::Impl::close() {
-  {
-    const std::lock_guard lock(mutex);
-    if (!closed) asio::post(io, [this] { shut(); });
-  }
-  {
-    const std::lock_guard lock(joining);
-    if (thread.joinable()) thread.join();
-    recording.reset();  // with the farewell in it
-  }
+  BlockingLoop::close([this] { shut(); });
+  keep(nullptr);  // with the farewell in it
   callbacks.stop();
 }
 
 void Board::Impl::keep(std::unique_ptr<Recording> own) {
-  const std::lock_guard lock(joining);
+  const std::lock_guard lock(keeping);
   recording.swap(own);
 }
 
@@ -209,71 +199,28 @@ void Board::Impl::deliver(const Setpoints& setpoints) {
   }
 }
 
-// A stop is sent however late it is; anything else only while its caller waits for it.
-void Board::Impl::begin(const CallPtr& call, Clock::time_point deadline) {
-  const bool stop = call->command.kind == CommandKind::stop;
-  auto left = std::chrono::ceil<Duration>(deadline - Clock::now());
-  {
-    const std::lock_guard lock(mutex);
-    if (!stop && (call->abandoned || left <= Duration{0})) return;
-    call->begun = true;
-  }
-  Call::End end(call->cancelled.slot(),
-                [this, call](const CommandResult& result) { finish(*call, result); });
-  if (call->start) {
-    call->start(left, std::move(end));
-  } else if (stop) {
-    async.async_stop(left > Duration{0} ? left : default_timeout, std::move(end));
-  } else if (call->command.kind == CommandKind::identify) {
-    async.async_identify(left, std::move(end));
-  } else {
-    async.async_send(call->command, left, std::move(end));
-  }
-}
-
 void Board::Impl::finish(Call& call, const CommandResult& result) {
-  {
-    const std::lock_guard lock(mutex);
+  BlockingLoop::finish(call, [&] {
     call.result = result;
     call.result.elapsed = std::chrono::duration_cast<Time>(Clock::now() - call.called);
     call.link = async.link();
     call.identity = async.identity();
-    call.done = true;
-  }
-  call.ended.notify_all();
+  });
 }
 
-// After this, nothing more is put on the loop; what is on it is carried out, then the loop ends.
 void Board::Impl::shut() {
-  {
-    const std::lock_guard lock(mutex);
-    if (closed) return;
-    closed = true;
+  const bool first = mark_closed([this] {
     for_each_queue([](States::Queue& queue) { queue.end(); });
     last_statistics = async.statistics();
     last_counters = async.carrier_counters();
     last_wires = async.wires();
-  }
-  news.notify_all();
-  look_timer.cancel();
-  async.async_close(farewell_limit, [this](const CommandResult&) {
-    work.reset();
-    // Twice around: the ends of commands that begin() finds closed come behind this one.
-    asio::post(io, [this] { asio::post(io, [this] { io.stop(); }); });
   });
+  if (!first) return;
+  look_timer.cancel();
+  async.async_close(farewell_limit, [this](const CommandResult&) { end_loop(); });
 }
 
 // --- on any thread
-
-// A day is as good as for ever, and cannot overflow.
-Board::Duration Board::Impl::bounded(Duration timeout) {
-  return std::clamp<Duration>(timeout, Duration{0}, std::chrono::hours{24});
-}
-
-Error Board::Impl::closed_error(std::string_view what) {
-  return Error(Problem{ErrorKind::refused, std::string(what), "the board was closed",
-                       "open it again with another Board", Outcome::closed});
-}
 
 void Board::Impl::require_sendable(const Command& command) {
   require_valid(command);
@@ -283,71 +230,47 @@ void Board::Impl::require_sendable(const Command& command) {
   for (const std::string& wire : wire_names) require_cable(wire, command);
 }
 
-Board::Impl::CallPtr Board::Impl::execute(const Command& command, Duration timeout) {
-  return execute(shown(command), std::make_shared<Call>(command), timeout);
+std::shared_ptr<const Board::Impl::Call> Board::Impl::execute(const Command& command,
+                                                              Duration timeout) {
+  const bool stop = command.kind == CommandKind::stop;
+  Start start;
+  if (stop) {
+    start = [this](Duration left, End end) { async.async_stop(left, std::move(end)); };
+  } else if (command.kind == CommandKind::identify) {
+    start = [this](Duration left, End end) { async.async_identify(left, std::move(end)); };
+  } else {
+    start = [this, kept = std::make_shared<const KeptCommand>(command)](Duration left, End end) {
+      async.async_send(kept->command, left, std::move(end));
+    };
+  }
+  return require_confirmed(run(shown(command), std::move(start), timeout, stop));
 }
 
-Board::Impl::CallPtr Board::Impl::execute(const std::string& text, CallPtr call, Duration timeout) {
-  run(text, call, bounded(timeout));
+std::shared_ptr<const Board::Impl::Call> Board::Impl::execute(std::string text, Start start,
+                                                              Duration timeout) {
+  return require_confirmed(run(std::move(text), std::move(start), timeout));
+}
+
+std::shared_ptr<const Board::Impl::Call> Board::Impl::require_confirmed(
+    std::shared_ptr<const Call> call) {
   if (call->result.outcome == Outcome::confirmed) return call;
-  throw Error(explain(text, call->result, call->link));
+  throw Error(explain(call->text, call->result, call->link));
 }
 
-void Board::Impl::run(const std::string& text, const CallPtr& call, Duration timeout) {
-  const auto deadline = call->called + timeout;
-  std::unique_lock lock(mutex);
-  if (closed) throw closed_error(text);
-  asio::post(io, [this, call, deadline] { begin(call, deadline); });
-  const auto is_done = [&] { return call->done; };
-  bool done = false;
-  try {
-    done = wait_until(lock, call->ended, deadline, is_done) ||
-           (call->begun && wait_until(lock, call->ended, deadline + grace, is_done));
-  } catch (...) {
-    abandon(call);
-    throw;
-  }
-  if (!done) {
-    call->abandoned = true;
-    if (call->command.kind == CommandKind::stop) {
-      throw Error(Problem{ErrorKind::refused, text,
-                          "not confirmed: the board's thread does not answer, and sends it when it "
-                          "does",
-                          std::string(stop_last_resort), Outcome::blocked});
-    }
-    throw blocked_error(
-        text, call->begun ? "not confirmed, it may have been executed or not" : "not sent");
-  }
-  if (call->result.outcome == Outcome::closed) throw closed_error(text);
-}
-
-void Board::Impl::abandon(const CallPtr& call) {
-  const std::lock_guard lock(mutex);
-  call->abandoned = true;
-  if (closed) return;
-  asio::post(io, [call] { call->cancelled.emit(asio::cancellation_type::terminal); });
-}
-
-void Board::Impl::run_on_loop(std::string_view what, std::function<void()> action) {
-  const auto call = std::make_shared<Call>(Command());
-  std::unique_lock lock(mutex);
-  if (closed) return;
-  asio::post(io, [this, call, action = std::move(action)] {
-    {
-      const std::lock_guard begin_lock(mutex);
-      if (call->abandoned) return;
-      call->begun = true;
-    }
-    action();
-    finish(*call, {});
-  });
-  const auto is_done = [&] { return call->done; };
-  if (call->ended.wait_for(lock, default_timeout, is_done)) return;
-  if (!call->begun) {
-    call->abandoned = true;
-    throw blocked_error(what, "not done");
-  }
-  call->ended.wait(lock, is_done);
+std::shared_ptr<const Board::Impl::Call> Board::Impl::run(std::string text, Start start,
+                                                          Duration timeout, bool stop) {
+  const auto call = std::make_shared<Call>();
+  call->text = std::move(text);
+  call->stop = stop;
+  call->cancelled.resize(1);
+  call->start = [this, start = std::move(start)](const CallPtr& base, Duration left) {
+    const auto begun = std::static_pointer_cast<Call>(base);
+    start(left, End(begun->cancelled.front().slot(),
+                    [this, begun](const CommandResult& result) { finish(*begun, result); }));
+  };
+  BlockingLoop::run(call, timeout);
+  if (call->result.outcome == Outcome::closed) throw closed_error(call->text);
+  return call;
 }
 
 PostResult Board::Impl::post(const Command& command) {

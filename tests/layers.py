@@ -21,8 +21,8 @@ CARRIERS = {'transports/can', 'transports/impaired', 'transports/serial', 'trans
 TRANSPORTS = FRAMING | CARRIERS | {'transports'}
 FIRMWARE = FRAMING | {'firmware', 'firmware/application', 'firmware/devices', 'firmware/drivers'}
 MODELS = {'firmware/ports/sim/chips', 'firmware/ports/sim/devices', 'firmware/ports/sim/robot'}
-HOST = TRANSPORTS | {'host', 'host/commands', 'host/control', 'host/devices', 'host/measurement', 'host/recording', 'host/replay',
-                     'host/session', 'host/uart'}
+HOST = TRANSPORTS | {'host', 'host/blocking', 'host/commands', 'host/control', 'host/devices', 'host/measurement', 'host/recording',
+                     'host/replay', 'host/session', 'host/uart'}
 SIMULATED = HOST | FIRMWARE | MODELS | {'firmware/ports/sim'}
 SHELL = SIMULATED | {'tools/r4/shell'}
 FORMATS = {'tools/r4/formats', 'tools/r4/formats/mcap', 'tools/r4/formats/packets'}
@@ -63,6 +63,7 @@ ALLOWED = {
     'firmware/ports/giga/devices': FIRMWARE | {'firmware/ports', 'firmware/ports/giga/chip'},
     'firmware/ports/giga': FIRMWARE | {'firmware/ports/giga/chip', 'firmware/ports/giga/devices',
                                        'firmware/ports/giga/links'},
+    'host/blocking': TRANSPORTS | {'host/commands', 'host/measurement'},
     'host/bridge': HOST,
     'host/commands': TRANSPORTS,
     'host/control': PUBLIC,

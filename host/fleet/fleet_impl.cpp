@@ -13,36 +13,11 @@ namespace r4 {
 
 namespace {
 
-// The session ends every command at its deadline, which is that of the call: more than this beyond it, the thread
-// is held up.
-constexpr std::chrono::milliseconds grace{500};
-
-// So long does close() wait for the boards to say that they are free.
-constexpr std::chrono::milliseconds farewell_limit{100};
-
-// A day is as good as for ever, and cannot overflow.
-Fleet::Duration bounded(Fleet::Duration timeout) {
-  return std::clamp<Fleet::Duration>(timeout, Fleet::Duration{0}, std::chrono::hours{24});
-}
-
 // Where more than this happens in a window, each datagram of hundreds of boards would wake the thread: then it looks
 // again after a pause, and finds several.
 constexpr std::chrono::milliseconds window{10};
 constexpr std::size_t busy_window = 200;
 constexpr std::chrono::microseconds breather{200};
-
-Error closed_error(std::string_view what) {
-  return Error(Problem{ErrorKind::refused, std::string(what), "the fleet was closed",
-                       "open it again with another Fleet", Outcome::closed});
-}
-
-// `instead`: what that means for what was asked.
-Error blocked_error(std::string_view what, std::string_view instead,
-                    std::string_view fix = "see that this computer has time for it") {
-  return Error(Problem{ErrorKind::refused, std::string(what),
-                       std::string(instead) + ": the fleet's thread does not answer",
-                       std::string(fix), Outcome::blocked});
-}
 
 std::vector<std::string> urls_of(const std::vector<std::string>& patterns) {
   std::vector<std::string> urls;
@@ -56,8 +31,11 @@ std::vector<std::string> urls_of(const std::vector<std::string>& patterns) {
 }  // namespace
 
 Fleet::Impl::Impl(const std::vector<std::string>& patterns, BoardOptions options)
-    : role(options.role), on_wait(std::move(options.on_wait)), urls(urls_of(patterns)) {
-  options.on_wait = nullptr;
+    // Other threads do nothing on it but post: what the reactor does needs no locks.
+    : BlockingLoop({"fleet", "see that this computer has time for it"},
+                   ASIO_CONCURRENCY_HINT_UNSAFE_IO, std::exchange(options.on_wait, nullptr)),
+      role(options.role),
+      urls(urls_of(patterns)) {
   boards.reserve(urls.size());
   links.resize(urls.size());
   for (std::size_t i = 0; i < urls.size(); ++i) {
@@ -65,7 +43,7 @@ Fleet::Impl::Impl(const std::vector<std::string>& patterns, BoardOptions options
     boards.push_back(std::make_unique<AsyncBoard>(io, urls[i], options));
     listen(i);
   }
-  thread = std::thread([this] { run(); });
+  start([this] { run(); });
   // On the loop, where no name that is looked up holds the others up.
   std::exception_ptr trouble;
   asio::post(io, [&] {
@@ -88,12 +66,7 @@ Fleet::Impl::Impl(const std::vector<std::string>& patterns, BoardOptions options
 }
 
 void Fleet::Impl::close() {
-  {
-    const std::lock_guard lock(mutex);
-    if (!closed) asio::post(io, [this] { shut(); });
-  }
-  const std::lock_guard lock(joining);
-  if (thread.joinable()) thread.join();
+  BlockingLoop::close([this] { shut(); });
 }
 
 // --- on the loop
@@ -155,26 +128,6 @@ void Fleet::Impl::tell(FleetEvent event) {
   news.notify_all();
 }
 
-// A stop is sent however late it is, and repeated.
-void Fleet::Impl::begin(const CallPtr& call, Clock::time_point deadline) {
-  auto left = std::chrono::ceil<Duration>(deadline - Clock::now());
-  {
-    const std::lock_guard lock(mutex);
-    if (!call->stop && (call->abandoned || left <= Duration{0})) return;
-    call->begun = true;
-  }
-  if (left <= Duration{0}) left = call->stop ? default_timeout : Duration{1};
-  for (std::size_t at = 0; at < call->boards.size(); ++at) {
-    BoundEnd end(call->cancelled[at].slot(), End{this, call, at});
-    try {
-      call->start(call->boards[at], at, left, std::move(end));
-    } catch (const Error& error) {
-      call->results[at].problem = error.problem();
-      finish(*call, at, CommandResult{Outcome::refused});
-    }
-  }
-}
-
 void Fleet::Impl::finish(Call& call, std::size_t at, const CommandResult& result) {
   FleetResult& mine = call.results[at];
   mine.result = result;
@@ -187,25 +140,15 @@ void Fleet::Impl::finish(Call& call, std::size_t at, const CommandResult& result
     mine.problem = explain(call.text, result, boards[mine.board]->link());
   }
   if (!mine.confirmed()) mine.problem.thing = url + ": " + mine.problem.thing;
-  const std::lock_guard lock(mutex);
-  if (--call.left == 0) call.ended.notify_all();
+  BlockingLoop::finish(call, [] {});
 }
 
-// After this, nothing more is put on the loop; what is on it is carried out, then the loop ends.
 void Fleet::Impl::shut() {
-  {
-    const std::lock_guard lock(mutex);
-    if (closed) return;
-    closed = true;
-  }
-  news.notify_all();
+  if (!mark_closed([] {})) return;
   leaving = boards.size();
   for (const auto& board : boards) {
     board->async_close(farewell_limit, [this](const CommandResult&) {
-      if (--leaving != 0) return;
-      work.reset();
-      // Twice around: the ends of commands that begin() finds closed come behind this one.
-      asio::post(io, [this] { asio::post(io, [this] { io.stop(); }); });
+      if (--leaving == 0) end_loop();
     });
   }
 }
@@ -232,91 +175,42 @@ void Fleet::Impl::require_board(std::size_t board) const {
               "they are 0 to " + std::to_string(boards.size() - 1));
 }
 
-Fleet::Impl::CallPtr Fleet::Impl::call_of(std::string text, const Boards& which,
-                                          Start start) const {
+std::shared_ptr<Fleet::Impl::Call> Fleet::Impl::call_of(std::string text, const Boards& which,
+                                                        Start start, bool stop) {
   auto call = std::make_shared<Call>();
   call->text = std::move(text);
+  call->stop = stop;
   call->boards = which;
-  call->start = std::move(start);
   call->cancelled.resize(which.size());
-  call->left = which.size();
+  call->parts = which.size();
   for (const std::size_t board : which) {
     require_board(board);
     call->results.push_back({board, {}, {}});
   }
+  call->start = [this, start = std::move(start)](const CallPtr& base, Duration left) {
+    const auto begun = std::static_pointer_cast<Call>(base);
+    for (std::size_t at = 0; at < begun->boards.size(); ++at) {
+      BoundEnd end(begun->cancelled[at].slot(), End{this, begun, at});
+      try {
+        start(begun->boards[at], at, left, std::move(end));
+      } catch (const Error& error) {
+        begun->results[at].problem = error.problem();
+        finish(*begun, at, CommandResult{Outcome::refused});
+      }
+    }
+  };
   return call;
 }
 
 FleetResults Fleet::Impl::execute(std::string text, const Boards& which, Duration timeout,
                                   Start start, bool stop) {
-  const CallPtr call = call_of(std::move(text), which, std::move(start));
-  call->stop = stop;
-  const auto deadline = Clock::now() + bounded(timeout);
-  std::unique_lock lock(mutex);
-  if (closed) throw closed_error(call->text);
-  asio::post(io, [this, call, deadline] { begin(call, deadline); });
-  const auto is_done = [&] { return call->left == 0; };
-  bool done = false;
-  try {
-    done = wait_until(lock, call->ended, deadline, is_done) ||
-           (call->begun && wait_until(lock, call->ended, deadline + grace, is_done));
-  } catch (...) {
-    if (!lock.owns_lock()) lock.lock();
-    call->abandoned = true;
-    if (!closed) {
-      asio::post(io, [call] {
-        for (auto& each : call->cancelled) each.emit(asio::cancellation_type::terminal);
-      });
-    }
-    throw;
-  }
-  if (!done) {
-    call->abandoned = true;
-    if (call->stop) {
-      throw blocked_error(call->text, "not confirmed; it goes out when it can", stop_last_resort);
-    }
-    throw blocked_error(
-        call->text, call->begun ? "not confirmed, it may have been executed or not" : "not sent");
-  }
+  const auto call = call_of(std::move(text), which, std::move(start), stop);
+  BlockingLoop::run(call, timeout);
   return FleetResults(call->results);
 }
 
 void Fleet::Impl::run_on_loop(std::string_view what, const std::function<void()>& action) {
-  struct Turn {
-    std::condition_variable ended;
-    bool begun = false;
-    bool abandoned = false;
-    bool done = false;
-    std::exception_ptr trouble;
-  };
-  const auto turn = std::make_shared<Turn>();
-  std::unique_lock lock(mutex);
-  if (closed) throw closed_error(what);
-  // `action` is the caller's, who is here as long as it runs.
-  asio::post(io, [this, turn, &action] {
-    {
-      const std::lock_guard begin_lock(mutex);
-      if (turn->abandoned) return;
-      turn->begun = true;
-    }
-    try {
-      action();
-    } catch (...) {
-      turn->trouble = std::current_exception();
-    }
-    const std::lock_guard end_lock(mutex);
-    turn->done = true;
-    turn->ended.notify_all();
-  });
-  const auto is_done = [&] { return turn->done; };
-  if (!turn->ended.wait_for(lock, default_timeout, is_done)) {
-    if (!turn->begun) {
-      turn->abandoned = true;
-      throw blocked_error(what, "not done");
-    }
-    turn->ended.wait(lock, is_done);
-  }
-  if (turn->trouble) std::rethrow_exception(turn->trouble);
+  if (!BlockingLoop::run_on_loop(what, action)) throw closed_error(what);
 }
 
 Fleet::Boards Fleet::Impl::wait_active(const Boards& which, Duration timeout) {
@@ -330,14 +224,10 @@ Fleet::Boards Fleet::Impl::wait_active(const Boards& which, Duration timeout) {
                                                          link.in_control && !link.gated();
       if (!active) missing.push_back(board);
     }
-    return closed || missing.empty();
+    return missing.empty();
   };
-  const SleepWatch slept;
-  std::unique_lock lock(mutex);
-  wait_until(lock, news, Clock::now() + bounded(timeout), all_active);
-  if (closed) throw closed_error("wait_active()");
-  // The deadline stands still while this computer sleeps.
-  return slept.time() > bounded(timeout) ? which : missing;
+  if (wait_for_news([] { return "wait_active()"; }, timeout, all_active)) return {};
+  return missing.empty() ? which : missing;  // empty: this computer slept longer than that
 }
 
 std::optional<FleetEvent> Fleet::Impl::next_event(Duration timeout) {
@@ -379,11 +269,7 @@ FleetResults Fleet::Impl::stop(const Boards& which, Duration timeout) {
 }
 
 void Fleet::Impl::stop_async(const Boards& which, Start start) {
-  const CallPtr call = call_of("E:STOP", which, std::move(start));
-  call->stop = true;
-  const std::lock_guard lock(mutex);
-  if (closed) return;
-  asio::post(io, [this, call] { begin(call, Clock::now() + default_timeout); });
+  run_unawaited(call_of("E:STOP", which, std::move(start), true), default_timeout);
 }
 
 }  // namespace r4

@@ -103,8 +103,9 @@ class Session {
 
   // `random` gives 64 random bits at each call.
   // Throws Error{usage} if options.fields are no state fields.
-  Session(Handler& handler, SessionOptions options, BoardRole role = BoardRole::control,
-          std::size_t wires = 1, std::function<std::uint64_t()> random = random_bits);
+  Session(
+      Handler& handler, SessionOptions options, BoardRole role = BoardRole::control,
+      std::size_t wires = 1, std::function<std::uint64_t()> random = [] { return random_bits(); });
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
