@@ -7,7 +7,6 @@ left behind. `init` is the guest's side, and says what the control port carries.
 """
 import ctypes
 import fcntl
-import json
 import os
 import pathlib
 import secrets
@@ -16,7 +15,6 @@ import shlex
 import shutil
 import signal
 import socket
-import stat
 import struct
 import subprocess
 import sys
@@ -25,6 +23,7 @@ import threading
 import time
 import tty
 
+from cable import Cable
 from kernel import Cpio, prepared
 from trouble import Trouble
 
@@ -33,7 +32,6 @@ QEMU = 'qemu-system-x86_64'
 BOOT_S = 60
 BOOT_CPU_S = 30
 LONGEST_BOOT_S = 600
-PLUG_AGAIN_S = 0.02
 KILL_AFTER_S = 2  # after the time limit's SIGTERM
 TIME_LIMIT_EXIT = 124  # as timeout(1)
 KERNEL_ARGUMENTS = ('console=ttyS0 quiet panic=-1 mitigations=off no_timer_check tsc=reliable '
@@ -44,7 +42,6 @@ MACHINE = ('-M pc -accel tcg,thread=multi -cpu max,-la57,-smap,-smep,-umip,-pku 
            '-nodefaults -no-user-config -vga none -display none -no-reboot -device virtio-serial-pci,max_ports=8').split()
 CAN = ('-object can-bus,id=bus -device kvaser_pci,canbus=bus '
        '-device kvaser_pci,canbus=bus').split()
-USB_DEVICE = {'driver': 'usb-serial', 'id': 'usb', 'chardev': 'usb', 'serial': 'R4-0001'}
 PASSED_ON = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1,
              signal.SIGUSR2)
 HERE = pathlib.Path(__file__).parent
@@ -66,19 +63,6 @@ def job(command):
                   '--inh-caps=+net_admin,+net_raw', '--ambient-caps=+net_admin,+net_raw']
     words += command
     return os.fsencode('echo $$ >/pid.job\nexec chroot /host ' + shlex.join(words) + '\n')
-
-
-def far_end(path):
-    """QEMU's words for what is at the other end of the USB cable."""
-    fix = 'give a tty (r4 sim pty:PATH serves one) or a Unix socket on which somebody listens'
-    try:
-        mode = os.stat(path).st_mode
-    except OSError as error:
-        raise Trouble(path, error.strerror, fix) from error
-    kind = 'serial' if stat.S_ISCHR(mode) else 'socket' if stat.S_ISSOCK(mode) else None
-    if kind is None:
-        raise Trouble(path, 'it is neither a tty nor a socket', fix)
-    return f'{kind},id=usb,path=' + os.path.abspath(path).replace(',', ',,')
 
 
 def die_with_us():
@@ -188,13 +172,11 @@ class Guest:
         if shutil.which('ip', path=os.environ.get('PATH', '') + ':/usr/sbin:/sbin') is None:
             raise Trouble('ip', 'it is not installed', 'tools/setup --can')
         self._command = command
-        self._usb = usb
-        self._usb_end = far_end(usb) if usb else None
+        self._cable = Cable(usb) if usb else None
         self._kernel = prepared()
         self._limit = limit
         self._limit_passed = False
         self._began = 0.0
-        self._plugging = False
         self._deadline = None
         self._verbose = verbose
         self._qemu = None
@@ -248,8 +230,6 @@ class Guest:
     def _start(self):
         self._log = self._channel('log')
         self._arguments += ['-serial', 'chardev:log']
-        self._qmp = self._channel('qmp')
-        self._arguments += ['-mon', 'chardev=qmp,mode=control']
         self._control = self._port('control', 1)
         ports = {}
         if self._terminal:
@@ -259,10 +239,10 @@ class Guest:
             ports['out'] = self._port('out', 3)
         if self._errors_apart:
             ports['err'] = self._port('err', 4)
-        if self._usb:
-            device = ','.join(f'{name}={value}' for name, value in USB_DEVICE.items())
-            self._arguments += ['-device', 'qemu-xhci', '-chardev', self._usb_end, '-device',
-                                device.removeprefix('driver=')]
+        if self._cable:
+            self._arguments += self._cable.arguments()
+            self._ends.append(self._cable.listener)
+            self._cable.plug()
         # Made before QEMU is, so that no other child of ours inherits it half-made.
         initrd = os.memfd_create('initrd')
         with open(initrd, 'wb', closefd=False) as file:
@@ -279,7 +259,6 @@ class Guest:
         for end in self._ends:
             end.close()
         os.close(initrd)
-        self._say_to_qemu({'execute': 'qmp_capabilities'})
         self._outputs = [
             Output(ports[name], descriptor, self._mark, lambda name=name: self._tell(f'close {name}'),
                    lambda: self._waking.send(b'\0'))
@@ -294,7 +273,7 @@ class Guest:
         disk.add('job', 0o100644, job(self._command))
         disk.add('settings', 0o100644, os.fsencode(
             f'MARK={self._mark.decode()}\nHOST_NAME={shlex.quote(socket.gethostname())}\n'
-            f'USB={int(bool(self._usb))}\nTERMINAL={int(self._terminal)}\nROWS={rows}\n'
+            f'USB={int(bool(self._cable))}\nTERMINAL={int(self._terminal)}\nROWS={rows}\n'
             f'COLUMNS={columns}\nERRORS_APART={int(self._errors_apart)}\n'))
         return disk.closed()
 
@@ -310,17 +289,13 @@ class Guest:
         except OSError:
             pass  # it has ended
 
-    def _say_to_qemu(self, order):
-        self._qmp.sendall(json.dumps(order).encode() + b'\n')
-
     def _watch(self):
         """Everything but the command's own bytes, until its end."""
-        control, qmp = Lines(self._control), Lines(self._qmp)
+        control = Lines(self._control)
         ended = os.pidfd_open(self._qemu.pid)
         selector = selectors.DefaultSelector()
         for source, handler in (
                 (self._control, lambda: [self._on_control(each) for each in control.received()]),
-                (self._qmp, lambda: [self._on_qmp(each) for each in qmp.received()]),
                 (self._log, self._on_log),
                 (self._woken, lambda: [self._on_signal(each) for each in self._woken.recv(64)]),
                 (ended, self._on_end)):
@@ -349,26 +324,9 @@ class Guest:
             self._status = int(rest)
             self._deadline = None
         elif line == 'usb unplug':
-            self._say_to_qemu({'execute': 'device_del', 'arguments': {'id': USB_DEVICE['id']}})
+            self._cable.unplug()
         elif line == 'usb plug':
-            self._plugging = True
-            self._plug()
-
-    def _plug(self):
-        try:
-            self._say_to_qemu({'execute': 'device_add', 'arguments': USB_DEVICE, 'id': 'plug'})
-        except OSError:
-            pass  # it has ended
-
-    def _on_qmp(self, line):
-        answer = json.loads(line)
-        if 'error' not in answer:
-            self._plugging = self._plugging and answer.get('id') != 'plug'
-        elif self._plugging and 'in use' in answer['error']['desc']:
-            # QEMU is not done with the device that was unplugged.
-            threading.Timer(PLUG_AGAIN_S, self._plug).start()
-        else:
-            self._say(f"USB: {answer['error']['desc']}")
+            self._cable.plug()
 
     def _on_log(self):
         received = self._log.recv(65536)
