@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Python package's types, and that it is built and installed with what Debian has, without a network."""
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tarfile
+
+import r4link
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+OFFLINE = {**os.environ, 'PIP_NO_INDEX': '1', 'PIP_DISABLE_PIP_VERSION_CHECK': '1'}
+OFFLINE.pop('PYTHONPATH')
+
+
+def run(*command, cwd=ROOT, env=None):
+    ended = subprocess.run([str(each) for each in command], cwd=cwd, env=env or os.environ, capture_output=True, text=True,
+                           check=False)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    return ended.stdout
+
+
+def test_types_are_strict():
+    """In one run, because most of its time goes into the types of the standard library, which the build folder keeps."""
+    package, examples = ROOT / 'host/python/r4link', ROOT / 'docs/examples'
+    sources = [*package.glob('*.py'), package / '_core.pyi', *(examples / 'python').glob('*.py'),
+               examples / 'openscout/openscout.py']
+    kept = pathlib.Path(os.environ['R4_BUILD']) / 'mypy'
+    run(sys.executable, '-m', 'mypy', '--strict', '--python-version', '3.10', '--cache-dir', kept, *sorted(sources),
+        env={**os.environ, 'MYPYPATH': f'{ROOT / "host/python"}:{ROOT / "docs/examples/openscout"}'})
+
+
+def test_installs_into_a_venv_and_builds_a_source_distribution(tmp_path):
+    run(sys.executable, '-m', 'venv', tmp_path / 'venv')
+    python = tmp_path / 'venv/bin/python'
+    run(python, '-m', 'pip', 'install', '--quiet', ROOT, env=OFFLINE)
+    told = run(python, '-c', 'import r4link; print(r4link.__version__, r4link.__file__); '
+                             'board = r4link.Board("sim:"); board.wait_active(); print(board)', cwd=tmp_path, env=OFFLINE)
+    assert told.startswith(f'{r4link.__version__} {tmp_path}') and 'active' in told
+    run(sys.executable, '-m', 'build', '--outdir', tmp_path / 'dist', '--sdist', ROOT, env=OFFLINE)
+    [source] = (tmp_path / 'dist').iterdir()
+    with tarfile.open(source) as archive:
+        names = archive.getnames()
+        archive.extractall(tmp_path / 'source')
+    # The source distribution is whole: it configures in a folder of its own, as a build without R4_BUILD does.
+    run(sys.executable, '-c', 'import build_backend; build_backend.configure("build")',
+        cwd=tmp_path / 'source' / f'r4link-{r4link.__version__}',
+        env={**OFFLINE, 'PYTHONPATH': 'host/python'})
+    assert f'r4link-{r4link.__version__}/host/python/bindings/board.cpp' in names
+    assert not any('__pycache__' in each or each.endswith('.so') for each in names)
+
+
+def test_a_wheel_has_the_same_bytes_twice_and_carries_its_libraries(tmp_path):
+    for folder in (tmp_path / 'one', tmp_path / 'two'):
+        made = run(ROOT / 'tools/wheel', '--built', os.environ['R4_BUILD'], '--into', folder)
+        assert '-manylinux_2_' in made and not list(folder.glob('*-linux_*')), made
+    first, second = sorted(tmp_path.glob('*/*.whl'))
+    assert first.name == second.name and first.read_bytes() == second.read_bytes()
+    shutil.copy(ROOT / 'tests/install/wheel_inside.sh', tmp_path / 'one')
+    told = run(tmp_path / 'one/wheel_inside.sh', sys.executable, env=OFFLINE)
+    assert 'drives a board; 6 libraries are its own' in told, told
+
+
+def test_no_reference_is_lost_or_left():
+    """On the interpreter that counts them, such as python3.11-dbg, with the module built for it."""
+    build = pathlib.Path(os.environ['R4_BUILD'])
+    ended = subprocess.run([f'/usr/bin/python3.{sys.version_info.minor}-dbg', ROOT / 'tests/python/reference_counts.py'],
+                           capture_output=True, text=True, timeout=120, check=False,
+                           env={**os.environ, 'PYTHONPATH': str(build / 'python-debug')})
+    assert ended.returncode == 0 and ended.stderr == '', ended.stdout + ended.stderr
