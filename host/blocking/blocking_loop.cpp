@@ -16,6 +16,10 @@ namespace {
 // longer than this beyond it is held up by a loop that does not turn.
 constexpr BlockingLoop::Duration grace{500};
 
+// For what has no deadline of its own.
+constexpr BlockingLoop::Duration patience{1000};
+static_assert(patience == Board::default_timeout);
+
 }  // namespace
 
 Error BlockingLoop::closed_error(std::string_view what) const {
@@ -65,10 +69,10 @@ void BlockingLoop::run(const CallPtr& call, Duration timeout) {
                       name_.fix);
 }
 
-void BlockingLoop::run_unawaited(const CallPtr& call, Duration timeout) {
+void BlockingLoop::run_unawaited(const CallPtr& call) {
   const std::lock_guard lock(mutex);
   if (closed) return;
-  asio::post(io, [this, call, deadline = call->called + timeout] { begin(call, deadline); });
+  asio::post(io, [this, call, deadline = call->called + patience] { begin(call, deadline); });
 }
 
 bool BlockingLoop::run_on_loop(std::string_view what, const std::function<void()>& action) {
@@ -93,7 +97,7 @@ bool BlockingLoop::run_on_loop(std::string_view what, const std::function<void()
     finish(*turn, [] {});
   });
   const auto is_done = [&] { return turn->parts == 0; };
-  if (!turn->ended.wait_for(lock, Board::default_timeout, is_done)) {
+  if (!turn->ended.wait_for(lock, patience, is_done)) {
     if (!turn->begun) {
       turn->abandoned = true;
       throw blocked_error(what, "not done", name_.fix);
@@ -111,7 +115,7 @@ void BlockingLoop::begin(const CallPtr& call, Clock::time_point deadline) {
     if (!call->stop && (call->abandoned || left <= Duration{0})) return;
     call->begun = true;
   }
-  call->start(call, left > Duration{0} ? left : Board::default_timeout);
+  call->start(call, left > Duration{0} ? left : patience);
 }
 
 void BlockingLoop::close(std::function<void()> shut) {

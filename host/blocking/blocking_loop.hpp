@@ -70,8 +70,8 @@ class BlockingLoop {
   // Waits until all parts of the call have ended. Throws if they do not in time, if it is closed, and what on_wait()
   // throws.
   void run(const CallPtr& call, Duration timeout);
-  // The same, and nobody waits. Nothing if it is closed.
-  void run_unawaited(const CallPtr& call, Duration timeout);
+  // The same, and nobody waits; the boards have Board::default_timeout. Nothing if it is closed.
+  void run_unawaited(const CallPtr& call);
   // Does `action` on the loop, between other things, and waits until it is done. False if it is closed. Throws if the
   // loop does not begin it in time (then it never will), and what `action` throws.
   bool run_on_loop(std::string_view what, const std::function<void()>& action);

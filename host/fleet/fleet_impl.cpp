@@ -269,7 +269,7 @@ FleetResults Fleet::Impl::stop(const Boards& which, Duration timeout) {
 }
 
 void Fleet::Impl::stop_async(const Boards& which, Start start) {
-  run_unawaited(call_of("E:STOP", which, std::move(start), true), default_timeout);
+  run_unawaited(call_of("E:STOP", which, std::move(start), true));
 }
 
 }  // namespace r4
