@@ -208,7 +208,7 @@ def test_monitor_follows_a_python_board():
         times = [host.next(is_state)['t'] for _ in range(20)]
         assert times == sorted(set(times))
         assert host.end() == 0
-    assert board.executed == ['F:DEFAULT,SAFE,CMD'] and board.stops == 0
+    assert set(board.executed) == {'F:DEFAULT,SAFE,CMD'} and board.stops == 0
 
 
 @pytest.mark.parametrize('options, url', [
@@ -218,7 +218,9 @@ def test_send_is_confirmed_by_a_python_board(options, url):
         result = send(url, 'O:358,1,1', 'Q:ID')
     assert set(board.heard_packed) == {'pack=0' not in url}
     assert result.returncode == 0 and 'second' in result.stdout, result
-    assert board.executed == ['F:DEFAULT,RELAYS,SAFE,CMD', 'O:358,1,1']
+    # Fields may be asked for again where the board's states are late.
+    assert board.executed[0] == 'F:DEFAULT,RELAYS,SAFE,CMD'
+    assert [each for each in board.executed if not each.startswith('F:')] == ['O:358,1,1']
 
 
 def test_send_tells_of_a_refusal_of_a_python_board():
