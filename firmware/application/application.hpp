@@ -211,31 +211,31 @@ class Application {
   Inputs inputs_;
   PortSlot ports_[max_ports];
   std::uint8_t port_count_ = 0;
-  bool any_behind_ = false;       // one of them, perhaps
-  std::uint32_t turned_ms_ = 0;   // when the loop last turned
-  std::uint32_t went_on_ms_ = 0;  // … and when it went on after it had stood still
+  bool any_behind_ = false;  // one of them, perhaps
   BoardState reported_state_ = BoardState::connecting;
   SafeReason reported_reason_ = SafeReason::none;
+  std::uint32_t turned_ms_ = 0;    // when the loop last turned
+  std::uint32_t went_on_ms_ = 0;   // … and when it went on after it had stood still
   std::uint32_t obstacle_ms_ = 0;  // when there was one last
   std::uint32_t caused_ms_ = 0;    // when a cause other than link came last
+  // Of the datagram that is being read: its host, and whether another path has brought it before.
+  HostId speaker_;
+  bool known_ = false;
+  bool outputs_live_ = false;  // outputs_ follow the setpoints
   // The newest stop, as long as it lasts: who asked for it, and its number if it had one.
-  HostId stop_from_;
   bool has_stop_number_ = false;
-  std::uint32_t stop_number_ = 0;
   bool stop_of_a_key_ = false;
+  std::uint32_t stop_number_ = 0;
+  HostId stop_from_;
   // Stops that the guard has heard, and those of them whose datagrams are still to be read; when it
   // heard the newest.
   std::uint32_t stops_heard_ = 0;
   std::uint32_t unread_stops_ = 0;
   std::uint32_t unread_ms_ = 0;
-  bool outputs_live_ = false;  // outputs_ follow the setpoints
-  // Of the datagram that is being read: its host, and whether another path has brought it before.
-  HostId speaker_;
-  bool known_ = false;
+  std::uint32_t answered_ms_ = 0;
+  bool has_answer_ = false;  // of the user's bus, which is told for a while
   UserI2c* i2c_;
   UserUart* uarts_[uart_channels];
-  bool has_answer_ = false;  // of the user's bus, which is told for a while
-  std::uint32_t answered_ms_ = 0;
   std::uint32_t rx_ok_ = 0;
   std::uint32_t rx_bad_ = 0;
   std::uint32_t rx_refused_ = 0;
