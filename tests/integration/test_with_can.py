@@ -198,6 +198,7 @@ def test_an_ordinary_user_has_it_too_with_his_own_ids_and_the_status_is_the_sign
     (['no-such-command'], {}, 127, 'no such command'),
     ([], {}, 2, '--help'),
     (['--usb-serial', '/no/such/tty', 'true'], {}, 6, 'r4 sim pty:PATH'),
+    (['--usb-serial', '/dev/null', 'true'], {}, 6, '/dev/null: it is neither a tty nor a socket'),
     (['/bin/true'], {'PATH': '/nowhere'}, 6, 'tools/setup --can'),
     (['true'], {'XDG_CACHE_HOME': '/dev/null'}, 6, 'XDG_CACHE_HOME'),
     (['true'], {'XDG_CACHE_HOME': '{tmp}', 'R4_CAN_KERNEL': '/no/such.deb'}, 6, 'R4_CAN_KERNEL'),

@@ -24,8 +24,10 @@ def far_end(path):
         mode = os.stat(path).st_mode
         if stat.S_ISCHR(mode):
             terminal = os.open(path, os.O_RDWR | os.O_NOCTTY)
-            tty.setraw(terminal)
-            return terminal
+            if os.isatty(terminal):
+                tty.setraw(terminal)
+                return terminal
+            os.close(terminal)
         if stat.S_ISSOCK(mode):
             connected = socket.socket(socket.AF_UNIX)
             connected.connect(path)
