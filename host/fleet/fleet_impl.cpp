@@ -226,8 +226,10 @@ Fleet::Boards Fleet::Impl::wait_active(const Boards& which, Duration timeout) {
     }
     return missing.empty();
   };
+  const SleepWatch slept;
   if (wait_for_news([] { return "wait_active()"; }, timeout, all_active)) return {};
-  return missing.empty() ? which : missing;  // empty: this computer slept longer than that
+  // The deadline stands still while this computer sleeps.
+  return slept.time() > bounded(timeout) ? which : missing;
 }
 
 std::optional<FleetEvent> Fleet::Impl::next_event(Duration timeout) {
