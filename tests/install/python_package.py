@@ -8,17 +8,7 @@ import sys
 import tarfile
 
 import r4link
-
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-OFFLINE = {**os.environ, 'PIP_NO_INDEX': '1', 'PIP_DISABLE_PIP_VERSION_CHECK': '1'}
-OFFLINE.pop('PYTHONPATH')
-
-
-def run(*command, cwd=ROOT, env=None):
-    ended = subprocess.run([str(each) for each in command], cwd=cwd, env=env or os.environ, capture_output=True, text=True,
-                           check=False)
-    assert ended.returncode == 0, ended.stdout + ended.stderr
-    return ended.stdout
+from running import OFFLINE, ROOT, run
 
 
 def test_types_are_strict():
