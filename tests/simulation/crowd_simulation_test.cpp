@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A board on a network where a crowd sends to it: up to 60 addresses, before the 16 places that a UDP
 // port has for its peers. Whoever is in control keeps it, whatever the others send, and when they have
-// left another gets it. How soon depends on how many ask for it as well, for the board answers 50 of
-// them a second, with a key 10. R4_CROWDS sets how many crowds there are, R4_SEED replays one.
+// left another gets it. R4_CROWDS sets how many crowds there are, R4_SEED replays one.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 

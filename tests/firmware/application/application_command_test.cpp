@@ -187,6 +187,23 @@ TEST_F(ApplicationCommand, LimitsTheLongAnswersToHostsThatHaveProvedNothing) {
   EXPECT_EQ(board.take(MessageKind::identity).size(), 1U) << "the host in control is answered";
 }
 
+// However many send one: nobody takes the answer, which proves the stop, from another.
+TEST_F(ApplicationCommand, ObeysAndAnswersEveryStop) {
+  for (std::uint32_t peer = 1000; peer < 2000; ++peer) {
+    board.take();
+    const std::string stop = "E:STOP;PNum:" + std::to_string(peer) + ";T:0;";
+    board.receive(stop, Source{0, peer});
+    EXPECT_EQ(board.reason(), SafeReason::stop);
+    int answers = 0;
+    for (const Heard& heard : board.take(MessageKind::board_heartbeat)) {
+      if (heard.peer != peer) continue;
+      ++answers;
+      EXPECT_NE(heard.bytes.find(";STOP:" + std::to_string(peer) + ";"), std::string::npos);
+    }
+    EXPECT_EQ(answers, 1);
+  }
+}
+
 TEST_F(ApplicationCommand, TellsWhoAsksWhetherAnotherHostIsInControl) {
   const auto identity = [this](Source from, SessionId sid = no_session) {
     board.take();

@@ -125,6 +125,23 @@ TEST_F(ApplicationKey, AnswersAnUnsignedHeartbeatWithItsNonce) {
   }
 }
 
+// docs/safety.md, "Limits": who forges an address makes the board send there at most so much.
+TEST_F(ApplicationKey, AnswersWithAtMostFiveTimesTheBytes) {
+  host.connect();
+  std::size_t longest = 0;
+  for (const char* fields : {"E:STOP;", "H:ROS2-R4;PNum:1;T:0;", "H:ROS2-R4;", "X;PNum:1;T:0;",
+                             "X:1;PNum:1;", "O:1,1,1;PNum:1;T:0;"}) {
+    board.take();
+    board.receive(fields, {0, 99});
+    std::size_t bytes = 0;
+    for (const Heard& heard : board.take()) bytes += heard.peer == 99 ? heard.bytes.size() : 0;
+    EXPECT_LE(bytes, 5 * test::with_crc(fields).size()) << fields;
+    longest = std::max(longest, 100 * bytes / test::with_crc(fields).size());
+  }
+  std::printf("answers have at most %zu %% of the bytes\n", longest);
+  EXPECT_GT(longest, 100U);
+}
+
 TEST_F(ApplicationKey, AnswersAnUnsignedCommandWithAuth) {
   host.connect();
   for (const char* command : {"O:1,1,1;", "nonsense:1;O:x;"}) {

@@ -51,6 +51,23 @@ TEST(Session, BecomesActiveWithTheBoardsStateAndSaysSoOnce) {
   EXPECT_EQ(link.links.size(), 2U);
 }
 
+TEST(Session, PassesOverWhatTheBoardAnswersToAnotherSession) {
+  ScriptedLink link;
+  link.connect();
+  const Ticket question = link.session.identify(1s, link.now);
+  const Ticket command = link.session.send(Command::servo(1500, 1), 1s, link.now);
+  const SessionId ours = std::exchange(link.host_session, 0x1234);
+  link.answer(link.last('Q').pnum, "udp");
+  link.nack(link.last('S').pnum, "RANGE");
+  EXPECT_TRUE(link.results.empty());
+  EXPECT_EQ(link.board_id, "");
+  link.host_session = ours;
+  link.answer(link.last('Q').pnum, "udp");
+  link.nack(link.last('S').pnum, "RANGE");
+  EXPECT_EQ(link.results.at(question).outcome, Outcome::confirmed);
+  EXPECT_EQ(link.results.at(command).outcome, Outcome::refused);
+}
+
 TEST(SessionFarewell, EndsHeartbeatsAndIsRepeatedUntilTheBoardTellsThatItIsFree) {
   ScriptedLink link;
   link.connect();

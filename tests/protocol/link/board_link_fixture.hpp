@@ -75,7 +75,7 @@ struct BoardLinkTest : testing::Test {
     return std::string(name_of(code).data(), name_of(code).size());
   }
 
-  // A host with a session id in control. Its heartbeats were first_number, a hello, and the next.
+  // A host with a session id in control. Its heartbeats were first_number, without an echo, and the next.
   void connect() {
     send_due();
     ASSERT_EQ(heartbeat(first_number, 0), HeartbeatEffect::unheard);

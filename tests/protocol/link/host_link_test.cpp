@@ -68,6 +68,17 @@ TEST_F(HostLinkTest, AnswersABoardHeartbeatAtOnceWithItsTime) {
   EXPECT_EQ(link.due_in(now), 100U);
 }
 
+// A board that cannot use the answer sends its T again. The two must not answer each other without end.
+TEST_F(HostLinkTest, AnswersEachTimeOfTheBoardAtOnceOnlyTheFirstTime) {
+  heartbeat();
+  ASSERT_TRUE(send_due());
+  heartbeat();
+  EXPECT_FALSE(link.heartbeat_due(now)) << "the same T";
+  ++now;
+  heartbeat();
+  EXPECT_TRUE(send_due());
+}
+
 TEST_F(HostLinkTest, AStateIsNotEchoed) {
   heartbeat();
   const std::uint32_t t = link.echo();
