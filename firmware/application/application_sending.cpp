@@ -41,11 +41,11 @@ void Application::transmit(Source to, const std::uint32_t& number, Text datagram
   if (!sent) slot.port->send(datagram, priority, to.peer);
 }
 
-// Is the datagram that is being read of the host in control?
+// True if the datagram that is being read comes from the host in control.
 bool Application::is_of_owner() const { return link_.has_owner() && link_.is_session_of(speaker_); }
 
-// The numbers of an answer to who is speaking. A watcher has its own, but where it hears those of everyone at
-// its port, or of the session. Answers to other hosts count apart, even behind the same bridge as the session.
+// Which numbers an answer to the datagram that is being read takes: those of its watcher; those of the port, if its
+// sender hears all that goes out there; else those of answers to other hosts, which may be behind the same bridge.
 std::uint32_t& Application::number_for(Source to) {
   Watcher* const watcher = watchers_.find(to);
   if (watcher != nullptr && !hears_all(to)) return watcher->pnum;

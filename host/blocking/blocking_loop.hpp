@@ -70,14 +70,14 @@ class BlockingLoop {
   // Waits until all parts of the call have ended. Throws if they do not in time, if it is closed, and what on_wait()
   // throws.
   void run(const CallPtr& call, Duration timeout);
-  // The same, and nobody waits; the boards have Board::default_timeout. Nothing if it is closed.
+  // Has the call begin, with Board::default_timeout, and does not wait. Does nothing if the loop is closed.
   void run_unawaited(const CallPtr& call);
   // Does `action` on the loop, between other things, and waits until it is done. False if it is closed. Throws if the
   // loop does not begin it in time (then it never will), and what `action` throws.
   bool run_on_loop(std::string_view what, const std::function<void()>& action);
   // Waits until `arrived` (asked under the lock) is true. False if it was not in time. A sleep of this computer is part
-  // of the time, though the deadline stands still meanwhile. Throws if it is closed; `what()`, asked under the lock,
-  // names what for.
+  // of the time, though the deadline stands still meanwhile. Throws if it is closed, an error about what() returns; that is
+  // called under the lock.
   template <class What, class Predicate>
   bool wait_for_news(What what, Duration timeout, Predicate arrived) {
     const SleepWatch slept;
@@ -121,8 +121,8 @@ class BlockingLoop {
     fill();
     if (--call.parts == 0) call.ended.notify_all();
   }
-  // The first thing of `shut`: from now on nothing more is put on the loop. False if that is so already. `last` is
-  // called under the lock.
+  // For the beginning of `shut`: from now on nothing more is put on the loop. False if it was closed before. Calls `last`
+  // under the lock.
   template <class Last>
   bool mark_closed(Last last) {
     {
@@ -134,7 +134,7 @@ class BlockingLoop {
     news.notify_all();
     return true;
   }
-  // The last thing: what is on the loop is carried out, then it ends.
+  // For the end of `shut`: carries out what is on the loop, then ends it.
   void end_loop();
 
   const std::function<void()> on_wait;

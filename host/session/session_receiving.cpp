@@ -181,7 +181,7 @@ void Session::on_lease_refused(std::size_t wire, const Nack& nack, const Datagra
 // executed: in the session in which the command was sent, and not after too many numbers. Without
 // proof the deadline ends it, as unknown.
 bool Session::is_proof(const Nack& nack) const {
-  // Of one copy: another wire may have brought one that the board takes.
+  // AUTH refuses one copy. The board may have executed the copy of another wire.
   if (nack.code == Refusal::auth && wires_.several()) return false;
   // By how many numbers ago each was taken, since a session may be older than half of all numbers.
   const std::uint32_t since_command = link_.last_pnum() - nack.pnum;
@@ -223,7 +223,7 @@ bool Session::is_cable_only(std::uint32_t pnum) {
   return false;
 }
 
-// Is its number among those of the states? The answer to a host without control is not.
+// True if its number is one of those that the states have. Answers to hosts without control are numbered apart.
 bool Session::counts(const Identity& identity) const {
   const bool to_watcher = watches() && identity.sid == no_session;
   return to_watcher || !(identity.has_busy && identity.busy);

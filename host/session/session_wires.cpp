@@ -73,7 +73,7 @@ void Session::ask_wires(Time now) {
 
 // --- what comes
 
-// Did the board show that T less than the timeout ago, by what is known of its clock?
+// True if the board sent that T less than the timeout ago, by what is known of its clock.
 bool Session::is_recent(std::uint32_t t_ms, Time now) const {
   const auto most = static_cast<std::int32_t>(options_.timing.timeout_ms);
   return link_.is_of_this_boot(t_ms, to_ms(now), to_ms(now), most);

@@ -83,7 +83,8 @@ class Authentication {
 
   // Is it signed? If so, its counter is used up.
   Verdict verify(const Datagram& datagram, std::uint32_t now_ms);
-  // It was not and was needed. True if that is answered: what a network has repeated or held back is not.
+  // Counts a datagram that needs a signature and has no good one. True if it is answered: what a network has repeated
+  // or held back is not.
   bool rejected(Verdict verdict);
   // How many were rejected for that.
   std::uint32_t rejections(Verdict verdict) const {

@@ -27,7 +27,7 @@ Arrival HostLink::on_datagram(std::uint32_t pnum, std::uint32_t t_ms, bool heart
   notice_boot(t_ms, now_ms);
   const Arrival arrival = tracker_.on(pnum);
   if (!is_current(arrival)) return arrival;
-  // A T is answered at once but once: a board that can make nothing of the answer has told it again.
+  // Each T is answered at once only the first time: a board that cannot use the answer sends that T again.
   if (heartbeat && t_ms != echo_) {
     echo_ = t_ms;
     answer_now_ = true;

@@ -302,7 +302,7 @@ bool is_heartbeat_of(const Field& field, unsigned code) {
   return field.name() == Text("H") && field.values() == words[code].word();
 }
 
-// The datagram's layout. Narrows [fields, end) to the fields that it leaves, and reads the numbers of the others.
+// The datagram's layout. Takes the fields that the packed head holds off [fields, end), and reads their numbers.
 Layout choose_layout(Fields& fields, const char*& end, Numbers& numbers) {
   Fields after = fields;
   const Field first = after.next();
