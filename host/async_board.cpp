@@ -252,20 +252,18 @@ std::vector<Wire> AsyncBoard::wires() const {
 // --- the wires
 
 Wire AsyncBoard::Impl::report(std::size_t wire) const {
-  Wire made = session.wire(wire, steady_now());
+  Wire made = session.path(wire, steady_now());
   made.name = carrier(wire).name();
   return made;
 }
 
 const std::string& AsyncBoard::Impl::name() {
-  if (!several()) return carrier(0).name();
   names.clear();
   for (const auto& wire : wires) names += (names.empty() ? "" : " ") + wire->carrier->name();
   return names;
 }
 
 const CarrierCounters& AsyncBoard::Impl::counters() {
-  if (!several()) return carrier(0).counters();
   counted = CarrierCounters();
   for (const auto& wire : wires) counted += wire->carrier->counters();
   return counted;
@@ -274,9 +272,8 @@ const CarrierCounters& AsyncBoard::Impl::counters() {
 // Which have begun to carry, or ceased to; and that one leads to another board.
 void AsyncBoard::Impl::tell_wires(const LinkStatus& status) {
   const LinkStatus before_that = std::exchange(told, status);
-  if (!several()) return;
   for (std::size_t i = 0; i < wires.size(); ++i) {
-    if (((before_that.carrying ^ status.carrying) & wire_bit(i)) == 0) continue;
+    if (((before_that.carrying ^ status.carrying) & path_bit(i)) == 0) continue;
     if (is_open()) call(wire_callbacks, report(i));
   }
   if (status.two_boards && !before_that.two_boards && is_open()) {

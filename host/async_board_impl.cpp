@@ -190,6 +190,10 @@ void AsyncBoard::Impl::open() {
     if (phase != Phase::made) return;  // closed by the callback that was told that it is open
   }
   if (!any) throw Error(*problem);
+  for (const auto& wire : wires) {
+    if (wire->trouble) tell_trouble(*wire);
+    if (phase != Phase::made) return;
+  }
   phase = Phase::open;
   sleep_watch = SleepWatch();
   due = steady_now();
@@ -197,23 +201,23 @@ void AsyncBoard::Impl::open() {
   if (!all) open_again();
 }
 
-// One of several that cannot be opened yet is tried again. `problem`: the first of all. Once the board is open nothing
-// that is wrong with one wire, a device of another kind in its place for example, touches the others.
+// One that cannot be opened yet is tried again where another is open. `problem`: the first of all. Then nothing that is
+// wrong with one wire, a device of another kind in its place for example, touches the others.
 bool AsyncBoard::Impl::open_wire(BoardWire& wire, std::optional<Problem>& problem) {
   try {
     with_system_errors(wire.carrier->name(), [&] { wire.carrier->open(wire); });
     wire.opened = true;
+    wire.trouble.reset();
     return true;
   } catch (const Error& error) {
-    if (phase == Phase::made && (!several() || error.kind() == ErrorKind::usage)) {
+    if (phase == Phase::made && error.kind() == ErrorKind::usage) {
       for (const auto& each : wires) each->carrier->close();
       throw;
     }
     if (!problem) problem = error.problem();
-    if (wire.trouble != error.problem().text()) {
-      wire.trouble = error.problem().text();
-      on_carrier_event(wire, {CarrierEvent::Kind::down, error.problem()});
-    }
+    const bool news = !wire.trouble || wire.trouble->text() != error.problem().text();
+    wire.trouble = error.problem();
+    if (news && phase == Phase::open) tell_trouble(wire);
   }
   return false;
 }

@@ -147,6 +147,9 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
   void cancel(Ticket id);
   void open();
   bool open_wire(BoardWire& wire, std::optional<Problem>& problem);
+  void tell_trouble(BoardWire& wire) {
+    on_carrier_event(wire, {CarrierEvent::Kind::down, *wire.trouble});
+  }
   void open_again();
   // Says farewell: its ticket, or 0 if there is nobody to say it to.
   Ticket leave(Time timeout);
@@ -192,7 +195,6 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
 
   // --- the wires
 
-  bool several() const { return wires.size() > 1; }
   Carrier& carrier(std::size_t wire) const { return *wires[wire]->carrier; }
   bool only_listens(std::size_t wire) const;
   Wire report(std::size_t wire) const;
@@ -243,8 +245,8 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
   Time due{0};
   asio::steady_timer timer;
   asio::steady_timer reopening;
-  std::string names;        // of several wires
-  CarrierCounters counted;  // likewise: of all together
+  std::string names;        // of the wires
+  CarrierCounters counted;  // of all of them together
   LinkStatus told;          // of the wires
   bool armed = false;
   Time armed_for{0};

@@ -5,11 +5,12 @@
 
 #include <cstddef>
 #include <memory>
-#include <string>
+#include <optional>
 #include <string_view>
 #include <utility>
 
 #include "r4link/carrier.hpp"
+#include "r4link/error.hpp"
 #include "recording/recording_tap.hpp"
 
 namespace r4 {
@@ -42,7 +43,7 @@ class BoardWire final : public Carrier::Handler {
   const std::unique_ptr<Carrier> carrier;
   RecordingTap tap;
   bool opened = false;
-  std::string trouble;  // why it could not be opened, as it was told last
+  std::optional<Problem> trouble;  // why it could not be opened, as it was told last
 
  private:
   Owner& owner_;

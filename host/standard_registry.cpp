@@ -68,10 +68,10 @@ std::string wire_of(const std::string& text) {
 }  // namespace
 
 void require_wires(std::size_t count) {
-  if (count >= 1 && count <= Session::most_wires) return;
+  if (count >= 1 && count <= Session::most_paths) return;
   throw Error(ErrorKind::usage, std::to_string(count) + " wires to one board",
-              "one to " + std::to_string(Session::most_wires) + " are possible",
-              "give the URLs of one board, at most " + std::to_string(Session::most_wires));
+              "one to " + std::to_string(Session::most_paths) + " are possible",
+              "give the URLs of one board, at most " + std::to_string(Session::most_paths));
 }
 
 std::vector<std::unique_ptr<Carrier>> make_host_carriers(asio::io_context& io,

@@ -14,7 +14,7 @@
 #include <string_view>
 
 #include "../../protocol/datagram/datagram_writer.hpp"
-#include "../session/lease.hpp"
+#include "../paths/lease.hpp"
 #include "r4link/datagram.hpp"
 
 namespace r4 {

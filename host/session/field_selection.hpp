@@ -18,7 +18,7 @@
 #include <string>
 #include <utility>
 
-#include "time.hpp"
+#include "../measurement/time.hpp"
 
 namespace r4 {
 

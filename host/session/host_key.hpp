@@ -11,8 +11,8 @@
 #include <optional>
 
 #include "../../protocol/keys/authentication.hpp"
+#include "../measurement/time.hpp"
 #include "r4link/link.hpp"
-#include "time.hpp"
 
 namespace r4 {
 

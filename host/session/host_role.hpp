@@ -20,7 +20,7 @@
 
 #include <cstdint>
 
-#include "time.hpp"
+#include "../measurement/time.hpp"
 
 namespace r4 {
 

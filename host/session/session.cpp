@@ -34,7 +34,7 @@ SessionOptions checked(SessionOptions options) {
 
 }  // namespace
 
-Session::Session(Handler& handler, SessionOptions options, BoardRole role, std::size_t wires,
+Session::Session(Handler& handler, SessionOptions options, BoardRole role, std::size_t paths,
                  std::function<std::uint64_t()> random)
     : handler_(handler),
       options_(checked(std::move(options))),
@@ -44,7 +44,7 @@ Session::Session(Handler& handler, SessionOptions options, BoardRole role, std::
       key_(options_.key, options_.clock_start),
       selection_(options_.fields),
       question_(options_.identify_interval),
-      wires_(wires, options_.timing),
+      paths_(paths, options_.timing, link_),
       pending_(max_pending, max_stops) {
   link_.hold(watches());
   begin_session();
@@ -86,10 +86,11 @@ Command Session::with_needed_fields(const Command& command) {
 
 Time Session::poll(Time now) {
   link_.poll(to_ms(now));
+  if (link_.long_silent(to_ms(now))) forget_board(now);
   notice_restart(now);
-  if (wires_.several()) ask_wires(now);
+  ask_paths(now);
   refresh_status(now);
-  if (!leaving_ && begun()) watches() ? send_lease(now) : send_heartbeat(now);
+  if (!leaving_ && paths_.begun()) watches() ? send_lease(now) : send_heartbeat(now);
   for (Pending& pending : pending_.under_way()) {
     if (now >= pending.deadline) {
       finish(pending, Outcome::timed_out, Refusal::none, now);
@@ -110,15 +111,15 @@ Time Session::poll(Time now) {
   return next_poll(now);
 }
 
-// Each wire has a lease of its own, with its own T to echo.
+// Each path has a lease of its own, with its own T to echo.
 void Session::send_lease(Time now) {
   const bool others = options_.fields != "DEFAULT";
   const Text list = others ? Text(options_.fields.data(), options_.fields.size()) : Text();
-  for (std::size_t i = 0; i < wires_.count(); ++i) {
-    Lease& lease = wires_.lease(i);
-    if (!may_speak(i) || !lease.due(now)) continue;
+  for (std::size_t i = 0; i < paths_.count(); ++i) {
+    Lease& lease = paths_.leases()[i];
+    if ((paths_.speaking() & path_bit(i)) == 0 || !lease.due(now)) continue;
     transmit_now(Command::watch(options_.watch_rate_hz, list), lease.echo(), Priority::normal, now,
-                 wire_bit(i));
+                 path_bit(i));
     lease.sent(now);
   }
 }
@@ -145,25 +146,19 @@ Time Session::next_poll(Time now) {
   // due_in() counts whole milliseconds; aim behind the edge, not before it.
   link = std::chrono::duration_cast<std::chrono::milliseconds>(link) + Time{0};
   if (link <= now) link = now + Time{1000};
-  if (begun()) next = std::min(next, link);
-  if (watches()) next = std::min(next, next_lease());
-  if (wires_.several()) next = std::min(next, wires_.next(now));
+  if (paths_.begun()) next = std::min(next, link);
+  if (watches()) next = std::min(next, paths_.leases().next(paths_.speaking()));
+  next = std::min(next, paths_.next(now));
   if (hears_board()) next = std::min(next, question_.next(question_interval()));
   if (role_.refused(now)) next = std::min(next, role_.refused_until());
   if (group_waits_) next = std::min(next, groups_.next());
   return next;
 }
 
-void Session::on_transport(std::size_t wire, bool up, Time now, bool can_ask) {
-  if (wires_.several()) wires_.on_transport(wire, up, can_ask, now);
-  transport_down_ = wires_.several() ? wires_.all_down() : !up;
-  if (!wires_.several() || transport_down_) link_.on_transport(up);
-  if (up && watches()) {
-    // A program that shares a wire hears the board from elsewhere, in other numbers; and who held the wire
-    // may have ended the lease, if that one controlled the board.
-    link_.forget_numbers();
-    wires_.lease(wire).renew(now);
-  }
+void Session::on_transport(std::size_t path, bool up, Time now, bool can_ask) {
+  paths_.on_transport(path, up, can_ask, now);
+  transport_down_ = paths_.all_down();
+  if (up || transport_down_) link_.on_transport(up);
   refresh_status(now);
 }
 
@@ -218,11 +213,11 @@ void Session::refresh_status(Time now) {
               : link_.gated(to_ms(now))            ? Gate::callback
                                                    : Gate::open,
       .key = watches() ? KeyTrouble::none : key_.trouble(now),
-      .lease = lease_trouble(now),
+      .lease = paths_.leases().trouble(now),
       .in_control = in_control(now),
       .transport_down = transport_down_,
-      .carrying = wires_.carrying(),
-      .two_boards = wires_.two_boards(),
+      .carrying = paths_.carrying(now),
+      .two_boards = paths_.two_boards(),
       .chip = link_.reason() == SafeReason::fault ? state_.fault : ChipFault(),
   };
   if (fresh == status_) return;
@@ -251,7 +246,7 @@ Statistics Session::statistics(Time now) const {
   report.packets = packets();
   // Not those of the numbers, which a transport that comes up begins anew.
   report.packets.restarts = link_.restarts();
-  report.copies = wires_.counters().duplicate;
+  report.copies = packets().duplicate;
   report.received -= report.copies;
   if (state_.sampled_error != ReceivedState::unknown) {
     report.clock_drift_ppm = clock_.drift_ppm();

@@ -15,8 +15,8 @@
 // (measurement/identity_question.hpp), the board's clock on ours (measurement/board_clock.hpp), the stop that
 // lasts (stop_repetition.hpp) and, where the session only watches, its lease at the board (lease.hpp).
 //
-// Over several wires (wires.hpp) every datagram goes out on each, written once and signed for each; what comes in is taken
-// once, whichever wire brings it first, and newest is what has the newest T. Leases alone are each wire's own.
+// Every datagram goes out on each of the paths (paths.hpp), written once and signed for each; what comes in is taken
+// once, whichever path brings it first, and newest is what has the newest T. Leases alone are each path's own.
 //
 // A retry has the bytes and the packet number of the original (signed anew, where there is a key),
 // so the board can execute it only once. When CMD has moved past a command, the retry's answer
@@ -55,6 +55,8 @@
 #include "../measurement/board_clock.hpp"
 #include "../measurement/identity_question.hpp"
 #include "../measurement/statistics.hpp"
+#include "../measurement/time.hpp"
+#include "../paths/paths.hpp"
 #include "arming.hpp"
 #include "field_selection.hpp"
 #include "host_key.hpp"
@@ -65,8 +67,6 @@
 #include "r4link/link.hpp"
 #include "r4link/options.hpp"
 #include "stop_repetition.hpp"
-#include "time.hpp"
-#include "wires.hpp"
 
 namespace r4 {
 
@@ -79,8 +79,8 @@ class Session {
   // views are valid in the call.
   class Handler {
    public:
-    virtual SendResult transmit(std::size_t wire, std::string_view datagram, Priority priority) = 0;
-    // Of the wires: what all of them have.
+    virtual SendResult transmit(std::size_t path, std::string_view datagram, Priority priority) = 0;
+    // Of the transports: what all of them have.
     virtual WireTrouble trouble() const { return WireTrouble::none; }
     virtual void on_state(const ReceivedState& state, const Datagram& datagram) = 0;
     virtual void on_board_heartbeat(const Datagram& datagram) = 0;
@@ -105,19 +105,19 @@ class Session {
   // Throws Error{usage} if options.fields are no state fields.
   Session(
       Handler& handler, SessionOptions options, BoardRole role = BoardRole::control,
-      std::size_t wires = 1, std::function<std::uint64_t()> random = [] { return random_bits(); });
+      std::size_t paths = 1, std::function<std::uint64_t()> random = [] { return random_bits(); });
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  static constexpr std::size_t most_wires = 4;
+  static constexpr std::size_t most_paths = 4;
 
-  // A datagram has come over that wire. poll() is needed then.
-  void receive(std::size_t wire, std::string_view bytes, Time now);
+  // A datagram has come over that path. poll() is needed then.
+  void receive(std::size_t path, std::string_view bytes, Time now);
   // Does what is due. Returns when it is needed next, at the latest.
   Time poll(Time now);
-  // The transport of a wire has gone or come; poll() is needed now. One of several is gone until it has come.
+  // The transport of a path has come, or gone; poll() is needed now. Before it has come it is gone.
   // `can_ask`: false where who watches may send no question (a bus).
-  void on_transport(std::size_t wire, bool up, Time now, bool can_ask = true);
+  void on_transport(std::size_t path, bool up, Time now, bool can_ask = true);
   // This computer slept for longer than the board waits for its host, while `now` stood still.
   // Another session begins: it is disarmed, and every command under way but a stop is cancelled.
   // on_restart() is called. poll() is needed now.
@@ -181,13 +181,9 @@ class Session {
   const std::string& fields() const { return selection_.fields(); }
   Statistics statistics(Time now) const;
   // Of the board's datagrams.
-  const PacketCounters& packets() const {
-    return wires_.several() ? wires_.counters() : link_.counters();
-  }
-  std::size_t wire_count() const { return wires_.count(); }
-  WireState wire_state(std::size_t wire) const;
+  const PacketCounters& packets() const { return paths_.counters(); }
   // All of it but its name.
-  Wire wire(std::size_t wire, Time now) const;
+  Wire path(std::size_t index, Time now) const { return paths_.report(index, now); }
 
   static constexpr std::size_t max_pending = 64;
   static constexpr std::size_t max_stops = 16;
@@ -203,7 +199,7 @@ class Session {
   void retry_due(Time now);
   void finish(Pending& pending, Outcome outcome, Refusal code, Time now);
   SendResult transmit_now(const Command& command, std::uint32_t t_ms, Priority priority, Time now,
-                          WireSet wires = all_wires);
+                          PathSet paths = all_paths);
   static PostResult post_result(SendResult result);
   // session_groups.cpp
   bool knows_groups(Time now);
@@ -211,45 +207,30 @@ class Session {
   static void write_group(Pending& pending);
   bool go_on(Pending& pending);
   bool group_is_ahead();
-  // What goes out: of which kind, by which number, and to which wires.
+  // What goes out: of which kind, by which number, and to which paths.
   struct Way {
     CommandKind kind;
     std::uint32_t pnum;
-    WireSet wires;
+    PathSet paths;
   };
-  static constexpr WireSet all_wires = 0xFF;
-  SendResult close_and_transmit(DatagramWriter& writer, Way way, Priority priority, Time now);
-  // session_wires.cpp
+  static constexpr PathSet all_paths = 0xFF;
   SendResult send_over(DatagramWriter& writer, Way way, Priority priority, Time now);
-  SendResult transmit_over(std::size_t wire, DatagramWriter& writer, Priority priority, Time now);
-  bool may_speak(std::size_t wire) const;
+  SendResult transmit_over(std::size_t path, DatagramWriter& writer, Priority priority, Time now);
   SessionId session_id() const { return watches() ? no_session : link_.session(); }
   void stamp(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum,
              std::uint32_t t_ms) const;
-  bool begun() const { return !wires_.several() || wires_.begun(); }
-  void ask_wires(Time now);
-  bool is_recent(std::uint32_t t_ms, Time now) const;
-  bool admit(std::size_t wire, const Datagram& datagram, Time now);
-  bool admit_identity(std::size_t wire, const Datagram& datagram, const Identity& identity,
-                      Time now);
-  bool is_new_heartbeat(std::size_t wire, std::uint32_t t_ms);
-  bool is_newest_state(std::size_t wire, const Datagram& datagram, Time now);
-  bool take_fields(std::size_t wire, const ReceivedState& fresh);
-  Arrival arrival_over(std::uint32_t t_ms, SafeReason reason, Time now);
-  bool is_told(const Nack& nack);
-  void note_busy(std::size_t wire, std::uint32_t t_ms, Time now);
+  void ask_paths(Time now);
+  bool others_speak(std::size_t path) const { return (paths_.speaking() & ~path_bit(path)) != 0; }
+  void on_restarted(Time now);
+  void forget_board(Time now);
   void note_own_command(Time now);
-  bool streams(Time now) const;
-  LeaseTrouble lease_trouble(Time now) const;
-  Time next_lease() const;
 
   bool link_up() const;
-  void on_heartbeat_datagram(std::size_t wire, const Datagram& datagram, Time now);
-  void on_state_datagram(std::size_t wire, const Datagram& datagram, Time now);
-  void on_identity_datagram(std::size_t wire, const Datagram& datagram, Time now);
-  void on_nack_datagram(std::size_t wire, const Datagram& datagram, Time now);
+  void on_heartbeat_datagram(std::size_t path, const Datagram& datagram, Time now);
+  void on_state_datagram(std::size_t path, const Datagram& datagram, Time now);
+  void on_identity_datagram(std::size_t path, const Datagram& datagram, Time now);
+  void on_nack_datagram(std::size_t path, const Datagram& datagram, Time now);
   bool counts(const Identity& identity) const;
-  void on_answer(const Datagram& datagram, Time now);
   bool notice_restart(Time now);
   void begin_session();
   void give_up_commands(Time now);
@@ -281,7 +262,7 @@ class Session {
   Time question_interval() const;
   void send_heartbeat(Time now);
   void send_lease(Time now);
-  void on_lease_refused(std::size_t wire, const Nack& nack, const Datagram& datagram, Time now);
+  void on_lease_refused(std::size_t path, const Nack& nack, const Datagram& datagram, Time now);
   Time next_poll(Time now);
   void select_fields(Time now);
   Command with_needed_fields(const Command& command);
@@ -297,8 +278,7 @@ class Session {
   FieldSelection selection_;
   IdentityQuestion question_;
   BoardClock clock_;
-  Wires wires_;
-  FieldSet newest_fields_;  // of several wires: what the states with the newest T have brought
+  Paths paths_;
   StopRepetition repetition_;
   LinkStatus status_;
   ReceivedState state_;
@@ -306,7 +286,7 @@ class Session {
   std::optional<bool> knows_leave_;  // does the board?
   bool leaving_ = false;
   Time left_at_{0};
-  std::optional<std::uint32_t> left_ms_;  // of several wires: the T of the newest state by then
+  std::optional<std::uint32_t> left_ms_;  // the T of the newest state by then
   bool transport_down_ = false;
   bool group_waits_ = false;  // for the answer to Q:ID
   StatisticsCollector collector_;
@@ -319,13 +299,6 @@ class Session {
   // As the newest heartbeat told it; unnamed_cause: none was heard.
   std::int32_t cause_ = Command::unnamed_cause;
   int questions_of_clock_ = 0;  // asked for its sake since the board began
-  // Of several wires: the answers that were told last, of which others bring copies.
-  struct Answered {
-    std::uint32_t pnum = 0;
-    Refusal code = Refusal::none;
-  };
-  std::array<Answered, 16> answered_{};
-  std::size_t answers_ = 0;
 };
 
 }  // namespace r4

@@ -45,8 +45,8 @@ PostResult Session::post(const Setpoints& group, Time now) {
   DatagramWriter writer(buffer.data(), buffer.size());
   for (std::size_t i = 0; i < group.size(); ++i) write_command(writer, group[i]);
   stamp(writer, group[0].kind, link_.take_pnum(), to_ms(now));
-  const SendResult result = close_and_transmit(
-      writer, {group[0].kind, link_.last_pnum(), all_wires}, Priority::normal, now);
+  const SendResult result =
+      send_over(writer, {group[0].kind, link_.last_pnum(), all_paths}, Priority::normal, now);
   if (result == SendResult::sent) posted_.add(link_.last_pnum(), group);
   return post_result(result);
 }

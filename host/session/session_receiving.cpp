@@ -8,7 +8,7 @@
 
 namespace r4 {
 
-void Session::receive(std::size_t wire, std::string_view bytes, Time now) {
+void Session::receive(std::size_t path, std::string_view bytes, Time now) {
   Datagram datagram;
   const ReadResult result = read_datagram(bytes, datagram);
   if (!result) {
@@ -21,43 +21,48 @@ void Session::receive(std::size_t wire, std::string_view bytes, Time now) {
                           kind == MessageKind::identity || kind == MessageKind::state;
   if (!from_board || !datagram.has_pnum() || !datagram.has_time()) return;
   ++collector_.counts.received;
-  if (!wires_.several()) wires_.heard(now);
 
   switch (kind) {
     case MessageKind::nack:
-      on_nack_datagram(wire, datagram, now);
+      on_nack_datagram(path, datagram, now);
       break;
     case MessageKind::identity:
-      on_identity_datagram(wire, datagram, now);
+      on_identity_datagram(path, datagram, now);
       break;
     case MessageKind::board_heartbeat:
-      on_heartbeat_datagram(wire, datagram, now);
+      on_heartbeat_datagram(path, datagram, now);
       break;
     default:
-      on_state_datagram(wire, datagram, now);
+      on_state_datagram(path, datagram, now);
       break;
   }
   refresh_status(now);
 }
 
-void Session::on_heartbeat_datagram(std::size_t wire, const Datagram& datagram, Time now) {
+void Session::on_heartbeat_datagram(std::size_t path, const Datagram& datagram, Time now) {
   const bool connecting = is_connecting_heartbeat(datagram);
-  // Said to hosts, on a wire that others listen to; who watches is told by the states that there is none.
   const SafeReport report = heartbeat_report(datagram);
-  if (connecting && watches() && streams(now)) return confirm_stop(report, now);
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
-  bool current = false;
-  if (wires_.several()) {
-    const bool admitted = admit(wire, datagram, now);
-    if (!admitted || (!connecting && !is_new_heartbeat(wire, t_ms))) {
-      if (wires_.is_known(wire)) confirm_stop(report, now);  // its number is proof enough
-      return;
-    }
-    if (connecting) link_.on_booting(report.reason, to_ms(now));
-    current = connecting || link_.on_newest(t_ms, true, report.reason, to_ms(now));
+  // Said to hosts, on a bus that others listen to; who watches is told by the states that there is none.
+  const bool passed_over = connecting && watches() && paths_.leases().streaming(now);
+  bool taken = false;
+  if (connecting) {
+    taken = !passed_over && paths_.admit_connecting(path, now);
   } else {
-    current = is_current(
-        link_.on_datagram(datagram.pnum(), connecting ? 0 : t_ms, true, report.reason, to_ms(now)));
+    const Paths::Admission admission = paths_.admit(path, datagram.pnum(), t_ms, now);
+    if (admission == Paths::Admission::restarted) on_restarted(now);
+    taken = admission != Paths::Admission::no && paths_.news().take_heartbeat(path, t_ms);
+  }
+  if (!taken) {
+    if (paths_.is_known(path)) confirm_stop(report, now);  // its number is proof enough
+    return;
+  }
+  const bool current = connecting || paths_.is_newest(t_ms, now);
+  if (connecting) {
+    link_.on_booting(report.reason, to_ms(now));
+  } else {
+    link_.on_heartbeat(t_ms);
+    current ? link_.on_reason(report.reason, to_ms(now)) : link_.on_heard(to_ms(now));
   }
   notice_restart(now);
   if (current) {
@@ -77,8 +82,14 @@ void Session::on_heartbeat_datagram(std::size_t wire, const Datagram& datagram, 
   on_causes(report.cause, now);
 }
 
-void Session::on_state_datagram(std::size_t wire, const Datagram& datagram, Time now) {
-  if (wires_.several() && !is_newest_state(wire, datagram, now)) return;
+void Session::on_state_datagram(std::size_t path, const Datagram& datagram, Time now) {
+  const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
+  const Paths::Admission admission = paths_.admit(path, datagram.pnum(), t_ms, now);
+  if (admission == Paths::Admission::no) return;
+  if (admission == Paths::Admission::restarted) on_restarted(now);  // nothing of the boot before
+  link_.on_heard(to_ms(now));
+  paths_.leases()[path].on_state(now);
+  if (!paths_.news().is_newest_state(path, t_ms)) return;
   ReceivedState fresh = state_;
   if (!read_state(datagram, fresh)) {
     ++collector_.counts.damaged;
@@ -88,23 +99,13 @@ void Session::on_state_datagram(std::size_t wire, const Datagram& datagram, Time
                              std::string_view(datagram.bytes().data(), datagram.bytes().size()));
     return;
   }
-  if (wires_.several() && !take_fields(wire, fresh)) return;
+  if (!paths_.news().take_state(path, t_ms, fresh.present)) return;
   const SafeReason reason = fresh.present.has(StateField::safe) ? fresh.safe : SafeReason::none;
-  const Arrival arrival =
-      wires_.several() ? arrival_over(fresh.t_ms, reason, now)
-                       : link_.on_datagram(fresh.pnum, fresh.t_ms, false, reason, to_ms(now));
-  if (notice_restart(now)) {  // nothing of the boot before
-    fresh = state_;
-    read_state(datagram, fresh);
-  }
-  // An older state must not replace a newer one. A late one that only a heartbeat or an answer has
-  // overtaken, in a queue where those go first, is still the newest state.
-  const bool newest_state =
-      arrival == Arrival::late && (wires_.several() || newer(fresh.pnum, state_.pnum));
-  if (!is_current(arrival) && !newest_state) return;
-  wires_.lease(wire).on_state(now);
+  // One that a heartbeat has overtaken, in a queue where those go first, is still the newest state.
+  const bool current = paths_.is_newest(t_ms, now);
   collector_.on_state(fresh.t_ms, now);
-  if (!newest_state) {
+  if (current) {
+    link_.on_reason(reason, to_ms(now));
     key_.on_board_time(fresh.t_ms, now);
     key_.on_host_seen(now);
   }
@@ -124,33 +125,36 @@ void Session::on_state_datagram(std::size_t wire, const Datagram& datagram, Time
   handler_.on_state(state_, datagram);
 }
 
-void Session::on_nack_datagram(std::size_t wire, const Datagram& datagram, Time now) {
+void Session::on_nack_datagram(std::size_t path, const Datagram& datagram, Time now) {
   Nack nack;
   if (!read_nack(datagram, nack)) return;
-  if (wires_.several() && !admit(wire, datagram, now)) return;
+  const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
+  if (!paths_.admit_answer(path, datagram.pnum(), t_ms, nack.has_session, now)) return;
   if (nack.sid != session_id() || !link_.is_taken(nack.pnum)) {
-    // On a CAN bus, on a wire that is shared and in a recording the answers to other hosts are heard, too. One to
-    // the host in control has a number among those of the states; one to who has no lease yet has not.
-    if (watches() && nack.has_session) on_answer(datagram, now);
+    // On a CAN bus, on a path that is shared and in a recording the answers to other hosts are heard, too.
+    if (watches() && nack.has_session) link_.on_heard(to_ms(now));
     return;
   }
-  if (watches()) return on_lease_refused(wire, nack, datagram, now);
+  link_.on_heard(to_ms(now));
+  if (watches()) return on_lease_refused(path, nack, datagram, now);
   selection_.on_answer();
   if (nack.code == Refusal::busy) {
-    note_busy(wire, static_cast<std::uint32_t>(datagram.time_ms()), now);
+    paths_.on_busy(path, t_ms, now);
+    if (paths_.all_busy(now)) role_.on_busy_until(paths_.all_busy_until(now));
     key_.on_host_seen(now);
   }
-  on_answer(datagram, now);
   const bool not_taken = nack.code == Refusal::auth && !is_cable_only(nack.pnum);
   if (not_taken) key_.on_refusal(now);
-  const bool other_copy = not_taken && key_.has_key();  // may have been executed
+  // AUTH refuses one copy: another, sent again or over another path, may have been executed.
+  const bool other_copy =
+      nack.code == Refusal::auth && ((not_taken && key_.has_key()) || others_speak(path));
   const bool proof = !other_copy && is_proof(nack);
-  if (!is_told(nack)) handler_.on_nack(nack, datagram);
+  if (!paths_.news().is_copy(nack)) handler_.on_nack(nack, datagram);
   for (Pending& pending : pending_.under_way()) {
     if (!pending.is_out() || pending.pnum != nack.pnum) continue;
     if (pending.kind == CommandKind::leave) {  // it was executed, or we have no session to leave
       const bool left = nack.code == Refusal::duplicate;
-      if (!left && wires_.several()) continue;  // of a copy: its heartbeats tell
+      if (!left && others_speak(path)) continue;  // of one copy: the board's heartbeats tell
       finish(pending, left ? Outcome::confirmed : Outcome::refused, nack.code, now);
       continue;
     }
@@ -168,10 +172,9 @@ void Session::on_nack_datagram(std::size_t wire, const Datagram& datagram, Time 
 
 // Of all that a session sends which only watches, the board refuses leases alone. What those codes say the
 // link tells.
-void Session::on_lease_refused(std::size_t wire, const Nack& nack, const Datagram& datagram,
+void Session::on_lease_refused(std::size_t path, const Nack& nack, const Datagram& datagram,
                                Time now) {
-  on_answer(datagram, now);
-  wires_.lease(wire).on_refusal(nack, now);
+  paths_.leases()[path].on_refusal(nack, now);
   const bool told =
       nack.code == Refusal::stale || nack.code == Refusal::busy || nack.code == Refusal::unknown;
   if (!told) handler_.on_nack(nack, datagram);
@@ -181,8 +184,6 @@ void Session::on_lease_refused(std::size_t wire, const Nack& nack, const Datagra
 // executed: in the session in which the command was sent, and not after too many numbers. Without
 // proof the deadline ends it, as unknown.
 bool Session::is_proof(const Nack& nack) const {
-  // AUTH refuses one copy. The board may have executed the copy of another wire.
-  if (nack.code == Refusal::auth && wires_.several()) return false;
   // By how many numbers ago each was taken, since a session may be older than half of all numbers.
   const std::uint32_t since_command = link_.last_pnum() - nack.pnum;
   const std::uint32_t since_session = link_.last_pnum() - nack.session;
@@ -190,18 +191,21 @@ bool Session::is_proof(const Nack& nack) const {
          since_command < BoardLink::memory;
 }
 
-void Session::on_identity_datagram(std::size_t wire, const Datagram& datagram, Time now) {
+void Session::on_identity_datagram(std::size_t path, const Datagram& datagram, Time now) {
   Identity identity;
   if (!read_identity(datagram, identity)) return;
   if (!watches() && identity.sid != session_id()) return;  // an answer to another host
-  if (wires_.several() && !admit_identity(wire, datagram, identity, now)) return;
+  const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
+  const Paths::Admission admission = paths_.admit_identity(path, identity, t_ms, now);
+  if (admission == Paths::Admission::no) return;
+  if (admission == Paths::Admission::restarted) on_restarted(now);
+  paths_.admit_answer(path, datagram.pnum(), t_ms, counts(identity), now);
+  if (counts(identity)) link_.on_heard(to_ms(now));
   selection_.on_answer();
-  if (counts(identity)) on_answer(datagram, now);
   knows_leave_ = has_capability(identity.capabilities, leave_capability);
   groups_.on_identity(identity.capabilities);
   if (const auto asked = question_.answered(identity)) {
     collector_.on_round_trip(now - *asked);
-    const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
     clock_.heard(t_ms, now);
     if (identity.has_asked) clock_.answered(t_ms, *asked);
   }
@@ -229,12 +233,10 @@ bool Session::counts(const Identity& identity) const {
   return to_watcher || !(identity.has_busy && identity.busy);
 }
 
-// An answer counts in the board's packet numbers, but not in those that a host without control
-// sees.
-void Session::on_answer(const Datagram& datagram, Time now) {
-  if (wires_.several()) return link_.on_heard(to_ms(now));
-  if (role_.refused(now)) return;
-  link_.on_answer(datagram.pnum(), static_cast<std::uint32_t>(datagram.time_ms()), to_ms(now));
+// A path has shown that the board has begun again.
+void Session::on_restarted(Time now) {
+  link_.on_restart();
+  link_.on_heard(to_ms(now));
   notice_restart(now);
 }
 
@@ -263,11 +265,22 @@ void Session::on_sleep(Time now) {
     transmit_now(Command::leave(), link_.echo(), Priority::normal, now);
   }
   repetition_.cancel();
-  arming_.on_sleep();
-  link_.begin_anew();
-  wires_.on_sleep(now);
+  forget_board(now);
   notice_restart(now);
   refresh_status(now);
+}
+
+// What was known of it says nothing any more: the times of the two cannot be compared.
+void Session::forget_board(Time now) {
+  arming_.on_sleep();
+  link_.begin_anew();
+  paths_.on_sleep(now);
+}
+
+// A state shows that the board has executed a command of ours in the session that it has.
+void Session::note_own_command(Time now) {
+  paths_.on_own_state(state_.t_ms, now);
+  role_.on_own_command(!paths_.all_busy(now), now);
 }
 
 // Our clock may have stood still, and their deadlines with it: nobody wants now what was asked for then.
@@ -329,7 +342,7 @@ void Session::confirm_leave(const SafeReport& report, std::uint32_t t_ms, Time n
   }
 }
 
-// Was a heartbeat with that T sent behind the farewell? Over several wires it may be of the same millisecond as a state
+// Was a heartbeat with that T sent behind the farewell? It may be of the same millisecond as a state
 // that told otherwise. Where the clocks tell little, for the network is slow, only what they tell for certain counts.
 bool Session::is_behind_leave(std::uint32_t t_ms) const {
   constexpr Time fast{5000};

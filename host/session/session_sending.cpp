@@ -27,34 +27,66 @@ void Session::stamp(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum
 
 // A datagram of which no copy is kept.
 SendResult Session::transmit_now(const Command& command, std::uint32_t t_ms, Priority priority,
-                                 Time now, WireSet wires) {
+                                 Time now, PathSet paths) {
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   write_command(writer, command);
   stamp(writer, command.kind, link_.take_pnum(), t_ms);
-  return close_and_transmit(writer, {command.kind, link_.last_pnum(), wires}, priority, now);
+  return send_over(writer, {command.kind, link_.last_pnum(), paths}, priority, now);
 }
 
-// The one way out: nothing is sent to a board that is refused, but stops.
-SendResult Session::close_and_transmit(DatagramWriter& writer, Way way, Priority priority,
-                                       Time now) {
-  if (key_.refuses_board() && way.kind != CommandKind::stop) return SendResult::down;
-  if (wires_.several()) return send_over(writer, way, priority, now);
-  const SendResult result = transmit_over(0, writer, priority, now);
-  if (result == SendResult::busy) role_.on_busy(now);
-  return result;
+// The one way out: a stop goes to every path, whoever is there; anything else to those whose board is known, and
+// takes our key.
+SendResult Session::send_over(DatagramWriter& writer, Way way, Priority priority, Time now) {
+  const bool stop = way.kind == CommandKind::stop;
+  if (key_.refuses_board() && !stop) return SendResult::down;
+  const PathSet to = stop ? way.paths : static_cast<PathSet>(way.paths & paths_.speaking());
+  SendResult best = SendResult::down;
+  bool busy = false;
+  for (std::size_t i = 0; i < paths_.count(); ++i) {
+    if ((to & path_bit(i)) == 0) continue;
+    const SendResult result = transmit_over(i, writer, priority, now);
+    if (result == SendResult::sent && way.kind == CommandKind::identify) {
+      paths_.asked(i, way.pnum, now);
+    }
+    if (result == SendResult::busy) {
+      paths_.on_busy(i, {}, now);
+      busy = true;
+    }
+    if (result == SendResult::sent || best == SendResult::down) best = result;
+  }
+  if (busy && best != SendResult::sent && paths_.all_busy(now)) {
+    role_.on_busy_until(paths_.all_busy_until(now));
+  }
+  return best;
 }
 
 // Each path has a signature of its own, which proves that path (docs/protocol.md, "Paths").
-SendResult Session::transmit_over(std::size_t wire, DatagramWriter& writer, Priority priority,
+SendResult Session::transmit_over(std::size_t path, DatagramWriter& writer, Priority priority,
                                   Time now) {
   const std::size_t size = writer.size();
   if (!watches()) key_.sign(writer, now);  // a watcher's datagrams need no signature
   const Text bytes = writer.finish();
   if (bytes.empty()) return SendResult::down;
-  const SendResult result = handler_.transmit(wire, {bytes.data(), bytes.size()}, priority);
+  const SendResult result = handler_.transmit(path, {bytes.data(), bytes.size()}, priority);
   writer.truncate(size);
   return result;
+}
+
+// One question to all that are to be asked who their board is.
+void Session::ask_paths(Time now) {
+  if (const PathSet due = paths_.to_ask(now); due != 0) {
+    std::array<char, max_datagram> buffer;
+    DatagramWriter writer(buffer.data(), buffer.size());
+    write_command(writer, Command::identify());
+    stamp(writer, CommandKind::identify, link_.take_pnum(), to_ms(now));
+    for (std::size_t i = 0; i < paths_.count(); ++i) {
+      if ((due & path_bit(i)) == 0) continue;
+      transmit_over(i, writer, Priority::normal, now);
+      paths_.asked(i, link_.last_pnum(), now);
+    }
+  }
+  if (paths_.poll(now)) link_.on_transport(true);  // the first heartbeat goes out at once
 }
 
 Session::Pending* Session::allocate(const Command& command, Time timeout, Time now) {
@@ -184,8 +216,8 @@ void Session::transmit(Pending& pending, Time now) {
   pending.retry =
       now + (is_urgent(pending.kind) ? Time{options_.stop_retry} : Time{options_.command_retry});
   DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.size);
-  close_and_transmit(writer, {pending.kind, pending.pnum, all_wires},
-                     stop ? Priority::stop : Priority::normal, now);
+  send_over(writer, {pending.kind, pending.pnum, all_paths},
+            stop ? Priority::stop : Priority::normal, now);
 }
 
 // In the order of send(): tickets rise.
@@ -222,7 +254,7 @@ void Session::repeat_stop(Time now) {
   std::array<char, max_datagram> buffer;
   std::copy(stop.begin(), stop.end(), buffer.begin());
   DatagramWriter writer(buffer.data(), buffer.size(), stop.size());
-  close_and_transmit(writer, {CommandKind::stop, 0, all_wires}, Priority::stop, now);
+  send_over(writer, {CommandKind::stop, 0, all_paths}, Priority::stop, now);
 }
 
 void Session::finish(Pending& pending, Outcome outcome, Refusal code, Time now) {
@@ -281,12 +313,12 @@ Ticket Session::leave(Time timeout, Time now) {
   for (Pending& pending : pending_.under_way()) {
     if (pending.kind != CommandKind::stop) finish(pending, Outcome::closed, Refusal::none, now);
   }
-  for (std::size_t i = 0; watches() && i < wires_.count(); ++i) {
-    transmit_now(Command::watch(0), wires_.lease(i).echo(), Priority::normal, now, wire_bit(i));
+  for (std::size_t i = 0; watches() && i < paths_.count(); ++i) {
+    transmit_now(Command::watch(0), paths_.leases()[i].echo(), Priority::normal, now, path_bit(i));
   }
   leaving_ = true;  // a heartbeat behind the farewell would take the board again
   left_at_ = now;
-  if (wires_.several() && state_.any()) left_ms_ = state_.t_ms;
+  if (state_.any()) left_ms_ = state_.t_ms;
   if (!may_say_farewell()) return 0;
   Pending* pending = allocate(Command::leave(), timeout, now);
   if (pending == nullptr) return 0;

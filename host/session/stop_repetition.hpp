@@ -10,8 +10,8 @@
 #include <cstddef>
 #include <string_view>
 
+#include "../measurement/time.hpp"
 #include "r4link/datagram.hpp"
-#include "time.hpp"
 
 namespace r4 {
 

@@ -17,29 +17,27 @@ const char* to_text(HostLinkState state) {
   return "unknown";
 }
 
-Arrival HostLink::on_datagram(std::uint32_t pnum, std::uint32_t t_ms, bool heartbeat,
-                              SafeReason reason, std::uint32_t now_ms) {
-  if (heartbeat && pnum == 0 && t_ms == 0) {
-    if (tracker_.started()) tracker_.restart();
-    on_booting(reason, now_ms);
-    return Arrival::first;
-  }
-  notice_boot(t_ms, now_ms);
-  const Arrival arrival = tracker_.on(pnum);
-  if (!is_current(arrival)) return arrival;
-  // Each T is answered at once only the first time: a board that cannot use the answer sends that T again.
-  if (heartbeat && t_ms != echo_) {
-    echo_ = t_ms;
-    answer_now_ = true;
-  }
-  reason_ = reason;
-  state_ = reason == SafeReason::none ? HostLinkState::active : HostLinkState::safe;
-  return arrival;
+// Each T is answered at once only the first time: a board that cannot use the answer sends that T again.
+void HostLink::on_heartbeat(std::uint32_t t_ms) {
+  if (t_ms == echo_) return;
+  echo_ = t_ms;
+  answer_now_ = true;
 }
 
-// It knows nothing of us.
-void HostLink::on_booting(SafeReason reason, std::uint32_t now_ms) {
+void HostLink::on_reason(SafeReason reason, std::uint32_t now_ms) {
+  on_heard(now_ms);
+  booting_ = false;
+  reason_ = reason;
+  state_ = reason == SafeReason::none ? HostLinkState::active : HostLinkState::safe;
+}
+
+void HostLink::on_heard(std::uint32_t now_ms) {
+  heard_ = true;
   heard_ms_ = now_ms;
+}
+
+void HostLink::on_booting(SafeReason reason, std::uint32_t now_ms) {
+  on_heard(now_ms);
   booting_ = true;
   state_ = HostLinkState::connecting;
   reason_ = reason;
@@ -47,60 +45,23 @@ void HostLink::on_booting(SafeReason reason, std::uint32_t now_ms) {
   forget_boot();
 }
 
+void HostLink::on_restart() {
+  ++restarts_;
+  if (!booting_) end_session();
+  booting_ = false;
+  forget_boot();
+}
+
 void HostLink::forget_boot() {
   echo_ = 0;
   echoed_ = false;
-  any_newest_ = false;
-}
-
-bool HostLink::on_newest(std::uint32_t t_ms, bool heartbeat, SafeReason reason,
-                         std::uint32_t now_ms) {
-  heard_ms_ = now_ms;
-  if (heartbeat && (echo_ == 0 || newer(t_ms, echo_))) {
-    echo_ = t_ms;
-    answer_now_ = true;
-  }
-  if (any_newest_ && newer(newest_ms_, t_ms)) return false;
-  any_newest_ = true;
-  newest_ms_ = t_ms;
-  on_clock(t_ms, false, now_ms);
-  reason_ = reason;
-  state_ = reason == SafeReason::none ? HostLinkState::active : HostLinkState::safe;
-  return true;
-}
-
-void HostLink::on_clock(std::uint32_t t_ms, bool restarted, std::uint32_t now_ms) {
-  if (restarted) {
-    ++restarts_;
-    if (!booting_) end_session();
-    forget_boot();
-  }
-  booting_ = false;
-  board_clock_known_ = true;
-  board_ms_ = t_ms;
-  clock_ms_ = heard_ms_ = now_ms;
-}
-
-Arrival HostLink::on_answer(std::uint32_t pnum, std::uint32_t t_ms, std::uint32_t now_ms) {
-  notice_boot(t_ms, now_ms);
-  return tracker_.on(pnum);
-}
-
-// Each boot has a clock of its own: a T that does not fit the last one is of a board that has begun
-// again, even if its first heartbeats were lost.
-void HostLink::notice_boot(std::uint32_t t_ms, std::uint32_t now_ms) {
-  const std::int32_t tolerance = booting_ ? booting_tolerance_ms : boot_tolerance_ms;
-  const bool restarted = !is_of_this_boot(t_ms, now_ms, now_ms, tolerance);
-  if (restarted && tracker_.started()) tracker_.restart();
-  on_clock(t_ms, restarted, now_ms);
 }
 
 void HostLink::begin_anew() {
   ++restarts_;
-  if (tracker_.started()) tracker_.restart();
   end_session();
   forget_boot();
-  board_clock_known_ = booting_ = false;
+  heard_ = booting_ = false;
   answer_now_ = true;
   if (state_ != HostLinkState::connecting) state_ = HostLinkState::lost;
 }
@@ -110,15 +71,6 @@ void HostLink::begin_anew() {
 void HostLink::end_session() {
   session_ = no_session;
   first_pnum_ = next_pnum_;
-}
-
-bool HostLink::is_of_this_boot(std::uint32_t t_ms, std::uint32_t since_ms, std::uint32_t now_ms,
-                               std::int32_t tolerance_ms) const {
-  if (!board_clock_known_) return true;
-  const std::uint32_t begin = board_ms_ + (since_ms - clock_ms_);
-  const std::uint32_t end = board_ms_ + (now_ms - clock_ms_);
-  return static_cast<std::int32_t>(t_ms - begin) >= -tolerance_ms &&
-         static_cast<std::int32_t>(t_ms - end) <= tolerance_ms;
 }
 
 void HostLink::on_transport(bool up) {
@@ -131,7 +83,6 @@ void HostLink::on_transport(bool up) {
 
 bool HostLink::poll(std::uint32_t now_ms) {
   hung_ = watchdog_expired(now_ms);
-  if (board_clock_known_ && now_ms - heard_ms_ > long_ago) begin_anew();
   if (state_ != HostLinkState::active && state_ != HostLinkState::safe) return false;
   if (now_ms - heard_ms_ < timing_.timeout_ms) return false;
   state_ = HostLinkState::lost;

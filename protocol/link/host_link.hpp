@@ -14,7 +14,7 @@
 
 #include <cstdint>
 
-#include "packet_tracker.hpp"
+#include "../datagram/wrapping.hpp"
 #include "r4link/vocabulary.hpp"
 
 namespace r4 {
@@ -31,34 +31,20 @@ class HostLink {
   bool wants_session() const { return session_ == no_session; }
   void begin_session(SessionId id) { session_ = id; }
 
-  // A valid datagram of the board. Returns what its number says; a late, old or duplicate one does
-  // not change the state. `heartbeat`: it is a board heartbeat, answered at once by
-  // heartbeat_due(). `reason`: its SAFE, none if it carries none.
-  Arrival on_datagram(std::uint32_t pnum, std::uint32_t t_ms, bool heartbeat, SafeReason reason,
-                      std::uint32_t now_ms);
+  // --- what the board says. Whoever feeds this has told what is new from copies and from what is late
+  // (host/paths/paths.hpp).
 
-  // A valid answer of the board to us (N, I): it counts in the packet numbers and shows that the
-  // board is there, but says nothing of its state.
-  Arrival on_answer(std::uint32_t pnum, std::uint32_t t_ms, std::uint32_t now_ms);
-
-  // --- of a board that is heard over several wires (host/session/wires.hpp). Each has packet numbers of its own, so
-  // what is newest is told by T, and who listens to the wires says when the board has begun again.
-
-  // A state or heartbeat of this boot. True if it is the newest so far: what an older one says is no longer so.
-  // The echo is the newest of any heartbeat.
-  bool on_newest(std::uint32_t t_ms, bool heartbeat, SafeReason reason, std::uint32_t now_ms);
-  // The board is there.
-  void on_heard(std::uint32_t now_ms) { heard_ms_ = now_ms; }
-  // It says that it is booting.
+  // A heartbeat, answered at once by heartbeat_due(). `t_ms`: its T, not older than echo().
+  void on_heartbeat(std::uint32_t t_ms);
+  // What the newest state or heartbeat gives as SAFE; none if it carries none.
+  void on_reason(SafeReason reason, std::uint32_t now_ms);
+  // The board is there, whatever it said.
+  void on_heard(std::uint32_t now_ms);
+  // It says that it is booting: it knows nothing of us.
   void on_booting(SafeReason reason, std::uint32_t now_ms);
-  // Has the board's T been heard?
-  bool knows_clock() const { return board_clock_known_; }
-  // May it be of the boot that is known that the board showed T between `since_ms` and now? Any, before the first.
-  bool is_of_this_boot(std::uint32_t t_ms, std::uint32_t since_ms, std::uint32_t now_ms,
-                       std::int32_t tolerance_ms) const;
-  // The board was found to have this T; `restarted`: it has restarted. If it has not said so itself, the host's own
-  // clock may have stood still: it wants a new session.
-  void on_clock(std::uint32_t t_ms, bool restarted, std::uint32_t now_ms);
+  // It has begun again. If it has not said so itself, the host's own clock may have stood still: a new session is
+  // wanted.
+  void on_restart();
 
   // Nothing that is known of the board counts any more, because this computer slept: the board is
   // taken for one that has restarted, and a new session is wanted.
@@ -66,14 +52,8 @@ class HostLink {
 
   // The transport has gone (`lost` at once) or come (a heartbeat is due at once).
   void on_transport(bool up);
-  // What comes from now on may have other packet numbers.
-  void forget_numbers() {
-    if (tracker_.started()) tracker_.restart();
-  }
 
-  // Lets time pass: silence of the board. True if the state changed. After 12 days of silence
-  // begin_anew() applies, because the times of the two cannot be compared any more
-  // (datagram/wrapping.hpp).
+  // Lets time pass: silence of the board. True if the state changed.
   bool poll(std::uint32_t now_ms);
 
   // Should a heartbeat be sent now? False while they are gated.
@@ -112,18 +92,14 @@ class HostLink {
   // How often the board was found to have begun again.
   std::uint32_t restarts() const { return restarts_; }
   SafeReason reason() const { return reason_; }
-  const PacketCounters& counters() const { return tracker_.counters(); }
+  // Has the board been silent for 12 days? Then the times of the two cannot be compared any more
+  // (datagram/wrapping.hpp), and begin_anew() is needed.
+  bool long_silent(std::uint32_t now_ms) const { return heard_ && now_ms - heard_ms_ > long_ago; }
 
-  // A T this far from where the board's clock should be is of another boot.
-  static constexpr std::int32_t boot_tolerance_ms = 10000;
-  // The same behind `PNum:0;T:0`, which a network may also have held back since the boot before: the
-  // paper's boards begin at 0 each time, so their T after a quick restart is not far off.
-  static constexpr std::int32_t booting_tolerance_ms = 1000;
   // From a heartbeat that could not be sent to the next attempt.
   static constexpr std::uint32_t retry_ms = 20;
 
  private:
-  void notice_boot(std::uint32_t t_ms, std::uint32_t now_ms);
   void forget_boot();
   void end_session();
 
@@ -133,15 +109,10 @@ class HostLink {
   std::uint32_t next_pnum_;
   HostLinkState state_ = HostLinkState::connecting;
   SafeReason reason_ = SafeReason::none;
-  PacketTracker tracker_;
   std::uint32_t echo_ = 0;
   std::uint32_t heard_ms_ = 0;
-  std::uint32_t board_ms_ = 0;  // the board's T at clock_ms_
-  std::uint32_t clock_ms_ = 0;
-  bool board_clock_known_ = false;
-  bool booting_ = false;         // it said so last
-  std::uint32_t newest_ms_ = 0;  // of several wires: the newest T
-  bool any_newest_ = false;
+  bool heard_ = false;
+  bool booting_ = false;  // it said so last
   std::uint32_t restarts_ = 0;
   std::uint32_t sent_ms_ = 0;
   bool any_sent_ = false;

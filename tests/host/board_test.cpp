@@ -78,9 +78,10 @@ TEST_P(BoardOver, StopsUntilCleared) {
   board.osmc(1).set(1000, Direction::forward);
   board.stop();
   EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::stop));
-  EXPECT_EQ(
-      board.link(),
-      (LinkStatus{.state = HostLinkState::safe, .reason = SafeReason::stop, .in_control = true}));
+  EXPECT_EQ(board.link(), (LinkStatus{.state = HostLinkState::safe,
+                                      .reason = SafeReason::stop,
+                                      .in_control = true,
+                                      .carrying = 1}));
 
   const Problem refused = problem_of([&] { board.osmc(1).set(5, Direction::forward); });
   EXPECT_EQ(refused.kind, ErrorKind::refused);

@@ -145,6 +145,7 @@ void Crowd::start(Host& host) {
   }
   host.session = std::make_unique<Session>(host, options, BoardRole::control, 1,
                                            [this] { return random_.next(); });
+  host.session->on_transport(0, true, time());
 }
 
 CrowdReport Crowd::run() {

@@ -86,6 +86,7 @@ class FleetLink final : firmware::Hal, firmware::Port, IncuriousHost {
     options.arming = Arming::off;
     session_.emplace(static_cast<Session::Handler&>(*this), options, BoardRole::control, 1U,
                      [this] { return random_.next(); });
+    session_->on_transport(0, true, time());
     boot();
   }
 

@@ -80,6 +80,7 @@ class AxisLink final : public firmware::Hal, public firmware::Port, public Incur
     application_->start(clock.first_ms);
     session_ = std::make_unique<Session>(*this, SessionOptions{}, BoardRole::control, 1,
                                          [this] { return random_.next(); });
+    session_->on_transport(0, true, time());
     board_due_us = session_due_us = 1000;
   }
 

@@ -32,6 +32,7 @@ VirtualRobot::VirtualRobot(std::uint64_t seed, const Link& link, const std::stri
   application_ = std::make_unique<firmware::Application>(hardware_.hal(), config);
   application_->add_port(*this);
   application_->start(board_ms());
+  session_.on_transport(0, true, now());
 }
 
 bool VirtualRobot::arm() {

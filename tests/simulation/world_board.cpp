@@ -323,6 +323,9 @@ void World::on_stop(std::uint32_t pnum) {
 }
 
 void World::on_refused(std::uint32_t, std::uint32_t pnum, Refusal code) {
+  report_.busy += code == Refusal::busy;
+  report_.stale += code == Refusal::stale;
+  report_.duplicate += code == Refusal::duplicate;
   note(fmt::format("board refuses {} {}", pnum, static_cast<int>(code)));
 }
 

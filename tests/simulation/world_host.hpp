@@ -39,7 +39,7 @@ struct World::Host final : Session::Handler {
     session =
         std::make_unique<Session>(*this, options, watcher ? BoardRole::watch : BoardRole::control,
                                   places.size(), [this] { return world.random_.next(); });
-    for (std::size_t i = 0; world.several() && i < places.size(); ++i) {
+    for (std::size_t i = 0; i < places.size(); ++i) {
       const Wire& wire = world.wires_[places[i].wire];
       session->on_transport(i, world.now_us_ >= wire.unplugged_until_us, time());
     }
@@ -52,8 +52,8 @@ struct World::Host final : Session::Handler {
     session.reset();
   }
   void count_copies() {
-    for (std::size_t i = 0; places.size() > 1 && i < places.size(); ++i) {
-      world.report_.copies += session->wire(i, time()).copies;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      world.report_.copies += session->path(i, time()).copies;
     }
   }
   Time time() const { return Time{static_cast<std::int64_t>(world.now_us_ + clock_offset_us)}; }
@@ -90,11 +90,7 @@ struct World::Host final : Session::Handler {
   }
   void on_board_heartbeat(const Datagram&) override {}
   void on_identity(const Identity&) override {}
-  void on_nack(const Nack& nack, const Datagram&) override {
-    world.report_.busy += nack.code == Refusal::busy;
-    world.report_.stale += nack.code == Refusal::stale;
-    world.report_.duplicate += nack.code == Refusal::duplicate;
-  }
+  void on_nack(const Nack&, const Datagram&) override {}
   void on_bad_datagram(const ReadResult&, std::string_view) override {}
   void on_link(const LinkStatus& status) override {
     world.note(fmt::format("host {} link {} safe {} busy {}", index, r4::to_text(status.state),

@@ -214,7 +214,7 @@ void World::check_wires() {
     wire.fine = true;
     const auto at = static_cast<std::size_t>(w);
     const bool serves = board_->paths().has({port_of(w), host.places[at].peer}) &&
-                        host.session->wire_state(at) == WireState::carrying;
+                        host.session->path(at, host.time()).state == WireState::carrying;
     const bool settled = wire.serves && now_us_ - wire.serves_since_us >= settled_us;
     if (settled && !serves) violate(fmt::format("wires: wire {} is good and given up", w));
     if (serves && !wire.serves) wire.serves_since_us = now_us_;

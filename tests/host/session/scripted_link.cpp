@@ -9,8 +9,10 @@
 namespace r4::test {
 
 ScriptedLink::ScriptedLink(SessionOptions options, BoardRole role)
-    : session(*this, std::move(options), role, 1, [n = 99ULL]() mutable { return ++n; }),
-      due_(session.poll(now)) {}
+    : session(*this, std::move(options), role, 1, [n = 99ULL]() mutable { return ++n; }) {
+  session.on_transport(0, true, now);
+  due_ = session.poll(now);
+}
 
 SessionOptions ScriptedLink::without_questions() {
   SessionOptions options;

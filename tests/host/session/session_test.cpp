@@ -192,13 +192,15 @@ TEST(Session, SaysWhyTheBoardIsSafe) {
   ScriptedLink link;
   link.connect();
   link.heartbeat(SafeReason::handle);
-  EXPECT_EQ(
-      link.session.link(),
-      (LinkStatus{.state = HostLinkState::safe, .reason = SafeReason::handle, .in_control = true}));
+  EXPECT_EQ(link.session.link(), (LinkStatus{.state = HostLinkState::safe,
+                                             .reason = SafeReason::handle,
+                                             .in_control = true,
+                                             .carrying = 1}));
   link.state("SAFE:4;CMD:1;");
   EXPECT_EQ(link.session.link(), (LinkStatus{.state = HostLinkState::safe,
                                              .reason = SafeReason::proximity,
-                                             .in_control = true}));
+                                             .in_control = true,
+                                             .carrying = 1}));
   EXPECT_EQ(link.session.state().safe, SafeReason::proximity);
   link.state("SAFE:0;CMD:1;");
   EXPECT_EQ(link.session.link().state, HostLinkState::active);
@@ -216,7 +218,8 @@ TEST(Session, IsLostWhenTheBoardFallsSilentAndComesBackByItself) {
   link.pass(3s);
   EXPECT_GE(link.count('H'), 39U) << "it goes on knocking";
   link.heartbeat(SafeReason::link);
-  EXPECT_EQ(link.session.link(), (LinkStatus{HostLinkState::safe, SafeReason::link}));
+  EXPECT_EQ(link.session.link(),
+            (LinkStatus{.state = HostLinkState::safe, .reason = SafeReason::link, .carrying = 1}));
   link.pass(10ms);
   link.executed(0);
   EXPECT_EQ(link.session.link().state, HostLinkState::active);
@@ -434,9 +437,14 @@ TEST(Session, AStateTellsWhenItWasSampled) {
   EXPECT_NEAR(statistics.clock_drift_ppm, 0, statistics.clock_drift_error_ppm);
   EXPECT_GT(statistics.clock_drift_error_ppm, 0);
   link.reboot();
+  link.state("AIN24:24;SAFE:1;CMD:1;");  // which the answer to a question has to bear out
+  EXPECT_NE(link.session.state().sampled_error, ReceivedState::unknown);
+  link.pass(100ms);
+  link.identity();
   link.state("AIN24:24;SAFE:1;CMD:1;");
-  EXPECT_EQ(link.session.state().sampled_error, ReceivedState::unknown) << "it is another clock";
-  EXPECT_EQ(link.session.state().sampled, link.session.state().received);
+  EXPECT_EQ(link.restarts, 1);
+  EXPECT_GT(state.sampled_error, 1300us) << "it is another clock";
+  EXPECT_LE(std::chrono::abs(state.received - state.sampled), state.sampled_error);
 }
 
 }  // namespace

@@ -23,7 +23,7 @@ class WatchedBus : public testing::Test {
     robot_.emplace(cables, SessionOptions{}, BoardRole::watch);
   }
   WiredRobot& robot() { return *robot_; }
-  WireState state(std::size_t wire) { return robot().session->wire_state(wire); }
+  WireState state(std::size_t wire) { return robot().session->path(wire, robot().now()).state; }
 
  private:
   std::optional<WiredRobot> robot_;

@@ -12,7 +12,7 @@ namespace {
 using Cable = WiredRobot::Cable;
 using Cables = WiredRobot::Cables;
 
-TEST(SessionWires, ShowOneRestartOfTheBoardAndAreBack) {
+TEST(SessionPaths, ShowOneRestartOfTheBoardAndAreBack) {
   for (const std::uint32_t lag : {1U, 30U, 200U}) {
     WiredRobot robot(Cables{{1}, {lag}});
     robot.connect();
@@ -30,7 +30,7 @@ TEST(SessionWires, ShowOneRestartOfTheBoardAndAreBack) {
   }
 }
 
-TEST(SessionWires, PassOverWhatIsAnHourOld) {
+TEST(SessionPaths, PassOverWhatIsAnHourOld) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   const auto old = [&](std::uint32_t back_ms) {
@@ -50,7 +50,7 @@ TEST(SessionWires, PassOverWhatIsAnHourOld) {
   EXPECT_EQ(robot.trips, 0);
 }
 
-TEST(SessionWires, BringWhatTheBoardSaidWhileItBootedTooLate) {
+TEST(SessionPaths, BringWhatTheBoardSaidWhileItBootedTooLate) {
   SessionOptions options = WiredRobot::at_will();
   options.key = key_of(1);
   options.clock_start = std::chrono::hours{1};
@@ -69,7 +69,7 @@ TEST(SessionWires, BringWhatTheBoardSaidWhileItBootedTooLate) {
 }
 
 // Whether the other wire is heard or not.
-TEST(SessionWires, AreNotEndedByALateWordThatTheBoardIsBooting) {
+TEST(SessionPaths, AreNotEndedByALateWordThatTheBoardIsBooting) {
   for (const bool alone : {false, true}) {
     WiredRobot robot(Cables{{1}, {1}});
     robot.connect();
@@ -88,7 +88,7 @@ TEST(SessionWires, AreNotEndedByALateWordThatTheBoardIsBooting) {
   }
 }
 
-TEST(SessionWires, BeginAnewWhenTheAnswerToAWordOfBootingSaysSo) {
+TEST(SessionPaths, BeginAnewWhenTheAnswerToAWordOfBootingSaysSo) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   robot.run(500);
@@ -104,7 +104,7 @@ TEST(SessionWires, BeginAnewWhenTheAnswerToAWordOfBootingSaysSo) {
   EXPECT_TRUE(robot.session->in_control(robot.now()));
 }
 
-TEST(SessionWires, BeginAnewWhereNothingElseComes) {
+TEST(SessionPaths, BeginAnewWhereNothingElseComes) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   for (const std::size_t wire : {0U, 1U}) robot.cut(wire);
@@ -118,11 +118,11 @@ TEST(SessionWires, BeginAnewWhereNothingElseComes) {
 }
 
 // The board answers who it is, and its clock is nearly that of the boot before.
-TEST(SessionWires, BeginAnewWhereTheBoardOnlySaysThatItBoots) {
+TEST(SessionPaths, BeginAnewWhereTheBoardOnlySaysThatItBoots) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   for (const std::size_t wire : {0U, 1U}) robot.cut(wire);
-  const std::string id = robot.session->wire(1, robot.now()).board_id;
+  const std::string id = robot.session->path(1, robot.now()).board_id;
   const std::string question = robot.cables[1].all('Q').back();
   const std::string sid = question.substr(question.find("SID:"), 21);
   for (int i = 0; i < 15; ++i) {

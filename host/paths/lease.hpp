@@ -15,10 +15,13 @@
 //     unknown   the board does not know of watchers; likewise, for another may come to its place
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <vector>
 
+#include "../measurement/time.hpp"
 #include "r4link/link.hpp"
-#include "time.hpp"
 
 namespace r4 {
 
@@ -70,5 +73,37 @@ inline LeaseTrouble Lease::trouble(Time now) const {
   if (state_ == State::full) return LeaseTrouble::full;
   return state_ == State::unknown ? LeaseTrouble::unknown : LeaseTrouble::none;
 }
+
+// One for each path of a session.
+class Leases {
+ public:
+  explicit Leases(std::size_t paths) : leases_(paths) {}
+
+  Lease& operator[](std::size_t path) { return leases_[path]; }
+  void renew(std::size_t path, Time now) { leases_[path].renew(now); }
+  // Do states come by any of them?
+  bool streaming(Time now) const {
+    return std::any_of(leases_.begin(), leases_.end(),
+                       [now](const Lease& lease) { return lease.streaming(now); });
+  }
+  // What is wrong with all of them.
+  LeaseTrouble trouble(Time now) const {
+    LeaseTrouble worst = LeaseTrouble::none;
+    if (streaming(now)) return worst;
+    for (const Lease& lease : leases_) worst = std::max(worst, lease.trouble(now));
+    return worst;
+  }
+  // When one of a path in `paths` (bit i: path i) is due.
+  Time next(std::uint8_t paths) const {
+    Time next = Time::max();
+    for (std::size_t i = 0; i < leases_.size(); ++i) {
+      if ((paths & 1U << i) != 0) next = std::min(next, leases_[i].next());
+    }
+    return next;
+  }
+
+ private:
+  std::vector<Lease> leases_;
+};
 
 }  // namespace r4

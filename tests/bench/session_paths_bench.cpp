@@ -21,7 +21,7 @@ class Receiver final : Session::Handler {
     options.arming = Arming::off;
     Session::Handler& handler = *this;
     session_.emplace(handler, options, BoardRole::control, wires);
-    for (std::size_t wire = 0; wire < wires && wires > 1; ++wire) {
+    for (std::size_t wire = 0; wire < wires; ++wire) {
       session_->on_transport(wire, true, Time{0});
       session_->poll(now(0));
       write("I:R4,0.1.0,board,udp;ASKED:" + std::to_string(asked_), 0, 0);

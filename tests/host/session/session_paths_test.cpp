@@ -29,7 +29,7 @@ std::string busy_for(const WiredRobot& robot) {
                   ",BUSY;SID:0000000000000065;PNum:1;T:" + std::to_string(robot.board_ms(0)) + ";");
 }
 
-TEST(SessionWires, AskWhoIsThereBeforeAnythingElseIsSaid) {
+TEST(SessionPaths, AskWhoIsThereBeforeAnythingElseIsSaid) {
   WiredRobot robot(Cables{{5}, {5}});
   robot.plug(0, true);
   robot.plug(1, true);
@@ -38,15 +38,15 @@ TEST(SessionWires, AskWhoIsThereBeforeAnythingElseIsSaid) {
     ASSERT_EQ(cable.sent.size(), 1U);
     EXPECT_EQ(cable.sent[0].substr(0, 5), "Q:ID;");
   }
-  EXPECT_EQ(robot.session->wire_state(0), WireState::asking);
+  EXPECT_EQ(robot.session->path(0, robot.now()).state, WireState::asking);
   robot.run(500);
   EXPECT_TRUE(robot.session->in_control(robot.now()));
-  EXPECT_EQ(robot.session->wire_state(0), WireState::carrying);
-  EXPECT_EQ(robot.session->wire_state(1), WireState::carrying);
+  EXPECT_EQ(robot.session->path(0, robot.now()).state, WireState::carrying);
+  EXPECT_EQ(robot.session->path(1, robot.now()).state, WireState::carrying);
   EXPECT_EQ(robot.session->link().carrying, 3);
 }
 
-TEST(SessionWires, CarryTheSameBytes) {
+TEST(SessionPaths, CarryTheSameBytes) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   robot.drive(100);
@@ -56,21 +56,21 @@ TEST(SessionWires, CarryTheSameBytes) {
   EXPECT_TRUE(executed_once(robot));
 }
 
-TEST(SessionWires, BringEachStateOnce) {
+TEST(SessionPaths, BringEachStateOnce) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   robot.told_states = 0;
   robot.run(1000);
   EXPECT_NEAR(static_cast<double>(robot.told_states), 100, 2);
   EXPECT_FALSE(robot.went_back);
-  EXPECT_GT(robot.session->wire(1, robot.now()).copies, 90U);
+  EXPECT_GT(robot.session->path(1, robot.now()).copies, 90U);
   EXPECT_EQ(robot.session->packets().lost, 0U);
-  EXPECT_EQ(robot.session->wire(0, robot.now()).loss(), 0);
-  EXPECT_EQ(robot.session->wire(1, robot.now()).loss(), 0);
-  EXPECT_GT(robot.session->wire(1, robot.now()).round_trip_us, 0);
+  EXPECT_EQ(robot.session->path(0, robot.now()).loss(), 0);
+  EXPECT_EQ(robot.session->path(1, robot.now()).loss(), 0);
+  EXPECT_GT(robot.session->path(1, robot.now()).round_trip_us, 0);
 }
 
-TEST(SessionWires, OneThatLagsNeverReplacesNewerState) {
+TEST(SessionPaths, OneThatLagsNeverReplacesNewerState) {
   WiredRobot robot(Cables{{1}, {200}});
   robot.connect();
   robot.run(1000);
@@ -91,7 +91,7 @@ TEST(SessionWires, OneThatLagsNeverReplacesNewerState) {
 }
 
 // The bar of the plan: one of two cut under full load, 1000 times.
-TEST(SessionWires, OneIsCutAThousandTimesAndNothingIsMissed) {
+TEST(SessionPaths, OneIsCutAThousandTimesAndNothingIsMissed) {
   WiredRobot robot(Cables{{1}, {2}});
   robot.connect();
   robot.run(500);
@@ -120,12 +120,12 @@ TEST(SessionWires, OneIsCutAThousandTimesAndNothingIsMissed) {
   EXPECT_EQ(robot.session->statistics(robot.now()).timed_out, 0U);
 }
 
-TEST(SessionWires, TellAtOnceWhatTheTransportTells) {
+TEST(SessionPaths, TellAtOnceWhatTheTransportTells) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   robot.plug(0, false);
   EXPECT_EQ(robot.links.back().carrying, 2);
-  EXPECT_EQ(robot.session->wire_state(0), WireState::down);
+  EXPECT_EQ(robot.session->path(0, robot.now()).state, WireState::down);
   EXPECT_FALSE(robot.links.back().transport_down);
   EXPECT_EQ(robot.links.back().state, HostLinkState::active);
   robot.plug(0, true);
@@ -134,7 +134,7 @@ TEST(SessionWires, TellAtOnceWhatTheTransportTells) {
   EXPECT_EQ(robot.trips, 0);
 }
 
-TEST(SessionWires, TellWithinTheTimeoutWhatNobodyTells) {
+TEST(SessionPaths, TellWithinTheTimeoutWhatNobodyTells) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   robot.cut(1);
@@ -142,11 +142,11 @@ TEST(SessionWires, TellWithinTheTimeoutWhatNobodyTells) {
   EXPECT_EQ(robot.session->link().carrying, 3);
   robot.run(20);
   EXPECT_EQ(robot.session->link().carrying, 1);
-  EXPECT_EQ(robot.session->wire_state(1), WireState::silent);
+  EXPECT_EQ(robot.session->path(1, robot.now()).state, WireState::silent);
   EXPECT_EQ(robot.session->link().state, HostLinkState::active);
 }
 
-TEST(SessionWires, AreLostTogetherAndComeBackOneByOne) {
+TEST(SessionPaths, AreLostTogetherAndComeBackOneByOne) {
   WiredRobot robot(Cables{{1}, {1}, {1}});
   robot.connect();
   for (std::size_t wire = 0; wire < 3; ++wire) robot.cut(wire);
@@ -168,7 +168,7 @@ TEST(SessionWires, AreLostTogetherAndComeBackOneByOne) {
   EXPECT_TRUE(executed_once(robot));
 }
 
-TEST(SessionWires, ConfirmACommandThatOneCarriesAndAnotherAnswers) {
+TEST(SessionPaths, ConfirmACommandThatOneCarriesAndAnotherAnswers) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   robot.cables[0].cut_to_host = true;
@@ -177,7 +177,7 @@ TEST(SessionWires, ConfirmACommandThatOneCarriesAndAnotherAnswers) {
   EXPECT_TRUE(executed_once(robot));
 }
 
-TEST(SessionWires, TellARefusalOnce) {
+TEST(SessionPaths, TellARefusalOnce) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   robot.nacks.clear();
@@ -192,17 +192,17 @@ TEST(SessionWires, TellARefusalOnce) {
   EXPECT_EQ(robot.nacks.size(), 1U);
 }
 
-TEST(SessionWires, AreRefusedWhenAllOfThemAre) {
+TEST(SessionPaths, AreRefusedWhenAllOfThemAre) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   robot.bring(1, busy_for(robot));
   EXPECT_FALSE(robot.session->link().busy);
-  EXPECT_TRUE(robot.session->wire(1, robot.now()).busy);
+  EXPECT_TRUE(robot.session->path(1, robot.now()).busy);
   robot.bring(0, busy_for(robot));
   EXPECT_TRUE(robot.session->link().busy);
 }
 
-TEST(SessionWires, AreNotRefusedByWhatTheBoardSaidBeforeItShowedThatItIsTheirs) {
+TEST(SessionPaths, AreNotRefusedByWhatTheBoardSaidBeforeItShowedThatItIsTheirs) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   const std::string busy = busy_for(robot);
@@ -213,7 +213,7 @@ TEST(SessionWires, AreNotRefusedByWhatTheBoardSaidBeforeItShowedThatItIsTheirs) 
   EXPECT_EQ(robot.drive(5).outcome, Outcome::confirmed);
 }
 
-TEST(SessionWires, AreBackInControlAsSoonAsAStateShowsIt) {
+TEST(SessionPaths, AreBackInControlAsSoonAsAStateShowsIt) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   const std::string busy = busy_for(robot);
@@ -225,13 +225,13 @@ TEST(SessionWires, AreBackInControlAsSoonAsAStateShowsIt) {
   EXPECT_TRUE(robot.session->in_control(robot.now()));
 }
 
-TEST(SessionWires, ToTwoBoardsAreRefused) {
+TEST(SessionPaths, ToTwoBoardsAreRefused) {
   WiredRobot robot(Cables{{1}, {1, 1}});
   robot.connect();
   EXPECT_TRUE(robot.session->link().two_boards);
-  EXPECT_EQ(robot.session->wire_state(1), WireState::other_board);
-  EXPECT_EQ(robot.session->wire(0, robot.now()).board_id, "board-0");
-  EXPECT_EQ(robot.session->wire(1, robot.now()).board_id, "board-1");
+  EXPECT_EQ(robot.session->path(1, robot.now()).state, WireState::other_board);
+  EXPECT_EQ(robot.session->path(0, robot.now()).board_id, "board-0");
+  EXPECT_EQ(robot.session->path(1, robot.now()).board_id, "board-1");
   robot.session->send(Command::osmc(1, Direction::forward, 1), WiredRobot::timeout, robot.now());
   robot.run(1000);
   for (const Cable& cable : robot.cables) {
@@ -244,20 +244,20 @@ TEST(SessionWires, ToTwoBoardsAreRefused) {
   EXPECT_TRUE(robot.session->in_control(robot.now()));
 }
 
-TEST(SessionWires, TakeTheBoardToWhichAllOfThemLeadWhicheverAnsweredFirst) {
+TEST(SessionPaths, TakeTheBoardToWhichAllOfThemLeadWhicheverAnsweredFirst) {
   WiredRobot robot(Cables{{1}, {1, 1}});
   robot.connect();
-  ASSERT_EQ(robot.session->wire_state(1), WireState::other_board);
+  ASSERT_EQ(robot.session->path(1, robot.now()).state, WireState::other_board);
   robot.plug(0, false);
   robot.cables[0].board = 1;  // that was the wrong one
   robot.plug(0, true);
   robot.run(1000);
   EXPECT_FALSE(robot.session->link().two_boards);
   EXPECT_TRUE(robot.session->in_control(robot.now()));
-  EXPECT_EQ(robot.session->wire(0, robot.now()).board_id, "board-1");
+  EXPECT_EQ(robot.session->path(0, robot.now()).board_id, "board-1");
 }
 
-TEST(SessionWires, GoOnWhenOneIsPluggedIntoAnotherBoard) {
+TEST(SessionPaths, GoOnWhenOneIsPluggedIntoAnotherBoard) {
   WiredRobot robot(Cables{{1}, {1}, {1, 1}});
   robot.plug(0, true);
   robot.plug(1, true);
@@ -271,19 +271,19 @@ TEST(SessionWires, GoOnWhenOneIsPluggedIntoAnotherBoard) {
   EXPECT_EQ(robot.cables[2].all('Q').size(), robot.cables[2].sent.size());
 }
 
-TEST(SessionWires, BeginWithoutOneWhoseBoardDoesNotAnswer) {
+TEST(SessionPaths, BeginWithoutOneWhoseBoardDoesNotAnswer) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.cut(1);
   robot.connect();
   EXPECT_TRUE(robot.session->in_control(robot.now()));
-  EXPECT_EQ(robot.session->wire_state(1), WireState::asking);
+  EXPECT_EQ(robot.session->path(1, robot.now()).state, WireState::asking);
   EXPECT_EQ(robot.cables[1].all('Q').size(), robot.cables[1].sent.size());
   robot.cut(1, false);
   robot.run(200);
   EXPECT_EQ(robot.session->link().carrying, 3);
 }
 
-TEST(SessionWires, TakeAStateInPartsFromWhicheverBringsThem) {
+TEST(SessionPaths, TakeAStateInPartsFromWhicheverBringsThem) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   robot.run(3);
@@ -298,7 +298,7 @@ TEST(SessionWires, TakeAStateInPartsFromWhicheverBringsThem) {
   EXPECT_EQ(robot.states[1].analog_cv[static_cast<int>(StateField::ain24)], 100);
 }
 
-TEST(SessionWires, TellOfAStateOnlyWhatItHasBrought) {
+TEST(SessionPaths, TellOfAStateOnlyWhatItHasBrought) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   robot.run(3);
@@ -311,7 +311,7 @@ TEST(SessionWires, TellOfAStateOnlyWhatItHasBrought) {
   EXPECT_FALSE(robot.session->state().present.has(StateField::cmd));
 }
 
-TEST(SessionWires, CountAsLostWhatNoneBrings) {
+TEST(SessionPaths, CountAsLostWhatNoneBrings) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   robot.run(100);
@@ -319,7 +319,7 @@ TEST(SessionWires, CountAsLostWhatNoneBrings) {
   robot.run(100);
   robot.cut(0, false);
   robot.run(100);
-  EXPECT_NEAR(robot.session->wire(0, robot.now()).packets.lost, 10, 2);
+  EXPECT_NEAR(robot.session->path(0, robot.now()).packets.lost, 10, 2);
   EXPECT_EQ(robot.session->packets().lost, 0U);
   robot.cut(0);
   robot.cut(1);
@@ -330,7 +330,7 @@ TEST(SessionWires, CountAsLostWhatNoneBrings) {
   EXPECT_NEAR(robot.session->packets().lost, 10, 2);
 }
 
-TEST(SessionWires, AllCarryAStopWhoeverIsThere) {
+TEST(SessionPaths, AllCarryAStopWhoeverIsThere) {
   WiredRobot robot(Cables{{1}, {1}, {1}});
   robot.plug(0, true);
   robot.plug(1, true);
@@ -346,7 +346,7 @@ TEST(SessionWires, AllCarryAStopWhoeverIsThere) {
             Outcome::confirmed);
 }
 
-TEST(SessionWires, AreLeftTogether) {
+TEST(SessionPaths, AreLeftTogether) {
   WiredRobot robot(Cables{{1}, {3}});
   robot.connect();
   robot.drive(1);
@@ -355,7 +355,7 @@ TEST(SessionWires, AreLeftTogether) {
   EXPECT_FALSE(robot.board(0).link().has_owner());
 }
 
-TEST(SessionWires, AreNotLeftByWhatTheBoardSaidBefore) {
+TEST(SessionPaths, AreNotLeftByWhatTheBoardSaidBefore) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();
   for (const std::size_t wire : {0U, 1U}) robot.cut(wire);
@@ -371,7 +371,7 @@ TEST(SessionWires, AreNotLeftByWhatTheBoardSaidBefore) {
   EXPECT_EQ(robot.results.at(ticket).outcome, Outcome::confirmed);
 }
 
-TEST(SessionWires, AreLeftBeforeAStateHasCome) {
+TEST(SessionPaths, AreLeftBeforeAStateHasCome) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.reboot(0, 0xC0000000U);  // whatever T: this one is not newer than 0
   robot.plug(0, true);
@@ -393,7 +393,7 @@ TEST(SessionWires, AreLeftBeforeAStateHasCome) {
   EXPECT_EQ(robot.results.at(ticket).outcome, Outcome::confirmed);
 }
 
-TEST(SessionWires, AreSignedEachByItsOwnSignature) {
+TEST(SessionPaths, AreSignedEachByItsOwnSignature) {
   SessionOptions options = WiredRobot::at_will();
   options.key = key_of(1);
   options.clock_start = std::chrono::hours{24};
@@ -416,7 +416,7 @@ TEST(SessionWires, AreSignedEachByItsOwnSignature) {
   EXPECT_TRUE(executed_once(robot));
 }
 
-TEST(SessionWires, AreArmedTogether) {
+TEST(SessionPaths, AreArmedTogether) {
   WiredRobot robot(Cables{{1}, {1}}, SessionOptions{});
   robot.connect();
   EXPECT_EQ(robot.finish(robot.session->arm(WiredRobot::timeout, robot.now())).outcome,
@@ -427,7 +427,7 @@ TEST(SessionWires, AreArmedTogether) {
   EXPECT_EQ(robot.drive(4).outcome, Outcome::confirmed);
 }
 
-TEST(SessionWires, HaveALeaseEachForWhoWatches) {
+TEST(SessionPaths, HaveALeaseEachForWhoWatches) {
   WiredRobot robot(Cables{{1}, {1}}, SessionOptions{}, BoardRole::watch);
   robot.connect();
   robot.run(2000);

@@ -1,0 +1,368 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "paths.hpp"
+
+#include <algorithm>
+
+namespace r4 {
+
+const char* to_text(WireState state) {
+  switch (state) {
+    case WireState::down:
+      return "down";
+    case WireState::asking:
+      return "asking";
+    case WireState::other_board:
+      return "other board";
+    case WireState::silent:
+      return "silent";
+    case WireState::carrying:
+      return "carrying";
+  }
+  return "unknown";
+}
+
+// --- the transports
+
+void Paths::on_transport(std::size_t index, bool up, bool can_ask, Time now) {
+  Path& path = paths_[index];
+  path.up = up;
+  path.can_ask = can_ask;
+  path.known = up && (!can_ask || is_only(path));
+  path.other = path.connecting = false;
+  path.questions.answered = false;
+  path.questions.unanswered = 0;
+  path.clock.forget();
+  path.heard = path.busy.until = Time{0};
+  path.questions.ask_at = path.known || !up ? Time::max() : now;
+  if (path.known && first_answer_.count() == 0) first_answer_ = now;
+  anew_ = anew_ || all_down();
+  if (!up) return;
+  // It may bring other numbers from now on; and a lease may have ended.
+  news_.restart(index);
+  leases_.renew(index, now);
+}
+
+bool Paths::all_down() const {
+  return std::none_of(paths_.begin(), paths_.end(), [](const Path& path) { return path.up; });
+}
+
+void Paths::on_sleep(Time now) {
+  for (std::size_t i = 0; i < paths_.size(); ++i) {
+    Path& path = paths_[i];
+    path.clock.forget();
+    path.connecting = false;
+    path.heard = path.busy.until = Time{0};
+    path.questions.open = IdentityQuestion{Time{0}};
+    if (path.up && path.can_ask && (path.questions.answered || !path.known))
+      path.questions.ask_at = now;
+    news_.restart(i);
+    leases_.renew(i, now);
+  }
+  clock_.forget();
+  news_.forget();
+  own_ = {};
+  anew_ = true;
+}
+
+// --- who is there
+
+PathSet Paths::to_ask(Time now) const {
+  PathSet due = 0;
+  for (std::size_t i = 0; i < paths_.size(); ++i) {
+    if (paths_[i].up && paths_[i].can_ask && now >= paths_[i].questions.ask_at) due |= path_bit(i);
+  }
+  return due;
+}
+
+void Paths::asked(std::size_t index, std::uint32_t pnum, Time now) {
+  Path& path = paths_[index];
+  PathQuestions& questions = path.questions;
+  questions.open.asked(pnum, now);
+  questions.asked_at = now;
+  questions.unanswered += questions.unanswered < most_unanswered ? 1 : 0;
+  const Time again = now + (path.other ? ask_other_interval : ask_interval);
+  questions.ask_at = path.known ? Time::max() : again;
+}
+
+// A path whose T does not fit.
+void Paths::ask_soon(Path& path, Time now) {
+  if (!path.can_ask) return;
+  PathQuestions& questions = path.questions;
+  questions.ask_at = std::min(questions.ask_at, std::max(now, questions.asked_at + ask_interval));
+}
+
+Paths::Admission Paths::admit_identity(std::size_t index, const Identity& identity,
+                                       std::uint32_t t_ms, Time now) {
+  Path& path = paths_[index];
+  if (!path.up) return Admission::no;
+  const std::optional<Time> asked = path.questions.open.answered(identity);
+  // Told to somebody else, or once more: it says who is there and not when.
+  if (!asked && path.can_ask) return path.known ? Admission::yes : Admission::no;
+  const std::string_view id(identity.board_id.data(), identity.board_id.size());
+  if (path.board_id != id) path.board_id = id;
+  // The first board that answers, until the session begins: while no other path leads to it, it may have been a mistake.
+  const bool others = (known() & ~path_bit(index)) != 0;
+  if (!id_ || is_only(path) || (!begun_ && !others)) id_ = id;
+  path.other = *id_ != id;
+  path.known = !path.other;
+  if (path.other) {
+    path.questions.ask_at = path.can_ask ? now + ask_other_interval : Time::max();
+    return Admission::no;
+  }
+  path.questions.ask_at = Time::max();
+  if (first_answer_.count() == 0) first_answer_ = now;
+  if (!asked) return Admission::yes;
+  path.questions.answered = true;
+  path.questions.unanswered = 0;
+  path.questions.round_trip = now - *asked;
+  // Of two boots the later one is that which answered what was asked after the other had answered.
+  const bool later = *asked > proven_;
+  // The board has answered between the question and now, which tells boots apart that are close together.
+  const bool same = clock_.known() ? clock_.fits(t_ms, *asked, now, PathClock::restart_tolerance_ms)
+                                   : fits_others(path, t_ms, now);
+  if (!same && !later) {
+    ask_soon(path, now);
+    return Admission::yes;
+  }
+  if (!same) begin_boot(t_ms, now);
+  set_clock(index, t_ms, now);
+  proven_ = now;
+  compare_those_that_listen(t_ms, now);
+  return same ? Admission::yes : Admission::restarted;
+}
+
+bool Paths::two_boards() const {
+  return std::any_of(paths_.begin(), paths_.end(), [](const Path& path) { return path.other; });
+}
+
+PathSet Paths::known() const {
+  PathSet set = 0;
+  for (std::size_t i = 0; i < paths_.size(); ++i) {
+    if (paths_[i].known) set |= path_bit(i);
+  }
+  return set;
+}
+
+bool Paths::poll(Time now) {
+  if (begun_ || known() == 0 || two_boards()) return false;
+  const bool asking = std::any_of(paths_.begin(), paths_.end(), [this](const Path& path) {
+    const bool compared = path.can_ask || path.clock.known() || is_only(path);
+    return path.up && !(path.known && compared);
+  });
+  if (asking && now < first_answer_ + patience) return false;
+  begun_ = true;
+  return true;
+}
+
+Time Paths::next(Time now) const {
+  Time next = Time::max();
+  for (const Path& path : paths_) {
+    if (path.up && path.can_ask)
+      next = std::min(next, std::max(path.questions.ask_at, now + Time{1000}));
+    if (is_heard(path, now)) next = std::min(next, path.heard + timeout_);
+  }
+  const Time begins = first_answer_ + patience;
+  if (!begun_ && known() != 0 && begins > now) next = std::min(next, begins);
+  return next;
+}
+
+// --- what they bring
+
+bool Paths::in_clock(const Path& path, std::uint32_t t_ms, Time now) {
+  const std::int32_t late =
+      path.connecting ? PathClock::restart_tolerance_ms : PathClock::tolerance_ms;
+  return path.clock.known() && path.clock.fits(t_ms, now, now, late);
+}
+
+// Before the link knows the board's clock, only the other paths do: of them one may have answered before a restart.
+bool Paths::fits_others(const Path& path, std::uint32_t t_ms, Time now) const {
+  return std::all_of(paths_.begin(), paths_.end(), [&](const Path& each) {
+    const bool knows = &each != &path && each.known && each.clock.known() && each.boot == boot_;
+    return !knows || in_clock(each, t_ms, now);
+  });
+}
+
+// Is what a believed path brings of the session's board, by its T? Before the session begins the other paths know
+// its clock alone.
+bool Paths::fits(const Path& path, std::uint32_t t_ms, Time now) const {
+  if (!begun_) return fits_others(path, t_ms, now);
+  const std::int32_t late =
+      path.connecting ? PathClock::restart_tolerance_ms : PathClock::tolerance_ms;
+  return !clock_.known() || clock_.fits(t_ms, now, now, late);
+}
+
+void Paths::set_clock(std::size_t index, std::uint32_t t_ms, Time now) {
+  Path& path = paths_[index];
+  path.clock.set(t_ms, now);
+  if (path.boot == boot_) return;
+  path.boot = boot_;
+  news_.restart(index);
+}
+
+void Paths::begin_boot(std::uint32_t t_ms, Time now) {
+  ++boot_;
+  news_.forget();
+  own_ = {};
+  clock_.set(t_ms, now);
+}
+
+// The board has said its T on a path that was asked: those that cannot be asked, and had another, are of another
+// board, or have yet to bring what is of this boot.
+void Paths::compare_those_that_listen(std::uint32_t t_ms, Time now) {
+  anew_ = false;
+  for (Path& each : paths_) {
+    if (each.can_ask || !each.clock.known() || in_clock(each, t_ms, now)) continue;
+    each.clock.forget();
+    if (!begun_) turn_away(each);
+  }
+}
+
+void Paths::turn_away(Path& path) {
+  if (path.can_ask) return ask_soon(path, path.questions.asked_at);
+  path.other = true;
+  path.known = false;
+}
+
+Paths::Admission Paths::admit(std::size_t index, std::uint32_t pnum, std::uint32_t t_ms, Time now) {
+  Path& path = paths_[index];
+  Admission admission = Admission::yes;
+  if (!is_of_this_boot(path, t_ms, now)) {
+    if (!path.up || !is_believed(path)) {
+      if (path.known) ask_soon(path, now);
+      return Admission::no;
+    }
+    if (!fits(path, t_ms, now)) {
+      // A restart, if it has carried and no other one knows better.
+      const bool carried = path.clock.known() && path.boot == boot_;
+      if (!carried && !anew_) turn_away(path);
+      if ((!carried && !anew_) || others_carry(path, now)) return Admission::no;
+      begin_boot(t_ms, now);
+      proven_ = now;
+      admission = Admission::restarted;
+    }
+    path.other = false;
+    path.known = true;
+  }
+  anew_ = false;
+  path.connecting = false;
+  set_clock(index, t_ms, now);
+  path.heard = now;
+  news_.on_number(index, pnum);
+  return begun_ ? admission : Admission::no;
+}
+
+// One that comes late is no sign that the board has begun again: who has its heartbeats learns that by the answer of
+// its clock, for which the path is asked now.
+bool Paths::admit_connecting(std::size_t index, Time now) {
+  Path& path = paths_[index];
+  if (!path.known) return false;
+  path.heard = now;
+  if (!path.connecting) {
+    path.connecting = true;
+    news_.restart(index);
+  }
+  const bool believed = is_believed(path);
+  if (!believed) ask_soon(path, now);  // what it sends next is of another clock
+  if (!begun_ || !all_connecting(now)) return false;
+  const bool recent =
+      link_.echo() != 0 && r4::is_heard(link_.state()) && clock_.known() &&
+      -clock_.ahead(link_.echo(), now) <= static_cast<std::int32_t>(to_ms(timeout_));
+  if (!believed && recent) return false;
+  news_.on_connecting();
+  return true;
+}
+
+bool Paths::admit_answer(std::size_t index, std::uint32_t pnum, std::uint32_t t_ms, bool counts,
+                         Time now) {
+  Path& path = paths_[index];
+  if (!is_of_this_boot(path, t_ms, now)) {
+    if (!is_believed(path)) {
+      if (path.known) ask_soon(path, now);
+      return false;
+    }
+    // On a bus the states come only once a lease was answered.
+    if (!path.known || path.clock.known()) return false;
+    if (!fits(path, t_ms, now)) {
+      if (!anew_) turn_away(path);
+      return false;
+    }
+  }
+  path.heard = now;
+  if (counts) news_.on_answer(index, pnum);
+  return begun_;
+}
+
+bool Paths::is_newest(std::uint32_t t_ms, Time now) {
+  if (!news_.is_newest(t_ms)) return false;
+  clock_.set(t_ms, now);
+  return true;
+}
+
+bool Paths::all_connecting(Time now) const {
+  return std::all_of(paths_.begin(), paths_.end(),
+                     [&](const Path& path) { return path.connecting || !is_heard(path, now); });
+}
+
+bool Paths::others_carry(const Path& path, Time now) const {
+  return std::any_of(paths_.begin(), paths_.end(),
+                     [&](const Path& each) { return &each != &path && is_heard(each, now); });
+}
+
+// --- who has the board
+
+void Paths::on_busy(std::size_t index, std::optional<std::uint32_t> t_ms, Time now) {
+  Path& path = paths_[index];
+  path.busy = {now + busy_memory, !t_ms, t_ms.value_or(0)};
+}
+
+bool Paths::refuses(const Path& path, Time now) const {
+  if (now >= path.busy.until) return false;
+  const bool comparable = !path.busy.here && own_.any && now - own_.at < own_state_memory;
+  return !comparable || newer(path.busy.board_ms, own_.t_ms);
+}
+
+bool Paths::all_busy(Time now) const {
+  return std::all_of(paths_.begin(), paths_.end(),
+                     [&](const Path& path) { return refuses(path, now) || !is_heard(path, now); });
+}
+
+Time Paths::all_busy_until(Time now) const {
+  Time until = now + busy_memory;
+  for (const Path& path : paths_) {
+    if (is_heard(path, now)) until = std::min(until, path.busy.until);
+  }
+  return until;
+}
+
+// --- in numbers
+
+PathSet Paths::carrying(Time now) const {
+  PathSet set = 0;
+  for (std::size_t i = 0; i < paths_.size(); ++i) {
+    if (is_heard(paths_[i], now)) set |= path_bit(i);
+  }
+  return set;
+}
+
+WireState Paths::state(const Path& path, Time now) const {
+  if (!path.up) return WireState::down;
+  if (path.other) return WireState::other_board;
+  if (!path.known) return WireState::asking;
+  return is_heard(path, now) ? WireState::carrying : WireState::silent;
+}
+
+Wire Paths::report(std::size_t index, Time now) const {
+  const auto microseconds = [](Time time) { return static_cast<double>(time.count()); };
+  const Path& path = paths_[index];
+  Wire report;
+  report.state = state(path, now);
+  report.age_us = path.heard.count() != 0 ? microseconds(now - path.heard) : 0;
+  report.busy = now < path.busy.until;
+  report.board_id = path.board_id;
+  report.packets = news_.counters(index);
+  report.copies = news_.copies(index);
+  report.round_trip_us = microseconds(path.questions.round_trip);
+  return report;
+}
+
+}  // namespace r4

@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the paths of a session let through, and what they take for news: without a session. Several paths are in
+// session_paths_test.cpp.
+#include "host/paths/paths.hpp"
+
+#include <gtest/gtest.h>
+
+namespace r4 {
+namespace {
+
+using Admission = Paths::Admission;
+
+struct OnePath : testing::Test {
+  OnePath() {
+    paths.on_transport(0, true, true, now);
+    paths.poll(now);
+  }
+  std::uint32_t board_t() const { return to_ms(now) + board_offset; }
+  Admission state() {
+    const Admission admission = paths.admit(0, board_pnum++, board_t(), now);
+    if (admission != Admission::no) paths.is_newest(board_t(), now);
+    return admission;
+  }
+  // As a session does it; true if its T is answered at once.
+  bool heartbeat(std::uint32_t t_ms, std::uint32_t pnum) {
+    const Admission admission = paths.admit(0, pnum, t_ms, now);
+    if (admission == Admission::restarted) link.on_restart();
+    if (admission == Admission::no || !paths.news().take_heartbeat(0, t_ms)) return false;
+    link.on_heartbeat(t_ms);
+    if (paths.is_newest(t_ms, now)) link.on_reason(SafeReason::none, to_ms(now));
+    return true;
+  }
+  bool heartbeat() { return heartbeat(board_t(), board_pnum++); }
+  bool booting() { return paths.admit_connecting(0, now); }
+  void pass(int ms) { now += std::chrono::milliseconds{ms}; }
+  // The session asks, as poll() does.
+  void ask() { paths.asked(0, ++question, now); }
+  Admission answer() {
+    Identity identity{Text("0.1.0"), Text("board"), Text("udp")};
+    identity.has_asked = true;
+    identity.asked = question;
+    return paths.admit_identity(0, identity, board_t(), now);
+  }
+  void reboot(std::uint32_t by = 1'000'000'000) {
+    board_offset += by;
+    board_pnum = 1;
+  }
+
+  HostLink link{LinkTiming{}, 7};
+  Paths paths{1, LinkTiming{}, link};
+  Time now = std::chrono::seconds{5};
+  std::uint32_t board_offset = 123'456;
+  std::uint32_t board_pnum = 1;
+  std::uint32_t question = 100;
+};
+
+TEST_F(OnePath, IsSpokenToAsSoonAsItsTransportIsThere) {
+  EXPECT_EQ(paths.speaking(), 1);
+  EXPECT_EQ(paths.to_ask(now), 0) << "there is nothing to compare its board with";
+  paths.on_transport(0, false, true, now);
+  EXPECT_EQ(paths.speaking(), 0);
+  EXPECT_TRUE(paths.all_down());
+}
+
+TEST_F(OnePath, ItsNumbersTellWhatIsNewerWithinAMillisecond) {
+  EXPECT_TRUE(heartbeat());
+  EXPECT_TRUE(heartbeat());
+  EXPECT_FALSE(heartbeat(board_t(), board_pnum - 1)) << "the same";
+  EXPECT_FALSE(heartbeat(board_t(), board_pnum - 2)) << "late";
+}
+
+TEST_F(OnePath, TakesNothingOlderForNews) {
+  pass(100);
+  ASSERT_TRUE(heartbeat(board_t(), 10));
+  EXPECT_FALSE(heartbeat(board_t() - 20, 5));
+  EXPECT_FALSE(heartbeat(board_t(), 10));
+  EXPECT_FALSE(paths.is_newest(board_t() - 1, now));
+  FieldSet fields;
+  fields.add(StateField::safe);
+  ASSERT_TRUE(paths.news().take_state(0, board_t(), fields));
+  EXPECT_FALSE(paths.news().take_state(0, board_t(), fields)) << "it has come";
+  EXPECT_FALSE(paths.news().is_newest_state(0, board_t() - 1));
+}
+
+TEST_F(OnePath, CountsWhatIsLostAndTakesBackWhatComesLate) {
+  heartbeat(board_t(), 10);
+  pass(10);
+  heartbeat(board_t(), 14);
+  EXPECT_EQ(paths.counters().lost, 3U);
+  heartbeat(board_t() - 5, 12);
+  EXPECT_EQ(paths.counters().lost, 2U);
+  EXPECT_EQ(paths.counters().late, 1U);
+  heartbeat(board_t() - 5, 12);
+  EXPECT_EQ(paths.counters().duplicate, 1U);
+  EXPECT_TRUE(paths.admit_answer(0, 17, board_t(), true, now));
+  EXPECT_EQ(paths.counters().lost, 4U) << "an answer counts in the numbers of the states";
+  EXPECT_TRUE(paths.admit_answer(0, 3, board_t(), false, now));
+  EXPECT_EQ(paths.counters().received, 4U) << "one to a host without control does not";
+}
+
+TEST_F(OnePath, NoticesABootWhoseHeartbeatsWereLost) {
+  heartbeat();
+  pass(300);
+  reboot();
+  EXPECT_EQ(state(), Admission::restarted);
+  pass(10);
+  EXPECT_EQ(state(), Admission::yes) << "once";
+  EXPECT_EQ(paths.counters().lost, 0U) << "new numbers are no loss";
+}
+
+TEST_F(OnePath, BelievesABoardThatSaysThatItBoots) {
+  EXPECT_TRUE(booting());
+  EXPECT_TRUE(booting());
+  EXPECT_EQ(state(), Admission::yes) << "the first boot that is heard is no restart";
+  pass(500);
+  reboot();
+  EXPECT_TRUE(booting());
+  EXPECT_EQ(state(), Admission::restarted);
+}
+
+TEST_F(OnePath, AWordOfBootingThatTheNetworkHeldBackIsNoRestart) {
+  booting();
+  heartbeat();
+  pass(400);
+  state();
+  booting();
+  pass(10);
+  EXPECT_EQ(state(), Admission::yes) << "the clock goes on";
+}
+
+TEST_F(OnePath, NoticesTheRestartOfABoardThatCountsItsTimeFromZero) {
+  board_offset = 0U - to_ms(now);
+  heartbeat();
+  pass(6000);
+  heartbeat();
+  booting();
+  pass(1000);
+  board_offset = 0U - to_ms(now);
+  EXPECT_EQ(state(), Admission::restarted);
+}
+
+TEST_F(OnePath, ADelayOfSecondsIsNoRestart) {
+  heartbeat();
+  pass(9000);
+  EXPECT_EQ(paths.admit(0, board_pnum++, board_t() - 9000, now), Admission::yes);
+  pass(10);
+  EXPECT_EQ(state(), Admission::yes);
+  ask();
+  EXPECT_EQ(answer(), Admission::yes) << "what was heard before was late, and the answer is not";
+}
+
+TEST_F(OnePath, TheBoardsClockMayWrap) {
+  board_offset = 0xffffffffU - to_ms(now) - 50;
+  heartbeat();
+  pass(100);
+  EXPECT_EQ(state(), Admission::yes);
+  EXPECT_TRUE(paths.is_newest(board_t(), now));
+}
+
+// Of a board that answers questions.
+TEST_F(OnePath, PassesOverWhatIsOfAnEarlierBootAndAsks) {
+  heartbeat();
+  ask();
+  ASSERT_EQ(answer(), Admission::yes);
+  pass(200);
+  EXPECT_EQ(paths.admit(0, 5, board_t() - 3'600'000, now), Admission::no);
+  EXPECT_EQ(paths.to_ask(now), 1);
+  ask();
+  EXPECT_EQ(answer(), Admission::yes) << "the board is as it was";
+  EXPECT_EQ(state(), Admission::yes);
+}
+
+TEST_F(OnePath, TheAnswerShowsThatTheBoardHasBegunAgain) {
+  heartbeat();
+  ask();
+  ASSERT_EQ(answer(), Admission::yes);
+  pass(200);
+  reboot();
+  EXPECT_EQ(state(), Admission::no);
+  ask();
+  pass(5);
+  EXPECT_EQ(answer(), Admission::restarted);
+  EXPECT_EQ(state(), Admission::yes);
+}
+
+TEST_F(OnePath, IsBelievedWhereTheBoardAnswersNoMore) {
+  heartbeat();
+  ask();
+  ASSERT_EQ(answer(), Admission::yes);
+  reboot();
+  int questions = 0;
+  while (state() == Admission::no && questions < 100) {
+    pass(100);
+    if (paths.to_ask(now) == 0) continue;
+    ask();
+    ++questions;
+  }
+  EXPECT_EQ(questions, 10) << "another firmware runs there";
+}
+
+TEST_F(OnePath, MayLeadToAnotherBoardLater) {
+  state();
+  ask();
+  ASSERT_EQ(answer(), Admission::yes);
+  paths.on_transport(0, false, true, now);
+  pass(5);
+  paths.on_transport(0, true, true, now);
+  ask();
+  Identity identity{Text("0.1.0"), Text("another"), Text("udp")};
+  identity.has_asked = true;
+  identity.asked = question;
+  EXPECT_EQ(paths.admit_identity(0, identity, 77, now), Admission::restarted);
+  EXPECT_FALSE(paths.two_boards());
+}
+
+TEST_F(OnePath, IsBusyUntilAStateShowsThatTheBoardIsOursAgain) {
+  heartbeat();
+  paths.on_busy(0, board_t(), now);
+  EXPECT_TRUE(paths.all_busy(now));
+  pass(10);
+  paths.on_own_state(board_t(), now);
+  EXPECT_FALSE(paths.all_busy(now)) << "its later word";
+  paths.on_busy(0, {}, now);
+  EXPECT_TRUE(paths.all_busy(now)) << "our own end hears another host in our place";
+  pass(300);
+  EXPECT_FALSE(paths.all_busy(now));
+}
+
+}  // namespace
+}  // namespace r4
