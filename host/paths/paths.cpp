@@ -159,7 +159,7 @@ Time Paths::next(Time now) const {
   for (const Path& path : paths_) {
     if (path.up && path.can_ask)
       next = std::min(next, std::max(path.questions.ask_at, now + Time{1000}));
-    if (is_heard(path, now)) next = std::min(next, path.heard + timeout_);
+    if (is_heard(path, now)) next = std::min(next, heard_until(path));
   }
   const Time begins = first_answer_ + patience;
   if (!begun_ && known() != 0 && begins > now) next = std::min(next, begins);
