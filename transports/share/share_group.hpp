@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which programs share a wire besides those of one's own user: ?share=GROUP, those of the members of a group of
+// The group whose members share a transport, besides the programs of the same user: ?share=GROUP, a group of
 // the system's (group(5)).
 #pragma once
 
-#include "../shared_wire.hpp"
+#include "../share_name.hpp"
 #include "../url.hpp"
 
 namespace r4 {
