@@ -26,10 +26,11 @@ class Registry {
     std::string usage;    // "udp://HOST[:2018][?listen=2390&local=ADDRESS]"
     std::string meaning;  // one line for --help
     CarrierFactory make;
-    // What the transport of a URL is called among the programs that share it (share_name.hpp). None: programs do not
-    // share it. Throws Error if the transport cannot be found.
+    // What the transport of a URL is called among the programs that share it (share_name.hpp).
+    // None: programs do not share it. Throws Error if the transport cannot be found.
     std::function<ShareName(const Url& url)> share_name = nullptr;
-    // True if the transport of this URL is its program's own, which is not shared. None: it never is.
+    // True if the transport of this URL is its program's own, which is not shared. None: it never
+    // is.
     std::function<bool(const Url& url)> own = nullptr;
   };
 

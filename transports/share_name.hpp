@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a transport is called among the programs of this computer that share it (share/shared_carrier.hpp).
+// What a transport is called among the programs of this computer that share it
+// (share/shared_carrier.hpp).
 #pragma once
 
 #include <sys/types.h>
@@ -16,7 +17,8 @@ struct ShareGroup {
 };
 
 struct ShareName {
-  // The same for all programs that mean this transport, and for no other transport. Empty: it is not shared.
+  // The same for all programs that mean this transport, and for no other transport. Empty: it is
+  // not shared.
   std::string text;
   ShareGroup group{};
   // It is a path, such as the number of a pty: once the device is gone, another one may get it.

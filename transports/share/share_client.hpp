@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The connection of a program to the one that holds the transport. A holder that is silent for answer_within is asked
-// whether it is alive, and has as long again to answer: a silent board is not a holder that hangs.
+// The connection of a program to the one that holds the transport. A holder that is silent for
+// answer_within is asked whether it is alive, and has as long again to answer: a silent board is
+// not a holder that hangs.
 #pragma once
 
 #include <array>
@@ -26,7 +27,8 @@ class ShareClient {
    public:
     virtual void on_message(const ShareMessage& message) = 0;
     virtual void on_all_heard() = 0;  // what had arrived was handed over
-    // The holder does not answer, or is of another version of R4 link. Called again until it answers.
+    // The holder does not answer, or is of another version of R4 link. Called again until it
+    // answers.
     virtual void on_no_help(const Problem& why) = 0;
     // The connection has ended.
     virtual void on_closed() = 0;
@@ -41,9 +43,10 @@ class ShareClient {
   ShareClient& operator=(const ShareClient&) = delete;
 
   enum class Joined { holder, nobody, stranger, crowd };
-  // Connects to the holder with that role, and sends `greeting`. A stranger has taken the name; a crowd waits for the
-  // holder, so that there is no room for another program. Throws std::system_error if the system does not let the loop
-  // wait for the connection. `thing`: the transport, for problems.
+  // Connects to the holder with that role, and sends `greeting`. A stranger has taken the name; a
+  // crowd waits for the holder, so that there is no room for another program. Throws
+  // std::system_error if the system does not let the loop wait for the connection. `thing`: the
+  // transport, for problems.
   Joined join(const ShareName& name, BoardRole role, ShareMessage::Kind greeting,
               const std::string& thing);
   // An E:STOP for the board.

@@ -40,7 +40,8 @@ class ShareHolder::Sharer : public std::enable_shared_from_this<Sharer> {
   bool is_served() const { return is_here() && served_; }
   void set_served() { served_ = true; }
 
-  // A copy may be lost, as on any transport. A program that would miss anything else has to come again.
+  // A copy may be lost, as on any transport. A program that would miss anything else has to come
+  // again.
   void tell(Kind kind, std::string_view text) {
     if (!is_here()) return;
     const int error = send_message(connection_.native_handle(), kind, text);
@@ -89,7 +90,8 @@ bool ShareHolder::hold(const ShareName& name, BoardRole role) {
   return true;
 }
 
-// Closed, with errno, if the loop cannot wait for it: an error here must not end the program, which may be driving.
+// Closed, with errno, if the loop cannot wait for it: an error here must not end the program, which
+// may be driving.
 LoopDescriptor ShareHolder::on_loop(FileDescriptor descriptor) {
   LoopDescriptor waited_for(io_);
   if (!descriptor) return waited_for;

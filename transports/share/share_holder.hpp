@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The end of a shared transport at the program that holds it: sends the other programs a copy of all that passes, and
-// takes stops from them. The stop of any of them is obeyed. Of those that say hello, the first most_served are served;
-// a program that has stopped the board is served beyond that, to hear whether it obeys. A copy that a slow program does
-// not take is lost to that program; nothing waits for it here.
+// The end of a shared transport at the program that holds it: sends the other programs a copy of
+// all that passes, and takes stops from them. The stop of any of them is obeyed. Of those that say
+// hello, the first most_served are served; a program that has stopped the board is served beyond
+// that, to hear whether it obeys. A copy that a slow program does not take is lost to that program;
+// nothing waits for it here.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -26,7 +27,8 @@ class ShareHolder {
  public:
   static constexpr std::size_t most_served = 16;
   static constexpr std::size_t most_served_after_a_stop = 20;
-  // So programs that connect again and again, of whichever user, take a few percent of the loop's time at most.
+  // So programs that connect again and again, of whichever user, take a few percent of the loop's
+  // time at most.
   static constexpr std::chrono::microseconds between_arrivals{300};
 
   // Called on the loop's thread. Any of these may release the holder.
@@ -49,7 +51,8 @@ class ShareHolder {
   ShareHolder(const ShareHolder&) = delete;
   ShareHolder& operator=(const ShareHolder&) = delete;
 
-  // Takes the name of that role. False, with errno, if that fails: EADDRINUSE if another program has it.
+  // Takes the name of that role. False, with errno, if that fails: EADDRINUSE if another program
+  // has it.
   bool hold(const ShareName& name, BoardRole role);
   void release() noexcept;
 

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The messages between programs that share a transport (docs/sharing.md). Each is one packet of a local
-// socket: a letter, then its content. Without I/O.
+// The messages between programs that share a transport (docs/sharing.md). Each is one packet of a
+// local socket: a letter, then its content. Without I/O.
 //
-//     hello     h VERSION                            to the holder: let me hear what passes; or: do you answer?
-//     ask       c VERSION                            to the holder: I control the board, let go of the transport.
-//                                                    The answer is the end of the connection
-//     welcome   w VERSION                            the answer to hello, and to what is no message of this version
-//     event     e u|d|! KIND THING 0 REASON 0 FIX    the transport is up, is down, has a warning
-//     received  r DATAGRAM                           from the board
-//     sent      s DATAGRAM                           to the board, by any program
-//     oversize  o BEGINNING                          from the board: too long for a datagram
-//     stop      S DATAGRAM                           to the holder: an E:STOP for the board
+//     hello     h VERSION     to the holder: let me hear what passes; or: do you answer?
+//     ask       c VERSION     to the holder: I control the board, let go of the transport. The
+//                             answer is the end of the connection
+//     welcome   w VERSION     the answer to hello, and to what is no message of this version
+//     event     e u|d|! KIND THING 0 REASON 0 FIX
+//                             the transport is up, is down, has a warning
+//     received  r DATAGRAM    from the board
+//     sent      s DATAGRAM    to the board, by any program
+//     oversize  o BEGINNING   from the board: too long for a datagram
+//     stop      S DATAGRAM    to the holder: an E:STOP for the board
 #pragma once
 
 #include <optional>

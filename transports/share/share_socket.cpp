@@ -17,7 +17,8 @@ namespace r4 {
 namespace {
 
 constexpr int most_waiting = 128;
-// About eighty states: a program that sleeps and wakes up hears nothing that is much older than a second.
+// About eighty states: a program that sleeps and wakes up hears nothing that is much older than a
+// second.
 constexpr int buffer_bytes = 32 * 1024;
 
 struct Address {

@@ -150,7 +150,8 @@ void SharedCarrier::close() noexcept {
   holder_.release();
 }
 
-// Joins the holder, or becomes it. False: look again soon. Throws Error if the transport cannot be had.
+// Joins the holder, or becomes it. False: look again soon. Throws Error if the transport cannot be
+// had.
 bool SharedCarrier::take_part() {
   if (!holder_.holds()) share_ = find_();
   const bool controls = role_ == BoardRole::control;
@@ -198,8 +199,9 @@ void SharedCarrier::require_control() {
               : "end that program, or watch beside it, as r4 monitor does");
 }
 
-// Takes the name of the program that watches and holds the transport. False if another program was faster. A program
-// that is to control takes its own name before it looks for this one, so one of the two sees the other.
+// Takes the name of the program that watches and holds the transport. False if another program was
+// faster. A program that is to control takes its own name before it looks for this one, so one of
+// the two sees the other.
 bool SharedCarrier::hold_to_watch() {
   if (!holder_.hold(share_, BoardRole::watch)) {
     if (const auto problem = out_of_resources(name_, errno)) throw Error(*problem);
@@ -212,7 +214,8 @@ bool SharedCarrier::hold_to_watch() {
   return false;
 }
 
-// If a holder was passed over that only watches, a device that one program can have open is taken from that program.
+// If a holder was passed over that only watches, a device that one program can have open is taken
+// from that program.
 void SharedCarrier::open_own() {
   state_ = State::holding;
   try {
@@ -273,7 +276,8 @@ SendResult SharedCarrier::send(std::string_view bytes, Priority priority, Peer t
     if (result == SendResult::sent) holder_.tell(Kind::sent, bytes);
     return result;
   }
-  // Another holder sends nothing for us but a stop: the board would take anything else for the holder's.
+  // Another holder sends nothing for us but a stop: the board would take anything else for the
+  // holder's.
   if (!is_served() || priority != Priority::stop) return SendResult::down;
   ++shared_counters_.tx_datagrams;
   shared_counters_.tx_bytes += bytes.size();

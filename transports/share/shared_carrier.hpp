@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A transport that the programs of a user share (docs/sharing.md): a carrier about the one that a URL names.
+// A transport that the programs of a user share (docs/sharing.md): a carrier about the one that a
+// URL names.
 //
 //     seeking ----a program holds it----> asking ----welcome----> joined
 //      |   ^                                |                       |
@@ -9,9 +10,9 @@
 //      |   |
 //      +-> holding, with the carrier open: no program holds it, or the holder was passed over
 //
-// The program that controls the board holds the transport itself: nothing of what it sends waits for another program.
-// It also holds a name of its own, so a second one is refused at once. Programs that watch hear all that passes, and
-// send stops.
+// The program that controls the board holds the transport itself: nothing of what it sends waits
+// for another program. It also holds a name of its own, so a second one is refused at once.
+// Programs that watch hear all that passes, and send stops.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -23,8 +24,9 @@
 
 namespace r4 {
 
-// What the carrier reports is what `own` does, whichever program holds the transport. open() does not wait for another
-// program; it throws Error{refused} if one controls the board, and what `own` throws.
+// What the carrier reports is what `own` does, whichever program holds the transport. open() does
+// not wait for another program; it throws Error{refused} if one controls the board, and what `own`
+// throws.
 std::unique_ptr<Carrier> make_shared_carrier(asio::io_context& io, std::unique_ptr<Carrier> own,
                                              FindShareName find, BoardRole role);
 

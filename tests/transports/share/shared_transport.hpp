@@ -170,8 +170,8 @@ class SharedTransportTest : public testing::Test {
       return (programs->has(text) && ...);
     });
   }
-  // A socket of another user's program, which only root can make: it has the name of the holder with that role, or is
-  // connected to that holder.
+  // A socket of another user's program, which only root can make: it has the name of the holder
+  // with that role, or is connected to that holder.
   FileDescriptor foreign_socket(BoardRole role, bool has_name) const {
     const std::string name =
         (role == BoardRole::control ? "r4link/0/control/" : "r4link/0/") + share.text;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What passes on a transport that a program of this computer holds, for r4 list: as a program that watches beside it,
-// which sends nothing (docs/sharing.md).
+// What passes on a transport that a program of this computer holds, for r4 list: as a program that
+// watches beside it, which sends nothing (docs/sharing.md).
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -15,8 +15,8 @@ namespace r4::tool {
 
 class HeldTransport final : private ShareClient::Owner {
  public:
-  // `board` gets the program that holds the transport, whether that one controls the board, and the board's identity
-  // when the board reports it: then `on_news` is called.
+  // `board` gets the program that holds the transport, whether that one controls the board, and the
+  // board's identity when the board reports it: then `on_news` is called.
   HeldTransport(asio::io_context& io, ListedBoard& board, std::function<void()> on_news)
       : board_(board), on_news_(std::move(on_news)), client_(io, *this) {}
 
