@@ -19,13 +19,14 @@ Registry Registry::standard() {
   Registry registry;
   registry.add({"udp", "udp://HOST[:2018][?listen=2390&local=ADDRESS], udp:auto, udp:?id=NAME",
                 "WiFi or Ethernet; for a board: udp://BIND[:2018][?peer=HOST[:2390]]",
-                make_udp_carrier, udp_wire, udp_has_own_port});
+                make_udp_carrier, udp_share_name, udp_has_own_port});
   registry.add({"serial", "serial:///dev/ttyACM0[?baud=1000000], serial:auto, serial:?sn=SERIAL",
-                "USB serial, or the pty of a simulated board", make_serial_carrier, serial_wire});
+                "USB serial, or the pty of a simulated board", make_serial_carrier,
+                serial_share_name});
   registry.add(
       {"pty", "pty:[PATH]", "for a board: a pty that a host opens as serial", make_pty_carrier});
   registry.add({"can", "can://can0[?node=1&fd=0&pack=1]", "ISO-TP on a CAN bus (SocketCAN)",
-                make_can_carrier, can_wire});
+                make_can_carrier, can_share_name});
   return registry;
 }
 
@@ -45,7 +46,7 @@ std::unique_ptr<Carrier> Registry::make(asio::io_context& io, std::string_view u
                                         Role role) const {
   Url parsed = Url::parse(url);
   const Entry& entry = entry_of(parsed);
-  if (role == Role::host && entry.wire) parsed.take("share");
+  if (role == Role::host && entry.share_name) parsed.take("share");
   return with_system_errors(parsed.text(), [&] { return entry.make(io, parsed, role); });
 }
 
@@ -53,14 +54,15 @@ std::unique_ptr<Carrier> Registry::make_shared(asio::io_context& io, std::string
                                                BoardRole role) const {
   Url parsed = Url::parse(url);
   const Entry& entry = entry_of(parsed);
-  if (!entry.wire) return entry.make(io, parsed, Role::host);
+  if (!entry.share_name) return entry.make(io, parsed, Role::host);
   // Who watches has no need of the port of hosts.
   Url alone = role == BoardRole::watch ? Url::parse(with_own_port(std::string(url))) : parsed;
   alone.take("share");
   ShareGroup group = take_share_group(parsed);
   if (entry.own && entry.own(parsed)) return entry.make(io, parsed, Role::host);
-  FindWire find = [wire = entry.wire, parsed = std::move(parsed), group = std::move(group)] {
-    SharedWire found = wire(parsed);
+  FindShareName find = [name_of = entry.share_name, parsed = std::move(parsed),
+                        group = std::move(group)] {
+    ShareName found = name_of(parsed);
     found.group = group;
     return found;
   };

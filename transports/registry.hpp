@@ -11,7 +11,7 @@
 
 #include "r4link/carrier.hpp"
 #include "r4link/options.hpp"
-#include "shared_wire.hpp"
+#include "share_name.hpp"
 #include "url.hpp"
 
 namespace r4 {
@@ -26,10 +26,11 @@ class Registry {
     std::string usage;    // "udp://HOST[:2018][?listen=2390&local=ADDRESS]"
     std::string meaning;  // one line for --help
     CarrierFactory make;
-    // What the wire is called that programs of this machine share (shared_wire.hpp). None: they
-    // do not. Throws Error where it is not to be found.
-    std::function<SharedWire(const Url& url)> wire = nullptr;
-    // Is the wire of this URL its program's own, which nobody shares? None: it never is.
+    // What the transport of a URL is called among the programs that share it (share_name.hpp).
+    // None: programs do not share it. Throws Error if the transport cannot be found.
+    std::function<ShareName(const Url& url)> share_name = nullptr;
+    // True if the transport of this URL is its program's own, which is not shared. None: it never
+    // is.
     std::function<bool(const Url& url)> own = nullptr;
   };
 
@@ -42,7 +43,7 @@ class Registry {
   // The carrier for a URL, not yet opened. Throws Error{usage} for an unknown scheme, naming those
   // that exist, and for a URL that its scheme does not take. A host's is of its own: `share` is passed over.
   std::unique_ptr<Carrier> make(asio::io_context& io, std::string_view url, Role role) const;
-  // The same for a host's program, which shares the wire with others of this machine.
+  // The same for a host's program, which shares the transport with others of this computer.
   std::unique_ptr<Carrier> make_shared(asio::io_context& io, std::string_view url,
                                        BoardRole role) const;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What other programs do to one that holds a wire: any number of them come, say anything in any order, read
+// What other programs do to one that holds a transport: any number of them come, say anything in any order, read
 // or do not, and go. The input is a list of actions. Whatever they do, nothing but a stop gets to the board, one
 // that watches hears all, and a stop of one that comes last is obeyed.
 #include <fmt/format.h>
@@ -15,9 +15,9 @@
 #include "protocol/messages/command_field.hpp"
 #include "r4link/datagram.hpp"
 #include "tests/fuzz/input.hpp"
+#include "transports/share/share_holder.hpp"
 #include "transports/share/share_message.hpp"
 #include "transports/share/share_socket.hpp"
-#include "transports/share/wire_holder.hpp"
 
 namespace r4 {
 namespace {
@@ -27,13 +27,13 @@ using Kind = ShareMessage::Kind;
 constexpr std::string_view stop = "E:STOP;^0x506f0fbe^";
 constexpr std::size_t most_connections = 60;
 
-class Holder final : private WireHolder::Owner {
+class Holder final : private ShareHolder::Owner {
  public:
   explicit Holder(bool gives_way) : gives_way_(gives_way) {
-    require(holder_.hold(wire));
-    watcher_ = come(Kind::hello, hello_text(BoardRole::watch, "watcher"));
+    require(holder_.hold(name, BoardRole::watch));
+    watcher_ = come(Kind::hello, ShareMessage::version);
     run();
-    require(holder_.sharers() == 1);
+    require(holder_.served() == 1);
     hear();
   }
   ~Holder() {
@@ -47,13 +47,14 @@ class Holder final : private WireHolder::Owner {
     FileDescriptor& one = others_.empty() ? none : others_[input.byte() % others_.size()];
     switch (action % 8) {
       case 0:
-        if (others_.size() < most_connections) others_.push_back(reach_holder(wire).connection);
+        if (others_.size() < most_connections)
+          others_.push_back(connect_to_holder(name, BoardRole::watch));
         break;
       case 1:
-        say(one, Kind::hello, hello_text(BoardRole::watch, "other"));
+        say(one, Kind::hello, ShareMessage::version);
         break;
       case 2:
-        say(one, Kind::hello, hello_text(BoardRole::control, "other"));
+        say(one, Kind::ask, ShareMessage::version);
         break;
       case 3:
         say(one, Kind::stop, stop);
@@ -70,7 +71,7 @@ class Holder final : private WireHolder::Owner {
         one.reset();
         break;
       case 6:
-        holder_.tell(Kind::received, "AIN24:24.28;", Priority::state);
+        holder_.tell(Kind::received, "AIN24:24.28;");
         told_ += given_away_ ? 0 : 1;
         hear();
         break;
@@ -84,10 +85,7 @@ class Holder final : private WireHolder::Owner {
 
   void end() {
     run();
-    // Where many came at once, the holder hears the last of them in a later window.
-    if (others_.size() + 1 >= WireHolder::most_arrivals) {
-      run_until([] { return false; });
-    }
+    run_until([] { return false; });  // it takes those in that have come, one after the other
     if (given_away_) return;
     const int before = stops_;
     const FileDescriptor last = come(Kind::stop, stop);
@@ -97,10 +95,8 @@ class Holder final : private WireHolder::Owner {
   }
 
  private:
-  const std::string& name() const override { return wire.name; }
-  Kind standing(std::string& text) const override {
-    text = wire.name;
-    return Kind::up;
+  std::vector<CarrierEvent> standing() const override {
+    return {{CarrierEvent::Kind::up, {ErrorKind::open, name.text, "", ""}}};
   }
   void on_stop_of_another(std::string_view bytes) override {
     Datagram datagram;
@@ -108,14 +104,14 @@ class Holder final : private WireHolder::Owner {
     require(!given_away_);
     ++stops_;
   }
-  bool gives_way() override {
-    given_away_ = gives_way_;
-    return gives_way_;
+  void on_asked() override {
+    if (!gives_way_) return;
+    given_away_ = true;
+    holder_.release();
   }
-  void on_given_away() override { require(given_away_ && !holder_.holds()); }
 
   static FileDescriptor come(Kind kind, std::string_view text) {
-    FileDescriptor connection = reach_holder(wire).connection;
+    FileDescriptor connection = connect_to_holder(name, BoardRole::watch);
     require(static_cast<bool>(connection));
     say(connection, kind, text);
     return connection;
@@ -123,18 +119,18 @@ class Holder final : private WireHolder::Owner {
   static void say(const FileDescriptor& connection, Kind kind, std::string_view text) {
     if (connection) send_message(connection.get(), kind, text);
   }
-  // Runs event after event until `done`, or until nothing happens for two windows.
+  // Runs event after event until `done`, or until nothing happens for as long as ten arrivals take.
   template <class Done>
   void run_until(Done done) {
     for (std::size_t event = 0; event < 100 * most_connections && !done(); ++event) {
       io.restart();
-      if (io.run_one_for(2 * WireHolder::arrival_window) == 0) return;
+      if (io.run_one_for(10 * ShareHolder::between_arrivals) == 0) return;
     }
   }
   void run() {
     io.restart();
     io.poll();
-    require(holder_.sharers() <= WireHolder::most_sharers + WireHolder::most_stoppers);
+    require(holder_.served() <= ShareHolder::most_served_after_a_stop);
   }
   // What the one that watches hears.
   void hear() {
@@ -143,20 +139,21 @@ class Holder final : private WireHolder::Owner {
       const ssize_t size = receive_packet(watcher_.get(), packet.data(), packet.size());
       if (size <= 0) break;
       const auto message = read_share_message({packet.data(), static_cast<std::size_t>(size)});
-      require(message && message->kind != Kind::down);
+      require(message &&
+              (message->kind != Kind::event || message->event.kind == CarrierEvent::Kind::up));
       told_ -= message->kind == Kind::received ? 1 : 0;
     }
     require(told_ == 0);
   }
 
   static inline asio::io_context io{1};
-  static inline const SharedWire wire{fmt::format("fuzz/{}", ::getpid())};
+  static inline const ShareName name{fmt::format("fuzz/{}", ::getpid())};
 
   const bool gives_way_;
   bool given_away_ = false;
   int stops_ = 0;
   int told_ = 0;  // and not yet heard
-  WireHolder holder_{io, *this, "holder"};
+  ShareHolder holder_{io, *this};
   FileDescriptor watcher_;
   std::vector<FileDescriptor> others_;
 };

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Programs that share a wire: what one user runs in several terminals, on the same URL."""
+"""Programs that share a transport: what one user runs in several terminals, on the same URL."""
 import contextlib
 import itertools
 import os
@@ -127,20 +127,20 @@ def test_of_five_that_watch_one_sleeps_one_dies_and_nobody_else_loses_anything(b
         assert silence <= within(TAKEN_OVER_WITHIN_S), f'{silence} s without a datagram'
 
 
-def with_a_stopped_holder(url, look):
-    """Two watch beside one that holds the wire, watches and is stopped: `look` is what to see of each then."""
-    with watch(url) as holder:
+def with_a_stopped_holder(url, look, watchers=2):
+    """Some watch beside one that holds the transport, watches and is stopped: `look` is what to see of each then."""
+    with watch(url) as holder, contextlib.ExitStack() as running:
         holder.next(is_state)
-        with watch(url) as one, watch(url) as other:
-            for each in (one, other):
-                each.next(is_state)
-            stopped = holder.signal(signal.SIGSTOP)
-            for each in (one, other):
-                look(each, holder.process.pid, stopped)
-            holder.signal(signal.SIGCONT)
-            for each in (one, other, holder):
-                each.skip_past()
-                each.next(is_state)
+        others = [running.enter_context(watch(url)) for _ in range(watchers)]
+        for each in others:
+            each.next(is_state)
+        stopped = holder.signal(signal.SIGSTOP)
+        for each in others:
+            look(each, holder.process.pid, stopped)
+        holder.signal(signal.SIGCONT)
+        for each in (*others, holder):
+            each.skip_past()
+            each.next(is_state)
 
 
 def hears_on(watcher, _, stopped):
@@ -157,9 +157,10 @@ def test_a_stopped_holder_that_watches_is_named_where_it_has_the_only_port():
 
 
 def test_a_stopped_holder_that_watches_keeps_nobody_from_a_board(folder):
-    for url in 'udp://127.0.0.1:0', f'pty:{folder}/tty':
+    # Only one program can have a serial port, so only one takes it from the stopped one.
+    for url, watchers in ('udp://127.0.0.1:0', 2), (f'pty:{folder}/tty', 1):
         with Board(url) as board:
-            with_a_stopped_holder(board.host_url.removesuffix('?listen=0'), hears_on)
+            with_a_stopped_holder(board.host_url.removesuffix('?listen=0'), hears_on, watchers)
 
 
 def test_a_stopped_holder_loses_the_serial_port_and_takes_no_byte_of_it_when_it_goes_on(folder):
@@ -211,8 +212,8 @@ def test_where_as_many_share_it_as_may_a_stop_is_obeyed_and_control_is_taken(fol
         for _ in range(16):
             other = others.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET))
             other.connect(f'\0r4link/{os.geteuid()}/serial/{os.path.realpath(folder + "/tty")}')
-            other.send(b'h2wother')
-            assert other.recv(2000) == b'w2r4'
+            other.send(b'h3')
+            assert other.recv(2000) == b'w3'
         told = run('monitor', board.host_url, '--duration', '0.5')
         assert '16 programs share it already, as many as may; end one of them' in told.stdout + told.stderr, told
         stopped = run('stop', board.host_url)
@@ -224,10 +225,13 @@ def test_where_as_many_share_it_as_may_a_stop_is_obeyed_and_control_is_taken(fol
 def test_a_driving_program_that_is_stopped_is_named(board):
     with driving(board.host_url, 'O:358,1,1') as host:
         host.signal(signal.SIGSTOP)
+        status = pathlib.Path(f'/proc/{host.process.pid}/status')
+        while 'State:\tT' not in status.read_text('utf-8'):
+            time.sleep(0.01)
         try:
             refused = run('send', board.host_url, 'O:1,1,1')
             assert refused.returncode != 0
-            assert f'(pid {host.process.pid}) does not answer' in refused.stderr, refused
+            assert f'controlled by r4 (pid {host.process.pid}), which is stopped; let it go on' in refused.stderr, refused
         finally:
             host.signal(signal.SIGCONT)
 
@@ -257,7 +261,7 @@ def test_programs_of_another_user_that_connect_again_and_again_hold_up_neither_t
     if os.geteuid() != 0:
         pytest.skip('only root may run programs as another user')
     with Board(f'pty:{folder}/tty') as board, driving(board.host_url, 'O:358,1,1') as host, contextlib.ExitStack() as others:
-        name = f'r4link/{os.geteuid()}/serial/{os.path.realpath(folder + "/tty")}'
+        name = f'r4link/{os.geteuid()}/control/serial/{os.path.realpath(folder + "/tty")}'
         for _ in range(20):
             other = subprocess.Popen(['/usr/bin/python3', '-S', '-c', HAMMER, name], user='nobody', group='nogroup',
                                      extra_groups=[], cwd='/')

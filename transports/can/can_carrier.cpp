@@ -364,7 +364,7 @@ std::unique_ptr<Carrier> make_can_carrier(asio::io_context& io, const Url& url, 
   return std::make_unique<CanCarrier>(io, url, role);
 }
 
-SharedWire can_wire(const Url& url) {
+ShareName can_share_name(const Url& url) {
   return {fmt::format("can/{}/{}", url.host(), node_of(url, Role::host))};
 }
 

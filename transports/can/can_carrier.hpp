@@ -15,7 +15,7 @@
 #include <asio/io_context.hpp>
 #include <memory>
 
-#include "../shared_wire.hpp"
+#include "../share_name.hpp"
 #include "../url.hpp"
 #include "r4link/carrier.hpp"
 
@@ -24,6 +24,6 @@ namespace r4 {
 std::unique_ptr<Carrier> make_can_carrier(asio::io_context& io, const Url& url, Role role);
 
 // What programs that share the wire call it: the interface and the board's number.
-SharedWire can_wire(const Url& url);
+ShareName can_share_name(const Url& url);
 
 }  // namespace r4

@@ -34,7 +34,9 @@ bool PortLock::lock(int device, Carrier::Claim claim) {
   while (true) {
     const struct flock other = other_from(device, place);
     if (other.l_type == F_UNLCK) break;
-    if (!claim.takes || other.l_len == 0) {
+    // A program that yields takes it from one program at most: two of them would take it from each
+    // other again and again.
+    if (!claim.takes || other.l_len == 0 || (claim.yields && place != 0)) {
       errno = EWOULDBLOCK;
       return false;
     }

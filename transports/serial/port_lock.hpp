@@ -4,7 +4,7 @@
 //
 //     bytes   0    1    2    3 …
 //     A       A                   yields: it has one byte
-//     B            B              has taken it from A, and yields, too
+//     B            B              has taken it from A, and yields, but not to one that yields
 //     C                 C C C …   has taken it from B: with all that follow it yields to nobody
 //
 // Whoever finds a byte behind its own locked has lost the port: A and B here.

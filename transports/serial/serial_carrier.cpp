@@ -220,7 +220,7 @@ std::unique_ptr<Carrier> make_serial_carrier(asio::io_context& io, const Url& ur
   return std::make_unique<SerialCarrier>(io, url);
 }
 
-SharedWire serial_wire(const Url& url) {
+ShareName serial_share_name(const Url& url) {
   const std::string path = resolve_links(find_device(url));
   for (const SerialPort& port : list_serial_ports()) {
     if (port.path == path && port.is_r4 && !port.serial_number.empty()) {

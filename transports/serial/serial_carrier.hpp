@@ -13,7 +13,7 @@
 #include <asio/io_context.hpp>
 #include <memory>
 
-#include "../shared_wire.hpp"
+#include "../share_name.hpp"
 #include "../url.hpp"
 #include "r4link/carrier.hpp"
 
@@ -24,6 +24,6 @@ std::unique_ptr<Carrier> make_serial_carrier(asio::io_context& io, const Url& ur
 
 // What programs that share the port call it: a board by its serial number, so that it may be plugged into
 // another socket, anything else by its device. Throws Error where there is none, or more than one.
-SharedWire serial_wire(const Url& url);
+ShareName serial_share_name(const Url& url);
 
 }  // namespace r4

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <climits>
 #include <optional>
 #include <vector>
 
@@ -14,20 +15,15 @@ namespace {
 std::optional<gid_t> id_of(const std::string& name) {
   group entry{};
   group* found = nullptr;
-  std::vector<char> room(1024);
-  int error = 0;
-  while ((error = ::getgrnam_r(name.c_str(), &entry, room.data(), room.size(), &found)) == ERANGE) {
-    room.resize(room.size() * 2);
-  }
-  if (error != 0 || found == nullptr) return std::nullopt;
-  return entry.gr_gid;
+  std::vector<char> room(1 << 20);  // a group may have thousands of members
+  ::getgrnam_r(name.c_str(), &entry, room.data(), room.size(), &found);
+  return found == nullptr ? std::nullopt : std::optional(entry.gr_gid);
 }
 
 bool is_ours(gid_t group) {
   if (::geteuid() == 0 || ::getegid() == group) return true;
-  std::vector<gid_t> groups(static_cast<std::size_t>(std::max(0, ::getgroups(0, nullptr))));
-  const int count = ::getgroups(static_cast<int>(groups.size()), groups.data());
-  groups.resize(static_cast<std::size_t>(std::max(0, count)));
+  std::vector<gid_t> groups(NGROUPS_MAX);
+  groups.resize(static_cast<std::size_t>(std::max(0, ::getgroups(NGROUPS_MAX, groups.data()))));
   return std::find(groups.begin(), groups.end(), group) != groups.end();
 }
 

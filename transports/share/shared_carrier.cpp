@@ -1,48 +1,50 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "shared_carrier.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "../operation_slot.hpp"
-#include "r4link/datagram.hpp"
+#include "share_client.hpp"
+#include "share_holder.hpp"
 #include "share_message.hpp"
-#include "share_places.hpp"
-#include "wire_holder.hpp"
-#include "wire_sharer.hpp"
+#include "share_socket.hpp"
 
 namespace r4 {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 using Kind = ShareMessage::Kind;
+using Joined = ShareClient::Joined;
 using std::chrono::milliseconds;
 
-constexpr milliseconds answer_within{200};
-constexpr SharePlaces::Patience at_first{milliseconds(500), answer_within};
-// Where a link may be under way by other wires, which must not wait.
-constexpr SharePlaces::Patience again{milliseconds(0), milliseconds(20)};
-// A holder that says nothing for so long is asked whether it is alive, and has so long again to answer.
-constexpr milliseconds ask_after{400};
+// The names by which the holder is sought, in this order.
+constexpr std::array holders{BoardRole::control, BoardRole::watch};
 constexpr milliseconds look_again{5}, look_again_slowly{100};
-// So long the wire may be nobody's before that is told.
+// How long no program may hold the transport before that is told.
 constexpr milliseconds take_over_within{100};
-constexpr milliseconds courtesy{20};  // left to a program that is about to take the wire to control
 
 class SharedCarrier final : public Carrier,
                             private Carrier::Handler,
-                            private WireHolder::Owner,
-                            private WireSharer::Owner {
+                            private ShareHolder::Owner,
+                            private ShareClient::Owner {
  public:
-  SharedCarrier(asio::io_context& io, std::unique_ptr<Carrier> own, FindWire find, BoardRole role)
+  SharedCarrier(asio::io_context& io, std::unique_ptr<Carrier> own, FindShareName find,
+                BoardRole role)
       : own_(std::move(own)),
+        find_(std::move(find)),
         role_(role),
         name_(own_->name()),
-        holder_(io, *this, program_invocation_short_name),
-        sharer_(io, *this),
-        places_(std::move(find), holder_, sharer_),
+        holder_(io, *this),
+        client_(io, *this),
         timer_(io) {}
   ~SharedCarrier() override { close(); }
 
@@ -56,8 +58,8 @@ class SharedCarrier final : public Carrier,
   }
   bool up() const override { return up_; }
   WireTrouble trouble() const override { return own_->trouble(); }
-  // What is sent on a wire that another program holds the board would take for the holder's.
-  bool is_shared() const override { return state_ == State::sharing || own_->is_shared(); }
+  // The board would take what is sent to another program's transport for the holder's.
+  bool is_shared() const override { return is_served() || own_->is_shared(); }
   std::size_t max_size() const override { return own_->max_size(); }
   const std::string& name() const override { return name_; }
   const CarrierCounters& counters() const override {
@@ -66,236 +68,228 @@ class SharedCarrier final : public Carrier,
   }
 
  private:
-  enum class State { closed, attaching, holding, sharing };
+  enum class State { closed, seeking, asking, joined, holding };
+  // For a part in the transport, since we had none.
+  struct Search {
+    Clock::time_point began = Clock::now();
+    std::size_t asked = 0;           // the holder that we have asked
+    std::size_t passed = 0;          // holders that are no help
+    std::optional<Problem> no_help;  // why not the first of them
+  };
 
   void on_datagram(std::string_view bytes, Peer from) override;
   void on_carrier_event(const CarrierEvent& event) override;
   void on_drained() override { handler_->on_drained(); }
-  void on_taken() override;
+  void on_taken() override { lose(); }
   void on_overheard(std::string_view bytes) override;
   void on_oversize(std::string_view beginning) override;
-  // Those who share our wire.
-  Kind standing(std::string& text) const override;
+  // Programs to which we are the holder.
+  std::vector<CarrierEvent> standing() const override;
   void on_stop_of_another(std::string_view datagram) override;
-  bool gives_way() override;
-  void on_given_away() override { attach_later(courtesy); }
-  // The holder of the wire that we share.
+  void on_asked() override;
+  // The holder that serves us.
   void on_message(const ShareMessage& message) override;
   void on_all_heard() override { handler_->on_drained(); }
-  void on_holder_lost() override;
+  void on_no_help(const Problem& why) override;
+  void on_closed() override;
 
-  void take_part();
-  bool try_to_take_part();
-  bool try_to_share();
-  bool try_to_hold();
-  void expect_answer(milliseconds within);
-  void look_after_holder();
-  bool leave_holder();
-  void leave_other_version();
-  void attach_later(milliseconds delay);
+  bool take_part();
+  void require_control();
+  bool hold_to_watch();
+  void open_own();
+  void pass_over(const Problem& why);
+  void lose();
   void look();
-  void look_later();
-  const SharePlaces::Patience& patience() const { return tried_ ? again : at_first; }
-  bool late() const { return Clock::now() - since_ >= take_over_within; }
+  void look_later(milliseconds delay);
+  bool late() const { return Clock::now() - search_.began >= take_over_within; }
+  // Another program holds the transport, and takes our stops.
+  bool is_served() const {
+    return state_ == State::joined || (state_ == State::asking && role_ == BoardRole::watch);
+  }
   void tell(const CarrierEvent& event);
 
   const std::unique_ptr<Carrier> own_;
+  const FindShareName find_;
   const BoardRole role_;
   std::string name_;
-  WireHolder holder_;
-  WireSharer sharer_;
-  SharePlaces places_;
+  ShareName share_;
+  ShareHolder holder_;
+  ShareClient client_;
   LoopTimer timer_;
   OperationSlot looking_;
+  Search search_;
   State state_ = State::closed;
   bool up_ = false;
-  bool moved_ = false;
-  bool tried_ = false;  // before: now a link may be under way
-  // Of the holder whose wire we share.
-  bool welcome_ = false;
-  bool heard_ = false;  // since it was looked after
-  bool asked_ = false;
   std::optional<Problem> trouble_;  // why it is down, or the warning that stands
-  Clock::time_point since_;         // we have no part in the wire
   Carrier::Handler* handler_ = nullptr;
-  CarrierCounters shared_counters_;  // of what others carried for us
+  CarrierCounters shared_counters_;  // of what other programs carried for us
   mutable CarrierCounters counted_;  // of it and our own
 };
 
 void SharedCarrier::open(Carrier::Handler& handler) {
   close();
   handler_ = &handler;
-  state_ = State::attaching;
-  since_ = Clock::now();
+  state_ = State::seeking;
+  search_ = {};
   try {
-    places_.begin();
-    take_part();
+    if (!take_part()) look_later(look_again);
   } catch (...) {
-    tried_ = true;
     close();
     throw;
   }
-  tried_ = true;
 }
 
 void SharedCarrier::close() noexcept {
   state_ = State::closed;
   handler_ = nullptr;
-  up_ = moved_ = false;
+  up_ = false;
   trouble_.reset();
   looking_.cancel();
-  sharer_.leave();
-  own_->close();  // the wire is free before others are told so
+  client_.leave();
+  own_->close();  // the transport is free before others are told so
   holder_.release();
 }
 
-// Throws Error where neither will do.
-void SharedCarrier::take_part() {
-  // Between our two questions others may come and go.
-  const Clock::time_point deadline = Clock::now() + take_over_within + share_places * answer_within;
-  do {
-    if (try_to_take_part()) return;
-  } while (!tried_ && Clock::now() < deadline);
-  throw Error(ErrorKind::open, name_, "other programs take it, one after the other",
-              "end those that control the board");
-}
-
-bool SharedCarrier::try_to_take_part() {
-  if (role_ == BoardRole::watch && try_to_share()) return true;
-  if (role_ == BoardRole::control) {
-    places_.ask_for_wire(name_, patience());
+// Joins the holder, or becomes it. False: look again soon. Throws Error if the transport cannot be
+// had.
+bool SharedCarrier::take_part() {
+  if (!holder_.holds()) share_ = find_();
+  const bool controls = role_ == BoardRole::control;
+  if (controls && !holder_.holds()) require_control();
+  bool has_stranger = false;
+  for (std::size_t step = std::max<std::size_t>(search_.passed, controls ? 1 : 0); step < 2;
+       ++step) {
+    search_.asked = step;
+    const Joined joined = with_system_errors(name_, [&] {
+      return client_.join(share_, holders[step], controls ? Kind::ask : Kind::hello, name_);
+    });
+    has_stranger = joined == Joined::stranger;
+    if (joined == Joined::nobody || has_stranger) continue;
+    if (joined == Joined::holder && !is_stopped(client_.process())) {
+      state_ = State::asking;
+      return true;
+    }
+    const bool waits = Clock::now() - search_.began < ShareClient::answer_within;
+    if (joined == Joined::crowd && waits) return false;
+    pass_over(client_.silence());
   }
-  try {
-    return try_to_hold();
-  } catch (const Error& error) {
-    if (error.kind() != ErrorKind::open) throw;
-    if (places_.somebody_has_come()) return false;  // and was faster
-    if (places_.no_help()) throw Error(*places_.no_help());
-    throw;
-  }
-}
-
-// True if we share it now, or may do so soon.
-bool SharedCarrier::try_to_share() {
-  if (!places_.join(name_, patience())) return false;
-  state_ = State::sharing;
-  welcome_ = heard_ = false;
-  asked_ = true;  // by the hello
-  sharer_.listen();
-  expect_answer(answer_within);
+  const bool is_free = search_.passed < 2 && !has_stranger;
+  if (!controls && is_free && !hold_to_watch()) return false;
+  open_own();
   return true;
 }
 
-void SharedCarrier::expect_answer(milliseconds within) {
-  timer_.expires_after(within);
-  timer_.async_wait(looking_.handler([this] { look_after_holder(); }));
-}
-
-// A board that says nothing is told by this from a holder that hangs.
-void SharedCarrier::look_after_holder() {
-  if (heard_) {
-    heard_ = asked_ = false;
-  } else if (!asked_) {
-    asked_ = true;
-    sharer_.ask_whether_alive();
-  } else {
-    places_.pass_over_hanging(name_);
-    if (leave_holder()) return;
-    // When it goes on it finds our hello.
-    tell({CarrierEvent::Kind::down, *places_.no_help()});
-    if (state_ != State::sharing) return;
+// Takes the name of the program that controls. Throws Error{refused} if another program has it.
+void SharedCarrier::require_control() {
+  FileDescriptor other;
+  for (int i = 0; !other && i < 2; ++i) {  // the other one may have ended in between
+    if (holder_.hold(share_, BoardRole::control)) return;
+    if (const auto problem = out_of_resources(name_, errno)) throw Error(*problem);
+    other = connect_to_holder(share_, BoardRole::control);
   }
-  expect_answer(ask_after);
+  if (other && !is_one_of_us(other.get(), share_)) return;  // a stranger keeps us from nothing
+  const pid_t process = other ? process_of(other.get()) : 0;
+  const bool stopped = is_stopped(process);
+  throw Error(
+      ErrorKind::refused, name_,
+      fmt::format("controlled by {}{}{}", program_of(process),
+                  other ? fmt::format(" (pid {})", process) : "",
+                  stopped ? ", which is stopped" : ""),
+      stopped ? fmt::format("let it go on (kill -CONT {0}), or end it (kill -KILL {0})", process)
+              : "end that program, or watch beside it, as r4 monitor does");
 }
 
-// It is no help to us. False: neither is any other, and the wire is not to be had without it.
-bool SharedCarrier::leave_holder() {
-  since_ = Clock::now();
-  try {
-    // One of those that leave it with us may be about to hold another.
-    for (int i = 0; i < 3; ++i) {
-      if (try_to_share() || try_to_hold()) return true;
-    }
-  } catch (const Error&) {
+// Takes the name of the program that watches and holds the transport. False if another program was
+// faster. A program that is to control takes its own name before it looks for this one, so one of
+// the two sees the other.
+bool SharedCarrier::hold_to_watch() {
+  if (!holder_.hold(share_, BoardRole::watch)) {
+    if (const auto problem = out_of_resources(name_, errno)) throw Error(*problem);
     return false;
   }
+  if (search_.passed != 0) return true;
+  const FileDescriptor other = connect_to_holder(share_, BoardRole::control);
+  if (other ? !is_one_of_us(other.get(), share_) : !would_block(errno)) return true;
+  holder_.release();
   return false;
 }
 
-void SharedCarrier::leave_other_version() {
-  sharer_.leave();
-  attach_later(look_again_slowly);
-  places_.pass_over_other_version(name_);
-  tell({CarrierEvent::Kind::down, *places_.no_help()});
-}
-
-// Where a holder hangs that only watches, it is taken from that one. Throws Error if it cannot be opened.
-bool SharedCarrier::try_to_hold() {
-  if (!places_.hold(name_)) return false;
-  const State before = std::exchange(state_, State::holding);
+// If a holder was passed over that only watches, a device that one program can have open is taken
+// from that program.
+void SharedCarrier::open_own() {
+  state_ = State::holding;
   try {
-    own_->claim({role_ == BoardRole::watch && holder_.holds(), places_.one_hangs()});
-    own_->open(*this);
-  } catch (...) {
-    state_ = before;
-    holder_.release();
+    own_->claim({role_ == BoardRole::watch, search_.no_help.has_value()});
+    with_system_errors(name_, [&] { own_->open(*this); });
+  } catch (const Error& error) {
+    state_ = State::seeking;
+    if (role_ == BoardRole::watch) holder_.release();
+    if (error.kind() == ErrorKind::open && search_.no_help) throw Error(*search_.no_help);
     throw;
   }
-  sharer_.leave();
-  return true;
+  if (state_ == State::holding && !holder_.holds()) look_later(look_again_slowly);
 }
 
-void SharedCarrier::attach_later(milliseconds delay) {
-  state_ = State::attaching;
-  places_.forget();
-  since_ = Clock::now() + delay;
+// The holder that was asked is no help.
+void SharedCarrier::pass_over(const Problem& why) {
+  client_.leave();
+  search_.passed = search_.asked + 1;
+  if (!search_.no_help) search_.no_help = why;
+}
+
+// We have no part in the transport any more.
+void SharedCarrier::lose() {
+  client_.leave();
+  own_->close();
+  holder_.release();
+  state_ = State::seeking;
+  search_ = {};
+  look_later(milliseconds(0));
+}
+
+void SharedCarrier::look() {
+  if (state_ == State::holding) {
+    if (!holder_.hold(share_, role_)) look_later(look_again_slowly);
+    return;
+  }
+  try {
+    if (take_part()) return;
+  } catch (const Error& error) {
+    const bool is_news =
+        (late() || search_.no_help) && (up_ || !trouble_ || error.kind() != ErrorKind::open);
+    search_.passed = 0;
+    search_.no_help.reset();
+    if (is_news) tell({CarrierEvent::Kind::down, error.problem()});
+    if (state_ != State::seeking) return;
+  }
+  look_later(late() ? look_again_slowly : look_again);
+}
+
+void SharedCarrier::look_later(milliseconds delay) {
   timer_.expires_after(delay);
   timer_.async_wait(looking_.handler([this] { look(); }));
 }
 
-void SharedCarrier::look() {
-  try {
-    places_.follow();
-    if (try_to_take_part()) return;
-  } catch (const Error& error) {
-    places_.forget();
-    if (late()) tell({CarrierEvent::Kind::down, error.problem()});
-    if (state_ != State::attaching) return;
-  }
-  look_later();
-}
-
-void SharedCarrier::look_later() {
-  timer_.expires_after(late() ? look_again_slowly : look_again);
-  timer_.async_wait(looking_.handler([this] { look(); }));
-}
-
 SendResult SharedCarrier::send(std::string_view bytes, Priority priority, Peer to) {
-  switch (state_) {
-    case State::holding: {
-      const SendResult result = own_->send(bytes, priority, to);
-      if (result == SendResult::sent) holder_.tell(Kind::sent, bytes);
-      return result;
-    }
-    case State::sharing:
-      // Nothing else is ours to say: the board would take it for the holder's.
-      if (priority != Priority::stop) return SendResult::down;
-      ++shared_counters_.tx_datagrams;
-      shared_counters_.tx_bytes += bytes.size();
-      return sharer_.send_stop(bytes);
-    case State::attaching:
-    case State::closed:
-      break;
+  if (state_ == State::holding) {
+    const SendResult result = own_->send(bytes, priority, to);
+    if (result == SendResult::sent) holder_.tell(Kind::sent, bytes);
+    return result;
   }
-  return SendResult::down;
+  // Another holder sends nothing for us but a stop: the board would take anything else for the
+  // holder's.
+  if (!is_served() || priority != Priority::stop) return SendResult::down;
+  ++shared_counters_.tx_datagrams;
+  shared_counters_.tx_bytes += bytes.size();
+  return client_.send_stop(bytes);
 }
 
-// --- we hold the wire
+// --- we hold the transport
 
 void SharedCarrier::on_datagram(std::string_view bytes, Peer from) {
-  // Ours first: it may be driving.
+  // Our own program first: it may be driving.
   handler_->on_datagram(bytes, from);
-  if (state_ == State::holding) holder_.tell(Kind::received, bytes, priority_of(bytes));
+  if (state_ == State::holding) holder_.tell(Kind::received, bytes);
 }
 
 void SharedCarrier::on_overheard(std::string_view bytes) {
@@ -309,77 +303,53 @@ void SharedCarrier::on_oversize(std::string_view beginning) {
 }
 
 void SharedCarrier::on_carrier_event(const CarrierEvent& event) {
-  // A board that is found elsewhere is another name.
-  const bool renamed = name_ != own_->name();
   name_ = own_->name();
-  const bool goes = event.kind == CarrierEvent::Kind::down && places_.wire().is_place;
-  const bool comes = event.kind == CarrierEvent::Kind::up && trouble_;
-  if (state_ == State::holding && (goes || comes)) places_.rename();
   tell(event);
-  if (!up_) return;
-  if (auto stranger = places_.take_stranger()) tell({CarrierEvent::Kind::warning, *stranger});
-  if (renamed && up_ && state_ == State::holding) holder_.tell(Kind::up, name_);
+  // Another device may be given that path at once.
+  const bool is_gone = event.kind == CarrierEvent::Kind::down && share_.is_path;
+  if (is_gone && state_ == State::holding) lose();
 }
 
-// To those who share the wire and to our program, unless it knows that already. `up` is told anew when
-// the datagrams come from elsewhere.
+// To the programs that we serve, and to our own program unless it knows that already.
 void SharedCarrier::tell(const CarrierEvent& event) {
   const bool up = event.kind == CarrierEvent::Kind::up;
   const bool down = event.kind == CarrierEvent::Kind::down;
   const bool known = down && !up_ && trouble_ && trouble_->reason == event.problem.reason;
-  const bool turns = (up || down) && up != up_;
-  if (turns && state_ != State::holding) ++(up ? shared_counters_.ups : shared_counters_.downs);
-  if (turns) up_ = up;
-  trouble_ = up ? std::nullopt : std::optional(event.problem);
-  if (state_ == State::holding && holder_.sharers() != 0) {
-    std::string text;
-    const Kind kind = standing(text);
-    holder_.tell(kind, text);
+  if ((up || down) && up != up_) {
+    up_ = up;
+    if (state_ != State::holding) ++(up ? shared_counters_.ups : shared_counters_.downs);
   }
+  trouble_ = up ? std::nullopt : std::optional(event.problem);
+  holder_.tell(Kind::event, text_of(event));
   if (!known) handler_->on_carrier_event(event);
 }
 
-Kind SharedCarrier::standing(std::string& text) const {
-  text = trouble_ ? problem_text(*trouble_) : name_;
-  if (!up_) return Kind::down;
-  return trouble_ ? Kind::warning : Kind::up;
+std::vector<CarrierEvent> SharedCarrier::standing() const {
+  std::vector<CarrierEvent> events;
+  if (up_) events.push_back({CarrierEvent::Kind::up, {ErrorKind::open, name_, "", ""}});
+  if (trouble_) {
+    events.push_back({up_ ? CarrierEvent::Kind::warning : CarrierEvent::Kind::down, *trouble_});
+  }
+  return events;
 }
 
 void SharedCarrier::on_stop_of_another(std::string_view datagram) {
-  if (own_->send(datagram, Priority::stop, everyone) == SendResult::sent) {
-    holder_.tell(Kind::sent, datagram);
-    handler_->on_overheard(datagram);
-  }
+  if (state_ != State::holding) return;  // it is repeated until the board obeys
+  if (own_->send(datagram, Priority::stop, everyone) != SendResult::sent) return;
+  holder_.tell(Kind::sent, datagram);
+  handler_->on_overheard(datagram);
 }
 
-// It may be from long ago that this program went on last.
-void SharedCarrier::on_taken() {
-  holder_.release();
-  attach_later(milliseconds(0));
+void SharedCarrier::on_asked() {
+  if (role_ == BoardRole::watch) lose();
 }
 
-bool SharedCarrier::gives_way() {
-  if (role_ == BoardRole::control) return false;
-  own_->close();
-  return true;
-}
-
-// --- we share the wire
+// --- another program holds the transport
 
 void SharedCarrier::on_message(const ShareMessage& message) {
-  heard_ = true;
-  if (places_.joined_is_passed_over()) {
-    places_.forget();
-    // It goes on, and tells how the wire is to those that come.
-    if (welcome_) {
-      sharer_.leave();
-      return attach_later(milliseconds(0));
-    }
-  }
   switch (message.kind) {
     case Kind::welcome:
-      welcome_ = true;
-      if (!message.same_version) leave_other_version();
+      if (role_ == BoardRole::watch) state_ = State::joined;
       break;
     case Kind::received:
       ++shared_counters_.rx_datagrams;
@@ -387,41 +357,42 @@ void SharedCarrier::on_message(const ShareMessage& message) {
       handler_->on_datagram(message.text, everyone);
       break;
     case Kind::sent:
-      return handler_->on_overheard(message.text);
+      handler_->on_overheard(message.text);
+      break;
     case Kind::oversize:
       ++shared_counters_.rx_oversize;
       handler_->on_oversize(message.text);
       break;
-    case Kind::up:
-      name_ = std::string(message.text);
-      tell({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
+    case Kind::event: {
+      CarrierEvent event = message.event;
+      if (event.kind == CarrierEvent::Kind::up) name_ = event.problem.thing;
+      event.problem.thing = name_;
+      tell(event);
       break;
-    case Kind::down:
-      return tell({CarrierEvent::Kind::down, message.problem});
-    case Kind::warning:
-      return tell({CarrierEvent::Kind::warning, message.problem});
-    case Kind::moved:
-      moved_ = true;
-      break;
+    }
     default:
       break;
   }
 }
 
-void SharedCarrier::on_holder_lost() {
-  if (std::exchange(moved_, false)) return attach_later(courtesy);
-  if (welcome_) return attach_later(milliseconds(0));
-  // It ends, or has had enough of us.
-  state_ = State::attaching;
-  places_.forget();
-  if (late() && !trouble_) tell({CarrierEvent::Kind::down, sharer_.turned_away(name_)});
-  if (state_ == State::attaching) look_later();
+void SharedCarrier::on_no_help(const Problem& why) {
+  if (state_ == State::joined) search_.began = Clock::now();
+  pass_over(why);
+  state_ = State::seeking;
+  look();
+}
+
+void SharedCarrier::on_closed() {
+  if (state_ == State::joined) return lose();
+  const bool let_go = role_ == BoardRole::control;
+  state_ = State::seeking;
+  look_later(let_go ? milliseconds(0) : late() ? look_again_slowly : look_again);
 }
 
 }  // namespace
 
 std::unique_ptr<Carrier> make_shared_carrier(asio::io_context& io, std::unique_ptr<Carrier> own,
-                                             FindWire find, BoardRole role) {
+                                             FindShareName find, BoardRole role) {
   return std::make_unique<SharedCarrier>(io, std::move(own), std::move(find), role);
 }
 

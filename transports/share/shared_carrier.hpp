@@ -1,29 +1,33 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A wire that the programs of a user share (docs/sharing.md): a carrier about the one that a URL names.
+// A transport that the programs of a user share (docs/sharing.md): a carrier about the one that a
+// URL names.
 //
-//                 nobody holds the wire                       a program that controls comes
-//     attaching ------------------------> holding (the carrier is open) ---+
-//      ^  |                                                                |
-//      |  +--> sharing (what the holder tells)                             |
-//      |          | the holder ends, or gives the wire away                |
-//      +----------+--------------------------------------------------------+
+//     seeking ----a program holds it----> asking ----welcome----> joined
+//      |   ^                                |                       |
+//      |   +---- the holder ends, or does not answer in time -------+
+//      |   |
+//      |   +---- a program that controls asks for the transport, or takes it
+//      |   |
+//      +-> holding, with the carrier open: no program holds it, or the holder was passed over
 //
-// Who controls the board holds the wire itself: nothing of what it sends waits for another program, and
-// none can hold it up. So a program that watches gives the wire to one that comes to control. Those
-// that watch hear all that passes, and send stops.
+// The program that controls the board holds the transport itself: nothing of what it sends waits
+// for another program. It also holds a name of its own, so a second one is refused at once.
+// Programs that watch hear all that passes, and send stops.
 #pragma once
 
 #include <asio/io_context.hpp>
 #include <memory>
 
-#include "../shared_wire.hpp"
+#include "../share_name.hpp"
 #include "r4link/carrier.hpp"
 #include "r4link/options.hpp"
 
 namespace r4 {
 
-// What the carrier reports is what `own` does, whoever holds the wire.
+// What the carrier reports is what `own` does, whichever program holds the transport. open() does
+// not wait for another program; it throws Error{refused} if one controls the board, and what `own`
+// throws.
 std::unique_ptr<Carrier> make_shared_carrier(asio::io_context& io, std::unique_ptr<Carrier> own,
-                                             FindWire find, BoardRole role);
+                                             FindShareName find, BoardRole role);
 
 }  // namespace r4

@@ -39,7 +39,7 @@ std::unique_ptr<Carrier> make_udp_carrier_with(asio::io_context& io, const Url& 
 
 bool udp_has_own_port(const Url& text) { return UdpUrl(text, Role::host).listen == 0; }
 
-SharedWire udp_wire(const Url& text) {
+ShareName udp_share_name(const Url& text) {
   const UdpUrl url(text, Role::host);
   if (url.listen == 0) return {};
   // Who watches has that port, too, if the URL names it, else one of its own.

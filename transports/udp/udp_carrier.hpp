@@ -29,7 +29,7 @@
 #include <asio/io_context.hpp>
 #include <memory>
 
-#include "../shared_wire.hpp"
+#include "../share_name.hpp"
 #include "../url.hpp"
 #include "r4link/carrier.hpp"
 #include "search/board_search.hpp"
@@ -46,7 +46,7 @@ std::unique_ptr<Carrier> make_udp_carrier_with(asio::io_context& io, const Url& 
 
 // What programs that share the wire call it: the board, as it is written, and the port of hosts. Empty
 // where that is any free one: then each has its own.
-SharedWire udp_wire(const Url& text);
+ShareName udp_share_name(const Url& text);
 bool udp_has_own_port(const Url& text);
 
 }  // namespace r4

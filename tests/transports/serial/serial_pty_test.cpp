@@ -430,6 +430,7 @@ TEST_F(SerialPtyTest, MayBeTakenFromOneThatYieldsWhichReadsAndSendsNothingMore) 
     EXPECT_TRUE(error_of([&] { opened(claim, second); })) << "asked to take it, it is not";
 
   const auto two = opened(takes_and_yields, second);
+  EXPECT_TRUE(error_of([&] { opened(takes_and_yields, third); })) << "those two would take turns";
   const auto three = opened(takes, third);
   for (int i = 0; i < 20; ++i) {
     write_text(terminal.master, fmt::format("for the third {}\r\n", i));

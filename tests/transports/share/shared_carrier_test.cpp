@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <sys/socket.h>
-#include <sys/un.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
+#include <csignal>
 
-#include "shared_wire.hpp"
+#include "shared_transport.hpp"
 #include "tests/support/datagrams.hpp"
 #include "transports/share/share_message.hpp"
 #include "transports/share/share_socket.hpp"
@@ -17,22 +17,27 @@ namespace {
 
 using namespace std::chrono_literals;
 
-class SharedCarrier : public SharedWireTest {};
+class SharedCarrier : public SharedTransportTest {
+ protected:
+  const std::string stop = datagram_of("E", "STOP");
+  const Problem unplugged{ErrorKind::open, "device:", "unplugged", "plug it in again"};
+  const std::string silent =
+      fmt::format("the program that holds it (pid {}) does not answer", ::getpid());
+};
 
-TEST_F(SharedCarrier, WhoComesFirstHasTheWire) {
-  const auto only = opened(BoardRole::control);
-  EXPECT_EQ(device.opened, 1);
+TEST_F(SharedCarrier, IsHeldByTheFirstProgramUntilThatCloses) {
+  const auto only = opened_in(io, BoardRole::control);
+  EXPECT_TRUE(only->carrier->up());
   EXPECT_EQ(only->carrier->name(), "device:");
   EXPECT_EQ(only->carrier->send("hello", Priority::normal), SendResult::sent);
-  EXPECT_EQ(device.all_sent(), std::vector<std::string>{"hello"});
-  device.deliver("answer");
-  EXPECT_TRUE(run_until(io, [&] { return only->has("answer"); }));
+  EXPECT_EQ(device.sent, std::vector<std::string>{"hello"});
+  EXPECT_TRUE(all_hear("answer", only));
   only->carrier->close();
   EXPECT_EQ(device.open, nullptr);
-  EXPECT_FALSE(reach_holder({wire}).connection);
+  EXPECT_FALSE(connect_to_holder(share, BoardRole::control));
 }
 
-TEST_F(SharedCarrier, ThoseThatWatchHearBothDirections) {
+TEST_F(SharedCarrier, LetsProgramsThatWatchHearBothDirections) {
   const auto driver = opened(BoardRole::control);
   const auto one = opened(BoardRole::watch);
   const auto two = opened(BoardRole::watch);
@@ -54,7 +59,7 @@ TEST_F(SharedCarrier, ThoseThatWatchHearBothDirections) {
   EXPECT_TRUE(driver->heard.overheard.empty());
 }
 
-TEST_F(SharedCarrier, ThoseThatWatchHearNoSecret) {
+TEST_F(SharedCarrier, LetsProgramsThatWatchHearNoSecret) {
   const auto driver = opened(BoardRole::control);
   const auto watcher = opened(BoardRole::watch);
   const std::string setting = with_crc("C:password,letmein!;PNum:1;T:2;");
@@ -64,15 +69,13 @@ TEST_F(SharedCarrier, ThoseThatWatchHearNoSecret) {
   device.deliver(setting);  // an echo of the line
   ASSERT_TRUE(run_until(io, [&] { return watcher->has(masked); }));
   EXPECT_EQ(watcher->heard.overheard, (std::vector<std::string>{masked, masked}));
-  ASSERT_EQ(watcher->heard.datagrams.size(), 1U);
-  EXPECT_EQ(device.all_sent(), std::vector<std::string>{setting}) << "to the board as it is";
+  EXPECT_EQ(device.sent, std::vector<std::string>{setting}) << "the board gets it as it is";
 }
 
-// Whoever drives is kept waiting by nobody that watches.
-TEST_F(SharedCarrier, WhoHoldsTheWireHasWhatComesAndSendsWhatGoesBeforeOthersAreTold) {
+TEST_F(SharedCarrier, ServesItsOwnProgramBeforeOthers) {
   const auto driver = opened(BoardRole::control);
-  const FileDescriptor watcher = reach_holder({wire}).connection;
-  send_message(watcher.get(), ShareMessage::Kind::hello, hello_text(BoardRole::watch, "watcher"));
+  const FileDescriptor watcher = connect_to_holder(share, BoardRole::control);
+  send_message(watcher.get(), ShareMessage::Kind::hello, ShareMessage::version);
   std::array<char, ShareMessage::max_size> packet;
   const auto hear = [&] { return receive_packet(watcher.get(), packet.data(), packet.size()) > 0; };
   for (int answers = 0; answers < 2;) {  // welcome, up
@@ -91,7 +94,7 @@ TEST_F(SharedCarrier, WhoHoldsTheWireHasWhatComesAndSendsWhatGoesBeforeOthersAre
   EXPECT_TRUE(hear());
 }
 
-TEST_F(SharedCarrier, AllHearWhatAnotherHostSaysOnTheWireAndWhatIsTooLong) {
+TEST_F(SharedCarrier, LetsAllHearWhatAnotherHostSaysAndWhatIsTooLong) {
   const auto driver = opened(BoardRole::control);
   const auto watcher = opened(BoardRole::watch);
   device.overhear("O:358,1,1;");
@@ -105,237 +108,268 @@ TEST_F(SharedCarrier, AllHearWhatAnotherHostSaysOnTheWireAndWhatIsTooLong) {
   EXPECT_EQ(watcher->carrier->counters().rx_oversize, 1U);
 }
 
-TEST_F(SharedCarrier, WhoWatchesStopsTheBoardAndSaysNothingElse) {
+TEST_F(SharedCarrier, LetsAProgramThatWatchesStopTheBoardAtOnceAndSayNothingElse) {
   const auto driver = opened(BoardRole::control);
-  const auto watcher = opened(BoardRole::watch);
+  const auto watcher = opened_in(io, BoardRole::watch);  // not served yet
   EXPECT_TRUE(watcher->carrier->is_shared());
   EXPECT_FALSE(driver->carrier->is_shared());
-  watcher->carrier->send(datagram_of("H", "ROS2-R4"), Priority::normal);
-  const std::string stop = datagram_of("E", "STOP");
+  EXPECT_EQ(watcher->carrier->send(datagram_of("H", "ROS2-R4"), Priority::normal),
+            SendResult::down);
   EXPECT_EQ(watcher->carrier->send(stop, Priority::stop), SendResult::sent);
-  ASSERT_TRUE(run_until(io, [&] { return !device.all_sent().empty(); }));
-  EXPECT_EQ(device.all_sent(), std::vector<std::string>{stop});
+  watcher->carrier->close();
+  ASSERT_TRUE(run_until(io, [&] { return !device.sent.empty(); }));
+  EXPECT_EQ(device.sent, std::vector<std::string>{stop});
   EXPECT_EQ(driver->heard.overheard, std::vector<std::string>{stop});
 }
 
-TEST_F(SharedCarrier, AStopNeedsNoWelcome) {
-  const auto driver = opened(BoardRole::control);
-  const auto watcher = program(BoardRole::watch, io);
-  watcher->carrier->open(watcher->heard);
-  const std::string stop = datagram_of("E", "STOP");
-  EXPECT_EQ(watcher->carrier->send(stop, Priority::stop), SendResult::sent);
-  watcher->carrier->close();
-  EXPECT_TRUE(run_until(io, [&] { return !device.all_sent().empty(); }));
-}
-
-TEST_F(SharedCarrier, AThirdIsToldWhoControls) {
-  OtherThread elsewhere;
-  std::unique_ptr<Program> driver;
-  elsewhere.run([&] {
-    driver = program(BoardRole::control, elsewhere.loop);
-    driver->carrier->open(driver->heard);
-  });
+TEST_F(SharedCarrier, RefusesASecondProgramThatIsToControlAndNamesTheFirst) {
+  auto driver = opened(BoardRole::control);
   const auto second = program(BoardRole::control, io);
-  const auto error = error_of([&] { second->carrier->open(second->heard); });
+  const auto error = error_of([&] { second->open(); });
   ASSERT_TRUE(error);
   EXPECT_EQ(error->kind(), ErrorKind::refused);
   EXPECT_EQ(error->problem().reason,
-            fmt::format("controlled by {} (pid {})", program_invocation_short_name, ::getpid()));
+            fmt::format("controlled by {} (pid {})", program_of(::getpid()), ::getpid()));
   EXPECT_FALSE(second->carrier->up());
   EXPECT_EQ(device.opened, 1);
-  elsewhere.run([&] { driver.reset(); });
-  second->carrier->open(second->heard);
+  driver.reset();
+  second->open();
   EXPECT_TRUE(second->carrier->up());
 }
 
-TEST_F(SharedCarrier, WhoWatchesGivesTheWireToWhoControls) {
-  OtherThread elsewhere;
-  std::array<std::unique_ptr<Program>, 3> watchers;
-  elsewhere.run([&] {
-    for (auto& each : watchers) {
-      each = program(BoardRole::watch, elsewhere.loop);
-      each->carrier->open(each->heard);
-    }
-  });
-  EXPECT_EQ(device.opened, 1);
-  const auto driver = program(BoardRole::control, io);
-  driver->carrier->open(driver->heard);
-  EXPECT_TRUE(driver->carrier->up());
-  driver->carrier->send("O:358,1,1;", Priority::normal);
-  const auto all_hear = [&](const std::string& text) {
-    return in_time([&] {
-      device.deliver(text);
-      run_for(io, 5ms);
-      bool all = true;
-      elsewhere.run([&] {
-        for (const auto& each : watchers) all = all && each->has(text);
-      });
-      return all;
-    });
-  };
-  EXPECT_TRUE(all_hear("driven"));
+TEST_F(SharedCarrier, GivesTheTransportToAProgramThatControls) {
+  const auto one = opened(BoardRole::watch);
+  const auto two = opened(BoardRole::watch);
+  const auto driver = opened_in(io, BoardRole::control);
+  EXPECT_FALSE(driver->carrier->up()) << "open() does not wait for the holder";
+  ASSERT_TRUE(run_until(io, [&] { return driver->carrier->up(); }));
+  EXPECT_TRUE(all_hear("driven", one, two, driver));
+  EXPECT_TRUE(one->carrier->is_shared());
+  EXPECT_TRUE(two->carrier->is_shared());
   driver->carrier->close();
-  ASSERT_TRUE(in_time([&] {
-    const std::lock_guard lock(device.mutex);
-    return device.open != nullptr;
-  }));
-  EXPECT_TRUE(all_hear("nobody drives"));
-  elsewhere.run([&] {
-    for (auto& each : watchers) {
-      EXPECT_EQ(each->heard.count(Kind::down), 0U);
-      each.reset();
-    }
-  });
+  EXPECT_TRUE(all_hear("nobody drives", one, two));
+  EXPECT_EQ(device.opened, 3);
+  for (const auto& each : {one.get(), two.get()}) EXPECT_EQ(each->heard.count(Kind::down), 0U);
 }
 
-TEST_F(SharedCarrier, AnotherTakesTheWireOverFromOneThatEnds) {
+TEST_F(SharedCarrier, IsTakenOverByAnotherProgramWhenTheHolderEnds) {
   std::vector<std::unique_ptr<Program>> programs;
-  for (int i = 0; i < 5; ++i) programs.push_back(opened(BoardRole::watch));
+  for (int i = 0; i < 4; ++i) programs.push_back(opened(BoardRole::watch));
   while (programs.size() > 1) {
     programs.erase(programs.begin());
-    const auto ended = Clock::now();
-    // Whoever has it now.
-    ASSERT_TRUE(run_until(io, [&] { return device.open != nullptr; }));
-    EXPECT_LT(in_milliseconds(Clock::now() - ended), 100);
-    const std::string text = fmt::format("{} left", programs.size());
-    ASSERT_TRUE(in_time([&] {
-      device.deliver(text);
-      run_for(io, 5ms);
-      bool all = true;
-      for (const auto& each : programs) all = all && each->has(text);
-      return all;
-    }));
+    EXPECT_TRUE(
+        all_hear(fmt::format("{} left", programs.size()), programs.front(), programs.back()));
   }
-  EXPECT_EQ(device.opened, 5);
+  EXPECT_EQ(device.opened, 4);
   EXPECT_EQ(programs.front()->heard.count(Kind::down), 0U);
-  EXPECT_GE(programs.front()->carrier->counters().rx_datagrams, 3U) << "heard of four others";
+  EXPECT_GE(programs.front()->carrier->counters().rx_datagrams, 2U) << "also what others held";
 }
 
-TEST_F(SharedCarrier, TroubleOfTheWireIsToldToAll) {
+TEST_F(SharedCarrier, TellsAllWhatHappensToTheTransport) {
   const auto holder = opened(BoardRole::watch);
   const auto early = opened(BoardRole::watch);
-  const Problem unplugged{ErrorKind::open, "device:", "unplugged", "plug it in again"};
-  device.report({CarrierEvent::Kind::down, unplugged});
+  device.report({Kind::down, unplugged});
   ASSERT_TRUE(run_until(io, [&] { return early->heard.count(Kind::down) == 1; }));
   EXPECT_EQ(early->heard.last(Kind::down)->problem.text(), unplugged.text());
   EXPECT_FALSE(early->carrier->up());
-  const auto late = program(BoardRole::watch, io);
-  late->carrier->open(late->heard);
+  const auto late = opened_in(io, BoardRole::watch);
   ASSERT_TRUE(run_until(io, [&] { return late->heard.count(Kind::down) == 1; }));
-  device.report({CarrierEvent::Kind::up, Problem{ErrorKind::open, "device:", "", ""}});
+  device.report({Kind::up, Problem{ErrorKind::open, "device:", "", ""}});
   ASSERT_TRUE(run_until(io, [&] { return late->carrier->up() && early->carrier->up(); }));
   EXPECT_EQ(early->carrier->counters().downs, 1U);
   EXPECT_EQ(early->carrier->counters().ups, 2U);
   EXPECT_EQ(late->carrier->counters().downs, 0U) << "it was down when it came";
 }
 
-TEST_F(SharedCarrier, AsksAgainWhereAnotherOpensTheWireInBetween) {
-  OtherThread elsewhere;
-  // It meets at the next place, as one does for which the holder of the first hangs.
-  auto rival = program(BoardRole::watch, elsewhere.loop, at_place({wire}, 1).name);
-  device.before_open = [&] { elsewhere.run([&] { rival->carrier->open(rival->heard); }); };
-  const auto driver = program(BoardRole::control, io);
-  driver->carrier->open(driver->heard);
-  EXPECT_TRUE(driver->carrier->up());
-  EXPECT_EQ(device.opened, 2);
-  elsewhere.run([&] { rival.reset(); });  // what it has under way there is its loop's
+TEST_F(SharedCarrier, MayBeClosedByAProgramThatHearsAStopOfAnother) {
+  const auto driver = opened(BoardRole::control);
+  const auto watcher = opened(BoardRole::watch);
+  driver->heard.then_overheard = [&] { driver->carrier->close(); };
+  for (int i = 0; i < 3; ++i) watcher->carrier->send(stop, Priority::stop);
+  ASSERT_TRUE(run_until(io, [&] { return watcher->carrier->up() && device.opened == 2; }));
+  EXPECT_EQ(device.sent, std::vector<std::string>{stop});
 }
 
-TEST_F(SharedCarrier, LooksAgainSlowlyWhereTheHolderEndsWhatItBegins) {
-  const FileDescriptor unkind = hold_wire({wire});
-  const auto watcher = program(BoardRole::watch, io);
-  watcher->carrier->open(watcher->heard);
+// As the board behind a link to a pty is, when it ends and begins again.
+TEST_F(SharedCarrier, BeginsAnewWhenADeviceGoesThatIsKnownByItsPath) {
+  share.is_path = true;
+  const auto one = opened(BoardRole::watch);
+  const auto two = opened(BoardRole::watch);
+  const ShareName before = share;
+  share.text += "/elsewhere";
+  device.report({Kind::down, unplugged});
+  ASSERT_TRUE(run_until(io, [&] { return two->heard.count(Kind::down) == 1; }));
+  EXPECT_TRUE(in_time([&] { return one->carrier->up() && two->carrier->up(); }));
+  EXPECT_FALSE(connect_to_holder(before, BoardRole::watch)) << "another device may be there";
+  EXPECT_TRUE(all_hear("to all", one, two));
+  EXPECT_EQ(device.opened, 2);
+  EXPECT_EQ(one->heard.count(Kind::down) + two->heard.count(Kind::down), 2U);
+}
+
+// --- a holder that does not answer
+
+TEST_F(SharedCarrier, NamesAHolderThatDoesNotAnswerIfTheTransportCannotBeOpened) {
+  asio::io_context stopped;  // nobody runs it
+  const auto holder = opened_in(stopped, BoardRole::watch);
+  const auto watcher = opened_in(io, BoardRole::watch);
+  const auto driver = opened_in(io, BoardRole::control);
+  for (const auto* each : {watcher.get(), driver.get()}) {
+    ASSERT_TRUE(run_until(io, [&] { return each->heard.count(Kind::down) == 1; }));
+    EXPECT_EQ(each->heard.last(Kind::down)->problem.reason, silent);
+  }
+  driver->carrier->close();
+  const auto goes_on = [&] {
+    return in_time([&] {
+      run_for(stopped, 5ms);
+      return watcher->carrier->up();
+    });
+  };
+  ASSERT_TRUE(goes_on());
+  // Again, after the watcher was served.
+  ASSERT_TRUE(run_until(io, [&] { return watcher->heard.count(Kind::down) == 2; }));
+  ASSERT_TRUE(goes_on());
+  EXPECT_EQ(watcher->heard.count(Kind::down), 2U);
+}
+
+TEST_F(SharedCarrier, IsOpenedBesideAHolderThatDoesNotAnswer) {
+  device.exclusive = false;
+  asio::io_context hanging;
+  const auto holder = opened_in(hanging, BoardRole::watch);
+  const auto watcher = opened_in(io, BoardRole::watch);
+  // A board that says nothing is not a holder that hangs.
+  EXPECT_FALSE(run_until(
+      io,
+      [&] {
+        hanging.restart();
+        hanging.poll();
+        return device.opened != 1;
+      },
+      1500ms));
+  EXPECT_TRUE(watcher->carrier->up());
+
+  EXPECT_TRUE(run_until(io, [&] { return device.opened == 2; }));
+  EXPECT_FALSE(watcher->carrier->is_shared());
+  const auto driver = opened(BoardRole::control);
+  const auto late = opened(BoardRole::watch);
+  EXPECT_TRUE(late->carrier->is_shared()) << "the program that controls serves it";
+  EXPECT_EQ(watcher->heard.count(Kind::down), 0U);
+}
+
+TEST_F(SharedCarrier, IsTakenFromAHolderThatDoesNotAnswerAndOnlyWatches) {
+  device.may_be_taken = true;
+  asio::io_context hanging;
+  const auto holder = opened_in(hanging, BoardRole::watch);
+  const auto watcher = opened_in(io, BoardRole::watch);
+  EXPECT_TRUE(all_hear("without it", watcher));
+  const auto driver = opened(BoardRole::control);
+  EXPECT_TRUE(all_hear("driven", watcher, driver));
+  EXPECT_TRUE(watcher->carrier->is_shared());
+  const auto driven_at = device.opened;
+  EXPECT_FALSE(holder->has("driven"));
+  // It goes on.
+  ASSERT_TRUE(in_time([&] {
+    run_for(hanging, 5ms);
+    device.deliver("joined");
+    return holder->has("joined");
+  }));
+  EXPECT_EQ(device.opened, driven_at);
+  EXPECT_EQ(watcher->heard.count(Kind::down) + holder->heard.count(Kind::down), 0U);
+}
+
+TEST_F(SharedCarrier, StaysWithAHolderThatDoesNotAnswerButControls) {
+  device.may_be_taken = true;
+  asio::io_context hanging;
+  const auto holder = opened_in(hanging, BoardRole::control);
+  const auto second = program(BoardRole::control, io);
+  const auto error = error_of([&] { second->open(); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->kind(), ErrorKind::refused);
+  const auto watcher = opened_in(io, BoardRole::watch);
+  ASSERT_TRUE(run_until(io, [&] { return watcher->heard.count(Kind::down) == 1; }));
+  EXPECT_EQ(watcher->heard.last(Kind::down)->problem.reason, silent);
+  EXPECT_EQ(device.opened, 1);
+}
+
+TEST_F(SharedCarrier, PassesOverAStoppedHolderAtOnce) {
+  const pid_t holder = ::fork();
+  if (holder == 0) {
+    const FileDescriptor name = take_share_name(share, BoardRole::watch);
+    ::raise(SIGSTOP);
+    ::_exit(0);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(holder, &status, WUNTRACED), holder);
+  for (const BoardRole role : {BoardRole::watch, BoardRole::control}) {
+    EXPECT_TRUE(opened_in(io, role)->carrier->up());
+  }
+  ::kill(holder, SIGKILL);
+  ::waitpid(holder, &status, 0);
+}
+
+TEST_F(SharedCarrier, PassesOverAHolderForWhichManyProgramsWait) {
+  device.exclusive = false;
+  asio::io_context hanging;
+  const auto holder = opened_in(hanging, BoardRole::watch);
+  while (connect_to_holder(share, BoardRole::watch)) continue;
+  for (const BoardRole role : {BoardRole::watch, BoardRole::control}) opened(role);
+  EXPECT_EQ(device.opened, 3);
+}
+
+TEST_F(SharedCarrier, LooksAgainSlowlyIfTheHolderEndsTheConnection) {
+  const FileDescriptor unkind = take_share_name(share, BoardRole::watch);
+  const auto watcher = opened_in(io, BoardRole::watch);
   int came = 0;
   const auto until = Clock::now() + 800ms;
   while (Clock::now() < until) {
     while (accept_sharer(unkind.get())) ++came;
     run_for(io, 1ms);
   }
-  EXPECT_GE(came, 5);
-  EXPECT_LE(came, 30);
-  ASSERT_EQ(watcher->heard.count(Kind::down), 1U);
-  EXPECT_EQ(watcher->heard.last(Kind::down)->problem.reason,
-            fmt::format("the program that holds it (pid {}) does not share it", ::getpid()));
+  EXPECT_GE(came, 3);
+  EXPECT_LE(came, 40);
 }
 
-TEST_F(SharedCarrier, MayBeClosedByWhoHearsAStopOfAnother) {
-  const auto driver = opened(BoardRole::control);
-  const auto watcher = opened(BoardRole::watch);
-  driver->heard.then_overheard = [&] { driver->carrier->close(); };
-  const std::string stop = datagram_of("E", "STOP");
-  for (int i = 0; i < 3; ++i) watcher->carrier->send(stop, Priority::stop);
-  ASSERT_TRUE(run_until(io, [&] { return watcher->carrier->up() && device.opened == 2; }));
-  EXPECT_EQ(device.all_sent(), std::vector<std::string>{stop});
-}
+// --- other users
 
 TEST_F(SharedCarrier, IsNotForOtherUsers) {
   const auto holder = opened(BoardRole::control);
-  const int result = run_unprivileged([&] { return reach_holder({wire}).connection ? 1 : 0; });
-  EXPECT_EQ(result, 0);
+  EXPECT_EQ(run_unprivileged([&] { return connect_to_holder(share, BoardRole::control) ? 1 : 0; }),
+            0);
 }
 
 TEST_F(SharedCarrier, IsForTheMembersOfTheGroupThatTheHolderNames) {
-  const std::string stop = datagram_of("E", "STOP");
   // A user in the group nobody has (65534), and in no other.
   const auto stop_it = [&](const ShareGroup& of) {
     return run_unprivileged([&] {
-      const SharedWire shared{wire, of};
-      const FileDescriptor connection = reach_holder(shared).connection;
+      const ShareName shared{share.text, of};
+      const FileDescriptor connection = connect_to_holder(shared, BoardRole::control);
       if (!connection || !is_one_of_us(connection.get(), shared)) return 1;
       return send_message(connection.get(), ShareMessage::Kind::stop, stop);
     });
   };
-  group = {"members", 65534};
+  share.group = {"members", 65534};
   const auto holder = opened(BoardRole::control);
   EXPECT_NE(stop_it({"others", 65534}), 0) << "another name";
-  EXPECT_EQ(stop_it(group), 0);
-  EXPECT_TRUE(run_until(io, [&] { return !device.all_sent().empty(); }));
-  EXPECT_EQ(device.all_sent(), std::vector<std::string>{stop});
+  EXPECT_EQ(stop_it(share.group), 0);
+  EXPECT_TRUE(run_until(io, [&] { return !device.sent.empty(); }));
+  EXPECT_EQ(device.sent, std::vector<std::string>{stop});
   holder->carrier->close();
-  group.id = 0;
+  share.group.id = 0;
   const auto strict = opened(BoardRole::control);
-  stop_it(group);
+  stop_it(share.group);
   run_for(io, 20ms);
-  EXPECT_EQ(device.all_sent().size(), 1U);
+  EXPECT_EQ(device.sent.size(), 1U);
 }
 
-// Anyone may take a name: it must keep nobody from a wire, and be told where it matters.
-TEST_F(SharedCarrier, AStrangerWhoTakesNamesKeepsNobodyFromTheWire) {
+// Any user may take a name.
+TEST_F(SharedCarrier, IsOpenedThoughAStrangerHasTakenItsNames) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root can be a stranger, too";
-  std::vector<FileDescriptor> squatters;
-  const auto take = [&](int place) {
-    const std::string name = "r4link/0/" + at_place({wire}, place).name;
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    name.copy(address.sun_path + 1, name.size());
-    const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
-    ASSERT_EQ(::seteuid(65534), 0);
-    const int squatter =
-        squatters.emplace_back(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0)).get();
-    const bool taken = ::bind(squatter, reinterpret_cast<const sockaddr*>(&address), size) == 0 &&
-                       ::listen(squatter, 1) == 0;
-    ASSERT_EQ(::seteuid(0), 0);
-    ASSERT_TRUE(taken);
-  };
-  take(0);
-  {
-    const auto driver = opened(BoardRole::control);
-    const auto watcher = opened(BoardRole::watch);
-    EXPECT_TRUE(watcher->carrier->is_shared());
-    for (const auto& each : {driver.get(), watcher.get()})
-      EXPECT_EQ(each->heard.count(Kind::warning), 0U);
-  }
-  for (int place = 1; place < share_places; ++place) take(place);
-  const auto alone = opened(BoardRole::control);
-  EXPECT_EQ(alone->carrier->send("hello", Priority::normal), SendResult::sent);
-  EXPECT_EQ(device.all_sent(), std::vector<std::string>{"hello"});
-  const auto& warning = alone->heard.events.back();
-  EXPECT_EQ(warning.kind, CarrierEvent::Kind::warning);
-  EXPECT_EQ(warning.problem.kind, ErrorKind::permission);
-  EXPECT_EQ(
-      warning.problem.reason,
-      fmt::format("user 65534 (pid {}) has taken the names by which programs of user 0 share it",
-                  ::getpid()));
+  device.exclusive = false;
+  const FileDescriptor squatters[] = {foreign_socket(BoardRole::control, true),
+                                      foreign_socket(BoardRole::watch, true)};
+  const auto driver = opened(BoardRole::control);
+  const auto watcher = opened(BoardRole::watch);
+  EXPECT_EQ(device.opened, 2);
+  EXPECT_FALSE(watcher->carrier->is_shared());
 }
 
 }  // namespace

@@ -342,7 +342,7 @@ TEST_F(UdpCarrierTest, SaysThatThePortIsInUse) {
 }
 
 TEST_F(UdpCarrierTest, IsOneWireHoweverTheAddressIsWritten) {
-  const auto wire = [](const char* url) { return udp_wire(Url::parse(url)).name; };
+  const auto wire = [](const char* url) { return udp_share_name(Url::parse(url)).text; };
   EXPECT_EQ(wire("udp://localhost"), wire("udp://127.0.0.1:2018?listen=2390"));
   EXPECT_EQ(wire("udp://LocalHost"), wire("udp://localhost"));
   EXPECT_EQ(wire("udp://[0:0::1]"), wire("udp://[::1]"));

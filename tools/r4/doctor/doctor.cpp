@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "../list/held_wire.hpp"
+#include "../list/held_transport.hpp"
 #include "../shell/json.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
@@ -55,9 +55,9 @@ std::string device_of(const std::string& path) {
 pid_t sharing(const std::string& path) {
   asio::io_context io(1);
   ListedBoard board;
-  HeldWire held(io, board, [] {});
+  HeldTransport held(io, board, [] {});
   try {
-    held.join(serial_wire(Url::parse("serial://" + path)));
+    held.join(serial_share_name(Url::parse("serial://" + path)));
   } catch (const Error&) {
     return 0;  // no such port, which the check of its permission tells
   }

@@ -144,6 +144,9 @@ class Sender {
     const Subscription refused = board_.on_link([this](const LinkStatus& link) {
       if (leads_to_two_boards(link)) io_.stop();
     });
+    const Subscription events = board_.on_event([this](const CarrierEvent& event) {
+      if (event.kind == CarrierEvent::Kind::down) down_ = event.problem;
+    });
     board_.open();
     send_next();
     io_.run();
@@ -229,6 +232,7 @@ class Sender {
       }
       failure_ = problem;
       failure_->thing = fmt::format("{} to {}", problem.thing, board_.name());
+      if (down_ && board_.link().transport_down) failure_->fix = down_->text();
       io_.stop();
       return;
     }
@@ -319,6 +323,7 @@ class Sender {
   std::optional<CommandResult> waiting_;  // for the end of a transfer
   std::size_t next_ = 0;
   std::optional<Problem> failure_;
+  std::optional<Problem> down_;  // why the transport was down last
 };
 
 int send(const SendOptions& given) {

@@ -13,7 +13,7 @@
 #include <system_error>
 #include <utility>
 
-#include "held_wire.hpp"
+#include "held_transport.hpp"
 #include "r4link/carrier.hpp"
 #include "r4link/datagram.hpp"
 #include "transports/can/can_carrier.hpp"
@@ -41,7 +41,7 @@ class NodeQuestion final : private Carrier::Handler {
   NodeQuestion(asio::io_context& io, const std::string& url, ListedBoard& board)
       : board_(board), held_(io, board, [] {}), timer_(io) {
     const Url parsed = Url::parse(url);
-    held_.join(can_wire(parsed));
+    held_.join(can_share_name(parsed));
     try {
       carrier_ = make_can_carrier(io, parsed, Role::host);
       carrier_->open(*this);
@@ -59,7 +59,7 @@ class NodeQuestion final : private Carrier::Handler {
       board_.identity = std::move(identity);
     }
   }
-  bool answered() const { return board_.identity && (board_.pid == 0 || board_.controls); }
+  bool answered() const { return board_.is_known(); }
 
  private:
   // As soon as nobody else was heard for as long as a host listens that comes. Whether that is a
@@ -80,7 +80,7 @@ class NodeQuestion final : private Carrier::Handler {
   void on_carrier_event(const CarrierEvent&) override {}
 
   ListedBoard& board_;
-  HeldWire held_;
+  HeldTransport held_;
   std::unique_ptr<Carrier> carrier_;
   asio::steady_timer timer_;
   int asked_ = 0;

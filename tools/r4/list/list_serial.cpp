@@ -13,7 +13,7 @@
 #include <system_error>
 #include <utility>
 
-#include "held_wire.hpp"
+#include "held_transport.hpp"
 #include "host/standard_registry.hpp"
 #include "transports/registry.hpp"
 #include "transports/serial/serial_carrier.hpp"
@@ -45,7 +45,7 @@ class PortQuestion final : private Carrier::Handler {
     try {
       const std::string url = url_of(port_.port);
       port_.asked = open;
-      if (held_.join(serial_wire(Url::parse(url)))) {
+      if (held_.join(serial_share_name(Url::parse(url)))) {
         port_.asked = true;
         return;
       }
@@ -83,9 +83,8 @@ class PortQuestion final : private Carrier::Handler {
     if (event.kind != CarrierEvent::Kind::up) port_.trouble = event.problem;
   }
 
-  // Who has the port may control the board, which its next heartbeat tells.
   void look() {
-    if (port_.board.identity && (port_.board.pid == 0 || port_.board.controls)) end();
+    if (port_.board.is_known()) end();
   }
   void end() {
     if (std::exchange(done_, true)) return;
@@ -96,7 +95,7 @@ class PortQuestion final : private Carrier::Handler {
   asio::io_context& io_;
   ListedPort& port_;
   std::function<void()> on_done_;
-  HeldWire held_;
+  HeldTransport held_;
   std::unique_ptr<Carrier> carrier_;
   asio::steady_timer timer_;
   int asked_ = 0;

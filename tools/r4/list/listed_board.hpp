@@ -17,15 +17,17 @@ constexpr int most_questions = 3;
 
 struct ListedBoard {
   std::optional<IdentityAnswer> identity;
-  // The program of this machine that holds the wire.
+  // The program of this machine that holds the transport.
   int pid = 0;          // 0: none
-  std::string program;  // what it calls itself; empty: it has not said
+  std::string program;  // empty: it has not answered
   bool controls = false;
   // A host that is not that program was heard on the bus.
   bool other_host = false;
   // Frames of another protocol come on its command id, so that it was not asked.
   bool foreign_frames = false;
 
+  // Both the board and the program that holds the transport have answered.
+  bool is_known() const { return identity && (pid == 0 || !program.empty()); }
   // Does a host control it? None: it is not known.
   std::optional<bool> busy() const;
 };

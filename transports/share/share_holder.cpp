@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "share_holder.hpp"
+
+#include <fmt/format.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <array>
+#include <asio/post.hpp>
+#include <cerrno>
+#include <string>
+#include <utility>
+
+#include "../../protocol/messages/command_field.hpp"
+#include "../../protocol/messages/settings.hpp"
+#include "r4link/datagram.hpp"
+#include "share_socket.hpp"
+
+namespace r4 {
+namespace {
+
+using Kind = ShareMessage::Kind;
+
+constexpr int messages_in_a_turn = 8;
+
+bool is_stop(std::string_view bytes) {
+  Datagram datagram;
+  return read_datagram(Text(bytes.data(), bytes.size()), datagram) && asks_to_stop(datagram);
+}
+
+}  // namespace
+
+// A program that has come.
+class ShareHolder::Sharer : public std::enable_shared_from_this<Sharer> {
+ public:
+  Sharer(ShareHolder& holder, LoopDescriptor connection)
+      : holder_(holder), connection_(std::move(connection)) {}
+
+  bool is_here() const { return connection_.is_open(); }
+  bool is_served() const { return is_here() && served_; }
+  void set_served() { served_ = true; }
+
+  // A copy may be lost, as on any transport. A program that would miss anything else has to come
+  // again.
+  void tell(Kind kind, std::string_view text) {
+    if (!is_here()) return;
+    const int error = send_message(connection_.native_handle(), kind, text);
+    if (would_block(error) && !is_copy(kind)) end();
+  }
+
+  void receive() {
+    const auto self = shared_from_this();  // a stop may release the holder
+    std::array<char, ShareMessage::max_size + 1> packet;
+    for (int i = 0; i < messages_in_a_turn && is_here(); ++i) {
+      const ssize_t size =
+          receive_packet(connection_.native_handle(), packet.data(), packet.size());
+      if (size < 0 && would_block(errno)) break;
+      // The program has not read everything: what it sent can still be read.
+      if (size < 0 && errno == ECONNRESET) continue;
+      if (size <= 0) return end();
+      holder_.on_message(*this,
+                         read_share_message({packet.data(), static_cast<std::size_t>(size)}));
+    }
+    if (!is_here()) return;
+    connection_.async_wait(asio::posix::descriptor_base::wait_read,
+                           readable_.handler([this] { receive(); }));
+  }
+
+  void end() noexcept {
+    readable_.cancel();
+    asio::error_code ignored;
+    connection_.close(ignored);
+    holder_.remove_ended_later();
+  }
+
+ private:
+  ShareHolder& holder_;
+  LoopDescriptor connection_;
+  OperationSlot readable_;
+  bool served_ = false;
+};
+
+bool ShareHolder::hold(const ShareName& name, BoardRole role) {
+  LoopDescriptor listener = on_loop(take_share_name(name, role));
+  if (!listener.is_open()) return false;
+  release();
+  name_ = name;
+  listener_ = std::move(listener);
+  listen();
+  return true;
+}
+
+// Closed, with errno, if the loop cannot wait for it: an error here must not end the program, which
+// may be driving.
+LoopDescriptor ShareHolder::on_loop(FileDescriptor descriptor) {
+  LoopDescriptor waited_for(io_);
+  if (!descriptor) return waited_for;
+  asio::error_code error;
+  waited_for.assign(descriptor.get(), error);
+  if (!error) static_cast<void>(descriptor.release());
+  errno = error.value();
+  return waited_for;
+}
+
+void ShareHolder::release() noexcept {
+  accepting_.cancel();
+  asio::error_code ignored;
+  listener_.close(ignored);
+  for (const auto& sharer : std::exchange(sharers_, {})) sharer->end();
+  removing_.cancel();
+}
+
+std::size_t ShareHolder::served() const {
+  return static_cast<std::size_t>(std::count_if(
+      sharers_.begin(), sharers_.end(), [](const auto& each) { return each->is_served(); }));
+}
+
+void ShareHolder::tell(Kind kind, std::string_view text) {
+  if (sharers_.empty()) return;
+  std::array<char, max_datagram + masking_room> room;
+  if (is_copy(kind)) {
+    const Text masked = without_secrets(Text(text.substr(0, max_datagram)), room.data());
+    text = {masked.data(), std::min(masked.size(), max_datagram)};
+  }
+  for (const auto& sharer : sharers_) {
+    if (sharer->is_served()) sharer->tell(kind, text);
+  }
+}
+
+void ShareHolder::listen() {
+  listener_.async_wait(asio::posix::descriptor_base::wait_read,
+                       accepting_.handler([this] { accept(); }));
+}
+
+void ShareHolder::accept() {
+  FileDescriptor connection = accept_sharer(listener_.native_handle());
+  accept_timer_.expires_after(between_arrivals);
+  accept_timer_.async_wait(accepting_.handler([this] { listen(); }));
+  if (!connection || !is_one_of_us(connection.get(), name_)) return;
+  LoopDescriptor waited_for = on_loop(std::move(connection));
+  if (!waited_for.is_open()) return;  // it may come again
+  const auto sharer = std::make_shared<Sharer>(*this, std::move(waited_for));
+  sharers_.push_back(sharer);
+  sharer->receive();  // mostly its hello is there already
+}
+
+void ShareHolder::on_message(Sharer& from, const std::optional<ShareMessage>& message) {
+  if (message && message->kind == Kind::stop && is_stop(message->text)) {
+    owner_.on_stop_of_another(message->text);
+    if (!from.is_served() && served() < most_served_after_a_stop) serve(from);
+  } else if (message && message->kind == Kind::hello) {
+    on_hello(from);
+  } else if (message && message->kind == Kind::ask) {
+    owner_.on_asked();
+  } else {
+    from.tell(Kind::welcome, ShareMessage::version);
+    from.end();
+  }
+}
+
+void ShareHolder::on_hello(Sharer& from) {
+  if (from.is_served()) return from.tell(Kind::welcome, ShareMessage::version);
+  if (served() < most_served) return serve(from);
+  const Problem full{ErrorKind::refused, "",
+                     fmt::format("{} programs share it already, as many as may", most_served),
+                     "end one of them; its place is free at once"};
+  from.tell(Kind::event, text_of({CarrierEvent::Kind::down, full}));
+}
+
+void ShareHolder::serve(Sharer& sharer) {
+  sharer.set_served();
+  sharer.tell(Kind::welcome, ShareMessage::version);
+  for (const CarrierEvent& event : owner_.standing()) sharer.tell(Kind::event, text_of(event));
+}
+
+void ShareHolder::remove_ended_later() {
+  asio::post(io_, removing_.handler([this] {
+    std::erase_if(sharers_, [](const auto& each) { return !each->is_here(); });
+  }));
+}
+
+}  // namespace r4

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The end of a shared transport at the program that holds it: sends the other programs a copy of
+// all that passes, and takes stops from them. The stop of any of them is obeyed. Of those that say
+// hello, the first most_served are served; a program that has stopped the board is served beyond
+// that, to hear whether it obeys. A copy that a slow program does not take is lost to that program;
+// nothing waits for it here.
+#pragma once
+
+#include <asio/io_context.hpp>
+#include <chrono>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "../file_descriptor.hpp"
+#include "../operation_slot.hpp"
+#include "../share_name.hpp"
+#include "r4link/carrier.hpp"
+#include "r4link/options.hpp"
+#include "share_message.hpp"
+
+namespace r4 {
+
+class ShareHolder {
+ public:
+  static constexpr std::size_t most_served = 16;
+  static constexpr std::size_t most_served_after_a_stop = 20;
+  // So programs that connect again and again, of whichever user, take a few percent of the loop's
+  // time at most.
+  static constexpr std::chrono::microseconds between_arrivals{300};
+
+  // Called on the loop's thread. Any of these may release the holder.
+  class Owner {
+   public:
+    // What a program that comes has to know of the transport.
+    virtual std::vector<CarrierEvent> standing() const = 0;
+    // Another program's E:STOP, which is one.
+    virtual void on_stop_of_another(std::string_view datagram) = 0;
+    // A program that controls the board asks for the transport.
+    virtual void on_asked() = 0;
+
+   protected:
+    ~Owner() = default;
+  };
+
+  ShareHolder(asio::io_context& io, Owner& owner)
+      : io_(io), owner_(owner), listener_(io), accept_timer_(io) {}
+  ~ShareHolder() { release(); }
+  ShareHolder(const ShareHolder&) = delete;
+  ShareHolder& operator=(const ShareHolder&) = delete;
+
+  // Takes the name of that role. False, with errno, if that fails: EADDRINUSE if another program
+  // has it.
+  bool hold(const ShareName& name, BoardRole role);
+  void release() noexcept;
+
+  bool holds() const { return listener_.is_open(); }
+  std::size_t served() const;
+  // To all that are served. Secrets in a copy are masked.
+  void tell(ShareMessage::Kind kind, std::string_view text);
+
+ private:
+  class Sharer;
+
+  LoopDescriptor on_loop(FileDescriptor descriptor);
+  void listen();
+  void accept();
+  void take_in(FileDescriptor connection);
+  void on_message(Sharer& from, const std::optional<ShareMessage>& message);
+  void on_hello(Sharer& from);
+  void serve(Sharer& sharer);
+  void remove_ended_later();
+
+  asio::io_context& io_;
+  Owner& owner_;
+  ShareName name_;
+  LoopDescriptor listener_;
+  OperationSlot accepting_;
+  LoopTimer accept_timer_;
+  OperationSlot removing_;
+  std::vector<std::shared_ptr<Sharer>> sharers_;
+};
+
+}  // namespace r4
