@@ -340,8 +340,8 @@ bool AsyncBoard::Impl::only_listens(std::size_t wire) const {
 SendResult AsyncBoard::Impl::transmit(std::size_t wire, std::string_view datagram,
                                       Priority priority) {
   if (!has_link()) return SendResult::down;
-  const bool listens = only_listens(wire);
-  if (listens && priority != Priority::stop && !datagram.starts_with("W:")) return SendResult::down;
+  const bool may_pass = priority == Priority::stop || priority == Priority::lease;
+  if (only_listens(wire) && !may_pass) return SendResult::down;
   const SendResult result = carrier(wire).send(datagram, priority);
   if (result == SendResult::sent) wires[wire]->tap.on_sent(datagram);
   return result;

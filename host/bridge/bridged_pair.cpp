@@ -222,7 +222,9 @@ void BridgedPair::follow_hosts(Time now) {
   if (served.empty() || !watch_.asked()) return;
   std::array<char, max_datagram> buffer;  // the board's states are for that host now
   DatagramWriter writer(buffer.data(), buffer.size());
-  send(board_, view(watch_.write_end(writer)), Priority::normal, everyone);
+  const Text end = watch_.write_end(writer);
+  // On a bus others may watch, too. There the lease runs out.
+  if (!board_.carrier->is_shared()) send(board_, view(end), Priority::normal, everyone);
 }
 
 // True if that heartbeat or command may pass, as far as keys decide.
@@ -347,7 +349,7 @@ void BridgedPair::watch_board(Time now) {
   if (!watch_.due(now)) return;
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
-  send(board_, view(watch_.write(writer, now)), Priority::normal, everyone);
+  send(board_, view(watch_.write(writer, now)), Priority::lease, everyone);
 }
 
 void BridgedPair::report_trouble() {

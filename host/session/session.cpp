@@ -117,7 +117,7 @@ void Session::send_lease(Time now) {
   for (std::size_t i = 0; i < wires_.count(); ++i) {
     Lease& lease = wires_.lease(i);
     if (!may_speak(i) || !lease.due(now)) continue;
-    transmit_now(Command::watch(options_.watch_rate_hz, list), lease.echo(), Priority::normal, now,
+    transmit_now(Command::watch(options_.watch_rate_hz, list), lease.echo(), Priority::lease, now,
                  wire_bit(i));
     lease.sent(now);
   }

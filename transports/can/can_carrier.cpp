@@ -70,7 +70,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
 
   Lane& lane(CanLane which) { return lanes_[which == CanLane::dialogue ? 0 : 1]; }
   SendResult send_stop(std::string_view bytes);
-  SendResult send_lease(std::string_view bytes);
+  SendResult send_lease();
   bool begin(std::string_view bytes, std::uint32_t now_us);
   bool begin_waiting(std::uint32_t now_us);
   void listen_for_others(const CanFrame& frame);
@@ -99,9 +99,6 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   bool armed_ = false;
   std::uint32_t armed_for_us_ = 0;
 };
-
-bool is_lease(std::string_view bytes) { return bytes.starts_with("W:"); }
-bool ends_lease(std::string_view bytes) { return bytes.starts_with("W:0;"); }
 
 // Whether a board packs is its setting, not its URL's.
 std::uint8_t node_of(const Url& url, Role role) {
@@ -185,7 +182,7 @@ SendResult CanCarrier::send(std::string_view bytes, Priority priority, Peer) {
     ++(result == SendResult::sent ? counters_.tx_datagrams : counters_.tx_errors);
     return result;
   }
-  if (role_ == Role::host && is_lease(bytes)) return send_lease(bytes);
+  if (priority == Priority::lease && role_ == Role::host) return send_lease();
   if (role_ == Role::host && !turn_.ours(Clock::now())) {
     return turn_.others() ? SendResult::busy : SendResult::down;
   }
@@ -222,9 +219,8 @@ bool CanCarrier::begin(std::string_view bytes, std::uint32_t now_us) {
 
 // By a frame that is the same whoever sends it, so that it collides with nobody's; where the board is, and no
 // host for whom it streams anyway.
-SendResult CanCarrier::send_lease(std::string_view bytes) {
+SendResult CanCarrier::send_lease() {
   const Clock::time_point now = Clock::now();
-  if (ends_lease(bytes)) return SendResult::down;  // others may watch, too: it runs out
   if (!trouble_.hears_board(now) || trouble_.hears_host(now)) return SendResult::down;
   node_.ask_for_states();
   bus_->send();
