@@ -91,8 +91,8 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   mutable CarrierCounters counters_;      // what others count is put in when it is asked for
   std::array<Lane, 2> lanes_;
   std::shared_ptr<CanBus> bus_;
-  std::optional<std::uint32_t> announced_stop_;  // its number
-  CanTrouble trouble_;                           // of a host
+  StopNumbers stops_;   // of a host
+  CanTrouble trouble_;  // of a host
   Handler* handler_ = nullptr;
   LoopTimer timer_;
   OperationSlot timing_;
@@ -195,18 +195,21 @@ SendResult CanCarrier::send(std::string_view bytes, Priority priority, Peer) {
   return result;
 }
 
-// Only its number is repeated: to a board a bare frame is a new stop each time, and who has seen the one
-// would have to look again before they clear it.
+// Only the frame with its number is repeated: to a board a bare frame is a new stop each time, and
+// who has seen the one would have to look again before they clear it.
 SendResult CanCarrier::send_stop(std::string_view bytes) {
   Datagram stop;
+  std::uint32_t pnum = 0;
+  if (!read_datagram(Text(bytes.data(), bytes.size()), stop) || !stop_number(stop, pnum)) {
+    return bus_->send_bare_stop();
+  }
   std::uint32_t number = 0;
-  const bool numbered =
-      read_datagram(Text(bytes.data(), bytes.size()), stop) && stop_number(stop, number);
-  if (!numbered) return bus_->announce_stop({});
-  if (announced_stop_ == number) return bus_->repeat_stop(number);
-  const SendResult result = bus_->announce_stop(number);
-  if (result == SendResult::sent) announced_stop_ = number;
-  return result;
+  if (!stops_.find(pnum, number)) {
+    const SendResult announced = bus_->announce_stop(stops_, number);
+    if (announced != SendResult::sent) return announced;
+    stops_.add(pnum, number);
+  }
+  return bus_->repeat_stop(number);
 }
 
 bool CanCarrier::begin(std::string_view bytes, std::uint32_t now_us) {
@@ -291,7 +294,8 @@ void CanCarrier::on_frame(const CanFrame& frame, std::uint32_t at_us) {
     handler_->on_overheard(command);
     return;
   }
-  const Text datagram = node_.on_frame(frame, at_us);
+  char room[max_datagram];
+  const Text datagram = stops_.in_full(node_.on_frame(frame, at_us), room);
   count_late_transfers();
   if (datagram.empty()) return;
   ++counters_.rx_datagrams;
