@@ -31,6 +31,10 @@ class Registry {
     std::function<SharedWire(const Url& url)> wire = nullptr;
     // Is the wire of this URL its program's own, which nobody shares? None: it never is.
     std::function<bool(const Url& url)> own = nullptr;
+    // The host's carrier of a device that one program can have open at a time.
+    std::function<std::unique_ptr<Carrier>(asio::io_context& io, const Url& url,
+                                           std::shared_ptr<DeviceClaim> claim)>
+        make_claimed = nullptr;
   };
 
   // A registry with the transports of this folder: udp, serial, pty, can.

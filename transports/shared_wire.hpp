@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a wire is called that the programs of a machine share (share/shared_carrier.hpp).
+// What a wire is called that the programs of a machine share (share/shared_carrier.hpp), and how
+// its device is opened.
 #pragma once
 
 #include <sys/types.h>
@@ -24,5 +25,16 @@ struct SharedWire {
 };
 // Throws Error where it is not to be found.
 using FindWire = std::function<SharedWire()>;
+
+// How a transport opens a device that one program can have open at a time (a serial port). The one
+// who shares the wire sets it before each open().
+struct DeviceClaim {
+  // Another program may take the device, after which this program reads and sends nothing more.
+  bool yields = false;
+  // Takes the device also from a program that yields: at the next opening only.
+  bool takes = false;
+  // Another program has taken the device, and the transport has closed it.
+  std::function<void()> on_taken = nullptr;
+};
 
 }  // namespace r4

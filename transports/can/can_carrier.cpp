@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "../../protocol/messages/command_field.hpp"
+#include "../board_end.hpp"
 #include "../framing/can/can_node.hpp"
 #include "../operation_slot.hpp"
 #include "../send_queue.hpp"
@@ -30,7 +31,7 @@ constexpr std::size_t normal_entries = 32;
 constexpr std::size_t state_entries = 1;  // newest wins
 constexpr std::uint32_t look_again_us = 20000;
 
-class CanCarrier final : public Carrier, private CanBus::Member {
+class CanCarrier final : public Carrier, public BoardEnd, private CanBus::Member {
  public:
   CanCarrier(asio::io_context& io, Url url, Role role);
   ~CanCarrier() override { close(); }
@@ -41,7 +42,6 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   void use_packed_form(bool wanted) override { node_.use_packed_form(wanted); }
   bool up() const override { return handler_ != nullptr && bus_->up(); }
   WireTrouble trouble() const override;
-  std::size_t max_size() const override { return max_datagram; }
   bool is_shared() const override { return true; }
   const std::string& name() const override { return name_; }
   const CarrierCounters& counters() const override;

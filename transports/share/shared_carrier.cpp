@@ -36,29 +36,27 @@ class SharedCarrier final : public Carrier,
                             private WireHolder::Owner,
                             private WireSharer::Owner {
  public:
-  SharedCarrier(asio::io_context& io, std::unique_ptr<Carrier> own, FindWire find, BoardRole role)
-      : own_(std::move(own)),
+  SharedCarrier(asio::io_context& io, std::unique_ptr<Carrier> own,
+                std::shared_ptr<DeviceClaim> claim, FindWire find, BoardRole role)
+      : claim_(std::move(claim)),
+        own_(std::move(own)),
         role_(role),
         name_(own_->name()),
         holder_(io, *this, program_invocation_short_name),
         sharer_(io, *this),
         places_(std::move(find), holder_, sharer_),
-        timer_(io) {}
+        timer_(io) {
+    claim_->on_taken = [this] { on_taken(); };
+  }
   ~SharedCarrier() override { close(); }
 
   void open(Carrier::Handler& handler) override;
   void close() noexcept override;
   SendResult send(std::string_view bytes, Priority priority, Peer to) override;
-  void use_packed_form(bool wanted) override { own_->use_packed_form(wanted); }
-  void gather() override { own_->gather(); }
-  std::optional<Clock::time_point> arrival() const override {
-    return state_ == State::holding ? own_->arrival() : std::nullopt;
-  }
   bool up() const override { return up_; }
   WireTrouble trouble() const override { return own_->trouble(); }
   // What is sent on a wire that another program holds the board would take for the holder's.
   bool is_shared() const override { return state_ == State::sharing || own_->is_shared(); }
-  std::size_t max_size() const override { return own_->max_size(); }
   const std::string& name() const override { return name_; }
   const CarrierCounters& counters() const override {
     counted_ = own_->counters();
@@ -71,7 +69,7 @@ class SharedCarrier final : public Carrier,
   void on_datagram(std::string_view bytes, Peer from) override;
   void on_carrier_event(const CarrierEvent& event) override;
   void on_drained() override { handler_->on_drained(); }
-  void on_taken() override;
+  void on_taken();
   void on_overheard(std::string_view bytes) override;
   void on_oversize(std::string_view beginning) override;
   // Those who share our wire.
@@ -99,6 +97,7 @@ class SharedCarrier final : public Carrier,
   bool late() const { return Clock::now() - since_ >= take_over_within; }
   void tell(const CarrierEvent& event);
 
+  const std::shared_ptr<DeviceClaim> claim_;  // how own_ opens its device
   const std::unique_ptr<Carrier> own_;
   const BoardRole role_;
   std::string name_;
@@ -234,7 +233,8 @@ bool SharedCarrier::try_to_hold() {
   if (!places_.hold(name_)) return false;
   const State before = std::exchange(state_, State::holding);
   try {
-    own_->claim({role_ == BoardRole::watch && holder_.holds(), places_.one_hangs()});
+    claim_->yields = role_ == BoardRole::watch && holder_.holds();
+    claim_->takes = places_.one_hangs();
     own_->open(*this);
   } catch (...) {
     state_ = before;
@@ -421,8 +421,10 @@ void SharedCarrier::on_holder_lost() {
 }  // namespace
 
 std::unique_ptr<Carrier> make_shared_carrier(asio::io_context& io, std::unique_ptr<Carrier> own,
-                                             FindWire find, BoardRole role) {
-  return std::make_unique<SharedCarrier>(io, std::move(own), std::move(find), role);
+                                             std::shared_ptr<DeviceClaim> claim, FindWire find,
+                                             BoardRole role) {
+  return std::make_unique<SharedCarrier>(io, std::move(own), std::move(claim), std::move(find),
+                                         role);
 }
 
 }  // namespace r4

@@ -22,8 +22,10 @@
 
 namespace r4 {
 
-// What the carrier reports is what `own` does, whoever holds the wire.
+// What the carrier reports is what `own` does, whoever holds the wire. `claim`: by which `own`
+// opens its device.
 std::unique_ptr<Carrier> make_shared_carrier(asio::io_context& io, std::unique_ptr<Carrier> own,
-                                             FindWire find, BoardRole role);
+                                             std::shared_ptr<DeviceClaim> claim, FindWire find,
+                                             BoardRole role);
 
 }  // namespace r4

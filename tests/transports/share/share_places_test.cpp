@@ -16,8 +16,10 @@ TEST_F(PlaceOfADevice, IsLeftToAnotherWhenItGoesAndIsWhereItComesAgain) {
   SharedWire now{wire, group, true};
   const auto made = [&] {
     auto one = std::make_unique<Program>();
+    auto claim = std::make_shared<DeviceClaim>();
     one->carrier = make_shared_carrier(
-        io, std::make_unique<Device::Wire>(io, device), [&] { return now; }, BoardRole::watch);
+        io, std::make_unique<Device::Wire>(io, device, claim), claim, [&] { return now; },
+        BoardRole::watch);
     one->carrier->open(one->heard);
     return one;
   };

@@ -48,7 +48,8 @@ struct Device {
 
 class Device::Wire final : public Carrier {
  public:
-  Wire(asio::io_context& io, Device& device) : io_(io), device_(device) {}
+  Wire(asio::io_context& io, Device& device, std::shared_ptr<DeviceClaim> claim)
+      : io_(io), device_(device), claim_(std::move(claim)) {}
   ~Wire() override { close(); }
 
   void open(Handler& handler) override {
@@ -58,7 +59,7 @@ class Device::Wire final : public Carrier {
       const std::lock_guard lock(device_.mutex);
       if (device_.exclusive && device_.open != nullptr) {
         Wire* const other = device_.open;
-        if (!device_.may_be_taken || !claim_.takes || !other->claim_.yields)
+        if (!device_.may_be_taken || !claim_->takes || !other->claim_->yields)
           throw Error(ErrorKind::open, name_, "in use", "end the other");
         asio::post(other->io_, [other] { other->lose(); });
       }
@@ -81,9 +82,7 @@ class Device::Wire final : public Carrier {
     if (device_.then_sent) device_.then_sent();
     return SendResult::sent;
   }
-  void claim(Claim claim) override { claim_ = claim; }
   bool up() const override { return up_; }
-  std::size_t max_size() const override { return max_datagram; }
   const std::string& name() const override { return name_; }
   const CarrierCounters& counters() const override { return counters_; }
 
@@ -91,9 +90,9 @@ class Device::Wire final : public Carrier {
   friend Device;
 
   void lose() {
-    Handler* const handler = handler_;
+    const bool was_open = handler_ != nullptr;
     close();
-    if (handler != nullptr) handler->on_taken();
+    if (was_open) claim_->on_taken();
   }
 
   asio::io_context& io_;
@@ -101,7 +100,7 @@ class Device::Wire final : public Carrier {
   const std::string name_ = "device:";
   Handler* handler_ = nullptr;
   bool up_ = false;
-  Claim claim_;
+  const std::shared_ptr<DeviceClaim> claim_;
   CarrierCounters counters_;
 };
 
@@ -156,8 +155,9 @@ class SharedWireTest : public testing::Test {
   std::unique_ptr<Program> program(BoardRole role, asio::io_context& loop,
                                    const std::string& name) {
     auto made = std::make_unique<Program>();
+    auto claim = std::make_shared<DeviceClaim>();
     made->carrier = make_shared_carrier(
-        loop, std::make_unique<Device::Wire>(loop, device),
+        loop, std::make_unique<Device::Wire>(loop, device, claim), claim,
         [this, name] {
           return SharedWire{name, group};
         },

@@ -120,7 +120,8 @@ TEST_F(ProgramOnABus, AStopOfALaterTurnIsAnotherOne) {
 TEST_F(ProgramOnABus, TwoStopsOfOneBoardAreTwoAlsoInOneTurn) {
   stop(0, 1);
   stop(0, 2);
-  EXPECT_EQ(stops(), (Texts{"bare", "numbered", "bare", "numbered"}));
+  EXPECT_EQ(stops(), (Texts{"bare", "bare", "numbered", "numbered"}))
+      << "in the order of their ids";
   EXPECT_EQ(confirmed_by(3), Texts{heartbeat(2)});
 }
 
