@@ -91,11 +91,10 @@ void AsyncBoard::start_apply(const Setpoints& setpoints, Duration timeout,
              [&] { return impl.session.send(setpoints, Impl::time_of(timeout), impl.now); });
 }
 
-void AsyncBoard::start_stop(Duration timeout, CompletionPtr completion,
-                            std::optional<std::uint32_t> number) {
+void AsyncBoard::start_stop(Duration timeout, CompletionPtr completion) {
   Impl& impl = *impl_;
   impl.begin(std::move(completion),
-             [&] { return impl.session.stop(Impl::time_of(timeout), impl.now, number); });
+             [&] { return impl.session.stop(Impl::time_of(timeout), impl.now); });
 }
 
 void AsyncBoard::start_arm(Duration timeout, CompletionPtr completion) {

@@ -52,7 +52,7 @@ Time AsyncBoard::Impl::time_of(Duration timeout) {
 // By how much what was due is late; 0 inside another entry.
 Time AsyncBoard::Impl::begin_entry(Completion::How way) {
   if (depth == 0) how = way;
-  before = std::exchange(now, steady_now());
+  const Time before = std::exchange(now, steady_now());
   if (now - before > held_up) in_backlog = true;
   return has_link() && depth == 0 ? now - due : Time{0};
 }
@@ -285,11 +285,9 @@ void AsyncBoard::Impl::on_timer() {
 
 void AsyncBoard::Impl::on_datagram(BoardWire& wire, std::string_view bytes) {
   enter(Completion::How::dispatch, [&] {
-    const auto arrival = wire.carrier->arrival();
-    const Time at = arrival ? std::chrono::duration_cast<Time>(arrival->time_since_epoch()) : now;
-    wire.tap.on_received(bytes, at);
+    wire.tap.on_received(bytes, now);
     if (waking != 0) return;
-    session.receive(wire.index, bytes, std::clamp(at, before, now));  // its time never goes back
+    session.receive(wire.index, bytes, now);
     wires[0]->tap.on_packets(session.packets());
     poll_wanted = true;
   });
@@ -344,8 +342,8 @@ bool AsyncBoard::Impl::only_listens(std::size_t wire) const {
 SendResult AsyncBoard::Impl::transmit(std::size_t wire, std::string_view datagram,
                                       Priority priority) {
   if (!has_link()) return SendResult::down;
-  const bool listens = only_listens(wire);
-  if (listens && priority != Priority::stop && !datagram.starts_with("W:")) return SendResult::down;
+  const bool may_pass = priority == Priority::stop || priority == Priority::lease;
+  if (only_listens(wire) && !may_pass) return SendResult::down;
   const SendResult result = carrier(wire).send(datagram, priority);
   if (result == SendResult::sent) wires[wire]->tap.on_sent(datagram);
   return result;

@@ -241,7 +241,6 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
   Phase phase = Phase::made;
 
   Time now{0};
-  Time before{0};  // the entry before
   Time due{0};
   asio::steady_timer timer;
   asio::steady_timer reopening;

@@ -70,7 +70,6 @@ class MemoryCarrier final : public Carrier {
   bool up() const override {
     return handler_ != nullptr && other_ != nullptr && other_->handler_ != nullptr;
   }
-  std::size_t max_size() const override { return max_datagram; }
   const std::string& name() const override { return name_; }
   const CarrierCounters& counters() const override { return counters_; }
 

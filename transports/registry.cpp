@@ -22,7 +22,7 @@ Registry Registry::standard() {
                 make_udp_carrier, udp_share_name, udp_has_own_port});
   registry.add({"serial", "serial:///dev/ttyACM0[?baud=1000000], serial:auto, serial:?sn=SERIAL",
                 "USB serial, or the pty of a simulated board", make_serial_carrier,
-                serial_share_name});
+                serial_share_name, nullptr, make_claimed_serial_carrier});
   registry.add(
       {"pty", "pty:[PATH]", "for a board: a pty that a host opens as serial", make_pty_carrier});
   registry.add({"can", "can://can0[?node=1&fd=0&pack=1]", "ISO-TP on a CAN bus (SocketCAN)",
@@ -66,7 +66,10 @@ std::unique_ptr<Carrier> Registry::make_shared(asio::io_context& io, std::string
     found.group = group;
     return found;
   };
-  return make_shared_carrier(io, entry.make(io, alone, Role::host), std::move(find), role);
+  auto claim = std::make_shared<DeviceClaim>();
+  auto carrier =
+      entry.make_claimed ? entry.make_claimed(io, alone, claim) : entry.make(io, alone, Role::host);
+  return make_shared_carrier(io, std::move(carrier), std::move(claim), std::move(find), role);
 }
 
 }  // namespace r4

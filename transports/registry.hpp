@@ -32,6 +32,10 @@ class Registry {
     // True if the transport of this URL is its program's own, which is not shared. None: it never
     // is.
     std::function<bool(const Url& url)> own = nullptr;
+    // The host's carrier of a device that one program can have open at a time.
+    std::function<std::unique_ptr<Carrier>(asio::io_context& io, const Url& url,
+                                           std::shared_ptr<DeviceClaim> claim)>
+        make_claimed = nullptr;
   };
 
   // A registry with the transports of this folder: udp, serial, pty, can.

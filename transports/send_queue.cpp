@@ -14,8 +14,9 @@ SendQueue::SendQueue(std::size_t normal, std::size_t states, std::uint64_t& drop
     : stop_(stop_entries), normal_(normal), state_(states), dropped_(dropped) {}
 
 SendResult SendQueue::push(std::string_view bytes, Priority priority, Peer to, Time now) {
-  Lane& lane = priority == Priority::stop ? stop_ : priority == Priority::normal ? normal_ : state_;
-  if (priority == Priority::normal) {
+  const bool normal = priority == Priority::normal || priority == Priority::lease;
+  Lane& lane = priority == Priority::stop ? stop_ : normal ? normal_ : state_;
+  if (normal) {
     while (lane.count != 0 && lane.entries[lane.first].expires <= now) {
       lane.pop();
       ++dropped_;
@@ -23,7 +24,7 @@ SendResult SendQueue::push(std::string_view bytes, Priority priority, Peer to, T
   }
   if (lane.count == lane.capacity) {
     ++dropped_;
-    if (priority == Priority::normal) return SendResult::full;
+    if (normal) return SendResult::full;
     lane.pop();
   }
   if (lane.entries.empty()) lane.entries.resize(lane.capacity);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What a transport is called among the programs of this computer that share it
-// (share/shared_carrier.hpp).
+// (share/shared_carrier.hpp), and how its device is opened.
 #pragma once
 
 #include <sys/types.h>
@@ -26,5 +26,16 @@ struct ShareName {
 };
 // Throws Error if the transport cannot be found.
 using FindShareName = std::function<ShareName()>;
+
+// How a transport opens a device that one program can have open at a time (a serial port). The
+// carrier that shares the transport sets it before each open().
+struct DeviceClaim {
+  // Another program may take the device, after which this program reads and sends nothing more.
+  bool yields = false;
+  // Takes the device also from a program that yields: at the next opening only.
+  bool takes = false;
+  // Another program has taken the device, and the transport has closed it.
+  std::function<void()> on_taken = nullptr;
+};
 
 }  // namespace r4

@@ -8,6 +8,7 @@
 #include "../../protocol/messages/command_field.hpp"
 #include "../../protocol/messages/message.hpp"
 #include "../../protocol/messages/site_settings.hpp"
+#include "../../transports/board_end.hpp"
 #include "../../transports/file_descriptor.hpp"
 
 namespace r4 {
@@ -217,12 +218,15 @@ bool BridgedPair::is_judged(const Datagram& heartbeat) const {
 void BridgedPair::follow_hosts(Time now) {
   if (!known_.poll(now)) return;
   const std::vector<Peer>& served = known_.served();
-  hosts_.carrier->hold(served.empty() ? everyone : served.front());
-  for (const Peer peer : served) hosts_.carrier->also_hold(peer);
+  BoardEnd& end = board_end_of(*hosts_.carrier);
+  end.hold(served.empty() ? everyone : served.front());
+  for (const Peer peer : served) end.also_hold(peer);
   if (served.empty() || !watch_.asked()) return;
   std::array<char, max_datagram> buffer;  // the board's states are for that host now
   DatagramWriter writer(buffer.data(), buffer.size());
-  send(board_, view(watch_.write_end(writer)), Priority::normal, everyone);
+  const Text farewell = watch_.write_end(writer);
+  // On a bus others may watch, too. There the lease runs out.
+  if (!board_.carrier->is_shared()) send(board_, view(farewell), Priority::normal, everyone);
 }
 
 // True if that heartbeat or command may pass, as far as keys decide.
@@ -308,7 +312,8 @@ void BridgedPair::deliver_to_hosts(const Datagram& datagram, bool is_state, Time
   for (std::size_t i = 1; i < served.size(); ++i) copy(served[i]);
   if (audience_.empty()) return;
   const auto has_it = [&](Peer peer) {
-    return known_.is_served_at(peer) || (to_everyone && hosts_.carrier->reaches(peer));
+    return known_.is_served_at(peer) ||
+           (to_everyone && board_end_of(*hosts_.carrier).reaches(peer));
   };
   audience_.for_each_watcher(now, [&](Peer peer) {
     if (!has_it(peer)) copy(peer);
@@ -347,7 +352,7 @@ void BridgedPair::watch_board(Time now) {
   if (!watch_.due(now)) return;
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
-  send(board_, view(watch_.write(writer, now)), Priority::normal, everyone);
+  send(board_, view(watch_.write(writer, now)), Priority::lease, everyone);
 }
 
 void BridgedPair::report_trouble() {

@@ -10,7 +10,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "r4link/command.hpp"
@@ -44,7 +43,6 @@ struct PendingCommand {
   CommandKind kind = CommandKind::heartbeat;
   bool cable_only = false;  // a setting that is refused elsewhere
   std::uint32_t pnum = 0;
-  std::optional<std::uint32_t> stop_number;  // of a stop that several sessions have in common
   std::uint64_t ticket = 0;
   std::int32_t cause = Command::unnamed_cause;  // clear: the cause it names, once one is known
   std::chrono::microseconds started{0}, deadline{0}, retry{0};
@@ -91,7 +89,6 @@ class PendingCommands {
     slot.kind = kind;
     slot.cable_only = false;
     slot.pnum = 0;
-    slot.stop_number.reset();
     slot.cause = Command::unnamed_cause;
     slot.size = 0;
     slot.group = Setpoints();

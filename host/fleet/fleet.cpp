@@ -170,7 +170,7 @@ FleetResults Fleet::arm(Duration timeout) { return arm(impl_->all_boards, timeou
 FleetResults Fleet::clear(Duration timeout) { return send(Command::clear(), timeout); }
 
 FleetResults Fleet::stop(Duration timeout) { return impl_->stop(impl_->all_boards, timeout); }
-void Fleet::stop_async() { impl_->stop_async(); }
+void Fleet::stop_async() { impl_->stop_async(impl_->all_boards); }
 
 FleetResults Fleet::apply(const std::vector<BoardSetpoints>& setpoints, Duration timeout) {
   for (const BoardSetpoints& each : setpoints) require_any(each.setpoints);

@@ -3,7 +3,6 @@
 
 #include <asio/post.hpp>
 #include <exception>
-#include <random>
 #include <utility>
 
 #include "../../transports/url_pattern.hpp"
@@ -250,28 +249,22 @@ std::optional<FleetEvent> Fleet::Impl::next_event(Duration timeout) {
   return event;
 }
 
-// One number for the boards on CAN, which hear the same frames (can_bus.hpp).
 Fleet::Impl::Start Fleet::Impl::start_of_stop() {
-  std::random_device device;
-  return
-      [this, number = device() | 1U](std::size_t board, std::size_t, Duration left, BoundEnd end) {
-        const bool on_a_bus = has_wire(urls[board], "can");
-        AsyncBoard& async = *boards[board];
-        async.start_stop(left, async.make_completion(std::move(end)),
-                         on_a_bus ? std::optional<std::uint32_t>(number) : std::nullopt);
-      };
+  return [this](std::size_t board, std::size_t, Duration left, BoundEnd end) {
+    boards[board]->async_stop(left, std::move(end));
+  };
 }
 
 FleetResults Fleet::Impl::stop(const Boards& which, Duration timeout) {
-  const Start start = start_of_stop();
-  FleetResults results = execute("E:STOP", which, std::max(timeout, Duration{1}), start, true);
+  FleetResults results =
+      execute("E:STOP", which, std::max(timeout, Duration{1}), start_of_stop(), true);
   // Whoever does not wait for it any longer does not mean that it may be lost.
-  if (!results.all_confirmed()) stop_async(results.failed(), start);
+  if (!results.all_confirmed()) stop_async(results.failed());
   return results;
 }
 
-void Fleet::Impl::stop_async(const Boards& which, Start start) {
-  run_unawaited(call_of("E:STOP", which, std::move(start), true));
+void Fleet::Impl::stop_async(const Boards& which) {
+  run_unawaited(call_of("E:STOP", which, start_of_stop(), true));
 }
 
 }  // namespace r4

@@ -61,8 +61,7 @@ struct Fleet::Impl : BlockingLoop {
   std::optional<FleetEvent> next_event(Duration timeout);
   BoardHealth health_of(std::size_t board) const;  // on the loop
   FleetResults stop(const Boards& which, Duration timeout);
-  void stop_async() { stop_async(all_boards, start_of_stop()); }
-  void stop_async(const Boards& which, Start start);
+  void stop_async(const Boards& which);
   void require_board(std::size_t board) const;
 
   // --- on the loop

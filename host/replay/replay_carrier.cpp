@@ -73,7 +73,6 @@ class ReplayCarrier final : public Carrier {
   }
 
   bool up() const override { return up_; }
-  std::size_t max_size() const override { return max_datagram; }
   const std::string& name() const override { return name_; }
   const CarrierCounters& counters() const override { return counters_; }
 

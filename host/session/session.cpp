@@ -118,7 +118,7 @@ void Session::send_lease(Time now) {
   for (std::size_t i = 0; i < paths_.count(); ++i) {
     Lease& lease = paths_.leases()[i];
     if ((paths_.speaking() & path_bit(i)) == 0 || !lease.due(now)) continue;
-    transmit_now(Command::watch(options_.watch_rate_hz, list), lease.echo(), Priority::normal, now,
+    transmit_now(Command::watch(options_.watch_rate_hz, list), lease.echo(), Priority::lease, now,
                  path_bit(i));
     lease.sent(now);
   }

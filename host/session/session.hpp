@@ -141,9 +141,8 @@ class Session {
   // Returns 0 when 64 commands are under way already.
   Ticket arm(Time timeout, Time now);
   // E:STOP, sent before this returns. Confirmed when the board tells that it has obeyed this very
-  // stop. Returns 0, with the stop sent all the same, when 16 stops are under way already. `number`: of a stop
-  // that sessions have in common, whose boards hear the same frames (CAN); none: the next of this one.
-  Ticket stop(Time timeout, Time now, std::optional<std::uint32_t> number = {});
+  // stop. Returns 0, with the stop sent all the same, when 16 stops are under way already.
+  Ticket stop(Time timeout, Time now);
   // Asks who the board is; on_identity() follows. Confirmed by the answer.
   Ticket identify(Time timeout, Time now);
   // Gives a command up, though it may have been executed: on_result() comes before this returns. A stop

@@ -2,7 +2,6 @@
 // What comes in, and what it proves.
 #include "../../protocol/link/board_link.hpp"
 #include "../../protocol/messages/state_fields.hpp"
-#include "../../transports/framing/can/can_ids.hpp"
 #include "../commands/command_evidence.hpp"
 #include "session.hpp"
 
@@ -321,12 +320,12 @@ void Session::confirm_from_state(Time now) {
   }
 }
 
-// The board names the stop that it has obeyed. On a CAN bus it was told the end of the number only.
+// The board names the stop that it has obeyed.
 void Session::confirm_stop(const SafeReport& report, Time now) {
   if (report.reason != SafeReason::stop || !report.has_stop) return;
   for (Pending& pending : pending_.under_way()) {
     if (!pending.is_out() || pending.kind != CommandKind::stop) continue;
-    if (report.stop != pending.pnum && report.stop != short_stop_number(pending.pnum)) continue;
+    if (report.stop != pending.pnum) continue;
     repetition_.begin({pending.bytes.data(), pending.size}, pending.retry,
                       now + options_.stop_linger);
     finish(pending, Outcome::confirmed, Refusal::none, now);

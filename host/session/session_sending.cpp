@@ -168,7 +168,7 @@ PostResult Session::post_result(SendResult result) {
   return PostResult::no_link;
 }
 
-Ticket Session::stop(Time timeout, Time now, std::optional<std::uint32_t> number) {
+Ticket Session::stop(Time timeout, Time now) {
   repetition_.cancel();  // this one goes on from here
   ++collector_.counts.commands;
   give_up_arming();
@@ -176,7 +176,6 @@ Ticket Session::stop(Time timeout, Time now, std::optional<std::uint32_t> number
   Ticket ticket = 0;
   if (Pending* pending = allocate(Command::stop(), timeout, now)) {
     ticket = pending->ticket;
-    pending->stop_number = number;
     transmit(*pending, now);
   } else {
     transmit_now(Command::stop(), to_ms(now), Priority::stop, now);
@@ -203,7 +202,7 @@ void Session::transmit(Pending& pending, Time now) {
   const bool stop = pending.kind == CommandKind::stop;
   if (pending.stage == Stage::queued) {
     if (pending.is_group()) write_group(pending);
-    pending.pnum = pending.stop_number ? *pending.stop_number : link_.take_pnum();
+    pending.pnum = link_.take_pnum();
     // The command's field is there already.
     DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.size);
     stamp(writer, pending.kind, pending.pnum, to_ms(now));

@@ -34,7 +34,6 @@
 #include <functional>
 #include <initializer_list>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -330,8 +329,7 @@ class AsyncBoard {
   void require_control(std::string_view what) const;
   void start_send(const Command& command, Duration timeout, CompletionPtr completion);
   void start_apply(const Setpoints& setpoints, Duration timeout, CompletionPtr completion);
-  void start_stop(Duration timeout, CompletionPtr completion,
-                  std::optional<std::uint32_t> number = {});
+  void start_stop(Duration timeout, CompletionPtr completion);
   void start_arm(Duration timeout, CompletionPtr completion);
   void start_identify(Duration timeout, CompletionPtr completion);
   void start_wait_active(Duration timeout, CompletionPtr completion);

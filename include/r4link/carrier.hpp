@@ -8,8 +8,6 @@
 // device does.
 #pragma once
 
-#include <chrono>
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -141,17 +139,16 @@ class R4LINK_API Carrier {
   // but must not destroy it.
   class Handler {
    public:
-    virtual void on_datagram(std::string_view bytes, Peer from) = 0;  // `bytes` valid in the call
+    // `bytes` are valid in the call. A host has one board: there `from` is `everyone`.
+    virtual void on_datagram(std::string_view bytes, Peer from) = 0;
     virtual void on_carrier_event(const CarrierEvent& event) = 0;
-    // All datagrams that had arrived have been handed over: to be called whenever that is so. A handler
-    // that was held up can tell by it which state of a backlog is the newest. Behind a long burst on a
-    // byte stream it may come with the next datagram only.
+    // All datagrams that had arrived have been handed over: to be called whenever that is so. A
+    // handler that was held up can tell by it which state of a backlog is the newest. After a long
+    // burst on a byte stream it may come with the next datagram only.
     virtual void on_drained() {}
-    // What another program sent to the board, on a wire that programs share.
+    // What another program sent to the board, where that can be heard.
     virtual void on_overheard(std::string_view bytes) { static_cast<void>(bytes); }
-    // Another program has taken the device (Claim::yields): this carrier has closed it.
-    virtual void on_taken() {}
-    // The first 1024 bytes of a line or packet that was longer, and so no datagram; the rest is thrown away.
+    // The first 1024 bytes of what was longer, and so is not a datagram. The rest is thrown away.
     virtual void on_oversize(std::string_view beginning) { static_cast<void>(beginning); }
 
    protected:
@@ -169,48 +166,19 @@ class R4LINK_API Carrier {
   // Stops at once; no call of the handler follows. Can be called twice.
   virtual void close() noexcept = 0;
 
-  // Sends one datagram (no terminator). Never blocks; `bytes` are copied if they must wait. A
-  // datagram that could not be written within 100 ms is dropped and counted.
+  // Sends one datagram of at most max_datagram (1024) bytes, without a terminator. Never blocks;
+  // `bytes` are copied if they must wait. A datagram that could not be written within 100 ms is
+  // dropped and counted. A host has one board, to which it sends: `everyone`.
   virtual SendResult send(std::string_view bytes, Priority priority, Peer to = everyone) = 0;
 
-  // At a board: that peer is in control. It keeps its number, however many others send, until another peer is
-  // held. Where nothing reaches everyone at once (UDP), what is sent to everyone goes to it. `everyone`: nobody
-  // on this carrier is in control any more.
-  virtual void hold(Peer peer) { static_cast<void>(peer); }
-  // It is that peer, too, for it is heard from several places: held beside the first until another is held.
-  virtual void also_hold(Peer peer) { static_cast<void>(peer); }
-
-  // At a board: does that peer get what is sent to everyone?
-  virtual bool reaches(Peer peer) const { return peer == everyone; }
-
-  // Is it a bus (CAN), on which what a board says is heard by all, and all its hosts send from one place? Then who
-  // only watches sends nothing but stops and leases (W), and a board asks for no proof of those.
+  // True where the board cannot tell one host from another: on a bus, which all hosts send to from
+  // one place, or through a program that shares its transport. A program that only watches sends
+  // nothing there but stops and leases.
   virtual bool is_shared() const { return false; }
 
-  // Sends the packed form from now on, where there is one (CAN). Received are both at any time.
-  virtual void use_packed_form(bool wanted) { static_cast<void>(wanted); }
-
-  // Of a device that one program can have open at a time: how the next open() takes it.
-  struct Claim {
-    bool yields =
-        false;  // it may be taken from this program, which then reads and sends nothing more
-    bool takes = false;  // also from a program that yields
-  };
-  virtual void claim(Claim claim) { static_cast<void>(claim); }
-
-  // At a host that records and does not drive, before open(): what comes may be handed over some milliseconds late, so
-  // that many boards wake the processor up no more often than one. A carrier that does so tells when it came.
-  virtual void gather() {}
-  // Of the datagram that is being handed over: when it came, unless that is now.
-  virtual std::optional<std::chrono::steady_clock::time_point> arrival() const {
-    return std::nullopt;
-  }
-
   virtual bool up() const = 0;
-  // At a host: as it is now.
+  // Why datagrams do not pass although the transport is up, as far as it can tell.
   virtual WireTrouble trouble() const { return WireTrouble::none; }
-  // The longest datagram it carries, in bytes.
-  virtual std::size_t max_size() const = 0;
   // For people: the URL, with what `auto` found.
   virtual const std::string& name() const = 0;
   virtual const CarrierCounters& counters() const = 0;

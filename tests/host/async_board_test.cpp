@@ -73,7 +73,6 @@ class Overhearing final : public Carrier {
   void close() noexcept override { handler_ = nullptr; }
   SendResult send(std::string_view, Priority, Peer) override { return SendResult::sent; }
   bool up() const override { return handler_ != nullptr; }
-  std::size_t max_size() const override { return max_datagram; }
   const std::string& name() const override { return name_; }
   const CarrierCounters& counters() const override { return counters_; }
   void overhear(std::string_view bytes) { handler_->on_overheard(bytes); }
@@ -111,7 +110,6 @@ class Undrained final : public Carrier, private Carrier::Handler {
     return below_->send(bytes, priority, to);
   }
   bool up() const override { return below_->up(); }
-  std::size_t max_size() const override { return below_->max_size(); }
   const std::string& name() const override { return below_->name(); }
   const CarrierCounters& counters() const override { return below_->counters(); }
 
@@ -137,7 +135,6 @@ class Bus final : public Carrier {
   }
   bool is_shared() const override { return true; }
   bool up() const override { return true; }
-  std::size_t max_size() const override { return max_datagram; }
   const std::string& name() const override { return name_; }
   const CarrierCounters& counters() const override { return counters_; }
 

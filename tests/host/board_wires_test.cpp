@@ -149,7 +149,6 @@ class Cuttable final : public Carrier, private Carrier::Handler {
     return cut ? SendResult::sent : below_->send(bytes, priority, to);
   }
   bool up() const override { return !unplugged && below_->up(); }
-  std::size_t max_size() const override { return below_->max_size(); }
   const std::string& name() const override { return below_->name(); }
   const CarrierCounters& counters() const override { return below_->counters(); }
   void plug(bool in) {

@@ -47,7 +47,6 @@ class Recorder final : public Carrier::Handler {
     if (then_event) then_event();
   }
   void on_drained() override { ++drained; }
-  void on_taken() override { ++taken; }
   void on_overheard(std::string_view bytes) override {
     overheard.emplace_back(bytes);
     if (then_overheard) then_overheard();
@@ -76,7 +75,6 @@ class Recorder final : public Carrier::Handler {
   std::vector<Datagram> datagrams;
   std::vector<Event> events;
   int drained = 0;
-  int taken = 0;
   std::vector<std::string> overheard;
   std::vector<std::string> oversize;
   std::function<void(const Datagram&)> then;  // also called

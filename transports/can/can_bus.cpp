@@ -10,6 +10,7 @@
 #include <asio/post.hpp>
 #include <cerrno>
 #include <map>
+#include <random>
 #include <utility>
 
 #include "../file_descriptor.hpp"
@@ -73,7 +74,8 @@ CanBus::CanBus(asio::io_context& io, std::string interface, bool fd)
       writable_(io),
       retry_timer_(io),
       look_timer_(io),
-      polling_(most_polling) {
+      polling_(most_polling),
+      announced_stop_(std::random_device{}()) {
   socket_.open(interface_, fd_);
   watch_socket();
   listen();

@@ -26,6 +26,7 @@
 #include "../writable_wait.hpp"
 #include "can_socket.hpp"
 #include "r4link/carrier.hpp"
+#include "stop_numbers.hpp"
 
 namespace r4 {
 
@@ -90,12 +91,20 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   bool take();
   // The emergency stop, which all boards of the bus hear, ahead of everything that waits in the interface's queue.
   //
-  // The bare frame first, which every board on any version of this plan obeys, and behind it the one with
-  // the number by which the stop is confirmed. Members whose stop has the same number have one of each: none
-  // is sent again within stop_spacing.
-  SendResult announce_stop(std::optional<std::uint32_t> number);
+  // The bare frame, which every board on any version of this plan obeys. To a board each is a new
+  // stop.
+  SendResult send_bare_stop();
+  // The same of a stop that is confirmed. `number` is set to the one that the bus gives it, by
+  // which repeat_stop() sends it. Members that announce a stop in one turn of the loop, within
+  // `together`, announce the same: they get one number, and one bare frame leaves. A member whose
+  // own earlier stop has that number gets another one.
+  SendResult announce_stop(const StopNumbers& own, std::uint32_t& number);
+  // The frame with that number. None is sent again within stop_spacing.
   SendResult repeat_stop(std::uint32_t number);
   static constexpr std::chrono::milliseconds stop_spacing{10};
+  // Shorter than a stop is repeated after its confirmation: whoever clears it meanwhile finds it
+  // pressed again.
+  static constexpr std::chrono::milliseconds together{100};
 
   bool up() const { return up_; }
   // What was told of last, if that is still so: for who has joined since.
@@ -173,9 +182,11 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   std::size_t out_count_ = 0;
   Clock::time_point progress_;
 
-  // The newest stops: of which the bare frame has left, and which left with its number, and when.
-  std::optional<std::uint32_t> announced_stop_;
+  // The stop that was announced last, and the one that left with its number last.
+  std::uint32_t announced_stop_;
   Clock::time_point announced_at_;
+  bool announcing_ = false;  // in this turn of the loop
+  OperationSlot announcement_;
   std::optional<std::uint32_t> numbered_stop_;
   Clock::time_point stop_left_;
 

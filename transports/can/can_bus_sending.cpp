@@ -12,9 +12,6 @@ namespace r4 {
 namespace {
 
 constexpr std::chrono::milliseconds retry_interval{1};
-// Members that announce the same stop do so in one go. What comes later is another one, whose number is the same by
-// chance.
-constexpr std::chrono::seconds one_press{1};
 
 }  // namespace
 
@@ -106,18 +103,24 @@ void CanBus::send_later() {
   writable_.start(socket_.number(), [this] { send(); });
 }
 
-SendResult CanBus::announce_stop(std::optional<std::uint32_t> number) {
+SendResult CanBus::send_bare_stop() {
+  CanFrame frame{};
+  frame.id = emergency_stop_id;
+  return send_first(frame);
+}
+
+SendResult CanBus::announce_stop(const StopNumbers& own, std::uint32_t& number) {
   const Clock::time_point now = Clock::now();
-  const bool announced = announced_stop_ == number && now - announced_at_ < one_press;
-  if (!number || !announced) {
-    CanFrame frame{};
-    frame.id = emergency_stop_id;
-    const SendResult bare = send_first(frame);
-    if (bare != SendResult::sent || !number) return bare;
-    announced_stop_ = number;
+  if (!announcing_ || now - announced_at_ >= together || own.carries(announced_stop_)) {
+    const SendResult bare = send_bare_stop();
+    if (bare != SendResult::sent) return bare;
+    announced_stop_ = short_stop_number(announced_stop_ + 1);
     announced_at_ = now;
+    announcing_ = true;
+    asio::post(io_, announcement_.handler([this] { announcing_ = false; }));
   }
-  return repeat_stop(*number);
+  number = announced_stop_;
+  return SendResult::sent;
 }
 
 SendResult CanBus::repeat_stop(std::uint32_t number) {

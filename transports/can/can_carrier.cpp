@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "../../protocol/messages/command_field.hpp"
+#include "../board_end.hpp"
 #include "../framing/can/can_node.hpp"
 #include "../operation_slot.hpp"
 #include "../send_queue.hpp"
@@ -30,7 +31,7 @@ constexpr std::size_t normal_entries = 32;
 constexpr std::size_t state_entries = 1;  // newest wins
 constexpr std::uint32_t look_again_us = 20000;
 
-class CanCarrier final : public Carrier, private CanBus::Member {
+class CanCarrier final : public Carrier, public BoardEnd, private CanBus::Member {
  public:
   CanCarrier(asio::io_context& io, Url url, Role role);
   ~CanCarrier() override { close(); }
@@ -41,7 +42,6 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   void use_packed_form(bool wanted) override { node_.use_packed_form(wanted); }
   bool up() const override { return handler_ != nullptr && bus_->up(); }
   WireTrouble trouble() const override;
-  std::size_t max_size() const override { return max_datagram; }
   bool is_shared() const override { return true; }
   const std::string& name() const override { return name_; }
   const CarrierCounters& counters() const override;
@@ -70,7 +70,7 @@ class CanCarrier final : public Carrier, private CanBus::Member {
 
   Lane& lane(CanLane which) { return lanes_[which == CanLane::dialogue ? 0 : 1]; }
   SendResult send_stop(std::string_view bytes);
-  SendResult send_lease(std::string_view bytes);
+  SendResult send_lease();
   bool begin(std::string_view bytes, std::uint32_t now_us);
   bool begin_waiting(std::uint32_t now_us);
   void listen_for_others(const CanFrame& frame);
@@ -91,17 +91,14 @@ class CanCarrier final : public Carrier, private CanBus::Member {
   mutable CarrierCounters counters_;      // what others count is put in when it is asked for
   std::array<Lane, 2> lanes_;
   std::shared_ptr<CanBus> bus_;
-  std::optional<std::uint32_t> announced_stop_;  // its number
-  CanTrouble trouble_;                           // of a host
+  StopNumbers stops_;   // of a host
+  CanTrouble trouble_;  // of a host
   Handler* handler_ = nullptr;
   LoopTimer timer_;
   OperationSlot timing_;
   bool armed_ = false;
   std::uint32_t armed_for_us_ = 0;
 };
-
-bool is_lease(std::string_view bytes) { return bytes.starts_with("W:"); }
-bool ends_lease(std::string_view bytes) { return bytes.starts_with("W:0;"); }
 
 // Whether a board packs is its setting, not its URL's.
 std::uint8_t node_of(const Url& url, Role role) {
@@ -185,7 +182,7 @@ SendResult CanCarrier::send(std::string_view bytes, Priority priority, Peer) {
     ++(result == SendResult::sent ? counters_.tx_datagrams : counters_.tx_errors);
     return result;
   }
-  if (role_ == Role::host && is_lease(bytes)) return send_lease(bytes);
+  if (priority == Priority::lease && role_ == Role::host) return send_lease();
   if (role_ == Role::host && !turn_.ours(Clock::now())) {
     return turn_.others() ? SendResult::busy : SendResult::down;
   }
@@ -198,18 +195,21 @@ SendResult CanCarrier::send(std::string_view bytes, Priority priority, Peer) {
   return result;
 }
 
-// Only its number is repeated: to a board a bare frame is a new stop each time, and who has seen the one
-// would have to look again before they clear it.
+// Only the frame with its number is repeated: to a board a bare frame is a new stop each time, and
+// who has seen the one would have to look again before they clear it.
 SendResult CanCarrier::send_stop(std::string_view bytes) {
   Datagram stop;
+  std::uint32_t pnum = 0;
+  if (!read_datagram(Text(bytes.data(), bytes.size()), stop) || !stop_number(stop, pnum)) {
+    return bus_->send_bare_stop();
+  }
   std::uint32_t number = 0;
-  const bool numbered =
-      read_datagram(Text(bytes.data(), bytes.size()), stop) && stop_number(stop, number);
-  if (!numbered) return bus_->announce_stop({});
-  if (announced_stop_ == number) return bus_->repeat_stop(number);
-  const SendResult result = bus_->announce_stop(number);
-  if (result == SendResult::sent) announced_stop_ = number;
-  return result;
+  if (!stops_.find(pnum, number)) {
+    const SendResult announced = bus_->announce_stop(stops_, number);
+    if (announced != SendResult::sent) return announced;
+    stops_.add(pnum, number);
+  }
+  return bus_->repeat_stop(number);
 }
 
 bool CanCarrier::begin(std::string_view bytes, std::uint32_t now_us) {
@@ -222,9 +222,8 @@ bool CanCarrier::begin(std::string_view bytes, std::uint32_t now_us) {
 
 // By a frame that is the same whoever sends it, so that it collides with nobody's; where the board is, and no
 // host for whom it streams anyway.
-SendResult CanCarrier::send_lease(std::string_view bytes) {
+SendResult CanCarrier::send_lease() {
   const Clock::time_point now = Clock::now();
-  if (ends_lease(bytes)) return SendResult::down;  // others may watch, too: it runs out
   if (!trouble_.hears_board(now) || trouble_.hears_host(now)) return SendResult::down;
   node_.ask_for_states();
   bus_->send();
@@ -295,7 +294,8 @@ void CanCarrier::on_frame(const CanFrame& frame, std::uint32_t at_us) {
     handler_->on_overheard(command);
     return;
   }
-  const Text datagram = node_.on_frame(frame, at_us);
+  char room[max_datagram];
+  const Text datagram = stops_.in_full(node_.on_frame(frame, at_us), room);
   count_late_transfers();
   if (datagram.empty()) return;
   ++counters_.rx_datagrams;

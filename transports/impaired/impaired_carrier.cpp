@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "../board_end.hpp"
 #include "../operation_slot.hpp"
 
 namespace r4 {
@@ -17,10 +18,10 @@ using Clock = std::chrono::steady_clock;
 
 Time now() { return std::chrono::duration_cast<Time>(Clock::now().time_since_epoch()); }
 
-class Impaired final : public ImpairedCarrier, private Carrier::Handler {
+class Impaired final : public ImpairedCarrier, public BoardEnd, private Carrier::Handler {
  public:
   Impaired(asio::io_context& io, std::unique_ptr<Carrier> below, const Impairment& impairment)
-      : below_(std::move(below)), impairment_(impairment), timer_(io) {
+      : below_(std::move(below)), end_(board_end_of(*below_)), impairment_(impairment), timer_(io) {
     begin();
   }
   ~Impaired() override { close(); }
@@ -47,14 +48,14 @@ class Impaired final : public ImpairedCarrier, private Carrier::Handler {
     pass();
     return SendResult::sent;
   }
-  void hold(Peer peer) override { below_->hold(peer); }
-  void also_hold(Peer peer) override { below_->also_hold(peer); }
-  bool reaches(Peer peer) const override { return below_->reaches(peer); }
+  void hold(Peer peer) override { end_.hold(peer); }
+  void also_hold(Peer peer) override { end_.also_hold(peer); }
+  bool reaches(Peer peer) const override { return end_.reaches(peer); }
+  void use_packed_form(bool wanted) override { end_.use_packed_form(wanted); }
+  bool is_own_cable() const override { return end_.is_own_cable(); }
   bool is_shared() const override { return below_->is_shared(); }
-  void use_packed_form(bool wanted) override { below_->use_packed_form(wanted); }
   bool up() const override { return below_->up(); }
   WireTrouble trouble() const override { return below_->trouble(); }
-  std::size_t max_size() const override { return below_->max_size(); }
   const std::string& name() const override { return below_->name(); }
   const CarrierCounters& counters() const override { return below_->counters(); }
   const ImpairmentCounters& received() const override { return in_->counters(); }
@@ -103,6 +104,7 @@ class Impaired final : public ImpairedCarrier, private Carrier::Handler {
   }
 
   const std::unique_ptr<Carrier> below_;
+  BoardEnd& end_;  // of it
   const Impairment impairment_;
   LoopTimer timer_;
   OperationSlot waiting_;

@@ -27,7 +27,7 @@ struct flock other_from(int device, off_t first) {
 
 }  // namespace
 
-bool PortLock::lock(int device, Carrier::Claim claim) {
+bool PortLock::lock(int device, const DeviceClaim& claim) {
   // For programs that are not ours, and lock it as a whole.
   if (::flock(device, LOCK_SH | LOCK_NB) != 0) return false;
   off_t place = 0;

@@ -12,14 +12,14 @@
 
 #include <sys/types.h>
 
-#include "r4link/carrier.hpp"
+#include "../share_name.hpp"
 
 namespace r4 {
 
 class PortLock {
  public:
   // False, with errno, if other programs have it and do not let it go.
-  bool lock(int device, Carrier::Claim claim);
+  bool lock(int device, const DeviceClaim& claim);
   // Another program has taken it from this one.
   bool is_taken() const;
   // Nobody has had it before.

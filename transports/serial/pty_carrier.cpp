@@ -16,10 +16,11 @@
 #include <filesystem>
 #include <utility>
 
+#include "../board_end.hpp"
 #include "../file_descriptor.hpp"
 #include "../operation_slot.hpp"
-#include "../unread_marks.hpp"
 #include "line_stream.hpp"
+#include "unread_marks.hpp"
 
 namespace r4 {
 namespace {
@@ -39,7 +40,7 @@ bool is_our_kind(const std::filesystem::path& link) {
   return !error && (target.parent_path() == "/dev/pts" || !std::filesystem::exists(link, error));
 }
 
-class PtyCarrier final : public Carrier, private LineStream::Owner {
+class PtyCarrier final : public Carrier, public BoardEnd, private LineStream::Owner {
  public:
   PtyCarrier(asio::io_context& io, Url url);
   ~PtyCarrier() override { close(); }
@@ -49,8 +50,8 @@ class PtyCarrier final : public Carrier, private LineStream::Owner {
   SendResult send(std::string_view bytes, Priority priority, Peer) override {
     return stream_.send(bytes, priority);
   }
+  bool is_own_cable() const override { return true; }
   bool up() const override { return up_; }
-  std::size_t max_size() const override { return max_datagram; }
   const std::string& name() const override { return name_; }
   const CarrierCounters& counters() const override { return counters_; }
 

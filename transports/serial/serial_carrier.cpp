@@ -52,15 +52,13 @@ std::string find_device(const Url& url) {
 
 class SerialCarrier final : public Carrier, private LineStream::Owner {
  public:
-  SerialCarrier(asio::io_context& io, Url url);
+  SerialCarrier(asio::io_context& io, Url url, std::shared_ptr<DeviceClaim> claim);
   ~SerialCarrier() override { close(); }
 
   void open(Handler& handler) override;
   void close() noexcept override;
   SendResult send(std::string_view bytes, Priority priority, Peer) override;
-  void claim(Claim claim) override { claim_ = claim; }
   bool up() const override { return up_; }
-  std::size_t max_size() const override { return max_datagram; }
   const std::string& name() const override { return name_; }
   const CarrierCounters& counters() const override { return counters_; }
 
@@ -88,20 +86,21 @@ class SerialCarrier final : public Carrier, private LineStream::Owner {
   int obstructed_ = 0;    // looks at which it was so
   Handler* handler_ = nullptr;
   bool up_ = false;
-  Claim claim_;
+  const std::shared_ptr<DeviceClaim> claim_;
   PortLock lock_;
   OperationSlot yielding_;
   CarrierCounters counters_;
   LineStream stream_;
 };
 
-SerialCarrier::SerialCarrier(asio::io_context& io, Url url)
+SerialCarrier::SerialCarrier(asio::io_context& io, Url url, std::shared_ptr<DeviceClaim> claim)
     : io_(io),
       url_(std::move(url)),
       baud_(static_cast<unsigned>(url_.get_number("baud", min_baud, max_baud, default_baud))),
       serial_number_(url_.get("sn").value_or("")),
       name_(url_.text()),
       timer_(io),
+      claim_(std::move(claim)),
       stream_(io, *this, counters_) {
   url_.allow_only("baud sn");
   const bool by_number = !serial_number_.empty();
@@ -116,7 +115,7 @@ SerialCarrier::SerialCarrier(asio::io_context& io, Url url)
 void SerialCarrier::open(Handler& handler) {
   close();
   open_device(find_device(url_));
-  claim_.takes = false;  // once: another may have it in the right way when it is opened again
+  claim_->takes = false;  // once: another may have it in the right way when it is opened again
   handler_ = &handler;
   up_ = true;
   ++counters_.ups;
@@ -132,7 +131,7 @@ void SerialCarrier::close() noexcept {
 }
 
 SendResult SerialCarrier::send(std::string_view bytes, Priority priority, Peer) {
-  if (claim_.yields && up_ && lock_.is_taken()) {
+  if (claim_->yields && up_ && lock_.is_taken()) {
     asio::post(io_, yielding_.handler([this] { may_read(); }));
     return SendResult::down;
   }
@@ -142,9 +141,8 @@ SendResult SerialCarrier::send(std::string_view bytes, Priority priority, Peer) 
 // Asked before each reading where the port may be taken from us: we may have been stopped for long.
 bool SerialCarrier::may_read() {
   if (!lock_.is_taken()) return true;
-  Handler* const handler = handler_;
   close();
-  handler->on_taken();
+  if (claim_->on_taken) claim_->on_taken();
   return false;
 }
 
@@ -164,7 +162,7 @@ std::string SerialCarrier::find_again() const {
 }
 
 void SerialCarrier::open_device(const std::string& path) {
-  stream_.start(open_serial_device(io_, path, baud_, claim_, lock_), path, claim_.yields);
+  stream_.start(open_serial_device(io_, path, baud_, *claim_, lock_), path, claim_->yields);
   name_ = "serial://" + path;
   if (baud_ != default_baud) name_ += fmt::format("?baud={}", baud_);
   const std::string real_path = resolve_links(path);
@@ -217,7 +215,12 @@ void SerialCarrier::look() {
 }  // namespace
 
 std::unique_ptr<Carrier> make_serial_carrier(asio::io_context& io, const Url& url, Role) {
-  return std::make_unique<SerialCarrier>(io, url);
+  return make_claimed_serial_carrier(io, url, std::make_shared<DeviceClaim>());
+}
+
+std::unique_ptr<Carrier> make_claimed_serial_carrier(asio::io_context& io, const Url& url,
+                                                     std::shared_ptr<DeviceClaim> claim) {
+  return std::make_unique<SerialCarrier>(io, url, std::move(claim));
 }
 
 ShareName serial_share_name(const Url& url) {

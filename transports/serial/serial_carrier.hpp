@@ -22,6 +22,10 @@ namespace r4 {
 // Throws Error{usage} for a URL that serial does not take.
 std::unique_ptr<Carrier> make_serial_carrier(asio::io_context& io, const Url& url, Role role);
 
+// The same, opened as `claim` says each time.
+std::unique_ptr<Carrier> make_claimed_serial_carrier(asio::io_context& io, const Url& url,
+                                                     std::shared_ptr<DeviceClaim> claim);
+
 // What programs that share the port call it: a board by its serial number, so that it may be plugged into
 // another socket, anything else by its device. Throws Error where there is none, or more than one.
 ShareName serial_share_name(const Url& url);

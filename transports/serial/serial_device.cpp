@@ -131,7 +131,7 @@ std::string resolve_links(const std::string& path) {
 }
 
 FileDescriptor open_serial_device(asio::io_context& io, const std::string& path, unsigned baud,
-                                  Carrier::Claim claim, PortLock& lock) {
+                                  const DeviceClaim& claim, PortLock& lock) {
   const std::string real_path = resolve_links(path);
   const bool real = is_in_sysfs(real_path);
   FileDescriptor device = real ? open_real(path, real_path, baud) : open_pty(io, real_path, baud);

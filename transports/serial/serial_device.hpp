@@ -20,7 +20,7 @@ namespace r4 {
 //
 // Throws Error: open (missing, in use, no tty), permission, usage (a rate that the device refuses).
 FileDescriptor open_serial_device(asio::io_context& io, const std::string& path, unsigned baud,
-                                  Carrier::Claim claim, PortLock& lock);
+                                  const DeviceClaim& claim, PortLock& lock);
 
 // The file that symbolic links such as /dev/serial/by-id/… lead to; `path` itself if it leads
 // nowhere.

@@ -37,30 +37,27 @@ class SharedCarrier final : public Carrier,
                             private ShareHolder::Owner,
                             private ShareClient::Owner {
  public:
-  SharedCarrier(asio::io_context& io, std::unique_ptr<Carrier> own, FindShareName find,
-                BoardRole role)
-      : own_(std::move(own)),
+  SharedCarrier(asio::io_context& io, std::unique_ptr<Carrier> own,
+                std::shared_ptr<DeviceClaim> claim, FindShareName find, BoardRole role)
+      : claim_(std::move(claim)),
+        own_(std::move(own)),
         find_(std::move(find)),
         role_(role),
         name_(own_->name()),
         holder_(io, *this),
         client_(io, *this),
-        timer_(io) {}
+        timer_(io) {
+    claim_->on_taken = [this] { lose(); };
+  }
   ~SharedCarrier() override { close(); }
 
   void open(Carrier::Handler& handler) override;
   void close() noexcept override;
   SendResult send(std::string_view bytes, Priority priority, Peer to) override;
-  void use_packed_form(bool wanted) override { own_->use_packed_form(wanted); }
-  void gather() override { own_->gather(); }
-  std::optional<Clock::time_point> arrival() const override {
-    return state_ == State::holding ? own_->arrival() : std::nullopt;
-  }
   bool up() const override { return up_; }
   WireTrouble trouble() const override { return own_->trouble(); }
   // The board would take what is sent to another program's transport for the holder's.
   bool is_shared() const override { return is_served() || own_->is_shared(); }
-  std::size_t max_size() const override { return own_->max_size(); }
   const std::string& name() const override { return name_; }
   const CarrierCounters& counters() const override {
     counted_ = own_->counters();
@@ -80,7 +77,6 @@ class SharedCarrier final : public Carrier,
   void on_datagram(std::string_view bytes, Peer from) override;
   void on_carrier_event(const CarrierEvent& event) override;
   void on_drained() override { handler_->on_drained(); }
-  void on_taken() override { lose(); }
   void on_overheard(std::string_view bytes) override;
   void on_oversize(std::string_view beginning) override;
   // Programs to which we are the holder.
@@ -108,6 +104,7 @@ class SharedCarrier final : public Carrier,
   }
   void tell(const CarrierEvent& event);
 
+  const std::shared_ptr<DeviceClaim> claim_;  // how own_ opens its device
   const std::unique_ptr<Carrier> own_;
   const FindShareName find_;
   const BoardRole role_;
@@ -219,7 +216,8 @@ bool SharedCarrier::hold_to_watch() {
 void SharedCarrier::open_own() {
   state_ = State::holding;
   try {
-    own_->claim({role_ == BoardRole::watch, search_.no_help.has_value()});
+    claim_->yields = role_ == BoardRole::watch;
+    claim_->takes = search_.no_help.has_value();
     with_system_errors(name_, [&] { own_->open(*this); });
   } catch (const Error& error) {
     state_ = State::seeking;
@@ -392,8 +390,10 @@ void SharedCarrier::on_closed() {
 }  // namespace
 
 std::unique_ptr<Carrier> make_shared_carrier(asio::io_context& io, std::unique_ptr<Carrier> own,
-                                             FindShareName find, BoardRole role) {
-  return std::make_unique<SharedCarrier>(io, std::move(own), std::move(find), role);
+                                             std::shared_ptr<DeviceClaim> claim, FindShareName find,
+                                             BoardRole role) {
+  return std::make_unique<SharedCarrier>(io, std::move(own), std::move(claim), std::move(find),
+                                         role);
 }
 
 }  // namespace r4

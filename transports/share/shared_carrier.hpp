@@ -24,10 +24,11 @@
 
 namespace r4 {
 
-// What the carrier reports is what `own` does, whichever program holds the transport. open() does
-// not wait for another program; it throws Error{refused} if one controls the board, and what `own`
-// throws.
+// What the carrier reports is what `own` does, whichever program holds the transport. `claim`: how
+// `own` opens its device. open() does not wait for another program; it throws Error{refused} if one
+// controls the board, and what `own` throws.
 std::unique_ptr<Carrier> make_shared_carrier(asio::io_context& io, std::unique_ptr<Carrier> own,
-                                             FindShareName find, BoardRole role);
+                                             std::shared_ptr<DeviceClaim> claim, FindShareName find,
+                                             BoardRole role);
 
 }  // namespace r4

@@ -5,13 +5,14 @@
 
 #include <asio/io_context.hpp>
 
+#include "../board_end.hpp"
 #include "../framing/peer_table.hpp"
 #include "search/host_lookup.hpp"
 #include "udp_end.hpp"
 
 namespace r4 {
 
-class UdpBoard final : public UdpEnd {
+class UdpBoard final : public UdpEnd, public BoardEnd {
  public:
   UdpBoard(asio::io_context& io, const Url& url, HostLookup lookup);
   ~UdpBoard() override { close(); }

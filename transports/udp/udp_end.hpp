@@ -26,7 +26,6 @@ class UdpEnd : public Carrier {
   void close() noexcept override;
   SendResult send(std::string_view bytes, Priority priority, Peer to) override;
   bool up() const override { return up_; }
-  std::size_t max_size() const override { return max_datagram; }
   const std::string& name() const override { return name_; }
   const CarrierCounters& counters() const override { return counters_; }
 

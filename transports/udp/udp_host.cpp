@@ -4,24 +4,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <utility>
 
 namespace r4 {
-namespace {
-
-// Others of the loop wait.
-constexpr int most_in_a_turn = 32;
-
-}  // namespace
 
 UdpHost::UdpHost(asio::io_context& io, const Url& url, HostLookup lookup, BoardSearch search)
     : UdpEnd(io, UdpUrl(url, Role::host)),
       lookup_(std::move(lookup)),
       search_(std::move(search)),
       watch_(io, lookup_),
-      crowd_(UdpCrowd::of(io)),
       network_(NetworkWatch::of(io)) {
   search_.port = url_.port;
 }
@@ -49,61 +40,12 @@ void UdpHost::open(Handler& handler) {
   watch();
 }
 
-void UdpHost::gather() {
-  close();
-  socket_ = UdpGathering::quiet_socket(io_);
-  gathering_.emplace(io_);
-}
-
-void UdpHost::listen() {
-  if (one_of_many_) {
-    if (crowd_.read(socket_.native_handle(), *this)) return;
-    return warn(fmt::format("nothing is heard: {}", std::strerror(errno)), "close some programs");
-  }
-  if (!gathering_) return UdpEnd::listen();
-  gathering_->wait(socket_.native_handle(), [this] { take_what_has_gathered(); });
-}
-
-void UdpHost::take_what_has_gathered() {
-  for (int i = 0; i < most_in_a_turn && handler_ != nullptr; ++i) {
-    const auto size = gathering_->read(received_.data(), received_.size(), sender_);
-    if (!size) {
-      handler_->on_drained();
-      break;
-    }
-    received({received_.data(), *size});
-  }
-  if (handler_ != nullptr) listen();
-}
-
-void UdpHost::on_packet(std::string_view bytes, const Endpoint& from) {
-  sender_ = from;
-  received(bytes);
-}
-
-void UdpHost::close_socket() noexcept {
-  if (gathering_) gathering_->stop();
-  crowd_.stop(*this);
-  if (std::exchange(entered_, false)) crowd_.leave();
-  one_of_many_ = false;
-  host_socket_.close();
-}
+void UdpHost::close_socket() noexcept { host_socket_.close(); }
 
 void UdpHost::close() noexcept {
   watch_.stop();
   network_.leave(*this);
   UdpEnd::close();
-}
-
-// Before its socket is open, which the loop's reactor is not to watch where it is one of many.
-void UdpHost::enter_crowd() {
-  entered_ = true;
-  one_of_many_ = crowd_.enter();
-  if (one_of_many_) {
-    socket_ = UdpGathering::quiet_socket(io_);
-  } else {
-    socket_ = UdpSocket(io_);
-  }
 }
 
 // The socket of a host whose board is there.
@@ -123,7 +65,6 @@ void UdpHost::bind(const Endpoint& board) {
   if (const int error = probe_route(board, url_.local, own); error != 0) {
     throw Error(no_route(url_.text, error));
   }
-  if (!gathering_) enter_crowd();
   open_socket(local, true);
   send_by_interface_of(url_.local, socket_.native_handle(), board, own);
   const asio::error_code error = host_socket_.bind(local, board);

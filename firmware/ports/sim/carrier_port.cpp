@@ -6,7 +6,7 @@
 namespace r4::sim {
 
 CarrierPort::CarrierPort(std::unique_ptr<Carrier> carrier, Owner& owner)
-    : carrier_(std::move(carrier)), owner_(owner) {}
+    : carrier_(std::move(carrier)), end_(board_end_of(*carrier_)), owner_(owner) {}
 
 void CarrierPort::send(Text datagram, Priority priority, Peer peer) {
   carrier_->send({datagram.data(), datagram.size()}, priority, peer);  // it counts what it drops

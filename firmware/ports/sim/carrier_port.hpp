@@ -5,8 +5,10 @@
 #include <memory>
 #include <string_view>
 
+#include "../../../transports/board_end.hpp"
 #include "../../port.hpp"
 #include "r4link/carrier.hpp"
+#include "r4link/datagram.hpp"
 
 namespace r4::sim {
 
@@ -33,14 +35,13 @@ class CarrierPort final : public firmware::Port, private Carrier::Handler {
   std::uint8_t number = 0;
 
   void send(Text datagram, Priority priority, std::uint32_t peer) override;
-  std::size_t max_size() const override { return carrier_->max_size(); }
-  void hold(std::uint32_t peer) override { carrier_->hold(peer); }
-  void also_hold(std::uint32_t peer) override { carrier_->also_hold(peer); }
-  bool reaches(std::uint32_t peer) const override { return carrier_->reaches(peer); }
-  void use_packed_form(bool wanted) override { carrier_->use_packed_form(wanted); }
+  std::size_t max_size() const override { return max_datagram; }
+  void hold(std::uint32_t peer) override { end_.hold(peer); }
+  void also_hold(std::uint32_t peer) override { end_.also_hold(peer); }
+  bool reaches(std::uint32_t peer) const override { return end_.reaches(peer); }
+  void use_packed_form(bool wanted) override { end_.use_packed_form(wanted); }
   bool is_bus() const override { return carrier_->is_shared(); }
-  // A pseudo-terminal stands for the cable.
-  bool may_configure() const override { return carrier_->name().compare(0, 4, "pty:") == 0; }
+  bool may_configure() const override { return end_.is_own_cable(); }
 
  private:
   void on_datagram(std::string_view bytes, Peer from) override;
@@ -48,6 +49,7 @@ class CarrierPort final : public firmware::Port, private Carrier::Handler {
   void on_carrier_event(const CarrierEvent& event) override;
 
   std::unique_ptr<Carrier> carrier_;
+  BoardEnd& end_;  // of it
   Owner& owner_;
 };
 

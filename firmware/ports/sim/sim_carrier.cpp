@@ -37,7 +37,6 @@ class SimCarrier final : public Carrier {
     return end_->send(bytes, priority, to);
   }
   bool up() const override { return end_->up(); }
-  std::size_t max_size() const override { return end_->max_size(); }
   const std::string& name() const override { return end_->name(); }
   const CarrierCounters& counters() const override { return end_->counters(); }
 

@@ -15,6 +15,7 @@
 
 #include "firmware/ports/sim/simulated_board.hpp"
 #include "r4link/vocabulary.hpp"
+#include "transports/board_end.hpp"
 #include "transports/framing/can/can_ids.hpp"
 #include "transports/registry.hpp"
 
@@ -156,7 +157,7 @@ void CarrierEchoProcess::serve(Form form, const std::string& state, int ready) {
   } echo;
   asio::io_context io{ASIO_CONCURRENCY_HINT_UNSAFE};
   const auto carrier = Registry::standard().make(io, board_url(form, Above::nothing), Role::board);
-  carrier->use_packed_form(form == Form::packed);
+  board_end_of(*carrier).use_packed_form(form == Form::packed);
   echo.carrier = carrier.get();
   echo.state = &state;
   carrier->open(echo);
@@ -225,7 +226,7 @@ void CanSenderProcess::serve_ours(Form form, Lane lane, const std::string& datag
   const auto carrier =
       Registry::standard().make(io, lane == Lane::telemetry ? board_url(form) : host_url(form),
                                 lane == Lane::telemetry ? Role::board : Role::host);
-  carrier->use_packed_form(form == Form::packed);
+  board_end_of(*carrier).use_packed_form(form == Form::packed);
   Deaf handler;
   carrier->open(handler);
   write_all(control_, "r", 1);

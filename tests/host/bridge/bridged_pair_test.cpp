@@ -355,6 +355,16 @@ TEST_F(BridgedPairTest, WhileItServesNoHostTheBridgeItselfWatchesTheBoard) {
   EXPECT_TRUE(begun[1].starts_with("W:0;")) << "a host is served: " << begun[1];
 }
 
+TEST_F(BridgedPairTest, OnABusTheBridgesOwnLeaseRunsOutForOthersMayWatchThere) {
+  board->shared = true;
+  board->say("H:R4-ROS2;PNum:3;T:90;SAFE:1;");
+  pass(25ms);
+  ASSERT_EQ(own_lease(*board).text, "W:10");
+  hosts->say(heartbeat, first);
+  pass(BridgeHosts::patience);
+  EXPECT_EQ(board->take(), Texts{heartbeat});
+}
+
 TEST_F(BridgedPairTest, ARefusalThatNamesASessionIsNoAnswerToTheBridgesOwnW) {
   begin();
   pass(2s);

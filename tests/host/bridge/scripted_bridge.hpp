@@ -12,10 +12,11 @@
 
 #include "host/bridge/bridged_pair.hpp"
 #include "tests/support/datagrams.hpp"
+#include "transports/board_end.hpp"
 
 namespace r4::test {
 
-class ScriptedCarrier final : public Carrier {
+class ScriptedCarrier final : public Carrier, public BoardEnd {
  public:
   struct Sent {
     std::string text;
@@ -43,8 +44,8 @@ class ScriptedCarrier final : public Carrier {
     if (peer != held) also_held.push_back(peer);
   }
   bool reaches(Peer peer) const override { return peer == everyone || peer == held; }
+  bool is_shared() const override { return shared; }
   bool up() const override { return handler_ != nullptr; }
-  std::size_t max_size() const override { return max_datagram; }
   const std::string& name() const override { return name_; }
   const CarrierCounters& counters() const override { return counted; }
 
@@ -69,6 +70,7 @@ class ScriptedCarrier final : public Carrier {
   std::optional<Problem> absence;  // why it cannot be opened
   SendResult result = SendResult::sent;
   CarrierCounters counted;
+  bool shared = false;
   bool keeps = true;  // what was sent, which takes memory
   std::vector<Sent> sent;
   Peer held = everyone;

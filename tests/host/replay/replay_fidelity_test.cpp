@@ -40,7 +40,6 @@ class TroubledCarrier final : public Carrier, private Carrier::Handler {
     return below_->send(bytes, priority, to);
   }
   bool up() const override { return below_->up(); }
-  std::size_t max_size() const override { return below_->max_size(); }
   const std::string& name() const override { return below_->name(); }
   const CarrierCounters& counters() const override { return below_->counters(); }
 

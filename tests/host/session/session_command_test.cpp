@@ -383,31 +383,6 @@ TEST(SessionStop, IsNotConfirmedByTheReportOfAnother) {
   EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
 }
 
-TEST(SessionStop, IsConfirmedByTheEndOfItsNumberAsACanBusCarriesIt) {
-  ScriptedLink link;
-  link.connect();
-  const Ticket ticket = link.session.stop(1s, link.now);
-  link.stopped((link.last('E').pnum + 1) & 0x3FFFF);
-  EXPECT_TRUE(under_way(link, ticket));
-  link.stopped(link.last('E').pnum & 0x3FFFF);
-  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
-}
-
-TEST(SessionStop, MayHaveANumberInCommonWithThoseOfOtherBoards) {
-  ScriptedLink link;
-  link.connect();
-  const Ticket ticket = link.session.stop(1s, link.now, 4711);
-  EXPECT_EQ(link.last('E').pnum, 4711U);
-  link.stopped(4712);
-  EXPECT_TRUE(under_way(link, ticket));
-  link.stopped(4711);
-  EXPECT_EQ(result_of(link, ticket).outcome, Outcome::confirmed);
-  const Ticket own = link.session.stop(1s, link.now);
-  EXPECT_NE(link.last('E').pnum, 4711U);
-  link.stopped(link.last('E').pnum);
-  EXPECT_EQ(result_of(link, own).outcome, Outcome::confirmed);
-}
-
 // --- what an E:CLEAR clears
 
 TEST(SessionClear, NamesTheCauseThatWasKnownWhenItWasAskedFor) {

@@ -176,9 +176,9 @@ void WiredRobot::put(std::size_t wire, bool to_board, std::string_view bytes) {
   packets_.push_back({now_ms_ + cable.lag_ms, wire, to_board, std::string(bytes)});
 }
 
-SendResult WiredRobot::transmit(std::size_t wire, std::string_view bytes, Priority) {
+SendResult WiredRobot::transmit(std::size_t wire, std::string_view bytes, Priority priority) {
   if (!up_[wire]) return SendResult::down;
-  if (cables[wire].listens && !bytes.starts_with("W:")) return SendResult::down;
+  if (cables[wire].listens && priority != Priority::lease) return SendResult::down;
   if (keeps_states) cables[wire].sent.emplace_back(bytes);
   put(wire, true, bytes);
   return SendResult::sent;

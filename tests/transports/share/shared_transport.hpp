@@ -41,14 +41,15 @@ struct Device {
 
 class Device::Port final : public Carrier {
  public:
-  Port(asio::io_context& io, Device& device) : io_(io), device_(device) {}
+  Port(asio::io_context& io, Device& device, std::shared_ptr<DeviceClaim> claim)
+      : io_(io), device_(device), claim_(std::move(claim)) {}
   ~Port() override { close(); }
 
   void open(Handler& handler) override {
     close();
     if (device_.exclusive && device_.open != nullptr) {
       Port* const other = device_.open;
-      if (!device_.may_be_taken || !claim_.takes || !other->claim_.yields)
+      if (!device_.may_be_taken || !claim_->takes || !other->claim_->yields)
         throw Error(ErrorKind::open, name_, "in use", "end the other");
       asio::post(other->io_, [other] { other->lose(); });
     }
@@ -68,9 +69,7 @@ class Device::Port final : public Carrier {
     if (device_.then_sent) device_.then_sent();
     return SendResult::sent;
   }
-  void claim(Claim claim) override { claim_ = claim; }
   bool up() const override { return up_; }
-  std::size_t max_size() const override { return max_datagram; }
   const std::string& name() const override { return name_; }
   const CarrierCounters& counters() const override { return counters_; }
 
@@ -78,9 +77,9 @@ class Device::Port final : public Carrier {
   friend Device;
 
   void lose() {
-    Handler* const handler = handler_;
+    const bool was_open = handler_ != nullptr;
     close();
-    if (handler != nullptr) handler->on_taken();
+    if (was_open) claim_->on_taken();
   }
 
   asio::io_context& io_;
@@ -88,7 +87,7 @@ class Device::Port final : public Carrier {
   const std::string name_ = "device:";
   Handler* handler_ = nullptr;
   bool up_ = false;
-  Claim claim_;
+  const std::shared_ptr<DeviceClaim> claim_;
   CarrierCounters counters_;
 };
 
@@ -136,8 +135,10 @@ class SharedTransportTest : public testing::Test {
 
   std::unique_ptr<Program> program(BoardRole role, asio::io_context& loop) {
     auto made = std::make_unique<Program>();
+    auto claim = std::make_shared<DeviceClaim>();
     made->carrier = make_shared_carrier(
-        loop, std::make_unique<Device::Port>(loop, device), [this] { return share; }, role);
+        loop, std::make_unique<Device::Port>(loop, device, claim), claim, [this] { return share; },
+        role);
     return made;
   }
   // A program whose open() has returned, in this loop or in one that nobody may run.

@@ -14,6 +14,7 @@
 
 #include "../recorder.hpp"
 #include "tests/support/datagrams.hpp"
+#include "transports/board_end.hpp"
 
 namespace r4::test {
 namespace {
@@ -108,7 +109,7 @@ std::string answer_from(asio::io_context& io, const char* asked, const std::stri
   socket.send(asio::buffer(valid(asked)));
   if (!run_until(io, [&] { return at_board.has(valid(asked)); })) return "nothing was heard";
   board.send("for one", Priority::normal, at_board.datagrams.back().from);
-  board.hold(at_board.datagrams.back().from);
+  board_end_of(board).hold(at_board.datagrams.back().from);
   board.send("for all", Priority::state);
   std::string all;
   for (int i = 0; i < 2; ++i) {
@@ -233,40 +234,6 @@ TEST_F(UdpCarrierTest, CountsAndDropsWhatIsTooLong) {
   EXPECT_EQ(host->counters().tx_errors, 1U);
 }
 
-TEST_F(UdpCarrierTest, WhatGathersIsHandedOverTogetherAndWithTheTimeAtWhichItCame) {
-  open_board();
-  host =
-      Registry::standard().make(io, "udp://127.0.0.1:" + port_of(*board) + "?listen=0", Role::host);
-  host->gather();
-  host->open(at_host);
-  const std::string listen = host->name().substr(host->name().find("listen=") + 7);
-  std::vector<Clock::time_point> came;
-  at_host.then = [&](const Recorder::Datagram&) { came.push_back(host->arrival().value()); };
-  Socket raw(io, "127.0.0.1");
-  std::vector<Clock::time_point> sent;
-  for (const char* const text : {"one", "two", "three"}) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));  // the loop is held up
-    sent.push_back(Clock::now());
-    raw.send(text, listen);
-  }
-  ASSERT_TRUE(wait_for(at_host, "three"));
-  EXPECT_EQ(at_host.datagrams.size(), 3U);
-  EXPECT_EQ(at_host.drained, 1);
-  for (std::size_t i = 0; i < 3; ++i) {
-    EXPECT_NEAR(in_milliseconds(came[i] - sent[i]), 0, 10);
-  }
-  raw.send(std::string(1025, 'x'), listen);
-  raw.send("four", listen);
-  ASSERT_TRUE(wait_for(at_host, "four"));
-  EXPECT_EQ(at_host.oversize.size(), 1U);
-  EXPECT_EQ(host->send("to the board", Priority::normal), SendResult::sent);
-  ASSERT_TRUE(wait_for(at_board, "to the board"));
-  host->open(at_host);  // again, at another port
-  raw.send("five", host->name().substr(host->name().find("listen=") + 7));
-  ASSERT_TRUE(wait_for(at_host, "five"));
-  EXPECT_LE(came.back(), Clock::now());
-}
-
 TEST_F(UdpCarrierTest, TellsTheHostHowWhatIsTooLongBegins) {
   open_board();
   open_host();
@@ -307,7 +274,7 @@ TEST_F(UdpCarrierTest, SendsForEveryoneToTheHostInControlAlthoughAnotherWasHeard
   owner.send(valid("owner"), port_of(*board));
   stranger.send(valid("stranger"), port_of(*board));
   ASSERT_TRUE(wait_for(at_board, valid("stranger")));
-  board->hold(at_board.datagrams[0].from);
+  board_end_of(*board).hold(at_board.datagrams[0].from);
   board->send("state", Priority::state);
   EXPECT_TRUE(run_until(io, [&] { return owner.receive() == "state"; }));
 
@@ -317,7 +284,7 @@ TEST_F(UdpCarrierTest, SendsForEveryoneToTheHostInControlAlthoughAnotherWasHeard
   EXPECT_TRUE(run_until(io, [&] { return owner.receive() == "another state"; }));
   EXPECT_EQ(stranger.receive(), "");
 
-  board->hold(everyone);  // it has gone
+  board_end_of(*board).hold(everyone);  // it has gone
   stranger.send(valid("again"), port_of(*board));
   ASSERT_TRUE(wait_for(at_board, valid("again")));
   board->send("for anybody", Priority::state);

@@ -148,9 +148,7 @@ class Recorders {
     print_trouble("r4: " + problem->text());
   }
   void add(const std::string& url) {
-    auto carriers = make_host_carriers(io_, {url}, BoardRole::watch);
-    for (const auto& carrier : carriers) carrier->gather();
-    boards_.push_back(std::make_unique<AsyncBoard>(io_, std::move(carriers), board_options_));
+    boards_.push_back(std::make_unique<AsyncBoard>(io_, url, board_options_));
   }
   void open(AsyncBoard& board) {
     board.on_event([this](const CarrierEvent&) {

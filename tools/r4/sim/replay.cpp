@@ -22,6 +22,7 @@
 #include "input_lines.hpp"
 #include "protocol/datagram/numbers.hpp"
 #include "sim_log.hpp"
+#include "transports/board_end.hpp"
 #include "transports/registry.hpp"
 
 namespace r4::tool {
@@ -152,8 +153,9 @@ class Replay : private Carrier::Handler {
     const Clock::time_point now = Clock::now();
     std::erase_if(audience_, [&](const auto& peer) { return now - peer.second > audience_for; });
     carrier_->send(item.bytes, Priority::normal, everyone);
+    const BoardEnd& end = board_end_of(*carrier_);
     for (const auto& [peer, heard] : audience_) {
-      if (!carrier_->reaches(peer)) carrier_->send(item.bytes, Priority::normal, peer);
+      if (!end.reaches(peer)) carrier_->send(item.bytes, Priority::normal, peer);
     }
   }
 

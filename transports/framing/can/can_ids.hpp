@@ -24,9 +24,9 @@ constexpr std::uint32_t can_nodes = 32;
 constexpr std::uint32_t emergency_stop_id = 0x010;
 // A stop with a number has it in the 18 low bits of a 29-bit id, behind 0x010. In the content it would
 // be wrong: two that begin at once would differ behind their ids, and destroy each other for ever.
-constexpr std::uint32_t short_stop_number(std::uint32_t pnum) { return pnum & 0x3FFFF; }
-constexpr std::uint32_t numbered_stop_id(std::uint32_t pnum) {
-  return emergency_stop_id << 18 | short_stop_number(pnum);
+constexpr std::uint32_t short_stop_number(std::uint32_t number) { return number & 0x3FFFF; }
+constexpr std::uint32_t numbered_stop_id(std::uint32_t number) {
+  return emergency_stop_id << 18 | short_stop_number(number);
 }
 constexpr std::uint32_t went_safe_id(std::uint32_t node) { return 0x020 | (node % can_nodes); }
 constexpr std::uint32_t command_id(std::uint32_t node) { return 0x180 | (node % can_nodes); }

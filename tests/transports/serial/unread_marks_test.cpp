@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "transports/unread_marks.hpp"
+#include "transports/serial/unread_marks.hpp"
 
 #include <gtest/gtest.h>
 

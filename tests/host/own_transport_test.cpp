@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The transport of docs/transports.md, "Writing another", between a Board and a simulated board.
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+
+#include <asio/executor_work_guard.hpp>
+#include <asio/io_context.hpp>
+#include <asio/post.hpp>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <mutex>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "docs/examples/own_transport/socket_carrier.hpp"
+#include "firmware/ports/sim/simulated_board.hpp"
+#include "host/board_loop.hpp"
+#include "r4link/board.hpp"
+#include "tests/support/at_will.hpp"
+#include "transports/file_descriptor.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+// A simulated board behind the other end of a socket.
+class BoardBehindASocket {
+ public:
+  BoardBehindASocket() {
+    int ends[2];
+    EXPECT_EQ(0, ::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends));
+    here_.reset(ends[0]);
+    there_.reset(ends[1]);
+    board_ = std::make_unique<sim::SimulatedBoard>(io_, sim::SimulatedBoard::Options());
+    board_->add_carrier(std::make_unique<SocketCarrier>(loop_, there_.get()));
+    board_->start();
+    thread_ = std::thread([this] { io_.run(); });
+  }
+  ~BoardBehindASocket() { switch_off(); }
+  BoardBehindASocket(const BoardBehindASocket&) = delete;
+  BoardBehindASocket& operator=(const BoardBehindASocket&) = delete;
+
+  CarrierMaker host_end() {
+    return [this](Loop& loop) { return std::make_unique<SocketCarrier>(loop, here_.get()); };
+  }
+  void switch_off() {
+    if (!thread_.joinable()) return;
+    asio::post(io_, [this] {
+      board_.reset();
+      work_.reset();
+    });
+    thread_.join();
+  }
+
+ private:
+  FileDescriptor here_;
+  FileDescriptor there_;
+  asio::io_context io_;
+  asio::executor_work_guard<asio::io_context::executor_type> work_ = asio::make_work_guard(io_);
+  BoardLoop loop_{io_};
+  std::unique_ptr<sim::SimulatedBoard> board_;
+  std::thread thread_;
+};
+
+TEST(OwnTransport, CarriesABoardThatIsDrivenAndStopped) {
+  BoardBehindASocket simulated;
+  Board board(simulated.host_end(), at_will());
+  board.wait_active();
+  EXPECT_EQ(board.name(), "radio");
+  EXPECT_NO_THROW(board.send("O:358,1,1"));
+  EXPECT_NO_THROW(board.stop());
+}
+
+TEST(OwnTransport, SaysThatItIsDownWhenTheOtherEndIsClosed) {
+  BoardBehindASocket simulated;
+  std::mutex mutex;
+  std::vector<std::string> reasons;
+  BoardCallbacks callbacks;
+  callbacks.on_event = [&](const CarrierEvent& event) {
+    const std::lock_guard lock(mutex);
+    if (event.kind == CarrierEvent::Kind::down) reasons.push_back(event.problem.reason);
+  };
+  Board board(simulated.host_end(), at_will(), callbacks);
+  board.wait_active();
+  simulated.switch_off();
+  const auto end = std::chrono::steady_clock::now() + 5s;
+  const auto told = [&] {
+    const std::lock_guard lock(mutex);
+    return reasons == std::vector<std::string>{"the other end was closed"};
+  };
+  while (!told() && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+  EXPECT_TRUE(told());
+}
+
+TEST(OwnTransport, IsShownInTheDocumentationAsItIsTested) {
+  const auto text_of = [](const char* path) {
+    const std::filesystem::path root =
+        std::filesystem::path(__FILE__).parent_path().parent_path().parent_path();
+    std::ostringstream text;
+    text << std::ifstream(root / path).rdbuf();
+    return text.str();
+  };
+  const std::string code = text_of("docs/examples/own_transport/socket_carrier.hpp");
+  ASSERT_FALSE(code.empty());
+  EXPECT_NE(text_of("docs/transports.md").find("```cpp\n" + code + "```\n"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace r4::test
