@@ -30,7 +30,12 @@ class PathClock {
   std::int32_t ahead(std::uint32_t t_ms, Time at) const {
     return static_cast<std::int32_t>(t_ms - (board_ms_ + (to_ms(at) - at_ms_)));
   }
-  // May the board have shown `t_ms` between `since` and `now`, if it may be this much late?
+  // May the board show `t_ms` at that time, if it may be this much late?
+  bool fits(std::uint32_t t_ms, Time now, std::int32_t late_ms) const {
+    const std::int32_t off = ahead(t_ms, now);
+    return off >= -late_ms && off <= tolerance_ms;
+  }
+  // The same between `since` and `now`.
   bool fits(std::uint32_t t_ms, Time since, Time now, std::int32_t late_ms) const {
     return ahead(t_ms, since) >= -late_ms && ahead(t_ms, now) <= tolerance_ms;
   }
@@ -74,6 +79,7 @@ struct Path {
   std::uint32_t boot = 0;
   PathClock clock;
   Time heard{0};
+  Time heard_until{0};  // silent from then on
   PathQuestions questions;
   PathBusy busy;
   std::string board_id;

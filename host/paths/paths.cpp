@@ -32,7 +32,7 @@ void Paths::on_transport(std::size_t index, bool up, bool can_ask, Time now) {
   path.questions.answered = false;
   path.questions.unanswered = 0;
   path.clock.forget();
-  path.heard = path.busy.until = Time{0};
+  path.heard = path.heard_until = path.busy.until = Time{0};
   path.questions.ask_at = path.known || !up ? Time::max() : now;
   if (path.known && first_answer_.count() == 0) first_answer_ = now;
   anew_ = anew_ || all_down();
@@ -51,7 +51,7 @@ void Paths::on_sleep(Time now) {
     Path& path = paths_[i];
     path.clock.forget();
     path.connecting = false;
-    path.heard = path.busy.until = Time{0};
+    path.heard = path.heard_until = path.busy.until = Time{0};
     path.questions.open = IdentityQuestion{Time{0}};
     if (path.up && path.can_ask && (path.questions.answered || !path.known))
       path.questions.ask_at = now;
@@ -159,7 +159,7 @@ Time Paths::next(Time now) const {
   for (const Path& path : paths_) {
     if (path.up && path.can_ask)
       next = std::min(next, std::max(path.questions.ask_at, now + Time{1000}));
-    if (is_heard(path, now)) next = std::min(next, heard_until(path));
+    if (is_heard(path, now)) next = std::min(next, path.heard_until);
   }
   const Time begins = first_answer_ + patience;
   if (!begun_ && known() != 0 && begins > now) next = std::min(next, begins);
@@ -171,7 +171,7 @@ Time Paths::next(Time now) const {
 bool Paths::in_clock(const Path& path, std::uint32_t t_ms, Time now) {
   const std::int32_t late =
       path.connecting ? PathClock::restart_tolerance_ms : PathClock::tolerance_ms;
-  return path.clock.known() && path.clock.fits(t_ms, now, now, late);
+  return path.clock.known() && path.clock.fits(t_ms, now, late);
 }
 
 // Before the link knows the board's clock, only the other paths do: of them one may have answered before a restart.
@@ -188,7 +188,7 @@ bool Paths::fits(const Path& path, std::uint32_t t_ms, Time now) const {
   if (!begun_) return fits_others(path, t_ms, now);
   const std::int32_t late =
       path.connecting ? PathClock::restart_tolerance_ms : PathClock::tolerance_ms;
-  return !clock_.known() || clock_.fits(t_ms, now, now, late);
+  return !clock_.known() || clock_.fits(t_ms, now, late);
 }
 
 void Paths::set_clock(std::size_t index, std::uint32_t t_ms, Time now) {
@@ -197,6 +197,12 @@ void Paths::set_clock(std::size_t index, std::uint32_t t_ms, Time now) {
   if (path.boot == boot_) return;
   path.boot = boot_;
   news_.restart(index);
+}
+
+// In whole milliseconds, in which the link counts, so that both fall silent at once (HostLink::poll()).
+void Paths::hear(Path& path, Time now) const {
+  path.heard = now;
+  path.heard_until = std::chrono::floor<std::chrono::milliseconds>(now) + timeout_;
 }
 
 void Paths::begin_boot(std::uint32_t t_ms, Time now) {
@@ -246,7 +252,7 @@ Paths::Admission Paths::admit(std::size_t index, std::uint32_t pnum, std::uint32
   anew_ = false;
   path.connecting = false;
   set_clock(index, t_ms, now);
-  path.heard = now;
+  hear(path, now);
   news_.on_number(index, pnum);
   return begun_ ? admission : Admission::no;
 }
@@ -256,7 +262,7 @@ Paths::Admission Paths::admit(std::size_t index, std::uint32_t pnum, std::uint32
 bool Paths::admit_connecting(std::size_t index, Time now) {
   Path& path = paths_[index];
   if (!path.known) return false;
-  path.heard = now;
+  hear(path, now);
   if (!path.connecting) {
     path.connecting = true;
     news_.restart(index);
@@ -287,7 +293,7 @@ bool Paths::admit_answer(std::size_t index, std::uint32_t pnum, std::uint32_t t_
       return false;
     }
   }
-  path.heard = now;
+  hear(path, now);
   if (counts) news_.on_answer(index, pnum);
   return begun_;
 }

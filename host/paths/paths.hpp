@@ -132,13 +132,8 @@ class Paths {
 
   bool is_only(const Path& path) const { return paths_.size() == 1 && &path == paths_.data(); }
   PathSet known() const;
-  // Until when, in the whole milliseconds in which the link counts (HostLink::poll()).
-  Time heard_until(const Path& path) const {
-    return std::chrono::floor<std::chrono::milliseconds>(path.heard) + timeout_;
-  }
-  bool is_heard(const Path& path, Time now) const {
-    return path.known && path.heard.count() != 0 && now < heard_until(path);
-  }
+  static bool is_heard(const Path& path, Time now) { return path.known && now < path.heard_until; }
+  void hear(Path& path, Time now) const;
   static bool is_believed(const Path& path) {
     return !path.can_ask || (path.known && (!path.questions.answered ||
                                             path.questions.unanswered >= most_unanswered));
