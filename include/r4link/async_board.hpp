@@ -243,7 +243,8 @@ class AsyncBoard {
 
   // Any number of callbacks of each kind, called in the order in which they were added; the handle ends
   // one (subscription.hpp). Of the states that came while the event loop was held up for more than
-  // 50 ms, on_state is told the newest alone.
+  // 50 ms, on_state is told the newest alone. on_nack is told each refusal of a command once, and
+  // not that a repeated command was a duplicate.
   Subscription on_state(std::function<void(const ReceivedState&, const Datagram&)> callback);
   Subscription on_board_heartbeat(std::function<void(const Datagram&)> callback);
   Subscription on_nack(std::function<void(const Nack&, const Datagram&)> callback);
@@ -252,7 +253,7 @@ class AsyncBoard {
   // of the controlling host, stops of any. Dots stand for a key or a password.
   Subscription on_overheard(std::function<void(std::string_view)> callback);
   Subscription on_link(std::function<void(const LinkStatus&)> callback);
-  // One of several wires has begun to carry, or ceased to. A transport that tells that it is gone is told of at
+  // A wire has begun to carry, or ceased to. A transport that tells that it is gone is told of at
   // once, any other after SessionOptions::timing's timeout.
   Subscription on_wire(std::function<void(const Wire&)> callback);
   // The transport, and a warning where the event loop was held up for so long that heartbeats were late.

@@ -340,7 +340,7 @@ class R4LINK_API Board {
   Subscription on_state(std::function<void(const ReceivedState&)> callback);
   Subscription on_link(std::function<void(const LinkStatus&)> callback);
   Subscription on_event(std::function<void(const CarrierEvent&)> callback);
-  // One of several wires has begun to carry, or ceased to.
+  // A wire has begun to carry, or ceased to.
   Subscription on_wire(std::function<void(const Wire&)> callback);
   // The board has begun again, or this computer slept for longer than the board waits for its host:
   // what it was told is gone, thresholds of U too. Comes before its new state.

@@ -49,8 +49,7 @@ enum class LeaseTrouble : std::uint8_t {
 // "none", "full", "unknown".
 R4LINK_API const char* to_text(LeaseTrouble trouble);
 
-// How one of several wires to the same board is (docs/redundancy.md). Of one wire, asking and other_board do not
-// occur.
+// How one of the wires to a board is (docs/redundancy.md). The only wire of a board is never asking or other_board.
 enum class WireState : std::uint8_t {
   down,         // its transport is gone, or could not be opened yet
   asking,       // it is up, and the board there has not said yet who it is
@@ -72,7 +71,7 @@ struct LinkStatus {
   bool in_control = false;  // the board takes our commands: they go out at once
   bool transport_down =
       false;  // it is gone: unplugged, its interface switched off. Of several: all are
-  std::uint8_t carrying = 0;  // of several wires those that carry: bit 0 is the first
+  std::uint8_t carrying = 0;  // the wires that carry: bit 0 is the first
   bool two_boards = false;    // a wire leads to another board than the rest
   ChipFault chip{};           // of a fault: the chip that is the cause, if it is one
   bool gated() const { return gate != Gate::open; }
@@ -215,9 +214,8 @@ struct Statistics {
   std::uint64_t received = 0;  // valid ones
   std::uint64_t states = 0;
   std::uint64_t damaged = 0;  // bad checksum, syntax or length
-  std::uint64_t copies =
-      0;  // of several wires: what another wire had brought before; not among `received`
-  // lost, duplicate, late. Of several wires: lost is what none of them brought, a duplicate what another had brought
+  std::uint64_t copies = 0;   // what had been brought before; not among `received`
+  // lost, duplicate, late: lost is what no wire has brought, a duplicate what one had brought
   // before. `restarts` are those of the board, as its clock tells them: a sleep of this computer
   // that is longer than the board's timeout counts as one.
   PacketCounters packets;
@@ -250,7 +248,7 @@ struct Wire {
   std::string name;  // of its transport, for people
   WireState state = WireState::down;
   bool busy = false;         // the board there answers that another host controls it
-  std::string board_id;      // of several wires: who answered there last
+  std::string board_id;      // the board that answered there last
   PacketCounters packets;    // of the board's datagrams on this wire; `restarts`: of their numbers
   std::uint64_t copies = 0;  // of them, what another wire had brought before
   double round_trip_us = 0;  // question to answer, the newest; 0: none yet

@@ -45,7 +45,7 @@ class LinkStatus(_Record):
         """Of several wires: all are."""
     @property
     def carrying(self) -> tuple[int, ...]:
-        """Of several wires those that carry, from 0."""
+        """The wires that carry, from 0."""
     @property
     def two_boards(self) -> bool:
         """A wire leads to another board than the rest."""
@@ -63,7 +63,7 @@ class Wire(_Record):
     def busy(self) -> bool: ...
     @property
     def board_id(self) -> str:
-        """Of several wires: who answered there last."""
+        """The board that answered there last."""
     @property
     def received(self) -> int: ...
     @property

@@ -269,7 +269,7 @@ class Board:
         return self._core.on_link(callback)
 
     def on_wire(self, callback: Callable[[Wire], object]) -> Subscription:
-        """One of several wires has begun to carry, or ceased to."""
+        """A wire has begun to carry, or ceased to."""
         return self._core.on_wire(callback)
 
     def on_event(self, callback: Callable[[Event], object]) -> Subscription:
